@@ -1,0 +1,29 @@
+/* Which kernel units were built, which of them this CPU can run, and their tables. */
+#ifndef TL_DISPATCH_H
+#define TL_DISPATCH_H
+
+#include "topleft.h"
+
+/* From the plainest to the widest: the last one that is available is the one to take. */
+enum { TL_ISA_SCALAR, TL_ISA_AVX2, TL_ISA_AVX512, TL_N_ISA };
+
+/* The name of an instruction set, NULL outside [0, TL_N_ISA). */
+const char *tl_isa_name(int i_isa);
+
+/* 1 when the unit is in this binary. */
+int tl_isa_built(int i_isa);
+
+/* 1 when the unit is in this binary and the CPU and the operating system support it. */
+int tl_isa_available(int i_isa);
+
+/* The compiler flags of a unit, "" when it was not built. */
+const char *tl_isa_flags(int i_isa);
+
+/* The kernels of an available instruction set, NULL for any other name. */
+const tl_kernels *tl_kernels_for(const char *name);
+
+/* What compiled this binary, for example "gcc 12.2.0", and the version it was compiled as. */
+const char *tl_compiler(void);
+const char *tl_version(void);
+
+#endif

@@ -1,0 +1,23 @@
+/* The kernel table of one instruction set: every stage, compiled together, with nothing visible but the table.
+ * isa_*.c name the set (TL_ISA_NAME) and the table (TL_KERNELS) and include this file. */
+#include "topleft.h"
+
+#include "snap.c"
+#include "clip.c"
+#include "setup.c"
+#include "sink.c"
+#include "raster.c"
+#include "resolve.c"
+
+const tl_kernels TL_KERNELS = {
+    .isa = TL_ISA_NAME,
+    .snap = snap,
+    .transform_f32 = transform_f32,
+    .transform_f64 = transform_f64,
+    .project = project,
+    .clip = clip,
+    .first_bad = first_bad,
+    .draw = draw,
+    .barycentric = barycentric,
+    .interpolate = interpolate,
+};

@@ -1,0 +1,140 @@
+/* Resolve: attributes from a visibility buffer, once per visible pixel.
+ * In: triangle ids and the vertex records they were drawn from.  Out: barycentric weights or interpolated values. */
+#include "fixed.h"
+
+/* The triangle (or piece) under the last pixel: neighbours mostly share it. */
+typedef struct {
+    int64_t id;             /* -1: none yet */
+    tl_triangle triangle;
+    const double *piece[3]; /* weights of a piece's corners in the source triangle, or NULL */
+    double inv_w[3];
+    int slot[3];            /* which of the input triangle's corners each turned corner is */
+} resolve_state;
+
+static inline int covers(const tl_triangle *t, int64_t x_px, int64_t y_px, int bits)
+{
+    for (int k = 0; k < 3; k++) {
+        const int next = k == 2 ? 0 : k + 1;
+        const tl_int128 dy = (tl_int128)t->y_fx[next] - t->y_fx[k], dx = (tl_int128)t->x_fx[next] - t->x_fx[k];
+        const int top_left = dy < 0 || (dy == 0 && dx > 0);
+        if (doubled_edge(t, k, next, x_px, y_px, bits) - !top_left < 0)
+            return 0;
+    }
+    return 1;
+}
+
+static int load_resolved(resolve_state *s, const tl_vertex_set *set, const int32_t *corners)
+{
+    if (load_triangle(set, corners, &s->triangle) == 0)
+        return 0;
+    for (int k = 0; k < 3; k++) {
+        s->slot[k] = k;
+        s->inv_w[k] = set->inv_w ? set->inv_w[s->triangle.corner[k]] : 1.0;
+    }
+    if (s->triangle.corner[1] != corners[1])
+        s->slot[1] = 2, s->slot[2] = 1;
+    return 1;
+}
+
+/* First piece of a triangle, by bisection in the ascending sources. */
+static int64_t first_piece(const tl_pieces *p, int64_t id)
+{
+    int64_t low = 0, high = p->n_pieces;
+    while (low < high) {
+        const int64_t middle = low + (high - low) / 2;
+        if (p->source[middle] < id)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low;
+}
+
+/* Makes `s` describe the triangle or piece that shows at the pixel; 0 when the buffer does not belong to the scene. */
+static int find_triangle(resolve_state *s, const tl_scene *scene, int64_t id, int64_t x_px, int64_t y_px, int bits)
+{
+    if (id == s->id && !s->piece[0])
+        return 1;
+    s->id = -1;
+    if (id < 0 || id >= scene->n_triangles)
+        return 0;
+    const int32_t *corners = scene->triangles + 3 * id;
+    for (int k = 0; k < 3; k++)
+        if (corners[k] < 0 || corners[k] >= scene->mesh.n_vertices) /* the caller's array may have changed */
+            return 0;
+    if (!is_clipped(&scene->mesh, corners)) {
+        s->piece[0] = NULL;
+        if (!load_resolved(s, &scene->mesh, corners))
+            return 0;
+        s->id = id;
+        return 1;
+    }
+    if (!scene->pieces)
+        return 0;
+    const tl_pieces *p = scene->pieces;
+    const tl_vertex_set cut = piece_set(p);
+    for (int64_t i = first_piece(p, id); i < p->n_pieces && p->source[i] == id; i++) {
+        if (!load_resolved(s, &cut, p->triangles + 3 * i) || !covers(&s->triangle, x_px, y_px, bits))
+            continue;
+        for (int k = 0; k < 3; k++)
+            s->piece[k] = p->weights + 3 * (int64_t)s->triangle.corner[k];
+        s->id = id;
+        return 1;
+    }
+    return 0;
+}
+
+/* Perspective-correct weights of the input triangle's corners at a pixel: exact edge functions times 1/w, normalised. */
+static void weights_of_pixel(const resolve_state *s, int64_t x_px, int64_t y_px, int bits, double *weights)
+{
+    double part[3], sum = 0.0;
+    for (int k = 0; k < 3; k++) {
+        const int a = k == 2 ? 0 : k + 1, b = 3 - k - a;
+        part[k] = (double)doubled_edge(&s->triangle, a, b, x_px, y_px, bits) * s->inv_w[k];
+        sum += part[k];
+    }
+    weights[0] = weights[1] = weights[2] = 0.0;
+    for (int k = 0; k < 3; k++) {
+        if (s->piece[0])
+            for (int j = 0; j < 3; j++)
+                weights[j] += part[k] / sum * s->piece[k][j];
+        else
+            weights[s->slot[k]] = part[k] / sum;
+    }
+}
+
+static void barycentric(const tl_scene *scene, const tl_window *window, const int32_t *ids, float *restrict out)
+{
+    resolve_state s = {.id = -1};
+    for (int64_t row = 0; row < window->height; row++)
+        for (int64_t col = 0; col < window->width; col++, ids++, out += 3) {
+            double w[3] = {0.0, 0.0, 0.0};
+            const int64_t x_px = col + window->x_px, y_px = row + window->y_px;
+            if (*ids >= 0 && find_triangle(&s, scene, *ids, x_px, y_px, window->subpixel_bits))
+                weights_of_pixel(&s, x_px, y_px, window->subpixel_bits, w);
+            for (int k = 0; k < 3; k++)
+                out[k] = (float)w[k];
+        }
+}
+
+static void interpolate(const tl_scene *scene, const tl_window *window, const int32_t *ids, const float *values, int n_values,
+                        int per_corner, float background, float *restrict out)
+{
+    resolve_state s = {.id = -1};
+    for (int64_t row = 0; row < window->height; row++)
+        for (int64_t col = 0; col < window->width; col++, ids++, out += n_values) {
+            const int64_t x_px = col + window->x_px, y_px = row + window->y_px;
+            if (*ids < 0 || !find_triangle(&s, scene, *ids, x_px, y_px, window->subpixel_bits)) {
+                for (int c = 0; c < n_values; c++)
+                    out[c] = background;
+                continue;
+            }
+            double w[3];
+            const float *v[3];
+            weights_of_pixel(&s, x_px, y_px, window->subpixel_bits, w);
+            for (int k = 0; k < 3; k++)
+                v[k] = values + n_values * (per_corner ? 3 * (int64_t)*ids + k : scene->triangles[3 * (int64_t)*ids + k]);
+            for (int c = 0; c < n_values; c++)
+                out[c] = (float)(w[0] * v[0][c] + w[1] * v[1][c] + w[2] * v[2][c]);
+        }
+}

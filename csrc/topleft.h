@@ -1,0 +1,147 @@
+/* The contract between the kernels and their callers: types with units, status codes, the kernel table.
+ *
+ * A kernel allocates nothing, touches no Python object and keeps no state; every buffer is the caller's.
+ * Names carry their space: _px pixels (y down, centres at +0.5), _fx fixed point, _clip homogeneous clip space.
+ */
+#ifndef TOPLEFT_H
+#define TOPLEFT_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+/* ---- vertices ------------------------------------------------------------------------------------------ */
+
+/* A snapped vertex, 16 bytes: one vector load.  x_fx = TL_SPECIAL marks a vertex that the 64-bit path cannot
+ * take; y_fx then holds the reason, a tl_special. */
+typedef struct {
+    int32_t x_fx, y_fx; /* |.| < 2^30 */
+    double z;           /* depth; 0 when the scene has none */
+} tl_vertex;
+
+#define TL_SPECIAL INT32_MIN
+
+typedef enum {
+    TL_BAD = 0,     /* not finite, or |x_fx| >= 2^62, or a depth outside float32 */
+    TL_WIDE = 1,    /* 2^30 <= |x_fx| < 2^62: the coordinates stand in the table of wide vertices */
+    TL_CLIPPED = 2, /* outside a clip plane: triangles that use it are drawn as pieces */
+} tl_special;
+
+typedef struct {
+    int64_t x_fx, y_fx; /* |.| < 2^62 */
+} tl_wide;
+
+typedef struct {
+    const tl_vertex *vertices;
+    const tl_wide *wide; /* a row per vertex, or NULL when no vertex is wide */
+    const double *inv_w; /* 1/w per vertex, or NULL: all equal (pixel space) */
+    int64_t n_vertices;
+} tl_vertex_set;
+
+typedef enum { TL_F32 = 0, TL_F64 = 1, TL_I64 = 2 } tl_scalar;
+
+/* How many vertices of each special kind a vertex stage has seen, used by a triangle or not. */
+typedef struct {
+    int64_t n_bad, n_wide, n_clipped;
+} tl_vertex_counts;
+
+/* ---- clip space ---------------------------------------------------------------------------------------- */
+
+typedef struct {
+    double half_width_px, half_height_px; /* half of the whole picture, which [-1, 1] maps to */
+    double guard_band_x, guard_band_y;    /* largest |x/w| and |y/w|: 2^60 sub-pixels from the middle of the picture */
+    int subpixel_bits;                    /* 0 to 16 */
+    int zero_to_one;                      /* depth range of clip space: [0, w] instead of [-w, w] */
+    int near_clip, far_clip;
+} tl_view;
+
+/* What is left of the triangles that a clip plane cuts: fans of triangles over their own vertices, in order of
+ * their source triangle. */
+typedef struct {
+    tl_vertex *vertices;  /* (n_vertices,) */
+    tl_wide *wide;        /* (n_vertices,) */
+    double *inv_w;        /* (n_vertices,) */
+    double *weights;      /* (n_vertices, 3): barycentrics in the source triangle */
+    int32_t *triangles;   /* (n_pieces, 3) into `vertices` */
+    int32_t *source;      /* (n_pieces,) index of the input triangle, ascending */
+    int64_t n_vertices, n_pieces;
+} tl_pieces;
+
+/* ---- drawing ------------------------------------------------------------------------------------------- */
+
+/* The part of the picture that a buffer shows, in whole pixels. */
+typedef struct {
+    int64_t x_px, y_px; /* picture pixel of column 0, row 0 */
+    int64_t width, height;
+    int subpixel_bits;
+} tl_window;
+
+typedef enum { TL_CULL_NONE = 0, TL_CULL_BACK = 1, TL_CULL_FRONT = 2 } tl_cull;
+typedef enum { TL_METHOD_AUTO = 0, TL_METHOD_EDGE = 1, TL_METHOD_SCANLINE = 2 } tl_method;
+
+/* What happens to a covered span. */
+typedef enum {
+    TL_SINK_MASK = 0,    /* uint8 = 1 */
+    TL_SINK_COUNT = 1,   /* int32 += 1 */
+    TL_SINK_ID = 2,      /* int32 = id, float = depth, painter's order */
+    TL_SINK_NEAREST = 3, /* the same where depth < what is there */
+    TL_SINK_FARTHEST = 4,
+    TL_SINK_FLAT = 5,        /* bytes of the triangle's colour */
+    TL_SINK_GOURAUD_U8 = 6,  /* interpolated vertex colours, rounded to nearest even */
+    TL_SINK_GOURAUD_F32 = 7,
+} tl_sink;
+
+typedef struct {
+    tl_sink sink;
+    void *pixels;         /* mask, counts, ids or colours; rows of stride_px pixels */
+    float *depth;         /* TL_SINK_ID, NEAREST, FARTHEST; the same stride */
+    int64_t stride_px;
+    const void *colors;   /* (T, C) for FLAT, (V, C) for GOURAUD; of the picture's type */
+    int n_channels;       /* 1 to 4 */
+    int pixel_bytes;      /* FLAT: n_channels times the size of a channel */
+} tl_target;
+
+typedef struct {
+    tl_vertex_set mesh;
+    const int32_t *triangles; /* (n_triangles, 3), every index in [0, n_vertices) */
+    int64_t n_triangles;
+    const tl_pieces *pieces;  /* of triangles with TL_CLIPPED vertices, or NULL */
+    tl_cull cull;
+    tl_method method;
+} tl_scene;
+
+/* ---- the kernel table ---------------------------------------------------------------------------------- */
+
+typedef struct tl_kernels {
+    const char *isa;
+
+    /* (n, n_components) pixels to snapped vertices.  z is read when with_depth and n_components = 3.
+     * `wide` may be NULL: wide vertices are then counted, and the caller comes again with a table. */
+    tl_vertex_counts (*snap)(const void *vertices_px, tl_scalar scalar, int n_components, int64_t n, int subpixel_bits,
+                             int with_depth, tl_vertex *out, tl_wide *wide);
+
+    /* (n, 3) object space to (n, 4) clip space; row-major 4x4.  float32 in float32, float64 in float64. */
+    void (*transform_f32)(const float *vertices, int64_t n, const float *matrix, double *vertices_clip);
+    void (*transform_f64)(const double *vertices, int64_t n, const double *matrix, double *vertices_clip);
+
+    /* (n, 4) clip space to snapped vertices and 1/w; `wide` as above. */
+    tl_vertex_counts (*project)(const double *vertices_clip, int64_t n, const tl_view *view, tl_vertex *out, tl_wide *wide,
+                                double *inv_w);
+
+    /* Cuts the triangles that have TL_CLIPPED vertices.  With pieces->vertices NULL only counts. */
+    void (*clip)(const double *vertices_clip, const tl_vertex *vertices, const int32_t *triangles, int64_t n_triangles,
+                 const tl_view *view, tl_pieces *pieces);
+
+    /* Lowest index of a TL_BAD vertex that a triangle uses, -1 if there is none. */
+    int64_t (*first_bad)(const tl_vertex *vertices, const int32_t *triangles, int64_t n_triangles);
+
+    void (*draw)(const tl_scene *scene, const tl_window *window, const tl_target *target);
+
+    /* Per pixel of `ids` (rows of window->width): float32 weights of the triangle's three vertices. */
+    void (*barycentric)(const tl_scene *scene, const tl_window *window, const int32_t *ids, float *out);
+
+    /* The same, applied to float32 values (n_vertices, n_values), or (n_triangles, 3, n_values) per corner. */
+    void (*interpolate)(const tl_scene *scene, const tl_window *window, const int32_t *ids, const float *values, int n_values,
+                        int per_corner, float background, float *out);
+} tl_kernels;
+
+#endif

@@ -1,0 +1,229 @@
+"""Build `topleft._engine`: one Cython unit, one dispatcher and one kernel unit per instruction set.
+
+Everything that is not about compiling stands in `pyproject.toml`. setuptools gives all sources of an extension the same
+flags, so `BuildEngine` compiles each unit by itself and links the objects.
+
+Environment:
+
+TOPLEFT_BUILD_ISA   comma list of the instruction sets to build, scalar always among them; an error when it cannot be
+TOPLEFT_WERROR      "1" turns warnings into errors
+"""
+
+import hashlib
+import os
+import subprocess
+import tempfile
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+from setuptools import Extension, setup
+from setuptools.command.build_ext import build_ext
+from setuptools.errors import CompileError, PlatformError
+
+ROOT = Path(__file__).resolve().parent
+
+WARNINGS = ["-Wall", "-Wextra"]
+# -ffp-contract=off and -fno-fast-math stand after whatever CFLAGS holds: the same bits on every machine depend on them.
+# Link-time optimisation could move code between units of different instruction sets.
+FLAGS_C = [
+    "-std=c11", "-O3", "-ffp-contract=off", "-fno-fast-math", "-fno-math-errno", "-fvisibility=hidden", "-fno-lto",
+]  # fmt: skip
+# Cython's output is not ours to clean: it has the usual harmless findings of generated code.
+FLAGS_CYTHON = [
+    "-O2", "-fvisibility=hidden", "-fno-lto",
+    "-Wno-unused-function", "-Wno-unused-parameter", "-Wno-missing-field-initializers", "-Wno-cast-function-type",
+]  # fmt: skip
+FLAGS_AVX2 = ["-mavx2", "-mfma", "-mbmi", "-mbmi2", "-mlzcnt", "-mpopcnt"]
+FLAGS_AVX512 = [
+    *FLAGS_AVX2,
+    *("-mavx512f", "-mavx512bw", "-mavx512dq", "-mavx512vl", "-mavx512cd", "-mprefer-vector-width=512"),
+]
+
+# What a compiler has to accept before a unit is built. Scalar: 128-bit integers, no excess precision.
+PROBE_SCALAR = """
+#include <float.h>
+#if FLT_EVAL_METHOD != 0
+#error "floating point has excess precision"
+#endif
+unsigned __int128 probe(unsigned long long a) { return (unsigned __int128)a * a; }
+"""
+PROBE_AVX2 = """
+#include <immintrin.h>
+#if !defined(__x86_64__)
+#error "not x86-64"
+#endif
+int probe(__m256i a) { return (int)_lzcnt_u32((unsigned)_mm256_movemask_epi8(_mm256_abs_epi32(a))); }
+"""
+PROBE_AVX512 = """
+#include <immintrin.h>
+#if !defined(__x86_64__)
+#error "not x86-64"
+#endif
+__m512i probe(__m512i a, __mmask64 m) { return _mm512_mask_mullo_epi64(_mm512_lzcnt_epi32(a), (__mmask8)m, a, a); }
+"""
+
+
+@dataclass(frozen=True)
+class Isa:
+    """One kernel unit: `csrc/isa_<name>.c`, its flags, and a file that tells whether the compiler can build it."""
+
+    name: str
+    flags: list[str]
+    probe: str
+
+
+ISAS = [Isa("scalar", [], PROBE_SCALAR), Isa("avx2", FLAGS_AVX2, PROBE_AVX2), Isa("avx512", FLAGS_AVX512, PROBE_AVX512)]
+
+
+def wanted_isas() -> set[str] | None:
+    """Return the instruction sets named by TOPLEFT_BUILD_ISA, None when the compiler shall decide."""
+    text = os.environ.get("TOPLEFT_BUILD_ISA", "").strip()
+    if not text:
+        return None
+    names = {name.strip() for name in text.split(",") if name.strip()}
+    known = [isa.name for isa in ISAS]
+    if unknown := sorted(names - set(known)):
+        raise PlatformError(f"TOPLEFT_BUILD_ISA must list some of {', '.join(known)}, got {', '.join(unknown)}")
+    return names | {"scalar"}
+
+
+def digest(*parts: object) -> str:
+    """Return a hash of values and of the contents of files."""
+    result = hashlib.sha256()
+    for part in parts:
+        data = part.name.encode() + b"\0" + part.read_bytes() if isinstance(part, Path) else repr(part).encode()
+        result.update(len(data).to_bytes(8, "little") + data)
+    return result.hexdigest()
+
+
+def files_in(folder: str, *suffixes: str) -> list[Path]:
+    """Return the files of a folder that end in one of the suffixes, sorted."""
+    return sorted(path for path in (ROOT / folder).iterdir() if path.suffix in suffixes)
+
+
+def make_once(target: Path, key: str, make) -> None:
+    """Call `make` unless `target` was made from the same key before. Contents decide, not time stamps.
+
+    `make` works in a folder of its own and moves the result here, so that two builds at a time never see half a file.
+    """
+    stamp = target.with_name(target.name + ".key")
+    if target.exists() and stamp.exists() and stamp.read_text() == key:
+        return
+    stamp.unlink(missing_ok=True)
+    make()
+    stamp.write_text(key)
+
+
+class BuildEngine(build_ext):
+    """Compile each unit with its own flags, rebuild what changed, link."""
+
+    def build_extension(self, ext: Extension) -> None:
+        if self.compiler.compiler_type == "msvc":
+            raise PlatformError("topleft needs gcc or clang: it uses 128-bit integers, which MSVC does not have")
+        self.temp = Path(self.build_temp).resolve() / "topleft"
+        self.temp.mkdir(parents=True, exist_ok=True)
+        compiler = self.compiler.compiler_so
+        try:
+            version = subprocess.run([compiler[0], "--version"], capture_output=True, check=False).stdout
+        except OSError as error:
+            raise CompileError(f"topleft needs gcc or clang, and cannot run {compiler[0]!r}: {error}") from error
+        self.identity = (compiler, version, self.include_dirs)
+
+        warnings = [*WARNINGS, *(["-Werror"] if os.environ.get("TOPLEFT_WERROR") == "1" else [])]
+        isas = self.isas_to_build()
+        flags = {isa.name: FLAGS_C + isa.flags for isa in isas}
+        macros = [("TL_VERSION", quoted(self.distribution.get_version()))]
+        for name, unit_flags in flags.items():
+            # Paths say where a machine keeps things, not how the code was compiled.
+            told = [flag for flag in [*compiler[1:], *unit_flags] if "/" not in flag]
+            macros += [(f"TL_HAVE_{name.upper()}", "1"), (f"TL_FLAGS_{name.upper()}", quoted(" ".join(told)))]
+
+        units = [(ROOT / f"csrc/isa_{name}.c", unit_flags, []) for name, unit_flags in flags.items()]
+        units.append((ROOT / "csrc/dispatch.c", FLAGS_C, macros))
+        units.append((self.cython(ROOT / ext.sources[0]), FLAGS_CYTHON, []))
+        with ThreadPoolExecutor(self.parallel or os.cpu_count()) as pool:
+            jobs = [pool.submit(self.compile_unit, source, [*warnings, *own], define) for source, own, define in units]
+            objects = [str(job.result()) for job in jobs]
+        self.compiler.link_shared_object(
+            objects,
+            self.get_ext_fullpath(ext.name),
+            libraries=[*self.get_libraries(ext), "m"],
+            library_dirs=ext.library_dirs,
+            runtime_library_dirs=ext.runtime_library_dirs,
+            export_symbols=self.get_export_symbols(ext),
+            debug=self.debug,
+            build_temp=str(self.temp),
+            target_lang="c",
+        )
+
+    def isas_to_build(self) -> list[Isa]:
+        """Return the kernel units to build: those asked for, or all that the compiler can build."""
+        wanted = wanted_isas()
+        chosen = []
+        for isa in ISAS:
+            if wanted is not None and isa.name not in wanted:
+                continue
+            if self.accepts(FLAGS_C + isa.flags, isa.probe):
+                chosen.append(isa)
+            elif isa.name == "scalar":
+                raise CompileError("topleft needs gcc or clang for a 64-bit machine: C11 with 128-bit integers")
+            elif wanted is not None:
+                raise CompileError(f"TOPLEFT_BUILD_ISA asks for {isa.name}, which this compiler cannot build")
+            else:
+                self.announce(f"topleft: no {isa.name} unit, this compiler cannot build it", 3)
+        return chosen
+
+    def accepts(self, flags: list[str], text: str) -> bool:
+        """Whether the compiler takes the flags and compiles the text."""
+        with tempfile.TemporaryDirectory() as folder:
+            source = Path(folder, "probe.c")
+            source.write_text(text)
+            command = [*self.compiler.compiler_so, *flags, "-c", str(source), "-o", str(source.with_suffix(".o"))]
+            return subprocess.run(command, capture_output=True, check=False).returncode == 0
+
+    def cython(self, source: Path) -> Path:
+        """Return the C file made from a .pyx file, in the build folder: the source tree stays as it is."""
+        import Cython
+        from Cython.Compiler.Main import CompilationOptions, compile_single
+
+        target = self.temp / (source.stem + ".c")
+
+        def make() -> None:
+            with tempfile.TemporaryDirectory(dir=self.temp) as folder:
+                made = Path(folder, target.name)
+                options = CompilationOptions(output_file=str(made), language_level=3)
+                if compile_single(str(source), options, "topleft." + source.stem).num_errors:
+                    raise CompileError(f"Cython found errors in {source.relative_to(ROOT)}")
+                os.replace(made, target)
+
+        make_once(target, digest(Cython.__version__, *files_in("src/topleft", ".pyx", ".pxd", ".pxi")), make)
+        return target
+
+    def compile_unit(self, source: Path, flags: list[str], macros: list[tuple[str, str]]) -> Path:
+        """Return the object of one source, compiled again when the source, a header or a flag changed."""
+        target = self.temp / (source.stem + ".o")
+        sources = [source, *files_in("csrc", ".c", ".h")]
+
+        def make() -> None:
+            with tempfile.TemporaryDirectory(dir=self.temp) as folder:
+                (made,) = self.compiler.compile(
+                    [os.path.relpath(source)],
+                    output_dir=folder,
+                    macros=macros,
+                    include_dirs=[str(ROOT / "csrc"), *self.include_dirs],
+                    debug=self.debug,
+                    extra_postargs=flags,
+                )
+                os.replace(made, target)
+
+        make_once(target, digest(self.identity, flags, macros, self.debug, *sources), make)
+        return target
+
+
+def quoted(text: str) -> str:
+    """Return a C string literal."""
+    return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
+
+
+setup(ext_modules=[Extension("topleft._engine", ["src/topleft/_engine.pyx"])], cmdclass={"build_ext": BuildEngine})

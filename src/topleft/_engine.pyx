@@ -1,0 +1,241 @@
+# cython: language_level=3, boundscheck=False, wraparound=False, initializedcheck=False, embedsignature=False
+"""Memoryviews in, one nogil kernel call, status out. The array layer has checked every shape, dtype and index."""
+
+from libc.stdint cimport int32_t, int64_t, uint8_t
+
+import numpy as np
+
+
+cdef extern from "topleft.h" nogil:
+    ctypedef struct tl_vertex:
+        pass
+    ctypedef struct tl_wide:
+        pass
+    ctypedef struct tl_vertex_set:
+        const tl_vertex *vertices
+        const tl_wide *wide
+        const double *inv_w
+        int64_t n_vertices
+    ctypedef int tl_scalar
+    ctypedef struct tl_vertex_counts:
+        int64_t n_bad, n_wide, n_clipped
+    ctypedef struct tl_view:
+        double half_width_px, half_height_px, guard_band_x, guard_band_y
+        int subpixel_bits, zero_to_one, near_clip, far_clip
+    ctypedef struct tl_pieces:
+        tl_vertex *vertices
+        tl_wide *wide
+        double *inv_w
+        double *weights
+        int32_t *triangles
+        int32_t *source
+        int64_t n_vertices, n_pieces
+    ctypedef struct tl_window:
+        int64_t x_px, y_px, width, height
+        int subpixel_bits
+    ctypedef int tl_cull
+    ctypedef int tl_method
+    ctypedef int tl_sink
+    ctypedef struct tl_target:
+        tl_sink sink
+        void *pixels
+        float *depth
+        int64_t stride_px
+        const void *colors
+        int n_channels, pixel_bytes
+    ctypedef struct tl_scene:
+        tl_vertex_set mesh
+        const int32_t *triangles
+        int64_t n_triangles
+        const tl_pieces *pieces
+        tl_cull cull
+        tl_method method
+    ctypedef struct tl_kernels:
+        tl_vertex_counts (*snap)(const void *, tl_scalar, int, int64_t, int, int, tl_vertex *, tl_wide *) noexcept nogil
+        void (*transform_f32)(const float *, int64_t, const float *, double *) noexcept nogil
+        void (*transform_f64)(const double *, int64_t, const double *, double *) noexcept nogil
+        tl_vertex_counts (*project)(const double *, int64_t, const tl_view *, tl_vertex *, tl_wide *, double *) noexcept nogil
+        void (*clip)(const double *, const tl_vertex *, const int32_t *, int64_t, const tl_view *, tl_pieces *) noexcept nogil
+        int64_t (*first_bad)(const tl_vertex *, const int32_t *, int64_t) noexcept nogil
+        void (*draw)(const tl_scene *, const tl_window *, const tl_target *) noexcept nogil
+        void (*barycentric)(const tl_scene *, const tl_window *, const int32_t *, float *) noexcept nogil
+        void (*interpolate)(const tl_scene *, const tl_window *, const int32_t *, const float *, int, int, float, float *) noexcept nogil
+
+include "_dispatch.pxi"
+
+VERTEX_BYTES = sizeof(tl_vertex)
+SCALARS = {np.dtype(np.float32): 0, np.dtype(np.float64): 1, np.dtype(np.int64): 2}  # tl_scalar
+
+
+cdef inline const void *data(const uint8_t[::1] view) noexcept nogil:
+    return &view[0] if view is not None and view.shape[0] > 0 else NULL
+
+
+def as_bytes(array):
+    """Return the memory of a contiguous array as a flat uint8 view."""
+    return array.reshape(-1).view(np.uint8)
+
+
+def snap(vertices, int subpixel_bits, bint with_depth, uint8_t[::1] records, int64_t[:, ::1] wide):
+    """Snap (V, C) pixel vertices into records; returns the numbers of bad, wide and clipped vertices."""
+    cdef const uint8_t[::1] raw = as_bytes(vertices)
+    cdef tl_scalar scalar = SCALARS[vertices.dtype]
+    cdef int64_t n = vertices.shape[0]
+    cdef int n_components = vertices.shape[1]
+    cdef tl_wide *table = <tl_wide *>&wide[0, 0] if wide is not None and n else NULL
+    cdef tl_vertex_counts counts
+    if n == 0:
+        return 0, 0, 0
+    with nogil:
+        counts = K.snap(data(raw), scalar, n_components, n, subpixel_bits, with_depth, <tl_vertex *>&records[0], table)
+    return counts.n_bad, counts.n_wide, counts.n_clipped
+
+
+def transform(vertices, matrix, double[:, ::1] vertices_clip):
+    """Transform (V, 3) float32 or float64 vertices by a (4, 4) matrix of the same dtype."""
+    cdef const uint8_t[::1] raw = as_bytes(vertices)
+    cdef const uint8_t[::1] raw_matrix = as_bytes(matrix)
+    cdef bint single = vertices.dtype == np.float32
+    cdef int64_t n = vertices.shape[0]
+    if n == 0:
+        return
+    with nogil:
+        if single:
+            K.transform_f32(<const float *>data(raw), n, <const float *>data(raw_matrix), &vertices_clip[0, 0])
+        else:
+            K.transform_f64(<const double *>data(raw), n, <const double *>data(raw_matrix), &vertices_clip[0, 0])
+
+
+cdef class View:
+    """How clip space maps to pixels."""
+
+    cdef tl_view view
+
+    def __init__(self, viewport, int subpixel_bits, bint zero_to_one, bint near_clip, bint far_clip):
+        self.view.half_width_px, self.view.half_height_px = viewport[0] / 2, viewport[1] / 2
+        self.view.guard_band_x, self.view.guard_band_y = (2.0**60 / (side / 2 * 2**subpixel_bits) for side in viewport)
+        self.view.subpixel_bits, self.view.zero_to_one = subpixel_bits, zero_to_one
+        self.view.near_clip, self.view.far_clip = near_clip, far_clip
+
+
+def project(const double[:, ::1] vertices_clip, View view, uint8_t[::1] records, int64_t[:, ::1] wide, double[::1] inv_w):
+    """Project and snap (V, 4) clip-space vertices; returns the numbers of bad, wide and clipped vertices."""
+    cdef int64_t n = vertices_clip.shape[0]
+    cdef tl_wide *table = <tl_wide *>&wide[0, 0] if wide is not None and n else NULL
+    cdef tl_vertex_counts counts
+    if n == 0:
+        return 0, 0, 0
+    with nogil:
+        counts = K.project(&vertices_clip[0, 0], n, &view.view, <tl_vertex *>&records[0], table, &inv_w[0])
+    return counts.n_bad, counts.n_wide, counts.n_clipped
+
+
+def first_bad(const uint8_t[::1] records, const int32_t[:, ::1] triangles):
+    """Return the lowest index of a vertex in use that has no fixed-point position, -1 if there is none."""
+    cdef int64_t n = triangles.shape[0], found = -1
+    if n:
+        with nogil:
+            found = K.first_bad(<const tl_vertex *>&records[0], &triangles[0, 0], n)
+    return found
+
+
+cdef class Pieces:
+    """What the clip planes leave of the triangles that they cut."""
+
+    cdef tl_pieces pieces
+    cdef object arrays
+
+    def __init__(self, const double[:, ::1] vertices_clip, const uint8_t[::1] records, const int32_t[:, ::1] triangles, View view):
+        cdef tl_pieces *p = &self.pieces
+        cdef int64_t n = triangles.shape[0]
+        cdef uint8_t[::1] vertices
+        cdef int64_t[:, ::1] wide
+        cdef double[::1] inv_w
+        cdef double[:, ::1] weights
+        cdef int32_t[:, ::1] corners
+        cdef int32_t[::1] source
+        p.vertices = NULL
+        p.n_vertices = p.n_pieces = 0
+        if n == 0:
+            return
+        with nogil:
+            K.clip(&vertices_clip[0, 0], <const tl_vertex *>&records[0], &triangles[0, 0], n, &view.view, p)
+        if p.n_pieces == 0:
+            return
+        vertices, wide = np.empty(p.n_vertices * VERTEX_BYTES, np.uint8), np.empty((p.n_vertices, 2), np.int64)
+        inv_w, weights = np.empty(p.n_vertices), np.empty((p.n_vertices, 3))
+        corners, source = np.empty((p.n_pieces, 3), np.int32), np.empty(p.n_pieces, np.int32)
+        self.arrays = (vertices, wide, inv_w, weights, corners, source)
+        p.vertices, p.wide = <tl_vertex *>&vertices[0], <tl_wide *>&wide[0, 0]
+        p.inv_w, p.weights = &inv_w[0], &weights[0, 0]
+        p.triangles, p.source = &corners[0, 0], &source[0]
+        with nogil:
+            K.clip(&vertices_clip[0, 0], <const tl_vertex *>&records[0], &triangles[0, 0], n, &view.view, p)
+
+    def __len__(self):
+        return self.pieces.n_pieces
+
+
+cdef class Scene:
+    """Snapped vertices and triangles, ready to be drawn or resolved; keeps what it points to alive."""
+
+    cdef tl_scene scene
+    cdef int64_t x_px, y_px
+    cdef int subpixel_bits
+    cdef object arrays
+
+    def __init__(
+        self, const uint8_t[::1] records, const int64_t[:, ::1] wide, const double[::1] inv_w, const int32_t[:, ::1] triangles,
+        Pieces pieces, int64_t x_px, int64_t y_px, int subpixel_bits, int cull, int method,
+    ):
+        self.arrays = (records, wide, inv_w, triangles, pieces)
+        self.scene.mesh.vertices = <const tl_vertex *>data(records)
+        self.scene.mesh.wide = <const tl_wide *>&wide[0, 0] if wide is not None and wide.shape[0] else NULL
+        self.scene.mesh.inv_w = &inv_w[0] if inv_w is not None and inv_w.shape[0] else NULL
+        self.scene.mesh.n_vertices = records.shape[0] // <int64_t>sizeof(tl_vertex)
+        self.scene.n_triangles = triangles.shape[0]
+        self.scene.triangles = &triangles[0, 0] if triangles.shape[0] else NULL
+        self.scene.pieces = &pieces.pieces if pieces is not None and len(pieces) else NULL
+        self.scene.cull, self.scene.method = cull, method
+        self.x_px, self.y_px, self.subpixel_bits = x_px, y_px, subpixel_bits
+
+    cdef tl_window window(self, int64_t first_row, int64_t n_rows, int64_t width) noexcept:
+        cdef tl_window w
+        w.x_px, w.y_px, w.subpixel_bits = self.x_px, self.y_px + first_row, self.subpixel_bits
+        w.width, w.height = width, n_rows
+        return w
+
+    def draw(
+        self, int sink, uint8_t[::1] pixels, float[:, ::1] depth, int64_t width, int64_t first_row, int64_t n_rows,
+        int pixel_bytes, const uint8_t[::1] colors, int n_channels,
+    ):
+        """Draw the rows [first_row, first_row + n_rows) of buffers that are `width` pixels wide."""
+        cdef tl_target target
+        cdef tl_window window = self.window(first_row, n_rows, width)
+        if width == 0 or n_rows == 0 or self.scene.n_triangles == 0:
+            return
+        target.sink = <tl_sink>sink
+        target.pixels = &pixels[first_row * width * pixel_bytes]
+        target.depth = &depth[first_row, 0] if depth is not None else NULL
+        target.stride_px = width
+        target.colors = data(colors)
+        target.n_channels, target.pixel_bytes = n_channels, pixel_bytes
+        with nogil:
+            K.draw(&self.scene, &window, &target)
+
+    def barycentric(self, const int32_t[:, ::1] ids, float[:, :, ::1] out):
+        """Write the weights of the three vertices of the triangle at each pixel."""
+        cdef tl_window window = self.window(0, ids.shape[0], ids.shape[1])
+        if ids.shape[0] and ids.shape[1]:
+            with nogil:
+                K.barycentric(&self.scene, &window, &ids[0, 0], &out[0, 0, 0])
+
+    def interpolate(self, const int32_t[:, ::1] ids, const float[:, ::1] values, bint per_corner, float background,
+                    float[:, :, ::1] out):
+        """Write the interpolated values at each pixel; `values` has a row per vertex, or per corner of each triangle."""
+        cdef tl_window window = self.window(0, ids.shape[0], ids.shape[1])
+        cdef int n_values = out.shape[2]
+        if ids.shape[0] and ids.shape[1] and n_values:
+            with nogil:
+                K.interpolate(&self.scene, &window, &ids[0, 0], &values[0, 0] if values.shape[0] else NULL, n_values,
+                              per_corner, background, &out[0, 0, 0])

@@ -1,0 +1,295 @@
+"""The four verbs on fresh memory, and `Rasterizer`, the same on memory that is kept."""
+
+from __future__ import annotations
+
+from typing import Any, Unpack
+
+from numpy.typing import ArrayLike, NDArray
+import numpy as np
+
+from topleft.arrays import as_size
+from topleft.fragments import Fragments
+from topleft.memory import FreshMemory, KeptMemory
+from topleft.rasterize import draw_coverage, draw_fill, draw_fragments, draw_overdraw
+from topleft.threads import parse_threads
+from topleft.view import View, ViewOptions
+
+__all__ = ["Rasterizer", "coverage", "fill", "overdraw", "rasterize"]
+
+FRESH = FreshMemory()
+
+
+def coverage(
+    vertices: ArrayLike, triangles: ArrayLike, size: tuple[int, int], *, out: NDArray[np.bool_] | None = None, **view: Unpack[ViewOptions]
+) -> NDArray[np.bool_]:
+    """Return the mask of the pixels whose centre a triangle covers.
+
+    Parameters
+    ----------
+    vertices : array_like, shape (V, 2), (V, 3) or (V, 4)
+        Pixels (x right, y down), pixels and depth, or clip space. Object space (V, 3) with `transform`. Any real dtype.
+    triangles : array_like of integers, shape (T, 3)
+        Indices of vertices; either winding.
+    size : (int, int)
+        Width and height of the picture in pixels.
+    out : ndarray of bool, shape (H, W), optional
+        Where the result goes. A fresh array costs its first touch, several times what drawing a small mesh costs.
+    **view
+        transform : array_like, shape (4, 4). Clip space from object space.
+        origin : (int, int). The pixel of the whole picture that is row 0, column 0 here.
+        viewport : (int, int). Width and height of the whole picture for clip space; default `size`.
+        subpixel_bits : int, 0 to 16. Vertices snap to ``2**-subpixel_bits`` pixels; default 8.
+        sampling : "center".
+        method : "auto", "edge" or "scanline": the same picture.
+        cull : "none", "back" or "front"; the front is counter-clockwise seen with y up.
+        clip_depth : "minus_one_to_one" (OpenGL) or "zero_to_one" (Direct3D, Vulkan).
+        near_clip, far_clip : bool. Whether that plane cuts.
+        threads : int or None. Never changes a bit.
+
+    Returns
+    -------
+    ndarray of bool, shape (H, W)
+        False where nothing is.
+
+    Raises
+    ------
+    ValueError
+        For a wrong shape, an unknown option, a vertex in use that is not finite or beyond ``2**62`` sub-pixels.
+    TypeError
+        For a wrong dtype.
+    IndexError
+        For an index outside the vertices; names the row.
+
+    References
+    ----------
+    J. Pineda, A Parallel Algorithm for Polygon Rasterization, 1988.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> tl.coverage([[0, 0], [4, 0], [0, 4]], [[0, 1, 2]], (4, 3)).astype(int)
+    array([[1, 1, 1, 0],
+           [1, 1, 0, 0],
+           [1, 0, 0, 0]])
+    """
+    return draw_coverage(FRESH, vertices, triangles, View.parse(size, view), out)
+
+
+def overdraw(
+    vertices: ArrayLike, triangles: ArrayLike, size: tuple[int, int], *, out: NDArray[np.int32] | None = None, **view: Unpack[ViewOptions]
+) -> NDArray[np.int32]:
+    """Return how many triangles cover each pixel's centre.
+
+    Parameters
+    ----------
+    vertices, triangles, size, **view
+        As in `coverage`.
+    out : ndarray of int32, shape (H, W), optional
+        Where the result goes.
+
+    Returns
+    -------
+    ndarray of int32, shape (H, W)
+        0 where nothing is.
+
+    Raises
+    ------
+    ValueError, TypeError, IndexError
+        As in `coverage`.
+
+    Examples
+    --------
+    Two triangles share the diagonal of a square; each pixel on it belongs to one of them.
+
+    >>> import topleft as tl
+    >>> tl.overdraw([[0, 0], [3, 0], [3, 3], [0, 3]], [[0, 1, 2], [0, 2, 3]], (3, 3))
+    array([[1, 1, 1],
+           [1, 1, 1],
+           [1, 1, 1]], dtype=int32)
+    """
+    return draw_overdraw(FRESH, vertices, triangles, View.parse(size, view), out)
+
+
+def fill(
+    vertices: ArrayLike,
+    triangles: ArrayLike,
+    colors: ArrayLike,
+    size: tuple[int, int],
+    *,
+    per: str = "auto",
+    background: ArrayLike | None = None,
+    out: NDArray[Any] | None = None,
+    **view: Unpack[ViewOptions],
+) -> NDArray[Any]:
+    """Return a picture of coloured triangles in painter's order: later triangles cover earlier ones.
+
+    Parameters
+    ----------
+    vertices, triangles, size, **view
+        As in `coverage`.
+    colors : array_like, shape (T, C), (V, C), (T,) or (V,), C from 1 to 4
+        uint8 (any integers in 0..255) or float32 (any floats). Per triangle: flat. Per vertex: interpolated screen-linearly.
+    per : "auto", "triangle" or "vertex"
+        What a row of `colors` belongs to; "auto" tells by the number of rows.
+    background : number or array_like, shape (C,), optional
+        Fills the picture first; 0 when neither `background` nor `out` is given.
+    out : ndarray of uint8 or float32, shape (H, W, C) or (H, W), optional
+        Is drawn over.
+
+    Returns
+    -------
+    ndarray of uint8 or float32, shape (H, W, C), or (H, W) for one-dimensional `colors`
+        uint8 values are the exact ones rounded to nearest, ties to even.
+
+    Raises
+    ------
+    ValueError
+        As in `coverage`; also when `colors` fits neither the triangles nor the vertices, or both.
+    TypeError, IndexError
+        As in `coverage`.
+
+    References
+    ----------
+    H. Gouraud, Continuous Shading of Curved Surfaces, 1971.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> tl.fill([[0, 0], [4, 0], [0, 4]], [[0, 1, 2]], [0, 200, 0], (4, 2), per="vertex", background=9)
+    array([[ 25,  75, 125,   9],
+           [ 25,  75,   9,   9]], dtype=uint8)
+    """
+    return draw_fill(FRESH, vertices, triangles, colors, View.parse(size, view), per, background, out)
+
+
+def rasterize(
+    vertices: ArrayLike,
+    triangles: ArrayLike,
+    size: tuple[int, int],
+    *,
+    depth_test: str | None = "less",
+    background_depth: float | None = None,
+    out: tuple[NDArray[np.int32], NDArray[np.float32]] | None = None,
+    **view: Unpack[ViewOptions],
+) -> Fragments:
+    """Return the visibility buffer: which triangle shows in each pixel, and how deep.
+
+    Parameters
+    ----------
+    vertices, triangles, size, **view
+        As in `coverage`. The depth of pixel-space vertices (V, 3) is their third column; (V, 2) vertices lie at depth 0
+        and are drawn in painter's order.
+    depth_test : "less", "greater" or None
+        Which triangle is kept: the one with the smaller depth, with the larger depth, or the later one. At equal depth the
+        triangle with the lower index.
+    background_depth : float, optional
+        Depth where nothing is; +inf, or -inf with "greater", unless given.
+    out : (ndarray of int32, ndarray of float32), each of shape (H, W), optional
+        Where ids and depth go.
+
+    Returns
+    -------
+    Fragments
+        ``.triangle`` (H, W) int32 with -1 for none, ``.depth`` (H, W) float32, ``.mask`` (H, W) bool,
+        ``.barycentric()``, ``.interpolate(values)``.
+
+    Raises
+    ------
+    ValueError, TypeError, IndexError
+        As in `coverage`; also a vertex in use with a depth that float32 cannot hold.
+
+    Notes
+    -----
+    Depth is interpolated linearly in screen space with exact integer weights and rounded once: at most half a unit in the
+    last place of float32 from the exact plane, plus ``2**-49`` times the largest depth of the triangle. Clip space gives
+    window depth: ``(z/w + 1) / 2``, or ``z/w`` with ``clip_depth="zero_to_one"``, in [0, 1].
+
+    References
+    ----------
+    E. Catmull, A Subdivision Algorithm for Computer Display of Curved Surfaces, 1974 (the depth buffer).
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> frags = tl.rasterize([[0, 0, 0.5], [4, 0, 0.5], [0, 4, 0.5], [0, 0, 0], [2, 0, 1], [0, 2, 1]], [[0, 1, 2], [3, 4, 5]], (4, 2))
+    >>> frags.triangle
+    array([[ 0,  0,  0, -1],
+           [ 0,  0, -1, -1]], dtype=int32)
+    >>> frags.depth
+    array([[0.5, 0.5, 0.5, inf],
+           [0.5, 0.5, inf, inf]], dtype=float32)
+    """
+    return draw_fragments(FRESH, vertices, triangles, View.parse(size, view), depth_test, background_depth, out)
+
+
+class Rasterizer:
+    """The four verbs for one size, on memory that is kept from call to call.
+
+    What a verb returns is overwritten by the next call of the same verb; copy what must last. Not for use from several
+    threads at once: give each its own.
+
+    Parameters
+    ----------
+    size : (int, int)
+        Width and height of the picture in pixels.
+    threads : int or None
+        For every call that does not say otherwise.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> rasterizer = tl.Rasterizer((4, 4))
+    >>> int(rasterizer.coverage([[0, 0], [4, 0], [0, 4]], [[0, 1, 2]]).sum())
+    6
+    """
+
+    def __init__(self, size: tuple[int, int], *, threads: int | None = None) -> None:
+        self.size = as_size(size)
+        self.threads = parse_threads(threads)
+        self._memory = KeptMemory()
+
+    def __repr__(self) -> str:
+        return f"Rasterizer(size={self.size}, threads={self.threads})"
+
+    def _view(self, options: ViewOptions) -> View:
+        options.setdefault("threads", self.threads)
+        return View.parse(self.size, options)
+
+    def coverage(
+        self, vertices: ArrayLike, triangles: ArrayLike, *, out: NDArray[np.bool_] | None = None, **view: Unpack[ViewOptions]
+    ) -> NDArray[np.bool_]:
+        """Return the mask of the pixels that a triangle covers, as `topleft.coverage` does."""
+        return draw_coverage(self._memory, vertices, triangles, self._view(view), out)
+
+    def overdraw(
+        self, vertices: ArrayLike, triangles: ArrayLike, *, out: NDArray[np.int32] | None = None, **view: Unpack[ViewOptions]
+    ) -> NDArray[np.int32]:
+        """Return how many triangles cover each pixel, as `topleft.overdraw` does."""
+        return draw_overdraw(self._memory, vertices, triangles, self._view(view), out)
+
+    def fill(
+        self,
+        vertices: ArrayLike,
+        triangles: ArrayLike,
+        colors: ArrayLike,
+        *,
+        per: str = "auto",
+        background: ArrayLike | None = None,
+        out: NDArray[Any] | None = None,
+        **view: Unpack[ViewOptions],
+    ) -> NDArray[Any]:
+        """Return a picture of coloured triangles in painter's order, as `topleft.fill` does."""
+        return draw_fill(self._memory, vertices, triangles, colors, self._view(view), per, background, out)
+
+    def rasterize(
+        self,
+        vertices: ArrayLike,
+        triangles: ArrayLike,
+        *,
+        depth_test: str | None = "less",
+        background_depth: float | None = None,
+        out: tuple[NDArray[np.int32], NDArray[np.float32]] | None = None,
+        **view: Unpack[ViewOptions],
+    ) -> Fragments:
+        """Return the visibility buffer, as `topleft.rasterize` does; its attributes too only last until the next call."""
+        return draw_fragments(self._memory, vertices, triangles, self._view(view), depth_test, background_depth, out)

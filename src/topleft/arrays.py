@@ -1,0 +1,184 @@
+"""Coercion and checks: what the caller gives becomes contiguous native arrays, or an error that names the argument."""
+
+from __future__ import annotations
+
+import operator
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+__all__ = [
+    "as_background",
+    "as_colors",
+    "as_matrix",
+    "as_out",
+    "as_size",
+    "as_subpixel_bits",
+    "as_triangles",
+    "as_values",
+    "as_vertices",
+    "as_window",
+]
+
+#: The largest side of a picture and the largest number of triangles or vertices: ids and indices are int32.
+INT32_MAX = 2**31 - 1
+
+
+def as_array(name: str, values: ArrayLike) -> NDArray[Any]:
+    """Return what NumPy makes of `values`, without a copy where it can."""
+    if not isinstance(values, np.ndarray) and hasattr(values, "__dlpack__") and not hasattr(values, "__array__"):
+        return np.from_dlpack(values)
+    try:
+        return np.asarray(values)
+    except ValueError as error:
+        raise ValueError(f"{name} must be array_like, got rows of different lengths ({error})") from None
+
+
+def as_vertices(values: ArrayLike, *, has_transform: bool) -> NDArray[Any]:
+    """Return (V, C) vertices as a contiguous float32, float64 or int64 array."""
+    array = as_array("vertices", values)
+    wish = "(V, 3) when transform is given" if has_transform else "(V, 2), (V, 3) or (V, 4)"
+    if array.size == 0 and array.ndim == 1:
+        array = array.reshape(0, 3 if has_transform else 2)
+    if array.ndim != 2 or array.shape[1] not in ((3,) if has_transform else (2, 3, 4)):
+        raise ValueError(f"vertices must have shape {wish}, got {array.shape}")
+    if array.shape[0] > INT32_MAX:
+        raise ValueError(f"vertices must have at most {INT32_MAX} rows, got {array.shape[0]}")
+    if array.dtype.kind == "f":
+        dtype: type = np.float32 if array.dtype.itemsize <= 4 else np.float64
+    elif array.dtype.kind in "iu":
+        dtype = np.float64 if has_transform or array.shape[1] == 4 else np.int64
+        if dtype is np.int64 and array.dtype.kind == "u" and array.dtype.itemsize == 8:
+            array = np.minimum(array, np.uint64(2**63 - 1))  # out of range either way
+    else:
+        raise TypeError(f"vertices must be real numbers, got dtype {array.dtype}")
+    if has_transform or array.shape[1] < 4:
+        return np.ascontiguousarray(array, dtype=dtype)
+    return np.ascontiguousarray(array, dtype=np.float64)  # clip space is float64 throughout
+
+
+def as_triangles(values: ArrayLike, n_vertices: int) -> NDArray[np.int32]:
+    """Return (T, 3) triangles as a contiguous int32 array, every index inside ``[0, n_vertices)``."""
+    array = as_array("triangles", values)
+    if array.size == 0 and array.ndim == 1:
+        return np.empty((0, 3), np.int32)
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise ValueError(f"triangles must have shape (T, 3), got {array.shape}")
+    if array.shape[0] > INT32_MAX:
+        raise ValueError(f"triangles must have at most {INT32_MAX} rows, got {array.shape[0]}")
+    if array.dtype.kind not in "iu":
+        raise TypeError(f"triangles must be integers, got dtype {array.dtype}")
+    if array.size and not (0 <= array.min() and array.max() < n_vertices):
+        row = int(np.argmax(((array < 0) | (array >= n_vertices)).any(axis=1)))
+        raise IndexError(
+            f"triangles must hold indices in [0, {n_vertices}), the number of vertices; row {row} is {array[row].tolist()}"
+        )
+    return np.ascontiguousarray(array, dtype=np.int32)
+
+
+def as_matrix(values: ArrayLike, dtype: np.dtype[Any]) -> NDArray[Any]:
+    """Return a finite (4, 4) transform of the vertices' dtype."""
+    array = as_array("transform", values)
+    if array.shape != (4, 4):
+        raise ValueError(f"transform must have shape (4, 4), got {array.shape}")
+    if array.dtype.kind not in "fiu":
+        raise TypeError(f"transform must be real numbers, got dtype {array.dtype}")
+    if not np.isfinite(array).all():
+        raise ValueError("transform must be finite, got NaN or infinity")
+    with np.errstate(over="ignore"):
+        matrix = np.ascontiguousarray(array, dtype=dtype)
+    if not np.isfinite(matrix).all():
+        raise ValueError("transform must fit float32, because the vertices are float32; pass float64 vertices")
+    return matrix
+
+
+def as_pair(name: str, values: object) -> tuple[int, int]:
+    """Return two integers."""
+    try:
+        first, second = values  # type: ignore[misc]
+        return operator.index(first), operator.index(second)
+    except (TypeError, ValueError):
+        raise TypeError(f"{name} must be two integers, got {values!r}") from None
+
+
+def as_size(values: object, name: str = "size", smallest: int = 0) -> tuple[int, int]:
+    """Return ``(width, height)``."""
+    width, height = as_pair(name, values)
+    if not (smallest <= width <= INT32_MAX and smallest <= height <= INT32_MAX):
+        raise ValueError(f"{name} must be (width, height) in {smallest}..{INT32_MAX}, got ({width}, {height})")
+    return width, height
+
+
+def as_window(origin: object, subpixel_bits: int) -> tuple[int, int]:
+    """Return the window's first pixel ``(x, y)``; the whole window must have fixed-point coordinates."""
+    x, y = as_pair("origin", origin)
+    limit = 2 ** (61 - subpixel_bits)
+    if not (abs(x) < limit and abs(y) < limit):
+        raise ValueError(f"origin must lie within {limit} pixels of 0 with {subpixel_bits} sub-pixel bits, got ({x}, {y})")
+    return x, y
+
+
+def as_subpixel_bits(value: object) -> int:
+    """Return the number of sub-pixel bits."""
+    try:
+        bits = operator.index(value)  # type: ignore[arg-type]
+    except TypeError:
+        raise TypeError(f"subpixel_bits must be an integer, got {value!r}") from None
+    if not 0 <= bits <= 16:
+        raise ValueError(f"subpixel_bits must be in 0..16, got {bits}")
+    return bits
+
+
+def as_colors(values: ArrayLike) -> NDArray[Any]:
+    """Return (N, C) or (N,) colours as a contiguous uint8 or float32 array."""
+    array = as_array("colors", values)
+    if array.size == 0 and array.ndim == 1:
+        array = array.astype(np.uint8) if array.dtype == np.float64 else array  # an empty list
+    if not (array.ndim == 1 or (array.ndim == 2 and 1 <= array.shape[1] <= 4)):
+        raise ValueError(f"colors must have shape (T, C), (V, C), (T,) or (V,) with C in 1..4, got {array.shape}")
+    if array.dtype.kind == "f":
+        return np.ascontiguousarray(array, dtype=np.float32)
+    if array.dtype.kind not in "iu":
+        raise TypeError(f"colors must be uint8 or float32, got dtype {array.dtype}")
+    if array.dtype != np.uint8 and array.size and not (0 <= array.min() and array.max() <= 255):
+        raise ValueError(f"colors must lie in 0..255 when they are integers, got {array.min()}..{array.max()}")
+    return np.ascontiguousarray(array, dtype=np.uint8)
+
+
+def as_background(background: ArrayLike | None, palette: NDArray[Any]) -> NDArray[Any] | None:
+    """Return the colour of empty pixels in the picture's dtype: one number, or one per channel."""
+    if background is None:
+        return None
+    ground = np.asarray(background)
+    if ground.shape not in ((), palette.shape[1:]):
+        raise ValueError(f"background must be one number or have shape {palette.shape[1:]}, got {ground.shape}")
+    if ground.dtype.kind not in "fiu":
+        raise TypeError(f"background must be real numbers, got dtype {ground.dtype}")
+    if palette.dtype == np.uint8 and not ((ground >= 0) & (ground <= 255) & (ground == np.floor(ground))).all():
+        raise ValueError(f"background must be whole numbers in 0..255 for uint8 colors, got {ground.tolist()}")
+    return ground.astype(palette.dtype)
+
+
+def as_values(values: ArrayLike, n_vertices: int, n_triangles: int) -> NDArray[np.float32]:
+    """Return attributes as a contiguous float32 array of shape (V,), (V, K) or (T, 3, K)."""
+    array = as_array("values", values)
+    if array.dtype.kind not in "fiub":
+        raise TypeError(f"values must be real numbers, got dtype {array.dtype}")
+    fits = (array.ndim in (1, 2) and array.shape[0] == n_vertices) or (array.ndim == 3 and array.shape[:2] == (n_triangles, 3))
+    if not fits:
+        raise ValueError(
+            f"values must have shape (V,), (V, K) or (T, 3, K) with V = {n_vertices} and T = {n_triangles}, got {array.shape}"
+        )
+    return np.ascontiguousarray(array, dtype=np.float32)
+
+
+def as_out(name: str, array: object, shape: tuple[int, ...], dtype: type) -> NDArray[Any]:
+    """Return `array` after checking that results can be written to it."""
+    if not isinstance(array, np.ndarray):
+        raise TypeError(f"{name} must be a NumPy array, got {type(array).__name__}")
+    if array.shape != shape or array.dtype != dtype:
+        raise ValueError(f"{name} must have shape {shape} and dtype {np.dtype(dtype)}, got {array.shape} and {array.dtype}")
+    if not array.flags.writeable:
+        raise ValueError(f"{name} must be writeable, got a read-only array")
+    return array

@@ -1,0 +1,272 @@
+"""Files: meshes in, pictures out. The only module that touches the disk.
+
+`load` reads what trimesh reads and returns one `Mesh`; `save_image` writes a picture or a raw buffer, whole or not at
+all.
+"""
+
+from __future__ import annotations
+
+import io
+import logging
+import os
+import re
+import secrets
+import warnings
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+import numpy.typing as npt
+from PIL import Image
+
+from topleft.errors import ImageError, MeshError, MissingPackageError
+from topleft.mesh import Mesh, angle_weighted_normals, coincident
+
+PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp")
+BUFFER_SUFFIXES = (".npy", ".npz")
+SUFFIXES = PICTURE_SUFFIXES + BUFFER_SUFFIXES
+"""What `save_image` writes, by the end of the name."""
+
+PILLOW_OPTIONS: Mapping[str, tuple[str, dict[str, Any]]] = {
+    ".png": ("PNG", {}),
+    ".jpg": ("JPEG", {"quality": 92, "subsampling": 0}),
+    ".jpeg": ("JPEG", {"quality": 92, "subsampling": 0}),
+    ".webp": ("WEBP", {"lossless": True}),  # ids and normals must survive
+}
+
+
+def load(path: str | os.PathLike[str]) -> Mesh:
+    """A mesh read from a file, by trimesh: OBJ, PLY, STL, glTF and GLB, OFF, and what else it has readers for.
+
+    Parameters
+    ----------
+    path : path
+        The end of its name tells the format.
+
+    Returns
+    -------
+    Mesh
+        Polygons are cut into triangles, groups and objects are one mesh, in the order of the file; the nodes of a scene
+        are placed by their transforms. Normals are those of the file. A file without normals gets its vertices merged
+        where they are equal, so that shading has no seams where a format (STL) or a texture had to double them.
+        Colours are those of the vertices or the faces, if there are any; materials and textures are not read.
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is no such file.
+    MeshError
+        If the file is broken, has no triangles, or is of an unsupported format.
+    MissingPackageError
+        If trimesh, or a package that it needs for this format, is not installed.
+    """
+    path = Path(path)
+    if not path.exists():
+        raise FileNotFoundError(f"there is no file {str(path)!r}")
+    if path.is_dir():
+        raise MeshError(f"{str(path)!r} is a folder, not a mesh")
+    try:
+        import trimesh
+    except ImportError:
+        raise MissingPackageError("reading a mesh needs trimesh: pip install 'topleft[render]'") from None
+    try:
+        with _strict_parsing():
+            if path.suffix.lower() == ".obj":
+                scene = trimesh.load_scene(io.BytesIO(_plain_obj(path)), file_type="obj", process=False)
+            else:
+                scene = trimesh.load_scene(str(path), process=False)
+            parts = [
+                _placed(scene.geometry[geometry], transform)
+                for transform, geometry in (scene.graph[node] for node in scene.graph.nodes_geometry)
+                if len(getattr(scene.geometry[geometry], "faces", ()))
+            ]
+        if not parts:
+            raise MeshError(f"{str(path)!r} has no triangles")
+        return _joined(parts)
+    except (MeshError, OSError, MemoryError):
+        raise
+    except NotImplementedError:
+        readable = " ".join(sorted(trimesh.available_formats()))
+        raise MeshError(f"cannot read {str(path)!r}: format {path.suffix!r} is none of {readable}") from None
+    except ImportError as error:
+        # Without this package trimesh reads UTF-8 only, so its absence here means a file that is no text.
+        if getattr(error, "name", None) != "charset_normalizer":
+            raise MissingPackageError(f"reading {path.suffix!r} needs another package: {error}") from error
+        raise MeshError(f"cannot read {str(path)!r}: not a {path.suffix!r} file, or broken") from error
+    except Exception as error:  # a reader meets broken bytes in its own way: KeyError, struct.error, ...
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise MeshError(f"cannot read {str(path)!r}: {reason}") from error
+
+
+def save_image(
+    path: str | os.PathLike[str],
+    image: npt.NDArray[Any] | Mapping[str, npt.NDArray[Any]],
+    *,
+    background: tuple[int, int, int] = (255, 255, 255),
+) -> None:
+    """Write a picture or a raw buffer; the file appears whole or not at all.
+
+    Parameters
+    ----------
+    path : path
+        PNG, JPEG, WebP (lossless), .npy or .npz, by the end of the name. A file of that name is replaced.
+    image : (H, W), (H, W, 3) or (H, W, 4) uint8
+        The picture. For .npy any array, for .npz any array or several by name.
+    background : (3,) of 0 to 255
+        What shows through in JPEG, which has no alpha.
+
+    Raises
+    ------
+    ImageError
+        If the format is unknown or cannot hold the array.
+    OSError
+        If the file cannot be written.
+    """
+    path = Path(path)
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES:
+        raise ImageError(f"cannot write {str(path)!r}: format {path.suffix!r} is none of {' '.join(SUFFIXES)}")
+    if suffix == ".npz":
+        arrays = image if isinstance(image, Mapping) else {"image": image}
+        _write_whole(path, lambda file: np.savez_compressed(file, **arrays))
+        return
+    if isinstance(image, Mapping):
+        raise ImageError(f"cannot write {str(path)!r}: several arrays by name need .npz")
+    if suffix == ".npy":
+        _write_whole(path, lambda file: np.save(file, image, allow_pickle=False))
+        return
+    if image.dtype != np.uint8 or image.ndim not in (2, 3) or image.shape[2:] not in ((), (3,), (4,)):
+        raise ImageError(
+            f"a picture must have shape (H, W), (H, W, 3) or (H, W, 4) and be uint8, got {image.shape} {image.dtype}"
+        )
+    if image.size == 0:
+        raise ImageError(f"cannot write {str(path)!r}: a picture of shape {image.shape} has no pixels")
+    if suffix in (".jpg", ".jpeg") and image.shape[2:] == (4,):
+        image = composite(image, background)
+    kind, options = PILLOW_OPTIONS[suffix]
+    picture = Image.fromarray(image)
+    _write_whole(path, lambda file: picture.save(file, format=kind, **options))
+
+
+def composite(image: npt.NDArray[np.uint8], background: tuple[int, int, int]) -> npt.NDArray[np.uint8]:
+    """The RGBA picture (H, W, 4) laid over one colour: (H, W, 3) uint8, mixed as the numbers stand (sRGB)."""
+    alpha = image[..., 3:].astype(np.uint32)
+    mixed = image[..., :3] * alpha + np.asarray(background, dtype=np.uint32) * (255 - alpha)
+    return ((mixed + 127) // 255).astype(np.uint8)
+
+
+def _write_whole(path: Path, write: Callable[[IO[bytes]], object]) -> None:
+    """Write to a new name in the same folder, then rename: a reader or a crash never meets half a file."""
+    if path.is_dir():
+        raise IsADirectoryError(f"cannot write {str(path)!r}: it is a folder")
+    temporary = path.with_name(f".{path.name[:100]}.{secrets.token_hex(4)}.part")
+    try:
+        with open(temporary, "xb") as file:
+            write(file)
+        os.replace(temporary, path)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
+
+
+@contextmanager
+def _strict_parsing() -> Iterator[None]:
+    """Make NumPy's text reader fail where it would stop in the middle of a broken file; keep trimesh off stderr."""
+    logger = logging.getLogger("trimesh")
+    quiet = logging.NullHandler()
+    logger.addHandler(quiet)  # a logger without a handler prints its warnings
+    try:
+        with warnings.catch_warnings():
+            warnings.filterwarnings("error", message="string or file could not be read")
+            yield
+    finally:
+        logger.removeHandler(quiet)
+
+
+def _plain_obj(path: Path) -> bytes:
+    """The text of an OBJ file as trimesh reads it rightly: UTF-8, one group, no materials, no relative indices.
+
+    trimesh takes groups from the last to the first, doubles the vertices between them, and counts a negative index
+    from the end of the file; the format counts it from the vertices above the line.
+    """
+    text = path.read_bytes().decode("utf-8", errors="replace").replace("\r\n", "\n").replace("\\\n", " ")
+    if "\0" in text:
+        raise MeshError(f"cannot read {str(path)!r}: not a text file")
+    text = re.sub(r"^[ \t]*(usemtl|mtllib|[ogs])\b.*$", "", text, flags=re.MULTILINE)
+    if re.search(r"^[ \t]*f\b.*-\d", text, flags=re.MULTILINE):
+        text = "\n".join(_absolute_indices(text.split("\n")))
+    return text.encode()
+
+
+def _absolute_indices(lines: list[str]) -> Iterator[str]:
+    above = {"v": 0, "vt": 0, "vn": 0}
+    for line in lines:
+        words = line.split()
+        if words and words[0] in above:
+            above[words[0]] += 1
+        elif words and words[0] == "f":
+            corners = ("/".join(map(_absolute, word.split("/"), above.values())) for word in words[1:])
+            line = " ".join(["f", *corners])
+        yield line
+
+
+def _absolute(index: str, n_above: int) -> str:
+    return str(n_above + 1 + int(index)) if index.startswith("-") else index
+
+
+def _placed(geometry: Any, transform: npt.NDArray[np.float64]) -> Mesh:
+    """A trimesh geometry as a mesh in the space of its scene; per-face colours get corners of their own."""
+    vertices, triangles = np.asarray(geometry.vertices), np.asarray(geometry.faces)
+    # trimesh computes normals when asked for them; what a file gave waits in the cache.
+    normals = np.asarray(geometry.vertex_normals) if "vertex_normals" in geometry._cache else None
+    colors = None
+    if geometry.visual.kind == "vertex":
+        colors = np.asarray(geometry.visual.vertex_colors)
+    elif geometry.visual.kind == "face":
+        colors = np.asarray(geometry.visual.face_colors).repeat(3, axis=0)
+        vertices = vertices[triangles.ravel()]
+        normals = None if normals is None else normals[triangles.ravel()]
+        triangles = np.arange(triangles.size).reshape(-1, 3)
+    if not np.array_equal(transform, np.eye(4)):
+        linear = transform[:3, :3]
+        vertices = vertices @ linear.T + transform[:3, 3]
+        if np.linalg.det(linear) < 0:  # a mirror turns the triangles over
+            triangles = triangles[:, ::-1]
+        if normals is not None:
+            normals = normals @ np.linalg.pinv(linear)
+    return Mesh(vertices, triangles, normals, colors)
+
+
+def _joined(parts: list[Mesh]) -> Mesh:
+    """One mesh of several; vertices that are equal become one unless the file has normals."""
+    starts = np.cumsum([0] + [len(part.vertices) for part in parts[:-1]])
+    vertices = np.concatenate([part.vertices for part in parts])
+    triangles = np.concatenate([part.triangles + start for part, start in zip(parts, starts, strict=True)])
+    colors = None
+    if any(part.colors is not None for part in parts):
+        colors = np.concatenate([_rgba(part) for part in parts])
+    if all(part.normals is not None for part in parts):
+        return Mesh(vertices, triangles, np.concatenate([part.vertex_normals() for part in parts]), colors)
+    normals = None
+    if any(part.normals is not None for part in parts):
+        normals = np.concatenate([part.vertex_normals() for part in parts])
+    elif colors is not None:
+        # Vertices of two colours stay two, and still share a normal.
+        first, group = coincident(vertices)
+        normals = angle_weighted_normals(vertices[first], group[triangles].astype(np.int32))[group]
+    attributes = [array for array in (vertices, normals, colors) if array is not None]
+    first, group = coincident(*attributes)
+    return Mesh(
+        vertices[first],
+        group[triangles],
+        None if normals is None else normals[first],
+        None if colors is None else colors[first],
+    )
+
+
+def _rgba(part: Mesh) -> npt.NDArray[np.uint8]:
+    if part.colors is None:
+        return np.full((len(part.vertices), 4), 255, dtype=np.uint8)
+    return part.colors

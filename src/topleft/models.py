@@ -1,0 +1,75 @@
+"""Values that options take: every option is a string in the API and an enum inside."""
+
+from __future__ import annotations
+
+from enum import IntEnum, StrEnum
+from typing import TypeVar
+
+__all__ = ["ClipDepth", "Cull", "DepthTest", "Per", "Sampling", "Sink", "parse"]
+
+
+class Sampling(StrEnum):
+    """Where a pixel is sampled."""
+
+    CENTER = "center"
+
+
+class Cull(StrEnum):
+    """Which triangles are left out; the front is counter-clockwise seen with y up."""
+
+    NONE = "none"
+    BACK = "back"
+    FRONT = "front"
+
+
+class DepthTest(StrEnum):
+    """Which of two triangles is kept; ``None`` in the API is painter's order."""
+
+    LESS = "less"
+    GREATER = "greater"
+
+
+class ClipDepth(StrEnum):
+    """The range of z/w that the near and far planes leave: OpenGL's, or that of Direct3D and Vulkan."""
+
+    MINUS_ONE_TO_ONE = "minus_one_to_one"
+    ZERO_TO_ONE = "zero_to_one"
+
+
+class Per(StrEnum):
+    """What a row of colours belongs to."""
+
+    AUTO = "auto"
+    TRIANGLE = "triangle"
+    VERTEX = "vertex"
+
+
+class Sink(IntEnum):
+    """What a covered span does to the buffers; the numbers are `tl_sink` in ``csrc/topleft.h``."""
+
+    MASK = 0
+    COUNT = 1
+    ID = 2
+    NEAREST = 3
+    FARTHEST = 4
+    FLAT = 5
+    GOURAUD_U8 = 6
+    GOURAUD_F32 = 7
+
+
+Option = TypeVar("Option", bound=StrEnum)
+
+
+def parse(kind: type[Option], name: str, value: object) -> Option:
+    """Return the member of an enum that an option names.
+
+    Raises
+    ------
+    ValueError
+        If `value` is none of the choices.
+    """
+    try:
+        return kind(value)  # type: ignore[arg-type]
+    except ValueError:
+        choices = ", ".join(repr(str(member)) for member in kind)
+        raise ValueError(f"{name} must be one of {choices}, got {value!r}") from None

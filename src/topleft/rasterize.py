@@ -1,0 +1,250 @@
+"""The pipeline as named stages, and what each verb does with it.
+
+    arrays -> transform -> clip -> snap -> draw
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, DTypeLike, NDArray
+
+from topleft import _engine
+from topleft.arrays import as_background, as_colors, as_matrix, as_out, as_triangles, as_vertices
+from topleft.fragments import Fragments
+from topleft.models import DepthTest, Per, Sink, parse
+from topleft.threads import run_bands
+from topleft.view import View
+
+__all__ = ["Memory", "draw_coverage", "draw_fill", "draw_fragments", "draw_overdraw"]
+
+
+class Memory(Protocol):
+    """Where arrays come from."""
+
+    def empty(self, name: str, shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
+        """Return an uninitialised array."""
+
+
+@dataclass(frozen=True, slots=True)
+class Snapped:
+    """A scene after the snap: ready to be drawn into any buffer of the view's size."""
+
+    scene: _engine.Scene
+    n_vertices: int
+    n_triangles: int
+    has_depth: bool
+
+
+def snap_scene(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, view: View, *, with_depth: bool) -> Snapped:
+    """Take arrays through transform, clip and snap.
+
+    Raises
+    ------
+    ValueError
+        If a vertex that a triangle uses is not finite, or lies beyond 2**62 sub-pixels.
+    IndexError
+        If a triangle names a vertex that does not exist.
+    """
+    points = as_vertices(vertices, has_transform=view.transform is not None)
+    corners = as_triangles(triangles, len(points))
+    is_clip_space = view.transform is not None or points.shape[1] == 4
+    n_triangles = len(corners)
+    if 0 in view.size:
+        corners = corners[:0]  # nothing to see
+    n = len(points) if len(corners) else 0
+    records = memory.empty("records", (n * _engine.VERTEX_BYTES,), np.uint8)
+    wide: NDArray[np.int64] | None = None
+    inv_w: NDArray[np.float64] | None = None
+    pieces: _engine.Pieces | None = None
+    bad = clipped = 0
+    if n and is_clip_space:
+        clip_points = transform_points(memory, points, view)
+        engine_view = _engine.View(view.viewport, view.subpixel_bits, view.zero_to_one, view.near_clip, view.far_clip)
+        inv_w = memory.empty("inv_w", (n,), np.float64)
+        bad, n_wide, clipped = _engine.project(clip_points, engine_view, records, None, inv_w)
+        if n_wide:
+            wide = np.empty((n, 2), np.int64)
+            _engine.project(clip_points, engine_view, records, wide, inv_w)
+    elif n:
+        bad, n_wide, _ = _engine.snap(points, view.subpixel_bits, with_depth, records, None)
+        if n_wide:
+            wide = np.empty((n, 2), np.int64)
+            _engine.snap(points, view.subpixel_bits, with_depth, records, wide)
+    if bad:
+        check_used_vertices(points, records, corners, view)
+    if clipped:
+        pieces = _engine.Pieces(clip_points, records, corners, engine_view)
+    scene = _engine.Scene(records, wide, inv_w, corners, pieces, *view.origin, view.subpixel_bits, view.cull, view.method)
+    return Snapped(scene, len(points), n_triangles, is_clip_space or points.shape[1] == 3)
+
+
+def transform_points(memory: Memory, points: NDArray[Any], view: View) -> NDArray[np.float64]:
+    """Return the vertices in clip space, (V, 4) float64."""
+    if view.transform is None:
+        return points
+    clip_points = memory.empty("clip_points", (len(points), 4), np.float64)
+    _engine.transform(points, as_matrix(view.transform, points.dtype), clip_points)
+    return clip_points
+
+
+def check_used_vertices(points: NDArray[Any], records: NDArray[np.uint8], corners: NDArray[np.int32], view: View) -> None:
+    """Raise an error for the first vertex that cannot be drawn, if a triangle uses it."""
+    i = _engine.first_bad(records, corners)
+    if i < 0:
+        return
+    row = points[i]
+    if not np.isfinite(row).all():
+        raise ValueError(f"vertices must be finite where a triangle uses them, got {row.tolist()} in row {i}")
+    if view.transform is not None:
+        raise ValueError(f"vertices must stay finite under transform, got {row.tolist()} in row {i}")
+    if abs(row[:2].astype(float)).max() < 2.0 ** (62 - view.subpixel_bits):
+        raise ValueError(f"vertices must have a depth that float32 can hold, got {row.tolist()} in row {i}")
+    raise ValueError(
+        f"vertices must lie within 2**{62 - view.subpixel_bits} pixels of 0 with {view.subpixel_bits} sub-pixel bits, "
+        f"got {row.tolist()} in row {i}"
+    )
+
+
+def draw(
+    snapped: Snapped,
+    view: View,
+    sink: Sink,
+    pixels: NDArray[Any],
+    *,
+    depth: NDArray[np.float32] | None = None,
+    colors: NDArray[Any] | None = None,
+) -> None:
+    """Draw a scene into contiguous buffers, in bands of rows."""
+    width, height = view.size
+    if not (width and height and snapped.n_triangles):
+        return
+    pixel_bytes = pixels.nbytes // (width * height)
+    color_bytes = None if colors is None else _engine.as_bytes(colors)
+    n_channels = 1 if colors is None or colors.ndim == 1 else colors.shape[1]
+    flat = _engine.as_bytes(pixels)
+
+    def draw_rows(first_row: int, n_rows: int) -> None:
+        snapped.scene.draw(sink, flat, depth, width, first_row, n_rows, pixel_bytes, color_bytes, n_channels)
+
+    run_bands(draw_rows, height, snapped.n_triangles, view.threads)
+
+
+@contextmanager
+def target(
+    memory: Memory, name: str, out: object, shape: tuple[int, ...], dtype: type, *, keep: bool = False
+) -> Iterator[tuple[NDArray[Any], NDArray[Any]]]:
+    """Give the array to return and a contiguous one to draw into; afterwards both are the same picture.
+
+    `keep`: what is in `out` shows through where nothing is drawn.
+    """
+    result = memory.empty(name, shape, dtype) if out is None else as_out("out", out, shape, dtype)
+    canvas = result if result.flags.c_contiguous else np.empty(shape, dtype)
+    if keep and canvas is not result:
+        canvas[...] = result
+    yield result, canvas
+    if canvas is not result:
+        result[...] = canvas
+
+
+def draw_coverage(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, view: View, out: object) -> NDArray[np.bool_]:
+    """`coverage`, on the memory given."""
+    snapped = snap_scene(memory, vertices, triangles, view, with_depth=False)
+    with target(memory, "coverage", out, view.size[::-1], np.bool_) as (result, canvas):
+        canvas.fill(False)
+        draw(snapped, view, Sink.MASK, canvas)
+    return result
+
+
+def draw_overdraw(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, view: View, out: object) -> NDArray[np.int32]:
+    """`overdraw`, on the memory given."""
+    snapped = snap_scene(memory, vertices, triangles, view, with_depth=False)
+    with target(memory, "overdraw", out, view.size[::-1], np.int32) as (result, canvas):
+        canvas.fill(0)
+        draw(snapped, view, Sink.COUNT, canvas)
+    return result
+
+
+def colors_are_flat(n_colors: int, snapped: Snapped, per: str) -> bool:
+    """Tell whether a row of colours belongs to a triangle; otherwise it belongs to a vertex."""
+    choice = parse(Per, "per", per)
+    n_triangles = snapped.n_triangles
+    fits_triangles, fits_vertices = n_colors == n_triangles, n_colors == snapped.n_vertices
+    if choice is Per.AUTO and fits_triangles and fits_vertices and n_colors:
+        raise ValueError(
+            f"colors has {n_colors} rows, and there are as many triangles as vertices: say per='triangle' or per='vertex'"
+        )
+    if choice is not Per.VERTEX and fits_triangles:
+        return True
+    if choice is not Per.TRIANGLE and fits_vertices:
+        return False
+    wish = {
+        Per.TRIANGLE: f"{n_triangles} rows, one per triangle",
+        Per.VERTEX: f"{snapped.n_vertices} rows, one per vertex",
+        Per.AUTO: f"{n_triangles} rows, one per triangle, or {snapped.n_vertices}, one per vertex",
+    }[choice]
+    raise ValueError(f"colors must have {wish}, got {n_colors}")
+
+
+def draw_fill(
+    memory: Memory,
+    vertices: ArrayLike,
+    triangles: ArrayLike,
+    colors: ArrayLike,
+    view: View,
+    per: str,
+    background: ArrayLike | None,
+    out: object,
+) -> NDArray[Any]:
+    """`fill`, on the memory given."""
+    palette = as_colors(colors)
+    snapped = snap_scene(memory, vertices, triangles, view, with_depth=False)
+    is_flat = colors_are_flat(len(palette), snapped, per)
+    shape = (*view.size[::-1], *palette.shape[1:])
+    ground = as_background(background, palette)
+    with target(memory, "fill", out, shape, palette.dtype.type, keep=ground is None) as (result, canvas):
+        if ground is not None:
+            canvas[...] = ground
+        elif out is None:
+            canvas.fill(0)
+        gouraud = Sink.GOURAUD_U8 if palette.dtype == np.uint8 else Sink.GOURAUD_F32
+        draw(snapped, view, Sink.FLAT if is_flat else gouraud, canvas, colors=palette)
+    return result
+
+
+def draw_fragments(
+    memory: Memory,
+    vertices: ArrayLike,
+    triangles: ArrayLike,
+    view: View,
+    depth_test: str | None,
+    background_depth: float | None,
+    out: object,
+) -> Fragments:
+    """`rasterize`, on the memory given."""
+    test = None if depth_test is None else parse(DepthTest, "depth_test", depth_test)
+    empty_depth = -np.inf if test is DepthTest.GREATER else np.inf
+    if out is None:
+        ids_out = depth_out = None
+    else:
+        try:
+            ids_out, depth_out = out  # type: ignore[misc]
+        except (TypeError, ValueError):
+            raise TypeError(f"out must be a pair (triangle, depth) of arrays, got {type(out).__name__}") from None
+    snapped = snap_scene(memory, vertices, triangles, view, with_depth=True)
+    sink = {None: Sink.ID, DepthTest.LESS: Sink.NEAREST, DepthTest.GREATER: Sink.FARTHEST}[test]
+    shape = view.size[::-1]
+    with (
+        target(memory, "triangle", ids_out, shape, np.int32) as (ids, ids_canvas),
+        target(memory, "depth", depth_out, shape, np.float32) as (depth, depth_canvas),
+    ):
+        ids_canvas.fill(-1)
+        depth_canvas.fill(empty_depth)
+        draw(snapped, view, sink if snapped.has_depth else Sink.ID, ids_canvas, depth=depth_canvas)
+        if background_depth is not None:
+            depth_canvas[ids_canvas < 0] = background_depth
+    return Fragments(ids, depth, snapped.scene, snapped.n_vertices, snapped.n_triangles)

@@ -1,0 +1,75 @@
+"""The options that all verbs share, checked once per call."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypedDict
+
+from numpy.typing import ArrayLike
+
+from topleft.arrays import as_size, as_subpixel_bits, as_window
+from topleft.methods import production_method
+from topleft.models import ClipDepth, Cull, Sampling, parse
+from topleft.threads import parse_threads
+
+__all__ = ["View", "ViewOptions"]
+
+CULL_CODES = {Cull.NONE: 0, Cull.BACK: 1, Cull.FRONT: 2}  # tl_cull in csrc/topleft.h
+
+
+class ViewOptions(TypedDict, total=False):
+    """The options that all verbs share; `docs/design.md`, section 2, tells what each does."""
+
+    transform: ArrayLike | None
+    origin: tuple[int, int]
+    viewport: tuple[int, int] | None
+    subpixel_bits: int
+    sampling: str
+    method: str
+    cull: str
+    clip_depth: str
+    near_clip: bool
+    far_clip: bool
+    threads: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """Checked `ViewOptions`."""
+
+    size: tuple[int, int]
+    origin: tuple[int, int]
+    viewport: tuple[int, int]
+    transform: ArrayLike | None
+    subpixel_bits: int
+    method: int
+    cull: int
+    zero_to_one: bool
+    near_clip: bool
+    far_clip: bool
+    threads: int | None
+
+    @classmethod
+    def parse(cls, size: object, options: ViewOptions) -> View:
+        """Check the options of a call."""
+        unknown = sorted(set(options) - set(ViewOptions.__annotations__))
+        if unknown:
+            raise TypeError(f"unknown option {unknown[0]!r}; the options are {', '.join(ViewOptions.__annotations__)}")
+        checked_size = as_size(size)
+        bits = as_subpixel_bits(options.get("subpixel_bits", 8))
+        viewport = options.get("viewport")
+        parse(Sampling, "sampling", options.get("sampling", "center"))
+        return cls(
+            size=checked_size,
+            origin=as_window(options.get("origin", (0, 0)), bits),
+            viewport=checked_size if viewport is None else as_size(viewport, "viewport", smallest=1),
+            transform=options.get("transform"),
+            subpixel_bits=bits,
+            method=production_method(options.get("method", "auto")),
+            cull=CULL_CODES[parse(Cull, "cull", options.get("cull", "none"))],
+            zero_to_one=parse(ClipDepth, "clip_depth", options.get("clip_depth", "minus_one_to_one"))
+            is ClipDepth.ZERO_TO_ONE,
+            near_clip=bool(options.get("near_clip", True)),
+            far_clip=bool(options.get("far_clip", True)),
+            threads=parse_threads(options.get("threads")),
+        )
