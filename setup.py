@@ -171,7 +171,7 @@ class BuildEngine(build_ext):
             elif wanted is not None:
                 raise CompileError(f"TOPLEFT_BUILD_ISA asks for {isa.name}, which this compiler cannot build")
             else:
-                self.announce(f"topleft: no {isa.name} unit, this compiler cannot build it", 3)
+                self.warn(f"no {isa.name} unit: this compiler cannot build it")
         return chosen
 
     def accepts(self, flags: list[str], text: str) -> bool:

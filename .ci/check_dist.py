@@ -1,0 +1,49 @@
+"""Check the contents of one sdist and one wheel: `check_dist.py FOLDER`."""
+
+import sys
+import tarfile
+import zipfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+def files_below(*folders: str) -> set[str]:
+    """Return the source files of the checkout below some folders, without what builds and tests leave there."""
+    skipped = {"__pycache__", ".hypothesis"}
+    paths = [path for folder in folders for path in ROOT.joinpath(folder).rglob("*") if path.is_file()]
+    paths = [path for path in paths if path.suffix not in {".so", ".pyc"} and not skipped & set(path.parts)]
+    return {path.relative_to(ROOT).as_posix() for path in paths if ".egg-info/" not in path.as_posix()}
+
+
+def check(title: str, found: set[str], wanted: set[str], forbidden: set[str]) -> None:
+    """End with a message when a wanted file is missing or a forbidden one is there."""
+    for problem, names in (("lacks", wanted - found), ("must not hold", found & forbidden)):
+        if names:
+            sys.exit(f"{title} {problem}: {', '.join(sorted(names))}")
+    print(f"{title}: {len(found)} files")
+
+
+def main(folder: Path) -> None:
+    (wheel,) = folder.glob("*.whl")
+    (sdist,) = folder.glob("*.tar.gz")
+    with zipfile.ZipFile(wheel) as archive:
+        in_wheel = set(archive.namelist())
+    with tarfile.open(sdist) as archive:
+        in_sdist = {member.name.partition("/")[2] for member in archive.getmembers() if member.isfile()}
+
+    package = {name.removeprefix("src/") for name in files_below("src/topleft")}
+    modules = {name for name in package if name.endswith((".py", ".pyi", "py.typed"))}
+    extensions = {name for name in in_wheel if name.startswith("topleft/_engine.") and name.endswith((".so", ".pyd"))}
+    metadata = {name for name in in_wheel if ".dist-info/" in name}
+    if len(extensions) != 1 or not any(name.endswith("/licenses/LICENSE") for name in metadata):
+        sys.exit(f"{wheel.name} must hold one compiled module and the license, got {sorted(extensions | metadata)}")
+    check(wheel.name, in_wheel, modules, in_wheel - modules - extensions - metadata)
+
+    top = {"LICENSE", "MANIFEST.in", "README.md", "pyproject.toml", "setup.py"}
+    built = {name for name in in_sdist if name.endswith((".so", ".o", ".pyc")) or name == "src/topleft/_engine.c"}
+    check(sdist.name, in_sdist, top | files_below("csrc", "src", "tests"), built)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

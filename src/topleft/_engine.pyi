@@ -1,0 +1,83 @@
+"""The types of the compiled module. Functions and classes are described in _engine.pyx and _dispatch.pxi."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+VERTEX_BYTES: int
+SCALARS: dict[np.dtype[Any], int]
+
+def use_isa(name: str) -> None: ...
+def isa_in_use() -> str: ...
+def isa_built() -> list[str]: ...
+def isa_available() -> list[str]: ...
+def compiler_info() -> dict[str, object]: ...
+def as_bytes(array: NDArray[Any]) -> NDArray[np.uint8]: ...
+def snap(
+    vertices: NDArray[Any],
+    subpixel_bits: int,
+    with_depth: bool,
+    records: NDArray[np.uint8],
+    wide: NDArray[np.int64] | None,
+) -> tuple[int, int, int]: ...
+def transform(vertices: NDArray[Any], matrix: NDArray[Any], vertices_clip: NDArray[np.float64]) -> None: ...
+def project(
+    vertices_clip: NDArray[np.float64],
+    view: View,
+    records: NDArray[np.uint8],
+    wide: NDArray[np.int64] | None,
+    inv_w: NDArray[np.float64],
+) -> tuple[int, int, int]: ...
+def first_bad(records: NDArray[np.uint8], triangles: NDArray[np.int32]) -> int: ...
+
+class View:
+    def __init__(
+        self, viewport: tuple[int, int], subpixel_bits: int, zero_to_one: bool, near_clip: bool, far_clip: bool
+    ) -> None: ...
+
+class Pieces:
+    def __init__(
+        self,
+        vertices_clip: NDArray[np.float64],
+        records: NDArray[np.uint8],
+        triangles: NDArray[np.int32],
+        view: View,
+    ) -> None: ...
+    def __len__(self) -> int: ...
+
+class Scene:
+    def __init__(
+        self,
+        records: NDArray[np.uint8],
+        wide: NDArray[np.int64] | None,
+        inv_w: NDArray[np.float64] | None,
+        triangles: NDArray[np.int32],
+        pieces: Pieces | None,
+        x_px: int,
+        y_px: int,
+        subpixel_bits: int,
+        cull: int,
+        method: int,
+    ) -> None: ...
+    def draw(
+        self,
+        sink: int,
+        pixels: NDArray[np.uint8],
+        depth: NDArray[np.float32] | None,
+        width: int,
+        first_row: int,
+        n_rows: int,
+        pixel_bytes: int,
+        colors: NDArray[np.uint8] | None,
+        n_channels: int,
+    ) -> None: ...
+    def barycentric(self, ids: NDArray[np.int32], out: NDArray[np.float32]) -> None: ...
+    def interpolate(
+        self,
+        ids: NDArray[np.int32],
+        values: NDArray[np.float32],
+        per_corner: bool,
+        background: float,
+        out: NDArray[np.float32],
+    ) -> None: ...

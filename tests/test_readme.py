@@ -1,0 +1,47 @@
+"""The programs of the README run as they stand there."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from topleft import scenes
+
+README = Path(__file__).parent.parent.joinpath("README.md").read_text(encoding="utf-8")
+PROGRAMS = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_readme_mask_is_a_star(folder):
+    exec(PROGRAMS[0], {})
+    with Image.open(folder / "star.png") as image:
+        assert image.size == (256, 256)
+        assert (np.asarray(image)[128, [0, 128, 255]] != 0).tolist() == [False, True, False]
+
+
+def test_readme_depth_and_id_map_agree(folder):
+    pytest.importorskip("trimesh")
+    vertices, triangles = scenes.shape("icosahedron")
+    lines = [f"v {x} {y} {z}" for x, y, z in vertices] + [f"f {a} {b} {c}" for a, b, c in triangles + 1]
+    folder.joinpath("bunny.obj").write_text("\n".join(lines) + "\n")
+    exec(PROGRAMS[1], {})
+    with np.load("view.npz") as view:
+        assert view["triangle"].shape == (480, 640)
+        assert view["triangle"].max() < len(triangles)
+        assert np.array_equal(view["triangle"] >= 0, np.isfinite(view["depth"]))
+        assert view["triangle"][240, 320] >= 0
+
+
+def test_readme_has_the_two_commands():
+    commands = re.findall(r"```sh\n(.*?)\n```", README, flags=re.DOTALL)
+    assert commands == [
+        "pip install '.[render]' && topleft render torus-knot -o knot.png",
+        "pip install '.[test]' && python -m pytest",
+    ]
