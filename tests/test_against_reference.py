@@ -1,0 +1,279 @@
+"""Every verb against the exact reference: `==` for integers, a derived bound for floats."""
+
+import comparing
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from strategies import (
+    CLIP_SCENES,
+    PIXEL_SCENES,
+    Scene,
+    clip_scenes,
+    fan,
+    floor,
+    jittered_grid,
+    pixel_scenes,
+    soup,
+    sphere_round_the_eye,
+    t_junctions,
+    with_depth,
+)
+
+import topleft as tl
+
+PIXEL = pytest.mark.parametrize("make", PIXEL_SCENES.values(), ids=PIXEL_SCENES)
+CLIP = pytest.mark.parametrize("make", CLIP_SCENES.values(), ids=CLIP_SCENES)
+DEPTH_TEST = pytest.mark.parametrize("depth_test", ["less", "greater", None])
+
+
+def scenes(make, n):
+    """n scenes of a generator, each with the random numbers that it was made from."""
+    for seed in range(n):
+        rng = np.random.default_rng(seed)
+        yield make(rng), rng
+
+
+# ---- coverage and overdraw ------------------------------------------------------------------------------------------
+
+
+@PIXEL
+def test_overdraw_adversarial_pixels_equals_reference(make):
+    for scene, _ in scenes(make, 40):
+        comparing.check_overdraw(scene)
+
+
+@CLIP
+def test_overdraw_adversarial_clip_space_equals_reference(make):
+    for scene, _ in scenes(make, 40):
+        comparing.check_overdraw(scene)
+
+
+@settings(max_examples=1000)
+@given(pixel_scenes())
+def test_overdraw_any_pixels_equals_reference(scene):
+    comparing.check_overdraw(scene)
+
+
+@settings(max_examples=1000)
+@given(clip_scenes())
+def test_overdraw_any_clip_space_equals_reference(scene):
+    comparing.check_overdraw(scene)
+
+
+@pytest.mark.parametrize("bits", range(17))
+def test_overdraw_each_number_of_bits_equals_reference(bits):
+    xy = np.random.default_rng(bits).uniform(-6, 18, (90, 2))
+    comparing.check_overdraw(soup(xy, (12, 12), subpixel_bits=bits))
+
+
+def test_overdraw_meshes_that_fill_the_frame_cover_each_sample_once():
+    for make in (jittered_grid, sphere_round_the_eye):
+        for scene, _ in scenes(make, 60):
+            assert (comparing.check_overdraw(scene) == 1).all()
+
+
+def test_overdraw_closed_fan_covers_no_sample_twice():
+    for scene, _ in scenes(fan, 30):
+        counts = comparing.check_overdraw(scene)
+        assert counts.max() == 1
+        hub, ring = scene.vertices[-1], scene.vertices[:-1]
+        rows, columns = np.indices(counts.shape) + 0.5
+        distance = np.hypot(columns - hub[0], rows - hub[1])
+        assert counts[distance < 0.99 * np.hypot(*(ring - hub).T).min()].all()
+
+
+def test_overdraw_floor_through_the_near_plane_covers_each_sample_once():
+    for scene, _ in scenes(floor, 30):
+        counts = comparing.check_overdraw(scene)
+        assert counts.max() == 1
+        assert (counts[len(counts) // 2 + 1 :] == 1).all()  # below the horizon
+
+
+def test_overdraw_t_junctions_on_the_grid_leave_no_gap():
+    for scene, _ in scenes(t_junctions, 60):
+        counts = comparing.check_overdraw(scene)
+        if (scene.vertices * 256 % 1 == 0).all():
+            assert counts.max() == 1
+
+
+@pytest.mark.parametrize("make", [jittered_grid, fan], ids=lambda f: f.__name__)
+def test_overdraw_large_picture_equals_int64_reference(make):
+    scene = make(np.random.default_rng(5), 400 if make is fan else 60, 1400)
+    counts, ids = comparing.overdraw_int64(scene)
+    for method in comparing.METHODS:
+        comparing.assert_exact(tl.overdraw(*scene.arrays, method=method), counts)
+        comparing.assert_exact(tl.rasterize(*scene.arrays, method=method).triangle, ids)
+
+
+def test_overdraw_large_soups_equal_int64_reference():
+    for seed, reach in enumerate([0.01, 0.1, 1.0, 8.0]):
+        rng = np.random.default_rng(seed)
+        n = int(40 / max(reach, 0.1))
+        xy = rng.uniform(0, 900, (n, 1, 2)) + rng.uniform(-900, 900, (n, 3, 2)) * reach
+        scene = soup(xy.reshape(-1, 2), (900, 700), origin=(13, -5))
+        counts, ids = comparing.overdraw_int64(scene)
+        for method in comparing.METHODS:
+            comparing.assert_exact(tl.overdraw(*scene.arrays, method=method, **scene.view), counts)
+            comparing.assert_exact(tl.rasterize(*scene.arrays, method=method, **scene.view).triangle, ids)
+
+
+def test_reference_and_int64_reference_agree():
+    for scene, _ in scenes(jittered_grid, 5):
+        counts, ids = comparing.overdraw_int64(scene)
+        assert (counts == comparing.ref.overdraw(*scene.arrays)).all()
+        assert (ids == comparing.ref.ids(*scene.arrays)).all()
+
+
+# ---- ids and depth --------------------------------------------------------------------------------------------------
+
+
+@PIXEL
+def test_rasterize_painters_order_equals_reference(make):
+    for scene, _ in scenes(make, 10):
+        comparing.check_painters_ids(scene)
+
+
+@DEPTH_TEST
+@PIXEL
+def test_rasterize_flat_depths_with_ties_equal_reference(make, depth_test):
+    for scene, rng in scenes(make, 6):
+        comparing.check_ids(with_depth(scene, rng, flat=True), depth_test)
+
+
+@DEPTH_TEST
+@PIXEL
+def test_rasterize_sloping_depths_within_bound(make, depth_test):
+    for scene, rng in scenes(make, 4):
+        comparing.check_fragments(with_depth(scene, rng), depth_test)
+
+
+@DEPTH_TEST
+@CLIP
+def test_rasterize_clip_space_depths_within_bound(make, depth_test):
+    for scene, _ in scenes(make, 8):
+        comparing.check_fragments(scene, depth_test)
+
+
+@given(pixel_scenes(n_components=3), st.sampled_from(["less", "greater", None]))
+def test_rasterize_any_pixels_within_bound(scene, depth_test):
+    comparing.check_fragments(scene, depth_test)
+
+
+@given(clip_scenes(), st.sampled_from(["less", "greater", None]))
+def test_rasterize_any_clip_space_within_bound(scene, depth_test):
+    comparing.check_fragments(scene, depth_test)
+
+
+@pytest.mark.parametrize("depth_test", ["less", "greater"])
+def test_rasterize_each_triangle_alone_explains_the_whole(depth_test):
+    for scene, rng in scenes(jittered_grid, 6):
+        scene = with_depth(scene, rng)
+        alone = [
+            tl.rasterize(scene.vertices, t[None], scene.size, depth_test=depth_test).depth for t in scene.triangles
+        ]
+        best = np.min(alone, 0) if depth_test == "less" else np.max(alone, 0)
+        whole = tl.rasterize(*scene.arrays, depth_test=depth_test)
+        comparing.assert_same(whole.depth, best)
+        first = np.where(np.isfinite(best), np.argmax(alone == best, axis=0), -1).astype(np.int32)
+        comparing.assert_same(whole.triangle, first)
+
+
+# ---- attributes -----------------------------------------------------------------------------------------------------
+
+
+@PIXEL
+def test_interpolate_pixels_within_bound(make):
+    for scene, rng in scenes(make, 4):
+        comparing.check_attributes(scene, rng.uniform(-100, 100, (len(scene.vertices), 2)).astype(np.float32))
+
+
+@CLIP
+def test_interpolate_clip_space_within_bound(make):
+    for scene, rng in scenes(make, 8):
+        comparing.check_attributes(scene, rng.uniform(-100, 100, (len(scene.vertices), 2)).astype(np.float32))
+
+
+@given(pixel_scenes(), st.integers(0, 2**32 - 1))
+def test_interpolate_any_pixels_within_bound(scene, seed):
+    values = np.random.default_rng(seed).uniform(-1, 1, (len(scene.vertices), 1)).astype(np.float32)
+    comparing.check_attributes(scene, values)
+
+
+@given(clip_scenes(), st.integers(0, 2**32 - 1))
+def test_interpolate_any_clip_space_within_bound(scene, seed):
+    values = np.random.default_rng(seed).uniform(-1, 1, (len(scene.vertices), 1)).astype(np.float32)
+    comparing.check_attributes(scene, values)
+
+
+# ---- fill -----------------------------------------------------------------------------------------------------------
+
+
+@PIXEL
+def test_fill_flat_equals_reference(make):
+    for scene, rng in scenes(make, 6):
+        colors = rng.integers(0, 256, (len(scene.triangles), rng.integers(1, 5)), np.uint8)
+        comparing.check_fill_uint8(scene, colors, "triangle")
+
+
+@PIXEL
+def test_fill_gouraud_uint8_equals_reference(make):
+    for scene, rng in scenes(make, 6):
+        colors = rng.integers(0, 256, (len(scene.vertices), rng.integers(1, 5)), np.uint8)
+        comparing.check_fill_uint8(scene, colors, "vertex")
+
+
+@given(pixel_scenes(), st.integers(0, 2**32 - 1), st.integers(1, 4))
+def test_fill_any_gouraud_uint8_equals_reference(scene, seed, n_channels):
+    rng = np.random.default_rng(seed)
+    colors = rng.choice([0, 1, 2, 127, 128, 254, 255], (len(scene.vertices), n_channels)).astype(np.uint8)
+    comparing.check_fill_uint8(scene, colors, "vertex")
+
+
+@PIXEL
+def test_fill_gouraud_float32_within_bound(make):
+    for scene, rng in scenes(make, 4):
+        comparing.check_fill_float32(scene, rng.uniform(-3, 3, (len(scene.vertices), 3)).astype(np.float32))
+
+
+@CLIP
+def test_fill_flat_clip_space_equals_reference(make):
+    for scene, rng in scenes(make, 6):
+        colors = rng.integers(0, 256, (len(scene.triangles), 3), np.uint8)
+        comparing.check_fill_uint8(scene, colors, "triangle")
+
+
+@CLIP
+def test_fill_gouraud_uint8_clip_space_but_for_ties_equals_reference(make):
+    for scene, rng in scenes(make, 8):
+        comparing.check_fill_uint8_cut(scene, rng.integers(0, 256, (len(scene.vertices), 3), np.uint8))
+
+
+@CLIP
+def test_fill_gouraud_float32_clip_space_within_bound(make):
+    for scene, rng in scenes(make, 8):
+        comparing.check_fill_float32(scene, rng.uniform(-3, 3, (len(scene.vertices), 2)).astype(np.float32))
+
+
+def test_fill_float32_flat_colours_are_copied():
+    scene = jittered_grid(np.random.default_rng(3))
+    colors = np.random.default_rng(4).standard_normal((len(scene.triangles), 3)).astype(np.float32)
+    ids = comparing.ref.ids(*scene.arrays)
+    comparing.assert_exact(tl.fill(scene.vertices, scene.triangles, colors, scene.size, per="triangle"), colors[ids])
+
+
+# ---- nothing to see -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("w", [-1.0, -1e-300, 0.0, 1e-300])
+def test_rasterize_all_behind_the_eye_is_nothing(w):
+    rng = np.random.default_rng(0)
+    positions = rng.uniform(-1, 1, (60, 4)) * [1, 1, 1, 0] + [0, 0, 0, w]
+    scene = soup(positions, (9, 7), near_clip=False, far_clip=False)
+    assert not comparing.check_overdraw(scene).any()
+    assert (tl.rasterize(*scene.arrays, **scene.view).triangle == -1).all()
+
+
+def test_overdraw_no_triangles_is_empty():
+    scene = Scene(np.zeros((3, 2)), np.zeros((0, 3), np.int64), (4, 3))
+    assert not comparing.check_overdraw(scene).any()
