@@ -7,7 +7,7 @@ Matrices act on columns: `clip = projection @ view @ [x, y, z, 1]`.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol
+from typing import Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -22,13 +22,17 @@ FRAMING_MARGIN = 1.05
 """The bounding sphere fills 1 / 1.05 of the frame, so that no outline touches its border."""
 
 
+@runtime_checkable
 class HasTriangles(Protocol):
     """What `Camera.framing` looks at: a `Mesh`, or anything like it."""
 
     @property
-    def vertices(self) -> npt.NDArray[Any]: ...
+    def vertices(self) -> npt.NDArray[Any]:
+        """Positions (V, 3)."""
+
     @property
-    def triangles(self) -> npt.NDArray[Any]: ...
+    def triangles(self) -> npt.NDArray[Any]:
+        """Rows of vertex indices (T, 3)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -277,8 +281,8 @@ def bounding_sphere(subject: HasTriangles | npt.ArrayLike) -> tuple[F64, float]:
     ValueError
         If there is no point, or one is not finite.
     """
-    if hasattr(subject, "triangles"):
-        points = np.asarray(subject.vertices, dtype=np.float64)[np.asarray(subject.triangles).ravel()]
+    if isinstance(subject, HasTriangles):
+        points = np.asarray(subject.vertices, dtype=np.float64)[subject.triangles.ravel()]
     else:
         points = np.asarray(subject, dtype=np.float64)
     if points.ndim != 2 or points.shape[1] != 3:

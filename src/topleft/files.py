@@ -13,7 +13,7 @@ import re
 import secrets
 import warnings
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any
 
@@ -85,19 +85,21 @@ def load(path: str | os.PathLike[str]) -> Mesh:
         if not parts:
             raise MeshError(f"{str(path)!r} has no triangles")
         return _joined(parts)
+    except FileNotFoundError as error:  # the mesh is there: glTF and others name more files
+        raise MeshError(f"cannot read {str(path)!r}: broken, or without a file that it names ({error})") from error
     except (MeshError, OSError, MemoryError):
         raise
     except NotImplementedError:
         readable = " ".join(sorted(trimesh.available_formats()))
         raise MeshError(f"cannot read {str(path)!r}: format {path.suffix!r} is none of {readable}") from None
     except ImportError as error:
-        # Without this package trimesh reads UTF-8 only, so its absence here means a file that is no text.
-        if getattr(error, "name", None) != "charset_normalizer":
+        # trimesh asks for these to guess the encoding of what is not UTF-8: here, of a file that is no text.
+        if getattr(error, "name", None) not in ("charset_normalizer", "chardet"):
             raise MissingPackageError(f"reading {path.suffix!r} needs another package: {error}") from error
-        raise MeshError(f"cannot read {str(path)!r}: not a {path.suffix!r} file, or broken") from error
+        raise MeshError(f"cannot read {str(path)!r}: broken, or not a {path.suffix!r} file") from error
     except Exception as error:  # a reader meets broken bytes in its own way: KeyError, struct.error, ...
         reason = " ".join(str(error).split()) or type(error).__name__
-        raise MeshError(f"cannot read {str(path)!r}: {reason}") from error
+        raise MeshError(f"cannot read {str(path)!r}: broken, or not a {path.suffix!r} file ({reason})") from error
 
 
 def save_image(
@@ -129,13 +131,14 @@ def save_image(
     if suffix not in SUFFIXES:
         raise ImageError(f"cannot write {str(path)!r}: format {path.suffix!r} is none of {' '.join(SUFFIXES)}")
     if suffix == ".npz":
-        arrays = image if isinstance(image, Mapping) else {"image": image}
+        arrays: dict[str, Any] = dict(image) if isinstance(image, Mapping) else {"image": image}
         _write_whole(path, lambda file: np.savez_compressed(file, **arrays))
         return
     if isinstance(image, Mapping):
         raise ImageError(f"cannot write {str(path)!r}: several arrays by name need .npz")
     if suffix == ".npy":
-        _write_whole(path, lambda file: np.save(file, image, allow_pickle=False))
+        array = image
+        _write_whole(path, lambda file: np.save(file, array, allow_pickle=False))
         return
     if image.dtype != np.uint8 or image.ndim not in (2, 3) or image.shape[2:] not in ((), (3,), (4,)):
         raise ImageError(
@@ -166,14 +169,24 @@ def _write_whole(path: Path, write: Callable[[IO[bytes]], object]) -> None:
         with open(temporary, "xb") as file:
             write(file)
         os.replace(temporary, path)
+    except OSError as error:
+        _remove(temporary)
+        if error.errno is None:
+            raise
+        raise type(error)(error.errno, f"cannot write: {error.strerror}", str(path)) from error
     except BaseException:
-        temporary.unlink(missing_ok=True)
+        _remove(temporary)
         raise
+
+
+def _remove(temporary: Path) -> None:
+    with suppress(OSError):  # it was never made
+        temporary.unlink()
 
 
 @contextmanager
 def _strict_parsing() -> Iterator[None]:
-    """Make NumPy's text reader fail where it would stop in the middle of a broken file; keep trimesh off stderr."""
+    """Make NumPy's text reader fail where it stops in a broken file (old ones only warn); keep trimesh off stderr."""
     logger = logging.getLogger("trimesh")
     quiet = logging.NullHandler()
     logger.addHandler(quiet)  # a logger without a handler prints its warnings
@@ -193,7 +206,7 @@ def _plain_obj(path: Path) -> bytes:
     """
     text = path.read_bytes().decode("utf-8", errors="replace").replace("\r\n", "\n").replace("\\\n", " ")
     if "\0" in text:
-        raise MeshError(f"cannot read {str(path)!r}: not a text file")
+        raise MeshError(f"cannot read {str(path)!r}: broken, or not a '.obj' file (it is not text)")
     text = re.sub(r"^[ \t]*(usemtl|mtllib|[ogs])\b.*$", "", text, flags=re.MULTILINE)
     if re.search(r"^[ \t]*f\b.*-\d", text, flags=re.MULTILINE):
         text = "\n".join(_absolute_indices(text.split("\n")))

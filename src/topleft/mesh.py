@@ -9,6 +9,7 @@ Tools 3(1), 1998 (normals weighted by the angle at the vertex).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -97,11 +98,15 @@ class Mesh:
         Returns
         -------
         (V, 3) float
-            Unit length where computed here; (0, 0, 0) for a vertex that no triangle with an area uses.
+            Read-only. Unit length where computed here, once; (0, 0, 0) for a vertex that no triangle with an area uses.
         """
         if self.normals is not None:
             return self.normals
-        return angle_weighted_normals(self.vertices, self.triangles)
+        return self._computed_normals
+
+    @cached_property
+    def _computed_normals(self) -> FloatArray:
+        return _read_only(angle_weighted_normals(self.vertices, self.triangles))
 
 
 def angle_weighted_normals(vertices: FloatArray, triangles: I32) -> F64:
@@ -127,18 +132,18 @@ def angle_weighted_normals(vertices: FloatArray, triangles: I32) -> F64:
     G. Thurmer and C. A. Wuthrich, "Computing Vertex Normals from Polygonal Facets", Journal of Graphics Tools 3(1),
     1998.
     """
-    corners = np.asarray(vertices, dtype=np.float64)[triangles]
-    onward = np.roll(corners, -1, axis=1) - corners
-    back = np.roll(corners, 1, axis=1) - corners
-    # atan2 keeps its accuracy for needles, where the arc cosine of a rounded quotient loses it.
-    twice_area = np.linalg.norm(np.cross(onward[:, 0], back[:, 0]), axis=1)
-    angle = np.arctan2(twice_area[:, None], (onward * back).sum(axis=2))
-    weighted = angle[..., None] * face_normals(vertices, triangles)[:, None]
-    total = np.empty((len(vertices), 3))
-    index = triangles.ravel()
-    for axis in range(3):
-        total[:, axis] = np.bincount(index, weighted[..., axis].ravel(), minlength=len(vertices))
-    return unit_or_zero(total)
+    a, b, c = _corners(vertices, triangles)
+    ab, bc, ca = b - a, c - b, a - c
+    area_vectors = np.cross(ca, ab)
+    twice_area = np.sqrt(np.einsum("ij,ij->i", area_vectors, area_vectors))
+    faces = np.ascontiguousarray(unit_or_zero(area_vectors).T)
+    total = np.zeros((3, len(vertices)))
+    for corner, (back, onward) in enumerate([(ca, ab), (ab, bc), (bc, ca)]):
+        # atan2 keeps its accuracy for needles, where the arc cosine of a rounded quotient loses it.
+        angle = np.arctan2(twice_area, -np.einsum("ij,ij->i", back, onward))
+        for axis in range(3):
+            total[axis] += np.bincount(triangles[:, corner], angle * faces[axis], minlength=len(vertices))
+    return unit_or_zero(total.T)
 
 
 def face_normals(vertices: FloatArray, triangles: I32) -> F64:
@@ -146,13 +151,13 @@ def face_normals(vertices: FloatArray, triangles: I32) -> F64:
 
     (0, 0, 0) for a triangle without area.
     """
-    a, b, c = (np.asarray(vertices, dtype=np.float64)[triangles[:, corner]] for corner in range(3))
+    a, b, c = _corners(vertices, triangles)
     return unit_or_zero(np.cross(b - a, c - a))
 
 
 def unit_or_zero(vectors: F64) -> F64:
     """Vectors (N, 3) scaled to length 1; zero stays zero."""
-    length = np.sqrt((vectors * vectors).sum(axis=-1, keepdims=True))
+    length = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))[:, None]
     return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
 
 
@@ -184,6 +189,12 @@ def coincident(*attributes: npt.NDArray[Any]) -> tuple[npt.NDArray[np.intp], npt
     return first, group
 
 
+def _corners(vertices: FloatArray, triangles: I32) -> tuple[F64, F64, F64]:
+    """Positions (T, 3) of the first, second and third corner of the triangles."""
+    points = np.asarray(vertices, dtype=np.float64)
+    return points[triangles[:, 0]], points[triangles[:, 1]], points[triangles[:, 2]]
+
+
 def _real_array(values: npt.ArrayLike, name: str) -> FloatArray:
     array = as_array(name, values)
     if array.dtype.kind not in "fiu":
@@ -204,9 +215,13 @@ def _color_array(values: npt.ArrayLike, n_vertices: int) -> U8:
 
 
 def _check_finite(vertices: FloatArray, triangles: I32) -> None:
-    bad = ~np.isfinite(vertices).all(axis=1)
-    if bad.any() and bad[triangles].any():
-        row = int(triangles.ravel()[bad[triangles.ravel()]].min())
+    finite = np.isfinite(vertices)
+    if finite.all():
+        return
+    used = triangles.ravel()
+    bad = used[~finite[used].all(axis=1)]
+    if len(bad):
+        row = int(bad.min())
         raise ValueError(f"vertices[{row}] = {vertices[row].tolist()} must be finite: a triangle uses it")
 
 

@@ -6,6 +6,7 @@ Tests, benchmarks, docs and the command line all draw from here, so a picture ca
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any
@@ -109,7 +110,7 @@ def to_pixels(clip: F64, width: int = 1920, height: int = 1080) -> F64:
 # Shapes in object space: closed, outward counter-clockwise
 
 
-def blob(n_triangles: int, seed: int = 3) -> Shape:
+def blob(n_triangles: int, seed: int = 3) -> Shape:  # noqa: ARG001
     """A bumpy sphere of about `n_triangles`, radius about 1, with a vertex per column at either pole.
 
     `seed` is there for the sake of the signature that all scenes share; the bumps are a formula.
@@ -119,7 +120,7 @@ def blob(n_triangles: int, seed: int = 3) -> Shape:
     vertices : (m, 3) float64, object space
     triangles : (k, 3) int32; those at the poles have no area
     """
-    columns = max(8, int(round(np.sqrt(n_triangles))))
+    columns = max(8, round(math.sqrt(n_triangles)))
     rows = max(4, n_triangles // (2 * columns))
     theta = np.linspace(0, np.pi, rows + 1)[:, None]
     phi = np.linspace(0, 2 * np.pi, columns, endpoint=False)[None, :]
@@ -144,10 +145,9 @@ def _smooth_blob(n_triangles: int = 20_000) -> Shape:
     remap = np.arange(len(vertices))
     remap[:columns] = 0
     remap[-columns:] = len(vertices) - columns
-    triangles = remap[triangles]
-    a, b, c = triangles.T
-    triangles = triangles[(a != b) & (b != c) & (c != a)]
-    used, compact = np.unique(triangles, return_inverse=True)
+    a, b, c = remap[triangles].T
+    has_area = (a != b) & (b != c) & (c != a)
+    used, compact = np.unique(remap[triangles[has_area]], return_inverse=True)
     return vertices[used], compact.reshape(-1, 3).astype(np.int32)
 
 
@@ -171,9 +171,7 @@ def torus_knot(
     tangent = np.stack(
         [ring_t * cos - p * ring * sin, ring_t * sin + p * ring * cos, 0.5 * q * np.cos(q * t)], axis=-1
     )
-    outward_of_torus = np.stack(
-        [np.cos(q * t) * cos, np.cos(q * t) * sin, np.sin(q * t)], axis=-1
-    )
+    outward_of_torus = np.stack([np.cos(q * t) * cos, np.cos(q * t) * sin, np.sin(q * t)], axis=-1)
     return _tube(curve, tangent, outward_of_torus, tube_radius, sections)
 
 

@@ -6,7 +6,8 @@ Light is added up in linear light: colours are decoded from sRGB, lit, and encod
 half the light is half as bright on a screen. Alpha of a mesh is not looked at: triangles are opaque.
 
 Based on: Phong, B. T., "Illumination for Computer Generated Pictures", Communications of the ACM 18(6), 1975 (normals
-interpolated, light computed in the pixel).
+interpolated, light computed in the pixel); Mitchell, J., G. McTaggart and C. Green, "Shading in Valve's Source Engine",
+SIGGRAPH 2006 courses (the half-Lambert fall-off, there with the power 2).
 """
 
 from __future__ import annotations
@@ -38,16 +39,20 @@ class Shading(StrEnum):
     NORMALS = "normals"
 
 
-DEFAULT_COLOR = (205, 203, 198)
+DEFAULT_COLOR = (224, 222, 217)
 """sRGB of a mesh without colours: a light warm grey, in which light and shadow both have room."""
 
 TO_LIGHT = np.array([-0.35, 0.45, 1.0]) / np.linalg.norm([-0.35, 0.45, 1.0])
 """Direction of the headlight in eye space: from over the viewer's left shoulder, so that up and left read as lit."""
 
-AMBIENT = 0.10
+AMBIENT = 0.03
 """Share of the light, in linear light, that reaches a surface from all sides."""
 
-GREY_OF_NEAREST, GREY_OF_FARTHEST = 32, 224
+WRAP_POWER = 3
+"""The headlight falls off as ((1 + n . l) / 2)**3 and so reaches 0 smoothly, at the far side of a sphere. Lambert's
+max(0, n . l) ends in a line, which on coarse meshes reads as a seam."""
+
+GREY_OF_NEAREST, GREY_OF_FARTHEST = 224, 32
 """Greys of the depth picture: neither black nor white, so that it shows on both."""
 
 _LINEAR_OF_SRGB = np.where(
@@ -85,7 +90,7 @@ def shade(
     shading : {"smooth", "flat", "ids", "depth", "normals"}
         "smooth": interpolated vertex normals, lit in the pixel by a headlight and ambient light. "flat": the same with
         the normals of the faces. Both light the side that is seen, whichever it is. "ids": a colour for each triangle.
-        "depth": grey, dark is near, over the range of distances in the picture. "normals": the smooth normal in
+        "depth": grey, bright is near, over the range of distances in the picture. "normals": the smooth normal in
         eye space, x, y, z from -1..1 as red, green, blue; what faces the viewer is light blue.
     color : (3,) of 0 to 255
         sRGB colour of a mesh without colours.
@@ -138,10 +143,14 @@ def eye_normals(frags: Fragments, mesh: Mesh, camera: Camera, *, is_smooth: bool
     faces[(faces * to_viewer).sum(axis=1) < 0] *= -1
     if not is_smooth:
         return faces.astype(np.float32)[ids]
-    corners = unit_or_zero(mesh.vertex_normals() @ np.linalg.inv(linear))[mesh.triangles]
-    is_turned = (corners.sum(axis=1) * faces).sum(axis=1) < 0
-    corners[is_turned] *= -1
-    normals = frags.interpolate(corners.astype(np.float32))[seen]
+    vertex_normals = unit_or_zero(mesh.vertex_normals() @ np.linalg.inv(linear))
+    a, b, c = mesh.triangles.T
+    is_turned = ((vertex_normals[a] + vertex_normals[b] + vertex_normals[c]) * faces).sum(axis=1) < 0
+    if is_turned[ids].any():
+        sign = np.where(is_turned, -1, 1)[:, None, None]
+        normals = frags.interpolate(sign * vertex_normals[mesh.triangles])[seen]
+    else:
+        normals = frags.interpolate(vertex_normals)[seen]
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     # Normals that cancel (or were never there) leave the one of the face.
     return np.where(length > 1e-6, normals / np.maximum(length, 1e-6), faces.astype(np.float32)[ids])
@@ -151,15 +160,15 @@ def eye_distance(depth: F32, camera: Camera) -> F64:
     """Distance along the view, world units, of window depths in [0, 1]: `-z` in eye space."""
     (a, b), (c, d) = camera.projection[2:, 2:]
     ndc = 2.0 * depth.astype(np.float64) - 1
-    return (ndc * d - b) / (ndc * c - a) * -1
+    return (ndc * d - b) / (ndc * c - a)
 
 
 def id_colors(ids: npt.NDArray[np.integer[Any]]) -> U8:
     """A bright colour (N, 3) uint8 for each id: the hue turns by the golden angle, so neighbours differ most."""
     ids = ids.astype(np.uint64)
     hue = (ids * np.uint64(0x9E3779B97F4A7C15) >> np.uint64(40)).astype(np.float32) / 2**24
-    level = (ids * np.uint64(0xD1B54A32D192ED03) >> np.uint64(62)).astype(np.float32)
-    value, saturation = 0.70 + 0.10 * level, 0.75 - 0.10 * level
+    tint = (ids * np.uint64(0xD1B54A32D192ED03) >> np.uint64(40)).astype(np.float32) / 2**24
+    value, saturation = 0.65 + 0.35 * tint, 0.80 - 0.40 * ((5 * tint) % 1)
     ramp = np.abs((6 * hue[:, None] + np.array([0, 4, 2], dtype=np.float32)) % 6 - 3) - 1
     rgb = value[:, None] * (1 - saturation[:, None] * (1 - np.clip(ramp, 0, 1)))
     return np.rint(255 * rgb).astype(np.uint8)
@@ -190,8 +199,8 @@ def _surface_colors(frags: Fragments, mesh: Mesh, seen: npt.NDArray[np.bool_], c
 
 
 def _lit(linear: F32, normals: F32) -> U8:
-    lambert = np.maximum(normals @ TO_LIGHT.astype(np.float32), 0)
-    light = AMBIENT + (1 - AMBIENT) * lambert
+    wrapped = (0.5 + 0.5 * (normals @ TO_LIGHT.astype(np.float32))) ** WRAP_POWER
+    light = AMBIENT + (1 - AMBIENT) * wrapped
     steps = linear * (_LINEAR_STEPS * light[:, None])
     return _SRGB_OF_LINEAR[np.minimum(np.rint(steps).astype(np.int32), _LINEAR_STEPS)]
 
