@@ -28,7 +28,7 @@ typedef unsigned __int128 tl_uint128;
 _Static_assert(sizeof(tl_vertex) == 16, "a vertex is one 16-byte load");
 _Static_assert(sizeof(tl_int128) == 16, "the wide path needs 128-bit integers");
 _Static_assert((-3 >> 1) == -2, "a right shift of a negative number must floor");
-_Static_assert(2.0 * (TL_NARROW_LIMIT * 2 - 2) * (TL_NARROW_LIMIT * 2 - 2) < 0x1p63, "2E must fit 64 bits");
+_Static_assert((tl_int128)2 * ((1LL << 31) - 2) * ((1LL << 31) - 2) < (tl_int128)1 << 63, "2E must fit 64 bits");
 
 /* Writes vertex i: its record, and its row of the wide table where there is one.  x_fx and y_fx are integers, infinite or NaN. */
 static inline void store_vertex(double x_fx, double y_fx, double z, int64_t i, tl_vertex *out, tl_wide *wide, tl_vertex_counts *n)

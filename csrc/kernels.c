@@ -3,21 +3,23 @@
 #include "topleft.h"
 
 #include "snap.c"
+#include "project.c"
 #include "clip.c"
 #include "setup.c"
 #include "sink.c"
 #include "raster.c"
 #include "resolve.c"
+#include "paint.c"
 
 const tl_kernels TL_KERNELS = {
     .isa = TL_ISA_NAME,
     .snap = snap,
-    .transform_f32 = transform_f32,
-    .transform_f64 = transform_f64,
     .project = project,
     .clip = clip,
     .first_bad = first_bad,
     .draw = draw,
     .barycentric = barycentric,
     .interpolate = interpolate,
+    .paint_flat = paint_flat,
+    .paint_gouraud = paint_gouraud,
 };

@@ -33,8 +33,9 @@ static inline void floor_divide_128(tl_int128 a, tl_int128 b, tl_int128 *quotien
 /* A box at most this wide is walked sample by sample, a wider one by its row ends. */
 #define TL_EDGE_MAX_WIDTH 6
 
-static inline void draw_triangle(const tl_vertex_set *set, const int32_t *corners, int32_t id, const tl_scene *scene,
-                                 const tl_window *window, const tl_target *target)
+/* One triangle by itself: any range, any method. */
+TL_INLINE void draw_triangle(const tl_vertex_set *set, const int32_t *corners, int32_t id, const tl_scene *scene,
+                             const tl_window *window, const tl_target *target, tl_sink sink)
 {
     tl_triangle t;
     const int sign = load_triangle(set, corners, &t);
@@ -43,17 +44,17 @@ static inline void draw_triangle(const tl_vertex_set *set, const int32_t *corner
     if (!clip_box(&t, window))
         return;
     t.id = id;
-    setup_sink(&t, window, target);
+    setup_sink(&t, window, sink);
     const int by_edge = scene->method == TL_METHOD_EDGE ||
                         (scene->method == TL_METHOD_AUTO && t.col1 - t.col0 <= TL_EDGE_MAX_WIDTH);
     if (t.is_narrow && by_edge)
-        walk_edge_64(&t, window, target);
+        walk_edge_64(&t, window, target, sink);
     else if (t.is_narrow)
-        walk_scanline_64(&t, window, target);
+        walk_scanline_64(&t, window, target, sink);
     else if (by_edge)
-        walk_edge_128(&t, window, target);
+        walk_edge_128(&t, window, target, sink);
     else
-        walk_scanline_128(&t, window, target);
+        walk_scanline_128(&t, window, target, sink);
 }
 
 static inline int is_clipped(const tl_vertex_set *set, const int32_t *corners)
@@ -66,21 +67,193 @@ static inline int is_clipped(const tl_vertex_set *set, const int32_t *corners)
 
 static tl_vertex_set piece_set(const tl_pieces *p)
 {
-    return (tl_vertex_set){p->vertices, p->wide, p->inv_w, p->n_vertices};
+    return (tl_vertex_set){p->vertices, p->wide, p->inv_w, NULL, p->n_vertices};
 }
+
+/* First piece of a triangle, by bisection in the ascending sources. */
+static int64_t first_piece(const tl_pieces *p, int64_t id)
+{
+    int64_t low = 0, high = p->n_pieces;
+    while (low < high) {
+        const int64_t middle = low + (high - low) / 2;
+        if (p->source[middle] < id)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low;
+}
+
+/* Triangle i, or its pieces, by itself. */
+TL_INLINE void draw_alone(const tl_scene *scene, int64_t i, const tl_window *window, const tl_target *target, tl_sink sink)
+{
+    const int32_t *corners = scene->triangles + 3 * i;
+    const tl_pieces *pieces = scene->pieces;
+    tl_vertex_set set = scene->mesh;
+    int64_t piece = 0, end = 1;
+    if (is_clipped(&set, corners)) {
+        if (!pieces)
+            return;
+        set = piece_set(pieces);
+        piece = first_piece(pieces, i);
+        for (end = piece; end < pieces->n_pieces && pieces->source[end] == i;)
+            end++;
+        corners = pieces->triangles + 3 * piece;
+    }
+    for (; piece < end; piece++, corners += 3)
+        draw_triangle(&set, corners, (int32_t)i, scene, window, target, sink);
+}
+
+TL_SINK_COPIES(draw_alone, (const tl_scene *scene, int64_t i, const tl_window *window, const tl_target *target), scene, i, window,
+               target)
+
+#include "batch.c"
+#include "rows.c"
+
+/* What one pass needs to know of the window and the scene, in int32. */
+typedef struct {
+    int32_t left, top, right, bottom; /* picture pixels */
+    int32_t max_extent;               /* of a triangle that 32-bit lanes can take, in units */
+    int second, third;                /* which corner comes second and third: culled faces then have negative area */
+} batch_limits;
+
+TL_INLINE vi first_centre_lanes(vi x_fx, int bits)
+{
+    const int round = bits ? (1 << (bits - 1)) - 1 : 0; /* the first centre at or right of x_fx, as first_centre */
+    return vi_shift_right(vi_add(x_fx, vi_set1(round)), bits);
+}
+
+/* Setup and cull of the triangles [i, i + TL_LANES). */
+TL_INLINE void draw_batch(batch_state *s, tl_sink sink, const batch_limits *limits, int64_t i, const int32_t *corners, vm live)
+{
+    const int bits = s->window->subpixel_bits;
+    const tl_vertex *vertices = s->scene->mesh.vertices;
+    const vi zero = vi_set1(0);
+    vi x[3], y[3];
+    vz z[3];
+    load_vertices(vertices, corners, &x[0], &y[0], &z[0]);
+    load_vertices(vertices, corners + limits->second, &x[1], &y[1], &z[1]);
+    load_vertices(vertices, corners + limits->third, &x[2], &y[2], &z[2]);
+    const vi x_min = vi_min(vi_min(x[0], x[1]), x[2]), x_max = vi_max(vi_max(x[0], x[1]), x[2]);
+    const vi y_min = vi_min(vi_min(y[0], y[1]), y[2]), y_max = vi_max(vi_max(y[0], y[1]), y[2]);
+    const vi width = vi_sub(x_max, x_min), height = vi_sub(y_max, y_min);
+    /* a special vertex has x = INT32_MIN: its triangle is too wide, or special throughout */
+    vm alone = vm_or(vi_gt_unsigned(width, vi_set1(limits->max_extent)), vi_gt_unsigned(height, vi_set1(limits->max_extent)));
+    alone = vm_and(live, vm_or(alone, vi_eq(x_min, vi_set1(TL_SPECIAL))));
+    lane_triangles t;
+    t.dx[0] = vi_sub(x[1], x[0]), t.dy[0] = vi_sub(y[1], y[0]);
+    t.dx[2] = vi_sub(x[0], x[2]), t.dy[2] = vi_sub(y[0], y[2]);
+    vi area = vi_sub(vi_mul(t.dy[0], t.dx[2]), vi_mul(t.dx[0], t.dy[2]));
+    vm drawn = vi_gt(area, zero), swapped = vm_and_not(live, live);
+    if (s->scene->cull == TL_CULL_NONE) {
+        swapped = vi_gt(zero, area);
+        drawn = vm_or(drawn, swapped);
+    }
+    drawn = vm_and_not(vm_and(live, drawn), alone);
+    const vi col = vi_max(first_centre_lanes(x_min, bits), vi_set1(limits->left));
+    const vi row = vi_max(first_centre_lanes(y_min, bits), vi_set1(limits->top));
+    const vi n_cols = vi_sub(vi_min(first_centre_lanes(x_max, bits), vi_set1(limits->right)), col);
+    const vi n_rows = vi_sub(vi_min(first_centre_lanes(y_max, bits), vi_set1(limits->bottom)), row);
+    drawn = vm_and(drawn, vi_gt(vi_min(n_cols, n_rows), zero));
+    if (s->scene->cull == TL_CULL_NONE)
+        area = vi_max(area, vi_sub(zero, area));
+    if (sink_has_depth(sink)) {
+        const vi box = vi_shift_right(vi_sub(vi_mul(width, height), vi_set1(1)), TL_SLIVER_BITS);
+        const vm sliver = vm_and(drawn, vi_gt(box, vi_sub(area, vi_set1(1)))); /* box * 2^12 > area, as setup_plane */
+        alone = vm_or(alone, sliver);
+        drawn = vm_and_not(drawn, sliver);
+    }
+    for (unsigned lanes = vm_bits(alone); lanes; lanes &= lanes - 1)
+        TL_SINK_CALL(draw_alone, sink, s->scene, i + __builtin_ctz(lanes), s->window, s->target)
+    if (!vm_any(drawn))
+        return;
+    if (s->scene->cull == TL_CULL_NONE) {
+        const vi x1 = x[1], y1 = y[1];
+        x[1] = vi_select(swapped, x[2], x1), y[1] = vi_select(swapped, y[2], y1);
+        x[2] = vi_select(swapped, x1, x[2]), y[2] = vi_select(swapped, y1, y[2]);
+        t.dx[0] = vi_sub(x[1], x[0]), t.dy[0] = vi_sub(y[1], y[0]);
+        t.dx[2] = vi_sub(x[0], x[2]), t.dy[2] = vi_sub(y[0], y[2]);
+    }
+    const vi centre_x = vi_add(vi_shift_left(col, bits + 1), vi_set1(1 << bits));
+    const vi centre_y = vi_add(vi_shift_left(row, bits + 1), vi_set1(1 << bits));
+    for (int k = 0; k < 3; k++) {
+        t.x[k] = vi_sub(vi_add(x[k], x[k]), centre_x);
+        t.y[k] = vi_sub(vi_add(y[k], y[k]), centre_y);
+    }
+    const vi id = vi_add(vi_set1((int32_t)i), vi_iota()), longer = vi_max(n_cols, n_rows);
+    const vi sample = vi_add(vi_mul(vi_sub(row, vi_set1(limits->top)), vi_set1((int32_t)s->target->stride_px)),
+                             vi_sub(col, vi_set1(limits->left)));
+    const vm over_tiny = vi_gt(longer, vi_set1(2)), over_small = vi_gt(longer, vi_set1(TL_SMALL_BOX));
+    const vm tiny = vm_and_not(drawn, over_tiny), small = vm_and(drawn, vm_and_not(over_tiny, over_small)),
+             rows = vm_and(drawn, over_small);
+    if (vm_any(tiny)) {
+        t.dx[1] = vi_sub(x[2], x[1]), t.dy[1] = vi_sub(y[2], y[1]);
+        draw_tiny(s, sink, &t, z, swapped, tiny, n_cols, n_rows, sample, id);
+    }
+    if (vm_any(small)) {
+        push(&s->small, sink, small, &t, z, swapped, n_cols, n_rows, sample, id);
+        if (s->small.n > TL_QUEUE - TL_LANES)
+            TL_SINK_CALL(flush_small, sink, s)
+    }
+    if (vm_any(rows)) {
+        push(&s->rows, sink, rows, &t, z, swapped, n_cols, n_rows, sample, id);
+        if (s->rows.n > TL_QUEUE - TL_LANES)
+            TL_SINK_CALL(flush_rows, sink, s)
+    }
+}
+
+/* Every triangle of a scene; the window has fewer than 2^31 samples and lies within 2^30 pixels of 0. */
+TL_INLINE void draw_batches(const tl_scene *scene, const tl_window *window, const tl_target *target, tl_sink sink)
+{
+    batch_state s;
+    s.scene = scene, s.window = window, s.target = target;
+    s.small.n = s.rows.n = s.fragments.n = 0;
+    const int bits = window->subpixel_bits, is_back = scene->cull == TL_CULL_BACK;
+    const int64_t farthest = (int64_t)1 << 30;
+    const batch_limits limits = {
+        .left = (int32_t)window->x_px,
+        .top = (int32_t)window->y_px,
+        .right = (int32_t)min64(window->x_px + window->width, farthest),
+        .bottom = (int32_t)min64(window->y_px + window->height, farthest),
+        .max_extent = TL_MAX_BOX_PX << (bits < 8 ? bits : 8),
+        .second = is_back ? 2 : 1,
+        .third = is_back ? 1 : 2,
+    };
+    int32_t tail[3 * TL_LANES] = {0};
+    const int64_t n_whole = scene->n_triangles / TL_LANES * TL_LANES;
+    memcpy(tail, scene->triangles + 3 * n_whole, sizeof(int32_t) * 3 * (size_t)(scene->n_triangles - n_whole));
+    for (int64_t i = 0; i < scene->n_triangles; i += TL_LANES)
+        draw_batch(&s, sink, &limits, i, i < n_whole ? scene->triangles + 3 * i : tail, vm_first(scene->n_triangles - i));
+    TL_SINK_CALL(flush_small, sink, &s)
+    TL_SINK_CALL(flush_rows, sink, &s)
+    flush_fragments(target, sink, &s.fragments);
+}
+
+TL_INLINE void draw_scene(const tl_scene *scene, const tl_window *window, const tl_target *target, tl_sink sink)
+{
+    const int64_t farthest = (int64_t)1 << 30;
+    const int is_near = window->x_px > -farthest && window->x_px < farthest && window->y_px > -farthest && window->y_px < farthest;
+    if (scene->method == TL_METHOD_AUTO && is_near) {
+        draw_batches(scene, window, target, sink);
+        return;
+    }
+    for (int64_t i = 0; i < scene->n_triangles; i++)
+        TL_SINK_CALL(draw_alone, sink, scene, i, window, target)
+}
+
+TL_SINK_COPIES(draw_scene, (const tl_scene *scene, const tl_window *window, const tl_target *target), scene, window, target)
 
 static void draw(const tl_scene *scene, const tl_window *window, const tl_target *target)
 {
-    const tl_pieces *pieces = scene->pieces;
-    const tl_vertex_set cut = pieces ? piece_set(pieces) : (tl_vertex_set){0};
-    int64_t piece = 0;
-    for (int64_t i = 0; i < scene->n_triangles; i++) {
-        const int32_t *corners = scene->triangles + 3 * i;
-        if (!is_clipped(&scene->mesh, corners)) {
-            draw_triangle(&scene->mesh, corners, (int32_t)i, scene, window, target);
-            continue;
-        }
-        for (; pieces && piece < pieces->n_pieces && pieces->source[piece] == i; piece++)
-            draw_triangle(&cut, pieces->triangles + 3 * piece, (int32_t)i, scene, window, target);
+    const int64_t pixel_bytes = target->sink == TL_SINK_MASK ? 1 : 4;
+    const int64_t rows_at_once = max64(1, (((int64_t)1 << 31) - 1) / target->stride_px);
+    for (int64_t row = 0; row < window->height; row += rows_at_once) {
+        tl_window band = *window;
+        tl_target part = *target;
+        band.y_px += row;
+        band.height = min64(rows_at_once, window->height - row);
+        part.pixels = (char *)target->pixels + row * target->stride_px * pixel_bytes;
+        part.depth = target->depth ? target->depth + row * target->stride_px : NULL;
+        TL_SINK_CALL(draw_scene, target->sink, scene, &band, &part)
     }
 }

@@ -23,31 +23,28 @@ static inline int covers(const tl_triangle *t, int64_t x_px, int64_t y_px, int b
     return 1;
 }
 
+static double inverse_w(const tl_vertex_set *set, int32_t i)
+{
+    double p[4];
+    if (set->inv_w)
+        return set->inv_w[i];
+    if (!set->source)
+        return 1.0;
+    clip_position(set->source, i, p);
+    return 1.0 / p[3];
+}
+
 static int load_resolved(resolve_state *s, const tl_vertex_set *set, const int32_t *corners)
 {
     if (load_triangle(set, corners, &s->triangle) == 0)
         return 0;
     for (int k = 0; k < 3; k++) {
         s->slot[k] = k;
-        s->inv_w[k] = set->inv_w ? set->inv_w[s->triangle.corner[k]] : 1.0;
+        s->inv_w[k] = inverse_w(set, s->triangle.corner[k]);
     }
     if (s->triangle.corner[1] != corners[1])
         s->slot[1] = 2, s->slot[2] = 1;
     return 1;
-}
-
-/* First piece of a triangle, by bisection in the ascending sources. */
-static int64_t first_piece(const tl_pieces *p, int64_t id)
-{
-    int64_t low = 0, high = p->n_pieces;
-    while (low < high) {
-        const int64_t middle = low + (high - low) / 2;
-        if (p->source[middle] < id)
-            low = middle + 1;
-        else
-            high = middle;
-    }
-    return low;
 }
 
 /* Makes `s` describe the triangle or piece that shows at the pixel; 0 when the buffer does not belong to the scene. */

@@ -15,8 +15,9 @@ typedef struct {
      * over all three corners, which is the same everywhere.  Integers, exact in float64 when `weights_exact`. */
     int weights_exact;
     double w1, w2, w1_col, w2_col, w1_row, w2_row, w_sum;
-    /* What the sink interpolates, depth or up to four channels: value0 + (w1 * slope1 + w2 * slope2). */
-    double value0[4], slope1[4], slope2[4];
+    /* Depth: z[0] + slope_y * (2py - 2y0) + slope_x * (2px - 2x0) when `has_plane`, by weights otherwise. */
+    int has_plane;
+    double slope_x, slope_y;
 } tl_triangle;
 
 /* Number of pixel centres left of x_fx, counted from pixel 0: the first centre at or right of it. */
@@ -99,17 +100,38 @@ static inline int clip_box(tl_triangle *t, const tl_window *window)
     t->col1 = min64(first_centre(x1, bits) - window->x_px, window->width);
     t->row0 = max64(first_centre(y0, bits) - window->y_px, 0);
     t->row1 = min64(first_centre(y1, bits) - window->y_px, window->height);
-    /* |2E| <= 2 * width * height of the extent, a product of differences below 2^63 */
-    t->weights_exact = 2.0 * ((double)x1 - (double)x0) * ((double)y1 - (double)y0) < 0x1p52;
     return t->col0 < t->col1 && t->row0 < t->row1;
 }
 
-/* Prepares weights_at: what depth and colours are interpolated with. */
+/* A triangle is a sliver when its box holds more than 2^12 times its area: the slopes of its depth plane are then so
+ * steep that float64 would lose bits that float32 shows, and the exact weights are used. */
+#define TL_SLIVER_BITS 12
+
+/* The depth plane over the corners, per half sub-pixel.  The same operations as plane_slopes in batch.c. */
+static inline void setup_plane(tl_triangle *t)
+{
+    const double x1 = (double)(t->x_fx[1] - t->x_fx[0]), y1 = (double)(t->y_fx[1] - t->y_fx[0]), z1 = t->z[1] - t->z[0];
+    const double x2 = (double)(t->x_fx[2] - t->x_fx[0]), y2 = (double)(t->y_fx[2] - t->y_fx[0]), z2 = t->z[2] - t->z[0];
+    const double width = (double)(max3(t->x_fx[0], t->x_fx[1], t->x_fx[2]) - min3(t->x_fx[0], t->x_fx[1], t->x_fx[2]));
+    const double height = (double)(max3(t->y_fx[0], t->y_fx[1], t->y_fx[2]) - min3(t->y_fx[0], t->y_fx[1], t->y_fx[2]));
+    const double area = x1 * y2 - y1 * x2;
+    t->has_plane = t->is_narrow && width * height <= area * (1 << TL_SLIVER_BITS);
+    if (!t->has_plane)
+        return;
+    const double inverse = 0.5 / area;
+    t->slope_x = (z1 * y2 - z2 * y1) * inverse;
+    t->slope_y = (z2 * x1 - z1 * x2) * inverse;
+}
+
+/* Prepares weights_at: what colours, and the depth of slivers, are interpolated with. */
 static inline void setup_weights(tl_triangle *t, const tl_window *window)
 {
     const int bits = window->subpixel_bits;
     const int64_t x_px = t->col0 + window->x_px, y_px = t->row0 + window->y_px;
     const double step = (double)((int64_t)2 << bits);
+    const double width = (double)max3(t->x_fx[0], t->x_fx[1], t->x_fx[2]) - (double)min3(t->x_fx[0], t->x_fx[1], t->x_fx[2]);
+    const double height = (double)max3(t->y_fx[0], t->y_fx[1], t->y_fx[2]) - (double)min3(t->y_fx[0], t->y_fx[1], t->y_fx[2]);
+    t->weights_exact = 2.0 * width * height < 0x1p52; /* |2E| <= 2 * width * height */
     t->w_sum = (double)weight_sum(t);
     t->w1 = (double)doubled_edge(t, 2, 0, x_px, y_px, bits);
     t->w2 = (double)doubled_edge(t, 0, 1, x_px, y_px, bits);

@@ -1,184 +1,195 @@
-/* Sinks: what a covered span does to the buffers.  The walkers know nothing of what is drawn.
- * In: a triangle and a span of samples.  Out: mask, counts, ids and depth, or colours. */
-#include <string.h>
-
+/* Sinks: what covered samples do to the buffers.  The walkers know nothing of what is drawn.
+ * In: lanes, spans or lists of samples.  Out: mask, counts, or ids with depth.
+ * Every sink gives the same picture in whatever order triangles come: ids decide ties.  `sink` is always a constant, so that
+ * each copy of the code keeps one case. */
 #include "fixed.h"
+#include "lanes.h"
 
-/* Samples interpolated at a time: two arrays of weights stay in the first-level cache. */
+/* Samples interpolated by weights at a time. */
 #define TL_CHUNK 64
 
-static inline void set_plane(tl_triangle *t, int i, double v0, double v1, double v2)
+/* Covered samples of small triangles wait in a list of this many. */
+#define TL_FRAGMENTS 1024
+
+typedef struct {
+    int n;
+    int32_t sample[TL_FRAGMENTS + 8 * TL_MAX_LANES]; /* row * stride_px + column */
+    int32_t id[TL_FRAGMENTS + 8 * TL_MAX_LANES];
+    float depth[TL_FRAGMENTS + 8 * TL_MAX_LANES];
+} fragment_list;
+
+/* A copy of a function for each sink, so that inner loops know what they draw, and a call of the right one.
+ * Such a function takes the sink last: TL_SINK_COPIES(f, (declared parameters), parameters ...), TL_SINK_CALL(f, sink, ...). */
+#define TL_SINK_COPY(f, name, sink, declared, ...) \
+    static __attribute__((noinline)) void f##_##name declared { f(__VA_ARGS__, sink); }
+#define TL_SINK_COPIES(f, declared, ...)                                     \
+    TL_SINK_COPY(f, mask, TL_SINK_MASK, declared, __VA_ARGS__)               \
+    TL_SINK_COPY(f, count, TL_SINK_COUNT, declared, __VA_ARGS__)             \
+    TL_SINK_COPY(f, label, TL_SINK_LABEL, declared, __VA_ARGS__)             \
+    TL_SINK_COPY(f, paint, TL_SINK_PAINT, declared, __VA_ARGS__)             \
+    TL_SINK_COPY(f, nearest, TL_SINK_NEAREST, declared, __VA_ARGS__)         \
+    TL_SINK_COPY(f, farthest, TL_SINK_FARTHEST, declared, __VA_ARGS__)
+#define TL_SINK_CALL(f, sink, ...)                                           \
+    switch (sink) {                                                          \
+    case TL_SINK_MASK: f##_mask(__VA_ARGS__); break;                         \
+    case TL_SINK_COUNT: f##_count(__VA_ARGS__); break;                       \
+    case TL_SINK_LABEL: f##_label(__VA_ARGS__); break;                       \
+    case TL_SINK_PAINT: f##_paint(__VA_ARGS__); break;                       \
+    case TL_SINK_NEAREST: f##_nearest(__VA_ARGS__); break;                   \
+    default: f##_farthest(__VA_ARGS__); break;                               \
+    }
+
+TL_INLINE int sink_has_depth(tl_sink sink)
 {
-    t->value0[i] = v0;
-    t->slope1[i] = (v1 - v0) / t->w_sum;
-    t->slope2[i] = (v2 - v0) / t->w_sum;
+    return sink == TL_SINK_PAINT || sink == TL_SINK_NEAREST || sink == TL_SINK_FARTHEST;
 }
 
-/* What the sink needs of a triangle beyond its spans. */
-static inline void setup_sink(tl_triangle *t, const tl_window *window, const tl_target *target)
+/* n bytes of 1: a call of memset costs more than most rows. */
+TL_INLINE void set_bytes(uint8_t *p, int64_t n)
 {
-    const int channels = target->n_channels;
-    const uint8_t *bytes = target->colors;
-    const float *floats = target->colors;
-    int64_t at[3];
-    switch (target->sink) {
-    case TL_SINK_MASK:
-    case TL_SINK_COUNT:
-    case TL_SINK_FLAT: return;
-    case TL_SINK_ID:
-    case TL_SINK_NEAREST:
-    case TL_SINK_FARTHEST:
-        setup_weights(t, window);
-        set_plane(t, 0, t->z[0], t->z[1], t->z[2]);
-        return;
-    default: break;
-    }
-    setup_weights(t, window);
-    for (int k = 0; k < 3; k++)
-        at[k] = (int64_t)t->corner[k] * channels;
-    for (int c = 0; c < channels; c++) {
-        if (target->sink == TL_SINK_GOURAUD_U8)
-            set_plane(t, c, bytes[at[0] + c], bytes[at[1] + c], bytes[at[2] + c]);
-        else
-            set_plane(t, c, floats[at[0] + c], floats[at[1] + c], floats[at[2] + c]);
-    }
-}
-
-static inline void put_depths(const tl_triangle *t, tl_sink sink, const double *restrict w1, const double *restrict w2, int n,
-                              int32_t *restrict ids, float *restrict depth)
-{
-    const double z0 = t->value0[0], slope1 = t->slope1[0], slope2 = t->slope2[0];
-    float z[TL_CHUNK];
-    for (int k = 0; k < n; k++)
-        z[k] = (float)(z0 + (w1[k] * slope1 + w2[k] * slope2)) + 0.0f; /* + 0 makes -0 a 0 */
-    /* stores without a branch: the compiler turns them into vector blends */
-    if (sink == TL_SINK_NEAREST) {
-        for (int k = 0; k < n; k++) {
-            const int wins = z[k] < depth[k];
-            ids[k] = wins ? t->id : ids[k];
-            depth[k] = wins ? z[k] : depth[k];
-        }
-    } else if (sink == TL_SINK_FARTHEST) {
-        for (int k = 0; k < n; k++) {
-            const int wins = z[k] > depth[k];
-            ids[k] = wins ? t->id : ids[k];
-            depth[k] = wins ? z[k] : depth[k];
-        }
+    const uint64_t ones = 0x0101010101010101u;
+    if (n >= 64) {
+        memset(p, 1, (size_t)n);
+    } else if (n >= 8) {
+        for (int64_t k = 0; k < n - 8; k += 8)
+            memcpy(p + k, &ones, 8);
+        memcpy(p + n - 8, &ones, 8);
+    } else if (n >= 4) {
+        memcpy(p, &ones, 4);
+        memcpy(p + n - 4, &ones, 4);
     } else {
-        for (int k = 0; k < n; k++) {
-            ids[k] = t->id;
-            depth[k] = z[k];
-        }
+        for (int64_t k = 0; k < n; k++)
+            p[k] = 1;
     }
 }
 
-static inline void put_flat(const uint8_t *color, int pixel_bytes, int64_t n, uint8_t *out)
+/* Ids and depths of the lanes in m that win.  Depths of new samples are never NaN or -0. */
+TL_INLINE void put_depths(const tl_target *target, tl_sink sink, int64_t at, vm m, vf depth, vi id)
 {
-    switch (pixel_bytes) {
-    case 1: memset(out, color[0], (size_t)n); return;
-    case 3:
-        for (int64_t k = 0; k < n; k++)
-            memcpy(out + 3 * k, color, 3);
+    int32_t *ids = (int32_t *)target->pixels + at;
+    vm wins;
+    if (sink == TL_SINK_PAINT) {
+        wins = vm_and(m, vi_gt(id, vi_load_masked(m, ids)));
+    } else {
+        const vf old = vf_load_masked(m, target->depth + at);
+        const vm equal = vm_and(m, vf_eq(depth, old));
+        wins = vm_and(m, sink == TL_SINK_NEAREST ? vf_lt(depth, old) : vf_lt(old, depth));
+        if (__builtin_expect(vm_any(equal), 0))
+            wins = vm_or(wins, vm_and(equal, vi_gt(vi_load_masked(equal, ids), id)));
+    }
+    vf_store_masked(target->depth + at, wins, depth);
+    vi_store_masked(ids, wins, id);
+}
+
+/* A span of samples without depth. */
+TL_INLINE void put_plain(const tl_target *target, tl_sink sink, int64_t at, int64_t n, int32_t id)
+{
+    if (sink == TL_SINK_MASK) {
+        set_bytes((uint8_t *)target->pixels + at, n);
         return;
-    case 4:
-        for (int64_t k = 0; k < n; k++)
-            memcpy(out + 4 * k, color, 4);
-        return;
-    default:
-        for (int64_t k = 0; k < n; k++)
-            memcpy(out + k * pixel_bytes, color, (size_t)pixel_bytes);
+    }
+    int32_t *pixels = (int32_t *)target->pixels + at;
+    for (int64_t k = 0; k < n; k += TL_LANES) {
+        const vm m = vm_first(n - k);
+        const vi old = vi_load_masked(m, pixels + k);
+        vi_store_masked(pixels + k, m, sink == TL_SINK_COUNT ? vi_add(old, vi_set1(1)) : vi_max(old, vi_set1(id)));
     }
 }
 
-/* Sign of w1*d1 + w2*d2 - half_sum * w_sum / 2 in exact integers; |d|, |half_sum| <= 511. */
-static int compare_exactly(const tl_triangle *t, const tl_window *window, int64_t row, int64_t col, int d1, int d2, int half_sum)
+/* 0, 1, 2, ... times a step. */
+TL_INLINE vd ramp(double step) { return vd_mul(vd_from_vi(vi_iota()), vd_set1(step)); }
+
+/* A span with depth from the plane: (z0 + slope_y * y) + slope_x * x, from the triangle's first corner. */
+TL_INLINE void put_plane(const tl_triangle *t, const tl_window *window, const tl_target *target, tl_sink sink, int64_t row,
+                         int64_t first, int64_t end)
 {
-    const tl_int128 terms[3] = {
-        doubled_edge(t, 2, 0, col + window->x_px, row + window->y_px, window->subpixel_bits),
-        doubled_edge(t, 0, 1, col + window->x_px, row + window->y_px, window->subpixel_bits),
-        weight_sum(t),
-    };
-    const int factors[3] = {2 * d1, 2 * d2, -half_sum};
-    tl_int128 high = 0, low = 0; /* the terms reach 2^127: two limbs */
-    for (int k = 0; k < 3; k++) {
-        high += (terms[k] >> 64) * factors[k];
-        low += (tl_int128)(uint64_t)terms[k] * factors[k];
-    }
-    high += low >> 64;
-    low = (tl_int128)(uint64_t)low;
-    return high < 0 ? -1 : high > 0 || low > 0;
-}
-
-/* The exact interpolated value rounded to nearest, ties to even.  float64 decides unless it is next to a tie. */
-static inline void put_gouraud_u8(const tl_triangle *t, const tl_window *window, const tl_target *target, int64_t row, int64_t col,
-                                  const double *restrict w1, const double *restrict w2, int n, uint8_t *restrict out)
-{
-    const int channels = target->n_channels;
-    const uint8_t *colors = target->colors;
-    for (int c = 0; c < channels; c++) {
-        const int c0 = colors[(int64_t)t->corner[0] * channels + c];
-        const int d1 = colors[(int64_t)t->corner[1] * channels + c] - c0, d2 = colors[(int64_t)t->corner[2] * channels + c] - c0;
-        const double slope1 = t->slope1[c], slope2 = t->slope2[c];
-        int near_tie = 0;
-        for (int k = 0; k < n; k++) {
-            const double value = c0 + (w1[k] * slope1 + w2[k] * slope2), floor_value = floor(value);
-            near_tie |= fabs(value - floor_value - 0.5) < 0x1p-20;
-            out[k * channels + c] = (uint8_t)rint(value);
-        }
-        for (int k = 0; near_tie && k < n; k++) {
-            const double value = c0 + (w1[k] * slope1 + w2[k] * slope2);
-            const int below = (int)floor(value);
-            if (!(fabs(value - below - 0.5) < 0x1p-20))
-                continue;
-            const int side = compare_exactly(t, window, row, col + k, d1, d2, 2 * (below - c0) + 1);
-            out[k * channels + c] = (uint8_t)(below + (side > 0 || (side == 0 && (below & 1))));
-        }
+    const int bits = window->subpixel_bits;
+    const double step = (double)((int64_t)2 << bits);
+    const double y = (double)(((row + window->y_px) * 2 + 1) * ((int64_t)1 << bits) - 2 * t->y_fx[0]);
+    const double x = (double)(((first + window->x_px) * 2 + 1) * ((int64_t)1 << bits) - 2 * t->x_fx[0]);
+    const vd z_row = vd_set1(t->z[0] + t->slope_y * y), slope_x = vd_set1(t->slope_x), steps = ramp(step);
+    const int64_t at = row * target->stride_px;
+    for (int64_t col = first; col < end; col += TL_LANES) {
+        const vd xs = vd_add(vd_set1(x + (double)(col - first) * step), steps);
+        const vf z = vf_add(vf_from_vd(vd_add(z_row, vd_mul(slope_x, xs))), vf_set1(0.0f));
+        put_depths(target, sink, at + col, vm_first(end - col), z, vi_set1(t->id));
     }
 }
 
-static inline void put_gouraud_f32(const tl_triangle *t, const tl_target *target, const double *restrict w1,
-                                   const double *restrict w2, int n, float *restrict out)
-{
-    const int channels = target->n_channels;
-    for (int c = 0; c < channels; c++) {
-        const double c0 = t->value0[c], slope1 = t->slope1[c], slope2 = t->slope2[c];
-        for (int k = 0; k < n; k++)
-            out[k * channels + c] = (float)(c0 + (w1[k] * slope1 + w2[k] * slope2));
-    }
-}
-
-static inline void put_interpolated(const tl_triangle *t, const tl_window *window, const tl_target *target, int64_t row,
-                                    int64_t first, int64_t end)
+/* A span with depth from the exact weights. */
+static void put_weighted(const tl_triangle *t, const tl_window *window, const tl_target *target, tl_sink sink, int64_t row,
+                         int64_t first, int64_t end)
 {
     double w1[TL_CHUNK], w2[TL_CHUNK];
+    float z[TL_CHUNK];
+    const double z0 = t->z[0], slope1 = (t->z[1] - z0) / t->w_sum, slope2 = (t->z[2] - z0) / t->w_sum;
     for (int64_t col = first; col < end; col += TL_CHUNK) {
         const int n = (int)min64(end - col, TL_CHUNK);
-        const int64_t at = row * target->stride_px + col;
         weights_at(t, window, row, col, n, w1, w2);
-        if (target->sink == TL_SINK_GOURAUD_U8)
-            put_gouraud_u8(t, window, target, row, col, w1, w2, n, (uint8_t *)target->pixels + at * target->n_channels);
-        else if (target->sink == TL_SINK_GOURAUD_F32)
-            put_gouraud_f32(t, target, w1, w2, n, (float *)target->pixels + at * target->n_channels);
-        else
-            put_depths(t, target->sink, w1, w2, n, (int32_t *)target->pixels + at, target->depth + at);
+        for (int k = 0; k < n; k++)
+            z[k] = (float)(z0 + (w1[k] * slope1 + w2[k] * slope2)) + 0.0f;
+        for (int k = 0; k < n; k += TL_LANES) {
+            const vm m = vm_first(n - k);
+            put_depths(target, sink, row * target->stride_px + col + k, m, vf_load_masked(m, z + k), vi_set1(t->id));
+        }
     }
 }
 
-/* Draws the samples [first, end) of a row; the window's own columns and rows. */
-static inline void put_span(const tl_triangle *t, const tl_window *window, const tl_target *target, int64_t row, int64_t first,
-                            int64_t end)
+/* What depth needs of a triangle beyond its spans. */
+TL_INLINE void setup_sink(tl_triangle *t, const tl_window *window, tl_sink sink)
 {
-    const int64_t at = row * target->stride_px + first;
-    switch (target->sink) {
-    case TL_SINK_MASK: memset((uint8_t *)target->pixels + at, 1, (size_t)(end - first)); return;
-    case TL_SINK_COUNT:
-        for (int64_t k = 0; k < end - first; k++)
-            ((int32_t *)target->pixels)[at + k]++;
+    if (!sink_has_depth(sink))
         return;
-    case TL_SINK_FLAT:
-        put_flat((const uint8_t *)target->colors + (int64_t)t->id * target->pixel_bytes, target->pixel_bytes, end - first,
-                 (uint8_t *)target->pixels + at * target->pixel_bytes);
-        return;
-    default: put_interpolated(t, window, target, row, first, end);
+    setup_plane(t);
+    if (!t->has_plane)
+        setup_weights(t, window);
+}
+
+/* The samples [first, end) of a row; the window's own columns and rows. */
+TL_INLINE void put_span(const tl_triangle *t, const tl_window *window, const tl_target *target, tl_sink sink, int64_t row,
+                        int64_t first, int64_t end)
+{
+    if (!sink_has_depth(sink))
+        put_plain(target, sink, row * target->stride_px + first, end - first, t->id);
+    else if (t->has_plane)
+        put_plane(t, window, target, sink, row, first, end);
+    else
+        put_weighted(t, window, target, sink, row, first, end);
+}
+
+/* float32 as an integer of the same order. */
+TL_INLINE int32_t ordered(float a)
+{
+    int32_t bits;
+    memcpy(&bits, &a, 4);
+    return bits ^ (int32_t)((uint32_t)(bits >> 31) >> 1);
+}
+
+/* Writes the list out, one sample after the other: without branches, whatever wins. */
+TL_INLINE void flush_fragments(const tl_target *target, tl_sink sink, fragment_list *f)
+{
+    int32_t *pixels = target->pixels;
+    for (int k = 0; k < f->n; k++) {
+        const int64_t at = (uint32_t)f->sample[k];
+        if (sink == TL_SINK_MASK) {
+            ((uint8_t *)target->pixels)[at] = 1;
+        } else if (sink == TL_SINK_COUNT) {
+            pixels[at]++;
+        } else if (sink == TL_SINK_LABEL) {
+            pixels[at] = f->id[k] > pixels[at] ? f->id[k] : pixels[at];
+        } else if (sink == TL_SINK_PAINT) {
+            const int wins = f->id[k] > pixels[at];
+            pixels[at] = wins ? f->id[k] : pixels[at];
+            target->depth[at] = wins ? f->depth[k] : target->depth[at];
+        } else {
+            const float z = f->depth[k], old_z = target->depth[at];
+            const int32_t id = f->id[k], old_id = pixels[at], turn = sink == TL_SINK_FARTHEST ? -1 : 0;
+            const int64_t key = (int64_t)((uint64_t)(uint32_t)(ordered(z) ^ turn) << 32 | (uint32_t)id);
+            const int64_t old_key = (int64_t)((uint64_t)(uint32_t)(ordered(old_z) ^ turn) << 32 | (uint32_t)old_id);
+            const int wins = key < old_key;
+            pixels[at] = wins ? id : old_id;
+            target->depth[at] = wins ? z : old_z;
+        }
     }
+    f->n = 0;
 }

@@ -30,14 +30,24 @@ typedef struct {
     int64_t x_fx, y_fx; /* |.| < 2^62 */
 } tl_wide;
 
+typedef enum { TL_F32 = 0, TL_F64 = 1, TL_I64 = 2 } tl_scalar;
+
+/* The caller's vertices. */
+typedef struct {
+    const void *data; /* (n, n_components) */
+    tl_scalar scalar;
+    int n_components;   /* 2 or 3: pixels (and depth), 3: object space when there is a matrix, 4: clip space */
+    int64_t n;
+    const void *matrix; /* (4, 4) row-major clip from object, of the same scalar type, or NULL */
+} tl_source;
+
 typedef struct {
     const tl_vertex *vertices;
-    const tl_wide *wide; /* a row per vertex, or NULL when no vertex is wide */
-    const double *inv_w; /* 1/w per vertex, or NULL: all equal (pixel space) */
+    const tl_wide *wide;     /* a row per vertex, or NULL when no vertex is wide */
+    const double *inv_w;     /* 1/w per vertex, or NULL: see `source` */
+    const tl_source *source; /* where w comes from when inv_w is NULL; NULL as well: all equal (pixel space) */
     int64_t n_vertices;
 } tl_vertex_set;
-
-typedef enum { TL_F32 = 0, TL_F64 = 1, TL_I64 = 2 } tl_scalar;
 
 /* How many vertices of each special kind a vertex stage has seen, used by a triangle or not. */
 typedef struct {
@@ -78,26 +88,21 @@ typedef struct {
 typedef enum { TL_CULL_NONE = 0, TL_CULL_BACK = 1, TL_CULL_FRONT = 2 } tl_cull;
 typedef enum { TL_METHOD_AUTO = 0, TL_METHOD_EDGE = 1, TL_METHOD_SCANLINE = 2 } tl_method;
 
-/* What happens to a covered span. */
+/* What happens to a covered sample. */
 typedef enum {
-    TL_SINK_MASK = 0,    /* uint8 = 1 */
-    TL_SINK_COUNT = 1,   /* int32 += 1 */
-    TL_SINK_ID = 2,      /* int32 = id, float = depth, painter's order */
-    TL_SINK_NEAREST = 3, /* the same where depth < what is there */
-    TL_SINK_FARTHEST = 4,
-    TL_SINK_FLAT = 5,        /* bytes of the triangle's colour */
-    TL_SINK_GOURAUD_U8 = 6,  /* interpolated vertex colours, rounded to nearest even */
-    TL_SINK_GOURAUD_F32 = 7,
+    TL_SINK_MASK = 0,     /* uint8 = 1 */
+    TL_SINK_COUNT = 1,    /* int32 += 1 */
+    TL_SINK_LABEL = 2,    /* int32 = id, painter's order: the later triangle wins */
+    TL_SINK_PAINT = 3,    /* the same, and float = depth */
+    TL_SINK_NEAREST = 4,  /* id and depth where depth < what is there; at equal depth the lower id */
+    TL_SINK_FARTHEST = 5, /* id and depth where depth > what is there; at equal depth the lower id */
 } tl_sink;
 
 typedef struct {
     tl_sink sink;
-    void *pixels;         /* mask, counts, ids or colours; rows of stride_px pixels */
-    float *depth;         /* TL_SINK_ID, NEAREST, FARTHEST; the same stride */
+    void *pixels; /* mask, counts or ids; rows of stride_px pixels; ids start as -1 */
+    float *depth; /* PAINT, NEAREST, FARTHEST; the same stride; starts as what every depth beats */
     int64_t stride_px;
-    const void *colors;   /* (T, C) for FLAT, (V, C) for GOURAUD; of the picture's type */
-    int n_channels;       /* 1 to 4 */
-    int pixel_bytes;      /* FLAT: n_channels times the size of a channel */
 } tl_target;
 
 typedef struct {
@@ -114,21 +119,15 @@ typedef struct {
 typedef struct tl_kernels {
     const char *isa;
 
-    /* (n, n_components) pixels to snapped vertices.  z is read when with_depth and n_components = 3.
+    /* Pixels to snapped vertices.  z is read when with_depth and n_components = 3.
      * `wide` may be NULL: wide vertices are then counted, and the caller comes again with a table. */
-    tl_vertex_counts (*snap)(const void *vertices_px, tl_scalar scalar, int n_components, int64_t n, int subpixel_bits,
-                             int with_depth, tl_vertex *out, tl_wide *wide);
+    tl_vertex_counts (*snap)(const tl_source *source, int subpixel_bits, int with_depth, tl_vertex *out, tl_wide *wide);
 
-    /* (n, 3) object space to (n, 4) clip space; row-major 4x4.  float32 in float32, float64 in float64. */
-    void (*transform_f32)(const float *vertices, int64_t n, const float *matrix, double *vertices_clip);
-    void (*transform_f64)(const double *vertices, int64_t n, const double *matrix, double *vertices_clip);
-
-    /* (n, 4) clip space to snapped vertices and 1/w; `wide` as above. */
-    tl_vertex_counts (*project)(const double *vertices_clip, int64_t n, const tl_view *view, tl_vertex *out, tl_wide *wide,
-                                double *inv_w);
+    /* Clip space, or object space by the matrix, to snapped vertices; `wide` as above. */
+    tl_vertex_counts (*project)(const tl_source *source, const tl_view *view, tl_vertex *out, tl_wide *wide);
 
     /* Cuts the triangles that have TL_CLIPPED vertices.  With pieces->vertices NULL only counts. */
-    void (*clip)(const double *vertices_clip, const tl_vertex *vertices, const int32_t *triangles, int64_t n_triangles,
+    void (*clip)(const tl_source *source, const tl_vertex *vertices, const int32_t *triangles, int64_t n_triangles,
                  const tl_view *view, tl_pieces *pieces);
 
     /* Lowest index of a TL_BAD vertex that a triangle uses, -1 if there is none. */
@@ -142,6 +141,12 @@ typedef struct tl_kernels {
     /* The same, applied to float32 values (n_vertices, n_values), or (n_triangles, 3, n_values) per corner. */
     void (*interpolate)(const tl_scene *scene, const tl_window *window, const int32_t *ids, const float *values, int n_values,
                         int per_corner, float background, float *out);
+
+    /* Colours where labels are not -1: per triangle, or interpolated screen-linearly from those of the vertices.
+     * n_channels of uint8 or float32 a colour. */
+    void (*paint_flat)(const int32_t *labels, int64_t n, const uint8_t *colors, int pixel_bytes, uint8_t *pixels);
+    void (*paint_gouraud)(const tl_scene *scene, const tl_window *window, const int32_t *labels, const void *colors, int n_channels,
+                          int is_u8, void *pixels);
 } tl_kernels;
 
 #endif

@@ -31,7 +31,8 @@ static inline TL_WALK(edges) TL_WALK(setup_edges)(const tl_triangle *t, const tl
 
 /* Edge functions stepped by additions, one test a sample.  Based on: J. Pineda, A Parallel Algorithm for Polygon
  * Rasterization, 1988. */
-static inline void TL_WALK(walk_edge)(const tl_triangle *t, const tl_window *window, const tl_target *target)
+TL_INLINE void TL_WALK(walk_edge)(const tl_triangle *t, const tl_window *window, const tl_target *target,
+                                       tl_sink sink)
 {
     const TL_WALK(edges) e = TL_WALK(setup_edges)(t, window);
     TL_INT row0 = e.value[0], row1 = e.value[1], row2 = e.value[2];
@@ -44,7 +45,7 @@ static inline void TL_WALK(walk_edge)(const tl_triangle *t, const tl_window *win
         while (col < t->col1 && (e0 | e1 | e2) >= 0)
             e0 -= e.dy[0], e1 -= e.dy[1], e2 -= e.dy[2], col++;
         if (first < col)
-            put_span(t, window, target, row, first, col);
+            put_span(t, window, target, sink, row, first, col);
         row0 += e.dx[0], row1 += e.dx[1], row2 += e.dx[2];
     }
 }
@@ -52,7 +53,8 @@ static inline void TL_WALK(walk_edge)(const tl_triangle *t, const tl_window *win
 /* Row ends by a digital differential analyser: E'(col) = value - dy * col >= 0 ends at floor(value / |dy|); one floor
  * division an edge, then quotient and remainder are stepped from row to row.  Horizontal edges say nothing that the box
  * does not.  Based on: J. E. Bresenham, Algorithm for computer control of a digital plotter, 1965. */
-static inline void TL_WALK(walk_scanline)(const tl_triangle *t, const tl_window *window, const tl_target *target)
+TL_INLINE void TL_WALK(walk_scanline)(const tl_triangle *t, const tl_window *window, const tl_target *target,
+                                       tl_sink sink)
 {
     const TL_WALK(edges) e = TL_WALK(setup_edges)(t, window);
     TL_INT quotient[3], remainder[3], divisor[3], quotient_step[3], remainder_step[3];
@@ -81,6 +83,6 @@ static inline void TL_WALK(walk_scanline)(const tl_triangle *t, const tl_window 
             remainder[k] -= carry ? divisor[k] : 0;
         }
         if (first < end)
-            put_span(t, window, target, row, t->col0 + (int64_t)first, t->col0 + (int64_t)end);
+            put_span(t, window, target, sink, row, t->col0 + (int64_t)first, t->col0 + (int64_t)end);
     }
 }

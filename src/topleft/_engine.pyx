@@ -11,12 +11,19 @@ cdef extern from "topleft.h" nogil:
         pass
     ctypedef struct tl_wide:
         pass
+    ctypedef int tl_scalar
+    ctypedef struct tl_source:
+        const void *data
+        tl_scalar scalar
+        int n_components
+        int64_t n
+        const void *matrix
     ctypedef struct tl_vertex_set:
         const tl_vertex *vertices
         const tl_wide *wide
         const double *inv_w
+        const tl_source *source
         int64_t n_vertices
-    ctypedef int tl_scalar
     ctypedef struct tl_vertex_counts:
         int64_t n_bad, n_wide, n_clipped
     ctypedef struct tl_view:
@@ -41,8 +48,6 @@ cdef extern from "topleft.h" nogil:
         void *pixels
         float *depth
         int64_t stride_px
-        const void *colors
-        int n_channels, pixel_bytes
     ctypedef struct tl_scene:
         tl_vertex_set mesh
         const int32_t *triangles
@@ -51,15 +56,15 @@ cdef extern from "topleft.h" nogil:
         tl_cull cull
         tl_method method
     ctypedef struct tl_kernels:
-        tl_vertex_counts (*snap)(const void *, tl_scalar, int, int64_t, int, int, tl_vertex *, tl_wide *) noexcept nogil
-        void (*transform_f32)(const float *, int64_t, const float *, double *) noexcept nogil
-        void (*transform_f64)(const double *, int64_t, const double *, double *) noexcept nogil
-        tl_vertex_counts (*project)(const double *, int64_t, const tl_view *, tl_vertex *, tl_wide *, double *) noexcept nogil
-        void (*clip)(const double *, const tl_vertex *, const int32_t *, int64_t, const tl_view *, tl_pieces *) noexcept nogil
+        tl_vertex_counts (*snap)(const tl_source *, int, int, tl_vertex *, tl_wide *) noexcept nogil
+        tl_vertex_counts (*project)(const tl_source *, const tl_view *, tl_vertex *, tl_wide *) noexcept nogil
+        void (*clip)(const tl_source *, const tl_vertex *, const int32_t *, int64_t, const tl_view *, tl_pieces *) noexcept nogil
         int64_t (*first_bad)(const tl_vertex *, const int32_t *, int64_t) noexcept nogil
         void (*draw)(const tl_scene *, const tl_window *, const tl_target *) noexcept nogil
         void (*barycentric)(const tl_scene *, const tl_window *, const int32_t *, float *) noexcept nogil
         void (*interpolate)(const tl_scene *, const tl_window *, const int32_t *, const float *, int, int, float, float *) noexcept nogil
+        void (*paint_flat)(const int32_t *, int64_t, const uint8_t *, int, uint8_t *) noexcept nogil
+        void (*paint_gouraud)(const tl_scene *, const tl_window *, const int32_t *, const void *, int, int, void *) noexcept nogil
 
 include "_dispatch.pxi"
 
@@ -76,36 +81,6 @@ def as_bytes(array):
     return array.reshape(-1).view(np.uint8)
 
 
-def snap(vertices, int subpixel_bits, bint with_depth, uint8_t[::1] records, int64_t[:, ::1] wide):
-    """Snap (V, C) pixel vertices into records; returns the numbers of bad, wide and clipped vertices."""
-    cdef const uint8_t[::1] raw = as_bytes(vertices)
-    cdef tl_scalar scalar = SCALARS[vertices.dtype]
-    cdef int64_t n = vertices.shape[0]
-    cdef int n_components = vertices.shape[1]
-    cdef tl_wide *table = <tl_wide *>&wide[0, 0] if wide is not None and n else NULL
-    cdef tl_vertex_counts counts
-    if n == 0:
-        return 0, 0, 0
-    with nogil:
-        counts = K.snap(data(raw), scalar, n_components, n, subpixel_bits, with_depth, <tl_vertex *>&records[0], table)
-    return counts.n_bad, counts.n_wide, counts.n_clipped
-
-
-def transform(vertices, matrix, double[:, ::1] vertices_clip):
-    """Transform (V, 3) float32 or float64 vertices by a (4, 4) matrix of the same dtype."""
-    cdef const uint8_t[::1] raw = as_bytes(vertices)
-    cdef const uint8_t[::1] raw_matrix = as_bytes(matrix)
-    cdef bint single = vertices.dtype == np.float32
-    cdef int64_t n = vertices.shape[0]
-    if n == 0:
-        return
-    with nogil:
-        if single:
-            K.transform_f32(<const float *>data(raw), n, <const float *>data(raw_matrix), &vertices_clip[0, 0])
-        else:
-            K.transform_f64(<const double *>data(raw), n, <const double *>data(raw_matrix), &vertices_clip[0, 0])
-
-
 cdef class View:
     """How clip space maps to pixels."""
 
@@ -118,16 +93,38 @@ cdef class View:
         self.view.near_clip, self.view.far_clip = near_clip, far_clip
 
 
-def project(const double[:, ::1] vertices_clip, View view, uint8_t[::1] records, int64_t[:, ::1] wide, double[::1] inv_w):
-    """Project and snap (V, 4) clip-space vertices; returns the numbers of bad, wide and clipped vertices."""
-    cdef int64_t n = vertices_clip.shape[0]
-    cdef tl_wide *table = <tl_wide *>&wide[0, 0] if wide is not None and n else NULL
-    cdef tl_vertex_counts counts
-    if n == 0:
-        return 0, 0, 0
-    with nogil:
-        counts = K.project(&vertices_clip[0, 0], n, &view.view, <tl_vertex *>&records[0], table, &inv_w[0])
-    return counts.n_bad, counts.n_wide, counts.n_clipped
+cdef class Source:
+    """The caller's (V, C) vertices, contiguous float32, float64 or int64, and the matrix that takes them to clip space."""
+
+    cdef tl_source source
+    cdef object arrays
+    cdef readonly bint is_clip_space
+
+    def __init__(self, vertices, matrix=None):
+        cdef const uint8_t[::1] raw = as_bytes(vertices)
+        cdef const uint8_t[::1] raw_matrix = None if matrix is None else as_bytes(matrix)
+        self.arrays = (raw, raw_matrix)
+        self.source.data = data(raw)
+        self.source.matrix = data(raw_matrix)
+        self.source.scalar = <tl_scalar><int>SCALARS[vertices.dtype]
+        self.source.n, self.source.n_components = vertices.shape
+        self.is_clip_space = matrix is not None or self.source.n_components == 4
+
+    def snap(self, int subpixel_bits, bint with_depth, uint8_t[::1] records, int64_t[:, ::1] wide):
+        """Snap pixels into records; returns the numbers of bad, wide and clipped vertices."""
+        cdef tl_wide *table = <tl_wide *>&wide[0, 0] if wide is not None else NULL
+        cdef tl_vertex_counts counts
+        with nogil:
+            counts = K.snap(&self.source, subpixel_bits, with_depth, <tl_vertex *>&records[0], table)
+        return counts.n_bad, counts.n_wide, counts.n_clipped
+
+    def project(self, View view, uint8_t[::1] records, int64_t[:, ::1] wide):
+        """Project and snap into records; returns the numbers of bad, wide and clipped vertices."""
+        cdef tl_wide *table = <tl_wide *>&wide[0, 0] if wide is not None else NULL
+        cdef tl_vertex_counts counts
+        with nogil:
+            counts = K.project(&self.source, &view.view, <tl_vertex *>&records[0], table)
+        return counts.n_bad, counts.n_wide, counts.n_clipped
 
 
 def first_bad(const uint8_t[::1] records, const int32_t[:, ::1] triangles):
@@ -145,7 +142,7 @@ cdef class Pieces:
     cdef tl_pieces pieces
     cdef object arrays
 
-    def __init__(self, const double[:, ::1] vertices_clip, const uint8_t[::1] records, const int32_t[:, ::1] triangles, View view):
+    def __init__(self, Source source, const uint8_t[::1] records, const int32_t[:, ::1] triangles, View view):
         cdef tl_pieces *p = &self.pieces
         cdef int64_t n = triangles.shape[0]
         cdef uint8_t[::1] vertices
@@ -153,24 +150,24 @@ cdef class Pieces:
         cdef double[::1] inv_w
         cdef double[:, ::1] weights
         cdef int32_t[:, ::1] corners
-        cdef int32_t[::1] source
+        cdef int32_t[::1] owners
         p.vertices = NULL
         p.n_vertices = p.n_pieces = 0
         if n == 0:
             return
         with nogil:
-            K.clip(&vertices_clip[0, 0], <const tl_vertex *>&records[0], &triangles[0, 0], n, &view.view, p)
+            K.clip(&source.source, <const tl_vertex *>&records[0], &triangles[0, 0], n, &view.view, p)
         if p.n_pieces == 0:
             return
         vertices, wide = np.empty(p.n_vertices * VERTEX_BYTES, np.uint8), np.empty((p.n_vertices, 2), np.int64)
         inv_w, weights = np.empty(p.n_vertices), np.empty((p.n_vertices, 3))
-        corners, source = np.empty((p.n_pieces, 3), np.int32), np.empty(p.n_pieces, np.int32)
-        self.arrays = (vertices, wide, inv_w, weights, corners, source)
+        corners, owners = np.empty((p.n_pieces, 3), np.int32), np.empty(p.n_pieces, np.int32)
+        self.arrays = (vertices, wide, inv_w, weights, corners, owners)
         p.vertices, p.wide = <tl_vertex *>&vertices[0], <tl_wide *>&wide[0, 0]
         p.inv_w, p.weights = &inv_w[0], &weights[0, 0]
-        p.triangles, p.source = &corners[0, 0], &source[0]
+        p.triangles, p.source = &corners[0, 0], &owners[0]
         with nogil:
-            K.clip(&vertices_clip[0, 0], <const tl_vertex *>&records[0], &triangles[0, 0], n, &view.view, p)
+            K.clip(&source.source, <const tl_vertex *>&records[0], &triangles[0, 0], n, &view.view, p)
 
     def __len__(self):
         return self.pieces.n_pieces
@@ -185,13 +182,14 @@ cdef class Scene:
     cdef object arrays
 
     def __init__(
-        self, const uint8_t[::1] records, const int64_t[:, ::1] wide, const double[::1] inv_w, const int32_t[:, ::1] triangles,
+        self, Source source, const uint8_t[::1] records, const int64_t[:, ::1] wide, const int32_t[:, ::1] triangles,
         Pieces pieces, int64_t x_px, int64_t y_px, int subpixel_bits, int cull, int method,
     ):
-        self.arrays = (records, wide, inv_w, triangles, pieces)
+        self.arrays = (source, records, wide, triangles, pieces)
         self.scene.mesh.vertices = <const tl_vertex *>data(records)
         self.scene.mesh.wide = <const tl_wide *>&wide[0, 0] if wide is not None and wide.shape[0] else NULL
-        self.scene.mesh.inv_w = &inv_w[0] if inv_w is not None and inv_w.shape[0] else NULL
+        self.scene.mesh.inv_w = NULL
+        self.scene.mesh.source = &source.source if source.is_clip_space else NULL
         self.scene.mesh.n_vertices = records.shape[0] // <int64_t>sizeof(tl_vertex)
         self.scene.n_triangles = triangles.shape[0]
         self.scene.triangles = &triangles[0, 0] if triangles.shape[0] else NULL
@@ -205,10 +203,7 @@ cdef class Scene:
         w.width, w.height = width, n_rows
         return w
 
-    def draw(
-        self, int sink, uint8_t[::1] pixels, float[:, ::1] depth, int64_t width, int64_t first_row, int64_t n_rows,
-        int pixel_bytes, const uint8_t[::1] colors, int n_channels,
-    ):
+    def draw(self, int sink, uint8_t[::1] pixels, float[:, ::1] depth, int64_t width, int64_t first_row, int64_t n_rows, int pixel_bytes):
         """Draw the rows [first_row, first_row + n_rows) of buffers that are `width` pixels wide."""
         cdef tl_target target
         cdef tl_window window = self.window(first_row, n_rows, width)
@@ -218,10 +213,24 @@ cdef class Scene:
         target.pixels = &pixels[first_row * width * pixel_bytes]
         target.depth = &depth[first_row, 0] if depth is not None else NULL
         target.stride_px = width
-        target.colors = data(colors)
-        target.n_channels, target.pixel_bytes = n_channels, pixel_bytes
         with nogil:
             K.draw(&self.scene, &window, &target)
+
+    def paint(self, const int32_t[:, ::1] labels, const uint8_t[::1] colors, uint8_t[::1] pixels, int64_t first_row, int64_t n_rows,
+              bint is_flat, bint is_u8, int n_channels):
+        """Colour the rows [first_row, first_row + n_rows) by their labels."""
+        cdef int64_t width = labels.shape[1]
+        cdef int pixel_bytes = n_channels if is_u8 else 4 * n_channels
+        cdef tl_window window = self.window(first_row, n_rows, width)
+        if width == 0 or n_rows == 0 or self.scene.n_triangles == 0:
+            return
+        with nogil:
+            if is_flat:
+                K.paint_flat(&labels[first_row, 0], n_rows * width, <const uint8_t *>data(colors), pixel_bytes,
+                             &pixels[first_row * width * pixel_bytes])
+            else:
+                K.paint_gouraud(&self.scene, &window, &labels[first_row, 0], data(colors), n_channels, is_u8,
+                                &pixels[first_row * width * pixel_bytes])
 
     def barycentric(self, const int32_t[:, ::1] ids, float[:, :, ::1] out):
         """Write the weights of the three vertices of the triangle at each pixel."""

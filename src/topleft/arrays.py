@@ -53,9 +53,7 @@ def as_vertices(values: ArrayLike, *, has_transform: bool) -> NDArray[Any]:
             array = np.minimum(array, np.uint64(2**63 - 1))  # out of range either way
     else:
         raise TypeError(f"vertices must be real numbers, got dtype {array.dtype}")
-    if has_transform or array.shape[1] < 4:
-        return np.ascontiguousarray(array, dtype=dtype)
-    return np.ascontiguousarray(array, dtype=np.float64)  # clip space is float64 throughout
+    return np.ascontiguousarray(array, dtype=dtype)
 
 
 def as_triangles(values: ArrayLike, n_vertices: int) -> NDArray[np.int32]:

@@ -45,16 +45,14 @@ class Per(StrEnum):
 
 
 class Sink(IntEnum):
-    """What a covered span does to the buffers; the numbers are `tl_sink` in ``csrc/topleft.h``."""
+    """What happens to a covered sample; the numbers are `tl_sink` in ``csrc/topleft.h``."""
 
     MASK = 0
     COUNT = 1
-    ID = 2
-    NEAREST = 3
-    FARTHEST = 4
-    FLAT = 5
-    GOURAUD_U8 = 6
-    GOURAUD_F32 = 7
+    LABEL = 2
+    PAINT = 3
+    NEAREST = 4
+    FARTHEST = 5
 
 
 Option = TypeVar("Option", bound=StrEnum)

@@ -52,44 +52,33 @@ def snap_scene(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, view: 
     """
     points = as_vertices(vertices, has_transform=view.transform is not None)
     corners = as_triangles(triangles, len(points))
-    is_clip_space = view.transform is not None or points.shape[1] == 4
+    matrix = None if view.transform is None else as_matrix(view.transform, points.dtype)
+    source = _engine.Source(points, matrix)
     n_triangles = len(corners)
     if 0 in view.size:
         corners = corners[:0]  # nothing to see
     n = len(points) if len(corners) else 0
     records = memory.empty("records", (n * _engine.VERTEX_BYTES,), np.uint8)
     wide: NDArray[np.int64] | None = None
-    inv_w: NDArray[np.float64] | None = None
     pieces: _engine.Pieces | None = None
     bad = clipped = 0
-    if n and is_clip_space:
-        clip_points = transform_points(memory, points, view)
+    if n and source.is_clip_space:
         engine_view = _engine.View(view.viewport, view.subpixel_bits, view.zero_to_one, view.near_clip, view.far_clip)
-        inv_w = memory.empty("inv_w", (n,), np.float64)
-        bad, n_wide, clipped = _engine.project(clip_points, engine_view, records, None, inv_w)
+        bad, n_wide, clipped = source.project(engine_view, records, None)
         if n_wide:
             wide = np.empty((n, 2), np.int64)
-            _engine.project(clip_points, engine_view, records, wide, inv_w)
+            source.project(engine_view, records, wide)
     elif n:
-        bad, n_wide, _ = _engine.snap(points, view.subpixel_bits, with_depth, records, None)
+        bad, n_wide, _ = source.snap(view.subpixel_bits, with_depth, records, None)
         if n_wide:
             wide = np.empty((n, 2), np.int64)
-            _engine.snap(points, view.subpixel_bits, with_depth, records, wide)
+            source.snap(view.subpixel_bits, with_depth, records, wide)
     if bad:
         check_used_vertices(points, records, corners, view)
     if clipped:
-        pieces = _engine.Pieces(clip_points, records, corners, engine_view)
-    scene = _engine.Scene(records, wide, inv_w, corners, pieces, *view.origin, view.subpixel_bits, view.cull, view.method)
-    return Snapped(scene, len(points), n_triangles, is_clip_space or points.shape[1] == 3)
-
-
-def transform_points(memory: Memory, points: NDArray[Any], view: View) -> NDArray[np.float64]:
-    """Return the vertices in clip space, (V, 4) float64."""
-    if view.transform is None:
-        return points
-    clip_points = memory.empty("clip_points", (len(points), 4), np.float64)
-    _engine.transform(points, as_matrix(view.transform, points.dtype), clip_points)
-    return clip_points
+        pieces = _engine.Pieces(source, records, corners, engine_view)
+    scene = _engine.Scene(source, records, wide, corners, pieces, *view.origin, view.subpixel_bits, view.cull, view.method)
+    return Snapped(scene, len(points), n_triangles, source.is_clip_space or points.shape[1] == 3)
 
 
 def check_used_vertices(points: NDArray[Any], records: NDArray[np.uint8], corners: NDArray[np.int32], view: View) -> None:
@@ -111,27 +100,37 @@ def check_used_vertices(points: NDArray[Any], records: NDArray[np.uint8], corner
 
 
 def draw(
-    snapped: Snapped,
-    view: View,
-    sink: Sink,
-    pixels: NDArray[Any],
-    *,
-    depth: NDArray[np.float32] | None = None,
-    colors: NDArray[Any] | None = None,
+    snapped: Snapped, view: View, sink: Sink, pixels: NDArray[Any], *, depth: NDArray[np.float32] | None = None
 ) -> None:
     """Draw a scene into contiguous buffers, in bands of rows."""
     width, height = view.size
     if not (width and height and snapped.n_triangles):
         return
-    pixel_bytes = pixels.nbytes // (width * height)
-    color_bytes = None if colors is None else _engine.as_bytes(colors)
-    n_channels = 1 if colors is None or colors.ndim == 1 else colors.shape[1]
-    flat = _engine.as_bytes(pixels)
+    flat, pixel_bytes = _engine.as_bytes(pixels), pixels.itemsize
 
     def draw_rows(first_row: int, n_rows: int) -> None:
-        snapped.scene.draw(sink, flat, depth, width, first_row, n_rows, pixel_bytes, color_bytes, n_channels)
+        snapped.scene.draw(sink, flat, depth, width, first_row, n_rows, pixel_bytes)
 
     run_bands(draw_rows, height, snapped.n_triangles, view.threads)
+
+
+def paint(
+    memory: Memory, snapped: Snapped, view: View, colors: NDArray[Any], pixels: NDArray[Any], *, is_flat: bool
+) -> None:
+    """Draw coloured triangles over contiguous pixels: first which triangle shows in each, then its colour."""
+    width, height = view.size
+    if not (width and height and snapped.n_triangles):
+        return
+    labels = memory.empty("labels", (height, width), np.int32)
+    labels.fill(-1)
+    draw(snapped, view, Sink.LABEL, labels)
+    palette, flat = _engine.as_bytes(colors), _engine.as_bytes(pixels)
+    n_channels = 1 if colors.ndim == 1 else colors.shape[1]
+
+    def paint_rows(first_row: int, n_rows: int) -> None:
+        snapped.scene.paint(labels, palette, flat, first_row, n_rows, is_flat, colors.dtype == np.uint8, n_channels)
+
+    run_bands(paint_rows, height, snapped.n_triangles, view.threads)
 
 
 @contextmanager
@@ -211,8 +210,7 @@ def draw_fill(
             canvas[...] = ground
         elif out is None:
             canvas.fill(0)
-        gouraud = Sink.GOURAUD_U8 if palette.dtype == np.uint8 else Sink.GOURAUD_F32
-        draw(snapped, view, Sink.FLAT if is_flat else gouraud, canvas, colors=palette)
+        paint(memory, snapped, view, palette, canvas, is_flat=is_flat)
     return result
 
 
@@ -236,7 +234,7 @@ def draw_fragments(
         except (TypeError, ValueError):
             raise TypeError(f"out must be a pair (triangle, depth) of arrays, got {type(out).__name__}") from None
     snapped = snap_scene(memory, vertices, triangles, view, with_depth=True)
-    sink = {None: Sink.ID, DepthTest.LESS: Sink.NEAREST, DepthTest.GREATER: Sink.FARTHEST}[test]
+    sink = {None: Sink.PAINT, DepthTest.LESS: Sink.NEAREST, DepthTest.GREATER: Sink.FARTHEST}[test]
     shape = view.size[::-1]
     with (
         target(memory, "triangle", ids_out, shape, np.int32) as (ids, ids_canvas),
@@ -244,7 +242,7 @@ def draw_fragments(
     ):
         ids_canvas.fill(-1)
         depth_canvas.fill(empty_depth)
-        draw(snapped, view, sink if snapped.has_depth else Sink.ID, ids_canvas, depth=depth_canvas)
+        draw(snapped, view, sink if snapped.has_depth else Sink.PAINT, ids_canvas, depth=depth_canvas)
         if background_depth is not None:
             depth_canvas[ids_canvas < 0] = background_depth
     return Fragments(ids, depth, snapped.scene, snapped.n_vertices, snapped.n_triangles)

@@ -1,0 +1,224 @@
+/* Batch: setup and cull of TL_LANES triangles at a time, in 32-bit lanes.
+ * In: vertex records and triangles.  Out: samples of boxes up to 2x2, queues of boxes up to 4x4 and of larger ones for
+ * rows.c, and the triangles that 32 bits cannot take, for draw_triangle.
+ *
+ * Range: extents of at most TL_MAX_EXTENT units, so |dx|, |dy| < 2^14, doubled relative coordinates fit 16 bits, products
+ * 2^30, and doubled edge functions 2^29 (see fixed.h). */
+#include "fixed.h"
+#include "lanes.h"
+
+#define TL_SMALL_BOX 4
+#define TL_MAX_BOX_PX 62 /* rows.c: row ends in float32 are exact up to here */
+#define TL_QUEUE 256
+
+/* Triangles that wait until a vector is full of their kind. */
+typedef struct {
+    int n;
+    int32_t corner[3][TL_QUEUE + TL_MAX_LANES]; /* doubled x | y << 16, relative to the first sample of the box */
+    int32_t sample[TL_QUEUE + TL_MAX_LANES];    /* the first sample of the box: row * stride_px + column */
+    int32_t size[TL_QUEUE + TL_MAX_LANES];      /* columns | rows << 16 of the box */
+    int32_t id[TL_QUEUE + TL_MAX_LANES];
+    double z[3][TL_QUEUE + TL_MAX_LANES];
+} box_queue;
+
+/* Everything that one pass over a scene needs; on the stack of draw. */
+typedef struct {
+    const tl_scene *scene;
+    const tl_window *window;
+    const tl_target *target;
+    box_queue small, rows;
+    fragment_list fragments;
+} batch_state;
+
+/* TL_LANES triangles with positive area; corners doubled and relative to the first sample of their boxes. */
+typedef struct {
+    vi x[3], y[3];
+    vi dx[3], dy[3]; /* edge k runs from corner k to corner k + 1; not doubled */
+    vi e[3];         /* E' at the first sample, as in walk.h: >= 0 inside */
+} lane_triangles;
+
+/* z = (z0 + slope_y * y) + slope_x * x, with x and y half sub-pixels from the first corner. */
+typedef struct {
+    vd z0, slope_x, slope_y;
+    vd x, y; /* of the first sample */
+} lane_planes;
+
+TL_INLINE void setup_edges_lanes(lane_triangles *t, int bits)
+{
+    for (int k = 0; k < 3; k++) {
+        const vi doubled = vi_sub(vi_mul(t->dy[k], t->x[k]), vi_mul(t->dx[k], t->y[k]));
+        /* left: dy < 0, top: dy = 0 and dx > 0; as one number, |dx| < 2^15 */
+        const vm top_left = vi_gt(vi_set1(0), vi_sub(vi_shift_left(t->dy[k], 16), t->dx[k]));
+        t->e[k] = vi_shift_right(vi_select(top_left, doubled, vi_sub(doubled, vi_set1(1))), bits + 1);
+    }
+}
+
+/* The same operations as setup_plane in setup.c. */
+TL_INLINE lane_planes plane_lanes(const lane_triangles *t, vd z0, vd z1, vd z2)
+{
+    const vd x1 = vd_from_vi(t->dx[0]), y1 = vd_from_vi(t->dy[0]);
+    const vi x2i = vi_sub(vi_set1(0), t->dx[2]), y2i = vi_sub(vi_set1(0), t->dy[2]);
+    const vd x2 = vd_from_vi(x2i), y2 = vd_from_vi(y2i), d1 = vd_sub(z1, z0), d2 = vd_sub(z2, z0);
+    const vd area = vd_from_vi(vi_sub(vi_mul(t->dx[0], y2i), vi_mul(t->dy[0], x2i))); /* exact: below 2^29 */
+    const vd inverse = vd_div(vd_set1(0.5), area);
+    lane_planes p;
+    p.z0 = z0;
+    p.slope_x = vd_mul(vd_sub(vd_mul(d1, y2), vd_mul(d2, y1)), inverse);
+    p.slope_y = vd_mul(vd_sub(vd_mul(d2, x1), vd_mul(d1, x2)), inverse);
+    p.x = vd_from_vi(vi_sub(vi_set1(0), t->x[0]));
+    p.y = vd_from_vi(vi_sub(vi_set1(0), t->y[0]));
+    return p;
+}
+
+TL_INLINE vf plane_depth(const lane_planes *p, vd x, vd y)
+{
+    const vd z = vd_add(vd_add(p->z0, vd_mul(p->slope_y, y)), vd_mul(p->slope_x, x));
+    return vf_add(vf_from_vd(z), vf_set1(0.0f)); /* + 0 makes -0 a 0 */
+}
+
+TL_INLINE void emit(fragment_list *f, tl_sink sink, vm m, vi sample, vi id, vf depth)
+{
+    vi_compress(f->sample + f->n, m, sample);
+    if (sink != TL_SINK_MASK && sink != TL_SINK_COUNT)
+        vi_compress(f->id + f->n, m, id);
+    if (sink_has_depth(sink))
+        vi_compress((int32_t *)(f->depth + f->n), m, vi_bits_of_vf(depth));
+    f->n += __builtin_popcount(vm_bits(m));
+}
+
+TL_INLINE void make_room(batch_state *s, tl_sink sink)
+{
+    if (s->fragments.n > TL_FRAGMENTS)
+        flush_fragments(s->target, sink, &s->fragments);
+}
+
+/* Boxes of up to 2x2 samples, tested where they are. */
+TL_INLINE void draw_tiny(batch_state *s, tl_sink sink, lane_triangles *t, const vz *z, vm swapped, vm live, vi n_cols, vi n_rows,
+                         vi sample, vi id)
+{
+    const int bits = s->window->subpixel_bits;
+    const vi stride = vi_set1((int32_t)s->target->stride_px), one = vi_set1(1), minus_one = vi_set1(-1);
+    vm in[2][2];
+    setup_edges_lanes(t, bits);
+    const vm has_col = vm_and(live, vi_gt(n_cols, one)), has_row = vm_and(live, vi_gt(n_rows, one));
+    const vm boxes[2][2] = {{live, has_col}, {has_row, vm_and(has_col, has_row)}};
+    for (int row = 0; row < 2; row++)
+        for (int col = 0; col < 2; col++) {
+            vi all = vi_set1(0);
+            for (int k = 0; k < 3; k++) {
+                const vi below = row ? vi_add(t->e[k], t->dx[k]) : t->e[k];
+                all = vi_or(all, col ? vi_sub(below, t->dy[k]) : below);
+            }
+            in[row][col] = vm_and(boxes[row][col], vi_gt(all, minus_one));
+        }
+    const vm any = vm_or(vm_or(in[0][0], in[0][1]), vm_or(in[1][0], in[1][1]));
+    if (!vm_any(any))
+        return;
+    lane_planes p;
+    vd x_right, y_down;
+    if (sink_has_depth(sink)) {
+        const vd step = vd_set1((double)(2 << bits));
+        const vd z0 = vd_from_vz(z[0]), z1 = vd_from_vz(z[1]), z2 = vd_from_vz(z[2]);
+        p = plane_lanes(t, z0, vd_select(swapped, z2, z1), vd_select(swapped, z1, z2));
+        x_right = vd_add(p.x, step);
+        y_down = vd_add(p.y, step);
+    }
+    /* the first sample of every triangle in one go, further ones by their place */
+    const vm first01 = vm_and_not(in[0][1], in[0][0]);
+    const vm first10 = vm_and_not(in[1][0], vm_or(in[0][0], in[0][1]));
+    const vm first11 = vm_and_not(in[1][1], vm_or(vm_or(in[0][0], in[0][1]), in[1][0]));
+    const vm on_right = vm_or(first01, first11), below = vm_or(first10, first11);
+    const vi right = vi_select(on_right, vi_add(sample, one), sample);
+    vf depth = vf_set1(0.0f);
+    if (sink_has_depth(sink))
+        depth = plane_depth(&p, vd_select(on_right, x_right, p.x), vd_select(below, y_down, p.y));
+    emit(&s->fragments, sink, any, vi_select(below, vi_add(right, stride), right), id, depth);
+    const vm more01 = vm_and_not(in[0][1], first01), more10 = vm_and_not(in[1][0], first10), more11 = vm_and_not(in[1][1], first11);
+    if (vm_any(more01))
+        emit(&s->fragments, sink, more01, vi_add(sample, one), id, sink_has_depth(sink) ? plane_depth(&p, x_right, p.y) : depth);
+    if (vm_any(more10))
+        emit(&s->fragments, sink, more10, vi_add(sample, stride), id, sink_has_depth(sink) ? plane_depth(&p, p.x, y_down) : depth);
+    if (vm_any(more11))
+        emit(&s->fragments, sink, more11, vi_add(vi_add(sample, stride), one), id,
+             sink_has_depth(sink) ? plane_depth(&p, x_right, y_down) : depth);
+    make_room(s, sink);
+}
+
+TL_INLINE void push(box_queue *q, tl_sink sink, vm m, const lane_triangles *t, const vz *z, vm swapped, vi n_cols, vi n_rows,
+                    vi sample, vi id)
+{
+    const vi low = vi_set1(0xffff);
+    for (int k = 0; k < 3; k++)
+        vi_compress(q->corner[k] + q->n, m, vi_or(vi_and(t->x[k], low), vi_shift_left(t->y[k], 16)));
+    vi_compress(q->sample + q->n, m, sample);
+    vi_compress(q->size + q->n, m, vi_or(n_cols, vi_shift_left(n_rows, 16)));
+    vi_compress(q->id + q->n, m, id);
+    if (sink_has_depth(sink)) {
+        const vd z1 = vd_from_vz(z[1]), z2 = vd_from_vz(z[2]);
+        vd_compress(q->z[0] + q->n, m, vd_from_vz(z[0]));
+        vd_compress(q->z[1] + q->n, m, vd_select(swapped, z2, z1));
+        vd_compress(q->z[2] + q->n, m, vd_select(swapped, z1, z2));
+    }
+    q->n += __builtin_popcount(vm_bits(m));
+}
+
+/* TL_LANES triangles of a queue, as pushed. */
+TL_INLINE void unpack(const box_queue *q, int i, int bits, lane_triangles *t)
+{
+    for (int k = 0; k < 3; k++) {
+        const vi packed = vi_load(q->corner[k] + i);
+        t->x[k] = vi_shift_right(vi_shift_left(packed, 16), 16);
+        t->y[k] = vi_shift_right(packed, 16);
+    }
+    for (int k = 0; k < 3; k++) {
+        const int next = k == 2 ? 0 : k + 1;
+        t->dx[k] = vi_shift_right(vi_sub(t->x[next], t->x[k]), 1);
+        t->dy[k] = vi_shift_right(vi_sub(t->y[next], t->y[k]), 1);
+    }
+    setup_edges_lanes(t, bits);
+}
+
+/* Boxes of up to 4x4 samples: every sample of TL_LANES boxes. */
+TL_INLINE void flush_small(batch_state *s, tl_sink sink)
+{
+    box_queue *q = &s->small;
+    const int bits = s->window->subpixel_bits, n = q->n;
+    const int32_t stride = (int32_t)s->target->stride_px;
+    const vd step = vd_set1((double)(2 << bits));
+    q->n = 0;
+    for (int i = 0; i < n; i += TL_LANES) {
+        lane_triangles t;
+        lane_planes p;
+        unpack(q, i, bits, &t);
+        if (sink_has_depth(sink))
+            p = plane_lanes(&t, vd_load(q->z[0] + i), vd_load(q->z[1] + i), vd_load(q->z[2] + i));
+        const vi sample = vi_load(q->sample + i), size = vi_load(q->size + i), id = vi_load(q->id + i);
+        const vi n_cols = vi_and(size, vi_set1(0xffff)), n_rows = vi_shift_right(size, 16);
+        const vm live = vm_first(n - i);
+        for (int row = 0; row < TL_SMALL_BOX; row++) {
+            const vm in_row = vm_and(live, vi_gt(n_rows, vi_set1(row)));
+            vi e0 = t.e[0], e1 = t.e[1], e2 = t.e[2];
+            vd x;
+            if (sink_has_depth(sink))
+                x = p.x;
+            for (int col = 0; col < TL_SMALL_BOX; col++) {
+                const vm in_box = vm_and(in_row, vi_gt(n_cols, vi_set1(col)));
+                const vm in = vm_and(in_box, vi_gt(vi_or(vi_or(e0, e1), e2), vi_set1(-1)));
+                if (TL_LANES > 1 || vm_any(in))
+                    emit(&s->fragments, sink, in, vi_add(sample, vi_set1(row * stride + col)), id,
+                         sink_has_depth(sink) ? plane_depth(&p, x, p.y) : vf_set1(0.0f));
+                e0 = vi_sub(e0, t.dy[0]), e1 = vi_sub(e1, t.dy[1]), e2 = vi_sub(e2, t.dy[2]);
+                if (sink_has_depth(sink))
+                    x = vd_add(x, step);
+            }
+            for (int k = 0; k < 3; k++)
+                t.e[k] = vi_add(t.e[k], t.dx[k]);
+            if (sink_has_depth(sink))
+                p.y = vd_add(p.y, step);
+            if ((row & 1) == 1)
+                make_room(s, sink);
+        }
+    }
+}
+
+TL_SINK_COPIES(flush_small, (batch_state *s), s)

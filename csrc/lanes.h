@@ -1,0 +1,34 @@
+/* Vector lanes: the same names for every instruction set, so that each kernel is written once.
+ *
+ *   vi  TL_LANES int32      vf  TL_LANES float32      vd  TL_LANES float64      vm  TL_LANES bits
+ *
+ * Arithmetic is IEEE, rounded to nearest, multiply and add apart: every instruction set gives the same bits.  The scalar
+ * lanes (TL_LANES = 1) are the definition.  Loads and stores need no alignment.  Intrinsics live in lanes_*.h alone.
+ *
+ *   v?_set1 v?_load v?_store v?_iota v?_add v?_sub v?_mul v?_div v?_min v?_max   as their names say; vi wraps
+ *   v?_select(m, a, b)      a where m, else b
+ *   v?_load_masked, v?_store_masked    touch only the memory of lanes in m
+ *   vi_compress(p, m, v)    the lanes in m, packed, at p; writes a whole vector
+ *   vm_first(n)             the first n lanes, none for n <= 0, all for n >= TL_LANES
+ *   vd_from_vi, vd_from_vf, vf_from_vi, vf_from_vd, vi_floor(vf), vi_round(vd)    conversions; INT32_MIN when out of range
+ */
+#ifndef TL_LANES_H
+#define TL_LANES_H
+
+#include <stdint.h>
+#include <string.h>
+
+#include "topleft.h"
+
+#define TL_INLINE static inline __attribute__((always_inline))
+#define TL_MAX_LANES 16
+
+#if defined(__AVX512F__) && defined(__AVX512DQ__) && defined(__AVX512BW__) && defined(__AVX512VL__)
+#include "lanes_avx512.h"
+#elif defined(__AVX2__) && defined(__FMA__) && defined(__BMI2__)
+#include "lanes_avx2.h"
+#else
+#include "lanes_scalar.h"
+#endif
+
+#endif

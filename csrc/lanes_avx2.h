@@ -1,0 +1,194 @@
+/* Eight lanes, masks as whole vectors of ones. */
+#include <immintrin.h>
+
+#define TL_LANES 8
+
+typedef __m256i vi;
+typedef __m256 vf;
+typedef struct { __m256d lo, hi; } vd;
+typedef __m256i vm;
+
+TL_INLINE vi vi_set1(int32_t a) { return _mm256_set1_epi32(a); }
+TL_INLINE vi vi_load(const int32_t *p) { return _mm256_loadu_si256((const __m256i *)p); }
+TL_INLINE void vi_store(int32_t *p, vi a) { _mm256_storeu_si256((__m256i *)p, a); }
+TL_INLINE vi vi_iota(void) { return _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7); }
+TL_INLINE vi vi_add(vi a, vi b) { return _mm256_add_epi32(a, b); }
+TL_INLINE vi vi_sub(vi a, vi b) { return _mm256_sub_epi32(a, b); }
+TL_INLINE vi vi_mul(vi a, vi b) { return _mm256_mullo_epi32(a, b); }
+TL_INLINE vi vi_min(vi a, vi b) { return _mm256_min_epi32(a, b); }
+TL_INLINE vi vi_max(vi a, vi b) { return _mm256_max_epi32(a, b); }
+TL_INLINE vi vi_or(vi a, vi b) { return _mm256_or_si256(a, b); }
+TL_INLINE vi vi_and(vi a, vi b) { return _mm256_and_si256(a, b); }
+TL_INLINE vi vi_shift_left(vi a, int n) { return _mm256_sll_epi32(a, _mm_cvtsi32_si128(n)); }
+TL_INLINE vi vi_shift_right(vi a, int n) { return _mm256_sra_epi32(a, _mm_cvtsi32_si128(n)); }
+TL_INLINE vm vi_gt(vi a, vi b) { return _mm256_cmpgt_epi32(a, b); }
+TL_INLINE vm vi_gt_unsigned(vi a, vi b)
+{
+    const vi sign = _mm256_set1_epi32(INT32_MIN);
+    return _mm256_cmpgt_epi32(_mm256_xor_si256(a, sign), _mm256_xor_si256(b, sign));
+}
+TL_INLINE vm vi_eq(vi a, vi b) { return _mm256_cmpeq_epi32(a, b); }
+TL_INLINE vi vi_select(vm m, vi a, vi b) { return _mm256_blendv_epi8(b, a, m); }
+TL_INLINE vi vi_load_masked(vm m, const int32_t *p) { return _mm256_maskload_epi32(p, m); }
+TL_INLINE void vi_store_masked(int32_t *p, vm m, vi a) { _mm256_maskstore_epi32(p, m, a); }
+
+TL_INLINE vm vm_and(vm a, vm b) { return _mm256_and_si256(a, b); }
+TL_INLINE vm vm_or(vm a, vm b) { return _mm256_or_si256(a, b); }
+TL_INLINE vm vm_and_not(vm a, vm b) { return _mm256_andnot_si256(b, a); }
+TL_INLINE int vm_any(vm a) { return !_mm256_testz_si256(a, a); }
+TL_INLINE unsigned vm_bits(vm a) { return (unsigned)_mm256_movemask_ps(_mm256_castsi256_ps(a)); }
+TL_INLINE vm vm_all(void) { return _mm256_set1_epi32(-1); }
+TL_INLINE vm vm_first(int64_t n)
+{
+    return _mm256_cmpgt_epi32(_mm256_set1_epi32(n > 8 ? 8 : (int)n), vi_iota());
+}
+
+/* lanes [begin, end) */
+TL_INLINE vm vm_range(int32_t begin, int32_t end)
+{
+    const vi lane = vi_iota();
+    return _mm256_andnot_si256(_mm256_cmpgt_epi32(_mm256_set1_epi32(begin), lane), _mm256_cmpgt_epi32(_mm256_set1_epi32(end), lane));
+}
+
+/* The order that moves the lanes in `bits` to the front: byte k of the packed list is the k-th lane set. */
+TL_INLINE vi compress_order(unsigned bits)
+{
+    const uint64_t lanes = _pdep_u64(bits, 0x0101010101010101u) * 0xff;
+    return _mm256_cvtepu8_epi32(_mm_cvtsi64_si128((long long)_pext_u64(0x0706050403020100u, lanes)));
+}
+TL_INLINE void vi_compress(int32_t *p, vm m, vi a) { vi_store(p, _mm256_permutevar8x32_epi32(a, compress_order(vm_bits(m)))); }
+
+TL_INLINE vf vf_set1(float a) { return _mm256_set1_ps(a); }
+TL_INLINE vf vf_add(vf a, vf b) { return _mm256_add_ps(a, b); }
+TL_INLINE vf vf_mul(vf a, vf b) { return _mm256_mul_ps(a, b); }
+TL_INLINE vf vf_div(vf a, vf b) { return _mm256_div_ps(a, b); }
+TL_INLINE vf vf_from_vi(vi a) { return _mm256_cvtepi32_ps(a); }
+TL_INLINE vf vf_select(vm m, vf a, vf b) { return _mm256_blendv_ps(b, a, _mm256_castsi256_ps(m)); }
+TL_INLINE void vf_store(float *p, vf a) { _mm256_storeu_ps(p, a); }
+TL_INLINE vi vi_floor(vf a) { return _mm256_cvtps_epi32(_mm256_floor_ps(a)); }
+TL_INLINE vf vf_load_masked(vm m, const float *p) { return _mm256_maskload_ps(p, m); }
+TL_INLINE void vf_store_masked(float *p, vm m, vf a) { _mm256_maskstore_ps(p, m, a); }
+TL_INLINE vm vf_lt(vf a, vf b) { return _mm256_castps_si256(_mm256_cmp_ps(a, b, _CMP_LT_OQ)); }
+TL_INLINE vm vf_eq(vf a, vf b) { return _mm256_castps_si256(_mm256_cmp_ps(a, b, _CMP_EQ_OQ)); }
+TL_INLINE vi vi_bits_of_vf(vf a) { return _mm256_castps_si256(a); }
+
+TL_INLINE vd vd_set1(double a) { return (vd){_mm256_set1_pd(a), _mm256_set1_pd(a)}; }
+TL_INLINE vd vd_add(vd a, vd b) { return (vd){_mm256_add_pd(a.lo, b.lo), _mm256_add_pd(a.hi, b.hi)}; }
+TL_INLINE vd vd_sub(vd a, vd b) { return (vd){_mm256_sub_pd(a.lo, b.lo), _mm256_sub_pd(a.hi, b.hi)}; }
+TL_INLINE vd vd_mul(vd a, vd b) { return (vd){_mm256_mul_pd(a.lo, b.lo), _mm256_mul_pd(a.hi, b.hi)}; }
+TL_INLINE vd vd_div(vd a, vd b) { return (vd){_mm256_div_pd(a.lo, b.lo), _mm256_div_pd(a.hi, b.hi)}; }
+TL_INLINE vd vd_from_vi(vi a)
+{
+    return (vd){_mm256_cvtepi32_pd(_mm256_castsi256_si128(a)), _mm256_cvtepi32_pd(_mm256_extracti128_si256(a, 1))};
+}
+TL_INLINE vf vf_from_vd(vd a)
+{
+    return _mm256_insertf128_ps(_mm256_castps128_ps256(_mm256_cvtpd_ps(a.lo)), _mm256_cvtpd_ps(a.hi), 1);
+}
+TL_INLINE vd vd_abs(vd a)
+{
+    const __m256d sign = _mm256_set1_pd(-0.0);
+    return (vd){_mm256_andnot_pd(sign, a.lo), _mm256_andnot_pd(sign, a.hi)};
+}
+TL_INLINE vm vd_ge(vd a, vd b)
+{
+    const __m256 lo = _mm256_castpd_ps(_mm256_cmp_pd(a.lo, b.lo, _CMP_GE_OQ)), hi = _mm256_castpd_ps(_mm256_cmp_pd(a.hi, b.hi, _CMP_GE_OQ));
+    const __m256i packed = _mm256_castps_si256(_mm256_shuffle_ps(lo, hi, 0x88)); /* 0 1 4 5 2 3 6 7 */
+    return _mm256_permute4x64_epi64(packed, 0xd8);
+}
+TL_INLINE vd vd_from_vf(vf a)
+{
+    return (vd){_mm256_cvtps_pd(_mm256_castps256_ps128(a)), _mm256_cvtps_pd(_mm256_extractf128_ps(a, 1))};
+}
+TL_INLINE vi vi_round(vd a)
+{
+    return _mm256_inserti128_si256(_mm256_castsi128_si256(_mm256_cvtpd_epi32(a.lo)), _mm256_cvtpd_epi32(a.hi), 1);
+}
+TL_INLINE vd vd_select(vm m, vd a, vd b)
+{
+    const __m256d lo = _mm256_castsi256_pd(_mm256_cvtepi32_epi64(_mm256_castsi256_si128(m)));
+    const __m256d hi = _mm256_castsi256_pd(_mm256_cvtepi32_epi64(_mm256_extracti128_si256(m, 1)));
+    return (vd){_mm256_blendv_pd(b.lo, a.lo, lo), _mm256_blendv_pd(b.hi, a.hi, hi)};
+}
+TL_INLINE void compress_four(double *p, unsigned bits, __m256d a)
+{
+    const vi order = compress_order(_pdep_u32(bits, 0x55) * 3); /* a double is two int32 lanes */
+    _mm256_storeu_si256((__m256i *)p, _mm256_permutevar8x32_epi32(_mm256_castpd_si256(a), order));
+}
+TL_INLINE void vd_compress(double *p, vm m, vd a)
+{
+    const unsigned bits = vm_bits(m);
+    compress_four(p, bits & 15, a.lo);
+    compress_four(p + __builtin_popcount(bits & 15), bits >> 4, a.hi);
+}
+TL_INLINE vd vd_load(const double *p) { return (vd){_mm256_loadu_pd(p), _mm256_loadu_pd(p + 4)}; }
+TL_INLINE void vd_store(double *p, vd a) { _mm256_storeu_pd(p, a.lo), _mm256_storeu_pd(p + 4, a.hi); }
+
+/* Plain 16-byte loads and transposes in registers: hardware gathers are three times as slow. */
+typedef struct { __m256d even, odd; } vz; /* z of lanes 0,1,4,5 and of 2,3,6,7 */
+TL_INLINE __m256i load_two(const tl_vertex *v, const int32_t *first)
+{
+    const __m128i *a = (const __m128i *)v;
+    return _mm256_inserti128_si256(_mm256_castsi128_si256(_mm_loadu_si128(a + first[0])), _mm_loadu_si128(a + first[12]), 1);
+}
+TL_INLINE void load_vertices(const tl_vertex *v, const int32_t *first, vi *x, vi *y, vz *z)
+{
+    const __m256i a = load_two(v, first), b = load_two(v, first + 3), c = load_two(v, first + 6), d = load_two(v, first + 9);
+    const __m256i ab = _mm256_unpacklo_epi32(a, b), cd = _mm256_unpacklo_epi32(c, d);
+    *x = _mm256_unpacklo_epi64(ab, cd);
+    *y = _mm256_unpackhi_epi64(ab, cd);
+    z->even = _mm256_castsi256_pd(_mm256_unpackhi_epi64(a, b));
+    z->odd = _mm256_castsi256_pd(_mm256_unpackhi_epi64(c, d));
+}
+TL_INLINE vd vd_from_vz(vz z)
+{
+    return (vd){_mm256_permute2f128_pd(z.even, z.odd, 0x20), _mm256_permute2f128_pd(z.even, z.odd, 0x31)};
+}
+
+/* The first four numbers of TL_LANES rows, as columns; reads up to two numbers past the last row. */
+TL_INLINE __m256 rows_f32(const float *p, int stride)
+{
+    return _mm256_insertf128_ps(_mm256_castps128_ps256(_mm_loadu_ps(p)), _mm_loadu_ps(p + 4 * stride), 1);
+}
+TL_INLINE void load_columns_f32(const float *p, int stride, vf *columns)
+{
+    const __m256 a = rows_f32(p, stride), b = rows_f32(p + stride, stride), c = rows_f32(p + 2 * stride, stride),
+                 d = rows_f32(p + 3 * stride, stride);
+    const __m256d ab = _mm256_castps_pd(_mm256_unpacklo_ps(a, b)), cd = _mm256_castps_pd(_mm256_unpacklo_ps(c, d));
+    const __m256d ab2 = _mm256_castps_pd(_mm256_unpackhi_ps(a, b)), cd2 = _mm256_castps_pd(_mm256_unpackhi_ps(c, d));
+    columns[0] = _mm256_castpd_ps(_mm256_unpacklo_pd(ab, cd));
+    columns[1] = _mm256_castpd_ps(_mm256_unpackhi_pd(ab, cd));
+    columns[2] = _mm256_castpd_ps(_mm256_unpacklo_pd(ab2, cd2));
+    columns[3] = _mm256_castpd_ps(_mm256_unpackhi_pd(ab2, cd2));
+}
+TL_INLINE void four_columns_f64(const double *p, int stride, __m256d *columns)
+{
+    const __m256d a = _mm256_loadu_pd(p), b = _mm256_loadu_pd(p + stride), c = _mm256_loadu_pd(p + 2 * stride),
+                  d = _mm256_loadu_pd(p + 3 * stride);
+    const __m256d x = _mm256_unpacklo_pd(a, b), y = _mm256_unpackhi_pd(a, b), x2 = _mm256_unpacklo_pd(c, d), y2 = _mm256_unpackhi_pd(c, d);
+    columns[0] = _mm256_permute2f128_pd(x, x2, 0x20);
+    columns[1] = _mm256_permute2f128_pd(y, y2, 0x20);
+    columns[2] = _mm256_permute2f128_pd(x, x2, 0x31);
+    columns[3] = _mm256_permute2f128_pd(y, y2, 0x31);
+}
+TL_INLINE void load_columns_f64(const double *p, int stride, vd *columns)
+{
+    __m256d low[4], high[4];
+    four_columns_f64(p, stride, low);
+    four_columns_f64(p + 4 * stride, stride, high);
+    for (int k = 0; k < 4; k++)
+        columns[k] = (vd){low[k], high[k]};
+}
+
+TL_INLINE void store_four(tl_vertex *v, __m128i x, __m128i y, __m256d z)
+{
+    const __m256i xy = _mm256_or_si256(_mm256_cvtepu32_epi64(x), _mm256_slli_epi64(_mm256_cvtepu32_epi64(y), 32));
+    const __m256i even = _mm256_unpacklo_epi64(xy, _mm256_castpd_si256(z)), odd = _mm256_unpackhi_epi64(xy, _mm256_castpd_si256(z));
+    _mm256_storeu_si256((__m256i *)v, _mm256_permute2x128_si256(even, odd, 0x20));
+    _mm256_storeu_si256((__m256i *)(v + 2), _mm256_permute2x128_si256(even, odd, 0x31));
+}
+TL_INLINE void store_vertices(tl_vertex *v, vi x, vi y, vd z)
+{
+    store_four(v, _mm256_castsi256_si128(x), _mm256_castsi256_si128(y), z.lo);
+    store_four(v + 4, _mm256_extracti128_si256(x, 1), _mm256_extracti128_si256(y, 1), z.hi);
+}

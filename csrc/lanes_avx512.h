@@ -1,0 +1,174 @@
+/* Sixteen lanes, masks in mask registers. */
+#include <immintrin.h>
+
+#define TL_LANES 16
+
+typedef __m512i vi;
+typedef __m512 vf;
+typedef struct { __m512d lo, hi; } vd;
+typedef __mmask16 vm;
+
+TL_INLINE vi vi_set1(int32_t a) { return _mm512_set1_epi32(a); }
+TL_INLINE vi vi_load(const int32_t *p) { return _mm512_loadu_si512(p); }
+TL_INLINE void vi_store(int32_t *p, vi a) { _mm512_storeu_si512(p, a); }
+TL_INLINE vi vi_iota(void) { return _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15); }
+TL_INLINE vi vi_add(vi a, vi b) { return _mm512_add_epi32(a, b); }
+TL_INLINE vi vi_sub(vi a, vi b) { return _mm512_sub_epi32(a, b); }
+TL_INLINE vi vi_mul(vi a, vi b) { return _mm512_mullo_epi32(a, b); }
+TL_INLINE vi vi_min(vi a, vi b) { return _mm512_min_epi32(a, b); }
+TL_INLINE vi vi_max(vi a, vi b) { return _mm512_max_epi32(a, b); }
+TL_INLINE vi vi_or(vi a, vi b) { return _mm512_or_si512(a, b); }
+TL_INLINE vi vi_and(vi a, vi b) { return _mm512_and_si512(a, b); }
+TL_INLINE vi vi_shift_left(vi a, int n) { return _mm512_sll_epi32(a, _mm_cvtsi32_si128(n)); }
+TL_INLINE vi vi_shift_right(vi a, int n) { return _mm512_sra_epi32(a, _mm_cvtsi32_si128(n)); }
+TL_INLINE vm vi_gt(vi a, vi b) { return _mm512_cmpgt_epi32_mask(a, b); }
+TL_INLINE vm vi_gt_unsigned(vi a, vi b) { return _mm512_cmpgt_epu32_mask(a, b); }
+TL_INLINE vm vi_eq(vi a, vi b) { return _mm512_cmpeq_epi32_mask(a, b); }
+TL_INLINE vi vi_select(vm m, vi a, vi b) { return _mm512_mask_mov_epi32(b, m, a); }
+/* compress in registers and store whole: a compress-store to memory is three times as slow */
+TL_INLINE void vi_compress(int32_t *p, vm m, vi a) { _mm512_storeu_si512(p, _mm512_maskz_compress_epi32(m, a)); }
+TL_INLINE vi vi_load_masked(vm m, const int32_t *p) { return _mm512_maskz_loadu_epi32(m, p); }
+TL_INLINE void vi_store_masked(int32_t *p, vm m, vi a) { _mm512_mask_storeu_epi32(p, m, a); }
+
+TL_INLINE vm vm_and(vm a, vm b) { return a & b; }
+TL_INLINE vm vm_or(vm a, vm b) { return a | b; }
+TL_INLINE vm vm_and_not(vm a, vm b) { return a & (vm)~b; }
+TL_INLINE int vm_any(vm a) { return a != 0; }
+TL_INLINE unsigned vm_bits(vm a) { return a; }
+TL_INLINE vm vm_all(void) { return 0xffff; }
+TL_INLINE vm vm_first(int64_t n) { return n >= 16 ? 0xffff : n <= 0 ? 0 : (vm)((1u << n) - 1); }
+/* lanes [begin, end), both in 0..16 */
+TL_INLINE vm vm_range(int32_t begin, int32_t end) { return (vm)((0xffffu << begin) & ~(0xffffu << end)); }
+
+TL_INLINE vf vf_set1(float a) { return _mm512_set1_ps(a); }
+TL_INLINE vf vf_add(vf a, vf b) { return _mm512_add_ps(a, b); }
+TL_INLINE vf vf_mul(vf a, vf b) { return _mm512_mul_ps(a, b); }
+TL_INLINE vf vf_div(vf a, vf b) { return _mm512_div_ps(a, b); }
+TL_INLINE vf vf_from_vi(vi a) { return _mm512_cvtepi32_ps(a); }
+TL_INLINE vf vf_select(vm m, vf a, vf b) { return _mm512_mask_mov_ps(b, m, a); }
+TL_INLINE void vf_store(float *p, vf a) { _mm512_storeu_ps(p, a); }
+TL_INLINE vi vi_floor(vf a) { return _mm512_cvt_roundps_epi32(a, _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC); }
+TL_INLINE vf vf_load_masked(vm m, const float *p) { return _mm512_maskz_loadu_ps(m, p); }
+TL_INLINE void vf_store_masked(float *p, vm m, vf a) { _mm512_mask_storeu_ps(p, m, a); }
+TL_INLINE vm vf_lt(vf a, vf b) { return _mm512_cmp_ps_mask(a, b, _CMP_LT_OQ); }
+TL_INLINE vm vf_eq(vf a, vf b) { return _mm512_cmp_ps_mask(a, b, _CMP_EQ_OQ); }
+TL_INLINE vi vi_bits_of_vf(vf a) { return _mm512_castps_si512(a); }
+
+TL_INLINE vd vd_set1(double a) { return (vd){_mm512_set1_pd(a), _mm512_set1_pd(a)}; }
+TL_INLINE vd vd_add(vd a, vd b) { return (vd){_mm512_add_pd(a.lo, b.lo), _mm512_add_pd(a.hi, b.hi)}; }
+TL_INLINE vd vd_sub(vd a, vd b) { return (vd){_mm512_sub_pd(a.lo, b.lo), _mm512_sub_pd(a.hi, b.hi)}; }
+TL_INLINE vd vd_mul(vd a, vd b) { return (vd){_mm512_mul_pd(a.lo, b.lo), _mm512_mul_pd(a.hi, b.hi)}; }
+TL_INLINE vd vd_div(vd a, vd b) { return (vd){_mm512_div_pd(a.lo, b.lo), _mm512_div_pd(a.hi, b.hi)}; }
+TL_INLINE vd vd_from_vi(vi a)
+{
+    return (vd){_mm512_cvtepi32_pd(_mm512_castsi512_si256(a)), _mm512_cvtepi32_pd(_mm512_extracti64x4_epi64(a, 1))};
+}
+TL_INLINE vf vf_from_vd(vd a)
+{
+    return _mm512_insertf32x8(_mm512_castps256_ps512(_mm512_cvtpd_ps(a.lo)), _mm512_cvtpd_ps(a.hi), 1);
+}
+TL_INLINE vd vd_abs(vd a) { return (vd){_mm512_abs_pd(a.lo), _mm512_abs_pd(a.hi)}; }
+TL_INLINE vm vd_ge(vd a, vd b)
+{
+    return (vm)(_mm512_cmp_pd_mask(a.lo, b.lo, _CMP_GE_OQ) | _mm512_cmp_pd_mask(a.hi, b.hi, _CMP_GE_OQ) << 8);
+}
+TL_INLINE vd vd_from_vf(vf a)
+{
+    return (vd){_mm512_cvtps_pd(_mm512_castps512_ps256(a)), _mm512_cvtps_pd(_mm512_extractf32x8_ps(a, 1))};
+}
+TL_INLINE vi vi_round(vd a)
+{
+    return _mm512_inserti64x4(_mm512_castsi256_si512(_mm512_cvtpd_epi32(a.lo)), _mm512_cvtpd_epi32(a.hi), 1);
+}
+TL_INLINE vd vd_select(vm m, vd a, vd b)
+{
+    return (vd){_mm512_mask_mov_pd(b.lo, (__mmask8)m, a.lo), _mm512_mask_mov_pd(b.hi, (__mmask8)(m >> 8), a.hi)};
+}
+TL_INLINE void vd_compress(double *p, vm m, vd a)
+{
+    _mm512_storeu_pd(p, _mm512_maskz_compress_pd((__mmask8)m, a.lo));
+    _mm512_storeu_pd(p + __builtin_popcount(m & 0xff), _mm512_maskz_compress_pd((__mmask8)(m >> 8), a.hi));
+}
+TL_INLINE vd vd_load(const double *p) { return (vd){_mm512_loadu_pd(p), _mm512_loadu_pd(p + 8)}; }
+TL_INLINE void vd_store(double *p, vd a) { _mm512_storeu_pd(p, a.lo), _mm512_storeu_pd(p + 8, a.hi); }
+
+/* Plain 16-byte loads and transposes in registers: hardware gathers are three times as slow. */
+typedef struct { __m512d even, odd; } vz; /* z of lanes 0,1,4,5,8,9,12,13 and of 2,3,6,7,10,11,14,15 */
+TL_INLINE __m512i load_four(const tl_vertex *v, const int32_t *first)
+{
+    const __m128i *a = (const __m128i *)v;
+    const __m256i low = _mm256_inserti128_si256(_mm256_castsi128_si256(_mm_loadu_si128(a + first[0])), _mm_loadu_si128(a + first[12]), 1);
+    const __m256i high = _mm256_inserti128_si256(_mm256_castsi128_si256(_mm_loadu_si128(a + first[24])), _mm_loadu_si128(a + first[36]), 1);
+    return _mm512_inserti64x4(_mm512_castsi256_si512(low), high, 1);
+}
+TL_INLINE void load_vertices(const tl_vertex *v, const int32_t *first, vi *x, vi *y, vz *z)
+{
+    const __m512i a = load_four(v, first), b = load_four(v, first + 3), c = load_four(v, first + 6), d = load_four(v, first + 9);
+    const __m512i ab = _mm512_unpacklo_epi32(a, b), cd = _mm512_unpacklo_epi32(c, d);
+    *x = _mm512_unpacklo_epi64(ab, cd);
+    *y = _mm512_unpackhi_epi64(ab, cd);
+    z->even = _mm512_castsi512_pd(_mm512_unpackhi_epi64(a, b));
+    z->odd = _mm512_castsi512_pd(_mm512_unpackhi_epi64(c, d));
+}
+TL_INLINE vd vd_from_vz(vz z)
+{
+    const __m512i low = _mm512_setr_epi64(0, 1, 8, 9, 2, 3, 10, 11), high = _mm512_setr_epi64(4, 5, 12, 13, 6, 7, 14, 15);
+    return (vd){_mm512_permutex2var_pd(z.even, low, z.odd), _mm512_permutex2var_pd(z.even, high, z.odd)};
+}
+
+/* The first four numbers of TL_LANES rows, as columns; reads up to two numbers past the last row. */
+TL_INLINE __m512 rows_f32(const float *p, int stride)
+{
+    const __m256 low = _mm256_insertf128_ps(_mm256_castps128_ps256(_mm_loadu_ps(p)), _mm_loadu_ps(p + 4 * stride), 1);
+    const __m256 high = _mm256_insertf128_ps(_mm256_castps128_ps256(_mm_loadu_ps(p + 8 * stride)), _mm_loadu_ps(p + 12 * stride), 1);
+    return _mm512_insertf32x8(_mm512_castps256_ps512(low), high, 1);
+}
+TL_INLINE void load_columns_f32(const float *p, int stride, vf *columns)
+{
+    const __m512 a = rows_f32(p, stride), b = rows_f32(p + stride, stride), c = rows_f32(p + 2 * stride, stride),
+                 d = rows_f32(p + 3 * stride, stride);
+    const __m512d ab = _mm512_castps_pd(_mm512_unpacklo_ps(a, b)), cd = _mm512_castps_pd(_mm512_unpacklo_ps(c, d));
+    const __m512d ab2 = _mm512_castps_pd(_mm512_unpackhi_ps(a, b)), cd2 = _mm512_castps_pd(_mm512_unpackhi_ps(c, d));
+    columns[0] = _mm512_castpd_ps(_mm512_unpacklo_pd(ab, cd));
+    columns[1] = _mm512_castpd_ps(_mm512_unpackhi_pd(ab, cd));
+    columns[2] = _mm512_castpd_ps(_mm512_unpacklo_pd(ab2, cd2));
+    columns[3] = _mm512_castpd_ps(_mm512_unpackhi_pd(ab2, cd2));
+}
+/* rows k and k + 4 */
+TL_INLINE __m512d rows_f64(const double *p, int stride)
+{
+    return _mm512_insertf64x4(_mm512_castpd256_pd512(_mm256_loadu_pd(p)), _mm256_loadu_pd(p + 4 * stride), 1);
+}
+TL_INLINE void eight_columns_f64(const double *p, int stride, __m512d *columns)
+{
+    const __m512d a = rows_f64(p, stride), b = rows_f64(p + stride, stride), c = rows_f64(p + 2 * stride, stride),
+                  d = rows_f64(p + 3 * stride, stride);
+    const __m512d x = _mm512_unpacklo_pd(a, b), y = _mm512_unpackhi_pd(a, b); /* x: x0 x1 z0 z1 x4 x5 z4 z5 */
+    const __m512d x2 = _mm512_unpacklo_pd(c, d), y2 = _mm512_unpackhi_pd(c, d);
+    const __m512i front = _mm512_setr_epi64(0, 1, 8, 9, 4, 5, 12, 13), back = _mm512_setr_epi64(2, 3, 10, 11, 6, 7, 14, 15);
+    columns[0] = _mm512_permutex2var_pd(x, front, x2);
+    columns[1] = _mm512_permutex2var_pd(y, front, y2);
+    columns[2] = _mm512_permutex2var_pd(x, back, x2);
+    columns[3] = _mm512_permutex2var_pd(y, back, y2);
+}
+TL_INLINE void load_columns_f64(const double *p, int stride, vd *columns)
+{
+    __m512d low[4], high[4];
+    eight_columns_f64(p, stride, low);
+    eight_columns_f64(p + 8 * stride, stride, high);
+    for (int k = 0; k < 4; k++)
+        columns[k] = (vd){low[k], high[k]};
+}
+
+TL_INLINE void store_eight(tl_vertex *v, __m256i x, __m256i y, __m512d z)
+{
+    const __m512i front = _mm512_setr_epi64(0, 8, 1, 9, 2, 10, 3, 11), back = _mm512_setr_epi64(4, 12, 5, 13, 6, 14, 7, 15);
+    const __m512i xy = _mm512_or_si512(_mm512_cvtepu32_epi64(x), _mm512_slli_epi64(_mm512_cvtepu32_epi64(y), 32));
+    _mm512_storeu_si512(v, _mm512_permutex2var_epi64(xy, front, _mm512_castpd_si512(z)));
+    _mm512_storeu_si512(v + 4, _mm512_permutex2var_epi64(xy, back, _mm512_castpd_si512(z)));
+}
+TL_INLINE void store_vertices(tl_vertex *v, vi x, vi y, vd z)
+{
+    store_eight(v, _mm512_castsi512_si256(x), _mm512_castsi512_si256(y), z.lo);
+    store_eight(v + 8, _mm512_extracti64x4_epi64(x, 1), _mm512_extracti64x4_epi64(y, 1), z.hi);
+}

@@ -1,0 +1,146 @@
+/* Paint: colours from labels, once per visible sample.
+ * In: the label of each sample and the colours of triangles or vertices.  Out: colours; samples with label -1 are kept.
+ * Based on: H. Gouraud, Continuous Shading of Curved Surfaces, 1971. */
+#include <string.h>
+
+#include "fixed.h"
+
+/* Copies the colour of each labelled sample's triangle; samples with label -1 stay as they are. */
+static void paint_flat(const int32_t *labels, int64_t n, const uint8_t *colors, int pixel_bytes, uint8_t *restrict out)
+{
+    switch (pixel_bytes) {
+    case 1:
+        for (int64_t k = 0; k < n; k++)
+            if (labels[k] >= 0)
+                out[k] = colors[labels[k]];
+        return;
+    case 3:
+        for (int64_t k = 0; k < n; k++)
+            if (labels[k] >= 0)
+                memcpy(out + 3 * k, colors + 3 * (int64_t)labels[k], 3);
+        return;
+    case 4:
+        for (int64_t k = 0; k < n; k++)
+            if (labels[k] >= 0)
+                memcpy(out + 4 * k, colors + 4 * (int64_t)labels[k], 4);
+        return;
+    default:
+        for (int64_t k = 0; k < n; k++)
+            if (labels[k] >= 0)
+                memcpy(out + k * pixel_bytes, colors + (int64_t)labels[k] * pixel_bytes, (size_t)pixel_bytes);
+    }
+}
+
+/* Sign of w1 * d1 + w2 * d2 - halves * w_sum / 2 in exact integers; |d|, |halves| <= 511. */
+static int compare_exactly(const tl_triangle *t, int64_t x_px, int64_t y_px, int bits, int d1, int d2, int halves)
+{
+    const tl_int128 terms[3] = {doubled_edge(t, 2, 0, x_px, y_px, bits), doubled_edge(t, 0, 1, x_px, y_px, bits), weight_sum(t)};
+    const int factors[3] = {2 * d1, 2 * d2, -halves};
+    tl_int128 high = 0, low = 0; /* the terms reach 2^127: two limbs */
+    for (int k = 0; k < 3; k++) {
+        high += (terms[k] >> 64) * factors[k];
+        low += (tl_int128)(uint64_t)terms[k] * factors[k];
+    }
+    high += low >> 64;
+    low = (tl_int128)(uint64_t)low;
+    return high < 0 ? -1 : high > 0 || low > 0;
+}
+
+/* One channel of n samples: the exact value rounded to nearest, ties to even.  float64 decides unless it is next to a tie. */
+static inline void paint_run_u8(const tl_triangle *t, const uint8_t *c, int64_t x_px, int64_t y_px, int bits, const double *w1,
+                                const double *w2, int n, int n_channels, uint8_t *restrict out)
+{
+    const int c0 = c[0], d1 = c[1] - c0, d2 = c[2] - c0;
+    const double slope1 = d1 / t->w_sum, slope2 = d2 / t->w_sum;
+    for (int k = 0; k < n; k++) {
+        const double value = c0 + (w1[k] * slope1 + w2[k] * slope2);
+        const int below = (int)floor(value);
+        int rounded = (int)rint(value);
+        if (fabs(value - below - 0.5) < 0x1p-20) {
+            const int side = compare_exactly(t, x_px + k, y_px, bits, d1, d2, 2 * (below - c0) + 1);
+            rounded = below + (side > 0 || (side == 0 && (below & 1)));
+        }
+        out[k * n_channels] = (uint8_t)rounded;
+    }
+}
+
+static inline void paint_run_f32(const tl_triangle *t, const float *c, const double *w1, const double *w2, int n, int n_channels,
+                                 float *restrict out)
+{
+    const double c0 = c[0], slope1 = (c[1] - c0) / t->w_sum, slope2 = (c[2] - c0) / t->w_sum;
+    for (int k = 0; k < n; k++)
+        out[k * n_channels] = (float)(c0 + (w1[k] * slope1 + w2[k] * slope2));
+}
+
+/* A sample of a piece: the colours of its corners are those of the cut points. */
+static void paint_piece(const resolve_state *s, const int32_t *corners, int64_t x_px, int64_t y_px, int bits, const void *colors,
+                        int n_channels, int is_u8, void *out)
+{
+    double part[3], sum = 0.0;
+    for (int k = 0; k < 3; k++) {
+        const int a = k == 2 ? 0 : k + 1, b = 3 - k - a;
+        part[k] = (double)doubled_edge(&s->triangle, a, b, x_px, y_px, bits);
+        sum += part[k];
+    }
+    for (int c = 0; c < n_channels; c++) {
+        double value = 0.0;
+        for (int j = 0; j < 3; j++) {
+            const int64_t at = (int64_t)corners[j] * n_channels + c;
+            const double weight = (part[0] * s->piece[0][j] + part[1] * s->piece[1][j] + part[2] * s->piece[2][j]) / sum;
+            value += weight * (is_u8 ? (double)((const uint8_t *)colors)[at] : (double)((const float *)colors)[at]);
+        }
+        if (is_u8)
+            ((uint8_t *)out)[c] = (uint8_t)rint(value < 0.0 ? 0.0 : value > 255.0 ? 255.0 : value);
+        else
+            ((float *)out)[c] = (float)value;
+    }
+}
+
+/* n samples of one triangle in a row. */
+static void paint_run(resolve_state *s, const tl_window *window, int64_t row, int64_t col, int n, const void *colors, int n_channels,
+                      int is_u8, void *out)
+{
+    double w1[TL_CHUNK], w2[TL_CHUNK];
+    tl_triangle *t = &s->triangle;
+    const int bits = window->subpixel_bits;
+    const int64_t x_px = col + window->x_px, y_px = row + window->y_px;
+    t->row0 = row, t->col0 = col;
+    setup_weights(t, window);
+    weights_at(t, window, row, col, n, w1, w2);
+    for (int c = 0; c < n_channels; c++) {
+        const int64_t at[3] = {(int64_t)t->corner[0] * n_channels + c, (int64_t)t->corner[1] * n_channels + c,
+                               (int64_t)t->corner[2] * n_channels + c};
+        if (is_u8) {
+            const uint8_t *all = colors, own[3] = {all[at[0]], all[at[1]], all[at[2]]};
+            paint_run_u8(t, own, x_px, y_px, bits, w1, w2, n, n_channels, (uint8_t *)out + c);
+        } else {
+            const float *all = colors, own[3] = {all[at[0]], all[at[1]], all[at[2]]};
+            paint_run_f32(t, own, w1, w2, n, n_channels, (float *)out + c);
+        }
+    }
+}
+
+static void paint_gouraud(const tl_scene *scene, const tl_window *window, const int32_t *labels, const void *colors, int n_channels,
+                          int is_u8, void *pixels)
+{
+    resolve_state s = {.id = -1};
+    const int pixel_bytes = n_channels * (is_u8 ? 1 : 4), bits = window->subpixel_bits;
+    for (int64_t row = 0; row < window->height; row++) {
+        const int32_t *label = labels + row * window->width;
+        char *out = (char *)pixels + row * window->width * pixel_bytes;
+        for (int64_t col = 0, n; col < window->width; col += n) {
+            for (n = 1; n < TL_CHUNK && col + n < window->width && label[col + n] == label[col];)
+                n++;
+            const int64_t x_px = col + window->x_px, y_px = row + window->y_px;
+            if (label[col] < 0 || !find_triangle(&s, scene, label[col], x_px, y_px, bits))
+                continue;
+            if (!s.piece[0]) {
+                paint_run(&s, window, row, col, (int)n, colors, n_channels, is_u8, out + col * pixel_bytes);
+                continue;
+            }
+            n = 1; /* the next sample may belong to another piece */
+            paint_piece(&s, scene->triangles + 3 * (int64_t)label[col], x_px, y_px, bits, colors, n_channels, is_u8,
+                        out + col * pixel_bytes);
+        }
+    }
+}
