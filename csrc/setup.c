@@ -115,7 +115,8 @@ static inline void setup_plane(tl_triangle *t)
     const double width = (double)(max3(t->x_fx[0], t->x_fx[1], t->x_fx[2]) - min3(t->x_fx[0], t->x_fx[1], t->x_fx[2]));
     const double height = (double)(max3(t->y_fx[0], t->y_fx[1], t->y_fx[2]) - min3(t->y_fx[0], t->y_fx[1], t->y_fx[2]));
     const double area = x1 * y2 - y1 * x2;
-    t->has_plane = t->is_narrow && width * height <= area * (1 << TL_SLIVER_BITS);
+    /* products below 2^52 are exact */
+    t->has_plane = width * height < 0x1p52 && width * height <= area * (1 << TL_SLIVER_BITS);
     if (!t->has_plane)
         return;
     const double inverse = 0.5 / area;

@@ -10,7 +10,7 @@ import topleft as tl
 from topleft.methods import reference as ref
 
 METHODS = ("edge", "scanline", "auto")
-DEPTH_SLACK = Fraction(1, 2**49)  # rule 8, times the largest |z| of the triangle
+DEPTH_SLACK = Fraction(1, 2**35)  # rule 8, times the largest |z| of the triangle
 # Weights come from exact edge functions in a dozen float64 operations on positive numbers: 2**-49 is ample for them,
 # and their three products with values and two sums stay below 2**-48 of the largest value.
 WEIGHT_SLACK = Fraction(1, 2**48)

@@ -92,7 +92,9 @@ def test_fill_background_fills_the_picture_first():
     np.testing.assert_array_equal(out[..., 2], np.where(LEFT_MASK, 3, 6))
 
 
-@pytest.mark.parametrize(("dtype", "expected"), [(np.float64, np.float32), (np.float16, np.float32), (np.int64, np.uint8)])
+@pytest.mark.parametrize(
+    ("dtype", "expected"), [(np.float64, np.float32), (np.float16, np.float32), (np.int64, np.uint8)]
+)
 def test_fill_colors_of_other_dtypes_become_float32_or_uint8(dtype, expected):
     picture = tl.fill(SQUARE, HALVES, np.array([[1, 2, 3], [4, 5, 6]], dtype), SIZE)
     assert picture.dtype == expected

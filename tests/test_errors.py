@@ -220,7 +220,12 @@ def test_error_leaves_out_as_it_was():
         ([["r"], ["g"]], {}, TypeError, "colors must be uint8 or float32, got dtype"),
         (np.zeros((2, 3)), {"per": "face"}, ValueError, "per must be one of 'auto', 'triangle', 'vertex', got 'face'"),
         (np.zeros((2, 3), int), {"background": 300}, ValueError, "background must be whole numbers in 0..255"),
-        (np.zeros((2, 3)), {"background": [1, 2]}, ValueError, "background must be one number or have shape (3,), got (2,)"),
+        (
+            np.zeros((2, 3)),
+            {"background": [1, 2]},
+            ValueError,
+            "background must be one number or have shape (3,), got (2,)",
+        ),
         (np.zeros((2, 3)), {"background": "red"}, TypeError, "background must be real numbers"),
     ],
 )
@@ -234,7 +239,9 @@ def test_colors_that_fit_both_raise_unless_told():
     colors = np.full((4, 1), 5, np.uint8)
     with raises(ValueError, "colors has 4 rows, and there are as many triangles as vertices: say per="):
         tl.fill(SQUARE, ring, colors, SIZE)
-    assert (tl.fill(SQUARE, ring, colors, SIZE, per="vertex") == tl.fill(SQUARE, ring, colors, SIZE, per="triangle")).all()
+    assert (
+        tl.fill(SQUARE, ring, colors, SIZE, per="vertex") == tl.fill(SQUARE, ring, colors, SIZE, per="triangle")
+    ).all()
 
 
 def test_bad_depth_test_raises():

@@ -1,18 +1,35 @@
 """Exact, watertight triangle rasterization on the CPU: NumPy arrays in, NumPy arrays out."""
 
+from topleft import scenes
 from topleft._isa import build_info
 from topleft.api import Rasterizer, coverage, fill, overdraw, rasterize
+from topleft.camera import Camera
+from topleft.errors import MeshError, TopleftError
+from topleft.files import load, save_image
 from topleft.fragments import Fragments
+from topleft.mesh import Mesh
+from topleft.render import render, visibility
+from topleft.shade import shade
 
 __version__: str = build_info()["version"]
 
 __all__ = [
+    "Camera",
     "Fragments",
+    "Mesh",
+    "MeshError",
     "Rasterizer",
+    "TopleftError",
     "__version__",
     "build_info",
     "coverage",
     "fill",
+    "load",
     "overdraw",
     "rasterize",
+    "render",
+    "save_image",
+    "scenes",
+    "shade",
+    "visibility",
 ]

@@ -14,21 +14,6 @@ def isa_built() -> list[str]: ...
 def isa_available() -> list[str]: ...
 def compiler_info() -> dict[str, object]: ...
 def as_bytes(array: NDArray[Any]) -> NDArray[np.uint8]: ...
-def snap(
-    vertices: NDArray[Any],
-    subpixel_bits: int,
-    with_depth: bool,
-    records: NDArray[np.uint8],
-    wide: NDArray[np.int64] | None,
-) -> tuple[int, int, int]: ...
-def transform(vertices: NDArray[Any], matrix: NDArray[Any], vertices_clip: NDArray[np.float64]) -> None: ...
-def project(
-    vertices_clip: NDArray[np.float64],
-    view: View,
-    records: NDArray[np.uint8],
-    wide: NDArray[np.int64] | None,
-    inv_w: NDArray[np.float64],
-) -> tuple[int, int, int]: ...
 def first_bad(records: NDArray[np.uint8], triangles: NDArray[np.int32]) -> int: ...
 
 class View:
@@ -36,22 +21,28 @@ class View:
         self, viewport: tuple[int, int], subpixel_bits: int, zero_to_one: bool, near_clip: bool, far_clip: bool
     ) -> None: ...
 
+class Source:
+    is_clip_space: bool
+    def __init__(self, vertices: NDArray[Any], matrix: NDArray[Any] | None = None) -> None: ...
+    def snap(
+        self, subpixel_bits: int, with_depth: bool, records: NDArray[np.uint8], wide: NDArray[np.int64] | None
+    ) -> tuple[int, int, int]: ...
+    def project(
+        self, view: View, records: NDArray[np.uint8], wide: NDArray[np.int64] | None
+    ) -> tuple[int, int, int]: ...
+
 class Pieces:
     def __init__(
-        self,
-        vertices_clip: NDArray[np.float64],
-        records: NDArray[np.uint8],
-        triangles: NDArray[np.int32],
-        view: View,
+        self, source: Source, records: NDArray[np.uint8], triangles: NDArray[np.int32], view: View
     ) -> None: ...
     def __len__(self) -> int: ...
 
 class Scene:
     def __init__(
         self,
+        source: Source,
         records: NDArray[np.uint8],
         wide: NDArray[np.int64] | None,
-        inv_w: NDArray[np.float64] | None,
         triangles: NDArray[np.int32],
         pieces: Pieces | None,
         x_px: int,
@@ -69,7 +60,16 @@ class Scene:
         first_row: int,
         n_rows: int,
         pixel_bytes: int,
-        colors: NDArray[np.uint8] | None,
+    ) -> None: ...
+    def paint(
+        self,
+        labels: NDArray[np.int32],
+        colors: NDArray[np.uint8],
+        pixels: NDArray[np.uint8],
+        first_row: int,
+        n_rows: int,
+        is_flat: bool,
+        is_u8: bool,
         n_channels: int,
     ) -> None: ...
     def barycentric(self, ids: NDArray[np.int32], out: NDArray[np.float32]) -> None: ...

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any, Unpack
 
-from numpy.typing import ArrayLike, NDArray
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from topleft.arrays import as_size
 from topleft.fragments import Fragments
@@ -20,7 +20,12 @@ FRESH = FreshMemory()
 
 
 def coverage(
-    vertices: ArrayLike, triangles: ArrayLike, size: tuple[int, int], *, out: NDArray[np.bool_] | None = None, **view: Unpack[ViewOptions]
+    vertices: ArrayLike,
+    triangles: ArrayLike,
+    size: tuple[int, int],
+    *,
+    out: NDArray[np.bool_] | None = None,
+    **view: Unpack[ViewOptions],
 ) -> NDArray[np.bool_]:
     """Return the mask of the pixels whose centre a triangle covers.
 
@@ -76,7 +81,12 @@ def coverage(
 
 
 def overdraw(
-    vertices: ArrayLike, triangles: ArrayLike, size: tuple[int, int], *, out: NDArray[np.int32] | None = None, **view: Unpack[ViewOptions]
+    vertices: ArrayLike,
+    triangles: ArrayLike,
+    size: tuple[int, int],
+    *,
+    out: NDArray[np.int32] | None = None,
+    **view: Unpack[ViewOptions],
 ) -> NDArray[np.int32]:
     """Return how many triangles cover each pixel's centre.
 
@@ -128,7 +138,8 @@ def fill(
     vertices, triangles, size, **view
         As in `coverage`.
     colors : array_like, shape (T, C), (V, C), (T,) or (V,), C from 1 to 4
-        uint8 (any integers in 0..255) or float32 (any floats). Per triangle: flat. Per vertex: interpolated screen-linearly.
+        uint8 (any integers in 0..255) or float32 (any floats). Per triangle: flat. Per vertex: interpolated linearly
+        on the screen.
     per : "auto", "triangle" or "vertex"
         What a row of `colors` belongs to; "auto" tells by the number of rows.
     background : number or array_like, shape (C,), optional
@@ -180,8 +191,8 @@ def rasterize(
         As in `coverage`. The depth of pixel-space vertices (V, 3) is their third column; (V, 2) vertices lie at depth 0
         and are drawn in painter's order.
     depth_test : "less", "greater" or None
-        Which triangle is kept: the one with the smaller depth, with the larger depth, or the later one. At equal depth the
-        triangle with the lower index.
+        Which triangle is kept: the one with the smaller depth, with the larger depth, or the later one. At equal depth
+        the triangle with the lower index.
     background_depth : float, optional
         Depth where nothing is; +inf, or -inf with "greater", unless given.
     out : (ndarray of int32, ndarray of float32), each of shape (H, W), optional
@@ -200,9 +211,9 @@ def rasterize(
 
     Notes
     -----
-    Depth is interpolated linearly in screen space with exact integer weights and rounded once: at most half a unit in the
-    last place of float32 from the exact plane, plus ``2**-49`` times the largest depth of the triangle. Clip space gives
-    window depth: ``(z/w + 1) / 2``, or ``z/w`` with ``clip_depth="zero_to_one"``, in [0, 1].
+    Depth is that of the plane through the snapped vertices, rounded once: at most half a unit in the last place of
+    float32 from the exact value, plus ``2**-35`` times the largest depth of the triangle. Clip space gives window
+    depth: ``(z/w + 1) / 2``, or ``z/w`` with ``clip_depth="zero_to_one"``, in [0, 1].
 
     References
     ----------
@@ -211,13 +222,14 @@ def rasterize(
     Examples
     --------
     >>> import topleft as tl
-    >>> frags = tl.rasterize([[0, 0, 0.5], [4, 0, 0.5], [0, 4, 0.5], [0, 0, 0], [2, 0, 1], [0, 2, 1]], [[0, 1, 2], [3, 4, 5]], (4, 2))
+    >>> vertices = [[0, 0, 0.5], [4, 0, 0.5], [0, 4, 0.5], [0, 0, 0], [2, 0, 2], [0, 2, 2]]
+    >>> frags = tl.rasterize(vertices, [[0, 1, 2], [3, 4, 5]], (4, 2), depth_test="greater")
     >>> frags.triangle
-    array([[ 0,  0,  0, -1],
+    array([[ 1,  0,  0, -1],
            [ 0,  0, -1, -1]], dtype=int32)
     >>> frags.depth
-    array([[0.5, 0.5, 0.5, inf],
-           [0.5, 0.5, inf, inf]], dtype=float32)
+    array([[ 1. ,  0.5,  0.5, -inf],
+           [ 0.5,  0.5, -inf, -inf]], dtype=float32)
     """
     return draw_fragments(FRESH, vertices, triangles, View.parse(size, view), depth_test, background_depth, out)
 
@@ -256,13 +268,23 @@ class Rasterizer:
         return View.parse(self.size, options)
 
     def coverage(
-        self, vertices: ArrayLike, triangles: ArrayLike, *, out: NDArray[np.bool_] | None = None, **view: Unpack[ViewOptions]
+        self,
+        vertices: ArrayLike,
+        triangles: ArrayLike,
+        *,
+        out: NDArray[np.bool_] | None = None,
+        **view: Unpack[ViewOptions],
     ) -> NDArray[np.bool_]:
         """Return the mask of the pixels that a triangle covers, as `topleft.coverage` does."""
         return draw_coverage(self._memory, vertices, triangles, self._view(view), out)
 
     def overdraw(
-        self, vertices: ArrayLike, triangles: ArrayLike, *, out: NDArray[np.int32] | None = None, **view: Unpack[ViewOptions]
+        self,
+        vertices: ArrayLike,
+        triangles: ArrayLike,
+        *,
+        out: NDArray[np.int32] | None = None,
+        **view: Unpack[ViewOptions],
     ) -> NDArray[np.int32]:
         """Return how many triangles cover each pixel, as `topleft.overdraw` does."""
         return draw_overdraw(self._memory, vertices, triangles, self._view(view), out)
@@ -291,5 +313,5 @@ class Rasterizer:
         out: tuple[NDArray[np.int32], NDArray[np.float32]] | None = None,
         **view: Unpack[ViewOptions],
     ) -> Fragments:
-        """Return the visibility buffer, as `topleft.rasterize` does; its attributes too only last until the next call."""
+        """Return the visibility buffer, as `topleft.rasterize` does; its attributes also end with the next call."""
         return draw_fragments(self._memory, vertices, triangles, self._view(view), depth_test, background_depth, out)

@@ -28,7 +28,7 @@ INT32_MAX = 2**31 - 1
 def as_array(name: str, values: ArrayLike) -> NDArray[Any]:
     """Return what NumPy makes of `values`, without a copy where it can."""
     if not isinstance(values, np.ndarray) and hasattr(values, "__dlpack__") and not hasattr(values, "__array__"):
-        return np.from_dlpack(values)
+        return np.from_dlpack(values)  # type: ignore[arg-type]
     try:
         return np.asarray(values)
     except ValueError as error:
@@ -70,7 +70,8 @@ def as_triangles(values: ArrayLike, n_vertices: int) -> NDArray[np.int32]:
     if array.size and not (0 <= array.min() and array.max() < n_vertices):
         row = int(np.argmax(((array < 0) | (array >= n_vertices)).any(axis=1)))
         raise IndexError(
-            f"triangles must hold indices in [0, {n_vertices}), the number of vertices; row {row} is {array[row].tolist()}"
+            f"triangles must hold indices in [0, {n_vertices}), the number of vertices; "
+            f"row {row} is {array[row].tolist()}"
         )
     return np.ascontiguousarray(array, dtype=np.int32)
 
@@ -94,8 +95,8 @@ def as_matrix(values: ArrayLike, dtype: np.dtype[Any]) -> NDArray[Any]:
 def as_pair(name: str, values: object) -> tuple[int, int]:
     """Return two integers."""
     try:
-        first, second = values  # type: ignore[misc]
-        return operator.index(first), operator.index(second)
+        first, second = map(operator.index, values)  # type: ignore[call-overload]
+        return first, second
     except (TypeError, ValueError):
         raise TypeError(f"{name} must be two integers, got {values!r}") from None
 
@@ -113,7 +114,9 @@ def as_window(origin: object, subpixel_bits: int) -> tuple[int, int]:
     x, y = as_pair("origin", origin)
     limit = 2 ** (61 - subpixel_bits)
     if not (abs(x) < limit and abs(y) < limit):
-        raise ValueError(f"origin must lie within {limit} pixels of 0 with {subpixel_bits} sub-pixel bits, got ({x}, {y})")
+        raise ValueError(
+            f"origin must lie within {limit} pixels of 0 with {subpixel_bits} sub-pixel bits, got ({x}, {y})"
+        )
     return x, y
 
 
@@ -163,10 +166,13 @@ def as_values(values: ArrayLike, n_vertices: int, n_triangles: int) -> NDArray[n
     array = as_array("values", values)
     if array.dtype.kind not in "fiub":
         raise TypeError(f"values must be real numbers, got dtype {array.dtype}")
-    fits = (array.ndim in (1, 2) and array.shape[0] == n_vertices) or (array.ndim == 3 and array.shape[:2] == (n_triangles, 3))
+    fits = (array.ndim in (1, 2) and array.shape[0] == n_vertices) or (
+        array.ndim == 3 and array.shape[:2] == (n_triangles, 3)
+    )
     if not fits:
         raise ValueError(
-            f"values must have shape (V,), (V, K) or (T, 3, K) with V = {n_vertices} and T = {n_triangles}, got {array.shape}"
+            f"values must have shape (V,), (V, K) or (T, 3, K) with V = {n_vertices} and T = {n_triangles}, "
+            f"got {array.shape}"
         )
     return np.ascontiguousarray(array, dtype=np.float32)
 
@@ -176,7 +182,9 @@ def as_out(name: str, array: object, shape: tuple[int, ...], dtype: type) -> NDA
     if not isinstance(array, np.ndarray):
         raise TypeError(f"{name} must be a NumPy array, got {type(array).__name__}")
     if array.shape != shape or array.dtype != dtype:
-        raise ValueError(f"{name} must have shape {shape} and dtype {np.dtype(dtype)}, got {array.shape} and {array.dtype}")
+        raise ValueError(
+            f"{name} must have shape {shape} and dtype {np.dtype(dtype)}, got {array.shape} and {array.dtype}"
+        )
     if not array.flags.writeable:
         raise ValueError(f"{name} must be writeable, got a read-only array")
     return array

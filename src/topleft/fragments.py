@@ -27,7 +27,12 @@ class Fragments:
     """
 
     def __init__(
-        self, triangle: NDArray[np.int32], depth: NDArray[np.float32], scene: _engine.Scene, n_vertices: int, n_triangles: int
+        self,
+        triangle: NDArray[np.int32],
+        depth: NDArray[np.float32],
+        scene: _engine.Scene,
+        n_vertices: int,
+        n_triangles: int,
     ) -> None:
         self.triangle = triangle
         self.depth = depth

@@ -1,6 +1,6 @@
 """The pipeline as named stages, and what each verb does with it.
 
-    arrays -> transform -> clip -> snap -> draw
+arrays -> transform -> clip -> snap -> draw
 """
 
 from __future__ import annotations
@@ -77,11 +77,15 @@ def snap_scene(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, view: 
         check_used_vertices(points, records, corners, view)
     if clipped:
         pieces = _engine.Pieces(source, records, corners, engine_view)
-    scene = _engine.Scene(source, records, wide, corners, pieces, *view.origin, view.subpixel_bits, view.cull, view.method)
+    scene = _engine.Scene(
+        source, records, wide, corners, pieces, *view.origin, view.subpixel_bits, view.cull, view.method
+    )
     return Snapped(scene, len(points), n_triangles, source.is_clip_space or points.shape[1] == 3)
 
 
-def check_used_vertices(points: NDArray[Any], records: NDArray[np.uint8], corners: NDArray[np.int32], view: View) -> None:
+def check_used_vertices(
+    points: NDArray[Any], records: NDArray[np.uint8], corners: NDArray[np.int32], view: View
+) -> None:
     """Raise an error for the first vertex that cannot be drawn, if a triangle uses it."""
     i = _engine.first_bad(records, corners)
     if i < 0:
@@ -150,7 +154,9 @@ def target(
         result[...] = canvas
 
 
-def draw_coverage(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, view: View, out: object) -> NDArray[np.bool_]:
+def draw_coverage(
+    memory: Memory, vertices: ArrayLike, triangles: ArrayLike, view: View, out: object
+) -> NDArray[np.bool_]:
     """`coverage`, on the memory given."""
     snapped = snap_scene(memory, vertices, triangles, view, with_depth=False)
     with target(memory, "coverage", out, view.size[::-1], np.bool_) as (result, canvas):
@@ -159,7 +165,9 @@ def draw_coverage(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, vie
     return result
 
 
-def draw_overdraw(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, view: View, out: object) -> NDArray[np.int32]:
+def draw_overdraw(
+    memory: Memory, vertices: ArrayLike, triangles: ArrayLike, view: View, out: object
+) -> NDArray[np.int32]:
     """`overdraw`, on the memory given."""
     snapped = snap_scene(memory, vertices, triangles, view, with_depth=False)
     with target(memory, "overdraw", out, view.size[::-1], np.int32) as (result, canvas):
@@ -175,7 +183,8 @@ def colors_are_flat(n_colors: int, snapped: Snapped, per: str) -> bool:
     fits_triangles, fits_vertices = n_colors == n_triangles, n_colors == snapped.n_vertices
     if choice is Per.AUTO and fits_triangles and fits_vertices and n_colors:
         raise ValueError(
-            f"colors has {n_colors} rows, and there are as many triangles as vertices: say per='triangle' or per='vertex'"
+            f"colors has {n_colors} rows, and there are as many triangles as vertices: "
+            "say per='triangle' or per='vertex'"
         )
     if choice is not Per.VERTEX and fits_triangles:
         return True

@@ -6,6 +6,7 @@ import operator
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
 
 __all__ = ["available_threads", "parse_threads", "run_bands"]
 
@@ -53,7 +54,7 @@ def run_bands(draw_rows: Callable[[int, int], None], n_rows: int, n_triangles: i
         threads = min(available_threads(), max(1, n_triangles // MIN_TRIANGLES_PER_THREAD))
     n_bands = max(1, min(threads, n_rows))
     bounds = [n_rows * i // n_bands for i in range(n_bands + 1)]
-    bands = [(first, end - first) for first, end in zip(bounds, bounds[1:], strict=False)]
+    bands = [(first, end - first) for first, end in pairwise(bounds)]
     jobs = [_shared_pool().submit(draw_rows, *band) for band in bands[1:]]
     try:
         draw_rows(*bands[0])

@@ -183,22 +183,29 @@ def _cut(a: Position, b: Position, da: float, db: float) -> Position:
     return tuple(p * of_a + q * of_b for p, q in zip(a, b, strict=True))
 
 
-def _fan(polygon: list[Vertex]) -> list[tuple[Vertex, Vertex, Vertex]]:
+def _clip_turn(a: Position, b: Position, c: Position) -> int:
+    """Return how a triangle turns as drawn (y down): the sign of its homogeneous determinant, in float64."""
+    det = (a[0] * (b[1] * c[3] - b[3] * c[1]) - a[1] * (b[0] * c[3] - b[3] * c[0])) + a[3] * (b[0] * c[1] - b[1] * c[0])
+    return (det < 0) - (det > 0)
+
+
+def _fan(polygon: list[Vertex], source_turn: int = 0) -> list[tuple[Vertex, Vertex, Vertex]]:
     """Return the polygon as a fan of triangles, from the first apex where the snap has turned none of them over.
 
-    Without such an apex (corners of a polygon a few sub-pixels thin have changed places): from the first corner, less
-    the triangles that turn against the polygon.
+    Without such an apex (corners that lie next to each other have changed places): from the apex with the least area
+    turned over, without the triangles that turn against the source triangle.
     """
     n = len(polygon)
-    if n == 0:
-        return []
     fans = [[(polygon[k], polygon[(k + i) % n], polygon[(k + i + 1) % n]) for i in range(1, n - 1)] for k in range(n)]
     for fan in fans:
         areas = [_signed_area(t) for t in fan]
         if min(areas) >= 0 or max(areas) <= 0:
             return fan
-    sign = 1 if sum(_signed_area(t) for t in fans[0]) >= 0 else -1
-    return [t for t in fans[0] if _signed_area(t) * sign > 0]
+        source_turn = source_turn or (1 if sum(areas) >= 0 else -1)
+    if not fans:
+        return []
+    best = min(fans, key=lambda fan: sum(max(0, -_signed_area(t) * source_turn) for t in fan))
+    return [t for t in best if _signed_area(t) * source_turn > 0]
 
 
 # ---- triangles ------------------------------------------------------------------------------------------------------
@@ -234,7 +241,9 @@ def pieces(
             polygon = [v for v in projected if v] if all(projected) else []
         else:
             polygon = [Vertex(snap([p], subpixel_bits)[0], (*p, 0)[2], 1.0, (*weights,)) for p, weights in ends]
-        for corners in _fan(polygon):
+        a, b, c = (tuple(p) for p, _ in ends)
+        turn = _clip_turn(a, b, c) if len(a) == 4 else 0
+        for corners in _fan(polygon, turn):
             area = _signed_area(corners)
             # Counter-clockwise to the eye is a negative area, because y points down.
             if area != 0 and cull != ("back" if area > 0 else "front"):
