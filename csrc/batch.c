@@ -72,8 +72,7 @@ TL_INLINE lane_planes plane_lanes(const lane_triangles *t, vd z0, vd z1, vd z2)
 
 TL_INLINE vf plane_depth(const lane_planes *p, vd x, vd y)
 {
-    const vd z = vd_add(vd_add(p->z0, vd_mul(p->slope_y, y)), vd_mul(p->slope_x, x));
-    return vf_add(vf_from_vd(z), vf_set1(0.0f)); /* + 0 makes -0 a 0 */
+    return sum_depth(vd_add(p->z0, vd_mul(p->slope_y, y)), vd_mul(p->slope_x, x));
 }
 
 TL_INLINE void emit(fragment_list *f, tl_sink sink, vm m, vi sample, vi id, vf depth)
@@ -189,32 +188,36 @@ TL_INLINE void flush_small(batch_state *s, tl_sink sink)
     for (int i = 0; i < n; i += TL_LANES) {
         lane_triangles t;
         lane_planes p;
+        vd z_col[TL_SMALL_BOX];
         unpack(q, i, bits, &t);
-        if (sink_has_depth(sink))
+        if (sink_has_depth(sink)) {
             p = plane_lanes(&t, vd_load(q->z[0] + i), vd_load(q->z[1] + i), vd_load(q->z[2] + i));
+            for (int col = 0; col < TL_SMALL_BOX; col++) {
+                z_col[col] = vd_mul(p.slope_x, p.x);
+                p.x = vd_add(p.x, step);
+            }
+        }
         const vi sample = vi_load(q->sample + i), size = vi_load(q->size + i), id = vi_load(q->id + i);
         const vi n_cols = vi_and(size, vi_set1(0xffff)), n_rows = vi_shift_right(size, 16);
         const vm live = vm_first(n - i);
         for (int row = 0; row < TL_SMALL_BOX; row++) {
             const vm in_row = vm_and(live, vi_gt(n_rows, vi_set1(row)));
             vi e0 = t.e[0], e1 = t.e[1], e2 = t.e[2];
-            vd x;
-            if (sink_has_depth(sink))
-                x = p.x;
+            vd z_row;
+            if (sink_has_depth(sink)) {
+                z_row = vd_add(p.z0, vd_mul(p.slope_y, p.y));
+                p.y = vd_add(p.y, step);
+            }
             for (int col = 0; col < TL_SMALL_BOX; col++) {
                 const vm in_box = vm_and(in_row, vi_gt(n_cols, vi_set1(col)));
                 const vm in = vm_and(in_box, vi_gt(vi_or(vi_or(e0, e1), e2), vi_set1(-1)));
                 if (TL_LANES > 1 || vm_any(in))
                     emit(&s->fragments, sink, in, vi_add(sample, vi_set1(row * stride + col)), id,
-                         sink_has_depth(sink) ? plane_depth(&p, x, p.y) : vf_set1(0.0f));
+                         sink_has_depth(sink) ? sum_depth(z_row, z_col[col]) : vf_set1(0.0f));
                 e0 = vi_sub(e0, t.dy[0]), e1 = vi_sub(e1, t.dy[1]), e2 = vi_sub(e2, t.dy[2]);
-                if (sink_has_depth(sink))
-                    x = vd_add(x, step);
             }
             for (int k = 0; k < 3; k++)
                 t.e[k] = vi_add(t.e[k], t.dx[k]);
-            if (sink_has_depth(sink))
-                p.y = vd_add(p.y, step);
             if ((row & 1) == 1)
                 make_room(s, sink);
         }

@@ -12,8 +12,22 @@ typedef struct {
     double weights[3]; /* barycentrics in the source triangle */
 } clip_corner;
 
+/* Puts a cut exactly on its plane, which rounding may have missed: far from the eye by more than the picture. */
+static inline void put_on_plane(double *p, int plane, const tl_view *view)
+{
+    switch (plane) {
+    case 0: p[3] = TL_MIN_W; return;
+    case 1: p[2] = view->zero_to_one ? 0.0 : -p[3]; return;
+    case 2: p[2] = p[3]; return;
+    case 3: p[0] = -(view->guard_band_x * p[3]); return;
+    case 4: p[0] = view->guard_band_x * p[3]; return;
+    case 5: p[1] = -(view->guard_band_y * p[3]); return;
+    default: p[1] = view->guard_band_y * p[3]; return;
+    }
+}
+
 /* The point where the edge from a (inside) to b (outside) meets the plane: both weights are positive, so w stays so. */
-static inline clip_corner cut_edge(const clip_corner *a, const clip_corner *b, double da, double db)
+static inline clip_corner cut_edge(const clip_corner *a, const clip_corner *b, double da, double db, int plane, const tl_view *view)
 {
     clip_corner cut;
     const double of_a = -db / (da - db), of_b = da / (da - db);
@@ -21,6 +35,7 @@ static inline clip_corner cut_edge(const clip_corner *a, const clip_corner *b, d
         cut.pos[k] = a->pos[k] * of_a + b->pos[k] * of_b;
     for (int k = 0; k < 3; k++)
         cut.weights[k] = a->weights[k] * of_a + b->weights[k] * of_b;
+    put_on_plane(cut.pos, plane, view);
     return cut;
 }
 
@@ -34,9 +49,9 @@ static int clip_polygon(const clip_corner *in, int n_in, int plane, const tl_vie
         if (da >= 0.0)
             out[n++] = *a;
         if (da >= 0.0 && db < 0.0)
-            out[n++] = cut_edge(a, b, da, db);
+            out[n++] = cut_edge(a, b, da, db, plane, view);
         else if (da < 0.0 && db >= 0.0)
-            out[n++] = cut_edge(b, a, db, da);
+            out[n++] = cut_edge(b, a, db, da, plane, view);
     }
     return n;
 }

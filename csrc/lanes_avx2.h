@@ -43,11 +43,17 @@ TL_INLINE vm vm_first(int64_t n)
     return _mm256_cmpgt_epi32(_mm256_set1_epi32(n > 8 ? 8 : (int)n), vi_iota());
 }
 
-/* lanes [begin, end) */
-TL_INLINE vm vm_range(int32_t begin, int32_t end)
+/* The masks of TL_LANES ranges of lanes [begin, end), none where begin > end; and one of them. */
+typedef struct { int32_t begin[8], end[8]; } vm_ranges;
+TL_INLINE void set_ranges(vm_ranges *r, vi begin, vi end)
 {
-    const vi lane = vi_iota();
-    return _mm256_andnot_si256(_mm256_cmpgt_epi32(_mm256_set1_epi32(begin), lane), _mm256_cmpgt_epi32(_mm256_set1_epi32(end), lane));
+    vi_store(r->begin, begin);
+    vi_store(r->end, end);
+}
+TL_INLINE vm get_range(const vm_ranges *r, int k)
+{
+    const vi lane = vi_iota(), begin = _mm256_set1_epi32(r->begin[k]), end = _mm256_set1_epi32(r->end[k]);
+    return _mm256_andnot_si256(_mm256_cmpgt_epi32(begin, lane), _mm256_cmpgt_epi32(end, lane));
 }
 
 /* The order that moves the lanes in `bits` to the front: byte k of the packed list is the k-th lane set. */

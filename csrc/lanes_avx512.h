@@ -37,8 +37,14 @@ TL_INLINE int vm_any(vm a) { return a != 0; }
 TL_INLINE unsigned vm_bits(vm a) { return a; }
 TL_INLINE vm vm_all(void) { return 0xffff; }
 TL_INLINE vm vm_first(int64_t n) { return n >= 16 ? 0xffff : n <= 0 ? 0 : (vm)((1u << n) - 1); }
-/* lanes [begin, end), both in 0..16 */
-TL_INLINE vm vm_range(int32_t begin, int32_t end) { return (vm)((0xffffu << begin) & ~(0xffffu << end)); }
+/* The masks of TL_LANES ranges of lanes [begin, end), both in 0..16, none where begin > end; and one of them. */
+typedef struct { int32_t bits[16]; } vm_ranges;
+TL_INLINE void set_ranges(vm_ranges *r, vi begin, vi end)
+{
+    const vi ones = _mm512_set1_epi32(-1);
+    vi_store(r->bits, _mm512_andnot_si512(_mm512_sllv_epi32(ones, end), _mm512_sllv_epi32(ones, begin)));
+}
+TL_INLINE vm get_range(const vm_ranges *r, int k) { return (vm)r->bits[k]; }
 
 TL_INLINE vf vf_set1(float a) { return _mm512_set1_ps(a); }
 TL_INLINE vf vf_add(vf a, vf b) { return _mm512_add_ps(a, b); }

@@ -36,7 +36,11 @@ TL_INLINE int vm_any(vm a) { return a != 0; }
 TL_INLINE unsigned vm_bits(vm a) { return a; }
 TL_INLINE vm vm_all(void) { return 1; }
 TL_INLINE vm vm_first(int64_t n) { return n > 0; }
-TL_INLINE vm vm_range(int32_t begin, int32_t end) { return begin <= 0 && end > 0; }
+
+/* The masks of TL_LANES ranges of lanes [begin, end); and one of them. */
+typedef struct { vm mask; } vm_ranges;
+TL_INLINE void set_ranges(vm_ranges *r, vi begin, vi end) { r->mask = begin <= 0 && end > 0; }
+TL_INLINE vm get_range(const vm_ranges *r, int k) { (void)k; return r->mask; }
 
 TL_INLINE vf vf_set1(float a) { return a; }
 TL_INLINE vf vf_add(vf a, vf b) { return a + b; }

@@ -208,6 +208,7 @@ TL_INLINE void draw_batches(const tl_scene *scene, const tl_window *window, cons
     batch_state s;
     s.scene = scene, s.window = window, s.target = target;
     s.small.n = s.rows.n = s.fragments.n = 0;
+    memset(s.fragments.sample, 0, sizeof s.fragments.sample); /* what is prefetched behind the end of the list */
     const int bits = window->subpixel_bits, is_back = scene->cull == TL_CULL_BACK;
     const int64_t farthest = (int64_t)1 << 30;
     const batch_limits limits = {

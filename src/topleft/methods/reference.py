@@ -157,11 +157,21 @@ class Projection(NamedTuple):
                 if d_here >= 0:
                     walked.append(here)
                 if d_here >= 0 > d_there:
-                    walked.append(_cut(here, there, d_here, d_there))
+                    walked.append(self.put_on_plane(_cut(here, there, d_here, d_there), k))
                 elif d_there >= 0 > d_here:
-                    walked.append(_cut(there, here, d_there, d_here))
+                    walked.append(self.put_on_plane(_cut(there, here, d_there, d_here), k))
             polygon = walked
         return polygon
+
+    def put_on_plane(self, p: Position, k: int) -> Position:
+        """Return a cut with the coordinate that plane k fixes set to its value, which rounding may have missed."""
+        x, y, z, w = p[:4]
+        x_guard, y_guard = (GUARD_FX / 2.0**self.subpixel_bits / half for half in self.half_px)
+        fixed = (
+            (x, y, z, W_MIN), (x, y, 0.0 if self.zero_to_one else -w, w), (x, y, w, w),
+            (-(x_guard * w), y, z, w), (x_guard * w, y, z, w), (x, -(y_guard * w), z, w), (x, y_guard * w, z, w),
+        )  # fmt: skip
+        return (*fixed[k], *p[4:])
 
     def vertex(self, p: Position) -> Vertex | None:
         """Divide by w, apply the viewport, snap; None when a cut has lost its digits and left the fixed-point range."""
