@@ -26,6 +26,7 @@ typedef struct {
     const tl_scene *scene;
     const tl_window *window;
     const tl_target *target;
+    int64_t bad_row; /* of triangles, -1: none so far */
     box_queue small, rows;
     fragment_list fragments;
 } batch_state;

@@ -3,7 +3,7 @@
  *   vi  TL_LANES int32      vf  TL_LANES float32      vd  TL_LANES float64      vm  TL_LANES bits
  *
  * Arithmetic is IEEE, rounded to nearest, multiply and add apart: every instruction set gives the same bits.  The scalar
- * lanes (TL_LANES = 1) are the definition.  Loads and stores need no alignment.  Intrinsics live in lanes_*.h alone.
+ * lanes (TL_LANES = 1) are the definition.  vd_quotients(a, b, q) divides three numbers by one, each correctly rounded.  Loads and stores need no alignment.  Intrinsics live in lanes_*.h alone.
  *
  *   v?_set1 v?_load v?_store v?_iota v?_add v?_sub v?_mul v?_div v?_min v?_max   as their names say; vi wraps
  *   v?_select(m, a, b)      a where m, else b

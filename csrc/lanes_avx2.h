@@ -91,6 +91,21 @@ TL_INLINE vf vf_from_vd(vd a)
 {
     return _mm256_insertf128_ps(_mm256_castps128_ps256(_mm256_cvtpd_ps(a.lo)), _mm256_cvtpd_ps(a.hi), 1);
 }
+/* a[k] / b for three a, each correctly rounded, for |b| and |a / b| within 2^+-500: one division.  The first step makes the
+ * quotient faithful, the second correct.  Based on: P. Markstein, Computation of elementary functions on the IBM RISC
+ * System/6000 processor, 1990. */
+TL_INLINE __m256d one_quotient(__m256d a, __m256d b, __m256d inverse)
+{
+    __m256d q = _mm256_mul_pd(a, inverse);
+    q = _mm256_fmadd_pd(_mm256_fnmadd_pd(q, b, a), inverse, q);
+    return _mm256_fmadd_pd(_mm256_fnmadd_pd(q, b, a), inverse, q);
+}
+TL_INLINE void vd_quotients(const vd *a, vd b, vd *q)
+{
+    const vd inverse = vd_div(vd_set1(1.0), b);
+    for (int k = 0; k < 3; k++)
+        q[k] = (vd){one_quotient(a[k].lo, b.lo, inverse.lo), one_quotient(a[k].hi, b.hi, inverse.hi)};
+}
 TL_INLINE vd vd_abs(vd a)
 {
     const __m256d sign = _mm256_set1_pd(-0.0);

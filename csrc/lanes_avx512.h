@@ -73,6 +73,21 @@ TL_INLINE vf vf_from_vd(vd a)
 {
     return _mm512_insertf32x8(_mm512_castps256_ps512(_mm512_cvtpd_ps(a.lo)), _mm512_cvtpd_ps(a.hi), 1);
 }
+/* a[k] / b for three a, each correctly rounded, for |b| and |a / b| within 2^+-500: one division.  The first step makes the
+ * quotient faithful, the second correct.  Based on: P. Markstein, Computation of elementary functions on the IBM RISC
+ * System/6000 processor, 1990. */
+TL_INLINE __m512d one_quotient(__m512d a, __m512d b, __m512d inverse)
+{
+    __m512d q = _mm512_mul_pd(a, inverse);
+    q = _mm512_fmadd_pd(_mm512_fnmadd_pd(q, b, a), inverse, q);
+    return _mm512_fmadd_pd(_mm512_fnmadd_pd(q, b, a), inverse, q);
+}
+TL_INLINE void vd_quotients(const vd *a, vd b, vd *q)
+{
+    const vd inverse = vd_div(vd_set1(1.0), b);
+    for (int k = 0; k < 3; k++)
+        q[k] = (vd){one_quotient(a[k].lo, b.lo, inverse.lo), one_quotient(a[k].hi, b.hi, inverse.hi)};
+}
 TL_INLINE vd vd_abs(vd a) { return (vd){_mm512_abs_pd(a.lo), _mm512_abs_pd(a.hi)}; }
 TL_INLINE vm vd_ge(vd a, vd b)
 {
@@ -131,6 +146,20 @@ TL_INLINE __m512 rows_f32(const float *p, int stride)
 }
 TL_INLINE void load_columns_f32(const float *p, int stride, vf *columns)
 {
+    if (stride == 3) { /* three whole loads, two permutations a column; there is no fourth number */
+        const __m512 a = _mm512_loadu_ps(p), b = _mm512_loadu_ps(p + 16), c = _mm512_loadu_ps(p + 32);
+        const __m512i x0 = _mm512_setr_epi32(0, 3, 6, 9, 12, 15, 18, 21, 24, 27, 30, 0, 0, 0, 0, 0);
+        const __m512i x1 = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 17, 20, 23, 26, 29);
+        const __m512i y0 = _mm512_setr_epi32(1, 4, 7, 10, 13, 16, 19, 22, 25, 28, 31, 0, 0, 0, 0, 0);
+        const __m512i y1 = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 18, 21, 24, 27, 30);
+        const __m512i z0 = _mm512_setr_epi32(2, 5, 8, 11, 14, 17, 20, 23, 26, 29, 0, 0, 0, 0, 0, 0);
+        const __m512i z1 = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 16, 19, 22, 25, 28, 31);
+        columns[0] = _mm512_permutex2var_ps(_mm512_permutex2var_ps(a, x0, b), x1, c);
+        columns[1] = _mm512_permutex2var_ps(_mm512_permutex2var_ps(a, y0, b), y1, c);
+        columns[2] = _mm512_permutex2var_ps(_mm512_permutex2var_ps(a, z0, b), z1, c);
+        columns[3] = _mm512_setzero_ps();
+        return;
+    }
     const __m512 a = rows_f32(p, stride), b = rows_f32(p + stride, stride), c = rows_f32(p + 2 * stride, stride),
                  d = rows_f32(p + 3 * stride, stride);
     const __m512d ab = _mm512_castps_pd(_mm512_unpacklo_ps(a, b)), cd = _mm512_castps_pd(_mm512_unpacklo_ps(c, d));

@@ -63,6 +63,11 @@ TL_INLINE vd vd_mul(vd a, vd b) { return a * b; }
 TL_INLINE vd vd_div(vd a, vd b) { return a / b; }
 TL_INLINE vd vd_from_vi(vi a) { return (double)a; }
 TL_INLINE vf vf_from_vd(vd a) { return (float)a; }
+TL_INLINE void vd_quotients(const vd *a, vd b, vd *q)
+{
+    for (int k = 0; k < 3; k++)
+        q[k] = a[k] / b;
+}
 TL_INLINE vd vd_abs(vd a) { return fabs(a); }
 TL_INLINE vm vd_ge(vd a, vd b) { return a >= b; }
 TL_INLINE vd vd_from_vf(vf a) { return (double)a; }

@@ -6,6 +6,7 @@
 /* w, near, far, -x, +x, -y, +y: the order in which a polygon meets the planes */
 #define TL_N_PLANES 7
 #define TL_MIN_W 0x1p-500 /* keeps 1/w and x/w from overflowing */
+#define TL_MAX_W 0x1p500  /* of a vertex that vd_quotients can take */
 
 /* Vertex i in clip space.  float32 is transformed in float32, float64 in float64. */
 static inline void clip_position(const tl_source *source, int64_t i, double *p)
@@ -106,39 +107,43 @@ TL_INLINE void clip_lanes(const tl_source *source, int64_t i, vd *p)
     }
 }
 
-/* Lanes that are inside every plane; a sum and its rounding have the same sign, so these are the tests of plane_distance. */
+/* Lanes inside the planes of w, near and far; a sum and its rounding have the same sign, so these are the tests of
+ * plane_distance.  Whatever lands within 2^30 sub-pixels is inside the guard band. */
 TL_INLINE vm inside_lanes(const vd *p, const tl_view *view)
 {
-    const vd x = p[0], y = p[1], z = p[2], w = p[3], zero = vd_set1(0.0);
-    vm inside = vm_and(vd_ge(w, vd_set1(TL_MIN_W)), vd_ge(vd_set1(DBL_MAX), w));
+    const vd z = p[2], w = p[3], zero = vd_set1(0.0);
+    vm inside = vm_and(vd_ge(w, vd_set1(TL_MIN_W)), vd_ge(vd_set1(TL_MAX_W), w));
     if (view->near_clip)
         inside = vm_and(inside, vd_ge(z, view->zero_to_one ? zero : vd_sub(zero, w)));
     if (view->far_clip)
         inside = vm_and(inside, vd_ge(w, z));
-    inside = vm_and(inside, vd_ge(vd_mul(vd_set1(view->guard_band_x), w), vd_abs(x)));
-    return vm_and(inside, vd_ge(vd_mul(vd_set1(view->guard_band_y), w), vd_abs(y)));
+    return inside;
 }
 
-static tl_vertex_counts project(const tl_source *source, const tl_view *view, tl_vertex *out, tl_wide *wide)
+static tl_vertex_counts project(const tl_source *source, int64_t first, int64_t end, const tl_view *view, tl_vertex *out, tl_wide *wide)
 {
     tl_vertex_counts counts = {0, 0, 0};
     const double unit = (double)(1 << view->subpixel_bits);
     const vd one = vd_set1(1.0), half = vd_set1(0.5), largest = vd_set1(FLT_MAX);
     const vd scale_x = vd_set1(view->half_width_px * unit), scale_y = vd_set1(view->half_height_px * unit);
-    int64_t i = 0;
-    for (; TL_LANES > 1 && i + TL_LANES + 1 <= source->n; i += TL_LANES) { /* loads read past the last row */
+    int64_t i = first;
+    /* loads read two numbers past the last row */
+    for (; TL_LANES > 1 && i + TL_LANES <= end && i + TL_LANES < source->n; i += TL_LANES) {
         vd p[4];
         clip_lanes(source, i, p);
-        const vm inside = inside_lanes(p, view);
-        const vi x = vi_round(vd_mul(vd_add(vd_div(p[0], p[3]), one), scale_x));
-        const vi y = vi_round(vd_mul(vd_sub(one, vd_div(p[1], p[3])), scale_y));
-        const vd z_ndc = vd_div(p[2], p[3]), z = view->zero_to_one ? z_ndc : vd_mul(vd_add(z_ndc, one), half);
-        const vm good = vm_and(vm_and(inside, vd_ge(largest, vd_abs(z))), vm_and(is_narrow_lanes(x), is_narrow_lanes(y)));
+        vm good = inside_lanes(p, view);
+        vd ndc[3];
+        vd_quotients(p, p[3], ndc);
+        const vi x = vi_round(vd_mul(vd_add(ndc[0], one), scale_x)), y = vi_round(vd_mul(vd_sub(one, ndc[1]), scale_y));
+        const vd z = view->zero_to_one ? ndc[2] : vd_mul(vd_add(ndc[2], one), half);
+        good = vm_and(good, vm_and(is_narrow_lanes(x), is_narrow_lanes(y)));
+        if (!(view->near_clip && view->far_clip))
+            good = vm_and(good, vd_ge(largest, vd_abs(z)));
         store_vertices(out + i, x, y, z);
         for (unsigned rest = vm_bits(vm_and_not(vm_all(), good)); rest; rest &= rest - 1)
             project_one(source, i + __builtin_ctz(rest), view, out, wide, &counts);
     }
-    for (; i < source->n; i++)
+    for (; i < end; i++)
         project_one(source, i, view, out, wide, &counts);
     return counts;
 }

@@ -114,8 +114,16 @@ TL_SINK_COPIES(draw_alone, (const tl_scene *scene, int64_t i, const tl_window *w
 typedef struct {
     int32_t left, top, right, bottom; /* picture pixels */
     int32_t max_extent;               /* of a triangle that 32-bit lanes can take, in units */
+    vi last_vertex;
     int second, third;                /* which corner comes second and third: culled faces then have negative area */
 } batch_limits;
+
+/* Whether the 3 * TL_LANES indices of a vector of triangles hold one outside [0, last_vertex]. */
+TL_INLINE int has_bad_index(const int32_t *corners, vi last_vertex)
+{
+    const vm bad01 = vm_or(vi_gt_unsigned(vi_load(corners), last_vertex), vi_gt_unsigned(vi_load(corners + TL_LANES), last_vertex));
+    return vm_any(vm_or(bad01, vi_gt_unsigned(vi_load(corners + 2 * TL_LANES), last_vertex)));
+}
 
 TL_INLINE vi first_centre_lanes(vi x_fx, int bits)
 {
@@ -129,6 +137,12 @@ TL_INLINE void draw_batch(batch_state *s, tl_sink sink, const batch_limits *limi
     const int bits = s->window->subpixel_bits;
     const tl_vertex *vertices = s->scene->mesh.vertices;
     const vi zero = vi_set1(0);
+    for (int k = 0; k < 3 * TL_LANES; k += 16)
+        __builtin_prefetch(corners + 12 * 48 + k);
+    if (has_bad_index(corners, limits->last_vertex)) {
+        s->bad_row = i;
+        return;
+    }
     vi x[3], y[3];
     vz z[3];
     load_vertices(vertices, corners, &x[0], &y[0], &z[0]);
@@ -203,10 +217,11 @@ TL_INLINE void draw_batch(batch_state *s, tl_sink sink, const batch_limits *limi
 }
 
 /* Every triangle of a scene; the window has fewer than 2^31 samples and lies within 2^30 pixels of 0. */
-TL_INLINE void draw_batches(const tl_scene *scene, const tl_window *window, const tl_target *target, tl_sink sink)
+TL_INLINE void draw_batches(const tl_scene *scene, const tl_window *window, const tl_target *target, int64_t *bad_row,
+                            tl_sink sink)
 {
     batch_state s;
-    s.scene = scene, s.window = window, s.target = target;
+    s.scene = scene, s.window = window, s.target = target, s.bad_row = -1;
     s.small.n = s.rows.n = s.fragments.n = 0;
     memset(s.fragments.sample, 0, sizeof s.fragments.sample); /* what is prefetched behind the end of the list */
     const int bits = window->subpixel_bits, is_back = scene->cull == TL_CULL_BACK;
@@ -219,32 +234,52 @@ TL_INLINE void draw_batches(const tl_scene *scene, const tl_window *window, cons
         .max_extent = TL_MAX_BOX_PX << (bits < 8 ? bits : 8),
         .second = is_back ? 2 : 1,
         .third = is_back ? 1 : 2,
+        .last_vertex = vi_set1((int32_t)(scene->mesh.n_vertices - 1)),
     };
     int32_t tail[3 * TL_LANES] = {0};
     const int64_t n_whole = scene->n_triangles / TL_LANES * TL_LANES;
     memcpy(tail, scene->triangles + 3 * n_whole, sizeof(int32_t) * 3 * (size_t)(scene->n_triangles - n_whole));
-    for (int64_t i = 0; i < scene->n_triangles; i += TL_LANES)
+    for (int64_t i = 0; i < scene->n_triangles && s.bad_row < 0; i += TL_LANES)
         draw_batch(&s, sink, &limits, i, i < n_whole ? scene->triangles + 3 * i : tail, vm_first(scene->n_triangles - i));
     TL_SINK_CALL(flush_small, sink, &s)
     TL_SINK_CALL(flush_rows, sink, &s)
     flush_fragments(target, sink, &s.fragments);
+    *bad_row = s.bad_row;
 }
 
-TL_INLINE void draw_scene(const tl_scene *scene, const tl_window *window, const tl_target *target, tl_sink sink)
+TL_INLINE void draw_scene(const tl_scene *scene, const tl_window *window, const tl_target *target, int64_t *bad_row, tl_sink sink)
 {
     const int64_t farthest = (int64_t)1 << 30;
     const int is_near = window->x_px > -farthest && window->x_px < farthest && window->y_px > -farthest && window->y_px < farthest;
     if (scene->method == TL_METHOD_AUTO && is_near) {
-        draw_batches(scene, window, target, sink);
+        draw_batches(scene, window, target, bad_row, sink);
         return;
     }
+    *bad_row = first_bad_row(scene->triangles, scene->n_triangles, scene->mesh.n_vertices);
+    if (*bad_row >= 0)
+        return;
     for (int64_t i = 0; i < scene->n_triangles; i++)
         TL_SINK_CALL(draw_alone, sink, scene, i, window, target)
 }
 
-TL_SINK_COPIES(draw_scene, (const tl_scene *scene, const tl_window *window, const tl_target *target), scene, window, target)
+TL_SINK_COPIES(draw_scene, (const tl_scene *scene, const tl_window *window, const tl_target *target, int64_t *bad_row), scene, window,
+               target, bad_row)
 
-static void draw(const tl_scene *scene, const tl_window *window, const tl_target *target)
+/* What every sample of the window starts as. */
+static void clear(const tl_window *window, const tl_target *target)
+{
+    const int is_count = target->sink == TL_SINK_MASK || target->sink == TL_SINK_COUNT;
+    const float farthest = target->sink == TL_SINK_FARTHEST ? -INFINITY : INFINITY;
+    const int64_t pixel_bytes = target->sink == TL_SINK_MASK ? 1 : 4;
+    for (int64_t row = 0; row < window->height; row++) {
+        const int64_t at = row * target->stride_px;
+        memset((char *)target->pixels + at * pixel_bytes, is_count ? 0 : 0xff, (size_t)(window->width * pixel_bytes));
+        for (int64_t col = 0; sink_has_depth(target->sink) && col < window->width; col++)
+            target->depth[at + col] = farthest;
+    }
+}
+
+static int64_t draw(const tl_scene *scene, const tl_window *window, const tl_target *target)
 {
     const int64_t pixel_bytes = target->sink == TL_SINK_MASK ? 1 : 4;
     const int64_t rows_at_once = max64(1, (((int64_t)1 << 31) - 1) / target->stride_px);
@@ -255,6 +290,13 @@ static void draw(const tl_scene *scene, const tl_window *window, const tl_target
         band.height = min64(rows_at_once, window->height - row);
         part.pixels = (char *)target->pixels + row * target->stride_px * pixel_bytes;
         part.depth = target->depth ? target->depth + row * target->stride_px : NULL;
-        TL_SINK_CALL(draw_scene, target->sink, scene, &band, &part)
+        int64_t bad_row = -1;
+        clear(&band, &part);
+        if (scene->n_triangles == 0)
+            continue;
+        TL_SINK_CALL(draw_scene, target->sink, scene, &band, &part, &bad_row)
+        if (bad_row >= 0)
+            return bad_row;
     }
+    return -1;
 }

@@ -57,14 +57,15 @@ TL_INLINE void pixel_lanes(const tl_source *source, int64_t i, vd *v)
         v[k] = vd_from_vf(v32[k]);
 }
 
-static tl_vertex_counts snap(const tl_source *source, int subpixel_bits, int with_depth, tl_vertex *out, tl_wide *wide)
+static tl_vertex_counts snap(const tl_source *source, int64_t first, int64_t end, int subpixel_bits, int with_depth, tl_vertex *out,
+                             tl_wide *wide)
 {
     tl_vertex_counts counts = {0, 0, 0};
     const double scale = (double)(1 << subpixel_bits);
-    int64_t i = 0;
+    int64_t i = first;
     with_depth = with_depth && source->n_components > 2;
     /* loads read two numbers past the last row */
-    for (; TL_LANES > 1 && source->scalar != TL_I64 && i + TL_LANES + 1 <= source->n; i += TL_LANES) {
+    for (; TL_LANES > 1 && source->scalar != TL_I64 && i + TL_LANES <= end && i + TL_LANES < source->n; i += TL_LANES) {
         vd v[4];
         pixel_lanes(source, i, v);
         const vd z = with_depth ? v[2] : vd_set1(0.0);
@@ -74,13 +75,41 @@ static tl_vertex_counts snap(const tl_source *source, int subpixel_bits, int wit
         for (unsigned rest = vm_bits(vm_and_not(vm_all(), good)); rest; rest &= rest - 1)
             snap_float(source, i + __builtin_ctz(rest), scale, with_depth, out, wide, &counts);
     }
-    for (; i < source->n; i++) {
+    for (; i < end; i++) {
         if (source->scalar == TL_I64)
             snap_integer(source, i, subpixel_bits, with_depth, out, wide, &counts);
         else
             snap_float(source, i, scale, with_depth, out, wide, &counts);
     }
     return counts;
+}
+
+static int64_t first_bad_row(const int32_t *triangles, int64_t n_triangles, int64_t n_vertices)
+{
+    const uint32_t n = (uint32_t)n_vertices;
+    for (int64_t i = 0; i < n_triangles; i++)
+        if ((uint32_t)triangles[3 * i] >= n || (uint32_t)triangles[3 * i + 1] >= n || (uint32_t)triangles[3 * i + 2] >= n)
+            return i;
+    return -1;
+}
+
+/* int64 indices as int32, checked: the first row with one outside [0, n_vertices), or -1. */
+static int64_t narrow_triangles(const int64_t *restrict triangles, int64_t n_triangles, int64_t n_vertices, int32_t *restrict out)
+{
+    const uint64_t n = (uint64_t)n_vertices;
+    const int64_t chunk = 3 * 1024;
+    for (int64_t first = 0; first < 3 * n_triangles; first += chunk) {
+        const int64_t end = first + chunk < 3 * n_triangles ? first + chunk : 3 * n_triangles;
+        uint64_t bad = 0; /* no branch inside: the compiler makes vectors of it */
+        for (int64_t i = first; i < end; i++) {
+            bad |= (uint64_t)((uint64_t)triangles[i] >= n);
+            out[i] = (int32_t)triangles[i];
+        }
+        for (int64_t i = first; bad && i < end; i++)
+            if ((uint64_t)triangles[i] >= n)
+                return i / 3;
+    }
+    return -1;
 }
 
 static int64_t first_bad(const tl_vertex *vertices, const int32_t *triangles, int64_t n_triangles)

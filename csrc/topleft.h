@@ -100,14 +100,14 @@ typedef enum {
 
 typedef struct {
     tl_sink sink;
-    void *pixels; /* mask, counts or ids; rows of stride_px pixels; ids start as -1 */
-    float *depth; /* PAINT, NEAREST, FARTHEST; the same stride; starts as what every depth beats */
+    void *pixels; /* mask, counts or ids; rows of stride_px pixels */
+    float *depth; /* PAINT, NEAREST, FARTHEST; the same stride */
     int64_t stride_px;
 } tl_target;
 
 typedef struct {
     tl_vertex_set mesh;
-    const int32_t *triangles; /* (n_triangles, 3), every index in [0, n_vertices) */
+    const int32_t *triangles; /* (n_triangles, 3); draw checks the indices, everything else trusts them */
     int64_t n_triangles;
     const tl_pieces *pieces;  /* of triangles with TL_CLIPPED vertices, or NULL */
     tl_cull cull;
@@ -119,12 +119,13 @@ typedef struct {
 typedef struct tl_kernels {
     const char *isa;
 
-    /* Pixels to snapped vertices.  z is read when with_depth and n_components = 3.
+    /* The pixels of vertices [first, end) to snapped vertices.  z is read when with_depth and n_components = 3.
      * `wide` may be NULL: wide vertices are then counted, and the caller comes again with a table. */
-    tl_vertex_counts (*snap)(const tl_source *source, int subpixel_bits, int with_depth, tl_vertex *out, tl_wide *wide);
+    tl_vertex_counts (*snap)(const tl_source *source, int64_t first, int64_t end, int subpixel_bits, int with_depth, tl_vertex *out,
+                             tl_wide *wide);
 
-    /* Clip space, or object space by the matrix, to snapped vertices; `wide` as above. */
-    tl_vertex_counts (*project)(const tl_source *source, const tl_view *view, tl_vertex *out, tl_wide *wide);
+    /* The clip space, or object space by the matrix, of vertices [first, end) to snapped vertices; `wide` as above. */
+    tl_vertex_counts (*project)(const tl_source *source, int64_t first, int64_t end, const tl_view *view, tl_vertex *out, tl_wide *wide);
 
     /* Cuts the triangles that have TL_CLIPPED vertices.  With pieces->vertices NULL only counts. */
     void (*clip)(const tl_source *source, const tl_vertex *vertices, const int32_t *triangles, int64_t n_triangles,
@@ -133,7 +134,16 @@ typedef struct tl_kernels {
     /* Lowest index of a TL_BAD vertex that a triangle uses, -1 if there is none. */
     int64_t (*first_bad)(const tl_vertex *vertices, const int32_t *triangles, int64_t n_triangles);
 
-    void (*draw)(const tl_scene *scene, const tl_window *window, const tl_target *target);
+    /* Lowest row with an index outside [0, n_vertices), -1 if there is none. */
+    int64_t (*first_bad_row)(const int32_t *triangles, int64_t n_triangles, int64_t n_vertices);
+
+    /* int64 indices as int32; returns the first row with an index outside [0, n_vertices), -1 if there is none. */
+    int64_t (*narrow_triangles)(const int64_t *triangles, int64_t n_triangles, int64_t n_vertices, int32_t *out);
+
+    /* Returns -1, or, when it has met an index outside [0, n_vertices), the number of a row at or before which there is
+     * one; what was drawn is then worthless.  The window's pixels are cleared first: 0, id -1, and the depth that every
+     * other beats. */
+    int64_t (*draw)(const tl_scene *scene, const tl_window *window, const tl_target *target);
 
     /* Per pixel of `ids` (rows of window->width): float32 weights of the triangle's three vertices. */
     void (*barycentric)(const tl_scene *scene, const tl_window *window, const int32_t *ids, float *out);

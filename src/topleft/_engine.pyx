@@ -56,11 +56,13 @@ cdef extern from "topleft.h" nogil:
         tl_cull cull
         tl_method method
     ctypedef struct tl_kernels:
-        tl_vertex_counts (*snap)(const tl_source *, int, int, tl_vertex *, tl_wide *) noexcept nogil
-        tl_vertex_counts (*project)(const tl_source *, const tl_view *, tl_vertex *, tl_wide *) noexcept nogil
+        tl_vertex_counts (*snap)(const tl_source *, int64_t, int64_t, int, int, tl_vertex *, tl_wide *) noexcept nogil
+        tl_vertex_counts (*project)(const tl_source *, int64_t, int64_t, const tl_view *, tl_vertex *, tl_wide *) noexcept nogil
         void (*clip)(const tl_source *, const tl_vertex *, const int32_t *, int64_t, const tl_view *, tl_pieces *) noexcept nogil
         int64_t (*first_bad)(const tl_vertex *, const int32_t *, int64_t) noexcept nogil
-        void (*draw)(const tl_scene *, const tl_window *, const tl_target *) noexcept nogil
+        int64_t (*first_bad_row)(const int32_t *, int64_t, int64_t) noexcept nogil
+        int64_t (*narrow_triangles)(const int64_t *, int64_t, int64_t, int32_t *) noexcept nogil
+        int64_t (*draw)(const tl_scene *, const tl_window *, const tl_target *) noexcept nogil
         void (*barycentric)(const tl_scene *, const tl_window *, const int32_t *, float *) noexcept nogil
         void (*interpolate)(const tl_scene *, const tl_window *, const int32_t *, const float *, int, int, float, float *) noexcept nogil
         void (*paint_flat)(const int32_t *, int64_t, const uint8_t *, int, uint8_t *) noexcept nogil
@@ -110,21 +112,39 @@ cdef class Source:
         self.source.n, self.source.n_components = vertices.shape
         self.is_clip_space = matrix is not None or self.source.n_components == 4
 
-    def snap(self, int subpixel_bits, bint with_depth, uint8_t[::1] records, int64_t[:, ::1] wide):
-        """Snap pixels into records; returns the numbers of bad, wide and clipped vertices."""
+    def snap(self, int64_t first, int64_t end, int subpixel_bits, bint with_depth, uint8_t[::1] records, int64_t[:, ::1] wide):
+        """Snap the pixels of vertices [first, end) into records; returns the numbers of bad, wide and clipped vertices."""
         cdef tl_wide *table = <tl_wide *>&wide[0, 0] if wide is not None else NULL
         cdef tl_vertex_counts counts
         with nogil:
-            counts = K.snap(&self.source, subpixel_bits, with_depth, <tl_vertex *>&records[0], table)
+            counts = K.snap(&self.source, first, end, subpixel_bits, with_depth, <tl_vertex *>&records[0], table)
         return counts.n_bad, counts.n_wide, counts.n_clipped
 
-    def project(self, View view, uint8_t[::1] records, int64_t[:, ::1] wide):
-        """Project and snap into records; returns the numbers of bad, wide and clipped vertices."""
+    def project(self, int64_t first, int64_t end, View view, uint8_t[::1] records, int64_t[:, ::1] wide):
+        """Project and snap vertices [first, end) into records; returns the numbers of bad, wide and clipped vertices."""
         cdef tl_wide *table = <tl_wide *>&wide[0, 0] if wide is not None else NULL
         cdef tl_vertex_counts counts
         with nogil:
-            counts = K.project(&self.source, &view.view, <tl_vertex *>&records[0], table)
+            counts = K.project(&self.source, first, end, &view.view, <tl_vertex *>&records[0], table)
         return counts.n_bad, counts.n_wide, counts.n_clipped
+
+
+def first_bad_row(const int32_t[:, ::1] triangles, int64_t n_vertices):
+    """Return the first row with an index outside ``[0, n_vertices)``, -1 if there is none."""
+    cdef int64_t n = triangles.shape[0], row = -1
+    if n:
+        with nogil:
+            row = K.first_bad_row(&triangles[0, 0], n, n_vertices)
+    return row
+
+
+def narrow_triangles(const int64_t[:, ::1] triangles, int64_t n_vertices, int32_t[:, ::1] out):
+    """Write the indices as int32; returns the first row with one outside ``[0, n_vertices)``, -1 if there is none."""
+    cdef int64_t n = triangles.shape[0], row = -1
+    if n:
+        with nogil:
+            row = K.narrow_triangles(&triangles[0, 0], n, n_vertices, &out[0, 0])
+    return row
 
 
 def first_bad(const uint8_t[::1] records, const int32_t[:, ::1] triangles):
@@ -204,17 +224,22 @@ cdef class Scene:
         return w
 
     def draw(self, int sink, uint8_t[::1] pixels, float[:, ::1] depth, int64_t width, int64_t first_row, int64_t n_rows, int pixel_bytes):
-        """Draw the rows [first_row, first_row + n_rows) of buffers that are `width` pixels wide."""
+        """Clear and draw the rows [first_row, first_row + n_rows) of buffers that are `width` pixels wide.
+
+        Returns -1, or a number that is not negative when a triangle has an index outside the vertices.
+        """
         cdef tl_target target
         cdef tl_window window = self.window(first_row, n_rows, width)
-        if width == 0 or n_rows == 0 or self.scene.n_triangles == 0:
-            return
+        cdef int64_t bad_row
+        if width == 0 or n_rows == 0:
+            return -1
         target.sink = <tl_sink>sink
         target.pixels = &pixels[first_row * width * pixel_bytes]
         target.depth = &depth[first_row, 0] if depth is not None else NULL
         target.stride_px = width
         with nogil:
-            K.draw(&self.scene, &window, &target)
+            bad_row = K.draw(&self.scene, &window, &target)
+        return bad_row
 
     def paint(self, const int32_t[:, ::1] labels, const uint8_t[::1] colors, uint8_t[::1] pixels, int64_t first_row, int64_t n_rows,
               bint is_flat, bint is_u8, int n_channels):

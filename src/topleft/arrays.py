@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
     "as_background",
+    "as_checked_triangles",
     "as_colors",
     "as_matrix",
     "as_out",
@@ -19,6 +20,7 @@ __all__ = [
     "as_values",
     "as_vertices",
     "as_window",
+    "bad_triangle",
 ]
 
 #: The largest side of a picture and the largest number of triangles or vertices: ids and indices are int32.
@@ -57,8 +59,11 @@ def as_vertices(values: ArrayLike, *, has_transform: bool) -> NDArray[Any]:
     return np.ascontiguousarray(array, dtype=dtype)
 
 
-def as_triangles(values: ArrayLike, n_vertices: int) -> NDArray[np.int32]:
-    """Return (T, 3) triangles as a contiguous int32 array, every index inside ``[0, n_vertices)``."""
+def as_triangles(values: ArrayLike) -> NDArray[np.signedinteger[Any]]:
+    """Return (T, 3) triangles as a contiguous int32 or int64 array; indices are not looked at.
+
+    Unsigned indices beyond the signed range come out negative, which no index may be.
+    """
     array = as_array("triangles", values)
     if array.size == 0 and array.ndim == 1:
         return np.empty((0, 3), np.int32)
@@ -68,13 +73,27 @@ def as_triangles(values: ArrayLike, n_vertices: int) -> NDArray[np.int32]:
         raise ValueError(f"triangles must have at most {INT32_MAX} rows, got {array.shape[0]}")
     if array.dtype.kind not in "iu":
         raise TypeError(f"triangles must be integers, got dtype {array.dtype}")
-    if array.size and not (0 <= array.min() and array.max() < n_vertices):
+    if array.dtype.itemsize < 4:
+        return np.ascontiguousarray(array, np.int32)
+    native = np.ascontiguousarray(array, array.dtype.newbyteorder("="))
+    return native.view(f"i{native.dtype.itemsize}")
+
+
+def as_checked_triangles(values: ArrayLike, n_vertices: int) -> NDArray[np.int32]:
+    """Return (T, 3) triangles as a contiguous int32 array, every index inside ``[0, n_vertices)``."""
+    array = as_triangles(values)
+    if array.size and not (array.min() >= 0 and array.max() < n_vertices):
         row = int(np.argmax(((array < 0) | (array >= n_vertices)).any(axis=1)))
-        raise IndexError(
-            f"triangles must hold indices in [0, {n_vertices}), the number of vertices; "
-            f"row {row} is {array[row].tolist()}"
-        )
-    return np.ascontiguousarray(array, dtype=np.int32)
+        raise bad_triangle(values, row, n_vertices)
+    return np.ascontiguousarray(array, np.int32)
+
+
+def bad_triangle(values: ArrayLike, row: int, n_vertices: int) -> IndexError:
+    """Return the error for a row of `triangles` that names a vertex that does not exist."""
+    return IndexError(
+        f"triangles must hold indices in [0, {n_vertices}), the number of vertices; "
+        f"row {row} is {np.asarray(values)[row].tolist()}"
+    )
 
 
 def as_matrix(values: ArrayLike, dtype: np.dtype[Any]) -> NDArray[Any]:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from topleft.arrays import as_array, as_triangles
+from topleft.arrays import as_array, as_checked_triangles
 
 FloatArray = npt.NDArray[np.floating[Any]]
 F64 = npt.NDArray[np.float64]
@@ -65,7 +65,7 @@ class Mesh:
 
     def __post_init__(self) -> None:
         vertices = _real_array(self.vertices, "vertices")
-        triangles = as_triangles(self.triangles, len(vertices))
+        triangles = as_checked_triangles(self.triangles, len(vertices))
         keep = object.__setattr__  # the dataclass is frozen, and its arrays are coerced
         keep(self, "vertices", _read_only(vertices))
         keep(self, "triangles", _read_only(triangles))

@@ -8,19 +8,23 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from topleft import _engine
-from topleft.arrays import as_background, as_colors, as_matrix, as_out, as_triangles, as_vertices
+from topleft.arrays import as_background, as_colors, as_matrix, as_out, as_triangles, as_vertices, bad_triangle
 from topleft.fragments import Fragments
 from topleft.models import DepthTest, Per, Sink, parse
-from topleft.threads import run_bands
+from topleft.threads import count_threads, run_parts
 from topleft.view import View
 
 __all__ = ["Memory", "draw_coverage", "draw_fill", "draw_fragments", "draw_overdraw"]
+
+
+#: Fewer vertices are snapped by one thread: waking another takes as long.
+MIN_VERTICES_TO_SHARE = 50_000
 
 
 class Memory(Protocol):
@@ -35,52 +39,80 @@ class Snapped:
     """A scene after the snap: ready to be drawn into any buffer of the view's size."""
 
     scene: _engine.Scene
+    triangles: ArrayLike
+    corners: NDArray[np.int32]
     n_vertices: int
     n_triangles: int
     has_depth: bool
 
 
-def snap_scene(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, view: View, *, with_depth: bool) -> Snapped:
+def snap_scene(
+    memory: Memory, vertices: ArrayLike, triangles: ArrayLike, view: View, *, with_depth: bool, out: object
+) -> Snapped:
     """Take arrays through transform, clip and snap.
+
+    Indices are checked where they are read anyway, while drawing; before that only when an error may not leave a trace
+    in the caller's `out`, or when the vertices need a closer look.
 
     Raises
     ------
     ValueError
         If a vertex that a triangle uses is not finite, or lies beyond 2**62 sub-pixels.
     IndexError
-        If a triangle names a vertex that does not exist.
+        If a triangle names a vertex that does not exist, and indices are checked here.
     """
     points = as_vertices(vertices, has_transform=view.transform is not None)
-    corners = as_triangles(triangles, len(points))
     matrix = None if view.transform is None else as_matrix(view.transform, points.dtype)
     source = _engine.Source(points, matrix)
+    corners, is_checked = index_triangles(memory, triangles, len(points))
     n_triangles = len(corners)
-    if 0 in view.size:
-        corners = corners[:0]  # nothing to see
-    n = len(points) if len(corners) else 0
+    n = len(points) if n_triangles and 0 not in view.size else 0
     records = memory.empty("records", (n * _engine.VERTEX_BYTES,), np.uint8)
+    engine_view = view.engine_view() if source.is_clip_space and n else None
+
+    def snap(first: int, end: int) -> tuple[int, int, int]:
+        if engine_view:
+            return source.project(first, end, engine_view, records, wide)
+        return source.snap(first, end, view.subpixel_bits, with_depth, records, wide)
+
     wide: NDArray[np.int64] | None = None
-    pieces: _engine.Pieces | None = None
     bad = clipped = 0
-    if n and source.is_clip_space:
-        engine_view = _engine.View(view.viewport, view.subpixel_bits, view.zero_to_one, view.near_clip, view.far_clip)
-        bad, n_wide, clipped = source.project(engine_view, records, None)
+    if n:
+        n_parts = count_threads(view.threads, n_triangles) if n >= MIN_VERTICES_TO_SHARE else 1
+        bad, n_wide, clipped = (sum(counts) for counts in zip(*run_parts(snap, n, n_parts), strict=True))
         if n_wide:
             wide = np.empty((n, 2), np.int64)
-            source.project(engine_view, records, wide)
-    elif n:
-        bad, n_wide, _ = source.snap(view.subpixel_bits, with_depth, records, None)
-        if n_wide:
-            wide = np.empty((n, 2), np.int64)
-            source.snap(view.subpixel_bits, with_depth, records, wide)
+            snap(0, n)
+    if not is_checked and (out is not None or n == 0 or bad or clipped):
+        check_triangles(triangles, corners, len(points))
     if bad:
         check_used_vertices(points, records, corners, view)
-    if clipped:
-        pieces = _engine.Pieces(source, records, corners, engine_view)
+    pieces = _engine.Pieces(source, records, corners, engine_view) if engine_view and clipped else None
+    drawn = corners if n else corners[:0]
     scene = _engine.Scene(
-        source, records, wide, corners, pieces, *view.origin, view.subpixel_bits, view.cull, view.method
+        source, records, wide, drawn, pieces, *view.origin, view.subpixel_bits, view.cull, view.method
     )
-    return Snapped(scene, len(points), n_triangles, source.is_clip_space or points.shape[1] == 3)
+    has_depth = source.is_clip_space or points.shape[1] == 3
+    return Snapped(scene, triangles, corners, len(points), n_triangles, has_depth)
+
+
+def index_triangles(memory: Memory, triangles: ArrayLike, n_vertices: int) -> tuple[NDArray[np.int32], bool]:
+    """Return triangles as int32, and whether their indices have been checked on the way."""
+    indices = as_triangles(triangles)
+    if indices.dtype == np.int32:
+        return cast(NDArray[np.int32], indices), False
+    corners: NDArray[np.int32] = memory.empty("triangles", indices.shape, np.int32)
+    row = _engine.narrow_triangles(cast(NDArray[np.int64], indices), n_vertices, corners)
+    if row >= 0:
+        raise bad_triangle(triangles, row, n_vertices)
+    return corners, True
+
+
+def check_triangles(triangles: ArrayLike, corners: NDArray[np.int32], n_vertices: int) -> None:
+    """Raise an error for the first triangle that names a vertex that does not exist."""
+    row = _engine.first_bad_row(corners, n_vertices)
+    if row >= 0:
+        raise bad_triangle(triangles, row, n_vertices)
 
 
 def check_used_vertices(
@@ -106,16 +138,17 @@ def check_used_vertices(
 def draw(
     snapped: Snapped, view: View, sink: Sink, pixels: NDArray[Any], *, depth: NDArray[np.float32] | None = None
 ) -> None:
-    """Draw a scene into contiguous buffers, in bands of rows."""
+    """Clear contiguous buffers and draw a scene into them, in bands of rows."""
     width, height = view.size
-    if not (width and height and snapped.n_triangles):
+    if 0 in view.size:
         return
     flat, pixel_bytes = _engine.as_bytes(pixels), pixels.itemsize
 
-    def draw_rows(first_row: int, n_rows: int) -> None:
-        snapped.scene.draw(sink, flat, depth, width, first_row, n_rows, pixel_bytes)
+    def draw_rows(first: int, end: int) -> None:
+        if snapped.scene.draw(sink, flat, depth, width, first, end - first, pixel_bytes) >= 0:
+            check_triangles(snapped.triangles, snapped.corners, snapped.n_vertices)
 
-    run_bands(draw_rows, height, snapped.n_triangles, view.threads)
+    run_parts(draw_rows, height, count_threads(view.threads, snapped.n_triangles))
 
 
 def paint(
@@ -126,15 +159,14 @@ def paint(
     if not (width and height and snapped.n_triangles):
         return
     labels = memory.empty("labels", (height, width), np.int32)
-    labels.fill(-1)
     draw(snapped, view, Sink.LABEL, labels)
     palette, flat = _engine.as_bytes(colors), _engine.as_bytes(pixels)
     n_channels = 1 if colors.ndim == 1 else colors.shape[1]
 
-    def paint_rows(first_row: int, n_rows: int) -> None:
-        snapped.scene.paint(labels, palette, flat, first_row, n_rows, is_flat, colors.dtype == np.uint8, n_channels)
+    def paint_rows(first: int, end: int) -> None:
+        snapped.scene.paint(labels, palette, flat, first, end - first, is_flat, colors.dtype == np.uint8, n_channels)
 
-    run_bands(paint_rows, height, snapped.n_triangles, view.threads)
+    run_parts(paint_rows, height, count_threads(view.threads, snapped.n_triangles))
 
 
 @contextmanager
@@ -158,9 +190,8 @@ def draw_coverage(
     memory: Memory, vertices: ArrayLike, triangles: ArrayLike, view: View, out: object
 ) -> NDArray[np.bool_]:
     """`coverage`, on the memory given."""
-    snapped = snap_scene(memory, vertices, triangles, view, with_depth=False)
+    snapped = snap_scene(memory, vertices, triangles, view, with_depth=False, out=out)
     with target(memory, "coverage", out, view.size[::-1], np.bool_) as (result, canvas):
-        canvas.fill(False)
         draw(snapped, view, Sink.MASK, canvas)
     return result
 
@@ -169,9 +200,8 @@ def draw_overdraw(
     memory: Memory, vertices: ArrayLike, triangles: ArrayLike, view: View, out: object
 ) -> NDArray[np.int32]:
     """`overdraw`, on the memory given."""
-    snapped = snap_scene(memory, vertices, triangles, view, with_depth=False)
+    snapped = snap_scene(memory, vertices, triangles, view, with_depth=False, out=out)
     with target(memory, "overdraw", out, view.size[::-1], np.int32) as (result, canvas):
-        canvas.fill(0)
         draw(snapped, view, Sink.COUNT, canvas)
     return result
 
@@ -210,7 +240,7 @@ def draw_fill(
 ) -> NDArray[Any]:
     """`fill`, on the memory given."""
     palette = as_colors(colors)
-    snapped = snap_scene(memory, vertices, triangles, view, with_depth=False)
+    snapped = snap_scene(memory, vertices, triangles, view, with_depth=False, out=out)
     is_flat = colors_are_flat(len(palette), snapped, per)
     shape = (*view.size[::-1], *palette.shape[1:])
     ground = as_background(background, palette)
@@ -234,7 +264,6 @@ def draw_fragments(
 ) -> Fragments:
     """`rasterize`, on the memory given."""
     test = None if depth_test is None else parse(DepthTest, "depth_test", depth_test)
-    empty_depth = -np.inf if test is DepthTest.GREATER else np.inf
     if out is None:
         ids_out = depth_out = None
     else:
@@ -242,16 +271,16 @@ def draw_fragments(
             ids_out, depth_out = out  # type: ignore[misc]
         except (TypeError, ValueError):
             raise TypeError(f"out must be a pair (triangle, depth) of arrays, got {type(out).__name__}") from None
-    snapped = snap_scene(memory, vertices, triangles, view, with_depth=True)
+    snapped = snap_scene(memory, vertices, triangles, view, with_depth=True, out=out)
     sink = {None: Sink.PAINT, DepthTest.LESS: Sink.NEAREST, DepthTest.GREATER: Sink.FARTHEST}[test]
     shape = view.size[::-1]
     with (
         target(memory, "triangle", ids_out, shape, np.int32) as (ids, ids_canvas),
         target(memory, "depth", depth_out, shape, np.float32) as (depth, depth_canvas),
     ):
-        ids_canvas.fill(-1)
-        depth_canvas.fill(empty_depth)
         draw(snapped, view, sink if snapped.has_depth else Sink.PAINT, ids_canvas, depth=depth_canvas)
+        if test is DepthTest.GREATER and not snapped.has_depth and background_depth is None:
+            background_depth = -np.inf
         if background_depth is not None:
             depth_canvas[ids_canvas < 0] = background_depth
     return Fragments(ids, depth, snapped.scene, snapped.n_vertices, snapped.n_triangles)

@@ -5,10 +5,13 @@ from __future__ import annotations
 import operator
 import os
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from itertools import pairwise
+from typing import TypeVar
 
-__all__ = ["available_threads", "parse_threads", "run_bands"]
+__all__ = ["available_threads", "count_threads", "parse_threads", "run_parts"]
+
+Part = TypeVar("Part")
 
 #: Below this many triangles a picture is drawn by the calling thread alone, unless the caller asks for more.
 MIN_TRIANGLES_PER_THREAD = 2000
@@ -48,19 +51,26 @@ def parse_threads(threads: object) -> int | None:
     return n
 
 
-def run_bands(draw_rows: Callable[[int, int], None], n_rows: int, n_triangles: int, threads: int | None) -> None:
-    """Call ``draw_rows(first_row, n_rows)`` on bands that together are all rows; the calling thread takes the first."""
+def count_threads(threads: int | None, n_triangles: int) -> int:
+    """Return how many threads a scene is worth."""
     if threads is None:
-        threads = min(available_threads(), max(1, n_triangles // MIN_TRIANGLES_PER_THREAD))
-    n_bands = max(1, min(threads, n_rows))
-    bounds = [n_rows * i // n_bands for i in range(n_bands + 1)]
-    bands = [(first, end - first) for first, end in pairwise(bounds)]
-    jobs = [_shared_pool().submit(draw_rows, *band) for band in bands[1:]]
+        return min(available_threads(), max(1, n_triangles // MIN_TRIANGLES_PER_THREAD))
+    return threads
+
+
+def run_parts(work: Callable[[int, int], Part], n: int, n_parts: int) -> list[Part]:
+    """Return ``work(first, end)`` of ranges that together are [0, n); the calling thread takes the first of them."""
+    n_parts = max(1, min(n_parts, n))
+    if n_parts == 1:
+        return [work(0, n)]
+    bounds = [n * i // n_parts for i in range(n_parts + 1)]
+    first, *others = pairwise(bounds)
+    jobs = [_shared_pool().submit(work, *part) for part in others]
     try:
-        draw_rows(*bands[0])
+        results = [work(*first)]
     finally:
-        for job in jobs:
-            job.result()
+        wait(jobs)  # never leave while another thread writes to the caller's memory
+    return results + [job.result() for job in jobs]
 
 
 def _shared_pool() -> ThreadPoolExecutor:

@@ -7,6 +7,7 @@ from typing import TypedDict
 
 from numpy.typing import ArrayLike
 
+from topleft import _engine
 from topleft.arrays import as_size, as_subpixel_bits, as_window
 from topleft.methods import production_method
 from topleft.models import ClipDepth, Cull, Sampling, parse
@@ -48,6 +49,10 @@ class View:
     near_clip: bool
     far_clip: bool
     threads: int | None
+
+    def engine_view(self) -> _engine.View:
+        """Return how clip space maps to pixels."""
+        return _engine.View(self.viewport, self.subpixel_bits, self.zero_to_one, self.near_clip, self.far_clip)
 
     @classmethod
     def parse(cls, size: object, options: ViewOptions) -> View:
