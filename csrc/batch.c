@@ -76,20 +76,25 @@ TL_INLINE vf plane_depth(const lane_planes *p, vd x, vd y)
     return sum_depth(vd_add(p->z0, vd_mul(p->slope_y, y)), vd_mul(p->slope_x, x));
 }
 
-TL_INLINE void emit(fragment_list *f, tl_sink sink, vm m, vi sample, vi id, vf depth)
+/* Appends the lanes in m to a list of n; returns its new length.  The length is passed by value: in memory, every call would
+ * wait for the last one's store. */
+TL_INLINE int emit(fragment_list *f, int n, tl_sink sink, vm m, vi sample, vi id, vf depth)
 {
-    vi_compress(f->sample + f->n, m, sample);
+    vi_compress(f->sample + n, m, sample);
     if (sink != TL_SINK_MASK && sink != TL_SINK_COUNT)
-        vi_compress(f->id + f->n, m, id);
+        vi_compress(f->id + n, m, id);
     if (sink_has_depth(sink))
-        vi_compress((int32_t *)(f->depth + f->n), m, vi_bits_of_vf(depth));
-    f->n += __builtin_popcount(vm_bits(m));
+        vi_compress((int32_t *)(f->depth + n), m, vi_bits_of_vf(depth));
+    return n + __builtin_popcount(vm_bits(m));
 }
 
-TL_INLINE void make_room(batch_state *s, tl_sink sink)
+/* Writes a full list out; returns its length. */
+TL_INLINE int make_room(batch_state *s, int n, tl_sink sink)
 {
-    if (s->fragments.n > TL_FRAGMENTS)
-        flush_fragments(s->target, sink, &s->fragments);
+    if (n <= TL_FRAGMENTS)
+        return n;
+    flush_fragments(s->target, sink, &s->fragments, n);
+    return 0;
 }
 
 /* Boxes of up to 2x2 samples, tested where they are. */
@@ -132,16 +137,17 @@ TL_INLINE void draw_tiny(batch_state *s, tl_sink sink, lane_triangles *t, const 
     vf depth = vf_set1(0.0f);
     if (sink_has_depth(sink))
         depth = plane_depth(&p, vd_select(on_right, x_right, p.x), vd_select(below, y_down, p.y));
-    emit(&s->fragments, sink, any, vi_select(below, vi_add(right, stride), right), id, depth);
+    fragment_list *f = &s->fragments;
+    int n = emit(f, f->n, sink, any, vi_select(below, vi_add(right, stride), right), id, depth);
     const vm more01 = vm_and_not(in[0][1], first01), more10 = vm_and_not(in[1][0], first10), more11 = vm_and_not(in[1][1], first11);
     if (vm_any(more01))
-        emit(&s->fragments, sink, more01, vi_add(sample, one), id, sink_has_depth(sink) ? plane_depth(&p, x_right, p.y) : depth);
+        n = emit(f, n, sink, more01, vi_add(sample, one), id, sink_has_depth(sink) ? plane_depth(&p, x_right, p.y) : depth);
     if (vm_any(more10))
-        emit(&s->fragments, sink, more10, vi_add(sample, stride), id, sink_has_depth(sink) ? plane_depth(&p, p.x, y_down) : depth);
+        n = emit(f, n, sink, more10, vi_add(sample, stride), id, sink_has_depth(sink) ? plane_depth(&p, p.x, y_down) : depth);
     if (vm_any(more11))
-        emit(&s->fragments, sink, more11, vi_add(vi_add(sample, stride), one), id,
-             sink_has_depth(sink) ? plane_depth(&p, x_right, y_down) : depth);
-    make_room(s, sink);
+        n = emit(f, n, sink, more11, vi_add(vi_add(sample, stride), one), id,
+                 sink_has_depth(sink) ? plane_depth(&p, x_right, y_down) : depth);
+    f->n = make_room(s, n, sink);
 }
 
 TL_INLINE void push(box_queue *q, tl_sink sink, vm m, const lane_triangles *t, const vz *z, vm swapped, vi n_cols, vi n_rows,
@@ -185,6 +191,7 @@ TL_INLINE void flush_small(batch_state *s, tl_sink sink)
     const int bits = s->window->subpixel_bits, n = q->n;
     const int32_t stride = (int32_t)s->target->stride_px;
     const vd step = vd_set1((double)(2 << bits));
+    int n_fragments = s->fragments.n;
     q->n = 0;
     for (int i = 0; i < n; i += TL_LANES) {
         lane_triangles t;
@@ -213,16 +220,17 @@ TL_INLINE void flush_small(batch_state *s, tl_sink sink)
                 const vm in_box = vm_and(in_row, vi_gt(n_cols, vi_set1(col)));
                 const vm in = vm_and(in_box, vi_gt(vi_or(vi_or(e0, e1), e2), vi_set1(-1)));
                 if (TL_LANES > 1 || vm_any(in))
-                    emit(&s->fragments, sink, in, vi_add(sample, vi_set1(row * stride + col)), id,
-                         sink_has_depth(sink) ? sum_depth(z_row, z_col[col]) : vf_set1(0.0f));
+                    n_fragments = emit(&s->fragments, n_fragments, sink, in, vi_add(sample, vi_set1(row * stride + col)), id,
+                                       sink_has_depth(sink) ? sum_depth(z_row, z_col[col]) : vf_set1(0.0f));
                 e0 = vi_sub(e0, t.dy[0]), e1 = vi_sub(e1, t.dy[1]), e2 = vi_sub(e2, t.dy[2]);
             }
             for (int k = 0; k < 3; k++)
                 t.e[k] = vi_add(t.e[k], t.dx[k]);
             if ((row & 1) == 1)
-                make_room(s, sink);
+                n_fragments = make_room(s, n_fragments, sink);
         }
     }
+    s->fragments.n = n_fragments;
 }
 
 TL_SINK_COPIES(flush_small, (batch_state *s), s)

@@ -243,7 +243,7 @@ TL_INLINE void draw_batches(const tl_scene *scene, const tl_window *window, cons
         draw_batch(&s, sink, &limits, i, i < n_whole ? scene->triangles + 3 * i : tail, vm_first(scene->n_triangles - i));
     TL_SINK_CALL(flush_small, sink, &s)
     TL_SINK_CALL(flush_rows, sink, &s)
-    flush_fragments(target, sink, &s.fragments);
+    flush_fragments(target, sink, &s.fragments, s.fragments.n);
     *bad_row = s.bad_row;
 }
 
