@@ -111,6 +111,9 @@ TL_INLINE vd vd_abs(vd a)
     const __m256d sign = _mm256_set1_pd(-0.0);
     return (vd){_mm256_andnot_pd(sign, a.lo), _mm256_andnot_pd(sign, a.hi)};
 }
+TL_INLINE vd vd_floor(vd a) { return (vd){_mm256_floor_pd(a.lo), _mm256_floor_pd(a.hi)}; }
+TL_INLINE vd vd_min(vd a, vd b) { return (vd){_mm256_min_pd(a.lo, b.lo), _mm256_min_pd(a.hi, b.hi)}; }
+TL_INLINE vd vd_max(vd a, vd b) { return (vd){_mm256_max_pd(a.lo, b.lo), _mm256_max_pd(a.hi, b.hi)}; }
 TL_INLINE vm vd_ge(vd a, vd b)
 {
     const __m256 lo = _mm256_castpd_ps(_mm256_cmp_pd(a.lo, b.lo, _CMP_GE_OQ)), hi = _mm256_castpd_ps(_mm256_cmp_pd(a.hi, b.hi, _CMP_GE_OQ));

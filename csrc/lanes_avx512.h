@@ -89,6 +89,9 @@ TL_INLINE void vd_quotients(const vd *a, vd b, vd *q)
         q[k] = (vd){one_quotient(a[k].lo, b.lo, inverse.lo), one_quotient(a[k].hi, b.hi, inverse.hi)};
 }
 TL_INLINE vd vd_abs(vd a) { return (vd){_mm512_abs_pd(a.lo), _mm512_abs_pd(a.hi)}; }
+TL_INLINE vd vd_floor(vd a) { return (vd){_mm512_roundscale_pd(a.lo, 1), _mm512_roundscale_pd(a.hi, 1)}; }
+TL_INLINE vd vd_min(vd a, vd b) { return (vd){_mm512_min_pd(a.lo, b.lo), _mm512_min_pd(a.hi, b.hi)}; }
+TL_INLINE vd vd_max(vd a, vd b) { return (vd){_mm512_max_pd(a.lo, b.lo), _mm512_max_pd(a.hi, b.hi)}; }
 TL_INLINE vm vd_ge(vd a, vd b)
 {
     return (vm)(_mm512_cmp_pd_mask(a.lo, b.lo, _CMP_GE_OQ) | _mm512_cmp_pd_mask(a.hi, b.hi, _CMP_GE_OQ) << 8);

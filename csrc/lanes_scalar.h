@@ -69,6 +69,9 @@ TL_INLINE void vd_quotients(const vd *a, vd b, vd *q)
         q[k] = a[k] / b;
 }
 TL_INLINE vd vd_abs(vd a) { return fabs(a); }
+TL_INLINE vd vd_floor(vd a) { return floor(a); }
+TL_INLINE vd vd_min(vd a, vd b) { return a < b ? a : b; }
+TL_INLINE vd vd_max(vd a, vd b) { return a > b ? a : b; }
 TL_INLINE vm vd_ge(vd a, vd b) { return a >= b; }
 TL_INLINE vd vd_from_vf(vf a) { return (double)a; }
 TL_INLINE vi vi_round(vd a) { return fabs(a) < 0x1p31 ? (vi)rint(a) : INT32_MIN; }

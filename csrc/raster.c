@@ -30,6 +30,9 @@ static inline void floor_divide_128(tl_int128 a, tl_int128 b, tl_int128 *quotien
 #undef TL_UINT
 #undef TL_WALK
 
+#include "batch.c"
+#include "rows.c"
+
 /* A box at most this wide is walked sample by sample, a wider one by its row ends. */
 #define TL_EDGE_MAX_WIDTH 6
 
@@ -45,9 +48,11 @@ TL_INLINE void draw_triangle(const tl_vertex_set *set, const int32_t *corners, i
         return;
     t.id = id;
     setup_sink(&t, window, sink);
-    const int by_edge = scene->method == TL_METHOD_EDGE ||
-                        (scene->method == TL_METHOD_AUTO && t.col1 - t.col0 <= TL_EDGE_MAX_WIDTH);
-    if (t.is_narrow && by_edge)
+    const int is_auto = scene->method == TL_METHOD_AUTO;
+    const int by_edge = scene->method == TL_METHOD_EDGE || (is_auto && t.col1 - t.col0 <= TL_EDGE_MAX_WIDTH);
+    if (is_auto && rows_fit(&t) && (!sink_has_depth(sink) || t.has_plane))
+        walk_rows(&t, window, target, sink);
+    else if (t.is_narrow && by_edge)
         walk_edge_64(&t, window, target, sink);
     else if (t.is_narrow)
         walk_scanline_64(&t, window, target, sink);
@@ -107,8 +112,6 @@ TL_INLINE void draw_alone(const tl_scene *scene, int64_t i, const tl_window *win
 TL_SINK_COPIES(draw_alone, (const tl_scene *scene, int64_t i, const tl_window *window, const tl_target *target), scene, i, window,
                target)
 
-#include "batch.c"
-#include "rows.c"
 
 /* What one pass needs to know of the window and the scene, in int32. */
 typedef struct {

@@ -109,6 +109,60 @@ TL_INLINE void draw_rows(batch_state *s, tl_sink sink, const row_edges *r, int i
     }
 }
 
+/* One triangle of any size, by the ends of TL_LANES rows at a time in float64: as above, exact while |2E| < 2^51, for then
+ * |v / d| * 2^-52 < 0.5 / d. */
+TL_INLINE int rows_fit(const tl_triangle *t)
+{
+    const double width = (double)(max3(t->x_fx[0], t->x_fx[1], t->x_fx[2]) - min3(t->x_fx[0], t->x_fx[1], t->x_fx[2]));
+    const double height = (double)(max3(t->y_fx[0], t->y_fx[1], t->y_fx[2]) - min3(t->y_fx[0], t->y_fx[1], t->y_fx[2]));
+    return TL_LANES > 1 && t->is_narrow && 2.0 * width * height < 0x1p50;
+}
+
+TL_INLINE void walk_rows(const tl_triangle *t, const tl_window *window, const tl_target *shared, tl_sink sink)
+{
+    const tl_target own = *shared, *target = &own; /* a copy that no store can change */
+    const edges_64 e = setup_edges_64(t, window);
+    const vd lanes = vd_from_vi(vi_iota()), one = vd_set1(1.0), zero = vd_set1(0.0), width = vd_set1((double)(t->col1 - t->col0));
+    const double step = (double)((int64_t)2 << window->subpixel_bits), x0 = sample_x(t, window, t->col0);
+    const vd xs = vd_add(vd_set1(x0), ramp(step)), slope_x = vd_set1(t->slope_x);
+    int32_t first[TL_MAX_LANES], end[TL_MAX_LANES];
+    double z_row[TL_MAX_LANES];
+    for (int64_t row0 = t->row0; row0 < t->row1; row0 += TL_LANES) {
+        const vd rows = vd_add(vd_set1((double)(row0 - t->row0)), lanes);
+        vd begins = zero, ends = width;
+        for (int k = 0; k < 3; k++) {
+            if (e.dy[k] == 0)
+                continue;
+            const vd v = vd_add(vd_set1((double)e.value[k] + 0.5), vd_mul(vd_set1((double)e.dx[k]), rows));
+            const vd quotient = vd_floor(vd_mul(v, vd_set1(1.0 / fabs((double)e.dy[k]))));
+            if (e.dy[k] < 0)
+                begins = vd_max(begins, vd_sub(zero, quotient));
+            else
+                ends = vd_min(ends, vd_add(quotient, one));
+        }
+        vi_store(first, vi_round(vd_min(begins, width)));
+        vi_store(end, vi_round(vd_max(ends, zero)));
+        if (sink_has_depth(sink)) {
+            const vd ys = vd_add(vd_set1(sample_y(t, window, row0)), ramp(step));
+            vd_store(z_row, vd_add(vd_set1(t->z[0]), vd_mul(vd_set1(t->slope_y), ys)));
+        }
+        const int n = t->row1 - row0 < TL_LANES ? (int)(t->row1 - row0) : TL_LANES;
+        for (int k = 0; k < n; k++) {
+            const int64_t at = (row0 + k) * target->stride_px + t->col0;
+            if (!sink_has_depth(sink)) {
+                if (first[k] < end[k])
+                    put_plain(target, sink, at + first[k], end[k] - first[k], t->id);
+                continue;
+            }
+            const vd z = vd_set1(z_row[k]);
+            for (int32_t col = first[k]; col < end[k]; col += TL_LANES) {
+                const vd x = vd_add(xs, vd_set1(col * step));
+                put_depths(target, sink, at + col, vm_first(end[k] - col), sum_depth(z, vd_mul(slope_x, x)), vi_set1(t->id));
+            }
+        }
+    }
+}
+
 TL_INLINE void flush_rows(batch_state *s, tl_sink sink)
 {
     box_queue *q = &s->rows;

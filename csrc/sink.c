@@ -103,15 +103,27 @@ TL_INLINE vf sum_depth(vd row, vd col) { return vf_add(vf_from_vd(vd_add(row, co
 /* 0, 1, 2, ... times a step. */
 TL_INLINE vd ramp(double step) { return vd_mul(vd_from_vi(vi_iota()), vd_set1(step)); }
 
-/* A span with depth from the plane: (z0 + slope_y * y) + slope_x * x, from the triangle's first corner. */
+/* The centre of a picture pixel in half sub-pixels from a corner of a triangle that holds it: terms may wrap, the difference of
+ * a triangle with a depth plane does not. */
+TL_INLINE double half_units(int64_t pixel, int64_t corner_fx, int bits)
+{
+    return (double)(int64_t)((((uint64_t)pixel * 2 + 1) << bits) - 2 * (uint64_t)corner_fx);
+}
+TL_INLINE double sample_x(const tl_triangle *t, const tl_window *window, int64_t col)
+{
+    return half_units(col + window->x_px, t->x_fx[0], window->subpixel_bits);
+}
+TL_INLINE double sample_y(const tl_triangle *t, const tl_window *window, int64_t row)
+{
+    return half_units(row + window->y_px, t->y_fx[0], window->subpixel_bits);
+}
+
+/* A span with depth from the plane: (z0 + slope_y * y) + slope_x * x. */
 TL_INLINE void put_plane(const tl_triangle *t, const tl_window *window, const tl_target *target, tl_sink sink, int64_t row,
                          int64_t first, int64_t end)
 {
-    const int bits = window->subpixel_bits;
-    const double step = (double)((int64_t)2 << bits);
-    const double y = (double)(((row + window->y_px) * 2 + 1) * ((int64_t)1 << bits) - 2 * t->y_fx[0]);
-    const double x = (double)(((first + window->x_px) * 2 + 1) * ((int64_t)1 << bits) - 2 * t->x_fx[0]);
-    const vd z_row = vd_set1(t->z[0] + t->slope_y * y), slope_x = vd_set1(t->slope_x), steps = ramp(step);
+    const double step = (double)((int64_t)2 << window->subpixel_bits), x = sample_x(t, window, first);
+    const vd z_row = vd_set1(t->z[0] + t->slope_y * sample_y(t, window, row)), slope_x = vd_set1(t->slope_x), steps = ramp(step);
     const int64_t at = row * target->stride_px;
     for (int64_t col = first; col < end; col += TL_LANES) {
         const vd xs = vd_add(vd_set1(x + (double)(col - first) * step), steps);
