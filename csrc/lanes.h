@@ -10,6 +10,7 @@
  *   v?_load_masked, v?_store_masked    touch only the memory of lanes in m
  *   vi_compress(p, m, v)    the lanes in m, packed, at p; writes a whole vector
  *   vm_first(n)             the first n lanes, none for n <= 0, all for n >= TL_LANES
+ *   hm_, hf_, hi_, hd_      the few that short rows need, in half vectors of TL_HALF_LANES (0: there are none)
  *   vd_from_vi, vd_from_vf, vf_from_vi, vf_from_vd, vi_floor(vf), vi_round(vd)    conversions; INT32_MIN when out of range
  */
 #ifndef TL_LANES_H

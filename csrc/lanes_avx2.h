@@ -2,6 +2,7 @@
 #include <immintrin.h>
 
 #define TL_LANES 8
+#define TL_HALF_LANES 0
 
 typedef __m256i vi;
 typedef __m256 vf;

@@ -55,7 +55,7 @@ TL_INLINE vi row_quotients(const row_edges *r, int side, int i, vf rows)
 /* One triangle of the queue. */
 TL_INLINE void draw_rows(batch_state *s, tl_sink sink, const row_edges *r, int i, int32_t sample, int32_t size, int32_t id)
 {
-    const tl_target *target = s->target;
+    const tl_target own = *s->target, *target = &own; /* a copy that no store can change */
     const double unit2 = (double)(2 << s->window->subpixel_bits);
     const int n_cols = size & 0xffff, n_rows = size >> 16;
     const int64_t stride = target->stride_px;
@@ -85,6 +85,14 @@ TL_INLINE void draw_rows(batch_state *s, tl_sink sink, const row_edges *r, int i
             vd_store(z_row, vd_add(vd_set1(r->z0[i]), vd_mul(vd_set1(r->slope_y[i]), ys)));
         }
         const int n = n_rows - row0 < TL_LANES ? n_rows - row0 : TL_LANES;
+#if TL_HALF_LANES
+        if (sink_has_depth(sink) && n_cols <= TL_HALF_LANES) {
+            set_ranges(&ranges, begins, vi_max(ends, zero));
+            for (int k = 0; k < n; k++, at += stride)
+                put_depths_half(target, sink, at, (hm)get_range(&ranges, k), hf_sum_depth(z_row[k], hd_lower(z_cols)), hi_lower(ids));
+            continue;
+        }
+#endif
         if (sink_has_depth(sink) && n_cols <= TL_LANES) {
             set_ranges(&ranges, begins, vi_max(ends, zero));
             for (int k = 0; k < n; k++, at += stride) {

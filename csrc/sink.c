@@ -64,23 +64,29 @@ TL_INLINE void set_bytes(uint8_t *p, int64_t n)
     }
 }
 
-/* Ids and depths of the lanes in m that win.  Depths of new samples are never NaN or -0. */
-TL_INLINE void put_depths(const tl_target *target, tl_sink sink, int64_t at, vm m, vf depth, vi id)
-{
-    int32_t *ids = (int32_t *)target->pixels + at;
-    vm wins;
-    if (sink == TL_SINK_PAINT) {
-        wins = vm_and(m, vi_gt(id, vi_load_masked(m, ids)));
-    } else {
-        const vf old = vf_load_masked(m, target->depth + at);
-        const vm equal = vm_and(m, vf_eq(depth, old));
-        wins = vm_and(m, sink == TL_SINK_NEAREST ? vf_lt(depth, old) : vf_lt(old, depth));
-        if (__builtin_expect(vm_any(equal), 0))
-            wins = vm_or(wins, vm_and(equal, vi_gt(vi_load_masked(equal, ids), id)));
+/* Ids and depths of the lanes in m that win.  Depths of new samples are never NaN or -0.  Written for whole vectors and, where
+ * there are such, for half vectors. */
+#define TL_PUT_DEPTHS(NAME, M, F, I, P)                                                                                  \
+    TL_INLINE void NAME(const tl_target *target, tl_sink sink, int64_t at, M m, F depth, I id)                           \
+    {                                                                                                                    \
+        int32_t *ids = (int32_t *)target->pixels + at;                                                                   \
+        M wins;                                                                                                          \
+        if (sink == TL_SINK_PAINT) {                                                                                     \
+            wins = P##m_and(m, P##i_gt(id, P##i_load_masked(m, ids)));                                                   \
+        } else {                                                                                                         \
+            const F old = P##f_load_masked(m, target->depth + at);                                                       \
+            const M equal = P##m_and(m, P##f_eq(depth, old));                                                            \
+            wins = P##m_and(m, sink == TL_SINK_NEAREST ? P##f_lt(depth, old) : P##f_lt(old, depth));                     \
+            if (__builtin_expect(P##m_any(equal), 0))                                                                    \
+                wins = P##m_or(wins, P##m_and(equal, P##i_gt(P##i_load_masked(equal, ids), id)));                        \
+        }                                                                                                                \
+        P##f_store_masked(target->depth + at, wins, depth);                                                              \
+        P##i_store_masked(ids, wins, id);                                                                                \
     }
-    vf_store_masked(target->depth + at, wins, depth);
-    vi_store_masked(ids, wins, id);
-}
+TL_PUT_DEPTHS(put_depths, vm, vf, vi, v)
+#if TL_HALF_LANES
+TL_PUT_DEPTHS(put_depths_half, hm, hf, hi, h)
+#endif
 
 /* A span of samples without depth. */
 TL_INLINE void put_plain(const tl_target *target, tl_sink sink, int64_t at, int64_t n, int32_t id)
