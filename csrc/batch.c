@@ -11,31 +11,47 @@
 #define TL_MAX_BOX_PX 62 /* rows.c: row ends in float32 are exact up to here */
 #define TL_QUEUE 256
 
-/* Triangles that wait until a vector is full of their kind. */
+/* Triangles that wait until a vector is full of their kind.  Their vertices are read again then: they are still in the
+ * first-level cache, and packing twelve vectors a queue cost more. */
 typedef struct {
     int n;
-    int32_t corner[3][TL_QUEUE + TL_MAX_LANES]; /* doubled x | y << 16, relative to the first sample of the box */
-    int32_t sample[TL_QUEUE + TL_MAX_LANES];    /* the first sample of the box: row * stride_px + column */
-    int32_t size[TL_QUEUE + TL_MAX_LANES];      /* columns | rows << 16 of the box */
+    int32_t col[TL_QUEUE + TL_MAX_LANES], row[TL_QUEUE + TL_MAX_LANES]; /* picture pixel of the first sample of the box */
+    int32_t size[TL_QUEUE + TL_MAX_LANES];                              /* columns | rows << 16 of the box */
     int32_t id[TL_QUEUE + TL_MAX_LANES];
-    double z[3][TL_QUEUE + TL_MAX_LANES];
 } box_queue;
+
+/* What one pass needs to know of the window and the scene, in int32. */
+typedef struct {
+    int32_t left, top, right, bottom; /* picture pixels */
+    int32_t max_extent;               /* of a triangle that 32-bit lanes can take, in units */
+    vi last_vertex;
+    int second, third;                /* which corner comes second and third: culled faces then have negative area */
+} batch_limits;
+
 
 /* Everything that one pass over a scene needs; on the stack of draw. */
 typedef struct {
     const tl_scene *scene;
     const tl_window *window;
     const tl_target *target;
+    batch_limits limits;
     int64_t bad_row; /* of triangles, -1: none so far */
     box_queue small, rows;
     fragment_list fragments;
 } batch_state;
+
+/* The snapped corners of TL_LANES triangles, as loaded. */
+typedef struct {
+    vi x[3], y[3];
+    vz z[3];
+} lane_corners;
 
 /* TL_LANES triangles with positive area; corners doubled and relative to the first sample of their boxes. */
 typedef struct {
     vi x[3], y[3];
     vi dx[3], dy[3]; /* edge k runs from corner k to corner k + 1; not doubled */
     vi e[3];         /* E' at the first sample, as in walk.h: >= 0 inside */
+    vi sample;       /* the first sample: row * stride_px + column */
 } lane_triangles;
 
 /* z = (z0 + slope_y * y) + slope_x * x, with x and y half sub-pixels from the first corner. */
@@ -43,6 +59,22 @@ typedef struct {
     vd z0, slope_x, slope_y;
     vd x, y; /* of the first sample */
 } lane_planes;
+
+TL_INLINE void load_corners(const batch_state *s, const int32_t *corners, lane_corners *c)
+{
+    const tl_vertex *vertices = s->scene->mesh.vertices;
+    load_vertices(vertices, corners, &c->x[0], &c->y[0], &c->z[0]);
+    load_vertices(vertices, corners + s->limits.second, &c->x[1], &c->y[1], &c->z[1]);
+    load_vertices(vertices, corners + s->limits.third, &c->x[2], &c->y[2], &c->z[2]);
+}
+
+/* Twice the signed area; exact where the extents are. */
+TL_INLINE vi area_lanes(const lane_corners *c)
+{
+    const vi x1 = vi_sub(c->x[1], c->x[0]), y1 = vi_sub(c->y[1], c->y[0]);
+    const vi x2 = vi_sub(c->x[2], c->x[0]), y2 = vi_sub(c->y[2], c->y[0]);
+    return vi_sub(vi_mul(x1, y2), vi_mul(y1, x2));
+}
 
 TL_INLINE void setup_edges_lanes(lane_triangles *t, int bits)
 {
@@ -54,16 +86,47 @@ TL_INLINE void setup_edges_lanes(lane_triangles *t, int bits)
     }
 }
 
+/* Turns the triangles so that their areas are positive, and measures them from the first samples of their boxes. */
+TL_INLINE void place_triangles(const batch_state *s, tl_sink sink, const lane_corners *c, vi col, vi row, lane_triangles *t, vd *z)
+{
+    const int bits = s->window->subpixel_bits, either_turn = s->scene->cull == TL_CULL_NONE;
+    const vi centre_x = vi_add(vi_shift_left(col, bits + 1), vi_set1(1 << bits));
+    const vi centre_y = vi_add(vi_shift_left(row, bits + 1), vi_set1(1 << bits));
+    vi x[3] = {c->x[0], c->x[1], c->x[2]}, y[3] = {c->y[0], c->y[1], c->y[2]};
+    for (int k = 0; sink_has_depth(sink) && k < 3; k++)
+        z[k] = vd_from_vz(c->z[k]);
+    if (either_turn) {
+        const vm turn = vi_gt(vi_set1(0), area_lanes(c));
+        x[1] = vi_select(turn, c->x[2], c->x[1]), y[1] = vi_select(turn, c->y[2], c->y[1]);
+        x[2] = vi_select(turn, c->x[1], c->x[2]), y[2] = vi_select(turn, c->y[1], c->y[2]);
+        if (sink_has_depth(sink)) {
+            const vd z1 = z[1];
+            z[1] = vd_select(turn, z[2], z1);
+            z[2] = vd_select(turn, z1, z[2]);
+        }
+    }
+    for (int k = 0; k < 3; k++) {
+        const int next = k == 2 ? 0 : k + 1;
+        t->x[k] = vi_sub(vi_add(x[k], x[k]), centre_x);
+        t->y[k] = vi_sub(vi_add(y[k], y[k]), centre_y);
+        t->dx[k] = vi_sub(x[next], x[k]);
+        t->dy[k] = vi_sub(y[next], y[k]);
+    }
+    t->sample = vi_add(vi_mul(vi_sub(row, vi_set1(s->limits.top)), vi_set1((int32_t)s->target->stride_px)),
+                       vi_sub(col, vi_set1(s->limits.left)));
+    setup_edges_lanes(t, bits);
+}
+
 /* The same operations as setup_plane in setup.c. */
-TL_INLINE lane_planes plane_lanes(const lane_triangles *t, vd z0, vd z1, vd z2)
+TL_INLINE lane_planes plane_lanes(const lane_triangles *t, const vd *z)
 {
     const vd x1 = vd_from_vi(t->dx[0]), y1 = vd_from_vi(t->dy[0]);
     const vi x2i = vi_sub(vi_set1(0), t->dx[2]), y2i = vi_sub(vi_set1(0), t->dy[2]);
-    const vd x2 = vd_from_vi(x2i), y2 = vd_from_vi(y2i), d1 = vd_sub(z1, z0), d2 = vd_sub(z2, z0);
+    const vd x2 = vd_from_vi(x2i), y2 = vd_from_vi(y2i), d1 = vd_sub(z[1], z[0]), d2 = vd_sub(z[2], z[0]);
     const vd area = vd_from_vi(vi_sub(vi_mul(t->dx[0], y2i), vi_mul(t->dy[0], x2i))); /* exact: below 2^29 */
     const vd inverse = vd_div(vd_set1(0.5), area);
     lane_planes p;
-    p.z0 = z0;
+    p.z0 = z[0];
     p.slope_x = vd_mul(vd_sub(vd_mul(d1, y2), vd_mul(d2, y1)), inverse);
     p.slope_y = vd_mul(vd_sub(vd_mul(d2, x1), vd_mul(d1, x2)), inverse);
     p.x = vd_from_vi(vi_sub(vi_set1(0), t->x[0]));
@@ -98,13 +161,12 @@ TL_INLINE int make_room(batch_state *s, int n, tl_sink sink)
 }
 
 /* Boxes of up to 2x2 samples, tested where they are. */
-TL_INLINE void draw_tiny(batch_state *s, tl_sink sink, lane_triangles *t, const vz *z, vm swapped, vm live, vi n_cols, vi n_rows,
-                         vi sample, vi id)
+TL_INLINE void draw_tiny(batch_state *s, tl_sink sink, const lane_triangles *t, const vd *z, vm live, vi n_cols, vi n_rows, vi id)
 {
     const int bits = s->window->subpixel_bits;
+    const vi sample = t->sample;
     const vi stride = vi_set1((int32_t)s->target->stride_px), one = vi_set1(1), minus_one = vi_set1(-1);
     vm in[2][2];
-    setup_edges_lanes(t, bits);
     const vm has_col = vm_and(live, vi_gt(n_cols, one)), has_row = vm_and(live, vi_gt(n_rows, one));
     const vm boxes[2][2] = {{live, has_col}, {has_row, vm_and(has_col, has_row)}};
     for (int row = 0; row < 2; row++)
@@ -123,8 +185,7 @@ TL_INLINE void draw_tiny(batch_state *s, tl_sink sink, lane_triangles *t, const 
     vd x_right, y_down;
     if (sink_has_depth(sink)) {
         const vd step = vd_set1((double)(2 << bits));
-        const vd z0 = vd_from_vz(z[0]), z1 = vd_from_vz(z[1]), z2 = vd_from_vz(z[2]);
-        p = plane_lanes(t, z0, vd_select(swapped, z2, z1), vd_select(swapped, z1, z2));
+        p = plane_lanes(t, z);
         x_right = vd_add(p.x, step);
         y_down = vd_add(p.y, step);
     }
@@ -150,38 +211,24 @@ TL_INLINE void draw_tiny(batch_state *s, tl_sink sink, lane_triangles *t, const 
     f->n = make_room(s, n, sink);
 }
 
-TL_INLINE void push(box_queue *q, tl_sink sink, vm m, const lane_triangles *t, const vz *z, vm swapped, vi n_cols, vi n_rows,
-                    vi sample, vi id)
+TL_INLINE void push(box_queue *q, vm m, vi col, vi row, vi n_cols, vi n_rows, vi id)
 {
-    const vi low = vi_set1(0xffff);
-    for (int k = 0; k < 3; k++)
-        vi_compress(q->corner[k] + q->n, m, vi_or(vi_and(t->x[k], low), vi_shift_left(t->y[k], 16)));
-    vi_compress(q->sample + q->n, m, sample);
+    vi_compress(q->col + q->n, m, col);
+    vi_compress(q->row + q->n, m, row);
     vi_compress(q->size + q->n, m, vi_or(n_cols, vi_shift_left(n_rows, 16)));
     vi_compress(q->id + q->n, m, id);
-    if (sink_has_depth(sink)) {
-        const vd z1 = vd_from_vz(z[1]), z2 = vd_from_vz(z[2]);
-        vd_compress(q->z[0] + q->n, m, vd_from_vz(z[0]));
-        vd_compress(q->z[1] + q->n, m, vd_select(swapped, z2, z1));
-        vd_compress(q->z[2] + q->n, m, vd_select(swapped, z1, z2));
-    }
     q->n += __builtin_popcount(vm_bits(m));
 }
 
-/* TL_LANES triangles of a queue, as pushed. */
-TL_INLINE void unpack(const box_queue *q, int i, int bits, lane_triangles *t)
+/* The triangles [i, i + TL_LANES) of a queue of n. */
+TL_INLINE void pop(const batch_state *s, tl_sink sink, const box_queue *q, int i, int n, lane_triangles *t, vd *z)
 {
-    for (int k = 0; k < 3; k++) {
-        const vi packed = vi_load(q->corner[k] + i);
-        t->x[k] = vi_shift_right(vi_shift_left(packed, 16), 16);
-        t->y[k] = vi_shift_right(packed, 16);
-    }
-    for (int k = 0; k < 3; k++) {
-        const int next = k == 2 ? 0 : k + 1;
-        t->dx[k] = vi_shift_right(vi_sub(t->x[next], t->x[k]), 1);
-        t->dy[k] = vi_shift_right(vi_sub(t->y[next], t->y[k]), 1);
-    }
-    setup_edges_lanes(t, bits);
+    int32_t corners[3 * TL_LANES];
+    lane_corners c;
+    for (int k = 0; k < TL_LANES; k++) /* lanes behind the end repeat the last triangle */
+        memcpy(corners + 3 * k, s->scene->triangles + 3 * (int64_t)q->id[i + k < n ? i + k : n - 1], 3 * sizeof *corners);
+    load_corners(s, corners, &c);
+    place_triangles(s, sink, &c, vi_load(q->col + i), vi_load(q->row + i), t, z);
 }
 
 /* Boxes of up to 4x4 samples: every sample of TL_LANES boxes. */
@@ -197,15 +244,16 @@ TL_INLINE void flush_small(batch_state *s, tl_sink sink)
         lane_triangles t;
         lane_planes p;
         vd z_col[TL_SMALL_BOX];
-        unpack(q, i, bits, &t);
+        vd z[3];
+        pop(s, sink, q, i, n, &t, z);
         if (sink_has_depth(sink)) {
-            p = plane_lanes(&t, vd_load(q->z[0] + i), vd_load(q->z[1] + i), vd_load(q->z[2] + i));
+            p = plane_lanes(&t, z);
             for (int col = 0; col < TL_SMALL_BOX; col++) {
                 z_col[col] = vd_mul(p.slope_x, p.x);
                 p.x = vd_add(p.x, step);
             }
         }
-        const vi sample = vi_load(q->sample + i), size = vi_load(q->size + i), id = vi_load(q->id + i);
+        const vi sample = t.sample, size = vi_load(q->size + i), id = vi_load(q->id + i);
         const vi n_cols = vi_and(size, vi_set1(0xffff)), n_rows = vi_shift_right(size, 16);
         const vm live = vm_first(n - i);
         for (int row = 0; row < TL_SMALL_BOX; row++) {

@@ -179,10 +179,13 @@ TL_INLINE void flush_rows(batch_state *s, tl_sink sink)
     for (int i = 0; i < n; i += TL_LANES) {
         lane_triangles t;
         row_edges r;
-        unpack(q, i, s->window->subpixel_bits, &t);
+        vd z[3];
+        int32_t sample[TL_MAX_LANES];
+        pop(s, sink, q, i, n, &t, z);
         sort_edges(&t, &r);
+        vi_store(sample, t.sample);
         if (sink_has_depth(sink)) {
-            const lane_planes p = plane_lanes(&t, vd_load(q->z[0] + i), vd_load(q->z[1] + i), vd_load(q->z[2] + i));
+            const lane_planes p = plane_lanes(&t, z);
             vd_store(r.z0, p.z0);
             vd_store(r.slope_x, p.slope_x);
             vd_store(r.slope_y, p.slope_y);
@@ -191,7 +194,7 @@ TL_INLINE void flush_rows(batch_state *s, tl_sink sink)
         }
         const int end = n - i < TL_LANES ? n - i : TL_LANES;
         for (int k = 0; k < end; k++)
-            draw_rows(s, sink, &r, k, q->sample[i + k], q->size[i + k], q->id[i + k]);
+            draw_rows(s, sink, &r, k, sample[k], q->size[i + k], q->id[i + k]);
     }
 }
 
