@@ -139,6 +139,39 @@ def test_rasterizer_gives_the_same_and_reuses_its_memory():
     np.testing.assert_array_equal(rasterizer.rasterize(SQUARE, LEFT).mask, LEFT_MASK)
 
 
+def test_module_level_calls_keep_scratch_until_it_is_released():
+    from topleft import memory
+
+    tl.release_memory()
+    tl.fill(SQUARE, HALVES, [1, 2], SIZE)
+    kept = memory.SCRATCH._threads.kept._blocks
+    assert set(kept) == {"labels", "records", "triangles"}
+    records = kept["records"]
+    tl.coverage(SQUARE, LEFT, SIZE)
+    assert kept["records"] is records
+    tl.release_memory()
+    assert memory.SCRATCH._threads.kept is None
+
+
+def test_module_level_calls_do_not_keep_more_than_the_bound(monkeypatch):
+    from topleft import memory
+
+    tl.release_memory()
+    monkeypatch.setattr(memory, "MAX_SCRATCH_BYTES", 63)
+    tl.fill(SQUARE, HALVES, [1, 2], SIZE)  # 4 records of 16 bytes, 16 labels of 4, 6 indices of 4
+    assert set(memory.SCRATCH._threads.kept._blocks) == {"triangles"}
+    tl.release_memory()
+
+
+@pytest.mark.parametrize("n_bytes", [0, 1, 4 << 20, (4 << 20) + 1, 9_000_001])
+def test_large_memory_is_aligned_to_huge_pages(n_bytes):
+    from topleft.memory import allocate
+
+    block = allocate(n_bytes)
+    assert block.size >= n_bytes
+    assert n_bytes < 4 << 20 or block.ctypes.data % (2 << 20) == 0
+
+
 def test_module_level_results_stay_valid():
     first = tl.coverage(SQUARE, LEFT, SIZE)
     assert not np.shares_memory(first, tl.coverage(SQUARE, HALVES, SIZE))

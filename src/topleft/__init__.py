@@ -7,6 +7,7 @@ from topleft.camera import Camera
 from topleft.errors import MeshError, TopleftError
 from topleft.files import load, save_image
 from topleft.fragments import Fragments
+from topleft.memory import release_memory
 from topleft.mesh import Mesh
 from topleft.render import render, visibility
 from topleft.shade import shade
@@ -27,6 +28,7 @@ __all__ = [
     "load",
     "overdraw",
     "rasterize",
+    "release_memory",
     "render",
     "save_image",
     "scenes",

@@ -9,13 +9,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from topleft.arrays import as_size
 from topleft.fragments import Fragments
-from topleft.memory import FreshMemory, KeptMemory
+from topleft.memory import SCRATCH, FreshMemory, KeptMemory
 from topleft.rasterize import draw_coverage, draw_fill, draw_fragments, draw_overdraw
 from topleft.threads import parse_threads
 from topleft.view import View, ViewOptions
 
 __all__ = ["Rasterizer", "coverage", "fill", "overdraw", "rasterize"]
 
+#: Fragments refer to what they were drawn from, so nothing of it can be reused.
 FRESH = FreshMemory()
 
 
@@ -77,7 +78,7 @@ def coverage(
            [1, 1, 0, 0],
            [1, 0, 0, 0]])
     """
-    return draw_coverage(FRESH, vertices, triangles, View.parse(size, view), out)
+    return draw_coverage(SCRATCH, vertices, triangles, View.parse(size, view), out)
 
 
 def overdraw(
@@ -117,7 +118,7 @@ def overdraw(
            [1, 1, 1],
            [1, 1, 1]], dtype=int32)
     """
-    return draw_overdraw(FRESH, vertices, triangles, View.parse(size, view), out)
+    return draw_overdraw(SCRATCH, vertices, triangles, View.parse(size, view), out)
 
 
 def fill(
@@ -170,7 +171,7 @@ def fill(
     array([[ 25,  75, 125,   9],
            [ 25,  75,   9,   9]], dtype=uint8)
     """
-    return draw_fill(FRESH, vertices, triangles, colors, View.parse(size, view), per, background, out)
+    return draw_fill(SCRATCH, vertices, triangles, colors, View.parse(size, view), per, background, out)
 
 
 def rasterize(

@@ -8,30 +8,24 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, Protocol, cast
+from typing import Any, cast
 
 import numpy as np
-from numpy.typing import ArrayLike, DTypeLike, NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine
 from topleft.arrays import as_background, as_colors, as_matrix, as_out, as_triangles, as_vertices, bad_triangle
 from topleft.fragments import Fragments
+from topleft.memory import Memory
 from topleft.models import DepthTest, Per, Sink, parse
 from topleft.threads import count_threads, run_parts
 from topleft.view import View
 
-__all__ = ["Memory", "draw_coverage", "draw_fill", "draw_fragments", "draw_overdraw"]
+__all__ = ["draw_coverage", "draw_fill", "draw_fragments", "draw_overdraw"]
 
 
 #: Fewer vertices are snapped by one thread: waking another takes as long.
 MIN_VERTICES_TO_SHARE = 50_000
-
-
-class Memory(Protocol):
-    """Where arrays come from."""
-
-    def empty(self, name: str, shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
-        """Return an uninitialised array."""
 
 
 @dataclass(frozen=True, slots=True)
