@@ -16,6 +16,9 @@ __all__ = ["Fragments"]
 class Fragments:
     """What `rasterize` returns.
 
+    Attributes are computed when they are asked for, from the `triangles` that were passed in, and for clip space from the
+    `vertices` too: do not change those arrays before.
+
     Attributes
     ----------
     triangle : ndarray of int32, shape (H, W)
