@@ -16,8 +16,8 @@ __all__ = ["Fragments"]
 class Fragments:
     """What `rasterize` returns.
 
-    Attributes are computed when they are asked for, from the `triangles` that were passed in, and for clip space from the
-    `vertices` too: do not change those arrays before.
+    Attributes are computed when they are asked for, from the `triangles` that were passed in, and for clip space from
+    the `vertices` too: do not change those arrays before.
 
     Attributes
     ----------

@@ -1,0 +1,1 @@
+"""What topleft is measured with: scenes, contestants that take turns, the exact result beside the time."""

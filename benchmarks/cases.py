@@ -1,0 +1,165 @@
+"""The registry of cases: which scene is drawn, in which number format, and what is asked for.
+
+Scenes come from `topleft.scenes`; this file names them and gives them a camera. Output: a `Scene` of plain arrays,
+the same for every contestant, which travels to the children as files.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+FULL_HD = (1920, 1080)
+UHD = (3840, 2160)
+
+TASKS = {
+    "visibility": "triangle id and depth of a mesh in object space: transform, clear and draw",
+    "depth-2d": "triangle id and depth of triangles in pixels: snap, clear and draw",
+    "mask": "which pixels are covered",
+    "fill": "flat colours in painter's order",
+    "labels": "triangle id in painter's order",
+    "empty": "a call that draws nothing",
+}
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What is drawn: arrays, and what is asked for."""
+
+    task: str
+    size: tuple[int, int]
+    vertices: NDArray[Any]
+    triangles: NDArray[Any]
+    transform: NDArray[np.float64] | None = None
+    colors: NDArray[np.uint8] | None = None
+    cull: str = "none"
+
+    def save(self, folder: Path) -> None:
+        """Write the arrays, for a child to load."""
+        facts = {"task": self.task, "size": self.size, "cull": self.cull}
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "scene.json").write_text(json.dumps(facts))
+        for name in ("vertices", "triangles", "transform", "colors"):
+            if (array := getattr(self, name)) is not None:
+                np.save(folder / f"{name}.npy", array)
+
+    @classmethod
+    def load(cls, folder: Path) -> Scene:
+        """Read what `save` wrote."""
+        facts = json.loads((folder / "scene.json").read_text())
+        arrays = {
+            name: np.load(folder / f"{name}.npy")
+            for name in ("vertices", "triangles", "transform", "colors")
+            if (folder / f"{name}.npy").exists()
+        }
+        return cls(task=facts["task"], size=tuple(facts["size"]), cull=facts["cull"], **arrays)
+
+
+@dataclass(frozen=True)
+class Case:
+    """A scene with a name.
+
+    `beside` names a case whose scene topleft also draws here, in turn with this one, so that the two compare.
+    `aliases` are the names that external yardsticks may print for it.
+    """
+
+    name: str
+    task: str
+    make: Callable[[], Scene]
+    beside: str | None = None
+    aliases: tuple[str, ...] = ()
+
+
+CASES: dict[str, Case] = {}
+"""All cases by name, in the order of the report."""
+
+
+def add(case: Case) -> None:
+    """Register a case."""
+    if case.name in CASES:
+        raise ValueError(f"two cases are called {case.name}")
+    CASES[case.name] = case
+
+
+def orbit_camera(size: tuple[int, int]) -> NDArray[np.float64]:
+    """Clip from object (4, 4): the camera of all mesh scenes, 3 units from the origin, 30 degrees round, 20 up."""
+    from topleft.camera import Camera, orbit_view
+
+    return Camera.perspective(orbit_view([0, 0, 0], 3.0, 30.0, 20.0), near=0.1, far=100.0).clip_from_world(size)
+
+
+def blob_scene(
+    n_triangles: int, *, wide: bool = False, cull: str = "back", size: tuple[int, int] = FULL_HD
+) -> Scene:
+    """The bumpy sphere under the orbit camera, in float32 and int32, or `wide`: in float64 and int64."""
+    from topleft import scenes
+
+    vertices, triangles = scenes.blob(n_triangles)
+    formats = (np.float64, np.int64) if wide else (np.float32, np.int32)
+    return Scene(
+        "visibility", size, vertices.astype(formats[0]), triangles.astype(formats[1]), orbit_camera(size), cull=cull
+    )
+
+
+def random_scene(task: str, n_triangles: int, size_px: float, size: tuple[int, int] = FULL_HD) -> Scene:
+    """Triangles strewn over the frame, as they come: float64 pixels."""
+    from topleft import scenes
+
+    vertices, triangles, colors = scenes.random_triangles(n_triangles, size_px, *size)
+    if task == "fill":
+        return Scene(task, size, np.ascontiguousarray(vertices[:, :2]), triangles, colors=colors)
+    return Scene(task, size, vertices, triangles)
+
+
+def large_scene(size: tuple[int, int] = UHD) -> Scene:
+    """One triangle over about half of the frame."""
+    from topleft import scenes
+
+    return Scene("mask", size, *scenes.large_triangle(*size))
+
+
+def planar_scene(n_points: int = 100_000, size: tuple[int, int] = FULL_HD) -> Scene:
+    """A mesh that tiles the frame."""
+    from topleft import scenes
+
+    return Scene("labels", size, *scenes.planar_mesh(n_points, *size))
+
+
+def empty_scene(size: tuple[int, int] = (64, 64)) -> Scene:
+    """No triangle on a frame so small that clearing it takes no time."""
+    return Scene("empty", size, np.zeros((0, 2)), np.zeros((0, 3), np.int32))
+
+
+def _register() -> None:
+    blobs = [("10k", 10_000, "10000"), ("100k", 100_000, "99856"), ("1m", 1_000_000, "1000000"),
+             ("10m", 10_000_000, "9998244")]  # fmt: skip
+    for label, n, printed in blobs:
+        add(Case(f"blob-{label}", "visibility", lambda n=n: blob_scene(n), aliases=(printed, f"blob{n}")))
+    for label, n, _ in blobs:
+        name = f"blob-{label}"
+        add(Case(f"{name}-f64", "visibility", lambda n=n: blob_scene(n, wide=True), beside=name))
+    for label, n, _ in blobs:
+        add(Case(f"blob-{label}-nocull", "visibility", lambda n=n: blob_scene(n, cull="none")))
+    for n, px in ((1000, 400), (10_000, 100), (100_000, 10), (1_000_000, 4)):
+        make = lambda n=n, px=px: random_scene("depth-2d", n, px)  # noqa: E731
+        add(Case(f"random-{n}x{px}", "depth-2d", make, aliases=(f"rand{n}_{px}",)))
+    add(Case("large-4k", "mask", large_scene, aliases=("large",)))
+    for n, px in ((1000, 300), (20_000, 40), (200_000, 8)):
+        make = lambda n=n, px=px: random_scene("fill", n, px)  # noqa: E731
+        add(Case(f"fill-{n}x{px}", "fill", make, aliases=(f"rand{n}_{px}",)))
+    add(Case("labels-planar", "labels", planar_scene, aliases=("planar100000",)))
+    add(Case("empty", "empty", empty_scene))
+    add(Case("tiny", "visibility", lambda: blob_scene(200, size=(64, 48))))
+    add(Case("tiny-fill", "fill", lambda: random_scene("fill", 20, 12, (64, 48))))
+
+
+_register()
+
+TRIALS = ("tiny", "tiny-fill")
+"""Cases that try the machinery out; they run only when named."""

@@ -1,0 +1,19 @@
+"""A contestant that draws nothing, fast: the count of wrong pixels must tell."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from benchmarks.cases import TASKS as ALL_TASKS
+from benchmarks.cases import Scene
+from benchmarks.peers import Drawing
+
+MODULE, DISTRIBUTION = "numpy", "numpy"
+TASKS = tuple(ALL_TASKS)
+
+
+def prepare(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
+    """Nothing, everywhere."""
+    width, height = scene.size
+    picture = {"triangle": np.full((height, width), -1, np.int32)}
+    return Drawing(lambda: None, lambda: picture, "nothing")

@@ -1,0 +1,48 @@
+"""DEODR: depth and one colour channel of pixel-space triangles, back faces culled or not."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from benchmarks.cases import Scene
+from benchmarks.exact import SUBPIXELS, snap
+from benchmarks.peers import Drawing
+
+MODULE, DISTRIBUTION = "deodr", "deodr"
+TASKS = ("visibility", "depth-2d", "labels")
+
+
+def prepare(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
+    """Labels are drawn as colours, float64, at one depth."""
+    from deodr import differentiable_renderer as renderer
+
+    xy_fx, z = snap(scene)
+    width, height = scene.size
+    n_vertices, n_triangles = len(z), len(scene.triangles)
+    is_label = scene.task == "labels"
+    # Without depth the first triangle wins: labels are drawn from the last to the first.
+    triangles = np.ascontiguousarray(scene.triangles[::-1] if is_label else scene.triangles, np.uint32)
+    xy_px = xy_fx / SUBPIXELS if scene.transform is not None else scene.vertices[:, :2].astype(np.float64)
+    colors = np.zeros((n_vertices, 1))
+    if is_label:  # flat: corners of their own
+        xy_px, z = xy_px[triangles.reshape(-1)], np.zeros(3 * n_triangles)
+        triangles = np.arange(3 * n_triangles, dtype=np.uint32).reshape(-1, 3)
+        colors = np.repeat(np.arange(n_triangles)[::-1] + 1.0, 3)[:, None]
+        n_vertices = len(z)
+    world = renderer.Scene2DBase(
+        faces=triangles, faces_uv=triangles, ij=np.ascontiguousarray(xy_px), depths=np.ascontiguousarray(z, np.float64),
+        textured=np.zeros(n_triangles, bool), uv=np.zeros((n_vertices, 2)), shade=np.zeros(n_vertices), colors=colors,
+        shaded=np.zeros(n_triangles, bool), edgeflags=np.zeros((n_triangles, 3), bool), height=height, width=width,
+        nb_colors=1, texture=np.zeros((0, 0, 1)), background_color=np.zeros(1), clockwise=False,
+        backface_culling=scene.cull == "back", strict_edge=True, perspective_correct=False,
+        integer_pixel_centers=False,
+    )  # fmt: skip
+    image, depth = np.zeros((height, width, 1)), np.zeros((height, width))
+
+    def draw() -> None:
+        renderer.renderScene(world, 0, image, depth, False, None, None, False)
+
+    if is_label:
+        labels = lambda: {"triangle": image[..., 0].round().astype(np.int32) - 1}  # noqa: E731
+        return Drawing(draw, labels, "label + depth", "corners")
+    return Drawing(draw, lambda: {"depth": depth.astype(np.float32)}, "depth", "transform or copy")

@@ -1,0 +1,118 @@
+"""OpenGL on Mesa's software rasterizer llvmpipe, by moderngl on EGL: no display, no GPU.
+
+Needs Mesa's EGL library (Debian: libegl1 libgl1-mesa-dri). The mesh is uploaded before; a call clears, draws and reads
+the pictures back into NumPy arrays. The vertex shader turns y over, so that row 0 is on top.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from benchmarks.cases import Scene
+from benchmarks.peers import Drawing
+
+MODULE = DISTRIBUTION = "moderngl"
+TASKS = ("visibility", "depth-2d", "mask", "fill", "labels")
+THREADS = True
+
+VERTEX_SHADER = """
+#version 330
+uniform mat4 clip_from_input;
+in vec3 position;
+#ifdef COLORED
+in vec3 color;
+flat out vec3 flat_color;
+#endif
+void main() {
+    gl_Position = clip_from_input * vec4(position, 1);
+#ifdef COLORED
+    flat_color = color;
+#endif
+}
+"""
+# Integer targets are cleared to 0: ids go in one higher.
+ID_SHADER = """
+#version 330
+out int id;
+void main() { id = gl_PrimitiveID + 1; }
+"""
+COLOR_SHADER = """
+#version 330
+flat in vec3 flat_color;
+out vec4 color;
+void main() { color = vec4(flat_color, 1); }
+"""
+MASK_SHADER = """
+#version 330
+out float covered;
+void main() { covered = 1; }
+"""
+
+
+def environment(threads: int) -> dict[str, str]:
+    """0 rasterizer threads: the calling thread draws."""
+    return {"LP_NUM_THREADS": str(threads if threads > 1 else 0), "LIBGL_ALWAYS_SOFTWARE": "1",
+            "GALLIUM_DRIVER": "llvmpipe"}  # fmt: skip
+
+
+def clip_from_input(scene: Scene) -> np.ndarray:
+    """The matrix (4, 4) that also turns the picture over: OpenGL's row 0 is at the bottom."""
+    width, height = scene.size
+    if scene.transform is not None:
+        return np.diag([1.0, -1.0, 1.0, 1.0]) @ scene.transform
+    return np.array([[2 / width, 0, 0, -1], [0, 2 / height, 0, -1], [0, 0, 2, -1], [0, 0, 0, 1]])
+
+
+def prepare(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
+    """Upload, compile, and give the call."""
+    import moderngl
+
+    context = moderngl.create_standalone_context(require=330, backend="egl")
+    if "llvmpipe" not in context.info["GL_RENDERER"]:
+        raise RuntimeError(f"OpenGL runs on {context.info['GL_RENDERER']}, not on llvmpipe")
+    width, height = scene.size
+    position = np.zeros((len(scene.vertices), 3), np.float32)
+    position[:, : scene.vertices.shape[1]] = scene.vertices
+    indices = np.ascontiguousarray(scene.triangles, np.int32)
+    with_depth = scene.task in ("visibility", "depth-2d")
+    source, shader = VERTEX_SHADER, ID_SHADER
+    buffers = [(context.buffer(position.tobytes()), "3f", "position")]
+    if scene.task == "fill":  # every triangle has corners of its own here, so a colour per vertex is one per triangle
+        source, shader = VERTEX_SHADER.replace("#version 330", "#version 330\n#define COLORED"), COLOR_SHADER
+        colors = np.zeros((len(position), 4), np.uint8)
+        colors[indices, :3] = scene.colors[:, None]
+        buffers.append((context.buffer(colors.tobytes()), "3f1 1x1", "color"))
+    elif scene.task == "mask":
+        shader = MASK_SHADER
+    program = context.program(vertex_shader=source, fragment_shader=shader)
+    program["clip_from_input"].write(clip_from_input(scene).T.astype("f4").tobytes())
+    mesh = context.vertex_array(program, buffers, context.buffer(indices.tobytes()))
+
+    n_channels, dtype = {"fill": (4, "f1"), "mask": (1, "f1")}.get(scene.task, (1, "i4"))
+    target = context.texture(scene.size, n_channels, dtype=dtype)
+    depth_target = context.depth_texture(scene.size) if with_depth else None
+    frame = context.framebuffer([target], depth_target)
+    frame.use()
+    culling = moderngl.CULL_FACE if scene.cull == "back" else moderngl.NOTHING
+    context.enable_only(culling | (moderngl.DEPTH_TEST if with_depth else moderngl.NOTHING))
+    context.front_face = "cw"  # turned over
+    picture = np.zeros((height, width, n_channels), np.int32 if dtype == "i4" else np.uint8)
+    depth = np.ones((height, width), np.float32)
+
+    def draw() -> None:
+        frame.clear(0, 0, 0, 0, depth=1.0)
+        mesh.render(moderngl.TRIANGLES)
+        frame.read_into(picture, components=n_channels, dtype=dtype, alignment=1)
+        if with_depth:
+            frame.read_into(depth, components=1, attachment=-1, dtype="f4", alignment=1)
+
+    def result() -> dict[str, np.ndarray]:
+        if scene.task == "fill":
+            return {"color": picture[..., :3]}
+        if scene.task == "mask":
+            return {"mask": picture[..., 0] > 0}
+        ids = picture[..., 0] - 1
+        return {"triangle": ids, **({"depth": np.where(ids < 0, np.float32(np.inf), depth)} if with_depth else {})}
+
+    gives = {"fill": "RGBA", "mask": "mask", "labels": "id"}.get(scene.task, "id + depth")
+    return Drawing(draw, result, gives, "upload")

@@ -1,0 +1,61 @@
+"""VTK off screen: the depth buffer of a mesh that is resident in OpenGL (here Mesa's llvmpipe)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from benchmarks.cases import Scene
+from benchmarks.peers import Drawing
+from benchmarks.peers.llvmpipe_peer import environment as mesa_environment
+
+MODULE = DISTRIBUTION = "vtk"
+TASKS = ("visibility",)
+THREADS = True
+
+
+def environment(threads: int) -> dict[str, str]:
+    """As for llvmpipe."""
+    return mesa_environment(threads) | {"VTK_DEFAULT_OPENGL_WINDOW": "vtkEGLRenderWindow"}
+
+
+def prepare(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
+    """The matrix of the scene is the projection; the view is the identity."""
+    import vtk
+    from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray, vtk_to_numpy
+
+    width, height = scene.size
+    points, cells, mesh = vtk.vtkPoints(), vtk.vtkCellArray(), vtk.vtkPolyData()
+    points.SetData(numpy_to_vtk(np.ascontiguousarray(scene.vertices, np.float32), deep=True))
+    rows = numpy_to_vtkIdTypeArray(np.ascontiguousarray(scene.triangles, np.int64).reshape(-1), deep=True)
+    cells.SetData(3, rows)
+    mesh.SetPoints(points)
+    mesh.SetPolys(cells)
+    mapper, actor = vtk.vtkPolyDataMapper(), vtk.vtkActor()
+    mapper.SetInputData(mesh)
+    actor.SetMapper(mapper)
+    actor.GetProperty().SetLighting(False)
+    actor.GetProperty().SetBackfaceCulling(scene.cull == "back")
+    renderer, window = vtk.vtkRenderer(), vtk.vtkRenderWindow()
+    renderer.AddActor(actor)
+    window.SetOffScreenRendering(True)
+    window.SetMultiSamples(0)
+    window.SetSize(width, height)
+    window.AddRenderer(renderer)
+    matrix = vtk.vtkMatrix4x4()
+    matrix.DeepCopy(scene.transform.reshape(-1).tolist())
+    camera = renderer.GetActiveCamera()
+    camera.SetPosition(0, 0, 0)
+    camera.SetFocalPoint(0, 0, -1)
+    camera.SetExplicitProjectionTransformMatrix(matrix)
+    camera.SetUseExplicitProjectionTransformMatrix(True)
+    buffer = vtk.vtkFloatArray()
+
+    def draw() -> None:
+        window.Render()
+        window.GetZbufferData(0, 0, width - 1, height - 1, buffer)
+
+    def picture() -> dict[str, np.ndarray]:
+        depth = vtk_to_numpy(buffer).reshape(height, width)[::-1]
+        return {"depth": np.where(depth < 1, depth, np.float32(np.inf))}
+
+    return Drawing(draw, picture, "depth", "upload")

@@ -1,0 +1,341 @@
+"""The engine against a plain int64 loop, on every instruction set: counts, ids, and depth to the last bit."""
+
+from math import gcd
+
+import int64_loop
+import numpy as np
+import pytest
+from comparing import assert_same
+from engine_cases import ON_EACH_ISA, THREADS, cases, check_all, mixed, on
+from int64_loop import DEPTH_TESTS
+from strategies import Scene, perspective, soup
+
+import topleft as tl
+from topleft import scenes
+
+BITS = pytest.mark.parametrize("bits", range(17))
+
+# ---- the timed scenes -----------------------------------------------------------------------------------------------
+
+FULL_HD = (1920, 1080)
+
+
+def blob(n, dtype, cull):
+    vertices, triangles = scenes.blob(n)
+    tilt, away = np.eye(4), np.eye(4)
+    tilt[1:3, 1:3] = [[0.8, -0.6], [0.6, 0.8]]
+    away[2, 3] = -3
+    transform = np.diag([9 / 16, 1, 1, 1]) @ perspective(0.1, 10, focal=2.7) @ away @ tilt
+    yield Scene(vertices.astype(dtype), triangles, FULL_HD, {"transform": transform, "cull": cull}), ("less",)
+
+
+def strewn(n, size_px):
+    vertices, triangles, _ = scenes.random_triangles(n, size_px, *FULL_HD)
+    yield Scene(vertices, triangles, FULL_HD), ("less",)
+
+
+def one_large():
+    yield Scene(*scenes.large_triangle(), (3840, 2160)), (None,)
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize("cull", ["back", "none"])
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("n", [10_000, 100_000])
+def test_engine_blob_equals_loop(n, dtype, cull, isa):
+    check_all(isa, cases(blob, n, dtype, cull), THREADS)
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize(("n", "size_px"), [(1000, 400), (10_000, 100), (100_000, 10), (100_000, 4)])
+def test_engine_strewn_triangles_equal_loop(n, size_px, isa):
+    check_all(isa, cases(strewn, n, size_px), THREADS)
+
+
+@ON_EACH_ISA
+def test_engine_large_triangle_equals_loop(isa):
+    check_all(isa, cases(one_large), THREADS)
+
+
+# ---- triangles of all kinds mixed -----------------------------------------------------------------------------------
+
+MIXED = {
+    0: {}, 1: {"level": False}, 2: {"cull": "back"}, 3: {"cull": "front", "level": False},
+    4: {"bits": 4, "origin": (-300, -77)}, 5: {"bits": 16, "level": False}, 6: {"bits": 0, "level": False},
+    7: {"bits": 12, "cull": "back", "level": False, "origin": (100_000, -99_999)},
+}  # fmt: skip
+
+
+def quarter_million(seed):
+    yield mixed(np.random.default_rng(seed), 250_000, (640, 360), **MIXED[seed]), DEPTH_TESTS
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize("seed", MIXED)
+def test_engine_two_million_mixed_triangles_equal_loop(seed, isa):
+    check_all(isa, cases(quarter_million, seed), (1, 3))
+
+
+def piles(n=12_000):
+    """Triangles of every class upon each other, within one another's vectors, queues and lists."""
+    for seed, side in enumerate([3, 17, 70]):
+        rng = np.random.default_rng(seed)
+        reach = rng.choice([2, 3, 5, 20, 61, 66, 200], (n, 1, 1))
+        xy = rng.uniform(0, side, (n, 1, 2)) + rng.uniform(-0.5, 0.5, (n, 3, 2)) * reach
+        z = np.repeat(rng.integers(0, 4, (n, 1)) / 4, 3, 1)
+        yield soup(np.dstack([xy, z]).reshape(-1, 3), (side, side)), DEPTH_TESTS
+
+
+@ON_EACH_ISA
+def test_engine_piles_of_mixed_triangles_equal_loop(isa):
+    check_all(isa, cases(piles), THREADS)
+
+
+# ---- every size of box and frame ------------------------------------------------------------------------------------
+
+LARGEST_BOX = 70
+
+
+def boxes(column):
+    """A triangle in each box of 0x0 to 70x70 samples, all boxes apart, in columns that are `column` modulo 16."""
+    rng = np.random.default_rng(column)
+    side = np.arange(LARGEST_BOX + 1)
+    cols, rows = (a.ravel() for a in np.meshgrid(side, side))
+    x = column + 16 * np.concatenate([[0], np.cumsum(side // 16 + 1)[:-1]])
+    y = np.concatenate([[0], np.cumsum(side + 1)[:-1]])
+    first = np.stack([x[cols], y[rows]], -1) * 256 + 128
+    n = np.stack([cols, rows], -1) * 256
+    low = first - rng.choice([0, 1, 128, 255], n.shape)
+    high = first + n - 256 + rng.choice([1, 128, 255, 256], n.shape)
+    t = rng.choice([0, 0.5, 1, rng.uniform(), rng.uniform()], n.shape)
+    middle = np.round(low + t * (high - low)).astype(np.int64)
+    corners = np.stack([low, middle, high], 1)
+    order = np.argsort(rng.uniform(size=corners.shape), axis=1)
+    xy = np.take_along_axis(corners, order, 1)
+    xyz = np.dstack([xy / 256, rng.standard_normal(order.shape[:2])])
+    yield soup(xyz.reshape(-1, 3), (int(x[-1]) + LARGEST_BOX + 2, int(y[-1]) + LARGEST_BOX + 2)), ("less",)
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize("column", range(16))
+def test_engine_boxes_of_each_size_equal_loop(column, isa):
+    check_all(isa, cases(boxes, column), THREADS[column % 4 :][:1])
+
+
+def frames():
+    for width in range(1, 131):
+        for size in {(width, 1 + 7 * width % 23), (1 + 5 * width % 37, width)}:
+            rng = np.random.default_rng(width)
+            yield mixed(rng, 90, size, level=bool(width % 2)), DEPTH_TESTS
+
+
+@ON_EACH_ISA
+def test_engine_frames_of_each_width_equal_loop(isa):
+    check_all(isa, cases(frames), (1, 3))
+
+
+# ---- one unit on either side of each limit --------------------------------------------------------------------------
+
+
+def with_extents(rng, extents, size, bits, origin=(0, 0), **view):
+    """Triangles of these extents (n, 2), in units, that touch all sides of their boxes, somewhere in the window."""
+    n = len(extents)
+    low = rng.integers(-extents, np.array(size) << bits, extents.shape)
+    middle = low + np.round(rng.choice([0, 1, rng.uniform(), rng.uniform()], extents.shape) * extents).astype(np.int64)
+    corners = np.stack([low, middle, low + extents], 1)
+    order = np.argsort(rng.uniform(size=corners.shape), axis=1)
+    xy = np.take_along_axis(corners, order, 1) * 2.0**-bits + origin
+    z = np.where(rng.integers(0, 2, (n, 1)), rng.standard_normal((n, 3)), rng.integers(-2, 3, (n, 1)))
+    return soup(np.dstack([xy, z]).reshape(-1, 3), size, subpixel_bits=bits, origin=origin, **view)
+
+
+def extents_at_limits(rng, bits, n=500):
+    """Round powers of two, whole pixels up to 70, and 62 pixels of at most 8 bits."""
+    powers = 2 ** np.arange(bits + 7)
+    pixels = np.arange(1, 71) << bits
+    usual = np.array([2, 3, 4, 5, 61, 62, 62, 62, 63, 64]) << min(bits, 8)
+    extents = np.stack([rng.choice(rng.permutation(group), (n, 2)) for group in (powers, pixels, usual)])
+    mixture = np.take_along_axis(extents, rng.integers(0, 3, (1, n, 2)), 0)[0]
+    return np.maximum(mixture + rng.integers(-1, 2, (n, 2)), 0)
+
+
+def limits_of(bits):
+    rng = np.random.default_rng(bits)
+    yield with_extents(rng, extents_at_limits(rng, bits), (150, 90), bits), DEPTH_TESTS
+
+
+@ON_EACH_ISA
+@BITS
+def test_engine_extents_at_limits_equal_loop(bits, isa):
+    check_all(isa, cases(limits_of, bits), (1, 8))
+
+
+def cut_by_windows(bits):
+    rng = np.random.default_rng(bits)
+    largest = 62 << min(bits, 8)
+    for x in range(-63, 64, 3):
+        size = tuple(rng.integers(1, 40, 2).tolist())
+        extents = largest - rng.integers(0, 3, (40, 2))
+        scene = with_extents(rng, extents, size, bits)
+        shift = (x, int(rng.integers(-63, 64)))
+        yield Scene(scene.vertices, scene.triangles, size, {"subpixel_bits": bits, "origin": shift}), DEPTH_TESTS
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize("bits", [0, 7, 8, 9, 16])
+def test_engine_largest_boxes_cut_by_windows_equal_loop(bits, isa):
+    check_all(isa, cases(cut_by_windows, bits))
+
+
+def windows_at(edge_px, bits):
+    """Windows that end at, begin at and hold a coordinate, on either side of the picture's origin."""
+    rng = np.random.default_rng(bits)
+    size = (37, 21)
+    for offset in [(-37, -21), (-36, 0), (-18, -10), (-1, -20), (0, 0), (1, 1)]:
+        for x_sign, y_sign in [(1, 0), (0, -1), (1, 1), (-1, -1), (-1, 1)]:
+            near = (x_sign * edge_px + offset[0], y_sign * edge_px + offset[1])
+            extents = np.concatenate([extents_at_limits(rng, bits, 40), rng.integers(0, 3 << bits, (40, 2))])
+            scene = with_extents(rng, extents, size, bits, near)
+            grid = scene.vertices[:, :2] * 2.0**bits
+            limit = edge_px * 2.0**bits
+            at_limit = (abs(abs(grid) - limit) < 2.0**bits) & (rng.integers(0, 3, grid.shape) == 0)
+            grid = np.where(at_limit, np.sign(grid) * (limit + rng.integers(-1, 2, grid.shape)), grid)
+            vertices = np.hstack([grid * 2.0**-bits, scene.vertices[:, 2:]])
+            yield Scene(vertices, scene.triangles, size, scene.view), DEPTH_TESTS
+
+
+@ON_EACH_ISA
+@BITS
+def test_engine_vertices_at_the_end_of_64_bits_equal_loop(bits, isa):
+    check_all(isa, cases(windows_at, 2**30 >> bits, bits))
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize("bits", [0, 8, 16])
+@pytest.mark.parametrize("edge_px", [2**15, 2**22, 2**30, 2**31])
+def test_engine_windows_at_limits_equal_loop(edge_px, bits, isa):
+    check_all(isa, cases(windows_at, edge_px, bits))
+
+
+def cross(a, b):
+    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+
+
+def boxes_at_sliver_limit(rng):
+    """Corners in units, at 0: boxes of 2**12 times the doubled area, and one unit more and less."""
+    width = np.arange(11_000, 15_873)
+    for area in rng.integers(30_000, 61_000, 9000).tolist():
+        box = 4096 * area + int(rng.integers(-1, 2))
+        for w in width[box % width == 0].tolist():
+            h = box // w
+            common = gcd(w, h)
+            if h <= 15_872 and area % common == 0:
+                y = area // common * pow(w // common, -1, h // common) % (h // common)
+                x, more = (w * y - area) // h, w * y < area
+                yield [(0, 0), (w, h), (x + more * w // common, y + more * h // common)]
+
+
+def at_sliver_limit():
+    """Depths that cancel at a covered sample: the plane and the exact weights differ in every bit, so both show."""
+    rng = np.random.default_rng(0)
+    xy = np.array(list(boxes_at_sliver_limit(rng)))
+    xy += rng.integers(0, 600 * 256, (len(xy), 1, 2))
+    size = (660, 660)
+    ids = int64_loop.draw_scene(soup(xy.reshape(-1, 2) / 256, size), (None,)).ids[None]
+    seen, pixel = np.unique(ids, return_index=True)
+    xy, pixel = xy[seen[1:]], pixel[1:]
+    sample = np.stack([pixel % size[0], pixel // size[0]], -1) * 256 + 128
+    to_corners = xy - sample[:, None]
+    weights = np.stack([cross(to_corners[:, k - 2], to_corners[:, k - 1]) for k in range(3)], -1)
+    weights *= np.sign(weights.sum(1, keepdims=True))
+    order = np.argsort(weights, axis=1)
+    xy, weights = np.take_along_axis(xy, order[:, :, None], 1), np.take_along_axis(weights, order, 1)
+    z = rng.uniform(1e6, 2e6, weights.shape)
+    z[:, 2] = -(weights[:, 0] * z[:, 0] + weights[:, 1] * z[:, 1]) / weights[:, 2]
+    turn = (np.arange(3) + rng.integers(0, 3, (len(xy), 1))) % 3
+    xyz = np.take_along_axis(np.dstack([xy / 256, z]), turn[:, :, None], 1)
+    assert len(xyz) > 300
+    yield soup(xyz.reshape(-1, 3), size), ("less",)
+
+
+@ON_EACH_ISA
+def test_engine_slivers_at_the_limit_take_the_same_depth(isa):
+    check_all(isa, cases(at_sliver_limit))
+
+
+# ---- depths ---------------------------------------------------------------------------------------------------------
+
+LARGEST = float(np.finfo(np.float32).max)
+SPECIAL_DEPTHS = [0.0, -0.0, 1e-45, -1e-45, 1e-40, 1e-300, -1e-300, 1.0, -1.0, 3e38, -3e38, LARGEST, -LARGEST]
+
+
+def special_depths():
+    rng = np.random.default_rng(0)
+    for size in [(40, 30), (130, 70)]:
+        scene = mixed(rng, 3000, size)
+        level = np.repeat(rng.choice(SPECIAL_DEPTHS, len(scene.triangles)), 3)
+        yield Scene(np.column_stack([scene.vertices[:, :2], level]), scene.triangles, size), DEPTH_TESTS
+        any_sign = rng.choice([-0.0, 0.0, 1.0, -1.0, 3e38, -3e38], len(scene.vertices))
+        yield Scene(np.column_stack([scene.vertices[:, :2], any_sign]), scene.triangles, size), (None,)
+        for exponent in (-130, -30, 0, 120):
+            z = rng.standard_normal(len(scene.vertices)) * 2.0**exponent
+            yield Scene(np.column_stack([scene.vertices[:, :2], z]), scene.triangles, size), DEPTH_TESTS
+
+
+@ON_EACH_ISA
+def test_engine_special_depths_equal_loop(isa):
+    check_all(isa, cases(special_depths))
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize("depth_test", DEPTH_TESTS)
+def test_engine_depth_of_minus_zero_is_zero(depth_test, isa):
+    scene = mixed(np.random.default_rng(1), 500, (50, 40))
+    scene.vertices[:, 2] = -0.0
+    with on(isa):
+        frags = tl.rasterize(*scene.arrays, depth_test=depth_test)
+    assert not frags.depth[frags.mask].view(np.int32).any()
+
+
+# ---- either turn, either side ---------------------------------------------------------------------------------------
+
+
+def both_turns(cull):
+    """Each triangle in both turns, in front of and behind its twin; corners and their depths change places."""
+    rng = np.random.default_rng(0)
+    scene = mixed(rng, 600, (90, 60), level=False, cull=cull)
+    corners = np.concatenate([scene.triangles, scene.triangles[:, [0, 2, 1]], scene.triangles[:, [2, 1, 0]]])
+    shift = np.repeat([0, 0, 1e-3, -1e-3], len(scene.vertices))[:, None] * [0, 0, 1]
+    vertices = np.tile(scene.vertices, (4, 1)) + shift
+    corners = np.concatenate([corners + k * len(scene.vertices) for k in range(4)])
+    yield Scene(vertices, rng.permutation(corners), scene.size, scene.view), DEPTH_TESTS
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize("cull", ["none", "back", "front"])
+def test_engine_both_turns_equal_loop(cull, isa):
+    check_all(isa, cases(both_turns, cull))
+
+
+@ON_EACH_ISA
+def test_engine_culled_sides_are_all(isa):
+    scene = mixed(np.random.default_rng(3), 5000, (90, 60))
+    with on(isa):
+        back, front, whole = (tl.overdraw(*scene.arrays, cull=cull) for cull in ("back", "front", "none"))
+    assert_same(back + front, whole)
+
+
+# ---- windows --------------------------------------------------------------------------------------------------------
+
+
+def windows():
+    rng = np.random.default_rng(4)
+    for scale in (1, 10, 1000, 100_000):
+        for _ in range(25):
+            origin, size = rng.integers(-80 * scale, 80 * scale, 2), tuple(rng.integers(1, 90, 2).tolist())
+            yield mixed(rng, 150, size, level=False, origin=tuple(origin.tolist())), DEPTH_TESTS
+
+
+@ON_EACH_ISA
+def test_engine_windows_anywhere_equal_loop(isa):
+    check_all(isa, cases(windows), (1, 2))
