@@ -16,8 +16,8 @@ def lines(record: dict[str, Any]) -> Iterator[str]:
     pin = ", ".join(map(str, options["pin"])) or "none"
     yield f"{facts['cpu']}; {facts['cpus']} CPUs, {facts['system']}, Python {facts['python']}"
     yield (
-        f"topleft {record['versions']['topleft']}, commit {commit}; {record['date']}; {options['repeats']} rounds of "
-        f"{options['seconds']} s a turn; pinned to {pin}"
+        f"topleft {record['versions']['topleft']}, checkout at {commit}; {record['date']}; "
+        f"{options['repeats']} rounds of {options['seconds']} s a turn; pinned to {pin}"
     )
     for scene in record["scenes"]:
         yield ""
@@ -48,10 +48,11 @@ def scene_lines(scene: dict[str, Any]) -> Iterator[str]:
             f"{number(yardstick['median_ms'])} ms (quartiles {number(yardstick['q1_ms'])} to "
             f"{number(yardstick['q3_ms'])}, min {number(yardstick['min_ms'])})."
         )
-        yield "Shortest call of a turn over that, median of the rounds: " + ", ".join(
-            f"{name} {ratio:.2f}" for name, ratio in yardstick["ratios_of_minima"].items()
+        calls = {run["name"]: run["calls"] / len(run["turn_minima_ms"]) for run in runs}
+        yield "Shortest call of a turn over that, median of the rounds (our calls a turn): " + ", ".join(
+            f"{name} {ratio:.2f} ({calls[name]:.0f})" for name, ratio in yardstick["ratios_of_minima"].items()
         )
-    crowded = [f"{run['name']} {run['cpu_share']:.0%}" for run in runs if run["cpu_share"] < 0.9 * run["threads"]]
+    crowded = [f"{run['name']} {run['cpu_share']:.0%}" for run in runs if is_crowded(run)]
     if crowded:
         yield ""
         yield "CPU time over time that passed, the rest went to others on that CPU or to waiting: " + ", ".join(crowded)
@@ -65,10 +66,17 @@ def scene_lines(scene: dict[str, Any]) -> Iterator[str]:
         yield "Skipped: " + "; ".join(f"{skip['name']}: {skip['reason']}" for skip in scene["skipped"])
 
 
+def is_crowded(run: dict[str, Any]) -> bool:
+    """Whether the contestant had its CPUs for less than 90 % of the time; unknown in old records."""
+    share = run.get("cpu_share")
+    return share is not None and share < 0.9 * run["threads"]
+
+
 def summary_lines(scenes: list[dict[str, Any]]) -> Iterator[str]:
     """A row for each scene and instruction set: more threads, the scene beside, yardsticks, the fastest peer."""
     yield "## Summary"
     yield "Medians, ms; ratios pair by pair. Yardsticks: our shortest call of a turn over what they print."
+    yield "!: the CPU was shared. That lengthens calls of several ms and spares short ones: do not trust the ratios."
     yield ""
     rows = []
     for scene in scenes:
@@ -85,8 +93,9 @@ def summary_lines(scenes: list[dict[str, Any]]) -> Iterator[str]:
                           if run["name"] in yardstick["ratios_of_minima"]]  # fmt: skip
             best = min(peers, key=lambda peer: peer["median_ms"], default=None)
             peer = f"{best['name']} ({best['gives']}) {ratio(best, run):.1f}" if best else ""
-            rows.append([scene["scene"], run["isa"], number(run["median_ms"]), ", ".join(threads), ", ".join(beside),
-                         ", ".join(yardsticks), peer])  # fmt: skip
+            median = number(run["median_ms"]) + "!" * is_crowded(run)
+            lists = [", ".join(ratios) for ratios in (threads, beside, yardsticks)]
+            rows.append([scene["scene"], run["isa"], median, *lists, peer])
     head = ["scene", "isa", "ms", "faster with (n) threads", "x scene beside", "x yardsticks", "fastest peer, x ours"]
     yield from table(head, rows)
 

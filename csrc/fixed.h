@@ -20,7 +20,6 @@
 
 #define TL_NARROW_LIMIT 0x1p30
 #define TL_WIDE_LIMIT 0x1p62
-#define TL_MAX_SUBPIXEL_BITS 16
 
 typedef __int128 tl_int128;
 typedef unsigned __int128 tl_uint128;

@@ -135,18 +135,6 @@ TL_INLINE vd vd_select(vm m, vd a, vd b)
     const __m256d hi = _mm256_castsi256_pd(_mm256_cvtepi32_epi64(_mm256_extracti128_si256(m, 1)));
     return (vd){_mm256_blendv_pd(b.lo, a.lo, lo), _mm256_blendv_pd(b.hi, a.hi, hi)};
 }
-TL_INLINE void compress_four(double *p, unsigned bits, __m256d a)
-{
-    const vi order = compress_order(_pdep_u32(bits, 0x55) * 3); /* a double is two int32 lanes */
-    _mm256_storeu_si256((__m256i *)p, _mm256_permutevar8x32_epi32(_mm256_castpd_si256(a), order));
-}
-TL_INLINE void vd_compress(double *p, vm m, vd a)
-{
-    const unsigned bits = vm_bits(m);
-    compress_four(p, bits & 15, a.lo);
-    compress_four(p + __builtin_popcount(bits & 15), bits >> 4, a.hi);
-}
-TL_INLINE vd vd_load(const double *p) { return (vd){_mm256_loadu_pd(p), _mm256_loadu_pd(p + 4)}; }
 TL_INLINE void vd_store(double *p, vd a) { _mm256_storeu_pd(p, a.lo), _mm256_storeu_pd(p + 4, a.hi); }
 
 /* Plain 16-byte loads and transposes in registers: hardware gathers are three times as slow. */
