@@ -8,7 +8,7 @@ import pytest
 from comparing import assert_same
 from engine_cases import ON_EACH_ISA, THREADS, cases, check_all, mixed, on
 from int64_loop import DEPTH_TESTS
-from strategies import Scene, perspective, soup
+from strategies import Scene, needles, perspective, soup
 
 import topleft as tl
 from topleft import scenes
@@ -289,12 +289,15 @@ def test_engine_special_depths_equal_loop(isa):
 
 @ON_EACH_ISA
 @pytest.mark.parametrize("depth_test", DEPTH_TESTS)
-def test_engine_depth_of_minus_zero_is_zero(depth_test, isa):
-    scene = mixed(np.random.default_rng(1), 500, (50, 40))
-    scene.vertices[:, 2] = -0.0
-    with on(isa):
-        frags = tl.rasterize(*scene.arrays, depth_test=depth_test)
-    assert not frags.depth[frags.mask].view(np.int32).any()
+@pytest.mark.parametrize("make", [lambda rng: mixed(rng, 500, (50, 40)), needles], ids=["mixed", "needles"])
+def test_engine_depth_that_rounds_to_minus_zero_is_zero(make, depth_test, isa):
+    scene = make(np.random.default_rng(1))
+    for z in (-0.0, -1e-300):
+        vertices = np.column_stack([scene.vertices[:, :2], np.full(len(scene.vertices), z)])
+        with on(isa):
+            frags = tl.rasterize(vertices, *scene.arrays[1:], depth_test=depth_test)
+        assert frags.mask.any()
+        assert not frags.depth[frags.mask].view(np.int32).any()
 
 
 # ---- either turn, either side ---------------------------------------------------------------------------------------
