@@ -181,8 +181,19 @@ def pixel_kinds(seed, n=90, size=(15, 11)):
     return soup(np.dstack([xy, rng.standard_normal((n, 3))]).reshape(-1, 3), size)
 
 
+def limit_kinds(seed, n=40, size=(15, 11)):
+    """Corners within two units of 2**29, 2**30 and 2**31, and edges from there through the window."""
+    rng, bits = np.random.default_rng(seed), [8, 0, 16, 3][seed]
+    corners = 2 ** rng.integers(29, 32, (n, 3, 2)) * rng.choice([-1, 1], (n, 3, 2)) + rng.integers(-2, 3, (n, 3, 2))
+    origin = rng.integers(-(2**30), 2**30, 2) >> bits
+    opposite = 2 * (origin + rng.integers(0, 12, (n, 2))) * 2**bits - corners[:, 0]
+    corners[:, 1] = np.where(rng.integers(0, 4, (n, 1)) > 0, opposite, corners[:, 1])
+    xyz = np.dstack([corners * 2.0**-bits, rng.standard_normal((n, 3))])
+    return soup(xyz.reshape(-1, 3), size, subpixel_bits=bits, origin=tuple(origin.tolist()))
+
+
 @ON_EACH_ISA
-@pytest.mark.parametrize("make", [clip_kinds, pixel_kinds])
+@pytest.mark.parametrize("make", [clip_kinds, pixel_kinds, limit_kinds])
 def test_engine_vectors_of_special_vertices_equal_reference(make, isa):
     for seed in range(4):
         scene = make(seed)
