@@ -3,11 +3,13 @@
  *   vi  TL_LANES int32      vf  TL_LANES float32      vd  TL_LANES float64      vm  TL_LANES bits
  *
  * Arithmetic is IEEE, rounded to nearest, multiply and add apart: every instruction set gives the same bits.  The scalar
- * lanes (TL_LANES = 1) are the definition.  vd_quotients(a, b, q) divides three numbers by one, each correctly rounded.  Loads and stores need no alignment.  Intrinsics live in lanes_*.h alone.
+ * lanes (TL_LANES = 1) are the definition.  vd_quotients(a, b, q, are_f32) divides three numbers by one, each correctly rounded.
+ * Loads and stores need no alignment.  Intrinsics live in lanes_*.h alone.
  *
  *   v?_set1 v?_load v?_store v?_iota v?_add v?_sub v?_mul v?_div v?_min v?_max   as their names say; vi wraps
  *   v?_select(m, a, b)      a where m, else b
  *   v?_load_masked, v?_store_masked    touch only the memory of lanes in m
+ *   v?_store_some(p, m, a, has_room)   the lanes in m; with room for a whole vector the others may be written as they are
  *   vi_compress(p, m, v)    the lanes in m, packed, at p; writes a whole vector
  *   vm_first(n)             the first n lanes, none for n <= 0, all for n >= TL_LANES
  *   hm_, hf_, hi_, hd_      the few that short rows need, in half vectors of TL_HALF_LANES (0: there are none)

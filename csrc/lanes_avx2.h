@@ -33,6 +33,15 @@ TL_INLINE vi vi_select(vm m, vi a, vi b) { return _mm256_blendv_epi8(b, a, m); }
 TL_INLINE vi vi_load_masked(vm m, const int32_t *p) { return _mm256_maskload_epi32(p, m); }
 TL_INLINE void vi_store_masked(int32_t *p, vm m, vi a) { _mm256_maskstore_epi32(p, m, a); }
 
+/* a masked store costs AMD's cores more than five times a load, a blend and a store */
+TL_INLINE void vi_store_some(int32_t *p, vm m, vi a, int has_room)
+{
+    if (has_room)
+        vi_store(p, vi_select(m, a, vi_load(p)));
+    else
+        vi_store_masked(p, m, a);
+}
+
 TL_INLINE vm vm_and(vm a, vm b) { return _mm256_and_si256(a, b); }
 TL_INLINE vm vm_or(vm a, vm b) { return _mm256_or_si256(a, b); }
 TL_INLINE vm vm_and_not(vm a, vm b) { return _mm256_andnot_si256(b, a); }
@@ -44,18 +53,29 @@ TL_INLINE vm vm_first(int64_t n)
     return _mm256_cmpgt_epi32(_mm256_set1_epi32(n > 8 ? 8 : (int)n), vi_iota());
 }
 
-/* The masks of TL_LANES ranges of lanes [begin, end), none where begin > end; and one of them. */
-typedef struct { int32_t begin[8], end[8]; } vm_ranges;
-TL_INLINE void set_ranges(vm_ranges *r, vi begin, vi end)
+TL_INLINE vm vm_from_bits(unsigned bits)
 {
-    vi_store(r->begin, begin);
-    vi_store(r->end, end);
+    const __m256i lane = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+    return _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_set1_epi32((int)bits), lane), lane);
 }
-TL_INLINE vm get_range(const vm_ranges *r, int k)
+/* 64 bytes of 0 or 1 */
+TL_INLINE void bytes_from_bits(uint8_t *p, uint64_t bits)
 {
-    const vi lane = vi_iota(), begin = _mm256_set1_epi32(r->begin[k]), end = _mm256_set1_epi32(r->end[k]);
-    return _mm256_andnot_si256(_mm256_cmpgt_epi32(begin, lane), _mm256_cmpgt_epi32(end, lane));
+    const __m256i spread = _mm256_setr_epi64x(0, 0x0101010101010101, 0x0202020202020202, 0x0303030303030303);
+    const __m256i lane = _mm256_set1_epi64x((long long)0x8040201008040201u), one = _mm256_set1_epi8(1);
+    for (int k = 0; k < 2; k++) {
+        const __m256i bytes = _mm256_shuffle_epi8(_mm256_set1_epi32((int)(bits >> 32 * k)), spread);
+        const __m256i on = _mm256_cmpeq_epi8(_mm256_and_si256(bytes, lane), lane);
+        _mm256_storeu_si256((__m256i *)(p + 32 * k), _mm256_and_si256(on, one));
+    }
 }
+/* Numbers whose bits [begin, end) are set, none where begin >= end; begin >= 0, end in 0..31. */
+TL_INLINE vi vi_bit_ranges(vi begin, vi end)
+{
+    const vi ones = _mm256_set1_epi32(-1);
+    return _mm256_andnot_si256(_mm256_sllv_epi32(ones, end), _mm256_sllv_epi32(ones, begin));
+}
+
 
 /* The order that moves the lanes in `bits` to the front: byte k of the packed list is the k-th lane set. */
 TL_INLINE vi compress_order(unsigned bits)
@@ -67,6 +87,7 @@ TL_INLINE void vi_compress(int32_t *p, vm m, vi a) { vi_store(p, _mm256_permutev
 
 TL_INLINE vf vf_set1(float a) { return _mm256_set1_ps(a); }
 TL_INLINE vf vf_add(vf a, vf b) { return _mm256_add_ps(a, b); }
+TL_INLINE vf vf_sub(vf a, vf b) { return _mm256_sub_ps(a, b); }
 TL_INLINE vf vf_mul(vf a, vf b) { return _mm256_mul_ps(a, b); }
 TL_INLINE vf vf_div(vf a, vf b) { return _mm256_div_ps(a, b); }
 TL_INLINE vf vf_from_vi(vi a) { return _mm256_cvtepi32_ps(a); }
@@ -75,7 +96,12 @@ TL_INLINE void vf_store(float *p, vf a) { _mm256_storeu_ps(p, a); }
 TL_INLINE vi vi_floor(vf a) { return _mm256_cvtps_epi32(_mm256_floor_ps(a)); }
 TL_INLINE vf vf_load_masked(vm m, const float *p) { return _mm256_maskload_ps(p, m); }
 TL_INLINE void vf_store_masked(float *p, vm m, vf a) { _mm256_maskstore_ps(p, m, a); }
+TL_INLINE void vf_store_some(float *p, vm m, vf a, int has_room)
+{
+    vi_store_some((int32_t *)p, m, _mm256_castps_si256(a), has_room);
+}
 TL_INLINE vm vf_lt(vf a, vf b) { return _mm256_castps_si256(_mm256_cmp_ps(a, b, _CMP_LT_OQ)); }
+TL_INLINE vm vf_ge(vf a, vf b) { return _mm256_castps_si256(_mm256_cmp_ps(a, b, _CMP_GE_OQ)); }
 TL_INLINE vm vf_eq(vf a, vf b) { return _mm256_castps_si256(_mm256_cmp_ps(a, b, _CMP_EQ_OQ)); }
 TL_INLINE vi vi_bits_of_vf(vf a) { return _mm256_castps_si256(a); }
 
@@ -93,19 +119,21 @@ TL_INLINE vf vf_from_vd(vd a)
     return _mm256_insertf128_ps(_mm256_castps128_ps256(_mm256_cvtpd_ps(a.lo)), _mm256_cvtpd_ps(a.hi), 1);
 }
 /* a[k] / b for three a, each correctly rounded, for |b| and |a / b| within 2^+-500: one division.  The first step makes the
- * quotient faithful, the second correct.  Based on: P. Markstein, Computation of elementary functions on the IBM RISC
+ * quotient faithful, the second correct.  Of float32 numbers one step is enough: it errs by less than 2^-100 of the quotient, which
+ * is no nearer than 2^-77 to the middle of two float64.  Based on: P. Markstein, Computation of elementary functions on the IBM RISC
  * System/6000 processor, 1990. */
-TL_INLINE __m256d one_quotient(__m256d a, __m256d b, __m256d inverse)
+TL_INLINE __m256d one_quotient(__m256d a, __m256d b, __m256d inverse, int are_f32)
 {
     __m256d q = _mm256_mul_pd(a, inverse);
-    q = _mm256_fmadd_pd(_mm256_fnmadd_pd(q, b, a), inverse, q);
+    if (!are_f32)
+        q = _mm256_fmadd_pd(_mm256_fnmadd_pd(q, b, a), inverse, q);
     return _mm256_fmadd_pd(_mm256_fnmadd_pd(q, b, a), inverse, q);
 }
-TL_INLINE void vd_quotients(const vd *a, vd b, vd *q)
+TL_INLINE void vd_quotients(const vd *a, vd b, vd *q, int are_f32)
 {
     const vd inverse = vd_div(vd_set1(1.0), b);
     for (int k = 0; k < 3; k++)
-        q[k] = (vd){one_quotient(a[k].lo, b.lo, inverse.lo), one_quotient(a[k].hi, b.hi, inverse.hi)};
+        q[k] = (vd){one_quotient(a[k].lo, b.lo, inverse.lo, are_f32), one_quotient(a[k].hi, b.hi, inverse.hi, are_f32)};
 }
 TL_INLINE vd vd_abs(vd a)
 {
@@ -135,6 +163,7 @@ TL_INLINE vd vd_select(vm m, vd a, vd b)
     const __m256d hi = _mm256_castsi256_pd(_mm256_cvtepi32_epi64(_mm256_extracti128_si256(m, 1)));
     return (vd){_mm256_blendv_pd(b.lo, a.lo, lo), _mm256_blendv_pd(b.hi, a.hi, hi)};
 }
+TL_INLINE vd vd_load(const double *p) { return (vd){_mm256_loadu_pd(p), _mm256_loadu_pd(p + 4)}; }
 TL_INLINE void vd_store(double *p, vd a) { _mm256_storeu_pd(p, a.lo), _mm256_storeu_pd(p + 4, a.hi); }
 
 /* Plain 16-byte loads and transposes in registers: hardware gathers are three times as slow. */

@@ -30,6 +30,7 @@ TL_INLINE vi vi_select(vm m, vi a, vi b) { return _mm512_mask_mov_epi32(b, m, a)
 TL_INLINE void vi_compress(int32_t *p, vm m, vi a) { _mm512_storeu_si512(p, _mm512_maskz_compress_epi32(m, a)); }
 TL_INLINE vi vi_load_masked(vm m, const int32_t *p) { return _mm512_maskz_loadu_epi32(m, p); }
 TL_INLINE void vi_store_masked(int32_t *p, vm m, vi a) { _mm512_mask_storeu_epi32(p, m, a); }
+TL_INLINE void vi_store_some(int32_t *p, vm m, vi a, int has_room) { (void)has_room; vi_store_masked(p, m, a); }
 
 TL_INLINE vm vm_and(vm a, vm b) { return a & b; }
 TL_INLINE vm vm_or(vm a, vm b) { return a | b; }
@@ -38,17 +39,20 @@ TL_INLINE int vm_any(vm a) { return a != 0; }
 TL_INLINE unsigned vm_bits(vm a) { return a; }
 TL_INLINE vm vm_all(void) { return 0xffff; }
 TL_INLINE vm vm_first(int64_t n) { return n >= 16 ? 0xffff : n <= 0 ? 0 : (vm)((1u << n) - 1); }
-/* The masks of TL_LANES ranges of lanes [begin, end), both in 0..16, none where begin > end; and one of them. */
-typedef struct { int32_t bits[16]; } vm_ranges;
-TL_INLINE void set_ranges(vm_ranges *r, vi begin, vi end)
+TL_INLINE vm vm_from_bits(unsigned bits) { return (vm)bits; }
+/* 64 bytes of 0 or 1 */
+TL_INLINE void bytes_from_bits(uint8_t *p, uint64_t bits) { _mm512_storeu_si512(p, _mm512_maskz_set1_epi8(bits, 1)); }
+/* Numbers whose bits [begin, end) are set, none where begin >= end; begin >= 0, end in 0..31. */
+TL_INLINE vi vi_bit_ranges(vi begin, vi end)
 {
     const vi ones = _mm512_set1_epi32(-1);
-    vi_store(r->bits, _mm512_andnot_si512(_mm512_sllv_epi32(ones, end), _mm512_sllv_epi32(ones, begin)));
+    return _mm512_andnot_si512(_mm512_sllv_epi32(ones, end), _mm512_sllv_epi32(ones, begin));
 }
-TL_INLINE vm get_range(const vm_ranges *r, int k) { return (vm)r->bits[k]; }
+
 
 TL_INLINE vf vf_set1(float a) { return _mm512_set1_ps(a); }
 TL_INLINE vf vf_add(vf a, vf b) { return _mm512_add_ps(a, b); }
+TL_INLINE vf vf_sub(vf a, vf b) { return _mm512_sub_ps(a, b); }
 TL_INLINE vf vf_mul(vf a, vf b) { return _mm512_mul_ps(a, b); }
 TL_INLINE vf vf_div(vf a, vf b) { return _mm512_div_ps(a, b); }
 TL_INLINE vf vf_from_vi(vi a) { return _mm512_cvtepi32_ps(a); }
@@ -57,7 +61,9 @@ TL_INLINE void vf_store(float *p, vf a) { _mm512_storeu_ps(p, a); }
 TL_INLINE vi vi_floor(vf a) { return _mm512_cvt_roundps_epi32(a, _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC); }
 TL_INLINE vf vf_load_masked(vm m, const float *p) { return _mm512_maskz_loadu_ps(m, p); }
 TL_INLINE void vf_store_masked(float *p, vm m, vf a) { _mm512_mask_storeu_ps(p, m, a); }
+TL_INLINE void vf_store_some(float *p, vm m, vf a, int has_room) { (void)has_room; vf_store_masked(p, m, a); }
 TL_INLINE vm vf_lt(vf a, vf b) { return _mm512_cmp_ps_mask(a, b, _CMP_LT_OQ); }
+TL_INLINE vm vf_ge(vf a, vf b) { return _mm512_cmp_ps_mask(a, b, _CMP_GE_OQ); }
 TL_INLINE vm vf_eq(vf a, vf b) { return _mm512_cmp_ps_mask(a, b, _CMP_EQ_OQ); }
 TL_INLINE vi vi_bits_of_vf(vf a) { return _mm512_castps_si512(a); }
 
@@ -75,19 +81,21 @@ TL_INLINE vf vf_from_vd(vd a)
     return _mm512_insertf32x8(_mm512_castps256_ps512(_mm512_cvtpd_ps(a.lo)), _mm512_cvtpd_ps(a.hi), 1);
 }
 /* a[k] / b for three a, each correctly rounded, for |b| and |a / b| within 2^+-500: one division.  The first step makes the
- * quotient faithful, the second correct.  Based on: P. Markstein, Computation of elementary functions on the IBM RISC
+ * quotient faithful, the second correct.  Of float32 numbers one step is enough: it errs by less than 2^-100 of the quotient, which
+ * is no nearer than 2^-77 to the middle of two float64.  Based on: P. Markstein, Computation of elementary functions on the IBM RISC
  * System/6000 processor, 1990. */
-TL_INLINE __m512d one_quotient(__m512d a, __m512d b, __m512d inverse)
+TL_INLINE __m512d one_quotient(__m512d a, __m512d b, __m512d inverse, int are_f32)
 {
     __m512d q = _mm512_mul_pd(a, inverse);
-    q = _mm512_fmadd_pd(_mm512_fnmadd_pd(q, b, a), inverse, q);
+    if (!are_f32)
+        q = _mm512_fmadd_pd(_mm512_fnmadd_pd(q, b, a), inverse, q);
     return _mm512_fmadd_pd(_mm512_fnmadd_pd(q, b, a), inverse, q);
 }
-TL_INLINE void vd_quotients(const vd *a, vd b, vd *q)
+TL_INLINE void vd_quotients(const vd *a, vd b, vd *q, int are_f32)
 {
     const vd inverse = vd_div(vd_set1(1.0), b);
     for (int k = 0; k < 3; k++)
-        q[k] = (vd){one_quotient(a[k].lo, b.lo, inverse.lo), one_quotient(a[k].hi, b.hi, inverse.hi)};
+        q[k] = (vd){one_quotient(a[k].lo, b.lo, inverse.lo, are_f32), one_quotient(a[k].hi, b.hi, inverse.hi, are_f32)};
 }
 TL_INLINE vd vd_abs(vd a) { return (vd){_mm512_abs_pd(a.lo), _mm512_abs_pd(a.hi)}; }
 TL_INLINE vd vd_floor(vd a) { return (vd){_mm512_roundscale_pd(a.lo, 1), _mm512_roundscale_pd(a.hi, 1)}; }
@@ -109,6 +117,7 @@ TL_INLINE vd vd_select(vm m, vd a, vd b)
 {
     return (vd){_mm512_mask_mov_pd(b.lo, (__mmask8)m, a.lo), _mm512_mask_mov_pd(b.hi, (__mmask8)(m >> 8), a.hi)};
 }
+TL_INLINE vd vd_load(const double *p) { return (vd){_mm512_loadu_pd(p), _mm512_loadu_pd(p + 8)}; }
 TL_INLINE void vd_store(double *p, vd a) { _mm512_storeu_pd(p, a.lo), _mm512_storeu_pd(p + 8, a.hi); }
 
 /* Plain 16-byte loads and transposes in registers: hardware gathers are three times as slow. */
@@ -193,17 +202,18 @@ TL_INLINE void load_columns_f64(const double *p, int stride, vd *columns)
         columns[k] = (vd){low[k], high[k]};
 }
 
-TL_INLINE void store_eight(tl_vertex *v, __m256i x, __m256i y, __m512d z)
+TL_INLINE void store_eight(tl_vertex *v, __m512i xy, __m512d z)
 {
     const __m512i front = _mm512_setr_epi64(0, 8, 1, 9, 2, 10, 3, 11), back = _mm512_setr_epi64(4, 12, 5, 13, 6, 14, 7, 15);
-    const __m512i xy = _mm512_or_si512(_mm512_cvtepu32_epi64(x), _mm512_slli_epi64(_mm512_cvtepu32_epi64(y), 32));
     _mm512_storeu_si512(v, _mm512_permutex2var_epi64(xy, front, _mm512_castpd_si512(z)));
     _mm512_storeu_si512(v + 4, _mm512_permutex2var_epi64(xy, back, _mm512_castpd_si512(z)));
 }
 TL_INLINE void store_vertices(tl_vertex *v, vi x, vi y, vd z)
 {
-    store_eight(v, _mm512_castsi512_si256(x), _mm512_castsi512_si256(y), z.lo);
-    store_eight(v + 8, _mm512_extracti64x4_epi64(x, 1), _mm512_extracti64x4_epi64(y, 1), z.hi);
+    const __m512i low = _mm512_setr_epi32(0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23);
+    const __m512i high = _mm512_setr_epi32(8, 24, 9, 25, 10, 26, 11, 27, 12, 28, 13, 29, 14, 30, 15, 31);
+    store_eight(v, _mm512_permutex2var_epi32(x, low, y), z.lo);
+    store_eight(v + 8, _mm512_permutex2var_epi32(x, high, y), z.hi);
 }
 
 /* Half vectors: a 64-byte load or store at any column crosses a cache line, one of 32 bytes every other time. */
@@ -217,8 +227,10 @@ TL_INLINE int hm_any(hm a) { return a != 0; }
 TL_INLINE hm hi_gt(hi a, hi b) { return _mm256_cmpgt_epi32_mask(a, b); }
 TL_INLINE hi hi_load_masked(hm m, const int32_t *p) { return _mm256_maskz_loadu_epi32(m, p); }
 TL_INLINE void hi_store_masked(int32_t *p, hm m, hi a) { _mm256_mask_storeu_epi32(p, m, a); }
+TL_INLINE void hi_store_some(int32_t *p, hm m, hi a, int has_room) { (void)has_room; hi_store_masked(p, m, a); }
 TL_INLINE hf hf_load_masked(hm m, const float *p) { return _mm256_maskz_loadu_ps(m, p); }
 TL_INLINE void hf_store_masked(float *p, hm m, hf a) { _mm256_mask_storeu_ps(p, m, a); }
+TL_INLINE void hf_store_some(float *p, hm m, hf a, int has_room) { (void)has_room; hf_store_masked(p, m, a); }
 TL_INLINE hm hf_lt(hf a, hf b) { return _mm256_cmp_ps_mask(a, b, _CMP_LT_OQ); }
 TL_INLINE hm hf_eq(hf a, hf b) { return _mm256_cmp_ps_mask(a, b, _CMP_EQ_OQ); }
 TL_INLINE hi hi_lower(vi a) { return _mm512_castsi512_si256(a); }

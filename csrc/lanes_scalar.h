@@ -29,6 +29,7 @@ TL_INLINE vi vi_select(vm m, vi a, vi b) { return m ? a : b; }
 TL_INLINE void vi_compress(int32_t *p, vm m, vi a) { (void)m; *p = a; }
 TL_INLINE vi vi_load_masked(vm m, const int32_t *p) { return m ? *p : 0; }
 TL_INLINE void vi_store_masked(int32_t *p, vm m, vi a) { if (m) *p = a; }
+TL_INLINE void vi_store_some(int32_t *p, vm m, vi a, int has_room) { (void)has_room; vi_store_masked(p, m, a); }
 
 TL_INLINE vm vm_and(vm a, vm b) { return a & b; }
 TL_INLINE vm vm_or(vm a, vm b) { return a | b; }
@@ -38,13 +39,26 @@ TL_INLINE unsigned vm_bits(vm a) { return a; }
 TL_INLINE vm vm_all(void) { return 1; }
 TL_INLINE vm vm_first(int64_t n) { return n > 0; }
 
-/* The masks of TL_LANES ranges of lanes [begin, end); and one of them. */
-typedef struct { vm mask; } vm_ranges;
-TL_INLINE void set_ranges(vm_ranges *r, vi begin, vi end) { r->mask = begin <= 0 && end > 0; }
-TL_INLINE vm get_range(const vm_ranges *r, int k) { (void)k; return r->mask; }
+TL_INLINE vm vm_from_bits(unsigned bits) { return bits & 1; }
+/* 64 bytes of 0 or 1 */
+TL_INLINE void bytes_from_bits(uint8_t *p, uint64_t bits)
+{
+    const uint64_t high = 0x7f7f7f7f7f7f7f7fu, ones = 0x0101010101010101u;
+    for (int k = 0; k < 64; k += 8) {
+        const uint64_t spread = (bits >> k & 0xff) * ones & 0x8040201008040201u; /* bit i of the eight in byte i */
+        uint64_t bytes = (spread + high) >> 7 & ones;
+#if __BYTE_ORDER__ == __ORDER_BIG_ENDIAN__
+        bytes = __builtin_bswap64(bytes);
+#endif
+        memcpy(p + k, &bytes, 8);
+    }
+}
+TL_INLINE vi vi_bit_ranges(vi begin, vi end) { return begin < 31 ? (vi)(~0u << begin & ~(~0u << end)) : 0; }
+
 
 TL_INLINE vf vf_set1(float a) { return a; }
 TL_INLINE vf vf_add(vf a, vf b) { return a + b; }
+TL_INLINE vf vf_sub(vf a, vf b) { return a - b; }
 TL_INLINE vf vf_mul(vf a, vf b) { return a * b; }
 TL_INLINE vf vf_div(vf a, vf b) { return a / b; }
 TL_INLINE vf vf_from_vi(vi a) { return (float)a; }
@@ -53,7 +67,9 @@ TL_INLINE void vf_store(float *p, vf a) { *p = a; }
 TL_INLINE vi vi_floor(vf a) { return fabsf(a) < 0x1p30f ? (vi)floorf(a) : INT32_MIN; }
 TL_INLINE vf vf_load_masked(vm m, const float *p) { return m ? *p : 0.0f; }
 TL_INLINE void vf_store_masked(float *p, vm m, vf a) { if (m) *p = a; }
+TL_INLINE void vf_store_some(float *p, vm m, vf a, int has_room) { (void)has_room; vf_store_masked(p, m, a); }
 TL_INLINE vm vf_lt(vf a, vf b) { return a < b; }
+TL_INLINE vm vf_ge(vf a, vf b) { return a >= b; }
 TL_INLINE vm vf_eq(vf a, vf b) { return a == b; }
 TL_INLINE vi vi_bits_of_vf(vf a) { vi b; memcpy(&b, &a, 4); return b; }
 
@@ -64,8 +80,9 @@ TL_INLINE vd vd_mul(vd a, vd b) { return a * b; }
 TL_INLINE vd vd_div(vd a, vd b) { return a / b; }
 TL_INLINE vd vd_from_vi(vi a) { return (double)a; }
 TL_INLINE vf vf_from_vd(vd a) { return (float)a; }
-TL_INLINE void vd_quotients(const vd *a, vd b, vd *q)
+TL_INLINE void vd_quotients(const vd *a, vd b, vd *q, int are_f32)
 {
+    (void)are_f32;
     for (int k = 0; k < 3; k++)
         q[k] = a[k] / b;
 }
@@ -77,6 +94,7 @@ TL_INLINE vm vd_ge(vd a, vd b) { return a >= b; }
 TL_INLINE vd vd_from_vf(vf a) { return (double)a; }
 TL_INLINE vi vi_round(vd a) { return fabs(a) < 0x1p31 ? (vi)rint(a) : INT32_MIN; }
 TL_INLINE vd vd_select(vm m, vd a, vd b) { return m ? a : b; }
+TL_INLINE vd vd_load(const double *p) { return *p; }
 TL_INLINE void vd_store(double *p, vd a) { *p = a; }
 
 /* The vertices first[3 * lane] of TL_LANES triangles.  z is left in the order of the loads until it is needed. */

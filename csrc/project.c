@@ -77,27 +77,25 @@ static void project_one(const tl_source *source, int64_t i, const tl_view *view,
     }
 }
 
-/* clip_position of TL_LANES vertices. */
-TL_INLINE void clip_lanes(const tl_source *source, int64_t i, vd *p)
+/* clip_position of TL_LANES vertices; matrix may be NULL. */
+TL_INLINE void clip_lanes_f32(const float *data, const float *m, int stride, vf *p)
 {
-    const int stride = source->n_components;
-    if (source->scalar == TL_F32) {
-        vf v[4];
-        const float *m = source->matrix;
-        load_columns_f32((const float *)source->data + i * stride, stride, v);
-        for (int k = 0; k < 4; k++) {
-            vf sum = v[k];
-            if (m) {
-                sum = vf_add(vf_mul(vf_set1(m[4 * k]), v[0]), vf_mul(vf_set1(m[4 * k + 1]), v[1]));
-                sum = vf_add(vf_add(sum, vf_mul(vf_set1(m[4 * k + 2]), v[2])), vf_set1(m[4 * k + 3]));
-            }
-            p[k] = vd_from_vf(sum);
+    vf v[4];
+    load_columns_f32(data, stride, v);
+    for (int k = 0; k < 4; k++) {
+        vf sum = v[k];
+        if (m) {
+            sum = vf_add(vf_mul(vf_set1(m[4 * k]), v[0]), vf_mul(vf_set1(m[4 * k + 1]), v[1]));
+            sum = vf_add(vf_add(sum, vf_mul(vf_set1(m[4 * k + 2]), v[2])), vf_set1(m[4 * k + 3]));
         }
-        return;
+        p[k] = sum;
     }
+}
+
+TL_INLINE void clip_lanes_f64(const double *data, const double *m, int stride, vd *p)
+{
     vd v[4];
-    const double *m = source->matrix;
-    load_columns_f64((const double *)source->data + i * stride, stride, v);
+    load_columns_f64(data, stride, v);
     for (int k = 0; k < 4; k++) {
         p[k] = v[k];
         if (m) {
@@ -120,20 +118,46 @@ TL_INLINE vm inside_lanes(const vd *p, const tl_view *view)
     return inside;
 }
 
-static tl_vertex_counts project(const tl_source *source, int64_t first, int64_t end, const tl_view *view, tl_vertex *out, tl_wide *wide)
+/* The same of float32 numbers: 0 < w < infinity says what the two tests of w say. */
+TL_INLINE vm inside_lanes_f32(const vf *p, const tl_view *view)
 {
-    tl_vertex_counts counts = {0, 0, 0};
+    const vf z = p[2], w = p[3], zero = vf_set1(0.0f);
+    vm inside = vm_and(vf_lt(zero, w), vf_lt(w, vf_set1(INFINITY)));
+    if (view->near_clip)
+        inside = vm_and(inside, vf_ge(z, view->zero_to_one ? zero : vf_sub(zero, w)));
+    if (view->far_clip)
+        inside = vm_and(inside, vf_ge(w, z));
+    return inside;
+}
+
+/* `scalar` and `has_matrix` are constants: a copy for each keeps the matrix in registers. */
+TL_INLINE int64_t project_lanes(const tl_source *source, int64_t first, int64_t end, const tl_view *view, tl_vertex *out, tl_wide *wide,
+                                tl_vertex_counts *counts, tl_scalar scalar, int has_matrix)
+{
     const double unit = (double)(1 << view->subpixel_bits);
     const vd one = vd_set1(1.0), half = vd_set1(0.5), largest = vd_set1(FLT_MAX);
     const vd scale_x = vd_set1(view->half_width_px * unit), scale_y = vd_set1(view->half_height_px * unit);
+    const int stride = has_matrix ? 3 : 4;
+    double m64[16];
+    float m32[16];
+    if (has_matrix)
+        memcpy(scalar == TL_F32 ? (void *)m32 : (void *)m64, source->matrix, scalar == TL_F32 ? sizeof m32 : sizeof m64);
     int64_t i = first;
     /* loads read two numbers past the last row */
-    for (; TL_LANES > 1 && i + TL_LANES <= end && i + TL_LANES < source->n; i += TL_LANES) {
-        vd p[4];
-        clip_lanes(source, i, p);
-        vm good = inside_lanes(p, view);
-        vd ndc[3];
-        vd_quotients(p, p[3], ndc);
+    for (; i + TL_LANES <= end && i + TL_LANES < source->n; i += TL_LANES) {
+        vd p[4], ndc[3];
+        vm good;
+        if (scalar == TL_F32) {
+            vf p32[4];
+            clip_lanes_f32((const float *)source->data + i * stride, has_matrix ? m32 : NULL, stride, p32);
+            good = inside_lanes_f32(p32, view);
+            for (int k = 0; k < 4; k++)
+                p[k] = vd_from_vf(p32[k]);
+        } else {
+            clip_lanes_f64((const double *)source->data + i * stride, has_matrix ? m64 : NULL, stride, p);
+            good = inside_lanes(p, view);
+        }
+        vd_quotients(p, p[3], ndc, scalar == TL_F32);
         const vi x = vi_round(vd_mul(vd_add(ndc[0], one), scale_x)), y = vi_round(vd_mul(vd_sub(one, ndc[1]), scale_y));
         const vd z = view->zero_to_one ? ndc[2] : vd_mul(vd_add(ndc[2], one), half);
         good = vm_and(good, vm_and(is_narrow_lanes(x), is_narrow_lanes(y)));
@@ -141,8 +165,21 @@ static tl_vertex_counts project(const tl_source *source, int64_t first, int64_t 
             good = vm_and(good, vd_ge(largest, vd_abs(z)));
         store_vertices(out + i, x, y, z);
         for (unsigned rest = vm_bits(vm_and_not(vm_all(), good)); rest; rest &= rest - 1)
-            project_one(source, i + __builtin_ctz(rest), view, out, wide, &counts);
+            project_one(source, i + __builtin_ctz(rest), view, out, wide, counts);
     }
+    return i;
+}
+
+static tl_vertex_counts project(const tl_source *source, int64_t first, int64_t end, const tl_view *view, tl_vertex *out, tl_wide *wide)
+{
+    tl_vertex_counts counts = {0, 0, 0};
+    int64_t i = first;
+    if (TL_LANES > 1 && source->scalar == TL_F32)
+        i = source->matrix ? project_lanes(source, first, end, view, out, wide, &counts, TL_F32, 1)
+                           : project_lanes(source, first, end, view, out, wide, &counts, TL_F32, 0);
+    else if (TL_LANES > 1)
+        i = source->matrix ? project_lanes(source, first, end, view, out, wide, &counts, TL_F64, 1)
+                           : project_lanes(source, first, end, view, out, wide, &counts, TL_F64, 0);
     for (; i < end; i++)
         project_one(source, i, view, out, wide, &counts);
     return counts;
