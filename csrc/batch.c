@@ -8,6 +8,7 @@
 #include "lanes.h"
 
 #define TL_SMALL_BOX 4
+#define TL_MIDDLE_BOX 16
 #define TL_MAX_BOX_PX 62 /* rows.c: row ends in float32 are exact up to here */
 #define TL_QUEUE 256
 
@@ -23,6 +24,7 @@ typedef struct {
 /* What one pass needs to know of the window and the scene, in int32. */
 typedef struct {
     int32_t left, top, right, bottom; /* picture pixels */
+    int32_t picture_top, picture_bottom; /* rows of the picture that other passes draw */
     int32_t max_extent;               /* of a triangle that 32-bit lanes can take, in units */
     vi last_vertex;
     int second, third;                /* which corner comes second and third: culled faces then have negative area */
@@ -34,9 +36,10 @@ typedef struct {
     const tl_scene *scene;
     const tl_window *window;
     const tl_target *target;
+    tl_share *share;
     batch_limits limits;
     int64_t bad_row; /* of triangles, -1: none so far */
-    box_queue small, rows;
+    box_queue small, middle, rows;
     fragment_list fragments;
 } batch_state;
 

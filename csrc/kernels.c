@@ -6,6 +6,7 @@
 #include "project.c"
 #include "clip.c"
 #include "setup.c"
+#include "covered.c"
 #include "sink.c"
 #include "raster.c"
 #include "resolve.c"

@@ -1,117 +1,11 @@
-/* Raster: every triangle of a scene, in order, through setup and a walker to the sink.
+/* Raster: every triangle of a scene, a vector of them at a time, through setup and cull to the code for its size.
  * In: vertex records and triangles.  Out: the target's buffers. */
 #include "fixed.h"
+#include "lanes.h"
 
-#define TL_INT int64_t
-#define TL_UINT uint64_t
-#define TL_WALK(name) name##_64
-static inline void floor_divide_64(int64_t a, int64_t b, int64_t *quotient, int64_t *remainder)
-{
-    const int64_t q = a / b, r = a % b;
-    *quotient = q - (r < 0);
-    *remainder = r < 0 ? r + b : r;
-}
-#include "walk.h"
-#undef TL_INT
-#undef TL_UINT
-#undef TL_WALK
-
-#define TL_INT tl_int128
-#define TL_UINT tl_uint128
-#define TL_WALK(name) name##_128
-static inline void floor_divide_128(tl_int128 a, tl_int128 b, tl_int128 *quotient, tl_int128 *remainder)
-{
-    const tl_int128 q = a / b, r = a % b;
-    *quotient = q - (r < 0);
-    *remainder = r < 0 ? r + b : r;
-}
-#include "walk.h"
-#undef TL_INT
-#undef TL_UINT
-#undef TL_WALK
-
+#include "alone.c"
 #include "batch.c"
 #include "rows.c"
-
-/* A box at most this wide is walked sample by sample, a wider one by its row ends. */
-#define TL_EDGE_MAX_WIDTH 6
-
-/* One triangle by itself: any range, any method. */
-TL_INLINE void draw_triangle(const tl_vertex_set *set, const int32_t *corners, int32_t id, const tl_scene *scene,
-                             const tl_window *window, const tl_target *target, tl_sink sink)
-{
-    tl_triangle t;
-    const int sign = load_triangle(set, corners, &t);
-    if (sign == 0 || (sign > 0 && scene->cull == TL_CULL_BACK) || (sign < 0 && scene->cull == TL_CULL_FRONT))
-        return;
-    if (!clip_box(&t, window))
-        return;
-    t.id = id;
-    setup_sink(&t, window, sink);
-    const int is_auto = scene->method == TL_METHOD_AUTO;
-    const int by_edge = scene->method == TL_METHOD_EDGE || (is_auto && t.col1 - t.col0 <= TL_EDGE_MAX_WIDTH);
-    if (is_auto && rows_fit(&t) && (!sink_has_depth(sink) || t.has_plane))
-        walk_rows(&t, window, target, sink);
-    else if (t.is_narrow && by_edge)
-        walk_edge_64(&t, window, target, sink);
-    else if (t.is_narrow)
-        walk_scanline_64(&t, window, target, sink);
-    else if (by_edge)
-        walk_edge_128(&t, window, target, sink);
-    else
-        walk_scanline_128(&t, window, target, sink);
-}
-
-static inline int is_clipped(const tl_vertex_set *set, const int32_t *corners)
-{
-    int clipped = 0;
-    for (int k = 0; k < 3; k++)
-        clipped |= set->vertices[corners[k]].x_fx == TL_SPECIAL && set->vertices[corners[k]].y_fx == TL_CLIPPED;
-    return clipped;
-}
-
-static tl_vertex_set piece_set(const tl_pieces *p)
-{
-    return (tl_vertex_set){p->vertices, p->wide, p->inv_w, NULL, p->n_vertices};
-}
-
-/* First piece of a triangle, by bisection in the ascending sources. */
-static int64_t first_piece(const tl_pieces *p, int64_t id)
-{
-    int64_t low = 0, high = p->n_pieces;
-    while (low < high) {
-        const int64_t middle = low + (high - low) / 2;
-        if (p->source[middle] < id)
-            low = middle + 1;
-        else
-            high = middle;
-    }
-    return low;
-}
-
-/* Triangle i, or its pieces, by itself. */
-TL_INLINE void draw_alone(const tl_scene *scene, int64_t i, const tl_window *window, const tl_target *target, tl_sink sink)
-{
-    const int32_t *corners = scene->triangles + 3 * i;
-    const tl_pieces *pieces = scene->pieces;
-    tl_vertex_set set = scene->mesh;
-    int64_t piece = 0, end = 1;
-    if (is_clipped(&set, corners)) {
-        if (!pieces)
-            return;
-        set = piece_set(pieces);
-        piece = first_piece(pieces, i);
-        for (end = piece; end < pieces->n_pieces && pieces->source[end] == i;)
-            end++;
-        corners = pieces->triangles + 3 * piece;
-    }
-    for (; piece < end; piece++, corners += 3)
-        draw_triangle(&set, corners, (int32_t)i, scene, window, target, sink);
-}
-
-TL_SINK_COPIES(draw_alone, (const tl_scene *scene, int64_t i, const tl_window *window, const tl_target *target), scene, i, window,
-               target)
-
 
 /* Whether the 3 * TL_LANES indices of a vector of triangles hold one outside [0, last_vertex]. */
 TL_INLINE int has_bad_index(const int32_t *corners, vi last_vertex)
@@ -126,8 +20,15 @@ TL_INLINE vi first_centre_lanes(vi x_fx, int bits)
     return vi_shift_right(vi_add(x_fx, vi_set1(round)), bits);
 }
 
-/* Setup and cull of the triangles [i, i + TL_LANES). */
-TL_INLINE void draw_batch(batch_state *s, tl_sink sink, int64_t i, const int32_t *corners, vm live)
+/* Lists triangles for the passes that draw the rest of the picture. */
+TL_INLINE void list_others(tl_share *share, vm m, vi id)
+{
+    vi_compress(share->others + share->n_others, m, id);
+    share->n_others += __builtin_popcount(vm_bits(m));
+}
+
+/* Setup and cull of TL_LANES triangles. */
+TL_INLINE void draw_batch(batch_state *s, tl_sink sink, const int32_t *corners, vi id, vm live)
 {
     const int bits = s->window->subpixel_bits, either_turn = s->scene->cull == TL_CULL_NONE;
     const batch_limits *limits = &s->limits;
@@ -135,7 +36,9 @@ TL_INLINE void draw_batch(batch_state *s, tl_sink sink, int64_t i, const int32_t
     for (int k = 0; k < 3 * TL_LANES; k += 16) /* 5 % of a million-triangle mesh */
         __builtin_prefetch(corners + 12 * 48 + k);
     if (has_bad_index(corners, limits->last_vertex)) {
-        s->bad_row = i;
+        int32_t ids[TL_MAX_LANES];
+        vi_store(ids, id);
+        s->bad_row = ids[0];
         return;
     }
     lane_corners c;
@@ -148,25 +51,44 @@ TL_INLINE void draw_batch(batch_state *s, tl_sink sink, int64_t i, const int32_t
     alone = vm_and(live, vm_or(alone, vi_eq(x_min, vi_set1(TL_SPECIAL))));
     const vi area = area_lanes(&c), absolute = either_turn ? vi_max(area, vi_sub(zero, area)) : area;
     vm drawn = vm_and_not(vm_and(live, vi_gt(absolute, zero)), alone);
+    if (!vm_any(vm_or(drawn, alone)))
+        return;
     const vi col = vi_max(first_centre_lanes(x_min, bits), vi_set1(limits->left));
-    const vi row = vi_max(first_centre_lanes(y_min, bits), vi_set1(limits->top));
     const vi n_cols = vi_sub(vi_min(first_centre_lanes(x_max, bits), vi_set1(limits->right)), col);
-    const vi n_rows = vi_sub(vi_min(first_centre_lanes(y_max, bits), vi_set1(limits->bottom)), row);
+    const vi top = first_centre_lanes(y_min, bits), bottom = first_centre_lanes(y_max, bits), row = vi_max(top, vi_set1(limits->top));
+    const vi n_rows = vi_sub(vi_min(bottom, vi_set1(limits->bottom)), row);
+    if (s->share->others) {
+        const vi first = vi_max(top, vi_set1(limits->picture_top)), end = vi_min(bottom, vi_set1(limits->picture_bottom));
+        const vm is_seen = vm_and(drawn, vm_and(vi_gt(n_cols, zero), vi_gt(end, first)));
+        const vm is_beyond = vm_or(vi_gt(row, first), vi_gt(end, vi_set1(limits->bottom)));
+        list_others(s->share, vm_or(alone, vm_and(is_seen, is_beyond)), id);
+    }
     drawn = vm_and(drawn, vi_gt(vi_min(n_cols, n_rows), zero));
+    if (TL_LANES == 1) { /* one lane gains nothing from the rows of rows.c */
+        const vm over_small = vm_and(drawn, vi_gt(vi_max(n_cols, n_rows), vi_set1(TL_SMALL_BOX)));
+        alone = vm_or(alone, over_small);
+        drawn = vm_and_not(drawn, over_small);
+    }
     if (sink_has_depth(sink)) {
         const vi box = vi_shift_right(vi_sub(vi_mul(width, height), vi_set1(1)), TL_SLIVER_BITS);
         const vm sliver = vm_and(drawn, vi_gt(box, vi_sub(absolute, vi_set1(1)))); /* box > area * 2^12, as setup_plane */
         alone = vm_or(alone, sliver);
         drawn = vm_and_not(drawn, sliver);
     }
-    for (unsigned lanes = vm_bits(alone); lanes; lanes &= lanes - 1)
-        TL_SINK_CALL(draw_alone, sink, s->scene, i + __builtin_ctz(lanes), s->window, s->target)
+    if (vm_any(alone)) {
+        int32_t ids[TL_MAX_LANES];
+        vi_store(ids, id);
+        for (unsigned lanes = vm_bits(alone); lanes; lanes &= lanes - 1)
+            TL_SINK_CALL(draw_alone, sink, s->scene, ids[__builtin_ctz(lanes)], s->window, s->target)
+    }
     if (!vm_any(drawn))
         return;
-    const vi id = vi_add(vi_set1((int32_t)i), vi_iota()), longer = vi_max(n_cols, n_rows);
+    const vi longer = vi_max(n_cols, n_rows);
     const vm over_tiny = vi_gt(longer, vi_set1(2)), over_small = vi_gt(longer, vi_set1(TL_SMALL_BOX));
     const vm tiny = vm_and_not(drawn, over_tiny), small = vm_and(drawn, vm_and_not(over_tiny, over_small)),
-             rows = vm_and(drawn, over_small);
+             over = vm_and(drawn, over_small);
+    const vm beyond = vm_or(vi_gt(n_cols, vi_set1(TL_LANES)), vi_gt(n_rows, vi_set1(TL_MIDDLE_BOX)));
+    const vm middle = vm_and_not(over, beyond), rows = vm_and(over, beyond);
     if (vm_any(tiny)) {
         lane_triangles t;
         vd z[3];
@@ -178,6 +100,11 @@ TL_INLINE void draw_batch(batch_state *s, tl_sink sink, int64_t i, const int32_t
         if (s->small.n > TL_QUEUE - TL_LANES)
             TL_SINK_CALL(flush_small, sink, s)
     }
+    if (vm_any(middle)) {
+        push(&s->middle, middle, col, row, n_cols, n_rows, id);
+        if (s->middle.n > TL_QUEUE - TL_LANES)
+            TL_SINK_CALL(flush_middle, sink, s)
+    }
     if (vm_any(rows)) {
         push(&s->rows, rows, col, row, n_cols, n_rows, id);
         if (s->rows.n > TL_QUEUE - TL_LANES)
@@ -185,43 +112,64 @@ TL_INLINE void draw_batch(batch_state *s, tl_sink sink, int64_t i, const int32_t
     }
 }
 
-/* Every triangle of a scene; the window has fewer than 2^31 samples and lies within 2^30 pixels of 0. */
-TL_INLINE void draw_batches(const tl_scene *scene, const tl_window *window, const tl_target *target, int64_t *bad_row,
+/* The corners of the triangles [i, i + TL_LANES) of a share, behind the end zeros; in `buffer` unless they lie there already. */
+TL_INLINE const int32_t *share_corners(const tl_scene *scene, const tl_share *share, int64_t i, int32_t *buffer)
+{
+    if (!share->ids && i + TL_LANES <= share->end)
+        return scene->triangles + 3 * i;
+    for (int k = 0; k < TL_LANES; k++) {
+        const int64_t id = i + k >= share->end ? -1 : share->ids ? share->ids[i + k] : i + k;
+        if (id >= 0)
+            memcpy(buffer + 3 * k, scene->triangles + 3 * id, 3 * sizeof *buffer);
+        else
+            memset(buffer + 3 * k, 0, 3 * sizeof *buffer);
+    }
+    return buffer;
+}
+
+/* Every triangle of a share; the window has fewer than 2^31 samples and lies within 2^30 pixels of 0. */
+TL_INLINE void draw_batches(const tl_scene *scene, const tl_window *window, const tl_target *target, tl_share *share, int64_t *bad_row,
                             tl_sink sink)
 {
     batch_state s;
-    s.scene = scene, s.window = window, s.target = target, s.bad_row = -1;
-    s.small.n = s.rows.n = s.fragments.n = 0;
+    s.scene = scene, s.window = window, s.target = target, s.share = share, s.bad_row = -1;
+    s.small.n = s.middle.n = s.rows.n = s.fragments.n = 0;
     memset(s.fragments.sample, 0, sizeof s.fragments.sample); /* what is prefetched behind the end of the list */
     const int bits = window->subpixel_bits, is_back = scene->cull == TL_CULL_BACK;
     const int64_t farthest = (int64_t)1 << 30;
+    const tl_window *picture = share->others ? share->picture : window;
     s.limits = (batch_limits){
         .left = (int32_t)window->x_px,
         .top = (int32_t)window->y_px,
         .right = (int32_t)min64(window->x_px + window->width, farthest),
         .bottom = (int32_t)min64(window->y_px + window->height, farthest),
+        .picture_top = (int32_t)picture->y_px,
+        .picture_bottom = (int32_t)min64(picture->y_px + picture->height, farthest),
         .max_extent = TL_MAX_BOX_PX << (bits < 8 ? bits : 8),
         .second = is_back ? 2 : 1,
         .third = is_back ? 1 : 2,
         .last_vertex = vi_set1((int32_t)(scene->mesh.n_vertices - 1)),
     };
-    int32_t tail[3 * TL_LANES] = {0};
-    const int64_t n_whole = scene->n_triangles / TL_LANES * TL_LANES;
-    memcpy(tail, scene->triangles + 3 * n_whole, sizeof(int32_t) * 3 * (size_t)(scene->n_triangles - n_whole));
-    for (int64_t i = 0; i < scene->n_triangles && s.bad_row < 0; i += TL_LANES)
-        draw_batch(&s, sink, i, i < n_whole ? scene->triangles + 3 * i : tail, vm_first(scene->n_triangles - i));
+    for (int64_t i = share->first; i < share->end && s.bad_row < 0; i += TL_LANES) {
+        int32_t corners[3 * TL_LANES];
+        const vm live = vm_first(share->end - i);
+        const vi id = share->ids ? vi_load_masked(live, share->ids + i) : vi_add(vi_set1((int32_t)i), vi_iota());
+        draw_batch(&s, sink, share_corners(scene, share, i, corners), id, live);
+    }
     TL_SINK_CALL(flush_small, sink, &s)
+    TL_SINK_CALL(flush_middle, sink, &s)
     TL_SINK_CALL(flush_rows, sink, &s)
     flush_fragments(target, sink, &s.fragments, s.fragments.n);
     *bad_row = s.bad_row;
 }
 
-TL_INLINE void draw_scene(const tl_scene *scene, const tl_window *window, const tl_target *target, int64_t *bad_row, tl_sink sink)
+TL_INLINE void draw_scene(const tl_scene *scene, const tl_window *window, const tl_target *target, tl_share *share, int64_t *bad_row,
+                          tl_sink sink)
 {
     const int64_t farthest = (int64_t)1 << 30;
     const int is_near = window->x_px > -farthest && window->x_px < farthest && window->y_px > -farthest && window->y_px < farthest;
     if (scene->method == TL_METHOD_AUTO && is_near) {
-        draw_batches(scene, window, target, bad_row, sink);
+        draw_batches(scene, window, target, share, bad_row, sink);
         return;
     }
     *bad_row = first_bad_row(scene->triangles, scene->n_triangles, scene->mesh.n_vertices);
@@ -231,24 +179,26 @@ TL_INLINE void draw_scene(const tl_scene *scene, const tl_window *window, const 
         TL_SINK_CALL(draw_alone, sink, scene, i, window, target)
 }
 
-TL_SINK_COPIES(draw_scene, (const tl_scene *scene, const tl_window *window, const tl_target *target, int64_t *bad_row), scene, window,
-               target, bad_row)
+TL_SINK_COPIES(draw_scene, (const tl_scene *scene, const tl_window *window, const tl_target *target, tl_share *share, int64_t *bad_row),
+               scene, window, target, share, bad_row)
 
 /* What every sample of the window starts as. */
 static void clear(const tl_window *window, const tl_target *target)
 {
-    const int is_count = target->sink == TL_SINK_MASK || target->sink == TL_SINK_COUNT;
     const float farthest = target->sink == TL_SINK_FARTHEST ? -INFINITY : INFINITY;
-    const int64_t pixel_bytes = target->sink == TL_SINK_MASK ? 1 : 4;
+    if (target->sink == TL_SINK_MASK) {
+        memset(target->covered, 0, (size_t)tl_covered_words(target->stride_px * window->height) * sizeof(uint64_t));
+        return;
+    }
     for (int64_t row = 0; row < window->height; row++) {
         const int64_t at = row * target->stride_px;
-        memset((char *)target->pixels + at * pixel_bytes, is_count ? 0 : 0xff, (size_t)(window->width * pixel_bytes));
+        memset((int32_t *)target->pixels + at, target->sink == TL_SINK_COUNT ? 0 : 0xff, (size_t)window->width * sizeof(int32_t));
         for (int64_t col = 0; sink_has_depth(target->sink) && col < window->width; col++)
             target->depth[at + col] = farthest;
     }
 }
 
-static int64_t draw(const tl_scene *scene, const tl_window *window, const tl_target *target)
+static int64_t draw(const tl_scene *scene, const tl_window *window, const tl_target *target, tl_share *share)
 {
     const int64_t pixel_bytes = target->sink == TL_SINK_MASK ? 1 : 4;
     const int64_t rows_at_once = max64(1, (((int64_t)1 << 31) - 1) / target->stride_px);
@@ -259,13 +209,16 @@ static int64_t draw(const tl_scene *scene, const tl_window *window, const tl_tar
         band.height = min64(rows_at_once, window->height - row);
         part.pixels = (char *)target->pixels + row * target->stride_px * pixel_bytes;
         part.depth = target->depth ? target->depth + row * target->stride_px : NULL;
+        part.n_samples = part.stride_px * (band.height - 1) + band.width;
         int64_t bad_row = -1;
-        clear(&band, &part);
-        if (scene->n_triangles == 0)
-            continue;
-        TL_SINK_CALL(draw_scene, target->sink, scene, &band, &part, &bad_row)
+        if (share->is_first)
+            clear(&band, &part);
+        if (share->first < share->end)
+            TL_SINK_CALL(draw_scene, target->sink, scene, &band, &part, share, &bad_row)
         if (bad_row >= 0)
             return bad_row;
+        if (target->sink == TL_SINK_MASK && share->is_last)
+            expand_covered(&band, &part);
     }
     return -1;
 }

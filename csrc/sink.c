@@ -45,25 +45,6 @@ TL_INLINE int sink_has_depth(tl_sink sink)
     return sink == TL_SINK_PAINT || sink == TL_SINK_NEAREST || sink == TL_SINK_FARTHEST;
 }
 
-/* n bytes of 1: a call of memset costs more than most rows. */
-TL_INLINE void set_bytes(uint8_t *p, int64_t n)
-{
-    const uint64_t ones = 0x0101010101010101u;
-    if (n >= 64) {
-        memset(p, 1, (size_t)n);
-    } else if (n >= 8) {
-        for (int64_t k = 0; k < n - 8; k += 8)
-            memcpy(p + k, &ones, 8);
-        memcpy(p + n - 8, &ones, 8);
-    } else if (n >= 4) {
-        memcpy(p, &ones, 4);
-        memcpy(p + n - 4, &ones, 4);
-    } else {
-        for (int64_t k = 0; k < n; k++)
-            p[k] = 1;
-    }
-}
-
 /* Ids and depths of the lanes in m that win.  Depths of new samples are never NaN or -0.  Written for whole vectors and, where
  * there are such, for half vectors. */
 #define TL_PUT_DEPTHS(NAME, M, F, I, P)                                                                                  \
@@ -80,26 +61,34 @@ TL_INLINE void set_bytes(uint8_t *p, int64_t n)
             if (__builtin_expect(P##m_any(equal), 0))                                                                    \
                 wins = P##m_or(wins, P##m_and(equal, P##i_gt(P##i_load_masked(equal, ids), id)));                        \
         }                                                                                                                \
-        P##f_store_masked(target->depth + at, wins, depth);                                                              \
-        P##i_store_masked(ids, wins, id);                                                                                \
+        P##f_store_some(target->depth + at, wins, depth, at + TL_LANES <= target->n_samples);                            \
+        P##i_store_some(ids, wins, id, at + TL_LANES <= target->n_samples);                                                                                \
     }
 TL_PUT_DEPTHS(put_depths, vm, vf, vi, v)
 #if TL_HALF_LANES
 TL_PUT_DEPTHS(put_depths_half, hm, hf, hi, h)
 #endif
 
+/* Counts or ids of the lanes in m. */
+TL_INLINE void put_numbers(const tl_target *target, tl_sink sink, int64_t at, vm m, vi id)
+{
+    int32_t *pixels = (int32_t *)target->pixels + at;
+    const vi old = vi_load_masked(m, pixels);
+    vi_store_some(pixels, m, sink == TL_SINK_COUNT ? vi_add(old, vi_set1(1)) : vi_max(old, id), at + TL_LANES <= target->n_samples);
+}
+
 /* A span of samples without depth. */
 TL_INLINE void put_plain(const tl_target *target, tl_sink sink, int64_t at, int64_t n, int32_t id)
 {
     if (sink == TL_SINK_MASK) {
-        set_bytes((uint8_t *)target->pixels + at, n);
+        cover_span(target, at, n);
         return;
     }
     int32_t *pixels = (int32_t *)target->pixels + at;
     for (int64_t k = 0; k < n; k += TL_LANES) {
         const vm m = vm_first(n - k);
         const vi old = vi_load_masked(m, pixels + k);
-        vi_store_masked(pixels + k, m, sink == TL_SINK_COUNT ? vi_add(old, vi_set1(1)) : vi_max(old, vi_set1(id)));
+        vi_store_some(pixels + k, m, sink == TL_SINK_COUNT ? vi_add(old, vi_set1(1)) : vi_max(old, vi_set1(id)), at + k + TL_LANES <= target->n_samples);
     }
 }
 
@@ -178,12 +167,21 @@ TL_INLINE void put_span(const tl_triangle *t, const tl_window *window, const tl_
         put_weighted(t, window, target, sink, row, first, end);
 }
 
-/* float32 as an integer of the same order. */
-TL_INLINE int32_t ordered(float a)
+/* A sample as one integer, smaller if it wins: depth bits in the order of the numbers, then id.  And back. */
+TL_INLINE int64_t sample_key(float depth, int32_t id, int32_t turn)
 {
     int32_t bits;
-    memcpy(&bits, &a, 4);
-    return bits ^ (int32_t)((uint32_t)(bits >> 31) >> 1);
+    memcpy(&bits, &depth, 4);
+    bits ^= (int32_t)((uint32_t)(bits >> 31) >> 1) ^ turn;
+    return (int64_t)((uint64_t)(uint32_t)bits << 32 | (uint32_t)id);
+}
+TL_INLINE float key_depth(int64_t key, int32_t turn)
+{
+    int32_t bits = (int32_t)(key >> 32) ^ turn;
+    float depth;
+    bits ^= (int32_t)((uint32_t)(bits >> 31) >> 1);
+    memcpy(&depth, &bits, 4);
+    return depth;
 }
 
 /* Writes the list out, one sample after the other: without branches, whatever wins. */
@@ -198,7 +196,7 @@ TL_INLINE void flush_fragments(const tl_target *target, tl_sink sink, const frag
             __builtin_prefetch(depths + f->sample[k + TL_PREFETCH], 1);
         }
         if (sink == TL_SINK_MASK) {
-            ((uint8_t *)target->pixels)[at] = 1;
+            target->covered[at >> 6] |= 1ull << (at & 63);
         } else if (sink == TL_SINK_COUNT) {
             pixels[at]++;
         } else if (sink == TL_SINK_LABEL) {
@@ -208,13 +206,11 @@ TL_INLINE void flush_fragments(const tl_target *target, tl_sink sink, const frag
             pixels[at] = wins ? f->id[k] : pixels[at];
             depths[at] = wins ? f->depth[k] : depths[at];
         } else {
-            const float z = f->depth[k], old_z = depths[at];
-            const int32_t id = f->id[k], old_id = pixels[at], turn = sink == TL_SINK_FARTHEST ? -1 : 0;
-            const int64_t key = (int64_t)((uint64_t)(uint32_t)(ordered(z) ^ turn) << 32 | (uint32_t)id);
-            const int64_t old_key = (int64_t)((uint64_t)(uint32_t)(ordered(old_z) ^ turn) << 32 | (uint32_t)old_id);
-            const int wins = key < old_key;
-            pixels[at] = wins ? id : old_id;
-            depths[at] = wins ? z : old_z;
+            const int32_t turn = sink == TL_SINK_FARTHEST ? -1 : 0;
+            const int64_t key = sample_key(f->depth[k], f->id[k], turn), old = sample_key(depths[at], pixels[at], turn);
+            const int64_t least = key < old ? key : old;
+            pixels[at] = (int32_t)least;
+            depths[at] = key_depth(least, turn);
         }
     }
 }

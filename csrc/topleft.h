@@ -90,7 +90,7 @@ typedef enum { TL_METHOD_AUTO = 0, TL_METHOD_EDGE = 1, TL_METHOD_SCANLINE = 2 } 
 
 /* What happens to a covered sample. */
 typedef enum {
-    TL_SINK_MASK = 0,     /* uint8 = 1 */
+    TL_SINK_MASK = 0,     /* uint8 = 1; a bit in `covered` until the last pass */
     TL_SINK_COUNT = 1,    /* int32 += 1 */
     TL_SINK_LABEL = 2,    /* int32 = id, painter's order: the later triangle wins */
     TL_SINK_PAINT = 3,    /* the same, and float = depth */
@@ -103,7 +103,12 @@ typedef struct {
     void *pixels; /* mask, counts or ids; rows of stride_px pixels */
     float *depth; /* PAINT, NEAREST, FARTHEST; the same stride */
     int64_t stride_px;
+    int64_t n_samples; /* from the first sample to the last, set by draw */
+    uint64_t *covered; /* MASK: tl_covered_words(stride_px * height of the window), at most of 2^31 samples */
 } tl_target;
+
+/* A bit a sample, and a word behind the end. */
+static inline int64_t tl_covered_words(int64_t n_samples) { return n_samples / 64 + 2; }
 
 typedef struct {
     tl_vertex_set mesh;
@@ -113,6 +118,17 @@ typedef struct {
     tl_cull cull;
     tl_method method;
 } tl_scene;
+
+/* The part of a scene that one pass draws.  Several passes may share a scene: each takes some of the triangles, draws what of
+ * them lies in its own window and lists the others for the passes that own the rest of the picture. */
+typedef struct {
+    const int32_t *ids;       /* the triangles ids[first] to ids[end - 1]; NULL: the triangles [first, end) */
+    int64_t first, end;
+    int32_t *others;          /* out, or NULL: those that reach into `picture` beyond the window; end - first + 16 numbers */
+    int64_t n_others;
+    const tl_window *picture; /* what all the passes draw; read when there are `others` */
+    int is_first, is_last;    /* of the passes over the window: the first clears it */
+} tl_share;
 
 /* ---- the kernel table ---------------------------------------------------------------------------------- */
 
@@ -142,8 +158,8 @@ typedef struct tl_kernels {
 
     /* Returns -1, or, when it has met an index outside [0, n_vertices), the number of a row at or before which there is
      * one; what was drawn is then worthless.  The window's pixels are cleared first: 0, id -1, and the depth that every
-     * other beats. */
-    int64_t (*draw)(const tl_scene *scene, const tl_window *window, const tl_target *target);
+     * other beats.  A share of a part needs method AUTO, a picture of less than 2^31 samples within 2^30 pixels of 0. */
+    int64_t (*draw)(const tl_scene *scene, const tl_window *window, const tl_target *target, tl_share *share);
 
     /* Per pixel of `ids` (rows of window->width): float32 weights of the triangle's three vertices. */
     void (*barycentric)(const tl_scene *scene, const tl_window *window, const int32_t *ids, float *out);

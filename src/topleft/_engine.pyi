@@ -18,6 +18,17 @@ def first_bad_row(triangles: NDArray[np.int32], n_vertices: int) -> int: ...
 def narrow_triangles(triangles: NDArray[np.int64], n_vertices: int, out: NDArray[np.int32]) -> int: ...
 def first_bad(records: NDArray[np.uint8], triangles: NDArray[np.int32]) -> int: ...
 
+class Target:
+    def __init__(
+        self,
+        sink: int,
+        pixels: NDArray[Any],
+        depth: NDArray[np.float32] | None,
+        covered: NDArray[np.uint64] | None,
+    ) -> None: ...
+    @staticmethod
+    def covered_shape(height: int, width: int) -> tuple[int, int]: ...
+
 class View:
     def __init__(
         self, viewport: tuple[int, int], subpixel_bits: int, zero_to_one: bool, near_clip: bool, far_clip: bool
@@ -59,16 +70,13 @@ class Scene:
         cull: int,
         method: int,
     ) -> None: ...
-    def draw(
-        self,
-        sink: int,
-        pixels: NDArray[np.uint8],
-        depth: NDArray[np.float32] | None,
-        width: int,
-        first_row: int,
-        n_rows: int,
-        pixel_bytes: int,
-    ) -> int: ...
+    def draw(self, target: Target, first_row: int, n_rows: int) -> int: ...
+    def draw_share(
+        self, target: Target, first_row: int, n_rows: int, first: int, others: NDArray[np.int32]
+    ) -> tuple[int, int]: ...
+    def draw_listed(
+        self, target: Target, first_row: int, n_rows: int, ids: NDArray[np.int32], is_last: bool
+    ) -> None: ...
     def paint(
         self,
         labels: NDArray[np.int32],

@@ -1,7 +1,7 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, initializedcheck=False, embedsignature=False
 """Memoryviews in, one nogil kernel call, status out. The array layer has checked every shape, dtype and index."""
 
-from libc.stdint cimport int32_t, int64_t, uint8_t
+from libc.stdint cimport int32_t, int64_t, uint8_t, uint64_t
 
 import numpy as np
 
@@ -48,6 +48,9 @@ cdef extern from "topleft.h" nogil:
         void *pixels
         float *depth
         int64_t stride_px
+        int64_t n_samples
+        uint64_t *covered
+    int64_t tl_covered_words(int64_t)
     ctypedef struct tl_scene:
         tl_vertex_set mesh
         const int32_t *triangles
@@ -55,6 +58,13 @@ cdef extern from "topleft.h" nogil:
         const tl_pieces *pieces
         tl_cull cull
         tl_method method
+    ctypedef struct tl_share:
+        const int32_t *ids
+        int64_t first, end
+        int32_t *others
+        int64_t n_others
+        const tl_window *picture
+        int is_first, is_last
     ctypedef struct tl_kernels:
         tl_vertex_counts (*snap)(const tl_source *, int64_t, int64_t, int, int, tl_vertex *, tl_wide *) noexcept nogil
         tl_vertex_counts (*project)(const tl_source *, int64_t, int64_t, const tl_view *, tl_vertex *, tl_wide *) noexcept nogil
@@ -62,7 +72,7 @@ cdef extern from "topleft.h" nogil:
         int64_t (*first_bad)(const tl_vertex *, const int32_t *, int64_t) noexcept nogil
         int64_t (*first_bad_row)(const int32_t *, int64_t, int64_t) noexcept nogil
         int64_t (*narrow_triangles)(const int64_t *, int64_t, int64_t, int32_t *) noexcept nogil
-        int64_t (*draw)(const tl_scene *, const tl_window *, const tl_target *) noexcept nogil
+        int64_t (*draw)(const tl_scene *, const tl_window *, const tl_target *, tl_share *) noexcept nogil
         void (*barycentric)(const tl_scene *, const tl_window *, const int32_t *, float *) noexcept nogil
         void (*interpolate)(const tl_scene *, const tl_window *, const int32_t *, const float *, int, int, float, float *) noexcept nogil
         void (*paint_flat)(const int32_t *, int64_t, const uint8_t *, int, uint8_t *) noexcept nogil
@@ -127,6 +137,39 @@ cdef class Source:
         with nogil:
             counts = K.project(&self.source, first, end, &view.view, <tl_vertex *>&records[0], table)
         return counts.n_bad, counts.n_wide, counts.n_clipped
+
+
+cdef class Target:
+    """The contiguous buffers of a picture, neither side of it 0, and what becomes of a covered sample."""
+
+    cdef tl_sink sink
+    cdef int64_t width, height
+    cdef int pixel_bytes
+    cdef uint8_t[::1] pixels
+    cdef float[:, ::1] depth
+    cdef uint64_t[:, ::1] covered
+
+    def __init__(self, int sink, pixels, depth, covered):
+        self.sink = <tl_sink>sink
+        self.height, self.width = pixels.shape
+        self.pixel_bytes = pixels.itemsize
+        self.pixels, self.depth, self.covered = as_bytes(pixels), depth, covered
+
+    @staticmethod
+    def covered_shape(int64_t height, int64_t width):
+        """Return the shape of the uint64 scratch that a mask needs: any rows of it are enough for as many of the mask."""
+        return height, tl_covered_words(width)
+
+    cdef tl_target rows(self, int64_t first_row) noexcept:
+        """The buffers from a row on."""
+        cdef tl_target t
+        t.sink = self.sink
+        t.pixels = &self.pixels[first_row * self.width * self.pixel_bytes]
+        t.depth = &self.depth[first_row, 0] if self.depth is not None else NULL
+        t.covered = &self.covered[first_row, 0] if self.covered is not None else NULL
+        t.stride_px = self.width
+        t.n_samples = 0  # draw knows
+        return t
 
 
 def first_bad_row(const int32_t[:, ::1] triangles, int64_t n_vertices):
@@ -223,23 +266,45 @@ cdef class Scene:
         w.width, w.height = width, n_rows
         return w
 
-    def draw(self, int sink, uint8_t[::1] pixels, float[:, ::1] depth, int64_t width, int64_t first_row, int64_t n_rows, int pixel_bytes):
-        """Clear and draw the rows [first_row, first_row + n_rows) of buffers that are `width` pixels wide.
+    def draw(self, Target target, int64_t first_row, int64_t n_rows):
+        """Clear and draw rows of a picture.
 
         Returns -1, or a number that is not negative when a triangle has an index outside the vertices.
         """
-        cdef tl_target target
-        cdef tl_window window = self.window(first_row, n_rows, width)
+        cdef tl_target rows = target.rows(first_row)
+        cdef tl_window window = self.window(first_row, n_rows, target.width)
+        cdef tl_share share
         cdef int64_t bad_row
-        if width == 0 or n_rows == 0:
-            return -1
-        target.sink = <tl_sink>sink
-        target.pixels = &pixels[first_row * width * pixel_bytes]
-        target.depth = &depth[first_row, 0] if depth is not None else NULL
-        target.stride_px = width
+        share.ids = share.others = NULL
+        share.first, share.end, share.is_first, share.is_last = 0, self.scene.n_triangles, True, True
         with nogil:
-            bad_row = K.draw(&self.scene, &window, &target)
+            bad_row = K.draw(&self.scene, &window, &rows, &share)
         return bad_row
+
+    def draw_share(self, Target target, int64_t first_row, int64_t n_rows, int64_t first, int32_t[::1] others):
+        """Clear rows of a picture and draw there the triangles from `first` on for which `others` has room, 16 numbers left.
+
+        What of them lies in other rows is listed in `others`; returns the first bad row or -1, and how many those are.
+        """
+        cdef tl_target rows = target.rows(first_row)
+        cdef tl_window window = self.window(first_row, n_rows, target.width), picture = self.window(0, target.height, target.width)
+        cdef tl_share share
+        cdef int64_t bad_row
+        share.ids, share.others, share.n_others, share.picture = NULL, &others[0], 0, &picture
+        share.first, share.end, share.is_first, share.is_last = first, first + others.shape[0] - 16, True, False
+        with nogil:
+            bad_row = K.draw(&self.scene, &window, &rows, &share)
+        return bad_row, share.n_others
+
+    def draw_listed(self, Target target, int64_t first_row, int64_t n_rows, const int32_t[::1] ids, bint is_last):
+        """Draw the triangles listed over what the rows hold."""
+        cdef tl_target rows = target.rows(first_row)
+        cdef tl_window window = self.window(first_row, n_rows, target.width)
+        cdef tl_share share
+        share.ids, share.others = &ids[0] if ids.shape[0] else NULL, NULL
+        share.first, share.end, share.is_first, share.is_last = 0, ids.shape[0], False, is_last
+        with nogil:
+            K.draw(&self.scene, &window, &rows, &share)
 
     def paint(self, const int32_t[:, ::1] labels, const uint8_t[::1] colors, uint8_t[::1] pixels, int64_t first_row, int64_t n_rows,
               bint is_flat, bint is_u8, int n_channels):

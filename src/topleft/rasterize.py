@@ -17,6 +17,7 @@ from topleft import _engine
 from topleft.arrays import as_background, as_colors, as_matrix, as_out, as_triangles, as_vertices, bad_triangle
 from topleft.fragments import Fragments
 from topleft.memory import Memory
+from topleft.methods import METHODS
 from topleft.models import DepthTest, Per, Sink, parse
 from topleft.threads import count_threads, run_parts
 from topleft.view import View
@@ -26,6 +27,9 @@ __all__ = ["draw_coverage", "draw_fill", "draw_fragments", "draw_overdraw"]
 
 #: Fewer vertices are snapped by one thread: waking another takes as long.
 MIN_VERTICES_TO_SHARE = 50_000
+
+#: Triangles times threads. With fewer, threads that each set up every triangle are done before they have met twice.
+MIN_TRIANGLES_TO_SHARE = 1_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,19 +134,65 @@ def check_used_vertices(
 
 
 def draw(
-    snapped: Snapped, view: View, sink: Sink, pixels: NDArray[Any], *, depth: NDArray[np.float32] | None = None
+    memory: Memory,
+    snapped: Snapped,
+    view: View,
+    sink: Sink,
+    pixels: NDArray[Any],
+    *,
+    depth: NDArray[np.float32] | None = None,
 ) -> None:
     """Clear contiguous buffers and draw a scene into them, in bands of rows."""
     width, height = view.size
     if 0 in view.size:
         return
-    flat, pixel_bytes = _engine.as_bytes(pixels), pixels.itemsize
+    covered: NDArray[np.uint64] | None = None
+    if sink is Sink.MASK:
+        covered = memory.empty("covered", _engine.Target.covered_shape(height, width), np.uint64)
+    target = _engine.Target(sink, pixels, depth, covered)
+    n_parts = min(height, count_threads(view.threads, snapped.n_triangles))
 
-    def draw_rows(first: int, end: int) -> None:
-        if snapped.scene.draw(sink, flat, depth, width, first, end - first, pixel_bytes) >= 0:
-            check_triangles(snapped.triangles, snapped.corners, snapped.n_vertices)
+    def draw_rows(first: int, end: int) -> int:
+        return snapped.scene.draw(target, first, end - first)
 
-    run_parts(draw_rows, height, count_threads(view.threads, snapped.n_triangles))
+    if is_shared(snapped, view, n_parts):
+        bad_rows = draw_shared(memory, snapped, target, height, n_parts)
+    else:
+        bad_rows = run_parts(draw_rows, height, n_parts)
+    if max(bad_rows) >= 0:
+        check_triangles(snapped.triangles, snapped.corners, snapped.n_vertices)
+
+
+def is_shared(snapped: Snapped, view: View, n_parts: int) -> bool:
+    """Tell whether each thread is to take a share of the triangles instead of setting up all of them."""
+    width, height = view.size
+    is_near = max(map(abs, view.origin)) < 2**29 and width * height < 2**31
+    pays = snapped.n_triangles * n_parts >= MIN_TRIANGLES_TO_SHARE
+    return n_parts > 1 and pays and is_near and view.method == METHODS["auto"].code
+
+
+def draw_shared(
+    memory: Memory, snapped: Snapped, target: _engine.Target, height: int, n_parts: int
+) -> list[int]:
+    """Draw as `draw` does: each part a share of the triangles into its own rows, then what others have found for it."""
+    scene, n = snapped.scene, snapped.n_triangles
+    rows = [height * i // n_parts for i in range(n_parts + 1)]
+    shares = [n * i // n_parts for i in range(n_parts + 1)]
+    room: NDArray[np.int32] = memory.empty("others", (n + 16 * n_parts,), np.int32)
+    others = [room[shares[i] + 16 * i : shares[i + 1] + 16 * (i + 1)] for i in range(n_parts)]
+
+    def draw_own(i: int, _: int) -> tuple[int, int]:
+        return scene.draw_share(target, rows[i], rows[i + 1] - rows[i], shares[i], others[i])
+
+    def draw_found(i: int, _: int) -> None:
+        finders = [k for k in range(n_parts) if k != i]
+        for k in finders:
+            scene.draw_listed(target, rows[i], rows[i + 1] - rows[i], others[k][: counts[k]], k == finders[-1])
+
+    bad_rows, counts = zip(*run_parts(draw_own, n_parts, n_parts), strict=True)
+    if max(bad_rows) < 0:
+        run_parts(draw_found, n_parts, n_parts)
+    return list(bad_rows)
 
 
 def paint(
@@ -153,7 +203,7 @@ def paint(
     if not (width and height and snapped.n_triangles):
         return
     labels = memory.empty("labels", (height, width), np.int32)
-    draw(snapped, view, Sink.LABEL, labels)
+    draw(memory, snapped, view, Sink.LABEL, labels)
     palette, flat = _engine.as_bytes(colors), _engine.as_bytes(pixels)
     n_channels = 1 if colors.ndim == 1 else colors.shape[1]
 
@@ -164,7 +214,7 @@ def paint(
 
 
 @contextmanager
-def target(
+def canvas_of(
     memory: Memory, name: str, out: object, shape: tuple[int, ...], dtype: type, *, keep: bool = False
 ) -> Iterator[tuple[NDArray[Any], NDArray[Any]]]:
     """Give the array to return and a contiguous one to draw into; afterwards both are the same picture.
@@ -185,8 +235,8 @@ def draw_coverage(
 ) -> NDArray[np.bool_]:
     """`coverage`, on the memory given."""
     snapped = snap_scene(memory, vertices, triangles, view, with_depth=False, out=out)
-    with target(memory, "coverage", out, view.size[::-1], np.bool_) as (result, canvas):
-        draw(snapped, view, Sink.MASK, canvas)
+    with canvas_of(memory, "coverage", out, view.size[::-1], np.bool_) as (result, canvas):
+        draw(memory, snapped, view, Sink.MASK, canvas)
     return result
 
 
@@ -195,8 +245,8 @@ def draw_overdraw(
 ) -> NDArray[np.int32]:
     """`overdraw`, on the memory given."""
     snapped = snap_scene(memory, vertices, triangles, view, with_depth=False, out=out)
-    with target(memory, "overdraw", out, view.size[::-1], np.int32) as (result, canvas):
-        draw(snapped, view, Sink.COUNT, canvas)
+    with canvas_of(memory, "overdraw", out, view.size[::-1], np.int32) as (result, canvas):
+        draw(memory, snapped, view, Sink.COUNT, canvas)
     return result
 
 
@@ -238,7 +288,7 @@ def draw_fill(
     is_flat = colors_are_flat(len(palette), snapped, per)
     shape = (*view.size[::-1], *palette.shape[1:])
     ground = as_background(background, palette)
-    with target(memory, "fill", out, shape, palette.dtype.type, keep=ground is None) as (result, canvas):
+    with canvas_of(memory, "fill", out, shape, palette.dtype.type, keep=ground is None) as (result, canvas):
         if ground is not None:
             canvas[...] = ground
         elif out is None:
@@ -269,10 +319,10 @@ def draw_fragments(
     sink = {None: Sink.PAINT, DepthTest.LESS: Sink.NEAREST, DepthTest.GREATER: Sink.FARTHEST}[test]
     shape = view.size[::-1]
     with (
-        target(memory, "triangle", ids_out, shape, np.int32) as (ids, ids_canvas),
-        target(memory, "depth", depth_out, shape, np.float32) as (depth, depth_canvas),
+        canvas_of(memory, "triangle", ids_out, shape, np.int32) as (ids, ids_canvas),
+        canvas_of(memory, "depth", depth_out, shape, np.float32) as (depth, depth_canvas),
     ):
-        draw(snapped, view, sink if snapped.has_depth else Sink.PAINT, ids_canvas, depth=depth_canvas)
+        draw(memory, snapped, view, sink if snapped.has_depth else Sink.PAINT, ids_canvas, depth=depth_canvas)
         if test is DepthTest.GREATER and not snapped.has_depth and background_depth is None:
             background_depth = -np.inf
         if background_depth is not None:

@@ -1,0 +1,165 @@
+/* Alone: one triangle by itself, of any size, range and method, through setup and a walker to the sink.
+ * In: vertex records, the pieces of cut triangles.  Out: samples to the sink. */
+#include "fixed.h"
+#include "lanes.h"
+
+#define TL_INT int64_t
+#define TL_UINT uint64_t
+#define TL_WALK(name) name##_64
+static inline void floor_divide_64(int64_t a, int64_t b, int64_t *quotient, int64_t *remainder)
+{
+    const int64_t q = a / b, r = a % b;
+    *quotient = q - (r < 0);
+    *remainder = r < 0 ? r + b : r;
+}
+#include "walk.h"
+#undef TL_INT
+#undef TL_UINT
+#undef TL_WALK
+
+#define TL_INT tl_int128
+#define TL_UINT tl_uint128
+#define TL_WALK(name) name##_128
+static inline void floor_divide_128(tl_int128 a, tl_int128 b, tl_int128 *quotient, tl_int128 *remainder)
+{
+    const tl_int128 q = a / b, r = a % b;
+    *quotient = q - (r < 0);
+    *remainder = r < 0 ? r + b : r;
+}
+#include "walk.h"
+#undef TL_INT
+#undef TL_UINT
+#undef TL_WALK
+
+/* One triangle of any size, by the ends of TL_LANES rows at a time in float64: as above, exact while |2E| < 2^51, for then
+ * |v / d| * 2^-52 < 0.5 / d. */
+TL_INLINE int rows_fit(const tl_triangle *t)
+{
+    const double width = (double)(max3(t->x_fx[0], t->x_fx[1], t->x_fx[2]) - min3(t->x_fx[0], t->x_fx[1], t->x_fx[2]));
+    const double height = (double)(max3(t->y_fx[0], t->y_fx[1], t->y_fx[2]) - min3(t->y_fx[0], t->y_fx[1], t->y_fx[2]));
+    return TL_LANES > 1 && t->is_narrow && 2.0 * width * height < 0x1p50;
+}
+
+TL_INLINE void walk_rows(const tl_triangle *t, const tl_window *window, const tl_target *shared, tl_sink sink)
+{
+    const tl_target own = *shared, *target = &own; /* a copy that no store can change */
+    const edges_64 e = setup_edges_64(t, window);
+    const vd lanes = vd_from_vi(vi_iota()), one = vd_set1(1.0), zero = vd_set1(0.0), width = vd_set1((double)(t->col1 - t->col0));
+    const double step = (double)((int64_t)2 << window->subpixel_bits), x0 = sample_x(t, window, t->col0);
+    const vd xs = vd_add(vd_set1(x0), ramp(step)), slope_x = vd_set1(t->slope_x);
+    int32_t first[TL_MAX_LANES], end[TL_MAX_LANES];
+    double z_row[TL_MAX_LANES];
+    for (int64_t row0 = t->row0; row0 < t->row1; row0 += TL_LANES) {
+        const vd rows = vd_add(vd_set1((double)(row0 - t->row0)), lanes);
+        vd begins = zero, ends = width;
+        for (int k = 0; k < 3; k++) {
+            if (e.dy[k] == 0)
+                continue;
+            const vd v = vd_add(vd_set1((double)e.value[k] + 0.5), vd_mul(vd_set1((double)e.dx[k]), rows));
+            const vd quotient = vd_floor(vd_mul(v, vd_set1(1.0 / fabs((double)e.dy[k]))));
+            if (e.dy[k] < 0)
+                begins = vd_max(begins, vd_sub(zero, quotient));
+            else
+                ends = vd_min(ends, vd_add(quotient, one));
+        }
+        vi_store(first, vi_round(vd_min(begins, width)));
+        vi_store(end, vi_round(vd_max(ends, zero)));
+        if (sink_has_depth(sink)) {
+            const vd ys = vd_add(vd_set1(sample_y(t, window, row0)), ramp(step));
+            vd_store(z_row, vd_add(vd_set1(t->z[0]), vd_mul(vd_set1(t->slope_y), ys)));
+        }
+        const int n = t->row1 - row0 < TL_LANES ? (int)(t->row1 - row0) : TL_LANES;
+        for (int k = 0; k < n; k++) {
+            const int64_t at = (row0 + k) * target->stride_px + t->col0;
+            if (!sink_has_depth(sink)) {
+                if (first[k] < end[k])
+                    put_plain(target, sink, at + first[k], end[k] - first[k], t->id);
+                continue;
+            }
+            const vd z = vd_set1(z_row[k]);
+            for (int32_t col = first[k]; col < end[k]; col += TL_LANES) {
+                const vd x = vd_add(xs, vd_set1(col * step));
+                put_depths(target, sink, at + col, vm_first(end[k] - col), sum_depth(z, vd_mul(slope_x, x)), vi_set1(t->id));
+            }
+        }
+    }
+}
+
+/* A box at most this wide is walked sample by sample, a wider one by its row ends. */
+#define TL_EDGE_MAX_WIDTH 6
+
+/* One triangle by itself: any range, any method. */
+TL_INLINE void draw_triangle(const tl_vertex_set *set, const int32_t *corners, int32_t id, const tl_scene *scene,
+                             const tl_window *window, const tl_target *target, tl_sink sink)
+{
+    tl_triangle t;
+    const int sign = load_triangle(set, corners, &t);
+    if (sign == 0 || (sign > 0 && scene->cull == TL_CULL_BACK) || (sign < 0 && scene->cull == TL_CULL_FRONT))
+        return;
+    if (!clip_box(&t, window))
+        return;
+    t.id = id;
+    setup_sink(&t, window, sink);
+    const int is_auto = scene->method == TL_METHOD_AUTO;
+    const int by_edge = scene->method == TL_METHOD_EDGE || (is_auto && t.col1 - t.col0 <= TL_EDGE_MAX_WIDTH);
+    if (is_auto && rows_fit(&t) && (!sink_has_depth(sink) || t.has_plane))
+        walk_rows(&t, window, target, sink);
+    else if (t.is_narrow && by_edge)
+        walk_edge_64(&t, window, target, sink);
+    else if (t.is_narrow)
+        walk_scanline_64(&t, window, target, sink);
+    else if (by_edge)
+        walk_edge_128(&t, window, target, sink);
+    else
+        walk_scanline_128(&t, window, target, sink);
+}
+
+static inline int is_clipped(const tl_vertex_set *set, const int32_t *corners)
+{
+    int clipped = 0;
+    for (int k = 0; k < 3; k++)
+        clipped |= set->vertices[corners[k]].x_fx == TL_SPECIAL && set->vertices[corners[k]].y_fx == TL_CLIPPED;
+    return clipped;
+}
+
+static tl_vertex_set piece_set(const tl_pieces *p)
+{
+    return (tl_vertex_set){p->vertices, p->wide, p->inv_w, NULL, p->n_vertices};
+}
+
+/* First piece of a triangle, by bisection in the ascending sources. */
+static int64_t first_piece(const tl_pieces *p, int64_t id)
+{
+    int64_t low = 0, high = p->n_pieces;
+    while (low < high) {
+        const int64_t middle = low + (high - low) / 2;
+        if (p->source[middle] < id)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low;
+}
+
+/* Triangle i, or its pieces, by itself. */
+TL_INLINE void draw_alone(const tl_scene *scene, int64_t i, const tl_window *window, const tl_target *target, tl_sink sink)
+{
+    const int32_t *corners = scene->triangles + 3 * i;
+    const tl_pieces *pieces = scene->pieces;
+    tl_vertex_set set = scene->mesh;
+    int64_t piece = 0, end = 1;
+    if (is_clipped(&set, corners)) {
+        if (!pieces)
+            return;
+        set = piece_set(pieces);
+        piece = first_piece(pieces, i);
+        for (end = piece; end < pieces->n_pieces && pieces->source[end] == i;)
+            end++;
+        corners = pieces->triangles + 3 * piece;
+    }
+    for (; piece < end; piece++, corners += 3)
+        draw_triangle(&set, corners, (int32_t)i, scene, window, target, sink);
+}
+
+TL_SINK_COPIES(draw_alone, (const tl_scene *scene, int64_t i, const tl_window *window, const tl_target *target), scene, i, window,
+               target)
