@@ -1,5 +1,6 @@
 """What the engine must draw, and whether it does: on one instruction set and another, with any number of threads."""
 
+import sys
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
@@ -65,12 +66,20 @@ def cases(make, *arguments):
     return [(scene, expect(scene, tests)) for scene, tests in make(*arguments)]
 
 
+@contextmanager
+def sharing(is_shared):
+    """Threads share the triangles of any scene, or set up all of them in each."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys.modules["topleft.rasterize"], "MIN_TRIANGLES_TO_SHARE", 0 if is_shared else 2**62)
+        yield
+
+
 def check(isa, scene, expected, threads=(1,)):
-    """Every sink gives the expected picture."""
+    """Every sink gives the expected picture; three threads and more share the triangles."""
     labels = np.arange(len(scene.triangles), dtype=np.float32)
     for n in threads:
         view = scene.view | {"threads": n}
-        with on(isa):
+        with on(isa), sharing(n > 2):
             assert_same(tl.overdraw(*scene.arrays, **view), expected.counts)
             assert_same(tl.coverage(*scene.arrays, **view), expected.counts > 0)
             for test, ids in expected.ids.items():

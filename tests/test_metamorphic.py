@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from comparing import assert_same, assert_same_buffers, buffers
+from engine_cases import sharing
 from hypothesis import given
 from strategies import (
     CLIP_SCENES,
@@ -152,8 +153,9 @@ def test_edge_and_scanline_give_every_buffer_alike(make):
 def test_threads_give_every_buffer_alike(make):
     for scene, _ in scenes_of(make, 3):
         expected = buffers(scene, threads=1)
-        for threads in (2, 3, 8):
-            assert_same_buffers(buffers(scene, threads=threads), expected)
+        for threads, is_shared in ((2, False), (2, True), (3, True), (8, False), (8, True)):
+            with sharing(is_shared):
+                assert_same_buffers(buffers(scene, threads=threads), expected)
 
 
 @MAKERS
