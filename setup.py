@@ -1,7 +1,8 @@
-"""Build `topleft._engine`: one Cython unit, one dispatcher and one kernel unit per instruction set.
+"""Build `topleft._engine`: one Cython unit, one dispatcher and one kernel unit per instruction set; and the classics in
+`topleft.methods`: one Cython unit each, for the compiler's default instruction set.
 
 Everything that is not about compiling stands in `pyproject.toml`. setuptools gives all sources of an extension the same
-flags, so `BuildEngine` compiles each unit by itself and links the objects.
+flags, so `BuildTopleft` compiles each unit by itself and links the objects.
 
 Environment:
 
@@ -16,12 +17,14 @@ import tempfile
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
+from threading import Lock
 
 from setuptools import Extension, setup
 from setuptools.command.build_ext import build_ext
 from setuptools.errors import CompileError, PlatformError
 
 ROOT = Path(__file__).resolve().parent
+ENGINE = "topleft._engine"
 
 WARNINGS = ["-Wall", "-Wextra"]
 # -ffp-contract=off and -fno-fast-math stand after whatever CFLAGS holds: the same bits on every machine depend on them.
@@ -34,6 +37,8 @@ FLAGS_CYTHON = [
     "-O2", "-fvisibility=hidden", "-fno-lto",
     "-Wno-unused-function", "-Wno-unused-parameter", "-Wno-missing-field-initializers", "-Wno-cast-function-type",
 ]  # fmt: skip
+# The classics do their arithmetic in Cython.
+FLAGS_CLASSIC = [*FLAGS_CYTHON, "-O3", "-ffp-contract=off", "-fno-fast-math", "-fno-math-errno"]
 FLAGS_AVX2 = ["-mavx2", "-mfma", "-mbmi", "-mbmi2", "-mlzcnt", "-mpopcnt"]
 FLAGS_AVX512 = [
     *FLAGS_AVX2,
@@ -115,8 +120,14 @@ def make_once(target: Path, key: str, make) -> None:
     stamp.write_text(key)
 
 
-class BuildEngine(build_ext):
+class BuildTopleft(build_ext):
     """Compile each unit with its own flags, rebuild what changed, link."""
+
+    cython_lock = Lock()  # Cython's compiler is not made for threads
+
+    def finalize_options(self) -> None:
+        super().finalize_options()
+        self.parallel = self.parallel or os.cpu_count()
 
     def build_extension(self, ext: Extension) -> None:
         if self.compiler.compiler_type == "msvc":
@@ -131,17 +142,7 @@ class BuildEngine(build_ext):
         self.identity = (compiler, version, self.include_dirs)
 
         warnings = [*WARNINGS, *(["-Werror"] if os.environ.get("TOPLEFT_WERROR") == "1" else [])]
-        isas = self.isas_to_build()
-        flags = {isa.name: FLAGS_C + isa.flags for isa in isas}
-        macros = [("TL_VERSION", quoted(self.distribution.get_version()))]
-        for name, unit_flags in flags.items():
-            # Paths say where a machine keeps things, not how the code was compiled.
-            told = [flag for flag in [*compiler[1:], *unit_flags] if "/" not in flag]
-            macros += [(f"TL_HAVE_{name.upper()}", "1"), (f"TL_FLAGS_{name.upper()}", quoted(" ".join(told)))]
-
-        units = [(ROOT / f"csrc/isa_{name}.c", unit_flags, []) for name, unit_flags in flags.items()]
-        units.append((ROOT / "csrc/dispatch.c", FLAGS_C, macros))
-        units.append((self.cython(ROOT / ext.sources[0]), FLAGS_CYTHON, []))
+        units = self.engine_units(ext) if ext.name == ENGINE else [(self.cython(ext), FLAGS_CLASSIC, [])]
         with ThreadPoolExecutor(self.parallel or os.cpu_count()) as pool:
             jobs = [pool.submit(self.compile_unit, source, [*warnings, *own], define) for source, own, define in units]
             objects = [str(job.result()) for job in jobs]
@@ -156,6 +157,20 @@ class BuildEngine(build_ext):
             build_temp=str(self.temp),
             target_lang="c",
         )
+
+    def engine_units(self, ext: Extension) -> list[tuple[Path, list[str], list[tuple[str, str]]]]:
+        """Return the units of the engine: source, flags, macros."""
+        isas = self.isas_to_build()
+        flags = {isa.name: FLAGS_C + isa.flags for isa in isas}
+        macros = [("TL_VERSION", quoted(self.distribution.get_version()))]
+        for name, unit_flags in flags.items():
+            # Paths say where a machine keeps things, not how the code was compiled.
+            told = [flag for flag in [*self.compiler.compiler_so[1:], *unit_flags] if "/" not in flag]
+            macros += [(f"TL_HAVE_{name.upper()}", "1"), (f"TL_FLAGS_{name.upper()}", quoted(" ".join(told)))]
+
+        units = [(ROOT / f"csrc/isa_{name}.c", unit_flags, []) for name, unit_flags in flags.items()]
+        units.append((ROOT / "csrc/dispatch.c", FLAGS_C, macros))
+        return [*units, (self.cython(ext), FLAGS_CYTHON, [])]
 
     def isas_to_build(self) -> list[Isa]:
         """Return the kernel units to build: those asked for, or all that the compiler can build."""
@@ -182,22 +197,25 @@ class BuildEngine(build_ext):
             command = [*self.compiler.compiler_so, *flags, "-c", str(source), "-o", str(source.with_suffix(".o"))]
             return subprocess.run(command, capture_output=True, check=False).returncode == 0
 
-    def cython(self, source: Path) -> Path:
-        """Return the C file made from a .pyx file, in the build folder: the source tree stays as it is."""
+    def cython(self, ext: Extension) -> Path:
+        """Return the C file made from the .pyx file, in the build folder: the source tree stays as it is."""
         import Cython
         from Cython.Compiler.Main import CompilationOptions, compile_single
 
+        source = ROOT / ext.sources[0]
         target = self.temp / (source.stem + ".c")
 
         def make() -> None:
             with tempfile.TemporaryDirectory(dir=self.temp) as folder:
                 made = Path(folder, target.name)
                 options = CompilationOptions(output_file=str(made), language_level=3)
-                if compile_single(str(source), options, "topleft." + source.stem).num_errors:
+                if compile_single(str(source), options, ext.name).num_errors:
                     raise CompileError(f"Cython found errors in {source.relative_to(ROOT)}")
                 os.replace(made, target)
 
-        make_once(target, digest(Cython.__version__, *files_in("src/topleft", ".pyx", ".pxd", ".pxi")), make)
+        included = files_in(str(source.parent.relative_to(ROOT)), ".pxd", ".pxi")
+        with self.cython_lock:
+            make_once(target, digest(Cython.__version__, source, *included), make)
         return target
 
     def compile_unit(self, source: Path, flags: list[str], macros: list[tuple[str, str]]) -> Path:
@@ -226,4 +244,11 @@ def quoted(text: str) -> str:
     return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
 
 
-setup(ext_modules=[Extension("topleft._engine", ["src/topleft/_engine.pyx"])], cmdclass={"build_ext": BuildEngine})
+def extensions() -> list[Extension]:
+    """Return the engine, and an extension for each kernel in `methods`."""
+    kernels = [path.relative_to(ROOT).as_posix() for path in files_in("src/topleft/methods", ".pyx")]
+    classics = [Extension(path.removeprefix("src/").removesuffix(".pyx").replace("/", "."), [path]) for path in kernels]
+    return [Extension(ENGINE, ["src/topleft/_engine.pyx"]), *classics]
+
+
+setup(ext_modules=extensions(), cmdclass={"build_ext": BuildTopleft})

@@ -4,6 +4,7 @@ from topleft import scenes
 from topleft._isa import build_info
 from topleft.api import Rasterizer, coverage, fill, overdraw, rasterize
 from topleft.camera import Camera
+from topleft.classic import bresenham_line
 from topleft.errors import MeshError, TopleftError
 from topleft.files import load, save_image
 from topleft.fragments import Fragments
@@ -22,6 +23,7 @@ __all__ = [
     "Rasterizer",
     "TopleftError",
     "__version__",
+    "bresenham_line",
     "build_info",
     "coverage",
     "fill",

@@ -46,7 +46,8 @@ def coverage(
         viewport : (int, int). Width and height of the whole picture for clip space; default `size`.
         subpixel_bits : int, 0 to 16. Vertices snap to ``2**-subpixel_bits`` pixels; default 8.
         sampling : "center".
-        method : "auto", "edge" or "scanline": the same picture.
+        method : "auto", "edge" or "scanline": the same picture. Or a classic of the literature, to compare with:
+            `topleft.methods.CLASSICS` names them, and docs/methods.md tells where each of them fails.
         cull : "none", "back" or "front"; the front is counter-clockwise seen with y up.
         clip_depth : "minus_one_to_one" (OpenGL) or "zero_to_one" (Direct3D, Vulkan).
         near_clip, far_clip : bool. Whether that plane cuts.

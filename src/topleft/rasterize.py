@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine
 from topleft.arrays import as_background, as_colors, as_matrix, as_out, as_triangles, as_vertices, bad_triangle
+from topleft.classic import draw_classic, fill_classic, refuse_classic
 from topleft.fragments import Fragments
 from topleft.memory import Memory
 from topleft.methods import METHODS
@@ -234,6 +235,8 @@ def draw_coverage(
     memory: Memory, vertices: ArrayLike, triangles: ArrayLike, view: View, out: object
 ) -> NDArray[np.bool_]:
     """`coverage`, on the memory given."""
+    if view.classic:
+        return draw_classic(view.classic, memory, vertices, triangles, view, Sink.MASK, out)
     snapped = snap_scene(memory, vertices, triangles, view, with_depth=False, out=out)
     with canvas_of(memory, "coverage", out, view.size[::-1], np.bool_) as (result, canvas):
         draw(memory, snapped, view, Sink.MASK, canvas)
@@ -244,6 +247,8 @@ def draw_overdraw(
     memory: Memory, vertices: ArrayLike, triangles: ArrayLike, view: View, out: object
 ) -> NDArray[np.int32]:
     """`overdraw`, on the memory given."""
+    if view.classic:
+        return draw_classic(view.classic, memory, vertices, triangles, view, Sink.COUNT, out)
     snapped = snap_scene(memory, vertices, triangles, view, with_depth=False, out=out)
     with canvas_of(memory, "overdraw", out, view.size[::-1], np.int32) as (result, canvas):
         draw(memory, snapped, view, Sink.COUNT, canvas)
@@ -284,6 +289,8 @@ def draw_fill(
 ) -> NDArray[Any]:
     """`fill`, on the memory given."""
     palette = as_colors(colors)
+    if view.classic:
+        return fill_classic(view.classic, memory, vertices, triangles, palette, view, per, background, out)
     snapped = snap_scene(memory, vertices, triangles, view, with_depth=False, out=out)
     is_flat = colors_are_flat(len(palette), snapped, per)
     shape = (*view.size[::-1], *palette.shape[1:])
@@ -307,6 +314,7 @@ def draw_fragments(
     out: object,
 ) -> Fragments:
     """`rasterize`, on the memory given."""
+    refuse_classic(view, "depth")
     test = None if depth_test is None else parse(DepthTest, "depth_test", depth_test)
     if out is None:
         ids_out = depth_out = None

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from topleft import _engine
 from topleft.arrays import as_size, as_subpixel_bits, as_window
-from topleft.methods import production_method
+from topleft.methods import Method, find_method
 from topleft.models import ClipDepth, Cull, Sampling, parse
 from topleft.threads import parse_threads
 
@@ -49,6 +49,7 @@ class View:
     near_clip: bool
     far_clip: bool
     threads: int | None
+    classic: Method | None = None
 
     def engine_view(self) -> _engine.View:
         """Return how clip space maps to pixels."""
@@ -64,17 +65,19 @@ class View:
         bits = as_subpixel_bits(options.get("subpixel_bits", 8))
         viewport = options.get("viewport")
         parse(Sampling, "sampling", options.get("sampling", "center"))
+        method = find_method(options.get("method", "auto"))
         return cls(
             size=checked_size,
             origin=as_window(options.get("origin", (0, 0)), bits),
             viewport=checked_size if viewport is None else as_size(viewport, "viewport", smallest=1),
             transform=options.get("transform"),
             subpixel_bits=bits,
-            method=production_method(options.get("method", "auto")),
+            method=method.code or 0,
             cull=CULL_CODES[parse(Cull, "cull", options.get("cull", "none"))],
             zero_to_one=parse(ClipDepth, "clip_depth", options.get("clip_depth", "minus_one_to_one"))
             is ClipDepth.ZERO_TO_ONE,
             near_clip=bool(options.get("near_clip", True)),
             far_clip=bool(options.get("far_clip", True)),
             threads=parse_threads(options.get("threads")),
+            classic=method if method.code is None else None,
         )

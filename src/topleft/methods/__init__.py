@@ -1,10 +1,66 @@
-"""The registry: the only list of the ways to fill that the library has."""
+"""The registry: the only list of the ways to fill that the library has, and what each of them claims.
+
+`METHODS` are the production ones: exact, identical buffers. `CLASSICS` are those of the literature, as published, to be
+compared; a variant's name stands after a slash. Their kernels are imported when they are first asked for.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from importlib import import_module
+from typing import Protocol, cast
 
-__all__ = ["METHODS", "Method", "production_method"]
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["CLASSICS", "METHODS", "Claims", "Kernel", "Method", "find_method", "load_kernel", "production_method"]
+
+
+class Kernel(Protocol):
+    """Draws triangles in order over a cleared window of the picture."""
+
+    def __call__(
+        self,
+        vertices: NDArray[np.float64],
+        triangles: NDArray[np.int32],
+        pixels: NDArray[np.uint8],
+        window: tuple[int, int, int, int],
+        sink: int,
+        variant: str = "",
+        subpixel_bits: int = 8,
+    ) -> None:
+        """Take pixel-space vertices, indices, the bytes of the buffer, (x, y, width, height) and a `Sink`."""
+
+
+@dataclass(frozen=True, slots=True)
+class Claims:
+    """What a method promises; `tests/test_claims.py` proves each answer, the "no" as well as the "yes".
+
+    Attributes
+    ----------
+    exact : bool
+        Every sample is decided without rounding under the method's own fill rule, for the vertices that it works on.
+    watertight : bool
+        Triangles that share edges leave no sample between them out.
+    top_left : bool
+        A sample on an edge is drawn when the edge is top or left, and not otherwise.
+    sub_pixel : bool
+        A shift of less than a pixel can change the picture.
+    integer_vertices : bool
+        Vertices are truncated to whole pixels first, and a pixel is sampled where its vertex would be.
+    overdraws_shared_edges : bool
+        Some sample of a mesh is drawn more than once.
+    winding : str
+        Which triangles are drawn: "either", "clockwise" or "counter-clockwise", as seen on the screen.
+    """
+
+    exact: bool = False
+    watertight: bool = False
+    top_left: bool = False
+    sub_pixel: bool = False
+    integer_vertices: bool = False
+    overdraws_shared_edges: bool = False
+    winding: str = "either"
 
 
 @dataclass(frozen=True, slots=True)
@@ -14,50 +70,226 @@ class Method:
     Attributes
     ----------
     name : str
-        What ``method=`` calls it.
+        What ``method=`` calls it; of a classic, the kernel's module and, after a slash, the variant.
     summary : str
         How it finds the covered samples.
     source : str
         Author, title, year.
-    code : int
-        `tl_method` in ``csrc/topleft.h``.
+    claims : Claims
+    code : int or None
+        `tl_method` in ``csrc/topleft.h``; None for a classic.
+    limit : float
+        A classic takes ``|x|`` and ``|y|`` below it: pixels, or sub-pixels when `has_subpixel_bits`.
+    has_subpixel_bits : bool
+        Whether ``subpixel_bits`` means anything to a classic.
     """
 
     name: str
     summary: str
     source: str
-    code: int
+    claims: Claims
+    code: int | None = None
+    limit: float = np.inf
+    has_subpixel_bits: bool = False
 
+
+EXACT = Claims(exact=True, watertight=True, top_left=True, sub_pixel=True)
 
 METHODS = {
     method.name: method
     for method in (
-        Method("auto", "the cheaper of edge and scanline for each triangle", "", 0),
+        Method("auto", "the cheaper of edge and scanline for each triangle", "", EXACT, 0),
         Method(
             "edge",
             "integer edge functions, stepped by additions, one test a sample",
             "J. Pineda, A Parallel Algorithm for Polygon Rasterization, 1988",
+            EXACT,
             1,
         ),
         Method(
             "scanline",
             "row ends by one floor division an edge, then stepped quotient and remainder",
             "J. E. Bresenham, Algorithm for computer control of a digital plotter, 1965",
+            EXACT,
             2,
         ),
     )
 }
 
+PINEDA = METHODS["edge"].source
+GIESEN = "F. Giesen, Optimizing the basic rasterizer, 2013"
+TUTORIAL_2 = "xterminal86, Software 3D renderer tutorial, part 2: Triangle, 2023"
+TUTORIAL_3 = "xterminal86, Software 3D renderer tutorial, part 3: Scanline is a lie, 2023"
+SOKOLOV = "D. Sokolov, tinyrenderer, lesson 2: Triangle rasterization and back face culling, 2015"
+WYLIE = "C. Wylie, G. Romney, D. Evans, A. Erdahl, Half-tone perspective drawings by computer, 1967"
+FENG = "Y. Feng, face3d, 2018"
 
-def production_method(name: object) -> int:
-    """Return the code of an exact method.
+#: Integer products of differences stay below 2**61; the published codes have 32 bits, which end at 2**14.
+INT_LIMIT = 2.0**29
+#: A Bresenham line is walked from its top, so this bounds the time that one triangle can take.
+WALK_LIMIT = 2.0**21
+
+CLASSICS = {
+    method.name: method
+    for method in (
+        Method(
+            "point_in_triangle",
+            "three cross products for every pixel of the bounding box, edges included",
+            TUTORIAL_3,
+            Claims(exact=True, watertight=True, integer_vertices=True, overdraws_shared_edges=True),
+            limit=INT_LIMIT,
+        ),
+        Method(
+            "point_in_triangle/top-left",
+            "the same, one unit off the edges that are neither top nor left",
+            TUTORIAL_3,
+            Claims(exact=True, watertight=True, top_left=True, integer_vertices=True),
+            limit=INT_LIMIT,
+        ),
+        Method(
+            "edge_increment",
+            "integer edge functions of sub-pixel vertices, stepped by additions",
+            GIESEN,
+            EXACT,
+            limit=INT_LIMIT,
+            has_subpixel_bits=True,
+        ),
+        Method(
+            "edge_increment/integer",
+            "the same for vertices on whole pixels",
+            GIESEN,
+            Claims(exact=True, watertight=True, top_left=True, integer_vertices=True),
+            limit=INT_LIMIT,
+        ),
+        Method(
+            "edge_increment/bottom-right",
+            "the same with top and left edges left out",
+            "K. Dyrkorn, A fast and precise triangle rasterizer, 2022",
+            Claims(exact=True, watertight=True, sub_pixel=True),
+            limit=INT_LIMIT,
+            has_subpixel_bits=True,
+        ),
+        Method(
+            "zigzag",
+            "stepped edge functions, turning round at the triangle's sides",
+            PINEDA,
+            EXACT,
+            limit=INT_LIMIT,
+            has_subpixel_bits=True,
+        ),
+        Method(
+            "bresenham_scanline",
+            "two Bresenham lines from the top down, outermost pixels, spans with both ends",
+            TUTORIAL_2,
+            Claims(integer_vertices=True, overdraws_shared_edges=True),
+            limit=WALK_LIMIT,
+        ),
+        Method(
+            "bresenham_scanline/top-left",
+            "the same with the first pixel of each run, without right ends and last rows",
+            TUTORIAL_2,
+            Claims(integer_vertices=True, overdraws_shared_edges=True),
+            limit=WALK_LIMIT,
+        ),
+        Method(
+            "bresenham_scanline/wireframe",
+            "the outlines of the flat triangles that the fill is made of",
+            TUTORIAL_2,
+            Claims(integer_vertices=True, overdraws_shared_edges=True),
+            limit=WALK_LIMIT,
+        ),
+        Method(
+            "lerp_scanline",
+            "the long and a short edge interpolated in float32 a row, truncated, spans with both ends",
+            SOKOLOV,
+            Claims(watertight=True, integer_vertices=True, overdraws_shared_edges=True),
+            limit=INT_LIMIT,
+        ),
+        Method(
+            "lerp_scanline/plus-one",
+            "the same with one more in the heights of the short edges, and the last row",
+            SOKOLOV,
+            Claims(integer_vertices=True, overdraws_shared_edges=True),
+            limit=INT_LIMIT,
+        ),
+        Method(
+            "row_crossing",
+            "each row asks the three edges for their crossing in float32, rounded; least to greatest",
+            WYLIE,
+            Claims(watertight=True, integer_vertices=True, overdraws_shared_edges=True),
+            limit=INT_LIMIT,
+        ),
+        Method(
+            "row_crossing/zero-area-test",
+            "the same without triangles that have no area",
+            WYLIE,
+            Claims(watertight=True, integer_vertices=True, overdraws_shared_edges=True),
+            limit=INT_LIMIT,
+        ),
+        Method(
+            "row_crossing/cull-back",
+            "the same without area or back faces",
+            WYLIE,
+            Claims(
+                watertight=True, integer_vertices=True, overdraws_shared_edges=True, winding="counter-clockwise"
+            ),
+            limit=INT_LIMIT,
+        ),
+        Method(
+            "row_crossing/cull-front",
+            "the same without area or front faces",
+            WYLIE,
+            Claims(watertight=True, integer_vertices=True, overdraws_shared_edges=True, winding="clockwise"),
+            limit=INT_LIMIT,
+        ),
+        Method(
+            "float_barycentric",
+            "three float32 weights for every pixel centre of the bounding box, edges included",
+            FENG,
+            Claims(sub_pixel=True, overdraws_shared_edges=True),
+        ),
+        Method(
+            "float_barycentric/float64",
+            "the same in float64",
+            FENG,
+            Claims(sub_pixel=True, overdraws_shared_edges=True),
+        ),
+    )
+}
+
+
+def find_method(name: object) -> Method:
+    """Return a method by its name.
 
     Raises
     ------
     ValueError
         If there is no such method.
     """
-    method = METHODS.get(name) if isinstance(name, str) else None
+    method = {**METHODS, **CLASSICS}.get(name) if isinstance(name, str) else None
     if method is None:
-        raise ValueError(f"method must be one of {', '.join(map(repr, METHODS))}, got {name!r}")
-    return method.code
+        raise ValueError(
+            f"method must be one of {', '.join(map(repr, METHODS))}, got {name!r}; "
+            f"methods to compare with are {', '.join(map(repr, CLASSICS))}"
+        )
+    return method
+
+
+def production_method(name: object) -> int:
+    """Return the code of an exact method of the engine.
+
+    Raises
+    ------
+    ValueError
+        If there is no such method, or it is a classic.
+    """
+    code = find_method(name).code
+    if code is None:
+        raise ValueError(f"method must be one of {', '.join(map(repr, METHODS))} here, got {name!r}")
+    return code
+
+
+def load_kernel(method: Method) -> tuple[Kernel, str]:
+    """Return the kernel of a classic and the name of its variant ("" for the first form)."""
+    module, _, variant = method.name.partition("/")
+    return cast(Kernel, import_module(f"{__name__}.{module}").draw), variant

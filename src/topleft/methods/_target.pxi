@@ -1,0 +1,89 @@
+# What the classics share: one way in, one way out. Included by each kernel, which defines FORMS and
+# fill_triangle(target, a, b, c, form, subpixel_bits).
+#
+# In: pixel-space vertices, finite and within the method's limit; indices inside them. Out: a window of the picture.
+# `plot` and `fill_span` clamp to the window; `put` is for loops that are clamped already. Nothing else writes.
+
+from libc.math cimport floor
+from libc.stdint cimport int32_t, int64_t, uint8_t
+
+cdef enum:  # Sink in models.py
+    MASK = 0
+    COUNT = 1
+    LABEL = 2
+
+cdef struct target:
+    void *pixels  # uint8 for MASK, int32 otherwise
+    int sink
+    int32_t label  # of the triangle being drawn
+    int64_t x0, y0, x1, y1  # window of the whole picture, pixels, half-open
+
+
+cdef inline void put(target *t, int64_t x, int64_t y) noexcept nogil:
+    """Draw one pixel of the window."""
+    cdef int64_t i = (y - t.y0) * (t.x1 - t.x0) + x - t.x0
+    if t.sink == MASK:
+        (<uint8_t *>t.pixels)[i] = 1
+    elif t.sink == COUNT:
+        (<int32_t *>t.pixels)[i] += 1
+    else:
+        (<int32_t *>t.pixels)[i] = t.label
+
+
+cdef inline void plot(target *t, int64_t x, int64_t y) noexcept nogil:
+    """Draw one pixel, if it lies in the window."""
+    if t.x0 <= x < t.x1 and t.y0 <= y < t.y1:
+        put(t, x, y)
+
+
+cdef inline void fill_span(target *t, int64_t y, int64_t first, int64_t last) noexcept nogil:
+    """Draw the pixels first to last of a row, both of them included."""
+    cdef int64_t i, row
+    if y < t.y0 or y >= t.y1:
+        return
+    row = (y - t.y0) * (t.x1 - t.x0)
+    first, last = row + max(first, t.x0) - t.x0, row + min(last, t.x1 - 1) - t.x0
+    if t.sink == MASK:
+        for i in range(first, last + 1):
+            (<uint8_t *>t.pixels)[i] = 1
+    elif t.sink == COUNT:
+        for i in range(first, last + 1):
+            (<int32_t *>t.pixels)[i] += 1
+    else:
+        for i in range(first, last + 1):
+            (<int32_t *>t.pixels)[i] = t.label
+
+
+cdef inline int64_t pixel_floor(double value, int64_t smallest, int64_t largest) noexcept nogil:
+    """Return the floor of a finite or infinite value, clamped before it becomes an integer."""
+    if value <= <double>smallest:
+        return smallest
+    return largest if value >= <double>largest else <int64_t>floor(value)
+
+
+def draw(
+    const double[:, ::1] vertices,
+    const int32_t[:, ::1] triangles,
+    uint8_t[::1] pixels,
+    tuple window,
+    int sink,
+    str variant="",
+    int subpixel_bits=8,
+):
+    """Draw triangles in order over a cleared window (x, y, width, height) of the picture."""
+    cdef int form = FORMS.index(variant)
+    cdef int64_t i
+    cdef target t
+    t.x0, t.y0 = window[:2]
+    t.x1, t.y1 = t.x0 + window[2], t.y0 + window[3]
+    t.sink = sink
+    if pixels.shape[0] == 0:
+        return
+    t.pixels = &pixels[0]
+    with nogil:
+        for i in range(triangles.shape[0]):
+            t.label = <int32_t>i
+            fill_triangle(
+                &t, &vertices[triangles[i, 0], 0], &vertices[triangles[i, 1], 0], &vertices[triangles[i, 2], 0],
+                form, subpixel_bits,
+            )
