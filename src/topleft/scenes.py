@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from functools import partial
 from types import MappingProxyType
 from typing import Any
 
@@ -89,6 +90,62 @@ def planar_mesh(n_points: int, width: int = 1920, height: int = 1080, seed: int 
     inner = rng.uniform([-1, -1], [width + 1, height + 1], (n_points, 2))
     vertices = np.concatenate([corners, inner])
     return vertices, Delaunay(vertices).simplices.astype(np.int32)
+
+
+TUTORIAL_SIZE = (640, 400)
+"""Width and height of the frame that the tutorial scenes are made for."""
+
+_TUTORIAL_TRIANGLES = {
+    "wide": [(10, 190), (630, 180), (300, 240)],
+    "tall": [(310, 10), (330, 390), (280, 210)],
+    "vertical-edge": [(200, 50), (200, 350), (450, 180)],
+    "horizontal-edge": [(100, 80), (540, 80), (350, 340)],
+    "right-angled": [(100, 50), (100, 350), (500, 350)],
+    "coincident-vertices": [(120, 100), (120, 100), (480, 300)],
+    "single-point": [(320, 200), (320, 200), (320, 200)],
+    "horizontal-sliver": [(20, 200), (620, 201), (300, 201)],
+    "vertical-sliver": [(320, 20), (321, 380), (321, 200)],
+    "horizontal-line": [(20, 200), (620, 200), (300, 200)],
+    "vertical-line": [(320, 20), (320, 380), (320, 150)],
+}
+
+
+def _tutorial_triangle(corners: list[tuple[int, int]]) -> Shape:
+    return np.array(corners, dtype=float), np.array([[0, 1, 2]], dtype=np.int32)
+
+
+def two_triangles() -> Shape:
+    """The upper left and the lower right half of a square: they share the edge from (100, 50) to (50, 100)."""
+    return np.array([[50.0, 50], [100, 50], [50, 100], [100, 100]]), np.array([[0, 1, 2], [1, 2, 3]], dtype=np.int32)
+
+
+def square_of_four() -> Shape:
+    """The same square as four triangles round its centre (75, 75)."""
+    vertices = np.array([[50.0, 50], [100, 50], [100, 100], [50, 100], [75, 75]])
+    return vertices, np.array([[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]], dtype=np.int32)
+
+
+def tight_fan(n: int = 16, *, sideways: bool = False) -> Shape:
+    """A fan of `n` triangles from (50, 50), downwards or to the right: 100 pixels long, 3 wide at the far end."""
+    rim = np.stack([50.0 + 3 * np.arange(n + 1), np.full(n + 1, 150.0)], axis=-1)
+    vertices = np.concatenate([[[50.0, 50.0]], rim[:, ::-1] if sideways else rim])
+    i = np.arange(1, n + 1, dtype=np.int32)
+    return vertices, np.stack([0 * i, i, i + 1], axis=-1)
+
+
+TUTORIAL_SCENES: Mapping[str, Callable[[], Shape]] = MappingProxyType(
+    {name: partial(_tutorial_triangle, corners) for name, corners in _TUTORIAL_TRIANGLES.items()}
+    | {
+        "two-triangles": two_triangles,
+        "square-of-four": square_of_four,
+        "tight-fan": tight_fan,
+        "tight-fan-sideways": partial(tight_fan, sideways=True),
+    }
+)
+"""What tutorials test their triangles with, by name: functions that return vertices, on whole pixels, and triangles.
+
+`docs/methods.md` has what each method makes of them, in pixels.
+"""
 
 
 # From object space to pixels
