@@ -34,10 +34,13 @@ def main(folder: Path) -> None:
 
     package = {name.removeprefix("src/") for name in files_below("src/topleft")}
     modules = {name for name in package if name.endswith((".py", ".pyi", "py.typed"))}
-    extensions = {name for name in in_wheel if name.startswith("topleft/_engine.") and name.endswith((".so", ".pyd"))}
+    units = {name.removesuffix(".pyx") for name in package if name.endswith(".pyx")}
+    extensions = {name for name in in_wheel if name.endswith((".so", ".pyd"))}
     metadata = {name for name in in_wheel if ".dist-info/" in name}
-    if len(extensions) != 1 or not any(name.endswith("/licenses/LICENSE") for name in metadata):
-        sys.exit(f"{wheel.name} must hold one compiled module and the license, got {sorted(extensions | metadata)}")
+    compiled = sorted(name.partition(".")[0] for name in extensions)
+    if compiled != sorted(units) or not any(name.endswith("/licenses/LICENSE") for name in metadata):
+        found = ", ".join(sorted(extensions | metadata))
+        sys.exit(f"{wheel.name} must hold the license and these, compiled: {', '.join(sorted(units))}; got {found}")
     check(wheel.name, in_wheel, modules, in_wheel - modules - extensions - metadata)
 
     top = {"LICENSE", "MANIFEST.in", "README.md", "pyproject.toml", "setup.py"}

@@ -4,7 +4,7 @@ import ast
 import os
 import subprocess
 import sys
-from importlib import metadata, resources
+from importlib import import_module, metadata, resources
 from inspect import ismodule
 
 import pytest
@@ -12,6 +12,7 @@ from packaging.requirements import Requirement
 from packaging.specifiers import SpecifierSet
 
 import topleft as tl
+from topleft.methods import CLASSICS
 
 ISAS = ["scalar", "avx2", "avx512"]
 
@@ -65,7 +66,11 @@ def test_metadata_command_is_topleft():
     assert (command.name, command.value) == ("topleft", "topleft.cli:main")
 
 
-@pytest.mark.parametrize("name", ["py.typed", "_engine.pyi"])
+#: The engine, and a kernel for each classic.
+UNITS = ["_engine", *(f"methods.{name}" for name in dict.fromkeys(name.partition("/")[0] for name in CLASSICS))]
+
+
+@pytest.mark.parametrize("name", ["py.typed", *(unit.replace(".", "/") + ".pyi" for unit in UNITS)])
 def test_package_is_typed(name):
     assert resources.files("topleft").joinpath(name).is_file()
 
@@ -75,15 +80,26 @@ def public_names(body: list[ast.stmt]) -> dict[str, ast.stmt]:
     return {name: node for name, node in named.items() if not name.startswith("_")}
 
 
-def test_stub_declares_what_the_compiled_module_has():
-    from topleft import _engine
-
-    stub = public_names(ast.parse(resources.files("topleft").joinpath("_engine.pyi").read_text(encoding="utf-8")).body)
-    there = {name for name, value in vars(_engine).items() if not name.startswith("_") and not ismodule(value)}
-    assert set(stub) == there
+@pytest.mark.parametrize("unit", UNITS)
+def test_stub_declares_what_the_compiled_module_has(unit):
+    module = import_module(f"topleft.{unit}")
+    path = resources.files("topleft").joinpath(unit.replace(".", "/") + ".pyi")
+    stub = public_names(ast.parse(path.read_text(encoding="utf-8")).body)
+    there = {name for name, value in vars(module).items() if not name.startswith("_") and not ismodule(value)}
+    assert set(stub) - {"np", "NDArray"} == there
     for name, node in stub.items():
         if isinstance(node, ast.ClassDef):
-            assert set(public_names(node.body)) == {n for n in vars(getattr(_engine, name)) if not n.startswith("_")}
+            assert set(public_names(node.body)) == {n for n in vars(getattr(module, name)) if not n.startswith("_")}
+
+
+def test_classics_use_no_engine_and_are_loaded_when_asked_for():
+    kernels = {f"topleft.{unit}" for unit in UNITS[1:]}
+    code = f"import topleft, sys; print(*sorted({kernels} & set(sys.modules)))"
+    assert run_python(code).stdout.split() == []
+    folder = resources.files("topleft.methods")
+    sources = [path for path in folder.iterdir() if path.name.endswith((".py", ".pyx", ".pxi"))]
+    lines = [line for path in sources for line in path.read_text(encoding="utf-8").splitlines()]
+    assert not [line for line in lines if "_engine" in line and "import" in line]
 
 
 def test_build_info_has_the_documented_keys():

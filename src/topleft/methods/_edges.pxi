@@ -24,6 +24,7 @@ cdef bint set_up_edges(edges *e, target *t, int64_t *x, int64_t *y, int bits, in
     |x|, |y| < 2**29: no edge function of the bounding box exceeds 2**61. False when nothing is drawn.
     """
     cdef int64_t area = (x[1] - x[0]) * (y[2] - y[0]) - (y[1] - y[0]) * (x[2] - x[0]), dx, dy
+    cdef int64_t pixel = <int64_t>1 << bits
     cdef int k, i, j
     if area == 0:
         return False
@@ -36,10 +37,10 @@ cdef bint set_up_edges(edges *e, target *t, int64_t *x, int64_t *y, int bits, in
     for k in range(3):
         i, j = (k + 1) % 3, (k + 2) % 3
         dx, dy = x[j] - x[i], y[j] - y[i]
-        e.value[k] = dx * ((e.y_first << bits) + half - y[i]) - dy * ((e.x_first << bits) + half - x[i])
+        e.value[k] = dx * (e.y_first * pixel + half - y[i]) - dy * (e.x_first * pixel + half - x[i])
         if not (is_bottom_right(dx, dy) if bottom_right else is_top_left(dx, dy)):
             e.value[k] -= 1
-        e.step_x[k], e.step_y[k] = -dy * (<int64_t>1 << bits), dx * (<int64_t>1 << bits)
+        e.step_x[k], e.step_y[k] = -dy * pixel, dx * pixel
     return True
 
 
