@@ -37,8 +37,8 @@ FLAGS_CYTHON = [
     "-O2", "-fvisibility=hidden", "-fno-lto",
     "-Wno-unused-function", "-Wno-unused-parameter", "-Wno-missing-field-initializers", "-Wno-cast-function-type",
 ]  # fmt: skip
-# The classics do their arithmetic in Cython.
-FLAGS_CLASSIC = [*FLAGS_CYTHON, "-O3", "-ffp-contract=off", "-fno-fast-math", "-fno-math-errno"]
+# The classics do their arithmetic in Cython; debug information would be four fifths of each module.
+FLAGS_CLASSIC = [*FLAGS_CYTHON, "-O3", "-g0", "-ffp-contract=off", "-fno-fast-math", "-fno-math-errno"]
 FLAGS_AVX2 = ["-mavx2", "-mfma", "-mbmi", "-mbmi2", "-mlzcnt", "-mpopcnt"]
 FLAGS_AVX512 = [
     *FLAGS_AVX2,
