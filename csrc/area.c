@@ -184,33 +184,32 @@ TL_INLINE void push_batch(area_state *s, int64_t i, const int32_t *corners, vm l
         push_edges(s, &c, drawn, is_negative);
 }
 
-static area_plane window_plane(const tl_window *window, const tl_area *area)
+static void place_plane(const tl_window *window, const tl_area *area, area_plane *p)
 {
     const int bits = window->subpixel_bits;
-    const int64_t far = (int64_t)1 << 30, beyond = (int64_t)1 << 27; /* no narrow edge, and no more than a window from it */
-    return (area_plane){
-        .cells = area->is_wide ? NULL : area->cells,
-        .wide_cells = area->is_wide ? area->cells : NULL,
-        .stride = (int32_t)tl_area_stride(window->width),
-        .n_cols = (int32_t)window->width,
-        .n_rows = (int32_t)window->height,
-        .x_px = window->x_px,
-        .y_px = window->y_px,
-        .left_px = clamp32(window->x_px, -far - beyond, far),
-        .top_px = clamp32(window->y_px, -far - beyond, far),
-        .top_fx = clamp32(window->y_px * ((int64_t)1 << bits), -far, far),
-        .bottom_fx = clamp32((window->y_px + window->height) * ((int64_t)1 << bits), -far, far),
-        .right_fx = clamp32((window->x_px + window->width) * ((int64_t)1 << bits), -far, far),
-        .bits = bits,
-        .seen = v4_zero(),
-    };
+    const int64_t far = (int64_t)1 << 30, beyond = (int64_t)1 << 29; /* no narrow edge, and no window that wide */
+    p->cells = area->is_wide ? NULL : area->cells;
+    p->wide_cells = area->is_wide ? area->cells : NULL;
+    p->stride = (int32_t)tl_area_stride(window->width);
+    p->n_cols = (int32_t)window->width;
+    p->n_rows = (int32_t)window->height;
+    p->x_px = window->x_px;
+    p->y_px = window->y_px;
+    p->left_px = clamp32(window->x_px, -far - beyond, far);
+    p->top_px = clamp32(window->y_px, -far - beyond, far);
+    p->top_fx = clamp32(window->y_px * ((int64_t)1 << bits), -far, far);
+    p->bottom_fx = clamp32((window->y_px + window->height) * ((int64_t)1 << bits), -far, far);
+    p->right_fx = clamp32((window->x_px + window->width) * ((int64_t)1 << bits), -far, far);
+    p->bits = bits;
+    p->n_waiting = 0;
+    p->seen = v4_zero();
 }
 
 static int64_t draw_area(const tl_scene *scene, const tl_window *window, const tl_area *target)
 {
     area_state s;
     const int bits = window->subpixel_bits;
-    s.plane = window_plane(window, target);
+    place_plane(window, target, &s.plane);
     s.scene = scene, s.bad_row = -1, s.is_wide = target->is_wide;
     s.max_extent = 1 << (bits + TL_MAX_EDGE_BITS < 25 ? bits + TL_MAX_EDGE_BITS : 25);
     memset(s.n, 0, sizeof s.n);
@@ -221,6 +220,10 @@ static int64_t draw_area(const tl_scene *scene, const tl_window *window, const t
         push_batch(&s, i, i < n_whole ? scene->triangles + 3 * i : tail, vm_first(scene->n_triangles - i));
     for (int kind = 0; kind < TL_EDGES_NONE; kind++)
         flush_edges(&s, kind, 1);
+    if (s.is_wide)
+        flush_quads(&s.plane, 1);
+    else
+        flush_quads(&s.plane, 0);
     const int fits = accumulate(&s.plane, target);
     return s.bad_row >= 0 ? s.bad_row : fits ? -1 : TL_AREA_OVERFLOW;
 }

@@ -43,6 +43,7 @@ class View:
     viewport: tuple[int, int]
     transform: ArrayLike | None
     subpixel_bits: int
+    sampling: Sampling
     method: int
     cull: int
     zero_to_one: bool
@@ -63,13 +64,13 @@ class View:
         checked_size = as_size(size)
         bits = as_subpixel_bits(options.get("subpixel_bits", 8))
         viewport = options.get("viewport")
-        parse(Sampling, "sampling", options.get("sampling", "center"))
         return cls(
             size=checked_size,
             origin=as_window(options.get("origin", (0, 0)), bits),
             viewport=checked_size if viewport is None else as_size(viewport, "viewport", smallest=1),
             transform=options.get("transform"),
             subpixel_bits=bits,
+            sampling=parse(Sampling, "sampling", options.get("sampling", "center")),
             method=production_method(options.get("method", "auto")),
             cull=CULL_CODES[parse(Cull, "cull", options.get("cull", "none"))],
             zero_to_one=parse(ClipDepth, "clip_depth", options.get("clip_depth", "minus_one_to_one"))
