@@ -51,6 +51,9 @@ def far_out(rng, n):
         corners[k % 3] = rng.uniform(0, SIDE, 2)
         if k % 2:
             corners[k % 3 - 1] += 2 * (rng.uniform(0, SIDE, 2) - (corners[k % 3 - 1] + corners[k % 3 - 2]) / 2)
+        if k % 5 == 0:  # rows of the frame that a single edge passes for 2**50 pixels and more
+            corners = rng.uniform(0, SIDE, (3, 2))
+            corners[:2, 0] *= [-(2.0**50), 2.0**50]
         yield soup(corners, (SIDE, SIDE))
 
 
@@ -127,6 +130,18 @@ def test_area_of_equal_layers_is_a_multiple(n, isa):
         expected = (draw(one).astype(np.float64) * n).astype(np.float32)
         assert_same(draw(many), expected)
         assert_same(draw(many, tl.coverage), np.minimum(expected, 1))
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize("step", [1, -1])
+def test_area_of_layers_that_begin_apart_is_their_number(step, isa):
+    """The sum passes what 32 bits hold although no cell does, on the way up or down."""
+    corners = np.tile([[0, -9], [0, 9], [60.0, -9], [60, -9], [0, 9], [60, 9]], (300, 1, 1))
+    corners[:, [0, 1, 4], 0] = np.arange(300)[:, None] // 30
+    layers = soup(corners.reshape(-1, 2) * [step, 1] + [20 - 20 * step, 0], (40, 3))
+    expected = np.float32(30) * np.minimum(np.arange(40, dtype=np.float32) + 1, 10)
+    with on(isa):
+        assert_same(draw(layers), np.tile(expected[::step], (3, 1)))
 
 
 def rotated_grid(n, angle, size):
