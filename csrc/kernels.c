@@ -9,6 +9,10 @@
 #include "covered.c"
 #include "sink.c"
 #include "raster.c"
+#include "ramp.c"
+#include "ramp_exact.c"
+#include "accumulate.c"
+#include "area.c"
 #include "resolve.c"
 #include "paint.c"
 
@@ -21,6 +25,7 @@ const tl_kernels TL_KERNELS = {
     .first_bad_row = first_bad_row,
     .narrow_triangles = narrow_triangles,
     .draw = draw,
+    .draw_area = draw_area,
     .barycentric = barycentric,
     .interpolate = interpolate,
     .paint_flat = paint_flat,

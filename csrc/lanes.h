@@ -12,6 +12,9 @@
  *   v?_store_some(p, m, a, has_room)   the lanes in m; with room for a whole vector the others may be written as they are
  *   vi_compress(p, m, v)    the lanes in m, packed, at p; writes a whole vector
  *   vm_first(n)             the first n lanes, none for n <= 0, all for n >= TL_LANES
+ *   v4_, vi_load_quads, vi_store_quads    four int32; TL_LANES of them as four vectors, lane k in slot vi_quad_slot(k)
+ *   vi_prefix_sum, vi_last  sums of lanes [0, k]; the last lane everywhere
+ *   vi_shift_in(a, before)  a one lane up, the last lane of `before` in lane 0
  *   hm_, hf_, hi_, hd_      the few that short rows need, in half vectors of TL_HALF_LANES (0: there are none)
  *   vd_from_vi, vd_from_vf, vf_from_vi, vf_from_vd, vi_floor(vf), vi_round(vd)    conversions; INT32_MIN when out of range
  */
@@ -33,5 +36,8 @@
 #else
 #include "lanes_scalar.h"
 #endif
+
+/* Where vi_store_quads puts the four numbers of a lane, in units of four. */
+TL_INLINE int vi_quad_slot(int lane) { return TL_LANES == 1 ? 0 : (lane & 3) * (TL_LANES / 4) + (lane >> 2); }
 
 #endif

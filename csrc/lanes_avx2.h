@@ -42,6 +42,54 @@ TL_INLINE void vi_store_some(int32_t *p, vm m, vi a, int has_room)
         vi_store_masked(p, m, a);
 }
 
+/* Four int32. */
+typedef __m128i v4;
+TL_INLINE v4 v4_zero(void) { return _mm_setzero_si128(); }
+TL_INLINE v4 v4_load(const int32_t *p) { return _mm_loadu_si128((const __m128i *)p); }
+TL_INLINE void v4_store(int32_t *p, v4 a) { _mm_storeu_si128((__m128i *)p, a); }
+TL_INLINE v4 v4_add(v4 a, v4 b) { return _mm_add_epi32(a, b); }
+TL_INLINE v4 v4_or(v4 a, v4 b) { return _mm_or_si128(a, b); }
+/* the 4x4 transposes within each 128 bits, their own inverse */
+TL_INLINE void transpose_quads(const vi *a, vi *b)
+{
+    const vi low01 = _mm256_unpacklo_epi32(a[0], a[1]), high01 = _mm256_unpackhi_epi32(a[0], a[1]);
+    const vi low23 = _mm256_unpacklo_epi32(a[2], a[3]), high23 = _mm256_unpackhi_epi32(a[2], a[3]);
+    b[0] = _mm256_unpacklo_epi64(low01, low23);
+    b[1] = _mm256_unpackhi_epi64(low01, low23);
+    b[2] = _mm256_unpacklo_epi64(high01, high23);
+    b[3] = _mm256_unpackhi_epi64(high01, high23);
+}
+TL_INLINE void vi_load_quads(const int32_t *p, vi *c)
+{
+    const vi rows[4] = {vi_load(p), vi_load(p + 8), vi_load(p + 16), vi_load(p + 24)};
+    transpose_quads(rows, c);
+}
+TL_INLINE void vi_store_quads(int32_t *p, const vi *c)
+{
+    vi rows[4];
+    transpose_quads(c, rows);
+    for (int k = 0; k < 4; k++)
+        vi_store(p + 8 * k, rows[k]);
+}
+TL_INLINE vi vi_prefix_sum(vi a)
+{
+    a = _mm256_add_epi32(a, _mm256_slli_si256(a, 4));
+    a = _mm256_add_epi32(a, _mm256_slli_si256(a, 8));
+    return _mm256_add_epi32(a, _mm256_shuffle_epi32(_mm256_permute2x128_si256(a, a, 0x08), 0xff));
+}
+TL_INLINE vi vi_last(vi a) { return _mm256_permutevar8x32_epi32(a, _mm256_set1_epi32(7)); }
+TL_INLINE vi vi_shift_in(vi a, vi before)
+{
+    const vi back = _mm256_setr_epi32(7, 0, 1, 2, 3, 4, 5, 6);
+    return _mm256_blend_epi32(_mm256_permutevar8x32_epi32(a, back), _mm256_permutevar8x32_epi32(before, back), 1);
+}
+/* the upper half scales without loss, so the sum is the only rounding */
+TL_INLINE vf vf_from_unsigned(vi a)
+{
+    const vf high = _mm256_cvtepi32_ps(_mm256_srli_epi32(a, 16)), low = _mm256_cvtepi32_ps(_mm256_and_si256(a, _mm256_set1_epi32(0xffff)));
+    return _mm256_add_ps(_mm256_mul_ps(high, _mm256_set1_ps(65536.0f)), low);
+}
+
 TL_INLINE vm vm_and(vm a, vm b) { return _mm256_and_si256(a, b); }
 TL_INLINE vm vm_or(vm a, vm b) { return _mm256_or_si256(a, b); }
 TL_INLINE vm vm_and_not(vm a, vm b) { return _mm256_andnot_si256(b, a); }

@@ -32,6 +32,47 @@ TL_INLINE vi vi_load_masked(vm m, const int32_t *p) { return _mm512_maskz_loadu_
 TL_INLINE void vi_store_masked(int32_t *p, vm m, vi a) { _mm512_mask_storeu_epi32(p, m, a); }
 TL_INLINE void vi_store_some(int32_t *p, vm m, vi a, int has_room) { (void)has_room; vi_store_masked(p, m, a); }
 
+/* Four int32. */
+typedef __m128i v4;
+TL_INLINE v4 v4_zero(void) { return _mm_setzero_si128(); }
+TL_INLINE v4 v4_load(const int32_t *p) { return _mm_loadu_si128((const __m128i *)p); }
+TL_INLINE void v4_store(int32_t *p, v4 a) { _mm_storeu_si128((__m128i *)p, a); }
+TL_INLINE v4 v4_add(v4 a, v4 b) { return _mm_add_epi32(a, b); }
+TL_INLINE v4 v4_or(v4 a, v4 b) { return _mm_or_si128(a, b); }
+/* the 4x4 transposes within each 128 bits, their own inverse */
+TL_INLINE void transpose_quads(const vi *a, vi *b)
+{
+    const vi low01 = _mm512_unpacklo_epi32(a[0], a[1]), high01 = _mm512_unpackhi_epi32(a[0], a[1]);
+    const vi low23 = _mm512_unpacklo_epi32(a[2], a[3]), high23 = _mm512_unpackhi_epi32(a[2], a[3]);
+    b[0] = _mm512_unpacklo_epi64(low01, low23);
+    b[1] = _mm512_unpackhi_epi64(low01, low23);
+    b[2] = _mm512_unpacklo_epi64(high01, high23);
+    b[3] = _mm512_unpackhi_epi64(high01, high23);
+}
+TL_INLINE void vi_load_quads(const int32_t *p, vi *c)
+{
+    const vi rows[4] = {vi_load(p), vi_load(p + 16), vi_load(p + 32), vi_load(p + 48)};
+    transpose_quads(rows, c);
+}
+TL_INLINE void vi_store_quads(int32_t *p, const vi *c)
+{
+    vi rows[4];
+    transpose_quads(c, rows);
+    for (int k = 0; k < 4; k++)
+        vi_store(p + 16 * k, rows[k]);
+}
+TL_INLINE vi vi_prefix_sum(vi a)
+{
+    const vi zero = _mm512_setzero_si512();
+    a = _mm512_add_epi32(a, _mm512_alignr_epi32(a, zero, 15));
+    a = _mm512_add_epi32(a, _mm512_alignr_epi32(a, zero, 14));
+    a = _mm512_add_epi32(a, _mm512_alignr_epi32(a, zero, 12));
+    return _mm512_add_epi32(a, _mm512_alignr_epi32(a, zero, 8));
+}
+TL_INLINE vi vi_last(vi a) { return _mm512_permutexvar_epi32(_mm512_set1_epi32(15), a); }
+TL_INLINE vi vi_shift_in(vi a, vi before) { return _mm512_alignr_epi32(a, before, 15); }
+TL_INLINE vf vf_from_unsigned(vi a) { return _mm512_cvtepu32_ps(a); }
+
 TL_INLINE vm vm_and(vm a, vm b) { return a & b; }
 TL_INLINE vm vm_or(vm a, vm b) { return a | b; }
 TL_INLINE vm vm_and_not(vm a, vm b) { return a & (vm)~b; }

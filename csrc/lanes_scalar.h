@@ -31,6 +31,31 @@ TL_INLINE vi vi_load_masked(vm m, const int32_t *p) { return m ? *p : 0; }
 TL_INLINE void vi_store_masked(int32_t *p, vm m, vi a) { if (m) *p = a; }
 TL_INLINE void vi_store_some(int32_t *p, vm m, vi a, int has_room) { (void)has_room; vi_store_masked(p, m, a); }
 
+/* Four int32. */
+typedef struct { int32_t k[4]; } v4;
+TL_INLINE v4 v4_zero(void) { return (v4){{0, 0, 0, 0}}; }
+TL_INLINE v4 v4_load(const int32_t *p) { return (v4){{p[0], p[1], p[2], p[3]}}; }
+TL_INLINE void v4_store(int32_t *p, v4 a) { memcpy(p, a.k, sizeof a.k); }
+TL_INLINE v4 v4_add(v4 a, v4 b)
+{
+    return (v4){{vi_add(a.k[0], b.k[0]), vi_add(a.k[1], b.k[1]), vi_add(a.k[2], b.k[2]), vi_add(a.k[3], b.k[3])}};
+}
+TL_INLINE v4 v4_or(v4 a, v4 b) { return (v4){{a.k[0] | b.k[0], a.k[1] | b.k[1], a.k[2] | b.k[2], a.k[3] | b.k[3]}}; }
+TL_INLINE void vi_load_quads(const int32_t *p, vi *c)
+{
+    for (int k = 0; k < 4; k++)
+        c[k] = p[k];
+}
+TL_INLINE void vi_store_quads(int32_t *p, const vi *c)
+{
+    for (int k = 0; k < 4; k++)
+        p[k] = c[k];
+}
+TL_INLINE vi vi_prefix_sum(vi a) { return a; }
+TL_INLINE vi vi_last(vi a) { return a; }
+TL_INLINE vi vi_shift_in(vi a, vi before) { (void)a; return before; }
+TL_INLINE vf vf_from_unsigned(vi a) { return (float)(uint32_t)a; }
+
 TL_INLINE vm vm_and(vm a, vm b) { return a & b; }
 TL_INLINE vm vm_or(vm a, vm b) { return a | b; }
 TL_INLINE vm vm_and_not(vm a, vm b) { return a & ~b; }

@@ -130,6 +130,22 @@ typedef struct {
     int is_first, is_last;    /* of the passes over the window: the first clears it */
 } tl_share;
 
+/* Where exact areas go.  `cells` is memory between the edges and the pixels: tl_area_stride(width) numbers a row, int32 that
+ * are all TL_CELL_CLEAR, or int64 that are all 0 when is_wide.  They are left as they were found. */
+typedef struct {
+    float *pixels;     /* rows of stride_px pixels */
+    int64_t stride_px;
+    void *cells;
+    int is_wide;
+    int is_clamped; /* what lies in more than one triangle counts as 1, instead of the sum of its areas */
+} tl_area;
+
+#define TL_CELL_CLEAR (1 << 30)
+#define TL_AREA_OVERFLOW -2 /* of draw_area: the sums need wide cells */
+
+/* Cells a row: 16 before the first pixel, at least 16 behind the last, whole cache lines. */
+static inline int64_t tl_area_stride(int64_t width) { return (width + 47) / 16 * 16; }
+
 /* ---- the kernel table ---------------------------------------------------------------------------------- */
 
 typedef struct tl_kernels {
@@ -160,6 +176,10 @@ typedef struct tl_kernels {
      * one; what was drawn is then worthless.  The window's pixels are cleared first: 0, id -1, and the depth that every
      * other beats.  A share of a part needs method AUTO, a picture of less than 2^31 samples within 2^30 pixels of 0. */
     int64_t (*draw)(const tl_scene *scene, const tl_window *window, const tl_target *target, tl_share *share);
+
+    /* The exact area that triangles cover of each pixel, their sum; the window has fewer than 2^31 cells.  Returns as `draw`
+     * does, or TL_AREA_OVERFLOW; either way the pixels are then worthless. */
+    int64_t (*draw_area)(const tl_scene *scene, const tl_window *window, const tl_area *target);
 
     /* Per pixel of `ids` (rows of window->width): float32 weights of the triangle's three vertices. */
     void (*barycentric)(const tl_scene *scene, const tl_window *window, const int32_t *ids, float *out);

@@ -117,6 +117,7 @@ def test_small_frames_and_empty_scenes_are_fine(name, size):
     ("options", "message"),
     [
         ({"transform": np.eye(4)}, "method 'row_crossing' takes vertices in pixels, got a transform"),
+        ({"sampling": "area"}, "sampling must be 'center' for method 'row_crossing', got 'area'"),
         ({"cull": "back"}, "cull must be 'none' for method 'row_crossing'"),
         ({"subpixel_bits": 4}, "method 'row_crossing' has no sub-pixel bits, got subpixel_bits=4"),
     ],

@@ -51,6 +51,13 @@ cdef extern from "topleft.h" nogil:
         int64_t n_samples
         uint64_t *covered
     int64_t tl_covered_words(int64_t)
+    ctypedef struct tl_area:
+        float *pixels
+        int64_t stride_px
+        void *cells
+        int is_wide, is_clamped
+    int64_t TL_CELL_CLEAR, TL_AREA_OVERFLOW
+    int64_t tl_area_stride(int64_t width)
     ctypedef struct tl_scene:
         tl_vertex_set mesh
         const int32_t *triangles
@@ -73,6 +80,7 @@ cdef extern from "topleft.h" nogil:
         int64_t (*first_bad_row)(const int32_t *, int64_t, int64_t) noexcept nogil
         int64_t (*narrow_triangles)(const int64_t *, int64_t, int64_t, int32_t *) noexcept nogil
         int64_t (*draw)(const tl_scene *, const tl_window *, const tl_target *, tl_share *) noexcept nogil
+        int64_t (*draw_area)(const tl_scene *, const tl_window *, const tl_area *) noexcept nogil
         void (*barycentric)(const tl_scene *, const tl_window *, const int32_t *, float *) noexcept nogil
         void (*interpolate)(const tl_scene *, const tl_window *, const int32_t *, const float *, int, int, float, float *) noexcept nogil
         void (*paint_flat)(const int32_t *, int64_t, const uint8_t *, int, uint8_t *) noexcept nogil
@@ -81,11 +89,18 @@ cdef extern from "topleft.h" nogil:
 include "_dispatch.pxi"
 
 VERTEX_BYTES = sizeof(tl_vertex)
+CELL_CLEAR = TL_CELL_CLEAR
+AREA_OVERFLOW = TL_AREA_OVERFLOW
 SCALARS = {np.dtype(np.float32): 0, np.dtype(np.float64): 1, np.dtype(np.int64): 2}  # tl_scalar
 
 
 cdef inline const void *data(const uint8_t[::1] view) noexcept nogil:
     return &view[0] if view is not None and view.shape[0] > 0 else NULL
+
+
+def area_stride(int64_t width):
+    """Return how many cells `Scene.draw_area` needs for a row of pixels."""
+    return tl_area_stride(width)
 
 
 def as_bytes(array):
@@ -305,6 +320,22 @@ cdef class Scene:
         share.first, share.end, share.is_first, share.is_last = 0, ids.shape[0], False, is_last
         with nogil:
             K.draw(&self.scene, &window, &rows, &share)
+
+    def draw_area(self, float[:, ::1] pixels, uint8_t[::1] cells, int64_t first_row, int64_t n_rows, bint is_wide, bint is_clamped):
+        """Write the area that triangles cover of the pixels in rows [first_row, first_row + n_rows).
+
+        `cells`: those of these rows, clear. Returns as `draw` does, or AREA_OVERFLOW when the cells must be wide.
+        """
+        cdef tl_area target
+        cdef tl_window window = self.window(first_row, n_rows, pixels.shape[1])
+        cdef int64_t status
+        if n_rows == 0 or pixels.shape[1] == 0:
+            return -1
+        target.pixels, target.stride_px, target.cells = &pixels[first_row, 0], pixels.shape[1], &cells[0]
+        target.is_wide, target.is_clamped = is_wide, is_clamped
+        with nogil:
+            status = K.draw_area(&self.scene, &window, &target)
+        return status
 
     def paint(self, const int32_t[:, ::1] labels, const uint8_t[::1] colors, uint8_t[::1] pixels, int64_t first_row, int64_t n_rows,
               bint is_flat, bint is_u8, int n_channels):

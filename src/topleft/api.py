@@ -25,10 +25,10 @@ def coverage(
     triangles: ArrayLike,
     size: tuple[int, int],
     *,
-    out: NDArray[np.bool_] | None = None,
+    out: NDArray[Any] | None = None,
     **view: Unpack[ViewOptions],
-) -> NDArray[np.bool_]:
-    """Return the mask of the pixels whose centre a triangle covers.
+) -> NDArray[Any]:
+    """Return the mask of the pixels whose centre a triangle covers, or how much of each pixel triangles cover.
 
     Parameters
     ----------
@@ -38,14 +38,14 @@ def coverage(
         Indices of vertices; either winding.
     size : (int, int)
         Width and height of the picture in pixels.
-    out : ndarray of bool, shape (H, W), optional
+    out : ndarray of bool (float32 for "area"), shape (H, W), optional
         Where the result goes. A fresh array costs its first touch, several times what drawing a small mesh costs.
     **view
         transform : array_like, shape (4, 4). Clip space from object space.
         origin : (int, int). The pixel of the whole picture that is row 0, column 0 here.
         viewport : (int, int). Width and height of the whole picture for clip space; default `size`.
         subpixel_bits : int, 0 to 16. Vertices snap to ``2**-subpixel_bits`` pixels; default 8.
-        sampling : "center".
+        sampling : "center", or "area": the exact area of the pixel (`coverage` and `overdraw` alone).
         method : "auto", "edge" or "scanline": the same picture. Or a classic of the literature, to compare with:
             `topleft.methods.CLASSICS` names them, and docs/methods.md tells where each of them fails.
         cull : "none", "back" or "front"; the front is counter-clockwise seen with y up.
@@ -56,7 +56,8 @@ def coverage(
     Returns
     -------
     ndarray of bool, shape (H, W)
-        False where nothing is.
+        False where nothing is. With ``sampling="area"`` float32: the areas of the triangles in each pixel, added up, at
+        most 1. They are exactly 1 where triangles tile a pixel, and a single one is within 9e-8 of its exact area.
 
     Raises
     ------
@@ -69,7 +70,7 @@ def coverage(
 
     References
     ----------
-    J. Pineda, A Parallel Algorithm for Polygon Rasterization, 1988.
+    J. Pineda, A Parallel Algorithm for Polygon Rasterization, 1988; R. Levien, font-rs, 2015 (area).
 
     Examples
     --------
@@ -78,6 +79,10 @@ def coverage(
     array([[1, 1, 1, 0],
            [1, 1, 0, 0],
            [1, 0, 0, 0]])
+    >>> tl.coverage([[0, 0], [4, 0], [0, 4]], [[0, 1, 2]], (4, 3), sampling="area")
+    array([[1. , 1. , 1. , 0.5],
+           [1. , 1. , 0.5, 0. ],
+           [1. , 0.5, 0. , 0. ]], dtype=float32)
     """
     return draw_coverage(SCRATCH, vertices, triangles, View.parse(size, view), out)
 
@@ -87,22 +92,22 @@ def overdraw(
     triangles: ArrayLike,
     size: tuple[int, int],
     *,
-    out: NDArray[np.int32] | None = None,
+    out: NDArray[Any] | None = None,
     **view: Unpack[ViewOptions],
-) -> NDArray[np.int32]:
-    """Return how many triangles cover each pixel's centre.
+) -> NDArray[Any]:
+    """Return how many triangles cover each pixel's centre, or the sum of the areas that they cover.
 
     Parameters
     ----------
     vertices, triangles, size, **view
         As in `coverage`.
-    out : ndarray of int32, shape (H, W), optional
+    out : ndarray of int32 (float32 for "area"), shape (H, W), optional
         Where the result goes.
 
     Returns
     -------
     ndarray of int32, shape (H, W)
-        0 where nothing is.
+        0 where nothing is. With ``sampling="area"`` float32: the areas of the triangles in each pixel, added up.
 
     Raises
     ------
@@ -274,9 +279,9 @@ class Rasterizer:
         vertices: ArrayLike,
         triangles: ArrayLike,
         *,
-        out: NDArray[np.bool_] | None = None,
+        out: NDArray[Any] | None = None,
         **view: Unpack[ViewOptions],
-    ) -> NDArray[np.bool_]:
+    ) -> NDArray[Any]:
         """Return the mask of the pixels that a triangle covers, as `topleft.coverage` does."""
         return draw_coverage(self._memory, vertices, triangles, self._view(view), out)
 
@@ -285,9 +290,9 @@ class Rasterizer:
         vertices: ArrayLike,
         triangles: ArrayLike,
         *,
-        out: NDArray[np.int32] | None = None,
+        out: NDArray[Any] | None = None,
         **view: Unpack[ViewOptions],
-    ) -> NDArray[np.int32]:
+    ) -> NDArray[Any]:
         """Return how many triangles cover each pixel, as `topleft.overdraw` does."""
         return draw_overdraw(self._memory, vertices, triangles, self._view(view), out)
 

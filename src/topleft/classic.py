@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from topleft.arrays import as_background, as_checked_triangles, as_out, as_triangles, as_vertices
 from topleft.memory import Memory
 from topleft.methods import Method, load_kernel
-from topleft.models import Per, Sink, parse
+from topleft.models import Per, Sampling, Sink, parse
 from topleft.view import View
 
 __all__ = ["bresenham_line", "draw_classic", "fill_classic", "refuse_classic"]
@@ -146,6 +146,8 @@ def check_options(method: Method, view: View) -> None:
     """Raise an error for an option that would change the picture and that a classic does not have."""
     if view.transform is not None:
         raise ValueError(f"method {method.name!r} takes vertices in pixels, got a transform")
+    if view.sampling is not Sampling.CENTER:
+        raise ValueError(f"sampling must be 'center' for method {method.name!r}, got {str(view.sampling)!r}")
     if view.cull:
         raise ValueError(f"cull must be 'none' for method {method.name!r}")
     if view.subpixel_bits != 8 and not method.has_subpixel_bits:

@@ -26,6 +26,9 @@ class Memory(Protocol):
     def empty(self, name: str, shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
         """Return an uninitialised array."""
 
+    def constant(self, name: str, n: int, value: int) -> NDArray[np.int32]:
+        """Return n int32 that are all `value`; who changes them puts that back."""
+
 
 class FreshMemory:
     """Every array is new: results stay valid for as long as anyone holds them."""
@@ -34,12 +37,19 @@ class FreshMemory:
         """Return an uninitialised array."""
         return _typed(allocate(_size(shape, dtype)), shape, dtype)
 
+    def constant(self, name: str, n: int, value: int) -> NDArray[np.int32]:  # noqa: ARG002
+        """Return n int32 that are all `value`."""
+        array: NDArray[np.int32] = _typed(allocate(4 * n), (n,), np.int32)
+        array.fill(value)
+        return array
+
 
 class KeptMemory:
     """One block of memory per name, which only grows: the next call overwrites what this one returned."""
 
     def __init__(self) -> None:
         self._blocks: dict[str, NDArray[np.uint8]] = {}
+        self._constants: dict[str, NDArray[np.int32]] = {}
 
     def empty(self, name: str, shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
         """Return an uninitialised array at the start of the block of that name."""
@@ -48,6 +58,13 @@ class KeptMemory:
         if block is None or block.size < n_bytes:
             block = self._blocks[name] = allocate(n_bytes)
         return _typed(block, shape, dtype)
+
+    def constant(self, name: str, n: int, value: int) -> NDArray[np.int32]:
+        """Return n int32 that are all `value`: filled once, put back by whoever changed them."""
+        block = self._constants.get(name)
+        if block is None or block.size < n:
+            block = self._constants[name] = FreshMemory().constant(name, n, value)
+        return block[:n]
 
 
 class ScratchMemory(FreshMemory):
@@ -60,10 +77,19 @@ class ScratchMemory(FreshMemory):
         """Return an uninitialised array."""
         if name not in SCRATCH_NAMES or _size(shape, dtype) > MAX_SCRATCH_BYTES:
             return super().empty(name, shape, dtype)
+        return self._kept().empty(name, shape, dtype)
+
+    def constant(self, name: str, n: int, value: int) -> NDArray[np.int32]:
+        """Return n int32 that are all `value`."""
+        if 4 * n > MAX_SCRATCH_BYTES:
+            return super().constant(name, n, value)
+        return self._kept().constant(name, n, value)
+
+    def _kept(self) -> KeptMemory:
         kept: KeptMemory | None = getattr(self._threads, "kept", None)
         if kept is None:
             kept = self._threads.kept = KeptMemory()
-        return kept.empty(name, shape, dtype)
+        return kept
 
     def release(self) -> None:
         """Give the calling thread's scratch back."""
@@ -76,7 +102,8 @@ SCRATCH = ScratchMemory()
 def release_memory() -> None:
     """Give back the scratch memory that `coverage`, `overdraw` and `fill` keep for the calling thread.
 
-    It holds snapped vertices, converted indices and labels: at most 64 MiB each, nothing once the thread has ended.
+    It holds snapped vertices, converted indices, labels and cells of areas: at most 64 MiB each, nothing once the
+    thread has ended.
     `Rasterizer` objects keep their own memory for as long as they live.
     """
     SCRATCH.release()

@@ -12,6 +12,7 @@ class Sampling(StrEnum):
     """Where a pixel is sampled."""
 
     CENTER = "center"
+    AREA = "area"
 
 
 class Cull(StrEnum):

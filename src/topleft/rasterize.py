@@ -14,12 +14,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine
+from topleft.area import sum_areas
 from topleft.arrays import as_background, as_colors, as_matrix, as_out, as_triangles, as_vertices, bad_triangle
 from topleft.classic import draw_classic, fill_classic, refuse_classic
 from topleft.fragments import Fragments
 from topleft.memory import Memory
 from topleft.methods import METHODS
-from topleft.models import DepthTest, Per, Sink, parse
+from topleft.models import DepthTest, Per, Sampling, Sink, parse
 from topleft.threads import count_threads, run_parts
 from topleft.view import View
 
@@ -231,25 +232,42 @@ def canvas_of(
         result[...] = canvas
 
 
-def draw_coverage(
-    memory: Memory, vertices: ArrayLike, triangles: ArrayLike, view: View, out: object
-) -> NDArray[np.bool_]:
+def draw_area(
+    memory: Memory, name: str, snapped: Snapped, view: View, out: object, *, is_clamped: bool
+) -> NDArray[np.float32]:
+    """Return the area that triangles cover of each pixel, or at most 1 of it."""
+    with canvas_of(memory, f"{name} area", out, view.size[::-1], np.float32) as (result, canvas):
+        n_threads = count_threads(view.threads, snapped.n_triangles)
+        if sum_areas(memory, snapped.scene, canvas, n_threads, is_clamped=is_clamped):
+            check_triangles(snapped.triangles, snapped.corners, snapped.n_vertices)
+    return result
+
+
+def refuse_area(view: View, verb: str) -> None:
+    """Raise an error where a pixel needs one triangle, and areas are of many."""
+    if view.sampling is Sampling.AREA:
+        raise ValueError(f"sampling 'area' gives no ids: {verb} takes 'center'")
+
+
+def draw_coverage(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, view: View, out: object) -> NDArray[Any]:
     """`coverage`, on the memory given."""
     if view.classic:
         return draw_classic(view.classic, memory, vertices, triangles, view, Sink.MASK, out)
     snapped = snap_scene(memory, vertices, triangles, view, with_depth=False, out=out)
+    if view.sampling is Sampling.AREA:
+        return draw_area(memory, "coverage", snapped, view, out, is_clamped=True)
     with canvas_of(memory, "coverage", out, view.size[::-1], np.bool_) as (result, canvas):
         draw(memory, snapped, view, Sink.MASK, canvas)
     return result
 
 
-def draw_overdraw(
-    memory: Memory, vertices: ArrayLike, triangles: ArrayLike, view: View, out: object
-) -> NDArray[np.int32]:
+def draw_overdraw(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, view: View, out: object) -> NDArray[Any]:
     """`overdraw`, on the memory given."""
     if view.classic:
         return draw_classic(view.classic, memory, vertices, triangles, view, Sink.COUNT, out)
     snapped = snap_scene(memory, vertices, triangles, view, with_depth=False, out=out)
+    if view.sampling is Sampling.AREA:
+        return draw_area(memory, "overdraw", snapped, view, out, is_clamped=False)
     with canvas_of(memory, "overdraw", out, view.size[::-1], np.int32) as (result, canvas):
         draw(memory, snapped, view, Sink.COUNT, canvas)
     return result
@@ -288,6 +306,7 @@ def draw_fill(
     out: object,
 ) -> NDArray[Any]:
     """`fill`, on the memory given."""
+    refuse_area(view, "fill")
     palette = as_colors(colors)
     if view.classic:
         return fill_classic(view.classic, memory, vertices, triangles, palette, view, per, background, out)
@@ -315,6 +334,7 @@ def draw_fragments(
 ) -> Fragments:
     """`rasterize`, on the memory given."""
     refuse_classic(view, "depth")
+    refuse_area(view, "rasterize")
     test = None if depth_test is None else parse(DepthTest, "depth_test", depth_test)
     if out is None:
         ids_out = depth_out = None

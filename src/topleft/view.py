@@ -43,6 +43,7 @@ class View:
     viewport: tuple[int, int]
     transform: ArrayLike | None
     subpixel_bits: int
+    sampling: Sampling
     method: int
     cull: int
     zero_to_one: bool
@@ -64,7 +65,6 @@ class View:
         checked_size = as_size(size)
         bits = as_subpixel_bits(options.get("subpixel_bits", 8))
         viewport = options.get("viewport")
-        parse(Sampling, "sampling", options.get("sampling", "center"))
         method = find_method(options.get("method", "auto"))
         return cls(
             size=checked_size,
@@ -72,6 +72,7 @@ class View:
             viewport=checked_size if viewport is None else as_size(viewport, "viewport", smallest=1),
             transform=options.get("transform"),
             subpixel_bits=bits,
+            sampling=parse(Sampling, "sampling", options.get("sampling", "center")),
             method=method.code or 0,
             cull=CULL_CODES[parse(Cull, "cull", options.get("cull", "none"))],
             zero_to_one=parse(ClipDepth, "clip_depth", options.get("clip_depth", "minus_one_to_one"))
