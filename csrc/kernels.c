@@ -15,6 +15,12 @@
 #include "area.c"
 #include "resolve.c"
 #include "paint.c"
+#include "mix.h"
+#include "mix_u8.c"
+#include "mix_f32.c"
+#include "mix.c"
+#include "blend_area.c"
+#include "blend.c"
 
 const tl_kernels TL_KERNELS = {
     .isa = TL_ISA_NAME,
@@ -26,6 +32,7 @@ const tl_kernels TL_KERNELS = {
     .narrow_triangles = narrow_triangles,
     .draw = draw,
     .draw_area = draw_area,
+    .blend = blend,
     .barycentric = barycentric,
     .interpolate = interpolate,
     .paint_flat = paint_flat,

@@ -135,10 +135,12 @@ def fill(
     *,
     per: str = "auto",
     background: ArrayLike | None = None,
+    blend: str = "replace",
+    alpha: str = "straight",
     out: NDArray[Any] | None = None,
     **view: Unpack[ViewOptions],
 ) -> NDArray[Any]:
-    """Return a picture of coloured triangles in painter's order: later triangles cover earlier ones.
+    """Return a picture of coloured triangles in painter's order: later triangles cover earlier ones, or blend with them.
 
     Parameters
     ----------
@@ -151,6 +153,13 @@ def fill(
         What a row of `colors` belongs to; "auto" tells by the number of rows.
     background : number or array_like, shape (C,), optional
         Fills the picture first; 0 when neither `background` nor `out` is given.
+    blend : "replace", "over", "add", "multiply", "max" or "min"
+        What the colour of a triangle does to what is there, one triangle after the other. "over" lets it through by the
+        alpha of the colour, the last of 2 or 4 channels. The others act on each channel alike, alpha included; uint8
+        sums stop at 255, and 255 is 1 in products. With ``sampling="area"`` the share of the pixel that the triangle
+        covers multiplies alpha, or is the share of the way from the old colour to the new.
+    alpha : "straight" or "premultiplied"
+        Whether colours and picture have been multiplied by alpha. Only "over" looks at it, and "replace" by area.
     out : ndarray of uint8 or float32, shape (H, W, C) or (H, W), optional
         Is drawn over.
 
@@ -177,7 +186,8 @@ def fill(
     array([[ 25,  75, 125,   9],
            [ 25,  75,   9,   9]], dtype=uint8)
     """
-    return draw_fill(SCRATCH, vertices, triangles, colors, View.parse(size, view), per, background, out)
+    checked = View.parse(size, view)
+    return draw_fill(SCRATCH, vertices, triangles, colors, checked, per, background, out, blend=blend, alpha=alpha)
 
 
 def rasterize(
@@ -304,11 +314,16 @@ class Rasterizer:
         *,
         per: str = "auto",
         background: ArrayLike | None = None,
+        blend: str = "replace",
+        alpha: str = "straight",
         out: NDArray[Any] | None = None,
         **view: Unpack[ViewOptions],
     ) -> NDArray[Any]:
         """Return a picture of coloured triangles in painter's order, as `topleft.fill` does."""
-        return draw_fill(self._memory, vertices, triangles, colors, self._view(view), per, background, out)
+        checked = self._view(view)
+        return draw_fill(
+            self._memory, vertices, triangles, colors, checked, per, background, out, blend=blend, alpha=alpha
+        )
 
     def rasterize(
         self,

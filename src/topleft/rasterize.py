@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from topleft import _engine
 from topleft.area import sum_areas
 from topleft.arrays import as_background, as_colors, as_matrix, as_out, as_triangles, as_vertices, bad_triangle
+from topleft.blend import Blending, blend_colors
 from topleft.classic import draw_classic, fill_classic, refuse_classic
 from topleft.fragments import Fragments
 from topleft.memory import Memory
@@ -304,10 +305,13 @@ def draw_fill(
     per: str,
     background: ArrayLike | None,
     out: object,
+    *,
+    blend: str,
+    alpha: str,
 ) -> NDArray[Any]:
     """`fill`, on the memory given."""
-    refuse_area(view, "fill")
     palette = as_colors(colors)
+    blending = Blending.parse(blend, alpha, palette, view)
     if view.classic:
         return fill_classic(view.classic, memory, vertices, triangles, palette, view, per, background, out)
     snapped = snap_scene(memory, vertices, triangles, view, with_depth=False, out=out)
@@ -319,7 +323,10 @@ def draw_fill(
             canvas[...] = ground
         elif out is None:
             canvas.fill(0)
-        paint(memory, snapped, view, palette, canvas, is_flat=is_flat)
+        if blending is None:
+            paint(memory, snapped, view, palette, canvas, is_flat=is_flat)
+        elif blend_colors(memory, snapped.scene, view, snapped.n_triangles, palette, canvas, blending, is_flat=is_flat):
+            check_triangles(snapped.triangles, snapped.corners, snapped.n_vertices)
     return result
 
 

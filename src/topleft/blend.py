@@ -1,0 +1,80 @@
+"""Blending: colours of triangles into a picture, one triangle after the other, in bands of rows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from topleft import _engine
+from topleft.memory import Memory
+from topleft.models import Alpha, Blend, Sampling, parse
+from topleft.threads import count_threads, run_parts
+from topleft.view import View
+
+__all__ = ["Blending", "blend_colors"]
+
+BLEND_CODES = {mode: code for code, mode in enumerate(Blend)}  # tl_blend in csrc/topleft.h
+
+
+@dataclass(frozen=True, slots=True)
+class Blending:
+    """How `fill` puts a colour into a pixel."""
+
+    mode: Blend
+    alpha: Alpha
+    by_area: bool
+
+    @classmethod
+    def parse(cls, mode: object, alpha: object, colors: NDArray[Any], view: View) -> Blending | None:
+        """Check the options of a call; None when a triangle simply replaces what its samples held.
+
+        Raises
+        ------
+        ValueError
+            If an option is unknown, "over" lacks alpha, or a classic is to blend.
+        """
+        chosen = cls(parse(Blend, "blend", mode), parse(Alpha, "alpha", alpha), view.sampling is Sampling.AREA)
+        n_channels = 1 if colors.ndim == 1 else colors.shape[1]
+        if chosen.mode is Blend.OVER and n_channels not in (2, 4):
+            raise ValueError(
+                f"colors must have 2 or 4 channels, the last of them alpha, for blend 'over', got {n_channels}"
+            )
+        if view.classic and chosen.mode is not Blend.REPLACE:
+            raise ValueError(f"blend must be 'replace' for method {view.classic.name!r}, got {str(chosen.mode)!r}")
+        return chosen if chosen.by_area or chosen.mode is not Blend.REPLACE else None
+
+
+def blend_colors(
+    memory: Memory,
+    scene: _engine.Scene,
+    view: View,
+    n_triangles: int,
+    colors: NDArray[Any],
+    pixels: NDArray[Any],
+    blending: Blending,
+    *,
+    is_flat: bool,
+) -> bool:
+    """Blend a scene into contiguous pixels; returns whether a triangle has an index outside the vertices."""
+    width, height = view.size
+    if not (width and height and n_triangles):
+        return False
+    n_parts = min(height, count_threads(view.threads, n_triangles))
+    n_channels, is_u8 = 1 if colors.ndim == 1 else colors.shape[1], colors.dtype == np.uint8
+    flat, palette = _engine.as_bytes(pixels), _engine.as_bytes(colors)
+    packed = memory.empty("packed", (height * width,), np.int32) if is_u8 and n_channels != 4 else None
+    n_cells = _engine.blend_cells(width)
+    cells = memory.constant("cells", n_parts * n_cells, _engine.CELL_CLEAR) if blending.by_area else None
+    code, is_premultiplied = BLEND_CODES[blending.mode], blending.alpha is Alpha.PREMULTIPLIED
+
+    def blend_part(i: int, _: int) -> int:
+        first, end = height * i // n_parts, height * (i + 1) // n_parts
+        own = None if cells is None else cells[n_cells * i : n_cells * (i + 1)]
+        return scene.blend(
+            flat, width, first, end - first, palette, n_channels, is_u8, is_flat, code, is_premultiplied, packed, own
+        )
+
+    return max(run_parts(blend_part, n_parts, n_parts)) >= 0
