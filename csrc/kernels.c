@@ -19,6 +19,7 @@
 #include "mix_u8.c"
 #include "mix_f32.c"
 #include "mix.c"
+#include "blend_strip.c"
 #include "blend_area.c"
 #include "blend.c"
 

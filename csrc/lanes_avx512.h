@@ -24,6 +24,9 @@ TL_INLINE vi vi_shift_left(vi a, int n) { return _mm512_sll_epi32(a, _mm_cvtsi32
 TL_INLINE vi vi_shift_right(vi a, int n) { return _mm512_sra_epi32(a, _mm_cvtsi32_si128(n)); }
 TL_INLINE vi vi_mul_halves(vi a, vi b) { return _mm512_mullo_epi16(a, b); }
 TL_INLINE vi vi_mul_high_halves(vi a, vi b) { return _mm512_mulhi_epu16(a, b); }
+TL_INLINE vi vi_scale_halves(vi a, vi b) { return _mm512_mulhrs_epi16(a, b); }
+TL_INLINE vi vi_add_halves(vi a, vi b) { return _mm512_add_epi16(a, b); }
+TL_INLINE vi vi_sub_halves(vi a, vi b) { return _mm512_sub_epi16(a, b); }
 TL_INLINE vi vi_upper_bytes(vi a) { return _mm512_srli_epi16(a, 8); }
 TL_INLINE vi vi_add_bytes(vi a, vi b) { return _mm512_adds_epu8(a, b); }
 TL_INLINE vi vi_max_bytes(vi a, vi b) { return _mm512_max_epu8(a, b); }

@@ -32,6 +32,13 @@ TL_INLINE vi vi_mul_high_halves(vi a, vi b)
     const uint32_t low = ((uint32_t)a & 0xffff) * ((uint32_t)b & 0xffff), high = ((uint32_t)a >> 16) * ((uint32_t)b >> 16);
     return (vi)((high & 0xffff0000) | low >> 16);
 }
+TL_INLINE vi vi_scale_halves(vi a, vi b)
+{
+    const int32_t low = ((int16_t)a * (int16_t)b + (1 << 14)) >> 15, high = ((a >> 16) * (b >> 16) + (1 << 14)) >> 15;
+    return (vi)((uint32_t)high << 16 | ((uint32_t)low & 0xffff));
+}
+TL_INLINE vi vi_add_halves(vi a, vi b) { return (vi)((((uint32_t)a & 0xffff0000) + ((uint32_t)b & 0xffff0000)) | (((uint32_t)a + (uint32_t)b) & 0xffff)); }
+TL_INLINE vi vi_sub_halves(vi a, vi b) { return (vi)((((uint32_t)a & 0xffff0000) - ((uint32_t)b & 0xffff0000)) | (((uint32_t)a - (uint32_t)b) & 0xffff)); }
 TL_INLINE vi vi_upper_bytes(vi a) { return (vi)((uint32_t)a >> 8 & 0x00ff00ff); }
 TL_INLINE vi vi_add_bytes(vi a, vi b)
 {

@@ -22,6 +22,11 @@ typedef enum {
     TL_MIX_MIN,
 } tl_mix;
 
+TL_INLINE int reads_alpha(tl_mix mode)
+{
+    return mode == TL_MIX_OVER_STRAIGHT || mode == TL_MIX_OVER_PREMULTIPLIED || mode == TL_MIX_REPLACE_STRAIGHT;
+}
+
 typedef struct blend_state {
     const tl_scene *scene;
     const tl_window *window;

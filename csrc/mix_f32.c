@@ -22,11 +22,6 @@ typedef struct {
     vm is_alpha;
 } f32_alphas;
 
-TL_INLINE int reads_alpha(tl_mix mode)
-{
-    return mode == TL_MIX_OVER_STRAIGHT || mode == TL_MIX_OVER_PREMULTIPLIED || mode == TL_MIX_REPLACE_STRAIGHT;
-}
-
 /* (s * above + d * below) / (above + below), and that sum as alpha. */
 TL_INLINE vf weigh_f32(vf d, vf s, vf above, vf below, vm alpha_lanes)
 {

@@ -69,70 +69,83 @@ TL_INLINE vi mix_whole_u8(vi d, vi s, vm m, tl_mix mode)
 
 /* ---- a colour over a part of the pixel ----------------------------------------------------------------------------- */
 
-/* The coverage in 1/65536, ties up. */
-TL_INLINE vi coverage_16(vi area) { return vi_shift_right(vi_add(area, vi_set1(128)), 8); }
+/* The coverage in 2^-15, ties up. */
+TL_INLINE vi coverage_15(vi area) { return vi_shift_right(vi_add(area, vi_set1(256)), 9); }
 
-/* d + (s - d) * weight / 65536, byte by byte, ties up. */
-TL_INLINE vi move_bytes(vi d, vi s, vi weight)
+/* What alpha makes of a coverage, in 2^-15, to nearest. */
+TL_INLINE vi weight_15(vi coverage, vi alpha)
 {
-    vi out = vi_set1(0);
-    for (int shift = 0; shift < 32; shift += 8) {
-        const vi from = byte_of(d, shift), step = vi_mul(vi_sub(byte_of(s, shift), from), weight);
-        const vi sum = vi_add(vi_add(vi_shift_left(from, 16), vi_set1(1 << 15)), step);
-        out = vi_or(out, vi_shift_left(vi_shift_right(sum, 16), shift));
-    }
-    return out;
+    if (!vm_any(vm_and_not(vm_all(), vi_eq(alpha, vi_set1(255)))))
+        return coverage;
+    return divide_24_bits(vi_mul(coverage, alpha), vi_set1(255));
 }
 
-/* d + (s * gain - d * loss) / 65536, at most 255. */
+/* d + (s - d) * weight / 2^15, byte by byte, ties up.  The weight is negated, for 2^15 itself is no 16-bit number. */
+TL_INLINE vi move_bytes(vi d, vi s, vi weight)
+{
+    const vi minus = vi_sub_halves(vi_set1(0), in_both_halves(weight)), even = even_bytes(d), odd = odd_bytes(d);
+    return join_bytes(vi_add_halves(even, vi_scale_halves(vi_sub_halves(even, even_bytes(s)), minus)),
+                      vi_add_halves(odd, vi_scale_halves(vi_sub_halves(odd, odd_bytes(s)), minus)));
+}
+
+/* d + (s * gain - d * loss) / 2^15, ties up, at most 255. */
 TL_INLINE vi trade_bytes(vi d, vi s, vi gain, vi loss)
 {
     vi out = vi_set1(0);
     for (int shift = 0; shift < 32; shift += 8) {
         const vi from = byte_of(d, shift), step = vi_sub(vi_mul(byte_of(s, shift), gain), vi_mul(from, loss));
-        const vi sum = vi_shift_right(vi_add(vi_add(vi_shift_left(from, 16), vi_set1(1 << 15)), step), 16);
+        const vi sum = vi_shift_right(vi_add(vi_add(vi_shift_left(from, 15), vi_set1(1 << 14)), step), 15);
         out = vi_or(out, vi_shift_left(vi_min(sum, vi_set1(255)), shift));
     }
     return out;
 }
 
-/* (a * b * c + d * e * f) / divisor, rounded to nearest, ties to even: sums below 2^40, the quotient at most 255 and, with the
- * divisor below 2^32, at least 2^-33 from the middle between two integers unless it is there. */
+/* (a * b + c * d) / divisor, rounded to nearest, ties to even: sums below 2^39, the quotient at most 255 and, with the divisor
+ * below 2^31, at least 2^-32 from the middle between two integers unless it is there. */
 TL_INLINE vi divide_sums(vi color, vd above, vi under, vd below, vd divisor)
 {
     return vi_round(vd_div(vd_add(vd_mul(vd_from_vi(color), above), vd_mul(vd_from_vi(under), below)), divisor));
 }
 
 /* Straight alpha where one of the two is translucent: `alpha`, of the colour in this pixel, and `rest`, what it leaves of the
- * other one, in 1 / (255 * 65536). */
+ * other one, in 1 / (255 * 2^15). */
 static __attribute__((noinline)) vi cover_translucent(vi d, vi s, vi alpha, vi rest)
 {
     const vi under = byte_of(d, 24), zero = vi_set1(0);
     const vd above = vd_mul(vd_from_vi(alpha), vd_set1(255.0)), below = vd_mul(vd_from_vi(under), vd_from_vi(rest));
     const vd sum = vd_add(above, below), divisor = vd_max(sum, vd_set1(1.0));
-    vi out = vi_shift_left(vi_round(vd_div(sum, vd_set1(255.0 * 65536.0))), 24);
+    vi out = vi_shift_left(vi_round(vd_div(sum, vd_set1(255.0 * 0x1p15))), 24);
     for (int shift = 0; shift < 24; shift += 8)
         out = vi_or(out, vi_shift_left(divide_sums(byte_of(s, shift), above, byte_of(d, shift), below, divisor), shift));
     const vm nothing_under = vm_or(vi_eq(under, zero), vi_eq(rest, zero));
     return vi_select(vm_and(vi_eq(alpha, zero), nothing_under), d, out);
 }
 
-/* `area`: of each pixel, in (0, TL_WHOLE].  The same as mix_whole_u8 where it is TL_WHOLE. */
+/* A part of each pixel. */
 TL_INLINE vi mix_part_u8(vi d, vi s, vi area, vm m, tl_mix mode)
 {
-    const vi opaque = vi_set1((int32_t)0xff000000), coverage = coverage_16(area), alpha = byte_of(s, 24);
+    const vi opaque = vi_set1((int32_t)0xff000000), coverage = coverage_15(area), alpha = byte_of(s, 24);
     if (mode == TL_MIX_OVER_STRAIGHT || mode == TL_MIX_REPLACE_STRAIGHT) {
-        const vi weight = divide_24_bits(vi_mul(coverage, alpha), vi_set1(255));
+        const vi weight = weight_15(coverage, alpha);
         const vm under = translucent(d), either = mode == TL_MIX_OVER_STRAIGHT ? under : vm_or(under, translucent(s));
         if (__builtin_expect(!vm_any(vm_and(m, either)), 1))
             return move_bytes(d, vi_or(s, opaque), weight);
-        const vi fine = vi_select(vi_eq(coverage, vi_set1(1 << 16)), vi_shift_left(alpha, 16), vi_mul(weight, vi_set1(255)));
-        const vi gone = mode == TL_MIX_OVER_STRAIGHT ? fine : vi_mul(coverage, vi_set1(255));
-        return cover_translucent(d, s, fine, vi_sub(vi_set1(255 << 16), gone));
+        const vi fine = vi_mul(weight, vi_set1(255)), gone = mode == TL_MIX_OVER_STRAIGHT ? fine : vi_mul(coverage, vi_set1(255));
+        return cover_translucent(d, s, fine, vi_sub(vi_set1(255 << 15), gone));
     }
     if (mode == TL_MIX_OVER_PREMULTIPLIED)
-        return trade_bytes(d, s, coverage, divide_24_bits(vi_mul(coverage, alpha), vi_set1(255)));
+        return trade_bytes(d, s, coverage, weight_15(coverage, alpha));
     return move_bytes(d, mode == TL_MIX_REPLACE ? s : mix_whole_u8(d, s, m, mode), coverage);
+}
+
+/* The same, and what it should be where the part is the whole: a weight in 2^-15 is too coarse for an alpha below 255. */
+TL_INLINE vi mix_area_u8(vi d, vi s, vi area, vm m, tl_mix mode, tl_mix whole_mode)
+{
+    const vi part = mix_part_u8(d, s, area, m, mode);
+    const vm whole = vm_and(m, vi_eq(area, vi_set1(TL_WHOLE)));
+    if (!reads_alpha(mode) || whole_mode == TL_MIX_REPLACE || !vm_any(whole))
+        return mode == TL_MIX_REPLACE_STRAIGHT ? vi_select(whole, s, part) : part;
+    return vi_select(whole, mix_whole_u8(d, s, m, mode), part);
 }
 
 /* ---- pixels of the canvas ------------------------------------------------------------------------------------------ */
@@ -171,7 +184,7 @@ TL_INLINE void mix_source_u8(blend_state *b, int64_t at, int n, tl_mix mode)
 TL_INLINE void mix_block_u8(blend_state *b, int64_t at, vm m, vi area, tl_mix mode)
 {
     const vi d = vi_load_masked(m, b->packed + at), s = b->is_flat ? vi_set1(b->color) : vi_load(b->source);
-    store_u8(b, at, m, mix_part_u8(d, s, area, m, mode));
+    store_u8(b, at, m, mix_area_u8(d, s, area, m, mode, b->whole_mode));
 }
 
 /* ---- fewer channels ------------------------------------------------------------------------------------------------ */

@@ -81,7 +81,8 @@ static void paint_piece(const resolve_state *s, const int32_t *corners, int64_t 
     double part[3], sum = 0.0;
     for (int k = 0; k < 3; k++) {
         const int a = k == 2 ? 0 : k + 1, b = 3 - k - a;
-        part[k] = (double)doubled_edge(&s->triangle, a, b, x_px, y_px, bits);
+        const tl_int128 edge = doubled_edge(&s->triangle, a, b, x_px, y_px, bits);
+        part[k] = edge > 0 ? (double)edge : 0.0; /* below 0 only where a piece covers a pixel but not its centre */
         sum += part[k];
     }
     for (int c = 0; c < n_channels; c++) {

@@ -1,8 +1,7 @@
 """Blending: each pixel as in the reference, in painter's order, the same bits on every build and without seams."""
 
-from fractions import Fraction
 from functools import lru_cache
-from itertools import pairwise, product
+from itertools import product
 
 import numpy as np
 import pytest
@@ -71,8 +70,40 @@ def test_blend_flat_equals_reference(mode, alpha, n_channels, dtype, isa):
             assert_exact(got, expected)
 
 
+@lru_cache(None)
+def single_areas():
+    """How much of each pixel every triangle of the scenes covers; `test_area.py` has the proof of it."""
+    return [
+        np.stack([tl.coverage(s.vertices, [t], s.size, sampling="area", **s.view) for t in s.triangles])
+        for s in small_scenes()
+    ]
+
+
+@lru_cache(None)
+def expected_by_areas(mode, alpha, n_channels, dtype):
+    found = []
+    for (scene, colors, ground, _), areas in zip(
+        expected_by_samples(mode, alpha, n_channels, dtype), single_areas(), strict=True
+    ):
+        options = {"per": "triangle", "mode": mode, "alpha": alpha, "background": ground, "coverages": areas}
+        found.append((scene, colors, ground, ref.blend(*scene.arrays[:2], colors, scene.size, **options)))
+    return found
+
+
 @ON_EACH_ISA
-@pytest.mark.parametrize(("mode", "alpha", "n_channels"), [("over", "straight", 4), ("multiply", "straight", 3), ("add", "straight", 1)])
+@pytest.mark.parametrize("dtype", [np.uint8, np.float32])
+@pytest.mark.parametrize(("mode", "alpha", "n_channels"), CASES)
+def test_blend_by_area_equals_reference(mode, alpha, n_channels, dtype, isa):
+    for scene, colors, ground, expected in expected_by_areas(mode, alpha, n_channels, dtype):
+        with on(isa):
+            got = draw(scene, colors, per="triangle", blend=mode, alpha=alpha, out=ground.copy(), sampling="area")
+        assert_exact(got, expected)
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize(
+    ("mode", "alpha", "n_channels"), [("over", "straight", 4), ("multiply", "straight", 3), ("add", "straight", 1)]
+)
 def test_blend_gouraud_equals_reference(mode, alpha, n_channels, isa):
     scene = small_scenes()[0]
     rng = np.random.default_rng(8)
@@ -86,7 +117,7 @@ def test_blend_gouraud_equals_reference(mode, alpha, n_channels, isa):
 @ON_EACH_ISA
 @pytest.mark.parametrize("dtype", [np.uint8, np.float32])
 def test_blend_gouraud_of_one_layer_is_the_fill(dtype, isa):
-    """Over nothing that a colour lets through, every mode that keeps the colour gives what `fill` gives; cut ones too."""
+    """Added to black, colours are what `fill` gives; those of triangles that a clip plane has cut, too."""
     for scene in small_scenes():
         for triangle in scene.triangles[:30]:
             one = Scene(scene.vertices, [triangle], scene.size)
@@ -118,7 +149,12 @@ def test_blend_over_of_every_number_is_the_nearest(isa):
 def test_blend_multiply_and_add_of_every_number_are_right(isa):
     scene, old, new = every_pair()
     ground, colors = np.tile(np.arange(256, dtype=np.uint8), (256, 1)), np.arange(256, dtype=np.uint8)
-    wish = {"multiply": (old * new + 127) // 255, "add": np.minimum(old + new, 255), "max": np.maximum(old, new), "min": np.minimum(old, new)}
+    wish = {
+        "multiply": (old * new + 127) // 255,
+        "add": np.minimum(old + new, 255),
+        "max": np.maximum(old, new),
+        "min": np.minimum(old, new),
+    }
     with on(isa):
         for mode, expected in wish.items():
             got = draw(scene, colors, per="triangle", blend=mode, out=ground.copy())
@@ -170,31 +206,50 @@ def crowd_picture(colors, **options):
     return draw(scene, colors, per="vertex" if len(colors) == len(scene.vertices) else "triangle", **options)
 
 
-KINDS = [("over", np.uint8, 4, False), ("over", np.float32, 4, False), ("multiply", np.uint8, 3, False), ("over", np.uint8, 2, True), ("add", np.float32, 3, True)]
+#: Mode, type, channels, whether colours are those of vertices, sampling.
+KINDS = [
+    ("over", np.uint8, 4, False, "center"),
+    ("over", np.float32, 4, False, "center"),
+    ("multiply", np.uint8, 3, False, "center"),
+    ("over", np.uint8, 2, True, "center"),
+    ("add", np.float32, 3, True, "center"),
+    ("over", np.uint8, 4, False, "area"),
+    ("replace", np.float32, 2, False, "area"),
+    ("replace", np.uint8, 3, True, "area"),
+    ("over", np.float32, 4, True, "area"),
+]
+ON_EACH_KIND = pytest.mark.parametrize(("mode", "dtype", "n_channels", "per_vertex", "sampling"), KINDS)
 
 
-@ON_EACH_ISA
-@pytest.mark.parametrize(("mode", "dtype", "n_channels", "per_vertex"), KINDS)
-def test_blend_is_the_same_on_any_isa_and_threads(mode, dtype, n_channels, per_vertex, isa):
+@lru_cache(None)
+def scalar_picture(mode, dtype, n_channels, per_vertex, sampling):
     colors = crowd_colors(dtype, n_channels, per_vertex=per_vertex)
     with on("scalar"):
-        expected = crowd_picture(colors, blend=mode, background=1, threads=1)
-    for n in THREADS:
-        with on(isa):
-            assert_same(crowd_picture(colors, blend=mode, background=1, threads=n), expected)
+        return crowd_picture(colors, blend=mode, background=1, sampling=sampling, threads=1)
 
 
 @ON_EACH_ISA
-@pytest.mark.parametrize(("mode", "dtype", "n_channels", "per_vertex"), KINDS)
-def test_blend_of_a_window_is_the_crop(mode, dtype, n_channels, per_vertex, isa):
+@ON_EACH_KIND
+def test_blend_is_the_same_on_any_isa_and_threads(mode, dtype, n_channels, per_vertex, sampling, isa):
+    colors = crowd_colors(dtype, n_channels, per_vertex=per_vertex)
+    options = {"blend": mode, "background": 1, "sampling": sampling}
+    expected = scalar_picture(mode, dtype, n_channels, per_vertex, sampling)
+    for n in THREADS:
+        with on(isa):
+            assert_same(crowd_picture(colors, threads=n, **options), expected)
+
+
+@ON_EACH_ISA
+@ON_EACH_KIND
+def test_blend_of_a_window_is_the_crop(mode, dtype, n_channels, per_vertex, sampling, isa):
     scene, _ = crowd()
     colors = crowd_colors(dtype, n_channels, per_vertex=per_vertex)
     with on(isa):
-        whole = crowd_picture(colors, blend=mode, background=1)
+        whole = crowd_picture(colors, blend=mode, background=1, sampling=sampling)
         for x, y, width, height in [(0, 0, 1, 1), (5, 7, 33, 20), (90, 1, 67, 82), (156, 82, 1, 1), (17, 40, 16, 3)]:
             window = Scene(scene.vertices, scene.triangles, (width, height))
             per = "vertex" if per_vertex else "triangle"
-            part = draw(window, colors, per=per, blend=mode, background=1, origin=(x, y))
+            part = draw(window, colors, per=per, blend=mode, background=1, origin=(x, y), sampling=sampling)
             assert_same(part, whole[y : y + height, x : x + width])
 
 
@@ -203,13 +258,15 @@ def test_blend_is_in_painters_order(isa):
     """What is drawn in two calls is what is drawn in one."""
     scene, _ = crowd()
     colors = crowd_colors(np.uint8, 4)
-    with on(isa):
-        expected = crowd_picture(colors, blend="over", background=(9, 9, 9, 90))
-        for cut in (1, 7, 1999, 2010, 4005):
-            got = np.full((83, 157, 4), (9, 9, 9, 90), np.uint8)
-            for part in (slice(0, cut), slice(cut, None)):
-                tl.fill(scene.vertices, scene.triangles[part], colors[part], scene.size, per="triangle", blend="over", out=got)
-            assert_same(got, expected)
+    for sampling in ("center", "area"):
+        options = {"per": "triangle", "blend": "over", "sampling": sampling}
+        with on(isa):
+            expected = crowd_picture(colors, blend="over", background=(9, 9, 9, 90), sampling=sampling)
+            for cut in (1, 7, 1999, 2010, 4005):
+                got = np.full((83, 157, 4), (9, 9, 9, 90), np.uint8)
+                for part in (slice(0, cut), slice(cut, None)):
+                    tl.fill(scene.vertices, scene.triangles[part], colors[part], scene.size, out=got, **options)
+                assert_same(got, expected)
 
 
 @ON_EACH_ISA
@@ -220,10 +277,67 @@ def test_blend_of_a_mesh_at_half_alpha_shows_no_seams(isa):
         for color in np.array([[200, 100, 50, 128]], np.uint8), np.array([[0.7, 0.4, 0.2, 0.5]], np.float32):
             ground = 255 if color.dtype == np.uint8 else 1
             with on(isa):
-                got = draw(scene, np.repeat(color, len(scene.triangles), 0), per="triangle", blend="over", background=ground)
-                once = tl.fill([[-9, -9], [500, -9], [-9, 500]], [[0, 1, 2]], color, (1, 1), per="triangle", blend="over", background=ground)
+                got = draw(
+                    scene, np.repeat(color, len(scene.triangles), 0), per="triangle", blend="over", background=ground
+                )
+                once = tl.fill(
+                    [[-9, -9], [500, -9], [-9, 500]],
+                    [[0, 1, 2]],
+                    color,
+                    (1, 1),
+                    per="triangle",
+                    blend="over",
+                    background=ground,
+                )
             assert (got[covered] == once[0, 0]).all()
             assert (got[~covered] == ground).all()
+
+
+@ON_EACH_ISA
+def test_blend_by_area_of_vertex_colours_that_agree_is_flat(isa):
+    """Also where a clip plane has cut the triangles, and pixel centres lie beside the pieces."""
+    for scene in small_scenes():
+        color = random_colors(np.random.default_rng(5), (1, 4), np.uint8, "straight")
+        options = {"blend": "over", "sampling": "area", "background": 1}
+        with on(isa):
+            got = draw(scene, np.repeat(color, len(scene.vertices), 0), per="vertex", **options)
+            flat = draw(scene, np.repeat(color, len(scene.triangles), 0), per="triangle", **options)
+        assert_same(got, flat)
+
+
+@ON_EACH_ISA
+def test_blend_by_area_of_vertex_colours_is_the_fill_inside(isa):
+    scene = soup([[1.3, 2.1], [60, 9.7], [20.2, 50]], (64, 64))
+    colors = np.array([[0, 255], [255, 255], [90, 255]], np.uint8)
+    with on(isa):
+        fill = draw(scene, colors, per="vertex")
+        got = draw(scene, colors, per="vertex", sampling="area", background=7)
+        inside = tl.coverage(*scene.arrays, sampling="area") == 1
+    assert inside.sum() > 500
+    assert_same(got[inside], fill[inside])
+
+
+@ON_EACH_ISA
+def test_blend_by_area_takes_weights_below_zero_as_zero(isa):
+    """The centre lies left of the triangle, half way up its edge: both colours there count, and the third does not."""
+    scene = soup([[0.75, -8], [0.75, 9], [8, 0.5]], (1, 1))
+    with on(isa):
+        got = draw(scene, np.array([100, 200, 0], np.uint8), per="vertex", sampling="area", blend="max")
+        color = (100 * 8.5 + 200 * 8.5) / 17
+        area = float(tl.coverage(*scene.arrays, sampling="area")[0, 0])
+    assert abs(int(got[0, 0]) - color * area) < 3
+
+
+def test_blend_by_area_shows_seams_that_the_sum_of_areas_does_not():
+    """Two halves of a pixel over black leave a quarter of it: 1 - (1 - a) * (1 - b) is below a + b."""
+    rng = np.random.default_rng(0)
+    mesh = jittered_grid(rng, 40, 90)
+    white = np.full((len(mesh.triangles), 3), 255, np.uint8)
+    got = draw(mesh, white, per="triangle", sampling="area")
+    assert (tl.overdraw(*mesh.arrays, sampling="area") == 1).all()
+    assert (got < 255).any(axis=-1).mean() > 0.25
+    assert got.min() < 192  # where triangles share a pixel evenly: 3 / 4 of 255 and less
+    assert (draw(mesh, white, per="triangle") == 255).all()
 
 
 # ---- the calls ------------------------------------------------------------------------------------------------------
@@ -252,12 +366,12 @@ def test_blend_of_nothing_is_the_background(size):
 
 @pytest.mark.parametrize("n", [1, 3])
 def test_blend_over_without_alpha_raises(n):
-    with pytest.raises(ValueError, match=f"colors must have 2 or 4 channels, the last of them alpha, for blend 'over', got {n}"):
+    with pytest.raises(ValueError, match=f"colors must have 2 or 4 channels, .* got {n}"):
         tl.fill(*ONE, np.zeros((1, n), np.uint8), (4, 4), blend="over")
 
 
 def test_blend_unknown_options_raise():
-    with pytest.raises(ValueError, match="blend must be one of 'replace', 'over', .* got 'screen'"):
+    with pytest.raises(ValueError, match=r"blend must be one of 'replace', 'over', .* got 'screen'"):
         tl.fill(*ONE, [[1]], (4, 4), blend="screen")
     with pytest.raises(ValueError, match="alpha must be one of 'straight', 'premultiplied', got 'none'"):
         tl.fill(*ONE, [[1]], (4, 4), alpha="none")

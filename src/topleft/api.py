@@ -45,7 +45,7 @@ def coverage(
         origin : (int, int). The pixel of the whole picture that is row 0, column 0 here.
         viewport : (int, int). Width and height of the whole picture for clip space; default `size`.
         subpixel_bits : int, 0 to 16. Vertices snap to ``2**-subpixel_bits`` pixels; default 8.
-        sampling : "center", or "area": the exact area of the pixel (`coverage` and `overdraw` alone).
+        sampling : "center", or "area": the exact area of the pixel (`coverage`, `overdraw` and `fill`).
         method : "auto", "edge" or "scanline": the same picture. Or a classic of the literature, to compare with:
             `topleft.methods.CLASSICS` names them, and docs/methods.md tells where each of them fails.
         cull : "none", "back" or "front"; the front is counter-clockwise seen with y up.
@@ -140,7 +140,7 @@ def fill(
     out: NDArray[Any] | None = None,
     **view: Unpack[ViewOptions],
 ) -> NDArray[Any]:
-    """Return a picture of coloured triangles in painter's order: later triangles cover earlier ones, or blend with them.
+    """Return a picture of coloured triangles in painter's order: later ones cover earlier ones, or blend with them.
 
     Parameters
     ----------
@@ -177,7 +177,7 @@ def fill(
 
     References
     ----------
-    H. Gouraud, Continuous Shading of Curved Surfaces, 1971.
+    H. Gouraud, Continuous Shading of Curved Surfaces, 1971; T. Porter, T. Duff, Compositing Digital Images, 1984.
 
     Examples
     --------
@@ -185,6 +185,9 @@ def fill(
     >>> tl.fill([[0, 0], [4, 0], [0, 4]], [[0, 1, 2]], [0, 200, 0], (4, 2), per="vertex", background=9)
     array([[ 25,  75, 125,   9],
            [ 25,  75,   9,   9]], dtype=uint8)
+    >>> twice, half_white = [[0, 1, 2]] * 2, [[255, 128]] * 2
+    >>> tl.fill([[0, 0], [4, 0], [0, 4]], twice, half_white, (4, 1), blend="over", background=(0, 255))[..., 0]
+    array([[192, 192, 192,   0]], dtype=uint8)
     """
     checked = View.parse(size, view)
     return draw_fill(SCRATCH, vertices, triangles, colors, checked, per, background, out, blend=blend, alpha=alpha)

@@ -7,7 +7,7 @@ Based on: T. Porter, T. Duff, Compositing Digital Images, 1984.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from math import floor
 from typing import Any
@@ -17,12 +17,27 @@ import numpy as np
 from topleft.methods.reference import Point, fragments
 
 ONE = np.float32(1)
-ZERO = np.float32(0)
 
 
 def nearest(value: Fraction) -> int:
     """Return the nearest integer, the upper one of two."""
     return floor(value + Fraction(1, 2))
+
+
+_NEW_UINT8: dict[str, Callable[[int, int], int]] = {
+    "replace": lambda _, s: s,
+    "add": lambda d, s: min(255, d + s),
+    "multiply": lambda d, s: nearest(Fraction(d * s, 255)),
+    "max": max,
+    "min": min,
+}
+_NEW_FLOAT32: dict[str, Callable[[np.float32, np.float32], np.float32]] = {
+    "replace": lambda _, s: s,
+    "add": lambda d, s: d + s,
+    "multiply": lambda d, s: d * s,
+    "max": lambda d, s: s if d < s else d,
+    "min": lambda d, s: s if s < d else d,
+}
 
 
 def blend_uint8(old: Sequence[int], color: Sequence[int], mode: str, alpha: str, coverage: Fraction) -> list[int]:
@@ -35,32 +50,34 @@ def blend_uint8(old: Sequence[int], color: Sequence[int], mode: str, alpha: str,
     """
     if coverage == 0:
         return list(old)
-    share = Fraction(nearest(coverage * 2**16), 2**16)
+    share = Fraction(nearest(coverage * 2**15), 2**15)
     has_alpha = len(old) in (2, 4)
     if mode in ("over", "replace") and has_alpha and alpha == "straight":
-        return _weigh_uint8(old, color, share, is_over=mode == "over")
+        weight = _alpha_uint8(color[-1], coverage, share)
+        return _weigh_uint8(old, color, 1 if coverage == 1 else share, weight, is_over=mode == "over")
     if mode == "over":
-        loss = Fraction(nearest(share * 2**16 * color[-1] / 255), 2**16)
+        loss = _alpha_uint8(color[-1], coverage, share)
         return [min(255, nearest(d + s * share - d * loss)) for d, s in zip(old, color, strict=True)]
-    new = {
-        "replace": lambda d, s: s,
-        "add": lambda d, s: min(255, d + s),
-        "multiply": lambda d, s: nearest(Fraction(d * s, 255)),
-        "max": max,
-        "min": min,
-    }[mode]
+    new = _NEW_UINT8[mode]
     return [nearest(d + (new(d, s) - d) * share) for d, s in zip(old, color, strict=True)]
 
 
-def _weigh_uint8(old: Sequence[int], color: Sequence[int], share: Fraction, *, is_over: bool) -> list[int]:
+def _alpha_uint8(alpha: int, coverage: Fraction, share: Fraction) -> Fraction:
+    """Return the alpha of a colour in a pixel: what it is in a whole one, else a multiple of 2**-15."""
+    return Fraction(alpha, 255) if coverage == 1 else Fraction(nearest(share * 2**15 * alpha / 255), 2**15)
+
+
+def _weigh_uint8(
+    old: Sequence[int], color: Sequence[int], share: Fraction | int, above: Fraction, *, is_over: bool
+) -> list[int]:
     """Return old and new colour in proportion to what each of them covers, and both together as alpha."""
-    weight = Fraction(nearest(share * 2**16 * color[-1] / 255), 2**16)
+    if share == 1 and not is_over:
+        return list(color)
     if old[-1] == 255 and (is_over or color[-1] == 255):
-        return [nearest(d + (s - d) * weight) for d, s in zip([*old[:-1], 255], [*color[:-1], 255], strict=True)]
-    above = Fraction(color[-1], 255) if share == 1 else weight
+        return [nearest(d + (s - d) * above) for d, s in zip([*old[:-1], 255], [*color[:-1], 255], strict=True)]
     below = Fraction(old[-1], 255) * (1 - (above if is_over else share))
     if above + below == 0:
-        return list(color) if share == 1 and not is_over else list(old)
+        return list(old)
     mixed = [round((s * above + d * below) / (above + below)) for d, s in zip(old[:-1], color[:-1], strict=True)]
     return [*mixed, round(255 * (above + below))]
 
@@ -83,13 +100,7 @@ def blend_float32(
         return [*((s * above + d * below) / total for d, s in zip(old[:-1], color[:-1], strict=True)), total]
     if mode == "over":
         return [s * c + d * (ONE - color[-1] * c) for d, s in zip(old, color, strict=True)]
-    new = {
-        "replace": lambda d, s: s,
-        "add": lambda d, s: d + s,
-        "multiply": lambda d, s: d * s,
-        "max": lambda d, s: max(s, d),
-        "min": lambda d, s: min(s, d),
-    }[mode]
+    new = _NEW_FLOAT32[mode]
     return [new(d, s) * c + d * (ONE - c) for d, s in zip(old, color, strict=True)]
 
 
