@@ -71,6 +71,7 @@ TL_INLINE void vd_quotients(const vd *a, vd b, vd *q)
 }
 TL_INLINE vd vd_abs(vd a) { return fabs(a); }
 TL_INLINE vd vd_floor(vd a) { return floor(a); }
+TL_INLINE vd vd_sqrt(vd a) { return sqrt(a); }
 TL_INLINE vd vd_min(vd a, vd b) { return a < b ? a : b; }
 TL_INLINE vd vd_max(vd a, vd b) { return a > b ? a : b; }
 TL_INLINE vm vd_ge(vd a, vd b) { return a >= b; }
@@ -79,15 +80,17 @@ TL_INLINE vi vi_round(vd a) { return fabs(a) < 0x1p31 ? (vi)rint(a) : INT32_MIN;
 TL_INLINE vd vd_select(vm m, vd a, vd b) { return m ? a : b; }
 TL_INLINE void vd_store(double *p, vd a) { *p = a; }
 
-/* The vertices first[3 * lane] of TL_LANES triangles.  z is left in the order of the loads until it is needed. */
+/* The vertices first[step * lane] of TL_LANES pairs or triangles.  z is left in the order of the loads until it is needed. */
 typedef double vz;
-TL_INLINE void load_vertices(const tl_vertex *v, const int32_t *first, vi *x, vi *y, vz *z)
+TL_INLINE void load_vertices_by(int step, const tl_vertex *v, const int32_t *first, vi *x, vi *y, vz *z)
 {
+    (void)step;
     const tl_vertex a = v[first[0]];
     *x = a.x_fx;
     *y = a.y_fx;
     *z = a.z;
 }
+TL_INLINE void load_vertices(const tl_vertex *v, const int32_t *first, vi *x, vi *y, vz *z) { load_vertices_by(3, v, first, x, y, z); }
 TL_INLINE vd vd_from_vz(vz z) { return z; }
 
 /* The first four numbers of TL_LANES rows, as columns; reads up to two numbers past the last row. */
