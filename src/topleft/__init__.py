@@ -2,7 +2,7 @@
 
 from topleft import scenes
 from topleft._isa import build_info
-from topleft.api import Rasterizer, coverage, fill, overdraw, rasterize
+from topleft.api import Rasterizer, coverage, fill, overdraw, rasterize, wireframe
 from topleft.camera import Camera
 from topleft.errors import MeshError, TopleftError
 from topleft.files import load, save_image
@@ -34,4 +34,5 @@ __all__ = [
     "scenes",
     "shade",
     "visibility",
+    "wireframe",
 ]
