@@ -74,6 +74,6 @@ static int find_ends(const tl_edges *lines, const int32_t *edge, line_end *ends)
 /* Whether a line at this depth shows at a pixel. */
 static inline int shows_depth(const tl_line_target *target, int64_t at, float z)
 {
-    const double there = (double)target->depth[at];
-    return target->is_farthest ? (double)z >= there - target->depth_bias : (double)z <= there + target->depth_bias;
+    const double away = target->is_farthest ? -1.0 : 1.0;
+    return away * (double)z <= away * (double)target->depth[at] + target->depth_bias;
 }

@@ -26,17 +26,46 @@ static inline void put_pixel(const line_state *s, int64_t at, float z)
         ((uint8_t *)s->target->pixels)[at] = 1;
 }
 
-static void flush_pixels(line_state *s)
+static void flush_plain(line_state *s)
 {
-    uint8_t *pixels = s->target->pixels;
-    for (int32_t k = 0; k < s->n && !s->has_depth; k++)
-        pixels[(uint32_t)s->at[k]] = 1;
-    for (int32_t k = 0; k < s->n && s->has_depth; k++) {
+    uint8_t *restrict pixels = s->target->pixels;
+    const int32_t *restrict at = s->at, n = s->n;
+    int32_t k = 0;
+    /* four loads for eight stores: a load waits for any store before it whose address ends in the same 12 bits; 30 % of
+     * blob(100k) */
+    for (; k + 8 <= n; k += 8) {
+        uint64_t pairs[4];
+        memcpy(pairs, at + k, sizeof pairs);
+        for (int j = 0; j < 4; j++) {
+            pixels[(uint32_t)pairs[j]] = 1;
+            pixels[pairs[j] >> 32] = 1;
+        }
+    }
+    for (; k < n; k++)
+        pixels[(uint32_t)at[k]] = 1;
+    s->n = 0;
+}
+
+/* No branch: what is hidden cannot be predicted; a third of the time. */
+static void flush_hidden(line_state *s)
+{
+    const tl_line_target own = *s->target, *target = &own; /* a copy that no store can change */
+    uint8_t *restrict pixels = target->pixels;
+    const int32_t *restrict at = s->at, *restrict z_bits = s->z, n = s->n;
+    for (int32_t k = 0; k < n; k++) {
         float z;
-        memcpy(&z, s->z + k, sizeof z);
-        put_pixel(s, (uint32_t)s->at[k], z);
+        memcpy(&z, z_bits + k, sizeof z);
+        pixels[(uint32_t)at[k]] |= (uint8_t)shows_depth(target, (uint32_t)at[k], z);
     }
     s->n = 0;
+}
+
+static void flush_pixels(line_state *s)
+{
+    if (s->has_depth)
+        flush_hidden(s);
+    else
+        flush_plain(s);
 }
 
 /* The steps [first, last] of a line that are inside the window. */
@@ -106,9 +135,10 @@ typedef struct {
 /* Steps all lines together and lists their pixels. */
 TL_INLINE void walk_lines(line_state *s, const lane_lines *l, vm live, int has_depth)
 {
-    const vi one = vi_set1(1), last = vi_sub(l->steps, one), zero = vi_set1(0);
-    vi at = vi_add(vi_mul(l->y, vi_set1((int32_t)s->target->stride_px)), l->x), rest = vi_shift_right(l->steps, 1), left = l->steps;
-    vm on = live;
+    const vi one = vi_set1(1), none = vi_set1(-1), last = vi_sub(l->steps, one), across = l->across, along = l->along, aside = l->aside;
+    vi at = vi_add(vi_mul(l->y, vi_set1((int32_t)s->target->stride_px)), l->x), rest = vi_shift_right(l->steps, 1);
+    vi left = vi_select(live, l->steps, none);
+    vm on = vi_gt(left, none);
     int32_t n = s->n;
     for (int k = 0; vm_any(on); k++) {
         vi_compress(s->at + n, on, at);
@@ -117,12 +147,13 @@ TL_INLINE void walk_lines(line_state *s, const lane_lines *l, vm live, int has_d
             vi_compress(s->z + n, on, vi_bits_of_vf(z));
         }
         n += __builtin_popcount(vm_bits(on));
-        rest = vi_add(rest, l->across);
+        rest = vi_add(rest, across);
+        at = vi_add(at, along);
         const vm turn = vi_gt(rest, last);
         rest = vi_select(turn, vi_sub(rest, l->steps), rest);
-        at = vi_add(vi_add(at, l->along), vi_select(turn, l->aside, zero));
+        at = vi_select(turn, vi_add(at, aside), at);
         left = vi_sub(left, one);
-        on = vm_and_not(on, vi_gt(zero, left));
+        on = vi_gt(left, none);
     }
     s->n = n;
 }
