@@ -5,7 +5,7 @@
  * Arithmetic is IEEE, rounded to nearest, multiply and add apart: every instruction set gives the same bits.  The scalar
  * lanes (TL_LANES = 1) are the definition.  vd_quotients(a, b, q) divides three numbers by one, each correctly rounded.  Loads and stores need no alignment.  Intrinsics live in lanes_*.h alone.
  *
- *   v?_set1 v?_load v?_store v?_iota v?_add v?_sub v?_mul v?_div v?_min v?_max vd_sqrt   as their names say; vi wraps
+ *   v?_set1 v?_load v?_store v?_iota v?_add v?_sub v?_mul v?_div v?_min v?_max vf_sqrt   as their names say; vi wraps
  *   v?_select(m, a, b)      a where m, else b
  *   v?_load_masked, v?_store_masked    touch only the memory of lanes in m
  *   vi_compress(p, m, v)    the lanes in m, packed, at p; writes a whole vector

@@ -67,8 +67,10 @@ TL_INLINE void vi_compress(int32_t *p, vm m, vi a) { vi_store(p, _mm256_permutev
 
 TL_INLINE vf vf_set1(float a) { return _mm256_set1_ps(a); }
 TL_INLINE vf vf_add(vf a, vf b) { return _mm256_add_ps(a, b); }
+TL_INLINE vf vf_sub(vf a, vf b) { return _mm256_sub_ps(a, b); }
 TL_INLINE vf vf_mul(vf a, vf b) { return _mm256_mul_ps(a, b); }
 TL_INLINE vf vf_div(vf a, vf b) { return _mm256_div_ps(a, b); }
+TL_INLINE vf vf_sqrt(vf a) { return _mm256_sqrt_ps(a); }
 TL_INLINE vf vf_from_vi(vi a) { return _mm256_cvtepi32_ps(a); }
 TL_INLINE vf vf_select(vm m, vf a, vf b) { return _mm256_blendv_ps(b, a, _mm256_castsi256_ps(m)); }
 TL_INLINE void vf_store(float *p, vf a) { _mm256_storeu_ps(p, a); }
@@ -113,7 +115,6 @@ TL_INLINE vd vd_abs(vd a)
     return (vd){_mm256_andnot_pd(sign, a.lo), _mm256_andnot_pd(sign, a.hi)};
 }
 TL_INLINE vd vd_floor(vd a) { return (vd){_mm256_floor_pd(a.lo), _mm256_floor_pd(a.hi)}; }
-TL_INLINE vd vd_sqrt(vd a) { return (vd){_mm256_sqrt_pd(a.lo), _mm256_sqrt_pd(a.hi)}; }
 TL_INLINE vd vd_min(vd a, vd b) { return (vd){_mm256_min_pd(a.lo, b.lo), _mm256_min_pd(a.hi, b.hi)}; }
 TL_INLINE vd vd_max(vd a, vd b) { return (vd){_mm256_max_pd(a.lo, b.lo), _mm256_max_pd(a.hi, b.hi)}; }
 TL_INLINE vm vd_ge(vd a, vd b)

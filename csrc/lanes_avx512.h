@@ -49,8 +49,10 @@ TL_INLINE vm get_range(const vm_ranges *r, int k) { return (vm)r->bits[k]; }
 
 TL_INLINE vf vf_set1(float a) { return _mm512_set1_ps(a); }
 TL_INLINE vf vf_add(vf a, vf b) { return _mm512_add_ps(a, b); }
+TL_INLINE vf vf_sub(vf a, vf b) { return _mm512_sub_ps(a, b); }
 TL_INLINE vf vf_mul(vf a, vf b) { return _mm512_mul_ps(a, b); }
 TL_INLINE vf vf_div(vf a, vf b) { return _mm512_div_ps(a, b); }
+TL_INLINE vf vf_sqrt(vf a) { return _mm512_sqrt_ps(a); }
 TL_INLINE vf vf_from_vi(vi a) { return _mm512_cvtepi32_ps(a); }
 TL_INLINE vf vf_select(vm m, vf a, vf b) { return _mm512_mask_mov_ps(b, m, a); }
 TL_INLINE void vf_store(float *p, vf a) { _mm512_storeu_ps(p, a); }
@@ -91,7 +93,6 @@ TL_INLINE void vd_quotients(const vd *a, vd b, vd *q)
 }
 TL_INLINE vd vd_abs(vd a) { return (vd){_mm512_abs_pd(a.lo), _mm512_abs_pd(a.hi)}; }
 TL_INLINE vd vd_floor(vd a) { return (vd){_mm512_roundscale_pd(a.lo, 1), _mm512_roundscale_pd(a.hi, 1)}; }
-TL_INLINE vd vd_sqrt(vd a) { return (vd){_mm512_sqrt_pd(a.lo), _mm512_sqrt_pd(a.hi)}; }
 TL_INLINE vd vd_min(vd a, vd b) { return (vd){_mm512_min_pd(a.lo, b.lo), _mm512_min_pd(a.hi, b.hi)}; }
 TL_INLINE vd vd_max(vd a, vd b) { return (vd){_mm512_max_pd(a.lo, b.lo), _mm512_max_pd(a.hi, b.hi)}; }
 TL_INLINE vm vd_ge(vd a, vd b)

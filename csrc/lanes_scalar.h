@@ -45,8 +45,10 @@ TL_INLINE vm get_range(const vm_ranges *r, int k) { (void)k; return r->mask; }
 
 TL_INLINE vf vf_set1(float a) { return a; }
 TL_INLINE vf vf_add(vf a, vf b) { return a + b; }
+TL_INLINE vf vf_sub(vf a, vf b) { return a - b; }
 TL_INLINE vf vf_mul(vf a, vf b) { return a * b; }
 TL_INLINE vf vf_div(vf a, vf b) { return a / b; }
+TL_INLINE vf vf_sqrt(vf a) { return sqrtf(a); }
 TL_INLINE vf vf_from_vi(vi a) { return (float)a; }
 TL_INLINE vf vf_select(vm m, vf a, vf b) { return m ? a : b; }
 TL_INLINE void vf_store(float *p, vf a) { *p = a; }
@@ -71,7 +73,6 @@ TL_INLINE void vd_quotients(const vd *a, vd b, vd *q)
 }
 TL_INLINE vd vd_abs(vd a) { return fabs(a); }
 TL_INLINE vd vd_floor(vd a) { return floor(a); }
-TL_INLINE vd vd_sqrt(vd a) { return sqrt(a); }
 TL_INLINE vd vd_min(vd a, vd b) { return a < b ? a : b; }
 TL_INLINE vd vd_max(vd a, vd b) { return a > b ? a : b; }
 TL_INLINE vm vd_ge(vd a, vd b) { return a >= b; }

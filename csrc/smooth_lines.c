@@ -27,20 +27,24 @@ typedef struct {
     int64_t u_px, v_px, size_v; /* the window's origin along u and v, its extent along v */
 } smooth_line;
 
-static inline void put_smooth(const smooth_state *s, int64_t at, float value, float z)
+/* No branch: which line is nearest cannot be predicted. */
+TL_INLINE void put_smooth(const tl_line_target *target, int64_t at, float value, float z, int has_depth)
 {
-    float *pixel = (float *)s->target->pixels + at;
-    if (value > *pixel && (!s->target->depth || shows_depth(s->target, at, z)))
-        *pixel = value;
+    float *pixel = (float *)target->pixels + at;
+    if (has_depth)
+        value = shows_depth(target, at, z) ? value : 0.0f;
+    *pixel = value > *pixel ? value : *pixel;
 }
 
-static void flush_smooth(smooth_state *s)
+TL_INLINE void flush_smooth(smooth_state *s, int has_depth)
 {
+    const tl_line_target own = *s->target, *target = &own; /* a copy that no store can change */
     for (int32_t k = 0; k < s->n; k++) {
-        float value, z;
+        float value, z = 0.0f;
         memcpy(&value, s->value + k, sizeof value);
-        memcpy(&z, s->z + k, sizeof z);
-        put_smooth(s, (uint32_t)s->at[k], value, z);
+        if (has_depth)
+            memcpy(&z, s->z + k, sizeof z);
+        put_smooth(target, (uint32_t)s->at[k], value, z, has_depth);
     }
     s->n = 0;
 }
@@ -67,30 +71,31 @@ static int setup_smooth_line(const smooth_state *s, const int32_t *edge, smooth_
     return l->first < l->end && (v1 >> bits) + 1 >= l->v_px && (v0 >> bits) - 1 < l->v_px + l->size_v;
 }
 
-/* The distance of a centre from a line, and the share of the line's length where it is nearest. */
-TL_INLINE vd lane_distance(vd u, vd v, vd du, vd dv, vd len2, vd *share)
+/* How far along the line, of twice the square of its length, a centre is; and the square of its distance. */
+TL_INLINE vd lane_square(vd u, vd v, vd du, vd dv, vd inverse, vd end, vd *along)
 {
-    const vd zero = vd_set1(0.0), one = vd_set1(1.0), two = vd_set1(2.0);
-    const vd across = vd_sub(vd_mul(u, dv), vd_mul(v, du)), along = vd_add(vd_mul(u, du), vd_mul(v, dv));
+    const vd zero = vd_set1(0.0), two = vd_set1(2.0);
+    const vd across = vd_mul(vd_sub(vd_mul(u, dv), vd_mul(v, du)), inverse);
     const vd u1 = vd_sub(u, vd_mul(two, du)), v1 = vd_sub(v, vd_mul(two, dv));
-    const vm before = vd_ge(zero, along), behind = vd_ge(along, vd_mul(two, len2));
-    vd square = vd_div(vd_mul(across, across), len2);
+    *along = vd_add(vd_mul(u, du), vd_mul(v, dv));
+    const vm before = vd_ge(zero, *along), behind = vd_ge(*along, end);
+    vd square = vd_mul(across, across);
     square = vd_select(behind, vd_add(vd_mul(u1, u1), vd_mul(v1, v1)), square);
-    square = vd_select(before, vd_add(vd_mul(u, u), vd_mul(v, v)), square);
-    *share = vd_select(before, zero, vd_select(behind, one, vd_div(along, vd_mul(two, len2))));
-    return vd_sqrt(square);
+    return vd_select(before, vd_add(vd_mul(u, u), vd_mul(v, v)), square);
 }
 
 /* A line of less than 2^24 sub-pixels: products of two distances are exact in float64. */
-TL_INLINE void walk_smooth_line(smooth_state *s, const smooth_line *l)
+TL_INLINE void walk_smooth_line(smooth_state *s, const smooth_line *l, int has_depth)
 {
     const int bits = s->window->subpixel_bits;
     const double unit = (double)(1 << bits);
     const int64_t own_u = (l->u_fx >> bits) - l->u_px, own_v = (l->v_fx >> bits) - l->v_px; /* the first end's pixel */
     const double rest_u = 2.0 * (double)(l->u_fx - ((own_u + l->u_px) << bits)), rest_v = 2.0 * (double)(l->v_fx - ((own_v + l->v_px) << bits));
-    const vd du = vd_set1((double)l->du), dv = vd_set1((double)l->dv);
-    const vd len2 = vd_max(vd_set1((double)l->du * (double)l->du + (double)l->dv * (double)l->dv), vd_set1(1.0));
+    const double length2 = (double)l->du * (double)l->du + (double)l->dv * (double)l->dv;
+    const vd du = vd_set1((double)l->du), dv = vd_set1((double)l->dv), end = vd_set1(2.0 * length2);
+    const vd inverse = vd_set1(length2 > 0.0 ? 1.0 / sqrt(length2) : 0.0), inverse_end = vd_set1(length2 > 0.0 ? 0.5 / length2 : 0.0);
     const vd slope = vd_set1(l->du ? (double)l->dv / (double)l->du : 0.0), per_pixel = vd_set1(0.5 / unit);
+    const vd zero = vd_set1(0.0), one = vd_set1(1.0), per_pixel2 = vd_set1(0.25 / (unit * unit));
     const vi stride_u = vi_set1(l->is_steep ? (int32_t)s->target->stride_px : 1), stride_v = vi_set1(l->is_steep ? 1 : (int32_t)s->target->stride_px);
     const vi last_v = vi_set1((int32_t)l->size_v - 1);
     for (int64_t first = l->first; first < l->end; first += TL_LANES) {
@@ -100,19 +105,22 @@ TL_INLINE void walk_smooth_line(smooth_state *s, const smooth_line *l)
         for (int aside = -1; aside <= 1; aside++) {
             const vd row = vd_add(middle, vd_set1((double)aside));
             const vd v = vd_add(vd_mul(row, vd_set1(2.0 * unit)), vd_set1(unit - rest_v));
-            vd share;
-            const vd distance = lane_distance(u, v, du, dv, len2, &share);
-            const vf value = vf_from_vd(vd_sub(vd_set1(1.0), vd_mul(distance, per_pixel)));
+            vd along;
+            const vd square = vd_mul(lane_square(u, v, du, dv, inverse, end, &along), per_pixel2);
+            const vf value = vf_sub(vf_set1(1.0f), vf_sqrt(vf_from_vd(square)));
             const vi v_px = vi_add(vi_round(row), vi_set1((int32_t)own_v));
             const vm inside = vm_and_not(vm_first(l->end - first), vi_gt_unsigned(v_px, last_v));
             const vm on = vm_and(inside, vf_lt(vf_set1(0.0f), value));
             vi_compress(s->at + s->n, on, vi_add(vi_mul(column, stride_u), vi_mul(v_px, stride_v)));
             vi_compress(s->value + s->n, on, vi_bits_of_vf(value));
-            vi_compress(s->z + s->n, on, vi_bits_of_vf(vf_from_vd(vd_add(vd_set1(l->z), vd_mul(share, vd_set1(l->dz))))));
+            if (has_depth) {
+                const vd share = vd_min(vd_max(vd_mul(along, inverse_end), zero), one);
+                vi_compress(s->z + s->n, on, vi_bits_of_vf(vf_from_vd(vd_add(vd_set1(l->z), vd_mul(share, vd_set1(l->dz))))));
+            }
             s->n += __builtin_popcount(vm_bits(on));
         }
         if (s->n > TL_MAX_PIXELS - 3 * TL_LANES)
-            flush_smooth(s);
+            flush_smooth(s, has_depth);
     }
 }
 
@@ -140,25 +148,34 @@ static void walk_far_line(const smooth_state *s, const smooth_line *l)
                 square = u1 * u1 + v1 * v1, share = 1.0;
             const double value = 1.0 - sqrt(square) * per_pixel;
             if (value > 0.0)
-                put_smooth(s, l->is_steep ? column * stride + (int64_t)row : (int64_t)row * stride + column, (float)value, (float)(l->z + share * l->dz));
+                put_smooth(s->target, l->is_steep ? column * stride + (int64_t)row : (int64_t)row * stride + column, (float)value,
+                           (float)(l->z + share * l->dz), s->target->depth != NULL);
         }
     }
 }
 
-static void draw_smooth_lines(const tl_edges *lines, const tl_window *window, const tl_line_target *target)
+TL_INLINE void draw_all_smooth(smooth_state *s, int has_depth)
 {
     const int64_t limit = (int64_t)1 << 24;
+    for (int64_t i = 0; i < s->lines->n_edges; i++) {
+        smooth_line l;
+        if (!setup_smooth_line(s, s->lines->edges + 2 * i, &l))
+            continue;
+        if (l.du > -limit && l.du < limit)
+            walk_smooth_line(s, &l, has_depth);
+        else
+            walk_far_line(s, &l);
+    }
+    flush_smooth(s, has_depth);
+}
+
+static void draw_smooth_lines(const tl_edges *lines, const tl_window *window, const tl_line_target *target)
+{
     smooth_state s = {.lines = lines, .window = window, .target = target};
     for (int64_t k = 0; k < window->height; k++)
         memset((float *)target->pixels + k * target->stride_px, 0, (size_t)window->width * sizeof(float));
-    for (int64_t i = 0; i < lines->n_edges; i++) {
-        smooth_line l;
-        if (!setup_smooth_line(&s, lines->edges + 2 * i, &l))
-            continue;
-        if (l.du > -limit && l.du < limit)
-            walk_smooth_line(&s, &l);
-        else
-            walk_far_line(&s, &l);
-    }
-    flush_smooth(&s);
+    if (target->depth)
+        draw_all_smooth(&s, 1);
+    else
+        draw_all_smooth(&s, 0);
 }
