@@ -10,7 +10,11 @@ from engine_cases import ON_EACH_ISA, THREADS, on
 from strategies import CLIP_SCENES, PIXEL_SCENES, soup, with_depth
 
 import topleft as tl
+from topleft import lines
+from topleft.memory import FreshMemory
 from topleft.methods import reference_lines as ref
+from topleft.rasterize import snap_scene
+from topleft.view import View
 
 TRIANGLE = [[0.5, 0.5], [4.5, 0.5], [0.5, 4.5]]
 ONE = [[0, 1, 2]]
@@ -72,6 +76,16 @@ def test_wireframe_cull_keeps_the_edges_of_what_is_left():
     assert_same(tl.wireframe(vertices, mixed, (5, 5), cull="back"), tl.wireframe(vertices, kept[0], (5, 5)))
     assert_same(tl.wireframe(vertices, mixed, (5, 5), cull="front"), tl.wireframe(vertices, kept[1], (5, 5)))
     assert not segment((0, 0), (3, 3), (4, 4), cull="back").any()
+
+
+def test_edges_are_listed_once_by_ascending_lower_index():
+    triangles = np.random.default_rng(1).integers(0, 30, (400, 3))
+    view = View.parse((9, 9), {})
+    snapped = snap_scene(FreshMemory(), np.zeros((30, 2)), triangles, view, with_depth=False, out=None)
+    edges = lines.list_edges(FreshMemory(), snapped)
+    expected = {tuple(sorted(pair)) for a, b, c in triangles.tolist() for pair in ((a, b), (b, c), (c, a))}
+    assert sorted((int(e) & 0xFFFFFFFF, int(e) >> 32) for e in edges) == sorted(expected)
+    assert (np.diff((edges & np.uint64(0xFFFFFFFF)).astype(int)) >= 0).all()
 
 
 def test_wireframe_of_nothing_is_empty():
