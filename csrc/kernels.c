@@ -15,6 +15,10 @@
 #include "area.c"
 #include "resolve.c"
 #include "paint.c"
+#include "edges.c"
+#include "line_ends.c"
+#include "smooth_lines.c"
+#include "lines.c"
 
 const tl_kernels TL_KERNELS = {
     .isa = TL_ISA_NAME,
@@ -30,4 +34,6 @@ const tl_kernels TL_KERNELS = {
     .interpolate = interpolate,
     .paint_flat = paint_flat,
     .paint_gouraud = paint_gouraud,
+    .list_edges = list_edges,
+    .draw_lines = draw_lines,
 };

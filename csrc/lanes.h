@@ -6,7 +6,7 @@
  * lanes (TL_LANES = 1) are the definition.  vd_quotients(a, b, q, are_f32) divides three numbers by one, each correctly rounded.
  * Loads and stores need no alignment.  Intrinsics live in lanes_*.h alone.
  *
- *   v?_set1 v?_load v?_store v?_iota v?_add v?_sub v?_mul v?_div v?_min v?_max   as their names say; vi wraps
+ *   v?_set1 v?_load v?_store v?_iota v?_add v?_sub v?_mul v?_div v?_min v?_max vf_sqrt   as their names say; vi wraps
  *   v?_select(m, a, b)      a where m, else b
  *   v?_load_masked, v?_store_masked    touch only the memory of lanes in m
  *   v?_store_some(p, m, a, has_room)   the lanes in m; with room for a whole vector the others may be written as they are

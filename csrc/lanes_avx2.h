@@ -138,6 +138,7 @@ TL_INLINE vf vf_add(vf a, vf b) { return _mm256_add_ps(a, b); }
 TL_INLINE vf vf_sub(vf a, vf b) { return _mm256_sub_ps(a, b); }
 TL_INLINE vf vf_mul(vf a, vf b) { return _mm256_mul_ps(a, b); }
 TL_INLINE vf vf_div(vf a, vf b) { return _mm256_div_ps(a, b); }
+TL_INLINE vf vf_sqrt(vf a) { return _mm256_sqrt_ps(a); }
 TL_INLINE vf vf_from_vi(vi a) { return _mm256_cvtepi32_ps(a); }
 TL_INLINE vf vf_select(vm m, vf a, vf b) { return _mm256_blendv_ps(b, a, _mm256_castsi256_ps(m)); }
 TL_INLINE void vf_store(float *p, vf a) { _mm256_storeu_ps(p, a); }
@@ -216,20 +217,22 @@ TL_INLINE void vd_store(double *p, vd a) { _mm256_storeu_pd(p, a.lo), _mm256_sto
 
 /* Plain 16-byte loads and transposes in registers: hardware gathers are three times as slow. */
 typedef struct { __m256d even, odd; } vz; /* z of lanes 0,1,4,5 and of 2,3,6,7 */
-TL_INLINE __m256i load_two(const tl_vertex *v, const int32_t *first)
+TL_INLINE __m256i load_two(int step, const tl_vertex *v, const int32_t *first)
 {
     const __m128i *a = (const __m128i *)v;
-    return _mm256_inserti128_si256(_mm256_castsi128_si256(_mm_loadu_si128(a + first[0])), _mm_loadu_si128(a + first[12]), 1);
+    return _mm256_inserti128_si256(_mm256_castsi128_si256(_mm_loadu_si128(a + first[0])), _mm_loadu_si128(a + first[4 * step]), 1);
 }
-TL_INLINE void load_vertices(const tl_vertex *v, const int32_t *first, vi *x, vi *y, vz *z)
+TL_INLINE void load_vertices_by(int step, const tl_vertex *v, const int32_t *first, vi *x, vi *y, vz *z)
 {
-    const __m256i a = load_two(v, first), b = load_two(v, first + 3), c = load_two(v, first + 6), d = load_two(v, first + 9);
+    const __m256i a = load_two(step, v, first), b = load_two(step, v, first + step);
+    const __m256i c = load_two(step, v, first + 2 * step), d = load_two(step, v, first + 3 * step);
     const __m256i ab = _mm256_unpacklo_epi32(a, b), cd = _mm256_unpacklo_epi32(c, d);
     *x = _mm256_unpacklo_epi64(ab, cd);
     *y = _mm256_unpackhi_epi64(ab, cd);
     z->even = _mm256_castsi256_pd(_mm256_unpackhi_epi64(a, b));
     z->odd = _mm256_castsi256_pd(_mm256_unpackhi_epi64(c, d));
 }
+TL_INLINE void load_vertices(const tl_vertex *v, const int32_t *first, vi *x, vi *y, vz *z) { load_vertices_by(3, v, first, x, y, z); }
 TL_INLINE vd vd_from_vz(vz z)
 {
     return (vd){_mm256_permute2f128_pd(z.even, z.odd, 0x20), _mm256_permute2f128_pd(z.even, z.odd, 0x31)};

@@ -96,6 +96,7 @@ TL_INLINE vf vf_add(vf a, vf b) { return _mm512_add_ps(a, b); }
 TL_INLINE vf vf_sub(vf a, vf b) { return _mm512_sub_ps(a, b); }
 TL_INLINE vf vf_mul(vf a, vf b) { return _mm512_mul_ps(a, b); }
 TL_INLINE vf vf_div(vf a, vf b) { return _mm512_div_ps(a, b); }
+TL_INLINE vf vf_sqrt(vf a) { return _mm512_sqrt_ps(a); }
 TL_INLINE vf vf_from_vi(vi a) { return _mm512_cvtepi32_ps(a); }
 TL_INLINE vf vf_select(vm m, vf a, vf b) { return _mm512_mask_mov_ps(b, m, a); }
 TL_INLINE void vf_store(float *p, vf a) { _mm512_storeu_ps(p, a); }
@@ -163,22 +164,24 @@ TL_INLINE void vd_store(double *p, vd a) { _mm512_storeu_pd(p, a.lo), _mm512_sto
 
 /* Plain 16-byte loads and transposes in registers: hardware gathers are three times as slow. */
 typedef struct { __m512d even, odd; } vz; /* z of lanes 0,1,4,5,8,9,12,13 and of 2,3,6,7,10,11,14,15 */
-TL_INLINE __m512i load_four(const tl_vertex *v, const int32_t *first)
+TL_INLINE __m512i load_four(int step, const tl_vertex *v, const int32_t *first)
 {
     const __m128i *a = (const __m128i *)v;
-    const __m256i low = _mm256_inserti128_si256(_mm256_castsi128_si256(_mm_loadu_si128(a + first[0])), _mm_loadu_si128(a + first[12]), 1);
-    const __m256i high = _mm256_inserti128_si256(_mm256_castsi128_si256(_mm_loadu_si128(a + first[24])), _mm_loadu_si128(a + first[36]), 1);
+    const __m256i low = _mm256_inserti128_si256(_mm256_castsi128_si256(_mm_loadu_si128(a + first[0])), _mm_loadu_si128(a + first[4 * step]), 1);
+    const __m256i high = _mm256_inserti128_si256(_mm256_castsi128_si256(_mm_loadu_si128(a + first[8 * step])), _mm_loadu_si128(a + first[12 * step]), 1);
     return _mm512_inserti64x4(_mm512_castsi256_si512(low), high, 1);
 }
-TL_INLINE void load_vertices(const tl_vertex *v, const int32_t *first, vi *x, vi *y, vz *z)
+TL_INLINE void load_vertices_by(int step, const tl_vertex *v, const int32_t *first, vi *x, vi *y, vz *z)
 {
-    const __m512i a = load_four(v, first), b = load_four(v, first + 3), c = load_four(v, first + 6), d = load_four(v, first + 9);
+    const __m512i a = load_four(step, v, first), b = load_four(step, v, first + step);
+    const __m512i c = load_four(step, v, first + 2 * step), d = load_four(step, v, first + 3 * step);
     const __m512i ab = _mm512_unpacklo_epi32(a, b), cd = _mm512_unpacklo_epi32(c, d);
     *x = _mm512_unpacklo_epi64(ab, cd);
     *y = _mm512_unpackhi_epi64(ab, cd);
     z->even = _mm512_castsi512_pd(_mm512_unpackhi_epi64(a, b));
     z->odd = _mm512_castsi512_pd(_mm512_unpackhi_epi64(c, d));
 }
+TL_INLINE void load_vertices(const tl_vertex *v, const int32_t *first, vi *x, vi *y, vz *z) { load_vertices_by(3, v, first, x, y, z); }
 TL_INLINE vd vd_from_vz(vz z)
 {
     const __m512i low = _mm512_setr_epi64(0, 1, 8, 9, 2, 3, 10, 11), high = _mm512_setr_epi64(4, 5, 12, 13, 6, 7, 14, 15);

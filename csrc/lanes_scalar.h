@@ -86,6 +86,7 @@ TL_INLINE vf vf_add(vf a, vf b) { return a + b; }
 TL_INLINE vf vf_sub(vf a, vf b) { return a - b; }
 TL_INLINE vf vf_mul(vf a, vf b) { return a * b; }
 TL_INLINE vf vf_div(vf a, vf b) { return a / b; }
+TL_INLINE vf vf_sqrt(vf a) { return sqrtf(a); }
 TL_INLINE vf vf_from_vi(vi a) { return (float)a; }
 TL_INLINE vf vf_select(vm m, vf a, vf b) { return m ? a : b; }
 TL_INLINE void vf_store(float *p, vf a) { *p = a; }
@@ -122,15 +123,17 @@ TL_INLINE vd vd_select(vm m, vd a, vd b) { return m ? a : b; }
 TL_INLINE vd vd_load(const double *p) { return *p; }
 TL_INLINE void vd_store(double *p, vd a) { *p = a; }
 
-/* The vertices first[3 * lane] of TL_LANES triangles.  z is left in the order of the loads until it is needed. */
+/* The vertices first[step * lane] of TL_LANES pairs or triangles.  z is left in the order of the loads until it is needed. */
 typedef double vz;
-TL_INLINE void load_vertices(const tl_vertex *v, const int32_t *first, vi *x, vi *y, vz *z)
+TL_INLINE void load_vertices_by(int step, const tl_vertex *v, const int32_t *first, vi *x, vi *y, vz *z)
 {
+    (void)step;
     const tl_vertex a = v[first[0]];
     *x = a.x_fx;
     *y = a.y_fx;
     *z = a.z;
 }
+TL_INLINE void load_vertices(const tl_vertex *v, const int32_t *first, vi *x, vi *y, vz *z) { load_vertices_by(3, v, first, x, y, z); }
 TL_INLINE vd vd_from_vz(vz z) { return z; }
 
 /* The first four numbers of TL_LANES rows, as columns; reads up to two numbers past the last row. */

@@ -146,6 +146,31 @@ typedef struct {
 /* Cells a row: 16 before the first pixel, at least 16 behind the last, whole cache lines. */
 static inline int64_t tl_area_stride(int64_t width) { return (width + 47) / 16 * 16; }
 
+/* ---- lines --------------------------------------------------------------------------------------------- */
+
+typedef struct {
+    tl_vertex_set mesh;
+    const tl_view *view;  /* for edges with a TL_CLIPPED end; NULL in pixel space */
+    const int32_t *edges; /* (n_edges, 2) into the vertices */
+    int64_t n_edges;
+} tl_edges;
+
+/* What listing edges needs besides. */
+typedef struct {
+    int64_t *starts;   /* (n_vertices + 1,) */
+    int32_t *last_low; /* (n_vertices,) */
+    int32_t *highs;    /* (3 * n_triangles,) */
+} tl_edge_scratch;
+
+typedef struct {
+    int is_smooth;      /* float32 coverage; otherwise uint8, 1 where a line is */
+    void *pixels;       /* rows of stride_px */
+    const float *depth; /* what hides lines, the same stride, or NULL */
+    double depth_bias;  /* how far behind it a line still shows */
+    int is_farthest;    /* the larger depth is the nearer one */
+    int64_t stride_px;
+} tl_line_target;
+
 /* ---- the kernel table ---------------------------------------------------------------------------------- */
 
 typedef struct tl_kernels {
@@ -193,6 +218,13 @@ typedef struct tl_kernels {
     void (*paint_flat)(const int32_t *labels, int64_t n, const uint8_t *colors, int pixel_bytes, uint8_t *pixels);
     void (*paint_gouraud)(const tl_scene *scene, const tl_window *window, const int32_t *labels, const void *colors, int n_channels,
                           int is_u8, void *pixels);
+
+    /* The edges of the triangles that are not culled, each once, as lower index + 2^32 * higher index; room for three a
+     * triangle.  Returns the first row with an index outside the vertices, or -1. */
+    int64_t (*list_edges)(const tl_scene *scene, const tl_edge_scratch *scratch, uint64_t *edges, int64_t *n_edges);
+
+    /* Clears the window's pixels and draws lines. */
+    void (*draw_lines)(const tl_edges *lines, const tl_window *window, const tl_line_target *target);
 } tl_kernels;
 
 #endif

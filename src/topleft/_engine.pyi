@@ -1,4 +1,4 @@
-"""The types of the compiled module. Functions and classes are described in _engine.pyx and _dispatch.pxi."""
+"""The types of the compiled module. What each does is told in _engine.pyx, _dispatch.pxi and _lines.pxi."""
 
 from typing import Any
 
@@ -109,3 +109,24 @@ class Scene:
         background: float,
         out: NDArray[np.float32],
     ) -> None: ...
+
+def list_edges(
+    scene: Scene,
+    starts: NDArray[np.int64],
+    last_low: NDArray[np.int32],
+    highs: NDArray[np.int32],
+    edges: NDArray[np.uint64],
+) -> int: ...
+def draw_lines(
+    scene: Scene,
+    view: View | None,
+    edges: NDArray[np.uint64],
+    pixels: NDArray[np.uint8],
+    depth: NDArray[np.float32] | None,
+    depth_bias: float,
+    is_farthest: bool,
+    is_smooth: bool,
+    width: int,
+    first_row: int,
+    n_rows: int,
+) -> None: ...

@@ -72,6 +72,22 @@ cdef extern from "topleft.h" nogil:
         int64_t n_others
         const tl_window *picture
         int is_first, is_last
+    ctypedef struct tl_edges:
+        tl_vertex_set mesh
+        const tl_view *view
+        const int32_t *edges
+        int64_t n_edges
+    ctypedef struct tl_edge_scratch:
+        int64_t *starts
+        int32_t *last_low
+        int32_t *highs
+    ctypedef struct tl_line_target:
+        int is_smooth
+        void *pixels
+        const float *depth
+        double depth_bias
+        int is_farthest
+        int64_t stride_px
     ctypedef struct tl_kernels:
         tl_vertex_counts (*snap)(const tl_source *, int64_t, int64_t, int, int, tl_vertex *, tl_wide *) noexcept nogil
         tl_vertex_counts (*project)(const tl_source *, int64_t, int64_t, const tl_view *, tl_vertex *, tl_wide *) noexcept nogil
@@ -85,6 +101,8 @@ cdef extern from "topleft.h" nogil:
         void (*interpolate)(const tl_scene *, const tl_window *, const int32_t *, const float *, int, int, float, float *) noexcept nogil
         void (*paint_flat)(const int32_t *, int64_t, const uint8_t *, int, uint8_t *) noexcept nogil
         void (*paint_gouraud)(const tl_scene *, const tl_window *, const int32_t *, const void *, int, int, void *) noexcept nogil
+        int64_t (*list_edges)(const tl_scene *, const tl_edge_scratch *, uint64_t *, int64_t *) noexcept nogil
+        void (*draw_lines)(const tl_edges *, const tl_window *, const tl_line_target *) noexcept nogil
 
 include "_dispatch.pxi"
 
@@ -369,3 +387,6 @@ cdef class Scene:
             with nogil:
                 K.interpolate(&self.scene, &window, &ids[0, 0], &values[0, 0] if values.shape[0] else NULL, n_values,
                               per_corner, background, &out[0, 0, 0])
+
+
+include "_lines.pxi"

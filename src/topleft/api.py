@@ -1,4 +1,4 @@
-"""The four verbs on fresh memory, and `Rasterizer`, the same on memory that is kept."""
+"""The five verbs on fresh memory, and `Rasterizer`, the same on memory that is kept."""
 
 from __future__ import annotations
 
@@ -9,12 +9,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from topleft.arrays import as_size
 from topleft.fragments import Fragments
+from topleft.lines import draw_wireframe
 from topleft.memory import SCRATCH, FreshMemory, KeptMemory
 from topleft.rasterize import draw_coverage, draw_fill, draw_fragments, draw_overdraw
 from topleft.threads import parse_threads
 from topleft.view import View, ViewOptions
 
-__all__ = ["Rasterizer", "coverage", "fill", "overdraw", "rasterize"]
+__all__ = ["Rasterizer", "coverage", "fill", "overdraw", "rasterize", "wireframe"]
 
 #: Fragments refer to what they were drawn from, so nothing of it can be reused.
 FRESH = FreshMemory()
@@ -241,8 +242,77 @@ def rasterize(
     return draw_fragments(FRESH, vertices, triangles, View.parse(size, view), depth_test, background_depth, out)
 
 
+def wireframe(
+    vertices: ArrayLike,
+    triangles: ArrayLike,
+    size: tuple[int, int],
+    *,
+    depth: Fragments | NDArray[np.float32] | None = None,
+    depth_test: str = "less",
+    depth_bias: float = 2.0**-10,
+    antialias: bool = False,
+    out: NDArray[Any] | None = None,
+    **view: Unpack[ViewOptions],
+) -> NDArray[Any]:
+    """Return the edges of the triangles as lines, each pixel of a line once.
+
+    Parameters
+    ----------
+    vertices, triangles, size, **view
+        As in `coverage`; `method` makes no difference. `cull` leaves out the edges that only culled triangles have,
+        and degenerate triangles.
+    depth : Fragments or ndarray of float32, shape (H, W), optional
+        What hides lines: a pixel of a line is drawn where its depth is at most `depth_bias` behind the buffer's.
+    depth_test : "less" or "greater"
+        Which depth is the nearer one.
+    depth_bias : float
+        In units of depth. An edge lies on the surface that hides it, which falls away from the edge within the pixel:
+        take what the depth changes by from pixel to pixel. The default suits window depth, 0 to 1 over the whole view.
+    antialias : bool
+        False: Bresenham lines between the pixels that hold the ends. True: coverage of lines one pixel wide between
+        the ends themselves.
+    out : ndarray, shape (H, W), optional
+        Where the result goes.
+
+    Returns
+    -------
+    ndarray of bool, or of float32 with `antialias`, shape (H, W)
+        Where lines are; coverage in [0, 1].
+
+    Raises
+    ------
+    ValueError, TypeError, IndexError
+        As in `coverage`.
+
+    Notes
+    -----
+    A line goes from its upper end to the lower one (a level one from left to right), so triangles on both sides of an
+    edge draw the same pixels: of `d` steps along the longer side, step `k` is ``floor((q*k + floor(d/2)) / d)`` pixels
+    across, `q` being the shorter side. It is computed in integers, whatever part of it the picture shows. Depth is
+    linear in `k`. With `antialias` the coverage of a pixel is ``max(0, 1 - distance)``, the distance in pixels of its
+    centre from the nearest edge that shows there, and depth that of the nearest point.
+
+    References
+    ----------
+    J. E. Bresenham, Algorithm for computer control of a digital plotter, 1965.
+    S. Gupta, R. F. Sproull, Filtering Edges for Gray-Scale Displays, 1981 (intensity by distance).
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> tl.wireframe([[0, 0], [4, 0], [0, 4]], [[0, 1, 2]], (5, 5)).astype(int)
+    array([[1, 1, 1, 1, 1],
+           [1, 0, 0, 1, 0],
+           [1, 0, 1, 0, 0],
+           [1, 1, 0, 0, 0],
+           [1, 0, 0, 0, 0]])
+    """
+    checked = View.parse(size, view)
+    return draw_wireframe(SCRATCH, vertices, triangles, checked, depth, depth_test, depth_bias, antialias, out)
+
+
 class Rasterizer:
-    """The four verbs for one size, on memory that is kept from call to call.
+    """The five verbs for one size, on memory that is kept from call to call.
 
     What a verb returns is overwritten by the next call of the same verb; copy what must last. Not for use from several
     threads at once: give each its own.
@@ -322,3 +392,21 @@ class Rasterizer:
     ) -> Fragments:
         """Return the visibility buffer, as `topleft.rasterize` does; its attributes also end with the next call."""
         return draw_fragments(self._memory, vertices, triangles, self._view(view), depth_test, background_depth, out)
+
+    def wireframe(
+        self,
+        vertices: ArrayLike,
+        triangles: ArrayLike,
+        *,
+        depth: Fragments | NDArray[np.float32] | None = None,
+        depth_test: str = "less",
+        depth_bias: float = 2.0**-10,
+        antialias: bool = False,
+        out: NDArray[Any] | None = None,
+        **view: Unpack[ViewOptions],
+    ) -> NDArray[Any]:
+        """Return the edges of the triangles as lines, as `topleft.wireframe` does."""
+        checked = self._view(view)
+        return draw_wireframe(
+            self._memory, vertices, triangles, checked, depth, depth_test, depth_bias, antialias, out
+        )
