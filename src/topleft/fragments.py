@@ -119,4 +119,4 @@ class Fragments:
         return out if array.ndim > 1 else out[..., 0]
 
     def _ids(self) -> NDArray[np.int32]:
-        return np.ascontiguousarray(self.triangle, dtype=np.int32)
+        return np.require(self.triangle, np.int32, ["C", "A"])

@@ -219,12 +219,12 @@ def paint(
 def canvas_of(
     memory: Memory, name: str, out: object, shape: tuple[int, ...], dtype: type, *, keep: bool = False
 ) -> Iterator[tuple[NDArray[Any], NDArray[Any]]]:
-    """Give the array to return and a contiguous one to draw into; afterwards both are the same picture.
+    """Give the array to return and a contiguous aligned one to draw into; afterwards both are the same picture.
 
     `keep`: what is in `out` shows through where nothing is drawn.
     """
     result = memory.empty(name, shape, dtype) if out is None else as_out("out", out, shape, dtype)
-    canvas = result if result.flags.c_contiguous else np.empty(shape, dtype)
+    canvas = result if result.flags.carray else np.empty(shape, dtype)
     if keep and canvas is not result:
         canvas[...] = result
     yield result, canvas
