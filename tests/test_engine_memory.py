@@ -219,6 +219,18 @@ def test_engine_each_place_of_a_bad_vertex_is_named(kind, isa):
                 tl.rasterize(scene.vertices, used, scene.size, **scene.view)
 
 
+@ON_EACH_ISA
+@pytest.mark.parametrize("dtype", [np.int32, np.int64])
+def test_engine_each_place_of_a_bad_index_is_named(dtype, isa):
+    scene = few_vertices("f64 xy", 20)
+    for n in (1, 17, 40):
+        for place in range(3 * n):
+            triangles = np.resize(scene.triangles, (n, 3)).astype(dtype)
+            triangles.flat[place] = [-1, 20, 2**31 - 1, -(2**31)][place % 4]
+            with on(isa), pytest.raises(IndexError, match=f"row {place // 3} is"):
+                tl.coverage(scene.vertices, triangles, scene.size, threads=1)
+
+
 # ---- threads and processes ------------------------------------------------------------------------------------------
 
 
