@@ -223,6 +223,17 @@ def test_fill_gouraud_uint8_equals_reference(make):
         comparing.check_fill_uint8(scene, colors, "vertex")
 
 
+@pytest.mark.parametrize("exponent", [2, 8, 20, 24, 30, 45, 51])
+def test_fill_gouraud_uint8_ties_of_large_triangles_equal_reference(exponent):
+    rng = np.random.default_rng(exponent)
+    for shift in (0.5, 3.5, 3.5 - 1 / 256, 3.5 + 1 / 256):
+        reach = int(rng.integers(2**exponent, 2 ** (exponent + 1)))
+        corner = reach * np.array([[-1, -1], [1, -1], [-1, 3]])  # values change with x alone, and tie in its middle
+        first, second = rng.integers(0, 256, (2, 4))
+        colors = np.array([first, second | 1 ^ first & 1, first], np.uint8)
+        comparing.check_fill_uint8(soup(corner + [shift, 0], (8, 3)), colors, "vertex")
+
+
 @given(pixel_scenes(), st.integers(0, 2**32 - 1), st.integers(1, 4))
 def test_fill_any_gouraud_uint8_equals_reference(scene, seed, n_channels):
     rng = np.random.default_rng(seed)
