@@ -232,6 +232,15 @@ def test_attributes_of_triangles_that_were_overwritten_are_empty_not_a_crash():
     assert (frags.interpolate(np.ones(4), background=-1) == -1).all()
 
 
+def test_attributes_of_one_id_and_one_index_too_many_are_empty():
+    triangles = HALVES.astype(np.int32)
+    frags = tl.rasterize(SQUARE, triangles[:1], SIZE)
+    frags.triangle[0, 3] = 1  # a row of the array behind the one that was drawn
+    assert (frags.barycentric()[0, 3] == 0).all()
+    triangles[0] = [0, 1, 4]
+    assert (frags.barycentric() == 0).all()
+
+
 def test_interpolate_per_vertex_and_per_corner_agree():
     frags = tl.rasterize(SQUARE, HALVES, SIZE)
     values = np.arange(8.0).reshape(4, 2)

@@ -95,9 +95,10 @@ def test_uint64_vertex_beyond_int64_raises():
         tl.coverage(np.array([[0, 0], [2**64 - 1, 0], [0, 4]], np.uint64), [[0, 1, 2]], SIZE)
 
 
+@pytest.mark.parametrize("x_px", [4, 2.0**40])
 @pytest.mark.parametrize("depth", [np.nan, np.inf, 1e300])
-def test_depth_that_float32_cannot_hold_raises_only_where_depth_is_used(depth):
-    vertices = [[0, 0, 0], [4, 0, depth], [0, 4, 0]]
+def test_depth_that_float32_cannot_hold_raises_only_where_depth_is_used(depth, x_px):
+    vertices = [[0, 0, 0], [x_px, 0, depth], [0, 4, 0]]
     assert tl.coverage(vertices, [[0, 1, 2]], SIZE).any()
     with pytest.raises(ValueError, match="in row 1"):
         tl.rasterize(vertices, [[0, 1, 2]], SIZE)
