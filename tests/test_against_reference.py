@@ -234,6 +234,15 @@ def test_fill_gouraud_uint8_ties_of_large_triangles_equal_reference(exponent):
         comparing.check_fill_uint8(soup(corner + [shift, 0], (8, 3)), colors, "vertex")
 
 
+def test_fill_gouraud_uint8_ties_that_float64_misses_equal_reference():
+    rng = np.random.default_rng(0)
+    for tenths in (1, 3, 5, 7, 9) * 20:  # of 255: halves
+        unit = int(rng.integers(1, 2**20)) / 256
+        corner = unit * np.array([[-tenths, -1], [10 - tenths, -1], [-tenths, 20]])
+        scene = soup(corner + 0.5, (1, 1))
+        comparing.check_fill_uint8(scene, np.array([[0], [255], [0]], np.uint8), "vertex")
+
+
 @given(pixel_scenes(), st.integers(0, 2**32 - 1), st.integers(1, 4))
 def test_fill_any_gouraud_uint8_equals_reference(scene, seed, n_channels):
     rng = np.random.default_rng(seed)
