@@ -1,5 +1,7 @@
 """Every verb against the exact reference: `==` for integers, a derived bound for floats."""
 
+from math import gcd
+
 import comparing
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ from strategies import (
     fan,
     floor,
     jittered_grid,
+    partner,
     pixel_scenes,
     soup,
     sphere_round_the_eye,
@@ -145,6 +148,23 @@ def test_rasterize_flat_depths_with_ties_equal_reference(make, depth_test):
 @PIXEL
 def test_rasterize_sloping_depths_within_bound(make, depth_test):
     for scene, rng in scenes(make, 4):
+        comparing.check_fragments(with_depth(scene, rng), depth_test)
+
+
+def far_slivers(rng, n=30, side=20):
+    """Triangles of three halves of a square sub-pixel round a pixel's centre, 2**36 pixels long: E beyond 2**53."""
+    corners = []
+    for _ in range(n):
+        a, b = (int(rng.integers(-(2**bits), 2**bits)) | 1 for bits in (44, 12))
+        b += next(k for k in range(0, 1000, 2) if gcd(a, b + k) == 1)
+        u, v = np.array([a, b]), np.array(partner(a, b))
+        corners.append(rng.integers(0, side, 2) * 256 + 128 + np.array([u, v, -u - v])[:, :: rng.choice([1, -1])])
+    return soup(np.concatenate(corners) / 256, (side, side))
+
+
+@DEPTH_TEST
+def test_rasterize_far_slivers_within_bound(depth_test):
+    for scene, rng in scenes(far_slivers, 6):
         comparing.check_fragments(with_depth(scene, rng), depth_test)
 
 
