@@ -346,11 +346,12 @@ def hard_quotients(rng, n):
 
 
 @ON_EACH_ISA
-def test_engine_depths_of_hard_quotients_are_rounded_once_each(isa):
+@pytest.mark.parametrize("scale", [1, 2.0**970])  # up to the largest w there is
+def test_engine_depths_of_hard_quotients_are_rounded_once_each(scale, isa):
     n = 200
-    z, w = np.array(list(hard_quotients(np.random.default_rng(0), n)), np.float64).T[:, :, None]
+    z, w = np.array(list(hard_quotients(np.random.default_rng(0), n))).T[:, :, None] * scale
     x = (np.arange(n)[:, None] + [0, 1, 0.5]) * 2 / n - 1
-    positions = np.dstack([x * w, [1, 1, -3] * w, np.repeat(z, 3, 1), np.repeat(w, 3, 1)])
+    positions = np.dstack([x * w, [1, 1, -1.5] * w, np.repeat(z, 3, 1), np.repeat(w, 3, 1)])
     scene = soup(positions.reshape(-1, 4), (n, 1))
     with on(isa):
         depth = tl.rasterize(*scene.arrays, clip_depth="zero_to_one").depth
