@@ -6,7 +6,7 @@ import pytest
 import topleft as tl
 from topleft import arrays, threads
 from topleft.memory import FreshMemory
-from topleft.rasterize import target
+from topleft.rasterize import canvas_of
 
 SQUARE = np.array([[0, 0], [4, 0], [4, 4], [0, 4]], float)
 HALVES = np.array([[0, 1, 2], [0, 2, 3]])
@@ -83,7 +83,7 @@ def test_unaligned_array_comes_to_the_kernels_aligned(coerce, values):
 
 def test_unaligned_out_is_filled_through_an_aligned_canvas():
     ids, depth = unaligned(np.zeros((4, 4), np.int32)), unaligned(np.zeros((4, 4), np.float32))
-    with target(FreshMemory(), "triangle", ids, (4, 4), np.int32) as (result, canvas):
+    with canvas_of(FreshMemory(), "triangle", ids, (4, 4), np.int32) as (result, canvas):
         assert canvas.flags.aligned
     frags = tl.rasterize(SQUARE, LEFT, SIZE, out=(ids, depth))
     assert result is frags.triangle is ids
