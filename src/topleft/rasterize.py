@@ -28,7 +28,7 @@ __all__ = ["draw_coverage", "draw_fill", "draw_fragments", "draw_overdraw"]
 
 
 #: Fewer vertices are snapped by one thread: waking another takes as long.
-MIN_VERTICES_TO_SHARE = 50_000
+MIN_VERTICES_TO_SHARE = 200_000
 
 #: Triangles times threads. With fewer, threads that each set up every triangle are done before they have met twice.
 MIN_TRIANGLES_TO_SHARE = 1_000_000
