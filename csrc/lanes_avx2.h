@@ -89,6 +89,7 @@ TL_INLINE vf vf_from_unsigned(vi a)
     const vf high = _mm256_cvtepi32_ps(_mm256_srli_epi32(a, 16)), low = _mm256_cvtepi32_ps(_mm256_and_si256(a, _mm256_set1_epi32(0xffff)));
     return _mm256_add_ps(_mm256_mul_ps(high, _mm256_set1_ps(65536.0f)), low);
 }
+TL_INLINE vi vi_gather(vm m, const int32_t *p, vi i) { return _mm256_mask_i32gather_epi32(_mm256_setzero_si256(), p, i, m, 4); }
 
 TL_INLINE vm vm_and(vm a, vm b) { return _mm256_and_si256(a, b); }
 TL_INLINE vm vm_or(vm a, vm b) { return _mm256_or_si256(a, b); }

@@ -72,6 +72,7 @@ TL_INLINE vi vi_prefix_sum(vi a)
 TL_INLINE vi vi_last(vi a) { return _mm512_permutexvar_epi32(_mm512_set1_epi32(15), a); }
 TL_INLINE vi vi_shift_in(vi a, vi before) { return _mm512_alignr_epi32(a, before, 15); }
 TL_INLINE vf vf_from_unsigned(vi a) { return _mm512_cvtepu32_ps(a); }
+TL_INLINE vi vi_gather(vm m, const int32_t *p, vi i) { return _mm512_mask_i32gather_epi32(_mm512_setzero_si512(), m, i, p, 4); }
 
 TL_INLINE vm vm_and(vm a, vm b) { return a & b; }
 TL_INLINE vm vm_or(vm a, vm b) { return a | b; }
