@@ -378,6 +378,18 @@ def test_engine_least_w_is_2_to_the_minus_500(w, is_seen, isa):
         assert_same(tl.coverage(*scene.arrays), np.full((4, 4), is_seen))
 
 
+@ON_EACH_ISA
+@pytest.mark.parametrize(("dtype", "z"), [(np.float32, 2.0**24), (np.float64, 2.0**53)])
+def test_engine_transform_adds_from_left_to_right(dtype, z, isa):
+    x, y = np.random.default_rng(0).integers(-8, 9, (2, 60)).astype(dtype)
+    transform = np.array([[1, 0, 1, -z], [0, 1, 0, 0], [0, 0, 0, 0], [0, 0, 0, 8]])
+    objects = soup(np.stack([x, y, np.full(60, z, dtype)], -1), (50, 50))
+    clip = soup(np.stack([(x + dtype(z)) - dtype(z), y, 0 * x, 0 * x + 8], -1), (50, 50))
+    assert (clip.vertices[:, 0] != x).any()
+    with on(isa):
+        assert_same(tl.overdraw(*objects.arrays, transform=transform), tl.overdraw(*clip.arrays))
+
+
 # ---- either turn, either side ---------------------------------------------------------------------------------------
 
 
