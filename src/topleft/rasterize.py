@@ -27,7 +27,7 @@ from topleft.view import View
 __all__ = ["draw_coverage", "draw_fill", "draw_fragments", "draw_overdraw"]
 
 
-#: Fewer vertices are snapped by one thread: waking another takes as long.
+#: Fewer vertices are snapped, and fewer triangles converted, by one thread: waking another takes as long.
 MIN_VERTICES_TO_SHARE = 200_000
 
 #: Triangles times threads. With fewer, threads that each set up every triangle are done before they have met twice.
@@ -64,7 +64,7 @@ def snap_scene(
     points = as_vertices(vertices, has_transform=view.transform is not None)
     matrix = None if view.transform is None else as_matrix(view.transform, points.dtype)
     source = _engine.Source(points, matrix)
-    corners, is_checked = index_triangles(memory, triangles, len(points))
+    corners, is_checked = index_triangles(memory, triangles, len(points), view.threads)
     n_triangles = len(corners)
     n = len(points) if n_triangles and 0 not in view.size else 0
     records = memory.empty("records", (n * _engine.VERTEX_BYTES,), np.uint8)
@@ -96,15 +96,25 @@ def snap_scene(
     return Snapped(scene, triangles, corners, len(points), n_triangles, has_depth)
 
 
-def index_triangles(memory: Memory, triangles: ArrayLike, n_vertices: int) -> tuple[NDArray[np.int32], bool]:
+def index_triangles(
+    memory: Memory, triangles: ArrayLike, n_vertices: int, threads: int | None
+) -> tuple[NDArray[np.int32], bool]:
     """Return triangles as int32, and whether their indices have been checked on the way."""
     indices = as_triangles(triangles)
     if indices.dtype == np.int32:
         return cast(NDArray[np.int32], indices), False
     corners: NDArray[np.int32] = memory.empty("triangles", indices.shape, np.int32)
-    row = _engine.narrow_triangles(cast(NDArray[np.int64], indices), n_vertices, corners)
-    if row >= 0:
-        raise bad_triangle(triangles, row, n_vertices)
+    wide = cast(NDArray[np.int64], indices)
+
+    def narrow(first: int, end: int) -> int:
+        row = _engine.narrow_triangles(wide[first:end], n_vertices, corners[first:end])
+        return first + row if row >= 0 else -1
+
+    n = len(indices)
+    rows = run_parts(narrow, n, count_threads(threads, n) if n >= MIN_VERTICES_TO_SHARE else 1)
+    for row in rows:
+        if row >= 0:
+            raise bad_triangle(triangles, row, n_vertices)
     return corners, True
 
 
