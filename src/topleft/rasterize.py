@@ -102,9 +102,9 @@ def index_triangles(
     """Return triangles as int32, and whether their indices have been checked on the way."""
     indices = as_triangles(triangles)
     if indices.dtype == np.int32:
-        return cast(NDArray[np.int32], indices), False
+        return cast("NDArray[np.int32]", indices), False
     corners: NDArray[np.int32] = memory.empty("triangles", indices.shape, np.int32)
-    wide = cast(NDArray[np.int64], indices)
+    wide = cast("NDArray[np.int64]", indices)
 
     def narrow(first: int, end: int) -> int:
         row = _engine.narrow_triangles(wide[first:end], n_vertices, corners[first:end])

@@ -34,6 +34,9 @@ class ViewOptions(TypedDict, total=False):
     threads: int | None
 
 
+OPTIONS = frozenset(ViewOptions.__annotations__)
+
+
 @dataclass(frozen=True, slots=True)
 class View:
     """Checked `ViewOptions`."""
@@ -59,9 +62,9 @@ class View:
     @classmethod
     def parse(cls, size: object, options: ViewOptions) -> View:
         """Check the options of a call."""
-        unknown = sorted(set(options) - set(ViewOptions.__annotations__))
-        if unknown:
-            raise TypeError(f"unknown option {unknown[0]!r}; the options are {', '.join(ViewOptions.__annotations__)}")
+        if not options.keys() <= OPTIONS:
+            unknown = min(options.keys() - OPTIONS)
+            raise TypeError(f"unknown option {unknown!r}; the options are {', '.join(ViewOptions.__annotations__)}")
         checked_size = as_size(size)
         bits = as_subpixel_bits(options.get("subpixel_bits", 8))
         viewport = options.get("viewport")
