@@ -40,6 +40,17 @@ def test_positions_are_distinct_and_each_of_1_to_16_sits_alone_in_its_row_and_co
     assert len(set(x)) == len(set(y)) == n
 
 
+def test_positions_are_those_of_vulkan_in_sixteenths_from_the_corner():
+    corner = {n: [(x + 8, y + 8) for x, y in at] for n, at in sampling.SAMPLE_POSITIONS.items()}
+    assert corner[2] == [(12, 12), (4, 4)]
+    assert corner[4] == [(6, 2), (14, 6), (2, 10), (10, 14)]
+    assert corner[8] == [(9, 5), (7, 11), (13, 9), (5, 3), (3, 13), (1, 7), (11, 15), (15, 1)]
+    assert corner[16] == [
+        (9, 9), (7, 5), (5, 10), (12, 7), (3, 6), (10, 13), (13, 11), (11, 3),
+        (6, 14), (8, 1), (4, 2), (2, 12), (0, 8), (15, 4), (14, 15), (1, 0),
+    ]  # fmt: skip
+
+
 def test_sample_coverage_half_a_pixel_2_samples():
     left, top = [[0, 0], [0.5, 0], [0.5, 1], [0, 1]], [[0, 0], [1, 0], [1, 0.5], [0, 0.5]]
     square = [[0, 1, 2], [0, 2, 3]]
