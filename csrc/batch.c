@@ -3,7 +3,8 @@
  * rows.c, and the triangles that 32 bits cannot take, for draw_triangle.
  *
  * Range: extents of at most TL_MAX_EXTENT units, so |dx|, |dy| < 2^14, doubled relative coordinates fit 16 bits, products
- * 2^30, and doubled edge functions 2^29 (see fixed.h). */
+ * 2^30, and doubled edge functions 2^29 (see fixed.h).  Squares: two pixels less and at most 8 bits, so that all this holds of
+ * corners of pixels up to a pixel outside the extent, but that doubled edge functions are below 2^30. */
 #include "fixed.h"
 #include "lanes.h"
 
@@ -26,6 +27,8 @@ typedef struct {
     int32_t left, top, right, bottom; /* picture pixels */
     int32_t picture_top, picture_bottom; /* rows of the picture that other passes draw */
     int32_t max_extent;               /* of a triangle that 32-bit lanes can take, in units */
+    extent_rounding round;
+    int32_t special_x;                /* TL_SPECIAL as load_corners gives it */
     vi last_vertex;
     int second, third;                /* which corner comes second and third: culled faces then have negative area */
 } batch_limits;
@@ -69,6 +72,10 @@ TL_INLINE void load_corners(const batch_state *s, const int32_t *corners, lane_c
     load_vertices(vertices, corners, &c->x[0], &c->y[0], &c->z[0]);
     load_vertices(vertices, corners + s->limits.second, &c->x[1], &c->y[1], &c->z[1]);
     load_vertices(vertices, corners + s->limits.third, &c->x[2], &c->y[2], &c->z[2]);
+    for (int k = 0; k < 3; k++) {
+        c->x[k] = vi_sub(c->x[k], vi_set1(s->scene->mesh.sample_x_fx));
+        c->y[k] = vi_sub(c->y[k], vi_set1(s->scene->mesh.sample_y_fx));
+    }
 }
 
 /* Twice the signed area; exact where the extents are. */
@@ -79,10 +86,18 @@ TL_INLINE vi area_lanes(const lane_corners *c)
     return vi_sub(vi_mul(x1, y2), vi_mul(y1, x2));
 }
 
-TL_INLINE void setup_edges_lanes(lane_triangles *t, int bits)
+TL_INLINE void setup_edges_lanes(lane_triangles *t, const tl_window *window, tl_sink sink)
 {
+    const int bits = window->subpixel_bits, of_squares = (sink == TL_SINK_MASK || sink == TL_SINK_COUNT) && window->test != TL_TEST_SAMPLE;
     for (int k = 0; k < 3; k++) {
         const vi doubled = vi_sub(vi_mul(t->dy[k], t->x[k]), vi_mul(t->dx[k], t->y[k]));
+        if (of_squares) { /* from the centre to the corner that counts: half a pixel in x and in y */
+            const vi zero = vi_set1(0), is_outer = vi_set1(window->test == TL_TEST_OUTER);
+            const vi sides = vi_add(vi_max(t->dx[k], vi_sub(zero, t->dx[k])), vi_max(t->dy[k], vi_sub(zero, t->dy[k])));
+            const vi reach = vi_shift_left(sides, bits), inwards = window->test == TL_TEST_OUTER ? reach : vi_sub(zero, reach);
+            t->e[k] = vi_shift_right(vi_sub(vi_add(doubled, inwards), is_outer), bits + 1);
+            continue;
+        }
         /* left: dy < 0, top: dy = 0 and dx > 0; as one number, |dx| < 2^15 */
         const vm top_left = vi_gt(vi_set1(0), vi_sub(vi_shift_left(t->dy[k], 16), t->dx[k]));
         t->e[k] = vi_shift_right(vi_select(top_left, doubled, vi_sub(doubled, vi_set1(1))), bits + 1);
@@ -117,7 +132,7 @@ TL_INLINE void place_triangles(const batch_state *s, tl_sink sink, const lane_co
     }
     t->sample = vi_add(vi_mul(vi_sub(row, vi_set1(s->limits.top)), vi_set1((int32_t)s->target->stride_px)),
                        vi_sub(col, vi_set1(s->limits.left)));
-    setup_edges_lanes(t, bits);
+    setup_edges_lanes(t, s->window, sink);
 }
 
 /* The same operations as setup_plane in setup.c. */

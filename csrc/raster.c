@@ -14,11 +14,8 @@ TL_INLINE int has_bad_index(const int32_t *corners, vi last_vertex)
     return vm_any(vm_or(bad01, vi_gt_unsigned(vi_load(corners + 2 * TL_LANES), last_vertex)));
 }
 
-TL_INLINE vi first_centre_lanes(vi x_fx, int bits)
-{
-    const int round = bits ? (1 << (bits - 1)) - 1 : 0; /* the first centre at or right of x_fx, as first_centre */
-    return vi_shift_right(vi_add(x_fx, vi_set1(round)), bits);
-}
+/* As round_extent tells. */
+TL_INLINE vi extent_pixels(vi x_fx, int32_t round, int bits) { return vi_shift_right(vi_add(x_fx, vi_set1(round)), bits); }
 
 /* Lists triangles for the passes that draw the rest of the picture. */
 TL_INLINE void list_others(tl_share *share, vm m, vi id)
@@ -48,14 +45,14 @@ TL_INLINE void draw_batch(batch_state *s, tl_sink sink, const int32_t *corners, 
     const vi width = vi_sub(x_max, x_min), height = vi_sub(y_max, y_min);
     /* a special vertex has x = INT32_MIN: its triangle is too wide, or special throughout */
     vm alone = vm_or(vi_gt_unsigned(width, vi_set1(limits->max_extent)), vi_gt_unsigned(height, vi_set1(limits->max_extent)));
-    alone = vm_and(live, vm_or(alone, vi_eq(x_min, vi_set1(TL_SPECIAL))));
+    alone = vm_and(live, vm_or(alone, vi_eq(x_min, vi_set1(limits->special_x))));
     const vi area = area_lanes(&c), absolute = either_turn ? vi_max(area, vi_sub(zero, area)) : area;
     vm drawn = vm_and_not(vm_and(live, vi_gt(absolute, zero)), alone);
     if (!vm_any(vm_or(drawn, alone)))
         return;
-    const vi col = vi_max(first_centre_lanes(x_min, bits), vi_set1(limits->left));
-    const vi n_cols = vi_sub(vi_min(first_centre_lanes(x_max, bits), vi_set1(limits->right)), col);
-    const vi top = first_centre_lanes(y_min, bits), bottom = first_centre_lanes(y_max, bits), row = vi_max(top, vi_set1(limits->top));
+    const vi col = vi_max(extent_pixels(x_min, limits->round.first, bits), vi_set1(limits->left));
+    const vi n_cols = vi_sub(vi_min(extent_pixels(x_max, limits->round.end, bits), vi_set1(limits->right)), col);
+    const vi top = extent_pixels(y_min, limits->round.first, bits), bottom = extent_pixels(y_max, limits->round.end, bits), row = vi_max(top, vi_set1(limits->top));
     const vi n_rows = vi_sub(vi_min(bottom, vi_set1(limits->bottom)), row);
     if (s->share->others) {
         const vi first = vi_max(top, vi_set1(limits->picture_top)), end = vi_min(bottom, vi_set1(limits->picture_bottom));
@@ -145,7 +142,9 @@ TL_INLINE void draw_batches(const tl_scene *scene, const tl_window *window, cons
         .bottom = (int32_t)min64(window->y_px + window->height, farthest),
         .picture_top = (int32_t)picture->y_px,
         .picture_bottom = (int32_t)min64(picture->y_px + picture->height, farthest),
-        .max_extent = TL_MAX_BOX_PX << (bits < 8 ? bits : 8),
+        .max_extent = (TL_MAX_BOX_PX - (window->test == TL_TEST_SAMPLE ? 0 : 2)) << (bits < 8 ? bits : 8),
+        .round = round_extent(window),
+        .special_x = (int32_t)((uint32_t)TL_SPECIAL - (uint32_t)scene->mesh.sample_x_fx),
         .second = is_back ? 2 : 1,
         .third = is_back ? 1 : 2,
         .last_vertex = vi_set1((int32_t)(scene->mesh.n_vertices - 1)),
@@ -168,7 +167,8 @@ TL_INLINE void draw_scene(const tl_scene *scene, const tl_window *window, const 
 {
     const int64_t farthest = (int64_t)1 << 30;
     const int is_near = window->x_px > -farthest && window->x_px < farthest && window->y_px > -farthest && window->y_px < farthest;
-    if (scene->method == TL_METHOD_AUTO && is_near) {
+    const int fits_lanes = window->test == TL_TEST_SAMPLE || window->subpixel_bits <= 8;
+    if (scene->method == TL_METHOD_AUTO && is_near && fits_lanes) {
         draw_batches(scene, window, target, share, bad_row, sink);
         return;
     }

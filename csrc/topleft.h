@@ -47,6 +47,7 @@ typedef struct {
     const double *inv_w;     /* 1/w per vertex, or NULL: see `source` */
     const tl_source *source; /* where w comes from when inv_w is NULL; NULL as well: all equal (pixel space) */
     int64_t n_vertices;
+    int32_t sample_x_fx, sample_y_fx; /* the sample from the pixel's centre, which vertices are seen from: |.| <= half a pixel */
 } tl_vertex_set;
 
 /* How many vertices of each special kind a vertex stage has seen, used by a triangle or not. */
@@ -78,11 +79,16 @@ typedef struct {
 
 /* ---- drawing ------------------------------------------------------------------------------------------- */
 
+/* When a triangle covers a pixel: when it holds the sample, when it meets the pixel's square in positive area, or when it holds
+ * the whole square.  The last two have no depth and no order: they draw masks and counts. */
+typedef enum { TL_TEST_SAMPLE = 0, TL_TEST_OUTER = 1, TL_TEST_INNER = 2 } tl_test;
+
 /* The part of the picture that a buffer shows, in whole pixels. */
 typedef struct {
     int64_t x_px, y_px; /* picture pixel of column 0, row 0 */
     int64_t width, height;
     int subpixel_bits;
+    tl_test test;
 } tl_window;
 
 typedef enum { TL_CULL_NONE = 0, TL_CULL_BACK = 1, TL_CULL_FRONT = 2 } tl_cull;

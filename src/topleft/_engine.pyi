@@ -72,6 +72,7 @@ class Scene:
         subpixel_bits: int,
         cull: int,
         method: int,
+        test: int = 0,
     ) -> None: ...
     def draw(self, target: Target, first_row: int, n_rows: int) -> int: ...
     def draw_share(

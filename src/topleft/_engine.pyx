@@ -24,6 +24,7 @@ cdef extern from "topleft.h" nogil:
         const double *inv_w
         const tl_source *source
         int64_t n_vertices
+        int32_t sample_x_fx, sample_y_fx
     ctypedef struct tl_vertex_counts:
         int64_t n_bad, n_wide, n_clipped
     ctypedef struct tl_view:
@@ -37,9 +38,11 @@ cdef extern from "topleft.h" nogil:
         int32_t *triangles
         int32_t *source
         int64_t n_vertices, n_pieces
+    ctypedef int tl_test
     ctypedef struct tl_window:
         int64_t x_px, y_px, width, height
         int subpixel_bits
+        tl_test test
     ctypedef int tl_cull
     ctypedef int tl_method
     ctypedef int tl_sink
@@ -257,11 +260,12 @@ cdef class Scene:
     cdef tl_scene scene
     cdef int64_t x_px, y_px
     cdef int subpixel_bits
+    cdef tl_test test
     cdef object arrays
 
     def __init__(
         self, Source source, const uint8_t[::1] records, const int64_t[:, ::1] wide, const int32_t[:, ::1] triangles,
-        Pieces pieces, int64_t x_px, int64_t y_px, int subpixel_bits, int cull, int method,
+        Pieces pieces, int64_t x_px, int64_t y_px, int subpixel_bits, int cull, int method, int test=0,
     ):
         self.arrays = (source, records, wide, triangles, pieces)
         self.scene.mesh.vertices = <const tl_vertex *>data(records)
@@ -273,12 +277,12 @@ cdef class Scene:
         self.scene.triangles = &triangles[0, 0] if triangles.shape[0] else NULL
         self.scene.pieces = &pieces.pieces if pieces is not None and len(pieces) else NULL
         self.scene.cull, self.scene.method = cull, method
-        self.x_px, self.y_px, self.subpixel_bits = x_px, y_px, subpixel_bits
+        self.x_px, self.y_px, self.subpixel_bits, self.test = x_px, y_px, subpixel_bits, test
 
     cdef tl_window window(self, int64_t first_row, int64_t n_rows, int64_t width) noexcept:
         cdef tl_window w
         w.x_px, w.y_px, w.subpixel_bits = self.x_px, self.y_px + first_row, self.subpixel_bits
-        w.width, w.height = width, n_rows
+        w.width, w.height, w.test = width, n_rows, self.test
         return w
 
     def draw(self, Target target, int64_t first_row, int64_t n_rows):

@@ -45,7 +45,8 @@ def coverage(
         origin : (int, int). The pixel of the whole picture that is row 0, column 0 here.
         viewport : (int, int). Width and height of the whole picture for clip space; default `size`.
         subpixel_bits : int, 0 to 16. Vertices snap to ``2**-subpixel_bits`` pixels; default 8.
-        sampling : "center", or "area": the exact area of the pixel (`coverage` and `overdraw` alone).
+        sampling : "center". For `coverage` and `overdraw` also "area": the exact area of the pixel; "outer": every pixel
+            square that a triangle meets in positive area; "inner": every square that lies wholly inside one.
         method : "auto", "edge" or "scanline": the same picture. Or a classic of the literature, to compare with:
             `topleft.methods.CLASSICS` names them, and docs/methods.md tells where each of them fails.
         cull : "none", "back" or "front"; the front is counter-clockwise seen with y up.

@@ -9,10 +9,12 @@ __all__ = ["ClipDepth", "Cull", "DepthTest", "Per", "Sampling", "Sink", "parse"]
 
 
 class Sampling(StrEnum):
-    """Where a pixel is sampled."""
+    """Where a pixel is sampled, or which squares count."""
 
     CENTER = "center"
     AREA = "area"
+    OUTER = "outer"
+    INNER = "inner"
 
 
 class Cull(StrEnum):

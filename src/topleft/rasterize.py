@@ -90,7 +90,7 @@ def snap_scene(
     pieces = _engine.Pieces(source, records, corners, engine_view) if engine_view and clipped else None
     drawn = corners if n else corners[:0]
     scene = _engine.Scene(
-        source, records, wide, drawn, pieces, *view.origin, view.subpixel_bits, view.cull, view.method
+        source, records, wide, drawn, pieces, *view.origin, view.subpixel_bits, view.cull, view.method, view.test
     )
     has_depth = source.is_clip_space or points.shape[1] == 3
     return Snapped(scene, triangles, corners, len(points), n_triangles, has_depth)
@@ -170,7 +170,8 @@ def is_shared(snapped: Snapped, view: View, n_parts: int) -> bool:
     width, height = view.size
     is_near = max(map(abs, view.origin)) < 2**29 and width * height < 2**31
     pays = snapped.n_triangles * n_parts >= MIN_TRIANGLES_TO_SHARE
-    return n_parts > 1 and pays and is_near and view.method == METHODS["auto"].code
+    fits_lanes = not view.test or view.subpixel_bits <= 8
+    return n_parts > 1 and pays and is_near and fits_lanes and view.method == METHODS["auto"].code
 
 
 def draw_shared(
@@ -243,10 +244,10 @@ def draw_area(
     return result
 
 
-def refuse_area(view: View, verb: str) -> None:
-    """Raise an error where a pixel needs one triangle, and areas are of many."""
-    if view.sampling is Sampling.AREA:
-        raise ValueError(f"sampling 'area' gives no ids: {verb} takes 'center'")
+def refuse_many(view: View, verb: str) -> None:
+    """Raise an error where a pixel needs one triangle, and areas or squares are of many."""
+    if view.sampling in (Sampling.AREA, Sampling.OUTER, Sampling.INNER):
+        raise ValueError(f"sampling {str(view.sampling)!r} gives no ids: {verb} takes 'center'")
 
 
 def draw_coverage(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, view: View, out: object) -> NDArray[Any]:
@@ -306,7 +307,7 @@ def draw_fill(
     out: object,
 ) -> NDArray[Any]:
     """`fill`, on the memory given."""
-    refuse_area(view, "fill")
+    refuse_many(view, "fill")
     palette = as_colors(colors)
     if view.classic:
         return fill_classic(view.classic, memory, vertices, triangles, palette, view, per, background, out)
@@ -334,7 +335,7 @@ def draw_fragments(
 ) -> Fragments:
     """`rasterize`, on the memory given."""
     refuse_classic(view, "depth")
-    refuse_area(view, "rasterize")
+    refuse_many(view, "rasterize")
     test = None if depth_test is None else parse(DepthTest, "depth_test", depth_test)
     if out is None:
         ids_out = depth_out = None

@@ -15,6 +15,7 @@ from topleft.threads import parse_threads
 
 __all__ = ["View", "ViewOptions"]
 
+TEST_CODES = {Sampling.OUTER: 1, Sampling.INNER: 2}  # tl_test in csrc/topleft.h
 CULL_CODES = {Cull.NONE: 0, Cull.BACK: 1, Cull.FRONT: 2}  # tl_cull in csrc/topleft.h
 
 
@@ -55,6 +56,11 @@ class View:
     def engine_view(self) -> _engine.View:
         """Return how clip space maps to pixels."""
         return _engine.View(self.viewport, self.subpixel_bits, self.zero_to_one, self.near_clip, self.far_clip)
+
+    @property
+    def test(self) -> int:
+        """When a triangle covers a pixel: `tl_test` in ``csrc/topleft.h``."""
+        return TEST_CODES.get(self.sampling, 0)
 
     @classmethod
     def parse(cls, size: object, options: ViewOptions) -> View:
