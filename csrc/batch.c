@@ -162,7 +162,7 @@ TL_INLINE vf plane_depth(const lane_planes *p, vd x, vd y)
 TL_INLINE int emit(fragment_list *f, int n, tl_sink sink, vm m, vi sample, vi id, vf depth)
 {
     vi_compress(f->sample + n, m, sample);
-    if (sink != TL_SINK_MASK && sink != TL_SINK_COUNT)
+    if (sink != TL_SINK_MASK && sink != TL_SINK_COUNT && sink != TL_SINK_SAMPLES)
         vi_compress(f->id + n, m, id);
     if (sink_has_depth(sink))
         vi_compress((int32_t *)(f->depth + n), m, vi_bits_of_vf(depth));

@@ -7,8 +7,10 @@
 #include "clip.c"
 #include "setup.c"
 #include "covered.c"
+#include "samples.c"
 #include "sink.c"
 #include "raster.c"
+#include "bin.c"
 #include "ramp.c"
 #include "ramp_exact.c"
 #include "accumulate.c"
@@ -25,6 +27,8 @@ const tl_kernels TL_KERNELS = {
     .first_bad_row = first_bad_row,
     .narrow_triangles = narrow_triangles,
     .draw = draw,
+    .bin = bin,
+    .list_bins = list_bins,
     .draw_area = draw_area,
     .barycentric = barycentric,
     .interpolate = interpolate,

@@ -186,8 +186,9 @@ TL_SINK_COPIES(draw_scene, (const tl_scene *scene, const tl_window *window, cons
 static void clear(const tl_window *window, const tl_target *target)
 {
     const float farthest = target->sink == TL_SINK_FARTHEST ? -INFINITY : INFINITY;
-    if (target->sink == TL_SINK_MASK) {
-        memset(target->covered, 0, (size_t)tl_covered_words(target->stride_px * window->height) * sizeof(uint64_t));
+    if (target->sink == TL_SINK_MASK || target->sink == TL_SINK_SAMPLES) {
+        const int64_t n_bits = target->stride_px * window->height << target->sample_bits;
+        memset(target->covered, 0, (size_t)tl_covered_words(n_bits) * sizeof(uint64_t));
         return;
     }
     for (int64_t row = 0; row < window->height; row++) {
@@ -195,6 +196,19 @@ static void clear(const tl_window *window, const tl_target *target)
         memset((int32_t *)target->pixels + at, target->sink == TL_SINK_COUNT ? 0 : 0xff, (size_t)window->width * sizeof(int32_t));
         for (int64_t col = 0; sink_has_depth(target->sink) && col < window->width; col++)
             target->depth[at + col] = farthest;
+    }
+}
+
+/* Each sample by itself. */
+static void draw_each_sample(const tl_scene *scene, const tl_window *window, const tl_target *target, tl_share *share, int64_t *bad_row)
+{
+    tl_scene seen = *scene;
+    tl_target one = *target;
+    for (int k = 0; k < 1 << target->sample_bits && *bad_row < 0; k++) {
+        seen.mesh.sample_x_fx = target->samples_fx[2 * k];
+        seen.mesh.sample_y_fx = target->samples_fx[2 * k + 1];
+        one.sample = k;
+        draw_scene_samples(&seen, window, &one, share, bad_row);
     }
 }
 
@@ -213,12 +227,16 @@ static int64_t draw(const tl_scene *scene, const tl_window *window, const tl_tar
         int64_t bad_row = -1;
         if (share->is_first)
             clear(&band, &part);
-        if (share->first < share->end)
+        if (share->first < share->end && target->sink == TL_SINK_SAMPLES)
+            draw_each_sample(scene, &band, &part, share, &bad_row);
+        else if (share->first < share->end)
             TL_SINK_CALL(draw_scene, target->sink, scene, &band, &part, share, &bad_row)
         if (bad_row >= 0)
             return bad_row;
         if (target->sink == TL_SINK_MASK && share->is_last)
             expand_covered(&band, &part);
+        if (target->sink == TL_SINK_SAMPLES && share->is_last)
+            share_samples(&band, &part);
     }
     return -1;
 }

@@ -87,6 +87,8 @@ TL_INLINE void draw_block(const tl_target *target, tl_sink sink, const int32_t *
         const vm m = vm_from_bits(drawn);
         if (sink == TL_SINK_MASK)
             cover(target, at, drawn);
+        else if (sink == TL_SINK_SAMPLES)
+            put_samples(target, at, drawn);
         else if (sink_has_depth(sink))
             put_depths(target, sink, at, m, sum_depth(vd_set1(z_row[row * stride_of_rows]), z_col), id);
         else

@@ -102,6 +102,7 @@ typedef enum {
     TL_SINK_PAINT = 3,    /* the same, and float = depth */
     TL_SINK_NEAREST = 4,  /* id and depth where depth < what is there; at equal depth the lower id */
     TL_SINK_FARTHEST = 5, /* id and depth where depth > what is there; at equal depth the lower id */
+    TL_SINK_SAMPLES = 6,  /* float: the share of samples that are covered; bits in `covered` until the last pass */
 } tl_sink;
 
 typedef struct {
@@ -110,7 +111,10 @@ typedef struct {
     float *depth; /* PAINT, NEAREST, FARTHEST; the same stride */
     int64_t stride_px;
     int64_t n_samples; /* from the first sample to the last, set by draw */
-    uint64_t *covered; /* MASK: tl_covered_words(stride_px * height of the window), at most of 2^31 samples */
+    uint64_t *covered; /* MASK, SAMPLES: tl_covered_words(samples of stride_px * height of the window), at most 2^31 pixels */
+    int sample_bits;           /* SAMPLES: 2^sample_bits samples a pixel, 1 to 4; stride_px is the width of the window */
+    const int32_t *samples_fx; /* (2^sample_bits, 2): x, y of each from the pixel's centre */
+    int sample;                /* the one that is being drawn; draw knows */
 } tl_target;
 
 /* A bit a sample, and a word behind the end. */
@@ -135,6 +139,12 @@ typedef struct {
     const tl_window *picture; /* what all the passes draw; read when there are `others` */
     int is_first, is_last;    /* of the passes over the window: the first clears it */
 } tl_share;
+
+/* The triangles that reach into a window, and the first and last band of rows of each. */
+typedef struct {
+    int64_t n;
+    int32_t *ids, *first_band, *last_band; /* n_triangles + 16 numbers each */
+} tl_bins;
 
 /* Where exact areas go.  `cells` is memory between the edges and the pixels: tl_area_stride(width) numbers a row, int32 that
  * are all TL_CELL_CLEAR, or int64 that are all 0 when is_wide.  They are left as they were found. */
@@ -182,6 +192,14 @@ typedef struct tl_kernels {
      * one; what was drawn is then worthless.  The window's pixels are cleared first: 0, id -1, and the depth that every
      * other beats.  A share of a part needs method AUTO, a picture of less than 2^31 samples within 2^30 pixels of 0. */
     int64_t (*draw)(const tl_scene *scene, const tl_window *window, const tl_target *target, tl_share *share);
+
+    /* Lists the triangles that are in the window or within reach_fx of it, with their bands of 2^band_bits rows; they may be a few
+     * too many.  Returns as `draw` does; the window as for a share of a part. */
+    int64_t (*bin)(const tl_scene *scene, const tl_window *window, int32_t reach_fx, int band_bits, tl_bins *bins);
+
+    /* The same by band: starts[k] to starts[k + 1] are the places of those of band k in `listed`.  `starts` has n_bands + 2 numbers.
+     * A first call with listed = NULL sets starts[n_bands + 1] to the length of `listed`. */
+    void (*list_bins)(const tl_bins *bins, int64_t n_bands, int64_t *starts, int32_t *listed);
 
     /* The exact area that triangles cover of each pixel, their sum; the window has fewer than 2^31 cells.  Returns as `draw`
      * does, or TL_AREA_OVERFLOW; either way the pixels are then worthless. */

@@ -1,5 +1,6 @@
 """The types of the compiled module. Functions and classes are described in _engine.pyx and _dispatch.pxi."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -28,13 +29,20 @@ class Target:
         pixels: NDArray[Any],
         depth: NDArray[np.float32] | None,
         covered: NDArray[np.uint64] | None,
+        samples: NDArray[np.int32] | None = None,
     ) -> None: ...
     @staticmethod
-    def covered_shape(height: int, width: int) -> tuple[int, int]: ...
+    def covered_shape(height: int, width: int, n_samples: int = 1) -> tuple[int, int]: ...
 
 class View:
     def __init__(
-        self, viewport: tuple[int, int], subpixel_bits: int, zero_to_one: bool, near_clip: bool, far_clip: bool
+        self,
+        viewport: tuple[int, int],
+        subpixel_bits: int,
+        guard_bits: int,
+        zero_to_one: bool,
+        near_clip: bool,
+        far_clip: bool,
     ) -> None: ...
 
 class Source:
@@ -54,6 +62,7 @@ class Source:
     ) -> tuple[int, int, int]: ...
 
 class Pieces:
+    arrays: tuple[Any, ...] | None
     def __init__(
         self, source: Source, records: NDArray[np.uint8], triangles: NDArray[np.int32], view: View
     ) -> None: ...
@@ -74,6 +83,7 @@ class Scene:
         method: int,
         test: int = 0,
     ) -> None: ...
+    def seen_from(self, x_fx: int, y_fx: int) -> Scene: ...
     def draw(self, target: Target, first_row: int, n_rows: int) -> int: ...
     def draw_share(
         self, target: Target, first_row: int, n_rows: int, first: int, others: NDArray[np.int32]
@@ -110,3 +120,16 @@ class Scene:
         background: float,
         out: NDArray[np.float32],
     ) -> None: ...
+
+class Bins:
+    bad_row: int
+    n_bands: int
+    n_listed: int
+    def __init__(
+        self, scene: Scene, height: int, width: int, reach_fx: int, band_bits: int, room: NDArray[np.int32]
+    ) -> None: ...
+    def fill(self, listed: NDArray[np.int32]) -> None: ...
+
+def draw_bands(
+    scenes: Sequence[Scene], targets: Sequence[Target], bins: Bins, first_band: int, end_band: int
+) -> None: ...

@@ -53,7 +53,15 @@ cdef extern from "topleft.h" nogil:
         int64_t stride_px
         int64_t n_samples
         uint64_t *covered
+        int sample_bits
+        const int32_t *samples_fx
+        int sample
     int64_t tl_covered_words(int64_t)
+    ctypedef struct tl_bins:
+        int64_t n
+        int32_t *ids
+        int32_t *first_band
+        int32_t *last_band
     ctypedef struct tl_area:
         float *pixels
         int64_t stride_px
@@ -83,6 +91,8 @@ cdef extern from "topleft.h" nogil:
         int64_t (*first_bad_row)(const int32_t *, int64_t, int64_t) noexcept nogil
         int64_t (*narrow_triangles)(const int64_t *, int64_t, int64_t, int32_t *) noexcept nogil
         int64_t (*draw)(const tl_scene *, const tl_window *, const tl_target *, tl_share *) noexcept nogil
+        int64_t (*bin)(const tl_scene *, const tl_window *, int32_t, int, tl_bins *) noexcept nogil
+        void (*list_bins)(const tl_bins *, int64_t, int64_t *, int32_t *) noexcept nogil
         int64_t (*draw_area)(const tl_scene *, const tl_window *, const tl_area *) noexcept nogil
         void (*barycentric)(const tl_scene *, const tl_window *, const int32_t *, float *) noexcept nogil
         void (*interpolate)(const tl_scene *, const tl_window *, const int32_t *, const float *, int, int, float, float *) noexcept nogil
@@ -116,9 +126,9 @@ cdef class View:
 
     cdef tl_view view
 
-    def __init__(self, viewport, int subpixel_bits, bint zero_to_one, bint near_clip, bint far_clip):
+    def __init__(self, viewport, int subpixel_bits, int guard_bits, bint zero_to_one, bint near_clip, bint far_clip):
         self.view.half_width_px, self.view.half_height_px = viewport[0] / 2, viewport[1] / 2
-        self.view.guard_band_x, self.view.guard_band_y = (2.0**60 / (side / 2 * 2**subpixel_bits) for side in viewport)
+        self.view.guard_band_x, self.view.guard_band_y = (2.0**60 / (side / 2 * 2**guard_bits) for side in viewport)
         self.view.subpixel_bits, self.view.zero_to_one = subpixel_bits, zero_to_one
         self.view.near_clip, self.view.far_clip = near_clip, far_clip
 
@@ -166,17 +176,20 @@ cdef class Target:
     cdef uint8_t[::1] pixels
     cdef float[:, ::1] depth
     cdef uint64_t[:, ::1] covered
+    cdef int sample_bits
+    cdef const int32_t[:, ::1] samples
 
-    def __init__(self, int sink, pixels, depth, covered):
+    def __init__(self, int sink, pixels, depth, covered, samples=None):
         self.sink = <tl_sink>sink
         self.height, self.width = pixels.shape
         self.pixel_bytes = pixels.itemsize
         self.pixels, self.depth, self.covered = as_bytes(pixels), depth, covered
+        self.samples, self.sample_bits = samples, 0 if samples is None else len(samples).bit_length() - 1
 
     @staticmethod
-    def covered_shape(int64_t height, int64_t width):
+    def covered_shape(int64_t height, int64_t width, int64_t n_samples=1):
         """Return the shape of the uint64 scratch that a mask needs: any rows of it are enough for as many of the mask."""
-        return height, tl_covered_words(width)
+        return height, tl_covered_words(width * n_samples)
 
     cdef tl_target rows(self, int64_t first_row) noexcept:
         """The buffers from a row on."""
@@ -186,7 +199,9 @@ cdef class Target:
         t.depth = &self.depth[first_row, 0] if self.depth is not None else NULL
         t.covered = &self.covered[first_row, 0] if self.covered is not None else NULL
         t.stride_px = self.width
-        t.n_samples = 0  # draw knows
+        t.n_samples = t.sample = 0  # draw knows
+        t.sample_bits = self.sample_bits
+        t.samples_fx = &self.samples[0, 0] if self.samples is not None else NULL
         return t
 
 
@@ -221,7 +236,7 @@ cdef class Pieces:
     """What the clip planes leave of the triangles that they cut."""
 
     cdef tl_pieces pieces
-    cdef object arrays
+    cdef readonly object arrays
 
     def __init__(self, Source source, const uint8_t[::1] records, const int32_t[:, ::1] triangles, View view):
         cdef tl_pieces *p = &self.pieces
@@ -278,6 +293,14 @@ cdef class Scene:
         self.scene.pieces = &pieces.pieces if pieces is not None and len(pieces) else NULL
         self.scene.cull, self.scene.method = cull, method
         self.x_px, self.y_px, self.subpixel_bits, self.test = x_px, y_px, subpixel_bits, test
+
+    def seen_from(self, int32_t x_fx, int32_t y_fx):
+        """Return the same scene with its samples off the centres of the pixels, in sub-pixels."""
+        cdef Scene seen = Scene.__new__(Scene)
+        seen.scene, seen.arrays = self.scene, self.arrays
+        seen.x_px, seen.y_px, seen.subpixel_bits, seen.test = self.x_px, self.y_px, self.subpixel_bits, self.test
+        seen.scene.mesh.sample_x_fx, seen.scene.mesh.sample_y_fx = x_fx, y_fx
+        return seen
 
     cdef tl_window window(self, int64_t first_row, int64_t n_rows, int64_t width) noexcept:
         cdef tl_window w
@@ -373,3 +396,54 @@ cdef class Scene:
             with nogil:
                 K.interpolate(&self.scene, &window, &ids[0, 0], &values[0, 0] if values.shape[0] else NULL, n_values,
                               per_corner, background, &out[0, 0, 0])
+
+
+cdef class Bins:
+    """The triangles that reach into each band of 2**band_bits rows of a picture."""
+
+    cdef tl_bins bins
+    cdef int64_t[::1] starts
+    cdef int32_t[::1] listed
+    cdef object room
+    cdef int band_bits
+    cdef readonly int64_t bad_row, n_bands, n_listed
+
+    def __init__(self, Scene scene, int64_t height, int64_t width, int32_t reach_fx, int band_bits, int32_t[:, ::1] room):
+        """`room`: (3, n_triangles + 16). `bad_row` is -1, or a triangle has an index outside the vertices."""
+        cdef tl_window window = scene.window(0, height, width)
+        self.room, self.band_bits, self.n_bands = room, band_bits, (height + (1 << band_bits) - 1) >> band_bits
+        self.starts = np.empty(self.n_bands + 2, np.int64)
+        self.bins.n = self.n_listed = 0
+        self.bins.ids, self.bins.first_band, self.bins.last_band = &room[0, 0], &room[1, 0], &room[2, 0]
+        with nogil:
+            self.bad_row = K.bin(&scene.scene, &window, reach_fx, band_bits, &self.bins)
+            if self.bad_row < 0:
+                K.list_bins(&self.bins, self.n_bands, &self.starts[0], NULL)
+                self.n_listed = self.starts[self.n_bands + 1]
+
+    def fill(self, int32_t[::1] listed):
+        """Sort the triangles into `listed`, which has room for `n_listed` and one more."""
+        self.listed = listed
+        with nogil:
+            K.list_bins(&self.bins, self.n_bands, &self.starts[0], &listed[0])
+
+
+def draw_bands(scenes, targets, Bins bins, int64_t first_band, int64_t end_band):
+    """Clear and draw bands of several pictures, a scene each, one band of all after the other."""
+    cdef Scene scene
+    cdef Target target
+    cdef tl_target rows
+    cdef tl_window window
+    cdef tl_share share
+    cdef int64_t band, first_row
+    cdef list pairs = list(zip(scenes, targets, strict=True))
+    share.others, share.first, share.is_first, share.is_last = NULL, 0, True, True
+    for band in range(first_band, end_band):
+        first_row = band << bins.band_bits
+        share.ids = &bins.listed[0] + bins.starts[band]
+        share.end = bins.starts[band + 1] - bins.starts[band]
+        for scene, target in pairs:
+            rows = target.rows(first_row)
+            window = scene.window(first_row, min(<int64_t>1 << bins.band_bits, target.height - first_row), target.width)
+            with nogil:
+                K.draw(&scene.scene, &window, &rows, &share)

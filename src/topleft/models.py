@@ -12,9 +12,18 @@ class Sampling(StrEnum):
     """Where a pixel is sampled, or which squares count."""
 
     CENTER = "center"
+    MSAA2 = "msaa2"
+    MSAA4 = "msaa4"
+    MSAA8 = "msaa8"
+    MSAA16 = "msaa16"
     AREA = "area"
     OUTER = "outer"
     INNER = "inner"
+
+    @property
+    def n_samples(self) -> int:
+        """Samples of a pixel, 1 unless there are several."""
+        return int(self.removeprefix("msaa")) if self.startswith("msaa") else 1
 
 
 class Cull(StrEnum):
@@ -56,6 +65,7 @@ class Sink(IntEnum):
     PAINT = 3
     NEAREST = 4
     FARTHEST = 5
+    SAMPLES = 6
 
 
 Option = TypeVar("Option", bound=StrEnum)

@@ -11,6 +11,7 @@ from topleft import _engine
 from topleft.arrays import as_size, as_subpixel_bits, as_window
 from topleft.methods import Method, find_method
 from topleft.models import ClipDepth, Cull, Sampling, parse
+from topleft.sampling import SAMPLE_GRID_BITS
 from topleft.threads import parse_threads
 
 __all__ = ["View", "ViewOptions"]
@@ -55,12 +56,18 @@ class View:
 
     def engine_view(self) -> _engine.View:
         """Return how clip space maps to pixels."""
-        return _engine.View(self.viewport, self.subpixel_bits, self.zero_to_one, self.near_clip, self.far_clip)
+        guard = self.grid_bits
+        return _engine.View(self.viewport, self.subpixel_bits, guard, self.zero_to_one, self.near_clip, self.far_clip)
 
     @property
     def test(self) -> int:
         """When a triangle covers a pixel: `tl_test` in ``csrc/topleft.h``."""
         return TEST_CODES.get(self.sampling, 0)
+
+    @property
+    def grid_bits(self) -> int:
+        """Sub-pixel bits of the grid that holds the snapped vertices and all samples."""
+        return self.subpixel_bits if self.sampling.n_samples == 1 else max(SAMPLE_GRID_BITS, self.subpixel_bits)
 
     @classmethod
     def parse(cls, size: object, options: ViewOptions) -> View:
@@ -70,15 +77,16 @@ class View:
             raise TypeError(f"unknown option {unknown[0]!r}; the options are {', '.join(ViewOptions.__annotations__)}")
         checked_size = as_size(size)
         bits = as_subpixel_bits(options.get("subpixel_bits", 8))
+        sampling = parse(Sampling, "sampling", options.get("sampling", "center"))
         viewport = options.get("viewport")
         method = find_method(options.get("method", "auto"))
         return cls(
             size=checked_size,
-            origin=as_window(options.get("origin", (0, 0)), bits),
+            origin=as_window(options.get("origin", (0, 0)), bits if sampling.n_samples == 1 else max(SAMPLE_GRID_BITS, bits)),
             viewport=checked_size if viewport is None else as_size(viewport, "viewport", smallest=1),
             transform=options.get("transform"),
             subpixel_bits=bits,
-            sampling=parse(Sampling, "sampling", options.get("sampling", "center")),
+            sampling=sampling,
             method=method.code or 0,
             cull=CULL_CODES[parse(Cull, "cull", options.get("cull", "none"))],
             zero_to_one=parse(ClipDepth, "clip_depth", options.get("clip_depth", "minus_one_to_one"))
