@@ -3,7 +3,7 @@
  * rows.c, and the triangles that 32 bits cannot take, for draw_triangle.
  *
  * Range: extents of at most TL_MAX_EXTENT units, so |dx|, |dy| < 2^14, doubled relative coordinates fit 16 bits, products
- * 2^30, and doubled edge functions 2^29 (see fixed.h).  Squares: two pixels less and at most 8 bits, so that all this holds of
+ * 2^30, and doubled edge functions 2^29 (see fixed.h).  Squares and several samples: two pixels less and at most 8 bits, so that all this holds of
  * corners of pixels up to a pixel outside the extent, but that doubled edge functions are below 2^30. */
 #include "fixed.h"
 #include "lanes.h"
@@ -56,7 +56,7 @@ typedef struct {
 typedef struct {
     vi x[3], y[3];
     vi dx[3], dy[3]; /* edge k runs from corner k to corner k + 1; not doubled */
-    vi e[3];         /* E' at the first sample, as in walk.h: >= 0 inside */
+    vi e[3];         /* E' at the first sample, as in walk.h: >= 0 inside; of SAMPLES 2E + bias at the centre */
     vi sample;       /* the first sample: row * stride_px + column */
 } lane_triangles;
 
@@ -100,7 +100,8 @@ TL_INLINE void setup_edges_lanes(lane_triangles *t, const tl_window *window, tl_
         }
         /* left: dy < 0, top: dy = 0 and dx > 0; as one number, |dx| < 2^15 */
         const vm top_left = vi_gt(vi_set1(0), vi_sub(vi_shift_left(t->dy[k], 16), t->dx[k]));
-        t->e[k] = vi_shift_right(vi_select(top_left, doubled, vi_sub(doubled, vi_set1(1))), bits + 1);
+        const vi biased = vi_select(top_left, doubled, vi_sub(doubled, vi_set1(1)));
+        t->e[k] = sink == TL_SINK_SAMPLES ? biased : vi_shift_right(biased, bits + 1);
     }
 }
 
@@ -162,7 +163,7 @@ TL_INLINE vf plane_depth(const lane_planes *p, vd x, vd y)
 TL_INLINE int emit(fragment_list *f, int n, tl_sink sink, vm m, vi sample, vi id, vf depth)
 {
     vi_compress(f->sample + n, m, sample);
-    if (sink != TL_SINK_MASK && sink != TL_SINK_COUNT && sink != TL_SINK_SAMPLES)
+    if (sink != TL_SINK_MASK && sink != TL_SINK_COUNT)
         vi_compress(f->id + n, m, id);
     if (sink_has_depth(sink))
         vi_compress((int32_t *)(f->depth + n), m, vi_bits_of_vf(depth));
@@ -178,10 +179,20 @@ TL_INLINE int make_room(batch_state *s, int n, tl_sink sink)
     return 0;
 }
 
+/* In sampled.c: what the sink SAMPLES does instead. */
+static void draw_tiny_of_samples(batch_state *s, const lane_triangles *t, vm live, vi n_cols, vi n_rows);
+static void flush_small_of_samples(batch_state *s);
+static void flush_middle_of_samples(batch_state *s);
+static void flush_rows_of_samples(batch_state *s);
+
 /* Boxes of up to 2x2 samples, tested where they are. */
 TL_INLINE void draw_tiny(batch_state *s, tl_sink sink, const lane_triangles *t, const vd *z, vm live, vi n_cols, vi n_rows, vi id)
 {
     const int bits = s->window->subpixel_bits;
+    if (sink == TL_SINK_SAMPLES) {
+        draw_tiny_of_samples(s, t, live, n_cols, n_rows);
+        return;
+    }
     const vi sample = t->sample;
     const vi stride = vi_set1((int32_t)s->target->stride_px), one = vi_set1(1), minus_one = vi_set1(-1);
     vm in[2][2];
@@ -252,6 +263,10 @@ TL_INLINE void pop(const batch_state *s, tl_sink sink, const box_queue *q, int i
 /* Boxes of up to 4x4 samples: every sample of TL_LANES boxes. */
 TL_INLINE void flush_small(batch_state *s, tl_sink sink)
 {
+    if (sink == TL_SINK_SAMPLES) {
+        flush_small_of_samples(s);
+        return;
+    }
     box_queue *q = &s->small;
     const int bits = s->window->subpixel_bits, n = q->n;
     const int32_t stride = (int32_t)s->target->stride_px;

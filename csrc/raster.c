@@ -6,6 +6,7 @@
 #include "alone.c"
 #include "batch.c"
 #include "rows.c"
+#include "sampled.c"
 
 /* Whether the 3 * TL_LANES indices of a vector of triangles hold one outside [0, last_vertex]. */
 TL_INLINE int has_bad_index(const int32_t *corners, vi last_vertex)
@@ -22,6 +23,14 @@ TL_INLINE void list_others(tl_share *share, vm m, vi id)
 {
     vi_compress(share->others + share->n_others, m, id);
     share->n_others += __builtin_popcount(vm_bits(m));
+}
+
+TL_INLINE void draw_one(const tl_scene *scene, int64_t i, const tl_window *window, const tl_target *target, tl_sink sink)
+{
+    if (sink == TL_SINK_SAMPLES)
+        draw_alone_each_sample(scene, i, window, target);
+    else
+        TL_SINK_CALL(draw_alone, sink, scene, i, window, target)
 }
 
 /* Setup and cull of TL_LANES triangles. */
@@ -76,7 +85,7 @@ TL_INLINE void draw_batch(batch_state *s, tl_sink sink, const int32_t *corners, 
         int32_t ids[TL_MAX_LANES];
         vi_store(ids, id);
         for (unsigned lanes = vm_bits(alone); lanes; lanes &= lanes - 1)
-            TL_SINK_CALL(draw_alone, sink, s->scene, ids[__builtin_ctz(lanes)], s->window, s->target)
+            draw_one(s->scene, ids[__builtin_ctz(lanes)], s->window, s->target, sink);
     }
     if (!vm_any(drawn))
         return;
@@ -133,6 +142,9 @@ TL_INLINE void draw_batches(const tl_scene *scene, const tl_window *window, cons
     s.small.n = s.middle.n = s.rows.n = s.fragments.n = 0;
     memset(s.fragments.sample, 0, sizeof s.fragments.sample); /* what is prefetched behind the end of the list */
     const int bits = window->subpixel_bits, is_back = scene->cull == TL_CULL_BACK;
+    const int is_centre = window->test == TL_TEST_SAMPLE && sink != TL_SINK_SAMPLES;
+    const int32_t reach = sink == TL_SINK_SAMPLES ? sample_reach(target) : 0;
+    const extent_rounding round = round_extent(window);
     const int64_t farthest = (int64_t)1 << 30;
     const tl_window *picture = share->others ? share->picture : window;
     s.limits = (batch_limits){
@@ -142,8 +154,8 @@ TL_INLINE void draw_batches(const tl_scene *scene, const tl_window *window, cons
         .bottom = (int32_t)min64(window->y_px + window->height, farthest),
         .picture_top = (int32_t)picture->y_px,
         .picture_bottom = (int32_t)min64(picture->y_px + picture->height, farthest),
-        .max_extent = (TL_MAX_BOX_PX - (window->test == TL_TEST_SAMPLE ? 0 : 2)) << (bits < 8 ? bits : 8),
-        .round = round_extent(window),
+        .max_extent = (TL_MAX_BOX_PX - (is_centre ? 0 : 2)) << (bits < 8 ? bits : 8),
+        .round = {round.first - reach, round.end + reach},
         .special_x = (int32_t)((uint32_t)TL_SPECIAL - (uint32_t)scene->mesh.sample_x_fx),
         .second = is_back ? 2 : 1,
         .third = is_back ? 1 : 2,
@@ -167,7 +179,7 @@ TL_INLINE void draw_scene(const tl_scene *scene, const tl_window *window, const 
 {
     const int64_t farthest = (int64_t)1 << 30;
     const int is_near = window->x_px > -farthest && window->x_px < farthest && window->y_px > -farthest && window->y_px < farthest;
-    const int fits_lanes = window->test == TL_TEST_SAMPLE || window->subpixel_bits <= 8;
+    const int is_centre = window->test == TL_TEST_SAMPLE && sink != TL_SINK_SAMPLES, fits_lanes = is_centre || window->subpixel_bits <= 8;
     if (scene->method == TL_METHOD_AUTO && is_near && fits_lanes) {
         draw_batches(scene, window, target, share, bad_row, sink);
         return;
@@ -176,7 +188,7 @@ TL_INLINE void draw_scene(const tl_scene *scene, const tl_window *window, const 
     if (*bad_row >= 0)
         return;
     for (int64_t i = 0; i < scene->n_triangles; i++)
-        TL_SINK_CALL(draw_alone, sink, scene, i, window, target)
+        draw_one(scene, i, window, target, sink);
 }
 
 TL_SINK_COPIES(draw_scene, (const tl_scene *scene, const tl_window *window, const tl_target *target, tl_share *share, int64_t *bad_row),
@@ -199,19 +211,6 @@ static void clear(const tl_window *window, const tl_target *target)
     }
 }
 
-/* Each sample by itself. */
-static void draw_each_sample(const tl_scene *scene, const tl_window *window, const tl_target *target, tl_share *share, int64_t *bad_row)
-{
-    tl_scene seen = *scene;
-    tl_target one = *target;
-    for (int k = 0; k < 1 << target->sample_bits && *bad_row < 0; k++) {
-        seen.mesh.sample_x_fx = target->samples_fx[2 * k];
-        seen.mesh.sample_y_fx = target->samples_fx[2 * k + 1];
-        one.sample = k;
-        draw_scene_samples(&seen, window, &one, share, bad_row);
-    }
-}
-
 static int64_t draw(const tl_scene *scene, const tl_window *window, const tl_target *target, tl_share *share)
 {
     const int64_t pixel_bytes = target->sink == TL_SINK_MASK ? 1 : 4;
@@ -227,9 +226,7 @@ static int64_t draw(const tl_scene *scene, const tl_window *window, const tl_tar
         int64_t bad_row = -1;
         if (share->is_first)
             clear(&band, &part);
-        if (share->first < share->end && target->sink == TL_SINK_SAMPLES)
-            draw_each_sample(scene, &band, &part, share, &bad_row);
-        else if (share->first < share->end)
+        if (share->first < share->end)
             TL_SINK_CALL(draw_scene, target->sink, scene, &band, &part, share, &bad_row)
         if (bad_row >= 0)
             return bad_row;

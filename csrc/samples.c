@@ -27,13 +27,6 @@ TL_INLINE void cover_samples(const tl_target *target, int64_t at, int64_t n)
         words[last] |= pattern & word_bits(begin, length, last << 6);
 }
 
-/* The same of the pixels in `bits`, which have no holes. */
-TL_INLINE void put_samples(const tl_target *target, int64_t at, unsigned bits)
-{
-    if (bits)
-        cover_samples(target, at + __builtin_ctz(bits), __builtin_popcount(bits));
-}
-
 /* Sums of 2^sample_bits bits each, where those lay. */
 TL_INLINE uint64_t count_bits(uint64_t v, int sample_bits)
 {

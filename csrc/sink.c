@@ -205,7 +205,7 @@ TL_INLINE void flush_fragments(const tl_target *target, tl_sink sink, const frag
             target->covered[at >> 6] |= 1ull << (at & 63);
         } else if (sink == TL_SINK_SAMPLES) {
             const int64_t bit = at << target->sample_bits;
-            target->covered[bit >> 6] |= 1ull << ((bit & 63) + target->sample);
+            target->covered[bit >> 6] |= (uint64_t)(uint32_t)f->id[k] << (bit & 63); /* a bit a sample */
         } else if (sink == TL_SINK_COUNT) {
             pixels[at]++;
         } else if (sink == TL_SINK_LABEL) {

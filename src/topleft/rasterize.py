@@ -182,7 +182,7 @@ def draw(
     def draw_rows(first: int, end: int) -> int:
         return snapped.scene.draw(target, first, end - first)
 
-    if sink is not Sink.SAMPLES and is_shared(snapped, view, n_parts):
+    if is_shared(snapped, view, n_parts, sink):
         bad_rows = draw_shared(memory, snapped, target, height, n_parts)
     else:
         bad_rows = run_parts(draw_rows, height, n_parts)
@@ -190,10 +190,11 @@ def draw(
         check_triangles(snapped.triangles, snapped.corners, snapped.n_vertices)
 
 
-def is_shared(snapped: Snapped, view: View, n_parts: int) -> bool:
+def is_shared(snapped: Snapped, view: View, n_parts: int, sink: Sink) -> bool:
     """Tell whether each thread is to take a share of the triangles instead of setting up all of them."""
     pays = snapped.n_triangles * n_parts >= MIN_TRIANGLES_TO_SHARE
-    return n_parts > 1 and pays and can_share(view)
+    fits_lanes = sink is not Sink.SAMPLES or view.grid_bits <= 8
+    return n_parts > 1 and pays and fits_lanes and can_share(view)
 
 
 def can_share(view: View) -> bool:
