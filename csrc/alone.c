@@ -33,38 +33,44 @@ static inline void floor_divide_128(tl_int128 a, tl_int128 b, tl_int128 *quotien
 
 /* One triangle of any size, by the ends of TL_LANES rows at a time in float64: as above, exact while |2E| < 2^51, for then
  * |v / d| * 2^-52 < 0.5 / d. */
-TL_INLINE int rows_fit(const tl_triangle *t, const tl_window *window)
+TL_INLINE int rows_fit(const tl_triangle *t, const tl_window *window, int with_border)
 {
-    const double around = window->test == TL_TEST_SAMPLE ? 0.0 : (double)((int64_t)2 << window->subpixel_bits);
+    const double around = with_border ? (double)((int64_t)2 << window->subpixel_bits) : 0.0;
     const double width = (double)(max3(t->x_fx[0], t->x_fx[1], t->x_fx[2]) - min3(t->x_fx[0], t->x_fx[1], t->x_fx[2]));
     const double height = (double)(max3(t->y_fx[0], t->y_fx[1], t->y_fx[2]) - min3(t->y_fx[0], t->y_fx[1], t->y_fx[2]));
     return TL_LANES > 1 && t->is_narrow && 2.0 * (width + around) * (height + around) < 0x1p50;
+}
+
+/* The columns [first, end) of TL_LANES rows, all within [low, high]. */
+TL_INLINE void find_row_ends(const edges_64 *e, vd rows, double low, double high, int32_t *first, int32_t *end)
+{
+    vd begins = vd_set1(low), ends = vd_set1(high);
+    for (int k = 0; k < 3; k++) {
+        if (e->dy[k] == 0)
+            continue;
+        const vd v = vd_add(vd_set1((double)e->value[k] + 0.5), vd_mul(vd_set1((double)e->dx[k]), rows));
+        const vd quotient = vd_floor(vd_mul(v, vd_set1(1.0 / fabs((double)e->dy[k]))));
+        if (e->dy[k] < 0)
+            begins = vd_max(begins, vd_sub(vd_set1(0.0), quotient));
+        else
+            ends = vd_min(ends, vd_add(quotient, vd_set1(1.0)));
+    }
+    vi_store(first, vi_round(vd_min(begins, vd_set1(high))));
+    vi_store(end, vi_round(vd_max(ends, vd_set1(low))));
 }
 
 TL_INLINE void walk_rows(const tl_triangle *t, const tl_window *window, const tl_target *shared, tl_sink sink)
 {
     const tl_target own = *shared, *target = &own; /* a copy that no store can change */
     const edges_64 e = setup_edges_64(t, window);
-    const vd lanes = vd_from_vi(vi_iota()), one = vd_set1(1.0), zero = vd_set1(0.0), width = vd_set1((double)(t->col1 - t->col0));
+    const vd lanes = vd_from_vi(vi_iota());
     const double step = (double)((int64_t)2 << window->subpixel_bits), x0 = sample_x(t, window, t->col0);
     const vd xs = vd_add(vd_set1(x0), ramp(step)), slope_x = vd_set1(t->slope_x);
     int32_t first[TL_MAX_LANES], end[TL_MAX_LANES];
     double z_row[TL_MAX_LANES];
     for (int64_t row0 = t->row0; row0 < t->row1; row0 += TL_LANES) {
         const vd rows = vd_add(vd_set1((double)(row0 - t->row0)), lanes);
-        vd begins = zero, ends = width;
-        for (int k = 0; k < 3; k++) {
-            if (e.dy[k] == 0)
-                continue;
-            const vd v = vd_add(vd_set1((double)e.value[k] + 0.5), vd_mul(vd_set1((double)e.dx[k]), rows));
-            const vd quotient = vd_floor(vd_mul(v, vd_set1(1.0 / fabs((double)e.dy[k]))));
-            if (e.dy[k] < 0)
-                begins = vd_max(begins, vd_sub(zero, quotient));
-            else
-                ends = vd_min(ends, vd_add(quotient, one));
-        }
-        vi_store(first, vi_round(vd_min(begins, width)));
-        vi_store(end, vi_round(vd_max(ends, zero)));
+        find_row_ends(&e, rows, 0.0, (double)(t->col1 - t->col0), first, end);
         if (sink_has_depth(sink)) {
             const vd ys = vd_add(vd_set1(sample_y(t, window, row0)), ramp(step));
             vd_store(z_row, vd_add(vd_set1(t->z[0]), vd_mul(vd_set1(t->slope_y), ys)));
@@ -103,7 +109,7 @@ TL_INLINE void draw_triangle(const tl_vertex_set *set, const int32_t *corners, i
     setup_sink(&t, window, sink);
     const int is_auto = scene->method == TL_METHOD_AUTO;
     const int by_edge = scene->method == TL_METHOD_EDGE || (is_auto && t.col1 - t.col0 <= TL_EDGE_MAX_WIDTH);
-    if (is_auto && rows_fit(&t, window) && (!sink_has_depth(sink) || t.has_plane))
+    if (is_auto && rows_fit(&t, window, window->test != TL_TEST_SAMPLE) && (!sink_has_depth(sink) || t.has_plane))
         walk_rows(&t, window, target, sink);
     else if (t.is_narrow && by_edge)
         walk_edge_64(&t, window, target, sink);

@@ -17,6 +17,7 @@
 #include "area.c"
 #include "resolve.c"
 #include "paint.c"
+#include "mean.c"
 
 const tl_kernels TL_KERNELS = {
     .isa = TL_ISA_NAME,
@@ -34,4 +35,6 @@ const tl_kernels TL_KERNELS = {
     .interpolate = interpolate,
     .paint_flat = paint_flat,
     .paint_gouraud = paint_gouraud,
+    .mean_flat = mean_flat,
+    .mean_colors = mean_colors,
 };

@@ -7,6 +7,7 @@
 #include "batch.c"
 #include "rows.c"
 #include "sampled.c"
+#include "sampled_alone.c"
 
 /* Whether the 3 * TL_LANES indices of a vector of triangles hold one outside [0, last_vertex]. */
 TL_INLINE int has_bad_index(const int32_t *corners, vi last_vertex)

@@ -96,12 +96,12 @@ TL_INLINE vf sampled_start(const sampled_edges *r, int side, const int32_t *samp
     return vf_add(vf_from_vi(vi_shift_right(doubled, bits + 1)), vf_set1(0.5f));
 }
 
-/* The pixels [begin, end) of rows, from E' + 0.5 of the three sides. */
+/* The pixels [begin, end) of rows, from E' + 0.5 of the three sides; counted in bits of samples. */
 typedef struct {
     vi begin, end;
 } lane_span;
 
-TL_INLINE lane_span sampled_span(const vf *v, const vf *inverse, vm third_is_left, vm third_is_right, vi n_cols)
+TL_INLINE lane_span sampled_span(const vf *v, const vf *inverse, vm third_is_left, vm third_is_right, vi n_cols, int sample_bits)
 {
     const vi zero = vi_set1(0), minus_one = vi_set1(-1);
     vi quotient[3];
@@ -111,15 +111,15 @@ TL_INLINE lane_span sampled_span(const vf *v, const vf *inverse, vm third_is_lef
     const vi right = vi_select(third_is_right, vi_min(quotient[1], quotient[2]), quotient[1]);
     const vm beyond_flat = vm_and_not(vm_and_not(vi_gt(zero, quotient[2]), third_is_left), third_is_right);
     const vi end = vi_min(vi_sub(right, minus_one), n_cols);
-    return (lane_span){vi_min(vi_max(vi_sub(zero, left), zero), n_cols), vi_select(beyond_flat, zero, vi_max(end, zero))};
+    const vi begin = vi_min(vi_max(vi_sub(zero, left), zero), n_cols), stop = vi_select(beyond_flat, zero, vi_max(end, zero));
+    return (lane_span){vi_shift_left(begin, sample_bits), vi_shift_left(stop, sample_bits)};
 }
 
 /* The bits of a sample in the word that begins at a column. */
 TL_INLINE vw add_span(vw words, lane_span span, int32_t col, int sample_bits, uint64_t pattern)
 {
-    const vi zero = vi_set1(0), full = vi_set1(64), from = vi_set1(col);
-    const vi begin = vi_shift_left(vi_sub(span.begin, from), sample_bits), end = vi_shift_left(vi_sub(span.end, from), sample_bits);
-    return vw_add_range(words, vi_min(vi_max(begin, zero), full), vi_min(vi_max(end, zero), full), pattern);
+    const vi zero = vi_set1(0), from = vi_set1(col << sample_bits);
+    return vw_add_range(words, vi_max(vi_sub(span.begin, from), zero), vi_max(vi_sub(span.end, from), zero), pattern);
 }
 
 static __attribute__((noinline)) void flush_middle_of_samples(batch_state *s)
@@ -152,7 +152,7 @@ static __attribute__((noinline)) void flush_middle_of_samples(batch_state *s)
             for (int side = 0; side < 3; side++)
                 v[side] = sampled_start(&e, side, target.samples_fx + 2 * sample, bits);
             for (int row = 0; row < max_rows; row++) {
-                const lane_span span = sampled_span(v, e.inverse, e.sides.third_is_left, e.sides.third_is_right, n_cols);
+                const lane_span span = sampled_span(v, e.inverse, e.sides.third_is_left, e.sides.third_is_right, n_cols, sample_bits);
                 for (int word = 0; word < n_words; word++) {
                     uint64_t *const at = words[row][word];
                     vw_store(at, add_span(sample ? vw_load(at) : vw_zero(), span, word * per_word, sample_bits, pattern));
@@ -188,7 +188,7 @@ TL_INLINE void draw_sampled_rows(const tl_target *target, const float (*starts)[
             vf v[3];
             for (int side = 0; side < 3; side++)
                 v[side] = vf_add(vf_set1(starts[sample][side][k]), vf_mul(vf_set1(steps[side][k]), rows));
-            spans[sample] = sampled_span(v, inverse, third_is_left, third_is_right, vi_set1(n_cols));
+            spans[sample] = sampled_span(v, inverse, third_is_left, third_is_right, vi_set1(n_cols), sample_bits);
         }
         for (int col = 0; col < n_cols; col += per_word) {
             vw all = vw_zero();
@@ -231,18 +231,6 @@ static __attribute__((noinline)) void flush_rows_of_samples(batch_state *s)
             const vm third_is_left = vm_first(lefts >> k & 1 ? TL_LANES : 0), third_is_right = vm_first(rights >> k & 1 ? TL_LANES : 0);
             draw_sampled_rows(&target, starts, steps, inverses, k, third_is_left, third_is_right, first[k], q->size[i + k]);
         }
-    }
-}
-
-/* Triangle i by itself, one sample after the other. */
-static __attribute__((noinline)) void draw_alone_each_sample(const tl_scene *scene, int64_t i, const tl_window *window, const tl_target *target)
-{
-    tl_scene seen = *scene;
-    tl_target one = *target;
-    for (one.sample = 0; one.sample < 1 << target->sample_bits; one.sample++) {
-        seen.mesh.sample_x_fx = target->samples_fx[2 * one.sample];
-        seen.mesh.sample_y_fx = target->samples_fx[2 * one.sample + 1];
-        draw_alone_samples(&seen, i, window, &one);
     }
 }
 

@@ -146,6 +146,13 @@ typedef struct {
     int32_t *ids, *first_band, *last_band; /* n_triangles + 16 numbers each */
 } tl_bins;
 
+/* How uint8 values become light and back: the first n_channels of a colour, in 65537 steps. */
+typedef struct {
+    const int32_t *decode; /* (256,), 0 to 65536 */
+    const uint8_t *encode; /* (65537,) */
+    int n_channels;
+} tl_transfer;
+
 /* Where exact areas go.  `cells` is memory between the edges and the pixels: tl_area_stride(width) numbers a row, int32 that
  * are all TL_CELL_CLEAR, or int64 that are all 0 when is_wide.  They are left as they were found. */
 typedef struct {
@@ -217,6 +224,13 @@ typedef struct tl_kernels {
     void (*paint_flat)(const int32_t *labels, int64_t n, const uint8_t *colors, int pixel_bytes, uint8_t *pixels);
     void (*paint_gouraud)(const tl_scene *scene, const tl_window *window, const int32_t *labels, const void *colors, int n_channels,
                           int is_u8, void *pixels);
+
+    /* The mean colour of the samples of n pixels: from planes of labels and the colours of the triangles, or from planes of colours.
+     * Planes lie `stride` pixels apart; transfer is NULL where values are averaged as they are. */
+    void (*mean_flat)(const int32_t *labels, int sample_bits, int64_t stride, int64_t n, const void *colors, int n_channels, int is_u8,
+                      const tl_transfer *transfer, void *pixels);
+    void (*mean_colors)(const void *colors, int sample_bits, int64_t stride, int64_t n, int n_channels, int is_u8,
+                        const tl_transfer *transfer, void *pixels);
 } tl_kernels;
 
 #endif

@@ -85,7 +85,9 @@ def test_coverage_window_is_the_crop_of_the_whole():
 
 
 def test_coverage_quad_is_1_and_half_of_it_half():
-    assert tl.coverage([[0, 0], [2, 0], [2, 2], [0, 2]], [[0, 1, 2], [0, 2, 3]], (3, 2), sampling="msaa16").tolist() == [
+    assert tl.coverage(
+        [[0, 0], [2, 0], [2, 2], [0, 2]], [[0, 1, 2], [0, 2, 3]], (3, 2), sampling="msaa16"
+    ).tolist() == [
         [1, 1, 0],
         [1, 1, 0],
     ]
@@ -180,7 +182,8 @@ def test_fragments_background_and_out():
 
 
 def test_fragments_empty_scene_or_picture():
-    assert (tl.rasterize(np.empty((0, 3)), np.empty((0, 3), int), (3, 2), sampling="msaa4").samples_triangle == -1).all()
+    nothing = tl.rasterize(np.empty((0, 3)), np.empty((0, 3), int), (3, 2), sampling="msaa4")
+    assert (nothing.samples_triangle == -1).all()
     assert tl.rasterize([[0, 0]] * 3, [[0, 1, 2]], (0, 2), sampling="msaa4").samples_depth.shape == (2, 0, 4)
 
 

@@ -133,3 +133,23 @@ class Bins:
 def draw_bands(
     scenes: Sequence[Scene], targets: Sequence[Target], bins: Bins, first_band: int, end_band: int
 ) -> None: ...
+
+class Transfer:
+    def __init__(self, decode: NDArray[np.int32], encode: NDArray[np.uint8], n_channels: int) -> None: ...
+
+def mean_flat(
+    labels: NDArray[np.int32],
+    colors: NDArray[Any],
+    pixels: NDArray[Any],
+    first_row: int,
+    n_rows: int,
+    transfer: Transfer | None,
+) -> None: ...
+def mean_colors(
+    painted: NDArray[Any],
+    pixels: NDArray[Any],
+    first_row: int,
+    n_rows: int,
+    n_channels: int,
+    transfer: Transfer | None,
+) -> None: ...

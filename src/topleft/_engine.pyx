@@ -62,6 +62,10 @@ cdef extern from "topleft.h" nogil:
         int32_t *ids
         int32_t *first_band
         int32_t *last_band
+    ctypedef struct tl_transfer:
+        const int32_t *decode
+        const uint8_t *encode
+        int n_channels
     ctypedef struct tl_area:
         float *pixels
         int64_t stride_px
@@ -98,6 +102,8 @@ cdef extern from "topleft.h" nogil:
         void (*interpolate)(const tl_scene *, const tl_window *, const int32_t *, const float *, int, int, float, float *) noexcept nogil
         void (*paint_flat)(const int32_t *, int64_t, const uint8_t *, int, uint8_t *) noexcept nogil
         void (*paint_gouraud)(const tl_scene *, const tl_window *, const int32_t *, const void *, int, int, void *) noexcept nogil
+        void (*mean_flat)(const int32_t *, int, int64_t, int64_t, const void *, int, int, const tl_transfer *, void *) noexcept nogil
+        void (*mean_colors)(const void *, int, int64_t, int64_t, int, int, const tl_transfer *, void *) noexcept nogil
 
 include "_dispatch.pxi"
 
@@ -447,3 +453,42 @@ def draw_bands(scenes, targets, Bins bins, int64_t first_band, int64_t end_band)
             window = scene.window(first_row, min(<int64_t>1 << bins.band_bits, target.height - first_row), target.width)
             with nogil:
                 K.draw(&scene.scene, &window, &rows, &share)
+
+
+cdef class Transfer:
+    """The tables that take the first channels of uint8 colours to light and back."""
+
+    cdef tl_transfer transfer
+    cdef object arrays
+
+    def __init__(self, const int32_t[::1] decode, const uint8_t[::1] encode, int n_channels):
+        self.arrays = (decode, encode)
+        self.transfer.decode, self.transfer.encode, self.transfer.n_channels = &decode[0], &encode[0], n_channels
+
+
+def mean_flat(const int32_t[:, :, ::1] labels, colors, pixels, int64_t first_row, int64_t n_rows, Transfer transfer):
+    """Write the mean colour of the triangles that the samples see over rows of pixels; labels (S, H, W)."""
+    cdef const uint8_t[::1] palette = as_bytes(colors)
+    cdef uint8_t[::1] flat = as_bytes(pixels)
+    cdef int n_channels = 1 if colors.ndim == 1 else colors.shape[1], is_u8 = colors.dtype == np.uint8
+    cdef int64_t width = labels.shape[2], first = first_row * width
+    cdef int sample_bits = int(labels.shape[0]).bit_length() - 1
+    cdef const tl_transfer *own = NULL if transfer is None else &transfer.transfer
+    if n_rows and width and palette.shape[0]:
+        with nogil:
+            K.mean_flat(&labels[0, first_row, 0], sample_bits, labels.shape[1] * width, n_rows * width, data(palette), n_channels, is_u8,
+                        own, &flat[first * n_channels * (1 if is_u8 else 4)])
+
+
+def mean_colors(painted, pixels, int64_t first_row, int64_t n_rows, int n_channels, Transfer transfer):
+    """Write the mean of planes of colours (S, H, W[, C]) over rows of pixels."""
+    cdef const uint8_t[::1] planes = as_bytes(painted)
+    cdef uint8_t[::1] flat = as_bytes(pixels)
+    cdef int is_u8 = painted.dtype == np.uint8
+    cdef int64_t height = painted.shape[1], width = painted.shape[2], first
+    cdef int sample_bits = int(painted.shape[0]).bit_length() - 1
+    cdef const tl_transfer *own = NULL if transfer is None else &transfer.transfer
+    first = first_row * width * n_channels * (1 if is_u8 else 4)
+    if n_rows and width:
+        with nogil:
+            K.mean_colors(&planes[first], sample_bits, height * width, n_rows * width, n_channels, is_u8, own, &flat[first])

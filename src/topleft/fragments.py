@@ -29,8 +29,8 @@ class Fragments:
     mask : ndarray of bool, shape (H, W)
         Where there is a triangle.
     samples_triangle, samples_depth : ndarray of int32 and of float32, shape (H, W, S)
-        The same for each sample, with several a pixel. `triangle`, `depth`, `mask` and the attributes are then those of the
-        first sample, which is nearest to the centre; `sample` gives those of another.
+        The same for each sample, with several a pixel. `triangle`, `depth`, `mask` and the attributes are then those of
+        the first sample, which is nearest to the centre; `sample` gives those of another.
     """
 
     #: Fragments of each sample when there are several.
@@ -71,9 +71,7 @@ class Fragments:
         n_triangles: int,
     ) -> Fragments:
         """Return the fragments of several samples: planes (S, H, W), and the scene as each sample sees it."""
-        samples = tuple(
-            cls(*planes, n_vertices, n_triangles) for planes in zip(triangle, depth, scenes, strict=True)
-        )
+        samples = tuple(cls(*planes, n_vertices, n_triangles) for planes in zip(triangle, depth, scenes, strict=True))
         frags = cls(triangle[0], depth[0], scenes[0], n_vertices, n_triangles)
         frags._samples = samples
         frags.samples_triangle, frags.samples_depth = np.moveaxis(triangle, 0, -1), np.moveaxis(depth, 0, -1)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import IntEnum, StrEnum
 from typing import TypeVar
 
-__all__ = ["ClipDepth", "Cull", "DepthTest", "Per", "Sampling", "Sink", "parse"]
+__all__ = ["ClipDepth", "Cull", "DepthTest", "Per", "Resolve", "Sampling", "Sink", "parse"]
 
 
 class Sampling(StrEnum):
@@ -54,6 +54,13 @@ class Per(StrEnum):
     AUTO = "auto"
     TRIANGLE = "triangle"
     VERTEX = "vertex"
+
+
+class Resolve(StrEnum):
+    """What of the colours of a pixel's samples is averaged: the values, or the light that sRGB values stand for."""
+
+    VALUES = "values"
+    LINEAR = "linear"
 
 
 class Sink(IntEnum):

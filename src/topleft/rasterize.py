@@ -21,6 +21,7 @@ from topleft.fragments import Fragments
 from topleft.memory import Memory
 from topleft.methods import METHODS
 from topleft.models import DepthTest, Per, Sampling, Sink, parse
+from topleft.resolve import parse_resolve, resolve_flat, resolve_gouraud
 from topleft.sampling import draw_planes, refine_grid, sample_positions
 from topleft.threads import count_threads, run_parts
 from topleft.view import View
@@ -205,9 +206,7 @@ def can_share(view: View) -> bool:
     return is_near and fits_lanes and view.method == METHODS["auto"].code
 
 
-def draw_shared(
-    memory: Memory, snapped: Snapped, target: _engine.Target, height: int, n_parts: int
-) -> list[int]:
+def draw_shared(memory: Memory, snapped: Snapped, target: _engine.Target, height: int, n_parts: int) -> list[int]:
     """Draw as `draw` does: each part a share of the triangles into its own rows, then what others have found for it."""
     scene, n = snapped.scene, snapped.n_triangles
     rows = [height * i // n_parts for i in range(n_parts + 1)]
@@ -230,11 +229,21 @@ def draw_shared(
 
 
 def paint(
-    memory: Memory, snapped: Snapped, view: View, colors: NDArray[Any], pixels: NDArray[Any], *, is_flat: bool
+    memory: Memory,
+    snapped: Snapped,
+    view: View,
+    colors: NDArray[Any],
+    pixels: NDArray[Any],
+    transfer: _engine.Transfer | None = None,
+    *,
+    is_flat: bool,
 ) -> None:
     """Draw coloured triangles over contiguous pixels: first which triangle shows in each, then its colour."""
     width, height = view.size
     if not (width and height and snapped.n_triangles):
+        return
+    if view.sampling.n_samples > 1:
+        paint_samples(memory, snapped, view, colors, pixels, transfer, is_flat=is_flat)
         return
     labels = memory.empty("labels", (height, width), np.int32)
     draw(memory, snapped, view, Sink.LABEL, labels)
@@ -245,6 +254,29 @@ def paint(
         snapped.scene.paint(labels, palette, flat, first, end - first, is_flat, colors.dtype == np.uint8, n_channels)
 
     run_parts(paint_rows, height, count_threads(view.threads, snapped.n_triangles))
+
+
+def paint_samples(
+    memory: Memory,
+    snapped: Snapped,
+    view: View,
+    colors: NDArray[Any],
+    pixels: NDArray[Any],
+    transfer: _engine.Transfer | None,
+    *,
+    is_flat: bool,
+) -> None:
+    """Draw coloured triangles over contiguous pixels, each pixel the mean of its samples."""
+    width, height = view.size
+    positions = sample_positions(view.sampling.n_samples, view.grid_bits)
+    labels: NDArray[np.int32] = memory.empty("sample ids", (len(positions), height, width), np.int32)
+    draw_all_samples(memory, snapped, view, positions, Sink.LABEL, labels, None)
+    n_threads = count_threads(view.threads, snapped.n_triangles)
+    if is_flat:
+        resolve_flat(labels, colors, pixels, transfer, n_threads)
+        return
+    scenes = [snapped.scene.seen_from(x, y) for x, y in positions.tolist()]
+    resolve_gouraud(memory, scenes, labels, colors, pixels, transfer, n_threads)
 
 
 @contextmanager
@@ -278,7 +310,7 @@ def draw_area(
 def refuse_many(view: View, verb: str) -> None:
     """Raise an error where a pixel needs one triangle, and areas or squares are of many."""
     if view.sampling in (Sampling.AREA, Sampling.OUTER, Sampling.INNER):
-        raise ValueError(f"sampling {str(view.sampling)!r} gives no ids: {verb} takes 'center'")
+        raise ValueError(f"sampling {str(view.sampling)!r} gives no ids: {verb} takes 'center' and 'msaa2' to 'msaa16'")
 
 
 def draw_coverage(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, view: View, out: object) -> NDArray[Any]:
@@ -357,10 +389,12 @@ def draw_fill(
     per: str,
     background: ArrayLike | None,
     out: object,
+    resolve: str = "values",
 ) -> NDArray[Any]:
     """`fill`, on the memory given."""
     refuse_many(view, "fill")
     palette = as_colors(colors)
+    transfer = parse_resolve(resolve, palette.dtype, 1 if palette.ndim == 1 else palette.shape[1])
     if view.classic:
         return fill_classic(view.classic, memory, vertices, triangles, palette, view, per, background, out)
     snapped = snap_scene(memory, vertices, triangles, view, with_depth=False, out=out)
@@ -372,7 +406,7 @@ def draw_fill(
             canvas[...] = ground
         elif out is None:
             canvas.fill(0)
-        paint(memory, snapped, view, palette, canvas, is_flat=is_flat)
+        paint(memory, snapped, view, palette, canvas, transfer, is_flat=is_flat)
     return result
 
 

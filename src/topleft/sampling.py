@@ -78,7 +78,7 @@ def draw_planes(
     *,
     is_near: bool,
 ) -> bool:
-    """Draw each sample into its plane of (S, H, W) arrays; returns whether a triangle has an index outside the vertices.
+    """Draw each sample into its plane of (S, H, W) arrays; returns whether an index lies outside the vertices.
 
     The scene is set up once, its triangles sorted into bands of rows, and band after band is drawn for one sample after
     the other. A scene that is not near (see `tl_kernels.draw`) is drawn as a whole for each sample.

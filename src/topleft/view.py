@@ -45,6 +45,7 @@ class View:
     viewport: tuple[int, int]
     transform: ArrayLike | None
     subpixel_bits: int
+    grid_bits: int  # of the grid that holds the snapped vertices and all samples
     sampling: Sampling
     method: int
     cull: int
@@ -56,18 +57,13 @@ class View:
 
     def engine_view(self) -> _engine.View:
         """Return how clip space maps to pixels."""
-        guard = self.grid_bits
-        return _engine.View(self.viewport, self.subpixel_bits, guard, self.zero_to_one, self.near_clip, self.far_clip)
+        bits = self.subpixel_bits, self.grid_bits
+        return _engine.View(self.viewport, *bits, self.zero_to_one, self.near_clip, self.far_clip)
 
     @property
     def test(self) -> int:
         """When a triangle covers a pixel: `tl_test` in ``csrc/topleft.h``."""
         return TEST_CODES.get(self.sampling, 0)
-
-    @property
-    def grid_bits(self) -> int:
-        """Sub-pixel bits of the grid that holds the snapped vertices and all samples."""
-        return self.subpixel_bits if self.sampling.n_samples == 1 else max(SAMPLE_GRID_BITS, self.subpixel_bits)
 
     @classmethod
     def parse(cls, size: object, options: ViewOptions) -> View:
@@ -78,14 +74,16 @@ class View:
         checked_size = as_size(size)
         bits = as_subpixel_bits(options.get("subpixel_bits", 8))
         sampling = parse(Sampling, "sampling", options.get("sampling", "center"))
+        grid_bits = bits if sampling.n_samples == 1 else max(SAMPLE_GRID_BITS, bits)
         viewport = options.get("viewport")
         method = find_method(options.get("method", "auto"))
         return cls(
             size=checked_size,
-            origin=as_window(options.get("origin", (0, 0)), bits if sampling.n_samples == 1 else max(SAMPLE_GRID_BITS, bits)),
+            origin=as_window(options.get("origin", (0, 0)), grid_bits),
             viewport=checked_size if viewport is None else as_size(viewport, "viewport", smallest=1),
             transform=options.get("transform"),
             subpixel_bits=bits,
+            grid_bits=grid_bits,
             sampling=sampling,
             method=method.code or 0,
             cull=CULL_CODES[parse(Cull, "cull", options.get("cull", "none"))],
