@@ -85,12 +85,8 @@ def test_coverage_window_is_the_crop_of_the_whole():
 
 
 def test_coverage_quad_is_1_and_half_of_it_half():
-    assert tl.coverage(
-        [[0, 0], [2, 0], [2, 2], [0, 2]], [[0, 1, 2], [0, 2, 3]], (3, 2), sampling="msaa16"
-    ).tolist() == [
-        [1, 1, 0],
-        [1, 1, 0],
-    ]
+    quad = [[0, 0], [2, 0], [2, 2], [0, 2]]
+    assert tl.coverage(quad, [[0, 1, 2], [0, 2, 3]], (3, 2), sampling="msaa16").tolist() == [[1, 1, 0]] * 2
     assert tl.coverage([[0, 0], [0.5, 0], [0, 9]], [[0, 1, 2]], (1, 1), sampling="msaa8").tolist() == [[0.5]]
 
 
