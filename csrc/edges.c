@@ -16,7 +16,7 @@ static int shows_side(const tl_scene *scene, int64_t i)
     const tl_pieces *p = scene->pieces;
     if (!p)
         return 0;
-    const tl_vertex_set cut = piece_set(p);
+    const tl_vertex_set cut = piece_set(p, &scene->mesh);
     for (int64_t k = first_piece(p, i); k < p->n_pieces && p->source[k] == i; k++)
         if (load_triangle(&cut, p->triangles + 3 * k, &t) == wanted)
             return 1;

@@ -7,8 +7,10 @@
 #include "clip.c"
 #include "setup.c"
 #include "covered.c"
+#include "samples.c"
 #include "sink.c"
 #include "raster.c"
+#include "bin.c"
 #include "ramp.c"
 #include "ramp_exact.c"
 #include "accumulate.c"
@@ -19,6 +21,7 @@
 #include "line_ends.c"
 #include "smooth_lines.c"
 #include "lines.c"
+#include "mean.c"
 
 const tl_kernels TL_KERNELS = {
     .isa = TL_ISA_NAME,
@@ -29,6 +32,8 @@ const tl_kernels TL_KERNELS = {
     .first_bad_row = first_bad_row,
     .narrow_triangles = narrow_triangles,
     .draw = draw,
+    .bin = bin,
+    .list_bins = list_bins,
     .draw_area = draw_area,
     .barycentric = barycentric,
     .interpolate = interpolate,
@@ -36,4 +41,6 @@ const tl_kernels TL_KERNELS = {
     .paint_gouraud = paint_gouraud,
     .list_edges = list_edges,
     .draw_lines = draw_lines,
+    .mean_flat = mean_flat,
+    .mean_colors = mean_colors,
 };

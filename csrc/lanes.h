@@ -14,6 +14,7 @@
  *   vi_compress(p, m, v)    the lanes in m, packed, at p; writes a whole vector
  *   vm_first(n)             the first n lanes, none for n <= 0, all for n >= TL_LANES
  *   v4_, vi_load_quads, vi_store_quads    four int32; TL_LANES of them as four vectors, lane k in slot vi_quad_slot(k)
+ *   vw_zero, vw_load, vw_store, vw_add_range    TL_LANES words of 64 bits
  *   vi_prefix_sum, vi_last  sums of lanes [0, k]; the last lane everywhere
  *   vi_shift_in(a, before)  a one lane up, the last lane of `before` in lane 0
  *   hm_, hf_, hi_, hd_      the few that short rows need, in half vectors of TL_HALF_LANES (0: there are none)

@@ -118,6 +118,24 @@ TL_INLINE void bytes_from_bits(uint8_t *p, uint64_t bits)
         _mm256_storeu_si256((__m256i *)(p + 32 * k), _mm256_and_si256(on, one));
     }
 }
+/* TL_LANES words of 64 bits; vw_add_range sets the bits [begin, end) that are in the pattern; begin, end >= 0. */
+typedef struct { __m256i lo, hi; } vw;
+TL_INLINE vw vw_zero(void) { return (vw){_mm256_setzero_si256(), _mm256_setzero_si256()}; }
+TL_INLINE vw vw_load(const uint64_t *p) { return (vw){_mm256_loadu_si256((const __m256i *)p), _mm256_loadu_si256((const __m256i *)(p + 4))}; }
+TL_INLINE void vw_store(uint64_t *p, vw a) { _mm256_storeu_si256((__m256i *)p, a.lo), _mm256_storeu_si256((__m256i *)(p + 4), a.hi); }
+TL_INLINE __m256i bit_range_64(__m128i begin, __m128i end)
+{
+    const __m256i ones = _mm256_set1_epi64x(-1);
+    return _mm256_andnot_si256(_mm256_sllv_epi64(ones, _mm256_cvtepu32_epi64(end)), _mm256_sllv_epi64(ones, _mm256_cvtepu32_epi64(begin)));
+}
+TL_INLINE vw vw_add_range(vw a, vi begin, vi end, uint64_t pattern)
+{
+    const __m256i every = _mm256_set1_epi64x((long long)pattern);
+    const __m256i lo = bit_range_64(_mm256_castsi256_si128(begin), _mm256_castsi256_si128(end));
+    const __m256i hi = bit_range_64(_mm256_extracti128_si256(begin, 1), _mm256_extracti128_si256(end, 1));
+    return (vw){_mm256_or_si256(a.lo, _mm256_and_si256(lo, every)), _mm256_or_si256(a.hi, _mm256_and_si256(hi, every))};
+}
+
 /* Numbers whose bits [begin, end) are set, none where begin >= end; begin >= 0, end in 0..31. */
 TL_INLINE vi vi_bit_ranges(vi begin, vi end)
 {

@@ -84,6 +84,24 @@ TL_INLINE vm vm_first(int64_t n) { return n >= 16 ? 0xffff : n <= 0 ? 0 : (vm)((
 TL_INLINE vm vm_from_bits(unsigned bits) { return (vm)bits; }
 /* 64 bytes of 0 or 1 */
 TL_INLINE void bytes_from_bits(uint8_t *p, uint64_t bits) { _mm512_storeu_si512(p, _mm512_maskz_set1_epi8(bits, 1)); }
+/* TL_LANES words of 64 bits; vw_add_range sets the bits [begin, end) that are in the pattern; begin, end >= 0. */
+typedef struct { __m512i lo, hi; } vw;
+TL_INLINE vw vw_zero(void) { return (vw){_mm512_setzero_si512(), _mm512_setzero_si512()}; }
+TL_INLINE vw vw_load(const uint64_t *p) { return (vw){_mm512_loadu_si512(p), _mm512_loadu_si512(p + 8)}; }
+TL_INLINE void vw_store(uint64_t *p, vw a) { _mm512_storeu_si512(p, a.lo), _mm512_storeu_si512(p + 8, a.hi); }
+TL_INLINE __m512i bit_range_64(__m256i begin, __m256i end)
+{
+    const __m512i ones = _mm512_set1_epi64(-1);
+    return _mm512_andnot_si512(_mm512_sllv_epi64(ones, _mm512_cvtepu32_epi64(end)), _mm512_sllv_epi64(ones, _mm512_cvtepu32_epi64(begin)));
+}
+TL_INLINE vw vw_add_range(vw a, vi begin, vi end, uint64_t pattern)
+{
+    const __m512i every = _mm512_set1_epi64((long long)pattern);
+    const __m512i lo = bit_range_64(_mm512_castsi512_si256(begin), _mm512_castsi512_si256(end));
+    const __m512i hi = bit_range_64(_mm512_extracti64x4_epi64(begin, 1), _mm512_extracti64x4_epi64(end, 1));
+    return (vw){_mm512_or_si512(a.lo, _mm512_and_si512(lo, every)), _mm512_or_si512(a.hi, _mm512_and_si512(hi, every))};
+}
+
 /* Numbers whose bits [begin, end) are set, none where begin >= end; begin >= 0, end in 0..31. */
 TL_INLINE vi vi_bit_ranges(vi begin, vi end)
 {

@@ -79,6 +79,17 @@ TL_INLINE void bytes_from_bits(uint8_t *p, uint64_t bits)
         memcpy(p + k, &bytes, 8);
     }
 }
+/* A word of 64 bits; vw_add_range sets the bits [begin, end) that are in the pattern; begin, end >= 0. */
+typedef uint64_t vw;
+TL_INLINE vw vw_zero(void) { return 0; }
+TL_INLINE vw vw_load(const uint64_t *p) { return *p; }
+TL_INLINE void vw_store(uint64_t *p, vw a) { *p = a; }
+TL_INLINE vw vw_add_range(vw a, vi begin, vi end, uint64_t pattern)
+{
+    end = end > 64 ? 64 : end;
+    return begin < end ? a | (~0ull << begin & ~0ull >> (64 - end) & pattern) : a;
+}
+
 TL_INLINE vi vi_bit_ranges(vi begin, vi end) { return begin < 31 ? (vi)(~0u << begin & ~(~0u << end)) : 0; }
 
 

@@ -152,10 +152,13 @@ def test_bad_size_raises(size, kind, message):
         tl.coverage(SQUARE, HALVES, size)
 
 
+SAMPLINGS = "'center', 'msaa2', 'msaa4', 'msaa8', 'msaa16', 'area', 'outer', 'inner'"
+
+
 @pytest.mark.parametrize(
     ("options", "kind", "message"),
     [
-        ({"sampling": "msaa3"}, ValueError, "sampling must be one of 'center', 'area', got 'msaa3'"),
+        ({"sampling": "msaa3"}, ValueError, f"sampling must be one of {SAMPLINGS}, got 'msaa3'"),
         ({"method": "magic"}, ValueError, "method must be one of 'auto', 'edge', 'scanline', got 'magic'"),
         ({"cull": True}, ValueError, "cull must be one of 'none', 'back', 'front', got True"),
         ({"clip_depth": "gl"}, ValueError, "clip_depth must be one of 'minus_one_to_one', 'zero_to_one', got 'gl'"),

@@ -39,14 +39,16 @@ def coverage(
         Indices of vertices; either winding.
     size : (int, int)
         Width and height of the picture in pixels.
-    out : ndarray of bool (float32 for "area"), shape (H, W), optional
+    out : ndarray of bool (float32 for several samples and "area"), shape (H, W), optional
         Where the result goes. A fresh array costs its first touch, several times what drawing a small mesh costs.
     **view
         transform : array_like, shape (4, 4). Clip space from object space.
         origin : (int, int). The pixel of the whole picture that is row 0, column 0 here.
         viewport : (int, int). Width and height of the whole picture for clip space; default `size`.
         subpixel_bits : int, 0 to 16. Vertices snap to ``2**-subpixel_bits`` pixels; default 8.
-        sampling : "center", or "area": the exact area of the pixel (`coverage` and `overdraw` alone).
+        sampling : "center"; "msaa2", "msaa4", "msaa8" or "msaa16": so many samples a pixel, at the standard positions
+            of Direct3D. For `coverage` and `overdraw` also "area": the exact area of the pixel; "outer": every
+            pixel square that a triangle meets in positive area; "inner": every one that lies wholly inside a triangle.
         method : "auto", "edge" or "scanline": the same picture. Or a classic of the literature, to compare with:
             `topleft.methods.CLASSICS` names them, and docs/methods.md tells where each of them fails.
         cull : "none", "back" or "front"; the front is counter-clockwise seen with y up.
@@ -57,7 +59,8 @@ def coverage(
     Returns
     -------
     ndarray of bool, shape (H, W)
-        False where nothing is. With ``sampling="area"`` float32: the areas of the triangles in each pixel, added up, at
+        False where nothing is. With several samples float32: the share of them that is covered. With
+        ``sampling="area"`` float32: the areas of the triangles in each pixel, added up, at
         most 1. They are exactly 1 where triangles tile a pixel, and a single one is within 9e-8 of its exact area.
 
     Raises
@@ -102,12 +105,12 @@ def overdraw(
     ----------
     vertices, triangles, size, **view
         As in `coverage`.
-    out : ndarray of int32 (float32 for "area"), shape (H, W), optional
+    out : ndarray of int32 (float32 for "area"), shape (H, W), or (H, W, S) for S samples, optional
         Where the result goes.
 
     Returns
     -------
-    ndarray of int32, shape (H, W)
+    ndarray of int32, shape (H, W), or (H, W, S) for S samples a pixel
         0 where nothing is. With ``sampling="area"`` float32: the areas of the triangles in each pixel, added up.
 
     Raises
@@ -136,6 +139,7 @@ def fill(
     *,
     per: str = "auto",
     background: ArrayLike | None = None,
+    resolve: str = "values",
     out: NDArray[Any] | None = None,
     **view: Unpack[ViewOptions],
 ) -> NDArray[Any]:
@@ -152,6 +156,9 @@ def fill(
         What a row of `colors` belongs to; "auto" tells by the number of rows.
     background : number or array_like, shape (C,), optional
         Fills the picture first; 0 when neither `background` nor `out` is given.
+    resolve : "values" or "linear"
+        With several samples a pixel ("msaa4", say) each pixel is the mean of its samples: of their values as they are,
+        or, for uint8, of the light that sRGB values stand for; the last of 2 or 4 channels is alpha, averaged as it is.
     out : ndarray of uint8 or float32, shape (H, W, C) or (H, W), optional
         Is drawn over.
 
@@ -178,7 +185,7 @@ def fill(
     array([[ 25,  75, 125,   9],
            [ 25,  75,   9,   9]], dtype=uint8)
     """
-    return draw_fill(SCRATCH, vertices, triangles, colors, View.parse(size, view), per, background, out)
+    return draw_fill(SCRATCH, vertices, triangles, colors, View.parse(size, view), per, background, out, resolve)
 
 
 def rasterize(
@@ -203,14 +210,16 @@ def rasterize(
         the triangle with the lower index.
     background_depth : float, optional
         Depth where nothing is; +inf, or -inf with "greater", unless given.
-    out : (ndarray of int32, ndarray of float32), each of shape (H, W), optional
+    out : (ndarray of int32, ndarray of float32), each of shape (H, W), or (H, W, S) for S samples, optional
         Where ids and depth go.
 
     Returns
     -------
     Fragments
         ``.triangle`` (H, W) int32 with -1 for none, ``.depth`` (H, W) float32, ``.mask`` (H, W) bool,
-        ``.barycentric()``, ``.interpolate(values)``.
+        ``.barycentric()``, ``.interpolate(values)``. With several samples a pixel also ``.samples_triangle`` and
+        ``.samples_depth`` (H, W, S); all else is then of the first sample, which is nearest to the centre, and
+        ``.sample(i)`` gives the same of another.
 
     Raises
     ------
@@ -374,11 +383,12 @@ class Rasterizer:
         *,
         per: str = "auto",
         background: ArrayLike | None = None,
+        resolve: str = "values",
         out: NDArray[Any] | None = None,
         **view: Unpack[ViewOptions],
     ) -> NDArray[Any]:
         """Return a picture of coloured triangles in painter's order, as `topleft.fill` does."""
-        return draw_fill(self._memory, vertices, triangles, colors, self._view(view), per, background, out)
+        return draw_fill(self._memory, vertices, triangles, colors, self._view(view), per, background, out, resolve)
 
     def rasterize(
         self,

@@ -6,14 +6,25 @@ from enum import IntEnum, StrEnum
 from functools import cache
 from typing import TypeVar
 
-__all__ = ["ClipDepth", "Cull", "DepthTest", "Per", "Sampling", "Sink", "parse"]
+__all__ = ["ClipDepth", "Cull", "DepthTest", "Per", "Resolve", "Sampling", "Sink", "parse"]
 
 
 class Sampling(StrEnum):
-    """Where a pixel is sampled."""
+    """Where a pixel is sampled, or which squares count."""
 
     CENTER = "center"
+    MSAA2 = "msaa2"
+    MSAA4 = "msaa4"
+    MSAA8 = "msaa8"
+    MSAA16 = "msaa16"
     AREA = "area"
+    OUTER = "outer"
+    INNER = "inner"
+
+    @property
+    def n_samples(self) -> int:
+        """Samples of a pixel, 1 unless there are several."""
+        return int(self.removeprefix("msaa")) if self.startswith("msaa") else 1
 
 
 class Cull(StrEnum):
@@ -46,6 +57,13 @@ class Per(StrEnum):
     VERTEX = "vertex"
 
 
+class Resolve(StrEnum):
+    """What of the colours of a pixel's samples is averaged: the values, or the light that sRGB values stand for."""
+
+    VALUES = "values"
+    LINEAR = "linear"
+
+
 class Sink(IntEnum):
     """What happens to a covered sample; the numbers are `tl_sink` in ``csrc/topleft.h``."""
 
@@ -55,6 +73,7 @@ class Sink(IntEnum):
     PAINT = 3
     NEAREST = 4
     FARTHEST = 5
+    SAMPLES = 6
 
 
 Option = TypeVar("Option", bound=StrEnum)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, cast
 
 import numpy as np
@@ -21,6 +21,8 @@ from topleft.fragments import Fragments
 from topleft.memory import Memory
 from topleft.methods import METHODS
 from topleft.models import DepthTest, Per, Sampling, Sink, parse
+from topleft.resolve import parse_resolve, resolve_flat, resolve_gouraud
+from topleft.sampling import draw_planes, refine_grid, sample_positions
 from topleft.threads import count_threads, run_parts
 from topleft.view import View
 
@@ -88,12 +90,32 @@ def snap_scene(
     if bad:
         check_used_vertices(points, records, corners, view)
     pieces = _engine.Pieces(source, records, corners, engine_view) if engine_view and clipped else None
+    if view.grid_bits > view.subpixel_bits:
+        wide = refine_scene(points, records, wide, corners, pieces, view)
     drawn = corners if n else corners[:0]
     scene = _engine.Scene(
-        source, records, wide, drawn, pieces, *view.origin, view.subpixel_bits, view.cull, view.method
+        source, records, wide, drawn, pieces, *view.origin, view.grid_bits, view.cull, view.method, view.test
     )
     has_depth = source.is_clip_space or points.shape[1] == 3
     return Snapped(scene, triangles, corners, len(points), n_triangles, has_depth)
+
+
+def refine_scene(
+    points: NDArray[Any],
+    records: NDArray[np.uint8],
+    wide: NDArray[np.int64] | None,
+    corners: NDArray[np.int32],
+    pieces: _engine.Pieces | None,
+    view: View,
+) -> NDArray[np.int64] | None:
+    """Shift vertices and pieces to the grid of the samples; returns the table of wide vertices."""
+    n_bits = view.grid_bits - view.subpixel_bits
+    if pieces:
+        refine_grid(pieces.arrays[0], pieces.arrays[1], n_bits)  # type: ignore[index]
+    wide, is_bad = refine_grid(records, wide, n_bits)
+    if is_bad:
+        check_used_vertices(points, records, corners, view)
+    return wide
 
 
 def index_triangles(
@@ -137,10 +159,10 @@ def check_used_vertices(
         raise ValueError(f"vertices must be finite where a triangle uses them, got {row.tolist()} in row {i}")
     if view.transform is not None:
         raise ValueError(f"vertices must stay finite under transform, got {row.tolist()} in row {i}")
-    if abs(row[:2].astype(float)).max() < 2.0 ** (62 - view.subpixel_bits):
+    if abs(row[:2].astype(float)).max() < 2.0 ** (62 - view.grid_bits):
         raise ValueError(f"vertices must have a depth that float32 can hold, got {row.tolist()} in row {i}")
     raise ValueError(
-        f"vertices must lie within 2**{62 - view.subpixel_bits} pixels of 0 with {view.subpixel_bits} sub-pixel bits, "
+        f"vertices must lie within 2**{62 - view.grid_bits} pixels of 0 with {view.grid_bits} sub-pixel bits, "
         f"got {row.tolist()} in row {i}"
     )
 
@@ -159,15 +181,19 @@ def draw(
     if 0 in view.size:
         return
     covered: NDArray[np.uint64] | None = None
-    if sink is Sink.MASK:
-        covered = memory.empty("covered", _engine.Target.covered_shape(height, width), np.uint64)
-    target = _engine.Target(sink, pixels, depth, covered)
+    samples: NDArray[np.int32] | None = None
+    if sink is Sink.SAMPLES:
+        samples = sample_positions(view.sampling.n_samples, view.grid_bits)
+    if sink in (Sink.MASK, Sink.SAMPLES):
+        n_samples = 1 if samples is None else len(samples)
+        covered = memory.empty("covered", _engine.Target.covered_shape(height, width, n_samples), np.uint64)
+    target = _engine.Target(sink, pixels, depth, covered, samples)
     n_parts = min(height, count_threads(view.threads, snapped.n_triangles))
 
     def draw_rows(first: int, end: int) -> int:
         return snapped.scene.draw(target, first, end - first)
 
-    if is_shared(snapped, view, n_parts):
+    if is_shared(snapped, view, n_parts, sink):
         bad_rows = draw_shared(memory, snapped, target, height, n_parts)
     else:
         bad_rows = run_parts(draw_rows, height, n_parts)
@@ -175,17 +201,22 @@ def draw(
         check_triangles(snapped.triangles, snapped.corners, snapped.n_vertices)
 
 
-def is_shared(snapped: Snapped, view: View, n_parts: int) -> bool:
+def is_shared(snapped: Snapped, view: View, n_parts: int, sink: Sink) -> bool:
     """Tell whether each thread is to take a share of the triangles instead of setting up all of them."""
+    pays = snapped.n_triangles * n_parts >= MIN_TRIANGLES_TO_SHARE
+    fits_lanes = sink is not Sink.SAMPLES or view.grid_bits <= 8
+    return n_parts > 1 and pays and fits_lanes and can_share(view)
+
+
+def can_share(view: View) -> bool:
+    """Tell whether a pass over a scene can draw some of its triangles."""
     width, height = view.size
     is_near = max(map(abs, view.origin)) < 2**29 and width * height < 2**31
-    pays = snapped.n_triangles * n_parts >= MIN_TRIANGLES_TO_SHARE
-    return n_parts > 1 and pays and is_near and view.method == METHODS["auto"].code
+    fits_lanes = not view.test or view.subpixel_bits <= 8
+    return is_near and fits_lanes and view.method == METHODS["auto"].code
 
 
-def draw_shared(
-    memory: Memory, snapped: Snapped, target: _engine.Target, height: int, n_parts: int
-) -> list[int]:
+def draw_shared(memory: Memory, snapped: Snapped, target: _engine.Target, height: int, n_parts: int) -> list[int]:
     """Draw as `draw` does: each part a share of the triangles into its own rows, then what others have found for it."""
     scene, n = snapped.scene, snapped.n_triangles
     rows = [height * i // n_parts for i in range(n_parts + 1)]
@@ -208,11 +239,21 @@ def draw_shared(
 
 
 def paint(
-    memory: Memory, snapped: Snapped, view: View, colors: NDArray[Any], pixels: NDArray[Any], *, is_flat: bool
+    memory: Memory,
+    snapped: Snapped,
+    view: View,
+    colors: NDArray[Any],
+    pixels: NDArray[Any],
+    transfer: _engine.Transfer | None = None,
+    *,
+    is_flat: bool,
 ) -> None:
     """Draw coloured triangles over contiguous pixels: first which triangle shows in each, then its colour."""
     width, height = view.size
     if not (width and height and snapped.n_triangles):
+        return
+    if view.sampling.n_samples > 1:
+        paint_samples(memory, snapped, view, colors, pixels, transfer, is_flat=is_flat)
         return
     labels = memory.empty("labels", (height, width), np.int32)
     draw(memory, snapped, view, Sink.LABEL, labels)
@@ -223,6 +264,29 @@ def paint(
         snapped.scene.paint(labels, palette, flat, first, end - first, is_flat, colors.dtype == np.uint8, n_channels)
 
     run_parts(paint_rows, height, count_threads(view.threads, snapped.n_triangles))
+
+
+def paint_samples(
+    memory: Memory,
+    snapped: Snapped,
+    view: View,
+    colors: NDArray[Any],
+    pixels: NDArray[Any],
+    transfer: _engine.Transfer | None,
+    *,
+    is_flat: bool,
+) -> None:
+    """Draw coloured triangles over contiguous pixels, each pixel the mean of its samples."""
+    width, height = view.size
+    positions = sample_positions(view.sampling.n_samples, view.grid_bits)
+    labels: NDArray[np.int32] = memory.empty("sample ids", (len(positions), height, width), np.int32)
+    draw_all_samples(memory, snapped, view, positions, Sink.LABEL, labels, None)
+    n_threads = count_threads(view.threads, snapped.n_triangles)
+    if is_flat:
+        resolve_flat(labels, colors, pixels, transfer, n_threads)
+        return
+    scenes = [snapped.scene.seen_from(x, y) for x, y in positions.tolist()]
+    resolve_gouraud(memory, scenes, labels, colors, pixels, transfer, n_threads)
 
 
 @contextmanager
@@ -253,10 +317,10 @@ def draw_area(
     return result
 
 
-def refuse_area(view: View, verb: str) -> None:
-    """Raise an error where a pixel needs one triangle, and areas are of many."""
-    if view.sampling is Sampling.AREA:
-        raise ValueError(f"sampling 'area' gives no ids: {verb} takes 'center'")
+def refuse_many(view: View, verb: str) -> None:
+    """Raise an error where a pixel needs one triangle, and areas or squares are of many."""
+    if view.sampling in (Sampling.AREA, Sampling.OUTER, Sampling.INNER):
+        raise ValueError(f"sampling {str(view.sampling)!r} gives no ids: {verb} takes 'center' and 'msaa2' to 'msaa16'")
 
 
 def draw_coverage(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, view: View, out: object) -> NDArray[Any]:
@@ -266,8 +330,27 @@ def draw_coverage(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, vie
     snapped = snap_scene(memory, vertices, triangles, view, with_depth=False, out=out)
     if view.sampling is Sampling.AREA:
         return draw_area(memory, "coverage", snapped, view, out, is_clamped=True)
+    if view.sampling.n_samples > 1:
+        with canvas_of(memory, "coverage share", out, view.size[::-1], np.float32) as (result, canvas):
+            draw(memory, snapped, view, Sink.SAMPLES, canvas)
+        return result
     with canvas_of(memory, "coverage", out, view.size[::-1], np.bool_) as (result, canvas):
         draw(memory, snapped, view, Sink.MASK, canvas)
+    return result
+
+
+def draw_sample_counts(memory: Memory, snapped: Snapped, view: View, out: object) -> NDArray[np.int32]:
+    """Return how many triangles cover each sample, (H, W, S): a plane a sample in memory."""
+    n, (width, height) = view.sampling.n_samples, view.size
+    planes = memory.empty("sample counts", (n, height, width), np.int32)
+    for plane, at in zip(planes, sample_positions(n, view.grid_bits).tolist(), strict=True):
+        seen = replace(snapped, scene=snapped.scene.seen_from(*at))
+        draw(memory, seen, view, Sink.COUNT, plane)
+    counts = np.moveaxis(planes, 0, -1)
+    if out is None:
+        return counts
+    result = as_out("out", out, counts.shape, np.int32)
+    result[...] = counts
     return result
 
 
@@ -278,6 +361,8 @@ def draw_overdraw(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, vie
     snapped = snap_scene(memory, vertices, triangles, view, with_depth=False, out=out)
     if view.sampling is Sampling.AREA:
         return draw_area(memory, "overdraw", snapped, view, out, is_clamped=False)
+    if view.sampling.n_samples > 1:
+        return draw_sample_counts(memory, snapped, view, out)
     with canvas_of(memory, "overdraw", out, view.size[::-1], np.int32) as (result, canvas):
         draw(memory, snapped, view, Sink.COUNT, canvas)
     return result
@@ -314,10 +399,12 @@ def draw_fill(
     per: str,
     background: ArrayLike | None,
     out: object,
+    resolve: str = "values",
 ) -> NDArray[Any]:
     """`fill`, on the memory given."""
-    refuse_area(view, "fill")
+    refuse_many(view, "fill")
     palette = as_colors(colors)
+    transfer = parse_resolve(resolve, palette.dtype, 1 if palette.ndim == 1 else palette.shape[1])
     if view.classic:
         return fill_classic(view.classic, memory, vertices, triangles, palette, view, per, background, out)
     snapped = snap_scene(memory, vertices, triangles, view, with_depth=False, out=out)
@@ -329,8 +416,54 @@ def draw_fill(
             canvas[...] = ground
         elif out is None:
             canvas.fill(0)
-        paint(memory, snapped, view, palette, canvas, is_flat=is_flat)
+        paint(memory, snapped, view, palette, canvas, transfer, is_flat=is_flat)
     return result
+
+
+def draw_samples(
+    memory: Memory,
+    snapped: Snapped,
+    view: View,
+    sink: Sink,
+    background_depth: float | None,
+    ids_out: object,
+    depth_out: object,
+) -> Fragments:
+    """Return the visibility buffer of every sample: a plane a sample in memory."""
+    (width, height), n = view.size, view.sampling.n_samples
+    positions = sample_positions(n, view.grid_bits)
+    ids: NDArray[np.int32] = memory.empty("sample ids", (n, height, width), np.int32)
+    depth: NDArray[np.float32] = memory.empty("sample depth", (n, height, width), np.float32)
+    draw_all_samples(memory, snapped, view, positions, sink, ids, depth)
+    if background_depth is not None:
+        depth[ids < 0] = background_depth
+    for name, out, planes in (("triangle", ids_out, ids), ("depth", depth_out, depth)):
+        if out is not None:
+            result = as_out(f"out {name}", out, (height, width, n), planes.dtype.type)
+            result[...] = np.moveaxis(planes, 0, -1)
+    scenes = [snapped.scene.seen_from(x, y) for x, y in positions.tolist()]
+    return Fragments.of_samples(ids, depth, scenes, snapped.n_vertices, snapped.n_triangles)
+
+
+def draw_all_samples(
+    memory: Memory,
+    snapped: Snapped,
+    view: View,
+    positions: NDArray[np.int32],
+    sink: Sink,
+    pixels: NDArray[np.int32],
+    depth: NDArray[np.float32] | None,
+) -> None:
+    """Clear (S, H, W) planes and draw what each sample sees."""
+    width, height = view.size
+    if not (width and height):
+        return
+    n_threads = min(height, count_threads(view.threads, snapped.n_triangles))
+    is_near = snapped.n_triangles > 0 and can_share(view)
+    if draw_planes(
+        memory, snapped.scene, snapped.n_triangles, positions, sink, pixels, depth, n_threads, is_near=is_near
+    ):
+        check_triangles(snapped.triangles, snapped.corners, snapped.n_vertices)
 
 
 def draw_fragments(
@@ -344,7 +477,7 @@ def draw_fragments(
 ) -> Fragments:
     """`rasterize`, on the memory given."""
     refuse_classic(view, "depth")
-    refuse_area(view, "rasterize")
+    refuse_many(view, "rasterize")
     test = None if depth_test is None else parse(DepthTest, "depth_test", depth_test)
     if out is None:
         ids_out = depth_out = None
@@ -355,14 +488,17 @@ def draw_fragments(
             raise TypeError(f"out must be a pair (triangle, depth) of arrays, got {type(out).__name__}") from None
     snapped = snap_scene(memory, vertices, triangles, view, with_depth=True, out=out)
     sink = {None: Sink.PAINT, DepthTest.LESS: Sink.NEAREST, DepthTest.GREATER: Sink.FARTHEST}[test]
+    if not snapped.has_depth:
+        sink = Sink.PAINT
+        background_depth = -np.inf if test is DepthTest.GREATER and background_depth is None else background_depth
+    if view.sampling.n_samples > 1:
+        return draw_samples(memory, snapped, view, sink, background_depth, ids_out, depth_out)
     shape = view.size[::-1]
     with (
         canvas_of(memory, "triangle", ids_out, shape, np.int32) as (ids, ids_canvas),
         canvas_of(memory, "depth", depth_out, shape, np.float32) as (depth, depth_canvas),
     ):
-        draw(memory, snapped, view, sink if snapped.has_depth else Sink.PAINT, ids_canvas, depth=depth_canvas)
-        if test is DepthTest.GREATER and not snapped.has_depth and background_depth is None:
-            background_depth = -np.inf
+        draw(memory, snapped, view, sink, ids_canvas, depth=depth_canvas)
         if background_depth is not None:
             depth_canvas[ids_canvas < 0] = background_depth
     return Fragments(ids, depth, snapped.scene, snapped.n_vertices, snapped.n_triangles)
