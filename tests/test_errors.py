@@ -154,7 +154,7 @@ def test_bad_size_raises(size, kind, message):
 @pytest.mark.parametrize(
     ("options", "kind", "message"),
     [
-        ({"sampling": "msaa3"}, ValueError, "sampling must be one of 'center', 'area', got 'msaa3'"),
+        ({"sampling": "msaa3"}, ValueError, "sampling must be one of 'center', 'msaa2', 'msaa4',"),
         ({"method": "magic"}, ValueError, "method must be one of 'auto', 'edge', 'scanline', got 'magic'"),
         ({"cull": True}, ValueError, "cull must be one of 'none', 'back', 'front', got True"),
         ({"clip_depth": "gl"}, ValueError, "clip_depth must be one of 'minus_one_to_one', 'zero_to_one', got 'gl'"),

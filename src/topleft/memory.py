@@ -13,11 +13,13 @@ __all__ = ["FreshMemory", "KeptMemory", "Memory", "ScratchMemory", "release_memo
 
 HUGE_PAGE = 2 << 20
 
-#: Most bytes that one name of a thread's scratch keeps between module-level calls; there are five names.
+#: Most bytes that one name of a thread's scratch keeps between module-level calls; there are nine names.
 MAX_SCRATCH_BYTES = 64 << 20
 
 #: What no result refers to once `coverage`, `overdraw` or `fill` has returned.
-SCRATCH_NAMES = frozenset({"covered", "labels", "others", "records", "triangles"})
+SCRATCH_NAMES = frozenset(
+    {"bands", "bins", "covered", "labels", "others", "records", "sample colors", "sample labels", "triangles"}
+)
 
 
 class Memory(Protocol):
