@@ -95,3 +95,11 @@ def test_options_that_do_not_go_together_are_errors():
         tl.fill(*SQUARE, colors, (1, 1), resolve="gamma")
     with pytest.raises(ValueError, match="resolve 'linear' takes sRGB colours of uint8, got float32"):
         tl.fill(*SQUARE, colors, (1, 1), resolve="linear", sampling="msaa4")
+
+
+def test_kept_fragments_outlive_a_fill():
+    rasterizer = tl.Rasterizer((2, 1))
+    frags = rasterizer.rasterize(*SQUARE, sampling="msaa2")
+    before = frags.samples_triangle.copy()
+    rasterizer.fill([[0, 0], [0, 0], [9, 9]], [[0, 1, 2]], [9], per="triangle", sampling="msaa2")
+    assert_same(frags.samples_triangle, before)

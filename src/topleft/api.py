@@ -47,8 +47,8 @@ def coverage(
         viewport : (int, int). Width and height of the whole picture for clip space; default `size`.
         subpixel_bits : int, 0 to 16. Vertices snap to ``2**-subpixel_bits`` pixels; default 8.
         sampling : "center"; "msaa2", "msaa4", "msaa8" or "msaa16": so many samples a pixel, at the standard positions
-            of Direct3D. For `coverage` and `overdraw` also "area": the exact area of the pixel; "outer": every
-            pixel square that a triangle meets in positive area; "inner": every one that lies wholly inside a triangle.
+            of Direct3D. For `coverage` and `overdraw` also "area": the exact area of the pixel; "outer": every pixel
+            square that a triangle meets in positive area; "inner": every square that lies wholly inside a triangle.
         method : "auto", "edge" or "scanline": the same picture. Or a classic of the literature, to compare with:
             `topleft.methods.CLASSICS` names them, and docs/methods.md tells where each of them fails.
         cull : "none", "back" or "front"; the front is counter-clockwise seen with y up.

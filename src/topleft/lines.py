@@ -15,7 +15,8 @@ from topleft import _engine
 from topleft.fragments import Fragments
 from topleft.memory import Memory
 from topleft.models import DepthTest, parse
-from topleft.rasterize import Snapped, canvas_of, check_triangles, snap_scene
+from topleft.rasterize import canvas_of
+from topleft.snapped import Snapped, check_triangles, snap_scene
 from topleft.threads import count_threads, run_parts
 from topleft.view import View
 
