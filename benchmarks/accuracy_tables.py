@@ -107,10 +107,9 @@ def changes_text(_: Record) -> str:
     missed = "*missed*, *overdrawn*: pixels that no triangle of the mesh draws, or that are drawn more than once"
     far = f"*far*: the same with the mesh {FAR_PX:,} px from the origin, in x and y; `-` beyond the method's range"
     wrong = "*wrong*: pixels that do not show the triangle that the exact picture shows"
-    changes = [
-        f"*{change.name}*: pixels that show another triangle after the change, {change.what}" for change in CHANGES
-    ]
-    return "\n".join(f"- {line}." for line in (missed, far, wrong, *changes))
+    changes = "The others: pixels that show another triangle after a change of the mesh"
+    named = "; ".join(f"*{change.name}*, {change.what}" for change in CHANGES)
+    return "\n".join(f"- {line}." for line in (missed, far, wrong, f"{changes}: {named}"))
 
 
 def per_million(count: int | None, n: int) -> str:

@@ -119,7 +119,7 @@ def chart_antialiasing(record: dict[str, Any]) -> Figure:
             axis.plot(row["ns_triangle"], row["rms"], SAMPLING_MARKERS[i % 10], color=colors[i % 10], mec="black",
                       ms=7, zorder=3)  # fmt: skip
             axis.annotate(row["sampling"], (row["ns_triangle"], row["rms"]), (7, 4), textcoords="offset points")
-        axis.set(xscale="log", yscale="log", ylim=(2e-4, 1))
+        axis.set(xscale="log", yscale="log", ylim=(min(row["rms"] for row in rows) / 3, 1))
         low, high = (of(row["ns_triangle"] for row in rows) for of in (min, max))
         axis.set_xlim(low / 1.5, high * 2)
     finish(figure, axes, "RMS error of coverage, edge pixels")
@@ -145,7 +145,7 @@ def finish(figure: Figure, axes: list[Axes], y_label: str) -> None:
     for i, axis in enumerate(axes):
         axis.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
         axis.xaxis.set_minor_locator(NullLocator())
-        axis.xaxis.set_major_formatter(lambda value, _: f"{value:,.0f}")
+        axis.xaxis.set_major_formatter(lambda value, _: f"{value / 1000:g}k" if value >= 10_000 else f"{value:,.0f}")
         if i >= len(axes) - 2:
             axis.set_xlabel("time per triangle, ns")
     figure.supylabel(y_label, fontsize=9)
