@@ -122,17 +122,6 @@ TL_INLINE vw add_span(vw words, lane_span span, int32_t col, int sample_bits, ui
     return vw_add_range(words, vi_max(vi_sub(span.begin, from), zero), vi_max(vi_sub(span.end, from), zero), pattern);
 }
 
-/* Asks for the memory of a box: bits of samples outgrow the second-level cache, and rows are too far apart to be foreseen. */
-TL_INLINE void fetch_box(const tl_target *target, int32_t first, int32_t size)
-{
-    const int sample_bits = target->sample_bits;
-    int64_t at = (int64_t)(uint32_t)first << sample_bits;
-    for (int row = 0; row < size >> 16; row++, at += target->stride_px << sample_bits) {
-        __builtin_prefetch(target->covered + (at >> 6), 1);
-        __builtin_prefetch(target->covered + ((at + ((int64_t)(size & 0xffff) << sample_bits)) >> 6), 1);
-    }
-}
-
 static __attribute__((noinline)) void flush_middle_of_samples(batch_state *s)
 {
     const tl_target target = *s->target; /* a copy that no store can change */
@@ -154,7 +143,6 @@ static __attribute__((noinline)) void flush_middle_of_samples(batch_state *s)
         for (int k = 0; k < end; k++) {
             max_rows = q->size[i + k] >> 16 > max_rows ? q->size[i + k] >> 16 : max_rows;
             max_cols = (q->size[i + k] & 0xffff) > max_cols ? q->size[i + k] & 0xffff : max_cols;
-            fetch_box(&target, first[k], q->size[i + k]);
         }
         const int n_words = (max_cols + per_word - 1) / per_word;
         const vi n_cols = vi_and(vi_load(q->size + i), vi_set1(0xffff));
@@ -239,10 +227,7 @@ static __attribute__((noinline)) void flush_rows_of_samples(batch_state *s)
         }
         const unsigned lefts = vm_bits(e.sides.third_is_left), rights = vm_bits(e.sides.third_is_right);
         const int end = n - i < TL_LANES ? n - i : TL_LANES;
-        fetch_box(&target, first[0], q->size[i]);
         for (int k = 0; k < end; k++) {
-            if (k + 1 < end)
-                fetch_box(&target, first[k + 1], q->size[i + k + 1]);
             const vm third_is_left = vm_first(lefts >> k & 1 ? TL_LANES : 0), third_is_right = vm_first(rights >> k & 1 ? TL_LANES : 0);
             draw_sampled_rows(&target, starts, steps, inverses, k, third_is_left, third_is_right, first[k], q->size[i + k]);
         }

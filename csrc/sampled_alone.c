@@ -72,17 +72,12 @@ static int walk_samples(const tl_scene *scene, const int32_t *corners, const tl_
         moved.col0 = col0, moved.row0 = row0;
         e[k] = setup_edges_64(&moved, window);
     }
-    int32_t first[TL_MAX_SAMPLES][TL_MAX_LANES] = {{0}}, end[TL_MAX_SAMPLES][TL_MAX_LANES] = {{0}};
+    int32_t first[TL_MAX_SAMPLES][TL_MAX_LANES], end[TL_MAX_SAMPLES][TL_MAX_LANES];
     for (int64_t row = row0; row < row1; row += TL_LANES) {
         const vd rows = vd_add(vd_set1((double)(row - row0)), vd_from_vi(vi_iota()));
         for (int k = 0; k < n_samples; k++)
             if (t[k].row0 < t[k].row1)
                 find_row_ends(&e[k], rows, (double)(t[k].col0 - col0), (double)(t[k].col1 - col0), first[k], end[k]);
-        for (int lane = 0; lane < TL_LANES && row + lane < row1; lane++) { /* rows are too far apart to be foreseen */
-            const int64_t at = (row + lane) * target->stride_px + col0;
-            __builtin_prefetch(target->covered + ((at + first[0][lane]) << target->sample_bits >> 6), 1);
-            __builtin_prefetch(target->covered + ((at + end[0][lane]) << target->sample_bits >> 6), 1);
-        }
         for (int lane = 0; lane < TL_LANES && row + lane < row1; lane++) {
             int32_t own_first[TL_MAX_SAMPLES], own_end[TL_MAX_SAMPLES];
             for (int k = 0; k < n_samples; k++) {
