@@ -231,7 +231,6 @@ TL_INLINE vd vd_select(vm m, vd a, vd b)
     const __m256d hi = _mm256_castsi256_pd(_mm256_cvtepi32_epi64(_mm256_extracti128_si256(m, 1)));
     return (vd){_mm256_blendv_pd(b.lo, a.lo, lo), _mm256_blendv_pd(b.hi, a.hi, hi)};
 }
-TL_INLINE vd vd_load(const double *p) { return (vd){_mm256_loadu_pd(p), _mm256_loadu_pd(p + 4)}; }
 TL_INLINE void vd_store(double *p, vd a) { _mm256_storeu_pd(p, a.lo), _mm256_storeu_pd(p + 4, a.hi); }
 
 /* Plain 16-byte loads and transposes in registers: hardware gathers are three times as slow. */

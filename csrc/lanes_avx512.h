@@ -178,7 +178,6 @@ TL_INLINE vd vd_select(vm m, vd a, vd b)
 {
     return (vd){_mm512_mask_mov_pd(b.lo, (__mmask8)m, a.lo), _mm512_mask_mov_pd(b.hi, (__mmask8)(m >> 8), a.hi)};
 }
-TL_INLINE vd vd_load(const double *p) { return (vd){_mm512_loadu_pd(p), _mm512_loadu_pd(p + 8)}; }
 TL_INLINE void vd_store(double *p, vd a) { _mm512_storeu_pd(p, a.lo), _mm512_storeu_pd(p + 8, a.hi); }
 
 /* Plain 16-byte loads and transposes in registers: hardware gathers are three times as slow. */

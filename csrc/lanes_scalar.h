@@ -132,7 +132,6 @@ TL_INLINE vm vd_ge(vd a, vd b) { return a >= b; }
 TL_INLINE vd vd_from_vf(vf a) { return (double)a; }
 TL_INLINE vi vi_round(vd a) { return fabs(a) < 0x1p31 ? (vi)rint(a) : INT32_MIN; }
 TL_INLINE vd vd_select(vm m, vd a, vd b) { return m ? a : b; }
-TL_INLINE vd vd_load(const double *p) { return *p; }
 TL_INLINE void vd_store(double *p, vd a) { *p = a; }
 
 /* The vertices first[step * lane] of TL_LANES pairs or triangles.  z is left in the order of the loads until it is needed. */
