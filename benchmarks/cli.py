@@ -1,4 +1,4 @@
-"""The command line: `python -m benchmarks run`, `report`, `list`."""
+"""The command line: `python -m benchmarks run`, `accuracy`, `report`, `charts`, `document`, `list`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks import report
+from benchmarks import accuracy, accuracy_tables, report
 from benchmarks.cases import CASES, TRIALS
 from benchmarks.contestants import known_peers
 from benchmarks.peers import PEERS
@@ -49,6 +49,29 @@ def parser() -> argparse.ArgumentParser:
     add = commands.add_parser("report", help="print tables again")
     add.set_defaults(action=report_command)
     add.add_argument("files", nargs="+", type=Path, metavar="FILE.json")
+
+    add = commands.add_parser("accuracy", help="measure time beside error, and stability, of every method")
+    add.set_defaults(action=accuracy_command)
+    defaults = accuracy.Options()
+    add.add_argument("--method", nargs="+", metavar="NAME", default=[], help="all that fill unless given")
+    add.add_argument("--repeats", type=positive, default=defaults.rounds, metavar="N", help="rounds (%(default)s)")
+    add.add_argument("--seconds", type=float, default=defaults.seconds, metavar="S",
+                     help="length of a turn, at least a call (%(default)s)")  # fmt: skip
+    add.add_argument("--edge-pixels", type=positive, default=defaults.edge_px, metavar="N",
+                     help="edge pixels to compare in each family, at least (%(default)s)")  # fmt: skip
+    add.add_argument("--frame", type=positive, default=defaults.frame_px, metavar="PX", help="side (%(default)s)")
+    add.add_argument("--scale", type=float, default=1.0, metavar="X", help="of the numbers of triangles timed (1)")
+    add.add_argument("-o", "--out", type=Path, metavar="FILE.json")
+
+    add = commands.add_parser("charts", help="draw the charts of an accuracy record, PNG and SVG")
+    add.set_defaults(action=charts_command)
+    add.add_argument("file", type=Path, metavar="FILE.json")
+    add.add_argument("-o", "--out", type=Path, default=Path("docs/images"), metavar="FOLDER")
+
+    add = commands.add_parser("document", help="write the tables of an accuracy record into a page")
+    add.set_defaults(action=document_command)
+    add.add_argument("file", type=Path, metavar="FILE.json")
+    add.add_argument("page", type=Path, metavar="PAGE.md")
 
     commands.add_parser("list", help="cases and peers").set_defaults(action=list_command)
     return root
@@ -126,7 +149,47 @@ def find_scenes(names: Sequence[str]) -> list[str]:
 def report_command(arguments: argparse.Namespace) -> int:
     """Print tables of records."""
     for path in arguments.files:
-        print(*report.lines(json.loads(path.read_text())), sep="\n")
+        record = json.loads(path.read_text())
+        tables = accuracy_tables if record.get("kind") == "accuracy" else report
+        print(*tables.lines(record), sep="\n")
+    return 0
+
+
+def accuracy_command(arguments: argparse.Namespace) -> int:
+    """Measure, write, print."""
+    options = accuracy.Options(
+        methods=arguments.method,
+        rounds=arguments.repeats,
+        seconds=arguments.seconds,
+        edge_px=arguments.edge_pixels,
+        frame_px=arguments.frame,
+        scale=arguments.scale,
+    )
+    try:
+        record = accuracy.run_accuracy(options, sys.stderr)
+    except ValueError as error:
+        print(f"benchmarks: {error}", file=sys.stderr)
+        return 2
+    if arguments.out:
+        write_record(arguments.out, record)
+    print(*accuracy_tables.lines(record), sep="\n")
+    return 0
+
+
+def charts_command(arguments: argparse.Namespace) -> int:
+    """Draw."""
+    from benchmarks.charts import draw_charts  # matplotlib
+
+    for path in draw_charts(json.loads(arguments.file.read_text()), arguments.out):
+        print(path)
+    return 0
+
+
+def document_command(arguments: argparse.Namespace) -> int:
+    """Replace what stands between the markers of a page."""
+    text = arguments.page.read_text(encoding="utf-8")
+    page = accuracy_tables.with_parts(text, json.loads(arguments.file.read_text()))
+    arguments.page.write_text(page, encoding="utf-8")
     return 0
 
 
@@ -143,7 +206,19 @@ def write_record(path: Path, record: dict[str, Any]) -> None:
     """Write JSON beside its place, then move it there: never half a file."""
     temporary = path.with_name(f".{path.name}.{os.getpid()}")
     try:
-        temporary.write_text(json.dumps(record, indent=1) + "\n")
+        temporary.write_text(record_text(record) + "\n")
         os.replace(temporary, path)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def record_text(record: dict[str, Any]) -> str:
+    """JSON; rows of figures take a line each."""
+    if record.get("kind") != "accuracy":
+        return json.dumps(record, indent=1)
+    parts = []
+    for key, value in record.items():
+        is_rows = isinstance(value, list) and value
+        text = "[\n  " + ",\n  ".join(map(json.dumps, value)) + "\n ]" if is_rows else json.dumps(value)
+        parts.append(f" {json.dumps(key)}: {text}")
+    return "{\n" + ",\n".join(parts) + "\n}"

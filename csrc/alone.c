@@ -33,37 +33,44 @@ static inline void floor_divide_128(tl_int128 a, tl_int128 b, tl_int128 *quotien
 
 /* One triangle of any size, by the ends of TL_LANES rows at a time in float64: as above, exact while |2E| < 2^51, for then
  * |v / d| * 2^-52 < 0.5 / d. */
-TL_INLINE int rows_fit(const tl_triangle *t)
+TL_INLINE int rows_fit(const tl_triangle *t, const tl_window *window, int with_border)
 {
+    const double around = with_border ? (double)((int64_t)2 << window->subpixel_bits) : 0.0;
     const double width = (double)(max3(t->x_fx[0], t->x_fx[1], t->x_fx[2]) - min3(t->x_fx[0], t->x_fx[1], t->x_fx[2]));
     const double height = (double)(max3(t->y_fx[0], t->y_fx[1], t->y_fx[2]) - min3(t->y_fx[0], t->y_fx[1], t->y_fx[2]));
-    return TL_LANES > 1 && t->is_narrow && 2.0 * width * height < 0x1p50;
+    return TL_LANES > 1 && t->is_narrow && 2.0 * (width + around) * (height + around) < 0x1p50;
+}
+
+/* The columns [first, end) of TL_LANES rows, all within [low, high]. */
+TL_INLINE void find_row_ends(const edges_64 *e, vd rows, double low, double high, int32_t *first, int32_t *end)
+{
+    vd begins = vd_set1(low), ends = vd_set1(high);
+    for (int k = 0; k < 3; k++) {
+        if (e->dy[k] == 0)
+            continue;
+        const vd v = vd_add(vd_set1((double)e->value[k] + 0.5), vd_mul(vd_set1((double)e->dx[k]), rows));
+        const vd quotient = vd_floor(vd_mul(v, vd_set1(1.0 / fabs((double)e->dy[k]))));
+        if (e->dy[k] < 0)
+            begins = vd_max(begins, vd_sub(vd_set1(0.0), quotient));
+        else
+            ends = vd_min(ends, vd_add(quotient, vd_set1(1.0)));
+    }
+    vi_store(first, vi_round(vd_min(begins, vd_set1(high))));
+    vi_store(end, vi_round(vd_max(ends, vd_set1(low))));
 }
 
 TL_INLINE void walk_rows(const tl_triangle *t, const tl_window *window, const tl_target *shared, tl_sink sink)
 {
     const tl_target own = *shared, *target = &own; /* a copy that no store can change */
     const edges_64 e = setup_edges_64(t, window);
-    const vd lanes = vd_from_vi(vi_iota()), one = vd_set1(1.0), zero = vd_set1(0.0), width = vd_set1((double)(t->col1 - t->col0));
+    const vd lanes = vd_from_vi(vi_iota());
     const double step = (double)((int64_t)2 << window->subpixel_bits), x0 = sample_x(t, window, t->col0);
     const vd xs = vd_add(vd_set1(x0), ramp(step)), slope_x = vd_set1(t->slope_x);
     int32_t first[TL_MAX_LANES], end[TL_MAX_LANES];
     double z_row[TL_MAX_LANES];
     for (int64_t row0 = t->row0; row0 < t->row1; row0 += TL_LANES) {
         const vd rows = vd_add(vd_set1((double)(row0 - t->row0)), lanes);
-        vd begins = zero, ends = width;
-        for (int k = 0; k < 3; k++) {
-            if (e.dy[k] == 0)
-                continue;
-            const vd v = vd_add(vd_set1((double)e.value[k] + 0.5), vd_mul(vd_set1((double)e.dx[k]), rows));
-            const vd quotient = vd_floor(vd_mul(v, vd_set1(1.0 / fabs((double)e.dy[k]))));
-            if (e.dy[k] < 0)
-                begins = vd_max(begins, vd_sub(zero, quotient));
-            else
-                ends = vd_min(ends, vd_add(quotient, one));
-        }
-        vi_store(first, vi_round(vd_min(begins, width)));
-        vi_store(end, vi_round(vd_max(ends, zero)));
+        find_row_ends(&e, rows, 0.0, (double)(t->col1 - t->col0), first, end);
         if (sink_has_depth(sink)) {
             const vd ys = vd_add(vd_set1(sample_y(t, window, row0)), ramp(step));
             vd_store(z_row, vd_add(vd_set1(t->z[0]), vd_mul(vd_set1(t->slope_y), ys)));
@@ -102,7 +109,7 @@ TL_INLINE void draw_triangle(const tl_vertex_set *set, const int32_t *corners, i
     setup_sink(&t, window, sink);
     const int is_auto = scene->method == TL_METHOD_AUTO;
     const int by_edge = scene->method == TL_METHOD_EDGE || (is_auto && t.col1 - t.col0 <= TL_EDGE_MAX_WIDTH);
-    if (is_auto && rows_fit(&t) && (!sink_has_depth(sink) || t.has_plane))
+    if (is_auto && rows_fit(&t, window, window->test != TL_TEST_SAMPLE) && (!sink_has_depth(sink) || t.has_plane))
         walk_rows(&t, window, target, sink);
     else if (t.is_narrow && by_edge)
         walk_edge_64(&t, window, target, sink);
@@ -114,6 +121,33 @@ TL_INLINE void draw_triangle(const tl_vertex_set *set, const int32_t *corners, i
         walk_scanline_128(&t, window, target, sink);
 }
 
+/* The squares [first, end) of a row that a triangle meets, or holds. */
+typedef struct {
+    int64_t first, end;
+} row_span;
+
+static row_span square_span(const tl_triangle *t, const tl_window *window, int64_t row)
+{
+    row_span span = {0, 0};
+    if (row < t->row0 || row >= t->row1)
+        return span;
+    const edges_128 e = setup_edges_128(t, window);
+    tl_int128 first = 0, end = t->col1 - t->col0;
+    for (int k = 0; k < 3; k++) {
+        tl_int128 quotient, remainder;
+        if (e.dy[k] == 0)
+            continue;
+        floor_divide_128(e.value[k] + e.dx[k] * (row - t->row0), e.dy[k] < 0 ? -e.dy[k] : e.dy[k], &quotient, &remainder);
+        if (e.dy[k] < 0)
+            first = -quotient > first ? -quotient : first;
+        else
+            end = quotient + 1 < end ? quotient + 1 : end;
+    }
+    if (first < end)
+        span = (row_span){t->col0 + (int64_t)first, t->col0 + (int64_t)end};
+    return span;
+}
+
 static inline int is_clipped(const tl_vertex_set *set, const int32_t *corners)
 {
     int clipped = 0;
@@ -122,9 +156,10 @@ static inline int is_clipped(const tl_vertex_set *set, const int32_t *corners)
     return clipped;
 }
 
-static tl_vertex_set piece_set(const tl_pieces *p)
+/* The vertices of the pieces, seen from the same sample. */
+static tl_vertex_set piece_set(const tl_pieces *p, const tl_vertex_set *mesh)
 {
-    return (tl_vertex_set){p->vertices, p->wide, p->inv_w, NULL, p->n_vertices};
+    return (tl_vertex_set){p->vertices, p->wide, p->inv_w, NULL, p->n_vertices, mesh->sample_x_fx, mesh->sample_y_fx};
 }
 
 /* First piece of a triangle, by bisection in the ascending sources. */
@@ -141,6 +176,40 @@ static int64_t first_piece(const tl_pieces *p, int64_t id)
     return low;
 }
 
+#define TL_MAX_PIECES (TL_MAX_CORNERS - 2) /* of one triangle */
+
+/* Counts the squares that any of a triangle's pieces meets, or holds: a square may meet several, and counts once. */
+static __attribute__((noinline)) void count_squares(const tl_vertex_set *set, const int32_t *corners, int n_pieces, const tl_scene *scene,
+                                                    const tl_window *window, const tl_target *target)
+{
+    tl_triangle t[TL_MAX_PIECES];
+    int64_t row0 = window->height, row1 = 0;
+    int n = 0;
+    for (int i = 0; i < n_pieces && n < TL_MAX_PIECES; i++) {
+        const int sign = load_triangle(set, corners + 3 * i, &t[n]);
+        const int is_culled = sign == 0 || (sign > 0 && scene->cull == TL_CULL_BACK) || (sign < 0 && scene->cull == TL_CULL_FRONT);
+        if (is_culled || !clip_box(&t[n], window))
+            continue;
+        row0 = min64(row0, t[n].row0);
+        row1 = max64(row1, t[n].row1);
+        n++;
+    }
+    for (int64_t row = row0; row < row1; row++)
+        for (int64_t done = 0, n_left = n; n_left > 0; n_left--) { /* the spans in the order of their beginnings */
+            int64_t first = window->width, end = 0;
+            for (int i = 0; i < n; i++) {
+                const row_span span = square_span(&t[i], window, row);
+                const int64_t begin = max64(span.first, done);
+                if (begin < span.end && (begin < first || (begin == first && span.end > end)))
+                    first = begin, end = span.end;
+            }
+            if (first >= end)
+                break;
+            put_plain(target, TL_SINK_COUNT, row * target->stride_px + first, end - first, 0);
+            done = end;
+        }
+}
+
 /* Triangle i, or its pieces, by itself. */
 TL_INLINE void draw_alone(const tl_scene *scene, int64_t i, const tl_window *window, const tl_target *target, tl_sink sink)
 {
@@ -151,11 +220,15 @@ TL_INLINE void draw_alone(const tl_scene *scene, int64_t i, const tl_window *win
     if (is_clipped(&set, corners)) {
         if (!pieces)
             return;
-        set = piece_set(pieces);
+        set = piece_set(pieces, &scene->mesh);
         piece = first_piece(pieces, i);
         for (end = piece; end < pieces->n_pieces && pieces->source[end] == i;)
             end++;
         corners = pieces->triangles + 3 * piece;
+    }
+    if (sink == TL_SINK_COUNT && window->test != TL_TEST_SAMPLE && end - piece > 1) {
+        count_squares(&set, corners, (int)(end - piece), scene, window, target);
+        return;
     }
     for (; piece < end; piece++, corners += 3)
         draw_triangle(&set, corners, (int32_t)i, scene, window, target, sink);

@@ -114,7 +114,7 @@ static __attribute__((noinline)) void push_alone(area_state *s, int64_t i)
         push_triangle(s, &s->scene->mesh, corners);
         return;
     }
-    const tl_vertex_set set = pieces ? piece_set(pieces) : s->scene->mesh;
+    const tl_vertex_set set = pieces ? piece_set(pieces, &s->scene->mesh) : s->scene->mesh;
     for (int64_t k = pieces ? first_piece(pieces, i) : 0; pieces && k < pieces->n_pieces && pieces->source[k] == i; k++)
         push_triangle(s, &set, pieces->triangles + 3 * k);
 }

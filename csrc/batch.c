@@ -3,7 +3,8 @@
  * rows.c, and the triangles that 32 bits cannot take, for draw_triangle.
  *
  * Range: extents of at most TL_MAX_EXTENT units, so |dx|, |dy| < 2^14, doubled relative coordinates fit 16 bits, products
- * 2^30, and doubled edge functions 2^29 (see fixed.h). */
+ * 2^30, and doubled edge functions 2^29 (see fixed.h).  Squares and several samples: two pixels less and at most 8 bits, so that all this holds of
+ * corners of pixels up to a pixel outside the extent, but that doubled edge functions are below 2^30. */
 #include "fixed.h"
 #include "lanes.h"
 
@@ -26,6 +27,8 @@ typedef struct {
     int32_t left, top, right, bottom; /* picture pixels */
     int32_t picture_top, picture_bottom; /* rows of the picture that other passes draw */
     int32_t max_extent;               /* of a triangle that 32-bit lanes can take, in units */
+    extent_rounding round;
+    int32_t special_x;                /* TL_SPECIAL as load_corners gives it */
     vi last_vertex;
     int second, third;                /* which corner comes second and third: culled faces then have negative area */
 } batch_limits;
@@ -53,7 +56,7 @@ typedef struct {
 typedef struct {
     vi x[3], y[3];
     vi dx[3], dy[3]; /* edge k runs from corner k to corner k + 1; not doubled */
-    vi e[3];         /* E' at the first sample, as in walk.h: >= 0 inside */
+    vi e[3];         /* E' at the first sample, as in walk.h: >= 0 inside; of SAMPLES 2E + bias at the centre */
     vi sample;       /* the first sample: row * stride_px + column */
 } lane_triangles;
 
@@ -69,6 +72,10 @@ TL_INLINE void load_corners(const batch_state *s, const int32_t *corners, lane_c
     load_vertices(vertices, corners, &c->x[0], &c->y[0], &c->z[0]);
     load_vertices(vertices, corners + s->limits.second, &c->x[1], &c->y[1], &c->z[1]);
     load_vertices(vertices, corners + s->limits.third, &c->x[2], &c->y[2], &c->z[2]);
+    for (int k = 0; k < 3; k++) {
+        c->x[k] = vi_sub(c->x[k], vi_set1(s->scene->mesh.sample_x_fx));
+        c->y[k] = vi_sub(c->y[k], vi_set1(s->scene->mesh.sample_y_fx));
+    }
 }
 
 /* Twice the signed area; exact where the extents are. */
@@ -79,13 +86,22 @@ TL_INLINE vi area_lanes(const lane_corners *c)
     return vi_sub(vi_mul(x1, y2), vi_mul(y1, x2));
 }
 
-TL_INLINE void setup_edges_lanes(lane_triangles *t, int bits)
+TL_INLINE void setup_edges_lanes(lane_triangles *t, const tl_window *window, tl_sink sink)
 {
+    const int bits = window->subpixel_bits, of_squares = (sink == TL_SINK_MASK || sink == TL_SINK_COUNT) && window->test != TL_TEST_SAMPLE;
     for (int k = 0; k < 3; k++) {
         const vi doubled = vi_sub(vi_mul(t->dy[k], t->x[k]), vi_mul(t->dx[k], t->y[k]));
+        if (of_squares) { /* from the centre to the corner that counts: half a pixel in x and in y */
+            const vi zero = vi_set1(0), is_outer = vi_set1(window->test == TL_TEST_OUTER);
+            const vi sides = vi_add(vi_max(t->dx[k], vi_sub(zero, t->dx[k])), vi_max(t->dy[k], vi_sub(zero, t->dy[k])));
+            const vi reach = vi_shift_left(sides, bits), inwards = window->test == TL_TEST_OUTER ? reach : vi_sub(zero, reach);
+            t->e[k] = vi_shift_right(vi_sub(vi_add(doubled, inwards), is_outer), bits + 1);
+            continue;
+        }
         /* left: dy < 0, top: dy = 0 and dx > 0; as one number, |dx| < 2^15 */
         const vm top_left = vi_gt(vi_set1(0), vi_sub(vi_shift_left(t->dy[k], 16), t->dx[k]));
-        t->e[k] = vi_shift_right(vi_select(top_left, doubled, vi_sub(doubled, vi_set1(1))), bits + 1);
+        const vi biased = vi_select(top_left, doubled, vi_sub(doubled, vi_set1(1)));
+        t->e[k] = sink == TL_SINK_SAMPLES ? biased : vi_shift_right(biased, bits + 1);
     }
 }
 
@@ -117,7 +133,7 @@ TL_INLINE void place_triangles(const batch_state *s, tl_sink sink, const lane_co
     }
     t->sample = vi_add(vi_mul(vi_sub(row, vi_set1(s->limits.top)), vi_set1((int32_t)s->target->stride_px)),
                        vi_sub(col, vi_set1(s->limits.left)));
-    setup_edges_lanes(t, bits);
+    setup_edges_lanes(t, s->window, sink);
 }
 
 /* The same operations as setup_plane in setup.c. */
@@ -163,10 +179,20 @@ TL_INLINE int make_room(batch_state *s, int n, tl_sink sink)
     return 0;
 }
 
+/* In sampled.c: what the sink SAMPLES does instead. */
+static void draw_tiny_of_samples(batch_state *s, const lane_triangles *t, vm live, vi n_cols, vi n_rows);
+static void flush_small_of_samples(batch_state *s);
+static void flush_middle_of_samples(batch_state *s);
+static void flush_rows_of_samples(batch_state *s);
+
 /* Boxes of up to 2x2 samples, tested where they are. */
 TL_INLINE void draw_tiny(batch_state *s, tl_sink sink, const lane_triangles *t, const vd *z, vm live, vi n_cols, vi n_rows, vi id)
 {
     const int bits = s->window->subpixel_bits;
+    if (sink == TL_SINK_SAMPLES) {
+        draw_tiny_of_samples(s, t, live, n_cols, n_rows);
+        return;
+    }
     const vi sample = t->sample;
     const vi stride = vi_set1((int32_t)s->target->stride_px), one = vi_set1(1), minus_one = vi_set1(-1);
     vm in[2][2];
@@ -237,6 +263,10 @@ TL_INLINE void pop(const batch_state *s, tl_sink sink, const box_queue *q, int i
 /* Boxes of up to 4x4 samples: every sample of TL_LANES boxes. */
 TL_INLINE void flush_small(batch_state *s, tl_sink sink)
 {
+    if (sink == TL_SINK_SAMPLES) {
+        flush_small_of_samples(s);
+        return;
+    }
     box_queue *q = &s->small;
     const int bits = s->window->subpixel_bits, n = q->n;
     const int32_t stride = (int32_t)s->target->stride_px;

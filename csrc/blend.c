@@ -28,7 +28,7 @@ static __attribute__((noinline)) void blend_alone(blend_state *b, int64_t i)
     if (is_cut) {
         if (!pieces)
             return;
-        set = piece_set(pieces);
+        set = piece_set(pieces, &scene->mesh);
         piece = first_piece(pieces, i);
         for (end = piece; end < pieces->n_pieces && pieces->source[end] == i;)
             end++;
@@ -111,12 +111,12 @@ TL_INLINE void blend_batch(blend_pass *p, const int32_t *corners, vi id, vm live
     const vi y_min = vi_min(vi_min(c.y[0], c.y[1]), c.y[2]), y_max = vi_max(vi_max(c.y[0], c.y[1]), c.y[2]);
     /* a special vertex has x = INT32_MIN: its triangle is too wide, or special throughout */
     vm alone = vm_or(vi_gt_unsigned(vi_sub(x_max, x_min), max_extent), vi_gt_unsigned(vi_sub(y_max, y_min), max_extent));
-    alone = vm_and(live, vm_or(alone, vi_eq(x_min, vi_set1(TL_SPECIAL))));
+    alone = vm_and(live, vm_or(alone, vi_eq(x_min, vi_set1(limits->special_x))));
     const vi area = area_lanes(&c), absolute = s->scene->cull == TL_CULL_NONE ? vi_max(area, vi_sub(zero, area)) : area;
-    const vi col = vi_max(first_centre_lanes(x_min, bits), vi_set1(limits->left));
-    const vi n_cols = vi_sub(vi_min(first_centre_lanes(x_max, bits), vi_set1(limits->right)), col);
-    const vi row = vi_max(first_centre_lanes(y_min, bits), vi_set1(limits->top));
-    const vi n_rows = vi_sub(vi_min(first_centre_lanes(y_max, bits), vi_set1(limits->bottom)), row);
+    const vi col = vi_max(extent_pixels(x_min, limits->round.first, bits), vi_set1(limits->left));
+    const vi n_cols = vi_sub(vi_min(extent_pixels(x_max, limits->round.end, bits), vi_set1(limits->right)), col);
+    const vi row = vi_max(extent_pixels(y_min, limits->round.first, bits), vi_set1(limits->top));
+    const vi n_rows = vi_sub(vi_min(extent_pixels(y_max, limits->round.end, bits), vi_set1(limits->bottom)), row);
     vm drawn = vm_and(live, vm_and(vi_gt(absolute, zero), vi_gt(vi_min(n_cols, n_rows), zero)));
     drawn = vm_and_not(drawn, alone);
     if (TL_LANES == 1) { /* one lane gains nothing from the rows above */
@@ -181,6 +181,8 @@ static void start_batch(batch_state *s, const tl_scene *scene, const tl_window *
         .right = (int32_t)min64(window->x_px + window->width, farthest),
         .bottom = (int32_t)min64(window->y_px + window->height, farthest),
         .max_extent = TL_MAX_BOX_PX << (bits < 8 ? bits : 8),
+        .round = round_extent(window),
+        .special_x = (int32_t)((uint32_t)TL_SPECIAL - (uint32_t)scene->mesh.sample_x_fx),
         .second = is_back ? 2 : 1,
         .third = is_back ? 1 : 2,
         .last_vertex = vi_set1((int32_t)(scene->mesh.n_vertices - 1)),

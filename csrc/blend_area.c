@@ -136,7 +136,7 @@ TL_INLINE void blend_area_batch(area_pass *p, int64_t i, const int32_t *corners,
 static int64_t blend_areas(blend_state *b)
 {
     const tl_scene *scene = b->scene;
-    const tl_window *window = b->window, atlas = {0, 0, TL_ATLAS_COLS, TL_ATLAS_ROWS, window->subpixel_bits};
+    const tl_window *window = b->window, atlas = {0, 0, TL_ATLAS_COLS, TL_ATLAS_ROWS, window->subpixel_bits, TL_TEST_SAMPLE};
     const int64_t far = (int64_t)1 << 30;
     if (window->x_px <= -far || window->x_px >= far || window->y_px <= -far || window->y_px >= far) {
         const int64_t bad_row = first_bad_row(scene->triangles, scene->n_triangles, scene->mesh.n_vertices);

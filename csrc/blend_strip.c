@@ -171,7 +171,7 @@ static void blend_strip(blend_state *b, const tl_triangle *pieces, int64_t n, in
     if (!(left < right))
         return;
     const int64_t col = (int64_t)left;
-    const tl_window strip = {window->x_px + col, window->y_px + row, (int64_t)right - col, n_rows, bits};
+    const tl_window strip = {window->x_px + col, window->y_px + row, (int64_t)right - col, n_rows, bits, TL_TEST_SAMPLE};
     area_plane plane;
     fetch_pixels(b, row * b->stride + col, n_rows, min64(strip.width, 128));
     place_plane(&strip, &(tl_area){.cells = b->canvas->cells}, &plane);
@@ -194,7 +194,6 @@ static void blend_strip(blend_state *b, const tl_triangle *pieces, int64_t n, in
             vi_store(plane.cells + k * plane.stride + TL_CELL_PAD + i, vi_set1(TL_CELL_ZERO));
 }
 
-#define TL_MAX_PIECES 16 /* seven planes leave a polygon of at most ten corners: eight triangles */
 
 /* Triangle i, all of its pieces as one. */
 static __attribute__((noinline)) void blend_area_alone(blend_state *b, int64_t i)
@@ -213,7 +212,7 @@ static __attribute__((noinline)) void blend_area_alone(blend_state *b, int64_t i
             n_pieces++;
         if (n_pieces == 0)
             return;
-        set = piece_set(pieces);
+        set = piece_set(pieces, &b->scene->mesh);
         corners = pieces->triangles + 3 * first;
     }
     for (int64_t k = 0; k < n_pieces && n < TL_MAX_PIECES; k++) {

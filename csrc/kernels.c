@@ -7,14 +7,21 @@
 #include "clip.c"
 #include "setup.c"
 #include "covered.c"
+#include "samples.c"
 #include "sink.c"
 #include "raster.c"
+#include "bin.c"
 #include "ramp.c"
 #include "ramp_exact.c"
 #include "accumulate.c"
 #include "area.c"
 #include "resolve.c"
 #include "paint.c"
+#include "edges.c"
+#include "line_ends.c"
+#include "smooth_lines.c"
+#include "lines.c"
+#include "mean.c"
 #include "mix.h"
 #include "mix_u8.c"
 #include "mix_f32.c"
@@ -32,10 +39,16 @@ const tl_kernels TL_KERNELS = {
     .first_bad_row = first_bad_row,
     .narrow_triangles = narrow_triangles,
     .draw = draw,
+    .bin = bin,
+    .list_bins = list_bins,
     .draw_area = draw_area,
     .blend = blend,
     .barycentric = barycentric,
     .interpolate = interpolate,
     .paint_flat = paint_flat,
     .paint_gouraud = paint_gouraud,
+    .list_edges = list_edges,
+    .draw_lines = draw_lines,
+    .mean_flat = mean_flat,
+    .mean_colors = mean_colors,
 };

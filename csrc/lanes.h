@@ -6,13 +6,15 @@
  * lanes (TL_LANES = 1) are the definition.  vd_quotients(a, b, q, are_f32) divides three numbers by one, each correctly rounded.
  * Loads and stores need no alignment.  Intrinsics live in lanes_*.h alone.
  *
- *   v?_set1 v?_load v?_store v?_iota v?_add v?_sub v?_mul v?_div v?_min v?_max   as their names say; vi wraps
+ *   v?_set1 v?_load v?_store v?_iota v?_add v?_sub v?_mul v?_div v?_min v?_max vf_sqrt   as their names say; vi wraps
  *   v?_select(m, a, b)      a where m, else b
  *   v?_load_masked, v?_store_masked    touch only the memory of lanes in m
  *   v?_store_some(p, m, a, has_room)   the lanes in m; with room for a whole vector the others may be written as they are
+ *   vi_gather(m, p, i)      p[i] in the lanes of m
  *   vi_compress(p, m, v)    the lanes in m, packed, at p; writes a whole vector
  *   vm_first(n)             the first n lanes, none for n <= 0, all for n >= TL_LANES
  *   v4_, vi_load_quads, vi_store_quads    four int32; TL_LANES of them as four vectors, lane k in slot vi_quad_slot(k)
+ *   vw_zero, vw_load, vw_store, vw_add_range    TL_LANES words of 64 bits
  *   vi_prefix_sum, vi_last  sums of lanes [0, k]; the last lane everywhere
  *   vi_shift_in(a, before)  a one lane up, the last lane of `before` in lane 0
  *   hm_, hf_, hi_, hd_      the few that short rows need, in half vectors of TL_HALF_LANES (0: there are none)

@@ -98,6 +98,7 @@ TL_INLINE vf vf_from_unsigned(vi a)
     const vf high = _mm256_cvtepi32_ps(_mm256_srli_epi32(a, 16)), low = _mm256_cvtepi32_ps(_mm256_and_si256(a, _mm256_set1_epi32(0xffff)));
     return _mm256_add_ps(_mm256_mul_ps(high, _mm256_set1_ps(65536.0f)), low);
 }
+TL_INLINE vi vi_gather(vm m, const int32_t *p, vi i) { return _mm256_mask_i32gather_epi32(_mm256_setzero_si256(), p, i, m, 4); }
 
 TL_INLINE vm vm_and(vm a, vm b) { return _mm256_and_si256(a, b); }
 TL_INLINE vm vm_or(vm a, vm b) { return _mm256_or_si256(a, b); }
@@ -126,6 +127,24 @@ TL_INLINE void bytes_from_bits(uint8_t *p, uint64_t bits)
         _mm256_storeu_si256((__m256i *)(p + 32 * k), _mm256_and_si256(on, one));
     }
 }
+/* TL_LANES words of 64 bits; vw_add_range sets the bits [begin, end) that are in the pattern; begin, end >= 0. */
+typedef struct { __m256i lo, hi; } vw;
+TL_INLINE vw vw_zero(void) { return (vw){_mm256_setzero_si256(), _mm256_setzero_si256()}; }
+TL_INLINE vw vw_load(const uint64_t *p) { return (vw){_mm256_loadu_si256((const __m256i *)p), _mm256_loadu_si256((const __m256i *)(p + 4))}; }
+TL_INLINE void vw_store(uint64_t *p, vw a) { _mm256_storeu_si256((__m256i *)p, a.lo), _mm256_storeu_si256((__m256i *)(p + 4), a.hi); }
+TL_INLINE __m256i bit_range_64(__m128i begin, __m128i end)
+{
+    const __m256i ones = _mm256_set1_epi64x(-1);
+    return _mm256_andnot_si256(_mm256_sllv_epi64(ones, _mm256_cvtepu32_epi64(end)), _mm256_sllv_epi64(ones, _mm256_cvtepu32_epi64(begin)));
+}
+TL_INLINE vw vw_add_range(vw a, vi begin, vi end, uint64_t pattern)
+{
+    const __m256i every = _mm256_set1_epi64x((long long)pattern);
+    const __m256i lo = bit_range_64(_mm256_castsi256_si128(begin), _mm256_castsi256_si128(end));
+    const __m256i hi = bit_range_64(_mm256_extracti128_si256(begin, 1), _mm256_extracti128_si256(end, 1));
+    return (vw){_mm256_or_si256(a.lo, _mm256_and_si256(lo, every)), _mm256_or_si256(a.hi, _mm256_and_si256(hi, every))};
+}
+
 /* Numbers whose bits [begin, end) are set, none where begin >= end; begin >= 0, end in 0..31. */
 TL_INLINE vi vi_bit_ranges(vi begin, vi end)
 {
@@ -147,6 +166,7 @@ TL_INLINE vf vf_add(vf a, vf b) { return _mm256_add_ps(a, b); }
 TL_INLINE vf vf_sub(vf a, vf b) { return _mm256_sub_ps(a, b); }
 TL_INLINE vf vf_mul(vf a, vf b) { return _mm256_mul_ps(a, b); }
 TL_INLINE vf vf_div(vf a, vf b) { return _mm256_div_ps(a, b); }
+TL_INLINE vf vf_sqrt(vf a) { return _mm256_sqrt_ps(a); }
 TL_INLINE vf vf_from_vi(vi a) { return _mm256_cvtepi32_ps(a); }
 TL_INLINE vf vf_select(vm m, vf a, vf b) { return _mm256_blendv_ps(b, a, _mm256_castsi256_ps(m)); }
 TL_INLINE void vf_store(float *p, vf a) { _mm256_storeu_ps(p, a); }
@@ -222,25 +242,26 @@ TL_INLINE vd vd_select(vm m, vd a, vd b)
     const __m256d hi = _mm256_castsi256_pd(_mm256_cvtepi32_epi64(_mm256_extracti128_si256(m, 1)));
     return (vd){_mm256_blendv_pd(b.lo, a.lo, lo), _mm256_blendv_pd(b.hi, a.hi, hi)};
 }
-TL_INLINE vd vd_load(const double *p) { return (vd){_mm256_loadu_pd(p), _mm256_loadu_pd(p + 4)}; }
 TL_INLINE void vd_store(double *p, vd a) { _mm256_storeu_pd(p, a.lo), _mm256_storeu_pd(p + 4, a.hi); }
 
 /* Plain 16-byte loads and transposes in registers: hardware gathers are three times as slow. */
 typedef struct { __m256d even, odd; } vz; /* z of lanes 0,1,4,5 and of 2,3,6,7 */
-TL_INLINE __m256i load_two(const tl_vertex *v, const int32_t *first)
+TL_INLINE __m256i load_two(int step, const tl_vertex *v, const int32_t *first)
 {
     const __m128i *a = (const __m128i *)v;
-    return _mm256_inserti128_si256(_mm256_castsi128_si256(_mm_loadu_si128(a + first[0])), _mm_loadu_si128(a + first[12]), 1);
+    return _mm256_inserti128_si256(_mm256_castsi128_si256(_mm_loadu_si128(a + first[0])), _mm_loadu_si128(a + first[4 * step]), 1);
 }
-TL_INLINE void load_vertices(const tl_vertex *v, const int32_t *first, vi *x, vi *y, vz *z)
+TL_INLINE void load_vertices_by(int step, const tl_vertex *v, const int32_t *first, vi *x, vi *y, vz *z)
 {
-    const __m256i a = load_two(v, first), b = load_two(v, first + 3), c = load_two(v, first + 6), d = load_two(v, first + 9);
+    const __m256i a = load_two(step, v, first), b = load_two(step, v, first + step);
+    const __m256i c = load_two(step, v, first + 2 * step), d = load_two(step, v, first + 3 * step);
     const __m256i ab = _mm256_unpacklo_epi32(a, b), cd = _mm256_unpacklo_epi32(c, d);
     *x = _mm256_unpacklo_epi64(ab, cd);
     *y = _mm256_unpackhi_epi64(ab, cd);
     z->even = _mm256_castsi256_pd(_mm256_unpackhi_epi64(a, b));
     z->odd = _mm256_castsi256_pd(_mm256_unpackhi_epi64(c, d));
 }
+TL_INLINE void load_vertices(const tl_vertex *v, const int32_t *first, vi *x, vi *y, vz *z) { load_vertices_by(3, v, first, x, y, z); }
 TL_INLINE vd vd_from_vz(vz z)
 {
     return (vd){_mm256_permute2f128_pd(z.even, z.odd, 0x20), _mm256_permute2f128_pd(z.even, z.odd, 0x31)};

@@ -81,6 +81,7 @@ TL_INLINE vi vi_prefix_sum(vi a)
 TL_INLINE vi vi_last(vi a) { return _mm512_permutexvar_epi32(_mm512_set1_epi32(15), a); }
 TL_INLINE vi vi_shift_in(vi a, vi before) { return _mm512_alignr_epi32(a, before, 15); }
 TL_INLINE vf vf_from_unsigned(vi a) { return _mm512_cvtepu32_ps(a); }
+TL_INLINE vi vi_gather(vm m, const int32_t *p, vi i) { return _mm512_mask_i32gather_epi32(_mm512_setzero_si512(), m, i, p, 4); }
 
 TL_INLINE vm vm_and(vm a, vm b) { return a & b; }
 TL_INLINE vm vm_or(vm a, vm b) { return a | b; }
@@ -92,6 +93,24 @@ TL_INLINE vm vm_first(int64_t n) { return n >= 16 ? 0xffff : n <= 0 ? 0 : (vm)((
 TL_INLINE vm vm_from_bits(unsigned bits) { return (vm)bits; }
 /* 64 bytes of 0 or 1 */
 TL_INLINE void bytes_from_bits(uint8_t *p, uint64_t bits) { _mm512_storeu_si512(p, _mm512_maskz_set1_epi8(bits, 1)); }
+/* TL_LANES words of 64 bits; vw_add_range sets the bits [begin, end) that are in the pattern; begin, end >= 0. */
+typedef struct { __m512i lo, hi; } vw;
+TL_INLINE vw vw_zero(void) { return (vw){_mm512_setzero_si512(), _mm512_setzero_si512()}; }
+TL_INLINE vw vw_load(const uint64_t *p) { return (vw){_mm512_loadu_si512(p), _mm512_loadu_si512(p + 8)}; }
+TL_INLINE void vw_store(uint64_t *p, vw a) { _mm512_storeu_si512(p, a.lo), _mm512_storeu_si512(p + 8, a.hi); }
+TL_INLINE __m512i bit_range_64(__m256i begin, __m256i end)
+{
+    const __m512i ones = _mm512_set1_epi64(-1);
+    return _mm512_andnot_si512(_mm512_sllv_epi64(ones, _mm512_cvtepu32_epi64(end)), _mm512_sllv_epi64(ones, _mm512_cvtepu32_epi64(begin)));
+}
+TL_INLINE vw vw_add_range(vw a, vi begin, vi end, uint64_t pattern)
+{
+    const __m512i every = _mm512_set1_epi64((long long)pattern);
+    const __m512i lo = bit_range_64(_mm512_castsi512_si256(begin), _mm512_castsi512_si256(end));
+    const __m512i hi = bit_range_64(_mm512_extracti64x4_epi64(begin, 1), _mm512_extracti64x4_epi64(end, 1));
+    return (vw){_mm512_or_si512(a.lo, _mm512_and_si512(lo, every)), _mm512_or_si512(a.hi, _mm512_and_si512(hi, every))};
+}
+
 /* Numbers whose bits [begin, end) are set, none where begin >= end; begin >= 0, end in 0..31. */
 TL_INLINE vi vi_bit_ranges(vi begin, vi end)
 {
@@ -105,6 +124,7 @@ TL_INLINE vf vf_add(vf a, vf b) { return _mm512_add_ps(a, b); }
 TL_INLINE vf vf_sub(vf a, vf b) { return _mm512_sub_ps(a, b); }
 TL_INLINE vf vf_mul(vf a, vf b) { return _mm512_mul_ps(a, b); }
 TL_INLINE vf vf_div(vf a, vf b) { return _mm512_div_ps(a, b); }
+TL_INLINE vf vf_sqrt(vf a) { return _mm512_sqrt_ps(a); }
 TL_INLINE vf vf_from_vi(vi a) { return _mm512_cvtepi32_ps(a); }
 TL_INLINE vf vf_select(vm m, vf a, vf b) { return _mm512_mask_mov_ps(b, m, a); }
 TL_INLINE void vf_store(float *p, vf a) { _mm512_storeu_ps(p, a); }
@@ -169,27 +189,28 @@ TL_INLINE vd vd_select(vm m, vd a, vd b)
 {
     return (vd){_mm512_mask_mov_pd(b.lo, (__mmask8)m, a.lo), _mm512_mask_mov_pd(b.hi, (__mmask8)(m >> 8), a.hi)};
 }
-TL_INLINE vd vd_load(const double *p) { return (vd){_mm512_loadu_pd(p), _mm512_loadu_pd(p + 8)}; }
 TL_INLINE void vd_store(double *p, vd a) { _mm512_storeu_pd(p, a.lo), _mm512_storeu_pd(p + 8, a.hi); }
 
 /* Plain 16-byte loads and transposes in registers: hardware gathers are three times as slow. */
 typedef struct { __m512d even, odd; } vz; /* z of lanes 0,1,4,5,8,9,12,13 and of 2,3,6,7,10,11,14,15 */
-TL_INLINE __m512i load_four(const tl_vertex *v, const int32_t *first)
+TL_INLINE __m512i load_four(int step, const tl_vertex *v, const int32_t *first)
 {
     const __m128i *a = (const __m128i *)v;
-    const __m256i low = _mm256_inserti128_si256(_mm256_castsi128_si256(_mm_loadu_si128(a + first[0])), _mm_loadu_si128(a + first[12]), 1);
-    const __m256i high = _mm256_inserti128_si256(_mm256_castsi128_si256(_mm_loadu_si128(a + first[24])), _mm_loadu_si128(a + first[36]), 1);
+    const __m256i low = _mm256_inserti128_si256(_mm256_castsi128_si256(_mm_loadu_si128(a + first[0])), _mm_loadu_si128(a + first[4 * step]), 1);
+    const __m256i high = _mm256_inserti128_si256(_mm256_castsi128_si256(_mm_loadu_si128(a + first[8 * step])), _mm_loadu_si128(a + first[12 * step]), 1);
     return _mm512_inserti64x4(_mm512_castsi256_si512(low), high, 1);
 }
-TL_INLINE void load_vertices(const tl_vertex *v, const int32_t *first, vi *x, vi *y, vz *z)
+TL_INLINE void load_vertices_by(int step, const tl_vertex *v, const int32_t *first, vi *x, vi *y, vz *z)
 {
-    const __m512i a = load_four(v, first), b = load_four(v, first + 3), c = load_four(v, first + 6), d = load_four(v, first + 9);
+    const __m512i a = load_four(step, v, first), b = load_four(step, v, first + step);
+    const __m512i c = load_four(step, v, first + 2 * step), d = load_four(step, v, first + 3 * step);
     const __m512i ab = _mm512_unpacklo_epi32(a, b), cd = _mm512_unpacklo_epi32(c, d);
     *x = _mm512_unpacklo_epi64(ab, cd);
     *y = _mm512_unpackhi_epi64(ab, cd);
     z->even = _mm512_castsi512_pd(_mm512_unpackhi_epi64(a, b));
     z->odd = _mm512_castsi512_pd(_mm512_unpackhi_epi64(c, d));
 }
+TL_INLINE void load_vertices(const tl_vertex *v, const int32_t *first, vi *x, vi *y, vz *z) { load_vertices_by(3, v, first, x, y, z); }
 TL_INLINE vd vd_from_vz(vz z)
 {
     const __m512i low = _mm512_setr_epi64(0, 1, 8, 9, 2, 3, 10, 11), high = _mm512_setr_epi64(4, 5, 12, 13, 6, 7, 14, 15);

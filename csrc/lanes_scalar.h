@@ -88,6 +88,7 @@ TL_INLINE vi vi_prefix_sum(vi a) { return a; }
 TL_INLINE vi vi_last(vi a) { return a; }
 TL_INLINE vi vi_shift_in(vi a, vi before) { (void)a; return before; }
 TL_INLINE vf vf_from_unsigned(vi a) { return (float)(uint32_t)a; }
+TL_INLINE vi vi_gather(vm m, const int32_t *p, vi i) { return m ? p[i] : 0; }
 
 TL_INLINE vm vm_and(vm a, vm b) { return a & b; }
 TL_INLINE vm vm_or(vm a, vm b) { return a | b; }
@@ -111,6 +112,17 @@ TL_INLINE void bytes_from_bits(uint8_t *p, uint64_t bits)
         memcpy(p + k, &bytes, 8);
     }
 }
+/* A word of 64 bits; vw_add_range sets the bits [begin, end) that are in the pattern; begin, end >= 0. */
+typedef uint64_t vw;
+TL_INLINE vw vw_zero(void) { return 0; }
+TL_INLINE vw vw_load(const uint64_t *p) { return *p; }
+TL_INLINE void vw_store(uint64_t *p, vw a) { *p = a; }
+TL_INLINE vw vw_add_range(vw a, vi begin, vi end, uint64_t pattern)
+{
+    end = end > 64 ? 64 : end;
+    return begin < end ? a | (~0ull << begin & ~0ull >> (64 - end) & pattern) : a;
+}
+
 TL_INLINE vi vi_bit_ranges(vi begin, vi end) { return begin < 31 ? (vi)(~0u << begin & ~(~0u << end)) : 0; }
 
 
@@ -119,6 +131,7 @@ TL_INLINE vf vf_add(vf a, vf b) { return a + b; }
 TL_INLINE vf vf_sub(vf a, vf b) { return a - b; }
 TL_INLINE vf vf_mul(vf a, vf b) { return a * b; }
 TL_INLINE vf vf_div(vf a, vf b) { return a / b; }
+TL_INLINE vf vf_sqrt(vf a) { return sqrtf(a); }
 TL_INLINE vf vf_from_vi(vi a) { return (float)a; }
 TL_INLINE vf vf_select(vm m, vf a, vf b) { return m ? a : b; }
 TL_INLINE void vf_store(float *p, vf a) { *p = a; }
@@ -154,18 +167,19 @@ TL_INLINE vm vd_ge(vd a, vd b) { return a >= b; }
 TL_INLINE vd vd_from_vf(vf a) { return (double)a; }
 TL_INLINE vi vi_round(vd a) { return fabs(a) < 0x1p31 ? (vi)rint(a) : INT32_MIN; }
 TL_INLINE vd vd_select(vm m, vd a, vd b) { return m ? a : b; }
-TL_INLINE vd vd_load(const double *p) { return *p; }
 TL_INLINE void vd_store(double *p, vd a) { *p = a; }
 
-/* The vertices first[3 * lane] of TL_LANES triangles.  z is left in the order of the loads until it is needed. */
+/* The vertices first[step * lane] of TL_LANES pairs or triangles.  z is left in the order of the loads until it is needed. */
 typedef double vz;
-TL_INLINE void load_vertices(const tl_vertex *v, const int32_t *first, vi *x, vi *y, vz *z)
+TL_INLINE void load_vertices_by(int step, const tl_vertex *v, const int32_t *first, vi *x, vi *y, vz *z)
 {
+    (void)step;
     const tl_vertex a = v[first[0]];
     *x = a.x_fx;
     *y = a.y_fx;
     *z = a.z;
 }
+TL_INLINE void load_vertices(const tl_vertex *v, const int32_t *first, vi *x, vi *y, vz *z) { load_vertices_by(3, v, first, x, y, z); }
 TL_INLINE vd vd_from_vz(vz z) { return z; }
 
 /* The first four numbers of TL_LANES rows, as columns; reads up to two numbers past the last row. */

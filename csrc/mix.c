@@ -77,7 +77,7 @@ static void color_partly_covered(blend_state *b, int64_t row, int64_t col, int n
 static void find_piece(blend_state *b, int64_t x_px, int64_t y_px)
 {
     const tl_pieces *p = b->scene->pieces;
-    const tl_vertex_set set = piece_set(p);
+    const tl_vertex_set set = piece_set(p, &b->scene->mesh);
     resolve_state best = b->resolve;
     double best_weight = -INFINITY;
     for (int64_t i = first_piece(p, b->id); i < p->n_pieces && p->source[i] == b->id; i++) {

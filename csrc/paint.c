@@ -4,6 +4,20 @@
 #include <string.h>
 
 #include "fixed.h"
+#include "lanes.h"
+
+/* The first samples of paint_flat whose colours have four bytes, a vector at a time; returns how many. */
+TL_INLINE int64_t paint_words(const int32_t *labels, int64_t n, const uint8_t *colors, uint8_t *restrict out)
+{
+    int64_t k = 0;
+    for (; TL_LANES > 1 && k + TL_LANES <= n; k += TL_LANES) {
+        const vi label = vi_load(labels + k);
+        const vm m = vi_gt(label, vi_set1(-1));
+        if (vm_any(m))
+            vi_store_some((int32_t *)(out + 4 * k), m, vi_gather(m, (const int32_t *)colors, label), 1);
+    }
+    return k;
+}
 
 /* Copies the colour of each labelled sample's triangle; samples with label -1 stay as they are. */
 static void paint_flat(const int32_t *labels, int64_t n, const uint8_t *colors, int pixel_bytes, uint8_t *restrict out)
@@ -20,7 +34,7 @@ static void paint_flat(const int32_t *labels, int64_t n, const uint8_t *colors, 
                 memcpy(out + 3 * k, colors + 3 * (int64_t)labels[k], 3);
         return;
     case 4:
-        for (int64_t k = 0; k < n; k++)
+        for (int64_t k = paint_words(labels, n, colors, out); k < n; k++)
             if (labels[k] >= 0)
                 memcpy(out + 4 * k, colors + 4 * (int64_t)labels[k], 4);
         return;

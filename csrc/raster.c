@@ -6,6 +6,8 @@
 #include "alone.c"
 #include "batch.c"
 #include "rows.c"
+#include "sampled.c"
+#include "sampled_alone.c"
 
 /* Whether the 3 * TL_LANES indices of a vector of triangles hold one outside [0, last_vertex]. */
 TL_INLINE int has_bad_index(const int32_t *corners, vi last_vertex)
@@ -14,17 +16,22 @@ TL_INLINE int has_bad_index(const int32_t *corners, vi last_vertex)
     return vm_any(vm_or(bad01, vi_gt_unsigned(vi_load(corners + 2 * TL_LANES), last_vertex)));
 }
 
-TL_INLINE vi first_centre_lanes(vi x_fx, int bits)
-{
-    const int round = bits ? (1 << (bits - 1)) - 1 : 0; /* the first centre at or right of x_fx, as first_centre */
-    return vi_shift_right(vi_add(x_fx, vi_set1(round)), bits);
-}
+/* As round_extent tells. */
+TL_INLINE vi extent_pixels(vi x_fx, int32_t round, int bits) { return vi_shift_right(vi_add(x_fx, vi_set1(round)), bits); }
 
 /* Lists triangles for the passes that draw the rest of the picture. */
 TL_INLINE void list_others(tl_share *share, vm m, vi id)
 {
     vi_compress(share->others + share->n_others, m, id);
     share->n_others += __builtin_popcount(vm_bits(m));
+}
+
+TL_INLINE void draw_one(const tl_scene *scene, int64_t i, const tl_window *window, const tl_target *target, tl_sink sink)
+{
+    if (sink == TL_SINK_SAMPLES)
+        draw_alone_each_sample(scene, i, window, target);
+    else
+        TL_SINK_CALL(draw_alone, sink, scene, i, window, target)
 }
 
 /* Setup and cull of TL_LANES triangles. */
@@ -48,14 +55,14 @@ TL_INLINE void draw_batch(batch_state *s, tl_sink sink, const int32_t *corners, 
     const vi width = vi_sub(x_max, x_min), height = vi_sub(y_max, y_min);
     /* a special vertex has x = INT32_MIN: its triangle is too wide, or special throughout */
     vm alone = vm_or(vi_gt_unsigned(width, vi_set1(limits->max_extent)), vi_gt_unsigned(height, vi_set1(limits->max_extent)));
-    alone = vm_and(live, vm_or(alone, vi_eq(x_min, vi_set1(TL_SPECIAL))));
+    alone = vm_and(live, vm_or(alone, vi_eq(x_min, vi_set1(limits->special_x))));
     const vi area = area_lanes(&c), absolute = either_turn ? vi_max(area, vi_sub(zero, area)) : area;
     vm drawn = vm_and_not(vm_and(live, vi_gt(absolute, zero)), alone);
     if (!vm_any(vm_or(drawn, alone)))
         return;
-    const vi col = vi_max(first_centre_lanes(x_min, bits), vi_set1(limits->left));
-    const vi n_cols = vi_sub(vi_min(first_centre_lanes(x_max, bits), vi_set1(limits->right)), col);
-    const vi top = first_centre_lanes(y_min, bits), bottom = first_centre_lanes(y_max, bits), row = vi_max(top, vi_set1(limits->top));
+    const vi col = vi_max(extent_pixels(x_min, limits->round.first, bits), vi_set1(limits->left));
+    const vi n_cols = vi_sub(vi_min(extent_pixels(x_max, limits->round.end, bits), vi_set1(limits->right)), col);
+    const vi top = extent_pixels(y_min, limits->round.first, bits), bottom = extent_pixels(y_max, limits->round.end, bits), row = vi_max(top, vi_set1(limits->top));
     const vi n_rows = vi_sub(vi_min(bottom, vi_set1(limits->bottom)), row);
     if (s->share->others) {
         const vi first = vi_max(top, vi_set1(limits->picture_top)), end = vi_min(bottom, vi_set1(limits->picture_bottom));
@@ -79,7 +86,7 @@ TL_INLINE void draw_batch(batch_state *s, tl_sink sink, const int32_t *corners, 
         int32_t ids[TL_MAX_LANES];
         vi_store(ids, id);
         for (unsigned lanes = vm_bits(alone); lanes; lanes &= lanes - 1)
-            TL_SINK_CALL(draw_alone, sink, s->scene, ids[__builtin_ctz(lanes)], s->window, s->target)
+            draw_one(s->scene, ids[__builtin_ctz(lanes)], s->window, s->target, sink);
     }
     if (!vm_any(drawn))
         return;
@@ -136,6 +143,9 @@ TL_INLINE void draw_batches(const tl_scene *scene, const tl_window *window, cons
     s.small.n = s.middle.n = s.rows.n = s.fragments.n = 0;
     memset(s.fragments.sample, 0, sizeof s.fragments.sample); /* what is prefetched behind the end of the list */
     const int bits = window->subpixel_bits, is_back = scene->cull == TL_CULL_BACK;
+    const int is_centre = window->test == TL_TEST_SAMPLE && sink != TL_SINK_SAMPLES;
+    const int32_t reach = sink == TL_SINK_SAMPLES ? sample_reach(target) : 0;
+    const extent_rounding round = round_extent(window);
     const int64_t farthest = (int64_t)1 << 30;
     const tl_window *picture = share->others ? share->picture : window;
     s.limits = (batch_limits){
@@ -145,7 +155,9 @@ TL_INLINE void draw_batches(const tl_scene *scene, const tl_window *window, cons
         .bottom = (int32_t)min64(window->y_px + window->height, farthest),
         .picture_top = (int32_t)picture->y_px,
         .picture_bottom = (int32_t)min64(picture->y_px + picture->height, farthest),
-        .max_extent = TL_MAX_BOX_PX << (bits < 8 ? bits : 8),
+        .max_extent = (TL_MAX_BOX_PX - (is_centre ? 0 : 2)) << (bits < 8 ? bits : 8),
+        .round = {round.first - reach, round.end + reach},
+        .special_x = (int32_t)((uint32_t)TL_SPECIAL - (uint32_t)scene->mesh.sample_x_fx),
         .second = is_back ? 2 : 1,
         .third = is_back ? 1 : 2,
         .last_vertex = vi_set1((int32_t)(scene->mesh.n_vertices - 1)),
@@ -168,7 +180,8 @@ TL_INLINE void draw_scene(const tl_scene *scene, const tl_window *window, const 
 {
     const int64_t farthest = (int64_t)1 << 30;
     const int is_near = window->x_px > -farthest && window->x_px < farthest && window->y_px > -farthest && window->y_px < farthest;
-    if (scene->method == TL_METHOD_AUTO && is_near) {
+    const int is_centre = window->test == TL_TEST_SAMPLE && sink != TL_SINK_SAMPLES, fits_lanes = is_centre || window->subpixel_bits <= 8;
+    if (scene->method == TL_METHOD_AUTO && is_near && fits_lanes) {
         draw_batches(scene, window, target, share, bad_row, sink);
         return;
     }
@@ -176,7 +189,7 @@ TL_INLINE void draw_scene(const tl_scene *scene, const tl_window *window, const 
     if (*bad_row >= 0)
         return;
     for (int64_t i = 0; i < scene->n_triangles; i++)
-        TL_SINK_CALL(draw_alone, sink, scene, i, window, target)
+        draw_one(scene, i, window, target, sink);
 }
 
 TL_SINK_COPIES(draw_scene, (const tl_scene *scene, const tl_window *window, const tl_target *target, tl_share *share, int64_t *bad_row),
@@ -186,8 +199,9 @@ TL_SINK_COPIES(draw_scene, (const tl_scene *scene, const tl_window *window, cons
 static void clear(const tl_window *window, const tl_target *target)
 {
     const float farthest = target->sink == TL_SINK_FARTHEST ? -INFINITY : INFINITY;
-    if (target->sink == TL_SINK_MASK) {
-        memset(target->covered, 0, (size_t)tl_covered_words(target->stride_px * window->height) * sizeof(uint64_t));
+    if (target->sink == TL_SINK_MASK || target->sink == TL_SINK_SAMPLES) {
+        const int64_t n_bits = target->stride_px * window->height << target->sample_bits;
+        memset(target->covered, 0, (size_t)tl_covered_words(n_bits) * sizeof(uint64_t));
         return;
     }
     for (int64_t row = 0; row < window->height; row++) {
@@ -219,6 +233,8 @@ static int64_t draw(const tl_scene *scene, const tl_window *window, const tl_tar
             return bad_row;
         if (target->sink == TL_SINK_MASK && share->is_last)
             expand_covered(&band, &part);
+        if (target->sink == TL_SINK_SAMPLES && share->is_last)
+            share_samples(&band, &part);
     }
     return -1;
 }

@@ -69,7 +69,7 @@ static int find_triangle(resolve_state *s, const tl_scene *scene, int64_t id, in
     if (!scene->pieces)
         return 0;
     const tl_pieces *p = scene->pieces;
-    const tl_vertex_set cut = piece_set(p);
+    const tl_vertex_set cut = piece_set(p, &scene->mesh);
     for (int64_t i = first_piece(p, id); i < p->n_pieces && p->source[i] == id; i++) {
         if (!load_resolved(s, &cut, p->triangles + 3 * i) || !covers(&s->triangle, x_px, y_px, bits))
             continue;

@@ -4,11 +4,18 @@
  * An edge ends a row at floor(v / d), v = E' at the row's first sample, d = |dy|.  It is computed in float32 as
  * floor((v + 0.5) * (1 / d)), exactly: v + 0.5 has at most 22 bits; with |v / d| < 64 the two roundings err by less than
  * 64 * 2^-22 = 2^-16, while (v + 0.5) / d is at least 0.5 / d > 2^-15 from an integer.  Farther out the clamp to the box
- * swallows the error. */
+ * swallows the error.  Squares (batch.c): 60 pixels of 2^8 make |v| < 2^22, which float32 still holds exactly, half included. */
 #include "fixed.h"
 #include "lanes.h"
 
-/* The left and right edge of TL_LANES triangles, and the third one, which is on either side or horizontal. */
+/* Which edge of TL_LANES triangles is the first on the left, the first on the right, and the third one, which is on either side or
+ * horizontal: edge 0 or 1 by is0 and is1 of that place, else edge 2. */
+typedef struct {
+    vm is0[3], is1[3];
+    vm third_is_left, third_is_right;
+} lane_sides;
+
+/* These edges. */
 typedef struct {
     vf start[3], step[3], inverse[3]; /* left, right, third */
     vm third_is_left, third_is_right;
@@ -21,33 +28,43 @@ typedef struct {
     double z0[TL_MAX_LANES], slope_x[TL_MAX_LANES], slope_y[TL_MAX_LANES], x[TL_MAX_LANES], y[TL_MAX_LANES];
 } row_edges;
 
-TL_INLINE void sort_edges(const lane_triangles *t, lane_edges *r)
+TL_INLINE lane_sides find_sides(const lane_triangles *t)
 {
-    const vi zero = vi_set1(0);
     vm left[3], right[3];
-    vf start[3], step[3], inverse[3];
     for (int k = 0; k < 3; k++) {
-        left[k] = vi_gt(zero, t->dy[k]);
-        right[k] = vi_gt(t->dy[k], zero);
-        start[k] = vf_add(vf_from_vi(t->e[k]), vf_set1(0.5f));
-        step[k] = vf_from_vi(t->dx[k]);
-        /* a horizontal edge is never asked: 1 keeps infinities away */
-        inverse[k] = vf_div(vf_set1(1.0f), vf_from_vi(vi_max(vi_max(t->dy[k], vi_sub(zero, t->dy[k])), vi_set1(1))));
+        left[k] = vi_gt(vi_set1(0), t->dy[k]);
+        right[k] = vi_gt(t->dy[k], vi_set1(0));
     }
-    /* the first left edge, the first right edge, and what remains */
     const vm third0 = vm_and_not(vm_and_not(vm_all(), left[0]), right[0]);
     const vm taken1 = vm_or(vm_and_not(left[1], left[0]), vm_and_not(right[1], right[0]));
     const vm third1 = vm_and_not(vm_and_not(vm_all(), taken1), third0);
-    const vm by_side[3][2] = {{left[0], left[1]}, {right[0], right[1]}, {third0, third1}};
+    const vm third2 = vm_and_not(vm_and_not(vm_all(), third0), third1);
+    return (lane_sides){
+        {left[0], right[0], third0},
+        {left[1], right[1], third1},
+        vm_or(vm_and(third1, left[1]), vm_and(third2, left[2])),
+        vm_or(vm_and(third1, right[1]), vm_and(third2, right[2])),
+    };
+}
+
+TL_INLINE void sort_edges(const lane_triangles *t, lane_edges *r)
+{
+    const lane_sides sides = find_sides(t);
+    vf start[3], step[3], inverse[3];
+    for (int k = 0; k < 3; k++) {
+        start[k] = vf_add(vf_from_vi(t->e[k]), vf_set1(0.5f));
+        step[k] = vf_from_vi(t->dx[k]);
+        /* a horizontal edge is never asked: 1 keeps infinities away */
+        inverse[k] = vf_div(vf_set1(1.0f), vf_from_vi(vi_max(vi_max(t->dy[k], vi_sub(vi_set1(0), t->dy[k])), vi_set1(1))));
+    }
     for (int side = 0; side < 3; side++) {
-        const vm is0 = by_side[side][0], is1 = by_side[side][1];
+        const vm is0 = sides.is0[side], is1 = sides.is1[side];
         r->start[side] = vf_select(is0, start[0], vf_select(is1, start[1], start[2]));
         r->step[side] = vf_select(is0, step[0], vf_select(is1, step[1], step[2]));
         r->inverse[side] = vf_select(is0, inverse[0], vf_select(is1, inverse[1], inverse[2]));
     }
-    const vm third2 = vm_and_not(vm_and_not(vm_all(), third0), third1);
-    r->third_is_left = vm_or(vm_and(third1, left[1]), vm_and(third2, left[2]));
-    r->third_is_right = vm_or(vm_and(third1, right[1]), vm_and(third2, right[2]));
+    r->third_is_left = sides.third_is_left;
+    r->third_is_right = sides.third_is_right;
 }
 
 TL_INLINE void store_edges(const lane_edges *e, row_edges *r)
@@ -170,6 +187,10 @@ TL_INLINE void setup_middle(tl_sink sink, const lane_triangles *t, const lane_pl
 
 TL_INLINE void flush_middle(batch_state *s, tl_sink sink)
 {
+    if (sink == TL_SINK_SAMPLES) {
+        flush_middle_of_samples(s);
+        return;
+    }
     const tl_target target = *s->target; /* a copy that no store can change */
     const double unit2 = (double)(2 << s->window->subpixel_bits);
     box_queue *q = &s->middle;
@@ -209,6 +230,10 @@ TL_SINK_COPIES(flush_middle, (batch_state *s), s)
 
 TL_INLINE void flush_rows(batch_state *s, tl_sink sink)
 {
+    if (sink == TL_SINK_SAMPLES) {
+        flush_rows_of_samples(s);
+        return;
+    }
     box_queue *q = &s->rows;
     const int n = q->n;
     q->n = 0;

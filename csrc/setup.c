@@ -20,11 +20,18 @@ typedef struct {
     double slope_x, slope_y;
 } tl_triangle;
 
-/* Number of pixel centres left of x_fx, counted from pixel 0: the first centre at or right of it. */
-static inline int64_t first_centre(int64_t x_fx, int bits)
+/* What turns an extent [low, high] into pixels: those from (low + first) >> bits on, up to (high + end) >> bits. */
+typedef struct {
+    int32_t first, end;
+} extent_rounding;
+
+/* The centres at or right of low and left of high; the squares that the extent meets in more than a line; those inside it. */
+static inline extent_rounding round_extent(const tl_window *window)
 {
-    const int64_t unit = (int64_t)1 << bits, whole = x_fx >> bits, rest = x_fx & (unit - 1);
-    return whole + (2 * rest > unit);
+    const int32_t unit = (int32_t)1 << window->subpixel_bits, half = unit > 1 ? unit / 2 - 1 : 0;
+    if (window->test == TL_TEST_SAMPLE)
+        return (extent_rounding){half, half};
+    return window->test == TL_TEST_OUTER ? (extent_rounding){0, unit - 1} : (extent_rounding){unit - 1, 0};
 }
 
 static inline int64_t min64(int64_t a, int64_t b) { return a < b ? a : b; }
@@ -35,7 +42,8 @@ static inline int64_t max3(int64_t a, int64_t b, int64_t c) { return max64(max64
 static inline tl_wide vertex_fx(const tl_vertex_set *set, int32_t i)
 {
     const tl_vertex v = set->vertices[i];
-    return v.x_fx == TL_SPECIAL ? set->wide[i] : (tl_wide){v.x_fx, v.y_fx};
+    const tl_wide p = v.x_fx == TL_SPECIAL ? set->wide[i] : (tl_wide){v.x_fx, v.y_fx};
+    return (tl_wide){p.x_fx - set->sample_x_fx, p.y_fx - set->sample_y_fx};
 }
 
 /* The doubled edge function from corner a to corner b at the centre of a picture pixel, unbiased. */
@@ -89,17 +97,18 @@ static inline int load_triangle(const tl_vertex_set *set, const int32_t *corners
     return sign;
 }
 
-/* The box of pixel centres inside the triangle's extent and the window.  Half-open on the right and at the bottom: no
- * centre exactly at the largest x or y can be covered under the top-left rule.  Returns whether any is left. */
+/* The box of pixels in the triangle's extent and the window.  Half-open on the right and at the bottom: no centre exactly at
+ * the largest x or y can be covered under the top-left rule.  Returns whether any is left. */
 static inline int clip_box(tl_triangle *t, const tl_window *window)
 {
     const int bits = window->subpixel_bits;
     const int64_t x0 = min3(t->x_fx[0], t->x_fx[1], t->x_fx[2]), x1 = max3(t->x_fx[0], t->x_fx[1], t->x_fx[2]);
     const int64_t y0 = min3(t->y_fx[0], t->y_fx[1], t->y_fx[2]), y1 = max3(t->y_fx[0], t->y_fx[1], t->y_fx[2]);
-    t->col0 = max64(first_centre(x0, bits) - window->x_px, 0);
-    t->col1 = min64(first_centre(x1, bits) - window->x_px, window->width);
-    t->row0 = max64(first_centre(y0, bits) - window->y_px, 0);
-    t->row1 = min64(first_centre(y1, bits) - window->y_px, window->height);
+    const extent_rounding round = round_extent(window);
+    t->col0 = max64(((x0 + round.first) >> bits) - window->x_px, 0);
+    t->col1 = min64(((x1 + round.end) >> bits) - window->x_px, window->width);
+    t->row0 = max64(((y0 + round.first) >> bits) - window->y_px, 0);
+    t->row1 = min64(((y1 + round.end) >> bits) - window->y_px, window->height);
     return t->col0 < t->col1 && t->row0 < t->row1;
 }
 

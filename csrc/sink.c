@@ -1,5 +1,5 @@
 /* Sinks: what covered samples do to the buffers.  The walkers know nothing of what is drawn.
- * In: lanes, spans or lists of samples.  Out: mask, counts, or ids with depth.
+ * In: lanes, spans or lists of samples.  Out: mask, counts, bits of samples, or ids with depth.
  * Every sink gives the same picture in whatever order triangles come: ids decide ties.  `sink` is always a constant, so that
  * each copy of the code keeps one case. */
 #include "fixed.h"
@@ -29,7 +29,8 @@ typedef struct {
     TL_SINK_COPY(f, label, TL_SINK_LABEL, declared, __VA_ARGS__)             \
     TL_SINK_COPY(f, paint, TL_SINK_PAINT, declared, __VA_ARGS__)             \
     TL_SINK_COPY(f, nearest, TL_SINK_NEAREST, declared, __VA_ARGS__)         \
-    TL_SINK_COPY(f, farthest, TL_SINK_FARTHEST, declared, __VA_ARGS__)
+    TL_SINK_COPY(f, farthest, TL_SINK_FARTHEST, declared, __VA_ARGS__)       \
+    TL_SINK_COPY(f, samples, TL_SINK_SAMPLES, declared, __VA_ARGS__)
 #define TL_SINK_CALL(f, sink, ...)                                           \
     switch (sink) {                                                          \
     case TL_SINK_MASK: f##_mask(__VA_ARGS__); break;                         \
@@ -37,7 +38,8 @@ typedef struct {
     case TL_SINK_LABEL: f##_label(__VA_ARGS__); break;                       \
     case TL_SINK_PAINT: f##_paint(__VA_ARGS__); break;                       \
     case TL_SINK_NEAREST: f##_nearest(__VA_ARGS__); break;                   \
-    default: f##_farthest(__VA_ARGS__); break;                               \
+    case TL_SINK_FARTHEST: f##_farthest(__VA_ARGS__); break;                 \
+    default: f##_samples(__VA_ARGS__); break;                                \
     }
 
 TL_INLINE int sink_has_depth(tl_sink sink)
@@ -89,6 +91,10 @@ TL_INLINE void put_plain(const tl_target *target, tl_sink sink, int64_t at, int6
     }
     if (sink == TL_SINK_BLEND) {
         mix_run(target->pixels, at, n);
+        return;
+    }
+    if (sink == TL_SINK_SAMPLES) {
+        cover_samples(target, at, n);
         return;
     }
     int32_t *pixels = (int32_t *)target->pixels + at;
@@ -204,6 +210,9 @@ TL_INLINE void flush_fragments(const tl_target *target, tl_sink sink, const frag
         }
         if (sink == TL_SINK_MASK) {
             target->covered[at >> 6] |= 1ull << (at & 63);
+        } else if (sink == TL_SINK_SAMPLES) {
+            const int64_t bit = at << target->sample_bits;
+            target->covered[bit >> 6] |= (uint64_t)(uint32_t)f->id[k] << (bit & 63); /* a bit a sample */
         } else if (sink == TL_SINK_COUNT) {
             pixels[at]++;
         } else if (sink == TL_SINK_LABEL) {

@@ -47,6 +47,7 @@ typedef struct {
     const double *inv_w;     /* 1/w per vertex, or NULL: see `source` */
     const tl_source *source; /* where w comes from when inv_w is NULL; NULL as well: all equal (pixel space) */
     int64_t n_vertices;
+    int32_t sample_x_fx, sample_y_fx; /* the sample from the pixel's centre, which vertices are seen from: |.| <= half a pixel */
 } tl_vertex_set;
 
 /* How many vertices of each special kind a vertex stage has seen, used by a triangle or not. */
@@ -78,11 +79,16 @@ typedef struct {
 
 /* ---- drawing ------------------------------------------------------------------------------------------- */
 
+/* When a triangle covers a pixel: when it holds the sample, when it meets the pixel's square in positive area, or when it holds
+ * the whole square.  The last two have no depth and no order: they draw masks and counts. */
+typedef enum { TL_TEST_SAMPLE = 0, TL_TEST_OUTER = 1, TL_TEST_INNER = 2 } tl_test;
+
 /* The part of the picture that a buffer shows, in whole pixels. */
 typedef struct {
     int64_t x_px, y_px; /* picture pixel of column 0, row 0 */
     int64_t width, height;
     int subpixel_bits;
+    tl_test test;
 } tl_window;
 
 typedef enum { TL_CULL_NONE = 0, TL_CULL_BACK = 1, TL_CULL_FRONT = 2 } tl_cull;
@@ -96,7 +102,8 @@ typedef enum {
     TL_SINK_PAINT = 3,    /* the same, and float = depth */
     TL_SINK_NEAREST = 4,  /* id and depth where depth < what is there; at equal depth the lower id */
     TL_SINK_FARTHEST = 5, /* id and depth where depth > what is there; at equal depth the lower id */
-    TL_SINK_BLEND = 6,    /* the colour of the triangle that `blend` draws; not for draw */
+    TL_SINK_SAMPLES = 6,  /* float: the share of samples that are covered; bits in `covered` until the last pass */
+    TL_SINK_BLEND = 7,    /* the colour of the triangle that `blend` draws; not for draw */
 } tl_sink;
 
 typedef struct {
@@ -105,7 +112,10 @@ typedef struct {
     float *depth; /* PAINT, NEAREST, FARTHEST; the same stride */
     int64_t stride_px;
     int64_t n_samples; /* from the first sample to the last, set by draw */
-    uint64_t *covered; /* MASK: tl_covered_words(stride_px * height of the window), at most of 2^31 samples */
+    uint64_t *covered; /* MASK, SAMPLES: tl_covered_words(samples of stride_px * height of the window), at most 2^31 pixels */
+    int sample_bits;           /* SAMPLES: 2^sample_bits samples a pixel, 1 to 4; stride_px is the width of the window */
+    const int32_t *samples_fx; /* (2^sample_bits, 2): x, y of each from the pixel's centre */
+    int sample;                /* the one that is being drawn; draw knows */
 } tl_target;
 
 /* A bit a sample, and a word behind the end. */
@@ -130,6 +140,21 @@ typedef struct {
     const tl_window *picture; /* what all the passes draw; read when there are `others` */
     int is_first, is_last;    /* of the passes over the window: the first clears it */
 } tl_share;
+
+/* The triangles that reach into a window, and the first and last band of rows of each. */
+typedef struct {
+    int64_t n;
+    int32_t *ids, *first_band, *last_band; /* n_triangles + 16 numbers each */
+} tl_bins;
+
+/* What is averaged of the samples' colours: uint8 values become light and back in 65537 steps; alpha, behind the first n_channels,
+ * does not.  With straight alpha colours count as much as they are opaque. */
+typedef struct {
+    const int32_t *decode; /* (256,), 0 to 65536; NULL: the values as they are */
+    const uint8_t *encode; /* (65537,) */
+    int n_channels;        /* of colour */
+    int is_straight;       /* channel n_channels is alpha, and colours have not been multiplied by it */
+} tl_transfer;
 
 /* Where exact areas go.  `cells` is memory between the edges and the pixels: tl_area_stride(width) numbers a row, int32 that
  * are all TL_CELL_CLEAR, or int64 that are all 0 when is_wide.  They are left as they were found. */
@@ -179,6 +204,31 @@ static inline int64_t tl_blend_cells(int64_t width)
     return atlas > strip ? atlas : strip;
 }
 
+/* ---- lines --------------------------------------------------------------------------------------------- */
+
+typedef struct {
+    tl_vertex_set mesh;
+    const tl_view *view;  /* for edges with a TL_CLIPPED end; NULL in pixel space */
+    const int32_t *edges; /* (n_edges, 2) into the vertices */
+    int64_t n_edges;
+} tl_edges;
+
+/* What listing edges needs besides. */
+typedef struct {
+    int64_t *starts;   /* (n_vertices + 1,) */
+    int32_t *last_low; /* (n_vertices,) */
+    int32_t *highs;    /* (3 * n_triangles,) */
+} tl_edge_scratch;
+
+typedef struct {
+    int is_smooth;      /* float32 coverage; otherwise uint8, 1 where a line is */
+    void *pixels;       /* rows of stride_px */
+    const float *depth; /* what hides lines, the same stride, or NULL */
+    double depth_bias;  /* how far behind it a line still shows */
+    int is_farthest;    /* the larger depth is the nearer one */
+    int64_t stride_px;
+} tl_line_target;
+
 /* ---- the kernel table ---------------------------------------------------------------------------------- */
 
 typedef struct tl_kernels {
@@ -210,6 +260,14 @@ typedef struct tl_kernels {
      * other beats.  A share of a part needs method AUTO, a picture of less than 2^31 samples within 2^30 pixels of 0. */
     int64_t (*draw)(const tl_scene *scene, const tl_window *window, const tl_target *target, tl_share *share);
 
+    /* Lists the triangles that are in the window or within reach_fx of it, with their bands of 2^band_bits rows; they may be a few
+     * too many.  Returns as `draw` does; the window as for a share of a part. */
+    int64_t (*bin)(const tl_scene *scene, const tl_window *window, int32_t reach_fx, int band_bits, tl_bins *bins);
+
+    /* The same by band: starts[k] to starts[k + 1] are the places of those of band k in `listed`.  `starts` has n_bands + 2 numbers.
+     * A first call with listed = NULL sets starts[n_bands + 1] to the length of `listed`. */
+    void (*list_bins)(const tl_bins *bins, int64_t n_bands, int64_t *starts, int32_t *listed);
+
     /* The exact area that triangles cover of each pixel, their sum; the window has fewer than 2^31 cells.  Returns as `draw`
      * does, or TL_AREA_OVERFLOW; either way the pixels are then worthless. */
     int64_t (*draw_area)(const tl_scene *scene, const tl_window *window, const tl_area *target);
@@ -229,6 +287,20 @@ typedef struct tl_kernels {
     void (*paint_flat)(const int32_t *labels, int64_t n, const uint8_t *colors, int pixel_bytes, uint8_t *pixels);
     void (*paint_gouraud)(const tl_scene *scene, const tl_window *window, const int32_t *labels, const void *colors, int n_channels,
                           int is_u8, void *pixels);
+
+    /* The mean colour of the samples of n pixels: from planes of labels and the colours of the triangles, or from planes of colours.
+     * Planes lie `stride` pixels apart; transfer is NULL where all channels are averaged as they are. */
+    void (*mean_flat)(const int32_t *labels, int sample_bits, int64_t stride, int64_t n, const void *colors, int n_channels, int is_u8,
+                      const tl_transfer *transfer, void *pixels);
+    void (*mean_colors)(const void *colors, int sample_bits, int64_t stride, int64_t n, int n_channels, int is_u8,
+                        const tl_transfer *transfer, void *pixels);
+
+    /* The edges of the triangles that are not culled, each once, as lower index + 2^32 * higher index; room for three a
+     * triangle.  Returns the first row with an index outside the vertices, or -1. */
+    int64_t (*list_edges)(const tl_scene *scene, const tl_edge_scratch *scratch, uint64_t *edges, int64_t *n_edges);
+
+    /* Clears the window's pixels and draws lines. */
+    void (*draw_lines)(const tl_edges *lines, const tl_window *window, const tl_line_target *target);
 } tl_kernels;
 
 #endif

@@ -3,7 +3,9 @@
  *
  * Both walk E' = (2E + bias) >> (bits + 1), bias -1 on edges that are neither top nor left.  2E changes by multiples of
  * 2^(bits+1) from sample to sample, so the floor keeps its sign at every sample, and E' changes by exactly -dy a column
- * and dx a row. */
+ * and dx a row.  Squares are tested at one corner an edge: the square meets the triangle only where the corner that lies
+ * farthest inside does not lie on the edge or outside, and is held by it only where the one farthest outside does.  No more
+ * is needed: with the box, these are all the axes that can separate the two. */
 
 typedef struct {
     TL_INT value[3]; /* E' at the first sample of the box, >= 0 inside */
@@ -19,12 +21,20 @@ static inline TL_WALK(edges) TL_WALK(setup_edges)(const tl_triangle *t, const tl
     for (int k = 0; k < 3; k++) {
         const int next = k == 2 ? 0 : k + 1;
         const TL_INT dx = (TL_INT)t->x_fx[next] - t->x_fx[k], dy = (TL_INT)t->y_fx[next] - t->y_fx[k];
+        e.dx[k] = dx;
+        e.dy[k] = dy;
+        if (window->test != TL_TEST_SAMPLE) { /* no farther than a pixel outside the extent: |E| < 2^63 or 2^127 */
+            const int is_outer = window->test == TL_TEST_OUTER;
+            const TL_INT x = ((TL_INT)(t->col0 + window->x_px) + (is_outer == (dy < 0))) * ((TL_INT)1 << bits);
+            const TL_INT y = ((TL_INT)(t->row0 + window->y_px) + (is_outer == (dx > 0))) * ((TL_INT)1 << bits);
+            const TL_UINT corner = (TL_UINT)dx * (TL_UINT)(y - t->y_fx[k]) - (TL_UINT)dy * (TL_UINT)(x - t->x_fx[k]);
+            e.value[k] = ((TL_INT)corner - is_outer) >> bits;
+            continue;
+        }
         const int top_left = dy < 0 || (dy == 0 && dx > 0);
         const TL_UINT doubled = (TL_UINT)dx * (TL_UINT)(py - (TL_INT)t->y_fx[k] * 2) -
                                 (TL_UINT)dy * (TL_UINT)(px - (TL_INT)t->x_fx[k] * 2);
         e.value[k] = ((TL_INT)doubled - !top_left) >> (bits + 1);
-        e.dx[k] = dx;
-        e.dy[k] = dy;
     }
     return e;
 }

@@ -1,5 +1,7 @@
 """Every verb against the exact reference: `==` for integers, a derived bound for floats."""
 
+from math import gcd
+
 import comparing
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ from strategies import (
     fan,
     floor,
     jittered_grid,
+    partner,
     pixel_scenes,
     soup,
     sphere_round_the_eye,
@@ -148,6 +151,23 @@ def test_rasterize_sloping_depths_within_bound(make, depth_test):
         comparing.check_fragments(with_depth(scene, rng), depth_test)
 
 
+def far_slivers(rng, n=30, side=20):
+    """Triangles of three halves of a square sub-pixel round a pixel's centre, 2**36 pixels long: E beyond 2**53."""
+    corners = []
+    for _ in range(n):
+        a, b = (int(rng.integers(-(2**bits), 2**bits)) | 1 for bits in (44, 12))
+        b += next(k for k in range(0, 1000, 2) if gcd(a, b + k) == 1)
+        u, v = np.array([a, b]), np.array(partner(a, b))
+        corners.append(rng.integers(0, side, 2) * 256 + 128 + np.array([u, v, -u - v])[:, :: rng.choice([1, -1])])
+    return soup(np.concatenate(corners) / 256, (side, side))
+
+
+@DEPTH_TEST
+def test_rasterize_far_slivers_within_bound(depth_test):
+    for scene, rng in scenes(far_slivers, 6):
+        comparing.check_fragments(with_depth(scene, rng), depth_test)
+
+
 @DEPTH_TEST
 @CLIP
 def test_rasterize_clip_space_depths_within_bound(make, depth_test):
@@ -221,6 +241,26 @@ def test_fill_gouraud_uint8_equals_reference(make):
     for scene, rng in scenes(make, 6):
         colors = rng.integers(0, 256, (len(scene.vertices), rng.integers(1, 5)), np.uint8)
         comparing.check_fill_uint8(scene, colors, "vertex")
+
+
+@pytest.mark.parametrize("exponent", [2, 8, 20, 24, 30, 45, 51])
+def test_fill_gouraud_uint8_ties_of_large_triangles_equal_reference(exponent):
+    rng = np.random.default_rng(exponent)
+    for shift in (0.5, 3.5, 3.5 - 1 / 256, 3.5 + 1 / 256):
+        reach = int(rng.integers(2**exponent, 2 ** (exponent + 1)))
+        corner = reach * np.array([[-1, -1], [1, -1], [-1, 3]])  # values change with x alone, and tie in its middle
+        first, second = rng.integers(0, 256, (2, 4))
+        colors = np.array([first, second | 1 ^ first & 1, first], np.uint8)
+        comparing.check_fill_uint8(soup(corner + [shift, 0], (8, 3)), colors, "vertex")
+
+
+def test_fill_gouraud_uint8_ties_that_float64_misses_equal_reference():
+    rng = np.random.default_rng(0)
+    for tenths in (1, 3, 5, 7, 9) * 20:  # of 255: halves
+        unit = int(rng.integers(1, 2**20)) / 256
+        corner = unit * np.array([[-tenths, -1], [10 - tenths, -1], [-tenths, 20]])
+        scene = soup(corner + 0.5, (1, 1))
+        comparing.check_fill_uint8(scene, np.array([[0], [255], [0]], np.uint8), "vertex")
 
 
 @given(pixel_scenes(), st.integers(0, 2**32 - 1), st.integers(1, 4))

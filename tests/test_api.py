@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 import topleft as tl
-from topleft import threads
+from topleft import arrays, threads
+from topleft.memory import FreshMemory
+from topleft.rasterize import canvas_of
 
 SQUARE = np.array([[0, 0], [4, 0], [4, 4], [0, 4]], float)
 HALVES = np.array([[0, 1, 2], [0, 2, 3]])
@@ -53,6 +55,41 @@ def test_out_of_any_layout_is_filled_and_returned(layout):
     assert result is out
     np.testing.assert_array_equal(out, LEFT_MASK)
     assert store.sum() == 64 - 16 + 6
+
+
+def unaligned(array):
+    """A copy that begins one byte behind where its dtype wants to."""
+    copy = np.zeros(array.nbytes + 1, np.uint8)[1:].view(array.dtype).reshape(array.shape)
+    copy[...] = array
+    return copy
+
+
+@pytest.mark.parametrize(
+    ("coerce", "values"),
+    [
+        (lambda a: arrays.as_vertices(a, has_transform=False), SQUARE),
+        (arrays.as_triangles, HALVES),
+        (arrays.as_triangles, HALVES.astype(np.int32)),
+        (lambda a: arrays.as_matrix(a, a.dtype), np.eye(4)),
+        (arrays.as_colors, SQUARE.astype(np.float32)),
+        (lambda a: arrays.as_values(a, 4, 2), SQUARE.astype(np.float32)),
+    ],
+)
+def test_unaligned_array_comes_to_the_kernels_aligned(coerce, values):
+    result = coerce(unaligned(values))
+    assert result.flags.aligned
+    np.testing.assert_array_equal(result, values)
+
+
+def test_unaligned_out_is_filled_through_an_aligned_canvas():
+    ids, depth = unaligned(np.zeros((4, 4), np.int32)), unaligned(np.zeros((4, 4), np.float32))
+    with canvas_of(FreshMemory(), "triangle", ids, (4, 4), np.int32) as (result, canvas):
+        assert canvas.flags.aligned
+    frags = tl.rasterize(SQUARE, LEFT, SIZE, out=(ids, depth))
+    assert result is frags.triangle is ids
+    np.testing.assert_array_equal(ids, np.where(LEFT_MASK, 0, -1))
+    np.testing.assert_array_equal(depth, np.where(LEFT_MASK, 0, np.inf))
+    np.testing.assert_array_equal(frags.barycentric().sum(-1), LEFT_MASK)
 
 
 def test_overdraw_out_is_cleared_first():
@@ -193,6 +230,15 @@ def test_attributes_of_triangles_that_were_overwritten_are_empty_not_a_crash():
     frags.triangle[0, 0] = 2**30
     assert (frags.barycentric() == 0).all()
     assert (frags.interpolate(np.ones(4), background=-1) == -1).all()
+
+
+def test_attributes_of_one_id_and_one_index_too_many_are_empty():
+    triangles = HALVES.astype(np.int32)
+    frags = tl.rasterize(SQUARE, triangles[:1], SIZE)
+    frags.triangle[0, 3] = 1  # a row of the array behind the one that was drawn
+    assert (frags.barycentric()[0, 3] == 0).all()
+    triangles[0] = [0, 1, 4]
+    assert (frags.barycentric() == 0).all()
 
 
 def test_interpolate_per_vertex_and_per_corner_agree():

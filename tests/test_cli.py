@@ -53,6 +53,12 @@ def test_render_shape_is_the_picture_of_the_library(run):
     assert np.array_equal(np.asarray(Image.open("knot.png")), render(mesh, size=(96, 64)))
 
 
+def test_render_wireframe_is_the_picture_with_edges(run):
+    assert run("render", "cube", "-o", "cube.png", "--wireframe", *SMALL) == (0, [])
+    expected = render(Mesh(*scenes.shape("cube")), size=(64, 48), edges=True)
+    assert np.array_equal(np.asarray(Image.open("cube.png")), expected)
+
+
 @pytest.mark.parametrize("kind", ["obj", "ply", "stl", "glb", "off"])
 def test_render_file_of_each_format_shows_the_mesh(run, folder, kind):
     trimesh = pytest.importorskip("trimesh")

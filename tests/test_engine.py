@@ -122,6 +122,20 @@ def test_engine_boxes_of_each_size_equal_loop(column, isa):
     check_all(isa, cases(boxes, column), THREADS[column % 4 :][:1])
 
 
+def quarters(n=20_000):
+    """Triangles that cover 10 samples of a box of 4x4, and 6 of 3x3: whole vectors of samples for the list."""
+    rng = np.random.default_rng(0)
+    legs = rng.choice([3.99, 3.99, 3.99, 2.99], (n, 1, 1)) * rng.choice([-1, 1], (n, 1, 2))
+    corner = rng.integers(0, 60, (n, 1, 2)) + 0.5 - np.sign(legs) / 256
+    xy = corner + [[0, 0], [1, 0], [0, 1]] * legs
+    yield soup(np.dstack([xy, rng.standard_normal((n, 3))]).reshape(-1, 3), (60, 60)), DEPTH_TESTS
+
+
+@ON_EACH_ISA
+def test_engine_fullest_small_boxes_equal_loop(isa):
+    check_all(isa, cases(quarters))
+
+
 def frames():
     for width in range(1, 131):
         for size in {(width, 1 + 7 * width % 23), (1 + 5 * width % 37, width)}:
@@ -217,6 +231,26 @@ def test_engine_windows_at_limits_equal_loop(edge_px, bits, isa):
     check_all(isa, cases(windows_at, edge_px, bits))
 
 
+def edges_past_far_columns(rng, n, col):
+    """Triangles whose right edges, 2**31 units high, pass the centre of a column or miss it by a unit."""
+    for _ in range(n):
+        dx, dy = 2 * rng.integers(0, 2**15) + 1, 2**31 - 2 * rng.integers(2, 2**15) - 1
+        top = np.array([col - (dx - 1) // 2, -(dy - 1) // 2])
+        yield [top + [rng.integers(-1, 2), 0], top + [dx, dy], [-5, rng.integers(0, 2)]]
+
+
+@ON_EACH_ISA
+def test_engine_rows_of_four_million_samples_end_exactly(isa):
+    col = 2**22 - 2
+    xy = np.array(list(edges_past_far_columns(np.random.default_rng(0), 12, col)))
+    for corners in xy:
+        arguments = corners, [[0, 1, 2]], (col + 20, 1)
+        with on(isa):
+            ends = [int(tl.coverage(*arguments, subpixel_bits=0, method=m).sum()) for m in ("auto", "scanline")]
+        assert ends[0] == ends[1]
+        assert col - 5 < ends[0] < col + 5
+
+
 def cross(a, b):
     return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
 
@@ -298,6 +332,62 @@ def test_engine_depth_that_rounds_to_minus_zero_is_zero(make, depth_test, isa):
             frags = tl.rasterize(vertices, *scene.arrays[1:], depth_test=depth_test)
         assert frags.mask.any()
         assert not frags.depth[frags.mask].view(np.int32).any()
+
+
+def hard_quotients(rng, n):
+    """a / b in 53 bits, next to the middle of two float64 of which one is the middle of two float32."""
+    while n:
+        middle = (2 * int(rng.integers(2**23, 2**24)) + 1) * 2**29 + int(rng.choice([-1, 1]))  # in 2**-54
+        side = int(rng.choice([-1, 1]))
+        b = -side * pow(middle, -1, 2**54) % 2**54
+        if 2**52 <= b < 2**53:
+            yield (middle * b + side) >> 54, b
+            n -= 1
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize("scale", [1, 2.0**970])  # up to the largest w there is
+def test_engine_depths_of_hard_quotients_are_rounded_once_each(scale, isa):
+    n = 200
+    z, w = np.array(list(hard_quotients(np.random.default_rng(0), n))).T[:, :, None] * scale
+    x = (np.arange(n)[:, None] + [0, 1, 0.5]) * 2 / n - 1
+    positions = np.dstack([x * w, [1, 1, -1.5] * w, np.repeat(z, 3, 1), np.repeat(w, 3, 1)])
+    scene = soup(positions.reshape(-1, 4), (n, 1))
+    with on(isa):
+        depth = tl.rasterize(*scene.arrays, clip_depth="zero_to_one").depth
+    assert_same(depth, (z / w).T.astype(np.float32))
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize(("plane", "sign"), [("near_clip", -1), ("far_clip", 1)])
+def test_engine_depth_without_a_plane_ends_at_the_largest_float32(plane, sign, isa):
+    n = 40
+    w = 1e-100
+    x = (np.arange(n)[:, None] + [0, 1, 0.5]) * 2 / n - 1
+    positions = np.dstack([x * w, [[w, w, -3 * w]] * n, np.full((n, 3), sign), np.full((n, 3), w)])
+    with on(isa):
+        depth = tl.rasterize(*soup(positions.reshape(-1, 4), (n, 1)).arrays, **{plane: False}).depth
+    assert (depth == sign * LARGEST).all()
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize(("w", "is_seen"), [(2.0**-500, True), (np.nextafter(2.0**-500, 0), False)])
+def test_engine_least_w_is_2_to_the_minus_500(w, is_seen, isa):
+    scene = soup(np.tile([[-1, -1, 0, 1], [3, -1, 0, 1], [-1, 3, 0, 1]], (20, 1)) * w, (4, 4))
+    with on(isa):
+        assert_same(tl.coverage(*scene.arrays), np.full((4, 4), is_seen))
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize(("dtype", "z"), [(np.float32, 2.0**24), (np.float64, 2.0**53)])
+def test_engine_transform_adds_from_left_to_right(dtype, z, isa):
+    x, y = np.random.default_rng(0).integers(-8, 9, (2, 60)).astype(dtype)
+    transform = np.array([[1, 0, 1, -z], [0, 1, 0, 0], [0, 0, 0, 0], [0, 0, 0, 8]])
+    objects = soup(np.stack([x, y, np.full(60, z, dtype)], -1), (50, 50))
+    clip = soup(np.stack([(x + dtype(z)) - dtype(z), y, 0 * x, 0 * x + 8], -1), (50, 50))
+    assert (clip.vertices[:, 0] != x).any()
+    with on(isa):
+        assert_same(tl.overdraw(*objects.arrays, transform=transform), tl.overdraw(*clip.arrays))
 
 
 # ---- either turn, either side ---------------------------------------------------------------------------------------

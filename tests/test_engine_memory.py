@@ -212,11 +212,23 @@ def test_engine_each_place_of_a_bad_vertex_is_named(kind, isa):
     for n in (3, 17, 40):
         for place in range(n):
             scene = few_vertices(kind, n)
-            bad, column = [(np.nan, 0), (np.inf, 1), (-np.inf, -1), (beyond, 1)][place % 4]
-            scene.vertices[place, column] = bad
+            bad, column = [(np.nan, 0), (np.inf, 1), (-np.inf, -1), (beyond, 1), (np.nan, 2)][place % 5]
+            scene.vertices[place, min(column, KINDS[kind][1] - 1)] = bad
             used = np.append(scene.triangles, [[place, 0, n - 1]], axis=0)
             with on(isa), pytest.raises(ValueError, match=f"in row {place}$"):
                 tl.rasterize(scene.vertices, used, scene.size, **scene.view)
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize("dtype", [np.int32, np.int64])
+def test_engine_each_place_of_a_bad_index_is_named(dtype, isa):
+    scene = few_vertices("f64 xy", 20)
+    for n in (1, 17, 40):
+        for place in range(3 * n):
+            triangles = np.resize(scene.triangles, (n, 3)).astype(dtype)
+            triangles.flat[place] = [-1, 20, 2**31 - 1, -(2**31)][place % 4]
+            with on(isa), pytest.raises(IndexError, match=f"row {place // 3} is"):
+                tl.coverage(scene.vertices, triangles, scene.size, threads=1)
 
 
 # ---- threads and processes ------------------------------------------------------------------------------------------

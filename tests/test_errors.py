@@ -95,9 +95,10 @@ def test_uint64_vertex_beyond_int64_raises():
         tl.coverage(np.array([[0, 0], [2**64 - 1, 0], [0, 4]], np.uint64), [[0, 1, 2]], SIZE)
 
 
+@pytest.mark.parametrize("x_px", [4, 2.0**40])
 @pytest.mark.parametrize("depth", [np.nan, np.inf, 1e300])
-def test_depth_that_float32_cannot_hold_raises_only_where_depth_is_used(depth):
-    vertices = [[0, 0, 0], [4, 0, depth], [0, 4, 0]]
+def test_depth_that_float32_cannot_hold_raises_only_where_depth_is_used(depth, x_px):
+    vertices = [[0, 0, 0], [x_px, 0, depth], [0, 4, 0]]
     assert tl.coverage(vertices, [[0, 1, 2]], SIZE).any()
     with pytest.raises(ValueError, match="in row 1"):
         tl.rasterize(vertices, [[0, 1, 2]], SIZE)
@@ -151,10 +152,13 @@ def test_bad_size_raises(size, kind, message):
         tl.coverage(SQUARE, HALVES, size)
 
 
+SAMPLINGS = "'center', 'msaa2', 'msaa4', 'msaa8', 'msaa16', 'area', 'outer', 'inner'"
+
+
 @pytest.mark.parametrize(
     ("options", "kind", "message"),
     [
-        ({"sampling": "msaa3"}, ValueError, "sampling must be one of 'center', 'area', got 'msaa3'"),
+        ({"sampling": "msaa3"}, ValueError, f"sampling must be one of {SAMPLINGS}, got 'msaa3'"),
         ({"method": "magic"}, ValueError, "method must be one of 'auto', 'edge', 'scanline', got 'magic'"),
         ({"cull": True}, ValueError, "cull must be one of 'none', 'back', 'front', got True"),
         ({"clip_depth": "gl"}, ValueError, "clip_depth must be one of 'minus_one_to_one', 'zero_to_one', got 'gl'"),

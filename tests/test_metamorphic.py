@@ -134,7 +134,7 @@ def test_window_any_clip_space_equals_crop(scene):
 
 def test_window_far_from_the_picture_is_empty():
     scene = jittered_grid(np.random.default_rng(0))
-    for origin in [(2**40, 0), (0, -(2**40)), (2**52, -(2**52)), (28, 0), (0, -28)]:
+    for origin in [(2**40, 0), (-(2**40), 0), (0, 2**40), (0, -(2**40)), (2**52, -(2**52)), (28, 0), (0, -28)]:
         assert not tl.overdraw(*scene.arrays, origin=origin).any() or abs(origin[0] + origin[1]) == 28
 
 

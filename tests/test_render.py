@@ -10,7 +10,7 @@ import pytest
 from topleft import files, scenes
 from topleft.camera import Camera
 from topleft.mesh import Mesh
-from topleft.render import render, visibility
+from topleft.render import EDGE_COLOR, depth_behind, render, visibility
 from topleft.shade import GREY_OF_FARTHEST, GREY_OF_NEAREST, eye_distance, eye_normals, id_colors, shade
 
 SHARED_MESHES = Path(__file__).resolve().parents[2] / "shared" / "meshes"
@@ -218,6 +218,38 @@ def test_shade_takes_fragments_of_rasterize():
     camera = facing(2)
     frags = visibility(square(), camera, (8, 8))
     assert np.array_equal(shade(frags, square(), camera), render(square(), camera, (8, 8)))
+
+
+# Edges
+
+
+def test_edges_are_dark_lines_over_the_picture():
+    plain = render(square(), facing(2.5), (80, 80), background=CLEAR)
+    picture = render(square(), facing(2.5), (80, 80), background=CLEAR, edges=True)
+    assert picture[39, 40].tolist() == [*EDGE_COLOR, 255]  # the diagonal runs through the centre
+    assert picture[40, 7].tolist() == [*EDGE_COLOR, 128]  # the side x = 8: half a pixel is outside
+    assert abs(picture[40, 8] - (0.5 * plain[40, 8] + 0.5 * np.array([*EDGE_COLOR, 255]))).max() <= 1
+    assert np.array_equal(picture[60:70, 60:70], plain[60:70, 60:70])
+    assert (picture[..., 3] >= plain[..., 3]).all()
+
+
+def test_edges_behind_the_surface_are_hidden():
+    front, back = square(z=0.5), square(z=-0.5)
+    both = Mesh(np.vstack([front.vertices, 0.5 * back.vertices]), np.vstack([front.triangles, back.triangles + 4]))
+    pictures = [render(mesh, facing(2.5), (80, 80), edges=True) for mesh in (both, front)]
+    assert np.array_equal(*pictures)
+
+
+def test_edges_of_a_closed_shape_show_only_in_front():
+    ball = Mesh(*scenes.shape("icosphere"))
+    pictures = [render(ball, size=(200, 150), edges=True, cull=cull) for cull in ("none", "back")]
+    differ = (pictures[0] != pictures[1]).any(-1)
+    assert differ.sum() < 0.01 * visibility(ball, size=(200, 150)).mask.sum()  # at the silhouette, within a pixel
+
+
+def test_depth_behind_falls_with_the_surface_and_not_over_its_border():
+    depth = np.array([[1, 2, 4, np.inf], [1, 2, 4, 9]], np.float32)
+    assert depth_behind(depth).tolist() == [[2, 3, 6, np.inf], [2, 3, 6, 14]]
 
 
 @pytest.mark.parametrize("name", ["suzanne", "african_head", "spot", "teapot", "stanford-bunny", "nefertiti"])

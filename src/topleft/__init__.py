@@ -2,7 +2,7 @@
 
 from topleft import scenes
 from topleft._isa import build_info
-from topleft.api import Rasterizer, coverage, fill, overdraw, rasterize
+from topleft.api import Rasterizer, coverage, fill, overdraw, rasterize, wireframe
 from topleft.camera import Camera
 from topleft.classic import bresenham_line
 from topleft.errors import MeshError, TopleftError
@@ -38,4 +38,5 @@ __all__ = [
     "shade",
     "silhouette",
     "visibility",
+    "wireframe",
 ]

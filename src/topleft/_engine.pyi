@@ -1,5 +1,6 @@
-"""The types of the compiled module. Functions and classes are described in _engine.pyx and _dispatch.pxi."""
+"""The types of the compiled module. What each does is told in _engine.pyx, _dispatch.pxi and _lines.pxi."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -29,13 +30,20 @@ class Target:
         pixels: NDArray[Any],
         depth: NDArray[np.float32] | None,
         covered: NDArray[np.uint64] | None,
+        samples: NDArray[np.int32] | None = None,
     ) -> None: ...
     @staticmethod
-    def covered_shape(height: int, width: int) -> tuple[int, int]: ...
+    def covered_shape(height: int, width: int, n_samples: int = 1) -> tuple[int, int]: ...
 
 class View:
     def __init__(
-        self, viewport: tuple[int, int], subpixel_bits: int, zero_to_one: bool, near_clip: bool, far_clip: bool
+        self,
+        viewport: tuple[int, int],
+        subpixel_bits: int,
+        guard_bits: int,
+        zero_to_one: bool,
+        near_clip: bool,
+        far_clip: bool,
     ) -> None: ...
 
 class Source:
@@ -55,6 +63,7 @@ class Source:
     ) -> tuple[int, int, int]: ...
 
 class Pieces:
+    arrays: tuple[Any, ...] | None
     def __init__(
         self, source: Source, records: NDArray[np.uint8], triangles: NDArray[np.int32], view: View
     ) -> None: ...
@@ -73,7 +82,9 @@ class Scene:
         subpixel_bits: int,
         cull: int,
         method: int,
+        test: int = 0,
     ) -> None: ...
+    def seen_from(self, x_fx: int, y_fx: int) -> Scene: ...
     def draw(self, target: Target, first_row: int, n_rows: int) -> int: ...
     def draw_share(
         self, target: Target, first_row: int, n_rows: int, first: int, others: NDArray[np.int32]
@@ -125,3 +136,59 @@ class Scene:
         background: float,
         out: NDArray[np.float32],
     ) -> None: ...
+
+def list_edges(
+    scene: Scene,
+    starts: NDArray[np.int64],
+    last_low: NDArray[np.int32],
+    highs: NDArray[np.int32],
+    edges: NDArray[np.uint64],
+) -> int: ...
+def draw_lines(
+    scene: Scene,
+    view: View | None,
+    edges: NDArray[np.uint64],
+    pixels: NDArray[np.uint8],
+    depth: NDArray[np.float32] | None,
+    depth_bias: float,
+    is_farthest: bool,
+    is_smooth: bool,
+    width: int,
+    first_row: int,
+    n_rows: int,
+) -> None: ...
+
+class Bins:
+    bad_row: int
+    n_bands: int
+    n_listed: int
+    def __init__(
+        self, scene: Scene, height: int, width: int, reach_fx: int, band_bits: int, room: NDArray[np.int32]
+    ) -> None: ...
+    def fill(self, listed: NDArray[np.int32]) -> None: ...
+
+def draw_bands(
+    scenes: Sequence[Scene], targets: Sequence[Target], bins: Bins, first_band: int, end_band: int
+) -> None: ...
+
+class Transfer:
+    def __init__(
+        self, tables: tuple[NDArray[np.int32], NDArray[np.uint8]] | None, n_channels: int, is_straight: bool
+    ) -> None: ...
+
+def mean_flat(
+    labels: NDArray[np.int32],
+    colors: NDArray[Any],
+    pixels: NDArray[Any],
+    first_row: int,
+    n_rows: int,
+    transfer: Transfer | None,
+) -> None: ...
+def mean_colors(
+    painted: NDArray[Any],
+    pixels: NDArray[Any],
+    first_row: int,
+    n_rows: int,
+    n_channels: int,
+    transfer: Transfer | None,
+) -> None: ...

@@ -24,6 +24,7 @@ cdef extern from "topleft.h" nogil:
         const double *inv_w
         const tl_source *source
         int64_t n_vertices
+        int32_t sample_x_fx, sample_y_fx
     ctypedef struct tl_vertex_counts:
         int64_t n_bad, n_wide, n_clipped
     ctypedef struct tl_view:
@@ -37,9 +38,11 @@ cdef extern from "topleft.h" nogil:
         int32_t *triangles
         int32_t *source
         int64_t n_vertices, n_pieces
+    ctypedef int tl_test
     ctypedef struct tl_window:
         int64_t x_px, y_px, width, height
         int subpixel_bits
+        tl_test test
     ctypedef int tl_cull
     ctypedef int tl_method
     ctypedef int tl_sink
@@ -50,7 +53,20 @@ cdef extern from "topleft.h" nogil:
         int64_t stride_px
         int64_t n_samples
         uint64_t *covered
+        int sample_bits
+        const int32_t *samples_fx
+        int sample
     int64_t tl_covered_words(int64_t)
+    ctypedef struct tl_bins:
+        int64_t n
+        int32_t *ids
+        int32_t *first_band
+        int32_t *last_band
+    ctypedef struct tl_transfer:
+        const int32_t *decode
+        const uint8_t *encode
+        int n_channels
+        int is_straight
     ctypedef struct tl_area:
         float *pixels
         int64_t stride_px
@@ -83,6 +99,22 @@ cdef extern from "topleft.h" nogil:
         int64_t n_others
         const tl_window *picture
         int is_first, is_last
+    ctypedef struct tl_edges:
+        tl_vertex_set mesh
+        const tl_view *view
+        const int32_t *edges
+        int64_t n_edges
+    ctypedef struct tl_edge_scratch:
+        int64_t *starts
+        int32_t *last_low
+        int32_t *highs
+    ctypedef struct tl_line_target:
+        int is_smooth
+        void *pixels
+        const float *depth
+        double depth_bias
+        int is_farthest
+        int64_t stride_px
     ctypedef struct tl_kernels:
         tl_vertex_counts (*snap)(const tl_source *, int64_t, int64_t, int, int, tl_vertex *, tl_wide *) noexcept nogil
         tl_vertex_counts (*project)(const tl_source *, int64_t, int64_t, const tl_view *, tl_vertex *, tl_wide *) noexcept nogil
@@ -91,12 +123,18 @@ cdef extern from "topleft.h" nogil:
         int64_t (*first_bad_row)(const int32_t *, int64_t, int64_t) noexcept nogil
         int64_t (*narrow_triangles)(const int64_t *, int64_t, int64_t, int32_t *) noexcept nogil
         int64_t (*draw)(const tl_scene *, const tl_window *, const tl_target *, tl_share *) noexcept nogil
+        int64_t (*bin)(const tl_scene *, const tl_window *, int32_t, int, tl_bins *) noexcept nogil
+        void (*list_bins)(const tl_bins *, int64_t, int64_t *, int32_t *) noexcept nogil
         int64_t (*draw_area)(const tl_scene *, const tl_window *, const tl_area *) noexcept nogil
         int64_t (*blend)(const tl_scene *, const tl_window *, const tl_canvas *) noexcept nogil
         void (*barycentric)(const tl_scene *, const tl_window *, const int32_t *, float *) noexcept nogil
         void (*interpolate)(const tl_scene *, const tl_window *, const int32_t *, const float *, int, int, float, float *) noexcept nogil
         void (*paint_flat)(const int32_t *, int64_t, const uint8_t *, int, uint8_t *) noexcept nogil
         void (*paint_gouraud)(const tl_scene *, const tl_window *, const int32_t *, const void *, int, int, void *) noexcept nogil
+        int64_t (*list_edges)(const tl_scene *, const tl_edge_scratch *, uint64_t *, int64_t *) noexcept nogil
+        void (*draw_lines)(const tl_edges *, const tl_window *, const tl_line_target *) noexcept nogil
+        void (*mean_flat)(const int32_t *, int, int64_t, int64_t, const void *, int, int, const tl_transfer *, void *) noexcept nogil
+        void (*mean_colors)(const void *, int, int64_t, int64_t, int, int, const tl_transfer *, void *) noexcept nogil
 
 include "_dispatch.pxi"
 
@@ -130,9 +168,9 @@ cdef class View:
 
     cdef tl_view view
 
-    def __init__(self, viewport, int subpixel_bits, bint zero_to_one, bint near_clip, bint far_clip):
+    def __init__(self, viewport, int subpixel_bits, int guard_bits, bint zero_to_one, bint near_clip, bint far_clip):
         self.view.half_width_px, self.view.half_height_px = viewport[0] / 2, viewport[1] / 2
-        self.view.guard_band_x, self.view.guard_band_y = (2.0**60 / (side / 2 * 2**subpixel_bits) for side in viewport)
+        self.view.guard_band_x, self.view.guard_band_y = (2.0**60 / (side / 2 * 2**guard_bits) for side in viewport)
         self.view.subpixel_bits, self.view.zero_to_one = subpixel_bits, zero_to_one
         self.view.near_clip, self.view.far_clip = near_clip, far_clip
 
@@ -180,17 +218,20 @@ cdef class Target:
     cdef uint8_t[::1] pixels
     cdef float[:, ::1] depth
     cdef uint64_t[:, ::1] covered
+    cdef int sample_bits
+    cdef const int32_t[:, ::1] samples
 
-    def __init__(self, int sink, pixels, depth, covered):
+    def __init__(self, int sink, pixels, depth, covered, samples=None):
         self.sink = <tl_sink>sink
         self.height, self.width = pixels.shape
         self.pixel_bytes = pixels.itemsize
         self.pixels, self.depth, self.covered = as_bytes(pixels), depth, covered
+        self.samples, self.sample_bits = samples, 0 if samples is None else len(samples).bit_length() - 1
 
     @staticmethod
-    def covered_shape(int64_t height, int64_t width):
+    def covered_shape(int64_t height, int64_t width, int64_t n_samples=1):
         """Return the shape of the uint64 scratch that a mask needs: any rows of it are enough for as many of the mask."""
-        return height, tl_covered_words(width)
+        return height, tl_covered_words(width * n_samples)
 
     cdef tl_target rows(self, int64_t first_row) noexcept:
         """The buffers from a row on."""
@@ -200,7 +241,9 @@ cdef class Target:
         t.depth = &self.depth[first_row, 0] if self.depth is not None else NULL
         t.covered = &self.covered[first_row, 0] if self.covered is not None else NULL
         t.stride_px = self.width
-        t.n_samples = 0  # draw knows
+        t.n_samples = t.sample = 0  # draw knows
+        t.sample_bits = self.sample_bits
+        t.samples_fx = &self.samples[0, 0] if self.samples is not None else NULL
         return t
 
 
@@ -235,7 +278,7 @@ cdef class Pieces:
     """What the clip planes leave of the triangles that they cut."""
 
     cdef tl_pieces pieces
-    cdef object arrays
+    cdef readonly object arrays
 
     def __init__(self, Source source, const uint8_t[::1] records, const int32_t[:, ::1] triangles, View view):
         cdef tl_pieces *p = &self.pieces
@@ -274,11 +317,12 @@ cdef class Scene:
     cdef tl_scene scene
     cdef int64_t x_px, y_px
     cdef int subpixel_bits
+    cdef tl_test test
     cdef object arrays
 
     def __init__(
         self, Source source, const uint8_t[::1] records, const int64_t[:, ::1] wide, const int32_t[:, ::1] triangles,
-        Pieces pieces, int64_t x_px, int64_t y_px, int subpixel_bits, int cull, int method,
+        Pieces pieces, int64_t x_px, int64_t y_px, int subpixel_bits, int cull, int method, int test=0,
     ):
         self.arrays = (source, records, wide, triangles, pieces)
         self.scene.mesh.vertices = <const tl_vertex *>data(records)
@@ -290,12 +334,20 @@ cdef class Scene:
         self.scene.triangles = &triangles[0, 0] if triangles.shape[0] else NULL
         self.scene.pieces = &pieces.pieces if pieces is not None and len(pieces) else NULL
         self.scene.cull, self.scene.method = cull, method
-        self.x_px, self.y_px, self.subpixel_bits = x_px, y_px, subpixel_bits
+        self.x_px, self.y_px, self.subpixel_bits, self.test = x_px, y_px, subpixel_bits, test
+
+    def seen_from(self, int32_t x_fx, int32_t y_fx):
+        """Return the same scene with its samples off the centres of the pixels, in sub-pixels."""
+        cdef Scene seen = Scene.__new__(Scene)
+        seen.scene, seen.arrays = self.scene, self.arrays
+        seen.x_px, seen.y_px, seen.subpixel_bits, seen.test = self.x_px, self.y_px, self.subpixel_bits, self.test
+        seen.scene.mesh.sample_x_fx, seen.scene.mesh.sample_y_fx = x_fx, y_fx
+        return seen
 
     cdef tl_window window(self, int64_t first_row, int64_t n_rows, int64_t width) noexcept:
         cdef tl_window w
         w.x_px, w.y_px, w.subpixel_bits = self.x_px, self.y_px + first_row, self.subpixel_bits
-        w.width, w.height = width, n_rows
+        w.width, w.height, w.test = width, n_rows, self.test
         return w
 
     def draw(self, Target target, int64_t first_row, int64_t n_rows):
@@ -407,3 +459,100 @@ cdef class Scene:
             with nogil:
                 K.interpolate(&self.scene, &window, &ids[0, 0], &values[0, 0] if values.shape[0] else NULL, n_values,
                               per_corner, background, &out[0, 0, 0])
+
+
+cdef class Bins:
+    """The triangles that reach into each band of 2**band_bits rows of a picture."""
+
+    cdef tl_bins bins
+    cdef int64_t[::1] starts
+    cdef int32_t[::1] listed
+    cdef object room
+    cdef int band_bits
+    cdef readonly int64_t bad_row, n_bands, n_listed
+
+    def __init__(self, Scene scene, int64_t height, int64_t width, int32_t reach_fx, int band_bits, int32_t[:, ::1] room):
+        """`room`: (3, n_triangles + 16). `bad_row` is -1, or a triangle has an index outside the vertices."""
+        cdef tl_window window = scene.window(0, height, width)
+        self.room, self.band_bits, self.n_bands = room, band_bits, (height + (1 << band_bits) - 1) >> band_bits
+        self.starts = np.empty(self.n_bands + 2, np.int64)
+        self.bins.n = self.n_listed = 0
+        self.bins.ids, self.bins.first_band, self.bins.last_band = &room[0, 0], &room[1, 0], &room[2, 0]
+        with nogil:
+            self.bad_row = K.bin(&scene.scene, &window, reach_fx, band_bits, &self.bins)
+            if self.bad_row < 0:
+                K.list_bins(&self.bins, self.n_bands, &self.starts[0], NULL)
+                self.n_listed = self.starts[self.n_bands + 1]
+
+    def fill(self, int32_t[::1] listed):
+        """Sort the triangles into `listed`, which has room for `n_listed` and one more."""
+        self.listed = listed
+        with nogil:
+            K.list_bins(&self.bins, self.n_bands, &self.starts[0], &listed[0])
+
+
+def draw_bands(scenes, targets, Bins bins, int64_t first_band, int64_t end_band):
+    """Clear and draw bands of several pictures, a scene each, one band of all after the other."""
+    cdef Scene scene
+    cdef Target target
+    cdef tl_target rows
+    cdef tl_window window
+    cdef tl_share share
+    cdef int64_t band, first_row
+    cdef list pairs = list(zip(scenes, targets, strict=True))
+    share.others, share.first, share.is_first, share.is_last = NULL, 0, True, True
+    for band in range(first_band, end_band):
+        first_row = band << bins.band_bits
+        share.ids = &bins.listed[0] + bins.starts[band]
+        share.end = bins.starts[band + 1] - bins.starts[band]
+        for scene, target in pairs:
+            rows = target.rows(first_row)
+            window = scene.window(first_row, min(<int64_t>1 << bins.band_bits, target.height - first_row), target.width)
+            with nogil:
+                K.draw(&scene.scene, &window, &rows, &share)
+
+
+cdef class Transfer:
+    """What is averaged of colours with several samples a pixel: their light, or as much of them as their alpha tells."""
+
+    cdef tl_transfer transfer
+    cdef object arrays
+
+    def __init__(self, tables, int n_channels, bint is_straight):
+        cdef const int32_t[::1] decode
+        cdef const uint8_t[::1] encode
+        self.transfer.n_channels, self.transfer.is_straight = n_channels, is_straight
+        if tables is not None:
+            decode, encode = self.arrays = tables
+            self.transfer.decode, self.transfer.encode = &decode[0], &encode[0]
+
+
+def mean_flat(const int32_t[:, :, ::1] labels, colors, pixels, int64_t first_row, int64_t n_rows, Transfer transfer):
+    """Write the mean colour of the triangles that the samples see over rows of pixels; labels (S, H, W)."""
+    cdef const uint8_t[::1] palette = as_bytes(colors)
+    cdef uint8_t[::1] flat = as_bytes(pixels)
+    cdef int n_channels = 1 if colors.ndim == 1 else colors.shape[1], is_u8 = colors.dtype == np.uint8
+    cdef int64_t width = labels.shape[2], first = first_row * width
+    cdef int sample_bits = int(labels.shape[0]).bit_length() - 1
+    cdef const tl_transfer *own = NULL if transfer is None else &transfer.transfer
+    if n_rows and width and palette.shape[0]:
+        with nogil:
+            K.mean_flat(&labels[0, first_row, 0], sample_bits, labels.shape[1] * width, n_rows * width, data(palette), n_channels, is_u8,
+                        own, &flat[first * n_channels * (1 if is_u8 else 4)])
+
+
+def mean_colors(painted, pixels, int64_t first_row, int64_t n_rows, int n_channels, Transfer transfer):
+    """Write the mean of planes of colours (S, H, W[, C]) over rows of pixels."""
+    cdef const uint8_t[::1] planes = as_bytes(painted)
+    cdef uint8_t[::1] flat = as_bytes(pixels)
+    cdef int is_u8 = painted.dtype == np.uint8
+    cdef int64_t height = painted.shape[1], width = painted.shape[2], first
+    cdef int sample_bits = int(painted.shape[0]).bit_length() - 1
+    cdef const tl_transfer *own = NULL if transfer is None else &transfer.transfer
+    first = first_row * width * n_channels * (1 if is_u8 else 4)
+    if n_rows and width:
+        with nogil:
+            K.mean_colors(&planes[first], sample_bits, height * width, n_rows * width, n_channels, is_u8, own, &flat[first])
+
+
+include "_lines.pxi"

@@ -1,4 +1,4 @@
-"""The four verbs on fresh memory, and `Rasterizer`, the same on memory that is kept."""
+"""The five verbs on fresh memory, and `Rasterizer`, the same on memory that is kept."""
 
 from __future__ import annotations
 
@@ -8,13 +8,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from topleft.arrays import as_size
+from topleft.fill import Style, draw_fill
 from topleft.fragments import Fragments
+from topleft.lines import draw_wireframe
 from topleft.memory import SCRATCH, FreshMemory, KeptMemory
-from topleft.rasterize import draw_coverage, draw_fill, draw_fragments, draw_overdraw
+from topleft.rasterize import draw_coverage, draw_fragments, draw_overdraw
 from topleft.threads import parse_threads
 from topleft.view import View, ViewOptions
 
-__all__ = ["Rasterizer", "coverage", "fill", "overdraw", "rasterize"]
+__all__ = ["Rasterizer", "coverage", "fill", "overdraw", "rasterize", "wireframe"]
 
 #: Fragments refer to what they were drawn from, so nothing of it can be reused.
 FRESH = FreshMemory()
@@ -38,14 +40,17 @@ def coverage(
         Indices of vertices; either winding.
     size : (int, int)
         Width and height of the picture in pixels.
-    out : ndarray of bool (float32 for "area"), shape (H, W), optional
+    out : ndarray of bool (float32 for several samples and "area"), shape (H, W), optional
         Where the result goes. A fresh array costs its first touch, several times what drawing a small mesh costs.
     **view
         transform : array_like, shape (4, 4). Clip space from object space.
         origin : (int, int). The pixel of the whole picture that is row 0, column 0 here.
         viewport : (int, int). Width and height of the whole picture for clip space; default `size`.
         subpixel_bits : int, 0 to 16. Vertices snap to ``2**-subpixel_bits`` pixels; default 8.
-        sampling : "center", or "area": the exact area of the pixel (`coverage`, `overdraw` and `fill`).
+        sampling : "center"; "msaa2", "msaa4", "msaa8" or "msaa16": so many samples a pixel, at the standard positions
+            of Direct3D; "area": the exact area of the pixel (`coverage`, `overdraw` and `fill`). For `coverage` and
+            `overdraw` also "outer": every pixel square that a triangle meets in positive area; "inner": every square
+            that lies wholly inside a triangle.
         method : "auto", "edge" or "scanline": the same picture. Or a classic of the literature, to compare with:
             `topleft.methods.CLASSICS` names them, and docs/methods.md tells where each of them fails.
         cull : "none", "back" or "front"; the front is counter-clockwise seen with y up.
@@ -56,7 +61,8 @@ def coverage(
     Returns
     -------
     ndarray of bool, shape (H, W)
-        False where nothing is. With ``sampling="area"`` float32: the areas of the triangles in each pixel, added up, at
+        False where nothing is. With several samples float32: the share of them that is covered. With
+        ``sampling="area"`` float32: the areas of the triangles in each pixel, added up, at
         most 1. They are exactly 1 where triangles tile a pixel, and a single one is within 9e-8 of its exact area.
 
     Raises
@@ -101,12 +107,12 @@ def overdraw(
     ----------
     vertices, triangles, size, **view
         As in `coverage`.
-    out : ndarray of int32 (float32 for "area"), shape (H, W), optional
+    out : ndarray of int32 (float32 for "area"), shape (H, W), or (H, W, S) for S samples, optional
         Where the result goes.
 
     Returns
     -------
-    ndarray of int32, shape (H, W)
+    ndarray of int32, shape (H, W), or (H, W, S) for S samples a pixel
         0 where nothing is. With ``sampling="area"`` float32: the areas of the triangles in each pixel, added up.
 
     Raises
@@ -137,6 +143,7 @@ def fill(
     background: ArrayLike | None = None,
     blend: str = "replace",
     alpha: str = "straight",
+    resolve: str = "values",
     out: NDArray[Any] | None = None,
     **view: Unpack[ViewOptions],
 ) -> NDArray[Any]:
@@ -160,6 +167,9 @@ def fill(
         covers multiplies alpha, or is the share of the way from the old colour to the new.
     alpha : "straight" or "premultiplied"
         Whether colours and picture have been multiplied by alpha. Only "over" looks at it, and "replace" by area.
+    resolve : "values" or "linear"
+        With several samples a pixel ("msaa4", say) each pixel is the mean of its samples: of their values as they are,
+        or, for uint8, of the light that sRGB values stand for; the last of 2 or 4 channels is alpha, averaged as it is.
     out : ndarray of uint8 or float32, shape (H, W, C) or (H, W), optional
         Is drawn over.
 
@@ -190,7 +200,8 @@ def fill(
     array([[192, 192, 192,   0]], dtype=uint8)
     """
     checked = View.parse(size, view)
-    return draw_fill(SCRATCH, vertices, triangles, colors, checked, per, background, out, blend=blend, alpha=alpha)
+    style = Style(per, background, blend, alpha, resolve)
+    return draw_fill(SCRATCH, vertices, triangles, colors, checked, style, out)
 
 
 def rasterize(
@@ -215,14 +226,16 @@ def rasterize(
         the triangle with the lower index.
     background_depth : float, optional
         Depth where nothing is; +inf, or -inf with "greater", unless given.
-    out : (ndarray of int32, ndarray of float32), each of shape (H, W), optional
+    out : (ndarray of int32, ndarray of float32), each of shape (H, W), or (H, W, S) for S samples, optional
         Where ids and depth go.
 
     Returns
     -------
     Fragments
         ``.triangle`` (H, W) int32 with -1 for none, ``.depth`` (H, W) float32, ``.mask`` (H, W) bool,
-        ``.barycentric()``, ``.interpolate(values)``.
+        ``.barycentric()``, ``.interpolate(values)``. With several samples a pixel also ``.samples_triangle`` and
+        ``.samples_depth`` (H, W, S); all else is then of the first sample, which is nearest to the centre, and
+        ``.sample(i)`` gives the same of another.
 
     Raises
     ------
@@ -254,8 +267,77 @@ def rasterize(
     return draw_fragments(FRESH, vertices, triangles, View.parse(size, view), depth_test, background_depth, out)
 
 
+def wireframe(
+    vertices: ArrayLike,
+    triangles: ArrayLike,
+    size: tuple[int, int],
+    *,
+    depth: Fragments | NDArray[np.float32] | None = None,
+    depth_test: str = "less",
+    depth_bias: float = 2.0**-10,
+    antialias: bool = False,
+    out: NDArray[Any] | None = None,
+    **view: Unpack[ViewOptions],
+) -> NDArray[Any]:
+    """Return the edges of the triangles as lines, each pixel of a line once.
+
+    Parameters
+    ----------
+    vertices, triangles, size, **view
+        As in `coverage`; `method` makes no difference. `cull` leaves out the edges that only culled triangles have,
+        and degenerate triangles.
+    depth : Fragments or ndarray of float32, shape (H, W), optional
+        What hides lines: a pixel of a line is drawn where its depth is at most `depth_bias` behind the buffer's.
+    depth_test : "less" or "greater"
+        Which depth is the nearer one.
+    depth_bias : float
+        In units of depth. An edge lies on the surface that hides it, which falls away from the edge within the pixel:
+        take what the depth changes by from pixel to pixel. The default suits window depth, 0 to 1 over the whole view.
+    antialias : bool
+        False: Bresenham lines between the pixels that hold the ends. True: coverage of lines one pixel wide between
+        the ends themselves.
+    out : ndarray, shape (H, W), optional
+        Where the result goes.
+
+    Returns
+    -------
+    ndarray of bool, or of float32 with `antialias`, shape (H, W)
+        Where lines are; coverage in [0, 1].
+
+    Raises
+    ------
+    ValueError, TypeError, IndexError
+        As in `coverage`.
+
+    Notes
+    -----
+    A line goes from its upper end to the lower one (a level one from left to right), so triangles on both sides of an
+    edge draw the same pixels: of `d` steps along the longer side, step `k` is ``floor((q*k + floor(d/2)) / d)`` pixels
+    across, `q` being the shorter side. It is computed in integers, whatever part of it the picture shows. Depth is
+    linear in `k`. With `antialias` the coverage of a pixel is ``max(0, 1 - distance)``, the distance in pixels of its
+    centre from the nearest edge that shows there, and depth that of the nearest point.
+
+    References
+    ----------
+    J. E. Bresenham, Algorithm for computer control of a digital plotter, 1965.
+    S. Gupta, R. F. Sproull, Filtering Edges for Gray-Scale Displays, 1981 (intensity by distance).
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> tl.wireframe([[0, 0], [4, 0], [0, 4]], [[0, 1, 2]], (5, 5)).astype(int)
+    array([[1, 1, 1, 1, 1],
+           [1, 0, 0, 1, 0],
+           [1, 0, 1, 0, 0],
+           [1, 1, 0, 0, 0],
+           [1, 0, 0, 0, 0]])
+    """
+    checked = View.parse(size, view)
+    return draw_wireframe(SCRATCH, vertices, triangles, checked, depth, depth_test, depth_bias, antialias, out)
+
+
 class Rasterizer:
-    """The four verbs for one size, on memory that is kept from call to call.
+    """The five verbs for one size, on memory that is kept from call to call.
 
     What a verb returns is overwritten by the next call of the same verb; copy what must last. Not for use from several
     threads at once: give each its own.
@@ -319,14 +401,13 @@ class Rasterizer:
         background: ArrayLike | None = None,
         blend: str = "replace",
         alpha: str = "straight",
+        resolve: str = "values",
         out: NDArray[Any] | None = None,
         **view: Unpack[ViewOptions],
     ) -> NDArray[Any]:
         """Return a picture of coloured triangles in painter's order, as `topleft.fill` does."""
-        checked = self._view(view)
-        return draw_fill(
-            self._memory, vertices, triangles, colors, checked, per, background, out, blend=blend, alpha=alpha
-        )
+        style = Style(per, background, blend, alpha, resolve)
+        return draw_fill(self._memory, vertices, triangles, colors, self._view(view), style, out)
 
     def rasterize(
         self,
@@ -340,3 +421,21 @@ class Rasterizer:
     ) -> Fragments:
         """Return the visibility buffer, as `topleft.rasterize` does; its attributes also end with the next call."""
         return draw_fragments(self._memory, vertices, triangles, self._view(view), depth_test, background_depth, out)
+
+    def wireframe(
+        self,
+        vertices: ArrayLike,
+        triangles: ArrayLike,
+        *,
+        depth: Fragments | NDArray[np.float32] | None = None,
+        depth_test: str = "less",
+        depth_bias: float = 2.0**-10,
+        antialias: bool = False,
+        out: NDArray[Any] | None = None,
+        **view: Unpack[ViewOptions],
+    ) -> NDArray[Any]:
+        """Return the edges of the triangles as lines, as `topleft.wireframe` does."""
+        checked = self._view(view)
+        return draw_wireframe(
+            self._memory, vertices, triangles, checked, depth, depth_test, depth_bias, antialias, out
+        )

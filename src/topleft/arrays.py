@@ -28,13 +28,14 @@ INT32_MAX = 2**31 - 1
 
 
 def as_array(name: str, values: ArrayLike) -> NDArray[Any]:
-    """Return what NumPy makes of `values`, without a copy where it can."""
+    """Return what NumPy makes of `values`, aligned for the kernels, without a copy where it can."""
     if not isinstance(values, np.ndarray) and hasattr(values, "__dlpack__") and not hasattr(values, "__array__"):
-        return np.from_dlpack(values)  # type: ignore[arg-type]
+        values = np.from_dlpack(values)  # type: ignore[arg-type]
     try:
-        return np.asarray(values)
+        array = np.asarray(values)
     except ValueError as error:
         raise ValueError(f"{name} must be array_like, got rows of different lengths ({error})") from None
+    return array if array.flags.aligned else array.copy()
 
 
 def as_vertices(values: ArrayLike, *, has_transform: bool) -> NDArray[Any]:

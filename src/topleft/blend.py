@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from topleft import _engine
 from topleft.memory import Memory
 from topleft.models import Alpha, Blend, Sampling, parse
-from topleft.threads import count_threads, run_parts
+from topleft.threads import run_parts
 from topleft.view import View
 
 __all__ = ["Blending", "blend_colors"]
@@ -28,8 +28,8 @@ class Blending:
     by_area: bool
 
     @classmethod
-    def parse(cls, mode: object, alpha: object, colors: NDArray[Any], view: View) -> Blending | None:
-        """Check the options of a call; None when a triangle simply replaces what its samples held.
+    def parse(cls, mode: object, alpha: object, colors: NDArray[Any], view: View) -> Blending:
+        """Check the options of a call.
 
         Raises
         ------
@@ -44,25 +44,27 @@ class Blending:
             )
         if view.classic and chosen.mode is not Blend.REPLACE:
             raise ValueError(f"blend must be 'replace' for method {view.classic.name!r}, got {str(chosen.mode)!r}")
-        return chosen if chosen.by_area or chosen.mode is not Blend.REPLACE else None
+        return chosen
+
+    @property
+    def is_needed(self) -> bool:
+        """False when a triangle simply replaces what its samples held."""
+        return self.by_area or self.mode is not Blend.REPLACE
 
 
 def blend_colors(
     memory: Memory,
     scene: _engine.Scene,
-    view: View,
-    n_triangles: int,
     colors: NDArray[Any],
     pixels: NDArray[Any],
     blending: Blending,
+    n_threads: int,
     *,
     is_flat: bool,
 ) -> bool:
     """Blend a scene into contiguous pixels; returns whether a triangle has an index outside the vertices."""
-    width, height = view.size
-    if not (width and height and n_triangles):
-        return False
-    n_parts = min(height, count_threads(view.threads, n_triangles))
+    height, width = pixels.shape[:2]
+    n_parts = min(height, n_threads)
     n_channels, is_u8 = 1 if colors.ndim == 1 else colors.shape[1], colors.dtype == np.uint8
     flat, palette = _engine.as_bytes(pixels), _engine.as_bytes(colors)
     packed = memory.empty("packed", (height * width,), np.int32) if is_u8 and n_channels != 4 else None

@@ -25,7 +25,7 @@ from topleft.files import SUFFIXES, load, save_image
 from topleft.fragments import Fragments
 from topleft.mesh import Mesh
 from topleft.models import Cull
-from topleft.render import DEFAULT_SIZE, visibility
+from topleft.render import DEFAULT_SIZE, draw_edges, visibility
 from topleft.scenes import SHAPES, shape
 from topleft.shade import DEFAULT_COLOR, Shading, eye_normals, shade
 
@@ -215,6 +215,8 @@ def _content(
             normals[frags.mask] = eye_normals(frags, mesh, camera, is_smooth=True)
             return normals
     color = shade(frags, mesh, camera, shading=options.shading, color=options.color, background=options.background)
+    if options.wireframe:
+        draw_edges(color, frags, mesh, camera, cull=options.cull, threads=options.threads)
     if suffix != ".npz":
         return color
     matrix = camera.clip_from_world(options.size)
@@ -297,6 +299,7 @@ def _parser() -> Parser:
     add("--background", type=_rgba, default=(255, 255, 255, 255), metavar="COLOR",
         help="a name, #rrggbb[aa] or transparent (default white)")
     add("--cull", choices=[str(side) for side in Cull], default="none", help="leave out triangles (default none)")
+    add("--wireframe", action="store_true", help="draw the edges over it")
     add("--views", type=_positive, default=1, metavar="N", help="a turntable of N pictures (default 1)")
     add("--threads", type=_positive, default=None, metavar="N", help="(default: as many as there are cores)")
     return parser

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -27,7 +28,13 @@ class Fragments:
         Depth of that triangle at the pixel's centre; the background's value elsewhere.
     mask : ndarray of bool, shape (H, W)
         Where there is a triangle.
+    samples_triangle, samples_depth : ndarray of int32 and of float32, shape (H, W, S)
+        The same for each sample, with several a pixel. `triangle`, `depth`, `mask` and the attributes are then those of
+        the first sample, which is nearest to the centre; `sample` gives those of another.
     """
+
+    #: Fragments of each sample when there are several.
+    _samples: tuple[Fragments, ...] = ()
 
     def __init__(
         self,
@@ -39,6 +46,8 @@ class Fragments:
     ) -> None:
         self.triangle = triangle
         self.depth = depth
+        self.samples_triangle = triangle[..., None]
+        self.samples_depth = depth[..., None]
         self._scene = scene
         self._n_vertices = n_vertices
         self._n_triangles = n_triangles
@@ -51,6 +60,26 @@ class Fragments:
     def mask(self) -> NDArray[np.bool_]:
         """Where there is a triangle, bool (H, W)."""
         return self.triangle >= 0
+
+    @classmethod
+    def of_samples(
+        cls,
+        triangle: NDArray[np.int32],
+        depth: NDArray[np.float32],
+        scenes: Sequence[_engine.Scene],
+        n_vertices: int,
+        n_triangles: int,
+    ) -> Fragments:
+        """Return the fragments of several samples: planes (S, H, W), and the scene as each sample sees it."""
+        samples = tuple(cls(*planes, n_vertices, n_triangles) for planes in zip(triangle, depth, scenes, strict=True))
+        frags = cls(triangle[0], depth[0], scenes[0], n_vertices, n_triangles)
+        frags._samples = samples
+        frags.samples_triangle, frags.samples_depth = np.moveaxis(triangle, 0, -1), np.moveaxis(depth, 0, -1)
+        return frags
+
+    def sample(self, i: int) -> Fragments:
+        """Return ids, depth and attributes at one sample of each pixel."""
+        return (self._samples or (self,))[i]
 
     def barycentric(self) -> NDArray[np.float32]:
         """Return the weights of the three vertices of the triangle that shows in each pixel.
@@ -119,4 +148,4 @@ class Fragments:
         return out if array.ndim > 1 else out[..., 0]
 
     def _ids(self) -> NDArray[np.int32]:
-        return np.ascontiguousarray(self.triangle, dtype=np.int32)
+        return np.require(self.triangle, np.int32, ["C", "A"])

@@ -13,11 +13,14 @@ __all__ = ["FreshMemory", "KeptMemory", "Memory", "ScratchMemory", "release_memo
 
 HUGE_PAGE = 2 << 20
 
-#: Most bytes that one name of a thread's scratch keeps between module-level calls; there are few names.
+#: Most bytes that one name of a thread's scratch keeps between module-level calls; `SCRATCH_NAMES` are all.
 MAX_SCRATCH_BYTES = 64 << 20
 
-#: What no result refers to once `coverage`, `overdraw` or `fill` has returned.
-SCRATCH_NAMES = frozenset({"covered", "labels", "others", "packed", "records", "triangles"})
+#: What no result refers to once `coverage`, `overdraw`, `fill` or `wireframe` has returned.
+SCRATCH_NAMES = frozenset(
+    {"bands", "bins", "covered", "labels", "others", "packed", "records", "sample colors", "sample labels", "triangles"}
+    | {"edge highs", "edge last_low", "edge starts", "edges"}
+)
 
 
 class Memory(Protocol):
@@ -100,11 +103,10 @@ SCRATCH = ScratchMemory()
 
 
 def release_memory() -> None:
-    """Give back the scratch memory that `coverage`, `overdraw` and `fill` keep for the calling thread.
+    """Give back the scratch memory that `coverage`, `overdraw`, `fill` and `wireframe` keep for the calling thread.
 
-    It holds snapped vertices, converted indices, labels and cells of areas: at most 64 MiB each, nothing once the
-    thread has ended.
-    `Rasterizer` objects keep their own memory for as long as they live.
+    It holds snapped vertices, converted indices, labels, cells and edges: at most 64 MiB each, nothing once the
+    thread has ended. `Rasterizer` objects keep their own memory for as long as they live.
     """
     SCRATCH.release()
 

@@ -3,16 +3,28 @@
 from __future__ import annotations
 
 from enum import IntEnum, StrEnum
+from functools import cache
 from typing import TypeVar
 
-__all__ = ["Alpha", "Blend", "ClipDepth", "Cull", "DepthTest", "Per", "Sampling", "Sink", "parse"]
+__all__ = ["Alpha", "Blend", "ClipDepth", "Cull", "DepthTest", "Per", "Resolve", "Sampling", "Sink", "parse"]
 
 
 class Sampling(StrEnum):
-    """Where a pixel is sampled."""
+    """Where a pixel is sampled, or which squares count."""
 
     CENTER = "center"
+    MSAA2 = "msaa2"
+    MSAA4 = "msaa4"
+    MSAA8 = "msaa8"
+    MSAA16 = "msaa16"
     AREA = "area"
+    OUTER = "outer"
+    INNER = "inner"
+
+    @property
+    def n_samples(self) -> int:
+        """Samples of a pixel, 1 unless there are several."""
+        return int(self.removeprefix("msaa")) if self.startswith("msaa") else 1
 
 
 class Cull(StrEnum):
@@ -63,6 +75,13 @@ class Alpha(StrEnum):
     PREMULTIPLIED = "premultiplied"
 
 
+class Resolve(StrEnum):
+    """What of the colours of a pixel's samples is averaged: the values, or the light that sRGB values stand for."""
+
+    VALUES = "values"
+    LINEAR = "linear"
+
+
 class Sink(IntEnum):
     """What happens to a covered sample; the numbers are `tl_sink` in ``csrc/topleft.h``."""
 
@@ -72,9 +91,16 @@ class Sink(IntEnum):
     PAINT = 3
     NEAREST = 4
     FARTHEST = 5
+    SAMPLES = 6
 
 
 Option = TypeVar("Option", bound=StrEnum)
+
+
+@cache
+def members(kind: type[Option]) -> dict[str, Option]:
+    """Return the members of an enum by their values: calling the enum takes five times as long."""
+    return {member.value: member for member in kind}
 
 
 def parse(kind: type[Option], name: str, value: object) -> Option:
@@ -85,8 +111,8 @@ def parse(kind: type[Option], name: str, value: object) -> Option:
     ValueError
         If `value` is none of the choices.
     """
-    try:
-        return kind(value)  # type: ignore[arg-type]
-    except ValueError:
+    member = members(kind).get(value) if isinstance(value, str) else None
+    if member is None:
         choices = ", ".join(repr(str(member)) for member in kind)
-        raise ValueError(f"{name} must be one of {choices}, got {value!r}") from None
+        raise ValueError(f"{name} must be one of {choices}, got {value!r}")
+    return member

@@ -7,133 +7,30 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
-from typing import Any, cast
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine
 from topleft.area import sum_areas
-from topleft.arrays import as_background, as_colors, as_matrix, as_out, as_triangles, as_vertices, bad_triangle
-from topleft.blend import Blending, blend_colors
-from topleft.classic import draw_classic, fill_classic, refuse_classic
+from topleft.arrays import as_out
+from topleft.classic import draw_classic, refuse_classic
 from topleft.fragments import Fragments
 from topleft.memory import Memory
 from topleft.methods import METHODS
-from topleft.models import DepthTest, Per, Sampling, Sink, parse
+from topleft.models import DepthTest, Sampling, Sink, parse
+from topleft.sampling import draw_planes, sample_positions
+from topleft.snapped import Snapped, check_triangles, snap_scene
 from topleft.threads import count_threads, run_parts
 from topleft.view import View
 
-__all__ = ["draw_coverage", "draw_fill", "draw_fragments", "draw_overdraw"]
+__all__ = ["canvas_of", "draw", "draw_all_samples", "draw_coverage", "draw_fragments", "draw_overdraw"]
 
-
-#: Fewer vertices are snapped by one thread: waking another takes as long.
-MIN_VERTICES_TO_SHARE = 50_000
 
 #: Triangles times threads. With fewer, threads that each set up every triangle are done before they have met twice.
 MIN_TRIANGLES_TO_SHARE = 1_000_000
-
-
-@dataclass(frozen=True, slots=True)
-class Snapped:
-    """A scene after the snap: ready to be drawn into any buffer of the view's size."""
-
-    scene: _engine.Scene
-    triangles: ArrayLike
-    corners: NDArray[np.int32]
-    n_vertices: int
-    n_triangles: int
-    has_depth: bool
-
-
-def snap_scene(
-    memory: Memory, vertices: ArrayLike, triangles: ArrayLike, view: View, *, with_depth: bool, out: object
-) -> Snapped:
-    """Take arrays through transform, clip and snap.
-
-    Indices are checked where they are read anyway, while drawing; before that only when an error may not leave a trace
-    in the caller's `out`, or when the vertices need a closer look.
-
-    Raises
-    ------
-    ValueError
-        If a vertex that a triangle uses is not finite, or lies beyond 2**62 sub-pixels.
-    IndexError
-        If a triangle names a vertex that does not exist, and indices are checked here.
-    """
-    points = as_vertices(vertices, has_transform=view.transform is not None)
-    matrix = None if view.transform is None else as_matrix(view.transform, points.dtype)
-    source = _engine.Source(points, matrix)
-    corners, is_checked = index_triangles(memory, triangles, len(points))
-    n_triangles = len(corners)
-    n = len(points) if n_triangles and 0 not in view.size else 0
-    records = memory.empty("records", (n * _engine.VERTEX_BYTES,), np.uint8)
-    engine_view = view.engine_view() if source.is_clip_space and n else None
-
-    def snap(first: int, end: int) -> tuple[int, int, int]:
-        if engine_view:
-            return source.project(first, end, engine_view, records, wide)
-        return source.snap(first, end, view.subpixel_bits, with_depth, records, wide)
-
-    wide: NDArray[np.int64] | None = None
-    bad = clipped = 0
-    if n:
-        n_parts = count_threads(view.threads, n_triangles) if n >= MIN_VERTICES_TO_SHARE else 1
-        bad, n_wide, clipped = (sum(counts) for counts in zip(*run_parts(snap, n, n_parts), strict=True))
-        if n_wide:
-            wide = np.empty((n, 2), np.int64)
-            snap(0, n)
-    if not is_checked and (out is not None or n == 0 or bad or clipped):
-        check_triangles(triangles, corners, len(points))
-    if bad:
-        check_used_vertices(points, records, corners, view)
-    pieces = _engine.Pieces(source, records, corners, engine_view) if engine_view and clipped else None
-    drawn = corners if n else corners[:0]
-    scene = _engine.Scene(
-        source, records, wide, drawn, pieces, *view.origin, view.subpixel_bits, view.cull, view.method
-    )
-    has_depth = source.is_clip_space or points.shape[1] == 3
-    return Snapped(scene, triangles, corners, len(points), n_triangles, has_depth)
-
-
-def index_triangles(memory: Memory, triangles: ArrayLike, n_vertices: int) -> tuple[NDArray[np.int32], bool]:
-    """Return triangles as int32, and whether their indices have been checked on the way."""
-    indices = as_triangles(triangles)
-    if indices.dtype == np.int32:
-        return cast(NDArray[np.int32], indices), False
-    corners: NDArray[np.int32] = memory.empty("triangles", indices.shape, np.int32)
-    row = _engine.narrow_triangles(cast(NDArray[np.int64], indices), n_vertices, corners)
-    if row >= 0:
-        raise bad_triangle(triangles, row, n_vertices)
-    return corners, True
-
-
-def check_triangles(triangles: ArrayLike, corners: NDArray[np.int32], n_vertices: int) -> None:
-    """Raise an error for the first triangle that names a vertex that does not exist."""
-    row = _engine.first_bad_row(corners, n_vertices)
-    if row >= 0:
-        raise bad_triangle(triangles, row, n_vertices)
-
-
-def check_used_vertices(
-    points: NDArray[Any], records: NDArray[np.uint8], corners: NDArray[np.int32], view: View
-) -> None:
-    """Raise an error for the first vertex that cannot be drawn, if a triangle uses it."""
-    i = _engine.first_bad(records, corners)
-    if i < 0:
-        return
-    row = points[i]
-    if not np.isfinite(row).all():
-        raise ValueError(f"vertices must be finite where a triangle uses them, got {row.tolist()} in row {i}")
-    if view.transform is not None:
-        raise ValueError(f"vertices must stay finite under transform, got {row.tolist()} in row {i}")
-    if abs(row[:2].astype(float)).max() < 2.0 ** (62 - view.subpixel_bits):
-        raise ValueError(f"vertices must have a depth that float32 can hold, got {row.tolist()} in row {i}")
-    raise ValueError(
-        f"vertices must lie within 2**{62 - view.subpixel_bits} pixels of 0 with {view.subpixel_bits} sub-pixel bits, "
-        f"got {row.tolist()} in row {i}"
-    )
 
 
 def draw(
@@ -150,15 +47,19 @@ def draw(
     if 0 in view.size:
         return
     covered: NDArray[np.uint64] | None = None
-    if sink is Sink.MASK:
-        covered = memory.empty("covered", _engine.Target.covered_shape(height, width), np.uint64)
-    target = _engine.Target(sink, pixels, depth, covered)
+    samples: NDArray[np.int32] | None = None
+    if sink is Sink.SAMPLES:
+        samples = sample_positions(view.sampling.n_samples, view.grid_bits)
+    if sink in (Sink.MASK, Sink.SAMPLES):
+        n_samples = 1 if samples is None else len(samples)
+        covered = memory.empty("covered", _engine.Target.covered_shape(height, width, n_samples), np.uint64)
+    target = _engine.Target(sink, pixels, depth, covered, samples)
     n_parts = min(height, count_threads(view.threads, snapped.n_triangles))
 
     def draw_rows(first: int, end: int) -> int:
         return snapped.scene.draw(target, first, end - first)
 
-    if is_shared(snapped, view, n_parts):
+    if is_shared(snapped, view, n_parts, sink):
         bad_rows = draw_shared(memory, snapped, target, height, n_parts)
     else:
         bad_rows = run_parts(draw_rows, height, n_parts)
@@ -166,17 +67,22 @@ def draw(
         check_triangles(snapped.triangles, snapped.corners, snapped.n_vertices)
 
 
-def is_shared(snapped: Snapped, view: View, n_parts: int) -> bool:
+def is_shared(snapped: Snapped, view: View, n_parts: int, sink: Sink) -> bool:
     """Tell whether each thread is to take a share of the triangles instead of setting up all of them."""
+    pays = snapped.n_triangles * n_parts >= MIN_TRIANGLES_TO_SHARE
+    fits_lanes = sink is not Sink.SAMPLES or view.grid_bits <= 8
+    return n_parts > 1 and pays and fits_lanes and can_share(view)
+
+
+def can_share(view: View) -> bool:
+    """Tell whether a pass over a scene can draw some of its triangles."""
     width, height = view.size
     is_near = max(map(abs, view.origin)) < 2**29 and width * height < 2**31
-    pays = snapped.n_triangles * n_parts >= MIN_TRIANGLES_TO_SHARE
-    return n_parts > 1 and pays and is_near and view.method == METHODS["auto"].code
+    fits_lanes = not view.test or view.subpixel_bits <= 8
+    return is_near and fits_lanes and view.method == METHODS["auto"].code
 
 
-def draw_shared(
-    memory: Memory, snapped: Snapped, target: _engine.Target, height: int, n_parts: int
-) -> list[int]:
+def draw_shared(memory: Memory, snapped: Snapped, target: _engine.Target, height: int, n_parts: int) -> list[int]:
     """Draw as `draw` does: each part a share of the triangles into its own rows, then what others have found for it."""
     scene, n = snapped.scene, snapped.n_triangles
     rows = [height * i // n_parts for i in range(n_parts + 1)]
@@ -198,34 +104,16 @@ def draw_shared(
     return list(bad_rows)
 
 
-def paint(
-    memory: Memory, snapped: Snapped, view: View, colors: NDArray[Any], pixels: NDArray[Any], *, is_flat: bool
-) -> None:
-    """Draw coloured triangles over contiguous pixels: first which triangle shows in each, then its colour."""
-    width, height = view.size
-    if not (width and height and snapped.n_triangles):
-        return
-    labels = memory.empty("labels", (height, width), np.int32)
-    draw(memory, snapped, view, Sink.LABEL, labels)
-    palette, flat = _engine.as_bytes(colors), _engine.as_bytes(pixels)
-    n_channels = 1 if colors.ndim == 1 else colors.shape[1]
-
-    def paint_rows(first: int, end: int) -> None:
-        snapped.scene.paint(labels, palette, flat, first, end - first, is_flat, colors.dtype == np.uint8, n_channels)
-
-    run_parts(paint_rows, height, count_threads(view.threads, snapped.n_triangles))
-
-
 @contextmanager
 def canvas_of(
     memory: Memory, name: str, out: object, shape: tuple[int, ...], dtype: type, *, keep: bool = False
 ) -> Iterator[tuple[NDArray[Any], NDArray[Any]]]:
-    """Give the array to return and a contiguous one to draw into; afterwards both are the same picture.
+    """Give the array to return and a contiguous aligned one to draw into; afterwards both are the same picture.
 
     `keep`: what is in `out` shows through where nothing is drawn.
     """
     result = memory.empty(name, shape, dtype) if out is None else as_out("out", out, shape, dtype)
-    canvas = result if result.flags.c_contiguous else np.empty(shape, dtype)
+    canvas = result if result.flags.carray else np.empty(shape, dtype)
     if keep and canvas is not result:
         canvas[...] = result
     yield result, canvas
@@ -244,10 +132,10 @@ def draw_area(
     return result
 
 
-def refuse_area(view: View, verb: str) -> None:
-    """Raise an error where a pixel needs one triangle, and areas are of many."""
-    if view.sampling is Sampling.AREA:
-        raise ValueError(f"sampling 'area' gives no ids: {verb} takes 'center'")
+def refuse_many(view: View, verb: str) -> None:
+    """Raise an error where a pixel needs one triangle, and areas or squares are of many."""
+    if view.sampling in (Sampling.AREA, Sampling.OUTER, Sampling.INNER):
+        raise ValueError(f"sampling {str(view.sampling)!r} gives no ids: {verb} takes 'center' and 'msaa2' to 'msaa16'")
 
 
 def draw_coverage(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, view: View, out: object) -> NDArray[Any]:
@@ -257,8 +145,27 @@ def draw_coverage(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, vie
     snapped = snap_scene(memory, vertices, triangles, view, with_depth=False, out=out)
     if view.sampling is Sampling.AREA:
         return draw_area(memory, "coverage", snapped, view, out, is_clamped=True)
+    if view.sampling.n_samples > 1:
+        with canvas_of(memory, "coverage share", out, view.size[::-1], np.float32) as (result, canvas):
+            draw(memory, snapped, view, Sink.SAMPLES, canvas)
+        return result
     with canvas_of(memory, "coverage", out, view.size[::-1], np.bool_) as (result, canvas):
         draw(memory, snapped, view, Sink.MASK, canvas)
+    return result
+
+
+def draw_sample_counts(memory: Memory, snapped: Snapped, view: View, out: object) -> NDArray[np.int32]:
+    """Return how many triangles cover each sample, (H, W, S): a plane a sample in memory."""
+    n, (width, height) = view.sampling.n_samples, view.size
+    planes = memory.empty("sample counts", (n, height, width), np.int32)
+    for plane, at in zip(planes, sample_positions(n, view.grid_bits).tolist(), strict=True):
+        seen = replace(snapped, scene=snapped.scene.seen_from(*at))
+        draw(memory, seen, view, Sink.COUNT, plane)
+    counts = np.moveaxis(planes, 0, -1)
+    if out is None:
+        return counts
+    result = as_out("out", out, counts.shape, np.int32)
+    result[...] = counts
     return result
 
 
@@ -269,65 +176,57 @@ def draw_overdraw(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, vie
     snapped = snap_scene(memory, vertices, triangles, view, with_depth=False, out=out)
     if view.sampling is Sampling.AREA:
         return draw_area(memory, "overdraw", snapped, view, out, is_clamped=False)
+    if view.sampling.n_samples > 1:
+        return draw_sample_counts(memory, snapped, view, out)
     with canvas_of(memory, "overdraw", out, view.size[::-1], np.int32) as (result, canvas):
         draw(memory, snapped, view, Sink.COUNT, canvas)
     return result
 
 
-def colors_are_flat(n_colors: int, snapped: Snapped, per: str) -> bool:
-    """Tell whether a row of colours belongs to a triangle; otherwise it belongs to a vertex."""
-    choice = parse(Per, "per", per)
-    n_triangles = snapped.n_triangles
-    fits_triangles, fits_vertices = n_colors == n_triangles, n_colors == snapped.n_vertices
-    if choice is Per.AUTO and fits_triangles and fits_vertices and n_colors:
-        raise ValueError(
-            f"colors has {n_colors} rows, and there are as many triangles as vertices: "
-            "say per='triangle' or per='vertex'"
-        )
-    if choice is not Per.VERTEX and fits_triangles:
-        return True
-    if choice is not Per.TRIANGLE and fits_vertices:
-        return False
-    wish = {
-        Per.TRIANGLE: f"{n_triangles} rows, one per triangle",
-        Per.VERTEX: f"{snapped.n_vertices} rows, one per vertex",
-        Per.AUTO: f"{n_triangles} rows, one per triangle, or {snapped.n_vertices}, one per vertex",
-    }[choice]
-    raise ValueError(f"colors must have {wish}, got {n_colors}")
-
-
-def draw_fill(
+def draw_samples(
     memory: Memory,
-    vertices: ArrayLike,
-    triangles: ArrayLike,
-    colors: ArrayLike,
+    snapped: Snapped,
     view: View,
-    per: str,
-    background: ArrayLike | None,
-    out: object,
-    *,
-    blend: str,
-    alpha: str,
-) -> NDArray[Any]:
-    """`fill`, on the memory given."""
-    palette = as_colors(colors)
-    blending = Blending.parse(blend, alpha, palette, view)
-    if view.classic:
-        return fill_classic(view.classic, memory, vertices, triangles, palette, view, per, background, out)
-    snapped = snap_scene(memory, vertices, triangles, view, with_depth=False, out=out)
-    is_flat = colors_are_flat(len(palette), snapped, per)
-    shape = (*view.size[::-1], *palette.shape[1:])
-    ground = as_background(background, palette)
-    with canvas_of(memory, "fill", out, shape, palette.dtype.type, keep=ground is None) as (result, canvas):
-        if ground is not None:
-            canvas[...] = ground
-        elif out is None:
-            canvas.fill(0)
-        if blending is None:
-            paint(memory, snapped, view, palette, canvas, is_flat=is_flat)
-        elif blend_colors(memory, snapped.scene, view, snapped.n_triangles, palette, canvas, blending, is_flat=is_flat):
-            check_triangles(snapped.triangles, snapped.corners, snapped.n_vertices)
-    return result
+    sink: Sink,
+    background_depth: float | None,
+    ids_out: object,
+    depth_out: object,
+) -> Fragments:
+    """Return the visibility buffer of every sample: a plane a sample in memory."""
+    (width, height), n = view.size, view.sampling.n_samples
+    positions = sample_positions(n, view.grid_bits)
+    ids: NDArray[np.int32] = memory.empty("sample ids", (n, height, width), np.int32)
+    depth: NDArray[np.float32] = memory.empty("sample depth", (n, height, width), np.float32)
+    draw_all_samples(memory, snapped, view, positions, sink, ids, depth)
+    if background_depth is not None:
+        depth[ids < 0] = background_depth
+    for name, out, planes in (("triangle", ids_out, ids), ("depth", depth_out, depth)):
+        if out is not None:
+            result = as_out(f"out {name}", out, (height, width, n), planes.dtype.type)
+            result[...] = np.moveaxis(planes, 0, -1)
+    scenes = [snapped.scene.seen_from(x, y) for x, y in positions.tolist()]
+    return Fragments.of_samples(ids, depth, scenes, snapped.n_vertices, snapped.n_triangles)
+
+
+def draw_all_samples(
+    memory: Memory,
+    snapped: Snapped,
+    view: View,
+    positions: NDArray[np.int32],
+    sink: Sink,
+    pixels: NDArray[np.int32],
+    depth: NDArray[np.float32] | None,
+) -> None:
+    """Clear (S, H, W) planes and draw what each sample sees."""
+    width, height = view.size
+    if not (width and height):
+        return
+    n_threads = min(height, count_threads(view.threads, snapped.n_triangles))
+    is_near = snapped.n_triangles > 0 and can_share(view)
+    if draw_planes(
+        memory, snapped.scene, snapped.n_triangles, positions, sink, pixels, depth, n_threads, is_near=is_near
+    ):
+        check_triangles(snapped.triangles, snapped.corners, snapped.n_vertices)
 
 
 def draw_fragments(
@@ -341,7 +240,7 @@ def draw_fragments(
 ) -> Fragments:
     """`rasterize`, on the memory given."""
     refuse_classic(view, "depth")
-    refuse_area(view, "rasterize")
+    refuse_many(view, "rasterize")
     test = None if depth_test is None else parse(DepthTest, "depth_test", depth_test)
     if out is None:
         ids_out = depth_out = None
@@ -352,14 +251,17 @@ def draw_fragments(
             raise TypeError(f"out must be a pair (triangle, depth) of arrays, got {type(out).__name__}") from None
     snapped = snap_scene(memory, vertices, triangles, view, with_depth=True, out=out)
     sink = {None: Sink.PAINT, DepthTest.LESS: Sink.NEAREST, DepthTest.GREATER: Sink.FARTHEST}[test]
+    if not snapped.has_depth:
+        sink = Sink.PAINT
+        background_depth = -np.inf if test is DepthTest.GREATER and background_depth is None else background_depth
+    if view.sampling.n_samples > 1:
+        return draw_samples(memory, snapped, view, sink, background_depth, ids_out, depth_out)
     shape = view.size[::-1]
     with (
         canvas_of(memory, "triangle", ids_out, shape, np.int32) as (ids, ids_canvas),
         canvas_of(memory, "depth", depth_out, shape, np.float32) as (depth, depth_canvas),
     ):
-        draw(memory, snapped, view, sink if snapped.has_depth else Sink.PAINT, ids_canvas, depth=depth_canvas)
-        if test is DepthTest.GREATER and not snapped.has_depth and background_depth is None:
-            background_depth = -np.inf
+        draw(memory, snapped, view, sink, ids_canvas, depth=depth_canvas)
         if background_depth is not None:
             depth_canvas[ids_canvas < 0] = background_depth
     return Fragments(ids, depth, snapped.scene, snapped.n_vertices, snapped.n_triangles)

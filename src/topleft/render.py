@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from topleft.api import rasterize
+from topleft.api import rasterize, wireframe
 from topleft.camera import Camera
 from topleft.fragments import Fragments
 from topleft.mesh import Mesh
@@ -18,6 +18,7 @@ from topleft.shade import DEFAULT_COLOR, shade
 
 DEFAULT_SIZE = (640, 480)
 WHITE = (255, 255, 255, 255)
+EDGE_COLOR = (24, 28, 40)
 
 
 def render(
@@ -29,6 +30,7 @@ def render(
     color: tuple[int, ...] = DEFAULT_COLOR,
     background: tuple[int, ...] = WHITE,
     cull: str = "none",
+    edges: bool = False,
     threads: int | None = None,
 ) -> npt.NDArray[np.uint8]:
     """A picture of the mesh.
@@ -49,6 +51,8 @@ def render(
         sRGB, and alpha if it is not opaque; white unless given, `(0, 0, 0, 0)` is transparent.
     cull : {"none", "back", "front"}
         Triangles to leave out, by the side that is seen.
+    edges : bool
+        Whether the edges that show are drawn over it, as smooth dark lines.
     threads : int, optional
         How many threads draw; never changes a bit.
 
@@ -71,7 +75,10 @@ def render(
     """
     camera = default_camera(mesh, size) if camera is None else camera
     frags = visibility(mesh, camera, size, cull=cull, threads=threads)
-    return shade(frags, mesh, camera, shading=shading, color=color, background=background)
+    picture = shade(frags, mesh, camera, shading=shading, color=color, background=background)
+    if edges:
+        draw_edges(picture, frags, mesh, camera, cull=cull, threads=threads)
+    return picture
 
 
 def visibility(
@@ -106,6 +113,44 @@ def visibility(
     camera = default_camera(mesh, size) if camera is None else camera
     transform = camera.clip_from_world(view.get("viewport") or size)
     return rasterize(mesh.vertices, mesh.triangles, size, transform=transform, cull=cull, threads=threads, **view)
+
+
+def draw_edges(
+    picture: npt.NDArray[np.uint8],
+    frags: Fragments,
+    mesh: Mesh,
+    camera: Camera,
+    *,
+    cull: str = "none",
+    threads: int | None = None,
+) -> None:
+    """Draw the edges of the mesh over its picture (H, W, 4), those that the visibility buffer does not hide."""
+    height, width = frags.depth.shape
+    lines = wireframe(
+        mesh.vertices, mesh.triangles, (width, height), transform=camera.clip_from_world((width, height)),
+        depth=depth_behind(frags.depth), antialias=True, cull=cull, threads=threads,
+    )  # fmt: skip
+    on = lines > 0
+    share = lines[on][:, None]
+    under = picture[on].astype(np.float32)
+    alpha = share + (1 - share) * (under[:, 3:] / 255)  # "over", T. Porter, T. Duff, Compositing Digital Images, 1984
+    rgb = share * np.array(EDGE_COLOR, np.float32) + (1 - share) * (under[:, 3:] / 255) * under[:, :3]
+    picture[on] = np.rint(np.hstack([rgb / alpha, 255 * alpha])).astype(np.uint8)
+
+
+def depth_behind(depth: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+    """The depth that edges may have and still show: farther by what the surface falls away within a pixel.
+
+    The slope along each axis is the smaller of those to the two neighbours: the other one may jump to another surface.
+    """
+    behind = depth.copy()
+    for axis in range(2):
+        with np.errstate(invalid="ignore"):
+            step = np.abs(np.diff(depth, axis=axis, prepend=np.inf, append=np.inf))
+        before, after = np.delete(step, -1, axis), np.delete(step, 0, axis)
+        slope = np.fmin(before, after)  # NaN: nothing on either side
+        behind += np.where(np.isfinite(slope), slope, 0)
+    return behind
 
 
 def default_camera(mesh: Mesh, size: tuple[int, int]) -> Camera:

@@ -11,10 +11,12 @@ from topleft import _engine
 from topleft.arrays import as_size, as_subpixel_bits, as_window
 from topleft.methods import Method, find_method
 from topleft.models import ClipDepth, Cull, Sampling, parse
+from topleft.sampling import SAMPLE_GRID_BITS
 from topleft.threads import parse_threads
 
 __all__ = ["View", "ViewOptions"]
 
+TEST_CODES = {Sampling.OUTER: 1, Sampling.INNER: 2}  # tl_test in csrc/topleft.h
 CULL_CODES = {Cull.NONE: 0, Cull.BACK: 1, Cull.FRONT: 2}  # tl_cull in csrc/topleft.h
 
 
@@ -34,6 +36,9 @@ class ViewOptions(TypedDict, total=False):
     threads: int | None
 
 
+OPTIONS = frozenset(ViewOptions.__annotations__)
+
+
 @dataclass(frozen=True, slots=True)
 class View:
     """Checked `ViewOptions`."""
@@ -43,6 +48,7 @@ class View:
     viewport: tuple[int, int]
     transform: ArrayLike | None
     subpixel_bits: int
+    grid_bits: int  # of the grid that holds the snapped vertices and all samples
     sampling: Sampling
     method: int
     cull: int
@@ -54,25 +60,34 @@ class View:
 
     def engine_view(self) -> _engine.View:
         """Return how clip space maps to pixels."""
-        return _engine.View(self.viewport, self.subpixel_bits, self.zero_to_one, self.near_clip, self.far_clip)
+        bits = self.subpixel_bits, self.grid_bits
+        return _engine.View(self.viewport, *bits, self.zero_to_one, self.near_clip, self.far_clip)
+
+    @property
+    def test(self) -> int:
+        """When a triangle covers a pixel: `tl_test` in ``csrc/topleft.h``."""
+        return TEST_CODES.get(self.sampling, 0)
 
     @classmethod
     def parse(cls, size: object, options: ViewOptions) -> View:
         """Check the options of a call."""
-        unknown = sorted(set(options) - set(ViewOptions.__annotations__))
-        if unknown:
-            raise TypeError(f"unknown option {unknown[0]!r}; the options are {', '.join(ViewOptions.__annotations__)}")
+        if not options.keys() <= OPTIONS:
+            unknown = min(options.keys() - OPTIONS)
+            raise TypeError(f"unknown option {unknown!r}; the options are {', '.join(ViewOptions.__annotations__)}")
         checked_size = as_size(size)
         bits = as_subpixel_bits(options.get("subpixel_bits", 8))
+        sampling = parse(Sampling, "sampling", options.get("sampling", "center"))
+        grid_bits = bits if sampling.n_samples == 1 else max(SAMPLE_GRID_BITS, bits)
         viewport = options.get("viewport")
         method = find_method(options.get("method", "auto"))
         return cls(
             size=checked_size,
-            origin=as_window(options.get("origin", (0, 0)), bits),
+            origin=as_window(options.get("origin", (0, 0)), grid_bits),
             viewport=checked_size if viewport is None else as_size(viewport, "viewport", smallest=1),
             transform=options.get("transform"),
             subpixel_bits=bits,
-            sampling=parse(Sampling, "sampling", options.get("sampling", "center")),
+            grid_bits=grid_bits,
+            sampling=sampling,
             method=method.code or 0,
             cull=CULL_CODES[parse(Cull, "cull", options.get("cull", "none"))],
             zero_to_one=parse(ClipDepth, "clip_depth", options.get("clip_depth", "minus_one_to_one"))

@@ -278,28 +278,36 @@ def _signed_area(corners: tuple[Vertex, Vertex, Vertex]) -> int:
     return edge_function(a, b, c)  # twice the area
 
 
-def fragments(vertices: Any, triangles: Any, size: Point, *, origin: Point = (0, 0), **view: Any) -> Iterator[Fragment]:
+def fragments(
+    vertices: Any, triangles: Any, size: Point, *, origin: Point = (0, 0), sample: Point = (0, 0), **view: Any
+) -> Iterator[Fragment]:
     """Yield every covered sample of every piece, in drawing order; parameters as for `pieces`.
 
-    The frame is the window of the whole picture at ``origin``.  Coordinates are doubled, so that a pixel centre is an
-    integer even with 0 sub-pixel bits.
+    The frame is the window of the whole picture at ``origin``.  Each pixel is sampled at its centre, or ``sample``
+    sixteenths of a pixel from it, -8 to 7.  Coordinates are sixteenths of a sub-pixel, so that samples are integers
+    even with 0 sub-pixel bits.
     """
     bits, (x_origin, y_origin) = view.get("subpixel_bits", 8), origin
     for piece in pieces(vertices, triangles, size, **view):
-        a, b, c = ((2 * v.xy_fx[0], 2 * v.xy_fx[1]) for v in piece.vertices)
+        a, b, c = ((16 * v.xy_fx[0], 16 * v.xy_fx[1]) for v in piece.vertices)
         if edge_function(a, b, c) > 0:
             edges = [(b, c), (c, a), (a, b)]  # opposite the first, second and third vertex
         else:
             edges = [(c, b), (a, c), (b, a)]
         owned = [is_top_left(*edge) for edge in edges]
-        # Pixels that the bounding box touches, in the window.
-        x_px, y_px = ([v.xy_fx[k] >> bits for v in piece.vertices] for k in range(2))
-        for row in range(max(0, min(y_px) - y_origin), min(size[1], max(y_px) + 1 - y_origin)):
-            for column in range(max(0, min(x_px) - x_origin), min(size[0], max(x_px) + 1 - x_origin)):
-                centre = ((2 * (column + x_origin) + 1) << bits, (2 * (row + y_origin) + 1) << bits)
-                e0, e1, e2 = (edge_function(*edge, centre) for edge in edges)
-                if all(e > 0 or (e == 0 and is_owned) for e, is_owned in zip((e0, e1, e2), owned, strict=True)):
-                    yield Fragment(row, column, piece, (e0, e1, e2))
+        for row, column in touched_pixels(piece, size, origin, bits):
+            at = ((16 * (column + x_origin) + 8 + sample[0]) << bits, (16 * (row + y_origin) + 8 + sample[1]) << bits)
+            e0, e1, e2 = (edge_function(*edge, at) for edge in edges)
+            if all(e > 0 or (e == 0 and is_owned) for e, is_owned in zip((e0, e1, e2), owned, strict=True)):
+                yield Fragment(row, column, piece, (e0, e1, e2))
+
+
+def touched_pixels(piece: Piece, size: Point, origin: Point, bits: int) -> Iterator[Point]:
+    """Yield ``(row, column)`` of the pixels of the window that the bounding box of a piece touches."""
+    x_px, y_px = ([v.xy_fx[k] >> bits for v in piece.vertices] for k in range(2))
+    for row in range(max(0, min(y_px) - origin[1]), min(size[1], max(y_px) + 1 - origin[1])):
+        for column in range(max(0, min(x_px) - origin[0]), min(size[0], max(x_px) + 1 - origin[0])):
+            yield row, column
 
 
 # ---- pictures -------------------------------------------------------------------------------------------------------

@@ -1,0 +1,126 @@
+"""The exact reference of the other kinds of sampling: several samples a pixel, and conservative coverage.
+
+In: scenes, as in `reference`.  Out: what each sample, or each pixel square, must hold.  Integers only: samples and the
+corners of pixels are counted in sixteenths of a sub-pixel.
+
+Based on: Microsoft, Direct3D 11.3 Functional Specification, 2015 (standard sample patterns);
+S. Gottschalk, M. C. Lin, D. Manocha, OBBTree: A Hierarchical Structure for Rapid Interference Detection, 1996
+(separating axes); J. Hasselgren, T. Akenine-Möller, L. Ohlsson, Conservative Rasterization, GPU Gems 2, 2005.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from topleft.methods import reference
+from topleft.methods.reference import Piece, Point
+
+# From the centre of the pixel, x right and y down, in sixteenths of a pixel.
+SAMPLE_POSITIONS: dict[int, tuple[Point, ...]] = {
+    1: ((0, 0),),
+    2: ((4, 4), (-4, -4)),
+    4: ((-2, -6), (6, -2), (-6, 2), (2, 6)),
+    8: ((1, -3), (-1, 3), (5, 1), (-3, -5), (-5, 5), (-7, -1), (3, 7), (7, -7)),
+    16: (
+        (1, 1), (-1, -3), (-3, 2), (4, -1), (-5, -2), (2, 5), (5, 3), (3, -5),
+        (-2, 6), (0, -7), (-4, -6), (-6, 4), (-8, 0), (7, -4), (6, 7), (-7, -8),
+    ),
+}  # fmt: skip
+
+
+# ---- several samples a pixel ----------------------------------------------------------------------------------------
+
+
+def sample_coverage(vertices: Any, triangles: Any, size: Point, n_samples: int, **view: Any) -> np.ndarray:
+    """Return which samples are covered: bool, shape (H, W, S).
+
+    Examples
+    --------
+    >>> sample_coverage([[0, 0], [2, 0], [0, 2]], [[0, 1, 2]], (2, 1), 4).astype(int)
+    array([[[1, 1, 1, 1],
+            [1, 0, 1, 0]]])
+    """
+    return _stack(reference.coverage, vertices, triangles, size, n_samples, **view)
+
+
+def sample_ids(vertices: Any, triangles: Any, size: Point, n_samples: int, **options: Any) -> np.ndarray:
+    """Return which triangle each sample sees: int32, shape (H, W, S), -1 for none; options of `reference.visible`."""
+    return _stack(reference.ids, vertices, triangles, size, n_samples, **options)
+
+
+def sample_depth(vertices: Any, triangles: Any, size: Point, n_samples: int, **options: Any) -> np.ndarray:
+    """Return how deep what each sample sees lies at that sample: Fraction, shape (H, W, S), None for nothing."""
+    return _stack(reference.depth, vertices, triangles, size, n_samples, **options)
+
+
+def _stack(verb: Callable[..., np.ndarray], *scene: Any, **options: Any) -> np.ndarray:
+    *arrays, n_samples = scene
+    return np.stack([verb(*arrays, sample=at, **options) for at in SAMPLE_POSITIONS[n_samples]], axis=-1)
+
+
+# ---- conservative coverage ------------------------------------------------------------------------------------------
+
+
+def outer(vertices: Any, triangles: Any, size: Point, **view: Any) -> np.ndarray:
+    """Return which pixel squares a triangle meets in positive area: bool, shape (H, W).
+
+    Examples
+    --------
+    >>> outer([[0, 0], [2, 0], [0, 2]], [[0, 1, 2]], (3, 2)).astype(int)
+    array([[1, 1, 0],
+           [1, 0, 0]])
+    """
+    return _conservative(_meets, vertices, triangles, size, **view)
+
+
+def inner(vertices: Any, triangles: Any, size: Point, **view: Any) -> np.ndarray:
+    """Return which pixel squares lie wholly inside one triangle, its border included: bool, shape (H, W).
+
+    Of a triangle that a clip plane cuts, each piece counts by itself.
+
+    Examples
+    --------
+    >>> inner([[0, 0], [2, 0], [0, 2]], [[0, 1, 2]], (3, 2)).astype(int)
+    array([[1, 0, 0],
+           [0, 0, 0]])
+    """
+    return _conservative(_holds, vertices, triangles, size, **view)
+
+
+def _conservative(
+    test: Callable[[list[Point], list[Point]], bool], vertices: Any, triangles: Any, size: Point, *,
+    origin: Point = (0, 0), **view: Any,
+) -> np.ndarray:  # fmt: skip
+    bits = view.get("subpixel_bits", 8)
+    picture = np.zeros((size[1], size[0]), bool)
+    for piece in reference.pieces(vertices, triangles, size, **view):
+        corners = _turned(piece)
+        for row, column in reference.touched_pixels(piece, size, origin, bits):
+            x, y = (column + origin[0]) << bits, (row + origin[1]) << bits
+            far_x, far_y = x + (1 << bits), y + (1 << bits)
+            picture[row, column] |= test(corners, [(x, y), (far_x, y), (far_x, far_y), (x, far_y)])
+    return picture
+
+
+def _turned(piece: Piece) -> list[Point]:
+    """Return the corners in the order in which their signed area is positive."""
+    a, b, c = (v.xy_fx for v in piece.vertices)
+    return [a, b, c] if reference.edge_function(a, b, c) > 0 else [a, c, b]
+
+
+def _meets(triangle: list[Point], square: list[Point]) -> bool:
+    """Tell whether the interiors meet: no edge of either has the other wholly outside or on its line."""
+    return not any(
+        all(reference.edge_function(a, b, p) <= 0 for p in other)
+        for polygon, other in ((triangle, square), (square, triangle))
+        for a, b in zip(polygon, polygon[1:] + polygon[:1], strict=True)
+    )
+
+
+def _holds(triangle: list[Point], square: list[Point]) -> bool:
+    """Tell whether every corner of the square is inside or on every edge."""
+    edges = zip(triangle, triangle[1:] + triangle[:1], strict=True)
+    return all(reference.edge_function(a, b, p) >= 0 for a, b in edges for p in square)
