@@ -12,6 +12,8 @@ from strategies import Scene, fan, jittered_grid, perspective, soup
 import topleft as tl
 from topleft.methods import reference as exact
 from topleft.methods import reference_blend as ref
+from topleft.methods.reference_sampling import mean
+from topleft.sampling import POSITIONS
 
 MODES = ("replace", "over", "add", "multiply", "max", "min")
 CHANNELS = (1, 2, 3, 4)
@@ -343,6 +345,42 @@ def test_blend_by_area_shows_seams_that_the_sum_of_areas_does_not():
 # ---- the calls ------------------------------------------------------------------------------------------------------
 
 ONE = ([[0, 0], [4, 0], [0, 4]], [[0, 1, 2]])
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize("dtype", [np.uint8, np.float32])
+@pytest.mark.parametrize(("mode", "alpha", "n_channels"), CASES)
+def test_blend_of_samples_is_the_mean_of_pictures_by_samples(mode, alpha, n_channels, dtype, isa):
+    rng = np.random.default_rng(n_channels)
+    scene = mixed(rng, 90, (41, 13))
+    vertices = np.round(scene.vertices[:, :2] * 256) / 256  # on the grid, so that moving them moves no corner
+    colors = random_colors(rng, (len(scene.triangles), n_channels), dtype, alpha)
+    options = {"per": "triangle", "background": random_colors(rng, (n_channels,), dtype, alpha), "alpha": alpha}
+    pictures = [
+        tl.fill(vertices - np.array(at) / 16, scene.triangles, colors, scene.size, blend=mode, **options)
+        for at in POSITIONS[4]
+    ]
+    is_straight = n_channels in (2, 4) and alpha == "straight" and mode in ("over", "replace")
+    samples = np.moveaxis(pictures, 0, 2)
+    expected = [[mean(pixel, is_straight=is_straight) for pixel in row] for row in samples]
+    for threads in (1, 3):
+        with on(isa):
+            view = {"sampling": "msaa4", "threads": threads}
+            got = tl.fill(vertices, scene.triangles, colors, scene.size, blend=mode, **options, **view)
+        if dtype == np.uint8:
+            assert_same(got, np.array(expected, np.uint8))
+        else:
+            assert abs(got - np.array(expected)).max() < 2**-22  # float64 sums rounded once, of numbers below 4
+
+
+def test_blend_of_samples_at_half_alpha_shows_no_seams():
+    scene = fan(np.random.default_rng(3), 40, 60)
+    colors = np.full((len(scene.triangles), 2), (255, 128), np.uint8)
+    view = {"blend": "over", "background": (0, 255), "per": "triangle", "sampling": "msaa8"}
+    got = tl.fill(scene.vertices[:, :2], scene.triangles, colors, scene.size, **view)
+    whole = tl.coverage(scene.vertices[:, :2], scene.triangles, scene.size, sampling="msaa8") == 1
+    assert whole.sum() > 500
+    assert (got[whole] == (128, 255)).all()
 
 
 def test_blend_goes_to_out_of_any_layout():

@@ -164,12 +164,15 @@ def fill(
         What the colour of a triangle does to what is there, one triangle after the other. "over" lets it through by the
         alpha of the colour, the last of 2 or 4 channels. The others act on each channel alike, alpha included; uint8
         sums stop at 255, and 255 is 1 in products. With ``sampling="area"`` the share of the pixel that the triangle
-        covers multiplies alpha, or is the share of the way from the old colour to the new.
+        covers multiplies alpha, or is the share of the way from the old colour to the new. With several samples a pixel
+        each sample is blended by itself.
     alpha : "straight" or "premultiplied"
-        Whether colours and picture have been multiplied by alpha. Only "over" looks at it, and "replace" by area.
+        Whether colours and picture, the last of 2 or 4 channels alpha, have been multiplied by it. "over" looks at it,
+        and "replace" where colours meet in a pixel, by area or in the mean of samples. Numbers that are no colours want
+        "premultiplied": all channels alike.
     resolve : "values" or "linear"
         With several samples a pixel ("msaa4", say) each pixel is the mean of its samples: of their values as they are,
-        or, for uint8, of the light that sRGB values stand for; the last of 2 or 4 channels is alpha, averaged as it is.
+        or, for uint8, of the light that sRGB values stand for (alpha, the last of 2 or 4 channels, as it is).
     out : ndarray of uint8 or float32, shape (H, W, C) or (H, W), optional
         Is drawn over.
 

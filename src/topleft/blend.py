@@ -26,6 +26,7 @@ class Blending:
     mode: Blend
     alpha: Alpha
     by_area: bool
+    has_alpha: bool
 
     @classmethod
     def parse(cls, mode: object, alpha: object, colors: NDArray[Any], view: View) -> Blending:
@@ -36,9 +37,10 @@ class Blending:
         ValueError
             If an option is unknown, "over" lacks alpha, or a classic is to blend.
         """
-        chosen = cls(parse(Blend, "blend", mode), parse(Alpha, "alpha", alpha), view.sampling is Sampling.AREA)
         n_channels = 1 if colors.ndim == 1 else colors.shape[1]
-        if chosen.mode is Blend.OVER and n_channels not in (2, 4):
+        modes = parse(Blend, "blend", mode), parse(Alpha, "alpha", alpha)
+        chosen = cls(*modes, by_area=view.sampling is Sampling.AREA, has_alpha=n_channels in (2, 4))
+        if chosen.mode is Blend.OVER and not chosen.has_alpha:
             raise ValueError(
                 f"colors must have 2 or 4 channels, the last of them alpha, for blend 'over', got {n_channels}"
             )
@@ -50,6 +52,11 @@ class Blending:
     def is_needed(self) -> bool:
         """False when a triangle simply replaces what its samples held."""
         return self.by_area or self.mode is not Blend.REPLACE
+
+    @property
+    def is_straight(self) -> bool:
+        """Whether the mode treats the last channel as alpha that colours have not been multiplied by."""
+        return self.has_alpha and self.alpha is Alpha.STRAIGHT and self.mode in (Blend.OVER, Blend.REPLACE)
 
 
 def blend_colors(

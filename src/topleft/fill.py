@@ -51,7 +51,7 @@ def draw_fill(
         )
     palette = as_colors(colors)
     blending = Blending.parse(style.blend, style.alpha, palette, view)
-    transfer = parse_resolve(style.resolve, palette, view, blending.alpha)
+    transfer = parse_resolve(style.resolve, palette, view, is_straight=blending.is_straight)
     if view.classic:
         return fill_classic(view.classic, memory, vertices, triangles, palette, view, style.per, style.background, out)
     snapped = snap_scene(memory, vertices, triangles, view, with_depth=False, out=out)

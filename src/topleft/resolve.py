@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from topleft import _engine
 from topleft.memory import Memory
-from topleft.models import Alpha, Resolve, parse
+from topleft.models import Resolve, parse
 from topleft.threads import run_parts
 from topleft.view import View
 
@@ -32,7 +32,9 @@ def srgb_tables() -> tuple[NDArray[np.int32], NDArray[np.uint8]]:
     return np.rint(LINEAR_ONE * decoded).astype(np.int32), np.rint(255 * encoded).astype(np.uint8)
 
 
-def parse_resolve(resolve: object, colors: NDArray[Any], view: View, alpha: Alpha) -> _engine.Transfer | None:
+def parse_resolve(
+    resolve: object, colors: NDArray[Any], view: View, *, is_straight: bool
+) -> _engine.Transfer | None:
     """Return what is averaged; None when it is the values as they are.
 
     Raises
@@ -46,11 +48,9 @@ def parse_resolve(resolve: object, colors: NDArray[Any], view: View, alpha: Alph
             f"resolve 'linear' takes sRGB colours of uint8, got {colors.dtype}: float32 is averaged as it is"
         )
     n_channels = 1 if colors.ndim == 1 else colors.shape[1]
-    has_alpha = n_channels in (2, 4)
-    is_straight = has_alpha and alpha is Alpha.STRAIGHT
     if view.sampling.n_samples == 1 or not (is_linear or is_straight):
         return None
-    return _engine.Transfer(srgb_tables() if is_linear else None, n_channels - has_alpha, is_straight)
+    return _engine.Transfer(srgb_tables() if is_linear else None, n_channels - (n_channels in (2, 4)), is_straight)
 
 
 def resolve_flat(
