@@ -104,7 +104,19 @@ typedef enum {
     TL_SINK_FARTHEST = 5, /* id and depth where depth > what is there; at equal depth the lower id */
     TL_SINK_SAMPLES = 6,  /* float: the share of samples that are covered; bits in `covered` until the last pass */
     TL_SINK_BLEND = 7,    /* the colour of the triangle that `blend` draws; not for draw */
+    TL_SINK_PEEL = 8,     /* ids and depths of the nearest layers, sorted: `peeled` */
 } tl_sink;
+
+/* The layers of pixels: of every covered sample of a pixel the n_layers that come first by depth, then id.  Planes, the first one
+ * first; id -1 and the depth that every other comes before where there are fewer. */
+#define TL_MAX_LAYERS 16
+typedef struct {
+    int n_layers;    /* 1 to TL_MAX_LAYERS */
+    int is_farthest; /* the larger depth comes first */
+    int32_t *ids;    /* the window's first pixel in the first plane, with the rows of the target */
+    float *depth;
+    int64_t plane_px; /* from plane to plane */
+} tl_peeled;
 
 typedef struct {
     tl_sink sink;
@@ -116,6 +128,7 @@ typedef struct {
     int sample_bits;           /* SAMPLES: 2^sample_bits samples a pixel, 1 to 4; stride_px is the width of the window */
     const int32_t *samples_fx; /* (2^sample_bits, 2): x, y of each from the pixel's centre */
     int sample;                /* the one that is being drawn; draw knows */
+    const tl_peeled *peeled;   /* PEEL; the window has less than 2^31 pixels */
 } tl_target;
 
 /* A bit a sample, and a word behind the end. */
@@ -128,6 +141,7 @@ typedef struct {
     const tl_pieces *pieces;  /* of triangles with TL_CLIPPED vertices, or NULL */
     tl_cull cull;
     tl_method method;
+    int32_t first_id; /* what triangle 0 is called in a buffer of ids that several scenes share; read by draw alone */
 } tl_scene;
 
 /* The part of a scene that one pass draws.  Several passes may share a scene: each takes some of the triangles, draws what of

@@ -5,6 +5,7 @@ from topleft._isa import build_info
 from topleft.api import Rasterizer, coverage, fill, overdraw, rasterize, wireframe
 from topleft.camera import Camera
 from topleft.classic import bresenham_line
+from topleft.depth_layers import DepthLayers, peel
 from topleft.errors import MeshError, TopleftError
 from topleft.files import load, save_image
 from topleft.fragments import Fragments
@@ -18,6 +19,7 @@ __version__: str = build_info()["version"]
 
 __all__ = [
     "Camera",
+    "DepthLayers",
     "Fragments",
     "Mesh",
     "MeshError",
@@ -30,6 +32,7 @@ __all__ = [
     "fill",
     "load",
     "overdraw",
+    "peel",
     "rasterize",
     "release_memory",
     "render",

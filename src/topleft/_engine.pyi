@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 VERTEX_BYTES: int
 CELL_CLEAR: int
 AREA_OVERFLOW: int
+MAX_LAYERS: int
 SCALARS: dict[np.dtype[Any], int]
 
 def use_isa(name: str) -> None: ...
@@ -85,7 +86,11 @@ class Scene:
         test: int = 0,
     ) -> None: ...
     def seen_from(self, x_fx: int, y_fx: int) -> Scene: ...
-    def draw(self, target: Target, first_row: int, n_rows: int) -> int: ...
+    def numbered_from(self, first_id: int) -> Scene: ...
+    def moved(self, x_px: int, y_px: int) -> Scene: ...
+    def draw(
+        self, target: Target, first_row: int, n_rows: int, is_first: bool = True, is_last: bool = True
+    ) -> int: ...
     def draw_share(
         self, target: Target, first_row: int, n_rows: int, first: int, others: NDArray[np.int32]
     ) -> tuple[int, int]: ...
@@ -168,8 +173,23 @@ class Bins:
     def fill(self, listed: NDArray[np.int32]) -> None: ...
 
 def draw_bands(
-    scenes: Sequence[Scene], targets: Sequence[Target], bins: Bins, first_band: int, end_band: int
+    scenes: Sequence[Scene],
+    targets: Sequence[Target],
+    bins: Bins,
+    first_band: int,
+    end_band: int,
+    is_first: bool = True,
 ) -> None: ...
+def peel(
+    scenes: Sequence[Scene],
+    bins: Sequence[Bins | None],
+    ids: NDArray[np.int32],
+    depth: NDArray[np.float32],
+    is_farthest: bool,
+    band_bits: int,
+    first_band: int,
+    end_band: int,
+) -> int: ...
 
 class Transfer:
     def __init__(

@@ -46,6 +46,12 @@ cdef extern from "topleft.h" nogil:
     ctypedef int tl_cull
     ctypedef int tl_method
     ctypedef int tl_sink
+    int TL_MAX_LAYERS, TL_SINK_PEEL
+    ctypedef struct tl_peeled:
+        int n_layers, is_farthest
+        int32_t *ids
+        float *depth
+        int64_t plane_px
     ctypedef struct tl_target:
         tl_sink sink
         void *pixels
@@ -56,6 +62,7 @@ cdef extern from "topleft.h" nogil:
         int sample_bits
         const int32_t *samples_fx
         int sample
+        const tl_peeled *peeled
     int64_t tl_covered_words(int64_t)
     ctypedef struct tl_bins:
         int64_t n
@@ -92,6 +99,7 @@ cdef extern from "topleft.h" nogil:
         const tl_pieces *pieces
         tl_cull cull
         tl_method method
+        int32_t first_id
     ctypedef struct tl_share:
         const int32_t *ids
         int64_t first, end
@@ -141,6 +149,7 @@ include "_dispatch.pxi"
 VERTEX_BYTES = sizeof(tl_vertex)
 CELL_CLEAR = TL_CELL_CLEAR
 AREA_OVERFLOW = TL_AREA_OVERFLOW
+MAX_LAYERS = TL_MAX_LAYERS
 SCALARS = {np.dtype(np.float32): 0, np.dtype(np.float64): 1, np.dtype(np.int64): 2}  # tl_scalar
 
 
@@ -244,6 +253,7 @@ cdef class Target:
         t.n_samples = t.sample = 0  # draw knows
         t.sample_bits = self.sample_bits
         t.samples_fx = &self.samples[0, 0] if self.samples is not None else NULL
+        t.peeled = NULL
         return t
 
 
@@ -333,16 +343,33 @@ cdef class Scene:
         self.scene.n_triangles = triangles.shape[0]
         self.scene.triangles = &triangles[0, 0] if triangles.shape[0] else NULL
         self.scene.pieces = &pieces.pieces if pieces is not None and len(pieces) else NULL
-        self.scene.cull, self.scene.method = cull, method
+        self.scene.cull, self.scene.method, self.scene.first_id = cull, method, 0
         self.x_px, self.y_px, self.subpixel_bits, self.test = x_px, y_px, subpixel_bits, test
 
     def seen_from(self, int32_t x_fx, int32_t y_fx):
         """Return the same scene with its samples off the centres of the pixels, in sub-pixels."""
-        cdef Scene seen = Scene.__new__(Scene)
-        seen.scene, seen.arrays = self.scene, self.arrays
-        seen.x_px, seen.y_px, seen.subpixel_bits, seen.test = self.x_px, self.y_px, self.subpixel_bits, self.test
+        cdef Scene seen = self.copy()
         seen.scene.mesh.sample_x_fx, seen.scene.mesh.sample_y_fx = x_fx, y_fx
         return seen
+
+    def numbered_from(self, int32_t first_id):
+        """Return the same scene with other ids in the buffers that `draw` fills: triangle 0 is called `first_id`."""
+        cdef Scene named = self.copy()
+        named.scene.first_id = first_id
+        return named
+
+    def moved(self, int64_t x_px, int64_t y_px):
+        """Return the same scene behind a window that begins x_px columns and y_px rows later."""
+        cdef Scene part = self.copy()
+        part.x_px += x_px
+        part.y_px += y_px
+        return part
+
+    cdef Scene copy(self):
+        cdef Scene other = Scene.__new__(Scene)
+        other.scene, other.arrays = self.scene, self.arrays
+        other.x_px, other.y_px, other.subpixel_bits, other.test = self.x_px, self.y_px, self.subpixel_bits, self.test
+        return other
 
     cdef tl_window window(self, int64_t first_row, int64_t n_rows, int64_t width) noexcept:
         cdef tl_window w
@@ -350,8 +377,8 @@ cdef class Scene:
         w.width, w.height, w.test = width, n_rows, self.test
         return w
 
-    def draw(self, Target target, int64_t first_row, int64_t n_rows):
-        """Clear and draw rows of a picture.
+    def draw(self, Target target, int64_t first_row, int64_t n_rows, bint is_first=True, bint is_last=True):
+        """Draw rows of a picture, which the first of several scenes clears and the last one finishes.
 
         Returns -1, or a number that is not negative when a triangle has an index outside the vertices.
         """
@@ -360,7 +387,7 @@ cdef class Scene:
         cdef tl_share share
         cdef int64_t bad_row
         share.ids = share.others = NULL
-        share.first, share.end, share.is_first, share.is_last = 0, self.scene.n_triangles, True, True
+        share.first, share.end, share.is_first, share.is_last = 0, self.scene.n_triangles, is_first, is_last
         with nogil:
             bad_row = K.draw(&self.scene, &window, &rows, &share)
         return bad_row
@@ -491,8 +518,8 @@ cdef class Bins:
             K.list_bins(&self.bins, self.n_bands, &self.starts[0], &listed[0])
 
 
-def draw_bands(scenes, targets, Bins bins, int64_t first_band, int64_t end_band):
-    """Clear and draw bands of several pictures, a scene each, one band of all after the other."""
+def draw_bands(scenes, targets, Bins bins, int64_t first_band, int64_t end_band, bint is_first=True):
+    """Draw bands of several pictures, a scene each, one band of all after the other, over what is there unless is_first."""
     cdef Scene scene
     cdef Target target
     cdef tl_target rows
@@ -500,7 +527,7 @@ def draw_bands(scenes, targets, Bins bins, int64_t first_band, int64_t end_band)
     cdef tl_share share
     cdef int64_t band, first_row
     cdef list pairs = list(zip(scenes, targets, strict=True))
-    share.others, share.first, share.is_first, share.is_last = NULL, 0, True, True
+    share.others, share.first, share.is_first, share.is_last = NULL, 0, is_first, True
     for band in range(first_band, end_band):
         first_row = band << bins.band_bits
         share.ids = &bins.listed[0] + bins.starts[band]
@@ -510,6 +537,42 @@ def draw_bands(scenes, targets, Bins bins, int64_t first_band, int64_t end_band)
             window = scene.window(first_row, min(<int64_t>1 << bins.band_bits, target.height - first_row), target.width)
             with nogil:
                 K.draw(&scene.scene, &window, &rows, &share)
+
+
+def peel(scenes, bins, int32_t[:, :, ::1] ids, float[:, :, ::1] depth, bint is_farthest, int band_bits,
+         int64_t first_band, int64_t end_band):
+    """Write the nearest layers of all scenes together, as planes (K, H, W), in bands of 2**band_bits rows.
+
+    `bins`: those of each scene, or None, where a band is to look at all triangles. Returns as `Scene.draw` does.
+    """
+    cdef tl_peeled peeled
+    cdef tl_target target
+    cdef tl_window window
+    cdef tl_share share
+    cdef Scene scene
+    cdef Bins own
+    cdef int64_t band, first_row, height = ids.shape[1], width = ids.shape[2], bad_row = -1
+    cdef list pairs = list(zip(scenes, bins, strict=True))
+    cdef int64_t i, n = len(pairs)
+    peeled.n_layers, peeled.is_farthest = ids.shape[0], is_farthest
+    peeled.plane_px = height * width
+    target.sink, target.pixels, target.depth, target.covered, target.samples_fx = <tl_sink>TL_SINK_PEEL, NULL, NULL, NULL, NULL
+    target.stride_px, target.n_samples, target.sample, target.sample_bits, target.peeled = width, 0, 0, 0, &peeled
+    for band in range(first_band, end_band):
+        first_row = band << band_bits
+        peeled.ids, peeled.depth = &ids[0, first_row, 0], &depth[0, first_row, 0]
+        for i in range(n):
+            scene, own = pairs[i]
+            share.ids, share.others, share.first, share.end = NULL, NULL, 0, scene.scene.n_triangles
+            if own is not None:
+                share.ids, share.end = &own.listed[0] + own.starts[band], own.starts[band + 1] - own.starts[band]
+            share.is_first, share.is_last = i == 0, i == n - 1
+            window = scene.window(first_row, min(<int64_t>1 << band_bits, height - first_row), width)
+            with nogil:
+                bad_row = K.draw(&scene.scene, &window, &target, &share)
+            if bad_row >= 0:
+                return bad_row
+    return bad_row
 
 
 cdef class Transfer:

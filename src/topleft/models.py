@@ -92,6 +92,7 @@ class Sink(IntEnum):
     NEAREST = 4
     FARTHEST = 5
     SAMPLES = 6
+    PEEL = 8
 
 
 Option = TypeVar("Option", bound=StrEnum)
