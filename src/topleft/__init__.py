@@ -12,6 +12,8 @@ from topleft.fragments import Fragments
 from topleft.memory import release_memory
 from topleft.mesh import Mesh
 from topleft.render import render, visibility
+from topleft.scene import Instance, Scene
+from topleft.scene_fragments import SceneFragments
 from topleft.shade import shade
 from topleft.silhouette import silhouette
 
@@ -21,9 +23,12 @@ __all__ = [
     "Camera",
     "DepthLayers",
     "Fragments",
+    "Instance",
     "Mesh",
     "MeshError",
     "Rasterizer",
+    "Scene",
+    "SceneFragments",
     "TopleftError",
     "__version__",
     "bresenham_line",

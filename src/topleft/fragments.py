@@ -28,6 +28,8 @@ class Fragments:
         Depth of that triangle at the pixel's centre; the background's value elsewhere.
     mask : ndarray of bool, shape (H, W)
         Where there is a triangle.
+    id, instance : ndarray of int32, shape (H, W)
+        The same as `triangle`, and 0 where there is one: of several instances `SceneFragments` tells more.
     samples_triangle, samples_depth : ndarray of int32 and of float32, shape (H, W, S)
         The same for each sample, with several a pixel. `triangle`, `depth`, `mask` and the attributes are then those of
         the first sample, which is nearest to the centre; `sample` gives those of another.
@@ -44,7 +46,7 @@ class Fragments:
         n_vertices: int,
         n_triangles: int,
     ) -> None:
-        self.triangle = triangle
+        self.id = triangle
         self.depth = depth
         self.samples_triangle = triangle[..., None]
         self.samples_depth = depth[..., None]
@@ -57,9 +59,19 @@ class Fragments:
         return f"Fragments({width}x{height}, {self._n_triangles} triangles)"
 
     @property
+    def triangle(self) -> NDArray[np.int32]:
+        """Index of the triangle that shows in the pixel, int32 (H, W), -1 where there is none."""
+        return self.id
+
+    @property
+    def instance(self) -> NDArray[np.int32]:
+        """Index of the mesh that shows in the pixel, int32 (H, W): 0, -1 where there is none."""
+        return np.minimum(self.id, 0)
+
+    @property
     def mask(self) -> NDArray[np.bool_]:
         """Where there is a triangle, bool (H, W)."""
-        return self.triangle >= 0
+        return self.id >= 0
 
     @classmethod
     def of_samples(

@@ -1,6 +1,7 @@
-"""Rendering: a mesh and a camera to a picture, in one call.
+"""Rendering: a mesh or scene and a camera to a picture, in one call.
 
-Input: `Mesh`, `Camera`. Output: the picture (H, W, 4) uint8 of `render`, or the visibility buffer of `visibility`.
+Input: `Mesh` or `Scene`, `Camera`. Output: the picture (H, W, 4) uint8 of `render`, or the visibility
+buffer of `visibility`.
 """
 
 from __future__ import annotations
@@ -15,6 +16,9 @@ from topleft.camera import Camera
 from topleft.fragments import Fragments
 from topleft.mesh import Mesh
 from topleft.multisample import shade_samples
+from topleft.scene import Instance, Scene
+from topleft.scene_draw import draw_scene
+from topleft.scene_render import camera_of, cull_of, shade_scene
 from topleft.shade import DEFAULT_COLOR, as_color, eye_distance, shade
 
 DEFAULT_SIZE = (640, 480)
@@ -23,7 +27,7 @@ EDGE_COLOR = (24, 28, 40)
 
 
 def render(
-    mesh: Mesh,
+    mesh: Mesh | Scene,
     camera: Camera | None = None,
     size: tuple[int, int] = DEFAULT_SIZE,
     *,
@@ -35,11 +39,11 @@ def render(
     sampling: str = "center",
     threads: int | None = None,
 ) -> npt.NDArray[np.uint8]:
-    """A picture of the mesh.
+    """A picture of the mesh or scene.
 
     Parameters
     ----------
-    mesh : Mesh
+    mesh : Mesh or Scene
         What to draw. Its colours are used if it has any.
     camera : Camera, optional
         Unless given, the three-quarter view of `Camera.framing`, with y up.
@@ -84,19 +88,21 @@ def render(
     depth_range = distances(frags, camera) if shading == "depth" else None
 
     def shade_one(sample: Fragments) -> npt.NDArray[np.uint8]:
-        return shade(
-            sample, mesh, camera, shading=shading, color=color, background=background, depth_range=depth_range
-        )
+        look: Any = {"shading": shading, "color": color, "background": background, "depth_range": depth_range}
+        if isinstance(mesh, Scene):
+            return shade_scene(sample, mesh, camera, **look)
+        return shade(sample, mesh, camera, **look)
 
-    has_samples = frags.samples_triangle.shape[-1] > 1
+    has_samples = frags.samples_depth.shape[-1] > 1
     picture = shade_samples(frags, shade_one, background) if has_samples else shade_one(frags)
-    if edges:
-        draw_edges(picture, frags, mesh, camera, cull=cull, threads=threads)
+    for instance in (mesh if isinstance(mesh, Scene) else [Instance(mesh)]) if edges else []:
+        own_camera, own_cull = camera_of(camera, instance), cull_of(cull, instance)
+        draw_edges(picture, frags, instance.mesh, own_camera, cull=own_cull, threads=threads)
     return picture
 
 
 def visibility(
-    mesh: Mesh,
+    mesh: Mesh | Scene,
     camera: Camera | None = None,
     size: tuple[int, int] = DEFAULT_SIZE,
     *,
@@ -104,7 +110,7 @@ def visibility(
     threads: int | None = None,
     **view: Any,
 ) -> Fragments:
-    """The visibility buffer of the mesh: ids and depth per pixel, and attributes interpolated on demand.
+    """The visibility buffer of the mesh or scene: ids and depth per pixel, and attributes interpolated on demand.
 
     Parameters
     ----------
@@ -117,7 +123,8 @@ def visibility(
     -------
     Fragments
         `.triangle` (H, W) int32, -1 where there is nothing; `.depth` (H, W) float32, window depth in [0, 1], +inf where
-        there is nothing.
+        there is nothing. Of a scene `SceneFragments`: also `.instance` (H, W) int32, and `.triangle` counts the
+        triangles of its mesh.
 
     Raises
     ------
@@ -126,6 +133,8 @@ def visibility(
     """
     camera = default_camera(mesh, size) if camera is None else camera
     transform = camera.clip_from_world(view.get("viewport") or size)
+    if isinstance(mesh, Scene):
+        return draw_scene(mesh, transform, size, cull=cull, threads=threads, **view)
     return rasterize(mesh.vertices, mesh.triangles, size, transform=transform, cull=cull, threads=threads, **view)
 
 
@@ -176,7 +185,8 @@ def distances(frags: Fragments, camera: Camera) -> tuple[float, float] | None:
     return float(ends[0]), float(ends[1])
 
 
-def default_camera(mesh: Mesh, size: tuple[int, int]) -> Camera:
-    """The three-quarter view of the mesh with y up, for a picture of this size."""
+def default_camera(mesh: Mesh | Scene, size: tuple[int, int]) -> Camera:
+    """The three-quarter view of the mesh or scene with y up, for a picture of this size."""
     width, height = size
-    return Camera.framing(mesh, aspect=width / height if width > 0 and height > 0 else 1.0)
+    subject = mesh.extreme_points() if isinstance(mesh, Scene) else mesh
+    return Camera.framing(subject, aspect=width / height if width > 0 and height > 0 else 1.0)
