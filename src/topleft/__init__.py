@@ -16,6 +16,7 @@ from topleft.scene import Instance, Scene
 from topleft.scene_fragments import SceneFragments
 from topleft.shade import shade
 from topleft.silhouette import silhouette
+from topleft.view_layers import ViewLayers, render_layers
 
 __version__: str = build_info()["version"]
 
@@ -30,6 +31,7 @@ __all__ = [
     "Scene",
     "SceneFragments",
     "TopleftError",
+    "ViewLayers",
     "__version__",
     "bresenham_line",
     "build_info",
@@ -41,6 +43,7 @@ __all__ = [
     "rasterize",
     "release_memory",
     "render",
+    "render_layers",
     "save_image",
     "scenes",
     "shade",
