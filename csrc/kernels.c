@@ -22,6 +22,7 @@
 #include "smooth_lines.c"
 #include "lines.c"
 #include "mean.c"
+#include "composite.c"
 #include "mix.h"
 #include "mix_u8.c"
 #include "mix_f32.c"
@@ -49,6 +50,7 @@ const tl_kernels TL_KERNELS = {
     .paint_gouraud = paint_gouraud,
     .list_edges = list_edges,
     .draw_lines = draw_lines,
+    .composite = composite,
     .mean_flat = mean_flat,
     .mean_colors = mean_colors,
 };

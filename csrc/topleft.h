@@ -218,6 +218,18 @@ static inline int64_t tl_blend_cells(int64_t width)
     return atlas > strip ? atlas : strip;
 }
 
+/* The layers that are seen through each other, and their colours: straight, alpha last. */
+typedef struct {
+    const int32_t *ids; /* planes, of the first pixel on; -1 ends the layers of a pixel */
+    int64_t plane_px;
+    int n_layers;
+    int n_channels;          /* 2 or 4 */
+    int is_u8;               /* colours are 0 to 255, and pixels uint8; otherwise 0 to 1 and float32 */
+    int is_flat;             /* colours are of the triangles, uint8 or float32; otherwise float32 planes (n_layers, n, n_channels) */
+    const void *colors;
+    const float *background; /* (n_channels,), of the same range, behind all layers; or NULL */
+} tl_composite;
+
 /* ---- lines --------------------------------------------------------------------------------------------- */
 
 typedef struct {
@@ -308,6 +320,9 @@ typedef struct tl_kernels {
                       const tl_transfer *transfer, void *pixels);
     void (*mean_colors)(const void *colors, int sample_bits, int64_t stride, int64_t n, int n_channels, int is_u8,
                         const tl_transfer *transfer, void *pixels);
+
+    /* What is seen through the layers of n pixels. */
+    void (*composite)(const tl_composite *layers, int64_t n, void *pixels);
 
     /* The edges of the triangles that are not culled, each once, as lower index + 2^32 * higher index; room for three a
      * triangle.  Returns the first row with an index outside the vertices, or -1. */

@@ -5,6 +5,7 @@ from topleft._isa import build_info
 from topleft.api import Rasterizer, coverage, fill, overdraw, rasterize, wireframe
 from topleft.camera import Camera
 from topleft.classic import bresenham_line
+from topleft.composite import composite
 from topleft.depth_layers import DepthLayers, peel
 from topleft.errors import MeshError, TopleftError
 from topleft.files import load, save_image
@@ -35,6 +36,7 @@ __all__ = [
     "__version__",
     "bresenham_line",
     "build_info",
+    "composite",
     "coverage",
     "fill",
     "load",

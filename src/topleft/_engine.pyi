@@ -191,6 +191,18 @@ def peel(
     end_band: int,
 ) -> int: ...
 
+def composite(
+    ids: NDArray[np.int32],
+    first_row: int,
+    n_rows: int,
+    colors: NDArray[np.uint8],
+    is_flat: bool,
+    is_u8: bool,
+    n_channels: int,
+    background: NDArray[np.float32] | None,
+    pixels: NDArray[np.uint8],
+) -> None: ...
+
 class Transfer:
     def __init__(
         self, tables: tuple[NDArray[np.int32], NDArray[np.uint8]] | None, n_channels: int, is_straight: bool

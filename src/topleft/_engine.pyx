@@ -107,6 +107,12 @@ cdef extern from "topleft.h" nogil:
         int64_t n_others
         const tl_window *picture
         int is_first, is_last
+    ctypedef struct tl_composite:
+        const int32_t *ids
+        int64_t plane_px
+        int n_layers, n_channels, is_u8, is_flat
+        const void *colors
+        const float *background
     ctypedef struct tl_edges:
         tl_vertex_set mesh
         const tl_view *view
@@ -139,6 +145,7 @@ cdef extern from "topleft.h" nogil:
         void (*interpolate)(const tl_scene *, const tl_window *, const int32_t *, const float *, int, int, float, float *) noexcept nogil
         void (*paint_flat)(const int32_t *, int64_t, const uint8_t *, int, uint8_t *) noexcept nogil
         void (*paint_gouraud)(const tl_scene *, const tl_window *, const int32_t *, const void *, int, int, void *) noexcept nogil
+        void (*composite)(const tl_composite *, int64_t, void *) noexcept nogil
         int64_t (*list_edges)(const tl_scene *, const tl_edge_scratch *, uint64_t *, int64_t *) noexcept nogil
         void (*draw_lines)(const tl_edges *, const tl_window *, const tl_line_target *) noexcept nogil
         void (*mean_flat)(const int32_t *, int, int64_t, int64_t, const void *, int, int, const tl_transfer *, void *) noexcept nogil
@@ -573,6 +580,24 @@ def peel(scenes, bins, int32_t[:, :, ::1] ids, float[:, :, ::1] depth, bint is_f
             if bad_row >= 0:
                 return bad_row
     return bad_row
+
+
+def composite(const int32_t[:, :, ::1] ids, int64_t first_row, int64_t n_rows, const uint8_t[::1] colors, bint is_flat, bint is_u8,
+              int n_channels, const float[::1] background, uint8_t[::1] pixels):
+    """Write what is seen through layers, planes (K, H, W), in rows [first_row, first_row + n_rows) of a picture.
+
+    `colors`: of the triangles, or of the layers of these rows, (K, n_rows, W, n_channels) float32. `background` may be None.
+    """
+    cdef tl_composite layers
+    cdef int64_t width = ids.shape[2], n = n_rows * width
+    cdef int pixel_bytes = n_channels if is_u8 else 4 * n_channels
+    if n == 0:
+        return
+    layers.ids, layers.plane_px, layers.n_layers = &ids[0, first_row, 0], ids.shape[1] * width, ids.shape[0]
+    layers.n_channels, layers.is_u8, layers.is_flat, layers.colors = n_channels, is_u8, is_flat, data(colors)
+    layers.background = &background[0] if background is not None else NULL
+    with nogil:
+        K.composite(&layers, n, &pixels[first_row * width * pixel_bytes])
 
 
 cdef class Transfer:

@@ -37,31 +37,47 @@ class DepthLayers:
         Index of the triangle, -1 where there are fewer layers.
     depth : ndarray of float32, shape (H, W, K)
         Its depth; +inf where there are fewer, -inf with ``depth_test="greater"``.
+    planes : (ndarray of int32, ndarray of float32), each of shape (K, H, W)
+        The same numbers as they lie in memory.
     """
 
     def __init__(self, ids: NDArray[np.int32], depth: NDArray[np.float32], snapped: Snapped) -> None:
         """Take planes (K, H, W) of a scene."""
         self.triangle = np.moveaxis(ids, 0, -1)
         self.depth = np.moveaxis(depth, 0, -1)
-        self._planes = ids, depth
+        self.planes = ids, depth
         self._snapped = snapped
 
     def __repr__(self) -> str:
         height, width, n = self.triangle.shape
-        return f"DepthLayers({width}x{height}, {n} layers, {self._snapped.n_triangles} triangles)"
+        return f"DepthLayers({width}x{height}, {n} layers, {self.n_triangles} triangles)"
 
     def __len__(self) -> int:
-        return len(self._planes[0])
+        return len(self.planes[0])
+
+    @property
+    def n_triangles(self) -> int:
+        """Triangles of the mesh that was peeled."""
+        return self._snapped.n_triangles
+
+    @property
+    def n_vertices(self) -> int:
+        """Vertices of the mesh that was peeled."""
+        return self._snapped.n_vertices
 
     @property
     def count(self) -> NDArray[np.int32]:
         """How many layers a pixel has, at most K: int32 (H, W)."""
-        return (self._planes[0] >= 0).sum(0, dtype=np.int32)
+        return (self.planes[0] >= 0).sum(0, dtype=np.int32)
 
     def layer(self, k: int) -> Fragments:
         """Return layer k, 0 the nearest, as a visibility buffer of its own: attributes are computed there."""
-        ids, depth = self._planes
-        return Fragments(ids[k], depth[k], self._snapped.scene, self._snapped.n_vertices, self._snapped.n_triangles)
+        return self.rows(k, 0, len(self.triangle))
+
+    def rows(self, k: int, top: int, n_rows: int) -> Fragments:
+        """Return rows [top, top + n_rows) of layer k in the same way."""
+        (ids, depth), box = self.planes, (k, slice(top, top + n_rows))
+        return Fragments(ids[box], depth[box], self._snapped.scene.moved(0, top), self.n_vertices, self.n_triangles)
 
 
 def peel(
