@@ -44,15 +44,22 @@ class Surface:
         The point has the weights of the pixel in its triangle, relative to a corner: so what float32 rounds off them
         moves it by less than 2**-22 of the longest edge, along the triangle.
         """
-        mesh = self.instance.mesh
-        weights = self.part.frags.barycentric()[self.seen].astype(np.float64)
-        a, b, c = np.moveaxis(mesh.vertices[mesh.triangles[self.part.frags.triangle[self.seen]]].astype(float), 1, 0)
-        return a + weights[:, 1:2] * (b - a) + weights[:, 2:] * (c - a)
+        mesh, seen = self.instance.mesh, self.seen
+        weights, ids = self.part.frags.barycentric(), self.part.frags.triangle[seen]
+        is_few = len(ids) < len(mesh.triangles)  # of many triangles those that show, of few all
+        rows, row = (mesh.triangles[ids], np.arange(len(ids))) if is_few else (mesh.triangles, ids)
+        a, b, c = (mesh.vertices[corners].astype(np.float64, copy=False) for corners in rows.T)
+        points: F64 = a[row]
+        for k, edge in ((1, b - a), (2, c - a)):
+            along = edge[row]
+            along *= weights[..., k][seen][:, None]
+            points += along
+        return points
 
     @cached_property
     def points_world(self) -> F64:
         """The same in the world."""
-        return moved(self.points, self.instance.transform)
+        return moved(self.points, self.instance.transform[:3])
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,13 +120,17 @@ class Sight:
 
 
 def moved(points: F64, matrix: F64) -> F64:
-    """Points (P, 3) taken through an affine matrix (4, 4)."""
-    return points @ matrix[:3, :3].T + matrix[:3, 3]
+    """Points (P, 3) taken through the first rows of a matrix, (N, 4) of N rows: (P, N) float64.
+
+    Written out, for a library's product of matrices rounds as it likes.
+    """
+    x, y, z = points.T
+    return np.stack([((a * x + b * y) + c * z) + d for a, b, c, d in matrix], -1)
 
 
 def project(points: F64, clip_from: F64, size: tuple[int, int]) -> F64:
     """Where points (P, 3) lie in a picture, pixels (P, 2) float64; NaN for what is not in front of the camera."""
-    clip = np.hstack([points, np.ones((len(points), 1))]) @ clip_from.T
-    w = np.where(clip[:, 3] > 0, clip[:, 3], np.nan)
+    x, y, w = moved(points, clip_from[[0, 1, 3]]).T
+    w[~(w > 0)] = np.nan
     width, height = size
-    return np.stack([(clip[:, 0] / w + 1) * (width / 2), (1 - clip[:, 1] / w) * (height / 2)], -1)
+    return np.stack([(x / w + 1) * (width / 2), (1 - y / w) * (height / 2)], -1)

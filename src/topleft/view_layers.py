@@ -214,16 +214,19 @@ def depth(sight: Sight) -> Array:
 
 def distance(sight: Sight) -> Array:
     """Distance along the view (H, W) float32, world units, +inf where nothing is."""
-    return sight.join((), np.inf, lambda surface: -moved(surface.points_world, sight.camera.view)[:, 2])
+    return sight.join((), np.inf, lambda surface: -moved(surface.points_world, sight.camera.view[2:3])[:, 0])
 
 
 def ray_distance(sight: Sight) -> Array:
     """Distance from the eye (H, W) float32, world units, +inf where nothing is; along the view without perspective."""
     if not sight.camera.projection[3, :3].any():
         return distance(sight)
-    return sight.join(
-        (), np.inf, lambda surface: np.linalg.norm(moved(surface.points_world, sight.camera.view), axis=1)
-    )
+
+    def make(surface: Surface) -> F64:
+        x, y, z = moved(surface.points_world, sight.camera.view[:3]).T
+        return np.sqrt(x * x + y * y + z * z)
+
+    return sight.join((), np.inf, make)
 
 
 def triangle(sight: Sight) -> Array:
@@ -253,8 +256,12 @@ def camera_normal(sight: Sight) -> Array:
 
 def world_normal(sight: Sight) -> Array:
     """Unit normal in the world, (H, W, 3) float32, 0 where nothing is."""
-    linear = sight.camera.view[:3, :3]  # normals go back by the transpose, where positions go by the inverse
-    return sight.join((3,), 0.0, lambda surface: unit_or_zero(normals_of(surface, sight.camera).astype(float) @ linear))
+    back = np.hstack([sight.camera.view[:3, :3].T, np.zeros((3, 1))])  # the transpose, where positions take the inverse
+
+    def make(surface: Surface) -> F64:
+        return unit_or_zero(moved(normals_of(surface, sight.camera).astype(np.float64), back))
+
+    return sight.join((3,), 0.0, make)
 
 
 def normals_of(surface: Surface, camera: Camera) -> npt.NDArray[np.float32]:
