@@ -201,12 +201,23 @@ def tabulate(
 def run_atlas(
     progress: TextIO | None = None, names: Sequence[str] = (), methods: Sequence[str] = ()
 ) -> dict[str, Any]:
-    """Draw every family, or the named ones, with every entry, or the named ones; return the record."""
+    """Draw every family, or the named ones, with every entry, or the named ones; return the record.
+
+    Raises
+    ------
+    ValueError
+        For a family or an entry that does not exist.
+    """
 
     def tell(text: str) -> None:
         if progress:
             print(text, file=progress, flush=True)
 
+    for what, wished, known in (
+        ("--family", names, [*FAMILIES, *DEPTH_FAMILIES]), ("--method", methods, [entry.name for entry in entries()])
+    ):  # fmt: skip
+        if unknown := [name for name in wished if name not in known]:
+            raise ValueError(f"{what} must be some of {', '.join(known)}, got {', '.join(unknown)}")
     chosen = [entry for entry in entries() if not methods or entry.name in methods]
     record: dict[str, Any] = {"schema": SCHEMA, "kind": "atlas", "families": [], "maps": []}
     for family in FAMILIES.values():
