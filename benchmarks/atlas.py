@@ -23,8 +23,8 @@ from benchmarks.exact_integers import Points, draw_points, signed_area, snapped_
 from benchmarks.exact_unsnapped import ExactPicture
 
 SCHEMA = 1
-NO_FILL = "draws outlines, fills nothing"
-NO_DEPTH = "takes vertices in pixels, has no clip space and no depth"
+NO_FILL = "not applicable, it draws outlines and fills nothing"
+NO_DEPTH = "no classic, for they take vertices in pixels and have no clip space and no depth"
 
 
 @dataclass(frozen=True)
@@ -235,6 +235,6 @@ def run_atlas(
         record["families"].append(facts)
         record["maps"] += maps
     record["not_applicable"] = {"bresenham_scanline/wireframe": NO_FILL} | {
-        family.name: f"classics: {NO_DEPTH}" for family in DEPTH_FAMILIES.values()
+        family.name: NO_DEPTH for family in DEPTH_FAMILIES.values()
     }
     return record

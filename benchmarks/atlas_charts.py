@@ -30,24 +30,25 @@ STYLE = {"font.size": 8, "axes.titlesize": 9, "svg.hashsalt": "topleft", "svg.fo
          "hatch.linewidth": 0.5, "hatch.color": "0.6"}  # fmt: skip
 COLORS = "YlGnBu"
 NORM = LogNorm(1e-4, 1, clip=True)
-DARK = 0.12
+DARK = 0.03
 """Share from which text is white."""
-WITHOUT = "white: none; dot: gaps; hatched: refuses to draw; % of edge pixels"
+WITHOUT = "white: none; dot: with gaps; hatched: refuses to draw; % of edge pixels"
 
 Record = dict[str, Any]
 Row = dict[str, Any]
 
 
 def draw_charts(record: Record, folder: Path) -> list[Path]:
-    """Write the charts and the magnified scenes as PNG and SVG, return where they are."""
+    """Write the charts as PNG and SVG, the magnified scenes as PNG, return where they are."""
     folder.mkdir(parents=True, exist_ok=True)
     paths = []
     with plt.rc_context(STYLE):
         for name, figure in figures(record):
-            for suffix in ("png", "svg"):
+            is_sheet = name.startswith("scenes")  # pixels gain nothing from SVG
+            for suffix in ["png"] if is_sheet else ["png", "svg"]:
                 paths.append(folder / f"atlas-{name}.{suffix}")
                 metadata = {"Date": None} if suffix == "svg" else {}
-                figure.savefig(paths[-1], dpi=150, metadata=metadata)
+                figure.savefig(paths[-1], dpi=120, metadata=metadata)
             plt.close(figure)
     return paths
 
@@ -124,7 +125,7 @@ def chart_pair(record: Record, facts: Row) -> Figure:
 
 def chart_depth(record: Record, deep: list[Row]) -> Figure:
     """Return heat maps of wrong pixels of the production methods, a panel for each family with clip space or depth."""
-    figure, grid = plt.subplots((len(deep) + 1) // 2, 2, figsize=(10, 1.75 * ((len(deep) + 1) // 2)),
+    figure, grid = plt.subplots((len(deep) + 1) // 2, 2, figsize=(10, 1.95 * ((len(deep) + 1) // 2)),
                                 layout="constrained", squeeze=False)  # fmt: skip
     for axis in grid.flat[len(deep) :]:
         axis.set_axis_off()
@@ -135,7 +136,8 @@ def chart_depth(record: Record, deep: list[Row]) -> Figure:
         steps = steps_of(facts)
         axis.set_xticks(range(len(steps)), steps, rotation=90 if len(facts["axes"]) > 1 else 0, fontsize=6.5)
         axis.set_yticks(range(len(rows)), [row["entry"] for row in rows], fontsize=7)
-        axis.set_title(f"{facts['name']}: {facts['what']}, by {', '.join(facts['axes'])}", loc="left", fontsize=7)
+        axis.set_title(f"{facts['name']}: {facts['what']}", loc="left", fontsize=7.5)
+        axis.set_xlabel(", ".join(facts["axes"]), fontsize=7)
     figure.suptitle(f"shows the wrong triangle   ({WITHOUT.replace('edge pixels', 'pixels')})", fontsize=9, x=0.01,
                     ha="left")  # fmt: skip
     return figure

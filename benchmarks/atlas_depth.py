@@ -275,7 +275,7 @@ DEPTH_FAMILIES = {
         DepthFamily("eye", "a fan with corners close to the plane of the eye",
                     [Axis("w of the corners", W_VALUES)], fan_at_the_eye, judge_clip),
         DepthFamily("slope", "two sheets that cut each other",
-                    [Axis("depth slope, 1 per px", SLOPES)], slope, judge_depth),
+                    [Axis("depth slope, per px", SLOPES)], slope, judge_depth),
         DepthFamily("sheets", "two parallel sheets at depths from 0.5 to 1",
                     [Axis("distance of the sheets", power_of_two(8, 12, 16, 18, 20, 22, 23, 24, 25, 26, 28, 32))],
                     sheets, judge_depth),
@@ -283,7 +283,7 @@ DEPTH_FAMILIES = {
                     [Axis("layers", {str(n): n for n in (1, 255, 256, 65535, 65536)})], deep_layers, judge_layers),
         DepthFamily("slope-far", "two sheets that cut each other, far from the origin",
                     [Axis("distance from the origin, px", {"0": 0.0} | power_of_ten(3, 5, 7, 9, 12)),
-                     Axis("depth slope, 1 per px", power_of_ten(-3, 0, 3))],
+                     Axis("depth slope, per px", power_of_ten(-3, 0, 3))],
                     lambda offset, per_px, seed: slope(per_px, seed, offset), judge_depth, 2),
     )
 }  # fmt: skip

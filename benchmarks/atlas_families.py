@@ -86,11 +86,27 @@ def far(distance_px: float, seed: int) -> Scene:
     jitter[[0, -1], :, 1] = jitter[:, [0, -1], 0] = 0  # the border stays a square
     if spacing > 1:
         jitter[n, n] = 0  # a corner in the middle of the frame, where there are so few
-    i = np.arange(len(line) ** 2).reshape(len(line), -1)
+    origin = int(middle) - FRAME_PX // 2
+    return Scene((middle + (xy + jitter)).reshape(-1, 2), grid_triangles(len(line)), origin=(origin, origin))
+
+
+def dense(cell_px: float, seed: int) -> Scene:
+    """Return a jittered grid of cells of that size, in a frame of a quarter of the side."""
+    rng = np.random.default_rng(seed)
+    side_px = FRAME_PX // 4
+    line = np.arange(-cell_px, side_px + cell_px + cell_px / 2, cell_px)
+    xy = np.stack(np.meshgrid(line, line), -1)
+    xy[1:-1, 1:-1] += rng.uniform(-0.45, 0.45, (len(line) - 2, len(line) - 2, 2)) * cell_px
+    origin = int(MIDDLE_PX)
+    return Scene((MIDDLE_PX + xy).reshape(-1, 2), grid_triangles(len(line)), (side_px, side_px), (origin, origin))
+
+
+def grid_triangles(n: int) -> I32:
+    """Return two triangles for each cell of a grid of n by n points."""
+    i = np.arange(n * n).reshape(n, n)
     a, b, c, d = i[:-1, :-1], i[:-1, 1:], i[1:, :-1], i[1:, 1:]
     triangles = np.concatenate([np.stack([a, b, c], -1), np.stack([b, d, c], -1)]).reshape(-1, 3)
-    origin = int(middle) - FRAME_PX // 2
-    return Scene((middle + (xy + jitter)).reshape(-1, 2), triangles.astype(np.int32), origin=(origin, origin))
+    return triangles.astype(np.int32)
 
 
 def fan_of(hub: F64, rim: F64, *, closed: bool) -> tuple[F64, I32]:
@@ -197,6 +213,8 @@ FAMILIES = {
         Family("large", "triangles with corners far away", [
             Axis("distance of the corners, px", power_of_ten(2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 18))], large, 24),
         Family("sliver", "a band of slivers across the frame", [THICKNESSES], sliver, 24),
+        Family("dense", "a mesh of small triangles", [
+            Axis("cell of the mesh, px", {"8": 8.0, "4": 4.0, "2": 2.0} | power_of_two(0, 1, 2))], dense, 4),
         Family("fan", "a fan round a point of the frame", [
             Axis("triangles", {str(n): n for n in (3, 4, 8, 16, 32, 64, 128, 256, 512)})],
             lambda n, seed: fan(n, tuple(np.random.default_rng(seed + 9).uniform(-1, 1, 2)), seed), 4),

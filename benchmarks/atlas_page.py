@@ -49,7 +49,8 @@ def left_table(head: list[str], rows: list[list[str]]) -> Iterator[str]:
 
 def first_text(record: Record) -> str:
     """Where each method first leaves gaps, overdraws, shows wrong triangles, and refuses."""
-    families = [facts for facts in record["families"] if len(facts["axes"]) == 1 and facts["name"] not in DEPTH_FAMILIES]
+    flat = [facts for facts in record["families"] if facts["name"] not in DEPTH_FAMILIES]
+    families = [facts for facts in flat if len(facts["axes"]) == 1]
     cells: dict[str, list[str]] = {}
     for facts in families:
         for row in (row for row in record["maps"] if row["family"] == facts["name"]):
@@ -67,10 +68,10 @@ def first_cell(row: Row, steps: list[str]) -> str:
     for field, word in (("gaps", "**gaps**"), ("overdrawn", "overdraws"), ("wrong", "wrong")):
         step = next((i for i, count in enumerate(row[field]) if count), None)
         if step is not None and not (field == "wrong" and found):
-            found.append(f"{word} {steps[step]}" if step else word)
+            found.append(f"{word} from {steps[step]}" if step else word)
     step = next((i for i, count in enumerate(row["wrong"]) if count is None), None)
     if step is not None:
-        found.append(f"refuses {steps[step]}")
+        found.append(f"refuses from {steps[step]}")
     return ", ".join(found) or NEVER
 
 
@@ -109,8 +110,11 @@ def percent(count: int, n: int) -> str:
 
 
 def not_applicable_text(record: Record) -> str:
-    """Which cells are empty, and why."""
-    return "\n".join(f"- `{name}`: {why}." for name, why in record["not_applicable"].items())
+    """Which rows are missing, and why."""
+    reasons: dict[str, list[str]] = {}
+    for name, why in record["not_applicable"].items():
+        reasons.setdefault(why, []).append(f"`{name}`")
+    return "\n".join(f"- {', '.join(names)}: {why}." for why, names in reasons.items())
 
 
 def scenes_text(_: Record) -> str:
@@ -120,7 +124,8 @@ def scenes_text(_: Record) -> str:
         methods = ", ".join(f"`{got.method}`" + ("" if got.subpixel_bits == 8 else f" ({got.subpixel_bits} bits)")
                             for got in scene.got)  # fmt: skip
         rows.append([f"`{scene.name}`", str(len(scene.triangles)), str(scene.subpixel_bits), methods])
-    return "\n".join(left_table(["scene", "triangles", "the engine is right with bits", "who fails"], rows))
+    head = ["scene", "triangles", "bits", "who fails"]
+    return "\n".join("| " + " | ".join(row) + " |" for row in [head, ["---"] * len(head), *rows])
 
 
 PARTS: dict[str, Callable[[Record], str]] = {

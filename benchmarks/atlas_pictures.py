@@ -17,7 +17,7 @@ from topleft.failure_scenes import FAILURE_SCENES, FailureScene, picture
 SHEETS = {
     "scenes-any": ("any",),
     "scenes-far": ("far", "large"),
-    "scenes-shape": ("sliver", "fan", "hub", "edge", "layers"),
+    "scenes-shape": ("sliver", "dense", "fan", "hub", "edge", "layers"),
 }
 """Sheets and the families on them."""
 
@@ -124,7 +124,8 @@ def draw_difference(axis: Axes, expected: NDArray[np.int32], got: NDArray[np.int
         else:
             color, sign = (GAP, "\N{MINUS SIGN}") if got[i, j] < expected[i, j] else (EXTRA, "+")
         axis.fill([j, j + 1, j + 1, j], [i, i, i + 1, i + 1], color=color, lw=0, zorder=2)
-        axis.text(j + 0.5, i + 0.5, sign, color="white", fontsize=6, ha="center", va="center", zorder=5)
+        axis.text(j + 0.5, i + 0.5, sign, color="white", fontsize=8, fontweight="bold", ha="center",
+                  va="center", zorder=5)  # fmt: skip
 
 
 def edges_in_window(scene: FailureScene) -> Iterator[Segment]:

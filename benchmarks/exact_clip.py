@@ -1,8 +1,8 @@
 """The exact picture of triangles in clip space: no divide, no cut, nothing snapped, nothing rounded.
 
-In: (V, 4) vertices. Out: which triangle each pixel centre shows and how many cover it. A pixel is a ray; its weights in
-a triangle are 3x3 determinants of x, y and w, and what lies before the near or beyond the far plane is told at the point
-that the ray meets. Also here: the picture of what the rules of the library leave after clip and snap.
+In: (V, 4) vertices. Out: which triangle each pixel centre shows and how many cover it. A pixel is a ray; its weights
+in a triangle are 3x3 determinants of x, y and w, and what lies before the near or beyond the far plane is told at the
+point that the ray meets. Also here: the picture of what the rules of the library leave after clip and snap.
 
 Based on: M. Olano, T. Greer, Triangle Scan Conversion using 2D Homogeneous Coordinates, 1997.
 """

@@ -1,8 +1,8 @@
 """The exact picture of triangles anywhere: vertices as Python integers, edge functions as wide as they need to be.
 
 In: vertices in units of 2**-bits pixels, as the atlas takes them from float64 (`true_points`) or as a method snaps them
-(`snapped_points`). Out: which triangle each pixel centre of a window shows, how many cover it, which pixels an edge meets.
-Edge functions are sums of a row and a column term, in int64 where these fit and in Python integers where not.
+(`snapped_points`). Out: which triangle each pixel centre of a window shows, how many cover it, which pixels an edge
+meets. Edge functions are sums of a row and a column term, in int64 where these fit and in Python integers where not.
 
 Based on: J. Pineda, A Parallel Algorithm for Polygon Rasterization, 1988.
 """
