@@ -239,13 +239,13 @@ def got_of(scene: Scene, entry: Entry, kind: str) -> Got:
 
 
 def keep_scene(failure: Failure, value_name: str, scene: Scene, bits: int) -> FailureScene:
-    """Return what is kept of a shrunk scene."""
+    """Return what is kept of a shrunk scene; without a value it needs nothing but a mesh."""
     scene, exact = compact(scene), Exact(compact(scene))
     expected = exact.labels() if failure.kind == "wrong" else exact.picture().count
-    family, value = (EVERYDAY, "") if failure.step == 0 else (failure.family, value_name)
-    name = "-".join(part for part in (family, value.replace(" ", "-"), failure.kind) if part)
+    family = failure.family if value_name else EVERYDAY
+    name = "-".join(part for part in (family, value_name.replace(" ", "-"), failure.kind) if part)
     return FailureScene(
-        name, family, value, failure.kind, tuple((x, y) for x, y in scene.vertices.tolist()),
+        name, family, value_name, failure.kind, tuple((x, y) for x, y in scene.vertices.tolist()),
         tuple((a, b, c) for a, b, c in scene.triangles.tolist()), scene.size, scene.origin, bits,
         rows_of(expected), (got_of(scene, failure.entry, failure.kind),),
     )  # fmt: skip
@@ -273,9 +273,15 @@ def shrink_all(record: dict[str, Any]) -> list[FailureScene]:
             continue
         shrinker = Shrinker(failure, family.axes[0].values[names[failure.step]])
         start = shrinker.start(family)
+        if start is None:  # it fails there, but not for what makes the family
+            shrinker.is_everyday = True
+            start = shrinker.start(family)
         if start is None:
             raise ValueError(f"no small scene shows {failure}")
-        new = keep_scene(failure, names[failure.step], shrinker.shrink(start), shrinker.bits)
+        if shrinker.is_everyday:
+            known = [i for i, scene in enumerate(kept) if (scene.family, scene.kind) == (EVERYDAY, failure.kind)]
+        value_name = "" if shrinker.is_everyday else names[failure.step]
+        new = keep_scene(failure, value_name, shrinker.shrink(start), shrinker.bits)
         kept.append(replace(new, name=f"{new.name}-{len(known) + 1}") if known else new)
     return kept
 
