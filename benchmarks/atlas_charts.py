@@ -81,7 +81,7 @@ def chart_family(record: Record, facts: Row) -> Figure:
     rows = maps_of(record, facts)
     n_steps = len(facts["n_px"])
     (what,) = facts["axes"]
-    figure, axes = plt.subplots(1, 2, figsize=(2.2 + 0.72 * n_steps, 1.2 + 0.21 * len(rows)), layout="constrained",
+    figure, axes = plt.subplots(1, 2, figsize=(2.4 + 0.72 * n_steps, 1.4 + 0.21 * len(rows)), layout="constrained",
                                 sharey=True)  # fmt: skip
     panels: list[tuple[str, Callable[[Row], NDArray[np.float64]]]] = [
         ("shows the wrong triangle", lambda row: shares(row, facts, "wrong")),
@@ -94,7 +94,7 @@ def chart_family(record: Record, facts: Row) -> Figure:
         axis.set_yticks(range(len(rows)), [row["entry"] for row in rows])
         axis.set_xlabel(what)
     mark_gaps(axes[1], rows)
-    figure.suptitle(f"{facts['name']}: {facts['what']}   ({WITHOUT})", fontsize=9, x=0.01, ha="left")
+    figure.suptitle(f"{facts['name']}: {facts['what']}\n{WITHOUT}", fontsize=8, x=0.01, ha="left")
     return figure
 
 

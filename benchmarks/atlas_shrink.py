@@ -134,6 +134,8 @@ class Shrinker:
             return False
         if self.is_middle and ((-FAR_PX < used) & (used < 0)).any():
             return False  # truncation would turn round
+        if self.failure.kind != "wrong" and Exact(scene).picture().count.max() > 1:
+            return False  # a mesh does not overlap
         try:
             return bool(self.faults(scene).any() and is_right(scene, self.bits))
         except ValueError:

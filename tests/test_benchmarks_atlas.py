@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import topleft as tl
 from topleft.failure_scenes import FAILURE_SCENES, picture
 from topleft.methods import CLASSICS, reference
 
@@ -249,14 +248,33 @@ def test_atlas_command_unknown_names_are_refused(capsys):
     assert "--method must be some of auto" in capsys.readouterr().err
 
 
-def test_atlas_charts_are_drawn_from_a_record(record, tmp_path):
+def test_atlas_charts_have_a_row_a_method_and_a_number_where_it_fails(record):
     pytest.importorskip("matplotlib")
     from benchmarks import atlas_charts
+    from matplotlib import pyplot as plt
 
-    facts = [facts for facts in record["families"] if facts["name"] in ("layers", "eye")]
-    small = record | {"families": facts}
-    names = {name: figure for name, figure in atlas_charts.figures(small) if not name.startswith("scenes")}
-    assert set(names) == {"layers", "depth"}
-    texts = [label.get_text() for label in names["layers"].axes[0].get_yticklabels()]
-    assert texts[:2] == ["auto", "edge"]
-    assert tl.build_info()["version"]
+    (facts,) = (facts for facts in record["families"] if facts["name"] == "layers")
+    figure = atlas_charts.chart_family(record, facts)
+    rows = [label.get_text() for label in figure.axes[0].get_yticklabels()]
+    assert rows == [row["entry"] for row in record["maps"] if row["family"] == "layers"]
+    right = figure.axes[1].texts  # a number in each cell that is not 0
+    assert len(right) == sum(bool(n) for row in record["maps"] if row["family"] == "layers" for n in row["overdrawn"])
+    assert [atlas_charts.share_text(x) for x in (0.5, 0.042, 0.0021, 0.0002, 0.00001)] == [
+        "50", "4.2", "0.2", ".02", "<.01"
+    ]  # fmt: skip
+    plt.close(figure)
+
+
+def test_magnified_pictures_show_each_wrong_picture_once():
+    pytest.importorskip("matplotlib")
+    from benchmarks import atlas_pictures
+
+    families = {family for group in atlas_pictures.SHEETS.values() for family in group}
+    assert families >= {scene.family for scene in FAILURE_SCENES.values()}
+    for scene in FAILURE_SCENES.values():
+        found = list(atlas_pictures.triptychs(scene))
+        assert {own.rows for own in found} == {got.rows for got in scene.got}
+        assert sum(len(own.methods) for own in found) == len(scene.got)
+    inside = list(atlas_pictures.edges_in_window(FAILURE_SCENES["far-1e14-overdraw"]))
+    assert len(inside) == 5
+    assert all(-1 <= x <= 8 for segment in inside for point in segment for x in point)
