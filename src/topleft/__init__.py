@@ -14,9 +14,10 @@ from topleft.memory import release_memory
 from topleft.mesh import Mesh
 from topleft.render import render, visibility
 from topleft.scene import Instance, Scene
-from topleft.scene_fragments import SceneFragments
+from topleft.scene_fragments import SceneDepthLayers, SceneFragments
 from topleft.shade import shade
 from topleft.silhouette import silhouette
+from topleft.transparent import render_transparent, visible_layers
 from topleft.view_layers import ViewLayers, render_layers
 
 __version__: str = build_info()["version"]
@@ -30,6 +31,7 @@ __all__ = [
     "MeshError",
     "Rasterizer",
     "Scene",
+    "SceneDepthLayers",
     "SceneFragments",
     "TopleftError",
     "ViewLayers",
@@ -46,10 +48,12 @@ __all__ = [
     "release_memory",
     "render",
     "render_layers",
+    "render_transparent",
     "save_image",
     "scenes",
     "shade",
     "silhouette",
     "visibility",
+    "visible_layers",
     "wireframe",
 ]

@@ -43,7 +43,8 @@ def composite(
         What `peel` returns.
     colors : array_like of uint8 or float32
         Of the triangles (T, C), of the vertices (V, C), or of each layer of each pixel (H, W, K, C): straight colours,
-        the last channel alpha, C 2 or 4. With `opacity` C is 1 or 3. uint8 runs to 255, float32 to 1.
+        the last channel alpha, C 2 or 4; with `opacity` C is 1 or 3. uint8 runs to 255, float32 to 1. Of a scene T
+        counts the triangles of all instances, and there are no colours of vertices.
     opacity : float, 0 to 1, optional
         Alpha of all colours, which then have no channel for it; with uint8 rounded to one of its 255 steps.
     per : "auto", "triangle", "vertex" or "pixel"
@@ -88,7 +89,7 @@ def composite(
     """
     if not isinstance(layers, DepthLayers):
         raise TypeError(f"layers must be what peel returns, got {type(layers).__name__}")
-    height, width, n_layers = layers.triangle.shape
+    n_layers, height, width = layers.planes[0].shape
     palette = as_palette(colors, opacity)
     wish = find_owner(palette, per, layers)
     n_channels, is_u8 = palette.shape[-1], palette.dtype == np.uint8
@@ -142,18 +143,21 @@ def as_palette(colors: ArrayLike, opacity: float | None) -> NDArray[Any]:
 
 def find_owner(palette: NDArray[Any], per: str, layers: DepthLayers) -> str:
     """Return whose colours these are: "triangle", "vertex" or "pixel"."""
-    rows = {"triangle": (layers.n_triangles,), "vertex": (layers.n_vertices,), "pixel": layers.triangle.shape}
+    n_layers, height, width = layers.planes[0].shape
+    rows: dict[str, tuple[int, ...]] = {"triangle": (layers.n_triangles,), "pixel": (height, width, n_layers)}
+    if layers.n_vertices is not None:
+        rows["vertex"] = (layers.n_vertices,)
     if per == "pixel" or (per == "auto" and palette.ndim == 4):
         choices = ["pixel"]
     elif parse(Per, "per", per) is Per.AUTO:
-        choices = [name for name in ("triangle", "vertex") if palette.shape[:-1] == rows[name]]
+        choices = [name for name in ("triangle", "vertex") if palette.shape[:-1] == rows.get(name)]
         if len(choices) > 1:
             raise ValueError(
                 f"colors fit triangles and vertices, {len(palette)} of each: say per='triangle' or 'vertex'"
             )
     else:
         choices = [per]
-    if not choices or palette.shape[:-1] != rows[choices[0]]:
+    if not choices or palette.shape[:-1] != rows.get(choices[0]):
         wishes = [f"{shape} for {name}s" for name, shape in rows.items() if per in ("auto", name)]
         raise ValueError(f"colors must have rows of shape {' or '.join(wishes)}, got {palette.shape[:-1]}")
     return choices[0]

@@ -22,7 +22,7 @@ from topleft.snapped import Snapped, check_triangles, snap_scene
 from topleft.threads import count_threads, run_parts
 from topleft.view import View, ViewOptions
 
-__all__ = ["DepthLayers", "peel", "peel_scenes"]
+__all__ = ["DepthLayers", "check_peel", "peel", "peel_scenes"]
 
 #: All layers of a band of rows, which stay in a cache while the band is drawn.
 BAND_BYTES = 1 << 20
@@ -42,18 +42,26 @@ class DepthLayers:
     """
 
     def __init__(self, ids: NDArray[np.int32], depth: NDArray[np.float32], snapped: Snapped) -> None:
-        """Take planes (K, H, W) of a scene."""
-        self.triangle = np.moveaxis(ids, 0, -1)
-        self.depth = np.moveaxis(depth, 0, -1)
+        """Take planes (K, H, W) of a mesh."""
         self.planes = ids, depth
         self._snapped = snapped
 
     def __repr__(self) -> str:
-        height, width, n = self.triangle.shape
-        return f"DepthLayers({width}x{height}, {n} layers, {self.n_triangles} triangles)"
+        n, height, width = self.planes[0].shape
+        return f"{type(self).__name__}({width}x{height}, {n} layers, {self.n_triangles} triangles)"
 
     def __len__(self) -> int:
         return len(self.planes[0])
+
+    @property
+    def triangle(self) -> NDArray[np.int32]:
+        """Index of the triangle of each layer, int32 (H, W, K), -1 where there are fewer."""
+        return np.moveaxis(self.planes[0], 0, -1)
+
+    @property
+    def depth(self) -> NDArray[np.float32]:
+        """Depth of each layer, float32 (H, W, K)."""
+        return np.moveaxis(self.planes[1], 0, -1)
 
     @property
     def n_triangles(self) -> int:
@@ -61,8 +69,8 @@ class DepthLayers:
         return self._snapped.n_triangles
 
     @property
-    def n_vertices(self) -> int:
-        """Vertices of the mesh that was peeled."""
+    def n_vertices(self) -> int | None:
+        """Vertices of the mesh that was peeled; None where there are several meshes."""
         return self._snapped.n_vertices
 
     @property
@@ -72,12 +80,14 @@ class DepthLayers:
 
     def layer(self, k: int) -> Fragments:
         """Return layer k, 0 the nearest, as a visibility buffer of its own: attributes are computed there."""
-        return self.rows(k, 0, len(self.triangle))
+        return self.rows(k, 0, self.planes[0].shape[1])
 
     def rows(self, k: int, top: int, n_rows: int) -> Fragments:
         """Return rows [top, top + n_rows) of layer k in the same way."""
         (ids, depth), box = self.planes, (k, slice(top, top + n_rows))
-        return Fragments(ids[box], depth[box], self._snapped.scene.moved(0, top), self.n_vertices, self.n_triangles)
+        snapped = self._snapped
+        scene = snapped.scene.moved(0, top)
+        return Fragments(ids[box], depth[box], scene, snapped.n_vertices, snapped.n_triangles)
 
 
 def peel(
@@ -133,10 +143,7 @@ def peel(
             [-1, -1]]], dtype=int32)
     """
     checked = View.parse(size, view)
-    refuse_classic(checked, "depth")
-    if checked.sampling is not Sampling.CENTER:
-        raise ValueError(f"sampling {str(checked.sampling)!r} gives no sorted layers: peel takes 'center'")
-    n, is_farthest = as_layers(layers), parse(DepthTest, "depth_test", depth_test) is DepthTest.GREATER
+    n, is_farthest = check_peel(checked, layers, depth_test)
     snapped = snap_scene(FRESH, vertices, triangles, checked, with_depth=True, out=None)
     ids, depth = peel_scenes(SCRATCH, [snapped], checked, n, is_farthest=is_farthest)
     return DepthLayers(ids, depth, snapped)
@@ -144,6 +151,14 @@ def peel(
 
 #: Layers refer to what they were drawn from, so nothing of it can be reused.
 FRESH = FreshMemory()
+
+
+def check_peel(view: View, layers: int, depth_test: str) -> tuple[int, bool]:
+    """Return how many layers are wanted, and whether the larger depth comes first, after checking the options."""
+    refuse_classic(view, "depth")
+    if view.sampling is not Sampling.CENTER:
+        raise ValueError(f"sampling {str(view.sampling)!r} gives no sorted layers: peel takes 'center'")
+    return as_layers(layers), parse(DepthTest, "depth_test", depth_test) is DepthTest.GREATER
 
 
 def as_layers(layers: object) -> int:

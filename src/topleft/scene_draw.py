@@ -15,17 +15,18 @@ from numpy.typing import NDArray
 from topleft import _engine
 from topleft.area import sum_areas
 from topleft.classic import refuse_classic
+from topleft.depth_layers import check_peel, peel_scenes
 from topleft.memory import SCRATCH, FreshMemory
 from topleft.models import DepthTest, Sampling, Sink, parse
 from topleft.rasterize import canvas_of, refuse_many
 from topleft.sampling import sample_positions
 from topleft.scene import Scene
-from topleft.scene_fragments import SceneFragments
+from topleft.scene_fragments import SceneDepthLayers, SceneFragments
 from topleft.snapped import Snapped, snap_scene
 from topleft.threads import count_threads, run_parts
 from topleft.view import View
 
-__all__ = ["PlacedScene", "draw_scene", "draw_scene_coverage"]
+__all__ = ["PlacedScene", "draw_scene", "draw_scene_coverage", "peel_scene"]
 
 #: Snapped vertices that are held at a time: 16 bytes each.
 VERTICES_AT_ONCE = 1 << 20
@@ -122,6 +123,24 @@ def draw_scene(
     if background_depth is not None:
         depth[ids < 0] = background_depth
     return SceneFragments(ids, depth, placed, positions)
+
+
+def peel_scene(
+    scene: Scene,
+    clip_from_world: NDArray[np.float64],
+    size: tuple[int, int],
+    *,
+    layers: int,
+    depth_test: str = "less",
+    **options: Any,
+) -> SceneDepthLayers:
+    """Return the nearest layers of a scene; options as those of `peel`, without `transform`."""
+    view_options: Any = options
+    view = View.parse(size, view_options)
+    n, is_farthest = check_peel(view, layers, depth_test)
+    placed = PlacedScene(scene, clip_from_world, view, with_depth=True)
+    snapped = [placed.snap(i) for i in range(len(scene))]  # a band of rows is drawn once, with all instances
+    return SceneDepthLayers(*peel_scenes(SCRATCH, snapped, view, n, is_farthest=is_farthest), placed)
 
 
 def draw_scene_coverage(

@@ -13,10 +13,11 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from topleft.depth_layers import DepthLayers
 from topleft.fragments import Fragments
 from topleft.snapped import Snapped
 
-__all__ = ["Part", "SceneFragments"]
+__all__ = ["Part", "SceneDepthLayers", "SceneFragments"]
 
 
 class Placed(Protocol):
@@ -185,6 +186,54 @@ class SceneFragments(Fragments):
             seen = part.frags.mask
             joined[part.box][seen] = make(part)[seen]
         return joined
+
+
+class SceneDepthLayers(DepthLayers):
+    """The nearest layers of every pixel of a `Scene`.
+
+    Attributes
+    ----------
+    instance, triangle, id : ndarray of int32, shape (H, W, K)
+        As in `SceneFragments`, of each layer; -1 where there are fewer.
+    depth : ndarray of float32, shape (H, W, K)
+        As in `DepthLayers`.
+    """
+
+    def __init__(self, ids: NDArray[np.int32], depth: NDArray[np.float32], placed: Placed) -> None:
+        """Take planes (K, H, W)."""
+        self.planes = ids, depth
+        self._placed = placed
+
+    @property
+    def n_triangles(self) -> int:
+        """Triangles of all instances together."""
+        return int(self._placed.first_ids[-1])
+
+    @property
+    def n_vertices(self) -> None:
+        """None: vertices are those of several meshes."""
+        return
+
+    @property
+    def id(self) -> NDArray[np.int32]:
+        """The triangles of all instances counted in their order, int32 (H, W, K)."""
+        return np.moveaxis(self.planes[0], 0, -1)
+
+    @cached_property
+    def instance(self) -> NDArray[np.int32]:
+        """Index of the instance of each layer, int32 (H, W, K)."""
+        return instances_of(self.id, self._placed.first_ids)
+
+    @cached_property
+    def triangle(self) -> NDArray[np.int32]:
+        """Index of the triangle in its mesh, int32 (H, W, K)."""
+        return local_ids(self.id, self.instance, self._placed.first_ids)
+
+    def layer(self, k: int) -> SceneFragments:
+        """Return layer k, 0 the nearest, as a visibility buffer of its own: attributes are computed there."""
+        k = range(len(self))[k]
+        ids, depth = self.planes
+        return SceneFragments(ids[k : k + 1], depth[k : k + 1], self._placed, [(0, 0)])
 
 
 def instances_of(ids: NDArray[np.int32], first_ids: NDArray[np.int64]) -> NDArray[np.int32]:
