@@ -47,8 +47,8 @@ class ViewLayers(Mapping[str, Array]):
         return f"ViewLayers({', '.join(f'{name} {array.shape} {array.dtype}' for name, array in self.items())})"
 
     def save(self, path: str | os.PathLike[str], layer: str | None = None, *, scale: float | None = None) -> None:
-        """Write the layers, or one of them; see `topleft.layer_files.save_layers`."""
-        from topleft.layer_files import save_layers
+        """Write the layers, or one of them; see `topleft.view_layer_files.save_layers`."""
+        from topleft.view_layer_files import save_layers
 
         save_layers(path, self, layer, scale=scale)
 
