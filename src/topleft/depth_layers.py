@@ -182,7 +182,9 @@ def peel_scenes(
     if 0 in view.size:
         return ids, depth
     n_threads = min(height, count_threads(view.threads, sum(snapped.n_triangles for snapped in scenes)))
-    band_bits = max(0, (BAND_BYTES // (8 * n_layers * width)).bit_length() - 1)
+    # without bins each band looks at all triangles: few bands; a band has less than 2**31 pixels
+    n_rows = BAND_BYTES // (8 * n_layers * width) if can_share(view) else min(height, (2**31 - 1) // width)
+    band_bits = max(0, n_rows.bit_length() - 1)
     while band_bits and height >> band_bits < 2 * n_threads:
         band_bits -= 1
     bins = [bins_of(memory, snapped, view, band_bits) for snapped in scenes]
