@@ -31,7 +31,7 @@ static void peel_lanes(const tl_target *target, int64_t at, vm m, vf depth, int3
     const int32_t *end = p->ids + p->n_layers * p->plane_px + at;
     float *depths = p->depth + at;
     vi carried = vi_set1(id);
-    if (p->n_layers > 2) { /* most samples of deep scenes come behind all layers */
+    if (p->n_layers > 2) { /* 4,000 triangles of 600 px, most behind all of 8 layers: half the time */
         const int64_t last = (p->n_layers - 1) * p->plane_px;
         const vf old = vf_load_masked(m, depths + last);
         m = vm_and_not(m, p->is_farthest ? vf_lt(depth, old) : vf_lt(old, depth));
