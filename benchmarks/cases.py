@@ -22,6 +22,7 @@ TASKS = {
     "visibility": "triangle id and depth of a mesh in object space: transform, clear and draw",
     "depth-2d": "triangle id and depth of triangles in pixels: snap, clear and draw",
     "mask": "which pixels are covered",
+    "smooth": "how much of each pixel is covered, 0 to 255",
     "fill": "flat colours in painter's order",
     "labels": "triangle id in painter's order",
     "empty": "a call that draws nothing",
