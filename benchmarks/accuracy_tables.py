@@ -129,7 +129,7 @@ def skipped_text(record: Record) -> str:
     """Peers that did not take part, with the reason."""
     rows = [row for row in record["peers"] + record["antialiasing"] if "skipped" in row]
     skipped = dict.fromkeys(f"{row['peer']} ({row['skipped']})" for row in rows)
-    return f"Skipped: {'; '.join(skipped)}." if skipped else "Every peer that can took part."
+    return f"Left out: {'; '.join(skipped)}." if skipped else "No program was missing."
 
 
 def changes_text(_: Record) -> str:

@@ -56,6 +56,7 @@ PEER_LETTERS = {
     "skimage": "Si", "agg": "Ag", "aggdraw": "Ad", "blend2d": "Bl",
 }  # fmt: skip
 """What stands in the marker of a peer."""
+PEER_LOOK: dict[str, Any] = {"marker": "s", "ms": 10.5, "mfc": "#FFFBE6", "mec": "#8A1C1C", "mew": 1}
 SAMPLING_LABELS = {"center": "1", "msaa2": "2", "msaa4": "4", "msaa8": "8", "msaa16": "16", "area": "area"}
 
 
@@ -106,7 +107,7 @@ def chart_coverage(record: dict[str, Any]) -> Figure:
         front_handle(),
         *peer_handles(record["peers"]),
     ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=5, fontsize=8.5, columnspacing=1.2)
+    figure.legend(handles=handles, loc="outside lower center", ncols=5, fontsize=8.5, columnspacing=1.2, labelspacing=0.7)
     return figure
 
 
@@ -145,7 +146,7 @@ def rows_of(record: dict[str, Any], name: str, family: dict[str, Any]) -> list[d
 
 def draw_peer(axis: Axes, name: str, point: Point) -> None:
     """Draw the marker that only peers have, a square with a letter."""
-    axis.plot(*point, "s", ms=10.5, mfc="#FFFBE6", mec="#8A1C1C", mew=1, zorder=5)
+    axis.plot(*point, **PEER_LOOK, zorder=5)
     axis.annotate(PEER_LETTERS.get(name, "?"), point, (0, -0.4), textcoords="offset points", ha="center", va="center",
                   fontsize=6.5, color="#8A1C1C", fontweight="bold", zorder=6)  # fmt: skip
 
@@ -153,11 +154,7 @@ def draw_peer(axis: Axes, name: str, point: Point) -> None:
 def peer_handles(rows: list[dict[str, Any]]) -> list[Line2D]:
     """Return the entries of a legend for the peers that have figures."""
     names = dict.fromkeys(row["peer"] for row in rows if "peer" in row and "skipped" not in row)
-    letters = {name: f"$\\mathsf{{{PEER_LETTERS.get(name, '?')}}}$" for name in names}
-    return [
-        Line2D([], [], color="#8A1C1C", marker=marker, ls="", ms=10, mew=0.4, label=name)
-        for name, marker in letters.items()
-    ]
+    return [Line2D([], [], **PEER_LOOK, ls="", label=f"{PEER_LETTERS.get(name, '?')}: {name}") for name in names]
 
 
 def front_handle() -> Line2D:

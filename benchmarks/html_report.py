@@ -24,16 +24,18 @@ TYPES = {".svg": "image/svg+xml", ".png": "image/png", ".jpg": "image/jpeg"}
 STYLE = """
 :root { color-scheme: light; }
 body { font: 16px/1.5 system-ui, "Segoe UI", Helvetica, Arial, sans-serif; color: #1c1c1c; background: #fff;
-       max-width: 62rem; margin: 2rem auto; padding: 0 1.25rem; }
+       max-width: 70rem; margin: 2rem auto; padding: 0 1.25rem; }
 h1 { font-size: 1.7rem; line-height: 1.2; margin: 3rem 0 .8rem; border-top: 2px solid #1c1c1c; padding-top: 1rem; }
 header h1 { border: 0; margin-top: 0; padding-top: 0; font-size: 2.1rem; }
 h2 { font-size: 1.25rem; margin: 2.2rem 0 .6rem; }
 p, li { max-width: 46rem; }
 li { margin: .25rem 0; }
 img { max-width: 100%; height: auto; display: block; margin: 1rem 0; }
+figure { margin: 1rem 0; max-width: 60rem; }
 td img { margin: 0; image-rendering: pixelated; }
 code, pre { font: .86em/1.45 ui-monospace, Consolas, "DejaVu Sans Mono", monospace; }
 code { background: #f3f3f0; padding: .05em .25em; border-radius: 3px; }
+td code { white-space: nowrap; }
 td code, pre code { background: none; padding: 0; }
 pre { background: #f6f6f3; padding: .8rem 1rem; overflow-x: auto; }
 .wide { overflow-x: auto; margin: 1rem 0; }
@@ -46,12 +48,12 @@ a { color: #0b5a8f; }
 dl { display: grid; grid-template-columns: max-content 1fr; gap: .15rem 1.2rem; margin: 1rem 0; }
 dt { color: #666; }
 dd { margin: 0; }
-nav ul { columns: 2; padding-left: 1.2rem; }
-nav > ul > li { break-inside: avoid; }
+nav > ul { display: flex; flex-wrap: wrap; gap: 0 2.5rem; padding: 0; list-style: none; }
+nav li ul { padding-left: 1.1rem; font-size: .92rem; }
 @media print {
   body { font-size: 10pt; max-width: none; margin: 0; }
   h1 { break-before: page; } header h1 { break-before: auto; }
-  h2, h3 { break-after: avoid; } img, tr { break-inside: avoid; }
+  h2, h3 { break-after: avoid; } figure, tr { break-inside: avoid; } nav { display: none; }
   .wide { overflow: visible; } table { font-size: 6.6pt; } th, td { padding: .1rem .25rem; }
 }
 """
@@ -92,14 +94,14 @@ def with_own_parts(text: str, record: dict[str, Any]) -> str:
 def facts_html(record: dict[str, Any]) -> str:
     """Return what the figures belong to, as a list."""
     machine = record["machine"]
+    rows = record.get("peers", []) + record.get("antialiasing", [])
+    versions = dict.fromkeys(row["gives"].partition(",")[0] for row in rows if "gives" in row)
     facts = {
         "Machine": f"{machine['cpu']}; {machine['cpus']} CPUs, {machine['memory_gib']} GiB, {machine['architecture']}",
         "System": f"{machine['system']}, Python {machine['python']}, NumPy {record['versions']['numpy']}",
         "topleft": f"{record['versions']['topleft']}, instruction set {record['isa']}",
         "Measured": accuracy_tables.commits_text(record),
-        "Peers": "; ".join(dict.fromkeys(f"{row['peer']}: {row['gives']}" for row in record["peers"] if "gives" in row))
-        or "none",
-        "Left out": accuracy_tables.skipped_text(record),
+        "Beside": ", ".join(versions) or "nothing",
     }
     items = "".join(f"<dt>{name}</dt><dd>{html.escape(text)}</dd>" for name, text in facts.items())
     return f"<dl>{items}</dl>"

@@ -37,7 +37,9 @@ def to_html(text: str, picture: Resolve, link: Resolve) -> str:
         elif re.match(r"(-|\d+\.) ", first):
             parts.append(list_html(block, picture, link))
         else:
-            parts.append(f"<p>{inline(' '.join(block), picture, link)}</p>")
+            content = inline(" ".join(block), picture, link)
+            tag = "figure" if all(PICTURE.fullmatch(line) for line in block) else "p"
+            parts.append(f"<{tag}>{content}</{tag}>")
     return "\n".join(parts)
 
 

@@ -55,7 +55,8 @@ def sizes_rows(record: Record) -> Table:
         ["memset, in the cache", "", *(number(area * memory["frame_ns_byte"]) for area in areas)],
         ["memset, in memory", "", *(number(area * memory["stream_ns_byte"]) for area in areas)],
     ]
-    return ["method", "precision", *(f"{area:,g} px" for area in areas)], [*cells.values(), *floors]
+    head = [f"{area:,.0f} px" if area >= 1 else f"{area:g} px" for area in areas]
+    return ["method", "precision", *head], [*cells.values(), *floors]
 
 
 def memory_text(record: Record) -> str:
@@ -92,7 +93,7 @@ def tutorial_rows(record: Record) -> Table:
     for row in rows:
         name = row["method"] if row["is_pure"] else f"`{row['method']}`"
         ratio = f"{row['fills'] / base:.3g}" if base else "-"
-        cells.append([name, row["precision"], f"{row['calls']:,.4g}", f"{row['fills']:,.4g}", ratio])
+        cells.append([name, row["precision"], number(row["calls"]), number(row["fills"]), ratio])
     return ["method", "precision", "calls a second", "fills alone", "x point_in_triangle"], cells
 
 

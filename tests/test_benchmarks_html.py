@@ -39,6 +39,7 @@ def html_of(text):
         ("1. a\n2. b", "<ol><li>a</li><li>b</li></ol>"),
         ("```sh\na <b>\n\nc\n```", "<pre><code>a &lt;b&gt;\n\nc</code></pre>"),
         ("[a](b.md) & ![c](d.png)", '<p><a href="b.md">a</a> &amp; <img alt="c" src="d.png"></p>'),
+        ("![a](b.png)", '<figure><img alt="a" src="b.png"></figure>'),
         ("<!-- table: x -->\ntext\n<!-- end -->", "<p>text</p>"),
         (
             "| a | b |\n|---|--:|\n| `1` | 2 |",

@@ -20,7 +20,7 @@ from benchmarks.depth import BITS, FORMATS, RATIOS, clip_scene, covered, make_sh
 from benchmarks.families import FAMILIES, in_cells  # noqa: E402
 from benchmarks.filling import areas, measure_family  # noqa: E402
 from benchmarks.options import Options  # noqa: E402
-from benchmarks.scaling import thread_counts  # noqa: E402
+from benchmarks.scaling import shortest_of, thread_counts  # noqa: E402
 from benchmarks.sizes import equilateral  # noqa: E402
 from benchmarks.turns import SLOW_MS, SLOW_ROUNDS, take_turns  # noqa: E402
 from benchmarks.tutorial import eleven_triangles  # noqa: E402
@@ -141,6 +141,10 @@ def test_equilateral_has_its_area_and_stays_in_the_frame(area_px):
 
 def test_thread_counts_double_up_to_the_machine():
     assert [thread_counts(n) for n in (1, 2, 3, 8, 12)] == [[1], [1, 2], [1, 2, 3], [1, 2, 4, 8], [1, 2, 4, 8, 12]]
+
+
+def test_shortest_of_a_turn():
+    assert shortest_of(lambda seconds: [3.0, seconds, 2.0])(1.5) == [1.5]
 
 
 def test_eleven_triangles_many_times_over():
