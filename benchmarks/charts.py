@@ -107,7 +107,7 @@ def chart_coverage(record: dict[str, Any]) -> Figure:
         front_handle(),
         *peer_handles(record["peers"]),
     ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=5, fontsize=8.5, columnspacing=1.2, labelspacing=0.7)
+    figure.legend(handles=handles, loc="outside lower center", ncols=5, fontsize=8.5, labelspacing=0.7)
     return figure
 
 

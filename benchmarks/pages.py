@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 
 from benchmarks import accuracy_tables, speed_tables
 from benchmarks.accuracy_tables import Record, is_default
 from benchmarks.report import table
 
-PARTS: dict[str, Callable[[Record], str]] = {
+PARTS: Mapping[str, Callable[[Record], str]] = {
     "facts": accuracy_tables.facts_text,
     "coverage": lambda record: "\n".join(table(*accuracy_tables.coverage_rows(record, is_default))),
     "bits": lambda record: "\n".join(table(*accuracy_tables.bits_rows(record))),
@@ -48,8 +48,8 @@ def lines(record: Record) -> Iterator[str]:
             yield from ("", f"## {title}", "", *table(*rows()))
 
 
-def with_parts(text: str, record: Record) -> str:
-    """Return a page with what stands between its markers made anew.
+def with_parts(text: str, record: Record, parts: Mapping[str, Callable[[Record], str]] = PARTS) -> str:
+    """Return a page with what stands between its markers made anew, by `parts`.
 
     Raises
     ------
@@ -59,10 +59,10 @@ def with_parts(text: str, record: Record) -> str:
 
     def made(found: re.Match[str]) -> str:
         head, name, _, end = found.groups()
-        if name not in PARTS:
-            raise ValueError(f"a marker must be one of {', '.join(PARTS)}, got {name!r}")
+        if name not in parts:
+            raise ValueError(f"a marker must be one of {', '.join(parts)}, got {name!r}")
         try:
-            return f"{head}{PARTS[name](record)}\n{end}"
+            return f"{head}{parts[name](record)}\n{end}"
         except KeyError as key:
             raise ValueError(f"the record must hold {key} for {name!r}: measure that part") from None
 

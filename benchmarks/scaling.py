@@ -1,7 +1,8 @@
 """Chart (e): how time grows with triangles, a hundred to ten million, and shrinks with threads.
 
 Out: `scaling` of a record. The scene is the bumpy sphere of the other benchmarks at 1920x1080, ids and depth, back
-faces culled; time is what passes, since threads share it. So others on the machine count, and a turn is its shortest call.
+faces culled. Time is what passes, since threads share it; others on the machine would count, so of a turn the shortest
+call is taken.
 """
 
 from __future__ import annotations
