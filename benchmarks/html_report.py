@@ -52,9 +52,11 @@ nav > ul { display: flex; flex-wrap: wrap; gap: 0 2.5rem; padding: 0; list-style
 nav li ul { padding-left: 1.1rem; font-size: .92rem; }
 @media print {
   body { font-size: 10pt; max-width: none; margin: 0; }
-  h1 { break-before: page; } header h1 { break-before: auto; }
+  section + section h1 { break-before: page; }
   h2, h3 { break-after: avoid; } figure, tr { break-inside: avoid; } nav { display: none; }
+  figure img { max-height: 15.5cm; }
   .wide { overflow: visible; } table { font-size: 6.6pt; } th, td { padding: .1rem .25rem; }
+  .many table { font-size: 4pt; } .many th, .many td { padding: .1rem; } .many code { white-space: normal; }
 }
 """
 

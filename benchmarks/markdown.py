@@ -18,6 +18,9 @@ INLINE: tuple[tuple[re.Pattern[str], str], ...] = (
 PICTURE = re.compile(r"!\[([^\]]*)\]\(([^)]+)\)")
 LINK = re.compile(r"\[([^\]]+)\]\(([^)]+)\)")
 
+MANY_COLUMNS = 13
+"""More than these have to be set smaller on paper."""
+
 Resolve = Callable[[str], str]
 """From the address that a page has to the one that the report has; pictures and links."""
 
@@ -111,4 +114,5 @@ def table_html(block: list[str], picture: Resolve, link: Resolve) -> str:
         return "<tr>" + "".join(f"<{tag}{look}>{cell}</{tag}>" for look, cell in filled) + "</tr>"
 
     lines = "".join(row_html(row, "td") for row in body)
-    return f'<div class="wide"><table><thead>{row_html(head, "th")}</thead><tbody>{lines}</tbody></table></div>'
+    kind = "wide many" if len(head) > MANY_COLUMNS else "wide"
+    return f'<div class="{kind}"><table><thead>{row_html(head, "th")}</thead><tbody>{lines}</tbody></table></div>'

@@ -17,7 +17,7 @@ if not (ROOT / "benchmarks").is_dir():
 sys.path.append(str(ROOT))
 
 from benchmarks import cli, html_report  # noqa: E402
-from benchmarks.markdown import to_html  # noqa: E402
+from benchmarks.markdown import MANY_COLUMNS, to_html  # noqa: E402
 
 RECORD = ROOT / "benchmarks/accuracy.json"
 HEAD = '<thead><tr><th>a</th><th class="n">b</th></tr></thead>'
@@ -49,6 +49,11 @@ def html_of(text):
 )
 def test_markdown_block_becomes_html(text, expected):
     assert html_of(text) == expected
+
+
+@pytest.mark.parametrize(("n", "kind"), [(MANY_COLUMNS, "wide"), (MANY_COLUMNS + 1, "wide many")])
+def test_markdown_table_of_many_columns_is_marked(n, kind):
+    assert html_of(f"{'|a' * n}|\n{'|-' * n}|").startswith(f'<div class="{kind}">')
 
 
 @pytest.fixture(scope="module")
