@@ -67,7 +67,7 @@ def chart_sizes(record: Record) -> Figure:
         rate = memory[f"{key}_ns_byte"]
         ends = [min(areas), max(areas)]
         axis.plot(ends, [area * rate for area in ends], color="0.4", ls=line, lw=1.2, label=label)
-    lowest = min(row["ns_triangle"] for row in rows if row["ns_triangle"] > 0)
+    lowest = min((row["ns_triangle"] for row in rows if row["ns_triangle"] > 0), default=1.0)
     axis.set(xscale="log", yscale="log", ylim=(lowest / 3, None))
     axis.set(xlabel="area of the triangle, pixels", ylabel="time per triangle")
     axis.yaxis.set_major_formatter(lambda value, _: duration(value))

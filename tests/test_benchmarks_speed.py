@@ -23,7 +23,7 @@ from benchmarks.options import Options  # noqa: E402
 from benchmarks.scaling import shortest_of, thread_counts  # noqa: E402
 from benchmarks.sizes import equilateral  # noqa: E402
 from benchmarks.turns import SLOW_MS, SLOW_ROUNDS, take_turns  # noqa: E402
-from benchmarks.tutorial import eleven_triangles  # noqa: E402
+from benchmarks.tutorial import eleven_triangles, per_second  # noqa: E402
 
 FRAME_PX = 128
 LITTLE = Options(["auto", "point_in_triangle"], rounds=1, seconds=0, edge_px=1, frame_px=320, scale=0.001)
@@ -151,6 +151,11 @@ def test_eleven_triangles_many_times_over():
     vertices, triangles = eleven_triangles(3)
     assert (len(vertices), triangles.shape) == (33, (33, 3))
     assert (triangles[:11] == triangles[22:]).all()
+
+
+def test_per_second_of_fills_that_noise_hides_is_what_the_clock_tells():
+    assert per_second(2.0, 0.5) == {"calls": 500.0, "fills": 2000.0}
+    assert per_second(2.0, -0.5) == {"calls": 500.0, "fills": 1e9}
 
 
 def test_accuracy_part_replaces_its_rows_alone():
