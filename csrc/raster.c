@@ -195,7 +195,7 @@ TL_INLINE void draw_scene(const tl_scene *scene, const tl_window *window, const 
 TL_SINK_COPIES(draw_scene, (const tl_scene *scene, const tl_window *window, const tl_target *target, tl_share *share, int64_t *bad_row),
                scene, window, target, share, bad_row)
 
-/* In vectors: a loop over single numbers took four times as long as the memset of the ids. */
+/* In vectors: a loop over single numbers took several times as long as the memset of the ids. */
 static void clear_depth(float *depth, int64_t n, float value)
 {
     int64_t k = 0;

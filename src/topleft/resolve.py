@@ -61,7 +61,6 @@ def resolve_flat(
     n_threads: int,
 ) -> None:
     """Write the mean colour of the triangles that the samples see, labels (S, H, W), over (H, W[, C]) pixels."""
-
     palette = _engine.Palette(colors, transfer)
 
     def resolve_rows(first: int, end: int) -> None:

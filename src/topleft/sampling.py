@@ -32,7 +32,7 @@ SAMPLE_GRID_BITS = 4
 BAND_BYTES = 512 << 10
 
 #: Labels of all samples in a band of rows that is resolved at once.
-LABEL_BAND_BYTES = int(__import__("os").environ.get("TLB", 1024)) << 10
+LABEL_BAND_BYTES = 512 << 10
 
 SPECIAL, BAD, WIDE = np.iinfo(np.int32).min, 0, 1  # x_fx and y_fx of vertices that are not narrow: csrc/topleft.h
 
@@ -141,7 +141,7 @@ def sort_bands(
     n_pixels: int,
     n_threads: int,
 ) -> _engine.Bins:
-    """Return the triangles that reach into each band of up to `n_pixels`; none when an index lies outside the vertices."""
+    """Return the triangles of each band of up to `n_pixels`; none when an index lies outside the vertices."""
     height, width = shape
     band_bits = max(0, (n_pixels // width).bit_length() - 1)
     while band_bits and height >> band_bits < 2 * n_threads:
