@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from topleft import cli, scenes
+from topleft import cli, png, scenes
 from topleft.camera import Camera
 from topleft.mesh import Mesh
 from topleft.render import render
@@ -196,7 +196,7 @@ def test_render_mesh_and_out_reversed_is_refused(run, folder):
     (folder / "a.obj").write_text(QUADS)
     status, lines = run("render", "a.png", "-o", "a.obj")
     assert (status, len(lines)) == (2, 1)
-    assert lines[0].startswith("topleft: OUT must end in one of .png .jpg .jpeg .webp .npy .npz, or in / for a folder")
+    assert lines[0].startswith("topleft: OUT must end in one of .png .jpg .jpeg .webp .tif .tiff .npy .npz, or in /")
     assert (folder / "a.obj").read_text() == QUADS
 
 
@@ -252,11 +252,11 @@ def test_render_protected_folder_is_found_before_any_work(run, monkeypatch):
 
 
 def test_render_disk_full_leaves_no_half_picture(run, folder, monkeypatch):
-    def write_half(self, file, **_):
-        file.write(b"half a pic")
+    def half_a_picture(image, **_):
+        yield b"half a pic"
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(Image.Image, "save", write_half)
+    monkeypatch.setattr(png, "pieces", half_a_picture)
     status, lines = run("render", "cube", "-o", "a.png", *SMALL)
     assert (status, lines) == (2, ["topleft: cannot write: No space left on device: 'a.png'"])
     assert names(folder) == []

@@ -6,8 +6,9 @@ from topleft.api import Rasterizer, coverage, fill, overdraw, rasterize, wirefra
 from topleft.camera import Camera
 from topleft.classic import bresenham_line
 from topleft.errors import MeshError, TopleftError
-from topleft.files import load, save_image
+from topleft.files import load
 from topleft.fragments import Fragments
+from topleft.images import save_image
 from topleft.memory import release_memory
 from topleft.mesh import Mesh
 from topleft.render import render, visibility

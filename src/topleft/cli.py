@@ -16,13 +16,13 @@ from typing import Any, NoReturn
 
 import numpy as np
 import numpy.typing as npt
-from PIL import ImageColor
 
 from topleft._isa import build_info
 from topleft.camera import DEFAULT_FOV_Y_DEG, THREE_QUARTER_DEG, Camera
 from topleft.errors import MissingPackageError, TopleftError
-from topleft.files import SUFFIXES, load, save_image
+from topleft.files import load
 from topleft.fragments import Fragments
+from topleft.images import SUFFIXES, save_image
 from topleft.mesh import Mesh
 from topleft.models import Cull
 from topleft.render import DEFAULT_SIZE, draw_edges, visibility
@@ -321,6 +321,8 @@ def _positive(text: str) -> int:
 def _rgba(text: str) -> tuple[int, ...]:
     if text.lower() in ("transparent", "none"):
         return (0, 0, 0, 0)
+    from PIL import ImageColor
+
     try:
         return ImageColor.getcolor(text, "RGBA")  # type: ignore[return-value]
     except ValueError:
