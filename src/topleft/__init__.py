@@ -3,6 +3,7 @@
 from topleft import scenes
 from topleft._isa import build_info
 from topleft.api import Rasterizer, coverage, fill, overdraw, rasterize, wireframe
+from topleft.batch import Job, render_batch
 from topleft.camera import Camera
 from topleft.classic import bresenham_line
 from topleft.errors import MeshError, TopleftError
@@ -19,6 +20,7 @@ __version__: str = build_info()["version"]
 __all__ = [
     "Camera",
     "Fragments",
+    "Job",
     "Mesh",
     "MeshError",
     "Rasterizer",
@@ -33,6 +35,7 @@ __all__ = [
     "rasterize",
     "release_memory",
     "render",
+    "render_batch",
     "save_image",
     "scenes",
     "shade",

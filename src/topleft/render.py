@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from topleft.api import rasterize, wireframe
+from topleft.api import Rasterizer, rasterize, wireframe
 from topleft.camera import Camera
 from topleft.fragments import Fragments
 from topleft.mesh import Mesh
@@ -32,6 +32,7 @@ def render(
     cull: str = "none",
     edges: bool = False,
     threads: int | None = None,
+    rasterizer: Rasterizer | None = None,
 ) -> npt.NDArray[np.uint8]:
     """A picture of the mesh.
 
@@ -55,6 +56,8 @@ def render(
         Whether the edges that show are drawn over it, as smooth dark lines.
     threads : int, optional
         How many threads draw; never changes a bit.
+    rasterizer : Rasterizer, optional
+        Of this size: what is needed on the way lies in the memory that it keeps.
 
     Returns
     -------
@@ -74,7 +77,7 @@ def render(
     255
     """
     camera = default_camera(mesh, size) if camera is None else camera
-    frags = visibility(mesh, camera, size, cull=cull, threads=threads)
+    frags = visibility(mesh, camera, size, cull=cull, threads=threads, rasterizer=rasterizer)
     picture = shade(frags, mesh, camera, shading=shading, color=color, background=background)
     if edges:
         draw_edges(picture, frags, mesh, camera, cull=cull, threads=threads)
@@ -88,6 +91,7 @@ def visibility(
     *,
     cull: str = "none",
     threads: int | None = None,
+    rasterizer: Rasterizer | None = None,
     **view: Any,
 ) -> Fragments:
     """The visibility buffer of the mesh: ids and depth per pixel, and attributes interpolated on demand.
@@ -96,6 +100,8 @@ def visibility(
     ----------
     mesh, camera, size, cull, threads
         As for `render`.
+    rasterizer : Rasterizer, optional
+        Of this size: the result lies in its memory, until the next call.
     **view
         Other options of `rasterize`, `origin=` for a window of a larger picture, say.
 
@@ -108,11 +114,15 @@ def visibility(
     Raises
     ------
     ValueError
-        If the mesh has no triangles and no camera is given, or an option is unknown.
+        If the mesh has no triangles and no camera is given, an option is unknown, or `rasterizer` has another size.
     """
     camera = default_camera(mesh, size) if camera is None else camera
-    transform = camera.clip_from_world(view.get("viewport") or size)
-    return rasterize(mesh.vertices, mesh.triangles, size, transform=transform, cull=cull, threads=threads, **view)
+    view |= {"transform": camera.clip_from_world(view.get("viewport") or size), "cull": cull, "threads": threads}
+    if rasterizer is None:
+        return rasterize(mesh.vertices, mesh.triangles, size, **view)
+    if rasterizer.size != tuple(size):
+        raise ValueError(f"rasterizer must have the size {tuple(size)}, got {rasterizer.size}")
+    return rasterizer.rasterize(mesh.vertices, mesh.triangles, **view)
 
 
 def draw_edges(
