@@ -14,7 +14,8 @@ from topleft.api import Rasterizer, rasterize, wireframe
 from topleft.camera import Camera
 from topleft.fragments import Fragments
 from topleft.mesh import Mesh
-from topleft.shade import DEFAULT_COLOR, shade
+from topleft.multisample import shade_samples
+from topleft.shade import DEFAULT_COLOR, as_color, eye_distance, shade
 
 DEFAULT_SIZE = (640, 480)
 WHITE = (255, 255, 255, 255)
@@ -31,6 +32,7 @@ def render(
     background: tuple[int, ...] = WHITE,
     cull: str = "none",
     edges: bool = False,
+    sampling: str = "center",
     threads: int | None = None,
     rasterizer: Rasterizer | None = None,
 ) -> npt.NDArray[np.uint8]:
@@ -54,6 +56,9 @@ def render(
         Triangles to leave out, by the side that is seen.
     edges : bool
         Whether the edges that show are drawn over it, as smooth dark lines.
+    sampling : {"center", "msaa2", "msaa4", "msaa8", "msaa16"}
+        Samples of a pixel. With several outlines are smooth: a triangle is shaded once in a pixel, where the first of
+        its samples lies, and the light of the samples is averaged.
     threads : int, optional
         How many threads draw; never changes a bit.
     rasterizer : Rasterizer, optional
@@ -62,7 +67,7 @@ def render(
     Returns
     -------
     (H, W, 4) uint8
-        sRGB with alpha: 255 where the mesh is, the background elsewhere.
+        sRGB with alpha: 255 where the mesh is, the background elsewhere, their mean where samples see both.
 
     Raises
     ------
@@ -77,8 +82,17 @@ def render(
     255
     """
     camera = default_camera(mesh, size) if camera is None else camera
-    frags = visibility(mesh, camera, size, cull=cull, threads=threads, rasterizer=rasterizer)
-    picture = shade(frags, mesh, camera, shading=shading, color=color, background=background)
+    background = as_color("background", background, 4)
+    frags = visibility(mesh, camera, size, cull=cull, threads=threads, sampling=sampling, rasterizer=rasterizer)
+    depth_range = distances(frags, camera) if shading == "depth" else None
+
+    def shade_one(sample: Fragments) -> npt.NDArray[np.uint8]:
+        return shade(
+            sample, mesh, camera, shading=shading, color=color, background=background, depth_range=depth_range
+        )
+
+    has_samples = frags.samples_triangle.shape[-1] > 1
+    picture = shade_samples(frags, shade_one, background) if has_samples else shade_one(frags)
     if edges:
         draw_edges(picture, frags, mesh, camera, cull=cull, threads=threads)
     return picture
@@ -161,6 +175,15 @@ def depth_behind(depth: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
         slope = np.fmin(before, after)  # NaN: nothing on either side
         behind += np.where(np.isfinite(slope), slope, 0)
     return behind
+
+
+def distances(frags: Fragments, camera: Camera) -> tuple[float, float] | None:
+    """The least and the greatest distance along the view of what any sample shows; None where there is nothing."""
+    depth = frags.samples_depth[frags.samples_triangle >= 0]
+    if not depth.size:
+        return None
+    ends = eye_distance(np.array([depth.min(), depth.max()]), camera)
+    return float(ends[0]), float(ends[1])
 
 
 def default_camera(mesh: Mesh, size: tuple[int, int]) -> Camera:
