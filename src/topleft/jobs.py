@@ -192,10 +192,11 @@ class Studio:
                 return picture
             save_image(job.files[0], picture, background=_opaque(job))
             return None
-        arrays = draw_layers(layers, Shot(scene, camera, size, options, rasterizer))
+        shot = Shot(scene, camera, size, options, rasterizer)
+        arrays = draw_layers(layers, shot)
         if path is None:
             return {name: array.copy() for name, array in arrays.items()}  # out of the memory that is kept
-        save_layers(path, arrays, background=_opaque(job))
+        save_layers(path, arrays, matrix=shot.eye.clip_from_world(size), background=_opaque(job))
         return None
 
     def _scene(self, scene: Any) -> Any:

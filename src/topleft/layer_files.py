@@ -47,7 +47,11 @@ def layer_paths(destination: Path, names: Sequence[str]) -> dict[str, Path]:
 
 
 def save_layers(
-    destination: Path, layers: Mapping[str, Array], *, background: tuple[int, int, int] = (255, 255, 255)
+    destination: Path,
+    layers: Mapping[str, Array],
+    *,
+    matrix: npt.NDArray[np.float64] | None = None,
+    background: tuple[int, int, int] = (255, 255, 255),
 ) -> tuple[Path, ...]:
     """Write layers, each file whole or not at all; returns the files.
 
@@ -58,6 +62,8 @@ def save_layers(
         as they are; TIFF colours, depth and ids; PNG colours, and 16-bit numbers for depth (linear from the
         nearest to the farthest) and ids (below 65,535), 8-bit ones for normals; JPEG and WebP colours.
     layers : mapping of str to ndarray
+    matrix : (4, 4) float64, optional
+        Clip space from the world; goes into .npz with the layers, as `clip_from_world`.
     background : (3,) of 0 to 255
         What shows through in JPEG.
 
@@ -70,7 +76,7 @@ def save_layers(
     """
     paths = layer_paths(destination, list(layers))
     if destination.suffix.lower() == ".npz" and "{layer}" not in str(destination):
-        save_image(destination, layers)
+        save_image(destination, layers if matrix is None else {**layers, "clip_from_world": matrix})
         return (destination,)
     # All are converted before the first is written: a layer that does not fit leaves no file.
     stored = {name: _stored(paths[name], name, array) for name, array in layers.items()}
