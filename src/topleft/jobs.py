@@ -178,8 +178,9 @@ class Studio:
         """Return the picture of a job, arrays by name if it asks for layers, or None when they are in their files."""
         layers = check_layers(job.layers)
         path = None if job.destination is None else Path(job.destination)
-        if path is not None:
-            for file in job.files:  # before any work: a format that is none
+        files = job.files  # before any work: a format that is none
+        for file in files:
+            if not file.parent.is_dir():
                 file.parent.mkdir(parents=True, exist_ok=True)
         scene = self._scene(job.scene)
         size = (int(job.size[0]), int(job.size[1]))
@@ -190,7 +191,7 @@ class Studio:
             picture = render(scene, camera, size, rasterizer=rasterizer, **options)
             if path is None:
                 return picture
-            save_image(job.files[0], picture, background=_opaque(job))
+            save_image(files[0], picture, background=_opaque(job))
             return None
         shot = Shot(scene, camera, size, options, rasterizer)
         arrays = draw_layers(layers, shot)

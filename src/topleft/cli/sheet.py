@@ -40,7 +40,7 @@ def make_sheet(files: Sequence[Sequence[Path]], captions: Sequence[str]) -> npt.
         if file.is_file():
             with Image.open(file) as image:
                 reduced = image.convert("RGBA")
-                reduced.thumbnail((LONGEST_SIDE, LONGEST_SIDE), Image.Resampling.BOX, reducing_gap=None)
+                reduced.thumbnail((LONGEST_SIDE, LONGEST_SIDE), Image.Resampling.HAMMING)
                 pictures[row, column] = reduced
     width = max((picture.width for picture in pictures.values()), default=LONGEST_SIDE)
     height = max((picture.height for picture in pictures.values()), default=LONGEST_SIDE)
