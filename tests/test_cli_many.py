@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
 import stat
+import subprocess
 import sys
+import time
 
 import numpy as np
 import pytest
@@ -379,3 +383,29 @@ def test_palette_of_an_animation_is_one_for_all_frames():
     frames = [Image.fromarray(picture) for picture in knots(4)]
     palettes = {bytes(frame.getpalette()) for frame in animation._in_palette(frames)}
     assert len(palettes) == 1
+
+
+# Interrupts
+
+
+@pytest.mark.skipif(not hasattr(os, "killpg"), reason="needs process groups")
+@pytest.mark.parametrize("meshes", [["octahedron"], ["octahedron", "tetrahedron"]])
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_render_interrupted_leaves_whole_files_and_goes_on_with_resume(run, folder, meshes, jobs):
+    views = ["--views", "300", "--jobs", str(jobs), "-o", "p/", "--shading", "ids", *SMALL]
+    command = [sys.executable, "-m", "topleft", "render", *meshes, *views]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True) as process:
+        until = time.monotonic() + 60
+        while len(names(folder)) < 3 and time.monotonic() < until:
+            time.sleep(0.002)
+        os.killpg(process.pid, signal.SIGINT)
+        assert process.stderr.read() == "topleft: interrupted\n"
+    assert process.returncode == 130
+    left = names(folder)
+    assert 3 <= len(left) < 300 * len(meshes)
+    for name in left:  # whole, and nothing else
+        assert pixels(name).shape == (48, 64, 4)
+    (folder / left[0]).write_text("kept")
+    assert run("render", *meshes, *views, "--resume") == (0, [])
+    assert len(names(folder)) == 300 * len(meshes)
+    assert (folder / left[0]).read_text() == "kept"
