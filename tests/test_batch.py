@@ -6,6 +6,7 @@ import itertools
 import os
 import pickle
 import sys
+import tempfile
 import threading
 import time
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
@@ -232,7 +233,7 @@ def test_batch_spools_many_meshes_in_bounded_room(processes, monkeypatch):
 
 
 def test_batch_leaves_no_spool(processes, tmp_path, monkeypatch):
-    monkeypatch.setattr(crews.tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     with tl.render_batch(views(9), executor=processes) as results:
         next(results)
         assert len(list(tmp_path.iterdir())) == 1

@@ -5,7 +5,8 @@ import sys
 
 import pytest
 
-LATE = ["PIL", "trimesh", "tqdm", "isal", "scipy", "matplotlib", "concurrent.futures", "multiprocessing", "argparse"]
+LATE = ["PIL", "trimesh", "tqdm", "isal", "scipy", "matplotlib", "concurrent.futures", "multiprocessing"]
+LATE += ["argparse", "logging", "shutil", "tempfile", "traceback", "tomllib", "json"]
 
 
 @pytest.mark.parametrize("name", LATE)

@@ -6,9 +6,6 @@ Input: the `executor` of a batch, and jobs. Output: futures of outcomes.
 from __future__ import annotations
 
 import os
-import pickle
-import shutil
-import tempfile
 from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -159,6 +156,8 @@ class SpooledScene:
 
     def __call__(self) -> Any:
         """Read it."""
+        import pickle
+
         with open(self.path, "rb") as file:
             return pickle.load(file)
 
@@ -174,6 +173,8 @@ class Spool:
     """Meshes in files of a temporary folder, each pickled once; those in use and the latest others."""
 
     def __init__(self) -> None:
+        import tempfile
+
         self._pid = os.getpid()
         self._folder = tempfile.mkdtemp(prefix="topleft-")
         self._entries: OrderedDict[int, _Spooled] = OrderedDict()
@@ -190,6 +191,8 @@ class Spool:
             return scene
         entry = self._entries.get(id(scene))
         if entry is None:
+            import pickle
+
             path = Path(self._folder, f"{self._n_written}.pickle")
             self._n_written += 1
             with open(path, "xb") as file:
@@ -213,6 +216,8 @@ class Spool:
 
     def close(self) -> None:
         """Remove the files; in a forked child they are the parent's."""
+        import shutil
+
         if self._pid == os.getpid():
             shutil.rmtree(self._folder, ignore_errors=True)
 
