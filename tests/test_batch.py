@@ -102,15 +102,46 @@ def test_batch_takes_the_threads_of_the_caller():
         assert pool.submit(int, 7).result() == 7  # left running
 
 
-def test_batch_takes_any_executor():
-    class Inline(Executor):
-        def submit(self, work, /, *arguments):
-            future = Future()
-            future.set_result(pickle.loads(pickle.dumps(work))(*pickle.loads(pickle.dumps(arguments))))
-            return future
+class Inline(Executor):
+    """Nobody knows it: it calls at once, with what pickling leaves."""
 
+    def __init__(self):
+        self.sizes = []
+
+    def submit(self, work, /, *arguments):
+        self.sizes.append(len(arguments[-1]))
+        future = Future()
+        future.set_result(pickle.loads(pickle.dumps(work))(*pickle.loads(pickle.dumps(arguments))))
+        return future
+
+
+def test_batch_takes_any_executor():
     results = list(tl.render_batch(views(3), executor=Inline()))
     assert np.array_equal(results[2].picture, pictures(3)[2])
+
+
+def test_batch_chunks_are_neighbours_of_one_scene():
+    inline = Inline()
+    other = tl.Mesh(CORNERS, FACES)
+    listed = [*views(7), *views(2, other), *views(1)]
+    assert tl.render_batch(listed, executor=inline, chunk=3).finish().n_made == 10
+    assert inline.sizes == [3, 3, 1, 2, 1]
+
+
+def test_batch_left_early_drops_what_has_not_begun():
+    gate, begun = threading.Event(), []
+
+    def slow(mesh, size):
+        begun.append(size)
+        assert gate.wait(30)
+        return tl.Camera.framing(mesh)
+
+    with ThreadPoolExecutor(1) as pool:
+        results = tl.render_batch([tl.Job(BOX, None, SIZE), *[tl.Job(BOX, slow, SIZE)] * 6], executor=pool, window=5)
+        next(results)
+        threading.Timer(0.05, gate.set).start()
+        results.close()
+    assert len(begun) <= 1
 
 
 @pytest.mark.parametrize("executor", EXECUTORS)
@@ -196,6 +227,14 @@ def test_studio_keeps_one_rasterizer_a_thread():
     assert first.threads == 1
 
 
+@pytest.mark.parametrize(("options", "threads"), [({}, 1), ({"threads": 3}, 3)])
+def test_batch_draws_a_picture_on_one_thread_unless_told(monkeypatch, options, threads):
+    found = []
+    monkeypatch.setattr(jobs, "render", lambda *_, **given: found.append(given["threads"]))
+    tl.render_batch([tl.Job(BOX, None, SIZE, options)]).finish()
+    assert found == [threads]
+
+
 def test_batch_pictures_stay_when_the_next_are_drawn():
     kept = list(tl.render_batch(views(4), executor=None))
     assert not np.array_equal(kept[0].picture, kept[1].picture)
@@ -269,6 +308,14 @@ def test_batch_raises_the_first_error_and_names_the_job(executor):
     with pytest.raises(ValueError, match="no camera today") as caught:
         found.extend(tl.render_batch(listed, executor=executor))
     assert caught.value.__notes__ == ["in job 2: Mesh"]
+
+
+def test_batch_ends_with_the_error_that_it_raises():
+    results = tl.render_batch([tl.Job(BOX, fail, SIZE), *views(5)], executor=2)
+    with pytest.raises(ValueError, match="no camera today"):
+        next(results)
+    assert list(results) == []
+    assert not any(thread.name.startswith("topleft-batch") for thread in threading.enumerate())
 
 
 @pytest.mark.parametrize("executor", EXECUTORS)
