@@ -110,7 +110,5 @@ def draw_layers(names: Iterable[str], shot: Shot) -> dict[str, Array]:
     ValueError
         If there is no such layer, or an option is unknown.
     """
-    wanted = check_layers(names)
-    # The picture first: it may be drawn on the memory that then holds the visibility buffer.
-    found = {name: LAYERS[name](shot) for name in sorted(wanted, key="color".__ne__)}
-    return {name: found[name] for name in wanted}
+    # `color` may draw its visibility buffer over the one of the others, in the same memory: it is the same one.
+    return {name: LAYERS[name](shot) for name in check_layers(names)}
