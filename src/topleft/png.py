@@ -28,6 +28,8 @@ SIGNATURE = b"\x89PNG\r\n\x1a\n"
 COLOR_TYPES = {(): 0, (2,): 4, (3,): 2, (4,): 6}
 """What stands in the header, by the axes after height and width."""
 
+COMPRESSORS = ("auto", "isal", "zlib")
+
 FILTER_UP = 2
 BAND_BYTES = 1 << 18
 """Rows are filtered and compressed by so much at a time: what is filtered is still in the cache when it is read."""
@@ -150,9 +152,6 @@ def _isal() -> Callable[[], Deflate] | None:
     except ImportError:
         return None
     return lambda: isal_zlib.compressobj(1)
-
-
-COMPRESSORS = ("auto", "isal", "zlib")
 
 
 def _new_deflate(compressor: str) -> Deflate:
