@@ -111,7 +111,8 @@ def test_encode_chunks_are_those_of_the_standard():
 
 
 def test_encode_filter_is_up_in_each_row():
-    rows = zlib.decompress(dict(chunks_of(png.encode(np.array([[1, 2], [5, 1]], np.uint8))))[b"IDAT"])
+    found = dict(chunks_of(png.encode(np.array([[1, 2], [5, 1]], np.uint8))))
+    rows = zlib.decompress(found[b"IDAT"])
     assert rows == bytes([2, 1, 2, 2, 4, 255])
 
 
@@ -159,3 +160,12 @@ def test_encode_impossible_text_is_refused(text, message):
 def test_encode_unknown_compressor_is_refused():
     with pytest.raises(ValueError, match="compressor must be one of auto, isal, zlib, got 'lzma'"):
         png.encode(np.zeros((1, 1), np.uint8), compressor="lzma")
+
+
+@pytest.mark.parametrize("compressor", COMPRESSORS)
+def test_encode_chunks_of_a_plain_picture_are_not_tiny(compressor, monkeypatch):
+    monkeypatch.setattr(png, "BAND_BYTES", 1000)
+    image = np.zeros((300, 300), np.uint8)  # 91 bands, which compress to less than a chunk
+    data = png.encode(image, compressor=compressor)
+    assert [name for name, _ in chunks_of(data)] == [b"IHDR", b"IDAT", b"IEND"]
+    assert np.array_equal(decoded(data)[0], image)

@@ -34,6 +34,9 @@ FILTER_UP = 2
 BAND_BYTES = 1 << 18
 """Rows are filtered and compressed by so much at a time: what is filtered is still in the cache when it is read."""
 
+MIN_CHUNK_BYTES = 1 << 10
+"""Less than this waits for what comes next: zlib gives its first two bytes at once."""
+
 
 class Deflate(Protocol):
     """A compressor that takes a stream by pieces."""
@@ -99,11 +102,13 @@ def pieces(
     deflate = _new_deflate(compressor)
     header = struct.pack(">IIBBBBB", width, height, 8 * image.dtype.itemsize, kinds[image.shape[2:]], 0, 0, 0)
     yield SIGNATURE + _chunk(b"IHDR", header) + b"".join(_text_chunk(*item) for item in (text or {}).items())
+    data = b""
     for band in _filtered_bands(image):
-        data = deflate.compress(band)
-        if data:
+        data += deflate.compress(band)
+        if len(data) >= MIN_CHUNK_BYTES:
             yield _chunk(b"IDAT", data)
-    yield _chunk(b"IDAT", deflate.flush()) + _chunk(b"IEND", b"")
+            data = b""
+    yield _chunk(b"IDAT", data + deflate.flush()) + _chunk(b"IEND", b"")
 
 
 def _filtered_bands(image: npt.NDArray[Any]) -> Iterator[npt.NDArray[np.uint8]]:
