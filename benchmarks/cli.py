@@ -1,4 +1,4 @@
-"""The command line: `python -m benchmarks run`, `accuracy`, `atlas`, `report`, `charts`, `samplings`, and the rest."""
+"""Commands: `python -m benchmarks run`, `accuracy`, `atlas`, `batch`, `report`, `charts`, `samplings`, and the rest."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks import accuracy, atlas_page, pages, report
+from benchmarks import accuracy, atlas_page, batch, pages, report
 from benchmarks import options as accuracy_options
 from benchmarks.cases import CASES, TRIALS
 from benchmarks.contestants import known_peers
@@ -71,6 +71,18 @@ def parser() -> argparse.ArgumentParser:
                      help="edge pixels to compare in each family, at least (%(default)s)")  # fmt: skip
     add.add_argument("--frame", type=positive, default=defaults.frame_px, metavar="PX", help="side (%(default)s)")
     add.add_argument("--scale", type=float, default=1.0, metavar="X", help="of the numbers of triangles timed (1)")
+    add.add_argument("-o", "--out", type=Path, metavar="FILE.json")
+
+    add = commands.add_parser("batch", help="measure many pictures: views a second, in memory and as PNG")
+    add.set_defaults(action=batch_command)
+    views = batch.Options()
+    add.add_argument("--peer", nargs="*", metavar="NAME", default=list(views.peers), help=f"{', '.join(views.peers)}")
+    add.add_argument("--threads", nargs="+", type=positive, metavar="N", default=list(views.threads))
+    add.add_argument("--triangles", type=positive, metavar="N", default=views.n_triangles, help="(%(default)s)")
+    add.add_argument("--views", type=positive, metavar="N", default=views.n_views, help="a call (%(default)s)")
+    add.add_argument("--frame", type=positive, default=views.size[0], metavar="PX", help="side (%(default)s)")
+    add.add_argument("--repeats", type=positive, default=views.repeats, metavar="N", help="rounds (%(default)s)")
+    add.add_argument("--pin", type=cpus, default=[], metavar="CPU[,CPU...]", help="n threads: the first n of them")
     add.add_argument("-o", "--out", type=Path, metavar="FILE.json")
 
     add = commands.add_parser("atlas", help="map where each method fails")
@@ -174,7 +186,7 @@ def report_command(arguments: argparse.Namespace) -> int:
     if arguments.html:
         return html_command(records, arguments)
     for record in records:
-        tables = {"accuracy": pages, "atlas": atlas_page}.get(record.get("kind"), report)
+        tables = {"accuracy": pages, "atlas": atlas_page, "batch": batch}.get(record.get("kind"), report)
         print(*tables.lines(record), sep="\n")
     return 0
 
@@ -215,6 +227,27 @@ def accuracy_command(arguments: argparse.Namespace) -> int:
         print(f"benchmarks: {error}", file=sys.stderr)
         return 2
     print(*pages.lines(record), sep="\n")
+    return 0
+
+
+def batch_command(arguments: argparse.Namespace) -> int:
+    """Measure, write, print."""
+    if unknown := [peer for peer in arguments.peer if peer not in batch.PEERS]:
+        print(f"benchmarks: --peer must be some of {', '.join(batch.PEERS)}, got {', '.join(unknown)}", file=sys.stderr)
+        return 2
+    options = batch.Options(
+        peers=arguments.peer,
+        threads=arguments.threads,
+        n_triangles=arguments.triangles,
+        n_views=arguments.views,
+        size=(arguments.frame, arguments.frame),
+        repeats=arguments.repeats,
+        pin=arguments.pin,
+    )
+    record = batch.run_batch(options, sys.stderr)
+    if arguments.out:
+        write_record(arguments.out, record)
+    print(*batch.lines(record), sep="\n")
     return 0
 
 

@@ -12,7 +12,7 @@ from benchmarks.cases import Scene
 from benchmarks.peers import Drawing
 
 MODULE = DISTRIBUTION = "moderngl"
-TASKS = ("visibility", "depth-2d", "mask", "fill", "labels", "smooth")
+TASKS = ("visibility", "depth-2d", "mask", "fill", "labels", "smooth", "views", "views-png")
 THREADS = True
 SAMPLES = 4
 """Of a pixel, for smooth pictures: all that llvmpipe has."""
@@ -65,8 +65,12 @@ def clip_from_input(scene: Scene) -> np.ndarray:
     return np.array([[2 / width, 0, 0, -1], [0, 2 / height, 0, -1], [0, 0, 2, -1], [0, 0, 0, 1]])
 
 
-def prepare(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
+def prepare(scene: Scene, threads: int) -> Drawing:
     """Upload, compile, and give the call."""
+    if scene.views is not None:
+        from benchmarks.peers.views import draw_by_llvmpipe
+
+        return draw_by_llvmpipe(scene, threads)
     import moderngl
 
     context = moderngl.create_standalone_context(require=330, backend="egl")
