@@ -3,13 +3,15 @@
 from topleft import scenes
 from topleft._isa import build_info
 from topleft.api import Rasterizer, coverage, fill, overdraw, rasterize, wireframe
+from topleft.batch import Job, render_batch
 from topleft.camera import Camera
 from topleft.classic import bresenham_line
 from topleft.composite import composite
 from topleft.depth_layers import DepthLayers, peel
 from topleft.errors import MeshError, TopleftError
-from topleft.files import load, save_image
+from topleft.files import load
 from topleft.fragments import Fragments
+from topleft.images import save_image
 from topleft.memory import release_memory
 from topleft.mesh import Mesh
 from topleft.render import render, visibility
@@ -27,6 +29,7 @@ __all__ = [
     "DepthLayers",
     "Fragments",
     "Instance",
+    "Job",
     "Mesh",
     "MeshError",
     "Rasterizer",
@@ -47,6 +50,7 @@ __all__ = [
     "rasterize",
     "release_memory",
     "render",
+    "render_batch",
     "render_layers",
     "render_transparent",
     "save_image",

@@ -64,7 +64,7 @@ def save_layers(
     """
     from PIL import Image
 
-    from topleft.files import _write_whole as write_whole
+    from topleft.images import write_whole
 
     path = Path(path)
     suffix = path.suffix.lower()
