@@ -92,7 +92,6 @@ class Sink(IntEnum):
     NEAREST = 4
     FARTHEST = 5
     SAMPLES = 6
-    PEEL = 8
 
 
 Option = TypeVar("Option", bound=StrEnum)
