@@ -22,6 +22,11 @@
 #include "smooth_lines.c"
 #include "lines.c"
 #include "mean.c"
+#include "shade_runs.c"
+#include "shade_texture.c"
+#include "shade_light.c"
+#include "shade_pixels.c"
+#include "shade.c"
 
 const tl_kernels TL_KERNELS = {
     .isa = TL_ISA_NAME,
@@ -41,6 +46,8 @@ const tl_kernels TL_KERNELS = {
     .paint_gouraud = paint_gouraud,
     .list_edges = list_edges,
     .draw_lines = draw_lines,
+    .set_inverse_w = set_inverse_w,
+    .shade = shade,
     .mean_flat = mean_flat,
     .mean_colors = mean_colors,
 };

@@ -9,6 +9,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "shading.h"
+
 /* ---- vertices ------------------------------------------------------------------------------------------ */
 
 /* A snapped vertex, 16 bytes: one vector load.  x_fx = TL_SPECIAL marks a vertex that the 64-bit path cannot
@@ -256,6 +258,13 @@ typedef struct tl_kernels {
                       const tl_transfer *transfer, void *pixels);
     void (*mean_colors)(const void *colors, int sample_bits, int64_t stride, int64_t n, int n_channels, int is_u8,
                         const tl_transfer *transfer, void *pixels);
+
+    /* Copies rows [first, end) of four numbers, the last of them replaced by 1/w of the vertex. */
+    void (*set_inverse_w)(const tl_source *source, const float *rows, int64_t first, int64_t end, float *out);
+
+    /* The picture of a visibility buffer, rows of window->width: uint8 red, green, blue, opacity.  `view` may be NULL in pixel space. */
+    void (*shade)(const tl_scene *scene, const tl_window *window, const tl_view *view, const tl_shading *shading, const int32_t *ids,
+                  const float *depth, uint8_t *pixels);
 
     /* The edges of the triangles that are not culled, each once, as lower index + 2^32 * higher index; room for three a
      * triangle.  Returns the first row with an index outside the vertices, or -1. */

@@ -8,19 +8,26 @@ from topleft.classic import bresenham_line
 from topleft.errors import MeshError, TopleftError
 from topleft.files import load, save_image
 from topleft.fragments import Fragments
+from topleft.light import Fog, Light
+from topleft.material import Material
 from topleft.memory import release_memory
 from topleft.mesh import Mesh
 from topleft.render import render, visibility
 from topleft.shade import shade
+from topleft.texture import Texture
 
 __version__: str = build_info()["version"]
 
 __all__ = [
     "Camera",
+    "Fog",
     "Fragments",
+    "Light",
+    "Material",
     "Mesh",
     "MeshError",
     "Rasterizer",
+    "Texture",
     "TopleftError",
     "__version__",
     "bresenham_line",

@@ -44,6 +44,8 @@ class View:
         near_clip: bool,
         far_clip: bool,
     ) -> None: ...
+    @property
+    def viewport(self) -> tuple[int, int]: ...
 
 class Source:
     is_clip_space: bool
@@ -69,6 +71,7 @@ class Pieces:
     def __len__(self) -> int: ...
 
 class Scene:
+    view: View | None
     def __init__(
         self,
         source: Source,
@@ -82,6 +85,7 @@ class Scene:
         cull: int,
         method: int,
         test: int = 0,
+        view: View | None = None,
     ) -> None: ...
     def seen_from(self, x_fx: int, y_fx: int) -> Scene: ...
     def draw(self, target: Target, first_row: int, n_rows: int) -> int: ...
@@ -173,4 +177,50 @@ def mean_colors(
     n_rows: int,
     n_channels: int,
     transfer: Transfer | None,
+) -> None: ...
+
+class Texture:
+    def __init__(
+        self, texels: NDArray[np.uint16], levels: NDArray[np.int32], filter_code: int, wrap_u: int, wrap_v: int
+    ) -> None: ...
+
+class Shading:
+    def __init__(
+        self,
+        normals: NDArray[np.float32],
+        face_normals: NDArray[np.float32] | None,
+        positions: NDArray[Any],
+        is_turned: NDArray[np.uint8] | None,
+        uv: NDArray[np.float32] | None,
+        colors: NDArray[np.float32] | None,
+        material_of: NDArray[np.int32] | None,
+        decode: NDArray[np.float32],
+    ) -> None: ...
+    def set_materials(self, materials: Sequence[tuple[Any, ...]]) -> None: ...
+    def set_lights(self, lights: Sequence[tuple[Any, ...]], ambient: Sequence[float]) -> None: ...
+    def set_view(
+        self,
+        show: int,
+        matcap: Texture | None,
+        eye_from: NDArray[np.float64],
+        has_perspective: bool,
+        eye: NDArray[np.float64],
+        ray: NDArray[np.float64],
+        background: Sequence[float],
+        background_bytes: Sequence[int],
+    ) -> None: ...
+    def set_fog(
+        self, color: Sequence[float], near: float, scale: float, distance_start: float, distance_scale: float
+    ) -> None: ...
+
+def set_inverse_w(scene: Scene, rows: NDArray[np.float32], out: NDArray[np.float32]) -> None: ...
+def shade(
+    scene: Scene,
+    view: View | None,
+    shading: Shading,
+    ids: NDArray[np.int32],
+    depth: NDArray[np.float32],
+    pixels: NDArray[np.uint8],
+    first_row: int,
+    n_rows: int,
 ) -> None: ...

@@ -5,7 +5,7 @@ Input: `Mesh`, `Camera`. Output: the picture (H, W, 4) uint8 of `render`, or the
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +14,8 @@ from topleft.api import rasterize, wireframe
 from topleft.camera import Camera
 from topleft.fragments import Fragments
 from topleft.mesh import Mesh
-from topleft.shade import DEFAULT_COLOR, shade
+from topleft.colors import DEFAULT_COLOR
+from topleft.shade import LookOptions, shade
 
 DEFAULT_SIZE = (640, 480)
 WHITE = (255, 255, 255, 255)
@@ -32,6 +33,7 @@ def render(
     cull: str = "none",
     edges: bool = False,
     threads: int | None = None,
+    **look: Unpack[LookOptions],
 ) -> npt.NDArray[np.uint8]:
     """A picture of the mesh.
 
@@ -43,7 +45,7 @@ def render(
         Unless given, the three-quarter view of `Camera.framing`, with y up.
     size : (width, height), pixels
         640 x 480 unless given.
-    shading : {"smooth", "flat", "ids", "depth", "normals"}
+    shading : {"smooth", "flat", "unlit", "matcap", "ids", "depth", "normals"}
         What the colours tell; `topleft.shade.shade` describes each.
     color : (3,) of 0 to 255
         sRGB colour of a mesh without colours.
@@ -55,6 +57,8 @@ def render(
         Whether the edges that show are drawn over it, as smooth dark lines.
     threads : int, optional
         How many threads draw; never changes a bit.
+    **look
+        `lights`, `ambient`, `material`, `matcap` and `fog` of `topleft.shade.shade`.
 
     Returns
     -------
@@ -75,7 +79,8 @@ def render(
     """
     camera = default_camera(mesh, size) if camera is None else camera
     frags = visibility(mesh, camera, size, cull=cull, threads=threads)
-    picture = shade(frags, mesh, camera, shading=shading, color=color, background=background)
+    colors = {"color": color, "background": background}
+    picture = shade(frags, mesh, camera, shading=shading, **colors, threads=threads, **look)
     if edges:
         draw_edges(picture, frags, mesh, camera, cull=cull, threads=threads)
     return picture

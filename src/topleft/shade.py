@@ -1,32 +1,44 @@
-"""Shading: from the visibility buffer to colours, in NumPy, for the pixels in which a triangle shows.
+"""Shading: from the visibility buffer to colours, for the pixels in which a triangle shows.
 
 Input: `Fragments`, the mesh and the camera they were made with. Output: a picture (H, W, 4) uint8, sRGB with alpha.
 
 Light is added up in linear light: colours are decoded from sRGB, lit, and encoded again, so that a surface that gets
-half the light is half as bright on a screen. Alpha of a mesh is not looked at: triangles are opaque.
+half the light is half as bright on a screen. The kernel is csrc/shade.c.
 
 Based on: Phong, B. T., "Illumination for Computer Generated Pictures", Communications of the ACM 18(6), 1975 (normals
-interpolated, light computed in the pixel); Mitchell, J., G. McTaggart and C. Green, "Shading in Valve's Source Engine",
-SIGGRAPH 2006 courses (the half-Lambert fall-off, there with the power 2).
+interpolated, light computed in the pixel); Blinn, J. F., "Models of Light Reflection for Computer Synthesized
+Pictures", SIGGRAPH 1977 (highlights).
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from enum import StrEnum
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 import numpy.typing as npt
 
+from topleft import _engine
 from topleft.camera import Camera
+from topleft.colors import DEFAULT_COLOR, LIGHT_OF_SRGB, Color, as_color, id_colors, light_of
+from topleft.eye import eye_distance, eye_normals
 from topleft.fragments import Fragments
-from topleft.mesh import Mesh, face_normals, unit_or_zero
+from topleft.frame import Frame, frame_of, is_similarity
+from topleft.light import AMBIENT, TO_HEADLIGHT, Fog, Light, LightKind, LightSpace, as_not_negative
+from topleft.material import Material
+from topleft.mesh import Mesh
 from topleft.models import parse
+from topleft.surface import Surface, surface_of
+from topleft.texture import Texture
+from topleft.threads import count_threads, parse_threads, run_parts
+
+__all__ = ["DEFAULT_COLOR", "LookOptions", "Shading", "eye_distance", "eye_normals", "id_colors", "shade"]
 
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
 U8 = npt.NDArray[np.uint8]
-Color = tuple[int, ...]
 
 
 class Shading(StrEnum):
@@ -34,38 +46,29 @@ class Shading(StrEnum):
 
     SMOOTH = "smooth"
     FLAT = "flat"
+    UNLIT = "unlit"
+    MATCAP = "matcap"
     IDS = "ids"
     DEPTH = "depth"
     NORMALS = "normals"
 
 
-DEFAULT_COLOR = (224, 222, 217)
-"""sRGB of a mesh without colours: a light warm grey, in which light and shadow both have room."""
-
-TO_LIGHT = np.array([-0.35, 0.45, 1.0]) / np.linalg.norm([-0.35, 0.45, 1.0])
-"""Direction of the headlight in eye space: from over the viewer's left shoulder, so that up and left read as lit."""
-
-AMBIENT = 0.03
-"""Share of the light, in linear light, that reaches a surface from all sides."""
-
-WRAP_POWER = 3
-"""The headlight falls off as ((1 + n . l) / 2)**3 and so reaches 0 smoothly, at the far side of a sphere. Lambert's
-max(0, n . l) ends in a line, which on coarse meshes reads as a seam."""
+SHOW_CODES = {Shading.NORMALS: 1, Shading.MATCAP: 2}  # tl_show in csrc/shading.h; light: 0
+LIGHT_CODES = {LightKind.DIRECTIONAL: 0, LightKind.POINT: 1}  # tl_light_kind in csrc/shading.h
+WRAPPED_LIGHT = 2
 
 GREY_OF_NEAREST, GREY_OF_FARTHEST = 224, 32
 """Greys of the depth picture: neither black nor white, so that it shows on both."""
 
-_LINEAR_OF_SRGB = np.where(
-    np.arange(256) <= 10,  # 0.04045 of 255
-    np.arange(256) / 255 / 12.92,
-    ((np.arange(256) / 255 + 0.055) / 1.055) ** 2.4,
-).astype(np.float32)
-# 2**14 steps: at the dark end, where sRGB is steepest, a step is a fifth of a level of eight bits.
-_LINEAR_STEPS = 2**14
-_ramp = np.arange(_LINEAR_STEPS + 1) / _LINEAR_STEPS
-_SRGB_OF_LINEAR = np.rint(
-    255 * np.where(_ramp <= 0.0031308, 12.92 * _ramp, 1.055 * _ramp ** (1 / 2.4) - 0.055)
-).astype(np.uint8)
+
+class LookOptions(TypedDict, total=False):
+    """The options of `shade` that `render` passes on."""
+
+    lights: Sequence[Light] | None
+    ambient: float | None
+    material: Material | None
+    matcap: Texture | None
+    fog: Fog | None
 
 
 def shade(
@@ -76,6 +79,12 @@ def shade(
     shading: str = "smooth",
     color: Color = DEFAULT_COLOR,
     background: Color = (255, 255, 255, 255),
+    lights: Sequence[Light] | None = None,
+    ambient: float | None = None,
+    material: Material | None = None,
+    matcap: Texture | None = None,
+    fog: Fog | None = None,
+    threads: int | None = None,
 ) -> U8:
     """The picture (H, W, 4) uint8 of a visibility buffer: sRGB, alpha 255 where a triangle shows.
 
@@ -84,128 +93,171 @@ def shade(
     frags : Fragments
         What `rasterize` returned for the mesh.
     mesh : Mesh
-        Its colours are used by "smooth" and "flat" if it has any.
+        Its materials, and its colours, are used if it has any.
     camera : Camera
         The camera of `frags`.
-    shading : {"smooth", "flat", "ids", "depth", "normals"}
-        "smooth": interpolated vertex normals, lit in the pixel by a headlight and ambient light. "flat": the same with
-        the normals of the faces. Both light the side that is seen, whichever it is. "ids": a colour for each triangle.
-        "depth": grey, bright is near, over the range of distances in the picture. "normals": the smooth normal in
-        eye space, x, y, z from -1..1 as red, green, blue; what faces the viewer is light blue.
+    shading : {"smooth", "flat", "unlit", "matcap", "ids", "depth", "normals"}
+        "smooth": interpolated vertex normals, lit in the pixel. "flat": the same with the normals of the faces. Both
+        light the side that is seen, whichever it is. "unlit": colours and textures as they are. "matcap": the colour that
+        `matcap` has for the normal. "ids": a colour for each triangle. "depth": grey, bright is near, over the range of
+        distances in the picture. "normals": the smooth normal in eye space, x, y, z from -1..1 as red, green, blue; what
+        faces the viewer is light blue.
     color : (3,) of 0 to 255
-        sRGB colour of a mesh without colours.
+        sRGB colour of a mesh without colours and materials.
     background : (4,) of 0 to 255
         sRGB and alpha where nothing shows.
+    lights : sequence of Light, optional
+        Lambert's cosine for each of them. Unless given: one headlight over the viewer's left shoulder, whose light wraps
+        round the mesh.
+    ambient : float, optional
+        Light from all sides, not negative, 0.03 unless given.
+    material : Material, optional
+        For all triangles, instead of those of the mesh.
+    matcap : Texture, optional
+        A picture of a lit sphere, for "matcap". It is clamped, so the rim holds where normals turn away.
+    fog : Fog, optional
+        The depth cue.
+    threads : int, optional
+        How many threads shade; never changes a bit.
 
     Raises
     ------
     ValueError
-        If `shading` is unknown or a colour is none.
+        If `shading` is unknown, a colour is none, a number is outside its range, or "matcap" has no matcap.
+    TypeError
+        If a light, material or texture is none.
     """
     mode = parse(Shading, "shading", shading)
-    color = as_color("color", color, 3)
+    own_color = as_color("color", color, 3)
+    behind = as_color("background", background, 4)
+    n_threads = count_threads(parse_threads(threads), len(mesh.triangles))
+    _check_types(lights=(lights or ()), material=material, matcap=matcap, fog=fog)
+    if mode is Shading.MATCAP and matcap is None:
+        raise ValueError("matcap must be a Texture for shading 'matcap', got None")
+    share = AMBIENT if ambient is None else as_not_negative("ambient", ambient)
     picture = np.empty((*frags.triangle.shape, 4), dtype=np.uint8)
-    picture[...] = as_color("background", background, 4)
-    seen = frags.mask
-    if not seen.any():
+    if mode in (Shading.IDS, Shading.DEPTH) or not len(mesh.triangles) or 0 in frags.triangle.shape:
+        picture[...] = behind
+        _paint_numbers(picture, frags, camera, mode)
         return picture
-    ids = frags.triangle[seen]
-    if mode is Shading.IDS:
-        rgb = id_colors(ids)
-    elif mode is Shading.DEPTH:
-        rgb = _grey_of_distance(eye_distance(frags.depth[seen], camera))[:, None]
-    else:
-        normals = eye_normals(frags, mesh, camera, is_smooth=mode is not Shading.FLAT)
-        if mode is Shading.NORMALS:
-            rgb = np.rint(127.5 * normals + 127.5).astype(np.uint8)
-        else:
-            rgb = _lit(_surface_colors(frags, mesh, seen, color), normals)
-    picture[seen, :3] = rgb
-    picture[seen, 3] = 255
+    ids, depth = (np.require(array, kind, ["C", "A"]) for array, kind in ((frags.triangle, np.int32), (frags.depth, np.float32)))
+    scene = frags._scene
+    look = _Look(scene, mesh, camera, picture.shape[1::-1], is_flat=mode is Shading.FLAT)
+    own = (material,) if material is not None else mesh.materials or (Material(own_color if mesh.colors is None else None),)
+    look.set_materials(mesh, own, is_unlit=mode is Shading.UNLIT)
+    look.set_lights(lights, share)
+    look.set_view(mode, matcap, behind)
+    look.set_fog(fog)
+
+    def shade_rows(first: int, end: int) -> None:
+        _engine.shade(scene, scene.view, look.shading, ids, depth, picture, first, end - first)
+
+    run_parts(shade_rows, len(picture), n_threads)
     return picture
 
 
-def eye_normals(frags: Fragments, mesh: Mesh, camera: Camera, *, is_smooth: bool) -> F32:
-    """Unit normals (P, 3) float32 in eye space of the visible pixels in row order, on the side that is seen.
+class _Look:
+    """The numbers of one picture, as the kernels read them."""
 
-    A triangle seen from behind has its normals turned round as a whole, never pixel by pixel: so a mesh whose faces are
-    inverted looks like one whose faces are not, and no edge of light runs through a triangle.
-    """
+    def __init__(self, scene: _engine.Scene, mesh: Mesh, camera: Camera, size: tuple[int, int], *, is_flat: bool) -> None:
+        in_eye_space = not is_similarity(camera.view)
+        self.surface = Surface(mesh, camera.view) if in_eye_space else surface_of(mesh)
+        viewport = size if scene.view is None else scene.view.viewport
+        self.frame = frame_of(camera, viewport, self.surface.center, in_eye_space=in_eye_space)
+        self.view = camera.view
+        self.is_in_eye_space = in_eye_space
+        self.uv = mesh.uv
+        normals = self.surface.normals
+        if scene.view is not None and self.frame.has_perspective:
+            normals = np.empty_like(normals)
+            _engine.set_inverse_w(scene, self.surface.normals, normals)
+        self.shading = _engine.Shading(
+            normals,
+            self.surface.face_normals if is_flat else None,
+            self.surface.positions,
+            None if is_flat else self.surface.is_turned,
+            mesh.uv,
+            self.surface.colors,
+            mesh.material_of_triangle if len(mesh.materials) > 1 else None,
+            LIGHT_OF_SRGB,
+        )
+
+    def set_materials(self, mesh: Mesh, materials: Sequence[Material], *, is_unlit: bool) -> None:
+        """Take the materials; a row that several triangles name may be one for all."""
+        rows = []
+        for one in materials:
+            texture = one.texture if mesh.uv is not None else None
+            has_colors = texture is not None or mesh.colors is not None
+            color = one.color or ((255, 255, 255) if has_colors else DEFAULT_COLOR)
+            back = None if one.back_color is None else light_of(one.back_color)
+            shininess = one.shininess if one.specular > 0 else 0.0
+            cutoff = one.alpha_cutoff or 0.0
+            engine = None if texture is None else texture.engine
+            rows.append((light_of(color), back, (one.specular,) * 3, shininess, is_unlit or one.unlit, cutoff, engine))
+        self.shading.set_materials(rows)
+
+    def set_lights(self, lights: Sequence[Light] | None, ambient: float) -> None:
+        """Take the lights, in shading space."""
+        if lights is None:
+            at = self.frame.eye_from.T @ TO_HEADLIGHT
+            rows: list[tuple[Any, ...]] = [(WRAPPED_LIGHT, at, (max(0.0, 1 - ambient),) * 3, 0.0)]
+        else:
+            rows = [self._light(light) for light in lights]
+        self.shading.set_lights(rows, (ambient,) * 3)
+
+    def _light(self, light: Light) -> tuple[Any, ...]:
+        frame, at = self.frame, np.array(light.at)
+        in_eye_space = light.space is LightSpace.EYE
+        if light.kind is LightKind.DIRECTIONAL:
+            if in_eye_space or self.is_in_eye_space:
+                at = at if in_eye_space else self.view[:3, :3] @ at
+                at = frame.eye_from.T @ at
+            at = at / np.linalg.norm(at)
+        elif in_eye_space:
+            at = frame.eye_from.T @ (at - frame.origin) / frame.scale
+        else:
+            at = (self.view[:3, :3] @ at + self.view[:3, 3] if self.is_in_eye_space else at) - self.surface.center
+        rgb = light_of(light.color)[:3]
+        return LIGHT_CODES[LightKind(light.kind)], at, tuple(light.intensity * c for c in rgb), light.falloff
+
+    def set_view(self, mode: Shading, matcap: Texture | None, background: Color) -> None:
+        """Take what the picture tells, and its background."""
+        frame = self.frame
+        engine = None if matcap is None else replace(matcap, filter="bilinear", wrap="clamp").engine
+        show = SHOW_CODES.get(mode, 0)
+        eyes = frame.eye_from, frame.has_perspective, frame.eye, frame.ray
+        self.shading.set_view(show, engine, *eyes, light_of(background), background)
+
+    def set_fog(self, fog: Fog | None) -> None:
+        """Take the depth cue, if there is one."""
+        if fog is not None:
+            frame = self.frame
+            scale = 1 / (fog.far - fog.near)
+            self.shading.set_fog(light_of(fog.color), fog.near, scale, frame.distance_start, frame.distance_scale)
+
+
+def _paint_numbers(picture: U8, frags: Fragments, camera: Camera, mode: Shading) -> None:
+    """Paint what ids and depth tell over the background."""
     seen = frags.mask
-    ids = frags.triangle[seen]
-    linear = camera.view[:3, :3]
-    points_eye = mesh.vertices @ linear.T + camera.view[:3, 3]
-    faces = face_normals(points_eye, mesh.triangles)
-    if camera.projection[3, 2] != 0:
-        to_viewer = -points_eye[mesh.triangles[:, 0]]  # the eye is the origin
+    if not seen.any():
+        return
+    if mode is Shading.IDS:
+        picture[seen, :3] = id_colors(frags.triangle[seen])
     else:
-        to_viewer = np.broadcast_to([0.0, 0.0, 1.0], faces.shape)
-    faces[(faces * to_viewer).sum(axis=1) < 0] *= -1
-    if not is_smooth:
-        return faces.astype(np.float32)[ids]
-    vertex_normals = unit_or_zero(mesh.vertex_normals() @ np.linalg.inv(linear))
-    a, b, c = mesh.triangles.T
-    is_turned = ((vertex_normals[a] + vertex_normals[b] + vertex_normals[c]) * faces).sum(axis=1) < 0
-    if is_turned[ids].any():
-        sign = np.where(is_turned, -1, 1)[:, None, None]
-        normals = frags.interpolate(sign * vertex_normals[mesh.triangles])[seen]
-    else:
-        normals = frags.interpolate(vertex_normals)[seen]
-    length = np.linalg.norm(normals, axis=1, keepdims=True)
-    # Normals that cancel (or were never there) leave the one of the face.
-    return np.where(length > 1e-6, normals / np.maximum(length, 1e-6), faces.astype(np.float32)[ids])
-
-
-def eye_distance(depth: F32, camera: Camera) -> F64:
-    """Distance along the view, world units, of window depths in [0, 1]: `-z` in eye space."""
-    (a, b), (c, d) = camera.projection[2:, 2:]
-    ndc = 2.0 * depth.astype(np.float64) - 1
-    return (ndc * d - b) / (ndc * c - a)
-
-
-def id_colors(ids: npt.NDArray[np.integer[Any]]) -> U8:
-    """A bright colour (N, 3) uint8 for each id: the hue turns by the golden angle, so neighbours differ most."""
-    ids = ids.astype(np.uint64)
-    hue = (ids * np.uint64(0x9E3779B97F4A7C15) >> np.uint64(40)).astype(np.float32) / 2**24
-    tint = (ids * np.uint64(0xD1B54A32D192ED03) >> np.uint64(40)).astype(np.float32) / 2**24
-    value, saturation = 0.65 + 0.35 * tint, 0.80 - 0.40 * ((5 * tint) % 1)
-    ramp = np.abs((6 * hue[:, None] + np.array([0, 4, 2], dtype=np.float32)) % 6 - 3) - 1
-    rgb = value[:, None] * (1 - saturation[:, None] * (1 - np.clip(ramp, 0, 1)))
-    return np.rint(255 * rgb).astype(np.uint8)
-
-
-def as_color(name: str, color: Color, n_channels: int) -> Color:
-    """The colour as whole numbers of 0 to 255; RGB becomes opaque where RGBA is asked for.
-
-    Raises
-    ------
-    ValueError
-        If it has another number of channels or a channel outside its range.
-    """
-    channels = tuple(int(channel) for channel in color)
-    if n_channels == 4 and len(channels) == 3:
-        channels = (*channels, 255)
-    if len(channels) != n_channels or not all(0 <= channel <= 255 for channel in channels):
-        raise ValueError(f"{name} must be {n_channels} numbers of 0 to 255, got {color!r}")
-    return channels
-
-
-def _surface_colors(frags: Fragments, mesh: Mesh, seen: npt.NDArray[np.bool_], color: Color) -> F32:
-    """Linear colours: (P, 3) of the mesh, or (1, 3) that holds for all pixels."""
-    if mesh.colors is None:
-        return _LINEAR_OF_SRGB[np.array([color])]
-    srgb = frags.interpolate(mesh.colors[:, :3].astype(np.float32))[seen]
-    return _LINEAR_OF_SRGB[np.rint(srgb).astype(np.uint8)]
-
-
-def _lit(linear: F32, normals: F32) -> U8:
-    wrapped = (0.5 + 0.5 * (normals @ TO_LIGHT.astype(np.float32))) ** WRAP_POWER
-    light = AMBIENT + (1 - AMBIENT) * wrapped
-    steps = linear * (_LINEAR_STEPS * light[:, None])
-    return _SRGB_OF_LINEAR[np.minimum(np.rint(steps).astype(np.int32), _LINEAR_STEPS)]
+        picture[seen, :3] = _grey_of_distance(eye_distance(frags.depth[seen], camera))[:, None]
+    picture[seen, 3] = 255
 
 
 def _grey_of_distance(distance: F64) -> U8:
     nearest, farthest = distance.min(), distance.max()
     share = (distance - nearest) / max(farthest - nearest, np.finfo(np.float64).tiny)
     return np.rint(GREY_OF_NEAREST + (GREY_OF_FARTHEST - GREY_OF_NEAREST) * share).astype(np.uint8)
+
+
+def _check_types(lights: Sequence[Light], material: object, matcap: object, fog: object) -> None:
+    for light in lights:
+        if not isinstance(light, Light):
+            raise TypeError(f"lights must be of Light, got {type(light).__name__}")
+    for name, value, kind in (("material", material, Material), ("matcap", matcap, Texture), ("fog", fog, Fog)):
+        if value is not None and not isinstance(value, kind):
+            raise TypeError(f"{name} must be a {kind.__name__}, got {type(value).__name__}")
