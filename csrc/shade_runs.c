@@ -10,7 +10,7 @@
 #include "fixed.h"
 #include "lanes.h"
 
-#define TL_SPAN 256 /* pixels of a row that are shaded together */
+#define TL_SPAN 512 /* pixels of a row that are shaded together */
 #define TL_SPAN_ROOM (TL_SPAN + 2 * TL_MAX_LANES)
 
 /* |E| below this stay int32, with the step to anywhere else in the box. */
@@ -75,14 +75,21 @@ TL_INLINE void find_runs(shade_runs *s, const int32_t *ids, int n)
 /* The corners of the triangles of TL_LANES runs; indices that the vertices do not have are bent to some that they have. */
 TL_INLINE void run_corners(const shade_runs *s, int slot, int32_t corners[3][TL_MAX_LANES])
 {
-    for (int lane = 0; lane < TL_LANES; lane++) {
-        const int32_t *own = s->scene->triangles + 3 * (int64_t)s->ints[RUN_ID][slot + lane];
-        for (int k = 0; k < 3; k++)
-            corners[k][lane] = own[k];
-    }
+    const int32_t *ids = s->ints[RUN_ID] + slot;
     const vi last = vi_set1((int32_t)s->scene->mesh.n_vertices - 1), zero = vi_set1(0);
+    vi c[4];
+    if (TL_LANES > 1 && !vm_any(vi_eq(vi_load(ids), zero))) {
+        vi_load_records((const char *)s->scene->triangles - 4, 12, ids, c); /* 16 bytes, from the number before the triangle on */
+    } else {
+        int32_t own[3][TL_MAX_LANES];
+        for (int lane = 0; lane < TL_LANES; lane++)
+            for (int k = 0; k < 3; k++)
+                own[k][lane] = s->scene->triangles[3 * (int64_t)ids[lane] + k];
+        for (int k = 0; k < 3; k++)
+            c[k + 1] = vi_load(own[k]);
+    }
     for (int k = 0; k < 3; k++)
-        vi_store(corners[k], vi_max(vi_min(vi_load(corners[k]), last), zero));
+        vi_store(corners[k], vi_max(vi_min(c[k + 1], last), zero));
 }
 
 TL_INLINE void put(shade_runs *s, int coefficient, int slot, vf a) { vf_store(s->floats[coefficient] + slot, a); }
@@ -303,7 +310,8 @@ TL_INLINE void set_runs(shade_runs *s, int64_t row)
 {
     const tl_shading *shading = s->shading;
     s->n_special = 0;
-    vi_store(s->ints[RUN_ID] + TL_LANES + s->n_runs, vi_set1(0));
+    if (s->n_runs) /* the rest of the last vector: a triangle that is there */
+        vi_store(s->ints[RUN_ID] + TL_LANES + s->n_runs, vi_set1(s->ints[RUN_ID][TL_LANES + s->n_runs - 1]));
     for (int slot = TL_LANES; slot < TL_LANES + s->n_runs; slot += TL_LANES) {
         run_setup r;
         run_corners(s, slot, r.corners);
