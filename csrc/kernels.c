@@ -27,6 +27,7 @@
 #include "shade_light.c"
 #include "shade_pixels.c"
 #include "shade.c"
+#include "shade_samples.c"
 
 const tl_kernels TL_KERNELS = {
     .isa = TL_ISA_NAME,
@@ -48,6 +49,7 @@ const tl_kernels TL_KERNELS = {
     .draw_lines = draw_lines,
     .set_inverse_w = set_inverse_w,
     .shade = shade,
+    .shade_samples = shade_samples,
     .mean_flat = mean_flat,
     .mean_colors = mean_colors,
 };

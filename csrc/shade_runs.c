@@ -210,9 +210,9 @@ static void special_edges(special_run *e, const double *x_fx, const double *y_fx
 }
 
 /* The same of one that is cut: from homogeneous corners, with q in the edge functions; the area is +-1. */
-static void homogeneous_edges(special_run *e, const tl_view *view, const tl_vertex_set *set, const int32_t *corners, double y, float *row_step)
+static void homogeneous_edges(special_run *e, const tl_view *view, const tl_vertex_set *set, const int32_t *corners, double y, double unit,
+                              float *row_step)
 {
-    const double unit = (double)(1 << view->subpixel_bits);
     double h[3][3], step[3], det = 0.0;
     for (int k = 0; k < 3; k++) {
         double p[4];
@@ -247,7 +247,7 @@ static void set_special(shade_runs *s, int slot, int lane, int64_t row, run_setu
     special_run *e = &s->special[s->n_special];
     float row_step[3], lanes[TL_MAX_LANES];
     if (is_cut) {
-        homogeneous_edges(e, s->view, set, corners, y, row_step);
+        homogeneous_edges(e, s->view, set, corners, y, unit, row_step);
     } else {
         double x_fx[3], y_fx[3];
         for (int k = 0; k < 3; k++) {

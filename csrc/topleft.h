@@ -266,6 +266,11 @@ typedef struct tl_kernels {
     void (*shade)(const tl_scene *scene, const tl_window *window, const tl_view *view, const tl_shading *shading, const int32_t *ids,
                   const float *depth, uint8_t *pixels);
 
+    /* The same from planes of ids and depth that lie `stride` pixels apart, one a sample; samples_fx as in tl_target. */
+    void (*shade_samples)(const tl_scene *scene, const tl_window *window, const tl_view *view, const tl_shading *shading,
+                          const int32_t *samples_fx, int sample_bits, int64_t stride, const int32_t *ids, const float *depth,
+                          uint8_t *pixels);
+
     /* The edges of the triangles that are not culled, each once, as lower index + 2^32 * higher index; room for three a
      * triangle.  Returns the first row with an index outside the vertices, or -1. */
     int64_t (*list_edges)(const tl_scene *scene, const tl_edge_scratch *scratch, uint64_t *edges, int64_t *n_edges);

@@ -224,3 +224,14 @@ def shade(
     first_row: int,
     n_rows: int,
 ) -> None: ...
+def shade_samples(
+    scene: Scene,
+    view: View | None,
+    shading: Shading,
+    positions: NDArray[np.int32],
+    ids: NDArray[np.int32],
+    depth: NDArray[np.float32],
+    pixels: NDArray[np.uint8],
+    first_row: int,
+    n_rows: int,
+) -> None: ...

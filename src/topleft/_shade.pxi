@@ -118,3 +118,16 @@ def shade(Scene scene, View view, Shading shading, const int32_t[:, ::1] ids, co
     if n_rows and ids.shape[1]:
         with nogil:
             K.shade(&scene.scene, &window, own, &shading.shading, &ids[first_row, 0], &depth[first_row, 0], &pixels[first_row, 0, 0])
+
+
+def shade_samples(Scene scene, View view, Shading shading, const int32_t[:, ::1] positions, const int32_t[:, :, ::1] ids,
+                  const float[:, :, ::1] depth, uint8_t[:, :, ::1] pixels, int64_t first_row, int64_t n_rows):
+    """Write rows of the picture (H, W, 4) of a visibility buffer with several samples a pixel, ids and depth (S, H, W)."""
+    cdef tl_window window = scene.window(first_row, n_rows, ids.shape[2])
+    cdef const tl_view *own = &view.view if view is not None else NULL
+    cdef int sample_bits = int(ids.shape[0]).bit_length() - 1
+    cdef int64_t stride = ids.shape[1] * ids.shape[2]
+    if n_rows and ids.shape[2]:
+        with nogil:
+            K.shade_samples(&scene.scene, &window, own, &shading.shading, &positions[0, 0], sample_bits, stride, &ids[0, first_row, 0],
+                            &depth[0, first_row, 0], &pixels[first_row, 0, 0])
