@@ -1,4 +1,4 @@
-"""The command line: `python -m benchmarks run`, `accuracy`, `report`, `charts`, `document`, `list`."""
+"""The command line: `python -m benchmarks run`, `accuracy`, `report`, `charts`, `samplings`, `document`, `list`."""
 
 from __future__ import annotations
 
@@ -66,6 +66,10 @@ def parser() -> argparse.ArgumentParser:
     add = commands.add_parser("charts", help="draw the charts of an accuracy record, PNG and SVG")
     add.set_defaults(action=charts_command)
     add.add_argument("file", type=Path, metavar="FILE.json")
+    add.add_argument("-o", "--out", type=Path, default=Path("docs/images"), metavar="FOLDER")
+
+    add = commands.add_parser("samplings", help="draw one small scene in every sampling, PNG")
+    add.set_defaults(action=samplings_command)
     add.add_argument("-o", "--out", type=Path, default=Path("docs/images"), metavar="FOLDER")
 
     add = commands.add_parser("document", help="write the tables of an accuracy record into a page")
@@ -182,6 +186,14 @@ def charts_command(arguments: argparse.Namespace) -> int:
 
     for path in draw_charts(json.loads(arguments.file.read_text()), arguments.out):
         print(path)
+    return 0
+
+
+def samplings_command(arguments: argparse.Namespace) -> int:
+    """Draw."""
+    from benchmarks.samplings import draw_samplings  # matplotlib
+
+    print(draw_samplings(arguments.out))
     return 0
 
 

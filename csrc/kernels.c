@@ -28,6 +28,13 @@
 #include "shade_pixels.c"
 #include "shade.c"
 #include "shade_samples.c"
+#include "mix.h"
+#include "mix_u8.c"
+#include "mix_f32.c"
+#include "mix.c"
+#include "blend_strip.c"
+#include "blend_area.c"
+#include "blend.c"
 
 const tl_kernels TL_KERNELS = {
     .isa = TL_ISA_NAME,
@@ -41,6 +48,7 @@ const tl_kernels TL_KERNELS = {
     .bin = bin,
     .list_bins = list_bins,
     .draw_area = draw_area,
+    .blend = blend,
     .barycentric = barycentric,
     .interpolate = interpolate,
     .paint_flat = paint_flat,

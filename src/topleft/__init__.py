@@ -14,6 +14,7 @@ from topleft.memory import release_memory
 from topleft.mesh import Mesh
 from topleft.render import render, visibility
 from topleft.shade import shade
+from topleft.silhouette import silhouette
 from topleft.texture import Texture
 
 __version__: str = build_info()["version"]
@@ -42,6 +43,7 @@ __all__ = [
     "save_image",
     "scenes",
     "shade",
+    "silhouette",
     "visibility",
     "wireframe",
 ]

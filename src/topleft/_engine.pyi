@@ -17,6 +17,7 @@ def isa_built() -> list[str]: ...
 def isa_available() -> list[str]: ...
 def compiler_info() -> dict[str, object]: ...
 def area_stride(width: int) -> int: ...
+def blend_cells(width: int) -> int: ...
 def as_bytes(array: NDArray[Any]) -> NDArray[np.uint8]: ...
 def first_bad_row(triangles: NDArray[np.int32], n_vertices: int) -> int: ...
 def narrow_triangles(triangles: NDArray[np.int64], n_vertices: int, out: NDArray[np.int32]) -> int: ...
@@ -72,6 +73,7 @@ class Pieces:
 
 class Scene:
     view: View | None
+    subpixel_bits: int
     def __init__(
         self,
         source: Source,
@@ -115,6 +117,21 @@ class Scene:
         is_u8: bool,
         n_channels: int,
     ) -> None: ...
+    def blend(
+        self,
+        pixels: NDArray[np.uint8],
+        width: int,
+        first_row: int,
+        n_rows: int,
+        colors: NDArray[np.uint8],
+        n_channels: int,
+        is_u8: bool,
+        is_flat: bool,
+        blend: int,
+        is_premultiplied: bool,
+        packed: NDArray[np.int32] | None,
+        cells: NDArray[np.int32] | None,
+    ) -> int: ...
     def barycentric(self, ids: NDArray[np.int32], out: NDArray[np.float32]) -> None: ...
     def interpolate(
         self,
@@ -160,7 +177,9 @@ def draw_bands(
 ) -> None: ...
 
 class Transfer:
-    def __init__(self, decode: NDArray[np.int32], encode: NDArray[np.uint8], n_channels: int) -> None: ...
+    def __init__(
+        self, tables: tuple[NDArray[np.int32], NDArray[np.uint8]] | None, n_channels: int, is_straight: bool
+    ) -> None: ...
 
 def mean_flat(
     labels: NDArray[np.int32],

@@ -16,7 +16,8 @@ DEFAULT_COLOR = (224, 222, 217)
 """sRGB of a mesh without colours: a light warm grey, in which light and shadow both have room."""
 
 _VALUES = np.arange(256) / 255
-LIGHT_OF_SRGB: F32 = np.where(_VALUES <= 0.04045, _VALUES / 12.92, ((_VALUES + 0.055) / 1.055) ** 2.4).astype(np.float32)
+_LIGHT = np.where(_VALUES <= 0.04045, _VALUES / 12.92, ((_VALUES + 0.055) / 1.055) ** 2.4)
+LIGHT_OF_SRGB: F32 = _LIGHT.astype(np.float32)
 """(256,) float32: the light, 0 to 1, of each sRGB value."""
 LIGHT_OF_SRGB.flags.writeable = False
 

@@ -52,3 +52,12 @@ def eye_distance(depth: F32, camera: Camera) -> F64:
     (a, b), (c, d) = camera.projection[2:, 2:]
     ndc = 2.0 * depth.astype(np.float64) - 1
     return (ndc * d - b) / (ndc * c - a)
+
+
+def distances(frags: Fragments, camera: Camera) -> tuple[float, float] | None:
+    """The least and the greatest distance along the view of what any sample shows; None where there is nothing."""
+    depth = frags.samples_depth[frags.samples_triangle >= 0]
+    if not depth.size:
+        return None
+    ends = eye_distance(np.array([depth.min(), depth.max()]), camera)
+    return float(ends[0]), float(ends[1])

@@ -81,6 +81,12 @@ class Fragments:
         """Return ids, depth and attributes at one sample of each pixel."""
         return (self._samples or (self,))[i]
 
+    def only(self, rows: NDArray[np.intp], cols: NDArray[np.intp]) -> Fragments:
+        """Return what is left when no other pixels than these show a triangle."""
+        triangle = np.full_like(self.triangle, -1)
+        triangle[rows, cols] = self.triangle[rows, cols]
+        return Fragments(triangle, self.depth, self._scene, self._n_vertices, self._n_triangles)
+
     def barycentric(self) -> NDArray[np.float32]:
         """Return the weights of the three vertices of the triangle that shows in each pixel.
 

@@ -24,7 +24,8 @@ class Frame:
     eye : (3,) float64
         Where the camera is; without perspective the unit vector to it.
     ray : (4, 3) float64
-        The ray of pixel position (0, 0), what it gains per column and per row, and, without perspective, along the depth.
+        The ray of pixel position (0, 0), what it gains per column and per row, and, without perspective, along the
+        depth.
     eye_from, origin : (3, 3) and (3,) float64
         Eye space from shading space: `eye_from @ p + origin` but for a scale.
     scale : float

@@ -58,7 +58,8 @@ class Light:
     intensity : float
         Not negative. A white surface that faces a white light of intensity 1 is white.
     falloff : float
-        Not negative. At distance d from a point the light is divided by `1 + falloff * d**2`; 0: it is the same everywhere.
+        Not negative. At distance d from a point the light is divided by `1 + falloff * d**2`; 0: it is the same
+        everywhere.
     space : {"world", "eye"}
         "eye": the light moves with the camera.
 

@@ -1,4 +1,4 @@
-"""A triangle mesh as arrays: positions, indices, and normals, colours and materials where it has them; checked once, here.
+"""A triangle mesh as arrays: positions, indices, and what else is known of its surface; checked once, here.
 
 Input: anything NumPy can read. Output: a `Mesh` whose arrays the other stages use as they are.
 
@@ -41,8 +41,8 @@ class Mesh:
     colors : (V, 3) or (V, 4) array_like of uint8, optional
         sRGB colours, with or without alpha.
     uv : (V, 2) array_like of real numbers, optional
-        Where each vertex lies in a texture: u from left to right, v from the bottom up, 0 to 1. Kept as float32. Where a
-        texture has a seam, vertices stand twice.
+        Where each vertex lies in a texture: u from left to right, v from the bottom up, 0 to 1. Kept as float32. Where
+        a texture has a seam, vertices stand twice.
     materials : sequence of Material, optional
         What the triangles are made of.
     material_of_triangle : (T,) array_like of integers, optional
@@ -263,7 +263,7 @@ def _material_rows(values: npt.ArrayLike, n_triangles: int, n_materials: int) ->
     outside = (array < 0) | (array >= n_materials)
     if outside.any():
         row = int(outside.argmax())
-        raise IndexError(f"material_of_triangle[{row}] = {array[row]} must be in 0..{n_materials - 1}, a row of materials")
+        raise IndexError(f"material_of_triangle[{row}] = {array[row]} must name one of {n_materials} materials")
     return np.ascontiguousarray(array, np.int32)
 
 

@@ -12,9 +12,9 @@ import numpy.typing as npt
 
 from topleft.api import rasterize, wireframe
 from topleft.camera import Camera
+from topleft.colors import DEFAULT_COLOR
 from topleft.fragments import Fragments
 from topleft.mesh import Mesh
-from topleft.colors import DEFAULT_COLOR
 from topleft.shade import LookOptions, shade
 
 DEFAULT_SIZE = (640, 480)
@@ -32,6 +32,7 @@ def render(
     background: tuple[int, ...] = WHITE,
     cull: str = "none",
     edges: bool = False,
+    sampling: str = "center",
     threads: int | None = None,
     **look: Unpack[LookOptions],
 ) -> npt.NDArray[np.uint8]:
@@ -55,6 +56,9 @@ def render(
         Triangles to leave out, by the side that is seen.
     edges : bool
         Whether the edges that show are drawn over it, as smooth dark lines.
+    sampling : {"center", "msaa2", "msaa4", "msaa8", "msaa16"}
+        Samples of a pixel. With several outlines are smooth: a triangle is shaded once in a pixel, where the first of
+        its samples lies, and the light of the samples is averaged.
     threads : int, optional
         How many threads draw; never changes a bit.
     **look
@@ -63,7 +67,7 @@ def render(
     Returns
     -------
     (H, W, 4) uint8
-        sRGB with alpha: 255 where the mesh is, the background elsewhere.
+        sRGB with alpha: 255 where the mesh is, the background elsewhere, their mean where samples see both.
 
     Raises
     ------
@@ -78,9 +82,10 @@ def render(
     255
     """
     camera = default_camera(mesh, size) if camera is None else camera
-    frags = visibility(mesh, camera, size, cull=cull, threads=threads)
-    colors = {"color": color, "background": background}
-    picture = shade(frags, mesh, camera, shading=shading, **colors, threads=threads, **look)
+    frags = visibility(mesh, camera, size, cull=cull, threads=threads, sampling=sampling)
+    picture = shade(
+        frags, mesh, camera, shading=shading, color=color, background=background, threads=threads, **look
+    )
     if edges:
         draw_edges(picture, frags, mesh, camera, cull=cull, threads=threads)
     return picture

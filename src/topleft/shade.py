@@ -23,18 +23,22 @@ import numpy.typing as npt
 from topleft import _engine
 from topleft.camera import Camera
 from topleft.colors import DEFAULT_COLOR, LIGHT_OF_SRGB, Color, as_color, id_colors, light_of
-from topleft.eye import eye_distance, eye_normals
+from topleft.eye import distances, eye_distance, eye_normals
 from topleft.fragments import Fragments
-from topleft.frame import Frame, frame_of, is_similarity
+from topleft.frame import frame_of, is_similarity
 from topleft.light import AMBIENT, TO_HEADLIGHT, Fog, Light, LightKind, LightSpace, as_not_negative
 from topleft.material import Material
 from topleft.mesh import Mesh
 from topleft.models import parse
+from topleft.multisample import shade_samples
+from topleft.sampling import sample_positions
 from topleft.surface import Surface, surface_of
 from topleft.texture import Texture
 from topleft.threads import count_threads, parse_threads, run_parts
 
-__all__ = ["DEFAULT_COLOR", "LookOptions", "Shading", "eye_distance", "eye_normals", "id_colors", "shade"]
+__all__ = [
+    "DEFAULT_COLOR", "LookOptions", "Shading", "as_color", "eye_distance", "eye_normals", "id_colors", "shade",
+]  # fmt: skip
 
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
@@ -79,6 +83,7 @@ def shade(
     shading: str = "smooth",
     color: Color = DEFAULT_COLOR,
     background: Color = (255, 255, 255, 255),
+    depth_range: tuple[float, float] | None = None,
     lights: Sequence[Light] | None = None,
     ambient: float | None = None,
     material: Material | None = None,
@@ -91,24 +96,28 @@ def shade(
     Parameters
     ----------
     frags : Fragments
-        What `rasterize` returned for the mesh.
+        What `rasterize` returned for the mesh. With several samples a pixel a triangle is shaded once in a pixel, at
+        the first of the samples that see it, and the picture is the mean of the light of the samples.
     mesh : Mesh
         Its materials, and its colours, are used if it has any.
     camera : Camera
         The camera of `frags`.
     shading : {"smooth", "flat", "unlit", "matcap", "ids", "depth", "normals"}
         "smooth": interpolated vertex normals, lit in the pixel. "flat": the same with the normals of the faces. Both
-        light the side that is seen, whichever it is. "unlit": colours and textures as they are. "matcap": the colour that
-        `matcap` has for the normal. "ids": a colour for each triangle. "depth": grey, bright is near, over the range of
-        distances in the picture. "normals": the smooth normal in eye space, x, y, z from -1..1 as red, green, blue; what
+        light the side that is seen, whichever it is. "unlit": colours and textures as they are. "matcap": the colour
+        that `matcap` has for the normal. "ids": a colour for each triangle. "depth": grey, bright is near, over a range of
+        distances. "normals": the smooth normal in eye space, x, y, z from -1..1 as red, green, blue; what
         faces the viewer is light blue.
     color : (3,) of 0 to 255
         sRGB colour of a mesh without colours and materials.
     background : (4,) of 0 to 255
         sRGB and alpha where nothing shows.
+    depth_range : (float, float), optional
+        Distances along the view that are the brightest and the darkest grey of "depth", world units; unless given,
+        those of the picture.
     lights : sequence of Light, optional
-        Lambert's cosine for each of them. Unless given: one headlight over the viewer's left shoulder, whose light wraps
-        round the mesh.
+        Lambert's cosine for each of them. Unless given: one headlight over the viewer's left shoulder, whose light
+        wraps round the mesh.
     ambient : float, optional
         Light from all sides, not negative, 0.03 unless given.
     material : Material, optional
@@ -135,22 +144,36 @@ def shade(
     if mode is Shading.MATCAP and matcap is None:
         raise ValueError("matcap must be a Texture for shading 'matcap', got None")
     share = AMBIENT if ambient is None else as_not_negative("ambient", ambient)
-    picture = np.empty((*frags.triangle.shape, 4), dtype=np.uint8)
+    n_samples = frags.samples_triangle.shape[-1]
     if mode in (Shading.IDS, Shading.DEPTH) or not len(mesh.triangles) or 0 in frags.triangle.shape:
-        picture[...] = behind
-        _paint_numbers(picture, frags, camera, mode)
-        return picture
-    ids, depth = (np.require(array, kind, ["C", "A"]) for array, kind in ((frags.triangle, np.int32), (frags.depth, np.float32)))
+        ends = depth_range or distances(frags, camera) if mode is Shading.DEPTH else None
+
+        def number_one(sample: Fragments) -> U8:
+            return picture_of_numbers(sample, camera, ends, behind)
+
+        return number_one(frags) if n_samples == 1 else shade_samples(frags, number_one, behind)
+    picture = np.empty((*frags.triangle.shape, 4), dtype=np.uint8)
     scene = frags._scene
-    look = _Look(scene, mesh, camera, picture.shape[1::-1], is_flat=mode is Shading.FLAT)
-    own = (material,) if material is not None else mesh.materials or (Material(own_color if mesh.colors is None else None),)
+    plain = Material(own_color if mesh.colors is None else None)
+    own = (material,) if material is not None else mesh.materials or (plain,)
+    rows = mesh.material_of_triangle if own is mesh.materials and len(own) > 1 else None
+    look = _Look(scene, mesh, camera, picture.shape[1::-1], rows, is_flat=mode is Shading.FLAT)
     look.set_materials(mesh, own, is_unlit=mode is Shading.UNLIT)
     look.set_lights(lights, share)
     look.set_view(mode, matcap, behind)
     look.set_fog(fog)
+    planes = np.moveaxis(frags.samples_triangle, -1, 0), np.moveaxis(frags.samples_depth, -1, 0)
+    kinds = np.int32, np.float32
+    ids, depth = (np.require(array, kind, ["C", "A"]) for array, kind in zip(planes, kinds, strict=True))
+
+    positions = None if n_samples == 1 else sample_positions(n_samples, scene.subpixel_bits)
 
     def shade_rows(first: int, end: int) -> None:
-        _engine.shade(scene, scene.view, look.shading, ids, depth, picture, first, end - first)
+        part = picture, first, end - first
+        if positions is None:
+            _engine.shade(scene, scene.view, look.shading, ids[0], depth[0], *part)
+        else:
+            _engine.shade_samples(scene, scene.view, look.shading, positions, ids, depth, *part)
 
     run_parts(shade_rows, len(picture), n_threads)
     return picture
@@ -159,7 +182,16 @@ def shade(
 class _Look:
     """The numbers of one picture, as the kernels read them."""
 
-    def __init__(self, scene: _engine.Scene, mesh: Mesh, camera: Camera, size: tuple[int, int], *, is_flat: bool) -> None:
+    def __init__(
+        self,
+        scene: _engine.Scene,
+        mesh: Mesh,
+        camera: Camera,
+        size: tuple[int, int],
+        material_of: npt.NDArray[np.int32] | None,
+        *,
+        is_flat: bool,
+    ) -> None:
         in_eye_space = not is_similarity(camera.view)
         self.surface = Surface(mesh, camera.view) if in_eye_space else surface_of(mesh)
         viewport = size if scene.view is None else scene.view.viewport
@@ -178,7 +210,7 @@ class _Look:
             None if is_flat else self.surface.is_turned,
             mesh.uv,
             self.surface.colors,
-            mesh.material_of_triangle if len(mesh.materials) > 1 else None,
+            material_of,
             LIGHT_OF_SRGB,
         )
 
@@ -236,22 +268,25 @@ class _Look:
             self.shading.set_fog(light_of(fog.color), fog.near, scale, frame.distance_start, frame.distance_scale)
 
 
-def _paint_numbers(picture: U8, frags: Fragments, camera: Camera, mode: Shading) -> None:
-    """Paint what ids and depth tell over the background."""
+def picture_of_numbers(
+    frags: Fragments, camera: Camera, depth_range: tuple[float, float] | None, background: Color
+) -> U8:
+    """The picture (H, W, 4) of ids, or of distances when they have a range."""
+    picture = np.empty((*frags.triangle.shape, 4), dtype=np.uint8)
+    picture[...] = background
     seen = frags.mask
     if not seen.any():
-        return
-    if mode is Shading.IDS:
+        return picture
+    if depth_range is None:
         picture[seen, :3] = id_colors(frags.triangle[seen])
     else:
-        picture[seen, :3] = _grey_of_distance(eye_distance(frags.depth[seen], camera))[:, None]
+        nearest, farthest = depth_range
+        distance = eye_distance(frags.depth[seen], camera)
+        share = np.clip((distance - nearest) / max(farthest - nearest, np.finfo(np.float64).tiny), 0, 1)
+        grey = GREY_OF_NEAREST + (GREY_OF_FARTHEST - GREY_OF_NEAREST) * share
+        picture[seen, :3] = np.rint(grey).astype(np.uint8)[:, None]
     picture[seen, 3] = 255
-
-
-def _grey_of_distance(distance: F64) -> U8:
-    nearest, farthest = distance.min(), distance.max()
-    share = (distance - nearest) / max(farthest - nearest, np.finfo(np.float64).tiny)
-    return np.rint(GREY_OF_NEAREST + (GREY_OF_FARTHEST - GREY_OF_NEAREST) * share).astype(np.uint8)
+    return picture
 
 
 def _check_types(lights: Sequence[Light], material: object, matcap: object, fog: object) -> None:

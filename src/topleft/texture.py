@@ -71,8 +71,8 @@ class Texture:
 
     Notes
     -----
-    Texels are kept as linear light in 65535ths, so filters and halvings take the mean of light. A halving is the mean over
-    the area of its texels, also where a side is odd.
+    Texels are kept as linear light in 65535ths, so filters and halvings take the mean of light. A halving is the mean
+    over the area of its texels, also where a side is odd.
 
     Examples
     --------
@@ -128,7 +128,7 @@ def as_image(name: str, pixels: npt.ArrayLike) -> U8:
     """
     array = as_array(name, pixels)
     if array.dtype != np.uint8:
-        if array.dtype.kind not in "iu" or array.size and not (0 <= array.min() and array.max() <= 255):
+        if array.dtype.kind not in "iu" or (array.size and not (0 <= array.min() and array.max() <= 255)):
             raise TypeError(f"{name} must be uint8, got {array.dtype}")
         array = array.astype(np.uint8)
     if array.ndim not in (2, 3) or array.shape[2:] not in ((), (3,), (4,)):
