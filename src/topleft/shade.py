@@ -105,8 +105,8 @@ def shade(
     shading : {"smooth", "flat", "unlit", "matcap", "ids", "depth", "normals"}
         "smooth": interpolated vertex normals, lit in the pixel. "flat": the same with the normals of the faces. Both
         light the side that is seen, whichever it is. "unlit": colours and textures as they are. "matcap": the colour
-        that `matcap` has for the normal. "ids": a colour for each triangle. "depth": grey, bright is near, over a range of
-        distances. "normals": the smooth normal in eye space, x, y, z from -1..1 as red, green, blue; what
+        that `matcap` has for the normal. "ids": a colour for each triangle. "depth": grey, bright is near, over a range
+        of distances. "normals": the smooth normal in eye space, x, y, z from -1..1 as red, green, blue; what
         faces the viewer is light blue.
     color : (3,) of 0 to 255
         sRGB colour of a mesh without colours and materials.
