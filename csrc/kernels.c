@@ -28,6 +28,7 @@
 #include "shade_pixels.c"
 #include "shade.c"
 #include "shade_samples.c"
+#include "shade_cutout.c"
 #include "mix.h"
 #include "mix_u8.c"
 #include "mix_f32.c"
@@ -58,6 +59,7 @@ const tl_kernels TL_KERNELS = {
     .set_inverse_w = set_inverse_w,
     .shade = shade,
     .shade_samples = shade_samples,
+    .cut_out = cut_out,
     .mean_flat = mean_flat,
     .mean_colors = mean_colors,
 };

@@ -309,6 +309,11 @@ typedef struct tl_kernels {
                           const int32_t *samples_fx, int sample_bits, int64_t stride, const int32_t *ids, const float *depth,
                           uint8_t *pixels);
 
+    /* Draws n triangles over ids and depth of the others, but for what their materials cut out; the window as for a share of a
+     * part, and fewer than 2^31 pixels. */
+    void (*cut_out)(const tl_scene *scene, const tl_window *window, const tl_view *view, const tl_shading *shading,
+                    const int32_t *triangles, int64_t n, int32_t *ids, float *depth);
+
     /* The edges of the triangles that are not culled, each once, as lower index + 2^32 * higher index; room for three a
      * triangle.  Returns the first row with an index outside the vertices, or -1. */
     int64_t (*list_edges)(const tl_scene *scene, const tl_edge_scratch *scratch, uint64_t *edges, int64_t *n_edges);

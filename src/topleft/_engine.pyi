@@ -254,3 +254,14 @@ def shade_samples(
     first_row: int,
     n_rows: int,
 ) -> None: ...
+def cut_out(
+    scene: Scene,
+    view: View | None,
+    shading: Shading,
+    opaque: NDArray[np.int32],
+    triangles: NDArray[np.int32],
+    ids: NDArray[np.int32],
+    depth: NDArray[np.float32],
+    first_row: int,
+    n_rows: int,
+) -> None: ...

@@ -167,6 +167,7 @@ cdef extern from "topleft.h" nogil:
         uint8_t *background_bytes
     ctypedef struct tl_kernels:
         void (*set_inverse_w)(const tl_source *, const float *, int64_t, int64_t, float *) noexcept nogil
+        void (*cut_out)(const tl_scene *, const tl_window *, const tl_view *, const tl_shading *, const int32_t *, int64_t, int32_t *, float *) noexcept nogil
         void (*shade_samples)(const tl_scene *, const tl_window *, const tl_view *, const tl_shading *, const int32_t *, int, int64_t, const int32_t *, const float *, uint8_t *) noexcept nogil
         void (*shade)(const tl_scene *, const tl_window *, const tl_view *, const tl_shading *, const int32_t *, const float *, uint8_t *) noexcept nogil
         tl_vertex_counts (*snap)(const tl_source *, int64_t, int64_t, int, int, tl_vertex *, tl_wide *) noexcept nogil

@@ -131,3 +131,23 @@ def shade_samples(Scene scene, View view, Shading shading, const int32_t[:, ::1]
         with nogil:
             K.shade_samples(&scene.scene, &window, own, &shading.shading, &positions[0, 0], sample_bits, stride, &ids[0, first_row, 0],
                             &depth[0, first_row, 0], &pixels[first_row, 0, 0])
+
+
+def cut_out(Scene scene, View view, Shading shading, const int32_t[::1] opaque, const int32_t[::1] triangles, int32_t[:, ::1] ids,
+            float[:, ::1] depth, int64_t first_row, int64_t n_rows):
+    """Clear rows of a visibility buffer, draw the opaque triangles, and over them what the others' materials leave of them."""
+    cdef tl_window window = scene.window(first_row, n_rows, ids.shape[1])
+    cdef const tl_view *own = &view.view if view is not None else NULL
+    cdef tl_target target
+    cdef tl_share share
+    if n_rows == 0 or ids.shape[1] == 0:
+        return
+    target.sink, target.stride_px = <tl_sink>4, ids.shape[1]  # nearest
+    target.pixels, target.depth, target.covered, target.samples_fx = &ids[first_row, 0], &depth[first_row, 0], NULL, NULL
+    target.n_samples = target.sample_bits = target.sample = 0
+    share.ids, share.others, share.first, share.end = &opaque[0], NULL, 0, opaque.shape[0] - 1  # the last is there to be read
+    share.is_first = share.is_last = True
+    with nogil:
+        K.draw(&scene.scene, &window, &target, &share)
+        K.cut_out(&scene.scene, &window, own, &shading.shading, &triangles[0], triangles.shape[0], &ids[first_row, 0],
+                  &depth[first_row, 0])

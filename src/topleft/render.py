@@ -13,6 +13,7 @@ import numpy.typing as npt
 from topleft.api import rasterize, wireframe
 from topleft.camera import Camera
 from topleft.colors import DEFAULT_COLOR
+from topleft.cutout import cut_out
 from topleft.fragments import Fragments
 from topleft.mesh import Mesh
 from topleft.shade import LookOptions, shade
@@ -83,6 +84,7 @@ def render(
     """
     camera = default_camera(mesh, size) if camera is None else camera
     frags = visibility(mesh, camera, size, cull=cull, threads=threads, sampling=sampling)
+    cut_out(frags, mesh, camera, look.get("material"), threads=threads)
     picture = shade(
         frags, mesh, camera, shading=shading, color=color, background=background, threads=threads, **look
     )
