@@ -10,7 +10,7 @@ from topleft.files import load, save_image
 from topleft.fragments import Fragments
 from topleft.memory import release_memory
 from topleft.mesh import Mesh
-from topleft.render import render, visibility
+from topleft.render import rasterize_mesh, render
 from topleft.shade import shade
 
 __version__: str = build_info()["version"]
@@ -30,11 +30,11 @@ __all__ = [
     "load",
     "overdraw",
     "rasterize",
+    "rasterize_mesh",
     "release_memory",
     "render",
     "save_image",
     "scenes",
     "shade",
-    "visibility",
     "wireframe",
 ]

@@ -25,7 +25,7 @@ from topleft.files import SUFFIXES, load, save_image
 from topleft.fragments import Fragments
 from topleft.mesh import Mesh
 from topleft.models import Cull
-from topleft.render import DEFAULT_SIZE, draw_edges, visibility
+from topleft.render import DEFAULT_SIZE, draw_edges, rasterize_mesh
 from topleft.scenes import SHAPES, shape
 from topleft.shade import DEFAULT_COLOR, Shading, eye_normals, shade
 
@@ -128,7 +128,7 @@ def render_job(job: Job, options: argparse.Namespace) -> Iterator[Path]:
             ortho=options.ortho,
             aspect=width / height,
         )
-        frags = visibility(mesh, camera, options.size, cull=options.cull, threads=options.threads)
+        frags = rasterize_mesh(mesh, camera, options.size, cull=options.cull, threads=options.threads)
         target.parent.mkdir(parents=True, exist_ok=True)
         save_image(target, _content(target, frags, mesh, camera, options), background=_opaque(options.background))
         yield target

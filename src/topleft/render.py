@@ -1,6 +1,6 @@
 """Rendering: a mesh and a camera to a picture, in one call.
 
-Input: `Mesh`, `Camera`. Output: the picture (H, W, 4) uint8 of `render`, or the visibility buffer of `visibility`.
+Input: `Mesh`, `Camera`. Output: the picture (H, W, 4) uint8 of `render`, or the visibility buffer of `rasterize_mesh`.
 """
 
 from __future__ import annotations
@@ -11,8 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft.api import rasterize, wireframe
+from topleft.bend import bend
 from topleft.camera import Camera
-from topleft.fragments import Fragments
+from topleft.fragments import BentFragments, Fragments
 from topleft.mesh import Mesh
 from topleft.shade import DEFAULT_COLOR, shade
 
@@ -74,14 +75,14 @@ def render(
     255
     """
     camera = default_camera(mesh, size) if camera is None else camera
-    frags = visibility(mesh, camera, size, cull=cull, threads=threads)
+    frags = rasterize_mesh(mesh, camera, size, cull=cull, threads=threads)
     picture = shade(frags, mesh, camera, shading=shading, color=color, background=background)
     if edges:
         draw_edges(picture, frags, mesh, camera, cull=cull, threads=threads)
     return picture
 
 
-def visibility(
+def rasterize_mesh(
     mesh: Mesh,
     camera: Camera | None = None,
     size: tuple[int, int] = DEFAULT_SIZE,
@@ -111,8 +112,13 @@ def visibility(
         If the mesh has no triangles and no camera is given, or an option is unknown.
     """
     camera = default_camera(mesh, size) if camera is None else camera
-    transform = camera.clip_from_world(view.get("viewport") or size)
-    return rasterize(mesh.vertices, mesh.triangles, size, transform=transform, cull=cull, threads=threads, **view)
+    view |= {"cull": cull, "threads": threads}
+    frame = view.get("viewport") or size
+    if camera.lens is None:
+        return rasterize(mesh.vertices, mesh.triangles, size, transform=camera.clip_from_world(frame), **view)
+    bent = bend(mesh.vertices, mesh.triangles, camera, camera.lens, frame, near_clip=view.get("near_clip", True))
+    parts = rasterize(bent.points_eye, bent.triangles, size, transform=camera.clip_from_eye(frame), **view)
+    return BentFragments(parts, bent.source, bent.weights, mesh.triangles, len(mesh.vertices))
 
 
 def draw_edges(
@@ -126,9 +132,18 @@ def draw_edges(
 ) -> None:
     """Draw the edges of the mesh over its picture (H, W, 4), those that the visibility buffer does not hide."""
     height, width = frags.depth.shape
+    size = width, height
+    vertices: npt.NDArray[Any] = mesh.vertices
+    triangles: npt.NDArray[np.integer[Any]] = mesh.triangles
+    if camera.lens is None:
+        transform = camera.clip_from_world(size)
+    else:
+        bent = bend(mesh.vertices, mesh.triangles, camera, camera.lens, size)
+        vertices, transform = bent.points_eye, camera.clip_from_eye(size)
+        triangles, cull = bent.outline(transform, cull), "none"
     lines = wireframe(
-        mesh.vertices, mesh.triangles, (width, height), transform=camera.clip_from_world((width, height)),
-        depth=depth_behind(frags.depth), antialias=True, cull=cull, threads=threads,
+        vertices, triangles, size, transform=transform, depth=depth_behind(frags.depth), antialias=True, cull=cull,
+        threads=threads,
     )  # fmt: skip
     on = lines > 0
     share = lines[on][:, None]
