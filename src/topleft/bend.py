@@ -4,8 +4,8 @@ Input: vertices and triangles in world space, a camera with a lens. Output: `Ben
 draws as the lens would show the mesh.
 
 An edge is halved (in space) where its picture, at a quarter, half or three quarters of its length, is off by more than
-the tolerance from what a straight edge would show there, or where it spans a large angle. That is a question to the edge
-alone, and an edge that two triangles share has one set of vertices: so they split it alike, and no gap opens.
+the tolerance from what a straight edge would show there, its depth too, or where it spans a large angle. That is a
+question to the edge alone, and triangles that share an edge share its ends: so they split it alike, and no gap opens.
 """
 
 from __future__ import annotations
@@ -32,6 +32,13 @@ MAX_EDGE_ANGLE = 0.25
 """Longer edges, in radians as the lens sees them, are halved in any case: so every triangle is small enough on the
 sphere of directions for the test of what the picture cannot show."""
 
+MAX_RANGE_ERROR = 2.0**-12
+"""Relative error of the distance that a fisheye has for depth: longer edges are halved, too."""
+
+WIDEST = np.radians(160)
+"""What lies farther from the axis is never drawn: a triangle round the back of the axis would cover everything. Those
+that pass the test have a cap of less than 10 degrees and end before that."""
+
 MAX_HALVINGS = 24
 """No edge is halved more often; only one that passes through the lens would be."""
 
@@ -41,8 +48,8 @@ N_ANGLES, N_AZIMUTHS = 513, 128
 FRAME_MARGIN = 1.05
 """What lies beyond so many times the frame's half sides is out of the picture."""
 
-# Corners 0, 1, 2 and the middles 3, 4, 5 of sides 0-1, 1-2, 2-0. For each set of halved sides (bit k: side k) the triangles
-# that come of it, in the winding of the whole.
+# Corners 0, 1, 2 and the middles 3, 4, 5 of sides 0-1, 1-2, 2-0. For each set of halved sides (bit k: side k) the
+# triangles that come of it, in the winding of the whole.
 _TURN = {0: 1, 1: 2, 2: 0, 3: 4, 4: 5, 5: 3}
 _ONE = [(0, 3, 2), (3, 1, 2)]
 _TWO = [(3, 1, 4), (0, 3, 4), (0, 4, 2)]
@@ -103,8 +110,8 @@ class BentMesh:
 class Sight:
     """What a lens sees of all directions, and where in a picture: made monotone beyond what the picture can show.
 
-    The polynomials of a lens turn back somewhere beyond the angles that they were fitted to, and would fold what lies there
-    into the picture. From the angle `limit` on, the picture goes on outwards, evenly.
+    The polynomials of a lens turn back somewhere beyond the angles that they were fitted to, and would fold what lies
+    there into the picture. From the angle `limit` on, the picture goes on outwards, evenly.
     """
 
     def __init__(self, lens: Lens, px_from_plane: F64, half_size_px: tuple[float, float]) -> None:
@@ -126,7 +133,7 @@ class Sight:
         in_frame = (np.abs(self.px(everywhere)) <= FRAME_MARGIN * np.array(half_size_px)).all(axis=1)
         shown = np.flatnonzero(in_frame.reshape(N_ANGLES, -1).any(axis=1))
         step = all_angles[1]
-        self.max_angle = float(all_angles[shown[-1]] + 2 * step if len(shown) else lens.max_angle)
+        self.max_angle = min(float(all_angles[shown[-1]]) + 2 * step if len(shown) else np.pi, WIDEST)
         # A little beyond what shows the extension may begin: the tamer, the fewer edges there are halved.
         self._extend(angles, rings, min(last, int(np.searchsorted(angles, self.max_angle + 2 * step))))
         self.least_cosine = np.cos(min(self.max_angle / 2 + np.pi / 4, np.radians(89.9)))
@@ -135,7 +142,8 @@ class Sight:
         """Places (N, 2) in the image plane and ranges (N,) of points (N, 3), both finite whatever the points are."""
         off_axis = np.hypot(points[:, 0], points[:, 1])
         angle = np.arctan2(off_axis, points[:, 2])
-        around = np.divide(points[:, :2], off_axis[:, None], out=np.zeros((len(points), 2)), where=off_axis[:, None] > 0)
+        sides, length = points[:, :2], off_axis[:, None]
+        around = np.divide(sides, length, out=np.zeros((len(points), 2)), where=length > 0)
         around[(off_axis == 0) & (angle > 0), 0] = 1.0
         far = np.sqrt(np.einsum("ij,ij->i", points, points))
         reach = np.maximum(self.lens.range_along(points), far * self.least_cosine)
@@ -292,11 +300,14 @@ class _Subdivision:
         px_a, px_b = self.sight.px(self.place[a]), self.sight.px(self.place[b])
         off = np.zeros(len(ask))
         for share in (0.25, 0.5, 0.75):
-            place, _ = self.sight((1 - share) * self.points[a] + share * self.points[b])
+            place, reach = self.sight((1 - share) * self.points[a] + share * self.points[b])
             weight_a, weight_b = (1 - share) * self.reach[a], share * self.reach[b]
-            straight = (weight_a[:, None] * px_a + weight_b[:, None] * px_b) / (weight_a + weight_b)[:, None]
-            off = np.maximum(off, np.abs(self.sight.px(place) - straight).max(axis=1))
-        is_bent[ask] = off > self.tolerance_px
+            mean = weight_a + weight_b
+            straight = (weight_a[:, None] * px_a + weight_b[:, None] * px_b) / mean[:, None]
+            off = np.maximum(off, np.abs(self.sight.px(place) - straight).max(axis=1) / self.tolerance_px)
+            if not self.sight.lens.has_planar_range:
+                off = np.maximum(off, np.abs(reach - mean) / (MAX_RANGE_ERROR * mean))
+        is_bent[ask] = off > 1
         return is_bent
 
 

@@ -1,7 +1,7 @@
 """Cameras: from world to clip space, as two 4x4 matrices made from words (eye, target, field of view, intrinsics).
 
 Spaces: world; eye (OpenGL: x right, y up, the view along -z); clip (OpenGL: -w <= x, y, z <= w inside).
-Matrices act on columns: `clip = projection @ view @ [x, y, z, 1]`. A lens bends what the view sees before it is projected.
+Matrices act on columns: `clip = projection @ view @ [x, y, z, 1]`. A lens bends what the view sees before that.
 """
 
 from __future__ import annotations
@@ -38,7 +38,8 @@ from topleft.projections import (
 )
 
 __all__ = [
-    "DEFAULT_FOV_Y_DEG", "THREE_QUARTER_DEG", "Camera", "bounding_sphere", "orbit_view", "perspective_matrix", "view_matrix",
+    "DEFAULT_FOV_Y_DEG", "THREE_QUARTER_DEG", "Camera", "bounding_sphere", "orbit_view", "perspective_matrix",
+    "view_matrix",
 ]  # fmt: skip
 
 DEFAULT_FOV_Y_DEG = 40.0
@@ -59,7 +60,7 @@ class Camera:
         field of view to that of the picture and leaves its height alone. `None`: `projection` is taken as it is, and
         a picture of another shape is stretched.
     lens : OpenCVLens or FisheyeLens, optional
-        Bends the rays before `projection` sees them; without one they are straight. Takes a projection with perspective.
+        Bends the rays before `projection`, which must have perspective, sees them; without one they are straight.
 
     Raises
     ------
@@ -222,8 +223,8 @@ class Camera:
         view : (4, 4) array_like
             Eye from world; `view_matrix` makes one.
         left, right, bottom, top : float
-            Sides of the picture in the plane at `near`, world units from the axis, as for glFrustum and glOrtho. A picture
-            of another shape is stretched.
+            Sides of the picture in the plane at `near`, world units from the axis, as for glFrustum and glOrtho. A
+            picture of another shape is stretched.
         near, far : float
             Distances of the planes in front of the eye, world units, near < far; with perspective 0 < near.
         ortho : bool

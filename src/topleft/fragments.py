@@ -154,8 +154,8 @@ class Fragments:
 class BentFragments(Fragments):
     """The visibility buffer of a mesh whose triangles were drawn in parts, in terms of the whole ones.
 
-    Made by `rasterize_mesh` for cameras with a lens. `triangle` holds triangles of the mesh, and attributes are those of
-    its vertices.
+    Made by `rasterize_mesh` for cameras with a lens. `triangle` holds triangles of the mesh, and attributes are those
+    of its vertices.
     """
 
     def __init__(
@@ -184,7 +184,8 @@ class BentFragments(Fragments):
         """Return an attribute of the vertices at each visible pixel, as `Fragments.interpolate` does."""
         array = as_values(values, self._n_vertices, self._n_triangles)
         if not len(self._source):
-            return np.full((*self.triangle.shape, *(array.shape[-1:] if array.ndim > 1 else ())), background, np.float32)
+            channels = array.shape[-1:] if array.ndim > 1 else ()
+            return np.full((*self.triangle.shape, *channels), background, np.float32)
         if array.ndim == 3:
             corners = array[self._source]
         else:

@@ -28,7 +28,11 @@ FINEST_TOLERANCE_PX = 2.0**-8
 class Lens(Protocol):
     """What a camera asks of its lens."""
 
+    #: Beyond it, in radians from the axis, the lens is not asked.
     max_angle: ClassVar[float]
+
+    #: Whether `range_along` is the distance along the axis, which a straight projection shows as it is.
+    has_planar_range: ClassVar[bool]
 
     def __hash__(self) -> int:
         """Lenses of the same terms are one."""
@@ -84,6 +88,7 @@ class OpenCVLens:
     tolerance_px: float = DEFAULT_TOLERANCE_PX
 
     max_angle: ClassVar[float] = np.radians(89.4)
+    has_planar_range: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         _check_terms([self.k1, self.k2, self.p1, self.p2, self.k3, self.k4, self.k5, self.k6], self.tolerance_px)
@@ -113,7 +118,7 @@ class OpenCVLens:
 
 @dataclass(frozen=True)
 class FisheyeLens:
-    """A fisheye, as `cv2.fisheye.projectPoints` has it; it may see behind itself.
+    """A fisheye, as `cv2.fisheye.projectPoints` has it; it may see behind itself, up to 160 degrees from its axis.
 
     Parameters
     ----------
@@ -140,6 +145,7 @@ class FisheyeLens:
     tolerance_px: float = DEFAULT_TOLERANCE_PX
 
     max_angle: ClassVar[float] = np.radians(179.0)
+    has_planar_range: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         _check_terms([self.k1, self.k2, self.k3, self.k4], self.tolerance_px)
