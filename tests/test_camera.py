@@ -233,7 +233,8 @@ def test_framing_box_comes_nearer_than_the_sphere():
 
 def test_framing_box_of_a_point_has_a_picture():
     for ortho in (False, True):
-        assert pixels(Camera.framing([(5, 5, 5)], fit="box", ortho=ortho), (5, 5, 5))[0, :2] == pytest.approx((320, 240))
+        camera = Camera.framing([(5, 5, 5)], fit="box", ortho=ortho)
+        assert pixels(camera, (5, 5, 5))[0, :2] == pytest.approx((320, 240))
 
 
 @pytest.mark.parametrize("ortho", [False, True])

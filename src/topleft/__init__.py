@@ -2,27 +2,33 @@
 
 from topleft import scenes
 from topleft._isa import build_info
+from topleft.adapt import as_mesh
 from topleft.api import Rasterizer, coverage, fill, overdraw, rasterize, wireframe
 from topleft.camera import Camera
 from topleft.classic import bresenham_line
 from topleft.errors import MeshError, TopleftError
 from topleft.files import load, save_image
 from topleft.fragments import Fragments
+from topleft.lens import FisheyeLens, OpenCVLens
 from topleft.memory import release_memory
 from topleft.mesh import Mesh
 from topleft.render import rasterize_mesh, render
 from topleft.shade import shade
+from topleft.viewpoints import turntable, viewpoints
 
 __version__: str = build_info()["version"]
 
 __all__ = [
     "Camera",
+    "FisheyeLens",
     "Fragments",
     "Mesh",
     "MeshError",
+    "OpenCVLens",
     "Rasterizer",
     "TopleftError",
     "__version__",
+    "as_mesh",
     "bresenham_line",
     "build_info",
     "coverage",
@@ -36,5 +42,7 @@ __all__ = [
     "save_image",
     "scenes",
     "shade",
+    "turntable",
+    "viewpoints",
     "wireframe",
 ]

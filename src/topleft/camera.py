@@ -12,11 +12,11 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from topleft.adapt import MeshLike
 from topleft.lens import Lens, lens_of_opencv
 from topleft.poses import (
     FRAMING_MARGIN,
     THREE_QUARTER_DEG,
-    HasTriangles,
     bounding_sphere,
     box_corners,
     distance_to_fit,
@@ -339,7 +339,7 @@ class Camera:
     @classmethod
     def framing(
         cls,
-        subject: HasTriangles | npt.ArrayLike,
+        subject: MeshLike | npt.ArrayLike,
         *,
         azimuth_deg: float = THREE_QUARTER_DEG[0],
         elevation_deg: float = THREE_QUARTER_DEG[1],
@@ -353,8 +353,8 @@ class Camera:
 
         Parameters
         ----------
-        subject : Mesh, or (N, 3) array_like
-            A mesh, of which the vertices in use count, or points: the two corners of a box, say.
+        subject : mesh, or (N, 3) array_like
+            Whatever `as_mesh` takes, of which the vertices in use count, or points: the two corners of a box, say.
         azimuth_deg : float
             0 looks at the front of the subject (+z with y up, -y with z up), 90 at its right (+x). Degrees.
         elevation_deg : float

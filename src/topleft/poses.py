@@ -5,11 +5,12 @@ Spaces: world; eye (OpenGL: x right, y up, the view along -z).
 
 from __future__ import annotations
 
-from typing import Any, Literal, Protocol, runtime_checkable
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
+from topleft.adapt import MeshLike, as_mesh, is_mesh_like
 from topleft.projections import F64, as_vector
 
 THREE_QUARTER_DEG = (35.0, 20.0)
@@ -19,20 +20,7 @@ FRAMING_MARGIN = 1.05
 """What fits fills 1 / 1.05 of the frame, so that no outline touches its border."""
 
 
-@runtime_checkable
-class HasTriangles(Protocol):
-    """What `Camera.framing` looks at: a `Mesh`, or anything like it."""
-
-    @property
-    def vertices(self) -> npt.NDArray[Any]:
-        """Positions (V, 3)."""
-
-    @property
-    def triangles(self) -> npt.NDArray[Any]:
-        """Rows of vertex indices (T, 3)."""
-
-
-def points_to_frame(subject: HasTriangles | npt.ArrayLike) -> F64:
+def points_to_frame(subject: MeshLike | npt.ArrayLike) -> F64:
     """The points (N, 3) float64 of a subject that count: vertices that triangles use, or all points.
 
     Raises
@@ -40,8 +28,9 @@ def points_to_frame(subject: HasTriangles | npt.ArrayLike) -> F64:
     ValueError
         If there is no point, or one is not finite.
     """
-    if isinstance(subject, HasTriangles):
-        points = np.asarray(subject.vertices, dtype=np.float64)[subject.triangles.ravel()]
+    if is_mesh_like(subject):
+        mesh = as_mesh(subject)
+        points = np.asarray(mesh.vertices, dtype=np.float64)[mesh.triangles.ravel()]
     else:
         points = np.asarray(subject, dtype=np.float64)
     if points.ndim != 2 or points.shape[1] != 3:
@@ -53,7 +42,7 @@ def points_to_frame(subject: HasTriangles | npt.ArrayLike) -> F64:
     return points
 
 
-def bounding_sphere(subject: HasTriangles | npt.ArrayLike) -> tuple[F64, float]:
+def bounding_sphere(subject: MeshLike | npt.ArrayLike) -> tuple[F64, float]:
     """Centre (3,) of the box round the subject, and the distance of its farthest point (1 if they are all one).
 
     Raises
@@ -67,7 +56,7 @@ def bounding_sphere(subject: HasTriangles | npt.ArrayLike) -> tuple[F64, float]:
     return center, radius if radius > 0 else 1.0
 
 
-def box_corners(subject: HasTriangles | npt.ArrayLike) -> F64:
+def box_corners(subject: MeshLike | npt.ArrayLike) -> F64:
     """The corners (8, 3) float64 of the box round the subject; raises as `bounding_sphere` does."""
     points = points_to_frame(subject)
     low, high = points.min(axis=0), points.max(axis=0)

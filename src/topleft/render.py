@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from topleft.adapt import MeshLike, as_mesh
 from topleft.api import rasterize, wireframe
 from topleft.bend import bend
 from topleft.camera import Camera
@@ -23,7 +24,7 @@ EDGE_COLOR = (24, 28, 40)
 
 
 def render(
-    mesh: Mesh,
+    mesh: MeshLike,
     camera: Camera | None = None,
     size: tuple[int, int] = DEFAULT_SIZE,
     *,
@@ -38,8 +39,8 @@ def render(
 
     Parameters
     ----------
-    mesh : Mesh
-        What to draw. Its colours are used if it has any.
+    mesh : Mesh, or whatever `as_mesh` takes
+        What to draw: a mesh of trimesh, meshio, pyvista, say. Its colours are used if it has any.
     camera : Camera, optional
         Unless given, the three-quarter view of `Camera.framing`, with y up.
     size : (width, height), pixels
@@ -74,6 +75,7 @@ def render(
     >>> tl.render(mesh, size=(64, 48), background=(0, 0, 0, 0))[24, 32].tolist()[3]
     255
     """
+    mesh = as_mesh(mesh)
     camera = default_camera(mesh, size) if camera is None else camera
     frags = rasterize_mesh(mesh, camera, size, cull=cull, threads=threads)
     picture = shade(frags, mesh, camera, shading=shading, color=color, background=background)
@@ -83,7 +85,7 @@ def render(
 
 
 def rasterize_mesh(
-    mesh: Mesh,
+    mesh: MeshLike,
     camera: Camera | None = None,
     size: tuple[int, int] = DEFAULT_SIZE,
     *,
@@ -111,6 +113,7 @@ def rasterize_mesh(
     ValueError
         If the mesh has no triangles and no camera is given, or an option is unknown.
     """
+    mesh = as_mesh(mesh)
     camera = default_camera(mesh, size) if camera is None else camera
     view |= {"cull": cull, "threads": threads}
     frame = view.get("viewport") or size

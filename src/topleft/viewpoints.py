@@ -14,14 +14,15 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from topleft.adapt import MeshLike
 from topleft.camera import Camera
-from topleft.poses import THREE_QUARTER_DEG, HasTriangles, bounding_sphere
+from topleft.poses import THREE_QUARTER_DEG, bounding_sphere
 
 GOLDEN_ANGLE_DEG = 180 * (3 - 5**0.5)
 
 
 def turntable(
-    subject: HasTriangles | npt.ArrayLike,
+    subject: MeshLike | npt.ArrayLike,
     n: int,
     *,
     azimuth_deg: float = THREE_QUARTER_DEG[0],
@@ -32,7 +33,7 @@ def turntable(
 
     Parameters
     ----------
-    subject : Mesh, or (N, 3) array_like
+    subject : mesh, or (N, 3) array_like
         As for `Camera.framing`.
     n : int
         How many, at least 1.
@@ -65,12 +66,12 @@ def turntable(
     ]
 
 
-def viewpoints(subject: HasTriangles | npt.ArrayLike, n: int, **framing: Any) -> list[Camera]:
+def viewpoints(subject: MeshLike | npt.ArrayLike, n: int, **framing: Any) -> list[Camera]:
     """Cameras spread evenly over the sphere round the subject, from the top to the bottom.
 
     Parameters
     ----------
-    subject : Mesh, or (N, 3) array_like
+    subject : mesh, or (N, 3) array_like
         As for `Camera.framing`.
     n : int
         How many, at least 1.
@@ -115,7 +116,7 @@ def _count(n: int) -> int:
     return n
 
 
-def _corners_of_sphere(subject: HasTriangles | npt.ArrayLike) -> npt.NDArray[np.float64]:
+def _corners_of_sphere(subject: MeshLike | npt.ArrayLike) -> npt.NDArray[np.float64]:
     """Two points with the sphere of the subject: the mesh is looked at once, not for every camera."""
     center, radius = bounding_sphere(subject)
     return np.stack([center - [radius, 0, 0], center + [radius, 0, 0]])
