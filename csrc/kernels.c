@@ -22,6 +22,7 @@
 #include "smooth_lines.c"
 #include "lines.c"
 #include "mean.c"
+#include "planes.c"
 
 const tl_kernels TL_KERNELS = {
     .isa = TL_ISA_NAME,
@@ -43,4 +44,6 @@ const tl_kernels TL_KERNELS = {
     .draw_lines = draw_lines,
     .mean_flat = mean_flat,
     .mean_colors = mean_colors,
+    .list_planes = list_planes,
+    .fill_planes = fill_planes,
 };

@@ -225,6 +225,18 @@ def test_framing_box_fills_the_frame_without_touching_it(ortho, size):
     assert 0 <= depth.min() < depth.max() <= 1
 
 
+@pytest.mark.parametrize("ortho", [False, True])
+def test_framing_points_fills_the_frame_more_than_sphere_and_box(ortho):
+    knot = Mesh(*scenes.shape("torus-knot"))
+    sizes = []
+    for fit in ("sphere", "box", "points"):
+        x, y, _ = pixels(Camera.framing(knot, fit=fit, ortho=ortho, aspect=4 / 3), knot.vertices).T
+        assert min(x.min(), 640 - x.max(), y.min(), 480 - y.max()) > 0
+        sizes.append(max(np.ptp(x) / 640, np.ptp(y) / 480))
+    assert sizes[2] > max(sizes[:2])
+    assert sizes[2] > 0.85
+
+
 def test_framing_box_comes_nearer_than_the_sphere():
     long_box = [(-5, -1, -1), (5, 1, 1)]
     sphere, box = (Camera.framing(long_box, fit=fit, azimuth_deg=90) for fit in ("sphere", "box"))
@@ -276,7 +288,10 @@ def test_off_center_halves_make_the_whole(ortho):
             lambda: Camera.off_center(np.eye(4), left=0, right=np.inf, bottom=0, top=1, near=1, far=2, ortho=True),
             "left < right and bottom < top must be finite, got 0 and inf",
         ),
-        (lambda: Camera.framing([(0, 0, 0)], fit="tight"), "fit must be \"sphere\" or \"box\", got 'tight'"),
+        (
+            lambda: Camera.framing([(0, 0, 0)], fit="tight"),
+            "fit must be \"sphere\", \"box\" or \"points\", got 'tight'",
+        ),
     ],
 )
 def test_camera_more_impossible_is_refused(make, message):

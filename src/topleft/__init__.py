@@ -7,8 +7,10 @@ from topleft.api import Rasterizer, coverage, fill, overdraw, rasterize, wirefra
 from topleft.camera import Camera
 from topleft.classic import bresenham_line
 from topleft.errors import MeshError, TopleftError
+from topleft.field import field, height_map
 from topleft.files import load, save_image
 from topleft.fragments import Fragments
+from topleft.grid import Grid
 from topleft.lens import FisheyeLens, OpenCVLens
 from topleft.memory import release_memory
 from topleft.mesh import Mesh
@@ -22,6 +24,7 @@ __all__ = [
     "Camera",
     "FisheyeLens",
     "Fragments",
+    "Grid",
     "Mesh",
     "MeshError",
     "OpenCVLens",
@@ -32,7 +35,9 @@ __all__ = [
     "bresenham_line",
     "build_info",
     "coverage",
+    "field",
     "fill",
+    "height_map",
     "load",
     "overdraw",
     "rasterize",

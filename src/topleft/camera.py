@@ -21,6 +21,7 @@ from topleft.poses import (
     box_corners,
     distance_to_fit,
     orbit_view,
+    points_to_frame,
     view_matrix,
 )
 from topleft.projections import (
@@ -347,7 +348,7 @@ class Camera:
         up: Literal["y", "z"] = "y",
         ortho: bool = False,
         aspect: float = 1.0,
-        fit: Literal["sphere", "box"] = "sphere",
+        fit: Literal["sphere", "box", "points"] = "sphere",
     ) -> Camera:
         """A camera that has the whole subject just inside its frame; three-quarter view by default.
 
@@ -367,9 +368,9 @@ class Camera:
             Without perspective.
         aspect : float
             Width / height of the picture to be made.
-        fit : {"sphere", "box"}
-            What just fits: the sphere round the subject, which keeps its size from every side, or its box, which fills
-            more of the frame.
+        fit : {"sphere", "box", "points"}
+            What just fits: the sphere round the subject, which keeps its size from every side; its box; or all of its
+            points, which comes nearest.
 
         Raises
         ------
@@ -379,17 +380,18 @@ class Camera:
         center, radius = bounding_sphere(subject)
         check_fov(fov_y_deg)
         check_positive("aspect", aspect)
-        if fit not in ("sphere", "box"):
-            raise ValueError(f'fit must be "sphere" or "box", got {fit!r}')
+        if fit not in ("sphere", "box", "points"):
+            raise ValueError(f'fit must be "sphere", "box" or "points", got {fit!r}')
         tan_y = np.tan(np.radians(fov_y_deg) / 2)
         # The sphere touches the pyramid of view at sin, not tan, of the half angle.
         distance = radius * FRAMING_MARGIN / np.sin(np.arctan(tan_y * min(1.0, aspect)))
         height = 2 * radius * FRAMING_MARGIN / min(1.0, aspect)
-        if fit == "box":
+        if fit != "sphere":
             turn = orbit_view((0, 0, 0), 1.0, azimuth_deg, elevation_deg, up=up)[:3, :3]
-            corners = (box_corners(subject) - center) @ turn.T
-            distance = distance_to_fit(corners, tan_y * aspect, tan_y)
-            height = 2 * FRAMING_MARGIN * max(np.abs(corners[:, 1]).max(), np.abs(corners[:, 0]).max() / aspect)
+            points = box_corners(subject) if fit == "box" else points_to_frame(subject)
+            points = (points - center) @ turn.T
+            distance = distance_to_fit(points, tan_y * aspect, tan_y)
+            height = 2 * FRAMING_MARGIN * max(np.abs(points[:, 1]).max(), np.abs(points[:, 0]).max() / aspect)
             height = height or 2 * FRAMING_MARGIN
         view = orbit_view(center, distance, azimuth_deg, elevation_deg, up=up)
         near, far = max(distance - 1.01 * radius, 1e-3 * radius), distance + 1.01 * radius

@@ -56,6 +56,11 @@ class Fragments:
         height, width = self.triangle.shape
         return f"Fragments({width}x{height}, {self._n_triangles} triangles)"
 
+    def _repr_png_(self) -> bytes | None:
+        from topleft.notebook import png_of_fragments  # which imports this module
+
+        return png_of_fragments(self)
+
     @property
     def mask(self) -> NDArray[np.bool_]:
         """Where there is a triangle, bool (H, W)."""
