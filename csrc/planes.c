@@ -68,12 +68,17 @@ TL_INLINE void fill_pixel(const value_plane *p, int64_t col, double y_px, int is
         ((double *)row)[col] = value;
 }
 
+/* How many pixels ahead the plane is asked for: it lies in a distant cache, and its number is known. */
+#define TL_PLANES_AHEAD 32
+
 /* Small triangles: a pixel at a time from listed planes, without a branch that depends on where a triangle ends. */
 TL_INLINE void fill_listed(const value_plane *planes, int64_t n_triangles, const int32_t *ids, int64_t width, double y_px, int is_f32,
                            void *row)
 {
     for (int64_t col = 0; col < width; col++) {
         const int64_t id = ids[col];
+        if (col + TL_PLANES_AHEAD < width)
+            __builtin_prefetch(planes + 1 + ids[col + TL_PLANES_AHEAD]);
         fill_pixel(planes + (id >= 0 && id < n_triangles ? 1 + id : 0), col, y_px, is_f32, row);
     }
 }

@@ -5,7 +5,7 @@ from picture import output_path, ramp
 
 import topleft as tl
 
-SIZE = (480, 360)
+SIZE = (480, 270)
 
 
 def main() -> None:

@@ -33,12 +33,12 @@ def main() -> None:
     points, triangles = terrain()
     cover = np.digitize(points[triangles, 2].mean(axis=1), [-45, -25, 10, 40, 62]).astype(np.float32)
 
-    grid = tl.Grid.around((points, triangles), pixel_size=2.5)
+    grid = tl.Grid.around((points, triangles), pixel_size=4.0)
     labels = tl.field((points, triangles), cover, grid, per="triangle")
     heights = tl.height_map((points, triangles), grid)
 
     south, east = np.gradient(heights, *grid.pixel_size[::-1])
-    light = np.clip((1 + 1.2 * (south - east)) / np.sqrt(1 + south**2 + east**2), 0.35, 1.25)
+    light = np.clip((1 + 0.8 * (south - east)) / np.sqrt(1 + south**2 + east**2), 0.35, 1.25)
     picture = COVER[labels.astype(int)] * light[..., None]
     for label, share in enumerate(np.bincount(labels.astype(int).ravel()) * np.prod(grid.pixel_size) / 1e4):
         print(f"cover {label}: {share:.2f} ha")

@@ -229,8 +229,8 @@ def _depth_of(heights: F64, triangles: I32) -> F64:
     with np.errstate(invalid="ignore", over="ignore"):
         low, high = (used.min(), used.max()) if used.size else (0.0, 0.0)
         middle, half = float(low / 2 + high / 2), float(high / 2 - low / 2)
-        depth: F64 = (heights - middle) / (half or 1.0)
-        return depth
+        depth: F64 = np.divide(np.subtract(heights, middle), half or 1.0)
+    return depth
 
 
 def _visible(points: F64, triangles: I32, view: View, sink: Sink) -> I32:
@@ -244,7 +244,7 @@ def _visible(points: F64, triangles: I32, view: View, sink: Sink) -> I32:
 
 def _on_planes(
     ids: I32, points_px: F64, triangles: I32, values: F64, dtype: type[np.floating[Any]], view: View, out: object
-) -> npt.NDArray[np.floating[Any]]:
+) -> npt.NDArray[Any]:
     n, n_threads = len(triangles), count_threads(view.threads, len(triangles))
     planes: F64 | None = None
     if ids.size < MAX_PIXELS_TO_LIST * n and n < MAX_LISTED_PLANES:
