@@ -23,6 +23,13 @@
 #include "lines.c"
 #include "mean.c"
 #include "planes.c"
+#include "mix.h"
+#include "mix_u8.c"
+#include "mix_f32.c"
+#include "mix.c"
+#include "blend_strip.c"
+#include "blend_area.c"
+#include "blend.c"
 
 const tl_kernels TL_KERNELS = {
     .isa = TL_ISA_NAME,
@@ -36,6 +43,7 @@ const tl_kernels TL_KERNELS = {
     .bin = bin,
     .list_bins = list_bins,
     .draw_area = draw_area,
+    .blend = blend,
     .barycentric = barycentric,
     .interpolate = interpolate,
     .paint_flat = paint_flat,

@@ -18,7 +18,14 @@
  *   vi_prefix_sum, vi_last  sums of lanes [0, k]; the last lane everywhere
  *   vi_shift_in(a, before)  a one lane up, the last lane of `before` in lane 0
  *   hm_, hf_, hi_, hd_      the few that short rows need, in half vectors of TL_HALF_LANES (0: there are none)
- *   vd_from_vi, vd_from_vf, vf_from_vi, vf_from_vd, vi_floor(vf), vi_round(vd)    conversions; INT32_MIN when out of range
+ *   vi_mul_halves, vi_mul_high_halves    lower and upper halves of the products of unsigned 16-bit halves
+ *   vi_scale_halves(a, b)   (a * b + 2^14) >> 15 of signed 16-bit halves; b = -2^15 is -1
+ *   vi_add_halves, vi_sub_halves    modulo 2^16
+ *   vi_upper_bytes          the upper byte of each half, as its value
+ *   vi_add_bytes, vi_max_bytes, vi_min_bytes    unsigned bytes; a sum is at most 255
+ *   vf_last_of(a, n)        the last of every n = 2 or 4 lanes, in all of them (scalar: a)
+ *   vd_from_vi, vd_from_vf, vf_from_vi, vf_from_vd, vi_floor(vf), vi_nearest(vf), vi_round(vd)    conversions; INT32_MIN when
+ *                           out of range; the last two to nearest, ties to even
  */
 #ifndef TL_LANES_H
 #define TL_LANES_H

@@ -22,6 +22,15 @@ TL_INLINE vi vi_or(vi a, vi b) { return _mm256_or_si256(a, b); }
 TL_INLINE vi vi_and(vi a, vi b) { return _mm256_and_si256(a, b); }
 TL_INLINE vi vi_shift_left(vi a, int n) { return _mm256_sll_epi32(a, _mm_cvtsi32_si128(n)); }
 TL_INLINE vi vi_shift_right(vi a, int n) { return _mm256_sra_epi32(a, _mm_cvtsi32_si128(n)); }
+TL_INLINE vi vi_mul_halves(vi a, vi b) { return _mm256_mullo_epi16(a, b); }
+TL_INLINE vi vi_mul_high_halves(vi a, vi b) { return _mm256_mulhi_epu16(a, b); }
+TL_INLINE vi vi_scale_halves(vi a, vi b) { return _mm256_mulhrs_epi16(a, b); }
+TL_INLINE vi vi_add_halves(vi a, vi b) { return _mm256_add_epi16(a, b); }
+TL_INLINE vi vi_sub_halves(vi a, vi b) { return _mm256_sub_epi16(a, b); }
+TL_INLINE vi vi_upper_bytes(vi a) { return _mm256_srli_epi16(a, 8); }
+TL_INLINE vi vi_add_bytes(vi a, vi b) { return _mm256_adds_epu8(a, b); }
+TL_INLINE vi vi_max_bytes(vi a, vi b) { return _mm256_max_epu8(a, b); }
+TL_INLINE vi vi_min_bytes(vi a, vi b) { return _mm256_min_epu8(a, b); }
 TL_INLINE vm vi_gt(vi a, vi b) { return _mm256_cmpgt_epi32(a, b); }
 TL_INLINE vm vi_gt_unsigned(vi a, vi b)
 {
@@ -162,6 +171,8 @@ TL_INLINE vf vf_from_vi(vi a) { return _mm256_cvtepi32_ps(a); }
 TL_INLINE vf vf_select(vm m, vf a, vf b) { return _mm256_blendv_ps(b, a, _mm256_castsi256_ps(m)); }
 TL_INLINE void vf_store(float *p, vf a) { _mm256_storeu_ps(p, a); }
 TL_INLINE vi vi_floor(vf a) { return _mm256_cvtps_epi32(_mm256_floor_ps(a)); }
+TL_INLINE vi vi_nearest(vf a) { return _mm256_cvtps_epi32(a); }
+TL_INLINE vf vf_last_of(vf a, int n) { return n == 4 ? _mm256_permute_ps(a, 0xff) : _mm256_movehdup_ps(a); }
 TL_INLINE vf vf_load_masked(vm m, const float *p) { return _mm256_maskload_ps(p, m); }
 TL_INLINE void vf_store_masked(float *p, vm m, vf a) { _mm256_maskstore_ps(p, m, a); }
 TL_INLINE void vf_store_some(float *p, vm m, vf a, int has_room)

@@ -22,6 +22,15 @@ TL_INLINE vi vi_or(vi a, vi b) { return _mm512_or_si512(a, b); }
 TL_INLINE vi vi_and(vi a, vi b) { return _mm512_and_si512(a, b); }
 TL_INLINE vi vi_shift_left(vi a, int n) { return _mm512_sll_epi32(a, _mm_cvtsi32_si128(n)); }
 TL_INLINE vi vi_shift_right(vi a, int n) { return _mm512_sra_epi32(a, _mm_cvtsi32_si128(n)); }
+TL_INLINE vi vi_mul_halves(vi a, vi b) { return _mm512_mullo_epi16(a, b); }
+TL_INLINE vi vi_mul_high_halves(vi a, vi b) { return _mm512_mulhi_epu16(a, b); }
+TL_INLINE vi vi_scale_halves(vi a, vi b) { return _mm512_mulhrs_epi16(a, b); }
+TL_INLINE vi vi_add_halves(vi a, vi b) { return _mm512_add_epi16(a, b); }
+TL_INLINE vi vi_sub_halves(vi a, vi b) { return _mm512_sub_epi16(a, b); }
+TL_INLINE vi vi_upper_bytes(vi a) { return _mm512_srli_epi16(a, 8); }
+TL_INLINE vi vi_add_bytes(vi a, vi b) { return _mm512_adds_epu8(a, b); }
+TL_INLINE vi vi_max_bytes(vi a, vi b) { return _mm512_max_epu8(a, b); }
+TL_INLINE vi vi_min_bytes(vi a, vi b) { return _mm512_min_epu8(a, b); }
 TL_INLINE vm vi_gt(vi a, vi b) { return _mm512_cmpgt_epi32_mask(a, b); }
 TL_INLINE vm vi_gt_unsigned(vi a, vi b) { return _mm512_cmpgt_epu32_mask(a, b); }
 TL_INLINE vm vi_eq(vi a, vi b) { return _mm512_cmpeq_epi32_mask(a, b); }
@@ -120,6 +129,8 @@ TL_INLINE vf vf_from_vi(vi a) { return _mm512_cvtepi32_ps(a); }
 TL_INLINE vf vf_select(vm m, vf a, vf b) { return _mm512_mask_mov_ps(b, m, a); }
 TL_INLINE void vf_store(float *p, vf a) { _mm512_storeu_ps(p, a); }
 TL_INLINE vi vi_floor(vf a) { return _mm512_cvt_roundps_epi32(a, _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC); }
+TL_INLINE vi vi_nearest(vf a) { return _mm512_cvtps_epi32(a); }
+TL_INLINE vf vf_last_of(vf a, int n) { return n == 4 ? _mm512_permute_ps(a, 0xff) : _mm512_movehdup_ps(a); }
 TL_INLINE vf vf_load_masked(vm m, const float *p) { return _mm512_maskz_loadu_ps(m, p); }
 TL_INLINE void vf_store_masked(float *p, vm m, vf a) { _mm512_mask_storeu_ps(p, m, a); }
 TL_INLINE void vf_store_some(float *p, vm m, vf a, int has_room) { (void)has_room; vf_store_masked(p, m, a); }

@@ -22,6 +22,39 @@ TL_INLINE vi vi_or(vi a, vi b) { return a | b; }
 TL_INLINE vi vi_and(vi a, vi b) { return a & b; }
 TL_INLINE vi vi_shift_left(vi a, int n) { return (vi)((uint32_t)a << n); }
 TL_INLINE vi vi_shift_right(vi a, int n) { return a >> n; }
+TL_INLINE vi vi_mul_halves(vi a, vi b)
+{
+    const uint32_t low = ((uint32_t)a & 0xffff) * ((uint32_t)b & 0xffff), high = ((uint32_t)a >> 16) * ((uint32_t)b >> 16);
+    return (vi)(high << 16 | (low & 0xffff));
+}
+TL_INLINE vi vi_mul_high_halves(vi a, vi b)
+{
+    const uint32_t low = ((uint32_t)a & 0xffff) * ((uint32_t)b & 0xffff), high = ((uint32_t)a >> 16) * ((uint32_t)b >> 16);
+    return (vi)((high & 0xffff0000) | low >> 16);
+}
+TL_INLINE vi vi_scale_halves(vi a, vi b)
+{
+    const int32_t low = ((int16_t)a * (int16_t)b + (1 << 14)) >> 15, high = ((a >> 16) * (b >> 16) + (1 << 14)) >> 15;
+    return (vi)((uint32_t)high << 16 | ((uint32_t)low & 0xffff));
+}
+TL_INLINE vi vi_add_halves(vi a, vi b) { return (vi)((((uint32_t)a & 0xffff0000) + ((uint32_t)b & 0xffff0000)) | (((uint32_t)a + (uint32_t)b) & 0xffff)); }
+TL_INLINE vi vi_sub_halves(vi a, vi b) { return (vi)((((uint32_t)a & 0xffff0000) - ((uint32_t)b & 0xffff0000)) | (((uint32_t)a - (uint32_t)b) & 0xffff)); }
+TL_INLINE vi vi_upper_bytes(vi a) { return (vi)((uint32_t)a >> 8 & 0x00ff00ff); }
+TL_INLINE vi vi_add_bytes(vi a, vi b)
+{
+    const uint32_t mask = 0x00ff00ff, even = ((uint32_t)a & mask) + ((uint32_t)b & mask);
+    const uint32_t odd = ((uint32_t)a >> 8 & mask) + ((uint32_t)b >> 8 & mask);
+    const uint32_t even_over = (even >> 8 & 0x00010001) * 255, odd_over = (odd >> 8 & 0x00010001) * 255;
+    return (vi)(((even | even_over) & mask) | ((odd | odd_over) & mask) << 8);
+}
+TL_INLINE vi vi_max_bytes(vi a, vi b)
+{
+    uint32_t out = 0;
+    for (uint32_t byte = 255; byte; byte <<= 8)
+        out |= ((uint32_t)a & byte) > ((uint32_t)b & byte) ? (uint32_t)a & byte : (uint32_t)b & byte;
+    return (vi)out;
+}
+TL_INLINE vi vi_min_bytes(vi a, vi b) { return ~vi_max_bytes(~a, ~b); }
 TL_INLINE vm vi_gt(vi a, vi b) { return a > b; }
 TL_INLINE vm vi_gt_unsigned(vi a, vi b) { return (uint32_t)a > (uint32_t)b; }
 TL_INLINE vm vi_eq(vi a, vi b) { return a == b; }
@@ -103,6 +136,8 @@ TL_INLINE vf vf_from_vi(vi a) { return (float)a; }
 TL_INLINE vf vf_select(vm m, vf a, vf b) { return m ? a : b; }
 TL_INLINE void vf_store(float *p, vf a) { *p = a; }
 TL_INLINE vi vi_floor(vf a) { return fabsf(a) < 0x1p30f ? (vi)floorf(a) : INT32_MIN; }
+TL_INLINE vi vi_nearest(vf a) { return fabsf(a) < 0x1p30f ? (vi)rintf(a) : INT32_MIN; }
+TL_INLINE vf vf_last_of(vf a, int n) { (void)n; return a; }
 TL_INLINE vf vf_load_masked(vm m, const float *p) { return m ? *p : 0.0f; }
 TL_INLINE void vf_store_masked(float *p, vm m, vf a) { if (m) *p = a; }
 TL_INLINE void vf_store_some(float *p, vm m, vf a, int has_room) { (void)has_room; vf_store_masked(p, m, a); }

@@ -60,22 +60,24 @@ static int compare_exactly(const tl_triangle *t, int64_t x_px, int64_t y_px, int
     return high < 0 ? -1 : high > 0 || low > 0;
 }
 
-/* One channel of n samples: the exact value rounded to nearest, ties to even.  float64 decides unless it is next to a tie. */
+/* The exact value of a channel rounded to nearest, ties to even; `value` decides unless it is next to a tie. */
+static inline uint8_t round_color(const tl_triangle *t, int64_t x_px, int64_t y_px, int bits, int c0, int d1, int d2, double value)
+{
+    const int below = (int)floor(value);
+    if (fabs(value - below - 0.5) >= 0x1p-20)
+        return (uint8_t)(int)rint(value);
+    const int side = compare_exactly(t, x_px, y_px, bits, d1, d2, 2 * (below - c0) + 1);
+    return (uint8_t)(below + (side > 0 || (side == 0 && (below & 1))));
+}
+
+/* One channel of n samples. */
 static inline void paint_run_u8(const tl_triangle *t, const uint8_t *c, int64_t x_px, int64_t y_px, int bits, const double *w1,
                                 const double *w2, int n, int n_channels, uint8_t *restrict out)
 {
     const int c0 = c[0], d1 = c[1] - c0, d2 = c[2] - c0;
     const double slope1 = d1 / t->w_sum, slope2 = d2 / t->w_sum;
-    for (int k = 0; k < n; k++) {
-        const double value = c0 + (w1[k] * slope1 + w2[k] * slope2);
-        const int below = (int)floor(value);
-        int rounded = (int)rint(value);
-        if (fabs(value - below - 0.5) < 0x1p-20) {
-            const int side = compare_exactly(t, x_px + k, y_px, bits, d1, d2, 2 * (below - c0) + 1);
-            rounded = below + (side > 0 || (side == 0 && (below & 1)));
-        }
-        out[k * n_channels] = (uint8_t)rounded;
-    }
+    for (int k = 0; k < n; k++)
+        out[k * n_channels] = round_color(t, x_px + k, y_px, bits, c0, d1, d2, c0 + (w1[k] * slope1 + w2[k] * slope2));
 }
 
 static inline void paint_run_f32(const tl_triangle *t, const float *c, const double *w1, const double *w2, int n, int n_channels,
@@ -93,7 +95,8 @@ static void paint_piece(const resolve_state *s, const int32_t *corners, int64_t 
     double part[3], sum = 0.0;
     for (int k = 0; k < 3; k++) {
         const int a = k == 2 ? 0 : k + 1, b = 3 - k - a;
-        part[k] = (double)doubled_edge(&s->triangle, a, b, x_px, y_px, bits);
+        const tl_int128 edge = doubled_edge(&s->triangle, a, b, x_px, y_px, bits);
+        part[k] = edge > 0 ? (double)edge : 0.0; /* below 0 only where a piece covers a pixel but not its centre */
         sum += part[k];
     }
     for (int c = 0; c < n_channels; c++) {

@@ -79,11 +79,18 @@ TL_INLINE void put_numbers(const tl_target *target, tl_sink sink, int64_t at, vm
     vi_store_some(pixels, m, sink == TL_SINK_COUNT ? vi_add(old, vi_set1(1)) : vi_max(old, id), at + TL_LANES <= target->n_samples);
 }
 
+struct blend_state;
+static void mix_run(struct blend_state *b, int64_t at, int64_t n); /* mix.c */
+
 /* A span of samples without depth. */
 TL_INLINE void put_plain(const tl_target *target, tl_sink sink, int64_t at, int64_t n, int32_t id)
 {
     if (sink == TL_SINK_MASK) {
         cover_span(target, at, n);
+        return;
+    }
+    if (sink == TL_SINK_BLEND) {
+        mix_run(target->pixels, at, n);
         return;
     }
     if (sink == TL_SINK_SAMPLES) {

@@ -103,11 +103,12 @@ typedef enum {
     TL_SINK_NEAREST = 4,  /* id and depth where depth < what is there; at equal depth the lower id */
     TL_SINK_FARTHEST = 5, /* id and depth where depth > what is there; at equal depth the lower id */
     TL_SINK_SAMPLES = 6,  /* float: the share of samples that are covered; bits in `covered` until the last pass */
+    TL_SINK_BLEND = 7,    /* the colour of the triangle that `blend` draws; not for draw */
 } tl_sink;
 
 typedef struct {
     tl_sink sink;
-    void *pixels; /* mask, counts or ids; rows of stride_px pixels */
+    void *pixels; /* mask, counts or ids; rows of stride_px pixels.  BLEND: the blend_state of mix.h */
     float *depth; /* PAINT, NEAREST, FARTHEST; the same stride */
     int64_t stride_px;
     int64_t n_samples; /* from the first sample to the last, set by draw */
@@ -146,11 +147,13 @@ typedef struct {
     int32_t *ids, *first_band, *last_band; /* n_triangles + 16 numbers each */
 } tl_bins;
 
-/* How uint8 values become light and back: the first n_channels of a colour, in 65537 steps. */
+/* What is averaged of the samples' colours: uint8 values become light and back in 65537 steps; alpha, behind the first n_channels,
+ * does not.  With straight alpha colours count as much as they are opaque. */
 typedef struct {
-    const int32_t *decode; /* (256,), 0 to 65536 */
+    const int32_t *decode; /* (256,), 0 to 65536; NULL: the values as they are */
     const uint8_t *encode; /* (65537,) */
-    int n_channels;
+    int n_channels;        /* of colour */
+    int is_straight;       /* channel n_channels is alpha, and colours have not been multiplied by it */
 } tl_transfer;
 
 /* Where exact areas go.  `cells` is memory between the edges and the pixels: tl_area_stride(width) numbers a row, int32 that
@@ -168,6 +171,38 @@ typedef struct {
 
 /* Cells a row: 16 before the first pixel, at least 16 behind the last, whole cache lines. */
 static inline int64_t tl_area_stride(int64_t width) { return (width + 47) / 16 * 16; }
+
+/* What a triangle's colour does to a pixel. */
+typedef enum {
+    TL_BLEND_REPLACE = 0,
+    TL_BLEND_OVER = 1,
+    TL_BLEND_ADD = 2,
+    TL_BLEND_MULTIPLY = 3,
+    TL_BLEND_MAX = 4,
+    TL_BLEND_MIN = 5,
+} tl_blend;
+
+/* Pixels that colours are blended into, one triangle after the other. */
+typedef struct {
+    void *pixels; /* rows of stride_px pixels of n_channels uint8 or float32 */
+    int64_t stride_px;
+    const void *colors; /* (n_triangles, n_channels), or (n_vertices, n_channels) unless is_flat */
+    int n_channels, is_u8, is_flat;
+    tl_blend blend;
+    int is_premultiplied; /* colours hold alpha already; otherwise the last of 2 or 4 channels is alpha */
+    int is_area;          /* the share of the pixel that the triangle covers counts, not its centre */
+    int32_t *packed;      /* uint8 with other than 4 channels: room for the window, a row after the other */
+    int32_t *cells;       /* is_area: tl_blend_cells(width), all TL_CELL_CLEAR, and left so */
+} tl_canvas;
+
+/* Cells for small triangles, or for strips of the width of a window. */
+#define TL_STRIP_ROWS 16
+#define TL_ATLAS_ROWS 1024
+static inline int64_t tl_blend_cells(int64_t width)
+{
+    const int64_t atlas = 16 * (TL_ATLAS_ROWS + 4), strip = TL_STRIP_ROWS * tl_area_stride(width) + 16;
+    return atlas > strip ? atlas : strip;
+}
 
 /* ---- lines --------------------------------------------------------------------------------------------- */
 
@@ -249,6 +284,9 @@ typedef struct tl_kernels {
      * does, or TL_AREA_OVERFLOW; either way the pixels are then worthless. */
     int64_t (*draw_area)(const tl_scene *scene, const tl_window *window, const tl_area *target);
 
+    /* Blends the colours of triangles into the canvas in their order.  Returns as `draw` does. */
+    int64_t (*blend)(const tl_scene *scene, const tl_window *window, const tl_canvas *canvas);
+
     /* Per pixel of `ids` (rows of window->width): float32 weights of the triangle's three vertices. */
     void (*barycentric)(const tl_scene *scene, const tl_window *window, const int32_t *ids, float *out);
 
@@ -263,7 +301,7 @@ typedef struct tl_kernels {
                           int is_u8, void *pixels);
 
     /* The mean colour of the samples of n pixels: from planes of labels and the colours of the triangles, or from planes of colours.
-     * Planes lie `stride` pixels apart; transfer is NULL where values are averaged as they are. */
+     * Planes lie `stride` pixels apart; transfer is NULL where all channels are averaged as they are. */
     void (*mean_flat)(const int32_t *labels, int sample_bits, int64_t stride, int64_t n, const void *colors, int n_channels, int is_u8,
                       const tl_transfer *transfer, void *pixels);
     void (*mean_colors)(const void *colors, int sample_bits, int64_t stride, int64_t n, int n_channels, int is_u8,

@@ -246,6 +246,18 @@ def test_samples_through_a_lens_have_ids_of_the_mesh():
     assert frags.sample(3).interpolate(CUBE.vertices).shape == (*SIZE[::-1], 3)
 
 
+def test_render_samples_through_a_lens_is_near_the_picture_of_one():
+    plain, smooth = (tl.render(CUBE, camera_of(BARREL), SIZE, sampling=how) for how in ("center", "msaa4"))
+    differ = (plain != smooth).any(axis=-1)
+    assert 0 < differ.sum() < 0.1 * differ.size
+
+
+def test_silhouette_through_a_lens_is_the_mask():
+    camera = camera_of(FISHEYE)
+    mask = tl.silhouette(CUBE, camera, SIZE, sampling="center")
+    assert np.array_equal(mask, tl.rasterize_mesh(CUBE, camera, SIZE).mask)
+
+
 def test_render_edges_through_a_lens_are_those_of_the_mesh():
     camera = camera_of(BARREL)
     triangle = Mesh([[-1, -1, 0.5], [1, -1, 0.5], [0, 1, 0.5]], [[0, 1, 2]])

@@ -122,5 +122,5 @@ def test_ids_and_depth_are_refused(kind):
     scene = floor(np.random.default_rng(1), 3, 8)
     with pytest.raises(ValueError, match=f"sampling '{kind}' gives no ids: rasterize takes 'center' and"):
         draw(scene, kind, tl.rasterize)
-    with pytest.raises(ValueError, match=f"sampling '{kind}' gives no ids: fill takes 'center' and"):
+    with pytest.raises(ValueError, match=f"sampling '{kind}' gives no order: fill takes 'center', 'msaa2'"):
         tl.fill(*scene.arrays[:2], np.zeros(len(scene.triangles)), scene.size, sampling=kind, **scene.view)

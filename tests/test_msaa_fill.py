@@ -9,6 +9,7 @@ from engine_cases import ON_EACH_ISA, THREADS, mixed, on
 from strategies import floor
 
 import topleft as tl
+from topleft.methods.reference_sampling import mean
 from topleft.resolve import srgb_tables
 
 COUNTS = (2, 4, 8, 16)
@@ -32,6 +33,7 @@ def test_flat_uint8_is_the_mean_to_nearest_ties_to_even(isa, n):
         for threads in THREADS:
             with on(isa):
                 options = {"per": "triangle", "background": 7, "sampling": f"msaa{n}", "threads": threads}
+                options |= {"alpha": "premultiplied"}
                 assert_same(tl.fill(*scene.arrays[:2], colors, scene.size, **options, **scene.view), expected)
 
 
@@ -56,7 +58,8 @@ def test_gouraud_is_the_mean_of_the_samples(isa, make):
     colors = rng.standard_normal((len(scene.vertices), 2)).astype(np.float32)
     frags = tl.rasterize(*scene.arrays, depth_test=None, sampling="msaa4", **scene.view)
     with on(isa):
-        got = tl.fill(*scene.arrays[:2], colors, scene.size, per="vertex", sampling="msaa4", **scene.view)
+        options = {"per": "vertex", "sampling": "msaa4", "alpha": "premultiplied"}
+        got = tl.fill(*scene.arrays[:2], colors, scene.size, **options, **scene.view)
     if scene.vertices.shape[1] == 4:  # colours are linear on the screen, attributes are not
         assert_same((got != 0).any(-1), (frags.samples_triangle >= 0).any(-1))
         return
@@ -79,9 +82,38 @@ def test_out_is_what_uncovered_samples_hold():
 
 def test_resolve_linear_averages_light():
     white = np.full((2, 4), 255, np.uint8)
-    options = {"sampling": "msaa2", "background": (0, 0, 0, 0)}
+    options = {"sampling": "msaa2", "background": (0, 0, 0, 0), "alpha": "premultiplied"}
     assert tl.fill(*SQUARE, white, (1, 1), **options).tolist() == [[[128] * 4]]
     assert tl.fill(*SQUARE, white, (1, 1), resolve="linear", **options).tolist() == [[[188, 188, 188, 128]]]
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize("resolve", ["values", "linear"])
+@pytest.mark.parametrize("n_channels", [2, 4])
+def test_straight_alpha_weighs_the_colours(n_channels, resolve, isa):
+    rng = np.random.default_rng(n_channels)
+    scene = mixed(rng, 80, (40, 30))
+    colors = rng.integers(0, 256, (len(scene.triangles), n_channels), np.uint8)
+    colors[::3, -1] = rng.choice([0, 255], len(colors[::3]))
+    samples = np.moveaxis(sampled(scene, 4, colors, 0), 0, 2)
+    with on(isa):
+        view = scene.view | {"sampling": "msaa4"}
+        got = tl.fill(*scene.arrays[:2], colors, scene.size, per="triangle", resolve=resolve, **view)
+    tables = srgb_tables() if resolve == "linear" else None
+    expected = [[mean(pixel, is_straight=True, tables=tables) for pixel in row] for row in samples]
+    assert_same(got, np.array(expected, np.uint8))
+
+
+def test_straight_alpha_weighs_float32_colours():
+    red = np.full((2, 4), (1, 0.5, 0, 0.75), np.float32)
+    got = tl.fill(*SQUARE, red, (1, 1), sampling="msaa2", background=(0, 1, 1, 0.25))
+    assert got.tolist() == [[[0.75, 0.625, 0.25, 0.5]]]
+
+
+def test_straight_alpha_leaves_no_dark_fringe():
+    white = np.full((2, 4), 255, np.uint8)
+    got = tl.fill(*SQUARE, white, (1, 1), sampling="msaa2", background=(0, 0, 0, 0))
+    assert got.tolist() == [[[255, 255, 255, 128]]]
 
 
 def test_resolve_linear_leaves_a_single_colour_as_it_is():

@@ -16,6 +16,7 @@ from topleft.memory import release_memory
 from topleft.mesh import Mesh
 from topleft.render import rasterize_mesh, render
 from topleft.shade import shade
+from topleft.silhouette import silhouette
 from topleft.viewpoints import turntable, viewpoints
 
 __version__: str = build_info()["version"]
@@ -47,6 +48,7 @@ __all__ = [
     "save_image",
     "scenes",
     "shade",
+    "silhouette",
     "turntable",
     "viewpoints",
     "wireframe",

@@ -66,6 +66,7 @@ cdef extern from "topleft.h" nogil:
         const int32_t *decode
         const uint8_t *encode
         int n_channels
+        int is_straight
     ctypedef struct tl_area:
         float *pixels
         int64_t stride_px
@@ -73,6 +74,17 @@ cdef extern from "topleft.h" nogil:
         int is_wide, is_clamped
     int64_t TL_CELL_CLEAR, TL_AREA_OVERFLOW, TL_PLANE_DOUBLES
     int64_t tl_area_stride(int64_t width)
+    ctypedef int tl_blend
+    ctypedef struct tl_canvas:
+        void *pixels
+        int64_t stride_px
+        const void *colors
+        int n_channels, is_u8, is_flat
+        tl_blend blend
+        int is_premultiplied, is_area
+        int32_t *packed
+        int32_t *cells
+    int64_t tl_blend_cells(int64_t width)
     ctypedef struct tl_scene:
         tl_vertex_set mesh
         const int32_t *triangles
@@ -120,6 +132,7 @@ cdef extern from "topleft.h" nogil:
         int64_t (*bin)(const tl_scene *, const tl_window *, int32_t, int, tl_bins *) noexcept nogil
         void (*list_bins)(const tl_bins *, int64_t, int64_t *, int32_t *) noexcept nogil
         int64_t (*draw_area)(const tl_scene *, const tl_window *, const tl_area *) noexcept nogil
+        int64_t (*blend)(const tl_scene *, const tl_window *, const tl_canvas *) noexcept nogil
         void (*barycentric)(const tl_scene *, const tl_window *, const int32_t *, float *) noexcept nogil
         void (*interpolate)(const tl_scene *, const tl_window *, const int32_t *, const float *, int, int, float, float *) noexcept nogil
         void (*paint_flat)(const int32_t *, int64_t, const uint8_t *, int, uint8_t *) noexcept nogil
@@ -146,6 +159,11 @@ cdef inline const void *data(const uint8_t[::1] view) noexcept nogil:
 def area_stride(int64_t width):
     """Return how many cells `Scene.draw_area` needs for a row of pixels."""
     return tl_area_stride(width)
+
+
+def blend_cells(int64_t width):
+    """Return how many cells `Scene.blend` needs for areas."""
+    return tl_blend_cells(width)
 
 
 def as_bytes(array):
@@ -412,6 +430,27 @@ cdef class Scene:
                 K.paint_gouraud(&self.scene, &window, &labels[first_row, 0], data(colors), n_channels, is_u8,
                                 &pixels[first_row * width * pixel_bytes])
 
+    def blend(self, uint8_t[::1] pixels, int64_t width, int64_t first_row, int64_t n_rows, const uint8_t[::1] colors, int n_channels,
+              bint is_u8, bint is_flat, int blend, bint is_premultiplied, int32_t[::1] packed, int32_t[::1] cells):
+        """Blend the colours of triangles into rows [first_row, first_row + n_rows) of a picture, one after the other.
+
+        `packed`: room for the picture, for uint8 with other than 4 channels; `cells`: clear, for areas. Returns as `draw` does.
+        """
+        cdef tl_canvas canvas
+        cdef tl_window window = self.window(first_row, n_rows, width)
+        cdef int pixel_bytes = n_channels if is_u8 else 4 * n_channels
+        cdef int64_t bad_row
+        if width == 0 or n_rows == 0 or self.scene.n_triangles == 0:
+            return -1
+        canvas.pixels, canvas.stride_px = &pixels[first_row * width * pixel_bytes], width
+        canvas.colors, canvas.n_channels, canvas.is_u8, canvas.is_flat = data(colors), n_channels, is_u8, is_flat
+        canvas.blend, canvas.is_premultiplied, canvas.is_area = <tl_blend>blend, is_premultiplied, cells is not None
+        canvas.packed = &packed[first_row * width] if packed is not None else NULL
+        canvas.cells = &cells[0] if cells is not None else NULL
+        with nogil:
+            bad_row = K.blend(&self.scene, &window, &canvas)
+        return bad_row
+
     def barycentric(self, const int32_t[:, ::1] ids, float[:, :, ::1] out):
         """Write the weights of the three vertices of the triangle at each pixel."""
         cdef tl_window window = self.window(0, ids.shape[0], ids.shape[1])
@@ -482,14 +521,18 @@ def draw_bands(scenes, targets, Bins bins, int64_t first_band, int64_t end_band)
 
 
 cdef class Transfer:
-    """The tables that take the first channels of uint8 colours to light and back."""
+    """What is averaged of colours with several samples a pixel: their light, or as much of them as their alpha tells."""
 
     cdef tl_transfer transfer
     cdef object arrays
 
-    def __init__(self, const int32_t[::1] decode, const uint8_t[::1] encode, int n_channels):
-        self.arrays = (decode, encode)
-        self.transfer.decode, self.transfer.encode, self.transfer.n_channels = &decode[0], &encode[0], n_channels
+    def __init__(self, tables, int n_channels, bint is_straight):
+        cdef const int32_t[::1] decode
+        cdef const uint8_t[::1] encode
+        self.transfer.n_channels, self.transfer.is_straight = n_channels, is_straight
+        if tables is not None:
+            decode, encode = self.arrays = tables
+            self.transfer.decode, self.transfer.encode = &decode[0], &encode[0]
 
 
 def mean_flat(const int32_t[:, :, ::1] labels, colors, pixels, int64_t first_row, int64_t n_rows, Transfer transfer):

@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from topleft.arrays import as_size
+from topleft.fill import Style, draw_fill
 from topleft.fragments import Fragments
 from topleft.lines import draw_wireframe
 from topleft.memory import SCRATCH, FreshMemory, KeptMemory
-from topleft.rasterize import draw_coverage, draw_fill, draw_fragments, draw_overdraw
+from topleft.rasterize import draw_coverage, draw_fragments, draw_overdraw
 from topleft.threads import parse_threads
 from topleft.view import View, ViewOptions
 
@@ -47,8 +48,9 @@ def coverage(
         viewport : (int, int). Width and height of the whole picture for clip space; default `size`.
         subpixel_bits : int, 0 to 16. Vertices snap to ``2**-subpixel_bits`` pixels; default 8.
         sampling : "center"; "msaa2", "msaa4", "msaa8" or "msaa16": so many samples a pixel, at the standard positions
-            of Direct3D. For `coverage` and `overdraw` also "area": the exact area of the pixel; "outer": every pixel
-            square that a triangle meets in positive area; "inner": every square that lies wholly inside a triangle.
+            of Direct3D; "area": the exact area of the pixel (`coverage`, `overdraw` and `fill`). For `coverage` and
+            `overdraw` also "outer": every pixel square that a triangle meets in positive area; "inner": every square
+            that lies wholly inside a triangle.
         method : "auto", "edge" or "scanline": the same picture. Or a classic of the literature, to compare with:
             `topleft.methods.CLASSICS` names them, and docs/methods.md tells where each of them fails.
         cull : "none", "back" or "front"; the front is counter-clockwise seen with y up.
@@ -139,11 +141,13 @@ def fill(
     *,
     per: str = "auto",
     background: ArrayLike | None = None,
+    blend: str = "replace",
+    alpha: str = "straight",
     resolve: str = "values",
     out: NDArray[Any] | None = None,
     **view: Unpack[ViewOptions],
 ) -> NDArray[Any]:
-    """Return a picture of coloured triangles in painter's order: later triangles cover earlier ones.
+    """Return a picture of coloured triangles in painter's order: later ones cover earlier ones, or blend with them.
 
     Parameters
     ----------
@@ -156,9 +160,19 @@ def fill(
         What a row of `colors` belongs to; "auto" tells by the number of rows.
     background : number or array_like, shape (C,), optional
         Fills the picture first; 0 when neither `background` nor `out` is given.
+    blend : "replace", "over", "add", "multiply", "max" or "min"
+        What the colour of a triangle does to what is there, one triangle after the other. "over" lets it through by the
+        alpha of the colour, the last of 2 or 4 channels. The others act on each channel alike, alpha included; uint8
+        sums stop at 255, and 255 is 1 in products. With ``sampling="area"`` the share of the pixel that the triangle
+        covers multiplies alpha, or is the share of the way from the old colour to the new. With several samples a pixel
+        each sample is blended by itself.
+    alpha : "straight" or "premultiplied"
+        Whether colours and picture, the last of 2 or 4 channels alpha, have been multiplied by it. "over" looks at it,
+        and "replace" where colours meet in a pixel, by area or in the mean of samples. Numbers that are no colours want
+        "premultiplied": all channels alike.
     resolve : "values" or "linear"
         With several samples a pixel ("msaa4", say) each pixel is the mean of its samples: of their values as they are,
-        or, for uint8, of the light that sRGB values stand for; the last of 2 or 4 channels is alpha, averaged as it is.
+        or, for uint8, of the light that sRGB values stand for (alpha, the last of 2 or 4 channels, as it is).
     out : ndarray of uint8 or float32, shape (H, W, C) or (H, W), optional
         Is drawn over.
 
@@ -176,7 +190,7 @@ def fill(
 
     References
     ----------
-    H. Gouraud, Continuous Shading of Curved Surfaces, 1971.
+    H. Gouraud, Continuous Shading of Curved Surfaces, 1971; T. Porter, T. Duff, Compositing Digital Images, 1984.
 
     Examples
     --------
@@ -184,8 +198,13 @@ def fill(
     >>> tl.fill([[0, 0], [4, 0], [0, 4]], [[0, 1, 2]], [0, 200, 0], (4, 2), per="vertex", background=9)
     array([[ 25,  75, 125,   9],
            [ 25,  75,   9,   9]], dtype=uint8)
+    >>> twice, half_white = [[0, 1, 2]] * 2, [[255, 128]] * 2
+    >>> tl.fill([[0, 0], [4, 0], [0, 4]], twice, half_white, (4, 1), blend="over", background=(0, 255))[..., 0]
+    array([[192, 192, 192,   0]], dtype=uint8)
     """
-    return draw_fill(SCRATCH, vertices, triangles, colors, View.parse(size, view), per, background, out, resolve)
+    checked = View.parse(size, view)
+    style = Style(per, background, blend, alpha, resolve)
+    return draw_fill(SCRATCH, vertices, triangles, colors, checked, style, out)
 
 
 def rasterize(
@@ -383,12 +402,15 @@ class Rasterizer:
         *,
         per: str = "auto",
         background: ArrayLike | None = None,
+        blend: str = "replace",
+        alpha: str = "straight",
         resolve: str = "values",
         out: NDArray[Any] | None = None,
         **view: Unpack[ViewOptions],
     ) -> NDArray[Any]:
         """Return a picture of coloured triangles in painter's order, as `topleft.fill` does."""
-        return draw_fill(self._memory, vertices, triangles, colors, self._view(view), per, background, out, resolve)
+        style = Style(per, background, blend, alpha, resolve)
+        return draw_fill(self._memory, vertices, triangles, colors, self._view(view), style, out)
 
     def rasterize(
         self,

@@ -86,6 +86,12 @@ class Fragments:
         """Return ids, depth and attributes at one sample of each pixel."""
         return (self._samples or (self,))[i]
 
+    def only(self, rows: NDArray[np.intp], cols: NDArray[np.intp]) -> Fragments:
+        """Return what is left when no other pixels than these show a triangle."""
+        triangle = np.full_like(self.triangle, -1)
+        triangle[rows, cols] = self.triangle[rows, cols]
+        return Fragments(triangle, self.depth, self._scene, self._n_vertices, self._n_triangles)
+
     def barycentric(self) -> NDArray[np.float32]:
         """Return the weights of the three vertices of the triangle that shows in each pixel.
 
@@ -178,6 +184,11 @@ class BentFragments(Fragments):
         )
         self.samples_triangle, self.samples_depth = wholes[parts.samples_triangle], parts.samples_depth
         self._parts, self._source, self._weights, self._triangles = parts, source, weights, triangles
+
+    def only(self, rows: NDArray[np.intp], cols: NDArray[np.intp]) -> Fragments:
+        """Return what is left when no other pixels than these show a triangle."""
+        parts = self._parts.only(rows, cols)
+        return BentFragments(parts, self._source, self._weights, self._triangles, self._n_vertices)
 
     def barycentric(self) -> NDArray[np.float32]:
         """Return the weights of the three vertices of the triangle that shows in each pixel."""

@@ -6,7 +6,7 @@ from enum import IntEnum, StrEnum
 from functools import cache
 from typing import TypeVar
 
-__all__ = ["ClipDepth", "Cull", "DepthTest", "Per", "Resolve", "Sampling", "Sink", "parse"]
+__all__ = ["Alpha", "Blend", "ClipDepth", "Cull", "DepthTest", "Per", "Resolve", "Sampling", "Sink", "parse"]
 
 
 class Sampling(StrEnum):
@@ -55,6 +55,24 @@ class Per(StrEnum):
     AUTO = "auto"
     TRIANGLE = "triangle"
     VERTEX = "vertex"
+
+
+class Blend(StrEnum):
+    """What a triangle's colour does to the colour of a pixel; in the order of `tl_blend` in ``csrc/topleft.h``."""
+
+    REPLACE = "replace"
+    OVER = "over"
+    ADD = "add"
+    MULTIPLY = "multiply"
+    MAX = "max"
+    MIN = "min"
+
+
+class Alpha(StrEnum):
+    """Whether the colours of pixels with alpha, their last channel, have been multiplied by it."""
+
+    STRAIGHT = "straight"
+    PREMULTIPLIED = "premultiplied"
 
 
 class Resolve(StrEnum):

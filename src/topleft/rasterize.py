@@ -15,19 +15,18 @@ from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine
 from topleft.area import sum_areas
-from topleft.arrays import as_background, as_colors, as_out
-from topleft.classic import draw_classic, fill_classic, refuse_classic
+from topleft.arrays import as_out
+from topleft.classic import draw_classic, refuse_classic
 from topleft.fragments import Fragments
 from topleft.memory import Memory
 from topleft.methods import METHODS
-from topleft.models import DepthTest, Per, Sampling, Sink, parse
-from topleft.resolve import parse_resolve, resolve_flat, resolve_gouraud
+from topleft.models import DepthTest, Sampling, Sink, parse
 from topleft.sampling import draw_planes, sample_positions
 from topleft.snapped import Snapped, check_triangles, snap_scene
 from topleft.threads import count_threads, run_parts
 from topleft.view import View
 
-__all__ = ["draw_coverage", "draw_fill", "draw_fragments", "draw_overdraw"]
+__all__ = ["canvas_of", "draw", "draw_all_samples", "draw_coverage", "draw_fragments", "draw_overdraw"]
 
 
 #: Triangles times threads. With fewer, threads that each set up every triangle are done before they have met twice.
@@ -103,57 +102,6 @@ def draw_shared(memory: Memory, snapped: Snapped, target: _engine.Target, height
     if max(bad_rows) < 0:
         run_parts(draw_found, n_parts, n_parts)
     return list(bad_rows)
-
-
-def paint(
-    memory: Memory,
-    snapped: Snapped,
-    view: View,
-    colors: NDArray[Any],
-    pixels: NDArray[Any],
-    transfer: _engine.Transfer | None = None,
-    *,
-    is_flat: bool,
-) -> None:
-    """Draw coloured triangles over contiguous pixels: first which triangle shows in each, then its colour."""
-    width, height = view.size
-    if not (width and height and snapped.n_triangles):
-        return
-    if view.sampling.n_samples > 1:
-        paint_samples(memory, snapped, view, colors, pixels, transfer, is_flat=is_flat)
-        return
-    labels = memory.empty("labels", (height, width), np.int32)
-    draw(memory, snapped, view, Sink.LABEL, labels)
-    palette, flat = _engine.as_bytes(colors), _engine.as_bytes(pixels)
-    n_channels = 1 if colors.ndim == 1 else colors.shape[1]
-
-    def paint_rows(first: int, end: int) -> None:
-        snapped.scene.paint(labels, palette, flat, first, end - first, is_flat, colors.dtype == np.uint8, n_channels)
-
-    run_parts(paint_rows, height, count_threads(view.threads, snapped.n_triangles))
-
-
-def paint_samples(
-    memory: Memory,
-    snapped: Snapped,
-    view: View,
-    colors: NDArray[Any],
-    pixels: NDArray[Any],
-    transfer: _engine.Transfer | None,
-    *,
-    is_flat: bool,
-) -> None:
-    """Draw coloured triangles over contiguous pixels, each pixel the mean of its samples."""
-    width, height = view.size
-    positions = sample_positions(view.sampling.n_samples, view.grid_bits)
-    labels: NDArray[np.int32] = memory.empty("sample labels", (len(positions), height, width), np.int32)
-    draw_all_samples(memory, snapped, view, positions, Sink.LABEL, labels, None)
-    n_threads = count_threads(view.threads, snapped.n_triangles)
-    if is_flat:
-        resolve_flat(labels, colors, pixels, transfer, n_threads)
-        return
-    scenes = [snapped.scene.seen_from(x, y) for x, y in positions.tolist()]
-    resolve_gouraud(memory, scenes, labels, colors, pixels, transfer, n_threads)
 
 
 @contextmanager
@@ -232,58 +180,6 @@ def draw_overdraw(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, vie
         return draw_sample_counts(memory, snapped, view, out)
     with canvas_of(memory, "overdraw", out, view.size[::-1], np.int32) as (result, canvas):
         draw(memory, snapped, view, Sink.COUNT, canvas)
-    return result
-
-
-def colors_are_flat(n_colors: int, snapped: Snapped, per: str) -> bool:
-    """Tell whether a row of colours belongs to a triangle; otherwise it belongs to a vertex."""
-    choice = parse(Per, "per", per)
-    n_triangles = snapped.n_triangles
-    fits_triangles, fits_vertices = n_colors == n_triangles, n_colors == snapped.n_vertices
-    if choice is Per.AUTO and fits_triangles and fits_vertices and n_colors:
-        raise ValueError(
-            f"colors has {n_colors} rows, and there are as many triangles as vertices: "
-            "say per='triangle' or per='vertex'"
-        )
-    if choice is not Per.VERTEX and fits_triangles:
-        return True
-    if choice is not Per.TRIANGLE and fits_vertices:
-        return False
-    wish = {
-        Per.TRIANGLE: f"{n_triangles} rows, one per triangle",
-        Per.VERTEX: f"{snapped.n_vertices} rows, one per vertex",
-        Per.AUTO: f"{n_triangles} rows, one per triangle, or {snapped.n_vertices}, one per vertex",
-    }[choice]
-    raise ValueError(f"colors must have {wish}, got {n_colors}")
-
-
-def draw_fill(
-    memory: Memory,
-    vertices: ArrayLike,
-    triangles: ArrayLike,
-    colors: ArrayLike,
-    view: View,
-    per: str,
-    background: ArrayLike | None,
-    out: object,
-    resolve: str = "values",
-) -> NDArray[Any]:
-    """`fill`, on the memory given."""
-    refuse_many(view, "fill")
-    palette = as_colors(colors)
-    transfer = parse_resolve(resolve, palette.dtype, 1 if palette.ndim == 1 else palette.shape[1])
-    if view.classic:
-        return fill_classic(view.classic, memory, vertices, triangles, palette, view, per, background, out)
-    snapped = snap_scene(memory, vertices, triangles, view, with_depth=False, out=out)
-    is_flat = colors_are_flat(len(palette), snapped, per)
-    shape = (*view.size[::-1], *palette.shape[1:])
-    ground = as_background(background, palette)
-    with canvas_of(memory, "fill", out, shape, palette.dtype.type, keep=ground is None) as (result, canvas):
-        if ground is not None:
-            canvas[...] = ground
-        elif out is None:
-            canvas.fill(0)
-        paint(memory, snapped, view, palette, canvas, transfer, is_flat=is_flat)
     return result
 
 

@@ -5,18 +5,19 @@ Input: `Mesh`, `Camera`. Output: the picture (H, W, 4) uint8 of `render`, or the
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from topleft.adapt import MeshLike, as_mesh
 from topleft.api import rasterize, wireframe
-from topleft.bend import bend
+from topleft.bend import BentMesh, bend
 from topleft.camera import Camera
 from topleft.fragments import BentFragments, Fragments
 from topleft.mesh import Mesh
-from topleft.shade import DEFAULT_COLOR, shade
+from topleft.multisample import shade_samples
+from topleft.shade import DEFAULT_COLOR, as_color, eye_distance, shade
 
 DEFAULT_SIZE = (640, 480)
 WHITE = (255, 255, 255, 255)
@@ -33,6 +34,7 @@ def render(
     background: tuple[int, ...] = WHITE,
     cull: str = "none",
     edges: bool = False,
+    sampling: str = "center",
     threads: int | None = None,
 ) -> npt.NDArray[np.uint8]:
     """A picture of the mesh.
@@ -55,13 +57,16 @@ def render(
         Triangles to leave out, by the side that is seen.
     edges : bool
         Whether the edges that show are drawn over it, as smooth dark lines.
+    sampling : {"center", "msaa2", "msaa4", "msaa8", "msaa16"}
+        Samples of a pixel. With several outlines are smooth: a triangle is shaded once in a pixel, where the first of
+        its samples lies, and the light of the samples is averaged.
     threads : int, optional
         How many threads draw; never changes a bit.
 
     Returns
     -------
     (H, W, 4) uint8
-        sRGB with alpha: 255 where the mesh is, the background elsewhere.
+        sRGB with alpha: 255 where the mesh is, the background elsewhere, their mean where samples see both.
 
     Raises
     ------
@@ -77,8 +82,17 @@ def render(
     """
     mesh = as_mesh(mesh)
     camera = default_camera(mesh, size) if camera is None else camera
-    frags = rasterize_mesh(mesh, camera, size, cull=cull, threads=threads)
-    picture = shade(frags, mesh, camera, shading=shading, color=color, background=background)
+    background = as_color("background", background, 4)
+    frags = rasterize_mesh(mesh, camera, size, cull=cull, threads=threads, sampling=sampling)
+    depth_range = distances(frags, camera) if shading == "depth" else None
+
+    def shade_one(sample: Fragments) -> npt.NDArray[np.uint8]:
+        return shade(
+            sample, mesh, camera, shading=shading, color=color, background=background, depth_range=depth_range
+        )
+
+    has_samples = frags.samples_triangle.shape[-1] > 1
+    picture = shade_samples(frags, shade_one, background) if has_samples else shade_one(frags)
     if edges:
         draw_edges(picture, frags, mesh, camera, cull=cull, threads=threads)
     return picture
@@ -116,12 +130,28 @@ def rasterize_mesh(
     mesh = as_mesh(mesh)
     camera = default_camera(mesh, size) if camera is None else camera
     view |= {"cull": cull, "threads": threads}
-    frame = view.get("viewport") or size
+    drawn = seen_through(mesh, camera, view.get("viewport") or size, near_clip=view.get("near_clip", True))
+    frags = rasterize(drawn.vertices, drawn.triangles, size, transform=drawn.transform, **view)
+    if drawn.bent is None:
+        return frags
+    return BentFragments(frags, drawn.bent.source, drawn.bent.weights, mesh.triangles, len(mesh.vertices))
+
+
+class Drawn(NamedTuple):
+    """What the verbs draw of a mesh."""
+
+    vertices: npt.NDArray[Any]
+    triangles: npt.NDArray[np.integer[Any]]
+    transform: npt.NDArray[np.float64]
+    bent: BentMesh | None
+
+
+def seen_through(mesh: Mesh, camera: Camera, frame: tuple[int, int], *, near_clip: bool = True) -> Drawn:
+    """The mesh as it is, and the camera's matrix for a whole picture of this size; or as the camera's lens bends it."""
     if camera.lens is None:
-        return rasterize(mesh.vertices, mesh.triangles, size, transform=camera.clip_from_world(frame), **view)
-    bent = bend(mesh.vertices, mesh.triangles, camera, camera.lens, frame, near_clip=view.get("near_clip", True))
-    parts = rasterize(bent.points_eye, bent.triangles, size, transform=camera.clip_from_eye(frame), **view)
-    return BentFragments(parts, bent.source, bent.weights, mesh.triangles, len(mesh.vertices))
+        return Drawn(mesh.vertices, mesh.triangles, camera.clip_from_world(frame), None)
+    bent = bend(mesh.vertices, mesh.triangles, camera, camera.lens, frame, near_clip=near_clip)
+    return Drawn(bent.points_eye, bent.triangles, camera.clip_from_eye(frame), bent)
 
 
 def draw_edges(
@@ -136,13 +166,8 @@ def draw_edges(
     """Draw the edges of the mesh over its picture (H, W, 4), those that the visibility buffer does not hide."""
     height, width = frags.depth.shape
     size = width, height
-    vertices: npt.NDArray[Any] = mesh.vertices
-    triangles: npt.NDArray[np.integer[Any]] = mesh.triangles
-    if camera.lens is None:
-        transform = camera.clip_from_world(size)
-    else:
-        bent = bend(mesh.vertices, mesh.triangles, camera, camera.lens, size)
-        vertices, transform = bent.points_eye, camera.clip_from_eye(size)
+    vertices, triangles, transform, bent = seen_through(mesh, camera, size)
+    if bent is not None:
         triangles, cull = bent.outline(transform, cull), "none"
     lines = wireframe(
         vertices, triangles, size, transform=transform, depth=depth_behind(frags.depth), antialias=True, cull=cull,
@@ -169,6 +194,15 @@ def depth_behind(depth: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
         slope = np.fmin(before, after)  # NaN: nothing on either side
         behind += np.where(np.isfinite(slope), slope, 0)
     return behind
+
+
+def distances(frags: Fragments, camera: Camera) -> tuple[float, float] | None:
+    """The least and the greatest distance along the view of what any sample shows; None where there is nothing."""
+    depth = frags.samples_depth[frags.samples_triangle >= 0]
+    if not depth.size:
+        return None
+    ends = eye_distance(np.array([depth.min(), depth.max()]), camera)
+    return float(ends[0]), float(ends[1])
 
 
 def default_camera(mesh: Mesh, size: tuple[int, int]) -> Camera:

@@ -1,4 +1,7 @@
-"""One colour a pixel from those of its samples: the mean of the values, or of the light that they stand for."""
+"""One colour a pixel from those of its samples: the mean of the values, or of the light that they stand for.
+
+With straight alpha colours count as much as they are opaque: the mean of premultiplied colours, made straight again.
+"""
 
 from __future__ import annotations
 
@@ -12,8 +15,9 @@ from topleft import _engine
 from topleft.memory import Memory
 from topleft.models import Resolve, parse
 from topleft.threads import run_parts
+from topleft.view import View
 
-__all__ = ["parse_resolve", "resolve_flat", "resolve_gouraud"]
+__all__ = ["parse_resolve", "resolve_colors", "resolve_flat", "resolve_gouraud"]
 
 #: Steps from no light to full light: 20 to the darkest level of sRGB.
 LINEAR_ONE = 1 << 16
@@ -28,19 +32,25 @@ def srgb_tables() -> tuple[NDArray[np.int32], NDArray[np.uint8]]:
     return np.rint(LINEAR_ONE * decoded).astype(np.int32), np.rint(255 * encoded).astype(np.uint8)
 
 
-def parse_resolve(resolve: object, dtype: np.dtype[Any], n_channels: int) -> _engine.Transfer | None:
-    """Return how values become light: None when they are averaged as they are.
+def parse_resolve(
+    resolve: object, colors: NDArray[Any], view: View, *, is_straight: bool
+) -> _engine.Transfer | None:
+    """Return what is averaged; None when it is the values as they are.
 
     Raises
     ------
     ValueError
         If the option is unknown, or light is asked for and the colours are no uint8.
     """
-    if parse(Resolve, "resolve", resolve) is Resolve.VALUES:
+    is_linear = parse(Resolve, "resolve", resolve) is Resolve.LINEAR
+    if is_linear and colors.dtype != np.uint8:
+        raise ValueError(
+            f"resolve 'linear' takes sRGB colours of uint8, got {colors.dtype}: float32 is averaged as it is"
+        )
+    n_channels = 1 if colors.ndim == 1 else colors.shape[1]
+    if view.sampling.n_samples == 1 or not (is_linear or is_straight):
         return None
-    if dtype != np.uint8:
-        raise ValueError(f"resolve 'linear' takes sRGB colours of uint8, got {dtype}: float32 is averaged as it is")
-    return _engine.Transfer(*srgb_tables(), n_channels - (n_channels in (2, 4)))  # the last of 2 or 4 is alpha
+    return _engine.Transfer(srgb_tables() if is_linear else None, n_channels - (n_channels in (2, 4)), is_straight)
 
 
 def resolve_flat(
@@ -80,3 +90,15 @@ def resolve_gouraud(
         _engine.mean_colors(painted, pixels, first, end - first, n_channels, transfer)
 
     run_parts(resolve_rows, labels.shape[1], n_threads)
+
+
+def resolve_colors(
+    painted: NDArray[Any], pixels: NDArray[Any], transfer: _engine.Transfer | None, n_threads: int
+) -> None:
+    """Write the mean of what the samples hold, (S, H, W[, C]), over (H, W[, C]) pixels."""
+    n_channels = 1 if pixels.ndim == 2 else pixels.shape[2]
+
+    def resolve_rows(first: int, end: int) -> None:
+        _engine.mean_colors(painted, pixels, first, end - first, n_channels, transfer)
+
+    run_parts(resolve_rows, len(pixels), n_threads)

@@ -76,6 +76,7 @@ def shade(
     shading: str = "smooth",
     color: Color = DEFAULT_COLOR,
     background: Color = (255, 255, 255, 255),
+    depth_range: tuple[float, float] | None = None,
 ) -> U8:
     """The picture (H, W, 4) uint8 of a visibility buffer: sRGB, alpha 255 where a triangle shows.
 
@@ -90,12 +91,15 @@ def shade(
     shading : {"smooth", "flat", "ids", "depth", "normals"}
         "smooth": interpolated vertex normals, lit in the pixel by a headlight and ambient light. "flat": the same with
         the normals of the faces. Both light the side that is seen, whichever it is. "ids": a colour for each triangle.
-        "depth": grey, bright is near, over the range of distances in the picture. "normals": the smooth normal in
+        "depth": grey, bright is near, over a range of distances. "normals": the smooth normal in
         eye space, x, y, z from -1..1 as red, green, blue; what faces the viewer is light blue.
     color : (3,) of 0 to 255
         sRGB colour of a mesh without colours.
     background : (4,) of 0 to 255
         sRGB and alpha where nothing shows.
+    depth_range : (float, float), optional
+        Distances along the view that are the brightest and the darkest grey of "depth", world units; unless given,
+        those of the picture.
 
     Raises
     ------
@@ -113,7 +117,7 @@ def shade(
     if mode is Shading.IDS:
         rgb = id_colors(ids)
     elif mode is Shading.DEPTH:
-        rgb = _grey_of_distance(eye_distance(frags.depth[seen], camera))[:, None]
+        rgb = _grey_of_distance(eye_distance(frags.depth[seen], camera), depth_range)[:, None]
     else:
         normals = eye_normals(frags, mesh, camera, is_smooth=mode is not Shading.FLAT)
         if mode is Shading.NORMALS:
@@ -205,7 +209,7 @@ def _lit(linear: F32, normals: F32) -> U8:
     return _SRGB_OF_LINEAR[np.minimum(np.rint(steps).astype(np.int32), _LINEAR_STEPS)]
 
 
-def _grey_of_distance(distance: F64) -> U8:
-    nearest, farthest = distance.min(), distance.max()
-    share = (distance - nearest) / max(farthest - nearest, np.finfo(np.float64).tiny)
+def _grey_of_distance(distance: F64, depth_range: tuple[float, float] | None) -> U8:
+    nearest, farthest = depth_range or (distance.min(), distance.max())
+    share = np.clip((distance - nearest) / max(farthest - nearest, np.finfo(np.float64).tiny), 0, 1)
     return np.rint(GREY_OF_NEAREST + (GREY_OF_FARTHEST - GREY_OF_NEAREST) * share).astype(np.uint8)

@@ -11,9 +11,11 @@ S. Gottschalk, M. C. Lin, D. Manocha, OBBTree: A Hierarchical Structure for Rapi
 from __future__ import annotations
 
 from collections.abc import Callable
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from topleft.methods import reference
 from topleft.methods.reference import Piece, Point
@@ -124,3 +126,34 @@ def _holds(triangle: list[Point], square: list[Point]) -> bool:
     """Tell whether every corner of the square is inside or on every edge."""
     edges = zip(triangle, triangle[1:] + triangle[:1], strict=True)
     return all(reference.edge_function(a, b, p) >= 0 for a, b in edges for p in square)
+
+
+def mean(
+    samples: npt.NDArray[Any],
+    *,
+    is_straight: bool,
+    tables: tuple[npt.NDArray[np.int32], npt.NDArray[np.uint8]] | None = None,
+) -> list[float]:
+    """Return the mean of the colours (S, C) of one pixel's samples, of uint8 rounded to nearest, ties to even.
+
+    `is_straight`: the last of 2 or 4 channels is alpha, and colours count as much as they are opaque. `tables`: what
+    takes uint8 colours to light, and light to colours.
+
+    Examples
+    --------
+    >>> mean(np.array([[255, 255], [9, 0]], np.uint8), is_straight=True)
+    [255, 128]
+    """
+    n_colors = samples.shape[1] - (samples.shape[1] in (2, 4))
+    alpha = [Fraction(float(sample[-1])) for sample in samples]
+    is_weighted = is_straight and len(set(alpha)) > 1 and sum(alpha) != 0
+    found: list[float] = []
+    for c, values in enumerate(samples.T):
+        weights = alpha if is_weighted and c < n_colors else [Fraction(1)] * len(samples)
+        light = tables[0][values] if tables and c < n_colors else values
+        exact = sum(w * Fraction(v) for w, v in zip(weights, light.tolist(), strict=True)) / sum(weights)
+        if samples.dtype != np.uint8:
+            found.append(float(exact))
+        else:
+            found.append(int(tables[1][round(exact)]) if tables and c < n_colors else round(exact))
+    return found

@@ -1,0 +1,83 @@
+"""Silhouettes: where a mesh is, seen by a camera, as a mask.
+
+Input: `Mesh`, `Camera`. Output: a mask (H, W), bool or float32.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy.typing as npt
+
+from topleft.adapt import MeshLike, as_mesh
+from topleft.api import coverage
+from topleft.camera import Camera
+from topleft.render import DEFAULT_SIZE, default_camera, seen_through
+
+__all__ = ["silhouette"]
+
+
+def silhouette(
+    mesh: MeshLike,
+    camera: Camera | None = None,
+    size: tuple[int, int] = DEFAULT_SIZE,
+    *,
+    sampling: str = "center",
+    cull: str = "none",
+    threads: int | None = None,
+    out: npt.NDArray[Any] | None = None,
+    **view: Any,
+) -> npt.NDArray[Any]:
+    """Return the mask of the mesh: where it is seen, or how much of each pixel it covers.
+
+    Parameters
+    ----------
+    mesh : Mesh, or whatever `as_mesh` takes
+        What to look at.
+    camera : Camera, optional
+        Unless given, the three-quarter view of `Camera.framing`, with y up.
+    size : (width, height), pixels
+        640 x 480 unless given.
+    sampling : str
+        As `coverage` takes it: "center" gives bool, "area" float32.
+    cull : {"none", "back", "front"}
+        Triangles to leave out, by the side that is seen.
+    threads : int, optional
+        How many threads draw; never changes a bit.
+    out : ndarray of bool (float32 for "area"), shape (H, W), optional
+        Where the result goes.
+    **view
+        Other options of `coverage`, `origin=` for a window of a larger picture, say.
+
+    Returns
+    -------
+    ndarray of bool or float32, shape (H, W)
+        False or 0 where the mesh is not.
+
+    Raises
+    ------
+    ValueError
+        If the mesh has no triangles and no camera is given, or an option is unknown.
+
+    Notes
+    -----
+    What is covered by samples is the union of the triangles. By area it is the sum of their areas, at most 1: the union
+    where triangles do not overlap within a pixel. They do not along the outline of a closed mesh with ``cull="back"``
+    that each line of sight enters once; where one part of it hides another, a pixel of the inner outline is full.
+    Without culling the far side counts as well, and a pixel on the outline gets up to twice its share.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> mesh = tl.Mesh(*tl.scenes.shape("cube"))
+    >>> int(tl.silhouette(mesh, size=(8, 6)).sum())
+    17
+    >>> round(float(tl.silhouette(mesh, size=(8, 6), sampling="area", cull="back").sum()), 2)
+    16.2
+    """
+    mesh = as_mesh(mesh)
+    camera = default_camera(mesh, size) if camera is None else camera
+    drawn = seen_through(mesh, camera, view.get("viewport") or size, near_clip=view.get("near_clip", True))
+    options: Any = {"transform": drawn.transform, "sampling": sampling, "cull": cull, "threads": threads} | view
+    mask: npt.NDArray[Any] = coverage(drawn.vertices, drawn.triangles, size, out=out, **options)
+    return mask

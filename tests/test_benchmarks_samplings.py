@@ -1,0 +1,28 @@
+"""The picture of one scene in every sampling."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+from topleft.models import Sampling
+
+ROOT = Path(__file__).parent.parent
+if not (ROOT / "benchmarks").is_dir():
+    pytest.skip("the benchmarks are not part of this copy", allow_module_level=True)
+sys.path.append(str(ROOT))
+
+from benchmarks import cli  # noqa: E402
+
+
+def test_samplings_command_draws_a_panel_for_each(tmp_path, capsys):
+    pytest.importorskip("matplotlib")
+    from benchmarks.samplings import ORDER
+
+    assert sorted(ORDER) == sorted(Sampling)
+    assert cli.main(["samplings", "-o", str(tmp_path)]) == 0
+    with Image.open(capsys.readouterr().out.strip()) as picture:
+        assert len(picture.convert("RGB").getcolors(1 << 20)) > 50
