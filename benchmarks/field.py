@@ -3,8 +3,8 @@
     python -m benchmarks.field [-o FILE.json]
 
 Rounds go round the contestants, so that what slows the machine slows all of them; the fastest and the median round are
-printed. Also `height_map` of 2,000 faces on 400x400, two hundred times in a row. What each is asked for: an array, or a canvas, of the whole frame;
-meshes, tables and triangulations are made before.
+printed. Also `height_map` of 2,000 faces on 400x400, two hundred times in a row. Each is asked for an array, or a
+canvas, of the whole frame; meshes, tables and triangulations are made before.
 """
 
 from __future__ import annotations
