@@ -4,13 +4,15 @@ from topleft import scenes
 from topleft._isa import build_info
 from topleft.adapt import as_mesh
 from topleft.api import Rasterizer, coverage, fill, overdraw, rasterize, wireframe
+from topleft.batch import Job, render_batch
 from topleft.camera import Camera
 from topleft.classic import bresenham_line
 from topleft.errors import MeshError, TopleftError
 from topleft.field import field, height_map
-from topleft.files import load, save_image
+from topleft.files import load
 from topleft.fragments import Fragments
 from topleft.grid import Grid
+from topleft.images import save_image
 from topleft.lens import FisheyeLens, OpenCVLens
 from topleft.memory import release_memory
 from topleft.mesh import Mesh
@@ -26,6 +28,7 @@ __all__ = [
     "FisheyeLens",
     "Fragments",
     "Grid",
+    "Job",
     "Mesh",
     "MeshError",
     "OpenCVLens",
@@ -45,6 +48,7 @@ __all__ = [
     "rasterize_mesh",
     "release_memory",
     "render",
+    "render_batch",
     "save_image",
     "scenes",
     "shade",

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft.adapt import MeshLike, as_mesh
-from topleft.api import rasterize, wireframe
+from topleft.api import Rasterizer, rasterize, wireframe
 from topleft.bend import BentMesh, bend
 from topleft.camera import Camera
 from topleft.fragments import BentFragments, Fragments
@@ -36,6 +36,7 @@ def render(
     edges: bool = False,
     sampling: str = "center",
     threads: int | None = None,
+    rasterizer: Rasterizer | None = None,
 ) -> npt.NDArray[np.uint8]:
     """A picture of the mesh.
 
@@ -62,6 +63,8 @@ def render(
         its samples lies, and the light of the samples is averaged.
     threads : int, optional
         How many threads draw; never changes a bit.
+    rasterizer : Rasterizer, optional
+        Of this size: what is needed on the way lies in the memory that it keeps.
 
     Returns
     -------
@@ -83,7 +86,7 @@ def render(
     mesh = as_mesh(mesh)
     camera = default_camera(mesh, size) if camera is None else camera
     background = as_color("background", background, 4)
-    frags = rasterize_mesh(mesh, camera, size, cull=cull, threads=threads, sampling=sampling)
+    frags = rasterize_mesh(mesh, camera, size, cull=cull, threads=threads, sampling=sampling, rasterizer=rasterizer)
     depth_range = distances(frags, camera) if shading == "depth" else None
 
     def shade_one(sample: Fragments) -> npt.NDArray[np.uint8]:
@@ -105,6 +108,7 @@ def rasterize_mesh(
     *,
     cull: str = "none",
     threads: int | None = None,
+    rasterizer: Rasterizer | None = None,
     **view: Any,
 ) -> Fragments:
     """The visibility buffer of the mesh: ids and depth per pixel, and attributes interpolated on demand.
@@ -113,6 +117,8 @@ def rasterize_mesh(
     ----------
     mesh, camera, size, cull, threads
         As for `render`.
+    rasterizer : Rasterizer, optional
+        Of this size: the result lies in its memory, until the next call.
     **view
         Other options of `rasterize`, `origin=` for a window of a larger picture, say.
 
@@ -125,13 +131,19 @@ def rasterize_mesh(
     Raises
     ------
     ValueError
-        If the mesh has no triangles and no camera is given, or an option is unknown.
+        If the mesh has no triangles and no camera is given, an option is unknown, or `rasterizer` has another size.
     """
     mesh = as_mesh(mesh)
     camera = default_camera(mesh, size) if camera is None else camera
     view |= {"cull": cull, "threads": threads}
     drawn = seen_through(mesh, camera, view.get("viewport") or size, near_clip=view.get("near_clip", True))
-    frags = rasterize(drawn.vertices, drawn.triangles, size, transform=drawn.transform, **view)
+    view["transform"] = drawn.transform
+    if rasterizer is None:
+        frags = rasterize(drawn.vertices, drawn.triangles, size, **view)
+    elif rasterizer.size != tuple(size):
+        raise ValueError(f"rasterizer must have the size {tuple(size)}, got {rasterizer.size}")
+    else:
+        frags = rasterizer.rasterize(drawn.vertices, drawn.triangles, **view)
     if drawn.bent is None:
         return frags
     return BentFragments(frags, drawn.bent.source, drawn.bent.weights, mesh.triangles, len(mesh.vertices))
