@@ -29,6 +29,7 @@
 #include "shade.c"
 #include "shade_samples.c"
 #include "shade_cutout.c"
+#include "planes.c"
 #include "mix.h"
 #include "mix_u8.c"
 #include "mix_f32.c"
@@ -62,4 +63,6 @@ const tl_kernels TL_KERNELS = {
     .cut_out = cut_out,
     .mean_flat = mean_flat,
     .mean_colors = mean_colors,
+    .list_planes = list_planes,
+    .fill_planes = fill_planes,
 };

@@ -39,7 +39,7 @@ def expected_ids(mesh):
     nearest, ids = np.full(SIZE[::-1], np.inf), np.full(SIZE[::-1], -1)
     for k in range(N_LAYERS + 1):
         own = replace(mesh, triangles=mesh.triangles[2 * k : 2 * k + 2], materials=(), material_of_triangle=None)
-        frags = tl.visibility(own, CAMERA, SIZE)
+        frags = tl.rasterize_mesh(own, CAMERA, SIZE)
         w = reference.Weights(frags, own, CAMERA, SIZE)
         opacity = reference.sample(LEAF.texture, w.of(own.uv), w.slopes_of(own.uv))[:, 3]
         is_left = np.zeros(SIZE[::-1], bool)
@@ -51,7 +51,7 @@ def expected_ids(mesh):
 
 
 def cut(mesh, size=SIZE, **options):
-    frags = tl.visibility(mesh, CAMERA, size, **options)
+    frags = tl.rasterize_mesh(mesh, CAMERA, size, **options)
     cut_out(frags, mesh, CAMERA, threads=options.get("threads"))
     return frags
 
@@ -71,7 +71,7 @@ def test_cutout_without_holes_is_the_visibility_buffer():
     solid = np.full_like(HOLES, 255)
     solid[0, 0, 3] = 254
     full = replace(full, materials=(replace(full.materials[0], texture=tl.Texture(solid)), mesh.materials[1]))
-    before, after = tl.visibility(full, CAMERA, SIZE), cut(full)
+    before, after = tl.rasterize_mesh(full, CAMERA, SIZE), cut(full)
     assert_same(after.triangle, before.triangle)
     assert_same(after.depth, before.depth)
 
@@ -103,7 +103,7 @@ def test_cutout_of_a_triangle_that_the_near_plane_cuts():
     floor = [[-9, 0, 8], [9, 0, 8], [0, 0, -60]]
     mesh = tl.Mesh(floor, [[0, 1, 2]], uv=np.array(floor)[:, [0, 2]] / 4, materials=(LEAF,))
     camera = tl.Camera.look_at((0, 1, 5), (0, 0.2, 0), near=0.1, far=1000)
-    frags = tl.visibility(mesh, camera, SIZE)
+    frags = tl.rasterize_mesh(mesh, camera, SIZE)
     before = frags.mask
     cut_out(frags, mesh, camera)
     assert not (frags.mask & ~before).any()
@@ -115,4 +115,4 @@ def test_render_cuts_holes_out():
     alone = replace(mesh, triangles=mesh.triangles[:2], materials=(LEAF,), material_of_triangle=None)
     picture = tl.render(alone, CAMERA, SIZE, background=(0, 0, 0, 0))
     assert_same(picture[..., 3] == 255, cut(alone).mask)
-    assert 0.2 < (picture[..., 3] == 255).sum() / tl.visibility(alone, CAMERA, SIZE).mask.sum() < 0.8
+    assert 0.2 < (picture[..., 3] == 255).sum() / tl.rasterize_mesh(alone, CAMERA, SIZE).mask.sum() < 0.8

@@ -43,7 +43,7 @@ ON_EACH_CAMERA = pytest.mark.parametrize("camera", CAMERAS.values(), ids=CAMERAS
 def check(mesh, camera, material=None, *, is_flat=False, **options):
     """The picture is that of the reference, rounded: at most one level off, and only next to the middle of two."""
     material = material or tl.Material(color=(224, 222, 217))
-    frags = tl.visibility(mesh, camera, SIZE)
+    frags = tl.rasterize_mesh(mesh, camera, SIZE)
     got = shade(frags, mesh, camera, shading="flat" if is_flat else "smooth", material=material, **options)
     expected = reference.picture(frags, mesh, camera, SIZE, material, is_flat=is_flat, **options)
     seen = frags.mask
@@ -93,7 +93,7 @@ def test_shade_textures_of_odd_sizes_are_those_of_the_reference(size):
 def test_shade_nearest_texel_is_that_of_the_reference(wrap):
     material = tl.Material(texture=tl.Texture(NOISE, filter="nearest", wrap=wrap), unlit=True)
     camera = CAMERAS["perspective"]
-    frags = tl.visibility(KNOT, camera, SIZE)
+    frags = tl.rasterize_mesh(KNOT, camera, SIZE)
     got = shade(frags, KNOT, camera, material=material)
     w = reference.Weights(frags, KNOT, camera, SIZE)
     expected = reference.encode(reference.sample(material.texture, w.of(KNOT.uv), None))[:, :3]
@@ -119,7 +119,7 @@ def test_shade_material_of_each_triangle():
     colors = [tl.Material(color=(k, 255 - k, 9), unlit=True) for k in range(5)]
     rows = RNG.integers(0, 5, len(KNOT.triangles))
     mesh = replace(KNOT, materials=colors, material_of_triangle=rows)
-    frags = tl.visibility(mesh, CAMERAS["ortho"], SIZE)
+    frags = tl.rasterize_mesh(mesh, CAMERAS["ortho"], SIZE)
     got = shade(frags, mesh, CAMERAS["ortho"])[frags.mask]
     assert_same(got[:, 0], rows[frags.triangle[frags.mask]].astype(np.uint8))
 
@@ -128,7 +128,7 @@ def test_shade_triangles_across_the_near_plane_and_huge_ones_keep_their_attribut
     # A floor from behind the eye to far away: one triangle is cut, and is larger than int32 edge functions allow.
     floor = tl.Mesh([[-50, 0, 9], [50, 0, 9], [0, 0, -200]], [[0, 1, 2]], uv=[[-50, 9], [50, 9], [0, -200]])
     camera = tl.Camera.look_at((0, 1, 5), (0, 0.2, 0), near=0.1, far=1000)
-    frags = tl.visibility(floor, camera, SIZE)
+    frags = tl.rasterize_mesh(floor, camera, SIZE)
     rows, cols = np.nonzero(frags.mask)
     white = tl.Material((255, 255, 255), unlit=True)
     got = tl.render(floor, camera, SIZE, fog=tl.Fog(0, 40, color=(0, 0, 0)), material=white)
@@ -160,7 +160,7 @@ def test_encode_gives_the_nearest_value_of_each_step_of_light():
     quad = tl.Mesh([[-9, -9, 0], [9, -9, 0], [0, 9, 0]], [[0, 1, 2]])
     camera = tl.Camera.look_at((0, 0, 1))
     white = tl.Material(color=(255, 255, 255))
-    frags = tl.visibility(quad, camera, (1, 1))
+    frags = tl.rasterize_mesh(quad, camera, (1, 1))
     got = [int(shade(frags, quad, camera, material=white, lights=[], ambient=float(a))[0, 0, 0]) for a in steps]
     table = srgb_tables()[1]
     assert got == table[np.rint(steps.astype(np.float32) * 65536).astype(int)].tolist()
@@ -187,7 +187,7 @@ def everything(threads=None, origin=(0, 0), size=SIZE, sampling="center"):
     options = {"lights": LIGHTS, "material": material, "fog": tl.Fog(3, 9), "threads": threads}
     near = tl.Camera.look_at((0.2, 0.1, 1.0), near=0.5, far=9)
     for camera in (*CAMERAS.values(), near):
-        frags = tl.visibility(COLORED, camera, size, origin=origin, viewport=SIZE, sampling=sampling)
+        frags = tl.rasterize_mesh(COLORED, camera, size, origin=origin, viewport=SIZE, sampling=sampling)
         for shading in ("smooth", "flat", "normals", "unlit"):
             yield shade(frags, COLORED, camera, shading=shading, **options)
 

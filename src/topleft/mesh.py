@@ -97,6 +97,11 @@ class Mesh:
             rows = _material_rows(self.material_of_triangle, len(triangles), len(self.materials))
             keep(self, "material_of_triangle", _read_only(rows))
 
+    def _repr_png_(self) -> bytes | None:
+        from topleft.notebook import png_of_mesh  # which imports this module
+
+        return png_of_mesh(self)
+
     @property
     def bounds(self) -> F64:
         """Lower and upper corner (2, 3) float64 of the box round the triangles; unused vertices do not count.
