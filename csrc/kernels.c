@@ -23,6 +23,14 @@
 #include "lines.c"
 #include "mean.c"
 #include "composite.c"
+#include "shade_runs.c"
+#include "shade_texture.c"
+#include "shade_light.c"
+#include "shade_pixels.c"
+#include "shade.c"
+#include "shade_samples.c"
+#include "shade_cutout.c"
+#include "planes.c"
 #include "mix.h"
 #include "mix_u8.c"
 #include "mix_f32.c"
@@ -51,6 +59,12 @@ const tl_kernels TL_KERNELS = {
     .list_edges = list_edges,
     .draw_lines = draw_lines,
     .composite = composite,
+    .set_inverse_w = set_inverse_w,
+    .shade = shade,
+    .shade_samples = shade_samples,
+    .cut_out = cut_out,
     .mean_flat = mean_flat,
     .mean_colors = mean_colors,
+    .list_planes = list_planes,
+    .fill_planes = fill_planes,
 };

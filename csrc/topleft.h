@@ -9,6 +9,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "shading.h"
+
 /* ---- vertices ------------------------------------------------------------------------------------------ */
 
 /* A snapped vertex, 16 bytes: one vector load.  x_fx = TL_SPECIAL marks a vertex that the 64-bit path cannot
@@ -255,6 +257,18 @@ typedef struct {
     int64_t stride_px;
 } tl_line_target;
 
+/* ---- values on triangles ------------------------------------------------------------------------------- */
+
+typedef struct {
+    const double *points_px;  /* (n_points, 2), before the snap */
+    const double *values;     /* (n_points,) */
+    const int32_t *triangles; /* (n_triangles, 3) */
+    int64_t n_points, n_triangles;
+    double *planes; /* (1 + n_triangles, TL_PLANE_DOUBLES) of list_planes, or NULL: fill_planes then computes them as it goes */
+} tl_valued;
+
+#define TL_PLANE_DOUBLES 8
+
 /* ---- the kernel table ---------------------------------------------------------------------------------- */
 
 typedef struct tl_kernels {
@@ -325,12 +339,35 @@ typedef struct tl_kernels {
     /* What is seen through the layers of n pixels. */
     void (*composite)(const tl_composite *layers, int64_t n, void *pixels);
 
+    /* Copies rows [first, end) of four numbers, the last of them replaced by 1/w of the vertex. */
+    void (*set_inverse_w)(const tl_source *source, const float *rows, int64_t first, int64_t end, float *out);
+
+    /* The picture of a visibility buffer, rows of window->width: uint8 red, green, blue, opacity.  `view` may be NULL in pixel space. */
+    void (*shade)(const tl_scene *scene, const tl_window *window, const tl_view *view, const tl_shading *shading, const int32_t *ids,
+                  const float *depth, uint8_t *pixels);
+
+    /* The same from planes of ids and depth that lie `stride` pixels apart, one a sample; samples_fx as in tl_target. */
+    void (*shade_samples)(const tl_scene *scene, const tl_window *window, const tl_view *view, const tl_shading *shading,
+                          const int32_t *samples_fx, int sample_bits, int64_t stride, const int32_t *ids, const float *depth,
+                          uint8_t *pixels);
+
+    /* Draws n triangles over ids and depth of the others, but for what their materials cut out; the window as for a share of a
+     * part, and fewer than 2^31 pixels. */
+    void (*cut_out)(const tl_scene *scene, const tl_window *window, const tl_view *view, const tl_shading *shading,
+                    const int32_t *triangles, int64_t n, int32_t *ids, float *depth);
+
     /* The edges of the triangles that are not culled, each once, as lower index + 2^32 * higher index; room for three a
      * triangle.  Returns the first row with an index outside the vertices, or -1. */
     int64_t (*list_edges)(const tl_scene *scene, const tl_edge_scratch *scratch, uint64_t *edges, int64_t *n_edges);
 
     /* Clears the window's pixels and draws lines. */
     void (*draw_lines)(const tl_edges *lines, const tl_window *window, const tl_line_target *target);
+
+    /* The planes of triangles [first, end); the one of no triangle, with first = 0. */
+    void (*list_planes)(const tl_valued *mesh, int64_t first, int64_t end);
+
+    /* Per pixel of `ids` (rows of window->width): the value of its centre on the plane of the triangle, float32 or float64. */
+    void (*fill_planes)(const tl_valued *mesh, const tl_window *window, const int32_t *ids, int is_f32, void *out);
 } tl_kernels;
 
 #endif

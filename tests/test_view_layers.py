@@ -199,7 +199,7 @@ def test_flow_of_a_mesh_under_two_cameras_and_behind_one():
 def test_ids_depth_and_masks_are_those_of_the_visibility_buffer():
     camera = CAMERAS["perspective"]
     found = look(camera, "triangle", "instance", "barycentric", "depth", "silhouette", "alpha")
-    frags = tl.visibility(scene(), camera, SIZE)
+    frags = tl.rasterize_mesh(scene(), camera, SIZE)
     assert_same(found["triangle"], frags.triangle)
     assert_same(found["instance"], frags.instance)
     assert_same(found["barycentric"], frags.barycentric())
@@ -232,7 +232,7 @@ def test_uv_and_attributes_are_interpolated():
     object.__setattr__(mesh, "uv", rng.random((24, 2), np.float32))
     camera, per_corner = CAMERAS["perspective"], rng.random((12, 3, 4))
     found = look(camera, "uv", subject=mesh, attributes={"heat": np.arange(24.0), "wide": per_corner})
-    frags = tl.visibility(mesh, camera, SIZE)
+    frags = tl.rasterize_mesh(mesh, camera, SIZE)
     assert list(found) == ["uv", "heat", "wide"]
     for name, values in (("uv", mesh.uv), ("heat", np.arange(24.0)), ("wide", per_corner)):
         assert_same(np.nan_to_num(found[name], nan=9), frags.interpolate(values, background=9))

@@ -1,7 +1,7 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, initializedcheck=False, embedsignature=False
 """Memoryviews in, one nogil kernel call, status out. The array layer has checked every shape, dtype and index."""
 
-from libc.stdint cimport int32_t, int64_t, uint8_t, uint64_t
+from libc.stdint cimport int32_t, int64_t, uint8_t, uint16_t, uint64_t
 
 import numpy as np
 
@@ -79,7 +79,7 @@ cdef extern from "topleft.h" nogil:
         int64_t stride_px
         void *cells
         int is_wide, is_clamped
-    int64_t TL_CELL_CLEAR, TL_AREA_OVERFLOW
+    int64_t TL_CELL_CLEAR, TL_AREA_OVERFLOW, TL_PLANE_DOUBLES
     int64_t tl_area_stride(int64_t width)
     ctypedef int tl_blend
     ctypedef struct tl_canvas:
@@ -129,7 +129,67 @@ cdef extern from "topleft.h" nogil:
         double depth_bias
         int is_farthest
         int64_t stride_px
+    ctypedef int tl_filter
+    ctypedef int tl_wrap
+    ctypedef int tl_light_kind
+    ctypedef int tl_show
+    int TL_MAX_LEVELS
+    ctypedef struct tl_texture:
+        const uint16_t *texels
+        int32_t *offset
+        int32_t *width
+        int32_t *height
+        int n_levels
+        tl_filter filter
+        tl_wrap wrap_u, wrap_v
+    ctypedef struct tl_material:
+        float *color
+        float *back_color
+        float *specular
+        float shininess, cutoff
+        int has_back_color, is_unlit
+        const tl_texture *texture
+    ctypedef struct tl_light:
+        tl_light_kind kind
+        float *at
+        float *color
+        float falloff
+    ctypedef struct tl_shading:
+        const float *normals
+        const float *face_normals
+        const void *positions
+        int is_f64
+        const uint8_t *is_turned
+        const float *uv
+        const float *colors
+        const int32_t *material_of
+        const tl_material *materials
+        int n_materials
+        const tl_light *lights
+        int n_lights
+        float *ambient
+        tl_show show
+        const tl_texture *matcap
+        float[3][4] eye_from
+        int has_perspective
+        float *eye
+        float[4][3] ray
+        float *fog_color
+        float fog_near, fog_scale, distance_start, distance_scale
+        const float *decode
+        float *background
+        uint8_t *background_bytes
+    ctypedef struct tl_valued:
+        const double *points_px
+        const double *values
+        const int32_t *triangles
+        int64_t n_points, n_triangles
+        double *planes
     ctypedef struct tl_kernels:
+        void (*set_inverse_w)(const tl_source *, const float *, int64_t, int64_t, float *) noexcept nogil
+        void (*cut_out)(const tl_scene *, const tl_window *, const tl_view *, const tl_shading *, const int32_t *, int64_t, int32_t *, float *) noexcept nogil
+        void (*shade_samples)(const tl_scene *, const tl_window *, const tl_view *, const tl_shading *, const int32_t *, int, int64_t, const int32_t *, const float *, uint8_t *) noexcept nogil
+        void (*shade)(const tl_scene *, const tl_window *, const tl_view *, const tl_shading *, const int32_t *, const float *, uint8_t *) noexcept nogil
         tl_vertex_counts (*snap)(const tl_source *, int64_t, int64_t, int, int, tl_vertex *, tl_wide *) noexcept nogil
         tl_vertex_counts (*project)(const tl_source *, int64_t, int64_t, const tl_view *, tl_vertex *, tl_wide *) noexcept nogil
         void (*clip)(const tl_source *, const tl_vertex *, const int32_t *, int64_t, const tl_view *, tl_pieces *) noexcept nogil
@@ -148,6 +208,8 @@ cdef extern from "topleft.h" nogil:
         void (*composite)(const tl_composite *, int64_t, void *) noexcept nogil
         int64_t (*list_edges)(const tl_scene *, const tl_edge_scratch *, uint64_t *, int64_t *) noexcept nogil
         void (*draw_lines)(const tl_edges *, const tl_window *, const tl_line_target *) noexcept nogil
+        void (*list_planes)(const tl_valued *, int64_t, int64_t) noexcept nogil
+        void (*fill_planes)(const tl_valued *, const tl_window *, const int32_t *, int, void *) noexcept nogil
         void (*mean_flat)(const int32_t *, int, int64_t, int64_t, const void *, int, int, const tl_transfer *, void *) noexcept nogil
         void (*mean_colors)(const void *, int, int64_t, int64_t, int, int, const tl_transfer *, void *) noexcept nogil
 
@@ -192,6 +254,11 @@ cdef class View:
         self.view.guard_band_x, self.view.guard_band_y = (2.0**60 / (side / 2 * 2**guard_bits) for side in viewport)
         self.view.subpixel_bits, self.view.zero_to_one = subpixel_bits, zero_to_one
         self.view.near_clip, self.view.far_clip = near_clip, far_clip
+
+    @property
+    def viewport(self):
+        """Width and height of the whole picture."""
+        return int(2 * self.view.half_width_px), int(2 * self.view.half_height_px)
 
 
 cdef class Source:
@@ -336,14 +403,16 @@ cdef class Scene:
 
     cdef tl_scene scene
     cdef int64_t x_px, y_px
-    cdef int subpixel_bits
+    cdef readonly int subpixel_bits
     cdef tl_test test
     cdef object arrays
+    cdef readonly View view
 
     def __init__(
         self, Source source, const uint8_t[::1] records, const int64_t[:, ::1] wide, const int32_t[:, ::1] triangles,
-        Pieces pieces, int64_t x_px, int64_t y_px, int subpixel_bits, int cull, int method, int test=0,
+        Pieces pieces, int64_t x_px, int64_t y_px, int subpixel_bits, int cull, int method, int test=0, View view=None,
     ):
+        self.view = view
         self.arrays = (source, records, wide, triangles, pieces)
         self.scene.mesh.vertices = <const tl_vertex *>data(records)
         self.scene.mesh.wide = <const tl_wide *>&wide[0, 0] if wide is not None and wide.shape[0] else NULL
@@ -379,6 +448,7 @@ cdef class Scene:
         cdef Scene other = Scene.__new__(Scene)
         other.scene, other.arrays = self.scene, self.arrays
         other.x_px, other.y_px, other.subpixel_bits, other.test = self.x_px, self.y_px, self.subpixel_bits, self.test
+        other.view = self.view
         return other
 
     cdef tl_window window(self, int64_t first_row, int64_t n_rows, int64_t width) noexcept nogil:
@@ -698,3 +768,5 @@ def mean_colors(painted, pixels, int64_t first_row, int64_t n_rows, int n_channe
 
 
 include "_lines.pxi"
+include "_shade.pxi"
+include "_planes.pxi"

@@ -47,7 +47,7 @@ class Part:
 
 
 class SceneFragments(Fragments):
-    """What `visibility` returns of a `Scene`.
+    """What `rasterize_mesh` returns of a `Scene`.
 
     An instance is snapped again when an attribute of it is asked for.
 

@@ -12,12 +12,15 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft.camera import Camera
+from topleft.colors import id_colors
+from topleft.cutout import has_holes
 from topleft.fragments import Fragments
+from topleft.material import Material
 from topleft.scene import Instance, Scene
 from topleft.scene_fragments import SceneFragments
-from topleft.shade import id_colors, shade
+from topleft.shade import shade
 
-__all__ = ["camera_of", "cull_of", "shade_scene"]
+__all__ = ["camera_of", "cull_of", "refuse_holes", "shade_scene"]
 
 
 def camera_of(camera: Camera, instance: Instance) -> Camera:
@@ -30,6 +33,14 @@ def cull_of(cull: str, instance: Instance) -> str:
     return {"back": "front", "front": "back"}.get(cull, cull) if instance.is_mirrored else cull
 
 
+def refuse_holes(scene: Scene, material: Material | None) -> None:
+    """Raise an error where a material cuts something out: what lies behind a hole may belong to another instance."""
+    for i, instance in enumerate(scene):
+        own = instance.mesh.materials if material is None else (material,)
+        if any(has_holes(one, instance.mesh) for one in own):
+            raise ValueError(f"scenes have no cut-outs, but a material of instance {i} has an alpha_cutoff")
+
+
 def shade_scene(
     frags: Fragments, scene: Scene, camera: Camera, *, background: tuple[int, ...], shading: str, **look: Any
 ) -> npt.NDArray[np.uint8]:
@@ -37,7 +48,7 @@ def shade_scene(
     picture = np.empty((*frags.id.shape, 4), np.uint8)
     picture[...] = background
     if not isinstance(frags, SceneFragments):
-        raise TypeError(f"frags must be what visibility returns of a scene, got {type(frags).__name__}")
+        raise TypeError(f"frags must be what rasterize_mesh returns of a scene, got {type(frags).__name__}")
     for part in frags.parts:
         instance = scene[part.instance]
         own = shade(

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from topleft.camera import Camera
 from topleft.fragments import Fragments
 from topleft.mesh import Mesh
-from topleft.render import visibility
+from topleft.render import rasterize_mesh
 from topleft.scene import Instance, Scene
 from topleft.scene_fragments import Part, SceneFragments
 
@@ -72,7 +72,7 @@ class Sight:
     camera : Camera
     size : (width, height), pixels
     options : dict
-        `cull` and `threads`, as `visibility` takes them.
+        `cull` and `threads`, as `rasterize_mesh` takes them.
     look : dict
         Further options of `render`, for colours.
     camera_to : Camera, optional
@@ -97,7 +97,7 @@ class Sight:
     @cached_property
     def frags(self) -> Fragments:
         """The visibility buffer, at the centres of the pixels."""
-        return visibility(self.subject, self.camera, self.size, **self.options)
+        return rasterize_mesh(self.subject, self.camera, self.size, **self.options)
 
     @cached_property
     def surfaces(self) -> Sequence[Surface]:

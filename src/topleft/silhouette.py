@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy.typing as npt
 
+from topleft.adapt import MeshLike, as_mesh
 from topleft.api import coverage
 from topleft.camera import Camera
-from topleft.mesh import Mesh
-from topleft.render import DEFAULT_SIZE, default_camera
+from topleft.render import DEFAULT_SIZE, default_camera, seen_through
 from topleft.scene import Scene
 from topleft.scene_draw import draw_scene_coverage
 
@@ -20,7 +20,7 @@ __all__ = ["silhouette"]
 
 
 def silhouette(
-    mesh: Mesh | Scene,
+    mesh: MeshLike | Scene,
     camera: Camera | None = None,
     size: tuple[int, int] = DEFAULT_SIZE,
     *,
@@ -34,7 +34,7 @@ def silhouette(
 
     Parameters
     ----------
-    mesh : Mesh or Scene
+    mesh : Mesh, Scene, or whatever `as_mesh` takes
         What to look at.
     camera : Camera, optional
         Unless given, the three-quarter view of `Camera.framing`, with y up.
@@ -78,10 +78,13 @@ def silhouette(
     >>> round(float(tl.silhouette(mesh, size=(8, 6), sampling="area", cull="back").sum()), 2)
     16.2
     """
+    mesh = mesh if isinstance(mesh, Scene) else as_mesh(mesh)
     camera = default_camera(mesh, size) if camera is None else camera
-    transform = camera.clip_from_world(view.get("viewport") or size)
-    options: Any = {"transform": transform, "sampling": sampling, "cull": cull, "threads": threads} | view
+    options: Any = {"sampling": sampling, "cull": cull, "threads": threads} | view
+    frame = view.get("viewport") or size
     if isinstance(mesh, Scene):
-        return draw_scene_coverage(mesh, size=size, out=out, clip_from_world=options.pop("transform"), **options)
-    mask: npt.NDArray[Any] = coverage(mesh.vertices, mesh.triangles, size, out=out, **options)
+        return draw_scene_coverage(mesh, size=size, out=out, clip_from_world=camera.clip_from_world(frame), **options)
+    drawn = seen_through(mesh, camera, frame, near_clip=view.get("near_clip", True))
+    options["transform"] = drawn.transform
+    mask: npt.NDArray[Any] = coverage(drawn.vertices, drawn.triangles, size, out=out, **options)
     return mask

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft.camera import Camera
+from topleft.colors import as_color
 from topleft.composite import composite
 from topleft.depth_layers import DepthLayers, peel
 from topleft.mesh import Mesh
@@ -18,7 +19,7 @@ from topleft.render import DEFAULT_SIZE, WHITE, default_camera
 from topleft.scene import Scene
 from topleft.scene_draw import peel_scene
 from topleft.scene_render import shade_scene
-from topleft.shade import as_color, shade
+from topleft.shade import shade
 
 __all__ = ["render_transparent", "visible_layers"]
 

@@ -14,11 +14,11 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft.camera import Camera
+from topleft.eye import eye_normals
 from topleft.mesh import Mesh, unit_or_zero
 from topleft.render import DEFAULT_SIZE, default_camera, render
 from topleft.scene import Scene
 from topleft.scene_render import camera_of
-from topleft.shade import eye_normals
 from topleft.sight import Sight, Surface, moved, project
 from topleft.silhouette import silhouette as draw_silhouette
 
