@@ -22,7 +22,7 @@ TL_INLINE vi encode_srgb(vf light)
     const vf steps = vf_mul(vf_max(light, vf_set1(0.0f)), vf_set1(TL_LIGHT_STEPS));
     const vf whole = vf_from_vi(vi_rint(vf_min(steps, vf_set1(TL_LIGHT_STEPS - 1.0f))));
     const vi bits = vi_bits_of_vf(whole);
-    const vf scale = vf_lookup(SRGB_SCALE, vi_and(vi_shift_right(bits, 23), vi_set1(15)));
+    const vf scale = vf_lookup(SRGB_SCALE, vi_shift_right(bits, 23));
     const vf m = vf_of_bits(vi_or(vi_and(bits, vi_set1(0x007fffff)), vi_set1(0x3f800000)));
     vf root = vf_set1(-0x1.762b04p-9f); /* m^(5/12), 1 <= m < 2 */
     root = vf_fma(root, m, vf_set1(0x1.fab834p-6f));

@@ -27,8 +27,7 @@ enum { /* coefficients of runs, float32 */
     RUN_V = RUN_U + 3,
     RUN_COLOR = RUN_V + 3,
     RUN_GRADIENT = RUN_COLOR + 9,    /* per column and per row: of sum(E q), sum(E q u), sum(E q v) */
-    RUN_AREA = RUN_GRADIENT + 6,     /* sum(E): positive where the front is seen */
-    N_RUN_FLOATS = RUN_AREA + 1,
+    N_RUN_FLOATS = RUN_GRADIENT + 6,
 };
 enum { RUN_E1, RUN_E2, RUN_STEP1, RUN_STEP2, RUN_SUM, RUN_MATERIAL, RUN_ID, RUN_SPECIAL, N_RUN_INTS };
 
@@ -47,8 +46,9 @@ typedef struct {
     int n_runs, n_special;
     int first_run[TL_SPAN]; /* of each vector: how many runs have begun before it */
     unsigned starts[TL_SPAN], visible[TL_SPAN];
-    int32_t ints[N_RUN_INTS][TL_SPAN_ROOM];
-    float floats[N_RUN_FLOATS][TL_SPAN_ROOM];
+    /* vectors of runs begin with a cache line: one across two takes twice as long */
+    _Alignas(64) int32_t ints[N_RUN_INTS][TL_SPAN_ROOM];
+    _Alignas(64) float floats[N_RUN_FLOATS][TL_SPAN_ROOM];
     special_run special[TL_SPAN];
 } shade_runs;
 
@@ -165,7 +165,6 @@ TL_INLINE void set_attributes(shade_runs *s, int slot, const run_setup *r)
 {
     const tl_shading *shading = s->shading;
     const vf *q = r->q;
-    put(s, RUN_AREA, slot, r->area);
     if (shading->face_normals) {
         set_face_normals(s, slot, r->area);
     } else if (s->needs_normal) {
