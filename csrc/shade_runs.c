@@ -43,6 +43,8 @@ typedef struct {
     const tl_shading *shading;
     const tl_view *view;
     int needs_q, needs_normal, needs_uv, needs_colors, needs_point; /* whether anything that is shown depends on it */
+    int is_grey;                       /* the light is that of shade_grey.c: per channel the line and the root of its colour */
+    float grey_line[3], grey_root[3];
     int n_runs, n_special;
     int first_run[TL_SPAN]; /* of each vector: how many runs have begun before it */
     unsigned starts[TL_SPAN], visible[TL_SPAN];
