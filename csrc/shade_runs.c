@@ -91,7 +91,7 @@ TL_INLINE void run_corners(const shade_runs *s, int slot, int32_t corners[3][TL_
             c[k + 1] = vi_load(own[k]);
     }
     for (int k = 0; k < 3; k++)
-        vi_store(corners[k], vi_max(vi_min(c[k + 1], last), zero));
+        vi_spill(corners[k], vi_max(vi_min(c[k + 1], last), zero));
 }
 
 TL_INLINE void put(shade_runs *s, int coefficient, int slot, vf a) { vf_store(s->floats[coefficient] + slot, a); }
@@ -106,7 +106,7 @@ TL_INLINE void put_three(shade_runs *s, int first, int slot, const vf *q, vf a0,
 
 /* What TL_LANES runs have in common with their triangles. */
 typedef struct {
-    int32_t corners[3][TL_MAX_LANES];
+    _Alignas(64) int32_t corners[3][TL_MAX_LANES];
     vf q[3], normal[3][3], area, col_step[3], row_step[3];
 } run_setup;
 
