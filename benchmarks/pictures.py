@@ -5,6 +5,8 @@ In: the scenes of `pictures_scenes.py`. Out: a record of counts and grey levels,
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, TextIO
 
@@ -17,7 +19,7 @@ from benchmarks.pictures_scenes import SCENES, SIZE, PictureScene, draw
 SNAP_PX = 2.0**-8
 """Either renderer moves a corner by half a sub-pixel of 2^-8 in x and in y, 0.71 of 2^-8 px; the rest is for float32."""
 
-CONTRAST = 16
+CONTRAST = 64
 GAP_PX = 6
 
 
@@ -48,7 +50,7 @@ def run_pictures(log: TextIO, names: list[str], folder: Path | None = None) -> d
         scene = SCENES[name]()
         ours, theirs = Drawn(*draw(scene)), Drawn(*peer.draw(scene))
         rows.append({"scene": name, "what": scene.what, "n_triangles": len(scene.mesh.triangles)})
-        rows[-1] |= compare(ours, theirs, pixel_corners(scene)) | {"bound": scene.bound}
+        rows[-1] |= compare(ours, theirs, partial(outline_px, scene)) | {"bound": scene.bound}
         print(f"{name}: mean {rows[-1]['mean']}, {rows[-1]['n_unexplained']} pixels unexplained", file=log)
         if folder is not None:
             write_sheet(sheet_path(folder, name), ours.color, theirs.color)
@@ -65,19 +67,29 @@ def run_pictures(log: TextIO, names: list[str], folder: Path | None = None) -> d
     }
 
 
-def pixel_corners(scene: PictureScene) -> np.ndarray:
-    """Where the corners of the triangles lie, in pixels, not snapped: (T, 3, 2) float64."""
-    return scene.camera.project(scene.mesh.vertices, SIZE)[scene.mesh.triangles][..., :2]
+def outline_px(scene: PictureScene, triangle: int) -> np.ndarray:
+    """The corners (N, 2) float64 of a triangle in pixels, not snapped: what the near plane leaves of it."""
+    mesh, (width, height) = scene.mesh, SIZE
+    clip = np.c_[mesh.vertices[mesh.triangles[triangle]], np.ones(3)] @ scene.camera.clip_from_world(SIZE).T
+    distance = clip[:, 2] + clip[:, 3]
+    corners = []
+    for a, b, at_a, at_b in zip(clip, np.roll(clip, -1, axis=0), distance, np.roll(distance, -1), strict=True):
+        if at_a >= 0:
+            corners.append(a)
+        if (at_a < 0) != (at_b < 0):
+            corners.append(a + at_a / (at_a - at_b) * (b - a))
+    x, y, _, w = np.array(corners).T
+    return np.stack([(x / w + 1) * width / 2, (1 - y / w) * height / 2], -1)
 
 
-def compare(ours: Drawn, theirs: Drawn, corners_px: np.ndarray) -> dict[str, Any]:
+def compare(ours: Drawn, theirs: Drawn, outline_of: Callable[[int], np.ndarray]) -> dict[str, Any]:
     """Count what differs.
 
     Parameters
     ----------
     ours, theirs : Drawn
-    corners_px : (T, 3, 2) float64
-        The triangles in pixels.
+    outline_of : function
+        The corners (N, 2) float64 of a triangle, pixels.
 
     Returns
     -------
@@ -90,10 +102,12 @@ def compare(ours: Drawn, theirs: Drawn, corners_px: np.ndarray) -> dict[str, Any
     """
     is_inside = inside(ours.triangle, theirs.triangle)
     difference = np.abs(ours.color.astype(int) - theirs.color)[is_inside]
-    rows, cols = np.nonzero(ours.triangle != theirs.triangle)
-    pairs = ours.triangle[rows, cols], theirs.triangle[rows, cols]
-    centers = np.stack([cols, rows], -1) + 0.5
-    distance = np.min([distance_to_edges(centers, ids, corners_px) for ids in pairs], axis=0)
+    distance = np.array(
+        [
+            min(distance_to_edges(np.array([column, row]) + 0.5, outline_of(i)) for i in pair if i >= 0)
+            for row, column, *pair in differing(ours.triangle, theirs.triangle)
+        ]
+    )
     n_coverage = int(((ours.triangle < 0) != (theirs.triangle < 0)).sum())
     return {
         "n_inside": int(is_inside.sum()),
@@ -101,10 +115,16 @@ def compare(ours: Drawn, theirs: Drawn, corners_px: np.ndarray) -> dict[str, Any
         "max": int(difference.max()),
         "n_other": int(difference.any(axis=1).sum()),
         "n_coverage": n_coverage,
-        "n_triangle": len(rows) - n_coverage,
+        "n_triangle": len(distance) - n_coverage,
         "max_distance_px": round(float(distance.max(initial=0.0)), 6),
         "n_unexplained": int((distance > SNAP_PX).sum()),
     }
+
+
+def differing(ours: np.ndarray, theirs: np.ndarray) -> list[list[int]]:
+    """Row, column and both triangles of the pixels that show different ones."""
+    rows, columns = np.nonzero(ours != theirs)
+    return np.stack([rows, columns, ours[rows, columns], theirs[rows, columns]], -1).tolist()
 
 
 def inside(*ids: np.ndarray) -> np.ndarray:
@@ -115,15 +135,12 @@ def inside(*ids: np.ndarray) -> np.ndarray:
     return np.logical_and.reduce([*windows, *(one == ids[0] for one in ids[1:])])
 
 
-def distance_to_edges(points: np.ndarray, ids: np.ndarray, corners_px: np.ndarray) -> np.ndarray:
-    """Distance (P,) of points (P, 2) to the nearest edge of the triangle that each names; infinite for -1."""
-    a = corners_px[ids]
-    b = np.roll(a, -1, axis=1)
-    along, to_point = b - a, points[:, None] - a
-    length2 = (along**2).sum(-1)
-    share = np.clip((to_point * along).sum(-1) / np.maximum(length2, np.finfo(float).tiny), 0, 1)
-    distance = np.linalg.norm(to_point - share[..., None] * along, axis=-1).min(axis=1)
-    return np.where(ids < 0, np.inf, distance)
+def distance_to_edges(point: np.ndarray, corners: np.ndarray) -> float:
+    """Distance of a point (2,) to the nearest edge of a polygon (N, 2)."""
+    along = np.roll(corners, -1, axis=0) - corners
+    to_point = point - corners
+    share = np.clip((to_point * along).sum(-1) / np.maximum((along**2).sum(-1), np.finfo(float).tiny), 0, 1)
+    return float(np.linalg.norm(to_point - share[:, None] * along, axis=-1).min())
 
 
 def sheet_path(folder: Path, name: str) -> Path:

@@ -13,7 +13,7 @@ import numpy as np
 
 import topleft as tl
 
-SIZE = (360, 300)
+SIZE = (320, 256)
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,12 +25,14 @@ class PictureScene:
     what : str
         For the reader of the table.
     mesh : Mesh
-        With at most one material.
+        In the world, with at most one material: what OpenGL draws.
     camera : Camera
     options : dict
         Further options of `tl.render`.
     bound : float
         Grey levels: how large the mean difference inside may be.
+    placed : Scene, optional
+        What topleft draws instead: the same triangles as instances.
     """
 
     what: str
@@ -38,6 +40,7 @@ class PictureScene:
     camera: tl.Camera
     options: dict[str, Any] = field(default_factory=dict)
     bound: float = 1.0
+    placed: tl.Scene | None = None
 
     @property
     def material(self) -> tl.Material:
@@ -46,10 +49,10 @@ class PictureScene:
 
 
 def draw(scene: PictureScene) -> tuple[np.ndarray, np.ndarray]:
-    """Return the picture (H, W, 3) uint8 and the ids (H, W) int32 of topleft."""
-    background = (255, 255, 255)
-    picture = tl.render(scene.mesh, scene.camera, SIZE, background=background, **scene.options)
-    return picture[..., :3], tl.rasterize_mesh(scene.mesh, scene.camera, SIZE).triangle
+    """Return the picture (H, W, 3) uint8 on white and the ids (H, W) int32 of topleft."""
+    subject = scene.placed or scene.mesh
+    picture = tl.render(subject, scene.camera, SIZE, background=(255, 255, 255), **scene.options)
+    return picture[..., :3], tl.rasterize_mesh(subject, scene.camera, SIZE).id
 
 
 def tiles(side: int = 64) -> np.ndarray:
@@ -84,7 +87,7 @@ def uv_of_cube(vertices: np.ndarray, turns: float) -> np.ndarray:
 
 def cube_camera() -> tl.Camera:
     """From close by, so that perspective is strong."""
-    return tl.Camera.look_at((2.1, 1.7, 2.4), (0, -0.1, 0), fov_y_deg=52)
+    return tl.Camera.look_at((2.1, 1.7, 2.4), (0, -0.15, 0), fov_y_deg=58)
 
 
 def aspect() -> float:
@@ -129,14 +132,60 @@ def lights() -> PictureScene:
 
 
 def back_faces() -> PictureScene:
-    """A bowl: the back of its triangles has a colour of its own, and normals turned to the viewer."""
-    vertices, triangles = tl.scenes.shape("sphere")
-    is_below = vertices[triangles][..., 1].max(axis=1) < 0.35
+    """Half a ring: the back of its triangles has a colour of its own, and normals turned to the viewer."""
+    vertices, triangles = tl.scenes.shape("torus")
+    is_behind = vertices[triangles][..., 2].max(axis=1) < 1e-9
     material = tl.Material((90, 130, 200), specular=0.4, shininess=60, back_color=(230, 140, 70))
-    mesh = tl.Mesh(vertices, triangles[is_below], vertices, materials=[material])
-    camera = tl.Camera.framing(mesh, aspect=aspect(), elevation_deg=32)
+    mesh = tl.Mesh(vertices, triangles[is_behind], materials=[material])
+    camera = tl.Camera.look_at((0.9, 1.0, 3.4), (0, 0, -0.4), fov_y_deg=36)
     sun = [tl.Light((1, 2, 1.5), intensity=0.9)]
-    return PictureScene("bowl, both sides, Blinn-Phong", mesh, camera, {"lights": sun, "ambient": 0.1})
+    return PictureScene("half a torus, both sides, Blinn-Phong", mesh, camera, {"lights": sun, "ambient": 0.1})
+
+
+def near_plane() -> PictureScene:
+    """Cut by the near plane, through which the inside shows."""
+    material = tl.Material((170, 190, 110), specular=0.3, shininess=30, back_color=(190, 90, 90))
+    mesh = tl.Mesh(*tl.scenes.shape("torus-knot", segments=96, sections=16), materials=[material])
+    camera = tl.Camera.look_at((0.8, 0.9, 2.6), fov_y_deg=66, near=2.45, far=10)
+    sun = [tl.Light((1, 2, 1.5), intensity=0.8), tl.Light((-2, 0, 2), "point", intensity=0.6, falloff=0.1)]
+    return PictureScene("torus knot, cut by the near plane", mesh, camera, {"lights": sun, "ambient": 0.1})
+
+
+def instances() -> PictureScene:
+    """A scene: one mesh turned and made smaller, mirrored, and stretched, under lights that stand in the world."""
+    material = tl.Material((210, 180, 120), specular=0.5, shininess=30, back_color=(60, 200, 90))
+    mesh = tl.Mesh(*tl.scenes.shape("torus-knot", segments=256, sections=24), materials=[material])
+    turned = place((0.6, 0.6, 0.6), (-1.2, 0.55, 0), turn_deg=70)
+    mirrored = place((-0.6, 0.6, 0.6), (1.1, 0.5, 0), turn_deg=20)
+    stretched = place((1.0, 0.35, 0.5), (0, -0.75, 0.3), turn_deg=-25)
+    placed = tl.Scene([(mesh, matrix) for matrix in (turned, mirrored, stretched)])
+    camera = tl.Camera.look_at((0.4, 0.9, 5.2), (0, -0.05, 0), fov_y_deg=38)
+    lights = [tl.Light((1, 2, 1.5), intensity=0.5), tl.Light((0, 0.9, 1.2), "point", (255, 190, 120), 2.0, falloff=0.7)]
+    options = {"lights": lights, "ambient": 0.08}
+    return PictureScene("three torus knots, instances", joined(placed), camera, options, placed=placed)
+
+
+def place(scale: tuple[float, float, float], at: tuple[float, float, float], *, turn_deg: float) -> np.ndarray:
+    """World from object (4, 4): scaled, turned about y, moved."""
+    turn, matrix = np.radians(turn_deg), np.eye(4)
+    matrix[:3, :3] = np.array([[np.cos(turn), 0, np.sin(turn)], [0, 1, 0], [-np.sin(turn), 0, np.cos(turn)]]) * scale
+    matrix[:3, 3] = at
+    return matrix
+
+
+def joined(scene: tl.Scene) -> tl.Mesh:
+    """The instances of a scene as one mesh in the world, its triangles in the same order, of the first one's materials."""
+    vertices, normals, triangles = [], [], []
+    for instance in scene:
+        linear, mesh = instance.transform[:3, :3], instance.mesh
+        n_before = sum(map(len, vertices))
+        order = slice(None, None, -1) if np.linalg.det(linear) < 0 else slice(None)  # the outside stays outside
+        triangles.append(mesh.triangles[:, order] + n_before)
+        vertices.append(mesh.vertices @ linear.T + instance.transform[:3, 3])
+        own = mesh.vertex_normals() @ np.linalg.inv(linear)
+        normals.append(own / np.linalg.norm(own, axis=1, keepdims=True))
+    arrays = map(np.concatenate, (vertices, triangles, normals))
+    return tl.Mesh(*arrays, materials=scene[0].mesh.materials)
 
 
 def matcap() -> PictureScene:
@@ -166,8 +215,8 @@ def bilinear() -> PictureScene:
 def trilinear() -> PictureScene:
     """Many texels in a pixel, seen at an angle."""
     vertices, triangles = tl.scenes.shape("torus")
-    material = tl.Material(texture=tl.Texture(tiles(128), "trilinear"))
-    mesh = tl.Mesh(vertices, triangles, uv=3 * vertices[:, [0, 2]], materials=[material])
+    material = tl.Material(texture=tl.Texture(tiles(64), "trilinear"))
+    mesh = tl.Mesh(vertices, triangles, uv=2 * vertices[:, [0, 2]], materials=[material])
     camera = tl.Camera.framing(mesh, aspect=aspect(), elevation_deg=30)
     return PictureScene("torus, trilinear, repeat", mesh, camera, bound=TRILINEAR_BOUND)
 
@@ -181,6 +230,8 @@ SCENES: Mapping[str, Callable[[], PictureScene]] = {
     "vertex-colors": vertex_colors,
     "lights": lights,
     "back-faces": back_faces,
+    "near-plane": near_plane,
+    "instances": instances,
     "matcap": matcap,
     "nearest": nearest,
     "bilinear": bilinear,
