@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from benchmarks.report import number, table
@@ -130,7 +130,7 @@ PARTS: dict[str, Callable[[Record], str]] = {
 """What the markers `<!-- table: NAME -->` of a page stand for."""
 
 
-def with_parts(text: str, record: Record) -> str:
+def with_parts(text: str, record: Record, parts: Mapping[str, Callable[[Record], str]] = PARTS) -> str:
     """Return a page with what stands between its markers made anew.
 
     Raises
@@ -138,7 +138,7 @@ def with_parts(text: str, record: Record) -> str:
     ValueError
         If a part has no marker in the page.
     """
-    for name, make in PARTS.items():
+    for name, make in parts.items():
         head, start, rest = text.partition(f"<!-- table: {name} -->\n")
         _, end, tail = rest.partition("<!-- end -->")
         if not end:

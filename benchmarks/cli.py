@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks import accuracy, accuracy_tables, report
+from benchmarks import accuracy, accuracy_tables, report, smooth_tables
 from benchmarks.cases import CASES, TRIALS
 from benchmarks.contestants import known_peers
 from benchmarks.peers import PEERS
@@ -72,7 +72,7 @@ def parser() -> argparse.ArgumentParser:
     add.set_defaults(action=samplings_command)
     add.add_argument("-o", "--out", type=Path, default=Path("docs/images"), metavar="FOLDER")
 
-    add = commands.add_parser("document", help="write the tables of an accuracy record into a page")
+    add = commands.add_parser("document", help="write the tables of a record into its page")
     add.set_defaults(action=document_command)
     add.add_argument("file", type=Path, metavar="FILE.json")
     add.add_argument("page", type=Path, metavar="PAGE.md")
@@ -199,8 +199,9 @@ def samplings_command(arguments: argparse.Namespace) -> int:
 
 def document_command(arguments: argparse.Namespace) -> int:
     """Replace what stands between the markers of a page."""
-    text = arguments.page.read_text(encoding="utf-8")
-    page = accuracy_tables.with_parts(text, json.loads(arguments.file.read_text()))
+    text, record = arguments.page.read_text(encoding="utf-8"), json.loads(arguments.file.read_text())
+    parts = accuracy_tables.PARTS if record.get("kind") == "accuracy" else smooth_tables.PARTS
+    page = accuracy_tables.with_parts(text, record, parts)
     arguments.page.write_text(page, encoding="utf-8")
     return 0
 

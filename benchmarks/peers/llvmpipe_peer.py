@@ -12,7 +12,9 @@ from benchmarks.cases import Scene
 from benchmarks.peers import Drawing
 
 MODULE = DISTRIBUTION = "moderngl"
-TASKS = ("visibility", "depth-2d", "mask", "fill", "labels")
+TASKS = ("visibility", "depth-2d", "mask", "fill", "labels", "smooth")
+SAMPLES = 4
+"""Of a smooth picture; llvmpipe has no more."""
 THREADS = True
 
 VERTEX_SHADER = """
@@ -71,13 +73,16 @@ def prepare(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
     if "llvmpipe" not in context.info["GL_RENDERER"]:
         raise RuntimeError(f"OpenGL runs on {context.info['GL_RENDERER']}, not on llvmpipe")
     width, height = scene.size
-    position = np.zeros((len(scene.vertices), 3), np.float32)
-    position[:, : scene.vertices.shape[1]] = scene.vertices
-    indices = np.ascontiguousarray(scene.triangles, np.int32)
+    vertices, triangles = scene.vertices, scene.triangles
+    if scene.task == "smooth":  # corners of its own for every triangle: a colour per vertex is then one per triangle
+        vertices, triangles = vertices[triangles].reshape(-1, 2), np.arange(3 * len(triangles)).reshape(-1, 3)
+    position = np.zeros((len(vertices), 3), np.float32)
+    position[:, : vertices.shape[1]] = vertices
+    indices = np.ascontiguousarray(triangles, np.int32)
     with_depth = scene.task in ("visibility", "depth-2d")
     source, shader = VERTEX_SHADER, ID_SHADER
     buffers = [(context.buffer(position.tobytes()), "3f", "position")]
-    if scene.task == "fill":  # every triangle has corners of its own here, so a colour per vertex is one per triangle
+    if scene.task in ("fill", "smooth"):
         source, shader = VERTEX_SHADER.replace("#version 330", "#version 330\n#define COLORED"), COLOR_SHADER
         colors = np.zeros((len(position), 4), np.uint8)
         colors[indices, :3] = scene.colors[:, None]
@@ -88,11 +93,14 @@ def prepare(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
     program["clip_from_input"].write(clip_from_input(scene).T.astype("f4").tobytes())
     mesh = context.vertex_array(program, buffers, context.buffer(indices.tobytes()))
 
-    n_channels, dtype = {"fill": (4, "f1"), "mask": (1, "f1")}.get(scene.task, (1, "i4"))
+    n_channels, dtype = {"fill": (4, "f1"), "smooth": (4, "f1"), "mask": (1, "f1")}.get(scene.task, (1, "i4"))
     target = context.texture(scene.size, n_channels, dtype=dtype)
     depth_target = context.depth_texture(scene.size) if with_depth else None
     frame = context.framebuffer([target], depth_target)
-    frame.use()
+    drawn = frame
+    if scene.task == "smooth":
+        drawn = context.framebuffer([context.renderbuffer(scene.size, n_channels, samples=SAMPLES, dtype=dtype)])
+    drawn.use()
     culling = moderngl.CULL_FACE if scene.cull == "back" else moderngl.NOTHING
     context.enable_only(culling | (moderngl.DEPTH_TEST if with_depth else moderngl.NOTHING))
     context.front_face = "cw"  # turned over
@@ -100,19 +108,22 @@ def prepare(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
     depth = np.ones((height, width), np.float32)
 
     def draw() -> None:
-        frame.clear(0, 0, 0, 0, depth=1.0)
+        drawn.clear(0, 0, 0, 0, depth=1.0)
         mesh.render(moderngl.TRIANGLES)
+        if drawn is not frame:
+            context.copy_framebuffer(frame, drawn)
+            drawn.use()
         frame.read_into(picture, components=n_channels, dtype=dtype, alignment=1)
         if with_depth:
             frame.read_into(depth, components=1, attachment=-1, dtype="f4", alignment=1)
 
     def result() -> dict[str, np.ndarray]:
-        if scene.task == "fill":
+        if scene.task in ("fill", "smooth"):
             return {"color": picture[..., :3]}
         if scene.task == "mask":
             return {"mask": picture[..., 0] > 0}
         ids = picture[..., 0] - 1
         return {"triangle": ids, **({"depth": np.where(ids < 0, np.float32(np.inf), depth)} if with_depth else {})}
 
-    gives = {"fill": "RGBA", "mask": "mask", "labels": "id"}.get(scene.task, "id + depth")
-    return Drawing(draw, result, gives, "upload")
+    gives = {"fill": "RGBA", "smooth": f"RGBA, {SAMPLES} samples", "mask": "mask", "labels": "id"}
+    return Drawing(draw, result, gives.get(scene.task, "id + depth"), "upload")

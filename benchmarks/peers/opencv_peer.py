@@ -8,7 +8,7 @@ from benchmarks.cases import Scene
 from benchmarks.peers import Drawing
 
 MODULE, DISTRIBUTION = "cv2", "opencv-python-headless"
-TASKS = ("visibility", "mask", "fill", "labels")
+TASKS = ("visibility", "mask", "fill", "labels", "smooth")
 SHIFT = 8
 
 
@@ -22,7 +22,8 @@ def prepare(scene: Scene, threads: int) -> Drawing:
     width, height = scene.size
     corners = np.rint((scene.vertices[:, :2] - 0.5) * (1 << SHIFT)).astype(np.int32)[scene.triangles]
     polygons = list(corners)
-    if scene.task == "fill":
+    line = cv2.LINE_AA if scene.task == "smooth" else cv2.LINE_8
+    if scene.task in ("fill", "smooth"):
         canvas, values = np.zeros((height, width, 3), np.uint8), scene.colors.tolist()
     elif scene.task == "labels":
         canvas, values = np.zeros((height, width), np.int32), list(range(len(polygons)))
@@ -33,10 +34,10 @@ def prepare(scene: Scene, threads: int) -> Drawing:
     def draw() -> None:
         canvas.fill(background)
         for polygon, value in zip(polygons, values, strict=True):
-            cv2.fillConvexPoly(canvas, polygon, value, cv2.LINE_8, SHIFT)
+            cv2.fillConvexPoly(canvas, polygon, value, line, SHIFT)
 
-    name = {"fill": "color", "labels": "triangle"}.get(scene.task, "mask")
-    gives = {"fill": "RGB", "labels": "id"}.get(scene.task, "mask")
+    name = {"fill": "color", "smooth": "color", "labels": "triangle"}.get(scene.task, "mask")
+    gives = {"fill": "RGB", "smooth": "RGB", "labels": "id"}.get(scene.task, "mask")
     return Drawing(draw, lambda: {name: canvas > 0 if name == "mask" else canvas}, gives, "snap, split into polygons")
 
 

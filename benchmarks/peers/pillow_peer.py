@@ -1,4 +1,4 @@
-"""Pillow: ImageDraw.polygon, a call a triangle. It draws the outline too."""
+"""Pillow: ImageDraw.polygon, a call a triangle; it draws the outline too. Smooth: 4 x 4 as large, then reduced."""
 
 from __future__ import annotations
 
@@ -8,35 +8,42 @@ from benchmarks.cases import Scene
 from benchmarks.peers import Drawing
 
 MODULE, DISTRIBUTION = "PIL", "pillow"
-TASKS = ("mask", "fill", "labels")
+TASKS = ("mask", "fill", "labels", "smooth")
+SUPERSAMPLING = 4
 
 
 def prepare(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
     """Pixel centres lie on integers, so vertices move by half a pixel."""
     from PIL import Image, ImageDraw
 
-    polygons = (scene.vertices[:, :2] - 0.5)[scene.triangles].reshape(-1, 6).tolist()
-    mode = {"fill": "RGB", "labels": "I"}.get(scene.task, "L")
+    is_smooth = scene.task == "smooth"
+    scale = SUPERSAMPLING if is_smooth else 1
+    polygons = (scene.vertices[:, :2] * scale - 0.5)[scene.triangles].reshape(-1, 6).tolist()
+    mode = {"fill": "RGB", "smooth": "RGB", "labels": "I"}.get(scene.task, "L")
     values = [255] * len(polygons)
-    if scene.task == "fill":
+    if scene.task in ("fill", "smooth"):
         values = list(map(tuple, scene.colors.tolist()))
     elif scene.task == "labels":
         values = list(range(len(polygons)))
     background = -1 if scene.task == "labels" else 0
-    image = Image.new(mode, scene.size, background)
-    everything = (0, 0, *scene.size)
+    size = (scene.size[0] * scale, scene.size[1] * scale)
+    image = Image.new(mode, size, background)
+    everything = (0, 0, *size)
+    reduced = [image]
 
     def draw() -> None:
         image.paste(background, everything)
         canvas = ImageDraw.Draw(image)
         for polygon, value in zip(polygons, values, strict=True):
             canvas.polygon(polygon, value)
+        if is_smooth:
+            reduced[0] = image.reduce(SUPERSAMPLING)
 
-    name = {"fill": "color", "labels": "triangle"}.get(scene.task, "mask")
-    gives = {"fill": "RGB image", "labels": "id image"}.get(scene.task, "mask image")
+    name = {"fill": "color", "smooth": "color", "labels": "triangle"}.get(scene.task, "mask")
+    gives = {"fill": "RGB image", "smooth": "RGB image", "labels": "id image"}.get(scene.task, "mask image")
     return Drawing(
         draw,
-        lambda: {name: np.asarray(image) > 0 if name == "mask" else np.asarray(image)},
+        lambda: {name: np.asarray(reduced[0]) > 0 if name == "mask" else np.asarray(reduced[0])},
         gives,
         "coordinates to lists",
     )
