@@ -173,7 +173,7 @@ def _register() -> None:
     for n, px in ((1000, 300), (20_000, 40), (200_000, 8)):
         make = lambda n=n, px=px: random_scene("fill", n, px)  # noqa: E731
         add(Case(f"fill-{n}x{px}", "fill", make, aliases=(f"rand{n}_{px}",)))
-    add(Case("fill-4k", "fill", lambda: large_scene("fill")))
+    add(Case("fill-4k", "fill", lambda: large_scene("fill"), aliases=("rgba-4k",)))
     add(Case("labels-planar", "labels", planar_scene, aliases=("planar100000",)))
     for n, px in ((1000, 300), (20_000, 40), (200_000, 8)):
         add(Case(f"smooth-{n}x{px}", "smooth", lambda n=n, px=px: random_scene("smooth", n, px)))

@@ -31,6 +31,22 @@ def test_fill_of_few_triangles_shows_the_later_one(n, channels):
     assert (ids >= 0).any()
 
 
+def test_fill_of_few_triangles_one_number_a_pixel():
+    vertices, triangles, colors = few_triangles(5, 1)
+    picture = tl.fill(vertices, triangles, colors[:, 0], SIZE, background=7)
+    assert (picture == tl.fill(vertices, triangles, colors, SIZE, background=7)[..., 0]).all()
+
+
+@pytest.mark.parametrize("options", [{"blend": "over", "sampling": "area"}, {"blend": "multiply"}])
+@pytest.mark.parametrize("n", [3, 70])
+def test_fill_blends_over_the_background_as_over_a_picture(n, options):
+    vertices, triangles, colors = few_triangles(n, 4)
+    out = np.full((*SIZE[::-1], 4), 200, np.uint8)
+    tl.fill(vertices, triangles, colors, SIZE, per="triangle", out=out, **options)
+    picture = tl.fill(vertices, triangles, colors, SIZE, per="triangle", background=200, **options)
+    assert (picture == out).all()
+
+
 @pytest.mark.parametrize("threads", [1, 3])
 def test_fill_of_few_triangles_keeps_out_where_nothing_is(threads):
     vertices, triangles, colors = few_triangles(9, 4)

@@ -81,7 +81,7 @@ def blend_colors(
     packed = memory.empty("packed", (height * width,), np.int32) if is_u8 and n_channels != 4 else None
     n_cells = _engine.blend_cells(width)
     cells = memory.constant("cells", n_parts * n_cells, _engine.CELL_CLEAR) if blending.by_area else None
-    under = None if ground is None else _engine.as_bytes(np.full(pixels.shape[2:], ground))
+    under = None if ground is None else _engine.as_bytes(np.full(pixels.shape[2:] or 1, ground))
     code, is_premultiplied = BLEND_CODES[blending.mode], blending.alpha is Alpha.PREMULTIPLIED
 
     def blend_part(i: int, _: int) -> int:

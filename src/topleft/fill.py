@@ -66,15 +66,15 @@ def draw_fill(
         if ground is None and out is None:
             ground = np.zeros((), palette.dtype)
         is_drawn = bool(canvas.size and snapped.n_triangles)
-        if is_drawn and is_direct(palette, snapped, view, blending, is_flat=is_flat):
-            blend(memory, snapped, view, palette, canvas, blending, transfer, is_flat=True, ground=ground)
-            return result
-        if ground is not None:
+        is_blended = blending.is_needed or is_direct(palette, snapped, view, is_flat=is_flat)
+        can_lay = is_drawn and is_blended and palette.dtype == np.uint8 and view.sampling.n_samples == 1
+        if ground is not None and not can_lay:
             lay_ground(canvas, ground)
+            ground = None
         if not is_drawn:
             pass
-        elif blending.is_needed:
-            blend(memory, snapped, view, palette, canvas, blending, transfer, is_flat=is_flat)
+        elif is_blended:
+            blend(memory, snapped, view, palette, canvas, blending, transfer, is_flat=is_flat, ground=ground)
         elif view.sampling.n_samples > 1:
             paint_samples(memory, snapped, view, palette, canvas, transfer, is_flat=is_flat)
         else:
@@ -110,13 +110,13 @@ def lay_ground(pixels: NDArray[Any], ground: NDArray[Any]) -> None:
     pixels[1:] = pixels[:1]
 
 
-def is_direct(palette: NDArray[Any], snapped: Snapped, view: View, blending: Blending, *, is_flat: bool) -> bool:
+def is_direct(palette: NDArray[Any], snapped: Snapped, view: View, *, is_flat: bool) -> bool:
     """Tell whether colours are best stored triangle by triangle, without labels in between.
 
     Labels cost a pass to clear and one to colour them, and less a triangle.
     """
     width, height = view.size
-    is_plain = is_flat and palette.dtype == np.uint8 and view.sampling.n_samples == 1 and not blending.is_needed
+    is_plain = is_flat and palette.dtype == np.uint8 and view.sampling.n_samples == 1
     return is_plain and snapped.n_triangles * MIN_PIXELS_A_TRIANGLE <= width * height
 
 
@@ -179,7 +179,7 @@ def blend(
 ) -> None:
     """Blend coloured triangles into contiguous pixels; with several samples a pixel each is a picture of its own.
 
-    `ground`, with one sample a pixel: the colour that all pixels get before.
+    `ground`, for uint8 with one sample a pixel: the colour that all pixels get before.
     """
     n_threads = count_threads(view.threads, snapped.n_triangles)
     if view.sampling.n_samples == 1:
