@@ -50,8 +50,8 @@ TL_INLINE int64_t even_words(const uint64_t *words, int64_t n)
     return k;
 }
 
-/* The bytes of the samples [at, at + n).  Long runs of one value take no more than `memset`: half of a frame of 8 MB in one
- * triangle 0.09 ms instead of 0.16. */
+/* The bytes of the samples [at, at + n).  Long runs of one value are left to `memset`: an empty frame of 8 MB takes 0.15 ms
+ * instead of 0.19. */
 static void expand_span(const tl_target *target, int64_t at, int64_t n)
 {
     uint8_t *const pixels = target->pixels;

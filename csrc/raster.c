@@ -212,24 +212,10 @@ static void clear(const tl_window *window, const tl_target *target)
     }
 }
 
-/* Fewer triangles than these are set up for each band of rows anew, so that what one pass writes is still in the cache when the
- * next one reads it. */
-#define TL_FEW_TRIANGLES 64
-#define TL_BAND_BITS (1 << 18) /* of a mask: half of a frame of 8 MB in one triangle takes 0.13 ms instead of 0.18 */
-
-static int64_t band_rows(const tl_target *target, const tl_share *share)
-{
-    const int64_t fitting = max64(1, (((int64_t)1 << 31) - 1) / target->stride_px);
-    const int is_whole = share->is_first && share->is_last && !share->others;
-    if (target->sink == TL_SINK_MASK && is_whole && share->end - share->first < TL_FEW_TRIANGLES)
-        return max64(1, min64(fitting, TL_BAND_BITS / target->stride_px));
-    return fitting;
-}
-
 static int64_t draw(const tl_scene *scene, const tl_window *window, const tl_target *target, tl_share *share)
 {
     const int64_t pixel_bytes = target->sink == TL_SINK_MASK ? 1 : 4;
-    const int64_t rows_at_once = band_rows(target, share);
+    const int64_t rows_at_once = max64(1, (((int64_t)1 << 31) - 1) / target->stride_px);
     for (int64_t row = 0; row < window->height; row += rows_at_once) {
         tl_window band = *window;
         tl_target part = *target;
