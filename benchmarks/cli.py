@@ -1,4 +1,4 @@
-"""The command line: `python -m benchmarks run`, `accuracy`, `report`, `charts`, `samplings`, `document`, `list`."""
+"""The command line: `python -m benchmarks run`, `accuracy`, `atlas`, `report`, `charts`, `samplings`, and the rest."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks import accuracy, accuracy_tables, report, smooth_tables
+from benchmarks import accuracy, accuracy_tables, atlas_page, report, smooth_tables
 from benchmarks.cases import CASES, TRIALS
 from benchmarks.contestants import known_peers
 from benchmarks.peers import PEERS
@@ -63,7 +63,15 @@ def parser() -> argparse.ArgumentParser:
     add.add_argument("--scale", type=float, default=1.0, metavar="X", help="of the numbers of triangles timed (1)")
     add.add_argument("-o", "--out", type=Path, metavar="FILE.json")
 
-    add = commands.add_parser("charts", help="draw the charts of an accuracy record, PNG and SVG")
+    add = commands.add_parser("atlas", help="map where each method fails")
+    add.set_defaults(action=atlas_command)
+    add.add_argument("--method", nargs="+", metavar="NAME", default=[], help="rows; all unless given")
+    add.add_argument("--family", nargs="+", metavar="NAME", default=[], help="families of scenes; all unless given")
+    add.add_argument("--scenes", type=Path, metavar="FILE.py",
+                     help="shrink the first failures and write them into src/topleft/failure_scenes.py")  # fmt: skip
+    add.add_argument("-o", "--out", type=Path, metavar="FILE.json")
+
+    add = commands.add_parser("charts", help="draw the charts of an accuracy record or an atlas, PNG and SVG")
     add.set_defaults(action=charts_command)
     add.add_argument("file", type=Path, metavar="FILE.json")
     add.add_argument("-o", "--out", type=Path, default=Path("docs/images"), metavar="FOLDER")
@@ -154,7 +162,7 @@ def report_command(arguments: argparse.Namespace) -> int:
     """Print tables of records."""
     for path in arguments.files:
         record = json.loads(path.read_text())
-        tables = accuracy_tables if record.get("kind") == "accuracy" else report
+        tables = {"accuracy": accuracy_tables, "atlas": atlas_page}.get(record.get("kind"), report)
         print(*tables.lines(record), sep="\n")
     return 0
 
@@ -180,11 +188,31 @@ def accuracy_command(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def atlas_command(arguments: argparse.Namespace) -> int:
+    """Draw, compare, write, print."""
+    from benchmarks import atlas, atlas_shrink
+
+    try:
+        record = atlas.run_atlas(sys.stderr, arguments.family, arguments.method)
+    except ValueError as error:
+        print(f"benchmarks: {error}", file=sys.stderr)
+        return 2
+    if arguments.out:
+        write_record(arguments.out, record)
+    if arguments.scenes:
+        text = atlas_shrink.with_scenes(arguments.scenes.read_text(), atlas_shrink.shrink_all(record))
+        arguments.scenes.write_text(text)
+    print(*atlas_page.lines(record), sep="\n")
+    return 0
+
+
 def charts_command(arguments: argparse.Namespace) -> int:
     """Draw."""
-    from benchmarks.charts import draw_charts  # matplotlib
+    from benchmarks import atlas_charts, charts  # matplotlib
 
-    for path in draw_charts(json.loads(arguments.file.read_text()), arguments.out):
+    record = json.loads(arguments.file.read_text())
+    draw_charts = atlas_charts.draw_charts if record["kind"] == "atlas" else charts.draw_charts
+    for path in draw_charts(record, arguments.out):
         print(path)
     return 0
 
@@ -199,8 +227,9 @@ def samplings_command(arguments: argparse.Namespace) -> int:
 
 def document_command(arguments: argparse.Namespace) -> int:
     """Replace what stands between the markers of a page."""
-    text, record = arguments.page.read_text(encoding="utf-8"), json.loads(arguments.file.read_text())
-    parts = accuracy_tables.PARTS if record.get("kind") == "accuracy" else smooth_tables.PARTS
+    text = arguments.page.read_text(encoding="utf-8")
+    record = json.loads(arguments.file.read_text())
+    parts = {"atlas": atlas_page.PARTS, "accuracy": accuracy_tables.PARTS}.get(record.get("kind"), smooth_tables.PARTS)
     page = accuracy_tables.with_parts(text, record, parts)
     arguments.page.write_text(page, encoding="utf-8")
     return 0
@@ -227,7 +256,7 @@ def write_record(path: Path, record: dict[str, Any]) -> None:
 
 def record_text(record: dict[str, Any]) -> str:
     """JSON; rows of figures take a line each."""
-    if record.get("kind") != "accuracy":
+    if record.get("kind") not in ("accuracy", "atlas"):
         return json.dumps(record, indent=1)
     parts = []
     for key, value in record.items():

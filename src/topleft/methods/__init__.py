@@ -41,7 +41,8 @@ class Claims:
     exact : bool
         Every sample is decided without rounding under the method's own fill rule, for the vertices that it works on.
     watertight : bool
-        Triangles that share edges leave no sample between them out.
+        Triangles that share edges leave no sample between them out; where a method calculates in float32, with
+        corners within 2**22 px (`failure_scenes.py` has what happens far beyond).
     top_left : bool
         A sample on an edge is drawn when the edge is top or left, and not otherwise.
     sub_pixel : bool
