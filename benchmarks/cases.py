@@ -24,7 +24,7 @@ TASKS = {
     "mask": "which pixels are covered",
     "fill": "flat colours in painter's order",
     "labels": "triangle id in painter's order",
-    "smooth": "flat opaque colours in painter's order on black, anti-aliased",
+    "smooth-fill": "flat opaque colours in painter's order on black, anti-aliased",
     "empty": "a call that draws nothing",
 }
 
@@ -113,7 +113,7 @@ def random_scene(task: str, n_triangles: int, size_px: float, size: tuple[int, i
     from topleft import scenes
 
     vertices, triangles, colors = scenes.random_triangles(n_triangles, size_px, *size)
-    if task in ("fill", "smooth"):
+    if task in ("fill", "smooth-fill"):
         return Scene(task, size, np.ascontiguousarray(vertices[:, :2]), triangles, colors=colors)
     return Scene(task, size, vertices, triangles)
 
@@ -132,7 +132,7 @@ def planar_scene(task: str = "labels", n_points: int = 100_000, *, is_white: boo
 
     vertices, triangles = scenes.planar_mesh(n_points, *FULL_HD)
     colors = None
-    if task == "smooth":
+    if task == "smooth-fill":
         colors = np.random.default_rng(7).integers(0, 256, (len(triangles), 3), np.uint8)
         colors = np.full_like(colors, 255) if is_white else colors
     return Scene(task, FULL_HD, vertices, triangles, colors=colors)
@@ -148,7 +148,7 @@ def singles_scene(n_across: int = 15, n_down: int = 10, size_px: int = 40, cell_
     center_px = (cell + 0.5) * cell_px + np.random.default_rng(7).uniform(-0.5, 0.5, (n, 2))
     corners = np.ascontiguousarray(vertices[:, :2] + np.repeat(center_px, 3, axis=0))
     size = (n_across * cell_px, n_down * cell_px)
-    return Scene("smooth", size, corners, triangles, colors=np.full((n, 3), 255, np.uint8))
+    return Scene("smooth-fill", size, corners, triangles, colors=np.full((n, 3), 255, np.uint8))
 
 
 def empty_scene(size: tuple[int, int] = (64, 64)) -> Scene:
@@ -176,15 +176,15 @@ def _register() -> None:
     add(Case("fill-4k", "fill", lambda: large_scene("fill"), aliases=("rgba-4k",)))
     add(Case("labels-planar", "labels", planar_scene, aliases=("planar100000",)))
     for n, px in ((1000, 300), (20_000, 40), (200_000, 8)):
-        add(Case(f"smooth-{n}x{px}", "smooth", lambda n=n, px=px: random_scene("smooth", n, px)))
-    add(Case("smooth-planar", "smooth", lambda: planar_scene("smooth")))
-    add(Case("smooth-4k", "smooth", lambda: large_scene("smooth")))
-    add(Case("smooth-singles", "smooth", singles_scene))
-    add(Case("smooth-seams", "smooth", lambda: planar_scene("smooth", 2000, is_white=True)))
+        add(Case(f"smooth-{n}x{px}", "smooth-fill", lambda n=n, px=px: random_scene("smooth-fill", n, px)))
+    add(Case("smooth-planar", "smooth-fill", lambda: planar_scene("smooth-fill")))
+    add(Case("smooth-4k", "smooth-fill", lambda: large_scene("smooth-fill")))
+    add(Case("smooth-singles", "smooth-fill", singles_scene))
+    add(Case("smooth-seams", "smooth-fill", lambda: planar_scene("smooth-fill", 2000, is_white=True)))
     add(Case("empty", "empty", empty_scene))
     add(Case("tiny", "visibility", lambda: blob_scene(200, size=(64, 48))))
     add(Case("tiny-fill", "fill", lambda: random_scene("fill", 20, 12, (64, 48))))
-    add(Case("tiny-smooth", "smooth", lambda: singles_scene(2, 2, 12, 20)))
+    add(Case("tiny-smooth", "smooth-fill", lambda: singles_scene(2, 2, 12, 20)))
 
 
 _register()

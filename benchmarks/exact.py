@@ -112,7 +112,7 @@ def coverage(picture: Picture) -> NDArray[np.bool_]:
 
 def draw_exact(scene: Scene) -> Picture:
     """The picture that a contestant should draw; nothing where there is no exact one."""
-    if scene.task == "smooth":
+    if scene.task == "smooth-fill":
         is_white = scene.colors is not None and (scene.colors == 255).all()
         return {"area": draw_area(scene.vertices, scene.triangles, scene.size)} if is_white else {}
     width, height = scene.size

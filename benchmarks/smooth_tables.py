@@ -11,7 +11,7 @@ from benchmarks.report import number, ratio, table
 Record = dict[str, Any]
 Run = dict[str, Any]
 
-TASK = "smooth"
+TASK = "smooth-fill"
 SINGLES, SEAMS = "smooth-singles", "smooth-seams"
 """Scenes whose pictures are compared with exact areas."""
 
@@ -56,7 +56,7 @@ def times_text(record: Record) -> str:
 
 def column(scene: dict[str, Any]) -> str:
     """What a scene is called in a table."""
-    return scene["scene"].removeprefix(f"{TASK}-")
+    return scene["scene"].removeprefix("smooth-")
 
 
 def time_text(run: Run | None) -> str:

@@ -46,7 +46,7 @@ def test_exact_picture_of_many_colours_is_none():
 
 
 def test_every_way_takes_part(record):
-    names = [f"topleft {ISA} {way}" for way in load_peer("topleft").WAYS["smooth"]]
+    names = [f"topleft {ISA} {way}" for way in load_peer("topleft").WAYS["smooth-fill"]]
     assert [entry["name"] for entry in record["scenes"][0]["runs"]] == names
 
 
@@ -64,7 +64,7 @@ def test_mesh_has_no_seams_summed_or_sampled(record):
 
 def test_tables_name_each_way_once(record):
     text = smooth_tables.errors_text(record)
-    for way in load_peer("topleft").WAYS["smooth"]:
+    for way in load_peer("topleft").WAYS["smooth-fill"]:
         assert text.count(f"| topleft {ISA} {way} ") == 1
     assert smooth_tables.times_text(record).count("\n") == 4
 

@@ -91,7 +91,7 @@ def test_render_format_is_that_of_the_name(run, suffix):
         ("ids", (48, 64), "i4"),
         ("depth", (48, 64), "f4"),
         ("normals", (48, 64, 3), "f4"),
-        ("smooth", (48, 64, 4), "u1"),
+        ("smooth-fill", (48, 64, 4), "u1"),
         ("flat", (48, 64, 4), "u1"),
     ],
 )

@@ -8,7 +8,7 @@ from benchmarks.cases import Scene
 from benchmarks.peers import Drawing
 
 MODULE = DISTRIBUTION = "aggdraw"
-TASKS = ("smooth",)
+TASKS = ("smooth-fill",)
 
 
 def prepare(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001

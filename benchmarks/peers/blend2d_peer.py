@@ -6,7 +6,7 @@ from benchmarks.cases import Scene
 from benchmarks.peers import Drawing
 
 MODULE, DISTRIBUTION = "blend2d", "blend2d-py"
-TASKS = ("smooth",)
+TASKS = ("smooth-fill",)
 
 
 def prepare(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001

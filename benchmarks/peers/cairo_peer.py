@@ -8,7 +8,7 @@ from benchmarks.cases import Scene
 from benchmarks.peers import Drawing
 
 MODULE, DISTRIBUTION = "cairo", "pycairo"
-TASKS = ("mask", "fill", "labels", "smooth")
+TASKS = ("mask", "fill", "labels", "smooth-fill")
 
 
 def prepare(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
@@ -20,7 +20,7 @@ def prepare(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
     is_mask = scene.task == "mask"
     if is_mask:
         rgb = np.ones((len(polygons), 3))
-    elif scene.task in ("fill", "smooth"):
+    elif scene.task in ("fill", "smooth-fill"):
         rgb = scene.colors / 255
     else:
         rgb = (np.arange(len(polygons))[:, None] + 1 >> np.array([16, 8, 0]) & 255) / 255
@@ -28,7 +28,7 @@ def prepare(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
     layout = cairo.FORMAT_A8 if is_mask else cairo.FORMAT_RGB24
     canvas = np.zeros((height, cairo.ImageSurface.format_stride_for_width(layout, width)), np.uint8)
     context = cairo.Context(cairo.ImageSurface.create_for_data(canvas, layout, width, height))
-    context.set_antialias(cairo.ANTIALIAS_DEFAULT if scene.task == "smooth" else cairo.ANTIALIAS_NONE)
+    context.set_antialias(cairo.ANTIALIAS_DEFAULT if scene.task == "smooth-fill" else cairo.ANTIALIAS_NONE)
 
     def draw() -> None:
         canvas.fill(0)

@@ -12,7 +12,7 @@ from benchmarks.cases import Scene
 from benchmarks.peers import Drawing
 
 MODULE = DISTRIBUTION = "moderngl"
-TASKS = ("visibility", "depth-2d", "mask", "fill", "labels", "smooth")
+TASKS = ("visibility", "depth-2d", "mask", "fill", "labels", "smooth-fill")
 SAMPLES = 4
 """Of a smooth picture; llvmpipe has no more."""
 THREADS = True
@@ -74,7 +74,7 @@ def prepare(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
         raise RuntimeError(f"OpenGL runs on {context.info['GL_RENDERER']}, not on llvmpipe")
     width, height = scene.size
     vertices, triangles = scene.vertices, scene.triangles
-    if scene.task == "smooth":  # corners of its own for every triangle: a colour per vertex is then one per triangle
+    if scene.task == "smooth-fill":  # corners of its own for every triangle: a colour per vertex is one per triangle
         vertices, triangles = vertices[triangles].reshape(-1, 2), np.arange(3 * len(triangles)).reshape(-1, 3)
     position = np.zeros((len(vertices), 3), np.float32)
     position[:, : vertices.shape[1]] = vertices
@@ -82,7 +82,7 @@ def prepare(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
     with_depth = scene.task in ("visibility", "depth-2d")
     source, shader = VERTEX_SHADER, ID_SHADER
     buffers = [(context.buffer(position.tobytes()), "3f", "position")]
-    if scene.task in ("fill", "smooth"):
+    if scene.task in ("fill", "smooth-fill"):
         source, shader = VERTEX_SHADER.replace("#version 330", "#version 330\n#define COLORED"), COLOR_SHADER
         colors = np.zeros((len(position), 4), np.uint8)
         colors[indices, :3] = scene.colors[:, None]
@@ -93,12 +93,12 @@ def prepare(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
     program["clip_from_input"].write(clip_from_input(scene).T.astype("f4").tobytes())
     mesh = context.vertex_array(program, buffers, context.buffer(indices.tobytes()))
 
-    n_channels, dtype = {"fill": (4, "f1"), "smooth": (4, "f1"), "mask": (1, "f1")}.get(scene.task, (1, "i4"))
+    n_channels, dtype = {"fill": (4, "f1"), "smooth-fill": (4, "f1"), "mask": (1, "f1")}.get(scene.task, (1, "i4"))
     target = context.texture(scene.size, n_channels, dtype=dtype)
     depth_target = context.depth_texture(scene.size) if with_depth else None
     frame = context.framebuffer([target], depth_target)
     drawn = frame
-    if scene.task == "smooth":
+    if scene.task == "smooth-fill":
         drawn = context.framebuffer([context.renderbuffer(scene.size, n_channels, samples=SAMPLES, dtype=dtype)])
     drawn.use()
     culling = moderngl.CULL_FACE if scene.cull == "back" else moderngl.NOTHING
@@ -118,12 +118,12 @@ def prepare(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
             frame.read_into(depth, components=1, attachment=-1, dtype="f4", alignment=1)
 
     def result() -> dict[str, np.ndarray]:
-        if scene.task in ("fill", "smooth"):
+        if scene.task in ("fill", "smooth-fill"):
             return {"color": picture[..., :3]}
         if scene.task == "mask":
             return {"mask": picture[..., 0] > 0}
         ids = picture[..., 0] - 1
         return {"triangle": ids, **({"depth": np.where(ids < 0, np.float32(np.inf), depth)} if with_depth else {})}
 
-    gives = {"fill": "RGBA", "smooth": f"RGBA, {SAMPLES} samples", "mask": "mask", "labels": "id"}
+    gives = {"fill": "RGBA", "smooth-fill": f"RGBA, {SAMPLES} samples", "mask": "mask", "labels": "id"}
     return Drawing(draw, result, gives.get(scene.task, "id + depth"), "upload")

@@ -8,7 +8,7 @@ from benchmarks.cases import Scene
 from benchmarks.peers import Drawing
 
 MODULE, DISTRIBUTION = "cv2", "opencv-python-headless"
-TASKS = ("visibility", "mask", "fill", "labels", "smooth")
+TASKS = ("visibility", "mask", "fill", "labels", "smooth-fill")
 SHIFT = 8
 
 
@@ -22,8 +22,8 @@ def prepare(scene: Scene, threads: int) -> Drawing:
     width, height = scene.size
     corners = np.rint((scene.vertices[:, :2] - 0.5) * (1 << SHIFT)).astype(np.int32)[scene.triangles]
     polygons = list(corners)
-    line = cv2.LINE_AA if scene.task == "smooth" else cv2.LINE_8
-    if scene.task in ("fill", "smooth"):
+    line = cv2.LINE_AA if scene.task == "smooth-fill" else cv2.LINE_8
+    if scene.task in ("fill", "smooth-fill"):
         canvas, values = np.zeros((height, width, 3), np.uint8), scene.colors.tolist()
     elif scene.task == "labels":
         canvas, values = np.zeros((height, width), np.int32), list(range(len(polygons)))
@@ -36,8 +36,8 @@ def prepare(scene: Scene, threads: int) -> Drawing:
         for polygon, value in zip(polygons, values, strict=True):
             cv2.fillConvexPoly(canvas, polygon, value, line, SHIFT)
 
-    name = {"fill": "color", "smooth": "color", "labels": "triangle"}.get(scene.task, "mask")
-    gives = {"fill": "RGB", "smooth": "RGB", "labels": "id"}.get(scene.task, "mask")
+    name = {"fill": "color", "smooth-fill": "color", "labels": "triangle"}.get(scene.task, "mask")
+    gives = {"fill": "RGB", "smooth-fill": "RGB", "labels": "id"}.get(scene.task, "mask")
     return Drawing(draw, lambda: {name: canvas > 0 if name == "mask" else canvas}, gives, "snap, split into polygons")
 
 

@@ -8,7 +8,7 @@ from benchmarks.cases import Scene
 from benchmarks.peers import Drawing
 
 MODULE, DISTRIBUTION = "PIL", "pillow"
-TASKS = ("mask", "fill", "labels", "smooth")
+TASKS = ("mask", "fill", "labels", "smooth-fill")
 SUPERSAMPLING = 4
 
 
@@ -16,12 +16,12 @@ def prepare(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
     """Pixel centres lie on integers, so vertices move by half a pixel."""
     from PIL import Image, ImageDraw
 
-    is_smooth = scene.task == "smooth"
+    is_smooth = scene.task == "smooth-fill"
     scale = SUPERSAMPLING if is_smooth else 1
     polygons = (scene.vertices[:, :2] * scale - 0.5)[scene.triangles].reshape(-1, 6).tolist()
-    mode = {"fill": "RGB", "smooth": "RGB", "labels": "I"}.get(scene.task, "L")
+    mode = {"fill": "RGB", "smooth-fill": "RGB", "labels": "I"}.get(scene.task, "L")
     values = [255] * len(polygons)
-    if scene.task in ("fill", "smooth"):
+    if scene.task in ("fill", "smooth-fill"):
         values = list(map(tuple, scene.colors.tolist()))
     elif scene.task == "labels":
         values = list(range(len(polygons)))
@@ -39,8 +39,8 @@ def prepare(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
         if is_smooth:
             reduced[0] = image.reduce(SUPERSAMPLING)
 
-    name = {"fill": "color", "smooth": "color", "labels": "triangle"}.get(scene.task, "mask")
-    gives = {"fill": "RGB image", "smooth": "RGB image", "labels": "id image"}.get(scene.task, "mask image")
+    name = {"fill": "color", "smooth-fill": "color", "labels": "triangle"}.get(scene.task, "mask")
+    gives = {"fill": "RGB image", "smooth-fill": "RGB image", "labels": "id image"}.get(scene.task, "mask image")
     return Drawing(
         draw,
         lambda: {name: np.asarray(reduced[0]) > 0 if name == "mask" else np.asarray(reduced[0])},

@@ -8,7 +8,7 @@ from benchmarks.cases import Scene
 from benchmarks.peers import Drawing
 
 MODULE, DISTRIBUTION = "skia", "skia-python"
-TASKS = ("mask", "fill", "labels", "smooth")
+TASKS = ("mask", "fill", "labels", "smooth-fill")
 
 
 def prepare(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
@@ -30,7 +30,7 @@ def prepare(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
             surface.getCanvas().drawPath(path, paint)
 
         return Drawing(draw_mask, lambda: {"mask": canvas > 0}, "mask", "path")
-    if scene.task == "smooth":
+    if scene.task == "smooth-fill":
         return prepare_paths(scene, skia)
     if scene.task == "fill":
         packed = scene.colors.astype(np.int64) @ np.array([1 << 16, 1 << 8, 1])

@@ -8,8 +8,8 @@ from benchmarks.cases import Scene
 from benchmarks.peers import Drawing
 
 MODULE = DISTRIBUTION = "topleft"
-TASKS = ("visibility", "depth-2d", "mask", "fill", "labels", "smooth", "empty")
-WAYS = {"smooth": ("area, one by one", "area, summed", "msaa4")}
+TASKS = ("visibility", "depth-2d", "mask", "fill", "labels", "smooth-fill", "empty")
+WAYS = {"smooth-fill": ("area, one by one", "area, summed", "msaa4")}
 THREADS = True
 
 
@@ -38,7 +38,7 @@ def prepare(scene: Scene, threads: int, way: str | None = None) -> Drawing:
             lambda: {"color": canvas[..., :3]},
             "RGBA",
         )
-    if scene.task == "smooth":
+    if scene.task == "smooth-fill":
         return prepare_smooth(rasterizer, scene, way)
     if scene.task == "labels":  # vertices (V, 2) are drawn in painter's order
         ids = np.zeros((height, width), np.int32)
