@@ -99,9 +99,9 @@ def errors_text(record: Record) -> str:
 
 
 PARTS: dict[str, Callable[[Record], str]] = {
-    "smooth facts": facts_text,
-    "smooth times": times_text,
-    "smooth ratios": ratios_text,
-    "smooth errors": errors_text,
+    "smooth-facts": facts_text,
+    "smooth-times": times_text,
+    "smooth-ratios": ratios_text,
+    "smooth-errors": errors_text,
 }
 """What the markers `<!-- table: NAME -->` of the page stand for."""

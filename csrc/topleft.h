@@ -290,8 +290,9 @@ typedef struct tl_kernels {
                           int is_u8, void *pixels);
 
     /* The mean colour of the samples of n pixels: from planes of labels and the colours of the triangles, or from planes of colours.
-     * Planes lie `stride` pixels apart; transfer is NULL where all channels are averaged as they are. */
-    void (*mean_flat)(const int32_t *labels, int sample_bits, int64_t stride, int64_t n, const void *colors, int n_channels, int is_u8,
+     * Planes lie `stride` pixels apart; transfer is NULL where all channels are averaged as they are.  A row of a palette of uint8
+     * has four numbers, whatever n_channels. */
+    void (*mean_flat)(const int32_t *labels, int sample_bits, int64_t stride, int64_t n, const void *palette, int n_channels, int is_u8,
                       const tl_transfer *transfer, void *pixels);
     void (*mean_colors)(const void *colors, int sample_bits, int64_t stride, int64_t n, int n_channels, int is_u8,
                         const tl_transfer *transfer, void *pixels);

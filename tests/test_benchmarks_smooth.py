@@ -16,7 +16,7 @@ if not (ROOT / "benchmarks").is_dir():
     pytest.skip("the benchmarks are not part of this copy", allow_module_level=True)
 sys.path.append(str(ROOT))
 
-from benchmarks import accuracy_tables, cli, smooth_tables  # noqa: E402
+from benchmarks import cli, pages, smooth_tables  # noqa: E402
 from benchmarks.cases import CASES  # noqa: E402
 from benchmarks.exact import area_error, draw_exact  # noqa: E402
 from benchmarks.peers import load_peer  # noqa: E402
@@ -80,5 +80,5 @@ def test_document_command_writes_smooth_tables(record, tmp_path):
 def test_page_tables_are_those_of_the_smooth_record():
     text = PAGE.read_text(encoding="utf-8")
     command = f"python -m benchmarks document {RECORD.relative_to(ROOT)} {PAGE.relative_to(ROOT)}"
-    made = accuracy_tables.with_parts(text, json.loads(RECORD.read_text()), smooth_tables.PARTS)
+    made = pages.with_parts(text, json.loads(RECORD.read_text()), smooth_tables.PARTS)
     assert made == text, f"run: {command}"

@@ -1,4 +1,4 @@
-"""Files: small meshes written here and read back, broken ones refused, and pictures that are whole or not there."""
+"""Files: small meshes written here and read back, broken ones refused."""
 
 from __future__ import annotations
 
@@ -7,10 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PIL import Image
 
 from topleft import files, scenes
-from topleft.errors import ImageError, MeshError, MissingPackageError
+from topleft.errors import MeshError, MissingPackageError
 from topleft.mesh import Mesh, face_normals
 
 trimesh = pytest.importorskip("trimesh")
@@ -18,7 +17,6 @@ trimesh = pytest.importorskip("trimesh")
 SHARED_MESHES = Path(__file__).resolve().parents[2] / "shared" / "meshes"
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
 GLTF_WITHOUT_ITS_BUFFER = """{"asset": {"version": "2.0"}, "buffers": [{"uri": "gone.bin", "byteLength": 36}]}"""
-PICTURE = np.arange(4 * 5 * 4, dtype=np.uint8).reshape(4, 5, 4)
 
 
 @pytest.fixture
@@ -216,104 +214,3 @@ def test_load_real_mesh_has_all_of_it(name, n_vertices, n_triangles):
         pytest.skip("the mesh is not on this machine")
     mesh = files.load(SHARED_MESHES / name)
     assert (len(mesh.vertices), len(mesh.triangles)) == (n_vertices, n_triangles)
-
-
-# Pictures out
-
-
-@pytest.mark.parametrize("suffix", [".png", ".webp"])
-def test_save_image_lossless_formats_keep_every_bit(tmp_path, suffix):
-    path = tmp_path / f"a{suffix}"
-    opaque = PICTURE | np.array([0, 0, 0, 255], dtype=np.uint8)
-    files.save_image(path, opaque)
-    assert np.array_equal(np.asarray(Image.open(path).convert("RGBA")), opaque)
-
-
-def test_save_image_png_keeps_alpha(tmp_path):
-    files.save_image(tmp_path / "a.png", PICTURE)
-    assert np.array_equal(np.asarray(Image.open(tmp_path / "a.png")), PICTURE)
-
-
-@pytest.mark.parametrize("suffix", [".jpg", ".jpeg", ".JPG"])
-def test_save_image_jpeg_lies_on_the_background(tmp_path, suffix):
-    path = tmp_path / f"a{suffix}"
-    files.save_image(path, np.zeros((16, 16, 4), np.uint8), background=(250, 240, 10))
-    with Image.open(path) as image:
-        assert image.mode == "RGB"
-        assert np.asarray(image)[8, 8].astype(int) == pytest.approx([250, 240, 10], abs=3)  # JPEG is lossy
-
-
-def test_composite_mixes_by_alpha():
-    image = np.array([[[200, 0, 0, 0], [200, 0, 0, 255], [200, 0, 0, 128]]], dtype=np.uint8)
-    assert files.composite(image, (0, 100, 255)).tolist() == [[[0, 100, 255], [200, 0, 0], [100, 50, 127]]]
-
-
-def test_save_image_npy_keeps_any_array(tmp_path):
-    depth = np.array([[np.inf, 0.5]], dtype=np.float32)
-    files.save_image(tmp_path / "a.npy", depth)
-    assert np.array_equal(np.load(tmp_path / "a.npy"), depth)
-    assert np.load(tmp_path / "a.npy").dtype == np.float32
-
-
-def test_save_image_npz_keeps_arrays_by_name(tmp_path):
-    files.save_image(tmp_path / "a.npz", {"x": np.arange(3), "y": np.eye(2)})
-    with np.load(tmp_path / "a.npz") as arrays:
-        assert sorted(arrays) == ["x", "y"]
-        assert arrays["x"].tolist() == [0, 1, 2]
-
-
-def test_save_image_replaces_a_file_and_leaves_nothing_else(tmp_path):
-    path = tmp_path / "a.png"
-    path.write_text("old")
-    files.save_image(path, PICTURE)
-    assert path.read_bytes().startswith(b"\x89PNG")
-    assert [entry.name for entry in tmp_path.iterdir()] == ["a.png"]
-
-
-def test_save_image_that_fails_half_way_leaves_the_old_file(tmp_path, monkeypatch):
-    path = tmp_path / "a.png"
-    path.write_text("old")
-
-    def write_half(self, file, **_):
-        file.write(b"half a pic")
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(Image.Image, "save", write_half)
-    with pytest.raises(OSError, match=r"cannot write: No space left on device: '.*a.png'"):
-        files.save_image(path, PICTURE)
-    assert path.read_text() == "old"
-    assert [entry.name for entry in tmp_path.iterdir()] == ["a.png"]
-
-
-def test_save_image_permissions_are_those_of_any_new_file(tmp_path):
-    files.save_image(tmp_path / "a.png", PICTURE)
-    (tmp_path / "other").touch()
-    assert (tmp_path / "a.png").stat().st_mode == (tmp_path / "other").stat().st_mode
-
-
-def test_save_image_into_a_missing_folder_is_refused(tmp_path):
-    with pytest.raises(FileNotFoundError, match=r"cannot write: No such file or directory: '.*nope/a.png'"):
-        files.save_image(tmp_path / "nope" / "a.png", PICTURE)
-
-
-def test_save_image_over_a_folder_is_refused(tmp_path):
-    (tmp_path / "a.png").mkdir()
-    with pytest.raises(IsADirectoryError, match="it is a folder"):
-        files.save_image(tmp_path / "a.png", PICTURE)
-
-
-@pytest.mark.parametrize(
-    ("name", "image", "message"),
-    [
-        ("a.gif", PICTURE, "cannot write '.*a.gif': format '.gif' is none of .png .jpg .jpeg .webp .npy .npz"),
-        ("a", PICTURE, "format '' is none of"),
-        ("a.png", PICTURE.astype(float), r"be uint8, got \(4, 5, 4\) float64"),
-        ("a.png", PICTURE[..., :2], r"must have shape \(H, W\), \(H, W, 3\) or \(H, W, 4\) .*, got \(4, 5, 2\) uint8"),
-        ("a.png", PICTURE[:0], r"a picture of shape \(0, 5, 4\) has no pixels"),
-        ("a.png", {"x": PICTURE}, "several arrays by name need .npz"),
-    ],
-)
-def test_save_image_impossible_is_refused(tmp_path, name, image, message):
-    with pytest.raises(ImageError, match=message):
-        files.save_image(tmp_path / name, image)
-    assert list(tmp_path.iterdir()) == []

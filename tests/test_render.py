@@ -15,7 +15,7 @@ from topleft.shade import GREY_OF_FARTHEST, GREY_OF_NEAREST, eye_distance, eye_n
 
 SHARED_MESHES = Path(__file__).resolve().parents[2] / "shared" / "meshes"
 SIZE = (64, 48)
-MODES = ["smooth-fill", "flat", "ids", "depth", "normals"]
+MODES = ["smooth", "flat", "ids", "depth", "normals"]
 SPHERE = Mesh(*scenes.shape("sphere"))
 CUBE = Mesh(*scenes.shape("cube"))
 CLEAR = (0, 0, 0, 0)
@@ -61,7 +61,7 @@ def test_render_leaves_the_mesh_alone():
     assert np.array_equal(CUBE.vertices, vertices)
 
 
-@pytest.mark.parametrize("shading", ["smooth-fill", "flat", "depth", "normals"])
+@pytest.mark.parametrize("shading", ["smooth", "flat", "depth", "normals"])
 @pytest.mark.parametrize("ortho_height", [None, 3])
 def test_render_inverted_faces_look_the_same(shading, ortho_height):
     turned = Mesh(SPHERE.vertices, SPHERE.triangles[:, ::-1])

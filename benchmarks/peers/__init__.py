@@ -32,10 +32,11 @@ PEERS = {
     "open3d": "Open3D's ray casting scene: Embree, one ray a pixel",
     "datashader": "datashader: trimesh by numba",
     "skia": "skia-python: drawVertices and drawPath",
-    "cairo": "pycairo: fill without antialiasing, or with it",
-    "blend2d": "Blend2D, by blend2d-py: a path and a fill a triangle",
-    "matplotlib": "matplotlib: a PolyCollection on its Agg renderer",
-    "aggdraw": "aggdraw: Anti-Grain Geometry, a polygon a triangle",
+    "cairo": "pycairo: fill",
+    "skimage": "scikit-image: draw.polygon",
+    "agg": "Anti-Grain Geometry, by matplotlib: draw_path, PolyCollection",
+    "aggdraw": "Anti-Grain Geometry, by aggdraw: polygon",
+    "blend2d": "Blend2D, by blend2d-py: fill_path",
 }
 """Peers by name, in the order of the report."""
 

@@ -8,7 +8,7 @@ from benchmarks.cases import Scene
 from benchmarks.peers import Drawing
 
 MODULE, DISTRIBUTION = "cv2", "opencv-python-headless"
-TASKS = ("visibility", "mask", "fill", "labels", "smooth-fill")
+TASKS = ("visibility", "mask", "fill", "labels", "smooth", "smooth-fill")
 SHIFT = 8
 
 
@@ -22,7 +22,6 @@ def prepare(scene: Scene, threads: int) -> Drawing:
     width, height = scene.size
     corners = np.rint((scene.vertices[:, :2] - 0.5) * (1 << SHIFT)).astype(np.int32)[scene.triangles]
     polygons = list(corners)
-    line = cv2.LINE_AA if scene.task == "smooth-fill" else cv2.LINE_8
     if scene.task in ("fill", "smooth-fill"):
         canvas, values = np.zeros((height, width, 3), np.uint8), scene.colors.tolist()
     elif scene.task == "labels":
@@ -30,14 +29,15 @@ def prepare(scene: Scene, threads: int) -> Drawing:
     else:
         canvas, values = np.zeros((height, width), np.uint8), [255] * len(polygons)
     background = -1 if scene.task == "labels" else 0
+    line = cv2.LINE_AA if scene.task in ("smooth", "smooth-fill") else cv2.LINE_8
 
     def draw() -> None:
         canvas.fill(background)
         for polygon, value in zip(polygons, values, strict=True):
             cv2.fillConvexPoly(canvas, polygon, value, line, SHIFT)
 
-    name = {"fill": "color", "smooth-fill": "color", "labels": "triangle"}.get(scene.task, "mask")
-    gives = {"fill": "RGB", "smooth-fill": "RGB", "labels": "id"}.get(scene.task, "mask")
+    name = {"fill": "color", "smooth-fill": "color", "labels": "triangle", "smooth": "smooth"}.get(scene.task, "mask")
+    gives = {"fill": "RGB", "smooth-fill": "RGB, LINE_AA", "labels": "id", "smooth": "LINE_AA"}.get(scene.task, "mask")
     return Drawing(draw, lambda: {name: canvas > 0 if name == "mask" else canvas}, gives, "snap, split into polygons")
 
 

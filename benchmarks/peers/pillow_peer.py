@@ -1,4 +1,7 @@
-"""Pillow: ImageDraw.polygon, a call a triangle; it draws the outline too. Smooth: 4 x 4 as large, then reduced."""
+"""Pillow: ImageDraw.polygon, a call a triangle. It draws the outline too.
+
+Smooth pictures are drawn four times as wide and high and reduced.
+"""
 
 from __future__ import annotations
 
@@ -8,17 +11,17 @@ from benchmarks.cases import Scene
 from benchmarks.peers import Drawing
 
 MODULE, DISTRIBUTION = "PIL", "pillow"
-TASKS = ("mask", "fill", "labels", "smooth-fill")
-SUPERSAMPLING = 4
+TASKS = ("mask", "fill", "labels", "smooth", "smooth-fill")
+FINER = 4
 
 
 def prepare(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
-    """Pixel centres lie on integers, so vertices move by half a pixel."""
+    """Coordinates are truncated, to the pixel that they lie in: vertices stay where they are."""
     from PIL import Image, ImageDraw
 
-    is_smooth = scene.task == "smooth-fill"
-    scale = SUPERSAMPLING if is_smooth else 1
-    polygons = (scene.vertices[:, :2] * scale - 0.5)[scene.triangles].reshape(-1, 6).tolist()
+    is_smooth = scene.task in ("smooth", "smooth-fill")
+    finer = FINER if is_smooth else 1
+    polygons = (scene.vertices[:, :2] * finer)[scene.triangles].reshape(-1, 6).tolist()
     mode = {"fill": "RGB", "smooth-fill": "RGB", "labels": "I"}.get(scene.task, "L")
     values = [255] * len(polygons)
     if scene.task in ("fill", "smooth-fill"):
@@ -26,7 +29,7 @@ def prepare(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
     elif scene.task == "labels":
         values = list(range(len(polygons)))
     background = -1 if scene.task == "labels" else 0
-    size = (scene.size[0] * scale, scene.size[1] * scale)
+    size = (scene.size[0] * finer, scene.size[1] * finer)
     image = Image.new(mode, size, background)
     everything = (0, 0, *size)
     reduced = [image]
@@ -37,13 +40,13 @@ def prepare(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
         for polygon, value in zip(polygons, values, strict=True):
             canvas.polygon(polygon, value)
         if is_smooth:
-            reduced[0] = image.reduce(SUPERSAMPLING)
+            reduced[:] = [image.reduce(FINER)]
 
-    name = {"fill": "color", "smooth-fill": "color", "labels": "triangle"}.get(scene.task, "mask")
-    gives = {"fill": "RGB image", "smooth-fill": "RGB image", "labels": "id image"}.get(scene.task, "mask image")
+    name = {"fill": "color", "smooth-fill": "color", "labels": "triangle", "smooth": "smooth"}.get(scene.task, "mask")
+    gives = {"fill": "RGB image", "smooth-fill": "RGB image, 16 samples", "labels": "id image", "smooth": "16 samples"}
     return Drawing(
         draw,
         lambda: {name: np.asarray(reduced[0]) > 0 if name == "mask" else np.asarray(reduced[0])},
-        gives,
+        gives.get(scene.task, "mask image"),
         "coordinates to lists",
     )

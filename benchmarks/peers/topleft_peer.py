@@ -8,7 +8,7 @@ from benchmarks.cases import Scene
 from benchmarks.peers import Drawing
 
 MODULE = DISTRIBUTION = "topleft"
-TASKS = ("visibility", "depth-2d", "mask", "fill", "labels", "smooth-fill", "empty")
+TASKS = ("visibility", "depth-2d", "mask", "fill", "labels", "smooth-fill", "empty", "views", "views-png")
 WAYS = {"smooth-fill": ("area, one by one", "area, summed", "msaa4")}
 THREADS = True
 
@@ -17,6 +17,10 @@ def prepare(scene: Scene, threads: int, way: str | None = None) -> Drawing:
     """Every call takes the arrays as they come and includes the transform or snap, and the clear."""
     import topleft as tl
 
+    if scene.views is not None:
+        from benchmarks.peers.views import draw_by_topleft
+
+        return draw_by_topleft(scene, threads)
     rasterizer = tl.Rasterizer(scene.size, threads=threads)
     width, height = scene.size
     mesh = scene.vertices, scene.triangles

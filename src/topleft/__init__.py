@@ -3,11 +3,13 @@
 from topleft import scenes
 from topleft._isa import build_info
 from topleft.api import Rasterizer, coverage, fill, overdraw, rasterize, wireframe
+from topleft.batch import Job, render_batch
 from topleft.camera import Camera
 from topleft.classic import bresenham_line
 from topleft.errors import MeshError, TopleftError
-from topleft.files import load, save_image
+from topleft.files import load
 from topleft.fragments import Fragments
+from topleft.images import save_image
 from topleft.memory import release_memory
 from topleft.mesh import Mesh
 from topleft.render import render, visibility
@@ -19,6 +21,7 @@ __version__: str = build_info()["version"]
 __all__ = [
     "Camera",
     "Fragments",
+    "Job",
     "Mesh",
     "MeshError",
     "Rasterizer",
@@ -33,6 +36,7 @@ __all__ = [
     "rasterize",
     "release_memory",
     "render",
+    "render_batch",
     "save_image",
     "scenes",
     "shade",

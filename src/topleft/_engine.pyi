@@ -163,6 +163,7 @@ class Bins:
     bad_row: int
     n_bands: int
     n_listed: int
+    band_bits: int
     def __init__(
         self, scene: Scene, height: int, width: int, reach_fx: int, band_bits: int, room: NDArray[np.int32]
     ) -> None: ...
@@ -177,13 +178,18 @@ class Transfer:
         self, tables: tuple[NDArray[np.int32], NDArray[np.uint8]] | None, n_channels: int, is_straight: bool
     ) -> None: ...
 
-def mean_flat(
+class Palette:
+    def __init__(self, colors: NDArray[Any], transfer: Transfer | None) -> None: ...
+    def mean_flat(self, labels: NDArray[np.int32], pixels: NDArray[Any], first_row: int, n_rows: int) -> None: ...
+
+def fill_bands(
+    scenes: Sequence[Scene],
     labels: NDArray[np.int32],
-    colors: NDArray[Any],
+    palette: Palette,
     pixels: NDArray[Any],
-    first_row: int,
-    n_rows: int,
-    transfer: Transfer | None,
+    bins: Bins,
+    first_band: int,
+    end_band: int,
 ) -> None: ...
 def mean_colors(
     painted: NDArray[Any],

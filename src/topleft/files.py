@@ -1,40 +1,21 @@
-"""Files: meshes in, pictures out. The only module that touches the disk.
-
-`load` reads what trimesh reads and returns one `Mesh`; `save_image` writes a picture or a raw buffer, whole or not at
-all.
-"""
+"""Files: meshes in. `load` reads what trimesh reads and returns one `Mesh`."""
 
 from __future__ import annotations
 
 import io
-import logging
 import os
 import re
-import secrets
 import warnings
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from PIL import Image
 
-from topleft.errors import ImageError, MeshError, MissingPackageError
+from topleft.errors import MeshError, MissingPackageError
 from topleft.mesh import Mesh, angle_weighted_normals, coincident
-
-PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp")
-BUFFER_SUFFIXES = (".npy", ".npz")
-SUFFIXES = PICTURE_SUFFIXES + BUFFER_SUFFIXES
-"""What `save_image` writes, by the end of the name."""
-
-PILLOW_OPTIONS: Mapping[str, tuple[str, dict[str, Any]]] = {
-    ".png": ("PNG", {}),
-    ".jpg": ("JPEG", {"quality": 92, "subsampling": 0}),
-    ".jpeg": ("JPEG", {"quality": 92, "subsampling": 0}),
-    ".webp": ("WEBP", {"lossless": True}),  # ids and normals must survive
-}
 
 
 def load(path: str | os.PathLike[str]) -> Mesh:
@@ -102,91 +83,11 @@ def load(path: str | os.PathLike[str]) -> Mesh:
         raise MeshError(f"cannot read {str(path)!r}: broken, or not a {path.suffix!r} file ({reason})") from error
 
 
-def save_image(
-    path: str | os.PathLike[str],
-    image: npt.NDArray[Any] | Mapping[str, npt.NDArray[Any]],
-    *,
-    background: tuple[int, int, int] = (255, 255, 255),
-) -> None:
-    """Write a picture or a raw buffer; the file appears whole or not at all.
-
-    Parameters
-    ----------
-    path : path
-        PNG, JPEG, WebP (lossless), .npy or .npz, by the end of the name. A file of that name is replaced.
-    image : (H, W), (H, W, 3) or (H, W, 4) uint8
-        The picture. For .npy any array, for .npz any array or several by name.
-    background : (3,) of 0 to 255
-        What shows through in JPEG, which has no alpha.
-
-    Raises
-    ------
-    ImageError
-        If the format is unknown or cannot hold the array.
-    OSError
-        If the file cannot be written.
-    """
-    path = Path(path)
-    suffix = path.suffix.lower()
-    if suffix not in SUFFIXES:
-        raise ImageError(f"cannot write {str(path)!r}: format {path.suffix!r} is none of {' '.join(SUFFIXES)}")
-    if suffix == ".npz":
-        arrays: dict[str, Any] = dict(image) if isinstance(image, Mapping) else {"image": image}
-        _write_whole(path, lambda file: np.savez_compressed(file, **arrays))
-        return
-    if isinstance(image, Mapping):
-        raise ImageError(f"cannot write {str(path)!r}: several arrays by name need .npz")
-    if suffix == ".npy":
-        array = image
-        _write_whole(path, lambda file: np.save(file, array, allow_pickle=False))
-        return
-    if image.dtype != np.uint8 or image.ndim not in (2, 3) or image.shape[2:] not in ((), (3,), (4,)):
-        raise ImageError(
-            f"a picture must have shape (H, W), (H, W, 3) or (H, W, 4) and be uint8, got {image.shape} {image.dtype}"
-        )
-    if image.size == 0:
-        raise ImageError(f"cannot write {str(path)!r}: a picture of shape {image.shape} has no pixels")
-    if suffix in (".jpg", ".jpeg") and image.shape[2:] == (4,):
-        image = composite(image, background)
-    kind, options = PILLOW_OPTIONS[suffix]
-    picture = Image.fromarray(image)
-    _write_whole(path, lambda file: picture.save(file, format=kind, **options))
-
-
-def composite(image: npt.NDArray[np.uint8], background: tuple[int, int, int]) -> npt.NDArray[np.uint8]:
-    """The RGBA picture (H, W, 4) laid over one colour: (H, W, 3) uint8, mixed as the numbers stand (sRGB)."""
-    alpha = image[..., 3:].astype(np.uint32)
-    mixed = image[..., :3] * alpha + np.asarray(background, dtype=np.uint32) * (255 - alpha)
-    return ((mixed + 127) // 255).astype(np.uint8)
-
-
-def _write_whole(path: Path, write: Callable[[IO[bytes]], object]) -> None:
-    """Write to a new name in the same folder, then rename: a reader or a crash never meets half a file."""
-    if path.is_dir():
-        raise IsADirectoryError(f"cannot write {str(path)!r}: it is a folder")
-    temporary = path.with_name(f".{path.name[:100]}.{secrets.token_hex(4)}.part")
-    try:
-        with open(temporary, "xb") as file:
-            write(file)
-        os.replace(temporary, path)
-    except OSError as error:
-        _remove(temporary)
-        if error.errno is None:
-            raise
-        raise type(error)(error.errno, f"cannot write: {error.strerror}", str(path)) from error
-    except BaseException:
-        _remove(temporary)
-        raise
-
-
-def _remove(temporary: Path) -> None:
-    with suppress(OSError):  # it was never made
-        temporary.unlink()
-
-
 @contextmanager
 def _strict_parsing() -> Iterator[None]:
     """Make NumPy's text reader fail where it stops in a broken file (old ones only warn); keep trimesh off stderr."""
+    import logging
+
     logger = logging.getLogger("trimesh")
     quiet = logging.NullHandler()
     logger.addHandler(quiet)  # a logger without a handler prints its warnings

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from topleft.api import rasterize, wireframe
+from topleft.api import Rasterizer, rasterize, wireframe
 from topleft.camera import Camera
 from topleft.fragments import Fragments
 from topleft.mesh import Mesh
@@ -34,6 +34,7 @@ def render(
     edges: bool = False,
     sampling: str = "center",
     threads: int | None = None,
+    rasterizer: Rasterizer | None = None,
 ) -> npt.NDArray[np.uint8]:
     """A picture of the mesh.
 
@@ -60,6 +61,8 @@ def render(
         its samples lies, and the light of the samples is averaged.
     threads : int, optional
         How many threads draw; never changes a bit.
+    rasterizer : Rasterizer, optional
+        Of this size: what is needed on the way lies in the memory that it keeps.
 
     Returns
     -------
@@ -80,7 +83,7 @@ def render(
     """
     camera = default_camera(mesh, size) if camera is None else camera
     background = as_color("background", background, 4)
-    frags = visibility(mesh, camera, size, cull=cull, threads=threads, sampling=sampling)
+    frags = visibility(mesh, camera, size, cull=cull, threads=threads, sampling=sampling, rasterizer=rasterizer)
     depth_range = distances(frags, camera) if shading == "depth" else None
 
     def shade_one(sample: Fragments) -> npt.NDArray[np.uint8]:
@@ -102,6 +105,7 @@ def visibility(
     *,
     cull: str = "none",
     threads: int | None = None,
+    rasterizer: Rasterizer | None = None,
     **view: Any,
 ) -> Fragments:
     """The visibility buffer of the mesh: ids and depth per pixel, and attributes interpolated on demand.
@@ -110,6 +114,8 @@ def visibility(
     ----------
     mesh, camera, size, cull, threads
         As for `render`.
+    rasterizer : Rasterizer, optional
+        Of this size: the result lies in its memory, until the next call.
     **view
         Other options of `rasterize`, `origin=` for a window of a larger picture, say.
 
@@ -122,11 +128,15 @@ def visibility(
     Raises
     ------
     ValueError
-        If the mesh has no triangles and no camera is given, or an option is unknown.
+        If the mesh has no triangles and no camera is given, an option is unknown, or `rasterizer` has another size.
     """
     camera = default_camera(mesh, size) if camera is None else camera
-    transform = camera.clip_from_world(view.get("viewport") or size)
-    return rasterize(mesh.vertices, mesh.triangles, size, transform=transform, cull=cull, threads=threads, **view)
+    view |= {"transform": camera.clip_from_world(view.get("viewport") or size), "cull": cull, "threads": threads}
+    if rasterizer is None:
+        return rasterize(mesh.vertices, mesh.triangles, size, **view)
+    if rasterizer.size != tuple(size):
+        raise ValueError(f"rasterizer must have the size {tuple(size)}, got {rasterizer.size}")
+    return rasterizer.rasterize(mesh.vertices, mesh.triangles, **view)
 
 
 def draw_edges(
