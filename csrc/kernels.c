@@ -22,6 +22,7 @@
 #include "smooth_lines.c"
 #include "lines.c"
 #include "mean.c"
+#include "planes.c"
 #include "mix.h"
 #include "mix_u8.c"
 #include "mix_f32.c"
@@ -51,4 +52,6 @@ const tl_kernels TL_KERNELS = {
     .draw_lines = draw_lines,
     .mean_flat = mean_flat,
     .mean_colors = mean_colors,
+    .list_planes = list_planes,
+    .fill_planes = fill_planes,
 };

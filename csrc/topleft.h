@@ -230,6 +230,18 @@ typedef struct {
     int64_t stride_px;
 } tl_line_target;
 
+/* ---- values on triangles ------------------------------------------------------------------------------- */
+
+typedef struct {
+    const double *points_px;  /* (n_points, 2), before the snap */
+    const double *values;     /* (n_points,) */
+    const int32_t *triangles; /* (n_triangles, 3) */
+    int64_t n_points, n_triangles;
+    double *planes; /* (1 + n_triangles, TL_PLANE_DOUBLES) of list_planes, or NULL: fill_planes then computes them as it goes */
+} tl_valued;
+
+#define TL_PLANE_DOUBLES 8
+
 /* ---- the kernel table ---------------------------------------------------------------------------------- */
 
 typedef struct tl_kernels {
@@ -303,6 +315,12 @@ typedef struct tl_kernels {
 
     /* Clears the window's pixels and draws lines. */
     void (*draw_lines)(const tl_edges *lines, const tl_window *window, const tl_line_target *target);
+
+    /* The planes of triangles [first, end); the one of no triangle, with first = 0. */
+    void (*list_planes)(const tl_valued *mesh, int64_t first, int64_t end);
+
+    /* Per pixel of `ids` (rows of window->width): the value of its centre on the plane of the triangle, float32 or float64. */
+    void (*fill_planes)(const tl_valued *mesh, const tl_window *window, const int32_t *ids, int is_f32, void *out);
 } tl_kernels;
 
 #endif

@@ -180,7 +180,7 @@ def test_batch_layers_are_copies_by_name():
     for result, camera, color in zip(results, orbit(BOX, 3), pictures(3), strict=True):
         assert list(result.picture) == ["id", "color"]
         assert np.array_equal(result.picture["color"], color)
-        assert np.array_equal(result.picture["id"], tl.visibility(BOX, camera, SIZE).triangle)
+        assert np.array_equal(result.picture["id"], tl.rasterize_mesh(BOX, camera, SIZE).triangle)
 
 
 def test_batch_camera_may_be_made_of_mesh_and_size():

@@ -20,7 +20,7 @@ from topleft.cli import animation
 from topleft.cli.plan import Orbit, outermost
 from topleft.cli.sheet import make_sheet
 from topleft.mesh import Mesh
-from topleft.render import render, visibility
+from topleft.render import rasterize_mesh, render
 
 SMALL = ["--size", "64x48"]
 KNOT = Mesh(*scenes.shape("torus-knot"))
@@ -101,7 +101,7 @@ def test_render_layers_names_follow_out(run, folder, out, layers, views, expecte
 
 def test_render_layers_are_those_of_the_mesh(run):
     assert run("render", "torus-knot", "-o", "p/", "--layers", "color,depth,id", *SMALL) == (0, [])
-    frags = visibility(KNOT, None, (64, 48))
+    frags = rasterize_mesh(KNOT, None, (64, 48))
     assert np.array_equal(pixels("p/torus-knot-color.png"), render(KNOT, None, (64, 48)))
     assert np.array_equal(pixels("p/torus-knot-id.png").astype(int) - 1, frags.triangle)
     assert np.array_equal(pixels("p/torus-knot-depth.png") > 0, frags.mask)

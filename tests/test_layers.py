@@ -34,7 +34,7 @@ def numbers_of(path):
 
 
 def test_layers_are_those_of_the_library(layers):
-    frags = tl.visibility(KNOT, None, SIZE, cull="back")
+    frags = tl.rasterize_mesh(KNOT, None, SIZE, cull="back")
     assert np.array_equal(layers["color"], tl.render(KNOT, None, SIZE, cull="back"))
     assert np.array_equal(layers["alpha"], np.where(frags.mask, 255, 0))
     assert np.array_equal(layers["depth"], frags.depth)
@@ -56,7 +56,7 @@ def test_layers_agree_when_the_picture_is_drawn_in_the_same_memory(layers):
 
 
 def test_layers_compute_nothing_else(monkeypatch):
-    monkeypatch.setattr("topleft.layers.visibility", None)
+    monkeypatch.setattr("topleft.layers.rasterize_mesh", None)
     assert list(draw_layers(["color"], SHOT)) == ["color"]
 
 

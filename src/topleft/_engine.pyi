@@ -1,4 +1,4 @@
-"""The types of the compiled module. What each does is told in _engine.pyx, _dispatch.pxi and _lines.pxi."""
+"""The types of the compiled module. What each does is told in _engine.pyx and the .pxi files."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 VERTEX_BYTES: int
 CELL_CLEAR: int
+PLANE_DOUBLES: int
 AREA_OVERFLOW: int
 SCALARS: dict[np.dtype[Any], int]
 
@@ -158,6 +159,17 @@ def draw_lines(
     first_row: int,
     n_rows: int,
 ) -> None: ...
+
+class Valued:
+    def __init__(
+        self,
+        points_px: NDArray[np.float64],
+        triangles: NDArray[np.int32],
+        values: NDArray[np.float64],
+        planes: NDArray[np.float64] | None = None,
+    ) -> None: ...
+    def list_planes(self, first: int, end: int) -> None: ...
+    def fill_planes(self, ids: NDArray[np.int32], out: NDArray[Any], first_row: int, n_rows: int) -> None: ...
 
 class Bins:
     bad_row: int

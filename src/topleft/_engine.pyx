@@ -72,7 +72,7 @@ cdef extern from "topleft.h" nogil:
         int64_t stride_px
         void *cells
         int is_wide, is_clamped
-    int64_t TL_CELL_CLEAR, TL_AREA_OVERFLOW
+    int64_t TL_CELL_CLEAR, TL_AREA_OVERFLOW, TL_PLANE_DOUBLES
     int64_t tl_area_stride(int64_t width)
     ctypedef int tl_blend
     ctypedef struct tl_canvas:
@@ -117,6 +117,12 @@ cdef extern from "topleft.h" nogil:
         double depth_bias
         int is_farthest
         int64_t stride_px
+    ctypedef struct tl_valued:
+        const double *points_px
+        const double *values
+        const int32_t *triangles
+        int64_t n_points, n_triangles
+        double *planes
     ctypedef struct tl_kernels:
         tl_vertex_counts (*snap)(const tl_source *, int64_t, int64_t, int, int, tl_vertex *, tl_wide *) noexcept nogil
         tl_vertex_counts (*project)(const tl_source *, int64_t, int64_t, const tl_view *, tl_vertex *, tl_wide *) noexcept nogil
@@ -135,6 +141,8 @@ cdef extern from "topleft.h" nogil:
         void (*paint_gouraud)(const tl_scene *, const tl_window *, const int32_t *, const void *, int, int, void *) noexcept nogil
         int64_t (*list_edges)(const tl_scene *, const tl_edge_scratch *, uint64_t *, int64_t *) noexcept nogil
         void (*draw_lines)(const tl_edges *, const tl_window *, const tl_line_target *) noexcept nogil
+        void (*list_planes)(const tl_valued *, int64_t, int64_t) noexcept nogil
+        void (*fill_planes)(const tl_valued *, const tl_window *, const int32_t *, int, void *) noexcept nogil
         void (*mean_flat)(const int32_t *, int, int64_t, int64_t, const void *, int, int, const tl_transfer *, void *) noexcept nogil
         void (*mean_colors)(const void *, int, int64_t, int64_t, int, int, const tl_transfer *, void *) noexcept nogil
 
@@ -613,3 +621,4 @@ def mean_colors(painted, pixels, int64_t first_row, int64_t n_rows, int n_channe
 
 
 include "_lines.pxi"
+include "_planes.pxi"

@@ -59,13 +59,13 @@ def load(path: str | os.PathLike[str]) -> Mesh:
             else:
                 scene = trimesh.load_scene(str(path), process=False)
             parts = [
-                _placed(scene.geometry[geometry], transform)
+                placed(scene.geometry[geometry], transform)
                 for transform, geometry in (scene.graph[node] for node in scene.graph.nodes_geometry)
                 if len(getattr(scene.geometry[geometry], "faces", ()))
             ]
         if not parts:
             raise MeshError(f"{str(path)!r} has no triangles")
-        return _joined(parts)
+        return joined(parts)
     except FileNotFoundError as error:  # the mesh is there: glTF and others name more files
         raise MeshError(f"cannot read {str(path)!r}: broken, or without a file that it names ({error})") from error
     except (MeshError, OSError, MemoryError):
@@ -130,7 +130,7 @@ def _absolute(index: str, n_above: int) -> str:
     return str(n_above + 1 + int(index)) if index.startswith("-") else index
 
 
-def _placed(geometry: Any, transform: npt.NDArray[np.float64]) -> Mesh:
+def placed(geometry: Any, transform: npt.NDArray[np.float64]) -> Mesh:
     """A trimesh geometry as a mesh in the space of its scene; per-face colours get corners of their own."""
     vertices, triangles = np.asarray(geometry.vertices), np.asarray(geometry.faces)
     # trimesh computes normals when asked for them; what a file gave waits in the cache.
@@ -153,7 +153,7 @@ def _placed(geometry: Any, transform: npt.NDArray[np.float64]) -> Mesh:
     return Mesh(vertices, triangles, normals, colors)
 
 
-def _joined(parts: list[Mesh]) -> Mesh:
+def joined(parts: list[Mesh]) -> Mesh:
     """One mesh of several; vertices that are equal become one unless the file has normals."""
     starts = np.cumsum([0] + [len(part.vertices) for part in parts[:-1]])
     vertices = np.concatenate([part.vertices for part in parts])

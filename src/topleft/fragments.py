@@ -56,6 +56,11 @@ class Fragments:
         height, width = self.triangle.shape
         return f"Fragments({width}x{height}, {self._n_triangles} triangles)"
 
+    def _repr_png_(self) -> bytes | None:
+        from topleft.notebook import png_of_fragments  # which imports this module
+
+        return png_of_fragments(self)
+
     @property
     def depth(self) -> NDArray[np.float32]:
         """Depth of each pixel, float32 (H, W); made now where all triangles lie at 0."""
@@ -172,3 +177,51 @@ class Fragments:
 
     def _ids(self) -> NDArray[np.int32]:
         return np.require(self.triangle, np.int32, ["C", "A"])
+
+
+class BentFragments(Fragments):
+    """The visibility buffer of a mesh whose triangles were drawn in parts, in terms of the whole ones.
+
+    Made by `rasterize_mesh` for cameras with a lens. `triangle` holds triangles of the mesh, and attributes are those
+    of its vertices.
+    """
+
+    def __init__(
+        self,
+        parts: Fragments,
+        source: NDArray[np.int64],
+        weights: NDArray[np.float64],
+        triangles: NDArray[np.integer[Any]],
+        n_vertices: int,
+    ) -> None:
+        wholes = np.append(source, -1).astype(np.int32)  # part -1, none, is the last
+        super().__init__(wholes[parts.triangle], parts.depth, parts._scene, n_vertices, len(triangles))
+        self._samples = tuple(
+            BentFragments(sample, source, weights, triangles, n_vertices) for sample in parts._samples
+        )
+        self.samples_triangle, self.samples_depth = wholes[parts.samples_triangle], parts.samples_depth
+        self._parts, self._source, self._weights, self._triangles = parts, source, weights, triangles
+
+    def only(self, rows: NDArray[np.intp], cols: NDArray[np.intp]) -> Fragments:
+        """Return what is left when no other pixels than these show a triangle."""
+        parts = self._parts.only(rows, cols)
+        return BentFragments(parts, self._source, self._weights, self._triangles, self._n_vertices)
+
+    def barycentric(self) -> NDArray[np.float32]:
+        """Return the weights of the three vertices of the triangle that shows in each pixel."""
+        if not len(self._source):
+            return np.zeros((*self.triangle.shape, 3), np.float32)
+        return self._parts.interpolate(self._weights)
+
+    def interpolate(self, values: ArrayLike, *, background: float = 0.0) -> NDArray[np.float32]:
+        """Return an attribute of the vertices at each visible pixel, as `Fragments.interpolate` does."""
+        array = as_values(values, self._n_vertices, self._n_triangles)
+        if not len(self._source):
+            channels = array.shape[-1:] if array.ndim > 1 else ()
+            return np.full((*self.triangle.shape, *channels), background, np.float32)
+        if array.ndim == 3:
+            corners = array[self._source]
+        else:
+            corners = array.reshape(len(array), -1)[self._triangles[self._source]]
+        out = self._parts.interpolate(np.matmul(self._weights, corners), background=background)
+        return out if array.ndim > 1 else out[..., 0]

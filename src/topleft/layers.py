@@ -18,7 +18,7 @@ from topleft.api import Rasterizer
 from topleft.camera import Camera
 from topleft.fragments import Fragments
 from topleft.mesh import Mesh
-from topleft.render import default_camera, render, visibility
+from topleft.render import default_camera, rasterize_mesh, render
 from topleft.shade import eye_normals
 
 __all__ = ["LAYERS", "Shot", "check_layers", "draw_layers"]
@@ -48,7 +48,7 @@ class Shot:
     def frags(self) -> Fragments:
         """The visibility buffer, drawn when the first layer needs it."""
         shared = {name: self.options[name] for name in ("cull", "threads") if name in self.options}
-        return visibility(self.mesh, self.eye, self.size, rasterizer=self.rasterizer, **shared)
+        return rasterize_mesh(self.mesh, self.eye, self.size, rasterizer=self.rasterizer, **shared)
 
 
 def color(shot: Shot) -> Array:

@@ -78,6 +78,11 @@ class Mesh:
         if self.colors is not None:
             keep(self, "colors", _read_only(_color_array(self.colors, len(vertices))))
 
+    def _repr_png_(self) -> bytes | None:
+        from topleft.notebook import png_of_mesh  # which imports this module
+
+        return png_of_mesh(self)
+
     @property
     def bounds(self) -> F64:
         """Lower and upper corner (2, 3) float64 of the box round the triangles; unused vertices do not count.

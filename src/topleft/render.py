@@ -1,18 +1,20 @@
 """Rendering: a mesh and a camera to a picture, in one call.
 
-Input: `Mesh`, `Camera`. Output: the picture (H, W, 4) uint8 of `render`, or the visibility buffer of `visibility`.
+Input: `Mesh`, `Camera`. Output: the picture (H, W, 4) uint8 of `render`, or the visibility buffer of `rasterize_mesh`.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from topleft.adapt import MeshLike, as_mesh
 from topleft.api import Rasterizer, rasterize, wireframe
+from topleft.bend import BentMesh, bend
 from topleft.camera import Camera
-from topleft.fragments import Fragments
+from topleft.fragments import BentFragments, Fragments
 from topleft.mesh import Mesh
 from topleft.multisample import shade_samples
 from topleft.shade import DEFAULT_COLOR, as_color, eye_distance, shade
@@ -23,7 +25,7 @@ EDGE_COLOR = (24, 28, 40)
 
 
 def render(
-    mesh: Mesh,
+    mesh: MeshLike,
     camera: Camera | None = None,
     size: tuple[int, int] = DEFAULT_SIZE,
     *,
@@ -40,8 +42,8 @@ def render(
 
     Parameters
     ----------
-    mesh : Mesh
-        What to draw. Its colours are used if it has any.
+    mesh : Mesh, or whatever `as_mesh` takes
+        What to draw: a mesh of trimesh, meshio, pyvista, say. Its colours are used if it has any.
     camera : Camera, optional
         Unless given, the three-quarter view of `Camera.framing`, with y up.
     size : (width, height), pixels
@@ -81,9 +83,10 @@ def render(
     >>> tl.render(mesh, size=(64, 48), background=(0, 0, 0, 0))[24, 32].tolist()[3]
     255
     """
+    mesh = as_mesh(mesh)
     camera = default_camera(mesh, size) if camera is None else camera
     background = as_color("background", background, 4)
-    frags = visibility(mesh, camera, size, cull=cull, threads=threads, sampling=sampling, rasterizer=rasterizer)
+    frags = rasterize_mesh(mesh, camera, size, cull=cull, threads=threads, sampling=sampling, rasterizer=rasterizer)
     depth_range = distances(frags, camera) if shading == "depth" else None
 
     def shade_one(sample: Fragments) -> npt.NDArray[np.uint8]:
@@ -98,8 +101,8 @@ def render(
     return picture
 
 
-def visibility(
-    mesh: Mesh,
+def rasterize_mesh(
+    mesh: MeshLike,
     camera: Camera | None = None,
     size: tuple[int, int] = DEFAULT_SIZE,
     *,
@@ -130,13 +133,37 @@ def visibility(
     ValueError
         If the mesh has no triangles and no camera is given, an option is unknown, or `rasterizer` has another size.
     """
+    mesh = as_mesh(mesh)
     camera = default_camera(mesh, size) if camera is None else camera
-    view |= {"transform": camera.clip_from_world(view.get("viewport") or size), "cull": cull, "threads": threads}
+    view |= {"cull": cull, "threads": threads}
+    drawn = seen_through(mesh, camera, view.get("viewport") or size, near_clip=view.get("near_clip", True))
+    view["transform"] = drawn.transform
     if rasterizer is None:
-        return rasterize(mesh.vertices, mesh.triangles, size, **view)
-    if rasterizer.size != tuple(size):
+        frags = rasterize(drawn.vertices, drawn.triangles, size, **view)
+    elif rasterizer.size != tuple(size):
         raise ValueError(f"rasterizer must have the size {tuple(size)}, got {rasterizer.size}")
-    return rasterizer.rasterize(mesh.vertices, mesh.triangles, **view)
+    else:
+        frags = rasterizer.rasterize(drawn.vertices, drawn.triangles, **view)
+    if drawn.bent is None:
+        return frags
+    return BentFragments(frags, drawn.bent.source, drawn.bent.weights, mesh.triangles, len(mesh.vertices))
+
+
+class Drawn(NamedTuple):
+    """What the verbs draw of a mesh."""
+
+    vertices: npt.NDArray[Any]
+    triangles: npt.NDArray[np.integer[Any]]
+    transform: npt.NDArray[np.float64]
+    bent: BentMesh | None
+
+
+def seen_through(mesh: Mesh, camera: Camera, frame: tuple[int, int], *, near_clip: bool = True) -> Drawn:
+    """The mesh as it is, and the camera's matrix for a whole picture of this size; or as the camera's lens bends it."""
+    if camera.lens is None:
+        return Drawn(mesh.vertices, mesh.triangles, camera.clip_from_world(frame), None)
+    bent = bend(mesh.vertices, mesh.triangles, camera, camera.lens, frame, near_clip=near_clip)
+    return Drawn(bent.points_eye, bent.triangles, camera.clip_from_eye(frame), bent)
 
 
 def draw_edges(
@@ -150,9 +177,13 @@ def draw_edges(
 ) -> None:
     """Draw the edges of the mesh over its picture (H, W, 4), those that the visibility buffer does not hide."""
     height, width = frags.depth.shape
+    size = width, height
+    vertices, triangles, transform, bent = seen_through(mesh, camera, size)
+    if bent is not None:
+        triangles, cull = bent.outline(transform, cull), "none"
     lines = wireframe(
-        mesh.vertices, mesh.triangles, (width, height), transform=camera.clip_from_world((width, height)),
-        depth=depth_behind(frags.depth), antialias=True, cull=cull, threads=threads,
+        vertices, triangles, size, transform=transform, depth=depth_behind(frags.depth), antialias=True, cull=cull,
+        threads=threads,
     )  # fmt: skip
     on = lines > 0
     share = lines[on][:, None]

@@ -9,16 +9,16 @@ from typing import Any
 
 import numpy.typing as npt
 
+from topleft.adapt import MeshLike, as_mesh
 from topleft.api import coverage
 from topleft.camera import Camera
-from topleft.mesh import Mesh
-from topleft.render import DEFAULT_SIZE, default_camera
+from topleft.render import DEFAULT_SIZE, default_camera, seen_through
 
 __all__ = ["silhouette"]
 
 
 def silhouette(
-    mesh: Mesh,
+    mesh: MeshLike,
     camera: Camera | None = None,
     size: tuple[int, int] = DEFAULT_SIZE,
     *,
@@ -32,7 +32,7 @@ def silhouette(
 
     Parameters
     ----------
-    mesh : Mesh
+    mesh : Mesh, or whatever `as_mesh` takes
         What to look at.
     camera : Camera, optional
         Unless given, the three-quarter view of `Camera.framing`, with y up.
@@ -75,8 +75,9 @@ def silhouette(
     >>> round(float(tl.silhouette(mesh, size=(8, 6), sampling="area", cull="back").sum()), 2)
     16.2
     """
+    mesh = as_mesh(mesh)
     camera = default_camera(mesh, size) if camera is None else camera
-    transform = camera.clip_from_world(view.get("viewport") or size)
-    options: Any = {"transform": transform, "sampling": sampling, "cull": cull, "threads": threads} | view
-    mask: npt.NDArray[Any] = coverage(mesh.vertices, mesh.triangles, size, out=out, **options)
+    drawn = seen_through(mesh, camera, view.get("viewport") or size, near_clip=view.get("near_clip", True))
+    options: Any = {"transform": drawn.transform, "sampling": sampling, "cull": cull, "threads": threads} | view
+    mask: npt.NDArray[Any] = coverage(drawn.vertices, drawn.triangles, size, out=out, **options)
     return mask
