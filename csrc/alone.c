@@ -86,7 +86,7 @@ TL_INLINE void walk_rows(const tl_triangle *t, const tl_window *window, const tl
             const vd z = vd_set1(z_row[k]);
             for (int32_t col = first[k]; col < end[k]; col += TL_LANES) {
                 const vd x = vd_add(xs, vd_set1(col * step));
-                put_depths(target, sink, at + col, vm_first(end[k] - col), sum_depth(z, vd_mul(slope_x, x)), vi_set1(t->id));
+                put_depths(target, sink, at + col, vm_first(end[k] - col), sum_depth(z, vd_mul(slope_x, x)), t->id);
             }
         }
     }
@@ -105,7 +105,7 @@ TL_INLINE void draw_triangle(const tl_vertex_set *set, const int32_t *corners, i
         return;
     if (!clip_box(&t, window))
         return;
-    t.id = id;
+    t.id = id + scene->first_id;
     setup_sink(&t, window, sink);
     const int is_auto = scene->method == TL_METHOD_AUTO;
     const int by_edge = scene->method == TL_METHOD_EDGE || (is_auto && t.col1 - t.col0 <= TL_EDGE_MAX_WIDTH);

@@ -3,6 +3,7 @@
 #include "fixed.h"
 #include "lanes.h"
 
+#include "peel.c"
 #include "alone.c"
 #include "batch.c"
 #include "rows.c"
@@ -100,7 +101,7 @@ TL_INLINE void draw_batch(batch_state *s, tl_sink sink, const int32_t *corners, 
         lane_triangles t;
         vd z[3];
         place_triangles(s, sink, &c, col, row, &t, z);
-        draw_tiny(s, sink, &t, z, tiny, n_cols, n_rows, id);
+        draw_tiny(s, sink, &t, z, tiny, n_cols, n_rows, vi_add(id, vi_set1(s->scene->first_id)));
     }
     if (vm_any(small)) {
         push(&s->small, small, col, row, n_cols, n_rows, id);
@@ -208,6 +209,10 @@ static void clear_depth(float *depth, int64_t n, float value)
 static void clear(const tl_window *window, const tl_target *target)
 {
     const float farthest = target->sink == TL_SINK_FARTHEST ? -INFINITY : INFINITY;
+    if (target->sink == TL_SINK_PEEL) {
+        clear_layers(window, target);
+        return;
+    }
     if (target->sink == TL_SINK_MASK || target->sink == TL_SINK_SAMPLES) {
         const int64_t n_bits = target->stride_px * window->height << target->sample_bits;
         memset(target->covered, 0, (size_t)tl_covered_words(n_bits) * sizeof(uint64_t));
@@ -230,7 +235,7 @@ static int64_t draw(const tl_scene *scene, const tl_window *window, const tl_tar
         tl_target part = *target;
         band.y_px += row;
         band.height = min64(rows_at_once, window->height - row);
-        part.pixels = (char *)target->pixels + row * target->stride_px * pixel_bytes;
+        part.pixels = target->pixels ? (char *)target->pixels + row * target->stride_px * pixel_bytes : NULL;
         part.depth = target->depth ? target->depth + row * target->stride_px : NULL;
         part.n_samples = part.stride_px * (band.height - 1) + band.width;
         int64_t bad_row = -1;

@@ -275,3 +275,40 @@ def test_render_edges_through_a_lens_leave_out_culled_triangles(cull):
     shown = tl.rasterize_mesh(triangle, camera, SIZE, cull=cull).mask.any()
     drawn = (tl.render(triangle, camera, SIZE, cull=cull, edges=True) != 255).any()
     assert shown == drawn == (cull == "front")
+
+
+def textured_ground():
+    noise = np.random.default_rng(2).integers(0, 256, (64, 64, 3)).astype(np.uint8)
+    uv = np.array([[0, 0], [3, 0], [3, 3], [0, 3]])
+    material = tl.Material(texture=tl.Texture(np.kron(noise[:8, :8], np.ones((8, 8, 1), np.uint8))))
+    vertices = [[-2, 1, 1], [2, 1, 1], [2, -1, 5], [-2, -1, 5]]
+    return Mesh(vertices, [[0, 2, 1], [0, 3, 2]], uv=uv, materials=(material,))
+
+
+@pytest.mark.parametrize("sampling", ["center", "msaa4"])
+@pytest.mark.parametrize("shading", ["smooth", "flat", "unlit", "normals", "ids", "depth"])
+def test_lens_without_distortion_shades_as_no_lens_does(shading, sampling):
+    camera = replace(camera_of({}, np.eye(4)), lens=tl.OpenCVLens())
+    options = {"shading": shading, "sampling": sampling}
+    for mesh in (textured_ground(), Mesh(CUBE.vertices + [0, 0, 4], CUBE.triangles)):
+        expected = tl.render(mesh, camera.straightened(), SIZE, **options).astype(int)
+        got = tl.render(mesh, camera, SIZE, **options).astype(int)
+        assert (expected[..., 0] != 255).sum() > 500
+        off = np.abs(got - expected).max(-1)
+        # Texels at the border of two may be the other one; with several samples a part is shaded once in a pixel, so
+        # the texture is looked up twice along the cuts.
+        assert (off > 1).mean() < (0.002 if sampling == "center" else 0.08)
+        assert off.mean() < 2
+
+
+@pytest.mark.parametrize("lens", [BARREL, FISHEYE])
+def test_texture_through_a_lens_is_that_of_a_fine_mesh(lens):
+    mesh = textured_ground()
+    camera = camera_of(lens, np.eye(4))
+    vertices, triangles = cut_finely(mesh, 48)
+    uv = cut_finely(Mesh(np.pad(mesh.uv, ((0, 0), (0, 1))), mesh.triangles), 48)[0][:, :2]
+    expected = tl.render(Mesh(vertices, triangles, uv=uv, materials=mesh.materials), camera, SIZE, shading="unlit")
+    got = tl.render(mesh, camera, SIZE, shading="unlit")
+    both = (got[..., :3] != 255).any(-1) & (expected[..., :3] != 255).any(-1)
+    assert both.sum() > 2000
+    assert np.abs(got[both].astype(int) - expected[both]).mean() < 4  # an eighth of a pixel of a texture with edges

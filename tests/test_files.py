@@ -10,6 +10,7 @@ import pytest
 
 from topleft import files, scenes
 from topleft.errors import MeshError, MissingPackageError
+from topleft.images import save_image
 from topleft.mesh import Mesh, face_normals
 
 trimesh = pytest.importorskip("trimesh")
@@ -57,9 +58,46 @@ def test_load_obj_groups_are_one_mesh_in_the_order_of_the_file(write):
     assert mesh.triangles.tolist() == [[0, 1, 2], [0, 2, 3], [3, 1, 0]]
 
 
-def test_load_obj_texture_seam_splits_no_vertex(write):
+def test_load_obj_texture_seam_doubles_vertices_but_not_normals(write):
     text = SQUARE + "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 .5\nf 1/1 2/2 3/3\nf 1/4 3/1 4/2\n"
-    assert len(files.load(write("a.obj", text)).vertices) == 4
+    mesh = files.load(write("a.obj", text))
+    assert mesh.uv[mesh.triangles].tolist() == [[[0, 0], [1, 0], [1, 1]], [[0, 0.5], [0, 0], [1, 0]]]
+    assert len(mesh.vertices) == 6
+    assert (mesh.vertex_normals() == [0, 0, 1]).all()
+    whole = files.load(write("b.obj", SQUARE + "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3\nf 1/1 3/3 4/4\n"))
+    assert len(whole.vertices) == 4
+
+
+MTL = "newmtl red\nKd 1 0 0\nKs .5 .5 .5\nNs 20\nnewmtl picture\nKd 0 0 0\nmap_Kd a.png\n"
+
+
+def test_load_obj_materials_come_with_their_triangles(write, tmp_path):
+    save_image(tmp_path / "a.png", np.full((1, 2, 3), (0, 0, 255), np.uint8))
+    write("a.mtl", MTL)
+    faces = "usemtl picture\nf 1/1 2/2 3/3\nusemtl red\nf 1/1 3/3 4/4\n"
+    mesh = files.load(write("a.obj", "mtllib a.mtl\n" + SQUARE + "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n" + faces))
+    assert mesh.material_of_triangle.tolist() == [0, 1]
+    picture, red = mesh.materials
+    assert picture.texture.image.tolist() == [[[0, 0, 255, 255]] * 2]
+    assert (red.color, red.texture, red.shininess) == ((255, 0, 0), None, 20)
+    assert red.specular == pytest.approx(0.5, abs=0.01)  # trimesh keeps bytes
+
+
+def test_load_gltf_base_color_is_light_and_its_cutout_is_kept(tmp_path):
+    trimesh = pytest.importorskip("trimesh")
+    shape = trimesh.creation.box()
+    shape.visual = trimesh.visual.TextureVisuals(
+        uv=np.zeros((8, 2)),
+        material=trimesh.visual.material.PBRMaterial(
+            baseColorFactor=[0.5, 0.0, 1.0, 1.0], roughnessFactor=0.5, alphaMode="MASK", alphaCutoff=0.25
+        ),
+    )
+    shape.export(tmp_path / "a.glb")
+    (material,) = files.load(tmp_path / "a.glb").materials
+    assert material.color[0] == pytest.approx(188, abs=1)  # half the light, in bytes
+    assert material.color[1:] == (0, 255)
+    assert (material.alpha_cutoff, material.shininess) == (0.25, pytest.approx(30))
+    assert 0 < material.specular < 1
 
 
 def test_load_obj_doubled_vertices_become_one(write):

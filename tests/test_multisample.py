@@ -11,7 +11,7 @@ from comparing import assert_same
 import topleft as tl
 from topleft.methods.reference_sampling import mean
 from topleft.resolve import srgb_tables
-from topleft.shade import GREY_OF_FARTHEST, GREY_OF_NEAREST, id_colors
+from topleft.shade import GREY_OF_FARTHEST, GREY_OF_NEAREST, id_colors, picture_of_numbers
 
 SIZE = (48, 36)
 KNOT = tl.Mesh(*tl.scenes.shape("torus-knot"))
@@ -49,12 +49,12 @@ def test_outline_over_nothing_has_the_colour_of_the_surface():
 def test_a_triangle_is_shaded_once_in_a_pixel(monkeypatch):
     shaded = []
 
-    def count(frags, *arguments, **options):
+    def count(frags, *arguments):
         shaded.append(int(frags.mask.sum()))
-        return tl.shade(frags, *arguments, **options)
+        return picture_of_numbers(frags, *arguments)
 
-    monkeypatch.setattr(sys.modules["topleft.render"], "shade", count)
-    tl.render(KNOT, size=SIZE, sampling="msaa8")
+    monkeypatch.setattr(sys.modules["topleft.shade"], "picture_of_numbers", count)
+    tl.render(KNOT, size=SIZE, sampling="msaa8", shading="ids")
     ids = tl.rasterize_mesh(KNOT, size=SIZE, sampling="msaa8").samples_triangle
     pairs = sum(len(set(pixel) - {-1}) for row in ids.tolist() for pixel in row)
     assert sum(shaded) == pairs

@@ -185,7 +185,7 @@ def test_visibility_window_is_the_crop():
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"shading": "toon"}, "shading must be one of 'smooth', 'flat', 'ids', 'depth', 'normals', got 'toon'"),
+        ({"shading": "toon"}, "shading must be one of 'smooth', .*'matcap', 'ids', 'depth', 'normals', got 'toon'"),
         ({"color": (1, 2)}, r"color must be 3 numbers of 0 to 255, got \(1, 2\)"),
         ({"background": (1, 2, 256)}, r"background must be 4 numbers of 0 to 255, got \(1, 2, 256\)"),
         ({"cull": "side"}, "cull must be one of 'none', 'back', 'front', got 'side'"),

@@ -10,6 +10,7 @@ VERTEX_BYTES: int
 CELL_CLEAR: int
 PLANE_DOUBLES: int
 AREA_OVERFLOW: int
+MAX_LAYERS: int
 SCALARS: dict[np.dtype[Any], int]
 
 def use_isa(name: str) -> None: ...
@@ -46,6 +47,8 @@ class View:
         near_clip: bool,
         far_clip: bool,
     ) -> None: ...
+    @property
+    def viewport(self) -> tuple[int, int]: ...
 
 class Source:
     is_clip_space: bool
@@ -71,6 +74,8 @@ class Pieces:
     def __len__(self) -> int: ...
 
 class Scene:
+    view: View | None
+    subpixel_bits: int
     def __init__(
         self,
         source: Source,
@@ -84,9 +89,14 @@ class Scene:
         cull: int,
         method: int,
         test: int = 0,
+        view: View | None = None,
     ) -> None: ...
     def seen_from(self, x_fx: int, y_fx: int) -> Scene: ...
-    def draw(self, target: Target, first_row: int, n_rows: int) -> int: ...
+    def numbered_from(self, first_id: int) -> Scene: ...
+    def moved(self, x_px: int, y_px: int) -> Scene: ...
+    def draw(
+        self, target: Target, first_row: int, n_rows: int, is_first: bool = True, is_last: bool = True
+    ) -> int: ...
     def draw_share(
         self, target: Target, first_row: int, n_rows: int, first: int, others: NDArray[np.int32]
     ) -> tuple[int, int]: ...
@@ -184,6 +194,28 @@ class Bins:
 def draw_bands(
     scenes: Sequence[Scene], targets: Sequence[Target], bins: Bins, first_band: int, end_band: int
 ) -> None: ...
+def peel(
+    scenes: Sequence[Scene],
+    bins: Sequence[Bins | None],
+    ids: NDArray[np.int32],
+    depth: NDArray[np.float32],
+    is_farthest: bool,
+    band_bits: int,
+    first_band: int,
+    end_band: int,
+) -> int: ...
+
+def composite(
+    ids: NDArray[np.int32],
+    first_row: int,
+    n_rows: int,
+    colors: NDArray[np.uint8],
+    is_flat: bool,
+    is_u8: bool,
+    n_channels: int,
+    background: NDArray[np.float32] | None,
+    pixels: NDArray[np.uint8],
+) -> None: ...
 
 class Transfer:
     def __init__(
@@ -210,4 +242,72 @@ def mean_colors(
     n_rows: int,
     n_channels: int,
     transfer: Transfer | None,
+) -> None: ...
+
+class Texture:
+    def __init__(
+        self, texels: NDArray[np.uint16], levels: NDArray[np.int32], filter_code: int, wrap_u: int, wrap_v: int
+    ) -> None: ...
+
+class Shading:
+    def __init__(
+        self,
+        normals: NDArray[np.float32],
+        face_normals: NDArray[np.float32] | None,
+        positions: NDArray[Any],
+        is_turned: NDArray[np.uint8] | None,
+        uv: NDArray[np.float32] | None,
+        colors: NDArray[np.float32] | None,
+        material_of: NDArray[np.int32] | None,
+        decode: NDArray[np.float32],
+    ) -> None: ...
+    def set_materials(self, materials: Sequence[tuple[Any, ...]]) -> None: ...
+    def set_lights(self, lights: Sequence[tuple[Any, ...]], ambient: Sequence[float]) -> None: ...
+    def set_view(
+        self,
+        show: int,
+        matcap: Texture | None,
+        eye_from: NDArray[np.float64],
+        has_perspective: bool,
+        eye: NDArray[np.float64],
+        ray: NDArray[np.float64],
+        background: Sequence[float],
+        background_bytes: Sequence[int],
+    ) -> None: ...
+    def set_fog(
+        self, color: Sequence[float], near: float, scale: float, distance_start: float, distance_scale: float
+    ) -> None: ...
+
+def set_inverse_w(scene: Scene, rows: NDArray[np.float32], out: NDArray[np.float32]) -> None: ...
+def shade(
+    scene: Scene,
+    view: View | None,
+    shading: Shading,
+    ids: NDArray[np.int32],
+    depth: NDArray[np.float32],
+    pixels: NDArray[np.uint8],
+    first_row: int,
+    n_rows: int,
+) -> None: ...
+def shade_samples(
+    scene: Scene,
+    view: View | None,
+    shading: Shading,
+    positions: NDArray[np.int32],
+    ids: NDArray[np.int32],
+    depth: NDArray[np.float32],
+    pixels: NDArray[np.uint8],
+    first_row: int,
+    n_rows: int,
+) -> None: ...
+def cut_out(
+    scene: Scene,
+    view: View | None,
+    shading: Shading,
+    opaque: NDArray[np.int32],
+    triangles: NDArray[np.int32],
+    ids: NDArray[np.int32],
+    depth: NDArray[np.float32],
+    first_row: int,
+    n_rows: int,
 ) -> None: ...

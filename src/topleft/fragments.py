@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine
 from topleft.arrays import as_values
+from topleft.mesh import Mesh
 
 __all__ = ["Fragments"]
 
@@ -28,6 +29,8 @@ class Fragments:
         Depth of that triangle at the pixel's centre; the background's value elsewhere.
     mask : ndarray of bool, shape (H, W)
         Where there is a triangle.
+    id, instance : ndarray of int32, shape (H, W)
+        The same as `triangle`, and 0 where there is one: of several instances `SceneFragments` tells more.
     samples_triangle, samples_depth : ndarray of int32 and of float32, shape (H, W, S)
         The same for each sample, with several a pixel. `triangle`, `depth`, `mask` and the attributes are then those of
         the first sample, which is nearest to the centre; `sample` gives those of another.
@@ -46,7 +49,7 @@ class Fragments:
         n_vertices: int,
         n_triangles: int,
     ) -> None:
-        self.triangle = triangle
+        self.id = triangle
         self._depth = depth
         self._scene = scene
         self._n_vertices = n_vertices
@@ -62,6 +65,16 @@ class Fragments:
         return png_of_fragments(self)
 
     @property
+    def triangle(self) -> NDArray[np.int32]:
+        """Index of the triangle that shows in the pixel, int32 (H, W), -1 where there is none."""
+        return self.id
+
+    @property
+    def instance(self) -> NDArray[np.int32]:
+        """Index of the mesh that shows in the pixel, int32 (H, W): 0, -1 where there is none."""
+        return np.minimum(self.id, 0)
+
+    @property
     def depth(self) -> NDArray[np.float32]:
         """Depth of each pixel, float32 (H, W); made now where all triangles lie at 0."""
         if not isinstance(self._depth, np.ndarray):
@@ -71,7 +84,7 @@ class Fragments:
     @property
     def samples_triangle(self) -> NDArray[np.int32]:
         """Indices of triangles by sample, int32 (H, W, S)."""
-        return self.triangle[..., None] if self._planes is None else np.moveaxis(self._planes[0], 0, -1)
+        return self.id[..., None] if self._planes is None else np.moveaxis(self._planes[0], 0, -1)
 
     @property
     def samples_depth(self) -> NDArray[np.float32]:
@@ -81,7 +94,7 @@ class Fragments:
     @property
     def mask(self) -> NDArray[np.bool_]:
         """Where there is a triangle, bool (H, W)."""
-        return self.triangle >= 0
+        return self.id >= 0
 
     @classmethod
     def of_samples(
@@ -189,6 +202,7 @@ class BentFragments(Fragments):
     def __init__(
         self,
         parts: Fragments,
+        drawn: NDArray[np.int64],
         source: NDArray[np.int64],
         weights: NDArray[np.float64],
         triangles: NDArray[np.integer[Any]],
@@ -197,15 +211,48 @@ class BentFragments(Fragments):
         wholes = np.append(source, -1).astype(np.int32)  # part -1, none, is the last
         super().__init__(wholes[parts.triangle], parts.depth, parts._scene, n_vertices, len(triangles))
         self._samples = tuple(
-            BentFragments(sample, source, weights, triangles, n_vertices) for sample in parts._samples
+            BentFragments(sample, drawn, source, weights, triangles, n_vertices) for sample in parts._samples
         )
-        self.samples_triangle, self.samples_depth = wholes[parts.samples_triangle], parts.samples_depth
-        self._parts, self._source, self._weights, self._triangles = parts, source, weights, triangles
+        self._planes = parts._planes and (wholes[parts._planes[0]], parts._planes[1])
+        self._parts, self._drawn = parts, drawn
+        self._source, self._weights, self._triangles = source, weights, triangles
+
+    @property
+    def parts(self) -> Fragments:
+        """The visibility buffer of the parts, as drawn."""
+        return self._parts
+
+    def again(self) -> BentFragments:
+        """Return the same made anew from the parts, whose buffers have changed."""
+        return self._of(self._parts)
+
+    def _of(self, parts: Fragments) -> BentFragments:
+        return BentFragments(parts, self._drawn, self._source, self._weights, self._triangles, self._n_vertices)
+
+    def mesh_of_parts(self, mesh: Mesh) -> Mesh:
+        """Return the parts as a mesh: positions and attributes of the mesh where the parts have corners."""
+        corners = self._triangles[self._source]
+
+        def spread(values: NDArray[Any]) -> NDArray[np.float64]:
+            of_parts = np.zeros((int(self._drawn.max(initial=-1)) + 1, values.shape[1]))
+            of_parts[self._drawn.ravel()] = np.matmul(self._weights, values[corners]).reshape(-1, values.shape[1])
+            return of_parts
+
+        rows = mesh.material_of_triangle
+        return Mesh(
+            spread(mesh.vertices),
+            self._drawn.astype(np.int32),
+            spread(mesh.vertex_normals()),
+            None if mesh.colors is None else np.rint(spread(mesh.colors)).astype(np.uint8),
+            None if mesh.uv is None else spread(mesh.uv).astype(np.float32),
+            mesh.materials,
+            None if rows is None else rows[self._source],
+        )
 
     def only(self, rows: NDArray[np.intp], cols: NDArray[np.intp]) -> Fragments:
         """Return what is left when no other pixels than these show a triangle."""
         parts = self._parts.only(rows, cols)
-        return BentFragments(parts, self._source, self._weights, self._triangles, self._n_vertices)
+        return self._of(parts)
 
     def barycentric(self) -> NDArray[np.float32]:
         """Return the weights of the three vertices of the triangle that shows in each pixel."""
