@@ -148,8 +148,8 @@ cdef extern from "topleft.h" nogil:
         float *color
         float *back_color
         float *specular
-        float shininess, cutoff
-        int has_back_color, is_unlit
+        float back_side, shininess, cutoff
+        int is_unlit
         const tl_texture *texture
     ctypedef struct tl_light:
         tl_light_kind kind

@@ -5,6 +5,7 @@ Input: `SceneFragments`, `Scene`, `Camera`. Output: a picture (H, W, 4) uint8, s
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -15,6 +16,8 @@ from topleft.camera import Camera
 from topleft.colors import id_colors
 from topleft.cutout import has_holes
 from topleft.fragments import Fragments
+from topleft.frame import is_similarity
+from topleft.light import Light, LightKind, LightSpace
 from topleft.material import Material
 from topleft.scene import Instance, Scene
 from topleft.scene_fragments import SceneFragments
@@ -33,6 +36,22 @@ def cull_of(cull: str, instance: Instance) -> str:
     return {"back": "front", "front": "back"}.get(cull, cull) if instance.is_mirrored else cull
 
 
+def lights_of(lights: Sequence[Light] | None, camera: Camera, instance: Instance) -> Sequence[Light] | None:
+    """The lights as they stand in the object space of an instance, as bright as they are in the world."""
+    if lights is None:
+        return None
+    object_from_world = np.linalg.inv(instance.transform)
+    # `Look` measures distances in object space where the way to the eye keeps angles, else in eye space.
+    in_object_space = is_similarity(camera.view @ instance.transform)
+    scale = np.cbrt(abs(np.linalg.det(instance.transform[:3, :3]))) if in_object_space else 1.0
+    moved = []
+    for light in lights:
+        at = np.array([*light.at, light.kind == LightKind.POINT])
+        at = at if light.space == LightSpace.EYE else object_from_world @ at
+        moved.append(replace(light, at=tuple(at[:3]), falloff=float(light.falloff * scale**2)))
+    return moved
+
+
 def refuse_holes(scene: Scene, material: Material | None) -> None:
     """Raise an error where a material cuts something out: what lies behind a hole may belong to another instance."""
     for i, instance in enumerate(scene):
@@ -49,8 +68,10 @@ def shade_scene(
     picture[...] = background
     if not isinstance(frags, SceneFragments):
         raise TypeError(f"frags must be what rasterize_mesh returns of a scene, got {type(frags).__name__}")
+    lights: Sequence[Light] | None = look.pop("lights", None)
     for part in frags.parts:
         instance = scene[part.instance]
+        look["lights"] = lights_of(lights, camera, instance)
         own = shade(
             part.frags, instance.mesh, camera_of(camera, instance), background=background, shading=shading, **look
         )
