@@ -17,7 +17,7 @@ from benchmarks import machine
 from benchmarks.pictures_scenes import SCENES, SIZE, PictureScene, draw
 
 SNAP_PX = 2.0**-8
-"""Either renderer moves a corner by half a sub-pixel of 2^-8 in x and in y, 0.71 of 2^-8 px; the rest is for float32."""
+"""Either renderer moves a corner by half of 2^-8 px in x and in y, 0.71 of 2^-8 px in all; the rest is for float32."""
 
 CONTRAST = 64
 GAP_PX = 6
@@ -50,7 +50,7 @@ def run_pictures(log: TextIO, names: list[str], folder: Path | None = None) -> d
         scene = SCENES[name]()
         ours, theirs = Drawn(*draw(scene)), Drawn(*peer.draw(scene))
         rows.append({"scene": name, "what": scene.what, "n_triangles": len(scene.mesh.triangles)})
-        rows[-1] |= compare(ours, theirs, partial(outline_px, scene)) | {"bound": scene.bound}
+        rows[-1] |= compare(ours, theirs, partial(outline_px, scene))
         print(f"{name}: mean {rows[-1]['mean']}, {rows[-1]['n_unexplained']} pixels unexplained", file=log)
         if folder is not None:
             write_sheet(sheet_path(folder, name), ours.color, theirs.color)
@@ -58,6 +58,7 @@ def run_pictures(log: TextIO, names: list[str], folder: Path | None = None) -> d
         "kind": "pictures",
         "machine": machine.describe_machine(),
         "versions": {"topleft": tl.build_info()["version"], "moderngl": machine.version_of("moderngl")},
+        "isa": tl.build_info()["isa"],
         "renderer": peer.renderer,
         "environment": ENVIRONMENT,
         "date": machine.now(),
@@ -149,7 +150,7 @@ def sheet_path(folder: Path, name: str) -> Path:
 
 
 def write_sheet(path: Path, ours: np.ndarray, theirs: np.ndarray) -> None:
-    """Write both pictures and their difference, `CONTRAST` times and from black on, side by side; pixels as they are."""
+    """Write both pictures and `CONTRAST` times their difference, side by side; pixels as they are."""
     from PIL import Image
 
     difference = np.minimum(CONTRAST * np.abs(ours.astype(int) - theirs), 255).astype(np.uint8)

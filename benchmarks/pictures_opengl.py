@@ -20,9 +20,7 @@ ENVIRONMENT = {
     "LIBGL_ALWAYS_SOFTWARE": "1",
     "GALLIUM_DRIVER": "llvmpipe",
     "LP_NUM_THREADS": "0",
-    "GALLIVM_PERF": "no_brilinear,no_rho_approx,no_quad_lod,no_aos_sampling",
 }
-"""llvmpipe's short cuts of texture filters are off: they are meant for speed, and other drivers have others."""
 
 MAX_LIGHTS = 8
 """That the shader has room for."""
@@ -48,6 +46,7 @@ FRAGMENT_SHADER = """
 #version 330
 const int HEADLIGHT = 0, LIGHTS = 1, MATCAP = 2, MAX_LIGHTS = 8;
 uniform int kind, n_lights;
+uniform bool own_level;
 uniform bool mirror_u, mirror_v; // moderngl knows repeat and clamp alone
 uniform bool has_texture, has_colors, has_back;
 uniform vec3 front_color, back_color, ambient, to_headlight, eye, fog_color;
@@ -77,7 +76,10 @@ void main() {
     if (has_colors) base *= light_of(floor(color_srgb + 0.5) / 255);
     if (has_texture) {
         vec2 folded = 1 - abs(mod(at, 2) - 1);
-        base *= texture(image, vec2(mirror_u ? folded.x : at.x, mirror_v ? folded.y : at.y)).rgb;
+        vec2 uv = vec2(mirror_u ? folded.x : at.x, mirror_v ? folded.y : at.y);
+        vec2 right = dFdx(at) * textureSize(image, 0), up = dFdy(at) * textureSize(image, 0);
+        float level = 0.5 * log2(max(dot(right, right), dot(up, up)));
+        base *= (own_level ? textureLod(image, uv, level) : texture(image, uv)).rgb;
     }
     if (has_back && !gl_FrontFacing) base = light_of(back_color / 255);
     vec3 light;
@@ -148,9 +150,9 @@ class OpenGL:
         self.frame.clear(0, 0, 0, 0, depth=1.0)
         mesh.render()
         width, height = SIZE
-        pixels = self.frame.read(components=3, alignment=1)
-        ids = np.frombuffer(self.frame.read(components=1, attachment=1, dtype="i4"), np.int32).reshape(height, width) - 1
+        pixels, numbers = self.frame.read(alignment=1), self.frame.read(attachment=1, components=1, dtype="i4")
         picture = np.frombuffer(pixels, np.uint8).reshape(height, width, 3)
+        ids = np.frombuffer(numbers, np.int32).reshape(height, width) - 1
         return np.where(ids[..., None] < 0, np.uint8(255), picture), ids
 
     def upload(self, texture: tl.Texture) -> Any:
@@ -213,6 +215,7 @@ def uniforms(scene: PictureScene) -> dict[str, Any]:
         "eye": eye_axes[:3, 3] if has_perspective else eye_axes[:3, 2],
         "kind": 2 if options.get("shading") == "matcap" else 0 if lights is None else 1,
         "has_texture": texture is not None,
+        "own_level": scene.own_level,
         "mirror_u": wraps[0] == "mirror",
         "mirror_v": wraps[1] == "mirror",
         "has_colors": mesh.colors is not None,

@@ -29,18 +29,18 @@ class PictureScene:
     camera : Camera
     options : dict
         Further options of `tl.render`.
-    bound : float
-        Grey levels: how large the mean difference inside may be.
     placed : Scene, optional
         What topleft draws instead: the same triangles as instances.
+    own_level : bool
+        Whether the shader computes the level of detail, instead of OpenGL.
     """
 
     what: str
     mesh: tl.Mesh
     camera: tl.Camera
     options: dict[str, Any] = field(default_factory=dict)
-    bound: float = 1.0
     placed: tl.Scene | None = None
+    own_level: bool = False
 
     @property
     def material(self) -> tl.Material:
@@ -60,7 +60,8 @@ def tiles(side: int = 64) -> np.ndarray:
     row, column = np.mgrid[:side, :side] / side
     is_odd = (np.floor(4 * row) + np.floor(4 * column)) % 2 == 1
     joint = (np.minimum(row * 4 % 1, column * 4 % 1) < 1 / 16)[..., None]
-    warm, cool = [240 - 90 * row, 150 - 60 * column, 60 + 20 * row], [70 + 80 * column, 150 + 30 * row, 230 - 70 * column]
+    warm = [240 - 90 * row, 150 - 60 * column, 60 + 20 * row]
+    cool = [70 + 80 * column, 150 + 30 * row, 230 - 70 * column]
     color = np.where(is_odd[..., None], np.stack(warm, -1), np.stack(cool, -1))
     return np.rint(np.where(joint, 40, color)).astype(np.uint8)
 
@@ -174,7 +175,7 @@ def place(scale: tuple[float, float, float], at: tuple[float, float, float], *, 
 
 
 def joined(scene: tl.Scene) -> tl.Mesh:
-    """The instances of a scene as one mesh in the world, its triangles in the same order, of the first one's materials."""
+    """The instances of a scene as one mesh in the world, its triangles in that order, of the first one's materials."""
     vertices, normals, triangles = [], [], []
     for instance in scene:
         linear, mesh = instance.transform[:3, :3], instance.mesh
@@ -195,11 +196,11 @@ def matcap() -> PictureScene:
     return PictureScene("torus knot, matcap", mesh, tl.Camera.framing(mesh, aspect=aspect()), options)
 
 
-def textured_cube(what: str, texture: tl.Texture, turns: float, **look: Any) -> PictureScene:
+def textured_cube(what: str, texture: tl.Texture, turns: float) -> PictureScene:
     """The texture on all sides of a cube."""
     vertices, triangles = tl.scenes.shape("cube")
     mesh = tl.Mesh(vertices, triangles, uv=uv_of_cube(vertices, turns), materials=[tl.Material(texture=texture)])
-    return PictureScene(what, mesh, cube_camera(), **look)
+    return PictureScene(what, mesh, cube_camera())
 
 
 def nearest() -> PictureScene:
@@ -209,20 +210,23 @@ def nearest() -> PictureScene:
 
 def bilinear() -> PictureScene:
     """Between the texels, repeated and clamped."""
-    return textured_cube("cube, bilinear, repeat and clamp", tl.Texture(tiles(16), "bilinear", ("repeat", "clamp")), 1.3)
+    texture = tl.Texture(tiles(16), "bilinear", ("repeat", "clamp"))
+    return textured_cube("cube, bilinear, repeat and clamp", texture, 1.3)
 
 
-def trilinear() -> PictureScene:
+def trilinear(what: str = "torus, trilinear, repeat", *, own_level: bool = False) -> PictureScene:
     """Many texels in a pixel, seen at an angle."""
     vertices, triangles = tl.scenes.shape("torus")
     material = tl.Material(texture=tl.Texture(tiles(64), "trilinear"))
     mesh = tl.Mesh(vertices, triangles, uv=2 * vertices[:, [0, 2]], materials=[material])
     camera = tl.Camera.framing(mesh, aspect=aspect(), elevation_deg=30)
-    return PictureScene("torus, trilinear, repeat", mesh, camera, bound=TRILINEAR_BOUND)
+    return PictureScene(what, mesh, camera, own_level=own_level)
 
 
-TRILINEAR_BOUND = 3.0
-"""OpenGL leaves the level of detail open: llvmpipe takes differences across two by two pixels, topleft derivatives."""
+def level() -> PictureScene:
+    """The same with the level of detail by the formula of topleft, of differences across two by two pixels."""
+    return trilinear("the same, level of detail in the shader", own_level=True)
+
 
 SCENES: Mapping[str, Callable[[], PictureScene]] = {
     "headlight": headlight,
@@ -236,4 +240,5 @@ SCENES: Mapping[str, Callable[[], PictureScene]] = {
     "nearest": nearest,
     "bilinear": bilinear,
     "trilinear": trilinear,
+    "level": level,
 }
