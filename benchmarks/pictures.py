@@ -6,6 +6,7 @@ In: the scenes of `pictures_scenes.py`. Out: a record of counts and grey levels,
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, TextIO
@@ -21,6 +22,7 @@ SNAP_PX = 2.0**-8
 
 CONTRAST = 64
 GAP_PX = 6
+N_VIEWS = 100
 
 
 class Drawn(NamedTuple):
@@ -44,6 +46,7 @@ def run_pictures(log: TextIO, names: list[str], folder: Path | None = None) -> d
 
     if unknown := [name for name in names if name not in SCENES]:
         raise ValueError(f"--scene must be some of {', '.join(SCENES)}, got {', '.join(unknown)}")
+    commit = machine.describe_commit()
     peer = OpenGL()
     rows = []
     for name in names or SCENES:
@@ -62,10 +65,36 @@ def run_pictures(log: TextIO, names: list[str], folder: Path | None = None) -> d
         "renderer": peer.renderer,
         "environment": ENVIRONMENT,
         "date": machine.now(),
-        **machine.describe_commit(),
+        **commit,
         "size": list(SIZE),
         "scenes": rows,
+        "outlines": compare_outlines(peer.draw),
     }
+
+
+def compare_outlines(draw_peer: Callable[[PictureScene], tuple[np.ndarray, np.ndarray]]) -> dict[str, Any]:
+    """Count what `compare` does of outlines, over views of the `headlight` scene from all sides."""
+    first = SCENES["headlight"]()
+    cameras = tl.viewpoints(first.mesh, N_VIEWS, aspect=SIZE[0] / SIZE[1])
+    rows = []
+    n_outline = 0
+    for camera in cameras:
+        scene = replace(first, camera=camera)
+        ours = Drawn(*draw(scene))
+        rows.append(compare(ours, Drawn(*draw_peer(scene)), partial(outline_px, scene)))
+        n_outline += count_outline(ours.triangle >= 0)
+    sums = {key: sum(row[key] for row in rows) for key in ("n_coverage", "n_triangle", "n_unexplained")}
+    worst = {key: max(row[key] for row in rows) for key in ("mean", "max_distance_px")}
+    return {"n_views": N_VIEWS, "n_outline": n_outline, **sums, **worst}
+
+
+def count_outline(is_covered: np.ndarray) -> int:
+    """Covered pixels with a neighbour, of four, that is not."""
+    all_around = np.ones_like(is_covered)
+    for axis in range(2):
+        for step in (1, -1):
+            all_around &= np.roll(is_covered, step, axis)
+    return int((is_covered & ~all_around).sum())
 
 
 def outline_px(scene: PictureScene, triangle: int) -> np.ndarray:

@@ -15,7 +15,7 @@ HEAD = ["scene", "what", "triangles", "inside px", "mean", "largest", "px that d
 
 def lines(record: Record) -> Iterator[str]:
     """The report of one record, Markdown."""
-    yield from (facts_text(record), "", differences_text(record))
+    yield from (facts_text(record), "", differences_text(record), "", outlines_text(record))
 
 
 def facts_text(record: Record) -> str:
@@ -40,6 +40,17 @@ def differences_text(record: Record) -> str:
     return "\n".join(table(HEAD, rows))
 
 
+def outlines_text(record: Record) -> str:
+    """What differs over many views."""
+    facts = record["outlines"]
+    return (
+        f"`headlight` from {facts['n_views']} sides: of {facts['n_outline']:,} pixels on outlines {facts['n_coverage']} are "
+        f"covered by one renderer alone; {facts['n_triangle']} others show another triangle. The farthest of both lies "
+        f"{facts['max_distance_px']:.5f} px from an edge, {facts['n_unexplained']} are unexplained. "
+        f"The largest mean difference inside is {facts['mean']:.4f}."
+    )
+
+
 def sheets_text(record: Record) -> str:
     """The sheets."""
     return "\n" + "\n\n".join(map(sheet_text, record["scenes"])) + "\n"
@@ -54,6 +65,7 @@ def sheet_text(row: Record) -> str:
 PARTS: Mapping[str, Callable[[Record], str]] = {
     "picture-facts": facts_text,
     "differences": differences_text,
+    "outlines": outlines_text,
     "sheets": sheets_text,
 }
 """What the markers of the page stand for."""
