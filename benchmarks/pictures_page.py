@@ -44,9 +44,9 @@ def outlines_text(record: Record) -> str:
     """What differs over many views."""
     facts = record["outlines"]
     return (
-        f"`headlight` from {facts['n_views']} sides: of {facts['n_outline']:,} pixels on outlines {facts['n_coverage']} are "
-        f"covered by one renderer alone; {facts['n_triangle']} others show another triangle. The farthest of both lies "
-        f"{facts['max_distance_px']:.5f} px from an edge, {facts['n_unexplained']} are unexplained. "
+        f"`headlight` from {facts['n_views']} sides has {facts['n_outline']:,} pixels on outlines. "
+        f"{facts['n_coverage']} are covered by one renderer alone, {facts['n_triangle']} others show another triangle, {facts['n_unexplained']} are "
+        f"unexplained: the farthest lies {facts['max_distance_px']:.5f} px from an edge. "
         f"The largest mean difference inside is {facts['mean']:.4f}."
     )
 

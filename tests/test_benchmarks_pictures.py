@@ -86,7 +86,7 @@ def test_outline_of_a_triangle_ends_at_the_near_plane():
     camera = tl.Camera.off_center(np.eye(4), left=-1, right=1, bottom=-1, top=1, near=1, far=9)
     corners = outline_px(PictureScene("", mesh, camera), 0)
     x, y = SIZE[0] / 2, SIZE[1] / 2
-    # Seen from the side, in its own plane: half way to (0, 0, 2) it is cut at z = -1, where 3/4 of its width are left.
+    # The edge from (1, 0, -2) to (0, 0, 2) is cut after a quarter of its way, at x = 0.75 and z = -1.
     assert np.allclose(corners, [(x, y), (1.5 * x, y), (1.75 * x, y), (x, y)], rtol=1e-12)
 
 
@@ -109,7 +109,7 @@ def test_kept_picture_of_opengl_is_what_topleft_draws(name):
     assert np.abs(ours.astype(int) - kept).max() <= 1  # a kernel may round the other way than the one of the record
     difference = np.abs(ours.astype(int) - theirs)[inside(ids)]
     assert difference.mean() < GOAL
-    assert (difference.max(axis=-1) > 8).mean() < 0.001  # pixels that show another triangle, which a sheet does not tell
+    assert (difference.max(axis=-1) > 8).mean() < 0.001  # these show another triangle
 
 
 def test_sheets_are_small():
