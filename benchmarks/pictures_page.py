@@ -45,8 +45,8 @@ def outlines_text(record: Record) -> str:
     facts = record["outlines"]
     return (
         f"`headlight` from {facts['n_views']} sides has {facts['n_outline']:,} pixels on outlines. "
-        f"{facts['n_coverage']} are covered by one renderer alone, {facts['n_triangle']} others show another triangle, {facts['n_unexplained']} are "
-        f"unexplained: the farthest lies {facts['max_distance_px']:.5f} px from an edge. "
+        f"{facts['n_coverage']} are covered by one renderer alone, {facts['n_triangle']} others show another triangle, "
+        f"{facts['n_unexplained']} are unexplained: the farthest lies {facts['max_distance_px']:.5f} px from an edge. "
         f"The largest mean difference inside is {facts['mean']:.4f}."
     )
 
