@@ -9,8 +9,8 @@ from benchmarks.report import table
 
 Record = dict[str, Any]
 
-HEAD = ["scene", "what", "triangles", "inside px", "mean", "largest", "px that differ", "other outline",
-        "other triangle", "farthest from an edge, px", "unexplained"]  # fmt: skip
+HEAD = ["scene", "what", "triangles", "inside", "mean", "largest", "differ", "other outline", "other triangle",
+        "off edge, px", "unexplained"]  # fmt: skip
 
 
 def lines(record: Record) -> Iterator[str]:
@@ -33,7 +33,7 @@ def differences_text(record: Record) -> str:
     """A row for each scene."""
     rows = [
         [f"`{row['scene']}`", row["what"], f"{row['n_triangles']:,}", f"{row['n_inside']:,}", f"{row['mean']:.4f}"]
-        + [str(row[key]) for key in ("max", "n_other", "n_coverage", "n_triangle")]
+        + [f"{row[key]:,}" for key in ("max", "n_other", "n_coverage", "n_triangle")]
         + [f"{row['max_distance_px']:.5f}" if row["n_coverage"] + row["n_triangle"] else "-", str(row["n_unexplained"])]
         for row in record["scenes"]
     ]
