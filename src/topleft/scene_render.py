@@ -46,6 +46,8 @@ def lights_of(lights: Sequence[Light] | None, camera: Camera, instance: Instance
     scale = np.cbrt(abs(np.linalg.det(instance.transform[:3, :3]))) if in_object_space else 1.0
     moved = []
     for light in lights:
+        if not isinstance(light, Light):
+            raise TypeError(f"lights must be of Light, got {type(light).__name__}")
         at = np.array([*light.at, light.kind == LightKind.POINT])
         at = at if light.space == LightSpace.EYE else object_from_world @ at
         moved.append(replace(light, at=tuple(at[:3]), falloff=float(light.falloff * scale**2)))
