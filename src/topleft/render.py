@@ -23,7 +23,7 @@ from topleft.mesh import Mesh
 from topleft.multisample import shade_samples
 from topleft.scene import Instance, Scene
 from topleft.scene_draw import draw_scene
-from topleft.scene_render import camera_of, cull_of, refuse_holes, shade_scene
+from topleft.scene_render import camera_of, cull_of, matrix_of, refuse_holes, shade_scene
 from topleft.shade import LookOptions, Shading, shade
 
 DEFAULT_SIZE = (640, 480)
@@ -84,7 +84,8 @@ def render(
     Raises
     ------
     ValueError
-        If the mesh has no triangles and no camera is given, or an option is unknown.
+        If the mesh has no triangles and no camera is given, an option is unknown, or a scene is to be seen through a
+        lens.
 
     Examples
     --------
@@ -165,13 +166,14 @@ def rasterize_mesh(
     Raises
     ------
     ValueError
-        If the mesh has no triangles and no camera is given, an option is unknown, or `rasterizer` has another size.
+        If the mesh has no triangles and no camera is given, an option is unknown, `rasterizer` has another size, or a
+        scene is to be seen through a lens.
     """
     mesh = mesh if isinstance(mesh, Scene) else as_mesh(mesh)
     camera = default_camera(mesh, size) if camera is None else camera
     view |= {"cull": cull, "threads": threads}
     if isinstance(mesh, Scene):
-        return draw_scene(mesh, camera.clip_from_world(view.get("viewport") or size), size, **view)
+        return draw_scene(mesh, matrix_of(camera, view.get("viewport") or size), size, **view)
     drawn = seen_through(mesh, camera, view.get("viewport") or size, near_clip=view.get("near_clip", True))
     view["transform"] = drawn.transform
     if rasterizer is None:
