@@ -1,4 +1,4 @@
-"""One fixed hypothesis profile; the command line as a fixture; the count of pixels compared with the exact reference."""
+"""One fixed hypothesis profile, the command line as a fixture, the count of pixels compared with the reference."""
 
 import comparing
 import pytest
