@@ -88,7 +88,7 @@ def test_layers_in_kept_memory_are_those_without(sampling):
         assert list(found) == order
         for name in names:
             assert np.array_equal(found[name], alone[name], equal_nan=name != "color")
-    assert np.shares_memory(found["depth"], kept.rasterize(np.zeros((3, 2)), [[0, 1, 2]]).depth)
+    assert np.shares_memory(found["depth"], kept.rasterize(np.zeros((3, 3)), [[0, 1, 2]]).depth)
 
 
 def test_layers_of_what_as_mesh_takes():
@@ -100,3 +100,45 @@ def test_color_with_an_opacity_is_that_of_glass():
     found = look(CAMERAS["perspective"], "color", "depth", opacity=0.3, shading="flat")
     expected = tl.render_transparent(scene(), CAMERAS["perspective"], SIZE, opacity=0.3, shading="flat")
     assert_same(found["color"], expected)
+
+
+# Cut-outs
+
+
+def pierced():
+    """A square before another one; the near one has a hole in its middle."""
+    image = np.full((64, 64, 4), 255, np.uint8)
+    image[16:48, 16:48, 3] = 0
+    corners = [[x, y, z] for z in (0, -1) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+    uv = [[0, 0], [1, 0], [1, 1], [0, 1]] * 2
+    holed = tl.Material(texture=tl.Texture(image), alpha_cutoff=0.5)
+    triangles = [[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]]
+    return tl.Mesh(corners, triangles, uv=uv, materials=[holed, tl.Material()], material_of_triangle=[0, 0, 1, 1])
+
+
+FRONT = Camera.look_at((0, 0, 5), fov_y_deg=40)
+
+
+@pytest.mark.parametrize("lens", [None, LENSES["barrel"]])
+def test_layers_show_what_is_behind_a_hole(lens):
+    found = look(replace(FRONT, lens=lens), "triangle", "distance", subject=pierced())
+    assert found["triangle"][30, 40] in (2, 3)
+    assert found["distance"][30, 40] == pytest.approx(6, abs=1e-5)  # float32 of an interpolated point
+    assert found["triangle"][30, 29] in (0, 1)
+    assert found["distance"][30, 29] == pytest.approx(5, abs=1e-5)
+
+
+@pytest.mark.parametrize("sampling", ["center", "msaa4"])
+def test_alpha_of_a_hole_is_that_of_the_picture(sampling):
+    mesh = pierced()
+    alone = tl.Mesh(mesh.vertices[:4], mesh.triangles[:2], uv=mesh.uv[:4], materials=mesh.materials[:1])
+    options = {"sampling": sampling, "background": (0, 0, 0, 0)}
+    found = look(FRONT, "color", "alpha", "silhouette", subject=alone, **options)
+    assert found["alpha"][30, 40] == 0
+    assert_same(found["alpha"], found["color"][..., 3])
+    assert found["silhouette"].dtype == (np.bool_ if sampling == "center" else np.float32)
+
+
+def test_layers_of_a_scene_with_cut_outs_are_refused():
+    with pytest.raises(ValueError, match="scenes have no cut-outs, but a material of instance 0 has an alpha_cutoff"):
+        look(FRONT, "depth", subject=tl.Scene([pierced()]))

@@ -45,6 +45,8 @@ def silhouette(sight: Sight) -> Array:
     sampling = sight.look.get("sampling", "center")
     if sampling == "center":
         return sight.frags.mask
+    if sight.has_holes:
+        return (sight.sampled(sampling).samples_triangle >= 0).mean(axis=-1, dtype=np.float32)
     return draw_silhouette(sight.subject, sight.camera, sight.size, sampling=sampling, **sight.options)
 
 

@@ -19,6 +19,7 @@ from topleft.colors import DEFAULT_COLOR, as_color
 from topleft.cutout import cut_out
 from topleft.eye import distances
 from topleft.fragments import BentFragments, Fragments
+from topleft.material import Material
 from topleft.mesh import Mesh
 from topleft.multisample import shade_samples
 from topleft.scene import Instance, Scene
@@ -118,6 +119,15 @@ def picture_of_mesh(
     if isinstance(frags, BentFragments) and options["shading"] in (Shading.IDS, Shading.DEPTH):
         shown, surface = frags.again(), mesh
     return shade(shown, surface, view, **options)
+
+
+def without_holes(frags: Fragments, mesh: Mesh, camera: Camera, material: Material | None) -> Fragments:
+    """The visibility buffer of a mesh without what its materials (or this one) cut out; `frags` is changed."""
+    if not isinstance(frags, BentFragments):
+        cut_out(frags, mesh, camera, material)
+        return frags
+    cut_out(frags.parts, frags.mesh_of_parts(mesh), camera.straightened(), material)
+    return frags.again()
 
 
 def picture_of_scene(

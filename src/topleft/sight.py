@@ -15,11 +15,13 @@ import numpy.typing as npt
 
 from topleft.api import Rasterizer
 from topleft.camera import Camera
+from topleft.cutout import has_holes
 from topleft.fragments import Fragments
 from topleft.mesh import Mesh
-from topleft.render import rasterize_mesh
+from topleft.render import rasterize_mesh, without_holes
 from topleft.scene import Instance, Scene
 from topleft.scene_fragments import Part, SceneFragments
+from topleft.scene_render import refuse_holes
 
 __all__ = ["Sight", "Surface", "moved", "project"]
 
@@ -100,8 +102,37 @@ class Sight:
 
     @cached_property
     def frags(self) -> Fragments:
-        """The visibility buffer, at the centres of the pixels."""
-        return rasterize_mesh(self.subject, self.camera, self.size, rasterizer=self.rasterizer, **self.options)
+        """The visibility buffer, at the centres of the pixels, without what materials cut out."""
+        return self._cut(rasterize_mesh(*self._view, rasterizer=self.rasterizer, **self.options))
+
+    def sampled(self, sampling: str) -> Fragments:
+        """Return the same with several samples a pixel."""
+        return self._cut(rasterize_mesh(*self._view, sampling=sampling, **self.options))
+
+    @cached_property
+    def has_holes(self) -> bool:
+        """Whether materials cut something out of the mesh.
+
+        Raises
+        ------
+        ValueError
+            If they do so in a scene.
+        """
+        material = self.look.get("material")
+        if isinstance(self.subject, Scene):
+            refuse_holes(self.subject, material)
+            return False
+        materials = self.subject.materials if material is None else (material,)
+        return any(has_holes(one, self.subject) for one in materials)
+
+    @property
+    def _view(self) -> tuple[Mesh | Scene, Camera, tuple[int, int]]:
+        return self.subject, self.camera, self.size
+
+    def _cut(self, frags: Fragments) -> Fragments:
+        if not self.has_holes or isinstance(self.subject, Scene):
+            return frags
+        return without_holes(frags, self.subject, self.camera, self.look.get("material"))
 
     @cached_property
     def surfaces(self) -> Sequence[Surface]:
