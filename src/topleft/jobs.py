@@ -42,8 +42,8 @@ class Job:
     ----------
     scene : Mesh, Scene, whatever `as_mesh` takes, path, or function without arguments that returns one of the first
         A file is read where it is drawn, once for jobs that follow each other. The same goes for what a function makes
-        where functions are equal, and for the meshes of other libraries, which are made ours; for worker processes it
-        must be picklable.
+        where functions are equal; for worker processes it must be picklable. A mesh of another library is made ours
+        once, and must not change between its jobs.
     camera : Camera, or function of the mesh (or scene) and the size that returns one, optional
         As for `render`.
     size : (width, height), pixels
