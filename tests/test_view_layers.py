@@ -210,9 +210,8 @@ def test_uv_and_attributes_are_interpolated():
 
 def test_only_what_is_asked_for_is_computed():
     sight = Sight(CUBE, CAMERAS["perspective"], SIZE)
-    LAYERS["color"](sight)
     assert "frags" not in vars(sight)
-    for name in ("alpha", "silhouette", "depth", "triangle", "instance", "barycentric"):
+    for name in ("color", "alpha", "silhouette", "depth", "triangle", "instance", "barycentric"):
         LAYERS[name](sight)
     assert "surfaces" not in vars(sight)
     for name in ("camera_normal", "world_normal"):

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from topleft.camera import Camera
 from topleft.eye import eye_normals
 from topleft.mesh import unit_or_zero
-from topleft.render import render
+from topleft.render import picture_of, render
 from topleft.scene_render import camera_of
 from topleft.sight import Sight, Surface, moved, project
 from topleft.silhouette import silhouette as draw_silhouette
@@ -32,12 +32,19 @@ def color(sight: Sight) -> Array:
     options = {**sight.options, **sight.look}
     if "opacity" in options:
         return render_transparent(sight.subject, sight.camera, sight.size, **options)
-    return render(sight.subject, sight.camera, sight.size, rasterizer=sight.rasterizer, **options)
+    sampling = options.pop("sampling", "center")
+    if sampling == "center":
+        return picture_of(sight.frags, sight.subject, sight.camera, **options)
+    options |= {"sampling": sampling, "rasterizer": sight.rasterizer}
+    return render(sight.subject, sight.camera, sight.size, **options)
 
 
 def alpha(sight: Sight) -> Array:
     """How much of the pixel is covered, (H, W) uint8, 255 for all of it."""
-    return np.rint(silhouette(sight) * np.float32(255)).astype(np.uint8)
+    share = silhouette(sight)
+    if share.dtype == np.bool_:
+        return share.view(np.uint8) * np.uint8(255)
+    return np.rint(share * np.float32(255)).astype(np.uint8)
 
 
 def silhouette(sight: Sight) -> Array:

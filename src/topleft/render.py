@@ -98,6 +98,29 @@ def render(
     mesh = mesh if isinstance(mesh, Scene) else as_mesh(mesh)
     camera = default_camera(mesh, size) if camera is None else camera
     frags = rasterize_mesh(mesh, camera, size, cull=cull, threads=threads, sampling=sampling, rasterizer=rasterizer)
+    return picture_of(
+        frags, mesh, camera, shading=shading, color=color, background=background, cull=cull, edges=edges,
+        threads=threads, **look,
+    )  # fmt: skip
+
+
+def picture_of(
+    frags: Fragments,
+    mesh: Mesh | Scene,
+    camera: Camera,
+    *,
+    shading: str = "smooth",
+    color: tuple[int, ...] = DEFAULT_COLOR,
+    background: tuple[int, ...] = WHITE,
+    cull: str = "none",
+    edges: bool = False,
+    threads: int | None = None,
+    **look: Unpack[LookOptions],
+) -> npt.NDArray[np.uint8]:
+    """The picture of the visibility buffer that `rasterize_mesh` returned; options as for `render`.
+
+    What materials cut out is taken out of the buffer.
+    """
     options: dict[str, Any] = {"shading": shading, "color": color, "threads": threads, **look}
     options["background"] = as_color("background", background, 4)
     make = picture_of_scene if isinstance(mesh, Scene) else picture_of_mesh
