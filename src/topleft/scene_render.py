@@ -23,12 +23,25 @@ from topleft.scene import Instance, Scene
 from topleft.scene_fragments import SceneFragments
 from topleft.shade import shade
 
-__all__ = ["camera_of", "cull_of", "refuse_holes", "shade_scene"]
+__all__ = ["camera_of", "cull_of", "matrix_of", "refuse_holes", "shade_scene"]
 
 
 def camera_of(camera: Camera, instance: Instance) -> Camera:
     """The camera as it stands in the object space of an instance."""
     return replace(camera, view=camera.view @ instance.transform)
+
+
+def matrix_of(camera: Camera, size: tuple[int, int]) -> npt.NDArray[np.float64]:
+    """Clip space from the world, for a scene in a picture of this size.
+
+    Raises
+    ------
+    ValueError
+        If the camera has a lens.
+    """
+    if camera.lens is not None:
+        raise ValueError("a scene is not drawn through a lens, but camera has one: draw a mesh, or straightened()")
+    return camera.clip_from_world(size)
 
 
 def cull_of(cull: str, instance: Instance) -> str:
