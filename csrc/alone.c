@@ -95,27 +95,47 @@ TL_INLINE void walk_rows(const tl_triangle *t, const tl_window *window, const tl
 /* A box at most this wide is walked sample by sample, a wider one by its row ends. */
 #define TL_EDGE_MAX_WIDTH 6
 
+/* Which code walks a triangle that is set up. */
+TL_INLINE tl_class walker_of(const tl_triangle *t, const tl_scene *scene, const tl_window *window, tl_sink sink)
+{
+    const int is_auto = scene->method == TL_METHOD_AUTO;
+    const int by_edge = scene->method == TL_METHOD_EDGE || (is_auto && t->col1 - t->col0 <= TL_EDGE_MAX_WIDTH);
+    if (is_auto && rows_fit(t, window, window->test != TL_TEST_SAMPLE) && (!sink_has_depth(sink) || t->has_plane))
+        return TL_CLASS_LONG;
+    if (t->is_narrow)
+        return by_edge ? TL_CLASS_EDGE_64 : TL_CLASS_SPAN_64;
+    return by_edge ? TL_CLASS_EDGE_128 : TL_CLASS_SPAN_128;
+}
+
 /* One triangle by itself: any range, any method. */
 TL_INLINE void draw_triangle(const tl_vertex_set *set, const int32_t *corners, int32_t id, const tl_scene *scene,
                              const tl_window *window, const tl_target *target, tl_sink sink)
 {
     tl_triangle t;
     const int sign = load_triangle(set, corners, &t);
-    if (sign == 0 || (sign > 0 && scene->cull == TL_CULL_BACK) || (sign < 0 && scene->cull == TL_CULL_FRONT))
+    if (sign == 0 || (sign > 0 && scene->cull == TL_CULL_BACK) || (sign < 0 && scene->cull == TL_CULL_FRONT)) {
+        if (sink == TL_SINK_CENSUS)
+            target->census->n[sign ? TL_CLASS_CULLED : TL_CLASS_DEGENERATE]++;
         return;
-    if (!clip_box(&t, window))
+    }
+    if (!clip_box(&t, window)) {
+        if (sink == TL_SINK_CENSUS)
+            count_unseen_one(target->census, &t, window);
         return;
+    }
     t.id = id;
-    setup_sink(&t, window, sink);
-    const int is_auto = scene->method == TL_METHOD_AUTO;
-    const int by_edge = scene->method == TL_METHOD_EDGE || (is_auto && t.col1 - t.col0 <= TL_EDGE_MAX_WIDTH);
-    if (is_auto && rows_fit(&t, window, window->test != TL_TEST_SAMPLE) && (!sink_has_depth(sink) || t.has_plane))
+    t.has_plane = 0;
+    setup_sink(&t, window, sink_of(target, sink));
+    const tl_class walker = walker_of(&t, scene, window, sink_of(target, sink));
+    if (sink == TL_SINK_CENSUS)
+        count_one(target->census, walker, &t, window->subpixel_bits);
+    else if (walker == TL_CLASS_LONG)
         walk_rows(&t, window, target, sink);
-    else if (t.is_narrow && by_edge)
+    else if (walker == TL_CLASS_EDGE_64)
         walk_edge_64(&t, window, target, sink);
-    else if (t.is_narrow)
+    else if (walker == TL_CLASS_SPAN_64)
         walk_scanline_64(&t, window, target, sink);
-    else if (by_edge)
+    else if (walker == TL_CLASS_EDGE_128)
         walk_edge_128(&t, window, target, sink);
     else
         walk_scanline_128(&t, window, target, sink);
