@@ -10,6 +10,7 @@ from topleft.files import load, save_image
 from topleft.fragments import Fragments
 from topleft.memory import release_memory
 from topleft.mesh import Mesh
+from topleft.planner import Plan, plan
 from topleft.render import render, visibility
 from topleft.shade import shade
 from topleft.silhouette import silhouette
@@ -21,6 +22,7 @@ __all__ = [
     "Fragments",
     "Mesh",
     "MeshError",
+    "Plan",
     "Rasterizer",
     "TopleftError",
     "__version__",
@@ -30,6 +32,7 @@ __all__ = [
     "fill",
     "load",
     "overdraw",
+    "plan",
     "rasterize",
     "release_memory",
     "render",

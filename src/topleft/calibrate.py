@@ -10,6 +10,7 @@ import platform
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -93,6 +94,12 @@ def least_ns(work: Callable[[], object], n_rounds: int) -> float:
     return float(min(times))
 
 
+def repeat(work: Callable[[], object], n: int) -> None:
+    """Do some work several times."""
+    for _ in range(n):
+        work()
+
+
 def scenes(kinds: tuple[tuple[int, int], ...], *, with_blob: bool = False, seed: int = 1) -> Iterator[tuple[Any, View]]:
     """Give scenes of triangles of each size in two frames, some outside, some that need 64 and 128 bits."""
     for frame in FRAMES:
@@ -162,7 +169,7 @@ def measure_calls(n_rounds: int) -> dict[str, float]:
         "fill": lambda: small.fill(vertices, triangles, colors),
         "rasterize": lambda: small.rasterize(vertices, triangles),
     }
-    return {name: least_ns(lambda verb=verb: [verb() for _ in range(50)], n_rounds) / 50 for name, verb in verbs.items()}  # type: ignore[misc]
+    return {name: least_ns(partial(repeat, verb, 50), n_rounds) / 50 for name, verb in verbs.items()}
 
 
 def measure_vertices(n_rounds: int) -> dict[str, float]:
@@ -172,8 +179,8 @@ def measure_vertices(n_rounds: int) -> dict[str, float]:
     triangles = np.zeros((1, 3), np.int32)
     points = rng.uniform(0, 640, (n, 3))
     eye, ortho = np.eye(4), np.diag([1e-3, 1e-3, 1e-3, 1])
+    eye[:3] *= 1e-3
     eye[3] = [0, 0, 1e-3, 1]
-    eye[:3, :3] *= 1e-3
     clip = np.concatenate([points * 1e-3, np.full((n, 1), 2.0)], axis=1)
     found = {}
     for dtype in (np.float32, np.float64, np.int64):
@@ -183,18 +190,16 @@ def measure_vertices(n_rounds: int) -> dict[str, float]:
         for name, (values, matrix) in kinds.items():
             array = values.astype(dtype)
             view = View.parse((640, 360), {"threads": 1, "transform": matrix})
-            memory = KeptMemory()
-            ns = least_ns(
-                lambda a=array, v=view, m=memory: snap_scene(m, a, triangles, v, with_depth=True, out=None), n_rounds  # type: ignore[misc]
-            )
-            found[f"{name} {np.dtype(dtype)}"] = ns / n
+            work = partial(snap_scene, KeptMemory(), array, triangles, view, with_depth=True, out=None)
+            found[f"{name} {np.dtype(dtype)}"] = least_ns(work, n_rounds) / n
     return found
 
 
 def measure_others(n_rounds: int) -> dict[str, float]:
     """Return the costs of what is neither a vertex nor a draw."""
     n = 200_000
-    wide, narrow = np.zeros((n, 3), np.int64), np.zeros((n, 3), np.int32)
+    wide: NDArray[np.int64] = np.zeros((n, 3), np.int64)
+    narrow: NDArray[np.int32] = np.zeros((n, 3), np.int32)
     ids, depth = np.zeros((360, 640), np.int32), np.zeros((360, 640), np.float32)
     vertices, triangles, _ = random_triangles(10, 300, 640, 360)
     picture = Rasterizer((640, 360), threads=1)
@@ -217,7 +222,7 @@ def measure_parallel(n_rounds: int) -> float:
         return 1.0
     vertices, triangles, _ = random_triangles(60_000, 12)
     pair = [Rasterizer(FRAMES[-1], threads=n) for n in (1, 2)]
-    one, two = (least_ns(lambda r=r: r.rasterize(vertices, triangles), n_rounds) for r in pair)  # type: ignore[misc]
+    one, two = (least_ns(partial(picture.rasterize, vertices, triangles), n_rounds) for picture in pair)
     return min(2.0, max(1.0, one / two))
 
 

@@ -21,7 +21,9 @@ from topleft.models import Sampling, Sink
 __all__ = ["FEATURES", "Costs", "cache_file", "features", "load_costs", "save_costs", "sink_group"]
 
 #: What the time of a draw is made of, in this order: triangles by how they are drawn, samples, pixels of the picture.
-FEATURES = ("hidden", "tiny", "small", "middle", "rows", "long", "64-bit", "128-bit", "point", "span", "pixel", "cold")
+FEATURES = (
+    "hidden", "tiny", "small", "middle", "rows", "long", "64-bit", "128-bit", "point", "span", "pixel", "cold",
+)  # fmt: skip
 
 #: Pixels of a picture that stay in a near cache while it is drawn; of a larger one the others are cold when they are met.
 NEAR_PIXELS = 400_000

@@ -71,6 +71,7 @@ def draw_fill(
             paint_samples(memory, snapped, view, palette, canvas, transfer, is_flat=is_flat)
         else:
             paint(memory, snapped, view, palette, canvas, is_flat=is_flat)
+    view.mark("shade")
     return result
 
 

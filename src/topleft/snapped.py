@@ -28,7 +28,12 @@ class Snapped:
     n_vertices: int
     n_triangles: int
     has_depth: bool
-    flat_depth: float | None = None  # the same of every vertex, as far as that has been looked at
+    flat_depth: float | None  # of every vertex, as far as that has been looked at
+    is_clip_space: bool
+    is_affine: bool
+    points: NDArray[Any]
+    records: NDArray[np.uint8]
+    pieces: _engine.Pieces | None
 
 
 def snap_scene(
@@ -48,7 +53,8 @@ def snap_scene(
     """
     points = as_vertices(vertices, has_transform=view.transform is not None)
     matrix = None if view.transform is None else as_matrix(view.transform, points.dtype)
-    source = _engine.Source(points, matrix, choices.is_affine(matrix))
+    is_affine = choices.is_affine(matrix)
+    source = _engine.Source(points, matrix, is_affine)
     corners, is_checked = index_triangles(memory, triangles, len(points), view)
     view.mark("input")
     n_triangles = len(corners)
@@ -84,7 +90,20 @@ def snap_scene(
     )
     has_depth = source.is_clip_space or points.shape[1] == 3
     flat = choices.flat_depth(points, has_depth=has_depth, is_clip_space=source.is_clip_space) if with_depth else None
-    return Snapped(scene, triangles, corners, len(points), n_triangles, has_depth, flat)
+    return Snapped(
+        scene=scene,
+        triangles=triangles,
+        corners=corners,
+        n_vertices=len(points),
+        n_triangles=n_triangles,
+        has_depth=has_depth,
+        flat_depth=flat,
+        is_clip_space=source.is_clip_space,
+        is_affine=is_affine,
+        points=points,
+        records=records,
+        pieces=pieces,
+    )
 
 
 def refine_scene(
