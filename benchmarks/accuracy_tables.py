@@ -1,47 +1,50 @@
-"""Tables of an accuracy record, for the terminal and for docs/accuracy.md, where they stand between markers."""
+"""Tables of an accuracy record: time beside error, the mesh, anti-aliasing."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
-from benchmarks.report import number, table
+from benchmarks.report import number
 from benchmarks.stability import CHANGES, EXACT, FAR_PX
 
 DEFAULT_BITS = "8"
-PRODUCTION = ("auto", "edge", "scanline")
 
 Record = dict[str, Any]
 Row = dict[str, Any]
 
 
-def lines(record: Record) -> Iterator[str]:
-    """The report of one record, Markdown: every method at every precision."""
-    yield facts_text(record)
-    for title, rows in (
-        ("Time and error", coverage_rows(record, lambda _: True)),
-        ("Mesh: per million edge pixels", stability_rows(record, lambda _: True)),
-        ("Anti-aliasing", antialiasing_rows(record)),
-    ):
-        yield from ("", f"## {title}", "", *table(*rows))
-
-
 def facts_text(record: Record) -> str:
-    """What the figures belong to."""
-    machine, options = record["machine"], record["options"]
-    commit = (record["commit"] or "unknown")[:12] + (" with changes" if record["changed"] else "")
+    """What the figures of charts (a) and (b) and of the mesh belong to."""
+    options, mesh = record["options"], record["mesh"]
     families = "; ".join(
         f"{family['name']}, {family['what']}: {family['n_timed']:,} timed, errors over {family['n_edge_px']:,} "
         f"edge pixels of {family['n_triangles']:,}"
         for family in record["families"]
     )
-    mesh = record["mesh"]
     return (
-        f"{machine['cpu']}, {machine['system']}, Python {machine['python']}, topleft {record['versions']['topleft']} "
-        f"({record['isa']}) at {commit}, {record['date'][:10]}; CPU time of one thread, {options['rounds']} rounds. "
+        f"{machine_text(record)}; CPU time of one thread, {options['rounds']} rounds. "
         f"Frame {options['frame_px']} px square. Triangles {families}. "
         f"Mesh: {mesh['n_triangles']:,} triangles, {mesh['n_edge_px']:,} edge pixels."
     )
+
+
+def machine_text(record: Record) -> str:
+    """Machine, versions, instruction set, commits, dates."""
+    machine = record["machine"]
+    return (
+        f"{machine['cpu']}, {machine['cpus']} CPUs, {machine['system']}, Python {machine['python']}, "
+        f"topleft {record['versions']['topleft']} ({record['isa']}) at {commits_text(record)}"
+    )
+
+
+def commits_text(record: Record) -> str:
+    """Commits of the checkout when the parts were measured, and the days."""
+    parts = record["parts"].values()
+    commits = dict.fromkeys(
+        (part["commit"] or "unknown")[:12] + (" with changes" if part["changed"] else "") for part in parts
+    )
+    return f"{', '.join(commits)}, {' to '.join(sorted({part['date'][:10] for part in parts}))}"
 
 
 def is_default(row: Row) -> bool:
@@ -91,15 +94,42 @@ def stability_rows(record: Record, keep: Callable[[Row], bool]) -> tuple[list[st
 
 
 def antialiasing_rows(record: Record) -> tuple[list[str], list[list[str]]]:
-    """A row for each way to sample: time and RMS error of every family."""
-    head = ["sampling", ""]
+    """A row for each way to sample and each peer: time and RMS error of every family."""
+    head = ["sampling", "gives"]
     for family in record["families"]:
         head += [f"{family['name']}: ns", "RMS"]
     cells: dict[str, list[str]] = {}
     for row in record["antialiasing"]:
-        own = cells.setdefault(row["sampling"], [f'`"{row["sampling"]}"`', ""])
+        if "skipped" in row:
+            continue
+        name = f'`"{row["sampling"]}"`' if "sampling" in row else row["peer"]
+        own = cells.setdefault(name, [name, row.get("gives", "topleft")])
         own += [number(row["ns_triangle"]), f"{row['rms']:.2g}"]
     return head, list(cells.values())
+
+
+def others_rows(record: Record) -> tuple[list[str], list[list[str]]]:
+    """A row for each peer and each pure twin: time and error of every family."""
+    families = {family["name"]: family for family in record["families"]}
+    head = ["drawn by", "gives"]
+    for name in families:
+        head += [f"{name}: ns", "wrong"]
+    cells: dict[str, list[str]] = {}
+    for row in record["peers"] + record["pure"]:
+        if "skipped" in row:
+            continue
+        name = row.get("peer") or row["twin"]
+        gives = row.get("gives") or f"counts, Python, as `{row['method']}`"
+        own = cells.setdefault(name, [name, gives])
+        own += [number(row["ns_triangle"]), per_million(row["wrong_px"], families[row["family"]]["n_edge_px"])]
+    return head, list(cells.values())
+
+
+def skipped_text(record: Record) -> str:
+    """Peers that did not take part, with the reason."""
+    rows = [row for row in record["peers"] + record["antialiasing"] if "skipped" in row]
+    skipped = dict.fromkeys(f"{row['peer']} ({row['skipped']})" for row in rows)
+    return f"Left out: {'; '.join(skipped)}." if skipped else "No program was missing."
 
 
 def changes_text(_: Record) -> str:
@@ -117,31 +147,3 @@ def per_million(count: int | None, n: int) -> str:
     if count is None:
         return "-"
     return f"{1e6 * count / n:,.0f}" if count * 1e5 >= n or not count else f"{1e6 * count / n:.1f}"
-
-
-PARTS: dict[str, Callable[[Record], str]] = {
-    "facts": facts_text,
-    "coverage": lambda record: "\n".join(table(*coverage_rows(record, is_default))),
-    "bits": lambda record: "\n".join(table(*bits_rows(record))),
-    "changes": changes_text,
-    "stability": lambda record: "\n".join(table(*stability_rows(record, is_default))),
-    "antialiasing": lambda record: "\n".join(table(*antialiasing_rows(record))),
-}
-"""What the markers `<!-- table: NAME -->` of a page stand for."""
-
-
-def with_parts(text: str, record: Record, parts: dict[str, Callable[[Record], str]] = PARTS) -> str:
-    """Return a page with what stands between its markers made anew.
-
-    Raises
-    ------
-    ValueError
-        If a part has no marker in the page.
-    """
-    for name, make in parts.items():
-        head, start, rest = text.partition(f"<!-- table: {name} -->\n")
-        _, end, tail = rest.partition("<!-- end -->")
-        if not end:
-            raise ValueError(f"the page must hold <!-- table: {name} --> and <!-- end --> after it")
-        text = head + start + make(record) + "\n" + end + tail
-    return text

@@ -22,15 +22,24 @@ TASKS = {
     "visibility": "triangle id and depth of a mesh in object space: transform, clear and draw",
     "depth-2d": "triangle id and depth of triangles in pixels: snap, clear and draw",
     "mask": "which pixels are covered",
+    "smooth": "how much of each pixel is covered, 0 to 255",
     "fill": "flat colours in painter's order",
     "labels": "triangle id in painter's order",
     "empty": "a call that draws nothing",
+    "views": "shaded pictures of a mesh from all sides, into memory",
+    "views-png": "shaded pictures of a mesh from all sides, into PNG files",
 }
+
+
+ARRAYS = ("vertices", "triangles", "transform", "colors", "views", "normals")
 
 
 @dataclass(frozen=True)
 class Scene:
-    """What is drawn: arrays, and what is asked for."""
+    """What is drawn: arrays, and what is asked for.
+
+    With many views `views` (N, 4, 4) are the eye from object of each, and `transform` is the clip from eye of all.
+    """
 
     task: str
     size: tuple[int, int]
@@ -39,13 +48,15 @@ class Scene:
     transform: NDArray[np.float64] | None = None
     colors: NDArray[np.uint8] | None = None
     cull: str = "none"
+    views: NDArray[np.float64] | None = None
+    normals: NDArray[np.float32] | None = None
 
     def save(self, folder: Path) -> None:
         """Write the arrays, for a child to load."""
         facts = {"task": self.task, "size": self.size, "cull": self.cull}
         folder.mkdir(parents=True, exist_ok=True)
         (folder / "scene.json").write_text(json.dumps(facts))
-        for name in ("vertices", "triangles", "transform", "colors"):
+        for name in ARRAYS:
             if (array := getattr(self, name)) is not None:
                 np.save(folder / f"{name}.npy", array)
 
@@ -55,7 +66,7 @@ class Scene:
         facts = json.loads((folder / "scene.json").read_text())
         arrays = {
             name: np.load(folder / f"{name}.npy")
-            for name in ("vertices", "triangles", "transform", "colors")
+            for name in ARRAYS
             if (folder / f"{name}.npy").exists()
         }
         return cls(task=facts["task"], size=tuple(facts["size"]), cull=facts["cull"], **arrays)
@@ -129,6 +140,21 @@ def planar_scene(n_points: int = 100_000, size: tuple[int, int] = FULL_HD) -> Sc
     from topleft import scenes
 
     return Scene("labels", size, *scenes.planar_mesh(n_points, *size))
+
+
+def views_scene(task: str, n_triangles: int, n_views: int, size: tuple[int, int]) -> Scene:
+    """The bumpy sphere from `n_views` sides, all round, 20 degrees up, in float32 and int32."""
+    from topleft import Mesh, scenes
+    from topleft.camera import Camera
+
+    vertices, triangles = scenes.blob(n_triangles)
+    mesh = Mesh(vertices.astype(np.float32), triangles)
+    angles = [360 * i / n_views for i in range(n_views)]
+    cameras = [Camera.framing(mesh, azimuth_deg=angle, elevation_deg=20, aspect=size[0] / size[1]) for angle in angles]
+    return Scene(
+        task, size, mesh.vertices, mesh.triangles, cameras[0].projection, cull="back",
+        views=np.stack([camera.view for camera in cameras]), normals=mesh.vertex_normals().astype(np.float32),
+    )  # fmt: skip
 
 
 def empty_scene(size: tuple[int, int] = (64, 64)) -> Scene:

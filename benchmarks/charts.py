@@ -1,4 +1,4 @@
-"""Charts of an accuracy record: time against error. The only module that needs matplotlib.
+"""Charts (a) and (b) of an accuracy record, time against error, and the list of all charts. Needs matplotlib.
 
 Shapes tell families of methods apart as well as colours, which are those of M. Okabe and K. Ito, Color Universal
 Design, 2008; both survive print and colour-blindness.
@@ -7,7 +7,6 @@ Design, 2008; both survive print and colour-blindness.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import matplotlib as mpl
@@ -43,7 +42,6 @@ LOOKS = {
 }
 """By the first part of the name; variants look alike, with a hollow marker."""
 
-SAMPLING_MARKERS = "osD^vP<>X*"
 STYLE = {"font.size": 9, "axes.spines.top": False, "axes.spines.right": False, "svg.hashsalt": "topleft",
          "axes.titlesize": 10, "legend.frameon": False, "figure.dpi": 100}  # fmt: skip
 
@@ -53,18 +51,13 @@ FAR_AWAY = 1e12
 Point = tuple[float, float]
 
 
-def draw_charts(record: dict[str, Any], folder: Path) -> list[Path]:
-    """Write the charts as PNG and SVG, return where they are."""
-    folder.mkdir(parents=True, exist_ok=True)
-    paths = []
-    with plt.rc_context(STYLE):
-        for name, figure in (("coverage", chart_coverage(record)), ("antialiasing", chart_antialiasing(record))):
-            for suffix in ("png", "svg"):
-                paths.append(folder / f"accuracy-{name}.{suffix}")
-                metadata = {"Date": None} if suffix == "svg" else {}
-                figure.savefig(paths[-1], dpi=160, metadata=metadata)
-            plt.close(figure)
-    return paths
+PEER_LETTERS = {
+    "llvmpipe": "Ll", "opencv": "Cv", "pillow": "Pi", "deodr": "De", "datashader": "Da", "skia": "Sk", "cairo": "Ca",
+    "skimage": "Si", "agg": "Ag", "aggdraw": "Ad", "blend2d": "Bl",
+}  # fmt: skip
+"""What stands in the marker of a peer."""
+PEER_LOOK: dict[str, Any] = {"marker": "s", "ms": 10.5, "mfc": "#FFFBE6", "mec": "#8A1C1C", "mew": 1}
+SAMPLING_LABELS = {"center": "1", "msaa2": "2", "msaa4": "4", "msaa8": "8", "msaa16": "16", "area": "area"}
 
 
 def chart_coverage(record: dict[str, Any]) -> Figure:
@@ -73,14 +66,23 @@ def chart_coverage(record: dict[str, Any]) -> Figure:
     for axis, family in zip(axes, record["families"], strict=True):
         n_edge_px = family["n_edge_px"]
         none_wrong = 0.3e6 / n_edge_px  # where zero stands on a logarithmic axis
-        rows = [row for row in record["coverage"] if row["family"] == family["name"]]
-        points = [(row["ns_triangle"], 1e6 * row["wrong_px"] / n_edge_px or none_wrong) for row in rows]
-        draw_front(axis, points)
+
+        def place(row: dict[str, Any], n_edge_px: int = n_edge_px, none_wrong: float = none_wrong) -> Point:
+            return row["ns_triangle"], 1e6 * row["wrong_px"] / n_edge_px or none_wrong
+
+        rows, twins, peers = (rows_of(record, name, family) for name in ("coverage", "pure", "peers"))
+        points = [place(row) for row in rows]
+        draw_front(axis, points + [place(row) for row in twins + peers])
         for row, point in zip(rows, points, strict=True):
             family_name, _, variant = row["method"].partition("/")
             look = LOOKS.get(family_name, Look(family_name, "#999999", "h"))
             axis.plot(*point, look.marker, ms=8 if look.marker == "*" else 6, mec="black", mew=0.6,
                       mfc="white" if variant else look.color, zorder=3)  # fmt: skip
+        for row in twins:
+            look = LOOKS[row["method"].partition("/")[0]]
+            axis.plot(*place(row), "h", ms=9, mec=look.color, mfc="white", mew=2, zorder=4)
+        for row in peers:
+            draw_peer(axis, row["peer"], place(row))
         for row, (_, y) in zip(rows, points, strict=True):
             if row["method"] == "auto":
                 axis.text(0.015, y, f"{row['precision']} bits", transform=axis.get_yaxis_transform(), va="center",
@@ -89,8 +91,9 @@ def chart_coverage(record: dict[str, Any]) -> Figure:
         axis.axhspan(none_wrong / 3, none_wrong * 1.8, color="0.93", zorder=0)
         axis.text(0.99, none_wrong * 0.42, f"none wrong of {n_edge_px:,}", transform=axis.get_yaxis_transform(),
                   ha="right", fontsize=7, color="0.35")  # fmt: skip
-        low, high = min(x for x, _ in points), max(x for x, _ in points)
-        axis.set_xlim(low / (high / low) ** 0.22, high * (high / low) ** 0.05)
+        times = [row["ns_triangle"] for row in rows + twins + peers]
+        low, high = min(times), max(times)
+        axis.set_xlim(low / (high / low) ** 0.18, high * (high / low) ** 0.05)
     finish(figure, axes, "wrong pixels per million edge pixels")
     seen = {row["method"].partition("/")[0] for row in record["coverage"]}
     handles = [
@@ -100,36 +103,69 @@ def chart_coverage(record: dict[str, Any]) -> Figure:
     ]
     handles += [
         Line2D([], [], color="white", marker="o", mec="black", mew=0.6, ls="", ms=7, label="hollow: a variant"),
-        Line2D([], [], color="0.45", ls="--", lw=1, label="Pareto front"),
+        Line2D([], [], color="white", marker="h", mec="black", mew=2, ls="", ms=8, label="hexagon: pure Python"),
+        front_handle(),
+        *peer_handles(record["peers"]),
     ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=4, fontsize=8.5, columnspacing=1.2)
+    figure.legend(handles=handles, loc="outside lower center", ncols=5, fontsize=8.5, labelspacing=0.7)
     return figure
 
 
 def chart_antialiasing(record: dict[str, Any]) -> Figure:
-    """Return chart (b): a panel for each family, a point for each way to sample."""
+    """Return chart (b): a panel for each family, a point for each way to sample and each peer."""
     figure, axes = panels(record)
-    ways = list(dict.fromkeys(row["sampling"] for row in record["antialiasing"]))
-    colors = [look.color for look in LOOKS.values()]
     for axis, family in zip(axes, record["families"], strict=True):
-        rows = [row for row in record["antialiasing"] if row["family"] == family["name"]]
-        draw_front(axis, [(row["ns_triangle"], row["rms"]) for row in rows])
-        for row in rows:
-            i = ways.index(row["sampling"])
-            axis.plot(row["ns_triangle"], row["rms"], SAMPLING_MARKERS[i % 10], color=colors[i % 10], mec="black",
-                      ms=7, zorder=3)  # fmt: skip
-            axis.annotate(row["sampling"], (row["ns_triangle"], row["rms"]), (7, 4), textcoords="offset points")
+        rows = rows_of(record, "antialiasing", family)
+        points = [(row["ns_triangle"], row["rms"]) for row in rows]
+        draw_front(axis, points)
+        own = [(row, point) for row, point in zip(rows, points, strict=True) if "sampling" in row]
+        samples = [point for row, point in own if row["sampling"] != "area"]
+        axis.plot(*zip(*samples, strict=True), color="black", lw=0.8, zorder=2)
+        for row, point in own:
+            axis.plot(*point, "o", color="black", ms=6, zorder=3)
+            axis.annotate(SAMPLING_LABELS.get(row["sampling"], row["sampling"]), point, (0, -12),
+                          textcoords="offset points", ha="center", fontsize=8)  # fmt: skip
+        for row, point in zip(rows, points, strict=True):
+            if "peer" in row:
+                draw_peer(axis, row["peer"], point)
         axis.set(xscale="log", yscale="log", ylim=(min(row["rms"] for row in rows) / 3, 1))
         low, high = (of(row["ns_triangle"] for row in rows) for of in (min, max))
         axis.set_xlim(low / 1.5, high * 2)
     finish(figure, axes, "RMS error of coverage, edge pixels")
+    label = "topleft: samples a pixel, or exact area"
+    handles = [Line2D([], [], color="black", marker="o", lw=0.8, ms=6, label=label), front_handle()]
+    handles += peer_handles(record["antialiasing"])
+    figure.legend(handles=handles, loc="outside lower center", ncols=4, fontsize=8.5, columnspacing=1.2)
     return figure
+
+
+def rows_of(record: dict[str, Any], name: str, family: dict[str, Any]) -> list[dict[str, Any]]:
+    """Return the rows of a list that belong to the family and have figures."""
+    return [row for row in record[name] if row["family"] == family["name"] and "skipped" not in row]
+
+
+def draw_peer(axis: Axes, name: str, point: Point) -> None:
+    """Draw the marker that only peers have, a square with a letter."""
+    axis.plot(*point, **PEER_LOOK, zorder=5)
+    axis.annotate(PEER_LETTERS.get(name, "?"), point, (0, -0.4), textcoords="offset points", ha="center", va="center",
+                  fontsize=6.5, color="#8A1C1C", fontweight="bold", zorder=6)  # fmt: skip
+
+
+def peer_handles(rows: list[dict[str, Any]]) -> list[Line2D]:
+    """Return the entries of a legend for the peers that have figures."""
+    names = dict.fromkeys(row["peer"] for row in rows if "peer" in row and "skipped" not in row)
+    return [Line2D([], [], **PEER_LOOK, ls="", label=f"{PEER_LETTERS.get(name, '?')}: {name}") for name in names]
+
+
+def front_handle() -> Line2D:
+    """Return the entry of a legend for the Pareto front."""
+    return Line2D([], [], color="0.45", ls="--", lw=1, label="Pareto front")
 
 
 def panels(record: dict[str, Any]) -> tuple[Figure, list[Axes]]:
     """Return a figure of two columns, a panel for each family of triangles."""
     families = record["families"]
-    figure, grid = plt.subplots((len(families) + 1) // 2, 2, figsize=(8, 7.6), squeeze=False, layout="constrained")
+    figure, grid = plt.subplots((len(families) + 1) // 2, 2, figsize=(9, 8.6), squeeze=False, layout="constrained")
     axes = list(grid.flat)
     for axis in axes[len(families) :]:
         axis.set_axis_off()
@@ -141,14 +177,23 @@ def panels(record: dict[str, Any]) -> tuple[Figure, list[Axes]]:
 
 
 def finish(figure: Figure, axes: list[Axes], y_label: str) -> None:
-    """Name the axes once a row or column, ticks without exponents on x."""
+    """Name the axes once a row or column, ticks with units on x."""
     for i, axis in enumerate(axes):
-        axis.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        low, high = axis.get_xlim()
+        axis.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5) if high < 300 * low else (1,)))
         axis.xaxis.set_minor_locator(NullLocator())
-        axis.xaxis.set_major_formatter(lambda value, _: f"{value / 1000:g}k" if value >= 10_000 else f"{value:,.0f}")
+        axis.xaxis.set_major_formatter(lambda value, _: duration(value))
         if i >= len(axes) - 2:
-            axis.set_xlabel("time per triangle, ns")
+            axis.set_xlabel("time per triangle")
     figure.supylabel(y_label, fontsize=9)
+
+
+def duration(ns: float) -> str:
+    """A round number of nanoseconds in the unit that fits."""
+    for unit, size in (("s", 1e9), ("ms", 1e6), ("µs", 1e3)):
+        if ns >= size:
+            return f"{ns / size:g} {unit}"
+    return f"{ns:g} ns"
 
 
 def draw_front(axis: Axes, points: list[Point]) -> None:

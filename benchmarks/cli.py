@@ -1,4 +1,4 @@
-"""The command line: `python -m benchmarks run`, `accuracy`, `atlas`, `report`, `charts`, `samplings`, and the rest."""
+"""Commands: `python -m benchmarks run`, `accuracy`, `atlas`, `batch`, `report`, `charts`, `samplings`, and the rest."""
 
 from __future__ import annotations
 
@@ -11,9 +11,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks import accuracy, accuracy_tables, atlas_page, report
+from benchmarks import accuracy, atlas_page, batch, pages, report
+from benchmarks import options as accuracy_options
 from benchmarks.cases import CASES, TRIALS
 from benchmarks.contestants import known_peers
+from benchmarks.machine import ROOT
 from benchmarks.peers import PEERS
 from benchmarks.rounds import Options, run
 from benchmarks.yardstick import DEFAULT_PATTERN, Yardstick
@@ -49,11 +51,19 @@ def parser() -> argparse.ArgumentParser:
     add = commands.add_parser("report", help="print tables again")
     add.set_defaults(action=report_command)
     add.add_argument("files", nargs="+", type=Path, metavar="FILE.json")
+    add.add_argument("--html", type=Path, metavar="FILE.html",
+                     help="write a page with all charts and words instead, of one accuracy record")  # fmt: skip
+    add.add_argument("--pages", type=Path, default=ROOT / "docs", metavar="FOLDER", help="where its words are (docs)")
 
     add = commands.add_parser("accuracy", help="measure time beside error, and stability, of every method")
     add.set_defaults(action=accuracy_command)
-    defaults = accuracy.Options()
+    defaults = accuracy_options.Options()
+    add.add_argument("--part", nargs="+", metavar="NAME", default=[],
+                     help=f"measure these alone, leave the rest of FILE.json: {', '.join(accuracy.PARTS)}")  # fmt: skip
     add.add_argument("--method", nargs="+", metavar="NAME", default=[], help="all that fill unless given")
+    add.add_argument("--peer", nargs="*", metavar="NAME", default=None, help="peers; all unless given, none: no names")
+    add.add_argument("--threads", type=positive, default=defaults.max_threads, metavar="N",
+                     help="how far threads are charted (%(default)s)")  # fmt: skip
     add.add_argument("--repeats", type=positive, default=defaults.rounds, metavar="N", help="rounds (%(default)s)")
     add.add_argument("--seconds", type=float, default=defaults.seconds, metavar="S",
                      help="length of a turn, at least a call (%(default)s)")  # fmt: skip
@@ -61,6 +71,18 @@ def parser() -> argparse.ArgumentParser:
                      help="edge pixels to compare in each family, at least (%(default)s)")  # fmt: skip
     add.add_argument("--frame", type=positive, default=defaults.frame_px, metavar="PX", help="side (%(default)s)")
     add.add_argument("--scale", type=float, default=1.0, metavar="X", help="of the numbers of triangles timed (1)")
+    add.add_argument("-o", "--out", type=Path, metavar="FILE.json")
+
+    add = commands.add_parser("batch", help="measure many pictures: views a second, in memory and as PNG")
+    add.set_defaults(action=batch_command)
+    views = batch.Options()
+    add.add_argument("--peer", nargs="*", metavar="NAME", default=list(views.peers), help=f"{', '.join(views.peers)}")
+    add.add_argument("--threads", nargs="+", type=positive, metavar="N", default=list(views.threads))
+    add.add_argument("--triangles", type=positive, metavar="N", default=views.n_triangles, help="(%(default)s)")
+    add.add_argument("--views", type=positive, metavar="N", default=views.n_views, help="a call (%(default)s)")
+    add.add_argument("--frame", type=positive, default=views.size[0], metavar="PX", help="side (%(default)s)")
+    add.add_argument("--repeats", type=positive, default=views.repeats, metavar="N", help="rounds (%(default)s)")
+    add.add_argument("--pin", type=cpus, default=[], metavar="CPU[,CPU...]", help="n threads: the first n of them")
     add.add_argument("-o", "--out", type=Path, metavar="FILE.json")
 
     add = commands.add_parser("atlas", help="map where each method fails")
@@ -159,32 +181,73 @@ def find_scenes(names: Sequence[str]) -> list[str]:
 
 
 def report_command(arguments: argparse.Namespace) -> int:
-    """Print tables of records."""
-    for path in arguments.files:
-        record = json.loads(path.read_text())
-        tables = {"accuracy": accuracy_tables, "atlas": atlas_page}.get(record.get("kind"), report)
+    """Print tables of records, or write the report of one."""
+    records = [json.loads(path.read_text()) for path in arguments.files]
+    if arguments.html:
+        return html_command(records, arguments)
+    for record in records:
+        tables = {"accuracy": pages, "atlas": atlas_page, "batch": batch}.get(record.get("kind"), report)
         print(*tables.lines(record), sep="\n")
+    return 0
+
+
+def html_command(records: list[dict[str, Any]], arguments: argparse.Namespace) -> int:
+    """Write the report."""
+    from benchmarks.html_report import make_report  # matplotlib
+
+    try:
+        if len(records) != 1 or records[0].get("kind") != "accuracy":
+            raise ValueError("--html takes one accuracy record")
+        write_text(arguments.html, make_report(records[0], arguments.pages))
+    except ValueError as error:
+        print(f"benchmarks: {error}", file=sys.stderr)
+        return 2
+    print(arguments.html)
     return 0
 
 
 def accuracy_command(arguments: argparse.Namespace) -> int:
     """Measure, write, print."""
-    options = accuracy.Options(
+    options = accuracy_options.Options(
         methods=arguments.method,
+        peers=list(PEERS) if arguments.peer is None else arguments.peer,
         rounds=arguments.repeats,
         seconds=arguments.seconds,
         edge_px=arguments.edge_pixels,
         frame_px=arguments.frame,
         scale=arguments.scale,
+        max_threads=arguments.threads,
     )
+    out = arguments.out
+    save = functools.partial(write_record, out) if out else None
     try:
-        record = accuracy.run_accuracy(options, sys.stderr)
+        record = json.loads(out.read_text()) if arguments.part and out and out.exists() else None
+        record = accuracy.run_accuracy(options, arguments.part, record, sys.stderr, save)
     except ValueError as error:
         print(f"benchmarks: {error}", file=sys.stderr)
         return 2
+    print(*pages.lines(record), sep="\n")
+    return 0
+
+
+def batch_command(arguments: argparse.Namespace) -> int:
+    """Measure, write, print."""
+    if unknown := [peer for peer in arguments.peer if peer not in batch.PEERS]:
+        print(f"benchmarks: --peer must be some of {', '.join(batch.PEERS)}, got {', '.join(unknown)}", file=sys.stderr)
+        return 2
+    options = batch.Options(
+        peers=arguments.peer,
+        threads=arguments.threads,
+        n_triangles=arguments.triangles,
+        n_views=arguments.views,
+        size=(arguments.frame, arguments.frame),
+        repeats=arguments.repeats,
+        pin=arguments.pin,
+    )
+    record = batch.run_batch(options, sys.stderr)
     if arguments.out:
         write_record(arguments.out, record)
-    print(*accuracy_tables.lines(record), sep="\n")
+    print(*batch.lines(record), sep="\n")
     return 0
 
 
@@ -208,10 +271,10 @@ def atlas_command(arguments: argparse.Namespace) -> int:
 
 def charts_command(arguments: argparse.Namespace) -> int:
     """Draw."""
-    from benchmarks import atlas_charts, charts  # matplotlib
+    from benchmarks import atlas_charts, chart_files  # matplotlib
 
     record = json.loads(arguments.file.read_text())
-    draw_charts = atlas_charts.draw_charts if record["kind"] == "atlas" else charts.draw_charts
+    draw_charts = atlas_charts.draw_charts if record["kind"] == "atlas" else chart_files.draw_charts
     for path in draw_charts(record, arguments.out):
         print(path)
     return 0
@@ -229,9 +292,12 @@ def document_command(arguments: argparse.Namespace) -> int:
     """Replace what stands between the markers of a page."""
     text = arguments.page.read_text(encoding="utf-8")
     record = json.loads(arguments.file.read_text())
-    parts = atlas_page.PARTS if record["kind"] == "atlas" else accuracy_tables.PARTS
-    page = accuracy_tables.with_parts(text, record, parts)
-    arguments.page.write_text(page, encoding="utf-8")
+    parts = atlas_page.PARTS if record["kind"] == "atlas" else pages.PARTS
+    try:
+        write_text(arguments.page, pages.with_parts(text, record, parts))
+    except ValueError as error:
+        print(f"benchmarks: {error}", file=sys.stderr)
+        return 2
     return 0
 
 
@@ -245,10 +311,15 @@ def list_command(_: argparse.Namespace) -> int:
 
 
 def write_record(path: Path, record: dict[str, Any]) -> None:
-    """Write JSON beside its place, then move it there: never half a file."""
+    """Write JSON."""
+    write_text(path, record_text(record) + "\n")
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write beside the place, then move it there: never half a file."""
     temporary = path.with_name(f".{path.name}.{os.getpid()}")
     try:
-        temporary.write_text(record_text(record) + "\n")
+        temporary.write_text(text, encoding="utf-8")
         os.replace(temporary, path)
     finally:
         temporary.unlink(missing_ok=True)

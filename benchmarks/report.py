@@ -127,7 +127,7 @@ def run_cells(run: dict[str, Any]) -> list[str]:
 def number(value: float) -> str:
     """Three digits that count."""
     if value >= 100:
-        return f"{value:.0f}"
+        return f"{value:,.0f}"
     return f"{value:.3g}" if value < 0.0995 else f"{value:.3f}" if value < 1 else f"{value:#.3g}"
 
 

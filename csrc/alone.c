@@ -86,7 +86,7 @@ TL_INLINE void walk_rows(const tl_triangle *t, const tl_window *window, const tl
             const vd z = vd_set1(z_row[k]);
             for (int32_t col = first[k]; col < end[k]; col += TL_LANES) {
                 const vd x = vd_add(xs, vd_set1(col * step));
-                put_depths(target, sink, at + col, vm_first(end[k] - col), sum_depth(z, vd_mul(slope_x, x)), vi_set1(t->id));
+                put_depths(target, sink, at + col, vm_first(end[k] - col), sum_depth(z, vd_mul(slope_x, x)), t->id);
             }
         }
     }
@@ -123,7 +123,7 @@ TL_INLINE void draw_triangle(const tl_vertex_set *set, const int32_t *corners, i
             count_unseen_one(target->census, &t, window);
         return;
     }
-    t.id = id;
+    t.id = id + scene->first_id;
     t.has_plane = 0;
     setup_sink(&t, window, sink_of(target, sink));
     const tl_class walker = walker_of(&t, scene, window, sink_of(target, sink));

@@ -286,7 +286,8 @@ TL_INLINE void flush_small(batch_state *s, tl_sink sink)
                 p.x = vd_add(p.x, step);
             }
         }
-        const vi sample = t.sample, size = vi_load(q->size + i), id = vi_load(q->id + i);
+        const vi sample = t.sample, size = vi_load(q->size + i);
+        const vi id = vi_add(vi_load(q->id + i), vi_set1(s->scene->first_id));
         const vi n_cols = vi_and(size, vi_set1(0xffff)), n_rows = vi_shift_right(size, 16);
         const vm live = vm_first(n - i);
         for (int row = 0; row < TL_SMALL_BOX; row++) {

@@ -23,6 +23,15 @@
 #include "smooth_lines.c"
 #include "lines.c"
 #include "mean.c"
+#include "composite.c"
+#include "shade_runs.c"
+#include "shade_texture.c"
+#include "shade_light.c"
+#include "shade_pixels.c"
+#include "shade.c"
+#include "shade_samples.c"
+#include "shade_cutout.c"
+#include "planes.c"
 #include "mix.h"
 #include "mix_u8.c"
 #include "mix_f32.c"
@@ -52,6 +61,13 @@ const tl_kernels TL_KERNELS = {
     .paint_gouraud = paint_gouraud,
     .list_edges = list_edges,
     .draw_lines = draw_lines,
+    .composite = composite,
+    .set_inverse_w = set_inverse_w,
+    .shade = shade,
+    .shade_samples = shade_samples,
+    .cut_out = cut_out,
     .mean_flat = mean_flat,
     .mean_colors = mean_colors,
+    .list_planes = list_planes,
+    .fill_planes = fill_planes,
 };

@@ -17,6 +17,12 @@
  *   vw_zero, vw_load, vw_store, vw_add_range    TL_LANES words of 64 bits
  *   vi_prefix_sum, vi_last  sums of lanes [0, k]; the last lane everywhere
  *   vi_shift_in(a, before)  a one lane up, the last lane of `before` in lane 0
+ *   vf_fma(a, b, c)         a * b + c, rounded once
+ *   vf_min, vf_max          the second number when one is NaN
+ *   v?_lookup(table, i)     table[i & 15] of sixteen numbers
+ *   v?_pick(p, i)           p[i] of TL_LANES numbers that lie together
+ *   vi_prefix_count(bits)   how many of the bits [0, k] are set
+ *   vi_load_records(base, scale, i, c), vf_load_pairs    16 bytes at base + scale * i[k], 8 at base + 8 * i[k], as columns
  *   hm_, hf_, hi_, hd_      the few that short rows need, in half vectors of TL_HALF_LANES (0: there are none)
  *   vi_mul_halves, vi_mul_high_halves    lower and upper halves of the products of unsigned 16-bit halves
  *   vi_scale_halves(a, b)   (a * b + 2^14) >> 15 of signed 16-bit halves; b = -2^15 is -1
@@ -40,10 +46,13 @@
 
 #if defined(__AVX512F__) && defined(__AVX512DQ__) && defined(__AVX512BW__) && defined(__AVX512VL__)
 #include "lanes_avx512.h"
+#include "lanes_shade_avx512.h"
 #elif defined(__AVX2__) && defined(__FMA__) && defined(__BMI2__)
 #include "lanes_avx2.h"
+#include "lanes_shade_avx2.h"
 #else
 #include "lanes_scalar.h"
+#include "lanes_shade_scalar.h"
 #endif
 
 /* Where vi_store_quads puts the four numbers of a lane, in units of four. */

@@ -6,6 +6,7 @@
  *
  * Based on: T. Porter, T. Duff, Compositing Digital Images, 1984 (sums are of premultiplied colours). */
 #include "fixed.h"
+#include "lanes.h"
 
 TL_INLINE uint8_t mean_u8(const uint8_t *values, int sample_bits, const tl_transfer *transfer)
 {
@@ -95,29 +96,115 @@ TL_INLINE void mean_pixel(const void *const *colors, int sample_bits, int n_chan
         mean_pixel_f32(colors, sample_bits, n_channels, transfer, pixel);
 }
 
-/* n pixels whose samples have the colours of their triangles; planes of labels lie `stride` apart. */
-static void mean_flat(const int32_t *labels, int sample_bits, int64_t stride, int64_t n, const void *colors, int n_channels, int is_u8,
-                      const tl_transfer *transfer, void *pixels)
+/* Two sums of up to 2^4 numbers below 256, 16 bits apart, to their means. */
+TL_INLINE vi mean_pairs(vi sums, int sample_bits)
 {
-    const int pixel_bytes = n_channels * (is_u8 ? 1 : 4);
-    char *pixel = pixels;
+    const vi is_odd = vi_and(vi_shift_right(sums, sample_bits), vi_set1(0x00010001));
+    const vi half = vi_set1(0x00010001 * ((1 << sample_bits >> 1) - 1));
+    return vi_and(vi_shift_right(vi_add(vi_add(sums, half), is_odd), sample_bits), vi_set1(0x00ff00ff));
+}
+
+/* Where the colours of triangles stand, and what becomes of those of a pixel's samples. */
+typedef struct {
+    const char *colors;
+    int row_bytes, n_channels, is_u8, sample_bits;
+    int64_t stride; /* from label to label of a pixel */
+    const tl_transfer *transfer;
+} mean_source;
+
+TL_INLINE void mean_labels(const mean_source *s, const int32_t *labels, char *pixel)
+{
+    const void *own[TL_MAX_SAMPLES];
+    for (int k = 0; k < 1 << s->sample_bits; k++) {
+        const int64_t label = labels[k * s->stride];
+        own[k] = label < 0 ? (const void *)pixel : s->colors + label * s->row_bytes;
+    }
+    mean_pixel(own, s->sample_bits, s->n_channels, s->is_u8, s->transfer, pixel);
+}
+
+/* The mean of the bytes of TL_LANES pixels, four a colour; `own` is what they hold.  Lanes in `rest` are weighted by an alpha that
+ * differs, and left for others. */
+TL_INLINE vi mean_bytes(const mean_source *s, const int32_t *labels, vm live, vi own, vm *rest)
+{
+    const tl_transfer *transfer = s->transfer;
+    const vi alpha = vi_set1(transfer && transfer->is_straight ? (int32_t)(0xffu << 8 * transfer->n_channels) : 0);
+    const vi minus_one = vi_set1(-1), bytes = vi_set1(0x00ff00ff), first = vi_load_masked(live, labels);
+    const int32_t *palette = (const int32_t *)(const void *)s->colors;
+    const vm is_drawn = vm_and(live, vi_gt(first, minus_one));
+    const vi color = vi_select(is_drawn, vi_gather(is_drawn, palette, first), own);
+    vi even = vi_and(color, bytes), odd = vi_and(vi_shift_right(color, 8), bytes);
+    vm is_mixed = vm_and_not(live, vm_all());
+    *rest = is_mixed;
+    for (int k = 1; k < 1 << s->sample_bits; k++)
+        is_mixed = vm_or(is_mixed, vm_and_not(live, vi_eq(vi_load_masked(live, labels + k * s->stride), first)));
+    if (!vm_any(is_mixed))
+        return color;
+    for (int k = 1; k < 1 << s->sample_bits; k++) {
+        const vi label = vi_load_masked(is_mixed, labels + k * s->stride);
+        const vm m = vm_and(is_mixed, vi_gt(label, minus_one));
+        const vi other = vi_select(m, vi_gather(m, palette, label), own);
+        even = vi_add(even, vi_and(other, bytes));
+        odd = vi_add(odd, vi_and(vi_shift_right(other, 8), bytes));
+        *rest = vm_or(*rest, vm_and_not(is_mixed, vi_eq(vi_and(other, alpha), vi_and(color, alpha))));
+    }
+    return vi_select(is_mixed, vi_or(mean_pairs(even, s->sample_bits), vi_shift_left(mean_pairs(odd, s->sample_bits), 8)), color);
+}
+
+/* n pixels of n_channels bytes. */
+TL_INLINE void mean_flat_bytes(const mean_source *s, const int32_t *labels, int64_t n, int n_channels, char *pixels)
+{
+    for (int64_t i = 0; i < n; i += TL_LANES) {
+        const vm live = vm_first(n - i);
+        const int end = n - i < TL_LANES ? (int)(n - i) : TL_LANES;
+        char *const own = pixels + n_channels * i;
+        vm rest;
+        if (n_channels == 4) {
+            int32_t *const whole = (int32_t *)(void *)own;
+            const vi mean = mean_bytes(s, labels + i, live, vi_load_masked(live, whole), &rest);
+            vi_store_masked(whole, vm_and_not(live, rest), mean);
+        } else {
+            int32_t colors[TL_MAX_LANES] = {0};
+            for (int k = 0; k < end; k++)
+                memcpy(colors + k, own + n_channels * k, (size_t)n_channels);
+            vi_store(colors, mean_bytes(s, labels + i, live, vi_load(colors), &rest));
+            for (int k = 0; k < end; k++)
+                if (!(vm_bits(rest) >> k & 1))
+                    memcpy(own + n_channels * k, colors + k, (size_t)n_channels);
+        }
+        for (unsigned lanes = vm_bits(rest); lanes; lanes &= lanes - 1)
+            mean_labels(s, labels + i + __builtin_ctz(lanes), own + n_channels * __builtin_ctz(lanes));
+    }
+}
+
+/* One after the other. */
+TL_INLINE void mean_flat_pixels(const mean_source *s, const int32_t *labels, int64_t n, char *pixel)
+{
+    const int pixel_bytes = s->n_channels * (s->is_u8 ? 1 : 4);
     for (int64_t i = 0; i < n; i++, labels++, pixel += pixel_bytes) {
         const int32_t first = labels[0];
         int32_t differs = 0;
-        for (int k = 1; k < 1 << sample_bits; k++)
-            differs |= labels[k * stride] ^ first;
-        if (!differs) {
-            if (first >= 0)
-                memcpy(pixel, (const char *)colors + (int64_t)first * pixel_bytes, (size_t)pixel_bytes);
-            continue;
-        }
-        const void *own[TL_MAX_SAMPLES];
-        for (int k = 0; k < 1 << sample_bits; k++) {
-            const int64_t label = labels[k * stride];
-            own[k] = label < 0 ? (const void *)pixel : (const char *)colors + label * pixel_bytes;
-        }
-        mean_pixel(own, sample_bits, n_channels, is_u8, transfer, pixel);
+        for (int k = 1; k < 1 << s->sample_bits; k++)
+            differs |= labels[k * s->stride] ^ first;
+        if (differs)
+            mean_labels(s, labels, pixel);
+        else if (first >= 0)
+            memcpy(pixel, s->colors + (int64_t)first * s->row_bytes, (size_t)pixel_bytes);
     }
+}
+
+/* n pixels whose samples have the colours of their triangles; planes of labels lie `stride` apart. */
+static void mean_flat(const int32_t *labels, int sample_bits, int64_t stride, int64_t n, const void *palette, int n_channels, int is_u8,
+                      const tl_transfer *transfer, void *pixels)
+{
+    const mean_source s = {palette, is_u8 ? 4 : 4 * n_channels, n_channels, is_u8, sample_bits, stride, transfer};
+    if (!is_u8 || (transfer && transfer->decode))
+        mean_flat_pixels(&s, labels, n, pixels);
+    else if (n_channels == 4)
+        mean_flat_bytes(&s, labels, n, 4, pixels);
+    else if (n_channels == 3)
+        mean_flat_bytes(&s, labels, n, 3, pixels);
+    else
+        mean_flat_bytes(&s, labels, n, n_channels, pixels);
 }
 
 /* n pixels from planes of colours that lie `stride` pixels apart. */

@@ -3,6 +3,7 @@
 #include "fixed.h"
 #include "lanes.h"
 
+#include "peel.c"
 #include "census.c"
 #include "alone.c"
 #include "batch.c"
@@ -114,7 +115,7 @@ TL_INLINE void draw_batch(batch_state *s, tl_sink sink, const int32_t *corners, 
         lane_triangles t;
         vd z[3];
         place_triangles(s, sink, &c, col, row, &t, z);
-        draw_tiny(s, sink, &t, z, tiny, n_cols, n_rows, id);
+        draw_tiny(s, sink, &t, z, tiny, n_cols, n_rows, vi_add(id, vi_set1(s->scene->first_id)));
     }
     if (vm_any(small)) {
         push(&s->small, small, col, row, n_cols, n_rows, id);
@@ -221,10 +222,23 @@ static int64_t count_classes(const tl_scene *scene, const tl_window *window, con
     return bad_row;
 }
 
+/* In vectors: a loop over single numbers took several times as long as the memset of the ids. */
+static void clear_depth(float *depth, int64_t n, float value)
+{
+    int64_t k = 0;
+    for (; k + TL_LANES <= n; k += TL_LANES)
+        vf_store(depth + k, vf_set1(value));
+    vf_store_masked(depth + k, vm_first(n - k), vf_set1(value));
+}
+
 /* What every sample of the window starts as. */
 static void clear(const tl_window *window, const tl_target *target)
 {
     const float farthest = target->sink == TL_SINK_FARTHEST ? -INFINITY : INFINITY;
+    if (target->sink == TL_SINK_PEEL) {
+        clear_layers(window, target);
+        return;
+    }
     if (target->sink == TL_SINK_MASK || target->sink == TL_SINK_SAMPLES) {
         const int64_t n_bits = target->stride_px * window->height << target->sample_bits;
         memset(target->covered, 0, (size_t)tl_covered_words(n_bits) * sizeof(uint64_t));
@@ -233,8 +247,8 @@ static void clear(const tl_window *window, const tl_target *target)
     for (int64_t row = 0; row < window->height; row++) {
         const int64_t at = row * target->stride_px;
         memset((int32_t *)target->pixels + at, target->sink == TL_SINK_COUNT ? 0 : 0xff, (size_t)window->width * sizeof(int32_t));
-        for (int64_t col = 0; sink_has_depth(target->sink) && col < window->width; col++)
-            target->depth[at + col] = farthest;
+        if (sink_has_depth(target->sink))
+            clear_depth(target->depth + at, window->width, farthest);
     }
 }
 
@@ -247,7 +261,7 @@ static int64_t draw(const tl_scene *scene, const tl_window *window, const tl_tar
         tl_target part = *target;
         band.y_px += row;
         band.height = min64(rows_at_once, window->height - row);
-        part.pixels = (char *)target->pixels + row * target->stride_px * pixel_bytes;
+        part.pixels = target->pixels ? (char *)target->pixels + row * target->stride_px * pixel_bytes : NULL;
         part.depth = target->depth ? target->depth + row * target->stride_px : NULL;
         part.n_samples = part.stride_px * (band.height - 1) + band.width;
         int64_t bad_row = -1;

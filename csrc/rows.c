@@ -88,14 +88,14 @@ TL_INLINE vi row_quotients(const row_edges *r, int side, int i, vf rows)
 
 /* Rows of a block of at most TL_LANES columns; the depth of a sample is the sum of its row's and its column's. */
 TL_INLINE void draw_block(const tl_target *target, tl_sink sink, const int32_t *bits, const double *z_row, int stride_of_rows, int64_t at,
-                          int n_rows, int is_half, vd z_col, vi id)
+                          int n_rows, int is_half, vd z_col, int32_t id)
 {
     const int64_t stride = target->stride_px;
     (void)is_half;
 #if TL_HALF_LANES
-    if (is_half && sink_has_depth(sink)) {
+    if (is_half && sink_has_depth(sink) && sink != TL_SINK_PEEL) {
         for (int row = 0; row < n_rows; row++, at += stride)
-            put_depths_half(target, sink, at, (hm)bits[row * stride_of_rows], hf_sum_depth(z_row[row * stride_of_rows], hd_lower(z_col)), hi_lower(id));
+            put_depths_half(target, sink, at, (hm)bits[row * stride_of_rows], hf_sum_depth(z_row[row * stride_of_rows], hd_lower(z_col)), hi_lower(vi_set1(id)));
         return;
     }
 #endif
@@ -107,7 +107,7 @@ TL_INLINE void draw_block(const tl_target *target, tl_sink sink, const int32_t *
         else if (sink_has_depth(sink))
             put_depths(target, sink, at, m, sum_depth(vd_set1(z_row[row * stride_of_rows]), z_col), id);
         else
-            put_numbers(target, sink, at, m, id);
+            put_numbers(target, sink, at, m, vi_set1(id));
     }
 }
 
@@ -148,7 +148,7 @@ TL_INLINE void draw_rows(batch_state *s, tl_sink sink, const row_edges *r, int i
             if (sink_has_depth(sink))
                 z_col = vd_mul(vd_set1(r->slope_x[i]), vd_add(vd_set1(r->x[i] + col0 * unit2), steps));
             vi_store(bits, in_block);
-            draw_block(target, sink, bits + begin, z_row + begin, 1, at + col0 + begin * target->stride_px, n, width <= TL_HALF_LANES, z_col, vi_set1(id));
+            draw_block(target, sink, bits + begin, z_row + begin, 1, at + col0 + begin * target->stride_px, n, width <= TL_HALF_LANES, z_col, id);
         }
     }
 }
@@ -221,7 +221,7 @@ TL_INLINE void flush_middle(batch_state *s, tl_sink sink)
             if (sink_has_depth(sink))
                 z_cols = vd_mul(vd_set1(slope_x[k]), vd_add(vd_set1(x[k]), ramp(unit2)));
             draw_block(&target, sink, &m.bits[0][k], &m.z[0][k], TL_MAX_LANES, (uint32_t)sample[k], size >> 16, (size & 0xffff) <= TL_HALF_LANES,
-                       z_cols, vi_set1(q->id[i + k]));
+                       z_cols, q->id[i + k] + s->scene->first_id);
         }
     }
 }
@@ -257,7 +257,7 @@ TL_INLINE void flush_rows(batch_state *s, tl_sink sink)
         }
         const int end = n - i < TL_LANES ? n - i : TL_LANES;
         for (int k = 0; k < end; k++)
-            draw_rows(s, sink, &r, k, sample[k], q->size[i + k], q->id[i + k]);
+            draw_rows(s, sink, &r, k, sample[k], q->size[i + k], q->id[i + k] + s->scene->first_id);
     }
 }
 

@@ -30,7 +30,8 @@ typedef struct {
     TL_SINK_COPY(f, paint, TL_SINK_PAINT, declared, __VA_ARGS__)             \
     TL_SINK_COPY(f, nearest, TL_SINK_NEAREST, declared, __VA_ARGS__)         \
     TL_SINK_COPY(f, farthest, TL_SINK_FARTHEST, declared, __VA_ARGS__)       \
-    TL_SINK_COPY(f, samples, TL_SINK_SAMPLES, declared, __VA_ARGS__)
+    TL_SINK_COPY(f, samples, TL_SINK_SAMPLES, declared, __VA_ARGS__)         \
+    TL_SINK_COPY(f, peel, TL_SINK_PEEL, declared, __VA_ARGS__)
 #define TL_SINK_CALL(f, sink, ...)                                           \
     switch (sink) {                                                          \
     case TL_SINK_MASK: f##_mask(__VA_ARGS__); break;                         \
@@ -39,12 +40,13 @@ typedef struct {
     case TL_SINK_PAINT: f##_paint(__VA_ARGS__); break;                       \
     case TL_SINK_NEAREST: f##_nearest(__VA_ARGS__); break;                   \
     case TL_SINK_FARTHEST: f##_farthest(__VA_ARGS__); break;                 \
+    case TL_SINK_PEEL: f##_peel(__VA_ARGS__); break;                         \
     default: f##_samples(__VA_ARGS__); break;                                \
     }
 
 TL_INLINE int sink_has_depth(tl_sink sink)
 {
-    return sink == TL_SINK_PAINT || sink == TL_SINK_NEAREST || sink == TL_SINK_FARTHEST;
+    return sink == TL_SINK_PAINT || sink == TL_SINK_NEAREST || sink == TL_SINK_FARTHEST || sink == TL_SINK_PEEL;
 }
 
 /* Ids and depths of the lanes in m that win.  Depths of new samples are never NaN or -0.  Written for whole vectors and, where
@@ -66,10 +68,22 @@ TL_INLINE int sink_has_depth(tl_sink sink)
         P##f_store_some(target->depth + at, wins, depth, at + TL_LANES <= target->n_samples);                            \
         P##i_store_some(ids, wins, id, at + TL_LANES <= target->n_samples);                                                                                \
     }
-TL_PUT_DEPTHS(put_depths, vm, vf, vi, v)
+TL_PUT_DEPTHS(put_buffers, vm, vf, vi, v)
 #if TL_HALF_LANES
 TL_PUT_DEPTHS(put_depths_half, hm, hf, hi, h)
 #endif
+
+static void peel_lanes(const tl_target *target, int64_t at, vm m, vf depth, int32_t id); /* peel.c */
+static void peel_fragments(const tl_peeled *peeled, const fragment_list *f, int n);
+
+/* The lanes in m of a triangle. */
+TL_INLINE void put_depths(const tl_target *target, tl_sink sink, int64_t at, vm m, vf depth, int32_t id)
+{
+    if (sink == TL_SINK_PEEL)
+        peel_lanes(target, at, m, depth, id);
+    else
+        put_buffers(target, sink, at, m, depth, vi_set1(id));
+}
 
 /* Counts or ids of the lanes in m. */
 TL_INLINE void put_numbers(const tl_target *target, tl_sink sink, int64_t at, vm m, vi id)
@@ -136,7 +150,7 @@ TL_INLINE void put_plane(const tl_triangle *t, const tl_window *window, const tl
     const int64_t at = row * target->stride_px;
     for (int64_t col = first; col < end; col += TL_LANES) {
         const vd xs = vd_add(vd_set1(x + (double)(col - first) * step), steps);
-        put_depths(target, sink, at + col, vm_first(end - col), sum_depth(z_row, vd_mul(slope_x, xs)), vi_set1(t->id));
+        put_depths(target, sink, at + col, vm_first(end - col), sum_depth(z_row, vd_mul(slope_x, xs)), t->id);
     }
 }
 
@@ -154,7 +168,7 @@ static void put_weighted(const tl_triangle *t, const tl_window *window, const tl
             z[k] = (float)(z0 + (w1[k] * slope1 + w2[k] * slope2)) + 0.0f;
         for (int k = 0; k < n; k += TL_LANES) {
             const vm m = vm_first(n - k);
-            put_depths(target, sink, row * target->stride_px + col + k, m, vf_load_masked(m, z + k), vi_set1(t->id));
+            put_depths(target, sink, row * target->stride_px + col + k, m, vf_load_masked(m, z + k), t->id);
         }
     }
 }
@@ -201,6 +215,10 @@ TL_INLINE float key_depth(int64_t key, int32_t turn)
 /* Writes the list out, one sample after the other: without branches, whatever wins. */
 TL_INLINE void flush_fragments(const tl_target *target, tl_sink sink, const fragment_list *f, int n)
 {
+    if (sink == TL_SINK_PEEL) {
+        peel_fragments(target->peeled, f, n);
+        return;
+    }
     int32_t *const pixels = target->pixels;
     float *const depths = target->depth;
     const int32_t flip = target->flip;

@@ -9,6 +9,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "shading.h"
+
 /* ---- vertices ------------------------------------------------------------------------------------------ */
 
 /* A snapped vertex, 16 bytes: one vector load.  x_fx = TL_SPECIAL marks a vertex that the 64-bit path cannot
@@ -105,6 +107,7 @@ typedef enum {
     TL_SINK_FARTHEST = 5, /* id and depth where depth > what is there; at equal depth the lower id */
     TL_SINK_SAMPLES = 6,  /* float: the share of samples that are covered; bits in `covered` until the last pass */
     TL_SINK_BLEND = 7,    /* the colour of the triangle that `blend` draws; not for draw */
+    TL_SINK_PEEL = 8,     /* ids and depths of the nearest layers, sorted: `peeled` */
     TL_SINK_CENSUS = 16,  /* nothing is drawn: triangles are counted by how they would be; not for draw */
 } tl_sink;
 
@@ -133,6 +136,17 @@ typedef struct {
     double covered[TL_N_CLASSES]; /* about how many of them are covered: the lesser of area and box, added up */
 } tl_census;
 
+/* The layers of pixels: of every covered sample of a pixel the n_layers that come first by depth, then id.  Planes, the first one
+ * first; id -1 and the depth that every other comes before where there are fewer. */
+#define TL_MAX_LAYERS 16
+typedef struct {
+    int n_layers;    /* 1 to TL_MAX_LAYERS */
+    int is_farthest; /* the larger depth comes first */
+    int32_t *ids;    /* the window's first pixel in the first plane, with the rows of the target */
+    float *depth;
+    int64_t plane_px; /* from plane to plane */
+} tl_peeled;
+
 typedef struct {
     tl_sink sink;
     void *pixels; /* mask, counts or ids; rows of stride_px pixels.  BLEND: the blend_state of mix.h */
@@ -145,6 +159,7 @@ typedef struct {
     int sample;                /* the one that is being drawn; draw knows */
     int32_t flip;              /* LABEL: what ids are xored with, 0, or TL_FLIP: the earlier triangle wins */
     tl_census *census;         /* CENSUS */
+    const tl_peeled *peeled;   /* PEEL; the window has less than 2^31 pixels */
 } tl_target;
 
 #define TL_FLIP INT32_MAX
@@ -159,6 +174,7 @@ typedef struct {
     const tl_pieces *pieces;  /* of triangles with TL_CLIPPED vertices, or NULL */
     tl_cull cull;
     tl_method method;
+    int32_t first_id; /* what triangle 0 is called in a buffer of ids that several scenes share; read by draw alone */
 } tl_scene;
 
 /* The part of a scene that one pass draws.  Several passes may share a scene: each takes some of the triangles, draws what of
@@ -235,6 +251,18 @@ static inline int64_t tl_blend_cells(int64_t width)
     return atlas > strip ? atlas : strip;
 }
 
+/* The layers that are seen through each other, and their colours: straight, alpha last. */
+typedef struct {
+    const int32_t *ids; /* planes, of the first pixel on; -1 ends the layers of a pixel */
+    int64_t plane_px;
+    int n_layers;
+    int n_channels;          /* 2 or 4 */
+    int is_u8;               /* colours are 0 to 255, and pixels uint8; otherwise 0 to 1 and float32 */
+    int is_flat;             /* colours are of the triangles, uint8 or float32; otherwise float32 planes (n_layers, n, n_channels) */
+    const void *colors;
+    const float *background; /* (n_channels,), of the same range, behind all layers; or NULL */
+} tl_composite;
+
 /* ---- lines --------------------------------------------------------------------------------------------- */
 
 typedef struct {
@@ -259,6 +287,18 @@ typedef struct {
     int is_farthest;    /* the larger depth is the nearer one */
     int64_t stride_px;
 } tl_line_target;
+
+/* ---- values on triangles ------------------------------------------------------------------------------- */
+
+typedef struct {
+    const double *points_px;  /* (n_points, 2), before the snap */
+    const double *values;     /* (n_points,) */
+    const int32_t *triangles; /* (n_triangles, 3) */
+    int64_t n_points, n_triangles;
+    double *planes; /* (1 + n_triangles, TL_PLANE_DOUBLES) of list_planes, or NULL: fill_planes then computes them as it goes */
+} tl_valued;
+
+#define TL_PLANE_DOUBLES 8
 
 /* ---- the kernel table ---------------------------------------------------------------------------------- */
 
@@ -328,11 +368,32 @@ typedef struct tl_kernels {
                           int is_u8, void *pixels);
 
     /* The mean colour of the samples of n pixels: from planes of labels and the colours of the triangles, or from planes of colours.
-     * Planes lie `stride` pixels apart; transfer is NULL where all channels are averaged as they are. */
-    void (*mean_flat)(const int32_t *labels, int sample_bits, int64_t stride, int64_t n, const void *colors, int n_channels, int is_u8,
+     * Planes lie `stride` pixels apart; transfer is NULL where all channels are averaged as they are.  A row of a palette of uint8
+     * has four numbers, whatever n_channels. */
+    void (*mean_flat)(const int32_t *labels, int sample_bits, int64_t stride, int64_t n, const void *palette, int n_channels, int is_u8,
                       const tl_transfer *transfer, void *pixels);
     void (*mean_colors)(const void *colors, int sample_bits, int64_t stride, int64_t n, int n_channels, int is_u8,
                         const tl_transfer *transfer, void *pixels);
+
+    /* What is seen through the layers of n pixels. */
+    void (*composite)(const tl_composite *layers, int64_t n, void *pixels);
+
+    /* Copies rows [first, end) of four numbers, the last of them replaced by 1/w of the vertex. */
+    void (*set_inverse_w)(const tl_source *source, const float *rows, int64_t first, int64_t end, float *out);
+
+    /* The picture of a visibility buffer, rows of window->width: uint8 red, green, blue, opacity.  `view` may be NULL in pixel space. */
+    void (*shade)(const tl_scene *scene, const tl_window *window, const tl_view *view, const tl_shading *shading, const int32_t *ids,
+                  const float *depth, uint8_t *pixels);
+
+    /* The same from planes of ids and depth that lie `stride` pixels apart, one a sample; samples_fx as in tl_target. */
+    void (*shade_samples)(const tl_scene *scene, const tl_window *window, const tl_view *view, const tl_shading *shading,
+                          const int32_t *samples_fx, int sample_bits, int64_t stride, const int32_t *ids, const float *depth,
+                          uint8_t *pixels);
+
+    /* Draws n triangles over ids and depth of the others, but for what their materials cut out; the window as for a share of a
+     * part, and fewer than 2^31 pixels. */
+    void (*cut_out)(const tl_scene *scene, const tl_window *window, const tl_view *view, const tl_shading *shading,
+                    const int32_t *triangles, int64_t n, int32_t *ids, float *depth);
 
     /* The edges of the triangles that are not culled, each once, as lower index + 2^32 * higher index; room for three a
      * triangle.  Returns the first row with an index outside the vertices, or -1. */
@@ -340,6 +401,12 @@ typedef struct tl_kernels {
 
     /* Clears the window's pixels and draws lines. */
     void (*draw_lines)(const tl_edges *lines, const tl_window *window, const tl_line_target *target);
+
+    /* The planes of triangles [first, end); the one of no triangle, with first = 0. */
+    void (*list_planes)(const tl_valued *mesh, int64_t first, int64_t end);
+
+    /* Per pixel of `ids` (rows of window->width): the value of its centre on the plane of the triangle, float32 or float64. */
+    void (*fill_planes)(const tl_valued *mesh, const tl_window *window, const int32_t *ids, int is_f32, void *out);
 } tl_kernels;
 
 #endif

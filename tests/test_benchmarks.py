@@ -158,3 +158,16 @@ def test_yardstick_groups_are_added_in_their_units():
 def test_yardstick_without_a_figure_tells():
     with pytest.raises(YardstickError, match="no figure for blob-10k"):
         Yardstick.parse("program", DEFAULT_PATTERN, Path(), []).read("hello", CASES["blob-10k"])
+
+
+def test_fields_that_are_timed_are_whole():
+    from benchmarks import field
+
+    points, triangles, values = field.mesh()
+    found = field.topleft_field(points, triangles, values)()
+    assert found.shape == field.SIZE[::-1]
+    assert np.isfinite(found).all()
+    assert len(triangles) > 200_000
+    heights = field.height_map()()
+    assert heights.shape == (400, 400)
+    assert np.isfinite(heights).all()

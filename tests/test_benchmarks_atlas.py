@@ -18,7 +18,7 @@ if not (ROOT / "benchmarks").is_dir():
     pytest.skip("the benchmarks are not part of this copy", allow_module_level=True)
 sys.path.append(str(ROOT))
 
-from benchmarks import accuracy_tables, atlas, atlas_page, atlas_shrink, cli  # noqa: E402
+from benchmarks import atlas, atlas_page, atlas_shrink, cli, pages  # noqa: E402
 from benchmarks.atlas_depth import DEPTH_FAMILIES, DepthScene, Picture, draw, judge_depth  # noqa: E402
 from benchmarks.atlas_families import FAMILIES  # noqa: E402
 from benchmarks.exact_clip import draw_clip, pieces_picture  # noqa: E402
@@ -220,7 +220,7 @@ def test_rows_of_a_picture_are_read_back(name):
 def test_atlas_page_tables_are_those_of_the_record(record):
     text = PAGE.read_text(encoding="utf-8")
     command = f"python -m benchmarks document {RECORD.relative_to(ROOT)} {PAGE.relative_to(ROOT)}"
-    assert accuracy_tables.with_parts(text, record, atlas_page.PARTS) == text, f"run: {command}"
+    assert pages.with_parts(text, record, atlas_page.PARTS) == text, f"run: {command}"
 
 
 def test_atlas_page_shows_every_chart(record):

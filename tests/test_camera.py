@@ -211,3 +211,89 @@ def test_view_matrix_is_a_rotation_and_a_shift():
     assert view[:3, :3] @ view[:3, :3].T == pytest.approx(np.eye(3))
     assert np.linalg.det(view) == pytest.approx(1)
     assert view @ [3, -2, 7, 1] == pytest.approx([0, 0, 0, 1])
+
+
+@pytest.mark.parametrize("ortho", [False, True])
+@pytest.mark.parametrize("size", [(640, 480), (300, 900)])
+def test_framing_box_fills_the_frame_without_touching_it(ortho, size):
+    corners = np.array([(x, y, z) for x in (0, 5) for y in (0, 2) for z in (0, 1)], float)
+    camera = Camera.framing(corners[[0, 7]], ortho=ortho, aspect=size[0] / size[1], fit="box", azimuth_deg=20)
+    x, y, depth = pixels(camera, corners, size).T
+    slack = np.array([x.min() / size[0], 1 - x.max() / size[0], y.min() / size[1], 1 - y.max() / size[1]])
+    assert slack.min() == pytest.approx(0.5 - 0.5 / 1.05, abs=0.011)  # the margin is taken across, not along the view
+    assert slack.min() > 0
+    assert 0 <= depth.min() < depth.max() <= 1
+
+
+@pytest.mark.parametrize("ortho", [False, True])
+def test_framing_points_fills_the_frame_more_than_sphere_and_box(ortho):
+    knot = Mesh(*scenes.shape("torus-knot"))
+    sizes = []
+    for fit in ("sphere", "box", "points"):
+        x, y, _ = pixels(Camera.framing(knot, fit=fit, ortho=ortho, aspect=4 / 3), knot.vertices).T
+        assert min(x.min(), 640 - x.max(), y.min(), 480 - y.max()) > 0
+        sizes.append(max(np.ptp(x) / 640, np.ptp(y) / 480))
+    assert sizes[2] > max(sizes[:2])
+    assert sizes[2] > 0.85
+
+
+def test_framing_box_comes_nearer_than_the_sphere():
+    long_box = [(-5, -1, -1), (5, 1, 1)]
+    sphere, box = (Camera.framing(long_box, fit=fit, azimuth_deg=90) for fit in ("sphere", "box"))
+    assert box.view[2, 3] > sphere.view[2, 3]
+
+
+def test_framing_box_of_a_point_has_a_picture():
+    for ortho in (False, True):
+        camera = Camera.framing([(5, 5, 5)], fit="box", ortho=ortho)
+        assert pixels(camera, (5, 5, 5))[0, :2] == pytest.approx((320, 240))
+
+
+@pytest.mark.parametrize("ortho", [False, True])
+def test_off_center_symmetric_is_the_camera_of_the_same_view(ortho):
+    view = view_matrix((1, 2, 3), (0, 0, 0))
+    side = 0.5 * np.tan(np.radians(25))
+    camera = Camera.off_center(
+        view, left=-side * 4 / 3, right=side * 4 / 3, bottom=-side, top=side, near=0.5, far=9, ortho=ortho
+    )
+    if ortho:
+        expected = Camera.orthographic(view, near=0.5, far=9, height=2 * side)
+    else:
+        expected = Camera.perspective(view, near=0.5, far=9, fov_y_deg=50)
+    assert camera.clip_from_world(SIZE) == pytest.approx(expected.clip_from_world(SIZE), abs=1e-14)
+
+
+@pytest.mark.parametrize("ortho", [False, True])
+def test_off_center_halves_make_the_whole(ortho):
+    sides = {"bottom": -0.3, "top": 0.3, "near": 1, "far": 9, "ortho": ortho}
+    whole = Camera.off_center(np.eye(4), left=-0.4, right=0.4, **sides)
+    right = Camera.off_center(np.eye(4), left=0.0, right=0.4, **sides)
+    point = (0.2, 0.1, -2)
+    at_whole, at_right = pixels(whole, point)[0], pixels(right, point, (320, 480))[0]
+    assert at_right == pytest.approx(at_whole - (320, 0, 0))
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (
+            lambda: Camera.off_center(np.eye(4), left=1, right=1, bottom=0, top=1, near=1, far=2),
+            "left < right and bottom < top must be finite, got 1 and 1, 0 and 1",
+        ),
+        (
+            lambda: Camera.off_center(np.eye(4), left=0, right=1, bottom=0, top=1, near=-1, far=2),
+            "0 < near < far, got -1 and 2",
+        ),
+        (
+            lambda: Camera.off_center(np.eye(4), left=0, right=np.inf, bottom=0, top=1, near=1, far=2, ortho=True),
+            "left < right and bottom < top must be finite, got 0 and inf",
+        ),
+        (
+            lambda: Camera.framing([(0, 0, 0)], fit="tight"),
+            "fit must be \"sphere\", \"box\" or \"points\", got 'tight'",
+        ),
+    ],
+)
+def test_camera_more_impossible_is_refused(make, message):
+    with pytest.raises(ValueError, match=message):
+        make()

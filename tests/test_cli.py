@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from topleft import cli, scenes
+from topleft import cli, png, scenes
 from topleft.camera import Camera
 from topleft.mesh import Mesh
 from topleft.render import render
@@ -104,8 +104,8 @@ def test_render_npy_holds_the_numbers_behind_the_picture(run, shading, shape, dt
 def test_render_npz_holds_all_buffers_and_the_matrix(run):
     assert run("render", "cube", "-o", "cube.npz", *SMALL)[0] == 0
     with np.load("cube.npz") as arrays:
-        assert sorted(arrays) == ["clip_from_world", "color", "depth", "triangle"]
-        assert np.array_equal(arrays["triangle"] >= 0, np.isfinite(arrays["depth"]))
+        assert sorted(arrays) == ["clip_from_world", "color", "depth", "id"]
+        assert np.array_equal(arrays["id"] >= 0, np.isfinite(arrays["depth"]))
         camera = Camera.framing(Mesh(*scenes.shape("cube")), aspect=64 / 48)
         assert np.array_equal(arrays["clip_from_world"], camera.clip_from_world((64, 48)))
 
@@ -196,7 +196,7 @@ def test_render_mesh_and_out_reversed_is_refused(run, folder):
     (folder / "a.obj").write_text(QUADS)
     status, lines = run("render", "a.png", "-o", "a.obj")
     assert (status, len(lines)) == (2, 1)
-    assert lines[0].startswith("topleft: OUT must end in one of .png .jpg .jpeg .webp .npy .npz, or in / for a folder")
+    assert lines[0].startswith("topleft: OUT must end in one of .png .jpg .jpeg .webp .tif .tiff .npy .npz, or in /")
     assert (folder / "a.obj").read_text() == QUADS
 
 
@@ -215,8 +215,8 @@ def test_render_mesh_and_out_reversed_is_refused(run, folder):
         (["cube", "-o", "a.gif"], "topleft: OUT must end in one of .png"),
         (["cube", "-o", ""], "topleft: OUT must end in one of .png"),
         (["cube", "torus", "-o", "a.png"], "topleft: several meshes need a folder or {name} in OUT, got 'a.png'"),
-        (["cube"], "topleft: the following arguments are required: -o/--out (try: topleft render --help)"),
-        (["-o", "a.png"], "topleft: the following arguments are required: MESH"),
+        (["cube"], "topleft: say where pictures go: -o/--out, --sheet or --animation (try: topleft render --help)"),
+        (["-o", "a.png"], "topleft: there is nothing to render: give MESH or --jobs-file (try: topleft render --help)"),
         (["cube", "-o", "a.png", "--size", "64"], "topleft: argument --size: must be WIDTHxHEIGHT, 1280x720 say, got"),
         (["cube", "-o", "a.png", "--size", "0x9"], "topleft: argument --size: must be WIDTHxHEIGHT"),
         (["cube", "-o", "a.png", "--views", "0"], "topleft: argument --views: must be a positive whole number, got"),
@@ -252,11 +252,11 @@ def test_render_protected_folder_is_found_before_any_work(run, monkeypatch):
 
 
 def test_render_disk_full_leaves_no_half_picture(run, folder, monkeypatch):
-    def write_half(self, file, **_):
-        file.write(b"half a pic")
+    def half_a_picture(image, **_):
+        yield b"half a pic"
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(Image.Image, "save", write_half)
+    monkeypatch.setattr(png, "pieces", half_a_picture)
     status, lines = run("render", "cube", "-o", "a.png", *SMALL)
     assert (status, lines) == (2, ["topleft: cannot write: No space left on device: 'a.png'"])
     assert names(folder) == []

@@ -1,4 +1,4 @@
-"""Files: small meshes written here and read back, broken ones refused, and pictures that are whole or not there."""
+"""Files: small meshes written here and read back, broken ones refused."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PIL import Image
 
 from topleft import files, scenes
-from topleft.errors import ImageError, MeshError, MissingPackageError
+from topleft.errors import MeshError, MissingPackageError
+from topleft.images import save_image
 from topleft.mesh import Mesh, face_normals
 
 trimesh = pytest.importorskip("trimesh")
@@ -18,7 +18,6 @@ trimesh = pytest.importorskip("trimesh")
 SHARED_MESHES = Path(__file__).resolve().parents[2] / "shared" / "meshes"
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
 GLTF_WITHOUT_ITS_BUFFER = """{"asset": {"version": "2.0"}, "buffers": [{"uri": "gone.bin", "byteLength": 36}]}"""
-PICTURE = np.arange(4 * 5 * 4, dtype=np.uint8).reshape(4, 5, 4)
 
 
 @pytest.fixture
@@ -59,9 +58,46 @@ def test_load_obj_groups_are_one_mesh_in_the_order_of_the_file(write):
     assert mesh.triangles.tolist() == [[0, 1, 2], [0, 2, 3], [3, 1, 0]]
 
 
-def test_load_obj_texture_seam_splits_no_vertex(write):
+def test_load_obj_texture_seam_doubles_vertices_but_not_normals(write):
     text = SQUARE + "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 .5\nf 1/1 2/2 3/3\nf 1/4 3/1 4/2\n"
-    assert len(files.load(write("a.obj", text)).vertices) == 4
+    mesh = files.load(write("a.obj", text))
+    assert mesh.uv[mesh.triangles].tolist() == [[[0, 0], [1, 0], [1, 1]], [[0, 0.5], [0, 0], [1, 0]]]
+    assert len(mesh.vertices) == 6
+    assert (mesh.vertex_normals() == [0, 0, 1]).all()
+    whole = files.load(write("b.obj", SQUARE + "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3\nf 1/1 3/3 4/4\n"))
+    assert len(whole.vertices) == 4
+
+
+MTL = "newmtl red\nKd 1 0 0\nKs .5 .5 .5\nNs 20\nnewmtl picture\nKd 0 0 0\nmap_Kd a.png\n"
+
+
+def test_load_obj_materials_come_with_their_triangles(write, tmp_path):
+    save_image(tmp_path / "a.png", np.full((1, 2, 3), (0, 0, 255), np.uint8))
+    write("a.mtl", MTL)
+    faces = "usemtl picture\nf 1/1 2/2 3/3\nusemtl red\nf 1/1 3/3 4/4\n"
+    mesh = files.load(write("a.obj", "mtllib a.mtl\n" + SQUARE + "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n" + faces))
+    assert mesh.material_of_triangle.tolist() == [0, 1]
+    picture, red = mesh.materials
+    assert picture.texture.image.tolist() == [[[0, 0, 255, 255]] * 2]
+    assert (red.color, red.texture, red.shininess) == ((255, 0, 0), None, 20)
+    assert red.specular == pytest.approx(0.5, abs=0.01)  # trimesh keeps bytes
+
+
+def test_load_gltf_base_color_is_light_and_its_cutout_is_kept(tmp_path):
+    trimesh = pytest.importorskip("trimesh")
+    shape = trimesh.creation.box()
+    shape.visual = trimesh.visual.TextureVisuals(
+        uv=np.zeros((8, 2)),
+        material=trimesh.visual.material.PBRMaterial(
+            baseColorFactor=[0.5, 0.0, 1.0, 1.0], roughnessFactor=0.5, alphaMode="MASK", alphaCutoff=0.25
+        ),
+    )
+    shape.export(tmp_path / "a.glb")
+    (material,) = files.load(tmp_path / "a.glb").materials
+    assert material.color[0] == pytest.approx(188, abs=1)  # half the light, in bytes
+    assert material.color[1:] == (0, 255)
+    assert (material.alpha_cutoff, material.shininess) == (0.25, pytest.approx(30))
+    assert 0 < material.specular < 1
 
 
 def test_load_obj_doubled_vertices_become_one(write):
@@ -216,104 +252,3 @@ def test_load_real_mesh_has_all_of_it(name, n_vertices, n_triangles):
         pytest.skip("the mesh is not on this machine")
     mesh = files.load(SHARED_MESHES / name)
     assert (len(mesh.vertices), len(mesh.triangles)) == (n_vertices, n_triangles)
-
-
-# Pictures out
-
-
-@pytest.mark.parametrize("suffix", [".png", ".webp"])
-def test_save_image_lossless_formats_keep_every_bit(tmp_path, suffix):
-    path = tmp_path / f"a{suffix}"
-    opaque = PICTURE | np.array([0, 0, 0, 255], dtype=np.uint8)
-    files.save_image(path, opaque)
-    assert np.array_equal(np.asarray(Image.open(path).convert("RGBA")), opaque)
-
-
-def test_save_image_png_keeps_alpha(tmp_path):
-    files.save_image(tmp_path / "a.png", PICTURE)
-    assert np.array_equal(np.asarray(Image.open(tmp_path / "a.png")), PICTURE)
-
-
-@pytest.mark.parametrize("suffix", [".jpg", ".jpeg", ".JPG"])
-def test_save_image_jpeg_lies_on_the_background(tmp_path, suffix):
-    path = tmp_path / f"a{suffix}"
-    files.save_image(path, np.zeros((16, 16, 4), np.uint8), background=(250, 240, 10))
-    with Image.open(path) as image:
-        assert image.mode == "RGB"
-        assert np.asarray(image)[8, 8].astype(int) == pytest.approx([250, 240, 10], abs=3)  # JPEG is lossy
-
-
-def test_composite_mixes_by_alpha():
-    image = np.array([[[200, 0, 0, 0], [200, 0, 0, 255], [200, 0, 0, 128]]], dtype=np.uint8)
-    assert files.composite(image, (0, 100, 255)).tolist() == [[[0, 100, 255], [200, 0, 0], [100, 50, 127]]]
-
-
-def test_save_image_npy_keeps_any_array(tmp_path):
-    depth = np.array([[np.inf, 0.5]], dtype=np.float32)
-    files.save_image(tmp_path / "a.npy", depth)
-    assert np.array_equal(np.load(tmp_path / "a.npy"), depth)
-    assert np.load(tmp_path / "a.npy").dtype == np.float32
-
-
-def test_save_image_npz_keeps_arrays_by_name(tmp_path):
-    files.save_image(tmp_path / "a.npz", {"x": np.arange(3), "y": np.eye(2)})
-    with np.load(tmp_path / "a.npz") as arrays:
-        assert sorted(arrays) == ["x", "y"]
-        assert arrays["x"].tolist() == [0, 1, 2]
-
-
-def test_save_image_replaces_a_file_and_leaves_nothing_else(tmp_path):
-    path = tmp_path / "a.png"
-    path.write_text("old")
-    files.save_image(path, PICTURE)
-    assert path.read_bytes().startswith(b"\x89PNG")
-    assert [entry.name for entry in tmp_path.iterdir()] == ["a.png"]
-
-
-def test_save_image_that_fails_half_way_leaves_the_old_file(tmp_path, monkeypatch):
-    path = tmp_path / "a.png"
-    path.write_text("old")
-
-    def write_half(self, file, **_):
-        file.write(b"half a pic")
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(Image.Image, "save", write_half)
-    with pytest.raises(OSError, match=r"cannot write: No space left on device: '.*a.png'"):
-        files.save_image(path, PICTURE)
-    assert path.read_text() == "old"
-    assert [entry.name for entry in tmp_path.iterdir()] == ["a.png"]
-
-
-def test_save_image_permissions_are_those_of_any_new_file(tmp_path):
-    files.save_image(tmp_path / "a.png", PICTURE)
-    (tmp_path / "other").touch()
-    assert (tmp_path / "a.png").stat().st_mode == (tmp_path / "other").stat().st_mode
-
-
-def test_save_image_into_a_missing_folder_is_refused(tmp_path):
-    with pytest.raises(FileNotFoundError, match=r"cannot write: No such file or directory: '.*nope/a.png'"):
-        files.save_image(tmp_path / "nope" / "a.png", PICTURE)
-
-
-def test_save_image_over_a_folder_is_refused(tmp_path):
-    (tmp_path / "a.png").mkdir()
-    with pytest.raises(IsADirectoryError, match="it is a folder"):
-        files.save_image(tmp_path / "a.png", PICTURE)
-
-
-@pytest.mark.parametrize(
-    ("name", "image", "message"),
-    [
-        ("a.gif", PICTURE, "cannot write '.*a.gif': format '.gif' is none of .png .jpg .jpeg .webp .npy .npz"),
-        ("a", PICTURE, "format '' is none of"),
-        ("a.png", PICTURE.astype(float), r"be uint8, got \(4, 5, 4\) float64"),
-        ("a.png", PICTURE[..., :2], r"must have shape \(H, W\), \(H, W, 3\) or \(H, W, 4\) .*, got \(4, 5, 2\) uint8"),
-        ("a.png", PICTURE[:0], r"a picture of shape \(0, 5, 4\) has no pixels"),
-        ("a.png", {"x": PICTURE}, "several arrays by name need .npz"),
-    ],
-)
-def test_save_image_impossible_is_refused(tmp_path, name, image, message):
-    with pytest.raises(ImageError, match=message):
-        files.save_image(tmp_path / name, image)
-    assert list(tmp_path.iterdir()) == []

@@ -11,7 +11,7 @@ from comparing import assert_same
 import topleft as tl
 from topleft.methods.reference_sampling import mean
 from topleft.resolve import srgb_tables
-from topleft.shade import GREY_OF_FARTHEST, GREY_OF_NEAREST, id_colors
+from topleft.shade import GREY_OF_FARTHEST, GREY_OF_NEAREST, id_colors, picture_of_numbers
 
 SIZE = (48, 36)
 KNOT = tl.Mesh(*tl.scenes.shape("torus-knot"))
@@ -21,14 +21,14 @@ CLEAR = (0, 0, 0, 0)
 @pytest.mark.parametrize("n", [2, 4, 8, 16])
 def test_alpha_is_the_share_of_samples_with_a_triangle(n):
     got = tl.render(KNOT, size=SIZE, sampling=f"msaa{n}", background=CLEAR)
-    frags = tl.visibility(KNOT, size=SIZE, sampling=f"msaa{n}")
+    frags = tl.rasterize_mesh(KNOT, size=SIZE, sampling=f"msaa{n}")
     assert_same(got[..., 3], np.rint(255 * (frags.samples_triangle >= 0).mean(-1)).astype(np.uint8))
 
 
 @pytest.mark.parametrize("background", [CLEAR, (255, 255, 255, 255), (10, 200, 30, 100)])
 def test_a_colour_per_triangle_is_the_mean_light_of_the_samples(background):
     got = tl.render(KNOT, size=SIZE, sampling="msaa4", shading="ids", background=background)
-    ids = tl.visibility(KNOT, size=SIZE, sampling="msaa4").samples_triangle
+    ids = tl.rasterize_mesh(KNOT, size=SIZE, sampling="msaa4").samples_triangle
     samples = np.empty((*ids.shape, 4), np.uint8)
     samples[...] = background
     samples[ids >= 0] = np.column_stack([id_colors(ids[ids >= 0]), np.full((ids >= 0).sum(), 255)])
@@ -49,13 +49,13 @@ def test_outline_over_nothing_has_the_colour_of_the_surface():
 def test_a_triangle_is_shaded_once_in_a_pixel(monkeypatch):
     shaded = []
 
-    def count(frags, *arguments, **options):
+    def count(frags, *arguments):
         shaded.append(int(frags.mask.sum()))
-        return tl.shade(frags, *arguments, **options)
+        return picture_of_numbers(frags, *arguments)
 
-    monkeypatch.setattr(sys.modules["topleft.render"], "shade", count)
-    tl.render(KNOT, size=SIZE, sampling="msaa8")
-    ids = tl.visibility(KNOT, size=SIZE, sampling="msaa8").samples_triangle
+    monkeypatch.setattr(sys.modules["topleft.shade"], "picture_of_numbers", count)
+    tl.render(KNOT, size=SIZE, sampling="msaa8", shading="ids")
+    ids = tl.rasterize_mesh(KNOT, size=SIZE, sampling="msaa8").samples_triangle
     pairs = sum(len(set(pixel) - {-1}) for row in ids.tolist() for pixel in row)
     assert sum(shaded) == pairs
 

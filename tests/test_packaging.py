@@ -49,8 +49,8 @@ def test_metadata_extras_are_the_documented_ones():
     assert set(metadata.metadata("topleft").get_all("Provides-Extra")) == {"render", "test", "bench", "dev", "all"}
 
 
-def test_metadata_render_extra_is_trimesh_and_tqdm():
-    assert requirements_of("render") == {"trimesh", "tqdm"}
+def test_metadata_render_extra_is_isal_trimesh_and_tqdm():
+    assert requirements_of("render") == {"isal", "trimesh", "tqdm"}
 
 
 def test_metadata_version_is_that_of_the_binary():

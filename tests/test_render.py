@@ -10,7 +10,7 @@ import pytest
 from topleft import files, scenes
 from topleft.camera import Camera
 from topleft.mesh import Mesh
-from topleft.render import EDGE_COLOR, depth_behind, render, visibility
+from topleft.render import EDGE_COLOR, depth_behind, rasterize_mesh, render
 from topleft.shade import GREY_OF_FARTHEST, GREY_OF_NEAREST, eye_distance, eye_normals, id_colors, shade
 
 SHARED_MESHES = Path(__file__).resolve().parents[2] / "shared" / "meshes"
@@ -35,7 +35,7 @@ def test_render_alpha_is_where_the_mesh_is(shading):
     picture = render(CUBE, size=SIZE, shading=shading, background=CLEAR)
     assert picture.shape == (48, 64, 4)
     assert picture.dtype == np.uint8
-    mask = visibility(CUBE, size=SIZE).mask
+    mask = rasterize_mesh(CUBE, size=SIZE).mask
     assert mask.any()
     assert np.array_equal(picture[..., 3] == 255, mask)
     assert (picture[~mask] == 0).all()
@@ -87,7 +87,7 @@ def test_render_light_comes_from_the_upper_left():
 
 def test_render_no_visible_part_of_a_sphere_is_black():
     picture = render(SPHERE, Camera.look_at((0, 0, 4)), (65, 65))
-    assert picture[visibility(SPHERE, Camera.look_at((0, 0, 4)), (65, 65)).mask][:, :3].min() > 40
+    assert picture[rasterize_mesh(SPHERE, Camera.look_at((0, 0, 4)), (65, 65)).mask][:, :3].min() > 40
 
 
 def test_render_smooth_sphere_has_no_step_between_neighbours():
@@ -131,7 +131,7 @@ def test_id_colors_of_many_ids_differ():
 def test_eye_distance_inverts_the_depth(ortho_height):
     camera = Camera.look_at((0, 0, 5), ortho_height=ortho_height, near=1, far=20)
     for z in (3.0, 0.0, -10.0):
-        depth = visibility(square(z), camera, (5, 5)).depth[2:3, 2]
+        depth = rasterize_mesh(square(z), camera, (5, 5)).depth[2:3, 2]
         assert eye_distance(depth, camera) == pytest.approx([5 - z], rel=1e-4)  # float32 depth
 
 
@@ -159,7 +159,7 @@ def test_render_normals_are_in_eye_space():
 def test_eye_normals_of_flat_faces_are_those_of_their_corners():
     # The faces of the cube share no vertex, so smooth and flat are the same thing, computed in two ways.
     camera = Camera.look_at((1, 2, 3))
-    frags = visibility(CUBE, camera, SIZE)
+    frags = rasterize_mesh(CUBE, camera, SIZE)
     smooth, flat = (eye_normals(frags, CUBE, camera, is_smooth=is_smooth) for is_smooth in (True, False))
     assert flat == pytest.approx(smooth, abs=1e-6)
     assert (flat[:, 2] > 0).all()
@@ -172,20 +172,20 @@ def test_render_vertex_without_normal_takes_that_of_the_face():
 
 @pytest.mark.parametrize(("cull", "is_seen"), [("none", True), ("back", True), ("front", False)])
 def test_render_cull_leaves_sides_out(cull, is_seen):
-    assert visibility(square(), facing(), SIZE, cull=cull).mask.any() == is_seen
+    assert rasterize_mesh(square(), facing(), SIZE, cull=cull).mask.any() == is_seen
 
 
 def test_visibility_window_is_the_crop():
     camera = Camera.framing(SPHERE, aspect=64 / 48)
-    whole = visibility(SPHERE, camera, SIZE)
-    window = visibility(SPHERE, camera, (20, 10), origin=(30, 15), viewport=SIZE)
+    whole = rasterize_mesh(SPHERE, camera, SIZE)
+    window = rasterize_mesh(SPHERE, camera, (20, 10), origin=(30, 15), viewport=SIZE)
     assert np.array_equal(window.triangle, whole.triangle[15:25, 30:50])
 
 
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"shading": "toon"}, "shading must be one of 'smooth', 'flat', 'ids', 'depth', 'normals', got 'toon'"),
+        ({"shading": "toon"}, "shading must be one of 'smooth', .*'matcap', 'ids', 'depth', 'normals', got 'toon'"),
         ({"color": (1, 2)}, r"color must be 3 numbers of 0 to 255, got \(1, 2\)"),
         ({"background": (1, 2, 256)}, r"background must be 4 numbers of 0 to 255, got \(1, 2, 256\)"),
         ({"cull": "side"}, "cull must be one of 'none', 'back', 'front', got 'side'"),
@@ -209,14 +209,14 @@ def test_render_nothing_with_a_camera_is_the_background():
 def test_shade_closed_shape_shows_no_background_inside(name):
     # A pixel of background with the mesh on all four sides would be a crack.
     mesh = Mesh(*scenes.shape(name))
-    mask = visibility(mesh, size=(500, 500)).mask
+    mask = rasterize_mesh(mesh, size=(500, 500)).mask
     alone = ~mask[1:-1, 1:-1] & mask[:-2, 1:-1] & mask[2:, 1:-1] & mask[1:-1, :-2] & mask[1:-1, 2:]
     assert not alone.any()
 
 
 def test_shade_takes_fragments_of_rasterize():
     camera = facing(2)
-    frags = visibility(square(), camera, (8, 8))
+    frags = rasterize_mesh(square(), camera, (8, 8))
     assert np.array_equal(shade(frags, square(), camera), render(square(), camera, (8, 8)))
 
 
@@ -244,7 +244,7 @@ def test_edges_of_a_closed_shape_show_only_in_front():
     ball = Mesh(*scenes.shape("icosphere"))
     pictures = [render(ball, size=(200, 150), edges=True, cull=cull) for cull in ("none", "back")]
     differ = (pictures[0] != pictures[1]).any(-1)
-    assert differ.sum() < 0.01 * visibility(ball, size=(200, 150)).mask.sum()  # at the silhouette, within a pixel
+    assert differ.sum() < 0.01 * rasterize_mesh(ball, size=(200, 150)).mask.sum()  # at the silhouette, within a pixel
 
 
 def test_depth_behind_falls_with_the_surface_and_not_over_its_border():
@@ -261,8 +261,8 @@ def test_render_real_mesh_shows_its_outside(name):
     mesh = files.load(path)
     for azimuth_deg in (35, 125, 215, 305):
         camera = Camera.framing(mesh, azimuth_deg=azimuth_deg)
-        both = visibility(mesh, camera, (300, 300))
-        front = visibility(mesh, camera, (300, 300), cull="back")
+        both = rasterize_mesh(mesh, camera, (300, 300))
+        front = rasterize_mesh(mesh, camera, (300, 300), cull="back")
         assert both.mask.sum() > 10_000
         # The teapot's handle is open where it meets the pot: 0.6 % of its pixels show the inside.
         assert (both.triangle != front.triangle).sum() < 0.01 * both.mask.sum()

@@ -17,7 +17,7 @@ def camera_of(mesh):
 
 def test_silhouette_is_the_mask_of_what_is_visible():
     got = tl.silhouette(TORUS, camera_of(TORUS), SIZE)
-    assert_same(got, tl.visibility(TORUS, camera_of(TORUS), SIZE).mask)
+    assert_same(got, tl.rasterize_mesh(TORUS, camera_of(TORUS), SIZE).mask)
     assert 0 < got.sum() < got.size
 
 

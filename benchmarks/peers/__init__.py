@@ -32,7 +32,11 @@ PEERS = {
     "open3d": "Open3D's ray casting scene: Embree, one ray a pixel",
     "datashader": "datashader: trimesh by numba",
     "skia": "skia-python: drawVertices and drawPath",
-    "cairo": "pycairo: fill without antialiasing",
+    "cairo": "pycairo: fill",
+    "skimage": "scikit-image: draw.polygon",
+    "agg": "Anti-Grain Geometry, by matplotlib: draw_path",
+    "aggdraw": "Anti-Grain Geometry, by aggdraw: polygon",
+    "blend2d": "Blend2D, by blend2d-py: fill_path",
 }
 """Peers by name, in the order of the report."""
 

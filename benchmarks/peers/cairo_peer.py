@@ -1,4 +1,4 @@
-"""pycairo: a path and a fill a triangle, without antialiasing."""
+"""pycairo: a path and a fill a triangle, without antialiasing, or at its best."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from benchmarks.cases import Scene
 from benchmarks.peers import Drawing
 
 MODULE, DISTRIBUTION = "cairo", "pycairo"
-TASKS = ("mask", "fill", "labels")
+TASKS = ("mask", "fill", "labels", "smooth")
 
 
 def prepare(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
@@ -17,7 +17,7 @@ def prepare(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
 
     width, height = scene.size
     polygons = scene.vertices[:, :2][scene.triangles].reshape(-1, 6).tolist()
-    is_mask = scene.task == "mask"
+    is_mask = scene.task in ("mask", "smooth")
     if is_mask:
         rgb = np.ones((len(polygons), 3))
     elif scene.task == "fill":
@@ -28,7 +28,7 @@ def prepare(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
     layout = cairo.FORMAT_A8 if is_mask else cairo.FORMAT_RGB24
     canvas = np.zeros((height, cairo.ImageSurface.format_stride_for_width(layout, width)), np.uint8)
     context = cairo.Context(cairo.ImageSurface.create_for_data(canvas, layout, width, height))
-    context.set_antialias(cairo.ANTIALIAS_NONE)
+    context.set_antialias(cairo.ANTIALIAS_BEST if scene.task == "smooth" else cairo.ANTIALIAS_NONE)
 
     def draw() -> None:
         canvas.fill(0)
@@ -40,6 +40,8 @@ def prepare(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
             context.fill()
 
     def picture() -> dict[str, np.ndarray]:
+        if scene.task == "smooth":
+            return {"smooth": canvas[:, :width]}
         if is_mask:
             return {"mask": canvas[:, :width] > 0}
         color = canvas[:, : 4 * width].view(np.uint32).reshape(height, width) & 0xFFFFFF
@@ -47,4 +49,6 @@ def prepare(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
             return {"triangle": color.astype(np.int32) - 1}
         return {"color": np.stack([color >> 16, color >> 8 & 255, color & 255], axis=-1).astype(np.uint8)}
 
+    if scene.task == "smooth":
+        return Drawing(draw, picture, "coverage, ANTIALIAS_BEST", "lists")
     return Drawing(draw, picture, "mask" if is_mask else "RGB" if scene.task == "fill" else "RGB labels", "lists")

@@ -9,11 +9,15 @@ from benchmarks.exact import SUBPIXELS, snap
 from benchmarks.peers import Drawing
 
 MODULE, DISTRIBUTION = "deodr", "deodr"
-TASKS = ("visibility", "depth-2d", "labels")
+TASKS = ("visibility", "depth-2d", "labels", "views", "views-png")
 
 
-def prepare(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
+def prepare(scene: Scene, threads: int) -> Drawing:
     """Labels are drawn as colours, float64, at one depth."""
+    if scene.views is not None:
+        from benchmarks.peers.views import draw_by_deodr
+
+        return draw_by_deodr(scene, threads)
     from deodr import differentiable_renderer as renderer
 
     xy_fx, z = snap(scene)

@@ -12,8 +12,10 @@ from benchmarks.cases import Scene
 from benchmarks.peers import Drawing
 
 MODULE = DISTRIBUTION = "moderngl"
-TASKS = ("visibility", "depth-2d", "mask", "fill", "labels")
+TASKS = ("visibility", "depth-2d", "mask", "fill", "labels", "smooth", "views", "views-png")
 THREADS = True
+SAMPLES = 4
+"""Of a pixel, for smooth pictures: all that llvmpipe has."""
 
 VERTEX_SHADER = """
 #version 330
@@ -63,8 +65,12 @@ def clip_from_input(scene: Scene) -> np.ndarray:
     return np.array([[2 / width, 0, 0, -1], [0, 2 / height, 0, -1], [0, 0, 2, -1], [0, 0, 0, 1]])
 
 
-def prepare(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
+def prepare(scene: Scene, threads: int) -> Drawing:
     """Upload, compile, and give the call."""
+    if scene.views is not None:
+        from benchmarks.peers.views import draw_by_llvmpipe
+
+        return draw_by_llvmpipe(scene, threads)
     import moderngl
 
     context = moderngl.create_standalone_context(require=330, backend="egl")
@@ -82,17 +88,19 @@ def prepare(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
         colors = np.zeros((len(position), 4), np.uint8)
         colors[indices, :3] = scene.colors[:, None]
         buffers.append((context.buffer(colors.tobytes()), "3f1 1x1", "color"))
-    elif scene.task == "mask":
+    elif scene.task in ("mask", "smooth"):
         shader = MASK_SHADER
     program = context.program(vertex_shader=source, fragment_shader=shader)
     program["clip_from_input"].write(clip_from_input(scene).T.astype("f4").tobytes())
     mesh = context.vertex_array(program, buffers, context.buffer(indices.tobytes()))
 
-    n_channels, dtype = {"fill": (4, "f1"), "mask": (1, "f1")}.get(scene.task, (1, "i4"))
+    n_channels, dtype = {"fill": (4, "f1"), "mask": (1, "f1"), "smooth": (1, "f1")}.get(scene.task, (1, "i4"))
     target = context.texture(scene.size, n_channels, dtype=dtype)
     depth_target = context.depth_texture(scene.size) if with_depth else None
-    frame = context.framebuffer([target], depth_target)
-    frame.use()
+    frame = drawn = context.framebuffer([target], depth_target)
+    if scene.task == "smooth":
+        drawn = context.framebuffer([context.renderbuffer(scene.size, 1, samples=SAMPLES)])
+    drawn.use()
     culling = moderngl.CULL_FACE if scene.cull == "back" else moderngl.NOTHING
     context.enable_only(culling | (moderngl.DEPTH_TEST if with_depth else moderngl.NOTHING))
     context.front_face = "cw"  # turned over
@@ -100,8 +108,11 @@ def prepare(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
     depth = np.ones((height, width), np.float32)
 
     def draw() -> None:
-        frame.clear(0, 0, 0, 0, depth=1.0)
+        drawn.use()
+        drawn.clear(0, 0, 0, 0, depth=1.0)
         mesh.render(moderngl.TRIANGLES)
+        if drawn is not frame:
+            context.copy_framebuffer(frame, drawn)
         frame.read_into(picture, components=n_channels, dtype=dtype, alignment=1)
         if with_depth:
             frame.read_into(depth, components=1, attachment=-1, dtype="f4", alignment=1)
@@ -109,10 +120,12 @@ def prepare(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
     def result() -> dict[str, np.ndarray]:
         if scene.task == "fill":
             return {"color": picture[..., :3]}
+        if scene.task == "smooth":
+            return {"smooth": picture[..., 0]}
         if scene.task == "mask":
             return {"mask": picture[..., 0] > 0}
         ids = picture[..., 0] - 1
         return {"triangle": ids, **({"depth": np.where(ids < 0, np.float32(np.inf), depth)} if with_depth else {})}
 
-    gives = {"fill": "RGBA", "mask": "mask", "labels": "id"}.get(scene.task, "id + depth")
-    return Drawing(draw, result, gives, "upload")
+    gives = {"fill": "RGBA", "mask": "mask", "labels": "id", "smooth": f"{SAMPLES} samples"}
+    return Drawing(draw, result, gives.get(scene.task, "id + depth"), "upload")

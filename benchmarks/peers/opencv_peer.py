@@ -8,7 +8,7 @@ from benchmarks.cases import Scene
 from benchmarks.peers import Drawing
 
 MODULE, DISTRIBUTION = "cv2", "opencv-python-headless"
-TASKS = ("visibility", "mask", "fill", "labels")
+TASKS = ("visibility", "mask", "fill", "labels", "smooth")
 SHIFT = 8
 
 
@@ -29,12 +29,15 @@ def prepare(scene: Scene, threads: int) -> Drawing:
     else:
         canvas, values = np.zeros((height, width), np.uint8), [255] * len(polygons)
     background = -1 if scene.task == "labels" else 0
+    line = cv2.LINE_AA if scene.task == "smooth" else cv2.LINE_8
 
     def draw() -> None:
         canvas.fill(background)
         for polygon, value in zip(polygons, values, strict=True):
-            cv2.fillConvexPoly(canvas, polygon, value, cv2.LINE_8, SHIFT)
+            cv2.fillConvexPoly(canvas, polygon, value, line, SHIFT)
 
+    if scene.task == "smooth":
+        return Drawing(draw, lambda: {"smooth": canvas}, "LINE_AA", "snap, split into polygons")
     name = {"fill": "color", "labels": "triangle"}.get(scene.task, "mask")
     gives = {"fill": "RGB", "labels": "id"}.get(scene.task, "mask")
     return Drawing(draw, lambda: {name: canvas > 0 if name == "mask" else canvas}, gives, "snap, split into polygons")

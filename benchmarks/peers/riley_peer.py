@@ -12,12 +12,16 @@ from benchmarks.cases import Scene
 from benchmarks.peers import Drawing
 
 MODULE, DISTRIBUTION = "riley", "riley-raster"
-TASKS = ("visibility",)
+TASKS = ("visibility", "views", "views-png")
 THREADS = True
 
 
 def prepare(scene: Scene, threads: int) -> Drawing:
     """Read focal length and pixel size off the matrix of the scene."""
+    if scene.views is not None:
+        from benchmarks.peers.views import draw_by_riley
+
+        return draw_by_riley(scene, threads)
     import riley
 
     if scene.cull != "back":

@@ -1,4 +1,4 @@
-"""skia-python: drawVertices for many triangles in one call, drawPath for one; antialiasing off."""
+"""skia-python: drawVertices for many triangles in one call, drawPath for one; antialiasing off unless asked for."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from benchmarks.cases import Scene
 from benchmarks.peers import Drawing
 
 MODULE, DISTRIBUTION = "skia", "skia-python"
-TASKS = ("mask", "fill", "labels")
+TASKS = ("mask", "fill", "labels", "smooth")
 
 
 def prepare(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
@@ -17,19 +17,22 @@ def prepare(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
 
     width, height = scene.size
     corners = scene.vertices[:, :2][scene.triangles]
-    if scene.task == "mask":
+    if scene.task in ("mask", "smooth"):
         canvas = np.zeros((height, width), np.uint8)
         surface = skia.Surface.MakeRasterDirect(skia.ImageInfo.MakeA8(width, height), canvas, width)
         path = skia.Path()
         for triangle in corners.tolist():
             path.addPoly([skia.Point(*corner) for corner in triangle], True)
-        paint = skia.Paint(AntiAlias=False)
+        is_smooth = scene.task == "smooth"
+        paint = skia.Paint(AntiAlias=is_smooth)
 
         def draw_mask() -> None:
             canvas.fill(0)
             surface.getCanvas().drawPath(path, paint)
 
-        return Drawing(draw_mask, lambda: {"mask": canvas > 0}, "mask", "path")
+        if is_smooth:
+            return Drawing(draw_mask, lambda: {"smooth": canvas}, "coverage, one path", "path")
+        return Drawing(draw_mask, lambda: {"mask": canvas > 0}, "mask, one path", "path")
     if scene.task == "fill":
         packed = scene.colors.astype(np.int64) @ np.array([1 << 16, 1 << 8, 1])
     else:

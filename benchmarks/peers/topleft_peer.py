@@ -8,7 +8,7 @@ from benchmarks.cases import Scene
 from benchmarks.peers import Drawing
 
 MODULE = DISTRIBUTION = "topleft"
-TASKS = ("visibility", "depth-2d", "mask", "fill", "labels", "empty")
+TASKS = ("visibility", "depth-2d", "mask", "fill", "labels", "empty", "views", "views-png")
 THREADS = True
 
 
@@ -16,6 +16,10 @@ def prepare(scene: Scene, threads: int) -> Drawing:
     """Every call takes the arrays as they come and includes the transform or snap, and the clear."""
     import topleft as tl
 
+    if scene.views is not None:
+        from benchmarks.peers.views import draw_by_topleft
+
+        return draw_by_topleft(scene, threads)
     rasterizer = tl.Rasterizer(scene.size, threads=threads)
     width, height = scene.size
     mesh = scene.vertices, scene.triangles

@@ -9,7 +9,7 @@ from benchmarks.peers import Drawing
 from benchmarks.peers.llvmpipe_peer import environment as mesa_environment
 
 MODULE = DISTRIBUTION = "vtk"
-TASKS = ("visibility",)
+TASKS = ("visibility", "views", "views-png")
 THREADS = True
 
 
@@ -18,8 +18,12 @@ def environment(threads: int) -> dict[str, str]:
     return mesa_environment(threads) | {"VTK_DEFAULT_OPENGL_WINDOW": "vtkEGLRenderWindow"}
 
 
-def prepare(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
+def prepare(scene: Scene, threads: int) -> Drawing:
     """The matrix of the scene is the projection; the view is the identity."""
+    if scene.views is not None:
+        from benchmarks.peers.views import draw_by_vtk
+
+        return draw_by_vtk(scene, threads)
     import vtk
     from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray, vtk_to_numpy
 

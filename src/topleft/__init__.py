@@ -2,44 +2,85 @@
 
 from topleft import scenes
 from topleft._isa import build_info
+from topleft.adapt import as_mesh
 from topleft.api import Rasterizer, coverage, fill, overdraw, rasterize, wireframe
+from topleft.batch import Job, render_batch
 from topleft.camera import Camera
 from topleft.classic import bresenham_line
+from topleft.composite import composite
+from topleft.depth_layers import DepthLayers, peel
 from topleft.errors import MeshError, TopleftError
-from topleft.files import load, save_image
+from topleft.field import field, height_map
+from topleft.files import load
 from topleft.fragments import Fragments
+from topleft.grid import Grid
+from topleft.images import save_image
+from topleft.lens import FisheyeLens, OpenCVLens
+from topleft.light import Fog, Light
+from topleft.material import Material
 from topleft.memory import release_memory
 from topleft.mesh import Mesh
 from topleft.planner import Plan, plan
-from topleft.render import render, visibility
+from topleft.render import rasterize_mesh, render
+from topleft.scene import Instance, Scene
+from topleft.scene_fragments import SceneDepthLayers, SceneFragments
 from topleft.shade import shade
 from topleft.silhouette import silhouette
+from topleft.texture import Texture
+from topleft.transparent import render_transparent, visible_layers
+from topleft.view_layers import ViewLayers, render_layers
+from topleft.viewpoints import turntable, viewpoints
 
 __version__: str = build_info()["version"]
 
 __all__ = [
     "Camera",
+    "DepthLayers",
+    "FisheyeLens",
+    "Fog",
     "Fragments",
+    "Grid",
+    "Instance",
+    "Job",
+    "Light",
+    "Material",
     "Mesh",
     "MeshError",
+    "OpenCVLens",
     "Plan",
     "Rasterizer",
+    "Scene",
+    "SceneDepthLayers",
+    "SceneFragments",
+    "Texture",
     "TopleftError",
+    "ViewLayers",
     "__version__",
+    "as_mesh",
     "bresenham_line",
     "build_info",
+    "composite",
     "coverage",
+    "field",
     "fill",
+    "height_map",
     "load",
     "overdraw",
+    "peel",
     "plan",
     "rasterize",
+    "rasterize_mesh",
     "release_memory",
     "render",
+    "render_batch",
+    "render_layers",
+    "render_transparent",
     "save_image",
     "scenes",
     "shade",
     "silhouette",
-    "visibility",
+    "turntable",
+    "viewpoints",
+    "visible_layers",
     "wireframe",
 ]

@@ -1,4 +1,4 @@
-"""The types of the compiled module. What each does is told in _engine.pyx, _dispatch.pxi and _lines.pxi."""
+"""The types of the compiled module. What each does is told in _engine.pyx and the .pxi files."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -8,7 +8,9 @@ from numpy.typing import NDArray
 
 VERTEX_BYTES: int
 CELL_CLEAR: int
+PLANE_DOUBLES: int
 AREA_OVERFLOW: int
+MAX_LAYERS: int
 SCALARS: dict[np.dtype[Any], int]
 
 def use_isa(name: str) -> None: ...
@@ -55,6 +57,8 @@ class View:
         near_clip: bool,
         far_clip: bool,
     ) -> None: ...
+    @property
+    def viewport(self) -> tuple[int, int]: ...
 
 class Source:
     is_clip_space: bool
@@ -82,6 +86,8 @@ class Pieces:
     def __len__(self) -> int: ...
 
 class Scene:
+    view: View | None
+    subpixel_bits: int
     def __init__(
         self,
         source: Source,
@@ -95,12 +101,17 @@ class Scene:
         cull: int,
         method: int,
         test: int = 0,
+        view: View | None = None,
     ) -> None: ...
     def seen_from(self, x_fx: int, y_fx: int) -> Scene: ...
     def count_classes(
         self, sink: int, width: int, height: int, samples: NDArray[np.int32] | None = None
     ) -> tuple[int, list[tuple[int, float, float]]]: ...
-    def draw(self, target: Target, first_row: int, n_rows: int) -> int: ...
+    def numbered_from(self, first_id: int) -> Scene: ...
+    def moved(self, x_px: int, y_px: int) -> Scene: ...
+    def draw(
+        self, target: Target, first_row: int, n_rows: int, is_first: bool = True, is_last: bool = True
+    ) -> int: ...
     def draw_share(
         self, target: Target, first_row: int, n_rows: int, first: int, others: NDArray[np.int32]
     ) -> tuple[int, int]: ...
@@ -173,10 +184,22 @@ def draw_lines(
     n_rows: int,
 ) -> None: ...
 
+class Valued:
+    def __init__(
+        self,
+        points_px: NDArray[np.float64],
+        triangles: NDArray[np.int32],
+        values: NDArray[np.float64],
+        planes: NDArray[np.float64] | None = None,
+    ) -> None: ...
+    def list_planes(self, first: int, end: int) -> None: ...
+    def fill_planes(self, ids: NDArray[np.int32], out: NDArray[Any], first_row: int, n_rows: int) -> None: ...
+
 class Bins:
     bad_row: int
     n_bands: int
     n_listed: int
+    band_bits: int
     def __init__(
         self, scene: Scene, height: int, width: int, reach_fx: int, band_bits: int, room: NDArray[np.int32]
     ) -> None: ...
@@ -185,19 +208,46 @@ class Bins:
 def draw_bands(
     scenes: Sequence[Scene], targets: Sequence[Target], bins: Bins, first_band: int, end_band: int
 ) -> None: ...
+def peel(
+    scenes: Sequence[Scene],
+    bins: Sequence[Bins | None],
+    ids: NDArray[np.int32],
+    depth: NDArray[np.float32],
+    is_farthest: bool,
+    band_bits: int,
+    first_band: int,
+    end_band: int,
+) -> int: ...
+
+def composite(
+    ids: NDArray[np.int32],
+    first_row: int,
+    n_rows: int,
+    colors: NDArray[np.uint8],
+    is_flat: bool,
+    is_u8: bool,
+    n_channels: int,
+    background: NDArray[np.float32] | None,
+    pixels: NDArray[np.uint8],
+) -> None: ...
 
 class Transfer:
     def __init__(
         self, tables: tuple[NDArray[np.int32], NDArray[np.uint8]] | None, n_channels: int, is_straight: bool
     ) -> None: ...
 
-def mean_flat(
+class Palette:
+    def __init__(self, colors: NDArray[Any], transfer: Transfer | None) -> None: ...
+    def mean_flat(self, labels: NDArray[np.int32], pixels: NDArray[Any], first_row: int, n_rows: int) -> None: ...
+
+def fill_bands(
+    scenes: Sequence[Scene],
     labels: NDArray[np.int32],
-    colors: NDArray[Any],
+    palette: Palette,
     pixels: NDArray[Any],
-    first_row: int,
-    n_rows: int,
-    transfer: Transfer | None,
+    bins: Bins,
+    first_band: int,
+    end_band: int,
 ) -> None: ...
 def mean_colors(
     painted: NDArray[Any],
@@ -206,4 +256,72 @@ def mean_colors(
     n_rows: int,
     n_channels: int,
     transfer: Transfer | None,
+) -> None: ...
+
+class Texture:
+    def __init__(
+        self, texels: NDArray[np.uint16], levels: NDArray[np.int32], filter_code: int, wrap_u: int, wrap_v: int
+    ) -> None: ...
+
+class Shading:
+    def __init__(
+        self,
+        normals: NDArray[np.float32],
+        face_normals: NDArray[np.float32] | None,
+        positions: NDArray[Any],
+        is_turned: NDArray[np.uint8] | None,
+        uv: NDArray[np.float32] | None,
+        colors: NDArray[np.float32] | None,
+        material_of: NDArray[np.int32] | None,
+        decode: NDArray[np.float32],
+    ) -> None: ...
+    def set_materials(self, materials: Sequence[tuple[Any, ...]]) -> None: ...
+    def set_lights(self, lights: Sequence[tuple[Any, ...]], ambient: Sequence[float]) -> None: ...
+    def set_view(
+        self,
+        show: int,
+        matcap: Texture | None,
+        eye_from: NDArray[np.float64],
+        has_perspective: bool,
+        eye: NDArray[np.float64],
+        ray: NDArray[np.float64],
+        background: Sequence[float],
+        background_bytes: Sequence[int],
+    ) -> None: ...
+    def set_fog(
+        self, color: Sequence[float], near: float, scale: float, distance_start: float, distance_scale: float
+    ) -> None: ...
+
+def set_inverse_w(scene: Scene, rows: NDArray[np.float32], out: NDArray[np.float32]) -> None: ...
+def shade(
+    scene: Scene,
+    view: View | None,
+    shading: Shading,
+    ids: NDArray[np.int32],
+    depth: NDArray[np.float32],
+    pixels: NDArray[np.uint8],
+    first_row: int,
+    n_rows: int,
+) -> None: ...
+def shade_samples(
+    scene: Scene,
+    view: View | None,
+    shading: Shading,
+    positions: NDArray[np.int32],
+    ids: NDArray[np.int32],
+    depth: NDArray[np.float32],
+    pixels: NDArray[np.uint8],
+    first_row: int,
+    n_rows: int,
+) -> None: ...
+def cut_out(
+    scene: Scene,
+    view: View | None,
+    shading: Shading,
+    opaque: NDArray[np.int32],
+    triangles: NDArray[np.int32],
+    ids: NDArray[np.int32],
+    depth: NDArray[np.float32],
+    first_row: int,
+    n_rows: int,
 ) -> None: ...

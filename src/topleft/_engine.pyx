@@ -1,7 +1,7 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, initializedcheck=False, embedsignature=False
 """Memoryviews in, one nogil kernel call, status out. The array layer has checked every shape, dtype and index."""
 
-from libc.stdint cimport int32_t, int64_t, uint8_t, uint64_t
+from libc.stdint cimport int32_t, int64_t, uint8_t, uint16_t, uint64_t
 from libc.string cimport memset
 
 import numpy as np
@@ -53,6 +53,12 @@ cdef extern from "topleft.h" nogil:
         int64_t *n
         double *boxes
         double *covered
+    int TL_MAX_LAYERS, TL_SINK_PEEL
+    ctypedef struct tl_peeled:
+        int n_layers, is_farthest
+        int32_t *ids
+        float *depth
+        int64_t plane_px
     ctypedef struct tl_target:
         tl_sink sink
         void *pixels
@@ -64,7 +70,7 @@ cdef extern from "topleft.h" nogil:
         const int32_t *samples_fx
         int sample
         int32_t flip
-        tl_census *census
+        const tl_peeled *peeled
     int64_t tl_covered_words(int64_t)
     ctypedef struct tl_bins:
         int64_t n
@@ -81,7 +87,7 @@ cdef extern from "topleft.h" nogil:
         int64_t stride_px
         void *cells
         int is_wide, is_clamped
-    int64_t TL_CELL_CLEAR, TL_AREA_OVERFLOW
+    int64_t TL_CELL_CLEAR, TL_AREA_OVERFLOW, TL_PLANE_DOUBLES
     int64_t tl_area_stride(int64_t width)
     ctypedef int tl_blend
     ctypedef struct tl_canvas:
@@ -101,6 +107,7 @@ cdef extern from "topleft.h" nogil:
         const tl_pieces *pieces
         tl_cull cull
         tl_method method
+        int32_t first_id
     ctypedef struct tl_share:
         const int32_t *ids
         int64_t first, end
@@ -108,6 +115,12 @@ cdef extern from "topleft.h" nogil:
         int64_t n_others
         const tl_window *picture
         int is_first, is_last
+    ctypedef struct tl_composite:
+        const int32_t *ids
+        int64_t plane_px
+        int n_layers, n_channels, is_u8, is_flat
+        const void *colors
+        const float *background
     ctypedef struct tl_edges:
         tl_vertex_set mesh
         const tl_view *view
@@ -126,7 +139,67 @@ cdef extern from "topleft.h" nogil:
         int64_t stride_px
     enum:
         TL_N_CLASSES, TL_FLIP
+    ctypedef int tl_filter
+    ctypedef int tl_wrap
+    ctypedef int tl_light_kind
+    ctypedef int tl_show
+    int TL_MAX_LEVELS
+    ctypedef struct tl_texture:
+        const uint16_t *texels
+        int32_t *offset
+        int32_t *width
+        int32_t *height
+        int n_levels
+        tl_filter filter
+        tl_wrap wrap_u, wrap_v
+    ctypedef struct tl_material:
+        float *color
+        float *back_color
+        float *specular
+        float shininess, cutoff
+        int has_back_color, is_unlit
+        const tl_texture *texture
+    ctypedef struct tl_light:
+        tl_light_kind kind
+        float *at
+        float *color
+        float falloff
+    ctypedef struct tl_shading:
+        const float *normals
+        const float *face_normals
+        const void *positions
+        int is_f64
+        const uint8_t *is_turned
+        const float *uv
+        const float *colors
+        const int32_t *material_of
+        const tl_material *materials
+        int n_materials
+        const tl_light *lights
+        int n_lights
+        float *ambient
+        tl_show show
+        const tl_texture *matcap
+        float[3][4] eye_from
+        int has_perspective
+        float *eye
+        float[4][3] ray
+        float *fog_color
+        float fog_near, fog_scale, distance_start, distance_scale
+        const float *decode
+        float *background
+        uint8_t *background_bytes
+    ctypedef struct tl_valued:
+        const double *points_px
+        const double *values
+        const int32_t *triangles
+        int64_t n_points, n_triangles
+        double *planes
     ctypedef struct tl_kernels:
+        void (*set_inverse_w)(const tl_source *, const float *, int64_t, int64_t, float *) noexcept nogil
+        void (*cut_out)(const tl_scene *, const tl_window *, const tl_view *, const tl_shading *, const int32_t *, int64_t, int32_t *, float *) noexcept nogil
+        void (*shade_samples)(const tl_scene *, const tl_window *, const tl_view *, const tl_shading *, const int32_t *, int, int64_t, const int32_t *, const float *, uint8_t *) noexcept nogil
+        void (*shade)(const tl_scene *, const tl_window *, const tl_view *, const tl_shading *, const int32_t *, const float *, uint8_t *) noexcept nogil
         tl_vertex_counts (*snap)(const tl_source *, int64_t, int64_t, int, int, tl_vertex *, tl_wide *) noexcept nogil
         tl_vertex_counts (*project)(const tl_source *, int64_t, int64_t, const tl_view *, tl_vertex *, tl_wide *) noexcept nogil
         void (*clip)(const tl_source *, const tl_vertex *, const int32_t *, int64_t, const tl_view *, tl_pieces *) noexcept nogil
@@ -144,16 +217,23 @@ cdef extern from "topleft.h" nogil:
         void (*interpolate)(const tl_scene *, const tl_window *, const int32_t *, const float *, int, int, float, float *) noexcept nogil
         void (*paint_flat)(const int32_t *, int64_t, const uint8_t *, int, uint8_t *) noexcept nogil
         void (*paint_gouraud)(const tl_scene *, const tl_window *, const int32_t *, const void *, int, int, void *) noexcept nogil
+        void (*composite)(const tl_composite *, int64_t, void *) noexcept nogil
         int64_t (*list_edges)(const tl_scene *, const tl_edge_scratch *, uint64_t *, int64_t *) noexcept nogil
         void (*draw_lines)(const tl_edges *, const tl_window *, const tl_line_target *) noexcept nogil
+        void (*list_planes)(const tl_valued *, int64_t, int64_t) noexcept nogil
+        void (*fill_planes)(const tl_valued *, const tl_window *, const int32_t *, int, void *) noexcept nogil
         void (*mean_flat)(const int32_t *, int, int64_t, int64_t, const void *, int, int, const tl_transfer *, void *) noexcept nogil
         void (*mean_colors)(const void *, int, int64_t, int64_t, int, int, const tl_transfer *, void *) noexcept nogil
 
 include "_dispatch.pxi"
 
+cdef enum:
+    LABEL = 2  # TL_SINK_LABEL
+
 VERTEX_BYTES = sizeof(tl_vertex)
 CELL_CLEAR = TL_CELL_CLEAR
 AREA_OVERFLOW = TL_AREA_OVERFLOW
+MAX_LAYERS = TL_MAX_LAYERS
 SCALARS = {np.dtype(np.float32): 0, np.dtype(np.float64): 1, np.dtype(np.int64): 2}  # tl_scalar
 
 
@@ -186,6 +266,11 @@ cdef class View:
         self.view.guard_band_x, self.view.guard_band_y = (2.0**60 / (side / 2 * 2**guard_bits) for side in viewport)
         self.view.subpixel_bits, self.view.zero_to_one = subpixel_bits, zero_to_one
         self.view.near_clip, self.view.far_clip = near_clip, far_clip
+
+    @property
+    def viewport(self):
+        """Width and height of the whole picture."""
+        return int(2 * self.view.half_width_px), int(2 * self.view.half_height_px)
 
 
 cdef class Source:
@@ -251,13 +336,13 @@ cdef class Target:
     cdef tl_target rows(self, int64_t first_row) noexcept:
         """The buffers from a row on."""
         cdef tl_target t
+        memset(&t, 0, sizeof(t))
         t.sink = self.sink
         t.pixels = &self.pixels[first_row * self.width * self.pixel_bytes]
         t.depth = &self.depth[first_row, 0] if self.depth is not None else NULL
         t.covered = &self.covered[first_row, 0] if self.covered is not None else NULL
         t.stride_px = self.width
-        t.n_samples = t.sample = 0  # draw knows
-        t.flip, t.census = self.flip, NULL
+        t.flip = self.flip
         t.sample_bits = self.sample_bits
         t.samples_fx = &self.samples[0, 0] if self.samples is not None else NULL
         return t
@@ -341,14 +426,16 @@ cdef class Scene:
 
     cdef tl_scene scene
     cdef int64_t x_px, y_px
-    cdef int subpixel_bits
+    cdef readonly int subpixel_bits
     cdef tl_test test
     cdef object arrays
+    cdef readonly View view
 
     def __init__(
         self, Source source, const uint8_t[::1] records, const int64_t[:, ::1] wide, const int32_t[:, ::1] triangles,
-        Pieces pieces, int64_t x_px, int64_t y_px, int subpixel_bits, int cull, int method, int test=0,
+        Pieces pieces, int64_t x_px, int64_t y_px, int subpixel_bits, int cull, int method, int test=0, View view=None,
     ):
+        self.view = view
         self.arrays = (source, records, wide, triangles, pieces)
         self.scene.mesh.vertices = <const tl_vertex *>data(records)
         self.scene.mesh.wide = <const tl_wide *>&wide[0, 0] if wide is not None and wide.shape[0] else NULL
@@ -358,18 +445,36 @@ cdef class Scene:
         self.scene.n_triangles = triangles.shape[0]
         self.scene.triangles = &triangles[0, 0] if triangles.shape[0] else NULL
         self.scene.pieces = &pieces.pieces if pieces is not None and len(pieces) else NULL
-        self.scene.cull, self.scene.method = cull, method
+        self.scene.cull, self.scene.method, self.scene.first_id = cull, method, 0
         self.x_px, self.y_px, self.subpixel_bits, self.test = x_px, y_px, subpixel_bits, test
 
     def seen_from(self, int32_t x_fx, int32_t y_fx):
         """Return the same scene with its samples off the centres of the pixels, in sub-pixels."""
-        cdef Scene seen = Scene.__new__(Scene)
-        seen.scene, seen.arrays = self.scene, self.arrays
-        seen.x_px, seen.y_px, seen.subpixel_bits, seen.test = self.x_px, self.y_px, self.subpixel_bits, self.test
+        cdef Scene seen = self.copy()
         seen.scene.mesh.sample_x_fx, seen.scene.mesh.sample_y_fx = x_fx, y_fx
         return seen
 
-    cdef tl_window window(self, int64_t first_row, int64_t n_rows, int64_t width) noexcept:
+    def numbered_from(self, int32_t first_id):
+        """Return the same scene with other ids in the buffers that `draw` fills: triangle 0 is called `first_id`."""
+        cdef Scene named = self.copy()
+        named.scene.first_id = first_id
+        return named
+
+    def moved(self, int64_t x_px, int64_t y_px):
+        """Return the same scene behind a window that begins x_px columns and y_px rows later."""
+        cdef Scene part = self.copy()
+        part.x_px += x_px
+        part.y_px += y_px
+        return part
+
+    cdef Scene copy(self):
+        cdef Scene other = Scene.__new__(Scene)
+        other.scene, other.arrays = self.scene, self.arrays
+        other.x_px, other.y_px, other.subpixel_bits, other.test = self.x_px, self.y_px, self.subpixel_bits, self.test
+        other.view = self.view
+        return other
+
+    cdef tl_window window(self, int64_t first_row, int64_t n_rows, int64_t width) noexcept nogil:
         cdef tl_window w
         w.x_px, w.y_px, w.subpixel_bits = self.x_px, self.y_px + first_row, self.subpixel_bits
         w.width, w.height, w.test = width, n_rows, self.test
@@ -393,8 +498,8 @@ cdef class Scene:
             bad_row = K.count_classes(&self.scene, &window, &target, &census)
         return bad_row, [(census.n[k], census.boxes[k], census.covered[k]) for k in range(TL_N_CLASSES)]
 
-    def draw(self, Target target, int64_t first_row, int64_t n_rows):
-        """Clear and draw rows of a picture.
+    def draw(self, Target target, int64_t first_row, int64_t n_rows, bint is_first=True, bint is_last=True):
+        """Draw rows of a picture, which the first of several scenes clears and the last one finishes.
 
         Returns -1, or a number that is not negative when a triangle has an index outside the vertices.
         """
@@ -403,7 +508,7 @@ cdef class Scene:
         cdef tl_share share
         cdef int64_t bad_row
         share.ids = share.others = NULL
-        share.first, share.end, share.is_first, share.is_last = 0, self.scene.n_triangles, True, True
+        share.first, share.end, share.is_first, share.is_last = 0, self.scene.n_triangles, is_first, is_last
         with nogil:
             bad_row = K.draw(&self.scene, &window, &rows, &share)
         return bad_row
@@ -511,7 +616,7 @@ cdef class Bins:
     cdef int64_t[::1] starts
     cdef int32_t[::1] listed
     cdef object room
-    cdef int band_bits
+    cdef readonly int band_bits
     cdef readonly int64_t bad_row, n_bands, n_listed
 
     def __init__(self, Scene scene, int64_t height, int64_t width, int32_t reach_fx, int band_bits, int32_t[:, ::1] room):
@@ -555,6 +660,60 @@ def draw_bands(scenes, targets, Bins bins, int64_t first_band, int64_t end_band)
                 K.draw(&scene.scene, &window, &rows, &share)
 
 
+def peel(scenes, bins, int32_t[:, :, ::1] ids, float[:, :, ::1] depth, bint is_farthest, int band_bits,
+         int64_t first_band, int64_t end_band):
+    """Write the nearest layers of all scenes together, as planes (K, H, W), in bands of 2**band_bits rows.
+
+    `bins`: those of each scene, or None, where a band is to look at all triangles. Returns as `Scene.draw` does.
+    """
+    cdef tl_peeled peeled
+    cdef tl_target target
+    cdef tl_window window
+    cdef tl_share share
+    cdef Scene scene
+    cdef Bins own
+    cdef int64_t band, first_row, height = ids.shape[1], width = ids.shape[2], bad_row = -1
+    cdef list pairs = list(zip(scenes, bins, strict=True))
+    cdef int64_t i, n = len(pairs)
+    peeled.n_layers, peeled.is_farthest = ids.shape[0], is_farthest
+    peeled.plane_px = height * width
+    memset(&target, 0, sizeof(target))
+    target.sink, target.stride_px, target.peeled = <tl_sink>TL_SINK_PEEL, width, &peeled
+    for band in range(first_band, end_band):
+        first_row = band << band_bits
+        peeled.ids, peeled.depth = &ids[0, first_row, 0], &depth[0, first_row, 0]
+        for i in range(n):
+            scene, own = pairs[i]
+            share.ids, share.others, share.first, share.end = NULL, NULL, 0, scene.scene.n_triangles
+            if own is not None:
+                share.ids, share.end = &own.listed[0] + own.starts[band], own.starts[band + 1] - own.starts[band]
+            share.is_first, share.is_last = i == 0, i == n - 1
+            window = scene.window(first_row, min(<int64_t>1 << band_bits, height - first_row), width)
+            with nogil:
+                bad_row = K.draw(&scene.scene, &window, &target, &share)
+            if bad_row >= 0:
+                return bad_row
+    return bad_row
+
+
+def composite(const int32_t[:, :, ::1] ids, int64_t first_row, int64_t n_rows, const uint8_t[::1] colors, bint is_flat, bint is_u8,
+              int n_channels, const float[::1] background, uint8_t[::1] pixels):
+    """Write what is seen through layers, planes (K, H, W), in rows [first_row, first_row + n_rows) of a picture.
+
+    `colors`: of the triangles, or of the layers of these rows, (K, n_rows, W, n_channels) float32. `background` may be None.
+    """
+    cdef tl_composite layers
+    cdef int64_t width = ids.shape[2], n = n_rows * width
+    cdef int pixel_bytes = n_channels if is_u8 else 4 * n_channels
+    if n == 0:
+        return
+    layers.ids, layers.plane_px, layers.n_layers = &ids[0, first_row, 0], ids.shape[1] * width, ids.shape[0]
+    layers.n_channels, layers.is_u8, layers.is_flat, layers.colors = n_channels, is_u8, is_flat, data(colors)
+    layers.background = &background[0] if background is not None else NULL
+    with nogil:
+        K.composite(&layers, n, &pixels[first_row * width * pixel_bytes])
+
+
 cdef class Transfer:
     """What is averaged of colours with several samples a pixel: their light, or as much of them as their alpha tells."""
 
@@ -570,18 +729,68 @@ cdef class Transfer:
             self.transfer.decode, self.transfer.encode = &decode[0], &encode[0]
 
 
-def mean_flat(const int32_t[:, :, ::1] labels, colors, pixels, int64_t first_row, int64_t n_rows, Transfer transfer):
-    """Write the mean colour of the triangles that the samples see over rows of pixels; labels (S, H, W)."""
-    cdef const uint8_t[::1] palette = as_bytes(colors)
+cdef class Palette:
+    """The colours of triangles, (T[, C]) uint8 or float32, and how those of samples become one."""
+
+    cdef const uint8_t[::1] colors
+    cdef int n_channels
+    cdef bint is_u8
+    cdef Transfer transfer
+
+    def __init__(self, colors, Transfer transfer):
+        self.n_channels, self.is_u8, self.transfer = 1 if colors.ndim == 1 else colors.shape[1], colors.dtype == np.uint8, transfer
+        if self.is_u8:  # four bytes a colour, aligned
+            wide = np.zeros(max(1, len(colors)), np.int32)
+            wide.view(np.uint8).reshape(-1, 4)[: len(colors), : self.n_channels] = colors.reshape(len(colors), -1)
+            colors = wide
+        self.colors = as_bytes(colors)
+
+    cdef void mean(self, const int32_t *labels, int sample_bits, int64_t stride, int64_t n, uint8_t *pixels, int64_t first) noexcept nogil:
+        """Write the means of n pixels from the first on: planes of labels lie `stride` apart."""
+        cdef const tl_transfer *own = NULL if self.transfer is None else &self.transfer.transfer
+        K.mean_flat(labels, sample_bits, stride, n, data(self.colors), self.n_channels, self.is_u8, own,
+                    &pixels[first * self.n_channels * (1 if self.is_u8 else 4)])
+
+    def mean_flat(self, const int32_t[:, :, ::1] labels, pixels, int64_t first_row, int64_t n_rows):
+        """Write the mean colour of the triangles that the samples see over rows of pixels; labels (S, H, W)."""
+        cdef uint8_t[::1] flat = as_bytes(pixels)
+        cdef int64_t width = labels.shape[2]
+        cdef int sample_bits = int(labels.shape[0]).bit_length() - 1
+        if n_rows and width and self.colors.shape[0]:
+            with nogil:
+                self.mean(&labels[0, first_row, 0], sample_bits, labels.shape[1] * width, n_rows * width, &flat[0], first_row * width)
+
+
+def fill_bands(scenes, int32_t[:, ::1] labels, Palette palette, pixels, Bins bins, int64_t first_band, int64_t end_band):
+    """Write the mean colours of samples over bands of (H, W[, C]) pixels: `scenes` is the scene as each of them sees it.
+
+    `labels`: memory for those of a band, (S, rows * W).
+    """
+    cdef tl_scene seen[16]
+    cdef Scene scene
+    cdef tl_target target
+    cdef tl_window window
+    cdef tl_share share
     cdef uint8_t[::1] flat = as_bytes(pixels)
-    cdef int n_channels = 1 if colors.ndim == 1 else colors.shape[1], is_u8 = colors.dtype == np.uint8
-    cdef int64_t width = labels.shape[2], first = first_row * width
-    cdef int sample_bits = int(labels.shape[0]).bit_length() - 1
-    cdef const tl_transfer *own = NULL if transfer is None else &transfer.transfer
-    if n_rows and width and palette.shape[0]:
-        with nogil:
-            K.mean_flat(&labels[0, first_row, 0], sample_bits, labels.shape[1] * width, n_rows * width, data(palette), n_channels, is_u8,
-                        own, &flat[first * n_channels * (1 if is_u8 else 4)])
+    cdef int k, n_samples = len(scenes), sample_bits = int(len(scenes)).bit_length() - 1
+    cdef int64_t band, first_row, n_rows, height = pixels.shape[0], width = pixels.shape[1]
+    for k in range(n_samples):
+        scene = scenes[k]
+        seen[k] = scene.scene
+    memset(&target, 0, sizeof(target))
+    target.sink, target.stride_px = <tl_sink>LABEL, width
+    share.others, share.first, share.is_first, share.is_last = NULL, 0, True, True
+    with nogil:
+        for band in range(first_band, end_band):
+            first_row = band << bins.band_bits
+            n_rows = min(<int64_t>1 << bins.band_bits, height - first_row)
+            window = scene.window(first_row, n_rows, width)
+            share.ids = &bins.listed[0] + bins.starts[band]
+            share.end = bins.starts[band + 1] - bins.starts[band]
+            for k in range(n_samples):
+                target.pixels = &labels[k, 0]
+                K.draw(&seen[k], &window, &target, &share)
+            palette.mean(&labels[0, 0], sample_bits, labels.shape[1], n_rows * width, &flat[0], first_row * width)
 
 
 def mean_colors(painted, pixels, int64_t first_row, int64_t n_rows, int n_channels, Transfer transfer):
@@ -599,3 +808,5 @@ def mean_colors(painted, pixels, int64_t first_row, int64_t n_rows, int n_channe
 
 
 include "_lines.pxi"
+include "_shade.pxi"
+include "_planes.pxi"

@@ -6,7 +6,6 @@ Out: milliseconds. Nothing that is drawn depends on it.
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -111,6 +110,8 @@ def cache_file() -> Path:
 
 def load_costs() -> Costs:
     """Return the costs of this machine, or those that ship if none, or none that can be read, have been measured."""
+    import json  # what few programs need is not imported with topleft
+
     for path in (cache_file(), Path(__file__).with_name("costs.json")):
         try:
             return Costs(**json.loads(path.read_text(encoding="utf-8")))
@@ -121,6 +122,8 @@ def load_costs() -> Costs:
 
 def save_costs(costs: Costs, path: Path | None = None) -> Path:
     """Write costs under a temporary name, rename the file, and return its path."""
+    import json
+
     target = cache_file() if path is None else path
     target.parent.mkdir(parents=True, exist_ok=True)
     temporary = target.with_name(f".{target.name}.{os.getpid()}")

@@ -1,40 +1,24 @@
-"""Files: meshes in, pictures out. The only module that touches the disk.
-
-`load` reads what trimesh reads and returns one `Mesh`; `save_image` writes a picture or a raw buffer, whole or not at
-all.
-"""
+"""Files: meshes in. `load` reads what trimesh reads and returns one `Mesh`."""
 
 from __future__ import annotations
 
 import io
-import logging
 import os
 import re
-import secrets
 import warnings
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from PIL import Image
 
-from topleft.errors import ImageError, MeshError, MissingPackageError
+from topleft.errors import MeshError, MissingPackageError
+from topleft.imported import material_of, obj_by_material
+from topleft.material import Material
 from topleft.mesh import Mesh, angle_weighted_normals, coincident
-
-PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp")
-BUFFER_SUFFIXES = (".npy", ".npz")
-SUFFIXES = PICTURE_SUFFIXES + BUFFER_SUFFIXES
-"""What `save_image` writes, by the end of the name."""
-
-PILLOW_OPTIONS: Mapping[str, tuple[str, dict[str, Any]]] = {
-    ".png": ("PNG", {}),
-    ".jpg": ("JPEG", {"quality": 92, "subsampling": 0}),
-    ".jpeg": ("JPEG", {"quality": 92, "subsampling": 0}),
-    ".webp": ("WEBP", {"lossless": True}),  # ids and normals must survive
-}
 
 
 def load(path: str | os.PathLike[str]) -> Mesh:
@@ -51,7 +35,9 @@ def load(path: str | os.PathLike[str]) -> Mesh:
         Polygons are cut into triangles, groups and objects are one mesh, in the order of the file; the nodes of a scene
         are placed by their transforms. Normals are those of the file. A file without normals gets its vertices merged
         where they are equal, so that shading has no seams where a format (STL) or a texture had to double them.
-        Colours are those of the vertices or the faces, if there are any; materials and textures are not read.
+        Colours are those of the vertices or the faces, if there are any; `uv` those of the file. Materials are those of
+        MTL (colour, its map, highlights) and glTF (base colour; metallic-rough surfaces are approximated, see
+        `topleft.imported`); the triangles of an OBJ file stand together by material.
 
     Raises
     ------
@@ -74,17 +60,16 @@ def load(path: str | os.PathLike[str]) -> Mesh:
     try:
         with _strict_parsing():
             if path.suffix.lower() == ".obj":
-                scene = trimesh.load_scene(io.BytesIO(_plain_obj(path)), file_type="obj", process=False)
+                parts = [
+                    replace(part, materials=() if material is None else (material,))
+                    for text, material in _obj_texts(path)
+                    for part in _parts(trimesh.load_scene(io.BytesIO(text), file_type="obj", process=False))
+                ]
             else:
-                scene = trimesh.load_scene(str(path), process=False)
-            parts = [
-                _placed(scene.geometry[geometry], transform)
-                for transform, geometry in (scene.graph[node] for node in scene.graph.nodes_geometry)
-                if len(getattr(scene.geometry[geometry], "faces", ()))
-            ]
+                parts = _parts(trimesh.load_scene(str(path), process=False))
         if not parts:
             raise MeshError(f"{str(path)!r} has no triangles")
-        return _joined(parts)
+        return joined(parts)
     except FileNotFoundError as error:  # the mesh is there: glTF and others name more files
         raise MeshError(f"cannot read {str(path)!r}: broken, or without a file that it names ({error})") from error
     except (MeshError, OSError, MemoryError):
@@ -102,91 +87,11 @@ def load(path: str | os.PathLike[str]) -> Mesh:
         raise MeshError(f"cannot read {str(path)!r}: broken, or not a {path.suffix!r} file ({reason})") from error
 
 
-def save_image(
-    path: str | os.PathLike[str],
-    image: npt.NDArray[Any] | Mapping[str, npt.NDArray[Any]],
-    *,
-    background: tuple[int, int, int] = (255, 255, 255),
-) -> None:
-    """Write a picture or a raw buffer; the file appears whole or not at all.
-
-    Parameters
-    ----------
-    path : path
-        PNG, JPEG, WebP (lossless), .npy or .npz, by the end of the name. A file of that name is replaced.
-    image : (H, W), (H, W, 3) or (H, W, 4) uint8
-        The picture. For .npy any array, for .npz any array or several by name.
-    background : (3,) of 0 to 255
-        What shows through in JPEG, which has no alpha.
-
-    Raises
-    ------
-    ImageError
-        If the format is unknown or cannot hold the array.
-    OSError
-        If the file cannot be written.
-    """
-    path = Path(path)
-    suffix = path.suffix.lower()
-    if suffix not in SUFFIXES:
-        raise ImageError(f"cannot write {str(path)!r}: format {path.suffix!r} is none of {' '.join(SUFFIXES)}")
-    if suffix == ".npz":
-        arrays: dict[str, Any] = dict(image) if isinstance(image, Mapping) else {"image": image}
-        _write_whole(path, lambda file: np.savez_compressed(file, **arrays))
-        return
-    if isinstance(image, Mapping):
-        raise ImageError(f"cannot write {str(path)!r}: several arrays by name need .npz")
-    if suffix == ".npy":
-        array = image
-        _write_whole(path, lambda file: np.save(file, array, allow_pickle=False))
-        return
-    if image.dtype != np.uint8 or image.ndim not in (2, 3) or image.shape[2:] not in ((), (3,), (4,)):
-        raise ImageError(
-            f"a picture must have shape (H, W), (H, W, 3) or (H, W, 4) and be uint8, got {image.shape} {image.dtype}"
-        )
-    if image.size == 0:
-        raise ImageError(f"cannot write {str(path)!r}: a picture of shape {image.shape} has no pixels")
-    if suffix in (".jpg", ".jpeg") and image.shape[2:] == (4,):
-        image = composite(image, background)
-    kind, options = PILLOW_OPTIONS[suffix]
-    picture = Image.fromarray(image)
-    _write_whole(path, lambda file: picture.save(file, format=kind, **options))
-
-
-def composite(image: npt.NDArray[np.uint8], background: tuple[int, int, int]) -> npt.NDArray[np.uint8]:
-    """The RGBA picture (H, W, 4) laid over one colour: (H, W, 3) uint8, mixed as the numbers stand (sRGB)."""
-    alpha = image[..., 3:].astype(np.uint32)
-    mixed = image[..., :3] * alpha + np.asarray(background, dtype=np.uint32) * (255 - alpha)
-    return ((mixed + 127) // 255).astype(np.uint8)
-
-
-def _write_whole(path: Path, write: Callable[[IO[bytes]], object]) -> None:
-    """Write to a new name in the same folder, then rename: a reader or a crash never meets half a file."""
-    if path.is_dir():
-        raise IsADirectoryError(f"cannot write {str(path)!r}: it is a folder")
-    temporary = path.with_name(f".{path.name[:100]}.{secrets.token_hex(4)}.part")
-    try:
-        with open(temporary, "xb") as file:
-            write(file)
-        os.replace(temporary, path)
-    except OSError as error:
-        _remove(temporary)
-        if error.errno is None:
-            raise
-        raise type(error)(error.errno, f"cannot write: {error.strerror}", str(path)) from error
-    except BaseException:
-        _remove(temporary)
-        raise
-
-
-def _remove(temporary: Path) -> None:
-    with suppress(OSError):  # it was never made
-        temporary.unlink()
-
-
 @contextmanager
 def _strict_parsing() -> Iterator[None]:
     """Make NumPy's text reader fail where it stops in a broken file (old ones only warn); keep trimesh off stderr."""
+    import logging
+
     logger = logging.getLogger("trimesh")
     quiet = logging.NullHandler()
     logger.addHandler(quiet)  # a logger without a handler prints its warnings
@@ -198,8 +103,17 @@ def _strict_parsing() -> Iterator[None]:
         logger.removeHandler(quiet)
 
 
-def _plain_obj(path: Path) -> bytes:
-    """The text of an OBJ file as trimesh reads it rightly: UTF-8, one group, no materials, no relative indices.
+def _parts(scene: Any) -> list[Mesh]:
+    """The meshes of a trimesh scene, in its order, placed."""
+    return [
+        placed(scene.geometry[geometry], transform)
+        for transform, geometry in (scene.graph[node] for node in scene.graph.nodes_geometry)
+        if len(getattr(scene.geometry[geometry], "faces", ()))
+    ]
+
+
+def _obj_texts(path: Path) -> Iterator[tuple[bytes, Material | None]]:
+    """The text of an OBJ file by material, as trimesh reads it rightly: UTF-8, one group, no relative indices.
 
     trimesh takes groups from the last to the first, doubles the vertices between them, and counts a negative index
     from the end of the file; the format counts it from the vertices above the line.
@@ -207,10 +121,11 @@ def _plain_obj(path: Path) -> bytes:
     text = path.read_bytes().decode("utf-8", errors="replace").replace("\r\n", "\n").replace("\\\n", " ")
     if "\0" in text:
         raise MeshError(f"cannot read {str(path)!r}: broken, or not a '.obj' file (it is not text)")
-    text = re.sub(r"^[ \t]*(usemtl|mtllib|[ogs])\b.*$", "", text, flags=re.MULTILINE)
+    text = re.sub(r"^[ \t]*[ogs]\b.*$", "", text, flags=re.MULTILINE)
     if re.search(r"^[ \t]*f\b.*-\d", text, flags=re.MULTILINE):
         text = "\n".join(_absolute_indices(text.split("\n")))
-    return text.encode()
+    for own, material in obj_by_material(text, path):
+        yield re.sub(r"^[ \t]*(usemtl|mtllib)\b.*$", "", own, flags=re.MULTILINE).encode(), material
 
 
 def _absolute_indices(lines: list[str]) -> Iterator[str]:
@@ -229,13 +144,19 @@ def _absolute(index: str, n_above: int) -> str:
     return str(n_above + 1 + int(index)) if index.startswith("-") else index
 
 
-def _placed(geometry: Any, transform: npt.NDArray[np.float64]) -> Mesh:
+def placed(geometry: Any, transform: npt.NDArray[np.float64]) -> Mesh:
     """A trimesh geometry as a mesh in the space of its scene; per-face colours get corners of their own."""
     vertices, triangles = np.asarray(geometry.vertices), np.asarray(geometry.faces)
     # trimesh computes normals when asked for them; what a file gave waits in the cache.
     normals = np.asarray(geometry.vertex_normals) if "vertex_normals" in geometry._cache else None
-    colors = None
-    if geometry.visual.kind == "vertex":
+    colors = uv = None
+    materials: tuple[Material, ...] = ()
+    if geometry.visual.kind == "texture":
+        own = geometry.visual.uv
+        uv = None if own is None or np.shape(own) != (len(vertices), 2) else np.asarray(own)
+        material = material_of(geometry.visual.material)
+        materials = () if material is None else (material,)
+    elif geometry.visual.kind == "vertex":
         colors = np.asarray(geometry.visual.vertex_colors)
     elif geometry.visual.kind == "face":
         colors = np.asarray(geometry.visual.face_colors).repeat(3, axis=0)
@@ -249,34 +170,49 @@ def _placed(geometry: Any, transform: npt.NDArray[np.float64]) -> Mesh:
             triangles = triangles[:, ::-1]
         if normals is not None:
             normals = normals @ np.linalg.pinv(linear)
-    return Mesh(vertices, triangles, normals, colors)
+    return Mesh(vertices, triangles, normals, colors, uv, materials)
 
 
-def _joined(parts: list[Mesh]) -> Mesh:
+def joined(parts: list[Mesh]) -> Mesh:
     """One mesh of several; vertices that are equal become one unless the file has normals."""
     starts = np.cumsum([0] + [len(part.vertices) for part in parts[:-1]])
     vertices = np.concatenate([part.vertices for part in parts])
     triangles = np.concatenate([part.triangles + start for part, start in zip(parts, starts, strict=True)])
-    colors = None
+    colors = uv = None
     if any(part.colors is not None for part in parts):
         colors = np.concatenate([_rgba(part) for part in parts])
+    if any(part.uv is not None for part in parts):
+        uv = np.concatenate([_uv(part) for part in parts])
+    surface = _joined_materials(parts)
     if all(part.normals is not None for part in parts):
-        return Mesh(vertices, triangles, np.concatenate([part.vertex_normals() for part in parts]), colors)
-    normals = None
-    if any(part.normals is not None for part in parts):
         normals = np.concatenate([part.vertex_normals() for part in parts])
-    elif colors is not None:
-        # Vertices of two colours stay two, and still share a normal.
+        return Mesh(vertices, triangles, normals, colors, uv, *surface)
+    own_normals: npt.NDArray[Any] | None = None
+    if any(part.normals is not None for part in parts):
+        own_normals = np.concatenate([part.vertex_normals() for part in parts])
+    elif colors is not None or uv is not None:
+        # Vertices of two colours, or on both sides of a seam, stay two, and still share a normal.
         first, group = coincident(vertices)
-        normals = angle_weighted_normals(vertices[first], group[triangles].astype(np.int32))[group]
-    attributes = [array for array in (vertices, normals, colors) if array is not None]
-    first, group = coincident(*attributes)
-    return Mesh(
-        vertices[first],
-        group[triangles],
-        None if normals is None else normals[first],
-        None if colors is None else colors[first],
-    )
+        own_normals = angle_weighted_normals(vertices[first], group[triangles].astype(np.int32))[group]
+    first, group = coincident(*(array for array in (vertices, own_normals, colors, uv) if array is not None))
+    own_normals, colors, uv = (None if array is None else array[first] for array in (own_normals, colors, uv))
+    return Mesh(vertices[first], group[triangles], own_normals, colors, uv, *surface)
+
+
+def _joined_materials(parts: list[Mesh]) -> tuple[tuple[Material, ...], npt.NDArray[np.int32] | None]:
+    """The materials of all parts, and which of them each triangle has."""
+    if not any(part.materials for part in parts):
+        return (), None
+    materials: dict[Material, int] = {}
+    rows = []
+    for part in parts:
+        own = part.materials[0] if part.materials else Material()
+        rows.append(np.full(len(part.triangles), materials.setdefault(own, len(materials)), np.int32))
+    return tuple(materials), np.concatenate(rows)
+
+
+def _uv(part: Mesh) -> npt.NDArray[np.float32]:
+    return np.zeros((len(part.vertices), 2), np.float32) if part.uv is None else part.uv
 
 
 def _rgba(part: Mesh) -> npt.NDArray[np.uint8]:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from topleft import _engine
+from topleft import _engine, choices
 from topleft.arrays import as_background, as_colors
 from topleft.blend import Blending, blend_colors
 from topleft.classic import fill_classic
@@ -16,7 +16,7 @@ from topleft.memory import Memory
 from topleft.models import Per, Sampling, Sink, parse
 from topleft.rasterize import canvas_of, draw, draw_all_samples
 from topleft.resolve import parse_resolve, resolve_colors, resolve_flat, resolve_gouraud
-from topleft.sampling import sample_positions
+from topleft.sampling import draw_means, sample_positions
 from topleft.snapped import Snapped, check_triangles, snap_scene
 from topleft.threads import count_threads, run_parts
 from topleft.view import View
@@ -132,9 +132,14 @@ def paint_samples(
     """Draw coloured triangles over contiguous pixels, each pixel the mean of its samples."""
     width, height = view.size
     positions = sample_positions(view.sampling.n_samples, view.grid_bits)
+    n_threads = min(height, count_threads(view.threads, snapped.n_triangles))
+    if is_flat and choices.can_share(view):
+        palette = _engine.Palette(colors, transfer)
+        if draw_means(memory, snapped.scene, snapped.n_triangles, positions, palette, pixels, n_threads):
+            check_triangles(snapped.triangles, snapped.corners, snapped.n_vertices)
+        return
     labels: NDArray[np.int32] = memory.empty("sample labels", (len(positions), height, width), np.int32)
     draw_all_samples(memory, snapped, view, positions, Sink.LABEL, labels, None)
-    n_threads = count_threads(view.threads, snapped.n_triangles)
     if is_flat:
         resolve_flat(labels, colors, pixels, transfer, n_threads)
         return

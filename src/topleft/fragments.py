@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine
 from topleft.arrays import as_values
+from topleft.mesh import Mesh
 
 __all__ = ["Fragments"]
 
@@ -28,6 +29,8 @@ class Fragments:
         Depth of that triangle at the pixel's centre; the background's value elsewhere.
     mask : ndarray of bool, shape (H, W)
         Where there is a triangle.
+    id, instance : ndarray of int32, shape (H, W)
+        The same as `triangle`, and 0 where there is one: of several instances `SceneFragments` tells more.
     samples_triangle, samples_depth : ndarray of int32 and of float32, shape (H, W, S)
         The same for each sample, with several a pixel. `triangle`, `depth`, `mask` and the attributes are then those of
         the first sample, which is nearest to the centre; `sample` gives those of another.
@@ -44,7 +47,7 @@ class Fragments:
         n_vertices: int,
         n_triangles: int,
     ) -> None:
-        self.triangle = triangle
+        self.id = triangle
         self.depth = depth
         self.samples_triangle = triangle[..., None]
         self.samples_depth = depth[..., None]
@@ -56,10 +59,25 @@ class Fragments:
         height, width = self.triangle.shape
         return f"Fragments({width}x{height}, {self._n_triangles} triangles)"
 
+    def _repr_png_(self) -> bytes | None:
+        from topleft.notebook import png_of_fragments  # which imports this module
+
+        return png_of_fragments(self)
+
+    @property
+    def triangle(self) -> NDArray[np.int32]:
+        """Index of the triangle that shows in the pixel, int32 (H, W), -1 where there is none."""
+        return self.id
+
+    @property
+    def instance(self) -> NDArray[np.int32]:
+        """Index of the mesh that shows in the pixel, int32 (H, W): 0, -1 where there is none."""
+        return np.minimum(self.id, 0)
+
     @property
     def mask(self) -> NDArray[np.bool_]:
         """Where there is a triangle, bool (H, W)."""
-        return self.triangle >= 0
+        return self.id >= 0
 
     @classmethod
     def of_samples(
@@ -155,3 +173,85 @@ class Fragments:
 
     def _ids(self) -> NDArray[np.int32]:
         return np.require(self.triangle, np.int32, ["C", "A"])
+
+
+class BentFragments(Fragments):
+    """The visibility buffer of a mesh whose triangles were drawn in parts, in terms of the whole ones.
+
+    Made by `rasterize_mesh` for cameras with a lens. `triangle` holds triangles of the mesh, and attributes are those
+    of its vertices.
+    """
+
+    def __init__(
+        self,
+        parts: Fragments,
+        drawn: NDArray[np.int64],
+        source: NDArray[np.int64],
+        weights: NDArray[np.float64],
+        triangles: NDArray[np.integer[Any]],
+        n_vertices: int,
+    ) -> None:
+        wholes = np.append(source, -1).astype(np.int32)  # part -1, none, is the last
+        super().__init__(wholes[parts.triangle], parts.depth, parts._scene, n_vertices, len(triangles))
+        self._samples = tuple(
+            BentFragments(sample, drawn, source, weights, triangles, n_vertices) for sample in parts._samples
+        )
+        self.samples_triangle, self.samples_depth = wholes[parts.samples_triangle], parts.samples_depth
+        self._parts, self._drawn = parts, drawn
+        self._source, self._weights, self._triangles = source, weights, triangles
+
+    @property
+    def parts(self) -> Fragments:
+        """The visibility buffer of the parts, as drawn."""
+        return self._parts
+
+    def again(self) -> BentFragments:
+        """Return the same made anew from the parts, whose buffers have changed."""
+        return self._of(self._parts)
+
+    def _of(self, parts: Fragments) -> BentFragments:
+        return BentFragments(parts, self._drawn, self._source, self._weights, self._triangles, self._n_vertices)
+
+    def mesh_of_parts(self, mesh: Mesh) -> Mesh:
+        """Return the parts as a mesh: positions and attributes of the mesh where the parts have corners."""
+        corners = self._triangles[self._source]
+
+        def spread(values: NDArray[Any]) -> NDArray[np.float64]:
+            of_parts = np.zeros((int(self._drawn.max(initial=-1)) + 1, values.shape[1]))
+            of_parts[self._drawn.ravel()] = np.matmul(self._weights, values[corners]).reshape(-1, values.shape[1])
+            return of_parts
+
+        rows = mesh.material_of_triangle
+        return Mesh(
+            spread(mesh.vertices),
+            self._drawn.astype(np.int32),
+            spread(mesh.vertex_normals()),
+            None if mesh.colors is None else np.rint(spread(mesh.colors)).astype(np.uint8),
+            None if mesh.uv is None else spread(mesh.uv).astype(np.float32),
+            mesh.materials,
+            None if rows is None else rows[self._source],
+        )
+
+    def only(self, rows: NDArray[np.intp], cols: NDArray[np.intp]) -> Fragments:
+        """Return what is left when no other pixels than these show a triangle."""
+        parts = self._parts.only(rows, cols)
+        return self._of(parts)
+
+    def barycentric(self) -> NDArray[np.float32]:
+        """Return the weights of the three vertices of the triangle that shows in each pixel."""
+        if not len(self._source):
+            return np.zeros((*self.triangle.shape, 3), np.float32)
+        return self._parts.interpolate(self._weights)
+
+    def interpolate(self, values: ArrayLike, *, background: float = 0.0) -> NDArray[np.float32]:
+        """Return an attribute of the vertices at each visible pixel, as `Fragments.interpolate` does."""
+        array = as_values(values, self._n_vertices, self._n_triangles)
+        if not len(self._source):
+            channels = array.shape[-1:] if array.ndim > 1 else ()
+            return np.full((*self.triangle.shape, *channels), background, np.float32)
+        if array.ndim == 3:
+            corners = array[self._source]
+        else:
+            corners = array.reshape(len(array), -1)[self._triangles[self._source]]
+        out = self._parts.interpolate(np.matmul(self._weights, corners), background=background)
+        return out if array.ndim > 1 else out[..., 0]

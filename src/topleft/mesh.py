@@ -1,4 +1,4 @@
-"""A triangle mesh as arrays: positions, indices, and normals and colours where it has them; checked once, here.
+"""A triangle mesh as arrays: positions, indices, and what else is known of its surface; checked once, here.
 
 Input: anything NumPy can read. Output: a `Mesh` whose arrays the other stages use as they are.
 
@@ -8,7 +8,8 @@ Tools 3(1), 1998 (normals weighted by the angle at the vertex).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any
 
@@ -16,8 +17,10 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft.arrays import as_array, as_checked_triangles
+from topleft.material import Material
 
 FloatArray = npt.NDArray[np.floating[Any]]
+F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
 I32 = npt.NDArray[np.int32]
 U8 = npt.NDArray[np.uint8]
@@ -37,6 +40,13 @@ class Mesh:
         Directions, of any length; `None`: not known, `vertex_normals` computes them.
     colors : (V, 3) or (V, 4) array_like of uint8, optional
         sRGB colours, with or without alpha.
+    uv : (V, 2) array_like of real numbers, optional
+        Where each vertex lies in a texture: u from left to right, v from the bottom up, 0 to 1. Kept as float32. Where
+        a texture has a seam, vertices stand twice.
+    materials : sequence of Material, optional
+        What the triangles are made of.
+    material_of_triangle : (T,) array_like of integers, optional
+        The row of `materials` that each triangle has; the first unless given.
 
     Raises
     ------
@@ -62,6 +72,9 @@ class Mesh:
     triangles: I32
     normals: FloatArray | None = None
     colors: U8 | None = None
+    uv: F32 | None = None
+    materials: tuple[Material, ...] = ()
+    material_of_triangle: I32 | None = None
 
     def __post_init__(self) -> None:
         vertices = _real_array(self.vertices, "vertices")
@@ -77,6 +90,17 @@ class Mesh:
             keep(self, "normals", _read_only(normals))
         if self.colors is not None:
             keep(self, "colors", _read_only(_color_array(self.colors, len(vertices))))
+        if self.uv is not None:
+            keep(self, "uv", _read_only(_uv_array(self.uv, len(vertices))))
+        keep(self, "materials", _material_tuple(self.materials))
+        if self.material_of_triangle is not None:
+            rows = _material_rows(self.material_of_triangle, len(triangles), len(self.materials))
+            keep(self, "material_of_triangle", _read_only(rows))
+
+    def _repr_png_(self) -> bytes | None:
+        from topleft.notebook import png_of_mesh  # which imports this module
+
+        return png_of_mesh(self)
 
     @property
     def bounds(self) -> F64:
@@ -107,6 +131,10 @@ class Mesh:
     @cached_property
     def _computed_normals(self) -> FloatArray:
         return _read_only(angle_weighted_normals(self.vertices, self.triangles))
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What another process needs: what is computed from it is computed there."""
+        return {field.name: self.__dict__[field.name] for field in fields(self)}
 
 
 def angle_weighted_normals(vertices: FloatArray, triangles: I32) -> F64:
@@ -212,6 +240,36 @@ def _color_array(values: npt.ArrayLike, n_vertices: int) -> U8:
     if array.ndim != 2 or array.shape[0] != n_vertices or array.shape[1] not in (3, 4):
         raise ValueError(f"colors must have shape ({n_vertices}, 3) or ({n_vertices}, 4), got {array.shape}")
     return np.ascontiguousarray(array)
+
+
+def _uv_array(values: npt.ArrayLike, n_vertices: int) -> F32:
+    array = as_array("uv", values)
+    if array.dtype.kind not in "fiu":
+        raise TypeError(f"uv must hold real numbers, got {array.dtype}")
+    if array.shape != (n_vertices, 2):
+        raise ValueError(f"uv must have shape ({n_vertices}, 2), got {array.shape}")
+    return np.ascontiguousarray(array, np.float32)
+
+
+def _material_tuple(values: Iterable[Material]) -> tuple[Material, ...]:
+    materials = tuple(values)
+    for value in materials:
+        if not isinstance(value, Material):
+            raise TypeError(f"materials must be of Material, got {type(value).__name__}")
+    return materials
+
+
+def _material_rows(values: npt.ArrayLike, n_triangles: int, n_materials: int) -> I32:
+    array = as_array("material_of_triangle", values)
+    if array.dtype.kind not in "iu":
+        raise TypeError(f"material_of_triangle must hold integers, got {array.dtype}")
+    if array.shape != (n_triangles,):
+        raise ValueError(f"material_of_triangle must have shape ({n_triangles},), got {array.shape}")
+    outside = (array < 0) | (array >= n_materials)
+    if outside.any():
+        row = int(outside.argmax())
+        raise IndexError(f"material_of_triangle[{row}] = {array[row]} must name one of {n_materials} materials")
+    return np.ascontiguousarray(array, np.int32)
 
 
 def _check_finite(vertices: FloatArray, triangles: I32) -> None:

@@ -25,8 +25,8 @@ def shade_samples(frags: Fragments, shade_one: Callable[[Fragments], U8], backgr
 
     `shade_one` gives the picture of one sample; pixels whose triangle an earlier sample has shown are left out of it.
     """
-    ids = [frags.sample(k).triangle for k in range(frags.samples_triangle.shape[-1])]
-    picture = shade_one(frags)  # of the first sample; right wherever one triangle has all samples
+    ids = [frags.sample(k).id for k in range(frags.samples_depth.shape[-1])]
+    picture = shade_one(frags.sample(0))  # of the first sample; right wherever one triangle has all samples
     is_split = np.zeros(ids[0].shape, np.bool_)
     for other in ids[1:]:
         is_split |= other != ids[0]

@@ -13,7 +13,7 @@ def memory_of(facts: Facts) -> tuple[dict[str, int], dict[str, int]]:
     """Return the bytes of scratch, which is kept from call to call, and of results, by name.
 
     What only the data can tell comes on top: a table of vertices beyond 2**30 sub-pixels, 16 bytes a vertex; the pieces
-    of cut triangles, about 100 bytes each; with several samples a pixel, triangles that reach into several bands of rows.
+    of cut triangles, about 100 bytes each; with several samples a pixel, triangles in several bands of rows.
     """
     view, n = facts.view, facts.n_triangles
     width, height = view.size

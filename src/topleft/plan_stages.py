@@ -57,7 +57,8 @@ SINKS = {
 def find_stages(facts: Facts, costs: Costs) -> tuple[Stage, ...]:
     """Return the stages of a call."""
     stages = [plan_input(facts, costs), *plan_vertices(facts, costs), plan_arithmetic(facts), plan_cull(facts)]
-    stages += [plan_method(facts, costs), *plan_sink(facts, costs), plan_threads(facts, costs), plan_memory(facts, costs)]
+    stages += [plan_method(facts, costs), *plan_sink(facts, costs)]
+    stages += [plan_threads(facts, costs), plan_memory(facts, costs)]
     return tuple(stages)
 
 
@@ -69,12 +70,6 @@ def plural(n: int, thing: str) -> str:
 def vertices(n: int) -> str:
     """Return a number of vertices."""
     return "1 vertex" if n == 1 else f"{n:,} vertices"
-
-
-def share(n: float, total: float) -> str:
-    """Return a part as a percentage."""
-    part = 100 * n / total if total else 0.0
-    return "none" if n == 0 else "all" if n == total else "under 1 %" if part < 1 else f"{min(99, round(part))} %"
 
 
 def megabytes(n: int) -> str:
@@ -109,7 +104,8 @@ def plan_vertices(facts: Facts, costs: Costs) -> Iterator[Stage]:
     ms = costs.vertex[f"{kind} {facts.point_dtype}"] * facts.n_vertices / threads / 1e6
     if kind == "snap":
         yield Stage("transform", "none", "vertices are in pixels", timed_in="snap")
-        yield Stage("clip", "none", "pixels have no near or far plane, and sides never cut: all sums are exact", timed_in="snap")
+        why = "pixels have no near or far plane, and sides never cut: all sums are exact"
+        yield Stage("clip", "none", why, timed_in="snap")
     else:
         yield plan_transform(facts)
         yield plan_clip(facts)
@@ -117,8 +113,9 @@ def plan_vertices(facts: Facts, costs: Costs) -> Iterator[Stage]:
     why = f"{vertices(facts.n_vertices)}, each moved by at most 1/{2 << bits} px; all that follows is integers"
     rejected = ["float32 coordinates: edges that two triangles share would leave gaps"]
     if facts.are_whole and bits:
-        rejected.append("0 sub-pixel bits: all vertices are whole pixels, so the picture would be the same, but no faster")
-    yield Stage("snap", f"{plural(bits, 'sub-pixel bit')}, {plural(threads, 'thread')}", why, tuple(rejected), ms, "vertices")
+        rejected.append("0 sub-pixel bits: all vertices are whole pixels: the same picture, but no faster")
+    choice = f"{plural(bits, 'sub-pixel bit')}, {plural(threads, 'thread')}"
+    yield Stage("snap", choice, why, tuple(rejected), ms, "vertices")
 
 
 def plan_transform(facts: Facts) -> Stage:
@@ -128,9 +125,13 @@ def plan_transform(facts: Facts) -> Stage:
         return Stage("transform", f"divide by w in {precision}", "vertices are in clip space", timed_in="snap")
     if facts.is_affine:
         rejected = (f"a divide by w for each of {vertices(facts.n_vertices)}: by 1 it changes no bit",)
-        return Stage("transform", f"matrix in {precision}, no divide", "its last row is 0 0 0 1, so every w is 1", rejected, timed_in="snap")
-    other = "float64: the vertices are float32" if precision == "float32" else "float32: would round away bits that the vertices have"
-    return Stage("transform", f"matrix and divide by w in {precision}", "perspective: the last row of the matrix is not 0 0 0 1", (other,), timed_in="snap")
+        choice = f"matrix in {precision}, no divide"
+        return Stage("transform", choice, "its last row is 0 0 0 1, so every w is 1", rejected, timed_in="snap")
+    other = "float64: the vertices are float32"
+    if precision == "float64":
+        other = "float32: would round away bits that the vertices have"
+    choice, why = f"matrix and divide by w in {precision}", "perspective: the last row of the matrix is not 0 0 0 1"
+    return Stage("transform", choice, why, (other,), timed_in="snap")
 
 
 def plan_clip(facts: Facts) -> Stage:
@@ -168,7 +169,8 @@ def plan_cull(facts: Facts) -> Stage:
              "between": "between the samples"}  # fmt: skip
     parts = [f"{facts.count(name):,} {text}" for name, text in names.items() if facts.count(name)]
     n_hidden = facts.count(*names)
-    why = f"{n_hidden:,} of {facts.n_triangles - facts.n_cut + facts.n_pieces:,} cannot cover a sample: " + ", ".join(parts)
+    n_all = facts.n_triangles - facts.n_cut + facts.n_pieces
+    why = f"{n_hidden:,} of {n_all:,} cannot cover a sample: " + ", ".join(parts)
     side = {0: "no side asked for", 1: "back faces", 2: "front faces"}[facts.view.cull]
     rejected = ("sides that are turned away: not asked for with cull=",) if not facts.view.cull else ()
     return Stage("cull", side, why if parts else "every triangle may cover a sample", rejected, timed_in="method")
@@ -195,7 +197,8 @@ def plan_method(facts: Facts, costs: Costs) -> Stage:
     n_threads = choices.threads_to_draw(view, facts.n_triangles)
     is_shared = choices.is_shared(view, facts.n_triangles, n_threads, facts.sink)
     times = view.sampling.n_samples / 4 if group == "samples" else view.sampling.n_samples
-    ms = times * costs.draw_ms(group, features(facts.census, n_pixels), n_threads, is_shared=is_shared) if n_pixels else 0.0
+    counts = features(facts.census, n_pixels)
+    ms = times * costs.draw_ms(group, counts, n_threads, is_shared=is_shared) if n_pixels else 0.0
     if view.sampling is Sampling.AREA:
         why = f"the picture is {n_pixels:,} pixels; an edge costs the rows that it passes, an interior nothing"
         choice = f"areas right of {3 * facts.n_drawn:,} edges, summed along rows"
@@ -216,11 +219,13 @@ def plan_sink(facts: Facts, costs: Costs) -> Iterator[Stage]:
     names = {Sampling.CENTER: "the pixel's centre", Sampling.AREA: "exact area", Sampling.OUTER: "squares that are met",
              Sampling.INNER: "squares that are held"}  # fmt: skip
     rejected = () if n == 1 else ("a full draw for each sample: setup, culling and boxes are shared",)
-    yield Stage("sampling", names.get(view.sampling, f"{n} samples a pixel"), f"sampling={str(view.sampling)!r} was asked for", rejected, timed_in="method")
+    choice, why = names.get(view.sampling, f"{n} samples a pixel"), f"sampling={str(view.sampling)!r} was asked for"
+    yield Stage("sampling", choice, why, rejected, timed_in="method")
     if facts.verb == "fill":
         ms = costs.other["paint"] * n_pixels * n / 1e6
-        yield Stage("shade", "colours from ids, once a pixel", f"at most {n_pixels:,} of {facts.covered:,.0f} samples show",
-                    ("colours while drawing: hidden samples would be coloured too",), ms, "shade")  # fmt: skip
+        why = f"at most {n_pixels:,} of about {facts.covered:,.0f} samples show"
+        rejected = ("colours while drawing: hidden samples would be coloured too",)
+        yield Stage("shade", "colours from ids, once a pixel", why, rejected, ms, "shade")
     elif facts.verb == "rasterize":
         wanted = [name for name in facts.outputs if name not in ("triangle", "depth", "mask")]
         choice = f"{', '.join(wanted)} from ids, when asked for" if wanted else "none"
@@ -237,8 +242,9 @@ def plan_depth(facts: Facts, costs: Costs) -> Stage:
         n_pixels = facts.view.size[0] * facts.view.size[1]
         earlier = choices.earlier_wins(facts.test, has_depth=facts.n_components > 2)
         order = "the earlier triangle wins" if earlier else "the later triangle wins"
-        why = f"every vertex lies at depth {facts.flat_depth:g}, so {order}, and one pass over {n_pixels:,} pixels writes it"
-        rejected = (f"a comparison for each of {facts.covered:,.0f} samples: planes through equal depths are equal to the bit",)
+        why = f"every vertex lies at depth {facts.flat_depth:g}: {order}, and one pass over {n_pixels:,} pixels writes it"
+        compared = f"a comparison for each of about {facts.covered:,.0f} samples"
+        rejected = (f"{compared}: planes through equal depths are equal to the bit",)
         ms = costs.other["flat"] * n_pixels / choices.threads_to_draw(facts.view, facts.n_triangles) / 1e6
         return Stage("depth", "no test, ids alone", why, rejected, ms, "depth")
     rejected = ("float32 slopes: faster, but coplanar triangles would hide each other at random",)
@@ -273,4 +279,5 @@ def plan_memory(facts: Facts, costs: Costs) -> Stage:
     parts = ", ".join(f"{name} {megabytes(n)}" for name, n in (scratch | results).items() if n)
     touch = f"fresh memory costs {costs.other['touch'] * (kept + made) / 1e6:.2g} ms more at its first touch"
     rejected = (f"fresh memory for each frame: {touch}; a Rasterizer keeps it",)
-    return Stage("memory", f"{megabytes(kept)} of scratch, {megabytes(made)} of results, {megabytes(kept + made)} at most", parts, rejected)
+    choice = f"{megabytes(kept)} of scratch, {megabytes(made)} of results, {megabytes(kept + made)} at most"
+    return Stage("memory", choice, parts, rejected)

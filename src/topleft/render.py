@@ -1,21 +1,30 @@
-"""Rendering: a mesh and a camera to a picture, in one call.
+"""Rendering: a mesh or scene and a camera to a picture, in one call.
 
-Input: `Mesh`, `Camera`. Output: the picture (H, W, 4) uint8 of `render`, or the visibility buffer of `visibility`.
+Input: `Mesh` or `Scene`, `Camera`. Output: the picture (H, W, 4) uint8 of `render`, or the visibility buffer of
+`rasterize_mesh`.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple, Unpack
 
 import numpy as np
 import numpy.typing as npt
 
-from topleft.api import rasterize, wireframe
+from topleft.adapt import MeshLike, as_mesh
+from topleft.api import Rasterizer, rasterize, wireframe
+from topleft.bend import BentMesh, bend
 from topleft.camera import Camera
-from topleft.fragments import Fragments
+from topleft.colors import DEFAULT_COLOR, as_color
+from topleft.cutout import cut_out
+from topleft.eye import distances
+from topleft.fragments import BentFragments, Fragments
 from topleft.mesh import Mesh
 from topleft.multisample import shade_samples
-from topleft.shade import DEFAULT_COLOR, as_color, eye_distance, shade
+from topleft.scene import Instance, Scene
+from topleft.scene_draw import draw_scene
+from topleft.scene_render import camera_of, cull_of, refuse_holes, shade_scene
+from topleft.shade import LookOptions, Shading, shade
 
 DEFAULT_SIZE = (640, 480)
 WHITE = (255, 255, 255, 255)
@@ -23,7 +32,7 @@ EDGE_COLOR = (24, 28, 40)
 
 
 def render(
-    mesh: Mesh,
+    mesh: MeshLike | Scene,
     camera: Camera | None = None,
     size: tuple[int, int] = DEFAULT_SIZE,
     *,
@@ -34,18 +43,20 @@ def render(
     edges: bool = False,
     sampling: str = "center",
     threads: int | None = None,
+    rasterizer: Rasterizer | None = None,
+    **look: Unpack[LookOptions],
 ) -> npt.NDArray[np.uint8]:
-    """A picture of the mesh.
+    """A picture of the mesh or scene.
 
     Parameters
     ----------
-    mesh : Mesh
-        What to draw. Its colours are used if it has any.
+    mesh : Mesh, Scene, or whatever `as_mesh` takes
+        What to draw: a mesh of trimesh, meshio, pyvista, say. Its colours are used if it has any.
     camera : Camera, optional
         Unless given, the three-quarter view of `Camera.framing`, with y up.
     size : (width, height), pixels
         640 x 480 unless given.
-    shading : {"smooth", "flat", "ids", "depth", "normals"}
+    shading : {"smooth", "flat", "unlit", "matcap", "ids", "depth", "normals"}
         What the colours tell; `topleft.shade.shade` describes each.
     color : (3,) of 0 to 255
         sRGB colour of a mesh without colours.
@@ -60,6 +71,10 @@ def render(
         its samples lies, and the light of the samples is averaged.
     threads : int, optional
         How many threads draw; never changes a bit.
+    rasterizer : Rasterizer, optional
+        Of this size: what is needed on the way lies in the memory that it keeps.
+    **look
+        `lights`, `ambient`, `material`, `matcap` and `fog` of `topleft.shade.shade`.
 
     Returns
     -------
@@ -78,38 +93,65 @@ def render(
     >>> tl.render(mesh, size=(64, 48), background=(0, 0, 0, 0))[24, 32].tolist()[3]
     255
     """
+    mesh = mesh if isinstance(mesh, Scene) else as_mesh(mesh)
     camera = default_camera(mesh, size) if camera is None else camera
-    background = as_color("background", background, 4)
-    frags = visibility(mesh, camera, size, cull=cull, threads=threads, sampling=sampling)
-    depth_range = distances(frags, camera) if shading == "depth" else None
-
-    def shade_one(sample: Fragments) -> npt.NDArray[np.uint8]:
-        return shade(
-            sample, mesh, camera, shading=shading, color=color, background=background, depth_range=depth_range
-        )
-
-    has_samples = frags.samples_triangle.shape[-1] > 1
-    picture = shade_samples(frags, shade_one, background) if has_samples else shade_one(frags)
-    if edges:
-        draw_edges(picture, frags, mesh, camera, cull=cull, threads=threads)
+    frags = rasterize_mesh(mesh, camera, size, cull=cull, threads=threads, sampling=sampling, rasterizer=rasterizer)
+    options: dict[str, Any] = {"shading": shading, "color": color, "threads": threads, **look}
+    options["background"] = as_color("background", background, 4)
+    make = picture_of_scene if isinstance(mesh, Scene) else picture_of_mesh
+    picture = make(frags, mesh, camera, options)  # type: ignore[arg-type]
+    for instance in (mesh if isinstance(mesh, Scene) else [Instance(mesh)]) if edges else []:
+        own_camera, own_cull = camera_of(camera, instance), cull_of(cull, instance)
+        draw_edges(picture, frags, instance.mesh, own_camera, cull=own_cull, threads=threads)
     return picture
 
 
-def visibility(
-    mesh: Mesh,
+def picture_of_mesh(
+    frags: Fragments, mesh: Mesh, camera: Camera, options: dict[str, Any]
+) -> npt.NDArray[np.uint8]:
+    """The picture of a mesh's visibility buffer, without what its materials cut out; options as `shade` takes them."""
+    shown, surface, view = frags, mesh, camera
+    if isinstance(frags, BentFragments):  # the kernels read what was drawn, triangle by triangle
+        shown, surface, view = frags.parts, frags.mesh_of_parts(mesh), camera.straightened()
+    cut_out(shown, surface, view, options.get("material"), threads=options["threads"])
+    if isinstance(frags, BentFragments) and options["shading"] in (Shading.IDS, Shading.DEPTH):
+        shown, surface = frags.again(), mesh
+    return shade(shown, surface, view, **options)
+
+
+def picture_of_scene(
+    frags: Fragments, scene: Scene, camera: Camera, options: dict[str, Any]
+) -> npt.NDArray[np.uint8]:
+    """The picture of a scene's visibility buffer; options as `shade` takes them."""
+    refuse_holes(scene, options.get("material"))
+    if options["shading"] == Shading.DEPTH:
+        options = {"depth_range": distances(frags, camera)} | options
+
+    def shade_one(sample: Fragments) -> npt.NDArray[np.uint8]:
+        return shade_scene(sample, scene, camera, **options)
+
+    has_samples = frags.samples_depth.shape[-1] > 1
+    return shade_samples(frags, shade_one, options["background"]) if has_samples else shade_one(frags)
+
+
+def rasterize_mesh(
+    mesh: MeshLike | Scene,
     camera: Camera | None = None,
     size: tuple[int, int] = DEFAULT_SIZE,
     *,
     cull: str = "none",
     threads: int | None = None,
+    rasterizer: Rasterizer | None = None,
     **view: Any,
 ) -> Fragments:
-    """The visibility buffer of the mesh: ids and depth per pixel, and attributes interpolated on demand.
+    """The visibility buffer of the mesh or scene: ids and depth per pixel, and attributes interpolated on demand.
 
     Parameters
     ----------
     mesh, camera, size, cull, threads
         As for `render`.
+    rasterizer : Rasterizer, optional
+        Of this size: the result lies in its memory, until the next call. Scenes are drawn in memory of their own.
     **view
         Other options of `rasterize`, `origin=` for a window of a larger picture, say.
 
@@ -117,16 +159,48 @@ def visibility(
     -------
     Fragments
         `.triangle` (H, W) int32, -1 where there is nothing; `.depth` (H, W) float32, window depth in [0, 1], +inf where
-        there is nothing.
+        there is nothing. Of a scene `SceneFragments`: also `.instance` (H, W) int32, and `.triangle` counts the
+        triangles of its mesh.
 
     Raises
     ------
     ValueError
-        If the mesh has no triangles and no camera is given, or an option is unknown.
+        If the mesh has no triangles and no camera is given, an option is unknown, or `rasterizer` has another size.
     """
+    mesh = mesh if isinstance(mesh, Scene) else as_mesh(mesh)
     camera = default_camera(mesh, size) if camera is None else camera
-    transform = camera.clip_from_world(view.get("viewport") or size)
-    return rasterize(mesh.vertices, mesh.triangles, size, transform=transform, cull=cull, threads=threads, **view)
+    view |= {"cull": cull, "threads": threads}
+    if isinstance(mesh, Scene):
+        return draw_scene(mesh, camera.clip_from_world(view.get("viewport") or size), size, **view)
+    drawn = seen_through(mesh, camera, view.get("viewport") or size, near_clip=view.get("near_clip", True))
+    view["transform"] = drawn.transform
+    if rasterizer is None:
+        frags = rasterize(drawn.vertices, drawn.triangles, size, **view)
+    elif rasterizer.size != tuple(size):
+        raise ValueError(f"rasterizer must have the size {tuple(size)}, got {rasterizer.size}")
+    else:
+        frags = rasterizer.rasterize(drawn.vertices, drawn.triangles, **view)
+    if drawn.bent is None:
+        return frags
+    bent = drawn.bent
+    return BentFragments(frags, bent.triangles, bent.source, bent.weights, mesh.triangles, len(mesh.vertices))
+
+
+class Drawn(NamedTuple):
+    """What the verbs draw of a mesh."""
+
+    vertices: npt.NDArray[Any]
+    triangles: npt.NDArray[np.integer[Any]]
+    transform: npt.NDArray[np.float64]
+    bent: BentMesh | None
+
+
+def seen_through(mesh: Mesh, camera: Camera, frame: tuple[int, int], *, near_clip: bool = True) -> Drawn:
+    """The mesh as it is, and the camera's matrix for a whole picture of this size; or as the camera's lens bends it."""
+    if camera.lens is None:
+        return Drawn(mesh.vertices, mesh.triangles, camera.clip_from_world(frame), None)
+    bent = bend(mesh.vertices, mesh.triangles, camera, camera.lens, frame, near_clip=near_clip)
+    return Drawn(bent.points_eye, bent.triangles, camera.clip_from_eye(frame), bent)
 
 
 def draw_edges(
@@ -140,9 +214,13 @@ def draw_edges(
 ) -> None:
     """Draw the edges of the mesh over its picture (H, W, 4), those that the visibility buffer does not hide."""
     height, width = frags.depth.shape
+    size = width, height
+    vertices, triangles, transform, bent = seen_through(mesh, camera, size)
+    if bent is not None:
+        triangles, cull = bent.outline(transform, cull), "none"
     lines = wireframe(
-        mesh.vertices, mesh.triangles, (width, height), transform=camera.clip_from_world((width, height)),
-        depth=depth_behind(frags.depth), antialias=True, cull=cull, threads=threads,
+        vertices, triangles, size, transform=transform, depth=depth_behind(frags.depth), antialias=True, cull=cull,
+        threads=threads,
     )  # fmt: skip
     on = lines > 0
     share = lines[on][:, None]
@@ -167,16 +245,8 @@ def depth_behind(depth: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
     return behind
 
 
-def distances(frags: Fragments, camera: Camera) -> tuple[float, float] | None:
-    """The least and the greatest distance along the view of what any sample shows; None where there is nothing."""
-    depth = frags.samples_depth[frags.samples_triangle >= 0]
-    if not depth.size:
-        return None
-    ends = eye_distance(np.array([depth.min(), depth.max()]), camera)
-    return float(ends[0]), float(ends[1])
-
-
-def default_camera(mesh: Mesh, size: tuple[int, int]) -> Camera:
-    """The three-quarter view of the mesh with y up, for a picture of this size."""
+def default_camera(mesh: Mesh | Scene, size: tuple[int, int]) -> Camera:
+    """The three-quarter view of the mesh or scene with y up, for a picture of this size."""
     width, height = size
-    return Camera.framing(mesh, aspect=width / height if width > 0 and height > 0 else 1.0)
+    subject = mesh.extreme_points() if isinstance(mesh, Scene) else mesh
+    return Camera.framing(subject, aspect=width / height if width > 0 and height > 0 else 1.0)

@@ -61,9 +61,10 @@ def resolve_flat(
     n_threads: int,
 ) -> None:
     """Write the mean colour of the triangles that the samples see, labels (S, H, W), over (H, W[, C]) pixels."""
+    palette = _engine.Palette(colors, transfer)
 
     def resolve_rows(first: int, end: int) -> None:
-        _engine.mean_flat(labels, colors, pixels, first, end - first, transfer)
+        palette.mean_flat(labels, pixels, first, end - first)
 
     run_parts(resolve_rows, labels.shape[1], n_threads)
 

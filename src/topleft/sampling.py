@@ -12,7 +12,7 @@ from topleft.memory import Memory
 from topleft.models import Sink
 from topleft.threads import run_parts
 
-__all__ = ["SAMPLE_GRID_BITS", "draw_planes", "refine_grid", "sample_positions"]
+__all__ = ["SAMPLE_GRID_BITS", "draw_means", "draw_planes", "refine_grid", "sample_positions"]
 
 #: From the centre of the pixel, x right and y down, in sixteenths of a pixel: the standard patterns of Direct3D 11.
 POSITIONS: dict[int, tuple[tuple[int, int], ...]] = {
@@ -30,6 +30,9 @@ SAMPLE_GRID_BITS = 4
 
 #: Ids and depth of one sample in a band of rows: they stay in the second-level cache while the band is drawn.
 BAND_BYTES = 512 << 10
+
+#: Labels of all samples in a band of rows that is resolved at once.
+LABEL_BAND_BYTES = 512 << 10
 
 SPECIAL, BAD, WIDE = np.iinfo(np.int32).min, 0, 1  # x_fx and y_fx of vertices that are not narrow: csrc/topleft.h
 
@@ -93,14 +96,58 @@ def draw_planes(
             for s, t in zip(scenes, targets, strict=True)
         ]
         return max(bad_rows) >= 0
-    band_bits = max(0, (BAND_BYTES // (8 * width)).bit_length() - 1)
-    while band_bits and height >> band_bits < 2 * n_threads:
-        band_bits -= 1
-    reach = int(np.abs(positions).max())
-    room = memory.empty("bins", (3, n_triangles + 16), np.int32)
-    bins = _engine.Bins(scene, height, width, reach, band_bits, room)
+    bins = sort_bands(memory, scene, n_triangles, positions, (height, width), BAND_BYTES // 8, n_threads)
     if bins.bad_row >= 0:
         return True
-    bins.fill(memory.empty("bands", (bins.n_listed + 1,), np.int32))
     run_parts(lambda first, end: _engine.draw_bands(scenes, targets, bins, first, end), bins.n_bands, n_threads)
     return False
+
+
+def draw_means(
+    memory: Memory,
+    scene: _engine.Scene,
+    n_triangles: int,
+    positions: NDArray[np.int32],
+    palette: _engine.Palette,
+    pixels: NDArray[Any],
+    n_threads: int,
+) -> bool:
+    """Write the mean colour of the samples over (H, W[, C]) pixels, in painter's order; returns as `draw_planes` does.
+
+    The scene is near, and labels live no longer than a band of rows.
+    """
+    height, width = pixels.shape[:2]
+    n = len(positions)
+    bins = sort_bands(memory, scene, n_triangles, positions, (height, width), LABEL_BAND_BYTES // (4 * n), n_threads)
+    if bins.bad_row >= 0:
+        return True
+    scenes = [scene.seen_from(x, y) for x, y in positions.tolist()]
+    n_parts = max(1, min(n_threads, bins.n_bands))
+    labels = list(memory.empty("sample labels", (n_parts, n, width << bins.band_bits), np.int32))
+    run_parts(
+        lambda first, end: _engine.fill_bands(scenes, labels.pop(), palette, pixels, bins, first, end),
+        bins.n_bands,
+        n_parts,
+    )
+    return False
+
+
+def sort_bands(
+    memory: Memory,
+    scene: _engine.Scene,
+    n_triangles: int,
+    positions: NDArray[np.int32],
+    shape: tuple[int, int],
+    n_pixels: int,
+    n_threads: int,
+) -> _engine.Bins:
+    """Return the triangles of each band of up to `n_pixels`; none when an index lies outside the vertices."""
+    height, width = shape
+    band_bits = max(0, (n_pixels // width).bit_length() - 1)
+    while band_bits and height >> band_bits < 2 * n_threads:
+        band_bits -= 1
+    room = memory.empty("bins", (3, n_triangles + 16), np.int32)
+    bins = _engine.Bins(scene, height, width, int(np.abs(positions).max()), band_bits, room)
+    if bins.bad_row < 0:
+        bins.fill(memory.empty("bands", (bins.n_listed + 1,), np.int32))
+    return bins

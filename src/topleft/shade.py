@@ -1,32 +1,46 @@
-"""Shading: from the visibility buffer to colours, in NumPy, for the pixels in which a triangle shows.
+"""Shading: from the visibility buffer to colours, for the pixels in which a triangle shows.
 
 Input: `Fragments`, the mesh and the camera they were made with. Output: a picture (H, W, 4) uint8, sRGB with alpha.
 
 Light is added up in linear light: colours are decoded from sRGB, lit, and encoded again, so that a surface that gets
-half the light is half as bright on a screen. Alpha of a mesh is not looked at: triangles are opaque.
+half the light is half as bright on a screen. The kernel is csrc/shade.c.
 
 Based on: Phong, B. T., "Illumination for Computer Generated Pictures", Communications of the ACM 18(6), 1975 (normals
-interpolated, light computed in the pixel); Mitchell, J., G. McTaggart and C. Green, "Shading in Valve's Source Engine",
-SIGGRAPH 2006 courses (the half-Lambert fall-off, there with the power 2).
+interpolated, light computed in the pixel); Blinn, J. F., "Models of Light Reflection for Computer Synthesized
+Pictures", SIGGRAPH 1977 (highlights).
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from enum import StrEnum
-from typing import Any
+from typing import TypedDict
 
 import numpy as np
 import numpy.typing as npt
 
+from topleft import _engine
 from topleft.camera import Camera
+from topleft.colors import DEFAULT_COLOR, Color, as_color, id_colors
+from topleft.eye import distances, eye_distance, eye_normals
 from topleft.fragments import Fragments
-from topleft.mesh import Mesh, face_normals, unit_or_zero
+from topleft.light import AMBIENT, Fog, Light, as_not_negative
+from topleft.look import Look
+from topleft.material import Material
+from topleft.mesh import Mesh
 from topleft.models import parse
+from topleft.multisample import shade_samples
+from topleft.sampling import sample_positions
+from topleft.texture import Texture
+from topleft.threads import count_threads, parse_threads, run_parts
+
+__all__ = [
+    "DEFAULT_COLOR", "LookOptions", "Shading", "as_color", "eye_distance", "eye_normals", "id_colors", "shade",
+]  # fmt: skip
 
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
 U8 = npt.NDArray[np.uint8]
-Color = tuple[int, ...]
 
 
 class Shading(StrEnum):
@@ -34,38 +48,26 @@ class Shading(StrEnum):
 
     SMOOTH = "smooth"
     FLAT = "flat"
+    UNLIT = "unlit"
+    MATCAP = "matcap"
     IDS = "ids"
     DEPTH = "depth"
     NORMALS = "normals"
 
 
-DEFAULT_COLOR = (224, 222, 217)
-"""sRGB of a mesh without colours: a light warm grey, in which light and shadow both have room."""
-
-TO_LIGHT = np.array([-0.35, 0.45, 1.0]) / np.linalg.norm([-0.35, 0.45, 1.0])
-"""Direction of the headlight in eye space: from over the viewer's left shoulder, so that up and left read as lit."""
-
-AMBIENT = 0.03
-"""Share of the light, in linear light, that reaches a surface from all sides."""
-
-WRAP_POWER = 3
-"""The headlight falls off as ((1 + n . l) / 2)**3 and so reaches 0 smoothly, at the far side of a sphere. Lambert's
-max(0, n . l) ends in a line, which on coarse meshes reads as a seam."""
-
+SHOW_CODES = {Shading.NORMALS: 1, Shading.MATCAP: 2}  # tl_show in csrc/shading.h; light: 0
 GREY_OF_NEAREST, GREY_OF_FARTHEST = 224, 32
 """Greys of the depth picture: neither black nor white, so that it shows on both."""
 
-_LINEAR_OF_SRGB = np.where(
-    np.arange(256) <= 10,  # 0.04045 of 255
-    np.arange(256) / 255 / 12.92,
-    ((np.arange(256) / 255 + 0.055) / 1.055) ** 2.4,
-).astype(np.float32)
-# 2**14 steps: at the dark end, where sRGB is steepest, a step is a fifth of a level of eight bits.
-_LINEAR_STEPS = 2**14
-_ramp = np.arange(_LINEAR_STEPS + 1) / _LINEAR_STEPS
-_SRGB_OF_LINEAR = np.rint(
-    255 * np.where(_ramp <= 0.0031308, 12.92 * _ramp, 1.055 * _ramp ** (1 / 2.4) - 0.055)
-).astype(np.uint8)
+
+class LookOptions(TypedDict, total=False):
+    """The options of `shade` that `render` passes on."""
+
+    lights: Sequence[Light] | None
+    ambient: float | None
+    material: Material | None
+    matcap: Texture | None
+    fog: Fog | None
 
 
 def shade(
@@ -77,139 +79,126 @@ def shade(
     color: Color = DEFAULT_COLOR,
     background: Color = (255, 255, 255, 255),
     depth_range: tuple[float, float] | None = None,
+    lights: Sequence[Light] | None = None,
+    ambient: float | None = None,
+    material: Material | None = None,
+    matcap: Texture | None = None,
+    fog: Fog | None = None,
+    threads: int | None = None,
 ) -> U8:
     """The picture (H, W, 4) uint8 of a visibility buffer: sRGB, alpha 255 where a triangle shows.
 
     Parameters
     ----------
     frags : Fragments
-        What `rasterize` returned for the mesh.
+        What `rasterize` returned for the mesh. With several samples a pixel a triangle is shaded once in a pixel, at
+        the first of the samples that see it, and the picture is the mean of the light of the samples.
     mesh : Mesh
-        Its colours are used by "smooth" and "flat" if it has any.
+        Its materials, and its colours, are used if it has any.
     camera : Camera
         The camera of `frags`.
-    shading : {"smooth", "flat", "ids", "depth", "normals"}
-        "smooth": interpolated vertex normals, lit in the pixel by a headlight and ambient light. "flat": the same with
-        the normals of the faces. Both light the side that is seen, whichever it is. "ids": a colour for each triangle.
-        "depth": grey, bright is near, over a range of distances. "normals": the smooth normal in
-        eye space, x, y, z from -1..1 as red, green, blue; what faces the viewer is light blue.
+    shading : {"smooth", "flat", "unlit", "matcap", "ids", "depth", "normals"}
+        "smooth": interpolated vertex normals, lit in the pixel. "flat": the same with the normals of the faces. Both
+        light the side that is seen, whichever it is. "unlit": colours and textures as they are. "matcap": the colour
+        that `matcap` has for the normal. "ids": a colour for each triangle. "depth": grey, bright is near, over a range
+        of distances. "normals": the smooth normal in eye space, x, y, z from -1..1 as red, green, blue; what
+        faces the viewer is light blue.
     color : (3,) of 0 to 255
-        sRGB colour of a mesh without colours.
+        sRGB colour of a mesh without colours and materials.
     background : (4,) of 0 to 255
         sRGB and alpha where nothing shows.
     depth_range : (float, float), optional
         Distances along the view that are the brightest and the darkest grey of "depth", world units; unless given,
         those of the picture.
+    lights : sequence of Light, optional
+        Lambert's cosine for each of them. Unless given: one headlight over the viewer's left shoulder, whose light
+        wraps round the mesh.
+    ambient : float, optional
+        Light from all sides, not negative, 0.03 unless given.
+    material : Material, optional
+        For all triangles, instead of those of the mesh.
+    matcap : Texture, optional
+        A picture of a lit sphere, for "matcap". It is clamped, so the rim holds where normals turn away.
+    fog : Fog, optional
+        The depth cue.
+    threads : int, optional
+        How many threads shade; never changes a bit.
 
     Raises
     ------
     ValueError
-        If `shading` is unknown or a colour is none.
+        If `shading` is unknown, a colour is none, a number is outside its range, or "matcap" has no matcap.
+    TypeError
+        If a light, material or texture is none.
     """
     mode = parse(Shading, "shading", shading)
-    color = as_color("color", color, 3)
+    own_color = as_color("color", color, 3)
+    behind = as_color("background", background, 4)
+    n_threads = count_threads(parse_threads(threads), len(mesh.triangles))
+    _check_types(lights=(lights or ()), material=material, matcap=matcap, fog=fog)
+    if mode is Shading.MATCAP and matcap is None:
+        raise ValueError("matcap must be a Texture for shading 'matcap', got None")
+    share = AMBIENT if ambient is None else as_not_negative("ambient", ambient)
+    n_samples = frags.samples_triangle.shape[-1]
+    if mode in (Shading.IDS, Shading.DEPTH) or not len(mesh.triangles) or 0 in frags.triangle.shape:
+        ends = depth_range or distances(frags, camera) if mode is Shading.DEPTH else None
+
+        def number_one(sample: Fragments) -> U8:
+            return picture_of_numbers(sample, camera, ends, behind)
+
+        return number_one(frags) if n_samples == 1 else shade_samples(frags, number_one, behind)
     picture = np.empty((*frags.triangle.shape, 4), dtype=np.uint8)
-    picture[...] = as_color("background", background, 4)
+    scene = frags._scene
+    plain = Material(own_color if mesh.colors is None else None)
+    own = (material,) if material is not None else mesh.materials or (plain,)
+    rows = mesh.material_of_triangle if own is mesh.materials and len(own) > 1 else None
+    look = Look(scene, mesh, camera, picture.shape[1::-1], rows, is_flat=mode is Shading.FLAT)
+    look.set_materials(mesh, own, is_unlit=mode is Shading.UNLIT)
+    look.set_lights(lights, share)
+    look.set_view(SHOW_CODES.get(mode, 0), matcap, behind)
+    look.set_fog(fog)
+    planes = np.moveaxis(frags.samples_triangle, -1, 0), np.moveaxis(frags.samples_depth, -1, 0)
+    kinds = np.int32, np.float32
+    ids, depth = (np.require(array, kind, ["C", "A"]) for array, kind in zip(planes, kinds, strict=True))
+
+    positions = None if n_samples == 1 else sample_positions(n_samples, scene.subpixel_bits)
+
+    def shade_rows(first: int, end: int) -> None:
+        part = picture, first, end - first
+        if positions is None:
+            _engine.shade(scene, scene.view, look.shading, ids[0], depth[0], *part)
+        else:
+            _engine.shade_samples(scene, scene.view, look.shading, positions, ids, depth, *part)
+
+    run_parts(shade_rows, len(picture), n_threads)
+    return picture
+
+
+def picture_of_numbers(
+    frags: Fragments, camera: Camera, depth_range: tuple[float, float] | None, background: Color
+) -> U8:
+    """The picture (H, W, 4) of ids, or of distances when they have a range."""
+    picture = np.empty((*frags.triangle.shape, 4), dtype=np.uint8)
+    picture[...] = background
     seen = frags.mask
     if not seen.any():
         return picture
-    ids = frags.triangle[seen]
-    if mode is Shading.IDS:
-        rgb = id_colors(ids)
-    elif mode is Shading.DEPTH:
-        rgb = _grey_of_distance(eye_distance(frags.depth[seen], camera), depth_range)[:, None]
+    if depth_range is None:
+        picture[seen, :3] = id_colors(frags.triangle[seen])
     else:
-        normals = eye_normals(frags, mesh, camera, is_smooth=mode is not Shading.FLAT)
-        if mode is Shading.NORMALS:
-            rgb = np.rint(127.5 * normals + 127.5).astype(np.uint8)
-        else:
-            rgb = _lit(_surface_colors(frags, mesh, seen, color), normals)
-    picture[seen, :3] = rgb
+        nearest, farthest = depth_range
+        distance = eye_distance(frags.depth[seen], camera)
+        share = np.clip((distance - nearest) / max(farthest - nearest, np.finfo(np.float64).tiny), 0, 1)
+        grey = GREY_OF_NEAREST + (GREY_OF_FARTHEST - GREY_OF_NEAREST) * share
+        picture[seen, :3] = np.rint(grey).astype(np.uint8)[:, None]
     picture[seen, 3] = 255
     return picture
 
 
-def eye_normals(frags: Fragments, mesh: Mesh, camera: Camera, *, is_smooth: bool) -> F32:
-    """Unit normals (P, 3) float32 in eye space of the visible pixels in row order, on the side that is seen.
-
-    A triangle seen from behind has its normals turned round as a whole, never pixel by pixel: so a mesh whose faces are
-    inverted looks like one whose faces are not, and no edge of light runs through a triangle.
-    """
-    seen = frags.mask
-    ids = frags.triangle[seen]
-    linear = camera.view[:3, :3]
-    points_eye = mesh.vertices @ linear.T + camera.view[:3, 3]
-    faces = face_normals(points_eye, mesh.triangles)
-    if camera.projection[3, 2] != 0:
-        to_viewer = -points_eye[mesh.triangles[:, 0]]  # the eye is the origin
-    else:
-        to_viewer = np.broadcast_to([0.0, 0.0, 1.0], faces.shape)
-    faces[(faces * to_viewer).sum(axis=1) < 0] *= -1
-    if not is_smooth:
-        return faces.astype(np.float32)[ids]
-    vertex_normals = unit_or_zero(mesh.vertex_normals() @ np.linalg.inv(linear))
-    a, b, c = mesh.triangles.T
-    is_turned = ((vertex_normals[a] + vertex_normals[b] + vertex_normals[c]) * faces).sum(axis=1) < 0
-    if is_turned[ids].any():
-        sign = np.where(is_turned, -1, 1)[:, None, None]
-        normals = frags.interpolate(sign * vertex_normals[mesh.triangles])[seen]
-    else:
-        normals = frags.interpolate(vertex_normals)[seen]
-    length = np.linalg.norm(normals, axis=1, keepdims=True)
-    # Normals that cancel (or were never there) leave the one of the face.
-    return np.where(length > 1e-6, normals / np.maximum(length, 1e-6), faces.astype(np.float32)[ids])
-
-
-def eye_distance(depth: F32, camera: Camera) -> F64:
-    """Distance along the view, world units, of window depths in [0, 1]: `-z` in eye space."""
-    (a, b), (c, d) = camera.projection[2:, 2:]
-    ndc = 2.0 * depth.astype(np.float64) - 1
-    return (ndc * d - b) / (ndc * c - a)
-
-
-def id_colors(ids: npt.NDArray[np.integer[Any]]) -> U8:
-    """A bright colour (N, 3) uint8 for each id: the hue turns by the golden angle, so neighbours differ most."""
-    ids = ids.astype(np.uint64)
-    hue = (ids * np.uint64(0x9E3779B97F4A7C15) >> np.uint64(40)).astype(np.float32) / 2**24
-    tint = (ids * np.uint64(0xD1B54A32D192ED03) >> np.uint64(40)).astype(np.float32) / 2**24
-    value, saturation = 0.65 + 0.35 * tint, 0.80 - 0.40 * ((5 * tint) % 1)
-    ramp = np.abs((6 * hue[:, None] + np.array([0, 4, 2], dtype=np.float32)) % 6 - 3) - 1
-    rgb = value[:, None] * (1 - saturation[:, None] * (1 - np.clip(ramp, 0, 1)))
-    return np.rint(255 * rgb).astype(np.uint8)
-
-
-def as_color(name: str, color: Color, n_channels: int) -> Color:
-    """The colour as whole numbers of 0 to 255; RGB becomes opaque where RGBA is asked for.
-
-    Raises
-    ------
-    ValueError
-        If it has another number of channels or a channel outside its range.
-    """
-    channels = tuple(int(channel) for channel in color)
-    if n_channels == 4 and len(channels) == 3:
-        channels = (*channels, 255)
-    if len(channels) != n_channels or not all(0 <= channel <= 255 for channel in channels):
-        raise ValueError(f"{name} must be {n_channels} numbers of 0 to 255, got {color!r}")
-    return channels
-
-
-def _surface_colors(frags: Fragments, mesh: Mesh, seen: npt.NDArray[np.bool_], color: Color) -> F32:
-    """Linear colours: (P, 3) of the mesh, or (1, 3) that holds for all pixels."""
-    if mesh.colors is None:
-        return _LINEAR_OF_SRGB[np.array([color])]
-    srgb = frags.interpolate(mesh.colors[:, :3].astype(np.float32))[seen]
-    return _LINEAR_OF_SRGB[np.rint(srgb).astype(np.uint8)]
-
-
-def _lit(linear: F32, normals: F32) -> U8:
-    wrapped = (0.5 + 0.5 * (normals @ TO_LIGHT.astype(np.float32))) ** WRAP_POWER
-    light = AMBIENT + (1 - AMBIENT) * wrapped
-    steps = linear * (_LINEAR_STEPS * light[:, None])
-    return _SRGB_OF_LINEAR[np.minimum(np.rint(steps).astype(np.int32), _LINEAR_STEPS)]
-
-
-def _grey_of_distance(distance: F64, depth_range: tuple[float, float] | None) -> U8:
-    nearest, farthest = depth_range or (distance.min(), distance.max())
-    share = np.clip((distance - nearest) / max(farthest - nearest, np.finfo(np.float64).tiny), 0, 1)
-    return np.rint(GREY_OF_NEAREST + (GREY_OF_FARTHEST - GREY_OF_NEAREST) * share).astype(np.uint8)
+def _check_types(lights: Sequence[Light], material: object, matcap: object, fog: object) -> None:
+    for light in lights:
+        if not isinstance(light, Light):
+            raise TypeError(f"lights must be of Light, got {type(light).__name__}")
+    for name, value, kind in (("material", material, Material), ("matcap", matcap, Texture), ("fog", fog, Fog)):
+        if value is not None and not isinstance(value, kind):
+            raise TypeError(f"{name} must be a {kind.__name__}, got {type(value).__name__}")

@@ -1,6 +1,6 @@
-"""Silhouettes: where a mesh is, seen by a camera, as a mask.
+"""Silhouettes: where a mesh or scene is, seen by a camera, as a mask.
 
-Input: `Mesh`, `Camera`. Output: a mask (H, W), bool or float32.
+Input: `Mesh` or `Scene`, `Camera`. Output: a mask (H, W), bool or float32.
 """
 
 from __future__ import annotations
@@ -9,16 +9,18 @@ from typing import Any
 
 import numpy.typing as npt
 
+from topleft.adapt import MeshLike, as_mesh
 from topleft.api import coverage
 from topleft.camera import Camera
-from topleft.mesh import Mesh
-from topleft.render import DEFAULT_SIZE, default_camera
+from topleft.render import DEFAULT_SIZE, default_camera, seen_through
+from topleft.scene import Scene
+from topleft.scene_draw import draw_scene_coverage
 
 __all__ = ["silhouette"]
 
 
 def silhouette(
-    mesh: Mesh,
+    mesh: MeshLike | Scene,
     camera: Camera | None = None,
     size: tuple[int, int] = DEFAULT_SIZE,
     *,
@@ -28,11 +30,11 @@ def silhouette(
     out: npt.NDArray[Any] | None = None,
     **view: Any,
 ) -> npt.NDArray[Any]:
-    """Return the mask of the mesh: where it is seen, or how much of each pixel it covers.
+    """Return the mask of the mesh or scene: where it is seen, or how much of each pixel it covers.
 
     Parameters
     ----------
-    mesh : Mesh
+    mesh : Mesh, Scene, or whatever `as_mesh` takes
         What to look at.
     camera : Camera, optional
         Unless given, the three-quarter view of `Camera.framing`, with y up.
@@ -64,7 +66,8 @@ def silhouette(
     What is covered by samples is the union of the triangles. By area it is the sum of their areas, at most 1: the union
     where triangles do not overlap within a pixel. They do not along the outline of a closed mesh with ``cull="back"``
     that each line of sight enters once; where one part of it hides another, a pixel of the inner outline is full.
-    Without culling the far side counts as well, and a pixel on the outline gets up to twice its share.
+    Without culling the far side counts as well, and a pixel on the outline gets up to twice its share. Areas of the
+    instances of a scene are added up as float32, which is exact while the sum is below 1.
 
     Examples
     --------
@@ -75,8 +78,13 @@ def silhouette(
     >>> round(float(tl.silhouette(mesh, size=(8, 6), sampling="area", cull="back").sum()), 2)
     16.2
     """
+    mesh = mesh if isinstance(mesh, Scene) else as_mesh(mesh)
     camera = default_camera(mesh, size) if camera is None else camera
-    transform = camera.clip_from_world(view.get("viewport") or size)
-    options: Any = {"transform": transform, "sampling": sampling, "cull": cull, "threads": threads} | view
-    mask: npt.NDArray[Any] = coverage(mesh.vertices, mesh.triangles, size, out=out, **options)
+    options: Any = {"sampling": sampling, "cull": cull, "threads": threads} | view
+    frame = view.get("viewport") or size
+    if isinstance(mesh, Scene):
+        return draw_scene_coverage(mesh, size=size, out=out, clip_from_world=camera.clip_from_world(frame), **options)
+    drawn = seen_through(mesh, camera, frame, near_clip=view.get("near_clip", True))
+    options["transform"] = drawn.transform
+    mask: npt.NDArray[Any] = coverage(drawn.vertices, drawn.triangles, size, out=out, **options)
     return mask

@@ -85,9 +85,8 @@ def snap_scene(
     if view.grid_bits > view.subpixel_bits:
         wide = refine_scene(points, records, wide, corners, pieces, view)
     drawn = corners if n else corners[:0]
-    scene = _engine.Scene(
-        source, records, wide, drawn, pieces, *view.origin, view.grid_bits, view.cull, view.method, view.test
-    )
+    how = (*view.origin, view.grid_bits, view.cull, view.method, view.test)
+    scene = _engine.Scene(source, records, wide, drawn, pieces, *how, engine_view)
     has_depth = source.is_clip_space or points.shape[1] == 3
     flat = choices.flat_depth(points, has_depth=has_depth, is_clip_space=source.is_clip_space) if with_depth else None
     return Snapped(

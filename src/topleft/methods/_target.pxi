@@ -39,19 +39,22 @@ cdef inline void plot(target *t, int64_t x, int64_t y) noexcept nogil:
 cdef inline void fill_span(target *t, int64_t y, int64_t first, int64_t last) noexcept nogil:
     """Draw the pixels first to last of a row, both of them included."""
     cdef int64_t i, row
+    cdef uint8_t *mask = <uint8_t *>t.pixels  # bytes may overlay `t` itself: read it once, or there is no memset
+    cdef int32_t *cells = <int32_t *>t.pixels
+    cdef int32_t label = t.label
     if y < t.y0 or y >= t.y1:
         return
     row = (y - t.y0) * (t.x1 - t.x0)
     first, last = row + max(first, t.x0) - t.x0, row + min(last, t.x1 - 1) - t.x0
     if t.sink == MASK:
         for i in range(first, last + 1):
-            (<uint8_t *>t.pixels)[i] = 1
+            mask[i] = 1
     elif t.sink == COUNT:
         for i in range(first, last + 1):
-            (<int32_t *>t.pixels)[i] += 1
+            cells[i] += 1
     else:
         for i in range(first, last + 1):
-            (<int32_t *>t.pixels)[i] = t.label
+            cells[i] = label
 
 
 cdef inline int64_t pixel_floor(double value, int64_t smallest, int64_t largest) noexcept nogil:

@@ -1,0 +1,49 @@
+"""All charts of an accuracy record, as files or as text for a report. Needs matplotlib."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from matplotlib import pyplot as plt
+from matplotlib.figure import Figure
+
+from benchmarks import speed_charts
+from benchmarks.charts import STYLE, chart_antialiasing, chart_coverage
+
+CHARTS: Mapping[str, Callable[[dict[str, Any]], Figure]] = {
+    "accuracy-coverage": chart_coverage,
+    "accuracy-antialiasing": chart_antialiasing,
+    "accuracy-depth": speed_charts.chart_depth,
+    "speed-sizes": speed_charts.chart_sizes,
+    "speed-scaling": speed_charts.chart_scaling,
+    "speed-tutorial": speed_charts.chart_tutorial,
+}
+"""By the name of the file."""
+
+
+def draw_charts(record: dict[str, Any], folder: Path) -> list[Path]:
+    """Write the charts as PNG and SVG, return where they are."""
+    folder.mkdir(parents=True, exist_ok=True)
+    paths = []
+    for name in CHARTS:
+        for suffix, data in chart_bytes(record, name, ("png", "svg")).items():
+            paths.append(folder / f"{name}.{suffix}")
+            paths[-1].write_bytes(data)
+    return paths
+
+
+def chart_bytes(record: dict[str, Any], name: str, suffixes: Sequence[str]) -> dict[str, bytes]:
+    """Return a chart as PNG or SVG; the same record gives the same bytes."""
+    found = {}
+    with plt.rc_context(STYLE):
+        figure = CHARTS[name](record)
+        for suffix in suffixes:
+            target = io.BytesIO()
+            metadata = {"Date": None} if suffix == "svg" else {}
+            figure.savefig(target, format=suffix, dpi=160, metadata=metadata)
+            found[suffix] = target.getvalue()
+        plt.close(figure)
+    return found

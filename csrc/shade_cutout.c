@@ -1,0 +1,93 @@
+/* Cut-out: triangles with holes in their texture, drawn over a visibility buffer; samples with too little opacity are left out, so
+ * that what is behind them stays.
+ * In: the buffer of all other triangles, a list of triangles.  Out: the buffer, the nearest of what is left in every pixel.
+ *
+ * A triangle is drawn by itself into a tile, then tested pixel by pixel: the order of the list does not matter. */
+#include "fixed.h"
+#include "lanes.h"
+
+#define TL_CUTOUT_TILE 64
+
+typedef struct {
+    int32_t ids[TL_CUTOUT_TILE * TL_CUTOUT_TILE];
+    float depth[TL_CUTOUT_TILE * TL_CUTOUT_TILE];
+} cutout_tile;
+
+/* The opacity of a material at the pixels of a run. */
+TL_INLINE vf opacity_of(shaded_lanes *p, const tl_material *m)
+{
+    vf texel[4];
+    if (!m->texture || !p->s->needs_uv)
+        return vf_set1(m->color[3]);
+    p->q = weighed(p, RUN_Q, RUN_Q + 1, RUN_Q + 2);
+    p->inv_q = vf_div(vf_set1(1.0f), p->q);
+    set_uv_lanes(p);
+    sample_texture(m->texture, p->uv[0], p->uv[1], p->du, p->dv, texel, 4);
+    return vf_mul(texel[3], vf_set1(m->color[3]));
+}
+
+/* Puts what is left of n pixels of a row of a tile into the buffer. */
+TL_INLINE void keep_opaque(shade_runs *s, const tl_material *m, int64_t row, int64_t column, int n, int32_t *own, const float *own_depth,
+                           int32_t *ids, float *depth)
+{
+    for (int x = 0; x < n; x += TL_LANES) { /* hide what the buffer hides */
+        const vm inside = vm_first(n - x);
+        const vi id = vi_load_masked(inside, own + x), there = vi_load_masked(inside, ids + x);
+        const vf z = vf_load_masked(inside, own_depth + x), z_there = vf_load_masked(inside, depth + x);
+        const vm is_tie = vm_and(vf_eq(z, z_there), vm_or(vi_gt(vi_set1(0), there), vi_gt(there, id)));
+        const vm wins = vm_and(vm_and(inside, vi_gt(id, vi_set1(-1))), vm_or(vf_lt(z, z_there), is_tie));
+        vi_store_masked(own + x, inside, vi_select(wins, id, vi_set1(-1)));
+    }
+    find_runs(s, own, n);
+    if (!s->n_runs)
+        return;
+    set_runs(s, row);
+    for (int x = 0, i = 0; x < n; x += TL_LANES, i++) {
+        if (!s->visible[i])
+            continue;
+        shaded_lanes p;
+        find_pixels(&p, s, i, column);
+        const vm is_opaque = vm_and(p.visible, vf_ge(opacity_of(&p, m), vf_set1(m->cutoff)));
+        vi_store_masked(ids + x, is_opaque, vi_load_masked(is_opaque, own + x));
+        vf_store_masked(depth + x, is_opaque, vf_load_masked(is_opaque, own_depth + x));
+    }
+}
+
+/* One triangle, tile by tile of the box that it can reach. */
+static void cut_triangle(shade_runs *s, cutout_tile *tile, const tl_window *window, int32_t id, int32_t *ids, float *depth)
+{
+    const tl_shading *shading = s->shading;
+    const int32_t *corners = s->scene->triangles + 3 * (int64_t)id;
+    const int32_t material = shading->material_of ? shading->material_of[id] : 0;
+    tl_triangle t = {.col0 = 0, .col1 = window->width, .row0 = 0, .row1 = window->height};
+    if (!is_clipped(&s->scene->mesh, corners) && (load_triangle(&s->scene->mesh, corners, &t) == 0 || !clip_box(&t, window)))
+        return;
+    for (int64_t top = t.row0; top < t.row1; top += TL_CUTOUT_TILE)
+        for (int64_t left = t.col0; left < t.col1; left += TL_CUTOUT_TILE) {
+            tl_window part = *window;
+            part.x_px += left, part.y_px += top;
+            part.width = min64(TL_CUTOUT_TILE, t.col1 - left), part.height = min64(TL_CUTOUT_TILE, t.row1 - top);
+            const tl_target target = {.sink = TL_SINK_PAINT, .pixels = tile->ids, .depth = tile->depth, .stride_px = TL_CUTOUT_TILE};
+            tl_share share = {.ids = &id, .end = 1, .is_first = 1, .is_last = 1};
+            draw(s->scene, &part, &target, &share);
+            s->window = window;
+            for (int64_t row = 0; row < part.height; row++) {
+                const int64_t from = row * TL_CUTOUT_TILE, to = (top + row) * window->width + left;
+                keep_opaque(s, &shading->materials[material], top + row, left, (int)part.width, tile->ids + from, tile->depth + from,
+                            ids + to, depth + to);
+            }
+        }
+}
+
+/* Draws n triangles over a visibility buffer, rows of window->width. */
+static void cut_out(const tl_scene *scene, const tl_window *window, const tl_view *view, const tl_shading *shading,
+                    const int32_t *triangles, int64_t n, int32_t *ids, float *depth)
+{
+    shade_runs s;
+    cutout_tile tile;
+    start_runs(&s, scene, window, view, shading);
+    s.needs_normal = s.needs_colors = s.needs_point = 0;
+    s.needs_q = s.needs_uv;
+    for (int64_t k = 0; k < n; k++)
+        cut_triangle(&s, &tile, window, triangles[k], ids, depth);
+}

@@ -1,0 +1,153 @@
+# Shading. Included by _engine.pyx, which declares the kernels.
+
+
+cdef class Texture:
+    """A picture of linear light and its halves: uint16 texels as `tl_texture` has them, a row (offset, width, height) a level."""
+
+    cdef tl_texture texture
+    cdef object texels
+
+    def __init__(self, const uint16_t[:, ::1] texels, const int32_t[:, ::1] levels, int filter_code, int wrap_u, int wrap_v):
+        cdef int k
+        self.texels = texels
+        self.texture.texels = &texels[0, 0]
+        self.texture.n_levels = levels.shape[0]
+        for k in range(levels.shape[0]):
+            self.texture.offset[k], self.texture.width[k], self.texture.height[k] = levels[k, 0], levels[k, 1], levels[k, 2]
+        for k in range(levels.shape[0], TL_MAX_LEVELS):
+            self.texture.offset[k], self.texture.width[k], self.texture.height[k] = 0, 1, 1
+        self.texture.filter, self.texture.wrap_u, self.texture.wrap_v = <tl_filter>filter_code, <tl_wrap>wrap_u, <tl_wrap>wrap_v
+
+
+cdef void copy_floats(float *out, values, int n) except *:
+    cdef int k
+    for k in range(n):
+        out[k] = values[k]
+
+
+cdef class Shading:
+    """What `tl_shading` holds; keeps what it points to alive."""
+
+    cdef tl_shading shading
+    cdef object arrays
+    cdef uint8_t[::1] materials
+    cdef uint8_t[::1] lights
+
+    def __init__(self, const float[:, ::1] normals, const float[:, ::1] face_normals, positions, const uint8_t[::1] is_turned,
+                 const float[:, ::1] uv, const float[:, ::1] colors, const int32_t[::1] material_of, const float[::1] decode):
+        cdef const uint8_t[::1] raw = as_bytes(positions)
+        cdef tl_shading *s = &self.shading
+        self.arrays = (normals, face_normals, raw, is_turned, uv, colors, material_of, decode)
+        s.normals = &normals[0, 0] if normals.shape[0] else NULL
+        s.face_normals = &face_normals[0, 0] if face_normals is not None and face_normals.shape[0] else NULL
+        s.positions, s.is_f64 = data(raw), positions.dtype == np.float64
+        s.is_turned = <const uint8_t *>data(is_turned)
+        s.uv = &uv[0, 0] if uv is not None and uv.shape[0] else NULL
+        s.colors = &colors[0, 0] if colors is not None and colors.shape[0] else NULL
+        s.material_of = &material_of[0] if material_of is not None and material_of.shape[0] else NULL
+        s.decode = &decode[0]
+        s.n_materials = s.n_lights = 0
+        s.matcap = NULL
+
+    def set_materials(self, materials):
+        """Take rows (color, back_color or None, specular, shininess, is_unlit, cutoff, texture or None)."""
+        cdef tl_material *m
+        cdef Texture texture
+        cdef int k
+        self.materials = np.zeros(max(1, len(materials)) * sizeof(tl_material), np.uint8)
+        m = <tl_material *>&self.materials[0]
+        self.arrays += (materials,)
+        for k, (color, back_color, specular, shininess, is_unlit, cutoff, own) in enumerate(materials):
+            copy_floats(m[k].color, color, 4)
+            copy_floats(m[k].back_color, (0, 0, 0) if back_color is None else back_color, 3)
+            copy_floats(m[k].specular, specular, 3)
+            m[k].has_back_color, m[k].shininess, m[k].is_unlit, m[k].cutoff = back_color is not None, shininess, is_unlit, cutoff
+            texture = own
+            m[k].texture = &texture.texture if texture is not None else NULL
+        self.shading.materials, self.shading.n_materials = m, len(materials)
+
+    def set_lights(self, lights, ambient):
+        """Take rows (kind, at, color, falloff)."""
+        cdef tl_light *light
+        cdef int k
+        self.lights = np.zeros(max(1, len(lights)) * sizeof(tl_light), np.uint8)
+        light = <tl_light *>&self.lights[0]
+        for k, (kind, at, color, falloff) in enumerate(lights):
+            light[k].kind, light[k].falloff = <tl_light_kind><int>kind, falloff
+            copy_floats(light[k].at, at, 3)
+            copy_floats(light[k].color, color, 3)
+        copy_floats(self.shading.ambient, ambient, 3)
+        self.shading.lights, self.shading.n_lights = light, len(lights)
+
+    def set_view(self, int show, Texture matcap, eye_from, bint has_perspective, eye, ray, background, background_bytes):
+        """Take what the picture tells, where it is seen from, and what is behind it."""
+        cdef tl_shading *s = &self.shading
+        cdef int k
+        s.show, s.has_perspective = <tl_show>show, has_perspective
+        s.matcap = &matcap.texture if matcap is not None else NULL
+        self.arrays += (matcap,)
+        copy_floats(s.eye, eye, 3)
+        for k in range(3):
+            copy_floats(s.eye_from[k], eye_from[k], 3)
+        for k in range(4):
+            copy_floats(s.ray[k], ray[k], 3)
+        copy_floats(s.background, background, 4)
+        for k in range(4):
+            s.background_bytes[k] = background_bytes[k]
+        self.set_fog((0, 0, 0), 0, 0, 0, 0)
+
+    def set_fog(self, color, float near, float scale, float distance_start, float distance_scale):
+        """Take the depth cue."""
+        cdef tl_shading *s = &self.shading
+        copy_floats(s.fog_color, color, 3)
+        s.fog_near, s.fog_scale, s.distance_start, s.distance_scale = near, scale, distance_start, distance_scale
+
+
+def set_inverse_w(Scene scene, const float[:, ::1] rows, float[:, ::1] out):
+    """Copy rows of four numbers, one a vertex, and write 1/w over the fourth."""
+    if rows.shape[0]:
+        with nogil:
+            K.set_inverse_w(scene.scene.mesh.source, &rows[0, 0], 0, rows.shape[0], &out[0, 0])
+
+
+def shade(Scene scene, View view, Shading shading, const int32_t[:, ::1] ids, const float[:, ::1] depth, uint8_t[:, :, ::1] pixels,
+          int64_t first_row, int64_t n_rows):
+    """Write rows of the picture (H, W, 4) of a visibility buffer."""
+    cdef tl_window window = scene.window(first_row, n_rows, ids.shape[1])
+    cdef const tl_view *own = &view.view if view is not None else NULL
+    if n_rows and ids.shape[1]:
+        with nogil:
+            K.shade(&scene.scene, &window, own, &shading.shading, &ids[first_row, 0], &depth[first_row, 0], &pixels[first_row, 0, 0])
+
+
+def shade_samples(Scene scene, View view, Shading shading, const int32_t[:, ::1] positions, const int32_t[:, :, ::1] ids,
+                  const float[:, :, ::1] depth, uint8_t[:, :, ::1] pixels, int64_t first_row, int64_t n_rows):
+    """Write rows of the picture (H, W, 4) of a visibility buffer with several samples a pixel, ids and depth (S, H, W)."""
+    cdef tl_window window = scene.window(first_row, n_rows, ids.shape[2])
+    cdef const tl_view *own = &view.view if view is not None else NULL
+    cdef int sample_bits = int(ids.shape[0]).bit_length() - 1
+    cdef int64_t stride = ids.shape[1] * ids.shape[2]
+    if n_rows and ids.shape[2]:
+        with nogil:
+            K.shade_samples(&scene.scene, &window, own, &shading.shading, &positions[0, 0], sample_bits, stride, &ids[0, first_row, 0],
+                            &depth[0, first_row, 0], &pixels[first_row, 0, 0])
+
+
+def cut_out(Scene scene, View view, Shading shading, const int32_t[::1] opaque, const int32_t[::1] triangles, int32_t[:, ::1] ids,
+            float[:, ::1] depth, int64_t first_row, int64_t n_rows):
+    """Clear rows of a visibility buffer, draw the opaque triangles, and over them what the others' materials leave of them."""
+    cdef tl_window window = scene.window(first_row, n_rows, ids.shape[1])
+    cdef const tl_view *own = &view.view if view is not None else NULL
+    cdef tl_target target
+    cdef tl_share share
+    if n_rows == 0 or ids.shape[1] == 0:
+        return
+    memset(&target, 0, sizeof(target))
+    target.sink, target.stride_px = <tl_sink>4, ids.shape[1]  # nearest
+    target.pixels, target.depth = &ids[first_row, 0], &depth[first_row, 0]
+    share.ids, share.others, share.first, share.end = &opaque[0], NULL, 0, opaque.shape[0] - 1  # the last is there to be read
+    share.is_first = share.is_last = True
+    with nogil:
+        K.draw(&scene.scene, &window, &target, &share)
+        K.cut_out(&scene.scene, &window, own, &shading.shading, &triangles[0], triangles.shape[0], &ids[first_row, 0],
+                  &depth[first_row, 0])

@@ -1,0 +1,56 @@
+"""The command line: `topleft render MESH [MESH ...] -o OUT`, `topleft explain MESH`, `calibrate` and `info`.
+
+Exit status: 0, all pictures were written; 1, some of several inputs failed and the rest were written; 2, nothing could
+be done with what was asked, told in one line on stderr.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Mapping, Sequence
+
+from topleft._isa import build_info
+from topleft.cli.arguments import REFUSED, Parser, UsageError, add_render_arguments
+from topleft.cli.explain import add_plan_commands
+from topleft.cli.render import FAILED, complain, one_line, run_render
+from topleft.errors import TopleftError
+
+__all__ = ["FAILED", "REFUSED", "UsageError", "main"]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Return the exit status of the command line, `sys.argv` unless arguments are given."""
+    options = _parser().parse_args(arguments)
+    try:
+        status: int = options.run(options)
+    except (TopleftError, OSError, ValueError, MemoryError) as error:
+        complain(one_line(error))
+        return REFUSED
+    except KeyboardInterrupt:
+        complain("interrupted")
+        return 130
+    return status
+
+
+def run_info(_: argparse.Namespace) -> int:
+    """Print what was built and what runs."""
+    for name, value in build_info().items():
+        if isinstance(value, Mapping):
+            print(f"{name}:", *(f"  {key}: {item}" for key, item in value.items()), sep="\n")
+        else:
+            print(f"{name}:", *(value if isinstance(value, (list, tuple)) else [value]), file=sys.stdout)
+    return 0
+
+
+def _parser() -> Parser:
+    parser = Parser(prog="topleft", description="Exact triangle rasterization on the CPU.")
+    parser.add_argument("--version", action="version", version=f"topleft {build_info()['version']}")
+    commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
+    info = commands.add_parser("info", help="print the version and what was built", description=run_info.__doc__)
+    info.set_defaults(run=run_info)
+    render = commands.add_parser("render", help="render meshes to pictures", description="Render meshes to pictures.")
+    add_render_arguments(render)
+    render.set_defaults(run=run_render)
+    add_plan_commands(commands)
+    return parser

@@ -1,0 +1,149 @@
+"""What `topleft render` takes: its arguments, as words of the command line or as keys of a job file."""
+
+from __future__ import annotations
+
+import argparse
+from typing import NoReturn
+
+from topleft.camera import DEFAULT_FOV_Y_DEG, THREE_QUARTER_DEG
+from topleft.cli.animation import ANIMATION_SUFFIXES
+from topleft.errors import TopleftError
+from topleft.images import PICTURE_SUFFIXES, SUFFIXES
+from topleft.layers import LAYERS, check_layers
+from topleft.models import Cull, Sampling
+from topleft.render import DEFAULT_SIZE
+from topleft.scenes import SHAPES
+from topleft.shade import DEFAULT_COLOR, Shading
+
+__all__ = ["REFUSED", "Parser", "UsageError", "add_picture_arguments", "add_render_arguments"]
+
+REFUSED = 2
+"""Exit status: nothing could be done."""
+
+RENDER_HELP = f"""\
+MESH is a file that trimesh reads (OBJ, PLY, STL, glTF, GLB, OFF, ...) or the name of a built-in shape:
+{', '.join(SHAPES)}.
+
+OUT is a file or a folder:
+  knot.png           one picture; with --views 12: knot-000.png to knot-011.png
+  pictures/          a folder, made if need be: pictures/bunny.png, or pictures/bunny-000.png, ...
+  a/{{name}}-{{view}}.jpg   a pattern: {{name}} of the mesh, {{view}} and {{index}} of the mesh in the list, as numbers,
+                     {{layer}}; several layers without it: knot-color.png, knot-depth.png, ...
+Formats: {' '.join(SUFFIXES)} (PNG in a folder). A picture of that name is replaced, a mesh never.
+
+--layers: {', '.join(LAYERS)}. .npz holds all layers of a view in one file, and clip_from_world, the 4x4 matrix; without
+--layers color, id and depth. .npy and TIFF hold ids as int32 (-1: nothing) and depth as float32 (window depth, +inf:
+nothing), .npy normals as float32 (eye space). In a PNG they are 16-bit numbers (normals: 8-bit), of which text chunks
+say: number = topleft:offset + topleft:scale * value; 0 is nothing. --shading ids, depth or normals makes pictures of
+them to look at, and .npy files with the numbers behind.
+
+--jobs-file: TOML or JSON. Keys are the long options without dashes in front, and mesh; each job may have its own, and
+what stands outside of jobs, or on the command line, holds where a job does not say otherwise:
+  size = [512, 512]                          {{"size": [512, 512],
+  [[job]]                                     "job": [
+  mesh = ["bunny.obj", "spot.obj"]              {{"mesh": ["bunny.obj", "spot.obj"],
+  out = "thumbs/{{name}}-{{view}}.png"              "out": "thumbs/{{name}}-{{view}}.png",
+  views = 12                                     "views": 12}}]}}
+
+Exit status: 0, all was written; 1, something failed, which is listed, and the rest was written; 2, nothing was.
+"""
+
+
+class UsageError(TopleftError):
+    """What was asked for makes no sense."""
+
+
+class Parser(argparse.ArgumentParser):
+    """An argument parser that complains in one line."""
+
+    def error(self, message: str) -> NoReturn:
+        """Leave with exit status 2."""
+        self.exit(REFUSED, f"topleft: {message} (try: {self.prog} --help)\n")
+
+
+def add_render_arguments(parser: Parser) -> None:
+    """Add all that `topleft render` takes."""
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.epilog = RENDER_HELP
+    parser.add_argument("meshes", nargs="*", metavar="MESH", help="a file or a built-in shape")
+    add_picture_arguments(parser)
+    many = parser.add_argument_group("many pictures")
+    add = many.add_argument
+    add("--jobs", type=_positive, default=1, metavar="N", help="pictures that are drawn side by side (default 1)")
+    add("--jobs-file", metavar="FILE", help="what to render, as TOML or JSON; see below")
+    add("--resume", action="store_true", help="leave out pictures whose files are there")
+    add("--sheet", metavar="FILE", help=f"all pictures on one sheet: {' '.join(PICTURE_SUFFIXES)}")
+    add("--animation", metavar="FILE",
+        help=f"the views of a mesh one after the other ({{name}} of the mesh): {' '.join(ANIMATION_SUFFIXES)}")
+    add("--fps", type=_rate, default=20.0, metavar="N", help="views a second of an animation (default 20)")
+
+
+def add_picture_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add what a job of a job file may say, too."""
+    add = parser.add_argument
+    azimuth, elevation = THREE_QUARTER_DEG
+    width, height = DEFAULT_SIZE
+    add("-o", "--out", metavar="OUT", help="a file, a folder or a pattern")
+    add("--size", type=_size, default=DEFAULT_SIZE, metavar="WxH", help=f"pixels (default {width}x{height})")
+    add("--azimuth", type=float, default=azimuth, metavar="DEG", help="right of the front (default %(default)g)")
+    add("--elevation", type=float, default=elevation, metavar="DEG", help="above level (default %(default)g)")
+    add("--fov", type=float, default=DEFAULT_FOV_Y_DEG, metavar="DEG", help="bottom to top (default %(default)g)")
+    add("--ortho", action="store_true", help="no perspective")
+    add("--up", choices=["y", "z"], default="y", help="the axis that points up (default y)")
+    add("--shading", choices=[str(mode) for mode in Shading], default="smooth", help="(default smooth)")
+    add("--color", type=_rgb, default=DEFAULT_COLOR, metavar="COLOR", help="of a mesh without colours")
+    add("--background", type=_rgba, default=(255, 255, 255, 255), metavar="COLOR",
+        help="a name, #rrggbb[aa] or transparent (default white)")
+    add("--cull", choices=[str(side) for side in Cull], default="none", help="leave out triangles (default none)")
+    add("--wireframe", action="store_true", help="draw the edges over it")
+    samplings = [str(mode) for mode in Sampling if mode is Sampling.CENTER or mode.n_samples > 1]
+    add("--sampling", choices=samplings, default="center", help="samples of a pixel (default center)")
+    add("--views", type=_positive, default=1, metavar="N", help="a turntable of N pictures (default 1)")
+    add("--layers", type=_layers, default=(), metavar="NAME,...", help=f"{','.join(LAYERS)} (default color)")
+    add("--threads", type=_positive, default=None, metavar="N",
+        help="of a picture (default: as many as there are cores, 1 with --jobs)")
+
+
+def _size(text: str) -> tuple[int, int]:
+    width, cross, height = text.lower().partition("x")
+    if not (cross and width.isdecimal() and height.isdecimal() and int(width) and int(height)):
+        raise argparse.ArgumentTypeError(f"must be WIDTHxHEIGHT, 1280x720 say, got {text!r}")
+    return int(width), int(height)
+
+
+def _positive(text: str) -> int:
+    if not (text.isdecimal() and int(text)):
+        raise argparse.ArgumentTypeError(f"must be a positive whole number, got {text!r}")
+    return int(text)
+
+
+def _rate(text: str) -> float:
+    try:
+        rate = float(text)
+    except ValueError:
+        rate = 0.0
+    if not 0.1 <= rate <= 100:  # what the hundredths of a second of a GIF, or patience, can tell apart
+        raise argparse.ArgumentTypeError(f"must be a number from 0.1 to 100, got {text!r}")
+    return rate
+
+
+def _layers(text: str) -> tuple[str, ...]:
+    try:
+        return check_layers(name.strip() for name in text.split(","))
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def _rgba(text: str) -> tuple[int, ...]:
+    if text.lower() in ("transparent", "none"):
+        return (0, 0, 0, 0)
+    from PIL import ImageColor
+
+    try:
+        return ImageColor.getcolor(text, "RGBA")  # type: ignore[return-value]
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"must be a colour name or #rrggbb, got {text!r}") from None
+
+
+def _rgb(text: str) -> tuple[int, ...]:
+    return _rgba(text)[:3]

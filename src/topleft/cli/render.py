@@ -1,0 +1,195 @@
+"""`topleft render`: from arguments to files.
+
+Every mesh is rendered; one that fails does not stop the rest, and is listed at the end.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import signal
+import sys
+import tempfile
+from collections.abc import Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from topleft.batch import Result, render_batch
+from topleft.cli.animation import check_animation, save_animation
+from topleft.cli.arguments import UsageError
+from topleft.cli.job_file import read_jobs
+from topleft.cli.plan import Shoot, check_targets, plan_shoots
+from topleft.cli.sheet import make_sheet
+from topleft.errors import MissingPackageError, TopleftError
+from topleft.images import PICTURE_SUFFIXES, save_image
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+__all__ = ["FAILED", "complain", "one_line", "run_render"]
+
+FAILED = 1
+"""Exit status: a part of the work failed."""
+
+MOST_VIEWS_TOGETHER = 16
+"""Views of a mesh that a process draws before it gives word: it reads the mesh once for them."""
+
+
+def run_render(options: argparse.Namespace) -> int:
+    """Render every mesh and return the exit status."""
+    with ExitStack() as stack:
+        shoots = _plan(options, stack)
+        animations = _animations(shoots, options)
+        extras = [path for path, _ in animations] + ([Path(options.sheet)] if options.sheet else [])
+        for path, _ in animations:
+            check_animation(path)
+        if extras:
+            _check_pictures(shoots, options)
+        check_targets(shoots, extras)
+        failed = _render(shoots, options)
+        for _, message in failed:
+            complain(message)
+        for path, shoot in animations:
+            if all(file.is_file() for file in _color_files(shoot)):
+                path.parent.mkdir(parents=True, exist_ok=True)
+                background = shoot.jobs[0].options["background"]
+                opaque = background[:3] if background[3] else (255, 255, 255)
+                save_animation(path, _color_files(shoot), fps=options.fps, background=opaque)
+        if options.sheet:
+            Path(options.sheet).parent.mkdir(parents=True, exist_ok=True)
+            sheet = make_sheet([_color_files(shoot) for shoot in shoots], [shoot.name for shoot in shoots])
+            save_image(options.sheet, sheet)
+    if failed:
+        sources = list(dict.fromkeys(source for source, _ in failed))
+        complain(f"{len(sources)} of {len(shoots)} meshes failed: {' '.join(sources)}")
+        return FAILED
+    return 0
+
+
+def _plan(options: argparse.Namespace, stack: ExitStack) -> list[Shoot]:
+    """Return the shoots of the command line or the job file."""
+    if options.jobs_file and options.meshes:
+        raise UsageError("a job file names its meshes itself: give MESH or --jobs-file, not both")
+    if not options.jobs_file and not options.meshes:
+        raise UsageError("there is nothing to render: give MESH or --jobs-file (try: topleft render --help)")
+    given = read_jobs(Path(options.jobs_file), options) if options.jobs_file else [options]
+    shoots: list[Shoot] = []
+    for each in given:
+        if each.out is None:
+            if not (options.sheet or options.animation):
+                raise UsageError("say where pictures go: -o/--out, --sheet or --animation (try: topleft render --help)")
+            folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="topleft-"))
+            each.out = str(Path(folder, "{index}-{view}.png"))
+        if each.threads is None and options.jobs > 1:
+            each.threads = 1
+        shoots += plan_shoots(each, len(shoots))
+    return shoots
+
+
+def _render(shoots: Sequence[Shoot], options: argparse.Namespace) -> list[tuple[str, str]]:
+    """Render all; the sources of what failed, each with the reason, once."""
+    jobs = [job for shoot in shoots for job in shoot.jobs]
+    source_of = [shoot.source for shoot in shoots for _ in shoot.jobs]
+    failed: dict[tuple[str, str], None] = {}
+    with ExitStack() as stack:
+        bar = stack.enter_context(_Progress(len(jobs)))
+        executor = _executor(shoots, options.jobs, stack)
+        chunk = min(MOST_VIEWS_TOGETHER, max(len(shoot.jobs) for shoot in shoots))
+        results = stack.enter_context(
+            render_batch(
+                jobs, executor=executor, progress=bar.step, on_error="collect", order="completed",
+                resume=options.resume, chunk=1 if isinstance(executor, int) else chunk,
+            )
+        )  # fmt: skip
+        for result in results:
+            if result.error is None:
+                continue
+            known = isinstance(result.error, (TopleftError, OSError, ValueError, MemoryError))
+            if len(shoots) == 1 or isinstance(result.error, MissingPackageError) or not known:
+                raise result.error
+            failed[source_of[result.index], one_line(result.error)] = None
+    order = {shoot.source: i for i, shoot in reversed(list(enumerate(shoots)))}
+    return sorted(failed, key=lambda entry: order[entry[0]])
+
+
+def _executor(shoots: Sequence[Shoot], n: int, stack: ExitStack) -> Executor | int | None:
+    """Who draws: processes for several meshes, since readers are Python and so one thread's work; else threads."""
+    if n == 1 or len(shoots) == 1:
+        return n if n > 1 else None
+    from concurrent.futures import ProcessPoolExecutor
+
+    pool = ProcessPoolExecutor(min(n, len(shoots)), initializer=_ignore_interrupt)
+    stack.callback(pool.shutdown, cancel_futures=True)
+    return pool
+
+
+def _ignore_interrupt() -> None:
+    """Leave Ctrl-C to the parent, which lets the pictures on the way be finished."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _animations(shoots: Sequence[Shoot], options: argparse.Namespace) -> list[tuple[Path, Shoot]]:
+    if not options.animation:
+        return []
+    if len(shoots) > 1 and "{name}" not in options.animation and "{index}" not in options.animation:
+        raise UsageError(f"several meshes need {{name}} in --animation, got {options.animation!r}")
+    return [
+        (Path(options.animation.replace("{name}", shoot.name).replace("{index}", f"{i:03d}")), shoot)
+        for i, shoot in enumerate(shoots)
+    ]
+
+
+def _check_pictures(shoots: Sequence[Shoot], options: argparse.Namespace) -> None:
+    """Raise an error if there are no pictures for a sheet or an animation."""
+    if options.sheet and Path(options.sheet).suffix.lower() not in PICTURE_SUFFIXES:
+        raise UsageError(f"--sheet must end in one of {' '.join(PICTURE_SUFFIXES)}, got {options.sheet!r}")
+    for job in (job for shoot in shoots for job in shoot.jobs):
+        if job.layers and "color" not in job.layers:
+            raise UsageError(f"--sheet and --animation show the layer color, got --layers {','.join(job.layers)}")
+        if Path(os.fspath(job.destination or "")).suffix.lower() not in PICTURE_SUFFIXES:
+            known = " ".join(PICTURE_SUFFIXES)
+            raise UsageError(f"--sheet and --animation need pictures: OUT must end in one of {known}")
+
+
+def _color_files(shoot: Shoot) -> list[Path]:
+    """The pictures of a mesh, view by view."""
+    return [Path(os.fspath(job.destination or "").replace("{layer}", "color")) for job in shoot.jobs]
+
+
+class _Progress:
+    """A bar on stderr when a person looks at it and there is more than one picture; nothing otherwise."""
+
+    def __init__(self, n_pictures: int) -> None:
+        self._bar: Any = None
+        if n_pictures > 1 and sys.stderr.isatty():
+            try:
+                from tqdm import tqdm
+            except ImportError:
+                return
+            self._bar = tqdm(total=n_pictures, unit="picture", file=sys.stderr)
+
+    def __enter__(self) -> _Progress:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._bar is not None:
+            self._bar.close()
+
+    def step(self, _: Result) -> None:
+        if self._bar is not None:
+            self._bar.update()
+
+
+def complain(message: str) -> None:
+    """Print one line on stderr."""
+    print(f"topleft: {message}", file=sys.stderr)
+
+
+def one_line(error: BaseException) -> str:
+    """What is wrong, in one line."""
+    if isinstance(error, MemoryError):
+        return "not enough memory for a mesh or picture of this size"
+    if isinstance(error, OSError) and error.strerror:
+        return f"{error.strerror}: {error.filename!r}" if error.filename else error.strerror
+    return " ".join(str(error).split())

@@ -1,0 +1,58 @@
+"""Contact sheets: many pictures, reduced, in rows on one.
+
+Input: the files of the pictures. Output: a picture (H, W, 3) uint8.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+__all__ = ["make_sheet"]
+
+LONGEST_SIDE = 256
+GAP = 8
+CAPTION_HEIGHT = 16
+PAPER, INK = (255, 255, 255), (60, 60, 60)
+
+
+def make_sheet(files: Sequence[Sequence[Path]], captions: Sequence[str]) -> npt.NDArray[np.uint8]:
+    """Return a sheet of the pictures of each mesh; what is not there stays empty.
+
+    Several pictures of several meshes: a row for each mesh. Otherwise the rows make the sheet about square.
+    """
+    from PIL import Image, ImageDraw
+
+    n_views = max(map(len, files))
+    if len(files) > 1 and n_views > 1:
+        n_columns, cells = n_views, [(row, k, file) for row, views in enumerate(files) for k, file in enumerate(views)]
+    else:
+        flat = [file for views in files for file in views]
+        n_columns = math.ceil(math.sqrt(len(flat)))
+        cells = [(i // n_columns, i % n_columns, file) for i, file in enumerate(flat)]
+    n_rows = 1 + max(row for row, _, _ in cells)
+    pictures = {}
+    for row, column, file in cells:
+        if file.is_file():
+            with Image.open(file) as image:
+                reduced = image.convert("RGBA")
+                reduced.thumbnail((LONGEST_SIDE, LONGEST_SIDE), Image.Resampling.HAMMING)
+                pictures[row, column] = reduced
+    width = max((picture.width for picture in pictures.values()), default=LONGEST_SIDE)
+    height = max((picture.height for picture in pictures.values()), default=LONGEST_SIDE)
+    step_x, step_y = width + GAP, height + GAP + CAPTION_HEIGHT
+    sheet = Image.new("RGB", (GAP + n_columns * step_x, GAP + n_rows * step_y), PAPER)
+    pen = ImageDraw.Draw(sheet)
+    for (row, column), picture in pictures.items():
+        left, top = GAP + column * step_x, GAP + row * step_y
+        sheet.paste(picture, (left + (width - picture.width) // 2, top + (height - picture.height) // 2), picture)
+    for i, caption in enumerate(captions):
+        row, column = (i, 0) if n_views > 1 else (i // n_columns, i % n_columns)
+        if len(captions) == 1:
+            row, column = n_rows - 1, 0
+        pen.text((GAP + column * step_x + 2, GAP + row * step_y + height + 2), caption, fill=INK)
+    return np.asarray(sheet)

@@ -1,0 +1,79 @@
+"""Frames: how a camera sees the space that light is computed in: rays of pixels, and the turn to eye space.
+
+Input: `Camera`, the size of the whole picture. Output: `Frame`, numbers for the kernels.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft.camera import Camera
+
+F64 = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """What `tl_shading` in csrc/shading.h tells of the camera, in a shading space whose origin is at `center`.
+
+    Attributes
+    ----------
+    eye : (3,) float64
+        Where the camera is; without perspective the unit vector to it.
+    ray : (4, 3) float64
+        The ray of pixel position (0, 0), what it gains per column and per row, and, without perspective, along the
+        depth.
+    eye_from, origin : (3, 3) and (3,) float64
+        Eye space from shading space: `eye_from @ p + origin` but for a scale.
+    scale : float
+        How many units of eye space one of the shading space is.
+    distance_start, distance_scale : float
+        The distance along the view: `start + scale * w`, or `start + scale * depth` without perspective.
+    """
+
+    has_perspective: bool
+    eye: F64
+    ray: F64
+    eye_from: F64
+    origin: F64
+    scale: float
+    distance_start: float
+    distance_scale: float
+
+
+def is_similarity(view: F64) -> bool:
+    """Whether a matrix (4, 4) keeps angles and does not mirror, so that light may be computed before it."""
+    linear = view[:3, :3]
+    squares = linear @ linear.T
+    scale = np.trace(squares) / 3
+    return bool(np.linalg.det(linear) > 0 and np.abs(squares - scale * np.eye(3)).max() <= 1e-9 * scale)
+
+
+def frame_of(camera: Camera, size: tuple[int, int], center: F64, *, in_eye_space: bool) -> Frame:
+    """How the camera sees shading space: the world, or its own eye space, moved so that `center` is the origin."""
+    view = np.eye(4) if in_eye_space else camera.view
+    clip = camera.clip_from_world(size) @ np.linalg.inv(camera.view) @ view
+    width, height = size
+    corner, right, down = np.array([-1.0, 1.0]), np.array([2 / width, 0]), np.array([0, -2 / height])  # of clip space
+    has_perspective = bool(np.any(clip[3, :3]))
+    rows = [0, 1, 3] if has_perspective else [0, 1, 2]
+    world_from_rows = np.linalg.inv(clip[rows, :3])
+    offset = world_from_rows @ clip[rows, 3]
+    ends = [(*corner, 1 if has_perspective else -1), (*right, 0), (*down, 0), (0, 0, 2)]
+    ray = np.array(ends) @ world_from_rows.T
+    if has_perspective:
+        eye = -offset - center
+        start, scale = 0.0, 1.0 / -camera.projection[3, 2]
+    else:
+        ray[0] -= offset + center
+        eye = -ray[3] / np.linalg.norm(ray[3])
+        (a, b), (c, d) = camera.projection[2:, 2:]
+        near, far = ((ndc * d - b) / (ndc * c - a) for ndc in (-1.0, 1.0))
+        start, scale = near, far - near
+    size_of_unit = float(np.cbrt(np.linalg.det(view[:3, :3])))
+    linear = view[:3, :3] / size_of_unit
+    origin = view[:3, :3] @ center + view[:3, 3]
+    return Frame(has_perspective, eye, ray, linear, origin, size_of_unit, start, scale)

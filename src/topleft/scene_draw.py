@@ -1,0 +1,180 @@
+"""Scenes into buffers: each instance is snapped and drawn over what the ones before have left.
+
+In: `Scene`, the matrix of a camera, the options of a view.  Out: `SceneFragments`, or a mask.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from topleft import _engine
+from topleft.area import sum_areas
+from topleft.classic import refuse_classic
+from topleft.depth_layers import check_peel, peel_scenes
+from topleft.memory import SCRATCH, FreshMemory
+from topleft.models import DepthTest, Sampling, Sink, parse
+from topleft.rasterize import canvas_of, refuse_many
+from topleft.sampling import sample_positions
+from topleft.scene import Scene
+from topleft.scene_fragments import SceneDepthLayers, SceneFragments
+from topleft.snapped import Snapped, snap_scene
+from topleft.threads import count_threads, run_parts
+from topleft.view import View
+
+__all__ = ["PlacedScene", "draw_scene", "draw_scene_coverage", "peel_scene"]
+
+#: Snapped vertices that are held at a time: 16 bytes each.
+VERTICES_AT_ONCE = 1 << 20
+
+#: `tl_kernels.draw` begins a mask anew after 2**31 pixels, which one that is drawn in several calls must not meet.
+MOST_PIXELS_OF_PART = 1 << 30
+
+FRESH = FreshMemory()
+
+#: cull codes of a view (tl_cull) for an instance that mirrors.
+MIRRORED = {0: 0, 1: 2, 2: 1}
+
+
+class PlacedScene:
+    """A scene as a camera sees it: its instances are snapped when they are asked for."""
+
+    def __init__(self, scene: Scene, clip_from_world: NDArray[np.float64], view: View, *, with_depth: bool) -> None:
+        self.scene = scene
+        self.first_ids = scene.first_ids
+        self._clip_from_world = clip_from_world
+        self._view = view
+        self._with_depth = with_depth
+
+    def snap(self, i: int) -> Snapped:
+        """Return an instance, snapped; in shared buffers it draws its own range of ids."""
+        instance, view = self.scene[i], self._view
+        cull = MIRRORED[view.cull] if instance.is_mirrored else view.cull
+        placed = replace(view, transform=self._clip_from_world @ instance.transform, cull=cull)
+        mesh = instance.mesh
+        snapped = snap_scene(FRESH, mesh.vertices, mesh.triangles, placed, with_depth=self._with_depth, out=None)
+        return replace(snapped, scene=snapped.scene.numbered_from(int(self.first_ids[i])))
+
+    def chunks(self) -> Iterator[list[Snapped]]:
+        """Yield the instances in their order, as many at a time as `VERTICES_AT_ONCE` allows."""
+        chunk: list[Snapped] = []
+        for i in range(len(self.scene)):
+            chunk.append(self.snap(i))
+            if sum(snapped.n_vertices for snapped in chunk) >= VERTICES_AT_ONCE:
+                yield chunk
+                chunk = []
+        if chunk:
+            yield chunk
+
+    def draw(self, targets: list[_engine.Target], positions: list[tuple[int, int]], height: int) -> None:
+        """Clear targets of that many rows, one a sample, and draw what each sees; (0, 0) is the pixel's centre."""
+        n_parts = count_threads(self._view.threads, self.scene.n_triangles)
+        n_parts = min(height, max(n_parts, height * self._view.size[0] // MOST_PIXELS_OF_PART))
+        n_left = len(self.scene)
+        is_first = True
+        for chunk in self.chunks():
+            n_left -= len(chunk)
+            for target, at in zip(targets, positions, strict=True):
+                scenes = [snapped.scene.seen_from(*at) for snapped in chunk]
+                run_parts(rows_of(scenes, target, is_first=is_first, is_last=n_left == 0), height, n_parts)
+            is_first = False
+
+
+def rows_of(
+    scenes: list[_engine.Scene], target: _engine.Target, *, is_first: bool, is_last: bool
+) -> Callable[[int, int], None]:
+    """Return what draws rows [first, end) of several scenes into one target, which the first of all clears."""
+
+    def draw_rows(first: int, end: int) -> None:
+        for i, scene in enumerate(scenes):
+            scene.draw(target, first, end - first, is_first and i == 0, is_last and i == len(scenes) - 1)
+
+    return draw_rows
+
+
+def draw_scene(
+    scene: Scene,
+    clip_from_world: NDArray[np.float64],
+    size: tuple[int, int],
+    *,
+    depth_test: str | None = "less",
+    background_depth: float | None = None,
+    **options: Any,
+) -> SceneFragments:
+    """Return the visibility buffer of a scene; options as those of `rasterize`, without `out` and `transform`."""
+    view_options: Any = options
+    view = View.parse(size, view_options)
+    refuse_classic(view, "depth")
+    refuse_many(view, "rasterize")
+    test = None if depth_test is None else parse(DepthTest, "depth_test", depth_test)
+    sink = {None: Sink.PAINT, DepthTest.LESS: Sink.NEAREST, DepthTest.GREATER: Sink.FARTHEST}[test]
+    (width, height), n = view.size, view.sampling.n_samples
+    positions = [(0, 0)] if n == 1 else [(x, y) for x, y in sample_positions(n, view.grid_bits).tolist()]
+    ids: NDArray[np.int32] = FRESH.empty("ids", (n, height, width), np.int32)
+    depth: NDArray[np.float32] = FRESH.empty("depth", (n, height, width), np.float32)
+    placed = PlacedScene(scene, clip_from_world, view, with_depth=True)
+    if width and height:
+        targets = [_engine.Target(sink, *planes, None) for planes in zip(ids, depth, strict=True)]
+        placed.draw(targets, positions, height)
+    if background_depth is not None:
+        depth[ids < 0] = background_depth
+    return SceneFragments(ids, depth, placed, positions)
+
+
+def peel_scene(
+    scene: Scene,
+    clip_from_world: NDArray[np.float64],
+    size: tuple[int, int],
+    *,
+    layers: int,
+    depth_test: str = "less",
+    **options: Any,
+) -> SceneDepthLayers:
+    """Return the nearest layers of a scene; options as those of `peel`, without `transform`."""
+    view_options: Any = options
+    view = View.parse(size, view_options)
+    n, is_farthest = check_peel(view, layers, depth_test)
+    placed = PlacedScene(scene, clip_from_world, view, with_depth=True)
+    snapped = [placed.snap(i) for i in range(len(scene))]  # a band of rows is drawn once, with all instances
+    return SceneDepthLayers(*peel_scenes(SCRATCH, snapped, view, n, is_farthest=is_farthest), placed)
+
+
+def draw_scene_coverage(
+    scene: Scene, clip_from_world: NDArray[np.float64], size: tuple[int, int], out: object, **options: Any
+) -> NDArray[Any]:
+    """Return the mask of a scene, as `coverage` gives that of a mesh; options as there."""
+    view_options: Any = options
+    view = View.parse(size, view_options)
+    refuse_classic(view, "a scene")
+    width, height = view.size
+    placed = PlacedScene(scene, clip_from_world, view, with_depth=False)
+    n = view.sampling.n_samples
+    is_share = n > 1 or view.sampling is Sampling.AREA
+    with canvas_of(FRESH, "coverage", out, (height, width), np.float32 if is_share else np.bool_) as (result, canvas):
+        if not (width and height):
+            pass
+        elif view.sampling is Sampling.AREA:
+            add_areas(placed, view, canvas)
+        else:
+            samples = sample_positions(n, view.grid_bits) if n > 1 else None
+            shape = _engine.Target.covered_shape(height, width, n)
+            sink = Sink.SAMPLES if n > 1 else Sink.MASK
+            target = _engine.Target(sink, canvas, None, SCRATCH.empty("covered", shape, np.uint64), samples)
+            placed.draw([target], [(0, 0)], height)
+    return result
+
+
+def add_areas(placed: PlacedScene, view: View, canvas: NDArray[np.float32]) -> None:
+    """Write the sum of the areas that the instances cover, at most 1."""
+    canvas[...] = 0
+    own = np.empty_like(canvas)
+    for chunk in placed.chunks():
+        for snapped in chunk:
+            n_threads = count_threads(view.threads, snapped.n_triangles)
+            sum_areas(SCRATCH, snapped.scene, own, n_threads, is_clamped=True)
+            canvas += own
+    np.minimum(canvas, 1, out=canvas)

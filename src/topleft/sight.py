@@ -1,0 +1,136 @@
+"""What a camera sees of a mesh or scene, and where in space each visible pixel lies: computed when it is asked for.
+
+Input: `Mesh` or `Scene`, `Camera`. Output: `Sight`, from which `view_layers` takes its layers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft.camera import Camera
+from topleft.fragments import Fragments
+from topleft.mesh import Mesh
+from topleft.render import rasterize_mesh
+from topleft.scene import Instance, Scene
+from topleft.scene_fragments import Part, SceneFragments
+
+__all__ = ["Sight", "Surface", "moved", "project"]
+
+F64 = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """The visible pixels of one instance, in row order."""
+
+    part: Part
+    instance: Instance
+
+    @cached_property
+    def seen(self) -> npt.NDArray[np.bool_]:
+        """Where in the rectangle of the part the instance shows."""
+        return self.part.frags.mask
+
+    @cached_property
+    def points(self) -> F64:
+        """Where the pixels lie on the mesh, in its own space: (P, 3) float64.
+
+        The point has the weights of the pixel in its triangle, relative to a corner: so what float32 rounds off them
+        moves it by less than 2**-22 of the longest edge, along the triangle.
+        """
+        mesh, seen = self.instance.mesh, self.seen
+        weights, ids = self.part.frags.barycentric(), self.part.frags.triangle[seen]
+        is_few = len(ids) < len(mesh.triangles)  # of many triangles those that show, of few all
+        rows, row = (mesh.triangles[ids], np.arange(len(ids))) if is_few else (mesh.triangles, ids)
+        a, b, c = (mesh.vertices[corners].astype(np.float64, copy=False) for corners in rows.T)
+        points: F64 = a[row]
+        for k, edge in ((1, b - a), (2, c - a)):
+            along = edge[row]
+            along *= weights[..., k][seen][:, None]
+            points += along
+        return points
+
+    @cached_property
+    def points_world(self) -> F64:
+        """The same in the world."""
+        return moved(self.points, self.instance.transform[:3])
+
+
+@dataclass(frozen=True, eq=False)
+class Sight:
+    """A mesh or scene and who looks at it.
+
+    Parameters
+    ----------
+    subject : Mesh or Scene
+    camera : Camera
+    size : (width, height), pixels
+    options : dict
+        `cull` and `threads`, as `rasterize_mesh` takes them.
+    look : dict
+        Further options of `render`, for colours.
+    camera_to : Camera, optional
+        Who looks when the flow ends.
+    transforms_to : (N, 4, 4) float64, optional
+        Where the instances are then.
+    """
+
+    subject: Mesh | Scene
+    camera: Camera
+    size: tuple[int, int]
+    options: dict[str, Any] = field(default_factory=dict)
+    look: dict[str, Any] = field(default_factory=dict)
+    camera_to: Camera | None = None
+    transforms_to: F64 | None = None
+
+    @property
+    def instances(self) -> Sequence[Instance]:
+        """The instances of the scene; of a mesh the only one, which stands where it is."""
+        return self.subject.instances if isinstance(self.subject, Scene) else (Instance(self.subject),)
+
+    @cached_property
+    def frags(self) -> Fragments:
+        """The visibility buffer, at the centres of the pixels."""
+        return rasterize_mesh(self.subject, self.camera, self.size, **self.options)
+
+    @cached_property
+    def surfaces(self) -> Sequence[Surface]:
+        """The visible pixels of each instance that shows any."""
+        frags = self.frags
+        if isinstance(frags, SceneFragments):
+            return [Surface(part, self.instances[part.instance]) for part in frags.parts]
+        height, width = frags.depth.shape
+        return [Surface(Part(0, slice(0, height), slice(0, width), frags), self.instances[0])]
+
+    def join(
+        self, channels: tuple[int, ...], background: float, make: Callable[[Surface], npt.NDArray[Any]]
+    ) -> npt.NDArray[np.float32]:
+        """Return a picture (H, W, *channels) of what `make` gives for the pixels of each surface."""
+        width, height = self.size
+        picture: npt.NDArray[np.float32] = np.full((height, width, *channels), background, np.float32)
+        for surface in self.surfaces:
+            picture[surface.part.box][surface.seen] = make(surface)
+        return picture
+
+
+def moved(points: F64, matrix: F64) -> F64:
+    """Points (P, 3) taken through the first rows of a matrix, (N, 4) of N rows: (P, N) float64.
+
+    Written out, for a library's product of matrices rounds as it likes.
+    """
+    x, y, z = points.T
+    return np.stack([((a * x + b * y) + c * z) + d for a, b, c, d in matrix], -1)
+
+
+def project(points: F64, clip_from: F64, size: tuple[int, int]) -> F64:
+    """Where points (P, 3) lie in a picture, pixels (P, 2) float64; NaN for what is not in front of the camera."""
+    x, y, w = moved(points, clip_from[[0, 1, 3]]).T
+    w[~(w > 0)] = np.nan
+    width, height = size
+    return np.stack([(x / w + 1) * (width / 2), (1 - y / w) * (height / 2)], -1)

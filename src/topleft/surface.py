@@ -1,0 +1,87 @@
+"""Surfaces: the arrays of a mesh as the shading kernels read them, made once per mesh.
+
+Input: `Mesh`. Output: `Surface`, rows of four float32 each, in the space of the mesh or in that of the eye.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft.mesh import Mesh, face_normals, unit_or_zero
+
+F32 = npt.NDArray[np.float32]
+F64 = npt.NDArray[np.float64]
+FloatArray = npt.NDArray[np.floating[Any]]
+
+
+class Surface:
+    """What shading needs of a mesh, each part made when it is first asked for.
+
+    Attributes
+    ----------
+    positions : (V, 3) float
+        As in the mesh, or in eye space.
+    center : (3,) float64
+        The middle of the mesh: the origin of the space that light is computed in, so that float32 is fine enough.
+    """
+
+    def __init__(self, mesh: Mesh, view: F64 | None = None) -> None:
+        """`view`: (4, 4), takes the mesh to eye space first."""
+        self._triangles = mesh.triangles
+        self._vertex_normals = mesh.vertex_normals
+        self._colors = mesh.colors
+        self._view = view
+        self.positions = mesh.vertices if view is None else mesh.vertices @ view[:3, :3].T + view[:3, 3]
+
+    @cached_property
+    def center(self) -> F64:
+        """The middle of the box round the vertices in use."""
+        used = self.positions[self._triangles.ravel()]
+        return (used.min(axis=0) / 2 + used.max(axis=0) / 2).astype(np.float64)
+
+    @cached_property
+    def normals(self) -> F32:
+        """(V, 4): unit normals, 0 where there is none, and 1."""
+        normals = np.asarray(self._vertex_normals(), dtype=np.float64)
+        if self._view is not None:
+            normals = normals @ np.linalg.inv(self._view[:3, :3])
+        return _fours(unit_or_zero(normals))
+
+    @cached_property
+    def face_normals(self) -> F32:
+        """(T, 4): unit normals of the triangles, on the side from which they run counter-clockwise, and 1."""
+        return _fours(face_normals(self.positions, self._triangles))
+
+    @cached_property
+    def is_turned(self) -> npt.NDArray[np.uint8] | None:
+        """(T,): 1 where the normals of the corners point to the other side than the triangle; None if none does."""
+        corners = self.normals[:, :3][self._triangles].sum(axis=1)
+        turned = np.einsum("ij,ij->i", corners, self.face_normals[:, :3]) < 0
+        return turned.astype(np.uint8) if turned.any() else None
+
+    @cached_property
+    def colors(self) -> F32 | None:
+        """(V, 4): sRGB of the vertices, 0 to 255, and 1; None if they have none."""
+        return None if self._colors is None else _fours(self._colors[:, :3])
+
+
+_surfaces: WeakKeyDictionary[Mesh, Surface] = WeakKeyDictionary()
+
+
+def surface_of(mesh: Mesh) -> Surface:
+    """The surface of a mesh in its own space, made once."""
+    surface = _surfaces.get(mesh)
+    if surface is None:
+        surface = _surfaces[mesh] = Surface(mesh)
+    return surface
+
+
+def _fours(rows: npt.NDArray[Any]) -> F32:
+    fours = np.ones((len(rows), 4), dtype=np.float32)
+    fours[:, :3] = rows
+    return fours

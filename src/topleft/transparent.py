@@ -1,0 +1,113 @@
+"""Transparent pictures: every layer of a mesh or scene is shaded, then they are seen through each other.
+
+Input: `Mesh` or `Scene`, `Camera`. Output: a picture (H, W, 4) uint8, sRGB with alpha.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft.camera import Camera
+from topleft.colors import as_color
+from topleft.composite import composite
+from topleft.depth_layers import DepthLayers, peel
+from topleft.mesh import Mesh
+from topleft.render import DEFAULT_SIZE, WHITE, default_camera
+from topleft.scene import Scene
+from topleft.scene_draw import peel_scene
+from topleft.scene_render import shade_scene
+from topleft.shade import shade
+
+__all__ = ["render_transparent", "visible_layers"]
+
+CLEAR = (0, 0, 0, 0)
+
+
+def render_transparent(
+    mesh: Mesh | Scene,
+    camera: Camera | None = None,
+    size: tuple[int, int] = DEFAULT_SIZE,
+    *,
+    opacity: float = 0.5,
+    layers: int = 8,
+    shading: str = "smooth",
+    background: tuple[int, ...] = WHITE,
+    cull: str = "none",
+    threads: int | None = None,
+    **look: Any,
+) -> npt.NDArray[np.uint8]:
+    """A picture of the mesh or scene as if it were of coloured glass.
+
+    Parameters
+    ----------
+    mesh, camera, size, shading, background, cull, threads, **look
+        As for `render`, one sample a pixel, and as for `shade`.
+    opacity : float, 0 to 1
+        How much each layer hides of what lies behind it.
+    layers : int, 1 to 16
+        How many are looked at; what lies behind them is not seen.
+
+    Returns
+    -------
+    (H, W, 4) uint8
+        sRGB with alpha. The values are composited as they are, front to back; see `composite`.
+
+    Raises
+    ------
+    ValueError
+        If the mesh has no triangles and no camera is given, or an option is out of range.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> mesh = tl.Mesh(*tl.scenes.shape("cube"))
+    >>> tl.render_transparent(mesh, size=(64, 48), opacity=0.5, background=(0, 0, 0, 0))[24, 32].tolist()[3]
+    192
+    """
+    camera = default_camera(mesh, size) if camera is None else camera
+    ground = as_color("background", background, 4)
+    found = visible_layers(mesh, camera, size, layers=layers, cull=cull, threads=threads)
+    pictures = np.zeros((size[1], size[0], layers, 3), np.uint8)
+    for k in range(layers):
+        frags = found.layer(k)
+        if not frags.mask.any():
+            break
+        if isinstance(mesh, Scene):
+            own = shade_scene(frags, mesh, camera, shading=shading, background=CLEAR, **look)
+        else:
+            own = shade(frags, mesh, camera, shading=shading, background=CLEAR, **look)
+        pictures[:, :, k] = own[..., :3]
+    picture: npt.NDArray[np.uint8] = composite(found, pictures, opacity=opacity, background=ground, threads=threads)
+    return picture
+
+
+def visible_layers(
+    mesh: Mesh | Scene, camera: Camera | None = None, size: tuple[int, int] = DEFAULT_SIZE, **options: Any
+) -> DepthLayers:
+    """The nearest layers of every pixel of a mesh or scene; options as for `peel`.
+
+    Parameters
+    ----------
+    mesh, camera, size
+        As for `render`.
+    **options
+        Those of `peel`: `layers`, `cull`, `threads`, `origin`, ...
+
+    Returns
+    -------
+    DepthLayers
+        Of a scene `SceneDepthLayers`, which tells instances apart.
+
+    Raises
+    ------
+    ValueError
+        If the mesh has no triangles and no camera is given, or an option is out of range.
+    """
+    camera = default_camera(mesh, size) if camera is None else camera
+    transform = camera.clip_from_world(options.get("viewport") or size)
+    if isinstance(mesh, Scene):
+        return peel_scene(mesh, transform, size, **{"layers": 4} | options)
+    return peel(mesh.vertices, mesh.triangles, size, transform=transform, **options)
