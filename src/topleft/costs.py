@@ -24,7 +24,7 @@ FEATURES = (
     "hidden", "tiny", "small", "middle", "rows", "long", "64-bit", "128-bit", "point", "span", "pixel", "cold",
 )  # fmt: skip
 
-#: Pixels of a picture that stay in a near cache while it is drawn; of a larger one the others are cold when they are met.
+#: Pixels of a picture that stay in a near cache while it is drawn; those of a larger one are cold when they are met.
 NEAR_PIXELS = 400_000
 
 Census = Sequence[tuple[int, float, float]]

@@ -58,6 +58,23 @@ class Facts:
         return sum(self.census[CLASSES.index(name)][0] for name in names)
 
     @property
+    def draws_planes(self) -> bool:
+        """Whether each sample is a picture of its own."""
+        return self.view.sampling.n_samples > 1 and self.verb in ("rasterize", "fill")
+
+    @property
+    def n_threads(self) -> int:
+        """How many threads draw."""
+        return choices.threads_to_draw(self.view, self.n_triangles)
+
+    @property
+    def is_shared(self) -> bool:
+        """Whether each thread takes a share of the triangles."""
+        if self.view.sampling is Sampling.AREA or self.draws_planes:
+            return False
+        return choices.is_shared(self.view, self.n_triangles, self.n_threads, self.sink)
+
+    @property
     def n_drawn(self) -> int:
         """Triangles and pieces that may cover a sample."""
         return self.count(*CLASSES[4:])

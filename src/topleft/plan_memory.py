@@ -23,24 +23,19 @@ def memory_of(facts: Facts) -> tuple[dict[str, int], dict[str, int]]:
     if facts.index_dtype not in ("int32", "uint32"):
         scratch["triangles"] = 12 * n
     results = result_bytes(facts)
-    n_threads = choices.threads_to_draw(view, n)
     if facts.sink in (Sink.MASK, Sink.SAMPLES) and not is_empty:
         scratch["covered"] = 8 * height * _engine.Target.covered_shape(height, width, n_samples)[1]
     if view.sampling is Sampling.AREA:
-        scratch["cells"] = 4 * height * _engine.area_stride(width)
+        strips = facts.n_threads * _engine.blend_cells(width)
+        scratch["cells"] = 4 * (strips if facts.verb == "fill" else height * _engine.area_stride(width))
     elif facts.verb == "fill" and n_samples == 1 and n:
         scratch["labels"] = 4 * n_pixels
-    elif draws_planes(facts) and not is_empty and n and choices.can_share(view):
+    elif facts.draws_planes and not is_empty and n and choices.can_share(view):
         scratch["bins"] = 12 * (n + 16)
         scratch["bands"] = 4 * (n + 1)
-    if not draws_planes(facts) and choices.is_shared(view, n, n_threads, facts.sink):
-        scratch["others"] = 4 * (n + 16 * n_threads)
+    if facts.is_shared:
+        scratch["others"] = 4 * (n + 16 * facts.n_threads)
     return scratch, results
-
-
-def draws_planes(facts: Facts) -> bool:
-    """Tell whether each sample is a picture of its own."""
-    return facts.view.sampling.n_samples > 1 and facts.verb in ("rasterize", "fill")
 
 
 def result_bytes(facts: Facts) -> dict[str, int]:

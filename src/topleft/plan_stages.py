@@ -194,17 +194,16 @@ def plan_method(facts: Facts, costs: Costs) -> Stage:
     view = facts.view
     n_pixels = view.size[0] * view.size[1]
     group = sink_group(facts.sink, view.sampling)
-    n_threads = choices.threads_to_draw(view, facts.n_triangles)
-    is_shared = choices.is_shared(view, facts.n_triangles, n_threads, facts.sink)
     times = view.sampling.n_samples / 4 if group == "samples" else view.sampling.n_samples
     counts = features(facts.census, n_pixels)
-    ms = times * costs.draw_ms(group, counts, n_threads, is_shared=is_shared) if n_pixels else 0.0
+    ms = times * costs.draw_ms(group, counts, facts.n_threads, is_shared=facts.is_shared) if n_pixels else 0.0
     if view.sampling is Sampling.AREA:
         why = f"the picture is {n_pixels:,} pixels; an edge costs the rows that it passes, an interior nothing"
         choice = f"areas right of {3 * facts.n_drawn:,} edges, summed along rows"
         return Stage("method", choice, why, ("16 samples a pixel: not exact, and slower",), ms, "draw")
     parts = [text.format(facts.count(name)) for name, text in METHOD_NAMES.items() if facts.count(name)]
-    covered = f"about {facts.covered:,.0f} samples in {n_pixels:,} pixels, {facts.covered / max(1, n_pixels):.2g} layers"
+    layers = facts.covered / max(1, n_pixels)
+    covered = f"about {facts.covered:,.0f} samples in {n_pixels:,} pixels, {layers:.2g} layers"
     rejected = ("one method for all: boxes waste tests on large triangles, rows waste setup on small ones",)
     if view.method != METHODS["auto"].code:
         rejected = ("method='auto': another one was asked for; the picture is the same",)
@@ -242,10 +241,10 @@ def plan_depth(facts: Facts, costs: Costs) -> Stage:
         n_pixels = facts.view.size[0] * facts.view.size[1]
         earlier = choices.earlier_wins(facts.test, has_depth=facts.n_components > 2)
         order = "the earlier triangle wins" if earlier else "the later triangle wins"
-        why = f"every vertex lies at depth {facts.flat_depth:g}: {order}, and one pass over {n_pixels:,} pixels writes it"
+        why = f"every vertex lies at depth {facts.flat_depth:g}: {order}; one pass over {n_pixels:,} pixels writes it"
         compared = f"a comparison for each of about {facts.covered:,.0f} samples"
         rejected = (f"{compared}: planes through equal depths are equal to the bit",)
-        ms = costs.other["flat"] * n_pixels / choices.threads_to_draw(facts.view, facts.n_triangles) / 1e6
+        ms = costs.other["flat"] * n_pixels / facts.n_threads / 1e6
         return Stage("depth", "no test, ids alone", why, rejected, ms, "depth")
     rejected = ("float32 slopes: faster, but coplanar triangles would hide each other at random",)
     why = "depths differ" if facts.test else "no test was asked for, but the depth of what shows is returned"
@@ -255,7 +254,7 @@ def plan_depth(facts: Facts, costs: Costs) -> Stage:
 def plan_threads(facts: Facts, costs: Costs) -> Stage:
     """Tell how many threads draw, and what each takes."""
     view, n = facts.view, facts.n_triangles
-    n_threads, usable = choices.threads_to_draw(view, n), available_threads()
+    n_threads, usable = facts.n_threads, available_threads()
     wake = f"waking a thread takes {costs.other['wake'] / 1e3:.0f} us"
     if view.threads is not None:
         why = f"threads={view.threads} was asked for"
@@ -265,7 +264,7 @@ def plan_threads(facts: Facts, costs: Costs) -> Stage:
         why = f"{n:,} triangles are fewer than {MIN_TRIANGLES_PER_THREAD:,} for each of {usable}; {wake}"
     if n_threads == 1:
         return Stage("threads", "1, the caller's own", why, (f"more: {wake}",))
-    if choices.is_shared(view, n, n_threads, facts.sink):
+    if facts.is_shared:
         rejected = (f"bands alone: each of {n_threads} threads would set up all {n:,} triangles",)
         return Stage("threads", f"{n_threads}, each a share of the triangles and its own rows", why, rejected)
     rejected = ("shares of the triangles: threads would have to meet twice",)

@@ -339,7 +339,7 @@ def find_verb(outputs: tuple[str, ...]) -> str:
     unknown = [name for name in outputs if name not in OUTPUTS]
     if unknown or not outputs:
         choices = ", ".join(map(repr, OUTPUTS))
-        raise ValueError(f"outputs must be some of {choices}, got {unknown[0] if unknown else outputs!r}")
+        raise ValueError(f"outputs must be some of {choices}, got {(unknown[0] if unknown else outputs)!r}")
     verbs = list(dict.fromkeys(OUTPUTS[name] for name in outputs))
     if len(verbs) > 1:
         raise ValueError(f"outputs must come from one verb, got {' and '.join(verbs)}: make a plan for each")
