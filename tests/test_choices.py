@@ -55,10 +55,10 @@ def test_flat_depth_left_out_gives_the_same_bits(monkeypatch, depth_test):
         def draw(arrays=(vertices, triangles), options=options):
             return tl.rasterize(*arrays, SIZE, **options)
 
-        chosen, forced = both_ways(monkeypatch, "flat_depth", lambda *_, **__: None, draw)
-        assert (bits_of(chosen) == bits_of(forced)).all()
-        assert (chosen.barycentric() == forced.barycentric()).all()
-        n_flat += chosen.mask.any()
+        never, always = both_ways(monkeypatch, "pays_without_depth", lambda *_: True, draw)
+        assert (bits_of(never) == bits_of(always)).all()
+        assert (never.barycentric() == always.barycentric()).all()
+        n_flat += never.mask.any()
     assert n_flat > 1500
 
 
@@ -185,15 +185,29 @@ def test_more_bits_and_other_methods_give_the_same_bits():
         (np.empty((0, 3)), None),
     ],
 )
-def test_flat_depth_is_that_of_every_vertex(points, depth):
-    assert choices.flat_depth(np.asarray(points), has_depth=True, is_clip_space=False) == depth
+def test_common_depth_is_that_of_every_vertex(points, depth):
+    assert choices.common_depth(np.asarray(points), has_depth=True, is_clip_space=False) == depth
 
 
 def test_clip_space_is_never_flat():
-    assert choices.flat_depth(np.ones((3, 4)), has_depth=True, is_clip_space=True) is None
+    assert choices.common_depth(np.ones((3, 4)), has_depth=True, is_clip_space=True) is None
 
 
 def test_sinks_of_fragments():
     found = [choices.fragment_sink(test, has_depth=True) for test in (None, *choices.DepthTest)]
     assert found == [Sink.PAINT, Sink.NEAREST, Sink.FARTHEST]
     assert choices.fragment_sink(choices.DepthTest.LESS, has_depth=False) is Sink.PAINT
+
+
+def test_depth_is_left_out_where_that_pays():
+    def is_left_out(n, size_px, size):
+        rng = np.random.default_rng(9)
+        corners = np.array([[0, 0], [size_px, 0], [0, size_px]])
+        vertices = (rng.uniform(0, size[0], (n, 1, 2)) + corners).reshape(-1, 2)
+        plan = tl.plan(vertices, np.arange(3 * n).reshape(n, 3), size)
+        return next(one.choice for one in plan.stages if one.name == "depth") == "no test, ids alone"
+
+    assert is_left_out(4000, 20, (512, 512))
+    assert not is_left_out(400, 20, (512, 512))
+    assert not is_left_out(4000, 20, (64, 64))
+    assert is_left_out(2, 2000, (512, 512))

@@ -9,7 +9,7 @@ import numpy as np
 
 cdef extern from "topleft.h" nogil:
     ctypedef struct tl_vertex:
-        pass
+        int32_t x_fx, y_fx
     ctypedef struct tl_wide:
         pass
     ctypedef int tl_scalar
@@ -479,6 +479,21 @@ cdef class Scene:
         w.x_px, w.y_px, w.subpixel_bits = self.x_px, self.y_px + first_row, self.subpixel_bits
         w.width, w.height, w.test = width, n_rows, self.test
         return w
+
+    def guess_layers(self, double n_pixels):
+        """Return about how often triangles cover each of n_pixels: from the areas of up to 128 of them, window or not."""
+        cdef const tl_vertex *v = self.scene.mesh.vertices
+        cdef int64_t n = min(self.scene.n_triangles, 128), i, last = self.scene.mesh.n_vertices - 1
+        cdef const int32_t *t
+        cdef double unit = 2.0 * 4.0**self.subpixel_bits, area, total = 0
+        for i in range(n):
+            t = self.scene.triangles + 3 * (i * self.scene.n_triangles // n)
+            if not (0 <= t[0] <= last and 0 <= t[1] <= last and 0 <= t[2] <= last):
+                return 0.0  # an error that draw finds
+            area = (<double>v[t[1]].x_fx - v[t[0]].x_fx) * (<double>v[t[2]].y_fx - v[t[0]].y_fx)
+            area -= (<double>v[t[1]].y_fx - v[t[0]].y_fx) * (<double>v[t[2]].x_fx - v[t[0]].x_fx)
+            total += min(abs(area) / unit, n_pixels)
+        return total * self.scene.n_triangles / (n * n_pixels) if n else 0.0
 
     def count_classes(self, int sink, int64_t width, int64_t height, const int32_t[:, ::1] samples=None):
         """Count the triangles by the code that draws them into a sink: `tl_census` in ``csrc/topleft.h``.

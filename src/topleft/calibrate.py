@@ -149,7 +149,7 @@ def fit(samples: list[Sample]) -> dict[str, float]:
     """Return costs that are not negative, with the least sum of squared relative errors."""
     counts = np.stack([sample.counts / sample.ns for sample in samples])
     ns = np.zeros(len(FEATURES))
-    kept = counts.any(axis=0)
+    kept: NDArray[np.bool_] = np.asarray(counts.any(axis=0))
     while kept.any():
         ns[:] = 0
         ns[kept] = np.linalg.lstsq(counts[:, kept], np.ones(len(counts)), rcond=None)[0]

@@ -6,23 +6,27 @@ measured on one and two cores of a Zen 4 with AVX-512; `docs/design.md`, section
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from topleft import _engine
 from topleft.methods import METHODS
 from topleft.models import DepthTest, Sink
 from topleft.threads import count_threads
 from topleft.view import View
 
 __all__ = [
+    "Inputs",
     "can_share",
+    "common_depth",
     "earlier_wins",
     "flat_depth",
     "fragment_sink",
     "is_affine",
     "is_shared",
+    "pays_without_depth",
     "threads_to_convert",
     "threads_to_draw",
     "threads_to_snap",
@@ -31,8 +35,22 @@ __all__ = [
 #: Fewer vertices are snapped, and fewer triangles converted, by one thread: waking another takes as long.
 MIN_TO_SHARE_ARRAYS = 200_000
 
+#: Pixels of a picture, and layers of triangles in it, from which on ids are drawn alone when all depths are equal.
+MIN_PIXELS_TO_FLATTEN = 1 << 16
+MIN_LAYERS_TO_FLATTEN = 1.0
+
 #: Triangles times threads. With fewer, threads that each set up every triangle are done before they have met twice.
 MIN_TRIANGLES_TO_SHARE = 1_000_000
+
+
+class Inputs(NamedTuple):
+    """A scene before and after the snap: what choices look at."""
+
+    points: NDArray[Any]
+    records: NDArray[np.uint8]
+    pieces: _engine.Pieces | None
+    is_clip_space: bool
+    is_affine: bool
 
 
 def is_affine(matrix: NDArray[Any] | None) -> bool:
@@ -77,8 +95,8 @@ def fragment_sink(test: DepthTest | None, *, has_depth: bool) -> Sink:
     return Sink.FARTHEST if test is DepthTest.GREATER else Sink.NEAREST
 
 
-def flat_depth(points: NDArray[Any], *, has_depth: bool, is_clip_space: bool) -> float | None:
-    """Return the depth of every vertex if they all have the same, so that no sample needs to compare or to store it.
+def common_depth(points: NDArray[Any], *, has_depth: bool, is_clip_space: bool) -> float | None:
+    """Return the depth of every vertex if they all have the same.
 
     The plane through three equal depths is that depth to the bit. The first, the middle and the last vertex settle it
     for most scenes; the others are looked at only when those agree. Clip space is never looked at: its depth is not
@@ -94,6 +112,22 @@ def flat_depth(points: NDArray[Any], *, has_depth: bool, is_clip_space: bool) ->
         return None
     with np.errstate(over="ignore"):  # what float32 cannot hold has been refused if a triangle uses it
         return float(np.float32(first)) + 0.0  # -0 becomes 0, as it does in every depth buffer
+
+
+def pays_without_depth(scene: _engine.Scene, view: View) -> bool:
+    """Tell whether one pass over all pixels costs less than comparing depths wherever triangles are.
+
+    The pass is as long as half a layer of comparisons; below `MIN_PIXELS_TO_FLATTEN` the call itself is.
+    """
+    n_pixels = view.size[0] * view.size[1]
+    return n_pixels >= MIN_PIXELS_TO_FLATTEN and scene.guess_layers(n_pixels) >= MIN_LAYERS_TO_FLATTEN
+
+
+def flat_depth(scene: _engine.Scene, inputs: Inputs, view: View, *, has_depth: bool) -> float | None:
+    """Return the depth of the whole scene if samples need neither compare nor store it, and leaving that out pays."""
+    if (inputs.is_clip_space and has_depth) or not pays_without_depth(scene, view):
+        return None
+    return common_depth(inputs.points, has_depth=has_depth, is_clip_space=inputs.is_clip_space)
 
 
 def earlier_wins(test: DepthTest | None, *, has_depth: bool) -> bool:

@@ -50,7 +50,8 @@ class Facts:
     n_clipped: int  # vertices outside of a clip plane
     n_cut: int  # triangles that a plane cuts and that are drawn as pieces
     n_pieces: int
-    flat_depth: float | None
+    flat_depth: float | None  # when ids are drawn alone
+    common_depth: float | None  # of all vertices, whatever is made of it
     census: tuple[tuple[int, float, float], ...]  # of each of CLASSES: triangles, samples in boxes, covered
 
     def count(self, *names: str) -> int:
@@ -104,17 +105,21 @@ def find_facts(
     snapped = snap_scene(FreshMemory(), vertices, triangles, view, with_depth=with_depth, out=None)
     check_triangles(triangles, snapped.corners, snapped.n_vertices)
     given, indices = as_array("vertices", vertices), as_array("triangles", triangles)
-    points, records, pieces = snapped.points, snapped.records, snapped.pieces
-    xy = records.view(np.int32).reshape(-1, 4)[:, :2]
+    inputs = snapped.inputs
+    points, pieces = inputs.points, inputs.pieces
+    xy = inputs.records.view(np.int32).reshape(-1, 4)[:, :2]
     is_special = xy[:, 0] == np.iinfo(np.int32).min
     sink = find_sink(verb, view, test, has_depth=snapped.has_depth)
-    is_flat = with_depth and snapped.flat_depth is not None and view.sampling is Sampling.CENTER
-    drawn_sink = Sink.LABEL if is_flat else sink
+    flat = None
+    if with_depth and view.sampling is Sampling.CENTER and 0 not in view.size:
+        flat = choices.flat_depth(snapped.scene, inputs, view, has_depth=snapped.has_depth)
+    common = choices.common_depth(points, has_depth=snapped.has_depth, is_clip_space=inputs.is_clip_space)
+    drawn_sink = sink if flat is None else Sink.LABEL
     samples = sample_positions(view.sampling.n_samples, view.grid_bits) if sink is Sink.SAMPLES else None
     census = [(0, 0.0, 0.0)] * len(CLASSES)
     if 0 not in view.size and snapped.n_triangles:
         _, census = snapped.scene.count_classes(drawn_sink, *view.size, samples)
-    in_pixels = not snapped.is_clip_space and len(points) > 0
+    in_pixels = not inputs.is_clip_space and len(points) > 0
     facts = Facts(
         verb=verb,
         outputs=outputs,
@@ -128,14 +133,15 @@ def find_facts(
         n_vertices=len(points),
         n_components=points.shape[1],
         n_triangles=snapped.n_triangles,
-        is_clip_space=snapped.is_clip_space,
-        is_affine=snapped.is_affine,
+        is_clip_space=inputs.is_clip_space,
+        is_affine=inputs.is_affine,
         are_whole=in_pixels and bool((points[:, :2] == np.rint(points[:, :2])).all()),
         n_wide=int((is_special & (xy[:, 1] == 1)).sum()),
         n_clipped=int((is_special & (xy[:, 1] == 2)).sum()),
         n_cut=len(np.unique(pieces.arrays[5])) if pieces else 0,  # type: ignore[index]
         n_pieces=len(pieces) if pieces else 0,
-        flat_depth=snapped.flat_depth if is_flat else None,
+        flat_depth=flat,
+        common_depth=common,
         census=tuple(census),
     )
     corners = np.array(snapped.corners, np.int32)

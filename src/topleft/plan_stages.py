@@ -248,6 +248,9 @@ def plan_depth(facts: Facts, costs: Costs) -> Stage:
         return Stage("depth", "no test, ids alone", why, rejected, ms, "depth")
     rejected = ("float32 slopes: faster, but coplanar triangles would hide each other at random",)
     why = "depths differ" if facts.test else "no test was asked for, but the depth of what shows is returned"
+    if facts.common_depth is not None:
+        why = f"every vertex lies at depth {facts.common_depth:g}, but this picture is small or mostly empty"
+        rejected = ("ids alone, and one pass over all pixels for depth: pays from one layer and 65,536 pixels on",)
     return Stage("depth", what, why, rejected, timed_in="method")
 
 

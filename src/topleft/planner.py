@@ -295,12 +295,12 @@ def plan(
     Examples
     --------
     >>> import topleft as tl
-    >>> square, halves = [[0, 0], [6, 0], [6, 6], [0, 6]], [[0, 1, 2], [0, 2, 3]]
-    >>> flat = tl.plan(square, halves, (8, 8))
+    >>> square, halves = [[0, 0], [300, 0], [300, 300], [0, 300]], [[0, 1, 2], [0, 2, 3]]
+    >>> flat = tl.plan(square, halves, (300, 300))
     >>> next(stage.choice for stage in flat.stages if stage.name == "depth")
     'no test, ids alone'
-    >>> tl.rasterize(square, halves, (8, 8), plan=flat).triangle[0]
-    array([ 1,  1,  1,  1,  1,  1, -1, -1], dtype=int32)
+    >>> tl.rasterize(square, halves, (300, 300), plan=flat).triangle[1, :4]
+    array([1, 0, 0, 0], dtype=int32)
     """
     wanted = (outputs,) if isinstance(outputs, str) else tuple(outputs)
     verb = find_verb(wanted)

@@ -263,12 +263,13 @@ def draw_fragments(
         canvas_of(memory, "triangle", ids_out, shape, np.int32) as (ids, ids_canvas),
         canvas_of(memory, "depth", depth_out, shape, np.float32) as (depth, depth_canvas),
     ):
-        if snapped.flat_depth is not None:
+        flat_depth = choices.flat_depth(snapped.scene, snapped.inputs, view, has_depth=snapped.has_depth)
+        if flat_depth is not None:
             background = background_depth
             if background is None:
                 background = -np.inf if test is DepthTest.GREATER else np.inf
             earlier_wins = choices.earlier_wins(test, has_depth=snapped.has_depth)
-            flat = snapped.flat_depth, background
+            flat = flat_depth, background
             draw_flat(memory, snapped, view, ids_canvas, depth_canvas, *flat, earlier_wins=earlier_wins)
         else:
             draw(memory, snapped, view, sink, ids_canvas, depth=depth_canvas)

@@ -28,12 +28,7 @@ class Snapped:
     n_vertices: int
     n_triangles: int
     has_depth: bool
-    flat_depth: float | None  # of every vertex, as far as that has been looked at
-    is_clip_space: bool
-    is_affine: bool
-    points: NDArray[Any]
-    records: NDArray[np.uint8]
-    pieces: _engine.Pieces | None
+    inputs: choices.Inputs
 
 
 def snap_scene(
@@ -88,21 +83,8 @@ def snap_scene(
     how = (*view.origin, view.grid_bits, view.cull, view.method, view.test)
     scene = _engine.Scene(source, records, wide, drawn, pieces, *how, engine_view)
     has_depth = source.is_clip_space or points.shape[1] == 3
-    flat = choices.flat_depth(points, has_depth=has_depth, is_clip_space=source.is_clip_space) if with_depth else None
-    return Snapped(
-        scene=scene,
-        triangles=triangles,
-        corners=corners,
-        n_vertices=len(points),
-        n_triangles=n_triangles,
-        has_depth=has_depth,
-        flat_depth=flat,
-        is_clip_space=source.is_clip_space,
-        is_affine=is_affine,
-        points=points,
-        records=records,
-        pieces=pieces,
-    )
+    inputs = choices.Inputs(points, records, pieces, source.is_clip_space, is_affine)
+    return Snapped(scene, triangles, corners, len(points), n_triangles, has_depth, inputs)
 
 
 def refine_scene(
