@@ -200,6 +200,7 @@ def measure_others(n_rounds: int) -> dict[str, float]:
     n = 200_000
     wide: NDArray[np.int64] = np.zeros((n, 3), np.int64)
     narrow: NDArray[np.int32] = np.zeros((n, 3), np.int32)
+    clip, beyond = measure_beyond(n_rounds)
     ids, depth = np.zeros((360, 640), np.int32), np.zeros((360, 640), np.float32)
     vertices, triangles, _ = random_triangles(10, 300, 640, 360)
     picture = Rasterizer((640, 360), threads=1)
@@ -209,11 +210,28 @@ def measure_others(n_rounds: int) -> dict[str, float]:
     fresh = 32 << 20
     return {
         "index": least_ns(lambda: _engine.narrow_triangles(wide, 1, narrow), n_rounds) / n,
+        "clip": clip,
+        "beyond": beyond,
         "paint": max(0.0, painted - counted) / ids.size,
         "flat": least_ns(lambda: _engine.set_flat_depth(ids, depth, 0, 360, True, 0.5, 1.0), n_rounds) / ids.size,
         "wake": least_ns(lambda: [run_parts(lambda first, _: first, 2, 2) for _ in range(20)], n_rounds) / 20,
         "touch": least_ns(lambda: allocate(fresh).fill(0), n_rounds) / fresh,
     }
+
+
+def measure_beyond(n_rounds: int) -> tuple[float, float]:
+    """Return what a triangle outside of a clip plane costs before the draw, beyond its vertices, and in the draw."""
+    n = 30_000
+    vertices = np.random.default_rng(4).uniform(-0.5, 0.5, (3 * n, 4))
+    vertices[:, 3] = 1
+    triangles = np.arange(3 * n, dtype=np.int32).reshape(n, 3)
+    memory, view = KeptMemory(), View.parse((64, 64), {"threads": 1})
+    inside = least_ns(partial(snap_scene, memory, vertices, triangles, view, with_depth=False, out=None), n_rounds)
+    vertices[np.arange(3 * n) % 150 != 0, 2] -= 3  # one triangle of fifty is cut, not dropped
+    outside = least_ns(partial(snap_scene, memory, vertices, triangles, view, with_depth=False, out=None), n_rounds)
+    snapped = snap_scene(memory, vertices, triangles, view, with_depth=False, out=None)
+    drawn = least_ns(drawing(memory, snapped, view, "count", Sink.COUNT), n_rounds)
+    return max(0.0, outside - inside) / n, drawn / n
 
 
 def measure_parallel(n_rounds: int) -> float:
@@ -222,7 +240,7 @@ def measure_parallel(n_rounds: int) -> float:
         return 1.0
     vertices, triangles, _ = random_triangles(60_000, 12)
     pair = [Rasterizer(FRAMES[-1], threads=n) for n in (1, 2)]
-    one, two = (least_ns(partial(picture.rasterize, vertices, triangles), n_rounds) for picture in pair)
+    one, two = (least_ns(partial(picture.rasterize, vertices, triangles), 5 * n_rounds) for picture in pair)
     return min(2.0, max(1.0, one / two))
 
 

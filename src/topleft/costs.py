@@ -45,8 +45,9 @@ class Costs:
     draw : dict of dict
         Per thing of `FEATURES`, by what happens to a covered sample.
     other : dict
-        index: a triangle converted to int32; paint: a pixel of `fill`; flat: a pixel of depth without a test; wake:
-        another thread; touch: a byte of fresh memory.
+        index: a triangle converted to int32; clip, beyond: a triangle outside of a clip plane, before and in the draw;
+        paint: a pixel of `fill`; flat: a pixel of depth without a test; wake: another thread; touch: a byte of fresh
+        memory.
     parallel : float
         How much faster two threads draw than one, 2 at best.
     residual : dict

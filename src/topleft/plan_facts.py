@@ -59,6 +59,11 @@ class Facts:
         return sum(self.census[CLASSES.index(name)][0] for name in names)
 
     @property
+    def n_beyond(self) -> int:
+        """Triangles of which the clip planes leave nothing."""
+        return self.n_triangles - self.n_cut + self.n_pieces - sum(row[0] for row in self.census)
+
+    @property
     def draws_planes(self) -> bool:
         """Whether each sample is a picture of its own."""
         return self.view.sampling.n_samples > 1 and self.verb in ("rasterize", "fill")

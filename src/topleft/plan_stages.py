@@ -108,7 +108,7 @@ def plan_vertices(facts: Facts, costs: Costs) -> Iterator[Stage]:
         yield Stage("clip", "none", why, timed_in="snap")
     else:
         yield plan_transform(facts)
-        yield plan_clip(facts)
+        yield plan_clip(facts, costs)
     bits = view.subpixel_bits
     why = f"{vertices(facts.n_vertices)}, each moved by at most 1/{2 << bits} px; all that follows is integers"
     rejected = ["float32 coordinates: edges that two triangles share would leave gaps"]
@@ -134,20 +134,21 @@ def plan_transform(facts: Facts) -> Stage:
     return Stage("transform", choice, why, (other,), timed_in="snap")
 
 
-def plan_clip(facts: Facts) -> Stage:
+def plan_clip(facts: Facts, costs: Costs) -> Stage:
     """Tell how many triangles are cut."""
     view = facts.view
     planes = [name for name, is_on in (("near", view.near_clip), ("far", view.far_clip)) if is_on]
     names = " and ".join(planes) + (" plane" if len(planes) == 1 else " planes") if planes else "the eye's plane"
     sides = ("the four sides of the picture: sums are exact as far as 2**60 sub-pixels, so nothing is cut there",)
     if not facts.n_clipped:
-        return Stage("clip", "none", f"no vertex lies outside of {names}", sides, timed_in="clip")
+        return Stage("clip", "none", f"no vertex lies outside of {names}", sides, 0.0, "clip")
     return Stage(
         "clip",
         f"{plural(facts.n_cut, 'triangle')} cut into {plural(facts.n_pieces, 'piece')}",
-        f"{vertices(facts.n_clipped)} outside of {names}; triangles wholly outside draw nothing",
+        f"{vertices(facts.n_clipped)} outside of {names}, and {plural(facts.n_beyond, 'triangle')} with them",
         sides,
-        timed_in="clip",
+        costs.other["clip"] * (facts.n_cut + facts.n_beyond) / 1e6,
+        "clip",
     )
 
 
@@ -168,7 +169,9 @@ def plan_cull(facts: Facts) -> Stage:
     names = {"degenerate": "without area", "culled": "turned away", "outside": "outside of the picture",
              "between": "between the samples"}  # fmt: skip
     parts = [f"{facts.count(name):,} {text}" for name, text in names.items() if facts.count(name)]
-    n_hidden = facts.count(*names)
+    if facts.n_beyond:
+        parts.append(f"{facts.n_beyond:,} outside of a clip plane")
+    n_hidden = facts.count(*names) + facts.n_beyond
     n_all = facts.n_triangles - facts.n_cut + facts.n_pieces
     why = f"{n_hidden:,} of {n_all:,} cannot cover a sample: " + ", ".join(parts)
     side = {0: "no side asked for", 1: "back faces", 2: "front faces"}[facts.view.cull]
@@ -202,8 +205,9 @@ def plan_method(facts: Facts, costs: Costs) -> Stage:
         choice = f"areas right of {3 * facts.n_drawn:,} edges, summed along rows"
         return Stage("method", choice, why, ("16 samples a pixel: not exact, and slower",), ms, "draw")
     parts = [text.format(facts.count(name)) for name, text in METHOD_NAMES.items() if facts.count(name)]
+    ms += costs.other["beyond"] * facts.n_beyond * (1 if facts.is_shared else facts.n_threads) / facts.n_threads / 1e6
     layers = facts.covered / max(1, n_pixels)
-    covered = f"about {facts.covered:,.0f} samples in {n_pixels:,} pixels, {layers:.2g} layers"
+    covered = f"about {facts.covered:,.0f} samples are covered, {layers:.2g} times the {n_pixels:,} pixels"
     rejected = ("one method for all: boxes waste tests on large triangles, rows waste setup on small ones",)
     if view.method != METHODS["auto"].code:
         rejected = ("method='auto': another one was asked for; the picture is the same",)
@@ -279,7 +283,7 @@ def plan_memory(facts: Facts, costs: Costs) -> Stage:
     scratch, results = memory_of(facts)
     kept, made = sum(scratch.values()), sum(results.values())
     parts = ", ".join(f"{name} {megabytes(n)}" for name, n in (scratch | results).items() if n)
-    touch = f"fresh memory costs {costs.other['touch'] * (kept + made) / 1e6:.2g} ms more at its first touch"
+    touch = f"{costs.other['touch'] * (kept + made) / 1e6:.2g} ms more for its first touch"
     rejected = (f"fresh memory for each frame: {touch}; a Rasterizer keeps it",)
     choice = f"{megabytes(kept)} of scratch, {megabytes(made)} of results, {megabytes(kept + made)} at most"
     return Stage("memory", choice, parts, rejected)
