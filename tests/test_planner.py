@@ -233,10 +233,13 @@ def test_plan_of_nothing(size, triangles, outputs):
     assert plan.explain().startswith(plan.verb)
 
 
+@pytest.mark.parametrize("sampling", ["center", "msaa4", "area"])
 @pytest.mark.parametrize("outputs", ["coverage", "overdraw", "color", ("triangle", "interpolate")])
-def test_measured_times_stand_beside_estimates(outputs):
+def test_measured_times_stand_beside_estimates(outputs, sampling):
     vertices, triangles, _ = random_triangles(500, 20, *SIZE)
-    plan = tl.plan(vertices, triangles, SIZE, outputs=outputs)
+    if sampling == "area" and "triangle" in outputs:
+        sampling = "msaa2"
+    plan = tl.plan(vertices, triangles, SIZE, outputs=outputs, sampling=sampling)
     assert plan.to_dict()["measured_ms"] is None
     told = plan.measure(2).to_dict()
     measured = {one["name"] for one in told["stages"] if one["measured_ms"] is not None}
@@ -321,3 +324,17 @@ def test_cli_calibrates(capsys, monkeypatch, tmp_path):
     monkeypatch.setattr(calibrate, "calibrate", costs.load_costs)
     assert cli.main(["calibrate"]) == 0
     assert capsys.readouterr().out.startswith(str(tmp_path / "topleft" / "costs.json"))
+
+
+def test_page_has_a_plan_of_each_scene():
+    from benchmarks import planner_page
+
+    text = planner_page.PAGE.read_text(encoding="utf-8")
+    assert text.startswith(planner_page.HEAD)
+    for title, arguments, options in planner_page.scenes():
+        section = text.partition(f"\n## {title}\n")[2].partition("\n## ")[0]
+        found = tl.plan(*arguments, **options)
+        assert found.explain().splitlines()[0] in section
+        words = " ".join(section.split())
+        for name in ("transform", "clip", "snap", "depth"):
+            assert " ".join(stage(found, name).why.split()) in words

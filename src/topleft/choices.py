@@ -1,7 +1,7 @@
 """What is chosen before anything is drawn: a small function for each choice, asked by the pipeline and by the planner.
 
-None of them changes a bit of a picture; `tests/test_planner.py` draws with each forced on and off. The numbers were
-measured on one and two cores of a Zen 4 with AVX-512; `docs/design.md`, section 12, has the scenes.
+None of them changes a bit of a picture; `tests/test_choices.py` draws with each forced on and off. The numbers were
+measured on one and two cores of a Zen 4 with AVX-512; `docs/design.md`, section 20, has the scenes.
 """
 
 from __future__ import annotations
@@ -117,7 +117,7 @@ def common_depth(points: NDArray[Any], *, has_depth: bool, is_clip_space: bool) 
 def pays_without_depth(scene: _engine.Scene, view: View) -> bool:
     """Tell whether one pass over all pixels costs less than comparing depths wherever triangles are.
 
-    The pass is as long as half a layer of comparisons; below `MIN_PIXELS_TO_FLATTEN` the call itself is.
+    The pass is as long as half a layer of comparisons; in small pictures finding out takes longer than both.
     """
     n_pixels = view.size[0] * view.size[1]
     return n_pixels >= MIN_PIXELS_TO_FLATTEN and scene.guess_layers(n_pixels) >= MIN_LAYERS_TO_FLATTEN

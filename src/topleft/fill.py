@@ -137,6 +137,7 @@ def paint_samples(
         palette = _engine.Palette(colors, transfer)
         if draw_means(memory, snapped.scene, snapped.n_triangles, positions, palette, pixels, n_threads):
             check_triangles(snapped.triangles, snapped.corners, snapped.n_vertices)
+        view.mark("draw")
         return
     labels: NDArray[np.int32] = memory.empty("sample labels", (len(positions), height, width), np.int32)
     draw_all_samples(memory, snapped, view, positions, Sink.LABEL, labels, None)
@@ -170,5 +171,6 @@ def blend(
     for scene, picture in zip(scenes, pictures, strict=True):
         if blend_colors(memory, scene, colors, picture, blending, n_threads, is_flat=is_flat):
             check_triangles(snapped.triangles, snapped.corners, snapped.n_vertices)
+    view.mark("draw")
     if view.sampling.n_samples > 1:
         resolve_colors(pictures, pixels, transfer, n_threads)

@@ -143,7 +143,7 @@ def find_facts(
         are_whole=in_pixels and bool((points[:, :2] == np.rint(points[:, :2])).all()),
         n_wide=int((is_special & (xy[:, 1] == 1)).sum()),
         n_clipped=int((is_special & (xy[:, 1] == 2)).sum()),
-        n_cut=len(np.unique(pieces.arrays[5])) if pieces else 0,  # type: ignore[index]
+        n_cut=len(np.unique(pieces.arrays[5][: len(pieces)])) if pieces else 0,  # type: ignore[index]
         n_pieces=len(pieces) if pieces else 0,
         flat_depth=flat,
         common_depth=common,

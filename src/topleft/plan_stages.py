@@ -205,7 +205,7 @@ def plan_method(facts: Facts, costs: Costs) -> Stage:
         choice = f"areas right of {3 * facts.n_drawn:,} edges, summed along rows"
         return Stage("method", choice, why, ("16 samples a pixel: not exact, and slower",), ms, "draw")
     parts = [text.format(facts.count(name)) for name, text in METHOD_NAMES.items() if facts.count(name)]
-    ms += costs.other["beyond"] * facts.n_beyond * (1 if facts.is_shared else facts.n_threads) / facts.n_threads / 1e6
+    ms += costs.other["beyond"] * facts.n_beyond / 1e6  # each thread looks at all of them
     layers = facts.covered / max(1, n_pixels)
     covered = f"about {facts.covered:,.0f} samples are covered, {layers:.2g} times the {n_pixels:,} pixels"
     rejected = ("one method for all: boxes waste tests on large triangles, rows waste setup on small ones",)

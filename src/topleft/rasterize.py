@@ -132,6 +132,7 @@ def draw_area(
         n_threads = count_threads(view.threads, snapped.n_triangles)
         if sum_areas(memory, snapped.scene, canvas, n_threads, is_clamped=is_clamped):
             check_triangles(snapped.triangles, snapped.corners, snapped.n_vertices)
+    view.mark("draw")
     return result
 
 
@@ -230,6 +231,7 @@ def draw_all_samples(
         memory, snapped.scene, snapped.n_triangles, positions, sink, pixels, depth, n_threads, is_near=is_near
     ):
         check_triangles(snapped.triangles, snapped.corners, snapped.n_vertices)
+    view.mark("draw")
 
 
 def draw_fragments(
