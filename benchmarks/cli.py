@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks import accuracy, atlas_page, batch, pages, report
+from benchmarks import accuracy, atlas_page, batch, pages, report, smooth_tables
 from benchmarks import options as accuracy_options
 from benchmarks.cases import CASES, TRIALS
 from benchmarks.contestants import known_peers
@@ -292,7 +292,7 @@ def document_command(arguments: argparse.Namespace) -> int:
     """Replace what stands between the markers of a page."""
     text = arguments.page.read_text(encoding="utf-8")
     record = json.loads(arguments.file.read_text())
-    parts = atlas_page.PARTS if record["kind"] == "atlas" else pages.PARTS
+    parts = {"accuracy": pages.PARTS, "atlas": atlas_page.PARTS}.get(record.get("kind"), smooth_tables.PARTS)
     try:
         write_text(arguments.page, pages.with_parts(text, record, parts))
     except ValueError as error:

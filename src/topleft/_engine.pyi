@@ -151,6 +151,7 @@ class Scene:
         is_flat: bool,
         blend: int,
         is_premultiplied: bool,
+        ground: NDArray[np.uint8] | None,
         packed: NDArray[np.int32] | None,
         cells: NDArray[np.int32] | None,
     ) -> int: ...

@@ -96,7 +96,9 @@ cdef extern from "topleft.h" nogil:
         const void *colors
         int n_channels, is_u8, is_flat
         tl_blend blend
-        int is_premultiplied, is_area
+        int is_premultiplied
+        const uint8_t *ground
+        int is_area
         int32_t *packed
         int32_t *cells
     int64_t tl_blend_cells(int64_t width)
@@ -586,10 +588,10 @@ cdef class Scene:
                                 &pixels[first_row * width * pixel_bytes])
 
     def blend(self, uint8_t[::1] pixels, int64_t width, int64_t first_row, int64_t n_rows, const uint8_t[::1] colors, int n_channels,
-              bint is_u8, bint is_flat, int blend, bint is_premultiplied, int32_t[::1] packed, int32_t[::1] cells):
+              bint is_u8, bint is_flat, int blend, bint is_premultiplied, const uint8_t[::1] ground, int32_t[::1] packed, int32_t[::1] cells):
         """Blend the colours of triangles into rows [first_row, first_row + n_rows) of a picture, one after the other.
 
-        `packed`: room for the picture, for uint8 with other than 4 channels; `cells`: clear, for areas. Returns as `draw` does.
+        `ground`: one colour, which the rows get first, or None. `packed`: room for the picture, for uint8 with other than 4 channels; `cells`: clear, for areas. Returns as `draw` does.
         """
         cdef tl_canvas canvas
         cdef tl_window window = self.window(first_row, n_rows, width)
@@ -600,6 +602,7 @@ cdef class Scene:
         canvas.pixels, canvas.stride_px = &pixels[first_row * width * pixel_bytes], width
         canvas.colors, canvas.n_channels, canvas.is_u8, canvas.is_flat = data(colors), n_channels, is_u8, is_flat
         canvas.blend, canvas.is_premultiplied, canvas.is_area = <tl_blend>blend, is_premultiplied, cells is not None
+        canvas.ground = &ground[0] if ground is not None else NULL
         canvas.packed = &packed[first_row * width] if packed is not None else NULL
         canvas.cells = &cells[0] if cells is not None else NULL
         with nogil:

@@ -261,6 +261,11 @@ def draw_fragments(
     if view.sampling.n_samples > 1:
         return draw_samples(memory, snapped, view, sink, background_depth, ids_out, depth_out)
     shape = view.size[::-1]
+    if not snapped.has_depth and depth_out is None:
+        with canvas_of(memory, "triangle", ids_out, shape, np.int32) as (ids, canvas):
+            draw(memory, snapped, view, Sink.LABEL, canvas)
+        ground = np.inf if background_depth is None else background_depth
+        return Fragments(ids, ground, snapped.scene, snapped.n_vertices, snapped.n_triangles)
     with (
         canvas_of(memory, "triangle", ids_out, shape, np.int32) as (ids, ids_canvas),
         canvas_of(memory, "depth", depth_out, shape, np.float32) as (depth, depth_canvas),
