@@ -24,6 +24,7 @@ from topleft.light import Fog, Light
 from topleft.material import Material
 from topleft.memory import release_memory
 from topleft.mesh import Mesh
+from topleft.planner import Plan, plan
 from topleft.render import rasterize_mesh, render
 from topleft.scene import Instance, Scene
 from topleft.scene_fragments import SceneDepthLayers, SceneFragments
@@ -63,6 +64,7 @@ __all__ = [
     "Mesh",
     "MeshError",
     "OpenCVLens",
+    "Plan",
     "Rasterizer",
     "Scene",
     "SceneDepthLayers",
@@ -82,6 +84,7 @@ __all__ = [
     "load",
     "overdraw",
     "peel",
+    "plan",
     "rasterize",
     "rasterize_mesh",
     "release_memory",

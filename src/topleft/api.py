@@ -57,6 +57,7 @@ def coverage(
         clip_depth : "minus_one_to_one" (OpenGL) or "zero_to_one" (Direct3D, Vulkan).
         near_clip, far_clip : bool. Whether that plane cuts.
         threads : int or None. Never changes a bit.
+        plan : Plan or None. Of `plan`, for the same triangles: saves their conversion and check, and notes the times.
 
     Returns
     -------
@@ -440,6 +441,4 @@ class Rasterizer:
     ) -> NDArray[Any]:
         """Return the edges of the triangles as lines, as `topleft.wireframe` does."""
         checked = self._view(view)
-        return draw_wireframe(
-            self._memory, vertices, triangles, checked, depth, depth_test, depth_bias, antialias, out
-        )
+        return draw_wireframe(self._memory, vertices, triangles, checked, depth, depth_test, depth_bias, antialias, out)

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from topleft import _engine
+from topleft import _engine, choices
 from topleft.arrays import as_background, as_colors
 from topleft.blend import Blending, blend_colors
 from topleft.classic import fill_classic
 from topleft.memory import Memory
 from topleft.models import Per, Sampling, Sink, parse
-from topleft.rasterize import can_share, canvas_of, draw, draw_all_samples
+from topleft.rasterize import canvas_of, draw, draw_all_samples
 from topleft.resolve import parse_resolve, resolve_colors, resolve_flat, resolve_gouraud
 from topleft.sampling import draw_means, sample_positions
 from topleft.snapped import Snapped, check_triangles, snap_scene
@@ -79,6 +79,7 @@ def draw_fill(
             paint_samples(memory, snapped, view, palette, canvas, transfer, is_flat=is_flat)
         else:
             paint(memory, snapped, view, palette, canvas, is_flat=is_flat)
+    view.mark("shade")
     return result
 
 
@@ -156,10 +157,11 @@ def paint_samples(
     width, height = view.size
     positions = sample_positions(view.sampling.n_samples, view.grid_bits)
     n_threads = min(height, count_threads(view.threads, snapped.n_triangles))
-    if is_flat and can_share(view):
+    if is_flat and choices.can_share(view):
         palette = _engine.Palette(colors, transfer)
         if draw_means(memory, snapped.scene, snapped.n_triangles, positions, palette, pixels, n_threads):
             check_triangles(snapped.triangles, snapped.corners, snapped.n_vertices)
+        view.mark("draw")
         return
     labels: NDArray[np.int32] = memory.empty("sample labels", (len(positions), height, width), np.int32)
     draw_all_samples(memory, snapped, view, positions, Sink.LABEL, labels, None)
@@ -197,5 +199,6 @@ def blend(
     for scene, picture in zip(scenes, pictures, strict=True):
         if blend_colors(memory, scene, colors, picture, blending, n_threads, is_flat=is_flat, ground=ground):
             check_triangles(snapped.triangles, snapped.corners, snapped.n_vertices)
+    view.mark("draw")
     if view.sampling.n_samples > 1:
         resolve_colors(pictures, pixels, transfer, n_threads)
