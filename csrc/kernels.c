@@ -28,6 +28,8 @@
 #include "shade_texture.c"
 #include "shade_light.c"
 #include "shade_pixels.c"
+#include "shade_srgb.c"
+#include "shade_grey.c"
 #include "shade.c"
 #include "shade_samples.c"
 #include "shade_cutout.c"

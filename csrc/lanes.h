@@ -22,6 +22,7 @@
  *   v?_lookup(table, i)     table[i & 15] of sixteen numbers
  *   v?_pick(p, i)           p[i] of TL_LANES numbers that lie together
  *   vi_prefix_count(bits)   how many of the bits [0, k] are set
+ *   vi_spill(p, a)          a store of lanes that are then read one by one
  *   vi_load_records(base, scale, i, c), vf_load_pairs    16 bytes at base + scale * i[k], 8 at base + 8 * i[k], as columns
  *   hm_, hf_, hi_, hd_      the few that short rows need, in half vectors of TL_HALF_LANES (0: there are none)
  *   vi_mul_halves, vi_mul_high_halves    lower and upper halves of the products of unsigned 16-bit halves
@@ -54,6 +55,14 @@
 #include "lanes_scalar.h"
 #include "lanes_shade_scalar.h"
 #endif
+
+/* Stores lanes that are then read one by one.  Compilers that see both take them out of the vector, one shuffle each, which is
+ * slower than memory: so they may not see it. */
+TL_INLINE void vi_spill(int32_t *p, vi a)
+{
+    vi_store(p, a);
+    __asm__("" : "+m"(*(int32_t(*)[TL_LANES])p));
+}
 
 /* Where vi_store_quads puts the four numbers of a lane, in units of four. */
 TL_INLINE int vi_quad_slot(int lane) { return TL_LANES == 1 ? 0 : (lane & 3) * (TL_LANES / 4) + (lane >> 2); }

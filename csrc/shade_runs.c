@@ -27,8 +27,7 @@ enum { /* coefficients of runs, float32 */
     RUN_V = RUN_U + 3,
     RUN_COLOR = RUN_V + 3,
     RUN_GRADIENT = RUN_COLOR + 9,    /* per column and per row: of sum(E q), sum(E q u), sum(E q v) */
-    RUN_AREA = RUN_GRADIENT + 6,     /* sum(E): positive where the front is seen */
-    N_RUN_FLOATS = RUN_AREA + 1,
+    N_RUN_FLOATS = RUN_GRADIENT + 6,
 };
 enum { RUN_E1, RUN_E2, RUN_STEP1, RUN_STEP2, RUN_SUM, RUN_MATERIAL, RUN_ID, RUN_SPECIAL, N_RUN_INTS };
 
@@ -44,11 +43,14 @@ typedef struct {
     const tl_shading *shading;
     const tl_view *view;
     int needs_q, needs_normal, needs_uv, needs_colors, needs_point; /* whether anything that is shown depends on it */
+    int is_grey;                       /* the light is that of shade_grey.c: per channel the line and the root of its colour */
+    float grey_line[3], grey_root[3];
     int n_runs, n_special;
     int first_run[TL_SPAN]; /* of each vector: how many runs have begun before it */
     unsigned starts[TL_SPAN], visible[TL_SPAN];
-    int32_t ints[N_RUN_INTS][TL_SPAN_ROOM];
-    float floats[N_RUN_FLOATS][TL_SPAN_ROOM];
+    /* vectors of runs begin with a cache line: one across two takes twice as long */
+    _Alignas(64) int32_t ints[N_RUN_INTS][TL_SPAN_ROOM];
+    _Alignas(64) float floats[N_RUN_FLOATS][TL_SPAN_ROOM];
     special_run special[TL_SPAN];
 } shade_runs;
 
@@ -89,7 +91,7 @@ TL_INLINE void run_corners(const shade_runs *s, int slot, int32_t corners[3][TL_
             c[k + 1] = vi_load(own[k]);
     }
     for (int k = 0; k < 3; k++)
-        vi_store(corners[k], vi_max(vi_min(c[k + 1], last), zero));
+        vi_spill(corners[k], vi_max(vi_min(c[k + 1], last), zero));
 }
 
 TL_INLINE void put(shade_runs *s, int coefficient, int slot, vf a) { vf_store(s->floats[coefficient] + slot, a); }
@@ -104,7 +106,7 @@ TL_INLINE void put_three(shade_runs *s, int first, int slot, const vf *q, vf a0,
 
 /* What TL_LANES runs have in common with their triangles. */
 typedef struct {
-    int32_t corners[3][TL_MAX_LANES];
+    _Alignas(64) int32_t corners[3][TL_MAX_LANES];
     vf q[3], normal[3][3], area, col_step[3], row_step[3];
 } run_setup;
 
@@ -165,7 +167,6 @@ TL_INLINE void set_attributes(shade_runs *s, int slot, const run_setup *r)
 {
     const tl_shading *shading = s->shading;
     const vf *q = r->q;
-    put(s, RUN_AREA, slot, r->area);
     if (shading->face_normals) {
         set_face_normals(s, slot, r->area);
     } else if (s->needs_normal) {

@@ -70,9 +70,9 @@ TL_INLINE vf high_channel(vi texels) { return vf_from_vi(vi_high_half(texels)); 
 TL_INLINE void sample_nearest(const tl_texture *t, vf u, vf v, vf *rgba)
 {
     const vi width = vi_set1(t->width[0]), x = find_nearest(u, width), y = find_nearest(v, vi_set1(t->height[0]));
-    int32_t at[TL_MAX_LANES];
+    _Alignas(64) int32_t at[TL_MAX_LANES];
     vf pair[2];
-    vi_store(at, vi_add(vi_mul(y, vi_add(width, vi_set1(1))), x));
+    vi_spill(at, vi_add(vi_mul(y, vi_add(width, vi_set1(1))), x));
     vf_load_pairs(t->texels, at, pair);
     const vi rg = vi_bits_of_vf(pair[0]), ba = vi_bits_of_vf(pair[1]);
     rgba[0] = low_channel(rg), rgba[1] = high_channel(rg), rgba[2] = low_channel(ba), rgba[3] = high_channel(ba);
@@ -86,10 +86,10 @@ TL_INLINE void sample_level(const tl_texture *t, vi level, vf u, vf v, vf *rgba,
     const vi next = vi_add(y.first, one), stride = vi_add(width, one);
     const vi second = vi_select(vi_gt(height, next), next, t->wrap_v == TL_WRAP_REPEAT ? vi_set1(0) : y.first);
     const vi base = vi_add(vi_lookup(t->offset, level), x.first);
-    int32_t at[2][TL_MAX_LANES];
+    _Alignas(64) int32_t at[2][TL_MAX_LANES];
     vi row[2][4];
-    vi_store(at[0], vi_add(base, vi_mul(y.first, stride)));
-    vi_store(at[1], vi_add(base, vi_mul(second, stride)));
+    vi_spill(at[0], vi_add(base, vi_mul(y.first, stride)));
+    vi_spill(at[1], vi_add(base, vi_mul(second, stride)));
     for (int k = 0; k < 2; k++)
         vi_load_records(t->texels, 8, at[k], row[k]);
     const vf w11 = vf_mul(x.share, y.share), w01 = vf_sub(x.share, w11), w10 = vf_sub(y.share, w11);

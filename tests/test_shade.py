@@ -62,6 +62,13 @@ def test_shade_headlight_is_that_of_the_reference(camera, is_flat):
     check(KNOT, camera, is_flat=is_flat)
 
 
+@pytest.mark.parametrize("intensity", [0.3, 1.0, 8.0, 61.0, 70.0])
+@pytest.mark.parametrize("color", [(0, 3, 250), (255, 1, 90), (12, 20, 40)])
+def test_shade_one_color_in_white_light_is_that_of_the_reference(color, intensity):
+    lights = tl.Light((1, 2, 3), intensity=intensity), tl.Light((-1, 0, 1), intensity=0.5)
+    check(KNOT, CAMERAS["perspective"], tl.Material(color=color), lights=lights, ambient=0.01)
+
+
 @ON_EACH_CAMERA
 @pytest.mark.parametrize("specular", [0.0, 0.6])
 @pytest.mark.parametrize("shininess", [3.0, 80.0])
@@ -154,12 +161,13 @@ def test_shade_normals_that_cancel_leave_that_of_the_face():
     assert smooth[32 - 8, 16].tolist() == [128, 128, 255, 255]  # in the middle between the two
 
 
-def test_encode_gives_the_nearest_value_of_each_step_of_light():
+@pytest.mark.parametrize("back_color", [None, (0, 0, 0)], ids=["grey", "channels"])
+def test_encode_gives_the_nearest_value_of_each_step_of_light(back_color):
     # A triangle a step: unlit, of vertex colours through a matcap would round; so by intensity of a light.
     steps = np.linspace(0, 1, 401)
     quad = tl.Mesh([[-9, -9, 0], [9, -9, 0], [0, 9, 0]], [[0, 1, 2]])
     camera = tl.Camera.look_at((0, 0, 1))
-    white = tl.Material(color=(255, 255, 255))
+    white = tl.Material(color=(255, 255, 255), back_color=back_color)  # two colours: each channel by itself
     frags = tl.rasterize_mesh(quad, camera, (1, 1))
     got = [int(shade(frags, quad, camera, material=white, lights=[], ambient=float(a))[0, 0, 0]) for a in steps]
     table = srgb_tables()[1]

@@ -283,10 +283,10 @@ class Shading:
         self,
         show: int,
         matcap: Texture | None,
-        eye_from: NDArray[np.float64],
+        eye_from: Sequence[Sequence[float]],
         has_perspective: bool,
-        eye: NDArray[np.float64],
-        ray: NDArray[np.float64],
+        eye: Sequence[float],
+        ray: Sequence[Sequence[float]],
         background: Sequence[float],
         background_bytes: Sequence[int],
     ) -> None: ...

@@ -107,7 +107,7 @@ class Look:
         """Take what the picture tells, and its background."""
         frame = self.frame
         engine = None if matcap is None else replace(matcap, filter="bilinear", wrap="clamp").engine
-        eyes = frame.eye_from, frame.has_perspective, frame.eye, frame.ray
+        eyes = frame.eye_from.tolist(), frame.has_perspective, frame.eye.tolist(), frame.ray.tolist()
         self.shading.set_view(show, engine, *eyes, light_of(background), background)
 
     def set_fog(self, fog: Fog | None) -> None:

@@ -157,7 +157,7 @@ def shade(
     look.set_lights(lights, share)
     look.set_view(SHOW_CODES.get(mode, 0), matcap, behind)
     look.set_fog(fog)
-    planes = np.moveaxis(frags.samples_triangle, -1, 0), np.moveaxis(frags.samples_depth, -1, 0)
+    planes = frags.samples_triangle.transpose(2, 0, 1), frags.samples_depth.transpose(2, 0, 1)
     kinds = np.int32, np.float32
     ids, depth = (np.require(array, kind, ["C", "A"]) for array, kind in zip(planes, kinds, strict=True))
 
