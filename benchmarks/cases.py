@@ -25,6 +25,7 @@ TASKS = {
     "smooth": "how much of each pixel is covered, 0 to 255",
     "fill": "flat colours in painter's order",
     "labels": "triangle id in painter's order",
+    "smooth-fill": "flat opaque colours in painter's order on black, anti-aliased",
     "empty": "a call that draws nothing",
     "views": "shaded pictures of a mesh from all sides, into memory",
     "views-png": "shaded pictures of a mesh from all sides, into PNG files",
@@ -123,23 +124,42 @@ def random_scene(task: str, n_triangles: int, size_px: float, size: tuple[int, i
     from topleft import scenes
 
     vertices, triangles, colors = scenes.random_triangles(n_triangles, size_px, *size)
-    if task == "fill":
+    if task in ("fill", "smooth-fill"):
         return Scene(task, size, np.ascontiguousarray(vertices[:, :2]), triangles, colors=colors)
     return Scene(task, size, vertices, triangles)
 
 
-def large_scene(size: tuple[int, int] = UHD) -> Scene:
+def large_scene(task: str = "mask", size: tuple[int, int] = UHD) -> Scene:
     """One triangle over about half of the frame."""
     from topleft import scenes
 
-    return Scene("mask", size, *scenes.large_triangle(*size))
+    colors = None if task == "mask" else np.array([[200, 120, 40]], np.uint8)
+    return Scene(task, size, *scenes.large_triangle(*size), colors=colors)
 
 
-def planar_scene(n_points: int = 100_000, size: tuple[int, int] = FULL_HD) -> Scene:
+def planar_scene(task: str = "labels", n_points: int = 100_000, *, is_white: bool = False) -> Scene:
     """A mesh that tiles the frame."""
     from topleft import scenes
 
-    return Scene("labels", size, *scenes.planar_mesh(n_points, *size))
+    vertices, triangles = scenes.planar_mesh(n_points, *FULL_HD)
+    colors = None
+    if task == "smooth-fill":
+        colors = np.random.default_rng(7).integers(0, 256, (len(triangles), 3), np.uint8)
+        colors = np.full_like(colors, 255) if is_white else colors
+    return Scene(task, FULL_HD, vertices, triangles, colors=colors)
+
+
+def singles_scene(n_across: int = 15, n_down: int = 10, size_px: int = 40, cell_px: int = 64) -> Scene:
+    """White triangles in the cells of a grid, anywhere within a pixel, so that none meets another."""
+    from topleft import scenes
+
+    n = n_across * n_down
+    vertices, triangles, _ = scenes.random_triangles(n, size_px, 0, 0)
+    cell = np.stack([np.arange(n) % n_across, np.arange(n) // n_across], axis=-1)
+    center_px = (cell + 0.5) * cell_px + np.random.default_rng(7).uniform(-0.5, 0.5, (n, 2))
+    corners = np.ascontiguousarray(vertices[:, :2] + np.repeat(center_px, 3, axis=0))
+    size = (n_across * cell_px, n_down * cell_px)
+    return Scene("smooth-fill", size, corners, triangles, colors=np.full((n, 3), 255, np.uint8))
 
 
 def views_scene(task: str, n_triangles: int, n_views: int, size: tuple[int, int]) -> Scene:
@@ -179,13 +199,21 @@ def _register() -> None:
     for n, px in ((1000, 300), (20_000, 40), (200_000, 8)):
         make = lambda n=n, px=px: random_scene("fill", n, px)  # noqa: E731
         add(Case(f"fill-{n}x{px}", "fill", make, aliases=(f"rand{n}_{px}",)))
+    add(Case("fill-4k", "fill", lambda: large_scene("fill"), aliases=("rgba-4k",)))
     add(Case("labels-planar", "labels", planar_scene, aliases=("planar100000",)))
+    for n, px in ((1000, 300), (20_000, 40), (200_000, 8)):
+        add(Case(f"smooth-{n}x{px}", "smooth-fill", lambda n=n, px=px: random_scene("smooth-fill", n, px)))
+    add(Case("smooth-planar", "smooth-fill", lambda: planar_scene("smooth-fill")))
+    add(Case("smooth-4k", "smooth-fill", lambda: large_scene("smooth-fill")))
+    add(Case("smooth-singles", "smooth-fill", singles_scene))
+    add(Case("smooth-seams", "smooth-fill", lambda: planar_scene("smooth-fill", 2000, is_white=True)))
     add(Case("empty", "empty", empty_scene))
     add(Case("tiny", "visibility", lambda: blob_scene(200, size=(64, 48))))
     add(Case("tiny-fill", "fill", lambda: random_scene("fill", 20, 12, (64, 48))))
+    add(Case("tiny-smooth", "smooth-fill", lambda: singles_scene(2, 2, 12, 20)))
 
 
 _register()
 
-TRIALS = ("tiny", "tiny-fill")
+TRIALS = ("tiny", "tiny-fill", "tiny-smooth")
 """Cases that try the machinery out; they run only when named."""

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks import accuracy, atlas_page, batch, pages, report
+from benchmarks import accuracy, atlas_page, batch, pages, pictures_page, report, smooth_tables
 from benchmarks import options as accuracy_options
 from benchmarks.cases import CASES, TRIALS
 from benchmarks.contestants import known_peers
@@ -102,6 +102,12 @@ def parser() -> argparse.ArgumentParser:
     add.set_defaults(action=samplings_command)
     add.add_argument("-o", "--out", type=Path, default=Path("docs/images"), metavar="FOLDER")
 
+    add = commands.add_parser("pictures", help="compare pictures with OpenGL on llvmpipe")
+    add.set_defaults(action=pictures_command)
+    add.add_argument("--scene", nargs="+", metavar="NAME", default=[], help="scenes; all unless given")
+    add.add_argument("--sheets", type=Path, metavar="FOLDER", help="write them side by side with their difference, PNG")
+    add.add_argument("-o", "--out", type=Path, metavar="FILE.json")
+
     add = commands.add_parser("document", help="write the tables of a record into its page")
     add.set_defaults(action=document_command)
     add.add_argument("file", type=Path, metavar="FILE.json")
@@ -186,8 +192,8 @@ def report_command(arguments: argparse.Namespace) -> int:
     if arguments.html:
         return html_command(records, arguments)
     for record in records:
-        tables = {"accuracy": pages, "atlas": atlas_page, "batch": batch}.get(record.get("kind"), report)
-        print(*tables.lines(record), sep="\n")
+        tables = {"accuracy": pages, "atlas": atlas_page, "batch": batch, "pictures": pictures_page}
+        print(*tables.get(record.get("kind"), report).lines(record), sep="\n")
     return 0
 
 
@@ -288,11 +294,27 @@ def samplings_command(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def pictures_command(arguments: argparse.Namespace) -> int:
+    """Draw, compare, write, print."""
+    from benchmarks.pictures import run_pictures
+
+    try:
+        record = run_pictures(sys.stderr, arguments.scene, arguments.sheets)
+    except (ValueError, ImportError, RuntimeError) as error:
+        print(f"benchmarks: {error}", file=sys.stderr)
+        return 2
+    if arguments.out:
+        write_record(arguments.out, record)
+    print(*pictures_page.lines(record), sep="\n")
+    return 0
+
+
 def document_command(arguments: argparse.Namespace) -> int:
     """Replace what stands between the markers of a page."""
     text = arguments.page.read_text(encoding="utf-8")
     record = json.loads(arguments.file.read_text())
-    parts = atlas_page.PARTS if record["kind"] == "atlas" else pages.PARTS
+    of_kind = {"accuracy": pages.PARTS, "atlas": atlas_page.PARTS, "pictures": pictures_page.PARTS}
+    parts = of_kind.get(record.get("kind"), smooth_tables.PARTS)
     try:
         write_text(arguments.page, pages.with_parts(text, record, parts))
     except ValueError as error:
@@ -327,7 +349,7 @@ def write_text(path: Path, text: str) -> None:
 
 def record_text(record: dict[str, Any]) -> str:
     """JSON; rows of figures take a line each."""
-    if record.get("kind") not in ("accuracy", "atlas"):
+    if record.get("kind") not in ("accuracy", "atlas", "pictures"):
         return json.dumps(record, indent=1)
     parts = []
     for key, value in record.items():

@@ -33,11 +33,13 @@ class Contestant:
     case: Case
     isa: str | None = None
     is_beside: bool = False
+    way: str | None = None
+    """Of several to do the task; see `WAYS` of the peer's file."""
 
     @property
     def name(self) -> str:
         """What the table calls it."""
-        words = [self.peer, *([self.isa] if self.isa else [])]
+        words = [self.peer, *filter(None, (self.isa, self.way))]
         words += [f"{self.threads} threads"] if self.threads > 1 else []
         return " ".join(words + ([f"on {self.case.name}"] if self.is_beside else []))
 
@@ -55,7 +57,8 @@ def choose(
     case: Case, beside: Case | None, peers: Sequence[str], isas: Sequence[str], threads: Sequence[int]
 ) -> tuple[list[Contestant], list[dict[str, str]]]:
     """Who takes part in a case, and who does not, with the reason. The first one is what all are compared with."""
-    chosen = [Contestant(OURS, n, case, isa) for n in threads for isa in isas]
+    ways = load_peer(OURS).WAYS.get(case.task, (None,))
+    chosen = [Contestant(OURS, n, case, isa, way=way) for n in threads for isa in isas for way in ways]
     if beside is not None:
         chosen += [Contestant(OURS, n, beside, isa, is_beside=True) for n in threads for isa in isas]
     skipped = []
@@ -104,7 +107,8 @@ class Child:
         child = cls(contestant, process, log)
         # As many CPUs of the list as there are threads; a program with more threads than that is not pinned.
         cpus = list(pin[: contestant.threads]) if len(pin) >= contestant.threads else []
-        order = {"peer": contestant.peer, "threads": contestant.threads, "scene": str(scene), "cpus": cpus}
+        order = {"peer": contestant.peer, "threads": contestant.threads, "scene": str(scene), "cpus": cpus,
+                 "options": {"way": contestant.way} if contestant.way else {}}  # fmt: skip
         try:
             child.facts = child.ask(START_TIMEOUT_S, **order) | {"pinned_to": cpus}
         except BaseException:

@@ -17,8 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.cases import Scene
+from benchmarks.exact_area import draw_area
 
 SUBPIXELS = 256
+AREA_ROUNDING = 1e-9
+"""What sums of areas are off by at most."""
+
 CHUNK = 1 << 20
 """Samples looked at together: about 200 MB of temporaries."""
 
@@ -41,12 +45,14 @@ class Error:
         return {"wrong_px": self.wrong_px, "max_depth_error": self.max_depth_error}
 
 
-def compare(picture: Picture, exact: Picture) -> Error:
-    """Count wrong pixels: ids where there are ids, else colours, else what is covered.
+def compare(picture: Picture, exact: Picture) -> Error | AreaError:
+    """Count wrong pixels: ids where there are ids, else colours, else what is covered; areas: see `area_error`.
 
     With depth and no ids, a pixel whose depth is off by more than `OTHER_SURFACE` is wrong too: another triangle shows.
     The largest difference of depth is over the pixels that both cover; with ids, over those whose ids agree.
     """
+    if "area" in exact:
+        return area_error(picture, exact["area"])
     difference = None
     if "depth" in picture and "depth" in exact:
         both = coverage(picture) & exact["mask"]
@@ -67,6 +73,34 @@ def compare(picture: Picture, exact: Picture) -> Error:
     return Error(int(wrong.sum()), float(difference[both].max(initial=0)))
 
 
+@dataclass(frozen=True)
+class AreaError:
+    """How far a smooth picture of white triangles that do not overlap is from the areas that they cover."""
+
+    wrong_px: int
+    """Pixels that are covered whole and not white: seams."""
+    darkest: float
+    """Of these, 0 to 1."""
+    rms: float | None
+    """Over the partly covered pixels, if there are any."""
+    worst: float | None
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return {"wrong_px": self.wrong_px, "darkest": self.darkest, "rms": self.rms, "worst": self.worst}
+
+
+def area_error(picture: Picture, area: NDArray[np.float64]) -> AreaError:
+    """Compare coverage, as such or as the brightness of the first channel, with exact areas."""
+    drawn = picture["area"].astype(np.float64) if "area" in picture else picture["color"][..., 0] / 255
+    is_whole = area > 1 - AREA_ROUNDING
+    is_part = (area > AREA_ROUNDING) & ~is_whole
+    error = np.abs(drawn - area)[is_part]
+    rms, worst = (float(np.sqrt((error**2).mean())), float(error.max())) if error.size else (None, None)
+    whole = drawn[is_whole]
+    return AreaError(int((whole < 1).sum()), float(whole.min(initial=1)), rms, worst)
+
+
 def coverage(picture: Picture) -> NDArray[np.bool_]:
     """Which pixels a picture covers."""
     if "mask" in picture:
@@ -77,7 +111,10 @@ def coverage(picture: Picture) -> NDArray[np.bool_]:
 
 
 def draw_exact(scene: Scene) -> Picture:
-    """The picture that a contestant should draw."""
+    """The picture that a contestant should draw; nothing where there is no exact one."""
+    if scene.task == "smooth-fill":
+        is_white = scene.colors is not None and (scene.colors == 255).all()
+        return {"area": draw_area(scene.vertices, scene.triangles, scene.size)} if is_white else {}
     width, height = scene.size
     xy_fx, z = snap(scene)
     ids = np.full(width * height, -1, np.int32)

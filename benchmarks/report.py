@@ -84,7 +84,8 @@ def summary_lines(scenes: list[dict[str, Any]]) -> Iterator[str]:
         n_threads = min((run["threads"] for run in own), default=1)
         peers = [run for run in scene["runs"] if run["peer"] != "topleft" and run["threads"] == n_threads]
         for run in (run for run in own if run["threads"] == n_threads):
-            same = [other for other in scene["runs"] if other.get("isa") == run["isa"] and other is not run]
+            same = [other for other in scene["runs"] if other.get("isa") == run["isa"] and other is not run
+                    and other.get("way") == run.get("way")]  # fmt: skip
             threads = [f"{ratio(run, other):.2f} ({other['threads']})" for other in same
                        if other["scene"] == run["scene"]]  # fmt: skip
             beside = [f"{ratio(run, other):.2f}" for other in same
@@ -95,7 +96,7 @@ def summary_lines(scenes: list[dict[str, Any]]) -> Iterator[str]:
             peer = f"{best['name']} ({best['gives']}) {ratio(best, run):.1f}" if best else ""
             median = number(run["median_ms"]) + "!" * is_crowded(run)
             lists = [", ".join(ratios) for ratios in (threads, beside, yardsticks)]
-            rows.append([scene["scene"], run["isa"], median, *lists, peer])
+            rows.append([scene["scene"], run["name"].removeprefix("topleft "), median, *lists, peer])
     head = ["scene", "isa", "ms", "faster with (n) threads", "x scene beside", "x yardsticks", "fastest peer, x ours"]
     yield from table(head, rows)
 

@@ -139,6 +139,8 @@ def check_pictures(
         key = contestant.case.name
         if key not in exact:
             exact[key] = draw_exact(scenes[key])
+        if not exact[key]:
+            continue
         try:
             picture = child.picture(folder / f"picture-{contestant.name.replace(' ', '-')}")
         except SkippedError as reason:
@@ -158,6 +160,7 @@ def summarize(child: Child, first: Child, error: dict[str, Any] | None) -> dict[
         "name": contestant.name,
         "peer": contestant.peer,
         "threads": contestant.threads,
+        "way": contestant.way,
         "scene": contestant.case.name,
         **child.facts,
         **spread(medians),

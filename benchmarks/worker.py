@@ -77,7 +77,7 @@ def make_ready(order: dict[str, Any]) -> tuple[Drawing, dict[str, Any]]:
     __import__(peer.MODULE)
     before = _reset_peak_memory()
     start = perf_counter()
-    drawing = peer.prepare(scene, order["threads"])
+    drawing = peer.prepare(scene, order["threads"], **order["options"])
     setup_ms = (perf_counter() - start) * 1e3
     start = perf_counter()
     for _ in range(WARM_CALLS):

@@ -95,21 +95,50 @@ TL_INLINE void walk_rows(const tl_triangle *t, const tl_window *window, const tl
 /* A box at most this wide is walked sample by sample, a wider one by its row ends. */
 #define TL_EDGE_MAX_WIDTH 6
 
+/* Whether a triangle that is set up is walked by float64 row ends; if not, sample by sample or by exact row ends. */
+TL_INLINE int takes_rows(const tl_triangle *t, const tl_scene *scene, const tl_window *window, tl_sink sink)
+{
+    return scene->method == TL_METHOD_AUTO && rows_fit(t, window, window->test != TL_TEST_SAMPLE) && (!sink_has_depth(sink) || t->has_plane);
+}
+TL_INLINE int takes_edge(const tl_triangle *t, const tl_scene *scene)
+{
+    return scene->method == TL_METHOD_EDGE || (scene->method == TL_METHOD_AUTO && t->col1 - t->col0 <= TL_EDGE_MAX_WIDTH);
+}
+
+/* Counts a triangle as draw_triangle would draw it. */
+TL_INLINE void count_drawn(tl_triangle *t, const tl_scene *scene, const tl_window *window, tl_census *census)
+{
+    t->has_plane = 0;
+    setup_sink(t, window, census->sink);
+    const tl_class narrow = takes_edge(t, scene) ? TL_CLASS_EDGE_64 : TL_CLASS_SPAN_64, wide = takes_edge(t, scene) ? TL_CLASS_EDGE_128 : TL_CLASS_SPAN_128;
+    const tl_class walker = takes_rows(t, scene, window, census->sink) ? TL_CLASS_LONG : t->is_narrow ? narrow : wide;
+    count_one(census, walker, t, window->subpixel_bits);
+}
+
 /* One triangle by itself: any range, any method. */
 TL_INLINE void draw_triangle(const tl_vertex_set *set, const int32_t *corners, int32_t id, const tl_scene *scene,
                              const tl_window *window, const tl_target *target, tl_sink sink)
 {
     tl_triangle t;
     const int sign = load_triangle(set, corners, &t);
-    if (sign == 0 || (sign > 0 && scene->cull == TL_CULL_BACK) || (sign < 0 && scene->cull == TL_CULL_FRONT))
+    if (sign == 0 || (sign > 0 && scene->cull == TL_CULL_BACK) || (sign < 0 && scene->cull == TL_CULL_FRONT)) {
+        if (sink == TL_SINK_CENSUS)
+            target->census->n[sign ? TL_CLASS_CULLED : TL_CLASS_DEGENERATE]++;
         return;
-    if (!clip_box(&t, window))
+    }
+    if (!clip_box(&t, window)) {
+        if (sink == TL_SINK_CENSUS)
+            count_unseen_one(target->census, &t, window);
         return;
+    }
     t.id = id + scene->first_id;
+    if (sink == TL_SINK_CENSUS) {
+        count_drawn(&t, scene, window, target->census);
+        return;
+    }
     setup_sink(&t, window, sink);
-    const int is_auto = scene->method == TL_METHOD_AUTO;
-    const int by_edge = scene->method == TL_METHOD_EDGE || (is_auto && t.col1 - t.col0 <= TL_EDGE_MAX_WIDTH);
-    if (is_auto && rows_fit(&t, window, window->test != TL_TEST_SAMPLE) && (!sink_has_depth(sink) || t.has_plane))
+    const int by_edge = takes_edge(&t, scene);
+    if (takes_rows(&t, scene, window, sink))
         walk_rows(&t, window, target, sink);
     else if (t.is_narrow && by_edge)
         walk_edge_64(&t, window, target, sink);

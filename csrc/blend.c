@@ -202,7 +202,10 @@ static int64_t blend_window(const tl_scene *scene, const tl_window *window, cons
     b->n_samples = b->stride * (window->height - 1) + window->width;
     b->n_channels = canvas->n_channels, b->is_flat = canvas->is_flat, b->mode = mix_of(canvas);
     b->target = (tl_target){.sink = TL_SINK_BLEND, .pixels = b, .stride_px = b->stride, .n_samples = b->n_samples};
-    for (int64_t row = 0; canvas->packed && row < window->height; row++)
+    const int32_t ground = canvas->ground ? packed_color(canvas->ground, canvas->n_channels) : 0;
+    for (int64_t row = 0; canvas->ground && row < window->height; row++)
+        put_solid(b->packed + row * b->stride, window->width, ground);
+    for (int64_t row = 0; canvas->packed && !canvas->ground && row < window->height; row++)
         pack_u8((const uint8_t *)canvas->pixels + row * canvas->stride_px * n_channels, window->width, canvas->n_channels,
                 canvas->packed + row * b->stride);
     int64_t bad_row = -1;
@@ -223,10 +226,17 @@ static int64_t blend_window(const tl_scene *scene, const tl_window *window, cons
     return bad_row;
 }
 
+/* Fewer triangles than these are set up for each band anew, so that a band is still in the cache when it is drawn over: half of a
+ * frame of 33 MB in one triangle takes 1.1 ms instead of 1.7. */
+#define TL_FEW_TRIANGLES 64
+#define TL_BAND_BYTES (1 << 18)
+
 static int64_t blend(const tl_scene *scene, const tl_window *window, const tl_canvas *canvas)
 {
     const int64_t pixel_bytes = canvas->n_channels * (canvas->is_u8 ? 1 : 4);
-    const int64_t rows_at_once = max64(1, (((int64_t)1 << 31) - 1) / canvas->stride_px);
+    const int64_t fitting = max64(1, (((int64_t)1 << 31) - 1) / canvas->stride_px);
+    const int64_t hot = max64(1, TL_BAND_BYTES / (canvas->stride_px * pixel_bytes));
+    const int64_t rows_at_once = canvas->ground && scene->n_triangles < TL_FEW_TRIANGLES ? min64(fitting, hot) : fitting;
     for (int64_t row = 0; row < window->height; row += rows_at_once) {
         tl_window band = *window;
         tl_canvas part = *canvas;

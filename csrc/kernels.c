@@ -17,6 +17,7 @@
 #include "area.c"
 #include "resolve.c"
 #include "paint.c"
+#include "flat.c"
 #include "edges.c"
 #include "line_ends.c"
 #include "smooth_lines.c"
@@ -50,6 +51,8 @@ const tl_kernels TL_KERNELS = {
     .first_bad_row = first_bad_row,
     .narrow_triangles = narrow_triangles,
     .draw = draw,
+    .count_classes = count_classes,
+    .set_flat_depth = set_flat_depth,
     .bin = bin,
     .list_bins = list_bins,
     .draw_area = draw_area,

@@ -19,6 +19,7 @@ TL_INLINE vi vi_mul(vi a, vi b) { return _mm512_mullo_epi32(a, b); }
 TL_INLINE vi vi_min(vi a, vi b) { return _mm512_min_epi32(a, b); }
 TL_INLINE vi vi_max(vi a, vi b) { return _mm512_max_epi32(a, b); }
 TL_INLINE vi vi_or(vi a, vi b) { return _mm512_or_si512(a, b); }
+TL_INLINE vi vi_xor(vi a, vi b) { return _mm512_xor_si512(a, b); }
 TL_INLINE vi vi_and(vi a, vi b) { return _mm512_and_si512(a, b); }
 TL_INLINE vi vi_shift_left(vi a, int n) { return _mm512_sll_epi32(a, _mm_cvtsi32_si128(n)); }
 TL_INLINE vi vi_shift_right(vi a, int n) { return _mm512_sra_epi32(a, _mm_cvtsi32_si128(n)); }

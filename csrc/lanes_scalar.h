@@ -19,6 +19,7 @@ TL_INLINE vi vi_mul(vi a, vi b) { return (vi)((uint32_t)a * (uint32_t)b); }
 TL_INLINE vi vi_min(vi a, vi b) { return a < b ? a : b; }
 TL_INLINE vi vi_max(vi a, vi b) { return a > b ? a : b; }
 TL_INLINE vi vi_or(vi a, vi b) { return a | b; }
+TL_INLINE vi vi_xor(vi a, vi b) { return a ^ b; }
 TL_INLINE vi vi_and(vi a, vi b) { return a & b; }
 TL_INLINE vi vi_shift_left(vi a, int n) { return (vi)((uint32_t)a << n); }
 TL_INLINE vi vi_shift_right(vi a, int n) { return a >> n; }

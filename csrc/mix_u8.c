@@ -155,6 +155,22 @@ TL_INLINE void store_u8(blend_state *b, int64_t at, vm m, vi pixels)
     vi_store_some(b->packed + at, m, pixels, at >= 0 && at + TL_LANES <= b->n_samples);
 }
 
+/* n > 0 pixels of one colour.  A long run is stored in whole vectors: one at its beginning, one at its end, those between at
+ * multiples of their size, for a store across two cache lines takes twice as long. */
+TL_INLINE void put_solid(int32_t *pixels, int64_t n, int32_t color)
+{
+    const vi colors = vi_set1(color);
+    if (n < TL_LANES) {
+        vi_store_some(pixels, vm_first(n), colors, 0);
+        return;
+    }
+    int32_t *const last = pixels + n - TL_LANES;
+    vi_store(pixels, colors);
+    for (int32_t *p = pixels + TL_LANES - ((uintptr_t)pixels >> 2) % TL_LANES; p < last; p += TL_LANES)
+        vi_store(p, colors);
+    vi_store(last, colors);
+}
+
 /* n_rows runs of pixels that the triangle covers whole: n[k * step] of them from first[k * step] on, none where n <= 0. */
 TL_INLINE void mix_runs_u8(blend_state *b, const int32_t *first, const int32_t *n, int step, int n_rows, tl_mix mode)
 {

@@ -130,9 +130,9 @@ TL_INLINE vm inside_lanes_f32(const vf *p, const tl_view *view)
     return inside;
 }
 
-/* `scalar` and `has_matrix` are constants: a copy for each keeps the matrix in registers. */
+/* `scalar`, `has_matrix` and `is_affine` are constants: a copy for each keeps the matrix in registers. */
 TL_INLINE int64_t project_lanes(const tl_source *source, int64_t first, int64_t end, const tl_view *view, tl_vertex *out, tl_wide *wide,
-                                tl_vertex_counts *counts, tl_scalar scalar, int has_matrix)
+                                tl_vertex_counts *counts, tl_scalar scalar, int has_matrix, int is_affine)
 {
     const double unit = (double)(1 << view->subpixel_bits);
     const vd one = vd_set1(1.0), half = vd_set1(0.5), largest = vd_set1(FLT_MAX);
@@ -157,7 +157,10 @@ TL_INLINE int64_t project_lanes(const tl_source *source, int64_t first, int64_t 
             clip_lanes_f64((const double *)source->data + i * stride, has_matrix ? m64 : NULL, stride, p);
             good = inside_lanes(p, view);
         }
-        vd_quotients(p, p[3], ndc, scalar == TL_F32);
+        if (is_affine)
+            ndc[0] = p[0], ndc[1] = p[1], ndc[2] = p[2];
+        else
+            vd_quotients(p, p[3], ndc, scalar == TL_F32);
         const vi x = vi_round(vd_mul(vd_add(ndc[0], one), scale_x)), y = vi_round(vd_mul(vd_sub(one, ndc[1]), scale_y));
         const vd z = view->zero_to_one ? ndc[2] : vd_mul(vd_add(ndc[2], one), half);
         good = vm_and(good, vm_and(is_narrow_lanes(x), is_narrow_lanes(y)));
@@ -175,11 +178,13 @@ static tl_vertex_counts project(const tl_source *source, int64_t first, int64_t 
     tl_vertex_counts counts = {0, 0, 0};
     int64_t i = first;
     if (TL_LANES > 1 && source->scalar == TL_F32)
-        i = source->matrix ? project_lanes(source, first, end, view, out, wide, &counts, TL_F32, 1)
-                           : project_lanes(source, first, end, view, out, wide, &counts, TL_F32, 0);
+        i = source->is_affine ? project_lanes(source, first, end, view, out, wide, &counts, TL_F32, 1, 1)
+            : source->matrix  ? project_lanes(source, first, end, view, out, wide, &counts, TL_F32, 1, 0)
+                              : project_lanes(source, first, end, view, out, wide, &counts, TL_F32, 0, 0);
     else if (TL_LANES > 1)
-        i = source->matrix ? project_lanes(source, first, end, view, out, wide, &counts, TL_F64, 1)
-                           : project_lanes(source, first, end, view, out, wide, &counts, TL_F64, 0);
+        i = source->is_affine ? project_lanes(source, first, end, view, out, wide, &counts, TL_F64, 1, 1)
+            : source->matrix  ? project_lanes(source, first, end, view, out, wide, &counts, TL_F64, 1, 0)
+                              : project_lanes(source, first, end, view, out, wide, &counts, TL_F64, 0, 0);
     for (; i < end; i++)
         project_one(source, i, view, out, wide, &counts);
     return counts;

@@ -4,6 +4,7 @@
 #include "lanes.h"
 
 #include "peel.c"
+#include "census.c"
 #include "alone.c"
 #include "batch.c"
 #include "rows.c"
@@ -29,7 +30,9 @@ TL_INLINE void list_others(tl_share *share, vm m, vi id)
 
 TL_INLINE void draw_one(const tl_scene *scene, int64_t i, const tl_window *window, const tl_target *target, tl_sink sink)
 {
-    if (sink == TL_SINK_SAMPLES)
+    if (sink == TL_SINK_CENSUS)
+        draw_alone(scene, i, window, target, sink);
+    else if (sink == TL_SINK_SAMPLES)
         draw_alone_each_sample(scene, i, window, target);
     else
         TL_SINK_CALL(draw_alone, sink, scene, i, window, target)
@@ -59,6 +62,8 @@ TL_INLINE void draw_batch(batch_state *s, tl_sink sink, const int32_t *corners, 
     alone = vm_and(live, vm_or(alone, vi_eq(x_min, vi_set1(limits->special_x))));
     const vi area = area_lanes(&c), absolute = either_turn ? vi_max(area, vi_sub(zero, area)) : area;
     vm drawn = vm_and_not(vm_and(live, vi_gt(absolute, zero)), alone);
+    if (sink == TL_SINK_CENSUS)
+        count_faceless(s->target->census, vm_and_not(vm_and_not(live, alone), drawn), area);
     if (!vm_any(vm_or(drawn, alone)))
         return;
     const vi col = vi_max(extent_pixels(x_min, limits->round.first, bits), vi_set1(limits->left));
@@ -71,13 +76,17 @@ TL_INLINE void draw_batch(batch_state *s, tl_sink sink, const int32_t *corners, 
         const vm is_beyond = vm_or(vi_gt(row, first), vi_gt(end, vi_set1(limits->bottom)));
         list_others(s->share, vm_or(alone, vm_and(is_seen, is_beyond)), id);
     }
+    if (sink == TL_SINK_CENSUS) {
+        const vi all_cols = vi_sub(extent_pixels(x_max, limits->round.end, bits), extent_pixels(x_min, limits->round.first, bits));
+        count_unseen(s->target->census, vm_and_not(drawn, vi_gt(vi_min(n_cols, n_rows), zero)), vi_min(all_cols, vi_sub(bottom, top)));
+    }
     drawn = vm_and(drawn, vi_gt(vi_min(n_cols, n_rows), zero));
     if (TL_LANES == 1) { /* one lane gains nothing from the rows of rows.c */
         const vm over_small = vm_and(drawn, vi_gt(vi_max(n_cols, n_rows), vi_set1(TL_SMALL_BOX)));
         alone = vm_or(alone, over_small);
         drawn = vm_and_not(drawn, over_small);
     }
-    if (sink_has_depth(sink)) {
+    if (sink_has_depth(sink_of(s->target, sink))) {
         const vi box = vi_shift_right(vi_sub(vi_mul(width, height), vi_set1(1)), TL_SLIVER_BITS);
         const vm sliver = vm_and(drawn, vi_gt(box, vi_sub(absolute, vi_set1(1)))); /* box > area * 2^12, as setup_plane */
         alone = vm_or(alone, sliver);
@@ -97,6 +106,11 @@ TL_INLINE void draw_batch(batch_state *s, tl_sink sink, const int32_t *corners, 
              over = vm_and(drawn, over_small);
     const vm beyond = vm_or(vi_gt(n_cols, vi_set1(TL_LANES)), vi_gt(n_rows, vi_set1(TL_MIDDLE_BOX)));
     const vm middle = vm_and_not(over, beyond), rows = vm_and(over, beyond);
+    if (sink == TL_SINK_CENSUS) {
+        const vm classes[4] = {tiny, small, middle, rows};
+        count_boxes(s->target->census, classes, n_cols, n_rows, absolute, bits);
+        return;
+    }
     if (vm_any(tiny)) {
         lane_triangles t;
         vd z[3];
@@ -144,8 +158,8 @@ TL_INLINE void draw_batches(const tl_scene *scene, const tl_window *window, cons
     s.small.n = s.middle.n = s.rows.n = s.fragments.n = 0;
     memset(s.fragments.sample, 0, sizeof s.fragments.sample); /* what is prefetched behind the end of the list */
     const int bits = window->subpixel_bits, is_back = scene->cull == TL_CULL_BACK;
-    const int is_centre = window->test == TL_TEST_SAMPLE && sink != TL_SINK_SAMPLES;
-    const int32_t reach = sink == TL_SINK_SAMPLES ? sample_reach(target) : 0;
+    const int of_samples = sink_of(target, sink) == TL_SINK_SAMPLES, is_centre = window->test == TL_TEST_SAMPLE && !of_samples;
+    const int32_t reach = of_samples ? sample_reach(target) : 0;
     const extent_rounding round = round_extent(window);
     const int64_t farthest = (int64_t)1 << 30;
     const tl_window *picture = share->others ? share->picture : window;
@@ -181,7 +195,8 @@ TL_INLINE void draw_scene(const tl_scene *scene, const tl_window *window, const 
 {
     const int64_t farthest = (int64_t)1 << 30;
     const int is_near = window->x_px > -farthest && window->x_px < farthest && window->y_px > -farthest && window->y_px < farthest;
-    const int is_centre = window->test == TL_TEST_SAMPLE && sink != TL_SINK_SAMPLES, fits_lanes = is_centre || window->subpixel_bits <= 8;
+    const int is_centre = window->test == TL_TEST_SAMPLE && sink_of(target, sink) != TL_SINK_SAMPLES;
+    const int fits_lanes = is_centre || window->subpixel_bits <= 8;
     if (scene->method == TL_METHOD_AUTO && is_near && fits_lanes) {
         draw_batches(scene, window, target, share, bad_row, sink);
         return;
@@ -195,6 +210,17 @@ TL_INLINE void draw_scene(const tl_scene *scene, const tl_window *window, const 
 
 TL_SINK_COPIES(draw_scene, (const tl_scene *scene, const tl_window *window, const tl_target *target, tl_share *share, int64_t *bad_row),
                scene, window, target, share, bad_row)
+
+/* Counts the triangles of a scene by what draw_scene does with them: in its own code. */
+static int64_t count_classes(const tl_scene *scene, const tl_window *window, const tl_target *target, tl_census *census)
+{
+    tl_target counted = *target;
+    tl_share share = {.end = scene->n_triangles};
+    int64_t bad_row = -1;
+    counted.sink = TL_SINK_CENSUS, counted.census = census;
+    draw_scene(scene, window, &counted, &share, &bad_row, TL_SINK_CENSUS);
+    return bad_row;
+}
 
 /* In vectors: a loop over single numbers took several times as long as the memset of the ids. */
 static void clear_depth(float *depth, int64_t n, float value)

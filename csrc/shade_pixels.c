@@ -184,8 +184,8 @@ TL_INLINE void shade_material(const shaded_lanes *p, const tl_material *m, vf *r
         for (int c = 0; c < 3; c++)
             rgb[c] = vf_mul(rgb[c], texel[c]);
     }
-    if (m->has_back_color) {
-        const vm is_back = vf_lt(p->area, vf_set1(0.0f));
+    if (m->back_side != 0.0f) {
+        const vm is_back = vf_lt(vf_set1(0.0f), vf_mul(p->area, vf_set1(m->back_side)));
         for (int c = 0; c < 3; c++)
             rgb[c] = vf_select(is_back, vf_set1(m->back_color[c]), rgb[c]);
     }

@@ -24,7 +24,7 @@ typedef struct {
 typedef struct {
     float color[4];      /* times the texture and the colours of the vertices; the fourth is opacity, for the cut-out */
     float back_color[3]; /* instead of `color` and all that where the back is seen */
-    int has_back_color;
+    float back_side;     /* sign of the area there: -1, in a mirror 1; 0: the back has no colour of its own */
     float specular[3];
     float shininess; /* Blinn's exponent; 0: no highlight */
     int is_unlit;

@@ -90,7 +90,7 @@ TL_INLINE void put_numbers(const tl_target *target, tl_sink sink, int64_t at, vm
 {
     int32_t *pixels = (int32_t *)target->pixels + at;
     const vi old = vi_load_masked(m, pixels);
-    vi_store_some(pixels, m, sink == TL_SINK_COUNT ? vi_add(old, vi_set1(1)) : vi_max(old, id), at + TL_LANES <= target->n_samples);
+    vi_store_some(pixels, m, sink == TL_SINK_COUNT ? vi_add(old, vi_set1(1)) : vi_max(old, vi_xor(id, vi_set1(target->flip))), at + TL_LANES <= target->n_samples);
 }
 
 struct blend_state;
@@ -112,10 +112,11 @@ TL_INLINE void put_plain(const tl_target *target, tl_sink sink, int64_t at, int6
         return;
     }
     int32_t *pixels = (int32_t *)target->pixels + at;
+    const vi name = vi_set1(id ^ target->flip);
     for (int64_t k = 0; k < n; k += TL_LANES) {
         const vm m = vm_first(n - k);
         const vi old = vi_load_masked(m, pixels + k);
-        vi_store_some(pixels + k, m, sink == TL_SINK_COUNT ? vi_add(old, vi_set1(1)) : vi_max(old, vi_set1(id)), at + k + TL_LANES <= target->n_samples);
+        vi_store_some(pixels + k, m, sink == TL_SINK_COUNT ? vi_add(old, vi_set1(1)) : vi_max(old, name), at + k + TL_LANES <= target->n_samples);
     }
 }
 
@@ -220,6 +221,7 @@ TL_INLINE void flush_fragments(const tl_target *target, tl_sink sink, const frag
     }
     int32_t *const pixels = target->pixels;
     float *const depths = target->depth;
+    const int32_t flip = target->flip;
     for (int k = 0; k < n; k++) {
         const int64_t at = (uint32_t)f->sample[k];
         if (sink_has_depth(sink)) { /* 6 % of a million-triangle mesh; nothing for sinks of one plane */
@@ -234,7 +236,8 @@ TL_INLINE void flush_fragments(const tl_target *target, tl_sink sink, const frag
         } else if (sink == TL_SINK_COUNT) {
             pixels[at]++;
         } else if (sink == TL_SINK_LABEL) {
-            pixels[at] = f->id[k] > pixels[at] ? f->id[k] : pixels[at];
+            const int32_t id = f->id[k] ^ flip;
+            pixels[at] = id > pixels[at] ? id : pixels[at];
         } else if (sink == TL_SINK_PAINT) {
             const int wins = f->id[k] > pixels[at];
             pixels[at] = wins ? f->id[k] : pixels[at];

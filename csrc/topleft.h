@@ -41,6 +41,7 @@ typedef struct {
     int n_components;   /* 2 or 3: pixels (and depth), 3: object space when there is a matrix, 4: clip space */
     int64_t n;
     const void *matrix; /* (4, 4) row-major clip from object, of the same scalar type, or NULL */
+    int is_affine;      /* the last row of the matrix is 0 0 0 1: every w is 1, and dividing by it changes no bit */
 } tl_source;
 
 typedef struct {
@@ -107,7 +108,33 @@ typedef enum {
     TL_SINK_SAMPLES = 6,  /* float: the share of samples that are covered; bits in `covered` until the last pass */
     TL_SINK_BLEND = 7,    /* the colour of the triangle that `blend` draws; not for draw */
     TL_SINK_PEEL = 8,     /* ids and depths of the nearest layers, sorted: `peeled` */
+    TL_SINK_CENSUS = 16,  /* nothing is drawn: triangles are counted by how they would be; not for draw */
 } tl_sink;
+
+/* Which code draws a triangle, or why none does.  A triangle that a clip plane cuts is counted by its pieces. */
+typedef enum {
+    TL_CLASS_DEGENERATE = 0, /* no area after the snap */
+    TL_CLASS_CULLED = 1,
+    TL_CLASS_OUTSIDE = 2, /* of the window */
+    TL_CLASS_BETWEEN = 3, /* its extent holds no sample */
+    TL_CLASS_TINY = 4,    /* a vector of triangles at a time in 32 bits: boxes up to 2x2 */
+    TL_CLASS_SMALL = 5,   /* up to 4x4 */
+    TL_CLASS_MIDDLE = 6,  /* up to 16 rows of a vector's width */
+    TL_CLASS_ROWS = 7,    /* a vector of rows of one triangle at a time */
+    TL_CLASS_LONG = 8,    /* by itself from here on: row ends in float64 */
+    TL_CLASS_EDGE_64 = 9, /* sample by sample in 64 bits */
+    TL_CLASS_SPAN_64 = 10,
+    TL_CLASS_EDGE_128 = 11,
+    TL_CLASS_SPAN_128 = 12,
+    TL_N_CLASSES = 13,
+} tl_class;
+
+typedef struct {
+    tl_sink sink;                 /* for which triangles are counted */
+    int64_t n[TL_N_CLASSES];      /* triangles, or pieces */
+    double boxes[TL_N_CLASSES];   /* samples in the boxes that they can cover of the window */
+    double covered[TL_N_CLASSES]; /* about how many of them are covered: the lesser of area and box, added up */
+} tl_census;
 
 /* The layers of pixels: of every covered sample of a pixel the n_layers that come first by depth, then id.  Planes, the first one
  * first; id -1 and the depth that every other comes before where there are fewer. */
@@ -130,8 +157,12 @@ typedef struct {
     int sample_bits;           /* SAMPLES: 2^sample_bits samples a pixel, 1 to 4; stride_px is the width of the window */
     const int32_t *samples_fx; /* (2^sample_bits, 2): x, y of each from the pixel's centre */
     int sample;                /* the one that is being drawn; draw knows */
+    int32_t flip;              /* LABEL: what ids are xored with, 0, or TL_FLIP: the earlier triangle wins */
+    tl_census *census;         /* CENSUS */
     const tl_peeled *peeled;   /* PEEL; the window has less than 2^31 pixels */
 } tl_target;
+
+#define TL_FLIP INT32_MAX
 
 /* A bit a sample, and a word behind the end. */
 static inline int64_t tl_covered_words(int64_t n_samples) { return n_samples / 64 + 2; }
@@ -206,6 +237,7 @@ typedef struct {
     int n_channels, is_u8, is_flat;
     tl_blend blend;
     int is_premultiplied; /* colours hold alpha already; otherwise the last of 2 or 4 channels is alpha */
+    const uint8_t *ground; /* uint8: the colour that all pixels get first, or NULL: they stay as they are */
     int is_area;          /* the share of the pixel that the triangle covers counts, not its centre */
     int32_t *packed;      /* uint8 with other than 4 channels: room for the window, a row after the other */
     int32_t *cells;       /* is_area: tl_blend_cells(width), all TL_CELL_CLEAR, and left so */
@@ -299,6 +331,14 @@ typedef struct tl_kernels {
      * one; what was drawn is then worthless.  The window's pixels are cleared first: 0, id -1, and the depth that every
      * other beats.  A share of a part needs method AUTO, a picture of less than 2^31 samples within 2^30 pixels of 0. */
     int64_t (*draw)(const tl_scene *scene, const tl_window *window, const tl_target *target, tl_share *share);
+
+    /* Counts the triangles of a scene by the code that `draw` has for them, with the sink of the census; the target's samples are read
+     * when that is SAMPLES.  Returns as `draw` does. */
+    int64_t (*count_classes)(const tl_scene *scene, const tl_window *window, const tl_target *target, tl_census *census);
+
+    /* The depth of n pixels whose triangles all lie at one: `depth` where there is an id, `background` elsewhere.  The ids are xored
+     * with `flip` first. */
+    void (*set_flat_depth)(int32_t *ids, int64_t n, int32_t flip, float depth, float background, float *out);
 
     /* Lists the triangles that are in the window or within reach_fx of it, with their bands of 2^band_bits rows; they may be a few
      * too many.  Returns as `draw` does; the window as for a share of a part. */

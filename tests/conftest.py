@@ -1,6 +1,7 @@
-"""One fixed hypothesis profile, and the count of pixels compared with the exact reference."""
+"""One fixed hypothesis profile, the command line as a fixture, the count of pixels compared with the reference."""
 
 import comparing
+import pytest
 from hypothesis import HealthCheck, settings
 
 settings.register_profile(
@@ -11,3 +12,24 @@ settings.load_profile("fixed")
 
 def pytest_terminal_summary(terminalreporter):
     terminalreporter.write_line(f"{comparing.n_pixels_compared:,} pixels compared with the exact reference")
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def run(folder, capsys):
+    """Run the command line: its exit status and the lines of stderr."""
+    import topleft.cli
+
+    def run_cli(*arguments):
+        try:
+            status = topleft.cli.main([str(argument) for argument in arguments])
+        except SystemExit as leaving:
+            status = leaving.code
+        return status, capsys.readouterr().err.splitlines()
+
+    return run_cli

@@ -70,7 +70,7 @@ def cases(make, *arguments):
 def sharing(is_shared):
     """Threads share the triangles of any scene, or set up all of them in each."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sys.modules["topleft.rasterize"], "MIN_TRIANGLES_TO_SHARE", 0 if is_shared else 2**62)
+        patch.setattr(sys.modules["topleft.choices"], "MIN_TRIANGLES_TO_SHARE", 0 if is_shared else 2**62)
         yield
 
 

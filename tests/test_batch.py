@@ -1,76 +1,28 @@
-"""Many pictures: the same ones whoever draws them, in bounded memory, whole files only, and errors with their jobs."""
+"""Many pictures: the same ones whoever draws them, in bounded memory, and errors with their jobs."""
 
 from __future__ import annotations
 
 import itertools
-import os
 import pickle
 import sys
-import tempfile
 import threading
-import time
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from multiprocessing import get_context
-from pathlib import Path
 
 import numpy as np
 import pytest
-from PIL import Image
+from batch_jobs import BOX, CORNERS, EXECUTORS, FACES, SIZE, orbit, pictures, views
 
 import topleft as tl
-from topleft import crews, files, jobs, scenes
-from topleft.errors import ImageError, MissingPackageError
+from topleft import jobs
+from topleft.errors import MissingPackageError
 from topleft.jobs import Studio
-
-SIZE = (40, 30)
-CORNERS, FACES = scenes.shape("cube")
-BOX = tl.Mesh(CORNERS @ [[1, 0.3, 0], [0, 2, 0.5], [0.2, 0.7, 3]] + CORNERS.prod(1, keepdims=True), FACES)
-EXECUTORS = [None, 1, 3]
-
-
-def orbit(mesh, n):
-    return [tl.Camera.framing(mesh, azimuth_deg=360 * i / n, aspect=4 / 3) for i in range(n)]
-
-
-def views(n, mesh=BOX, **options):
-    return [tl.Job(mesh, camera, SIZE, options) for camera in orbit(mesh, n)]
-
-
-def pictures(n, mesh=BOX, **options):
-    return [tl.render(mesh, camera, SIZE, **options) for camera in orbit(mesh, n)]
 
 
 @pytest.fixture(scope="module")
 def processes():
     with ProcessPoolExecutor(2, get_context("spawn")) as pool:
         yield pool
-
-
-class CountedMesh(tl.Mesh):
-    """A mesh that counts how often it is pickled, and on which process it is read."""
-
-    n_pickled = 0
-
-    def __reduce__(self):
-        type(self).n_pickled += 1
-        return read_counted, (self.vertices, self.triangles)
-
-
-def read_counted(vertices, triangles):
-    mesh = CountedMesh(vertices, triangles)
-    object.__setattr__(mesh, "token", os.urandom(8))
-    return mesh
-
-
-class ColorOfReader:
-    """A camera maker that leaves a mark of the object that it was called with in a file."""
-
-    def __init__(self, folder):
-        self.folder = str(folder)
-
-    def __call__(self, mesh, size):
-        Path(self.folder, f"{os.getpid()}-{mesh.token.hex()}").touch()
-        return tl.Camera.framing(mesh, aspect=size[0] / size[1])
 
 
 def fail(mesh, size):
@@ -175,12 +127,12 @@ def test_batch_as_completed_does_not_wait_for_the_slow():
 
 
 def test_batch_layers_are_copies_by_name():
-    listed = [tl.Job(BOX, camera, SIZE, layers=("id", "color")) for camera in orbit(BOX, 3)]
+    listed = [tl.Job(BOX, camera, SIZE, layers=("triangle", "color")) for camera in orbit(BOX, 3)]
     results = list(tl.render_batch(listed))
     for result, camera, color in zip(results, orbit(BOX, 3), pictures(3), strict=True):
-        assert list(result.picture) == ["id", "color"]
+        assert list(result.picture) == ["triangle", "color"]
         assert np.array_equal(result.picture["color"], color)
-        assert np.array_equal(result.picture["id"], tl.rasterize_mesh(BOX, camera, SIZE).triangle)
+        assert np.array_equal(result.picture["triangle"], tl.rasterize_mesh(BOX, camera, SIZE).triangle)
 
 
 def test_batch_camera_may_be_made_of_mesh_and_size():
@@ -239,63 +191,6 @@ def test_batch_pictures_stay_when_the_next_are_drawn():
     kept = list(tl.render_batch(views(4), executor=None))
     assert not np.array_equal(kept[0].picture, kept[1].picture)
     assert np.array_equal(kept[0].picture, pictures(4)[0])
-
-
-# Meshes
-
-
-def test_batch_pickles_a_shared_mesh_once_and_each_process_reads_it_once(processes, tmp_path):
-    CountedMesh.n_pickled = 0
-    mesh = CountedMesh(CORNERS, FACES)
-    object.__setattr__(mesh, "token", b"")
-    listed = [tl.Job(mesh, ColorOfReader(tmp_path), SIZE) for _ in range(30)]
-    assert tl.render_batch(listed, executor=processes).finish().n_made == 30
-    assert CountedMesh.n_pickled == 1
-    pids = [path.name.partition("-")[0] for path in tmp_path.iterdir()]
-    assert len(pids) == len(set(pids)) <= 2
-
-
-def test_batch_spools_many_meshes_in_bounded_room(processes, monkeypatch):
-    most = []
-    release = crews.Spool.release
-
-    def count(self, scene):
-        most.append(len(list(Path(self._folder).iterdir())))
-        release(self, scene)
-
-    monkeypatch.setattr(crews.Spool, "release", count)
-    listed = (tl.Job(tl.Mesh(BOX.vertices + i, BOX.triangles), None, SIZE) for i in range(40))
-    results = list(tl.render_batch(listed, executor=processes, window=3))
-    assert all(np.array_equal(result.picture, results[0].picture) for result in results[:2])
-    assert max(most) <= crews.N_SPOOLED + 3
-    assert len(most) == 40
-
-
-def test_batch_leaves_no_spool(processes, tmp_path, monkeypatch):
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    with tl.render_batch(views(9), executor=processes) as results:
-        next(results)
-        assert len(list(tmp_path.iterdir())) == 1
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize("executor", EXECUTORS)
-def test_batch_reads_a_file_once(executor, tmp_path, monkeypatch):
-    read = []
-    monkeypatch.setattr(jobs, "load", lambda path: read.append(path) or BOX)
-    listed = [tl.Job(str(tmp_path / name), None, SIZE) for name in "aaabbb"]
-    results = list(tl.render_batch(listed, executor=executor))
-    assert sorted(read) == [str(tmp_path / "a"), str(tmp_path / "b")]
-    assert np.array_equal(results[5].picture, tl.render(BOX, None, SIZE))
-
-
-def test_batch_tries_a_broken_file_once(tmp_path, monkeypatch):
-    read = []
-    monkeypatch.setattr(jobs, "load", lambda path: read.append(path) or files.load(path))
-    listed = [tl.Job(str(tmp_path / "gone.obj"), None, SIZE)] * 3
-    summary = tl.render_batch(listed, executor=2, on_error="collect").finish()
-    assert [str(result.error) for result in summary.failed] == [f"there is no file {str(tmp_path / 'gone.obj')!r}"] * 3
-    assert len(read) == 1
 
 
 # Errors
@@ -377,80 +272,7 @@ def test_batch_of_no_jobs_is_refused(item, executor):
         list(tl.render_batch([(BOX,), item], executor=executor))
 
 
-# Files
-
-
-@pytest.mark.parametrize("executor", EXECUTORS)
-def test_batch_writes_files_and_makes_folders(executor, tmp_path):
-    listed = [tl.Job(BOX, camera, SIZE, {}, tmp_path / f"a/b/{i}.png") for i, camera in enumerate(orbit(BOX, 4))]
-    results = list(tl.render_batch(listed, executor=executor))
-    assert [result.picture for result in results] == [None] * 4
-    for i, expected in enumerate(pictures(4)):
-        assert np.array_equal(np.asarray(Image.open(tmp_path / f"a/b/{i}.png")), expected)
-    assert sorted(path.name for path in (tmp_path / "a/b").iterdir()) == ["0.png", "1.png", "2.png", "3.png"]
-
-
-def test_batch_writes_a_file_for_each_layer(tmp_path):
-    job = tl.Job(BOX, None, SIZE, {}, tmp_path / "{layer}.png", ("color", "id"))
-    assert tl.render_batch([job]).finish().n_made == 1
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["color.png", "id.png"]
-
-
-def test_batch_resume_leaves_out_what_is_there(tmp_path):
-    listed = [tl.Job(BOX, None, SIZE, {}, tmp_path / f"{i}-{{layer}}.png", ("color", "id")) for i in range(5)]
-    tl.render_batch(listed[:3]).finish()
-    (tmp_path / "1-id.png").unlink()
-    (tmp_path / "0-id.png").write_text("kept")
-    for executor in EXECUTORS:
-        results = list(tl.render_batch(listed, executor=executor, resume=True, chunk=2))
-        assert [result.index for result in results] == [0, 1, 2, 3, 4]
-        expected = [True, False, True, False, False] if executor is None else [True] * 5
-        assert [result.is_skipped for result in results] == expected
-    assert (tmp_path / "0-id.png").read_text() == "kept"
-    assert tl.render_batch(listed, resume=True).finish().n_skipped == 5
-
-
-def test_batch_resume_draws_what_goes_to_no_file():
-    (result,) = tl.render_batch([tl.Job(BOX, None, SIZE)], resume=True)
-    assert not result.is_skipped
-
-
-@pytest.mark.parametrize(
-    ("destination", "layers", "message"),
-    [
-        ("a.gif", (), "format '.gif' is none of"),
-        ("a.png", ("color", "id"), r"2 layers need {layer} in the name, or \.npz, got '.*a.png'"),
-        ("a.png", ("colour",), "layers must be some of color, alpha, depth, id, normals, got 'colour'"),
-    ],
-)
-@pytest.mark.parametrize("resume", [False, True])
-def test_batch_impossible_destination_is_an_error_of_the_job(tmp_path, destination, layers, message, resume):
-    job = tl.Job(BOX, None, SIZE, {}, tmp_path / destination, layers)
-    with pytest.raises((ImageError, ValueError), match=message):
-        tl.render_batch([job], resume=resume).finish()
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize("executor", [None, 2])
-def test_batch_interrupted_leaves_whole_files_and_goes_on_with_resume(executor, tmp_path):
-    def listed(interrupt_at):
-        for i, camera in enumerate(orbit(BOX, 30)):
-            if i == interrupt_at:
-                raise KeyboardInterrupt
-            yield tl.Job(BOX, camera, SIZE, {}, tmp_path / f"{i:02}.png")
-
-    with pytest.raises(KeyboardInterrupt):
-        tl.render_batch(listed(20), executor=executor).finish()
-    left = sorted(path.name for path in tmp_path.iterdir())
-    assert 0 < len(left) <= 20
-    for name in left:  # whole, and nothing else
-        assert np.asarray(Image.open(tmp_path / name)).shape == (30, 40, 4)
-    summary = tl.render_batch(listed(None), executor=executor, resume=True).finish()
-    assert (summary.n_made, summary.n_skipped) == (30 - len(left), len(left))
-    assert len(list(tmp_path.iterdir())) == 30
-
-
-# Progress, forks
+# Progress
 
 
 def test_batch_progress_is_called_for_each_job():
@@ -469,51 +291,3 @@ def test_batch_progress_bar_without_tqdm_says_how_to_get_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "tqdm", None)
     with pytest.raises(MissingPackageError, match=r"progress=True needs tqdm: pip install 'topleft\[render\]'"):
         tl.render_batch([], progress=True)
-
-
-def run_in_fork(work):
-    """Exit status of a forked child that calls `work`, within half a minute."""
-    pid = os.fork()
-    if pid == 0:
-        try:
-            work()
-        except BaseException:
-            os._exit(1)
-        os._exit(0)
-    until = time.monotonic() + 30
-    while time.monotonic() < until:
-        done, status = os.waitpid(pid, os.WNOHANG)
-        if done:
-            return os.waitstatus_to_exitcode(status)
-        time.sleep(0.01)
-    os.kill(pid, 9)
-    os.waitpid(pid, 0)
-    raise AssertionError("the forked child hangs")
-
-
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
-@pytest.mark.filterwarnings("ignore::DeprecationWarning")  # of fork beside threads, which is what is tested
-@pytest.mark.parametrize("order", ["jobs", "completed"])
-def test_batch_begun_before_a_fork_goes_on_in_parent_and_child(order):
-    expected = pictures(20)
-    results = tl.render_batch(views(20), executor=2, order=order)
-    first = [next(results) for _ in range(5)]
-
-    def rest():
-        found = first + list(results)
-        assert sorted(result.index for result in found) == list(range(20))
-        assert all(np.array_equal(result.picture, expected[result.index]) for result in found)
-
-    assert run_in_fork(rest) == 0
-    rest()
-
-
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
-@pytest.mark.filterwarnings("ignore::DeprecationWarning")
-def test_batch_begins_in_a_forked_child():
-    tl.render_batch(views(5), executor=2).finish()
-
-    def begin():
-        assert tl.render_batch(views(5), executor=2).finish().n_made == 5
-
-    assert run_in_fork(begin) == 0

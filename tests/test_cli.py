@@ -20,26 +20,6 @@ SMALL = ["--size", "64x48"]
 QUADS = "g a\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\ng b\nv 0 0 1\nf 1 2 5\n"
 
 
-@pytest.fixture
-def folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
-@pytest.fixture
-def run(folder, capsys):
-    """Run the command line: its exit status and the lines of stderr."""
-
-    def run_cli(*arguments):
-        try:
-            status = cli.main([str(argument) for argument in arguments])
-        except SystemExit as leaving:
-            status = leaving.code
-        return status, capsys.readouterr().err.splitlines()
-
-    return run_cli
-
-
 def names(folder):
     return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
 
@@ -104,8 +84,8 @@ def test_render_npy_holds_the_numbers_behind_the_picture(run, shading, shape, dt
 def test_render_npz_holds_all_buffers_and_the_matrix(run):
     assert run("render", "cube", "-o", "cube.npz", *SMALL)[0] == 0
     with np.load("cube.npz") as arrays:
-        assert sorted(arrays) == ["clip_from_world", "color", "depth", "id"]
-        assert np.array_equal(arrays["id"] >= 0, np.isfinite(arrays["depth"]))
+        assert sorted(arrays) == ["clip_from_world", "color", "depth", "triangle"]
+        assert np.array_equal(arrays["triangle"] >= 0, np.isfinite(arrays["depth"]))
         camera = Camera.framing(Mesh(*scenes.shape("cube")), aspect=64 / 48)
         assert np.array_equal(arrays["clip_from_world"], camera.clip_from_world((64, 48)))
 

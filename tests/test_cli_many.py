@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from topleft import cli, scenes
+from topleft import scenes
 from topleft.camera import Camera
 from topleft.cli import animation
 from topleft.cli.plan import Orbit, outermost
@@ -24,26 +24,6 @@ from topleft.render import rasterize_mesh, render
 
 SMALL = ["--size", "64x48"]
 KNOT = Mesh(*scenes.shape("torus-knot"))
-
-
-@pytest.fixture
-def folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
-@pytest.fixture
-def run(folder, capsys):
-    """Run the command line: its exit status and the lines of stderr."""
-
-    def run_cli(*arguments):
-        try:
-            status = cli.main([str(argument) for argument in arguments])
-        except SystemExit as leaving:
-            status = leaving.code
-        return status, capsys.readouterr().err.splitlines()
-
-    return run_cli
 
 
 @pytest.fixture
@@ -87,11 +67,11 @@ def pixels(path):
     [
         ("p/", "color,depth", 1, ["p/cube-color.png", "p/cube-depth.png"]),
         ("p/", "depth", 1, ["p/cube.png"]),
-        ("a.png", "color,id", 1, ["a-color.png", "a-id.png"]),
-        ("a.png", "color,id", 2, ["a-000-color.png", "a-000-id.png", "a-001-color.png", "a-001-id.png"]),
+        ("a.png", "color,triangle", 1, ["a-color.png", "a-triangle.png"]),
+        ("a.png", "color,alpha", 2, ["a-000-alpha.png", "a-000-color.png", "a-001-alpha.png", "a-001-color.png"]),
         ("{layer}/{name}.tiff", "alpha,depth", 1, ["alpha/cube.tiff", "depth/cube.tiff"]),
-        ("a.npz", "color,id", 1, ["a.npz"]),
-        ("a.npy", "normals", 1, ["a.npy"]),
+        ("a.npz", "color,triangle", 1, ["a.npz"]),
+        ("a.npy", "camera_normal", 1, ["a.npy"]),
     ],
 )
 def test_render_layers_names_follow_out(run, folder, out, layers, views, expected):
@@ -100,10 +80,10 @@ def test_render_layers_names_follow_out(run, folder, out, layers, views, expecte
 
 
 def test_render_layers_are_those_of_the_mesh(run):
-    assert run("render", "torus-knot", "-o", "p/", "--layers", "color,depth,id", *SMALL) == (0, [])
+    assert run("render", "torus-knot", "-o", "p/", "--layers", "color,depth,triangle", *SMALL) == (0, [])
     frags = rasterize_mesh(KNOT, None, (64, 48))
     assert np.array_equal(pixels("p/torus-knot-color.png"), render(KNOT, None, (64, 48)))
-    assert np.array_equal(pixels("p/torus-knot-id.png").astype(int) - 1, frags.triangle)
+    assert np.array_equal(pixels("p/torus-knot-triangle.png").astype(int) - 1, frags.triangle)
     assert np.array_equal(pixels("p/torus-knot-depth.png") > 0, frags.mask)
 
 
@@ -175,14 +155,14 @@ out = "b/"
 views = 1
 azimuth = -30.5
 wireframe = true
-layers = ["color", "id"]
+layers = ["color", "triangle"]
 """
 
 
 def test_job_file_is_what_it_says(run, folder):
     (folder / "jobs.toml").write_text(TOML)
     assert run("render", "--jobs-file", "jobs.toml") == (0, [])
-    b = [f"b/{name}-{layer}.png" for name in ("cube", "torus") for layer in ("color", "id")]
+    b = [f"b/{name}-{layer}.png" for name in ("cube", "torus") for layer in ("color", "triangle")]
     assert names(folder) == ["a/000.png", "a/001.png", "a/002.png", *b, "jobs.toml"]
     cube = Mesh(*scenes.shape("cube"))
     camera = Camera.framing(cube, azimuth_deg=-30.5, aspect=64 / 48)
@@ -267,7 +247,7 @@ def test_sheet_shows_each_picture_in_its_place(run, folder):
 
 
 def test_sheet_of_several_meshes_has_a_row_for_each(run, folder):
-    arguments = ["cube", "torus", "--sheet", "s.png", "--views", 3, "-o", "p/", "--layers", "color,id", *SMALL]
+    arguments = ["cube", "torus", "--sheet", "s.png", "--views", 3, "-o", "p/", "--layers", "color,triangle", *SMALL]
     assert run("render", *arguments) == (0, [])
     assert len(names(folder)) == 13
     assert pixels("s.png").shape == (8 + 2 * (48 + 24), 8 + 3 * (64 + 8), 3)
@@ -365,9 +345,10 @@ def test_video_without_ffmpeg_gives_the_hint_before_any_work(run, folder, monkey
         (["torus", "--animation", "a.gif"], "topleft: several meshes need {name} in --animation, got 'a.gif'"),
         (["--sheet", "a.gif"], "topleft: --sheet must end in one of .png .jpg .jpeg .webp .tif .tiff, got 'a.gif'"),
         (["--sheet", "a.png", "-o", "a.npz"], "topleft: --sheet and --animation need pictures: OUT must end in one of"),
-        (["--sheet", "a.png", "-o", "p/", "--layers", "id"], "topleft: --sheet and --animation show the layer color"),
+        (["--sheet", "a.png", "-o", "p/", "--layers", "uv"], "topleft: --sheet and --animation show the layer color"),
         (["--sheet", "p/cube.png", "-o", "p/"], "topleft: 'cube' and 'p/cube.png' would both be written to"),
-        (["-o", "p/", "--layers", "uv"], "topleft: argument --layers: layers must be some of color, alpha,"),
+        (["-o", "p/", "--layers", "id"], "topleft: argument --layers: layers must be some of color, alpha,"),
+        (["-o", "p/", "--layers", "flow"], "topleft: argument --layers: layer 'flow' needs two cameras"),
         (["-o", "p/", "--fps", "0"], "topleft: argument --fps: must be a number from 0.1 to 100, got '0'"),
         (["-o", "p/", "--jobs", "0"], "topleft: argument --jobs: must be a positive whole number, got '0'"),
     ],

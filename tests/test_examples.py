@@ -34,8 +34,8 @@ def test_example_makes_the_picture_of_the_page(name, tmp_path):
     assert (difference.max(axis=-1) > 3).mean() < 0.01
 
 
-def test_examples_are_eight_and_all_on_the_page():
-    assert len(EXAMPLES) == 8
+def test_examples_are_nine_and_all_on_the_page():
+    assert len(EXAMPLES) == 9
     assert sorted(re.findall(r"images/example-(\w+)\.png", PAGE)) == EXAMPLES
     assert sorted(re.findall(r"\(../examples/(\w+)\.py\)", PAGE)) == EXAMPLES
 

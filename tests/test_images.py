@@ -125,7 +125,7 @@ def test_save_image_over_a_folder_is_refused(tmp_path):
         ("a", PICTURE, "format '' is none of"),
         ("a.png", PICTURE.astype(float), r"cannot write '.*a.png': .png holds uint8 .*; got float64 \(4, 5, 4\)"),
         ("a.jpg", PICTURE[..., :2], r".jpg holds uint8 \(H, W\), .*; got uint8 \(4, 5, 2\)"),
-        ("a.tif", PICTURE[0, 0].astype(np.float32), r"holds .*, float32 \(H, W\); got float32 \(4,\)"),
+        ("a.tif", PICTURE[0, 0].astype(np.float32), r"holds .*, float32 \(H, W, K\); got float32 \(4,\)"),
         ("a.png", PICTURE[:0], r"a picture of shape \(0, 5, 4\) has no pixels"),
         ("a.png", {"x": PICTURE}, "several arrays by name need .npz"),
     ],

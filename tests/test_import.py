@@ -5,6 +5,8 @@ import sys
 
 import pytest
 
+import topleft as tl
+
 LATE = ["PIL", "trimesh", "tqdm", "isal", "scipy", "matplotlib", "concurrent.futures", "multiprocessing"]
 LATE += ["argparse", "logging", "shutil", "tempfile", "traceback", "tomllib", "json"]
 
@@ -16,3 +18,18 @@ def test_import_leaves_for_later(name):
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     before, after = done.stdout.split()
     assert before == "True" or after == "False"
+
+
+@pytest.mark.parametrize("module", ["batch", "jobs", "view_layers", "transparent"])
+def test_import_leaves_what_is_big_and_seldom_used_for_later(module):
+    code = f"import sys, topleft; print('topleft.{module}' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"
+
+
+def test_every_public_name_is_there():
+    for name in tl.__all__:
+        assert getattr(tl, name) is not None
+        assert name in dir(tl)
+    with pytest.raises(AttributeError, match="module 'topleft' has no attribute 'nothing'"):
+        tl.nothing  # noqa: B018

@@ -5,45 +5,14 @@ import doctest
 import numpy as np
 import pytest
 from comparing import assert_same
-from PIL import Image
+from layer_views import CAMERAS, CUBE, FLOAT32, ON_EACH_CAMERA, SIZE, SNAP_PX, SPHERE, look, pixels, scene
 
 import topleft as tl
 from topleft import view_layers
 from topleft.camera import Camera
-from topleft.errors import ImageError
+from topleft.layers import LAYERS
 from topleft.sight import Sight
-from topleft.view_layers import LAYERS, ViewLayers, render_layers
-
-SIZE = (80, 60)
-SNAP_PX = 2.0**-9  # half a sub-pixel
-FLOAT32 = 2.0**-23  # the rounding of a result, and some of the weights
-SPHERE = tl.Mesh(*tl.scenes.shape("sphere"))
-CUBE = tl.Mesh(*tl.scenes.shape("cube"))
-CAMERAS = {
-    "perspective": Camera.look_at((3, 2, 4), near=0.5, far=50),
-    "orthographic": Camera.look_at((3, 2, 4), ortho_height=5, near=0.5, far=50),
-    "off-centre": Camera.from_intrinsics(
-        [[70, 3, 30], [0, 80, 20], [0, 0, 1]],
-        np.diag([1.0, -1, -1, 1]) @ Camera.look_at((3, 2, 4)).view,
-        SIZE, near=0.5, far=50,
-    ),
-}  # fmt: skip
-ON_EACH_CAMERA = pytest.mark.parametrize("camera", CAMERAS.values(), ids=CAMERAS)
-
-
-def scene():
-    """A stretched and a turned instance, and a float32 one."""
-    stretched, aside = np.diag([1.5, 0.6, 1, 1]), np.eye(4)
-    aside[:3, :3] = np.linalg.qr(np.random.default_rng(1).standard_normal((3, 3)))[0]
-    aside[:3, 3] = -1.2, 0.4, 0.9
-    back = np.eye(4)
-    back[:3, 3] = 0.5, -0.5, -2
-    single = tl.Mesh(SPHERE.vertices.astype(np.float32), SPHERE.triangles)
-    return tl.Scene([(SPHERE, stretched), (CUBE, aside), (single, back)])
-
-
-def look(camera, *layers, subject=None, **options):
-    return render_layers(scene() if subject is None else subject, camera, SIZE, layers=layers, **options)
+from topleft.view_layers import render_layers
 
 
 def corners_world(subject, found):
@@ -70,11 +39,6 @@ def plane_distance_along_view(camera, corners, x_px, y_px):
     along = np.einsum("ij,ij->i", normal, corners[:, 0] - ends[0]) / np.einsum("ij,ij->i", normal, ends[1] - ends[0])
     point = ends[0] + along[:, None] * (ends[1] - ends[0])
     return -(point @ camera.view[:3, :3].T + camera.view[:3, 3])[:, 2]
-
-
-def pixels(mask):
-    rows, cols = np.nonzero(mask)
-    return cols + 0.5, rows + 0.5
 
 
 def screen(camera, points):
@@ -246,9 +210,8 @@ def test_uv_and_attributes_are_interpolated():
 
 def test_only_what_is_asked_for_is_computed():
     sight = Sight(CUBE, CAMERAS["perspective"], SIZE)
-    LAYERS["color"](sight)
     assert "frags" not in vars(sight)
-    for name in ("alpha", "silhouette", "depth", "triangle", "instance", "barycentric"):
+    for name in ("color", "alpha", "silhouette", "depth", "triangle", "instance", "barycentric"):
         LAYERS[name](sight)
     assert "surfaces" not in vars(sight)
     for name in ("camera_normal", "world_normal"):
@@ -269,82 +232,6 @@ def test_layers_are_a_mapping_with_a_short_repr():
     found = render_layers(CUBE, size=(4, 3), layers="alpha")
     assert (len(found), list(found), repr(found)) == (1, ["alpha"], "ViewLayers(alpha (3, 4) uint8)")
     assert list(render_layers(CUBE, size=(4, 3))) == ["color", "depth"]
-
-
-# ---- files ----------------------------------------------------------------------------------------------------------
-
-
-def test_save_npz_holds_all_layers(tmp_path):
-    found = look(CAMERAS["perspective"], "color", "depth", "instance")
-    found.save(tmp_path / "a.npz")
-    with np.load(tmp_path / "a.npz") as file:
-        assert set(file) == set(found)
-        for name in found:
-            assert_same(file[name], found[name])
-    found.save(tmp_path / "b.npz", "depth")
-    with np.load(tmp_path / "b.npz") as file:
-        assert list(file) == ["depth"]
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.npz", "b.npz"]
-
-
-def test_save_png_distance_is_in_millimetres(tmp_path):
-    found = look(CAMERAS["perspective"], "distance")
-    found.save(tmp_path / "a.png")
-    expected = np.rint(np.where(np.isfinite(found["distance"]), found["distance"], 0).astype(float) * 1000)
-    got = np.asarray(Image.open(tmp_path / "a.png"))
-    assert got.dtype.itemsize >= 2
-    assert (got == expected).all()
-    assert got.max() > 1000
-    found.save(tmp_path / "a.png", scale=5000)
-    assert abs(int(np.asarray(Image.open(tmp_path / "a.png")).max()) - 5 * int(got.max())) <= 3
-
-
-def test_save_png_ids_are_one_more_and_masks_eight_bits(tmp_path):
-    found = look(CAMERAS["perspective"], "triangle", "silhouette", "color", "depth")
-    for name in found:
-        found.save(tmp_path / f"{name}.png", name)
-    assert (np.asarray(Image.open(tmp_path / "triangle.png")) == found["triangle"] + 1).all()
-    assert (np.asarray(Image.open(tmp_path / "silhouette.png")) == found["silhouette"] * 255).all()
-    assert_same(np.asarray(Image.open(tmp_path / "color.png")), found["color"])
-    depth = np.where(found["silhouette"], found["depth"], 0).astype(float)
-    assert (np.asarray(Image.open(tmp_path / "depth.png")) == np.rint(depth * 65535)).all()
-
-
-def test_save_tiff_keeps_every_bit(tmp_path):
-    found = look(CAMERAS["perspective"], "distance", "world_position", "triangle", "color")
-    for name in found:
-        found.save(tmp_path / f"{name}.tif", name)
-    assert_same(np.asarray(Image.open(tmp_path / "distance.tif")), found["distance"])
-    assert_same(np.asarray(Image.open(tmp_path / "triangle.tif")), found["triangle"])
-    assert_same(np.asarray(Image.open(tmp_path / "color.tif")), found["color"])
-    with Image.open(tmp_path / "world_position.tif") as file:
-        for k in range(3):
-            file.seek(k)
-            assert np.array_equal(np.asarray(file), found["world_position"][..., k], equal_nan=True)
-
-
-def test_save_failure_leaves_the_old_file(tmp_path):
-    path = tmp_path / "a.png"
-    path.write_bytes(b"old")
-    with pytest.raises(ValueError, match="distance must lie in 0 to 65535 steps for a PNG, got 0 to 7e"):
-        ViewLayers({"distance": np.array([[0, 70000.0]], np.float32)}).save(path)
-    assert path.read_bytes() == b"old"
-    assert len(list(tmp_path.iterdir())) == 1
-
-
-def test_save_what_a_file_cannot_hold_is_refused(tmp_path):
-    found = look(CAMERAS["perspective"], "world_normal", "depth")
-    with pytest.raises(ImageError, match=r"format '\.exr' is none of \.npz \.png \.tif \.tiff"):
-        found.save(tmp_path / "a.exr")
-    with pytest.raises(ValueError, match=r"a \.png file holds one layer: say which one of world_normal, depth"):
-        found.save(tmp_path / "a.png")
-    with pytest.raises(ValueError, match="layer must be one of world_normal, depth, got 'uv'"):
-        found.save(tmp_path / "a.png", "uv")
-    with pytest.raises(ImageError, match=r"PNG holds 16 bits of \(H, W\) alone, 'world_normal' has \(60, 80, 3\)"):
-        found.save(tmp_path / "a.png", "world_normal")
-    with pytest.raises(ImageError, match="layer 'depth' of shape"):
-        render_layers(CUBE, size=(0, 3), layers="depth").save(tmp_path / "a.png")
-    assert not list(tmp_path.iterdir())
 
 
 # ---- errors ---------------------------------------------------------------------------------------------------------
@@ -384,7 +271,7 @@ def test_bad_transforms_are_refused(transforms, message):
 
 
 def test_unknown_option_is_refused():
-    with pytest.raises(TypeError, match="colour"):
+    with pytest.raises(TypeError, match="there is no option 'colour' of a picture"):
         render_layers(CUBE, colour=1)
     with pytest.raises(TypeError, match="option 'shading' is for layer 'color', which is not among depth"):
         render_layers(CUBE, layers="depth", shading="flat", sampling="center")

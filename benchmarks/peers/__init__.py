@@ -34,7 +34,7 @@ PEERS = {
     "skia": "skia-python: drawVertices and drawPath",
     "cairo": "pycairo: fill",
     "skimage": "scikit-image: draw.polygon",
-    "agg": "Anti-Grain Geometry, by matplotlib: draw_path",
+    "agg": "Anti-Grain Geometry, by matplotlib: draw_path, PolyCollection",
     "aggdraw": "Anti-Grain Geometry, by aggdraw: polygon",
     "blend2d": "Blend2D, by blend2d-py: fill_path",
 }

@@ -11,25 +11,30 @@ from benchmarks.cases import Scene
 from benchmarks.peers import Drawing
 
 MODULE = DISTRIBUTION = "aggdraw"
-TASKS = ("smooth",)
+TASKS = ("smooth", "smooth-fill")
 
 
 def prepare(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
     """A new canvas for each picture: an old one cannot be cleared without drawing."""
     import aggdraw
 
+    width, height = scene.size
     polygons = scene.vertices[:, :2][scene.triangles].reshape(-1, 6).tolist()
-    brush = aggdraw.Brush(255)
+    if scene.task == "smooth":
+        mode, name, brushes = "L", "smooth", [aggdraw.Brush(255)] * len(polygons)
+    else:
+        mode, name, brushes = "RGB", "color", [aggdraw.Brush(tuple(color)) for color in scene.colors.tolist()]
     found: list[aggdraw.Draw] = []
 
     def draw() -> None:
-        canvas = aggdraw.Draw("L", scene.size, 0)
-        for polygon in polygons:
+        canvas = aggdraw.Draw(mode, scene.size, 0)
+        for polygon, brush in zip(polygons, brushes, strict=True):
             canvas.polygon(polygon, None, brush)
         found[:] = [canvas]
 
     def picture() -> dict[str, np.ndarray]:
-        width, height = scene.size
-        return {"smooth": np.frombuffer(found[0].tobytes(), np.uint8).reshape(height, width)}
+        pixels = np.frombuffer(found[0].tobytes(), np.uint8)
+        return {name: pixels.reshape(height, width, -1) if name == "color" else pixels.reshape(height, width)}
 
-    return Drawing(draw, picture, "coverage", "coordinates to lists")
+    gives, untimed = ("coverage", "") if name == "smooth" else ("RGB image", "brushes, ")
+    return Drawing(draw, picture, gives, untimed + "coordinates to lists")

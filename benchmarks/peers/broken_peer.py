@@ -15,5 +15,9 @@ TASKS = tuple(ALL_TASKS)
 def prepare(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
     """Nothing, everywhere."""
     width, height = scene.size
-    picture = {"triangle": np.full((height, width), -1, np.int32), "smooth": np.zeros((height, width), np.uint8)}
+    picture = {
+        "triangle": np.full((height, width), -1, np.int32),
+        "smooth": np.zeros((height, width), np.uint8),
+        "color": np.zeros((height, width, 3), np.uint8),
+    }
     return Drawing(lambda: None, lambda: picture, "nothing")

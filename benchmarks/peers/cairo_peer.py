@@ -1,4 +1,4 @@
-"""pycairo: a path and a fill a triangle, without antialiasing, or at its best."""
+"""pycairo: a path and a fill a triangle, without antialiasing, or with it for smooth pictures."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from benchmarks.cases import Scene
 from benchmarks.peers import Drawing
 
 MODULE, DISTRIBUTION = "cairo", "pycairo"
-TASKS = ("mask", "fill", "labels", "smooth")
+TASKS = ("mask", "fill", "labels", "smooth", "smooth-fill")
 
 
 def prepare(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
@@ -20,7 +20,7 @@ def prepare(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
     is_mask = scene.task in ("mask", "smooth")
     if is_mask:
         rgb = np.ones((len(polygons), 3))
-    elif scene.task == "fill":
+    elif scene.task in ("fill", "smooth-fill"):
         rgb = scene.colors / 255
     else:
         rgb = (np.arange(len(polygons))[:, None] + 1 >> np.array([16, 8, 0]) & 255) / 255
@@ -28,7 +28,8 @@ def prepare(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
     layout = cairo.FORMAT_A8 if is_mask else cairo.FORMAT_RGB24
     canvas = np.zeros((height, cairo.ImageSurface.format_stride_for_width(layout, width)), np.uint8)
     context = cairo.Context(cairo.ImageSurface.create_for_data(canvas, layout, width, height))
-    context.set_antialias(cairo.ANTIALIAS_BEST if scene.task == "smooth" else cairo.ANTIALIAS_NONE)
+    quality = {"smooth": cairo.ANTIALIAS_BEST, "smooth-fill": cairo.ANTIALIAS_DEFAULT}
+    context.set_antialias(quality.get(scene.task, cairo.ANTIALIAS_NONE))
 
     def draw() -> None:
         canvas.fill(0)
@@ -49,6 +50,5 @@ def prepare(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
             return {"triangle": color.astype(np.int32) - 1}
         return {"color": np.stack([color >> 16, color >> 8 & 255, color & 255], axis=-1).astype(np.uint8)}
 
-    if scene.task == "smooth":
-        return Drawing(draw, picture, "coverage, ANTIALIAS_BEST", "lists")
-    return Drawing(draw, picture, "mask" if is_mask else "RGB" if scene.task == "fill" else "RGB labels", "lists")
+    gives = {"mask": "mask", "smooth": "coverage, ANTIALIAS_BEST", "labels": "RGB labels"}
+    return Drawing(draw, picture, gives.get(scene.task, "RGB"), "lists")

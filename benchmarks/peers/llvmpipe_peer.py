@@ -12,7 +12,7 @@ from benchmarks.cases import Scene
 from benchmarks.peers import Drawing
 
 MODULE = DISTRIBUTION = "moderngl"
-TASKS = ("visibility", "depth-2d", "mask", "fill", "labels", "smooth", "views", "views-png")
+TASKS = ("visibility", "depth-2d", "mask", "fill", "labels", "smooth", "smooth-fill", "views", "views-png")
 THREADS = True
 SAMPLES = 4
 """Of a pixel, for smooth pictures: all that llvmpipe has."""
@@ -77,13 +77,16 @@ def prepare(scene: Scene, threads: int) -> Drawing:
     if "llvmpipe" not in context.info["GL_RENDERER"]:
         raise RuntimeError(f"OpenGL runs on {context.info['GL_RENDERER']}, not on llvmpipe")
     width, height = scene.size
-    position = np.zeros((len(scene.vertices), 3), np.float32)
-    position[:, : scene.vertices.shape[1]] = scene.vertices
-    indices = np.ascontiguousarray(scene.triangles, np.int32)
+    vertices, triangles = scene.vertices, scene.triangles
+    if scene.task == "smooth-fill":  # corners of its own for every triangle: a colour per vertex is one per triangle
+        vertices, triangles = vertices[triangles].reshape(-1, 2), np.arange(3 * len(triangles)).reshape(-1, 3)
+    position = np.zeros((len(vertices), 3), np.float32)
+    position[:, : vertices.shape[1]] = vertices
+    indices = np.ascontiguousarray(triangles, np.int32)
     with_depth = scene.task in ("visibility", "depth-2d")
     source, shader = VERTEX_SHADER, ID_SHADER
     buffers = [(context.buffer(position.tobytes()), "3f", "position")]
-    if scene.task == "fill":  # every triangle has corners of its own here, so a colour per vertex is one per triangle
+    if scene.task in ("fill", "smooth-fill"):
         source, shader = VERTEX_SHADER.replace("#version 330", "#version 330\n#define COLORED"), COLOR_SHADER
         colors = np.zeros((len(position), 4), np.uint8)
         colors[indices, :3] = scene.colors[:, None]
@@ -94,12 +97,13 @@ def prepare(scene: Scene, threads: int) -> Drawing:
     program["clip_from_input"].write(clip_from_input(scene).T.astype("f4").tobytes())
     mesh = context.vertex_array(program, buffers, context.buffer(indices.tobytes()))
 
-    n_channels, dtype = {"fill": (4, "f1"), "mask": (1, "f1"), "smooth": (1, "f1")}.get(scene.task, (1, "i4"))
+    channels = {"fill": (4, "f1"), "smooth-fill": (4, "f1"), "mask": (1, "f1"), "smooth": (1, "f1")}
+    n_channels, dtype = channels.get(scene.task, (1, "i4"))
     target = context.texture(scene.size, n_channels, dtype=dtype)
     depth_target = context.depth_texture(scene.size) if with_depth else None
     frame = drawn = context.framebuffer([target], depth_target)
-    if scene.task == "smooth":
-        drawn = context.framebuffer([context.renderbuffer(scene.size, 1, samples=SAMPLES)])
+    if scene.task in ("smooth", "smooth-fill"):
+        drawn = context.framebuffer([context.renderbuffer(scene.size, n_channels, samples=SAMPLES)])
     drawn.use()
     culling = moderngl.CULL_FACE if scene.cull == "back" else moderngl.NOTHING
     context.enable_only(culling | (moderngl.DEPTH_TEST if with_depth else moderngl.NOTHING))
@@ -118,7 +122,7 @@ def prepare(scene: Scene, threads: int) -> Drawing:
             frame.read_into(depth, components=1, attachment=-1, dtype="f4", alignment=1)
 
     def result() -> dict[str, np.ndarray]:
-        if scene.task == "fill":
+        if scene.task in ("fill", "smooth-fill"):
             return {"color": picture[..., :3]}
         if scene.task == "smooth":
             return {"smooth": picture[..., 0]}
@@ -127,5 +131,6 @@ def prepare(scene: Scene, threads: int) -> Drawing:
         ids = picture[..., 0] - 1
         return {"triangle": ids, **({"depth": np.where(ids < 0, np.float32(np.inf), depth)} if with_depth else {})}
 
-    gives = {"fill": "RGBA", "mask": "mask", "labels": "id", "smooth": f"{SAMPLES} samples"}
+    gives = {"fill": "RGBA", "mask": "mask", "labels": "id"}
+    gives |= {"smooth": f"{SAMPLES} samples", "smooth-fill": f"RGBA, {SAMPLES} samples"}
     return Drawing(draw, result, gives.get(scene.task, "id + depth"), "upload")

@@ -8,7 +8,7 @@ from benchmarks.cases import Scene
 from benchmarks.peers import Drawing
 
 MODULE, DISTRIBUTION = "cv2", "opencv-python-headless"
-TASKS = ("visibility", "mask", "fill", "labels", "smooth")
+TASKS = ("visibility", "mask", "fill", "labels", "smooth", "smooth-fill")
 SHIFT = 8
 
 
@@ -22,24 +22,22 @@ def prepare(scene: Scene, threads: int) -> Drawing:
     width, height = scene.size
     corners = np.rint((scene.vertices[:, :2] - 0.5) * (1 << SHIFT)).astype(np.int32)[scene.triangles]
     polygons = list(corners)
-    if scene.task == "fill":
+    if scene.task in ("fill", "smooth-fill"):
         canvas, values = np.zeros((height, width, 3), np.uint8), scene.colors.tolist()
     elif scene.task == "labels":
         canvas, values = np.zeros((height, width), np.int32), list(range(len(polygons)))
     else:
         canvas, values = np.zeros((height, width), np.uint8), [255] * len(polygons)
     background = -1 if scene.task == "labels" else 0
-    line = cv2.LINE_AA if scene.task == "smooth" else cv2.LINE_8
+    line = cv2.LINE_AA if scene.task in ("smooth", "smooth-fill") else cv2.LINE_8
 
     def draw() -> None:
         canvas.fill(background)
         for polygon, value in zip(polygons, values, strict=True):
             cv2.fillConvexPoly(canvas, polygon, value, line, SHIFT)
 
-    if scene.task == "smooth":
-        return Drawing(draw, lambda: {"smooth": canvas}, "LINE_AA", "snap, split into polygons")
-    name = {"fill": "color", "labels": "triangle"}.get(scene.task, "mask")
-    gives = {"fill": "RGB", "labels": "id"}.get(scene.task, "mask")
+    name = {"fill": "color", "smooth-fill": "color", "labels": "triangle", "smooth": "smooth"}.get(scene.task, "mask")
+    gives = {"fill": "RGB", "smooth-fill": "RGB, LINE_AA", "labels": "id", "smooth": "LINE_AA"}.get(scene.task, "mask")
     return Drawing(draw, lambda: {name: canvas > 0 if name == "mask" else canvas}, gives, "snap, split into polygons")
 
 

@@ -1,10 +1,14 @@
 """Exact, watertight triangle rasterization on the CPU: NumPy arrays in, NumPy arrays out."""
 
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 from topleft import scenes
 from topleft._isa import build_info
 from topleft.adapt import as_mesh
 from topleft.api import Rasterizer, coverage, fill, overdraw, rasterize, wireframe
-from topleft.batch import Job, render_batch
 from topleft.camera import Camera
 from topleft.classic import bresenham_line
 from topleft.composite import composite
@@ -20,15 +24,29 @@ from topleft.light import Fog, Light
 from topleft.material import Material
 from topleft.memory import release_memory
 from topleft.mesh import Mesh
+from topleft.planner import Plan, plan
 from topleft.render import rasterize_mesh, render
 from topleft.scene import Instance, Scene
 from topleft.scene_fragments import SceneDepthLayers, SceneFragments
 from topleft.shade import shade
 from topleft.silhouette import silhouette
 from topleft.texture import Texture
-from topleft.transparent import render_transparent, visible_layers
-from topleft.view_layers import ViewLayers, render_layers
 from topleft.viewpoints import turntable, viewpoints
+
+if TYPE_CHECKING:
+    from topleft.batch import Job, render_batch
+    from topleft.transparent import render_transparent, visible_layers
+    from topleft.view_layers import ViewLayers, render_layers
+
+# What most programs do without is imported when it is asked for: a third of the time that the package takes.
+_LATE = {
+    "Job": "topleft.batch",
+    "ViewLayers": "topleft.view_layers",
+    "render_batch": "topleft.batch",
+    "render_layers": "topleft.view_layers",
+    "render_transparent": "topleft.transparent",
+    "visible_layers": "topleft.transparent",
+}
 
 __version__: str = build_info()["version"]
 
@@ -46,6 +64,7 @@ __all__ = [
     "Mesh",
     "MeshError",
     "OpenCVLens",
+    "Plan",
     "Rasterizer",
     "Scene",
     "SceneDepthLayers",
@@ -65,6 +84,7 @@ __all__ = [
     "load",
     "overdraw",
     "peel",
+    "plan",
     "rasterize",
     "rasterize_mesh",
     "release_memory",
@@ -81,3 +101,14 @@ __all__ = [
     "visible_layers",
     "wireframe",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _LATE:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = globals()[name] = getattr(import_module(_LATE[name]), name)
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -2,13 +2,14 @@
 """Memoryviews in, one nogil kernel call, status out. The array layer has checked every shape, dtype and index."""
 
 from libc.stdint cimport int32_t, int64_t, uint8_t, uint16_t, uint64_t
+from libc.string cimport memset
 
 import numpy as np
 
 
 cdef extern from "topleft.h" nogil:
     ctypedef struct tl_vertex:
-        pass
+        int32_t x_fx, y_fx
     ctypedef struct tl_wide:
         pass
     ctypedef int tl_scalar
@@ -18,6 +19,7 @@ cdef extern from "topleft.h" nogil:
         int n_components
         int64_t n
         const void *matrix
+        int is_affine
     ctypedef struct tl_vertex_set:
         const tl_vertex *vertices
         const tl_wide *wide
@@ -46,6 +48,11 @@ cdef extern from "topleft.h" nogil:
     ctypedef int tl_cull
     ctypedef int tl_method
     ctypedef int tl_sink
+    ctypedef struct tl_census:
+        tl_sink sink
+        int64_t *n
+        double *boxes
+        double *covered
     int TL_MAX_LAYERS, TL_SINK_PEEL
     ctypedef struct tl_peeled:
         int n_layers, is_farthest
@@ -62,6 +69,7 @@ cdef extern from "topleft.h" nogil:
         int sample_bits
         const int32_t *samples_fx
         int sample
+        int32_t flip
         const tl_peeled *peeled
     int64_t tl_covered_words(int64_t)
     ctypedef struct tl_bins:
@@ -88,7 +96,9 @@ cdef extern from "topleft.h" nogil:
         const void *colors
         int n_channels, is_u8, is_flat
         tl_blend blend
-        int is_premultiplied, is_area
+        int is_premultiplied
+        const uint8_t *ground
+        int is_area
         int32_t *packed
         int32_t *cells
     int64_t tl_blend_cells(int64_t width)
@@ -129,6 +139,8 @@ cdef extern from "topleft.h" nogil:
         double depth_bias
         int is_farthest
         int64_t stride_px
+    enum:
+        TL_N_CLASSES, TL_FLIP
     ctypedef int tl_filter
     ctypedef int tl_wrap
     ctypedef int tl_light_kind
@@ -146,8 +158,8 @@ cdef extern from "topleft.h" nogil:
         float *color
         float *back_color
         float *specular
-        float shininess, cutoff
-        int has_back_color, is_unlit
+        float back_side, shininess, cutoff
+        int is_unlit
         const tl_texture *texture
     ctypedef struct tl_light:
         tl_light_kind kind
@@ -197,6 +209,8 @@ cdef extern from "topleft.h" nogil:
         int64_t (*first_bad_row)(const int32_t *, int64_t, int64_t) noexcept nogil
         int64_t (*narrow_triangles)(const int64_t *, int64_t, int64_t, int32_t *) noexcept nogil
         int64_t (*draw)(const tl_scene *, const tl_window *, const tl_target *, tl_share *) noexcept nogil
+        int64_t (*count_classes)(const tl_scene *, const tl_window *, const tl_target *, tl_census *) noexcept nogil
+        void (*set_flat_depth)(int32_t *, int64_t, int32_t, float, float, float *) noexcept nogil
         int64_t (*bin)(const tl_scene *, const tl_window *, int32_t, int, tl_bins *) noexcept nogil
         void (*list_bins)(const tl_bins *, int64_t, int64_t *, int32_t *) noexcept nogil
         int64_t (*draw_area)(const tl_scene *, const tl_window *, const tl_area *) noexcept nogil
@@ -268,12 +282,13 @@ cdef class Source:
     cdef object arrays
     cdef readonly bint is_clip_space
 
-    def __init__(self, vertices, matrix=None):
+    def __init__(self, vertices, matrix=None, bint is_affine=False):
         cdef const uint8_t[::1] raw = as_bytes(vertices)
         cdef const uint8_t[::1] raw_matrix = None if matrix is None else as_bytes(matrix)
         self.arrays = (raw, raw_matrix)
         self.source.data = data(raw)
         self.source.matrix = data(raw_matrix)
+        self.source.is_affine = matrix is not None and is_affine
         self.source.scalar = <tl_scalar><int>SCALARS[vertices.dtype]
         self.source.n, self.source.n_components = vertices.shape
         self.is_clip_space = matrix is not None or self.source.n_components == 4
@@ -306,9 +321,10 @@ cdef class Target:
     cdef uint64_t[:, ::1] covered
     cdef int sample_bits
     cdef const int32_t[:, ::1] samples
+    cdef int32_t flip
 
-    def __init__(self, int sink, pixels, depth, covered, samples=None):
-        self.sink = <tl_sink>sink
+    def __init__(self, int sink, pixels, depth, covered, samples=None, bint earlier_wins=False):
+        self.sink, self.flip = <tl_sink>sink, TL_FLIP if earlier_wins else 0
         self.height, self.width = pixels.shape
         self.pixel_bytes = pixels.itemsize
         self.pixels, self.depth, self.covered = as_bytes(pixels), depth, covered
@@ -322,15 +338,15 @@ cdef class Target:
     cdef tl_target rows(self, int64_t first_row) noexcept:
         """The buffers from a row on."""
         cdef tl_target t
+        memset(&t, 0, sizeof(t))
         t.sink = self.sink
         t.pixels = &self.pixels[first_row * self.width * self.pixel_bytes]
         t.depth = &self.depth[first_row, 0] if self.depth is not None else NULL
         t.covered = &self.covered[first_row, 0] if self.covered is not None else NULL
         t.stride_px = self.width
-        t.n_samples = t.sample = 0  # draw knows
+        t.flip = self.flip
         t.sample_bits = self.sample_bits
         t.samples_fx = &self.samples[0, 0] if self.samples is not None else NULL
-        t.peeled = NULL
         return t
 
 
@@ -350,6 +366,15 @@ def narrow_triangles(const int64_t[:, ::1] triangles, int64_t n_vertices, int32_
         with nogil:
             row = K.narrow_triangles(&triangles[0, 0], n, n_vertices, &out[0, 0])
     return row
+
+
+def set_flat_depth(int32_t[:, ::1] ids, float[:, ::1] out, int64_t first_row, int64_t n_rows, bint earlier_wins, float depth,
+                   float background):
+    """Write the depth of rows of a picture whose triangles all lie at one; ids as `Target` has them drawn become ids."""
+    cdef int64_t n = n_rows * ids.shape[1]
+    if n:
+        with nogil:
+            K.set_flat_depth(&ids[first_row, 0], n, TL_FLIP if earlier_wins else 0, depth, background, &out[first_row, 0])
 
 
 def first_bad(const uint8_t[::1] records, const int32_t[:, ::1] triangles):
@@ -457,6 +482,39 @@ cdef class Scene:
         w.width, w.height, w.test = width, n_rows, self.test
         return w
 
+    def guess_layers(self, double n_pixels):
+        """Return about how often triangles cover each of n_pixels: from the areas of up to 128 of them, window or not."""
+        cdef const tl_vertex *v = self.scene.mesh.vertices
+        cdef int64_t n = min(self.scene.n_triangles, 128), i, last = self.scene.mesh.n_vertices - 1
+        cdef const int32_t *t
+        cdef double unit = 2.0 * 4.0**self.subpixel_bits, area, total = 0
+        for i in range(n):
+            t = self.scene.triangles + 3 * (i * self.scene.n_triangles // n)
+            if not (0 <= t[0] <= last and 0 <= t[1] <= last and 0 <= t[2] <= last):
+                return 0.0  # an error that draw finds
+            area = (<double>v[t[1]].x_fx - v[t[0]].x_fx) * (<double>v[t[2]].y_fx - v[t[0]].y_fx)
+            area -= (<double>v[t[1]].y_fx - v[t[0]].y_fx) * (<double>v[t[2]].x_fx - v[t[0]].x_fx)
+            total += min(abs(area) / unit, n_pixels)
+        return total * self.scene.n_triangles / (n * n_pixels) if n else 0.0
+
+    def count_classes(self, int sink, int64_t width, int64_t height, const int32_t[:, ::1] samples=None):
+        """Count the triangles by the code that draws them into a sink: `tl_census` in ``csrc/topleft.h``.
+
+        Returns the first bad row or -1, and triangles, samples in their boxes, and covered samples of each `tl_class`.
+        """
+        cdef tl_window window = self.window(0, height, width)
+        cdef tl_target target
+        cdef tl_census census
+        cdef int64_t bad_row
+        memset(&census, 0, sizeof(census))
+        memset(&target, 0, sizeof(target))
+        census.sink = <tl_sink>sink
+        if samples is not None:
+            target.samples_fx, target.sample_bits = &samples[0, 0], samples.shape[0].bit_length() - 1
+        with nogil:
+            bad_row = K.count_classes(&self.scene, &window, &target, &census)
+        return bad_row, [(census.n[k], census.boxes[k], census.covered[k]) for k in range(TL_N_CLASSES)]
+
     def draw(self, Target target, int64_t first_row, int64_t n_rows, bint is_first=True, bint is_last=True):
         """Draw rows of a picture, which the first of several scenes clears and the last one finishes.
 
@@ -530,10 +588,10 @@ cdef class Scene:
                                 &pixels[first_row * width * pixel_bytes])
 
     def blend(self, uint8_t[::1] pixels, int64_t width, int64_t first_row, int64_t n_rows, const uint8_t[::1] colors, int n_channels,
-              bint is_u8, bint is_flat, int blend, bint is_premultiplied, int32_t[::1] packed, int32_t[::1] cells):
+              bint is_u8, bint is_flat, int blend, bint is_premultiplied, const uint8_t[::1] ground, int32_t[::1] packed, int32_t[::1] cells):
         """Blend the colours of triangles into rows [first_row, first_row + n_rows) of a picture, one after the other.
 
-        `packed`: room for the picture, for uint8 with other than 4 channels; `cells`: clear, for areas. Returns as `draw` does.
+        `ground`: one colour, which the rows get first, or None. `packed`: room for the picture, for uint8 with other than 4 channels; `cells`: clear, for areas. Returns as `draw` does.
         """
         cdef tl_canvas canvas
         cdef tl_window window = self.window(first_row, n_rows, width)
@@ -544,6 +602,7 @@ cdef class Scene:
         canvas.pixels, canvas.stride_px = &pixels[first_row * width * pixel_bytes], width
         canvas.colors, canvas.n_channels, canvas.is_u8, canvas.is_flat = data(colors), n_channels, is_u8, is_flat
         canvas.blend, canvas.is_premultiplied, canvas.is_area = <tl_blend>blend, is_premultiplied, cells is not None
+        canvas.ground = &ground[0] if ground is not None else NULL
         canvas.packed = &packed[first_row * width] if packed is not None else NULL
         canvas.cells = &cells[0] if cells is not None else NULL
         with nogil:
@@ -636,8 +695,8 @@ def peel(scenes, bins, int32_t[:, :, ::1] ids, float[:, :, ::1] depth, bint is_f
     cdef int64_t i, n = len(pairs)
     peeled.n_layers, peeled.is_farthest = ids.shape[0], is_farthest
     peeled.plane_px = height * width
-    target.sink, target.pixels, target.depth, target.covered, target.samples_fx = <tl_sink>TL_SINK_PEEL, NULL, NULL, NULL, NULL
-    target.stride_px, target.n_samples, target.sample, target.sample_bits, target.peeled = width, 0, 0, 0, &peeled
+    memset(&target, 0, sizeof(target))
+    target.sink, target.stride_px, target.peeled = <tl_sink>TL_SINK_PEEL, width, &peeled
     for band in range(first_band, end_band):
         first_row = band << band_bits
         peeled.ids, peeled.depth = &ids[0, first_row, 0], &depth[0, first_row, 0]
@@ -736,9 +795,8 @@ def fill_bands(scenes, int32_t[:, ::1] labels, Palette palette, pixels, Bins bin
     for k in range(n_samples):
         scene = scenes[k]
         seen[k] = scene.scene
-    target.sink, target.depth, target.covered, target.stride_px = <tl_sink>LABEL, NULL, NULL, width
-    target.n_samples = target.sample = target.sample_bits = 0  # draw knows
-    target.samples_fx = NULL
+    memset(&target, 0, sizeof(target))
+    target.sink, target.stride_px = <tl_sink>LABEL, width
     share.others, share.first, share.is_first, share.is_last = NULL, 0, True, True
     with nogil:
         for band in range(first_band, end_band):

@@ -50,18 +50,18 @@ cdef class Shading:
         s.matcap = NULL
 
     def set_materials(self, materials):
-        """Take rows (color, back_color or None, specular, shininess, is_unlit, cutoff, texture or None)."""
+        """Take rows (color, back_color, back_side, specular, shininess, is_unlit, cutoff, texture or None)."""
         cdef tl_material *m
         cdef Texture texture
         cdef int k
         self.materials = np.zeros(max(1, len(materials)) * sizeof(tl_material), np.uint8)
         m = <tl_material *>&self.materials[0]
         self.arrays += (materials,)
-        for k, (color, back_color, specular, shininess, is_unlit, cutoff, own) in enumerate(materials):
+        for k, (color, back_color, back_side, specular, shininess, is_unlit, cutoff, own) in enumerate(materials):
             copy_floats(m[k].color, color, 4)
-            copy_floats(m[k].back_color, (0, 0, 0) if back_color is None else back_color, 3)
+            copy_floats(m[k].back_color, back_color, 3)
             copy_floats(m[k].specular, specular, 3)
-            m[k].has_back_color, m[k].shininess, m[k].is_unlit, m[k].cutoff = back_color is not None, shininess, is_unlit, cutoff
+            m[k].back_side, m[k].shininess, m[k].is_unlit, m[k].cutoff = back_side, shininess, is_unlit, cutoff
             texture = own
             m[k].texture = &texture.texture if texture is not None else NULL
         self.shading.materials, self.shading.n_materials = m, len(materials)
@@ -142,9 +142,9 @@ def cut_out(Scene scene, View view, Shading shading, const int32_t[::1] opaque, 
     cdef tl_share share
     if n_rows == 0 or ids.shape[1] == 0:
         return
+    memset(&target, 0, sizeof(target))
     target.sink, target.stride_px = <tl_sink>4, ids.shape[1]  # nearest
-    target.pixels, target.depth, target.covered, target.samples_fx = &ids[first_row, 0], &depth[first_row, 0], NULL, NULL
-    target.n_samples = target.sample_bits = target.sample = 0
+    target.pixels, target.depth = &ids[first_row, 0], &depth[first_row, 0]
     share.ids, share.others, share.first, share.end = &opaque[0], NULL, 0, opaque.shape[0] - 1  # the last is there to be read
     share.is_first = share.is_last = True
     with nogil:

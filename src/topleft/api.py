@@ -57,6 +57,7 @@ def coverage(
         clip_depth : "minus_one_to_one" (OpenGL) or "zero_to_one" (Direct3D, Vulkan).
         near_clip, far_clip : bool. Whether that plane cuts.
         threads : int or None. Never changes a bit.
+        plan : Plan or None. Of `plan`, for the same triangles: saves their conversion and check, and notes the times.
 
     Returns
     -------
@@ -214,7 +215,7 @@ def rasterize(
     *,
     depth_test: str | None = "less",
     background_depth: float | None = None,
-    out: tuple[NDArray[np.int32], NDArray[np.float32]] | None = None,
+    out: tuple[NDArray[np.int32] | None, NDArray[np.float32] | None] | None = None,
     **view: Unpack[ViewOptions],
 ) -> Fragments:
     """Return the visibility buffer: which triangle shows in each pixel, and how deep.
@@ -230,7 +231,8 @@ def rasterize(
     background_depth : float, optional
         Depth where nothing is; +inf, or -inf with "greater", unless given.
     out : (ndarray of int32, ndarray of float32), each of shape (H, W), or (H, W, S) for S samples, optional
-        Where ids and depth go.
+        Where ids and depth go; either may be None. Without an array for it, the depth of vertices (V, 2) is made when
+        it is asked for: ids alone take half the time.
 
     Returns
     -------
@@ -419,7 +421,7 @@ class Rasterizer:
         *,
         depth_test: str | None = "less",
         background_depth: float | None = None,
-        out: tuple[NDArray[np.int32], NDArray[np.float32]] | None = None,
+        out: tuple[NDArray[np.int32] | None, NDArray[np.float32] | None] | None = None,
         **view: Unpack[ViewOptions],
     ) -> Fragments:
         """Return the visibility buffer, as `topleft.rasterize` does; its attributes also end with the next call."""
@@ -439,6 +441,4 @@ class Rasterizer:
     ) -> NDArray[Any]:
         """Return the edges of the triangles as lines, as `topleft.wireframe` does."""
         checked = self._view(view)
-        return draw_wireframe(
-            self._memory, vertices, triangles, checked, depth, depth_test, depth_bias, antialias, out
-        )
+        return draw_wireframe(self._memory, vertices, triangles, checked, depth, depth_test, depth_bias, antialias, out)

@@ -68,8 +68,12 @@ def blend_colors(
     n_threads: int,
     *,
     is_flat: bool,
+    ground: NDArray[Any] | None = None,
 ) -> bool:
-    """Blend a scene into contiguous pixels; returns whether a triangle has an index outside the vertices."""
+    """Blend a scene into contiguous pixels; returns whether a triangle has an index outside the vertices.
+
+    `ground`, for uint8: the colour that all pixels get before.
+    """
     height, width = pixels.shape[:2]
     n_parts = min(height, n_threads)
     n_channels, is_u8 = 1 if colors.ndim == 1 else colors.shape[1], colors.dtype == np.uint8
@@ -77,13 +81,15 @@ def blend_colors(
     packed = memory.empty("packed", (height * width,), np.int32) if is_u8 and n_channels != 4 else None
     n_cells = _engine.blend_cells(width)
     cells = memory.constant("cells", n_parts * n_cells, _engine.CELL_CLEAR) if blending.by_area else None
+    under = None if ground is None else _engine.as_bytes(np.full(pixels.shape[2:] or 1, ground))
     code, is_premultiplied = BLEND_CODES[blending.mode], blending.alpha is Alpha.PREMULTIPLIED
 
     def blend_part(i: int, _: int) -> int:
         first, end = height * i // n_parts, height * (i + 1) // n_parts
         own = None if cells is None else cells[n_cells * i : n_cells * (i + 1)]
         return scene.blend(
-            flat, width, first, end - first, palette, n_channels, is_u8, is_flat, code, is_premultiplied, packed, own
-        )
+            flat, width, first, end - first, palette, n_channels, is_u8, is_flat,
+            code, is_premultiplied, under, packed, own,
+        )  # fmt: skip
 
     return max(run_parts(blend_part, n_parts, n_parts)) >= 0

@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine
+from topleft.choices import can_share
 from topleft.classic import refuse_classic
 from topleft.fragments import Fragments
 from topleft.memory import SCRATCH, FreshMemory, Memory
 from topleft.models import DepthTest, Sampling, parse
-from topleft.rasterize import can_share
 from topleft.snapped import Snapped, check_triangles, snap_scene
 from topleft.threads import count_threads, run_parts
 from topleft.view import View, ViewOptions

@@ -38,19 +38,19 @@ class Fragments:
 
     #: Fragments of each sample when there are several.
     _samples: tuple[Fragments, ...] = ()
+    #: Ids and depth of these, (S, H, W).
+    _planes: tuple[NDArray[np.int32], NDArray[np.float32]] | None = None
 
     def __init__(
         self,
         triangle: NDArray[np.int32],
-        depth: NDArray[np.float32],
+        depth: NDArray[np.float32] | float,
         scene: _engine.Scene,
         n_vertices: int,
         n_triangles: int,
     ) -> None:
         self.id = triangle
-        self.depth = depth
-        self.samples_triangle = triangle[..., None]
-        self.samples_depth = depth[..., None]
+        self._depth = depth
         self._scene = scene
         self._n_vertices = n_vertices
         self._n_triangles = n_triangles
@@ -75,6 +75,23 @@ class Fragments:
         return np.minimum(self.id, 0)
 
     @property
+    def depth(self) -> NDArray[np.float32]:
+        """Depth of each pixel, float32 (H, W); made now where all triangles lie at 0."""
+        if not isinstance(self._depth, np.ndarray):
+            self._depth = np.where(self.mask, np.float32(0.0), np.float32(self._depth))
+        return self._depth
+
+    @property
+    def samples_triangle(self) -> NDArray[np.int32]:
+        """Indices of triangles by sample, int32 (H, W, S)."""
+        return self.id[..., None] if self._planes is None else np.moveaxis(self._planes[0], 0, -1)
+
+    @property
+    def samples_depth(self) -> NDArray[np.float32]:
+        """Depth by sample, float32 (H, W, S)."""
+        return self.depth[..., None] if self._planes is None else np.moveaxis(self._planes[1], 0, -1)
+
+    @property
     def mask(self) -> NDArray[np.bool_]:
         """Where there is a triangle, bool (H, W)."""
         return self.id >= 0
@@ -92,7 +109,7 @@ class Fragments:
         samples = tuple(cls(*planes, n_vertices, n_triangles) for planes in zip(triangle, depth, scenes, strict=True))
         frags = cls(triangle[0], depth[0], scenes[0], n_vertices, n_triangles)
         frags._samples = samples
-        frags.samples_triangle, frags.samples_depth = np.moveaxis(triangle, 0, -1), np.moveaxis(depth, 0, -1)
+        frags._planes = triangle, depth
         return frags
 
     def sample(self, i: int) -> Fragments:
@@ -196,7 +213,7 @@ class BentFragments(Fragments):
         self._samples = tuple(
             BentFragments(sample, drawn, source, weights, triangles, n_vertices) for sample in parts._samples
         )
-        self.samples_triangle, self.samples_depth = wholes[parts.samples_triangle], parts.samples_depth
+        self._planes = parts._planes and (wholes[parts._planes[0]], parts._planes[1])
         self._parts, self._drawn = parts, drawn
         self._source, self._weights, self._triangles = source, weights, triangles
 

@@ -5,6 +5,7 @@ Input: an array, or several by name. Output: PNG, JPEG, WebP, TIFF, .npy or .npz
 
 from __future__ import annotations
 
+import io
 import os
 from collections.abc import Callable, Mapping
 from contextlib import suppress
@@ -30,8 +31,8 @@ HOLDS: Mapping[str, tuple[str, ...]] = {
     ".jpg": BYTES,
     ".jpeg": BYTES,
     ".webp": BYTES,
-    ".tif": (*BYTES, "uint16 (H, W)", "int32 (H, W)", "float32 (H, W)"),
-    ".tiff": (*BYTES, "uint16 (H, W)", "int32 (H, W)", "float32 (H, W)"),
+    ".tif": (*BYTES, "uint16 (H, W)", "int32 (H, W)", "float32 (H, W)", "float32 (H, W, K)"),
+    ".tiff": (*BYTES, "uint16 (H, W)", "int32 (H, W)", "float32 (H, W)", "float32 (H, W, K)"),
 }
 
 PILLOW_OPTIONS: Mapping[str, tuple[str, dict[str, Any]]] = {
@@ -58,7 +59,8 @@ def save_image(
         PNG, JPEG, WebP (lossless), TIFF, .npy or .npz, by the end of the name. A file of that name is replaced.
     image : (H, W), (H, W, 3) or (H, W, 4) uint8
         The picture. PNG also holds (H, W, 2) uint8, grey with alpha, and (H, W) uint16; TIFF also (H, W) of uint16,
-        int32 or float32. For .npy any array, for .npz any array or several by name.
+        int32 or float32, and (H, W, K) float32, a page for each channel. For .npy any array, for .npz any array or
+        several by name.
     background : (3,) of 0 to 255
         What shows through in JPEG, which has no alpha.
     text : mapping of str to str, optional
@@ -96,6 +98,12 @@ def save_image(
     from PIL import Image  # 10 ms that PNG does without
 
     kind, options = PILLOW_OPTIONS[suffix]
+    if picture.dtype == np.float32 and picture.ndim == 3:
+        first, *others = (Image.fromarray(np.ascontiguousarray(channel)) for channel in np.moveaxis(picture, -1, 0))
+        pages = io.BytesIO()  # Pillow reads back what it has written of several pages
+        first.save(pages, format=kind, save_all=True, append_images=others, **options)
+        write_whole(path, lambda file: file.write(pages.getbuffer()))
+        return
     write_whole(path, lambda file: Image.fromarray(picture).save(file, format=kind, **options))
 
 
@@ -134,7 +142,8 @@ def _check_holds(path: Path, image: npt.NDArray[Any]) -> None:
     """Raise an error for what the format cannot hold."""
     kinds = HOLDS[path.suffix.lower()]
     channels = "".join(f", {n}" for n in image.shape[2:])
-    if image.ndim < 2 or f"{image.dtype} (H, W{channels})" not in kinds:
+    found = {f"{image.dtype} (H, W{channels})", f"{image.dtype} (H, W{', K' * (image.ndim - 2)})"}
+    if image.ndim < 2 or not found & set(kinds):
         raise ImageError(
             f"cannot write {str(path)!r}: {path.suffix} holds {', '.join(kinds)}; got {image.dtype} {image.shape}"
         )

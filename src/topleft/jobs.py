@@ -15,19 +15,23 @@ from typing import Any
 
 import numpy.typing as npt
 
+from topleft.adapt import MeshLike, as_mesh
 from topleft.api import Rasterizer
 from topleft.camera import Camera
 from topleft.files import load
 from topleft.images import save_image
 from topleft.layer_files import layer_paths, save_layers
-from topleft.layers import Shot, check_layers, draw_layers
+from topleft.layers import check_layers, draw_layers
 from topleft.mesh import Mesh
 from topleft.render import DEFAULT_SIZE, render
+from topleft.scene import Scene
+from topleft.transparent import render_transparent
+from topleft.view_layers import sight_of
 
 __all__ = ["Job", "Outcome", "SceneFile", "Studio", "as_job"]
 
 Array = npt.NDArray[Any]
-CameraMaker = Callable[[Mesh, tuple[int, int]], Camera]
+CameraMaker = Callable[[Any, tuple[int, int]], Camera]
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,19 +40,21 @@ class Job:
 
     Parameters
     ----------
-    scene : Mesh, path, or function without arguments that returns a mesh
+    scene : Mesh, Scene, whatever `as_mesh` takes, path, or function without arguments that returns one of the first
         A file is read where it is drawn, once for jobs that follow each other. The same goes for what a function makes
-        where functions are equal; for worker processes it must be picklable.
-    camera : Camera, or function of the mesh and the size that returns one, optional
+        where functions are equal; for worker processes it must be picklable. A mesh of another library is made ours
+        once, and must not change between its jobs.
+    camera : Camera, or function of the mesh (or scene) and the size that returns one, optional
         As for `render`.
     size : (width, height), pixels
     options : mapping
-        Other options of `render`, by name.
+        Other options of `render`, by name; with "opacity" those of `render_transparent`; for "flow" among the layers
+        also "camera_to" and "transforms_to" of `render_layers`.
     destination : path, optional
         The file to be written; its folder is made. `{layer}` in the name stands for the name of a layer. None: the
         picture is returned.
     layers : sequence of str
-        What is wanted besides, or instead of, the picture: names of `topleft.layers.LAYERS`. None: the picture alone.
+        What is wanted besides, or instead of, the picture: names that `render_layers` knows. None: the picture alone.
     """
 
     scene: Any
@@ -117,6 +123,23 @@ class SceneFile:
         return load(self.path)
 
 
+class ForeignMesh:
+    """A mesh of another library, to be made ours; equal where it is the same object."""
+
+    def __init__(self, subject: MeshLike) -> None:
+        self.subject = subject
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, ForeignMesh) and self.subject is other.subject
+
+    def __hash__(self) -> int:
+        return id(self.subject)
+
+    def __call__(self) -> Mesh:
+        """Make it."""
+        return as_mesh(self.subject)
+
+
 class SceneShelf:
     """Meshes that were made, or the errors that came instead: the `n` latest, shared by all threads."""
 
@@ -144,7 +167,8 @@ class SceneShelf:
     @staticmethod
     def _call(make: Callable[[], Any]) -> tuple[Any, Exception | None]:
         try:
-            return make(), None
+            made = make()
+            return made if isinstance(made, Scene) else as_mesh(made), None
         except Exception as error:
             return None, error
 
@@ -187,21 +211,27 @@ class Studio:
         options = {"threads": 1, **job.options}
         rasterizer = self._rasterizer(size)
         if not layers:
-            picture = render(scene, camera, size, rasterizer=rasterizer, **options)
+            if "opacity" in options:
+                picture = render_transparent(scene, camera, size, **options)
+            else:
+                picture = render(scene, camera, size, rasterizer=rasterizer, **options)
             if path is None:
                 return picture
             save_image(files[0], picture, background=_opaque(job))
             return None
-        shot = Shot(scene, camera, size, options, rasterizer)
-        arrays = draw_layers(layers, shot)
+        sight = sight_of(scene, camera, size, rasterizer=rasterizer, **options)
+        arrays = draw_layers(layers, sight)
         if path is None:
             return {name: array.copy() for name, array in arrays.items()}  # out of the memory that is kept
-        save_layers(path, arrays, matrix=shot.eye.clip_from_world(size), background=_opaque(job))
+        matrix = None if sight.camera.lens is not None else sight.camera.clip_from_world(size)
+        save_layers(path, arrays, matrix=matrix, background=_opaque(job))
         return None
 
     def _scene(self, scene: Any) -> Any:
         if isinstance(scene, (str, os.PathLike)):
             scene = SceneFile(os.fspath(scene))
+        elif not isinstance(scene, Mesh | Scene) and not callable(scene):
+            scene = ForeignMesh(scene)
         return self._shelf.get(scene) if callable(scene) else scene
 
     def _rasterizer(self, size: tuple[int, int]) -> Rasterizer:

@@ -1,91 +1,164 @@
-"""Layers: what a view of a mesh shows besides its colours, by name.
+"""The registry of layers: what a view of a mesh or scene shows, by name.
 
-Input: a mesh, a camera and the options of `render`. Output: an array for each name asked for; nothing else is computed.
+Input: a `Sight`. Output: an array for each name asked for; nothing else is computed.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
-from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from topleft.api import Rasterizer
 from topleft.camera import Camera
-from topleft.fragments import Fragments
-from topleft.mesh import Mesh
-from topleft.render import default_camera, rasterize_mesh, render
-from topleft.shade import eye_normals
+from topleft.eye import eye_normals
+from topleft.mesh import unit_or_zero
+from topleft.render import picture_of, render
+from topleft.scene_render import camera_of
+from topleft.sight import Sight, Surface, moved, project
+from topleft.silhouette import silhouette as draw_silhouette
+from topleft.transparent import render_transparent
 
-__all__ = ["LAYERS", "Shot", "check_layers", "draw_layers"]
+__all__ = ["LAYERS", "check_layers", "draw_layers"]
 
 Array = npt.NDArray[Any]
+F64 = npt.NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
-class Shot:
-    """A view that layers are taken of: `options` are those of `render`.
-
-    What layers hold may lie in the memory of `rasterizer`, which the next picture overwrites.
-    """
-
-    mesh: Mesh
-    camera: Camera | None
-    size: tuple[int, int]
-    options: Mapping[str, Any] = field(default_factory=dict)
-    rasterizer: Rasterizer | None = None
-
-    @cached_property
-    def eye(self) -> Camera:
-        """The camera, or the one that `render` takes where none is given."""
-        return default_camera(self.mesh, self.size) if self.camera is None else self.camera
-
-    @cached_property
-    def frags(self) -> Fragments:
-        """The visibility buffer, drawn when the first layer needs it."""
-        shared = {name: self.options[name] for name in ("cull", "threads") if name in self.options}
-        return rasterize_mesh(self.mesh, self.eye, self.size, rasterizer=self.rasterizer, **shared)
+def color(sight: Sight) -> Array:
+    """The picture (H, W, 4) uint8 of `render`, or of `render_transparent` if the look has an `opacity`."""
+    options = {**sight.options, **sight.look}
+    if "opacity" in options:
+        return render_transparent(sight.subject, sight.camera, sight.size, **options)
+    sampling = options.pop("sampling", "center")
+    if sampling == "center":
+        return picture_of(sight.frags, sight.subject, sight.camera, **options)
+    options |= {"sampling": sampling, "rasterizer": sight.rasterizer}
+    return render(sight.subject, sight.camera, sight.size, **options)
 
 
-def color(shot: Shot) -> Array:
-    """The picture (H, W, 4) uint8 of `render`."""
-    return render(shot.mesh, shot.eye, shot.size, rasterizer=shot.rasterizer, **shot.options)
+def alpha(sight: Sight) -> Array:
+    """How much of the pixel is covered, (H, W) uint8, 255 for all of it."""
+    share = silhouette(sight)
+    if share.dtype == np.bool_:
+        return share.view(np.uint8) * np.uint8(255)
+    return np.rint(share * np.float32(255)).astype(np.uint8)
 
 
-def alpha(shot: Shot) -> Array:
-    """255 where the mesh is, 0 elsewhere: (H, W) uint8."""
-    return shot.frags.mask.view(np.uint8) * np.uint8(255)
+def silhouette(sight: Sight) -> Array:
+    """Where the subject is, (H, W): bool, or the share of samples, float32."""
+    sampling = sight.look.get("sampling", "center")
+    if sampling == "center":
+        return sight.frags.mask
+    if sight.has_holes:
+        return (sight.sampled(sampling).samples_triangle >= 0).mean(axis=-1, dtype=np.float32)
+    return draw_silhouette(sight.subject, sight.camera, sight.size, sampling=sampling, **sight.options)
 
 
-def depth(shot: Shot) -> Array:
-    """Window depth (H, W) float32: 0 near, 1 far, +inf where nothing is."""
-    return shot.frags.depth
+def depth(sight: Sight) -> Array:
+    """Window depth (H, W) float32, +inf where nothing is."""
+    return sight.frags.depth
 
 
-def triangle(shot: Shot) -> Array:
-    """Index of the triangle that shows, (H, W) int32, -1 where nothing is."""
-    return shot.frags.triangle
+def distance(sight: Sight) -> Array:
+    """Distance along the view (H, W) float32, world units, +inf where nothing is."""
+    return sight.join((), np.inf, lambda surface: -moved(surface.points_world, sight.camera.view[2:3])[:, 0])
 
 
-def normals(shot: Shot) -> Array:
-    """Unit normals in eye space (x right, y up, z to the viewer), (H, W, 3) float32, 0 where nothing is."""
-    frags = shot.frags
-    directions = np.zeros((*frags.triangle.shape, 3), np.float32)
-    directions[frags.mask] = eye_normals(frags, shot.mesh, shot.eye, is_smooth=True)
-    return directions
+def ray_distance(sight: Sight) -> Array:
+    """Distance from the eye (H, W) float32, world units, +inf where nothing is; along the view without perspective."""
+    if not sight.camera.projection[3, :3].any():
+        return distance(sight)
+
+    def make(surface: Surface) -> F64:
+        x, y, z = moved(surface.points_world, sight.camera.view[:3]).T
+        return np.sqrt(x * x + y * y + z * z)
+
+    return sight.join((), np.inf, make)
 
 
-LAYERS: Mapping[str, Callable[[Shot], Array]] = MappingProxyType(
-    {"color": color, "alpha": alpha, "depth": depth, "id": triangle, "normals": normals}
-)
-"""The only list of layers: the command line, batches and files read it."""
+def triangle(sight: Sight) -> Array:
+    """Index of the triangle in its mesh, (H, W) int32, -1 where nothing is."""
+    return sight.frags.triangle
 
 
-def check_layers(names: Iterable[str]) -> tuple[str, ...]:
+def instance(sight: Sight) -> Array:
+    """Index of the instance, (H, W) int32, -1 where nothing is."""
+    return sight.frags.instance
+
+
+def barycentric(sight: Sight) -> Array:
+    """Weights of the triangle's vertices, (H, W, 3) float32, 0 where nothing is."""
+    return sight.frags.barycentric()
+
+
+def world_position(sight: Sight) -> Array:
+    """The point of the surface, (H, W, 3) float32, NaN where nothing is."""
+    return sight.join((3,), np.nan, lambda surface: surface.points_world)
+
+
+def camera_normal(sight: Sight) -> Array:
+    """Unit normal in eye space, (H, W, 3) float32, 0 where nothing is."""
+    return sight.join((3,), 0.0, lambda surface: normals_of(surface, sight.camera))
+
+
+def world_normal(sight: Sight) -> Array:
+    """Unit normal in the world, (H, W, 3) float32, 0 where nothing is."""
+    back = np.hstack([sight.camera.view[:3, :3].T, np.zeros((3, 1))])  # the transpose, where positions take the inverse
+
+    def make(surface: Surface) -> F64:
+        return unit_or_zero(moved(normals_of(surface, sight.camera).astype(np.float64), back))
+
+    return sight.join((3,), 0.0, make)
+
+
+def normals_of(surface: Surface, camera: Camera) -> npt.NDArray[np.float32]:
+    """Unit normals (P, 3) of the pixels of a surface in eye space, on the side that is seen."""
+    own = camera_of(camera, surface.instance)
+    return eye_normals(surface.part.frags, surface.instance.mesh, own, is_smooth=True)
+
+
+def uv(sight: Sight) -> Array:
+    """Texture coordinates, (H, W, 2) float32, NaN where nothing is or a mesh has none."""
+    if all(getattr(instance.mesh, "uv", None) is None for instance in sight.instances):
+        raise ValueError("layer 'uv' needs a mesh that has texture coordinates")
+
+    def make(surface: Surface) -> Array:
+        coordinates = getattr(surface.instance.mesh, "uv", None)
+        if coordinates is None:
+            return np.full((1, 2), np.nan)
+        return surface.part.frags.interpolate(coordinates)[surface.seen]
+
+    return sight.join((2,), np.nan, make)
+
+
+def flow(sight: Sight) -> Array:
+    """Where the point of each pixel moves to in the picture, (H, W, 2) float32 pixels, NaN where nothing is."""
+    if sight.camera_to is None and sight.transforms_to is None:
+        raise ValueError("layer 'flow' needs camera_to or transforms_to")
+
+    def make(surface: Surface) -> F64:
+        here = surface.instance.transform
+        there = here if sight.transforms_to is None else sight.transforms_to[surface.part.instance]
+        end = project(surface.points, sight.camera_to or sight.camera, there, sight.size)
+        return end - project(surface.points, sight.camera, here, sight.size)
+
+    return sight.join((2,), np.nan, make)
+
+
+LAYERS: Mapping[str, Callable[[Sight], Array]] = MappingProxyType({
+    layer.__name__: layer
+    for layer in (
+        color, alpha, silhouette, depth, distance, ray_distance, triangle, instance, barycentric, world_position,
+        world_normal, camera_normal, uv, flow,
+    )
+})  # fmt: skip
+"""The only list of layers: `render_layers`, batches, files and the command line read it."""
+
+
+def check_layers(names: str | Iterable[str]) -> tuple[str, ...]:
     """Return names of layers, each once.
 
     Raises
@@ -93,22 +166,23 @@ def check_layers(names: Iterable[str]) -> tuple[str, ...]:
     ValueError
         If there is no such layer.
     """
-    if isinstance(names, str):
-        names = (names,)
-    checked = tuple(dict.fromkeys(names))
+    checked = tuple(dict.fromkeys((names,) if isinstance(names, str) else names))
     for name in checked:
         if name not in LAYERS:
             raise ValueError(f"layers must be some of {', '.join(LAYERS)}, got {name!r}")
     return checked
 
 
-def draw_layers(names: Iterable[str], shot: Shot) -> dict[str, Array]:
+def draw_layers(names: str | Iterable[str], sight: Sight) -> dict[str, Array]:
     """Return arrays by name, in the order asked for.
 
     Raises
     ------
     ValueError
-        If there is no such layer, or an option is unknown.
+        If there is no such layer, or one cannot be had of this sight.
     """
-    # `color` may draw its visibility buffer over the one of the others, in the same memory: it is the same one.
-    return {name: LAYERS[name](shot) for name in check_layers(names)}
+    checked = check_layers(names)
+    # Colours first: in memory that is kept they may need other samples than the visibility buffer of all others.
+    drawn = {name: LAYERS[name](sight) for name in sorted(checked, key=lambda name: name != "color")}
+    return {name: drawn[name] for name in checked}
+

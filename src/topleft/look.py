@@ -44,6 +44,7 @@ class Look:
         viewport = size if scene.view is None else scene.view.viewport
         self.frame = frame_of(camera, viewport, self.surface.center, in_eye_space=in_eye_space)
         self.view = camera.view
+        self.back_side = -1.0 if np.linalg.det(camera.view[:3, :3]) > 0 else 1.0
         self.is_in_eye_space = in_eye_space
         self.uv = mesh.uv
         normals = self.surface.normals
@@ -68,11 +69,14 @@ class Look:
             texture = one.texture if mesh.uv is not None else None
             has_colors = texture is not None or mesh.colors is not None
             color = one.color or ((255, 255, 255) if has_colors else DEFAULT_COLOR)
-            back = None if one.back_color is None else light_of(one.back_color)
+            back = light_of(one.back_color or (0, 0, 0))[:3]
+            side = 0.0 if one.back_color is None else self.back_side
             shininess = one.shininess if one.specular > 0 else 0.0
             cutoff = one.alpha_cutoff or 0.0
             engine = None if texture is None else texture.engine
-            rows.append((light_of(color), back, (one.specular,) * 3, shininess, is_unlit or one.unlit, cutoff, engine))
+            rows.append(
+                (light_of(color), back, side, (one.specular,) * 3, shininess, is_unlit or one.unlit, cutoff, engine)
+            )
         self.shading.set_materials(rows)
 
     def set_lights(self, lights: Sequence[Light] | None, ambient: float) -> None:

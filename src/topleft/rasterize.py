@@ -13,13 +13,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from topleft import _engine
+from topleft import _engine, choices
 from topleft.area import sum_areas
 from topleft.arrays import as_out
 from topleft.classic import draw_classic, refuse_classic
 from topleft.fragments import Fragments
 from topleft.memory import Memory
-from topleft.methods import METHODS
 from topleft.models import DepthTest, Sampling, Sink, parse
 from topleft.sampling import draw_planes, sample_positions
 from topleft.snapped import Snapped, check_triangles, snap_scene
@@ -27,10 +26,6 @@ from topleft.threads import count_threads, run_parts
 from topleft.view import View
 
 __all__ = ["canvas_of", "draw", "draw_all_samples", "draw_coverage", "draw_fragments", "draw_overdraw"]
-
-
-#: Triangles times threads. With fewer, threads that each set up every triangle are done before they have met twice.
-MIN_TRIANGLES_TO_SHARE = 1_000_000
 
 
 def draw(
@@ -41,6 +36,7 @@ def draw(
     pixels: NDArray[Any],
     *,
     depth: NDArray[np.float32] | None = None,
+    earlier_wins: bool = False,
 ) -> None:
     """Clear contiguous buffers and draw a scene into them, in bands of rows."""
     width, height = view.size
@@ -53,33 +49,40 @@ def draw(
     if sink in (Sink.MASK, Sink.SAMPLES):
         n_samples = 1 if samples is None else len(samples)
         covered = memory.empty("covered", _engine.Target.covered_shape(height, width, n_samples), np.uint64)
-    target = _engine.Target(sink, pixels, depth, covered, samples)
-    n_parts = min(height, count_threads(view.threads, snapped.n_triangles))
+    target = _engine.Target(sink, pixels, depth, covered, samples, earlier_wins)
+    n_parts = choices.threads_to_draw(view, snapped.n_triangles)
 
     def draw_rows(first: int, end: int) -> int:
         return snapped.scene.draw(target, first, end - first)
 
-    if is_shared(snapped, view, n_parts, sink):
+    if choices.is_shared(view, snapped.n_triangles, n_parts, sink):
         bad_rows = draw_shared(memory, snapped, target, height, n_parts)
     else:
         bad_rows = run_parts(draw_rows, height, n_parts)
     if max(bad_rows) >= 0:
         check_triangles(snapped.triangles, snapped.corners, snapped.n_vertices)
+    view.mark("draw")
 
 
-def is_shared(snapped: Snapped, view: View, n_parts: int, sink: Sink) -> bool:
-    """Tell whether each thread is to take a share of the triangles instead of setting up all of them."""
-    pays = snapped.n_triangles * n_parts >= MIN_TRIANGLES_TO_SHARE
-    fits_lanes = sink is not Sink.SAMPLES or view.grid_bits <= 8
-    return n_parts > 1 and pays and fits_lanes and can_share(view)
+def draw_flat(
+    memory: Memory,
+    snapped: Snapped,
+    view: View,
+    ids: NDArray[np.int32],
+    depth: NDArray[np.float32],
+    flat_depth: float,
+    background: float,
+    *,
+    earlier_wins: bool,
+) -> None:
+    """Draw ids and depth of triangles that all lie at one depth: ids alone, which tell where that depth is."""
+    draw(memory, snapped, view, Sink.LABEL, ids, earlier_wins=earlier_wins)
 
+    def set_depth(first: int, end: int) -> None:
+        _engine.set_flat_depth(ids, depth, first, end - first, earlier_wins, flat_depth, background)
 
-def can_share(view: View) -> bool:
-    """Tell whether a pass over a scene can draw some of its triangles."""
-    width, height = view.size
-    is_near = max(map(abs, view.origin)) < 2**29 and width * height < 2**31
-    fits_lanes = not view.test or view.subpixel_bits <= 8
-    return is_near and fits_lanes and view.method == METHODS["auto"].code
+    run_parts(set_depth, len(ids), choices.threads_to_draw(view, snapped.n_triangles))
+    view.mark("depth")
 
 
 def draw_shared(memory: Memory, snapped: Snapped, target: _engine.Target, height: int, n_parts: int) -> list[int]:
@@ -129,6 +132,7 @@ def draw_area(
         n_threads = count_threads(view.threads, snapped.n_triangles)
         if sum_areas(memory, snapped.scene, canvas, n_threads, is_clamped=is_clamped):
             check_triangles(snapped.triangles, snapped.corners, snapped.n_vertices)
+    view.mark("draw")
     return result
 
 
@@ -221,12 +225,13 @@ def draw_all_samples(
     width, height = view.size
     if not (width and height):
         return
-    n_threads = min(height, count_threads(view.threads, snapped.n_triangles))
-    is_near = snapped.n_triangles > 0 and can_share(view)
+    n_threads = choices.threads_to_draw(view, snapped.n_triangles)
+    is_near = snapped.n_triangles > 0 and choices.can_share(view)
     if draw_planes(
         memory, snapped.scene, snapped.n_triangles, positions, sink, pixels, depth, n_threads, is_near=is_near
     ):
         check_triangles(snapped.triangles, snapped.corners, snapped.n_vertices)
+    view.mark("draw")
 
 
 def draw_fragments(
@@ -250,18 +255,31 @@ def draw_fragments(
         except (TypeError, ValueError):
             raise TypeError(f"out must be a pair (triangle, depth) of arrays, got {type(out).__name__}") from None
     snapped = snap_scene(memory, vertices, triangles, view, with_depth=True, out=out)
-    sink = {None: Sink.PAINT, DepthTest.LESS: Sink.NEAREST, DepthTest.GREATER: Sink.FARTHEST}[test]
+    sink = choices.fragment_sink(test, has_depth=snapped.has_depth)
     if not snapped.has_depth:
-        sink = Sink.PAINT
         background_depth = -np.inf if test is DepthTest.GREATER and background_depth is None else background_depth
     if view.sampling.n_samples > 1:
         return draw_samples(memory, snapped, view, sink, background_depth, ids_out, depth_out)
     shape = view.size[::-1]
+    if not snapped.has_depth and depth_out is None:
+        with canvas_of(memory, "triangle", ids_out, shape, np.int32) as (ids, canvas):
+            draw(memory, snapped, view, Sink.LABEL, canvas)
+        ground = np.inf if background_depth is None else background_depth
+        return Fragments(ids, ground, snapped.scene, snapped.n_vertices, snapped.n_triangles)
     with (
         canvas_of(memory, "triangle", ids_out, shape, np.int32) as (ids, ids_canvas),
         canvas_of(memory, "depth", depth_out, shape, np.float32) as (depth, depth_canvas),
     ):
-        draw(memory, snapped, view, sink, ids_canvas, depth=depth_canvas)
-        if background_depth is not None:
-            depth_canvas[ids_canvas < 0] = background_depth
+        flat_depth = choices.flat_depth(snapped.scene, snapped.inputs, view, has_depth=snapped.has_depth)
+        if flat_depth is not None:
+            background = background_depth
+            if background is None:
+                background = -np.inf if test is DepthTest.GREATER else np.inf
+            earlier_wins = choices.earlier_wins(test, has_depth=snapped.has_depth)
+            flat = flat_depth, background
+            draw_flat(memory, snapped, view, ids_canvas, depth_canvas, *flat, earlier_wins=earlier_wins)
+        else:
+            draw(memory, snapped, view, sink, ids_canvas, depth=depth_canvas)
+            if background_depth is not None:
+                depth_canvas[ids_canvas < 0] = background_depth
     return Fragments(ids, depth, snapped.scene, snapped.n_vertices, snapped.n_triangles)

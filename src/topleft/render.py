@@ -19,11 +19,12 @@ from topleft.colors import DEFAULT_COLOR, as_color
 from topleft.cutout import cut_out
 from topleft.eye import distances
 from topleft.fragments import BentFragments, Fragments
+from topleft.material import Material
 from topleft.mesh import Mesh
 from topleft.multisample import shade_samples
 from topleft.scene import Instance, Scene
 from topleft.scene_draw import draw_scene
-from topleft.scene_render import camera_of, cull_of, refuse_holes, shade_scene
+from topleft.scene_render import camera_of, cull_of, matrix_of, refuse_holes, shade_scene
 from topleft.shade import LookOptions, Shading, shade
 
 DEFAULT_SIZE = (640, 480)
@@ -84,7 +85,8 @@ def render(
     Raises
     ------
     ValueError
-        If the mesh has no triangles and no camera is given, or an option is unknown.
+        If the mesh has no triangles and no camera is given, an option is unknown, or a scene is to be seen through a
+        lens.
 
     Examples
     --------
@@ -96,6 +98,29 @@ def render(
     mesh = mesh if isinstance(mesh, Scene) else as_mesh(mesh)
     camera = default_camera(mesh, size) if camera is None else camera
     frags = rasterize_mesh(mesh, camera, size, cull=cull, threads=threads, sampling=sampling, rasterizer=rasterizer)
+    return picture_of(
+        frags, mesh, camera, shading=shading, color=color, background=background, cull=cull, edges=edges,
+        threads=threads, **look,
+    )  # fmt: skip
+
+
+def picture_of(
+    frags: Fragments,
+    mesh: Mesh | Scene,
+    camera: Camera,
+    *,
+    shading: str = "smooth",
+    color: tuple[int, ...] = DEFAULT_COLOR,
+    background: tuple[int, ...] = WHITE,
+    cull: str = "none",
+    edges: bool = False,
+    threads: int | None = None,
+    **look: Unpack[LookOptions],
+) -> npt.NDArray[np.uint8]:
+    """The picture of the visibility buffer that `rasterize_mesh` returned; options as for `render`.
+
+    What materials cut out is taken out of the buffer.
+    """
     options: dict[str, Any] = {"shading": shading, "color": color, "threads": threads, **look}
     options["background"] = as_color("background", background, 4)
     make = picture_of_scene if isinstance(mesh, Scene) else picture_of_mesh
@@ -117,6 +142,15 @@ def picture_of_mesh(
     if isinstance(frags, BentFragments) and options["shading"] in (Shading.IDS, Shading.DEPTH):
         shown, surface = frags.again(), mesh
     return shade(shown, surface, view, **options)
+
+
+def without_holes(frags: Fragments, mesh: Mesh, camera: Camera, material: Material | None) -> Fragments:
+    """The visibility buffer of a mesh without what its materials (or this one) cut out; `frags` is changed."""
+    if not isinstance(frags, BentFragments):
+        cut_out(frags, mesh, camera, material)
+        return frags
+    cut_out(frags.parts, frags.mesh_of_parts(mesh), camera.straightened(), material)
+    return frags.again()
 
 
 def picture_of_scene(
@@ -165,13 +199,14 @@ def rasterize_mesh(
     Raises
     ------
     ValueError
-        If the mesh has no triangles and no camera is given, an option is unknown, or `rasterizer` has another size.
+        If the mesh has no triangles and no camera is given, an option is unknown, `rasterizer` has another size, or a
+        scene is to be seen through a lens.
     """
     mesh = mesh if isinstance(mesh, Scene) else as_mesh(mesh)
     camera = default_camera(mesh, size) if camera is None else camera
     view |= {"cull": cull, "threads": threads}
     if isinstance(mesh, Scene):
-        return draw_scene(mesh, camera.clip_from_world(view.get("viewport") or size), size, **view)
+        return draw_scene(mesh, matrix_of(camera, view.get("viewport") or size), size, **view)
     drawn = seen_through(mesh, camera, view.get("viewport") or size, near_clip=view.get("near_clip", True))
     view["transform"] = drawn.transform
     if rasterizer is None:

@@ -65,6 +65,8 @@ class SceneFragments(Fragments):
         The same for each sample, with several a pixel.
     """
 
+    _planes: tuple[NDArray[np.int32], NDArray[np.float32]]
+
     def __init__(
         self,
         ids: NDArray[np.int32],
@@ -73,8 +75,8 @@ class SceneFragments(Fragments):
         positions: Sequence[tuple[int, int]],
     ) -> None:
         """Take planes (S, H, W) and where their samples lie."""
-        self.id, self.depth = ids[0], depth[0]
-        self.samples_id, self.samples_depth = np.moveaxis(ids, 0, -1), np.moveaxis(depth, 0, -1)
+        self.id, self._depth = ids[0], depth[0]
+        self.samples_id = np.moveaxis(ids, 0, -1)
         self._placed = placed
         self._positions = positions
         self._planes = ids, depth
@@ -100,7 +102,7 @@ class SceneFragments(Fragments):
         return instances_of(self.samples_id, self._placed.first_ids)
 
     @cached_property
-    def samples_triangle(self) -> NDArray[np.int32]:  # type: ignore[override]
+    def samples_triangle(self) -> NDArray[np.int32]:
         """Index of the triangle in its mesh that each sample sees, int32 (H, W, S)."""
         return local_ids(self.samples_id, self.samples_instance, self._placed.first_ids)
 

@@ -5,6 +5,7 @@ Input: `SceneFragments`, `Scene`, `Camera`. Output: a picture (H, W, 4) uint8, s
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -15,12 +16,14 @@ from topleft.camera import Camera
 from topleft.colors import id_colors
 from topleft.cutout import has_holes
 from topleft.fragments import Fragments
+from topleft.frame import is_similarity
+from topleft.light import Light, LightKind, LightSpace
 from topleft.material import Material
 from topleft.scene import Instance, Scene
 from topleft.scene_fragments import SceneFragments
 from topleft.shade import shade
 
-__all__ = ["camera_of", "cull_of", "refuse_holes", "shade_scene"]
+__all__ = ["camera_of", "cull_of", "matrix_of", "refuse_holes", "shade_scene"]
 
 
 def camera_of(camera: Camera, instance: Instance) -> Camera:
@@ -28,9 +31,40 @@ def camera_of(camera: Camera, instance: Instance) -> Camera:
     return replace(camera, view=camera.view @ instance.transform)
 
 
+def matrix_of(camera: Camera, size: tuple[int, int]) -> npt.NDArray[np.float64]:
+    """Clip space from the world, for a scene in a picture of this size.
+
+    Raises
+    ------
+    ValueError
+        If the camera has a lens.
+    """
+    if camera.lens is not None:
+        raise ValueError("a scene is not drawn through a lens, but camera has one: draw a mesh, or straightened()")
+    return camera.clip_from_world(size)
+
+
 def cull_of(cull: str, instance: Instance) -> str:
     """What `cull` leaves out of an instance, whose winding is turned over where it is mirrored."""
     return {"back": "front", "front": "back"}.get(cull, cull) if instance.is_mirrored else cull
+
+
+def lights_of(lights: Sequence[Light] | None, camera: Camera, instance: Instance) -> Sequence[Light] | None:
+    """The lights as they stand in the object space of an instance, as bright as they are in the world."""
+    if lights is None:
+        return None
+    object_from_world = np.linalg.inv(instance.transform)
+    # `Look` measures distances in object space where the way to the eye keeps angles, else in eye space.
+    in_object_space = is_similarity(camera.view @ instance.transform)
+    scale = np.cbrt(abs(np.linalg.det(instance.transform[:3, :3]))) if in_object_space else 1.0
+    moved = []
+    for light in lights:
+        if not isinstance(light, Light):
+            raise TypeError(f"lights must be of Light, got {type(light).__name__}")
+        at = np.array([*light.at, light.kind == LightKind.POINT])
+        at = at if light.space == LightSpace.EYE else object_from_world @ at
+        moved.append(replace(light, at=tuple(at[:3]), falloff=float(light.falloff * scale**2)))
+    return moved
 
 
 def refuse_holes(scene: Scene, material: Material | None) -> None:
@@ -49,8 +83,10 @@ def shade_scene(
     picture[...] = background
     if not isinstance(frags, SceneFragments):
         raise TypeError(f"frags must be what rasterize_mesh returns of a scene, got {type(frags).__name__}")
+    lights: Sequence[Light] | None = look.pop("lights", None)
     for part in frags.parts:
         instance = scene[part.instance]
+        look["lights"] = lights_of(lights, camera, instance)
         own = shade(
             part.frags, instance.mesh, camera_of(camera, instance), background=background, shading=shading, **look
         )

@@ -1,6 +1,6 @@
 """What a camera sees of a mesh or scene, and where in space each visible pixel lies: computed when it is asked for.
 
-Input: `Mesh` or `Scene`, `Camera`. Output: `Sight`, from which `view_layers` takes its layers.
+Input: `Mesh` or `Scene`, `Camera`. Output: `Sight`, from which `layers` are taken.
 """
 
 from __future__ import annotations
@@ -13,12 +13,15 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from topleft.api import Rasterizer
 from topleft.camera import Camera
+from topleft.cutout import has_holes
 from topleft.fragments import Fragments
 from topleft.mesh import Mesh
-from topleft.render import rasterize_mesh
+from topleft.render import rasterize_mesh, without_holes
 from topleft.scene import Instance, Scene
 from topleft.scene_fragments import Part, SceneFragments
+from topleft.scene_render import refuse_holes
 
 __all__ = ["Sight", "Surface", "moved", "project"]
 
@@ -79,6 +82,8 @@ class Sight:
         Who looks when the flow ends.
     transforms_to : (N, 4, 4) float64, optional
         Where the instances are then.
+    rasterizer : Rasterizer, optional
+        What layers hold may lie in its memory, which the next picture overwrites.
     """
 
     subject: Mesh | Scene
@@ -88,6 +93,7 @@ class Sight:
     look: dict[str, Any] = field(default_factory=dict)
     camera_to: Camera | None = None
     transforms_to: F64 | None = None
+    rasterizer: Rasterizer | None = None
 
     @property
     def instances(self) -> Sequence[Instance]:
@@ -96,8 +102,37 @@ class Sight:
 
     @cached_property
     def frags(self) -> Fragments:
-        """The visibility buffer, at the centres of the pixels."""
-        return rasterize_mesh(self.subject, self.camera, self.size, **self.options)
+        """The visibility buffer, at the centres of the pixels, without what materials cut out."""
+        return self._cut(rasterize_mesh(*self._view, rasterizer=self.rasterizer, **self.options))
+
+    def sampled(self, sampling: str) -> Fragments:
+        """Return the same with several samples a pixel."""
+        return self._cut(rasterize_mesh(*self._view, sampling=sampling, **self.options))
+
+    @cached_property
+    def has_holes(self) -> bool:
+        """Whether materials cut something out of the mesh.
+
+        Raises
+        ------
+        ValueError
+            If they do so in a scene.
+        """
+        material = self.look.get("material")
+        if isinstance(self.subject, Scene):
+            refuse_holes(self.subject, material)
+            return False
+        materials = self.subject.materials if material is None else (material,)
+        return any(has_holes(one, self.subject) for one in materials)
+
+    @property
+    def _view(self) -> tuple[Mesh | Scene, Camera, tuple[int, int]]:
+        return self.subject, self.camera, self.size
+
+    def _cut(self, frags: Fragments) -> Fragments:
+        if not self.has_holes or isinstance(self.subject, Scene):
+            return frags
+        return without_holes(frags, self.subject, self.camera, self.look.get("material"))
 
     @cached_property
     def surfaces(self) -> Sequence[Surface]:
@@ -128,9 +163,16 @@ def moved(points: F64, matrix: F64) -> F64:
     return np.stack([((a * x + b * y) + c * z) + d for a, b, c, d in matrix], -1)
 
 
-def project(points: F64, clip_from: F64, size: tuple[int, int]) -> F64:
-    """Where points (P, 3) lie in a picture, pixels (P, 2) float64; NaN for what is not in front of the camera."""
-    x, y, w = moved(points, clip_from[[0, 1, 3]]).T
-    w[~(w > 0)] = np.nan
+def project(points: F64, camera: Camera, transform: F64, size: tuple[int, int]) -> F64:
+    """Where points (P, 3) of an object lie in a picture, pixels (P, 2) float64; NaN for what the camera cannot see."""
+    projection = camera.clip_from_eye(size)
+    if camera.lens is None:
+        is_seen = np.ones(len(points), np.bool_)
+        x, y, w = moved(points, (projection @ camera.view @ transform)[[0, 1, 3]]).T
+    else:
+        eye = moved(points, (camera.view @ transform)[:3])
+        is_seen = np.arctan2(np.hypot(eye[:, 0], eye[:, 1]), -eye[:, 2]) < camera.lens.max_angle
+        x, y, w = moved(camera.lens.bend(eye), projection[[0, 1, 3]]).T
+    w[~(is_seen & (w > 0))] = np.nan
     width, height = size
     return np.stack([(x / w + 1) * (width / 2), (1 - y / w) * (height / 2)], -1)

@@ -8,17 +8,14 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from topleft import _engine
+from topleft import _engine, choices
 from topleft.arrays import as_matrix, as_triangles, as_vertices, bad_triangle
 from topleft.memory import Memory
 from topleft.sampling import refine_grid
-from topleft.threads import count_threads, run_parts
+from topleft.threads import run_parts
 from topleft.view import View
 
 __all__ = ["Snapped", "check_triangles", "snap_scene"]
-
-#: Fewer vertices are snapped, and fewer triangles converted, by one thread: waking another takes as long.
-MIN_VERTICES_TO_SHARE = 200_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +28,7 @@ class Snapped:
     n_vertices: int
     n_triangles: int
     has_depth: bool
+    inputs: choices.Inputs
 
 
 def snap_scene(
@@ -50,8 +48,10 @@ def snap_scene(
     """
     points = as_vertices(vertices, has_transform=view.transform is not None)
     matrix = None if view.transform is None else as_matrix(view.transform, points.dtype)
-    source = _engine.Source(points, matrix)
-    corners, is_checked = index_triangles(memory, triangles, len(points), view.threads)
+    is_affine = choices.is_affine(matrix)
+    source = _engine.Source(points, matrix, is_affine)
+    corners, is_checked = index_triangles(memory, triangles, len(points), view)
+    view.mark("input")
     n_triangles = len(corners)
     n = len(points) if n_triangles and 0 not in view.size else 0
     records = memory.empty("records", (n * _engine.VERTEX_BYTES,), np.uint8)
@@ -65,23 +65,26 @@ def snap_scene(
     wide: NDArray[np.int64] | None = None
     bad = clipped = 0
     if n:
-        n_parts = count_threads(view.threads, n_triangles) if n >= MIN_VERTICES_TO_SHARE else 1
+        n_parts = choices.threads_to_snap(view.threads, n, n_triangles)
         bad, n_wide, clipped = (sum(counts) for counts in zip(*run_parts(snap, n, n_parts), strict=True))
         if n_wide:
             wide = np.empty((n, 2), np.int64)
             snap(0, n)
+    view.mark("vertices")
     if not is_checked and (out is not None or n == 0 or bad or clipped):
         check_triangles(triangles, corners, len(points))
     if bad:
         check_used_vertices(points, records, corners, view)
     pieces = _engine.Pieces(source, records, corners, engine_view) if engine_view and clipped else None
+    view.mark("clip")
     if view.grid_bits > view.subpixel_bits:
         wide = refine_scene(points, records, wide, corners, pieces, view)
     drawn = corners if n else corners[:0]
     how = (*view.origin, view.grid_bits, view.cull, view.method, view.test)
     scene = _engine.Scene(source, records, wide, drawn, pieces, *how, engine_view)
     has_depth = source.is_clip_space or points.shape[1] == 3
-    return Snapped(scene, triangles, corners, len(points), n_triangles, has_depth)
+    inputs = choices.Inputs(points, records, pieces, source.is_clip_space, is_affine)
+    return Snapped(scene, triangles, corners, len(points), n_triangles, has_depth, inputs)
 
 
 def refine_scene(
@@ -103,9 +106,11 @@ def refine_scene(
 
 
 def index_triangles(
-    memory: Memory, triangles: ArrayLike, n_vertices: int, threads: int | None
+    memory: Memory, triangles: ArrayLike, n_vertices: int, view: View
 ) -> tuple[NDArray[np.int32], bool]:
     """Return triangles as int32, and whether their indices have been checked on the way."""
+    if view.plan is not None:
+        return view.plan.corners_of(triangles, n_vertices), True
     indices = as_triangles(triangles)
     if indices.dtype == np.int32:
         return cast("NDArray[np.int32]", indices), False
@@ -117,7 +122,7 @@ def index_triangles(
         return first + row if row >= 0 else -1
 
     n = len(indices)
-    rows = run_parts(narrow, n, count_threads(threads, n) if n >= MIN_VERTICES_TO_SHARE else 1)
+    rows = run_parts(narrow, n, choices.threads_to_convert(view.threads, n))
     for row in rows:
         if row >= 0:
             raise bad_triangle(triangles, row, n_vertices)

@@ -1,6 +1,6 @@
 """Transparent pictures: every layer of a mesh or scene is shaded, then they are seen through each other.
 
-Input: `Mesh` or `Scene`, `Camera`. Output: a picture (H, W, 4) uint8, sRGB with alpha.
+Input: a mesh or `Scene`, `Camera`. Output: a picture (H, W, 4) uint8, sRGB with alpha.
 """
 
 from __future__ import annotations
@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from topleft.adapt import MeshLike, as_mesh
 from topleft.camera import Camera
 from topleft.colors import as_color
 from topleft.composite import composite
 from topleft.depth_layers import DepthLayers, peel
-from topleft.mesh import Mesh
 from topleft.render import DEFAULT_SIZE, WHITE, default_camera
 from topleft.scene import Scene
 from topleft.scene_draw import peel_scene
@@ -27,7 +27,7 @@ CLEAR = (0, 0, 0, 0)
 
 
 def render_transparent(
-    mesh: Mesh | Scene,
+    mesh: MeshLike | Scene,
     camera: Camera | None = None,
     size: tuple[int, int] = DEFAULT_SIZE,
     *,
@@ -58,7 +58,7 @@ def render_transparent(
     Raises
     ------
     ValueError
-        If the mesh has no triangles and no camera is given, or an option is out of range.
+        If the mesh has no triangles and no camera is given, an option is out of range, or the camera has a lens.
 
     Examples
     --------
@@ -67,6 +67,7 @@ def render_transparent(
     >>> tl.render_transparent(mesh, size=(64, 48), opacity=0.5, background=(0, 0, 0, 0))[24, 32].tolist()[3]
     192
     """
+    mesh = mesh if isinstance(mesh, Scene) else as_mesh(mesh)
     camera = default_camera(mesh, size) if camera is None else camera
     ground = as_color("background", background, 4)
     found = visible_layers(mesh, camera, size, layers=layers, cull=cull, threads=threads)
@@ -85,7 +86,7 @@ def render_transparent(
 
 
 def visible_layers(
-    mesh: Mesh | Scene, camera: Camera | None = None, size: tuple[int, int] = DEFAULT_SIZE, **options: Any
+    mesh: MeshLike | Scene, camera: Camera | None = None, size: tuple[int, int] = DEFAULT_SIZE, **options: Any
 ) -> DepthLayers:
     """The nearest layers of every pixel of a mesh or scene; options as for `peel`.
 
@@ -104,9 +105,12 @@ def visible_layers(
     Raises
     ------
     ValueError
-        If the mesh has no triangles and no camera is given, or an option is out of range.
+        If the mesh has no triangles and no camera is given, an option is out of range, or the camera has a lens.
     """
+    mesh = mesh if isinstance(mesh, Scene) else as_mesh(mesh)
     camera = default_camera(mesh, size) if camera is None else camera
+    if camera.lens is not None:
+        raise ValueError("layers are not peeled through a lens, but camera has one: take its straightened()")
     transform = camera.clip_from_world(options.get("viewport") or size)
     if isinstance(mesh, Scene):
         return peel_scene(mesh, transform, size, **{"layers": 4} | options)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypedDict
+from typing import Any, Protocol, TypedDict
 
-from numpy.typing import ArrayLike
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine
 from topleft.arrays import as_size, as_subpixel_bits, as_window
@@ -14,10 +15,23 @@ from topleft.models import ClipDepth, Cull, Sampling, parse
 from topleft.sampling import SAMPLE_GRID_BITS
 from topleft.threads import parse_threads
 
-__all__ = ["View", "ViewOptions"]
+__all__ = ["Planned", "View", "ViewOptions"]
 
 TEST_CODES = {Sampling.OUTER: 1, Sampling.INNER: 2}  # tl_test in csrc/topleft.h
 CULL_CODES = {Cull.NONE: 0, Cull.BACK: 1, Cull.FRONT: 2}  # tl_cull in csrc/topleft.h
+
+
+class Planned(Protocol):
+    """What a verb asks of the plan that it is given: `topleft.Plan`."""
+
+    def fitted(self, view: View) -> View:
+        """Return the view with what was chosen for it, or raise an error where the plan is for another one."""
+
+    def corners_of(self, triangles: ArrayLike, n_vertices: int) -> NDArray[np.int32]:
+        """Return the checked int32 triangles, or raise an error where the plan is for others."""
+
+    def mark(self, stage: str) -> None:
+        """Note that a stage has ended."""
 
 
 class ViewOptions(TypedDict, total=False):
@@ -34,6 +48,7 @@ class ViewOptions(TypedDict, total=False):
     near_clip: bool
     far_clip: bool
     threads: int | None
+    plan: Any
 
 
 OPTIONS = frozenset(ViewOptions.__annotations__)
@@ -57,11 +72,17 @@ class View:
     far_clip: bool
     threads: int | None
     classic: Method | None = None
+    plan: Planned | None = None
 
     def engine_view(self) -> _engine.View:
         """Return how clip space maps to pixels."""
         bits = self.subpixel_bits, self.grid_bits
         return _engine.View(self.viewport, *bits, self.zero_to_one, self.near_clip, self.far_clip)
+
+    def mark(self, stage: str) -> None:
+        """Note for the plan that a stage has ended."""
+        if self.plan is not None:
+            self.plan.mark(stage)
 
     @property
     def test(self) -> int:
@@ -80,7 +101,10 @@ class View:
         grid_bits = bits if sampling.n_samples == 1 else max(SAMPLE_GRID_BITS, bits)
         viewport = options.get("viewport")
         method = find_method(options.get("method", "auto"))
-        return cls(
+        plan = options.get("plan")
+        if not (plan is None or hasattr(plan, "fitted")):
+            raise TypeError(f"plan must be a Plan or None, got {type(plan).__name__}")
+        view = cls(
             size=checked_size,
             origin=as_window(options.get("origin", (0, 0)), grid_bits),
             viewport=checked_size if viewport is None else as_size(viewport, "viewport", smallest=1),
@@ -97,3 +121,4 @@ class View:
             threads=parse_threads(options.get("threads")),
             classic=method if method.code is None else None,
         )
+        return view if plan is None else plan.fitted(view)

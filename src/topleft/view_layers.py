@@ -6,26 +6,31 @@ Input: `Mesh` or `Scene`, `Camera`, names. Output: `ViewLayers`, arrays by name;
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from types import MappingProxyType
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from topleft.adapt import MeshLike, as_mesh
+from topleft.api import Rasterizer
 from topleft.camera import Camera
-from topleft.eye import eye_normals
-from topleft.mesh import Mesh, unit_or_zero
-from topleft.render import DEFAULT_SIZE, default_camera, render
+from topleft.layer_files import save_layers
+from topleft.layers import LAYERS, check_layers, draw_layers
+from topleft.render import DEFAULT_SIZE, default_camera
 from topleft.scene import Scene
-from topleft.scene_render import camera_of
-from topleft.sight import Sight, Surface, moved, project
-from topleft.silhouette import silhouette as draw_silhouette
+from topleft.shade import LookOptions
+from topleft.sight import Sight
 
-__all__ = ["LAYERS", "ViewLayers", "render_layers"]
+__all__ = ["ViewLayers", "render_layers", "sight_of"]
 
 Array = npt.NDArray[Any]
 F64 = npt.NDArray[np.float64]
+
+LOOKS = frozenset({"shading", "color", "background", "edges", "sampling", *LookOptions.__annotations__})
+GLASS_LOOKS = frozenset({"shading", "color", "background", "opacity", "layers", *LookOptions.__annotations__})
+"""Options of `render` and of `render_transparent` that are for colours alone, and `sampling`."""
 
 
 class ViewLayers(Mapping[str, Array]):
@@ -46,15 +51,23 @@ class ViewLayers(Mapping[str, Array]):
     def __repr__(self) -> str:
         return f"ViewLayers({', '.join(f'{name} {array.shape} {array.dtype}' for name, array in self.items())})"
 
-    def save(self, path: str | os.PathLike[str], layer: str | None = None, *, scale: float | None = None) -> None:
-        """Write the layers, or one of them; see `topleft.view_layer_files.save_layers`."""
-        from topleft.view_layer_files import save_layers
+    def save(
+        self, path: str | os.PathLike[str], layer: str | None = None, *, scale: float | None = None
+    ) -> tuple[Path, ...]:
+        """Write the layers, or one of them, and return the files; see `topleft.layer_files.save_layers`.
 
-        save_layers(path, self, layer, scale=scale)
+        Raises
+        ------
+        ValueError
+            If there is no such layer; and as `save_layers` does.
+        """
+        if layer is not None and layer not in self:
+            raise ValueError(f"layer must be one of {', '.join(self)}, got {layer!r}")
+        return save_layers(path, self if layer is None else {layer: self[layer]}, scale=scale)
 
 
 def render_layers(
-    mesh: Mesh | Scene,
+    mesh: MeshLike | Scene,
     camera: Camera | None = None,
     size: tuple[int, int] = DEFAULT_SIZE,
     *,
@@ -64,13 +77,14 @@ def render_layers(
     transforms_to: npt.ArrayLike | None = None,
     cull: str = "none",
     threads: int | None = None,
+    rasterizer: Rasterizer | None = None,
     **look: Any,
 ) -> ViewLayers:
     """Layers of one view by name: depth, normals, positions, ids and flow beside the colours.
 
     Parameters
     ----------
-    mesh : Mesh or Scene
+    mesh : Mesh, Scene, or whatever `as_mesh` takes
         What to look at.
     camera : Camera, optional
         Unless given, the three-quarter view of `Camera.framing`, with y up.
@@ -88,9 +102,11 @@ def render_layers(
         given they stay.
     cull, threads
         As for `render`.
+    rasterizer : Rasterizer, optional
+        Of this size: "depth" and "triangle" lie in its memory, until the next call.
     **look
-        Further options of `render`, for "color". `sampling` also holds for "alpha" and "silhouette"; every other layer
-        is taken at the centres of the pixels.
+        Further options of `render`, for "color"; with `opacity` those of `render_transparent`. `sampling` also holds
+        for "alpha" and "silhouette"; every other layer is taken at the centres of the pixels.
 
     Returns
     -------
@@ -122,7 +138,7 @@ def render_layers(
     ------
     ValueError
         If there is no such layer, an attribute has its name or does not fit, "flow" has no end, "uv" finds no texture
-        coordinates, or an option of `render` is wrong.
+        coordinates, an option of `render` is wrong, a scene is to be seen through a lens, or has cut-outs.
     TypeError
         If an option is unknown, or of colours and no colours are asked for.
 
@@ -131,6 +147,11 @@ def render_layers(
     The point of a pixel lies on its triangle and projects to within 2**-9 pixels of the centre in x and y, half a
     sub-pixel, which is what the snap moves a vertex by; float32 then rounds it. Flow is the difference of its two
     projections in float64, so what does not move has flow 0, to the bit.
+
+    All layers show the mesh without what its materials cut out.
+
+    Through a lens a point projects to within its `tolerance_px` and half a sub-pixel of the centre. "distance" is along
+    the axis, also through a fisheye, whose "depth" is that of the distance from the eye. No scene is seen through one.
 
     Examples
     --------
@@ -144,18 +165,11 @@ def render_layers(
     names = check_layers(layers)
     for option in look.keys() - {"sampling"} if "color" not in names else ():
         raise TypeError(f"option {option!r} is for layer 'color', which is not among {', '.join(names)}")
-    camera = default_camera(mesh, size) if camera is None else camera
-    n_instances = len(mesh) if isinstance(mesh, Scene) else 1
-    sight = Sight(
-        subject=mesh,
-        camera=camera,
-        size=size,
-        options={"cull": cull, "threads": threads},
-        look=look,
-        camera_to=camera_to,
-        transforms_to=None if transforms_to is None else as_transforms(transforms_to, n_instances),
-    )
-    found = {name: LAYERS[name](sight) for name in names}
+    sight = sight_of(
+        mesh, camera, size, camera_to=camera_to, transforms_to=transforms_to, cull=cull, threads=threads,
+        rasterizer=rasterizer, **look,
+    )  # fmt: skip
+    found = draw_layers(names, sight)
     for name, values in (attributes or {}).items():
         if name in LAYERS:
             raise ValueError(f"attributes must not have the name of a layer, got {name!r}")
@@ -163,13 +177,41 @@ def render_layers(
     return ViewLayers(found)
 
 
-def check_layers(layers: str | Iterable[str]) -> tuple[str, ...]:
-    """Return names of layers, each once, after checking them."""
-    names = tuple(dict.fromkeys((layers,) if isinstance(layers, str) else layers))
-    for name in names:
-        if name not in LAYERS:
-            raise ValueError(f"layers must be some of {', '.join(LAYERS)}, got {name!r}")
-    return names
+def sight_of(
+    mesh: MeshLike | Scene,
+    camera: Camera | None,
+    size: tuple[int, int],
+    *,
+    camera_to: Camera | None = None,
+    transforms_to: npt.ArrayLike | None = None,
+    cull: str = "none",
+    threads: int | None = None,
+    rasterizer: Rasterizer | None = None,
+    **look: Any,
+) -> Sight:
+    """Return what layers are taken of; arguments as for `render_layers`.
+
+    Raises
+    ------
+    TypeError
+        If an option is unknown.
+    ValueError
+        If the mesh has no triangles and no camera is given, or `transforms_to` holds no matrices.
+    """
+    for option in sorted(look.keys() - (GLASS_LOOKS if "opacity" in look else LOOKS)):
+        raise TypeError(f"there is no option {option!r} of a picture")
+    subject = mesh if isinstance(mesh, Scene) else as_mesh(mesh)
+    n_instances = len(subject) if isinstance(subject, Scene) else 1
+    return Sight(
+        subject=subject,
+        camera=default_camera(subject, size) if camera is None else camera,
+        size=size,
+        options={"cull": cull, "threads": threads},
+        look=look,
+        camera_to=camera_to,
+        transforms_to=None if transforms_to is None else as_transforms(transforms_to, n_instances),
+        rasterizer=rasterizer,
+    )
 
 
 def as_transforms(transforms: npt.ArrayLike, n: int) -> F64:
@@ -184,125 +226,3 @@ def as_transforms(transforms: npt.ArrayLike, n: int) -> F64:
     if not (array[:, 3] == [0, 0, 0, 1]).all():
         raise ValueError("the last row of each of transforms_to must be [0, 0, 0, 1]")
     return array
-
-
-# ---- one function a layer ---------------------------------------------------------------------------------------
-
-
-def color(sight: Sight) -> Array:
-    """The picture (H, W, 4) uint8 of `render`."""
-    return render(sight.subject, sight.camera, sight.size, **sight.options, **sight.look)
-
-
-def alpha(sight: Sight) -> Array:
-    """How much of the pixel is covered, (H, W) uint8, 255 for all of it."""
-    return np.rint(silhouette(sight) * np.float32(255)).astype(np.uint8)
-
-
-def silhouette(sight: Sight) -> Array:
-    """Where the subject is, (H, W): bool, or the share of samples, float32."""
-    sampling = sight.look.get("sampling", "center")
-    if sampling == "center":
-        return sight.frags.mask
-    return draw_silhouette(sight.subject, sight.camera, sight.size, sampling=sampling, **sight.options)
-
-
-def depth(sight: Sight) -> Array:
-    """Window depth (H, W) float32, +inf where nothing is."""
-    return sight.frags.depth
-
-
-def distance(sight: Sight) -> Array:
-    """Distance along the view (H, W) float32, world units, +inf where nothing is."""
-    return sight.join((), np.inf, lambda surface: -moved(surface.points_world, sight.camera.view[2:3])[:, 0])
-
-
-def ray_distance(sight: Sight) -> Array:
-    """Distance from the eye (H, W) float32, world units, +inf where nothing is; along the view without perspective."""
-    if not sight.camera.projection[3, :3].any():
-        return distance(sight)
-
-    def make(surface: Surface) -> F64:
-        x, y, z = moved(surface.points_world, sight.camera.view[:3]).T
-        return np.sqrt(x * x + y * y + z * z)
-
-    return sight.join((), np.inf, make)
-
-
-def triangle(sight: Sight) -> Array:
-    """Index of the triangle in its mesh, (H, W) int32, -1 where nothing is."""
-    return sight.frags.triangle
-
-
-def instance(sight: Sight) -> Array:
-    """Index of the instance, (H, W) int32, -1 where nothing is."""
-    return sight.frags.instance
-
-
-def barycentric(sight: Sight) -> Array:
-    """Weights of the triangle's vertices, (H, W, 3) float32, 0 where nothing is."""
-    return sight.frags.barycentric()
-
-
-def world_position(sight: Sight) -> Array:
-    """The point of the surface, (H, W, 3) float32, NaN where nothing is."""
-    return sight.join((3,), np.nan, lambda surface: surface.points_world)
-
-
-def camera_normal(sight: Sight) -> Array:
-    """Unit normal in eye space, (H, W, 3) float32, 0 where nothing is."""
-    return sight.join((3,), 0.0, lambda surface: normals_of(surface, sight.camera))
-
-
-def world_normal(sight: Sight) -> Array:
-    """Unit normal in the world, (H, W, 3) float32, 0 where nothing is."""
-    back = np.hstack([sight.camera.view[:3, :3].T, np.zeros((3, 1))])  # the transpose, where positions take the inverse
-
-    def make(surface: Surface) -> F64:
-        return unit_or_zero(moved(normals_of(surface, sight.camera).astype(np.float64), back))
-
-    return sight.join((3,), 0.0, make)
-
-
-def normals_of(surface: Surface, camera: Camera) -> npt.NDArray[np.float32]:
-    """Unit normals (P, 3) of the pixels of a surface in eye space, on the side that is seen."""
-    own = camera_of(camera, surface.instance)
-    return eye_normals(surface.part.frags, surface.instance.mesh, own, is_smooth=True)
-
-
-def uv(sight: Sight) -> Array:
-    """Texture coordinates, (H, W, 2) float32, NaN where nothing is or a mesh has none."""
-    if all(getattr(instance.mesh, "uv", None) is None for instance in sight.instances):
-        raise ValueError("layer 'uv' needs a mesh that has texture coordinates")
-
-    def make(surface: Surface) -> Array:
-        coordinates = getattr(surface.instance.mesh, "uv", None)
-        if coordinates is None:
-            return np.full((1, 2), np.nan)
-        return surface.part.frags.interpolate(coordinates)[surface.seen]
-
-    return sight.join((2,), np.nan, make)
-
-
-def flow(sight: Sight) -> Array:
-    """Where the point of each pixel moves to in the picture, (H, W, 2) float32 pixels, NaN where nothing is."""
-    if sight.camera_to is None and sight.transforms_to is None:
-        raise ValueError("layer 'flow' needs camera_to or transforms_to")
-    begin, end = (camera.clip_from_world(sight.size) for camera in (sight.camera, sight.camera_to or sight.camera))
-
-    def make(surface: Surface) -> F64:
-        here = surface.instance.transform
-        there = here if sight.transforms_to is None else sight.transforms_to[surface.part.instance]
-        return project(surface.points, end @ there, sight.size) - project(surface.points, begin @ here, sight.size)
-
-    return sight.join((2,), np.nan, make)
-
-
-LAYERS: Mapping[str, Callable[[Sight], Array]] = MappingProxyType({
-    layer.__name__: layer
-    for layer in (
-        color, alpha, silhouette, depth, distance, ray_distance, triangle, instance, barycentric, world_position,
-        world_normal, camera_normal, uv, flow,
-    )
-})  # fmt: skip
-"""Every layer by its name."""

@@ -1,4 +1,4 @@
-"""The command line: `topleft render MESH [MESH ...] -o OUT` and `topleft info`.
+"""The command line: `topleft render MESH [MESH ...] -o OUT`, `topleft explain MESH`, `calibrate` and `info`.
 
 Exit status: 0, all pictures were written; 1, some of several inputs failed and the rest were written; 2, nothing could
 be done with what was asked, told in one line on stderr.
@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 
 from topleft._isa import build_info
 from topleft.cli.arguments import REFUSED, Parser, UsageError, add_render_arguments
+from topleft.cli.explain import add_plan_commands
 from topleft.cli.render import FAILED, complain, one_line, run_render
 from topleft.errors import TopleftError
 
@@ -51,4 +52,5 @@ def _parser() -> Parser:
     render = commands.add_parser("render", help="render meshes to pictures", description="Render meshes to pictures.")
     add_render_arguments(render)
     render.set_defaults(run=run_render)
+    add_plan_commands(commands)
     return parser

@@ -20,6 +20,9 @@ __all__ = ["REFUSED", "Parser", "UsageError", "add_picture_arguments", "add_rend
 REFUSED = 2
 """Exit status: nothing could be done."""
 
+LAYERS_OF_ONE_VIEW = tuple(name for name in LAYERS if name != "flow")
+"""Flow needs a second camera, or a second place."""
+
 RENDER_HELP = f"""\
 MESH is a file that trimesh reads (OBJ, PLY, STL, glTF, GLB, OFF, ...) or the name of a built-in shape:
 {', '.join(SHAPES)}.
@@ -31,11 +34,13 @@ OUT is a file or a folder:
                      {{layer}}; several layers without it: knot-color.png, knot-depth.png, ...
 Formats: {' '.join(SUFFIXES)} (PNG in a folder). A picture of that name is replaced, a mesh never.
 
---layers: {', '.join(LAYERS)}. .npz holds all layers of a view in one file, and clip_from_world, the 4x4 matrix; without
---layers color, id and depth. .npy and TIFF hold ids as int32 (-1: nothing) and depth as float32 (window depth, +inf:
-nothing), .npy normals as float32 (eye space). In a PNG they are 16-bit numbers (normals: 8-bit), of which text chunks
-say: number = topleft:offset + topleft:scale * value; 0 is nothing. --shading ids, depth or normals makes pictures of
-them to look at, and .npy files with the numbers behind.
+--layers: {', '.join(LAYERS_OF_ONE_VIEW[:8])},
+{', '.join(LAYERS_OF_ONE_VIEW[8:])}.
+.npz holds all layers of a view in one file, and clip_from_world, the 4x4 matrix; without --layers color, triangle and
+depth. .npy and TIFF hold ids as int32 (-1: nothing) and all other numbers as float32 (depth and distances: +inf where
+nothing is). In a PNG they are 16-bit numbers, 0 where nothing is: ids plus 1, distances in thousandths, depth from 1
+to 65535; normals and barycentrics are 8-bit. Text chunks say it: number = topleft:offset + topleft:scale * value.
+--shading ids, depth or normals makes pictures of them to look at, and .npy files with the numbers behind.
 
 --jobs-file: TOML or JSON. Keys are the long options without dashes in front, and mesh; each job may have its own, and
 what stands outside of jobs, or on the command line, holds where a job does not say otherwise:
@@ -80,28 +85,35 @@ def add_render_arguments(parser: Parser) -> None:
 
 def add_picture_arguments(parser: argparse.ArgumentParser) -> None:
     """Add what a job of a job file may say, too."""
-    add = parser.add_argument
     azimuth, elevation = THREE_QUARTER_DEG
     width, height = DEFAULT_SIZE
+    add = parser.add_argument
     add("-o", "--out", metavar="OUT", help="a file, a folder or a pattern")
     add("--size", type=_size, default=DEFAULT_SIZE, metavar="WxH", help=f"pixels (default {width}x{height})")
+    add("--views", type=_positive, default=1, metavar="N", help="a turntable of N pictures (default 1)")
+    add("--layers", type=_layers, default=(), metavar="NAME,...", help="what to write; see below (default color)")
+    add("--threads", type=_positive, default=None, metavar="N",
+        help="of a picture (default: as many as there are cores, 1 with --jobs)")
+    add = parser.add_argument_group("camera").add_argument
     add("--azimuth", type=float, default=azimuth, metavar="DEG", help="right of the front (default %(default)g)")
     add("--elevation", type=float, default=elevation, metavar="DEG", help="above level (default %(default)g)")
     add("--fov", type=float, default=DEFAULT_FOV_Y_DEG, metavar="DEG", help="bottom to top (default %(default)g)")
     add("--ortho", action="store_true", help="no perspective")
     add("--up", choices=["y", "z"], default="y", help="the axis that points up (default y)")
-    add("--shading", choices=[str(mode) for mode in Shading], default="smooth", help="(default smooth)")
+    add = parser.add_argument_group("look").add_argument
+    add("--shading", choices=[str(mode) for mode in Shading], default="smooth", metavar="NAME",
+        help=f"{', '.join(Shading)} (default smooth)")
     add("--color", type=_rgb, default=DEFAULT_COLOR, metavar="COLOR", help="of a mesh without colours")
     add("--background", type=_rgba, default=(255, 255, 255, 255), metavar="COLOR",
         help="a name, #rrggbb[aa] or transparent (default white)")
-    add("--cull", choices=[str(side) for side in Cull], default="none", help="leave out triangles (default none)")
+    add("--texture", metavar="FILE", help="a picture for all of a mesh that has texture coordinates")
+    add("--matcap", metavar="FILE", help="a picture of a lit sphere, for --shading matcap")
+    add("--opacity", type=_share, default=None, metavar="X", help="0 to 1: as if of glass, of which each layer hides X")
     add("--wireframe", action="store_true", help="draw the edges over it")
+    add("--cull", choices=[str(side) for side in Cull], default="none", help="leave out triangles (default none)")
     samplings = [str(mode) for mode in Sampling if mode is Sampling.CENTER or mode.n_samples > 1]
-    add("--sampling", choices=samplings, default="center", help="samples of a pixel (default center)")
-    add("--views", type=_positive, default=1, metavar="N", help="a turntable of N pictures (default 1)")
-    add("--layers", type=_layers, default=(), metavar="NAME,...", help=f"{','.join(LAYERS)} (default color)")
-    add("--threads", type=_positive, default=None, metavar="N",
-        help="of a picture (default: as many as there are cores, 1 with --jobs)")
+    add("--sampling", choices=samplings, default="center", metavar="NAME",
+        help=f"samples of a pixel: {', '.join(samplings)} (default center)")
 
 
 def _size(text: str) -> tuple[int, int]:
@@ -117,6 +129,16 @@ def _positive(text: str) -> int:
     return int(text)
 
 
+def _share(text: str) -> float:
+    try:
+        share = float(text)
+    except ValueError:
+        share = -1.0
+    if not 0 <= share <= 1:
+        raise argparse.ArgumentTypeError(f"must be a number from 0 to 1, got {text!r}")
+    return share
+
+
 def _rate(text: str) -> float:
     try:
         rate = float(text)
@@ -129,9 +151,12 @@ def _rate(text: str) -> float:
 
 def _layers(text: str) -> tuple[str, ...]:
     try:
-        return check_layers(name.strip() for name in text.split(","))
+        names = check_layers(name.strip() for name in text.split(","))
     except ValueError as error:
         raise argparse.ArgumentTypeError(str(error)) from None
+    if "flow" in names:
+        raise argparse.ArgumentTypeError("layer 'flow' needs two cameras: see topleft.render_layers")
+    return names
 
 
 def _rgba(text: str) -> tuple[int, ...]:

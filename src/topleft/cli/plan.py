@@ -8,7 +8,7 @@ from __future__ import annotations
 import argparse
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -18,15 +18,20 @@ import numpy.typing as npt
 
 from topleft.camera import Camera
 from topleft.cli.arguments import UsageError
+from topleft.errors import ImageError, MeshError
 from topleft.files import load
 from topleft.images import SUFFIXES
 from topleft.jobs import Job
+from topleft.material import Material
 from topleft.mesh import Mesh
+from topleft.models import Sampling
 from topleft.scenes import SHAPES, shape
+from topleft.shade import Shading
+from topleft.texture import Texture
 
 __all__ = ["Shoot", "check_targets", "plan_shoots"]
 
-SHADINGS_WITH_NUMBERS: Mapping[str, str] = {"ids": "id", "depth": "depth", "normals": "normals"}
+SHADINGS_WITH_NUMBERS: Mapping[str, str] = {"ids": "triangle", "depth": "depth", "normals": "camera_normal"}
 """Shadings that are a layer made visible: .npy holds the layer."""
 
 
@@ -35,14 +40,42 @@ class Source:
     """The mesh of a file, or the built-in shape of that name."""
 
     name: str
+    texture: str | None = None
 
     def __call__(self) -> Mesh:
         """Read it."""
+        mesh = self._mesh()
+        if self.texture is None:
+            return mesh
+        if mesh.uv is None:
+            raise MeshError(f"--texture needs texture coordinates, and {self.name!r} has none")
+        return replace(mesh, materials=(Material(texture=read_texture(self.texture)),), material_of_triangle=None)
+
+    def _mesh(self) -> Mesh:
         if self.name in SHAPES:
             return Mesh(*shape(self.name))
         if not Path(self.name).exists() and Path(self.name).name == self.name and "." not in self.name:
             raise UsageError(f"there is no file and no built-in shape {self.name!r}; shapes: {', '.join(SHAPES)}")
         return load(self.name)
+
+
+def read_texture(path: str) -> Texture:
+    """The picture of a file.
+
+    Raises
+    ------
+    ImageError
+        If it is none that Pillow reads.
+    OSError
+        If it cannot be read.
+    """
+    from PIL import Image, UnidentifiedImageError
+
+    try:
+        with Image.open(path) as image:
+            return Texture(np.asarray(image.convert("RGBA")))
+    except UnidentifiedImageError:
+        raise ImageError(f"cannot read {path!r}: it is no picture that Pillow knows") from None
 
 
 @dataclass(frozen=True)
@@ -100,6 +133,7 @@ def plan_shoots(options: argparse.Namespace, start: int = 0) -> list[Shoot]:
         If OUT cannot hold the pictures.
     """
     pattern = _pattern(options.out, options)
+    look = _render_options(options)
     shoots = []
     for i_mesh, source in enumerate(options.meshes, start):
         name = source if source in SHAPES else Path(source).stem
@@ -111,27 +145,34 @@ def plan_shoots(options: argparse.Namespace, start: int = 0) -> list[Shoot]:
             orbit = Orbit(azimuth_deg, options.elevation, options.fov, options.up, options.ortho)
             path = filled.replace("{name}", name)
             layers = _layers(path, options)
-            jobs.append(Job(Source(source), orbit, options.size, _render_options(options), path, layers))
+            jobs.append(Job(Source(source, options.texture), orbit, options.size, look, path, layers))
         shoots.append(Shoot(source, name, tuple(jobs)))
     return shoots
 
 
 def _render_options(options: argparse.Namespace) -> dict[str, Any]:
-    return {
+    if (options.shading == Shading.MATCAP) != (options.matcap is not None):
+        raise UsageError("--shading matcap and --matcap FILE go together")
+    look = {
         "shading": options.shading,
         "color": options.color,
         "background": options.background,
         "cull": options.cull,
-        "edges": options.wireframe,
-        "sampling": options.sampling,
         "threads": options.threads,
     }
+    if options.matcap is not None:
+        look["matcap"] = read_texture(options.matcap)
+    if options.opacity is None:
+        return look | {"edges": options.wireframe, "sampling": options.sampling}
+    if options.wireframe or options.sampling != Sampling.CENTER:
+        raise UsageError("--opacity goes with neither --wireframe nor --sampling")
+    return look | {"opacity": options.opacity}
 
 
 def _layers(path: str, options: argparse.Namespace) -> tuple[str, ...]:
     suffix = Path(path).suffix.lower()
     if not options.layers and suffix == ".npz":
-        return ("color", "id", "depth")
+        return ("color", "triangle", "depth")
     if not options.layers and suffix == ".npy" and options.shading in SHADINGS_WITH_NUMBERS:
         return (SHADINGS_WITH_NUMBERS[options.shading],)
     return tuple(options.layers)

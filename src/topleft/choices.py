@@ -1,0 +1,135 @@
+"""What is chosen before anything is drawn: a small function for each choice, asked by the pipeline and by the planner.
+
+None of them changes a bit of a picture; `tests/test_choices.py` draws with each forced on and off. The numbers were
+measured on one and two cores of a Zen 4 with AVX-512; `docs/design.md`, section 20, has the scenes.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from topleft import _engine
+from topleft.methods import METHODS
+from topleft.models import DepthTest, Sink
+from topleft.threads import count_threads
+from topleft.view import View
+
+__all__ = [
+    "Inputs",
+    "can_share",
+    "common_depth",
+    "earlier_wins",
+    "flat_depth",
+    "fragment_sink",
+    "is_affine",
+    "is_shared",
+    "pays_without_depth",
+    "threads_to_convert",
+    "threads_to_draw",
+    "threads_to_snap",
+]
+
+#: Fewer vertices are snapped, and fewer triangles converted, by one thread: waking another takes as long.
+MIN_TO_SHARE_ARRAYS = 200_000
+
+#: Pixels of a picture, and layers of triangles in it, from which on ids are drawn alone when all depths are equal.
+MIN_PIXELS_TO_FLATTEN = 1 << 16
+MIN_LAYERS_TO_FLATTEN = 1.0
+
+#: Triangles times threads. With fewer, threads that each set up every triangle are done before they have met twice.
+MIN_TRIANGLES_TO_SHARE = 1_000_000
+
+
+class Inputs(NamedTuple):
+    """A scene before and after the snap: what choices look at."""
+
+    points: NDArray[Any]
+    records: NDArray[np.uint8]
+    pieces: _engine.Pieces | None
+    is_clip_space: bool
+    is_affine: bool
+
+
+def is_affine(matrix: NDArray[Any] | None) -> bool:
+    """Tell whether every w is 1 behind a transform: dividing by it changes no bit, so it is left out."""
+    return matrix is not None and matrix[3].tolist() == [0, 0, 0, 1]
+
+
+def threads_to_convert(threads: int | None, n_triangles: int) -> int:
+    """Return how many threads make int32 of other indices."""
+    return count_threads(threads, n_triangles) if n_triangles >= MIN_TO_SHARE_ARRAYS else 1
+
+
+def threads_to_snap(threads: int | None, n_vertices: int, n_triangles: int) -> int:
+    """Return how many threads transform and snap vertices."""
+    return count_threads(threads, n_triangles) if n_vertices >= MIN_TO_SHARE_ARRAYS else 1
+
+
+def threads_to_draw(view: View, n_triangles: int) -> int:
+    """Return how many threads draw, in bands of rows."""
+    return min(view.size[1], count_threads(view.threads, n_triangles))
+
+
+def can_share(view: View) -> bool:
+    """Tell whether a pass over a scene can draw some of its triangles."""
+    width, height = view.size
+    is_near = max(map(abs, view.origin)) < 2**29 and width * height < 2**31
+    fits_lanes = not view.test or view.subpixel_bits <= 8
+    return is_near and fits_lanes and view.method == METHODS["auto"].code
+
+
+def is_shared(view: View, n_triangles: int, n_parts: int, sink: Sink) -> bool:
+    """Tell whether each thread is to take a share of the triangles instead of setting up all of them."""
+    pays = n_triangles * n_parts >= MIN_TRIANGLES_TO_SHARE
+    fits_lanes = sink is not Sink.SAMPLES or view.grid_bits <= 8
+    return n_parts > 1 and pays and fits_lanes and can_share(view)
+
+
+def fragment_sink(test: DepthTest | None, *, has_depth: bool) -> Sink:
+    """Return what `rasterize` does with a covered sample: the nearer, the farther or the later triangle stays."""
+    if test is None or not has_depth:
+        return Sink.PAINT
+    return Sink.FARTHEST if test is DepthTest.GREATER else Sink.NEAREST
+
+
+def common_depth(points: NDArray[Any], *, has_depth: bool, is_clip_space: bool) -> float | None:
+    """Return the depth of every vertex if they all have the same.
+
+    The plane through three equal depths is that depth to the bit. The first, the middle and the last vertex settle it
+    for most scenes; the others are looked at only when those agree. Clip space is never looked at: its depth is not
+    known before the divide.
+    """
+    if not has_depth:
+        return 0.0
+    if is_clip_space or not len(points):
+        return None
+    z = points[:, 2]
+    first = z[0]
+    if not (z[len(z) // 2] == first and z[-1] == first) or not (z == first).all():
+        return None
+    with np.errstate(over="ignore"):  # what float32 cannot hold has been refused if a triangle uses it
+        return float(np.float32(first)) + 0.0  # -0 becomes 0, as it does in every depth buffer
+
+
+def pays_without_depth(scene: _engine.Scene, view: View) -> bool:
+    """Tell whether one pass over all pixels costs less than comparing depths wherever triangles are.
+
+    The pass is as long as half a layer of comparisons; in small pictures finding out takes longer than both.
+    """
+    n_pixels = view.size[0] * view.size[1]
+    return n_pixels >= MIN_PIXELS_TO_FLATTEN and scene.guess_layers(n_pixels) >= MIN_LAYERS_TO_FLATTEN
+
+
+def flat_depth(scene: _engine.Scene, inputs: Inputs, view: View, *, has_depth: bool) -> float | None:
+    """Return the depth of the whole scene if samples need neither compare nor store it, and leaving that out pays."""
+    if (inputs.is_clip_space and has_depth) or not pays_without_depth(scene, view):
+        return None
+    return common_depth(inputs.points, has_depth=has_depth, is_clip_space=inputs.is_clip_space)
+
+
+def earlier_wins(test: DepthTest | None, *, has_depth: bool) -> bool:
+    """Tell whether the triangle with the lower index shows where depths are equal; otherwise the later one does."""
+    return test is not None and has_depth

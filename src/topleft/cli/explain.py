@@ -1,0 +1,78 @@
+"""`topleft explain`: how a view of a mesh is drawn, and why. `topleft calibrate`: what this machine takes for it."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from topleft.camera import DEFAULT_FOV_Y_DEG, THREE_QUARTER_DEG
+from topleft.cli.arguments import _positive, _size
+from topleft.cli.plan import Orbit, Source
+from topleft.models import Cull, Sampling
+from topleft.render import DEFAULT_SIZE
+
+__all__ = ["add_plan_commands", "run_calibrate", "run_explain"]
+
+
+def run_explain(options: argparse.Namespace) -> int:
+    """Print how a view of a mesh is drawn: what is chosen at each stage, why, and what it takes."""
+    from topleft.planner import plan
+
+    mesh = Source(options.mesh)()
+    orbit = Orbit(options.azimuth, options.elevation, options.fov, options.up, options.ortho)
+    camera = orbit(mesh, options.size)
+    outputs = {"fill": ("color",), "rasterize": ("triangle", "depth")}.get(options.verb, (options.verb,))
+    explained = plan(
+        mesh.vertices,
+        mesh.triangles,
+        options.size,
+        outputs=outputs,
+        transform=camera.clip_from_world(options.size),
+        cull=options.cull,
+        sampling=options.sampling,
+        threads=options.threads,
+    )
+    if options.measure:
+        explained.measure()
+    if options.json:
+        import json
+
+        print(json.dumps(explained.to_dict(), indent=1))
+    else:
+        print(explained.explain())
+    return 0
+
+
+def run_calibrate(_: argparse.Namespace) -> int:
+    """Measure this machine for some ten seconds and keep what estimates are made from."""
+    from topleft.calibrate import calibrate
+    from topleft.costs import save_costs
+
+    costs = calibrate()
+    print(f"{save_costs(costs)}: {costs.source}; the worst is off by a factor of {costs.residual['worst']:.1f}")
+    return 0
+
+
+def add_plan_commands(commands: Any) -> None:
+    """Add both commands to the parsers of the command line."""
+    azimuth, elevation = THREE_QUARTER_DEG
+    width, height = DEFAULT_SIZE
+    explain = commands.add_parser("explain", help="tell how a mesh is drawn, and why", description=run_explain.__doc__)
+    explain.set_defaults(run=run_explain)
+    add = explain.add_argument
+    add("mesh", metavar="MESH", help="a file or a built-in shape")
+    verbs = ["rasterize", "coverage", "overdraw", "fill"]
+    add("--verb", choices=verbs, default=verbs[0], help="(default %(default)s)")
+    add("--size", type=_size, default=DEFAULT_SIZE, metavar="WxH", help=f"pixels (default {width}x{height})")
+    add("--azimuth", type=float, default=azimuth, metavar="DEG", help="right of the front (default %(default)g)")
+    add("--elevation", type=float, default=elevation, metavar="DEG", help="above level (default %(default)g)")
+    add("--fov", type=float, default=DEFAULT_FOV_Y_DEG, metavar="DEG", help="bottom to top (default %(default)g)")
+    add("--ortho", action="store_true", help="no perspective")
+    add("--up", choices=["y", "z"], default="y", help="the axis that points up (default y)")
+    add("--cull", choices=[str(side) for side in Cull], default="none", help="leave out triangles (default none)")
+    add("--sampling", choices=[str(mode) for mode in Sampling], default="center", help="of a pixel (default center)")
+    add("--threads", type=_positive, default=None, metavar="N", help="(default: as many as pay)")
+    add("--measure", action="store_true", help="draw it, and show what the stages took")
+    add("--json", action="store_true", help="numbers and sentences as JSON")
+    calibrate = commands.add_parser("calibrate", help="measure this machine", description=run_calibrate.__doc__)
+    calibrate.set_defaults(run=run_calibrate)

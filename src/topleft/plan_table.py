@@ -1,0 +1,74 @@
+"""A plan as text and as HTML. In: what `Plan.to_dict` gives. Out: a string."""
+
+from __future__ import annotations
+
+import html
+import textwrap
+from collections.abc import Mapping
+from typing import Any
+
+__all__ = ["as_html", "as_text"]
+
+WIDTH = 110
+INDENT = " " * 12
+
+
+def as_text(plan: Mapping[str, Any]) -> str:
+    """Return a plan as lines of at most 110 characters."""
+    lines = [title(plan), ""]
+    lines.append(f"{'stage':<12}{'choice':<{WIDTH - 36}}{'estimated':>12}{'measured':>12}")
+    for stage in plan["stages"]:
+        first, *others = wrap(stage["choice"], WIDTH - 38)
+        times = f"{milliseconds(stage['estimated_ms'], stage):>12}{milliseconds(stage['measured_ms'], None):>12}"
+        lines.append(f"{stage['name']:<12}{first:<{WIDTH - 36}}{times}".rstrip())
+        lines += [INDENT + line for line in others]
+        lines += paragraph("why: ", stage["why"])
+        for rejected in stage["rejected"]:
+            lines += paragraph("not: ", rejected)
+    total = milliseconds(plan["estimated_ms"], None)
+    lines.append(f"{'':<12}{'in all':<{WIDTH - 36}}{total:>12}{milliseconds(plan['measured_ms'], None):>12}".rstrip())
+    lines += ["", f"estimates: {plan['costs']}; on memory that is kept"]
+    return "\n".join(lines)
+
+
+def title(plan: Mapping[str, Any]) -> str:
+    """Return what is drawn, in a line."""
+    width, height = plan["size"]
+    n_threads = plan["threads"]
+    return (
+        f"{plan['verb']} -> {', '.join(plan['outputs'])}: {width}x{height} pixels, {plan['n_triangles']:,} triangles, "
+        f"{plan['n_vertices']:,} vertices, {n_threads} thread{'s' * (n_threads > 1)}"
+    )
+
+
+def wrap(text: str, width: int) -> list[str]:
+    """Return a text as lines, at least one."""
+    return textwrap.wrap(text, width, break_long_words=False, break_on_hyphens=False) or [""]
+
+
+def paragraph(head: str, text: str) -> list[str]:
+    """Return a text with a head that hangs out."""
+    first, *others = wrap(text, WIDTH - len(INDENT) - len(head))
+    return [INDENT + head + first, *(INDENT + " " * len(head) + line for line in others)]
+
+
+def milliseconds(ms: float | None, stage: Mapping[str, Any] | None) -> str:
+    """Return a time, or which stage it is a part of."""
+    if ms is None:
+        return f"in {stage['timed_in']}" if stage and stage["timed_in"] else ""
+    return f"{ms:.1f} ms" if ms >= 10 else f"{ms:.2f} ms" if ms >= 0.1 else f"{1000 * ms:.0f} us"
+
+
+def as_html(plan: Mapping[str, Any]) -> str:
+    """Return a plan as a table."""
+    rows = []
+    for stage in plan["stages"]:
+        rejected = "<br>".join(html.escape(text) for text in stage["rejected"])
+        cells = [stage["name"], stage["choice"], stage["why"]]
+        times = [milliseconds(stage["estimated_ms"], stage), milliseconds(stage["measured_ms"], None)]
+        rows.append("".join(f"<td>{html.escape(cell)}</td>" for cell in cells) + f"<td>{rejected}</td>"
+                    + "".join(f"<td>{cell}</td>" for cell in times))  # fmt: skip
+    heads = "".join(f"<th>{name}</th>" for name in ("stage", "choice", "why", "not", "estimated", "measured"))
+    body = "".join(f"<tr>{row}</tr>" for row in rows)
+    caption = f"<caption>{html.escape(title(plan))}</caption>"
+    return f"<table>{caption}<thead><tr>{heads}</tr></thead><tbody>{body}</tbody></table>"

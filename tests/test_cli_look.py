@@ -1,0 +1,79 @@
+"""What `topleft render` may be told about the look of a mesh: texture, matcap, glass."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import topleft as tl
+from topleft import scenes
+
+SMALL = ["--size", "64x48"]
+SIZE = (64, 48)
+SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n"
+CHECKS = np.kron([[0, 1], [1, 0]], np.ones((4, 4)))[..., None] * np.array([200, 80, 30]) + 20
+KNOT = tl.Mesh(*scenes.shape("torus-knot"))
+
+
+def pixels(path):
+    with Image.open(path) as image:
+        return np.asarray(image)
+
+
+@pytest.fixture
+def checks(folder):
+    Image.fromarray(CHECKS.astype(np.uint8)).save(folder / "checks.png")
+    return tl.Texture(CHECKS.astype(np.uint8))
+
+
+def test_render_texture_is_laid_on_the_mesh(run, folder, checks):
+    pytest.importorskip("trimesh")
+    (folder / "a.obj").write_text(SQUARE)
+    options = ["--texture", "checks.png", "--shading", "unlit", "--jobs", 2, *SMALL]
+    assert run("render", "a.obj", "-o", "a.png", "--views", 2, *options) == (0, [])
+    mesh = tl.load(folder / "a.obj")
+    assert mesh.uv is not None
+    camera = tl.Camera.framing(mesh, aspect=64 / 48)
+    expected = tl.render(mesh, camera, SIZE, shading="unlit", material=tl.Material(texture=checks))
+    assert np.array_equal(pixels("a-000.png"), expected)
+    assert {(220, 100, 50, 255), (20, 20, 20, 255)} <= {tuple(color) for color in expected.reshape(-1, 4).tolist()}
+
+
+def test_render_matcap_is_the_picture_of_the_library(run, checks):
+    look = ["--shading", "matcap", "--matcap", "checks.png"]
+    assert run("render", "torus-knot", "-o", "a.png", *look, *SMALL) == (0, [])
+    assert np.array_equal(pixels("a.png"), tl.render(KNOT, None, SIZE, shading="matcap", matcap=checks))
+
+
+@pytest.mark.parametrize("layers", [[], ["--layers", "color"]])
+def test_render_opacity_is_glass(run, layers):
+    assert run("render", "torus-knot", "-o", "a.png", "--opacity", 0.4, *layers, *SMALL) == (0, [])
+    assert np.array_equal(pixels("a.png"), tl.render_transparent(KNOT, None, SIZE, opacity=0.4))
+
+
+def test_render_unlit_shows_the_color(run):
+    assert run("render", "cube", "-o", "a.png", "--shading", "unlit", "--color", "#123456", *SMALL) == (0, [])
+    assert np.unique(pixels("a.png").reshape(-1, 4), axis=0).tolist() == [[18, 52, 86, 255], [255, 255, 255, 255]]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        (["--texture", "checks.png"], "topleft: --texture needs texture coordinates, and 'cube' has none"),
+        (["--shading", "matcap"], "topleft: --shading matcap and --matcap FILE go together"),
+        (["--matcap", "checks.png"], "topleft: --shading matcap and --matcap FILE go together"),
+        (["--shading", "matcap", "--matcap", "gone.png"], "topleft: No such file or directory: '"),
+        (["--shading", "matcap", "--matcap", "notes.png"], "topleft: cannot read 'notes.png': it is no picture that P"),
+        (["--opacity", "2"], "topleft: argument --opacity: must be a number from 0 to 1, got '2'"),
+        (["--opacity", "half"], "topleft: argument --opacity: must be a number from 0 to 1, got 'half'"),
+        (["--opacity", "0.5", "--wireframe"], "topleft: --opacity goes with neither --wireframe nor --sampling"),
+        (["--opacity", "0.5", "--sampling", "msaa4"], "topleft: --opacity goes with neither --wireframe nor --samp"),
+    ],
+)
+def test_render_impossible_look_is_one_line_and_status_2(run, folder, checks, arguments, line):
+    (folder / "notes.png").write_text("buy milk")
+    status, lines = run("render", "cube", "-o", "a.png", *arguments, *SMALL)
+    assert (status, len(lines)) == (2, 1)
+    assert lines[0].startswith(line)
+    assert not (folder / "a.png").exists()

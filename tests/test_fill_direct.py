@@ -1,0 +1,124 @@
+"""Pictures of few triangles, whose colours are stored one after the other, and what lies under them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import topleft as tl
+from topleft.scenes import random_triangles
+
+SIZE = (333, 401)
+"""More rows than one band of a few triangles has, and rows that begin anywhere in a cache line."""
+
+
+def few_triangles(n: int, channels: int):
+    """Triangles of 150 px in no order, some beyond the frame, and colours."""
+    vertices, triangles, _ = random_triangles(n, 150, *SIZE)
+    colors = np.random.default_rng(n).integers(0, 256, (n, channels), np.uint8)
+    return np.ascontiguousarray(vertices[:, :2]), triangles, colors
+
+
+@pytest.mark.parametrize("channels", [1, 2, 3, 4])
+@pytest.mark.parametrize("n", [1, 5, 63, 64, 300])
+def test_fill_of_few_triangles_shows_the_later_one(n, channels):
+    vertices, triangles, colors = few_triangles(n, channels)
+    ids = tl.rasterize(vertices, triangles, SIZE).triangle
+    ground = np.arange(7, 7 + channels, dtype=np.uint8)
+    expected = np.concatenate([colors, ground[None]])[ids]
+    picture = tl.fill(vertices, triangles, colors, SIZE, per="triangle", background=ground)
+    assert (picture == expected).all()
+    assert (ids >= 0).any()
+
+
+def test_fill_of_few_triangles_one_number_a_pixel():
+    vertices, triangles, colors = few_triangles(5, 1)
+    picture = tl.fill(vertices, triangles, colors[:, 0], SIZE, background=7)
+    assert (picture == tl.fill(vertices, triangles, colors, SIZE, background=7)[..., 0]).all()
+
+
+@pytest.mark.parametrize("options", [{"blend": "over", "sampling": "area"}, {"blend": "multiply"}])
+@pytest.mark.parametrize("n", [3, 70])
+def test_fill_blends_over_the_background_as_over_a_picture(n, options):
+    vertices, triangles, colors = few_triangles(n, 4)
+    out = np.full((*SIZE[::-1], 4), 200, np.uint8)
+    tl.fill(vertices, triangles, colors, SIZE, per="triangle", out=out, **options)
+    picture = tl.fill(vertices, triangles, colors, SIZE, per="triangle", background=200, **options)
+    assert (picture == out).all()
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_fill_of_few_triangles_keeps_out_where_nothing_is(threads):
+    vertices, triangles, colors = few_triangles(9, 4)
+    ids = tl.rasterize(vertices, triangles, SIZE).triangle
+    out = np.random.default_rng(1).integers(0, 256, (*SIZE[::-1], 4), np.uint8)
+    expected = np.where((ids < 0)[..., None], out, colors[ids])
+    tl.fill(vertices, triangles, colors, SIZE, per="triangle", out=out, threads=threads)
+    assert (out == expected).all()
+
+
+@pytest.mark.parametrize("method", ["edge", "scanline"])
+def test_fill_of_few_triangles_every_method_gives_the_same(method):
+    scene = few_triangles(20, 4)
+    assert (tl.fill(*scene, SIZE, method=method) == tl.fill(*scene, SIZE)).all()
+
+
+def test_fill_of_few_triangles_windows_are_crops():
+    vertices, triangles, colors = few_triangles(20, 4)
+    whole = tl.fill(vertices, triangles, colors, SIZE, background=3)
+    window = tl.fill(vertices, triangles, colors, (101, 97), background=3, origin=(77, 133))
+    assert (window == whole[133:230, 77:178]).all()
+
+
+def test_fill_of_few_triangles_into_every_second_column():
+    vertices, triangles, colors = few_triangles(5, 4)
+    strided = np.zeros((SIZE[1], 2 * SIZE[0], 4), np.uint8)
+    tl.fill(vertices, triangles, colors, SIZE, background=9, out=strided[:, ::2])
+    assert (strided[:, ::2] == tl.fill(vertices, triangles, colors, SIZE, background=9)).all()
+    assert not strided[:, 1::2].any()
+
+
+def test_fill_without_triangles_is_background():
+    nothing = np.empty((0, 3), np.int32), np.empty((0, 4), np.uint8)
+    picture = tl.fill(np.empty((0, 2)), *nothing, (5, 4), background=(1, 2, 3, 4))
+    assert (picture == [1, 2, 3, 4]).all()
+
+
+@pytest.mark.parametrize("width", [1, 63, 64, 65, 640, 1000])
+def test_coverage_of_long_runs_of_one_value(width):
+    vertices, triangles = [[0, 0], [2 * width, 0], [0, 200]], [[0, 1, 2]]
+    mask = tl.coverage(vertices, triangles, (width, 150))
+    assert (mask == (tl.overdraw(vertices, triangles, (width, 150)) > 0)).all()
+    assert mask.view(np.uint8).max() == 1
+
+
+def test_rasterize_flat_vertices_depth_is_made_when_asked_for():
+    vertices, triangles, _ = few_triangles(4, 1)
+    ids, depth = np.empty(SIZE[::-1], np.int32), np.empty(SIZE[::-1], np.float32)
+    tl.rasterize(vertices, triangles, SIZE, out=(ids, depth))
+    frags = tl.rasterize(vertices, triangles, SIZE)
+    assert (frags.triangle == ids).all()
+    assert frags.depth.dtype == np.float32
+    assert (frags.depth == depth).all()
+    assert set(np.unique(depth)) == {0, np.inf}
+
+
+@pytest.mark.parametrize(("options", "ground"), [({"depth_test": "greater"}, -np.inf), ({"background_depth": 7}, 7.0)])
+def test_rasterize_flat_vertices_background_depth(options, ground):
+    frags = tl.rasterize([[0, 0], [4, 0], [0, 4]], [[0, 1, 2]], (3, 2), **options)
+    assert frags.depth.tolist() == [[0, 0, 0], [0, 0, ground]]
+    assert (frags.samples_depth[..., 0] == frags.depth).all()
+
+
+def test_rasterize_out_may_be_ids_alone():
+    ids = np.empty((2, 3), np.int32)
+    frags = tl.rasterize([[0, 0], [4, 0], [0, 4]], [[0, 1, 2]], (3, 2), out=(ids, None))
+    assert frags.triangle is ids
+    assert ids.tolist() == [[0, 0, 0], [0, 0, -1]]
+
+
+def test_rasterize_out_may_be_depth_alone():
+    depth = np.empty((2, 3), np.float32)
+    frags = tl.rasterize([[0, 0, 1], [4, 0, 1], [0, 4, 1]], [[0, 1, 2]], (3, 2), out=(None, depth))
+    assert frags.depth is depth
+    assert depth.tolist() == [[1, 1, 1], [1, 1, np.inf]]
