@@ -211,6 +211,9 @@ def plan_method(facts: Facts, costs: Costs) -> Stage:
     rejected = ("one method for all: boxes waste tests on large triangles, rows waste setup on small ones",)
     if view.method != METHODS["auto"].code:
         rejected = ("method='auto': another one was asked for; the picture is the same",)
+    if facts.is_direct and facts.n_drawn:
+        parts = [f"{plural(facts.n_drawn, 'triangle')} one after the other, in painter's order"]
+        rejected = ("vectors and queues of triangles: they change the order, and colours have no ids to tell it",)
     return Stage("method", "; ".join(parts) or "nothing to draw", covered, rejected, ms, "draw")
 
 
