@@ -78,29 +78,40 @@ TL_INLINE void sample_nearest(const tl_texture *t, vf u, vf v, vf *rgba)
     rgba[0] = low_channel(rg), rgba[1] = high_channel(rg), rgba[2] = low_channel(ba), rgba[3] = high_channel(ba);
 }
 
-/* The four texels round (u, v) on a level of its own in each lane, weighted by their distance, in 65535ths. */
-TL_INLINE void sample_level(const tl_texture *t, vi level, vf u, vf v, vf *rgba, int n_channels)
+/* The four texels round (u, v) on a level of its own in each lane, and their weights. */
+typedef struct {
+    _Alignas(64) int32_t at[2][TL_MAX_LANES]; /* of the upper two and of the lower two */
+    vf weight[4];
+} texel_quad;
+
+TL_INLINE void find_quad(const tl_texture *t, vi level, vf u, vf v, texel_quad *quad)
 {
     const vi width = vi_lookup(t->width, level), height = vi_lookup(t->height, level), one = vi_set1(1);
     const texel_pair x = find_pair(u, width, t->wrap_u), y = find_pair(v, height, t->wrap_v);
     const vi next = vi_add(y.first, one), stride = vi_add(width, one);
     const vi second = vi_select(vi_gt(height, next), next, t->wrap_v == TL_WRAP_REPEAT ? vi_set1(0) : y.first);
     const vi base = vi_add(vi_lookup(t->offset, level), x.first);
-    _Alignas(64) int32_t at[2][TL_MAX_LANES];
+    vi_spill(quad->at[0], vi_add(base, vi_mul(y.first, stride)));
+    vi_spill(quad->at[1], vi_add(base, vi_mul(second, stride)));
+    quad->weight[3] = vf_mul(x.share, y.share);
+    quad->weight[1] = vf_sub(x.share, quad->weight[3]), quad->weight[2] = vf_sub(y.share, quad->weight[3]);
+    quad->weight[0] = vf_sub(vf_sub(vf_set1(1.0f), x.share), quad->weight[2]);
+}
+
+/* Their weighted sum, in 65535ths. */
+TL_INLINE void filter_quad(const tl_texture *t, const texel_quad *quad, vf *rgba, int n_channels)
+{
     vi row[2][4];
-    vi_spill(at[0], vi_add(base, vi_mul(y.first, stride)));
-    vi_spill(at[1], vi_add(base, vi_mul(second, stride)));
     for (int k = 0; k < 2; k++)
-        vi_load_records(t->texels, 8, at[k], row[k]);
-    const vf w11 = vf_mul(x.share, y.share), w01 = vf_sub(x.share, w11), w10 = vf_sub(y.share, w11);
-    const vf w00 = vf_sub(vf_sub(vf_set1(1.0f), x.share), w10);
+        vi_load_records(t->texels, 8, quad->at[k], row[k]);
     for (int c = 0; c < n_channels; c++) {
         vf texel[4];
         for (int k = 0; k < 4; k++) {
             const vi words = row[k >> 1][2 * (k & 1) + (c >> 1)];
             texel[k] = c & 1 ? high_channel(words) : low_channel(words);
         }
-        rgba[c] = vf_fma(w11, texel[3], vf_fma(w10, texel[2], vf_fma(w01, texel[1], vf_mul(w00, texel[0]))));
+        const vf upper = vf_fma(quad->weight[1], texel[1], vf_mul(quad->weight[0], texel[0]));
+        rgba[c] = vf_fma(quad->weight[3], texel[3], vf_fma(quad->weight[2], texel[2], upper));
     }
 }
 
@@ -124,15 +135,20 @@ TL_INLINE void sample_texture(const tl_texture *t, vf u, vf v, const vf *du, con
     if (t->filter == TL_FILTER_NEAREST) {
         sample_nearest(t, u, v, rgba);
     } else if (t->filter == TL_FILTER_BILINEAR) {
-        sample_level(t, vi_set1(0), u, v, rgba, n_channels);
+        texel_quad quad;
+        find_quad(t, vi_set1(0), u, v, &quad);
+        filter_quad(t, &quad, rgba, n_channels);
     } else {
         const vf last = vf_set1((float)(t->n_levels - 1)), lod = vf_min(vf_max(level_of_detail(t, du, dv), zero), last);
         const vi level = vi_floor(lod);
         const vf share = vf_sub(lod, vf_from_vi(level));
-        sample_level(t, level, u, v, rgba, n_channels);
+        texel_quad fine, coarse;
+        find_quad(t, level, u, v, &fine);
+        find_quad(t, vi_min(vi_add(level, vi_set1(1)), vi_set1(t->n_levels - 1)), u, v, &coarse);
+        filter_quad(t, &fine, rgba, n_channels);
         if (vm_any(vf_lt(zero, share))) {
             vf coarser[4];
-            sample_level(t, vi_min(vi_add(level, vi_set1(1)), vi_set1(t->n_levels - 1)), u, v, coarser, n_channels);
+            filter_quad(t, &coarse, coarser, n_channels);
             for (int c = 0; c < n_channels; c++)
                 rgba[c] = vf_fma(share, vf_sub(coarser[c], rgba[c]), rgba[c]);
         }

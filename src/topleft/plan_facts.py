@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from topleft import choices
 from topleft.arrays import as_array
+from topleft.fill import is_direct
 from topleft.memory import FreshMemory
 from topleft.models import DepthTest, Sampling, Sink
 from topleft.sampling import sample_positions
@@ -52,6 +53,7 @@ class Facts:
     n_pieces: int
     flat_depth: float | None  # when ids are drawn alone
     common_depth: float | None  # of all vertices, whatever is made of it
+    is_direct: bool  # uint8 colours of triangles are stored without labels in between
     census: tuple[tuple[int, float, float], ...]  # of each of CLASSES: triangles, samples in boxes, covered
 
     def count(self, *names: str) -> int:
@@ -76,7 +78,7 @@ class Facts:
     @property
     def is_shared(self) -> bool:
         """Whether each thread takes a share of the triangles."""
-        if self.view.sampling is Sampling.AREA or self.draws_planes:
+        if self.view.sampling is Sampling.AREA or self.draws_planes or self.is_direct:
             return False
         return choices.is_shared(self.view, self.n_triangles, self.n_threads, self.sink)
 
@@ -147,6 +149,7 @@ def find_facts(
         n_pieces=len(pieces) if pieces else 0,
         flat_depth=flat,
         common_depth=common,
+        is_direct=verb == "fill" and is_direct(np.zeros(1, np.uint8), snapped, view, is_flat=True),
         census=tuple(census),
     )
     corners = np.array(snapped.corners, np.int32)

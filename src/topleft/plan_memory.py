@@ -28,7 +28,7 @@ def memory_of(facts: Facts) -> tuple[dict[str, int], dict[str, int]]:
     if view.sampling is Sampling.AREA:
         strips = facts.n_threads * _engine.blend_cells(width)
         scratch["cells"] = 4 * (strips if facts.verb == "fill" else height * _engine.area_stride(width))
-    elif facts.verb == "fill" and n_samples == 1 and n:
+    elif facts.verb == "fill" and n_samples == 1 and n and not facts.is_direct:
         scratch["labels"] = 4 * n_pixels
     elif facts.draws_planes and not is_empty and n and choices.can_share(view):
         scratch["bins"] = 12 * (n + 16)

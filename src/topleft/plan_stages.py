@@ -211,6 +211,9 @@ def plan_method(facts: Facts, costs: Costs) -> Stage:
     rejected = ("one method for all: boxes waste tests on large triangles, rows waste setup on small ones",)
     if view.method != METHODS["auto"].code:
         rejected = ("method='auto': another one was asked for; the picture is the same",)
+    if facts.is_direct and facts.n_drawn:
+        parts = [f"{plural(facts.n_drawn, 'triangle')} one after the other, in painter's order"]
+        rejected = ("vectors and queues of triangles: they change the order, and colours have no ids to tell it",)
     return Stage("method", "; ".join(parts) or "nothing to draw", covered, rejected, ms, "draw")
 
 
@@ -224,7 +227,11 @@ def plan_sink(facts: Facts, costs: Costs) -> Iterator[Stage]:
     rejected = () if n == 1 else ("a full draw for each sample: setup, culling and boxes are shared",)
     choice, why = names.get(view.sampling, f"{n} samples a pixel"), f"sampling={str(view.sampling)!r} was asked for"
     yield Stage("sampling", choice, why, rejected, timed_in="method")
-    if facts.verb == "fill":
+    if facts.is_direct:
+        why = "triangles are few for the picture: uint8 colours of triangles go straight to it"
+        rejected = ("labels and colours from them: two passes over the picture, which pay for small triangles",)
+        yield Stage("shade", "none", why, rejected, timed_in="method")
+    elif facts.verb == "fill":
         ms = costs.other["paint"] * n_pixels * n / 1e6
         why = f"at most {n_pixels:,} of about {facts.covered:,.0f} samples show"
         rejected = ("colours while drawing: hidden samples would be coloured too",)
@@ -239,6 +246,8 @@ def plan_sink(facts: Facts, costs: Costs) -> Iterator[Stage]:
 def plan_depth(facts: Facts, costs: Costs) -> Stage:
     """Tell whether samples compare depths."""
     what = SINKS[facts.sink] if facts.view.sampling is not Sampling.AREA else "a sum of areas a pixel"
+    if facts.is_direct:
+        what = "the colour of the later triangle a pixel"
     if facts.verb != "rasterize":
         return Stage("depth", "none", f"{facts.verb} needs {what}", timed_in="method")
     if facts.flat_depth is not None:
