@@ -1,0 +1,221 @@
+# The contract with the kernels, as csrc/topleft.h and its parts have it. Included by _engine.pyx.
+
+cdef extern from "topleft.h" nogil:
+    ctypedef struct tl_vertex:
+        int32_t x_fx, y_fx
+    ctypedef struct tl_wide:
+        pass
+    ctypedef int tl_scalar
+    ctypedef struct tl_source:
+        const void *data
+        tl_scalar scalar
+        int n_components
+        int64_t n
+        const void *matrix
+        int is_affine
+    ctypedef struct tl_vertex_set:
+        const tl_vertex *vertices
+        const tl_wide *wide
+        const double *inv_w
+        const tl_source *source
+        int64_t n_vertices
+        int32_t sample_x_fx, sample_y_fx
+    ctypedef struct tl_vertex_counts:
+        int64_t n_bad, n_wide, n_clipped
+    ctypedef struct tl_view:
+        double half_width_px, half_height_px, guard_band_x, guard_band_y
+        int subpixel_bits, zero_to_one, near_clip, far_clip
+    ctypedef struct tl_pieces:
+        tl_vertex *vertices
+        tl_wide *wide
+        double *inv_w
+        double *weights
+        int32_t *triangles
+        int32_t *source
+        int64_t n_vertices, n_pieces
+    ctypedef int tl_test
+    ctypedef struct tl_window:
+        int64_t x_px, y_px, width, height
+        int subpixel_bits
+        tl_test test
+    ctypedef int tl_cull
+    ctypedef int tl_method
+    ctypedef int tl_sink
+    ctypedef struct tl_census:
+        tl_sink sink
+        int64_t *n
+        double *boxes
+        double *covered
+    int TL_MAX_LAYERS, TL_SINK_PEEL
+    ctypedef struct tl_peeled:
+        int n_layers, is_farthest
+        int32_t *ids
+        float *depth
+        int64_t plane_px
+    ctypedef struct tl_target:
+        tl_sink sink
+        void *pixels
+        float *depth
+        int64_t stride_px
+        int64_t n_samples
+        uint64_t *covered
+        int sample_bits
+        const int32_t *samples_fx
+        int sample
+        int32_t flip
+        const tl_peeled *peeled
+    int64_t tl_covered_words(int64_t)
+    ctypedef struct tl_bins:
+        int64_t n
+        int32_t *ids
+        int32_t *first_band
+        int32_t *last_band
+    ctypedef struct tl_transfer:
+        const int32_t *decode
+        const uint8_t *encode
+        int n_channels
+        int is_straight
+    ctypedef struct tl_area:
+        float *pixels
+        int64_t stride_px
+        void *cells
+        int is_wide, is_clamped
+    int64_t TL_CELL_CLEAR, TL_AREA_OVERFLOW, TL_PLANE_DOUBLES
+    int64_t tl_area_stride(int64_t width)
+    ctypedef int tl_blend
+    ctypedef struct tl_canvas:
+        void *pixels
+        int64_t stride_px
+        const void *colors
+        int n_channels, is_u8, is_flat
+        tl_blend blend
+        int is_premultiplied
+        const uint8_t *ground
+        int is_area
+        int32_t *packed
+        int32_t *cells
+    int64_t tl_blend_cells(int64_t width)
+    ctypedef struct tl_scene:
+        tl_vertex_set mesh
+        const int32_t *triangles
+        int64_t n_triangles
+        const tl_pieces *pieces
+        tl_cull cull
+        tl_method method
+        int32_t first_id
+    ctypedef struct tl_share:
+        const int32_t *ids
+        int64_t first, end
+        int32_t *others
+        int64_t n_others
+        const tl_window *picture
+        int is_first, is_last
+    ctypedef struct tl_composite:
+        const int32_t *ids
+        int64_t plane_px
+        int n_layers, n_channels, is_u8, is_flat
+        const void *colors
+        const float *background
+    ctypedef struct tl_edges:
+        tl_vertex_set mesh
+        const tl_view *view
+        const int32_t *edges
+        int64_t n_edges
+    ctypedef struct tl_edge_scratch:
+        int64_t *starts
+        int32_t *last_low
+        int32_t *highs
+    ctypedef struct tl_line_target:
+        int is_smooth
+        void *pixels
+        const float *depth
+        double depth_bias
+        int is_farthest
+        int64_t stride_px
+    enum:
+        TL_N_CLASSES, TL_FLIP
+    ctypedef int tl_filter
+    ctypedef int tl_wrap
+    ctypedef int tl_light_kind
+    ctypedef int tl_show
+    int TL_MAX_LEVELS
+    ctypedef struct tl_texture:
+        const uint16_t *texels
+        int32_t *offset
+        int32_t *width
+        int32_t *height
+        int n_levels
+        tl_filter filter
+        tl_wrap wrap_u, wrap_v
+    ctypedef struct tl_material:
+        float *color
+        float *back_color
+        float *specular
+        float back_side, shininess, cutoff
+        int is_unlit
+        const tl_texture *texture
+    ctypedef struct tl_light:
+        tl_light_kind kind
+        float *at
+        float *color
+        float falloff
+    ctypedef struct tl_shading:
+        const float *normals
+        const float *face_normals
+        const void *positions
+        int is_f64
+        const uint8_t *is_turned
+        const float *uv
+        const float *colors
+        const int32_t *material_of
+        const tl_material *materials
+        int n_materials
+        const tl_light *lights
+        int n_lights
+        float *ambient
+        tl_show show
+        const tl_texture *matcap
+        float[3][4] eye_from
+        int has_perspective
+        float *eye
+        float[4][3] ray
+        float *fog_color
+        float fog_near, fog_scale, distance_start, distance_scale
+        const float *decode
+        float *background
+        uint8_t *background_bytes
+    ctypedef struct tl_valued:
+        const double *points_px
+        const double *values
+        const int32_t *triangles
+        int64_t n_points, n_triangles
+        double *planes
+    ctypedef struct tl_kernels:
+        void (*set_inverse_w)(const tl_source *, const float *, int64_t, int64_t, float *) noexcept nogil
+        void (*cut_out)(const tl_scene *, const tl_window *, const tl_view *, const tl_shading *, const int32_t *, int64_t, int32_t *, float *) noexcept nogil
+        void (*shade_samples)(const tl_scene *, const tl_window *, const tl_view *, const tl_shading *, const int32_t *, int, int64_t, const int32_t *, const float *, uint8_t *) noexcept nogil
+        void (*shade)(const tl_scene *, const tl_window *, const tl_view *, const tl_shading *, const int32_t *, const float *, uint8_t *) noexcept nogil
+        tl_vertex_counts (*snap)(const tl_source *, int64_t, int64_t, int, int, tl_vertex *, tl_wide *) noexcept nogil
+        tl_vertex_counts (*project)(const tl_source *, int64_t, int64_t, const tl_view *, tl_vertex *, tl_wide *) noexcept nogil
+        void (*clip)(const tl_source *, const tl_vertex *, const int32_t *, int64_t, const tl_view *, tl_pieces *) noexcept nogil
+        int64_t (*first_bad)(const tl_vertex *, const int32_t *, int64_t) noexcept nogil
+        int64_t (*first_bad_row)(const int32_t *, int64_t, int64_t) noexcept nogil
+        int64_t (*narrow_triangles)(const int64_t *, int64_t, int64_t, int32_t *) noexcept nogil
+        int64_t (*draw)(const tl_scene *, const tl_window *, const tl_target *, tl_share *) noexcept nogil
+        int64_t (*count_classes)(const tl_scene *, const tl_window *, const tl_target *, tl_census *) noexcept nogil
+        void (*set_flat_depth)(int32_t *, int64_t, int32_t, float, float, float *) noexcept nogil
+        int64_t (*bin)(const tl_scene *, const tl_window *, int32_t, int, tl_bins *) noexcept nogil
+        void (*list_bins)(const tl_bins *, int64_t, int64_t *, int32_t *) noexcept nogil
+        int64_t (*draw_area)(const tl_scene *, const tl_window *, const tl_area *) noexcept nogil
+        int64_t (*blend)(const tl_scene *, const tl_window *, const tl_canvas *) noexcept nogil
+        void (*barycentric)(const tl_scene *, const tl_window *, const int32_t *, float *) noexcept nogil
+        void (*interpolate)(const tl_scene *, const tl_window *, const int32_t *, const float *, int, int, float, float *) noexcept nogil
+        void (*paint_flat)(const int32_t *, int64_t, const uint8_t *, int, uint8_t *) noexcept nogil
+        void (*paint_gouraud)(const tl_scene *, const tl_window *, const int32_t *, const void *, int, int, void *) noexcept nogil
+        void (*composite)(const tl_composite *, int64_t, void *) noexcept nogil
+        int64_t (*list_edges)(const tl_scene *, const tl_edge_scratch *, uint64_t *, int64_t *) noexcept nogil
+        void (*draw_lines)(const tl_edges *, const tl_window *, const tl_line_target *) noexcept nogil
+        void (*list_planes)(const tl_valued *, int64_t, int64_t) noexcept nogil
+        void (*fill_planes)(const tl_valued *, const tl_window *, const int32_t *, int, void *) noexcept nogil
+        void (*mean_flat)(const int32_t *, int, int64_t, int64_t, const void *, int, int, const tl_transfer *, void *) noexcept nogil
+        void (*mean_colors)(const void *, int, int64_t, int64_t, int, int, const tl_transfer *, void *) noexcept nogil

@@ -1,0 +1,166 @@
+# What a pass reads and writes: views, vertices, buffers, indices, clipped pieces. Included by _engine.pyx.
+
+
+cdef class View:
+    """How clip space maps to pixels."""
+
+    cdef tl_view view
+
+    def __init__(self, viewport, int subpixel_bits, int guard_bits, bint zero_to_one, bint near_clip, bint far_clip):
+        self.view.half_width_px, self.view.half_height_px = viewport[0] / 2, viewport[1] / 2
+        self.view.guard_band_x, self.view.guard_band_y = (2.0**60 / (side / 2 * 2**guard_bits) for side in viewport)
+        self.view.subpixel_bits, self.view.zero_to_one = subpixel_bits, zero_to_one
+        self.view.near_clip, self.view.far_clip = near_clip, far_clip
+
+    @property
+    def viewport(self):
+        """Width and height of the whole picture."""
+        return int(2 * self.view.half_width_px), int(2 * self.view.half_height_px)
+
+
+cdef class Source:
+    """The caller's (V, C) vertices, contiguous float32, float64 or int64, and the matrix that takes them to clip space."""
+
+    cdef tl_source source
+    cdef object arrays
+    cdef readonly bint is_clip_space
+
+    def __init__(self, vertices, matrix=None, bint is_affine=False):
+        cdef const uint8_t[::1] raw = as_bytes(vertices)
+        cdef const uint8_t[::1] raw_matrix = None if matrix is None else as_bytes(matrix)
+        self.arrays = (raw, raw_matrix)
+        self.source.data = data(raw)
+        self.source.matrix = data(raw_matrix)
+        self.source.is_affine = matrix is not None and is_affine
+        self.source.scalar = <tl_scalar><int>SCALARS[vertices.dtype]
+        self.source.n, self.source.n_components = vertices.shape
+        self.is_clip_space = matrix is not None or self.source.n_components == 4
+
+    def snap(self, int64_t first, int64_t end, int subpixel_bits, bint with_depth, uint8_t[::1] records, int64_t[:, ::1] wide):
+        """Snap the pixels of vertices [first, end) into records; returns the numbers of bad, wide and clipped vertices."""
+        cdef tl_wide *table = <tl_wide *>&wide[0, 0] if wide is not None else NULL
+        cdef tl_vertex_counts counts
+        with nogil:
+            counts = K.snap(&self.source, first, end, subpixel_bits, with_depth, <tl_vertex *>&records[0], table)
+        return counts.n_bad, counts.n_wide, counts.n_clipped
+
+    def project(self, int64_t first, int64_t end, View view, uint8_t[::1] records, int64_t[:, ::1] wide):
+        """Project and snap vertices [first, end) into records; returns the numbers of bad, wide and clipped vertices."""
+        cdef tl_wide *table = <tl_wide *>&wide[0, 0] if wide is not None else NULL
+        cdef tl_vertex_counts counts
+        with nogil:
+            counts = K.project(&self.source, first, end, &view.view, <tl_vertex *>&records[0], table)
+        return counts.n_bad, counts.n_wide, counts.n_clipped
+
+
+cdef class Target:
+    """The contiguous buffers of a picture, neither side of it 0, and what becomes of a covered sample."""
+
+    cdef tl_sink sink
+    cdef int64_t width, height
+    cdef int pixel_bytes
+    cdef uint8_t[::1] pixels
+    cdef float[:, ::1] depth
+    cdef uint64_t[:, ::1] covered
+    cdef int sample_bits
+    cdef const int32_t[:, ::1] samples
+    cdef int32_t flip
+
+    def __init__(self, int sink, pixels, depth, covered, samples=None, bint earlier_wins=False):
+        self.sink, self.flip = <tl_sink>sink, TL_FLIP if earlier_wins else 0
+        self.height, self.width = pixels.shape
+        self.pixel_bytes = pixels.itemsize
+        self.pixels, self.depth, self.covered = as_bytes(pixels), depth, covered
+        self.samples, self.sample_bits = samples, 0 if samples is None else len(samples).bit_length() - 1
+
+    @staticmethod
+    def covered_shape(int64_t height, int64_t width, int64_t n_samples=1):
+        """Return the shape of the uint64 scratch that a mask needs: any rows of it are enough for as many of the mask."""
+        return height, tl_covered_words(width * n_samples)
+
+    cdef tl_target rows(self, int64_t first_row) noexcept:
+        """The buffers from a row on."""
+        cdef tl_target t
+        memset(&t, 0, sizeof(t))
+        t.sink = self.sink
+        t.pixels = &self.pixels[first_row * self.width * self.pixel_bytes]
+        t.depth = &self.depth[first_row, 0] if self.depth is not None else NULL
+        t.covered = &self.covered[first_row, 0] if self.covered is not None else NULL
+        t.stride_px = self.width
+        t.flip = self.flip
+        t.sample_bits = self.sample_bits
+        t.samples_fx = &self.samples[0, 0] if self.samples is not None else NULL
+        return t
+
+
+def first_bad_row(const int32_t[:, ::1] triangles, int64_t n_vertices):
+    """Return the first row with an index outside ``[0, n_vertices)``, -1 if there is none."""
+    cdef int64_t n = triangles.shape[0], row = -1
+    if n:
+        with nogil:
+            row = K.first_bad_row(&triangles[0, 0], n, n_vertices)
+    return row
+
+
+def narrow_triangles(const int64_t[:, ::1] triangles, int64_t n_vertices, int32_t[:, ::1] out):
+    """Write the indices as int32; returns the first row with one outside ``[0, n_vertices)``, -1 if there is none."""
+    cdef int64_t n = triangles.shape[0], row = -1
+    if n:
+        with nogil:
+            row = K.narrow_triangles(&triangles[0, 0], n, n_vertices, &out[0, 0])
+    return row
+
+
+def set_flat_depth(int32_t[:, ::1] ids, float[:, ::1] out, int64_t first_row, int64_t n_rows, bint earlier_wins, float depth,
+                   float background):
+    """Write the depth of rows of a picture whose triangles all lie at one; ids as `Target` has them drawn become ids."""
+    cdef int64_t n = n_rows * ids.shape[1]
+    if n:
+        with nogil:
+            K.set_flat_depth(&ids[first_row, 0], n, TL_FLIP if earlier_wins else 0, depth, background, &out[first_row, 0])
+
+
+def first_bad(const uint8_t[::1] records, const int32_t[:, ::1] triangles):
+    """Return the lowest index of a vertex in use that has no fixed-point position, -1 if there is none."""
+    cdef int64_t n = triangles.shape[0], found = -1
+    if n:
+        with nogil:
+            found = K.first_bad(<const tl_vertex *>&records[0], &triangles[0, 0], n)
+    return found
+
+
+cdef class Pieces:
+    """What the clip planes leave of the triangles that they cut."""
+
+    cdef tl_pieces pieces
+    cdef readonly object arrays
+
+    def __init__(self, Source source, const uint8_t[::1] records, const int32_t[:, ::1] triangles, View view):
+        cdef tl_pieces *p = &self.pieces
+        cdef int64_t n = triangles.shape[0]
+        cdef uint8_t[::1] vertices
+        cdef int64_t[:, ::1] wide
+        cdef double[::1] inv_w
+        cdef double[:, ::1] weights
+        cdef int32_t[:, ::1] corners
+        cdef int32_t[::1] owners
+        p.vertices = NULL
+        p.n_vertices = p.n_pieces = 0
+        if n == 0:
+            return
+        with nogil:
+            K.clip(&source.source, <const tl_vertex *>&records[0], &triangles[0, 0], n, &view.view, p)
+        if p.n_pieces == 0:
+            return
+        vertices, wide = np.empty(p.n_vertices * VERTEX_BYTES, np.uint8), np.empty((p.n_vertices, 2), np.int64)
+        inv_w, weights = np.empty(p.n_vertices), np.empty((p.n_vertices, 3))
+        corners, owners = np.empty((p.n_pieces, 3), np.int32), np.empty(p.n_pieces, np.int32)
+        self.arrays = (vertices, wide, inv_w, weights, corners, owners)
+        p.vertices, p.wide = <tl_vertex *>&vertices[0], <tl_wide *>&wide[0, 0]
+        p.inv_w, p.weights = &inv_w[0], &weights[0, 0]
+        p.triangles, p.source = &corners[0, 0], &owners[0]
+        with nogil:
+            K.clip(&source.source, <const tl_vertex *>&records[0], &triangles[0, 0], n, &view.view, p)
+
+    def __len__(self):
+        return self.pieces.n_pieces

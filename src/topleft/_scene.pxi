@@ -1,0 +1,205 @@
+# Snapped triangles, and what is drawn and resolved of them. Included by _engine.pyx.
+
+
+cdef class Scene:
+    """Snapped vertices and triangles, ready to be drawn or resolved; keeps what it points to alive."""
+
+    cdef tl_scene scene
+    cdef int64_t x_px, y_px
+    cdef readonly int subpixel_bits
+    cdef tl_test test
+    cdef object arrays
+    cdef readonly View view
+
+    def __init__(
+        self, Source source, const uint8_t[::1] records, const int64_t[:, ::1] wide, const int32_t[:, ::1] triangles,
+        Pieces pieces, int64_t x_px, int64_t y_px, int subpixel_bits, int cull, int method, int test=0, View view=None,
+    ):
+        self.view = view
+        self.arrays = (source, records, wide, triangles, pieces)
+        self.scene.mesh.vertices = <const tl_vertex *>data(records)
+        self.scene.mesh.wide = <const tl_wide *>&wide[0, 0] if wide is not None and wide.shape[0] else NULL
+        self.scene.mesh.inv_w = NULL
+        self.scene.mesh.source = &source.source if source.is_clip_space else NULL
+        self.scene.mesh.n_vertices = records.shape[0] // <int64_t>sizeof(tl_vertex)
+        self.scene.n_triangles = triangles.shape[0]
+        self.scene.triangles = &triangles[0, 0] if triangles.shape[0] else NULL
+        self.scene.pieces = &pieces.pieces if pieces is not None and len(pieces) else NULL
+        self.scene.cull, self.scene.method, self.scene.first_id = cull, method, 0
+        self.x_px, self.y_px, self.subpixel_bits, self.test = x_px, y_px, subpixel_bits, test
+
+    def seen_from(self, int32_t x_fx, int32_t y_fx):
+        """Return the same scene with its samples off the centres of the pixels, in sub-pixels."""
+        cdef Scene seen = self.copy()
+        seen.scene.mesh.sample_x_fx, seen.scene.mesh.sample_y_fx = x_fx, y_fx
+        return seen
+
+    def numbered_from(self, int32_t first_id):
+        """Return the same scene with other ids in the buffers that `draw` fills: triangle 0 is called `first_id`."""
+        cdef Scene named = self.copy()
+        named.scene.first_id = first_id
+        return named
+
+    def moved(self, int64_t x_px, int64_t y_px):
+        """Return the same scene behind a window that begins x_px columns and y_px rows later."""
+        cdef Scene part = self.copy()
+        part.x_px += x_px
+        part.y_px += y_px
+        return part
+
+    cdef Scene copy(self):
+        cdef Scene other = Scene.__new__(Scene)
+        other.scene, other.arrays = self.scene, self.arrays
+        other.x_px, other.y_px, other.subpixel_bits, other.test = self.x_px, self.y_px, self.subpixel_bits, self.test
+        other.view = self.view
+        return other
+
+    cdef tl_window window(self, int64_t first_row, int64_t n_rows, int64_t width) noexcept nogil:
+        cdef tl_window w
+        w.x_px, w.y_px, w.subpixel_bits = self.x_px, self.y_px + first_row, self.subpixel_bits
+        w.width, w.height, w.test = width, n_rows, self.test
+        return w
+
+    def guess_layers(self, double n_pixels):
+        """Return about how often triangles cover each of n_pixels: from the areas of up to 128 of them, window or not."""
+        cdef const tl_vertex *v = self.scene.mesh.vertices
+        cdef int64_t n = min(self.scene.n_triangles, 128), i, last = self.scene.mesh.n_vertices - 1
+        cdef const int32_t *t
+        cdef double unit = 2.0 * 4.0**self.subpixel_bits, area, total = 0
+        for i in range(n):
+            t = self.scene.triangles + 3 * (i * self.scene.n_triangles // n)
+            if not (0 <= t[0] <= last and 0 <= t[1] <= last and 0 <= t[2] <= last):
+                return 0.0  # an error that draw finds
+            area = (<double>v[t[1]].x_fx - v[t[0]].x_fx) * (<double>v[t[2]].y_fx - v[t[0]].y_fx)
+            area -= (<double>v[t[1]].y_fx - v[t[0]].y_fx) * (<double>v[t[2]].x_fx - v[t[0]].x_fx)
+            total += min(abs(area) / unit, n_pixels)
+        return total * self.scene.n_triangles / (n * n_pixels) if n else 0.0
+
+    def count_classes(self, int sink, int64_t width, int64_t height, const int32_t[:, ::1] samples=None):
+        """Count the triangles by the code that draws them into a sink: `tl_census` in ``csrc/topleft.h``.
+
+        Returns the first bad row or -1, and triangles, samples in their boxes, and covered samples of each `tl_class`.
+        """
+        cdef tl_window window = self.window(0, height, width)
+        cdef tl_target target
+        cdef tl_census census
+        cdef int64_t bad_row
+        memset(&census, 0, sizeof(census))
+        memset(&target, 0, sizeof(target))
+        census.sink = <tl_sink>sink
+        if samples is not None:
+            target.samples_fx, target.sample_bits = &samples[0, 0], samples.shape[0].bit_length() - 1
+        with nogil:
+            bad_row = K.count_classes(&self.scene, &window, &target, &census)
+        return bad_row, [(census.n[k], census.boxes[k], census.covered[k]) for k in range(TL_N_CLASSES)]
+
+    def draw(self, Target target, int64_t first_row, int64_t n_rows, bint is_first=True, bint is_last=True):
+        """Draw rows of a picture, which the first of several scenes clears and the last one finishes.
+
+        Returns -1, or a number that is not negative when a triangle has an index outside the vertices.
+        """
+        cdef tl_target rows = target.rows(first_row)
+        cdef tl_window window = self.window(first_row, n_rows, target.width)
+        cdef tl_share share
+        cdef int64_t bad_row
+        share.ids = share.others = NULL
+        share.first, share.end, share.is_first, share.is_last = 0, self.scene.n_triangles, is_first, is_last
+        with nogil:
+            bad_row = K.draw(&self.scene, &window, &rows, &share)
+        return bad_row
+
+    def draw_share(self, Target target, int64_t first_row, int64_t n_rows, int64_t first, int32_t[::1] others):
+        """Clear rows of a picture and draw there the triangles from `first` on for which `others` has room, 16 numbers left.
+
+        What of them lies in other rows is listed in `others`; returns the first bad row or -1, and how many those are.
+        """
+        cdef tl_target rows = target.rows(first_row)
+        cdef tl_window window = self.window(first_row, n_rows, target.width), picture = self.window(0, target.height, target.width)
+        cdef tl_share share
+        cdef int64_t bad_row
+        share.ids, share.others, share.n_others, share.picture = NULL, &others[0], 0, &picture
+        share.first, share.end, share.is_first, share.is_last = first, first + others.shape[0] - 16, True, False
+        with nogil:
+            bad_row = K.draw(&self.scene, &window, &rows, &share)
+        return bad_row, share.n_others
+
+    def draw_listed(self, Target target, int64_t first_row, int64_t n_rows, const int32_t[::1] ids, bint is_last):
+        """Draw the triangles listed over what the rows hold."""
+        cdef tl_target rows = target.rows(first_row)
+        cdef tl_window window = self.window(first_row, n_rows, target.width)
+        cdef tl_share share
+        share.ids, share.others = &ids[0] if ids.shape[0] else NULL, NULL
+        share.first, share.end, share.is_first, share.is_last = 0, ids.shape[0], False, is_last
+        with nogil:
+            K.draw(&self.scene, &window, &rows, &share)
+
+    def draw_area(self, float[:, ::1] pixels, uint8_t[::1] cells, int64_t first_row, int64_t n_rows, bint is_wide, bint is_clamped):
+        """Write the area that triangles cover of the pixels in rows [first_row, first_row + n_rows).
+
+        `cells`: those of these rows, clear. Returns as `draw` does, or AREA_OVERFLOW when the cells must be wide.
+        """
+        cdef tl_area target
+        cdef tl_window window = self.window(first_row, n_rows, pixels.shape[1])
+        cdef int64_t status
+        if n_rows == 0 or pixels.shape[1] == 0:
+            return -1
+        target.pixels, target.stride_px, target.cells = &pixels[first_row, 0], pixels.shape[1], &cells[0]
+        target.is_wide, target.is_clamped = is_wide, is_clamped
+        with nogil:
+            status = K.draw_area(&self.scene, &window, &target)
+        return status
+
+    def paint(self, const int32_t[:, ::1] labels, const uint8_t[::1] colors, uint8_t[::1] pixels, int64_t first_row, int64_t n_rows,
+              bint is_flat, bint is_u8, int n_channels):
+        """Colour the rows [first_row, first_row + n_rows) by their labels."""
+        cdef int64_t width = labels.shape[1]
+        cdef int pixel_bytes = n_channels if is_u8 else 4 * n_channels
+        cdef tl_window window = self.window(first_row, n_rows, width)
+        if width == 0 or n_rows == 0 or self.scene.n_triangles == 0:
+            return
+        with nogil:
+            if is_flat:
+                K.paint_flat(&labels[first_row, 0], n_rows * width, <const uint8_t *>data(colors), pixel_bytes,
+                             &pixels[first_row * width * pixel_bytes])
+            else:
+                K.paint_gouraud(&self.scene, &window, &labels[first_row, 0], data(colors), n_channels, is_u8,
+                                &pixels[first_row * width * pixel_bytes])
+
+    def blend(self, uint8_t[::1] pixels, int64_t width, int64_t first_row, int64_t n_rows, const uint8_t[::1] colors, int n_channels,
+              bint is_u8, bint is_flat, int blend, bint is_premultiplied, const uint8_t[::1] ground, int32_t[::1] packed, int32_t[::1] cells):
+        """Blend the colours of triangles into rows [first_row, first_row + n_rows) of a picture, one after the other.
+
+        `ground`: one colour, which the rows get first, or None. `packed`: room for the picture, for uint8 with other than 4 channels; `cells`: clear, for areas. Returns as `draw` does.
+        """
+        cdef tl_canvas canvas
+        cdef tl_window window = self.window(first_row, n_rows, width)
+        cdef int pixel_bytes = n_channels if is_u8 else 4 * n_channels
+        cdef int64_t bad_row
+        if width == 0 or n_rows == 0 or self.scene.n_triangles == 0:
+            return -1
+        canvas.pixels, canvas.stride_px = &pixels[first_row * width * pixel_bytes], width
+        canvas.colors, canvas.n_channels, canvas.is_u8, canvas.is_flat = data(colors), n_channels, is_u8, is_flat
+        canvas.blend, canvas.is_premultiplied, canvas.is_area = <tl_blend>blend, is_premultiplied, cells is not None
+        canvas.ground = &ground[0] if ground is not None else NULL
+        canvas.packed = &packed[first_row * width] if packed is not None else NULL
+        canvas.cells = &cells[0] if cells is not None else NULL
+        with nogil:
+            bad_row = K.blend(&self.scene, &window, &canvas)
+        return bad_row
+
+    def barycentric(self, const int32_t[:, ::1] ids, float[:, :, ::1] out):
+        """Write the weights of the three vertices of the triangle at each pixel."""
+        cdef tl_window window = self.window(0, ids.shape[0], ids.shape[1])
+        if ids.shape[0] and ids.shape[1]:
+            with nogil:
+                K.barycentric(&self.scene, &window, &ids[0, 0], &out[0, 0, 0])
+
+    def interpolate(self, const int32_t[:, ::1] ids, const float[:, ::1] values, bint per_corner, float background,
+                    float[:, :, ::1] out):
+        """Write the interpolated values at each pixel; `values` has a row per vertex, or per corner of each triangle."""
+        cdef tl_window window = self.window(0, ids.shape[0], ids.shape[1])
+        cdef int n_values = out.shape[2]
+        if ids.shape[0] and ids.shape[1] and n_values:
+            with nogil:
+                K.interpolate(&self.scene, &window, &ids[0, 0], &values[0, 0] if values.shape[0] else NULL, n_values,
+                              per_corner, background, &out[0, 0, 0])
