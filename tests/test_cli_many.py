@@ -79,6 +79,13 @@ def test_render_layers_names_follow_out(run, folder, out, layers, views, expecte
     assert names(folder) == expected
 
 
+def test_render_layer_id_is_short_for_triangle(run, folder):
+    assert run("render", "cube", "-o", "p/", "--layers", "color,depth,id", *SMALL) == (0, [])
+    assert sorted(path.name for path in (folder / "p").iterdir()) == [
+        "cube-color.png", "cube-depth.png", "cube-triangle.png",
+    ]  # fmt: skip
+
+
 def test_render_layers_are_those_of_the_mesh(run):
     assert run("render", "torus-knot", "-o", "p/", "--layers", "color,depth,triangle", *SMALL) == (0, [])
     frags = rasterize_mesh(KNOT, None, (64, 48))
@@ -347,7 +354,7 @@ def test_video_without_ffmpeg_gives_the_hint_before_any_work(run, folder, monkey
         (["--sheet", "a.png", "-o", "a.npz"], "topleft: --sheet and --animation need pictures: OUT must end in one of"),
         (["--sheet", "a.png", "-o", "p/", "--layers", "uv"], "topleft: --sheet and --animation show the layer color"),
         (["--sheet", "p/cube.png", "-o", "p/"], "topleft: 'cube' and 'p/cube.png' would both be written to"),
-        (["-o", "p/", "--layers", "id"], "topleft: argument --layers: layers must be some of color, alpha,"),
+        (["-o", "p/", "--layers", "ids"], "topleft: argument --layers: layers must be some of color, alpha,"),
         (["-o", "p/", "--layers", "flow"], "topleft: argument --layers: layer 'flow' needs two cameras"),
         (["-o", "p/", "--fps", "0"], "topleft: argument --fps: must be a number from 0.1 to 100, got '0'"),
         (["-o", "p/", "--jobs", "0"], "topleft: argument --jobs: must be a positive whole number, got '0'"),

@@ -35,7 +35,7 @@ OUT is a file or a folder:
 Formats: {' '.join(SUFFIXES)} (PNG in a folder). A picture of that name is replaced, a mesh never.
 
 --layers: {', '.join(LAYERS_OF_ONE_VIEW[:8])},
-{', '.join(LAYERS_OF_ONE_VIEW[8:])}.
+{', '.join(LAYERS_OF_ONE_VIEW[8:])}; id is short for triangle.
 .npz holds all layers of a view in one file, and clip_from_world, the 4x4 matrix; without --layers color, triangle and
 depth. .npy and TIFF hold ids as int32 (-1: nothing) and all other numbers as float32 (depth and distances: +inf where
 nothing is). In a PNG they are 16-bit numbers, 0 where nothing is: ids plus 1, distances in thousandths, depth from 1
@@ -151,7 +151,8 @@ def _rate(text: str) -> float:
 
 def _layers(text: str) -> tuple[str, ...]:
     try:
-        names = check_layers(name.strip() for name in text.split(","))
+        given = (name.strip() for name in text.split(","))
+        names = check_layers("triangle" if name == "id" else name for name in given)
     except ValueError as error:
         raise argparse.ArgumentTypeError(str(error)) from None
     if "flow" in names:
