@@ -60,6 +60,10 @@ def render_transparent(
     ValueError
         If the mesh has no triangles and no camera is given, an option is out of range, or the camera has a lens.
 
+    Notes
+    -----
+    Materials cut nothing out here: what `alpha_cutoff` would leave out of a texture is glass, too.
+
     Examples
     --------
     >>> import topleft as tl
