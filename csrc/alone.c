@@ -95,6 +95,13 @@ TL_INLINE void walk_rows(const tl_triangle *t, const tl_window *window, const tl
 /* A box at most this wide is walked sample by sample, a wider one by its row ends. */
 #define TL_EDGE_MAX_WIDTH 6
 
+/* What stands in the picture for triangles. */
+TL_INLINE vi names_of(const tl_scene *scene, vm m, vi id)
+{
+    return vi_add(scene->names ? vi_gather(m, scene->names, id) : id, vi_set1(scene->first_id));
+}
+TL_INLINE int32_t name_of(const tl_scene *scene, int32_t id) { return (scene->names ? scene->names[id] : id) + scene->first_id; }
+
 /* Whether a triangle that is set up is walked by float64 row ends; if not, sample by sample or by exact row ends. */
 TL_INLINE int takes_rows(const tl_triangle *t, const tl_scene *scene, const tl_window *window, tl_sink sink)
 {
@@ -131,7 +138,7 @@ TL_INLINE void draw_triangle(const tl_vertex_set *set, const int32_t *corners, i
             count_unseen_one(target->census, &t, window);
         return;
     }
-    t.id = id + scene->first_id;
+    t.id = name_of(scene, id);
     if (sink == TL_SINK_CENSUS) {
         count_drawn(&t, scene, window, target->census);
         return;

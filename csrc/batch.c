@@ -287,9 +287,9 @@ TL_INLINE void flush_small(batch_state *s, tl_sink sink)
             }
         }
         const vi sample = t.sample, size = vi_load(q->size + i);
-        const vi id = vi_add(vi_load(q->id + i), vi_set1(s->scene->first_id));
         const vi n_cols = vi_and(size, vi_set1(0xffff)), n_rows = vi_shift_right(size, 16);
         const vm live = vm_first(n - i);
+        const vi id = names_of(s->scene, live, vi_load(q->id + i));
         for (int row = 0; row < TL_SMALL_BOX; row++) {
             const vm in_row = vm_and(live, vi_gt(n_rows, vi_set1(row)));
             vi e0 = t.e[0], e1 = t.e[1], e2 = t.e[2];

@@ -169,12 +169,13 @@ static void append_pieces(tl_pieces *p, const clip_corner *polygon, int n, int32
     p->n_vertices += n;
 }
 
-static void clip(const tl_source *source, const tl_vertex *vertices, const int32_t *triangles, int64_t n_triangles,
+static void clip(const tl_source *source, const tl_vertex *vertices, const int32_t *triangles, const int32_t *ids, int64_t n_listed,
                  const tl_view *view, tl_pieces *pieces)
 {
     clip_corner polygon[TL_MAX_CORNERS];
     pieces->n_vertices = pieces->n_pieces = 0;
-    for (int64_t t = 0; t < n_triangles; t++) {
+    for (int64_t i = 0; i < n_listed; i++) {
+        const int64_t t = ids ? ids[i] : i;
         const int32_t *corners = triangles + 3 * t;
         int cut = 0;
         for (int k = 0; k < 3; k++)

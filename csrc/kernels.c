@@ -18,6 +18,7 @@
 #include "resolve.c"
 #include "paint.c"
 #include "flat.c"
+#include "clusters.c"
 #include "edges.c"
 #include "line_ends.c"
 #include "smooth_lines.c"
@@ -61,6 +62,11 @@ const tl_kernels TL_KERNELS = {
     .interpolate = interpolate,
     .paint_flat = paint_flat,
     .paint_gouraud = paint_gouraud,
+    .place_on_curve = place_on_curve,
+    .sort_keys = sort_keys,
+    .cut_clusters = cut_clusters,
+    .measure_clusters = measure_clusters,
+    .cull_clusters = cull_clusters,
     .list_edges = list_edges,
     .draw_lines = draw_lines,
     .composite = composite,

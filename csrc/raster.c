@@ -10,6 +10,7 @@
 #include "rows.c"
 #include "sampled.c"
 #include "sampled_alone.c"
+#include "clustered.c"
 
 /* Whether the 3 * TL_LANES indices of a vector of triangles hold one outside [0, last_vertex]. */
 TL_INLINE int has_bad_index(const int32_t *corners, vi last_vertex)
@@ -70,7 +71,7 @@ TL_INLINE void draw_batch(batch_state *s, tl_sink sink, const int32_t *corners, 
     const vi n_cols = vi_sub(vi_min(extent_pixels(x_max, limits->round.end, bits), vi_set1(limits->right)), col);
     const vi top = extent_pixels(y_min, limits->round.first, bits), bottom = extent_pixels(y_max, limits->round.end, bits), row = vi_max(top, vi_set1(limits->top));
     const vi n_rows = vi_sub(vi_min(bottom, vi_set1(limits->bottom)), row);
-    if (s->share->others) {
+    if (s->share->others && !s->share->clusters) {
         const vi first = vi_max(top, vi_set1(limits->picture_top)), end = vi_min(bottom, vi_set1(limits->picture_bottom));
         const vm is_seen = vm_and(drawn, vm_and(vi_gt(n_cols, zero), vi_gt(end, first)));
         const vm is_beyond = vm_or(vi_gt(row, first), vi_gt(end, vi_set1(limits->bottom)));
@@ -115,7 +116,7 @@ TL_INLINE void draw_batch(batch_state *s, tl_sink sink, const int32_t *corners, 
         lane_triangles t;
         vd z[3];
         place_triangles(s, sink, &c, col, row, &t, z);
-        draw_tiny(s, sink, &t, z, tiny, n_cols, n_rows, vi_add(id, vi_set1(s->scene->first_id)));
+        draw_tiny(s, sink, &t, z, tiny, n_cols, n_rows, names_of(s->scene, tiny, id));
     }
     if (vm_any(small)) {
         push(&s->small, small, col, row, n_cols, n_rows, id);
@@ -162,7 +163,7 @@ TL_INLINE void draw_batches(const tl_scene *scene, const tl_window *window, cons
     const int32_t reach = of_samples ? sample_reach(target) : 0;
     const extent_rounding round = round_extent(window);
     const int64_t farthest = (int64_t)1 << 30;
-    const tl_window *picture = share->others ? share->picture : window;
+    const tl_window *picture = share->others && !share->clusters ? share->picture : window;
     s.limits = (batch_limits){
         .left = (int32_t)window->x_px,
         .top = (int32_t)window->y_px,
@@ -175,17 +176,30 @@ TL_INLINE void draw_batches(const tl_scene *scene, const tl_window *window, cons
         .special_x = (int32_t)((uint32_t)TL_SPECIAL - (uint32_t)scene->mesh.sample_x_fx),
         .second = is_back ? 2 : 1,
         .third = is_back ? 1 : 2,
-        .last_vertex = vi_set1((int32_t)(scene->mesh.n_vertices - 1)),
+        .last_vertex = vi_set1((int32_t)((share->clusters ? TL_CLUSTER : scene->mesh.n_vertices) - 1)),
     };
-    for (int64_t i = share->first; i < share->end && s.bad_row < 0; i += TL_LANES) {
-        int32_t corners[3 * TL_LANES];
-        const vm live = vm_first(share->end - i);
-        const vi id = share->ids ? vi_load_masked(live, share->ids + i) : vi_add(vi_set1((int32_t)i), vi_iota());
-        draw_batch(&s, sink, share_corners(scene, share, i, corners), id, live);
+    tl_cluster_pass *clusters = share->clusters;
+    cluster_scene cluster;
+    tl_share part = *share;
+    for (int64_t next = 0; next < (clusters ? clusters->n_listed : 1); next++) {
+        if (clusters) {
+            const tl_cluster *c = clusters->mesh->clusters + clusters->list[next];
+            if (clusters->may_be_hidden && is_hidden(c, clusters->seen, window, target))
+                continue;
+            part.first = 0, part.end = load_cluster(c, clusters, scene, share, &cluster);
+            clusters->n_drawn++;
+            s.scene = &cluster.scene;
+        }
+        for (int64_t i = part.first; i < part.end && s.bad_row < 0; i += TL_LANES) {
+            int32_t corners[3 * TL_LANES];
+            const vm live = vm_first(part.end - i);
+            const vi id = part.ids ? vi_load_masked(live, part.ids + i) : vi_add(vi_set1((int32_t)i), vi_iota());
+            draw_batch(&s, sink, share_corners(s.scene, &part, i, corners), id, live);
+        }
+        TL_SINK_CALL(flush_small, sink, &s)
+        TL_SINK_CALL(flush_middle, sink, &s)
+        TL_SINK_CALL(flush_rows, sink, &s)
     }
-    TL_SINK_CALL(flush_small, sink, &s)
-    TL_SINK_CALL(flush_middle, sink, &s)
-    TL_SINK_CALL(flush_rows, sink, &s)
     flush_fragments(target, sink, &s.fragments, s.fragments.n);
     *bad_row = s.bad_row;
 }
@@ -267,7 +281,7 @@ static int64_t draw(const tl_scene *scene, const tl_window *window, const tl_tar
         int64_t bad_row = -1;
         if (share->is_first)
             clear(&band, &part);
-        if (share->first < share->end)
+        if (share->first < share->end || share->clusters)
             TL_SINK_CALL(draw_scene, target->sink, scene, &band, &part, share, &bad_row)
         if (bad_row >= 0)
             return bad_row;

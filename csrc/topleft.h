@@ -175,13 +175,65 @@ typedef struct {
     tl_cull cull;
     tl_method method;
     int32_t first_id; /* what triangle 0 is called in a buffer of ids that several scenes share; read by draw alone */
+    const int32_t *names; /* (n_triangles,): what each is called, from first_id on; NULL: its index; read by draw alone */
 } tl_scene;
+
+/* ---- clusters ------------------------------------------------------------------------------------------ */
+
+/* A mesh in object space, sorted into clusters: few neighbouring triangles, whose vertices stand together. */
+
+#define TL_CLUSTER 256      /* triangles at most; and vertices, so that a byte tells them apart */
+#define TL_CLUSTER_GROUP 64 /* clusters that have a box in common */
+#define TL_CLUSTER_TAIL 32  /* rows that must be readable behind the vertices */
+
+typedef struct {
+    double low[3], high[3];      /* their box */
+    double axis[3], cone_cos;    /* of their normals; cone_cos <= 0: any */
+    double min_area, min_height; /* the least doubled area, and of that over the longest side */
+    int64_t first_triangle, first_vertex;
+    int32_t n_triangles, n_vertices;
+} tl_cluster;
+
+typedef struct {
+    const tl_cluster *clusters;
+    int64_t n_clusters;
+    const double *group_boxes; /* (groups, 6): low and high of TL_CLUSTER_GROUP clusters each; NaN: not finite */
+    const uint8_t *corners;    /* (n_triangles, 3) into the vertices of their cluster */
+    const int32_t *names;      /* (n_triangles,): which triangle of the mesh each is */
+} tl_clustered;
+
+/* A view, as far as clusters are concerned. */
+typedef struct {
+    double matrix[16];          /* clip from object */
+    double side[4][2];          /* left, right, top, bottom: a pixel beyond it where side[0] * x (y) + side[1] * w < 0 */
+    double eye[4];              /* what the rows of x, y and w take to 0 */
+    double scale_x, scale_y;    /* sub-pixels a unit of normalized device coordinates */
+    double half_width_px, half_height_px;
+    double length[3];           /* of the rows of x, y and w, without their last number */
+    double error;               /* of the vertex stage, as a share of the sum of all terms of a row */
+    int near_clip, far_clip, zero_to_one;
+    int is_farthest;            /* what lies farther is drawn first */
+    tl_cull cull;
+} tl_cluster_view;
+
+/* What a pass draws of a clustered mesh. */
+typedef struct {
+    const tl_clustered *mesh;
+    const tl_cluster_view *seen;
+    const tl_source *source; /* the vertices of all clusters, with the matrix */
+    const tl_view *view;
+    const int32_t *list;     /* the clusters, in the order in which they are drawn */
+    int64_t n_listed;
+    int may_be_hidden;       /* whether clusters that lie behind all that is drawn are left out; NEAREST and FARTHEST alone */
+    int64_t n_drawn;         /* out: clusters that were not left out */
+} tl_cluster_pass;
 
 /* The part of a scene that one pass draws.  Several passes may share a scene: each takes some of the triangles, draws what of
  * them lies in its own window and lists the others for the passes that own the rest of the picture. */
 typedef struct {
     const int32_t *ids;       /* the triangles ids[first] to ids[end - 1]; NULL: the triangles [first, end) */
     int64_t first, end;
+    tl_cluster_pass *clusters; /* or NULL; then `scene` has no vertices and no triangles, and others lists those that have a TL_SPECIAL corner */
     int32_t *others;          /* out, or NULL: those that reach into `picture` beyond the window; end - first + 16 numbers */
     int64_t n_others;
     const tl_window *picture; /* what all the passes draw; read when there are `others` */
@@ -314,9 +366,29 @@ typedef struct tl_kernels {
     /* The clip space, or object space by the matrix, of vertices [first, end) to snapped vertices; `wide` as above. */
     tl_vertex_counts (*project)(const tl_source *source, int64_t first, int64_t end, const tl_view *view, tl_vertex *out, tl_wide *wide);
 
-    /* Cuts the triangles that have TL_CLIPPED vertices.  With pieces->vertices NULL only counts. */
-    void (*clip)(const tl_source *source, const tl_vertex *vertices, const int32_t *triangles, int64_t n_triangles,
+    /* Cuts the triangles that have TL_CLIPPED vertices: of all n, or of the n in ids, which ascend.  With pieces->vertices NULL
+     * only counts. */
+    void (*clip)(const tl_source *source, const tl_vertex *vertices, const int32_t *triangles, const int32_t *ids, int64_t n,
                  const tl_view *view, tl_pieces *pieces);
+
+    /* Where the middles of triangles lie on a curve that keeps neighbours together; `box` is low and high of the vertices. */
+    void (*place_on_curve)(const tl_source *source, const int32_t *triangles, int64_t first, int64_t end, const double *box, uint32_t *keys);
+
+    /* The order of n keys, equal ones as they stand; `room` has n pairs. */
+    void (*sort_keys)(const uint32_t *keys, int64_t n, uint64_t *room, uint64_t *other_room, int32_t *order);
+
+    /* Cuts the triangles in `order` into clusters: sets their ranges, the mesh's vertices that theirs are, corners and names.
+     * `seen` is (n_vertices,), -1.  Returns the number of clusters; *n_used is that of their vertices. */
+    int64_t (*cut_clusters)(const int32_t *triangles, const int32_t *order, int64_t n, int32_t *seen, tl_cluster *clusters,
+                            int32_t *vertices, uint8_t *corners, int64_t *n_used);
+
+    /* Measures clusters [first, end), a multiple of TL_CLUSTER_GROUP, whose vertices `source` holds, and the boxes of their groups. */
+    void (*measure_clusters)(const tl_source *source, const uint8_t *corners, int64_t first, int64_t end, tl_cluster *clusters,
+                             double *group_boxes);
+
+    /* Lists the clusters that may draw something, about in the order of depth, those that are seen from behind last; `room` has 8
+     * bytes for each cluster.  Returns how many. */
+    int64_t (*cull_clusters)(const tl_clustered *mesh, const tl_cluster_view *view, int32_t *list, void *room);
 
     /* Lowest index of a TL_BAD vertex that a triangle uses, -1 if there is none. */
     int64_t (*first_bad)(const tl_vertex *vertices, const int32_t *triangles, int64_t n_triangles);

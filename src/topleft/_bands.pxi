@@ -37,10 +37,10 @@ def draw_bands(scenes, targets, Bins bins, int64_t first_band, int64_t end_band)
     cdef Target target
     cdef tl_target rows
     cdef tl_window window
-    cdef tl_share share
+    cdef tl_share share = no_share()
     cdef int64_t band, first_row
     cdef list pairs = list(zip(scenes, targets, strict=True))
-    share.others, share.first, share.is_first, share.is_last = NULL, 0, True, True
+    share.is_first = share.is_last = True
     for band in range(first_band, end_band):
         first_row = band << bins.band_bits
         share.ids = &bins.listed[0] + bins.starts[band]
@@ -61,7 +61,7 @@ def peel(scenes, bins, int32_t[:, :, ::1] ids, float[:, :, ::1] depth, bint is_f
     cdef tl_peeled peeled
     cdef tl_target target
     cdef tl_window window
-    cdef tl_share share
+    cdef tl_share share = no_share()
     cdef Scene scene
     cdef Bins own
     cdef int64_t band, first_row, height = ids.shape[1], width = ids.shape[2], bad_row = -1
@@ -76,7 +76,7 @@ def peel(scenes, bins, int32_t[:, :, ::1] ids, float[:, :, ::1] depth, bint is_f
         peeled.ids, peeled.depth = &ids[0, first_row, 0], &depth[0, first_row, 0]
         for i in range(n):
             scene, own = pairs[i]
-            share.ids, share.others, share.first, share.end = NULL, NULL, 0, scene.scene.n_triangles
+            share.ids, share.end = NULL, scene.scene.n_triangles
             if own is not None:
                 share.ids, share.end = &own.listed[0] + own.starts[band], own.starts[band + 1] - own.starts[band]
             share.is_first, share.is_last = i == 0, i == n - 1

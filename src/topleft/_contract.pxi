@@ -103,9 +103,42 @@ cdef extern from "topleft.h" nogil:
         tl_cull cull
         tl_method method
         int32_t first_id
+        const int32_t *names
+    int64_t TL_CLUSTER, TL_CLUSTER_GROUP, TL_CLUSTER_TAIL
+    ctypedef struct tl_cluster:
+        double low[3]
+        double high[3]
+        int64_t first_triangle, first_vertex
+        int32_t n_triangles, n_vertices
+    ctypedef struct tl_clustered:
+        const tl_cluster *clusters
+        int64_t n_clusters
+        const double *group_boxes
+        const uint8_t *corners
+        const int32_t *names
+    ctypedef struct tl_cluster_view:
+        double matrix[16]
+        double side[4][2]
+        double eye[4]
+        double scale_x, scale_y
+        double half_width_px, half_height_px
+        double length[3]
+        double error
+        int near_clip, far_clip, zero_to_one, is_farthest
+        tl_cull cull
+    ctypedef struct tl_cluster_pass:
+        const tl_clustered *mesh
+        const tl_cluster_view *seen
+        const tl_source *source
+        const tl_view *view
+        const int32_t *list
+        int64_t n_listed
+        int may_be_hidden
+        int64_t n_drawn
     ctypedef struct tl_share:
         const int32_t *ids
         int64_t first, end
+        tl_cluster_pass *clusters
         int32_t *others
         int64_t n_others
         const tl_window *picture
@@ -197,7 +230,12 @@ cdef extern from "topleft.h" nogil:
         void (*shade)(const tl_scene *, const tl_window *, const tl_view *, const tl_shading *, const int32_t *, const float *, uint8_t *) noexcept nogil
         tl_vertex_counts (*snap)(const tl_source *, int64_t, int64_t, int, int, tl_vertex *, tl_wide *) noexcept nogil
         tl_vertex_counts (*project)(const tl_source *, int64_t, int64_t, const tl_view *, tl_vertex *, tl_wide *) noexcept nogil
-        void (*clip)(const tl_source *, const tl_vertex *, const int32_t *, int64_t, const tl_view *, tl_pieces *) noexcept nogil
+        void (*clip)(const tl_source *, const tl_vertex *, const int32_t *, const int32_t *, int64_t, const tl_view *, tl_pieces *) noexcept nogil
+        void (*place_on_curve)(const tl_source *, const int32_t *, int64_t, int64_t, const double *, uint32_t *) noexcept nogil
+        void (*sort_keys)(const uint32_t *, int64_t, uint64_t *, uint64_t *, int32_t *) noexcept nogil
+        int64_t (*cut_clusters)(const int32_t *, const int32_t *, int64_t, int32_t *, tl_cluster *, int32_t *, uint8_t *, int64_t *) noexcept nogil
+        void (*measure_clusters)(const tl_source *, const uint8_t *, int64_t, int64_t, tl_cluster *, double *) noexcept nogil
+        int64_t (*cull_clusters)(const tl_clustered *, const tl_cluster_view *, int32_t *, void *) noexcept nogil
         int64_t (*first_bad)(const tl_vertex *, const int32_t *, int64_t) noexcept nogil
         int64_t (*first_bad_row)(const int32_t *, int64_t, int64_t) noexcept nogil
         int64_t (*narrow_triangles)(const int64_t *, int64_t, int64_t, int32_t *) noexcept nogil

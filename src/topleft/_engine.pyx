@@ -1,7 +1,7 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, initializedcheck=False, embedsignature=False
 """Memoryviews in, one nogil kernel call, status out. The array layer has checked every shape, dtype and index."""
 
-from libc.stdint cimport int32_t, int64_t, uint8_t, uint16_t, uint64_t
+from libc.stdint cimport int32_t, int64_t, uint8_t, uint16_t, uint32_t, uint64_t
 from libc.string cimport memset
 
 import numpy as np
@@ -41,6 +41,7 @@ def as_bytes(array):
 include "_inputs.pxi"
 include "_scene.pxi"
 include "_bands.pxi"
+include "_clusters.pxi"
 include "_means.pxi"
 include "_lines.pxi"
 include "_shade.pxi"

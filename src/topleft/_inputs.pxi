@@ -52,6 +52,23 @@ cdef class Source:
             counts = K.project(&self.source, first, end, &view.view, <tl_vertex *>&records[0], table)
         return counts.n_bad, counts.n_wide, counts.n_clipped
 
+    def project_blocks(self, const uint8_t[::1] is_used, int64_t block, View view, uint8_t[::1] records):
+        """Project and snap the blocks of vertices that are used; returns as `project` does."""
+        cdef int64_t i = 0, end, n = is_used.shape[0], n_bad = 0, n_wide = 0, n_clipped = 0
+        cdef tl_vertex_counts counts
+        with nogil:
+            while i < n:
+                end = i
+                while end < n and is_used[end]:
+                    end += 1
+                if end > i:
+                    counts = K.project(&self.source, i * block, min(end * block, self.source.n), &view.view, <tl_vertex *>&records[0], NULL)
+                    n_bad += counts.n_bad
+                    n_wide += counts.n_wide
+                    n_clipped += counts.n_clipped
+                i = end + 1
+        return n_bad, n_wide, n_clipped
+
 
 cdef class Target:
     """The contiguous buffers of a picture, neither side of it 0, and what becomes of a covered sample."""
@@ -135,9 +152,11 @@ cdef class Pieces:
     cdef tl_pieces pieces
     cdef readonly object arrays
 
-    def __init__(self, Source source, const uint8_t[::1] records, const int32_t[:, ::1] triangles, View view):
+    def __init__(self, Source source, const uint8_t[::1] records, const int32_t[:, ::1] triangles, View view, const int32_t[::1] ids=None):
+        """`ids`: the triangles that may be cut, ascending; unless given, all of them."""
         cdef tl_pieces *p = &self.pieces
-        cdef int64_t n = triangles.shape[0]
+        cdef int64_t n = triangles.shape[0] if ids is None else ids.shape[0]
+        cdef const int32_t *listed = &ids[0] if ids is not None and n else NULL
         cdef uint8_t[::1] vertices
         cdef int64_t[:, ::1] wide
         cdef double[::1] inv_w
@@ -149,7 +168,7 @@ cdef class Pieces:
         if n == 0:
             return
         with nogil:
-            K.clip(&source.source, <const tl_vertex *>&records[0], &triangles[0, 0], n, &view.view, p)
+            K.clip(&source.source, <const tl_vertex *>&records[0], &triangles[0, 0], listed, n, &view.view, p)
         if p.n_pieces == 0:
             return
         vertices, wide = np.empty(p.n_vertices * VERTEX_BYTES, np.uint8), np.empty((p.n_vertices, 2), np.int64)
@@ -160,7 +179,7 @@ cdef class Pieces:
         p.inv_w, p.weights = &inv_w[0], &weights[0, 0]
         p.triangles, p.source = &corners[0, 0], &owners[0]
         with nogil:
-            K.clip(&source.source, <const tl_vertex *>&records[0], &triangles[0, 0], n, &view.view, p)
+            K.clip(&source.source, <const tl_vertex *>&records[0], &triangles[0, 0], listed, n, &view.view, p)
 
     def __len__(self):
         return self.pieces.n_pieces

@@ -57,7 +57,7 @@ def fill_bands(scenes, int32_t[:, ::1] labels, Palette palette, pixels, Bins bin
     cdef Scene scene
     cdef tl_target target
     cdef tl_window window
-    cdef tl_share share
+    cdef tl_share share = no_share()
     cdef uint8_t[::1] flat = as_bytes(pixels)
     cdef int k, n_samples = len(scenes), sample_bits = int(len(scenes)).bit_length() - 1
     cdef int64_t band, first_row, n_rows, height = pixels.shape[0], width = pixels.shape[1]
@@ -66,7 +66,7 @@ def fill_bands(scenes, int32_t[:, ::1] labels, Palette palette, pixels, Bins bin
         seen[k] = scene.scene
     memset(&target, 0, sizeof(target))
     target.sink, target.stride_px = <tl_sink>LABEL, width
-    share.others, share.first, share.is_first, share.is_last = NULL, 0, True, True
+    share.is_first = share.is_last = True
     with nogil:
         for band in range(first_band, end_band):
             first_row = band << bins.band_bits

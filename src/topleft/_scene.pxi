@@ -1,6 +1,13 @@
 # Snapped triangles, and what is drawn and resolved of them. Included by _engine.pyx.
 
 
+cdef inline tl_share no_share() noexcept nogil:
+    """A share of nothing, of no clusters, that lists nothing."""
+    cdef tl_share share
+    memset(&share, 0, sizeof(share))
+    return share
+
+
 cdef class Scene:
     """Snapped vertices and triangles, ready to be drawn or resolved; keeps what it points to alive."""
 
@@ -25,7 +32,7 @@ cdef class Scene:
         self.scene.n_triangles = triangles.shape[0]
         self.scene.triangles = &triangles[0, 0] if triangles.shape[0] else NULL
         self.scene.pieces = &pieces.pieces if pieces is not None and len(pieces) else NULL
-        self.scene.cull, self.scene.method, self.scene.first_id = cull, method, 0
+        self.scene.cull, self.scene.method, self.scene.first_id, self.scene.names = cull, method, 0, NULL
         self.x_px, self.y_px, self.subpixel_bits, self.test = x_px, y_px, subpixel_bits, test
 
     def seen_from(self, int32_t x_fx, int32_t y_fx):
@@ -100,9 +107,8 @@ cdef class Scene:
         """
         cdef tl_target rows = target.rows(first_row)
         cdef tl_window window = self.window(first_row, n_rows, target.width)
-        cdef tl_share share
+        cdef tl_share share = no_share()
         cdef int64_t bad_row
-        share.ids = share.others = NULL
         share.first, share.end, share.is_first, share.is_last = 0, self.scene.n_triangles, is_first, is_last
         with nogil:
             bad_row = K.draw(&self.scene, &window, &rows, &share)
@@ -115,9 +121,9 @@ cdef class Scene:
         """
         cdef tl_target rows = target.rows(first_row)
         cdef tl_window window = self.window(first_row, n_rows, target.width), picture = self.window(0, target.height, target.width)
-        cdef tl_share share
+        cdef tl_share share = no_share()
         cdef int64_t bad_row
-        share.ids, share.others, share.n_others, share.picture = NULL, &others[0], 0, &picture
+        share.others, share.picture = &others[0], &picture
         share.first, share.end, share.is_first, share.is_last = first, first + others.shape[0] - 16, True, False
         with nogil:
             bad_row = K.draw(&self.scene, &window, &rows, &share)
@@ -127,8 +133,8 @@ cdef class Scene:
         """Draw the triangles listed over what the rows hold."""
         cdef tl_target rows = target.rows(first_row)
         cdef tl_window window = self.window(first_row, n_rows, target.width)
-        cdef tl_share share
-        share.ids, share.others = &ids[0] if ids.shape[0] else NULL, NULL
+        cdef tl_share share = no_share()
+        share.ids = &ids[0] if ids.shape[0] else NULL
         share.first, share.end, share.is_first, share.is_last = 0, ids.shape[0], False, is_last
         with nogil:
             K.draw(&self.scene, &window, &rows, &share)

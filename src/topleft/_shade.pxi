@@ -139,13 +139,13 @@ def cut_out(Scene scene, View view, Shading shading, const int32_t[::1] opaque, 
     cdef tl_window window = scene.window(first_row, n_rows, ids.shape[1])
     cdef const tl_view *own = &view.view if view is not None else NULL
     cdef tl_target target
-    cdef tl_share share
+    cdef tl_share share = no_share()
     if n_rows == 0 or ids.shape[1] == 0:
         return
     memset(&target, 0, sizeof(target))
     target.sink, target.stride_px = <tl_sink>4, ids.shape[1]  # nearest
     target.pixels, target.depth = &ids[first_row, 0], &depth[first_row, 0]
-    share.ids, share.others, share.first, share.end = &opaque[0], NULL, 0, opaque.shape[0] - 1  # the last is there to be read
+    share.ids, share.end = &opaque[0], opaque.shape[0] - 1  # the last is there to be read
     share.is_first = share.is_last = True
     with nogil:
         K.draw(&scene.scene, &window, &target, &share)

@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 
 from topleft import _engine
 from topleft.methods import METHODS
-from topleft.models import DepthTest, Sink
+from topleft.models import DepthTest, Sampling, Sink
 from topleft.threads import count_threads
 from topleft.view import View
 
 __all__ = [
     "Inputs",
+    "can_cluster",
     "can_share",
     "common_depth",
     "earlier_wins",
@@ -93,6 +94,12 @@ def fragment_sink(test: DepthTest | None, *, has_depth: bool) -> Sink:
     if test is None or not has_depth:
         return Sink.PAINT
     return Sink.FARTHEST if test is DepthTest.GREATER else Sink.NEAREST
+
+
+def can_cluster(view: View, test: DepthTest | None) -> bool:
+    """Tell whether the clusters of a mesh may be drawn one by one, in any order: where depth and index tell who wins."""
+    is_one_sample = view.sampling is Sampling.CENTER and view.transform is not None
+    return is_one_sample and test is not None and 0 not in view.size and can_share(view)
 
 
 def common_depth(points: NDArray[Any], *, has_depth: bool, is_clip_space: bool) -> float | None:

@@ -65,7 +65,7 @@ def _cut_sample(
     cut: np.ndarray[tuple[int, ...], np.dtype[np.int32]],
     n_threads: int,
 ) -> None:
-    scene = frags._scene
+    scene = frags._scene_with(cut)
     look = Look(scene, mesh, camera, frags.triangle.shape[::-1], rows, is_flat=False)
     look.set_materials(mesh, materials, is_unlit=True)
     look.set_view(0, None, (0, 0, 0, 0))

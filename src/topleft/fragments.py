@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,9 @@ from topleft.arrays import as_values
 from topleft.mesh import Mesh
 
 __all__ = ["Fragments"]
+
+#: Makes the scene that attributes of some triangles need: these are snapped, no others.
+PartOfScene = Callable[[NDArray[np.int32]], _engine.Scene]
 
 
 class Fragments:
@@ -45,13 +49,13 @@ class Fragments:
         self,
         triangle: NDArray[np.int32],
         depth: NDArray[np.float32] | float,
-        scene: _engine.Scene,
+        scene: _engine.Scene | PartOfScene,
         n_vertices: int,
         n_triangles: int,
     ) -> None:
         self.id = triangle
         self._depth = depth
-        self._scene = scene
+        self._scene_or_maker = scene
         self._n_vertices = n_vertices
         self._n_triangles = n_triangles
 
@@ -120,7 +124,7 @@ class Fragments:
         """Return what is left when no other pixels than these show a triangle."""
         triangle = np.full_like(self.triangle, -1)
         triangle[rows, cols] = self.triangle[rows, cols]
-        return Fragments(triangle, self.depth, self._scene, self._n_vertices, self._n_triangles)
+        return Fragments(triangle, self.depth, self._scene_or_maker, self._n_vertices, self._n_triangles)
 
     def barycentric(self) -> NDArray[np.float32]:
         """Return the weights of the three vertices of the triangle that shows in each pixel.
@@ -187,6 +191,17 @@ class Fragments:
         rows = array.reshape(-1, channels) if array.size else np.empty((0, channels), np.float32)
         self._scene.interpolate(self._ids(), rows, array.ndim == 3, float(background), out)
         return out if array.ndim > 1 else out[..., 0]
+
+    @cached_property
+    def _scene(self) -> _engine.Scene:
+        """The triangles that show, snapped; maybe the others too."""
+        return self._scene_with(())
+
+    def _scene_with(self, triangles: ArrayLike) -> _engine.Scene:
+        """Return the triangles that show and these, snapped; maybe the others too."""
+        if isinstance(self._scene_or_maker, _engine.Scene):
+            return self._scene_or_maker
+        return self._scene_or_maker(np.union1d(self.id[self.id >= 0], np.asarray(triangles, np.int32)))
 
     def _ids(self) -> NDArray[np.int32]:
         return np.require(self.triangle, np.int32, ["C", "A"])

@@ -17,6 +17,8 @@ from topleft import _engine, choices
 from topleft.area import sum_areas
 from topleft.arrays import as_out
 from topleft.classic import draw_classic, refuse_classic
+from topleft.clustered import ClusterScene
+from topleft.clusters import Clusters
 from topleft.fragments import Fragments
 from topleft.memory import Memory
 from topleft.models import DepthTest, Sampling, Sink, parse
@@ -242,8 +244,9 @@ def draw_fragments(
     depth_test: str | None,
     background_depth: float | None,
     out: object,
+    clusters: Clusters | None = None,
 ) -> Fragments:
-    """`rasterize`, on the memory given."""
+    """`rasterize`, on the memory given; `clusters`: of the same vertices and triangles."""
     refuse_classic(view, "depth")
     refuse_many(view, "rasterize")
     test = None if depth_test is None else parse(DepthTest, "depth_test", depth_test)
@@ -254,6 +257,10 @@ def draw_fragments(
             ids_out, depth_out = out  # type: ignore[misc]
         except (TypeError, ValueError):
             raise TypeError(f"out must be a pair (triangle, depth) of arrays, got {type(out).__name__}") from None
+    if clusters is not None and choices.can_cluster(view, test):
+        frags = draw_clustered_fragments(memory, clusters, view, test, background_depth, ids_out, depth_out)
+        if frags is not None:
+            return frags
     snapped = snap_scene(memory, vertices, triangles, view, with_depth=True, out=out)
     sink = choices.fragment_sink(test, has_depth=snapped.has_depth)
     if not snapped.has_depth:
@@ -283,3 +290,28 @@ def draw_fragments(
             if background_depth is not None:
                 depth_canvas[ids_canvas < 0] = background_depth
     return Fragments(ids, depth, snapped.scene, snapped.n_vertices, snapped.n_triangles)
+
+
+def draw_clustered_fragments(
+    memory: Memory,
+    clusters: Clusters,
+    view: View,
+    test: DepthTest | None,
+    background_depth: float | None,
+    ids_out: object,
+    depth_out: object,
+) -> Fragments | None:
+    """Return what `draw_fragments` does, of a mesh in clusters; None where only that can tell what is wrong."""
+    seen = ClusterScene(clusters, view)
+    sink = choices.fragment_sink(test, has_depth=True)
+    shape = view.size[::-1]
+    with (
+        canvas_of(memory, "triangle", ids_out, shape, np.int32) as (ids, ids_canvas),
+        canvas_of(memory, "depth", depth_out, shape, np.float32) as (depth, depth_canvas),
+    ):
+        if not seen.draw(memory, sink, _engine.Target(sink, ids_canvas, depth_canvas, None)):
+            return None
+        if background_depth is not None:
+            depth_canvas[ids_canvas < 0] = background_depth
+    view.mark("draw")
+    return Fragments(ids, depth, seen.part, len(clusters.points), clusters.n_triangles)

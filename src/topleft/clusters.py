@@ -1,0 +1,122 @@
+"""Clusters: a mesh sorted once, so that a view leaves out what cannot show in it.
+
+In: the vertices and triangles of a mesh in object space, then a matrix and a window. Out: what of them may draw a pixel.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from topleft import _engine
+from topleft.threads import count_threads, run_parts
+from topleft.view import View
+
+__all__ = ["Clusters"]
+
+#: A bound of the error of the vertex stage as a share of the terms that it adds up: seven roundings, and a reserve.
+STAGE_ERROR = {np.dtype(np.float32): 2.0**-20, np.dtype(np.float64): 2.0**-49}
+
+#: Pixels around the window that count as inside: more than the snap and the vertex stage move a corner.
+MARGIN_PX = 1.0
+
+
+class Clusters:
+    """A mesh in object space, and a copy of it in clusters: few triangles that are neighbours, measured together.
+
+    Attributes
+    ----------
+    points : ndarray, shape (V, 3), contiguous float32 or float64
+        The vertices of the mesh.
+    corners : ndarray of int32, shape (T, 3)
+        Its triangles, whose indices have been checked.
+    own_points : ndarray, shape (N, 3)
+        The vertices cluster by cluster; those on their borders several times. Some rows more follow, to be read past the end.
+    """
+
+    def __init__(self, points: NDArray[Any], corners: NDArray[np.int32], threads: int | None = None) -> None:
+        """Sort and measure (V, 3) contiguous points and (T, 3) checked corners."""
+        self.points, self.corners = points, corners
+        n_triangles = len(corners)
+        order: NDArray[np.int32] = np.empty(n_triangles, np.int32)
+        keys: NDArray[np.uint32] = np.empty(n_triangles, np.uint32)
+        room: NDArray[np.uint64] = np.empty((2, n_triangles), np.uint64)
+        _engine.order_triangles(_engine.Source(points), corners, box_of(points), keys, room, order)
+        clusters: NDArray[np.uint8] = np.empty(max(1, n_triangles) * _engine.CLUSTER_BYTES, np.uint8)
+        vertices: NDArray[np.int32] = np.empty(3 * n_triangles, np.int32)
+        own_corners: NDArray[np.uint8] = np.empty((n_triangles, 3), np.uint8)
+        seen: NDArray[np.int32] = np.full(len(points), -1, np.int32)
+        n, n_vertices = _engine.cut_clusters(corners, order, seen, clusters, vertices, own_corners)
+        records = clusters[: n * _engine.CLUSTER_BYTES].copy()
+        self.own_points = np.zeros((n_vertices + _engine.CLUSTER_TAIL, 3), points.dtype)
+        np.take(points, vertices[:n_vertices], axis=0, out=self.own_points[:n_vertices])
+        group_boxes: NDArray[np.float64] = np.empty((-(-n // _engine.CLUSTER_GROUP), 6))
+        source = _engine.Source(self.own_points)
+
+        def measure(first: int, end: int) -> None:
+            first, end = first * _engine.CLUSTER_GROUP, min(end * _engine.CLUSTER_GROUP, n)
+            _engine.measure_clusters(source, own_corners, records, group_boxes, first, end)
+
+        run_parts(measure, len(group_boxes), count_threads(threads, n_triangles))
+        self.engine = _engine.Clustered(records, group_boxes, own_corners, order)
+
+    def __len__(self) -> int:
+        return len(self.engine)
+
+    @property
+    def n_triangles(self) -> int:
+        """How many triangles the mesh has."""
+        return len(self.corners)
+
+    def view_of_rows(
+        self, matrix: NDArray[Any], view: View, first: int, end: int, *, is_farthest: bool
+    ) -> _engine.ClusterView:
+        """Return what clusters need to know of rows [first, end) of the view's window; `matrix` is clip from object."""
+        exact = matrix.astype(np.float64)
+        return _engine.ClusterView(
+            exact, sides_of(view, first, end), eye_of(exact), view.viewport, view.subpixel_bits,
+            np.linalg.norm(exact[[0, 1, 3], :3], axis=1), STAGE_ERROR[self.points.dtype],
+            view.near_clip, view.far_clip, view.zero_to_one, is_farthest, view.cull,
+        )  # fmt: skip
+
+    def survivors(self, seen: _engine.ClusterView) -> NDArray[np.int32]:
+        """Return the clusters that may draw a pixel, in the order in which they are drawn."""
+        listed: NDArray[np.int32] = np.empty(len(self), np.int32)
+        return listed[: self.engine.cull(seen, listed, np.empty(len(self), np.uint64))]
+
+
+def box_of(points: NDArray[Any]) -> NDArray[np.float64]:
+    """Return the lowest and the highest of the finite coordinates of each axis, (6,)."""
+    if not len(points):
+        return np.zeros(6)
+    low, high = points.min(axis=0), points.max(axis=0)
+    if not np.isfinite([low, high]).all():
+        finite = points[np.isfinite(points).all(axis=1)]
+        low, high = (finite.min(axis=0), finite.max(axis=0)) if len(finite) else (np.zeros(3), np.zeros(3))
+    return np.concatenate([low, high]).astype(np.float64)
+
+
+def sides_of(view: View, first: int, end: int) -> NDArray[np.float64]:
+    """Return a and b for the left, right, top and bottom of rows of a window.
+
+    Beyond a side is what has a * x + b * w < 0, in y for the last two.
+    """
+    half_width, half_height = view.viewport[0] / 2, view.viewport[1] / 2
+    left, right = view.origin[0] - MARGIN_PX, view.origin[0] + view.size[0] + MARGIN_PX
+    top, bottom = view.origin[1] + first - MARGIN_PX, view.origin[1] + end + MARGIN_PX
+    return np.array([
+        (half_width, half_width - left), (-half_width, right - half_width),
+        (-half_height, half_height - top), (half_height, bottom - half_height),
+    ])  # fmt: skip
+
+
+def eye_of(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the homogeneous point that x, y and w of clip space are 0 for, (4,); its sign tells which turn is the front.
+
+    A plane (n, d) of a triangle with normal n = (b - a) x (c - a) is seen from its front where n . eye[:3] + d eye[3] > 0.
+    """
+    rows = matrix[[0, 1, 3]]
+    minors = [np.linalg.det(np.delete(rows, k, axis=1)) for k in range(4)]
+    return np.array(minors) * [1, -1, 1, -1]
