@@ -23,7 +23,7 @@ typedef struct {
 #define TL_N_SIDES 6 /* left, right, above, below, near, far */
 #define TL_IN_DEPTH 0x30u /* within near and far: no triangle is cut into pieces, whose corners are others */
 
-static seen_box place_box(const double *low, const double *high, const double *matrix)
+static inline seen_box place_box(const double *low, const double *high, const double *matrix)
 {
     seen_box b;
     for (int k = 0; k < 3; k++) {
@@ -111,13 +111,13 @@ static int is_turned_away(const tl_cluster *c, const tl_cluster_view *v, const s
     return c->min_height * factor > 8.0 * sides && c->min_area * factor > 16.0;
 }
 
-/* Whether the cluster shows its back, about: it is drawn late then, when what is in front of it may hide it. */
+/* Whether the cluster shows its back, or what is culled, about: it is drawn late then, when what is in front of it may hide it. */
 static int shows_back(const tl_cluster *c, const tl_cluster_view *v, const seen_box *box)
 {
     double along = 0.0;
     for (int k = 0; k < 3; k++)
         along += (v->eye[k] - v->eye[3] * box->centre[k]) * c->axis[k];
-    return c->cone_cos > 0.0 && along < 0.0;
+    return c->cone_cos > 0.0 && (v->cull == TL_CULL_FRONT ? along > 0.0 : along < 0.0);
 }
 
 /* ---- the order in which they are drawn ------------------------------------------------------------------- */
@@ -191,7 +191,7 @@ static int64_t cull_clusters(const tl_clustered *mesh, const tl_cluster_view *v,
             if (v->cull != TL_CULL_NONE && (within & TL_IN_DEPTH) == TL_IN_DEPTH && is_turned_away(c, v, &own))
                 continue;
             const int32_t number = (int32_t)i;
-            found[n++] = (found_cluster){v->cull == TL_CULL_NONE && shows_back(c, v, &own) ? ~number : number,
+            found[n++] = (found_cluster){shows_back(c, v, &own) ? ~number : number,
                                          (float)own.f[has_perspective ? 3 : 2].centre};
         }
     }
@@ -218,16 +218,31 @@ TL_INLINE int all_beat(const tl_target *target, int64_t row0, int64_t row1, int6
     return 1;
 }
 
+/* The depth of the vertex stage for z / w. */
+static inline double depth_of_ndc(const tl_cluster_view *v, double z) { return v->zero_to_one ? z : (z + 1.0) * 0.5; }
+
+/* Whether the middle of a box lies before what the window shows there: then it is not hidden, and this is the cheaper test. */
+static inline int shows_middle(const seen_box *box, const tl_cluster_view *v, const tl_window *window, const tl_target *target)
+{
+    const double inverse = 1.0 / box->f[3].centre;
+    const double x_px = (box->f[0].centre * inverse + 1.0) * v->half_width_px - (double)window->x_px;
+    const double y_px = (1.0 - box->f[1].centre * inverse) * v->half_height_px - (double)window->y_px;
+    if (!(x_px >= 0.0 && x_px < (double)window->width && y_px >= 0.0 && y_px < (double)window->height))
+        return 0;
+    const double z = depth_of_ndc(v, box->f[2].centre * inverse), there = target->depth[(int64_t)y_px * target->stride_px + (int64_t)x_px];
+    return target->sink == TL_SINK_FARTHEST ? there < z : there > z;
+}
+
 /* Whether a cluster lies behind all that the window shows where it is. */
 static int is_hidden(const tl_cluster *c, const tl_cluster_view *v, const tl_window *window, const tl_target *target)
 {
     const int is_farthest = target->sink == TL_SINK_FARTHEST;
     const seen_box box = place_box(c->low, c->high, v->matrix);
+    if (shows_middle(&box, v, window, target))
+        return 0;
     unsigned within = 0xf;
-    double corner[4][8], low[3], high[3], w_min = INFINITY, largest[3];
-    if (is_outside(&box, v, &within))
-        return 1;
-    if ((within & TL_IN_DEPTH) != TL_IN_DEPTH)
+    double corner[4][8], inverse[8], low[3], high[3], largest[3];
+    if (is_outside(&box, v, &within) || (within & TL_IN_DEPTH) != TL_IN_DEPTH)
         return 0;
     for (int i = 0; i < 4; i++) {
         const double *row = v->matrix + 4 * i;
@@ -235,15 +250,15 @@ static int is_hidden(const tl_cluster *c, const tl_cluster_view *v, const tl_win
             corner[i][k] = box.f[i].centre + (((k & 1 ? row[0] : -row[0]) * box.half[0] + (k & 2 ? row[1] : -row[1]) * box.half[1]) +
                                               (k & 4 ? row[2] : -row[2]) * box.half[2]);
     }
-    for (int k = 0; k < 8; k++)
-        w_min = corner[3][k] < w_min ? corner[3][k] : w_min;
-    w_min -= v->error * box.f[3].terms;
+    const double w_min = box.f[3].centre - box.f[3].reach - v->error * box.f[3].terms;
     if (!(w_min > 0.0))
         return 0;
+    for (int k = 0; k < 8; k++)
+        inverse[k] = 1.0 / corner[3][k];
     for (int i = 0; i < 3; i++) { /* a quotient of two forms is largest and least at corners */
         low[i] = INFINITY, high[i] = -INFINITY;
         for (int k = 0; k < 8; k++) {
-            const double q = corner[i][k] / corner[3][k];
+            const double q = corner[i][k] * inverse[k];
             low[i] = q < low[i] ? q : low[i];
             high[i] = q > high[i] ? q : high[i];
         }
@@ -258,9 +273,7 @@ static int is_hidden(const tl_cluster *c, const tl_cluster_view *v, const tl_win
         return 0;
     const int64_t col0 = max64((int64_t)floor(left) - window->x_px, 0), col1 = min64((int64_t)floor(right) + 1 - window->x_px, window->width);
     const int64_t row0 = max64((int64_t)floor(top) - window->y_px, 0), row1 = min64((int64_t)floor(bottom) + 1 - window->y_px, window->height);
-    double z = is_farthest ? high[2] : low[2];
-    z = v->zero_to_one ? z : (z + 1.0) * 0.5;
     /* docs/design.md, section 4: the error of a depth before it is rounded to float32 */
-    z += (is_farthest ? 1.0 : -1.0) * (0x1p-33 * (largest[2] + 1.0));
-    return all_beat(target, row0, row1, col0, col1, (float)z, is_farthest);
+    const double error = 0x1p-33 * (largest[2] + 1.0), z = depth_of_ndc(v, is_farthest ? high[2] : low[2]);
+    return all_beat(target, row0, row1, col0, col1, (float)(is_farthest ? z + error : z - error), is_farthest);
 }
