@@ -202,6 +202,8 @@ static int64_t cull_clusters(const tl_clustered *mesh, const tl_cluster_view *v,
 
 /* ---- occlusion ------------------------------------------------------------------------------------------- */
 
+#define TL_MAX_LOOKED_AT 1024 /* pixels: triangles that are culled one by one take no longer */
+
 /* Whether every depth of a rectangle of the window beats this one. */
 TL_INLINE int all_beat(const tl_target *target, int64_t row0, int64_t row1, int64_t col0, int64_t col1, float depth, int is_farthest)
 {
@@ -273,6 +275,8 @@ static int is_hidden(const tl_cluster *c, const tl_cluster_view *v, const tl_win
         return 0;
     const int64_t col0 = max64((int64_t)floor(left) - window->x_px, 0), col1 = min64((int64_t)floor(right) + 1 - window->x_px, window->width);
     const int64_t row0 = max64((int64_t)floor(top) - window->y_px, 0), row1 = min64((int64_t)floor(bottom) + 1 - window->y_px, window->height);
+    if (v->cull != TL_CULL_NONE && shows_back(c, v, &box) && (col1 - col0) * (row1 - row0) > TL_MAX_LOOKED_AT)
+        return 0;
     /* docs/design.md, section 4: the error of a depth before it is rounded to float32 */
     const double error = 0x1p-33 * (largest[2] + 1.0), z = depth_of_ndc(v, is_farthest ? high[2] : low[2]);
     return all_beat(target, row0, row1, col0, col1, (float)(is_farthest ? z + error : z - error), is_farthest);

@@ -38,26 +38,44 @@ def measure_clusters(Source source, const uint8_t[:, ::1] corners, uint8_t[::1] 
             K.measure_clusters(&source.source, &corners[0, 0], first, end, <tl_cluster *>&clusters[0], &group_boxes[0, 0])
 
 
+cdef inline double minor(const double *a, const double *b, const double *c, int i, int j, int k) noexcept nogil:
+    """The determinant of three columns of three rows."""
+    return a[i] * (b[j] * c[k] - b[k] * c[j]) - a[j] * (b[i] * c[k] - b[k] * c[i]) + a[k] * (b[i] * c[j] - b[j] * c[i])
+
+
 cdef class ClusterView:
-    """A window of a picture, as far as clusters are concerned; `tl_cluster_view` tells what the arrays hold."""
+    """Rows of a picture's window, as far as clusters are concerned."""
 
     cdef tl_cluster_view view
 
-    def __init__(self, matrix, sides, eye, viewport, int subpixel_bits, lengths, double error, bint near_clip, bint far_clip,
-                 bint zero_to_one, bint is_farthest, int cull):
+    def __init__(self, matrix, Scene scene, int64_t first_row, int64_t n_rows, int64_t width, double margin_px, double error, bint is_farthest):
+        """`matrix`: clip from object; `scene`: how it is seen; beyond `margin_px` around the window nothing shows.
+
+        `error`: of the vertex stage, as a share of the terms that it adds up.
+        """
         cdef tl_cluster_view *v = &self.view
+        cdef const tl_view *how = &scene.view.view
+        cdef tl_window window = scene.window(first_row, n_rows, width)
+        cdef double *x = v.matrix
+        cdef double *y = v.matrix + 4
+        cdef double *w = v.matrix + 12
+        cdef double unit = 2.0**window.subpixel_bits
         cdef int i
         for i in range(16):
             v.matrix[i] = matrix.flat[i]
-        for i in range(4):
-            v.side[i][0], v.side[i][1] = sides[i]
-            v.eye[i] = eye[i]
-        for i in range(3):
-            v.length[i] = lengths[i]
-        v.half_width_px, v.half_height_px = viewport[0] / 2, viewport[1] / 2
-        v.scale_x, v.scale_y = v.half_width_px * 2.0**subpixel_bits, v.half_height_px * 2.0**subpixel_bits
-        v.error, v.near_clip, v.far_clip, v.zero_to_one = error, near_clip, far_clip, zero_to_one
-        v.is_farthest, v.cull = is_farthest, <tl_cull>cull
+        v.half_width_px, v.half_height_px = how.half_width_px, how.half_height_px
+        v.scale_x, v.scale_y = how.half_width_px * unit, how.half_height_px * unit
+        v.side[0][0], v.side[0][1] = how.half_width_px, how.half_width_px - (window.x_px - margin_px)
+        v.side[1][0], v.side[1][1] = -how.half_width_px, (window.x_px + window.width + margin_px) - how.half_width_px
+        v.side[2][0], v.side[2][1] = -how.half_height_px, how.half_height_px - (window.y_px - margin_px)
+        v.side[3][0], v.side[3][1] = how.half_height_px, (window.y_px + window.height + margin_px) - how.half_height_px
+        v.eye[0], v.eye[1] = minor(x, y, w, 1, 2, 3), -minor(x, y, w, 0, 2, 3)
+        v.eye[2], v.eye[3] = minor(x, y, w, 0, 1, 3), -minor(x, y, w, 0, 1, 2)
+        v.length[0] = sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2])
+        v.length[1] = sqrt(y[0] * y[0] + y[1] * y[1] + y[2] * y[2])
+        v.length[2] = sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
+        v.error, v.near_clip, v.far_clip, v.zero_to_one = error, how.near_clip, how.far_clip, how.zero_to_one
+        v.is_farthest, v.cull = is_farthest, scene.scene.cull
 
 
 cdef class Clustered:
@@ -96,7 +114,7 @@ cdef class Clustered:
             n += self.mesh.clusters[listed[i]].n_triangles
         return n
 
-    def draw(self, Scene scene, Source source, View view, ClusterView seen, const int32_t[::1] listed, bint may_be_hidden, Target target,
+    def draw(self, Scene scene, Source source, ClusterView seen, const int32_t[::1] listed, bint may_be_hidden, Target target,
              int64_t first_row, int64_t n_rows, int32_t[::1] others, bint is_first, bint is_last):
         """Draw clusters into rows of a picture.
 
@@ -109,7 +127,7 @@ cdef class Clustered:
         cdef tl_share share = no_share()
         cdef tl_cluster_pass clusters
         memset(&clusters, 0, sizeof(clusters))
-        clusters.mesh, clusters.seen, clusters.source, clusters.view = &self.mesh, &seen.view, &source.source, &view.view
+        clusters.mesh, clusters.seen, clusters.source, clusters.view = &self.mesh, &seen.view, &source.source, &scene.view.view
         clusters.list, clusters.n_listed, clusters.may_be_hidden = &listed[0] if listed.shape[0] else NULL, listed.shape[0], may_be_hidden
         share.clusters, share.others, share.is_first, share.is_last = &clusters, &others[0], is_first, is_last
         with nogil:

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from topleft import _engine
 from topleft.threads import count_threads, run_parts
-from topleft.view import View
 
 __all__ = ["Clusters"]
 
@@ -70,16 +69,12 @@ class Clusters:
         """How many triangles the mesh has."""
         return len(self.corners)
 
-    def view_of_rows(
-        self, matrix: NDArray[Any], view: View, first: int, end: int, *, is_farthest: bool
+    def seen_in(
+        self, matrix: NDArray[np.float64], scene: _engine.Scene, first: int, end: int, width: int, *, is_farthest: bool
     ) -> _engine.ClusterView:
-        """Return what clusters need to know of rows [first, end) of the view's window; `matrix` is clip from object."""
-        exact = matrix.astype(np.float64)
-        return _engine.ClusterView(
-            exact, sides_of(view, first, end), eye_of(exact), view.viewport, view.subpixel_bits,
-            np.linalg.norm(exact[[0, 1, 3], :3], axis=1), STAGE_ERROR[self.points.dtype],
-            view.near_clip, view.far_clip, view.zero_to_one, is_farthest, view.cull,
-        )  # fmt: skip
+        """Return what clusters need to know of rows [first, end) of a scene's window; `matrix` is clip from object."""
+        error = STAGE_ERROR[self.points.dtype]
+        return _engine.ClusterView(matrix, scene, first, end - first, width, MARGIN_PX, error, is_farthest)
 
     def survivors(self, seen: _engine.ClusterView) -> NDArray[np.int32]:
         """Return the clusters that may draw a pixel, in the order in which they are drawn."""
@@ -97,26 +92,3 @@ def box_of(points: NDArray[Any]) -> NDArray[np.float64]:
         low, high = (finite.min(axis=0), finite.max(axis=0)) if len(finite) else (np.zeros(3), np.zeros(3))
     return np.concatenate([low, high]).astype(np.float64)
 
-
-def sides_of(view: View, first: int, end: int) -> NDArray[np.float64]:
-    """Return a and b for the left, right, top and bottom of rows of a window.
-
-    Beyond a side is what has a * x + b * w < 0, in y for the last two.
-    """
-    half_width, half_height = view.viewport[0] / 2, view.viewport[1] / 2
-    left, right = view.origin[0] - MARGIN_PX, view.origin[0] + view.size[0] + MARGIN_PX
-    top, bottom = view.origin[1] + first - MARGIN_PX, view.origin[1] + end + MARGIN_PX
-    return np.array([
-        (half_width, half_width - left), (-half_width, right - half_width),
-        (-half_height, half_height - top), (half_height, bottom - half_height),
-    ])  # fmt: skip
-
-
-def eye_of(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the homogeneous point that x, y and w of clip space are 0 for, (4,); its sign tells which turn is the front.
-
-    A plane (n, d) of a triangle with normal n = (b - a) x (c - a) is seen from its front where n . eye[:3] + d eye[3] > 0.
-    """
-    rows = matrix[[0, 1, 3]]
-    minors = [np.linalg.det(np.delete(rows, k, axis=1)) for k in range(4)]
-    return np.array(minors) * [1, -1, 1, -1]

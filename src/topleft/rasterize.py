@@ -17,7 +17,7 @@ from topleft import _engine, choices
 from topleft.area import sum_areas
 from topleft.arrays import as_out
 from topleft.classic import draw_classic, refuse_classic
-from topleft.clustered import ClusterScene
+from topleft.clustered import ClusteredScene
 from topleft.clusters import Clusters
 from topleft.fragments import Fragments
 from topleft.memory import Memory
@@ -302,7 +302,7 @@ def draw_clustered_fragments(
     depth_out: object,
 ) -> Fragments | None:
     """Return what `draw_fragments` does, of a mesh in clusters; None where only that can tell what is wrong."""
-    seen = ClusterScene(clusters, view)
+    seen = ClusteredScene(clusters, view)
     sink = choices.fragment_sink(test, has_depth=True)
     shape = view.size[::-1]
     with (
