@@ -56,3 +56,11 @@ static int64_t load_cluster(const tl_cluster *c, const tl_cluster_pass *pass, co
     memset(own->corners + 3 * c->n_triangles, 0, 3 * TL_LANES * sizeof *own->corners);
     return counts.n_bad || counts.n_wide || counts.n_clipped ? list_special(own, c->n_triangles, share) : c->n_triangles;
 }
+
+/* The clusters that a pass draws, unless they turn out to be hidden. */
+static int64_t list_clusters(tl_cluster_pass *pass, const tl_window *window, const tl_target *target)
+{
+    pass->n_drawn = 0;
+    pass->n_seen = cull_clusters(pass->mesh, pass->seen, window, pass->may_be_hidden ? target : NULL, pass->list, pass->room);
+    return pass->n_seen;
+}

@@ -120,6 +120,94 @@ static int shows_back(const tl_cluster *c, const tl_cluster_view *v, const seen_
     return c->cone_cos > 0.0 && (v->cull == TL_CULL_FRONT ? along > 0.0 : along < 0.0);
 }
 
+/* ---- occlusion ------------------------------------------------------------------------------------------- */
+
+/* Whether every depth of a rectangle of the window beats this one. */
+TL_INLINE int all_beat(const tl_target *target, int64_t row0, int64_t row1, int64_t col0, int64_t col1, float depth, int is_farthest)
+{
+    const vf bound = vf_set1(depth);
+    for (int64_t row = row0; row < row1; row++) {
+        const float *p = target->depth + row * target->stride_px;
+        for (int64_t col = col0; col < col1; col += TL_LANES) {
+            const vm live = vm_first(col1 - col);
+            const vf there = vf_load_masked(live, p + col);
+            if (vm_any(vm_and_not(live, is_farthest ? vf_lt(bound, there) : vf_lt(there, bound))))
+                return 0;
+        }
+    }
+    return 1;
+}
+
+/* The depth of the vertex stage for z / w. */
+static inline double depth_of_ndc(const tl_cluster_view *v, double z) { return v->zero_to_one ? z : (z + 1.0) * 0.5; }
+
+/* Whether the middle of a box lies before what the window shows there: then it is not hidden, and this is the cheaper test. */
+static inline int shows_middle(const seen_box *box, const tl_cluster_view *v, const tl_window *window, const tl_target *target)
+{
+    const double inverse = 1.0 / box->f[3].centre;
+    const double x_px = (box->f[0].centre * inverse + 1.0) * v->half_width_px - (double)window->x_px;
+    const double y_px = (1.0 - box->f[1].centre * inverse) * v->half_height_px - (double)window->y_px;
+    if (!(x_px >= 0.0 && x_px < (double)window->width && y_px >= 0.0 && y_px < (double)window->height))
+        return 0;
+    const double z = depth_of_ndc(v, box->f[2].centre * inverse), there = target->depth[(int64_t)y_px * target->stride_px + (int64_t)x_px];
+    return target->sink == TL_SINK_FARTHEST ? there < z : there > z;
+}
+
+/* Whether all of a box lies behind what the window shows where it is, found out by looking at so many pixels at most. */
+static int is_hidden(const seen_box *box, const tl_cluster_view *v, const tl_window *window, const tl_target *target, int64_t most_px)
+{
+    const int is_farthest = target->sink == TL_SINK_FARTHEST;
+    if (shows_middle(box, v, window, target))
+        return 0;
+    unsigned within = 0xf;
+    double corner[4][8], inverse[8], low[3], high[3], largest[3];
+    if (is_outside(box, v, &within) || (within & TL_IN_DEPTH) != TL_IN_DEPTH)
+        return 0;
+    for (int i = 0; i < 4; i++) {
+        const double *row = v->matrix + 4 * i;
+        for (int k = 0; k < 8; k++)
+            corner[i][k] = box->f[i].centre + (((k & 1 ? row[0] : -row[0]) * box->half[0] + (k & 2 ? row[1] : -row[1]) * box->half[1]) +
+                                              (k & 4 ? row[2] : -row[2]) * box->half[2]);
+    }
+    const double w_min = box->f[3].centre - box->f[3].reach - v->error * box->f[3].terms;
+    if (!(w_min > 0.0))
+        return 0;
+    for (int k = 0; k < 8; k++)
+        inverse[k] = 1.0 / corner[3][k];
+    for (int i = 0; i < 3; i++) { /* a quotient of two forms is largest and least at corners */
+        low[i] = INFINITY, high[i] = -INFINITY;
+        for (int k = 0; k < 8; k++) {
+            const double q = corner[i][k] * inverse[k];
+            low[i] = q < low[i] ? q : low[i];
+            high[i] = q > high[i] ? q : high[i];
+        }
+        largest[i] = fmax(fabs(low[i]), fabs(high[i]));
+        const double error = 2.0 * v->error * (box->f[i].terms + largest[i] * box->f[3].terms) / w_min;
+        low[i] -= error, high[i] += error;
+    }
+    /* one pixel more on each side than the snap can move it; sums of doubles up to 2^51 have their pixel right */
+    const double left = (low[0] + 1.0) * v->half_width_px - 1.5, right = (high[0] + 1.0) * v->half_width_px + 1.5;
+    const double top = (1.0 - high[1]) * v->half_height_px - 1.5, bottom = (1.0 - low[1]) * v->half_height_px + 1.5;
+    if (!(left > -0x1p50 && right < 0x1p50 && top > -0x1p50 && bottom < 0x1p50))
+        return 0;
+    const int64_t col0 = max64((int64_t)floor(left) - window->x_px, 0), col1 = min64((int64_t)floor(right) + 1 - window->x_px, window->width);
+    const int64_t row0 = max64((int64_t)floor(top) - window->y_px, 0), row1 = min64((int64_t)floor(bottom) + 1 - window->y_px, window->height);
+    if ((col1 - col0) * (row1 - row0) > most_px)
+        return 0;
+    /* docs/design.md, section 4: the error of a depth before it is rounded to float32 */
+    const double error = 0x1p-33 * (largest[2] + 1.0), z = depth_of_ndc(v, is_farthest ? high[2] : low[2]);
+    return all_beat(target, row0, row1, col0, col1, (float)(is_farthest ? z + error : z - error), is_farthest);
+}
+
+#define TL_MAX_PX_OF_CULLED 1024 /* triangles that are culled one by one take no longer */
+
+static int is_cluster_hidden(const tl_cluster *c, const tl_cluster_view *v, const tl_window *window, const tl_target *target)
+{
+    const seen_box box = place_box(c->low, c->high, v->matrix);
+    const int is_culled_later = v->cull != TL_CULL_NONE && shows_back(c, v, &box);
+    return is_hidden(&box, v, window, target, is_culled_later ? TL_MAX_PX_OF_CULLED : INT64_MAX);
+}
+
 /* ---- the order in which they are drawn ------------------------------------------------------------------- */
 
 #define TL_SLABS 16 /* of depth; within one, neighbours stay together */
@@ -169,7 +257,8 @@ static void sort_by_depth(const tl_clustered *mesh, const tl_cluster_view *v, co
     }
 }
 
-static int64_t cull_clusters(const tl_clustered *mesh, const tl_cluster_view *v, int32_t *list, void *room)
+static int64_t cull_clusters(const tl_clustered *mesh, const tl_cluster_view *v, const tl_window *window, const tl_target *target,
+                             int32_t *list, void *room)
 {
     found_cluster *found = room;
     const double *row_w = v->matrix + 12;
@@ -179,7 +268,7 @@ static int64_t cull_clusters(const tl_clustered *mesh, const tl_cluster_view *v,
         const double *box = mesh->group_boxes + 6 * (first / TL_CLUSTER_GROUP);
         const seen_box group = place_box(box, box + 3, v->matrix);
         unsigned within_group = 0;
-        if (is_outside(&group, v, &within_group))
+        if (is_outside(&group, v, &within_group) || (target && is_hidden(&group, v, window, target, INT64_MAX)))
             continue;
         const int64_t end = first + TL_CLUSTER_GROUP < mesh->n_clusters ? first + TL_CLUSTER_GROUP : mesh->n_clusters;
         for (int64_t i = first; i < end; i++) {
@@ -191,93 +280,10 @@ static int64_t cull_clusters(const tl_clustered *mesh, const tl_cluster_view *v,
             if (v->cull != TL_CULL_NONE && (within & TL_IN_DEPTH) == TL_IN_DEPTH && is_turned_away(c, v, &own))
                 continue;
             const int32_t number = (int32_t)i;
-            found[n++] = (found_cluster){shows_back(c, v, &own) ? ~number : number,
-                                         (float)own.f[has_perspective ? 3 : 2].centre};
+            found[n++] = (found_cluster){shows_back(c, v, &own) ? ~number : number, (float)own.f[has_perspective ? 3 : 2].centre};
         }
     }
     if (n)
         sort_by_depth(mesh, v, found, n, list);
     return n;
-}
-
-/* ---- occlusion ------------------------------------------------------------------------------------------- */
-
-#define TL_MAX_LOOKED_AT 1024 /* pixels: triangles that are culled one by one take no longer */
-
-/* Whether every depth of a rectangle of the window beats this one. */
-TL_INLINE int all_beat(const tl_target *target, int64_t row0, int64_t row1, int64_t col0, int64_t col1, float depth, int is_farthest)
-{
-    const vf bound = vf_set1(depth);
-    for (int64_t row = row0; row < row1; row++) {
-        const float *p = target->depth + row * target->stride_px;
-        for (int64_t col = col0; col < col1; col += TL_LANES) {
-            const vm live = vm_first(col1 - col);
-            const vf there = vf_load_masked(live, p + col);
-            if (vm_any(vm_and_not(live, is_farthest ? vf_lt(bound, there) : vf_lt(there, bound))))
-                return 0;
-        }
-    }
-    return 1;
-}
-
-/* The depth of the vertex stage for z / w. */
-static inline double depth_of_ndc(const tl_cluster_view *v, double z) { return v->zero_to_one ? z : (z + 1.0) * 0.5; }
-
-/* Whether the middle of a box lies before what the window shows there: then it is not hidden, and this is the cheaper test. */
-static inline int shows_middle(const seen_box *box, const tl_cluster_view *v, const tl_window *window, const tl_target *target)
-{
-    const double inverse = 1.0 / box->f[3].centre;
-    const double x_px = (box->f[0].centre * inverse + 1.0) * v->half_width_px - (double)window->x_px;
-    const double y_px = (1.0 - box->f[1].centre * inverse) * v->half_height_px - (double)window->y_px;
-    if (!(x_px >= 0.0 && x_px < (double)window->width && y_px >= 0.0 && y_px < (double)window->height))
-        return 0;
-    const double z = depth_of_ndc(v, box->f[2].centre * inverse), there = target->depth[(int64_t)y_px * target->stride_px + (int64_t)x_px];
-    return target->sink == TL_SINK_FARTHEST ? there < z : there > z;
-}
-
-/* Whether a cluster lies behind all that the window shows where it is. */
-static int is_hidden(const tl_cluster *c, const tl_cluster_view *v, const tl_window *window, const tl_target *target)
-{
-    const int is_farthest = target->sink == TL_SINK_FARTHEST;
-    const seen_box box = place_box(c->low, c->high, v->matrix);
-    if (shows_middle(&box, v, window, target))
-        return 0;
-    unsigned within = 0xf;
-    double corner[4][8], inverse[8], low[3], high[3], largest[3];
-    if (is_outside(&box, v, &within) || (within & TL_IN_DEPTH) != TL_IN_DEPTH)
-        return 0;
-    for (int i = 0; i < 4; i++) {
-        const double *row = v->matrix + 4 * i;
-        for (int k = 0; k < 8; k++)
-            corner[i][k] = box.f[i].centre + (((k & 1 ? row[0] : -row[0]) * box.half[0] + (k & 2 ? row[1] : -row[1]) * box.half[1]) +
-                                              (k & 4 ? row[2] : -row[2]) * box.half[2]);
-    }
-    const double w_min = box.f[3].centre - box.f[3].reach - v->error * box.f[3].terms;
-    if (!(w_min > 0.0))
-        return 0;
-    for (int k = 0; k < 8; k++)
-        inverse[k] = 1.0 / corner[3][k];
-    for (int i = 0; i < 3; i++) { /* a quotient of two forms is largest and least at corners */
-        low[i] = INFINITY, high[i] = -INFINITY;
-        for (int k = 0; k < 8; k++) {
-            const double q = corner[i][k] * inverse[k];
-            low[i] = q < low[i] ? q : low[i];
-            high[i] = q > high[i] ? q : high[i];
-        }
-        largest[i] = fmax(fabs(low[i]), fabs(high[i]));
-        const double error = 2.0 * v->error * (box.f[i].terms + largest[i] * box.f[3].terms) / w_min;
-        low[i] -= error, high[i] += error;
-    }
-    /* one pixel more on each side than the snap can move it; sums of doubles up to 2^51 have their pixel right */
-    const double left = (low[0] + 1.0) * v->half_width_px - 1.5, right = (high[0] + 1.0) * v->half_width_px + 1.5;
-    const double top = (1.0 - high[1]) * v->half_height_px - 1.5, bottom = (1.0 - low[1]) * v->half_height_px + 1.5;
-    if (!(left > -0x1p50 && right < 0x1p50 && top > -0x1p50 && bottom < 0x1p50))
-        return 0;
-    const int64_t col0 = max64((int64_t)floor(left) - window->x_px, 0), col1 = min64((int64_t)floor(right) + 1 - window->x_px, window->width);
-    const int64_t row0 = max64((int64_t)floor(top) - window->y_px, 0), row1 = min64((int64_t)floor(bottom) + 1 - window->y_px, window->height);
-    if (v->cull != TL_CULL_NONE && shows_back(c, v, &box) && (col1 - col0) * (row1 - row0) > TL_MAX_LOOKED_AT)
-        return 0;
-    /* docs/design.md, section 4: the error of a depth before it is rounded to float32 */
-    const double error = 0x1p-33 * (largest[2] + 1.0), z = depth_of_ndc(v, is_farthest ? high[2] : low[2]);
-    return all_beat(target, row0, row1, col0, col1, (float)(is_farthest ? z + error : z - error), is_farthest);
 }

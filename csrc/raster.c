@@ -181,10 +181,11 @@ TL_INLINE void draw_batches(const tl_scene *scene, const tl_window *window, cons
     tl_cluster_pass *clusters = share->clusters;
     cluster_scene cluster;
     tl_share part = *share;
-    for (int64_t next = 0; next < (clusters ? clusters->n_listed : 1); next++) {
+    const int64_t n_parts = clusters ? list_clusters(clusters, window, target) : 1;
+    for (int64_t next = 0; next < n_parts; next++) {
         if (clusters) {
             const tl_cluster *c = clusters->mesh->clusters + clusters->list[next];
-            if (clusters->may_be_hidden && is_hidden(c, clusters->seen, window, target))
+            if (clusters->may_be_hidden && is_cluster_hidden(c, clusters->seen, window, target))
                 continue;
             part.first = 0, part.end = load_cluster(c, clusters, scene, share, &cluster);
             clusters->n_drawn++;

@@ -222,10 +222,10 @@ typedef struct {
     const tl_cluster_view *seen;
     const tl_source *source; /* the vertices of all clusters, with the matrix */
     const tl_view *view;
-    const int32_t *list;     /* the clusters, in the order in which they are drawn */
-    int64_t n_listed;
+    int32_t *list;           /* room for a number for each cluster, and for two */
+    void *room;
     int may_be_hidden;       /* whether clusters that lie behind all that is drawn are left out; NEAREST and FARTHEST alone */
-    int64_t n_drawn;         /* out: clusters that were not left out */
+    int64_t n_seen, n_drawn; /* out: clusters that the window may show, and those of them that were not hidden */
 } tl_cluster_pass;
 
 /* The part of a scene that one pass draws.  Several passes may share a scene: each takes some of the triangles, draws what of
@@ -386,9 +386,10 @@ typedef struct tl_kernels {
     void (*measure_clusters)(const tl_source *source, const uint8_t *corners, int64_t first, int64_t end, tl_cluster *clusters,
                              double *group_boxes);
 
-    /* Lists the clusters that may draw something, about in the order of depth, those that are seen from behind last; `room` has 8
-     * bytes for each cluster.  Returns how many. */
-    int64_t (*cull_clusters)(const tl_clustered *mesh, const tl_cluster_view *view, int32_t *list, void *room);
+    /* Lists the clusters that may draw something, about in the order of depth, those that are seen from behind last; with a target
+     * of depths, without groups of them that what it shows hides.  `room` has 8 bytes for each cluster.  Returns how many. */
+    int64_t (*cull_clusters)(const tl_clustered *mesh, const tl_cluster_view *view, const tl_window *window, const tl_target *target,
+                             int32_t *list, void *room);
 
     /* Lowest index of a TL_BAD vertex that a triangle uses, -1 if there is none. */
     int64_t (*first_bad)(const tl_vertex *vertices, const int32_t *triangles, int64_t n_triangles);

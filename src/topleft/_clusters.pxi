@@ -104,7 +104,7 @@ cdef class Clustered:
         cdef int64_t n = 0
         if self.mesh.n_clusters:
             with nogil:
-                n = K.cull_clusters(&self.mesh, &view.view, &listed[0], &room[0])
+                n = K.cull_clusters(&self.mesh, &view.view, NULL, NULL, &listed[0], &room[0])
         return n
 
     def count_triangles(self, const int32_t[::1] listed):
@@ -114,13 +114,13 @@ cdef class Clustered:
             n += self.mesh.clusters[listed[i]].n_triangles
         return n
 
-    def draw(self, Scene scene, Source source, ClusterView seen, const int32_t[::1] listed, bint may_be_hidden, Target target,
-             int64_t first_row, int64_t n_rows, int32_t[::1] others, bint is_first, bint is_last):
-        """Draw clusters into rows of a picture.
+    def draw(self, Scene scene, Source source, ClusterView seen, bint may_be_hidden, Target target, int64_t first_row, int64_t n_rows,
+             int32_t[::1] room, int32_t[::1] others, bint is_first, bint is_last):
+        """Draw what the rows of a picture show.
 
-        `scene`: how, and what triangle 0 is called; its own triangles are not read. `others`, a number for each triangle,
-        gets those that a clip plane may cut, or that 64 bits cannot hold. Returns how many of these there are, and how many
-        clusters were not hidden.
+        `scene`: how, and what triangle 0 is called; its own triangles are not read. `room`: three numbers a cluster, and one.
+        `others`, a number for each triangle, gets those that a clip plane may cut, or that 64 bits cannot hold. Returns how
+        many of these there are, how many clusters the window may show, and how many of them were not hidden.
         """
         cdef tl_target rows = target.rows(first_row)
         cdef tl_window window = scene.window(first_row, n_rows, target.width)
@@ -128,8 +128,8 @@ cdef class Clustered:
         cdef tl_cluster_pass clusters
         memset(&clusters, 0, sizeof(clusters))
         clusters.mesh, clusters.seen, clusters.source, clusters.view = &self.mesh, &seen.view, &source.source, &scene.view.view
-        clusters.list, clusters.n_listed, clusters.may_be_hidden = &listed[0] if listed.shape[0] else NULL, listed.shape[0], may_be_hidden
+        clusters.list, clusters.room, clusters.may_be_hidden = &room[0], &room[self.mesh.n_clusters], may_be_hidden
         share.clusters, share.others, share.is_first, share.is_last = &clusters, &others[0], is_first, is_last
         with nogil:
             K.draw(&scene.scene, &window, &rows, &share)
-        return share.n_others, clusters.n_drawn
+        return share.n_others, clusters.n_seen, clusters.n_drawn

@@ -131,10 +131,10 @@ cdef extern from "topleft.h" nogil:
         const tl_cluster_view *seen
         const tl_source *source
         const tl_view *view
-        const int32_t *list
-        int64_t n_listed
+        int32_t *list
+        void *room
         int may_be_hidden
-        int64_t n_drawn
+        int64_t n_seen, n_drawn
     ctypedef struct tl_share:
         const int32_t *ids
         int64_t first, end
@@ -235,7 +235,7 @@ cdef extern from "topleft.h" nogil:
         void (*sort_keys)(const uint32_t *, int64_t, uint64_t *, uint64_t *, int32_t *) noexcept nogil
         int64_t (*cut_clusters)(const int32_t *, const int32_t *, int64_t, int32_t *, tl_cluster *, int32_t *, uint8_t *, int64_t *) noexcept nogil
         void (*measure_clusters)(const tl_source *, const uint8_t *, int64_t, int64_t, tl_cluster *, double *) noexcept nogil
-        int64_t (*cull_clusters)(const tl_clustered *, const tl_cluster_view *, int32_t *, void *) noexcept nogil
+        int64_t (*cull_clusters)(const tl_clustered *, const tl_cluster_view *, const tl_window *, const tl_target *, int32_t *, void *) noexcept nogil
         int64_t (*first_bad)(const tl_vertex *, const int32_t *, int64_t) noexcept nogil
         int64_t (*first_bad_row)(const int32_t *, int64_t, int64_t) noexcept nogil
         int64_t (*narrow_triangles)(const int64_t *, int64_t, int64_t, int32_t *) noexcept nogil

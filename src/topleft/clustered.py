@@ -5,7 +5,7 @@ In: `Clusters`, a view, a target. Out: the same picture that the whole mesh give
 
 from __future__ import annotations
 
-from itertools import count
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -34,58 +34,49 @@ class ClusteredScene:
     def __init__(self, clusters: Clusters, view: View, first_id: int = 0) -> None:
         self.clusters, self._view, self._first_id = clusters, view, first_id
         self._matrix = as_matrix(view.transform, clusters.points.dtype)  # type: ignore[arg-type]
+        self._exact = self._matrix.astype(np.float64)
         self._is_affine = choices.is_affine(self._matrix)
         self._engine_view = view.engine_view()
         self._own = self._source_of(clusters.own_points)
         self._empty = self._scene_of(self._own, NO_RECORDS, clusters.corners[:0], None)
 
-    def draw(
-        self, memory: Memory, sink: Sink, target: _engine.Target, *, is_first: bool = True, is_last: bool = True
-    ) -> bool:
-        """Draw into a target that the first of several scenes clears and the last one finishes.
+    def draw_rows(
+        self,
+        memory: Memory,
+        sink: Sink,
+        target: _engine.Target,
+        first: int,
+        end: int,
+        *,
+        sample: tuple[int, int] = (0, 0),
+        is_first: bool = True,
+        is_last: bool = True,
+    ) -> NDArray[np.int32]:
+        """Draw rows [first, end) of a target that the first of several scenes clears and the last one finishes.
 
-        Returns False, with the target in any state, where a vertex does not fit or is not finite: the whole mesh is
-        then to be drawn, which tells why.
+        Returns the triangles that are still to be drawn: the planes of clip space may cut them, or they do not fit.
         """
-        clusters, (width, height) = self.clusters, self._view.size
-        n_parts = min(height, choices.threads_to_draw(self._view, clusters.n_triangles))
-        rooms: NDArray[np.int32] = memory.empty("others", (n_parts, clusters.n_triangles + 1), np.int32)
-        exact = self._matrix.astype(np.float64)
-        may_be_hidden, numbers = sink in (Sink.NEAREST, Sink.FARTHEST), count()
-
-        def draw_rows(first: int, end: int) -> NDArray[np.int32]:
-            seen = clusters.seen_in(exact, self._empty, first, end, width, is_farthest=sink is Sink.FARTHEST)
-            room, listed, place = rooms[next(numbers)], clusters.survivors(seen), (target, first, end - first)
-            how = self._empty, self._own, seen, listed, may_be_hidden
-            return room[: clusters.engine.draw(*how, *place, room, is_first, is_last)[0]]
-
-        others = [found for found in run_parts(draw_rows, height, n_parts) if len(found)]
-        return not others or self._draw_others(memory, np.unique(np.concatenate(others)), target, n_parts, is_last)
-
-    def _draw_others(
-        self, memory: Memory, triangles: NDArray[np.int32], target: _engine.Target, n_parts: int, is_last: bool
-    ) -> bool:
-        """Draw triangles that the planes of clip space may cut over what is there; returns as `draw` does."""
-        scene = self._part(triangles, memory)
-        if scene is None:
-            return False
-
-        def draw_rows(first: int, end: int) -> None:
-            scene.draw_listed(target, first, end - first, triangles, is_last)
-
-        run_parts(draw_rows, self._view.size[1], n_parts)
-        return True
+        clusters = self.clusters
+        scene = self._empty if sample == (0, 0) else self._empty.seen_from(*sample)
+        seen = clusters.seen_in(self._exact, scene, first, end, self._view.size[0], is_farthest=sink is Sink.FARTHEST)
+        room: NDArray[np.int32] = memory.empty("clusters", (3 * len(clusters) + 1,), np.int32)
+        others: NDArray[np.int32] = memory.empty("others", (clusters.n_triangles + 1,), np.int32)
+        may_be_hidden = sink in (Sink.NEAREST, Sink.FARTHEST)
+        place = target, first, end - first, room, others
+        n_others, _, _ = clusters.engine.draw(scene, self._own, seen, may_be_hidden, *place, is_first, is_last)
+        return others[:n_others].copy()
 
     def part(self, triangles: NDArray[np.int32]) -> _engine.Scene:
         """Return the mesh with the vertices that some triangles use snapped, and seldom all; `triangles` ascend."""
-        scene = self._part(triangles, FreshMemory())
+        scene = self.try_part(triangles, FreshMemory())
         if scene is None:  # a vertex beside one of them, which need not be used, does not fit
             points, corners = self.clusters.points, self.clusters.corners
             snapped = snap_scene(FreshMemory(), points, corners, self._view, with_depth=True, out=None)
             return snapped.scene
         return scene
 
-    def _part(self, triangles: NDArray[np.int32], memory: Memory) -> _engine.Scene | None:
+    def try_part(self, triangles: NDArray[np.int32], memory: Memory) -> _engine.Scene | None:
+        """Return the same, or None where a vertex does not fit or is not finite."""
         points, corners = self.clusters.points, self.clusters.corners
         source = self._source_of(points)
         is_used: NDArray[np.uint8] = np.zeros(len(points) // VERTEX_BLOCK + 1, np.uint8)
@@ -111,3 +102,57 @@ class ClusteredScene:
         how = (*view.origin, view.grid_bits, view.cull, view.method, view.test)
         scene = _engine.Scene(source, records, None, corners, pieces, *how, self._engine_view)
         return scene.numbered_from(self._first_id)
+
+
+def draw_clustered(
+    memories: Sequence[Memory],
+    scenes: Sequence[ClusteredScene],
+    sink: Sink,
+    target: _engine.Target,
+    height: int,
+    sample: tuple[int, int] = (0, 0),
+) -> bool:
+    """Clear a target and draw scenes, a thread for each memory.
+
+    Returns False, with the target in any state, where a vertex does not fit or is not finite: the whole meshes are then
+    to be drawn, which tells why.
+    """
+    n_parts, last = min(height, len(memories)), len(scenes) - 1
+
+    def draw_rows(i: int, _: int) -> list[NDArray[np.int32]]:
+        rows = height * i // n_parts, height * (i + 1) // n_parts
+        return [
+            scene.draw_rows(
+                memories[i], sink, target, *rows, sample=sample, is_first=k == 0, is_last=k == last
+            )
+            for k, scene in enumerate(scenes)
+        ]
+
+    found = zip(*run_parts(draw_rows, n_parts, n_parts), strict=True)
+    for scene, parts in zip(scenes, found, strict=True):
+        others = [part for part in parts if len(part)]
+        if others and not draw_others(memories[0], scene, np.unique(np.concatenate(others)), target, height, n_parts, sample):
+            return False
+    return True
+
+
+def draw_others(
+    memory: Memory,
+    scene: ClusteredScene,
+    triangles: NDArray[np.int32],
+    target: _engine.Target,
+    height: int,
+    n_parts: int,
+    sample: tuple[int, int],
+) -> bool:
+    """Draw some triangles of a scene over what is there; returns as `draw_clustered` does."""
+    part = scene.try_part(triangles, memory)
+    if part is None:
+        return False
+    seen = part.seen_from(*sample)
+
+    def draw_rows(first: int, end: int) -> None:
+        seen.draw_listed(target, first, end - first, triangles, True)
+
+    run_parts(draw_rows, height, n_parts)
+    return True

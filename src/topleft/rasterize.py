@@ -17,10 +17,10 @@ from topleft import _engine, choices
 from topleft.area import sum_areas
 from topleft.arrays import as_out
 from topleft.classic import draw_classic, refuse_classic
-from topleft.clustered import ClusteredScene
+from topleft.clustered import ClusteredScene, draw_clustered
 from topleft.clusters import Clusters
 from topleft.fragments import Fragments
-from topleft.memory import Memory
+from topleft.memory import FreshMemory, Memory
 from topleft.models import DepthTest, Sampling, Sink, parse
 from topleft.sampling import draw_planes, sample_positions
 from topleft.snapped import Snapped, check_triangles, snap_scene
@@ -309,7 +309,10 @@ def draw_clustered_fragments(
         canvas_of(memory, "triangle", ids_out, shape, np.int32) as (ids, ids_canvas),
         canvas_of(memory, "depth", depth_out, shape, np.float32) as (depth, depth_canvas),
     ):
-        if not seen.draw(memory, sink, _engine.Target(sink, ids_canvas, depth_canvas, None)):
+        n_threads = choices.threads_to_draw(view, clusters.n_triangles)
+        memories = [memory] if n_threads == 1 else [FreshMemory() for _ in range(n_threads)]
+        target = _engine.Target(sink, ids_canvas, depth_canvas, None)
+        if not draw_clustered(memories, [seen], sink, target, view.size[1]):
             return None
         if background_depth is not None:
             depth_canvas[ids_canvas < 0] = background_depth
