@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from topleft import _engine
 from topleft.methods import METHODS
-from topleft.models import DepthTest, Sampling, Sink
+from topleft.models import DepthTest, Sink
 from topleft.threads import count_threads
 from topleft.view import View
 
@@ -27,6 +27,7 @@ __all__ = [
     "fragment_sink",
     "is_affine",
     "is_shared",
+    "pays_to_cluster",
     "pays_without_depth",
     "threads_to_convert",
     "threads_to_draw",
@@ -42,6 +43,13 @@ MIN_LAYERS_TO_FLATTEN = 1.0
 
 #: Triangles times threads. With fewer, threads that each set up every triangle are done before they have met twice.
 MIN_TRIANGLES_TO_SHARE = 1_000_000
+
+#: Triangles from which on a mesh that is drawn again is sorted into clusters; instances from which on one is at once.
+MIN_TRIANGLES_TO_CLUSTER = 20_000
+MIN_INSTANCES_TO_CLUSTER = 16
+
+#: What it does not matter to in which order triangles are drawn.
+ORDER_FREE = frozenset({Sink.MASK, Sink.COUNT, Sink.NEAREST, Sink.FARTHEST, Sink.SAMPLES})
 
 
 class Inputs(NamedTuple):
@@ -96,10 +104,18 @@ def fragment_sink(test: DepthTest | None, *, has_depth: bool) -> Sink:
     return Sink.FARTHEST if test is DepthTest.GREATER else Sink.NEAREST
 
 
-def can_cluster(view: View, test: DepthTest | None) -> bool:
-    """Tell whether the clusters of a mesh may be drawn one by one, in any order: where depth and index tell who wins."""
-    is_one_sample = view.sampling is Sampling.CENTER and view.transform is not None
-    return is_one_sample and test is not None and 0 not in view.size and can_share(view)
+def can_cluster(view: View, sink: Sink) -> bool:
+    """Tell whether the clusters of a mesh may be drawn one by one, in any order: where that decides nothing."""
+    is_on_grid = view.grid_bits == view.subpixel_bits and (sink is not Sink.SAMPLES or view.grid_bits <= 8)
+    return sink in ORDER_FREE and is_on_grid and 0 not in view.size and can_share(view)
+
+
+def pays_to_cluster(n_triangles: int, n_drawn: int, n_instances: int = 1) -> bool:
+    """Tell whether a mesh is drawn often enough to sort its triangles first.
+
+    `n_triangles`: of all that is drawn with it; `n_drawn`: how many pictures of it there have been.
+    """
+    return n_triangles >= MIN_TRIANGLES_TO_CLUSTER and (n_drawn > 0 or n_instances >= MIN_INSTANCES_TO_CLUSTER)
 
 
 def common_depth(points: NDArray[Any], *, has_depth: bool, is_clip_space: bool) -> float | None:

@@ -6,26 +6,51 @@ In: `Clusters`, a view, a target. Out: the same picture that the whole mesh give
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine, choices
 from topleft.arrays import as_matrix
 from topleft.clusters import Clusters
 from topleft.memory import FreshMemory, Memory
+from topleft.mesh import Mesh
 from topleft.models import Sink
 from topleft.snapped import snap_scene
 from topleft.threads import run_parts
 from topleft.view import View
 
-__all__ = ["ClusteredScene"]
+__all__ = ["ClusteredScene", "StaticPlan", "draw_clustered"]
 
 #: Vertices that are snapped together when some of them are needed: whole vectors.
 VERTEX_BLOCK = 16
 
 NO_RECORDS: NDArray[np.uint8] = np.empty(0, np.uint8)
+
+
+class StaticPlan:
+    """The plan of a mesh that does not change: from its second picture on it is drawn in clusters, where that pays."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        self._mesh = mesh
+
+    def fitted(self, view: View) -> View:
+        """Return the view with this plan."""
+        return replace(view, plan=self)
+
+    def corners_of(self, triangles: ArrayLike, n_vertices: int) -> NDArray[np.int32]:  # noqa: ARG002
+        """Return the triangles of the mesh, which has checked them."""
+        return self._mesh.triangles
+
+    def find_clusters(self) -> Clusters | None:
+        """Return the clusters of the mesh if it is drawn often enough; this is one time more."""
+        mesh = self._mesh
+        return mesh.clusters if choices.pays_to_cluster(len(mesh.triangles), mesh.note_drawn()) else None
+
+    def mark(self, stage: str) -> None:
+        """Nothing is measured."""
 
 
 class ClusteredScene:

@@ -11,13 +11,16 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from topleft.arrays import as_array, as_checked_triangles
 from topleft.material import Material
+
+if TYPE_CHECKING:
+    from topleft.clusters import Clusters
 
 FloatArray = npt.NDArray[np.floating[Any]]
 F32 = npt.NDArray[np.float32]
@@ -127,6 +130,30 @@ class Mesh:
         if self.normals is not None:
             return self.normals
         return self._computed_normals
+
+    @cached_property
+    def vertex_box(self) -> F64:
+        """Lowest and highest x, y, z of all finite vertices, (6,) float64; zeros without any."""
+        from topleft.clusters import box_of  # seldom needed
+
+        return box_of(self.vertices)
+
+    def note_drawn(self) -> int:
+        """Note that there is a picture of the mesh; returns how many there were before."""
+        n_drawn: int = self.__dict__.get("_n_drawn", 0)
+        self.__dict__["_n_drawn"] = n_drawn + 1
+        return n_drawn
+
+    @cached_property
+    def clusters(self) -> Clusters:
+        """The triangles sorted into clusters, which a view needs only some of; made when it is first asked for.
+
+        That takes about as long as drawing the mesh some twenty times, and keeps a copy of it of about 30 bytes a
+        triangle. Meshes that are drawn more than once ask for it themselves: `topleft.choices.pays_to_cluster`.
+        """
+        from topleft.clusters import Clusters  # seldom needed
+
+        return Clusters(self.vertices, self.triangles)
 
     @cached_property
     def _computed_normals(self) -> FloatArray:

@@ -230,6 +230,9 @@ class Plan:
                 )
         return self._corners
 
+    def find_clusters(self) -> None:
+        """Return None: vertices may change from call to call."""
+
     def mark(self, stage: str) -> None:
         """Note that a stage has ended."""
         self._clock.mark(stage)

@@ -244,9 +244,8 @@ def draw_fragments(
     depth_test: str | None,
     background_depth: float | None,
     out: object,
-    clusters: Clusters | None = None,
 ) -> Fragments:
-    """`rasterize`, on the memory given; `clusters`: of the same vertices and triangles."""
+    """`rasterize`, on the memory given."""
     refuse_classic(view, "depth")
     refuse_many(view, "rasterize")
     test = None if depth_test is None else parse(DepthTest, "depth_test", depth_test)
@@ -257,8 +256,11 @@ def draw_fragments(
             ids_out, depth_out = out  # type: ignore[misc]
         except (TypeError, ValueError):
             raise TypeError(f"out must be a pair (triangle, depth) of arrays, got {type(out).__name__}") from None
-    if clusters is not None and choices.can_cluster(view, test):
-        frags = draw_clustered_fragments(memory, clusters, view, test, background_depth, ids_out, depth_out)
+    sink = choices.fragment_sink(test, has_depth=True)
+    may_cluster = view.sampling.n_samples == 1 and view.transform is not None and choices.can_cluster(view, sink)
+    clusters = view.find_clusters() if may_cluster else None
+    if clusters is not None:
+        frags = draw_clustered_fragments(memory, clusters, view, sink, background_depth, ids_out, depth_out)
         if frags is not None:
             return frags
     snapped = snap_scene(memory, vertices, triangles, view, with_depth=True, out=out)
@@ -296,14 +298,13 @@ def draw_clustered_fragments(
     memory: Memory,
     clusters: Clusters,
     view: View,
-    test: DepthTest | None,
+    sink: Sink,
     background_depth: float | None,
     ids_out: object,
     depth_out: object,
 ) -> Fragments | None:
     """Return what `draw_fragments` does, of a mesh in clusters; None where only that can tell what is wrong."""
     seen = ClusteredScene(clusters, view)
-    sink = choices.fragment_sink(test, has_depth=True)
     shape = view.size[::-1]
     with (
         canvas_of(memory, "triangle", ids_out, shape, np.int32) as (ids, ids_canvas),

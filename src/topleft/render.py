@@ -15,6 +15,7 @@ from topleft.adapt import MeshLike, as_mesh
 from topleft.api import Rasterizer, rasterize, wireframe
 from topleft.bend import BentMesh, bend
 from topleft.camera import Camera
+from topleft.clustered import StaticPlan
 from topleft.colors import DEFAULT_COLOR, as_color
 from topleft.cutout import cut_out
 from topleft.eye import distances
@@ -209,10 +210,12 @@ def rasterize_mesh(
         return draw_scene(mesh, matrix_of(camera, view.get("viewport") or size), size, **view)
     drawn = seen_through(mesh, camera, view.get("viewport") or size, near_clip=view.get("near_clip", True))
     view["transform"] = drawn.transform
+    if rasterizer is not None and rasterizer.size != tuple(size):
+        raise ValueError(f"rasterizer must have the size {tuple(size)}, got {rasterizer.size}")
+    if drawn.bent is None:
+        view.setdefault("plan", StaticPlan(mesh))
     if rasterizer is None:
         frags = rasterize(drawn.vertices, drawn.triangles, size, **view)
-    elif rasterizer.size != tuple(size):
-        raise ValueError(f"rasterizer must have the size {tuple(size)}, got {rasterizer.size}")
     else:
         frags = rasterizer.rasterize(drawn.vertices, drawn.triangles, **view)
     if drawn.bent is None:

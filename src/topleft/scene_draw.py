@@ -12,15 +12,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from topleft import _engine
+from topleft import _engine, choices
 from topleft.area import sum_areas
 from topleft.classic import refuse_classic
+from topleft.clusters import Clusters
 from topleft.depth_layers import check_peel, peel_scenes
 from topleft.memory import SCRATCH, FreshMemory
 from topleft.models import DepthTest, Sampling, Sink, parse
 from topleft.rasterize import canvas_of, refuse_many
 from topleft.sampling import sample_positions
 from topleft.scene import Scene
+from topleft.scene_clusters import draw_placed, front_to_back, wants_clusters
 from topleft.scene_fragments import SceneDepthLayers, SceneFragments
 from topleft.snapped import Snapped, snap_scene
 from topleft.threads import count_threads, run_parts
@@ -52,12 +54,18 @@ class PlacedScene:
 
     def snap(self, i: int) -> Snapped:
         """Return an instance, snapped; in shared buffers it draws its own range of ids."""
+        mesh = self.scene[i].mesh
+        snapped = snap_scene(FRESH, mesh.vertices, mesh.triangles, self._view_of(i), with_depth=self._with_depth, out=None)
+        return replace(snapped, scene=snapped.scene.numbered_from(int(self.first_ids[i])))
+
+    def _view_of(self, i: int) -> View:
         instance, view = self.scene[i], self._view
         cull = MIRRORED[view.cull] if instance.is_mirrored else view.cull
-        placed = replace(view, transform=self._clip_from_world @ instance.transform, cull=cull)
-        mesh = instance.mesh
-        snapped = snap_scene(FRESH, mesh.vertices, mesh.triangles, placed, with_depth=self._with_depth, out=None)
-        return replace(snapped, scene=snapped.scene.numbered_from(int(self.first_ids[i])))
+        return replace(view, transform=self._clip_from_world @ instance.transform, cull=cull)
+
+    def clustered(self, i: int) -> tuple[Clusters, View, int]:
+        """Return the clusters of an instance's mesh, how they are seen, and what triangle 0 is called."""
+        return self.scene[i].mesh.clusters, self._view_of(i), int(self.first_ids[i])
 
     def chunks(self) -> Iterator[list[Snapped]]:
         """Yield the instances in their order, as many at a time as `VERTICES_AT_ONCE` allows."""
@@ -70,10 +78,14 @@ class PlacedScene:
         if chunk:
             yield chunk
 
-    def draw(self, targets: list[_engine.Target], positions: list[tuple[int, int]], height: int) -> None:
+    def draw(self, sink: Sink, targets: list[_engine.Target], positions: list[tuple[int, int]], height: int) -> None:
         """Clear targets of that many rows, one a sample, and draw what each sees; (0, 0) is the pixel's centre."""
         n_parts = count_threads(self._view.threads, self.scene.n_triangles)
         n_parts = min(height, max(n_parts, height * self._view.size[0] // MOST_PIXELS_OF_PART))
+        if choices.can_cluster(self._view, sink) and wants_clusters(self.scene):
+            order = front_to_back(self.scene, self._clip_from_world)
+            if draw_placed(self, order, sink, targets, positions, height, n_parts):
+                return
         n_left = len(self.scene)
         is_first = True
         for chunk in self.chunks():
@@ -119,7 +131,7 @@ def draw_scene(
     placed = PlacedScene(scene, clip_from_world, view, with_depth=True)
     if width and height:
         targets = [_engine.Target(sink, *planes, None) for planes in zip(ids, depth, strict=True)]
-        placed.draw(targets, positions, height)
+        placed.draw(sink, targets, positions, height)
     if background_depth is not None:
         depth[ids < 0] = background_depth
     return SceneFragments(ids, depth, placed, positions)
@@ -164,7 +176,7 @@ def draw_scene_coverage(
             shape = _engine.Target.covered_shape(height, width, n)
             sink = Sink.SAMPLES if n > 1 else Sink.MASK
             target = _engine.Target(sink, canvas, None, SCRATCH.empty("covered", shape, np.uint64), samples)
-            placed.draw([target], [(0, 0)], height)
+            placed.draw(sink, [target], [(0, 0)], height)
     return result
 
 

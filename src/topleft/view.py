@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Protocol, TypedDict
+from typing import TYPE_CHECKING, Any, Protocol, TypedDict
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,6 +14,9 @@ from topleft.methods import Method, find_method
 from topleft.models import ClipDepth, Cull, Sampling, parse
 from topleft.sampling import SAMPLE_GRID_BITS
 from topleft.threads import parse_threads
+
+if TYPE_CHECKING:
+    from topleft.clusters import Clusters
 
 __all__ = ["Planned", "View", "ViewOptions"]
 
@@ -29,6 +32,9 @@ class Planned(Protocol):
 
     def corners_of(self, triangles: ArrayLike, n_vertices: int) -> NDArray[np.int32]:
         """Return the checked int32 triangles, or raise an error where the plan is for others."""
+
+    def find_clusters(self) -> Clusters | None:
+        """Return the vertices and triangles in clusters if they have been sorted, or are to be now."""
 
     def mark(self, stage: str) -> None:
         """Note that a stage has ended."""
@@ -83,6 +89,10 @@ class View:
         """Note for the plan that a stage has ended."""
         if self.plan is not None:
             self.plan.mark(stage)
+
+    def find_clusters(self) -> Clusters | None:
+        """Return the vertices and triangles in clusters, if the plan has them."""
+        return None if self.plan is None else self.plan.find_clusters()
 
     @property
     def test(self) -> int:
