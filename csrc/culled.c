@@ -79,8 +79,8 @@ static int is_outside(const seen_box *box, const tl_cluster_view *v, unsigned *w
 /* Whether every triangle of a box within the near and far planes is certain to be turned the way that is culled after the snap.
  *
  * The screen area of a triangle is n . g(a) times a factor, with g(a) = k - k3 a, where (k, k3) is the eye: what the rows of x, y
- * and w take to 0.  Snapping moves corners by less than a sub-pixel, which changes twice the area by less than 4 (lx + ly) + 8
- * sub-pixels^2 when no side is longer than (lx, ly). */
+ * and w take to 0.  The vertex stage and the snap move corners by less than d sub-pixels, which changes twice the area by less
+ * than 4 d (lx + ly) + 8 d^2 sub-pixels^2 when no side is longer than (lx, ly). */
 static int is_turned_away(const tl_cluster *c, const tl_cluster_view *v, const seen_box *box)
 {
     const form_bounds *f = box->f;
@@ -99,16 +99,14 @@ static int is_turned_away(const tl_cluster *c, const tl_cluster_view *v, const s
     const double across = sqrt(fmax(0.0, 1.0 - along * along)), cone_sin = sqrt(fmax(0.0, 1.0 - c->cone_cos * c->cone_cos));
     const double least = 0.999 * length * (along * c->cone_cos - across * cone_sin) - 1.001 * fabs(v->eye[3]) * radius;
     const double factor = least * (v->scale_x * v->scale_y) / (w_max * w_max * w_max);
-    double sides = 0.0;
+    double sides = 0.0, moved = 0.0;
     const double scale[2] = {v->scale_x, v->scale_y};
     for (int k = 0; k < 2; k++) {
         const double largest = (fabs(f[k].centre) + f[k].reach) / w_min;
-        const double error = scale[k] * v->error * (f[k].terms + largest * f[3].terms) / w_min;
-        if (!(error < 0.25))
-            return 0;
+        moved = fmax(moved, 0.75 + scale[k] * v->error * (f[k].terms + largest * f[3].terms) / w_min);
         sides += 1.001 * scale[k] * (v->length[k] + largest * v->length[2]) / w_min;
     }
-    return c->min_height * factor > 8.0 * sides && c->min_area * factor > 16.0;
+    return c->min_height * factor > 8.0 * moved * sides && c->min_area * factor > 16.0 * moved * moved;
 }
 
 /* Whether the cluster shows its back, or what is culled, about: it is drawn late then, when what is in front of it may hide it. */

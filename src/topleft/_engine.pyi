@@ -11,6 +11,10 @@ CELL_CLEAR: int
 PLANE_DOUBLES: int
 AREA_OVERFLOW: int
 MAX_LAYERS: int
+CLUSTER: int
+CLUSTER_GROUP: int
+CLUSTER_TAIL: int
+CLUSTER_BYTES: int
 SCALARS: dict[np.dtype[Any], int]
 
 def use_isa(name: str) -> None: ...
@@ -74,6 +78,9 @@ class Source:
         records: NDArray[np.uint8],
         wide: NDArray[np.int64] | None,
     ) -> tuple[int, int, int]: ...
+    def project_blocks(
+        self, is_used: NDArray[np.uint8], block: int, view: View, records: NDArray[np.uint8]
+    ) -> tuple[int, int, int]: ...
     def project(
         self, first: int, end: int, view: View, records: NDArray[np.uint8], wide: NDArray[np.int64] | None
     ) -> tuple[int, int, int]: ...
@@ -81,7 +88,12 @@ class Source:
 class Pieces:
     arrays: tuple[Any, ...] | None
     def __init__(
-        self, source: Source, records: NDArray[np.uint8], triangles: NDArray[np.int32], view: View
+        self,
+        source: Source,
+        records: NDArray[np.uint8],
+        triangles: NDArray[np.int32],
+        view: View,
+        ids: NDArray[np.int32] | None = None,
     ) -> None: ...
     def __len__(self) -> int: ...
 
@@ -327,3 +339,68 @@ def cut_out(
     first_row: int,
     n_rows: int,
 ) -> None: ...
+
+def order_triangles(
+    source: Source,
+    triangles: NDArray[np.int32],
+    box: NDArray[np.float64],
+    keys: NDArray[np.uint32],
+    room: NDArray[np.uint64],
+    order: NDArray[np.int32],
+) -> None: ...
+def cut_clusters(
+    triangles: NDArray[np.int32],
+    order: NDArray[np.int32],
+    seen: NDArray[np.int32],
+    clusters: NDArray[np.uint8],
+    vertices: NDArray[np.int32],
+    corners: NDArray[np.uint8],
+) -> tuple[int, int]: ...
+def measure_clusters(
+    source: Source,
+    corners: NDArray[np.uint8],
+    clusters: NDArray[np.uint8],
+    group_boxes: NDArray[np.float64],
+    first: int,
+    end: int,
+) -> None: ...
+
+class ClusterView:
+    def __init__(
+        self,
+        matrix: NDArray[np.float64],
+        scene: Scene,
+        first_row: int,
+        n_rows: int,
+        width: int,
+        margin_px: float,
+        error: float,
+        is_farthest: bool,
+    ) -> None: ...
+
+class Clustered:
+    n_triangles: int
+    def __init__(
+        self,
+        clusters: NDArray[np.uint8],
+        group_boxes: NDArray[np.float64],
+        corners: NDArray[np.uint8],
+        names: NDArray[np.int32],
+    ) -> None: ...
+    def __len__(self) -> int: ...
+    def cull(self, view: ClusterView, listed: NDArray[np.int32], room: NDArray[np.uint64]) -> int: ...
+    def count_triangles(self, listed: NDArray[np.int32]) -> int: ...
+    def draw(
+        self,
+        scene: Scene,
+        source: Source,
+        seen: ClusterView,
+        may_be_hidden: bool,
+        target: Target,
+        first_row: int,
+        n_rows: int,
+        room: NDArray[np.int32],
+        others: NDArray[np.int32],
+        is_first: bool,
+        is_last: bool,
+    ) -> tuple[int, int, int]: ...

@@ -155,23 +155,24 @@ def draw_clustered(
 
     found = zip(*run_parts(draw_rows, n_parts, n_parts), strict=True)
     for scene, parts in zip(scenes, found, strict=True):
-        others = [part for part in parts if len(part)]
-        if others and not draw_others(memories[0], scene, np.unique(np.concatenate(others)), target, height, n_parts, sample):
+        if not any(map(len, parts)):
+            continue
+        others = np.unique(np.concatenate(parts))
+        if not draw_others(memories, scene, others, target, height, sample):
             return False
     return True
 
 
 def draw_others(
-    memory: Memory,
+    memories: Sequence[Memory],
     scene: ClusteredScene,
     triangles: NDArray[np.int32],
     target: _engine.Target,
     height: int,
-    n_parts: int,
     sample: tuple[int, int],
 ) -> bool:
     """Draw some triangles of a scene over what is there; returns as `draw_clustered` does."""
-    part = scene.try_part(triangles, memory)
+    part = scene.try_part(triangles, memories[0])
     if part is None:
         return False
     seen = part.seen_from(*sample)
@@ -179,5 +180,5 @@ def draw_others(
     def draw_rows(first: int, end: int) -> None:
         seen.draw_listed(target, first, end - first, triangles, True)
 
-    run_parts(draw_rows, height, n_parts)
+    run_parts(draw_rows, height, min(height, len(memories)))
     return True

@@ -1,6 +1,6 @@
 """Clusters: a mesh sorted once, so that a view leaves out what cannot show in it.
 
-In: the vertices and triangles of a mesh in object space, then a matrix and a window. Out: what of them may draw a pixel.
+In: the vertices and triangles of a mesh in object space, then a view of it. Out: what of them may draw a pixel.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from topleft.threads import count_threads, run_parts
 
 __all__ = ["Clusters"]
 
-#: A bound of the error of the vertex stage as a share of the terms that it adds up: seven roundings, and a reserve.
-STAGE_ERROR = {np.dtype(np.float32): 2.0**-20, np.dtype(np.float64): 2.0**-49}
+#: A bound of the error of the vertex stage as a share of the terms that it adds up: four roundings, twice.
+STAGE_ERROR = {np.dtype(np.float32): 2.0**-21, np.dtype(np.float64): 2.0**-50}
 
 #: Pixels around the window that count as inside: more than the snap and the vertex stage move a corner.
 MARGIN_PX = 1.0
@@ -32,7 +32,7 @@ class Clusters:
     corners : ndarray of int32, shape (T, 3)
         Its triangles, whose indices have been checked.
     own_points : ndarray, shape (N, 3)
-        The vertices cluster by cluster; those on their borders several times. Some rows more follow, to be read past the end.
+        The vertices cluster by cluster, those on borders several times, and some rows that may be read past the end.
     """
 
     def __init__(self, points: NDArray[Any], corners: NDArray[np.int32], threads: int | None = None) -> None:

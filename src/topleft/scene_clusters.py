@@ -55,6 +55,5 @@ def draw_placed(
     """Clear targets, one a sample, and draw what each sees; returns as `draw_clustered` does."""
     scenes = [ClusteredScene(*placed.clustered(i)) for i in order.tolist()]
     memories = [KeptMemory() for _ in range(n_threads)]
-    return all(
-        draw_clustered(memories, scenes, sink, target, height, at) for target, at in zip(targets, positions, strict=True)
-    )
+    seen = zip(targets, positions, strict=True)
+    return all(draw_clustered(memories, scenes, sink, target, height, at) for target, at in seen)

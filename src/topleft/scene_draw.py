@@ -55,7 +55,8 @@ class PlacedScene:
     def snap(self, i: int) -> Snapped:
         """Return an instance, snapped; in shared buffers it draws its own range of ids."""
         mesh = self.scene[i].mesh
-        snapped = snap_scene(FRESH, mesh.vertices, mesh.triangles, self._view_of(i), with_depth=self._with_depth, out=None)
+        view, with_depth = self._view_of(i), self._with_depth
+        snapped = snap_scene(FRESH, mesh.vertices, mesh.triangles, view, with_depth=with_depth, out=None)
         return replace(snapped, scene=snapped.scene.numbered_from(int(self.first_ids[i])))
 
     def _view_of(self, i: int) -> View:
