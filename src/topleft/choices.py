@@ -6,6 +6,7 @@ measured on one and two cores of a Zen 4 with AVX-512; `docs/design.md`, section
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,9 +14,9 @@ from numpy.typing import NDArray
 
 from topleft import _engine
 from topleft.methods import METHODS
-from topleft.models import DepthTest, Sink
+from topleft.models import Cull, DepthTest, Sink
 from topleft.threads import count_threads
-from topleft.view import View
+from topleft.view import CULL_CODES, View
 
 __all__ = [
     "Inputs",
@@ -28,6 +29,7 @@ __all__ = [
     "is_affine",
     "is_shared",
     "pays_to_cluster",
+    "pays_to_draw_clusters",
     "pays_without_depth",
     "threads_to_convert",
     "threads_to_draw",
@@ -47,6 +49,11 @@ MIN_TRIANGLES_TO_SHARE = 1_000_000
 #: Triangles from which on a mesh that is drawn again is sorted into clusters; instances from which on one is at once.
 MIN_TRIANGLES_TO_CLUSTER = 20_000
 MIN_INSTANCES_TO_CLUSTER = 16
+
+#: Where faces are culled clusters save less: triangles from which on they do though a view shows all of the mesh, and
+#: the share of the mesh that smaller ones may show.
+MIN_TRIANGLES_TO_CLUSTER_CULLED = 500_000
+MAX_SHARE_TO_CLUSTER_CULLED = 0.75
 
 #: What it does not matter to in which order triangles are drawn.
 ORDER_FREE = frozenset({Sink.MASK, Sink.COUNT, Sink.NEAREST, Sink.FARTHEST, Sink.SAMPLES})
@@ -116,6 +123,12 @@ def pays_to_cluster(n_triangles: int, n_drawn: int, n_instances: int = 1) -> boo
     `n_triangles`: of all that is drawn with it; `n_drawn`: how many pictures of it there have been.
     """
     return n_triangles >= MIN_TRIANGLES_TO_CLUSTER and (n_drawn > 0 or n_instances >= MIN_INSTANCES_TO_CLUSTER)
+
+
+def pays_to_draw_clusters(view: View, n_triangles: int, share_seen: Callable[[], float]) -> bool:
+    """Tell whether a view of a mesh in clusters is drawn from these; `share_seen`: how many of them it may show."""
+    is_culled = view.cull != CULL_CODES[Cull.NONE] and n_triangles < MIN_TRIANGLES_TO_CLUSTER_CULLED
+    return not is_culled or share_seen() <= MAX_SHARE_TO_CLUSTER_CULLED
 
 
 def common_depth(points: NDArray[Any], *, has_depth: bool, is_clip_space: bool) -> float | None:

@@ -65,6 +65,12 @@ class ClusteredScene:
         self._own = self._source_of(clusters.own_points)
         self._empty = self._scene_of(self._own, NO_RECORDS, clusters.corners[:0], None)
 
+    def share(self) -> float:
+        """Return the share of the clusters that the window may show, hidden or not."""
+        clusters, (width, height) = self.clusters, self._view.size
+        seen = clusters.seen_in(self._exact, self._empty, 0, height, width, is_farthest=False)
+        return len(clusters.survivors(seen)) / max(1, len(clusters))
+
     def draw_rows(
         self,
         memory: Memory,

@@ -303,8 +303,13 @@ def draw_clustered_fragments(
     ids_out: object,
     depth_out: object,
 ) -> Fragments | None:
-    """Return what `draw_fragments` does, of a mesh in clusters; None where only that can tell what is wrong."""
+    """Return what `draw_fragments` does, of a mesh in clusters.
+
+    None where drawing them does not pay, or where only that can tell what is wrong.
+    """
     seen = ClusteredScene(clusters, view)
+    if not choices.pays_to_draw_clusters(view, clusters.n_triangles, seen.share):
+        return None
     shape = view.size[::-1]
     with (
         canvas_of(memory, "triangle", ids_out, shape, np.int32) as (ids, ids_canvas),
