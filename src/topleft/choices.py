@@ -25,7 +25,9 @@ __all__ = [
     "flat_depth",
     "fragment_sink",
     "is_affine",
+    "is_direct",
     "is_shared",
+    "must_cut",
     "pays_without_depth",
     "threads_to_convert",
     "threads_to_draw",
@@ -42,6 +44,10 @@ MIN_LAYERS_TO_FLATTEN = 1.0
 #: Triangles times threads. With fewer, threads that each set up every triangle are done before they have met twice.
 MIN_TRIANGLES_TO_SHARE = 1_000_000
 
+#: With fewer pixels in the picture for each triangle, labels take less time than colours stored triangle by triangle:
+#: 200,000 triangles of 8 px in 1920x1080 take 6.4 and 8 ms, 20,000 of 40 px 3.8 and 2.3 ms.
+MIN_PIXELS_A_TRIANGLE = 45
+
 
 class Inputs(NamedTuple):
     """A scene before and after the snap: what choices look at."""
@@ -56,6 +62,11 @@ class Inputs(NamedTuple):
 def is_affine(matrix: NDArray[Any] | None) -> bool:
     """Tell whether every w is 1 behind a transform: dividing by it changes no bit, so it is left out."""
     return matrix is not None and matrix[3].tolist() == [0, 0, 0, 1]
+
+
+def must_cut(n_outside: int) -> bool:
+    """Tell whether triangles are looked through for those that a clip plane cuts: no vertex outside, none cut."""
+    return n_outside > 0
 
 
 def threads_to_convert(threads: int | None, n_triangles: int) -> int:
@@ -133,3 +144,13 @@ def flat_depth(scene: _engine.Scene, inputs: Inputs, view: View, *, has_depth: b
 def earlier_wins(test: DepthTest | None, *, has_depth: bool) -> bool:
     """Tell whether the triangle with the lower index shows where depths are equal; otherwise the later one does."""
     return test is not None and has_depth
+
+
+def is_direct(view: View, n_triangles: int, dtype: np.dtype[Any], *, is_flat: bool) -> bool:
+    """Tell whether colours are best stored triangle by triangle, without labels in between.
+
+    Labels cost a pass to clear and one to colour them, and less a triangle.
+    """
+    width, height = view.size
+    is_plain = is_flat and dtype == np.uint8 and view.sampling.n_samples == 1
+    return is_plain and n_triangles * MIN_PIXELS_A_TRIANGLE <= width * height

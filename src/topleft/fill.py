@@ -23,11 +23,6 @@ from topleft.view import View
 
 __all__ = ["Style", "draw_fill"]
 
-#: With fewer pixels in the picture for each triangle, labels take less time than colours stored triangle by triangle:
-#: 200,000 triangles of 8 px in 1920x1080 take 6.4 and 8 ms, 20,000 of 40 px 3.8 and 2.3 ms.
-MIN_PIXELS_A_TRIANGLE = 45
-
-
 @dataclass(frozen=True, slots=True)
 class Style:
     """The options of `fill` besides those that all verbs share, not yet checked."""
@@ -66,7 +61,7 @@ def draw_fill(
         if ground is None and out is None:
             ground = np.zeros((), palette.dtype)
         is_drawn = bool(canvas.size and snapped.n_triangles)
-        is_blended = blending.is_needed or is_direct(palette, snapped, view, is_flat=is_flat)
+        is_blended = blending.is_needed or choices.is_direct(view, snapped.n_triangles, palette.dtype, is_flat=is_flat)
         can_lay = is_drawn and is_blended and palette.dtype == np.uint8 and view.sampling.n_samples == 1
         if ground is not None and not can_lay:
             lay_ground(canvas, ground)
@@ -109,16 +104,6 @@ def lay_ground(pixels: NDArray[Any], ground: NDArray[Any]) -> None:
     """Give all pixels one colour: the first row, and the others row by row, which NumPy copies fast."""
     pixels[:1] = ground
     pixels[1:] = pixels[:1]
-
-
-def is_direct(palette: NDArray[Any], snapped: Snapped, view: View, *, is_flat: bool) -> bool:
-    """Tell whether colours are best stored triangle by triangle, without labels in between.
-
-    Labels cost a pass to clear and one to colour them, and less a triangle.
-    """
-    width, height = view.size
-    is_plain = is_flat and palette.dtype == np.uint8 and view.sampling.n_samples == 1
-    return is_plain and snapped.n_triangles * MIN_PIXELS_A_TRIANGLE <= width * height
 
 
 def paint(

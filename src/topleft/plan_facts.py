@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from topleft import choices
 from topleft.arrays import as_array
-from topleft.fill import is_direct
 from topleft.memory import FreshMemory
 from topleft.models import DepthTest, Sampling, Sink
 from topleft.sampling import sample_positions
@@ -149,7 +148,7 @@ def find_facts(
         n_pieces=len(pieces) if pieces else 0,
         flat_depth=flat,
         common_depth=common,
-        is_direct=verb == "fill" and is_direct(np.zeros(1, np.uint8), snapped, view, is_flat=True),
+        is_direct=verb == "fill" and choices.is_direct(view, snapped.n_triangles, np.dtype(np.uint8), is_flat=True),
         census=tuple(census),
     )
     corners = np.array(snapped.corners, np.int32)
