@@ -7,14 +7,16 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, TextIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 import topleft as tl
-from benchmarks.choices_scenes import Scene, forget_scenes, scenes
+from benchmarks.choices_builds import BUILDS, concerns, load_builds, ways_with
+from benchmarks.choices_scenes import Scene, scenes
 from benchmarks.choices_ways import CHOICES, THREADED, Picture, Way, Ways
 from benchmarks.machine import describe_commit, describe_machine, now
 
@@ -31,13 +33,20 @@ class Options:
     scenes: Sequence[str] = ()
     """Beginnings of names; all for none."""
     rounds: int = 7
-    seconds: float = 0.004
+    seconds: float = 0.002
     """Length of a turn, at least a call."""
     scale: float = 1.0
+    builds: Path | None = None
+    """Where builds with other constants are kept; without it they are not measured."""
 
 
-def run_choices(options: Options, log: TextIO, record: dict[str, Any] | None = None) -> dict[str, Any]:
-    """Return a record, or what was measured anew in it.
+def run_choices(
+    options: Options,
+    log: TextIO,
+    record: dict[str, Any] | None = None,
+    save: Callable[[dict[str, Any]], None] | None = None,
+) -> dict[str, Any]:
+    """Return a record, or what was measured anew in it; `save` gets it after each scene.
 
     Raises
     ------
@@ -46,19 +55,33 @@ def run_choices(options: Options, log: TextIO, record: dict[str, Any] | None = N
     AssertionError
         If two ways draw different bits.
     """
-    if unknown := [name for name in options.choices if name not in CHOICES]:
-        raise ValueError(f"--choice must be some of {', '.join(CHOICES)}, got {', '.join(unknown)}")
-    wanted = list(options.choices) or list(CHOICES)
+    known = [*CHOICES, *BUILDS]
+    if unknown := [name for name in options.choices if name not in known]:
+        raise ValueError(f"--choice must be some of {', '.join(known)}, got {', '.join(unknown)}")
+    makers = makers_of(options)
     rows = []
     for scene in chosen_scenes(options):
-        for choice in wanted:
-            row = measure_choice(choice, scene, CHOICES[choice](scene), options)
+        for choice, ways_of in makers.items():
+            row = measure_choice(choice, scene, ways_of(scene), options)
             if row:
                 rows.append(row)
                 print(row_text(row), file=log, flush=True)
-        if scene.sampling == "outer":
-            forget_scenes()
+        if save:
+            save(with_rows(record, rows))
     return with_rows(record, rows)
+
+
+def makers_of(options: Options) -> dict[str, Callable[[Scene], Ways]]:
+    """Return what gives the ways of a scene, for each choice that is wanted."""
+    wanted = list(options.choices) or [*CHOICES, *BUILDS]
+    makers = {name: CHOICES[name] for name in wanted if name in CHOICES}
+    for name in wanted:
+        if name in BUILDS and options.builds:
+            libraries = load_builds(name, options.builds)
+            makers[name] = lambda scene, name=name, own=libraries: (
+                ways_with(scene, own) if concerns(name, scene) else []
+            )
+    return makers
 
 
 def chosen_scenes(options: Options) -> Iterator[Scene]:
@@ -107,13 +130,13 @@ def check_same_bits(scene: Scene, ways: Ways) -> None:
 
 
 def take_rounds(
-    ways: Sequence[Way], n_rounds: int, seconds: float, clock: Callable[[], float]
+    ways: Sequence[Way], n_rounds: int, seconds: float, clock: Callable[[], float], hopeless: float = HOPELESS
 ) -> list[NDArray[np.float64]]:
     """Return the least milliseconds of a call in each round, way by way; the order turns from round to round."""
     found: list[list[float]] = [[] for _ in ways]
     for i in range(n_rounds):
         for k in (np.arange(len(ways)) + i) % len(ways):
-            if i and found[k][0] > HOPELESS * found[0][0]:
+            if i and found[k][0] > hopeless * found[0][0]:
                 continue
             with ways[k].in_force():
                 found[k].append(least_ms(ways[k].draw, seconds, clock))
@@ -145,7 +168,7 @@ def with_rows(record: dict[str, Any] | None, rows: list[dict[str, Any]]) -> dict
     """Return a record with these rows in place of older ones of the same choice and scene."""
     new = {key_of(row): row for row in rows}
     old = {} if record is None else {key_of(row): row for row in record["rows"]}
-    order = {name: i for i, name in enumerate(CHOICES)}
+    order = {name: i for i, name in enumerate([*CHOICES, *BUILDS])}
     merged = sorted((old | new).values(), key=lambda row: order.get(row["choice"], len(order)))
     parts = {name: value for name, value in (record or {}).items() if name not in FACTS}
     return facts() | parts | {"rows": merged}

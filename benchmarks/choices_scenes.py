@@ -119,7 +119,7 @@ def inside_matrix(size: tuple[int, int]) -> NDArray[np.float64]:
 
 
 def geometries(scale: float) -> Iterator[Scene]:
-    """Give scenes for `rasterize` with one sample a pixel; `scale`: of the numbers of triangles and the frame's sides."""
+    """Give scenes for `rasterize` with one sample a pixel; `scale`: of numbers of triangles and sides of the frame."""
     from benchmarks.cases import orbit_camera
 
     hd, uhd = ((max(16, round(scale * w)), max(16, round(scale * h))) for w, h in (HD, UHD))
@@ -129,22 +129,28 @@ def geometries(scale: float) -> Iterator[Scene]:
         yield Scene(f"mesh {label}", "mesh", lambda n=n: blob_arrays(n_of(n)), hd, eye)
     wide = lambda: blob_arrays(n_of(100_000), np.float64, np.int64)  # noqa: E731
     yield Scene("mesh 100k float64 int64", "mesh", wide, hd, eye)
-    yield Scene("mesh 100k in 3840x2160", "mesh", lambda: blob_arrays(n_of(100_000)), uhd, {"transform": orbit_camera(uhd)})
-    yield Scene("mesh 1k in 64x64", "mesh", lambda: blob_arrays(n_of(1000)), (64, 64), {"transform": orbit_camera((64, 64))})
+    yield Scene(
+        "mesh 100k in 3840x2160", "mesh", lambda: blob_arrays(n_of(100_000)), uhd, {"transform": orbit_camera(uhd)}
+    )
+    yield Scene(
+        "mesh 1k in 64x64", "mesh", lambda: blob_arrays(n_of(1000)), (64, 64), {"transform": orbit_camera((64, 64))}
+    )
     flat_eye = {"transform": np.diag([0.5, 0.9, 0.5, 1.0])}
     for label, n in (("10k", 10_000), ("1M", 1_000_000)):
         yield Scene(f"orthographic {label}", "orthographic", lambda n=n: blob_arrays(n_of(n)), hd, flat_eye)
     inside = {"transform": inside_matrix(hd)}
     for label, n in (("10k", 10_000), ("1M", 1_000_000)):
         yield Scene(f"clip-crossing {label}", "clip-crossing", lambda n=n: blob_arrays(n_of(n)), hd, inside)
-    for n, px in ((1_000_000, 4), (200_000, 8), (20_000, 40), (5_000, 100), (1_000, 300), (100, 800), (300, 60)):
+    for n, px in ((1_000_000, 4), (200_000, 8), (20_000, 40), (5_000, 100), (1_000, 300), (100, 800), (50, 60)):
         yield Scene(f"random {n} of {px} px", "random", lambda n=n, px=px: strewn(n_of(n), px, hd), hd)
     for n, px in ((200_000, 8), (20_000, 40), (1_000, 300), (2_000, 8), (300, 60)):
         yield Scene(f"flat {n} of {px} px", "flat z", lambda n=n, px=px: strewn(n_of(n), px, hd, 0.5), hd)
     small = (256, 256)
     yield Scene("flat 2000 of 20 px in 256x256", "flat z", lambda: strewn(n_of(2000), 20, small, 0.5), small)
     yield Scene("slivers 20000 of 100 px", "slivers", lambda: sliver_scene(n_of(20_000), hd), hd)
-    yield Scene("partly outside 200000 of 20 px", "partly outside", lambda: strewn(n_of(200_000), 20, hd, None, 4.0), hd)
+    yield Scene(
+        "partly outside 200000 of 20 px", "partly outside", lambda: strewn(n_of(200_000), 20, hd, None, 4.0), hd
+    )
     yield Scene("partly outside 200 of 900 px", "partly outside", lambda: strewn(n_of(200), 900, hd, None, 2.0), hd)
     yield Scene("map of 100000", "map", lambda: map_arrays(n_of(100_000), hd), hd)
     yield Scene("whole pixels, map of 10000", "whole pixels", lambda: map_arrays(n_of(10_000), hd, is_whole=True), hd)
@@ -164,15 +170,22 @@ def tuple_rint(arrays: Arrays) -> Arrays:
     return vertices, arrays[1]
 
 
-ASKED = (
-    ("rasterize", "center"), ("coverage", "center"), ("overdraw", "center"), ("fill", "center"),
-    ("rasterize", "msaa4"), ("coverage", "msaa4"), ("fill", "msaa4"), ("coverage", "area"), ("coverage", "outer"),
+ASKED = (("rasterize", "center"), ("coverage", "center"))
+"""Verbs and samplings that every scene is drawn with."""
+
+ASKED_OF_SOME = (
+    ("overdraw", "center"), ("fill", "center"),
+    ("rasterize", "msaa4"), ("coverage", "msaa4"), ("fill", "msaa4"), ("coverage", "area"),
 )  # fmt: skip
-"""Verbs and samplings."""
+"""Of the smaller ones, too."""
+
+MOST_TRIANGLES = 400_000
 
 
 def scenes(scale: float = 1.0) -> Iterator[Scene]:
-    """Give every geometry with everything that is asked of it."""
+    """Give every geometry with what is asked of it, those of one geometry one after the other."""
     for scene in geometries(scale):
-        for verb, sampling in ASKED:
+        n = len(scene.arrays[1])
+        for verb, sampling in ASKED + (ASKED_OF_SOME if n <= MOST_TRIANGLES else ()):
             yield replace(scene, verb=verb, sampling=sampling)
+        forget_scenes()
