@@ -145,8 +145,9 @@ def geometries(scale: float) -> Iterator[Scene]:
         yield Scene(f"random {n} of {px} px", "random", lambda n=n, px=px: strewn(n_of(n), px, hd), hd)
     for n, px in ((200_000, 8), (20_000, 40), (1_000, 300), (2_000, 8), (300, 60)):
         yield Scene(f"flat {n} of {px} px", "flat z", lambda n=n, px=px: strewn(n_of(n), px, hd, 0.5), hd)
-    small = (256, 256)
-    yield Scene("flat 2000 of 20 px in 256x256", "flat z", lambda: strewn(n_of(2000), 20, small, 0.5), small)
+    for n, px, side in ((2000, 20, 256), (1000, 40, 128), (50, 20, 64)):
+        make = lambda n=n, px=px, side=side: strewn(n_of(n), px, (side, side), 0.5)  # noqa: E731
+        yield Scene(f"flat {n} of {px} px in {side}x{side}", "flat z", make, (side, side))
     yield Scene("slivers 20000 of 100 px", "slivers", lambda: sliver_scene(n_of(20_000), hd), hd)
     yield Scene(
         "partly outside 200000 of 20 px", "partly outside", lambda: strewn(n_of(200_000), 20, hd, None, 4.0), hd

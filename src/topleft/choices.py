@@ -37,15 +37,21 @@ __all__ = [
 #: Fewer vertices are snapped, and fewer triangles converted, by one thread: waking another takes as long.
 MIN_TO_SHARE_ARRAYS = 200_000
 
-#: Pixels of a picture, and layers of triangles in it, from which on ids are drawn alone when all depths are equal.
-MIN_PIXELS_TO_FLATTEN = 1 << 16
-MIN_LAYERS_TO_FLATTEN = 1.0
+#: Nanoseconds that decide whether depths are compared where all are equal: ids alone cost a pass over all pixels and a few
+#: calls, comparisons something a covered sample, and, where the picture does not stay in a near cache, a row of a triangle
+#: that is fetched. Flat triangles of 8, 40 and 400 px, 0.2 to 2 layers, 64x64 to 1920x1080: off by 1.2 times at most.
+FLAT_CALL_NS, FLAT_PIXEL_NS = 12_000, 0.19
+COMPARED_SAMPLE_NS, COMPARED_ROW_NS = 0.35, 12.0
+
+#: Pixels of a picture that stay in a near cache while it is drawn; those of a larger one are cold when they are met.
+NEAR_PIXELS = 400_000
 
 #: Triangles times threads. With fewer, threads that each set up every triangle are done before they have met twice.
 MIN_TRIANGLES_TO_SHARE = 1_000_000
 
-#: With fewer pixels in the picture for each triangle, labels take less time than colours stored triangle by triangle:
-#: 200,000 triangles of 8 px in 1920x1080 take 6.4 and 8 ms, 20,000 of 40 px 3.8 and 2.3 ms.
+#: With fewer pixels in the picture for each triangle that is seen, labels take less time than colours stored triangle
+#: by triangle: 200,000 triangles of 8 px in 1920x1080 take 6.4 and 8 ms, 20,000 of 40 px 3.8 and 2.3 ms, 200,000 of
+#: 20 px, one in 16 of them in the picture, 5.7 and 3.7 ms.
 MIN_PIXELS_A_TRIANGLE = 45
 
 
@@ -126,12 +132,13 @@ def common_depth(points: NDArray[Any], *, has_depth: bool, is_clip_space: bool) 
 
 
 def pays_without_depth(scene: _engine.Scene, view: View) -> bool:
-    """Tell whether one pass over all pixels costs less than comparing depths wherever triangles are.
-
-    The pass is as long as half a layer of comparisons; in small pictures finding out takes longer than both.
-    """
+    """Tell whether one pass over all pixels costs less than comparing depths wherever triangles are."""
     n_pixels = view.size[0] * view.size[1]
-    return n_pixels >= MIN_PIXELS_TO_FLATTEN and scene.guess_layers(n_pixels) >= MIN_LAYERS_TO_FLATTEN
+    _, n_layers, n_rows = scene.guess_seen(*view.size)
+    compared_ns = COMPARED_SAMPLE_NS * n_layers * n_pixels
+    if n_pixels > NEAR_PIXELS:
+        compared_ns += COMPARED_ROW_NS * n_rows
+    return compared_ns > FLAT_CALL_NS + FLAT_PIXEL_NS * n_pixels
 
 
 def flat_depth(scene: _engine.Scene, inputs: Inputs, view: View, *, has_depth: bool) -> float | None:
@@ -146,11 +153,12 @@ def earlier_wins(test: DepthTest | None, *, has_depth: bool) -> bool:
     return test is not None and has_depth
 
 
-def is_direct(view: View, n_triangles: int, dtype: np.dtype[Any], *, is_flat: bool) -> bool:
+def is_direct(scene: _engine.Scene, view: View, dtype: np.dtype[Any], *, is_flat: bool) -> bool:
     """Tell whether colours are best stored triangle by triangle, without labels in between.
 
-    Labels cost a pass to clear and one to colour them, and less a triangle.
+    Labels cost a pass to clear and one to colour them, and less a triangle that is seen.
     """
-    width, height = view.size
-    is_plain = is_flat and dtype == np.uint8 and view.sampling.n_samples == 1
-    return is_plain and n_triangles * MIN_PIXELS_A_TRIANGLE <= width * height
+    if not is_flat or dtype != np.uint8 or view.sampling.n_samples > 1:
+        return False
+    n_seen, _, _ = scene.guess_seen(*view.size)
+    return n_seen * MIN_PIXELS_A_TRIANGLE <= view.size[0] * view.size[1]

@@ -61,7 +61,7 @@ def draw_fill(
         if ground is None and out is None:
             ground = np.zeros((), palette.dtype)
         is_drawn = bool(canvas.size and snapped.n_triangles)
-        is_blended = blending.is_needed or choices.is_direct(view, snapped.n_triangles, palette.dtype, is_flat=is_flat)
+        is_blended = blending.is_needed or choices.is_direct(snapped.scene, view, palette.dtype, is_flat=is_flat)
         can_lay = is_drawn and is_blended and palette.dtype == np.uint8 and view.sampling.n_samples == 1
         if ground is not None and not can_lay:
             lay_ground(canvas, ground)

@@ -148,7 +148,7 @@ def find_facts(
         n_pieces=len(pieces) if pieces else 0,
         flat_depth=flat,
         common_depth=common,
-        is_direct=verb == "fill" and choices.is_direct(view, snapped.n_triangles, np.dtype(np.uint8), is_flat=True),
+        is_direct=verb == "fill" and choices.is_direct(snapped.scene, view, np.dtype(np.uint8), is_flat=True),
         census=tuple(census),
     )
     corners = np.array(snapped.corners, np.int32)

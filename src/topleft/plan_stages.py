@@ -262,8 +262,8 @@ def plan_depth(facts: Facts, costs: Costs) -> Stage:
     rejected = ("float32 slopes: faster, but coplanar triangles would hide each other at random",)
     why = "depths differ" if facts.test else "no test was asked for, but the depth of what shows is returned"
     if facts.common_depth is not None:
-        why = f"every vertex lies at depth {facts.common_depth:g}, but this picture is small or mostly empty"
-        rejected = ("ids alone, and one pass over all pixels for depth: pays from one layer and 65,536 pixels on",)
+        why = f"every vertex lies at depth {facts.common_depth:g}, but little of the picture is covered"
+        rejected = ("ids alone, and a pass over all pixels for depth: longer than the comparisons",)
     return Stage("depth", what, why, rejected, timed_in="method")
 
 
