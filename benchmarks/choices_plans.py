@@ -10,7 +10,7 @@ import numpy as np
 import topleft as tl
 from benchmarks.choices import Options, chosen_scenes, digits, take_rounds, with_rows
 from benchmarks.choices_scenes import Scene
-from benchmarks.choices_ways import Way, drawing, verb_of
+from benchmarks.choices_ways import Way, drawing, picture_of, verb_of
 
 PLANNED = ("mesh 1k", "mesh 10k", "mesh 100k", "mesh 100k float64 int64", "mesh 1M", "one large", "ten in 64x64")
 """Scenes whose plans are timed."""
@@ -51,7 +51,7 @@ def measure_plans(options: Options) -> list[dict[str, Any]]:
             vertices, triangles = scene.arrays[0], scene.arrays[1].astype(dtype)
             asked = scene.asked()
             plan = tl.plan(vertices, triangles, scene.size, **asked)
-            picture = tl.Rasterizer(scene.size, threads=asked.pop("threads"))
+            picture = picture_of(tl, scene.size)
             ways = [
                 Way("without", verb_of(scene, picture, vertices, triangles, (), asked)),
                 Way("with", verb_of(scene, picture, vertices, triangles, (), asked | {"plan": plan})),

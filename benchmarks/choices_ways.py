@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -62,9 +63,19 @@ Ways = list[Way]
 def drawing(scene: Scene, *, library: Any = tl, **changes: Any) -> Draw:
     """Return what draws a scene on memory that is kept."""
     vertices, triangles = changes.pop("arrays", None) or scene.arrays
-    options = scene.asked(**changes)
-    picture = library.Rasterizer(scene.size, threads=options.pop("threads"))
-    return verb_of(scene, picture, vertices, triangles, (), options)
+    return verb_of(scene, picture_of(library, scene.size), vertices, triangles, (), scene.asked(**changes))
+
+
+@lru_cache(maxsize=8)
+def picture_of(library: Any, size: tuple[int, int]) -> Any:
+    """Return the one `Rasterizer` of a size: all ways draw into the same memory, wherever the system has put it."""
+    return library.Rasterizer(size)
+
+
+@lru_cache(maxsize=1)
+def memory_of(_: tuple[int, int]) -> KeptMemory:
+    """Return the one memory of a size, for ways that call the parts of the pipeline."""
+    return KeptMemory()
 
 
 def verb_of(scene: Scene, owner: Any, vertices: Any, triangles: Any, size: tuple[Any, ...], options: Any) -> Draw:
@@ -176,7 +187,7 @@ def of_samples(scene: Scene) -> Ways:
 
 def drawing_shares(scene: Scene) -> Draw:
     """Return what draws the samples of all pixels as the verb does, without its checks."""
-    memory, view = KeptMemory(), View.parse(scene.size, scene.asked())
+    memory, view = memory_of(scene.size), View.parse(scene.size, scene.asked())
 
     def draw_shares() -> Picture:
         snapped = snap_scene(memory, *scene.arrays, view, with_depth=False, out=None)
@@ -189,7 +200,7 @@ def drawing_shares(scene: Scene) -> Draw:
 
 def drawing_every_sample(scene: Scene) -> Draw:
     """Return what draws a mask for each sample and averages them."""
-    memory, view = KeptMemory(), View.parse(scene.size, scene.asked())
+    memory, view = memory_of(scene.size), View.parse(scene.size, scene.asked())
     n, shape = view.sampling.n_samples, scene.size[::-1]
 
     def draw_all() -> Picture:
@@ -230,7 +241,7 @@ def of_sums(scene: Scene) -> Ways:
 
 def drawing_sums(scene: Scene, *, is_wide: bool) -> Draw:
     """Return what adds areas, in 64 bits at once if wanted."""
-    memory, view = KeptMemory(), View.parse(scene.size, scene.asked())
+    memory, view = memory_of(scene.size), View.parse(scene.size, scene.asked())
     width, height = scene.size
 
     def draw_areas() -> Picture:
