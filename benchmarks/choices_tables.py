@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
+import numpy as np
+
 from benchmarks.report import table
 
 Record = dict[str, Any]
@@ -67,8 +69,12 @@ def ways_text(rows: list[Row]) -> str:
 
 def label_of(row: Row) -> str:
     """Name a scene and what is asked of it."""
-    asked = row["verb"] if row["sampling"] == "center" else f"{row['verb']} {row['sampling']}"
-    return f"{row['scene']}, {asked}"
+    return f"{row['scene']}, {asked_of(row)}"
+
+
+def asked_of(row: Row) -> str:
+    """Name what is asked of a scene."""
+    return str(row["verb"]) if row["sampling"] == "center" else f"{row['verb']} {row['sampling']}"
 
 
 def kinds_text(record: Record) -> str:
@@ -99,13 +105,25 @@ def misses_text(record: Record) -> str:
 
 
 def estimates_text(record: Record) -> str:
-    """Estimated and measured time of scenes."""
-    rows = [
-        [label_of(row), f"{row['estimated_ms']:.3g}", f"{row['measured_ms']:.3g}",
-         f"{row['estimated_ms'] / row['measured_ms']:.2f}"]
-        for row in record["estimates"]
-    ]  # fmt: skip
-    return "\n".join(table(["scene", "estimated ms", "measured ms", "ratio"], rows))
+    """Estimated by measured time of all scenes, for each verb: the median, the middle four fifths, the ends."""
+    groups: dict[str, list[Row]] = {}
+    for row in record["estimates"]:
+        groups.setdefault(asked_of(row), []).append(row)
+    rows = []
+    for asked, own in groups.items():
+        ordered = sorted(own, key=by_measured)
+        low, middle, high = np.percentile([by_measured(row) for row in own], [10, 50, 90])
+        ends = [
+            f"{by_measured(row):.2f} ({row['scene']}, {row['measured_ms']:.3g} ms)" for row in (ordered[0], ordered[-1])
+        ]
+        rows.append([asked, str(len(own)), f"{middle:.2f}", f"{low:.2f} to {high:.2f}", ends[0], ends[-1]])
+    head = ["verb", "scenes", "median", "four fifths", "least", "most"]
+    return "\n".join(table(head, rows))
+
+
+def by_measured(row: Row) -> float:
+    """Return the estimated by the measured time."""
+    return float(row["estimated_ms"] / row["measured_ms"])
 
 
 def plans_text(record: Record) -> str:

@@ -271,8 +271,19 @@ def of_threads(scene: Scene) -> Ways:
     """As many threads as are said to pay, or one, or two."""
     if scene.sampling not in ("center", "area") or scene.verb == "overdraw":
         return []
-    n_chosen = min(2, threads.count_threads(None, len(scene.arrays[1])))
-    return [Way(f"{n} thread{'s' * (n > 1)}", drawing(scene, threads=n)) for n in (n_chosen, 3 - n_chosen)]
+    found: list[int] = []
+
+    def spy(*arguments: Any) -> int:
+        found.append(asked(*arguments))
+        return found[-1]
+
+    asked, chosen = choices.threads_to_draw, drawing(scene, threads=None)
+    two = (threads, "available_threads", lambda: 2), (choices, "available_threads", lambda: 2)
+    with Way("", chosen, ((choices, "threads_to_draw", spy), *two)).in_force():
+        chosen()
+    names = {1: "1 thread", 2: "2 threads"}
+    n_other = 3 - found[0]
+    return [Way(names[found[0]], chosen, two), Way(names[n_other], drawing(scene, threads=n_other))]
 
 
 def of_shares(scene: Scene) -> Ways:

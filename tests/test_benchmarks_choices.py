@@ -52,13 +52,19 @@ def test_every_kind_of_scene_is_measured(record):
 
 @pytest.mark.parametrize(
     ("choice", "chosen"),
-    [("depth test", "ids alone"), ("method", "auto"), ("threads", "1 thread"), ("shares", "bands")],
+    [("depth test", "ids alone"), ("method", "auto"), ("shares", "bands")],
 )
 def test_first_way_is_that_of_the_planner(choice, chosen):
     ways = CHOICES[choice](flat_scene())
     assert ways[0].name == chosen
     assert ways[0].forced == ()
     assert all(way.name != chosen for way in ways[1:])
+
+
+@pytest.mark.parametrize(("n", "names"), [(9, ["1 thread", "2 threads"]), (9000, ["2 threads", "1 thread"])])
+def test_threads_are_chosen_as_if_there_were_two(n, names):
+    scene = Scene("flat", "flat z", lambda: strewn(n, 60, (300, 300), 0.5), (300, 300))
+    assert [way.name for way in CHOICES["threads"](scene)] == names
 
 
 def test_way_puts_its_value_in_place_and_back():
@@ -114,7 +120,8 @@ def test_tables_hold_each_choice_and_scene(record):
     summary = choices_tables.summary_text(record)
     assert all(f"| {name} " in summary for name in CHOICES)
     assert choices_tables.plans_text(record).count("\n") == 1 + len(record["plans"])
-    assert choices_tables.estimates_text(record).count("\n") == 1 + len(record["estimates"])
+    verbs = {(row["verb"], row["sampling"]) for row in record["estimates"]}
+    assert choices_tables.estimates_text(record).count("\n") == 1 + len(verbs) == 9
     assert "no way" in choices_tables.misses_text({"rows": []}).lower()
 
 

@@ -335,3 +335,34 @@ def test_colours_are_stored_as_they_come_where_few_are_seen():
     assert not is_direct(400, 0)
     assert is_direct(100, 2000)
     assert not is_direct(2000, 2000)
+
+
+@pytest.mark.parametrize(
+    ("n", "size_px", "size", "expected"), [(50, 60, (1920, 1080), 4), (1, 60, (300, 300), 1), (200, 900, (300, 300), 4)]
+)
+def test_threads_are_as_many_as_the_work_is_worth(monkeypatch, n, size_px, size, expected):
+    monkeypatch.setattr(choices, "available_threads", lambda: 4)
+    vertices, triangles, _ = tl.scenes.random_triangles(n, size_px, *size)
+    plan = tl.plan(vertices, triangles, size)
+    assert plan.threads == expected
+    assert tl.plan(vertices, triangles, size, threads=3).threads == 3
+
+
+def test_threads_are_no_more_than_rows(monkeypatch):
+    monkeypatch.setattr(choices, "available_threads", lambda: 4)
+    vertices, triangles, _ = tl.scenes.random_triangles(2000, 900, 4000, 2)
+    assert tl.plan(vertices, triangles, (4000, 2)).threads == 2
+
+
+def test_work_grows_with_what_is_seen_and_asked():
+    def work(n, size_px, sink, **view):
+        vertices, triangles, _ = tl.scenes.random_triangles(n, size_px)
+        checked = View.parse((1920, 1080), view)
+        snapped = snap_scene(KeptMemory(), vertices, triangles, checked, with_depth=True, out=None)
+        return choices.work_ns(checked, snapped.scene, n, sink)
+
+    few = work(1000, 40, Sink.NEAREST)
+    assert few < work(2000, 40, Sink.NEAREST) < work(2000, 80, Sink.NEAREST)
+    assert few > work(1000, 40, Sink.COUNT) > work(1000, 40, Sink.MASK)
+    assert work(1000, 40, Sink.NEAREST, origin=(5000, 0)) == 5 * 1000 + 0.6 * 1920 * 1080
+    assert work(1000, 40, Sink.NEAREST, sampling="msaa4") > 3.9 * few

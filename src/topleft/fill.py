@@ -18,7 +18,7 @@ from topleft.rasterize import canvas_of, draw, draw_all_samples
 from topleft.resolve import parse_resolve, resolve_colors, resolve_flat, resolve_gouraud
 from topleft.sampling import draw_means, sample_positions
 from topleft.snapped import Snapped, check_triangles, snap_scene
-from topleft.threads import count_threads, run_parts
+from topleft.threads import run_parts
 from topleft.view import View
 
 __all__ = ["Style", "draw_fill"]
@@ -125,7 +125,7 @@ def paint(
     def paint_rows(first: int, end: int) -> None:
         snapped.scene.paint(labels, palette, flat, first, end - first, is_flat, colors.dtype == np.uint8, n_channels)
 
-    run_parts(paint_rows, height, count_threads(view.threads, snapped.n_triangles))
+    run_parts(paint_rows, height, choices.threads_to_draw(view, snapped.scene, snapped.n_triangles, Sink.LABEL))
 
 
 def paint_samples(
@@ -141,7 +141,7 @@ def paint_samples(
     """Draw coloured triangles over contiguous pixels, each pixel the mean of its samples."""
     width, height = view.size
     positions = sample_positions(view.sampling.n_samples, view.grid_bits)
-    n_threads = min(height, count_threads(view.threads, snapped.n_triangles))
+    n_threads = choices.threads_to_draw(view, snapped.scene, snapped.n_triangles, Sink.LABEL)
     if is_flat and choices.can_share(view):
         palette = _engine.Palette(colors, transfer)
         if draw_means(memory, snapped.scene, snapped.n_triangles, positions, palette, pixels, n_threads):
@@ -173,7 +173,7 @@ def blend(
 
     `ground`, for uint8 with one sample a pixel: the colour that all pixels get before.
     """
-    n_threads = count_threads(view.threads, snapped.n_triangles)
+    n_threads = choices.threads_to_draw(view, snapped.scene, snapped.n_triangles, Sink.LABEL)
     if view.sampling.n_samples == 1:
         pictures, scenes = pixels[None], [snapped.scene]
     else:

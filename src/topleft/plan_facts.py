@@ -53,6 +53,8 @@ class Facts:
     flat_depth: float | None  # when ids are drawn alone
     common_depth: float | None  # of all vertices, whatever is made of it
     is_direct: bool  # uint8 colours of triangles are stored without labels in between
+    n_threads: int  # that draw
+    work_ms: float  # of one thread, as guessed before the draw
     census: tuple[tuple[int, float, float], ...]  # of each of CLASSES: triangles, samples in boxes, covered
 
     def count(self, *names: str) -> int:
@@ -68,11 +70,6 @@ class Facts:
     def draws_planes(self) -> bool:
         """Whether each sample is a picture of its own."""
         return self.view.sampling.n_samples > 1 and self.verb in ("rasterize", "fill")
-
-    @property
-    def n_threads(self) -> int:
-        """How many threads draw."""
-        return choices.threads_to_draw(self.view, self.n_triangles)
 
     @property
     def is_shared(self) -> bool:
@@ -149,6 +146,8 @@ def find_facts(
         flat_depth=flat,
         common_depth=common,
         is_direct=verb == "fill" and choices.is_direct(snapped.scene, view, np.dtype(np.uint8), is_flat=True),
+        n_threads=choices.threads_to_draw(view, snapped.scene, snapped.n_triangles, drawn_sink),
+        work_ms=choices.work_ns(view, snapped.scene, snapped.n_triangles, drawn_sink) / 1e6,
         census=tuple(census),
     )
     corners = np.array(snapped.corners, np.int32)
