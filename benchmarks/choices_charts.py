@@ -45,7 +45,7 @@ def chart_choices(record: dict[str, Any]) -> Figure:
     worst = max(row["ratio"] for row in record["rows"])
     for line, style in ((NEAR, "--"), (FAR, "-")):
         axis.axvline(line, color="#8A1C1C", lw=1, ls=style, zorder=1)
-        axis.text(line, -0.75, f"{line:g}", color="#8A1C1C", ha="center", fontsize=8)
+        axis.text(line, -1.1, f"{line:g}", color="#8A1C1C", ha="center", va="bottom", fontsize=8)
     axis.set(xscale="log", xlim=(0.985, max(1.7, worst * 1.05)), ylim=(len(rows) - 0.4, -1.0))
     ticks = [tick for tick in (1, 1.1, 1.2, 1.3, 1.5, 2, 3, 5, 10) if tick < max(1.7, worst * 1.05)]
     axis.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
@@ -59,5 +59,6 @@ def chart_choices(record: dict[str, Any]) -> Figure:
         plt.Line2D([], [], ls="", marker=MARKERS[k % 10], color=COLORS[k % 10], mec="white", mew=0.4, ms=6, label=kind)
         for k, kind in enumerate(kinds)
     ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=6, fontsize=8)
+    below = -0.55 / (0.34 * len(rows))  # inches under the axis
+    axis.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.42, below), ncols=6, fontsize=8)
     return figure

@@ -55,7 +55,7 @@ MIN_THREAD_NS = 220_000
 #: pixel of the picture, by what is drawn; a row and a pixel at most where the picture stays in a near cache.
 TRIANGLE_NS = 5.0
 WORK_NS = {
-    "bits": (4.0, 0.04, 0.04),
+    "bits": (4.0, 0.018, 0.014),
     "counts": (6.0, 0.2, 0.3),
     "ids": (12.0, 0.4, 0.6),
     "labels": (8.0, 0.1, 0.15),
