@@ -15,7 +15,7 @@ __all__ = ["available_threads", "count_threads", "parse_threads", "run_parts"]
 
 Part = TypeVar("Part")
 
-#: Triangles of a scene of instances, of lines or of arrays that are worth a thread; `choices.threads_to_draw` knows more.
+#: Triangles of a scene of instances, of lines or of arrays that are worth a thread; draws: `choices.threads_to_draw`.
 MIN_TRIANGLES_PER_THREAD = 2000
 
 _pool: ThreadPoolExecutor | None = None
