@@ -24,7 +24,7 @@ from topleft.memory import FreshMemory, Memory
 from topleft.models import DepthTest, Sampling, Sink, parse
 from topleft.sampling import draw_planes, sample_positions
 from topleft.snapped import Snapped, check_triangles, snap_scene
-from topleft.threads import count_threads, run_parts
+from topleft.threads import run_parts
 from topleft.view import View
 
 __all__ = ["canvas_of", "draw", "draw_all_samples", "draw_coverage", "draw_fragments", "draw_overdraw"]
@@ -52,7 +52,7 @@ def draw(
         n_samples = 1 if samples is None else len(samples)
         covered = memory.empty("covered", _engine.Target.covered_shape(height, width, n_samples), np.uint64)
     target = _engine.Target(sink, pixels, depth, covered, samples, earlier_wins)
-    n_parts = choices.threads_to_draw(view, snapped.n_triangles)
+    n_parts = choices.threads_to_draw(view, snapped.scene, snapped.n_triangles, sink)
 
     def draw_rows(first: int, end: int) -> int:
         return snapped.scene.draw(target, first, end - first)
@@ -83,7 +83,7 @@ def draw_flat(
     def set_depth(first: int, end: int) -> None:
         _engine.set_flat_depth(ids, depth, first, end - first, earlier_wins, flat_depth, background)
 
-    run_parts(set_depth, len(ids), choices.threads_to_draw(view, snapped.n_triangles))
+    run_parts(set_depth, len(ids), choices.threads_to_draw(view, snapped.scene, snapped.n_triangles, Sink.LABEL))
     view.mark("depth")
 
 
@@ -131,7 +131,7 @@ def draw_area(
 ) -> NDArray[np.float32]:
     """Return the area that triangles cover of each pixel, or at most 1 of it."""
     with canvas_of(memory, f"{name} area", out, view.size[::-1], np.float32) as (result, canvas):
-        n_threads = count_threads(view.threads, snapped.n_triangles)
+        n_threads = choices.threads_to_draw(view, snapped.scene, snapped.n_triangles, Sink.COUNT)
         if sum_areas(memory, snapped.scene, canvas, n_threads, is_clamped=is_clamped):
             check_triangles(snapped.triangles, snapped.corners, snapped.n_vertices)
     view.mark("draw")
@@ -227,7 +227,7 @@ def draw_all_samples(
     width, height = view.size
     if not (width and height):
         return
-    n_threads = choices.threads_to_draw(view, snapped.n_triangles)
+    n_threads = choices.threads_to_draw(view, snapped.scene, snapped.n_triangles, sink)
     is_near = snapped.n_triangles > 0 and choices.can_share(view)
     if draw_planes(
         memory, snapped.scene, snapped.n_triangles, positions, sink, pixels, depth, n_threads, is_near=is_near
@@ -315,7 +315,7 @@ def draw_clustered_fragments(
         canvas_of(memory, "triangle", ids_out, shape, np.int32) as (ids, ids_canvas),
         canvas_of(memory, "depth", depth_out, shape, np.float32) as (depth, depth_canvas),
     ):
-        n_threads = choices.threads_to_draw(view, clusters.n_triangles)
+        n_threads = count_threads(view.threads, clusters.n_triangles)
         memories = [memory] if n_threads == 1 else [FreshMemory() for _ in range(n_threads)]
         target = _engine.Target(sink, ids_canvas, depth_canvas, None)
         if not draw_clustered(memories, [seen], sink, target, view.size[1]):
