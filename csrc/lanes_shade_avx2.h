@@ -14,6 +14,12 @@ TL_INLINE vf vf_lookup(const float *table, vi i)
 }
 TL_INLINE vi vi_lookup(const int32_t *table, vi i) { return _mm256_castps_si256(vf_lookup((const float *)table, i)); }
 TL_INLINE vf vf_pick(const float *p, vi i) { return _mm256_permutevar8x32_ps(_mm256_loadu_ps(p), i); }
+TL_INLINE vd vd_load(const double *p) { return (vd){_mm256_loadu_pd(p), _mm256_loadu_pd(p + 4)}; }
+TL_INLINE vd vd_sqrt(vd a) { return (vd){_mm256_sqrt_pd(a.lo), _mm256_sqrt_pd(a.hi)}; }
+TL_INLINE vd vd_pick(const double *p, vi i)
+{
+    return (vd){_mm256_i32gather_pd(p, _mm256_castsi256_si128(i), 8), _mm256_i32gather_pd(p, _mm256_extracti128_si256(i, 1), 8)};
+}
 TL_INLINE vi vi_pick(const int32_t *p, vi i) { return _mm256_permutevar8x32_epi32(_mm256_loadu_si256((const __m256i *)p), i); }
 TL_INLINE vi vi_prefix_count(unsigned bits)
 {

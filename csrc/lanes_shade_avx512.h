@@ -10,6 +10,14 @@ TL_INLINE vi vi_high_half(vi a) { return _mm512_srli_epi32(a, 16); }
 TL_INLINE vf vf_lookup(const float *table, vi i) { return _mm512_permutexvar_ps(i, _mm512_loadu_ps(table)); }
 TL_INLINE vi vi_lookup(const int32_t *table, vi i) { return _mm512_permutexvar_epi32(i, _mm512_loadu_si512(table)); }
 TL_INLINE vf vf_pick(const float *p, vi i) { return _mm512_permutexvar_ps(i, _mm512_loadu_ps(p)); }
+TL_INLINE vd vd_load(const double *p) { return (vd){_mm512_loadu_pd(p), _mm512_loadu_pd(p + 8)}; }
+TL_INLINE vd vd_sqrt(vd a) { return (vd){_mm512_sqrt_pd(a.lo), _mm512_sqrt_pd(a.hi)}; }
+TL_INLINE vd vd_pick(const double *p, vi i)
+{
+    const __m512d low = _mm512_loadu_pd(p), high = _mm512_loadu_pd(p + 8);
+    return (vd){_mm512_permutex2var_pd(low, _mm512_cvtepi32_epi64(_mm512_castsi512_si256(i)), high),
+                _mm512_permutex2var_pd(low, _mm512_cvtepi32_epi64(_mm512_extracti64x4_epi64(i, 1)), high)};
+}
 TL_INLINE vi vi_pick(const int32_t *p, vi i) { return _mm512_permutexvar_epi32(i, _mm512_loadu_si512(p)); }
 TL_INLINE vi vi_prefix_count(unsigned bits)
 {

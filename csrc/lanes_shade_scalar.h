@@ -10,6 +10,9 @@ TL_INLINE vi vi_high_half(vi a) { return (vi)((uint32_t)a >> 16); }
 TL_INLINE vf vf_lookup(const float *table, vi i) { return table[i & 15]; }
 TL_INLINE vi vi_lookup(const int32_t *table, vi i) { return table[i & 15]; }
 TL_INLINE vf vf_pick(const float *p, vi i) { (void)i; return *p; }
+TL_INLINE vd vd_load(const double *p) { return *p; }
+TL_INLINE vd vd_sqrt(vd a) { return sqrt(a); }
+TL_INLINE vd vd_pick(const double *p, vi i) { (void)i; return *p; }
 TL_INLINE vi vi_pick(const int32_t *p, vi i) { (void)i; return *p; }
 TL_INLINE vi vi_prefix_count(unsigned bits) { return (vi)(bits & 1); }
 TL_INLINE void vi_load_records(const void *base, int scale, const int32_t *i, vi *c) { memcpy(c, (const char *)base + (int64_t)*i * scale, 16); }

@@ -133,6 +133,16 @@ def shade_samples(Scene scene, View view, Shading shading, const int32_t[:, ::1]
                             &depth[0, first_row, 0], &pixels[first_row, 0, 0])
 
 
+def shade_normals(Scene scene, View view, Shading shading, const int32_t[:, ::1] ids, float[:, :, ::1] out, int64_t first_row,
+                  int64_t n_rows):
+    """Write rows of the unit normals (H, W, 3) of a visibility buffer."""
+    cdef tl_window window = scene.window(first_row, n_rows, ids.shape[1])
+    cdef const tl_view *own = &view.view if view is not None else NULL
+    if n_rows and ids.shape[1]:
+        with nogil:
+            K.shade_normals(&scene.scene, &window, own, &shading.shading, &ids[first_row, 0], &out[first_row, 0, 0])
+
+
 def cut_out(Scene scene, View view, Shading shading, const int32_t[::1] opaque, const int32_t[::1] triangles, int32_t[:, ::1] ids,
             float[:, ::1] depth, int64_t first_row, int64_t n_rows):
     """Clear rows of a visibility buffer, draw the opaque triangles, and over them what the others' materials leave of them."""

@@ -148,7 +148,7 @@ class Fragments:
         array([0.5 , 0.25, 0.25], dtype=float32)
         """
         out = np.empty((*self.triangle.shape, 3), np.float32)
-        self._scene.barycentric(self._ids(), out)
+        self._scene.with_inverse_w(self.id.size).barycentric(self._ids(), out)
         return out
 
     def interpolate(self, values: ArrayLike, *, background: float = 0.0) -> NDArray[np.float32]:
@@ -185,7 +185,8 @@ class Fragments:
         channels = array.shape[-1] if array.ndim > 1 else 1
         out: NDArray[Any] = np.empty((*self.triangle.shape, channels), np.float32)
         rows = array.reshape(-1, channels) if array.size else np.empty((0, channels), np.float32)
-        self._scene.interpolate(self._ids(), rows, array.ndim == 3, float(background), out)
+        scene = self._scene.with_inverse_w(self.id.size)
+        scene.interpolate(self._ids(), rows, array.ndim == 3, float(background), out)
         return out if array.ndim > 1 else out[..., 0]
 
     def _ids(self) -> NDArray[np.int32]:
