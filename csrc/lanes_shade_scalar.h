@@ -24,3 +24,8 @@ TL_INLINE void vf_store_fourths(const float *rows, vf fourth, float *out)
         out[k] = rows[k];
     out[3] = fourth;
 }
+/* Pixels of two and of three numbers, one after the other. */
+TL_INLINE void vf_store_pairs(float *p, const vf *c) { p[0] = c[0], p[1] = c[1]; }
+TL_INLINE void vf_store_triples(float *p, const vf *c) { p[0] = c[0], p[1] = c[1], p[2] = c[2]; }
+/* Four doubles at base + 8 * stride * i[k], as columns. */
+TL_INLINE void vd_load_records(const double *base, int stride, const int32_t *i, vd *c) { memcpy(c, base + (int64_t)*i * stride, 32); }

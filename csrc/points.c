@@ -8,34 +8,43 @@
 
 typedef struct {
     weighed_span weighed;
-    _Alignas(64) double corner[9][TL_SPAN_ROOM];                /* positions of the corners of runs */
     _Alignas(64) double value[3 * TL_POINT_ROWS][TL_SPAN_ROOM]; /* of each row at the first corner, and along the edges to the others */
 } point_span;
 
-/* The positions of the corners of runs. */
-TL_INLINE void load_positions(point_span *r, const tl_points *points)
+/* The positions (x, y, z) of TL_LANES vertices. */
+TL_INLINE void load_positions(const tl_points *points, const int32_t *vertices, vd *p)
 {
-    const shade_runs *s = &r->weighed.runs;
-    const int32_t last = (int32_t)s->scene->mesh.n_vertices - 1;
-    for (int slot = TL_LANES; slot < TL_LANES + s->n_runs; slot++)
-        for (int k = 0; k < 3; k++) {
-            const int32_t corner = s->scene->triangles[3 * (int64_t)s->ints[RUN_ID][slot] + k];
-            const int64_t at = 3 * (int64_t)(corner < 0 ? 0 : corner > last ? last : corner); /* the caller's array may have changed */
-            for (int axis = 0; axis < 3; axis++)
-                r->corner[3 * k + axis][slot] =
-                    points->is_f64 ? ((const double *)points->positions)[at + axis] : (double)((const float *)points->positions)[at + axis];
+    const double *p64 = points->positions;
+    const float *p32 = points->positions;
+    if (TL_LANES > 1 && !vm_any(vi_eq(vi_load(vertices), vi_set1(0)))) { /* four numbers, from the one before the row on */
+        vd row[4];
+        vi bits[4];
+        if (points->is_f64)
+            vd_load_records(p64 - 1, 3, vertices, row);
+        else
+            vi_load_records((const char *)p32 - 4, 12, vertices, bits);
+        for (int axis = 0; axis < 3; axis++)
+            p[axis] = points->is_f64 ? row[axis + 1] : vd_from_vf(vf_of_bits(bits[axis + 1]));
+        return;
+    }
+    double lanes[3][TL_MAX_LANES];
+    for (int lane = 0; lane < TL_LANES; lane++)
+        for (int axis = 0; axis < 3; axis++) {
+            const int64_t at = 3 * (int64_t)vertices[lane] + axis;
+            lanes[axis][lane] = points->is_f64 ? p64[at] : (double)p32[at];
         }
+    for (int axis = 0; axis < 3; axis++)
+        p[axis] = vd_load(lanes[axis]);
 }
 
 /* What the rows are at the corners of runs. */
 TL_INLINE void set_values(point_span *r, const tl_points *points)
 {
-    const shade_runs *s = &r->weighed.runs;
-    load_positions(r, points);
-    for (int slot = TL_LANES; slot < TL_LANES + s->n_runs; slot += TL_LANES) {
+    const int end = TL_LANES + r->weighed.runs.n_runs;
+    for (int slot = TL_LANES; slot < end; slot += TL_LANES) {
         vd p[9];
-        for (int k = 0; k < 9; k++)
-            p[k] = vd_load(r->corner[k] + slot);
+        for (int k = 0; k < 3; k++)
+            load_positions(points, r->weighed.corners[k] + slot, p + 3 * k);
         for (int k = 3; k < 9; k++)
             p[k] = vd_sub(p[k], p[k % 3]);
         for (int i = 0; i < points->n_rows; i++)
@@ -51,7 +60,8 @@ TL_INLINE void set_values(point_span *r, const tl_points *points)
 /* Where x, y and w lie in the picture. */
 TL_INLINE void to_pixels(const tl_points *points, const vd *p, vd *xy)
 {
-    const vd one = vd_set1(1.0), none = vd_set1(NAN), x = vd_div(p[0], p[2]), y = vd_div(p[1], p[2]);
+    const vd one = vd_set1(1.0), none = vd_set1(NAN), inverse = vd_div(one, p[2]);
+    const vd x = vd_mul(p[0], inverse), y = vd_mul(p[1], inverse);
     const vm is_behind = vd_ge(vd_set1(0.0), p[2]);
     xy[0] = vd_select(is_behind, none, vd_mul(vd_add(x, one), vd_set1(points->half_width_px)));
     xy[1] = vd_select(is_behind, none, vd_mul(vd_sub(one, y), vd_set1(points->half_height_px)));
@@ -126,7 +136,6 @@ static void fill_points(const tl_scene *scene, const tl_window *window, const tl
     point_span r;
     start_weights(&r.weighed, scene, window);
     memset(r.value, 0, sizeof r.value);
-    memset(r.corner, 0, sizeof r.corner);
     for (int64_t row = 0; row < window->height; row++)
         for (int64_t column = 0; column < window->width; column += TL_SPAN) {
             const int64_t at = row * window->width + column;

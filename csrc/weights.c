@@ -14,9 +14,10 @@
 typedef struct {
     shade_runs runs;
     resolve_state alone;
-    int n_alone;                                  /* runs that are left to weights_of_pixel */
-    int has_w;                                    /* whether w differs from vertex to vertex */
-    _Alignas(64) double q[3][TL_SPAN_ROOM];       /* 1/w of the corners, by run */
+    int n_alone;                                   /* runs that are left to weights_of_pixel */
+    int has_w;                                     /* whether w differs from vertex to vertex */
+    _Alignas(64) int32_t corners[3][TL_SPAN_ROOM]; /* by run: of vertices that are there */
+    _Alignas(64) double q[3][TL_SPAN_ROOM];        /* 1/w of the corners, by run */
     _Alignas(64) double w[3][TL_SPAN + TL_MAX_LANES]; /* the weights of the pixels of the span */
 } weighed_span;
 
@@ -27,6 +28,7 @@ static void start_weights(weighed_span *r, const tl_scene *scene, const tl_windo
     s->scene = scene, s->window = window;
     memset(s->ints, 0, sizeof s->ints);
     memset(r->q, 0, sizeof r->q);
+    memset(r->corners, 0, sizeof r->corners);
     r->alone.id = -1;
     r->has_w = scene->mesh.inv_w || (source && !(source->matrix && source->is_affine));
 }
@@ -52,13 +54,31 @@ static int32_t weigh_special(shade_runs *s, const int32_t *corners, int64_t row)
     return e->area == 0.0f ? TL_ALONE : s->n_special + 1;
 }
 
-/* 1/w of the corners of TL_LANES runs. */
-TL_INLINE void load_inverse_w(weighed_span *r, int slot, int32_t corners[3][TL_MAX_LANES])
+/* 1/w of TL_LANES vertices. */
+TL_INLINE void load_inverse_w(const tl_vertex_set *set, const int32_t *vertices, double *q)
 {
-    const tl_vertex_set *set = &r->runs.scene->mesh;
-    for (int k = 0; k < 3; k++)
+    if (set->inv_w)
         for (int lane = 0; lane < TL_LANES; lane++)
-            r->q[k][slot + lane] = set->inv_w ? set->inv_w[corners[k][lane]] : inverse_w(set, corners[k][lane]);
+            q[lane] = set->inv_w[vertices[lane]];
+    else
+        for (int lane = 0; lane < TL_LANES; lane++)
+            q[lane] = inverse_w(set, vertices[lane]);
+}
+
+/* The corners of runs and their 1/w: in a pass of its own, as what is stored number by number is not yet there for vectors. */
+TL_INLINE void load_run_corners(weighed_span *r)
+{
+    shade_runs *s = &r->runs;
+    for (int slot = TL_LANES; slot < TL_LANES + s->n_runs; slot += TL_LANES) {
+        int32_t corners[3][TL_MAX_LANES];
+        const vm is_there = run_corners(s, slot, corners);
+        vi_store(s->ints[RUN_SPECIAL] + slot, vi_select(is_there, vi_set1(0), vi_set1(TL_ALONE)));
+        for (int k = 0; k < 3; k++) {
+            vi_store(r->corners[k] + slot, vi_load(corners[k]));
+            if (r->has_w)
+                load_inverse_w(&s->scene->mesh, corners[k], r->q[k] + slot);
+        }
+    }
 }
 
 /* Prepares the runs of a row. */
@@ -69,25 +89,23 @@ TL_INLINE void set_weighed_runs(weighed_span *r, int64_t row)
     s->n_special = r->n_alone = 0;
     if (s->n_runs) /* the rest of the last vector: a triangle that is there */
         vi_store(s->ints[RUN_ID] + TL_LANES + s->n_runs, vi_set1(s->ints[RUN_ID][TL_LANES + s->n_runs - 1]));
+    load_run_corners(r);
     for (int slot = TL_LANES; slot < TL_LANES + s->n_runs; slot += TL_LANES) {
         run_setup setup;
-        const vm is_run = vm_first(TL_LANES + s->n_runs - slot), is_there = run_corners(s, slot, setup.corners);
-        vm is_alone = vm_and_not(vm_all(), is_there);
-        vi_store(s->ints[RUN_SPECIAL] + slot, vi_set1(0));
-        vm is_special = set_edges(s, slot, row, &setup);
+        for (int k = 0; k < 3; k++)
+            vi_spill(setup.corners[k], vi_load(r->corners[k] + slot));
+        const vm is_run = vm_first(TL_LANES + s->n_runs - slot);
+        vm is_alone = vi_gt(vi_set1(0), vi_load(s->ints[RUN_SPECIAL] + slot)), is_special = set_edges(s, slot, row, &setup);
         is_alone = vm_or(is_alone, vm_and_not(vi_eq(vi_load(s->ints[RUN_SUM] + slot), vi_set1(0)), is_special));
-        if (r->has_w) {
-            load_inverse_w(r, slot, setup.corners);
-            for (int k = 0; k < 3; k++) {
-                const vd q = vd_load(r->q[k] + slot);
-                is_alone = vm_or(is_alone, vm_and_not(vm_all(), vm_and(vd_ge(q, least), vd_ge(most, q))));
-            }
+        for (int k = 0; r->has_w && k < 3; k++) {
+            const vd q = vd_load(r->q[k] + slot);
+            is_alone = vm_or(is_alone, vm_and_not(vm_all(), vm_and(vd_ge(q, least), vd_ge(most, q))));
         }
         is_special = vm_and(vm_or(is_special, is_alone), is_run);
         for (unsigned rest = vm_bits(is_special); rest; rest &= rest - 1) {
             const int lane = __builtin_ctz(rest);
             const int32_t corners[3] = {setup.corners[0][lane], setup.corners[1][lane], setup.corners[2][lane]};
-            int32_t how = vm_bits(is_alone) >> lane & 1 ? TL_ALONE : weigh_special(s, corners, row);
+            const int32_t how = vm_bits(is_alone) >> lane & 1 ? TL_ALONE : weigh_special(s, corners, row);
             s->ints[RUN_SPECIAL][slot + lane] = how;
             s->n_special += how > 0;
             r->n_alone += how < 0;
@@ -177,9 +195,18 @@ TL_INLINE void weigh_span(weighed_span *r, const int32_t *ids, int n, int64_t ro
             weigh_lanes(r, i, column, row);
 }
 
-/* Writes up to TL_LANES pixels: n_channels numbers `step` apart from pixel to pixel. */
+/* Writes n pixels, up to TL_LANES: n_channels numbers, `step` apart from pixel to pixel. */
 TL_INLINE void store_channels(float *restrict out, int64_t step, int n, const vf *channels, int n_channels)
 {
+    if (n == TL_LANES && step == n_channels && n_channels < 4) {
+        if (n_channels == 1)
+            vf_store(out, channels[0]);
+        else if (n_channels == 2)
+            vf_store_pairs(out, channels);
+        else
+            vf_store_triples(out, channels);
+        return;
+    }
     float lanes[4][TL_MAX_LANES];
     for (int c = 0; c < n_channels; c++)
         vf_store(lanes[c], channels[c]);
@@ -216,18 +243,26 @@ typedef struct {
 } vertex_values;
 
 /* The values of the corners of runs, n_channels from `first` on, into the coefficients 3 c + k. */
-TL_INLINE void load_values(shade_runs *s, const vertex_values *values, int first, int n_channels)
+TL_INLINE void load_values(weighed_span *r, const vertex_values *values, int first, int n_channels)
 {
-    for (int slot = TL_LANES; slot < TL_LANES + s->n_runs; slot++) {
-        const int64_t id = s->ints[RUN_ID][slot];
+    shade_runs *s = &r->runs;
+    const vi zero = vi_set1(0);
+    for (int slot = TL_LANES; slot < TL_LANES + s->n_runs; slot += TL_LANES)
         for (int k = 0; k < 3; k++) {
-            const int64_t corner = s->scene->triangles[3 * id + k];
-            const int is_there = corner >= 0 && corner < s->scene->mesh.n_vertices; /* the caller's array may have changed */
-            const float *own = values->rows + values->n_values * (values->per_corner ? 3 * id + k : is_there ? corner : 0) + first;
-            for (int c = 0; c < n_channels; c++)
-                s->floats[3 * c + k][slot] = own[c];
+            const int32_t *corners = r->corners[k] + slot;
+            vi c[4];
+            if (TL_LANES > 1 && n_channels == 3 && values->n_values == 3 && !values->per_corner && !vm_any(vi_eq(vi_load(corners), zero))) {
+                vi_load_records((const char *)values->rows - 4, 12, corners, c); /* 16 bytes, from the number before the row on */
+                for (int channel = 0; channel < 3; channel++)
+                    vf_store(s->floats[3 * channel + k] + slot, vf_of_bits(c[channel + 1]));
+                continue;
+            }
+            for (int lane = 0; lane < TL_LANES; lane++) {
+                const int64_t at = values->per_corner ? 3 * (int64_t)s->ints[RUN_ID][slot + lane] + k : corners[lane];
+                for (int channel = 0; channel < n_channels; channel++)
+                    s->floats[3 * channel + k][slot + lane] = values->rows[values->n_values * at + first + channel];
+            }
         }
-    }
 }
 
 /* n_channels of the pixels of a span. */
@@ -235,7 +270,7 @@ TL_INLINE void interpolate_span(weighed_span *r, const vertex_values *values, in
 {
     const shade_runs *s = &r->runs;
     const vf background = vf_set1(values->background);
-    load_values(&r->runs, values, first, n_channels);
+    load_values(r, values, first, n_channels);
     for (int x = 0, i = 0; x < n; x += TL_LANES, i++) {
         const vm visible = vm_from_bits(s->visible[i]);
         vf sums[4];
