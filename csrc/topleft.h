@@ -423,10 +423,10 @@ typedef struct tl_kernels {
     /* Per pixel of `ids` (rows of window->width): what is told of its point, float32 or float64. */
     void (*fill_points)(const tl_scene *scene, const tl_window *window, const tl_points *points, const int32_t *ids, void *out);
 
-    /* Draws n triangles over ids and depth of the others, but for what their materials cut out; the window as for a share of a
-     * part, and fewer than 2^31 pixels. */
+    /* Draws n triangles over a target, NEAREST or PEEL, of all others, but for what their materials cut out; the window as for a share of
+     * a part, and fewer than 2^31 pixels. */
     void (*cut_out)(const tl_scene *scene, const tl_window *window, const tl_view *view, const tl_shading *shading,
-                    const int32_t *triangles, int64_t n, int32_t *ids, float *depth);
+                    const int32_t *triangles, int64_t n, const tl_target *target);
 
     /* The edges of the triangles that are not culled, each once, as lower index + 2^32 * higher index; room for three a
      * triangle.  Returns the first row with an index outside the vertices, or -1. */

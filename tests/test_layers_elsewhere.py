@@ -137,8 +137,3 @@ def test_alpha_of_a_hole_is_that_of_the_picture(sampling):
     assert found["alpha"][30, 40] == 0
     assert_same(found["alpha"], found["color"][..., 3])
     assert found["silhouette"].dtype == (np.bool_ if sampling == "center" else np.float32)
-
-
-def test_layers_of_a_scene_with_cut_outs_are_refused():
-    with pytest.raises(ValueError, match="scenes have no cut-outs, but a material of instance 0 has an alpha_cutoff"):
-        look(FRONT, "depth", subject=tl.Scene([pierced()]))

@@ -72,6 +72,6 @@ def test_weights_of_clip_space_are_those_of_float64(isa, spread):
 def test_weights_of_vertices_far_more_than_pixels_are_the_same(isa):
     mesh, camera = tl.Mesh(*tl.scenes.blob(20_000)), tl.Camera.look_at((2, 3, 4))
     with on(isa):
-        frags = tl.rasterize_mesh(mesh, camera, SIZE)  # 1/w of 10,000 vertices for 2,257 pixels: where they are asked for
+        frags = tl.rasterize_mesh(mesh, camera, SIZE)  # 10,000 vertices, 2,257 pixels: 1/w where it is asked for
         wide = tl.rasterize_mesh(mesh, camera, (200, 100), viewport=SIZE)  # for 20,000: of all at first
         assert_same(wide.barycentric()[: SIZE[1], : SIZE[0]], frags.barycentric())

@@ -338,6 +338,17 @@ def shade_normals(
     first_row: int,
     n_rows: int,
 ) -> None: ...
+def cut_out_over(
+    scene: Scene,
+    view: View | None,
+    shading: Shading,
+    triangles: NDArray[np.int32],
+    ids: NDArray[np.int32],
+    depth: NDArray[np.float32],
+    is_peeled: bool,
+    first_row: int,
+    n_rows: int,
+) -> None: ...
 def cut_out(
     scene: Scene,
     view: View | None,

@@ -23,8 +23,9 @@ from topleft.material import Material
 from topleft.mesh import Mesh
 from topleft.multisample import shade_samples
 from topleft.scene import Instance, Scene
+from topleft.scene_cutout import cut_out_scene
 from topleft.scene_draw import draw_scene
-from topleft.scene_render import camera_of, cull_of, matrix_of, refuse_holes, shade_scene
+from topleft.scene_render import camera_of, cull_of, matrix_of, shade_scene
 from topleft.shade import LookOptions, Shading, shade
 
 DEFAULT_SIZE = (640, 480)
@@ -144,8 +145,11 @@ def picture_of_mesh(
     return shade(shown, surface, view, **options)
 
 
-def without_holes(frags: Fragments, mesh: Mesh, camera: Camera, material: Material | None) -> Fragments:
-    """The visibility buffer of a mesh without what its materials (or this one) cut out; `frags` is changed."""
+def without_holes(frags: Fragments, mesh: Mesh | Scene, camera: Camera, material: Material | None) -> Fragments:
+    """The visibility buffer without what materials (or this one) cut out; `frags` is changed."""
+    if isinstance(mesh, Scene):
+        cut_out_scene(frags, mesh, camera, material)
+        return frags
     if not isinstance(frags, BentFragments):
         cut_out(frags, mesh, camera, material)
         return frags
@@ -156,8 +160,8 @@ def without_holes(frags: Fragments, mesh: Mesh, camera: Camera, material: Materi
 def picture_of_scene(
     frags: Fragments, scene: Scene, camera: Camera, options: dict[str, Any]
 ) -> npt.NDArray[np.uint8]:
-    """The picture of a scene's visibility buffer; options as `shade` takes them."""
-    refuse_holes(scene, options.get("material"))
+    """The picture of a scene's visibility buffer, without what materials cut out; options as `shade` takes them."""
+    cut_out_scene(frags, scene, camera, options.get("material"), threads=options["threads"])
     if options["shading"] == Shading.DEPTH:
         options = {"depth_range": distances(frags, camera)} | options
 

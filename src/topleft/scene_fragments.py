@@ -13,8 +13,10 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from topleft import _engine
 from topleft.depth_layers import DepthLayers
 from topleft.fragments import Fragments
+from topleft.scene import Scene
 from topleft.snapped import Snapped
 
 __all__ = ["Part", "SceneDepthLayers", "SceneFragments"]
@@ -24,8 +26,18 @@ class Placed(Protocol):
     """A scene as a camera sees it."""
 
     @property
+    def scene(self) -> Scene:
+        """The scene."""
+
+    @property
     def first_ids(self) -> NDArray[np.int64]:
         """Where the ids of each instance begin, and their end: (N + 1,)."""
+
+    def of(self, scene: Scene) -> Placed:
+        """Return another scene, seen in the same way."""
+
+    def draw(self, targets: list[_engine.Target], positions: Sequence[tuple[int, int]], height: int) -> None:
+        """Clear targets of that many rows, one a sample, and draw what each sees."""
 
     def snap(self, i: int) -> Snapped:
         """Return an instance, snapped."""
@@ -85,6 +97,26 @@ class SceneFragments(Fragments):
         height, width = self.id.shape
         first_ids = self._placed.first_ids
         return f"SceneFragments({width}x{height}, {len(first_ids) - 1} instances, {first_ids[-1]} triangles)"
+
+    @property
+    def placed(self) -> Placed:
+        """What was drawn."""
+        return self._placed
+
+    @property
+    def positions(self) -> Sequence[tuple[int, int]]:
+        """Where the samples lie."""
+        return self._positions
+
+    @property
+    def planes(self) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+        """Ids and depth of each sample, (S, H, W)."""
+        return self._planes
+
+    def forget(self) -> None:
+        """Forget what was computed of buffers that have changed."""
+        for name in ("instance", "triangle", "samples_instance", "samples_triangle", "parts"):
+            self.__dict__.pop(name, None)
 
     @cached_property
     def instance(self) -> NDArray[np.int32]:
@@ -205,6 +237,11 @@ class SceneDepthLayers(DepthLayers):
         """Take planes (K, H, W)."""
         self.planes = ids, depth
         self._placed = placed
+
+    @property
+    def placed(self) -> Placed:
+        """What was drawn."""
+        return self._placed
 
     @property
     def n_triangles(self) -> int:

@@ -14,16 +14,14 @@ import numpy.typing as npt
 
 from topleft.camera import Camera
 from topleft.colors import id_colors
-from topleft.cutout import has_holes
 from topleft.fragments import Fragments
 from topleft.frame import is_similarity
 from topleft.light import Light, LightKind, LightSpace
-from topleft.material import Material
 from topleft.scene import Instance, Scene
 from topleft.scene_fragments import SceneFragments
 from topleft.shade import shade
 
-__all__ = ["camera_of", "cull_of", "matrix_of", "refuse_holes", "shade_scene"]
+__all__ = ["camera_of", "cull_of", "matrix_of", "shade_scene"]
 
 
 def camera_of(camera: Camera, instance: Instance) -> Camera:
@@ -65,14 +63,6 @@ def lights_of(lights: Sequence[Light] | None, camera: Camera, instance: Instance
         at = at if light.space == LightSpace.EYE else object_from_world @ at
         moved.append(replace(light, at=tuple(at[:3]), falloff=float(light.falloff * scale**2)))
     return moved
-
-
-def refuse_holes(scene: Scene, material: Material | None) -> None:
-    """Raise an error where a material cuts something out: what lies behind a hole may belong to another instance."""
-    for i, instance in enumerate(scene):
-        own = instance.mesh.materials if material is None else (material,)
-        if any(has_holes(one, instance.mesh) for one in own):
-            raise ValueError(f"scenes have no cut-outs, but a material of instance {i} has an alpha_cutoff")
 
 
 def shade_scene(

@@ -17,13 +17,12 @@ import numpy.typing as npt
 from topleft import _engine
 from topleft.api import Rasterizer
 from topleft.camera import Camera
-from topleft.cutout import has_holes
+from topleft.cutout import cut_of
 from topleft.fragments import BentFragments, Fragments
 from topleft.mesh import Mesh
 from topleft.render import rasterize_mesh, without_holes
 from topleft.scene import Instance, Scene
 from topleft.scene_fragments import Part, SceneFragments
-from topleft.scene_render import refuse_holes
 from topleft.threads import count_threads, parse_threads, run_parts
 
 __all__ = ["PointKind", "Sight", "Surface", "project"]
@@ -141,26 +140,16 @@ class Sight:
 
     @cached_property
     def has_holes(self) -> bool:
-        """Whether materials cut something out of the mesh.
-
-        Raises
-        ------
-        ValueError
-            If they do so in a scene.
-        """
+        """Whether materials cut something out."""
         material = self.look.get("material")
-        if isinstance(self.subject, Scene):
-            refuse_holes(self.subject, material)
-            return False
-        materials = self.subject.materials if material is None else (material,)
-        return any(has_holes(one, self.subject) for one in materials)
+        return any(cut_of(instance.mesh, material) is not None for instance in self.instances)
 
     @property
     def _view(self) -> tuple[Mesh | Scene, Camera, tuple[int, int]]:
         return self.subject, self.camera, self.size
 
     def _cut(self, frags: Fragments) -> Fragments:
-        if not self.has_holes or isinstance(self.subject, Scene):
+        if not self.has_holes:
             return frags
         return without_holes(frags, self.subject, self.camera, self.look.get("material"))
 
