@@ -46,6 +46,10 @@ class Cut:
         """Those with holes."""
         return np.flatnonzero(self.is_cut).astype(np.int32)
 
+    def of_parts(self, source: npt.NDArray[np.int64]) -> Cut:
+        """The same of parts of triangles."""
+        return Cut(self.materials, None if self.rows is None else self.rows[source], self.is_cut[source])
+
     def solid(self, mesh: Mesh) -> Mesh:
         """The mesh with triangles of no area in the place of those with holes: ids stay."""
         return Mesh(mesh.vertices, np.where(self.is_cut[:, None], mesh.triangles[:, :1], mesh.triangles))

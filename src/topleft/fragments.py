@@ -232,23 +232,7 @@ class BentFragments(Fragments):
 
     def mesh_of_parts(self, mesh: Mesh) -> Mesh:
         """Return the parts as a mesh: positions and attributes of the mesh where the parts have corners."""
-        corners = self._triangles[self._source]
-
-        def spread(values: NDArray[Any]) -> NDArray[np.float64]:
-            of_parts = np.zeros((int(self._drawn.max(initial=-1)) + 1, values.shape[1]))
-            of_parts[self._drawn.ravel()] = np.matmul(self._weights, values[corners]).reshape(-1, values.shape[1])
-            return of_parts
-
-        rows = mesh.material_of_triangle
-        return Mesh(
-            spread(mesh.vertices),
-            self._drawn.astype(np.int32),
-            spread(mesh.vertex_normals()),
-            None if mesh.colors is None else np.rint(spread(mesh.colors)).astype(np.uint8),
-            None if mesh.uv is None else spread(mesh.uv).astype(np.float32),
-            mesh.materials,
-            None if rows is None else rows[self._source],
-        )
+        return mesh_of_parts(mesh, self._drawn, self._source, self._weights)
 
     def only(self, rows: NDArray[np.intp], cols: NDArray[np.intp]) -> Fragments:
         """Return what is left when no other pixels than these show a triangle."""
@@ -273,3 +257,26 @@ class BentFragments(Fragments):
             corners = array.reshape(len(array), -1)[self._triangles[self._source]]
         out = self._parts.interpolate(np.matmul(self._weights, corners), background=background)
         return out if array.ndim > 1 else out[..., 0]
+
+
+def mesh_of_parts(
+    mesh: Mesh, drawn: NDArray[np.int64], source: NDArray[np.int64], weights: NDArray[np.float64]
+) -> Mesh:
+    """Return parts of triangles as a mesh: positions and attributes of the whole mesh where the parts have corners."""
+    corners = mesh.triangles[source]
+
+    def spread(values: NDArray[Any]) -> NDArray[np.float64]:
+        of_parts = np.zeros((int(drawn.max(initial=-1)) + 1, values.shape[1]))
+        of_parts[drawn.ravel()] = np.matmul(weights, values[corners]).reshape(-1, values.shape[1])
+        return of_parts
+
+    rows = mesh.material_of_triangle
+    return Mesh(
+        spread(mesh.vertices),
+        drawn.astype(np.int32),
+        spread(mesh.vertex_normals()),
+        None if mesh.colors is None else np.rint(spread(mesh.colors)).astype(np.uint8),
+        None if mesh.uv is None else spread(mesh.uv).astype(np.float32),
+        mesh.materials,
+        None if rows is None else rows[source],
+    )

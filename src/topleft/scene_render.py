@@ -14,14 +14,15 @@ import numpy.typing as npt
 
 from topleft.camera import Camera
 from topleft.colors import id_colors
-from topleft.fragments import Fragments
+from topleft.fragments import BentFragments, Fragments
 from topleft.frame import is_similarity
 from topleft.light import Light, LightKind, LightSpace
+from topleft.mesh import Mesh
 from topleft.scene import Instance, Scene
 from topleft.scene_fragments import SceneFragments
 from topleft.shade import shade
 
-__all__ = ["camera_of", "cull_of", "matrix_of", "shade_scene"]
+__all__ = ["camera_of", "cull_of", "drawn_of", "shade_scene"]
 
 
 def camera_of(camera: Camera, instance: Instance) -> Camera:
@@ -29,17 +30,9 @@ def camera_of(camera: Camera, instance: Instance) -> Camera:
     return replace(camera, view=camera.view @ instance.transform)
 
 
-def matrix_of(camera: Camera, size: tuple[int, int]) -> npt.NDArray[np.float64]:
-    """Clip space from the world, for a scene in a picture of this size.
-
-    Raises
-    ------
-    ValueError
-        If the camera has a lens.
-    """
-    if camera.lens is not None:
-        raise ValueError("a scene is not drawn through a lens, but camera has one: draw a mesh, or straightened()")
-    return camera.clip_from_world(size)
+def drawn_of(frags: Fragments, mesh: Mesh) -> tuple[Fragments, Mesh]:
+    """The fragments and the mesh as they were drawn: through a lens those of its parts."""
+    return (frags.parts, frags.mesh_of_parts(mesh)) if isinstance(frags, BentFragments) else (frags, mesh)
 
 
 def cull_of(cull: str, instance: Instance) -> str:
@@ -77,9 +70,9 @@ def shade_scene(
     for part in frags.parts:
         instance = scene[part.instance]
         look["lights"] = lights_of(lights, camera, instance)
-        own = shade(
-            part.frags, instance.mesh, camera_of(camera, instance), background=background, shading=shading, **look
-        )
+        shown, mesh = drawn_of(part.frags, instance.mesh)
+        own_camera = camera_of(camera, instance).straightened()
+        own = shade(shown, mesh, own_camera, background=background, shading=shading, **look)
         seen = part.frags.mask
         picture[part.box][seen] = own[seen]
     if shading == "ids":

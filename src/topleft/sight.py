@@ -18,11 +18,12 @@ from topleft import _engine
 from topleft.api import Rasterizer
 from topleft.camera import Camera
 from topleft.cutout import cut_of
-from topleft.fragments import BentFragments, Fragments
+from topleft.fragments import Fragments
 from topleft.mesh import Mesh
 from topleft.render import rasterize_mesh, without_holes
 from topleft.scene import Instance, Scene
 from topleft.scene_fragments import Part, SceneFragments
+from topleft.scene_render import drawn_of
 from topleft.threads import count_threads, parse_threads, run_parts
 
 __all__ = ["PointKind", "Sight", "Surface", "project"]
@@ -56,8 +57,7 @@ class Surface:
     @cached_property
     def drawn(self) -> tuple[Fragments, Mesh]:
         """The fragments and the mesh as they were drawn: through a lens those of its parts."""
-        frags, mesh = self.part.frags, self.instance.mesh
-        return (frags.parts, frags.mesh_of_parts(mesh)) if isinstance(frags, BentFragments) else (frags, mesh)
+        return drawn_of(self.part.frags, self.instance.mesh)
 
     def tell(
         self,

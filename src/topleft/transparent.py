@@ -19,7 +19,7 @@ from topleft.depth_layers import DepthLayers, peel
 from topleft.material import Material
 from topleft.render import DEFAULT_SIZE, WHITE, default_camera
 from topleft.scene import Scene
-from topleft.scene_cutout import cuts_of, draw_cuts, solid_scene
+from topleft.scene_cutout import cuts_of, draw_cuts, solid_scene, surfaces_of
 from topleft.scene_draw import peel_scene
 from topleft.scene_fragments import SceneDepthLayers
 from topleft.scene_render import shade_scene
@@ -115,7 +115,7 @@ def solid_layers(
     if not any(cuts) or not isinstance(found, SceneDepthLayers) or 0 in size:
         return found
     whole = SceneDepthLayers(*found.planes, found.placed.of(scene))
-    draw_cuts(whole.placed, camera, cuts, *whole.planes, is_peeled=True, threads=threads)
+    draw_cuts(whole.placed, surfaces_of(scene, camera), cuts, *whole.planes, is_peeled=True, threads=threads)
     return whole
 
 

@@ -138,7 +138,7 @@ def render_layers(
     ------
     ValueError
         If there is no such layer, an attribute has its name or does not fit, "flow" has no end, "uv" finds no texture
-        coordinates, an option of `render` is wrong, or a scene is to be seen through a lens.
+        coordinates, or an option of `render` is wrong.
     TypeError
         If an option is unknown, or of colours and no colours are asked for.
 
@@ -151,7 +151,7 @@ def render_layers(
     All layers show the mesh or scene without what its materials cut out.
 
     Through a lens a point projects to within its `tolerance_px` and half a sub-pixel of the centre. "distance" is along
-    the axis, also through a fisheye, whose "depth" is that of the distance from the eye. No scene is seen through one.
+    the axis, also through a fisheye, whose "depth" is that of the distance from the eye.
 
     Examples
     --------
