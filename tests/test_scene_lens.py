@@ -45,7 +45,7 @@ def test_scene_of_one_is_the_mesh(lens):
     for options in ({"edges": True}, {"shading": "ids"}, {"shading": "depth"}, {"cull": "back"}):
         assert_same(tl.render(one, camera, SIZE, **options), tl.render(SPHERE, camera, SIZE, **options))
     smooth = [tl.render(subject, camera, SIZE, sampling="msaa4").astype(int) for subject in (one, SPHERE)]
-    assert np.abs(smooth[0] - smooth[1]).max() <= 1  # light of samples is rounded before the mean in scenes, not in meshes
+    assert np.abs(smooth[0] - smooth[1]).max() <= 1  # scenes round the light of samples before the mean
     for sampling in ("center", "msaa4", "area"):
         got, expected = (tl.silhouette(s, camera, SIZE, sampling=sampling, cull="back") for s in (one, SPHERE))
         assert_same(got, expected)

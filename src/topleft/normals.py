@@ -41,9 +41,9 @@ def shade_normals(
     corners cancel, or there are none, it is the normal of the face.
     """
     ids = np.require(frags.triangle, np.int32, ["C", "A"])
-    out = np.zeros((*ids.shape, 3), np.float32)
     if not len(mesh.triangles) or 0 in ids.shape:
-        return out
+        return np.zeros((*ids.shape, 3), np.float32)
+    out = np.empty((*ids.shape, 3), np.float32)
     scene = frags._scene
     look = Look(scene, mesh, camera, ids.shape[::-1], None, is_flat=False)
     look.set_turn(SHOW_NORMALS, turn)
