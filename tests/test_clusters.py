@@ -137,7 +137,7 @@ def test_masks_and_counts_have_the_same_bits(isa, sink):
             covered = np.empty(_engine.Target.covered_shape(SIZE[1], SIZE[0]), np.uint64)
             target = _engine.Target(sink, pixels, None, covered)
             memories, seen = [FreshMemory() for _ in range(2)], ClusteredScene(clusters, view)
-            if not draw_clustered(memories, [seen], sink, target, SIZE[1]):
+            if not draw_clustered(memories, [seen], target, SIZE[1]):
                 continue  # a vertex does not fit 32 bits
         assert_same(pixels, expected)
         n_compared += expected.any()

@@ -73,7 +73,7 @@ cdef class Source:
 cdef class Target:
     """The contiguous buffers of a picture, neither side of it 0, and what becomes of a covered sample."""
 
-    cdef tl_sink sink
+    cdef readonly int sink
     cdef int64_t width, height
     cdef int pixel_bytes
     cdef uint8_t[::1] pixels
@@ -84,7 +84,7 @@ cdef class Target:
     cdef int32_t flip
 
     def __init__(self, int sink, pixels, depth, covered, samples=None, bint earlier_wins=False):
-        self.sink, self.flip = <tl_sink>sink, TL_FLIP if earlier_wins else 0
+        self.sink, self.flip = sink, TL_FLIP if earlier_wins else 0
         self.height, self.width = pixels.shape
         self.pixel_bytes = pixels.itemsize
         self.pixels, self.depth, self.covered = as_bytes(pixels), depth, covered
@@ -99,7 +99,7 @@ cdef class Target:
         """The buffers from a row on."""
         cdef tl_target t
         memset(&t, 0, sizeof(t))
-        t.sink = self.sink
+        t.sink = <tl_sink>self.sink
         t.pixels = &self.pixels[first_row * self.width * self.pixel_bytes]
         t.depth = &self.depth[first_row, 0] if self.depth is not None else NULL
         t.covered = &self.covered[first_row, 0] if self.covered is not None else NULL
@@ -174,7 +174,7 @@ cdef class Pieces:
         vertices, wide = np.empty(p.n_vertices * VERTEX_BYTES, np.uint8), np.empty((p.n_vertices, 2), np.int64)
         inv_w, weights = np.empty(p.n_vertices), np.empty((p.n_vertices, 3))
         corners, owners = np.empty((p.n_pieces, 3), np.int32), np.empty(p.n_pieces, np.int32)
-        self.arrays = (vertices, wide, inv_w, weights, corners, owners)
+        self.arrays = tuple(map(np.asarray, (vertices, wide, inv_w, weights, corners, owners)))
         p.vertices, p.wide = <tl_vertex *>&vertices[0], <tl_wide *>&wide[0, 0]
         p.inv_w, p.weights = &inv_w[0], &weights[0, 0]
         p.triangles, p.source = &corners[0, 0], &owners[0]

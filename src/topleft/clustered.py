@@ -74,7 +74,6 @@ class ClusteredScene:
     def draw_rows(
         self,
         memory: Memory,
-        sink: Sink,
         target: _engine.Target,
         first: int,
         end: int,
@@ -89,10 +88,11 @@ class ClusteredScene:
         """
         clusters = self.clusters
         scene = self._empty if sample == (0, 0) else self._empty.seen_from(*sample)
-        seen = clusters.seen_in(self._exact, scene, first, end, self._view.size[0], is_farthest=sink is Sink.FARTHEST)
+        is_farthest = target.sink == Sink.FARTHEST
+        seen = clusters.seen_in(self._exact, scene, first, end, self._view.size[0], is_farthest=is_farthest)
         room: NDArray[np.int32] = memory.empty("clusters", (3 * len(clusters) + 1,), np.int32)
         others: NDArray[np.int32] = memory.empty("others", (clusters.n_triangles + 1,), np.int32)
-        may_be_hidden = sink in (Sink.NEAREST, Sink.FARTHEST)
+        may_be_hidden = is_farthest or target.sink == Sink.NEAREST
         place = target, first, end - first, room, others
         n_others, _, _ = clusters.engine.draw(scene, self._own, seen, may_be_hidden, *place, is_first, is_last)
         return others[:n_others].copy()
@@ -138,7 +138,6 @@ class ClusteredScene:
 def draw_clustered(
     memories: Sequence[Memory],
     scenes: Sequence[ClusteredScene],
-    sink: Sink,
     target: _engine.Target,
     height: int,
     sample: tuple[int, int] = (0, 0),
@@ -154,7 +153,7 @@ def draw_clustered(
         rows = height * i // n_parts, height * (i + 1) // n_parts
         return [
             scene.draw_rows(
-                memories[i], sink, target, *rows, sample=sample, is_first=k == 0, is_last=k == last
+                memories[i], target, *rows, sample=sample, is_first=k == 0, is_last=k == last
             )
             for k, scene in enumerate(scenes)
         ]

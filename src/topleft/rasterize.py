@@ -24,7 +24,7 @@ from topleft.memory import FreshMemory, Memory
 from topleft.models import DepthTest, Sampling, Sink, parse
 from topleft.sampling import draw_planes, sample_positions
 from topleft.snapped import Snapped, check_triangles, snap_scene
-from topleft.threads import run_parts
+from topleft.threads import count_threads, run_parts
 from topleft.view import View
 
 __all__ = ["canvas_of", "draw", "draw_all_samples", "draw_coverage", "draw_fragments", "draw_overdraw"]
@@ -318,7 +318,7 @@ def draw_clustered_fragments(
         n_threads = count_threads(view.threads, clusters.n_triangles)
         memories = [memory] if n_threads == 1 else [FreshMemory() for _ in range(n_threads)]
         target = _engine.Target(sink, ids_canvas, depth_canvas, None)
-        if not draw_clustered(memories, [seen], sink, target, view.size[1]):
+        if not draw_clustered(memories, [seen], target, view.size[1]):
             return None
         if background_depth is not None:
             depth_canvas[ids_canvas < 0] = background_depth

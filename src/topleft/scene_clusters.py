@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from topleft import _engine, choices
 from topleft.clustered import ClusteredScene, draw_clustered
 from topleft.memory import KeptMemory
-from topleft.models import Sink
 from topleft.scene import Scene
 
 if TYPE_CHECKING:
@@ -46,7 +45,6 @@ def front_to_back(scene: Scene, clip_from_world: NDArray[np.float64]) -> NDArray
 def draw_placed(
     placed: PlacedScene,
     order: NDArray[np.intp],
-    sink: Sink,
     targets: Sequence[_engine.Target],
     positions: Sequence[tuple[int, int]],
     height: int,
@@ -56,4 +54,4 @@ def draw_placed(
     scenes = [ClusteredScene(*placed.clustered(i)) for i in order.tolist()]
     memories = [KeptMemory() for _ in range(n_threads)]
     seen = zip(targets, positions, strict=True)
-    return all(draw_clustered(memories, scenes, sink, target, height, at) for target, at in seen)
+    return all(draw_clustered(memories, scenes, target, height, at) for target, at in seen)

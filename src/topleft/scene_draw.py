@@ -5,7 +5,7 @@ In: `Scene`, the matrix of a camera, the options of a view.  Out: `SceneFragment
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -45,12 +45,26 @@ MIRRORED = {0: 0, 1: 2, 2: 1}
 class PlacedScene:
     """A scene as a camera sees it: its instances are snapped when they are asked for."""
 
-    def __init__(self, scene: Scene, clip_from_world: NDArray[np.float64], view: View, *, with_depth: bool) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        clip_from_world: NDArray[np.float64],
+        view: View,
+        *,
+        with_depth: bool,
+        may_cluster: bool = True,
+    ) -> None:
         self.scene = scene
         self.first_ids = scene.first_ids
         self._clip_from_world = clip_from_world
         self._view = view
         self._with_depth = with_depth
+        self._may_cluster = may_cluster
+
+    def of(self, scene: Scene) -> PlacedScene:
+        """Return another scene, made for this picture alone, seen in the same way."""
+        how = self._clip_from_world, self._view
+        return PlacedScene(scene, *how, with_depth=self._with_depth, may_cluster=False)
 
     def snap(self, i: int) -> Snapped:
         """Return an instance, snapped; in shared buffers it draws its own range of ids."""
@@ -79,13 +93,14 @@ class PlacedScene:
         if chunk:
             yield chunk
 
-    def draw(self, sink: Sink, targets: list[_engine.Target], positions: list[tuple[int, int]], height: int) -> None:
+    def draw(self, targets: list[_engine.Target], positions: Sequence[tuple[int, int]], height: int) -> None:
         """Clear targets of that many rows, one a sample, and draw what each sees; (0, 0) is the pixel's centre."""
         n_parts = count_threads(self._view.threads, self.scene.n_triangles)
         n_parts = min(height, max(n_parts, height * self._view.size[0] // MOST_PIXELS_OF_PART))
-        if choices.can_cluster(self._view, sink) and wants_clusters(self.scene):
+        can_cluster = self._may_cluster and choices.can_cluster(self._view, Sink(targets[0].sink))
+        if can_cluster and wants_clusters(self.scene):
             order = front_to_back(self.scene, self._clip_from_world)
-            if draw_placed(self, order, sink, targets, positions, height, n_parts):
+            if draw_placed(self, order, targets, positions, height, n_parts):
                 return
         n_left = len(self.scene)
         is_first = True
@@ -132,7 +147,7 @@ def draw_scene(
     placed = PlacedScene(scene, clip_from_world, view, with_depth=True)
     if width and height:
         targets = [_engine.Target(sink, *planes, None) for planes in zip(ids, depth, strict=True)]
-        placed.draw(sink, targets, positions, height)
+        placed.draw(targets, positions, height)
     if background_depth is not None:
         depth[ids < 0] = background_depth
     return SceneFragments(ids, depth, placed, positions)
@@ -177,7 +192,7 @@ def draw_scene_coverage(
             shape = _engine.Target.covered_shape(height, width, n)
             sink = Sink.SAMPLES if n > 1 else Sink.MASK
             target = _engine.Target(sink, canvas, None, SCRATCH.empty("covered", shape, np.uint64), samples)
-            placed.draw(sink, [target], [(0, 0)], height)
+            placed.draw([target], [(0, 0)], height)
     return result
 
 
