@@ -1,0 +1,149 @@
+"""How far two surfaces lie apart: bounds on the two-sided Hausdorff distance, that hold for every point of both.
+
+In: points and triangles of two surfaces. Out: `Apart`: a distance that is met, and one that is not passed.
+
+The kernels (`csrc/nearest.c`, `csrc/reach.c`) look at triangles by branch and bound; this file puts the triangles of a
+surface in an order that keeps neighbours together, cuts the work in blocks, and adds what rounding may hide.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft import _engine
+from topleft.mesh import coincident
+from topleft.threads import available_threads, run_parts
+
+F64 = npt.NDArray[np.float64]
+I32 = npt.NDArray[np.int32]
+
+#: A bound may pass what is known to be met by this share of it ...
+SHARE = 1 / 16
+
+#: ... or by this share of the size of the surface: half a pixel of a picture in which it is 131,072 pixels wide.
+LEAST = 2.0**-18
+
+#: What float64 may hide, as a share of the largest coordinate: a point is halved, and moved to a foot, by fewer than 100
+#: operations, each of which rounds by at most 2**-53 of it.
+ROUNDING = 2.0**-44
+
+#: Points or triangles that a thread takes at a time: what is found must not depend on who finds it.
+BLOCK = 4096
+
+#: Bits of the place of a triangle along each axis. With the 31 bits of its index they fill 64.
+PLACE_BITS = 11
+
+
+class Apart(NamedTuple):
+    """How far two surfaces lie apart, in their own unit: `known <= distance <= bound`, but for rounding on the left."""
+
+    known: float
+    bound: float
+
+
+class Surface:
+    """Triangles among which the nearest are found.
+
+    Parameters
+    ----------
+    points : (V, 3) float64
+    triangles : (T, 3) int32
+        At least one. Vertices at one place should have one index: it is by them that neighbours are known.
+    """
+
+    def __init__(self, points: F64, triangles: I32) -> None:
+        self.points, self.triangles = np.ascontiguousarray(points), np.ascontiguousarray(triangles)
+
+    @classmethod
+    def of_mesh(cls, vertices: npt.NDArray[Any], triangles: I32, center: F64) -> Surface:
+        """The surface of a mesh, without the vertices that no triangle uses, moved so that `center` is the origin."""
+        points, corners = welded(vertices, triangles)
+        return cls(points - center, corners)
+
+    @cached_property
+    def order(self) -> npt.NDArray[np.int64]:
+        """The triangles along a curve that fills space (Z-order, G. M. Morton, 1966), neighbours near each other."""
+        low, high = self.points.min(axis=0), self.points.max(axis=0)
+        scale = (2**PLACE_BITS - 1) / np.where(high > low, high - low, 1)
+        key = np.arange(len(self.triangles), dtype=np.uint64)
+        for axis in range(3):
+            column = (self.points[:, axis] - low[axis]) * (scale[axis] / 3)
+            place = sum(column[self.triangles[:, k]] for k in range(3)).astype(np.uint64)
+            for bit in range(PLACE_BITS):
+                key |= ((place >> np.uint64(bit)) & np.uint64(1)) << np.uint64(31 + 3 * bit + axis)
+        key.sort()
+        return (key & np.uint64(2**31 - 1)).astype(np.int64)
+
+    @cached_property
+    def tree(self) -> _engine.Surface:
+        """The triangles in their order, in boxes that are a little larger than they."""
+        slack = float(np.abs(self.points).max()) * 2.0**-22
+        return _engine.Surface(self.points, np.ascontiguousarray(self.triangles[self.order]), slack)
+
+    def nearest(self, points: F64, *, with_feet: bool = False) -> tuple[I32, F64 | None, float]:
+        """The rows in `order` of the triangles nearest to points, where on them, and the largest distance."""
+        points = np.ascontiguousarray(points)
+        found = np.empty(len(points), np.int32)
+        feet = np.empty((len(points), 3)) if with_feet else None
+
+        def find(first: int, end: int) -> float:
+            blocks = range(first * BLOCK, min(end * BLOCK, len(points)), BLOCK)
+            ends = [(i, min(i + BLOCK, len(points))) for i in blocks]
+            return max(self.tree.find_nearest(points, *block, found, feet) for block in ends)
+
+        n_blocks = -(-len(points) // BLOCK)
+        return found, feet, max(run_parts(find, n_blocks, available_threads()), default=0.0) if n_blocks else 0.0
+
+
+def measure(one: Surface, other: Surface) -> Apart:
+    """Bounds on the Hausdorff distance between two surfaces: of what is farthest from the other, either way.
+
+    Returns
+    -------
+    Apart
+        `bound` holds for every point of both, rounding included.
+    """
+    ends = [(one, other), (other, one)]
+    rows = [target.nearest(source.points) for source, target in ends]
+    known = max(largest for _, _, largest in rows)
+    size = max(float(np.ptp(surface.points, axis=0).max()) for surface, _ in ends)
+    bound = known
+    known_of_corners = known
+    for (source, target), (nearest, _, _) in zip(ends, rows, strict=True):
+        found = reach(source, target, known_of_corners, LEAST * size)
+        known, bound = max(known, found.known), max(bound, found.bound)
+    largest = max(float(np.abs(surface.points).max()) for surface, _ in ends)
+    return Apart(known, bound * (1 + ROUNDING) + ROUNDING * largest)
+
+
+def reach(source: Surface, target: Surface, known: float, least: float) -> Apart:
+    """How far the points of one surface are from another."""
+
+    def find(first: int, end: int) -> tuple[float, float, int]:
+        ends = first * BLOCK, min(end * BLOCK, len(source.triangles))
+        return target.tree.find_reach(source.points, source.triangles, *ends, known, SHARE, least)
+
+    found = run_parts(find, -(-len(source.triangles) // BLOCK), available_threads())
+    return Apart(max(row[0] for row in found), max(row[1] for row in found))
+
+
+def welded(vertices: npt.NDArray[Any], triangles: I32) -> tuple[F64, I32]:
+    """Points (N, 3) float64 that triangles use, each place once, and the triangles that are left of them.
+
+    A triangle with two corners at one place is left out where another triangle has the side that remains of it, so
+    where there is any triangle with three places.
+    """
+    first, group = coincident(vertices)
+    corners = group[triangles]
+    a, b, c = corners.T
+    is_whole = (a != b) & (b != c) & (c != a)
+    if is_whole.any():
+        corners = corners[is_whole]
+    is_used = np.zeros(len(first), np.bool_)
+    is_used[corners.ravel()] = True
+    rows = np.cumsum(is_used) - 1
+    return vertices[first[is_used]].astype(np.float64), rows[corners].astype(np.int32)
