@@ -77,4 +77,5 @@ const tl_kernels TL_KERNELS = {
     .build_tree = build_tree,
     .find_nearest = nearest_of_points,
     .find_reach = find_reach,
+    .set_feet = set_feet,
 };

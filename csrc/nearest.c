@@ -186,6 +186,17 @@ static void build_tree(tl_surface *s)
     }
 }
 
+/* The foot of each of n points on one triangle: where it is, and its squared distance. */
+static void set_feet(const double *points, const int32_t *triangles, const double *from, const int32_t *triangle, const int32_t *point,
+                     int64_t n, double *at, double *squared)
+{
+    for (int64_t i = 0; i < n; i++) {
+        const int32_t *corner = triangles + 3 * (int64_t)triangle[i];
+        squared[i] = nearest_of_triangle(from + 3 * (int64_t)point[i], points + 3 * (int64_t)corner[0], points + 3 * (int64_t)corner[1],
+                                         points + 3 * (int64_t)corner[2], at + 3 * i);
+    }
+}
+
 /* The nearest triangle of points [first, end), and where on it; `at` may be NULL.  Returns the largest distance. */
 static double nearest_of_points(const tl_surface *s, const double *points, int64_t first, int64_t end, int32_t *triangle, double *at)
 {

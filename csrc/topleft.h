@@ -420,6 +420,10 @@ typedef struct tl_kernels {
      * that share.  In and out: reach, of which `known` counts on entry. */
     void (*find_reach)(const tl_surface *surface, const double *points, const int32_t *triangles, int64_t first, int64_t end,
                        double share, double least, tl_reach *reach);
+
+    /* For n pairs of a point of `from` and a triangle of `points`: where on it is nearest to the point, and the squared distance. */
+    void (*set_feet)(const double *points, const int32_t *triangles, const double *from, const int32_t *triangle, const int32_t *point,
+                     int64_t n, double *at, double *squared);
 } tl_kernels;
 
 #endif

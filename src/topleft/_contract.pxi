@@ -240,3 +240,4 @@ cdef extern from "topleft.h" nogil:
         void (*build_tree)(tl_surface *) noexcept nogil
         double (*find_nearest)(const tl_surface *, const double *, int64_t, int64_t, int32_t *, double *) noexcept nogil
         void (*find_reach)(const tl_surface *, const double *, const int32_t *, int64_t, int64_t, double, double, tl_reach *) noexcept nogil
+        void (*set_feet)(const double *, const int32_t *, const double *, const int32_t *, const int32_t *, int64_t, double *, double *) noexcept nogil

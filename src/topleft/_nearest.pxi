@@ -48,3 +48,12 @@ cdef class Surface:
             with nogil:
                 K.find_reach(&self.surface, &points[0, 0], &triangles[0, 0], first, end, share, least, &reach)
         return reach.known, reach.bound, reach.n_pieces
+
+
+def set_feet(const double[:, ::1] points, const int32_t[:, ::1] triangles, const double[:, ::1] from_points,
+             const int32_t[::1] triangle, const int32_t[::1] point, double[:, ::1] at, double[::1] squared):
+    """Write where on a triangle is nearest to a point, and the squared distance, of each pair of row numbers."""
+    cdef int64_t n = triangle.shape[0]
+    if n:
+        with nogil:
+            K.set_feet(&points[0, 0], &triangles[0, 0], &from_points[0, 0], &triangle[0], &point[0], n, &at[0, 0], &squared[0])

@@ -34,6 +34,9 @@ ROUNDING = 2.0**-44
 #: Points or triangles that a thread takes at a time: what is found must not depend on who finds it.
 BLOCK = 4096
 
+#: Points whose distance is looked at before triangles are.
+MOST_SAMPLES = 1 << 18
+
 #: Bits of the place of a triangle along each axis. With the 31 bits of its index they fill 64.
 PLACE_BITS = 11
 
@@ -84,19 +87,14 @@ class Surface:
         slack = float(np.abs(self.points).max()) * 2.0**-22
         return _engine.Surface(self.points, np.ascontiguousarray(self.triangles[self.order]), slack)
 
-    def nearest(self, points: F64, *, with_feet: bool = False) -> tuple[I32, F64 | None, float]:
-        """The rows in `order` of the triangles nearest to points, where on them, and the largest distance."""
-        points = np.ascontiguousarray(points)
+    def farthest(self, points: F64) -> float:
+        """How far the farthest of points is from the surface."""
         found = np.empty(len(points), np.int32)
-        feet = np.empty((len(points), 3)) if with_feet else None
 
         def find(first: int, end: int) -> float:
-            blocks = range(first * BLOCK, min(end * BLOCK, len(points)), BLOCK)
-            ends = [(i, min(i + BLOCK, len(points))) for i in blocks]
-            return max(self.tree.find_nearest(points, *block, found, feet) for block in ends)
+            return max(self.tree.find_nearest(points, *block, found) for block in blocks(first, end, len(points)))
 
-        n_blocks = -(-len(points) // BLOCK)
-        return found, feet, max(run_parts(find, n_blocks, available_threads()), default=0.0) if n_blocks else 0.0
+        return max(run_parts(find, n_blocks(len(points)), available_threads()))
 
 
 def measure(one: Surface, other: Surface) -> Apart:
@@ -108,14 +106,10 @@ def measure(one: Surface, other: Surface) -> Apart:
         `bound` holds for every point of both, rounding included.
     """
     ends = [(one, other), (other, one)]
-    rows = [target.nearest(source.points) for source, target in ends]
-    known = max(largest for _, _, largest in rows)
+    at_corners = max(target.farthest(some_points(source)) for source, target in ends)
     size = max(float(np.ptp(surface.points, axis=0).max()) for surface, _ in ends)
-    bound = known
-    known_of_corners = known
-    for (source, target), (nearest, _, _) in zip(ends, rows, strict=True):
-        found = reach(source, target, known_of_corners, LEAST * size)
-        known, bound = max(known, found.known), max(bound, found.bound)
+    found = [reach(source, target, at_corners, LEAST * size) for source, target in ends]
+    known, bound = (max(numbers) for numbers in zip(*found, strict=True))
     largest = max(float(np.abs(surface.points).max()) for surface, _ in ends)
     return Apart(known, bound * (1 + ROUNDING) + ROUNDING * largest)
 
@@ -123,12 +117,33 @@ def measure(one: Surface, other: Surface) -> Apart:
 def reach(source: Surface, target: Surface, known: float, least: float) -> Apart:
     """How far the points of one surface are from another."""
 
-    def find(first: int, end: int) -> tuple[float, float, int]:
-        ends = first * BLOCK, min(end * BLOCK, len(source.triangles))
-        return target.tree.find_reach(source.points, source.triangles, *ends, known, SHARE, least)
+    n, tree = len(source.triangles), target.tree
 
-    found = run_parts(find, -(-len(source.triangles) // BLOCK), available_threads())
-    return Apart(max(row[0] for row in found), max(row[1] for row in found))
+    def find(first: int, end: int) -> Apart:
+        found = [
+            tree.find_reach(source.points, source.triangles, *block, known, SHARE, least)
+            for block in blocks(first, end, n)
+        ]
+        return Apart(max(row[0] for row in found), max(row[1] for row in found))
+
+    found = run_parts(find, n_blocks(n), available_threads())
+    return Apart(max(part.known for part in found), max(part.bound for part in found))
+
+
+def n_blocks(n: int) -> int:
+    """How many blocks n points or triangles are."""
+    return -(-n // BLOCK)
+
+
+def blocks(first: int, end: int, n: int) -> list[tuple[int, int]]:
+    """The blocks [first, end) of n points or triangles, as ranges of these."""
+    return [(i, min(i + BLOCK, n)) for i in range(first * BLOCK, min(end * BLOCK, n), BLOCK)]
+
+
+def some_points(surface: Surface) -> F64:
+    """At most about `MOST_SAMPLES` points of a surface: what is known of them only spares work."""
+    step = max(1, len(surface.points) // MOST_SAMPLES)
+    return np.ascontiguousarray(surface.points[::step])
 
 
 def welded(vertices: npt.NDArray[Any], triangles: I32) -> tuple[F64, I32]:
