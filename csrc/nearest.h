@@ -31,7 +31,7 @@ typedef struct {
 typedef struct {
     double known;     /* some point of some triangle is so far away */
     double bound;     /* no point of any is farther */
-    int64_t n_pieces; /* looked at */
+    int64_t n_pieces; /* of the triangle that was cut into the most */
 } tl_reach;
 
 #endif

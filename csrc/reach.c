@@ -222,6 +222,7 @@ static void find_reach(const tl_surface *s, const double *points, const int32_t 
     const double known = reach->known;
     for (int64_t i = first; i < end; i++) {
         int n = 1;
+        int64_t n_pieces = 0;
         stack[0].n = 0;
         for (int k = 0; k < 3; k++)
             add_corner(stack, points + 3 * (int64_t)triangles[3 * i + k]);
@@ -233,8 +234,9 @@ static void find_reach(const tl_surface *s, const double *points, const int32_t 
         while (n) {
             const double bound = bound_piece(&r, stack, &n);
             reach->bound = bound > reach->bound ? bound : reach->bound;
-            reach->n_pieces++;
+            n_pieces++;
         }
+        reach->n_pieces = n_pieces > reach->n_pieces ? n_pieces : reach->n_pieces;
         reach->known = r.known > reach->known ? r.known : reach->known;
     }
 }

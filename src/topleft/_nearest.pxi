@@ -41,7 +41,7 @@ cdef class Surface:
 
     def find_reach(self, const double[:, ::1] points, const int32_t[:, ::1] triangles,
                    int64_t first, int64_t end, double known, double share, double least):
-        """Return how far triangles [first, end) are at least and at most, and how many pieces were looked at."""
+        """Return how far triangles [first, end) are at least and at most, and the most pieces that one was cut into."""
         cdef tl_reach reach
         reach.known, reach.bound, reach.n_pieces = known, 0.0, 0
         if first < end:

@@ -3,7 +3,7 @@
 In: points, triangles. Out: fewer of both, and which points have become one. How far they lie from what they were is
 measured elsewhere: nothing here promises anything.
 
-Based on: M. Garland, P. S. Heckbert, "Surface Simplification Using Quadric Error Metrics", 1997 (what the package does).
+Based on: M. Garland, P. S. Heckbert, "Surface Simplification Using Quadric Error Metrics", 1997.
 """
 
 from __future__ import annotations
@@ -19,13 +19,21 @@ from topleft.errors import MissingPackageError
 F64 = npt.NDArray[np.float64]
 I32 = npt.NDArray[np.int32]
 
+#: Scales to be tried: the diameter of a mesh, per triangle that is wanted.
+FINENESS = (10.0, 1.0)
+
+#: A result with more than this share of the triangles is a failure: nearly nothing can be collapsed.
+STUCK = 0.8
+
 #: The package keeps its mesh in a global variable.
 _lock = threading.Lock()
 
 
 class Collapsed(NamedTuple):
-    """What is left: points (N, 3) float64, triangles (K, 3) int32; and `into` (V,), the row of `points` that each point
-    went into, -1 where it vanished with all its triangles."""
+    """What is left: points (N, 3) float64, triangles (K, 3) int32, and which point (V,) each went into.
+
+    -1 where a point vanished with all its triangles.
+    """
 
     points: F64
     triangles: I32
@@ -41,7 +49,7 @@ def collapser() -> Any:
         If it is not installed.
     """
     try:
-        import fast_simplification
+        import fast_simplification  # type: ignore[import-not-found, unused-ignore]
     except ImportError:
         raise MissingPackageError(
             "levels of detail need fast-simplification: pip install 'topleft[simplify]'"
@@ -49,30 +57,41 @@ def collapser() -> Any:
     return fast_simplification
 
 
-def collapse(points: F64, triangles: I32, n_wanted: int, *, keeps_border: bool) -> Collapsed:
-    """Fewer triangles, about as many as wanted; more where nothing can be collapsed.
+def collapse(points: F64, triangles: I32, n_wanted: int) -> Collapsed:
+    """Fewer triangles, about as many as wanted; more where nothing can be collapsed. Open borders stay as they are.
 
     Parameters
     ----------
     points : (V, 3) float64
     triangles : (T, 3) int32
     n_wanted : int
-    keeps_border : bool
-        Leave the points of sides that have one triangle where they are.
 
     Notes
     -----
     The package collapses in rounds, what costs least first; the thresholds of the rounds are absolute. Points are
-    scaled so that a picture with the wanted number of triangles needs the middle ones: the distance that a triangle
-    less costs goes with its area. On the blob of 100,000 triangles that halves the bound.
+    scaled so that a mesh with the wanted number of triangles needs the middle ones: what a collapse moves the surface
+    by goes with the area of triangles. On the blob of 200,000 triangles that makes the bounds 1.1 to 7 times smaller
+    than a scale of 1 does. A finer scale may end the rounds early; then a coarser one has its turn.
+
+    The package moves open borders as if there were no surface outside: on the bunny, which is open below, bounds
+    are 4 to 6 times smaller where borders stay.
     """
+    for fineness in FINENESS:
+        found = collapse_at(points, triangles, n_wanted, fineness)
+        if len(found.triangles) <= STUCK * len(triangles):
+            break
+    return found
+
+
+def collapse_at(points: F64, triangles: I32, n_wanted: int, fineness: float) -> Collapsed:
+    """Fewer triangles, with the thresholds of the rounds so fine."""
     package = collapser()
     low, high = points.min(axis=0), points.max(axis=0)
     center, size = low / 2 + high / 2, float((high - low).max()) or 1.0
-    scale = max(n_wanted, 1) / size
+    scale = fineness * max(n_wanted, 1) / size
     with _lock:
         moved, left, pairs = package.simplify(
-            (points - center) * scale, triangles, target_count=n_wanted, preserve_border=keeps_border,
+            (points - center) * scale, triangles, target_count=n_wanted, preserve_border=True,
             return_collapses=True,
         )  # fmt: skip
     pairs = np.asarray(pairs).reshape(-1, 2)

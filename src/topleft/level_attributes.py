@@ -35,15 +35,12 @@ class Corners(NamedTuple):
     attributes : dict of str to (N, K) array
     material : (N,) int32 or None
         Row of the materials; triangles of two materials have no point in common.
-    has_seams : bool
-        Whether several points stand at one place.
     """
 
     points: F64
     triangles: I32
     attributes: dict[str, npt.NDArray[Any]]
     material: I32 | None
-    has_seams: bool
 
 
 def corners_of(mesh: Mesh) -> Corners:
@@ -53,7 +50,7 @@ def corners_of(mesh: Mesh) -> Corners:
     rows = mesh.material_of_triangle
     if not given and rows is None:
         points, triangles = welded(mesh.vertices, mesh.triangles)
-        return Corners(points, triangles, {}, None, has_seams=False)
+        return Corners(points, triangles, {}, None)
     first, group = coincident(mesh.vertices, *given.values())
     corners = group[mesh.triangles]
     _, place = coincident(mesh.vertices)
@@ -73,7 +70,6 @@ def corners_of(mesh: Mesh) -> Corners:
         compact.reshape(-1, 3).astype(np.int32),
         {name: array[source] for name, array in given.items()},
         None if rows is None else (used % len(mesh.materials)).astype(np.int32),
-        has_seams=len(np.unique(place[source])) < len(source),
     )
 
 
@@ -89,7 +85,7 @@ def next_corners(corners: Corners, collapsed: Collapsed) -> Corners:
         of_next = np.empty(len(collapsed.points), np.int32)
         of_next[collapsed.into[is_left]] = material[is_left]
         material = of_next
-    return Corners(collapsed.points, collapsed.triangles, attributes, material, corners.has_seams)
+    return Corners(collapsed.points, collapsed.triangles, attributes, material)
 
 
 def nearest_before(corners: Corners, collapsed: Collapsed) -> tuple[npt.NDArray[np.intp], F64]:

@@ -10,7 +10,7 @@ import threading
 
 import numpy as np
 
-from topleft.collapse import collapse, collapser
+from topleft.collapse import STUCK, collapse, collapser
 from topleft.level_attributes import Corners, corners_of, level_mesh, next_corners
 from topleft.levels import Level, Levels, keep_levels, kept_levels
 from topleft.mesh import Mesh
@@ -21,9 +21,6 @@ __all__ = ["levels_of", "simplify"]
 #: Levels are measured against the mesh itself, or against its finest level with at most so many triangles, whose bound
 #: is added: it is small beside those of coarser levels, and the time that comparisons take goes with the triangles.
 MOST_TO_COMPARE = 1_000_000
-
-#: A level that keeps more than this share of the triangles is the last try: nothing more can be collapsed.
-STUCK = 0.8
 
 _lock = threading.RLock()
 
@@ -59,9 +56,9 @@ def simplify(mesh: Mesh, *, ratio: float = 0.25, smallest: int = 200) -> Levels:
 
     Vertices that stand at one place with equal attributes count as one, and those that no triangle uses as none. What
     the mesh has of normals, colours and texture coordinates a vertex of a level takes from the point of the level
-    before that is nearest to it, among the triangles round the vertices that went into it. Where attributes jump, or
-    materials meet, the seam stays as it is, vertex by vertex, and so do open borders of such a mesh: nothing bleeds
-    across and nothing cracks, but no level is coarser than its seams. A mesh without normals has levels without.
+    before that is nearest to it, among the triangles round the vertices that went into it. Open borders stay as they
+    are, vertex by vertex, and so do the seams where attributes jump or materials meet: nothing bleeds across and
+    nothing cracks, but no level is coarser than its borders and seams. A mesh without normals has levels without.
 
     Examples
     --------
@@ -96,9 +93,7 @@ def coarser_levels(mesh: Mesh, ratio: float, smallest: int) -> list[Level]:
     anchor = Surface.of_mesh(mesh.vertices, mesh.triangles, center)
     bound_of_anchor = 0.0
     while len(corners.triangles) * ratio >= smallest:
-        collapsed = collapse(
-            corners.points, corners.triangles, int(len(corners.triangles) * ratio), keeps_border=corners.has_seams
-        )
+        collapsed = collapse(corners.points, corners.triangles, int(len(corners.triangles) * ratio))
         if not len(collapsed.triangles) or len(collapsed.triangles) > STUCK * len(corners.triangles):
             break
         corners = stored(next_corners(corners, collapsed), mesh)

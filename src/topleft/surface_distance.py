@@ -27,9 +27,9 @@ SHARE = 1 / 16
 #: ... or by this share of the size of the surface: half a pixel of a picture in which it is 131,072 pixels wide.
 LEAST = 2.0**-18
 
-#: What float64 may hide, as a share of the largest coordinate: a point is halved, and moved to a foot, by fewer than 100
-#: operations, each of which rounds by at most 2**-53 of it.
-ROUNDING = 2.0**-44
+#: What float64 may hide, as a share of the largest coordinate: a cut moves a corner by less than four roundings of
+#: 2**-53 of it, a foot is found with fewer than 64 of them, and squares and roots lose less than 2**-45 of the distance.
+ROUNDING_OF_CUT, ROUNDING_OF_FOOT, ROUNDING_OF_ROOT = 2.0**-51, 2.0**-47, 2.0**-45
 
 #: Points or triangles that a thread takes at a time: what is found must not depend on who finds it.
 BLOCK = 4096
@@ -46,6 +46,14 @@ class Apart(NamedTuple):
 
     known: float
     bound: float
+
+
+class Reach(NamedTuple):
+    """How far triangles are from a surface at least and at most, and into how many pieces one of them was cut."""
+
+    known: float
+    bound: float
+    n_pieces: int
 
 
 class Surface:
@@ -109,25 +117,26 @@ def measure(one: Surface, other: Surface) -> Apart:
     at_corners = max(target.farthest(some_points(source)) for source, target in ends)
     size = max(float(np.ptp(surface.points, axis=0).max()) for surface, _ in ends)
     found = [reach(source, target, at_corners, LEAST * size) for source, target in ends]
-    known, bound = (max(numbers) for numbers in zip(*found, strict=True))
+    known, bound, n_pieces = (max(numbers) for numbers in zip(*found, strict=True))
     largest = max(float(np.abs(surface.points).max()) for surface, _ in ends)
-    return Apart(known, bound * (1 + ROUNDING) + ROUNDING * largest)
+    # A corner of a piece has been cut out of one that was cut out of another: at most as often as there are pieces.
+    rounding = (ROUNDING_OF_CUT * n_pieces + ROUNDING_OF_FOOT) * largest
+    return Apart(known, bound * (1 + ROUNDING_OF_ROOT) + rounding)
 
 
-def reach(source: Surface, target: Surface, known: float, least: float) -> Apart:
-    """How far the points of one surface are from another."""
-
+def reach(source: Surface, target: Surface, known: float, least: float) -> Reach:
+    """How far the points of one surface are from another, and the roundings that are in it."""
     n, tree = len(source.triangles), target.tree
 
-    def find(first: int, end: int) -> Apart:
-        found = [
+    def find(first: int, end: int) -> Reach:
+        rows = [
             tree.find_reach(source.points, source.triangles, *block, known, SHARE, least)
             for block in blocks(first, end, n)
         ]
-        return Apart(max(row[0] for row in found), max(row[1] for row in found))
+        return Reach(*(max(column) for column in zip(*rows, strict=True)))
 
-    found = run_parts(find, n_blocks(n), available_threads())
-    return Apart(max(part.known for part in found), max(part.bound for part in found))
+    rows = run_parts(find, n_blocks(n), available_threads())
+    return Reach(*(max(column) for column in zip(*rows, strict=True)))
 
 
 def n_blocks(n: int) -> int:

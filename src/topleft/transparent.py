@@ -15,6 +15,7 @@ from topleft.camera import Camera
 from topleft.colors import as_color
 from topleft.composite import composite
 from topleft.depth_layers import DepthLayers, peel
+from topleft.detail import detailed
 from topleft.render import DEFAULT_SIZE, WHITE, default_camera
 from topleft.scene import Scene
 from topleft.scene_draw import peel_scene
@@ -36,6 +37,7 @@ def render_transparent(
     shading: str = "smooth",
     background: tuple[int, ...] = WHITE,
     cull: str = "none",
+    tolerance: float = 0.0,
     threads: int | None = None,
     **look: Any,
 ) -> npt.NDArray[np.uint8]:
@@ -43,7 +45,7 @@ def render_transparent(
 
     Parameters
     ----------
-    mesh, camera, size, shading, background, cull, threads, **look
+    mesh, camera, size, shading, background, cull, tolerance, threads, **look
         As for `render`, one sample a pixel, and as for `shade`.
     opacity : float, 0 to 1
         How much each layer hides of what lies behind it.
@@ -73,6 +75,7 @@ def render_transparent(
     """
     mesh = mesh if isinstance(mesh, Scene) else as_mesh(mesh)
     camera = default_camera(mesh, size) if camera is None else camera
+    mesh = detailed(mesh, camera, size, tolerance, cull=cull)
     ground = as_color("background", background, 4)
     found = visible_layers(mesh, camera, size, layers=layers, cull=cull, threads=threads)
     pictures = np.zeros((size[1], size[0], layers, 3), np.uint8)
