@@ -140,13 +140,14 @@ def choose_detail(
         bound_px = pixels_of_bound(matrix, viewport or size, window, original, level)
         count = len(level.mesh.triangles)
         if bound_px is None:
-            return whole("it may reach the near or the far plane, or the eye, where no distance in pixels is bounded")
-        if bound_px <= tolerance:
+            rejected.append(f"level {i}, {count:,} triangles: may reach the near or the far plane, or the eye")
+        elif bound_px <= tolerance:
             why = f"no point that shows is off by more than {bound_px:.3g} px, and {tolerance:g} px are allowed"
             rejected.append(f"the mesh itself, {n:,} triangles: finer than the picture has to be")
             return Detail(i, level.mesh, level.bound, bound_px, tolerance, n, why, tuple(rejected[-2:]))
-        rejected.append(f"level {i}, {count:,} triangles: may be off by {bound_px:.3g} px")
-    why = f"no coarser level is within {tolerance:g} px" if coarser else "it has no coarser level"
+        else:
+            rejected.append(f"level {i}, {count:,} triangles: may be off by {bound_px:.3g} px")
+    why = f"no coarser level is sure to be within {tolerance:g} px" if coarser else "it has no coarser level"
     return whole(why, tuple(rejected[-1:]))
 
 

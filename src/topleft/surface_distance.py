@@ -28,7 +28,7 @@ SHARE = 1 / 16
 LEAST = 2.0**-18
 
 #: What float64 may hide, as a share of the largest coordinate: a cut moves a corner by less than four roundings of
-#: 2**-53 of it, a foot is found with fewer than 64 of them, and squares and roots lose less than 2**-45 of the distance.
+#: 2**-53 of it, a foot is found with fewer than 64, and squares and roots lose less than 2**-45 of the distance.
 ROUNDING_OF_CUT, ROUNDING_OF_FOOT, ROUNDING_OF_ROOT = 2.0**-51, 2.0**-47, 2.0**-45
 
 #: Points or triangles that a thread takes at a time: what is found must not depend on who finds it.
