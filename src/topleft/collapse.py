@@ -22,6 +22,9 @@ I32 = npt.NDArray[np.int32]
 #: Scales to be tried: the diameter of a mesh, per triangle that is wanted.
 FINENESS = (10.0, 1.0)
 
+#: Larger meshes have the coarser scale alone, which takes half the time.
+MOST_TO_COLLAPSE_FINELY = 2_000_000
+
 #: A result with more than this share of the triangles is a failure: nearly nothing can be collapsed.
 STUCK = 0.8
 
@@ -32,12 +35,12 @@ _lock = threading.Lock()
 class Collapsed(NamedTuple):
     """What is left: points (N, 3) float64, triangles (K, 3) int32, and which point (V,) each went into.
 
-    -1 where a point vanished with all its triangles.
+    -1 where a point vanished with all its triangles; None where nobody asked.
     """
 
     points: F64
     triangles: I32
-    into: I32
+    into: I32 | None
 
 
 def collapser() -> Any:
@@ -57,7 +60,7 @@ def collapser() -> Any:
     return fast_simplification
 
 
-def collapse(points: F64, triangles: I32, n_wanted: int) -> Collapsed:
+def collapse(points: F64, triangles: I32, n_wanted: int, *, with_pairs: bool = True) -> Collapsed:
     """Fewer triangles, about as many as wanted; more where nothing can be collapsed. Open borders stay as they are.
 
     Parameters
@@ -65,6 +68,8 @@ def collapse(points: F64, triangles: I32, n_wanted: int) -> Collapsed:
     points : (V, 3) float64
     triangles : (T, 3) int32
     n_wanted : int
+    with_pairs : bool
+        Whether it is to be told which points became one, which takes memory.
 
     Notes
     -----
@@ -76,26 +81,33 @@ def collapse(points: F64, triangles: I32, n_wanted: int) -> Collapsed:
     The package moves open borders as if there were no surface outside: on the bunny, which is open below, bounds
     are 4 to 6 times smaller where borders stay.
     """
-    for fineness in FINENESS:
-        found = collapse_at(points, triangles, n_wanted, fineness)
+    for fineness in FINENESS if len(triangles) <= MOST_TO_COLLAPSE_FINELY else FINENESS[1:]:
+        found = collapse_at(points, triangles, n_wanted, fineness, with_pairs=with_pairs)
         if len(found.triangles) <= STUCK * len(triangles):
             break
     return found
 
 
-def collapse_at(points: F64, triangles: I32, n_wanted: int, fineness: float) -> Collapsed:
+def collapse_at(points: F64, triangles: I32, n_wanted: int, fineness: float, *, with_pairs: bool) -> Collapsed:
     """Fewer triangles, with the thresholds of the rounds so fine."""
     package = collapser()
     low, high = points.min(axis=0), points.max(axis=0)
     center, size = low / 2 + high / 2, float((high - low).max()) or 1.0
     scale = fineness * max(n_wanted, 1) / size
     with _lock:
-        moved, left, pairs = package.simplify(
+        moved, left, *pairs = package.simplify(
             (points - center) * scale, triangles, target_count=n_wanted, preserve_border=True,
-            return_collapses=True,
+            return_collapses=with_pairs,
         )  # fmt: skip
+    left = np.asarray(left, np.int32)
+    into = rows_of_pairs(pairs[0], triangles, len(points), left) if with_pairs else None
+    return Collapsed(np.asarray(moved, np.float64) / scale + center, left, into)
+
+
+def rows_of_pairs(pairs: Any, triangles: I32, n_points: int, left: I32) -> I32:
+    """The row that each point went into, from pairs of points of which the second went into the first."""
     pairs = np.asarray(pairs).reshape(-1, 2)
-    into = np.arange(len(points), dtype=np.int32)
+    into = np.arange(n_points, dtype=np.int32)
     into[pairs[:, 1]] = pairs[:, 0]
     while True:  # a point that another went into may have gone into a third: each round halves the way
         further = into[into]
@@ -105,9 +117,9 @@ def collapse_at(points: F64, triangles: I32, n_wanted: int, fineness: float) -> 
     corners = into[triangles]
     a, b, c = corners.T
     corners = corners[(a != b) & (b != c) & (c != a)]
-    is_left = np.zeros(len(points), np.bool_)
+    is_left = np.zeros(n_points, np.bool_)
     is_left[corners.ravel()] = True
-    row = np.where(is_left, np.cumsum(is_left, dtype=np.int32) - 1, np.int32(-1)).astype(np.int32)
+    row: I32 = np.where(is_left, np.cumsum(is_left) - 1, -1).astype(np.int32)
     if not np.array_equal(row[corners], left):
         raise RuntimeError("fast-simplification has returned other triangles than its collapses leave")
-    return Collapsed(np.asarray(moved, np.float64) / scale + center, np.asarray(left, np.int32), row[into])
+    return row[into]

@@ -76,26 +76,29 @@ def corners_of(mesh: Mesh) -> Corners:
 def next_corners(corners: Corners, collapsed: Collapsed) -> Corners:
     """The corners of the next level."""
     attributes, material = corners.attributes, corners.material
+    into = collapsed.into
+    if into is None:
+        return Corners(collapsed.points, collapsed.triangles, {}, None)
     if attributes:
-        triangle, weights = nearest_before(corners, collapsed)
+        triangle, weights = nearest_before(corners, collapsed.points, into)
         rows = corners.triangles[triangle]
         attributes = {name: mixed(name, array, rows, weights) for name, array in attributes.items()}
     if material is not None:
-        is_left = collapsed.into >= 0
+        is_left = into >= 0
         of_next = np.empty(len(collapsed.points), np.int32)
-        of_next[collapsed.into[is_left]] = material[is_left]
+        of_next[into[is_left]] = material[is_left]
         material = of_next
     return Corners(collapsed.points, collapsed.triangles, attributes, material)
 
 
-def nearest_before(corners: Corners, collapsed: Collapsed) -> tuple[npt.NDArray[np.intp], F64]:
+def nearest_before(corners: Corners, points: F64, into: I32) -> tuple[npt.NDArray[np.intp], F64]:
     """Of each new point the triangle (N,) that has its nearest point, and the weights (N, 3) of its corners there."""
-    point = collapsed.into[corners.triangles].ravel()
+    point = into[corners.triangles].ravel()
     triangle = np.repeat(np.arange(len(corners.triangles), dtype=np.int32), 3)[point >= 0]
     point = point[point >= 0]
     feet = np.empty((len(point), 3))
     squared = np.empty(len(point))
-    _engine.set_feet(corners.points, corners.triangles, collapsed.points, triangle, point, feet, squared)
+    _engine.set_feet(corners.points, corners.triangles, points, triangle, point, feet, squared)
     order = np.lexsort((triangle, squared, point))
     starts = np.flatnonzero(np.diff(point[order], prepend=-1))
     best = order[starts]  # every new point has triangles, so these are the points in their order

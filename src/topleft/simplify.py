@@ -20,7 +20,11 @@ __all__ = ["levels_of", "simplify"]
 
 #: Levels are measured against the mesh itself, or against its finest level with at most so many triangles, whose bound
 #: is added: it is small beside those of coarser levels, and the time that comparisons take goes with the triangles.
-MOST_TO_COMPARE = 1_000_000
+MOST_TO_COMPARE = 300_000
+
+#: The finest level has about so many triangles at most. A blob of 300,000 is within half a pixel where it fills a frame
+#: of 7,000 pixels; finer levels would take most of the time and of the memory.
+MOST_OF_LEVEL = 1_000_000
 
 _lock = threading.RLock()
 
@@ -93,7 +97,9 @@ def coarser_levels(mesh: Mesh, ratio: float, smallest: int) -> list[Level]:
     anchor = Surface.of_mesh(mesh.vertices, mesh.triangles, center)
     bound_of_anchor = 0.0
     while len(corners.triangles) * ratio >= smallest:
-        collapsed = collapse(corners.points, corners.triangles, int(len(corners.triangles) * ratio))
+        n_wanted = min(int(len(corners.triangles) * ratio), MOST_OF_LEVEL)
+        has_more = bool(corners.attributes) or corners.material is not None
+        collapsed = collapse(corners.points, corners.triangles, n_wanted, with_pairs=has_more)
         if not len(collapsed.triangles) or len(collapsed.triangles) > STUCK * len(corners.triangles):
             break
         corners = stored(next_corners(corners, collapsed), mesh)

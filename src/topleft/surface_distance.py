@@ -158,8 +158,7 @@ def some_points(surface: Surface) -> F64:
 def welded(vertices: npt.NDArray[Any], triangles: I32) -> tuple[F64, I32]:
     """Points (N, 3) float64 that triangles use, each place once, and the triangles that are left of them.
 
-    A triangle with two corners at one place is left out where another triangle has the side that remains of it, so
-    where there is any triangle with three places.
+    Triangles with two corners at one place are left out, since they cover nothing; unless there are no others.
     """
     first, group = coincident(vertices)
     corners = group[triangles]
