@@ -118,6 +118,7 @@ def parser() -> argparse.ArgumentParser:
     add.add_argument("--mesh", nargs="*", default=[], metavar="FILE", help="meshes besides the generated ones")
     add.add_argument("--triangles", type=positive, default=10_000_000, metavar="N", help="of the blob (%(default)s)")
     add.add_argument("--rounds", type=positive, default=5, metavar="N", help="(%(default)s)")
+    add.add_argument("--json", type=Path, metavar="FILE.json", help="the record")
     add.add_argument("--keep", type=Path, metavar="FOLDER", help="where levels are kept from run to run")
     add.add_argument("-o", "--out", type=Path, default=Path("docs"), metavar="FOLDER", help="(%(default)s)")
 
@@ -337,6 +338,8 @@ def levels_command(arguments: argparse.Namespace) -> int:
 
     options = levels.Options(tuple(arguments.mesh), arguments.triangles, arguments.rounds, arguments.keep)
     record = levels.run_levels(options)
+    if arguments.json:
+        write_record(arguments.json, record)
     paths = levels.write_page(record, arguments.out)
     print(*levels.lines(record), *paths, sep="\n")
     return 0

@@ -5,7 +5,6 @@ The error is measured on masks, not taken from the bound: how far a sample that 
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -28,9 +27,6 @@ SAMPLES = 1200
 
 TOLERANCE = 0.5
 FOV_Y_DEG = 40.0
-GOAL = 50
-"""How many times faster a far view of the largest mesh is to be."""
-
 
 @dataclass(frozen=True)
 class Options:
@@ -211,13 +207,12 @@ def lines(record: dict[str, Any]) -> Sequence[str]:
 
 
 def write_page(record: dict[str, Any], docs: Path) -> list[Path]:
-    """Write the page, its chart and the record."""
+    """Write the page and its chart."""
     from benchmarks.levels_chart import chart_png
 
     found = {
         docs / "levels.md": page(record).encode(),
         docs / "images" / "levels.png": chart_png(record),
-        docs / "records" / "levels.json": (json.dumps(record, indent=1) + "\n").encode(),
     }
     for path, data in found.items():
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -23,7 +23,8 @@ def chart_png(record: dict[str, Any]) -> bytes:
     n_rows = -(-len(meshes) // n_columns)
     with plt.rc_context(STYLE):
         figure, panels = plt.subplots(
-            n_rows, n_columns, figsize=(5.2 * n_columns, 3.5 * n_rows), squeeze=False, sharex=True, sharey=True, layout="constrained"
+            n_rows, n_columns, figsize=(5.2 * n_columns, 3.5 * n_rows), squeeze=False, sharex=True, sharey=True,
+            layout="constrained",
         )
         for panel, mesh in zip(panels.flat, meshes, strict=False):
             draw_mesh(panel, mesh, record["tolerance"])

@@ -41,8 +41,8 @@ def test_levels_are_kept_from_run_to_run(tmp_path):
 def test_levels_command_writes_page_chart_and_record(tmp_path, monkeypatch, mesh_record, capsys):
     monkeypatch.setattr(levels, "subjects", lambda _: [("torus", tl.Mesh(*tl.scenes.torus()))])
     monkeypatch.setattr(levels, "measure_mesh", lambda *_: mesh_record)
-    assert cli.main(["levels", "-o", str(tmp_path)]) == 0
-    record = json.loads((tmp_path / "records" / "levels.json").read_text())
+    assert cli.main(["levels", "--json", str(tmp_path / "levels.json"), "-o", str(tmp_path)]) == 0
+    record = json.loads((tmp_path / "levels.json").read_text())
     page = (tmp_path / "levels.md").read_text()
     assert page == levels.page(record)
     assert "## torus, 2,304 triangles" in page

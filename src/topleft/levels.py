@@ -7,8 +7,6 @@ from __future__ import annotations
 
 import hashlib
 import os
-import tempfile
-import zipfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -98,6 +96,8 @@ class Levels(Sequence[Level]):
         ValueError
             If the name does not end in .npz.
         """
+        import tempfile  # it takes shutil with it
+
         path = _checked_path(path)
         arrays: dict[str, npt.NDArray[Any]] = {
             "mesh": np.array(digest_of(self[0].mesh)),
@@ -135,6 +135,8 @@ class Levels(Sequence[Level]):
         MeshError
             If the file is broken, or its levels are those of another mesh.
         """
+        import zipfile
+
         path = _checked_path(path)
         try:
             with np.load(path, allow_pickle=False) as file:
