@@ -156,7 +156,8 @@ def page(record: dict[str, Any]) -> str:
         f"Measured {record['date'][:10]} on {machine['cpu']}, {record['isa']}: `rasterize` of {width}x{height} pixels "
         f"on one thread, on memory that is kept, the best of {record['rounds']} rounds in turns. \"Measured\" is how "
         "far a sample of one outline lies from the other, to the spacing of samples (an eighth of a pixel for small "
-        "pictures of the mesh, a whole one for the largest).\n"
+        "pictures of the mesh, a whole one for the largest): one sample more or less counts as that, whatever the "
+        "bound.\n"
     )
     for mesh in record["meshes"]:
         parts.append(f"## {mesh['name']}, {mesh['n_triangles']:,} triangles\n")
