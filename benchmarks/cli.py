@@ -1,4 +1,4 @@
-"""Commands: `python -m benchmarks run`, `accuracy`, `atlas`, `batch`, `report`, `charts`, `samplings`, and the rest."""
+"""Commands: `python -m benchmarks run`, `accuracy`, `atlas`, `batch`, `choices`, `report`, `charts`, and the rest."""
 
 from __future__ import annotations
 
@@ -11,7 +11,18 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks import accuracy, atlas_page, batch, pages, pictures_page, report, smooth_tables
+from benchmarks import (
+    accuracy,
+    atlas_page,
+    batch,
+    choices,
+    choices_plans,
+    choices_tables,
+    pages,
+    pictures_page,
+    report,
+    smooth_tables,
+)
 from benchmarks import options as accuracy_options
 from benchmarks.cases import CASES, TRIALS
 from benchmarks.contestants import known_peers
@@ -93,7 +104,21 @@ def parser() -> argparse.ArgumentParser:
                      help="shrink the first failures and write them into src/topleft/failure_scenes.py")  # fmt: skip
     add.add_argument("-o", "--out", type=Path, metavar="FILE.json")
 
-    add = commands.add_parser("charts", help="draw the charts of an accuracy record or an atlas, PNG and SVG")
+    add = commands.add_parser("choices", help="measure what the planner chooses beside what it could have chosen")
+    add.set_defaults(action=choices_command)
+    ways = choices.Options()
+    add.add_argument("--choice", nargs="+", metavar="NAME", default=[], help="measure these alone; all unless given")
+    add.add_argument("--scene", nargs="+", metavar="NAME", default=[], help="scenes, or beginnings of their names")
+    add.add_argument("--plans", action="store_true", help="measure estimates and plans alone")
+    add.add_argument("--builds", type=Path, metavar="FOLDER",
+                     help="build the library with other constants there unless it is, and measure it")  # fmt: skip
+    add.add_argument("--repeats", type=positive, default=ways.rounds, metavar="N", help="rounds (%(default)s)")
+    add.add_argument("--scale", type=float, default=ways.scale, metavar="X", help="of triangles and frames (1)")
+    add.add_argument("-o", "--out", type=Path, metavar="FILE.json", help="what it holds and is not measured stays")
+
+    add = commands.add_parser(
+        "charts", help="draw the charts of a record of accuracy, choices or an atlas, PNG and SVG"
+    )
     add.set_defaults(action=charts_command)
     add.add_argument("file", type=Path, metavar="FILE.json")
     add.add_argument("-o", "--out", type=Path, default=Path("docs/images"), metavar="FOLDER")
@@ -201,7 +226,13 @@ def report_command(arguments: argparse.Namespace) -> int:
     if arguments.html:
         return html_command(records, arguments)
     for record in records:
-        tables = {"accuracy": pages, "atlas": atlas_page, "batch": batch, "pictures": pictures_page}
+        tables = {
+            "accuracy": pages,
+            "atlas": atlas_page,
+            "batch": batch,
+            "pictures": pictures_page,
+            "choices": choices_tables,
+        }
         print(*tables.get(record.get("kind"), report).lines(record), sep="\n")
     return 0
 
@@ -284,13 +315,39 @@ def atlas_command(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def choices_command(arguments: argparse.Namespace) -> int:
+    """Measure, write, print."""
+    options = choices.Options(
+        choices=arguments.choice,
+        scenes=arguments.scene,
+        rounds=arguments.repeats,
+        scale=arguments.scale,
+        builds=arguments.builds,
+    )
+    out = arguments.out
+    save = functools.partial(write_record, out) if out else None
+    record = json.loads(out.read_text()) if out and out.exists() else None
+    try:
+        if arguments.plans:
+            record = choices_plans.run_plans(options, record)
+        else:
+            record = choices.run_choices(options, sys.stderr, record, save)
+    except ValueError as error:
+        print(f"benchmarks: {error}", file=sys.stderr)
+        return 2
+    if out:
+        write_record(out, record)
+    print(*choices_tables.lines(record), sep="\n")
+    return 0
+
+
 def charts_command(arguments: argparse.Namespace) -> int:
     """Draw."""
-    from benchmarks import atlas_charts, chart_files  # matplotlib
+    from benchmarks import atlas_charts, chart_files, choices_charts  # matplotlib
 
     record = json.loads(arguments.file.read_text())
-    draw_charts = atlas_charts.draw_charts if record["kind"] == "atlas" else chart_files.draw_charts
-    for path in draw_charts(record, arguments.out):
+    of_kind = {"atlas": atlas_charts, "choices": choices_charts}
+    for path in of_kind.get(record["kind"], chart_files).draw_charts(record, arguments.out):
         print(path)
     return 0
 
@@ -322,7 +379,8 @@ def document_command(arguments: argparse.Namespace) -> int:
     """Replace what stands between the markers of a page."""
     text = arguments.page.read_text(encoding="utf-8")
     record = json.loads(arguments.file.read_text())
-    of_kind = {"accuracy": pages.PARTS, "atlas": atlas_page.PARTS, "pictures": pictures_page.PARTS}
+    of_kind = {"accuracy": pages.PARTS, "atlas": atlas_page.PARTS, "pictures": pictures_page.PARTS,
+               "choices": choices_tables.PARTS}  # fmt: skip
     parts = of_kind.get(record.get("kind"), smooth_tables.PARTS)
     try:
         write_text(arguments.page, pages.with_parts(text, record, parts))
@@ -371,7 +429,7 @@ def write_text(path: Path, text: str) -> None:
 
 def record_text(record: dict[str, Any]) -> str:
     """JSON; rows of figures take a line each."""
-    if record.get("kind") not in ("accuracy", "atlas", "pictures"):
+    if record.get("kind") not in ("accuracy", "atlas", "pictures", "choices"):
         return json.dumps(record, indent=1)
     parts = []
     for key, value in record.items():

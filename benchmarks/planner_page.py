@@ -54,6 +54,9 @@ package; `topleft calibrate` measures yours in about ten seconds, and keeps the 
 (`$XDG_CACHE_HOME`). The last line of each plan says whose costs they are, and how far off they were for scenes that
 were not fitted. They are for memory that is kept, as a `Rasterizer` does, and for threads that have a core each.
 
+[choices.md](choices.md) has each choice beside what could have been chosen, estimates beside measurements, and what a
+plan takes.
+
 The plans below were written by `python -m benchmarks.planner_page`, measured on the machine that they name.
 """
 

@@ -169,7 +169,9 @@ TL_INLINE void push_batch(area_state *s, int64_t i, const int32_t *corners, vm l
     for (unsigned lanes = vm_bits(alone); lanes; lanes &= lanes - 1)
         push_alone(s, i + __builtin_ctz(lanes));
     const vm meets_rows = vm_and(vi_gt(vi_set1(p->bottom_fx), y_min), vi_gt(y_max, vi_set1(p->top_fx)));
-    vm drawn = vm_and(vm_and_not(live, alone), vm_and(meets_rows, vi_gt(vi_set1(p->right_fx), x_min)));
+    /* heights are whole numbers of units: the edges of a triangle that lies left of the window add up to nothing there */
+    const vm meets_cols = vm_and(vi_gt(vi_set1(p->right_fx), x_min), vi_gt(x_max, vi_set1(p->left_fx)));
+    vm drawn = vm_and(vm_and_not(live, alone), vm_and(meets_rows, meets_cols));
     if (!vm_any(drawn))
         return;
     /* twice the area: differences of at most 2^25, so every step is exact in float64 */
@@ -199,6 +201,7 @@ static void place_plane(const tl_window *window, const tl_area *area, area_plane
     p->top_px = clamp32(window->y_px, -far - beyond, far);
     p->top_fx = clamp32(window->y_px * ((int64_t)1 << bits), -far, far);
     p->bottom_fx = clamp32((window->y_px + window->height) * ((int64_t)1 << bits), -far, far);
+    p->left_fx = clamp32(window->x_px * ((int64_t)1 << bits), -far, far);
     p->right_fx = clamp32((window->x_px + window->width) * ((int64_t)1 << bits), -far, far);
     p->bits = bits;
     p->n_waiting = 0;

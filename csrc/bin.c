@@ -14,24 +14,35 @@ typedef struct {
     int32_t max_extent, left, top, right, bottom;
 } bin_limits;
 
-/* Triangle i by itself; one that a plane cuts is in every band. */
+/* Widens the rows [*row0, *row1) of the window by those that a triangle may reach. */
+static void widen_rows(const bin_limits *b, const tl_vertex_set *set, const int32_t *corners, int64_t *row0, int64_t *row1)
+{
+    const tl_window *window = b->window;
+    const int bits = window->subpixel_bits;
+    tl_triangle t;
+    const int sign = load_triangle(set, corners, &t);
+    if (sign == 0 || (sign > 0 && b->scene->cull == TL_CULL_BACK) || (sign < 0 && b->scene->cull == TL_CULL_FRONT))
+        return;
+    const int64_t y0 = min3(t.y_fx[0], t.y_fx[1], t.y_fx[2]), y1 = max3(t.y_fx[0], t.y_fx[1], t.y_fx[2]);
+    const int64_t first = max64(((y0 + b->low_fx) >> bits) - window->y_px, 0);
+    const int64_t end = min64(((y1 + b->high_fx) >> bits) - window->y_px, window->height);
+    if (first < end)
+        *row0 = min64(*row0, first), *row1 = max64(*row1, end);
+}
+
+/* Triangle i, or its pieces, by itself. */
 static __attribute__((noinline)) void bin_alone(const bin_limits *b, int64_t i, tl_bins *bins)
 {
     const tl_scene *scene = b->scene;
-    const tl_window *window = b->window;
-    const int bits = window->subpixel_bits;
+    const tl_pieces *pieces = scene->pieces;
     const int32_t *corners = scene->triangles + 3 * i;
-    int64_t row0 = 0, row1 = window->height;
+    int64_t row0 = b->window->height, row1 = 0;
     if (!is_clipped(&scene->mesh, corners)) {
-        tl_triangle t;
-        const int sign = load_triangle(&scene->mesh, corners, &t);
-        if (sign == 0 || (sign > 0 && scene->cull == TL_CULL_BACK) || (sign < 0 && scene->cull == TL_CULL_FRONT))
-            return;
-        const int64_t y0 = min3(t.y_fx[0], t.y_fx[1], t.y_fx[2]), y1 = max3(t.y_fx[0], t.y_fx[1], t.y_fx[2]);
-        row0 = max64(((y0 + b->low_fx) >> bits) - window->y_px, 0);
-        row1 = min64(((y1 + b->high_fx) >> bits) - window->y_px, window->height);
-    } else if (!scene->pieces) {
-        return;
+        widen_rows(b, &scene->mesh, corners, &row0, &row1);
+    } else if (pieces) {
+        const tl_vertex_set set = piece_set(pieces, &scene->mesh);
+        for (int64_t k = first_piece(pieces, i); k < pieces->n_pieces && pieces->source[k] == i; k++)
+            widen_rows(b, &set, pieces->triangles + 3 * k, &row0, &row1);
     }
     if (row0 >= row1)
         return;

@@ -29,7 +29,7 @@ typedef struct {
     int32_t stride, n_cols, n_rows;
     int64_t x_px, y_px;                  /* picture pixel of the first cell */
     int32_t left_px, top_px;             /* the same, as near as lanes need it */
-    int32_t top_fx, bottom_fx, right_fx; /* the window's border, likewise */
+    int32_t top_fx, bottom_fx, left_fx, right_fx; /* the window's border, likewise */
     int bits;
     int n_waiting; /* cells [at, at + 4) and what will be added to them, in the order of vi_store_quads */
     int32_t at[TL_WAITING_QUADS], quads[4 * TL_WAITING_QUADS];
@@ -208,7 +208,8 @@ TL_INLINE void add_wide_row(area_plane *plane, int is_wide, int64_t row, int64_t
 {
     if (col >= plane->n_cols)
         return;
-    const int64_t first = col < 0 ? -col : 0, passed = (int64_t)high + 2;
+    /* what lies left of column 0 belongs to the cell before it: left_sum would take the rest there for less than nothing */
+    const int64_t first = col < 0 ? -col - 1 : 0, passed = (int64_t)high + 2;
     const int64_t visible = passed < plane->n_cols - col ? passed : plane->n_cols - col, end = visible > first ? visible : first + 1;
     const vd zero = vd_set1(0.0), one = vd_set1(1.0), lo = vd_set1(low), hi = vd_set1(high);
     const int64_t at = row * plane->stride + TL_CELL_PAD + col;

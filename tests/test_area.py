@@ -10,8 +10,11 @@ from engine_cases import ON_EACH_ISA, THREADS, mixed, on
 from strategies import Scene, needles, perspective, soup
 
 import topleft as tl
-from topleft import scenes
+from topleft import _engine, scenes
+from topleft.memory import KeptMemory
 from topleft.methods import reference_area as ref
+from topleft.snapped import snap_scene
+from topleft.view import View
 
 UNIT = 2.0**-24
 SIDE = 12
@@ -290,3 +293,25 @@ def test_area_gives_no_ids():
 
 def test_area_reference_adds_up_to_the_triangle():
     assert ref.area([[0.5, 0.25], [7, 1], [3, 5.5]], [[0, 1, 2]], (8, 6)).sum() == Fraction(6.5 * 5.25 - 0.75 * 2.5) / 2
+
+
+def test_shallow_edge_across_the_left_border_needs_no_wide_cells():
+    corners = np.array([[0.82, 18.04], [-13.3, 15.85], [-7.85, 4.55]])
+    view = View.parse((40, 30), {"sampling": "area"})
+    snapped = snap_scene(KeptMemory(), corners, np.array([[0, 1, 2]], np.int32), view, with_depth=False, out=None)
+    cells = KeptMemory().constant("cells", 30 * _engine.area_stride(40), _engine.CELL_CLEAR)
+    narrow, wide = np.empty((30, 40), np.float32), np.empty((30, 40), np.float32)
+    assert snapped.scene.draw_area(narrow, _engine.as_bytes(cells), 0, 30, False, True) == -1
+    wide_cells = np.zeros(len(cells), np.int64)
+    assert snapped.scene.draw_area(wide, _engine.as_bytes(wide_cells), 0, 30, True, True) == -1
+    assert (narrow == wide).all()
+    assert narrow[:, 0].any()
+
+
+@pytest.mark.parametrize("far", [0, 1])
+def test_triangles_beside_the_window_add_nothing(far):
+    vertices, triangles, _ = scenes.random_triangles(300, 20, 60, 40)
+    beside = vertices[:, :2] + [-100 if far == 0 else 100, 0]
+    both = np.concatenate([vertices[:, :2], beside]), np.concatenate([triangles, triangles + len(vertices)])
+    alone = tl.overdraw(vertices[:, :2], triangles, (60, 40), sampling="area")
+    assert (tl.overdraw(*both, (60, 40), sampling="area") == alone).all()

@@ -4,8 +4,11 @@ import numpy as np
 import pytest
 
 import topleft as tl
-from topleft import choices
+from topleft import choices, sampling
+from topleft.memory import KeptMemory
 from topleft.models import Sink
+from topleft.snapped import snap_scene
+from topleft.view import View
 
 SIZE = (21, 17)
 
@@ -209,5 +212,157 @@ def test_depth_is_left_out_where_that_pays():
 
     assert is_left_out(4000, 20, (512, 512))
     assert not is_left_out(400, 20, (512, 512))
-    assert not is_left_out(4000, 20, (64, 64))
-    assert is_left_out(2, 2000, (512, 512))
+    assert is_left_out(4000, 20, (128, 128))
+    assert not is_left_out(100, 20, (128, 128))
+    assert is_left_out(20, 2000, (512, 512))
+
+
+def random_clip_space(rng):
+    """Vertices and triangles of a small scene in clip space, many of them cut by the near and far planes."""
+    n = int(rng.integers(1, 40))
+    vertices = rng.uniform(-1.5, 1.5, (3 * n, 4))
+    vertices[:, 3] = rng.uniform(-0.5, 2.0, 3 * n)
+    return vertices, np.arange(3 * n, dtype=np.int32).reshape(n, 3)
+
+
+@pytest.mark.parametrize("n_components", [3, 4])
+def test_samples_in_bands_and_whole_give_the_same_bits(monkeypatch, n_components):
+    rng = np.random.default_rng(7)
+    monkeypatch.setattr(sampling, "BAND_BYTES", 8 * SIZE[0] * 4)  # bands of four rows
+    for _ in range(700):
+        vertices, triangles = random_clip_space(rng) if n_components == 4 else random_triangles(rng, 3)
+        options = {"sampling": "msaa4", "cull": str(rng.choice(["none", "back", "front"])), "threads": 1}
+
+        def draw(arrays=(vertices, triangles), options=options):
+            frags = tl.rasterize(*arrays, SIZE, **options)
+            return np.stack([frags.samples_triangle, frags.samples_depth.view(np.int32)])
+
+        chosen, whole = both_ways(monkeypatch, "can_share", lambda _: False, draw)
+        assert (chosen == whole).all()
+
+
+def test_search_for_cut_triangles_gives_the_same_bits(monkeypatch):
+    rng = np.random.default_rng(8)
+    for _ in range(700):
+        vertices, triangles = random_clip_space(rng)
+        if rng.integers(2):
+            vertices[:, 3] = 2.0  # none is cut
+
+        def draw(arrays=(vertices, triangles)):
+            return bits_of(tl.rasterize(*arrays, SIZE))
+
+        chosen, searched = both_ways(monkeypatch, "must_cut", lambda _: True, draw)
+        assert (chosen == searched).all()
+
+
+def test_colours_with_labels_and_without_are_the_same(monkeypatch):
+    rng = np.random.default_rng(9)
+    for _ in range(700):
+        vertices, triangles = random_triangles(rng)
+        colors = rng.integers(0, 256, (len(triangles), int(rng.integers(1, 5))), np.uint8)
+
+        def draw(arrays=(vertices, triangles, colors)):
+            return tl.fill(*arrays, SIZE, per="triangle")
+
+        labels, direct = (both_ways(monkeypatch, "is_direct", lambda *_, v=v, **__: v, draw)[1] for v in (False, True))
+        assert (labels == direct).all()
+
+
+def listed_in_bands(vertices, cull="none"):
+    """How many triangles the four bands of a picture of 16x16 pixels list together."""
+    view = View.parse((16, 16), {"sampling": "msaa4", "cull": cull})
+    triangles = np.arange(len(vertices), dtype=np.int32).reshape(-1, 3)
+    snapped = snap_scene(KeptMemory(), vertices, triangles, view, with_depth=False, out=None)
+    positions = sampling.sample_positions(4, view.grid_bits)
+    bins = sampling.sort_bands(KeptMemory(), snapped.scene, len(triangles), positions, (16, 16), 64, 1)
+    assert bins.n_bands == 4
+    return bins.n_listed
+
+
+@pytest.mark.parametrize(
+    ("corners", "expected"),
+    [
+        ([[-1, 0.9, 0, 1], [1, 0.9, 0, 1], [0, 0.6, 0, 1]], 1),  # in the first rows
+        ([[-1, 0.9, 0, 1], [1, 0.9, 0, 1], [0, -0.9, 0, 1]], 4),
+        ([[-1, 0.9, -3, 1], [1, 0.9, -3, 1], [0, 0.6, -3, 1]], 0),  # nothing in front of the near plane
+        ([[-1, 0.9, 0, 1], [1, 0.9, 0, 1], [0, 0.6, -3, 1]], 1),  # cut
+        ([[-1, 0.9, 0, 1], [1, 0.9, 0, 1], [0, -0.9, -3, 1]], 2),  # what is left of it is a third as tall
+    ],
+)
+def test_bands_list_what_reaches_into_them(corners, expected):
+    assert listed_in_bands(np.array(corners, float)) == expected
+
+
+def test_cut_triangles_that_are_turned_away_are_in_no_band():
+    corners = np.array([[-1, 0.9, 0, 1], [1, 0.9, 0, 1], [0, 0.6, -3, 1.0]])
+    assert sorted(listed_in_bands(corners, side) for side in ("back", "front")) == [0, 1]
+
+
+def guess_of(vertices, size, **view):
+    """What a scene in pixels seems to hold: triangles in the picture, layers, and rows."""
+    triangles = np.arange(len(vertices), dtype=np.int32).reshape(-1, 3)
+    checked = View.parse(size, view)
+    return snap_scene(KeptMemory(), vertices, triangles, checked, with_depth=False, out=None).scene.guess_seen(*size)
+
+
+def test_guess_counts_triangles_in_the_picture():
+    triangle = np.array([[2.0, 2], [6, 2], [2, 6]])
+    vertices = np.concatenate([triangle + [20 * i, 0] for i in range(4)])
+    assert guess_of(vertices, (20, 10)) == (1.0, 8 / 200, 4.0)
+    assert guess_of(vertices, (40, 10)) == (2.0, 16 / 400, 8.0)
+    assert guess_of(vertices, (20, 10), origin=(80, 0)) == (0.0, 0.0, 0.0)
+
+
+def test_guess_of_an_area_is_at_most_its_box_in_the_picture():
+    assert guess_of(np.array([[-10.0, -10], [1000, -10], [-10, 1000]]), (10, 10)) == (1.0, 1.0, 10.0)
+    assert guess_of(np.array([[2.0**30, 0], [0, 2.0**30], [0, 0]]), (10, 10)) == (1.0, 1.0, 10.0)
+
+
+def test_guess_of_nothing_is_nothing():
+    assert guess_of(np.empty((0, 2)), (10, 10)) == (0.0, 0.0, 0.0)
+
+
+def test_colours_are_stored_as_they_come_where_few_are_seen():
+    def is_direct(n_seen, n_hidden):
+        triangle = np.array([[2.0, 2], [6, 2], [2, 6]])
+        vertices = np.concatenate([np.tile(triangle, (n_seen, 1)), np.tile(triangle - 100, (n_hidden, 1))])
+        order = np.random.default_rng(1).permutation(n_seen + n_hidden)
+        triangles = np.arange(len(vertices)).reshape(-1, 3)[order]
+        plan = tl.plan(vertices, triangles, (100, 100), outputs="color")
+        return "painter's order" in next(stage.choice for stage in plan.stages if stage.name == "method")
+
+    assert is_direct(100, 0)
+    assert not is_direct(400, 0)
+    assert is_direct(100, 2000)
+    assert not is_direct(2000, 2000)
+
+
+@pytest.mark.parametrize(
+    ("n", "size_px", "size", "expected"), [(50, 60, (1920, 1080), 4), (1, 60, (300, 300), 1), (200, 900, (300, 300), 4)]
+)
+def test_threads_are_as_many_as_the_work_is_worth(monkeypatch, n, size_px, size, expected):
+    monkeypatch.setattr(choices, "available_threads", lambda: 4)
+    vertices, triangles, _ = tl.scenes.random_triangles(n, size_px, *size)
+    plan = tl.plan(vertices, triangles, size)
+    assert plan.threads == expected
+    assert tl.plan(vertices, triangles, size, threads=3).threads == 3
+
+
+def test_threads_are_no_more_than_rows(monkeypatch):
+    monkeypatch.setattr(choices, "available_threads", lambda: 4)
+    vertices, triangles, _ = tl.scenes.random_triangles(2000, 900, 4000, 2)
+    assert tl.plan(vertices, triangles, (4000, 2)).threads == 2
+
+
+def test_work_grows_with_what_is_seen_and_asked():
+    def work(n, size_px, sink, **view):
+        vertices, triangles, _ = tl.scenes.random_triangles(n, size_px)
+        checked = View.parse((1920, 1080), view)
+        snapped = snap_scene(KeptMemory(), vertices, triangles, checked, with_depth=True, out=None)
+        return choices.work_ns(checked, snapped.scene, n, sink)
+
+    few = work(1000, 40, Sink.NEAREST)
+    assert few < work(2000, 40, Sink.NEAREST) < work(2000, 80, Sink.NEAREST)
+    assert few > work(1000, 40, Sink.COUNT) > work(1000, 40, Sink.MASK)
+    assert work(1000, 40, Sink.NEAREST, origin=(5000, 0)) == 5 * 1000 + 0.6 * 1920 * 1080
+    assert work(1000, 40, Sink.NEAREST, sampling="msaa4") > 3.9 * few

@@ -85,7 +85,7 @@ def test_what_covers_is_about_what_is_counted(isa):
 
 
 def test_stages_say_what_was_chosen():
-    vertices, triangles = boxes(8, 80, 4000)
+    vertices, triangles = boxes(8, 80, 4000, 4000)
     plan = tl.plan(np.rint(vertices), triangles.astype(np.int64), (400, 200))
     assert [one.name for one in plan.stages] == [
         "input", "transform", "clip", "snap", "arithmetic", "cull", "method", "depth", "sampling", "shade", "threads",

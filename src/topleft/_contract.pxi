@@ -133,7 +133,7 @@ cdef extern from "topleft.h" nogil:
         int is_farthest
         int64_t stride_px
     enum:
-        TL_N_CLASSES, TL_FLIP
+        TL_N_CLASSES, TL_FLIP, TL_SPECIAL
     ctypedef int tl_filter
     ctypedef int tl_wrap
     ctypedef int tl_light_kind

@@ -60,20 +60,44 @@ cdef class Scene:
         w.width, w.height, w.test = width, n_rows, self.test
         return w
 
-    def guess_layers(self, double n_pixels):
-        """Return about how often triangles cover each of n_pixels: from the areas of up to 128 of them, window or not."""
+    def guess_seen(self, int64_t width, int64_t height):
+        """Return about how many triangles reach into the picture, how often they cover each pixel, and their rows in all.
+
+        From the boxes and areas of up to 128 of them; one with a vertex that is wide or outside of a clip plane counts as
+        if it covered the picture.
+        """
         cdef const tl_vertex *v = self.scene.mesh.vertices
-        cdef int64_t n = min(self.scene.n_triangles, 128), i, last = self.scene.mesh.n_vertices - 1
+        cdef const tl_vertex *a
+        cdef const tl_vertex *b
+        cdef const tl_vertex *c
+        cdef int64_t n = min(self.scene.n_triangles, 128), i, n_seen = 0, last = self.scene.mesh.n_vertices - 1
         cdef const int32_t *t
-        cdef double unit = 2.0 * 4.0**self.subpixel_bits, area, total = 0
+        cdef double unit = 2.0**self.subpixel_bits, area, total = 0, n_rows = 0, n_pixels = <double>width * height
+        cdef double left = self.x_px * unit, top = self.y_px * unit, cols, rows, each
+        cdef double right = (self.x_px + width) * unit, bottom = (self.y_px + height) * unit
         for i in range(n):
             t = self.scene.triangles + 3 * (i * self.scene.n_triangles // n)
             if not (0 <= t[0] <= last and 0 <= t[1] <= last and 0 <= t[2] <= last):
-                return 0.0  # an error that draw finds
-            area = (<double>v[t[1]].x_fx - v[t[0]].x_fx) * (<double>v[t[2]].y_fx - v[t[0]].y_fx)
-            area -= (<double>v[t[1]].y_fx - v[t[0]].y_fx) * (<double>v[t[2]].x_fx - v[t[0]].x_fx)
-            total += min(abs(area) / unit, n_pixels)
-        return total * self.scene.n_triangles / (n * n_pixels) if n else 0.0
+                return 0.0, 0.0, 0.0  # an error that draw finds
+            a, b, c = &v[t[0]], &v[t[1]], &v[t[2]]
+            cols = min(<double>max(a.x_fx, b.x_fx, c.x_fx), right) - max(<double>min(a.x_fx, b.x_fx, c.x_fx), left)
+            rows = min(<double>max(a.y_fx, b.y_fx, c.y_fx), bottom) - max(<double>min(a.y_fx, b.y_fx, c.y_fx), top)
+            if a.x_fx == TL_SPECIAL or b.x_fx == TL_SPECIAL or c.x_fx == TL_SPECIAL:
+                n_seen += 1
+                total += n_pixels
+                n_rows += height
+                continue
+            if cols <= 0 or rows <= 0:
+                continue
+            n_seen += 1
+            n_rows += rows / unit
+            area = (<double>b.x_fx - a.x_fx) * (<double>c.y_fx - a.y_fx)
+            area -= (<double>b.y_fx - a.y_fx) * (<double>c.x_fx - a.x_fx)
+            total += min(0.5 * abs(area), cols * rows) / (unit * unit)
+        if not n or not n_pixels:
+            return 0.0, 0.0, 0.0
+        each = self.scene.n_triangles / <double>n
+        return n_seen * each, total * each / n_pixels, n_rows * each
 
     def count_classes(self, int sink, int64_t width, int64_t height, const int32_t[:, ::1] samples=None):
         """Count the triangles by the code that draws them into a sink: `tl_census` in ``csrc/topleft.h``.

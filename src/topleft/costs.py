@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from topleft.choices import NEAR_PIXELS
 from topleft.models import Sampling, Sink
 
 __all__ = ["FEATURES", "Costs", "cache_file", "features", "load_costs", "save_costs", "sink_group"]
@@ -23,9 +24,6 @@ __all__ = ["FEATURES", "Costs", "cache_file", "features", "load_costs", "save_co
 FEATURES = (
     "hidden", "tiny", "small", "middle", "rows", "long", "64-bit", "128-bit", "point", "span", "pixel", "cold",
 )  # fmt: skip
-
-#: Pixels of a picture that stay in a near cache while it is drawn; those of a larger one are cold when they are met.
-NEAR_PIXELS = 400_000
 
 Census = Sequence[tuple[int, float, float]]
 

@@ -18,15 +18,10 @@ from topleft.rasterize import canvas_of, draw, draw_all_samples
 from topleft.resolve import parse_resolve, resolve_colors, resolve_flat, resolve_gouraud
 from topleft.sampling import draw_means, sample_positions
 from topleft.snapped import Snapped, check_triangles, snap_scene
-from topleft.threads import count_threads, run_parts
+from topleft.threads import run_parts
 from topleft.view import View
 
 __all__ = ["Style", "draw_fill"]
-
-#: With fewer pixels in the picture for each triangle, labels take less time than colours stored triangle by triangle:
-#: 200,000 triangles of 8 px in 1920x1080 take 6.4 and 8 ms, 20,000 of 40 px 3.8 and 2.3 ms.
-MIN_PIXELS_A_TRIANGLE = 45
-
 
 @dataclass(frozen=True, slots=True)
 class Style:
@@ -66,7 +61,7 @@ def draw_fill(
         if ground is None and out is None:
             ground = np.zeros((), palette.dtype)
         is_drawn = bool(canvas.size and snapped.n_triangles)
-        is_blended = blending.is_needed or is_direct(palette, snapped, view, is_flat=is_flat)
+        is_blended = blending.is_needed or choices.is_direct(snapped.scene, view, palette.dtype, is_flat=is_flat)
         can_lay = is_drawn and is_blended and palette.dtype == np.uint8 and view.sampling.n_samples == 1
         if ground is not None and not can_lay:
             lay_ground(canvas, ground)
@@ -111,16 +106,6 @@ def lay_ground(pixels: NDArray[Any], ground: NDArray[Any]) -> None:
     pixels[1:] = pixels[:1]
 
 
-def is_direct(palette: NDArray[Any], snapped: Snapped, view: View, *, is_flat: bool) -> bool:
-    """Tell whether colours are best stored triangle by triangle, without labels in between.
-
-    Labels cost a pass to clear and one to colour them, and less a triangle.
-    """
-    width, height = view.size
-    is_plain = is_flat and palette.dtype == np.uint8 and view.sampling.n_samples == 1
-    return is_plain and snapped.n_triangles * MIN_PIXELS_A_TRIANGLE <= width * height
-
-
 def paint(
     memory: Memory,
     snapped: Snapped,
@@ -140,7 +125,7 @@ def paint(
     def paint_rows(first: int, end: int) -> None:
         snapped.scene.paint(labels, palette, flat, first, end - first, is_flat, colors.dtype == np.uint8, n_channels)
 
-    run_parts(paint_rows, height, count_threads(view.threads, snapped.n_triangles))
+    run_parts(paint_rows, height, choices.threads_to_draw(view, snapped.scene, snapped.n_triangles, Sink.LABEL))
 
 
 def paint_samples(
@@ -156,7 +141,7 @@ def paint_samples(
     """Draw coloured triangles over contiguous pixels, each pixel the mean of its samples."""
     width, height = view.size
     positions = sample_positions(view.sampling.n_samples, view.grid_bits)
-    n_threads = min(height, count_threads(view.threads, snapped.n_triangles))
+    n_threads = choices.threads_to_draw(view, snapped.scene, snapped.n_triangles, Sink.LABEL)
     if is_flat and choices.can_share(view):
         palette = _engine.Palette(colors, transfer)
         if draw_means(memory, snapped.scene, snapped.n_triangles, positions, palette, pixels, n_threads):
@@ -188,7 +173,7 @@ def blend(
 
     `ground`, for uint8 with one sample a pixel: the colour that all pixels get before.
     """
-    n_threads = count_threads(view.threads, snapped.n_triangles)
+    n_threads = choices.threads_to_draw(view, snapped.scene, snapped.n_triangles, Sink.LABEL)
     if view.sampling.n_samples == 1:
         pictures, scenes = pixels[None], [snapped.scene]
     else:

@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from topleft import choices
 from topleft.arrays import as_array
-from topleft.fill import is_direct
 from topleft.memory import FreshMemory
 from topleft.models import DepthTest, Sampling, Sink
 from topleft.sampling import sample_positions
@@ -54,6 +53,8 @@ class Facts:
     flat_depth: float | None  # when ids are drawn alone
     common_depth: float | None  # of all vertices, whatever is made of it
     is_direct: bool  # uint8 colours of triangles are stored without labels in between
+    n_threads: int  # that draw
+    work_ms: float  # of one thread, as guessed before the draw
     census: tuple[tuple[int, float, float], ...]  # of each of CLASSES: triangles, samples in boxes, covered
 
     def count(self, *names: str) -> int:
@@ -69,11 +70,6 @@ class Facts:
     def draws_planes(self) -> bool:
         """Whether each sample is a picture of its own."""
         return self.view.sampling.n_samples > 1 and self.verb in ("rasterize", "fill")
-
-    @property
-    def n_threads(self) -> int:
-        """How many threads draw."""
-        return choices.threads_to_draw(self.view, self.n_triangles)
 
     @property
     def is_shared(self) -> bool:
@@ -149,7 +145,9 @@ def find_facts(
         n_pieces=len(pieces) if pieces else 0,
         flat_depth=flat,
         common_depth=common,
-        is_direct=verb == "fill" and is_direct(np.zeros(1, np.uint8), snapped, view, is_flat=True),
+        is_direct=verb == "fill" and choices.is_direct(snapped.scene, view, np.dtype(np.uint8), is_flat=True),
+        n_threads=choices.threads_to_draw(view, snapped.scene, snapped.n_triangles, drawn_sink),
+        work_ms=choices.work_ns(view, snapped.scene, snapped.n_triangles, drawn_sink) / 1e6,
         census=tuple(census),
     )
     corners = np.array(snapped.corners, np.int32)

@@ -9,13 +9,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from topleft import choices
+from topleft.choices import MIN_THREAD_NS
 from topleft.costs import Costs, features, sink_group
 from topleft.detail import Detail
 from topleft.methods import METHODS
 from topleft.models import Sampling, Sink
 from topleft.plan_facts import Facts
 from topleft.plan_memory import memory_of
-from topleft.threads import MIN_TRIANGLES_PER_THREAD, available_threads, count_threads
+from topleft.threads import available_threads
 
 __all__ = ["Stage", "find_stages"]
 
@@ -272,8 +273,8 @@ def plan_depth(facts: Facts, costs: Costs) -> Stage:
     rejected = ("float32 slopes: faster, but coplanar triangles would hide each other at random",)
     why = "depths differ" if facts.test else "no test was asked for, but the depth of what shows is returned"
     if facts.common_depth is not None:
-        why = f"every vertex lies at depth {facts.common_depth:g}, but this picture is small or mostly empty"
-        rejected = ("ids alone, and one pass over all pixels for depth: pays from one layer and 65,536 pixels on",)
+        why = f"every vertex lies at depth {facts.common_depth:g}, but little of the picture is covered"
+        rejected = ("ids alone, and a pass over all pixels for depth: longer than the comparisons",)
     return Stage("depth", what, why, rejected, timed_in="method")
 
 
@@ -284,10 +285,10 @@ def plan_threads(facts: Facts, costs: Costs) -> Stage:
     wake = f"waking a thread takes {costs.other['wake'] / 1e3:.0f} us"
     if view.threads is not None:
         why = f"threads={view.threads} was asked for"
-    elif count_threads(None, n) == usable:
-        why = f"the process may use {usable}, and {n:,} triangles are at least {MIN_TRIANGLES_PER_THREAD:,} for each"
     else:
-        why = f"{n:,} triangles are fewer than {MIN_TRIANGLES_PER_THREAD:,} for each of {usable}; {wake}"
+        is_enough = "at least" if n_threads == usable else "less than"
+        each = f"{MIN_THREAD_NS / 1e6:g} ms for each of {usable}"
+        why = f"about {facts.work_ms:.2g} ms of work are {is_enough} {each}; {wake}"
     if n_threads == 1:
         return Stage("threads", "1, the caller's own", why, (f"more: {wake}",))
     if facts.is_shared:

@@ -27,7 +27,6 @@ from topleft.plan_facts import CLASSES, find_facts
 from topleft.plan_memory import memory_of
 from topleft.plan_stages import Stage, find_stages, plan_detail
 from topleft.plan_table import as_html, as_text
-from topleft.threads import count_threads
 from topleft.view import CULL_CODES, View, ViewOptions
 
 __all__ = ["OUTPUTS", "Plan", "plan"]
@@ -339,7 +338,7 @@ def plan(
         classes=MappingProxyType(dict(zip(CLASSES, (row[0] for row in facts.census), strict=True))),
         scratch_bytes=MappingProxyType(scratch),
         result_bytes=MappingProxyType(results),
-        threads=count_threads(checked.threads, facts.n_triangles),
+        threads=max(1, facts.n_threads),
         costs=costs.source,
         _view=checked,
         _corners=corners,

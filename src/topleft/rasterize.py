@@ -22,7 +22,7 @@ from topleft.memory import Memory
 from topleft.models import DepthTest, Sampling, Sink, parse
 from topleft.sampling import draw_planes, sample_positions
 from topleft.snapped import Snapped, check_triangles, snap_scene
-from topleft.threads import count_threads, run_parts
+from topleft.threads import run_parts
 from topleft.view import View
 
 __all__ = ["canvas_of", "draw", "draw_all_samples", "draw_coverage", "draw_fragments", "draw_overdraw"]
@@ -50,7 +50,7 @@ def draw(
         n_samples = 1 if samples is None else len(samples)
         covered = memory.empty("covered", _engine.Target.covered_shape(height, width, n_samples), np.uint64)
     target = _engine.Target(sink, pixels, depth, covered, samples, earlier_wins)
-    n_parts = choices.threads_to_draw(view, snapped.n_triangles)
+    n_parts = choices.threads_to_draw(view, snapped.scene, snapped.n_triangles, sink)
 
     def draw_rows(first: int, end: int) -> int:
         return snapped.scene.draw(target, first, end - first)
@@ -81,7 +81,7 @@ def draw_flat(
     def set_depth(first: int, end: int) -> None:
         _engine.set_flat_depth(ids, depth, first, end - first, earlier_wins, flat_depth, background)
 
-    run_parts(set_depth, len(ids), choices.threads_to_draw(view, snapped.n_triangles))
+    run_parts(set_depth, len(ids), choices.threads_to_draw(view, snapped.scene, snapped.n_triangles, Sink.LABEL))
     view.mark("depth")
 
 
@@ -129,7 +129,7 @@ def draw_area(
 ) -> NDArray[np.float32]:
     """Return the area that triangles cover of each pixel, or at most 1 of it."""
     with canvas_of(memory, f"{name} area", out, view.size[::-1], np.float32) as (result, canvas):
-        n_threads = count_threads(view.threads, snapped.n_triangles)
+        n_threads = choices.threads_to_draw(view, snapped.scene, snapped.n_triangles, Sink.COUNT)
         if sum_areas(memory, snapped.scene, canvas, n_threads, is_clamped=is_clamped):
             check_triangles(snapped.triangles, snapped.corners, snapped.n_vertices)
     view.mark("draw")
@@ -225,7 +225,7 @@ def draw_all_samples(
     width, height = view.size
     if not (width and height):
         return
-    n_threads = choices.threads_to_draw(view, snapped.n_triangles)
+    n_threads = choices.threads_to_draw(view, snapped.scene, snapped.n_triangles, sink)
     is_near = snapped.n_triangles > 0 and choices.can_share(view)
     if draw_planes(
         memory, snapped.scene, snapped.n_triangles, positions, sink, pixels, depth, n_threads, is_near=is_near

@@ -75,7 +75,9 @@ def snap_scene(
         check_triangles(triangles, corners, len(points))
     if bad:
         check_used_vertices(points, records, corners, view)
-    pieces = _engine.Pieces(source, records, corners, engine_view) if engine_view and clipped else None
+    pieces = None
+    if engine_view is not None and choices.must_cut(clipped):
+        pieces = _engine.Pieces(source, records, corners, engine_view)
     view.mark("clip")
     if view.grid_bits > view.subpixel_bits:
         wide = refine_scene(points, records, wide, corners, pieces, view)

@@ -15,7 +15,7 @@ __all__ = ["available_threads", "count_threads", "parse_threads", "run_parts"]
 
 Part = TypeVar("Part")
 
-#: Below this many triangles a picture is drawn by the calling thread alone, unless the caller asks for more.
+#: Triangles of a scene of instances, of lines or of arrays that are worth a thread; draws: `choices.threads_to_draw`.
 MIN_TRIANGLES_PER_THREAD = 2000
 
 _pool: ThreadPoolExecutor | None = None
