@@ -9,6 +9,7 @@ import pytest
 from surface_samples import corners_of, sampled_distance
 
 import topleft as tl
+from topleft.collapse import border_points, gather
 from topleft.levels import kept_levels
 from topleft.simplify import levels_of
 
@@ -212,3 +213,25 @@ def test_levels_that_cannot_be_written_leave_nothing(tmp_path, monkeypatch):
     with pytest.raises(OSError, match="full"):
         levels.save(tmp_path / "torus.npz")
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("with_uv", [False, True])
+def test_simplify_needles_do_not_end_the_levels(with_uv):
+    vertices, triangles = tl.scenes.blob(20_000)  # a hundred and forty needles round each pole
+    mesh = tl.Mesh(vertices, triangles, uv=vertices[:, :2] if with_uv else None)
+    levels = tl.simplify(mesh)
+    assert len(levels[-1].mesh.triangles) < 1000
+    level = levels[2]
+    if with_uv:  # the point that attributes are taken from is about a cell away at most
+        assert np.abs(level.mesh.uv - level.mesh.vertices[:, :2]).max() < 0.1
+    assert level.bound < 0.1
+
+
+def test_gather_leaves_borders_alone():
+    points, triangles = grid(12)
+    found = gather(points, triangles, 8)
+    on_border = border_points(triangles)
+    assert len(on_border) == 48
+    assert np.array_equal(found.points[found.into[on_border]], points[on_border])
+    assert len(found.triangles) < len(triangles)
+    assert (found.into >= 0).sum() >= len(found.points)
