@@ -55,7 +55,7 @@ def collapser() -> Any:
         If it is not installed.
     """
     try:
-        import fast_simplification  # type: ignore[import-not-found, unused-ignore]
+        import fast_simplification  # type: ignore[import-not-found, import-untyped, unused-ignore]
     except ImportError:
         raise MissingPackageError(
             "levels of detail need fast-simplification: pip install 'topleft[simplify]'"
