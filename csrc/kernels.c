@@ -33,6 +33,9 @@
 #include "shade.c"
 #include "shade_samples.c"
 #include "shade_cutout.c"
+#include "weights.c"
+#include "points.c"
+#include "shade_normals.c"
 #include "planes.c"
 #include "nearest.c"
 #include "reach.c"
@@ -59,6 +62,7 @@ const tl_kernels TL_KERNELS = {
     .list_bins = list_bins,
     .draw_area = draw_area,
     .blend = blend,
+    .inverse_w = inverse_ws,
     .barycentric = barycentric,
     .interpolate = interpolate,
     .paint_flat = paint_flat,
@@ -68,6 +72,8 @@ const tl_kernels TL_KERNELS = {
     .composite = composite,
     .set_inverse_w = set_inverse_w,
     .shade = shade,
+    .shade_normals = shade_normals,
+    .fill_points = fill_points,
     .shade_samples = shade_samples,
     .cut_out = cut_out,
     .mean_flat = mean_flat,

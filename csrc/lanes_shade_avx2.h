@@ -14,6 +14,12 @@ TL_INLINE vf vf_lookup(const float *table, vi i)
 }
 TL_INLINE vi vi_lookup(const int32_t *table, vi i) { return _mm256_castps_si256(vf_lookup((const float *)table, i)); }
 TL_INLINE vf vf_pick(const float *p, vi i) { return _mm256_permutevar8x32_ps(_mm256_loadu_ps(p), i); }
+TL_INLINE vd vd_load(const double *p) { return (vd){_mm256_loadu_pd(p), _mm256_loadu_pd(p + 4)}; }
+TL_INLINE vd vd_sqrt(vd a) { return (vd){_mm256_sqrt_pd(a.lo), _mm256_sqrt_pd(a.hi)}; }
+TL_INLINE vd vd_pick(const double *p, vi i)
+{
+    return (vd){_mm256_i32gather_pd(p, _mm256_castsi256_si128(i), 8), _mm256_i32gather_pd(p, _mm256_extracti128_si256(i, 1), 8)};
+}
 TL_INLINE vi vi_pick(const int32_t *p, vi i) { return _mm256_permutevar8x32_epi32(_mm256_loadu_si256((const __m256i *)p), i); }
 TL_INLINE vi vi_prefix_count(unsigned bits)
 {
@@ -55,4 +61,40 @@ TL_INLINE void vf_store_fourths(const float *rows, vf fourth, float *out)
         const vi at = _mm256_add_epi32(_mm256_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1), _mm256_set1_epi32(2 * k));
         _mm256_storeu_ps(out + 8 * k, _mm256_blend_ps(_mm256_loadu_ps(rows + 8 * k), _mm256_permutevar8x32_ps(fourth, at), 0x88));
     }
+}
+/* Pixels of two and of three numbers, one after the other. */
+TL_INLINE void vf_store_pairs(float *p, const vf *c)
+{
+    const vf low = _mm256_unpacklo_ps(c[0], c[1]), high = _mm256_unpackhi_ps(c[0], c[1]);
+    _mm256_storeu_ps(p, _mm256_permute2f128_ps(low, high, 0x20));
+    _mm256_storeu_ps(p + 8, _mm256_permute2f128_ps(low, high, 0x31));
+}
+TL_INLINE void vf_store_triples(float *p, const vf *c)
+{
+    static const int32_t from[24] = {0, 0, 0, 1, 1, 1, 2, 2, 2, 3, 3, 3, 4, 4, 4, 5, 5, 5, 6, 6, 6, 7, 7, 7};
+    vf turned[3][3];
+    for (int k = 0; k < 3; k++)
+        for (int channel = 0; channel < 3; channel++)
+            turned[k][channel] = _mm256_permutevar8x32_ps(c[channel], _mm256_loadu_si256((const __m256i *)(from + 8 * k)));
+    _mm256_storeu_ps(p, _mm256_blend_ps(_mm256_blend_ps(turned[0][0], turned[0][1], 0x92), turned[0][2], 0x24));
+    _mm256_storeu_ps(p + 8, _mm256_blend_ps(_mm256_blend_ps(turned[1][0], turned[1][1], 0x24), turned[1][2], 0x49));
+    _mm256_storeu_ps(p + 16, _mm256_blend_ps(_mm256_blend_ps(turned[2][0], turned[2][1], 0x49), turned[2][2], 0x92));
+}
+/* Four doubles at base + 8 * stride * i[k], as columns. */
+TL_INLINE void vd_load_records(const double *base, int stride, const int32_t *i, vd *c)
+{
+    __m256d half[2][4];
+    for (int part = 0; part < 2; part++) {
+        __m256d row[4];
+        for (int k = 0; k < 4; k++)
+            row[k] = _mm256_loadu_pd(base + (int64_t)i[4 * part + k] * stride);
+        const __m256d even[2] = {_mm256_unpacklo_pd(row[0], row[1]), _mm256_unpackhi_pd(row[0], row[1])};
+        const __m256d odd[2] = {_mm256_unpacklo_pd(row[2], row[3]), _mm256_unpackhi_pd(row[2], row[3])};
+        for (int k = 0; k < 2; k++) {
+            half[part][k] = _mm256_permute2f128_pd(even[k], odd[k], 0x20);
+            half[part][k + 2] = _mm256_permute2f128_pd(even[k], odd[k], 0x31);
+        }
+    }
+    for (int k = 0; k < 4; k++)
+        c[k] = (vd){half[0][k], half[1][k]};
 }

@@ -10,6 +10,14 @@ TL_INLINE vi vi_high_half(vi a) { return _mm512_srli_epi32(a, 16); }
 TL_INLINE vf vf_lookup(const float *table, vi i) { return _mm512_permutexvar_ps(i, _mm512_loadu_ps(table)); }
 TL_INLINE vi vi_lookup(const int32_t *table, vi i) { return _mm512_permutexvar_epi32(i, _mm512_loadu_si512(table)); }
 TL_INLINE vf vf_pick(const float *p, vi i) { return _mm512_permutexvar_ps(i, _mm512_loadu_ps(p)); }
+TL_INLINE vd vd_load(const double *p) { return (vd){_mm512_loadu_pd(p), _mm512_loadu_pd(p + 8)}; }
+TL_INLINE vd vd_sqrt(vd a) { return (vd){_mm512_sqrt_pd(a.lo), _mm512_sqrt_pd(a.hi)}; }
+TL_INLINE vd vd_pick(const double *p, vi i)
+{
+    const __m512d low = _mm512_loadu_pd(p), high = _mm512_loadu_pd(p + 8);
+    return (vd){_mm512_permutex2var_pd(low, _mm512_cvtepi32_epi64(_mm512_castsi512_si256(i)), high),
+                _mm512_permutex2var_pd(low, _mm512_cvtepi32_epi64(_mm512_extracti64x4_epi64(i, 1)), high)};
+}
 TL_INLINE vi vi_pick(const int32_t *p, vi i) { return _mm512_permutexvar_epi32(i, _mm512_loadu_si512(p)); }
 TL_INLINE vi vi_prefix_count(unsigned bits)
 {
@@ -56,4 +64,41 @@ TL_INLINE void vf_store_fourths(const float *rows, vf fourth, float *out)
         const vi at = _mm512_add_epi32(_mm512_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3), _mm512_set1_epi32(4 * k));
         _mm512_storeu_ps(out + 16 * k, _mm512_mask_permutexvar_ps(_mm512_loadu_ps(rows + 16 * k), 0x8888, at, fourth));
     }
+}
+/* Pixels of two and of three numbers, one after the other. */
+TL_INLINE void vf_store_pairs(float *p, const vf *c)
+{
+    const vi low = _mm512_setr_epi32(0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23);
+    _mm512_storeu_ps(p, _mm512_permutex2var_ps(c[0], low, c[1]));
+    _mm512_storeu_ps(p + 16, _mm512_permutex2var_ps(c[0], _mm512_add_epi32(low, _mm512_set1_epi32(8)), c[1]));
+}
+TL_INLINE void vf_store_triples(float *p, const vf *c)
+{
+    static const int32_t from[48] = {0, 16, 0, 1, 17, 1, 2, 18, 2, 3, 19, 3, 4, 20, 4, 5, 21, 5, 6, 22, 6, 7, 23, 7, 8, 24, 8, 9, 25, 9, 10, 26, 10, 11, 27, 11, 12, 28, 12, 13, 29, 13, 14, 30, 14, 15, 31, 15};
+    static const __mmask16 is_third[3] = {0x4924, 0x2492, 0x9249};
+    for (int k = 0; k < 3; k++) {
+        const vi at = _mm512_loadu_si512(from + 16 * k);
+        _mm512_storeu_ps(p + 16 * k, _mm512_mask_permutexvar_ps(_mm512_permutex2var_ps(c[0], at, c[1]), is_third[k], at, c[2]));
+    }
+}
+/* Four doubles at base + 8 * stride * i[k], as columns. */
+TL_INLINE void vd_load_records(const double *base, int stride, const int32_t *i, vd *c)
+{
+    __m512d half[2][4];
+    for (int part = 0; part < 2; part++) {
+        __m512d row[4];
+        for (int k = 0; k < 4; k++) { /* lanes k and k + 4 */
+            const double *a = base + (int64_t)i[8 * part + k] * stride, *b = base + (int64_t)i[8 * part + k + 4] * stride;
+            row[k] = _mm512_insertf64x4(_mm512_castpd256_pd512(_mm256_loadu_pd(a)), _mm256_loadu_pd(b), 1);
+        }
+        const __m512d even[2] = {_mm512_unpacklo_pd(row[0], row[1]), _mm512_unpackhi_pd(row[0], row[1])};
+        const __m512d odd[2] = {_mm512_unpacklo_pd(row[2], row[3]), _mm512_unpackhi_pd(row[2], row[3])};
+        const __m512i low = _mm512_setr_epi64(0, 1, 8, 9, 4, 5, 12, 13), high = _mm512_setr_epi64(2, 3, 10, 11, 6, 7, 14, 15);
+        for (int k = 0; k < 2; k++) {
+            half[part][k] = _mm512_permutex2var_pd(even[k], low, odd[k]);
+            half[part][k + 2] = _mm512_permutex2var_pd(even[k], high, odd[k]);
+        }
+    }
+    for (int k = 0; k < 4; k++)
+        c[k] = (vd){half[0][k], half[1][k]};
 }

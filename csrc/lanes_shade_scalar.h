@@ -10,6 +10,9 @@ TL_INLINE vi vi_high_half(vi a) { return (vi)((uint32_t)a >> 16); }
 TL_INLINE vf vf_lookup(const float *table, vi i) { return table[i & 15]; }
 TL_INLINE vi vi_lookup(const int32_t *table, vi i) { return table[i & 15]; }
 TL_INLINE vf vf_pick(const float *p, vi i) { (void)i; return *p; }
+TL_INLINE vd vd_load(const double *p) { return *p; }
+TL_INLINE vd vd_sqrt(vd a) { return sqrt(a); }
+TL_INLINE vd vd_pick(const double *p, vi i) { (void)i; return *p; }
 TL_INLINE vi vi_pick(const int32_t *p, vi i) { (void)i; return *p; }
 TL_INLINE vi vi_prefix_count(unsigned bits) { return (vi)(bits & 1); }
 TL_INLINE void vi_load_records(const void *base, int scale, const int32_t *i, vi *c) { memcpy(c, (const char *)base + (int64_t)*i * scale, 16); }
@@ -21,3 +24,8 @@ TL_INLINE void vf_store_fourths(const float *rows, vf fourth, float *out)
         out[k] = rows[k];
     out[3] = fourth;
 }
+/* Pixels of two and of three numbers, one after the other. */
+TL_INLINE void vf_store_pairs(float *p, const vf *c) { p[0] = c[0], p[1] = c[1]; }
+TL_INLINE void vf_store_triples(float *p, const vf *c) { p[0] = c[0], p[1] = c[1], p[2] = c[2]; }
+/* Four doubles at base + 8 * stride * i[k], as columns. */
+TL_INLINE void vd_load_records(const double *base, int stride, const int32_t *i, vd *c) { memcpy(c, base + (int64_t)*i * stride, 32); }

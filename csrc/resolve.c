@@ -1,5 +1,5 @@
-/* Resolve: attributes from a visibility buffer, once per visible pixel.
- * In: triangle ids and the vertex records they were drawn from.  Out: barycentric weights or interpolated values. */
+/* Resolve: the weights of one pixel, of any triangle whatever.  weights.c has the same a vector of pixels at a time.
+ * In: a triangle's id and the vertex records it was drawn from.  Out: barycentric weights, float64. */
 #include "fixed.h"
 
 /* The triangle (or piece) under the last pixel: neighbours mostly share it. */
@@ -98,40 +98,4 @@ static void weights_of_pixel(const resolve_state *s, int64_t x_px, int64_t y_px,
         else
             weights[s->slot[k]] = part[k] / sum;
     }
-}
-
-static void barycentric(const tl_scene *scene, const tl_window *window, const int32_t *ids, float *restrict out)
-{
-    resolve_state s = {.id = -1};
-    for (int64_t row = 0; row < window->height; row++)
-        for (int64_t col = 0; col < window->width; col++, ids++, out += 3) {
-            double w[3] = {0.0, 0.0, 0.0};
-            const int64_t x_px = col + window->x_px, y_px = row + window->y_px;
-            if (*ids >= 0 && find_triangle(&s, scene, *ids, x_px, y_px, window->subpixel_bits))
-                weights_of_pixel(&s, x_px, y_px, window->subpixel_bits, w);
-            for (int k = 0; k < 3; k++)
-                out[k] = (float)w[k];
-        }
-}
-
-static void interpolate(const tl_scene *scene, const tl_window *window, const int32_t *ids, const float *values, int n_values,
-                        int per_corner, float background, float *restrict out)
-{
-    resolve_state s = {.id = -1};
-    for (int64_t row = 0; row < window->height; row++)
-        for (int64_t col = 0; col < window->width; col++, ids++, out += n_values) {
-            const int64_t x_px = col + window->x_px, y_px = row + window->y_px;
-            if (*ids < 0 || !find_triangle(&s, scene, *ids, x_px, y_px, window->subpixel_bits)) {
-                for (int c = 0; c < n_values; c++)
-                    out[c] = background;
-                continue;
-            }
-            double w[3];
-            const float *v[3];
-            weights_of_pixel(&s, x_px, y_px, window->subpixel_bits, w);
-            for (int k = 0; k < 3; k++)
-                v[k] = values + n_values * (per_corner ? 3 * (int64_t)*ids + k : scene->triangles[3 * (int64_t)*ids + k]);
-            for (int c = 0; c < n_values; c++)
-                out[c] = (float)(w[0] * v[0][c] + w[1] * v[1][c] + w[2] * v[2][c]);
-        }
 }

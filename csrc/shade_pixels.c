@@ -50,8 +50,8 @@ static void set_special_edges(shaded_lanes *p)
     }
 }
 
-/* The lanes of vector i of the span that begins at `column`. */
-TL_INLINE void find_pixels(shaded_lanes *p, const shade_runs *s, int i, int64_t column)
+/* The lanes of vector i of the span that begins at `column`, and their edge functions; but for those of special runs. */
+TL_INLINE void find_lanes(shaded_lanes *p, const shade_runs *s, int i, int64_t column, vi *e, vi *sum)
 {
     const unsigned starts = s->starts[i];
     const int begins = (int)(starts & 1);
@@ -60,13 +60,20 @@ TL_INLINE void find_pixels(shaded_lanes *p, const shade_runs *s, int i, int64_t 
     p->run = vi_sub(vi_prefix_count(starts), vi_set1(begins));
     p->visible = vm_from_bits(s->visible[i]);
     p->column = vi_add(vi_iota(), vi_set1((int32_t)column + i * TL_LANES));
-    const vi e1 = vi_add(pick_int(p, RUN_E1), vi_mul(p->column, pick_int(p, RUN_STEP1)));
-    const vi e2 = vi_add(pick_int(p, RUN_E2), vi_mul(p->column, pick_int(p, RUN_STEP2)));
-    const vi sum = pick_int(p, RUN_SUM);
+    e[1] = vi_add(pick_int(p, RUN_E1), vi_mul(p->column, pick_int(p, RUN_STEP1)));
+    e[2] = vi_add(pick_int(p, RUN_E2), vi_mul(p->column, pick_int(p, RUN_STEP2)));
+    *sum = pick_int(p, RUN_SUM);
+    e[0] = vi_sub(vi_sub(*sum, e[1]), e[2]);
+}
+
+/* The same as float32, of all runs. */
+TL_INLINE void find_pixels(shaded_lanes *p, const shade_runs *s, int i, int64_t column)
+{
+    vi e[3], sum;
+    find_lanes(p, s, i, column, e, &sum);
     p->area = vf_from_vi(sum);
-    p->e[0] = vf_from_vi(vi_sub(vi_sub(sum, e1), e2));
-    p->e[1] = vf_from_vi(e1);
-    p->e[2] = vf_from_vi(e2);
+    for (int k = 0; k < 3; k++)
+        p->e[k] = vf_from_vi(e[k]);
     if (s->n_special)
         set_special_edges(p);
 }

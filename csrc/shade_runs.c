@@ -74,12 +74,14 @@ TL_INLINE void find_runs(shade_runs *s, const int32_t *ids, int n)
     s->n_runs = slot - TL_LANES;
 }
 
-/* The corners of the triangles of TL_LANES runs; indices that the vertices do not have are bent to some that they have. */
-TL_INLINE void run_corners(const shade_runs *s, int slot, int32_t corners[3][TL_MAX_LANES])
+/* The corners of the triangles of TL_LANES runs; indices that the vertices do not have are bent to some that they have.
+ * Returns the runs that needed none of that. */
+TL_INLINE vm run_corners(const shade_runs *s, int slot, int32_t corners[3][TL_MAX_LANES])
 {
     const int32_t *ids = s->ints[RUN_ID] + slot;
     const vi last = vi_set1((int32_t)s->scene->mesh.n_vertices - 1), zero = vi_set1(0);
     vi c[4];
+    vm is_there = vm_all();
     if (TL_LANES > 1 && !vm_any(vi_eq(vi_load(ids), zero))) {
         vi_load_records((const char *)s->scene->triangles - 4, 12, ids, c); /* 16 bytes, from the number before the triangle on */
     } else {
@@ -90,8 +92,12 @@ TL_INLINE void run_corners(const shade_runs *s, int slot, int32_t corners[3][TL_
         for (int k = 0; k < 3; k++)
             c[k + 1] = vi_load(own[k]);
     }
-    for (int k = 0; k < 3; k++)
-        vi_spill(corners[k], vi_max(vi_min(c[k + 1], last), zero));
+    for (int k = 0; k < 3; k++) {
+        const vi corner = vi_max(vi_min(c[k + 1], last), zero);
+        is_there = vm_and(is_there, vi_eq(corner, c[k + 1]));
+        vi_spill(corners[k], corner);
+    }
+    return is_there;
 }
 
 TL_INLINE void put(shade_runs *s, int coefficient, int slot, vf a) { vf_store(s->floats[coefficient] + slot, a); }

@@ -302,6 +302,28 @@ typedef struct {
 
 #define TL_PLANE_DOUBLES 8
 
+/* ---- points of pixels ---------------------------------------------------------------------------------- */
+
+/* What is told of the point of a pixel. */
+typedef enum {
+    TL_POINT_ROWS_OF = 0, /* n_rows numbers, 1 or 3 */
+    TL_POINT_LENGTH = 1,  /* the length of three */
+    TL_POINT_FLOW = 2,    /* the way in pixels, x and y, from where three numbers x, y, w lie to where three others do; NaN unless w > 0 */
+} tl_point_kind;
+
+#define TL_POINT_ROWS 6
+
+typedef struct {
+    const void *positions; /* (n_vertices, 3) float32 or float64 */
+    int is_f64;
+    tl_point_kind kind;
+    int n_rows;
+    double rows[TL_POINT_ROWS][4];        /* a number is row . (x, y, z, 1) */
+    double half_width_px, half_height_px; /* FLOW: half of the whole picture */
+    double background;
+    int is_f64_out;
+} tl_points;
+
 /* ---- the kernel table ---------------------------------------------------------------------------------- */
 
 typedef struct tl_kernels {
@@ -356,6 +378,9 @@ typedef struct tl_kernels {
     /* Blends the colours of triangles into the canvas in their order.  Returns as `draw` does. */
     int64_t (*blend)(const tl_scene *scene, const tl_window *window, const tl_canvas *canvas);
 
+    /* 1/w of vertices [first, end) of clip space, for tl_vertex_set; nothing of it is checked. */
+    void (*inverse_w)(const tl_source *source, int64_t first, int64_t end, double *out);
+
     /* Per pixel of `ids` (rows of window->width): float32 weights of the triangle's three vertices. */
     void (*barycentric)(const tl_scene *scene, const tl_window *window, const int32_t *ids, float *out);
 
@@ -392,10 +417,17 @@ typedef struct tl_kernels {
                           const int32_t *samples_fx, int sample_bits, int64_t stride, const int32_t *ids, const float *depth,
                           uint8_t *pixels);
 
-    /* Draws n triangles over ids and depth of the others, but for what their materials cut out; the window as for a share of a
-     * part, and fewer than 2^31 pixels. */
+    /* Unit normals on the side that is seen, float32 (x, y, z), 0 where nothing is: turned by shading->eye_from; show is NORMALS. */
+    void (*shade_normals)(const tl_scene *scene, const tl_window *window, const tl_view *view, const tl_shading *shading,
+                          const int32_t *ids, float *out);
+
+    /* Per pixel of `ids` (rows of window->width): what is told of its point, float32 or float64. */
+    void (*fill_points)(const tl_scene *scene, const tl_window *window, const tl_points *points, const int32_t *ids, void *out);
+
+    /* Draws n triangles over a target, NEAREST or PEEL, of all others, but for what their materials cut out; the window as for a share of
+     * a part, and fewer than 2^31 pixels. */
     void (*cut_out)(const tl_scene *scene, const tl_window *window, const tl_view *view, const tl_shading *shading,
-                    const int32_t *triangles, int64_t n, int32_t *ids, float *depth);
+                    const int32_t *triangles, int64_t n, const tl_target *target);
 
     /* The edges of the triangles that are not culled, each once, as lower index + 2^32 * higher index; room for three a
      * triangle.  Returns the first row with an index outside the vertices, or -1. */

@@ -65,11 +65,8 @@ def test_layers_through_a_lens_that_bends_nothing_are_those_without():
         assert np.abs(a[name] - b[name])[same].max() <= 1e-3  # normals where the snap moved the corners
 
 
-def test_scene_through_a_lens_is_refused():
+def test_glass_through_a_lens_is_refused():
     camera = replace(CAMERAS["perspective"], lens=LENSES["barrel"])
-    for draw in (tl.render, tl.rasterize_mesh, tl.silhouette, tl.render_layers):
-        with pytest.raises(ValueError, match="a scene is not drawn through a lens, but camera has one"):
-            draw(scene(), camera, SIZE)
     for subject in (scene(), CUBE):
         with pytest.raises(ValueError, match="layers are not peeled through a lens, but camera has one"):
             tl.render_transparent(subject, camera, SIZE)
@@ -137,8 +134,3 @@ def test_alpha_of_a_hole_is_that_of_the_picture(sampling):
     assert found["alpha"][30, 40] == 0
     assert_same(found["alpha"], found["color"][..., 3])
     assert found["silhouette"].dtype == (np.bool_ if sampling == "center" else np.float32)
-
-
-def test_layers_of_a_scene_with_cut_outs_are_refused():
-    with pytest.raises(ValueError, match="scenes have no cut-outs, but a material of instance 0 has an alpha_cutoff"):
-        look(FRONT, "depth", subject=tl.Scene([pierced()]))

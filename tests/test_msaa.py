@@ -149,6 +149,15 @@ def test_fragments_all_sizes_are_those_of_centres_when_vertices_move(isa, level)
                     assert_same(frags.sample(k).barycentric(), expected.barycentric())
 
 
+@pytest.mark.parametrize("bits", [0, 2])
+def test_ids_of_cut_triangles_on_a_coarse_grid_are_those_of_the_reference(bits):
+    scene = floor(np.random.default_rng(6), 4, 16)
+    scene.view["subpixel_bits"] = bits
+    frags = draw(scene, 4, tl.rasterize)
+    assert (frags.samples_triangle >= 0).any()
+    assert_same(frags.samples_triangle, ref.sample_ids(*scene.arrays, 4, depth_test="less", **scene.view))
+
+
 def test_fragments_of_cut_triangles_keep_their_attributes():
     scene = floor(np.random.default_rng(6), 4, 16)
     frags = draw(scene, 8, tl.rasterize)

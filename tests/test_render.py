@@ -11,7 +11,7 @@ from topleft import files, scenes
 from topleft.camera import Camera
 from topleft.mesh import Mesh
 from topleft.render import EDGE_COLOR, depth_behind, rasterize_mesh, render
-from topleft.shade import GREY_OF_FARTHEST, GREY_OF_NEAREST, eye_distance, eye_normals, id_colors, shade
+from topleft.shade import GREY_OF_FARTHEST, GREY_OF_NEAREST, eye_distance, id_colors, shade
 
 SHARED_MESHES = Path(__file__).resolve().parents[2] / "shared" / "meshes"
 SIZE = (64, 48)
@@ -154,15 +154,6 @@ def test_render_normal_toward_the_viewer_is_light_blue():
 def test_render_normals_are_in_eye_space():
     picture = render(CUBE, Camera.look_at((5, 0, 0)), (9, 9), shading="normals")
     assert picture[4, 4, :3].tolist() == [128, 128, 255]
-
-
-def test_eye_normals_of_flat_faces_are_those_of_their_corners():
-    # The faces of the cube share no vertex, so smooth and flat are the same thing, computed in two ways.
-    camera = Camera.look_at((1, 2, 3))
-    frags = rasterize_mesh(CUBE, camera, SIZE)
-    smooth, flat = (eye_normals(frags, CUBE, camera, is_smooth=is_smooth) for is_smooth in (True, False))
-    assert flat == pytest.approx(smooth, abs=1e-6)
-    assert (flat[:, 2] > 0).all()
 
 
 def test_render_vertex_without_normal_takes_that_of_the_face():

@@ -298,12 +298,3 @@ def test_scene_unknown_option_is_refused():
 
 def test_scene_examples_hold():
     assert doctest.testmod(scene_module).failed == 0
-
-
-def test_scene_with_a_cut_out_is_refused():
-    leaf = np.zeros((4, 4, 4), np.uint8)
-    leaf[:2] = 255
-    material = tl.Material(texture=tl.Texture(leaf), alpha_cutoff=0.5)
-    quad = tl.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], uv=[[0, 0], [1, 0], [0, 1]], materials=(material,))
-    with pytest.raises(ValueError, match="scenes have no cut-outs, but a material of instance 1 has an alpha_cutoff"):
-        tl.render(tl.Scene([CUBE, quad]), CAMERA, SIZE)

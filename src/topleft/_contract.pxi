@@ -208,9 +208,22 @@ cdef extern from "topleft.h" nogil:
     ctypedef struct tl_reach:
         double known, bound
         int64_t n_pieces
+    enum:
+        TL_POINT_ROWS
+    ctypedef int tl_point_kind
+    ctypedef struct tl_points:
+        const void *positions
+        int is_f64
+        tl_point_kind kind
+        int n_rows
+        double rows[TL_POINT_ROWS][4]
+        double half_width_px, half_height_px, background
+        int is_f64_out
     ctypedef struct tl_kernels:
+        void (*shade_normals)(const tl_scene *, const tl_window *, const tl_view *, const tl_shading *, const int32_t *, float *) noexcept nogil
+        void (*fill_points)(const tl_scene *, const tl_window *, const tl_points *, const int32_t *, void *) noexcept nogil
         void (*set_inverse_w)(const tl_source *, const float *, int64_t, int64_t, float *) noexcept nogil
-        void (*cut_out)(const tl_scene *, const tl_window *, const tl_view *, const tl_shading *, const int32_t *, int64_t, int32_t *, float *) noexcept nogil
+        void (*cut_out)(const tl_scene *, const tl_window *, const tl_view *, const tl_shading *, const int32_t *, int64_t, const tl_target *) noexcept nogil
         void (*shade_samples)(const tl_scene *, const tl_window *, const tl_view *, const tl_shading *, const int32_t *, int, int64_t, const int32_t *, const float *, uint8_t *) noexcept nogil
         void (*shade)(const tl_scene *, const tl_window *, const tl_view *, const tl_shading *, const int32_t *, const float *, uint8_t *) noexcept nogil
         tl_vertex_counts (*snap)(const tl_source *, int64_t, int64_t, int, int, tl_vertex *, tl_wide *) noexcept nogil
@@ -226,6 +239,7 @@ cdef extern from "topleft.h" nogil:
         void (*list_bins)(const tl_bins *, int64_t, int64_t *, int32_t *) noexcept nogil
         int64_t (*draw_area)(const tl_scene *, const tl_window *, const tl_area *) noexcept nogil
         int64_t (*blend)(const tl_scene *, const tl_window *, const tl_canvas *) noexcept nogil
+        void (*inverse_w)(const tl_source *, int64_t, int64_t, double *) noexcept nogil
         void (*barycentric)(const tl_scene *, const tl_window *, const int32_t *, float *) noexcept nogil
         void (*interpolate)(const tl_scene *, const tl_window *, const int32_t *, const float *, int, int, float, float *) noexcept nogil
         void (*paint_flat)(const int32_t *, int64_t, const uint8_t *, int, uint8_t *) noexcept nogil

@@ -108,6 +108,7 @@ class Scene:
     def count_classes(
         self, sink: int, width: int, height: int, samples: NDArray[np.int32] | None = None
     ) -> tuple[int, list[tuple[int, float, float]]]: ...
+    def with_inverse_w(self, n_pixels: int) -> Scene: ...
     def numbered_from(self, first_id: int) -> Scene: ...
     def moved(self, x_px: int, y_px: int) -> Scene: ...
     def draw(
@@ -196,6 +197,18 @@ class Valued:
     ) -> None: ...
     def list_planes(self, first: int, end: int) -> None: ...
     def fill_planes(self, ids: NDArray[np.int32], out: NDArray[Any], first_row: int, n_rows: int) -> None: ...
+
+class Points:
+    def __init__(
+        self,
+        positions: NDArray[Any],
+        kind: int,
+        rows: NDArray[np.float64],
+        half_size: tuple[float, float],
+        background: float,
+        is_f64_out: bool,
+    ) -> None: ...
+    def fill(self, scene: Scene, ids: NDArray[np.int32], out: NDArray[Any], first_row: int, n_rows: int) -> None: ...
 
 class Bins:
     bad_row: int
@@ -313,6 +326,26 @@ def shade_samples(
     ids: NDArray[np.int32],
     depth: NDArray[np.float32],
     pixels: NDArray[np.uint8],
+    first_row: int,
+    n_rows: int,
+) -> None: ...
+def shade_normals(
+    scene: Scene,
+    view: View | None,
+    shading: Shading,
+    ids: NDArray[np.int32],
+    out: NDArray[np.float32],
+    first_row: int,
+    n_rows: int,
+) -> None: ...
+def cut_out_over(
+    scene: Scene,
+    view: View | None,
+    shading: Shading,
+    triangles: NDArray[np.int32],
+    ids: NDArray[np.int32],
+    depth: NDArray[np.float32],
+    is_peeled: bool,
     first_row: int,
     n_rows: int,
 ) -> None: ...

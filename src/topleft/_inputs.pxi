@@ -155,7 +155,7 @@ cdef class Pieces:
         vertices, wide = np.empty(p.n_vertices * VERTEX_BYTES, np.uint8), np.empty((p.n_vertices, 2), np.int64)
         inv_w, weights = np.empty(p.n_vertices), np.empty((p.n_vertices, 3))
         corners, owners = np.empty((p.n_pieces, 3), np.int32), np.empty(p.n_pieces, np.int32)
-        self.arrays = (vertices, wide, inv_w, weights, corners, owners)
+        self.arrays = tuple(map(np.asarray, (vertices, wide, inv_w, weights, corners, owners)))
         p.vertices, p.wide = <tl_vertex *>&vertices[0], <tl_wide *>&wide[0, 0]
         p.inv_w, p.weights = &inv_w[0], &weights[0, 0]
         p.triangles, p.source = &corners[0, 0], &owners[0]

@@ -47,6 +47,21 @@ cdef class Scene:
         part.y_px += y_px
         return part
 
+    def with_inverse_w(self, int64_t n_pixels):
+        """Return the same scene with 1/w of all vertices at hand, if so many pixels ask for enough of them."""
+        cdef const tl_source *source = self.scene.mesh.source
+        cdef double[::1] inv_w
+        cdef Scene other
+        if source == NULL or source.is_affine or self.scene.mesh.inv_w != NULL or self.scene.mesh.n_vertices > 2 * n_pixels:
+            return self
+        inv_w = np.empty(max(1, self.scene.mesh.n_vertices))
+        with nogil:
+            K.inverse_w(source, 0, self.scene.mesh.n_vertices, &inv_w[0])
+        other = self.copy()
+        other.scene.mesh.inv_w = &inv_w[0]
+        other.arrays = (self.arrays, inv_w)
+        return other
+
     cdef Scene copy(self):
         cdef Scene other = Scene.__new__(Scene)
         other.scene, other.arrays = self.scene, self.arrays

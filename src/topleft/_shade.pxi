@@ -133,6 +133,16 @@ def shade_samples(Scene scene, View view, Shading shading, const int32_t[:, ::1]
                             &depth[0, first_row, 0], &pixels[first_row, 0, 0])
 
 
+def shade_normals(Scene scene, View view, Shading shading, const int32_t[:, ::1] ids, float[:, :, ::1] out, int64_t first_row,
+                  int64_t n_rows):
+    """Write rows of the unit normals (H, W, 3) of a visibility buffer."""
+    cdef tl_window window = scene.window(first_row, n_rows, ids.shape[1])
+    cdef const tl_view *own = &view.view if view is not None else NULL
+    if n_rows and ids.shape[1]:
+        with nogil:
+            K.shade_normals(&scene.scene, &window, own, &shading.shading, &ids[first_row, 0], &out[first_row, 0, 0])
+
+
 def cut_out(Scene scene, View view, Shading shading, const int32_t[::1] opaque, const int32_t[::1] triangles, int32_t[:, ::1] ids,
             float[:, ::1] depth, int64_t first_row, int64_t n_rows):
     """Clear rows of a visibility buffer, draw the opaque triangles, and over them what the others' materials leave of them."""
@@ -149,5 +159,23 @@ def cut_out(Scene scene, View view, Shading shading, const int32_t[::1] opaque, 
     share.is_first = share.is_last = True
     with nogil:
         K.draw(&scene.scene, &window, &target, &share)
-        K.cut_out(&scene.scene, &window, own, &shading.shading, &triangles[0], triangles.shape[0], &ids[first_row, 0],
-                  &depth[first_row, 0])
+        K.cut_out(&scene.scene, &window, own, &shading.shading, &triangles[0], triangles.shape[0], &target)
+
+
+def cut_out_over(Scene scene, View view, Shading shading, const int32_t[::1] triangles, int32_t[:, :, ::1] ids, float[:, :, ::1] depth,
+                 bint is_peeled, int64_t first_row, int64_t n_rows):
+    """Draw triangles, but for what their materials cut out, over rows of a visibility buffer (1, H, W) or of layers (K, H, W)."""
+    cdef int64_t height = ids.shape[1], width = ids.shape[2]
+    cdef tl_window window = scene.window(first_row, n_rows, width)
+    cdef const tl_view *own = &view.view if view is not None else NULL
+    cdef tl_target target
+    cdef tl_peeled peeled
+    if n_rows == 0 or width == 0 or triangles.shape[0] == 0:
+        return
+    memset(&target, 0, sizeof(target))
+    peeled.n_layers, peeled.is_farthest, peeled.plane_px = ids.shape[0], False, height * width
+    peeled.ids, peeled.depth = &ids[0, first_row, 0], &depth[0, first_row, 0]
+    target.sink, target.stride_px, target.n_samples = <tl_sink>(TL_SINK_PEEL if is_peeled else 4), width, n_rows * width  # 4: nearest
+    target.pixels, target.depth, target.peeled = peeled.ids, peeled.depth, &peeled
+    with nogil:
+        K.cut_out(&scene.scene, &window, own, &shading.shading, &triangles[0], triangles.shape[0], &target)

@@ -10,8 +10,10 @@ an order, however many holes lie behind each other; it costs a second pass over 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from topleft import _engine
 from topleft.camera import Camera
@@ -21,11 +23,47 @@ from topleft.material import Material
 from topleft.mesh import Mesh
 from topleft.threads import count_threads, parse_threads, run_parts
 
+I32 = npt.NDArray[np.int32]
+F32 = npt.NDArray[np.float32]
+
 
 def has_holes(material: Material, mesh: Mesh) -> bool:
     """Whether the material leaves something out of the triangles that have it."""
     texture = material.texture if mesh.uv is not None else None
     return bool(material.alpha_cutoff) and texture is not None and bool((texture.image[..., 3] < 255).any())
+
+
+@dataclass(frozen=True, eq=False)
+class Cut:
+    """Materials of a mesh, and which triangles have holes in theirs."""
+
+    materials: Sequence[Material]
+    rows: I32 | None
+    is_cut: npt.NDArray[np.bool_]
+
+    @property
+    def triangles(self) -> I32:
+        """Those with holes."""
+        return np.flatnonzero(self.is_cut).astype(np.int32)
+
+    def of_parts(self, source: npt.NDArray[np.int64]) -> Cut:
+        """The same of parts of triangles."""
+        return Cut(self.materials, None if self.rows is None else self.rows[source], self.is_cut[source])
+
+    def solid(self, mesh: Mesh) -> Mesh:
+        """The mesh with triangles of no area in the place of those with holes: ids stay."""
+        return Mesh(mesh.vertices, np.where(self.is_cut[:, None], mesh.triangles[:, :1], mesh.triangles))
+
+
+def cut_of(mesh: Mesh, material: Material | None = None) -> Cut | None:
+    """What the materials of a mesh, or this one, cut out of it; None if nothing."""
+    materials = mesh.materials if material is None else (material,)
+    holes = [has_holes(one, mesh) for one in materials]
+    if not any(holes):
+        return None
+    with_holes = np.array(holes)
+    rows = mesh.material_of_triangle if material is None and len(materials) > 1 else None
+    return Cut(materials, rows, np.full(len(mesh.triangles), True) if rows is None else with_holes[rows])
 
 
 def cut_out(
@@ -42,35 +80,41 @@ def cut_out(
     threads : int, optional
         Never changes a bit.
     """
-    materials = mesh.materials if material is None else (material,)
-    with_holes = np.array([has_holes(one, mesh) for one in materials], dtype=bool)
-    if not with_holes.any() or 0 in frags.triangle.shape:
+    cut = cut_of(mesh, material)
+    if cut is None or 0 in frags.triangle.shape:
         return
-    rows = mesh.material_of_triangle if material is None and len(materials) > 1 else None
-    is_cut = np.full(len(mesh.triangles), True) if rows is None else with_holes[rows]
-    cut = np.flatnonzero(is_cut).astype(np.int32)
-    opaque = np.append(np.flatnonzero(~is_cut), 0).astype(np.int32)  # one more than is drawn
+    triangles = cut.triangles
+    opaque = np.append(np.flatnonzero(~cut.is_cut), 0).astype(np.int32)  # one more than is drawn
     n_threads = count_threads(parse_threads(threads), len(mesh.triangles))
     for k in range(frags.samples_triangle.shape[-1]):
-        _cut_sample(frags.sample(k), mesh, camera, materials, rows, opaque, cut, n_threads)
+        sample = frags.sample(k)
+        scene, ids, depth = sample._scene, sample.triangle, sample.depth
+        look = look_of(scene, mesh, camera, ids.shape[::-1], cut)
+
+        def cut_rows(
+            first: int, end: int, scene: _engine.Scene = scene, look: Look = look, ids: I32 = ids, depth: F32 = depth
+        ) -> None:
+            _engine.cut_out(scene, scene.view, look.shading, opaque, triangles, ids, depth, first, end - first)
+
+        run_parts(cut_rows, len(ids), n_threads)
 
 
-def _cut_sample(
-    frags: Fragments,
-    mesh: Mesh,
-    camera: Camera,
-    materials: Sequence[Material],
-    rows: np.ndarray[tuple[int, ...], np.dtype[np.int32]] | None,
-    opaque: np.ndarray[tuple[int, ...], np.dtype[np.int32]],
-    cut: np.ndarray[tuple[int, ...], np.dtype[np.int32]],
-    n_threads: int,
+def draw_cut(
+    scene: _engine.Scene, mesh: Mesh, camera: Camera, cut: Cut, ids: I32, depth: F32, *, is_peeled: bool, n_threads: int
 ) -> None:
-    scene = frags._scene
-    look = Look(scene, mesh, camera, frags.triangle.shape[::-1], rows, is_flat=False)
-    look.set_materials(mesh, materials, is_unlit=True)
+    """Draw the triangles with holes over the planes of a visibility buffer (1, H, W), or of layers (K, H, W)."""
+    triangles = cut.triangles
+    look = look_of(scene, mesh, camera, ids.shape[:0:-1], cut)
+
+    def draw_rows(first: int, end: int) -> None:
+        _engine.cut_out_over(scene, scene.view, look.shading, triangles, ids, depth, is_peeled, first, end - first)
+
+    run_parts(draw_rows, ids.shape[1], n_threads)
+
+
+def look_of(scene: _engine.Scene, mesh: Mesh, camera: Camera, size: tuple[int, ...], cut: Cut) -> Look:
+    """What the kernel reads of materials with holes."""
+    look = Look(scene, mesh, camera, (size[0], size[1]), cut.rows, is_flat=False)
+    look.set_materials(mesh, cut.materials, is_unlit=True)
     look.set_view(0, None, (0, 0, 0, 0))
-
-    def cut_rows(first: int, end: int) -> None:
-        _engine.cut_out(scene, scene.view, look.shading, opaque, cut, frags.triangle, frags.depth, first, end - first)
-
-    run_parts(cut_rows, len(frags.triangle), n_threads)
+    return look

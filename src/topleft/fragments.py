@@ -148,7 +148,7 @@ class Fragments:
         array([0.5 , 0.25, 0.25], dtype=float32)
         """
         out = np.empty((*self.triangle.shape, 3), np.float32)
-        self._scene.barycentric(self._ids(), out)
+        self._scene.with_inverse_w(self.id.size).barycentric(self._ids(), out)
         return out
 
     def interpolate(self, values: ArrayLike, *, background: float = 0.0) -> NDArray[np.float32]:
@@ -185,7 +185,8 @@ class Fragments:
         channels = array.shape[-1] if array.ndim > 1 else 1
         out: NDArray[Any] = np.empty((*self.triangle.shape, channels), np.float32)
         rows = array.reshape(-1, channels) if array.size else np.empty((0, channels), np.float32)
-        self._scene.interpolate(self._ids(), rows, array.ndim == 3, float(background), out)
+        scene = self._scene.with_inverse_w(self.id.size)
+        scene.interpolate(self._ids(), rows, array.ndim == 3, float(background), out)
         return out if array.ndim > 1 else out[..., 0]
 
     def _ids(self) -> NDArray[np.int32]:
@@ -231,23 +232,7 @@ class BentFragments(Fragments):
 
     def mesh_of_parts(self, mesh: Mesh) -> Mesh:
         """Return the parts as a mesh: positions and attributes of the mesh where the parts have corners."""
-        corners = self._triangles[self._source]
-
-        def spread(values: NDArray[Any]) -> NDArray[np.float64]:
-            of_parts = np.zeros((int(self._drawn.max(initial=-1)) + 1, values.shape[1]))
-            of_parts[self._drawn.ravel()] = np.matmul(self._weights, values[corners]).reshape(-1, values.shape[1])
-            return of_parts
-
-        rows = mesh.material_of_triangle
-        return Mesh(
-            spread(mesh.vertices),
-            self._drawn.astype(np.int32),
-            spread(mesh.vertex_normals()),
-            None if mesh.colors is None else np.rint(spread(mesh.colors)).astype(np.uint8),
-            None if mesh.uv is None else spread(mesh.uv).astype(np.float32),
-            mesh.materials,
-            None if rows is None else rows[self._source],
-        )
+        return mesh_of_parts(mesh, self._drawn, self._source, self._weights)
 
     def only(self, rows: NDArray[np.intp], cols: NDArray[np.intp]) -> Fragments:
         """Return what is left when no other pixels than these show a triangle."""
@@ -272,3 +257,26 @@ class BentFragments(Fragments):
             corners = array.reshape(len(array), -1)[self._triangles[self._source]]
         out = self._parts.interpolate(np.matmul(self._weights, corners), background=background)
         return out if array.ndim > 1 else out[..., 0]
+
+
+def mesh_of_parts(
+    mesh: Mesh, drawn: NDArray[np.int64], source: NDArray[np.int64], weights: NDArray[np.float64]
+) -> Mesh:
+    """Return parts of triangles as a mesh: positions and attributes of the whole mesh where the parts have corners."""
+    corners = mesh.triangles[source]
+
+    def spread(values: NDArray[Any]) -> NDArray[np.float64]:
+        of_parts = np.zeros((int(drawn.max(initial=-1)) + 1, values.shape[1]))
+        of_parts[drawn.ravel()] = np.matmul(weights, values[corners]).reshape(-1, values.shape[1])
+        return of_parts
+
+    rows = mesh.material_of_triangle
+    return Mesh(
+        spread(mesh.vertices),
+        drawn.astype(np.int32),
+        spread(mesh.vertex_normals()),
+        None if mesh.colors is None else np.rint(spread(mesh.colors)).astype(np.uint8),
+        None if mesh.uv is None else spread(mesh.uv).astype(np.float32),
+        mesh.materials,
+        None if rows is None else rows[source],
+    )

@@ -12,12 +12,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from topleft.camera import Camera
-from topleft.eye import eye_normals
-from topleft.mesh import unit_or_zero
+from topleft.normals import shade_normals
 from topleft.render import picture_of, render
 from topleft.scene_render import camera_of
-from topleft.sight import Sight, Surface, moved, project
+from topleft.sight import PointKind, Sight, Surface, project
 from topleft.silhouette import silhouette as draw_silhouette
 from topleft.transparent import render_transparent
 
@@ -64,19 +62,16 @@ def depth(sight: Sight) -> Array:
 
 def distance(sight: Sight) -> Array:
     """Distance along the view (H, W) float32, world units, +inf where nothing is."""
-    return sight.join((), np.inf, lambda surface: -moved(surface.points_world, sight.camera.view[2:3])[:, 0])
+    rows = -sight.camera.view[2:3]
+    return sight.join((), np.inf, lambda one: sight.tell(one, PointKind.ROWS, rows @ one.instance.transform, np.inf))
 
 
 def ray_distance(sight: Sight) -> Array:
     """Distance from the eye (H, W) float32, world units, +inf where nothing is; along the view without perspective."""
     if not sight.camera.projection[3, :3].any():
         return distance(sight)
-
-    def make(surface: Surface) -> F64:
-        x, y, z = moved(surface.points_world, sight.camera.view[:3]).T
-        return np.sqrt(x * x + y * y + z * z)
-
-    return sight.join((), np.inf, make)
+    rows = sight.camera.view[:3]
+    return sight.join((), np.inf, lambda one: sight.tell(one, PointKind.LENGTH, rows @ one.instance.transform, np.inf))
 
 
 def triangle(sight: Sight) -> Array:
@@ -96,28 +91,24 @@ def barycentric(sight: Sight) -> Array:
 
 def world_position(sight: Sight) -> Array:
     """The point of the surface, (H, W, 3) float32, NaN where nothing is."""
-    return sight.join((3,), np.nan, lambda surface: surface.points_world)
+    return sight.join((3,), np.nan, lambda one: sight.tell(one, PointKind.ROWS, one.instance.transform[:3], np.nan))
 
 
 def camera_normal(sight: Sight) -> Array:
     """Unit normal in eye space, (H, W, 3) float32, 0 where nothing is."""
-    return sight.join((3,), 0.0, lambda surface: normals_of(surface, sight.camera))
+    return sight.join((3,), 0.0, lambda surface: normals_of(sight, surface, np.eye(3)))
 
 
 def world_normal(sight: Sight) -> Array:
     """Unit normal in the world, (H, W, 3) float32, 0 where nothing is."""
-    back = np.hstack([sight.camera.view[:3, :3].T, np.zeros((3, 1))])  # the transpose, where positions take the inverse
-
-    def make(surface: Surface) -> F64:
-        return unit_or_zero(moved(normals_of(surface, sight.camera).astype(np.float64), back))
-
-    return sight.join((3,), 0.0, make)
+    back = sight.camera.view[:3, :3].T  # the transpose, where positions take the inverse
+    return sight.join((3,), 0.0, lambda surface: normals_of(sight, surface, back))
 
 
-def normals_of(surface: Surface, camera: Camera) -> npt.NDArray[np.float32]:
-    """Unit normals (P, 3) of the pixels of a surface in eye space, on the side that is seen."""
-    own = camera_of(camera, surface.instance)
-    return eye_normals(surface.part.frags, surface.instance.mesh, own, is_smooth=True)
+def normals_of(sight: Sight, surface: Surface, turn: F64) -> npt.NDArray[np.float32]:
+    """Unit normals (H, W, 3) of a surface, from eye space by the matrix (3, 3) `turn`, on the side that is seen."""
+    own = camera_of(sight.camera, surface.instance).straightened()
+    return shade_normals(*surface.drawn, own, turn, threads=sight.options.get("threads"))
 
 
 def uv(sight: Sight) -> Array:
@@ -128,8 +119,8 @@ def uv(sight: Sight) -> Array:
     def make(surface: Surface) -> Array:
         coordinates = getattr(surface.instance.mesh, "uv", None)
         if coordinates is None:
-            return np.full((1, 2), np.nan)
-        return surface.part.frags.interpolate(coordinates)[surface.seen]
+            return np.full((*surface.seen.shape, 2), np.nan, np.float32)
+        return surface.part.frags.interpolate(coordinates, background=np.nan)
 
     return sight.join((2,), np.nan, make)
 
@@ -138,12 +129,19 @@ def flow(sight: Sight) -> Array:
     """Where the point of each pixel moves to in the picture, (H, W, 2) float32 pixels, NaN where nothing is."""
     if sight.camera_to is None and sight.transforms_to is None:
         raise ValueError("layer 'flow' needs camera_to or transforms_to")
+    begin, end, size = sight.camera, sight.camera_to or sight.camera, sight.size
 
-    def make(surface: Surface) -> F64:
+    def make(surface: Surface) -> Array:
         here = surface.instance.transform
         there = here if sight.transforms_to is None else sight.transforms_to[surface.part.instance]
-        end = project(surface.points, sight.camera_to or sight.camera, there, sight.size)
-        return end - project(surface.points, sight.camera, here, sight.size)
+        if begin.lens is None and end.lens is None:
+            ways = [camera.clip_from_eye(size) @ camera.view @ at for camera, at in ((begin, here), (end, there))]
+            rows = np.concatenate([way[[0, 1, 3]] for way in ways])
+            return sight.tell(surface, PointKind.FLOW, rows, np.nan, size=size)
+        picture = np.full((*surface.seen.shape, 2), np.nan, np.float32)
+        points = surface.points
+        picture[surface.seen] = project(points, end, there, size) - project(points, begin, here, size)
+        return picture
 
     return sight.join((2,), np.nan, make)
 

@@ -26,6 +26,9 @@ LIGHT_CODES = {LightKind.DIRECTIONAL: 0, LightKind.POINT: 1}  # tl_light_kind in
 WRAPPED_LIGHT = 2
 
 
+F64 = npt.NDArray[np.float64]
+
+
 class Look:
     """The numbers of one picture, as the kernels read them."""
 
@@ -109,6 +112,13 @@ class Look:
         engine = None if matcap is None else replace(matcap, filter="bilinear", wrap="clamp").engine
         eyes = frame.eye_from.tolist(), frame.has_perspective, frame.eye.tolist(), frame.ray.tolist()
         self.shading.set_view(show, engine, *eyes, light_of(background), background)
+
+    def set_turn(self, show: int, turn: F64) -> None:
+        """Take what is told, in a space that the matrix (3, 3) takes eye space to."""
+        frame = self.frame
+        rows = (turn @ frame.eye_from).tolist()
+        eyes = rows, frame.has_perspective, frame.eye.tolist(), frame.ray.tolist()
+        self.shading.set_view(show, None, *eyes, (0, 0, 0, 0), (0, 0, 0, 0))
 
     def set_fog(self, fog: Fog | None) -> None:
         """Take the depth cue, if there is one."""

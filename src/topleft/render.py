@@ -24,8 +24,9 @@ from topleft.material import Material
 from topleft.mesh import Mesh
 from topleft.multisample import shade_samples
 from topleft.scene import Instance, Scene
-from topleft.scene_draw import draw_scene
-from topleft.scene_render import camera_of, cull_of, matrix_of, refuse_holes, shade_scene
+from topleft.scene_cutout import cut_out_scene
+from topleft.scene_lens import draw_seen
+from topleft.scene_render import camera_of, cull_of, shade_scene
 from topleft.shade import LookOptions, Shading, shade
 
 DEFAULT_SIZE = (640, 480)
@@ -91,8 +92,7 @@ def render(
     Raises
     ------
     ValueError
-        If the mesh has no triangles and no camera is given, an option is unknown, or a scene is to be seen through a
-        lens.
+        If the mesh has no triangles and no camera is given, or an option is unknown.
     MissingPackageError
         If levels of detail are to be made and fast-simplification is not installed.
 
@@ -153,8 +153,10 @@ def picture_of_mesh(
     return shade(shown, surface, view, **options)
 
 
-def without_holes(frags: Fragments, mesh: Mesh, camera: Camera, material: Material | None) -> Fragments:
-    """The visibility buffer of a mesh without what its materials (or this one) cut out; `frags` is changed."""
+def without_holes(frags: Fragments, mesh: Mesh | Scene, camera: Camera, material: Material | None) -> Fragments:
+    """The visibility buffer without what materials (or this one) cut out; `frags` is changed."""
+    if isinstance(mesh, Scene):
+        return cut_out_scene(frags, mesh, camera, material)
     if not isinstance(frags, BentFragments):
         cut_out(frags, mesh, camera, material)
         return frags
@@ -165,8 +167,8 @@ def without_holes(frags: Fragments, mesh: Mesh, camera: Camera, material: Materi
 def picture_of_scene(
     frags: Fragments, scene: Scene, camera: Camera, options: dict[str, Any]
 ) -> npt.NDArray[np.uint8]:
-    """The picture of a scene's visibility buffer; options as `shade` takes them."""
-    refuse_holes(scene, options.get("material"))
+    """The picture of a scene's visibility buffer, without what materials cut out; options as `shade` takes them."""
+    frags = cut_out_scene(frags, scene, camera, options.get("material"), threads=options["threads"])
     if options["shading"] == Shading.DEPTH:
         options = {"depth_range": distances(frags, camera)} | options
 
@@ -211,8 +213,7 @@ def rasterize_mesh(
     Raises
     ------
     ValueError
-        If the mesh has no triangles and no camera is given, an option is unknown, `rasterizer` has another size, or a
-        scene is to be seen through a lens.
+        If the mesh has no triangles and no camera is given, an option is unknown, or `rasterizer` has another size.
     """
     mesh = mesh if isinstance(mesh, Scene) else as_mesh(mesh)
     camera = default_camera(mesh, size) if camera is None else camera
@@ -220,7 +221,7 @@ def rasterize_mesh(
     mesh = detailed(mesh, camera, size, tolerance, cull=cull, **window)
     view |= {"cull": cull, "threads": threads}
     if isinstance(mesh, Scene):
-        return draw_scene(mesh, matrix_of(camera, view.get("viewport") or size), size, **view)
+        return draw_seen(mesh, camera, size, **view)
     drawn = seen_through(mesh, camera, view.get("viewport") or size, near_clip=view.get("near_clip", True))
     view["transform"] = drawn.transform
     if rasterizer is None:

@@ -5,7 +5,7 @@ In: `Scene`, the matrix of a camera, the options of a view.  Out: `SceneFragment
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -50,6 +50,10 @@ class PlacedScene:
         self._view = view
         self._with_depth = with_depth
 
+    def of(self, scene: Scene) -> PlacedScene:
+        """Return another scene, seen in the same way."""
+        return PlacedScene(scene, self._clip_from_world, self._view, with_depth=self._with_depth)
+
     def snap(self, i: int) -> Snapped:
         """Return an instance, snapped; in shared buffers it draws its own range of ids."""
         instance, view = self.scene[i], self._view
@@ -70,7 +74,7 @@ class PlacedScene:
         if chunk:
             yield chunk
 
-    def draw(self, targets: list[_engine.Target], positions: list[tuple[int, int]], height: int) -> None:
+    def draw(self, targets: list[_engine.Target], positions: Sequence[tuple[int, int]], height: int) -> None:
         """Clear targets of that many rows, one a sample, and draw what each sees; (0, 0) is the pixel's centre."""
         n_parts = count_threads(self._view.threads, self.scene.n_triangles)
         n_parts = min(height, max(n_parts, height * self._view.size[0] // MOST_PIXELS_OF_PART))

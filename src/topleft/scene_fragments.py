@@ -13,8 +13,10 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from topleft import _engine
 from topleft.depth_layers import DepthLayers
 from topleft.fragments import Fragments
+from topleft.scene import Scene
 from topleft.snapped import Snapped
 
 __all__ = ["Part", "SceneDepthLayers", "SceneFragments"]
@@ -24,8 +26,18 @@ class Placed(Protocol):
     """A scene as a camera sees it."""
 
     @property
+    def scene(self) -> Scene:
+        """The scene."""
+
+    @property
     def first_ids(self) -> NDArray[np.int64]:
         """Where the ids of each instance begin, and their end: (N + 1,)."""
+
+    def of(self, scene: Scene) -> Placed:
+        """Return another scene, seen in the same way."""
+
+    def draw(self, targets: list[_engine.Target], positions: Sequence[tuple[int, int]], height: int) -> None:
+        """Clear targets of that many rows, one a sample, and draw what each sees."""
 
     def snap(self, i: int) -> Snapped:
         """Return an instance, snapped."""
@@ -83,28 +95,53 @@ class SceneFragments(Fragments):
 
     def __repr__(self) -> str:
         height, width = self.id.shape
-        first_ids = self._placed.first_ids
+        first_ids = self.first_ids
         return f"SceneFragments({width}x{height}, {len(first_ids) - 1} instances, {first_ids[-1]} triangles)"
+
+    @property
+    def placed(self) -> Placed:
+        """What was drawn."""
+        return self._placed
+
+    @property
+    def first_ids(self) -> NDArray[np.int64]:
+        """Where the ids of each instance begin, and their end: (N + 1,)."""
+        return self._placed.first_ids
+
+    @property
+    def positions(self) -> Sequence[tuple[int, int]]:
+        """Where the samples lie."""
+        return self._positions
+
+    @property
+    def planes(self) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+        """Ids and depth of each sample, (S, H, W)."""
+        return self._planes
+
+    def forget(self) -> None:
+        """Forget what was computed of buffers that have changed."""
+        for name in ("instance", "triangle", "samples_instance", "samples_triangle", "parts"):
+            self.__dict__.pop(name, None)
 
     @cached_property
     def instance(self) -> NDArray[np.int32]:
         """Index of the instance that shows in each pixel, int32 (H, W), -1 where there is none."""
-        return instances_of(self.id, self._placed.first_ids)
+        return instances_of(self.id, self.first_ids)
 
     @cached_property
     def triangle(self) -> NDArray[np.int32]:
         """Index of the triangle in its mesh, int32 (H, W), -1 where there is none."""
-        return local_ids(self.id, self.instance, self._placed.first_ids)
+        return local_ids(self.id, self.instance, self.first_ids)
 
     @cached_property
     def samples_instance(self) -> NDArray[np.int32]:
         """Index of the instance that each sample sees, int32 (H, W, S)."""
-        return instances_of(self.samples_id, self._placed.first_ids)
+        return instances_of(self.samples_id, self.first_ids)
 
     @cached_property
     def samples_triangle(self) -> NDArray[np.int32]:
         """Index of the triangle in its mesh that each sample sees, int32 (H, W, S)."""
-        return local_ids(self.samples_id, self.samples_instance, self._placed.first_ids)
+        return local_ids(self.samples_id, self.samples_instance, self.first_ids)
 
     def sample(self, i: int) -> SceneFragments:
         """Return ids, depth and attributes at one sample of each pixel."""
@@ -135,7 +172,7 @@ class SceneFragments(Fragments):
         ends = [np.maximum.reduceat(axis, starts) + 1 for axis in (rows, columns)]
         for i, top, left, bottom, right in zip(found.tolist(), *lows, *ends, strict=True):
             box = slice(int(top), int(bottom)), slice(int(left), int(right))
-            first, end = self._placed.first_ids[i : i + 2]
+            first, end = self.first_ids[i : i + 2]
             ids = self.id[box]
             own = np.where((ids >= first) & (ids < end), ids - np.int32(first), np.int32(-1))
             snapped = self._placed.snap(i)
@@ -166,7 +203,7 @@ class SceneFragments(Fragments):
         ValueError
             If the number of arrays is not that of the instances, or they fit neither these nor each other.
         """
-        n = len(self._placed.first_ids) - 1
+        n = len(self.first_ids) - 1
         arrays = [np.asarray(array) for array in values]  # type: ignore[union-attr]
         if len(arrays) != n:
             raise ValueError(f"values must be one array for each of {n} instances, got {len(arrays)}")
@@ -205,6 +242,11 @@ class SceneDepthLayers(DepthLayers):
         """Take planes (K, H, W)."""
         self.planes = ids, depth
         self._placed = placed
+
+    @property
+    def placed(self) -> Placed:
+        """What was drawn."""
+        return self._placed
 
     @property
     def n_triangles(self) -> int:

@@ -14,16 +14,15 @@ import numpy.typing as npt
 
 from topleft.camera import Camera
 from topleft.colors import id_colors
-from topleft.cutout import has_holes
-from topleft.fragments import Fragments
+from topleft.fragments import BentFragments, Fragments
 from topleft.frame import is_similarity
 from topleft.light import Light, LightKind, LightSpace
-from topleft.material import Material
+from topleft.mesh import Mesh
 from topleft.scene import Instance, Scene
 from topleft.scene_fragments import SceneFragments
 from topleft.shade import shade
 
-__all__ = ["camera_of", "cull_of", "matrix_of", "refuse_holes", "shade_scene"]
+__all__ = ["camera_of", "cull_of", "drawn_of", "shade_scene"]
 
 
 def camera_of(camera: Camera, instance: Instance) -> Camera:
@@ -31,17 +30,9 @@ def camera_of(camera: Camera, instance: Instance) -> Camera:
     return replace(camera, view=camera.view @ instance.transform)
 
 
-def matrix_of(camera: Camera, size: tuple[int, int]) -> npt.NDArray[np.float64]:
-    """Clip space from the world, for a scene in a picture of this size.
-
-    Raises
-    ------
-    ValueError
-        If the camera has a lens.
-    """
-    if camera.lens is not None:
-        raise ValueError("a scene is not drawn through a lens, but camera has one: draw a mesh, or straightened()")
-    return camera.clip_from_world(size)
+def drawn_of(frags: Fragments, mesh: Mesh) -> tuple[Fragments, Mesh]:
+    """The fragments and the mesh as they were drawn: through a lens those of its parts."""
+    return (frags.parts, frags.mesh_of_parts(mesh)) if isinstance(frags, BentFragments) else (frags, mesh)
 
 
 def cull_of(cull: str, instance: Instance) -> str:
@@ -67,14 +58,6 @@ def lights_of(lights: Sequence[Light] | None, camera: Camera, instance: Instance
     return moved
 
 
-def refuse_holes(scene: Scene, material: Material | None) -> None:
-    """Raise an error where a material cuts something out: what lies behind a hole may belong to another instance."""
-    for i, instance in enumerate(scene):
-        own = instance.mesh.materials if material is None else (material,)
-        if any(has_holes(one, instance.mesh) for one in own):
-            raise ValueError(f"scenes have no cut-outs, but a material of instance {i} has an alpha_cutoff")
-
-
 def shade_scene(
     frags: Fragments, scene: Scene, camera: Camera, *, background: tuple[int, ...], shading: str, **look: Any
 ) -> npt.NDArray[np.uint8]:
@@ -87,9 +70,9 @@ def shade_scene(
     for part in frags.parts:
         instance = scene[part.instance]
         look["lights"] = lights_of(lights, camera, instance)
-        own = shade(
-            part.frags, instance.mesh, camera_of(camera, instance), background=background, shading=shading, **look
-        )
+        shown, mesh = drawn_of(part.frags, instance.mesh)
+        own_camera = camera_of(camera, instance).straightened()
+        own = shade(shown, mesh, own_camera, background=background, shading=shading, **look)
         seen = part.frags.mask
         picture[part.box][seen] = own[seen]
     if shading == "ids":

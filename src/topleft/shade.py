@@ -22,7 +22,7 @@ import numpy.typing as npt
 from topleft import _engine
 from topleft.camera import Camera
 from topleft.colors import DEFAULT_COLOR, Color, as_color, id_colors
-from topleft.eye import distances, eye_distance, eye_normals
+from topleft.eye import distances, eye_distance
 from topleft.fragments import Fragments
 from topleft.light import AMBIENT, Fog, Light, as_not_negative
 from topleft.look import Look
@@ -34,9 +34,7 @@ from topleft.sampling import sample_positions
 from topleft.texture import Texture
 from topleft.threads import count_threads, parse_threads, run_parts
 
-__all__ = [
-    "DEFAULT_COLOR", "LookOptions", "Shading", "as_color", "eye_distance", "eye_normals", "id_colors", "shade",
-]  # fmt: skip
+__all__ = ["DEFAULT_COLOR", "LookOptions", "Shading", "as_color", "eye_distance", "id_colors", "shade"]
 
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]

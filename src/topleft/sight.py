@@ -7,25 +7,39 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from enum import IntEnum
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from topleft import _engine
 from topleft.api import Rasterizer
 from topleft.camera import Camera
-from topleft.cutout import has_holes
+from topleft.cutout import cut_of
 from topleft.fragments import Fragments
 from topleft.mesh import Mesh
 from topleft.render import rasterize_mesh, without_holes
 from topleft.scene import Instance, Scene
 from topleft.scene_fragments import Part, SceneFragments
-from topleft.scene_render import refuse_holes
+from topleft.scene_render import drawn_of
+from topleft.threads import count_threads, parse_threads, run_parts
 
-__all__ = ["Sight", "Surface", "moved", "project"]
+__all__ = ["PointKind", "Sight", "Surface", "project"]
 
 F64 = npt.NDArray[np.float64]
+
+
+class PointKind(IntEnum):
+    """What is told of a point: tl_point_kind in csrc/topleft.h."""
+
+    ROWS = 0
+    LENGTH = 1
+    FLOW = 2
+
+
+N_NUMBERS = {PointKind.LENGTH: 1, PointKind.FLOW: 2}
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,28 +55,43 @@ class Surface:
         return self.part.frags.mask
 
     @cached_property
-    def points(self) -> F64:
-        """Where the pixels lie on the mesh, in its own space: (P, 3) float64.
+    def drawn(self) -> tuple[Fragments, Mesh]:
+        """The fragments and the mesh as they were drawn: through a lens those of its parts."""
+        return drawn_of(self.part.frags, self.instance.mesh)
 
-        The point has the weights of the pixel in its triangle, relative to a corner: so what float32 rounds off them
-        moves it by less than 2**-22 of the longest edge, along the triangle.
+    def tell(
+        self,
+        what: PointKind,
+        rows: F64,
+        background: float,
+        *,
+        size: tuple[int, int] = (0, 0),
+        threads: int | None = None,
+        dtype: type[np.floating[Any]] = np.float32,
+    ) -> npt.NDArray[Any]:
+        """What `csrc/points.c` tells of the points of the pixels, from numbers that are rows (N, 4) times (x, y, z, 1).
+
+        Points are in the space of the mesh. A point has the float64 weights of its pixel in its triangle, before the
+        snap, relative to a corner; all is float64 and rounded once. `size` is that of the whole picture, for the flow.
         """
-        mesh, seen = self.instance.mesh, self.seen
-        weights, ids = self.part.frags.barycentric(), self.part.frags.triangle[seen]
-        is_few = len(ids) < len(mesh.triangles)  # of many triangles those that show, of few all
-        rows, row = (mesh.triangles[ids], np.arange(len(ids))) if is_few else (mesh.triangles, ids)
-        a, b, c = (mesh.vertices[corners].astype(np.float64, copy=False) for corners in rows.T)
-        points: F64 = a[row]
-        for k, edge in ((1, b - a), (2, c - a)):
-            along = edge[row]
-            along *= weights[..., k][seen][:, None]
-            points += along
-        return points
+        frags, mesh = self.drawn
+        ids = np.require(frags.triangle, np.int32, ["C", "A"])
+        n = N_NUMBERS.get(what, len(rows))
+        out: npt.NDArray[Any] = np.empty((*ids.shape, n)[: 2 if n == 1 else 3], dtype)
+        half_size = size[0] / 2, size[1] / 2
+        points = _engine.Points(
+            mesh.vertices, what, np.ascontiguousarray(rows), half_size, background, dtype is np.float64
+        )
+        scene = frags._scene.with_inverse_w(ids.size)
+        n_threads = count_threads(parse_threads(threads), len(mesh.triangles))
+        run_parts(lambda first, end: points.fill(scene, ids, out, first, end - first), len(ids), n_threads)
+        return out
 
-    @cached_property
-    def points_world(self) -> F64:
-        """The same in the world."""
-        return moved(self.points, self.instance.transform[:3])
+    @property
+    def points(self) -> F64:
+        """Where the pixels that are seen lie on the mesh, in its own space: (P, 3) float64."""
+        points: F64 = self.tell(PointKind.ROWS, np.eye(4)[:3], np.nan, dtype=np.float64)[self.seen]
+        return points
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,26 +140,16 @@ class Sight:
 
     @cached_property
     def has_holes(self) -> bool:
-        """Whether materials cut something out of the mesh.
-
-        Raises
-        ------
-        ValueError
-            If they do so in a scene.
-        """
+        """Whether materials cut something out."""
         material = self.look.get("material")
-        if isinstance(self.subject, Scene):
-            refuse_holes(self.subject, material)
-            return False
-        materials = self.subject.materials if material is None else (material,)
-        return any(has_holes(one, self.subject) for one in materials)
+        return any(cut_of(instance.mesh, material) is not None for instance in self.instances)
 
     @property
     def _view(self) -> tuple[Mesh | Scene, Camera, tuple[int, int]]:
         return self.subject, self.camera, self.size
 
     def _cut(self, frags: Fragments) -> Fragments:
-        if not self.has_holes or isinstance(self.subject, Scene):
+        if not self.has_holes:
             return frags
         return without_holes(frags, self.subject, self.camera, self.look.get("material"))
 
@@ -146,12 +165,20 @@ class Sight:
     def join(
         self, channels: tuple[int, ...], background: float, make: Callable[[Surface], npt.NDArray[Any]]
     ) -> npt.NDArray[np.float32]:
-        """Return a picture (H, W, *channels) of what `make` gives for the pixels of each surface."""
+        """Return a picture (H, W, *channels) of what `make` gives for the rectangle of each surface."""
         width, height = self.size
+        if not isinstance(self.frags, SceneFragments):
+            return make(self.surfaces[0])
         picture: npt.NDArray[np.float32] = np.full((height, width, *channels), background, np.float32)
         for surface in self.surfaces:
-            picture[surface.part.box][surface.seen] = make(surface)
+            picture[surface.part.box][surface.seen] = make(surface)[surface.seen]
         return picture
+
+    def tell(
+        self, surface: Surface, what: PointKind, rows: F64, background: float, *, size: tuple[int, int] = (0, 0)
+    ) -> npt.NDArray[Any]:
+        """What `Surface.tell` does, with the threads of this sight."""
+        return surface.tell(what, rows, background, size=size, threads=self.options.get("threads"))
 
 
 def moved(points: F64, matrix: F64) -> F64:

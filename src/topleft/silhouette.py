@@ -16,7 +16,7 @@ from topleft.detail import detailed
 from topleft.render import DEFAULT_SIZE, default_camera, seen_through
 from topleft.scene import Scene
 from topleft.scene_draw import draw_scene_coverage
-from topleft.scene_render import matrix_of
+from topleft.scene_lens import scene_through
 
 __all__ = ["silhouette"]
 
@@ -90,7 +90,8 @@ def silhouette(
     options: Any = {"sampling": sampling, "cull": cull, "threads": threads} | view
     frame = view.get("viewport") or size
     if isinstance(mesh, Scene):
-        return draw_scene_coverage(mesh, size=size, out=out, clip_from_world=matrix_of(camera, frame), **options)
+        seen = scene_through(mesh, camera, frame, near_clip=view.get("near_clip", True))
+        return draw_scene_coverage(seen.scene, seen.clip_from_world, size, out, **options)
     drawn = seen_through(mesh, camera, frame, near_clip=view.get("near_clip", True))
     options["transform"] = drawn.transform
     mask: npt.NDArray[Any] = coverage(drawn.vertices, drawn.triangles, size, out=out, **options)

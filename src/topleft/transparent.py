@@ -14,11 +14,15 @@ from topleft.adapt import MeshLike, as_mesh
 from topleft.camera import Camera
 from topleft.colors import as_color
 from topleft.composite import composite
+from topleft.cutout import cut_of
 from topleft.depth_layers import DepthLayers, peel
 from topleft.detail import detailed
+from topleft.material import Material
 from topleft.render import DEFAULT_SIZE, WHITE, default_camera
 from topleft.scene import Scene
+from topleft.scene_cutout import cuts_of, draw_cuts, solid_scene, surfaces_of
 from topleft.scene_draw import peel_scene
+from topleft.scene_fragments import SceneDepthLayers
 from topleft.scene_render import shade_scene
 from topleft.shade import shade
 
@@ -64,7 +68,7 @@ def render_transparent(
 
     Notes
     -----
-    Materials cut nothing out here: what `alpha_cutoff` would leave out of a texture is glass, too.
+    What `alpha_cutoff` leaves out of a texture is no glass: the layers behind it are one fewer.
 
     Examples
     --------
@@ -75,9 +79,16 @@ def render_transparent(
     """
     mesh = mesh if isinstance(mesh, Scene) else as_mesh(mesh)
     camera = default_camera(mesh, size) if camera is None else camera
-    mesh = detailed(mesh, camera, size, tolerance, cull=cull)
+    material = look.get("material")
+    mesh = detailed(mesh, camera, size, tolerance, cull=cull, material=material)
     ground = as_color("background", background, 4)
-    found = visible_layers(mesh, camera, size, layers=layers, cull=cull, threads=threads)
+    if not isinstance(mesh, Scene) and cut_of(mesh, material) is not None:
+        mesh = Scene([mesh])  # which is the same picture
+    options: dict[str, Any] = {"layers": layers, "cull": cull, "threads": threads}
+    if isinstance(mesh, Scene):
+        found = solid_layers(mesh, camera, size, material, **options)
+    else:
+        found = visible_layers(mesh, camera, size, **options)
     pictures = np.zeros((size[1], size[0], layers, 3), np.uint8)
     for k in range(layers):
         frags = found.layer(k)
@@ -92,10 +103,29 @@ def render_transparent(
     return picture
 
 
+def solid_layers(
+    scene: Scene,
+    camera: Camera,
+    size: tuple[int, int],
+    material: Material | None,
+    *,
+    threads: int | None,
+    **options: Any,
+) -> DepthLayers:
+    """The nearest layers of a scene without what its materials, or this one, cut out."""
+    cuts = cuts_of(scene, material)
+    found = visible_layers(solid_scene(scene, cuts), camera, size, threads=threads, **options)
+    if not any(cuts) or not isinstance(found, SceneDepthLayers) or 0 in size:
+        return found
+    whole = SceneDepthLayers(*found.planes, found.placed.of(scene))
+    draw_cuts(whole.placed, surfaces_of(scene, camera), cuts, *whole.planes, is_peeled=True, threads=threads)
+    return whole
+
+
 def visible_layers(
     mesh: MeshLike | Scene, camera: Camera | None = None, size: tuple[int, int] = DEFAULT_SIZE, **options: Any
 ) -> DepthLayers:
-    """The nearest layers of every pixel of a mesh or scene; options as for `peel`.
+    """The nearest layers of every pixel of a mesh or scene, whatever its materials cut out; options as for `peel`.
 
     Parameters
     ----------

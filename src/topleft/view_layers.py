@@ -140,8 +140,7 @@ def render_layers(
     ------
     ValueError
         If there is no such layer, an attribute has its name or does not fit, "flow" has no end, "uv" finds no texture
-        coordinates, an option of `render` is wrong, there are attributes and a tolerance, or a scene has cut-outs
-        or is to be seen through a lens.
+        coordinates, an option of `render` is wrong, or there are attributes and a tolerance.
     TypeError
         If an option is unknown, or of colours and no colours are asked for.
 
@@ -151,10 +150,10 @@ def render_layers(
     sub-pixel, which is what the snap moves a vertex by; float32 then rounds it. Flow is the difference of its two
     projections in float64, so what does not move has flow 0, to the bit.
 
-    All layers show the mesh without what its materials cut out.
+    All layers show the mesh or scene without what its materials cut out.
 
     Through a lens a point projects to within its `tolerance_px` and half a sub-pixel of the centre. "distance" is along
-    the axis, also through a fisheye, whose "depth" is that of the distance from the eye. No scene is seen through one.
+    the axis, also through a fisheye, whose "depth" is that of the distance from the eye.
 
     Examples
     --------
