@@ -77,7 +77,7 @@ class Drawn:
     def corners_of(self, triangles, n_vertices):
         return self._clusters.corners
 
-    def find_clusters(self):
+    def find_clusters(self, vertices):
         return self._clusters
 
     def mark(self, stage):

@@ -44,7 +44,7 @@ class StaticPlan:
         """Return the triangles of the mesh, which has checked them."""
         return self._mesh.triangles
 
-    def find_clusters(self) -> Clusters | None:
+    def find_clusters(self, vertices: ArrayLike) -> Clusters | None:  # noqa: ARG002
         """Return the clusters of the mesh if it is drawn often enough; this is one time more."""
         mesh = self._mesh
         return mesh.clusters if choices.pays_to_cluster(len(mesh.triangles), mesh.note_drawn()) else None
@@ -86,6 +86,28 @@ class ClusteredScene:
 
         Returns the triangles that are still to be drawn: the planes of clip space may cut them, or they do not fit.
         """
+        others, _ = self._draw_rows(memory, target, first, end, sample, is_first=is_first, is_last=is_last)
+        return others
+
+    def count_drawn(self, sink: Sink) -> int:
+        """Return how many clusters the picture draws, by one thread: those that are not left out, nor hidden."""
+        width, height = self._view.size
+        ids: NDArray[np.int32] = np.empty((height, width), np.int32)
+        target = _engine.Target(sink, ids, np.empty((height, width), np.float32), None)
+        return self._draw_rows(FreshMemory(), target, 0, height, (0, 0), is_first=True, is_last=True)[1]
+
+    def _draw_rows(
+        self,
+        memory: Memory,
+        target: _engine.Target,
+        first: int,
+        end: int,
+        sample: tuple[int, int],
+        *,
+        is_first: bool,
+        is_last: bool,
+    ) -> tuple[NDArray[np.int32], int]:
+        """Return what is still to be drawn, and how many clusters were."""
         clusters = self.clusters
         scene = self._empty if sample == (0, 0) else self._empty.seen_from(*sample)
         is_farthest = target.sink == Sink.FARTHEST
@@ -94,8 +116,8 @@ class ClusteredScene:
         others: NDArray[np.int32] = memory.empty("others", (clusters.n_triangles + 1,), np.int32)
         may_be_hidden = is_farthest or target.sink == Sink.NEAREST
         place = target, first, end - first, room, others
-        n_others, _, _ = clusters.engine.draw(scene, self._own, seen, may_be_hidden, *place, is_first, is_last)
-        return others[:n_others].copy()
+        n_others, _, n_drawn = clusters.engine.draw(scene, self._own, seen, may_be_hidden, *place, is_first, is_last)
+        return others[:n_others].copy(), n_drawn
 
     def part(self, triangles: NDArray[np.int32]) -> _engine.Scene:
         """Return the mesh with the vertices that some triangles use snapped, and seldom all; `triangles` ascend."""

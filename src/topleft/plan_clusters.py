@@ -1,0 +1,63 @@
+"""What clusters do for a view of a mesh, counted before the plan is told: how many are left out, and by which test."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from topleft import choices
+from topleft.clustered import ClusteredScene
+from topleft.clusters import Clusters
+from topleft.mesh import Mesh
+from topleft.models import Cull, DepthTest, Sampling
+from topleft.view import CULL_CODES, View
+
+__all__ = ["ClusterFacts", "find_cluster_facts"]
+
+
+@dataclass(frozen=True, slots=True)
+class ClusterFacts:
+    """How the clusters of a mesh fare in a view.
+
+    Attributes
+    ----------
+    clusters : Clusters or None
+        What is drawn from; None when the mesh is drawn whole.
+    why_not : str
+        Why it is.
+    n_outside, n_turned, n_hidden, n_drawn : int
+        Clusters outside of the picture, turned away, hidden, and drawn.
+    """
+
+    clusters: Clusters | None
+    why_not: str = ""
+    n_outside: int = 0
+    n_turned: int = 0
+    n_hidden: int = 0
+    n_drawn: int = 0
+
+    @property
+    def share(self) -> float:
+        """Share of the clusters that are drawn; 1 without clusters."""
+        return 1.0 if self.clusters is None else self.n_drawn / max(1, len(self.clusters))
+
+
+def find_cluster_facts(mesh: Mesh, view: View, verb: str, test: DepthTest | None) -> ClusterFacts:
+    """Return what `rasterize_mesh` does from the second picture of a mesh on; clusters are made for it if need be."""
+    n_triangles = len(mesh.triangles)
+    if verb != "rasterize":
+        return ClusterFacts(None, f"{verb} draws arrays, which may change")
+    if view.sampling is not Sampling.CENTER:
+        return ClusterFacts(None, "with several samples a pixel, bands of rows are drawn, a sample after the other")
+    sink = choices.fragment_sink(test, has_depth=True)
+    if not choices.can_cluster(view, sink):
+        return ClusterFacts(None, "the order of the triangles matters, or the window lies too far off")
+    if not choices.pays_to_cluster(n_triangles, 1):
+        return ClusterFacts(None, f"{n_triangles:,} triangles are done before sorting them would pay")
+    clusters = mesh.clusters
+    seen = ClusteredScene(clusters, view)
+    if not choices.pays_to_draw_clusters(view, n_triangles, seen.share):
+        return ClusterFacts(None, "most of the mesh shows, and faces that are turned away cost little one by one")
+    whole = ClusteredScene(clusters, replace(view, cull=CULL_CODES[Cull.NONE]))
+    n, n_inside, n_faced = len(clusters), round(whole.share() * len(clusters)), round(seen.share() * len(clusters))
+    n_drawn = seen.count_drawn(sink)
+    return ClusterFacts(clusters, "", n - n_inside, n_inside - n_faced, n_faced - n_drawn, n_drawn)
