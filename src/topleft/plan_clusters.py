@@ -35,11 +35,6 @@ class ClusterFacts:
     n_hidden: int = 0
     n_drawn: int = 0
 
-    @property
-    def share(self) -> float:
-        """Share of the clusters that are drawn; 1 without clusters."""
-        return 1.0 if self.clusters is None else self.n_drawn / max(1, len(self.clusters))
-
 
 def find_cluster_facts(mesh: Mesh, view: View, verb: str, test: DepthTest | None) -> ClusterFacts:
     """Return what `rasterize_mesh` does from the second picture of a mesh on; clusters are made for it if need be."""
