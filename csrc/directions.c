@@ -2,46 +2,30 @@
  * In: vectors, positions or colours of a mesh.  Out: float64 (n, 3), or float32 (n, 4) whose last number is 1.
  *
  * Nothing but sums, products, quotients and roots, each rounded once, in the order that is written: the same bits everywhere. */
-#include <string.h>
-
 #include "fixed.h"
-#include "lanes.h" /* TL_INLINE */
+#include "lanes.h"
 
-/* The power of two, 2^-1 to 2^1022, that takes a number up to 2^1022 to [1/2, 1): products with it are exact but for what is lost
- * below 2^-1074. */
-TL_INLINE double power_to_one(double a)
+/* The powers of two, 2^-1 to 2^1022, that take numbers up to 2^1022 to [1/2, 1): products with them are exact but for what is lost
+ * below 2^-1074; and what undoes them. */
+TL_INLINE vd power_to_one(vd a) { return vd_power(a, 2045ull << 52, 2047ull << 52); }
+TL_INLINE vd power_from_one(vd power) { return vd_power(power, 2046ull << 52, 2047ull << 52); }
+
+TL_INLINE vd largest_of(const vd *v) { return vd_max(vd_max(vd_abs(v[0]), vd_abs(v[1])), vd_abs(v[2])); }
+
+TL_INLINE vd dot_of(const vd *a, const vd *b) { return vd_add(vd_add(vd_mul(a[0], b[0]), vd_mul(a[1], b[1])), vd_mul(a[2], b[2])); }
+
+/* Vectors, of numbers below 2^1022, scaled to length 1, however long they are; zero stays zero.  Returns their lengths. */
+TL_INLINE vd to_unit(vd *v)
 {
-    uint64_t bits;
-    memcpy(&bits, &a, sizeof bits);
-    bits = (2045ull << 52) - (bits & 2047ull << 52);
-    memcpy(&a, &bits, sizeof bits);
-    return a;
-}
-
-/* What undoes it. */
-TL_INLINE double power_from_one(double power)
-{
-    uint64_t bits;
-    memcpy(&bits, &power, sizeof bits);
-    bits = (2046ull << 52) - bits;
-    memcpy(&power, &bits, sizeof bits);
-    return power;
-}
-
-TL_INLINE double larger(double a, double b) { return a > b ? a : b; }
-TL_INLINE double largest_of(double x, double y, double z) { return larger(larger(fabs(x), fabs(y)), fabs(z)); }
-
-/* The vector, of numbers below 2^1022, scaled to length 1, however long it is; zero, and what is not a number, become zero.  Returns
- * its length. */
-TL_INLINE double to_unit(double *x, double *y, double *z)
-{
-    const double power = power_to_one(largest_of(*x, *y, *z)), a = *x * power, b = *y * power, c = *z * power;
-    const double length = sqrt((a * a + b * b) + c * c);
-    const double divisor = length > 0.0 ? length : 1.0, unit_x = a / divisor, unit_y = b / divisor, unit_z = c / divisor;
-    *x = length > 0.0 ? unit_x : 0.0;
-    *y = length > 0.0 ? unit_y : 0.0;
-    *z = length > 0.0 ? unit_z : 0.0;
-    return length * power_from_one(power);
+    const vd power = power_to_one(largest_of(v));
+    for (int k = 0; k < 3; k++)
+        v[k] = vd_mul(v[k], power);
+    const vd length = vd_sqrt(dot_of(v, v));
+    const vm is_any = vd_ge(length, vd_set1(0x1p-60)); /* the largest number is 2^-52 or more, then */
+    const vd divisor = vd_select(is_any, length, vd_set1(1.0));
+    for (int k = 0; k < 3; k++)
+        v[k] = vd_select(is_any, vd_div(v[k], divisor), vd_set1(0.0));
+    return vd_mul(length, power_from_one(power));
 }
 
 static inline void load_three(const tl_source *source, int64_t i, double *p)
@@ -50,29 +34,37 @@ static inline void load_three(const tl_source *source, int64_t i, double *p)
         p[k] = source->scalar == TL_F32 ? (double)((const float *)source->data)[3 * i + k] : ((const double *)source->data)[3 * i + k];
 }
 
-#define TL_DIRECTIONS 64 /* at a time: vectors of them stay in the first-level cache */
+#define TL_DIRECTIONS 64 /* at a time, whole vectors of lanes */
 
-TL_INLINE void unit_block(const tl_source *vectors, const double *turn, int64_t first, int n, double (*out)[TL_DIRECTIONS])
+/* What squares of would overflow is made smaller, what is not finite zero. */
+static void gather_vectors(const tl_source *vectors, int64_t first, int n, double (*v)[TL_DIRECTIONS])
 {
     for (int i = 0; i < n; i++) {
         double p[3];
         load_three(vectors, first + i, p);
+        const double far = (fabs(p[0]) + fabs(p[1])) + fabs(p[2]);
+        const int is_finite = (fabs(p[0]) <= DBL_MAX) & (fabs(p[1]) <= DBL_MAX) & (fabs(p[2]) <= DBL_MAX);
         for (int k = 0; k < 3; k++)
-            out[k][i] = p[k];
+            v[k][i] = far <= 0x1p1000 ? p[k] : is_finite ? p[k] * 0x1p-60 : 0.0;
     }
-    for (int i = 0; i < n; i++) {
-        double x = out[0][i], y = out[1][i], z = out[2][i];
-        const double far = largest_of(x, y, z), near = far > 0x1p1000 ? 0x1p-60 : 1.0;
-        const int is_finite = (fabs(x) <= DBL_MAX) & (fabs(y) <= DBL_MAX) & (fabs(z) <= DBL_MAX);
-        x = is_finite ? x * near : 0.0, y = is_finite ? y * near : 0.0, z = is_finite ? z * near : 0.0;
+}
+
+TL_INLINE void unit_block(const double *turn, int n, double (*block)[TL_DIRECTIONS])
+{
+    for (int i = 0; i < n; i += TL_LANES) {
+        vd v[3];
+        for (int k = 0; k < 3; k++)
+            v[k] = vd_load(block[k] + i);
         if (turn) {
-            to_unit(&x, &y, &z);
-            const double a = (x * turn[0] + y * turn[3]) + z * turn[6], b = (x * turn[1] + y * turn[4]) + z * turn[7];
-            z = (x * turn[2] + y * turn[5]) + z * turn[8];
-            x = a, y = b;
+            const vd own[3] = {v[0], v[1], v[2]};
+            for (int k = 0; k < 3; k++) {
+                const vd column[3] = {vd_set1(turn[k]), vd_set1(turn[3 + k]), vd_set1(turn[6 + k])};
+                v[k] = dot_of(own, column);
+            }
         }
-        to_unit(&x, &y, &z);
-        out[0][i] = x, out[1][i] = y, out[2][i] = z;
+        to_unit(v);
+        for (int k = 0; k < 3; k++)
+            vd_store(block[k] + i, v[k]);
     }
 }
 
@@ -89,13 +81,14 @@ static inline void store_rows(double (*v)[TL_DIRECTIONS], int n, int64_t first, 
 
 static void unit_vectors(const tl_source *vectors, const double *turn, int64_t first, int64_t end, double *out, float *rows)
 {
+    double v[3][TL_DIRECTIONS] = {{0.0}};
     for (int64_t i = first; i < end; i += TL_DIRECTIONS) {
-        double v[3][TL_DIRECTIONS];
         const int n = (int)(end - i < TL_DIRECTIONS ? end - i : TL_DIRECTIONS);
+        gather_vectors(vectors, i, n, v);
         if (turn)
-            unit_block(vectors, turn, i, n, v);
+            unit_block(turn, n, v);
         else
-            unit_block(vectors, NULL, i, n, v);
+            unit_block(NULL, n, v);
         store_rows(v, n, i, out, rows);
     }
 }

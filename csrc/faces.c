@@ -1,16 +1,16 @@
 /* Faces: the normals of triangles and of vertices, which side these are on, and the box round a mesh.
  * In: vertices and triangles.  Out: unit vectors, flags, a box.
  *
- * Triangles go by blocks: corners are gathered one by one, then a plain loop without branches, which compilers turn into vectors,
- * computes all that follows, then sums are scattered one by one.  Angles have an arctangent of their own, as those of C libraries
+ * Triangles go by blocks: corners are gathered one by one, all that follows is computed a vector of triangles at a time, and sums are
+ * scattered one by one.  Angles have an arctangent of their own, as those of C libraries
  * differ; so every machine has the same bits.
  *
  * Based on: G. Thurmer and C. A. Wuthrich, Computing Vertex Normals from Polygonal Facets, Journal of Graphics Tools 3(1), 1998;
  * W. Kahan, Miscalculating Area and Angles of a Needle-like Triangle, 2014 (shortest sides first). */
 #include "fixed.h"
-#include "lanes.h" /* TL_INLINE */
+#include "lanes.h"
 
-#define TL_FACES 64 /* at a time: 192 corners, some KiB */
+#define TL_FACES 64 /* at a time, whole vectors of lanes: a block stays in the first-level cache */
 
 typedef struct {
     int n;
@@ -44,7 +44,7 @@ TL_INLINE void gather_as(const void *data, int is_f32, const int32_t *triangles,
                 const int64_t at = 3 * (int64_t)t[c] + k;
                 const double p = is_f32 ? (double)((const float *)data)[at] : ((const double *)data)[at];
                 b->corner[c][k][i] = p;
-                far = is_f32 ? 0.0 : larger(far, fabs(p));
+                far = is_f32 ? 0.0 : far + fabs(p);
             }
         for (int k = 0; far > 0x1p1000 && k < 9; k++)
             b->corner[k / 3][k % 3][i] *= 0x1p-60;
@@ -61,61 +61,66 @@ static void gather_corners(const tl_source *source, const int32_t *triangles, fa
 
 /* The angle whose tangent is y / x, of y >= 0 and an x that is positive but for rounding; 0 of 0 and 0.  The quotient is turned back by
  * 0, 45 or 90 degrees to within tan(22.5 degrees) of 0, where the polynomial is within 2^-56 of atan(q) / q. */
-TL_INLINE double angle_of(double y, double x)
+TL_INLINE vd angle_of(vd y, vd x)
 {
-    const int is_low = x * 0x1.a827999fcef32p-2 > y, is_high = y * 0x1.a827999fcef32p-2 > x;
-    const double above = is_low ? y : is_high ? -x : y - x, below = is_low ? x : is_high ? y : y + x;
-    const double start = is_low ? 0.0 : is_high ? 0x1.921fb54442d18p+0 : 0x1.921fb54442d18p-1;
-    const double q = above / (below > 0.0 ? below : 1.0), z = q * q;
-    double sum = -0x1.3a2f1cc1ba3c5p-6;
-    sum = sum * z + 0x1.4161b24be475bp-5;
-    sum = sum * z + -0x1.a0993ef875d4ap-5;
-    sum = sum * z + 0x1.dfe637a48099bp-5;
-    sum = sum * z + -0x1.10fa76aa9b02cp-4;
-    sum = sum * z + 0x1.3b1262f3a2b5bp-4;
-    sum = sum * z + -0x1.745d0b27da190p-4;
-    sum = sum * z + 0x1.c71c7185386f1p-4;
-    sum = sum * z + -0x1.2492492436180p-3;
-    sum = sum * z + 0x1.999999999934bp-3;
-    sum = sum * z + -0x1.5555555555555p-2;
-    const double angle = start + (q + q * (z * sum));
-    return below > 0.0 ? angle : 0.0;
+    const vd slope = vd_set1(0x1.a827999fcef32p-2), zero = vd_set1(0.0);
+    const vm is_low = vd_ge(vd_mul(x, slope), y), is_high = vd_ge(vd_mul(y, slope), x);
+    const vd above = vd_select(is_low, y, vd_select(is_high, vd_sub(zero, x), vd_sub(y, x)));
+    const vd below = vd_select(is_low, x, vd_select(is_high, y, vd_add(y, x)));
+    const vd start = vd_select(is_low, zero, vd_select(is_high, vd_set1(0x1.921fb54442d18p+0), vd_set1(0x1.921fb54442d18p-1)));
+    const vm is_none = vd_ge(zero, below);
+    const vd q = vd_div(above, vd_select(is_none, vd_set1(1.0), below)), z = vd_mul(q, q);
+    static const double RISING[] = {-0x1.3a2f1cc1ba3c5p-6, 0x1.4161b24be475bp-5, -0x1.a0993ef875d4ap-5, 0x1.dfe637a48099bp-5,
+                                    -0x1.10fa76aa9b02cp-4, 0x1.3b1262f3a2b5bp-4, -0x1.745d0b27da190p-4, 0x1.c71c7185386f1p-4,
+                                    -0x1.2492492436180p-3, 0x1.999999999934bp-3, -0x1.5555555555555p-2};
+    vd sum = vd_set1(RISING[0]);
+    for (int k = 1; k < 11; k++)
+        sum = vd_add(vd_mul(sum, z), vd_set1(RISING[k]));
+    return vd_select(is_none, zero, vd_add(start, vd_add(q, vd_mul(q, vd_mul(z, sum)))));
 }
+
+/* Of three values the one at the corner with the largest angle. */
+typedef struct {
+    vm is_first, is_not_last; /* corner 0 rather than 1; one of these rather than 2 */
+} widest_corner;
+
+TL_INLINE vd pick_widest(widest_corner w, vd at_0, vd at_1, vd at_2) { return vd_select(w.is_not_last, vd_select(w.is_first, at_0, at_1), at_2); }
 
 /* Normals and, where wanted, angles.  Both begin at the corner with the largest angle, between the two shortest sides: their product
  * loses least for needles.  With the corners the other way round, the normal changes its sign and nothing else. */
 TL_INLINE void measure_block(face_block *b, int with_angles)
 {
-    for (int i = 0; i < b->n; i++) {
-        double s[3][3];
+    for (int i = 0; i < b->n; i += TL_LANES) {
+        vd s[3][3], dot[3], u[3], v[3], normal[3];
+        for (int c = 0; c < 3; c++)
+            for (int k = 0; k < 3; k++)
+                s[c][k] = vd_sub(vd_load(b->corner[c == 2 ? 0 : c + 1][k] + i), vd_load(b->corner[c][k] + i));
+        const vd power = power_to_one(vd_max(vd_max(largest_of(s[0]), largest_of(s[1])), largest_of(s[2])));
+        for (int c = 0; c < 3; c++)
+            for (int k = 0; k < 3; k++)
+                s[c][k] = vd_mul(s[c][k], power);
+        for (int c = 0; c < 3; c++)
+            dot[c] = vd_sub(vd_set1(0.0), dot_of(s[c], s[c == 0 ? 2 : c - 1]));
+        const vm is_first = vd_ge(dot[1], dot[0]);
+        const widest_corner widest = {is_first, vd_ge(dot[2], vd_select(is_first, dot[0], dot[1]))};
         for (int k = 0; k < 3; k++) {
-            s[0][k] = b->corner[1][k][i] - b->corner[0][k][i];
-            s[1][k] = b->corner[2][k][i] - b->corner[1][k][i];
-            s[2][k] = b->corner[0][k][i] - b->corner[2][k][i];
+            u[k] = pick_widest(widest, s[2][k], s[0][k], s[1][k]);
+            v[k] = pick_widest(widest, s[0][k], s[1][k], s[2][k]);
         }
-        const double far = larger(larger(largest_of(s[0][0], s[0][1], s[0][2]), largest_of(s[1][0], s[1][1], s[1][2])),
-                                  largest_of(s[2][0], s[2][1], s[2][2]));
-        const double power = power_to_one(far);
+        for (int k = 0; k < 3; k++) {
+            const int j = k == 2 ? 0 : k + 1, l = k == 0 ? 2 : k - 1;
+            normal[k] = vd_sub(vd_mul(u[j], v[l]), vd_mul(u[l], v[j]));
+        }
+        const vd area = to_unit(normal);
         for (int k = 0; k < 3; k++)
-            s[0][k] *= power, s[1][k] *= power, s[2][k] *= power;
-        const double d0 = -((s[2][0] * s[0][0] + s[2][1] * s[0][1]) + s[2][2] * s[0][2]);
-        const double d1 = -((s[0][0] * s[1][0] + s[0][1] * s[1][1]) + s[0][2] * s[1][2]);
-        const double d2 = -((s[1][0] * s[2][0] + s[1][1] * s[2][1]) + s[1][2] * s[2][2]);
-        const int at_1 = (d1 < d0) & (d1 <= d2), at_2 = (d2 < d0) & (d2 < d1);
-        double u[3], v[3];
-        for (int k = 0; k < 3; k++) {
-            u[k] = at_1 ? s[0][k] : at_2 ? s[1][k] : s[2][k];
-            v[k] = at_1 ? s[1][k] : at_2 ? s[2][k] : s[0][k];
-        }
-        double x = u[1] * v[2] - u[2] * v[1], y = u[2] * v[0] - u[0] * v[2], z = u[0] * v[1] - u[1] * v[0];
-        const double area = to_unit(&x, &y, &z);
-        b->normal[0][i] = x, b->normal[1][i] = y, b->normal[2][i] = z;
+            vd_store(b->normal[k] + i, normal[k]);
         if (with_angles) {
-            const double onward = angle_of(area, at_1 ? d2 : at_2 ? d0 : d1), back = angle_of(area, at_1 ? d0 : at_2 ? d1 : d2);
-            const double largest = 0x1.921fb54442d18p+1 - (onward + back);
-            b->angle[0][i] = at_1 ? back : at_2 ? onward : largest;
-            b->angle[1][i] = at_1 ? largest : at_2 ? back : onward;
-            b->angle[2][i] = at_1 ? onward : at_2 ? largest : back;
+            const vd onward = angle_of(area, pick_widest(widest, dot[1], dot[2], dot[0]));
+            const vd back = angle_of(area, pick_widest(widest, dot[2], dot[0], dot[1]));
+            const vd largest = vd_sub(vd_set1(0x1.921fb54442d18p+1), vd_add(onward, back));
+            vd_store(b->angle[0] + i, pick_widest(widest, largest, back, onward));
+            vd_store(b->angle[1] + i, pick_widest(widest, onward, largest, back));
+            vd_store(b->angle[2] + i, pick_widest(widest, back, onward, largest));
         }
     }
 }
@@ -179,7 +184,7 @@ static int64_t vertex_normals(const tl_source *source, const int32_t *triangles,
 
 static int64_t face_normals(const tl_source *source, const int32_t *triangles, int64_t first, int64_t end, double *out, float *rows)
 {
-    face_block b;
+    face_block b = {.n = 0};
     _Static_assert(TL_FACES == TL_DIRECTIONS, "a block of faces has a block of normals");
     for (int64_t i = first; i < end; i += b.n) {
         const int64_t bad = load_block(source, triangles, i, end, &b);
@@ -194,7 +199,7 @@ static int64_t face_normals(const tl_source *source, const int32_t *triangles, i
 static int64_t find_turned(const tl_source *source, const int32_t *triangles, int64_t first, int64_t end, const float *normals,
                            uint8_t *is_turned)
 {
-    face_block b;
+    face_block b = {.n = 0};
     for (int64_t i = first; i < end; i += b.n) {
         double sum[3][TL_FACES];
         const int64_t bad = load_block(source, triangles, i, end, &b);

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from topleft import scenes
-from topleft.mesh import Mesh, angle_weighted_normals, coincident, face_normals
+from topleft.faces import angle_weighted_normals, face_normals
+from topleft.mesh import Mesh, coincident
 
 TRIANGLE = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
 
