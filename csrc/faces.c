@@ -2,11 +2,10 @@
  * In: vertices and triangles.  Out: unit vectors, flags, a box.
  *
  * Triangles go by blocks: corners are gathered one by one, all that follows is computed a vector of triangles at a time, and sums are
- * scattered one by one.  Angles have an arctangent of their own, as those of C libraries
- * differ; so every machine has the same bits.
+ * scattered one by one.  Angles have an arctangent of their own, as those of C libraries differ: every machine has the same bits.
  *
  * Based on: G. Thurmer and C. A. Wuthrich, Computing Vertex Normals from Polygonal Facets, Journal of Graphics Tools 3(1), 1998;
- * W. Kahan, Miscalculating Area and Angles of a Needle-like Triangle, 2014 (shortest sides first). */
+ * W. Kahan, Miscalculating Area and Angles of a Needle-like Triangle, 2014. */
 #include "fixed.h"
 #include "lanes.h"
 

@@ -69,9 +69,12 @@ def angle_weighted_normals(vertices: FloatArray, triangles: I32, *, threads: int
     """
     points, corners = _contiguous(vertices), np.ascontiguousarray(triangles, np.int32)
     source, out = _engine.Source(points), np.empty((len(points), 3))
-    n_threads = min(_threads(len(corners), threads), MAX_THREADS_OF_VERTICES if threads is None else threads)
-    rows = run_parts(lambda *part: _engine.vertex_normals(source, corners, *part, out), len(points), n_threads)
-    _check(rows, corners, len(points))
+
+    def add_up(first: int, end: int) -> int:
+        return _engine.vertex_normals(source, corners, first, end, out)
+
+    n_threads = min(_threads(len(corners), None), MAX_THREADS_OF_VERTICES) if threads is None else threads
+    _check(run_parts(add_up, len(points), n_threads), corners, len(points))
     return out
 
 
@@ -81,14 +84,22 @@ def face_normals(vertices: FloatArray, triangles: I32, *, threads: int | None = 
     (0, 0, 0) for a triangle without area.
     """
     out = np.empty((len(triangles), 3))
-    _over_faces(vertices, triangles, threads, lambda *given: _engine.face_normals(*given, out, None))
+
+    def measure(source: _engine.Source, corners: I32, first: int, end: int) -> int:
+        return _engine.face_normals(source, corners, first, end, out, None)
+
+    _over_faces(vertices, triangles, threads, measure)
     return out
 
 
 def face_normal_rows(vertices: FloatArray, triangles: I32, *, threads: int | None = None) -> F32:
     """The same as rows (T, 4) float32, the last number 1."""
     rows = np.empty((len(triangles), 4), np.float32)
-    _over_faces(vertices, triangles, threads, lambda *given: _engine.face_normals(*given, None, rows))
+
+    def measure(source: _engine.Source, corners: I32, first: int, end: int) -> int:
+        return _engine.face_normals(source, corners, first, end, None, rows)
+
+    _over_faces(vertices, triangles, threads, measure)
     return rows
 
 
@@ -97,7 +108,11 @@ def turned_faces(vertices: FloatArray, triangles: I32, normals: F32, *, threads:
     turned = np.empty(len(triangles), np.uint8)
     if len(normals) != len(vertices):
         raise ValueError(f"normals must have shape ({len(vertices)}, 4), got {normals.shape}")
-    _over_faces(vertices, triangles, threads, lambda *given: _engine.find_turned(*given, normals, turned))
+
+    def compare(source: _engine.Source, corners: I32, first: int, end: int) -> int:
+        return _engine.find_turned(source, corners, first, end, normals, turned)
+
+    _over_faces(vertices, triangles, threads, compare)
     return turned
 
 
@@ -117,46 +132,52 @@ def box_of_triangles(vertices: FloatArray, triangles: I32, *, threads: int | Non
 
 def unit_or_zero(vectors: FloatArray) -> F64:
     """Vectors (N, 3) scaled to length 1, float64; zero stays zero, and what is not finite becomes zero."""
-    own, out = _contiguous(vectors), np.empty((len(vectors), 3))
-    source = _engine.Source(own)
-    run_parts(lambda *part: _engine.unit_vectors(source, None, *part, out, None), len(own), _threads(len(own)))
+    out = np.empty((len(vectors), 3))
+    _over_rows(vectors, lambda source, first, end: _engine.unit_vectors(source, None, first, end, out, None))
     return out
 
 
 def unit_rows(vectors: FloatArray, turn: F64 | None = None) -> F32:
     """The same as rows (N, 4) float32, the last number 1; of `vectors @ turn` where there is a matrix (3, 3)."""
-    own, rows = _contiguous(vectors), np.empty((len(vectors), 4), np.float32)
-    source, matrix = _engine.Source(own), None if turn is None else np.ascontiguousarray(turn, np.float64)
-    run_parts(lambda *part: _engine.unit_vectors(source, matrix, *part, None, rows), len(own), _threads(len(own)))
+    rows = np.empty((len(vectors), 4), np.float32)
+    matrix = None if turn is None else np.ascontiguousarray(turn, np.float64)
+    _over_rows(vectors, lambda source, first, end: _engine.unit_vectors(source, matrix, first, end, None, rows))
     return rows
 
 
 def moved(points: FloatArray, matrix: F64) -> F64:
     """Points (N, 3), float64, moved by an affine matrix (4, 4)."""
-    own, out = _contiguous(points), np.empty((len(points), 3))
-    source, rows = _engine.Source(own), np.ascontiguousarray(matrix, np.float64)
-    run_parts(lambda *part: _engine.move_points(source, rows, *part, out), len(own), _threads(len(own)))
+    out = np.empty((len(points), 3))
+    rows = np.ascontiguousarray(matrix, np.float64)
+    _over_rows(points, lambda source, first, end: _engine.move_points(source, rows, first, end, out))
     return out
 
 
 def color_rows(colors: U8) -> F32:
     """Rows (N, 4) float32 of colours (N, 3) or (N, 4): red, green, blue, and 1."""
     rows = np.empty((len(colors), 4), np.float32)
-    run_parts(lambda *part: _engine.color_rows(colors, *part, rows), len(colors), _threads(len(colors)))
+    n_threads = _threads(len(colors), None)
+    run_parts(lambda first, end: _engine.color_rows(colors, first, end, rows), len(colors), n_threads)
     return rows
+
+
+def _over_rows(rows: FloatArray, work: Callable[[_engine.Source, int, int], None]) -> None:
+    source = _engine.Source(_contiguous(rows))
+    run_parts(lambda first, end: work(source, first, end), len(rows), _threads(len(rows), None))
 
 
 def _over_faces(
     vertices: FloatArray, triangles: I32, threads: int | None, work: Callable[[_engine.Source, I32, int, int], int]
 ) -> None:
     points, corners = _contiguous(vertices), np.ascontiguousarray(triangles, np.int32)
-    source = _engine.Source(points)
-    rows = run_parts(lambda *part: work(source, corners, *part), len(corners), _threads(len(corners), threads))
+    source, n_threads = _engine.Source(points), _threads(len(corners), threads)
+    rows = run_parts(lambda first, end: work(source, corners, first, end), len(corners), n_threads)
     _check(rows, corners, len(points))
 
 
-def _threads(n: int, threads: int | None = None) -> int:
-    return max(1, min(count_threads(threads, n), n // MIN_PER_THREAD)) if threads is None else threads
+def _threads(n: int, threads: int | None) -> int:
+    """How many threads some triangles or vertices are worth."""
+    return max(1, min(count_threads(None, n), n // MIN_PER_THREAD)) if threads is None else threads
 
 
 def _contiguous(rows: FloatArray) -> FloatArray:
