@@ -160,17 +160,17 @@ def gather(points: F64, triangles: I32, n_wanted: int, *, least_flat: float = 0.
 
 
 def flatness(points: F64, triangles: I32, group: npt.NDArray[np.int64], n_groups: int) -> F64:
-    """The sum of the vectors of area of the triangles that begin in a group of points, as a share of their area."""
+    """The sum of the vectors of area of the triangles with corners in a group of points, as a share of their area."""
     sums = np.zeros((4, n_groups))
     for start in range(0, len(triangles), MOST_TO_WEIGH):
         some = triangles[start : start + MOST_TO_WEIGH]
         a, b, c = points[some.T]
         across = np.cross(b - a, c - a)
-        own = group[some[:, 0]]
-        low, high = int(own.min()), int(own.max()) + 1
         length = np.sqrt(np.einsum("ij,ij->i", across, across))
-        for k, weights in enumerate((*across.T, length)):
-            sums[k, low:high] += np.bincount(own - low, weights, high - low)
+        for own in group[some.T]:
+            low, high = int(own.min()), int(own.max()) + 1
+            for k, weights in enumerate((*across.T, length)):
+                sums[k, low:high] += np.bincount(own - low, weights, high - low)
     flat: F64 = np.divide(np.sqrt((sums[:3] ** 2).sum(axis=0)), sums[3], out=np.ones(n_groups), where=sums[3] > 0)
     return flat
 
