@@ -71,9 +71,9 @@ def test_batch_spools_many_meshes_in_bounded_room(processes, monkeypatch):
     most = []
     release = crews.Spool.release
 
-    def count(self, scene):
+    def count(self, scene, with_levels=False):
         most.append(len(list(Path(self._folder).iterdir())))
-        release(self, scene)
+        release(self, scene, with_levels)
 
     monkeypatch.setattr(crews.Spool, "release", count)
     listed = (tl.Job(tl.Mesh(BOX.vertices + i, BOX.triangles), None, SIZE) for i in range(40))
@@ -228,8 +228,8 @@ def test_batch_in_processes_draws_levels_of_the_parent(processes):
     mesh = tl.Mesh(*tl.scenes.torus(segments=48, sections=24))
     found = list(tl.render_batch(views(3, mesh, tolerance=2), executor=processes))
     assert kept_levels(mesh) is not None
-    for picture, expected in zip(found, pictures(3, mesh, tolerance=2), strict=True):
-        assert np.array_equal(picture, expected)
+    for result, expected in zip(found, pictures(3, mesh, tolerance=2), strict=True):
+        assert np.array_equal(result.picture, expected)
 
 
 def test_levels_that_cannot_be_made_are_left_to_the_job(monkeypatch):
