@@ -24,9 +24,6 @@ from topleft.view import View
 
 __all__ = ["ClusteredScene", "StaticPlan", "draw_clustered"]
 
-#: Vertices that are snapped together when some of them are needed: whole vectors.
-VERTEX_BLOCK = 16
-
 NO_RECORDS: NDArray[np.uint8] = np.empty(0, np.uint8)
 
 
@@ -119,8 +116,8 @@ class ClusteredScene:
         n_others, _, n_drawn = clusters.engine.draw(scene, self._own, seen, may_be_hidden, *place, is_first, is_last)
         return others[:n_others].copy(), n_drawn
 
-    def part(self, triangles: NDArray[np.int32]) -> _engine.Scene:
-        """Return the mesh with the vertices that some triangles use snapped, and seldom all; `triangles` ascend."""
+    def part(self, *triangles: NDArray[np.int32]) -> _engine.Scene:
+        """Return the mesh with the vertices that some triangles use snapped, and seldom all; -1 is none."""
         scene = self.try_part(triangles, FreshMemory())
         if scene is None:  # a vertex beside one of them, which need not be used, does not fit
             points, corners = self.clusters.points, self.clusters.corners
@@ -128,18 +125,26 @@ class ClusteredScene:
             return snapped.scene
         return scene
 
-    def try_part(self, triangles: NDArray[np.int32], memory: Memory) -> _engine.Scene | None:
+    def try_part(self, triangles: Sequence[NDArray[np.int32]], memory: Memory) -> _engine.Scene | None:
         """Return the same, or None where a vertex does not fit or is not finite."""
         points, corners = self.clusters.points, self.clusters.corners
         source = self._source_of(points)
-        is_used: NDArray[np.uint8] = np.zeros(len(points) // VERTEX_BLOCK + 1, np.uint8)
-        is_used[corners[triangles].ravel() // VERTEX_BLOCK] = 1
+        ids = [np.ascontiguousarray(array, np.int32).ravel() for array in triangles]
+        is_used: NDArray[np.uint8] = np.zeros(len(points) // _engine.BLOCK + 1, np.uint8)
+        for array in ids:
+            _engine.mark_vertices(array, corners, is_used)
         records: NDArray[np.uint8] = memory.empty("records", (len(points) * _engine.VERTEX_BYTES,), np.uint8)
-        bad, wide, clipped = source.project_blocks(is_used, VERTEX_BLOCK, self._engine_view, records)
+        bad, wide, clipped = source.project_blocks(is_used, self._engine_view, records)
         if bad or wide:
             return None
-        pieces = _engine.Pieces(source, records, corners, self._engine_view, triangles) if clipped else None
-        return self._scene_of(source, records, corners, pieces)
+        pieces = None
+        if clipped:
+            cut = np.empty(sum(map(len, ids)), np.int32)
+            n_cut = 0
+            for array in ids:
+                n_cut += _engine.list_cut(array, corners, records, cut[n_cut:])
+            pieces = _engine.Pieces(source, records, corners, self._engine_view, np.unique(cut[:n_cut]))
+        return self._scene_of(source, records, corners, pieces, is_used)
 
     def _source_of(self, points: NDArray[Any]) -> _engine.Source:
         return _engine.Source(points, self._matrix, self._is_affine)
@@ -150,10 +155,11 @@ class ClusteredScene:
         records: NDArray[np.uint8],
         corners: NDArray[np.int32],
         pieces: _engine.Pieces | None,
+        is_used: NDArray[np.uint8] | None = None,
     ) -> _engine.Scene:
         view = self._view
         how = (*view.origin, view.grid_bits, view.cull, view.method, view.test)
-        scene = _engine.Scene(source, records, None, corners, pieces, *how, self._engine_view)
+        scene = _engine.Scene(source, records, None, corners, pieces, *how, self._engine_view, is_used)
         return scene.numbered_from(self._first_id)
 
 
@@ -199,7 +205,7 @@ def draw_others(
     sample: tuple[int, int],
 ) -> bool:
     """Draw some triangles of a scene over what is there; returns as `draw_clustered` does."""
-    part = scene.try_part(triangles, memories[0])
+    part = scene.try_part([triangles], memories[0])
     if part is None:
         return False
     seen = part.seen_from(*sample)

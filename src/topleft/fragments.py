@@ -16,7 +16,7 @@ from topleft.mesh import Mesh
 __all__ = ["Fragments"]
 
 #: Makes the scene that attributes of some triangles need: these are snapped, no others.
-PartOfScene = Callable[[NDArray[np.int32]], _engine.Scene]
+PartOfScene = Callable[..., _engine.Scene]
 
 
 class Fragments:
@@ -196,13 +196,13 @@ class Fragments:
     @cached_property
     def _scene(self) -> _engine.Scene:
         """The triangles that show, snapped; maybe the others too."""
-        return self._scene_with(())
+        return self._scene_with()
 
-    def _scene_with(self, triangles: ArrayLike) -> _engine.Scene:
+    def _scene_with(self, *triangles: NDArray[np.int32]) -> _engine.Scene:
         """Return the triangles that show and these, snapped; maybe the others too."""
         if isinstance(self._scene_or_maker, _engine.Scene):
             return self._scene_or_maker
-        return self._scene_or_maker(np.union1d(self.id[self.id >= 0], np.asarray(triangles, np.int32)))
+        return self._scene_or_maker(self.id, *triangles)
 
     def _ids(self) -> NDArray[np.int32]:
         return np.require(self.triangle, np.int32, ["C", "A"])
