@@ -18,7 +18,7 @@
 enum {
     TL_PIECE_CORNERS = 12,
     TL_PIECES = 96, /* that wait; when there is no room a piece is taken as it is */
-    TL_RECENT = 8,  /* triangles that are remembered: blob of 10^7 to 10^6, 4: RATIO4, 16: RATIO16 times the time of 8 */
+    TL_RECENT = 8,  /* triangles that are remembered: blob of 10^6 and its 250,000, 6.1 s of CPU time to 4.4 */
 };
 
 /* A convex piece of a triangle. */
