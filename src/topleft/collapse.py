@@ -25,12 +25,12 @@ FINENESS = (10.0, 1.0)
 #: Larger meshes have the coarser scale alone, which takes half the time.
 MOST_TO_COLLAPSE_FINELY = 2_000_000
 
-#: Still larger ones are gathered first, for the package takes 350 bytes and 3.3 us a triangle: into cells for one
+#: Still larger ones are gathered first, for the package takes 300 bytes and 3.3 us a triangle: into cells for one
 #: in so many of the triangles that are wanted ...
 MOST_TO_COLLAPSE, GATHERED_FOR = 4_000_000, 4
 
 #: ... where the sum of the vectors of area in a cell is at least this share of the area: where normals are off by
-#: 0.045 or less. Without that the star at the poles of the blob is lost, and bounds are 30 times larger.
+#: 0.045 or less. Without that the star at the poles of the blob is lost, and the bound is 10 times larger.
 FLAT = 0.999
 
 #: Triangles by which the area of all is judged.
