@@ -138,6 +138,15 @@ def parser() -> argparse.ArgumentParser:
     add.add_argument("file", type=Path, metavar="FILE.json")
     add.add_argument("page", type=Path, metavar="PAGE.md")
 
+    add = commands.add_parser("levels", help="measure levels of detail, and write their page: time beside error")
+    add.set_defaults(action=levels_command)
+    add.add_argument("--mesh", nargs="*", default=[], metavar="FILE", help="meshes besides the generated ones")
+    add.add_argument("--triangles", type=positive, default=10_000_000, metavar="N", help="of the blob (%(default)s)")
+    add.add_argument("--rounds", type=positive, default=5, metavar="N", help="(%(default)s)")
+    add.add_argument("--json", type=Path, metavar="FILE.json", help="the record")
+    add.add_argument("--keep", type=Path, metavar="FOLDER", help="where levels are kept from run to run")
+    add.add_argument("-o", "--out", type=Path, default=Path("docs"), metavar="FOLDER", help="(%(default)s)")
+
     commands.add_parser("list", help="cases and peers").set_defaults(action=list_command)
     return root
 
@@ -378,6 +387,19 @@ def document_command(arguments: argparse.Namespace) -> int:
     except ValueError as error:
         print(f"benchmarks: {error}", file=sys.stderr)
         return 2
+    return 0
+
+
+def levels_command(arguments: argparse.Namespace) -> int:
+    """Measure, write the page, print."""
+    from benchmarks import levels  # matplotlib, fast-simplification
+
+    options = levels.Options(tuple(arguments.mesh), arguments.triangles, arguments.rounds, arguments.keep)
+    record = levels.run_levels(options)
+    if arguments.json:
+        write_record(arguments.json, record)
+    paths = levels.write_page(record, arguments.out)
+    print(*levels.lines(record), *paths, sep="\n")
     return 0
 
 

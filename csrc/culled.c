@@ -194,6 +194,8 @@ static int is_hidden(const seen_box *box, const tl_cluster_view *v, const tl_win
         return 0;
     /* docs/design.md, section 4: the error of a depth before it is rounded to float32 */
     const double error = 0x1p-33 * (largest[2] + 1.0), z = depth_of_ndc(v, is_farthest ? high[2] : low[2]);
+    if (!(fabs(z) < 0x1p126)) /* the vertex stage has depths end at the largest float32 */
+        return 0;
     return all_beat(target, row0, row1, col0, col1, (float)(is_farthest ? z + error : z - error), is_farthest);
 }
 

@@ -38,6 +38,8 @@
 #include "points.c"
 #include "shade_normals.c"
 #include "planes.c"
+#include "nearest.c"
+#include "reach.c"
 #include "mix.h"
 #include "mix_u8.c"
 #include "mix_f32.c"
@@ -84,4 +86,8 @@ const tl_kernels TL_KERNELS = {
     .mean_colors = mean_colors,
     .list_planes = list_planes,
     .fill_planes = fill_planes,
+    .build_tree = build_tree,
+    .find_nearest = nearest_of_points,
+    .find_reach = find_reach,
+    .set_feet = set_feet,
 };

@@ -9,6 +9,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "nearest.h"
 #include "shading.h"
 
 /* ---- vertices ------------------------------------------------------------------------------------------ */
@@ -513,6 +514,21 @@ typedef struct tl_kernels {
 
     /* Per pixel of `ids` (rows of window->width): the value of its centre on the plane of the triangle, float32 or float64. */
     void (*fill_planes)(const tl_valued *mesh, const tl_window *window, const int32_t *ids, int is_f32, void *out);
+
+    /* The boxes of a surface, all but whose nodes are there. */
+    void (*build_tree)(tl_surface *surface);
+
+    /* The nearest triangle of points [first, end), and where on it unless `at` is NULL.  Returns the largest distance. */
+    double (*find_nearest)(const tl_surface *surface, const double *points, int64_t first, int64_t end, int32_t *triangle, double *at);
+
+    /* How far triangles [first, end) can be from a surface.  A bound is near enough when it passes what is known by `least`, or by
+     * that share.  In and out: reach, of which `known` counts on entry. */
+    void (*find_reach)(const tl_surface *surface, const double *points, const int32_t *triangles, int64_t first, int64_t end,
+                       double share, double least, tl_reach *reach);
+
+    /* For n pairs of a point of `from` and a triangle of `points`: where on it is nearest to the point, and the squared distance. */
+    void (*set_feet)(const double *points, const int32_t *triangles, const double *from, const int32_t *triangle, const int32_t *point,
+                     int64_t n, double *at, double *squared);
 } tl_kernels;
 
 #endif

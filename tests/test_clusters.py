@@ -19,6 +19,12 @@ from topleft.view import View
 SIZE = (160, 120)
 
 
+@pytest.fixture(autouse=True)
+def however_little_it_pays(monkeypatch):
+    """Views are drawn in clusters even where that does not pay."""
+    monkeypatch.setattr(choices, "pays_to_draw_clusters", lambda *_: True)
+
+
 def meshes():
     """Closed shapes, coarse and fine, and a soup of slivers, degenerate triangles and big ones."""
     rng = np.random.default_rng(3)

@@ -46,11 +46,16 @@ def test_metadata_runtime_dependencies_state_a_floor():
 
 
 def test_metadata_extras_are_the_documented_ones():
-    assert set(metadata.metadata("topleft").get_all("Provides-Extra")) == {"render", "test", "bench", "dev", "all"}
+    found = set(metadata.metadata("topleft").get_all("Provides-Extra"))
+    assert found == {"render", "simplify", "test", "bench", "dev", "all"}
 
 
 def test_metadata_render_extra_is_isal_trimesh_and_tqdm():
     assert requirements_of("render") == {"isal", "trimesh", "tqdm"}
+
+
+def test_metadata_simplify_extra_is_fast_simplification():
+    assert requirements_of("simplify") == {"fast-simplification"}
 
 
 def test_metadata_version_is_that_of_the_binary():
@@ -169,6 +174,6 @@ def test_use_isa_unknown_name_is_an_error_and_changes_nothing():
 
 
 def test_import_of_topleft_loads_no_optional_dependency():
-    optional = {"trimesh", "tqdm", "scipy", "matplotlib"}
+    optional = {"trimesh", "tqdm", "scipy", "matplotlib", "fast_simplification"}
     done = run_python(f"import topleft, sys; print(*sorted({optional} & set(sys.modules)))")
     assert (done.returncode, done.stdout.split()) == (0, []), done.stderr

@@ -13,6 +13,7 @@ from topleft.camera import Camera
 from topleft.classic import bresenham_line
 from topleft.composite import composite
 from topleft.depth_layers import DepthLayers, peel
+from topleft.detail import Detail, choose_detail
 from topleft.errors import MeshError, TopleftError
 from topleft.field import field, height_map
 from topleft.files import load
@@ -20,6 +21,7 @@ from topleft.fragments import Fragments
 from topleft.grid import Grid
 from topleft.images import save_image
 from topleft.lens import FisheyeLens, OpenCVLens
+from topleft.levels import Level, Levels
 from topleft.light import Fog, Light
 from topleft.material import Material
 from topleft.memory import release_memory
@@ -30,6 +32,7 @@ from topleft.scene import Instance, Scene
 from topleft.scene_fragments import SceneDepthLayers, SceneFragments
 from topleft.shade import shade
 from topleft.silhouette import silhouette
+from topleft.simplify import simplify
 from topleft.texture import Texture
 from topleft.viewpoints import turntable, viewpoints
 
@@ -53,12 +56,15 @@ __version__: str = build_info()["version"]
 __all__ = [
     "Camera",
     "DepthLayers",
+    "Detail",
     "FisheyeLens",
     "Fog",
     "Fragments",
     "Grid",
     "Instance",
     "Job",
+    "Level",
+    "Levels",
     "Light",
     "Material",
     "Mesh",
@@ -76,6 +82,7 @@ __all__ = [
     "as_mesh",
     "bresenham_line",
     "build_info",
+    "choose_detail",
     "composite",
     "coverage",
     "field",
@@ -96,6 +103,7 @@ __all__ = [
     "scenes",
     "shade",
     "silhouette",
+    "simplify",
     "turntable",
     "viewpoints",
     "visible_layers",

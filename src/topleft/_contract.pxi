@@ -224,6 +224,24 @@ cdef extern from "topleft.h" nogil:
         int64_t n_points, n_triangles
         double *planes
     enum:
+        TL_TREE_LEAF
+        TL_TREE_WIDTH
+        TL_TREE_LEVELS
+    ctypedef struct tl_tree_node:
+        pass
+    ctypedef struct tl_surface:
+        const double *points
+        const int32_t *triangles
+        int64_t n_triangles
+        tl_tree_node *nodes
+        int64_t *first_node
+        int64_t *n_nodes
+        int n_levels
+        float slack
+    ctypedef struct tl_reach:
+        double known, bound
+        int64_t n_pieces
+    enum:
         TL_POINT_ROWS
     ctypedef int tl_point_kind
     ctypedef struct tl_points:
@@ -271,3 +289,7 @@ cdef extern from "topleft.h" nogil:
         void (*fill_planes)(const tl_valued *, const tl_window *, const int32_t *, int, void *) noexcept nogil
         void (*mean_flat)(const int32_t *, int, int64_t, int64_t, const void *, int, int, const tl_transfer *, void *) noexcept nogil
         void (*mean_colors)(const void *, int, int64_t, int64_t, int, int, const tl_transfer *, void *) noexcept nogil
+        void (*build_tree)(tl_surface *) noexcept nogil
+        double (*find_nearest)(const tl_surface *, const double *, int64_t, int64_t, int32_t *, double *) noexcept nogil
+        void (*find_reach)(const tl_surface *, const double *, const int32_t *, int64_t, int64_t, double, double, tl_reach *) noexcept nogil
+        void (*set_feet)(const double *, const int32_t *, const double *, const int32_t *, const int32_t *, int64_t, double *, double *) noexcept nogil

@@ -438,3 +438,34 @@ class Clustered:
         is_first: bool,
         is_last: bool,
     ) -> tuple[int, int, int]: ...
+
+class Surface:
+    def __init__(self, points: NDArray[np.float64], triangles: NDArray[np.int32], slack: float) -> None: ...
+    def find_nearest(
+        self,
+        points: NDArray[np.float64],
+        first: int,
+        end: int,
+        triangle: NDArray[np.int32],
+        at: NDArray[np.float64] | None = None,
+    ) -> float: ...
+    def find_reach(
+        self,
+        points: NDArray[np.float64],
+        triangles: NDArray[np.int32],
+        first: int,
+        end: int,
+        known: float,
+        share: float,
+        least: float,
+    ) -> tuple[float, float, int]: ...
+
+def set_feet(
+    points: NDArray[np.float64],
+    triangles: NDArray[np.int32],
+    from_points: NDArray[np.float64],
+    triangle: NDArray[np.int32],
+    point: NDArray[np.int32],
+    at: NDArray[np.float64],
+    squared: NDArray[np.float64],
+) -> None: ...

@@ -15,8 +15,9 @@ from topleft.threads import count_threads, run_parts
 
 __all__ = ["Clusters"]
 
-#: A bound of the error of the vertex stage as a share of the terms that it adds up: four roundings, twice.
-STAGE_ERROR = {np.dtype(np.float32): 2.0**-21, np.dtype(np.float64): 2.0**-50}
+#: A bound of the error of the vertex stage as a share of the terms that it adds up: four roundings, and the same again
+#: for how the bounds themselves are computed, in float64; twice that.
+STAGE_ERROR = {np.dtype(np.float32): 2.0**-21, np.dtype(np.float64): 2.0**-49}
 
 #: Pixels around the window that count as inside: more than the snap and the vertex stage move a corner.
 MARGIN_PX = 1.0

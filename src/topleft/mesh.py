@@ -11,16 +11,14 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from topleft.arrays import as_array, as_checked_triangles
+from topleft.clusters import Clusters, box_of
 from topleft.material import Material
-
-if TYPE_CHECKING:
-    from topleft.clusters import Clusters
 
 FloatArray = npt.NDArray[np.floating[Any]]
 F32 = npt.NDArray[np.float32]
@@ -134,8 +132,6 @@ class Mesh:
     @cached_property
     def vertex_box(self) -> F64:
         """Lowest and highest x, y, z of all finite vertices, (6,) float64; zeros without any."""
-        from topleft.clusters import box_of  # seldom needed
-
         return box_of(self.vertices)
 
     def note_drawn(self) -> int:
@@ -151,8 +147,6 @@ class Mesh:
         That takes about as long as drawing the mesh some twenty times, and keeps a copy of it of about 30 bytes a
         triangle. Meshes that are drawn more than once ask for it themselves: `topleft.choices.pays_to_cluster`.
         """
-        from topleft.clusters import Clusters  # seldom needed
-
         return Clusters(self.vertices, self.triangles)
 
     @cached_property

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from topleft import choices
 from topleft.choices import MIN_THREAD_NS
 from topleft.costs import Costs, features, sink_group
+from topleft.detail import Detail
 from topleft.methods import METHODS
 from topleft.models import Sampling, Sink
 from topleft.plan_facts import Facts
@@ -76,6 +77,15 @@ def vertices(n: int) -> str:
 def megabytes(n: int) -> str:
     """Return a number of bytes as people read it."""
     return f"{n:,} bytes" if n < 10_000 else f"{n / 1e3:,.0f} kB" if n < 10_000_000 else f"{n / 1e6:,.0f} MB"
+
+
+def plan_detail(found: Detail) -> Stage:
+    """Tell which level of a mesh is drawn."""
+    count, n = len(found.mesh.triangles), found.n_triangles
+    choice = f"the mesh itself, {plural(n, 'triangle')}"
+    if found.level:
+        choice = f"level {found.level}: {plural(count, 'triangle')} of {n:,}, within {found.bound_px:.3g} px"
+    return Stage("detail", choice, found.why, found.rejected)
 
 
 def plan_input(facts: Facts, costs: Costs) -> Stage:

@@ -14,15 +14,18 @@ from typing import Any, Unpack
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from topleft.adapt import MeshLike
 from topleft.arrays import as_triangles
+from topleft.camera import Camera
 from topleft.classic import refuse_classic
 from topleft.costs import load_costs
+from topleft.detail import choose_detail
 from topleft.memory import KeptMemory
 from topleft.methods import METHODS
 from topleft.models import DepthTest, Sampling, parse
 from topleft.plan_facts import CLASSES, find_facts
 from topleft.plan_memory import memory_of
-from topleft.plan_stages import Stage, find_stages
+from topleft.plan_stages import Stage, find_stages, plan_detail
 from topleft.plan_table import as_html, as_text
 from topleft.view import CULL_CODES, View, ViewOptions
 
@@ -258,12 +261,13 @@ def run(plan: Plan, memory: KeptMemory) -> None:
 
 
 def plan(
-    vertices: ArrayLike,
-    triangles: ArrayLike,
+    vertices: ArrayLike | MeshLike,
+    triangles: ArrayLike | Camera,
     size: tuple[int, int],
     *,
     outputs: tuple[str, ...] | list[str] | str = ("triangle", "depth"),
     depth_test: str | None = "less",
+    tolerance: float = 0.0,
     **view: Unpack[ViewOptions],
 ) -> Plan:
     """Return how a scene is drawn: what is chosen at each stage, why, what is left out, and what it should take.
@@ -274,12 +278,15 @@ def plan(
     Parameters
     ----------
     vertices, triangles, size, **view
-        As in `coverage`.
+        As in `coverage`; or a mesh and a camera in the place of the first two, as in `rasterize_mesh`.
     outputs : str or sequence of str
         What is wanted: "coverage"; "overdraw"; "color" (`fill`); or any of "triangle", "depth", "mask",
         "barycentric" and "interpolate" (`rasterize`).
     depth_test : "less", "greater" or None
         As in `rasterize`.
+    tolerance : float
+        Of a mesh and a camera: how far outlines may be off, pixels, as in `render`. The plan is that of the level of
+        detail that is drawn, and has a stage "detail" that tells which, and why.
 
     Returns
     -------
@@ -290,7 +297,8 @@ def plan(
     Raises
     ------
     ValueError
-        For an output that no verb gives, or outputs of several verbs; else as the verb.
+        For an output that no verb gives, or outputs of several verbs; for a tolerance without a mesh and a camera, or
+        a camera with a lens; else as the verb.
     TypeError, IndexError
         As the verb.
 
@@ -310,6 +318,12 @@ def plan(
     options = ViewOptions(**view)
     if options.pop("plan", None) is not None:
         raise TypeError("plan takes no plan=")
+    detail: tuple[Stage, ...] = ()
+    if isinstance(triangles, Camera):
+        vertices, triangles, stage = plan_mesh(vertices, triangles, size, tolerance, options)
+        detail = (stage,)
+    elif tolerance:
+        raise ValueError("tolerance needs a mesh and a camera in the place of vertices and triangles")
     checked = View.parse(size, options)
     refuse_classic(checked, "plan")
     if checked.sampling in (Sampling.OUTER, Sampling.INNER, Sampling.AREA) and verb == "rasterize":
@@ -323,7 +337,7 @@ def plan(
         size=checked.size,
         n_vertices=facts.n_vertices,
         n_triangles=facts.n_triangles,
-        stages=find_stages(facts, costs),
+        stages=(*detail, *find_stages(facts, costs)),
         classes=MappingProxyType(dict(zip(CLASSES, (row[0] for row in facts.census), strict=True))),
         scratch_bytes=MappingProxyType(scratch),
         result_bytes=MappingProxyType(results),
@@ -334,6 +348,21 @@ def plan(
         _triangles=triangles,
         _arguments=(vertices, depth_test),
     )
+
+
+def plan_mesh(
+    mesh: Any, camera: Camera, size: tuple[int, int], tolerance: float, options: ViewOptions
+) -> tuple[ArrayLike, ArrayLike, Stage]:
+    """Return vertices and triangles of the level that is drawn, and what is to be told of it; set the transform."""
+    if "transform" in options:
+        raise ValueError("transform is that of the camera: give either")
+    viewport = options.get("viewport")
+    options["transform"] = camera.clip_from_world(viewport or size)
+    found = choose_detail(
+        mesh, camera, size, tolerance=tolerance, cull=options.get("cull", "none"), viewport=viewport,
+        origin=options.get("origin", (0, 0)),
+    )  # fmt: skip
+    return found.mesh.vertices, found.mesh.triangles, plan_detail(found)
 
 
 def find_verb(outputs: tuple[str, ...]) -> str:

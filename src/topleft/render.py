@@ -18,6 +18,7 @@ from topleft.camera import Camera
 from topleft.clustered import StaticPlan
 from topleft.colors import DEFAULT_COLOR, as_color
 from topleft.cutout import cut_out
+from topleft.detail import detailed
 from topleft.eye import distances
 from topleft.fragments import BentFragments, Fragments
 from topleft.material import Material
@@ -45,6 +46,7 @@ def render(
     cull: str = "none",
     edges: bool = False,
     sampling: str = "center",
+    tolerance: float = 0.0,
     threads: int | None = None,
     rasterizer: Rasterizer | None = None,
     **look: Unpack[LookOptions],
@@ -72,6 +74,10 @@ def render(
     sampling : {"center", "msaa2", "msaa4", "msaa8", "msaa16"}
         Samples of a pixel. With several outlines are smooth: a triangle is shaded once in a pixel, where the first of
         its samples lies, and the light of the samples is averaged.
+    tolerance : float
+        How far outlines may lie from where they belong, pixels: the mesh is drawn at the coarsest level of detail that
+        a bound on its distance allows in this view, see `choose_detail`. 0: the mesh itself. Levels are made at the
+        first use, which takes a while, and kept with the mesh; `simplify` and `Levels.load` do that beforehand.
     threads : int, optional
         How many threads draw; never changes a bit.
     rasterizer : Rasterizer, optional
@@ -88,6 +94,8 @@ def render(
     ------
     ValueError
         If the mesh has no triangles and no camera is given, or an option is unknown.
+    MissingPackageError
+        If levels of detail are to be made and fast-simplification is not installed.
 
     Examples
     --------
@@ -98,6 +106,7 @@ def render(
     """
     mesh = mesh if isinstance(mesh, Scene) else as_mesh(mesh)
     camera = default_camera(mesh, size) if camera is None else camera
+    mesh = detailed(mesh, camera, size, tolerance, cull=cull, material=look.get("material"))
     frags = rasterize_mesh(mesh, camera, size, cull=cull, threads=threads, sampling=sampling, rasterizer=rasterizer)
     return picture_of(
         frags, mesh, camera, shading=shading, color=color, background=background, cull=cull, edges=edges,
@@ -177,6 +186,7 @@ def rasterize_mesh(
     size: tuple[int, int] = DEFAULT_SIZE,
     *,
     cull: str = "none",
+    tolerance: float = 0.0,
     threads: int | None = None,
     rasterizer: Rasterizer | None = None,
     **view: Any,
@@ -187,6 +197,8 @@ def rasterize_mesh(
     ----------
     mesh, camera, size, cull, threads
         As for `render`.
+    tolerance : float
+        As for `render`; but for 0 ids are those of the level's triangles, ``choose_detail(...).mesh``.
     rasterizer : Rasterizer, optional
         Of this size: the result lies in its memory, until the next call. Scenes are drawn in memory of their own.
     **view
@@ -206,6 +218,8 @@ def rasterize_mesh(
     """
     mesh = mesh if isinstance(mesh, Scene) else as_mesh(mesh)
     camera = default_camera(mesh, size) if camera is None else camera
+    window = {"viewport": view.get("viewport"), "origin": view.get("origin", (0, 0))}
+    mesh = detailed(mesh, camera, size, tolerance, cull=cull, **window)
     view |= {"cull": cull, "threads": threads}
     if isinstance(mesh, Scene):
         return draw_seen(mesh, camera, size, **view)

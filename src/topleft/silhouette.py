@@ -12,6 +12,7 @@ import numpy.typing as npt
 from topleft.adapt import MeshLike, as_mesh
 from topleft.api import coverage
 from topleft.camera import Camera
+from topleft.detail import detailed
 from topleft.render import DEFAULT_SIZE, default_camera, seen_through
 from topleft.scene import Scene
 from topleft.scene_draw import draw_scene_coverage
@@ -27,6 +28,7 @@ def silhouette(
     *,
     sampling: str = "center",
     cull: str = "none",
+    tolerance: float = 0.0,
     threads: int | None = None,
     out: npt.NDArray[Any] | None = None,
     **view: Any,
@@ -45,6 +47,8 @@ def silhouette(
         As `coverage` takes it: "center" gives bool, "area" float32.
     cull : {"none", "back", "front"}
         Triangles to leave out, by the side that is seen.
+    tolerance : float
+        As for `render`: how far the outline may lie from where it belongs, pixels.
     threads : int, optional
         How many threads draw; never changes a bit.
     out : ndarray of bool (float32 for "area"), shape (H, W), optional
@@ -81,6 +85,8 @@ def silhouette(
     """
     mesh = mesh if isinstance(mesh, Scene) else as_mesh(mesh)
     camera = default_camera(mesh, size) if camera is None else camera
+    window = {"viewport": view.get("viewport"), "origin": view.get("origin", (0, 0))}
+    mesh = detailed(mesh, camera, size, tolerance, cull=cull, **window)
     options: Any = {"sampling": sampling, "cull": cull, "threads": threads} | view
     frame = view.get("viewport") or size
     if isinstance(mesh, Scene):

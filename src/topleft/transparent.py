@@ -16,6 +16,7 @@ from topleft.colors import as_color
 from topleft.composite import composite
 from topleft.cutout import cut_of
 from topleft.depth_layers import DepthLayers, peel
+from topleft.detail import detailed
 from topleft.material import Material
 from topleft.render import DEFAULT_SIZE, WHITE, default_camera
 from topleft.scene import Scene
@@ -40,6 +41,7 @@ def render_transparent(
     shading: str = "smooth",
     background: tuple[int, ...] = WHITE,
     cull: str = "none",
+    tolerance: float = 0.0,
     threads: int | None = None,
     **look: Any,
 ) -> npt.NDArray[np.uint8]:
@@ -47,7 +49,7 @@ def render_transparent(
 
     Parameters
     ----------
-    mesh, camera, size, shading, background, cull, threads, **look
+    mesh, camera, size, shading, background, cull, tolerance, threads, **look
         As for `render`, one sample a pixel, and as for `shade`.
     opacity : float, 0 to 1
         How much each layer hides of what lies behind it.
@@ -77,8 +79,9 @@ def render_transparent(
     """
     mesh = mesh if isinstance(mesh, Scene) else as_mesh(mesh)
     camera = default_camera(mesh, size) if camera is None else camera
-    ground = as_color("background", background, 4)
     material = look.get("material")
+    mesh = detailed(mesh, camera, size, tolerance, cull=cull, material=material)
+    ground = as_color("background", background, 4)
     if not isinstance(mesh, Scene) and cut_of(mesh, material) is not None:
         mesh = Scene([mesh])  # which is the same picture
     options: dict[str, Any] = {"layers": layers, "cull": cull, "threads": threads}

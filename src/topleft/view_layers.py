@@ -16,6 +16,7 @@ import numpy.typing as npt
 from topleft.adapt import MeshLike, as_mesh
 from topleft.api import Rasterizer
 from topleft.camera import Camera
+from topleft.detail import detailed
 from topleft.layer_files import save_layers
 from topleft.layers import LAYERS, check_layers, draw_layers
 from topleft.render import DEFAULT_SIZE, default_camera
@@ -76,6 +77,7 @@ def render_layers(
     camera_to: Camera | None = None,
     transforms_to: npt.ArrayLike | None = None,
     cull: str = "none",
+    tolerance: float = 0.0,
     threads: int | None = None,
     rasterizer: Rasterizer | None = None,
     **look: Any,
@@ -100,8 +102,8 @@ def render_layers(
     transforms_to : (N, 4, 4) array_like, optional
         For "flow": where the instances of the scene are when it ends, world from object; (4, 4) for a mesh. Unless
         given they stay.
-    cull, threads
-        As for `render`.
+    cull, tolerance, threads
+        As for `render`. With a tolerance, "triangle" counts those of the level of detail, and there are no attributes.
     rasterizer : Rasterizer, optional
         Of this size: "depth" and "triangle" lie in its memory, until the next call.
     **look
@@ -138,7 +140,7 @@ def render_layers(
     ------
     ValueError
         If there is no such layer, an attribute has its name or does not fit, "flow" has no end, "uv" finds no texture
-        coordinates, or an option of `render` is wrong.
+        coordinates, an option of `render` is wrong, or there are attributes and a tolerance.
     TypeError
         If an option is unknown, or of colours and no colours are asked for.
 
@@ -165,9 +167,11 @@ def render_layers(
     names = check_layers(layers)
     for option in look.keys() - {"sampling"} if "color" not in names else ():
         raise TypeError(f"option {option!r} is for layer 'color', which is not among {', '.join(names)}")
+    if attributes and tolerance:
+        raise ValueError("attributes are those of the mesh's own vertices, which a tolerance may leave out")
     sight = sight_of(
-        mesh, camera, size, camera_to=camera_to, transforms_to=transforms_to, cull=cull, threads=threads,
-        rasterizer=rasterizer, **look,
+        mesh, camera, size, camera_to=camera_to, transforms_to=transforms_to, cull=cull,
+        tolerance=tolerance, threads=threads, rasterizer=rasterizer, **look,
     )  # fmt: skip
     found = draw_layers(names, sight)
     for name, values in (attributes or {}).items():
@@ -185,6 +189,7 @@ def sight_of(
     camera_to: Camera | None = None,
     transforms_to: npt.ArrayLike | None = None,
     cull: str = "none",
+    tolerance: float = 0.0,
     threads: int | None = None,
     rasterizer: Rasterizer | None = None,
     **look: Any,
@@ -202,9 +207,10 @@ def sight_of(
         raise TypeError(f"there is no option {option!r} of a picture")
     subject = mesh if isinstance(mesh, Scene) else as_mesh(mesh)
     n_instances = len(subject) if isinstance(subject, Scene) else 1
+    camera = default_camera(subject, size) if camera is None else camera
     return Sight(
-        subject=subject,
-        camera=default_camera(subject, size) if camera is None else camera,
+        subject=detailed(subject, camera, size, tolerance, cull=cull, material=look.get("material")),
+        camera=camera,
         size=size,
         options={"cull": cull, "threads": threads},
         look=look,

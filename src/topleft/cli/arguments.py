@@ -109,6 +109,8 @@ def add_picture_arguments(parser: argparse.ArgumentParser) -> None:
     add("--texture", metavar="FILE", help="a picture for all of a mesh that has texture coordinates")
     add("--matcap", metavar="FILE", help="a picture of a lit sphere, for --shading matcap")
     add("--opacity", type=_share, default=None, metavar="X", help="0 to 1: as if of glass, of which each layer hides X")
+    add("--tolerance", type=_tolerance, default=0.0, metavar="PX",
+        help="draw a coarser level of the mesh whose outline is off by at most PX pixels (default 0: the mesh)")
     add("--wireframe", action="store_true", help="draw the edges over it")
     add("--cull", choices=[str(side) for side in Cull], default="none", help="leave out triangles (default none)")
     samplings = [str(mode) for mode in Sampling if mode is Sampling.CENTER or mode.n_samples > 1]
@@ -137,6 +139,16 @@ def _share(text: str) -> float:
     if not 0 <= share <= 1:
         raise argparse.ArgumentTypeError(f"must be a number from 0 to 1, got {text!r}")
     return share
+
+
+def _tolerance(text: str) -> float:
+    try:
+        tolerance = float(text)
+    except ValueError:
+        tolerance = -1.0
+    if not 0 <= tolerance < float("inf"):
+        raise argparse.ArgumentTypeError(f"must be a number of pixels, 0 or more, got {text!r}")
+    return tolerance
 
 
 def _rate(text: str) -> float:

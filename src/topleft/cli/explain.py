@@ -6,7 +6,7 @@ import argparse
 from typing import Any
 
 from topleft.camera import DEFAULT_FOV_Y_DEG, THREE_QUARTER_DEG
-from topleft.cli.arguments import _positive, _size
+from topleft.cli.arguments import _positive, _size, _tolerance
 from topleft.cli.plan import Orbit, Source
 from topleft.models import Cull, Sampling
 from topleft.render import DEFAULT_SIZE
@@ -23,11 +23,11 @@ def run_explain(options: argparse.Namespace) -> int:
     camera = orbit(mesh, options.size)
     outputs = {"fill": ("color",), "rasterize": ("triangle", "depth")}.get(options.verb, (options.verb,))
     explained = plan(
-        mesh.vertices,
-        mesh.triangles,
+        mesh,
+        camera,
         options.size,
         outputs=outputs,
-        transform=camera.clip_from_world(options.size),
+        tolerance=options.tolerance,
         cull=options.cull,
         sampling=options.sampling,
         threads=options.threads,
@@ -71,6 +71,7 @@ def add_plan_commands(commands: Any) -> None:
     add("--up", choices=["y", "z"], default="y", help="the axis that points up (default y)")
     add("--cull", choices=[str(side) for side in Cull], default="none", help="leave out triangles (default none)")
     add("--sampling", choices=[str(mode) for mode in Sampling], default="center", help="of a pixel (default center)")
+    add("--tolerance", type=_tolerance, default=0.0, metavar="PX", help="by which outlines may be off (default 0)")
     add("--threads", type=_positive, default=None, metavar="N", help="(default: as many as pay)")
     add("--measure", action="store_true", help="draw it, and show what the stages took")
     add("--json", action="store_true", help="numbers and sentences as JSON")

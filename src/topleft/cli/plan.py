@@ -158,6 +158,7 @@ def _render_options(options: argparse.Namespace) -> dict[str, Any]:
         "color": options.color,
         "background": options.background,
         "cull": options.cull,
+        "tolerance": options.tolerance,
         "threads": options.threads,
     }
     if options.matcap is not None:
