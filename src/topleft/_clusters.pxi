@@ -38,6 +38,29 @@ def measure_clusters(Source source, const uint8_t[:, ::1] corners, uint8_t[::1] 
             K.measure_clusters(&source.source, &corners[0, 0], first, end, <tl_cluster *>&clusters[0], &group_boxes[0, 0])
 
 
+def mark_ids(const int32_t[::1] ids, uint8_t[::1] is_met):
+    """Put 1 where `is_met` has an id of `ids`; ids that it has no place for are passed over, -1 too."""
+    cdef int64_t i, n = is_met.shape[0]
+    cdef uint32_t id
+    with nogil:
+        for i in range(ids.shape[0]):
+            id = <uint32_t>ids[i]
+            if id < n:
+                is_met[id] = 1
+
+
+def mark_corners(const int32_t[:, ::1] triangles, const int32_t[::1] listed, int block_bits, uint8_t[::1] is_used):
+    """Put 1 where `is_used`, a number for each 2**block_bits vertices, has a vertex of the listed triangles."""
+    cdef int64_t i
+    cdef int k
+    cdef const int32_t *corners
+    with nogil:
+        for i in range(listed.shape[0]):
+            corners = &triangles[listed[i], 0]
+            for k in range(3):
+                is_used[corners[k] >> block_bits] = 1
+
+
 cdef inline double minor(const double *a, const double *b, const double *c, int i, int j, int k) noexcept nogil:
     """The determinant of three columns of three rows."""
     return a[i] * (b[j] * c[k] - b[k] * c[j]) - a[j] * (b[i] * c[k] - b[k] * c[i]) + a[k] * (b[i] * c[j] - b[j] * c[i])

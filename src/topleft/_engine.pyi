@@ -374,6 +374,10 @@ def cut_out(
     n_rows: int,
 ) -> None: ...
 
+def mark_ids(ids: NDArray[np.int32], is_met: NDArray[np.uint8]) -> None: ...
+def mark_corners(
+    triangles: NDArray[np.int32], listed: NDArray[np.int32], block_bits: int, is_used: NDArray[np.uint8]
+) -> None: ...
 def order_triangles(
     source: Source,
     triangles: NDArray[np.int32],

@@ -5,7 +5,7 @@ In: `Clusters`, a view, a target. Out: the same picture that the whole mesh give
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -25,7 +25,8 @@ from topleft.view import View
 __all__ = ["ClusteredScene", "StaticPlan", "draw_clustered"]
 
 #: Vertices that are snapped together when some of them are needed: whole vectors.
-VERTEX_BLOCK = 16
+VERTEX_BLOCK_BITS = 4
+VERTEX_BLOCK = 1 << VERTEX_BLOCK_BITS
 
 NO_RECORDS: NDArray[np.uint8] = np.empty(0, np.uint8)
 
@@ -97,24 +98,31 @@ class ClusteredScene:
         n_others, _, _ = clusters.engine.draw(scene, self._own, seen, may_be_hidden, *place, is_first, is_last)
         return others[:n_others].copy()
 
-    def part(self, triangles: NDArray[np.int32]) -> _engine.Scene:
-        """Return the mesh with the vertices that some triangles use snapped, and seldom all; `triangles` ascend."""
-        scene = self.try_part(triangles, FreshMemory())
+    def part(self, list_triangles: Callable[[], NDArray[np.int32]]) -> _engine.Scene:
+        """Return the mesh with what some triangles use snapped, maybe more; `list_triangles` gives them, ascending."""
+        points, corners, view = self.clusters.points, self.clusters.corners, self._view
+        scene = None
+        if choices.pays_to_snap_all(len(points), view.size[0] * view.size[1]):
+            scene = self.try_part(None, FreshMemory())
+        if scene is None:
+            scene = self.try_part(list_triangles(), FreshMemory())
         if scene is None:  # a vertex beside one of them, which need not be used, does not fit
-            points, corners = self.clusters.points, self.clusters.corners
-            snapped = snap_scene(FreshMemory(), points, corners, self._view, with_depth=True, out=None)
-            return snapped.scene
+            scene = snap_scene(FreshMemory(), points, corners, view, with_depth=True, out=None).scene
         return scene
 
-    def try_part(self, triangles: NDArray[np.int32], memory: Memory) -> _engine.Scene | None:
-        """Return the same, or None where a vertex does not fit or is not finite."""
+    def try_part(self, triangles: NDArray[np.int32] | None, memory: Memory) -> _engine.Scene | None:
+        """Return the mesh with what some triangles use snapped; None where a vertex does not fit or is not finite.
+
+        Without triangles: with all vertices snapped, or None where a clip plane may cut a triangle, too.
+        """
         points, corners = self.clusters.points, self.clusters.corners
         source = self._source_of(points)
-        is_used: NDArray[np.uint8] = np.zeros(len(points) // VERTEX_BLOCK + 1, np.uint8)
-        is_used[corners[triangles].ravel() // VERTEX_BLOCK] = 1
+        is_used: NDArray[np.uint8] = np.full(len(points) // VERTEX_BLOCK + 1, triangles is None, np.uint8)
+        if triangles is not None:
+            _engine.mark_corners(corners, triangles, VERTEX_BLOCK_BITS, is_used)
         records: NDArray[np.uint8] = memory.empty("records", (len(points) * _engine.VERTEX_BYTES,), np.uint8)
         bad, wide, clipped = source.project_blocks(is_used, VERTEX_BLOCK, self._engine_view, records)
-        if bad or wide:
+        if bad or wide or (clipped and triangles is None):
             return None
         pieces = _engine.Pieces(source, records, corners, self._engine_view, triangles) if clipped else None
         return self._scene_of(source, records, corners, pieces)
