@@ -3,7 +3,7 @@
 In: scenes of `static_scenes`. Out: a record with a row for each scene and one for each mesh.
 
 Both ways are the public call on memory that is kept, on one thread; each has a `Mesh` of its own, of the same arrays.
-The planner's has been drawn before, so it is in clusters where `topleft.choices` says that this pays; the other never is.
+The planner's has been drawn before: it is in clusters where `topleft.choices` says that this pays. The other never is.
 """
 
 from __future__ import annotations
@@ -18,8 +18,6 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, TextIO
-
-import numpy as np
 
 import topleft as tl
 from benchmarks.choices import check_same_bits, digits, facts, quartiles, take_rounds
