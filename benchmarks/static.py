@@ -14,7 +14,7 @@ import sys
 import time
 import tracemalloc
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, TextIO
@@ -26,8 +26,6 @@ from benchmarks.static_scenes import StaticScene, scenes
 from topleft import choices, scene_clusters
 from topleft.clustered import ClusteredScene
 from topleft.clusters import Clusters
-from topleft.models import Cull
-from topleft.view import CULL_CODES
 
 WHOLE: Forced = ((choices, "pays_to_cluster", lambda *_: False),)
 FORCED: Forced = ((choices, "pays_to_cluster", lambda *_: True), (choices, "pays_to_draw_clusters", lambda *_: True))
@@ -96,8 +94,8 @@ def counting(fates: Fates) -> Forced:
     class CountedScene(ClusteredScene):
         def __init__(self, clusters: Clusters, view: Any, first_id: int = 0) -> None:
             super().__init__(clusters, view, first_id)
-            n, all_sides = len(clusters), replace(view, cull=CULL_CODES[Cull.NONE])
-            self.counts = n, round(n * ClusteredScene(clusters, all_sides).share()), round(n * self.share())
+            n, seen = len(clusters), self.survey(len(clusters))
+            self.counts = n, round(n * (1 - seen.outside)), round(n * (seen.back + seen.front))
             self.clusters = copy.copy(clusters)
             self.clusters.engine = CountedEngine(clusters.engine, fates)
 

@@ -88,7 +88,8 @@ def draw_others(axis: Axes, rows: list[dict[str, Any]]) -> None:
         color, label = KIND_COLORS[kind], KIND_NAMES[kind] if kind not in named else None
         named.add(kind)
         axis.plot([low, high], [i, i], color=color, lw=1.5, zorder=2)
-        axis.plot(middle, i, "o", color=color, mfc=color if row["is_clustered"] else "white", ms=5, label=label, zorder=3)
+        inside = color if row["is_clustered"] else "white"
+        axis.plot(middle, i, "o", color=color, mfc=inside, ms=5, label=label, zorder=3)
     axis.axvline(1, color="0.4", lw=1, zorder=1)
     axis.set(xscale="log", ylim=(len(rows) - 0.4, -0.6), xlabel="times as fast as whole")
     axis.set_yticks(range(len(rows)), [label_of(row) for row in rows], fontsize=7.5)

@@ -154,12 +154,17 @@ def models_text(record: Record) -> str:
 def first_text(record: Record) -> str:
     """The first two pictures of a mesh, and those that follow."""
     rows = [
-        [label_of(row), *(f"{ms:.3g}" for ms in (row["whole_first_ms"], row["first_ms"], row["second_ms"], row["ms"][1]))]
+        [label_of(row), *(f"{ms:.3g}" for ms in firsts_of(row))]
         for row in record["rows"]
         if row["is_clustered"] and matches(row, {"cull": "none", "sampling": "center", "verb": "rasterize"})
         if row["size"][0] != 512 and row["view"] in ("whole", "above", "200 in rows")
     ]
     return "\n".join(table(["scene", "first, whole", "first", "second", "those that follow"], rows))
+
+
+def firsts_of(row: Row) -> list[float]:
+    """Return the milliseconds of the first picture, whole; then of the first, the second and later ones."""
+    return [*(float(row[name]) for name in ("whole_first_ms", "first_ms", "second_ms")), float(row["ms"][1])]
 
 
 def kept_whole_text(record: Record) -> str:

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine, choices
 from topleft.arrays import as_matrix
-from topleft.clusters import Clusters
+from topleft.clusters import Clusters, Survey
 from topleft.memory import FreshMemory, Memory
 from topleft.mesh import Mesh
 from topleft.models import Sink
@@ -27,6 +27,9 @@ __all__ = ["ClusteredScene", "StaticPlan", "draw_clustered"]
 #: Vertices that are snapped together when some of them are needed: whole vectors.
 VERTEX_BLOCK_BITS = 4
 VERTEX_BLOCK = 1 << VERTEX_BLOCK_BITS
+
+#: Clusters that tell what a view shows of all: 10 microseconds.
+SURVEYED = 100
 
 NO_RECORDS: NDArray[np.uint8] = np.empty(0, np.uint8)
 
@@ -66,11 +69,11 @@ class ClusteredScene:
         self._own = self._source_of(clusters.own_points)
         self._empty = self._scene_of(self._own, NO_RECORDS, clusters.corners[:0], None)
 
-    def share(self) -> float:
-        """Return the share of the clusters that the window may show, hidden or not."""
-        clusters, (width, height) = self.clusters, self._view.size
+    def survey(self, n_most: int = SURVEYED) -> Survey:
+        """Return what becomes of the clusters, by some of them: outside, turned away, and so on."""
+        (width, height), clusters = self._view.size, self.clusters
         seen = clusters.seen_in(self._exact, self._empty, 0, height, width, is_farthest=False)
-        return len(clusters.survivors(seen)) / max(1, len(clusters))
+        return clusters.survey(seen, n_most)
 
     def draw_rows(
         self,
