@@ -28,7 +28,8 @@ from topleft.clustered import ClusteredScene
 from topleft.clusters import Clusters
 
 WHOLE: Forced = ((choices, "pays_to_cluster", lambda *_: False),)
-FORCED: Forced = ((choices, "pays_to_cluster", lambda *_: True), (choices, "pays_to_draw_clusters", lambda *_: True))
+ASKED = ("pays_to_cluster", "pays_to_draw_clusters", "pays_to_draw_instances")
+FORCED: Forced = tuple((choices, name, lambda *_: True) for name in ASKED)
 
 Row = dict[str, Any]
 Record = dict[str, Any]

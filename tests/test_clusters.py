@@ -10,7 +10,7 @@ from engine_cases import ON_EACH_ISA, THREADS, on
 import topleft as tl
 from topleft import _engine, choices
 from topleft.clustered import ClusteredScene, draw_clustered
-from topleft.clusters import Clusters, Survey
+from topleft.clusters import Clusters
 from topleft.memory import FreshMemory
 from topleft.models import Sink
 from topleft.rasterize import draw_coverage, draw_fragments, draw_overdraw
@@ -23,9 +23,7 @@ SIZE = (160, 120)
 def however_little_it_pays(monkeypatch):
     """Views are drawn in clusters even where that does not pay."""
     monkeypatch.setattr(choices, "pays_to_draw_clusters", lambda *_: True)
-
-
-PAYS_TO_DRAW = choices.pays_to_draw_clusters
+    monkeypatch.setattr(choices, "pays_to_draw_instances", lambda *_: True)
 
 
 def meshes():
@@ -370,45 +368,3 @@ def test_ids_without_a_place_are_passed_over():
     is_met = np.zeros(3, np.uint8)
     _engine.mark_ids(np.array([-1, 2, 3, 0, 2**31 - 1], np.int32), is_met)
     assert is_met.tolist() == [1, 0, 1]
-
-
-@pytest.mark.parametrize(
-    ("n", "cull", "outside", "front", "pays"),
-    [
-        (30_000, "none", 0.0, 0.4, False),
-        (30_000, "none", 0.2, 0.4, True),
-        (30_000, "back", 0.5, 0.4, False),
-        (30_000, "back", 0.7, 0.1, True),
-        (100_000, "none", 0.0, 0.5, True),
-        (100_000, "front", 0.0, 0.5, False),
-        (100_000, "back", 0.4, 0.5, True),
-        (9_000_000, "back", 0.0, 0.5, True),
-        (9_000_000, "none", 0.0, 0.9, False),
-    ],
-)
-def test_clusters_are_drawn_where_enough_is_left_out(n, cull, outside, front, pays):
-    view = View.parse(SIZE, {"cull": cull})
-    assert PAYS_TO_DRAW(view, n, lambda: Survey(outside, 0.0, 1 - outside - front, front)) == pays
-
-
-@pytest.mark.parametrize("cull", ["none", "back", "front"])
-def test_survey_counts_what_is_left_out(cull):
-    mesh = as_arrays("fine")
-    clusters = Clusters(*mesh)
-    camera = tl.Camera.look_at((0, 0, 3), near=0.01, far=100.0, fov_y_deg=20)
-    view = {"transform": camera.clip_from_world(SIZE), "cull": cull}
-    listed, _ = survivors(mesh, **view)
-    scene = ClusteredScene(clusters, View.parse(SIZE, view))
-    seen = scene.survey(len(clusters))
-    assert round(len(clusters) * (seen.back + seen.front)) == len(listed)
-    assert round(sum(seen), 9) == 1
-    assert seen.outside > 0.5
-    assert (seen.turned > 0) == (cull != "none")
-    some = scene.survey(50)
-    assert all(abs(a - b) < 0.2 for a, b in zip(some, seen, strict=True))  # of about 50
-
-
-def test_survey_of_nothing_is_nothing():
-    clusters = Clusters(np.zeros((3, 3), np.float32), np.empty((0, 3), np.int32))
-    view = View.parse(SIZE, {"transform": np.eye(4)})
-    assert ClusteredScene(clusters, view).survey() == (0, 0, 0, 0)
