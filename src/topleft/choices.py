@@ -90,7 +90,7 @@ MAX_FRONT_TO_CLUSTER = 0.8
 MIN_OUTSIDE_TO_CLUSTER = ((60_000, 0.1, 0.6), (500_000, 0.0, 0.33), (math.inf, 0.0, 0.0))
 
 #: Scenes whose instances lie so many deep, on the mean, are drawn from clusters in any case: 200 in rows, 8.8 deep, are
-#: 4.0 to 5.5 times as fast. Side by side and culled they are 0.89 and 0.94 times as fast; with four samples, for each of
+#: 4.0 to 5.5 times as fast. Side by side and culled, 0.89 and 0.94 times as fast; with four samples, for each of
 #: which clusters are snapped anew, 0.77 and 0.87 times: then so large a share must be outside.
 MIN_LAYERS_TO_CLUSTER = 3.0
 MIN_OUTSIDE_OF_SAMPLES = 0.33
