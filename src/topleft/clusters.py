@@ -5,7 +5,7 @@ In: the vertices and triangles of a mesh in object space, then a view of it. Out
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from topleft import _engine
 from topleft.threads import count_threads, run_parts
 
-__all__ = ["Clusters"]
+__all__ = ["Clusters", "Survey"]
 
 #: A bound of the error of the vertex stage as a share of the terms that it adds up: four roundings, and the same again
 #: for how the bounds themselves are computed, in float64; twice that.
@@ -21,6 +21,17 @@ STAGE_ERROR = {np.dtype(np.float32): 2.0**-21, np.dtype(np.float64): 2.0**-49}
 
 #: Pixels around the window that count as inside: more than the snap and the vertex stage move a corner.
 MARGIN_PX = 1.0
+
+
+class Survey(NamedTuple):
+    """Shares of the clusters of a mesh by what a view does with them, hidden or not."""
+
+    outside: float
+    turned: float
+    """Certain to be culled."""
+    back: float
+    """Showing their backs: what is closed and not culled hides them."""
+    front: float
 
 
 class Clusters:
@@ -88,6 +99,13 @@ class Clusters:
         """Return the clusters that may draw a pixel, in the order in which they are drawn."""
         listed: NDArray[np.int32] = np.empty(len(self), np.int32)
         return listed[: self.engine.cull(seen, listed, np.empty(len(self), np.uint64))]
+
+    def survey(self, seen: _engine.ClusterView, n_most: int) -> Survey:
+        """Return what becomes of some clusters, about `n_most`, evenly spread over the mesh."""
+        n_of: NDArray[np.int64] = np.zeros(4, np.int64)
+        self.engine.survey(seen, max(1, round(len(self) / n_most)), n_of)
+        n = max(1, int(n_of.sum()))
+        return Survey(*(count / n for count in n_of.tolist()))
 
 
 def box_of(points: NDArray[Any]) -> NDArray[np.float64]:
