@@ -1,4 +1,4 @@
-"""docs/planner.md: what a plan says, of eight scenes. ``python -m benchmarks.planner_page`` writes it."""
+"""docs/planner.md: what a plan says, of ten scenes. ``python -m benchmarks.planner_page`` writes it."""
 
 from __future__ import annotations
 
@@ -26,6 +26,8 @@ compares bits. On the command line: `topleft explain MESH`.
 plan = tl.plan(vertices, triangles, (1920, 1080), transform=matrix)
 print(plan.explain())
 frags = tl.rasterize(vertices, triangles, (1920, 1080), transform=next_matrix, plan=plan)
+
+print(tl.plan(mesh, camera, (1920, 1080)).explain())  # of a Mesh, which does not change
 ```
 
 With `plan=` a verb takes the triangles that the plan has converted and checked, and the plan's threads. Vertices,
@@ -37,6 +39,8 @@ what it was then: the plan has a copy. After such a call, or `plan.measure()`, t
 | row | what it tells |
 |---|---|
 | input | whether vertices and indices are read where they are or copied; the time includes the call itself |
+| detail | of a mesh: the level of detail that is drawn, and how far off its outline may be ([levels.md](levels.md)) |
+| clusters | of a mesh: what is left out of its clusters, or why it is drawn whole ([static.md](static.md)) |
 | transform | none for pixels; the matrix; whether there is a divide by w |
 | clip | how many triangles the near and far planes cut, and into how many pieces |
 | snap | sub-pixel bits; the time is that of transform and snap, which are one pass over the vertices |
@@ -87,6 +91,10 @@ def scenes() -> Iterator[tuple[str, tuple[Any, ...], dict[str, Any]]]:
     )
     far = np.array([[-3.0e7, 100], [3.0e7, 500], [200, 3.0e7], [20, 20], [60, 20], [20, 60]])
     yield "Corners far away", (far, [[0, 1, 2], [3, 4, 5]], (640, 480)), {"outputs": "coverage", "sampling": "msaa4"}
+    camera = tl.Camera.framing(mesh := tl.Mesh(*sphere), aspect=16 / 9)
+    yield "A mesh of a million triangles, drawn again", (mesh, camera, size), {"threads": 1}
+    away, knot_mesh = tl.Camera.look_at((30, 20, 60), fov_y_deg=30), tl.Mesh(*knot)
+    yield "A mesh far away, half a pixel off at most", (knot_mesh, away, size), {"tolerance": 0.5, "threads": 1}
     yield "Exact areas", (flat, triangles, size), {"outputs": "coverage", "sampling": "area", "threads": 2}
 
 

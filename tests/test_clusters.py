@@ -78,7 +78,7 @@ class Drawn:
     def corners_of(self, triangles, n_vertices):
         return self._clusters.corners
 
-    def find_clusters(self):
+    def find_clusters(self, vertices):
         return self._clusters
 
     def mark(self, stage):
@@ -346,25 +346,3 @@ def test_holes_are_cut_out_of_clusters(always, monkeypatch):
     got = tl.render(mesh, size=SIZE)
     monkeypatch.setattr(choices, "pays_to_cluster", lambda *_: False)
     assert_same(got, tl.render(mesh, size=SIZE))
-
-
-@pytest.mark.parametrize("cut", [False, True])
-def test_attributes_have_the_same_bits_with_all_vertices_snapped(cut, monkeypatch):
-    mesh = as_arrays("blob")
-    camera = tl.Camera.look_at((0, 0, 1.0 if cut else 3.0), near=0.3, far=100.0)
-    view = {"transform": camera.clip_from_world(SIZE), "threads": 1}
-    expected = draw(mesh, None, "less", **view)
-    listed = []
-    marked = _engine.mark_ids
-    monkeypatch.setattr(_engine, "mark_ids", lambda *arrays: listed.append(1) or marked(*arrays))
-    for pays in (False, True):
-        monkeypatch.setattr(choices, "pays_to_snap_all", lambda *_, pays=pays: pays)
-        got = draw(mesh, Clusters(*mesh), "less", **view)
-        assert_same(got.interpolate(mesh[0]), expected.interpolate(mesh[0]))
-        assert len(listed) == (1 if not pays else 1 + cut)
-
-
-def test_ids_without_a_place_are_passed_over():
-    is_met = np.zeros(3, np.uint8)
-    _engine.mark_ids(np.array([-1, 2, 3, 0, 2**31 - 1], np.int32), is_met)
-    assert is_met.tolist() == [1, 0, 1]

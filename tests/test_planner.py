@@ -1,9 +1,11 @@
 """Plans: what they say is what happens; what they save changes nothing; what does not fit them is refused."""
 
 import json
+import re
 
 import numpy as np
 import pytest
+from comparing import assert_same
 
 import topleft as tl
 from topleft import _engine, costs, planner
@@ -269,6 +271,52 @@ def test_repr_is_short_and_html_is_escaped():
     plan = tl.plan(*boxes(8, 9), SIZE)
     assert repr(plan).startswith("<Plan: rasterize 320x200, 2 triangles, 1 thread, about ")
     assert plan._repr_html_().startswith("<table><caption>rasterize -&gt; triangle, depth")
+
+
+def test_plan_of_a_mesh_counts_its_clusters():
+    mesh = tl.Mesh(*tl.scenes.blob(60_000))
+    near = tl.Camera.look_at((0, 0, 2.5), fov_y_deg=15)
+    plan = tl.plan(mesh, near, (320, 240), threads=1)
+    row, n = stage(plan, "clusters"), len(mesh.clusters)
+    drawn, whole = (int(number.replace(",", "")) for number in re.findall(r"[0-9][0-9,]*", row.choice)[:2])
+    left_out = [int(number) for number in re.findall(r"([0-9]+) (?:outside|turned|hidden)", row.why)]
+    assert whole == n == drawn + sum(left_out)
+    assert len(left_out) == 2
+    assert 0 < drawn < n / 2
+    assert plan.scratch_bytes["clusters"] > mesh.clusters.n_bytes > 0
+
+
+@pytest.mark.parametrize(
+    ("n_triangles", "options", "why"),
+    [
+        (500, {}, "done before sorting"),
+        (60_000, {"sampling": "msaa4"}, "several samples"),
+        (60_000, {"depth_test": None}, "order of the triangles"),
+        (60_000, {"cull": "back"}, "most of the mesh shows"),
+        (60_000, {"outputs": "coverage"}, "arrays, which may change"),
+    ],
+)
+def test_plan_of_a_mesh_tells_why_it_is_drawn_whole(n_triangles, options, why):
+    mesh = tl.Mesh(*tl.scenes.blob(n_triangles))
+    row = stage(tl.plan(mesh, tl.Camera.framing(mesh), (320, 240), **options), "clusters")
+    assert (row.choice, why in row.why) == ("none", True)
+
+
+def test_plan_of_a_mesh_draws_its_clusters_and_no_other_vertices():
+    mesh = tl.Mesh(*tl.scenes.blob(60_000))
+    camera = tl.Camera.framing(mesh)
+    plan = tl.plan(mesh, camera, (320, 240))
+    matrix = camera.clip_from_world((320, 240))
+    assert plan.find_clusters(mesh.vertices) is mesh.clusters
+    assert plan.find_clusters(mesh.vertices * 2) is None
+    for vertices in (mesh.vertices, mesh.vertices * 0.7):
+        expected = tl.rasterize(vertices, mesh.triangles, (320, 240), transform=matrix)
+        got = tl.rasterize(vertices, mesh.triangles, (320, 240), transform=matrix, plan=plan)
+        assert_same(got.triangle, expected.triangle)
+        assert_same(got.depth, expected.depth)
+    assert plan.measured_ms["draw"] > 0
+    frags = tl.rasterize_mesh(mesh, camera, (320, 240), plan=plan)
+    assert_same(frags.triangle, tl.rasterize_mesh(mesh, camera, (320, 240)).triangle)
 
 
 def test_plan_is_frozen():

@@ -4,6 +4,38 @@ CLUSTER = TL_CLUSTER
 CLUSTER_GROUP = TL_CLUSTER_GROUP
 CLUSTER_TAIL = TL_CLUSTER_TAIL
 CLUSTER_BYTES = sizeof(tl_cluster)
+BLOCK = VERTEX_BLOCK
+
+
+def mark_vertices(const int32_t[::1] ids, const int32_t[:, ::1] corners, uint8_t[::1] is_used):
+    """Mark the blocks of VERTEX_BLOCK vertices that some triangles use; an id of -1 is of none."""
+    cdef int64_t i, k, n = ids.shape[0]
+    cdef int32_t last = -1
+    with nogil:
+        for i in range(n):
+            if ids[i] != last and ids[i] >= 0:
+                for k in range(3):
+                    is_used[corners[ids[i], k] // VERTEX_BLOCK] = 1
+            last = ids[i]
+
+
+def list_cut(const int32_t[::1] ids, const int32_t[:, ::1] corners, const uint8_t[::1] records, int32_t[::1] cut):
+    """List those of some triangles that a clip plane may cut, maybe more than once; returns how many."""
+    cdef const tl_vertex *vertices = <const tl_vertex *>data(records)
+    cdef const tl_vertex *v
+    cdef int64_t i, k, n_cut = 0, n = ids.shape[0]
+    cdef int32_t last = -1
+    with nogil:
+        for i in range(n):
+            if ids[i] != last and ids[i] >= 0:
+                for k in range(3):
+                    v = vertices + corners[ids[i], k]
+                    if v.x_fx == TL_SPECIAL and v.y_fx == TL_CLIPPED:
+                        cut[n_cut] = ids[i]
+                        n_cut += 1
+                        break
+            last = ids[i]
+    return n_cut
 
 
 def order_triangles(Source source, const int32_t[:, ::1] triangles, const double[::1] box, uint32_t[::1] keys, uint64_t[:, ::1] room, int32_t[::1] order):
@@ -36,29 +68,6 @@ def measure_clusters(Source source, const uint8_t[:, ::1] corners, uint8_t[::1] 
     if end > first:
         with nogil:
             K.measure_clusters(&source.source, &corners[0, 0], first, end, <tl_cluster *>&clusters[0], &group_boxes[0, 0])
-
-
-def mark_ids(const int32_t[::1] ids, uint8_t[::1] is_met):
-    """Put 1 where `is_met` has an id of `ids`; ids that it has no place for are passed over, -1 too."""
-    cdef int64_t i, n = is_met.shape[0]
-    cdef uint32_t id
-    with nogil:
-        for i in range(ids.shape[0]):
-            id = <uint32_t>ids[i]
-            if id < n:
-                is_met[id] = 1
-
-
-def mark_corners(const int32_t[:, ::1] triangles, const int32_t[::1] listed, int block_bits, uint8_t[::1] is_used):
-    """Put 1 where `is_used`, a number for each 2**block_bits vertices, has a vertex of the listed triangles."""
-    cdef int64_t i
-    cdef int k
-    cdef const int32_t *corners
-    with nogil:
-        for i in range(listed.shape[0]):
-            corners = &triangles[listed[i], 0]
-            for k in range(3):
-                is_used[corners[k] >> block_bits] = 1
 
 
 cdef inline double minor(const double *a, const double *b, const double *c, int i, int j, int k) noexcept nogil:

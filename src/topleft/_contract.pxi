@@ -104,6 +104,7 @@ cdef extern from "topleft.h" nogil:
         tl_method method
         int32_t first_id
         const int32_t *names
+    int32_t TL_CLIPPED
     int64_t TL_CLUSTER, TL_CLUSTER_GROUP, TL_CLUSTER_TAIL, TL_N_FATES
     ctypedef struct tl_cluster:
         double low[3]

@@ -15,6 +15,7 @@ CLUSTER: int
 CLUSTER_GROUP: int
 CLUSTER_TAIL: int
 CLUSTER_BYTES: int
+BLOCK: int
 SCALARS: dict[np.dtype[Any], int]
 
 def use_isa(name: str) -> None: ...
@@ -80,7 +81,7 @@ class Source:
         wide: NDArray[np.int64] | None,
     ) -> tuple[int, int, int]: ...
     def project_blocks(
-        self, is_used: NDArray[np.uint8], block: int, view: View, records: NDArray[np.uint8]
+        self, is_used: NDArray[np.uint8], view: View, records: NDArray[np.uint8]
     ) -> tuple[int, int, int]: ...
     def project(
         self, first: int, end: int, view: View, records: NDArray[np.uint8], wide: NDArray[np.int64] | None
@@ -115,6 +116,7 @@ class Scene:
         method: int,
         test: int = 0,
         view: View | None = None,
+        is_used: NDArray[np.uint8] | None = None,
     ) -> None: ...
     def seen_from(self, x_fx: int, y_fx: int) -> Scene: ...
     def guess_seen(self, width: int, height: int) -> tuple[float, float, float]: ...
@@ -374,10 +376,10 @@ def cut_out(
     n_rows: int,
 ) -> None: ...
 
-def mark_ids(ids: NDArray[np.int32], is_met: NDArray[np.uint8]) -> None: ...
-def mark_corners(
-    triangles: NDArray[np.int32], listed: NDArray[np.int32], block_bits: int, is_used: NDArray[np.uint8]
-) -> None: ...
+def mark_vertices(ids: NDArray[np.int32], corners: NDArray[np.int32], is_used: NDArray[np.uint8]) -> None: ...
+def list_cut(
+    ids: NDArray[np.int32], corners: NDArray[np.int32], records: NDArray[np.uint8], cut: NDArray[np.int32]
+) -> int: ...
 def order_triangles(
     source: Source,
     triangles: NDArray[np.int32],

@@ -1,5 +1,8 @@
 # What a pass reads and writes: views, vertices, buffers, indices, clipped pieces. Included by _engine.pyx.
 
+cdef enum:
+    VERTEX_BLOCK = 16  # vertices that are snapped together when some of them are needed: whole vectors
+
 
 cdef class View:
     """How clip space maps to pixels."""
@@ -52,8 +55,8 @@ cdef class Source:
             counts = K.project(&self.source, first, end, &view.view, <tl_vertex *>&records[0], table)
         return counts.n_bad, counts.n_wide, counts.n_clipped
 
-    def project_blocks(self, const uint8_t[::1] is_used, int64_t block, View view, uint8_t[::1] records):
-        """Project and snap the blocks of vertices that are used; returns as `project` does."""
+    def project_blocks(self, const uint8_t[::1] is_used, View view, uint8_t[::1] records):
+        """Project and snap the blocks of VERTEX_BLOCK vertices that are used; returns as `project` does."""
         cdef int64_t i = 0, end, n = is_used.shape[0], n_bad = 0, n_wide = 0, n_clipped = 0
         cdef tl_vertex_counts counts
         with nogil:
@@ -62,7 +65,7 @@ cdef class Source:
                 while end < n and is_used[end]:
                     end += 1
                 if end > i:
-                    counts = K.project(&self.source, i * block, min(end * block, self.source.n), &view.view, <tl_vertex *>&records[0], NULL)
+                    counts = K.project(&self.source, i * VERTEX_BLOCK, min(end * VERTEX_BLOCK, self.source.n), &view.view, <tl_vertex *>&records[0], NULL)
                     n_bad += counts.n_bad
                     n_wide += counts.n_wide
                     n_clipped += counts.n_clipped

@@ -17,12 +17,14 @@ cdef class Scene:
     cdef tl_test test
     cdef object arrays
     cdef readonly View view
+    cdef const uint8_t[::1] is_used  # the blocks of vertices that have been snapped; None: all
 
     def __init__(
         self, Source source, const uint8_t[::1] records, const int64_t[:, ::1] wide, const int32_t[:, ::1] triangles,
         Pieces pieces, int64_t x_px, int64_t y_px, int subpixel_bits, int cull, int method, int test=0, View view=None,
+        const uint8_t[::1] is_used=None,
     ):
-        self.view = view
+        self.view, self.is_used = view, is_used
         self.arrays = (source, records, wide, triangles, pieces)
         self.scene.mesh.vertices = <const tl_vertex *>data(records)
         self.scene.mesh.wide = <const tl_wide *>&wide[0, 0] if wide is not None and wide.shape[0] else NULL
@@ -73,7 +75,7 @@ cdef class Scene:
         cdef Scene other = Scene.__new__(Scene)
         other.scene, other.arrays = self.scene, self.arrays
         other.x_px, other.y_px, other.subpixel_bits, other.test = self.x_px, self.y_px, self.subpixel_bits, self.test
-        other.view = self.view
+        other.view, other.is_used = self.view, self.is_used
         return other
 
     cdef tl_window window(self, int64_t first_row, int64_t n_rows, int64_t width) noexcept nogil:

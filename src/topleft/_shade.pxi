@@ -104,10 +104,23 @@ cdef class Shading:
 
 
 def set_inverse_w(Scene scene, const float[:, ::1] rows, float[:, ::1] out):
-    """Copy rows of four numbers, one a vertex, and write 1/w over the fourth."""
-    if rows.shape[0]:
+    """Copy rows of four numbers, one a vertex, and write 1/w over the fourth; of vertices that have been snapped."""
+    cdef int64_t i = 0, end, n = rows.shape[0], n_blocks
+    if n == 0:
+        return
+    if scene.is_used is None:
         with nogil:
-            K.set_inverse_w(scene.scene.mesh.source, &rows[0, 0], 0, rows.shape[0], &out[0, 0])
+            K.set_inverse_w(scene.scene.mesh.source, &rows[0, 0], 0, n, &out[0, 0])
+        return
+    n_blocks = scene.is_used.shape[0]
+    with nogil:
+        while i < n_blocks:
+            end = i
+            while end < n_blocks and scene.is_used[end]:
+                end += 1
+            if end > i:
+                K.set_inverse_w(scene.scene.mesh.source, &rows[0, 0], i * VERTEX_BLOCK, min(end * VERTEX_BLOCK, n), &out[0, 0])
+            i = end + 1
 
 
 def shade(Scene scene, View view, Shading shading, const int32_t[:, ::1] ids, const float[:, ::1] depth, uint8_t[:, :, ::1] pixels,

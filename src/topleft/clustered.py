@@ -5,7 +5,7 @@ In: `Clusters`, a view, a target. Out: the same picture that the whole mesh give
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -23,10 +23,6 @@ from topleft.threads import run_parts
 from topleft.view import View
 
 __all__ = ["ClusteredScene", "StaticPlan", "draw_clustered"]
-
-#: Vertices that are snapped together when some of them are needed: whole vectors.
-VERTEX_BLOCK_BITS = 4
-VERTEX_BLOCK = 1 << VERTEX_BLOCK_BITS
 
 #: Clusters that tell what a view shows of all: 10 microseconds.
 SURVEYED = 100
@@ -48,7 +44,7 @@ class StaticPlan:
         """Return the triangles of the mesh, which has checked them."""
         return self._mesh.triangles
 
-    def find_clusters(self) -> Clusters | None:
+    def find_clusters(self, vertices: ArrayLike) -> Clusters | None:  # noqa: ARG002
         """Return the clusters of the mesh if it is drawn often enough; this is one time more."""
         mesh = self._mesh
         return mesh.clusters if choices.pays_to_cluster(len(mesh.triangles), mesh.note_drawn()) else None
@@ -90,6 +86,28 @@ class ClusteredScene:
 
         Returns the triangles that are still to be drawn: the planes of clip space may cut them, or they do not fit.
         """
+        others, _ = self._draw_rows(memory, target, first, end, sample, is_first=is_first, is_last=is_last)
+        return others
+
+    def count_drawn(self, sink: Sink) -> int:
+        """Return how many clusters the picture draws, by one thread: those that are not left out, nor hidden."""
+        width, height = self._view.size
+        ids: NDArray[np.int32] = np.empty((height, width), np.int32)
+        target = _engine.Target(sink, ids, np.empty((height, width), np.float32), None)
+        return self._draw_rows(FreshMemory(), target, 0, height, (0, 0), is_first=True, is_last=True)[1]
+
+    def _draw_rows(
+        self,
+        memory: Memory,
+        target: _engine.Target,
+        first: int,
+        end: int,
+        sample: tuple[int, int],
+        *,
+        is_first: bool,
+        is_last: bool,
+    ) -> tuple[NDArray[np.int32], int]:
+        """Return what is still to be drawn, and how many clusters were."""
         clusters = self.clusters
         scene = self._empty if sample == (0, 0) else self._empty.seen_from(*sample)
         is_farthest = target.sink == Sink.FARTHEST
@@ -98,37 +116,38 @@ class ClusteredScene:
         others: NDArray[np.int32] = memory.empty("others", (clusters.n_triangles + 1,), np.int32)
         may_be_hidden = is_farthest or target.sink == Sink.NEAREST
         place = target, first, end - first, room, others
-        n_others, _, _ = clusters.engine.draw(scene, self._own, seen, may_be_hidden, *place, is_first, is_last)
-        return others[:n_others].copy()
+        n_others, _, n_drawn = clusters.engine.draw(scene, self._own, seen, may_be_hidden, *place, is_first, is_last)
+        return others[:n_others].copy(), n_drawn
 
-    def part(self, list_triangles: Callable[[], NDArray[np.int32]]) -> _engine.Scene:
-        """Return the mesh with what some triangles use snapped, maybe more; `list_triangles` gives them, ascending."""
-        points, corners, view = self.clusters.points, self.clusters.corners, self._view
-        scene = None
-        if choices.pays_to_snap_all(len(points), view.size[0] * view.size[1]):
-            scene = self.try_part(None, FreshMemory())
-        if scene is None:
-            scene = self.try_part(list_triangles(), FreshMemory())
+    def part(self, *triangles: NDArray[np.int32]) -> _engine.Scene:
+        """Return the mesh with the vertices that some triangles use snapped, and seldom all; -1 is none."""
+        scene = self.try_part(triangles, FreshMemory())
         if scene is None:  # a vertex beside one of them, which need not be used, does not fit
-            scene = snap_scene(FreshMemory(), points, corners, view, with_depth=True, out=None).scene
+            points, corners = self.clusters.points, self.clusters.corners
+            snapped = snap_scene(FreshMemory(), points, corners, self._view, with_depth=True, out=None)
+            return snapped.scene
         return scene
 
-    def try_part(self, triangles: NDArray[np.int32] | None, memory: Memory) -> _engine.Scene | None:
-        """Return the mesh with what some triangles use snapped; None where a vertex does not fit or is not finite.
-
-        Without triangles: with all vertices snapped, or None where a clip plane may cut a triangle, too.
-        """
+    def try_part(self, triangles: Sequence[NDArray[np.int32]], memory: Memory) -> _engine.Scene | None:
+        """Return the same, or None where a vertex does not fit or is not finite."""
         points, corners = self.clusters.points, self.clusters.corners
         source = self._source_of(points)
-        is_used: NDArray[np.uint8] = np.full(len(points) // VERTEX_BLOCK + 1, triangles is None, np.uint8)
-        if triangles is not None:
-            _engine.mark_corners(corners, triangles, VERTEX_BLOCK_BITS, is_used)
+        ids = [np.ascontiguousarray(array, np.int32).ravel() for array in triangles]
+        is_used: NDArray[np.uint8] = np.zeros(len(points) // _engine.BLOCK + 1, np.uint8)
+        for array in ids:
+            _engine.mark_vertices(array, corners, is_used)
         records: NDArray[np.uint8] = memory.empty("records", (len(points) * _engine.VERTEX_BYTES,), np.uint8)
-        bad, wide, clipped = source.project_blocks(is_used, VERTEX_BLOCK, self._engine_view, records)
-        if bad or wide or (clipped and triangles is None):
+        bad, wide, clipped = source.project_blocks(is_used, self._engine_view, records)
+        if bad or wide:
             return None
-        pieces = _engine.Pieces(source, records, corners, self._engine_view, triangles) if clipped else None
-        return self._scene_of(source, records, corners, pieces)
+        pieces = None
+        if clipped:
+            cut = np.empty(sum(map(len, ids)), np.int32)
+            n_cut = 0
+            for array in ids:
+                n_cut += _engine.list_cut(array, corners, records, cut[n_cut:])
+            pieces = _engine.Pieces(source, records, corners, self._engine_view, np.unique(cut[:n_cut]))
+        return self._scene_of(source, records, corners, pieces, is_used)
 
     def _source_of(self, points: NDArray[Any]) -> _engine.Source:
         return _engine.Source(points, self._matrix, self._is_affine)
@@ -139,10 +158,11 @@ class ClusteredScene:
         records: NDArray[np.uint8],
         corners: NDArray[np.int32],
         pieces: _engine.Pieces | None,
+        is_used: NDArray[np.uint8] | None = None,
     ) -> _engine.Scene:
         view = self._view
         how = (*view.origin, view.grid_bits, view.cull, view.method, view.test)
-        scene = _engine.Scene(source, records, None, corners, pieces, *how, self._engine_view)
+        scene = _engine.Scene(source, records, None, corners, pieces, *how, self._engine_view, is_used)
         return scene.numbered_from(self._first_id)
 
 
@@ -188,7 +208,7 @@ def draw_others(
     sample: tuple[int, int],
 ) -> bool:
     """Draw some triangles of a scene over what is there; returns as `draw_clustered` does."""
-    part = scene.try_part(triangles, memories[0])
+    part = scene.try_part([triangles], memories[0])
     if part is None:
         return False
     seen = part.seen_from(*sample)

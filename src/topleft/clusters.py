@@ -72,9 +72,16 @@ class Clusters:
 
         run_parts(measure, len(group_boxes), count_threads(threads, n_triangles))
         self.engine = _engine.Clustered(records, group_boxes, own_corners, order)
+        arrays = self.own_points, records, group_boxes, own_corners, order
+        self._n_bytes = sum(array.nbytes for array in arrays)
 
     def __len__(self) -> int:
         return len(self.engine)
+
+    @property
+    def n_bytes(self) -> int:
+        """How much memory the copy takes."""
+        return self._n_bytes
 
     @property
     def n_triangles(self) -> int:

@@ -88,7 +88,8 @@ def cut_out(
     n_threads = count_threads(parse_threads(threads), len(mesh.triangles))
     for k in range(frags.samples_triangle.shape[-1]):
         sample = frags.sample(k)
-        scene, ids, depth = sample._scene_with(np.arange(len(mesh.triangles))), sample.triangle, sample.depth
+        scene = sample._scene_with(np.arange(len(mesh.triangles), dtype=np.int32))  # all are drawn anew
+        ids, depth = sample.triangle, sample.depth
         look = look_of(scene, mesh, camera, ids.shape[::-1], cut)
 
         def cut_rows(

@@ -15,8 +15,8 @@ from topleft.mesh import Mesh
 
 __all__ = ["Fragments"]
 
-#: Makes the scene that attributes of some triangles need, which it asks for where that pays.
-PartOfScene = Callable[[Callable[[], NDArray[np.int32]]], _engine.Scene]
+#: Makes the scene that attributes of some triangles need: these are snapped, no others.
+PartOfScene = Callable[..., _engine.Scene]
 
 
 class Fragments:
@@ -196,20 +196,13 @@ class Fragments:
     @cached_property
     def _scene(self) -> _engine.Scene:
         """The triangles that show, snapped; maybe the others too."""
-        return self._scene_with(())
+        return self._scene_with()
 
-    def _scene_with(self, triangles: ArrayLike) -> _engine.Scene:
+    def _scene_with(self, *triangles: NDArray[np.int32]) -> _engine.Scene:
         """Return the triangles that show and these, snapped; maybe the others too."""
         if isinstance(self._scene_or_maker, _engine.Scene):
             return self._scene_or_maker
-
-        def list_triangles() -> NDArray[np.int32]:
-            is_wanted: NDArray[np.uint8] = np.zeros(self._n_triangles, np.uint8)
-            _engine.mark_ids(np.ravel(self.id), is_wanted)
-            is_wanted[np.asarray(triangles, np.intp)] = 1
-            return np.flatnonzero(is_wanted.view(np.bool_)).astype(np.int32)
-
-        return self._scene_or_maker(list_triangles)
+        return self._scene_or_maker(self.id, *triangles)
 
     def _ids(self) -> NDArray[np.int32]:
         return np.require(self.triangle, np.int32, ["C", "A"])

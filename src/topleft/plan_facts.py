@@ -14,6 +14,7 @@ from topleft import choices
 from topleft.arrays import as_array
 from topleft.memory import FreshMemory
 from topleft.models import DepthTest, Sampling, Sink
+from topleft.plan_clusters import ClusterFacts
 from topleft.sampling import sample_positions
 from topleft.snapped import check_triangles, snap_scene
 from topleft.view import View
@@ -56,6 +57,7 @@ class Facts:
     n_threads: int  # that draw
     work_ms: float  # of one thread, as guessed before the draw
     census: tuple[tuple[int, float, float], ...]  # of each of CLASSES: triangles, samples in boxes, covered
+    clusters: ClusterFacts | None = None  # of a mesh
 
     def count(self, *names: str) -> int:
         """Return how many triangles or pieces are of some classes."""

@@ -33,7 +33,11 @@ def memory_of(facts: Facts) -> tuple[dict[str, int], dict[str, int]]:
     elif facts.draws_planes and not is_empty and n and choices.can_share(view):
         scratch["bins"] = 12 * (n + 16)
         scratch["bands"] = 4 * (n + 1)
-    if facts.is_shared:
+    found = facts.clusters
+    if found is not None and found.clusters is not None:  # the records are not needed, unless a plane cuts
+        scratch["records"] = 0 if not facts.n_clipped else scratch["records"]
+        scratch["clusters"] = 12 * len(found.clusters) + 4 * facts.n_threads * n + found.clusters.n_bytes
+    elif facts.is_shared:
         scratch["others"] = 4 * (n + 16 * facts.n_threads)
     return scratch, results
 

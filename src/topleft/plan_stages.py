@@ -6,14 +6,15 @@ In: `Facts` and `Costs`. Out: `Stage`s, in the order of the pipeline.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from topleft import choices
+from topleft import _engine, choices
 from topleft.choices import MIN_THREAD_NS
 from topleft.costs import Costs, features, sink_group
 from topleft.detail import Detail
 from topleft.methods import METHODS
 from topleft.models import Sampling, Sink
+from topleft.plan_clusters import ClusterFacts
 from topleft.plan_facts import Facts
 from topleft.plan_memory import memory_of
 from topleft.threads import available_threads
@@ -55,13 +56,52 @@ SINKS = {
     Sink.SAMPLES: "a bit a sample, counted at the end",
 }
 
+#: What it takes to find out whether a cluster shows, and what one that does not would take of the time of one that
+#: does: of balls of 10**6 and 10**7 triangles.
+CLUSTER_TEST_NS = 160
+LEFT_OUT_SHARE = 0.6
+
 
 def find_stages(facts: Facts, costs: Costs) -> tuple[Stage, ...]:
     """Return the stages of a call."""
     stages = [plan_input(facts, costs), *plan_vertices(facts, costs), plan_arithmetic(facts), plan_cull(facts)]
     stages += [plan_method(facts, costs), *plan_sink(facts, costs)]
     stages += [plan_threads(facts, costs), plan_memory(facts, costs)]
-    return tuple(stages)
+    return tuple(stages if facts.clusters is None else with_clusters(stages, facts.clusters))
+
+
+def with_clusters(stages: list[Stage], found: ClusterFacts) -> list[Stage]:
+    """Return the stages of a mesh that is drawn again, with one that tells what its clusters save."""
+    if found.clusters is None:
+        stages.insert(1, Stage("clusters", "none", found.why_not, timed_in="method"))
+        return stages
+    n, n_triangles = len(found.clusters), found.clusters.n_triangles
+    names = {"outside of the picture": found.n_outside, "turned away": found.n_turned, "hidden": found.n_hidden}
+    parts = [f"{count:,} {text}" for text, count in names.items() if count]
+    why = "the mesh does not change, so its triangles were sorted once; " + (", ".join(parts) or "none is left out")
+    rejected = (
+        f"the mesh from beginning to end: all of {plural(n_triangles, 'triangle')} would be set up",
+        "the order of the triangles as given: near ones that come late hide nothing",
+    )
+    choice = f"{found.n_drawn:,} of {n:,} drawn, front to back, at most {_engine.CLUSTER} triangles each"
+    row = Stage("clusters", choice, why, rejected, timed_in="method")
+    vertex_stages = ("transform", "clip", "snap")
+    share = found.n_drawn / max(1.0, found.n_drawn + LEFT_OUT_SHARE * (n - found.n_drawn))
+    total = CLUSTER_TEST_NS * n / 1e6
+    scaled = []
+    for stage in stages:
+        if stage.name == "input":
+            scaled.append(replace(stage, choice="a copy of the mesh, sorted and checked once", rejected=()))
+        elif stage.name in vertex_stages:
+            total += (stage.estimated_ms or 0.0) * share
+            scaled.append(replace(stage, estimated_ms=None, timed_in="method"))
+        elif stage.name == "method":
+            total += (stage.estimated_ms or 0.0) * share
+            scaled.append(replace(stage, estimated_ms=total))
+        else:
+            scaled.append(stage)
+    scaled.insert(1, row)
+    return scaled
 
 
 def plural(n: int, thing: str) -> str:

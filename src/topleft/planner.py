@@ -18,11 +18,14 @@ from topleft.adapt import MeshLike
 from topleft.arrays import as_triangles
 from topleft.camera import Camera
 from topleft.classic import refuse_classic
+from topleft.clusters import Clusters
 from topleft.costs import load_costs
 from topleft.detail import choose_detail
 from topleft.memory import KeptMemory
+from topleft.mesh import Mesh
 from topleft.methods import METHODS
 from topleft.models import DepthTest, Sampling, parse
+from topleft.plan_clusters import find_cluster_facts
 from topleft.plan_facts import CLASSES, find_facts
 from topleft.plan_memory import memory_of
 from topleft.plan_stages import Stage, find_stages, plan_detail
@@ -112,6 +115,7 @@ class Plan:
     _corners: NDArray[np.int32] = field(repr=False)
     _triangles: ArrayLike = field(repr=False)
     _arguments: tuple[Any, ...] = field(repr=False)
+    _clusters: Clusters | None = field(repr=False, default=None)
     _clock: Clock = field(repr=False, default_factory=Clock)
 
     @property
@@ -232,8 +236,9 @@ class Plan:
                 )
         return self._corners
 
-    def find_clusters(self) -> None:
-        """Return None: vertices may change from call to call."""
+    def find_clusters(self, vertices: ArrayLike) -> Clusters | None:
+        """Return the clusters of the mesh that the plan was made for, if these are its vertices; others may change."""
+        return self._clusters if vertices is self._arguments[0] else None
 
     def mark(self, stage: str) -> None:
         """Note that a stage has ended."""
@@ -319,16 +324,19 @@ def plan(
     if options.pop("plan", None) is not None:
         raise TypeError("plan takes no plan=")
     detail: tuple[Stage, ...] = ()
+    mesh: Mesh | None = None
     if isinstance(triangles, Camera):
-        vertices, triangles, stage = plan_mesh(vertices, triangles, size, tolerance, options)
-        detail = (stage,)
+        mesh, stage = plan_mesh(vertices, triangles, size, tolerance, options)
+        detail, vertices, triangles = (stage,), mesh.vertices, mesh.triangles
     elif tolerance:
         raise ValueError("tolerance needs a mesh and a camera in the place of vertices and triangles")
     checked = View.parse(size, options)
     refuse_classic(checked, "plan")
     if checked.sampling in (Sampling.OUTER, Sampling.INNER, Sampling.AREA) and verb == "rasterize":
         raise ValueError(f"sampling {str(checked.sampling)!r} gives no ids: outputs must be 'coverage' or 'overdraw'")
+    found = None if mesh is None else find_cluster_facts(mesh, checked, verb, test)
     facts, corners = find_facts(vertices, triangles, checked, verb, wanted, test)
+    facts = replace(facts, clusters=found)
     costs = load_costs()
     scratch, results = memory_of(facts)
     return Plan(
@@ -347,13 +355,14 @@ def plan(
         _corners=corners,
         _triangles=triangles,
         _arguments=(vertices, depth_test),
+        _clusters=None if found is None else found.clusters,
     )
 
 
 def plan_mesh(
     mesh: Any, camera: Camera, size: tuple[int, int], tolerance: float, options: ViewOptions
-) -> tuple[ArrayLike, ArrayLike, Stage]:
-    """Return vertices and triangles of the level that is drawn, and what is to be told of it; set the transform."""
+) -> tuple[Mesh, Stage]:
+    """Return the level that is drawn, and what is to be told of it; set the transform."""
     if "transform" in options:
         raise ValueError("transform is that of the camera: give either")
     viewport = options.get("viewport")
@@ -362,7 +371,7 @@ def plan_mesh(
         mesh, camera, size, tolerance=tolerance, cull=options.get("cull", "none"), viewport=viewport,
         origin=options.get("origin", (0, 0)),
     )  # fmt: skip
-    return found.mesh.vertices, found.mesh.triangles, plan_detail(found)
+    return found.mesh, plan_detail(found)
 
 
 def find_verb(outputs: tuple[str, ...]) -> str:

@@ -258,7 +258,7 @@ def draw_fragments(
             raise TypeError(f"out must be a pair (triangle, depth) of arrays, got {type(out).__name__}") from None
     sink = choices.fragment_sink(test, has_depth=True)
     may_cluster = view.sampling.n_samples == 1 and view.transform is not None and choices.can_cluster(view, sink)
-    clusters = view.find_clusters() if may_cluster else None
+    clusters = view.find_clusters(vertices) if may_cluster else None
     if clusters is not None:
         frags = draw_clustered_fragments(memory, clusters, view, sink, background_depth, ids_out, depth_out)
         if frags is not None:

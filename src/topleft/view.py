@@ -33,8 +33,8 @@ class Planned(Protocol):
     def corners_of(self, triangles: ArrayLike, n_vertices: int) -> NDArray[np.int32]:
         """Return the checked int32 triangles, or raise an error where the plan is for others."""
 
-    def find_clusters(self) -> Clusters | None:
-        """Return the vertices and triangles in clusters if they have been sorted, or are to be now."""
+    def find_clusters(self, vertices: ArrayLike) -> Clusters | None:
+        """Return vertices and triangles in clusters, if the plan is for a mesh that does not change and has these."""
 
     def mark(self, stage: str) -> None:
         """Note that a stage has ended."""
@@ -90,9 +90,9 @@ class View:
         if self.plan is not None:
             self.plan.mark(stage)
 
-    def find_clusters(self) -> Clusters | None:
+    def find_clusters(self, vertices: ArrayLike) -> Clusters | None:
         """Return the vertices and triangles in clusters, if the plan has them."""
-        return None if self.plan is None else self.plan.find_clusters()
+        return None if self.plan is None else self.plan.find_clusters(vertices)
 
     @property
     def test(self) -> int:
