@@ -24,8 +24,8 @@ from topleft.view import View
 
 __all__ = ["ClusteredScene", "StaticPlan", "draw_clustered"]
 
-#: Clusters that tell what a view shows of all: 10 microseconds.
-SURVEYED = 100
+#: Clusters that tell what a view shows of all: 5 microseconds.
+SURVEYED = 50
 
 NO_RECORDS: NDArray[np.uint8] = np.empty(0, np.uint8)
 
