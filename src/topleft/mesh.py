@@ -140,6 +140,11 @@ class Mesh:
         self.__dict__["_n_drawn"] = n_drawn + 1
         return n_drawn
 
+    @property
+    def has_clusters(self) -> bool:
+        """Whether `clusters` have been made."""
+        return "clusters" in self.__dict__
+
     @cached_property
     def clusters(self) -> Clusters:
         """The triangles sorted into clusters, which a view needs only some of; made when it is first asked for.

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from topleft import _engine, choices
 from topleft.area import sum_areas
 from topleft.classic import refuse_classic
+from topleft.clustered import ClusteredScene
 from topleft.clusters import Clusters
 from topleft.depth_layers import check_peel, peel_scenes
 from topleft.memory import SCRATCH, FreshMemory
@@ -72,6 +73,13 @@ class PlacedScene:
         view, with_depth = self._view_of(i), self._with_depth
         snapped = snap_scene(FRESH, mesh.vertices, mesh.triangles, view, with_depth=with_depth, out=None)
         return replace(snapped, scene=snapped.scene.numbered_from(int(self.first_ids[i])))
+
+    def snap_part(self, i: int, triangles: NDArray[np.int32]) -> _engine.Scene:
+        """Return what some triangles of an instance need, snapped: all of it, unless its mesh is drawn in clusters."""
+        can_cluster = self._may_cluster and choices.can_cluster(self._view, Sink.NEAREST)
+        if can_cluster and self.scene[i].mesh.has_clusters:
+            return ClusteredScene(*self.clustered(i)).part(triangles)
+        return self.snap(i).scene
 
     def _view_of(self, i: int) -> View:
         instance, view = self.scene[i], self._view

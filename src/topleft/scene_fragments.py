@@ -42,6 +42,9 @@ class Placed(Protocol):
     def snap(self, i: int) -> Snapped:
         """Return an instance, snapped."""
 
+    def snap_part(self, i: int, triangles: NDArray[np.int32]) -> _engine.Scene:
+        """Return what some triangles of an instance need, snapped; maybe all of it."""
+
 
 @dataclass(frozen=True, slots=True)
 class Part:
@@ -175,10 +178,9 @@ class SceneFragments(Fragments):
             first, end = self.first_ids[i : i + 2]
             ids = self.id[box]
             own = np.where((ids >= first) & (ids < end), ids - np.int32(first), np.int32(-1))
-            snapped = self._placed.snap(i)
-            scene = snapped.scene.seen_from(*self._positions[0]).moved(int(left), int(top))
-            frags = Fragments(own, self.depth[box], scene, snapped.n_vertices, snapped.n_triangles)
-            yield Part(i, *box, frags)
+            scene = self._placed.snap_part(i, own).seen_from(*self._positions[0]).moved(int(left), int(top))
+            mesh = self._placed.scene[i].mesh
+            yield Part(i, *box, Fragments(own, self.depth[box], scene, len(mesh.vertices), len(mesh.triangles)))
 
     def barycentric(self) -> NDArray[np.float32]:
         """Return the weights of the three vertices of the triangle that shows in each pixel; see `Fragments`."""
