@@ -346,3 +346,20 @@ def test_holes_are_cut_out_of_clusters(always, monkeypatch):
     got = tl.render(mesh, size=SIZE)
     monkeypatch.setattr(choices, "pays_to_cluster", lambda *_: False)
     assert_same(got, tl.render(mesh, size=SIZE))
+
+
+@pytest.mark.parametrize("cut", [False, True])
+def test_attributes_have_the_same_bits_with_all_vertices_snapped(cut, monkeypatch):
+    mesh = as_arrays("blob")
+    camera = tl.Camera.look_at((0, 0, 1.0 if cut else 3.0), near=0.3, far=100.0)
+    view = {"transform": camera.clip_from_world(SIZE), "threads": 1}
+    expected = draw(mesh, None, "less", **view)
+    listed = []
+    marked = _engine.mark_vertices
+    monkeypatch.setattr(_engine, "mark_vertices", lambda *arrays: listed.append(1) or marked(*arrays))
+    for pays, n_listed in ((False, 1), (True, int(cut))):
+        listed.clear()
+        monkeypatch.setattr(choices, "pays_to_snap_all", lambda *_, pays=pays: pays)
+        got = draw(mesh, Clusters(*mesh), "less", **view)
+        assert_same(got.interpolate(mesh[0]), expected.interpolate(mesh[0]))
+        assert bool(listed) == bool(n_listed)

@@ -121,7 +121,11 @@ class ClusteredScene:
 
     def part(self, *triangles: NDArray[np.int32]) -> _engine.Scene:
         """Return the mesh with the vertices that some triangles use snapped, and seldom all; -1 is none."""
-        scene = self.try_part(triangles, FreshMemory())
+        scene = None
+        if choices.pays_to_snap_all(len(self.clusters.points), self._view.size[0] * self._view.size[1]):
+            scene = self._try_all(FreshMemory())
+        if scene is None:
+            scene = self.try_part(triangles, FreshMemory())
         if scene is None:  # a vertex beside one of them, which need not be used, does not fit
             points, corners = self.clusters.points, self.clusters.corners
             snapped = snap_scene(FreshMemory(), points, corners, self._view, with_depth=True, out=None)
@@ -148,6 +152,15 @@ class ClusteredScene:
                 n_cut += _engine.list_cut(array, corners, records, cut[n_cut:])
             pieces = _engine.Pieces(source, records, corners, self._engine_view, np.unique(cut[:n_cut]))
         return self._scene_of(source, records, corners, pieces, is_used)
+
+    def _try_all(self, memory: Memory) -> _engine.Scene | None:
+        """Return the mesh with all vertices snapped, None where one does not fit or a clip plane may cut a triangle."""
+        points, corners = self.clusters.points, self.clusters.corners
+        source = self._source_of(points)
+        records: NDArray[np.uint8] = memory.empty("records", (len(points) * _engine.VERTEX_BYTES,), np.uint8)
+        if any(source.project(0, len(points), self._engine_view, records, None)):
+            return None
+        return self._scene_of(source, records, corners, None)
 
     def _source_of(self, points: NDArray[Any]) -> _engine.Source:
         return _engine.Source(points, self._matrix, self._is_affine)
