@@ -107,7 +107,8 @@ def test_survey_of_instances_weighs_them_by_their_triangles():
 @pytest.mark.parametrize(
     ("view", "outside", "layers", "pays"),
     [
-        ({}, 0.0, 1.0, True),
+        ({}, 0.0, 1.0, False),
+        ({}, 0.2, 1.0, True),
         ({"cull": "back"}, 0.0, 1.0, False),
         ({"cull": "back"}, 0.0, 5.0, True),
         ({"sampling": "msaa4"}, 0.0, 1.5, False),

@@ -90,10 +90,11 @@ MAX_FRONT_TO_CLUSTER = 0.8
 MIN_OUTSIDE_TO_CLUSTER = ((60_000, 0.1, 0.6), (500_000, 0.0, 0.33), (math.inf, 0.0, 0.0))
 
 #: Scenes whose instances lie so many deep, on the mean, are drawn from clusters in any case: 200 in rows, 8.8 deep, are
-#: 4.0 to 5.5 times as fast. Side by side and culled, 0.89 and 0.94 times as fast; with four samples, for each of
-#: which clusters are snapped anew, 0.77 and 0.87 times: then so large a share must be outside.
+#: 4 to 5.5 times as fast. Others are where so large a share is outside, with one sample and with several, for each of
+#: which clusters are snapped anew: small in the picture and side by side, blobs are 0.90 and 0.87 times as fast, scans
+#: 1.5 and 1.4.
 MIN_LAYERS_TO_CLUSTER = 3.0
-MIN_OUTSIDE_OF_SAMPLES = 0.33
+MIN_OUTSIDE_OF_INSTANCES = (0.1, 0.33)
 
 #: Pixels for each vertex from which on attributes of a mesh in clusters have all vertices snapped: to find those that
 #: show reads all pixels. `render` of 100,000 triangles seen whole in 1920x1080: 9.5 ms and, of those alone, 11.1; of
@@ -213,8 +214,8 @@ def pays_to_draw_instances(
     `survey`: as for one mesh; `count_layers`: how many instances lie one behind the other.
     """
     seen = survey()
-    is_worth = view.sampling.n_samples == 1 or seen.outside >= MIN_OUTSIDE_OF_SAMPLES
-    pays = is_worth and pays_to_draw_clusters(view, n_triangles, lambda: seen)
+    least = MIN_OUTSIDE_OF_INSTANCES[view.sampling.n_samples > 1]
+    pays = seen.outside >= least and pays_to_draw_clusters(view, n_triangles, lambda: seen)
     return pays or count_layers() >= MIN_LAYERS_TO_CLUSTER
 
 
