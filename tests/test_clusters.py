@@ -357,9 +357,18 @@ def test_attributes_have_the_same_bits_with_all_vertices_snapped(cut, monkeypatc
     listed = []
     marked = _engine.mark_vertices
     monkeypatch.setattr(_engine, "mark_vertices", lambda *arrays: listed.append(1) or marked(*arrays))
-    for pays, n_listed in ((False, 1), (True, int(cut))):
-        listed.clear()
+    for pays in (False, True):
         monkeypatch.setattr(choices, "pays_to_snap_all", lambda *_, pays=pays: pays)
         got = draw(mesh, Clusters(*mesh), "less", **view)
+        listed.clear()
         assert_same(got.interpolate(mesh[0]), expected.interpolate(mesh[0]))
-        assert bool(listed) == bool(n_listed)
+        assert len(listed) == (1 if not pays else cut)
+
+
+def test_only_used_blocks_of_vertices_are_marked():
+    corners = np.array([[0, 1, 2], [16, 3, 40], [33, 34, 35]], np.int32)
+    is_used = np.zeros(4, np.uint8)
+    _engine.mark_vertices(np.array([-1, 0, 0, -1, 2], np.int32), corners, is_used)
+    assert is_used.tolist() == [1, 0, 1, 0]
+    _engine.mark_vertices(np.array([1], np.int32), corners, is_used)
+    assert is_used.tolist() == [1, 1, 1, 0]

@@ -51,7 +51,7 @@ def find_cluster_facts(mesh: Mesh, view: View, verb: str, test: DepthTest | None
     clusters = mesh.clusters
     seen = ClusteredScene(clusters, view)
     if not choices.pays_to_draw_clusters(view, n_triangles, seen.survey):
-        return ClusterFacts(None, "most of the mesh shows, and faces that are turned away cost little one by one")
-    n, found, n_drawn = len(clusters), seen.survey(len(clusters)), seen.count_drawn(sink)
-    n_outside, n_turned = round(n * found.outside), round(n * found.turned)
+        return ClusterFacts(None, "most of the mesh shows, and drawing that cluster by cluster takes longer")
+    n, found = len(clusters), seen.survey(len(clusters))
+    n_outside, n_turned, n_drawn = round(found.outside * n), round(found.turned * n), seen.count_drawn(sink)
     return ClusterFacts(clusters, "", n_outside, n_turned, n - n_outside - n_turned - n_drawn, n_drawn)
