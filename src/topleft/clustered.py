@@ -120,29 +120,31 @@ class ClusteredScene:
         return others[:n_others].copy(), n_drawn
 
     def part(self, *triangles: NDArray[np.int32]) -> _engine.Scene:
-        """Return the mesh with the vertices that some triangles use snapped, and seldom all; -1 is none."""
+        """Return the mesh with what some triangles use snapped, maybe more; -1 is no triangle."""
+        points, corners, view = self.clusters.points, self.clusters.corners, self._view
         scene = None
-        if choices.pays_to_snap_all(len(self.clusters.points), self._view.size[0] * self._view.size[1]):
-            scene = self._try_all(FreshMemory())
+        if choices.pays_to_snap_all(len(points), view.size[0] * view.size[1]):
+            scene = self.try_part(None, FreshMemory())
         if scene is None:
             scene = self.try_part(triangles, FreshMemory())
         if scene is None:  # a vertex beside one of them, which need not be used, does not fit
-            points, corners = self.clusters.points, self.clusters.corners
-            snapped = snap_scene(FreshMemory(), points, corners, self._view, with_depth=True, out=None)
-            return snapped.scene
+            scene = snap_scene(FreshMemory(), points, corners, view, with_depth=True, out=None).scene
         return scene
 
-    def try_part(self, triangles: Sequence[NDArray[np.int32]], memory: Memory) -> _engine.Scene | None:
-        """Return the same, or None where a vertex does not fit or is not finite."""
+    def try_part(self, triangles: Sequence[NDArray[np.int32]] | None, memory: Memory) -> _engine.Scene | None:
+        """Return the mesh with what some triangles use snapped; None where a vertex does not fit or is not finite.
+
+        Without triangles: with all vertices snapped, or None where a clip plane may cut a triangle, too.
+        """
         points, corners = self.clusters.points, self.clusters.corners
         source = self._source_of(points)
-        ids = [np.ascontiguousarray(array, np.int32).ravel() for array in triangles]
-        is_used: NDArray[np.uint8] = np.zeros(len(points) // _engine.BLOCK + 1, np.uint8)
+        is_used: NDArray[np.uint8] = np.full(len(points) // _engine.BLOCK + 1, triangles is None, np.uint8)
+        ids = [np.ascontiguousarray(array, np.int32).ravel() for array in triangles or ()]
         for array in ids:
             _engine.mark_vertices(array, corners, is_used)
         records: NDArray[np.uint8] = memory.empty("records", (len(points) * _engine.VERTEX_BYTES,), np.uint8)
         bad, wide, clipped = source.project_blocks(is_used, self._engine_view, records)
-        if bad or wide:
+        if bad or wide or (clipped and triangles is None):
             return None
         pieces = None
         if clipped:
@@ -152,15 +154,6 @@ class ClusteredScene:
                 n_cut += _engine.list_cut(array, corners, records, cut[n_cut:])
             pieces = _engine.Pieces(source, records, corners, self._engine_view, np.unique(cut[:n_cut]))
         return self._scene_of(source, records, corners, pieces, is_used)
-
-    def _try_all(self, memory: Memory) -> _engine.Scene | None:
-        """Return the mesh with all vertices snapped, None where one does not fit or a clip plane may cut a triangle."""
-        points, corners = self.clusters.points, self.clusters.corners
-        source = self._source_of(points)
-        records: NDArray[np.uint8] = memory.empty("records", (len(points) * _engine.VERTEX_BYTES,), np.uint8)
-        if any(source.project(0, len(points), self._engine_view, records, None)):
-            return None
-        return self._scene_of(source, records, corners, None)
 
     def _source_of(self, points: NDArray[Any]) -> _engine.Source:
         return _engine.Source(points, self._matrix, self._is_affine)

@@ -5,13 +5,17 @@ In: the vertices and triangles of a mesh in object space, then a view of it. Out
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from topleft import _engine
 from topleft.threads import count_threads, run_parts
+
+if TYPE_CHECKING:
+    from topleft.view import View
 
 __all__ = ["Clusters", "Survey"]
 
@@ -87,6 +91,23 @@ class Clusters:
     def n_triangles(self) -> int:
         """How many triangles the mesh has."""
         return len(self.corners)
+
+    @cached_property
+    def _box_corners(self) -> NDArray[np.float64]:
+        """The corners of the box round all finite vertices, homogeneous: (8, 4)."""
+        box = box_of(self.points)
+        ends = np.array([[k >> axis & 1 for axis in range(3)] for k in range(8)], np.bool_)
+        return np.concatenate([np.where(ends, box[3:], box[:3]), np.ones((8, 1))], axis=1)
+
+    def lie_inside(self, view: View) -> bool:
+        """Tell whether all of the mesh is about inside of the view's window: sooner than a survey does."""
+        x, y, _, w = np.asarray(view.transform, np.float64) @ self._box_corners.T
+        if not w.min() > 0:
+            return False
+        (width, height), (left, top) = view.viewport, view.origin
+        columns, rows = (x / w + 1) * (width / 2) - left, (1 - y / w) * (height / 2) - top
+        is_inside = columns.min() >= 0 and columns.max() <= view.size[0] and rows.min() >= 0
+        return bool(is_inside and rows.max() <= view.size[1])
 
     def seen_in(
         self, matrix: NDArray[np.float64], scene: _engine.Scene, first: int, end: int, width: int, *, is_farthest: bool
