@@ -1,11 +1,10 @@
-"""Commands: `python -m benchmarks run`, `accuracy`, `atlas`, `batch`, `choices`, `report`, `charts`, and the rest."""
+"""Commands: `python -m benchmarks run`, `accuracy`, `atlas`, `batch`, `choices`, `static`, `report`, and the rest."""
 
 from __future__ import annotations
 
 import argparse
 import functools
 import json
-import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -22,12 +21,15 @@ from benchmarks import (
     pictures_page,
     report,
     smooth_tables,
+    static,
+    static_tables,
 )
 from benchmarks import options as accuracy_options
 from benchmarks.cases import CASES, TRIALS
 from benchmarks.contestants import known_peers
 from benchmarks.machine import ROOT
 from benchmarks.peers import PEERS
+from benchmarks.records import write_record, write_text
 from benchmarks.rounds import Options, run
 from benchmarks.yardstick import DEFAULT_PATTERN, Yardstick
 
@@ -116,8 +118,17 @@ def parser() -> argparse.ArgumentParser:
     add.add_argument("--scale", type=float, default=ways.scale, metavar="X", help="of triangles and frames (1)")
     add.add_argument("-o", "--out", type=Path, metavar="FILE.json", help="what it holds and is not measured stays")
 
+    add = commands.add_parser("static", help="measure meshes that do not change, in clusters beside whole")
+    add.set_defaults(action=static_command)
+    still = static.Options()
+    add.add_argument("--scene", nargs="+", metavar="NAME", default=[], help="beginnings of names; all unless given")
+    add.add_argument("--mesh", nargs="+", type=Path, metavar="FILE", default=[], help="closed meshes to draw, too")
+    add.add_argument("--repeats", type=positive, default=still.rounds, metavar="N", help="rounds (%(default)s)")
+    add.add_argument("--scale", type=float, default=still.scale, metavar="X", help="of triangles and frames (1)")
+    add.add_argument("-o", "--out", type=Path, metavar="FILE.json", help="what it holds and is not measured stays")
+
     add = commands.add_parser(
-        "charts", help="draw the charts of a record of accuracy, choices or an atlas, PNG and SVG"
+        "charts", help="draw the charts of a record of accuracy, choices, static or an atlas"
     )
     add.set_defaults(action=charts_command)
     add.add_argument("file", type=Path, metavar="FILE.json")
@@ -232,6 +243,7 @@ def report_command(arguments: argparse.Namespace) -> int:
             "batch": batch,
             "pictures": pictures_page,
             "choices": choices_tables,
+            "static": static_tables,
         }
         print(*tables.get(record.get("kind"), report).lines(record), sep="\n")
     return 0
@@ -341,12 +353,24 @@ def choices_command(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def static_command(arguments: argparse.Namespace) -> int:
+    """Measure, write, print."""
+    options = static.Options(
+        scenes=arguments.scene, files=arguments.mesh, rounds=arguments.repeats, scale=arguments.scale
+    )
+    out = arguments.out
+    save = functools.partial(write_record, out) if out else None
+    record = static.run_static(options, sys.stderr, json.loads(out.read_text()) if out and out.exists() else None, save)
+    print(*static_tables.lines(record), sep="\n")
+    return 0
+
+
 def charts_command(arguments: argparse.Namespace) -> int:
     """Draw."""
-    from benchmarks import atlas_charts, chart_files, choices_charts  # matplotlib
+    from benchmarks import atlas_charts, chart_files, choices_charts, static_charts  # matplotlib
 
     record = json.loads(arguments.file.read_text())
-    of_kind = {"atlas": atlas_charts, "choices": choices_charts}
+    of_kind = {"atlas": atlas_charts, "choices": choices_charts, "static": static_charts}
     for path in of_kind.get(record["kind"], chart_files).draw_charts(record, arguments.out):
         print(path)
     return 0
@@ -380,7 +404,7 @@ def document_command(arguments: argparse.Namespace) -> int:
     text = arguments.page.read_text(encoding="utf-8")
     record = json.loads(arguments.file.read_text())
     of_kind = {"accuracy": pages.PARTS, "atlas": atlas_page.PARTS, "pictures": pictures_page.PARTS,
-               "choices": choices_tables.PARTS}  # fmt: skip
+               "choices": choices_tables.PARTS, "static": static_tables.PARTS}  # fmt: skip
     parts = of_kind.get(record.get("kind"), smooth_tables.PARTS)
     try:
         write_text(arguments.page, pages.with_parts(text, record, parts))
@@ -410,30 +434,3 @@ def list_command(_: argparse.Namespace) -> int:
     for name, what in PEERS.items():
         print(f"{name:22} {what}")
     return 0
-
-
-def write_record(path: Path, record: dict[str, Any]) -> None:
-    """Write JSON."""
-    write_text(path, record_text(record) + "\n")
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write beside the place, then move it there: never half a file."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        temporary.write_text(text, encoding="utf-8")
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
-
-
-def record_text(record: dict[str, Any]) -> str:
-    """JSON; rows of figures take a line each."""
-    if record.get("kind") not in ("accuracy", "atlas", "pictures", "choices"):
-        return json.dumps(record, indent=1)
-    parts = []
-    for key, value in record.items():
-        is_rows = isinstance(value, list) and value
-        text = "[\n  " + ",\n  ".join(map(json.dumps, value)) + "\n ]" if is_rows else json.dumps(value)
-        parts.append(f" {json.dumps(key)}: {text}")
-    return "{\n" + ",\n".join(parts) + "\n}"

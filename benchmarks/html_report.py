@@ -16,7 +16,7 @@ from benchmarks import accuracy_tables, pages
 from benchmarks.chart_files import CHARTS, chart_bytes
 from benchmarks.markdown import to_html
 
-PAGES = ("accuracy.md", "speed.md", "atlas.md", "methods.md", "levels.md", "pictures.md", "choices.md")
+PAGES = ("accuracy.md", "speed.md", "atlas.md", "methods.md", "levels.md", "pictures.md", "choices.md", "static.md")
 """In the order of the report."""
 
 TYPES = {".svg": "image/svg+xml", ".png": "image/png", ".jpg": "image/jpeg"}

@@ -39,6 +39,9 @@ typedef struct {
     tl_cull cull;
 } tl_cluster_view;
 
+/* What a view does with a cluster. */
+enum { TL_FATE_OUTSIDE, TL_FATE_TURNED, TL_FATE_BACK, TL_FATE_FRONT, TL_N_FATES };
+
 /* What a pass draws of a clustered mesh. */
 typedef struct tl_cluster_pass {
     const tl_clustered *mesh;

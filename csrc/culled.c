@@ -115,7 +115,7 @@ static int shows_back(const tl_cluster *c, const tl_cluster_view *v, const seen_
     double along = 0.0;
     for (int k = 0; k < 3; k++)
         along += (v->eye[k] - v->eye[3] * box->centre[k]) * c->axis[k];
-    return c->cone_cos > 0.0 && (v->cull == TL_CULL_FRONT ? along > 0.0 : along < 0.0);
+    return v->cull == TL_CULL_FRONT ? along > 0.0 : along < 0.0;
 }
 
 /* ---- occlusion ------------------------------------------------------------------------------------------- */
@@ -286,4 +286,20 @@ static int64_t cull_clusters(const tl_clustered *mesh, const tl_cluster_view *v,
     if (n)
         sort_by_depth(mesh, v, found, n, list);
     return n;
+}
+
+static void survey_clusters(const tl_clustered *mesh, const tl_cluster_view *v, int64_t step, int64_t n_of[TL_N_FATES])
+{
+    memset(n_of, 0, TL_N_FATES * sizeof *n_of);
+    for (int64_t i = 0; i < mesh->n_clusters; i += step) {
+        const tl_cluster *c = mesh->clusters + i;
+        const seen_box box = place_box(c->low, c->high, v->matrix);
+        unsigned within = 0;
+        if (is_outside(&box, v, &within))
+            n_of[TL_FATE_OUTSIDE]++;
+        else if (v->cull != TL_CULL_NONE && (within & TL_IN_DEPTH) == TL_IN_DEPTH && is_turned_away(c, v, &box))
+            n_of[TL_FATE_TURNED]++;
+        else
+            n_of[c->cone_cos > 0.0 && shows_back(c, v, &box) ? TL_FATE_BACK : TL_FATE_FRONT]++;
+    }
 }

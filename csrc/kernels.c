@@ -75,6 +75,7 @@ const tl_kernels TL_KERNELS = {
     .cut_clusters = cut_clusters,
     .measure_clusters = measure_clusters,
     .cull_clusters = cull_clusters,
+    .survey_clusters = survey_clusters,
     .list_edges = list_edges,
     .draw_lines = draw_lines,
     .composite = composite,

@@ -39,6 +39,10 @@ typedef struct tl_kernels {
     int64_t (*cull_clusters)(const tl_clustered *mesh, const tl_cluster_view *view, const tl_window *window, const tl_target *target,
                              int32_t *list, void *room);
 
+    /* Counts some clusters, one of each `step`, by what a view does with them, whatever hides them: outside of the window, turned
+     * away and culled, showing their backs, the others. */
+    void (*survey_clusters)(const tl_clustered *mesh, const tl_cluster_view *view, int64_t step, int64_t n_of[TL_N_FATES]);
+
     /* Lowest index of a TL_BAD vertex that a triangle uses, -1 if there is none. */
     int64_t (*first_bad)(const tl_vertex *vertices, const int32_t *triangles, int64_t n_triangles);
 

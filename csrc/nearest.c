@@ -37,20 +37,28 @@ TL_INLINE double nearest_of_segment(const double p[3], const double a[3], const 
     return squared_between(p, at);
 }
 
-/* The point of the triangle that is nearest to p: above its inside, or on a side.  A needle whose inside is lost in rounding has
- * its sides. */
-static double nearest_of_triangle(const double p[3], const double a[3], const double b[3], const double c[3], double at[3])
+/* The point of the triangle that p is above or below, and its squared distance; infinity where that is not inside. */
+TL_INLINE double above_inside(const double p[3], const double a[3], const double b[3], const double c[3], double at[3])
 {
     const double ab[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]}, ac[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
     const double ap[3] = {p[0] - a[0], p[1] - a[1], p[2] - a[2]};
     const double bb = dot_f64(ab, ab), bc = dot_f64(ab, ac), cc = dot_f64(ac, ac), pb = dot_f64(ap, ab), pc = dot_f64(ap, ac);
     const double area = bb * cc - bc * bc, v = cc * pb - bc * pc, w = bb * pc - bc * pb;
-    if (area > 1e-12 * bb * cc && v > 0.0 && w > 0.0 && v + w < area) {
-        const double s = v / area, t = w / area;
-        for (int k = 0; k < 3; k++)
-            at[k] = a[k] + s * ab[k] + t * ac[k];
-        return squared_between(p, at);
-    }
+    if (!(area > 1e-12 * bb * cc && v > 0.0 && w > 0.0 && v + w < area))
+        return INFINITY;
+    const double s = v / area, t = w / area;
+    for (int k = 0; k < 3; k++)
+        at[k] = a[k] + s * ab[k] + t * ac[k];
+    return squared_between(p, at);
+}
+
+/* The point of the triangle that is nearest to p: above its inside, or on a side.  A needle whose inside is lost in rounding has
+ * its sides. */
+static double nearest_of_triangle(const double p[3], const double a[3], const double b[3], const double c[3], double at[3])
+{
+    const double inside = above_inside(p, a, b, c, at);
+    if (inside < INFINITY)
+        return inside;
     double other[3], best = nearest_of_segment(p, a, b, at);
     for (int side = 0; side < 2; side++) {
         const double squared = nearest_of_segment(p, side ? c : b, side ? a : c, other);

@@ -5,7 +5,8 @@
  * and the distance from the surface is not larger than that.  No point of a piece is farther from the surface than its middle by more
  * than its radius, either.  Where neither is near enough to what is known to be met, the piece is cut along the sides of the triangle
  * that is nearest to its middle: what lies above that triangle is judged by it, the rest by others.  Where that does not help, the
- * piece is halved.  A bound holds wherever the cuts are.
+ * piece is halved.  A bound holds wherever the cuts are, and whichever triangle judges: those that did last are asked before the
+ * tree.
  *
  * Based on: M. Tang, M. Lee, Y. J. Kim, Interactive Hausdorff Distance Computation for General Polygonal Models, 2009; M. Guthe,
  * P. Borodin, R. Klein, Fast and Accurate Hausdorff Distance Calculation between Meshes, 2005 (branch and bound, and that the
@@ -17,6 +18,7 @@
 enum {
     TL_PIECE_CORNERS = 12,
     TL_PIECES = 96, /* that wait; when there is no room a piece is taken as it is */
+    TL_RECENT = 8,  /* triangles that are remembered: blob of 10^6 and its 250,000, 6.1 s of CPU time to 4.4 */
 };
 
 /* A convex piece of a triangle. */
@@ -31,7 +33,7 @@ typedef struct {
     double across[3]; /* the normal of the triangle, of any length */
     double share, least;
     double known;
-    int64_t seed; /* a triangle that is near */
+    int64_t recent[TL_RECENT]; /* triangles that have judged, the latest first: neighbours are near them, too */
 } reaching;
 
 static void cross_f64(const double a[3], const double b[3], double out[3])
@@ -94,14 +96,26 @@ static double squared_from_triangle(const tl_surface *s, const convex *p, int64_
     return largest;
 }
 
+/* Puts a triangle first of those that are remembered, in place of the one at [i]. */
+TL_INLINE void remember(reaching *r, int64_t triangle, int i)
+{
+    for (; i > 0; i--)
+        r->recent[i] = r->recent[i - 1];
+    r->recent[0] = triangle;
+}
+
 /* The foot of a point, which is a distance that is met. */
 static foot foot_of(reaching *r, const double p[3])
 {
     foot best;
-    set_foot(r->surface, p, r->seed, &best);
+    set_foot(r->surface, p, r->recent[0], &best);
     improve_foot(r->surface, p, &best);
     const double distance = sqrt(best.squared);
     r->known = distance > r->known ? distance : r->known;
+    int i = 0;
+    while (i < TL_RECENT - 1 && r->recent[i] != best.triangle)
+        i++;
+    remember(r, best.triangle, i);
     return best;
 }
 
@@ -110,6 +124,23 @@ static double enough_of(const reaching *r)
 {
     const double more = r->share * r->known;
     return r->known + (more > r->least ? more : r->least);
+}
+
+/* The foot of the middle of a piece: on a triangle that is remembered, if the middle lies above its inside and not farther than what
+ * is known to be met; else on the nearest. */
+static foot foot_of_middle(reaching *r, const double middle[3])
+{
+    const tl_surface *s = r->surface;
+    for (int i = 0; i < TL_RECENT; i++) {
+        foot below = {.triangle = r->recent[i]};
+        below.squared = above_inside(middle, corner_of(s, below.triangle, 0), corner_of(s, below.triangle, 1),
+                                     corner_of(s, below.triangle, 2), below.at);
+        if (below.squared <= r->known * r->known) {
+            remember(r, below.triangle, i);
+            return below;
+        }
+    }
+    return foot_of(r, middle);
 }
 
 /* Cuts a piece along the sides of a triangle, across the triangle that it is of; pushes what lies outside.  Returns how many there are. */
@@ -181,12 +212,11 @@ static double middle_of(const convex *p, double middle[3])
 static double bound_piece(reaching *r, convex *stack, int *n)
 {
     convex *p = stack + *n - 1;
+    --*n;
     double middle[3];
     const double radius = sqrt(middle_of(p, middle));
-    const foot below = foot_of(r, middle);
-    r->seed = below.triangle;
+    const foot below = foot_of_middle(r, middle);
     const double by_middle = sqrt(below.squared) + radius;
-    --*n;
     if (by_middle <= enough_of(r))
         return by_middle;
     int farthest;
@@ -218,7 +248,7 @@ static void find_reach(const tl_surface *s, const double *points, const int32_t 
                        double least, tl_reach *reach)
 {
     convex stack[TL_PIECES];
-    reaching r = {s, {0.0, 0.0, 0.0}, share, least, 0.0, 0};
+    reaching r = {s, {0.0, 0.0, 0.0}, share, least, 0.0, {0}};
     const double known = reach->known;
     for (int64_t i = first; i < end; i++) {
         int n = 1;

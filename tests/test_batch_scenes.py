@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 import tempfile
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
@@ -11,11 +12,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from batch_jobs import BOX, CORNERS, EXECUTORS, FACES, SIZE, orbit, views
+from batch_jobs import BOX, CORNERS, EXECUTORS, FACES, SIZE, orbit, pictures, views
 
 import topleft as tl
 from topleft import adapt, crews, files, jobs
 from topleft.layers import LAYERS
+from topleft.levels import kept_levels
 
 
 @pytest.fixture(scope="module")
@@ -69,9 +71,9 @@ def test_batch_spools_many_meshes_in_bounded_room(processes, monkeypatch):
     most = []
     release = crews.Spool.release
 
-    def count(self, scene):
+    def count(self, scene, with_levels=False):
         most.append(len(list(Path(self._folder).iterdir())))
-        release(self, scene)
+        release(self, scene, with_levels)
 
     monkeypatch.setattr(crews.Spool, "release", count)
     listed = (tl.Job(tl.Mesh(BOX.vertices + i, BOX.triangles), None, SIZE) for i in range(40))
@@ -205,3 +207,32 @@ def test_batch_layers_unknown_option_is_an_error_of_the_job(options):
     (name,) = options.keys() - {"opacity"}
     with pytest.raises(TypeError, match=f"there is no option '{name}' of a picture"):
         tl.render_batch([tl.Job(BOX, None, SIZE, options, None, ("depth",))]).finish()
+
+
+def test_spooled_mesh_comes_with_its_levels():
+    pytest.importorskip("fast_simplification")
+    mesh = tl.Mesh(*tl.scenes.torus(segments=48, sections=24))
+    spool = crews.Spool()
+    try:
+        found = spool.hold(tl.Scene([tl.Instance(mesh), tl.Instance(mesh)]), True)()
+        plain = spool.hold(mesh)()
+    finally:
+        spool.close()
+    assert found[0].mesh is found[1].mesh
+    assert [one.bound for one in kept_levels(found[0].mesh)] == [one.bound for one in kept_levels(mesh)]
+    assert kept_levels(plain) is None
+
+
+def test_batch_in_processes_draws_levels_of_the_parent(processes):
+    pytest.importorskip("fast_simplification")
+    mesh = tl.Mesh(*tl.scenes.torus(segments=48, sections=24))
+    found = list(tl.render_batch(views(3, mesh, tolerance=2), executor=processes))
+    assert kept_levels(mesh) is not None
+    for result, expected in zip(found, pictures(3, mesh, tolerance=2), strict=True):
+        assert np.array_equal(result.picture, expected)
+
+
+def test_levels_that_cannot_be_made_are_left_to_the_job(monkeypatch):
+    monkeypatch.setitem(sys.modules, "fast_simplification", None)
+    assert crews.coarser_levels_of(tl.Mesh(*tl.scenes.torus())) == []
+    assert crews.coarser_levels_of("bunny.obj") == []

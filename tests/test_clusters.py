@@ -23,6 +23,7 @@ SIZE = (160, 120)
 def however_little_it_pays(monkeypatch):
     """Views are drawn in clusters even where that does not pay."""
     monkeypatch.setattr(choices, "pays_to_draw_clusters", lambda *_: True)
+    monkeypatch.setattr(choices, "pays_to_draw_instances", lambda *_: True)
 
 
 def meshes():
@@ -345,3 +346,29 @@ def test_holes_are_cut_out_of_clusters(always, monkeypatch):
     got = tl.render(mesh, size=SIZE)
     monkeypatch.setattr(choices, "pays_to_cluster", lambda *_: False)
     assert_same(got, tl.render(mesh, size=SIZE))
+
+
+@pytest.mark.parametrize("cut", [False, True])
+def test_attributes_have_the_same_bits_with_all_vertices_snapped(cut, monkeypatch):
+    mesh = as_arrays("blob")
+    camera = tl.Camera.look_at((0, 0, 1.0 if cut else 3.0), near=0.3, far=100.0)
+    view = {"transform": camera.clip_from_world(SIZE), "threads": 1}
+    expected = draw(mesh, None, "less", **view)
+    listed = []
+    marked = _engine.mark_vertices
+    monkeypatch.setattr(_engine, "mark_vertices", lambda *arrays: listed.append(1) or marked(*arrays))
+    for pays in (False, True):
+        monkeypatch.setattr(choices, "pays_to_snap_all", lambda *_, pays=pays: pays)
+        got = draw(mesh, Clusters(*mesh), "less", **view)
+        listed.clear()
+        assert_same(got.interpolate(mesh[0]), expected.interpolate(mesh[0]))
+        assert len(listed) == (1 if not pays else cut)
+
+
+def test_only_used_blocks_of_vertices_are_marked():
+    corners = np.array([[0, 1, 2], [16, 3, 40], [33, 34, 35]], np.int32)
+    is_used = np.zeros(4, np.uint8)
+    _engine.mark_vertices(np.array([-1, 0, 0, -1, 2], np.int32), corners, is_used)
+    assert is_used.tolist() == [1, 0, 1, 0]
+    _engine.mark_vertices(np.array([1], np.int32), corners, is_used)
+    assert is_used.tolist() == [1, 1, 1, 0]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from topleft import mesh as mesh_module
 from topleft import scenes
 from topleft.faces import angle_weighted_normals, face_normals
 from topleft.mesh import Mesh, coincident
@@ -120,6 +121,21 @@ def test_coincident_groups_equal_rows_in_order_of_first_sight():
 def test_coincident_compares_all_attributes():
     first, _ = coincident(np.zeros((3, 3)), np.array([[1], [2], [1]], dtype=np.uint8))
     assert first.tolist() == [0, 1]
+
+
+def test_coincident_where_hashes_collide_compares_values(monkeypatch):
+    rng = np.random.default_rng(5)
+    rows = rng.integers(0, 4, (300, 3)).astype(np.float32)
+    by_hash = coincident(rows)
+    monkeypatch.setattr(mesh_module, "_runs_by_hash", lambda _: None)
+    by_value = coincident(rows)
+    assert len(by_value[0]) == len(np.unique(rows, axis=0))
+    assert all(np.array_equal(one, other) for one, other in zip(by_hash, by_value, strict=True))
+
+
+def test_runs_by_hash_that_is_not_one_of_values_is_none():
+    nan = np.full(2, np.nan)  # equal bits, and not equal
+    assert mesh_module._runs_by_hash([nan]) is None
 
 
 def test_coincident_of_nothing_is_empty():

@@ -303,7 +303,7 @@ def test_plan_of_a_mesh_tells_why_it_is_drawn_whole(n_triangles, options, why):
 
 
 def test_plan_of_a_mesh_draws_its_clusters_and_no_other_vertices():
-    mesh = tl.Mesh(*tl.scenes.blob(60_000))
+    mesh = tl.Mesh(*tl.scenes.blob(130_000))
     camera = tl.Camera.framing(mesh)
     plan = tl.plan(mesh, camera, (320, 240))
     matrix = camera.clip_from_world((320, 240))

@@ -139,6 +139,13 @@ cdef class Clustered:
                 n = K.cull_clusters(&self.mesh, &view.view, NULL, NULL, &listed[0], &room[0])
         return n
 
+    def survey(self, ClusterView view, int64_t step, int64_t[::1] n_of):
+        """Count one cluster of each `step`: those outside, turned away and culled, showing their backs, and the others."""
+        if n_of.shape[0] != TL_N_FATES:
+            raise ValueError("n_of must have a number for each fate")
+        with nogil:
+            K.survey_clusters(&self.mesh, &view.view, step, &n_of[0])
+
     def count_triangles(self, const int32_t[::1] listed):
         """Return how many triangles some clusters have."""
         cdef int64_t i, n = 0

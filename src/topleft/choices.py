@@ -6,8 +6,9 @@ measured on one and two cores of a Zen 4 with AVX-512; `docs/design.md`, section
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,9 @@ from topleft.methods import METHODS
 from topleft.models import Cull, DepthTest, Sampling, Sink
 from topleft.threads import available_threads, count_threads
 from topleft.view import CULL_CODES, View
+
+if TYPE_CHECKING:
+    from topleft.clusters import Survey
 
 __all__ = [
     "Inputs",
@@ -29,9 +33,12 @@ __all__ = [
     "is_affine",
     "is_direct",
     "is_shared",
+    "least_outside",
     "must_cut",
     "pays_to_cluster",
     "pays_to_draw_clusters",
+    "pays_to_draw_instances",
+    "pays_to_snap_all",
     "pays_without_depth",
     "threads_to_convert",
     "threads_to_draw",
@@ -75,10 +82,25 @@ MIN_TRIANGLES_TO_SHARE = 1_000_000
 MIN_TRIANGLES_TO_CLUSTER = 20_000
 MIN_INSTANCES_TO_CLUSTER = 16
 
-#: Where faces are culled clusters save less: triangles from which on they do though a view shows all of the mesh, and
-#: the share of the mesh that smaller ones may show.
-MIN_TRIANGLES_TO_CLUSTER_CULLED = 500_000
-MAX_SHARE_TO_CLUSTER_CULLED = 0.75
+#: Clusters take 1.2 to 1.5 times as long for a triangle that shows (hills and soup, all of it in view, are 0.65 to 0.9
+#: times as fast), and leave out what is outside, turned away or behind others. A view is drawn from them where no more
+#: of them face it, and as many are outside, as is said here: (below so many triangles, without culling, with it).
+#: Measured on blobs, scans, hills and soup in 512x512 and 1920x1080. Whole and culled, 30,000 to 300,000 triangles are
+#: 0.86 to 0.93 times as fast, 1,000,000 1.09; half in view, 0.85 to 1.05, 0.93 to 1.12, and 1.3. `docs/static.md`.
+MAX_FRONT_TO_CLUSTER = 0.8
+MIN_OUTSIDE_TO_CLUSTER = ((60_000, 0.1, 0.6), (500_000, 0.0, 0.33), (math.inf, 0.0, 0.0))
+
+#: Scenes whose instances lie so many deep, on the mean, are drawn from clusters in any case: 200 in rows, 8.8 deep, are
+#: 4 to 5.5 times as fast. Others are where so large a share is outside, with one sample and with several, for each of
+#: which clusters are snapped anew: small in the picture and side by side, blobs are 0.90 and 0.87 times as fast, scans
+#: 1.5 and 1.4.
+MIN_LAYERS_TO_CLUSTER = 3.0
+MIN_OUTSIDE_OF_INSTANCES = (0.1, 0.33)
+
+#: Pixels for each vertex from which on attributes of a mesh in clusters have all vertices snapped: to find those that
+#: show reads all pixels. `render` of 100,000 triangles seen whole in 1920x1080: 9.5 ms and, of those alone, 11.1; of
+#: 1,000,000 22.7 and 25.1; of 3,000,000, a fifth of them in view, 18.9 and 17.5.
+MIN_PIXELS_A_VERTEX = 4
 
 #: What it does not matter to in which order triangles are drawn.
 ORDER_FREE = frozenset({Sink.MASK, Sink.COUNT, Sink.NEAREST, Sink.FARTHEST, Sink.SAMPLES})
@@ -177,10 +199,34 @@ def pays_to_cluster(n_triangles: int, n_drawn: int, n_instances: int = 1) -> boo
     return n_triangles >= MIN_TRIANGLES_TO_CLUSTER and (n_drawn > 0 or n_instances >= MIN_INSTANCES_TO_CLUSTER)
 
 
-def pays_to_draw_clusters(view: View, n_triangles: int, share_seen: Callable[[], float]) -> bool:
-    """Tell whether a view of a mesh in clusters is drawn from these; `share_seen`: how many of them it may show."""
-    is_culled = view.cull != CULL_CODES[Cull.NONE] and n_triangles < MIN_TRIANGLES_TO_CLUSTER_CULLED
-    return not is_culled or share_seen() <= MAX_SHARE_TO_CLUSTER_CULLED
+def pays_to_draw_clusters(view: View, n_triangles: int, survey: Callable[[], Survey]) -> bool:
+    """Tell whether a view of a mesh in clusters is drawn from these; `survey`: what becomes of them in it."""
+    seen = survey()
+    return seen.front <= MAX_FRONT_TO_CLUSTER and seen.outside >= least_outside(view, n_triangles)
+
+
+def least_outside(view: View, n_triangles: int) -> float:
+    """Return the share of the clusters of a mesh that must lie outside for its clusters to pay."""
+    is_culled = view.cull != CULL_CODES[Cull.NONE]
+    return next(shares[is_culled] for below, *shares in MIN_OUTSIDE_TO_CLUSTER if n_triangles < below)
+
+
+def pays_to_draw_instances(
+    view: View, n_triangles: int, survey: Callable[[], Survey], count_layers: Callable[[], float]
+) -> bool:
+    """Tell whether a scene in clusters is drawn from these; `n_triangles`: of an instance, on the mean.
+
+    `survey`: as for one mesh; `count_layers`: how many instances lie one behind the other.
+    """
+    seen = survey()
+    least = MIN_OUTSIDE_OF_INSTANCES[view.sampling.n_samples > 1]
+    pays = seen.outside >= least and pays_to_draw_clusters(view, n_triangles, lambda: seen)
+    return pays or count_layers() >= MIN_LAYERS_TO_CLUSTER
+
+
+def pays_to_snap_all(n_vertices: int, n_pixels: int) -> bool:
+    """Tell whether all vertices of a mesh in clusters are snapped for attributes, not only those that show."""
+    return n_vertices * MIN_PIXELS_A_VERTEX <= n_pixels
 
 
 def common_depth(points: NDArray[Any], *, has_depth: bool, is_clip_space: bool) -> float | None:

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine, choices
 from topleft.arrays import as_matrix
-from topleft.clusters import Clusters
+from topleft.clusters import Clusters, Survey
 from topleft.memory import FreshMemory, Memory
 from topleft.mesh import Mesh
 from topleft.models import Sink
@@ -23,6 +23,9 @@ from topleft.threads import run_parts
 from topleft.view import View
 
 __all__ = ["ClusteredScene", "StaticPlan", "draw_clustered"]
+
+#: Clusters that tell what a view shows of all: 5 microseconds.
+SURVEYED = 50
 
 NO_RECORDS: NDArray[np.uint8] = np.empty(0, np.uint8)
 
@@ -62,11 +65,11 @@ class ClusteredScene:
         self._own = self._source_of(clusters.own_points)
         self._empty = self._scene_of(self._own, NO_RECORDS, clusters.corners[:0], None)
 
-    def share(self) -> float:
-        """Return the share of the clusters that the window may show, hidden or not."""
-        clusters, (width, height) = self.clusters, self._view.size
+    def survey(self, n_most: int = SURVEYED) -> Survey:
+        """Return what becomes of the clusters, by some of them: outside, turned away, and so on."""
+        (width, height), clusters = self._view.size, self.clusters
         seen = clusters.seen_in(self._exact, self._empty, 0, height, width, is_farthest=False)
-        return len(clusters.survivors(seen)) / max(1, len(clusters))
+        return clusters.survey(seen, n_most)
 
     def draw_rows(
         self,
@@ -117,25 +120,31 @@ class ClusteredScene:
         return others[:n_others].copy(), n_drawn
 
     def part(self, *triangles: NDArray[np.int32]) -> _engine.Scene:
-        """Return the mesh with the vertices that some triangles use snapped, and seldom all; -1 is none."""
-        scene = self.try_part(triangles, FreshMemory())
+        """Return the mesh with what some triangles use snapped, maybe more; -1 is no triangle."""
+        points, corners, view = self.clusters.points, self.clusters.corners, self._view
+        scene = None
+        if choices.pays_to_snap_all(len(points), view.size[0] * view.size[1]):
+            scene = self.try_part(None, FreshMemory())
+        if scene is None:
+            scene = self.try_part(triangles, FreshMemory())
         if scene is None:  # a vertex beside one of them, which need not be used, does not fit
-            points, corners = self.clusters.points, self.clusters.corners
-            snapped = snap_scene(FreshMemory(), points, corners, self._view, with_depth=True, out=None)
-            return snapped.scene
+            scene = snap_scene(FreshMemory(), points, corners, view, with_depth=True, out=None).scene
         return scene
 
-    def try_part(self, triangles: Sequence[NDArray[np.int32]], memory: Memory) -> _engine.Scene | None:
-        """Return the same, or None where a vertex does not fit or is not finite."""
+    def try_part(self, triangles: Sequence[NDArray[np.int32]] | None, memory: Memory) -> _engine.Scene | None:
+        """Return the mesh with what some triangles use snapped; None where a vertex does not fit or is not finite.
+
+        Without triangles: with all vertices snapped, or None where a clip plane may cut a triangle, too.
+        """
         points, corners = self.clusters.points, self.clusters.corners
         source = self._source_of(points)
-        ids = [np.ascontiguousarray(array, np.int32).ravel() for array in triangles]
-        is_used: NDArray[np.uint8] = np.zeros(len(points) // _engine.BLOCK + 1, np.uint8)
+        is_used: NDArray[np.uint8] = np.full(len(points) // _engine.BLOCK + 1, triangles is None, np.uint8)
+        ids = [np.ascontiguousarray(array, np.int32).ravel() for array in triangles or ()]
         for array in ids:
             _engine.mark_vertices(array, corners, is_used)
         records: NDArray[np.uint8] = memory.empty("records", (len(points) * _engine.VERTEX_BYTES,), np.uint8)
         bad, wide, clipped = source.project_blocks(is_used, self._engine_view, records)
-        if bad or wide:
+        if bad or wide or (clipped and triangles is None):
             return None
         pieces = None
         if clipped:

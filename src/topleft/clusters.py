@@ -5,7 +5,8 @@ In: the vertices and triangles of a mesh in object space, then a view of it. Out
 
 from __future__ import annotations
 
-from typing import Any
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,10 @@ from numpy.typing import NDArray
 from topleft import _engine
 from topleft.threads import count_threads, run_parts
 
-__all__ = ["Clusters"]
+if TYPE_CHECKING:
+    from topleft.view import View
+
+__all__ = ["Clusters", "Survey"]
 
 #: A bound of the error of the vertex stage as a share of the terms that it adds up: four roundings, and the same again
 #: for how the bounds themselves are computed, in float64; twice that.
@@ -21,6 +25,17 @@ STAGE_ERROR = {np.dtype(np.float32): 2.0**-21, np.dtype(np.float64): 2.0**-49}
 
 #: Pixels around the window that count as inside: more than the snap and the vertex stage move a corner.
 MARGIN_PX = 1.0
+
+
+class Survey(NamedTuple):
+    """Shares of the clusters of a mesh by what a view does with them, hidden or not."""
+
+    outside: float
+    turned: float
+    """Certain to be culled."""
+    back: float
+    """Showing their backs: what is closed and not culled hides them."""
+    front: float
 
 
 class Clusters:
@@ -77,6 +92,23 @@ class Clusters:
         """How many triangles the mesh has."""
         return len(self.corners)
 
+    @cached_property
+    def _box_corners(self) -> NDArray[np.float64]:
+        """The corners of the box round all finite vertices, homogeneous: (8, 4)."""
+        box = box_of(self.points)
+        ends = np.array([[k >> axis & 1 for axis in range(3)] for k in range(8)], np.bool_)
+        return np.concatenate([np.where(ends, box[3:], box[:3]), np.ones((8, 1))], axis=1)
+
+    def lie_inside(self, view: View) -> bool:
+        """Tell whether all of the mesh is about inside of the view's window: sooner than a survey does."""
+        x, y, _, w = np.asarray(view.transform, np.float64) @ self._box_corners.T
+        if not w.min() > 0:
+            return False
+        (width, height), (left, top) = view.viewport, view.origin
+        columns, rows = (x / w + 1) * (width / 2) - left, (1 - y / w) * (height / 2) - top
+        is_inside = columns.min() >= 0 and columns.max() <= view.size[0] and rows.min() >= 0
+        return bool(is_inside and rows.max() <= view.size[1])
+
     def seen_in(
         self, matrix: NDArray[np.float64], scene: _engine.Scene, first: int, end: int, width: int, *, is_farthest: bool
     ) -> _engine.ClusterView:
@@ -88,6 +120,13 @@ class Clusters:
         """Return the clusters that may draw a pixel, in the order in which they are drawn."""
         listed: NDArray[np.int32] = np.empty(len(self), np.int32)
         return listed[: self.engine.cull(seen, listed, np.empty(len(self), np.uint64))]
+
+    def survey(self, seen: _engine.ClusterView, n_most: int) -> Survey:
+        """Return what becomes of some clusters, about `n_most`, evenly spread over the mesh."""
+        n_of: NDArray[np.int64] = np.zeros(4, np.int64)
+        self.engine.survey(seen, max(1, round(len(self) / n_most)), n_of)
+        n = max(1, int(n_of.sum()))
+        return Survey(*(count / n for count in n_of.tolist()))
 
 
 def box_of(points: NDArray[Any]) -> NDArray[np.float64]:

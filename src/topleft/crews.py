@@ -12,7 +12,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from topleft.errors import MissingPackageError
 from topleft.jobs import Job, Outcome, Studio
+from topleft.levels import Level, Levels, keep_levels
+from topleft.mesh import Mesh
+from topleft.scene import Scene
+from topleft.simplify import levels_of
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor, Future
@@ -134,13 +139,13 @@ class ProcessCrew(Crew):
 
     def submit(self, jobs: Jobs) -> Future[list[Outcome]]:
         """Put jobs on the way, their meshes replaced by where to find them."""
-        light = [(index, replace(job, scene=self._spool.hold(job.scene))) for index, job in jobs]
+        light = [(index, replace(job, scene=self._spool.hold(job.scene, _needs_levels(job)))) for index, job in jobs]
         return self._executor.submit(draw_in_process, self._spool.token, light)
 
     def forget(self, jobs: Jobs) -> None:
         """Let go of their meshes."""
         for _, job in jobs:
-            self._spool.release(job.scene)
+            self._spool.release(job.scene, _needs_levels(job))
 
     def stop(self, futures: Sequence[Future[Any]]) -> None:
         """Wait until what has begun is finished, then remove the files."""
@@ -150,7 +155,7 @@ class ProcessCrew(Crew):
 
 @dataclass(frozen=True)
 class SpooledScene:
-    """A mesh that another process has put into a file."""
+    """A mesh that another process has put into a file, and its levels of detail."""
 
     path: str
 
@@ -159,7 +164,10 @@ class SpooledScene:
         import pickle
 
         with open(self.path, "rb") as file:
-            return pickle.load(file)
+            scene, coarser = pickle.load(file)
+        for mesh, levels in coarser:
+            keep_levels(mesh, Levels(mesh, levels))
+        return scene
 
 
 @dataclass
@@ -177,7 +185,7 @@ class Spool:
 
         self._pid = os.getpid()
         self._folder = tempfile.mkdtemp(prefix="topleft-")
-        self._entries: OrderedDict[int, _Spooled] = OrderedDict()
+        self._entries: OrderedDict[tuple[int, bool], _Spooled] = OrderedDict()
         self._n_written = 0
 
     @property
@@ -185,27 +193,32 @@ class Spool:
         """What tells this batch from others."""
         return self._folder
 
-    def hold(self, scene: Any) -> Any:
-        """Return what stands for a mesh, which stays in its file until it is released; names stay as they are."""
+    def hold(self, scene: Any, with_levels: bool = False) -> Any:
+        """Return what stands for a mesh, which stays in its file until it is released; names stay as they are.
+
+        Levels of detail are made here where they are needed, once, and not in each worker.
+        """
         if isinstance(scene, (str, os.PathLike)) or callable(scene):
             return scene
-        entry = self._entries.get(id(scene))
+        key = id(scene), with_levels
+        entry = self._entries.get(key)
         if entry is None:
             import pickle
 
             path = Path(self._folder, f"{self._n_written}.pickle")
             self._n_written += 1
+            coarser = coarser_levels_of(scene) if with_levels else []
             with open(path, "xb") as file:
-                pickle.dump(scene, file, pickle.HIGHEST_PROTOCOL)
-            entry = self._entries[id(scene)] = _Spooled(scene, SpooledScene(str(path)))
+                pickle.dump((scene, coarser), file, pickle.HIGHEST_PROTOCOL)
+            entry = self._entries[key] = _Spooled(scene, SpooledScene(str(path)))
             self._trim()
-        self._entries.move_to_end(id(scene))
+        self._entries.move_to_end(key)
         entry.n_users += 1
         return entry.at
 
-    def release(self, scene: Any) -> None:
+    def release(self, scene: Any, with_levels: bool = False) -> None:
         """One job less needs it."""
-        entry = self._entries.get(id(scene))
+        entry = self._entries.get((id(scene), with_levels))
         if entry is not None:
             entry.n_users -= 1
 
@@ -220,6 +233,22 @@ class Spool:
 
         if self._pid == os.getpid():
             shutil.rmtree(self._folder, ignore_errors=True)
+
+
+def coarser_levels_of(scene: Any) -> list[tuple[Mesh, tuple[Level, ...]]]:
+    """The meshes of a scene, each with its coarser levels; none where they cannot be made, which the job will tell."""
+    if not isinstance(scene, Mesh | Scene):
+        return []
+    meshes = [scene] if isinstance(scene, Mesh) else [instance.mesh for instance in scene]
+    try:
+        return [(mesh, levels_of(mesh)[1:]) for mesh in dict.fromkeys(meshes)]
+    except MissingPackageError:
+        return []
+
+
+def _needs_levels(job: Job) -> bool:
+    """Tell whether a job may be drawn with levels of detail."""
+    return bool(job.options.get("tolerance", 0))
 
 
 _studio: tuple[str, Studio] | None = None

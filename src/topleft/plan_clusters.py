@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from topleft import choices
 from topleft.clustered import ClusteredScene
 from topleft.clusters import Clusters
 from topleft.mesh import Mesh
-from topleft.models import Cull, DepthTest, Sampling
-from topleft.view import CULL_CODES, View
+from topleft.models import DepthTest, Sampling
+from topleft.view import View
 
 __all__ = ["ClusterFacts", "find_cluster_facts"]
 
@@ -50,9 +50,8 @@ def find_cluster_facts(mesh: Mesh, view: View, verb: str, test: DepthTest | None
         return ClusterFacts(None, f"{n_triangles:,} triangles are done before sorting them would pay")
     clusters = mesh.clusters
     seen = ClusteredScene(clusters, view)
-    if not choices.pays_to_draw_clusters(view, n_triangles, seen.share):
-        return ClusterFacts(None, "most of the mesh shows, and faces that are turned away cost little one by one")
-    whole = ClusteredScene(clusters, replace(view, cull=CULL_CODES[Cull.NONE]))
-    n, n_inside, n_faced = len(clusters), round(whole.share() * len(clusters)), round(seen.share() * len(clusters))
-    n_drawn = seen.count_drawn(sink)
-    return ClusterFacts(clusters, "", n - n_inside, n_inside - n_faced, n_faced - n_drawn, n_drawn)
+    if not choices.pays_to_draw_clusters(view, n_triangles, seen.survey):
+        return ClusterFacts(None, "most of the mesh shows, and drawing that cluster by cluster takes longer")
+    n, found = len(clusters), seen.survey(len(clusters))
+    n_outside, n_turned, n_drawn = round(found.outside * n), round(found.turned * n), seen.count_drawn(sink)
+    return ClusterFacts(clusters, "", n_outside, n_turned, n - n_outside - n_turned - n_drawn, n_drawn)

@@ -307,8 +307,10 @@ def draw_clustered_fragments(
 
     None where drawing them does not pay, or where only that can tell what is wrong.
     """
+    if choices.least_outside(view, clusters.n_triangles) and clusters.lie_inside(view):
+        return None
     seen = ClusteredScene(clusters, view)
-    if not choices.pays_to_draw_clusters(view, clusters.n_triangles, seen.share):
+    if not choices.pays_to_draw_clusters(view, clusters.n_triangles, seen.survey):
         return None
     shape = view.size[::-1]
     with (

@@ -14,13 +14,24 @@ from numpy.typing import NDArray
 
 from topleft import _engine, choices
 from topleft.clustered import ClusteredScene, draw_clustered
+from topleft.clusters import Survey
 from topleft.memory import KeptMemory
 from topleft.scene import Scene
+from topleft.view import View
 
 if TYPE_CHECKING:
     from topleft.scene_draw import PlacedScene
 
-__all__ = ["draw_placed", "front_to_back", "wants_clusters"]
+__all__ = ["draw_placed", "front_to_back", "pays_to_draw", "wants_clusters"]
+
+#: Instances that tell what a picture shows of all, and clusters of each: less than a tenth of a millisecond.
+SURVEYED_INSTANCES, SURVEYED_OF_EACH = 4, 25
+
+#: Cells on each side of the picture in which layers are counted: of 15 by 8 pixels at 1920x1080.
+CELLS = 128
+
+#: Which end of a box each of its corners has, axis by axis.
+CORNERS = np.array([[k >> axis & 1 for axis in range(3)] for k in range(8)], np.bool_)
 
 
 def wants_clusters(scene: Scene) -> bool:
@@ -40,6 +51,40 @@ def front_to_back(scene: Scene, clip_from_world: NDArray[np.float64]) -> NDArray
     ])  # fmt: skip
     row = clip_from_world[3] if clip_from_world[3, :3].any() else clip_from_world[2]
     return np.argsort(middles @ row[:3], kind="stable")
+
+
+def pays_to_draw(placed: PlacedScene, clip_from_world: NDArray[np.float64], view: View) -> bool:
+    """Tell whether a scene whose meshes are in clusters is drawn from these."""
+    scene = placed.scene
+    n_triangles = scene.n_triangles // len(scene)
+    return choices.pays_to_draw_instances(
+        view, n_triangles, lambda: survey_instances(placed), lambda: count_layers(scene, clip_from_world)
+    )
+
+
+def survey_instances(placed: PlacedScene) -> Survey:
+    """Return what becomes of the clusters of a scene, by some of its instances."""
+    some = range(0, len(placed.scene), -(-len(placed.scene) // SURVEYED_INSTANCES))
+    weights = [placed.scene[i].mesh.triangles.shape[0] for i in some]
+    surveys = [ClusteredScene(*placed.clustered(i)).survey(SURVEYED_OF_EACH) for i in some]
+    return Survey(*np.average(surveys, axis=0, weights=weights).tolist())
+
+
+def count_layers(scene: Scene, clip_from_world: NDArray[np.float64]) -> float:
+    """Return how many boxes of instances lie one behind the other, on the mean over the picture where there are any."""
+    boxes = {id(instance.mesh): instance.mesh.vertex_box for instance in scene}
+    lows, highs = np.array([boxes[id(instance.mesh)].reshape(2, 3) for instance in scene]).swapaxes(0, 1)
+    corners = np.where(CORNERS, highs[:, None], lows[:, None])
+    matrices = np.array([clip_from_world @ instance.transform for instance in scene])
+    clip = np.einsum("nij,nkj->nki", matrices[..., :3], corners) + matrices[:, None, :, 3]
+    clip = clip[(clip[..., 3] > 0).all(axis=1)]  # a box about the eye has no outline
+    cells = np.rint((clip[..., :2] / clip[..., 3:] + 1) * (0.5 * CELLS)).clip(0, CELLS).astype(np.intp)
+    (left, top), (right, bottom) = cells.min(axis=1).T, cells.max(axis=1).T
+    steps = np.zeros((CELLS + 1, CELLS + 1), np.intp)
+    for row, column, step in ((top, left, 1), (top, right, -1), (bottom, left, -1), (bottom, right, 1)):
+        np.add.at(steps, (row, column), step)
+    n_of_cell = steps.cumsum(axis=0).cumsum(axis=1)
+    return float(n_of_cell.sum() / max(1, np.count_nonzero(n_of_cell)))
 
 
 def draw_placed(

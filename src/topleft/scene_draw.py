@@ -23,7 +23,7 @@ from topleft.models import DepthTest, Sampling, Sink, parse
 from topleft.rasterize import canvas_of, refuse_many
 from topleft.sampling import sample_positions
 from topleft.scene import Scene
-from topleft.scene_clusters import draw_placed, front_to_back, wants_clusters
+from topleft.scene_clusters import draw_placed, front_to_back, pays_to_draw, wants_clusters
 from topleft.scene_fragments import SceneDepthLayers, SceneFragments
 from topleft.snapped import Snapped, snap_scene
 from topleft.threads import count_threads, run_parts
@@ -106,7 +106,8 @@ class PlacedScene:
         n_parts = count_threads(self._view.threads, self.scene.n_triangles)
         n_parts = min(height, max(n_parts, height * self._view.size[0] // MOST_PIXELS_OF_PART))
         can_cluster = self._may_cluster and choices.can_cluster(self._view, Sink(targets[0].sink))
-        if can_cluster and wants_clusters(self.scene):
+        seen = self._clip_from_world, self._view
+        if can_cluster and wants_clusters(self.scene) and pays_to_draw(self, *seen):
             order = front_to_back(self.scene, self._clip_from_world)
             if draw_placed(self, order, targets, positions, height, n_parts):
                 return

@@ -9,8 +9,9 @@ from __future__ import annotations
 import threading
 
 import numpy as np
+import numpy.typing as npt
 
-from topleft.collapse import STUCK, collapse, collapser
+from topleft.collapse import MOST_TO_COLLAPSE, STUCK, border_points, collapse, collapser
 from topleft.level_attributes import Corners, corners_of, level_mesh, next_corners
 from topleft.levels import Level, Levels, keep_levels, kept_levels
 from topleft.mesh import Mesh
@@ -25,6 +26,12 @@ MOST_TO_COMPARE = 300_000
 #: The finest level has about so many triangles at most. A blob of 300,000 is within half a pixel where it fills a frame
 #: of 7,000 pixels; finer levels would take most of the time and of the memory.
 MOST_OF_LEVEL = 1_000_000
+
+#: A level ends the levels, and is none of them, if it has 1/n of the triangles of the one before and more than n to
+#: this power times its bound: something is lost. Bounds go with the area of triangles on smooth surfaces, with n.
+MOST_POWER = 2.0
+
+I32 = npt.NDArray[np.int32]
 
 _lock = threading.RLock()
 
@@ -88,28 +95,47 @@ def levels_of(mesh: Mesh) -> Levels:
 
 
 def coarser_levels(mesh: Mesh, ratio: float, smallest: int) -> list[Level]:
-    """The levels below the mesh."""
+    """The levels below the mesh, as long as each is of use."""
     found: list[Level] = []
     corners = corners_of(mesh)
-    if len(corners.triangles) * ratio < smallest:
-        return found
-    center = corners.points.min(axis=0) / 2 + corners.points.max(axis=0) / 2
-    anchor = Surface.of_mesh(mesh.vertices, mesh.triangles, center)
+    center = corners.points.min(axis=0) / 2 + corners.points.max(axis=0) / 2 if len(corners.points) else np.zeros(3)
+    has_more = bool(corners.attributes) or corners.material is not None
+    anchor: Surface | None = None
     bound_of_anchor = 0.0
-    while len(corners.triangles) * ratio >= smallest:
-        n_wanted = min(int(len(corners.triangles) * ratio), MOST_OF_LEVEL)
-        has_more = bool(corners.attributes) or corners.material is not None
+    while n_wanted := wanted_of(corners.triangles, ratio, smallest):
+        if anchor is None:  # without attributes the corners are welded already
+            anchor = (
+                Surface.of_mesh(mesh.vertices, mesh.triangles, center)
+                if has_more
+                else Surface(corners.points - center, corners.triangles)
+            )
+        n_before = len(corners.triangles)
         collapsed = collapse(corners.points, corners.triangles, n_wanted, with_pairs=has_more)
-        if not len(collapsed.triangles) or len(collapsed.triangles) > STUCK * len(corners.triangles):
+        if not 0 < len(collapsed.triangles) <= STUCK * n_before:
             break
         corners = stored(next_corners(corners, collapsed), mesh)
         level = level_mesh(corners, mesh)
         surface = Surface.of_mesh(level.vertices, level.triangles, center)
         apart = measure(anchor, surface)
-        found.append(Level(level, bound_of_anchor + apart.bound, max(apart.known - bound_of_anchor, 0.0)))
+        bound = bound_of_anchor + apart.bound
+        if found and bound > (n_before / len(corners.triangles)) ** MOST_POWER * found[-1].bound:
+            break
+        found.append(Level(level, bound, max(apart.known - bound_of_anchor, 0.0)))
         if len(anchor.triangles) > MOST_TO_COMPARE:
-            anchor, bound_of_anchor = surface, found[-1].bound
+            anchor, bound_of_anchor = surface, bound
     return found
+
+
+def wanted_of(triangles: I32, ratio: float, smallest: int) -> int:
+    """How many triangles the next level is to have; 0: there is to be none.
+
+    Borders stay, and one of n sides needs about n triangles: the ratio is that of all others. Else a level would have
+    nothing but its borders. (Very large meshes are looked at when they have become smaller.)
+    """
+    n_fixed = len(border_points(triangles)) if len(triangles) <= MOST_TO_COLLAPSE else 0
+    n_free = int((len(triangles) - n_fixed) * ratio)
+    n_wanted = min(n_fixed + n_free, max(MOST_OF_LEVEL, n_fixed))
+    return n_wanted if smallest <= n_free and n_wanted <= STUCK * len(triangles) else 0
 
 
 def stored(corners: Corners, mesh: Mesh) -> Corners:

@@ -90,10 +90,15 @@ class Surface:
         return (key & np.uint64(2**31 - 1)).astype(np.int64)
 
     @cached_property
+    def in_order(self) -> I32:
+        """The triangles (T, 3) in their order."""
+        return self.triangles[self.order]
+
+    @cached_property
     def tree(self) -> _engine.Surface:
         """The triangles in their order, in boxes that are a little larger than they."""
         slack = float(np.abs(self.points).max()) * 2.0**-22
-        return _engine.Surface(self.points, np.ascontiguousarray(self.triangles[self.order]), slack)
+        return _engine.Surface(self.points, self.in_order, slack)
 
     def farthest(self, points: F64) -> float:
         """How far the farthest of points is from the surface."""
@@ -130,7 +135,7 @@ def reach(source: Surface, target: Surface, known: float, least: float) -> Reach
 
     def find(first: int, end: int) -> Reach:
         rows = [
-            tree.find_reach(source.points, source.triangles, *block, known, SHARE, least)
+            tree.find_reach(source.points, source.in_order, *block, known, SHARE, least)
             for block in blocks(first, end, n)
         ]
         return Reach(*(max(column) for column in zip(*rows, strict=True)))
