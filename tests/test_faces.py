@@ -168,12 +168,14 @@ def test_faces_without_area_have_no_weight(isa):
         assert not faces.face_normals(vertices, triangles).any()
 
 
-def test_sums_follow_the_order_of_the_faces():
-    # A wall of weight pi / 2 on one side, then its counterpart, then a thin one: what is left is the thin one's normal,
-    # which a sum in another order would round.
-    vertices = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 0, 2.0**-60]])
-    triangles = np.array([[0, 1, 2], [0, 2, 1], [0, 3, 1], [0, 3, 1]])
-    assert faces.angle_weighted_normals(vertices, triangles)[0].tolist() == [0, 1, 0]
+@pytest.mark.parametrize("threads", THREADS)
+def test_sums_follow_the_order_of_the_faces(threads):
+    # Front and back of a wide face, and a face so thin that its weight is lost when the front is added after it.
+    vertices = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 2.0**-60, 0]])
+    front, back, thin = [0, 1, 2], [0, 2, 1], [0, 1, 3]
+    for triangles, z in (([front, back, thin], 1), ([thin, front, back], 0), ([front, thin, back], 0)):
+        normals = faces.angle_weighted_normals(vertices, np.array(triangles), threads=threads)
+        assert normals[0].tolist() == [0, 0, z]
 
 
 @ON_EACH_ISA
