@@ -5,7 +5,8 @@ Spaces: world; eye (OpenGL: x right, y up, the view along -z).
 
 from __future__ import annotations
 
-from typing import Literal
+import math
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -20,17 +21,29 @@ FRAMING_MARGIN = 1.05
 """What fits fills 1 / 1.05 of the frame, so that no outline touches its border."""
 
 
+POINTS_AT_ONCE = 1 << 14
+"""Points whose distances are computed together: they stay in the second-level cache."""
+
+
 def points_to_frame(subject: MeshLike | npt.ArrayLike) -> F64:
-    """The points (N, 3) float64 of a subject that count: vertices that triangles use, or all points.
+    """The points (N, 3) float64 of a subject that count: vertices that triangles use, each once, or all points.
 
     Raises
     ------
     ValueError
         If there is no point, or one is not finite.
     """
+    return np.asarray(_own_points(subject), dtype=np.float64)
+
+
+def _own_points(subject: MeshLike | npt.ArrayLike) -> npt.NDArray[np.floating[Any]]:
+    """The same in the precision that they have."""
+    points: npt.NDArray[np.floating[Any]]
     if is_mesh_like(subject):
         mesh = as_mesh(subject)
-        points = np.asarray(mesh.vertices, dtype=np.float64)[mesh.triangles.ravel()]
+        is_used = np.zeros(len(mesh.vertices), dtype=bool)
+        is_used[mesh.triangles.ravel()] = True
+        points = mesh.vertices if is_used.all() else mesh.vertices[is_used]
     else:
         points = np.asarray(subject, dtype=np.float64)
     if points.ndim != 2 or points.shape[1] != 3:
@@ -50,9 +63,16 @@ def bounding_sphere(subject: MeshLike | npt.ArrayLike) -> tuple[F64, float]:
     ValueError
         If there is no point, or one is not finite.
     """
-    points = points_to_frame(subject)
-    center = points.min(axis=0) / 2 + points.max(axis=0) / 2
-    radius = float(np.sqrt(((points - center) ** 2).sum(axis=1).max()))
+    points = _own_points(subject)
+    # column by column: NumPy takes twenty times as long along rows of three
+    low, high = (np.array([end(points[:, axis]) for axis in range(3)], np.float64) for end in (np.min, np.max))
+    center = low / 2 + high / 2
+    farthest = 0.0
+    for first in range(0, len(points), POINTS_AT_ONCE):
+        own = points[first : first + POINTS_AT_ONCE].astype(np.float64)
+        x, y, z = ((own[:, axis] - center[axis]) ** 2 for axis in range(3))
+        farthest = max(farthest, float((x + y + z).max()))
+    radius = math.sqrt(farthest)
     return center, radius if radius > 0 else 1.0
 
 
