@@ -38,6 +38,8 @@
 #include "points.c"
 #include "shade_normals.c"
 #include "planes.c"
+#include "directions.c"
+#include "faces.c"
 #include "nearest.c"
 #include "reach.c"
 #include "mix.h"
@@ -87,6 +89,13 @@ const tl_kernels TL_KERNELS = {
     .mean_colors = mean_colors,
     .list_planes = list_planes,
     .fill_planes = fill_planes,
+    .vertex_normals = vertex_normals,
+    .face_normals = face_normals,
+    .find_turned = find_turned,
+    .box_of_faces = box_of_faces,
+    .unit_vectors = unit_vectors,
+    .move_points = move_points,
+    .color_rows = color_rows,
     .build_tree = build_tree,
     .find_nearest = nearest_of_points,
     .find_reach = find_reach,

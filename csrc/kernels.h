@@ -144,6 +144,32 @@ typedef struct tl_kernels {
     /* Per pixel of `ids` (rows of window->width): the value of its centre on the plane of the triangle, float32 or float64. */
     void (*fill_planes)(const tl_valued *mesh, const tl_window *window, const int32_t *ids, int is_f32, void *out);
 
+    /* Unit normals (n_vertices, 3) of the vertices [first, end): the faces round a vertex count by the angle there, in their order; 0 where
+     * nothing is left.  This one and the next three return -1, or a row with an index outside the vertices. */
+    int64_t (*vertex_normals)(const tl_source *source, const int32_t *triangles, int64_t n_triangles, int64_t first, int64_t end,
+                              double *out);
+
+    /* Unit normals of triangles [first, end), on the side that is counter-clockwise, 0 without an area: float64 (n_triangles, 3), or
+     * float32 (n_triangles, 4) and 1; the other is NULL. */
+    int64_t (*face_normals)(const tl_source *source, const int32_t *triangles, int64_t first, int64_t end, double *out, float *rows);
+
+    /* 1 for the triangles of [first, end) whose corners have normals, (n_vertices, 4), that point to the other side, else 0. */
+    int64_t (*find_turned)(const tl_source *source, const int32_t *triangles, int64_t first, int64_t end, const float *normals,
+                           uint8_t *is_turned);
+
+    /* Low and high of the corners of triangles [first, end): six numbers. */
+    int64_t (*box_of_faces)(const tl_source *source, const int32_t *triangles, int64_t first, int64_t end, double *box);
+
+    /* Vectors [first, end), times a matrix (3, 3) from the right unless that is NULL, scaled to length 1; 0 where they have none, or
+     * are not finite.  Out as for face_normals. */
+    void (*unit_vectors)(const tl_source *vectors, const double *turn, int64_t first, int64_t end, double *out, float *rows);
+
+    /* Points [first, end) by an affine matrix (3, 4), float64 (n, 3). */
+    void (*move_points)(const tl_source *points, const double *matrix, int64_t first, int64_t end, double *out);
+
+    /* The first three of n_channels of colours [first, end) as float32 (n, 4) and 1. */
+    void (*color_rows)(const uint8_t *colors, int n_channels, int64_t first, int64_t end, float *rows);
+
     /* The boxes of a surface, all but whose nodes are there. */
     void (*build_tree)(tl_surface *surface);
 

@@ -23,6 +23,7 @@
  *   v?_pick(p, i)           p[i] of TL_LANES numbers that lie together
  *   vi_prefix_count(bits)   how many of the bits [0, k] are set
  *   vi_spill(p, a)          a store of lanes that are then read one by one
+ *   vd_power(a, sum, mask)  the number whose bits are `sum` less the bits of a in `mask`
  *   vd_load_records(base, stride, i, c)    four doubles at base + 8 * stride * i[k], as columns
  *   vf_store_pairs, vf_store_triples    pixels of two or three numbers, one after the other
  *   vi_load_records(base, scale, i, c), vf_load_pairs    16 bytes at base + scale * i[k], 8 at base + 8 * i[k], as columns

@@ -16,6 +16,12 @@ TL_INLINE vi vi_lookup(const int32_t *table, vi i) { return _mm256_castps_si256(
 TL_INLINE vf vf_pick(const float *p, vi i) { return _mm256_permutevar8x32_ps(_mm256_loadu_ps(p), i); }
 TL_INLINE vd vd_load(const double *p) { return (vd){_mm256_loadu_pd(p), _mm256_loadu_pd(p + 4)}; }
 TL_INLINE vd vd_sqrt(vd a) { return (vd){_mm256_sqrt_pd(a.lo), _mm256_sqrt_pd(a.hi)}; }
+TL_INLINE __m256d bits_minus(__m256d a, uint64_t sum, uint64_t mask)
+{
+    const __m256i b = _mm256_and_si256(_mm256_castpd_si256(a), _mm256_set1_epi64x((long long)mask));
+    return _mm256_castsi256_pd(_mm256_sub_epi64(_mm256_set1_epi64x((long long)sum), b));
+}
+TL_INLINE vd vd_power(vd a, uint64_t sum, uint64_t mask) { return (vd){bits_minus(a.lo, sum, mask), bits_minus(a.hi, sum, mask)}; }
 TL_INLINE vd vd_pick(const double *p, vi i)
 {
     return (vd){_mm256_i32gather_pd(p, _mm256_castsi256_si128(i), 8), _mm256_i32gather_pd(p, _mm256_extracti128_si256(i, 1), 8)};

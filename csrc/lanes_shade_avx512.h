@@ -12,6 +12,12 @@ TL_INLINE vi vi_lookup(const int32_t *table, vi i) { return _mm512_permutexvar_e
 TL_INLINE vf vf_pick(const float *p, vi i) { return _mm512_permutexvar_ps(i, _mm512_loadu_ps(p)); }
 TL_INLINE vd vd_load(const double *p) { return (vd){_mm512_loadu_pd(p), _mm512_loadu_pd(p + 8)}; }
 TL_INLINE vd vd_sqrt(vd a) { return (vd){_mm512_sqrt_pd(a.lo), _mm512_sqrt_pd(a.hi)}; }
+TL_INLINE __m512d bits_minus(__m512d a, uint64_t sum, uint64_t mask)
+{
+    const __m512i b = _mm512_and_si512(_mm512_castpd_si512(a), _mm512_set1_epi64((long long)mask));
+    return _mm512_castsi512_pd(_mm512_sub_epi64(_mm512_set1_epi64((long long)sum), b));
+}
+TL_INLINE vd vd_power(vd a, uint64_t sum, uint64_t mask) { return (vd){bits_minus(a.lo, sum, mask), bits_minus(a.hi, sum, mask)}; }
 TL_INLINE vd vd_pick(const double *p, vi i)
 {
     const __m512d low = _mm512_loadu_pd(p), high = _mm512_loadu_pd(p + 8);

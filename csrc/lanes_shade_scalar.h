@@ -12,6 +12,7 @@ TL_INLINE vi vi_lookup(const int32_t *table, vi i) { return table[i & 15]; }
 TL_INLINE vf vf_pick(const float *p, vi i) { (void)i; return *p; }
 TL_INLINE vd vd_load(const double *p) { return *p; }
 TL_INLINE vd vd_sqrt(vd a) { return sqrt(a); }
+TL_INLINE vd vd_power(vd a, uint64_t sum, uint64_t mask) { uint64_t b; memcpy(&b, &a, 8); b = sum - (b & mask); memcpy(&a, &b, 8); return a; }
 TL_INLINE vd vd_pick(const double *p, vi i) { (void)i; return *p; }
 TL_INLINE vi vi_pick(const int32_t *p, vi i) { (void)i; return *p; }
 TL_INLINE vi vi_prefix_count(unsigned bits) { return (vi)(bits & 1); }

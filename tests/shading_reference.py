@@ -5,7 +5,7 @@ Shares no code with them but the snap and the halvings of textures. All vertices
 
 import numpy as np
 
-from topleft.mesh import face_normals, unit_or_zero
+from topleft.faces import face_normals, unit_or_zero
 from topleft.texture import halved, light_of_image
 
 TO_HEADLIGHT = np.array([-0.35, 0.45, 1.0]) / np.linalg.norm([-0.35, 0.45, 1.0])

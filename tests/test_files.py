@@ -10,8 +10,9 @@ import pytest
 
 from topleft import files, scenes
 from topleft.errors import MeshError, MissingPackageError
+from topleft.faces import face_normals
 from topleft.images import save_image
-from topleft.mesh import Mesh, face_normals
+from topleft.mesh import Mesh
 
 trimesh = pytest.importorskip("trimesh")
 

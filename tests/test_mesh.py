@@ -7,7 +7,8 @@ import pytest
 
 from topleft import mesh as mesh_module
 from topleft import scenes
-from topleft.mesh import Mesh, angle_weighted_normals, coincident, face_normals
+from topleft.faces import angle_weighted_normals, face_normals
+from topleft.mesh import Mesh, coincident
 
 TRIANGLE = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
 

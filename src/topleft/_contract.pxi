@@ -291,6 +291,13 @@ cdef extern from "topleft.h" nogil:
         void (*fill_planes)(const tl_valued *, const tl_window *, const int32_t *, int, void *) noexcept nogil
         void (*mean_flat)(const int32_t *, int, int64_t, int64_t, const void *, int, int, const tl_transfer *, void *) noexcept nogil
         void (*mean_colors)(const void *, int, int64_t, int64_t, int, int, const tl_transfer *, void *) noexcept nogil
+        int64_t (*vertex_normals)(const tl_source *, const int32_t *, int64_t, int64_t, int64_t, double *) noexcept nogil
+        int64_t (*face_normals)(const tl_source *, const int32_t *, int64_t, int64_t, double *, float *) noexcept nogil
+        int64_t (*find_turned)(const tl_source *, const int32_t *, int64_t, int64_t, const float *, uint8_t *) noexcept nogil
+        int64_t (*box_of_faces)(const tl_source *, const int32_t *, int64_t, int64_t, double *) noexcept nogil
+        void (*unit_vectors)(const tl_source *, const double *, int64_t, int64_t, double *, float *) noexcept nogil
+        void (*move_points)(const tl_source *, const double *, int64_t, int64_t, double *) noexcept nogil
+        void (*color_rows)(const uint8_t *, int, int64_t, int64_t, float *) noexcept nogil
         void (*build_tree)(tl_surface *) noexcept nogil
         double (*find_nearest)(const tl_surface *, const double *, int64_t, int64_t, int32_t *, double *) noexcept nogil
         void (*find_reach)(const tl_surface *, const double *, const int32_t *, int64_t, int64_t, double, double, tl_reach *) noexcept nogil

@@ -476,3 +476,38 @@ def set_feet(
     at: NDArray[np.float64],
     squared: NDArray[np.float64],
 ) -> None: ...
+
+def vertex_normals(
+    source: Source, triangles: NDArray[np.int32], first: int, end: int, out: NDArray[np.float64]
+) -> int: ...
+def face_normals(
+    source: Source,
+    triangles: NDArray[np.int32],
+    first: int,
+    end: int,
+    out: NDArray[np.float64] | None,
+    rows: NDArray[np.float32] | None,
+) -> int: ...
+def find_turned(
+    source: Source,
+    triangles: NDArray[np.int32],
+    first: int,
+    end: int,
+    normals: NDArray[np.float32],
+    is_turned: NDArray[np.uint8],
+) -> int: ...
+def box_of_faces(
+    source: Source, triangles: NDArray[np.int32], first: int, end: int, box: NDArray[np.float64]
+) -> int: ...
+def unit_vectors(
+    vectors: Source,
+    turn: NDArray[np.float64] | None,
+    first: int,
+    end: int,
+    out: NDArray[np.float64] | None,
+    rows: NDArray[np.float32] | None,
+) -> None: ...
+def move_points(
+    points: Source, matrix: NDArray[np.float64], first: int, end: int, out: NDArray[np.float64]
+) -> None: ...
+def color_rows(colors: NDArray[np.uint8], first: int, end: int, rows: NDArray[np.float32]) -> None: ...

@@ -16,9 +16,10 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft.errors import MeshError, MissingPackageError
+from topleft.faces import angle_weighted_normals
 from topleft.imported import material_of, obj_by_material
 from topleft.material import Material
-from topleft.mesh import Mesh, angle_weighted_normals, coincident
+from topleft.mesh import Mesh, coincident
 
 
 def load(path: str | os.PathLike[str]) -> Mesh:

@@ -87,3 +87,18 @@ def determinant(rows: list[list[float]]) -> float:
     """Of a matrix (3, 3): NumPy's takes ten times as long for one."""
     (a, b, c), (d, e, f), (g, h, i) = rows
     return a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
+
+
+def turn_of_normals(view: F64) -> F64:
+    """The matrix (3, 3) that takes rows of normals to eye space, but for their lengths: the inverse of that of points.
+
+    Its numbers are sums of products, the same on every machine.
+    """
+    rows = view[:3, :3].tolist()
+    (a, b, c), (d, e, f), (g, h, i) = rows
+    adjugate = [
+        [e * i - f * h, c * h - b * i, b * f - c * e],
+        [f * g - d * i, a * i - c * g, c * d - a * f],
+        [d * h - e * g, b * g - a * h, a * e - b * d],
+    ]
+    return np.array(adjugate) * math.copysign(1.0, determinant(rows))

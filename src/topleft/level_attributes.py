@@ -15,7 +15,8 @@ import numpy.typing as npt
 
 from topleft import _engine
 from topleft.collapse import Collapsed
-from topleft.mesh import FloatArray, Mesh, coincident, unit_or_zero
+from topleft.faces import unit_or_zero
+from topleft.mesh import FloatArray, Mesh, coincident
 from topleft.surface_distance import welded
 
 F64 = npt.NDArray[np.float64]

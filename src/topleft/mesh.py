@@ -1,9 +1,6 @@
 """A triangle mesh as arrays: positions, indices, and what else is known of its surface; checked once, here.
 
 Input: anything NumPy can read. Output: a `Mesh` whose arrays the other stages use as they are.
-
-Based on: Thurmer, G., and C. A. Wuthrich, "Computing Vertex Normals from Polygonal Facets", Journal of Graphics
-Tools 3(1), 1998 (normals weighted by the angle at the vertex).
 """
 
 from __future__ import annotations
@@ -18,6 +15,7 @@ import numpy.typing as npt
 
 from topleft.arrays import as_array, as_checked_triangles
 from topleft.clusters import Clusters, box_of
+from topleft.faces import angle_weighted_normals, box_of_triangles
 from topleft.material import Material
 
 FloatArray = npt.NDArray[np.floating[Any]]
@@ -114,8 +112,7 @@ class Mesh:
         """
         if not len(self.triangles):
             raise ValueError("a mesh without triangles has no bounds")
-        used = self.vertices[self.triangles.ravel()]
-        return np.stack([used.min(axis=0), used.max(axis=0)]).astype(np.float64)
+        return box_of_triangles(self.vertices, self.triangles)
 
     def vertex_normals(self) -> FloatArray:
         """Normals (V, 3): those of the mesh where it has them, else angle-weighted ones, float64.
@@ -161,58 +158,6 @@ class Mesh:
     def __getstate__(self) -> dict[str, Any]:
         """What another process needs: what is computed from it is computed there."""
         return {field.name: self.__dict__[field.name] for field in fields(self)}
-
-
-def angle_weighted_normals(vertices: FloatArray, triangles: I32) -> F64:
-    """Unit normals (V, 3) float64 of a mesh: the faces round a vertex count by the angle they have there.
-
-    Parameters
-    ----------
-    vertices : (V, 3) float
-    triangles : (T, 3) int32, counter-clockwise seen from outside
-
-    Returns
-    -------
-    (V, 3) float64
-        (0, 0, 0) where no face with an area meets the vertex, or where the faces cancel.
-
-    Notes
-    -----
-    The weight makes the normal independent of how a flat face is cut into triangles, which weights of one a
-    triangle, or of its area, do not.
-
-    References
-    ----------
-    G. Thurmer and C. A. Wuthrich, "Computing Vertex Normals from Polygonal Facets", Journal of Graphics Tools 3(1),
-    1998.
-    """
-    a, b, c = _corners(vertices, triangles)
-    ab, bc, ca = b - a, c - b, a - c
-    area_vectors = np.cross(ca, ab)
-    twice_area = np.sqrt(np.einsum("ij,ij->i", area_vectors, area_vectors))
-    faces = np.ascontiguousarray(unit_or_zero(area_vectors).T)
-    total = np.zeros((3, len(vertices)))
-    for corner, (back, onward) in enumerate([(ca, ab), (ab, bc), (bc, ca)]):
-        # atan2 keeps its accuracy for needles, where the arc cosine of a rounded quotient loses it.
-        angle = np.arctan2(twice_area, -np.einsum("ij,ij->i", back, onward))
-        for axis in range(3):
-            total[axis] += np.bincount(triangles[:, corner], angle * faces[axis], minlength=len(vertices))
-    return unit_or_zero(total.T)
-
-
-def face_normals(vertices: FloatArray, triangles: I32) -> F64:
-    """Unit normals (T, 3) float64 of the triangles, on the side from which they run counter-clockwise.
-
-    (0, 0, 0) for a triangle without area.
-    """
-    a, b, c = _corners(vertices, triangles)
-    return unit_or_zero(np.cross(b - a, c - a))
-
-
-def unit_or_zero(vectors: F64) -> F64:
-    """Vectors (N, 3) scaled to length 1; zero stays zero."""
-    length = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))[:, None]
-    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
 
 
 def coincident(*attributes: npt.NDArray[Any]) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
@@ -268,12 +213,6 @@ def _differ(columns: list[npt.NDArray[Any]], order: npt.NDArray[np.intp]) -> npt
         ordered = column[order]
         starts[1:] |= ordered[1:] != ordered[:-1]
     return starts
-
-
-def _corners(vertices: FloatArray, triangles: I32) -> tuple[F64, F64, F64]:
-    """Positions (T, 3) of the first, second and third corner of the triangles."""
-    points = np.asarray(vertices, dtype=np.float64)
-    return points[triangles[:, 0]], points[triangles[:, 1]], points[triangles[:, 2]]
 
 
 def _real_array(values: npt.ArrayLike, name: str) -> FloatArray:

@@ -6,17 +6,17 @@ Input: `Mesh`. Output: `Surface`, rows of four float32 each, in the space of the
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
 import numpy.typing as npt
 
-from topleft.mesh import Mesh, face_normals, unit_or_zero
+from topleft.faces import box_of_triangles, color_rows, face_normal_rows, moved, turned_faces, unit_rows
+from topleft.frame import turn_of_normals
+from topleft.mesh import Mesh
 
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
-FloatArray = npt.NDArray[np.floating[Any]]
 
 
 class Surface:
@@ -36,38 +36,34 @@ class Surface:
         self._vertex_normals = mesh.vertex_normals
         self._colors = mesh.colors
         self._view = view
-        self.positions = mesh.vertices if view is None else mesh.vertices @ view[:3, :3].T + view[:3, 3]
+        self.positions = mesh.vertices if view is None else moved(mesh.vertices, view)
 
     @cached_property
     def center(self) -> F64:
         """The middle of the box round the vertices in use."""
-        used = self.positions[self._triangles.ravel()]
-        return (used.min(axis=0) / 2 + used.max(axis=0) / 2).astype(np.float64)
+        low, high = box_of_triangles(self.positions, self._triangles).astype(self.positions.dtype)
+        return np.asarray(low / 2 + high / 2, np.float64)
 
     @cached_property
     def normals(self) -> F32:
         """(V, 4): unit normals, 0 where there is none, and 1."""
-        normals = np.asarray(self._vertex_normals(), dtype=np.float64)
-        if self._view is not None:
-            normals = normals @ np.linalg.inv(self._view[:3, :3])
-        return _fours(unit_or_zero(normals))
+        return unit_rows(self._vertex_normals(), None if self._view is None else turn_of_normals(self._view))
 
     @cached_property
     def face_normals(self) -> F32:
         """(T, 4): unit normals of the triangles, on the side from which they run counter-clockwise, and 1."""
-        return _fours(face_normals(self.positions, self._triangles))
+        return face_normal_rows(self.positions, self._triangles)
 
     @cached_property
     def is_turned(self) -> npt.NDArray[np.uint8] | None:
         """(T,): 1 where the normals of the corners point to the other side than the triangle; None if none does."""
-        corners = self.normals[:, :3][self._triangles].sum(axis=1)
-        turned = np.einsum("ij,ij->i", corners, self.face_normals[:, :3]) < 0
-        return turned.astype(np.uint8) if turned.any() else None
+        turned = turned_faces(self.positions, self._triangles, self.normals)
+        return turned if turned.view(np.bool_).any() else None
 
     @cached_property
     def colors(self) -> F32 | None:
         """(V, 4): sRGB of the vertices, 0 to 255, and 1; None if they have none."""
-        return None if self._colors is None else _fours(self._colors[:, :3])
+        return None if self._colors is None else color_rows(self._colors)
 
 
 _surfaces: WeakKeyDictionary[Mesh, Surface] = WeakKeyDictionary()
@@ -79,9 +75,3 @@ def surface_of(mesh: Mesh) -> Surface:
     if surface is None:
         surface = _surfaces[mesh] = Surface(mesh)
     return surface
-
-
-def _fours(rows: npt.NDArray[Any]) -> F32:
-    fours = np.ones((len(rows), 4), dtype=np.float32)
-    fours[:, :3] = rows
-    return fours
