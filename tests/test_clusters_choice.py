@@ -6,7 +6,7 @@ import pytest
 import topleft as tl
 from topleft import choices, scene_clusters
 from topleft.clustered import ClusteredScene
-from topleft.clusters import Clusters, Survey
+from topleft.clusters import Clusters, Patience, Survey
 from topleft.scene_clusters import count_layers, survey_instances
 from topleft.scene_draw import PlacedScene
 from topleft.view import View
@@ -132,3 +132,22 @@ def test_scene_asks_before_it_draws_clusters(monkeypatch):
         monkeypatch.setattr(choices, "MIN_LAYERS_TO_CLUSTER", layers)
         tl.rasterize_mesh(scene, camera, SIZE, cull="back", threads=1)
         assert len(drawn) == n_drawn
+
+
+def test_patience_doubles_and_ends_when_clusters_pay():
+    patience, asked = Patience(), []
+    for i in range(40):
+        if patience.is_over():
+            asked.append(i)
+            patience.note(pays=i > 20)
+    assert asked == [0, 3, 8, 17, 26, *range(27, 40)]
+
+
+def test_mesh_drawn_whole_is_not_surveyed_for_each_picture(monkeypatch):
+    mesh = tl.Mesh(*tl.scenes.blob(choices.MIN_TRIANGLES_TO_CLUSTER + 1000))
+    surveyed = []
+    monkeypatch.setattr(choices, "pays_to_draw_clusters", lambda *_: surveyed.append(1) is not None)
+    expected = tl.rasterize_mesh(mesh, size=SIZE).triangle
+    for _ in range(9):
+        assert (tl.rasterize_mesh(mesh, size=SIZE).triangle == expected).all()
+    assert len(surveyed) == 3

@@ -33,7 +33,6 @@ __all__ = [
     "is_affine",
     "is_direct",
     "is_shared",
-    "least_outside",
     "must_cut",
     "pays_to_cluster",
     "pays_to_draw_clusters",
@@ -202,13 +201,9 @@ def pays_to_cluster(n_triangles: int, n_drawn: int, n_instances: int = 1) -> boo
 def pays_to_draw_clusters(view: View, n_triangles: int, survey: Callable[[], Survey]) -> bool:
     """Tell whether a view of a mesh in clusters is drawn from these; `survey`: what becomes of them in it."""
     seen = survey()
-    return seen.front <= MAX_FRONT_TO_CLUSTER and seen.outside >= least_outside(view, n_triangles)
-
-
-def least_outside(view: View, n_triangles: int) -> float:
-    """Return the share of the clusters of a mesh that must lie outside for its clusters to pay."""
     is_culled = view.cull != CULL_CODES[Cull.NONE]
-    return next(shares[is_culled] for below, *shares in MIN_OUTSIDE_TO_CLUSTER if n_triangles < below)
+    least = next(shares[is_culled] for below, *shares in MIN_OUTSIDE_TO_CLUSTER if n_triangles < below)
+    return seen.front <= MAX_FRONT_TO_CLUSTER and seen.outside >= least
 
 
 def pays_to_draw_instances(

@@ -5,8 +5,7 @@ In: the vertices and triangles of a mesh in object space, then a view of it. Out
 
 from __future__ import annotations
 
-from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,10 +13,7 @@ from numpy.typing import NDArray
 from topleft import _engine
 from topleft.threads import count_threads, run_parts
 
-if TYPE_CHECKING:
-    from topleft.view import View
-
-__all__ = ["Clusters", "Survey"]
+__all__ = ["Clusters", "Patience", "Survey"]
 
 #: A bound of the error of the vertex stage as a share of the terms that it adds up: four roundings, and the same again
 #: for how the bounds themselves are computed, in float64; twice that.
@@ -38,6 +34,27 @@ class Survey(NamedTuple):
     front: float
 
 
+class Patience:
+    """How long to go on drawing a mesh whole before its clusters are asked again whether they pay.
+
+    After a picture for which they did not, that is not found out for the next two, then four, then eight pictures:
+    cameras move little between pictures, and finding out takes 5 % of a small one.
+    """
+
+    def __init__(self) -> None:
+        self._n_left = self._n_refused = 0
+
+    def is_over(self) -> bool:
+        """Tell whether to find out, for one picture more."""
+        self._n_left -= 1
+        return self._n_left < 0
+
+    def note(self, *, pays: bool) -> None:
+        """Note what was found out."""
+        self._n_refused = 0 if pays else min(3, self._n_refused + 1)
+        self._n_left = 2**self._n_refused if self._n_refused else 0
+
+
 class Clusters:
     """A mesh in object space, and a copy of it in clusters: few triangles that are neighbours, measured together.
 
@@ -53,7 +70,7 @@ class Clusters:
 
     def __init__(self, points: NDArray[Any], corners: NDArray[np.int32], threads: int | None = None) -> None:
         """Sort and measure (V, 3) contiguous points and (T, 3) checked corners."""
-        self.points, self.corners = points, corners
+        self.points, self.corners, self.patience = points, corners, Patience()
         n_triangles = len(corners)
         order: NDArray[np.int32] = np.empty(n_triangles, np.int32)
         keys: NDArray[np.uint32] = np.empty(n_triangles, np.uint32)
@@ -91,23 +108,6 @@ class Clusters:
     def n_triangles(self) -> int:
         """How many triangles the mesh has."""
         return len(self.corners)
-
-    @cached_property
-    def _box_corners(self) -> NDArray[np.float64]:
-        """The corners of the box round all finite vertices, homogeneous: (8, 4)."""
-        box = box_of(self.points)
-        ends = np.array([[k >> axis & 1 for axis in range(3)] for k in range(8)], np.bool_)
-        return np.concatenate([np.where(ends, box[3:], box[:3]), np.ones((8, 1))], axis=1)
-
-    def lie_inside(self, view: View) -> bool:
-        """Tell whether all of the mesh is about inside of the view's window: sooner than a survey does."""
-        x, y, _, w = np.asarray(view.transform, np.float64) @ self._box_corners.T
-        if not w.min() > 0:
-            return False
-        (width, height), (left, top) = view.viewport, view.origin
-        columns, rows = (x / w + 1) * (width / 2) - left, (1 - y / w) * (height / 2) - top
-        is_inside = columns.min() >= 0 and columns.max() <= view.size[0] and rows.min() >= 0
-        return bool(is_inside and rows.max() <= view.size[1])
 
     def seen_in(
         self, matrix: NDArray[np.float64], scene: _engine.Scene, first: int, end: int, width: int, *, is_farthest: bool

@@ -307,10 +307,12 @@ def draw_clustered_fragments(
 
     None where drawing them does not pay, or where only that can tell what is wrong.
     """
-    if choices.least_outside(view, clusters.n_triangles) and clusters.lie_inside(view):
+    if not clusters.patience.is_over():
         return None
     seen = ClusteredScene(clusters, view)
-    if not choices.pays_to_draw_clusters(view, clusters.n_triangles, seen.survey):
+    pays = choices.pays_to_draw_clusters(view, clusters.n_triangles, seen.survey)
+    clusters.patience.note(pays=pays)
+    if not pays:
         return None
     shape = view.size[::-1]
     with (

@@ -8,11 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
 from topleft.arrays import INT32_MAX
+from topleft.clusters import Patience
 from topleft.mesh import Mesh
 
 __all__ = ["Instance", "Scene"]
@@ -116,6 +118,11 @@ class Scene:
         n, n_meshes = len(self), len({id(instance.mesh) for instance in self})
         many, kinds = "s" * (n > 1), "es" * (n_meshes > 1)
         return f"Scene({n} instance{many} of {n_meshes} mesh{kinds}, {self.n_triangles} triangles)"
+
+    @cached_property
+    def patience(self) -> Patience:
+        """How long to go on drawing the meshes whole."""
+        return Patience()
 
     @property
     def n_triangles(self) -> int:

@@ -56,10 +56,14 @@ def front_to_back(scene: Scene, clip_from_world: NDArray[np.float64]) -> NDArray
 def pays_to_draw(placed: PlacedScene, clip_from_world: NDArray[np.float64], view: View) -> bool:
     """Tell whether a scene whose meshes are in clusters is drawn from these."""
     scene = placed.scene
+    if not scene.patience.is_over():
+        return False
     n_triangles = scene.n_triangles // len(scene)
-    return choices.pays_to_draw_instances(
+    pays = choices.pays_to_draw_instances(
         view, n_triangles, lambda: survey_instances(placed), lambda: count_layers(scene, clip_from_world)
     )
+    scene.patience.note(pays=pays)
+    return pays
 
 
 def survey_instances(placed: PlacedScene) -> Survey:
