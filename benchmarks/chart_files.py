@@ -1,9 +1,10 @@
-"""All charts of an accuracy record, as files or as text for a report. Needs matplotlib."""
+"""Charts as files or as text for a report, and those of an accuracy record. Needs matplotlib."""
 
 from __future__ import annotations
 
 import io
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -26,20 +27,29 @@ CHARTS: Mapping[str, Callable[[dict[str, Any]], Figure]] = {
 
 def draw_charts(record: dict[str, Any], folder: Path) -> list[Path]:
     """Write the charts as PNG and SVG, return where they are."""
+    return [path for name, make in CHARTS.items() for path in write_chart(partial(make, record), folder, name)]
+
+
+def write_chart(make: Callable[[], Figure], folder: Path, name: str) -> list[Path]:
+    """Write a chart as PNG and SVG, return where they are."""
     folder.mkdir(parents=True, exist_ok=True)
     paths = []
-    for name in CHARTS:
-        for suffix, data in chart_bytes(record, name, ("png", "svg")).items():
-            paths.append(folder / f"{name}.{suffix}")
-            paths[-1].write_bytes(data)
+    for suffix, data in figure_bytes(make, ("png", "svg")).items():
+        paths.append(folder / f"{name}.{suffix}")
+        paths[-1].write_bytes(data)
     return paths
 
 
 def chart_bytes(record: dict[str, Any], name: str, suffixes: Sequence[str]) -> dict[str, bytes]:
+    """Return a chart of an accuracy record as PNG or SVG."""
+    return figure_bytes(partial(CHARTS[name], record), suffixes)
+
+
+def figure_bytes(make: Callable[[], Figure], suffixes: Sequence[str]) -> dict[str, bytes]:
     """Return a chart as PNG or SVG; the same record gives the same bytes."""
     found = {}
     with plt.rc_context(STYLE):
-        figure = CHARTS[name](record)
+        figure = make()
         for suffix in suffixes:
             target = io.BytesIO()
             metadata = {"Date": None} if suffix == "svg" else {}

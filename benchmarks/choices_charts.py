@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,7 @@ import numpy as np
 from matplotlib import pyplot as plt
 from matplotlib.figure import Figure
 
-from benchmarks.charts import STYLE
+from benchmarks.chart_files import write_chart
 from benchmarks.choices_tables import FAR, NEAR, by_choice, mean
 
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#999999", "#8A1C1C", "#7A6A00")
@@ -18,15 +19,7 @@ MARKERS = "osD^vPX<>h"
 
 def draw_charts(record: dict[str, Any], folder: Path) -> list[Path]:
     """Write the chart as PNG and SVG, return where they are."""
-    folder.mkdir(parents=True, exist_ok=True)
-    paths = []
-    with plt.rc_context(STYLE):
-        figure = chart_choices(record)
-        for suffix in ("png", "svg"):
-            paths.append(folder / f"choices.{suffix}")
-            figure.savefig(paths[-1], dpi=160, metadata={"Date": None} if suffix == "svg" else {})
-        plt.close(figure)
-    return paths
+    return write_chart(partial(chart_choices, record), folder, "choices")
 
 
 def chart_choices(record: dict[str, Any]) -> Figure:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,7 @@ from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from benchmarks.charts import STYLE
+from benchmarks.chart_files import write_chart
 from benchmarks.static_tables import faster, label_of
 
 LOOKS = (("#000000", "o"), ("#0072B2", "s"), ("#009E73", "D"), ("#D55E00", "^"), ("#CC79A7", "v"))
@@ -28,15 +29,7 @@ TICKS = (0.5, 1, 2, 5, 10, 20, 50, 100, 200)
 
 def draw_charts(record: dict[str, Any], folder: Path) -> list[Path]:
     """Write the chart as PNG and SVG, return where they are."""
-    folder.mkdir(parents=True, exist_ok=True)
-    paths = []
-    with plt.rc_context(STYLE):
-        figure = chart_static(record)
-        for suffix in ("png", "svg"):
-            paths.append(folder / f"static.{suffix}")
-            figure.savefig(paths[-1], dpi=160, metadata={"Date": None} if suffix == "svg" else {})
-        plt.close(figure)
-    return paths
+    return write_chart(partial(chart_static, record), folder, "static")
 
 
 def chart_static(record: dict[str, Any]) -> Figure:
