@@ -257,6 +257,8 @@ static void sort_by_depth(const tl_clustered *mesh, const tl_cluster_view *v, co
     }
 }
 
+/* Lists the clusters that may draw something, about in the order of depth, those that are seen from behind last; with a target of
+ * depths, without groups of them that what it shows hides.  `room` has 8 bytes for each cluster.  Returns how many. */
 static int64_t cull_clusters(const tl_clustered *mesh, const tl_cluster_view *v, const tl_window *window, const tl_target *target,
                              int32_t *list, void *room)
 {

@@ -74,7 +74,6 @@ const tl_kernels TL_KERNELS = {
     .sort_keys = sort_keys,
     .cut_clusters = cut_clusters,
     .measure_clusters = measure_clusters,
-    .cull_clusters = cull_clusters,
     .survey_clusters = survey_clusters,
     .list_edges = list_edges,
     .draw_lines = draw_lines,

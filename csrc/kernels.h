@@ -34,11 +34,6 @@ typedef struct tl_kernels {
     void (*measure_clusters)(const tl_source *source, const uint8_t *corners, int64_t first, int64_t end, tl_cluster *clusters,
                              double *group_boxes);
 
-    /* Lists the clusters that may draw something, about in the order of depth, those that are seen from behind last; with a target
-     * of depths, without groups of them that what it shows hides.  `room` has 8 bytes for each cluster.  Returns how many. */
-    int64_t (*cull_clusters)(const tl_clustered *mesh, const tl_cluster_view *view, const tl_window *window, const tl_target *target,
-                             int32_t *list, void *room);
-
     /* Counts some clusters, one of each `step`, by what a view does with them, whatever hides them: outside of the window, turned
      * away and culled, showing their backs, the others. */
     void (*survey_clusters)(const tl_clustered *mesh, const tl_cluster_view *view, int64_t step, int64_t n_of[TL_N_FATES]);

@@ -128,30 +128,12 @@ cdef class Clustered:
     def __len__(self):
         return self.mesh.n_clusters
 
-    def cull(self, ClusterView view, int32_t[::1] listed, uint64_t[::1] room):
-        """List the clusters that may draw something, in the order in which they are drawn; returns how many.
-
-        `listed` and `room` have a number for each cluster.
-        """
-        cdef int64_t n = 0
-        if self.mesh.n_clusters:
-            with nogil:
-                n = K.cull_clusters(&self.mesh, &view.view, NULL, NULL, &listed[0], &room[0])
-        return n
-
     def survey(self, ClusterView view, int64_t step, int64_t[::1] n_of):
         """Count one cluster of each `step`: those outside, turned away and culled, showing their backs, and the others."""
         if n_of.shape[0] != TL_N_FATES:
             raise ValueError("n_of must have a number for each fate")
         with nogil:
             K.survey_clusters(&self.mesh, &view.view, step, &n_of[0])
-
-    def count_triangles(self, const int32_t[::1] listed):
-        """Return how many triangles some clusters have."""
-        cdef int64_t i, n = 0
-        for i in range(listed.shape[0]):
-            n += self.mesh.clusters[listed[i]].n_triangles
-        return n
 
     def draw(self, Scene scene, Source source, ClusterView seen, bint may_be_hidden, Target target, int64_t first_row, int64_t n_rows,
              int32_t[::1] room, int32_t[::1] others, bint is_first, bint is_last):

@@ -116,11 +116,6 @@ class Clusters:
         error = STAGE_ERROR[self.points.dtype]
         return _engine.ClusterView(matrix, scene, first, end - first, width, MARGIN_PX, error, is_farthest)
 
-    def survivors(self, seen: _engine.ClusterView) -> NDArray[np.int32]:
-        """Return the clusters that may draw a pixel, in the order in which they are drawn."""
-        listed: NDArray[np.int32] = np.empty(len(self), np.int32)
-        return listed[: self.engine.cull(seen, listed, np.empty(len(self), np.uint64))]
-
     def survey(self, seen: _engine.ClusterView, n_most: int) -> Survey:
         """Return what becomes of some clusters, about `n_most`, evenly spread over the mesh."""
         n_of: NDArray[np.int64] = np.zeros(4, np.int64)
