@@ -46,8 +46,8 @@ TL_INLINE vf mix_whole_f32(vf d, vf s, const f32_alphas *a, tl_mix mode)
     }
 }
 
-/* The same as mix_whole_f32 where c = 1. */
-TL_INLINE vf mix_part_f32(vf d, vf s, vf c, const f32_alphas *a, tl_mix mode)
+/* 0 < c < 1. */
+TL_INLINE vf mix_partial_f32(vf d, vf s, vf c, const f32_alphas *a, tl_mix mode)
 {
     const vf one = vf_set1(1.0f);
     if (mode == TL_MIX_OVER_PREMULTIPLIED)
@@ -55,9 +55,18 @@ TL_INLINE vf mix_part_f32(vf d, vf s, vf c, const f32_alphas *a, tl_mix mode)
     if (mode == TL_MIX_OVER_STRAIGHT || mode == TL_MIX_REPLACE_STRAIGHT) {
         const vf above = vf_mul(a->s_alpha, c), gone = mode == TL_MIX_OVER_STRAIGHT ? above : c;
         const vf mean = weigh_f32(d, s, above, vf_mul(a->d_alpha, vf_sub(one, gone)), a->is_alpha);
-        return mode == TL_MIX_OVER_STRAIGHT ? mean : vf_select(vf_eq(c, one), s, mean);
+        return mean;
     }
     return vf_add(vf_mul(mix_whole_f32(d, s, a, mode), c), vf_mul(d, vf_sub(one, c)));
+}
+
+/* 0 < c <= 1.  A pixel that is covered whole takes the formula without c: with c = 1 an infinity or the sign of a zero would
+ * come out otherwise, and which pixels share a vector must not matter. */
+TL_INLINE vf mix_part_f32(vf d, vf s, vf c, const f32_alphas *a, tl_mix mode)
+{
+    const vm whole = vf_eq(c, vf_set1(1.0f));
+    const vf part = mix_partial_f32(d, s, c, a, mode);
+    return vm_any(whole) ? vf_select(whole, mix_whole_f32(d, s, a, mode), part) : part;
 }
 
 /* Channels i to i + TL_LANES of a run that begins at `p`; c: their coverage, or NULL where it is 1. */

@@ -128,10 +128,11 @@ TL_INLINE vi mix_part_u8(vi d, vi s, vi area, vm m, tl_mix mode)
     if (mode == TL_MIX_OVER_STRAIGHT || mode == TL_MIX_REPLACE_STRAIGHT) {
         const vi weight = weight_15(coverage, alpha);
         const vm under = translucent(d), either = mode == TL_MIX_OVER_STRAIGHT ? under : vm_or(under, translucent(s));
+        const vi moved = move_bytes(d, vi_or(s, opaque), weight);
         if (__builtin_expect(!vm_any(vm_and(m, either)), 1))
-            return move_bytes(d, vi_or(s, opaque), weight);
+            return moved;
         const vi fine = vi_mul(weight, vi_set1(255)), gone = mode == TL_MIX_OVER_STRAIGHT ? fine : vi_mul(coverage, vi_set1(255));
-        return cover_translucent(d, s, fine, vi_sub(vi_set1(255 << 15), gone));
+        return vi_select(either, cover_translucent(d, s, fine, vi_sub(vi_set1(255 << 15), gone)), moved);
     }
     if (mode == TL_MIX_OVER_PREMULTIPLIED)
         return trade_bytes(d, s, coverage, weight_15(coverage, alpha));
