@@ -33,7 +33,7 @@ class Surface:
     def __init__(self, mesh: Mesh, view: F64 | None = None) -> None:
         """`view`: (4, 4), takes the mesh to eye space first."""
         self._triangles = mesh.triangles
-        self._vertex_normals = mesh.vertex_normals
+        self._vertex_normals = mesh.vertex_normals()  # the method would hold the mesh, which is the key of `_surfaces`
         self._colors = mesh.colors
         self._view = view
         self.positions = mesh.vertices if view is None else moved(mesh.vertices, view)
@@ -47,7 +47,7 @@ class Surface:
     @cached_property
     def normals(self) -> F32:
         """(V, 4): unit normals, 0 where there is none, and 1."""
-        return unit_rows(self._vertex_normals(), None if self._view is None else turn_of_normals(self._view))
+        return unit_rows(self._vertex_normals, None if self._view is None else turn_of_normals(self._view))
 
     @cached_property
     def face_normals(self) -> F32:
