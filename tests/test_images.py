@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from PIL import Image
@@ -133,4 +136,25 @@ def test_save_image_over_a_folder_is_refused(tmp_path):
 def test_save_image_impossible_is_refused(tmp_path, name, image, message):
     with pytest.raises(ImageError, match=message):
         images.save_image(tmp_path / name, image)
+    assert list(tmp_path.iterdir()) == []
+
+
+WRITE_UNDER_A_LIMIT = """
+import resource, signal, sys
+import numpy as np
+import topleft as tl
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (3000, 3000))
+noise = np.random.default_rng(0).integers(0, 256, (60, 60, 3), dtype=np.uint8)
+tl.save_image(sys.argv[1], noise)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="limits of files are of POSIX")
+@pytest.mark.parametrize("suffix", [".jpg", ".png", ".webp", ".npy", ".npz", ".tif"])
+def test_save_image_on_a_full_disk_is_an_error_and_leaves_nothing(tmp_path, suffix):
+    path = tmp_path / f"a{suffix}"
+    done = subprocess.run([sys.executable, "-c", WRITE_UNDER_A_LIMIT, str(path)], capture_output=True, text=True)
+    assert done.returncode == 1
+    assert "OSError" in done.stderr or "cannot write" in done.stderr
     assert list(tmp_path.iterdir()) == []

@@ -100,11 +100,13 @@ def save_image(
     kind, options = PILLOW_OPTIONS[suffix]
     if picture.dtype == np.float32 and picture.ndim == 3:
         first, *others = (Image.fromarray(np.ascontiguousarray(channel)) for channel in np.moveaxis(picture, -1, 0))
-        pages = io.BytesIO()  # Pillow reads back what it has written of several pages
-        first.save(pages, format=kind, save_all=True, append_images=others, **options)
-        write_whole(path, lambda file: file.write(pages.getbuffer()))
-        return
-    write_whole(path, lambda file: Image.fromarray(picture).save(file, format=kind, **options))
+        options = {**options, "save_all": True, "append_images": others}
+    else:
+        first = Image.fromarray(picture)
+    # In memory first: Pillow's JPEG encoder does not notice a disk that is full, its TIFF one reads back what it wrote.
+    encoded = io.BytesIO()
+    first.save(encoded, format=kind, **options)
+    write_whole(path, lambda file: file.write(encoded.getbuffer()))
 
 
 def composite(image: npt.NDArray[np.uint8], background: tuple[int, int, int]) -> npt.NDArray[np.uint8]:
