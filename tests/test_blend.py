@@ -427,3 +427,39 @@ def test_blend_bad_index_raises_and_leaves_out_alone():
     assert (out == 7).all()
     with pytest.raises(IndexError, match="row 1"):
         tl.fill(ONE[0], [[0, 1, 2], [0, 1, 3]], [1, 2], (4, 4), blend="add")
+
+
+# ---- each pixel by itself -------------------------------------------------------------------------------------------
+
+HALF_A_ROW = [[-100, 0.5], [200, 0.5], [50, -200]], [[0, 1, 2]]  # the upper half of each pixel of row 0
+
+
+def over_by_area(under, x, color, **options):
+    view = {"per": "triangle", "sampling": "area", "origin": (x, 0)} | options
+    return tl.fill(*HALF_A_ROW, [color], (under.shape[1], 1), **view, out=under.copy())
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize("blend", ["over", "replace"])
+def test_blend_by_area_ignores_the_neighbours_of_a_pixel(blend, isa):
+    under = np.zeros((1, 40, 4), np.uint8)
+    under[..., 3] = 255
+    under[0, [1, 17, 30], 3] = 128  # translucent
+    with on(isa):
+        whole = over_by_area(under, 0, [1, 1, 1, 255], blend=blend)
+        for x in (1, 2, 3, 18):
+            assert_same(over_by_area(under[:, x:], x, [1, 1, 1, 255], blend=blend), whole[:, x:])
+    opaque = under[0, :, 3] == 255
+    assert (whole[0, opaque] == [1, 1, 1, 255]).all()  # 0.5 is rounded up
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize(("blend", "color", "ground"), [("replace", 1.0, np.inf), ("multiply", -1.0, 0.0)])
+def test_blend_by_area_of_a_whole_pixel_is_the_blend_without_area(blend, color, ground, isa):
+    vertices, triangles = [[0.5, -50], [0.5, 50], [60, 0]], [[0, 1, 2]]  # a part of pixel 0, all of those beyond
+    under = np.full((1, 32, 1), ground, np.float32)
+    view = {"per": "triangle", "blend": blend}
+    with on(isa):
+        by_area = tl.fill(vertices, triangles, [[color]], (32, 1), **view, sampling="area", out=under.copy())
+        plain = tl.fill(vertices, triangles, [[color]], (32, 1), **view, out=under.copy())
+    assert by_area[0, 1:].tobytes() == plain[0, 1:].tobytes()

@@ -1,8 +1,10 @@
 """The shading kernels against float64 NumPy, and the same bits on every instruction set, thread count and window."""
 
+import gc
 import os
 import subprocess
 import sys
+import weakref
 from dataclasses import replace
 
 import numpy as np
@@ -277,3 +279,38 @@ def test_shade_several_samples_of_one_triangle_are_as_one():
 def test_wrong_values_are_named(make, error, message):
     with pytest.raises(error, match=message):
         make()
+
+
+@pytest.mark.parametrize("shading", ["smooth", "flat", "ids", "depth"])
+def test_shade_with_another_mesh_is_refused(shading):
+    cube = tl.Mesh(*tl.scenes.shape("cube"))
+    frags = tl.rasterize_mesh(KNOT, CAMERAS["ortho"], SIZE)
+    drawn, given = (f"{len(m.vertices)} vertices and {len(m.triangles)} triangles" for m in (KNOT, cube))
+    message = f"mesh must be the one that was drawn, with {drawn}, got {given.split()[0]} and {given.split()[3]}"
+    with pytest.raises(ValueError, match=message):
+        tl.shade(frags, cube, CAMERAS["ortho"], shading=shading)
+
+
+def test_shade_of_what_is_no_mesh_is_refused():
+    frags = tl.rasterize_mesh(KNOT, CAMERAS["ortho"], SIZE)
+    with pytest.raises(TypeError, match="mesh must be a Mesh, got int"):
+        tl.shade(frags, 3, CAMERAS["ortho"])
+    with pytest.raises(TypeError, match="frags must be Fragments, got NoneType"):
+        tl.shade(None, KNOT, CAMERAS["ortho"])
+
+
+def test_shade_through_a_lens_is_the_picture_of_render():
+    intrinsics = [[90, 0, 75], [0, 90, 55], [0, 0, 1]]
+    camera = tl.Camera.from_intrinsics(intrinsics, np.eye(4), SIZE, near=0.1, far=50, distortion=[-0.3, 0.1, 0, 0])
+    mesh = replace(KNOT, vertices=KNOT.vertices + [0, 0, 4])
+    assert_same(tl.shade(tl.rasterize_mesh(mesh, camera, SIZE), mesh, camera), tl.render(mesh, camera, SIZE))
+
+
+@pytest.mark.parametrize("draw", [tl.render, tl.render_transparent, lambda mesh: tl.render(tl.Scene([mesh]))])
+def test_shade_does_not_keep_a_mesh(draw):
+    mesh = replace(KNOT)
+    draw(mesh)
+    kept = weakref.ref(mesh)
+    del mesh
+    gc.collect()
+    assert kept() is None

@@ -23,7 +23,7 @@ from topleft import _engine
 from topleft.camera import Camera
 from topleft.colors import DEFAULT_COLOR, Color, as_color, id_colors
 from topleft.eye import distances, eye_distance
-from topleft.fragments import Fragments
+from topleft.fragments import BentFragments, Fragments
 from topleft.light import AMBIENT, Fog, Light, as_not_negative
 from topleft.look import Look
 from topleft.material import Material
@@ -125,11 +125,16 @@ def shade(
     Raises
     ------
     ValueError
-        If `shading` is unknown, a colour is none, a number is outside its range, or "matcap" has no matcap.
+        If the mesh has other numbers of vertices or triangles than what was drawn, `shading` is unknown, a colour is
+        none, a number is outside its range, or "matcap" has no matcap.
     TypeError
-        If a light, material or texture is none.
+        If `frags`, the mesh, a light, material or texture is none.
     """
+    _check_drawn(frags, mesh)
     mode = parse(Shading, "shading", shading)
+    if isinstance(frags, BentFragments) and mode not in (Shading.IDS, Shading.DEPTH):
+        # The kernels read what was drawn, triangle by triangle.
+        mesh, camera, frags = frags.mesh_of_parts(mesh), camera.straightened(), frags.parts
     own_color = as_color("color", color, 3)
     behind = as_color("background", background, 4)
     n_threads = count_threads(parse_threads(threads), len(mesh.triangles))
@@ -191,6 +196,20 @@ def picture_of_numbers(
         picture[seen, :3] = np.rint(grey).astype(np.uint8)[:, None]
     picture[seen, 3] = 255
     return picture
+
+
+def _check_drawn(frags: Fragments, mesh: Mesh) -> None:
+    """Raise an error unless the mesh can be the one that was drawn: the kernels index its arrays by the fragments."""
+    if not isinstance(frags, Fragments):
+        raise TypeError(f"frags must be Fragments, got {type(frags).__name__}")
+    if not isinstance(mesh, Mesh):
+        raise TypeError(f"mesh must be a Mesh, got {type(mesh).__name__}")
+    drawn, given = (frags._n_vertices, frags._n_triangles), (len(mesh.vertices), len(mesh.triangles))
+    if drawn != given:
+        raise ValueError(
+            f"mesh must be the one that was drawn, with {drawn[0]} vertices and {drawn[1]} triangles, "
+            f"got {given[0]} and {given[1]}"
+        )
 
 
 def _check_types(lights: Sequence[Light], material: object, matcap: object, fog: object) -> None:
