@@ -1,5 +1,5 @@
-"""Build `topleft._engine`: one Cython unit, one dispatcher and one kernel unit per instruction set; and the classics in
-`topleft.methods`: one Cython unit each, for the compiler's default instruction set.
+"""Build `topleft._engine.kernels`: one Cython unit, one dispatcher and one kernel unit per instruction set; and the
+classics in `topleft.methods`: one Cython unit each, for the compiler's default instruction set.
 
 Everything that is not about compiling stands in `pyproject.toml`. setuptools gives all sources of an extension the same
 flags, so `BuildTopleft` compiles each unit by itself and links the objects.
@@ -24,7 +24,7 @@ from setuptools.command.build_ext import build_ext
 from setuptools.errors import CompileError, PlatformError
 
 ROOT = Path(__file__).resolve().parent
-ENGINE = "topleft._engine"
+ENGINE = "topleft._engine.kernels"
 
 WARNINGS = ["-Wall", "-Wextra"]
 # -ffp-contract=off and -fno-fast-math stand after whatever CFLAGS holds: the same bits on every machine depend on them.
@@ -248,7 +248,7 @@ def extensions() -> list[Extension]:
     """Return the engine, and an extension for each kernel in `methods`."""
     kernels = [path.relative_to(ROOT).as_posix() for path in files_in("src/topleft/methods", ".pyx")]
     classics = [Extension(path.removeprefix("src/").removesuffix(".pyx").replace("/", "."), [path]) for path in kernels]
-    return [Extension(ENGINE, ["src/topleft/_engine.pyx"]), *classics]
+    return [Extension(ENGINE, ["src/topleft/_engine/kernels.pyx"]), *classics]
 
 
 setup(ext_modules=extensions(), cmdclass={"build_ext": BuildTopleft})

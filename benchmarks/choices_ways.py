@@ -17,14 +17,16 @@ from numpy.typing import NDArray
 
 import topleft as tl
 from benchmarks.choices_scenes import Scene
-from topleft import _engine, choices, sampling, threads
-from topleft.area import sum_areas
-from topleft.memory import FreshMemory, KeptMemory
-from topleft.models import Sink
-from topleft.rasterize import draw
-from topleft.sampling import sample_positions
-from topleft.snapped import snap_scene
-from topleft.view import View
+from topleft import _engine
+from topleft._base import threads
+from topleft._base.memory import FreshMemory, KeptMemory
+from topleft._base.options import Sink
+from topleft._raster import choices, sampling
+from topleft._raster.area import sum_areas
+from topleft._raster.rasterize import draw
+from topleft._raster.sampling import sample_positions
+from topleft._raster.snap import snap_scene
+from topleft._raster.view import View
 
 Picture = tuple[NDArray[Any], ...]
 Draw = Callable[[], Picture]
@@ -261,7 +263,7 @@ def of_memory(scene: Scene) -> Ways:
     """Scratch that a thread keeps, or fresh memory; results are fresh either way."""
     if scene.verb == "rasterize" or scene.sampling not in ("center", "area"):
         return []
-    from topleft import api
+    from topleft._raster import verbs as api
 
     call = verb_of(scene, tl, *scene.arrays, (scene.size,), scene.asked())
     return [Way("kept", call), Way("fresh", call, ((api, "SCRATCH", FreshMemory()),))]

@@ -1,7 +1,7 @@
 """How much of each pixel triangles cover, of float64 vertices as they are: nothing is snapped.
 
 In: vertices in pixels, triangles, the size of the frame. Out: the areas in each pixel, added up, in float64; closed
-forms whose rounding stays below 1e-9 of a pixel, which `tests/test_benchmarks_accuracy.py` checks against fractions.
+forms whose rounding stays below 1e-9 of a pixel: `tests/studies/test_benchmarks_accuracy.py` compares with fractions.
 
 Based on: R. Levien, font-rs, 2015 (an edge adds what lies to the right of it).
 """

@@ -16,8 +16,8 @@ import numpy as np
 import topleft as tl
 from benchmarks.machine import describe_commit, describe_machine, now, version_of
 from benchmarks.report import table
-from topleft.clustered import StaticPlan
-from topleft.detail import pixels_of_bound, window_of
+from topleft._lod.detail import pixels_of_bound, window_of
+from topleft._render.render import StaticPlan
 
 SIZE = (1920, 1080)
 HEIGHTS_PX = (1000, 300, 100, 30, 10)

@@ -14,7 +14,7 @@ import numpy as np
 
 import topleft as tl
 from benchmarks.pictures_scenes import SIZE, PictureScene
-from topleft.colors import DEFAULT_COLOR
+from topleft._base.color import DEFAULT_COLOR
 
 ENVIRONMENT = {
     "LIBGL_ALWAYS_SOFTWARE": "1",

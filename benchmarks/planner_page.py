@@ -19,8 +19,8 @@ HEAD = """\
 # What a scene needs, and why
 
 `tl.plan` says how a scene is drawn before it is drawn: what is chosen at each stage, why, and what was left out.
-The picture never changes: `tests/test_choices.py` draws thousands of scenes with each choice forced on and off, and
-compares bits. On the command line: `topleft explain MESH`.
+The picture never changes: `tests/plan/test_choices.py` draws thousands of scenes with each choice forced on and off,
+and compares bits. On the command line: `topleft explain MESH`.
 
 ```python
 plan = tl.plan(vertices, triangles, (1920, 1080), transform=matrix)

@@ -15,8 +15,8 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
 import topleft as tl
-from topleft.models import Sampling
-from topleft.sampling import POSITIONS
+from topleft._base.options import Sampling
+from topleft._raster.sampling import POSITIONS
 
 SIZE = (9, 7)
 VERTICES = np.array(

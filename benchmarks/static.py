@@ -23,9 +23,10 @@ import topleft as tl
 from benchmarks.choices import check_same_bits, digits, facts, quartiles, take_rounds
 from benchmarks.choices_ways import Draw, Forced, Picture, Way
 from benchmarks.static_scenes import StaticScene, scenes
-from topleft import choices, scene_clusters
-from topleft.clustered import ClusteredScene
-from topleft.clusters import Clusters
+from topleft._raster import choices
+from topleft._raster.clustered import ClusteredScene
+from topleft._raster.clusters import Clusters
+from topleft._render import scene_clusters
 
 WHOLE: Forced = ((choices, "pays_to_cluster", lambda *_: False),)
 ASKED = ("pays_to_cluster", "pays_to_draw_clusters", "pays_to_draw_instances")
@@ -106,7 +107,7 @@ def counting(fates: Fates) -> Forced:
             )
             return super().draw_rows(*arguments, **options)
 
-    rasterize = sys.modules["topleft.rasterize"]  # not the verb of the same name
+    rasterize = sys.modules["topleft._raster.rasterize"]  # not the verb of the same name
     return (rasterize, "ClusteredScene", CountedScene), (scene_clusters, "ClusteredScene", CountedScene)
 
 

@@ -2,7 +2,7 @@
  * In: linear light.  Out: whole numbers of 0 to 255.
  *
  * Light is rounded to steps of 2^-16, and a step to the nearest sRGB value of 0 to 255: the polynomial below gives that value
- * for each of the 65537 steps (tests/test_shade.py looks at all of them).
+ * for each of the 65537 steps (tests/shade/test_shade.py looks at all of them).
  * Based on: IEC 61966-2-1, 1999. */
 #include "lanes.h"
 #include "shading.h"

@@ -7,7 +7,7 @@ import numpy as np
 from picture import beside, output_path, ramp
 
 import topleft as tl
-from topleft.shade import eye_distance
+from topleft._shade.shade import eye_distance
 
 SIZE = (320, 240)
 INTRINSICS = np.array([[260.0, 0, 161.3], [0, 261.5, 118.7], [0, 0, 1]])

@@ -1,8 +1,12 @@
 """One fixed hypothesis profile, the command line as a fixture, the count of pixels compared with the reference."""
 
+from pathlib import Path
+
 import comparing
 import pytest
 from hypothesis import HealthCheck, settings
+
+collect_ignore = [] if Path(__file__).parents[1].joinpath("benchmarks").is_dir() else ["studies"]
 
 settings.register_profile(
     "fixed", derandomize=True, deadline=None, database=None, max_examples=300, suppress_health_check=list(HealthCheck)

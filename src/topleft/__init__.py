@@ -6,49 +6,49 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from topleft import scenes
-from topleft._isa import build_info
-from topleft.adapt import as_mesh
-from topleft.api import Rasterizer, coverage, fill, overdraw, rasterize, wireframe
-from topleft.camera import Camera
-from topleft.classic import bresenham_line
-from topleft.composite import composite
-from topleft.depth_layers import DepthLayers, peel
-from topleft.detail import Detail, choose_detail
+from topleft._base.memory import release_memory
+from topleft._camera.camera import Camera
+from topleft._camera.lens import FisheyeLens, OpenCVLens
+from topleft._camera.viewpoints import turntable, viewpoints
+from topleft._engine.isa import build_info
+from topleft._field.field import field, height_map
+from topleft._field.grid import Grid
+from topleft._io.images import save_image
+from topleft._io.load import load
+from topleft._lod.detail import Detail, choose_detail
+from topleft._lod.levels import Level, Levels
+from topleft._lod.simplify import simplify
+from topleft._model.adapt import as_mesh
+from topleft._model.light import Fog, Light
+from topleft._model.material import Material
+from topleft._model.mesh import Mesh
+from topleft._model.scene import Instance, Scene
+from topleft._model.texture import Texture
+from topleft._plan.planner import Plan, plan
+from topleft._raster.classic import bresenham_line
+from topleft._raster.composite import composite
+from topleft._raster.fragments import Fragments
+from topleft._raster.peel import DepthLayers, peel
+from topleft._raster.verbs import Rasterizer, coverage, fill, overdraw, rasterize, wireframe
+from topleft._render.render import rasterize_mesh, render
+from topleft._render.scene_fragments import SceneDepthLayers, SceneFragments
+from topleft._render.silhouette import silhouette
+from topleft._shade.shade import shade
 from topleft.errors import MeshError, TopleftError
-from topleft.field import field, height_map
-from topleft.files import load
-from topleft.fragments import Fragments
-from topleft.grid import Grid
-from topleft.images import save_image
-from topleft.lens import FisheyeLens, OpenCVLens
-from topleft.levels import Level, Levels
-from topleft.light import Fog, Light
-from topleft.material import Material
-from topleft.memory import release_memory
-from topleft.mesh import Mesh
-from topleft.planner import Plan, plan
-from topleft.render import rasterize_mesh, render
-from topleft.scene import Instance, Scene
-from topleft.scene_fragments import SceneDepthLayers, SceneFragments
-from topleft.shade import shade
-from topleft.silhouette import silhouette
-from topleft.simplify import simplify
-from topleft.texture import Texture
-from topleft.viewpoints import turntable, viewpoints
 
 if TYPE_CHECKING:
-    from topleft.batch import Job, render_batch
-    from topleft.transparent import render_transparent, visible_layers
-    from topleft.view_layers import ViewLayers, render_layers
+    from topleft._batch.batch import Job, render_batch
+    from topleft._render.transparent import render_transparent, visible_layers
+    from topleft._render.view_layers import ViewLayers, render_layers
 
 # What most programs do without is imported when it is asked for: a third of the time that the package takes.
 _LATE = {
-    "Job": "topleft.batch",
-    "ViewLayers": "topleft.view_layers",
-    "render_batch": "topleft.batch",
-    "render_layers": "topleft.view_layers",
-    "render_transparent": "topleft.transparent",
-    "visible_layers": "topleft.transparent",
+    "Job": "topleft._batch.batch",
+    "ViewLayers": "topleft._render.view_layers",
+    "render_batch": "topleft._batch.batch",
+    "render_layers": "topleft._render.view_layers",
+    "render_transparent": "topleft._render.transparent",
+    "visible_layers": "topleft._render.transparent",
 }
 
 __version__: str = build_info()["version"]
@@ -119,4 +119,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return sorted(__all__)

@@ -10,7 +10,7 @@ import argparse
 import sys
 from collections.abc import Mapping, Sequence
 
-from topleft._isa import build_info
+from topleft._engine.isa import build_info
 from topleft.cli.arguments import REFUSED, Parser, UsageError, add_render_arguments
 from topleft.cli.explain import add_plan_commands
 from topleft.cli.render import FAILED, complain, one_line, run_render

@@ -14,8 +14,8 @@ from itertools import chain
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, cast
 
+from topleft._io.images import write_whole
 from topleft.errors import ImageError, MissingPackageError
-from topleft.images import write_whole
 
 if TYPE_CHECKING:
     from PIL.Image import Image as Picture

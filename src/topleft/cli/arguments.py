@@ -5,15 +5,15 @@ from __future__ import annotations
 import argparse
 from typing import NoReturn
 
-from topleft.camera import DEFAULT_FOV_Y_DEG, THREE_QUARTER_DEG
+from topleft._base.options import Cull, Sampling
+from topleft._camera.camera import DEFAULT_FOV_Y_DEG, THREE_QUARTER_DEG
+from topleft._io.images import PICTURE_SUFFIXES, SUFFIXES
+from topleft._render.layers import LAYERS, check_layers
+from topleft._render.render import DEFAULT_SIZE
+from topleft._shade.shade import DEFAULT_COLOR, Shading
 from topleft.cli.animation import ANIMATION_SUFFIXES
 from topleft.errors import TopleftError
-from topleft.images import PICTURE_SUFFIXES, SUFFIXES
-from topleft.layers import LAYERS, check_layers
-from topleft.models import Cull, Sampling
-from topleft.render import DEFAULT_SIZE
 from topleft.scenes import SHAPES
-from topleft.shade import DEFAULT_COLOR, Shading
 
 __all__ = ["REFUSED", "Parser", "UsageError", "add_picture_arguments", "add_render_arguments"]
 

@@ -5,18 +5,18 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from topleft.camera import DEFAULT_FOV_Y_DEG, THREE_QUARTER_DEG
+from topleft._base.options import Cull, Sampling
+from topleft._camera.camera import DEFAULT_FOV_Y_DEG, THREE_QUARTER_DEG
+from topleft._render.render import DEFAULT_SIZE
 from topleft.cli.arguments import _positive, _size, _tolerance
 from topleft.cli.plan import Orbit, Source
-from topleft.models import Cull, Sampling
-from topleft.render import DEFAULT_SIZE
 
 __all__ = ["add_plan_commands", "run_calibrate", "run_explain"]
 
 
 def run_explain(options: argparse.Namespace) -> int:
     """Print how a view of a mesh is drawn: what is chosen at each stage, why, and what it takes."""
-    from topleft.planner import plan
+    from topleft._plan.planner import plan
 
     mesh = Source(options.mesh)()
     orbit = Orbit(options.azimuth, options.elevation, options.fov, options.up, options.ortho)
@@ -45,8 +45,8 @@ def run_explain(options: argparse.Namespace) -> int:
 
 def run_calibrate(_: argparse.Namespace) -> int:
     """Measure this machine for some ten seconds and keep what estimates are made from."""
-    from topleft.calibrate import calibrate
-    from topleft.costs import save_costs
+    from topleft._plan.calibrate import calibrate
+    from topleft._plan.costs import save_costs
 
     costs = calibrate()
     print(f"{save_costs(costs)}: {costs.source}; the worst is off by a factor of {costs.residual['worst']:.1f}")

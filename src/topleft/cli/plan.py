@@ -16,18 +16,18 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from topleft.camera import Camera
+from topleft._base.options import Sampling
+from topleft._batch.jobs import Job
+from topleft._camera.camera import Camera
+from topleft._io.images import SUFFIXES
+from topleft._io.load import load
+from topleft._model.material import Material
+from topleft._model.mesh import Mesh
+from topleft._model.texture import Texture
+from topleft._shade.shade import Shading
 from topleft.cli.arguments import UsageError
 from topleft.errors import ImageError, MeshError
-from topleft.files import load
-from topleft.images import SUFFIXES
-from topleft.jobs import Job
-from topleft.material import Material
-from topleft.mesh import Mesh
-from topleft.models import Sampling
 from topleft.scenes import SHAPES, shape
-from topleft.shade import Shading
-from topleft.texture import Texture
 
 __all__ = ["Shoot", "check_targets", "plan_shoots"]
 

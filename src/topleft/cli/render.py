@@ -15,14 +15,14 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from topleft.batch import Result, render_batch
+from topleft._batch.batch import Result, render_batch
+from topleft._io.images import PICTURE_SUFFIXES, save_image
 from topleft.cli.animation import check_animation, save_animation
 from topleft.cli.arguments import UsageError
 from topleft.cli.job_file import read_jobs
 from topleft.cli.plan import Shoot, check_targets, plan_shoots
 from topleft.cli.sheet import make_sheet
 from topleft.errors import MissingPackageError, TopleftError
-from topleft.images import PICTURE_SUFFIXES, save_image
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor

@@ -34,7 +34,7 @@ class Kernel(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Claims:
-    """What a method promises; `tests/test_claims.py` proves each answer, the "no" as well as the "yes".
+    """What a method promises; `tests/methods/test_claims.py` proves each answer, the "no" as well as the "yes".
 
     Attributes
     ----------

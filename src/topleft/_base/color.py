@@ -1,0 +1,69 @@
+"""Colours: sRGB values of 0 to 255, the light that they stand for, and a colour for each id."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from numpy.typing import NDArray
+
+F32 = npt.NDArray[np.float32]
+U8 = npt.NDArray[np.uint8]
+Color = tuple[int, ...]
+
+DEFAULT_COLOR = (224, 222, 217)
+"""sRGB of a mesh without colours: a light warm grey, in which light and shadow both have room."""
+
+_VALUES = np.arange(256) / 255
+_LIGHT = np.where(_VALUES <= 0.04045, _VALUES / 12.92, ((_VALUES + 0.055) / 1.055) ** 2.4)
+LIGHT_OF_SRGB: F32 = _LIGHT.astype(np.float32)
+"""(256,) float32: the light, 0 to 1, of each sRGB value."""
+LIGHT_OF_SRGB.flags.writeable = False
+
+
+def as_color(name: str, color: Iterable[Any], n_channels: int) -> Color:
+    """The colour as whole numbers of 0 to 255; RGB becomes opaque where RGBA is asked for.
+
+    Raises
+    ------
+    ValueError
+        If it has another number of channels or a channel outside its range.
+    """
+    channels = tuple(int(channel) for channel in color)
+    if n_channels == 4 and len(channels) == 3:
+        channels = (*channels, 255)
+    if len(channels) != n_channels or not all(0 <= channel <= 255 for channel in channels):
+        raise ValueError(f"{name} must be {n_channels} numbers of 0 to 255, got {color!r}")
+    return channels
+
+
+def light_of(color: Color) -> tuple[float, ...]:
+    """Linear red, green and blue of an sRGB colour, and its opacity of 0 to 1 (1 unless it has one)."""
+    red, green, blue = (float(LIGHT_OF_SRGB[channel]) for channel in color[:3])
+    return red, green, blue, color[3] / 255 if len(color) == 4 else 1.0
+
+
+def id_colors(ids: npt.NDArray[np.integer[Any]]) -> U8:
+    """A bright colour (N, 3) uint8 for each id: the hue turns by the golden angle, so neighbours differ most."""
+    ids = ids.astype(np.uint64)
+    hue = (ids * np.uint64(0x9E3779B97F4A7C15) >> np.uint64(40)).astype(np.float32) / 2**24
+    tint = (ids * np.uint64(0xD1B54A32D192ED03) >> np.uint64(40)).astype(np.float32) / 2**24
+    value, saturation = 0.65 + 0.35 * tint, 0.80 - 0.40 * ((5 * tint) % 1)
+    ramp = np.abs((6 * hue[:, None] + np.array([0, 4, 2], dtype=np.float32)) % 6 - 3) - 1
+    rgb = value[:, None] * (1 - saturation[:, None] * (1 - np.clip(ramp, 0, 1)))
+    return np.rint(255 * rgb).astype(np.uint8)
+
+
+LINEAR_ONE = 1 << 16
+
+
+@lru_cache(maxsize=1)
+def srgb_tables() -> tuple[NDArray[np.int32], NDArray[np.uint8]]:
+    """Return the light of each sRGB value, in steps, and the sRGB value of each step."""
+    value, light = np.arange(256) / 255, np.arange(LINEAR_ONE + 1) / LINEAR_ONE
+    decoded = np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
+    encoded = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+    return np.rint(LINEAR_ONE * decoded).astype(np.int32), np.rint(255 * encoded).astype(np.uint8)

@@ -1,0 +1,351 @@
+"""Many pictures: jobs to files or arrays, on one thread, on several, or by worker processes.
+
+Input: jobs, as many as a generator gives. Output: results, in the order of the jobs or as they come.
+"""
+
+from __future__ import annotations
+
+import operator
+import os
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence, Sized
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
+
+import numpy.typing as npt
+
+from topleft._base.options import parse
+from topleft._batch.jobs import Job, Outcome, Studio, as_job
+from topleft._batch.workers import Crew, crew_of
+from topleft.errors import MissingPackageError
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor, Future
+
+__all__ = ["Batch", "Job", "Result", "Summary", "render_batch"]
+
+Array = npt.NDArray[Any]
+Progress = Callable[["Result"], object]
+
+
+class OnError(StrEnum):
+    """What an error of a job does."""
+
+    RAISE = "raise"
+    COLLECT = "collect"
+
+
+class Order(StrEnum):
+    """In which order results come."""
+
+    JOBS = "jobs"
+    COMPLETED = "completed"
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """What came of a job.
+
+    Attributes
+    ----------
+    index : int
+        Which job it was, from 0.
+    job : Job
+    picture : ndarray (H, W, 4) uint8, or dict of str to ndarray, or None
+        The picture, or its layers by name; None where they went to files, or were not made.
+    error : Exception or None
+        Why it failed.
+    is_skipped : bool
+        Whether its files were there and it was left out (`resume`).
+    """
+
+    index: int
+    job: Job
+    picture: Array | dict[str, Array] | None = None
+    error: Exception | None = None
+    is_skipped: bool = False
+
+
+@dataclass(frozen=True)
+class Summary:
+    """How many pictures were made, how many were left out, and the results of the jobs that failed."""
+
+    n_made: int
+    n_skipped: int
+    failed: tuple[Result, ...]
+
+
+def render_batch(
+    jobs: Iterable[Job | tuple[Any, ...]],
+    *,
+    executor: Executor | int | None = None,
+    progress: Progress | bool | None = None,
+    on_error: str = "raise",
+    order: str = "jobs",
+    resume: bool = False,
+    chunk: int = 1,
+    window: int | None = None,
+) -> Batch:
+    """Return the results of many jobs, to be iterated over: a picture is drawn when its turn comes, not before.
+
+    Parameters
+    ----------
+    jobs : iterable of Job, or of tuples (scene, camera, size, options, destination, layers), shorter ones too
+        May be a generator without an end: no more than `window` times `chunk` pictures are on the way at any time.
+    executor : None, int or concurrent.futures.Executor
+        None: the calling thread. A number: so many threads, which end with the batch. An executor is left running; what
+        a `ProcessPoolExecutor` draws is pickled, except that a mesh is handed to its processes through a file, once
+        for all jobs that share it. Other executors get whole jobs. Never changes a bit.
+    progress : function of a Result, or True, optional
+        Called after each job. True shows a bar with rate and remaining time (tqdm).
+    on_error : {"raise", "collect"}
+        Whether the first error ends the batch, or results carry their errors.
+    order : {"jobs", "completed"}
+        Whether results come in the order of the jobs, or as soon as they are there.
+    resume : bool
+        Leave out jobs whose files are all there. A file is whole or not there, also after an interrupt.
+    chunk : int
+        How many neighbouring jobs of one scene are handed to a worker together: less to send for each picture.
+    window : int, optional
+        How many chunks are on the way at a time; unless given, 2 a worker and 2 more.
+
+    Returns
+    -------
+    Batch
+        An iterator of `Result`; `finish()` goes through all of them and counts. Use it in a `with` block, or close it,
+        if you leave early: nothing new is begun then, and what is being written is finished.
+
+    Raises
+    ------
+    ValueError, TypeError
+        If an option is none of those. Errors of jobs come as `on_error` says, with the job in their notes.
+
+    Notes
+    -----
+    Pictures are the unit of threading: each is drawn by one thread, unless its options say otherwise.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> mesh = tl.Mesh(*tl.scenes.shape("cube"))
+    >>> cameras = [tl.Camera.framing(mesh, azimuth_deg=azimuth_deg) for azimuth_deg in range(0, 360, 90)]
+    >>> jobs = (tl.Job(mesh, camera, (64, 48)) for camera in cameras)
+    >>> [result.picture.shape for result in tl.render_batch(jobs, executor=2)]
+    [(48, 64, 4), (48, 64, 4), (48, 64, 4), (48, 64, 4)]
+    """
+    n_chunk, n_window = _positive("chunk", chunk), None if window is None else _positive("window", window)
+    wish = parse(Order, "order", order)
+    collects = parse(OnError, "on_error", on_error) is OnError.COLLECT
+    crew = crew_of(executor)
+    n_jobs = len(jobs) if isinstance(jobs, Sized) else None
+    if crew is None:
+        results = _one_by_one(iter(jobs), resume)
+    else:
+        in_flight = _InFlight(crew, n_window or 2 * crew.n_workers + 2, wish is Order.COMPLETED)
+        results = in_flight.results(_chunks(iter(jobs), n_chunk, resume))
+    return Batch(results, _bar(n_jobs) if progress is True else progress or None, collects=collects)
+
+
+class Batch(Iterator[Result]):
+    """The results of `render_batch`, drawn while it is iterated over."""
+
+    def __init__(self, results: Iterator[Result], progress: Progress | _Bar | None, *, collects: bool) -> None:
+        self._results = results
+        self._progress = progress
+        self._collects = collects
+
+    def __iter__(self) -> Batch:
+        return self
+
+    def __next__(self) -> Result:
+        try:
+            result = next(self._results)
+        except BaseException:
+            self.close()
+            raise
+        if self._progress:
+            self._progress(result)
+        if result.error is not None and not self._collects:
+            self.close()
+            result.error.add_note(f"in job {result.index}: {result.job.name}")
+            raise result.error
+        return result
+
+    def __enter__(self) -> Batch:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End it: jobs that have not begun are dropped, those that have are finished."""
+        self._results.close()  # type: ignore[attr-defined]
+        if isinstance(self._progress, _Bar):
+            self._progress.close()
+
+    def finish(self) -> Summary:
+        """Go through all results and return how many there were; pictures that went to no file are lost."""
+        n_made = n_skipped = 0
+        failed = []
+        for result in self:
+            if result.error is not None:
+                failed.append(result)
+            else:
+                n_made, n_skipped = n_made + (not result.is_skipped), n_skipped + result.is_skipped
+        return Summary(n_made, n_skipped, tuple(failed))
+
+
+def _one_by_one(jobs: Iterator[object], resume: bool) -> Iterator[Result]:
+    """Results of jobs that the calling thread draws."""
+    studio = Studio()
+    for index, item in enumerate(jobs):
+        job = as_job(item, index)
+        if resume and _is_done(job):
+            yield Result(index, job, is_skipped=True)
+            continue
+        (outcome,) = studio.draw([(index, job)])
+        yield Result(index, job, outcome.picture, outcome.error)
+
+
+@dataclass
+class _Task:
+    """Jobs that a worker gets together; `future` is None where all are done already."""
+
+    jobs: list[tuple[int, Job]]
+    future: Future[list[Outcome]] | None = None
+
+    def results(self) -> list[Result]:
+        """What came of them."""
+        if self.future is None:
+            return [Result(index, job, is_skipped=True) for index, job in self.jobs]
+        try:
+            outcomes = self.future.result()
+        except Exception as error:  # what a worker could not even send back
+            return [Result(index, job, error=error) for index, job in self.jobs]
+        pairs = zip(self.jobs, outcomes, strict=True)
+        return [Result(index, job, outcome.picture, outcome.error) for (index, job), outcome in pairs]
+
+
+def _chunks(jobs: Iterator[object], n: int, resume: bool) -> Iterator[tuple[list[tuple[int, Job]], bool]]:
+    """Yield neighbouring jobs of one scene, at most n together, and whether their files are there already."""
+    together: list[tuple[int, Job]] = []
+    for index, item in enumerate(jobs):
+        job = as_job(item, index)
+        if resume and _is_done(job):
+            if together:
+                yield together, False
+                together = []
+            yield [(index, job)], True
+            continue
+        if together and (len(together) == n or not _is_same(together[-1][1].scene, job.scene)):
+            yield together, False
+            together = []
+        together.append((index, job))
+        if n == 1:  # at once: the next job may be long in coming
+            yield together, False
+            together = []
+    if together:
+        yield together, False
+
+
+def _is_same(one: object, other: object) -> bool:
+    """Whether two jobs have one scene; meshes are compared by identity, names and functions by value."""
+    return one is other or ((isinstance(one, (str, os.PathLike)) or callable(one)) and bool(one == other))
+
+
+class _InFlight:
+    """Tasks that are on the way, a bounded number of them."""
+
+    def __init__(self, crew: Crew, window: int, as_completed: bool) -> None:
+        self._crew = crew
+        self._window = window
+        self._as_completed = as_completed
+        self._tasks: deque[_Task] = deque()
+
+    def results(self, chunks: Iterator[tuple[list[tuple[int, Job]], bool]]) -> Iterator[Result]:
+        """Yield the results of all."""
+        self._crew.start()
+        try:
+            while self._fill(chunks):
+                if self._crew.revive():  # a fork took the workers away: what was on the way begins again
+                    for task in self._tasks:
+                        if task.future is not None:
+                            task.future = self._crew.submit(task.jobs)
+                task = self._next_done() if self._as_completed else self._tasks.popleft()
+                results = task.results()
+                self._crew.forget(task.jobs)
+                yield from results
+        finally:
+            for task in self._tasks:
+                if task.future is not None:
+                    task.future.cancel()
+            self._crew.stop([task.future for task in self._tasks if task.future is not None])
+
+    def _fill(self, chunks: Iterator[tuple[list[tuple[int, Job]], bool]]) -> bool:
+        """Put tasks on the way while there is room; tell whether there are any."""
+        while len(self._tasks) < self._window:
+            found = next(chunks, None)
+            if found is None:
+                break
+            jobs, is_done = found
+            self._tasks.append(_Task(jobs, None if is_done else self._crew.submit(jobs)))
+        return bool(self._tasks)
+
+    def _next_done(self) -> _Task:
+        """Take out a task that is done, the earliest of them."""
+        from concurrent.futures import FIRST_COMPLETED, wait
+
+        def is_done(task: _Task) -> bool:
+            return task.future is None or task.future.done()
+
+        if not any(map(is_done, self._tasks)):
+            wait([task.future for task in self._tasks if task.future is not None], return_when=FIRST_COMPLETED)
+        task = next(filter(is_done, self._tasks))
+        self._tasks.remove(task)
+        return task
+
+
+def _is_done(job: Job) -> bool:
+    """Tell whether all files of a job are there; what is wrong with a job is found when it is drawn."""
+    try:
+        files: Sequence[Path] = job.files
+    except ValueError:
+        return False
+    return bool(files) and all(file.is_file() for file in files)
+
+
+def _positive(name: str, value: object) -> int:
+    try:
+        n = operator.index(value)  # type: ignore[arg-type]
+    except TypeError:
+        raise TypeError(f"{name} must be an integer, got {value!r}") from None
+    if n < 1:
+        raise ValueError(f"{name} must be at least 1, got {n}")
+    return n
+
+
+class _Bar:
+    """A bar with rate and remaining time."""
+
+    def __init__(self, bar: Any) -> None:
+        self._bar = bar
+
+    def __call__(self, _: Result) -> None:
+        self._bar.update()
+
+    def close(self) -> None:
+        """Leave it on the screen as it is."""
+        self._bar.close()
+
+
+def _bar(n_jobs: int | None) -> _Bar:
+    try:
+        from tqdm import tqdm
+    except ImportError:
+        raise MissingPackageError("progress=True needs tqdm: pip install 'topleft[render]'") from None
+    return _Bar(tqdm(total=n_jobs, unit="picture"))

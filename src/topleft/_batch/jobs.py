@@ -1,0 +1,256 @@
+"""Jobs: a scene, a camera and where the picture goes; and the studio that draws them, one after the other, in a thread.
+
+Input: `Job`. Output: arrays, or files that are whole or not there.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections import OrderedDict
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+import numpy.typing as npt
+
+from topleft._camera.camera import Camera
+from topleft._io.images import save_image
+from topleft._io.layer_files import layer_paths, save_layers
+from topleft._io.load import load
+from topleft._model.adapt import MeshLike, as_mesh
+from topleft._model.mesh import Mesh
+from topleft._model.scene import Scene
+from topleft._raster.verbs import Rasterizer
+from topleft._render.layers import check_layers, draw_layers
+from topleft._render.render import DEFAULT_SIZE, render
+from topleft._render.transparent import render_transparent
+from topleft._render.view_layers import sight_of
+
+__all__ = ["Job", "Outcome", "SceneFile", "Studio", "as_job"]
+
+Array = npt.NDArray[Any]
+CameraMaker = Callable[[Any, tuple[int, int]], Camera]
+
+
+@dataclass(frozen=True, eq=False)
+class Job:
+    """One picture to be made.
+
+    Parameters
+    ----------
+    scene : Mesh, Scene, whatever `as_mesh` takes, path, or function without arguments that returns one of the first
+        A file is read where it is drawn, once for jobs that follow each other. The same goes for what a function makes
+        where functions are equal; for worker processes it must be picklable. A mesh of another library is made ours
+        once, and must not change between its jobs.
+    camera : Camera, or function of the mesh (or scene) and the size that returns one, optional
+        As for `render`.
+    size : (width, height), pixels
+    options : mapping
+        Other options of `render`, by name; with "opacity" those of `render_transparent`; for "flow" among the layers
+        also "camera_to" and "transforms_to" of `render_layers`.
+    destination : path, optional
+        The file to be written; its folder is made. `{layer}` in the name stands for the name of a layer. None: the
+        picture is returned.
+    layers : sequence of str
+        What is wanted besides, or instead of, the picture: names that `render_layers` knows. None: the picture alone.
+    """
+
+    scene: Any
+    camera: Camera | CameraMaker | None = None
+    size: tuple[int, int] = DEFAULT_SIZE
+    options: Mapping[str, Any] = field(default_factory=dict)
+    destination: str | os.PathLike[str] | None = None
+    layers: Sequence[str] = ()
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The files that it writes.
+
+        Raises
+        ------
+        ImageError
+            If the format is unknown, or several layers would have one file that can hold one.
+        ValueError
+            If there is no such layer.
+        """
+        if self.destination is None:
+            return ()
+        path = Path(self.destination)
+        return tuple(dict.fromkeys(layer_paths(path, check_layers(self.layers) or ("color",)).values()))
+
+    @property
+    def name(self) -> str:
+        """A word for it in messages."""
+        scene = os.fspath(self.scene) if isinstance(self.scene, (str, os.PathLike)) else type(self.scene).__name__
+        return str(scene) if self.destination is None else f"{scene} -> {os.fspath(self.destination)}"
+
+
+def as_job(item: object, index: int) -> Job:
+    """Return a job as it is, or that of a tuple of its fields.
+
+    Raises
+    ------
+    TypeError
+        If it is neither.
+    """
+    if isinstance(item, Job):
+        return item
+    names = [entry.name for entry in fields(Job)]
+    if isinstance(item, tuple) and 1 <= len(item) <= len(names):
+        return Job(*item)
+    raise TypeError(f"jobs[{index}] must be a Job or a tuple ({', '.join(names)}), got {type(item).__name__}")
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What came of one job: the picture, unless it went to a file, or the error."""
+
+    index: int
+    picture: Array | dict[str, Array] | None = None
+    error: Exception | None = None
+
+
+@dataclass(frozen=True)
+class SceneFile:
+    """A mesh that is in a file."""
+
+    path: str
+
+    def __call__(self) -> Mesh:
+        """Read it."""
+        return load(self.path)
+
+
+class ForeignMesh:
+    """A mesh of another library, to be made ours; equal where it is the same object."""
+
+    def __init__(self, subject: MeshLike) -> None:
+        self.subject = subject
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, ForeignMesh) and self.subject is other.subject
+
+    def __hash__(self) -> int:
+        return id(self.subject)
+
+    def __call__(self) -> Mesh:
+        """Make it."""
+        return as_mesh(self.subject)
+
+
+class SceneShelf:
+    """Meshes that were made, or the errors that came instead: the `n` latest, shared by all threads."""
+
+    def __init__(self, n: int) -> None:
+        self._n = n
+        self._made: OrderedDict[Hashable, tuple[Any, Exception | None]] = OrderedDict()
+        # One at a time: readers are not safe in threads (they change the process's warning filters).
+        self._lock = threading.Lock()
+
+    def get(self, make: Callable[[], Any]) -> Any:
+        """Return what an equal function has made, or make it."""
+        found = self._made.get(make)
+        if found is None:
+            with self._lock:
+                found = self._made.get(make)
+                if found is None:
+                    found = self._made[make] = self._call(make)
+                    if len(self._made) > self._n:
+                        self._made.popitem(last=False)
+        scene, error = found
+        if error is not None:
+            raise error.with_traceback(None)
+        return scene
+
+    @staticmethod
+    def _call(make: Callable[[], Any]) -> tuple[Any, Exception | None]:
+        try:
+            made = make()
+            return made if isinstance(made, Scene) else as_mesh(made), None
+        except Exception as error:
+            return None, error
+
+
+class Studio:
+    """Draws jobs: each thread on one thread and in memory of its own, which it keeps from picture to picture.
+
+    Parameters
+    ----------
+    n_scenes : int
+        How many meshes that were read are kept for jobs to come.
+    """
+
+    def __init__(self, n_scenes: int = 4) -> None:
+        self._shelf = SceneShelf(n_scenes)
+        self._threads = threading.local()
+
+    def draw(self, jobs: Sequence[tuple[int, Job]]) -> list[Outcome]:
+        """Return what came of each job; an error of one does not stop the next."""
+        outcomes = []
+        for index, job in jobs:
+            try:
+                outcomes.append(Outcome(index, self.draw_one(job)))
+            except Exception as error:
+                _let_go(error)
+                outcomes.append(Outcome(index, error=error))
+        return outcomes
+
+    def draw_one(self, job: Job) -> Array | dict[str, Array] | None:
+        """Return the picture of a job, arrays by name if it asks for layers, or None when they are in their files."""
+        layers = check_layers(job.layers)
+        path = None if job.destination is None else Path(job.destination)
+        files = job.files  # before any work: a format that is none
+        for file in files:
+            if not file.parent.is_dir():
+                file.parent.mkdir(parents=True, exist_ok=True)
+        scene = self._scene(job.scene)
+        size = (int(job.size[0]), int(job.size[1]))
+        camera = job.camera(scene, size) if callable(job.camera) else job.camera
+        options = {"threads": 1, **job.options}
+        rasterizer = self._rasterizer(size)
+        if not layers:
+            if "opacity" in options:
+                picture = render_transparent(scene, camera, size, **options)
+            else:
+                picture = render(scene, camera, size, rasterizer=rasterizer, **options)
+            if path is None:
+                return picture
+            save_image(files[0], picture, background=_opaque(job))
+            return None
+        sight = sight_of(scene, camera, size, rasterizer=rasterizer, **options)
+        arrays = draw_layers(layers, sight)
+        if path is None:
+            return {name: array.copy() for name, array in arrays.items()}  # out of the memory that is kept
+        matrix = None if sight.camera.lens is not None else sight.camera.clip_from_world(size)
+        save_layers(path, arrays, matrix=matrix, background=_opaque(job))
+        return None
+
+    def _scene(self, scene: Any) -> Any:
+        if isinstance(scene, (str, os.PathLike)):
+            scene = SceneFile(os.fspath(scene))
+        elif not isinstance(scene, Mesh | Scene) and not callable(scene):
+            scene = ForeignMesh(scene)
+        return self._shelf.get(scene) if callable(scene) else scene
+
+    def _rasterizer(self, size: tuple[int, int]) -> Rasterizer:
+        kept: Rasterizer | None = getattr(self._threads, "rasterizer", None)
+        if kept is None or kept.size != size:
+            kept = self._threads.rasterizer = Rasterizer(size, threads=1)
+        return kept
+
+
+def _let_go(error: BaseException | None) -> None:
+    """Free what the frames of an error hold, pictures among it: results carry errors for long."""
+    import traceback
+
+    while error is not None:
+        traceback.clear_frames(error.__traceback__)
+        error = error.__cause__ or error.__context__
+
+
+def _opaque(job: Job) -> tuple[int, int, int]:
+    """What JPEG shows for the background: white if it is transparent."""
+    color = tuple(job.options.get("background", (255, 255, 255)))
+    return color[:3] if len(color) < 4 or color[3] else (255, 255, 255)

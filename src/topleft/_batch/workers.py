@@ -1,0 +1,262 @@
+"""Crews: who draws the jobs of a batch, threads or processes, and how meshes reach them.
+
+Input: the `executor` of a batch, and jobs. Output: futures of outcomes.
+"""
+
+from __future__ import annotations
+
+import os
+from collections import OrderedDict
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from topleft._batch.jobs import Job, Outcome, Studio
+from topleft._lod.levels import Level, Levels, keep_levels
+from topleft._lod.simplify import levels_of
+from topleft._model.mesh import Mesh
+from topleft._model.scene import Scene
+from topleft.errors import MissingPackageError
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor, Future
+
+__all__ = ["Crew", "crew_of"]
+
+Jobs = Sequence[tuple[int, Job]]
+
+N_SPOOLED = 8
+"""Meshes whose files are kept for jobs to come, besides those that a job on the way needs."""
+
+
+def crew_of(executor: object) -> Crew | None:
+    """Return who draws: None for the calling thread.
+
+    Raises
+    ------
+    TypeError
+        If it is neither a number nor an executor.
+    ValueError
+        If the number is below 1.
+    """
+    if executor is None:
+        return None
+    if isinstance(executor, int) and not isinstance(executor, bool):
+        if executor < 1:
+            raise ValueError(f"executor must be at least 1 thread, got {executor}")
+        return ThreadCrew(executor)
+    from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
+
+    if not isinstance(executor, Executor):
+        raise TypeError(f"executor must be None, a number of threads or an Executor, got {type(executor).__name__}")
+    if isinstance(executor, ThreadPoolExecutor):
+        return HiredThreads(executor)
+    return ProcessCrew(executor) if isinstance(executor, ProcessPoolExecutor) else Strangers(executor)
+
+
+class Crew:
+    """Workers of an executor that the caller owns; jobs are sent as they are."""
+
+    def __init__(self, executor: Executor) -> None:
+        self._executor = executor
+        self.n_workers: int = getattr(executor, "_max_workers", 0) or os.cpu_count() or 1
+
+    def start(self) -> None:
+        """Get ready; called before the first job."""
+
+    def submit(self, jobs: Jobs) -> Future[list[Outcome]]:
+        """Put jobs on the way."""
+        raise NotImplementedError
+
+    def forget(self, jobs: Jobs) -> None:
+        """Let go of what jobs needed that are done."""
+
+    def revive(self) -> bool:
+        """Tell whether workers were lost by a fork and are there again."""
+        return False
+
+    def stop(self, futures: Sequence[Future[Any]]) -> None:
+        """Wait until what has begun is finished."""
+        from concurrent.futures import wait
+
+        wait(futures)
+
+
+class HiredThreads(Crew):
+    """Threads of the caller's executor: they see the meshes as they are."""
+
+    def start(self) -> None:
+        """Get ready."""
+        self._studio = Studio(max(4, 2 * self.n_workers))
+
+    def submit(self, jobs: Jobs) -> Future[list[Outcome]]:
+        """Put jobs on the way."""
+        return self._executor.submit(self._studio.draw, jobs)
+
+
+class ThreadCrew(HiredThreads):
+    """Threads of the batch's own, which end with it."""
+
+    def __init__(self, n_workers: int) -> None:
+        self.n_workers = n_workers
+
+    def start(self) -> None:
+        """Start no thread yet: they come with the first jobs."""
+        from concurrent.futures import ThreadPoolExecutor
+
+        super().start()
+        self._executor = ThreadPoolExecutor(self.n_workers, thread_name_prefix="topleft-batch")
+        self._pid = os.getpid()
+
+    def revive(self) -> bool:
+        """Begin anew in a forked child: the threads stayed with the parent, and so did locks that they held."""
+        if self._pid == os.getpid():
+            return False
+        self.start()
+        return True
+
+    def stop(self, futures: Sequence[Future[Any]]) -> None:  # noqa: ARG002
+        """Wait until what has begun is finished, then end the threads."""
+        if self._pid == os.getpid():
+            self._executor.shutdown(cancel_futures=True)
+
+
+class Strangers(Crew):
+    """Workers of which nothing is known, perhaps on other machines: each job carries all that it needs."""
+
+    def submit(self, jobs: Jobs) -> Future[list[Outcome]]:
+        """Put jobs on the way."""
+        return self._executor.submit(draw_in_process, str(os.getpid()), list(jobs))
+
+
+class ProcessCrew(Crew):
+    """Processes on this machine: meshes reach them through files that each reads once."""
+
+    def start(self) -> None:
+        """Get ready."""
+        self._spool = Spool()
+
+    def submit(self, jobs: Jobs) -> Future[list[Outcome]]:
+        """Put jobs on the way, their meshes replaced by where to find them."""
+        light = [(index, replace(job, scene=self._spool.hold(job.scene, _needs_levels(job)))) for index, job in jobs]
+        return self._executor.submit(draw_in_process, self._spool.token, light)
+
+    def forget(self, jobs: Jobs) -> None:
+        """Let go of their meshes."""
+        for _, job in jobs:
+            self._spool.release(job.scene, _needs_levels(job))
+
+    def stop(self, futures: Sequence[Future[Any]]) -> None:
+        """Wait until what has begun is finished, then remove the files."""
+        super().stop(futures)
+        self._spool.close()
+
+
+@dataclass(frozen=True)
+class SpooledScene:
+    """A mesh that another process has put into a file, and its levels of detail."""
+
+    path: str
+
+    def __call__(self) -> Any:
+        """Read it."""
+        import pickle
+
+        with open(self.path, "rb") as file:
+            scene, coarser = pickle.load(file)
+        for mesh, levels in coarser:
+            keep_levels(mesh, Levels(mesh, levels))
+        return scene
+
+
+@dataclass
+class _Spooled:
+    scene: Any  # held, so that no other object gets its id
+    at: SpooledScene
+    n_users: int = 0
+
+
+class Spool:
+    """Meshes in files of a temporary folder, each pickled once; those in use and the latest others."""
+
+    def __init__(self) -> None:
+        import tempfile
+
+        self._pid = os.getpid()
+        self._folder = tempfile.mkdtemp(prefix="topleft-")
+        self._entries: OrderedDict[tuple[int, bool], _Spooled] = OrderedDict()
+        self._n_written = 0
+
+    @property
+    def token(self) -> str:
+        """What tells this batch from others."""
+        return self._folder
+
+    def hold(self, scene: Any, with_levels: bool = False) -> Any:
+        """Return what stands for a mesh, which stays in its file until it is released; names stay as they are.
+
+        Levels of detail are made here where they are needed, once, and not in each worker.
+        """
+        if isinstance(scene, (str, os.PathLike)) or callable(scene):
+            return scene
+        key = id(scene), with_levels
+        entry = self._entries.get(key)
+        if entry is None:
+            import pickle
+
+            path = Path(self._folder, f"{self._n_written}.pickle")
+            self._n_written += 1
+            coarser = coarser_levels_of(scene) if with_levels else []
+            with open(path, "xb") as file:
+                pickle.dump((scene, coarser), file, pickle.HIGHEST_PROTOCOL)
+            entry = self._entries[key] = _Spooled(scene, SpooledScene(str(path)))
+            self._trim()
+        self._entries.move_to_end(key)
+        entry.n_users += 1
+        return entry.at
+
+    def release(self, scene: Any, with_levels: bool = False) -> None:
+        """One job less needs it."""
+        entry = self._entries.get((id(scene), with_levels))
+        if entry is not None:
+            entry.n_users -= 1
+
+    def _trim(self) -> None:
+        idle = [key for key, entry in self._entries.items() if not entry.n_users]
+        for key in idle[: max(0, len(self._entries) - N_SPOOLED)]:
+            os.unlink(self._entries.pop(key).at.path)
+
+    def close(self) -> None:
+        """Remove the files; in a forked child they are the parent's."""
+        import shutil
+
+        if self._pid == os.getpid():
+            shutil.rmtree(self._folder, ignore_errors=True)
+
+
+def coarser_levels_of(scene: Any) -> list[tuple[Mesh, tuple[Level, ...]]]:
+    """The meshes of a scene, each with its coarser levels; none where they cannot be made, which the job will tell."""
+    if not isinstance(scene, Mesh | Scene):
+        return []
+    meshes = [scene] if isinstance(scene, Mesh) else [instance.mesh for instance in scene]
+    try:
+        return [(mesh, levels_of(mesh)[1:]) for mesh in dict.fromkeys(meshes)]
+    except MissingPackageError:
+        return []
+
+
+def _needs_levels(job: Job) -> bool:
+    """Tell whether a job may be drawn with levels of detail."""
+    return bool(job.options.get("tolerance", 0))
+
+
+_studio: tuple[str, Studio] | None = None
+
+
+def draw_in_process(token: str, jobs: Jobs) -> list[Outcome]:
+    """Draw jobs in a worker process, which keeps what it has read for the rest of the batch."""
+    global _studio
+    if _studio is None or _studio[0] != token:
+        _studio = token, Studio()
+    return _studio[1].draw(jobs)

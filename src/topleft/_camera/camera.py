@@ -1,0 +1,400 @@
+"""Cameras: from world to clip space, as two 4x4 matrices made from words (eye, target, field of view, intrinsics).
+
+Spaces: world; eye (OpenGL: x right, y up, the view along -z); clip (OpenGL: -w <= x, y, z <= w inside).
+Matrices act on columns: `clip = projection @ view @ [x, y, z, 1]`. A lens bends what the view sees before that.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft._camera.lens import Lens, lens_of_opencv
+from topleft._camera.poses import (
+    FRAMING_MARGIN,
+    THREE_QUARTER_DEG,
+    bounding_sphere,
+    box_corners,
+    distance_to_fit,
+    orbit_view,
+    points_to_frame,
+    view_matrix,
+)
+from topleft._camera.projections import (
+    F64,
+    as_square,
+    as_vector,
+    box_matrix,
+    check_fov,
+    check_planes,
+    check_positive,
+    check_regular,
+    frustum_matrix,
+    orthographic_matrix,
+    perspective_matrix,
+)
+from topleft._model.adapt import MeshLike
+
+__all__ = [
+    "DEFAULT_FOV_Y_DEG", "THREE_QUARTER_DEG", "Camera", "bounding_sphere", "orbit_view", "perspective_matrix",
+    "view_matrix",
+]  # fmt: skip
+
+DEFAULT_FOV_Y_DEG = 40.0
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """Where the camera stands and how it projects.
+
+    Parameters
+    ----------
+    view : (4, 4) array_like
+        Eye from world. Eye axes are those of OpenGL: x right, y up, the view along -z.
+    projection : (4, 4) array_like
+        Clip from eye, OpenGL clip space.
+    aspect : float, optional
+        Width / height of the picture that `projection` was made for. `clip_from_world` then widens or narrows the
+        field of view to that of the picture and leaves its height alone. `None`: `projection` is taken as it is, and
+        a picture of another shape is stretched.
+    lens : OpenCVLens or FisheyeLens, optional
+        Bends the rays before `projection`, which must have perspective, sees them; without one they are straight.
+
+    Raises
+    ------
+    ValueError
+        If a matrix has another shape or a number that is not finite, if `aspect` is not positive, or if there is a lens
+        and no perspective.
+
+    Examples
+    --------
+    >>> camera = Camera.look_at(eye=(0, 0, 5), target=(0, 0, 0), fov_y_deg=90)
+    >>> clip = camera.clip_from_world((200, 100)) @ [10, 0, 0, 1]
+    >>> round(float(clip[0] / clip[3]), 6)
+    1.0
+    """
+
+    view: F64
+    projection: F64
+    aspect: float | None = None
+    lens: Lens | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("view", "projection"):
+            matrix = as_square(getattr(self, name), 4, name)
+            matrix.flags.writeable = False
+            object.__setattr__(self, name, matrix)
+        if self.aspect is not None:
+            check_positive("aspect", self.aspect)
+        if self.lens is not None and not np.array_equal(self.projection[3], [0, 0, -1, 0]):
+            raise ValueError(
+                f"a lens needs a projection whose last row is [0, 0, -1, 0], got {self.projection[3].tolist()}"
+            )
+
+    def clip_from_world(self, size: tuple[int, int]) -> F64:
+        """The matrix (4, 4) float64 that `rasterize` takes as `transform=`, for a picture of this size.
+
+        Parameters
+        ----------
+        size : (width, height), pixels
+            An empty picture gets the matrix of a square one.
+
+        Raises
+        ------
+        ValueError
+            If the camera has a lens, which no matrix describes: `rasterize_mesh` and `render` draw through it, and
+            `straightened` leaves it out.
+        """
+        if self.lens is not None:
+            raise ValueError("no matrix describes a camera with a lens; rasterize_mesh draws through it")
+        return self.clip_from_eye(size) @ self.view
+
+    def clip_from_eye(self, size: tuple[int, int]) -> F64:
+        """The projection (4, 4) float64 for a picture of this size; with a lens it acts on what the lens has bent."""
+        width, height = size
+        projection = self.projection.copy()
+        if self.aspect is not None and width > 0 and height > 0:
+            projection[0] = projection[0] * (self.aspect * height) / width
+        return projection
+
+    def straightened(self) -> Camera:
+        """The same camera without its lens."""
+        return replace(self, lens=None)
+
+    def project(self, points: npt.ArrayLike, size: tuple[int, int]) -> F64:
+        """Where world points lie in a picture.
+
+        Parameters
+        ----------
+        points : (N, 3) array_like
+            World positions.
+        size : (width, height), pixels
+
+        Returns
+        -------
+        (N, 3) float64
+            x and y in pixels (the centre of the top-left pixel is (0.5, 0.5)) and window depth, 0 near and 1 far.
+            Whatever a point behind the eye gives is not in the picture.
+
+        Raises
+        ------
+        ValueError
+            If the points have another shape.
+
+        Examples
+        --------
+        >>> Camera.look_at((0, 0, 5)).project([(0, 0, 0)], (200, 100))[0, :2].tolist()
+        [100.0, 50.0]
+        """
+        world = np.asarray(points, dtype=np.float64)
+        if world.ndim != 2 or world.shape[1] != 3:
+            raise ValueError(f"points must have shape (N, 3), got {world.shape}")
+        eye = world @ self.view[:3, :3].T + self.view[:3, 3]
+        if self.lens is not None:
+            eye = self.lens.bend(eye)
+        projection = self.clip_from_eye(size)
+        clip = eye @ projection[:, :3].T + projection[:, 3]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ndc = clip[:, :3] / clip[:, 3:]
+        width, height = size
+        return np.stack([(ndc[:, 0] + 1) * (width / 2), (1 - ndc[:, 1]) * (height / 2), (ndc[:, 2] + 1) / 2], axis=1)
+
+    @classmethod
+    def perspective(
+        cls, view: npt.ArrayLike, *, near: float, far: float, fov_y_deg: float = DEFAULT_FOV_Y_DEG
+    ) -> Camera:
+        """A pinhole camera with a field of view of `fov_y_deg` from the bottom to the top of the picture.
+
+        Parameters
+        ----------
+        view : (4, 4) array_like
+            Eye from world; `view_matrix` makes one.
+        near, far : float
+            Distances of the planes in front of the eye, world units, 0 < near < far.
+        fov_y_deg : float
+            Degrees, between 0 and 180.
+
+        Raises
+        ------
+        ValueError
+            If the field of view or the planes are outside their range.
+        """
+        return cls(as_square(view, 4, "view"), perspective_matrix(fov_y_deg, near, far), aspect=1.0)
+
+    @classmethod
+    def orthographic(cls, view: npt.ArrayLike, *, near: float, far: float, height: float) -> Camera:
+        """A camera without perspective that sees `height` world units from the bottom to the top of the picture.
+
+        Parameters
+        ----------
+        view : (4, 4) array_like
+            Eye from world; `view_matrix` makes one.
+        near, far : float
+            Distances of the planes in front of the eye, world units, near < far; negative ones lie behind it.
+        height : float
+            World units, positive.
+
+        Raises
+        ------
+        ValueError
+            If the height or the planes are outside their range.
+        """
+        return cls(as_square(view, 4, "view"), orthographic_matrix(height, near, far), aspect=1.0)
+
+    @classmethod
+    def off_center(
+        cls,
+        view: npt.ArrayLike,
+        *,
+        left: float,
+        right: float,
+        bottom: float,
+        top: float,
+        near: float,
+        far: float,
+        ortho: bool = False,
+    ) -> Camera:
+        """A camera whose axis need not pass through the middle of its picture: part of a wall of screens, say.
+
+        Parameters
+        ----------
+        view : (4, 4) array_like
+            Eye from world; `view_matrix` makes one.
+        left, right, bottom, top : float
+            Sides of the picture in the plane at `near`, world units from the axis, as for glFrustum and glOrtho. A
+            picture of another shape is stretched.
+        near, far : float
+            Distances of the planes in front of the eye, world units, near < far; with perspective 0 < near.
+        ortho : bool
+            Without perspective.
+
+        Raises
+        ------
+        ValueError
+            If the sides or the planes are out of order.
+        """
+        matrix = (box_matrix if ortho else frustum_matrix)(left, right, bottom, top, near, far)
+        return cls(as_square(view, 4, "view"), matrix)
+
+    @classmethod
+    def look_at(
+        cls,
+        eye: npt.ArrayLike,
+        target: npt.ArrayLike = (0.0, 0.0, 0.0),
+        up: npt.ArrayLike = (0.0, 1.0, 0.0),
+        *,
+        fov_y_deg: float = DEFAULT_FOV_Y_DEG,
+        ortho_height: float | None = None,
+        near: float | None = None,
+        far: float | None = None,
+    ) -> Camera:
+        """A camera at `eye` that has `target` in the middle of its picture.
+
+        Parameters
+        ----------
+        eye, target : (3,) array_like
+            World positions.
+        up : (3,) array_like
+            The world direction that points up in the picture; not parallel to the view.
+        fov_y_deg : float
+            Field of view from bottom to top, degrees; not looked at when `ortho_height` is given.
+        ortho_height : float, optional
+            Makes the camera orthographic, with that many world units from bottom to top.
+        near, far : float, optional
+            Distances of the planes; a hundredth and a hundred times the distance of the target unless given.
+
+        Raises
+        ------
+        ValueError
+            If eye and target coincide, `up` is parallel to the view, or another number is outside its range.
+        """
+        view = view_matrix(eye, target, up)
+        distance = float(np.linalg.norm(as_vector(target, "target") - as_vector(eye, "eye")))
+        near = 0.01 * distance if near is None else near
+        far = 100 * distance if far is None else far
+        if ortho_height is not None:
+            return cls.orthographic(view, near=near, far=far, height=ortho_height)
+        return cls.perspective(view, near=near, far=far, fov_y_deg=fov_y_deg)
+
+    @classmethod
+    def from_intrinsics(
+        cls,
+        intrinsics: npt.ArrayLike,
+        camera_from_world: npt.ArrayLike,
+        size: tuple[int, int],
+        *,
+        near: float,
+        far: float,
+        distortion: npt.ArrayLike | None = None,
+        fisheye: npt.ArrayLike | None = None,
+    ) -> Camera:
+        """The camera of a calibrated photograph, in the convention of OpenCV.
+
+        Parameters
+        ----------
+        intrinsics : (3, 3) array_like
+            `[[fx, skew, cx], [0, fy, cy], [0, 0, 1]]`, pixels.
+        camera_from_world : (4, 4) array_like
+            The pose. Camera axes are those of OpenCV: x right, y down, z forward.
+        size : (width, height), pixels
+            The picture that the intrinsics belong to. A picture rendered at another size is that one, scaled.
+        near, far : float
+            Distances of the planes along z, world units, 0 < near < far. With `fisheye` they are spheres.
+        distortion : (4,), (5,) or (8,) array_like, optional
+            `k1, k2, p1, p2[, k3[, k4, k5, k6]]` as `cv2.calibrateCamera` returns them.
+        fisheye : (4,) array_like, optional
+            `k1, k2, k3, k4` as `cv2.fisheye.calibrate` returns them. Not together with `distortion`.
+
+        Raises
+        ------
+        ValueError
+            If a matrix has another shape, is singular or has another last row, or a number is outside its range.
+
+        Notes
+        -----
+        OpenCV puts the centre of the top-left pixel at (0, 0), `topleft` at (0.5, 0.5). So the point that the matrix
+        projects to (u, v) is drawn at x_px = u + 0.5, y_px = v + 0.5: in the same pixel.
+        """
+        matrix = as_square(intrinsics, 3, "intrinsics")
+        pose = as_square(camera_from_world, 4, "camera_from_world")
+        width, height = size
+        check_positive("width", width)
+        check_positive("height", height)
+        check_planes(near, far)
+        if not np.array_equal(matrix[2], [0, 0, 1]):
+            raise ValueError(f"the last row of intrinsics must be [0, 0, 1], got {matrix[2].tolist()}")
+        if not np.array_equal(pose[3], [0, 0, 0, 1]):
+            raise ValueError(f"the last row of camera_from_world must be [0, 0, 0, 1], got {pose[3].tolist()}")
+        check_regular(matrix, "intrinsics")
+        check_regular(pose, "camera_from_world")
+        px_of_center = np.array([[1, 0, 0.5], [0, 1, 0.5], [0, 0, 1]])
+        ndc_of_px = np.array([[2 / width, 0, -1], [0, -2 / height, 1], [0, 0, 1]])
+        eye_of_camera = np.diag([1.0, -1.0, -1.0, 1.0])
+        projection = perspective_matrix(90, near, far)
+        projection[:2, :3] = (ndc_of_px @ px_of_center @ matrix)[:2] @ eye_of_camera[:3, :3]
+        return cls(eye_of_camera @ pose, projection, lens=lens_of_opencv(distortion, fisheye))
+
+    @classmethod
+    def framing(
+        cls,
+        subject: MeshLike | npt.ArrayLike,
+        *,
+        azimuth_deg: float = THREE_QUARTER_DEG[0],
+        elevation_deg: float = THREE_QUARTER_DEG[1],
+        fov_y_deg: float = DEFAULT_FOV_Y_DEG,
+        up: Literal["y", "z"] = "y",
+        ortho: bool = False,
+        aspect: float = 1.0,
+        fit: Literal["sphere", "box", "points"] = "sphere",
+    ) -> Camera:
+        """A camera that has the whole subject just inside its frame; three-quarter view by default.
+
+        Parameters
+        ----------
+        subject : mesh, or (N, 3) array_like
+            Whatever `as_mesh` takes, of which the vertices in use count, or points: the two corners of a box, say.
+        azimuth_deg : float
+            0 looks at the front of the subject (+z with y up, -y with z up), 90 at its right (+x). Degrees.
+        elevation_deg : float
+            0 is level, 90 looks straight down. Degrees, -90 to 90.
+        fov_y_deg : float
+            Field of view from bottom to top, degrees. Sets the distance from which `ortho` is seen, too.
+        up : {"y", "z"}
+            The axis of the world that points up.
+        ortho : bool
+            Without perspective.
+        aspect : float
+            Width / height of the picture to be made.
+        fit : {"sphere", "box", "points"}
+            What just fits: the sphere round the subject, which keeps its size from every side; its box; or all of its
+            points, which comes nearest.
+
+        Raises
+        ------
+        ValueError
+            If there is nothing to frame or a number is outside its range.
+        """
+        center, radius = bounding_sphere(subject)
+        check_fov(fov_y_deg)
+        check_positive("aspect", aspect)
+        if fit not in ("sphere", "box", "points"):
+            raise ValueError(f'fit must be "sphere", "box" or "points", got {fit!r}')
+        tan_y = np.tan(np.radians(fov_y_deg) / 2)
+        # The sphere touches the pyramid of view at sin, not tan, of the half angle.
+        distance = radius * FRAMING_MARGIN / np.sin(np.arctan(tan_y * min(1.0, aspect)))
+        height = 2 * radius * FRAMING_MARGIN / min(1.0, aspect)
+        if fit != "sphere":
+            turn = orbit_view((0, 0, 0), 1.0, azimuth_deg, elevation_deg, up=up)[:3, :3]
+            points = box_corners(subject) if fit == "box" else points_to_frame(subject)
+            points = (points - center) @ turn.T
+            distance = distance_to_fit(points, tan_y * aspect, tan_y)
+            height = 2 * FRAMING_MARGIN * max(np.abs(points[:, 1]).max(), np.abs(points[:, 0]).max() / aspect)
+            height = height or 2 * FRAMING_MARGIN
+        view = orbit_view(center, distance, azimuth_deg, elevation_deg, up=up)
+        near, far = max(distance - 1.01 * radius, 1e-3 * radius), distance + 1.01 * radius
+        if ortho:
+            return cls.orthographic(view, near=near, far=far, height=height)
+        return cls.perspective(view, near=near, far=far, fov_y_deg=fov_y_deg)

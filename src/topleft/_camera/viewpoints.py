@@ -1,0 +1,122 @@
+"""Viewpoints: many cameras round one subject.
+
+Input: a subject and how many. Output: a list of `Camera`, each made by `Camera.framing`.
+
+Based on: Gonzalez, A., "Measurement of Areas on a Sphere Using Fibonacci and Latitude-Longitude Lattices", Mathematical
+Geosciences 42, 2010.
+"""
+
+from __future__ import annotations
+
+import operator
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft._camera.camera import Camera
+from topleft._camera.poses import THREE_QUARTER_DEG, bounding_sphere
+from topleft._model.adapt import MeshLike
+
+GOLDEN_ANGLE_DEG = 180 * (3 - 5**0.5)
+
+
+def turntable(
+    subject: MeshLike | npt.ArrayLike,
+    n: int,
+    *,
+    azimuth_deg: float = THREE_QUARTER_DEG[0],
+    elevation_deg: float = THREE_QUARTER_DEG[1],
+    **framing: Any,
+) -> list[Camera]:
+    """Cameras that go once round the subject at one height, in equal steps.
+
+    Parameters
+    ----------
+    subject : mesh, or (N, 3) array_like
+        As for `Camera.framing`.
+    n : int
+        How many, at least 1.
+    azimuth_deg, elevation_deg : float
+        Of the first one; the next stands at a larger azimuth. Degrees.
+    **framing
+        Other options of `Camera.framing`: `up="z"`, `fov_y_deg=`, `aspect=`.
+
+    Returns
+    -------
+    list of Camera
+
+    Raises
+    ------
+    ValueError
+        If `n` is below 1, or as `Camera.framing` does.
+    TypeError
+        If `n` is no integer.
+
+    Examples
+    --------
+    >>> len(turntable([(-1, -1, -1), (1, 1, 1)], 12))
+    12
+    """
+    n = _count(n)
+    sphere = _corners_of_sphere(subject) if framing.get("fit", "sphere") == "sphere" else subject
+    return [
+        Camera.framing(sphere, azimuth_deg=azimuth_deg + 360 * i / n, elevation_deg=elevation_deg, **framing)
+        for i in range(n)
+    ]
+
+
+def viewpoints(subject: MeshLike | npt.ArrayLike, n: int, **framing: Any) -> list[Camera]:
+    """Cameras spread evenly over the sphere round the subject, from the top to the bottom.
+
+    Parameters
+    ----------
+    subject : mesh, or (N, 3) array_like
+        As for `Camera.framing`.
+    n : int
+        How many, at least 1.
+    **framing
+        Other options of `Camera.framing`: `up="z"`, `fov_y_deg=`, `aspect=`.
+
+    Returns
+    -------
+    list of Camera
+
+    Raises
+    ------
+    ValueError
+        If `n` is below 1, or as `Camera.framing` does.
+    TypeError
+        If `n` is no integer.
+
+    Notes
+    -----
+    The lattice of Fibonacci: camera i of n stands at the height 1 - (2 i + 1) / n of the unit sphere, the golden angle
+    round from the one before. Each has the same share of the sphere's area to itself.
+
+    Examples
+    --------
+    >>> eye = [-camera.view[:3, :3].T @ camera.view[:3, 3] for camera in viewpoints([(-1, -1, -1), (1, 1, 1)], 100)]
+    >>> bool(np.abs(np.mean(eye, axis=0)).max() < 0.05)
+    True
+    """
+    n = _count(n)
+    sphere = _corners_of_sphere(subject) if framing.get("fit", "sphere") == "sphere" else subject
+    height = 1 - (2 * np.arange(n) + 1) / n
+    return [
+        Camera.framing(sphere, azimuth_deg=i * GOLDEN_ANGLE_DEG % 360, elevation_deg=elevation_deg, **framing)
+        for i, elevation_deg in enumerate(np.degrees(np.arcsin(height)).tolist())
+    ]
+
+
+def _count(n: int) -> int:
+    n = operator.index(n)
+    if n < 1:
+        raise ValueError(f"n must be at least 1, got {n}")
+    return n
+
+
+def _corners_of_sphere(subject: MeshLike | npt.ArrayLike) -> npt.NDArray[np.float64]:
+    """Two points with the sphere of the subject: the mesh is looked at once, not for every camera."""
+    center, radius = bounding_sphere(subject)
+    return np.stack([center - [radius, 0, 0], center + [radius, 0, 0]])

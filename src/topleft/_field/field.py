@@ -1,0 +1,261 @@
+"""Fields: values on an unstructured mesh, and heights of its surface, on a regular grid.
+
+Input: a mesh, values of its vertices or faces, a `Grid`. Output: an array (H, W), NaN where nothing is.
+
+Based on: Gold, C. M., T. D. Charters and J. Ramsden, "Automated Contour Mapping Using Triangular Element Data
+Structures and an Interpolant over Each Irregular Triangular Domain", SIGGRAPH 1977 (the plane through each triangle).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft import _engine
+from topleft._base.arrays import as_array, as_checked_triangles
+from topleft._base.memory import SCRATCH
+from topleft._base.options import Per, Sink, parse
+from topleft._base.threads import count_threads, run_parts
+from topleft._field.grid import Extent, Grid, grid_around
+from topleft._model.adapt import MeshLike, Surface, as_surface
+from topleft._raster.rasterize import canvas_of, draw
+from topleft._raster.snap import snap_scene
+from topleft._raster.view import View
+
+F64 = npt.NDArray[np.float64]
+I32 = npt.NDArray[np.int32]
+
+
+#: Pixels a triangle. With fewer it pays to compute all planes first: 200,000 triangles at 1080p.
+MAX_PIXELS_TO_LIST = 48
+
+#: They take 64 bytes each, which the thread's scratch memory keeps.
+MAX_LISTED_PLANES = 1_000_000
+
+
+def field(
+    mesh: MeshLike,
+    values: npt.ArrayLike,
+    size: tuple[int, int] | Grid | None = None,
+    *,
+    extent: Extent | None = None,
+    pixel_size: float | tuple[float, float] | None = None,
+    y: str = "up",
+    per: str = "auto",
+    subpixel_bits: int = 8,
+    threads: int | None = None,
+    out: npt.NDArray[Any] | None = None,
+) -> npt.NDArray[np.floating[Any]]:
+    """Return a field of an unstructured mesh on a regular grid, one value a pixel.
+
+    Parameters
+    ----------
+    mesh : matplotlib.tri.Triangulation, meshio.Mesh, pyvista.PolyData, (points, triangles), ...
+        Whatever `as_mesh` takes; z is not looked at. Where triangles overlap, the later one is seen.
+    values : array_like of real numbers, shape (V,) per vertex or (F,) per face
+        Faces are the triangles, or the polygons that they were cut from. A NaN makes its triangles NaN.
+    size : (width, height) or Grid, optional
+        How many pixels; or the grid, which then says all.
+    extent : (x_min, x_max, y_min, y_max), optional
+        What the picture shows, data units; the box of the mesh unless given.
+    pixel_size : float or (float, float), optional
+        Width and height of a pixel, data units, instead of `size`; see `Grid.around`.
+    y : {"up", "down"}
+        "up": row 0 is at y_max, as on a map; "down": row 0 is at y_min. See `Grid`.
+    per : {"auto", "vertex", "triangle"}
+        What a value belongs to; "auto" tells by their number.
+    subpixel_bits, threads
+        As in `coverage`.
+    out : ndarray of the dtype of the result, shape (H, W), optional
+        Where the result goes. A fresh array costs its first touch.
+
+    Returns
+    -------
+    ndarray of float32, or float64 unless `values` are float32, shape (H, W)
+        Linear over each triangle, or constant; NaN outside of the mesh.
+
+    Raises
+    ------
+    ValueError
+        If the number of values fits neither, or both; if a point in use is not finite; or as `Grid.around`.
+    TypeError
+        If the values are no real numbers, or the mesh is none.
+
+    Notes
+    -----
+    Each pixel belongs to the triangle that owns its centre, by the top-left rule on vertices that are rounded to
+    ``2**-subpixel_bits`` pixels: there are neither gaps nor doubles. The value is that of the exact triangle's plane at
+    the centre in float64, kept within the three values of the triangle. Points go to pixels in float64, the difference
+    to the extent first, so large coordinates (UTM, say) lose nothing: a point is off by less than 2**-51 of its
+    distance from that side, before it is rounded to the grid above.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> tl.field(([[0, 0], [4, 0], [0, 4]], [[0, 1, 2]]), [0.0, 4.0, 8.0], (4, 4))
+    array([[7.5, nan, nan, nan],
+           [5.5, 6.5, nan, nan],
+           [3.5, 4.5, 5.5, nan],
+           [1.5, 2.5, 3.5, 4.5]])
+    """
+    surface = as_surface(mesh)
+    points = _plane_points(surface)
+    array = as_array("values", values)
+    if array.dtype.kind not in "fiub":
+        raise TypeError(f"values must be real numbers, got dtype {array.dtype}")
+    is_per_face = _is_per_face(array, len(points), surface.n_faces, parse(Per, "per", per))
+    grid = _grid_of(surface, size, pixel_size, extent, y)
+    points_px, triangles = grid.to_pixels(points), as_checked_triangles(surface.triangles, len(points))
+    view = View.parse(grid.size, {"subpixel_bits": subpixel_bits, "threads": threads})
+    ids = _visible(points_px, triangles, view, Sink.LABEL)
+    dtype = np.float32 if array.dtype == np.float32 else np.float64
+    if is_per_face:
+        own = array if surface.faces is None else array[surface.faces]
+        with canvas_of(SCRATCH, "field", out, ids.shape, dtype) as (result, canvas):
+            np.take(np.append(own, np.nan).astype(dtype), ids, out=canvas, mode="wrap")  # id -1 is the last
+        return result
+    return _on_planes(ids, points_px, triangles, array.astype(np.float64, copy=False), dtype, view, out)
+
+
+def height_map(
+    mesh: MeshLike,
+    spacing: float | tuple[float, float] | Grid,
+    *,
+    surface: str = "upper",
+    extent: Extent | None = None,
+    y: str = "up",
+    subpixel_bits: int = 8,
+    threads: int | None = None,
+    out: F64 | None = None,
+) -> F64:
+    """Return the heights of the upper or lower surface of a mesh on a regular grid, seen along z.
+
+    Parameters
+    ----------
+    mesh : mesh with points (V, 3)
+        Whatever `as_mesh` takes; z is the height.
+    spacing : float, (float, float) or Grid
+        Width and height of a pixel, in the units of the mesh; or the grid, which then says all.
+    surface : {"upper", "lower"}
+        Whether the largest or the smallest height counts.
+    extent : (x_min, x_max, y_min, y_max), optional
+        What the picture shows; the box of the mesh unless given.
+    y : {"up", "down"}
+        "up": row 0 is at y_max, as on a map; "down": row 0 is at y_min. See `Grid`.
+    subpixel_bits, threads
+        As in `coverage`.
+    out : ndarray of float64, shape (H, W), optional
+        Where the result goes. A fresh array costs its first touch.
+
+    Returns
+    -------
+    ndarray of float64, shape (H, W)
+        z of the surface at the pixel centres (`Grid.around(mesh, pixel_size=spacing)` tells where they are), NaN where
+        there is none.
+
+    Raises
+    ------
+    ValueError
+        If the points are flat, one in use is not finite, an option is unknown, or as `Grid.around`.
+    TypeError
+        If the mesh is none.
+
+    Notes
+    -----
+    A depth buffer in float32 only decides which triangle is seen: of surfaces closer to each other than 2**-22 of the
+    range of heights either may be taken. The height is then that of the triangle's exact plane, in float64.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> tl.height_map(([[0, 0, 1], [2, 0, 1], [0, 2, 3]], [[0, 1, 2]]), 1.0)
+    array([[2.5, nan],
+           [1.5, 1.5]])
+    """
+    if surface not in ("upper", "lower"):
+        raise ValueError(f'surface must be "upper" or "lower", got {surface!r}')
+    shape = as_surface(mesh)
+    points = _plane_points(shape)
+    if points.shape[1] != 3:
+        raise ValueError(f"a height map needs points of shape (V, 3), got {points.shape}")
+    is_grid = isinstance(spacing, Grid)
+    grid = _grid_of(shape, spacing, None, extent, y) if is_grid else _grid_of(shape, None, spacing, extent, y)
+    triangles = as_checked_triangles(shape.triangles, len(points))
+    points_px, heights = grid.to_pixels(points), np.ascontiguousarray(points[:, 2], np.float64)
+    view = View.parse(grid.size, {"subpixel_bits": subpixel_bits, "threads": threads})
+    sink = Sink.FARTHEST if surface == "upper" else Sink.NEAREST
+    ids = _visible(np.column_stack([points_px, _depth_of(heights, triangles)]), triangles, view, sink)
+    return _on_planes(ids, points_px, triangles, heights, np.float64, view, out)
+
+
+def _plane_points(surface: Surface) -> npt.NDArray[Any]:
+    points = as_array("points", surface.points)
+    if points.ndim != 2 or points.shape[1] not in (2, 3):
+        raise ValueError(f"points must have shape (V, 2) or (V, 3), got {points.shape}")
+    if points.dtype.kind not in "fiu":
+        raise TypeError(f"points must be real numbers, got dtype {points.dtype}")
+    return points
+
+
+def _grid_of(surface: Surface, size: Any, pixel_size: Any, extent: Extent | None, y: str) -> Grid:
+    if isinstance(size, Grid):
+        if extent is not None or pixel_size is not None or y != "up":
+            raise ValueError("a Grid says extent, pixel_size and y itself: give none of them beside it")
+        return size
+    return grid_around(surface, size, pixel_size, extent, y)
+
+
+def _is_per_face(values: npt.NDArray[Any], n_vertices: int, n_faces: int, per: Per) -> bool:
+    fits_vertices, fits_faces = values.shape == (n_vertices,), values.shape == (n_faces,)
+    if per is Per.AUTO and fits_vertices and fits_faces:
+        raise ValueError(
+            f"values has {n_faces} numbers, and there are as many faces as vertices: "
+            "say per='triangle' or per='vertex'"
+        )
+    if fits_faces and per is not Per.VERTEX:
+        return True
+    if fits_vertices and per is not Per.TRIANGLE:
+        return False
+    wishes = {Per.VERTEX: f"({n_vertices},)", Per.TRIANGLE: f"({n_faces},)"}
+    wish = wishes.get(per, f"({n_vertices},) per vertex or ({n_faces},) per face")
+    raise ValueError(f"values must have shape {wish}, got {values.shape}")
+
+
+def _depth_of(heights: F64, triangles: I32) -> F64:
+    """The heights that count as -1 to 1: what float32 tells apart best."""
+    used: F64 = heights[triangles]
+    with np.errstate(invalid="ignore", over="ignore"):
+        low, high = (used.min(), used.max()) if used.size else (0.0, 0.0)
+        middle, half = float(low / 2 + high / 2), float(high / 2 - low / 2)
+        depth: F64 = np.divide(np.subtract(heights, middle), half or 1.0)
+    return depth
+
+
+def _visible(points: F64, triangles: I32, view: View, sink: Sink) -> I32:
+    """Ids (H, W) of the triangles that show, in memory that the thread's next call overwrites."""
+    snapped = snap_scene(SCRATCH, points, triangles, view, with_depth=sink is not Sink.LABEL, out=None)
+    ids: I32 = SCRATCH.empty("labels", view.size[::-1], np.int32)
+    depth = None if sink is Sink.LABEL else SCRATCH.empty("depth of heights", ids.shape, np.float32)
+    draw(SCRATCH, snapped, view, sink, ids, depth=depth)
+    return ids
+
+
+def _on_planes(
+    ids: I32, points_px: F64, triangles: I32, values: F64, dtype: type[np.floating[Any]], view: View, out: object
+) -> npt.NDArray[Any]:
+    n, n_threads = len(triangles), count_threads(view.threads, len(triangles))
+    planes: F64 | None = None
+    if ids.size < MAX_PIXELS_TO_LIST * n and n < MAX_LISTED_PLANES:
+        planes = SCRATCH.empty("planes", ((1 + n) * _engine.PLANE_DOUBLES,), np.float64)
+    valued = _engine.Valued(points_px, triangles, np.ascontiguousarray(values), planes)
+    if planes is not None:
+        run_parts(valued.list_planes, n, n_threads)
+    with canvas_of(SCRATCH, "field", out, ids.shape, dtype) as (result, canvas):
+
+        def fill_rows(first: int, end: int) -> None:
+            valued.fill_planes(ids, canvas, first, end - first)
+
+        run_parts(fill_rows, ids.shape[0], n_threads)
+    return result

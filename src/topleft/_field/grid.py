@@ -1,0 +1,166 @@
+"""Regular grids over data: which part of the plane a picture shows, in units of the data.
+
+Input: an extent and a size, or what the grid is to be laid round. Output: `Grid`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft._base.arrays import as_size
+from topleft._model.adapt import MeshLike, Surface, as_surface
+
+F64 = npt.NDArray[np.float64]
+Extent = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True)
+class Grid:
+    """A picture laid over the plane of the data.
+
+    Parameters
+    ----------
+    size : (width, height), pixels
+    extent : (x_min, x_max, y_min, y_max)
+        Outer sides of the outermost pixels, data units; the order of matplotlib's `imshow(extent=)`.
+    y : {"up", "down"}
+        Where y grows in the picture. "up": row 0 is at `y_max`, as on a map (`imshow(origin="upper")`); "down": row 0
+        is at `y_min` (`origin="lower"`).
+
+    Raises
+    ------
+    ValueError
+        If the extent is empty or not finite, or `y` is neither "up" nor "down".
+
+    Examples
+    --------
+    >>> grid = Grid((4, 2), (500000.0, 500002.0, 10.0, 11.0))
+    >>> grid.pixel_size
+    (0.5, 0.5)
+    >>> grid.y_centers.tolist()
+    [10.75, 10.25]
+    """
+
+    size: tuple[int, int]
+    extent: Extent
+    y: str = "up"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "size", as_size(self.size))
+        try:
+            x_min, x_max, y_min, y_max = map(float, self.extent)
+        except (TypeError, ValueError):
+            raise ValueError(f"extent must be (x_min, x_max, y_min, y_max), got {self.extent!r}") from None
+        if not (np.isfinite([x_min, x_max, y_min, y_max]).all() and x_min < x_max and y_min < y_max):
+            raise ValueError(
+                f"extent must be finite with x_min < x_max and y_min < y_max, got {x_min}, {x_max}, {y_min}, {y_max}"
+            )
+        object.__setattr__(self, "extent", (x_min, x_max, y_min, y_max))
+        if self.y not in ("up", "down"):
+            raise ValueError(f'y must be "up" or "down", got {self.y!r}')
+
+    @classmethod
+    def around(
+        cls,
+        subject: MeshLike,
+        *,
+        size: tuple[int, int] | None = None,
+        pixel_size: float | tuple[float, float] | None = None,
+        extent: Extent | None = None,
+        y: str = "up",
+    ) -> Grid:
+        """The grid round a mesh, of so many pixels or of pixels so large.
+
+        Parameters
+        ----------
+        subject : mesh
+            Whatever `as_mesh` takes; x and y of the points that its triangles use count.
+        size : (width, height), optional
+            How many pixels.
+        pixel_size : float or (float, float), optional
+            Width and height of a pixel, data units; instead of `size`. The grid begins at (x_min, y_min) of the extent
+            and has as many whole pixels as cover it.
+        extent : (x_min, x_max, y_min, y_max), optional
+            Data units; the box of the mesh unless given.
+        y : {"up", "down"}
+            As for `Grid`.
+
+        Raises
+        ------
+        ValueError
+            If neither or both of `size` and `pixel_size` are given, the mesh has no triangles or no area, or a number
+            is outside its range.
+        """
+        return grid_around(as_surface(subject), size, pixel_size, extent, y)
+
+    @property
+    def pixel_size(self) -> tuple[float, float]:
+        """Width and height of a pixel, data units."""
+        x_min, x_max, y_min, y_max = self.extent
+        width, height = self.size
+        return (x_max - x_min) / max(width, 1), (y_max - y_min) / max(height, 1)
+
+    @property
+    def x_centers(self) -> F64:
+        """The x (W,) of the middle of each column."""
+        return np.add(self.extent[0], (np.arange(self.size[0]) + 0.5) * self.pixel_size[0], dtype=np.float64)
+
+    @property
+    def y_centers(self) -> F64:
+        """The y (H,) of the middle of each row."""
+        steps = (np.arange(self.size[1]) + 0.5) * self.pixel_size[1]
+        first, sign = (self.extent[3], -1) if self.y == "up" else (self.extent[2], 1)
+        return np.add(first, sign * steps, dtype=np.float64)
+
+    def to_pixels(self, points: npt.NDArray[Any]) -> F64:
+        """Pixels (N, 2) float64, x right and y down the picture, of the x and y of points (N, 2 or more).
+
+        Notes
+        -----
+        The difference to the side of the extent is taken first and in float64, so coordinates may be large: the result
+        has three roundings of 2**-53 each, relative to itself, besides the one of the data.
+        """
+        width, height = self.size
+        x_min, x_max, y_min, y_max = self.extent
+        pixels = np.empty((len(points), 2))
+        np.multiply(np.subtract(points[:, 0], x_min, dtype=np.float64), width / (x_max - x_min), out=pixels[:, 0])
+        from_top = np.asarray(points[:, 1], np.float64) - y_min if self.y == "down" else y_max - points[:, 1]
+        np.multiply(from_top, height / (y_max - y_min), out=pixels[:, 1])
+        return pixels
+
+
+def grid_around(
+    surface: Surface,
+    size: tuple[int, int] | None,
+    pixel_size: float | tuple[float, float] | None,
+    extent: Extent | None,
+    y: str,
+) -> Grid:
+    """`Grid.around`, of points and triangles."""
+    if (size is None) == (pixel_size is None):
+        raise ValueError("a grid needs either size or pixel_size")
+    if extent is None:
+        extent = extent_of(surface)
+    if pixel_size is None:
+        return Grid(as_size(size), extent, y)
+    x_min, x_max, y_min, y_max = Grid((1, 1), extent, y).extent
+    step = np.broadcast_to(np.asarray(pixel_size, np.float64), 2)
+    if not (np.isfinite(step).all() and (step > 0).all()):
+        raise ValueError(f"pixel_size must be positive, got {pixel_size}")
+    # A box of 3.0000000000000004 pixels, after the roundings of its sides, has three.
+    counts = np.maximum(np.ceil(np.array([x_max - x_min, y_max - y_min]) / step - 1e-9), 1)
+    width, height = as_size((int(counts[0]), int(counts[1])))
+    return Grid((width, height), (x_min, x_min + width * step[0], y_min, y_min + height * step[1]), y)
+
+
+def extent_of(surface: Surface) -> Extent:
+    """The box round the points that triangles use."""
+    if not len(surface.triangles):
+        raise ValueError("a mesh without triangles has no extent")
+    points, corners = np.asarray(surface.points), np.asarray(surface.triangles)
+    x, y = points[:, 0][corners], points[:, 1][corners]  # by column: NumPy is slow along short rows
+    return float(x.min()), float(x.max()), float(y.min()), float(y.max())

@@ -1,0 +1,191 @@
+"""Levels of detail: a mesh and coarser ones in its stead, each with a bound on how far it lies from the mesh.
+
+In: a mesh. Out: `Levels`, which are kept with the mesh, and in a file where that is asked for.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft._camera.poses import bounding_sphere
+from topleft._model.mesh import Mesh
+from topleft.errors import MeshError
+
+__all__ = ["Level", "Levels", "keep_levels", "kept_levels"]
+
+F64 = npt.NDArray[np.float64]
+
+#: The arrays of a mesh, by the names that they have in files.
+ARRAYS = ("vertices", "triangles", "normals", "colors", "uv", "material_of_triangle")
+
+
+@dataclass(frozen=True, eq=False)
+class Level:
+    """A mesh in the stead of another.
+
+    Attributes
+    ----------
+    mesh : Mesh
+    bound : float
+        No point of either surface is farther than that from the other one, in units of object space.
+    known : float
+        About how far some point is, as measured: so `bound` is at most `bound / known` times too large. 0: not known.
+    """
+
+    mesh: Mesh
+    bound: float = 0.0
+    known: float = 0.0
+
+    @cached_property
+    def extent(self) -> tuple[F64, F64, float]:
+        """Box (2, 3), and the centre (3,) and the radius of the sphere round it all."""
+        return self.mesh.bounds, *bounding_sphere(self.mesh)
+
+
+class Levels(Sequence[Level]):
+    """A mesh and its coarser levels, the finest first: `levels[0]` is the mesh itself, its bound 0.
+
+    Made by `topleft.simplify`.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    coarser : sequence of Level
+        Each with fewer triangles than the one before.
+    """
+
+    def __init__(self, mesh: Mesh, coarser: Sequence[Level] = ()) -> None:
+        # Not the mesh itself: it is what keeps its levels alive, and a circle would keep both for ever.
+        self._original = Level(replace(mesh))
+        self._coarser = tuple(coarser)
+
+    def __len__(self) -> int:
+        return 1 + len(self._coarser)
+
+    def __getitem__(self, i: Any) -> Any:
+        """Return a level, or a tuple of them for a slice."""
+        return (self._original, *self._coarser)[i]
+
+    def __iter__(self) -> Iterator[Level]:
+        return iter((self._original, *self._coarser))
+
+    def __repr__(self) -> str:
+        counts = ", ".join(f"{len(level.mesh.triangles):,} (bound {level.bound:.3g})" for level in self)
+        return f"<Levels of {len(self)}: triangles {counts}>"
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the coarser levels to one .npz file, which is whole or not there.
+
+        Parameters
+        ----------
+        path : path
+            Materials are not written: `load` takes those of the mesh.
+
+        Raises
+        ------
+        ValueError
+            If the name does not end in .npz.
+        """
+        import tempfile  # it takes shutil with it
+
+        path = _checked_path(path)
+        arrays: dict[str, npt.NDArray[Any]] = {
+            "mesh": np.array(digest_of(self[0].mesh)),
+            "bound": np.array([level.bound for level in self[1:]], np.float64),
+            "known": np.array([level.known for level in self[1:]], np.float64),
+        }
+        for i, level in enumerate(self[1:], 1):
+            for name in ARRAYS:
+                array = getattr(level.mesh, name)
+                if array is not None:
+                    arrays[f"{name}_{i}"] = array
+        handle, made = tempfile.mkstemp(dir=path.parent, prefix=path.stem, suffix=".npz")
+        try:
+            with os.fdopen(handle, "wb") as file:
+                np.savez(file, **arrays)  # type: ignore[arg-type]
+            os.replace(made, path)
+        except BaseException:
+            Path(made).unlink(missing_ok=True)
+            raise
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str], mesh: Mesh) -> Levels:
+        """Read what `save` wrote, and keep it with the mesh.
+
+        Parameters
+        ----------
+        path : path
+        mesh : Mesh
+            The one whose levels they are: its arrays must be those of then, to the bit.
+
+        Raises
+        ------
+        FileNotFoundError
+            If there is no such file.
+        MeshError
+            If the file is broken, or its levels are those of another mesh.
+        """
+        import zipfile
+
+        path = _checked_path(path)
+        try:
+            with np.load(path, allow_pickle=False) as file:
+                arrays = dict(file)
+            digest, bounds, knowns = str(arrays["mesh"]), arrays["bound"], arrays["known"]
+        except FileNotFoundError:
+            raise FileNotFoundError(f"there is no file {str(path)!r}") from None
+        except (KeyError, ValueError, EOFError, zipfile.BadZipFile) as error:
+            raise MeshError(f"cannot read {str(path)!r}: broken, or not levels of detail ({error})") from error
+        if digest != digest_of(mesh):
+            raise MeshError(f"{str(path)!r} holds the levels of another mesh: make them anew with topleft.simplify")
+        coarser = [
+            Level(
+                Mesh(**{name: arrays.get(f"{name}_{i}") for name in ARRAYS}, materials=mesh.materials),  # type: ignore[arg-type]
+                float(bounds[i - 1]),
+                float(knowns[i - 1]),
+            )
+            for i in range(1, len(bounds) + 1)
+        ]
+        return keep_levels(mesh, cls(mesh, coarser))
+
+
+def digest_of(mesh: Mesh) -> str:
+    """A hash of the arrays of a mesh."""
+    result = hashlib.sha256()
+    for name in ARRAYS:
+        array = getattr(mesh, name)
+        result.update(f"{name} {None if array is None else (array.shape, array.dtype.str)}\n".encode())
+        if array is not None:
+            result.update(np.ascontiguousarray(array).data)
+    return result.hexdigest()
+
+
+_levels: WeakKeyDictionary[Mesh, Levels] = WeakKeyDictionary()
+
+
+def keep_levels(mesh: Mesh, levels: Levels) -> Levels:
+    """Keep levels for as long as their mesh lives, and return them."""
+    _levels[mesh] = levels
+    return levels
+
+
+def kept_levels(mesh: Mesh) -> Levels | None:
+    """The levels of a mesh, if it has any yet."""
+    return _levels.get(mesh)
+
+
+def _checked_path(path: str | os.PathLike[str]) -> Path:
+    checked = Path(path)
+    if checked.suffix != ".npz":
+        raise ValueError(f"levels are kept in a file that ends in .npz, got {str(checked)!r}")
+    return checked

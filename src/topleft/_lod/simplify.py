@@ -1,0 +1,143 @@
+"""`simplify`: coarser levels of a mesh, each with a bound on its distance from the mesh.
+
+In: a mesh. Out: `Levels`. Edges are collapsed by another package (`collapse.py`); our part is that nothing is believed:
+each level is measured against the surface that it stands for (`surface_distance.py`).
+"""
+
+from __future__ import annotations
+
+import threading
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft._lod.collapse import MOST_TO_COLLAPSE, STUCK, border_points, collapse, collapser
+from topleft._lod.level_attributes import Corners, corners_of, level_mesh, next_corners
+from topleft._lod.levels import Level, Levels, keep_levels, kept_levels
+from topleft._lod.surface_distance import Surface, measure
+from topleft._model.mesh import Mesh
+
+__all__ = ["levels_of", "simplify"]
+
+#: Levels are measured against the mesh itself, or against its finest level with at most so many triangles, whose bound
+#: is added: it is small beside those of coarser levels, and the time that comparisons take goes with the triangles.
+MOST_TO_COMPARE = 300_000
+
+#: The finest level has about so many triangles at most. A blob of 300,000 is within half a pixel where it fills a frame
+#: of 7,000 pixels; finer levels would take most of the time and of the memory.
+MOST_OF_LEVEL = 1_000_000
+
+#: A level ends the levels, and is none of them, if it has 1/n of the triangles of the one before and more than n to
+#: this power times its bound: something is lost. Bounds go with the area of triangles on smooth surfaces, with n.
+MOST_POWER = 2.0
+
+I32 = npt.NDArray[np.int32]
+
+_lock = threading.RLock()
+
+
+def simplify(mesh: Mesh, *, ratio: float = 0.25, smallest: int = 200) -> Levels:
+    """The mesh and coarser levels of it, each with a bound on how far it lies from the mesh; kept with the mesh.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    ratio : float
+        Triangles of a level as a share of those of the level before, 0.05 to 0.75.
+    smallest : int
+        There is no level with fewer triangles than about so many, at least 4.
+
+    Returns
+    -------
+    Levels
+        `levels[0]` is the mesh. It ends where triangles cannot be collapsed any more. `render(tolerance=)` finds the
+        levels with the mesh for as long as it lives; `levels.save(path)` writes them.
+
+    Raises
+    ------
+    ValueError
+        If an option is out of range.
+    MissingPackageError
+        If fast-simplification is not installed: ``pip install 'topleft[simplify]'``.
+
+    Notes
+    -----
+    The bound is one on the two-sided Hausdorff distance of the surfaces as they are drawn, float32 or float64, in units
+    of object space: it holds for each point of both, borders included, whatever the collapser did.
+
+    Vertices that stand at one place with equal attributes count as one, and those that no triangle uses as none. What
+    the mesh has of normals, colours and texture coordinates a vertex of a level takes from the point of the level
+    before that is nearest to it, among the triangles round the vertices that went into it. Open borders stay as they
+    are, vertex by vertex, and so do the seams where attributes jump or materials meet: nothing bleeds across and
+    nothing cracks, but no level is coarser than its borders and seams. A mesh without normals has levels without.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> torus = tl.Mesh(*tl.scenes.torus())
+    >>> levels = tl.simplify(torus)  # doctest: +SKIP
+    >>> [len(level.mesh.triangles) for level in levels]  # doctest: +SKIP
+    [16384, 4096, 1024, 256]
+    """
+    if not 0.05 <= ratio <= 0.75:
+        raise ValueError(f"ratio must lie in 0.05 to 0.75, got {ratio!r}")
+    if smallest < 4:
+        raise ValueError(f"smallest must be at least 4, got {smallest!r}")
+    collapser()
+    with _lock:
+        return keep_levels(mesh, Levels(mesh, coarser_levels(mesh, ratio, smallest)))
+
+
+def levels_of(mesh: Mesh) -> Levels:
+    """The levels that are kept with a mesh; they are made where there are none yet, once."""
+    with _lock:
+        return kept_levels(mesh) or simplify(mesh)
+
+
+def coarser_levels(mesh: Mesh, ratio: float, smallest: int) -> list[Level]:
+    """The levels below the mesh, as long as each is of use."""
+    found: list[Level] = []
+    corners = corners_of(mesh)
+    center = corners.points.min(axis=0) / 2 + corners.points.max(axis=0) / 2 if len(corners.points) else np.zeros(3)
+    has_more = bool(corners.attributes) or corners.material is not None
+    anchor: Surface | None = None
+    bound_of_anchor = 0.0
+    while n_wanted := wanted_of(corners.triangles, ratio, smallest):
+        if anchor is None:  # without attributes the corners are welded already
+            anchor = (
+                Surface.of_mesh(mesh.vertices, mesh.triangles, center)
+                if has_more
+                else Surface(corners.points - center, corners.triangles)
+            )
+        n_before = len(corners.triangles)
+        collapsed = collapse(corners.points, corners.triangles, n_wanted, with_pairs=has_more)
+        if not 0 < len(collapsed.triangles) <= STUCK * n_before:
+            break
+        corners = stored(next_corners(corners, collapsed), mesh)
+        level = level_mesh(corners, mesh)
+        surface = Surface.of_mesh(level.vertices, level.triangles, center)
+        apart = measure(anchor, surface)
+        bound = bound_of_anchor + apart.bound
+        if found and bound > (n_before / len(corners.triangles)) ** MOST_POWER * found[-1].bound:
+            break
+        found.append(Level(level, bound, max(apart.known - bound_of_anchor, 0.0)))
+        if len(anchor.triangles) > MOST_TO_COMPARE:
+            anchor, bound_of_anchor = surface, bound
+    return found
+
+
+def wanted_of(triangles: I32, ratio: float, smallest: int) -> int:
+    """How many triangles the next level is to have; 0: there is to be none.
+
+    Borders stay, and one of n sides needs about n triangles: the ratio is that of all others. Else a level would have
+    nothing but its borders. (Very large meshes are looked at when they have become smaller.)
+    """
+    n_fixed = len(border_points(triangles)) if len(triangles) <= MOST_TO_COLLAPSE else 0
+    n_free = int((len(triangles) - n_fixed) * ratio)
+    n_wanted = min(n_fixed + n_free, max(MOST_OF_LEVEL, n_fixed))
+    return n_wanted if smallest <= n_free and n_wanted <= STUCK * len(triangles) else 0
+
+
+def stored(corners: Corners, mesh: Mesh) -> Corners:
+    """The corners with their points as the mesh of the level has them: what is drawn is what is measured."""
+    return corners._replace(points=corners.points.astype(mesh.vertices.dtype).astype(np.float64))

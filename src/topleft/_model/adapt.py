@@ -1,0 +1,262 @@
+"""Adapters: the meshes of other libraries, told by their attributes, as a `Mesh`; none of those libraries is imported.
+
+Input: `trimesh.Trimesh` and `trimesh.Scene`, `meshio.Mesh`, `pyvista.PolyData`, `matplotlib.tri.Triangulation`,
+anything with `vertices` and `triangles` (or `faces`), or a pair of arrays. Output: `Mesh`, or `Surface` where points
+may be flat. Arrays are taken without a copy where their numbers allow it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft._base.arrays import as_array
+from topleft._model.imported import material_of
+from topleft._model.material import Material
+from topleft._model.mesh import Mesh, coincident
+from topleft._model.normals import angle_weighted_normals
+
+MeshLike: TypeAlias = Any
+"""What `as_mesh` takes."""
+
+CORNERS_OF_CELL = {"triangle": 3, "triangle6": 3, "triangle7": 3, "quad": 4, "quad8": 4, "quad9": 4, "polygon": None}
+"""Corners of the surface cells of meshio, which come first in a row; `None`: all of the row."""
+
+
+class Surface(NamedTuple):
+    """Points, and triangles that know which face they were cut from."""
+
+    points: npt.NDArray[Any]
+    """(V, 2) or (V, 3)."""
+
+    triangles: npt.NDArray[Any]
+    """(T, 3) integers."""
+
+    faces: npt.NDArray[np.int64] | None
+    """(T,) the face, of any number of corners, that each triangle is a part of; `None`: faces are the triangles."""
+
+    n_faces: int
+
+
+def as_mesh(subject: MeshLike) -> Mesh:
+    """The subject as a `Mesh`.
+
+    Parameters
+    ----------
+    subject : Mesh, trimesh.Trimesh, trimesh.Scene, meshio.Mesh, pyvista.PolyData, matplotlib.tri.Triangulation
+        Or anything with `vertices` and `triangles` or `faces`, or a pair (vertices, triangles).
+
+    Returns
+    -------
+    Mesh
+        Vertices share the memory of the subject's where they are float32 or float64 (V, 3). Flat points get z = 0.
+        Faces with more corners become fans of triangles, in the order of the faces; masked triangles are left out. Of
+        trimesh come colours, and the normals that it has already; a scene is placed and joined as `load` does it.
+
+    Raises
+    ------
+    TypeError
+        If the subject is none of these.
+    ValueError
+        If it has no faces that are surfaces, or as `Mesh` does.
+
+    Examples
+    --------
+    >>> as_mesh(([[0, 0], [1, 0], [0, 1]], [[0, 1, 2]])).vertices.tolist()
+    [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]
+    """
+    if isinstance(subject, Mesh):
+        return subject
+    if _is_scene(subject):
+        nodes = [subject.graph[node] for node in subject.graph.nodes_geometry]
+        shapes = [(subject.geometry[name], transform) for transform, name in nodes]
+        parts = [placed(shape, transform) for shape, transform in shapes if len(getattr(shape, "faces", ()))]
+        if not parts:
+            raise ValueError("mesh has no triangles: nothing in the scene has faces")
+        return joined(parts)
+    if hasattr(subject, "visual") and hasattr(subject, "faces"):
+        return placed(subject, np.eye(4))
+    surface = as_surface(subject)
+    points = surface.points
+    if points.ndim == 2 and points.shape[1] == 2:
+        points = np.column_stack([points, np.zeros(len(points))])
+    return Mesh(points, surface.triangles)
+
+
+def as_surface(subject: MeshLike) -> Surface:
+    """The points and triangles of a subject that `as_mesh` takes; points stay flat where they are.
+
+    Raises
+    ------
+    TypeError
+        If the subject is none of those.
+    ValueError
+        If it has no faces that are surfaces.
+    """
+    if _is_scene(subject):
+        subject = as_mesh(subject)
+    if hasattr(subject, "x") and hasattr(subject, "y") and hasattr(subject, "triangles"):
+        return _of_triangulation(subject)
+    if hasattr(subject, "points") and isinstance(getattr(subject, "cells", None), list):
+        return _of_cells(as_array("points", subject.points), subject.cells)
+    if hasattr(subject, "points") and hasattr(subject, "faces"):
+        return _of_padded(subject)
+    if hasattr(subject, "vertices"):
+        # The `triangles` of trimesh are positions; its `faces` are what others call triangles.
+        triangles = getattr(subject, "faces", None)
+        triangles = getattr(subject, "triangles", None) if triangles is None else triangles
+        if triangles is not None:
+            return _plain(subject.vertices, triangles)
+    if isinstance(subject, tuple | list) and len(subject) == 2:
+        return _plain(*subject)
+    raise TypeError(
+        "mesh must be a Mesh, a mesh of trimesh, meshio or pyvista, a Triangulation, or a pair (vertices, triangles), "
+        f"got {type(subject).__name__}"
+    )
+
+
+def is_mesh_like(subject: object) -> bool:
+    """Whether a subject has faces, rather than being an array of points."""
+    return _is_scene(subject) or any(hasattr(subject, name) for name in ("triangles", "faces", "cells"))
+
+
+def _is_scene(subject: object) -> bool:
+    return hasattr(subject, "geometry") and hasattr(subject, "graph")
+
+
+def _plain(vertices: npt.ArrayLike, triangles: npt.ArrayLike) -> Surface:
+    corners = as_array("triangles", triangles)
+    return Surface(as_array("vertices", vertices), corners, None, len(corners))
+
+
+def _of_triangulation(subject: Any) -> Surface:
+    points = np.column_stack([as_array("x", subject.x), as_array("y", subject.y)])
+    triangles, mask = as_array("triangles", subject.triangles), getattr(subject, "mask", None)
+    if mask is None:
+        return Surface(points, triangles, None, len(triangles))
+    kept = np.flatnonzero(~np.asarray(mask))
+    return Surface(points, triangles[kept], kept, len(triangles))
+
+
+def _of_cells(points: npt.NDArray[Any], blocks: Iterable[Any]) -> Surface:
+    """Triangles of the surface cells of meshio, block after block."""
+    blocks = list(blocks)
+    surfaces = [block for block in blocks if block.type in CORNERS_OF_CELL]
+    found = [as_array("cells", block.data)[:, : CORNERS_OF_CELL[block.type]] for block in surfaces]
+    if not found:
+        kinds = ", ".join(block.type for block in blocks) or "none"
+        raise ValueError(f"mesh has no triangles: its cells are {kinds}")
+    return _fans(points, found)
+
+
+def _of_padded(subject: Any) -> Surface:
+    """Triangles of the faces of pyvista: one array, before each face its number of corners."""
+    points, padded = as_array("points", subject.points), as_array("faces", subject.faces)
+    if padded.ndim == 2:
+        return Surface(points, padded, None, len(padded))
+    if getattr(subject, "n_strips", 0):
+        raise ValueError("mesh has strips of triangles: take its triangulate()")
+    if padded.size % 4 == 0 and (padded[::4] == 3).all():
+        triangles = padded.reshape(-1, 4)[:, 1:]
+        return Surface(points, triangles, None, len(triangles))
+    faces, start = [], 0
+    while start < len(padded):
+        faces.append(padded[None, start + 1 : start + 1 + padded[start]])
+        start += 1 + int(padded[start])
+    return _fans(points, faces)
+
+
+def _fans(points: npt.NDArray[Any], blocks: list[npt.NDArray[Any]]) -> Surface:
+    """Faces (N, K) as K - 2 triangles each."""
+    if all(block.shape[1] == 3 for block in blocks):
+        triangles = blocks[0] if len(blocks) == 1 else np.concatenate(blocks)
+        return Surface(points, triangles, None, len(triangles))
+    fans, sources, n_faces = [], [], 0
+    for block in blocks:
+        n, n_corners = block.shape
+        steps = np.arange(1, n_corners - 1)
+        fan = np.stack([np.zeros_like(steps), steps, steps + 1], axis=1)
+        fans.append(block[:, fan].reshape(-1, 3))
+        sources.append(np.repeat(np.arange(n_faces, n_faces + n), len(steps)))
+        n_faces += n
+    return Surface(points, np.concatenate(fans), np.concatenate(sources), n_faces)
+
+
+def placed(geometry: Any, transform: npt.NDArray[np.float64]) -> Mesh:
+    """A trimesh geometry as a mesh in the space of its scene; per-face colours get corners of their own."""
+    vertices, triangles = np.asarray(geometry.vertices), np.asarray(geometry.faces)
+    # trimesh computes normals when asked for them; what a file gave waits in the cache.
+    normals = np.asarray(geometry.vertex_normals) if "vertex_normals" in geometry._cache else None
+    colors = uv = None
+    materials: tuple[Material, ...] = ()
+    if geometry.visual.kind == "texture":
+        own = geometry.visual.uv
+        uv = None if own is None or np.shape(own) != (len(vertices), 2) else np.asarray(own)
+        material = material_of(geometry.visual.material)
+        materials = () if material is None else (material,)
+    elif geometry.visual.kind == "vertex":
+        colors = np.asarray(geometry.visual.vertex_colors)
+    elif geometry.visual.kind == "face":
+        colors = np.asarray(geometry.visual.face_colors).repeat(3, axis=0)
+        vertices = vertices[triangles.ravel()]
+        normals = None if normals is None else normals[triangles.ravel()]
+        triangles = np.arange(triangles.size).reshape(-1, 3)
+    if not np.array_equal(transform, np.eye(4)):
+        linear = transform[:3, :3]
+        vertices = vertices @ linear.T + transform[:3, 3]
+        if np.linalg.det(linear) < 0:  # a mirror turns the triangles over
+            triangles = triangles[:, ::-1]
+        if normals is not None:
+            normals = normals @ np.linalg.pinv(linear)
+    return Mesh(vertices, triangles, normals, colors, uv, materials)
+
+
+def joined(parts: list[Mesh]) -> Mesh:
+    """One mesh of several; vertices that are equal become one unless the file has normals."""
+    starts = np.cumsum([0] + [len(part.vertices) for part in parts[:-1]])
+    vertices = np.concatenate([part.vertices for part in parts])
+    triangles = np.concatenate([part.triangles + start for part, start in zip(parts, starts, strict=True)])
+    colors = uv = None
+    if any(part.colors is not None for part in parts):
+        colors = np.concatenate([_rgba(part) for part in parts])
+    if any(part.uv is not None for part in parts):
+        uv = np.concatenate([_uv(part) for part in parts])
+    surface = _joined_materials(parts)
+    if all(part.normals is not None for part in parts):
+        normals = np.concatenate([part.vertex_normals() for part in parts])
+        return Mesh(vertices, triangles, normals, colors, uv, *surface)
+    own_normals: npt.NDArray[Any] | None = None
+    if any(part.normals is not None for part in parts):
+        own_normals = np.concatenate([part.vertex_normals() for part in parts])
+    elif colors is not None or uv is not None:
+        # Vertices of two colours, or on both sides of a seam, stay two, and still share a normal.
+        first, group = coincident(vertices)
+        own_normals = angle_weighted_normals(vertices[first], group[triangles].astype(np.int32))[group]
+    first, group = coincident(*(array for array in (vertices, own_normals, colors, uv) if array is not None))
+    own_normals, colors, uv = (None if array is None else array[first] for array in (own_normals, colors, uv))
+    return Mesh(vertices[first], group[triangles], own_normals, colors, uv, *surface)
+
+
+def _joined_materials(parts: list[Mesh]) -> tuple[tuple[Material, ...], npt.NDArray[np.int32] | None]:
+    """The materials of all parts, and which of them each triangle has."""
+    if not any(part.materials for part in parts):
+        return (), None
+    materials: dict[Material, int] = {}
+    rows = []
+    for part in parts:
+        own = part.materials[0] if part.materials else Material()
+        rows.append(np.full(len(part.triangles), materials.setdefault(own, len(materials)), np.int32))
+    return tuple(materials), np.concatenate(rows)
+
+
+def _uv(part: Mesh) -> npt.NDArray[np.float32]:
+    return np.zeros((len(part.vertices), 2), np.float32) if part.uv is None else part.uv
+
+
+def _rgba(part: Mesh) -> npt.NDArray[np.uint8]:
+    if part.colors is None:
+        return np.full((len(part.vertices), 4), 255, dtype=np.uint8)
+    return part.colors

@@ -1,0 +1,148 @@
+"""Lights: directions and points that light comes from, and the depth cue; values, checked once.
+
+Based on: Lambert, J. H., "Photometria", 1760; Mitchell, J., G. McTaggart and C. Green, "Shading in Valve's Source
+Engine", SIGGRAPH 2006 courses (the half-Lambert fall-off of the headlight, there with the power 2).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft._base.color import Color, as_color
+from topleft._base.options import parse
+
+F64 = npt.NDArray[np.float64]
+
+TO_HEADLIGHT = np.array([-0.35, 0.45, 1.0]) / np.linalg.norm([-0.35, 0.45, 1.0])
+"""Direction of the headlight in eye space: from over the viewer's left shoulder, so that up and left read as lit."""
+
+AMBIENT = 0.03
+"""Share of the light, in linear light, that reaches a surface from all sides.
+
+The headlight adds the rest: it falls off as ((1 + n . l) / 2)**3 and so reaches 0 smoothly, at the far side of a
+sphere. Lambert's max(0, n . l) ends in a line, which on coarse meshes reads as a seam.
+"""
+
+
+class LightKind(StrEnum):
+    """Where light comes from."""
+
+    DIRECTIONAL = "directional"
+    POINT = "point"
+
+
+class LightSpace(StrEnum):
+    """What a light is fixed to."""
+
+    WORLD = "world"
+    EYE = "eye"
+
+
+@dataclass(frozen=True)
+class Light:
+    """A light that shines from a direction or from a point; without shadows.
+
+    Parameters
+    ----------
+    at : (3,) of float
+        The direction *to* the light, of any length, or the point where it is. World space, or that of the eye (x right,
+        y up, the view along -z).
+    kind : {"directional", "point"}
+        What `at` means.
+    color : (3,) of 0 to 255
+        sRGB.
+    intensity : float
+        Not negative. A white surface that faces a white light of intensity 1 is white.
+    falloff : float
+        Not negative. At distance d from a point the light is divided by `1 + falloff * d**2`; 0: it is the same
+        everywhere.
+    space : {"world", "eye"}
+        "eye": the light moves with the camera.
+
+    Raises
+    ------
+    ValueError
+        If a number is not finite or outside its range, or the direction has no length.
+
+    Examples
+    --------
+    >>> Light((0, 1, 0)).kind
+    <LightKind.DIRECTIONAL: 'directional'>
+    """
+
+    at: tuple[float, float, float]
+    kind: str = "directional"
+    color: Color = (255, 255, 255)
+    intensity: float = 1.0
+    falloff: float = 0.0
+    space: str = "world"
+
+    def __post_init__(self) -> None:
+        keep = object.__setattr__  # the dataclass is frozen, and its values are coerced
+        keep(self, "kind", parse(LightKind, "kind", self.kind))
+        keep(self, "space", parse(LightSpace, "space", self.space))
+        keep(self, "color", as_color("color", self.color, 3))
+        keep(self, "at", as_point("at", self.at))
+        if self.kind == LightKind.DIRECTIONAL and not any(self.at):
+            raise ValueError(f"at must be a direction, got {self.at}")
+        for name in ("intensity", "falloff"):
+            keep(self, name, as_not_negative(name, getattr(self, name)))
+
+
+@dataclass(frozen=True)
+class Fog:
+    """The depth cue: with the distance along the view, a colour takes the place of what is seen.
+
+    Parameters
+    ----------
+    near, far : float
+        Where it begins, and where nothing else is left; world units in front of the eye, near < far.
+    color : (3,) of 0 to 255
+        sRGB.
+
+    Raises
+    ------
+    ValueError
+        If a number is outside its range.
+    """
+
+    near: float
+    far: float
+    color: Color = (255, 255, 255)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "color", as_color("color", self.color, 3))
+        if not (np.isfinite([self.near, self.far]).all() and self.near < self.far):
+            raise ValueError(f"near and far must be finite and near < far, got {self.near} and {self.far}")
+
+
+def as_point(name: str, values: object) -> tuple[float, float, float]:
+    """Three finite numbers.
+
+    Raises
+    ------
+    ValueError
+        If they are none.
+    """
+    array = np.asarray(values, dtype=np.float64)
+    if array.shape != (3,) or not np.isfinite(array).all():
+        raise ValueError(f"{name} must be three finite numbers, got {values!r}")
+    x, y, z = array.tolist()
+    return x, y, z
+
+
+def as_not_negative(name: str, value: float) -> float:
+    """The number as a float.
+
+    Raises
+    ------
+    ValueError
+        If it is negative or not finite.
+    """
+    if not (np.isfinite(value) and value >= 0):
+        raise ValueError(f"{name} must be finite and not negative, got {value!r}")
+    return float(value)

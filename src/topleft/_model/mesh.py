@@ -1,0 +1,287 @@
+"""A triangle mesh as arrays: positions, indices, and what else is known of its surface; checked once, here.
+
+Input: anything NumPy can read. Output: a `Mesh` whose arrays the other stages use as they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, fields
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft._base.arrays import as_array, as_checked_triangles
+from topleft._model.material import Material
+from topleft._model.normals import angle_weighted_normals, box_of_triangles
+from topleft._raster.clusters import Clusters, box_of
+
+FloatArray = npt.NDArray[np.floating[Any]]
+F32 = npt.NDArray[np.float32]
+F64 = npt.NDArray[np.float64]
+I32 = npt.NDArray[np.int32]
+U8 = npt.NDArray[np.uint8]
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Vertices and triangles in object space, with normals and colours per vertex where they are known.
+
+    Parameters
+    ----------
+    vertices : (V, 3) array_like of real numbers
+        Positions; float32 and float64 stay as they are, everything else becomes float64.
+    triangles : (T, 3) array_like of integers
+        Rows of vertex indices, counter-clockwise seen from outside; kept as int32.
+    normals : (V, 3) array_like of real numbers, optional
+        Directions, of any length; `None`: not known, `vertex_normals` computes them.
+    colors : (V, 3) or (V, 4) array_like of uint8, optional
+        sRGB colours, with or without alpha.
+    uv : (V, 2) array_like of real numbers, optional
+        Where each vertex lies in a texture: u from left to right, v from the bottom up, 0 to 1. Kept as float32. Where
+        a texture has a seam, vertices stand twice.
+    materials : sequence of Material, optional
+        What the triangles are made of.
+    material_of_triangle : (T,) array_like of integers, optional
+        The row of `materials` that each triangle has; the first unless given.
+
+    Raises
+    ------
+    ValueError
+        If an array has another shape, or a vertex that a triangle uses is not finite.
+    TypeError
+        If an array holds another kind of number.
+    IndexError
+        If a triangle names a vertex that does not exist.
+
+    Notes
+    -----
+    The arrays are read-only views: of the caller's memory where the dtype allows.
+
+    Examples
+    --------
+    >>> mesh = Mesh([[0, 0, 0], [1, 0, 0], [0, 2, 0]], [[0, 1, 2]])
+    >>> mesh.bounds.tolist()
+    [[0.0, 0.0, 0.0], [1.0, 2.0, 0.0]]
+    """
+
+    vertices: FloatArray
+    triangles: I32
+    normals: FloatArray | None = None
+    colors: U8 | None = None
+    uv: F32 | None = None
+    materials: tuple[Material, ...] = ()
+    material_of_triangle: I32 | None = None
+
+    def __post_init__(self) -> None:
+        vertices = _real_array(self.vertices, "vertices")
+        triangles = as_checked_triangles(self.triangles, len(vertices))
+        keep = object.__setattr__  # the dataclass is frozen, and its arrays are coerced
+        keep(self, "vertices", _read_only(vertices))
+        keep(self, "triangles", _read_only(triangles))
+        _check_finite(vertices, triangles)
+        if self.normals is not None:
+            normals = _real_array(self.normals, "normals")
+            if len(normals) != len(vertices):
+                raise ValueError(f"normals must have shape ({len(vertices)}, 3), got {normals.shape}")
+            keep(self, "normals", _read_only(normals))
+        if self.colors is not None:
+            keep(self, "colors", _read_only(_color_array(self.colors, len(vertices))))
+        if self.uv is not None:
+            keep(self, "uv", _read_only(_uv_array(self.uv, len(vertices))))
+        keep(self, "materials", _material_tuple(self.materials))
+        if self.material_of_triangle is not None:
+            rows = _material_rows(self.material_of_triangle, len(triangles), len(self.materials))
+            keep(self, "material_of_triangle", _read_only(rows))
+
+    def _repr_png_(self) -> bytes | None:
+        from topleft._render.notebook import png_of_mesh  # which imports this module
+
+        return png_of_mesh(self)
+
+    @property
+    def bounds(self) -> F64:
+        """Lower and upper corner (2, 3) float64 of the box round the triangles; unused vertices do not count.
+
+        Raises
+        ------
+        ValueError
+            If the mesh has no triangles.
+        """
+        if not len(self.triangles):
+            raise ValueError("a mesh without triangles has no bounds")
+        return box_of_triangles(self.vertices, self.triangles)
+
+    def vertex_normals(self) -> FloatArray:
+        """Normals (V, 3): those of the mesh where it has them, else angle-weighted ones, float64.
+
+        Returns
+        -------
+        (V, 3) float
+            Read-only. Unit length where computed here, once; (0, 0, 0) for a vertex that no triangle with an area uses.
+        """
+        if self.normals is not None:
+            return self.normals
+        return self._computed_normals
+
+    @cached_property
+    def vertex_box(self) -> F64:
+        """Lowest and highest x, y, z of all finite vertices, (6,) float64; zeros without any."""
+        return box_of(self.vertices)
+
+    def note_drawn(self) -> int:
+        """Note that there is a picture of the mesh; returns how many there were before."""
+        n_drawn: int = self.__dict__.get("_n_drawn", 0)
+        self.__dict__["_n_drawn"] = n_drawn + 1
+        return n_drawn
+
+    @property
+    def has_clusters(self) -> bool:
+        """Whether `clusters` have been made."""
+        return "clusters" in self.__dict__
+
+    @cached_property
+    def clusters(self) -> Clusters:
+        """The triangles sorted into clusters, which a view needs only some of; made when it is first asked for.
+
+        That takes about as long as drawing the mesh some twenty times, and keeps a copy of it of about 30 bytes a
+        triangle. Meshes that are drawn more than once ask for it themselves: `topleft.choices.pays_to_cluster`.
+        """
+        return Clusters(self.vertices, self.triangles)
+
+    @cached_property
+    def _computed_normals(self) -> FloatArray:
+        return _read_only(angle_weighted_normals(self.vertices, self.triangles))
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What another process needs: what is computed from it is computed there."""
+        return {field.name: self.__dict__[field.name] for field in fields(self)}
+
+
+def coincident(*attributes: npt.NDArray[Any]) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+    """Groups of rows that are equal in all the attributes, compared exactly.
+
+    Parameters
+    ----------
+    *attributes : (V, K) arrays
+        Positions, say, or positions and colours.
+
+    Returns
+    -------
+    first : (G,) int
+        The lowest row of each group, ascending.
+    group : (V,) int
+        The group that each row belongs to: `attribute[first][group]` equals `attribute`.
+    """
+    columns = [column for rows in attributes for column in rows.T]
+    order, starts = _runs_by_hash(columns) or _runs_by_value(columns)
+    lowest = np.minimum.reduceat(order, np.flatnonzero(starts)) if len(order) else order
+    first_of_row = np.empty(len(order), dtype=np.intp)
+    first_of_row[order] = lowest[np.cumsum(starts) - 1]
+    is_first = first_of_row == np.arange(len(order))
+    return np.flatnonzero(is_first), (np.cumsum(is_first) - 1)[first_of_row]
+
+
+def _runs_by_hash(columns: list[npt.NDArray[Any]]) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.bool_]] | None:
+    """Rows in an order in which equal ones follow each other, and where runs of them begin.
+
+    Takes a third of the time of `_runs_by_value`. None in the rare case that rows share a hash and differ.
+    """
+    key = np.zeros(len(columns[0]), np.uint64)
+    for column in columns:
+        numbers = column.astype(np.float64) + 0.0  # -0.0 equals 0.0; all dtypes of meshes fit
+        key = (key ^ numbers.view(np.uint64)) * np.uint64(0x9E3779B97F4A7C15)
+        key ^= key >> np.uint64(32)
+    order = np.argsort(key)
+    starts = _differ([key], order)
+    return (order, starts) if np.array_equal(starts, _differ(columns, order)) else None
+
+
+def _runs_by_value(columns: list[npt.NDArray[Any]]) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.bool_]]:
+    """The same by comparing the rows."""
+    order = np.lexsort(columns[::-1])
+    return order, _differ(columns, order)
+
+
+def _differ(columns: list[npt.NDArray[Any]], order: npt.NDArray[np.intp]) -> npt.NDArray[np.bool_]:
+    """Which rows, in an order, differ from the one before."""
+    starts = np.zeros(len(order), dtype=bool)
+    starts[:1] = True
+    for column in columns:
+        ordered = column[order]
+        starts[1:] |= ordered[1:] != ordered[:-1]
+    return starts
+
+
+def _real_array(values: npt.ArrayLike, name: str) -> FloatArray:
+    array = as_array(name, values)
+    if array.dtype.kind not in "fiu":
+        raise TypeError(f"{name} must hold real numbers, got {array.dtype}")
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise ValueError(f"{name} must have shape (V, 3), got {array.shape}")
+    native = array.dtype.newbyteorder("=")
+    return np.ascontiguousarray(array, native if native in (np.float32, np.float64) else np.float64)
+
+
+def _color_array(values: npt.ArrayLike, n_vertices: int) -> U8:
+    array = as_array("colors", values)
+    if array.dtype != np.uint8:
+        raise TypeError(f"colors must be uint8, got {array.dtype}")
+    if array.ndim != 2 or array.shape[0] != n_vertices or array.shape[1] not in (3, 4):
+        raise ValueError(f"colors must have shape ({n_vertices}, 3) or ({n_vertices}, 4), got {array.shape}")
+    return np.ascontiguousarray(array)
+
+
+def _uv_array(values: npt.ArrayLike, n_vertices: int) -> F32:
+    array = as_array("uv", values)
+    if array.dtype.kind not in "fiu":
+        raise TypeError(f"uv must hold real numbers, got {array.dtype}")
+    if array.shape != (n_vertices, 2):
+        raise ValueError(f"uv must have shape ({n_vertices}, 2), got {array.shape}")
+    return np.ascontiguousarray(array, np.float32)
+
+
+def _material_tuple(values: Iterable[Material]) -> tuple[Material, ...]:
+    materials = tuple(values)
+    for value in materials:
+        if not isinstance(value, Material):
+            raise TypeError(f"materials must be of Material, got {type(value).__name__}")
+    return materials
+
+
+def _material_rows(values: npt.ArrayLike, n_triangles: int, n_materials: int) -> I32:
+    array = as_array("material_of_triangle", values)
+    if array.dtype.kind not in "iu":
+        raise TypeError(f"material_of_triangle must hold integers, got {array.dtype}")
+    if array.shape != (n_triangles,):
+        raise ValueError(f"material_of_triangle must have shape ({n_triangles},), got {array.shape}")
+    outside = (array < 0) | (array >= n_materials)
+    if outside.any():
+        row = int(outside.argmax())
+        raise IndexError(f"material_of_triangle[{row}] = {array[row]} must name one of {n_materials} materials")
+    return np.ascontiguousarray(array, np.int32)
+
+
+def _check_finite(vertices: FloatArray, triangles: I32) -> None:
+    finite = np.isfinite(vertices)
+    if finite.all():
+        return
+    used = triangles.ravel()
+    bad = used[~finite[used].all(axis=1)]
+    if len(bad):
+        row = int(bad.min())
+        raise ValueError(f"vertices[{row}] = {vertices[row].tolist()} must be finite: a triangle uses it")
+
+
+def _read_only(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    view = array.view()
+    view.flags.writeable = False
+    return view
+
+
+def has_holes(material: Material, mesh: Mesh) -> bool:
+    """Whether the material leaves something out of the triangles that have it."""
+    texture = material.texture if mesh.uv is not None else None
+    return bool(material.alpha_cutoff) and texture is not None and bool((texture.image[..., 3] < 255).any())

@@ -1,0 +1,185 @@
+"""Scenes: meshes that stand in one world, each placed by a matrix, as often as wanted.
+
+Input: meshes and matrices. Output: a `Scene`, which `render`, `visibility`, `silhouette` and `render_layers`
+take like a mesh. (Ready-made test scenes are in `topleft.scenes`.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft._base.arrays import INT32_MAX
+from topleft._model.mesh import Mesh
+from topleft._raster.clusters import Patience
+
+__all__ = ["Instance", "Scene"]
+
+F64 = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Instance:
+    """A mesh and where it stands; the arrays are those of the mesh, never copied.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    transform : (4, 4) array_like
+        World from object, with last row [0, 0, 0, 1] and not singular. One that mirrors turns the winding over, and
+        what `cull` leaves out with it, so that the outside stays outside.
+    name : str, optional
+
+    Raises
+    ------
+    ValueError
+        If the matrix has another shape or last row, is singular, or holds a number that is not finite.
+    TypeError
+        If `mesh` is none.
+    """
+
+    mesh: Mesh
+    transform: F64 = field(default_factory=lambda: np.eye(4))
+    name: str | None = None
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.mesh, Mesh):
+            raise TypeError(f"an instance needs a Mesh, got {type(self.mesh).__name__}")
+        matrix = np.array(self.transform, dtype=np.float64)
+        if matrix.shape != (4, 4):
+            raise ValueError(f"transform must have shape (4, 4), got {matrix.shape}")
+        if not np.isfinite(matrix).all():
+            raise ValueError(f"transform must hold finite numbers, got {matrix.tolist()}")
+        if not np.array_equal(matrix[3], [0, 0, 0, 1]):
+            raise ValueError(f"the last row of transform must be [0, 0, 0, 1], got {matrix[3].tolist()}")
+        if np.linalg.matrix_rank(matrix) < 4:
+            raise ValueError(f"transform must not be singular, got {matrix.tolist()}")
+        matrix.flags.writeable = False
+        object.__setattr__(self, "transform", matrix)
+
+    @property
+    def is_mirrored(self) -> bool:
+        """Whether the matrix turns the winding of triangles over."""
+        return bool(np.linalg.det(self.transform[:3, :3]) < 0)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Scene:
+    """Meshes in one world.
+
+    Parameters
+    ----------
+    instances : iterable of Instance, Mesh, (Mesh, transform) or (Mesh, transform, name)
+        At least one. A mesh by itself stands where its vertices are.
+
+    Raises
+    ------
+    ValueError
+        If there is no instance, or they have more than 2**31 - 1 triangles together.
+    TypeError
+        If an instance is something else.
+
+    Examples
+    --------
+    >>> import numpy as np, topleft as tl
+    >>> cube = tl.Mesh(*tl.scenes.shape("cube"))
+    >>> aside = np.eye(4)
+    >>> aside[0, 3] = 3
+    >>> scene = tl.Scene([cube, (cube, aside, "right")])
+    >>> scene
+    Scene(2 instances of 1 mesh, 24 triangles)
+    >>> scene[1].name, scene.bounds.tolist()
+    ('right', [[-1.0, -1.0, -1.0], [4.0, 1.0, 1.0]])
+    """
+
+    instances: tuple[Instance, ...]
+
+    def __init__(self, instances: Iterable[Instance | Mesh | tuple[object, ...]]) -> None:
+        object.__setattr__(self, "instances", tuple(map(as_instance, instances)))
+        if not self.instances:
+            raise ValueError("a scene needs at least one instance, got none")
+        if self.n_triangles > INT32_MAX:
+            raise ValueError(f"a scene must have at most {INT32_MAX} triangles, got {self.n_triangles}")
+
+    def __len__(self) -> int:
+        return len(self.instances)
+
+    def __iter__(self) -> Iterator[Instance]:
+        return iter(self.instances)
+
+    def __getitem__(self, i: int) -> Instance:
+        return self.instances[i]
+
+    def __repr__(self) -> str:
+        n, n_meshes = len(self), len({id(instance.mesh) for instance in self})
+        many, kinds = "s" * (n > 1), "es" * (n_meshes > 1)
+        return f"Scene({n} instance{many} of {n_meshes} mesh{kinds}, {self.n_triangles} triangles)"
+
+    @cached_property
+    def patience(self) -> Patience:
+        """How long to go on drawing the meshes whole."""
+        return Patience()
+
+    @property
+    def n_triangles(self) -> int:
+        """Triangles of all instances together."""
+        return sum(len(instance.mesh.triangles) for instance in self.instances)
+
+    @property
+    def first_ids(self) -> npt.NDArray[np.int64]:
+        """Where the triangles of each instance begin when all are counted, and the number of all: (N + 1,) int64."""
+        return np.cumsum([0, *(len(instance.mesh.triangles) for instance in self.instances)], dtype=np.int64)
+
+    @property
+    def bounds(self) -> F64:
+        """Lower and upper corner (2, 3) float64 of the box round all triangles, in the world.
+
+        Raises
+        ------
+        ValueError
+            If there are no triangles.
+        """
+        points = self.extreme_points()
+        return np.stack([points.min(axis=0), points.max(axis=0)])
+
+    def extreme_points(self) -> F64:
+        """Corners of triangles in the world, (N, 3) float64, which have the box and the bounding sphere of all.
+
+        Raises
+        ------
+        ValueError
+            If there are no triangles.
+        """
+        used = [world_corners(instance) for instance in self.instances if len(instance.mesh.triangles)]
+        if not used:
+            raise ValueError("a scene without triangles has no bounds")
+        ends = np.concatenate([points[[*points.argmin(axis=0), *points.argmax(axis=0)]] for points in used])
+        center = ends.min(axis=0) / 2 + ends.max(axis=0) / 2
+        farthest = [points[((points - center) ** 2).sum(axis=1).argmax()] for points in used]
+        return np.concatenate([ends, farthest])
+
+
+def as_instance(value: object) -> Instance:
+    """Return an instance of what a scene is made from."""
+    if isinstance(value, Instance):
+        return value
+    if isinstance(value, Mesh):
+        return Instance(value)
+    if isinstance(value, tuple) and 2 <= len(value) <= 3:
+        return Instance(*value)
+    raise TypeError(
+        f"instances must be Instance, Mesh, (Mesh, transform) or (Mesh, transform, name), got {type(value).__name__}"
+    )
+
+
+def world_corners(instance: Instance) -> F64:
+    """The vertices that triangles of an instance use, in the world: (N, 3) float64."""
+    mesh = instance.mesh
+    is_used = np.zeros(len(mesh.vertices), np.bool_)
+    is_used[mesh.triangles.ravel()] = True
+    linear, offset = instance.transform[:3, :3], instance.transform[:3, 3]
+    return mesh.vertices[is_used].astype(np.float64) @ linear.T + offset

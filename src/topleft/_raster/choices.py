@@ -1,0 +1,276 @@
+"""What is chosen before anything is drawn: a small function for each choice, asked by the pipeline and by the planner.
+
+None of them changes a bit of a picture; `tests/plan/test_choices.py` draws with each forced on and off. The numbers
+were measured on one and two cores of a Zen 4 with AVX-512; `docs/design.md`, section 20, has the scenes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from topleft import _engine
+from topleft._base.options import Cull, DepthTest, Sampling, Sink
+from topleft._base.threads import available_threads, count_threads
+from topleft._raster.view import CULL_CODES, View
+from topleft.methods import METHODS
+
+if TYPE_CHECKING:
+    from topleft._raster.clusters import Survey
+
+__all__ = [
+    "Inputs",
+    "can_cluster",
+    "can_share",
+    "common_depth",
+    "earlier_wins",
+    "flat_depth",
+    "fragment_sink",
+    "is_affine",
+    "is_direct",
+    "is_shared",
+    "must_cut",
+    "pays_to_cluster",
+    "pays_to_draw_clusters",
+    "pays_to_draw_instances",
+    "pays_to_snap_all",
+    "pays_without_depth",
+    "threads_to_convert",
+    "threads_to_draw",
+    "threads_to_snap",
+    "work_ns",
+]
+
+#: Fewer vertices are snapped, and fewer triangles converted, by one thread: waking another takes as long.
+MIN_TO_SHARE_ARRAYS = 200_000
+
+#: Nanoseconds that decide whether depths are compared where all are equal: ids alone cost a pass over all pixels and a
+#: few calls, comparisons something a covered sample, and, where the picture does not stay in a near cache, a row of a
+#: triangle. Of flat triangles of 8, 40 and 400 px, 0.2 to 2 layers, 64x64 to 1920x1080: wrong by 1.2 times at most.
+FLAT_CALL_NS, FLAT_PIXEL_NS = 12_000, 0.19
+COMPARED_SAMPLE_NS, COMPARED_ROW_NS = 0.35, 12.0
+
+#: Pixels of a picture that stay in a near cache while it is drawn; those of a larger one are cold when they are met.
+NEAR_PIXELS = 400_000
+
+#: A thread gets at least so much work: of 132 calls, those of 0.45 ms or more were done sooner by two threads, but for
+#: one that waits for memory (0.9 times), and those of less by one (1.2 times at most).
+MIN_THREAD_NS = 220_000
+
+#: What the guess of work is made of: nanoseconds a triangle; a row of a triangle that is seen, a covered sample and a
+#: pixel of the picture, by what is drawn; a row and a pixel at most where the picture stays in a near cache.
+TRIANGLE_NS = 5.0
+WORK_NS = {
+    "bits": (4.0, 0.018, 0.014),
+    "counts": (6.0, 0.2, 0.3),
+    "ids": (12.0, 0.4, 0.6),
+    "labels": (8.0, 0.1, 0.15),
+    "area": (9.0, 0.0, 0.3),
+}
+NEAR_ROW_NS, NEAR_PIXEL_NS = 4.0, 0.15
+WORK_OF = {Sink.MASK: "bits", Sink.SAMPLES: "bits", Sink.COUNT: "counts", Sink.LABEL: "labels"}
+
+#: Triangles times threads. With fewer, threads that each set up every triangle are done before they have met twice.
+MIN_TRIANGLES_TO_SHARE = 1_000_000
+
+#: Triangles from which on a mesh that is drawn again is sorted into clusters; instances from which on one is at once.
+MIN_TRIANGLES_TO_CLUSTER = 20_000
+MIN_INSTANCES_TO_CLUSTER = 16
+
+#: Clusters take 1.2 to 1.5 times as long for a triangle that shows (hills and soup, all of it in view, are 0.65 to 0.9
+#: times as fast), and leave out what is outside, turned away or behind others. A view is drawn from them where no more
+#: of them face it, and as many are outside, as is said here: (below so many triangles, without culling, with it).
+#: Measured on blobs, scans, hills and soup in 512x512 and 1920x1080. Whole and culled, 30,000 to 300,000 triangles are
+#: 0.86 to 0.93 times as fast, 1,000,000 1.09; half in view, 0.85 to 1.05, 0.93 to 1.12, and 1.3. `docs/static.md`.
+MAX_FRONT_TO_CLUSTER = 0.8
+MIN_OUTSIDE_TO_CLUSTER = ((60_000, 0.1, 0.6), (500_000, 0.0, 0.33), (math.inf, 0.0, 0.0))
+
+#: Scenes whose instances lie so many deep, on the mean, are drawn from clusters in any case: 200 in rows, 8.8 deep, are
+#: 4 to 5.5 times as fast. Others are where so large a share is outside, with one sample and with several, for each of
+#: which clusters are snapped anew: small in the picture and side by side, blobs are 0.90 and 0.87 times as fast, scans
+#: 1.5 and 1.4.
+MIN_LAYERS_TO_CLUSTER = 3.0
+MIN_OUTSIDE_OF_INSTANCES = (0.1, 0.33)
+
+#: Pixels for each vertex from which on attributes of a mesh in clusters have all vertices snapped: to find those that
+#: show reads all pixels. `render` of 100,000 triangles seen whole in 1920x1080: 9.5 ms and, of those alone, 11.1; of
+#: 1,000,000 22.7 and 25.1; of 3,000,000, a fifth of them in view, 18.9 and 17.5.
+MIN_PIXELS_A_VERTEX = 4
+
+#: What it does not matter to in which order triangles are drawn.
+ORDER_FREE = frozenset({Sink.MASK, Sink.COUNT, Sink.NEAREST, Sink.FARTHEST, Sink.SAMPLES})
+
+#: With fewer pixels in the picture for each triangle that is seen, labels take less time than colours stored triangle
+#: by triangle: 200,000 triangles of 8 px in 1920x1080 take 6.4 and 8 ms, 20,000 of 40 px 3.8 and 2.3 ms, 200,000 of
+#: 20 px, one in 16 of them in the picture, 5.7 and 3.7 ms.
+MIN_PIXELS_A_TRIANGLE = 45
+
+
+class Inputs(NamedTuple):
+    """A scene before and after the snap: what choices look at."""
+
+    points: NDArray[Any]
+    records: NDArray[np.uint8]
+    pieces: _engine.Pieces | None
+    is_clip_space: bool
+    is_affine: bool
+
+
+def is_affine(matrix: NDArray[Any] | None) -> bool:
+    """Tell whether every w is 1 behind a transform: dividing by it changes no bit, so it is left out."""
+    return matrix is not None and matrix[3].tolist() == [0, 0, 0, 1]
+
+
+def must_cut(n_outside: int) -> bool:
+    """Tell whether triangles are looked through for those that a clip plane cuts: no vertex outside, none cut."""
+    return n_outside > 0
+
+
+def threads_to_convert(threads: int | None, n_triangles: int) -> int:
+    """Return how many threads make int32 of other indices."""
+    return count_threads(threads, n_triangles) if n_triangles >= MIN_TO_SHARE_ARRAYS else 1
+
+
+def threads_to_snap(threads: int | None, n_vertices: int, n_triangles: int) -> int:
+    """Return how many threads transform and snap vertices."""
+    return count_threads(threads, n_triangles) if n_vertices >= MIN_TO_SHARE_ARRAYS else 1
+
+
+def threads_to_draw(view: View, scene: _engine.Scene, n_triangles: int, sink: Sink) -> int:
+    """Return how many threads draw, in bands of rows: as many as are asked for, or as many as the work is worth."""
+    n_threads = view.threads
+    if n_threads is None:
+        n_threads = available_threads()
+        if n_threads > 1:
+            n_threads = min(n_threads, max(1, int(work_ns(view, scene, n_triangles, sink) / MIN_THREAD_NS)))
+    return min(view.size[1], n_threads)
+
+
+def work_ns(view: View, scene: _engine.Scene, n_triangles: int, sink: Sink) -> float:
+    """Return about how long one thread draws, from a guess of what is seen."""
+    kind = "area" if view.sampling is Sampling.AREA else WORK_OF.get(sink, "ids")
+    row_ns, sample_ns, pixel_ns = WORK_NS[kind]
+    n_pixels = view.size[0] * view.size[1]
+    if n_pixels <= NEAR_PIXELS:
+        row_ns, pixel_ns = min(row_ns, NEAR_ROW_NS), min(pixel_ns, NEAR_PIXEL_NS)
+    _, n_layers, n_rows = scene.guess_seen(*view.size)
+    drawn_ns = row_ns * n_rows + n_pixels * (sample_ns * n_layers + pixel_ns)
+    return TRIANGLE_NS * n_triangles + view.sampling.n_samples * drawn_ns
+
+
+def can_share(view: View) -> bool:
+    """Tell whether a pass over a scene can draw some of its triangles."""
+    width, height = view.size
+    is_near = max(map(abs, view.origin)) < 2**29 and width * height < 2**31
+    fits_lanes = not view.test or view.subpixel_bits <= 8
+    return is_near and fits_lanes and view.method == METHODS["auto"].code
+
+
+def is_shared(view: View, n_triangles: int, n_parts: int, sink: Sink) -> bool:
+    """Tell whether each thread is to take a share of the triangles instead of setting up all of them."""
+    pays = n_triangles * n_parts >= MIN_TRIANGLES_TO_SHARE
+    fits_lanes = sink is not Sink.SAMPLES or view.grid_bits <= 8
+    return n_parts > 1 and pays and fits_lanes and can_share(view)
+
+
+def fragment_sink(test: DepthTest | None, *, has_depth: bool) -> Sink:
+    """Return what `rasterize` does with a covered sample: the nearer, the farther or the later triangle stays."""
+    if test is None or not has_depth:
+        return Sink.PAINT
+    return Sink.FARTHEST if test is DepthTest.GREATER else Sink.NEAREST
+
+
+def can_cluster(view: View, sink: Sink) -> bool:
+    """Tell whether the clusters of a mesh may be drawn one by one, in any order: where that decides nothing."""
+    is_on_grid = view.grid_bits == view.subpixel_bits and (sink is not Sink.SAMPLES or view.grid_bits <= 8)
+    return sink in ORDER_FREE and is_on_grid and 0 not in view.size and can_share(view)
+
+
+def pays_to_cluster(n_triangles: int, n_drawn: int, n_instances: int = 1) -> bool:
+    """Tell whether a mesh is drawn often enough to sort its triangles first.
+
+    `n_triangles`: of all that is drawn with it; `n_drawn`: how many pictures of it there have been.
+    """
+    return n_triangles >= MIN_TRIANGLES_TO_CLUSTER and (n_drawn > 0 or n_instances >= MIN_INSTANCES_TO_CLUSTER)
+
+
+def pays_to_draw_clusters(view: View, n_triangles: int, survey: Callable[[], Survey]) -> bool:
+    """Tell whether a view of a mesh in clusters is drawn from these; `survey`: what becomes of them in it."""
+    seen = survey()
+    is_culled = view.cull != CULL_CODES[Cull.NONE]
+    least = next(shares[is_culled] for below, *shares in MIN_OUTSIDE_TO_CLUSTER if n_triangles < below)
+    return seen.front <= MAX_FRONT_TO_CLUSTER and seen.outside >= least
+
+
+def pays_to_draw_instances(
+    view: View, n_triangles: int, survey: Callable[[], Survey], count_layers: Callable[[], float]
+) -> bool:
+    """Tell whether a scene in clusters is drawn from these; `n_triangles`: of an instance, on the mean.
+
+    `survey`: as for one mesh; `count_layers`: how many instances lie one behind the other.
+    """
+    seen = survey()
+    least = MIN_OUTSIDE_OF_INSTANCES[view.sampling.n_samples > 1]
+    pays = seen.outside >= least and pays_to_draw_clusters(view, n_triangles, lambda: seen)
+    return pays or count_layers() >= MIN_LAYERS_TO_CLUSTER
+
+
+def pays_to_snap_all(n_vertices: int, n_pixels: int) -> bool:
+    """Tell whether all vertices of a mesh in clusters are snapped for attributes, not only those that show."""
+    return n_vertices * MIN_PIXELS_A_VERTEX <= n_pixels
+
+
+def common_depth(points: NDArray[Any], *, has_depth: bool, is_clip_space: bool) -> float | None:
+    """Return the depth of every vertex if they all have the same.
+
+    The plane through three equal depths is that depth to the bit. The first, the middle and the last vertex settle it
+    for most scenes; the others are looked at only when those agree. Clip space is never looked at: its depth is not
+    known before the divide.
+    """
+    if not has_depth:
+        return 0.0
+    if is_clip_space or not len(points):
+        return None
+    z = points[:, 2]
+    first = z[0]
+    if not (z[len(z) // 2] == first and z[-1] == first) or not (z == first).all():
+        return None
+    with np.errstate(over="ignore"):  # what float32 cannot hold has been refused if a triangle uses it
+        return float(np.float32(first)) + 0.0  # -0 becomes 0, as it does in every depth buffer
+
+
+def pays_without_depth(scene: _engine.Scene, view: View) -> bool:
+    """Tell whether one pass over all pixels costs less than comparing depths wherever triangles are."""
+    n_pixels = view.size[0] * view.size[1]
+    _, n_layers, n_rows = scene.guess_seen(*view.size)
+    compared_ns = COMPARED_SAMPLE_NS * n_layers * n_pixels
+    if n_pixels > NEAR_PIXELS:
+        compared_ns += COMPARED_ROW_NS * n_rows
+    return compared_ns > FLAT_CALL_NS + FLAT_PIXEL_NS * n_pixels
+
+
+def flat_depth(scene: _engine.Scene, inputs: Inputs, view: View, *, has_depth: bool) -> float | None:
+    """Return the depth of the whole scene if samples need neither compare nor store it, and leaving that out pays."""
+    if (inputs.is_clip_space and has_depth) or not pays_without_depth(scene, view):
+        return None
+    return common_depth(inputs.points, has_depth=has_depth, is_clip_space=inputs.is_clip_space)
+
+
+def earlier_wins(test: DepthTest | None, *, has_depth: bool) -> bool:
+    """Tell whether the triangle with the lower index shows where depths are equal; otherwise the later one does."""
+    return test is not None and has_depth
+
+
+def is_direct(scene: _engine.Scene, view: View, dtype: np.dtype[Any], *, is_flat: bool) -> bool:
+    """Tell whether colours are best stored triangle by triangle, without labels in between.
+
+    Labels cost a pass to clear and one to colour them, and less a triangle that is seen.
+    """
+    if not is_flat or dtype != np.uint8 or view.sampling.n_samples > 1:
+        return False
+    n_seen, _, _ = scene.guess_seen(*view.size)
+    return n_seen * MIN_PIXELS_A_TRIANGLE <= view.size[0] * view.size[1]

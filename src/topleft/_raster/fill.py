@@ -1,0 +1,190 @@
+"""Colours of triangles into a picture: which triangle shows in each pixel, or each triangle blended in its turn."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from topleft import _engine
+from topleft._base.arrays import as_background, as_colors
+from topleft._base.memory import Memory
+from topleft._base.options import Per, Sampling, Sink, parse
+from topleft._base.threads import run_parts
+from topleft._raster import choices
+from topleft._raster.blend import Blending, blend_colors
+from topleft._raster.classic import fill_classic
+from topleft._raster.rasterize import canvas_of, draw, draw_all_samples
+from topleft._raster.resolve import parse_resolve, resolve_colors, resolve_flat, resolve_gouraud
+from topleft._raster.sampling import draw_means, sample_positions
+from topleft._raster.snap import Snapped, check_triangles, snap_scene
+from topleft._raster.view import View
+
+__all__ = ["Style", "draw_fill"]
+
+@dataclass(frozen=True, slots=True)
+class Style:
+    """The options of `fill` besides those that all verbs share, not yet checked."""
+
+    per: str
+    background: ArrayLike | None
+    blend: str
+    alpha: str
+    resolve: str
+
+
+def draw_fill(
+    memory: Memory,
+    vertices: ArrayLike,
+    triangles: ArrayLike,
+    colors: ArrayLike,
+    view: View,
+    style: Style,
+    out: object,
+) -> NDArray[Any]:
+    """`fill`, on the memory given."""
+    if view.sampling in (Sampling.OUTER, Sampling.INNER):
+        raise ValueError(
+            f"sampling {str(view.sampling)!r} gives no order: fill takes 'center', 'msaa2' to 'msaa16' and 'area'"
+        )
+    palette = as_colors(colors)
+    blending = Blending.parse(style.blend, style.alpha, palette, view)
+    transfer = parse_resolve(style.resolve, palette, view, is_straight=blending.is_straight)
+    if view.classic:
+        return fill_classic(view.classic, memory, vertices, triangles, palette, view, style.per, style.background, out)
+    snapped = snap_scene(memory, vertices, triangles, view, with_depth=False, out=out)
+    is_flat = colors_are_flat(len(palette), snapped, style.per)
+    shape = (*view.size[::-1], *palette.shape[1:])
+    ground = as_background(style.background, palette)
+    with canvas_of(memory, "fill", out, shape, palette.dtype.type, keep=ground is None) as (result, canvas):
+        if ground is None and out is None:
+            ground = np.zeros((), palette.dtype)
+        is_drawn = bool(canvas.size and snapped.n_triangles)
+        is_blended = blending.is_needed or choices.is_direct(snapped.scene, view, palette.dtype, is_flat=is_flat)
+        can_lay = is_drawn and is_blended and palette.dtype == np.uint8 and view.sampling.n_samples == 1
+        if ground is not None and not can_lay:
+            lay_ground(canvas, ground)
+            ground = None
+        if not is_drawn:
+            pass
+        elif is_blended:
+            blend(memory, snapped, view, palette, canvas, blending, transfer, is_flat=is_flat, ground=ground)
+        elif view.sampling.n_samples > 1:
+            paint_samples(memory, snapped, view, palette, canvas, transfer, is_flat=is_flat)
+        else:
+            paint(memory, snapped, view, palette, canvas, is_flat=is_flat)
+    view.mark("shade")
+    return result
+
+
+def colors_are_flat(n_colors: int, snapped: Snapped, per: str) -> bool:
+    """Tell whether a row of colours belongs to a triangle; otherwise it belongs to a vertex."""
+    choice = parse(Per, "per", per)
+    n_triangles = snapped.n_triangles
+    fits_triangles, fits_vertices = n_colors == n_triangles, n_colors == snapped.n_vertices
+    if choice is Per.AUTO and fits_triangles and fits_vertices and n_colors:
+        raise ValueError(
+            f"colors has {n_colors} rows, and there are as many triangles as vertices: "
+            "say per='triangle' or per='vertex'"
+        )
+    if choice is not Per.VERTEX and fits_triangles:
+        return True
+    if choice is not Per.TRIANGLE and fits_vertices:
+        return False
+    wish = {
+        Per.TRIANGLE: f"{n_triangles} rows, one per triangle",
+        Per.VERTEX: f"{snapped.n_vertices} rows, one per vertex",
+        Per.AUTO: f"{n_triangles} rows, one per triangle, or {snapped.n_vertices}, one per vertex",
+    }[choice]
+    raise ValueError(f"colors must have {wish}, got {n_colors}")
+
+
+def lay_ground(pixels: NDArray[Any], ground: NDArray[Any]) -> None:
+    """Give all pixels one colour: the first row, and the others row by row, which NumPy copies fast."""
+    pixels[:1] = ground
+    pixels[1:] = pixels[:1]
+
+
+def paint(
+    memory: Memory,
+    snapped: Snapped,
+    view: View,
+    colors: NDArray[Any],
+    pixels: NDArray[Any],
+    *,
+    is_flat: bool,
+) -> None:
+    """Draw coloured triangles over contiguous pixels: first which triangle shows in each, then its colour."""
+    width, height = view.size
+    labels = memory.empty("labels", (height, width), np.int32)
+    draw(memory, snapped, view, Sink.LABEL, labels)
+    palette, flat = _engine.as_bytes(colors), _engine.as_bytes(pixels)
+    n_channels = 1 if colors.ndim == 1 else colors.shape[1]
+
+    def paint_rows(first: int, end: int) -> None:
+        snapped.scene.paint(labels, palette, flat, first, end - first, is_flat, colors.dtype == np.uint8, n_channels)
+
+    run_parts(paint_rows, height, choices.threads_to_draw(view, snapped.scene, snapped.n_triangles, Sink.LABEL))
+
+
+def paint_samples(
+    memory: Memory,
+    snapped: Snapped,
+    view: View,
+    colors: NDArray[Any],
+    pixels: NDArray[Any],
+    transfer: _engine.Transfer | None,
+    *,
+    is_flat: bool,
+) -> None:
+    """Draw coloured triangles over contiguous pixels, each pixel the mean of its samples."""
+    width, height = view.size
+    positions = sample_positions(view.sampling.n_samples, view.grid_bits)
+    n_threads = choices.threads_to_draw(view, snapped.scene, snapped.n_triangles, Sink.LABEL)
+    if is_flat and choices.can_share(view):
+        palette = _engine.Palette(colors, transfer)
+        if draw_means(memory, snapped.scene, snapped.n_triangles, positions, palette, pixels, n_threads):
+            check_triangles(snapped.triangles, snapped.corners, snapped.n_vertices)
+        view.mark("draw")
+        return
+    labels: NDArray[np.int32] = memory.empty("sample labels", (len(positions), height, width), np.int32)
+    draw_all_samples(memory, snapped, view, positions, Sink.LABEL, labels, None)
+    if is_flat:
+        resolve_flat(labels, colors, pixels, transfer, n_threads)
+        return
+    scenes = [snapped.scene.seen_from(x, y) for x, y in positions.tolist()]
+    resolve_gouraud(memory, scenes, labels, colors, pixels, transfer, n_threads)
+
+
+def blend(
+    memory: Memory,
+    snapped: Snapped,
+    view: View,
+    colors: NDArray[Any],
+    pixels: NDArray[Any],
+    blending: Blending,
+    transfer: _engine.Transfer | None,
+    *,
+    is_flat: bool,
+    ground: NDArray[Any] | None = None,
+) -> None:
+    """Blend coloured triangles into contiguous pixels; with several samples a pixel each is a picture of its own.
+
+    `ground`, for uint8 with one sample a pixel: the colour that all pixels get before.
+    """
+    n_threads = choices.threads_to_draw(view, snapped.scene, snapped.n_triangles, Sink.LABEL)
+    if view.sampling.n_samples == 1:
+        pictures, scenes = pixels[None], [snapped.scene]
+    else:
+        positions = sample_positions(view.sampling.n_samples, view.grid_bits).tolist()
+        scenes = [snapped.scene.seen_from(x, y) for x, y in positions]
+        pictures = memory.empty("sample colors", (len(scenes), *pixels.shape), colors.dtype)
+        pictures[...] = pixels
+    for scene, picture in zip(scenes, pictures, strict=True):
+        if blend_colors(memory, scene, colors, picture, blending, n_threads, is_flat=is_flat, ground=ground):
+            check_triangles(snapped.triangles, snapped.corners, snapped.n_vertices)
+    view.mark("draw")
+    if view.sampling.n_samples > 1:
+        resolve_colors(pictures, pixels, transfer, n_threads)

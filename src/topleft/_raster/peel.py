@@ -1,0 +1,214 @@
+"""Depth peeling: the nearest layers of every pixel, sorted.
+
+In: scenes after the snap.  Out: `DepthLayers`, ids and depths of K layers, and attributes of each.
+"""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Sequence
+from typing import Unpack
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from topleft import _engine
+from topleft._base.memory import SCRATCH, FreshMemory, Memory
+from topleft._base.options import DepthTest, Sampling, parse
+from topleft._base.threads import count_threads, run_parts
+from topleft._raster.choices import can_share
+from topleft._raster.classic import refuse_classic
+from topleft._raster.fragments import Fragments
+from topleft._raster.snap import Snapped, check_triangles, snap_scene
+from topleft._raster.view import View, ViewOptions
+
+__all__ = ["DepthLayers", "check_peel", "peel", "peel_scenes"]
+
+#: All layers of a band of rows, which stay in a cache while the band is drawn.
+BAND_BYTES = 1 << 20
+
+
+class DepthLayers:
+    """What `peel` returns: of every pixel the triangles that cover its centre, the nearest first.
+
+    Attributes
+    ----------
+    triangle : ndarray of int32, shape (H, W, K)
+        Index of the triangle, -1 where there are fewer layers.
+    depth : ndarray of float32, shape (H, W, K)
+        Its depth; +inf where there are fewer, -inf with ``depth_test="greater"``.
+    planes : (ndarray of int32, ndarray of float32), each of shape (K, H, W)
+        The same numbers as they lie in memory.
+    """
+
+    def __init__(self, ids: NDArray[np.int32], depth: NDArray[np.float32], snapped: Snapped) -> None:
+        """Take planes (K, H, W) of a mesh."""
+        self.planes = ids, depth
+        self._snapped = snapped
+
+    def __repr__(self) -> str:
+        n, height, width = self.planes[0].shape
+        return f"{type(self).__name__}({width}x{height}, {n} layers, {self.n_triangles} triangles)"
+
+    def __len__(self) -> int:
+        return len(self.planes[0])
+
+    @property
+    def triangle(self) -> NDArray[np.int32]:
+        """Index of the triangle of each layer, int32 (H, W, K), -1 where there are fewer."""
+        return np.moveaxis(self.planes[0], 0, -1)
+
+    @property
+    def depth(self) -> NDArray[np.float32]:
+        """Depth of each layer, float32 (H, W, K)."""
+        return np.moveaxis(self.planes[1], 0, -1)
+
+    @property
+    def n_triangles(self) -> int:
+        """Triangles of the mesh that was peeled."""
+        return self._snapped.n_triangles
+
+    @property
+    def n_vertices(self) -> int | None:
+        """Vertices of the mesh that was peeled; None where there are several meshes."""
+        return self._snapped.n_vertices
+
+    @property
+    def count(self) -> NDArray[np.int32]:
+        """How many layers a pixel has, at most K: int32 (H, W)."""
+        return (self.planes[0] >= 0).sum(0, dtype=np.int32)
+
+    def layer(self, k: int) -> Fragments:
+        """Return layer k, 0 the nearest, as a visibility buffer of its own: attributes are computed there."""
+        return self.rows(k, 0, self.planes[0].shape[1])
+
+    def rows(self, k: int, top: int, n_rows: int) -> Fragments:
+        """Return rows [top, top + n_rows) of layer k in the same way."""
+        (ids, depth), box = self.planes, (k, slice(top, top + n_rows))
+        snapped = self._snapped
+        scene = snapped.scene.moved(0, top)
+        return Fragments(ids[box], depth[box], scene, snapped.n_vertices, snapped.n_triangles)
+
+
+def peel(
+    vertices: ArrayLike,
+    triangles: ArrayLike,
+    size: tuple[int, int],
+    *,
+    layers: int = 4,
+    depth_test: str = "less",
+    **view: Unpack[ViewOptions],
+) -> DepthLayers:
+    """Return the nearest layers of every pixel: ids and depths, sorted, as depth peeling gives them.
+
+    Parameters
+    ----------
+    vertices, triangles, size, **view
+        As in `rasterize`, one sample a pixel.
+    layers : int, 1 to 16
+        How many layers are kept of a pixel.
+    depth_test : "less" or "greater"
+        Which depth comes first.
+
+    Returns
+    -------
+    DepthLayers
+        ``.triangle`` (H, W, K) int32 with -1 for none, ``.depth`` (H, W, K) float32, ``.count`` (H, W), and
+        ``.layer(k)``, the visibility buffer of one layer.
+
+    Raises
+    ------
+    ValueError, TypeError, IndexError
+        As in `rasterize`; also a number of layers outside 1 to 16, or several samples a pixel.
+
+    Notes
+    -----
+    The layers of a pixel are the triangles that cover its centre, by their depth, at equal depth by their index; each
+    has the id and the depth that `rasterize` gives it when it is drawn alone. So layer 0 is what `rasterize` returns,
+    and layer k what it would return if what the layers before show were gone. Vertices (V, 2) lie at depth 0: their
+    layers are the triangles in the order of their indices.
+
+    References
+    ----------
+    C. Everitt, Interactive Order-Independent Transparency, 2001.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> vertices = [[0, 0, 5], [4, 0, 5], [0, 4, 5], [0, 0, 0], [2, 0, 2], [0, 2, 2]]
+    >>> tl.peel(vertices, [[0, 1, 2], [3, 4, 5]], (4, 1), layers=2).triangle
+    array([[[ 1,  0],
+            [ 0, -1],
+            [ 0, -1],
+            [-1, -1]]], dtype=int32)
+    """
+    checked = View.parse(size, view)
+    n, is_farthest = check_peel(checked, layers, depth_test)
+    snapped = snap_scene(FRESH, vertices, triangles, checked, with_depth=True, out=None)
+    ids, depth = peel_scenes(SCRATCH, [snapped], checked, n, is_farthest=is_farthest)
+    return DepthLayers(ids, depth, snapped)
+
+
+#: Layers refer to what they were drawn from, so nothing of it can be reused.
+FRESH = FreshMemory()
+
+
+def check_peel(view: View, layers: int, depth_test: str) -> tuple[int, bool]:
+    """Return how many layers are wanted, and whether the larger depth comes first, after checking the options."""
+    refuse_classic(view, "depth")
+    if view.sampling is not Sampling.CENTER:
+        raise ValueError(f"sampling {str(view.sampling)!r} gives no sorted layers: peel takes 'center'")
+    return as_layers(layers), parse(DepthTest, "depth_test", depth_test) is DepthTest.GREATER
+
+
+def as_layers(layers: object) -> int:
+    """Return a number of layers after checking it."""
+    try:
+        n = operator.index(layers)  # type: ignore[arg-type]
+    except TypeError:
+        raise TypeError(f"layers must be an integer, got {layers!r}") from None
+    if not 1 <= n <= _engine.MAX_LAYERS:
+        raise ValueError(f"layers must lie in 1 to {_engine.MAX_LAYERS}, got {n}")
+    return n
+
+
+def peel_scenes(
+    memory: Memory, scenes: Sequence[Snapped], view: View, n_layers: int, *, is_farthest: bool
+) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+    """Return planes (K, H, W) of ids and depths of all scenes together; the engine's scenes know their first ids."""
+    width, height = view.size
+    ids: NDArray[np.int32] = FRESH.empty("layer ids", (n_layers, height, width), np.int32)
+    depth: NDArray[np.float32] = FRESH.empty("layer depth", (n_layers, height, width), np.float32)
+    if 0 in view.size:
+        return ids, depth
+    n_threads = min(height, count_threads(view.threads, sum(snapped.n_triangles for snapped in scenes)))
+    # without bins each band looks at all triangles: few bands; a band has less than 2**31 pixels
+    n_rows = BAND_BYTES // (8 * n_layers * width) if can_share(view) else min(height, (2**31 - 1) // width)
+    band_bits = max(0, n_rows.bit_length() - 1)
+    while band_bits and height >> band_bits < 2 * n_threads:
+        band_bits -= 1
+    bins = [bins_of(memory, snapped, view, band_bits) for snapped in scenes]
+    n_bands = -(-height >> band_bits)
+
+    def peel_bands(first: int, end: int) -> int:
+        drawn = [snapped.scene for snapped in scenes]
+        return _engine.peel(drawn, bins, ids, depth, is_farthest, band_bits, first, end)
+
+    if max(run_parts(peel_bands, n_bands, n_threads)) >= 0:
+        for snapped in scenes:
+            check_triangles(snapped.triangles, snapped.corners, snapped.n_vertices)
+    return ids, depth
+
+
+def bins_of(memory: Memory, snapped: Snapped, view: View, band_bits: int) -> _engine.Bins | None:
+    """Return the triangles of each band of rows; None where every band looks at all of them."""
+    width, height = view.size
+    if not (snapped.n_triangles and can_share(view)):
+        return None
+    bins = _engine.Bins(
+        snapped.scene, height, width, 0, band_bits, memory.empty("bins", (3, snapped.n_triangles + 16), np.int32)
+    )
+    if bins.bad_row >= 0:
+        check_triangles(snapped.triangles, snapped.corners, snapped.n_vertices)
+    bins.fill(np.empty(bins.n_listed + 1, np.int32))
+    return bins

@@ -1,0 +1,153 @@
+"""Several samples a pixel: where they lie, and the grid that holds them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from topleft import _engine
+from topleft._base.memory import Memory
+from topleft._base.options import Sink
+from topleft._base.threads import run_parts
+
+__all__ = ["SAMPLE_GRID_BITS", "draw_means", "draw_planes", "refine_grid", "sample_positions"]
+
+#: From the centre of the pixel, x right and y down, in sixteenths of a pixel: the standard patterns of Direct3D 11.
+POSITIONS: dict[int, tuple[tuple[int, int], ...]] = {
+    2: ((4, 4), (-4, -4)),
+    4: ((-2, -6), (6, -2), (-6, 2), (2, 6)),
+    8: ((1, -3), (-1, 3), (5, 1), (-3, -5), (-5, 5), (-7, -1), (3, 7), (7, -7)),
+    16: (
+        (1, 1), (-1, -3), (-3, 2), (4, -1), (-5, -2), (2, 5), (5, 3), (3, -5),
+        (-2, 6), (0, -7), (-4, -6), (-6, 4), (-8, 0), (7, -4), (6, 7), (-7, -8),
+    ),
+}  # fmt: skip
+
+#: Sub-pixel bits of the coarsest grid that all samples lie on.
+SAMPLE_GRID_BITS = 4
+
+#: Ids and depth of one sample in a band of rows: they stay in the second-level cache while the band is drawn.
+BAND_BYTES = 512 << 10
+
+#: Labels of all samples in a band of rows that is resolved at once.
+LABEL_BAND_BYTES = 512 << 10
+
+SPECIAL, BAD, WIDE = np.iinfo(np.int32).min, 0, 1  # x_fx and y_fx of vertices that are not narrow: csrc/topleft.h
+
+
+def sample_positions(n_samples: int, grid_bits: int) -> NDArray[np.int32]:
+    """Return where the samples lie from the pixel's centre, int32 (S, 2), in units of ``2**-grid_bits`` pixels."""
+    return np.array(POSITIONS[n_samples], np.int32) << np.int32(grid_bits - SAMPLE_GRID_BITS)
+
+
+def refine_grid(
+    records: NDArray[np.uint8], wide: NDArray[np.int64] | None, n_bits: int
+) -> tuple[NDArray[np.int64] | None, bool]:
+    """Shift snapped vertices in place to a grid that is `n_bits` finer.
+
+    Returns the table of wide vertices, a new one if there was none and one is needed, and whether a vertex has left the
+    range; such vertices are marked.
+    """
+    xy = records.view(np.int32).reshape(-1, 4)[:, :2]
+    is_special = xy[:, 0] == SPECIAL
+    is_wide = is_special & (xy[:, 1] == WIDE)
+    leaves = ~is_special & (np.abs(xy) >= 2 ** (30 - n_bits)).any(axis=1)
+    stays = ~is_special & ~leaves
+    xy[stays] <<= np.int32(n_bits)
+    is_wide |= leaves
+    if not is_wide.any():
+        return wide, False
+    if wide is None:
+        wide = np.zeros((len(xy), 2), np.int64)
+    wide[leaves] = xy[leaves]
+    is_far = is_wide & (np.abs(wide) >= 2 ** (62 - n_bits)).any(axis=1)
+    wide[is_wide] <<= n_bits
+    xy[is_wide] = SPECIAL, WIDE
+    xy[is_far] = SPECIAL, BAD
+    return wide, bool(is_far.any())
+
+
+def draw_planes(
+    memory: Memory,
+    scene: _engine.Scene,
+    n_triangles: int,
+    positions: NDArray[np.int32],
+    sink: Sink,
+    pixels: NDArray[Any],
+    depth: NDArray[np.float32] | None,
+    n_threads: int,
+    *,
+    is_near: bool,
+) -> bool:
+    """Draw each sample into its plane of (S, H, W) arrays; returns whether an index lies outside the vertices.
+
+    The scene is set up once, its triangles sorted into bands of rows, and band after band is drawn for one sample after
+    the other. A scene that is not near (see `tl_kernels.draw`) is drawn as a whole for each sample.
+    """
+    n_samples, height, width = pixels.shape
+    scenes = [scene.seen_from(x, y) for x, y in positions.tolist()]
+    depths = [None] * n_samples if depth is None else list(depth)
+    targets = [_engine.Target(sink, plane, z, None) for plane, z in zip(pixels, depths, strict=True)]
+    if not is_near:
+        bad_rows = [
+            max(run_parts(lambda first, end, s=s, t=t: s.draw(t, first, end - first), height, n_threads))  # type: ignore[misc]
+            for s, t in zip(scenes, targets, strict=True)
+        ]
+        return max(bad_rows) >= 0
+    bins = sort_bands(memory, scene, n_triangles, positions, (height, width), BAND_BYTES // 8, n_threads)
+    if bins.bad_row >= 0:
+        return True
+    run_parts(lambda first, end: _engine.draw_bands(scenes, targets, bins, first, end), bins.n_bands, n_threads)
+    return False
+
+
+def draw_means(
+    memory: Memory,
+    scene: _engine.Scene,
+    n_triangles: int,
+    positions: NDArray[np.int32],
+    palette: _engine.Palette,
+    pixels: NDArray[Any],
+    n_threads: int,
+) -> bool:
+    """Write the mean colour of the samples over (H, W[, C]) pixels, in painter's order; returns as `draw_planes` does.
+
+    The scene is near, and labels live no longer than a band of rows.
+    """
+    height, width = pixels.shape[:2]
+    n = len(positions)
+    bins = sort_bands(memory, scene, n_triangles, positions, (height, width), LABEL_BAND_BYTES // (4 * n), n_threads)
+    if bins.bad_row >= 0:
+        return True
+    scenes = [scene.seen_from(x, y) for x, y in positions.tolist()]
+    n_parts = max(1, min(n_threads, bins.n_bands))
+    labels = list(memory.empty("sample labels", (n_parts, n, width << bins.band_bits), np.int32))
+    run_parts(
+        lambda first, end: _engine.fill_bands(scenes, labels.pop(), palette, pixels, bins, first, end),
+        bins.n_bands,
+        n_parts,
+    )
+    return False
+
+
+def sort_bands(
+    memory: Memory,
+    scene: _engine.Scene,
+    n_triangles: int,
+    positions: NDArray[np.int32],
+    shape: tuple[int, int],
+    n_pixels: int,
+    n_threads: int,
+) -> _engine.Bins:
+    """Return the triangles of each band of up to `n_pixels`; none when an index lies outside the vertices."""
+    height, width = shape
+    band_bits = max(0, (n_pixels // width).bit_length() - 1)
+    while band_bits and height >> band_bits < 2 * n_threads:
+        band_bits -= 1
+    room = memory.empty("bins", (3, n_triangles + 16), np.int32)
+    bins = _engine.Bins(scene, height, width, int(np.abs(positions).max()), band_bits, room)
+    if bins.bad_row < 0:
+        bins.fill(memory.empty("bands", (bins.n_listed + 1,), np.int32))
+    return bins

@@ -1,0 +1,134 @@
+"""The options that all verbs share, checked once per call."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol, TypedDict
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from topleft import _engine
+from topleft._base.arrays import as_size, as_subpixel_bits, as_window
+from topleft._base.options import ClipDepth, Cull, Sampling, parse
+from topleft._base.threads import parse_threads
+from topleft._raster.sampling import SAMPLE_GRID_BITS
+from topleft.methods import Method, find_method
+
+if TYPE_CHECKING:
+    from topleft._raster.clusters import Clusters
+
+__all__ = ["Planned", "View", "ViewOptions"]
+
+TEST_CODES = {Sampling.OUTER: 1, Sampling.INNER: 2}  # tl_test in csrc/topleft.h
+CULL_CODES = {Cull.NONE: 0, Cull.BACK: 1, Cull.FRONT: 2}  # tl_cull in csrc/topleft.h
+
+
+class Planned(Protocol):
+    """What a verb asks of the plan that it is given: `topleft.Plan`."""
+
+    def fitted(self, view: View) -> View:
+        """Return the view with what was chosen for it, or raise an error where the plan is for another one."""
+
+    def corners_of(self, triangles: ArrayLike, n_vertices: int) -> NDArray[np.int32]:
+        """Return the checked int32 triangles, or raise an error where the plan is for others."""
+
+    def find_clusters(self, vertices: ArrayLike) -> Clusters | None:
+        """Return vertices and triangles in clusters, if the plan is for a mesh that does not change and has these."""
+
+    def mark(self, stage: str) -> None:
+        """Note that a stage has ended."""
+
+
+class ViewOptions(TypedDict, total=False):
+    """The options that all verbs share; `docs/design.md`, section 2, tells what each does."""
+
+    transform: ArrayLike | None
+    origin: tuple[int, int]
+    viewport: tuple[int, int] | None
+    subpixel_bits: int
+    sampling: str
+    method: str
+    cull: str
+    clip_depth: str
+    near_clip: bool
+    far_clip: bool
+    threads: int | None
+    plan: Any
+
+
+OPTIONS = frozenset(ViewOptions.__annotations__)
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """Checked `ViewOptions`."""
+
+    size: tuple[int, int]
+    origin: tuple[int, int]
+    viewport: tuple[int, int]
+    transform: ArrayLike | None
+    subpixel_bits: int
+    grid_bits: int  # of the grid that holds the snapped vertices and all samples
+    sampling: Sampling
+    method: int
+    cull: int
+    zero_to_one: bool
+    near_clip: bool
+    far_clip: bool
+    threads: int | None
+    classic: Method | None = None
+    plan: Planned | None = None
+
+    def engine_view(self) -> _engine.View:
+        """Return how clip space maps to pixels."""
+        bits = self.subpixel_bits, self.grid_bits
+        return _engine.View(self.viewport, *bits, self.zero_to_one, self.near_clip, self.far_clip)
+
+    def mark(self, stage: str) -> None:
+        """Note for the plan that a stage has ended."""
+        if self.plan is not None:
+            self.plan.mark(stage)
+
+    def find_clusters(self, vertices: ArrayLike) -> Clusters | None:
+        """Return the vertices and triangles in clusters, if the plan has them."""
+        return None if self.plan is None else self.plan.find_clusters(vertices)
+
+    @property
+    def test(self) -> int:
+        """When a triangle covers a pixel: `tl_test` in ``csrc/topleft.h``."""
+        return TEST_CODES.get(self.sampling, 0)
+
+    @classmethod
+    def parse(cls, size: object, options: ViewOptions) -> View:
+        """Check the options of a call."""
+        if not options.keys() <= OPTIONS:
+            unknown = min(options.keys() - OPTIONS)
+            raise TypeError(f"unknown option {unknown!r}; the options are {', '.join(ViewOptions.__annotations__)}")
+        checked_size = as_size(size)
+        bits = as_subpixel_bits(options.get("subpixel_bits", 8))
+        sampling = parse(Sampling, "sampling", options.get("sampling", "center"))
+        grid_bits = bits if sampling.n_samples == 1 else max(SAMPLE_GRID_BITS, bits)
+        viewport = options.get("viewport")
+        method = find_method(options.get("method", "auto"))
+        plan = options.get("plan")
+        if not (plan is None or hasattr(plan, "fitted")):
+            raise TypeError(f"plan must be a Plan or None, got {type(plan).__name__}")
+        view = cls(
+            size=checked_size,
+            origin=as_window(options.get("origin", (0, 0)), grid_bits),
+            viewport=checked_size if viewport is None else as_size(viewport, "viewport", smallest=1),
+            transform=options.get("transform"),
+            subpixel_bits=bits,
+            grid_bits=grid_bits,
+            sampling=sampling,
+            method=method.code or 0,
+            cull=CULL_CODES[parse(Cull, "cull", options.get("cull", "none"))],
+            zero_to_one=parse(ClipDepth, "clip_depth", options.get("clip_depth", "minus_one_to_one"))
+            is ClipDepth.ZERO_TO_ONE,
+            near_clip=bool(options.get("near_clip", True)),
+            far_clip=bool(options.get("far_clip", True)),
+            threads=parse_threads(options.get("threads")),
+            classic=method if method.code is None else None,
+        )
+        return view if plan is None else plan.fitted(view)

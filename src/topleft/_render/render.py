@@ -1,0 +1,333 @@
+"""Rendering: a mesh or scene and a camera to a picture, in one call.
+
+Input: `Mesh` or `Scene`, `Camera`. Output: the picture (H, W, 4) uint8 of `render`, or the visibility buffer of
+`rasterize_mesh`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, NamedTuple, Unpack
+
+import numpy as np
+import numpy.typing as npt
+from numpy.typing import ArrayLike, NDArray
+
+from topleft._base.color import DEFAULT_COLOR, as_color
+from topleft._camera.camera import Camera
+from topleft._lod.detail import detailed
+from topleft._model.adapt import MeshLike, as_mesh
+from topleft._model.material import Material
+from topleft._model.mesh import Mesh
+from topleft._model.scene import Instance, Scene
+from topleft._raster import choices
+from topleft._raster.clusters import Clusters
+from topleft._raster.fragments import Fragments
+from topleft._raster.verbs import Rasterizer, rasterize, wireframe
+from topleft._raster.view import View
+from topleft._render.bend import BentMesh, bend
+from topleft._render.scene_cutout import cut_out_scene
+from topleft._render.scene_fragments import BentFragments
+from topleft._render.scene_lens import draw_seen
+from topleft._render.scene_render import camera_of, cull_of, shade_scene
+from topleft._shade.cutout import cut_out
+from topleft._shade.eye import distances
+from topleft._shade.multisample import shade_samples
+from topleft._shade.shade import LookOptions, Shading, shade
+
+DEFAULT_SIZE = (640, 480)
+WHITE = (255, 255, 255, 255)
+EDGE_COLOR = (24, 28, 40)
+
+
+def render(
+    mesh: MeshLike | Scene,
+    camera: Camera | None = None,
+    size: tuple[int, int] = DEFAULT_SIZE,
+    *,
+    shading: str = "smooth",
+    color: tuple[int, ...] = DEFAULT_COLOR,
+    background: tuple[int, ...] = WHITE,
+    cull: str = "none",
+    edges: bool = False,
+    sampling: str = "center",
+    tolerance: float = 0.0,
+    threads: int | None = None,
+    rasterizer: Rasterizer | None = None,
+    **look: Unpack[LookOptions],
+) -> npt.NDArray[np.uint8]:
+    """A picture of the mesh or scene.
+
+    Parameters
+    ----------
+    mesh : Mesh, Scene, or whatever `as_mesh` takes
+        What to draw: a mesh of trimesh, meshio, pyvista, say. Its colours are used if it has any.
+    camera : Camera, optional
+        Unless given, the three-quarter view of `Camera.framing`, with y up.
+    size : (width, height), pixels
+        640 x 480 unless given.
+    shading : {"smooth", "flat", "unlit", "matcap", "ids", "depth", "normals"}
+        What the colours tell; `topleft.shade.shade` describes each.
+    color : (3,) of 0 to 255
+        sRGB colour of a mesh without colours.
+    background : (3,) or (4,) of 0 to 255
+        sRGB, and alpha if it is not opaque; white unless given, `(0, 0, 0, 0)` is transparent.
+    cull : {"none", "back", "front"}
+        Triangles to leave out, by the side that is seen.
+    edges : bool
+        Whether the edges that show are drawn over it, as smooth dark lines.
+    sampling : {"center", "msaa2", "msaa4", "msaa8", "msaa16"}
+        Samples of a pixel. With several outlines are smooth: a triangle is shaded once in a pixel, where the first of
+        its samples lies, and the light of the samples is averaged.
+    tolerance : float
+        How far outlines may lie from where they belong, pixels: the mesh is drawn at the coarsest level of detail that
+        a bound on its distance allows in this view, see `choose_detail`. 0: the mesh itself. Levels are made at the
+        first use, which takes a while, and kept with the mesh; `simplify` and `Levels.load` do that beforehand.
+    threads : int, optional
+        How many threads draw; never changes a bit.
+    rasterizer : Rasterizer, optional
+        Of this size: what is needed on the way lies in the memory that it keeps.
+    **look
+        `lights`, `ambient`, `material`, `matcap` and `fog` of `topleft.shade.shade`.
+
+    Returns
+    -------
+    (H, W, 4) uint8
+        sRGB with alpha: 255 where the mesh is, the background elsewhere, their mean where samples see both.
+
+    Raises
+    ------
+    ValueError
+        If the mesh has no triangles and no camera is given, or an option is unknown.
+    MissingPackageError
+        If levels of detail are to be made and fast-simplification is not installed.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> mesh = tl.Mesh(*tl.scenes.shape("cube"))
+    >>> tl.render(mesh, size=(64, 48), background=(0, 0, 0, 0))[24, 32].tolist()[3]
+    255
+    """
+    mesh = mesh if isinstance(mesh, Scene) else as_mesh(mesh)
+    camera = default_camera(mesh, size) if camera is None else camera
+    mesh = detailed(mesh, camera, size, tolerance, cull=cull, material=look.get("material"))
+    frags = rasterize_mesh(mesh, camera, size, cull=cull, threads=threads, sampling=sampling, rasterizer=rasterizer)
+    return picture_of(
+        frags, mesh, camera, shading=shading, color=color, background=background, cull=cull, edges=edges,
+        threads=threads, **look,
+    )  # fmt: skip
+
+
+def picture_of(
+    frags: Fragments,
+    mesh: Mesh | Scene,
+    camera: Camera,
+    *,
+    shading: str = "smooth",
+    color: tuple[int, ...] = DEFAULT_COLOR,
+    background: tuple[int, ...] = WHITE,
+    cull: str = "none",
+    edges: bool = False,
+    threads: int | None = None,
+    **look: Unpack[LookOptions],
+) -> npt.NDArray[np.uint8]:
+    """The picture of the visibility buffer that `rasterize_mesh` returned; options as for `render`.
+
+    What materials cut out is taken out of the buffer.
+    """
+    options: dict[str, Any] = {"shading": shading, "color": color, "threads": threads, **look}
+    options["background"] = as_color("background", background, 4)
+    make = picture_of_scene if isinstance(mesh, Scene) else picture_of_mesh
+    picture = make(frags, mesh, camera, options)  # type: ignore[arg-type]
+    for instance in (mesh if isinstance(mesh, Scene) else [Instance(mesh)]) if edges else []:
+        own_camera, own_cull = camera_of(camera, instance), cull_of(cull, instance)
+        draw_edges(picture, frags, instance.mesh, own_camera, cull=own_cull, threads=threads)
+    return picture
+
+
+def picture_of_mesh(
+    frags: Fragments, mesh: Mesh, camera: Camera, options: dict[str, Any]
+) -> npt.NDArray[np.uint8]:
+    """The picture of a mesh's visibility buffer, without what its materials cut out; options as `shade` takes them."""
+    shown, surface, view = frags, mesh, camera
+    if isinstance(frags, BentFragments):  # the kernels read what was drawn, triangle by triangle
+        shown, surface, view = frags.parts, frags.mesh_of_parts(mesh), camera.straightened()
+    cut_out(shown, surface, view, options.get("material"), threads=options["threads"])
+    if isinstance(frags, BentFragments) and options["shading"] in (Shading.IDS, Shading.DEPTH):
+        shown, surface = frags.again(), mesh
+    return shade(shown, surface, view, **options)
+
+
+def without_holes(frags: Fragments, mesh: Mesh | Scene, camera: Camera, material: Material | None) -> Fragments:
+    """The visibility buffer without what materials (or this one) cut out; `frags` is changed."""
+    if isinstance(mesh, Scene):
+        return cut_out_scene(frags, mesh, camera, material)
+    if not isinstance(frags, BentFragments):
+        cut_out(frags, mesh, camera, material)
+        return frags
+    cut_out(frags.parts, frags.mesh_of_parts(mesh), camera.straightened(), material)
+    return frags.again()
+
+
+def picture_of_scene(
+    frags: Fragments, scene: Scene, camera: Camera, options: dict[str, Any]
+) -> npt.NDArray[np.uint8]:
+    """The picture of a scene's visibility buffer, without what materials cut out; options as `shade` takes them."""
+    frags = cut_out_scene(frags, scene, camera, options.get("material"), threads=options["threads"])
+    if options["shading"] == Shading.DEPTH:
+        options = {"depth_range": distances(frags, camera)} | options
+
+    def shade_one(sample: Fragments) -> npt.NDArray[np.uint8]:
+        return shade_scene(sample, scene, camera, **options)
+
+    has_samples = frags.samples_depth.shape[-1] > 1
+    return shade_samples(frags, shade_one, options["background"]) if has_samples else shade_one(frags)
+
+
+def rasterize_mesh(
+    mesh: MeshLike | Scene,
+    camera: Camera | None = None,
+    size: tuple[int, int] = DEFAULT_SIZE,
+    *,
+    cull: str = "none",
+    tolerance: float = 0.0,
+    threads: int | None = None,
+    rasterizer: Rasterizer | None = None,
+    **view: Any,
+) -> Fragments:
+    """The visibility buffer of the mesh or scene: ids and depth per pixel, and attributes interpolated on demand.
+
+    Parameters
+    ----------
+    mesh, camera, size, cull, threads
+        As for `render`.
+    tolerance : float
+        As for `render`; but for 0 ids are those of the level's triangles, ``choose_detail(...).mesh``.
+    rasterizer : Rasterizer, optional
+        Of this size: the result lies in its memory, until the next call. Scenes are drawn in memory of their own.
+    **view
+        Other options of `rasterize`, `origin=` for a window of a larger picture, say.
+
+    Returns
+    -------
+    Fragments
+        `.triangle` (H, W) int32, -1 where there is nothing; `.depth` (H, W) float32, window depth in [0, 1], +inf where
+        there is nothing. Of a scene `SceneFragments`: also `.instance` (H, W) int32, and `.triangle` counts the
+        triangles of its mesh.
+
+    Raises
+    ------
+    ValueError
+        If the mesh has no triangles and no camera is given, an option is unknown, or `rasterizer` has another size.
+    """
+    mesh = mesh if isinstance(mesh, Scene) else as_mesh(mesh)
+    camera = default_camera(mesh, size) if camera is None else camera
+    window = {"viewport": view.get("viewport"), "origin": view.get("origin", (0, 0))}
+    mesh = detailed(mesh, camera, size, tolerance, cull=cull, **window)
+    view |= {"cull": cull, "threads": threads}
+    if isinstance(mesh, Scene):
+        return draw_seen(mesh, camera, size, **view)
+    drawn = seen_through(mesh, camera, view.get("viewport") or size, near_clip=view.get("near_clip", True))
+    view["transform"] = drawn.transform
+    if rasterizer is not None and rasterizer.size != tuple(size):
+        raise ValueError(f"rasterizer must have the size {tuple(size)}, got {rasterizer.size}")
+    if drawn.bent is None:
+        view.setdefault("plan", StaticPlan(mesh))
+    if rasterizer is None:
+        frags = rasterize(drawn.vertices, drawn.triangles, size, **view)
+    else:
+        frags = rasterizer.rasterize(drawn.vertices, drawn.triangles, **view)
+    if drawn.bent is None:
+        return frags
+    bent = drawn.bent
+    return BentFragments(frags, bent.triangles, bent.source, bent.weights, mesh.triangles, len(mesh.vertices))
+
+
+class Drawn(NamedTuple):
+    """What the verbs draw of a mesh."""
+
+    vertices: npt.NDArray[Any]
+    triangles: npt.NDArray[np.integer[Any]]
+    transform: npt.NDArray[np.float64]
+    bent: BentMesh | None
+
+
+def seen_through(mesh: Mesh, camera: Camera, frame: tuple[int, int], *, near_clip: bool = True) -> Drawn:
+    """The mesh as it is, and the camera's matrix for a whole picture of this size; or as the camera's lens bends it."""
+    if camera.lens is None:
+        return Drawn(mesh.vertices, mesh.triangles, camera.clip_from_world(frame), None)
+    bent = bend(mesh.vertices, mesh.triangles, camera, camera.lens, frame, near_clip=near_clip)
+    return Drawn(bent.points_eye, bent.triangles, camera.clip_from_eye(frame), bent)
+
+
+def draw_edges(
+    picture: npt.NDArray[np.uint8],
+    frags: Fragments,
+    mesh: Mesh,
+    camera: Camera,
+    *,
+    cull: str = "none",
+    threads: int | None = None,
+) -> None:
+    """Draw the edges of the mesh over its picture (H, W, 4), those that the visibility buffer does not hide."""
+    height, width = frags.depth.shape
+    size = width, height
+    vertices, triangles, transform, bent = seen_through(mesh, camera, size)
+    if bent is not None:
+        triangles, cull = bent.outline(transform, cull), "none"
+    lines = wireframe(
+        vertices, triangles, size, transform=transform, depth=depth_behind(frags.depth), antialias=True, cull=cull,
+        threads=threads,
+    )  # fmt: skip
+    on = lines > 0
+    share = lines[on][:, None]
+    under = picture[on].astype(np.float32)
+    alpha = share + (1 - share) * (under[:, 3:] / 255)  # "over", T. Porter, T. Duff, Compositing Digital Images, 1984
+    rgb = share * np.array(EDGE_COLOR, np.float32) + (1 - share) * (under[:, 3:] / 255) * under[:, :3]
+    picture[on] = np.rint(np.hstack([rgb / alpha, 255 * alpha])).astype(np.uint8)
+
+
+def depth_behind(depth: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+    """The depth that edges may have and still show: farther by what the surface falls away within a pixel.
+
+    The slope along each axis is the smaller of those to the two neighbours: the other one may jump to another surface.
+    """
+    behind = depth.copy()
+    for axis in range(2):
+        with np.errstate(invalid="ignore"):
+            step = np.abs(np.diff(depth, axis=axis, prepend=np.inf, append=np.inf))
+        before, after = np.delete(step, -1, axis), np.delete(step, 0, axis)
+        slope = np.fmin(before, after)  # NaN: nothing on either side
+        behind += np.where(np.isfinite(slope), slope, 0)
+    return behind
+
+
+def default_camera(mesh: Mesh | Scene, size: tuple[int, int]) -> Camera:
+    """The three-quarter view of the mesh or scene with y up, for a picture of this size."""
+    width, height = size
+    subject = mesh.extreme_points() if isinstance(mesh, Scene) else mesh
+    return Camera.framing(subject, aspect=width / height if width > 0 and height > 0 else 1.0)
+
+
+class StaticPlan:
+    """The plan of a mesh that does not change: from its second picture on it is drawn in clusters, where that pays."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        self._mesh = mesh
+
+    def fitted(self, view: View) -> View:
+        """Return the view with this plan."""
+        return replace(view, plan=self)
+
+    def corners_of(self, triangles: ArrayLike, n_vertices: int) -> NDArray[np.int32]:  # noqa: ARG002
+        """Return the triangles of the mesh, which has checked them."""
+        return self._mesh.triangles
+
+    def find_clusters(self, vertices: ArrayLike) -> Clusters | None:  # noqa: ARG002
+        """Return the clusters of the mesh if it is drawn often enough; this is one time more."""
+        mesh = self._mesh
+        return mesh.clusters if choices.pays_to_cluster(len(mesh.triangles), mesh.note_drawn()) else None
+
+    def mark(self, stage: str) -> None:
+        """Nothing is measured."""

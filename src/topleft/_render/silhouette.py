@@ -1,0 +1,98 @@
+"""Silhouettes: where a mesh or scene is, seen by a camera, as a mask.
+
+Input: `Mesh` or `Scene`, `Camera`. Output: a mask (H, W), bool or float32.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy.typing as npt
+
+from topleft._camera.camera import Camera
+from topleft._lod.detail import detailed
+from topleft._model.adapt import MeshLike, as_mesh
+from topleft._model.scene import Scene
+from topleft._raster.verbs import coverage
+from topleft._render.render import DEFAULT_SIZE, default_camera, seen_through
+from topleft._render.scene_draw import draw_scene_coverage
+from topleft._render.scene_lens import scene_through
+
+__all__ = ["silhouette"]
+
+
+def silhouette(
+    mesh: MeshLike | Scene,
+    camera: Camera | None = None,
+    size: tuple[int, int] = DEFAULT_SIZE,
+    *,
+    sampling: str = "center",
+    cull: str = "none",
+    tolerance: float = 0.0,
+    threads: int | None = None,
+    out: npt.NDArray[Any] | None = None,
+    **view: Any,
+) -> npt.NDArray[Any]:
+    """Return the mask of the mesh or scene: where it is seen, or how much of each pixel it covers.
+
+    Parameters
+    ----------
+    mesh : Mesh, Scene, or whatever `as_mesh` takes
+        What to look at.
+    camera : Camera, optional
+        Unless given, the three-quarter view of `Camera.framing`, with y up.
+    size : (width, height), pixels
+        640 x 480 unless given.
+    sampling : str
+        As `coverage` takes it: "center" gives bool, "area" float32.
+    cull : {"none", "back", "front"}
+        Triangles to leave out, by the side that is seen.
+    tolerance : float
+        As for `render`: how far the outline may lie from where it belongs, pixels.
+    threads : int, optional
+        How many threads draw; never changes a bit.
+    out : ndarray of bool (float32 for "area"), shape (H, W), optional
+        Where the result goes.
+    **view
+        Other options of `coverage`, `origin=` for a window of a larger picture, say.
+
+    Returns
+    -------
+    ndarray of bool or float32, shape (H, W)
+        False or 0 where the mesh is not.
+
+    Raises
+    ------
+    ValueError
+        If the mesh has no triangles and no camera is given, or an option is unknown.
+
+    Notes
+    -----
+    What is covered by samples is the union of the triangles. By area it is the sum of their areas, at most 1: the union
+    where triangles do not overlap within a pixel. They do not along the outline of a closed mesh with ``cull="back"``
+    that each line of sight enters once; where one part of it hides another, a pixel of the inner outline is full.
+    Without culling the far side counts as well, and a pixel on the outline gets up to twice its share. Areas of the
+    instances of a scene are added up as float32, which is exact while the sum is below 1.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> mesh = tl.Mesh(*tl.scenes.shape("cube"))
+    >>> int(tl.silhouette(mesh, size=(8, 6)).sum())
+    17
+    >>> round(float(tl.silhouette(mesh, size=(8, 6), sampling="area", cull="back").sum()), 2)
+    16.2
+    """
+    mesh = mesh if isinstance(mesh, Scene) else as_mesh(mesh)
+    camera = default_camera(mesh, size) if camera is None else camera
+    window = {"viewport": view.get("viewport"), "origin": view.get("origin", (0, 0))}
+    mesh = detailed(mesh, camera, size, tolerance, cull=cull, **window)
+    options: Any = {"sampling": sampling, "cull": cull, "threads": threads} | view
+    frame = view.get("viewport") or size
+    if isinstance(mesh, Scene):
+        seen = scene_through(mesh, camera, frame, near_clip=view.get("near_clip", True))
+        return draw_scene_coverage(seen.scene, seen.clip_from_world, size, out, **options)
+    drawn = seen_through(mesh, camera, frame, near_clip=view.get("near_clip", True))
+    options["transform"] = drawn.transform
+    mask: npt.NDArray[Any] = coverage(drawn.vertices, drawn.triangles, size, out=out, **options)
+    return mask

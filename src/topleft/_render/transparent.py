@@ -1,0 +1,154 @@
+"""Transparent pictures: every layer of a mesh or scene is shaded, then they are seen through each other.
+
+Input: a mesh or `Scene`, `Camera`. Output: a picture (H, W, 4) uint8, sRGB with alpha.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft._base.color import as_color
+from topleft._camera.camera import Camera
+from topleft._lod.detail import detailed
+from topleft._model.adapt import MeshLike, as_mesh
+from topleft._model.material import Material
+from topleft._model.scene import Scene
+from topleft._raster.composite import composite
+from topleft._raster.peel import DepthLayers, peel
+from topleft._render.render import DEFAULT_SIZE, WHITE, default_camera
+from topleft._render.scene_cutout import cuts_of, draw_cuts, solid_scene, surfaces_of
+from topleft._render.scene_draw import peel_scene
+from topleft._render.scene_fragments import SceneDepthLayers
+from topleft._render.scene_render import shade_scene
+from topleft._shade.cutout import cut_of
+from topleft._shade.shade import shade
+
+__all__ = ["render_transparent", "visible_layers"]
+
+CLEAR = (0, 0, 0, 0)
+
+
+def render_transparent(
+    mesh: MeshLike | Scene,
+    camera: Camera | None = None,
+    size: tuple[int, int] = DEFAULT_SIZE,
+    *,
+    opacity: float = 0.5,
+    layers: int = 8,
+    shading: str = "smooth",
+    background: tuple[int, ...] = WHITE,
+    cull: str = "none",
+    tolerance: float = 0.0,
+    threads: int | None = None,
+    **look: Any,
+) -> npt.NDArray[np.uint8]:
+    """A picture of the mesh or scene as if it were of coloured glass.
+
+    Parameters
+    ----------
+    mesh, camera, size, shading, background, cull, tolerance, threads, **look
+        As for `render`, one sample a pixel, and as for `shade`.
+    opacity : float, 0 to 1
+        How much each layer hides of what lies behind it.
+    layers : int, 1 to 16
+        How many are looked at; what lies behind them is not seen.
+
+    Returns
+    -------
+    (H, W, 4) uint8
+        sRGB with alpha. The values are composited as they are, front to back; see `composite`.
+
+    Raises
+    ------
+    ValueError
+        If the mesh has no triangles and no camera is given, an option is out of range, or the camera has a lens.
+
+    Notes
+    -----
+    What `alpha_cutoff` leaves out of a texture is no glass: the layers behind it are one fewer.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> mesh = tl.Mesh(*tl.scenes.shape("cube"))
+    >>> tl.render_transparent(mesh, size=(64, 48), opacity=0.5, background=(0, 0, 0, 0))[24, 32].tolist()[3]
+    192
+    """
+    mesh = mesh if isinstance(mesh, Scene) else as_mesh(mesh)
+    camera = default_camera(mesh, size) if camera is None else camera
+    material = look.get("material")
+    mesh = detailed(mesh, camera, size, tolerance, cull=cull, material=material)
+    ground = as_color("background", background, 4)
+    if not isinstance(mesh, Scene) and cut_of(mesh, material) is not None:
+        mesh = Scene([mesh])  # which is the same picture
+    options: dict[str, Any] = {"layers": layers, "cull": cull, "threads": threads}
+    if isinstance(mesh, Scene):
+        found = solid_layers(mesh, camera, size, material, **options)
+    else:
+        found = visible_layers(mesh, camera, size, **options)
+    pictures = np.zeros((size[1], size[0], layers, 3), np.uint8)
+    for k in range(layers):
+        frags = found.layer(k)
+        if not frags.mask.any():
+            break
+        if isinstance(mesh, Scene):
+            own = shade_scene(frags, mesh, camera, shading=shading, background=CLEAR, **look)
+        else:
+            own = shade(frags, mesh, camera, shading=shading, background=CLEAR, **look)
+        pictures[:, :, k] = own[..., :3]
+    picture: npt.NDArray[np.uint8] = composite(found, pictures, opacity=opacity, background=ground, threads=threads)
+    return picture
+
+
+def solid_layers(
+    scene: Scene,
+    camera: Camera,
+    size: tuple[int, int],
+    material: Material | None,
+    *,
+    threads: int | None,
+    **options: Any,
+) -> DepthLayers:
+    """The nearest layers of a scene without what its materials, or this one, cut out."""
+    cuts = cuts_of(scene, material)
+    found = visible_layers(solid_scene(scene, cuts), camera, size, threads=threads, **options)
+    if not any(cuts) or not isinstance(found, SceneDepthLayers) or 0 in size:
+        return found
+    whole = SceneDepthLayers(*found.planes, found.placed.of(scene))
+    draw_cuts(whole.placed, surfaces_of(scene, camera), cuts, *whole.planes, is_peeled=True, threads=threads)
+    return whole
+
+
+def visible_layers(
+    mesh: MeshLike | Scene, camera: Camera | None = None, size: tuple[int, int] = DEFAULT_SIZE, **options: Any
+) -> DepthLayers:
+    """The nearest layers of every pixel of a mesh or scene, whatever its materials cut out; options as for `peel`.
+
+    Parameters
+    ----------
+    mesh, camera, size
+        As for `render`.
+    **options
+        Those of `peel`: `layers`, `cull`, `threads`, `origin`, ...
+
+    Returns
+    -------
+    DepthLayers
+        Of a scene `SceneDepthLayers`, which tells instances apart.
+
+    Raises
+    ------
+    ValueError
+        If the mesh has no triangles and no camera is given, an option is out of range, or the camera has a lens.
+    """
+    mesh = mesh if isinstance(mesh, Scene) else as_mesh(mesh)
+    camera = default_camera(mesh, size) if camera is None else camera
+    if camera.lens is not None:
+        raise ValueError("layers are not peeled through a lens, but camera has one: take its straightened()")
+    transform = camera.clip_from_world(options.get("viewport") or size)
+    if isinstance(mesh, Scene):
+        return peel_scene(mesh, transform, size, **{"layers": 4} | options)
+    return peel(mesh.vertices, mesh.triangles, size, transform=transform, **options)

@@ -1,0 +1,324 @@
+"""The command line: real files in, pictures out, one clear line and the right exit status when it cannot be."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from topleft import cli, scenes
+from topleft._camera.camera import Camera
+from topleft._io import png
+from topleft._model.mesh import Mesh
+from topleft._render.render import render
+
+SMALL = ["--size", "64x48"]
+QUADS = "g a\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\ng b\nv 0 0 1\nf 1 2 5\n"
+
+
+def names(folder):
+    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
+
+
+# Pictures
+
+
+def test_render_shape_is_the_picture_of_the_library(run):
+    assert run("render", "torus-knot", "-o", "knot.png", "--size", "96x64") == (0, [])
+    mesh = Mesh(*scenes.shape("torus-knot"))
+    assert np.array_equal(np.asarray(Image.open("knot.png")), render(mesh, size=(96, 64)))
+
+
+def test_render_wireframe_is_the_picture_with_edges(run):
+    assert run("render", "cube", "-o", "cube.png", "--wireframe", *SMALL) == (0, [])
+    expected = render(Mesh(*scenes.shape("cube")), size=(64, 48), edges=True)
+    assert np.array_equal(np.asarray(Image.open("cube.png")), expected)
+
+
+@pytest.mark.parametrize("kind", ["obj", "ply", "stl", "glb", "off"])
+def test_render_file_of_each_format_shows_the_mesh(run, folder, kind):
+    trimesh = pytest.importorskip("trimesh")
+    vertices, triangles = scenes.shape("icosphere")
+    trimesh.Trimesh(vertices, triangles, process=False).export(folder / f"ball.{kind}")
+    assert run("render", f"ball.{kind}", "-o", "ball.png", *SMALL) == (0, [])
+    expected = render(Mesh(vertices, triangles), size=(64, 48)).astype(int)
+    # Formats round positions to float32 or decimals, and may write normals of their own.
+    assert np.abs(np.asarray(Image.open("ball.png")) - expected).mean() < 1
+
+
+def test_render_obj_with_quads_and_groups_shows_all_triangles(run, folder):
+    pytest.importorskip("trimesh")
+    (folder / "a.obj").write_text(QUADS)
+    assert run("render", "a.obj", "-o", "a.npy", "--shading", "ids", *SMALL)[0] == 0
+    assert np.unique(np.load("a.npy")).tolist() == [-1, 0, 1, 2]
+
+
+@pytest.mark.parametrize("suffix", ["png", "jpg", "jpeg", "webp", "PNG"])
+def test_render_format_is_that_of_the_name(run, suffix):
+    assert run("render", "cube", "-o", f"cube.{suffix}", *SMALL) == (0, [])
+    with Image.open(f"cube.{suffix}") as image:
+        assert image.size == (64, 48)
+        assert image.format == {"png": "PNG", "webp": "WEBP"}.get(suffix.lower(), "JPEG")
+
+
+@pytest.mark.parametrize(
+    ("shading", "shape", "dtype"),
+    [
+        ("ids", (48, 64), "i4"),
+        ("depth", (48, 64), "f4"),
+        ("normals", (48, 64, 3), "f4"),
+        ("smooth", (48, 64, 4), "u1"),
+        ("flat", (48, 64, 4), "u1"),
+    ],
+)
+def test_render_npy_holds_the_numbers_behind_the_picture(run, shading, shape, dtype):
+    assert run("render", "cube", "-o", "cube.npy", "--shading", shading, *SMALL)[0] == 0
+    array = np.load("cube.npy")
+    assert (array.shape, array.dtype) == (shape, np.dtype(dtype))
+
+
+def test_render_npz_holds_all_buffers_and_the_matrix(run):
+    assert run("render", "cube", "-o", "cube.npz", *SMALL)[0] == 0
+    with np.load("cube.npz") as arrays:
+        assert sorted(arrays) == ["clip_from_world", "color", "depth", "triangle"]
+        assert np.array_equal(arrays["triangle"] >= 0, np.isfinite(arrays["depth"]))
+        camera = Camera.framing(Mesh(*scenes.shape("cube")), aspect=64 / 48)
+        assert np.array_equal(arrays["clip_from_world"], camera.clip_from_world((64, 48)))
+
+
+def test_render_camera_options_reach_the_camera(run):
+    angles = ["--azimuth", "-30", "--elevation", "10", "--fov", "25"]
+    others = ["--ortho", "--up", "z", "--cull", "back", "--threads", "1"]
+    assert run("render", "cube", "-o", "cube.png", *SMALL, *angles, *others)[0] == 0
+    mesh = Mesh(*scenes.shape("cube"))
+    camera = Camera.framing(
+        mesh, azimuth_deg=-30, elevation_deg=10, fov_y_deg=25, ortho=True, up="z", aspect=64 / 48
+    )
+    assert np.array_equal(np.asarray(Image.open("cube.png")), render(mesh, camera, (64, 48)))
+
+
+@pytest.mark.parametrize(
+    ("text", "rgba"),
+    [
+        ("transparent", [0, 0, 0, 0]),
+        ("navy", [0, 0, 128, 255]),
+        ("#102030", [16, 32, 48, 255]),
+        ("#10203040", [16, 32, 48, 64]),
+    ],
+)
+def test_render_background_is_a_name_or_a_number(run, text, rgba):
+    assert run("render", "cube", "-o", "cube.png", "--background", text, *SMALL)[0] == 0
+    assert np.asarray(Image.open("cube.png"))[0, 0].tolist() == rgba
+
+
+def test_render_transparent_jpeg_is_white(run):
+    assert run("render", "cube", "-o", "cube.jpg", "--background", "transparent", *SMALL)[0] == 0
+    assert np.asarray(Image.open("cube.jpg"))[0, 0].min() > 250
+
+
+# Names
+
+
+@pytest.mark.parametrize(
+    ("meshes", "out", "views", "expected"),
+    [
+        (["cube"], "a.png", 1, ["a.png"]),
+        (["cube"], "new/sub/a.png", 1, ["new/sub/a.png"]),
+        (["cube"], "pictures", 1, ["pictures/cube.png"]),
+        (["cube"], "v1.2/", 1, ["v1.2/cube.png"]),
+        (["cube", "torus"], "pictures", 1, ["pictures/cube.png", "pictures/torus.png"]),
+        (["cube"], "a.png", 2, ["a-000.png", "a-001.png"]),
+        (["cube"], "{view}_a.png", 2, ["000_a.png", "001_a.png"]),
+        (["cube", "torus"], "p", 2, ["p/cube-000.png", "p/cube-001.png", "p/torus-000.png", "p/torus-001.png"]),
+        (["cube", "torus"], "{name}/{index}.jpg", 1, ["cube/000.jpg", "torus/001.jpg"]),
+        (["cube", "cube"], "{index}.png", 2, ["000-000.png", "000-001.png", "001-000.png", "001-001.png"]),
+    ],
+)
+def test_render_names_follow_out(run, folder, meshes, out, views, expected):
+    assert run("render", *meshes, "-o", out, "--views", views, *SMALL) == (0, [])
+    assert names(folder) == expected
+
+
+def test_render_views_go_round_the_mesh(run):
+    assert run("render", "torus-knot", "-o", "a.npy", "--views", "4", "--shading", "ids", *SMALL)[0] == 0
+    mesh = Mesh(*scenes.shape("torus-knot"))
+    for i_view in range(4):
+        camera = Camera.framing(mesh, azimuth_deg=35 + 90 * i_view, aspect=64 / 48)
+        expected = render(mesh, camera, (64, 48), background=(0, 0, 0, 0))[..., 3] > 0
+        assert np.array_equal(np.load(f"a-00{i_view}.npy") >= 0, expected)
+
+
+def test_render_file_and_shape_of_one_name_would_collide(run, folder):
+    (folder / "cube.obj").write_text(QUADS)
+    status, lines = run("render", "cube", "cube.obj", "-o", "out/")
+    assert (status, len(lines)) == (2, 1)
+    assert lines[0].startswith("topleft: 'cube' and 'cube.obj' would both be written to 'out/cube.png'; put {index}")
+    assert names(folder) == ["cube.obj"]
+
+
+def test_render_names_that_differ_by_case_would_collide(run, folder):
+    (folder / "Cube.obj").write_text(QUADS)
+    assert run("render", "cube", "Cube.obj", "-o", "out/")[0] == 2
+
+
+def test_render_never_replaces_a_mesh(run, folder):
+    (folder / "a.npz").write_text(QUADS)
+    status, lines = run("render", "a.npz", "-o", "./a.npz")
+    assert (status, lines) == (2, ["topleft: OUT would overwrite the mesh 'a.npz'"])
+    assert (folder / "a.npz").read_text() == QUADS
+
+
+def test_render_mesh_and_out_reversed_is_refused(run, folder):
+    (folder / "a.obj").write_text(QUADS)
+    status, lines = run("render", "a.png", "-o", "a.obj")
+    assert (status, len(lines)) == (2, 1)
+    assert lines[0].startswith("topleft: OUT must end in one of .png .jpg .jpeg .webp .tif .tiff .npy .npz, or in /")
+    assert (folder / "a.obj").read_text() == QUADS
+
+
+# What goes wrong
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        (["nope.obj", "-o", "a.png"], "topleft: there is no file 'nope.obj'"),
+        (["dodo", "-o", "a.png"], "topleft: there is no file and no built-in shape 'dodo'; shapes: blob, cube, "),
+        (["broken.obj", "-o", "a.png"], "topleft: cannot read 'broken.obj': broken, or not a '.obj' file"),
+        (["empty.obj", "-o", "a.png"], "topleft: 'empty.obj' has no triangles"),
+        (["notes.txt", "-o", "a.png"], "topleft: cannot read 'notes.txt': format '.txt' is none of "),
+        (["cube", "-o", "notes.txt/a.png"], "topleft: cannot write to the folder 'notes.txt': '"),
+        (["cube", "-o", "a.gif"], "topleft: OUT must end in one of .png"),
+        (["cube", "-o", ""], "topleft: OUT must end in one of .png"),
+        (["cube", "torus", "-o", "a.png"], "topleft: several meshes need a folder or {name} in OUT, got 'a.png'"),
+        (["cube"], "topleft: say where pictures go: -o/--out, --sheet or --animation (try: topleft render --help)"),
+        (["-o", "a.png"], "topleft: there is nothing to render: give MESH or --jobs-file (try: topleft render --help)"),
+        (["cube", "-o", "a.png", "--size", "64"], "topleft: argument --size: must be WIDTHxHEIGHT, 1280x720 say, got"),
+        (["cube", "-o", "a.png", "--size", "0x9"], "topleft: argument --size: must be WIDTHxHEIGHT"),
+        (["cube", "-o", "a.png", "--views", "0"], "topleft: argument --views: must be a positive whole number, got"),
+        (["cube", "-o", "a.png", "--background", "x"], "topleft: argument --background: must be a colour name or #"),
+        (["cube", "-o", "a.png", "--shading", "toon"], "topleft: argument --shading: invalid choice: 'toon'"),
+        (["cube", "-o", "a.png", "--fov", "180"], "topleft: fov_y_deg must lie between 0 and 180, got 180.0"),
+        (["cube", "-o", "a.png", "--elevation", "91"], "topleft: elevation_deg must lie in -90 to 90, got 91.0"),
+        (["cube", "-o", "a.png", "--colour", "red"], "topleft: unrecognized arguments: --colour red"),
+    ],
+)
+def test_render_impossible_is_one_line_and_status_2(run, folder, arguments, line):
+    pytest.importorskip("trimesh")
+    (folder / "broken.obj").write_text("v 0 0 0\nv 1 0\nf 1 2 3\n")
+    (folder / "empty.obj").write_text("# nothing\n")
+    (folder / "notes.txt").write_text("buy milk\n")
+    status, lines = run("render", *arguments)
+    assert (status, len(lines)) == (2, 1)
+    assert lines[0].startswith(line)
+    assert names(folder) == ["broken.obj", "empty.obj", "notes.txt"]
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
+def test_render_into_a_protected_folder_is_one_line_and_status_2(run, folder):
+    (folder / "locked").mkdir(mode=0o555)
+    expected = "topleft: cannot write to the folder 'locked': permission denied"
+    assert run("render", "cube", "torus", "-o", "locked/") == (2, [expected])
+
+
+def test_render_protected_folder_is_found_before_any_work(run, monkeypatch):
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    expected = "topleft: cannot write to the folder 'locked': permission denied"
+    assert run("render", "cube", "torus", "-o", "locked/") == (2, [expected])
+
+
+def test_render_disk_full_leaves_no_half_picture(run, folder, monkeypatch):
+    def half_a_picture(image, **_):
+        yield b"half a pic"
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(png, "pieces", half_a_picture)
+    status, lines = run("render", "cube", "-o", "a.png", *SMALL)
+    assert (status, lines) == (2, ["topleft: cannot write: No space left on device: 'a.png'"])
+    assert names(folder) == []
+
+
+def test_render_many_goes_on_after_a_failure(run, folder):
+    pytest.importorskip("trimesh")
+    (folder / "broken.obj").write_text("v 0 0 0\nf 1 2 3\n")
+    status, lines = run("render", "cube", "broken.obj", "nope.ply", "torus", "-o", "out", *SMALL)
+    assert status == 1
+    assert lines[0].startswith("topleft: cannot read 'broken.obj'")
+    assert lines[1:] == [
+        "topleft: there is no file 'nope.ply'",
+        "topleft: 2 of 4 meshes failed: broken.obj nope.ply",
+    ]
+    assert names(folder) == ["broken.obj", "out/cube.png", "out/torus.png"]
+
+
+def test_render_without_trimesh_gives_the_hint(run, folder, monkeypatch):
+    monkeypatch.setitem(sys.modules, "trimesh", None)
+    (folder / "a.obj").write_text(QUADS)
+    expected = "topleft: reading a mesh needs trimesh: pip install 'topleft[render]'"
+    assert run("render", "a.obj", "cube", "-o", "out/", *SMALL) == (2, [expected])
+
+
+def test_render_shape_needs_no_optional_package(run, monkeypatch):
+    for package in ("trimesh", "tqdm", "scipy"):
+        monkeypatch.setitem(sys.modules, package, None)
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
+    assert run("render", "cube", "torus", "-o", "out/", *SMALL) == (0, [])
+
+
+# Progress, information, entry points
+
+
+def test_render_progress_is_shown_to_a_person(run, monkeypatch):
+    pytest.importorskip("tqdm")
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
+    status, lines = run("render", "cube", "-o", "a.png", "--views", "3", *SMALL)
+    assert status == 0
+    assert "3/3" in lines[-1]
+
+
+@pytest.mark.parametrize(("views", "is_tty"), [(1, True), (3, False)])
+def test_render_progress_is_silent_for_one_picture_or_a_pipe(run, monkeypatch, views, is_tty):
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: is_tty, raising=False)
+    assert run("render", "cube", "-o", "a.png", "--views", views, *SMALL) == (0, [])
+
+
+def test_info_tells_the_version_and_what_runs(capsys):
+    assert cli.main(["info"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert any(line.startswith("version: ") for line in lines)
+    assert any(line.startswith("isa: ") for line in lines)
+
+
+def test_no_command_is_status_2(run):
+    status, lines = run()
+    assert (status, lines) == (2, ["topleft: the following arguments are required: COMMAND (try: topleft --help)"])
+
+
+def test_help_names_shapes_and_formats(capsys):
+    with pytest.raises(SystemExit) as leaving:
+        cli.main(["render", "--help"])
+    text = capsys.readouterr().out
+    assert leaving.value.code == 0
+    assert all(word in text for word in [*scenes.SHAPES, ".png", ".npz", "{name}", "--views"])
+
+
+def test_python_m_topleft_is_the_command_line(folder):
+    command = [sys.executable, "-m", "topleft", "render", "nope.obj", "-o", "a.png"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (2, "", "topleft: there is no file 'nope.obj'\n")
+
+
+def test_render_warnings_of_a_reader_stay_off_stderr(folder):
+    pytest.importorskip("trimesh")
+    header = "ply\nformat ascii 1.0\ncomment TextureFile gone.png\nelement vertex 3\n"
+    properties = "property float x\nproperty float y\nproperty float z\nelement face 1\n"
+    rows = "property list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
+    Path("a.ply").write_text(header + properties + rows)
+    command = [sys.executable, "-m", "topleft", "render", "a.ply", "-o", "a.png", *SMALL]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")

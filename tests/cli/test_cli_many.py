@@ -1,0 +1,401 @@
+"""The command line for many pictures: layers, job files, workers, sheets, animations, and going on after a break."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import stat
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from topleft import scenes
+from topleft._camera.camera import Camera
+from topleft._model.mesh import Mesh
+from topleft._render.render import rasterize_mesh, render
+from topleft.cli import animation
+from topleft.cli.plan import Orbit, outermost
+from topleft.cli.sheet import make_sheet
+
+SMALL = ["--size", "64x48"]
+KNOT = Mesh(*scenes.shape("torus-knot"))
+
+
+@pytest.fixture
+def ffmpeg(folder, monkeypatch):
+    """A program of that name that keeps what it is told and fed, and writes a file; or fails if told to."""
+    tools = folder / "tools"
+    tools.mkdir()
+    program = tools / "ffmpeg"
+    program.write_text(
+        f"#!{sys.executable}\n"
+        "import json, os, sys\n"
+        "if os.environ.get('FAIL'): sys.exit('one\\nUnknown encoder')\n"
+        "pixels = sys.stdin.buffer.read()\n"
+        f"json.dump([sys.argv[1:], len(pixels)], open({str(folder / 'told.json')!r}, 'w'))\n"
+        "open(sys.argv[-1], 'wb').write(pixels)\n"
+    )
+    program.chmod(program.stat().st_mode | stat.S_IXUSR)
+    monkeypatch.setenv("PATH", str(tools))
+    return folder / "told.json"
+
+
+def names(folder):
+    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
+
+
+def knots(n, size=(64, 48)):
+    cameras = [Camera.framing(KNOT, azimuth_deg=35 + 360 * i / n, aspect=size[0] / size[1]) for i in range(n)]
+    return [render(KNOT, camera, size) for camera in cameras]
+
+
+def pixels(path):
+    with Image.open(path) as image:
+        return np.asarray(image)
+
+
+# Layers
+
+
+@pytest.mark.parametrize(
+    ("out", "layers", "views", "expected"),
+    [
+        ("p/", "color,depth", 1, ["p/cube-color.png", "p/cube-depth.png"]),
+        ("p/", "depth", 1, ["p/cube.png"]),
+        ("a.png", "color,triangle", 1, ["a-color.png", "a-triangle.png"]),
+        ("a.png", "color,alpha", 2, ["a-000-alpha.png", "a-000-color.png", "a-001-alpha.png", "a-001-color.png"]),
+        ("{layer}/{name}.tiff", "alpha,depth", 1, ["alpha/cube.tiff", "depth/cube.tiff"]),
+        ("a.npz", "color,triangle", 1, ["a.npz"]),
+        ("a.npy", "camera_normal", 1, ["a.npy"]),
+    ],
+)
+def test_render_layers_names_follow_out(run, folder, out, layers, views, expected):
+    assert run("render", "cube", "-o", out, "--layers", layers, "--views", views, *SMALL) == (0, [])
+    assert names(folder) == expected
+
+
+def test_render_layer_id_is_short_for_triangle(run, folder):
+    assert run("render", "cube", "-o", "p/", "--layers", "color,depth,id", *SMALL) == (0, [])
+    assert sorted(path.name for path in (folder / "p").iterdir()) == [
+        "cube-color.png", "cube-depth.png", "cube-triangle.png",
+    ]  # fmt: skip
+
+
+def test_render_layers_are_those_of_the_mesh(run):
+    assert run("render", "torus-knot", "-o", "p/", "--layers", "color,depth,triangle", *SMALL) == (0, [])
+    frags = rasterize_mesh(KNOT, None, (64, 48))
+    assert np.array_equal(pixels("p/torus-knot-color.png"), render(KNOT, None, (64, 48)))
+    assert np.array_equal(pixels("p/torus-knot-triangle.png").astype(int) - 1, frags.triangle)
+    assert np.array_equal(pixels("p/torus-knot-depth.png") > 0, frags.mask)
+
+
+def test_render_sampling_reaches_the_picture(run):
+    assert run("render", "torus-knot", "-o", "a.png", "--sampling", "msaa4", *SMALL) == (0, [])
+    assert np.array_equal(pixels("a.png"), render(KNOT, None, (64, 48), sampling="msaa4"))
+
+
+# Workers
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+@pytest.mark.parametrize("meshes", [["torus-knot"], ["torus-knot", "cube", "torus"]])
+def test_render_jobs_give_the_same_files(run, folder, jobs, meshes):
+    assert run("render", *meshes, "-o", "p/", "--views", 3, "--jobs", jobs, *SMALL) == (0, [])
+    assert len(names(folder)) == 3 * len(meshes)
+    for i, expected in enumerate(knots(3)):
+        assert np.array_equal(pixels(f"p/torus-knot-00{i}.png"), expected)
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_render_jobs_go_on_after_a_failure_and_list_it_once(run, folder, jobs):
+    (folder / "broken.obj").write_text("v 0 0 0\nf 1 2 3\n")
+    status, lines = run("render", "cube", "broken.obj", "nope.ply", "-o", "p", "--views", 3, "--jobs", jobs, *SMALL)
+    assert status == 1
+    assert lines[0].startswith("topleft: cannot read 'broken.obj'")
+    assert lines[1:] == ["topleft: there is no file 'nope.ply'", "topleft: 2 of 3 meshes failed: broken.obj nope.ply"]
+    assert names(folder) == ["broken.obj", "p/cube-000.png", "p/cube-001.png", "p/cube-002.png"]
+
+
+def test_render_resume_draws_what_is_missing(run, folder):
+    assert run("render", "torus-knot", "-o", "p/", "--views", 3, *SMALL) == (0, [])
+    (folder / "p/torus-knot-001.png").unlink()
+    (folder / "p/torus-knot-002.png").write_text("kept")
+    assert run("render", "torus-knot", "-o", "p/", "--views", 3, "--resume", *SMALL) == (0, [])
+    assert np.array_equal(pixels("p/torus-knot-001.png"), knots(3)[1])
+    assert (folder / "p/torus-knot-002.png").read_text() == "kept"
+
+
+# Cameras
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("seed", range(5))
+def test_orbit_frames_to_the_bit_as_framing_does(seed, dtype):
+    rng = np.random.default_rng(seed)
+    mesh = Mesh(rng.normal(size=(60, 3)).astype(dtype), rng.integers(0, 50, (40, 3)))
+    orbit = Orbit(30.0, -20.0, 35.0, "z", ortho=bool(seed % 2))
+    expected = Camera.framing(
+        mesh, azimuth_deg=30, elevation_deg=-20, fov_y_deg=35, up="z", ortho=bool(seed % 2), aspect=0.5
+    )
+    camera = orbit(mesh, (50, 100))
+    assert np.array_equal(camera.clip_from_world((50, 100)), expected.clip_from_world((50, 100)))
+    assert outermost(mesh).shape == (7, 3)
+
+
+# Job files
+
+
+TOML = """
+size = [64, 48]
+views = 3
+[[job]]
+mesh = "torus-knot"
+out = "a/{view}.png"
+[[job]]
+mesh = ["cube", "torus"]
+out = "b/"
+views = 1
+azimuth = -30.5
+wireframe = true
+layers = ["color", "triangle"]
+"""
+
+
+def test_job_file_is_what_it_says(run, folder):
+    (folder / "jobs.toml").write_text(TOML)
+    assert run("render", "--jobs-file", "jobs.toml") == (0, [])
+    b = [f"b/{name}-{layer}.png" for name in ("cube", "torus") for layer in ("color", "triangle")]
+    assert names(folder) == ["a/000.png", "a/001.png", "a/002.png", *b, "jobs.toml"]
+    cube = Mesh(*scenes.shape("cube"))
+    camera = Camera.framing(cube, azimuth_deg=-30.5, aspect=64 / 48)
+    assert np.array_equal(pixels("b/cube-color.png"), render(cube, camera, (64, 48), edges=True))
+
+
+def test_job_file_json_is_the_same_as_toml(run, folder):
+    document = {"job": [{"mesh": "cube", "size": [64, 48], "out": "a.png", "wireframe": False}]}
+    (folder / "jobs.json").write_text(json.dumps(document))
+    assert run("render", "--jobs-file", "jobs.json") == (0, [])
+    assert np.array_equal(pixels("a.png"), render(Mesh(*scenes.shape("cube")), None, (64, 48)))
+
+
+def test_job_file_takes_from_the_command_line_what_it_does_not_say(run, folder):
+    (folder / "jobs.json").write_text('{"size": "64x48", "job": [{"mesh": "cube"}]}')
+    assert run("render", "--jobs-file", "jobs.json", "-o", "a.npy", "--size", "10x10", "--shading", "ids") == (0, [])
+    assert (np.load("a.npy").shape, np.load("a.npy").dtype) == ((48, 64), np.int32)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "line"),
+    [
+        ("jobs.txt", "", "topleft: a job file must end in .toml or .json, got 'jobs.txt'"),
+        ("gone.toml", None, "topleft: No such file or directory: 'gone.toml'"),
+        ("jobs.toml", "size = [", "topleft: cannot read 'jobs.toml': "),
+        ("jobs.json", "{", "topleft: cannot read 'jobs.json': "),
+        ("jobs.json", b"\xff", "topleft: cannot read 'jobs.json': "),
+        ("jobs.json", "[]", "topleft: 'jobs.json' must hold an object, got list"),
+        ("jobs.json", "{}", "topleft: 'jobs.json' must have jobs: [[job]] in TOML, a list \"job\" of objects in JSON"),
+    ],
+)
+def test_job_file_broken_is_one_line_and_status_2(run, folder, name, text, line):
+    if text is not None:
+        (folder / name).write_bytes(text if isinstance(text, bytes) else text.encode())
+    status, lines = run("render", "--jobs-file", name, "-o", "p/")
+    assert (status, len(lines)) == (2, 1)
+    assert lines[0].startswith(line)
+
+
+@pytest.mark.parametrize(
+    ("job", "line"),
+    [
+        ('{"out": "a"}', "mesh must be a name or a list of"),
+        ('{"mesh": [1]}', "mesh must be a name or a list of"),
+        ('{"mesh": "cube", "colour": 1}', "there is no key 'colour'"),
+        ('{"mesh": "cube", "size": [1]}', "argument --size: must be"),
+        ('{"mesh": "cube", "ortho": 1}', "ortho must be true or fal"),
+        ('{"mesh": "cube", "fov": {}}', "fov must be text, a number"),
+        ('{"mesh": "cube", "jobs": 2}', "there is no key 'jobs'"),
+    ],
+)
+def test_job_file_impossible_names_the_job(run, folder, job, line):
+    (folder / "jobs.json").write_text('{"job": [{"mesh": "cube"}, ' + job + "]}")
+    status, lines = run("render", "--jobs-file", "jobs.json", "-o", "p/")
+    assert (status, len(lines)) == (2, 1)
+    assert lines[0].startswith(f"topleft: 'jobs.json', job 2: {line}")
+
+
+def test_job_file_and_meshes_are_refused(run):
+    status, lines = run("render", "cube", "--jobs-file", "jobs.toml", "-o", "p/")
+    assert (status, lines) == (2, ["topleft: a job file names its meshes itself: give MESH or --jobs-file, not both"])
+
+
+def test_job_file_jobs_of_one_name_would_collide(run, folder):
+    (folder / "jobs.json").write_text('{"out": "p/", "job": [{"mesh": "cube"}, {"mesh": "cube"}]}')
+    status, lines = run("render", "--jobs-file", "jobs.json")
+    assert status == 2
+    assert "would both be written to 'p/cube.png'" in lines[0]
+
+
+# Sheets
+
+
+def test_sheet_shows_each_picture_in_its_place(run, folder):
+    assert run("render", "torus-knot", "--sheet", "sheet.png", "--views", 5, "--size", "32x24") == (0, [])
+    assert names(folder) == ["sheet.png"]
+    sheet = pixels("sheet.png")
+    assert sheet.shape == (8 + 2 * (24 + 8 + 16), 8 + 3 * (32 + 8), 3)
+    for i, expected in enumerate(knots(5, (32, 24))):
+        top, left = 8 + 48 * (i // 3), 8 + 40 * (i % 3)
+        assert np.array_equal(sheet[top : top + 24, left : left + 32], expected[..., :3])
+
+
+def test_sheet_of_several_meshes_has_a_row_for_each(run, folder):
+    arguments = ["cube", "torus", "--sheet", "s.png", "--views", 3, "-o", "p/", "--layers", "color,triangle", *SMALL]
+    assert run("render", *arguments) == (0, [])
+    assert len(names(folder)) == 13
+    assert pixels("s.png").shape == (8 + 2 * (48 + 24), 8 + 3 * (64 + 8), 3)
+    assert np.array_equal(pixels("s.png")[8 + 72 : 8 + 72 + 48, 8 : 8 + 64], pixels("p/torus-000-color.png")[..., :3])
+
+
+def test_sheet_reduces_large_pictures(tmp_path):
+    Image.new("RGBA", (1000, 500), (200, 0, 0, 255)).save(tmp_path / "a.png")
+    sheet = make_sheet([[tmp_path / "a.png"]], ["a"])
+    assert sheet.shape == (8 + 128 + 24, 8 + 256 + 8, 3)
+    assert sheet[8 + 64, 8 + 128].tolist() == [200, 0, 0]
+
+
+def test_sheet_leaves_room_for_what_failed(run, folder):
+    status, _ = run("render", "cube", "nope.obj", "--sheet", "sheet.png", *SMALL)
+    assert status == 1
+    sheet = pixels("sheet.png")
+    assert sheet.shape == (8 + 48 + 24, 8 + 2 * (64 + 8), 3)
+    assert (sheet[8:56, 8:72] != 255).any()
+    assert (sheet[8:56, 80:144] == 255).all()
+
+
+# Animations
+
+
+@pytest.mark.parametrize(("suffix", "kind"), [("apng", "PNG"), ("webp", "WEBP"), ("gif", "GIF")])
+def test_animation_shows_all_views(run, folder, suffix, kind):
+    arguments = ["--animation", f"a.{suffix}", "--views", 5, "--fps", 10, *SMALL]
+    assert run("render", "torus-knot", *arguments) == (0, [])
+    assert names(folder) == [f"a.{suffix}"]
+    with Image.open(f"a.{suffix}") as image:
+        assert (image.format, image.n_frames, image.info.get("loop", 0)) == (kind, 5, 0)
+        for i, expected in enumerate(knots(5)):
+            image.seek(i)
+            found = np.asarray(image.convert("RGBA"))
+            assert image.info["duration"] == 100
+            if suffix == "gif":  # 255 colours for all
+                assert abs(found.astype(int) - expected).mean() < 2
+            else:
+                assert np.array_equal(found, expected)
+
+
+def test_animation_gif_keeps_what_is_transparent(run):
+    arguments = ["--animation", "a.gif", "--views", 3, "--background", "transparent", *SMALL]
+    assert run("render", "torus-knot", *arguments) == (0, [])
+    with Image.open("a.gif") as image:
+        for i, expected in enumerate(knots(3)):
+            image.seek(i)
+            is_clear = np.asarray(image.convert("RGBA"))[..., 3] == 0
+            assert np.array_equal(is_clear, (expected == 255).all(-1))
+
+
+def test_animation_of_several_meshes_is_one_for_each(run, folder):
+    arguments = ["--animation", "{name}.webp", "-o", "p/", "--views", 2, *SMALL]
+    assert run("render", "cube", "torus", *arguments) == (0, [])
+    assert [name for name in names(folder) if name.endswith("webp")] == ["cube.webp", "torus.webp"]
+
+
+def test_animation_of_a_mesh_that_failed_is_left_out(run, folder):
+    assert run("render", "cube", "nope.obj", "--animation", "{name}.gif", "--views", 2, *SMALL)[0] == 1
+    assert names(folder) == ["cube.gif"]
+
+
+def test_video_is_handed_to_ffmpeg(run, folder, ffmpeg):
+    arguments = ["--animation", "v/a.mp4", "--views", 3, "--fps", 12.5, "--size", "33x25"]
+    assert run("render", "torus-knot", *arguments) == (0, [])
+    command, n_bytes = json.loads(ffmpeg.read_text())
+    assert n_bytes == 3 * 33 * 25 * 3
+    assert command[command.index("-s") + 1] == "33x25"
+    assert command[command.index("-r") + 1] == "12.5"
+    expected = b"".join(picture[..., :3].tobytes() for picture in knots(3, (33, 25)))
+    assert (folder / "v/a.mp4").read_bytes() == expected
+    assert names(folder) == ["told.json", "tools/ffmpeg", "v/a.mp4"]
+
+
+def test_video_that_fails_leaves_no_file(run, folder, ffmpeg, monkeypatch):
+    monkeypatch.setenv("FAIL", "1")
+    status, lines = run("render", "cube", "--animation", "a.mp4", "--views", 2, *SMALL)
+    assert (status, lines) == (2, ["topleft: ffmpeg could not write 'a.mp4': Unknown encoder"])
+    assert names(folder) == ["tools/ffmpeg"]
+
+
+def test_video_without_ffmpeg_gives_the_hint_before_any_work(run, folder, monkeypatch):
+    monkeypatch.setenv("PATH", str(folder))
+    status, lines = run("render", "cube", "--animation", "a.mp4", "-o", "p/", *SMALL)
+    hint = "topleft: .mp4 needs ffmpeg, which is not installed (https://ffmpeg.org); .gif, .webp and .apng do without"
+    assert (status, lines) == (2, [hint])
+    assert names(folder) == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        (["--animation", "a.avi"], "topleft: an animation must end in one of .gif .webp .apng .mp4 .mkv .mov .w"),
+        (["torus", "--animation", "a.gif"], "topleft: several meshes need {name} in --animation, got 'a.gif'"),
+        (["--sheet", "a.gif"], "topleft: --sheet must end in one of .png .jpg .jpeg .webp .tif .tiff, got 'a.gif'"),
+        (["--sheet", "a.png", "-o", "a.npz"], "topleft: --sheet and --animation need pictures: OUT must end in one of"),
+        (["--sheet", "a.png", "-o", "p/", "--layers", "uv"], "topleft: --sheet and --animation show the layer color"),
+        (["--sheet", "p/cube.png", "-o", "p/"], "topleft: 'cube' and 'p/cube.png' would both be written to"),
+        (["-o", "p/", "--layers", "ids"], "topleft: argument --layers: layers must be some of color, alpha,"),
+        (["-o", "p/", "--layers", "flow"], "topleft: argument --layers: layer 'flow' needs two cameras"),
+        (["-o", "p/", "--fps", "0"], "topleft: argument --fps: must be a number from 0.1 to 100, got '0'"),
+        (["-o", "p/", "--jobs", "0"], "topleft: argument --jobs: must be a positive whole number, got '0'"),
+    ],
+)
+def test_many_impossible_is_one_line_and_status_2(run, folder, arguments, line):
+    status, lines = run("render", "cube", *arguments, *SMALL)
+    assert (status, len(lines)) == (2, 1)
+    assert lines[0].startswith(line)
+    assert names(folder) == []
+
+
+def test_palette_of_an_animation_is_one_for_all_frames():
+    frames = [Image.fromarray(picture) for picture in knots(4)]
+    palettes = {bytes(frame.getpalette()) for frame in animation._in_palette(frames)}
+    assert len(palettes) == 1
+
+
+# Interrupts
+
+
+@pytest.mark.skipif(not hasattr(os, "killpg"), reason="needs process groups")
+@pytest.mark.parametrize("meshes", [["octahedron"], ["octahedron", "tetrahedron"]])
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_render_interrupted_leaves_whole_files_and_goes_on_with_resume(run, folder, meshes, jobs):
+    options = ["--jobs", str(jobs), "-o", "p/", "--shading", "ids", *SMALL]
+    command = [sys.executable, "-m", "topleft", "render", *meshes, *options, "--views", "5000"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True) as process:
+        for _ in range(20_000):  # not by the clock: a machine may stand still
+            if len(names(folder)) >= 3 or process.poll() is not None:
+                break
+            time.sleep(0.002)
+        os.killpg(process.pid, signal.SIGINT)
+        assert process.stderr.read() == "topleft: interrupted\n"
+    assert process.returncode == 130
+    left = names(folder)
+    assert 3 <= len(left) < 5000 * len(meshes)
+    for name in left:  # whole, and nothing else
+        assert pixels(name).shape == (48, 64, 4)
+    (folder / left[0]).write_text("kept")
+    assert run("render", *meshes, *options, "--views", "40", "--resume") == (0, [])
+    wanted = {f"p/{mesh}-{i:03}.png" for mesh in meshes for i in range(40)}
+    assert set(names(folder)) == wanted | set(left)
+    assert (folder / left[0]).read_text() == "kept"

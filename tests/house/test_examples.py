@@ -1,0 +1,66 @@
+"""The examples run as a user runs them, and the pictures of docs/examples.md are theirs."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+ROOT = Path(__file__).parents[2]
+EXAMPLES = sorted(path.stem for path in ROOT.joinpath("examples").glob("*.py") if path.stem != "picture")
+PAGE = ROOT.joinpath("docs", "examples.md").read_text(encoding="utf-8")
+
+
+def run(name, output, *options):
+    command = [sys.executable, str(ROOT / "examples" / f"{name}.py"), "-o", str(output), *options]
+    return subprocess.run(command, check=True, capture_output=True, text=True, timeout=120).stdout
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_example_makes_the_picture_of_the_page(name, tmp_path):
+    if name == "thumbnails":
+        pytest.importorskip("trimesh")
+    run(name, tmp_path / "out.png")
+    on_page = ROOT / "docs" / "images" / f"example-{name}.png"
+    with Image.open(tmp_path / "out.png") as made, Image.open(on_page) as shown:
+        assert made.size == shown.size
+        difference = np.abs(np.asarray(made.convert("RGB"), int) - np.asarray(shown.convert("RGB"), int))
+    # Sines and powers of other machines may differ in the last bit, which moves an edge here and there.
+    assert (difference.max(axis=-1) > 3).mean() < 0.01
+
+
+def test_examples_are_nine_and_all_on_the_page():
+    assert len(EXAMPLES) == 9
+    assert sorted(re.findall(r"images/example-(\w+)\.png", PAGE)) == EXAMPLES
+    assert sorted(re.findall(r"\(../examples/(\w+)\.py\)", PAGE)) == EXAMPLES
+
+
+def test_pictures_of_the_page_are_small():
+    for name in EXAMPLES:
+        assert ROOT.joinpath("docs", "images", f"example-{name}.png").stat().st_size < 100_000
+
+
+def test_thumbnails_of_a_folder(tmp_path):
+    pytest.importorskip("trimesh")
+    folder = tmp_path / "meshes"
+    folder.mkdir()
+    folder.joinpath("one.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    assert run("thumbnails", tmp_path / "sheet.png", "--folder", str(folder)) == "one.obj: 1 triangles\n"
+    with Image.open(tmp_path / "sheet.png") as sheet:
+        assert sheet.size == (4 * 128, 128)
+
+
+def test_area_resampling_loses_nothing(tmp_path):
+    before, after = re.findall(r"[\d.]+\d", run("area_resampling", tmp_path / "out.png"))
+    assert float(before) == pytest.approx(float(after), rel=1e-5)
+
+
+def test_segmentation_masks_have_boxes(tmp_path):
+    lines = run("segmentation_mask", tmp_path / "out.png").splitlines()
+    assert len(lines) == 4
+    assert all(int(line.split()[-2]) > 1000 for line in lines)

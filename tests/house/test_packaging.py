@@ -1,0 +1,180 @@
+"""What the installed package promises: its floor, its dependencies, its build, the choice of the instruction set."""
+
+import ast
+import os
+import subprocess
+import sys
+from importlib import import_module, metadata, resources
+from inspect import ismodule
+
+import pytest
+from packaging.requirements import Requirement
+from packaging.specifiers import SpecifierSet
+
+import topleft as tl
+from topleft.methods import CLASSICS
+
+ISAS = ["scalar", "avx2", "avx512"]
+
+
+def requirements_of(extra: str) -> set[str]:
+    """Names of the distributions that an extra adds, "" for the runtime dependencies, one level deep."""
+    found = [Requirement(line) for line in metadata.requires("topleft") or []]
+    base = {r.name for r in found if not r.marker or r.marker.evaluate({"extra": ""})}
+    if not extra:
+        return base
+    return {r.name for r in found if r.marker and r.marker.evaluate({"extra": extra})} - base
+
+
+def run_python(code: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    env = {key: value for key, value in os.environ.items() if key != "TOPLEFT_ISA"} | environment
+    return subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, timeout=120)
+
+
+def test_metadata_python_floor_is_3_11():
+    floor = SpecifierSet(metadata.metadata("topleft")["Requires-Python"])
+    assert ["3.10" in floor, "3.11" in floor, "3.13" in floor] == [False, True, True]
+
+
+def test_metadata_runtime_dependencies_are_numpy_and_pillow_alone():
+    assert requirements_of("") == {"numpy", "pillow"}
+
+
+def test_metadata_runtime_dependencies_state_a_floor():
+    found = [Requirement(line) for line in metadata.requires("topleft") or []]
+    assert all(r.specifier for r in found if not r.marker)
+
+
+def test_metadata_extras_are_the_documented_ones():
+    found = set(metadata.metadata("topleft").get_all("Provides-Extra"))
+    assert found == {"render", "simplify", "test", "bench", "dev", "all"}
+
+
+def test_metadata_render_extra_is_isal_trimesh_and_tqdm():
+    assert requirements_of("render") == {"isal", "trimesh", "tqdm"}
+
+
+def test_metadata_simplify_extra_is_fast_simplification():
+    assert requirements_of("simplify") == {"fast-simplification"}
+
+
+def test_metadata_version_is_that_of_the_binary():
+    assert tl.build_info()["version"] == metadata.version("topleft")
+
+
+def test_metadata_license_is_mit():
+    assert metadata.metadata("topleft")["License-Expression"] == "MIT"
+
+
+def test_metadata_command_is_topleft():
+    (command,) = metadata.distribution("topleft").entry_points.select(group="console_scripts")
+    assert (command.name, command.value) == ("topleft", "topleft.cli:main")
+
+
+#: The engine, and a kernel for each classic.
+UNITS = ["_engine.kernels", *(f"methods.{name}" for name in dict.fromkeys(name.partition("/")[0] for name in CLASSICS))]
+
+
+@pytest.mark.parametrize("name", ["py.typed", *(unit.replace(".", "/") + ".pyi" for unit in UNITS)])
+def test_package_is_typed(name):
+    assert resources.files("topleft").joinpath(name).is_file()
+
+
+def public_names(body: list[ast.stmt]) -> dict[str, ast.stmt]:
+    named = {getattr(node, "name", None) or getattr(getattr(node, "target", None), "id", "_"): node for node in body}
+    return {name: node for name, node in named.items() if not name.startswith("_")}
+
+
+@pytest.mark.parametrize("unit", UNITS)
+def test_stub_declares_what_the_compiled_module_has(unit):
+    module = import_module(f"topleft.{unit}")
+    path = resources.files("topleft").joinpath(unit.replace(".", "/") + ".pyi")
+    stub = public_names(ast.parse(path.read_text(encoding="utf-8")).body)
+    there = {name for name, value in vars(module).items() if not name.startswith("_") and not ismodule(value)}
+    assert set(stub) - {"np", "NDArray"} == there
+    for name, node in stub.items():
+        if isinstance(node, ast.ClassDef):
+            assert set(public_names(node.body)) == {n for n in vars(getattr(module, name)) if not n.startswith("_")}
+
+
+def test_classics_use_no_engine_and_are_loaded_when_asked_for():
+    kernels = {f"topleft.{unit}" for unit in UNITS[1:]}
+    code = f"import topleft, sys; print(*sorted({kernels} & set(sys.modules)))"
+    assert run_python(code).stdout.split() == []
+    folder = resources.files("topleft.methods")
+    sources = [path for path in folder.iterdir() if path.name.endswith((".py", ".pyx", ".pxi"))]
+    lines = [line for path in sources for line in path.read_text(encoding="utf-8").splitlines()]
+    assert not [line for line in lines if "_engine" in line and "import" in line]
+
+
+def test_build_info_has_the_documented_keys():
+    assert list(tl.build_info()) == ["version", "compiler", "flags", "isa_built", "isa_available", "isa"]
+
+
+def test_build_info_names_isas_from_plain_to_wide():
+    info = tl.build_info()
+    assert info["isa_built"] == [isa for isa in ISAS if isa in info["isa_built"]]
+    assert info["isa_available"] == [isa for isa in info["isa_built"] if isa in info["isa_available"]]
+    assert "scalar" in info["isa_available"]
+
+
+def test_build_info_flags_of_each_unit_forbid_contraction():
+    info = tl.build_info()
+    assert list(info["flags"]) == info["isa_built"]
+    assert all("-ffp-contract=off" in flags.split() for flags in info["flags"].values())
+
+
+def test_build_info_names_the_compiler():
+    assert tl.build_info()["compiler"].split()[0] in {"gcc", "clang"}
+
+
+def test_isa_default_is_the_widest_available():
+    done = run_python("import topleft as tl; print(tl.build_info()['isa'])")
+    assert done.stdout.split() == [tl.build_info()["isa_available"][-1]], done.stderr
+
+
+@pytest.mark.parametrize("isa", tl.build_info()["isa_available"])
+def test_isa_override_is_used(isa):
+    done = run_python("import topleft as tl; print(tl.build_info()['isa'])", TOPLEFT_ISA=isa)
+    assert done.stdout.split() == [isa], done.stderr
+
+
+def test_isa_override_empty_is_no_override():
+    done = run_python("import topleft as tl; print(tl.build_info()['isa'])", TOPLEFT_ISA="")
+    assert done.stdout.split() == [tl.build_info()["isa_available"][-1]], done.stderr
+
+
+def test_isa_override_unknown_name_lists_the_choices():
+    done = run_python("import topleft", TOPLEFT_ISA="sse9")
+    choices = ", ".join(tl.build_info()["isa_available"])
+    message = f"TOPLEFT_ISA must be one of {choices}, got 'sse9', which is no instruction set that topleft knows"
+    assert (done.returncode, done.stderr.splitlines()[-1]) == (1, "ValueError: " + message)
+
+
+@pytest.mark.parametrize(
+    ("built", "reason"), [(["scalar", "avx2"], "which this machine cannot run"), (["scalar"], "which was not built")]
+)
+def test_isa_override_unavailable_says_why(monkeypatch, built, reason):
+    from topleft._engine import isa as _isa
+    from topleft._engine import kernels
+
+    monkeypatch.setenv("TOPLEFT_ISA", "avx2")
+    monkeypatch.setattr(kernels, "isa_built", lambda: built)
+    monkeypatch.setattr(kernels, "isa_available", lambda: ["scalar"])
+    with pytest.raises(ValueError, match=f"TOPLEFT_ISA must be one of scalar, got 'avx2', {reason}"):
+        _isa.select()
+
+
+def test_use_isa_unknown_name_is_an_error_and_changes_nothing():
+    from topleft import _engine
+
+    before = _engine.isa_in_use()
+    with pytest.raises(ValueError, match="instruction set must be one of scalar"):
+        _engine.use_isa("sse9")
+    assert _engine.isa_in_use() == before
+
+
+def test_import_of_topleft_loads_no_optional_dependency():
+    optional = {"trimesh", "tqdm", "scipy", "matplotlib", "fast_simplification"}
+    done = run_python(f"import topleft, sys; print(*sorted({optional} & set(sys.modules)))")
+    assert (done.returncode, done.stdout.split()) == (0, []), done.stderr

@@ -1,0 +1,81 @@
+"""The programs of the README run as they stand there."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from topleft import scenes
+
+README = Path(__file__).parents[2].joinpath("README.md").read_text(encoding="utf-8")
+PROGRAMS = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_readme_mask_is_a_star(folder):
+    exec(PROGRAMS[0], {})
+    with Image.open(folder / "star.png") as image:
+        assert image.size == (256, 256)
+        assert (np.asarray(image)[128, [0, 128, 255]] != 0).tolist() == [False, True, False]
+
+
+def test_readme_layers_agree(folder):
+    pytest.importorskip("trimesh")
+    vertices, triangles = scenes.shape("icosahedron")
+    lines = [f"v {x} {y} {z}" for x, y, z in vertices] + [f"f {a} {b} {c}" for a, b, c in triangles + 1]
+    folder.joinpath("bunny.obj").write_text("\n".join(lines) + "\n")
+    exec(PROGRAMS[1], {})
+    with np.load("view.npz") as view:
+        assert view["triangle"].shape == (480, 640)
+        assert view["triangle"].max() < len(triangles)
+        assert np.array_equal(view["triangle"] >= 0, np.isfinite(view["depth"]))
+        assert view["triangle"][240, 320] >= 0
+    with Image.open("distance.png") as image:
+        assert np.array_equal(np.asarray(image) > 0, view_mask(folder))
+
+
+def view_mask(folder):
+    with np.load(folder / "view.npz") as view:
+        return view["triangle"] >= 0
+
+
+def test_readme_pictures_show_the_scene(folder):
+    exec(PROGRAMS[2], {})
+    for name in ("scene.png", "glass.png"):
+        with Image.open(name) as image:
+            assert image.size == (640, 480)
+            assert len(np.unique(np.asarray(image).reshape(-1, 4), axis=0)) > 1000
+
+
+def test_readme_batch_writes_all_views(folder):
+    exec(PROGRAMS[3], {})
+    assert sorted(path.name for path in (folder / "views").iterdir()) == [f"{i:03}.png" for i in range(100)]
+
+
+def test_readme_heights_and_fields_are_those_of_the_sphere(folder):
+    pytest.importorskip("trimesh")
+    found = {}
+    exec(PROGRAMS[4], found)
+    assert found["picture"].shape == (240, 320, 4)
+    assert np.nanmax(found["heights"]) == pytest.approx(1, abs=1e-3)  # a polyhedron in the unit sphere
+    assert found["grid"].shape == (400, 400)
+    assert np.isnan(found["grid"][0, 0])
+
+
+def test_readme_programs_are_all_run():
+    assert len(PROGRAMS) == 5
+
+
+def test_readme_has_the_two_commands():
+    commands = re.findall(r"```sh\n(.*?)\n```", README, flags=re.DOTALL)
+    assert commands == [
+        "pip install '.[render]' && topleft render torus-knot -o knot.png",
+        "pip install '.[test]' && python -m pytest",
+    ]

@@ -1,0 +1,256 @@
+"""Files: small meshes written here and read back, broken ones refused."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from topleft import scenes
+from topleft._io import load as files
+from topleft._io.images import save_image
+from topleft._model.mesh import Mesh
+from topleft._model.normals import face_normals
+from topleft.errors import MeshError, MissingPackageError
+
+trimesh = pytest.importorskip("trimesh")
+
+SHARED_MESHES = Path(__file__).resolve().parents[3] / "shared" / "meshes"
+SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
+GLTF_WITHOUT_ITS_BUFFER = """{"asset": {"version": "2.0"}, "buffers": [{"uri": "gone.bin", "byteLength": 36}]}"""
+
+
+@pytest.fixture
+def write(tmp_path):
+    def write_file(name, content):
+        path = tmp_path / name
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+        return path
+
+    return write_file
+
+
+def exported(kind, mesh=None):
+    vertices, triangles = scenes.shape("icosphere", subdivisions=1)
+    return (mesh or trimesh.Trimesh(vertices, triangles, process=False)).export(file_type=kind)
+
+
+def area(mesh):
+    a, b, c = (mesh.vertices[mesh.triangles[:, corner]] for corner in range(3))
+    return np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
+
+
+# Meshes in
+
+
+def test_load_obj_quads_and_polygons_become_triangles(write):
+    mesh = files.load(write("a.obj", SQUARE + "v .5 2 0\nf 1 2 3 4\nf 1 2 3 5 4\n"))
+    assert mesh.triangles.shape == (2 + 3, 3)
+    assert area(mesh) == pytest.approx(1 + 1.5)
+    assert (face_normals(mesh.vertices, mesh.triangles) == [0, 0, 1]).all()
+
+
+def test_load_obj_groups_are_one_mesh_in_the_order_of_the_file(write):
+    groups = "g one\nusemtl red\nf 1 2 3\ns off\ng two\nusemtl blue\nf 1 3 4\nf 4 2 1\n"
+    text = "mtllib no.mtl\no thing\n" + SQUARE + groups
+    mesh = files.load(write("a.obj", text))
+    assert mesh.vertices.tolist() == [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+    assert mesh.triangles.tolist() == [[0, 1, 2], [0, 2, 3], [3, 1, 0]]
+
+
+def test_load_obj_texture_seam_doubles_vertices_but_not_normals(write):
+    text = SQUARE + "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 .5\nf 1/1 2/2 3/3\nf 1/4 3/1 4/2\n"
+    mesh = files.load(write("a.obj", text))
+    assert mesh.uv[mesh.triangles].tolist() == [[[0, 0], [1, 0], [1, 1]], [[0, 0.5], [0, 0], [1, 0]]]
+    assert len(mesh.vertices) == 6
+    assert (mesh.vertex_normals() == [0, 0, 1]).all()
+    whole = files.load(write("b.obj", SQUARE + "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3\nf 1/1 3/3 4/4\n"))
+    assert len(whole.vertices) == 4
+
+
+MTL = "newmtl red\nKd 1 0 0\nKs .5 .5 .5\nNs 20\nnewmtl picture\nKd 0 0 0\nmap_Kd a.png\n"
+
+
+def test_load_obj_materials_come_with_their_triangles(write, tmp_path):
+    save_image(tmp_path / "a.png", np.full((1, 2, 3), (0, 0, 255), np.uint8))
+    write("a.mtl", MTL)
+    faces = "usemtl picture\nf 1/1 2/2 3/3\nusemtl red\nf 1/1 3/3 4/4\n"
+    mesh = files.load(write("a.obj", "mtllib a.mtl\n" + SQUARE + "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n" + faces))
+    assert mesh.material_of_triangle.tolist() == [0, 1]
+    picture, red = mesh.materials
+    assert picture.texture.image.tolist() == [[[0, 0, 255, 255]] * 2]
+    assert (red.color, red.texture, red.shininess) == ((255, 0, 0), None, 20)
+    assert red.specular == pytest.approx(0.5, abs=0.01)  # trimesh keeps bytes
+
+
+def test_load_gltf_base_color_is_light_and_its_cutout_is_kept(tmp_path):
+    trimesh = pytest.importorskip("trimesh")
+    shape = trimesh.creation.box()
+    shape.visual = trimesh.visual.TextureVisuals(
+        uv=np.zeros((8, 2)),
+        material=trimesh.visual.material.PBRMaterial(
+            baseColorFactor=[0.5, 0.0, 1.0, 1.0], roughnessFactor=0.5, alphaMode="MASK", alphaCutoff=0.25
+        ),
+    )
+    shape.export(tmp_path / "a.glb")
+    (material,) = files.load(tmp_path / "a.glb").materials
+    assert material.color[0] == pytest.approx(188, abs=1)  # half the light, in bytes
+    assert material.color[1:] == (0, 255)
+    assert (material.alpha_cutoff, material.shininess) == (0.25, pytest.approx(30))
+    assert 0 < material.specular < 1
+
+
+def test_load_obj_doubled_vertices_become_one(write):
+    mesh = files.load(write("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 4 5 6\n"))
+    assert len(mesh.vertices) == 4
+
+
+def test_load_obj_normals_of_the_file_are_kept(write):
+    text = SQUARE + "vn 0 0.6 0.8\nvn 0 0 1\nf 1//1 2//1 3//1\nf 1//2 3//2 4//2\n"
+    mesh = files.load(write("a.obj", text))
+    assert mesh.normals[mesh.triangles].tolist() == [[[0, 0.6, 0.8]] * 3, [[0, 0, 1]] * 3]
+
+
+def test_load_obj_relative_indices_count_from_their_line(write):
+    text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\nv 5 0 0\nv 6 0 0\nv 5 1 0\nf -3 -2 6\n"
+    mesh = files.load(write("a.obj", text))
+    assert mesh.vertices[mesh.triangles][:, 0].tolist() == [[0, 0, 0], [5, 0, 0]]
+
+
+def test_load_obj_vertex_colors_are_kept(write):
+    text = "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\nf 1 2 3\n"
+    assert files.load(write("a.obj", text)).colors.tolist() == [[255, 0, 0, 255], [0, 255, 0, 255], [0, 0, 255, 255]]
+
+
+def test_load_obj_in_another_encoding_is_read(write):
+    content = "# Modell für Köln\n".encode("latin-1") + SQUARE.encode() + b"f 1 2 3\r\n"
+    assert len(files.load(write("a.obj", content)).triangles) == 1
+
+
+def test_load_stl_corners_are_merged(write):
+    mesh = files.load(write("a.stl", exported("stl")))
+    assert mesh.vertices.shape == (42, 3)
+    assert mesh.triangles.shape == (80, 3)
+    assert mesh.normals is None
+
+
+@pytest.mark.parametrize("kind", ["ply", "off", "glb", "stl_ascii"])
+def test_load_reads_what_trimesh_writes(write, kind):
+    mesh = files.load(write(f"a.{kind}", exported(kind)))
+    vertices, triangles = scenes.shape("icosphere", subdivisions=1)
+    assert mesh.triangles.shape == (80, 3)
+    assert mesh.vertices[mesh.triangles] == pytest.approx(vertices[triangles], abs=1e-6)
+
+
+def test_load_ply_vertex_normals_are_kept(write):
+    normals = np.tile([0.0, 0.6, 0.8], (42, 1))
+    vertices, triangles = scenes.shape("icosphere", subdivisions=1)
+    source = trimesh.Trimesh(vertices, triangles, vertex_normals=normals, process=False)
+    mesh = files.load(write("a.ply", source.export(file_type="ply", vertex_normal=True)))
+    assert mesh.normals == pytest.approx(normals)
+
+
+def test_load_ply_face_colors_stay_sharp_and_shading_smooth(write):
+    vertices, triangles = scenes.shape("icosphere", subdivisions=1)
+    colors = np.tile([[255, 0, 0, 255], [0, 0, 255, 255]], (40, 1)).astype(np.uint8)
+    source = trimesh.Trimesh(vertices, triangles, face_colors=colors, process=False)
+    mesh = files.load(write("a.ply", source.export(file_type="ply")))
+    assert (mesh.colors[mesh.triangles] == colors[:, None]).all()
+    expected = Mesh(vertices, triangles).vertex_normals()[triangles]
+    assert mesh.vertex_normals()[mesh.triangles] == pytest.approx(expected, abs=1e-6)
+
+
+def test_load_glb_nodes_are_placed_and_mirrors_keep_the_outside(write):
+    vertices, triangles = scenes.shape("icosphere", subdivisions=1)
+    ball = trimesh.Trimesh(vertices, triangles, process=False)
+    scene = trimesh.Scene()
+    scene.add_geometry(ball, transform=np.diag([2.0, 1, 1, 1]))
+    shift = np.eye(4)
+    shift[:3, 3] = 10, 0, 0
+    scene.add_geometry(ball, transform=shift @ np.diag([-1.0, 1, 1, 1]))
+    mesh = files.load(write("a.glb", scene.export(file_type="glb")))
+    assert mesh.triangles.shape == (160, 3)
+    assert mesh.bounds == pytest.approx(np.array([[-2, -1, -1], [11, 1, 1]]), abs=0.1)
+    a, b, c = (mesh.vertices[mesh.triangles[:, corner]] for corner in range(3))
+    ball_volume = (a * np.cross(b, c)).sum() / 6
+    assert ball_volume == pytest.approx(3 * ball.volume, rel=1e-5)
+
+
+def test_load_scaled_node_normals_stay_at_right_angles(write):
+    normals = np.tile([0.6, 0.0, 0.8], (3, 1))
+    source = trimesh.Trimesh([[0, 0, 0], [0.8, 0, -0.6], [0, 1, 0]], [[0, 1, 2]], vertex_normals=normals, process=False)
+    scene = trimesh.Scene()
+    scene.add_geometry(source, transform=np.diag([1.0, 1, 5, 1]))
+    mesh = files.load(write("a.glb", scene.export(file_type="glb", include_normals=True)))
+    edges = mesh.vertices[1:] - mesh.vertices[:1]
+    assert edges @ mesh.vertex_normals()[0] == pytest.approx([0, 0], abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("a.obj", "", "'.*a.obj' has no triangles"),
+        ("a.obj", "what is this\n", "has no triangles"),
+        ("a.obj", SQUARE, "has no triangles"),
+        ("a.obj", SQUARE + "f 1 2 9\n", "cannot read '.*a.obj': broken, or not a '.obj' file"),
+        ("a.obj", SQUARE + "f 1 two 3\n", "cannot read '.*a.obj': broken"),
+        ("a.obj", "v 0 0 0\nv 1 0 zero\nv 0 1 0\nf 1 2 3\n", "cannot read '.*a.obj': broken"),
+        ("a.obj", "v 0 0\nv 1 0\nv 0 1\nf 1 2 3\n", r"vertices must have shape \(V, 3\), got \(3, 2\)"),
+        ("a.obj", "v 0 0 0\nv 1 0 nan\nv 0 1 0\nf 1 2 3\n", r"vertices\[1\] = \[1.0, 0.0, nan\] must be finite"),
+        ("a.obj", b"\0\1\2\377", "broken, or not a '.obj' file .it is not text"),
+        ("a.stl", b"", "has no triangles|broken"),
+        ("a.stl", b"\200\0\3\377" * 50, "cannot read '.*a.stl': broken"),
+        ("a.ply", b"ply\nformat", "cannot read '.*a.ply': broken"),
+        ("a.glb", b"glTF\2\0\0\0", "cannot read '.*a.glb': broken"),
+        ("a.gltf", "{", "cannot read '.*a.gltf': broken"),
+        ("a.gltf", GLTF_WITHOUT_ITS_BUFFER, "broken, or without a file that it names .*gone.bin"),
+        ("a.txt", "v", "cannot read '.*a.txt': format '.txt' is none of .*obj.*ply"),
+        ("a", "v", "cannot read '.*a': format '' is none of"),
+    ],
+)
+def test_load_broken_file_is_refused(write, name, content, message):
+    with pytest.raises(MeshError, match=message):
+        files.load(write(name, content))
+
+
+@pytest.mark.parametrize("kind", ["stl", "ply", "glb"])
+def test_load_half_a_file_is_refused(write, kind):
+    whole = exported(kind)
+    with pytest.raises(MeshError, match="cannot read"):
+        files.load(write(f"a.{kind}", whole[: len(whole) // 2]))
+
+
+def test_load_missing_file_is_refused(tmp_path):
+    with pytest.raises(FileNotFoundError, match=r"there is no file '.*nope.obj'"):
+        files.load(tmp_path / "nope.obj")
+
+
+def test_load_folder_is_refused(tmp_path):
+    with pytest.raises(MeshError, match="is a folder, not a mesh"):
+        files.load(tmp_path)
+
+
+def test_load_without_trimesh_says_how_to_get_it(write, monkeypatch):
+    monkeypatch.setitem(sys.modules, "trimesh", None)
+    with pytest.raises(MissingPackageError, match=r"needs trimesh: pip install 'topleft\[render\]'"):
+        files.load(write("a.obj", SQUARE + "f 1 2 3\n"))
+
+
+@pytest.mark.parametrize(
+    ("name", "n_vertices", "n_triangles"),
+    [
+        ("suzanne.obj", 507, 968),
+        ("african_head.obj", 1339, 2492),
+        ("spot.obj", 3225, 5856),
+        ("teapot.obj", 3241, 6320),
+        ("stanford-bunny.obj", 34834, 69451),
+        ("nefertiti.obj", 49971, 99938),
+    ],
+)
+def test_load_real_mesh_has_all_of_it(name, n_vertices, n_triangles):
+    if not (SHARED_MESHES / name).exists():
+        pytest.skip("the mesh is not on this machine")
+    mesh = files.load(SHARED_MESHES / name)
+    assert (len(mesh.vertices), len(mesh.triangles)) == (n_vertices, n_triangles)

@@ -1,0 +1,314 @@
+"""Levels of detail: what `simplify` promises, what is kept, and where."""
+
+import pickle
+import sys
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from surface_samples import corners_of, sampled_distance
+
+import topleft as tl
+from topleft._lod import collapse as collapsing
+from topleft._lod.collapse import border_points, collapse, flatness, gather
+from topleft._lod.levels import kept_levels
+from topleft._lod.simplify import levels_of, wanted_of
+
+
+def torus(**attributes):
+    return tl.Mesh(*tl.scenes.torus(segments=48, sections=24), **attributes)
+
+
+def grid(n, height=None):
+    """A square of 2 n * n triangles, and the texture coordinates of its vertices."""
+    y, x = np.mgrid[0 : n + 1, 0 : n + 1] / n
+    z = 0 * x if height is None else height(x, y)
+    first = (np.arange(n)[:, None] * (n + 1) + np.arange(n)).ravel()
+    triangles = np.concatenate([first[:, None] + [0, 1, n + 2], first[:, None] + [0, n + 2, n + 1]])
+    return np.stack([x.ravel(), y.ravel(), z.ravel()], axis=1), triangles
+
+
+def two_boxes():
+    """A grid of two materials whose halves have other texture coordinates where they meet."""
+    points, triangles = grid(16, lambda x, y: 0.05 * np.sin(7 * x) * np.cos(5 * y))
+    middle = points[triangles, 0].mean(axis=1)
+    is_right = middle > 0.5
+    n = len(points)
+    triangles = np.where(is_right[:, None], triangles + n, triangles)
+    both = np.vstack([points, points])
+    uv = both[:, :2] * 0.5
+    uv[n:, 0] += 0.5
+    materials = (tl.Material((200, 0, 0)), tl.Material((0, 0, 200)))
+    return tl.Mesh(both, triangles, uv=uv, materials=materials, material_of_triangle=is_right.astype(int))
+
+
+@pytest.mark.parametrize("mesh", [torus(), tl.Mesh(*tl.scenes.blob(1500)), two_boxes()], ids=["torus", "blob", "seam"])
+def test_simplify_bound_is_never_below_the_distance(mesh):
+    levels = tl.simplify(mesh, smallest=40)
+    assert len(levels) > 1
+    for finer, level in pairwise(levels):
+        assert len(level.mesh.triangles) < len(finer.mesh.triangles)
+        assert sampled_distance(corners_of(mesh), corners_of(level.mesh), 3) <= level.bound
+        assert level.known <= level.bound
+
+
+def test_simplify_flat_grid_stays_where_it_is():
+    mesh = tl.Mesh(*grid(24))
+    level = tl.simplify(mesh)[1]
+    assert len(level.mesh.triangles) < len(mesh.triangles) / 2
+    assert level.bound <= 2.0**-18 + 2.0**-40  # what is not worth looking at, and rounding
+    assert np.array_equal(level.mesh.bounds, mesh.bounds)
+
+
+def test_simplify_bound_is_that_of_float32_vertices():
+    vertices, triangles = tl.scenes.torus(segments=48, sections=24)
+    mesh = tl.Mesh(vertices.astype(np.float32) + 1000, triangles)
+    level = tl.simplify(mesh)[1]
+    assert level.mesh.vertices.dtype == np.float32
+    assert sampled_distance(corners_of(mesh), corners_of(level.mesh), 2) <= level.bound
+
+
+def test_simplify_small_mesh_has_no_coarser_level():
+    assert len(tl.simplify(tl.Mesh(*tl.scenes.shape("cube")))) == 1
+
+
+def test_simplify_empty_mesh_has_no_coarser_level():
+    levels = tl.simplify(tl.Mesh(np.zeros((0, 3)), np.zeros((0, 3), int)))
+    assert [len(level.mesh.triangles) for level in levels] == [0]
+
+
+def test_simplify_vertices_doubled_or_unused_do_not_matter():
+    mesh = torus()
+    apart = mesh.vertices[mesh.triangles].reshape(-1, 3)
+    apart = np.vstack([apart, [[100.0, 100, 100]]])
+    soup = tl.Mesh(apart, np.arange(len(mesh.triangles) * 3).reshape(-1, 3))
+    sizes = [len(level.mesh.triangles) for level in tl.simplify(mesh)]
+    assert [len(level.mesh.triangles) for level in tl.simplify(soup)] == sizes
+    assert tl.simplify(soup)[1].mesh.bounds.max() < 2
+
+
+def test_simplify_seam_and_border_keep_place_and_attributes():
+    mesh = two_boxes()
+    level = tl.simplify(mesh, smallest=40)[1].mesh
+    x, y = level.vertices[:, 0], level.vertices[:, 1]
+    rows = level.material_of_triangle
+    for side in (0, 1):
+        used = np.unique(level.triangles[rows == side])
+        on_seam = used[x[used] == 0.5]
+        assert len(on_seam) == 17  # all there were
+        assert np.array_equal(np.sort(y[on_seam]), np.arange(17) / 16)
+        assert np.array_equal(level.uv[on_seam, 0], np.full(17, 0.25 + 0.5 * side, np.float32))
+    assert (x[level.triangles[rows == 0]] <= 0.5).all()
+    assert (x[level.triangles[rows == 1]] >= 0.5).all()
+    assert level.materials == mesh.materials
+
+
+def test_simplify_attributes_are_those_of_the_nearest_point():
+    points, triangles = grid(24)
+    colors = np.rint(points * 255 + [0, 0, 99]).astype(np.uint8)
+    mesh = tl.Mesh(points, triangles, np.tile([0, 0, 2.0], (len(points), 1)), colors, points[:, :2])
+    level = tl.simplify(mesh)[1].mesh
+    assert np.abs(level.uv - level.vertices[:, :2]).max() <= 2.0**-20  # float32, and feet to 2**-18 of the size
+    assert np.abs(level.colors - (level.vertices * 255 + [0, 0, 99])).max() <= 1  # rounded twice
+    assert np.allclose(level.normals, [0, 0, 1], atol=1e-12)  # unit vectors, rounded
+
+
+def test_simplify_keeps_no_normals_where_there_are_none():
+    assert tl.simplify(torus())[1].mesh.normals is None
+
+
+def test_simplify_is_kept_with_the_mesh_and_made_once():
+    mesh = torus()
+    assert kept_levels(mesh) is None
+    levels = levels_of(mesh)
+    assert levels_of(mesh) is levels
+    assert tl.simplify(mesh, ratio=0.5) is levels_of(mesh)
+    assert levels_of(mesh) is not levels
+
+
+def test_simplify_levels_go_with_the_mesh():
+    from weakref import ref
+
+    mesh = torus()
+    levels = ref(tl.simplify(mesh))
+    del mesh
+    assert levels() is None
+
+
+def test_mesh_with_levels_can_be_pickled():
+    mesh = torus()
+    tl.simplify(mesh)
+    assert np.array_equal(pickle.loads(pickle.dumps(mesh)).vertices, mesh.vertices)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"ratio": 0.0}, r"ratio must lie in 0.05 to 0.75, got 0.0"),
+        ({"ratio": 0.9}, r"ratio must lie in 0.05 to 0.75, got 0.9"),
+        ({"smallest": 3}, r"smallest must be at least 4, got 3"),
+    ],
+)
+def test_simplify_wrong_option_is_refused(options, message):
+    with pytest.raises(ValueError, match=message):
+        tl.simplify(torus(), **options)
+
+
+def test_simplify_without_the_package_says_how_to_get_it(monkeypatch):
+    monkeypatch.setitem(sys.modules, "fast_simplification", None)
+    with pytest.raises(ImportError, match=r"pip install 'topleft\[simplify\]'"):
+        tl.simplify(torus())
+
+
+def test_levels_tell_what_they_are():
+    levels = tl.simplify(torus())
+    assert repr(levels).startswith("<Levels of 2: triangles 2,304 (bound 0), 576 (bound 0.0")
+    assert levels[:1] == (levels[0],)
+
+
+def test_levels_saved_and_loaded_are_the_same(tmp_path):
+    mesh = two_boxes()
+    levels = tl.simplify(mesh, smallest=40)
+    levels.save(tmp_path / "boxes.npz")
+    assert [path.name for path in tmp_path.iterdir()] == ["boxes.npz"]
+    again = two_boxes()
+    loaded = tl.Levels.load(tmp_path / "boxes.npz", again)
+    assert levels_of(again) is loaded
+    assert [(one.bound, one.known) for one in loaded] == [(one.bound, one.known) for one in levels]
+    for one, other in zip(loaded, levels, strict=True):
+        for name in ("vertices", "triangles", "uv", "material_of_triangle"):
+            assert np.array_equal(getattr(one.mesh, name), getattr(other.mesh, name))
+        assert one.mesh.normals is None
+    assert loaded[1].mesh.materials == again.materials
+
+
+def test_levels_of_another_mesh_are_refused(tmp_path):
+    tl.simplify(torus()).save(tmp_path / "torus.npz")
+    moved = tl.Mesh(torus().vertices + 1, torus().triangles)
+    with pytest.raises(tl.MeshError, match=r"torus.npz' holds the levels of another mesh"):
+        tl.Levels.load(tmp_path / "torus.npz", moved)
+
+
+def test_levels_broken_file_is_refused(tmp_path):
+    (tmp_path / "broken.npz").write_bytes(b"PK not a zip")
+    with pytest.raises(tl.MeshError, match=r"cannot read .*broken.npz': broken, or not levels of detail"):
+        tl.Levels.load(tmp_path / "broken.npz", torus())
+    np.savez(tmp_path / "other.npz", x=1)
+    with pytest.raises(tl.MeshError, match=r"cannot read .*other.npz'"):
+        tl.Levels.load(tmp_path / "other.npz", torus())
+
+
+def test_levels_file_that_is_not_there_is_named(tmp_path):
+    with pytest.raises(FileNotFoundError, match=r"there is no file .*none.npz"):
+        tl.Levels.load(tmp_path / "none.npz", torus())
+
+
+def test_levels_other_suffix_is_refused(tmp_path):
+    with pytest.raises(ValueError, match=r"levels are kept in a file that ends in .npz, got .*levels.zip"):
+        tl.simplify(torus()).save(tmp_path / "levels.zip")
+
+
+def test_levels_that_cannot_be_written_leave_nothing(tmp_path, monkeypatch):
+    levels = tl.simplify(torus())
+    monkeypatch.setattr(np, "savez", lambda *_, **__: (_ for _ in ()).throw(OSError("full")))
+    with pytest.raises(OSError, match="full"):
+        levels.save(tmp_path / "torus.npz")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("with_uv", [False, True])
+def test_simplify_needles_do_not_end_the_levels(with_uv):
+    vertices, triangles = tl.scenes.blob(20_000)  # a hundred and forty needles round each pole
+    mesh = tl.Mesh(vertices, triangles, uv=vertices[:, :2] if with_uv else None)
+    levels = tl.simplify(mesh)
+    assert len(levels[-1].mesh.triangles) < 1000
+    level = levels[2]
+    if with_uv:  # the point that attributes are taken from is about a cell away at most
+        assert np.abs(level.mesh.uv - level.mesh.vertices[:, :2]).max() < 0.1
+    assert level.bound < 0.1
+
+
+def test_gather_leaves_borders_alone():
+    points, triangles = grid(12)
+    found = gather(points, triangles, 8)
+    on_border = border_points(triangles)
+    assert len(on_border) == 48
+    assert np.array_equal(found.points[found.into[on_border]], points[on_border])
+    assert len(found.triangles) < len(triangles)
+    assert (found.into >= 0).sum() >= len(found.points)
+
+
+def test_gather_leaves_bent_cells_alone():
+    """A roof: cells along its ridge hold triangles of both sides."""
+    points, triangles = grid(16, lambda x, y: np.minimum(x, 1 - x) + 0 * y)
+    found = gather(points, triangles, 64, least_flat=0.99)
+    is_ridge = points[:, 0] == 0.5
+    assert np.array_equal(found.points[found.into[is_ridge]], points[is_ridge])
+    assert len(gather(points, triangles, 64).points) < len(found.points) < len(points)
+
+
+def test_flatness_is_one_for_a_plane_and_the_cosine_for_a_roof():
+    points, triangles = grid(4, lambda x, y: np.minimum(x, 1 - x) + 0 * y)
+    one_side = triangles[points[triangles, 0].max(axis=1) <= 0.5]
+    group = np.zeros(len(points), np.int64)
+    assert flatness(points, one_side, group, 1) == pytest.approx([1])  # sums of squares, rounded
+    assert flatness(points, triangles, group, 1) == pytest.approx([np.sqrt(0.5)])
+
+
+def test_collapse_of_large_mesh_tells_where_points_went(monkeypatch):
+    monkeypatch.setattr(collapsing, "MOST_TO_COLLAPSE", 1000)
+    monkeypatch.setattr(collapsing, "GATHERED_FOR", 1)
+    points, triangles = grid(40, lambda x, y: 0.05 * np.sin(3 * x) * np.cos(2 * y))
+    gathered = gather(points, triangles, 300, least_flat=collapsing.FLAT)
+    assert 300 < len(gathered.triangles) < len(triangles)
+    found = collapse(points, triangles, 300)
+    assert 0 < len(found.triangles) <= 1.25 * 300
+    corners = found.into[triangles]
+    a, b, c = corners.T
+    left = corners[(corners >= 0).all(axis=1) & (a != b) & (b != c) & (c != a)]
+    assert np.array_equal(np.unique(left, axis=0), np.unique(found.triangles, axis=0))
+
+
+@pytest.mark.parametrize("with_uv", [False, True])
+def test_simplify_large_mesh_is_within_its_bounds(monkeypatch, with_uv):
+    monkeypatch.setattr(collapsing, "MOST_TO_COLLAPSE", 1000)
+    monkeypatch.setattr(collapsing, "GATHERED_FOR", 1)
+    monkeypatch.setattr(collapsing, "FLAT", 0.9)  # coarse as it is, no cell is flatter
+    sizes = []
+
+    def watched(points, triangles, n_wanted, **options):
+        found = gather(points, triangles, n_wanted, **options)
+        sizes.append(len(found.triangles))
+        return found
+
+    monkeypatch.setattr(collapsing, "gather", watched)
+    mesh = torus()
+    mesh = tl.Mesh(mesh.vertices, mesh.triangles, uv=mesh.vertices[:, :2] if with_uv else None)
+    level = tl.simplify(mesh)[1]
+    assert 576 < sizes[0] < 2304
+    assert sampled_distance(corners_of(mesh), corners_of(level.mesh), 2) <= level.bound < 0.2
+
+
+def test_wanted_of_leaves_borders_out_of_the_ratio():
+    _, triangles = grid(20)  # 800 triangles, 80 sides of the border
+    assert wanted_of(triangles, 0.25, 180) == 80 + 180
+    assert wanted_of(triangles, 0.25, 181) == 0
+    assert wanted_of(np.asarray(tl.scenes.torus(segments=20, sections=20)[1], np.int32), 0.25, 200) == 200
+
+
+def test_simplify_leaves_out_a_level_with_a_spike(monkeypatch):
+    mesh = tl.Mesh(*tl.scenes.torus(segments=96, sections=48))
+    whole = tl.simplify(mesh)
+    assert len(whole) == 3
+    module = sys.modules["topleft._lod.simplify"]
+    n_calls = []
+
+    def careless(points, triangles, n_wanted, *, with_pairs):
+        found = collapse(points, triangles, n_wanted, with_pairs=with_pairs)
+        n_calls.append(n_wanted)
+        return found if len(n_calls) == 1 else found._replace(points=found.points + 5 * np.eye(len(found.points), 3))
+
+    monkeypatch.setattr(module, "collapse", careless)
+    levels = tl.simplify(mesh)
+    assert len(n_calls) == 2
+    assert [one.bound for one in levels] == [one.bound for one in whole[:2]]

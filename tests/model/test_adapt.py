@@ -1,0 +1,203 @@
+"""Meshes of other libraries and arrays of other kinds, as they are."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import topleft as tl
+from topleft import scenes
+from topleft._camera.camera import Camera
+from topleft._model.adapt import as_mesh, as_surface
+from topleft._model.mesh import Mesh
+
+SIZE = (64, 48)
+VERTICES, TRIANGLES = scenes.shape("icosahedron")
+POINTS = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 0]])
+
+
+def block(kind, rows):
+    return SimpleNamespace(type=kind, data=np.array(rows))
+
+
+def cells(points, *blocks):
+    """What `meshio.Mesh` looks like."""
+    return SimpleNamespace(points=points, cells=list(blocks))
+
+
+def poly(points, faces):
+    """What `pyvista.PolyData` looks like."""
+    return SimpleNamespace(points=points, faces=np.array(faces), n_strips=0)
+
+
+class Tensor:
+    """An array that only speaks DLPack, as a tensor on the CPU does."""
+
+    def __init__(self, values):
+        self.array = np.array(values)
+
+    def __dlpack__(self, **options):
+        return self.array.__dlpack__(**options)
+
+    def __dlpack_device__(self):
+        return self.array.__dlpack_device__()
+
+
+class Wrapped:
+    """An array that only speaks `__array__`."""
+
+    def __init__(self, values):
+        self.array = np.array(values)
+
+    def __array__(self, dtype=None, copy=None):
+        return self.array if dtype is None else self.array.astype(dtype)
+
+
+def test_as_mesh_gives_a_mesh_back():
+    mesh = Mesh(VERTICES, TRIANGLES)
+    assert as_mesh(mesh) is mesh
+
+
+def test_as_mesh_of_trimesh_shares_its_vertices():
+    trimesh = pytest.importorskip("trimesh")
+    theirs = trimesh.Trimesh(VERTICES, TRIANGLES, process=False)
+    mesh = as_mesh(theirs)
+    assert np.shares_memory(mesh.vertices, np.asarray(theirs.vertices))
+    assert np.array_equal(mesh.triangles, TRIANGLES)
+    assert mesh.normals is None
+
+
+def test_as_mesh_of_trimesh_takes_colors_and_known_normals():
+    trimesh = pytest.importorskip("trimesh")
+    colors = np.random.default_rng(2).integers(0, 256, (len(VERTICES), 4), dtype=np.uint8)
+    theirs = trimesh.Trimesh(VERTICES, TRIANGLES, vertex_normals=-VERTICES, vertex_colors=colors, process=False)
+    mesh = as_mesh(theirs)
+    assert np.array_equal(mesh.colors, colors)
+    assert mesh.normals == pytest.approx(-VERTICES / np.linalg.norm(VERTICES, axis=1)[:, None])
+
+
+def test_render_of_a_trimesh_scene_places_its_parts():
+    trimesh = pytest.importorskip("trimesh")
+    scene = trimesh.Scene()
+    move = np.eye(4)
+    move[0, 3] = 3
+    scene.add_geometry(trimesh.Trimesh(VERTICES, TRIANGLES, process=False))
+    scene.add_geometry(trimesh.Trimesh(VERTICES, TRIANGLES, process=False), transform=move)
+    both = Mesh(np.vstack([VERTICES, VERTICES + (3, 0, 0)]), np.vstack([TRIANGLES, TRIANGLES + len(VERTICES)]))
+    assert np.array_equal(*(tl.render(mesh, size=SIZE, shading="flat") for mesh in (scene, both)))
+
+
+def test_as_mesh_of_an_empty_scene_is_refused():
+    trimesh = pytest.importorskip("trimesh")
+    with pytest.raises(ValueError, match="mesh has no triangles: nothing in the scene has faces"):
+        as_mesh(trimesh.Scene())
+
+
+def test_as_mesh_of_meshio_takes_surface_cells():
+    meshio = pytest.importorskip("meshio")
+    theirs = meshio.Mesh(POINTS, [("line", [[0, 1]]), ("triangle", [[1, 4, 2]]), ("quad", [[0, 1, 2, 3]])])
+    mesh = as_mesh(theirs)
+    assert mesh.triangles.tolist() == [[1, 4, 2], [0, 1, 2], [0, 2, 3]]
+    assert np.shares_memory(mesh.vertices, theirs.points)
+
+
+def test_as_surface_of_cells_knows_the_faces():
+    quads, triangles = block("quad8", [[0, 1, 2, 3, 9, 9, 9, 9]]), block("triangle6", [[1, 4, 2, 9, 9, 9]])
+    surface = as_surface(cells(POINTS, quads, triangles))
+    assert surface.triangles.tolist() == [[0, 1, 2], [0, 2, 3], [1, 4, 2]]
+    assert surface.faces.tolist() == [0, 0, 1]
+    assert surface.n_faces == 2
+
+
+def test_as_surface_of_triangle_cells_is_no_copy():
+    theirs = cells(POINTS, block("triangle", [[0, 1, 2]]))
+    surface = as_surface(theirs)
+    assert np.shares_memory(surface.triangles, theirs.cells[0].data)
+    assert surface.faces is None
+
+
+def test_as_mesh_of_cells_without_surface_is_refused():
+    with pytest.raises(ValueError, match="mesh has no triangles: its cells are tetra, line"):
+        as_mesh(cells(POINTS, block("tetra", [[0, 1, 2, 3]]), block("line", [[0, 1]])))
+
+
+def test_as_mesh_of_polydata_of_triangles_shares_its_points():
+    theirs = poly(POINTS.astype(np.float32), [3, 0, 1, 2, 3, 0, 2, 3])
+    mesh = as_mesh(theirs)
+    assert mesh.triangles.tolist() == [[0, 1, 2], [0, 2, 3]]
+    assert np.shares_memory(mesh.vertices, theirs.points)
+
+
+def test_as_surface_of_polydata_of_mixed_faces():
+    surface = as_surface(poly(POINTS, [4, 0, 1, 2, 3, 3, 1, 4, 2]))
+    assert surface.triangles.tolist() == [[0, 1, 2], [0, 2, 3], [1, 4, 2]]
+    assert surface.faces.tolist() == [0, 0, 1]
+
+
+def test_as_mesh_of_strips_is_refused():
+    with pytest.raises(ValueError, match=r"mesh has strips of triangles: take its triangulate\(\)"):
+        as_mesh(SimpleNamespace(points=POINTS, faces=np.array([3, 0, 1, 2]), n_strips=1))
+
+
+def test_as_mesh_of_a_triangulation_is_flat_and_masked():
+    tri = pytest.importorskip("matplotlib.tri")
+    theirs = tri.Triangulation(POINTS[:, 0], POINTS[:, 1], [[0, 1, 2], [0, 2, 3], [1, 4, 2]], mask=[0, 1, 0])
+    mesh = as_mesh(theirs)
+    assert mesh.triangles.tolist() == [[0, 1, 2], [1, 4, 2]]
+    assert mesh.vertices.tolist() == POINTS.tolist()
+    assert as_surface(theirs).faces.tolist() == [0, 2]
+    assert as_surface(theirs).n_faces == 3
+
+
+@pytest.mark.parametrize("name", ["triangles", "faces"])
+def test_as_mesh_of_anything_with_vertices(name):
+    theirs = SimpleNamespace(**{"vertices": VERTICES, name: TRIANGLES})
+    assert np.array_equal(tl.render(theirs, size=SIZE), tl.render(Mesh(VERTICES, TRIANGLES), size=SIZE))
+
+
+def test_rasterize_mesh_takes_a_pair():
+    frags = tl.rasterize_mesh((VERTICES, TRIANGLES), size=SIZE)
+    assert np.array_equal(frags.triangle, tl.rasterize_mesh(Mesh(VERTICES, TRIANGLES), size=SIZE).triangle)
+    assert frags.mask.any()
+
+
+def test_framing_takes_what_render_takes():
+    trimesh = pytest.importorskip("trimesh")
+    expected = Camera.framing(Mesh(VERTICES, TRIANGLES)).view
+    theirs = trimesh.Trimesh(VERTICES, TRIANGLES, process=False)
+    assert np.array_equal(Camera.framing(theirs).view, expected)
+    assert np.array_equal(Camera.framing(poly(VERTICES, np.insert(TRIANGLES, 0, 3, axis=1).ravel())).view, expected)
+
+
+@pytest.mark.parametrize("subject", [None, 3, "bunny.obj", VERTICES, SimpleNamespace(points=POINTS)])
+def test_as_mesh_of_something_else_is_refused(subject):
+    with pytest.raises(TypeError, match=r"mesh must be a Mesh, .* got (NoneType|int|str|ndarray|SimpleNamespace)"):
+        as_mesh(subject)
+
+
+@pytest.mark.parametrize("kind", [Tensor, Wrapped])
+def test_verbs_take_tensors(kind):
+    vertices, triangles, colors = [[0.0, 0], [4, 0], [0, 4]], [[0, 1, 2]], [[9.0], [8.0], [7.0]]
+    given = kind(vertices), kind(triangles)
+    assert np.array_equal(tl.coverage(*given, (4, 4)), tl.coverage(vertices, triangles, (4, 4)))
+    assert np.array_equal(tl.overdraw(*given, (4, 4)), tl.overdraw(vertices, triangles, (4, 4)))
+    assert np.array_equal(tl.wireframe(*given, (4, 4)), tl.wireframe(vertices, triangles, (4, 4)))
+    found = tl.fill(*given, kind(colors), (4, 4))
+    assert np.array_equal(found, tl.fill(vertices, triangles, colors, (4, 4)))
+    frags = tl.rasterize(*given, (4, 4), transform=None)
+    assert np.array_equal(frags.interpolate(kind(colors)), frags.interpolate(colors))
+    assert as_mesh((kind([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]), kind(triangles))).triangles.tolist() == triangles
+
+
+def test_mesh_of_a_tensor_shares_its_memory():
+    tensor = Tensor(VERTICES)
+    assert np.shares_memory(as_mesh((tensor, Tensor(TRIANGLES))).vertices, tensor.array)
+
+
+def test_import_topleft_imports_no_other_mesh_library():
+    code = "import sys, topleft; print([m for m in ('trimesh', 'meshio', 'pyvista', 'matplotlib') if m in sys.modules])"
+    assert subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout == "[]\n"

@@ -1,0 +1,142 @@
+"""Mesh: what it accepts, its normals, and vertices that are the same place."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from topleft import scenes
+from topleft._model import mesh as mesh_module
+from topleft._model.mesh import Mesh, coincident
+from topleft._model.normals import angle_weighted_normals, face_normals
+
+TRIANGLE = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+
+
+@pytest.mark.parametrize(
+    ("given", "kept"),
+    [("f4", "f4"), ("f8", "f8"), (">f4", "f4"), (">f8", "f8"), ("f2", "f8"), ("i8", "f8"), ("u1", "f8")],
+)
+def test_mesh_vertices_keep_float32_and_float64(given, kept):
+    mesh = Mesh(np.array(TRIANGLE, dtype=given), [[0, 1, 2]])
+    assert mesh.vertices.dtype == np.dtype(kept)
+    assert mesh.vertices.dtype.isnative
+    assert mesh.vertices.tolist() == TRIANGLE
+
+
+@pytest.mark.parametrize("dtype", ["u1", "i2", ">i4", "i8", "u8"])
+def test_mesh_triangles_of_any_integers_become_int32(dtype):
+    mesh = Mesh(TRIANGLE, np.array([[2, 1, 0]], dtype=dtype))
+    assert mesh.triangles.dtype == np.int32
+    assert mesh.triangles.tolist() == [[2, 1, 0]]
+
+
+def test_mesh_arrays_are_read_only_and_the_callers_are_not():
+    vertices = np.array(TRIANGLE, dtype=float)
+    mesh = Mesh(vertices, [[0, 1, 2]])
+    with pytest.raises(ValueError, match="read-only"):
+        mesh.vertices[0, 0] = 1
+    vertices[0, 0] = 1
+
+
+def test_mesh_without_triangles_is_a_mesh():
+    assert Mesh(np.empty((0, 3)), []).triangles.shape == (0, 3)
+
+
+def test_mesh_unused_vertex_may_be_nan():
+    mesh = Mesh([*TRIANGLE, [np.nan, 0, 0]], [[0, 1, 2]])
+    assert mesh.bounds.tolist() == [[0, 0, 0], [1, 1, 0]]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "message"),
+    [
+        (([[0, 0]], [[0, 0, 0]]), ValueError, r"vertices must have shape \(V, 3\), got \(1, 2\)"),
+        ((["abc"], [[0, 0, 0]]), TypeError, "vertices must hold real numbers"),
+        ((TRIANGLE, [[0, 1]]), ValueError, r"triangles must have shape \(T, 3\), got \(1, 2\)"),
+        ((TRIANGLE, [[0.0, 1.0, 2.0]]), TypeError, "triangles must be integers, got dtype float64"),
+        ((TRIANGLE, [[0, 1, 2], [0, 1, 3]]), IndexError, r"row 1 is \[0, 1, 3\]"),
+        ((TRIANGLE, [[0, -1, 2]]), IndexError, r"row 0 is \[0, -1, 2\]"),
+        (([[0, 0, 0], [0, np.inf, 0], [1, 1, 1]], [[2, 1, 0]]), ValueError, r"vertices\[1\] = \[0.0, inf, 0.0\] must"),
+        ((TRIANGLE, [[0, 1, 2]], [[0, 0, 1]]), ValueError, r"normals must have shape \(3, 3\), got \(1, 3\)"),
+        ((TRIANGLE, [[0, 1, 2]], None, [[0, 0, 0]]), TypeError, "colors must be uint8, got int64"),
+        (
+            (TRIANGLE, [[0, 1, 2]], None, np.zeros((2, 3), np.uint8)),
+            ValueError,
+            r"colors must have shape \(3, 3\) or \(3, 4\), got \(2, 3\)",
+        ),
+    ],
+)
+def test_mesh_of_bad_arrays_is_refused(arguments, error, message):
+    with pytest.raises(error, match=message):
+        Mesh(*arguments)
+
+
+def test_bounds_without_triangles_is_refused():
+    with pytest.raises(ValueError, match="a mesh without triangles has no bounds"):
+        _ = Mesh(TRIANGLE, []).bounds
+
+
+def test_face_normals_of_a_degenerate_triangle_are_zero():
+    assert face_normals(np.array([[0.0, 0, 0], [1, 1, 1], [2, 2, 2]]), np.array([[0, 1, 2]])).tolist() == [[0, 0, 0]]
+
+
+def test_vertex_normals_of_the_mesh_win():
+    normals = [[0.0, 0, 2], [0, 0, 1], [0, 0, 1]]
+    assert Mesh(TRIANGLE, [[0, 1, 2]], normals).vertex_normals().tolist() == normals
+
+
+def test_vertex_normals_do_not_depend_on_how_a_face_is_cut():
+    # The cube with shared corners: at each corner three right angles, however many triangles share them.
+    vertices, triangles = scenes.shape("cube")
+    first, group = coincident(vertices)
+    normals = angle_weighted_normals(vertices[first], group[triangles].astype(np.int32))
+    assert normals == pytest.approx(vertices[first] / 3**0.5)
+
+
+def test_vertex_normals_of_a_fine_sphere_are_radial():
+    vertices, triangles = scenes.shape("sphere")
+    cosine = (Mesh(vertices, triangles).vertex_normals() * vertices).sum(axis=1)
+    assert cosine.min() > 0.99999
+
+
+def test_vertex_normals_of_an_unused_vertex_are_zero():
+    assert Mesh([*TRIANGLE, [5, 5, 5]], [[0, 1, 2]]).vertex_normals().tolist() == [[0, 0, 1]] * 3 + [[0, 0, 0]]
+
+
+def test_vertex_normals_weigh_by_angle():
+    # Two faces at right angles along x; the second is seen from vertex 0 under 45 degrees instead of 90.
+    vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 0, 1]]
+    normal = Mesh(vertices, [[0, 1, 2], [0, 3, 1]]).vertex_normals()[0]
+    # The faces' normals are (0, 0, 1) and (0, 1, 0).
+    assert normal == pytest.approx(np.array([0, 1, 2]) / 5**0.5)
+
+
+def test_coincident_groups_equal_rows_in_order_of_first_sight():
+    first, group = coincident(np.array([[1.0, 2], [0, 0], [1, 2], [-0.0, 0]]))
+    assert first.tolist() == [0, 1]
+    assert group.tolist() == [0, 1, 0, 1]
+
+
+def test_coincident_compares_all_attributes():
+    first, _ = coincident(np.zeros((3, 3)), np.array([[1], [2], [1]], dtype=np.uint8))
+    assert first.tolist() == [0, 1]
+
+
+def test_coincident_where_hashes_collide_compares_values(monkeypatch):
+    rng = np.random.default_rng(5)
+    rows = rng.integers(0, 4, (300, 3)).astype(np.float32)
+    by_hash = coincident(rows)
+    monkeypatch.setattr(mesh_module, "_runs_by_hash", lambda _: None)
+    by_value = coincident(rows)
+    assert len(by_value[0]) == len(np.unique(rows, axis=0))
+    assert all(np.array_equal(one, other) for one, other in zip(by_hash, by_value, strict=True))
+
+
+def test_runs_by_hash_that_is_not_one_of_values_is_none():
+    nan = np.full(2, np.nan)  # equal bits, and not equal
+    assert mesh_module._runs_by_hash([nan]) is None
+
+
+def test_coincident_of_nothing_is_empty():
+    assert [len(part) for part in coincident(np.empty((0, 3)))] == [0, 0]

@@ -1,0 +1,296 @@
+"""What goes in and what comes out: empty scenes, `out=`, kept memory, colours, backgrounds."""
+
+import numpy as np
+import pytest
+
+import topleft as tl
+from topleft._base import arrays, threads
+from topleft._base.memory import FreshMemory
+from topleft._raster.rasterize import canvas_of
+
+SQUARE = np.array([[0, 0], [4, 0], [4, 4], [0, 4]], float)
+HALVES = np.array([[0, 1, 2], [0, 2, 3]])
+LEFT = [[0, 3, 1]]  # the half of the square at the top left corner
+SIZE = (4, 4)
+LEFT_MASK = np.array([[1, 1, 1, 0], [1, 1, 0, 0], [1, 0, 0, 0], [0, 0, 0, 0]], bool)
+
+
+@pytest.mark.parametrize("size", [(0, 0), (0, 3), (3, 0), (5, 3)])
+@pytest.mark.parametrize(("vertices", "triangles"), [([], []), (SQUARE, []), (np.empty((0, 4)), np.empty((0, 3), int))])
+def test_scene_without_triangles_gives_empty_pictures(size, vertices, triangles):
+    shape = size[::-1]
+    frags = tl.rasterize(vertices, triangles, size)
+    np.testing.assert_array_equal(frags.triangle, np.full(shape, -1, np.int32))
+    np.testing.assert_array_equal(frags.depth, np.full(shape, np.inf, np.float32))
+    np.testing.assert_array_equal(frags.mask, np.zeros(shape, bool))
+    np.testing.assert_array_equal(frags.barycentric(), np.zeros((*shape, 3), np.float32))
+    np.testing.assert_array_equal(tl.coverage(vertices, triangles, size), np.zeros(shape, bool))
+    np.testing.assert_array_equal(tl.overdraw(vertices, triangles, size), np.zeros(shape, np.int32))
+    colors = np.zeros((len(triangles), 3), np.uint8)
+    np.testing.assert_array_equal(tl.fill(vertices, triangles, colors, size), np.zeros((*shape, 3), np.uint8))
+
+
+@pytest.mark.parametrize("size", [(0, 0), (0, 3), (3, 0)])
+def test_frame_without_pixels_gives_empty_pictures_of_that_shape(size):
+    shape = size[::-1]
+    frags = tl.rasterize(SQUARE, HALVES, size)
+    assert frags.triangle.shape == frags.depth.shape == tl.coverage(SQUARE, HALVES, size).shape == shape
+    assert frags.interpolate(np.zeros((2, 3, 5))).shape == (*shape, 5)
+    assert tl.fill(SQUARE, HALVES, np.zeros((2, 3)), size).shape == (*shape, 3)
+
+
+def test_results_have_the_stated_dtypes():
+    frags = tl.rasterize(SQUARE, HALVES, SIZE)
+    found = [frags.triangle, frags.depth, frags.mask, frags.barycentric(), frags.interpolate(np.zeros(4))]
+    assert [a.dtype for a in found] == [np.int32, np.float32, bool, np.float32, np.float32]
+    assert tl.coverage(SQUARE, HALVES, SIZE).dtype == bool
+    assert tl.overdraw(SQUARE, HALVES, SIZE).dtype == np.int32
+
+
+@pytest.mark.parametrize("layout", ["C", "F", "strided", "reversed"])
+def test_out_of_any_layout_is_filled_and_returned(layout):
+    store = np.ones((8, 8), bool, order="F" if layout == "F" else "C")
+    out = {"strided": store[::2, 1::2], "reversed": store[3::-1, 3::-1]}.get(layout, store[:4, :4])
+    result = tl.coverage(SQUARE, LEFT, SIZE, out=out)
+    assert result is out
+    np.testing.assert_array_equal(out, LEFT_MASK)
+    assert store.sum() == 64 - 16 + 6
+
+
+def unaligned(array):
+    """A copy that begins one byte behind where its dtype wants to."""
+    copy = np.zeros(array.nbytes + 1, np.uint8)[1:].view(array.dtype).reshape(array.shape)
+    copy[...] = array
+    return copy
+
+
+@pytest.mark.parametrize(
+    ("coerce", "values"),
+    [
+        (lambda a: arrays.as_vertices(a, has_transform=False), SQUARE),
+        (arrays.as_triangles, HALVES),
+        (arrays.as_triangles, HALVES.astype(np.int32)),
+        (lambda a: arrays.as_matrix(a, a.dtype), np.eye(4)),
+        (arrays.as_colors, SQUARE.astype(np.float32)),
+        (lambda a: arrays.as_values(a, 4, 2), SQUARE.astype(np.float32)),
+    ],
+)
+def test_unaligned_array_comes_to_the_kernels_aligned(coerce, values):
+    result = coerce(unaligned(values))
+    assert result.flags.aligned
+    np.testing.assert_array_equal(result, values)
+
+
+def test_unaligned_out_is_filled_through_an_aligned_canvas():
+    ids, depth = unaligned(np.zeros((4, 4), np.int32)), unaligned(np.zeros((4, 4), np.float32))
+    with canvas_of(FreshMemory(), "triangle", ids, (4, 4), np.int32) as (result, canvas):
+        assert canvas.flags.aligned
+    frags = tl.rasterize(SQUARE, LEFT, SIZE, out=(ids, depth))
+    assert result is frags.triangle is ids
+    np.testing.assert_array_equal(ids, np.where(LEFT_MASK, 0, -1))
+    np.testing.assert_array_equal(depth, np.where(LEFT_MASK, 0, np.inf))
+    np.testing.assert_array_equal(frags.barycentric().sum(-1), LEFT_MASK)
+
+
+def test_overdraw_out_is_cleared_first():
+    out = np.full((4, 4), 9, np.int32)
+    np.testing.assert_array_equal(tl.overdraw(SQUARE, LEFT * 2, SIZE, out=out), 2 * LEFT_MASK)
+
+
+def test_rasterize_out_gets_ids_and_depth():
+    ids, depth = np.empty((4, 4), np.int32), np.empty((4, 8), np.float32)[:, ::2]
+    frags = tl.rasterize(SQUARE, LEFT, SIZE, out=(ids, depth))
+    assert frags.triangle is ids
+    assert frags.depth is depth
+    np.testing.assert_array_equal(ids, np.where(LEFT_MASK, 0, -1))
+    np.testing.assert_array_equal(depth, np.where(LEFT_MASK, 0, np.inf))
+
+
+@pytest.mark.parametrize("n_channels", [None, 1, 2, 3, 4])
+@pytest.mark.parametrize("dtype", [np.uint8, np.float32])
+def test_flat_fill_draws_over_out_and_shows_it_elsewhere(n_channels, dtype):
+    shape = () if n_channels is None else (n_channels,)
+    color = np.arange(10, 10 + (n_channels or 1)).reshape(shape).astype(dtype)
+    out = np.full((4, 4, *shape), 7, dtype)
+    tl.fill(SQUARE, LEFT, color[None], SIZE, out=out)
+    np.testing.assert_array_equal(out[LEFT_MASK], np.broadcast_to(color, (6, *shape)))
+    assert (out[~LEFT_MASK] == 7).all()
+
+
+def test_fill_draws_over_out_that_is_not_contiguous():
+    out = np.full((4, 8, 2), 7, np.uint8)[:, ::2]
+    tl.fill(SQUARE, LEFT, [[1, 2]], SIZE, out=out)
+    np.testing.assert_array_equal(out[..., 1], np.where(LEFT_MASK, 2, 7))
+
+
+def test_fill_background_fills_the_picture_first():
+    out = np.full((4, 4, 3), 7, np.uint8)
+    tl.fill(SQUARE, LEFT, [[1, 2, 3]], SIZE, background=[4, 5, 6], out=out)
+    np.testing.assert_array_equal(out[..., 2], np.where(LEFT_MASK, 3, 6))
+
+
+@pytest.mark.parametrize(
+    ("dtype", "expected"), [(np.float64, np.float32), (np.float16, np.float32), (np.int64, np.uint8)]
+)
+def test_fill_colors_of_other_dtypes_become_float32_or_uint8(dtype, expected):
+    picture = tl.fill(SQUARE, HALVES, np.array([[1, 2, 3], [4, 5, 6]], dtype), SIZE)
+    assert picture.dtype == expected
+    assert picture[3, 0].tolist() == [4, 5, 6]
+
+
+def test_fill_is_in_painters_order():
+    picture = tl.fill(SQUARE, [[0, 1, 3], [0, 3, 1]], [1, 2], SIZE)
+    np.testing.assert_array_equal(picture, 2 * LEFT_MASK)
+
+
+@pytest.mark.parametrize(("depth_test", "empty"), [("less", np.inf), ("greater", -np.inf), (None, np.inf)])
+def test_background_depth_stands_where_nothing_is(depth_test, empty):
+    assert tl.rasterize(SQUARE, LEFT, SIZE, depth_test=depth_test).depth[3, 3] == empty
+    frags = tl.rasterize(SQUARE, LEFT, SIZE, depth_test=depth_test, background_depth=5)
+    np.testing.assert_array_equal(frags.depth, np.where(LEFT_MASK, 0, 5))
+
+
+def test_equal_depth_keeps_the_lower_index_and_painters_order_the_later():
+    vertices = np.column_stack([SQUARE, [0.25] * 4])
+    both = [[0, 1, 3], [0, 3, 1]]
+    assert tl.rasterize(vertices, both, SIZE).triangle[0, 0] == 0
+    assert tl.rasterize(vertices, both, SIZE, depth_test="greater").triangle[0, 0] == 0
+    assert tl.rasterize(vertices, both, SIZE, depth_test=None).triangle[0, 0] == 1
+    assert tl.rasterize(SQUARE, both, SIZE).triangle[0, 0] == 1  # (V, 2) has no depth
+
+
+def test_negative_zero_depth_comes_out_as_zero():
+    vertices = np.column_stack([SQUARE, [-0.0] * 4])
+    assert not np.signbit(tl.rasterize(vertices, HALVES, SIZE).depth).any()
+
+
+def test_rasterizer_gives_the_same_and_reuses_its_memory():
+    rasterizer = tl.Rasterizer(SIZE)
+    first = rasterizer.coverage(SQUARE, HALVES)
+    assert first.all()
+    second = rasterizer.coverage(SQUARE, LEFT)
+    assert np.shares_memory(first, second)
+    np.testing.assert_array_equal(second, LEFT_MASK)
+    np.testing.assert_array_equal(rasterizer.overdraw(SQUARE, LEFT), LEFT_MASK)
+    np.testing.assert_array_equal(rasterizer.fill(SQUARE, LEFT, [3]), 3 * LEFT_MASK)
+    np.testing.assert_array_equal(rasterizer.rasterize(SQUARE, LEFT).mask, LEFT_MASK)
+
+
+def test_module_level_calls_keep_scratch_until_it_is_released():
+    from topleft._base import memory
+
+    tl.release_memory()
+    tl.fill(SQUARE, HALVES, [1, 2], SIZE)
+    kept = memory.SCRATCH._threads.kept._blocks
+    assert set(kept) == {"labels", "records", "triangles"}
+    records = kept["records"]
+    tl.coverage(SQUARE, LEFT, SIZE)
+    assert kept["records"] is records
+    tl.release_memory()
+    assert memory.SCRATCH._threads.kept is None
+
+
+def test_module_level_calls_do_not_keep_more_than_the_bound(monkeypatch):
+    from topleft._base import memory
+
+    tl.release_memory()
+    monkeypatch.setattr(memory, "MAX_SCRATCH_BYTES", 63)
+    tl.fill(SQUARE, HALVES, [1, 2], SIZE)  # 4 records of 16 bytes, 16 labels of 4, 6 indices of 4
+    assert set(memory.SCRATCH._threads.kept._blocks) == {"triangles"}
+    tl.release_memory()
+
+
+@pytest.mark.parametrize("n_bytes", [0, 1, 4 << 20, (4 << 20) + 1, 9_000_001])
+def test_large_memory_is_aligned_to_huge_pages(n_bytes):
+    from topleft._base.memory import allocate
+
+    block = allocate(n_bytes)
+    assert block.size >= n_bytes
+    assert n_bytes < 4 << 20 or block.ctypes.data % (2 << 20) == 0
+
+
+def test_module_level_results_stay_valid():
+    first = tl.coverage(SQUARE, LEFT, SIZE)
+    assert not np.shares_memory(first, tl.coverage(SQUARE, HALVES, SIZE))
+    np.testing.assert_array_equal(first, LEFT_MASK)
+
+
+def test_attributes_survive_a_change_of_the_inputs():
+    vertices, triangles = SQUARE.copy(), HALVES.astype(np.int32)
+    frags = tl.rasterize(vertices, triangles, SIZE)
+    expected = frags.barycentric()
+    vertices[:] = np.nan
+    np.testing.assert_array_equal(frags.barycentric(), expected)
+
+
+def test_attributes_of_triangles_that_were_overwritten_are_empty_not_a_crash():
+    triangles = HALVES.astype(np.int32)
+    frags = tl.rasterize(SQUARE, triangles, SIZE)
+    triangles[:] = 2**30
+    frags.triangle[0, 0] = 2**30
+    assert (frags.barycentric() == 0).all()
+    assert (frags.interpolate(np.ones(4), background=-1) == -1).all()
+
+
+def test_attributes_of_one_id_and_one_index_too_many_are_empty():
+    triangles = HALVES.astype(np.int32)
+    frags = tl.rasterize(SQUARE, triangles[:1], SIZE)
+    frags.triangle[0, 3] = 1  # a row of the array behind the one that was drawn
+    assert (frags.barycentric()[0, 3] == 0).all()
+    triangles[0] = [0, 1, 4]
+    assert (frags.barycentric() == 0).all()
+
+
+def test_interpolate_per_vertex_and_per_corner_agree():
+    frags = tl.rasterize(SQUARE, HALVES, SIZE)
+    values = np.arange(8.0).reshape(4, 2)
+    np.testing.assert_array_equal(frags.interpolate(values), frags.interpolate(values[HALVES]))
+    np.testing.assert_array_equal(frags.interpolate(values[:, 1]), frags.interpolate(values)[..., 1])
+
+
+@pytest.mark.parametrize("n_threads", [1, 2, 3, 8])
+def test_number_of_threads_changes_no_bit(n_threads):
+    rng = np.random.default_rng(7)
+    vertices = rng.uniform(-20, 120, (3000, 3))
+    triangles = np.arange(3000).reshape(-1, 3)
+    one = tl.rasterize(vertices, triangles, (101, 67), threads=1)
+    many = tl.rasterize(vertices, triangles, (101, 67), threads=n_threads)
+    np.testing.assert_array_equal(many.triangle, one.triangle)
+    np.testing.assert_array_equal(many.depth, one.depth)
+
+
+def test_environment_sets_the_number_of_threads(monkeypatch):
+    monkeypatch.setenv("TOPLEFT_NUM_THREADS", "5")
+    assert threads.available_threads() == 5
+
+
+def test_threads_survive_a_fork():
+    import multiprocessing
+
+    assert tl.coverage(SQUARE, HALVES, SIZE, threads=2).all()
+    with multiprocessing.get_context("fork").Pool(1) as pool:
+        mask = pool.apply(tl.coverage, (SQUARE, HALVES, SIZE), {"threads": 2})
+    assert mask.all()
+
+
+def test_dlpack_object_is_taken_without_array_interface():
+    class Tensor:
+        def __init__(self, array):
+            self.array = array
+
+        def __dlpack__(self, **kwargs):
+            return self.array.__dlpack__(**kwargs)
+
+        def __dlpack_device__(self):
+            return self.array.__dlpack_device__()
+
+    np.testing.assert_array_equal(tl.coverage(Tensor(SQUARE), Tensor(np.array(LEFT)), SIZE), LEFT_MASK)
+
+
+def test_float16_vertices_are_transformed_in_float64():
+    rng = np.random.default_rng(5)
+    vertices, matrix = rng.uniform(-1, 1, (90, 3)).astype(np.float16), np.eye(4) + rng.uniform(-0.2, 0.2, (4, 4))
+    triangles = np.arange(90).reshape(-1, 3)
+    half = tl.rasterize(vertices, triangles, (32, 32), transform=matrix)
+    double = tl.rasterize(vertices.astype(np.float64), triangles, (32, 32), transform=matrix)
+    np.testing.assert_array_equal(half.depth, double.depth)

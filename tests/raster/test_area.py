@@ -1,0 +1,317 @@
+"""Exact areas: within the bound that docs/design.md proves, and to the last bit where they must be."""
+
+from fractions import Fraction
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from comparing import assert_same
+from engine_cases import ON_EACH_ISA, THREADS, mixed, on
+from strategies import Scene, needles, perspective, soup
+
+import topleft as tl
+from topleft import _engine, scenes
+from topleft._base.memory import KeptMemory
+from topleft._raster.snap import snap_scene
+from topleft._raster.view import View
+from topleft.methods import reference_area as ref
+
+UNIT = 2.0**-24
+SIDE = 12
+
+
+def draw(scene, verb=tl.overdraw, **view):
+    return verb(*scene.arrays, sampling="area", **(scene.view | view))
+
+
+# ---- against fractions ----------------------------------------------------------------------------------------------
+
+
+def strewn(rng, n, bits=8):
+    """Triangles of all sizes and shapes about a small frame, some of them slivers or with corners on pixel borders."""
+    reach = rng.choice([0.2, 1, 3, 9, 40, 700], (n, 1, 1))
+    xy = rng.uniform(-3, SIDE + 3, (n, 1, 2)) + rng.uniform(-0.5, 0.5, (n, 3, 2)) * reach
+    kind = rng.integers(0, 6, n)
+    xy[kind == 0] = np.round(xy[kind == 0] * 2) / 2
+    on_edge = (xy[:, 0] + xy[:, 1]) / 2 + rng.integers(-2, 3, (n, 2)) * 2.0**-bits
+    xy[kind == 1, 2] = on_edge[kind == 1]
+    xy[kind == 2, 1, 0] = xy[kind == 2, 0, 0]
+    return [soup(corners, (SIDE, SIDE), subpixel_bits=bits) for corners in xy]
+
+
+def through_clip_planes(rng, n):
+    """Clip-space triangles that reach behind the eye."""
+    eye = perspective(0.5, 9)
+    for corners in rng.uniform(-2, 2, (n, 3, 3)) - [0, 0, 1.5]:
+        yield soup(corners @ eye[:, :3].T + eye[:, 3], (SIDE, SIDE))
+
+
+def far_out(rng, n):
+    """Triangles as large as fixed point allows, and as far away, that reach into the frame."""
+    for k in range(n):
+        reach = 2.0 ** rng.integers(12, 53, (3, 2))
+        corners = rng.uniform(-1, 1, (3, 2)) * reach
+        corners[k % 3] = rng.uniform(0, SIDE, 2)
+        if k % 2:
+            corners[k % 3 - 1] += 2 * (rng.uniform(0, SIDE, 2) - (corners[k % 3 - 1] + corners[k % 3 - 2]) / 2)
+        if k % 5 == 0:  # rows of the frame that a single edge passes for 2**50 pixels and more
+            corners = rng.uniform(0, SIDE, (3, 2))
+            corners[:2, 0] *= [-(2.0**50), 2.0**50]
+        yield soup(corners, (SIDE, SIDE))
+
+
+def at_limits(rng, n):
+    """Triangles astride the limit between 32 and 64 bits, in windows on either side of the origin."""
+    for bits, signs in [(b, s) for b in (0, 8, 16) for s in [(1, 0), (0, -1), (1, 1), (-1, -1), (-1, 1)]]:
+        origin = tuple(sign * (2**30 >> bits) - SIDE // 2 for sign in signs)
+        for scene in strewn(rng, n, bits):
+            yield soup(scene.vertices + origin, scene.size, subpixel_bits=bits, origin=origin)
+
+
+KINDS = {
+    "strewn": lambda rng: strewn(rng, 700),
+    "coarse": lambda rng: [s for bits in range(5) for s in strewn(rng, 50, bits)],
+    "fine": lambda rng: [s for bits in (12, 16) for s in strewn(rng, 100, bits)],
+    "clipped": lambda rng: through_clip_planes(rng, 100),
+    "far": lambda rng: far_out(rng, 150),
+    "limits": lambda rng: at_limits(rng, 20),
+    "needles": lambda rng: [soup(c, (SIDE, SIDE)) for c in needles(rng, 100, SIDE).vertices.reshape(-1, 3, 2)],
+}
+
+
+@lru_cache(None)
+def exact_areas(kind):
+    made = list(KINDS[kind](np.random.default_rng(7)))
+    return [(scene, ref.area(*scene.arrays, **scene.view)) for scene in made]
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize("kind", KINDS)
+def test_area_of_one_triangle_is_within_bound(kind, isa):
+    largest = n_partly = 0
+    for scene, exact in exact_areas(kind):
+        with on(isa):
+            error = abs(draw(scene) - exact)
+        n_partly += ((exact > 0) & (exact < 1)).sum()
+        largest = max(largest, float(error.max()))
+    assert n_partly > 100
+    assert largest <= 1.503 * UNIT  # at most three edges in a pixel, 0.501 units each
+
+
+@ON_EACH_ISA
+def test_area_of_many_layers_is_within_bound(isa):
+    """Past a sum of 1 float32 itself rounds by up to one unit in 2**24."""
+    rng = np.random.default_rng(3)
+    scene = soup(rng.uniform(-9, 9, (1200, 2)) + [2, 1], (4, 2))
+    exact, with_edges = cached_layers(scene.vertices.tobytes(), scene)
+    with on(isa):
+        got = draw(scene).astype(np.float64)
+    assert exact.max() > 50
+    assert (abs(got - exact) <= UNIT * (1.503 * with_edges + exact)).all()
+
+
+LAYERS = {}
+
+
+def cached_layers(key, scene):
+    if key not in LAYERS:
+        single = [ref.area(scene.vertices, [t], scene.size) for t in scene.triangles.tolist()]
+        edges = sum(((a > 0) & (a < 1)).astype(int) for a in single)
+        LAYERS[key] = sum(single).astype(np.float64), edges
+    return LAYERS[key]
+
+
+# ---- to the last bit ------------------------------------------------------------------------------------------------
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize("n", [1, 191, 192, 193, 255, 256, 4095, 4096, 65535, 65536])
+def test_area_of_equal_layers_is_a_multiple(n, isa):
+    one = soup([[0.3, -9], [4.6, 0], [0.7, 40]], (5, 3))
+    many = Scene(one.vertices, np.repeat(one.triangles, n, 0), one.size)
+    with on(isa):
+        expected = (draw(one).astype(np.float64) * n).astype(np.float32)
+        assert_same(draw(many), expected)
+        assert_same(draw(many, tl.coverage), np.minimum(expected, 1))
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize("step", [1, -1])
+def test_area_of_layers_that_begin_apart_is_their_number(step, isa):
+    """The sum passes what 32 bits hold although no cell does, on the way up or down."""
+    corners = np.tile([[0, -9], [0, 9], [60.0, -9], [60, -9], [0, 9], [60, 9]], (300, 1, 1))
+    corners[:, [0, 1, 4], 0] = np.arange(300)[:, None] // 30
+    layers = soup(corners.reshape(-1, 2) * [step, 1] + [20 - 20 * step, 0], (40, 3))
+    expected = np.float32(30) * np.minimum(np.arange(40, dtype=np.float32) + 1, 10)
+    with on(isa):
+        assert_same(draw(layers), np.tile(expected[::step], (3, 1)))
+
+
+def rotated_grid(n, angle, size):
+    """A square grid of n by n cells, rotated about the middle of a frame that it covers, cells cut by a diagonal."""
+    at = (np.stack(np.meshgrid(np.arange(n + 1), np.arange(n + 1)), -1).reshape(-1, 2) / n - 0.5) * 1.6 * max(size)
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    a = (np.arange(n)[:, None] * (n + 1) + np.arange(n)).reshape(-1)
+    b, c, d = a + 1, a + n + 1, a + n + 2
+    return Scene(at @ turn + np.array(size) / 2, np.concatenate([np.stack([a, b, c], 1), np.stack([d, b, c], 1)]), size)
+
+
+def fan(n, reach, size, rng):
+    """Triangles about one point, out to a circle that holds the frame."""
+    angle = np.sort(rng.uniform(0, 2 * np.pi, n))
+    angle[:4] = [0, 2, 4, 6]
+    angle = np.sort(angle)
+    rim = np.stack([np.cos(angle), np.sin(angle)], -1) * reach + np.array(size) / 2
+    i = np.arange(n)
+    middle = rng.uniform(0, size, (1, 2))
+    return Scene(np.concatenate([rim, middle]), np.stack([i, (i + 1) % n, np.full(n, n)], 1), size)
+
+
+def tilings():
+    rng = np.random.default_rng(5)
+    size = (90, 70)
+    yield from (rotated_grid(n, angle, size) for n, angle in [(1, 0.3), (7, 0.1), (40, 1.0), (150, 0.7), (300, 0.0)])
+    yield from (fan(60, reach, size, rng) for reach in (120, 20_000, 1e6, 2.0**40))
+    vertices, triangles = scenes.planar_mesh(3000, *size)[:2]
+    yield Scene(vertices, triangles, size)
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize("bits", [6, 8, 16])  # coarser snaps would fold the mesh
+def test_area_of_a_tiling_is_one(bits, isa):
+    for scene in tilings():
+        with on(isa):
+            assert (draw(scene, subpixel_bits=bits) == 1).all()
+
+
+def crowd():
+    """Triangles of every class, some of them huge, in a frame of odd size."""
+    rng = np.random.default_rng(11)
+    parts = [mixed(rng, 2500, (131, 67)), needles(rng, 60, 60)]
+    vertices = np.concatenate([p.vertices[:, :2] for p in parts])
+    return soup(np.concatenate([vertices, rng.uniform(-1e6, 1e6, (90, 2))]), (131, 67))
+
+
+@ON_EACH_ISA
+def test_area_is_the_same_on_any_isa_and_threads(isa):
+    scene = crowd()
+    with on("scalar"):
+        expected = draw(scene, threads=1)
+    for n in THREADS:
+        with on(isa):
+            assert_same(draw(scene, threads=n), expected)
+
+
+@ON_EACH_ISA
+def test_area_of_a_window_is_the_crop(isa):
+    scene = crowd()
+    with on(isa):
+        whole = draw(scene)
+        for x, y, width, height in [(0, 0, 1, 1), (5, 7, 33, 20), (64, 1, 67, 66), (130, 66, 1, 1), (17, 40, 16, 3)]:
+            part = draw(Scene(scene.vertices, scene.triangles, (width, height)), origin=(x, y))
+            assert_same(part, whole[y : y + height, x : x + width])
+
+
+@ON_EACH_ISA
+def test_area_of_a_window_far_away_is_the_same(isa):
+    """Moved by a power of two, fixed point keeps every bit of a triangle."""
+    rng = np.random.default_rng(2)
+    scene = soup(rng.uniform(-9, 40, (120, 2)), (30, 20))
+    with on(isa):
+        for shift in (2**20, -(2**20)):
+            moved = Scene(scene.vertices + shift, scene.triangles, scene.size)
+            assert_same(draw(moved, origin=(shift, shift)), draw(scene))
+        nothing = draw(scene, origin=(2**50, 0))
+        assert not nothing.any()
+
+
+@ON_EACH_ISA
+def test_area_does_not_depend_on_order_or_turn(isa):
+    scene = crowd()
+    rng = np.random.default_rng(0)
+    order = rng.permutation(scene.triangles)
+    with on(isa):
+        assert_same(draw(Scene(scene.vertices, order[:, [1, 0, 2]], scene.size)), draw(scene))
+
+
+@ON_EACH_ISA
+def test_area_of_both_sides_is_the_whole(isa):
+    scene = crowd()
+    scene = Scene(scene.vertices, scene.triangles[:200], (20, 20))
+    with on(isa):
+        back, front, whole = (draw(scene, cull=cull).astype(np.float64) for cull in ("back", "front", "none"))
+    assert back.any()
+    assert front.any()
+    assert (abs(back + front - whole) <= UNIT * (4 + whole)).all()
+
+
+# ---- the calls ------------------------------------------------------------------------------------------------------
+
+
+def test_area_of_degenerate_triangles_is_zero():
+    assert not draw(soup([[0, 0], [5, 5], [9, 9], [1, 1], [1, 1], [3, 0]], (8, 8))).any()
+
+
+def test_area_coverage_is_cut_off_at_one():
+    twice = Scene([[0, 0], [4, 0], [0, 4]], [[0, 1, 2], [2, 1, 0]], (3, 1))
+    assert draw(twice).tolist() == [[2, 2, 2]]
+    assert draw(twice, tl.coverage).tolist() == [[1, 1, 1]]
+
+
+@pytest.mark.parametrize("shape", [(0, 5), (5, 0), (3, 2)])
+def test_area_of_nothing_is_zero(shape):
+    empty = tl.coverage(np.zeros((0, 2)), np.zeros((0, 3), int), shape, sampling="area")
+    assert (empty.shape, empty.dtype, empty.any()) == (shape[::-1], np.float32, False)
+
+
+def test_area_rasterizer_leaves_its_cells_clear():
+    one, other = crowd(), rotated_grid(9, 0.4, (131, 67))
+    rasterizer = tl.Rasterizer((131, 67))
+    for scene in (one, other, Scene(one.vertices, np.repeat(one.triangles[:40], 300, 0), one.size), one):
+        got = rasterizer.overdraw(scene.vertices, scene.triangles, sampling="area")
+        assert_same(got, draw(scene))
+
+
+def test_area_after_a_bad_index_is_right():
+    scene = rotated_grid(9, 0.4, (40, 30))
+    for triangles in ([[0, 1, 2], [0, 1, 100]], [[0, 1, 2]] * 40 + [[0, -1, 2]]):
+        with pytest.raises(IndexError, match=f"row {len(triangles) - 1}"):
+            tl.coverage(scene.vertices, np.array(triangles, np.int32), scene.size, sampling="area")
+        assert (draw(scene) == 1).all()
+
+
+def test_area_goes_to_out():
+    out = np.full((6, 4), 9, np.float32)[::2]
+    assert draw(soup([[0, 0], [4, 0], [0, 1]], (4, 3)), tl.coverage, out=out) is out
+    assert out.tolist() == [[0.875, 0.625, 0.375, 0.125], [0] * 4, [0] * 4]
+
+
+def test_area_gives_no_ids():
+    with pytest.raises(ValueError, match="sampling 'area' gives no ids"):
+        tl.rasterize([[0, 0], [4, 0], [0, 1]], [[0, 1, 2]], (4, 3), sampling="area")
+
+
+def test_area_reference_adds_up_to_the_triangle():
+    assert ref.area([[0.5, 0.25], [7, 1], [3, 5.5]], [[0, 1, 2]], (8, 6)).sum() == Fraction(6.5 * 5.25 - 0.75 * 2.5) / 2
+
+
+def test_shallow_edge_across_the_left_border_needs_no_wide_cells():
+    corners = np.array([[0.82, 18.04], [-13.3, 15.85], [-7.85, 4.55]])
+    view = View.parse((40, 30), {"sampling": "area"})
+    snapped = snap_scene(KeptMemory(), corners, np.array([[0, 1, 2]], np.int32), view, with_depth=False, out=None)
+    cells = KeptMemory().constant("cells", 30 * _engine.area_stride(40), _engine.CELL_CLEAR)
+    narrow, wide = np.empty((30, 40), np.float32), np.empty((30, 40), np.float32)
+    assert snapped.scene.draw_area(narrow, _engine.as_bytes(cells), 0, 30, False, True) == -1
+    wide_cells = np.zeros(len(cells), np.int64)
+    assert snapped.scene.draw_area(wide, _engine.as_bytes(wide_cells), 0, 30, True, True) == -1
+    assert (narrow == wide).all()
+    assert narrow[:, 0].any()
+
+
+@pytest.mark.parametrize("far", [0, 1])
+def test_triangles_beside_the_window_add_nothing(far):
+    vertices, triangles, _ = scenes.random_triangles(300, 20, 60, 40)
+    beside = vertices[:, :2] + [-100 if far == 0 else 100, 0]
+    both = np.concatenate([vertices[:, :2], beside]), np.concatenate([triangles, triangles + len(vertices)])
+    alone = tl.overdraw(vertices[:, :2], triangles, (60, 40), sampling="area")
+    assert (tl.overdraw(*both, (60, 40), sampling="area") == alone).all()

@@ -1,0 +1,154 @@
+"""Whether a view of a mesh in clusters, or of instances, is drawn from these: what becomes of some of them decides."""
+
+import numpy as np
+import pytest
+
+import topleft as tl
+from topleft._base.options import Sink
+from topleft._raster import choices
+from topleft._raster.clustered import ClusteredScene
+from topleft._raster.clusters import Clusters, Patience, Survey
+from topleft._raster.view import View
+from topleft._render import scene_clusters
+from topleft._render.scene_clusters import count_layers, survey_instances
+from topleft._render.scene_draw import PlacedScene
+
+SIZE = (160, 120)
+CAMERA = tl.Camera.look_at((0, 0, 3), near=0.01, far=100.0)
+
+
+def as_floats(vertices, triangles):
+    return vertices.astype(np.float32), triangles.astype(np.int32)
+
+
+FINE = as_floats(*tl.scenes.blob(300_000))
+
+
+@pytest.mark.parametrize(
+    ("n", "cull", "outside", "front", "pays"),
+    [
+        (30_000, "none", 0.0, 0.4, False),
+        (30_000, "none", 0.2, 0.4, True),
+        (30_000, "back", 0.5, 0.4, False),
+        (30_000, "back", 0.7, 0.1, True),
+        (100_000, "none", 0.0, 0.5, True),
+        (100_000, "front", 0.0, 0.5, False),
+        (100_000, "back", 0.4, 0.5, True),
+        (9_000_000, "back", 0.0, 0.5, True),
+        (9_000_000, "none", 0.0, 0.9, False),
+    ],
+)
+def test_clusters_are_drawn_where_enough_is_left_out(n, cull, outside, front, pays):
+    view = View.parse(SIZE, {"cull": cull})
+    assert choices.pays_to_draw_clusters(view, n, lambda: Survey(outside, 0.0, 1 - outside - front, front)) == pays
+
+
+@pytest.mark.parametrize("cull", ["none", "back", "front"])
+def test_survey_counts_what_is_left_out(cull):
+    clusters = Clusters(*FINE)
+    camera = tl.Camera.look_at((0, 0, 3), near=0.01, far=100.0, fov_y_deg=20)
+    view = {"transform": camera.clip_from_world(SIZE), "cull": cull}
+    scene = ClusteredScene(clusters, View.parse(SIZE, view))
+    seen = scene.survey(len(clusters))
+    assert 0 < scene.count_drawn(Sink.NEAREST) <= round(len(clusters) * (seen.back + seen.front)) < len(clusters) / 2
+    assert round(sum(seen), 9) == 1
+    assert seen.outside > 0.5
+    assert (seen.turned > 0) == (cull != "none")
+    some = scene.survey(50)
+    assert all(abs(a - b) < 0.2 for a, b in zip(some, seen, strict=True))  # of about 50
+
+
+def test_survey_of_nothing_is_nothing():
+    clusters = Clusters(np.zeros((3, 3), np.float32), np.empty((0, 3), np.int32))
+    view = View.parse(SIZE, {"transform": np.eye(4)})
+    assert ClusteredScene(clusters, view).survey() == (0, 0, 0, 0)
+
+
+def standing(places, mesh=None):
+    """Instances of a mesh at some places."""
+    matrices = np.tile(np.eye(4), (len(places), 1, 1))
+    matrices[:, :3, 3] = places
+    mesh = tl.Mesh(*tl.scenes.shape("cube")) if mesh is None else mesh
+    return tl.Scene([(mesh, matrix) for matrix in matrices])
+
+
+ORTHO = tl.Camera.look_at((0, 0, 30), ortho_height=8.0).clip_from_world((100, 100))
+
+
+@pytest.mark.parametrize(
+    ("places", "expected"),
+    [
+        ([(0, 0, 0)], 1),
+        ([(-3, 0, 0), (3, 0, 0)], 1),
+        ([(0, 0, 0), (0, 0, -5)], 2),
+        ([(0, 0, 0), (0, 0, -5), (0, 0, 5), (3, 0, 0)], 2),
+        ([(50, 0, 0)], 0),
+    ],
+)
+def test_layers_are_boxes_behind_each_other(places, expected):
+    assert count_layers(standing(places), ORTHO) == expected
+
+
+def test_box_about_the_eye_is_no_layer():
+    camera = tl.Camera.look_at((0, 0, 0), (0, 0, 1), near=0.01, far=100.0)
+    assert count_layers(standing([(0, 0, 0), (0, 0, 20)]), camera.clip_from_world((100, 100))) == 1
+
+
+def test_survey_of_instances_weighs_them_by_their_triangles():
+    scene = standing([(0, 0, 0), (500, 0, 0)], tl.Mesh(*FINE))
+    placed = PlacedScene(scene, CAMERA.clip_from_world(SIZE), View.parse(SIZE, {}), with_depth=True)
+    assert survey_instances(placed).outside == 0.5
+    small = tl.Mesh(*as_floats(*tl.scenes.blob(100_000)))
+    both = tl.Scene([*scene[:1], (small, scene[1].transform)])
+    placed = PlacedScene(both, CAMERA.clip_from_world(SIZE), View.parse(SIZE, {}), with_depth=True)
+    share = len(small.triangles) / both.n_triangles
+    assert survey_instances(placed).outside == pytest.approx(share, abs=1e-12)  # a quotient of sums of doubles
+
+
+@pytest.mark.parametrize(
+    ("view", "outside", "layers", "pays"),
+    [
+        ({}, 0.0, 1.0, False),
+        ({}, 0.2, 1.0, True),
+        ({"cull": "back"}, 0.0, 1.0, False),
+        ({"cull": "back"}, 0.0, 5.0, True),
+        ({"sampling": "msaa4"}, 0.0, 1.5, False),
+        ({"sampling": "msaa4"}, 0.0, 3.0, True),
+        ({"sampling": "msaa4"}, 0.5, 0.0, True),
+    ],
+)
+def test_instances_are_drawn_from_clusters_where_enough_is_left_out(view, outside, layers, pays):
+    seen = Survey(outside, 0.0, 0.6 - outside, 0.4)
+    assert choices.pays_to_draw_instances(View.parse(SIZE, view), 70_000, lambda: seen, lambda: layers) == pays
+
+
+def test_scene_asks_before_it_draws_clusters(monkeypatch):
+    scene = standing([(0, 0, -3.0 * k) for k in range(16)], tl.Mesh(*as_floats(*tl.scenes.blob(10_000))))
+    drawn = []
+    draw = scene_clusters.draw_clustered
+    monkeypatch.setattr(scene_clusters, "draw_clustered", lambda *a, **k: drawn.append(1) or draw(*a, **k))
+    camera = tl.Camera.look_at((0, 0, 30), ortho_height=4.0, near=1.0, far=100.0)
+    for layers, n_drawn in ((3.0, 1), (100.0, 0)):
+        drawn.clear()
+        monkeypatch.setattr(choices, "MIN_LAYERS_TO_CLUSTER", layers)
+        tl.rasterize_mesh(scene, camera, SIZE, cull="back", threads=1)
+        assert len(drawn) == n_drawn
+
+
+def test_patience_doubles_and_ends_when_clusters_pay():
+    patience, asked = Patience(), []
+    for i in range(40):
+        if patience.is_over():
+            asked.append(i)
+            patience.note(pays=i > 20)
+    assert asked == [0, 3, 8, 17, 26, *range(27, 40)]
+
+
+def test_mesh_drawn_whole_is_not_surveyed_for_each_picture(monkeypatch):
+    mesh = tl.Mesh(*tl.scenes.blob(choices.MIN_TRIANGLES_TO_CLUSTER + 1000))
+    surveyed = []
+    monkeypatch.setattr(choices, "pays_to_draw_clusters", lambda *_: surveyed.append(1) is not None)
+    expected = tl.rasterize_mesh(mesh, size=SIZE).triangle
+    for _ in range(9):
+        assert (tl.rasterize_mesh(mesh, size=SIZE).triangle == expected).all()
+    assert len(surveyed) == 3

@@ -1,0 +1,295 @@
+"""What must not change a picture: order, names and turn of vertices, windows, methods, instruction sets, threads."""
+
+import hashlib
+import os
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from comparing import assert_same, assert_same_buffers, buffers
+from engine_cases import sharing
+from hypothesis import given
+from strategies import (
+    CLIP_SCENES,
+    PIXEL_SCENES,
+    Scene,
+    clip_scenes,
+    jittered_grid,
+    pixel_scenes,
+    soup,
+    sphere_round_the_eye,
+    turned,
+    with_depth,
+)
+
+import topleft as tl
+
+MAKERS = pytest.mark.parametrize("make", (PIXEL_SCENES | CLIP_SCENES).values(), ids=PIXEL_SCENES | CLIP_SCENES)
+PIXEL = pytest.mark.parametrize("make", PIXEL_SCENES.values(), ids=PIXEL_SCENES)
+
+
+def scenes_of(make, n=5):
+    """Seeded scenes; those in pixels get a depth, so that every verb has work to do."""
+    for seed in range(n):
+        rng = np.random.default_rng(1000 + seed)
+        scene = make(rng)
+        yield (with_depth(scene, rng, flat=bool(rng.integers(2))) if scene.vertices.shape[1] == 2 else scene), rng
+
+
+# ---- triangles ------------------------------------------------------------------------------------------------------
+
+
+@MAKERS
+def test_permuted_triangles_keep_coverage_overdraw_and_depth(make):
+    for scene, rng in scenes_of(make):
+        order = rng.permutation(len(scene.triangles))
+        permuted = replace(scene, triangles=scene.triangles[order])
+        for verb in (tl.coverage, tl.overdraw):
+            assert_same(verb(*permuted.arrays, **scene.view), verb(*scene.arrays, **scene.view))
+        for depth_test in ("less", "greater"):
+            got = tl.rasterize(*permuted.arrays, depth_test=depth_test, **scene.view)
+            assert_same(got.depth, tl.rasterize(*scene.arrays, depth_test=depth_test, **scene.view).depth)
+
+
+def test_permuted_triangles_without_ties_keep_ids():
+    for scene, rng in scenes_of(sphere_round_the_eye):
+        order = rng.permutation(len(scene.triangles))
+        got = tl.rasterize(scene.vertices, scene.triangles[order], scene.size, **scene.view).triangle
+        assert_same(order[got].astype(np.int32), tl.rasterize(*scene.arrays, **scene.view).triangle)
+
+
+@PIXEL
+def test_turned_vertices_keep_coverage_overdraw_and_ids(make):
+    for scene, rng in scenes_of(make):
+        scene = replace(scene, view=scene.view | {"cull": "none"})
+        other = replace(scene, triangles=turned(scene.triangles, rng))
+        for verb in (tl.coverage, tl.overdraw):
+            assert_same(verb(*other.arrays, **scene.view), verb(*scene.arrays, **scene.view))
+        got = tl.rasterize(*other.arrays, depth_test=None, **scene.view)
+        assert_same(got.triangle, tl.rasterize(*scene.arrays, depth_test=None, **scene.view).triangle)
+
+
+@MAKERS
+def test_renumbered_vertices_keep_every_buffer(make):
+    for scene, rng in scenes_of(make):
+        number = rng.permutation(len(scene.vertices) + 3)  # three vertices that nothing uses
+        vertices = np.full((len(number), scene.vertices.shape[1]), 1, scene.vertices.dtype)
+        vertices[number[: len(scene.vertices)]] = scene.vertices
+        if vertices.dtype.kind == "f":
+            vertices[number[-3:]] = np.nan  # and is never looked at
+        other = Scene(vertices, number[scene.triangles], scene.size, scene.view)
+        assert_same_buffers(buffers(other, vertex_rows=np.argsort(number)), buffers(scene))
+
+
+@PIXEL
+def test_shift_by_whole_pixels_with_the_window_keeps_every_buffer(make):
+    for scene, rng in scenes_of(make):
+        if abs(scene.vertices[:, :2]).max() > 2**20:  # beyond, the shift itself would round
+            continue
+        shift = 2 * rng.integers(-5000, 5000, 2)  # even: with 0 bits an odd shift turns the ties of the snap round
+        origin = np.add(scene.view.get("origin", (0, 0)), shift)
+        moved = np.floor((scene.vertices[:, :2] + shift) * 2.0**18) / 2.0**18  # so that the shift back is exact
+        there = np.hstack([moved, scene.vertices[:, 2:]])
+        here = np.hstack([moved - shift, scene.vertices[:, 2:]])
+        view = scene.view | {"origin": tuple(origin.tolist())}
+        assert_same_buffers(buffers(replace(scene, vertices=there, view=view)), buffers(replace(scene, vertices=here)))
+
+
+# ---- windows --------------------------------------------------------------------------------------------------------
+
+
+def check_windows(scene, rng):
+    """Any window of the picture holds the crop of every buffer, background included."""
+    x0, y0 = scene.view.get("origin", (0, 0))
+    width, height = scene.size
+    viewport = scene.view.get("viewport", scene.size)
+    whole = buffers(scene, viewport=viewport)
+    for _ in range(3):
+        left, top = int(rng.integers(width)), int(rng.integers(height))
+        size = int(rng.integers(1, width - left + 1)), int(rng.integers(1, height - top + 1))
+        window = buffers(replace(scene, size=size), viewport=viewport, origin=(x0 + left, y0 + top))
+        crop = {k: v[top : top + size[1], left : left + size[0]] for k, v in whole.items()}
+        assert_same_buffers(window, crop)
+
+
+@MAKERS
+def test_window_equals_crop(make):
+    for scene, rng in scenes_of(make):
+        check_windows(scene, rng)
+
+
+@given(pixel_scenes(n_components=3))
+def test_window_any_pixels_equals_crop(scene):
+    check_windows(scene, np.random.default_rng(0))
+
+
+@given(clip_scenes())
+def test_window_any_clip_space_equals_crop(scene):
+    check_windows(scene, np.random.default_rng(0))
+
+
+def test_window_far_from_the_picture_is_empty():
+    scene = jittered_grid(np.random.default_rng(0))
+    for origin in [(2**40, 0), (-(2**40), 0), (0, 2**40), (0, -(2**40)), (2**52, -(2**52)), (28, 0), (0, -28)]:
+        assert not tl.overdraw(*scene.arrays, origin=origin).any() or abs(origin[0] + origin[1]) == 28
+
+
+# ---- the same call in other ways ------------------------------------------------------------------------------------
+
+
+@MAKERS
+def test_edge_and_scanline_give_every_buffer_alike(make):
+    for scene, _ in scenes_of(make, 10):
+        expected = buffers(scene, method="edge")
+        assert_same_buffers(buffers(scene, method="scanline"), expected)
+        assert_same_buffers(buffers(scene), expected)
+
+
+@MAKERS
+def test_threads_give_every_buffer_alike(make):
+    for scene, _ in scenes_of(make, 3):
+        expected = buffers(scene, threads=1)
+        for threads, is_shared in ((2, False), (2, True), (3, True), (8, False), (8, True)):
+            with sharing(is_shared):
+                assert_same_buffers(buffers(scene, threads=threads), expected)
+
+
+@MAKERS
+def test_repeated_call_gives_every_buffer_again(make):
+    scene, _ = next(scenes_of(make, 1))
+    assert_same_buffers(buffers(scene), buffers(scene))
+
+
+def hash_of_buffers(n=4):
+    """One number for every buffer of a set of seeded scenes."""
+    digest = hashlib.sha256()
+    for make in (PIXEL_SCENES | CLIP_SCENES).values():
+        for scene, _ in scenes_of(make, n):
+            for name, picture in buffers(scene).items():
+                digest.update(f"{make.__name__} {name} {picture.shape} {picture.dtype}".encode())
+                digest.update(picture.tobytes())
+    return digest.hexdigest()
+
+
+@pytest.mark.parametrize("isa", ["scalar", "avx2", "avx512"])
+def test_instruction_sets_give_every_buffer_alike(isa):
+    if isa not in tl.build_info()["isa_available"]:
+        pytest.skip(f"{isa} does not run here")
+    code = "import topleft, test_metamorphic as t; print(topleft.build_info()['isa'], t.hash_of_buffers())"
+    path = os.pathsep.join([str(Path(__file__).parent), *sys.path])
+    environment = os.environ | {"TOPLEFT_ISA": isa, "PYTHONPATH": path}
+    run = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+    assert run.stdout.split() == [isa, hash_of_buffers()]
+
+
+def test_four_threads_at_once_draw_what_one_draws():
+    todo = [scene for make in (PIXEL_SCENES | CLIP_SCENES).values() for scene, _ in scenes_of(make, 2)]
+    expected = [buffers(scene) for scene in todo]
+    with ThreadPoolExecutor(4) as pool:
+        for _ in range(3):
+            for got, want in zip(pool.map(buffers, todo), expected, strict=True):
+                assert_same_buffers(got, want)
+
+
+def test_four_threads_with_a_rasterizer_each_draw_what_one_draws():
+    todo = [scene for scene, _ in scenes_of(sphere_round_the_eye, 8)] + [
+        scene for scene, _ in scenes_of(jittered_grid, 8)
+    ]
+
+    def draw(scene):
+        rasterizer = tl.Rasterizer(scene.size)
+        for _ in range(20):
+            counts = rasterizer.overdraw(scene.vertices, scene.triangles, **scene.view).copy()
+            frags = rasterizer.rasterize(scene.vertices, scene.triangles, **scene.view)
+        return counts, frags.triangle.copy(), frags.depth.copy()
+
+    with ThreadPoolExecutor(4) as pool:
+        for scene, (counts, triangle, depth) in zip(todo, pool.map(draw, todo), strict=True):
+            assert_same(counts, tl.overdraw(*scene.arrays, **scene.view))
+            frags = tl.rasterize(*scene.arrays, **scene.view)
+            assert_same(triangle, frags.triangle)
+            assert_same(depth, frags.depth)
+
+
+def test_rasterizer_used_for_many_scenes_equals_the_functions():
+    todo = [replace(scene, size=(16, 12)) for make in CLIP_SCENES.values() for scene, _ in scenes_of(make, 3)]
+    todo += [replace(scene, size=(16, 12)) for make in PIXEL_SCENES.values() for scene, _ in scenes_of(make, 3)]
+    rasterizer = tl.Rasterizer((16, 12))
+    for scene in todo:
+        arrays = scene.arrays[:2]
+        colors = np.arange(3 * len(scene.triangles), dtype=np.uint8).reshape(-1, 3)
+        assert_same(rasterizer.coverage(*arrays, **scene.view), tl.coverage(*scene.arrays, **scene.view))
+        assert_same(rasterizer.overdraw(*arrays, **scene.view), tl.overdraw(*scene.arrays, **scene.view))
+        got = rasterizer.fill(*arrays, colors, per="triangle", **scene.view)
+        assert_same(got, tl.fill(*arrays, colors, scene.size, per="triangle", **scene.view))
+        assert_same(rasterizer.rasterize(*arrays, **scene.view).depth, tl.rasterize(*scene.arrays, **scene.view).depth)
+
+
+# ---- arrays ---------------------------------------------------------------------------------------------------------
+
+
+def layouts(array):
+    """The same numbers in memory in other ways."""
+    strided = np.zeros((2 * array.shape[0], 3 * array.shape[1]), array.dtype)
+    strided[::2, ::3] = array
+    backwards = np.ascontiguousarray(array[::-1])[::-1]
+    read_only = array.copy()
+    read_only.flags.writeable = False
+    swapped = array.astype(array.dtype.newbyteorder())
+    unaligned = np.frombuffer(b"x" + array.tobytes(), np.uint8)[1:].view(array.dtype).reshape(array.shape)
+    return {
+        "strided": strided[::2, ::3], "backwards": backwards, "read-only": read_only, "byte-swapped": swapped,
+        "Fortran": np.asfortranarray(array), "unaligned": unaligned, "list": array.tolist(),
+    }  # fmt: skip
+
+
+@MAKERS
+def test_any_layout_gives_the_same_picture_and_is_not_modified(make):
+    scene, _ = next(scenes_of(make, 1))
+    expected = tl.rasterize(*scene.arrays, **scene.view)
+    corners = layouts(np.asarray(scene.triangles))
+    for name, vertices in layouts(scene.vertices).items():
+        if name == "list" and scene.vertices.dtype == np.float32:
+            continue  # a list is float64, and so is its transform
+        before = np.array(vertices, copy=True), np.array(corners[name], copy=True)
+        got = tl.rasterize(vertices, corners[name], scene.size, **scene.view)
+        assert_same(got.triangle, expected.triangle)
+        assert_same(got.depth, expected.depth)
+        assert (np.array_equal(vertices, before[0]), np.array_equal(corners[name], before[1])) == (True, True)
+
+
+@pytest.mark.parametrize(
+    "dtype", ["f2", "f4", "f8", "i1", "i2", "i4", "i8", "u1", "u2", "u4", "u8", ">f4", ">i2", ">u8"]
+)
+@pytest.mark.parametrize("n_components", [2, 3, 4])
+def test_any_vertex_dtype_gives_the_same_picture(dtype, n_components):
+    rng = np.random.default_rng(2)
+    xyzw = np.hstack([rng.integers(0, 40, (60, 2)), rng.integers(0, 3, (60, 1)), rng.integers(1, 5, (60, 1))])
+    scene = soup(xyzw[:, :n_components].astype(float), (36, 33), viewport=(3, 5), near_clip=False, far_clip=False)
+    expected = tl.rasterize(*scene.arrays, **scene.view)
+    got = tl.rasterize(scene.vertices.astype(dtype), scene.triangles, scene.size, **scene.view)
+    assert expected.mask.any()
+    assert_same(got.triangle, expected.triangle)
+    assert_same(got.depth, expected.depth)
+
+
+@pytest.mark.parametrize("dtype", ["i1", "i2", "i4", "i8", "u1", "u2", "u4", "u8", ">i4", ">u2"])
+def test_any_triangle_dtype_gives_the_same_picture(dtype):
+    scene = jittered_grid(np.random.default_rng(2))
+    got = tl.rasterize(scene.vertices, scene.triangles.astype(dtype), scene.size).triangle
+    assert_same(got, tl.rasterize(*scene.arrays).triangle)
+
+
+def test_inputs_colors_values_and_transform_are_not_modified():
+    scene, rng = next(scenes_of(CLIP_SCENES["transformed"], 1))
+    colors = rng.integers(0, 256, (len(scene.vertices), 3), np.uint8)
+    values = rng.standard_normal((len(scene.vertices), 2)).astype(np.float32)
+    inputs = [scene.vertices, scene.triangles, scene.view["transform"], colors, values]
+    before = [array.copy() for array in inputs]
+    tl.fill(*scene.arrays[:2], colors, scene.size, per="vertex", **scene.view)
+    tl.rasterize(*scene.arrays, **scene.view).interpolate(values)
+    assert all(np.array_equal(array, copy) for array, copy in zip(inputs, before, strict=True))

@@ -1,0 +1,198 @@
+"""Several samples a pixel: each is the engine's own picture, seen from the sample."""
+
+import numpy as np
+import pytest
+from comparing import assert_same
+from engine_cases import ON_EACH_ISA, THREADS, mixed, on, sharing
+from strategies import CLIP_SCENES, PIXEL_SCENES, Scene, few_bits, floor, on_centres, slivers, with_depth
+
+import topleft as tl
+from topleft._raster.sampling import POSITIONS
+from topleft.methods import reference_sampling as ref
+
+COUNTS = (2, 4, 8, 16)
+SCENES = {name: f for name, f in (PIXEL_SCENES | CLIP_SCENES).items() if name not in ("far_away", "far_integers")}
+
+
+def draw(scene, n, verb=tl.coverage, **view):
+    return verb(*scene.arrays, **(scene.view | {"sampling": f"msaa{n}"} | view))
+
+
+def shares(covered):
+    """Covered samples of each pixel, of all."""
+    return covered.sum(-1, dtype=np.float32) / np.float32(covered.shape[-1])
+
+
+def seen_from(scene, at):
+    """The scene with its vertices moved, as the pixel centre sees it that the sample takes the place of."""
+    moved = np.asarray(scene.vertices, np.float64).copy()
+    moved[:, :2] -= np.array(at) / 16
+    return Scene(moved, scene.triangles, scene.size, scene.view)
+
+
+def test_positions_are_those_of_the_reference():
+    assert {n: at for n, at in ref.SAMPLE_POSITIONS.items() if n > 1} == POSITIONS
+
+
+# ---- coverage -------------------------------------------------------------------------------------------------------
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize("name", SCENES)
+def test_coverage_is_the_share_of_samples_of_the_reference(isa, name):
+    scene = SCENES[name](np.random.default_rng(21))
+    if name == "guard_band":
+        scene.view["subpixel_bits"] = 8
+    expected = ref.sample_coverage(*scene.arrays, 4, **scene.view)
+    with on(isa):
+        for method in ("auto", "edge"):
+            assert_same(draw(scene, 4, method=method), shares(expected))
+            assert_same(draw(scene, 4, tl.overdraw, method=method) > 0, expected)
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize("n", COUNTS)
+@pytest.mark.parametrize("bits", [0, 1, 2, 3, 4, 5, 8, 9, 16])
+def test_coverage_each_precision_is_that_of_the_reference(isa, n, bits):
+    rng = np.random.default_rng(bits)
+    with on(isa):
+        for make in (few_bits, on_centres, slivers):
+            scene = make(rng, 4)
+            view = scene.view | {"subpixel_bits": bits, "origin": (2, 3)}
+            assert_same(draw(scene, n, **view), shares(ref.sample_coverage(*scene.arrays, n, **view)))
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize("bits", [4, 8, 16])
+def test_coverage_all_sizes_is_that_of_centres_when_vertices_move(isa, bits):
+    scene = mixed(np.random.default_rng(bits), 300, (190, 150), bits=bits, origin=(-40, 7))
+    snapped = np.rint(scene.vertices[:, :2] * 2.0**bits) / 2.0**bits
+    scene = Scene(snapped, scene.triangles, scene.size, scene.view)
+    for n in COUNTS:
+        with on(isa):
+            expected = np.stack([tl.overdraw(*(at := seen_from(scene, p)).arrays, **at.view) for p in POSITIONS[n]], -1)
+            for threads in THREADS:
+                with sharing(threads > 2):
+                    assert_same(draw(scene, n, threads=threads), shares(expected > 0))
+            assert_same(draw(scene, n, tl.overdraw), expected)
+
+
+def test_coverage_window_is_the_crop_of_the_whole():
+    whole = mixed(np.random.default_rng(3), 200, (120, 90))
+    part = Scene(whole.vertices, whole.triangles, (50, 40), whole.view | {"origin": (33, 21)})
+    for n in COUNTS:
+        assert_same(draw(part, n), draw(whole, n)[21:61, 33:83])
+
+
+def test_coverage_quad_is_1_and_half_of_it_half():
+    quad = [[0, 0], [2, 0], [2, 2], [0, 2]]
+    assert tl.coverage(quad, [[0, 1, 2], [0, 2, 3]], (3, 2), sampling="msaa16").tolist() == [[1, 1, 0]] * 2
+    assert tl.coverage([[0, 0], [0.5, 0], [0, 9]], [[0, 1, 2]], (1, 1), sampling="msaa8").tolist() == [[0.5]]
+
+
+def test_coverage_coarse_grid_beyond_the_range_of_the_samples_is_an_error():
+    far = [[0, 0], [2.0**59, 0], [0, 2.0**59]]
+    assert tl.coverage(far, [[0, 1, 2]], (1, 1), subpixel_bits=0).all()
+    with pytest.raises(ValueError, match=r"within 2\*\*58 pixels of 0 with 4 sub-pixel bits"):
+        tl.coverage(far, [[0, 1, 2]], (1, 1), subpixel_bits=0, sampling="msaa4")
+
+
+@ON_EACH_ISA
+def test_coverage_coarse_grid_takes_vertices_beyond_the_narrow_range(isa):
+    far = [[-(2**29) + 3, -5], [2**29 - 1, 4], [7, 2**40]]
+    with on(isa):
+        got = tl.coverage(far, [[0, 1, 2]], (9, 9), subpixel_bits=0, sampling="msaa8")
+    assert_same(got, shares(ref.sample_coverage(far, [[0, 1, 2]], (9, 9), 8, subpixel_bits=0)))
+
+
+# ---- ids and depth --------------------------------------------------------------------------------------------------
+
+
+def assert_same_fragments(got, expected):
+    assert_same(got.triangle, expected.triangle)
+    assert_same(got.depth.view(np.int32), expected.depth.view(np.int32))
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize("name", SCENES)
+def test_ids_are_those_of_the_reference(isa, name):
+    rng = np.random.default_rng(22)
+    scene = SCENES[name](rng)
+    if name == "guard_band":
+        scene.view["subpixel_bits"] = 8
+    tests = (None,)
+    if name in PIXEL_SCENES:
+        scene, tests = with_depth(scene, rng, flat=True), (None, "less", "greater")
+    for depth_test in tests:
+        expected = ref.sample_ids(*scene.arrays, 2, depth_test=depth_test, **scene.view)
+        for method in ("auto", "scanline"):
+            with on(isa):
+                frags = draw(scene, 2, tl.rasterize, depth_test=depth_test, method=method)
+            assert_same(frags.samples_triangle, expected)
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize("level", [True, False])
+def test_fragments_all_sizes_are_those_of_centres_when_vertices_move(isa, level):
+    scene = mixed(np.random.default_rng(9), 400, (190, 150), level=level, origin=(-40, 7))
+    scene.vertices[:, :2] = np.rint(scene.vertices[:, :2] * 256) / 256
+    with on(isa):
+        for n, threads in zip(COUNTS, THREADS, strict=True):
+            for depth_test in ("less", "greater", None):
+                frags = draw(scene, n, tl.rasterize, depth_test=depth_test, threads=threads)
+                for k, at in enumerate(POSITIONS[n]):
+                    moved = seen_from(scene, at)
+                    expected = tl.rasterize(*moved.arrays, depth_test=depth_test, **moved.view)
+                    assert_same_fragments(frags.sample(k), expected)
+                    assert_same(frags.samples_triangle[..., k], expected.triangle)
+                    assert_same(frags.samples_depth[..., k], expected.depth)
+                    assert_same(frags.sample(k).barycentric(), expected.barycentric())
+
+
+@pytest.mark.parametrize("bits", [0, 2])
+def test_ids_of_cut_triangles_on_a_coarse_grid_are_those_of_the_reference(bits):
+    scene = floor(np.random.default_rng(6), 4, 16)
+    scene.view["subpixel_bits"] = bits
+    frags = draw(scene, 4, tl.rasterize)
+    assert (frags.samples_triangle >= 0).any()
+    assert_same(frags.samples_triangle, ref.sample_ids(*scene.arrays, 4, depth_test="less", **scene.view))
+
+
+def test_fragments_of_cut_triangles_keep_their_attributes():
+    scene = floor(np.random.default_rng(6), 4, 16)
+    frags = draw(scene, 8, tl.rasterize)
+    for k in range(8):
+        weights = frags.sample(k).barycentric()
+        assert_same(weights.sum(-1) > 0.5, frags.samples_triangle[..., k] >= 0)
+
+
+def test_fragments_are_those_of_the_first_sample():
+    scene = mixed(np.random.default_rng(2), 50, (40, 30))
+    frags = draw(scene, 4, tl.rasterize)
+    assert_same_fragments(frags, frags.sample(0))
+    assert_same(frags.interpolate(scene.vertices), frags.sample(0).interpolate(scene.vertices))
+    center = tl.rasterize(*scene.arrays, **scene.view)
+    assert_same(center.samples_triangle[..., 0], center.triangle)
+    assert_same_fragments(center.sample(0), center)
+
+
+def test_fragments_background_and_out():
+    one = ([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]], (2, 1))
+    out = np.empty((1, 2, 2), np.int32), np.empty((1, 2, 2), np.float32)
+    tl.rasterize(*one, sampling="msaa2", background_depth=5, out=out)
+    assert out[0].tolist() == [[[-1, 0], [-1, -1]]]
+    assert out[1].tolist() == [[[5, 1], [5, 5]]]
+    flat = tl.rasterize([[0, 0], [1, 0], [0, 1]], *one[1:], sampling="msaa2", depth_test="greater")
+    assert flat.samples_depth.tolist() == [[[-np.inf, 0], [-np.inf, -np.inf]]]
+
+
+def test_fragments_empty_scene_or_picture():
+    nothing = tl.rasterize(np.empty((0, 3)), np.empty((0, 3), int), (3, 2), sampling="msaa4")
+    assert (nothing.samples_triangle == -1).all()
+    assert tl.rasterize([[0, 0]] * 3, [[0, 1, 2]], (0, 2), sampling="msaa4").samples_depth.shape == (2, 0, 4)
+
+
+def test_index_outside_the_vertices_is_an_error():
+    for verb in (tl.coverage, tl.overdraw, tl.rasterize):
+        with pytest.raises(IndexError, match="row 1"):
+            verb([[0, 0], [1, 0], [0, 1]], [[0, 1, 2], [0, 1, 3]], (4, 4), sampling="msaa4")

@@ -1,0 +1,252 @@
+"""Scenes: instances into one buffer, bit for bit the picture of one mesh that holds all of them."""
+
+import doctest
+
+import numpy as np
+import pytest
+from comparing import assert_same
+from engine_cases import ON_EACH_ISA, THREADS, on
+from scene_cases import CAMERA, CUBE, SIZE, SPHERE, joined, many, told_apart
+
+import topleft as tl
+from topleft._camera.camera import Camera
+from topleft._model import scene as scene_module
+from topleft._render import scene_draw
+from topleft._render.render import rasterize_mesh
+from topleft._render.scene_fragments import SceneFragments
+
+
+def assert_same_as_joined(got, expected, scene):
+    assert_same(got.id, expected.triangle)
+    assert_same(got.depth, expected.depth)
+    instance, triangle = told_apart(scene, expected.triangle)
+    assert_same(got.instance, instance)
+    assert_same(got.triangle, triangle)
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize(
+    "options", [{}, {"depth_test": "greater"}, {"depth_test": None}, {"cull": "back"}, {"method": "edge"}]
+)
+def test_scene_is_the_mesh_of_all_its_instances(isa, options):
+    scene = many()
+    with on(isa):
+        expected = tl.rasterize(*joined(scene), SIZE, **options)
+        assert len(np.unique(told_apart(scene, expected.triangle)[0])) > 5
+        for threads in THREADS:
+            assert_same_as_joined(rasterize_mesh(scene, CAMERA, SIZE, threads=threads, **options), expected, scene)
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize("sampling", ["msaa2", "msaa4", "msaa16"])
+def test_scene_samples_are_those_of_the_mesh_of_all(isa, sampling):
+    scene = many(2)
+    with on(isa):
+        expected = tl.rasterize(*joined(scene), SIZE, sampling=sampling)
+        for threads in (1, 3):
+            got = rasterize_mesh(scene, CAMERA, SIZE, sampling=sampling, threads=threads)
+            assert_same(got.samples_id, expected.samples_triangle)
+            assert_same(got.samples_depth, expected.samples_depth)
+            instance, triangle = told_apart(scene, expected.samples_triangle)
+            assert_same(got.samples_instance, instance)
+            assert_same(got.samples_triangle, triangle)
+            assert_same(got.sample(1).barycentric(), expected.sample(1).barycentric())
+
+
+@pytest.mark.parametrize("n_vertices", [1, 100, 1 << 20])
+def test_scene_any_number_of_instances_at_once_is_the_same(monkeypatch, n_vertices):
+    monkeypatch.setattr(scene_draw, "VERTICES_AT_ONCE", n_vertices)
+    scene = many(3)
+    assert_same_as_joined(rasterize_mesh(scene, CAMERA, SIZE), tl.rasterize(*joined(scene), SIZE), scene)
+    for sampling in ("center", "msaa4", "outer", "inner"):
+        expected = tl.coverage(*joined(scene), SIZE, sampling=sampling)
+        assert_same(tl.silhouette(scene, CAMERA, SIZE, sampling=sampling), expected)
+
+
+def test_scene_window_is_the_crop_of_the_whole():
+    scene = many(4)
+    whole = rasterize_mesh(scene, CAMERA, SIZE)
+    part = rasterize_mesh(scene, CAMERA, (30, 25), origin=(21, 33), viewport=SIZE)
+    for name in ("instance", "triangle", "depth"):
+        assert_same(getattr(part, name), np.ascontiguousarray(getattr(whole, name)[33:58, 21:51]))
+    assert_same(part.barycentric(), whole.barycentric()[33:58, 21:51])
+
+
+def test_scene_equal_depths_go_to_the_lower_instance_then_triangle():
+    quad = tl.Mesh([[-1, -1, 0], [1, -1, 0], [0, 1, 0]], [[0, 1, 2], [0, 1, 2]])
+    frags = rasterize_mesh(tl.Scene([quad, quad]), Camera.look_at((0, 0, 5)), (9, 9))
+    assert np.unique(frags.instance).tolist() == [-1, 0]
+    assert np.unique(frags.triangle).tolist() == [-1, 0]
+
+
+def test_scene_attributes_are_those_of_the_mesh_of_all():
+    scene = many(5)
+    rng = np.random.default_rng(0)
+    values = [rng.random((len(instance.mesh.vertices), 2)) for instance in scene]
+    got, expected = rasterize_mesh(scene, CAMERA, SIZE), tl.rasterize(*joined(scene), SIZE)
+    assert_same(got.barycentric(), expected.barycentric())
+    assert_same(got.interpolate(values, background=-3), expected.interpolate(np.concatenate(values), background=-3))
+    flat = [v[:, 0] for v in values]
+    assert_same(got.interpolate(flat), expected.interpolate(np.concatenate(flat)))
+    rows, cols = np.nonzero(got.mask)
+    few = got.only(rows[::7], cols[::7])
+    assert few.mask.sum() == len(rows[::7])
+    assert_same(few.barycentric(), np.where(few.mask[..., None], expected.barycentric(), np.float32(0)))
+
+
+def test_scene_mirrored_instance_keeps_its_outside():
+    mirror = np.diag([-1.0, 1, 1, 1])
+    turned = tl.Mesh(CUBE.vertices * [-1, 1, 1], CUBE.triangles[:, ::-1])
+    for cull in ("none", "back", "front"):
+        got = rasterize_mesh(tl.Scene([(CUBE, mirror)]), CAMERA, SIZE, cull=cull)
+        assert_same(got.triangle, rasterize_mesh(turned, CAMERA, SIZE, cull=cull).triangle)
+    got = tl.render(tl.Scene([(CUBE, mirror)]), CAMERA, SIZE, cull="back", edges=True)
+    assert_same(got, tl.render(turned, CAMERA, SIZE, cull="back", edges=True))
+
+
+@pytest.mark.parametrize("shading", ["smooth", "flat", "ids", "depth", "normals"])
+@pytest.mark.parametrize("sampling", ["center", "msaa4"])
+def test_scene_of_one_is_rendered_like_its_mesh(shading, sampling):
+    options = {"shading": shading, "sampling": sampling, "background": (1, 2, 3, 0), "edges": shading == "flat"}
+    got, expected = tl.render(tl.Scene([SPHERE]), size=SIZE, **options), tl.render(SPHERE, size=SIZE, **options)
+    if sampling == "center":
+        assert_same(got, expected)
+    else:  # the samples of a scene are rounded to eight bits before their mean, those of a mesh after it
+        assert np.abs(got.astype(int) - expected).max() <= 1
+
+
+def test_scene_picture_shows_each_instance_as_if_alone():
+    aside = np.eye(4)
+    aside[0, 3] = 3.5
+    scene, camera = tl.Scene([SPHERE, (CUBE, aside)]), Camera.look_at((2, 3, 9))
+    picture, frags = tl.render(scene, camera, SIZE), rasterize_mesh(scene, camera, SIZE)
+    moved = tl.Mesh(CUBE.vertices + [3.5, 0, 0], CUBE.triangles)
+    for k, mesh in enumerate([SPHERE, moved]):
+        own = frags.instance == k
+        assert own.sum() > 100
+        difference = picture[own].astype(int) - tl.render(mesh, camera, SIZE)[own]
+        assert np.abs(difference).max() <= 1  # the matrix of the instance is multiplied in another order
+
+
+def test_scene_shares_the_arrays_of_its_mesh():
+    scene = tl.Scene([SPHERE, (SPHERE, np.diag([2.0, 2, 2, 1]))])
+    assert scene[0].mesh is scene[1].mesh is SPHERE
+    assert (len(scene), scene.n_triangles) == (2, 2 * len(SPHERE.triangles))
+
+
+def test_scene_frame_and_bounds_hold_all_instances():
+    scene = many(6)
+    points = np.concatenate([i.mesh.vertices @ i.transform[:3, :3].T + i.transform[:3, 3] for i in scene])
+    assert np.allclose(scene.bounds, [points.min(0), points.max(0)], rtol=0, atol=1e-12)
+    mask = tl.silhouette(scene, size=(64, 64))
+    assert mask.any()
+    assert not any(border.any() for border in (mask[0], mask[-1], mask[:, 0], mask[:, -1]))
+    assert_same(tl.render(tl.Scene([CUBE]), size=SIZE), tl.render(CUBE, size=SIZE))
+
+
+def test_scene_area_is_that_of_the_mesh_of_all():
+    aside = np.eye(4)
+    aside[0, 3] = 2.5
+    scene = tl.Scene([CUBE, (CUBE, aside)])
+    options = {"sampling": "area", "cull": "back"}
+    got = tl.silhouette(scene, CAMERA, SIZE, **options)
+    expected = tl.coverage(*joined(scene), SIZE, **options)
+    # below 1 sums are exact; what rounds to less than nothing is cut off at 0 instance by instance
+    assert np.abs(got - expected).max() <= 4 * 2.0**-24
+    assert got.max() == 1
+
+
+@pytest.mark.parametrize("size", [(0, 5), (5, 0)])
+def test_scene_empty_picture_has_its_shape(size):
+    frags = rasterize_mesh(many(), CAMERA, size)
+    assert frags.triangle.shape == frags.instance.shape == size[::-1]
+    assert tl.silhouette(many(), CAMERA, size).shape == size[::-1]
+    assert tl.render(many(), CAMERA, size).shape == (*size[::-1], 4)
+
+
+def test_scene_out_holds_the_mask():
+    out = np.ones((70, 180), bool)[:, ::2]
+    assert tl.silhouette(many(), CAMERA, SIZE, out=out) is out
+    assert_same(out, tl.silhouette(many(), CAMERA, SIZE))
+
+
+def test_scene_background_depth_is_where_nothing_is():
+    frags = rasterize_mesh(many(), CAMERA, SIZE, background_depth=7)
+    assert_same(frags.depth == 7, ~frags.mask)
+
+
+def test_scene_of_empty_meshes_shows_nothing():
+    empty = tl.Mesh(np.zeros((0, 3)), np.zeros((0, 3), int))
+    frags = rasterize_mesh(tl.Scene([empty, empty]), CAMERA, (4, 3))
+    assert not frags.mask.any()
+    assert (frags.depth == np.inf).all()
+    assert_same(frags.barycentric(), np.zeros((3, 4, 3), np.float32))
+    assert repr(frags) == "SceneFragments(4x3, 2 instances, 0 triangles)"
+    with pytest.raises(ValueError, match="a scene without triangles has no bounds"):
+        tl.render(tl.Scene([empty]))
+
+
+def test_mesh_has_one_instance():
+    frags = rasterize_mesh(CUBE, size=(8, 6))
+    assert_same(frags.instance, np.where(frags.mask, 0, -1).astype(np.int32))
+    assert_same(frags.id, frags.triangle)
+    assert not isinstance(frags, SceneFragments)
+
+
+@pytest.mark.parametrize(
+    ("transform", "message"),
+    [
+        (np.eye(3), r"transform must have shape \(4, 4\), got \(3, 3\)"),
+        (np.full((4, 4), np.nan), "transform must hold finite numbers, got"),
+        (np.ones((4, 4)), r"the last row of transform must be \[0, 0, 0, 1\], got \[1\.0, 1\.0, 1\.0, 1\.0\]"),
+        (np.diag([1, 1, 0, 1]), "transform must not be singular, got"),
+    ],
+)
+def test_instance_bad_transform_is_refused(transform, message):
+    with pytest.raises(ValueError, match=message):
+        tl.Instance(CUBE, transform)
+
+
+def test_scene_without_instances_is_refused():
+    with pytest.raises(ValueError, match="a scene needs at least one instance, got none"):
+        tl.Scene([])
+
+
+def test_scene_of_too_many_triangles_is_refused():
+    mesh = tl.Mesh([[0, 0, 0]], np.zeros((1 << 20, 3), np.int32))
+    with pytest.raises(ValueError, match=f"a scene must have at most {2**31 - 1} triangles, got {2**31}"):
+        tl.Scene([mesh] * 2048)
+
+
+@pytest.mark.parametrize("instance", [3, "cube", (CUBE,)])
+def test_scene_of_something_else_is_refused(instance):
+    with pytest.raises(
+        TypeError, match=r"instances must be Instance, Mesh, \(Mesh, transform\) or \(Mesh, transform, name\), got"
+    ):
+        tl.Scene([instance])
+
+
+def test_instance_of_no_mesh_is_refused():
+    with pytest.raises(TypeError, match="an instance needs a Mesh, got ndarray"):
+        tl.Instance(np.eye(3))
+
+
+def test_scene_values_that_do_not_fit_are_refused():
+    frags = rasterize_mesh(tl.Scene([CUBE, SPHERE]), CAMERA, (4, 4))
+    with pytest.raises(ValueError, match="values must be one array for each of 2 instances, got 1"):
+        frags.interpolate([np.zeros(8)])
+    with pytest.raises(ValueError, match=r"values must have as many channels for each instance, got \[\(\), \(2,\)\]"):
+        frags.interpolate([np.zeros(8), np.zeros((len(SPHERE.vertices), 2))])
+
+
+def test_scene_unknown_option_is_refused():
+    with pytest.raises(TypeError, match="unknown option 'out'"):
+        rasterize_mesh(many(), CAMERA, SIZE, out=None)
+    with pytest.raises(ValueError, match="sampling 'area' gives no ids"):
+        rasterize_mesh(many(), CAMERA, SIZE, sampling="area")
+    with pytest.raises(ValueError, match="method 'bresenham_scanline' has no depth"):
+        rasterize_mesh(many(), CAMERA, SIZE, method="bresenham_scanline")
+
+
+def test_scene_examples_hold():
+    assert doctest.testmod(scene_module).failed == 0

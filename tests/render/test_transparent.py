@@ -1,0 +1,91 @@
+"""Transparent meshes and scenes: the layers of all instances, shaded and composited."""
+
+import doctest
+
+import numpy as np
+import pytest
+from comparing import assert_same
+from engine_cases import ON_EACH_ISA, on
+from scene_cases import CAMERA, CUBE, SIZE, SPHERE, joined, many, told_apart
+
+import topleft as tl
+from topleft._render import transparent
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize(
+    "options", [{}, {"depth_test": "greater"}, {"cull": "back"}, {"origin": (11, 5), "viewport": SIZE}]
+)
+def test_layers_of_a_scene_are_those_of_the_mesh_of_all(isa, options):
+    scene = many(2)
+    with on(isa):
+        expected = tl.peel(*joined(scene), SIZE, layers=5, **options)
+        assert expected.count.max() >= 4
+        for threads in (1, 3):
+            got = tl.visible_layers(scene, CAMERA, SIZE, layers=5, threads=threads, **options)
+            assert_same(got.id, expected.triangle)
+            assert_same(got.depth, expected.depth)
+            assert_same(got.count, expected.count)
+            instance, triangle = told_apart(scene, expected.triangle)
+            assert_same(got.instance, instance)
+            assert_same(got.triangle, triangle)
+            assert_same(got.layer(2).barycentric(), expected.layer(2).barycentric())
+
+
+def test_layers_of_a_scene_are_composited_by_triangle_and_pixel():
+    scene = many(3)
+    got, expected = tl.visible_layers(scene, CAMERA, SIZE), tl.peel(*joined(scene), SIZE)
+    rng = np.random.default_rng(1)
+    for shape in ((scene.n_triangles,), (*SIZE[::-1], 4)):
+        colors = rng.integers(0, 256, (*shape, 4), np.uint8)
+        assert_same(tl.composite(got, colors), tl.composite(expected, colors))
+    with pytest.raises(ValueError, match=r"colors must have rows of shape .*\(70, 90, 4\) for pixels, got \(3,\)"):
+        tl.composite(got, np.zeros((3, 4)), per="auto")
+    with pytest.raises(ValueError, match="colors must have rows of shape"):
+        tl.composite(got, np.zeros((3, 4)), per="vertex")
+    assert repr(got) == f"SceneDepthLayers(90x70, 4 layers, {scene.n_triangles} triangles)"
+
+
+def test_transparent_picture_is_over_of_shaded_layers():
+    camera = tl.Camera.look_at((3, 2, 4))
+    got = tl.render_transparent(CUBE, camera, SIZE, opacity=0.25, shading="flat", background=(10, 20, 30))
+    front = tl.render(CUBE, camera, SIZE, shading="flat", cull="back")
+    layers = tl.visible_layers(CUBE, camera, SIZE, cull="front", layers=1)
+    behind = tl.shade(layers.layer(0), CUBE, camera, shading="flat")
+    seen = layers.layer(0).mask & tl.silhouette(CUBE, camera, SIZE, cull="back")
+    alpha = 64 / 255
+    ground = np.array([10, 20, 30.0])
+    expected = alpha * front[seen][:, :3] + (1 - alpha) * (alpha * behind[seen][:, :3] + (1 - alpha) * ground)
+    assert seen.sum() > 300
+    assert np.abs(got[seen][:, :3] - expected).max() <= 0.5 + 1e-9
+    assert (got[..., 3] == 255).all()
+
+
+def test_transparent_opaque_picture_is_that_of_render():
+    for subject in (SPHERE, many(4)):
+        assert_same(tl.render_transparent(subject, CAMERA, SIZE, opacity=1, layers=2), tl.render(subject, CAMERA, SIZE))
+    assert_same(tl.render_transparent(CUBE, size=SIZE, opacity=1), tl.render(CUBE, size=SIZE))
+
+
+def test_transparent_mesh_and_scene_of_one_are_the_same():
+    assert_same(tl.render_transparent(SPHERE, size=SIZE), tl.render_transparent(tl.Scene([SPHERE]), size=SIZE))
+
+
+@pytest.mark.parametrize("size", [(0, 5), (5, 0)])
+def test_transparent_empty_picture_has_its_shape(size):
+    for subject in (CUBE, many()):
+        assert tl.render_transparent(subject, CAMERA, size).shape == (*size[::-1], 4)
+
+
+def test_transparent_bad_options_are_refused():
+    with pytest.raises(ValueError, match="opacity must lie in 0 to 1, got 2"):
+        tl.render_transparent(CUBE, size=(4, 4), opacity=2)
+    for subject in (CUBE, many()):
+        with pytest.raises(ValueError, match="layers must lie in 1 to 16, got 99"):
+            tl.visible_layers(subject, CAMERA, (4, 4), layers=99)
+        with pytest.raises(ValueError, match="sampling 'msaa4' gives no sorted layers"):
+            tl.visible_layers(subject, CAMERA, (4, 4), sampling="msaa4")
+
+
+def test_transparent_examples_hold():
+    assert doctest.testmod(transparent).failed == 0

@@ -1,0 +1,83 @@
+"""Rendering with several samples a pixel: smooth outlines, and each triangle shaded once in a pixel."""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+import pytest
+from comparing import assert_same
+
+import topleft as tl
+from topleft._base.color import srgb_tables
+from topleft._shade.shade import GREY_OF_FARTHEST, GREY_OF_NEAREST, id_colors, picture_of_numbers
+from topleft.methods.reference_sampling import mean
+
+SIZE = (48, 36)
+KNOT = tl.Mesh(*tl.scenes.shape("torus-knot"))
+CLEAR = (0, 0, 0, 0)
+
+
+@pytest.mark.parametrize("n", [2, 4, 8, 16])
+def test_alpha_is_the_share_of_samples_with_a_triangle(n):
+    got = tl.render(KNOT, size=SIZE, sampling=f"msaa{n}", background=CLEAR)
+    frags = tl.rasterize_mesh(KNOT, size=SIZE, sampling=f"msaa{n}")
+    assert_same(got[..., 3], np.rint(255 * (frags.samples_triangle >= 0).mean(-1)).astype(np.uint8))
+
+
+@pytest.mark.parametrize("background", [CLEAR, (255, 255, 255, 255), (10, 200, 30, 100)])
+def test_a_colour_per_triangle_is_the_mean_light_of_the_samples(background):
+    got = tl.render(KNOT, size=SIZE, sampling="msaa4", shading="ids", background=background)
+    ids = tl.rasterize_mesh(KNOT, size=SIZE, sampling="msaa4").samples_triangle
+    samples = np.empty((*ids.shape, 4), np.uint8)
+    samples[...] = background
+    samples[ids >= 0] = np.column_stack([id_colors(ids[ids >= 0]), np.full((ids >= 0).sum(), 255)])
+    expected = np.array([[mean(p, is_straight=True, tables=srgb_tables()) for p in row] for row in samples], np.uint8)
+    is_clear = expected[..., 3] == 0  # whose colour is that of the background
+    assert_same(got[~is_clear], expected[~is_clear])
+    assert (got[is_clear] == background).all()
+
+
+def test_outline_over_nothing_has_the_colour_of_the_surface():
+    square = tl.Mesh([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+    camera = tl.Camera.look_at((0.1, 0.2, 5))
+    got = tl.render(square, camera, SIZE, shading="flat", sampling="msaa8", background=CLEAR)
+    assert len(np.unique(got[got[..., 3] > 0][:, :3], axis=0)) == 1
+    assert len(np.unique(got[..., 3])) > 3
+
+
+def test_a_triangle_is_shaded_once_in_a_pixel(monkeypatch):
+    shaded = []
+
+    def count(frags, *arguments):
+        shaded.append(int(frags.mask.sum()))
+        return picture_of_numbers(frags, *arguments)
+
+    monkeypatch.setattr(sys.modules["topleft._shade.shade"], "picture_of_numbers", count)
+    tl.render(KNOT, size=SIZE, sampling="msaa8", shading="ids")
+    ids = tl.rasterize_mesh(KNOT, size=SIZE, sampling="msaa8").samples_triangle
+    pairs = sum(len(set(pixel) - {-1}) for row in ids.tolist() for pixel in row)
+    assert sum(shaded) == pairs
+
+
+def test_depth_has_one_range_for_all_samples():
+    got = tl.render(KNOT, size=SIZE, sampling="msaa4", shading="depth", background=CLEAR)
+    greys = got[got[..., 3] == 255][:, 0]
+    assert GREY_OF_FARTHEST <= greys.min() < greys.max() <= GREY_OF_NEAREST
+    center = tl.render(KNOT, size=SIZE, shading="depth", background=CLEAR)
+    both = (got[..., 3] == 255) & (center[..., 3] == 255)
+    assert np.abs(got[both].astype(int) - center[both]).mean() < 5  # samples near the centre; another range: 30
+
+
+def test_empty_picture_and_picture_of_nothing():
+    assert tl.render(KNOT, size=(0, 4), sampling="msaa4").shape == (4, 0, 4)
+    away = tl.Camera.look_at((0, 0, 900), (0, 0, 1000))
+    assert (tl.render(KNOT, away, SIZE, sampling="msaa4", background=(1, 2, 3)) == (1, 2, 3, 255)).all()
+
+
+@pytest.mark.parametrize("sampling", ["area", "outer", "inner"])
+def test_samplings_without_an_order_are_refused(sampling):
+    with pytest.raises(ValueError, match=f"sampling '{sampling}' gives no ids"):
+        tl.render(KNOT, size=SIZE, sampling=sampling)
+
+

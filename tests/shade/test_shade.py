@@ -1,0 +1,316 @@
+"""The shading kernels against float64 NumPy, and the same bits on every instruction set, thread count and window."""
+
+import gc
+import os
+import subprocess
+import sys
+import weakref
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shading_reference as reference
+from comparing import assert_same
+
+import topleft as tl
+from topleft import _engine
+from topleft._base.color import srgb_tables
+from topleft._shade.shade import shade
+
+SIZE = (150, 110)
+RNG = np.random.default_rng(6)
+NOISE = np.kron(RNG.integers(0, 256, (24, 40, 3)), np.ones((4, 4, 1))).astype(np.uint8)
+LIGHTS = (
+    tl.Light((1, 2, 3), color=(255, 240, 200)),
+    tl.Light((-2, 1, 0.5), kind="point", color=(120, 160, 255), intensity=1.5, falloff=0.3),
+)
+
+
+def textured(name, n_repeats=3):
+    """A shape with a texture laid on along z, and colours."""
+    mesh = tl.Mesh(*tl.scenes.shape(name))
+    uv = n_repeats * (mesh.vertices[:, :2] @ [[0.9, -0.2], [0.3, 0.8]]) + 0.3 * mesh.vertices[:, 2:]
+    return tl.Mesh(mesh.vertices, mesh.triangles, uv=uv)
+
+
+KNOT = textured("torus-knot")
+COLORED = replace(KNOT, colors=RNG.integers(0, 256, (len(KNOT.vertices), 3)).astype(np.uint8))
+CAMERAS = {
+    "perspective": tl.Camera.framing(KNOT, aspect=150 / 110),
+    "ortho": tl.Camera.framing(KNOT, aspect=150 / 110, ortho=True),
+}
+ON_EACH_CAMERA = pytest.mark.parametrize("camera", CAMERAS.values(), ids=CAMERAS)
+
+
+def check(mesh, camera, material=None, *, is_flat=False, **options):
+    """The picture is that of the reference, rounded: at most one level off, and only next to the middle of two."""
+    material = material or tl.Material(color=(224, 222, 217))
+    frags = tl.rasterize_mesh(mesh, camera, SIZE)
+    got = shade(frags, mesh, camera, shading="flat" if is_flat else "smooth", material=material, **options)
+    expected = reference.picture(frags, mesh, camera, SIZE, material, is_flat=is_flat, **options)
+    seen = frags.mask
+    assert seen.sum() > 2000
+    assert np.abs(got[seen, :3] - expected[seen]).max() < SLACK
+
+
+SLACK = 0.5 + 0.1
+"""Levels: half a level of rounding, and a tenth: 2**-17 of light is 0.03 levels in the dark, texels are 0.03 more,
+and float32 in weights, normals and coordinates makes up the rest."""
+
+
+@ON_EACH_CAMERA
+@pytest.mark.parametrize("is_flat", [False, True])
+def test_shade_headlight_is_that_of_the_reference(camera, is_flat):
+    check(KNOT, camera, is_flat=is_flat)
+
+
+@pytest.mark.parametrize("intensity", [0.3, 1.0, 8.0, 61.0, 70.0])
+@pytest.mark.parametrize("color", [(0, 3, 250), (255, 1, 90), (12, 20, 40)])
+def test_shade_one_color_in_white_light_is_that_of_the_reference(color, intensity):
+    lights = tl.Light((1, 2, 3), intensity=intensity), tl.Light((-1, 0, 1), intensity=0.5)
+    check(KNOT, CAMERAS["perspective"], tl.Material(color=color), lights=lights, ambient=0.01)
+
+
+@ON_EACH_CAMERA
+@pytest.mark.parametrize("specular", [0.0, 0.6])
+@pytest.mark.parametrize("shininess", [3.0, 80.0])
+def test_shade_lights_are_those_of_the_reference(camera, specular, shininess):
+    material = tl.Material(color=(90, 200, 130), specular=specular, shininess=shininess, back_color=(200, 40, 40))
+    check(KNOT, camera, material, lights=LIGHTS, ambient=0.05, fog=tl.Fog(2, 9, color=(20, 30, 60)))
+
+
+@ON_EACH_CAMERA
+def test_shade_vertex_colors_are_those_of_the_reference(camera):
+    check(COLORED, camera, tl.Material())
+
+
+@ON_EACH_CAMERA
+@pytest.mark.parametrize("kind", ["bilinear", "trilinear"])
+@pytest.mark.parametrize("wrap", ["repeat", "clamp", "mirror", ("mirror", "repeat")])
+def test_shade_textures_are_those_of_the_reference(camera, kind, wrap):
+    texture = tl.Texture(NOISE, filter=kind, wrap=wrap)
+    check(KNOT, camera, tl.Material(texture=texture), lights=LIGHTS[:1])
+
+
+@pytest.mark.parametrize("size", [(1, 1), (3, 5), (31, 17), (64, 1)])
+def test_shade_textures_of_odd_sizes_are_those_of_the_reference(size):
+    texture = tl.Texture(RNG.integers(0, 256, (*size, 3)).astype(np.uint8))
+    check(textured("sphere", 5), CAMERAS["perspective"], tl.Material(texture=texture))
+
+
+@pytest.mark.parametrize("wrap", ["repeat", "clamp", "mirror"])
+def test_shade_nearest_texel_is_that_of_the_reference(wrap):
+    material = tl.Material(texture=tl.Texture(NOISE, filter="nearest", wrap=wrap), unlit=True)
+    camera = CAMERAS["perspective"]
+    frags = tl.rasterize_mesh(KNOT, camera, SIZE)
+    got = shade(frags, KNOT, camera, material=material)
+    w = reference.Weights(frags, KNOT, camera, SIZE)
+    expected = reference.encode(reference.sample(material.texture, w.of(KNOT.uv), None))[:, :3]
+    # A coordinate that float32 rounds over the border between two texels: a few in ten thousand.
+    assert (np.abs(got[frags.mask, :3] - expected) > 0.51).any(axis=1).mean() < 1e-3
+
+
+def test_shade_seam_shows_no_line():
+    # u runs from 0.8 over 1 to 1.2 on one side and continues at 0.2 on the other: the same picture as without a seam.
+    square = [[-1, -1, 0], [0, -1, 0], [0, 1, 0], [-1, 1, 0], [0, -1, 0], [1, -1, 0], [1, 1, 0], [0, 1, 0]]
+    uv = np.array([[0.8, 0], [1.2, 0], [1.2, 1], [0.8, 1], [0.2, 0], [0.6, 0], [0.6, 1], [0.2, 1]])
+    triangles = [[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]]
+    material = tl.Material(texture=tl.Texture(NOISE), unlit=True)
+    camera = tl.Camera.look_at((0.3, 0.2, 3))
+    seamed, whole = (
+        tl.render(tl.Mesh(square, triangles, uv=own), camera, SIZE, material=material).astype(int)
+        for own in (uv, np.where(np.arange(8)[:, None] < 4, uv, uv + [1, 0]))
+    )
+    assert np.abs(seamed - whole).max() <= 1  # u - floor(u) of float32
+
+
+def test_shade_material_of_each_triangle():
+    colors = [tl.Material(color=(k, 255 - k, 9), unlit=True) for k in range(5)]
+    rows = RNG.integers(0, 5, len(KNOT.triangles))
+    mesh = replace(KNOT, materials=colors, material_of_triangle=rows)
+    frags = tl.rasterize_mesh(mesh, CAMERAS["ortho"], SIZE)
+    got = shade(frags, mesh, CAMERAS["ortho"])[frags.mask]
+    assert_same(got[:, 0], rows[frags.triangle[frags.mask]].astype(np.uint8))
+
+
+def test_shade_triangles_across_the_near_plane_and_huge_ones_keep_their_attributes():
+    # A floor from behind the eye to far away: one triangle is cut, and is larger than int32 edge functions allow.
+    floor = tl.Mesh([[-50, 0, 9], [50, 0, 9], [0, 0, -200]], [[0, 1, 2]], uv=[[-50, 9], [50, 9], [0, -200]])
+    camera = tl.Camera.look_at((0, 1, 5), (0, 0.2, 0), near=0.1, far=1000)
+    frags = tl.rasterize_mesh(floor, camera, SIZE)
+    rows, cols = np.nonzero(frags.mask)
+    white = tl.Material((255, 255, 255), unlit=True)
+    got = tl.render(floor, camera, SIZE, fog=tl.Fog(0, 40, color=(0, 0, 0)), material=white)
+    rays = np.linalg.inv(camera.clip_from_world(SIZE))
+    ndc = np.c_[2 * (cols + 0.5) / SIZE[0] - 1, 1 - 2 * (rows + 0.5) / SIZE[1]]
+    near, far = (np.c_[ndc, np.full(len(ndc), z), np.ones(len(ndc))] @ rays.T for z in (-1, 1))
+    near, far = near[:, :3] / near[:, 3:], far[:, :3] / far[:, 3:]
+    points = near + (far - near) * (near[:, 1] / (near[:, 1] - far[:, 1]))[:, None]
+    distance = -(points @ camera.view[2, :3] + camera.view[2, 3])
+    expected = reference.encode(1 - np.clip(distance / 40, 0, 1))
+    # Where the floor ends at the horizon a row is a pixel of the snap away from the next: leave the last ones out.
+    is_near = distance < 39
+    assert is_near.sum() > 4000
+    assert np.abs(got[rows, cols, 0] - expected)[is_near].max() <= 1
+
+
+def test_shade_normals_that_cancel_leave_that_of_the_face():
+    normals = [[0, 0, 1], [0, 0, -1], [0, 0, 0]]
+    mesh = tl.Mesh([[-1, -1, 0], [1, -1, 0], [0, 1, 0]], [[0, 1, 2]], normals=normals)
+    camera = tl.Camera.look_at((0, 0, 3))
+    flat, smooth = (tl.render(mesh, camera, (33, 33), shading=shading) for shading in ("flat", "normals"))
+    assert flat[16, 16].tolist() == tl.render(mesh, camera, (33, 33), shading="flat")[20, 16].tolist()
+    assert smooth[32 - 8, 16].tolist() == [128, 128, 255, 255]  # in the middle between the two
+
+
+@pytest.mark.parametrize("back_color", [None, (0, 0, 0)], ids=["grey", "channels"])
+def test_encode_gives_the_nearest_value_of_each_step_of_light(back_color):
+    # A triangle a step: unlit, of vertex colours through a matcap would round; so by intensity of a light.
+    steps = np.linspace(0, 1, 401)
+    quad = tl.Mesh([[-9, -9, 0], [9, -9, 0], [0, 9, 0]], [[0, 1, 2]])
+    camera = tl.Camera.look_at((0, 0, 1))
+    white = tl.Material(color=(255, 255, 255), back_color=back_color)  # two colours: each channel by itself
+    frags = tl.rasterize_mesh(quad, camera, (1, 1))
+    got = [int(shade(frags, quad, camera, material=white, lights=[], ambient=float(a))[0, 0, 0]) for a in steps]
+    table = srgb_tables()[1]
+    assert got == table[np.rint(steps.astype(np.float32) * 65536).astype(int)].tolist()
+
+
+def test_matcap_shows_what_it_has_for_the_normal():
+    ramp = np.zeros((64, 64, 3), np.uint8)
+    ramp[..., 0] = np.arange(64) * 4
+    sphere = tl.Mesh(*tl.scenes.shape("sphere"))
+    camera = tl.Camera.look_at((0, 0, 4), ortho_height=2.2)
+    red = tl.render(sphere, camera, (65, 65), shading="matcap", matcap=tl.Texture(ramp))[32, :, 0].astype(int)
+    inside = red[4:-4]
+    assert (np.diff(inside) >= 0).all()
+    assert inside[0] < 40
+    assert inside[-1] > 200
+
+
+# ---- the same bits ------------------------------------------------------------------------------------------
+
+
+def everything(threads=None, origin=(0, 0), size=SIZE, sampling="center"):
+    """Pictures with all that the kernels do."""
+    material = tl.Material(texture=tl.Texture(NOISE), specular=0.5, shininess=30, back_color=(9, 99, 199))
+    options = {"lights": LIGHTS, "material": material, "fog": tl.Fog(3, 9), "threads": threads}
+    near = tl.Camera.look_at((0.2, 0.1, 1.0), near=0.5, far=9)
+    for camera in (*CAMERAS.values(), near):
+        frags = tl.rasterize_mesh(COLORED, camera, size, origin=origin, viewport=SIZE, sampling=sampling)
+        for shading in ("smooth", "flat", "normals", "unlit"):
+            yield shade(frags, COLORED, camera, shading=shading, **options)
+
+
+@pytest.mark.parametrize("sampling", ["center", "msaa4"])
+def test_shade_threads_change_no_bit(sampling):
+    for one, three in zip(everything(1, sampling=sampling), everything(3, sampling=sampling), strict=True):
+        assert_same(three, one)
+
+
+@pytest.mark.parametrize("sampling", ["center", "msaa4"])
+def test_shade_windows_are_crops(sampling):
+    whole = everything(sampling=sampling)
+    for part, picture in zip(everything(origin=(37, 21), size=(83, 64), sampling=sampling), whole, strict=True):
+        assert_same(part, picture[21:85, 37:120])
+
+
+PRINT_HASH = """
+import hashlib, test_shade
+digest = hashlib.sha256()
+for sampling in ("center", "msaa8"):
+    for picture in test_shade.everything(sampling=sampling):
+        digest.update(picture.tobytes())
+print(digest.hexdigest())
+"""
+
+
+def test_shade_each_isa_gives_the_same_bits():
+    names = _engine.isa_available()
+    here = os.path.dirname(__file__)
+    digests = set()
+    for name in names:
+        path = os.pathsep.join([here, *sys.path])
+        environment = {**os.environ, "TOPLEFT_ISA": name, "PYTHONPATH": path}
+        command = [sys.executable, "-c", PRINT_HASH]
+        digests.add(subprocess.run(command, env=environment, capture_output=True, check=True).stdout)
+    assert len(digests) == 1
+
+
+def test_shade_several_samples_of_one_triangle_are_as_one():
+    camera = tl.Camera.look_at((0, 0, 2))
+    wall = tl.Mesh([[-9, -9, 0], [9, -9, 0], [0, 9, 0]], [[0, 1, 2]])
+    one, eight = (tl.render(wall, camera, (16, 16), shading="flat", sampling=name) for name in ("center", "msaa8"))
+    assert_same(eight, one)
+
+
+# ---- errors -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("make", "error", "message"),
+    [
+        (lambda: tl.Light((0, 0, 0)), ValueError, r"at must be a direction, got \(0.0, 0.0, 0.0\)"),
+        (lambda: tl.Light((0, 1)), ValueError, r"at must be three finite numbers, got \(0, 1\)"),
+        (lambda: tl.Light((0, 1, 0), kind="spot"), ValueError, "kind must be one of 'directional', 'point', got"),
+        (lambda: tl.Light((0, 1, 0), intensity=-1), ValueError, "intensity must be finite and not negative, got -1"),
+        (lambda: tl.Fog(2, 1), ValueError, "near and far must be finite and near < far, got 2 and 1"),
+        (lambda: tl.Material(specular=2), ValueError, "specular must lie in 0 to 1, got 2"),
+        (lambda: tl.Material(texture=NOISE), TypeError, "texture must be a Texture, got ndarray"),
+        (lambda: tl.Texture(NOISE / 255), TypeError, "image must be uint8, got float64"),
+        (lambda: tl.Texture(NOISE[..., :2]), ValueError, r"image must have shape .*, got \(96, 160, 2\)"),
+        (lambda: tl.Texture(NOISE[:0]), ValueError, "image must have 1 to 32768 pixels a side"),
+        (lambda: tl.Texture(NOISE, wrap="fold"), ValueError, "wrap must be one of 'repeat', 'clamp', 'mirror', got"),
+        (lambda: tl.Texture(NOISE, wrap=("repeat",)), ValueError, "wrap must be one word, or two for u and v"),
+        (lambda: replace(KNOT, uv=[[0, 1]]), ValueError, r"uv must have shape \(\d+, 2\), got \(1, 2\)"),
+        (lambda: replace(KNOT, materials=[1]), TypeError, "materials must be of Material, got int"),
+        (lambda: replace(KNOT, material_of_triangle=[0]), ValueError, "material_of_triangle must have shape"),
+        (
+            lambda: replace(KNOT, material_of_triangle=np.ones(len(KNOT.triangles), int), materials=[tl.Material()]),
+            IndexError,
+            r"material_of_triangle\[0\] = 1 must name one of 1 materials",
+        ),
+        (lambda: tl.render(KNOT, shading="matcap"), ValueError, "matcap must be a Texture for shading 'matcap'"),
+        (lambda: tl.render(KNOT, lights=[(0, 1, 0)]), TypeError, "lights must be of Light, got tuple"),
+        (lambda: tl.render(KNOT, fog=3), TypeError, "fog must be a Fog, got int"),
+        (lambda: tl.render(KNOT, ambient=-1), ValueError, "ambient must be finite and not negative, got -1"),
+    ],
+)
+def test_wrong_values_are_named(make, error, message):
+    with pytest.raises(error, match=message):
+        make()
+
+
+@pytest.mark.parametrize("shading", ["smooth", "flat", "ids", "depth"])
+def test_shade_with_another_mesh_is_refused(shading):
+    cube = tl.Mesh(*tl.scenes.shape("cube"))
+    frags = tl.rasterize_mesh(KNOT, CAMERAS["ortho"], SIZE)
+    drawn, given = (f"{len(m.vertices)} vertices and {len(m.triangles)} triangles" for m in (KNOT, cube))
+    message = f"mesh must be the one that was drawn, with {drawn}, got {given.split()[0]} and {given.split()[3]}"
+    with pytest.raises(ValueError, match=message):
+        tl.shade(frags, cube, CAMERAS["ortho"], shading=shading)
+
+
+def test_shade_of_what_is_no_mesh_is_refused():
+    frags = tl.rasterize_mesh(KNOT, CAMERAS["ortho"], SIZE)
+    with pytest.raises(TypeError, match="mesh must be a Mesh, got int"):
+        tl.shade(frags, 3, CAMERAS["ortho"])
+    with pytest.raises(TypeError, match="frags must be Fragments, got NoneType"):
+        tl.shade(None, KNOT, CAMERAS["ortho"])
+
+
+def test_shade_through_a_lens_is_the_picture_of_render():
+    intrinsics = [[90, 0, 75], [0, 90, 55], [0, 0, 1]]
+    camera = tl.Camera.from_intrinsics(intrinsics, np.eye(4), SIZE, near=0.1, far=50, distortion=[-0.3, 0.1, 0, 0])
+    mesh = replace(KNOT, vertices=KNOT.vertices + [0, 0, 4])
+    assert_same(tl.shade(tl.rasterize_mesh(mesh, camera, SIZE), mesh, camera), tl.render(mesh, camera, SIZE))
+
+
+@pytest.mark.parametrize("draw", [tl.render, tl.render_transparent, lambda mesh: tl.render(tl.Scene([mesh]))])
+def test_shade_does_not_keep_a_mesh(draw):
+    mesh = replace(KNOT)
+    draw(mesh)
+    kept = weakref.ref(mesh)
+    del mesh
+    gc.collect()
+    assert kept() is None

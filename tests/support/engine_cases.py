@@ -1,0 +1,112 @@
+"""What the engine must draw, and whether it does: on one instruction set and another, with any number of threads."""
+
+import sys
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import lru_cache
+
+import int64_loop
+import numpy as np
+import pytest
+from comparing import assert_same
+from int64_loop import DEPTH_TESTS
+from strategies import soup
+
+import topleft as tl
+from topleft import _engine
+
+THREADS = (1, 2, 3, 8)
+
+#: Stands above all other marks: pytest then draws a scene on each instruction set before it makes the next.
+ON_EACH_ISA = pytest.mark.parametrize("isa", tl.build_info()["isa_available"])
+
+
+@contextmanager
+def on(isa):
+    """Run on the kernels of one instruction set."""
+    before = _engine.isa_in_use()
+    _engine.use_isa(isa)
+    try:
+        yield
+    finally:
+        _engine.use_isa(before)
+
+
+@dataclass(frozen=True)
+class Expected:
+    """Pictures of a scene; ids and depth by depth test."""
+
+    counts: np.ndarray
+    ids: dict
+    depth: dict
+
+
+def expect(scene, tests=DEPTH_TESTS):
+    """Counts and ids of the loop, and the plain depths, which lie within their bound of the loop's."""
+    loop = int64_loop.draw_scene(scene, tests)
+    depth = {test: plain(scene, test).depth for test in tests}
+    for test, ids in loop.ids.items():
+        exact, largest = loop.depth(ids)
+        with np.errstate(invalid="ignore", over="ignore"):
+            half_ulp = np.spacing(abs(depth[test])).astype(np.float64) / 2
+            assert not (abs(depth[test] - exact) > half_ulp + 2.0**-35 * largest).any()  # design, rule 8
+    return Expected(loop.counts, loop.ids, depth)
+
+
+def plain(scene, test):
+    """Fragments by the definition: on the scalar kernels, a triangle and a sample at a time."""
+    with on("scalar"):
+        view = scene.view | {"method": "edge", "threads": 1}
+        return tl.rasterize(*scene.arrays, depth_test=test, **view)
+
+
+@lru_cache(maxsize=1)
+def cases(make, *arguments):
+    """Scenes of a generator, each with what it must give: kept until every instruction set has drawn them."""
+    return [(scene, expect(scene, tests)) for scene, tests in make(*arguments)]
+
+
+@contextmanager
+def sharing(is_shared):
+    """Threads share the triangles of any scene, or set up all of them in each."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys.modules["topleft._raster.choices"], "MIN_TRIANGLES_TO_SHARE", 0 if is_shared else 2**62)
+        yield
+
+
+def check(isa, scene, expected, threads=(1,)):
+    """Every sink gives the expected picture; three threads and more share the triangles."""
+    labels = np.arange(len(scene.triangles), dtype=np.float32)
+    for n in threads:
+        view = scene.view | {"threads": n}
+        with on(isa), sharing(n > 2):
+            assert_same(tl.overdraw(*scene.arrays, **view), expected.counts)
+            assert_same(tl.coverage(*scene.arrays, **view), expected.counts > 0)
+            for test, ids in expected.ids.items():
+                frags = tl.rasterize(*scene.arrays, depth_test=test, **view)
+                assert_same(frags.triangle, ids)
+                assert_same(frags.depth.view(np.int32), expected.depth[test].view(np.int32))
+            if None in expected.ids:
+                got = tl.fill(*scene.arrays[:2], labels, scene.size, per="triangle", background=-1, **view)
+                assert_same(got, expected.ids[None].astype(np.float32))
+
+
+def check_all(isa, made, threads=(1,)):
+    for scene, expected in made:
+        check(isa, scene, expected, threads)
+
+
+def mixed(rng, n, size, *, bits=8, level=True, **view):
+    """Triangles of a tenth of a pixel to 130 pixels, slivers and degenerate ones too; depths with ties, or none."""
+    reach = rng.choice([0.3, 1, 2, 4, 12, 64, 130], (n, 1, 1), p=[0.2, 0.25, 0.25, 0.15, 0.12, 0.02, 0.01])
+    xy = rng.uniform(-20, np.add(size, 20), (n, 1, 2)) + rng.uniform(-0.5, 0.5, (n, 3, 2)) * reach
+    kind = rng.integers(0, 50, n)
+    along = rng.uniform(0, 1, (n, 1))
+    on_edge = xy[:, 0] + along * (xy[:, 1] - xy[:, 0]) + rng.integers(-2, 3, (n, 2)) * 2.0**-bits
+    xy[kind == 0, 2] = on_edge[kind == 0]
+    xy[kind == 1, 2] = xy[kind == 1, 0]
+    snap_ties = (np.floor(xy * 2.0**bits) + 0.5) * 2.0**-bits
+    xy = np.where((kind % 5 == 2)[:, None, None], np.round(xy * 2) / 2, xy)  # centres, corners and middles of pixels
+    xy = np.where((kind % 5 == 3)[:, None, None], snap_ties, xy) + np.array(view.get("origin", (0, 0)))
+    z = np.repeat(rng.integers(-8, 56, (n, 1)) / 64, 3, 1) if level else rng.standard_normal((n, 3))
+    return soup(np.dstack([xy, z]).reshape(-1, 3), size, subpixel_bits=bits, **view)
