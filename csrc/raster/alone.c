@@ -6,12 +6,6 @@
 #define TL_INT int64_t
 #define TL_UINT uint64_t
 #define TL_WALK(name) name##_64
-static inline void floor_divide_64(int64_t a, int64_t b, int64_t *quotient, int64_t *remainder)
-{
-    const int64_t q = a / b, r = a % b;
-    *quotient = q - (r < 0);
-    *remainder = r < 0 ? r + b : r;
-}
 #include "raster/walk.h"
 #undef TL_INT
 #undef TL_UINT
@@ -20,12 +14,6 @@ static inline void floor_divide_64(int64_t a, int64_t b, int64_t *quotient, int6
 #define TL_INT tl_int128
 #define TL_UINT tl_uint128
 #define TL_WALK(name) name##_128
-static inline void floor_divide_128(tl_int128 a, tl_int128 b, tl_int128 *quotient, tl_int128 *remainder)
-{
-    const tl_int128 q = a / b, r = a % b;
-    *quotient = q - (r < 0);
-    *remainder = r < 0 ? r + b : r;
-}
 #include "raster/walk.h"
 #undef TL_INT
 #undef TL_UINT
@@ -183,36 +171,6 @@ static row_span square_span(const tl_triangle *t, const tl_window *window, int64
         span = (row_span){t->col0 + (int64_t)first, t->col0 + (int64_t)end};
     return span;
 }
-
-static inline int is_clipped(const tl_vertex_set *set, const int32_t *corners)
-{
-    int clipped = 0;
-    for (int k = 0; k < 3; k++)
-        clipped |= set->vertices[corners[k]].x_fx == TL_SPECIAL && set->vertices[corners[k]].y_fx == TL_CLIPPED;
-    return clipped;
-}
-
-/* The vertices of the pieces, seen from the same sample. */
-static tl_vertex_set piece_set(const tl_pieces *p, const tl_vertex_set *mesh)
-{
-    return (tl_vertex_set){p->vertices, p->wide, p->inv_w, NULL, p->n_vertices, mesh->sample_x_fx, mesh->sample_y_fx};
-}
-
-/* First piece of a triangle, by bisection in the ascending sources. */
-static int64_t first_piece(const tl_pieces *p, int64_t id)
-{
-    int64_t low = 0, high = p->n_pieces;
-    while (low < high) {
-        const int64_t middle = low + (high - low) / 2;
-        if (p->source[middle] < id)
-            low = middle + 1;
-        else
-            high = middle;
-    }
-    return low;
-}
-
-#define TL_MAX_PIECES (TL_MAX_CORNERS - 2) /* of one triangle */
 
 /* Counts the squares that any of a triangle's pieces meets, or holds: a square may meet several, and counts once. */
 static __attribute__((noinline)) void count_squares(const tl_vertex_set *set, const int32_t *corners, int n_pieces, const tl_scene *scene,

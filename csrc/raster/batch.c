@@ -35,7 +35,7 @@ typedef struct {
 
 
 /* Everything that one pass over a scene needs; on the stack of draw. */
-typedef struct {
+typedef struct batch_state {
     const tl_scene *scene;
     const tl_window *window;
     const tl_target *target;
@@ -53,7 +53,7 @@ typedef struct {
 } lane_corners;
 
 /* TL_LANES triangles with positive area; corners doubled and relative to the first sample of their boxes. */
-typedef struct {
+typedef struct lane_triangles {
     vi x[3], y[3];
     vi dx[3], dy[3]; /* edge k runs from corner k to corner k + 1; not doubled */
     vi e[3];         /* E' at the first sample, as in walk.h: >= 0 inside; of SAMPLES 2E + bias at the centre */
@@ -178,12 +178,6 @@ TL_INLINE int make_room(batch_state *s, int n, tl_sink sink)
     flush_fragments(s->target, sink, &s->fragments, n);
     return 0;
 }
-
-/* In sampled.c: what the sink SAMPLES does instead. */
-static void draw_tiny_of_samples(batch_state *s, const lane_triangles *t, vm live, vi n_cols, vi n_rows);
-static void flush_small_of_samples(batch_state *s);
-static void flush_middle_of_samples(batch_state *s);
-static void flush_rows_of_samples(batch_state *s);
 
 /* Boxes of up to 2x2 samples, tested where they are. */
 TL_INLINE void draw_tiny(batch_state *s, tl_sink sink, const lane_triangles *t, const vd *z, vm live, vi n_cols, vi n_rows, vi id)

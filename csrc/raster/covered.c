@@ -7,6 +7,7 @@
 #include "vertex/fixed.h"
 #include "lanes/lanes.h"
 
+#define TL_MAX_SAMPLES 16
 #define TL_EVEN_WORDS 8 /* that are worth a call */
 
 /* Marks samples from `at` on, one a bit. */

@@ -3,7 +3,6 @@
 #include "vertex/fixed.h"
 #include "lanes/lanes.h"
 
-#include "raster/peel.c"
 #include "raster/census.c"
 #include "raster/alone.c"
 #include "raster/batch.c"

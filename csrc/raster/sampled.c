@@ -7,7 +7,6 @@
 #include "vertex/fixed.h"
 #include "lanes/lanes.h"
 
-#define TL_MAX_SAMPLES 16
 #define TL_MAX_WORDS (TL_MIDDLE_BOX * TL_MAX_SAMPLES / 64) /* of a row of a middle box */
 
 /* What a sample adds to the doubled edge functions. */

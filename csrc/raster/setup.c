@@ -34,11 +34,6 @@ static inline extent_rounding round_extent(const tl_window *window)
     return window->test == TL_TEST_OUTER ? (extent_rounding){0, unit - 1} : (extent_rounding){unit - 1, 0};
 }
 
-static inline int64_t min64(int64_t a, int64_t b) { return a < b ? a : b; }
-static inline int64_t max64(int64_t a, int64_t b) { return a > b ? a : b; }
-static inline int64_t min3(int64_t a, int64_t b, int64_t c) { return min64(min64(a, b), c); }
-static inline int64_t max3(int64_t a, int64_t b, int64_t c) { return max64(max64(a, b), c); }
-
 static inline tl_wide vertex_fx(const tl_vertex_set *set, int32_t i)
 {
     const tl_vertex v = set->vertices[i];
@@ -116,7 +111,7 @@ static inline int clip_box(tl_triangle *t, const tl_window *window)
  * steep that float64 would lose bits that float32 shows, and the exact weights are used. */
 #define TL_SLIVER_BITS 12
 
-/* The depth plane over the corners, per half sub-pixel.  The same operations as plane_slopes in batch.c. */
+/* The depth plane over the corners, per half sub-pixel.  The same operations as plane_lanes in batch.c. */
 static inline void setup_plane(tl_triangle *t)
 {
     const double x1 = (double)(t->x_fx[1] - t->x_fx[0]), y1 = (double)(t->y_fx[1] - t->y_fx[0]), z1 = t->z[1] - t->z[0];

@@ -4,20 +4,12 @@
  * each copy of the code keeps one case. */
 #include "vertex/fixed.h"
 #include "lanes/lanes.h"
+#include "raster/fragments.h"
+#include "raster/hooks.h"
+#include "raster/peel.c"
 
 /* Samples interpolated by weights at a time. */
 #define TL_CHUNK 64
-
-/* Covered samples of small triangles wait in a list of this many. */
-#define TL_FRAGMENTS 1024
-#define TL_PREFETCH 16
-
-typedef struct {
-    int n;
-    int32_t sample[TL_FRAGMENTS + 8 * TL_MAX_LANES + TL_PREFETCH]; /* row * stride_px + column */
-    int32_t id[TL_FRAGMENTS + 8 * TL_MAX_LANES];
-    float depth[TL_FRAGMENTS + 8 * TL_MAX_LANES];
-} fragment_list;
 
 /* A copy of a function for each sink, so that inner loops know what they draw, and a call of the right one.
  * Such a function takes the sink last: TL_SINK_COPIES(f, (declared parameters), parameters ...), TL_SINK_CALL(f, sink, ...). */
@@ -73,9 +65,6 @@ TL_PUT_DEPTHS(put_buffers, vm, vf, vi, v)
 TL_PUT_DEPTHS(put_depths_half, hm, hf, hi, h)
 #endif
 
-static void peel_lanes(const tl_target *target, int64_t at, vm m, vf depth, int32_t id); /* peel.c */
-static void peel_fragments(const tl_peeled *peeled, const fragment_list *f, int n);
-
 /* The lanes in m of a triangle. */
 TL_INLINE void put_depths(const tl_target *target, tl_sink sink, int64_t at, vm m, vf depth, int32_t id)
 {
@@ -92,9 +81,6 @@ TL_INLINE void put_numbers(const tl_target *target, tl_sink sink, int64_t at, vm
     const vi old = vi_load_masked(m, pixels);
     vi_store_some(pixels, m, sink == TL_SINK_COUNT ? vi_add(old, vi_set1(1)) : vi_max(old, vi_xor(id, vi_set1(target->flip))), at + TL_LANES <= target->n_samples);
 }
-
-struct blend_state;
-static void mix_run(struct blend_state *b, int64_t at, int64_t n); /* mix.c */
 
 /* A span of samples without depth. */
 TL_INLINE void put_plain(const tl_target *target, tl_sink sink, int64_t at, int64_t n, int32_t id)
@@ -193,23 +179,6 @@ TL_INLINE void put_span(const tl_triangle *t, const tl_window *window, const tl_
         put_plane(t, window, target, sink, row, first, end);
     else
         put_weighted(t, window, target, sink, row, first, end);
-}
-
-/* A sample as one integer, smaller if it wins: depth bits in the order of the numbers, then id.  And back. */
-TL_INLINE int64_t sample_key(float depth, int32_t id, int32_t turn)
-{
-    int32_t bits;
-    memcpy(&bits, &depth, 4);
-    bits ^= (int32_t)((uint32_t)(bits >> 31) >> 1) ^ turn;
-    return (int64_t)((uint64_t)(uint32_t)bits << 32 | (uint32_t)id);
-}
-TL_INLINE float key_depth(int64_t key, int32_t turn)
-{
-    int32_t bits = (int32_t)(key >> 32) ^ turn;
-    float depth;
-    bits ^= (int32_t)((uint32_t)(bits >> 31) >> 1);
-    memcpy(&depth, &bits, 4);
-    return depth;
 }
 
 /* Writes the list out, one sample after the other: without branches, whatever wins. */

@@ -3,30 +3,6 @@
 #include "vertex/fixed.h"
 #include "lanes/lanes.h"
 
-/* A vector of pixels: where its lanes find their runs, and what they are to show. */
-typedef struct {
-    const shade_runs *s;
-    int first;  /* the slot of the run that lane 0 belongs to, or of the first one behind it */
-    vi run;     /* of each lane, from `first` on */
-    vm visible; /* lanes that show a triangle */
-    vi column;  /* in the window */
-    vf e[3];    /* edge functions */
-    vf area, q, inv_q;
-    vf normal[3];
-    vf color[3]; /* of the vertices */
-    vf uv[2], du[2], dv[2];
-    vf ray[3], point[3];
-} shaded_lanes;
-
-TL_INLINE vf pick(const shaded_lanes *p, int coefficient) { return vf_pick(p->s->floats[coefficient] + p->first, p->run); }
-TL_INLINE vi pick_int(const shaded_lanes *p, int coefficient) { return vi_pick(p->s->ints[coefficient] + p->first, p->run); }
-
-/* The sum of a value at the corners, weighted by the edge functions. */
-TL_INLINE vf weighed(const shaded_lanes *p, int c0, int c1, int c2)
-{
-    return vf_fma(p->e[0], pick(p, c0), vf_fma(p->e[1], pick(p, c1), vf_mul(p->e[2], pick(p, c2))));
-}
-
 /* Edge functions of the lanes whose runs are special, run by run. */
 static void set_special_edges(shaded_lanes *p)
 {
@@ -50,23 +26,7 @@ static void set_special_edges(shaded_lanes *p)
     }
 }
 
-/* The lanes of vector i of the span that begins at `column`, and their edge functions; but for those of special runs. */
-TL_INLINE void find_lanes(shaded_lanes *p, const shade_runs *s, int i, int64_t column, vi *e, vi *sum)
-{
-    const unsigned starts = s->starts[i];
-    const int begins = (int)(starts & 1);
-    p->s = s;
-    p->first = s->first_run[i] - 1 + begins;
-    p->run = vi_sub(vi_prefix_count(starts), vi_set1(begins));
-    p->visible = vm_from_bits(s->visible[i]);
-    p->column = vi_add(vi_iota(), vi_set1((int32_t)column + i * TL_LANES));
-    e[1] = vi_add(pick_int(p, RUN_E1), vi_mul(p->column, pick_int(p, RUN_STEP1)));
-    e[2] = vi_add(pick_int(p, RUN_E2), vi_mul(p->column, pick_int(p, RUN_STEP2)));
-    *sum = pick_int(p, RUN_SUM);
-    e[0] = vi_sub(vi_sub(*sum, e[1]), e[2]);
-}
-
-/* The same as float32, of all runs. */
+/* The lanes of vector i of the span that begins at `column`, and their edge functions as float32, of all runs. */
 TL_INLINE void find_pixels(shaded_lanes *p, const shade_runs *s, int i, int64_t column)
 {
     vi e[3], sum;

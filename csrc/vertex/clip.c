@@ -6,6 +6,7 @@
 #include "vertex/fixed.h"
 
 #define TL_MAX_CORNERS (3 + TL_N_PLANES)
+#define TL_MAX_PIECES (TL_MAX_CORNERS - 2) /* of one triangle */
 
 typedef struct {
     double pos[4];     /* x, y, z, w */
@@ -188,4 +189,33 @@ static void clip(const tl_source *source, const tl_vertex *vertices, const int32
             pieces->n_pieces += n - 2;
         }
     }
+}
+
+/* What reads the pieces. */
+static inline int is_clipped(const tl_vertex_set *set, const int32_t *corners)
+{
+    int clipped = 0;
+    for (int k = 0; k < 3; k++)
+        clipped |= set->vertices[corners[k]].x_fx == TL_SPECIAL && set->vertices[corners[k]].y_fx == TL_CLIPPED;
+    return clipped;
+}
+
+/* The vertices of the pieces, seen from the same sample. */
+static tl_vertex_set piece_set(const tl_pieces *p, const tl_vertex_set *mesh)
+{
+    return (tl_vertex_set){p->vertices, p->wide, p->inv_w, NULL, p->n_vertices, mesh->sample_x_fx, mesh->sample_y_fx};
+}
+
+/* First piece of a triangle, by bisection in the ascending sources. */
+static int64_t first_piece(const tl_pieces *p, int64_t id)
+{
+    int64_t low = 0, high = p->n_pieces;
+    while (low < high) {
+        const int64_t middle = low + (high - low) / 2;
+        if (p->source[middle] < id)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low;
 }

@@ -29,6 +29,25 @@ _Static_assert(sizeof(tl_int128) == 16, "the wide path needs 128-bit integers");
 _Static_assert((-3 >> 1) == -2, "a right shift of a negative number must floor");
 _Static_assert((tl_int128)2 * ((1LL << 31) - 2) * ((1LL << 31) - 2) < (tl_int128)1 << 63, "2E must fit 64 bits");
 
+static inline int64_t min64(int64_t a, int64_t b) { return a < b ? a : b; }
+static inline int64_t max64(int64_t a, int64_t b) { return a > b ? a : b; }
+static inline int64_t min3(int64_t a, int64_t b, int64_t c) { return min64(min64(a, b), c); }
+static inline int64_t max3(int64_t a, int64_t b, int64_t c) { return max64(max64(a, b), c); }
+
+/* Quotient and remainder for b > 0, rounded down. */
+static inline void floor_divide_64(int64_t a, int64_t b, int64_t *quotient, int64_t *remainder)
+{
+    const int64_t q = a / b, r = a % b;
+    *quotient = q - (r < 0);
+    *remainder = r < 0 ? r + b : r;
+}
+static inline void floor_divide_128(tl_int128 a, tl_int128 b, tl_int128 *quotient, tl_int128 *remainder)
+{
+    const tl_int128 q = a / b, r = a % b;
+    *quotient = q - (r < 0);
+    *remainder = r < 0 ? r + b : r;
+}
+
 /* Writes vertex i: its record, and its row of the wide table where there is one.  x_fx and y_fx are integers, infinite or NaN. */
 static inline void store_vertex(double x_fx, double y_fx, double z, int64_t i, tl_vertex *out, tl_wide *wide, tl_vertex_counts *n)
 {
