@@ -1,47 +1,37 @@
-/* The kernel table of one instruction set: every stage, compiled together, with nothing visible but the table.
+/* The kernel table of one instruction set: every stage, compiled together, with nothing visible but the table.  A stage includes what
+ * it stands on; these are the ones that the table names.
  * isa_*.c name the set (TL_ISA_NAME) and the table (TL_KERNELS) and include this file. */
 #include "topleft.h"
 
 #include "vertex/snap.c"
 #include "vertex/project.c"
 #include "vertex/clip.c"
-#include "raster/setup.c"
-#include "raster/covered.c"
-#include "raster/sink.c"
+#include "clusters/cluster_sort.c"
+#include "clusters/cluster_view.c"
 #include "raster/raster.c"
 #include "raster/bin.c"
-#include "area/ramp.c"
-#include "area/accumulate.c"
 #include "area/area.c"
 #include "pixels/weights_one.c"
-#include "pixels/paint.c"
-#include "clusters/cluster_sort.c"
-#include "lines/edges.c"
-#include "lines/smooth_lines.c"
-#include "lines/lines.c"
-#include "pixels/resolve.c"
-#include "pixels/composite.c"
-#include "pixels/runs.c"
-#include "shade/texture.c"
-#include "shade/light.c"
-#include "shade/shade_pixels.c"
 #include "pixels/weights.c"
-#include "shade/srgb.c"
+#include "pixels/paint.c"
+#include "pixels/resolve.c"
+#include "pixels/points.c"
+#include "pixels/planes.c"
+#include "pixels/composite.c"
+#include "lines/edges.c"
+#include "lines/lines.c"
+#include "blend/blend.c"
 #include "shade/shade.c"
 #include "shade/shade_samples.c"
 #include "shade/alpha_test.c"
-#include "pixels/points.c"
-#include "pixels/planes.c"
 #include "mesh/normals.c"
 #include "mesh/nearest.c"
 #include "mesh/reach.c"
-#include "blend/mix.h"
-#include "blend/mix_u8.c"
-#include "blend/mix_f32.c"
-#include "blend/mix.c"
-#include "blend/blend_strip.c"
-#include "blend/blend_area.c"
-#include "blend/blend.c"
+
+#ifndef TL_KERNELS /* read by itself, as an editor does */
+#define TL_ISA_NAME "none"
+#define TL_KERNELS tl_kernels_none
+#endif
 
 const tl_kernels TL_KERNELS = {
     .isa = TL_ISA_NAME,

@@ -6,8 +6,16 @@
  * with the same result wherever both are right.
  *
  * Based on: R. Levien, font-rs, 2015. */
-#include "vertex/fixed.h"
+#ifndef TL_ACCUMULATE_C
+#define TL_ACCUMULATE_C
+
+#include <stdint.h>
+#include <string.h>
+
+#include "topleft.h"
 #include "lanes/lanes.h"
+#include "vertex/fixed.h"
+#include "area/ramp.c"
 
 #define TL_SUM_MARGIN (1 << 20) /* rounding may leave a few units less than nothing */
 #define TL_SUM_UNIT (1.0f / (1 << TL_AREA_BITS))
@@ -114,3 +122,5 @@ static int accumulate(const area_plane *plane, const tl_area *target)
     const int fits = target->is_clamped ? accumulate_narrow(plane, target, 1) : accumulate_narrow(plane, target, 0);
     return fits && (seen[0] | seen[1] | seen[2] | seen[3]) >= 0;
 }
+
+#endif

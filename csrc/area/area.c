@@ -4,8 +4,21 @@
  * Triangles become edges, edges become differences in cells (ramp.c), and one pass over the rows sums these up
  * (accumulate.c): the cost goes with the edges, not with what they enclose.  Sums are integers, so order, threads and
  * vectors do not matter, and where a mesh tiles the plane they are 2^24 to the last bit. */
-#include "vertex/fixed.h"
+#ifndef TL_AREA_C
+#define TL_AREA_C
+
+#include <stdint.h>
+#include <string.h>
+
+#include "topleft.h"
 #include "lanes/lanes.h"
+#include "vertex/clip.c"
+#include "vertex/fixed.h"
+#include "raster/batch.c"
+#include "raster/raster.c"
+#include "raster/setup.c"
+#include "area/accumulate.c"
+#include "area/ramp.c"
 
 #define TL_MAX_EDGE_BITS 14 /* pixels of an edge in lanes: see the error bound of ramp.c */
 #define TL_SHORT_ROWS 8
@@ -230,3 +243,5 @@ static int64_t draw_area(const tl_scene *scene, const tl_window *window, const t
     const int fits = accumulate(&s.plane, target);
     return s.bad_row >= 0 ? s.bad_row : fits ? -1 : TL_AREA_OVERFLOW;
 }
+
+#endif

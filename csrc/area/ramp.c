@@ -14,8 +14,15 @@
  *
  * Based on: R. Levien, font-rs (signed area, accumulated along rows), 2015; D. Turner, FreeType's smooth rasterizer
  * (cells of area and cover), 2001. */
-#include "vertex/fixed.h"
+#ifndef TL_RAMP_C
+#define TL_RAMP_C
+
+#include <math.h>
+#include <stdint.h>
+
+#include "topleft.h"
 #include "lanes/lanes.h"
+#include "vertex/fixed.h"
 
 #define TL_AREA_BITS 24
 #define TL_CELL_PAD 16 /* cells before column 0: rows start on a cache line, and the last four take what lies left of it */
@@ -310,3 +317,5 @@ static void add_exact_edge(area_plane *plane, int64_t x0, int64_t y0, int64_t x1
         add_exact_row(plane, row - plane->y_px, whole - plane->x_px, low, high, steep, (double)(int64_t)(tb - ta) * height);
     }
 }
+
+#endif

@@ -4,7 +4,26 @@
  * Nothing is drawn out of order: one queue of triangles, whose setup and row ends are computed a vector of triangles at a time,
  * as in rows.c, and whose rows are then drawn triangle by triangle.  What 32-bit lanes cannot take empties the queue and is drawn
  * by itself.  Bands of rows see the same triangles in the same order, so threads cannot change a bit. */
+#ifndef TL_BLEND_C
+#define TL_BLEND_C
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "topleft.h"
+#include "lanes/lanes.h"
+#include "vertex/clip.c"
+#include "vertex/fixed.h"
+#include "vertex/snap.c"
+#include "raster/alone.c"
+#include "raster/batch.c"
+#include "raster/raster.c"
+#include "raster/rows.c"
+#include "raster/setup.c"
+#include "blend/blend_area.c"
+#include "blend/mix.c"
 #include "blend/mix.h"
+#include "blend/mix_u8.c"
 
 typedef struct {
     batch_state batch; /* its queue `rows` holds what waits */
@@ -250,3 +269,5 @@ static int64_t blend(const tl_scene *scene, const tl_window *window, const tl_ca
     }
     return -1;
 }
+
+#endif

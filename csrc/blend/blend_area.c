@@ -4,6 +4,22 @@
  * Small triangles take places below one another in an atlas of cells, moved there by whole pixels, which changes no bit: so edges
  * of many triangles fill the lanes of ramp.c.  Only then are the cells summed and the colours blended, triangle by triangle.
  * A triangle that is too large for that empties the atlas and is drawn by itself. */
+#ifndef TL_BLEND_AREA_C
+#define TL_BLEND_AREA_C
+
+#include <stdint.h>
+#include <string.h>
+
+#include "topleft.h"
+#include "lanes/lanes.h"
+#include "vertex/fixed.h"
+#include "vertex/snap.c"
+#include "raster/batch.c"
+#include "raster/raster.c"
+#include "area/area.c"
+#include "area/ramp.c"
+#include "blend/blend_strip.c"
+#include "blend/mix.c"
 #include "blend/mix.h"
 
 #define TL_ATLAS_COLS 16
@@ -158,3 +174,5 @@ static int64_t blend_areas(blend_state *b)
     flush_atlas(&p);
     return p.area.bad_row;
 }
+
+#endif

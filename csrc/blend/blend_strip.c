@@ -5,7 +5,24 @@
  * blends; between two edges lies a run as it is without areas.
  *
  * Based on: R. Levien, font-rs, 2015. */
+#ifndef TL_BLEND_STRIP_C
+#define TL_BLEND_STRIP_C
+
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+#include "topleft.h"
+#include "lanes/lanes.h"
+#include "vertex/clip.c"
+#include "vertex/fixed.h"
+#include "raster/setup.c"
+#include "area/area.c"
+#include "area/ramp.c"
+#include "blend/mix.c"
 #include "blend/mix.h"
+#include "blend/mix_f32.c"
+#include "blend/mix_u8.c"
 
 /* The pixels [col, col + TL_LANES) of a row that begins at `at`; of them those in m that the areas say. */
 TL_INLINE void mix_block(blend_state *b, int64_t at, vm m, vi sums, int is_u8, tl_mix mode)
@@ -234,3 +251,5 @@ static __attribute__((noinline)) void blend_area_alone(blend_state *b, int64_t i
     for (int64_t row = first_row; row < end_row; row += n_rows)
         blend_strip(b, t, n, row, (int)min64(n_rows, end_row - row));
 }
+
+#endif

@@ -2,7 +2,24 @@
  * In: a triangle, runs of samples that it covers.  Out: pixels of the canvas, by mix_u8.c or mix_f32.c.
  * Based on: T. Porter, T. Duff, Compositing Digital Images, 1984 (over, plus; alpha multiplied by coverage);
  * H. Gouraud, Continuous Shading of Curved Surfaces, 1971. */
+#ifndef TL_MIX_C
+#define TL_MIX_C
+
+#include <math.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "topleft.h"
+#include "lanes/lanes.h"
+#include "vertex/clip.c"
+#include "vertex/fixed.h"
+#include "raster/setup.c"
+#include "raster/sink.c"
+#include "pixels/paint.c"
+#include "pixels/weights_one.c"
 #include "blend/mix.h"
+#include "blend/mix_f32.c"
+#include "blend/mix_u8.c"
 
 /* Takes up triangle `id`.  Returns whether it changes anything where it shows. */
 TL_INLINE int begin_flat(blend_state *b, int64_t id)
@@ -169,3 +186,5 @@ static void mix_run(struct blend_state *b, int64_t at, int64_t n)
     }
     mix_runs(b, &(int32_t){(int32_t)at}, &(int32_t){(int32_t)n}, 1, 1);
 }
+
+#endif

@@ -6,8 +6,13 @@
 #ifndef TL_MIX_H
 #define TL_MIX_H
 
-#include "vertex/fixed.h"
+#include <stdint.h>
+
+#include "topleft.h"
 #include "lanes/lanes.h"
+#include "raster/sink.c"
+#include "area/ramp.c"
+#include "pixels/weights_one.c"
 
 /* STRAIGHT: the last channel is alpha, and the others are not multiplied by it.  The other modes treat all channels alike, but
  * for what OVER_PREMULTIPLIED reads in the last channel of the colour. */

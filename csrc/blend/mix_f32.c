@@ -3,6 +3,13 @@
  *
  * Every operation rounds once, in the order written: the same bits in every build.  A vector starts with the first channel of a
  * pixel unless there are three, and then nothing looks at a neighbour. */
+#ifndef TL_MIX_F32_C
+#define TL_MIX_F32_C
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "lanes/lanes.h"
 #include "blend/mix.h"
 
 /* The alpha of each lane's pixel: p is where `a` was loaded from, with channel i of a run in its first lane. */
@@ -120,3 +127,5 @@ TL_INLINE void mix_block_f32(blend_state *b, int64_t at, vm m, vi area, tl_mix m
             mix_lanes_f32(b, b->floats + at * n_channels, i, on, b->is_flat ? NULL : b->source_f32, coverage, mode);
     }
 }
+
+#endif

@@ -3,6 +3,12 @@
  *
  * All of it is integer arithmetic, or float arithmetic on integers that is exact or rounded once where that cannot change the
  * integer that comes out.  Of a quotient by 255 nothing lies nearer than 1/510 to the middle between two integers. */
+#ifndef TL_MIX_U8_C
+#define TL_MIX_U8_C
+
+#include <stdint.h>
+
+#include "lanes/lanes.h"
 #include "blend/mix.h"
 
 /* ---- a colour over the whole pixel --------------------------------------------------------------------------------- */
@@ -241,3 +247,5 @@ TL_INLINE int32_t packed_color(const uint8_t *color, int n_channels)
     pack_u8(color, 1, n_channels, &packed);
     return packed;
 }
+
+#endif

@@ -3,7 +3,16 @@
  *
  * Based on: G. M. Morton, A Computer Oriented Geodetic Data Base, 1966 (the order); S. Kumar, D. Manocha, B. Garrett, M. Lin,
  * Hierarchical Back-Face Computation, 1996 (cones of normals). */
-#include "vertex/fixed.h"
+#ifndef TL_CLUSTER_SORT_C
+#define TL_CLUSTER_SORT_C
+
+#include <float.h>
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+#include "clusters.h"
+#include "topleft.h"
 
 #define TL_CURVE_BITS 10 /* cells a side: 1024; a surface meets some millions of them */
 
@@ -189,3 +198,5 @@ static void measure_clusters(const tl_source *source, const uint8_t *corners, in
         }
     }
 }
+
+#endif

@@ -8,8 +8,18 @@
  *
  * Based on: U. Assarsson, T. Möller, Optimized View Frustum Culling Algorithms for Bounding Boxes, 2000;
  * N. Greene, M. Kass, G. Miller, Hierarchical Z-Buffer Visibility, 1993 (with one level: clusters are small in the picture). */
-#include "vertex/fixed.h"
+#ifndef TL_CLUSTER_VIEW_C
+#define TL_CLUSTER_VIEW_C
+
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+#include "clusters.h"
+#include "topleft.h"
 #include "lanes/lanes.h"
+#include "vertex/fixed.h"
+#include "vertex/project.c"
 
 /* Row i of the matrix over a box: its value at the centre, how far it goes from there, and a bound of its terms. */
 typedef struct {
@@ -367,3 +377,5 @@ static int64_t list_clusters(tl_cluster_pass *pass, const tl_window *window, con
     pass->n_seen = cull_clusters(pass->mesh, pass->seen, window, pass->may_be_hidden ? target : NULL, pass->list, pass->room);
     return pass->n_seen;
 }
+
+#endif

@@ -41,12 +41,8 @@
 #define TL_LANES_H
 
 #include <stdint.h>
-#include <string.h>
 
-#include "topleft.h"
-
-#define TL_INLINE static inline __attribute__((always_inline))
-#define TL_MAX_LANES 16
+#include "lanes/inline.h"
 
 #if defined(__AVX512F__) && defined(__AVX512DQ__) && defined(__AVX512BW__) && defined(__AVX512VL__)
 #include "lanes/lanes_avx512.h"

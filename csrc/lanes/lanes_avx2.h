@@ -1,5 +1,13 @@
 /* Eight lanes, masks as whole vectors of ones. */
+#ifndef TL_LANES_AVX2_H
+#define TL_LANES_AVX2_H
+
 #include <immintrin.h>
+#include <stdint.h>
+#include <string.h>
+
+#include "topleft.h"
+#include "lanes/inline.h"
 
 #define TL_LANES 8
 #define TL_HALF_LANES 0
@@ -422,3 +430,5 @@ TL_INLINE void vd_load_records(const double *base, int stride, const int32_t *i,
     for (int k = 0; k < 4; k++)
         c[k] = (vd){half[0][k], half[1][k]};
 }
+
+#endif

@@ -1,5 +1,13 @@
 /* Sixteen lanes, masks in mask registers. */
+#ifndef TL_LANES_AVX512_H
+#define TL_LANES_AVX512_H
+
 #include <immintrin.h>
+#include <stdint.h>
+#include <string.h>
+
+#include "topleft.h"
+#include "lanes/inline.h"
 
 #define TL_LANES 16
 #define TL_HALF_LANES 8
@@ -425,3 +433,5 @@ TL_INLINE void vd_load_records(const double *base, int stride, const int32_t *i,
     for (int k = 0; k < 4; k++)
         c[k] = (vd){half[0][k], half[1][k]};
 }
+
+#endif

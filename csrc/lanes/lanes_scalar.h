@@ -1,5 +1,13 @@
 /* One lane, plain C: the definition of what every other instruction set must give. */
+#ifndef TL_LANES_SCALAR_H
+#define TL_LANES_SCALAR_H
+
 #include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+#include "topleft.h"
+#include "lanes/inline.h"
 
 #define TL_LANES 1
 #define TL_HALF_LANES 0
@@ -230,3 +238,5 @@ TL_INLINE void vf_store_pairs(float *p, const vf *c) { p[0] = c[0], p[1] = c[1];
 TL_INLINE void vf_store_triples(float *p, const vf *c) { p[0] = c[0], p[1] = c[1], p[2] = c[2]; }
 /* Four doubles at base + 8 * stride * i[k], as columns. */
 TL_INLINE void vd_load_records(const double *base, int stride, const int32_t *i, vd *c) { memcpy(c, base + (int64_t)*i * stride, 32); }
+
+#endif

@@ -5,7 +5,16 @@
  *
  * A counting sort by the lower index, then a look at each vertex's own list: 2.9 ns an edge of a triangle of blob(100k),
  * where sorting all pairs takes twenty times as long, and a table of the edges seen last forgets half of them. */
-#include "vertex/fixed.h"
+#ifndef TL_EDGES_C
+#define TL_EDGES_C
+
+#include <stdint.h>
+#include <string.h>
+
+#include "topleft.h"
+#include "vertex/clip.c"
+#include "vertex/project.c"
+#include "raster/setup.c"
 
 /* Whether a triangle shows the side that is drawn: as draw_triangle, of the pieces where a plane cuts it. */
 static int shows_side(const tl_scene *scene, int64_t i)
@@ -169,3 +178,5 @@ static inline int shows_depth(const tl_line_target *target, int64_t at, float z)
     const double away = target->is_farthest ? -1.0 : 1.0;
     return away * (double)z <= away * (double)target->depth[at] + target->depth_bias;
 }
+
+#endif

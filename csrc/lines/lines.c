@@ -5,8 +5,17 @@
  * A line of d steps along its longer side and q <= d across is, at step k, floor((q k + floor(d / 2)) / d) pixels across:
  * a half step is taken.  The steps inside the window follow by floor divisions.  |x_px| < 2^62, so d < 2^63 and every
  * product of two of these is below 2^126; the remainder is below d and a step adds at most d, which fits 64 bits. */
-#include "vertex/fixed.h"
+#ifndef TL_LINES_C
+#define TL_LINES_C
+
+#include <stdint.h>
+#include <string.h>
+
+#include "topleft.h"
 #include "lanes/lanes.h"
+#include "vertex/fixed.h"
+#include "lines/edges.c"
+#include "lines/smooth_lines.c"
 
 #define TL_MAX_STEPS 63   /* longer lines are drawn by themselves: the lanes step together, and most lines of a mesh are short */
 
@@ -242,3 +251,5 @@ static void draw_lines(const tl_edges *lines, const tl_window *window, const tl_
             draw_all_lines(&s, 0);
     }
 }
+
+#endif

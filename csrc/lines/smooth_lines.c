@@ -6,8 +6,17 @@
  * u runs along the longer side of the line, v across, both from its first end in half sub-pixels.  The line is at most as
  * steep as a diagonal, so a centre nearer than 1 is in the line's pixel of its column or a neighbour of that across:
  * the next ones are at least 1.5 away across, and 1.5 / sqrt(2) > 1. */
-#include "vertex/fixed.h"
+#ifndef TL_SMOOTH_LINES_C
+#define TL_SMOOTH_LINES_C
+
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+#include "topleft.h"
 #include "lanes/lanes.h"
+#include "vertex/fixed.h"
+#include "lines/edges.c"
 
 typedef struct {
     const tl_edges *lines;
@@ -179,3 +188,5 @@ static void draw_smooth_lines(const tl_edges *lines, const tl_window *window, co
     else
         draw_all_smooth(&s, 0);
 }
+
+#endif

@@ -6,8 +6,13 @@
  *
  * Based on: N. Roussopoulos, S. Kelley, F. Vincent, Nearest Neighbor Queries, 1995 (boxes in the order of their distance);
  * C. Ericson, Real-Time Collision Detection, 2005 (the point of a segment nearest to a point). */
-#include <math.h>
+#ifndef TL_NEAREST_C
+#define TL_NEAREST_C
 
+#include <math.h>
+#include <stdint.h>
+
+#include "nearest.h"
 #include "lanes/lanes.h"
 
 /* Where a point is nearest to the surface. */
@@ -222,3 +227,5 @@ static double nearest_of_points(const tl_surface *s, const double *points, int64
     }
     return sqrt(largest);
 }
+
+#endif

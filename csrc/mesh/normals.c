@@ -9,7 +9,15 @@
  *
  * Based on: G. Thurmer and C. A. Wuthrich, Computing Vertex Normals from Polygonal Facets, Journal of Graphics Tools 3(1), 1998;
  * W. Kahan, Miscalculating Area and Angles of a Needle-like Triangle, 2014. */
-#include "vertex/fixed.h"
+#ifndef TL_NORMALS_C
+#define TL_NORMALS_C
+
+#include <float.h>
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+#include "topleft.h"
 #include "lanes/lanes.h"
 
 /* The powers of two, 2^-1 to 2^1022, that take numbers up to 2^1022 to [1/2, 1): products with them are exact but for what is lost
@@ -348,3 +356,5 @@ static int64_t box_of_faces(const tl_source *source, const int32_t *triangles, i
     }
     return -1;
 }
+
+#endif

@@ -11,9 +11,15 @@
  * Based on: M. Tang, M. Lee, Y. J. Kim, Interactive Hausdorff Distance Computation for General Polygonal Models, 2009; M. Guthe,
  * P. Borodin, R. Klein, Fast and Accurate Hausdorff Distance Calculation between Meshes, 2005 (branch and bound, and that the
  * distance is convex). */
-#include <math.h>
+#ifndef TL_REACH_C
+#define TL_REACH_C
 
+#include <math.h>
+#include <stdint.h>
+
+#include "nearest.h"
 #include "lanes/lanes.h"
+#include "mesh/nearest.c"
 
 enum {
     TL_PIECE_CORNERS = 12,
@@ -270,3 +276,5 @@ static void find_reach(const tl_surface *s, const double *points, const int32_t 
         reach->known = r.known > reach->known ? r.known : reach->known;
     }
 }
+
+#endif

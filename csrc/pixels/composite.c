@@ -5,7 +5,13 @@
  * The colour is the mean of the colours by w, the alpha their sum.  All in float64, the operations in this order, rounded once.
  *
  * Based on: T. Porter, T. Duff, Compositing Digital Images, 1984 ("over"). */
-#include "vertex/fixed.h"
+#ifndef TL_COMPOSITE_C
+#define TL_COMPOSITE_C
+
+#include <math.h>
+#include <stdint.h>
+
+#include "topleft.h"
 #include "lanes/lanes.h"
 
 /* The layer with its colour at `color`, of which one step is 1 / one. */
@@ -53,3 +59,5 @@ static void composite(const tl_composite *p, int64_t n, void *pixels)
         }
     }
 }
+
+#endif

@@ -1,10 +1,19 @@
 /* Paint: colours from labels, once per visible sample.
  * In: the label of each sample and the colours of triangles or vertices.  Out: colours; samples with label -1 are kept.
  * Based on: H. Gouraud, Continuous Shading of Curved Surfaces, 1971. */
+#ifndef TL_PAINT_C
+#define TL_PAINT_C
+
+#include <math.h>
+#include <stdint.h>
 #include <string.h>
 
-#include "vertex/fixed.h"
+#include "topleft.h"
 #include "lanes/lanes.h"
+#include "vertex/fixed.h"
+#include "raster/setup.c"
+#include "raster/sink.c"
+#include "pixels/weights_one.c"
 
 /* The first samples of paint_flat whose colours have four bytes, a vector at a time; returns how many. */
 TL_INLINE int64_t paint_words(const int32_t *labels, int64_t n, const uint8_t *colors, uint8_t *restrict out)
@@ -161,3 +170,5 @@ static void paint_gouraud(const tl_scene *scene, const tl_window *window, const 
         }
     }
 }
+
+#endif

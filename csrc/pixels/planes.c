@@ -3,9 +3,14 @@
  *
  * A triangle owns pixels by its snapped vertices, so a centre may lie a fraction of a sub-pixel outside of the exact triangle: the
  * value is kept within the three of the triangle. */
-#include <math.h>
+#ifndef TL_PLANES_C
+#define TL_PLANES_C
 
-#include "vertex/fixed.h"
+#include <math.h>
+#include <stdint.h>
+
+#include "topleft.h"
+#include "lanes/lanes.h"
 
 /* The plane of one triangle: TL_PLANE_DOUBLES, a cache line. */
 typedef struct {
@@ -125,3 +130,5 @@ static void fill_planes(const tl_valued *mesh, const tl_window *window, const in
         }
     }
 }
+
+#endif

@@ -3,8 +3,18 @@
  *
  * A point has the weights of its pixel in its triangle, relative to the first corner: it lies on the triangle.  A number that depends
  * linearly on the point is computed at the corners, and interpolated.  All is float64, rounded once at the end. */
-#include "vertex/fixed.h"
+#ifndef TL_POINTS_C
+#define TL_POINTS_C
+
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+#include "topleft.h"
 #include "lanes/lanes.h"
+#include "vertex/fixed.h"
+#include "pixels/runs.c"
+#include "pixels/weights.c"
 
 typedef struct {
     weighed_span weighed;
@@ -153,3 +163,5 @@ static void fill_points(const tl_scene *scene, const tl_window *window, const tl
             }
         }
 }
+
+#endif

@@ -7,8 +7,15 @@
  * Straight alpha that differs between the samples: colours are weighted by it.
  *
  * Based on: T. Porter, T. Duff, Compositing Digital Images, 1984 (sums are of premultiplied colours). */
-#include "vertex/fixed.h"
+#ifndef TL_RESOLVE_C
+#define TL_RESOLVE_C
+
+#include <stdint.h>
+#include <string.h>
+
+#include "topleft.h"
 #include "lanes/lanes.h"
+#include "raster/covered.c"
 
 TL_INLINE uint8_t mean_u8(const uint8_t *values, int sample_bits, const tl_transfer *transfer)
 {
@@ -230,3 +237,5 @@ static void set_flat_depth(int32_t *restrict ids, int64_t n, int32_t flip, float
         ids[k] = id < 0 ? id : id ^ flip;
     }
 }
+
+#endif

@@ -7,8 +7,18 @@
  *
  * Based on: C. A. Burns and W. A. Hunt, The Visibility Buffer, 2013; J. F. Blinn, Hyperbolic Interpolation, 1992;
  * M. Olano and T. Greer, Triangle Scan Conversion using 2D Homogeneous Coordinates, 1997 (triangles cut by a clip plane). */
-#include "vertex/fixed.h"
+#ifndef TL_RUNS_C
+#define TL_RUNS_C
+
+#include <math.h>
+#include <stdint.h>
+
+#include "shading.h"
+#include "topleft.h"
 #include "lanes/lanes.h"
+#include "vertex/clip.c"
+#include "vertex/project.c"
+#include "raster/setup.c"
 
 #define TL_SPAN 512 /* pixels of a row that are shaded together */
 #define TL_SPAN_ROOM (TL_SPAN + 2 * TL_MAX_LANES)
@@ -373,3 +383,5 @@ TL_INLINE void find_lanes(shaded_lanes *p, const shade_runs *s, int i, int64_t c
     *sum = pick_int(p, RUN_SUM);
     e[0] = vi_sub(vi_sub(*sum, e[1]), e[2]);
 }
+
+#endif

@@ -4,8 +4,20 @@
  * The bits are those of weights_of_pixel: edge functions are integers below 2^53, so float64 has them exactly, and every operation
  * after that is the same.  What does not fit is left to weights_of_pixel itself, pixel by pixel: triangles that a clip plane cuts,
  * coordinates beyond 2^30, boxes beyond 2^52, and 1/w that vd_quotients might not take. */
-#include "vertex/fixed.h"
+#ifndef TL_WEIGHTS_C
+#define TL_WEIGHTS_C
+
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+#include "topleft.h"
 #include "lanes/lanes.h"
+#include "vertex/fixed.h"
+#include "vertex/project.c"
+#include "raster/setup.c"
+#include "pixels/runs.c"
+#include "pixels/weights_one.c"
 
 #define TL_ALONE -1 /* RUN_SPECIAL of a run that is left to weights_of_pixel */
 #define TL_FLOAT64_BOX 0x1p52
@@ -339,3 +351,5 @@ static void inverse_ws(const tl_source *source, int64_t first, int64_t end, doub
         out[i] = 1.0 / p[3];
     }
 }
+
+#endif

@@ -1,6 +1,16 @@
 /* The weights of one pixel, of any triangle whatever.  weights.c has the same a vector of pixels at a time.
  * In: a triangle's id and the vertex records it was drawn from.  Out: barycentric weights, float64. */
+#ifndef TL_WEIGHTS_ONE_C
+#define TL_WEIGHTS_ONE_C
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "topleft.h"
+#include "vertex/clip.c"
 #include "vertex/fixed.h"
+#include "vertex/project.c"
+#include "raster/setup.c"
 
 /* The triangle (or piece) under the last pixel: neighbours mostly share it. */
 typedef struct {
@@ -99,3 +109,5 @@ static void weights_of_pixel(const resolve_state *s, int64_t x_px, int64_t y_px,
             weights[s->slot[k]] = part[k] / sum;
     }
 }
+
+#endif

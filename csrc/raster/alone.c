@@ -1,23 +1,28 @@
 /* Alone: one triangle by itself, of any size, range and method, through setup and a walker to the sink.
  * In: vertex records, the pieces of cut triangles.  Out: samples to the sink. */
-#include "vertex/fixed.h"
+#ifndef TL_ALONE_C
+#define TL_ALONE_C
+
+#include <math.h>
+#include <stdint.h>
+
+#include "topleft.h"
 #include "lanes/lanes.h"
+#include "vertex/clip.c"
+#include "vertex/fixed.h"
+#include "raster/census.c"
+#include "raster/setup.c"
+#include "raster/sink.c"
 
 #define TL_INT int64_t
 #define TL_UINT uint64_t
 #define TL_WALK(name) name##_64
 #include "raster/walk.h"
-#undef TL_INT
-#undef TL_UINT
-#undef TL_WALK
 
 #define TL_INT tl_int128
 #define TL_UINT tl_uint128
 #define TL_WALK(name) name##_128
 #include "raster/walk.h"
-#undef TL_INT
-#undef TL_UINT
-#undef TL_WALK
 
 /* One triangle of any size, by the ends of TL_LANES rows at a time in float64: as above, exact while |2E| < 2^51, for then
  * |v / d| * 2^-52 < 0.5 / d. */
@@ -230,3 +235,5 @@ TL_INLINE void draw_alone(const tl_scene *scene, int64_t i, const tl_window *win
 
 TL_SINK_COPIES(draw_alone, (const tl_scene *scene, int64_t i, const tl_window *window, const tl_target *target), scene, i, window,
                target)
+
+#endif

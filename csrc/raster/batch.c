@@ -5,8 +5,19 @@
  * Range: extents of at most TL_MAX_EXTENT units, so |dx|, |dy| < 2^14, doubled relative coordinates fit 16 bits, products
  * 2^30, and doubled edge functions 2^29 (see fixed.h).  Squares and several samples: two pixels less and at most 8 bits, so that all this holds of
  * corners of pixels up to a pixel outside the extent, but that doubled edge functions are below 2^30. */
-#include "vertex/fixed.h"
+#ifndef TL_BATCH_C
+#define TL_BATCH_C
+
+#include <stdint.h>
+#include <string.h>
+
+#include "topleft.h"
 #include "lanes/lanes.h"
+#include "raster/alone.c"
+#include "raster/fragments.h"
+#include "raster/hooks.h"
+#include "raster/setup.c"
+#include "raster/sink.c"
 
 #define TL_SMALL_BOX 4
 #define TL_MIDDLE_BOX 16
@@ -310,3 +321,5 @@ TL_INLINE void flush_small(batch_state *s, tl_sink sink)
 }
 
 TL_SINK_COPIES(flush_small, (batch_state *s), s)
+
+#endif

@@ -3,8 +3,19 @@
  *
  * A triangle is listed when a point within reach_fx of its extent, in x and in y, is a centre in the window: more than its samples
  * cover.  Bands are 2^band_bits rows tall. */
-#include "vertex/fixed.h"
+#ifndef TL_BIN_C
+#define TL_BIN_C
+
+#include <stdint.h>
+#include <string.h>
+
+#include "topleft.h"
 #include "lanes/lanes.h"
+#include "vertex/clip.c"
+#include "vertex/fixed.h"
+#include "raster/batch.c"
+#include "raster/raster.c"
+#include "raster/setup.c"
 
 typedef struct {
     const tl_scene *scene;
@@ -127,3 +138,5 @@ static void list_bins(const tl_bins *bins, int64_t n_bands, int64_t *starts, int
         for (int32_t k = bins->first_band[i]; k <= bins->last_band[i]; k++)
             listed[starts[k + 1]++] = bins->ids[i];
 }
+
+#endif

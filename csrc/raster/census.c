@@ -1,7 +1,14 @@
 /* Census: how many triangles each part of the drawing code would take, counted where it decides.
  * In: what raster.c and alone.c know of triangles.  Out: tl_census. */
-#include "vertex/fixed.h"
+#ifndef TL_CENSUS_C
+#define TL_CENSUS_C
+
+#include <stdint.h>
+
+#include "topleft.h"
 #include "lanes/lanes.h"
+#include "vertex/fixed.h"
+#include "raster/setup.c"
 
 /* The sink that triangles are drawn, or counted, for. */
 TL_INLINE tl_sink sink_of(const tl_target *target, tl_sink sink) { return sink == TL_SINK_CENSUS ? target->census->sink : sink; }
@@ -58,3 +65,5 @@ static inline void count_one(tl_census *census, tl_class walker, const tl_triang
     const double area_px = (double)weight_sum(t) * 0.25 / (double)((int64_t)1 << 2 * bits);
     count_box(census, walker, (double)(t->col1 - t->col0) * (double)(t->row1 - t->row0), area_px);
 }
+
+#endif

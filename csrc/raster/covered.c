@@ -4,7 +4,13 @@
  * An eighth of the memory stays in a nearer cache while triangles are drawn over one another, and the bytes are written once
  * instead of being cleared first.  Bits lie in the order of the pixels, row * stride_px + column, those of a pixel side by side in
  * the order of its samples: bit (pixel << sample_bits) + sample. */
-#include "vertex/fixed.h"
+#ifndef TL_COVERED_C
+#define TL_COVERED_C
+
+#include <stdint.h>
+#include <string.h>
+
+#include "topleft.h"
 #include "lanes/lanes.h"
 
 #define TL_MAX_SAMPLES 16
@@ -148,3 +154,5 @@ static void share_samples(const tl_window *window, const tl_target *target)
     default: share_span(target, 0, n, 4); break;
     }
 }
+
+#endif

@@ -7,8 +7,16 @@
  *
  * Based on: C. Everitt, Interactive Order-Independent Transparency, 2001 (depth peeling); L. Carpenter, The A-buffer, 1984 (the
  * fragments of a pixel in a list). */
-#include "vertex/fixed.h"
+#ifndef TL_PEEL_C
+#define TL_PEEL_C
+
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+#include "topleft.h"
 #include "lanes/lanes.h"
+#include "raster/fragments.h"
 
 static void clear_layers(const tl_window *window, const tl_target *target)
 {
@@ -71,3 +79,5 @@ static void peel_fragments(const tl_peeled *p, const fragment_list *f, int n)
         }
     }
 }
+
+#endif

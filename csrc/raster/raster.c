@@ -1,15 +1,28 @@
 /* Raster: every triangle of a scene, a vector of them at a time, through setup and cull to the code for its size.
  * In: vertex records and triangles.  Out: the target's buffers. */
-#include "vertex/fixed.h"
-#include "lanes/lanes.h"
+#ifndef TL_RASTER_C
+#define TL_RASTER_C
 
-#include "raster/census.c"
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+#include "clusters.h"
+#include "topleft.h"
+#include "lanes/lanes.h"
+#include "vertex/fixed.h"
+#include "vertex/snap.c"
+#include "clusters/cluster_view.c"
 #include "raster/alone.c"
 #include "raster/batch.c"
+#include "raster/census.c"
+#include "raster/covered.c"
+#include "raster/peel.c"
 #include "raster/rows.c"
 #include "raster/sampled.c"
 #include "raster/sampled_alone.c"
-#include "clusters/cluster_view.c"
+#include "raster/setup.c"
+#include "raster/sink.c"
 
 /* Whether the 3 * TL_LANES indices of a vector of triangles hold one outside [0, last_vertex]. */
 TL_INLINE int has_bad_index(const int32_t *corners, vi last_vertex)
@@ -292,3 +305,5 @@ static int64_t draw(const tl_scene *scene, const tl_window *window, const tl_tar
     }
     return -1;
 }
+
+#endif

@@ -5,8 +5,18 @@
  * floor((v + 0.5) * (1 / d)), exactly: v + 0.5 has at most 22 bits; with |v / d| < 64 the two roundings err by less than
  * 64 * 2^-22 = 2^-16, while (v + 0.5) / d is at least 0.5 / d > 2^-15 from an integer.  Farther out the clamp to the box
  * swallows the error.  Squares (batch.c): 60 pixels of 2^8 make |v| < 2^22, which float32 still holds exactly, half included. */
-#include "vertex/fixed.h"
+#ifndef TL_ROWS_C
+#define TL_ROWS_C
+
+#include <stdint.h>
+
+#include "topleft.h"
 #include "lanes/lanes.h"
+#include "raster/alone.c"
+#include "raster/batch.c"
+#include "raster/covered.c"
+#include "raster/hooks.h"
+#include "raster/sink.c"
 
 /* Which edge of TL_LANES triangles is the first on the left, the first on the right, and the third one, which is on either side or
  * horizontal: edge 0 or 1 by is0 and is1 of that place, else edge 2. */
@@ -262,3 +272,5 @@ TL_INLINE void flush_rows(batch_state *s, tl_sink sink)
 }
 
 TL_SINK_COPIES(flush_rows, (batch_state *s), s)
+
+#endif

@@ -4,8 +4,17 @@
  * A sample moves an edge function by 2 (dx * y - dy * x), from the centre, and nothing else: load, cull, setup and queues are
  * shared.  Ranges are those of squares (batch.c).  A box is up to a pixel too large, so where row ends decide, a horizontal edge
  * is tested. */
-#include "vertex/fixed.h"
+#ifndef TL_SAMPLED_C
+#define TL_SAMPLED_C
+
+#include <stdint.h>
+
+#include "topleft.h"
 #include "lanes/lanes.h"
+#include "raster/batch.c"
+#include "raster/covered.c"
+#include "raster/hooks.h"
+#include "raster/rows.c"
 
 #define TL_MAX_WORDS (TL_MIDDLE_BOX * TL_MAX_SAMPLES / 64) /* of a row of a middle box */
 
@@ -243,3 +252,5 @@ static int32_t sample_reach(const tl_target *target)
     }
     return reach;
 }
+
+#endif

@@ -4,8 +4,18 @@
  * The rows of a large triangle are the same for all samples but for their ends: the pixels between these are stored as whole
  * words, and two words at each end are put together from the spans of the samples, a vector of rows at a time.  Rows whose ends
  * are more than two words wide, or that some samples miss, are put together word by word. */
-#include "vertex/fixed.h"
+#ifndef TL_SAMPLED_ALONE_C
+#define TL_SAMPLED_ALONE_C
+
+#include <stdint.h>
+
+#include "topleft.h"
 #include "lanes/lanes.h"
+#include "vertex/clip.c"
+#include "vertex/fixed.h"
+#include "raster/alone.c"
+#include "raster/covered.c"
+#include "raster/setup.c"
 
 /* Marks the spans of all samples in a row, in the words that hold the pixels [from, to); `at` is the pixel of column 0. */
 TL_INLINE void cover_ends(const tl_target *target, int64_t at, int64_t from, int64_t to, const int32_t *first, const int32_t *end)
@@ -201,3 +211,5 @@ static __attribute__((noinline)) void draw_alone_each_sample(const tl_scene *sce
         draw_alone_samples(&seen, i, window, &one);
     }
 }
+
+#endif

@@ -1,6 +1,12 @@
 /* Triangle setup: the three corners in a fixed turn, the box of samples they can cover, the weights of a sample.
  * In: a triangle of vertex records.  Out: tl_triangle, or nothing when it is culled, degenerate or outside.
  * Based on: J. Pineda, A Parallel Algorithm for Polygon Rasterization, 1988. */
+#ifndef TL_SETUP_C
+#define TL_SETUP_C
+
+#include <stdint.h>
+
+#include "topleft.h"
 #include "vertex/fixed.h"
 
 /* A triangle with positive area (y down) and its samples inside the window. */
@@ -162,3 +168,5 @@ static inline void weights_at(const tl_triangle *t, const tl_window *window, int
         w2[k] = (double)doubled_edge(t, 0, 1, col + k + window->x_px, row + window->y_px, window->subpixel_bits);
     }
 }
+
+#endif

@@ -2,11 +2,19 @@
  * In: lanes, spans or lists of samples.  Out: mask, counts, bits of samples, or ids with depth.
  * Every sink gives the same picture in whatever order triangles come: ids decide ties.  `sink` is always a constant, so that
  * each copy of the code keeps one case. */
-#include "vertex/fixed.h"
+#ifndef TL_SINK_C
+#define TL_SINK_C
+
+#include <stdint.h>
+
+#include "topleft.h"
 #include "lanes/lanes.h"
+#include "vertex/fixed.h"
+#include "raster/covered.c"
 #include "raster/fragments.h"
 #include "raster/hooks.h"
 #include "raster/peel.c"
+#include "raster/setup.c"
 
 /* Samples interpolated by weights at a time. */
 #define TL_CHUNK 64
@@ -220,3 +228,5 @@ TL_INLINE void flush_fragments(const tl_target *target, tl_sink sink, const frag
         }
     }
 }
+
+#endif

@@ -1,4 +1,4 @@
-/* The two walkers, written once and compiled for 64-bit and 128-bit integers: alone.c includes this file twice.
+/* The two walkers, written once and compiled for 64-bit and 128-bit integers: alone.c includes this file twice.  (No guard, therefore.)
  * In: a set-up triangle.  Out: the covered span of each row.  TL_INT is the integer, TL_WALK(name) names its copy.
  *
  * Both walk E' = (2E + bias) >> (bits + 1), bias -1 on edges that are neither top nor left.  2E changes by multiples of
@@ -6,6 +6,18 @@
  * and dx a row.  Squares are tested at one corner an edge: the square meets the triangle only where the corner that lies
  * farthest inside does not lie on the edge or outside, and is held by it only where the one farthest outside does.  No more
  * is needed: with the box, these are all the axes that can separate the two. */
+#include <stdint.h>
+
+#include "topleft.h"
+#include "lanes/lanes.h"
+#include "raster/setup.c"
+#include "raster/sink.c"
+
+#ifndef TL_WALK /* read by itself, as an editor does */
+#define TL_INT int64_t
+#define TL_UINT uint64_t
+#define TL_WALK(name) name##_64
+#endif
 
 typedef struct {
     TL_INT value[3]; /* E' at the first sample of the box, >= 0 inside */
@@ -96,3 +108,7 @@ TL_INLINE void TL_WALK(walk_scanline)(const tl_triangle *t, const tl_window *win
             put_span(t, window, target, sink, row, t->col0 + (int64_t)first, t->col0 + (int64_t)end);
     }
 }
+
+#undef TL_INT
+#undef TL_UINT
+#undef TL_WALK

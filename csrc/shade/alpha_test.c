@@ -1,10 +1,25 @@
-/* Cut-out: triangles with holes in their texture, drawn over a visibility buffer or over layers; samples with too little opacity are
+/* Alpha test: triangles with holes in their texture, drawn over a visibility buffer or over layers; samples with too little opacity are
  * left out, so that what is behind them stays.
  * In: the buffer of all other triangles, a list of triangles.  Out: the buffer, the nearest of what is left in every pixel.
  *
  * A triangle is drawn by itself into a tile, then tested pixel by pixel: the order of the list does not matter. */
-#include "vertex/fixed.h"
+#ifndef TL_ALPHA_TEST_C
+#define TL_ALPHA_TEST_C
+
+#include <stdint.h>
+
+#include "shading.h"
+#include "topleft.h"
 #include "lanes/lanes.h"
+#include "vertex/clip.c"
+#include "vertex/fixed.h"
+#include "raster/peel.c"
+#include "raster/raster.c"
+#include "raster/setup.c"
+#include "pixels/runs.c"
+#include "shade/shade.c"
+#include "shade/shade_pixels.c"
+#include "shade/texture.c"
 
 #define TL_CUTOUT_TILE 64
 
@@ -118,3 +133,5 @@ static void cut_out(const tl_scene *scene, const tl_window *window, const tl_vie
     for (int64_t k = 0; k < n; k++)
         cut_triangle(&c, &s, window, triangles[k]);
 }
+
+#endif

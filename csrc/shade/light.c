@@ -2,8 +2,12 @@
  * In: a unit normal, where the surface is and from where it is seen.  Out: diffuse light and highlights, linear.
  * Based on: J. H. Lambert, Photometria, 1760; J. F. Blinn, Models of Light Reflection for Computer Synthesized Pictures, 1977;
  * J. Mitchell, G. McTaggart and C. Green, Shading in Valve's Source Engine, 2006 (the wrapped fall-off, there with the power 2). */
-#include "lanes/lanes.h"
+#ifndef TL_LIGHT_C
+#define TL_LIGHT_C
+
 #include "shading.h"
+#include "lanes/lanes.h"
+#include "shade/texture.c"
 
 typedef struct {
     vf normal[3];  /* unit, towards the viewer */
@@ -83,3 +87,5 @@ TL_INLINE void add_lights(const lit_surface *s, const tl_shading *shading, float
     for (int k = 0; k < shading->n_lights; k++)
         add_light(s, &shading->lights[k], shininess, diffuse, specular);
 }
+
+#endif

@@ -1,8 +1,22 @@
 /* Shades a visibility buffer: a picture in light, from light to sRGB; or the normals that shading has, as numbers.
  * In: ids, the scene they were drawn from, materials and lights.  Out: red, green, blue and opacity, uint8; or unit vectors, float32,
  * on the side that is seen, 0 where nothing is. */
-#include "vertex/fixed.h"
+#ifndef TL_SHADE_C
+#define TL_SHADE_C
+
+#include <stdint.h>
+#include <string.h>
+
+#include "shading.h"
+#include "topleft.h"
 #include "lanes/lanes.h"
+#include "vertex/fixed.h"
+#include "vertex/project.c"
+#include "pixels/runs.c"
+#include "pixels/weights.c"
+#include "shade/light.c"
+#include "shade/shade_pixels.c"
+#include "shade/srgb.c"
 
 static void start_runs(shade_runs *s, const tl_scene *scene, const tl_window *window, const tl_view *view, const tl_shading *shading)
 {
@@ -112,3 +126,5 @@ static void shade_normals(const tl_scene *scene, const tl_window *window, const 
             }
         }
 }
+
+#endif

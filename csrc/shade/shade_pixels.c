@@ -1,7 +1,17 @@
 /* Pixels: the light of a vector of pixels, from the runs they belong to.
  * In: runs with their coefficients.  Out: linear red, green and blue (or values of 0 to 255 that tell a normal). */
-#include "vertex/fixed.h"
+#ifndef TL_SHADE_PIXELS_C
+#define TL_SHADE_PIXELS_C
+
+#include <math.h>
+#include <stdint.h>
+
+#include "shading.h"
+#include "topleft.h"
 #include "lanes/lanes.h"
+#include "pixels/runs.c"
+#include "shade/light.c"
+#include "shade/texture.c"
 
 /* Edge functions of the lanes whose runs are special, run by run. */
 static void set_special_edges(shaded_lanes *p)
@@ -251,3 +261,5 @@ TL_INLINE void shade_pixels(shaded_lanes *p, int64_t row, const float *depth, vf
     if (shading->fog_scale != 0.0f)
         fade(p, depth, rgb);
 }
+
+#endif

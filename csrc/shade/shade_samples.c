@@ -1,8 +1,20 @@
 /* Shaded samples: a visibility buffer with several samples a pixel to a picture.  A triangle is shaded once in each pixel that it
  * shows in, at the first of the samples that see it; what the pixel shows is the mean of the light at its samples.
  * In: planes of ids, the scene.  Out: red, green, blue and opacity, uint8. */
-#include "vertex/fixed.h"
+#ifndef TL_SHADE_SAMPLES_C
+#define TL_SHADE_SAMPLES_C
+
+#include <stdint.h>
+#include <string.h>
+
+#include "shading.h"
+#include "topleft.h"
 #include "lanes/lanes.h"
+#include "vertex/fixed.h"
+#include "pixels/runs.c"
+#include "shade/shade.c"
+#include "shade/shade_pixels.c"
+#include "shade/srgb.c"
 
 /* The light of a span of pixels, added up, and how many samples it comes from. */
 typedef struct {
@@ -97,3 +109,5 @@ static void shade_samples(const tl_scene *scene, const tl_window *window, const 
                 vi_store_masked((int32_t *)pixels + at + x, vm_first(n - x), finish_lanes(&sums, shading, sample_bits, x));
         }
 }
+
+#endif

@@ -8,8 +8,14 @@
  * The curve of sRGB is a power: that of a product is the product of the powers.  So under grey light one root is taken for three
  * channels, of the light as it is, where encode_srgb takes one of each channel's, rounded to a step.
  * Based on: IEC 61966-2-1, 1999. */
-#include "lanes/lanes.h"
+#ifndef TL_SRGB_C
+#define TL_SRGB_C
+
 #include "shading.h"
+#include "lanes/lanes.h"
+#include "pixels/runs.c"
+#include "shade/light.c"
+#include "shade/shade_pixels.c"
 
 #define TL_LIGHT_STEPS 65536.0f
 #define SRGB_SLOPE (12.92f * 255.0f) /* of the line that dark light follows */
@@ -115,3 +121,5 @@ TL_INLINE vi grey_word(shaded_lanes *p)
     }
     return to_word(byte[0], byte[1], byte[2], vi_set1(255));
 }
+
+#endif

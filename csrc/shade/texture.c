@@ -2,8 +2,13 @@
  * In: coordinates and how fast they change from pixel to pixel.  Out: red, green, blue and opacity, 0 to 1.
  * Based on: L. Williams, Pyramidal Parametrics, 1983 (mipmaps); P. Heckbert, Fundamentals of Texture Mapping and Image Warping, 1989
  * (the footprint of a pixel from derivatives). */
-#include "lanes/lanes.h"
+#ifndef TL_TEXTURE_C
+#define TL_TEXTURE_C
+
+#include <stdint.h>
+
 #include "shading.h"
+#include "lanes/lanes.h"
 
 /* log2 of positive numbers, within 2^-22 of it, or of the distance to 1 near 1; of 0: -127. */
 TL_INLINE vf vf_log2(vf a)
@@ -156,3 +161,5 @@ TL_INLINE void sample_texture(const tl_texture *t, vf u, vf v, const vf *du, con
     for (int c = 0; c < n_channels; c++)
         rgba[c] = vf_mul(rgba[c], scale);
 }
+
+#endif

@@ -1,9 +1,15 @@
 /* Clip: the triangles that a clip plane cuts.
  * In: homogeneous vertices.  Out: the pieces that are left, snapped.
  * Based on: I. E. Sutherland, G. W. Hodgman, Reentrant Polygon Clipping, 1974. */
+#ifndef TL_CLIP_C
+#define TL_CLIP_C
+
+#include <stdint.h>
 #include <string.h>
 
+#include "topleft.h"
 #include "vertex/fixed.h"
+#include "vertex/project.c"
 
 #define TL_MAX_CORNERS (3 + TL_N_PLANES)
 #define TL_MAX_PIECES (TL_MAX_CORNERS - 2) /* of one triangle */
@@ -219,3 +225,5 @@ static int64_t first_piece(const tl_pieces *p, int64_t id)
     }
     return low;
 }
+
+#endif

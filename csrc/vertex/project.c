@@ -1,7 +1,17 @@
 /* Project: object space to clip space to snapped vertices, those outside a clip plane marked.
  * In: the caller's vertices, a matrix.  Out: vertex records. */
-#include "vertex/fixed.h"
+#ifndef TL_PROJECT_C
+#define TL_PROJECT_C
+
+#include <float.h>
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+#include "topleft.h"
 #include "lanes/lanes.h"
+#include "vertex/fixed.h"
+#include "vertex/snap.c"
 
 /* w, near, far, -x, +x, -y, +y: the order in which a polygon meets the planes */
 #define TL_N_PLANES 7
@@ -189,3 +199,5 @@ static tl_vertex_counts project(const tl_source *source, int64_t first, int64_t 
         project_one(source, i, view, out, wide, &counts);
     return counts;
 }
+
+#endif

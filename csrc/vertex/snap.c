@@ -1,6 +1,14 @@
 /* Snap: pixel coordinates to fixed point, once, ties to even.  In: vertices in pixels.  Out: vertex records. */
-#include "vertex/fixed.h"
+#ifndef TL_SNAP_C
+#define TL_SNAP_C
+
+#include <float.h>
+#include <math.h>
+#include <stdint.h>
+
+#include "topleft.h"
 #include "lanes/lanes.h"
+#include "vertex/fixed.h"
 
 /* float32 widens to float64 without loss, and a power of two scales without loss: rint is the only rounding. */
 static void snap_float(const tl_source *source, int64_t i, double scale, int with_depth, tl_vertex *out, tl_wide *wide,
@@ -122,3 +130,5 @@ static int64_t first_bad(const tl_vertex *vertices, const int32_t *triangles, in
     }
     return first;
 }
+
+#endif
