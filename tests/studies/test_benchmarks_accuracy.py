@@ -25,7 +25,7 @@ ROOT = Path(__file__).parents[2]
 SIZE = (12, 11)
 METHODS = ["auto", "row_crossing/cull-front", "float_barycentric"]
 RECORD = ROOT / "benchmarks/accuracy.json"
-PAGES = [ROOT / "docs/accuracy.md", ROOT / "docs/speed.md"]
+PAGES = [ROOT / "docs/measured/accuracy.md", ROOT / "docs/measured/speed.md"]
 CHARTS = [f"accuracy-{name}" for name in ("coverage", "antialiasing", "depth")]
 CHARTS += [f"speed-{name}" for name in ("sizes", "scaling", "tutorial")]
 

@@ -20,7 +20,7 @@ from topleft.methods import CLASSICS, reference
 
 ROOT = Path(__file__).parents[2]
 RECORD = ROOT / "benchmarks/atlas.json"
-PAGE = ROOT / "docs/atlas.md"
+PAGE = ROOT / "docs/measured/atlas.md"
 SIZE = (12, 11)
 EVERY_FAMILY = pytest.mark.parametrize("name", [name for name in FAMILIES if name != "dense"])
 

@@ -18,7 +18,7 @@ from benchmarks.choices_ways import CHOICES, Way
 from topleft._raster import choices
 
 ROOT = Path(__file__).parents[2]
-RECORD, PAGE = ROOT / "benchmarks/choices.json", ROOT / "docs/choices.md"
+RECORD, PAGE = ROOT / "benchmarks/choices.json", ROOT / "docs/measured/choices.md"
 TINY = bench.Options(rounds=1, seconds=0.0, scale=0.02)
 
 

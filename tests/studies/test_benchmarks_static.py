@@ -14,7 +14,7 @@ import topleft as tl
 from topleft._raster import choices
 
 ROOT = Path(__file__).parents[2]
-RECORD, PAGE = ROOT / "benchmarks/static.json", ROOT / "docs/static.md"
+RECORD, PAGE = ROOT / "benchmarks/static.json", ROOT / "docs/measured/static.md"
 SCALE = 0.02
 CUBE = "v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\nv -1 -1 1\nv 1 -1 1\nv 1 1 1\nv -1 1 1\n" + "".join(
     f"f {' '.join(map(str, face))}\n"
