@@ -15,7 +15,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from benchmarks import accuracy_tables, pages
-from benchmarks.chart_files import CHARTS, chart_bytes
+from benchmarks.chart_files import CHARTS, chart_svg
 from benchmarks.markdown import to_html
 
 PAGES = (
@@ -118,7 +118,7 @@ def picture_data(record: dict[str, Any], folder: Path, address: str) -> str:
     """Return a picture as a data URI: a chart of the record by the name of its file, any other file as it is."""
     path = folder / address
     if path.stem in CHARTS:
-        data, suffix = chart_bytes(record, path.stem, ("svg",))["svg"], ".svg"
+        data, suffix = chart_svg(record, path.stem), ".svg"
     else:
         data, suffix = path.read_bytes(), path.suffix
     return f"data:{TYPES[suffix]};base64,{base64.b64encode(data).decode()}"
