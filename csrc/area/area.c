@@ -15,7 +15,6 @@
 #include "vertex/clip.c"
 #include "vertex/fixed.h"
 #include "raster/batch.c"
-#include "raster/raster.c"
 #include "raster/setup.c"
 #include "area/accumulate.c"
 #include "area/ramp.c"
@@ -108,8 +107,7 @@ static void push_triangle(area_state *s, const tl_vertex_set *set, const int32_t
 {
     tl_triangle t;
     const int sign = load_triangle(set, corners, &t);
-    const tl_cull cull = s->scene->cull;
-    if (sign == 0 || (sign > 0 && cull == TL_CULL_BACK) || (sign < 0 && cull == TL_CULL_FRONT))
+    if (is_culled(sign, s->scene->cull))
         return;
     for (int k = 0; k < 3; k++) {
         const int next = k == 2 ? 0 : k + 1;
@@ -121,15 +119,9 @@ static void push_triangle(area_state *s, const tl_vertex_set *set, const int32_t
 /* Triangle i, or its pieces, by itself. */
 static __attribute__((noinline)) void push_alone(area_state *s, int64_t i)
 {
-    const int32_t *corners = s->scene->triangles + 3 * i;
-    const tl_pieces *pieces = s->scene->pieces;
-    if (!is_clipped(&s->scene->mesh, corners)) {
-        push_triangle(s, &s->scene->mesh, corners);
-        return;
-    }
-    const tl_vertex_set set = pieces ? piece_set(pieces, &s->scene->mesh) : s->scene->mesh;
-    for (int64_t k = pieces ? first_piece(pieces, i) : 0; pieces && k < pieces->n_pieces && pieces->source[k] == i; k++)
-        push_triangle(s, &set, pieces->triangles + 3 * k);
+    const triangle_parts parts = parts_of(s->scene, i);
+    for (int k = 0; k < parts.n; k++)
+        push_triangle(s, &parts.set, parts.corners + 3 * k);
 }
 
 /* The edges of the triangles in `drawn`; `turned` ones have negative area. */

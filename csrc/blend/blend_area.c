@@ -15,7 +15,6 @@
 #include "vertex/fixed.h"
 #include "vertex/snap.c"
 #include "raster/batch.c"
-#include "raster/raster.c"
 #include "area/area.c"
 #include "area/ramp.c"
 #include "blend/blend_strip.c"

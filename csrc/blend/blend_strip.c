@@ -211,30 +211,15 @@ static void blend_strip(blend_state *b, const tl_triangle *pieces, int64_t n, in
             vi_store(plane.cells + k * plane.stride + TL_CELL_PAD + i, vi_set1(TL_CELL_ZERO));
 }
 
-
 /* Triangle i, all of its pieces as one. */
 static __attribute__((noinline)) void blend_area_alone(blend_state *b, int64_t i)
 {
     const tl_window *window = b->window;
-    const tl_cull cull = b->scene->cull;
-    const int32_t *corners = b->scene->triangles + 3 * i;
-    const tl_pieces *pieces = b->scene->pieces;
-    const int is_cut = is_clipped(&b->scene->mesh, corners);
-    tl_vertex_set set = b->scene->mesh;
-    int64_t n_pieces = 1, n = 0, top = INT64_MAX, bottom = INT64_MIN, left = INT64_MAX, right = INT64_MIN;
+    const triangle_parts parts = parts_of(b->scene, i);
+    int64_t n = 0, top = INT64_MAX, bottom = INT64_MIN, left = INT64_MAX, right = INT64_MIN;
     tl_triangle t[TL_MAX_PIECES];
-    if (is_cut) {
-        const int64_t first = pieces ? first_piece(pieces, i) : 0;
-        for (n_pieces = 0; pieces && first + n_pieces < pieces->n_pieces && pieces->source[first + n_pieces] == i;)
-            n_pieces++;
-        if (n_pieces == 0)
-            return;
-        set = piece_set(pieces, &b->scene->mesh);
-        corners = pieces->triangles + 3 * first;
-    }
-    for (int64_t k = 0; k < n_pieces && n < TL_MAX_PIECES; k++) {
-        const int sign = load_triangle(&set, corners + 3 * k, t + n);
-        if (sign == 0 || (sign > 0 && cull == TL_CULL_BACK) || (sign < 0 && cull == TL_CULL_FRONT))
+    for (int k = 0; k < parts.n && n < TL_MAX_PIECES; k++) {
+        if (is_culled(load_triangle(&parts.set, parts.corners + 3 * k, t + n), b->scene->cull))
             continue;
         top = min64(top, min3(t[n].y_fx[0], t[n].y_fx[1], t[n].y_fx[2]) >> window->subpixel_bits);
         bottom = max64(bottom, max3(t[n].y_fx[0], t[n].y_fx[1], t[n].y_fx[2]) >> window->subpixel_bits);
@@ -246,7 +231,7 @@ static __attribute__((noinline)) void blend_area_alone(blend_state *b, int64_t i
     if (first_row >= end_row || (b->is_flat && !begin_flat(b, i)))
         return;
     if (!b->is_flat)
-        begin_gouraud(b, i, &set, corners, is_cut);
+        begin_gouraud(b, i, &parts.set, parts.corners, parts.is_cut);
     const int n_rows = strip_rows(min64(window->width, right - left + 4));
     for (int64_t row = first_row; row < end_row; row += n_rows)
         blend_strip(b, t, n, row, (int)min64(n_rows, end_row - row));

@@ -19,17 +19,11 @@
 /* Whether a triangle shows the side that is drawn: as draw_triangle, of the pieces where a plane cuts it. */
 static int shows_side(const tl_scene *scene, int64_t i)
 {
-    const int32_t *corners = scene->triangles + 3 * i;
     const int wanted = scene->cull == TL_CULL_BACK ? -1 : 1;
     tl_triangle t;
-    if (!is_clipped(&scene->mesh, corners))
-        return load_triangle(&scene->mesh, corners, &t) == wanted;
-    const tl_pieces *p = scene->pieces;
-    if (!p)
-        return 0;
-    const tl_vertex_set cut = piece_set(p, &scene->mesh);
-    for (int64_t k = first_piece(p, i); k < p->n_pieces && p->source[k] == i; k++)
-        if (load_triangle(&cut, p->triangles + 3 * k, &t) == wanted)
+    const triangle_parts parts = parts_of(scene, i);
+    for (int k = 0; k < parts.n; k++)
+        if (load_triangle(&parts.set, parts.corners + 3 * k, &t) == wanted)
             return 1;
     return 0;
 }

@@ -211,11 +211,9 @@ TL_INLINE void draw_lanes(line_state *s, const int32_t *edges, vm live, int has_
 
 TL_INLINE void draw_all_lines(line_state *s, int has_depth)
 {
-    const int64_t n = s->lines->n_edges, farthest = (int64_t)1 << 30;
-    const tl_window *w = s->window;
-    const int is_near = w->x_px > -farthest && w->x_px < farthest && w->y_px > -farthest && w->y_px < farthest;
+    const int64_t n = s->lines->n_edges;
     int64_t i = 0;
-    for (; !is_near && i < n; i++)
+    for (; !is_near(s->window) && i < n; i++)
         draw_line(s, s->lines->edges + 2 * i);
     for (; i + TL_LANES <= n; i += TL_LANES)
         draw_lanes(s, s->lines->edges + 2 * i, vm_all(), has_depth);

@@ -384,4 +384,41 @@ TL_INLINE void find_lanes(shaded_lanes *p, const shade_runs *s, int i, int64_t c
     e[0] = vi_sub(vi_sub(*sum, e[1]), e[2]);
 }
 
+/* The lanes of a vector of pixels that belong to special runs, run by run. */
+typedef struct {
+    vd x_fx; /* of the pixels */
+    vi special;
+    int32_t number[TL_MAX_LANES]; /* the same, lane by lane */
+    vm rest;                      /* lanes whose runs are still to come */
+    const special_run *run;
+} special_lanes;
+
+TL_INLINE special_lanes start_special(const shaded_lanes *p, vi special)
+{
+    const tl_window *window = p->s->window;
+    const vd x_px = vd_add(vd_from_vi(p->column), vd_set1((double)window->x_px + 0.5));
+    special_lanes own = {.x_fx = vd_mul(x_px, vd_set1((double)(1 << window->subpixel_bits))), .special = special};
+    vi_store(own.number, special);
+    own.rest = vm_and(p->visible, vi_gt(special, vi_set1(0)));
+    return own;
+}
+
+/* Takes the next run; returns its lanes, none behind the last one. */
+TL_INLINE vm next_special(const shaded_lanes *p, special_lanes *own)
+{
+    if (!vm_any(own->rest))
+        return own->rest;
+    const int32_t number = own->number[__builtin_ctz(vm_bits(own->rest))];
+    const vm lanes = vm_and(own->rest, vi_eq(own->special, vi_set1(number)));
+    own->run = &p->s->special[number - 1];
+    own->rest = vm_and_not(own->rest, lanes);
+    return lanes;
+}
+
+TL_INLINE vd special_edge(const special_lanes *own, int k)
+{
+    const special_run *e = own->run;
+    return vd_add(vd_set1(e->at[k]), vd_mul(vd_set1(e->step[k]), vd_sub(own->x_fx, vd_set1(e->from[k]))));
+}
+
 #endif

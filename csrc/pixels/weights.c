@@ -128,23 +128,15 @@ TL_INLINE void set_weighed_runs(weighed_span *r, int64_t row)
 /* Edge functions of the lanes whose runs are float64. */
 static void set_float64_edges(const shaded_lanes *p, vi special, vd *e, vm *is_back)
 {
-    const shade_runs *s = p->s;
-    const double unit = (double)(1 << s->window->subpixel_bits);
-    const vd x_fx = vd_mul(vd_add(vd_from_vi(p->column), vd_set1((double)s->window->x_px + 0.5)), vd_set1(unit)), zero = vd_set1(0.0);
-    int32_t number[TL_MAX_LANES];
-    vi_store(number, special);
-    vm rest = vm_and(p->visible, vi_gt(special, vi_set1(0)));
-    while (vm_any(rest)) {
-        const int32_t own = number[__builtin_ctz(vm_bits(rest))];
-        const vm lanes = vm_and(rest, vi_eq(special, vi_set1(own)));
-        const special_run *run = &s->special[own - 1];
+    const vd zero = vd_set1(0.0);
+    special_lanes own = start_special(p, special);
+    for (vm lanes; vm_any(lanes = next_special(p, &own));) {
+        const int is_negative = own.run->area < 0.0f;
         for (int k = 0; k < 3; k++) {
-            vd value = vd_add(vd_set1(run->at[k]), vd_mul(vd_set1(run->step[k]), vd_sub(x_fx, vd_set1(run->from[k]))));
-            value = run->area < 0.0f ? vd_sub(zero, value) : vd_add(zero, value); /* never -0 */
-            e[k] = vd_select(lanes, value, e[k]);
+            const vd value = special_edge(&own, k);
+            e[k] = vd_select(lanes, is_negative ? vd_sub(zero, value) : vd_add(zero, value), e[k]); /* never -0 */
         }
-        *is_back = run->area < 0.0f ? vm_or(*is_back, lanes) : vm_and_not(*is_back, lanes);
-        rest = vm_and_not(rest, lanes);
+        *is_back = is_negative ? vm_or(*is_back, lanes) : vm_and_not(*is_back, lanes);
     }
 }
 

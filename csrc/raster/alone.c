@@ -121,14 +121,12 @@ TL_INLINE void draw_triangle(const tl_vertex_set *set, const int32_t *corners, i
 {
     tl_triangle t;
     const int sign = load_triangle(set, corners, &t);
-    if (sign == 0 || (sign > 0 && scene->cull == TL_CULL_BACK) || (sign < 0 && scene->cull == TL_CULL_FRONT)) {
-        if (sink == TL_SINK_CENSUS)
-            target->census->n[sign ? TL_CLASS_CULLED : TL_CLASS_DEGENERATE]++;
+    if (is_culled(sign, scene->cull)) {
+        count_faceless_one(target, sink, sign);
         return;
     }
     if (!clip_box(&t, window)) {
-        if (sink == TL_SINK_CENSUS)
-            count_unseen_one(target->census, &t, window);
+        count_unseen_one(target, sink, &t, window);
         return;
     }
     t.id = name_of(scene, id);
@@ -186,8 +184,7 @@ static __attribute__((noinline)) void count_squares(const tl_vertex_set *set, co
     int n = 0;
     for (int i = 0; i < n_pieces && n < TL_MAX_PIECES; i++) {
         const int sign = load_triangle(set, corners + 3 * i, &t[n]);
-        const int is_culled = sign == 0 || (sign > 0 && scene->cull == TL_CULL_BACK) || (sign < 0 && scene->cull == TL_CULL_FRONT);
-        if (is_culled || !clip_box(&t[n], window))
+        if (is_culled(sign, scene->cull) || !clip_box(&t[n], window))
             continue;
         row0 = min64(row0, t[n].row0);
         row1 = max64(row1, t[n].row1);
@@ -212,25 +209,13 @@ static __attribute__((noinline)) void count_squares(const tl_vertex_set *set, co
 /* Triangle i, or its pieces, by itself. */
 TL_INLINE void draw_alone(const tl_scene *scene, int64_t i, const tl_window *window, const tl_target *target, tl_sink sink)
 {
-    const int32_t *corners = scene->triangles + 3 * i;
-    const tl_pieces *pieces = scene->pieces;
-    tl_vertex_set set = scene->mesh;
-    int64_t piece = 0, end = 1;
-    if (is_clipped(&set, corners)) {
-        if (!pieces)
-            return;
-        set = piece_set(pieces, &scene->mesh);
-        piece = first_piece(pieces, i);
-        for (end = piece; end < pieces->n_pieces && pieces->source[end] == i;)
-            end++;
-        corners = pieces->triangles + 3 * piece;
-    }
-    if (sink == TL_SINK_COUNT && window->test != TL_TEST_SAMPLE && end - piece > 1) {
-        count_squares(&set, corners, (int)(end - piece), scene, window, target);
+    const triangle_parts parts = parts_of(scene, i);
+    if (sink == TL_SINK_COUNT && window->test != TL_TEST_SAMPLE && parts.n > 1) {
+        count_squares(&parts.set, parts.corners, parts.n, scene, window, target);
         return;
     }
-    for (; piece < end; piece++, corners += 3)
-        draw_triangle(&set, corners, (int32_t)i, scene, window, target, sink);
+    for (int k = 0; k < parts.n; k++)
+        draw_triangle(&parts.set, parts.corners + 3 * k, (int32_t)i, scene, window, target, sink);
 }
 
 TL_SINK_COPIES(draw_alone, (const tl_scene *scene, int64_t i, const tl_window *window, const tl_target *target), scene, i, window,

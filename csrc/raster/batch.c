@@ -13,6 +13,7 @@
 
 #include "topleft.h"
 #include "lanes/lanes.h"
+#include "vertex/fixed.h"
 #include "raster/alone.c"
 #include "raster/fragments.h"
 #include "raster/hooks.h"
@@ -44,7 +45,6 @@ typedef struct {
     int second, third;                /* which corner comes second and third: culled faces then have negative area */
 } batch_limits;
 
-
 /* Everything that one pass over a scene needs; on the stack of draw. */
 typedef struct batch_state {
     const tl_scene *scene;
@@ -62,6 +62,17 @@ typedef struct {
     vi x[3], y[3];
     vz z[3];
 } lane_corners;
+
+/* TL_LANES triangles as loaded, and what becomes of them. */
+typedef struct {
+    lane_corners c;
+    vi x_min, x_max, y_min, y_max;
+    vi area, absolute; /* twice the area; positive where the side that is drawn shows */
+    vi top, bottom;    /* rows of the extent in the picture */
+    vi col, row, n_cols, n_rows; /* the box of samples in the window */
+    vm alone;          /* too large for 32-bit lanes, or special */
+    vm drawn;          /* the others that are to be drawn */
+} lane_batch;
 
 /* TL_LANES triangles with positive area; corners doubled and relative to the first sample of their boxes. */
 typedef struct lane_triangles {
@@ -96,6 +107,57 @@ TL_INLINE vi area_lanes(const lane_corners *c)
     const vi x2 = vi_sub(c->x[2], c->x[0]), y2 = vi_sub(c->y[2], c->y[0]);
     return vi_sub(vi_mul(x1, y2), vi_mul(y1, x2));
 }
+
+/* Whether the 3 * TL_LANES indices of a vector of triangles hold one outside [0, last_vertex]. */
+TL_INLINE int has_bad_index(const int32_t *corners, vi last_vertex)
+{
+    const vm bad01 = vm_or(vi_gt_unsigned(vi_load(corners), last_vertex), vi_gt_unsigned(vi_load(corners + TL_LANES), last_vertex));
+    return vm_any(vm_or(bad01, vi_gt_unsigned(vi_load(corners + 2 * TL_LANES), last_vertex)));
+}
+
+/* As round_extent tells. */
+TL_INLINE vi extent_pixels(vi x_fx, int32_t round, int bits) { return vi_shift_right(vi_add(x_fx, vi_set1(round)), bits); }
+
+/* Loads TL_LANES triangles, and finds those that lanes can take and that show the side which is drawn.  Returns 0, with the row in
+ * `bad_row`, when an index lies outside the vertices. */
+TL_INLINE int load_batch(batch_state *s, const int32_t *corners, vi id, vm live, lane_batch *b)
+{
+    const batch_limits *limits = &s->limits;
+    const vi zero = vi_set1(0), max_extent = vi_set1(limits->max_extent);
+    if (has_bad_index(corners, limits->last_vertex)) {
+        int32_t ids[TL_MAX_LANES];
+        vi_store(ids, id);
+        s->bad_row = ids[0];
+        return 0;
+    }
+    load_corners(s, corners, &b->c);
+    const lane_corners *c = &b->c;
+    b->x_min = vi_min(vi_min(c->x[0], c->x[1]), c->x[2]), b->x_max = vi_max(vi_max(c->x[0], c->x[1]), c->x[2]);
+    b->y_min = vi_min(vi_min(c->y[0], c->y[1]), c->y[2]), b->y_max = vi_max(vi_max(c->y[0], c->y[1]), c->y[2]);
+    /* a special vertex has x = INT32_MIN: its triangle is too wide, or special throughout */
+    const vm too_wide = vi_gt_unsigned(vi_sub(b->x_max, b->x_min), max_extent);
+    const vm too_tall = vi_gt_unsigned(vi_sub(b->y_max, b->y_min), max_extent);
+    b->alone = vm_and(live, vm_or(vm_or(too_wide, too_tall), vi_eq(b->x_min, vi_set1(limits->special_x))));
+    b->area = area_lanes(c);
+    b->absolute = s->scene->cull == TL_CULL_NONE ? vi_max(b->area, vi_sub(zero, b->area)) : b->area;
+    b->drawn = vm_and_not(vm_and(live, vi_gt(b->absolute, zero)), b->alone);
+    return 1;
+}
+
+/* The boxes of samples in the window; empty ones have no columns or no rows. */
+TL_INLINE void find_boxes(const batch_state *s, lane_batch *b)
+{
+    const batch_limits *limits = &s->limits;
+    const int bits = s->window->subpixel_bits;
+    b->col = vi_max(extent_pixels(b->x_min, limits->round.first, bits), vi_set1(limits->left));
+    b->n_cols = vi_sub(vi_min(extent_pixels(b->x_max, limits->round.end, bits), vi_set1(limits->right)), b->col);
+    b->top = extent_pixels(b->y_min, limits->round.first, bits), b->bottom = extent_pixels(b->y_max, limits->round.end, bits);
+    b->row = vi_max(b->top, vi_set1(limits->top));
+    b->n_rows = vi_sub(vi_min(b->bottom, vi_set1(limits->bottom)), b->row);
+}
+
+/* Whether there is a sample in them. */
+TL_INLINE vm has_box(const lane_batch *b) { return vi_gt(vi_min(b->n_cols, b->n_rows), vi_set1(0)); }
 
 TL_INLINE void setup_edges_lanes(lane_triangles *t, const tl_window *window, tl_sink sink)
 {
@@ -321,5 +383,43 @@ TL_INLINE void flush_small(batch_state *s, tl_sink sink)
 }
 
 TL_SINK_COPIES(flush_small, (batch_state *s), s)
+
+/* The corners of the triangles [i, i + TL_LANES) of a share, behind the end zeros; in `buffer` unless they lie there already. */
+TL_INLINE const int32_t *share_corners(const tl_scene *scene, const tl_share *share, int64_t i, int32_t *buffer)
+{
+    if (!share->ids && i + TL_LANES <= share->end)
+        return scene->triangles + 3 * i;
+    for (int k = 0; k < TL_LANES; k++) {
+        const int64_t id = i + k >= share->end ? -1 : share->ids ? share->ids[i + k] : i + k;
+        if (id >= 0)
+            memcpy(buffer + 3 * k, scene->triangles + 3 * id, 3 * sizeof *buffer);
+        else
+            memset(buffer + 3 * k, 0, 3 * sizeof *buffer);
+    }
+    return buffer;
+}
+
+/* For triangles that cover the centres of pixels; the window has fewer than 2^31 samples and lies within 2^30 pixels of 0. */
+static void start_batch(batch_state *s, const tl_scene *scene, const tl_window *window, const tl_target *target)
+{
+    const int bits = window->subpixel_bits, is_back = scene->cull == TL_CULL_BACK;
+    const int64_t farthest = (int64_t)1 << 30;
+    s->scene = scene, s->window = window, s->target = target, s->bad_row = -1;
+    s->small.n = s->middle.n = s->rows.n = s->fragments.n = 0;
+    s->limits = (batch_limits){
+        .left = (int32_t)window->x_px,
+        .top = (int32_t)window->y_px,
+        .right = (int32_t)min64(window->x_px + window->width, farthest),
+        .bottom = (int32_t)min64(window->y_px + window->height, farthest),
+        .picture_top = (int32_t)window->y_px,
+        .picture_bottom = (int32_t)min64(window->y_px + window->height, farthest),
+        .max_extent = TL_MAX_BOX_PX << (bits < 8 ? bits : 8),
+        .round = round_extent(window),
+        .special_x = (int32_t)((uint32_t)TL_SPECIAL - (uint32_t)scene->mesh.sample_x_fx),
+        .second = is_back ? 2 : 1,
+        .third = is_back ? 1 : 2,
+        .last_vertex = vi_set1((int32_t)(scene->mesh.n_vertices - 1)),
+    };
+}
 
 #endif

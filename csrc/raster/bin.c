@@ -14,7 +14,6 @@
 #include "vertex/clip.c"
 #include "vertex/fixed.h"
 #include "raster/batch.c"
-#include "raster/raster.c"
 #include "raster/setup.c"
 
 typedef struct {
@@ -32,7 +31,7 @@ static void widen_rows(const bin_limits *b, const tl_vertex_set *set, const int3
     const int bits = window->subpixel_bits;
     tl_triangle t;
     const int sign = load_triangle(set, corners, &t);
-    if (sign == 0 || (sign > 0 && b->scene->cull == TL_CULL_BACK) || (sign < 0 && b->scene->cull == TL_CULL_FRONT))
+    if (is_culled(sign, b->scene->cull))
         return;
     const int64_t y0 = min3(t.y_fx[0], t.y_fx[1], t.y_fx[2]), y1 = max3(t.y_fx[0], t.y_fx[1], t.y_fx[2]);
     const int64_t first = max64(((y0 + b->low_fx) >> bits) - window->y_px, 0);
@@ -44,17 +43,10 @@ static void widen_rows(const bin_limits *b, const tl_vertex_set *set, const int3
 /* Triangle i, or its pieces, by itself. */
 static __attribute__((noinline)) void bin_alone(const bin_limits *b, int64_t i, tl_bins *bins)
 {
-    const tl_scene *scene = b->scene;
-    const tl_pieces *pieces = scene->pieces;
-    const int32_t *corners = scene->triangles + 3 * i;
+    const triangle_parts parts = parts_of(b->scene, i);
     int64_t row0 = b->window->height, row1 = 0;
-    if (!is_clipped(&scene->mesh, corners)) {
-        widen_rows(b, &scene->mesh, corners, &row0, &row1);
-    } else if (pieces) {
-        const tl_vertex_set set = piece_set(pieces, &scene->mesh);
-        for (int64_t k = first_piece(pieces, i); k < pieces->n_pieces && pieces->source[k] == i; k++)
-            widen_rows(b, &set, pieces->triangles + 3 * k, &row0, &row1);
-    }
+    for (int k = 0; k < parts.n; k++)
+        widen_rows(b, &parts.set, parts.corners + 3 * k, &row0, &row1);
     if (row0 >= row1)
         return;
     bins->ids[bins->n] = (int32_t)i;

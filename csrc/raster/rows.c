@@ -163,6 +163,20 @@ TL_INLINE void draw_rows(batch_state *s, tl_sink sink, const row_edges *r, int i
     }
 }
 
+/* The samples from `begin` on, up to `end`, of the row of each triangle that its edges are at; goes on to the next row. */
+TL_INLINE void next_row(lane_edges *e, vi n_cols, vi *begin, vi *end)
+{
+    const vi zero = vi_set1(0), one = vi_set1(1);
+    vi quotient[3];
+    for (int side = 0; side < 3; side++) {
+        quotient[side] = vi_floor(vf_mul(e->start[side], e->inverse[side]));
+        e->start[side] = vf_add(e->start[side], e->step[side]);
+    }
+    const vi left = vi_select(e->third_is_left, vi_min(quotient[0], quotient[2]), quotient[0]);
+    const vi right = vi_select(e->third_is_right, vi_min(quotient[1], quotient[2]), quotient[1]);
+    *begin = vi_max(vi_sub(zero, left), zero), *end = vi_min(vi_add(right, one), n_cols);
+}
+
 /* The rows of TL_LANES triangles: of each its covered samples, a bit each, and its depth at column 0. */
 typedef struct {
     int32_t bits[TL_MIDDLE_BOX][TL_MAX_LANES];
@@ -171,7 +185,7 @@ typedef struct {
 
 TL_INLINE void setup_middle(tl_sink sink, const lane_triangles *t, const lane_planes *p, vi n_cols, int n_rows, double unit2, middle_rows *m)
 {
-    const vi zero = vi_set1(0), one = vi_set1(1);
+    const vi zero = vi_set1(0);
     const vd step = vd_set1(unit2);
     lane_edges e;
     sort_edges(t, &e);
@@ -179,15 +193,9 @@ TL_INLINE void setup_middle(tl_sink sink, const lane_triangles *t, const lane_pl
     if (sink_has_depth(sink))
         y = p->y;
     for (int row = 0; row < n_rows; row++) {
-        vi quotient[3];
-        for (int side = 0; side < 3; side++) {
-            quotient[side] = vi_floor(vf_mul(e.start[side], e.inverse[side]));
-            e.start[side] = vf_add(e.start[side], e.step[side]);
-        }
-        const vi left = vi_select(e.third_is_left, vi_min(quotient[0], quotient[2]), quotient[0]);
-        const vi right = vi_select(e.third_is_right, vi_min(quotient[1], quotient[2]), quotient[1]);
-        const vi begin = vi_max(vi_sub(zero, left), zero), end = vi_max(vi_min(vi_add(right, one), n_cols), zero);
-        vi_store(m->bits[row], vi_bit_ranges(begin, end));
+        vi begin, end;
+        next_row(&e, n_cols, &begin, &end);
+        vi_store(m->bits[row], vi_bit_ranges(begin, vi_max(end, zero)));
         if (sink_has_depth(sink)) {
             vd_store(m->z[row], vd_add(p->z0, vd_mul(p->slope_y, y)));
             y = vd_add(y, step);

@@ -76,7 +76,7 @@ static int setup_sampled_triangle(const tl_scene *scene, const int32_t *corners,
         const int sign = load_triangle(&seen, corners, t);
         if (!rows_fit(t, window, 1))
             return 0;
-        if (sign == 0 || (sign > 0 && scene->cull == TL_CULL_BACK) || (sign < 0 && scene->cull == TL_CULL_FRONT))
+        if (is_culled(sign, scene->cull))
             return 1;
         if (!clip_box(t, window)) {
             t->row0 = t->row1 = 0;

@@ -98,6 +98,12 @@ static inline int load_triangle(const tl_vertex_set *set, const int32_t *corners
     return sign;
 }
 
+/* Whether a triangle whose area had a sign is not drawn. */
+static inline int is_culled(int sign, tl_cull cull)
+{
+    return sign == 0 || (sign > 0 && cull == TL_CULL_BACK) || (sign < 0 && cull == TL_CULL_FRONT);
+}
+
 /* The box of pixels in the triangle's extent and the window.  Half-open on the right and at the bottom: no centre exactly at
  * the largest x or y can be covered under the top-left rule.  Returns whether any is left. */
 static inline int clip_box(tl_triangle *t, const tl_window *window)

@@ -42,6 +42,15 @@ static void start_runs(shade_runs *s, const tl_scene *scene, const tl_window *wi
         memset(s->floats[k], 0, TL_MAX_LANES * sizeof(float));
 }
 
+/* Prepares the runs of the pixels from `column` on in a row of ids; returns how many pixels. */
+TL_INLINE int start_span(shade_runs *s, const int32_t *ids, int64_t row, int64_t column)
+{
+    const int n = (int)min64(TL_SPAN, s->window->width - column);
+    find_runs(s, ids + row * s->window->width + column, n);
+    set_runs(s, row);
+    return n;
+}
+
 TL_INLINE vi shaded_word(shaded_lanes *p, int64_t row, const float *depth)
 {
     const tl_show show = p->s->shading->show;
@@ -61,9 +70,7 @@ static void shade(const tl_scene *scene, const tl_window *window, const tl_view 
     for (int64_t row = 0; row < window->height; row++)
         for (int64_t column = 0; column < window->width; column += TL_SPAN) {
             const int64_t at = row * window->width + column;
-            const int n = (int)min64(TL_SPAN, window->width - column);
-            find_runs(&s, ids + at, n);
-            set_runs(&s, row);
+            const int n = start_span(&s, ids, row, column);
             for (int x = 0, i = 0; x < n; x += TL_LANES, i++) {
                 vi word = vi_set1(background);
                 if (s.visible[i]) {
@@ -106,9 +113,7 @@ static void shade_normals(const tl_scene *scene, const tl_window *window, const 
     for (int64_t row = 0; row < window->height; row++)
         for (int64_t column = 0; column < window->width; column += TL_SPAN) {
             const int64_t at = row * window->width + column;
-            const int n = (int)min64(TL_SPAN, window->width - column);
-            find_runs(&s, ids + at, n);
-            set_runs(&s, row);
+            const int n = start_span(&s, ids, row, column);
             for (int x = 0, i = 0; x < n; x += TL_LANES, i++) {
                 vf normal[3] = {zero, zero, zero};
                 if (s.visible[i]) {

@@ -16,23 +16,11 @@
 /* Edge functions of the lanes whose runs are special, run by run. */
 static void set_special_edges(shaded_lanes *p)
 {
-    const shade_runs *s = p->s;
-    const vi special = pick_int(p, RUN_SPECIAL);
-    const double unit = (double)(1 << s->window->subpixel_bits);
-    const vd x_fx = vd_mul(vd_add(vd_from_vi(p->column), vd_set1((double)s->window->x_px + 0.5)), vd_set1(unit));
-    int32_t number[TL_MAX_LANES];
-    vi_store(number, special);
-    vm rest = vm_and(p->visible, vi_gt(special, vi_set1(0)));
-    while (vm_any(rest)) {
-        const int32_t own = number[__builtin_ctz(vm_bits(rest))];
-        const vm lanes = vm_and(rest, vi_eq(special, vi_set1(own)));
-        const special_run *e = &s->special[own - 1];
-        for (int k = 0; k < 3; k++) {
-            const vd value = vd_add(vd_set1(e->at[k]), vd_mul(vd_set1(e->step[k]), vd_sub(x_fx, vd_set1(e->from[k]))));
-            p->e[k] = vf_select(lanes, vf_from_vd(value), p->e[k]);
-        }
-        p->area = vf_select(lanes, vf_set1(e->area), p->area);
-        rest = vm_and_not(rest, lanes);
+    special_lanes own = start_special(p, pick_int(p, RUN_SPECIAL));
+    for (vm lanes; vm_any(lanes = next_special(p, &own));) {
+        for (int k = 0; k < 3; k++)
+            p->e[k] = vf_select(lanes, vf_from_vd(special_edge(&own, k)), p->e[k]);
+        p->area = vf_select(lanes, vf_set1(own.run->area), p->area);
     }
 }
 

@@ -226,4 +226,28 @@ static int64_t first_piece(const tl_pieces *p, int64_t id)
     return low;
 }
 
+/* What is drawn of a triangle: itself, or the pieces that clip planes leave of it; n of them, three of `corners` each. */
+typedef struct {
+    tl_vertex_set set;
+    const int32_t *corners;
+    int n, is_cut;
+} triangle_parts;
+
+static inline triangle_parts parts_of(const tl_scene *scene, int64_t i)
+{
+    const tl_pieces *pieces = scene->pieces;
+    triangle_parts parts = {scene->mesh, scene->triangles + 3 * i, 1, 0};
+    if (!is_clipped(&parts.set, parts.corners))
+        return parts;
+    parts.is_cut = 1, parts.n = 0;
+    if (!pieces)
+        return parts;
+    const int64_t first = first_piece(pieces, i);
+    while (first + parts.n < pieces->n_pieces && pieces->source[first + parts.n] == i)
+        parts.n++;
+    parts.set = piece_set(pieces, &scene->mesh);
+    parts.corners = pieces->triangles + 3 * first;
+    return parts;
+}
+
 #endif
