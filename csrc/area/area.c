@@ -221,11 +221,10 @@ static int64_t draw_area(const tl_scene *scene, const tl_window *window, const t
     s.scene = scene, s.bad_row = -1, s.is_wide = target->is_wide;
     s.max_extent = 1 << (bits + TL_MAX_EDGE_BITS < 25 ? bits + TL_MAX_EDGE_BITS : 25);
     memset(s.n, 0, sizeof s.n);
-    int32_t tail[3 * TL_LANES] = {0};
-    const int64_t n_whole = scene->n_triangles / TL_LANES * TL_LANES;
-    memcpy(tail, scene->triangles + 3 * n_whole, sizeof(int32_t) * 3 * (size_t)(scene->n_triangles - n_whole));
+    const tl_share all = {.end = scene->n_triangles};
+    int32_t tail[3 * TL_LANES];
     for (int64_t i = 0; i < scene->n_triangles && s.bad_row < 0; i += TL_LANES)
-        push_batch(&s, i, i < n_whole ? scene->triangles + 3 * i : tail, vm_first(scene->n_triangles - i));
+        push_batch(&s, i, share_corners(scene, &all, i, tail), vm_first(scene->n_triangles - i));
     for (int kind = 0; kind < TL_EDGES_NONE; kind++)
         flush_edges(&s, kind, 1);
     if (s.is_wide)

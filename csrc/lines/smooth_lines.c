@@ -99,7 +99,8 @@ TL_INLINE void walk_smooth_line(smooth_state *s, const smooth_line *l, int has_d
     const int bits = s->window->subpixel_bits;
     const double unit = (double)(1 << bits);
     const int64_t own_u = (l->u_fx >> bits) - l->u_px, own_v = (l->v_fx >> bits) - l->v_px; /* the first end's pixel */
-    const double rest_u = 2.0 * (double)(l->u_fx - ((own_u + l->u_px) << bits)), rest_v = 2.0 * (double)(l->v_fx - ((own_v + l->v_px) << bits));
+    const double rest_u = 2.0 * (double)(l->u_fx - (own_u + l->u_px) * ((int64_t)1 << bits));
+    const double rest_v = 2.0 * (double)(l->v_fx - (own_v + l->v_px) * ((int64_t)1 << bits));
     const double length2 = (double)l->du * (double)l->du + (double)l->dv * (double)l->dv;
     const vd du = vd_set1((double)l->du), dv = vd_set1((double)l->dv), end = vd_set1(2.0 * length2);
     const vd inverse = vd_set1(length2 > 0.0 ? 1.0 / sqrt(length2) : 0.0), inverse_end = vd_set1(length2 > 0.0 ? 0.5 / length2 : 0.0);

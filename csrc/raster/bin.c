@@ -104,12 +104,11 @@ static int64_t bin(const tl_scene *scene, const tl_window *window, int32_t reach
         .right = (int32_t)min64(window->x_px + window->width, farthest),
         .bottom = (int32_t)min64(window->y_px + window->height, farthest),
     };
-    int32_t tail[3 * TL_LANES] = {0};
-    const int64_t n_whole = scene->n_triangles / TL_LANES * TL_LANES;
-    memcpy(tail, scene->triangles + 3 * n_whole, sizeof(int32_t) * 3 * (size_t)(scene->n_triangles - n_whole));
+    const tl_share all = {.end = scene->n_triangles};
+    int32_t tail[3 * TL_LANES];
     bins->n = 0;
     for (int64_t i = 0; i < scene->n_triangles; i += TL_LANES)
-        if (!bin_batch(&b, i, i < n_whole ? scene->triangles + 3 * i : tail, vm_first(scene->n_triangles - i), bins))
+        if (!bin_batch(&b, i, share_corners(scene, &all, i, tail), vm_first(scene->n_triangles - i), bins))
             return i;
     return -1;
 }

@@ -26,7 +26,8 @@ TL_INLINE void cover_ends(const tl_target *target, int64_t at, int64_t from, int
         const int64_t col = word * per_word - at;
         uint64_t bits = 0;
         for (int sample = 0; sample < 1 << sample_bits; sample++) {
-            const int64_t begin = max64(first[sample] - col, 0) << sample_bits, stop = min64(end[sample] - col, per_word) << sample_bits;
+            const int64_t begin = max64(first[sample] - col, 0) << sample_bits;
+            const int64_t stop = max64(min64(end[sample] - col, per_word), 0) << sample_bits;
             if (begin < stop)
                 bits |= (~0ull << begin & ~0ull >> (64 - stop) & sample_pattern(sample_bits)) << sample;
         }
