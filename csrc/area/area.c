@@ -23,9 +23,15 @@
 #define TL_SHORT_ROWS 8
 #define TL_EDGE_QUEUE 112
 
-/* Edges wait until a vector is full of their kind: of 1 to 8 rows, or more; that pass up to 2 columns a row, or up to 6;
- * or any number.  The last kind are no edges at all: horizontal, or without an effect here. */
-enum { TL_EDGES_LONG = TL_SHORT_ROWS, TL_EDGES_FLAT = TL_SHORT_ROWS + 1, TL_EDGES_SHALLOW = 2 * TL_EDGES_FLAT, TL_EDGES_NONE, TL_EDGE_KINDS };
+/* Edges wait until a vector is full of their kind: of 1 to 8 rows, or more; that pass up to 2 columns a row, or up to
+ * 6; or any number.  The last kind are no edges at all: horizontal, or without an effect here. */
+enum {
+    TL_EDGES_LONG = TL_SHORT_ROWS,
+    TL_EDGES_FLAT = TL_SHORT_ROWS + 1,
+    TL_EDGES_SHALLOW = 2 * TL_EDGES_FLAT,
+    TL_EDGES_NONE,
+    TL_EDGE_KINDS
+};
 
 typedef struct {
     area_plane plane;
@@ -99,7 +105,8 @@ static void push_edge(area_state *s, int64_t x0, int64_t y0, int64_t x1, int64_t
     if (dy == 0 || y0 >= p->bottom_fx || y1 <= p->top_fx || min64(x0, x1) >= p->right_fx)
         return;
     const int64_t rows = ((y1 - 1) >> p->bits) - (y0 >> p->bits);
-    const int kind = width > 6 * dy ? TL_EDGES_SHALLOW : (int)min64(rows, TL_EDGES_LONG) + (width > 2 * dy ? TL_EDGES_FLAT : 0);
+    const int kind =
+        width > 6 * dy ? TL_EDGES_SHALLOW : (int)min64(rows, TL_EDGES_LONG) + (width > 2 * dy ? TL_EDGES_FLAT : 0);
     s->edges[kind][s->n[kind]++] = (edge_record){(int32_t)x0, (int32_t)y0, dx, sign * dy};
 }
 
@@ -137,7 +144,8 @@ TL_INLINE void push_edges(area_state *s, const lane_corners *c, vm drawn, vm tur
         const vi y0 = vi_min(c->y[k], c->y[next]), y1 = vi_max(c->y[k], c->y[next]);
         const vi dx = vi_sub(x1, x0), dy = vi_sub(y1, y0), width = vi_max(dx, vi_sub(zero, dx)), dy2 = vi_add(dy, dy);
         const vm meets_rows = vm_and(vi_gt(vi_set1(p->bottom_fx), y0), vi_gt(y1, vi_set1(p->top_fx)));
-        const vm on = vm_and(vm_and(drawn, vi_gt(dy, zero)), vm_and(meets_rows, vi_gt(vi_set1(p->right_fx), vi_min(x0, x1))));
+        const vm on =
+            vm_and(vm_and(drawn, vi_gt(dy, zero)), vm_and(meets_rows, vi_gt(vi_set1(p->right_fx), vi_min(x0, x1))));
         const vi rows = vi_sub(vi_shift_right(vi_sub(y1, one), p->bits), vi_shift_right(y0, p->bits));
         vi kind = vi_min(rows, last_kind);
         kind = vi_select(vi_gt(width, dy2), vi_add(kind, vi_set1(TL_EDGES_FLAT)), kind);
@@ -169,12 +177,14 @@ TL_INLINE void push_batch(area_state *s, int64_t i, const int32_t *corners, vm l
     const vi x_min = vi_min(vi_min(c.x[0], c.x[1]), c.x[2]), x_max = vi_max(vi_max(c.x[0], c.x[1]), c.x[2]);
     const vi y_min = vi_min(vi_min(c.y[0], c.y[1]), c.y[2]), y_max = vi_max(vi_max(c.y[0], c.y[1]), c.y[2]);
     /* a special vertex has x = INT32_MIN: its triangle is too wide, or special throughout */
-    vm alone = vm_or(vi_gt_unsigned(vi_sub(x_max, x_min), max_extent), vi_gt_unsigned(vi_sub(y_max, y_min), max_extent));
+    vm alone =
+        vm_or(vi_gt_unsigned(vi_sub(x_max, x_min), max_extent), vi_gt_unsigned(vi_sub(y_max, y_min), max_extent));
     alone = vm_and(live, vm_or(alone, vi_eq(x_min, vi_set1(TL_SPECIAL))));
     for (unsigned lanes = vm_bits(alone); lanes; lanes &= lanes - 1)
         push_alone(s, i + __builtin_ctz(lanes));
     const vm meets_rows = vm_and(vi_gt(vi_set1(p->bottom_fx), y_min), vi_gt(y_max, vi_set1(p->top_fx)));
-    /* heights are whole numbers of units: the edges of a triangle that lies left of the window add up to nothing there */
+    /* heights are whole numbers of units: the edges of a triangle that lies left of the window add up to nothing
+     * there */
     const vm meets_cols = vm_and(vi_gt(vi_set1(p->right_fx), x_min), vi_gt(x_max, vi_set1(p->left_fx)));
     vm drawn = vm_and(vm_and_not(live, alone), vm_and(meets_rows, meets_cols));
     if (!vm_any(drawn))
@@ -185,7 +195,9 @@ TL_INLINE void push_batch(area_state *s, int64_t i, const int32_t *corners, vm l
     const vd area = vd_sub(vd_mul(x1, y2), vd_mul(y1, x2));
     const vm is_positive = vd_ge(area, vd_set1(1.0)), is_negative = vd_ge(vd_set1(-1.0), area);
     const tl_cull cull = s->scene->cull;
-    const vm either = cull == TL_CULL_BACK ? is_negative : cull == TL_CULL_FRONT ? is_positive : vm_or(is_positive, is_negative);
+    const vm either = cull == TL_CULL_BACK    ? is_negative
+                      : cull == TL_CULL_FRONT ? is_positive
+                                              : vm_or(is_positive, is_negative);
     drawn = vm_and(drawn, either);
     if (vm_any(drawn))
         push_edges(s, &c, drawn, is_negative);

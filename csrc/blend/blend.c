@@ -1,9 +1,10 @@
 /* Blend: the pass that puts the colours of triangles into the canvas, one triangle after the other.
  * In: vertex records, triangles and their colours.  Out: pixels.
  *
- * Nothing is drawn out of order: one queue of triangles, whose setup and row ends are computed a vector of triangles at a time,
- * as in rows.c, and whose rows are then drawn triangle by triangle.  What 32-bit lanes cannot take empties the queue and is drawn
- * by itself.  Bands of rows see the same triangles in the same order, so threads cannot change a bit. */
+ * Nothing is drawn out of order: one queue of triangles, whose setup and row ends are computed a vector of triangles at
+ * a time, as in rows.c, and whose rows are then drawn triangle by triangle.  What 32-bit lanes cannot take empties the
+ * queue and is drawn by itself.  Bands of rows see the same triangles in the same order, so threads cannot change a
+ * bit. */
 #ifndef TL_BLEND_C
 #define TL_BLEND_C
 
@@ -77,7 +78,8 @@ static __attribute__((noinline)) void flush_blend(blend_pass *p)
         pop(&p->batch, TL_SINK_BLEND, q, i, n, &t, no_depth);
         for (int k = 0; k < end; k++)
             max_rows = q->size[i + k] >> 16 > max_rows ? q->size[i + k] >> 16 : max_rows;
-        setup_blend_rows(&t, vi_and(vi_load(q->size + i), vi_set1(0xffff)), max_rows, vi_set1((int32_t)b->stride), &rows);
+        setup_blend_rows(&t, vi_and(vi_load(q->size + i), vi_set1(0xffff)), max_rows, vi_set1((int32_t)b->stride),
+                         &rows);
         for (int k = 0; k < end; k++) {
             const int64_t id = q->id[i + k];
             if (!b->is_flat)
@@ -129,7 +131,8 @@ static int64_t blend_batches(blend_pass *p)
     const tl_share all = {.first = 0, .end = scene->n_triangles};
     for (int64_t i = 0; i < all.end && s->bad_row < 0; i += TL_LANES) {
         int32_t corners[3 * TL_LANES];
-        blend_batch(p, share_corners(scene, &all, i, corners), vi_add(vi_set1((int32_t)i), vi_iota()), vm_first(all.end - i));
+        blend_batch(p, share_corners(scene, &all, i, corners), vi_add(vi_set1((int32_t)i), vi_iota()),
+                    vm_first(all.end - i));
     }
     flush_blend(p);
     return s->bad_row;
@@ -137,7 +140,8 @@ static int64_t blend_batches(blend_pass *p)
 
 static tl_mix mix_of(const tl_canvas *canvas)
 {
-    const int has_alpha = canvas->n_channels == 2 || canvas->n_channels == 4, is_straight = has_alpha && !canvas->is_premultiplied;
+    const int has_alpha = canvas->n_channels == 2 || canvas->n_channels == 4;
+    const int is_straight = has_alpha && !canvas->is_premultiplied;
     switch (canvas->blend) {
     case TL_BLEND_REPLACE: return is_straight ? TL_MIX_REPLACE_STRAIGHT : TL_MIX_REPLACE;
     case TL_BLEND_OVER: return is_straight ? TL_MIX_OVER_STRAIGHT : TL_MIX_OVER_PREMULTIPLIED;
@@ -165,8 +169,8 @@ static int64_t blend_window(const tl_scene *scene, const tl_window *window, cons
     for (int64_t row = 0; canvas->ground && row < window->height; row++)
         put_solid(b->packed + row * b->stride, window->width, ground);
     for (int64_t row = 0; canvas->packed && !canvas->ground && row < window->height; row++)
-        pack_u8((const uint8_t *)canvas->pixels + row * canvas->stride_px * n_channels, window->width, canvas->n_channels,
-                canvas->packed + row * b->stride);
+        pack_u8((const uint8_t *)canvas->pixels + row * canvas->stride_px * n_channels, window->width,
+                canvas->n_channels, canvas->packed + row * b->stride);
     int64_t bad_row = -1;
     if (canvas->is_area) {
         bad_row = blend_areas(b);
@@ -184,8 +188,8 @@ static int64_t blend_window(const tl_scene *scene, const tl_window *window, cons
     return bad_row;
 }
 
-/* Fewer triangles than these are set up for each band anew, so that a band is still in the cache when it is drawn over: half of a
- * frame of 33 MB in one triangle takes 1.1 ms instead of 1.7. */
+/* Fewer triangles than these are set up for each band anew, so that a band is still in the cache when it is drawn over:
+ * half of a frame of 33 MB in one triangle takes 1.1 ms instead of 1.7. */
 #define TL_FEW_TRIANGLES 64
 #define TL_BAND_BYTES (1 << 18)
 
@@ -194,7 +198,8 @@ static int64_t blend(const tl_scene *scene, const tl_window *window, const tl_ca
     const int64_t pixel_bytes = canvas->n_channels * (canvas->is_u8 ? 1 : 4);
     const int64_t fitting = max64(1, (((int64_t)1 << 31) - 1) / canvas->stride_px);
     const int64_t hot = max64(1, TL_BAND_BYTES / (canvas->stride_px * pixel_bytes));
-    const int64_t rows_at_once = canvas->ground && scene->n_triangles < TL_FEW_TRIANGLES ? min64(fitting, hot) : fitting;
+    const int64_t rows_at_once =
+        canvas->ground && scene->n_triangles < TL_FEW_TRIANGLES ? min64(fitting, hot) : fitting;
     for (int64_t row = 0; row < window->height; row += rows_at_once) {
         tl_window band = *window;
         tl_canvas part = *canvas;

@@ -24,8 +24,8 @@
 #define TL_WALK(name) name##_128
 #include "raster/walk.h"
 
-/* One triangle of any size, by the ends of TL_LANES rows at a time in float64: as above, exact while |2E| < 2^51, for then
- * |v / d| * 2^-52 < 0.5 / d. */
+/* One triangle of any size, by the ends of TL_LANES rows at a time in float64: as above, exact while |2E| < 2^51, for
+ * then |v / d| * 2^-52 < 0.5 / d. */
 TL_INLINE int rows_fit(const tl_triangle *t, const tl_window *window, int with_border)
 {
     const double around = with_border ? (double)((int64_t)2 << window->subpixel_bits) : 0.0;
@@ -93,16 +93,21 @@ TL_INLINE vi names_of(const tl_scene *scene, vm m, vi id)
 {
     return vi_add(scene->names ? vi_gather(m, scene->names, id) : id, vi_set1(scene->first_id));
 }
-TL_INLINE int32_t name_of(const tl_scene *scene, int32_t id) { return (scene->names ? scene->names[id] : id) + scene->first_id; }
+TL_INLINE int32_t name_of(const tl_scene *scene, int32_t id)
+{
+    return (scene->names ? scene->names[id] : id) + scene->first_id;
+}
 
 /* Whether a triangle that is set up is walked by float64 row ends; if not, sample by sample or by exact row ends. */
 TL_INLINE int takes_rows(const tl_triangle *t, const tl_scene *scene, const tl_window *window, tl_sink sink)
 {
-    return scene->method == TL_METHOD_AUTO && rows_fit(t, window, window->test != TL_TEST_SAMPLE) && (!sink_has_depth(sink) || t->has_plane);
+    return scene->method == TL_METHOD_AUTO && rows_fit(t, window, window->test != TL_TEST_SAMPLE) &&
+           (!sink_has_depth(sink) || t->has_plane);
 }
 TL_INLINE int takes_edge(const tl_triangle *t, const tl_scene *scene)
 {
-    return scene->method == TL_METHOD_EDGE || (scene->method == TL_METHOD_AUTO && t->col1 - t->col0 <= TL_EDGE_MAX_WIDTH);
+    return scene->method == TL_METHOD_EDGE ||
+           (scene->method == TL_METHOD_AUTO && t->col1 - t->col0 <= TL_EDGE_MAX_WIDTH);
 }
 
 /* Counts a triangle as draw_triangle would draw it. */
@@ -110,7 +115,8 @@ TL_INLINE void count_drawn(tl_triangle *t, const tl_scene *scene, const tl_windo
 {
     t->has_plane = 0;
     setup_sink(t, window, census->sink);
-    const tl_class narrow = takes_edge(t, scene) ? TL_CLASS_EDGE_64 : TL_CLASS_SPAN_64, wide = takes_edge(t, scene) ? TL_CLASS_EDGE_128 : TL_CLASS_SPAN_128;
+    const tl_class narrow = takes_edge(t, scene) ? TL_CLASS_EDGE_64 : TL_CLASS_SPAN_64;
+    const tl_class wide = takes_edge(t, scene) ? TL_CLASS_EDGE_128 : TL_CLASS_SPAN_128;
     const tl_class walker = takes_rows(t, scene, window, census->sink) ? TL_CLASS_LONG : t->is_narrow ? narrow : wide;
     count_one(census, walker, t, window->subpixel_bits);
 }
@@ -164,7 +170,8 @@ static row_span square_span(const tl_triangle *t, const tl_window *window, int64
         tl_int128 quotient, remainder;
         if (e.dy[k] == 0)
             continue;
-        floor_divide_128(e.value[k] + e.dx[k] * (row - t->row0), e.dy[k] < 0 ? -e.dy[k] : e.dy[k], &quotient, &remainder);
+        floor_divide_128(e.value[k] + e.dx[k] * (row - t->row0), e.dy[k] < 0 ? -e.dy[k] : e.dy[k], &quotient,
+                         &remainder);
         if (e.dy[k] < 0)
             first = -quotient > first ? -quotient : first;
         else
@@ -176,8 +183,9 @@ static row_span square_span(const tl_triangle *t, const tl_window *window, int64
 }
 
 /* Counts the squares that any of a triangle's pieces meets, or holds: a square may meet several, and counts once. */
-static __attribute__((noinline)) void count_squares(const tl_vertex_set *set, const int32_t *corners, int n_pieces, const tl_scene *scene,
-                                                    const tl_window *window, const tl_target *target)
+static __attribute__((noinline)) void count_squares(const tl_vertex_set *set, const int32_t *corners, int n_pieces,
+                                                    const tl_scene *scene, const tl_window *window,
+                                                    const tl_target *target)
 {
     tl_triangle t[TL_MAX_PIECES];
     int64_t row0 = window->height, row1 = 0;
@@ -207,7 +215,8 @@ static __attribute__((noinline)) void count_squares(const tl_vertex_set *set, co
 }
 
 /* Triangle i, or its pieces, by itself. */
-TL_INLINE void draw_alone(const tl_scene *scene, int64_t i, const tl_window *window, const tl_target *target, tl_sink sink)
+TL_INLINE void draw_alone(const tl_scene *scene, int64_t i, const tl_window *window, const tl_target *target,
+                          tl_sink sink)
 {
     const triangle_parts parts = parts_of(scene, i);
     if (sink == TL_SINK_COUNT && window->test != TL_TEST_SAMPLE && parts.n > 1) {
@@ -218,7 +227,7 @@ TL_INLINE void draw_alone(const tl_scene *scene, int64_t i, const tl_window *win
         draw_triangle(&parts.set, parts.corners + 3 * k, (int32_t)i, scene, window, target, sink);
 }
 
-TL_SINK_COPIES(draw_alone, (const tl_scene *scene, int64_t i, const tl_window *window, const tl_target *target), scene, i, window,
-               target)
+TL_SINK_COPIES(draw_alone, (const tl_scene *scene, int64_t i, const tl_window *window, const tl_target *target), scene,
+               i, window, target)
 
 #endif

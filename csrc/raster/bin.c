@@ -1,8 +1,8 @@
 /* Bin: which triangles reach into which bands of rows, so that a scene is set up once for many samples and bands.
  * In: vertex records and triangles.  Out: the triangles that can be seen, and the first and last band of each.
  *
- * A triangle is listed when a point within reach_fx of its extent, in x and in y, is a centre in the window: more than its samples
- * cover.  Bands are 2^band_bits rows tall. */
+ * A triangle is listed when a point within reach_fx of its extent, in x and in y, is a centre in the window: more than
+ * its samples cover.  Bands are 2^band_bits rows tall. */
 #ifndef TL_BIN_C
 #define TL_BIN_C
 
@@ -25,7 +25,8 @@ typedef struct {
 } bin_limits;
 
 /* Widens the rows [*row0, *row1) of the window by those that a triangle may reach. */
-static void widen_rows(const bin_limits *b, const tl_vertex_set *set, const int32_t *corners, int64_t *row0, int64_t *row1)
+static void widen_rows(const bin_limits *b, const tl_vertex_set *set, const int32_t *corners, int64_t *row0,
+                       int64_t *row1)
 {
     const tl_window *window = b->window;
     const int bits = window->subpixel_bits;
@@ -67,7 +68,8 @@ TL_INLINE int bin_batch(const bin_limits *b, int64_t i, const int32_t *corners, 
         load_vertices(b->scene->mesh.vertices, corners + k, &c.x[k], &c.y[k], &c.z[k]);
     const vi x_min = vi_min(vi_min(c.x[0], c.x[1]), c.x[2]), x_max = vi_max(vi_max(c.x[0], c.x[1]), c.x[2]);
     const vi y_min = vi_min(vi_min(c.y[0], c.y[1]), c.y[2]), y_max = vi_max(vi_max(c.y[0], c.y[1]), c.y[2]);
-    vm alone = vm_or(vi_gt_unsigned(vi_sub(x_max, x_min), max_extent), vi_gt_unsigned(vi_sub(y_max, y_min), max_extent));
+    vm alone =
+        vm_or(vi_gt_unsigned(vi_sub(x_max, x_min), max_extent), vi_gt_unsigned(vi_sub(y_max, y_min), max_extent));
     alone = vm_and(live, vm_or(alone, vi_eq(x_min, vi_set1(TL_SPECIAL))));
     for (unsigned lanes = vm_bits(alone); lanes; lanes &= lanes - 1)
         bin_alone(b, i + __builtin_ctz(lanes), bins);
@@ -113,7 +115,8 @@ static int64_t bin(const tl_scene *scene, const tl_window *window, int32_t reach
     return -1;
 }
 
-/* Lists the triangles of each band, those of band k from starts[k] on to starts[k + 1]; with listed NULL only counts. */
+/* Lists the triangles of each band, those of band k from starts[k] on to starts[k + 1]; with listed NULL only
+ * counts. */
 static void list_bins(const tl_bins *bins, int64_t n_bands, int64_t *starts, int32_t *listed)
 {
     if (!listed) {

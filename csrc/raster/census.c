@@ -11,7 +11,10 @@
 #include "raster/setup.c"
 
 /* The sink that triangles are drawn, or counted, for. */
-TL_INLINE tl_sink sink_of(const tl_target *target, tl_sink sink) { return sink == TL_SINK_CENSUS ? target->census->sink : sink; }
+TL_INLINE tl_sink sink_of(const tl_target *target, tl_sink sink)
+{
+    return sink == TL_SINK_CENSUS ? target->census->sink : sink;
+}
 
 /* What follows is empty for all sinks but the census, so that the code that draws reads without it. */
 
@@ -73,7 +76,8 @@ TL_INLINE void count_unseen_one(const tl_target *target, tl_sink sink, const tl_
     const int64_t x0 = min3(t->x_fx[0], t->x_fx[1], t->x_fx[2]), x1 = max3(t->x_fx[0], t->x_fx[1], t->x_fx[2]);
     const int64_t y0 = min3(t->y_fx[0], t->y_fx[1], t->y_fx[2]), y1 = max3(t->y_fx[0], t->y_fx[1], t->y_fx[2]);
     const int bits = window->subpixel_bits;
-    const int is_empty = (x0 + round.first) >> bits >= (x1 + round.end) >> bits || (y0 + round.first) >> bits >= (y1 + round.end) >> bits;
+    const int is_empty = (x0 + round.first) >> bits >= (x1 + round.end) >> bits ||
+                         (y0 + round.first) >> bits >= (y1 + round.end) >> bits;
     target->census->n[is_empty ? TL_CLASS_BETWEEN : TL_CLASS_OUTSIDE]++;
 }
 

@@ -24,7 +24,8 @@
 #include "raster/setup.c"
 #include "raster/sink.c"
 
-TL_INLINE void draw_one(const tl_scene *scene, int64_t i, const tl_window *window, const tl_target *target, tl_sink sink)
+TL_INLINE void draw_one(const tl_scene *scene, int64_t i, const tl_window *window, const tl_target *target,
+                        tl_sink sink)
 {
     if (sink == TL_SINK_CENSUS)
         draw_alone(scene, i, window, target, sink);
@@ -39,7 +40,8 @@ TL_INLINE void list_others(const batch_state *s, const lane_batch *b, vi id)
 {
     tl_share *share = s->share;
     const batch_limits *limits = &s->limits;
-    const vi first = vi_max(b->top, vi_set1(limits->picture_top)), end = vi_min(b->bottom, vi_set1(limits->picture_bottom));
+    const vi first = vi_max(b->top, vi_set1(limits->picture_top));
+    const vi end = vi_min(b->bottom, vi_set1(limits->picture_bottom));
     const vm is_seen = vm_and(b->drawn, vm_and(vi_gt(b->n_cols, vi_set1(0)), vi_gt(end, first)));
     const vm is_beyond = vm_or(vi_gt(b->row, first), vi_gt(end, vi_set1(limits->bottom)));
     const vm m = vm_or(b->alone, vm_and(is_seen, is_beyond));
@@ -51,7 +53,8 @@ TL_INLINE void list_others(const batch_state *s, const lane_batch *b, vi id)
 TL_INLINE vi shorter_side(const batch_state *s, const lane_batch *b)
 {
     const int bits = s->window->subpixel_bits;
-    const vi first = extent_pixels(b->x_min, s->limits.round.first, bits), end = extent_pixels(b->x_max, s->limits.round.end, bits);
+    const vi first = extent_pixels(b->x_min, s->limits.round.first, bits);
+    const vi end = extent_pixels(b->x_max, s->limits.round.end, bits);
     return vi_min(vi_sub(end, first), vi_sub(b->bottom, b->top));
 }
 
@@ -66,7 +69,8 @@ TL_INLINE void take_out(const batch_state *s, tl_sink sink, lane_batch *b)
     if (sink_has_depth(sink_of(s->target, sink))) {
         const vi size = vi_mul(vi_sub(b->x_max, b->x_min), vi_sub(b->y_max, b->y_min)), one = vi_set1(1);
         const vi box = vi_shift_right(vi_sub(size, one), TL_SLIVER_BITS);
-        const vm sliver = vm_and(b->drawn, vi_gt(box, vi_sub(b->absolute, one))); /* box > area * 2^12, as setup_plane */
+        /* box > area * 2^12, as setup_plane */
+        const vm sliver = vm_and(b->drawn, vi_gt(box, vi_sub(b->absolute, one)));
         b->alone = vm_or(b->alone, sliver);
         b->drawn = vm_and_not(b->drawn, sliver);
     }
@@ -88,7 +92,8 @@ enum { BOX_TINY, BOX_SMALL, BOX_MIDDLE, BOX_ROWS, N_BOXES };
 TL_INLINE void sort_boxes(const lane_batch *b, vm *boxes)
 {
     const vi longer = vi_max(b->n_cols, b->n_rows);
-    const vm over_tiny = vi_gt(longer, vi_set1(2)), over_small = vi_gt(longer, vi_set1(TL_SMALL_BOX)), over = vm_and(b->drawn, over_small);
+    const vm over_tiny = vi_gt(longer, vi_set1(2)), over_small = vi_gt(longer, vi_set1(TL_SMALL_BOX));
+    const vm over = vm_and(b->drawn, over_small);
     const vm beyond = vm_or(vi_gt(b->n_cols, vi_set1(TL_LANES)), vi_gt(b->n_rows, vi_set1(TL_MIDDLE_BOX)));
     boxes[BOX_TINY] = vm_and_not(b->drawn, over_tiny);
     boxes[BOX_SMALL] = vm_and(b->drawn, vm_and_not(over_tiny, over_small));
@@ -160,8 +165,8 @@ TL_INLINE void flush_queues(batch_state *s, tl_sink sink)
 }
 
 /* As start_batch, but for squares and several samples, and for the shares of a picture. */
-TL_INLINE void start_share(batch_state *s, const tl_scene *scene, const tl_window *window, const tl_target *target, tl_share *share,
-                           tl_sink sink)
+TL_INLINE void start_share(batch_state *s, const tl_scene *scene, const tl_window *window, const tl_target *target,
+                           tl_share *share, tl_sink sink)
 {
     const int bits = window->subpixel_bits, of_samples = sink_of(target, sink) == TL_SINK_SAMPLES;
     const int32_t reach = of_samples ? sample_reach(target) : 0;
@@ -182,8 +187,8 @@ TL_INLINE void start_share(batch_state *s, const tl_scene *scene, const tl_windo
 }
 
 /* Every triangle of a share; the window has fewer than 2^31 samples and lies within 2^30 pixels of 0. */
-TL_INLINE void draw_batches(const tl_scene *scene, const tl_window *window, const tl_target *target, tl_share *share, int64_t *bad_row,
-                            tl_sink sink)
+TL_INLINE void draw_batches(const tl_scene *scene, const tl_window *window, const tl_target *target, tl_share *share,
+                            int64_t *bad_row, tl_sink sink)
 {
     batch_state s;
     start_share(&s, scene, window, target, share, sink);
@@ -212,8 +217,8 @@ TL_INLINE void draw_batches(const tl_scene *scene, const tl_window *window, cons
     *bad_row = s.bad_row;
 }
 
-TL_INLINE void draw_scene(const tl_scene *scene, const tl_window *window, const tl_target *target, tl_share *share, int64_t *bad_row,
-                          tl_sink sink)
+TL_INLINE void draw_scene(const tl_scene *scene, const tl_window *window, const tl_target *target, tl_share *share,
+                          int64_t *bad_row, tl_sink sink)
 {
     const int is_centre = window->test == TL_TEST_SAMPLE && sink_of(target, sink) != TL_SINK_SAMPLES;
     const int fits_lanes = is_centre || window->subpixel_bits <= 8;
@@ -228,7 +233,9 @@ TL_INLINE void draw_scene(const tl_scene *scene, const tl_window *window, const 
         draw_one(scene, i, window, target, sink);
 }
 
-TL_SINK_COPIES(draw_scene, (const tl_scene *scene, const tl_window *window, const tl_target *target, tl_share *share, int64_t *bad_row),
+TL_SINK_COPIES(draw_scene,
+               (const tl_scene *scene, const tl_window *window, const tl_target *target, tl_share *share,
+                int64_t *bad_row),
                scene, window, target, share, bad_row)
 
 /* Counts the triangles of a scene by what draw_scene does with them: in its own code. */
@@ -266,7 +273,8 @@ static void clear(const tl_window *window, const tl_target *target)
     }
     for (int64_t row = 0; row < window->height; row++) {
         const int64_t at = row * target->stride_px;
-        memset((int32_t *)target->pixels + at, target->sink == TL_SINK_COUNT ? 0 : 0xff, (size_t)window->width * sizeof(int32_t));
+        memset((int32_t *)target->pixels + at, target->sink == TL_SINK_COUNT ? 0 : 0xff,
+               (size_t)window->width * sizeof(int32_t));
         if (sink_has_depth(target->sink))
             clear_depth(target->depth + at, window->width, farthest);
     }

@@ -1,6 +1,6 @@
 /* Shades a visibility buffer: a picture in light, from light to sRGB; or the normals that shading has, as numbers.
- * In: ids, the scene they were drawn from, materials and lights.  Out: red, green, blue and opacity, uint8; or unit vectors, float32,
- * on the side that is seen, 0 where nothing is. */
+ * In: ids, the scene they were drawn from, materials and lights.  Out: red, green, blue and opacity, uint8; or unit
+ * vectors, float32, on the side that is seen, 0 where nothing is. */
 #ifndef TL_SHADE_C
 #define TL_SHADE_C
 
@@ -18,7 +18,8 @@
 #include "shade/shade_pixels.c"
 #include "shade/srgb.c"
 
-static void start_runs(shade_runs *s, const tl_scene *scene, const tl_window *window, const tl_view *view, const tl_shading *shading)
+static void start_runs(shade_runs *s, const tl_scene *scene, const tl_window *window, const tl_view *view,
+                       const tl_shading *shading)
 {
     int shines = 0, has_texture = 0, is_lit = 0, has_points = 0;
     for (int k = 0; k < shading->n_materials; k++) {
@@ -60,8 +61,8 @@ TL_INLINE vi shaded_word(shaded_lanes *p, int64_t row, const float *depth)
 }
 
 /* The picture of a visibility buffer; rows of window->width. */
-static void shade(const tl_scene *scene, const tl_window *window, const tl_view *view, const tl_shading *shading, const int32_t *ids,
-                  const float *depth, uint8_t *pixels)
+static void shade(const tl_scene *scene, const tl_window *window, const tl_view *view, const tl_shading *shading,
+                  const int32_t *ids, const float *depth, uint8_t *pixels)
 {
     shade_runs s;
     int32_t background;
@@ -90,7 +91,9 @@ static void shade(const tl_scene *scene, const tl_window *window, const tl_view 
 static void set_inverse_w(const tl_source *source, const float *rows, int64_t first, int64_t end, float *restrict out)
 {
     int64_t i = first;
-    for (; TL_LANES > 1 && source->scalar == TL_F32 && source->matrix && i + TL_LANES <= end && i + TL_LANES < source->n; i += TL_LANES) {
+    for (;
+         TL_LANES > 1 && source->scalar == TL_F32 && source->matrix && i + TL_LANES <= end && i + TL_LANES < source->n;
+         i += TL_LANES) {
         vf p[4];
         clip_lanes_f32((const float *)source->data + 3 * i, (const float *)source->matrix, 3, p);
         vf_store_fourths(rows + 4 * i, vf_div(vf_set1(1.0f), p[3]), out + 4 * i);
@@ -104,8 +107,8 @@ static void set_inverse_w(const tl_source *source, const float *rows, int64_t fi
     }
 }
 
-static void shade_normals(const tl_scene *scene, const tl_window *window, const tl_view *view, const tl_shading *shading,
-                          const int32_t *ids, float *restrict out)
+static void shade_normals(const tl_scene *scene, const tl_window *window, const tl_view *view,
+                          const tl_shading *shading, const int32_t *ids, float *restrict out)
 {
     shade_runs s;
     const vf zero = vf_set1(0.0f);
