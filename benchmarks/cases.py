@@ -101,7 +101,8 @@ def add(case: Case) -> None:
 
 def orbit_camera(size: tuple[int, int]) -> NDArray[np.float64]:
     """Clip from object (4, 4): the camera of all mesh scenes, 3 units from the origin, 30 degrees round, 20 up."""
-    from topleft._camera.camera import Camera, orbit_view
+    from topleft._camera.camera import Camera
+    from topleft._camera.matrices import orbit_view
 
     return Camera.perspective(orbit_view([0, 0, 0], 3.0, 30.0, 20.0), near=0.1, far=100.0).clip_from_world(size)
 

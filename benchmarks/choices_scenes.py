@@ -112,7 +112,8 @@ def map_arrays(n: int, size: tuple[int, int], *, is_whole: bool = False) -> Arra
 
 def inside_matrix(size: tuple[int, int]) -> NDArray[np.float64]:
     """Return clip from object for an eye within the sphere."""
-    from topleft._camera.camera import Camera, orbit_view
+    from topleft._camera.camera import Camera
+    from topleft._camera.matrices import orbit_view
 
     view = orbit_view([0, 0, 0], 0.7, 30.0, 20.0)
     return Camera.perspective(view, near=0.05, far=100.0).clip_from_world(size)

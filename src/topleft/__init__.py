@@ -24,7 +24,7 @@ from topleft._model.material import Material
 from topleft._model.mesh import Mesh
 from topleft._model.scene import Instance, Scene
 from topleft._model.texture import Texture
-from topleft._plan.planner import Plan, plan
+from topleft._plan.plan import Plan, plan
 from topleft._raster.classic import bresenham_line
 from topleft._raster.composite import composite
 from topleft._raster.fragments import Fragments

@@ -17,7 +17,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 import numpy.typing as npt
 
-from topleft._camera.poses import bounding_sphere
+from topleft._camera.matrices import bounding_sphere
 from topleft._model.mesh import Mesh
 from topleft.errors import MeshError
 

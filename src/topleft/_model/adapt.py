@@ -14,16 +14,20 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._base.arrays import as_array
-from topleft._model.imported import material_of
+from topleft._base.color import Color
 from topleft._model.material import Material
 from topleft._model.mesh import Mesh, coincident
 from topleft._model.normals import angle_weighted_normals
+from topleft._model.texture import Texture
 
 MeshLike: TypeAlias = Any
 """What `as_mesh` takes."""
 
 CORNERS_OF_CELL = {"triangle": 3, "triangle6": 3, "triangle7": 3, "quad": 4, "quad8": 4, "quad9": 4, "polygon": None}
 """Corners of the surface cells of meshio, which come first in a row; `None`: all of the row."""
+
+DIELECTRIC = 0.04
+"""The share of light that glass, paint and skin reflect when seen along their normal."""
 
 
 class Surface(NamedTuple):
@@ -260,3 +264,45 @@ def _rgba(part: Mesh) -> npt.NDArray[np.uint8]:
     if part.colors is None:
         return np.full((len(part.vertices), 4), 255, dtype=np.uint8)
     return part.colors
+
+
+def material_of(source: Any) -> Material | None:
+    """The material of a trimesh visual: `SimpleMaterial` (MTL) or `PBRMaterial` (glTF); None for anything else."""
+    if hasattr(source, "baseColorFactor"):
+        return _metallic_rough(source)
+    if hasattr(source, "diffuse"):
+        shininess = float(source.glossiness or 0)
+        specular = 0.0 if source.specular is None else float(np.mean(np.asarray(source.specular)[:3])) / 255
+        texture = _texture(source.image)
+        color = None if texture else _rgb(source.diffuse)
+        return Material(color, texture, specular=min(specular, 1.0) if shininess else 0.0, shininess=shininess)
+    return None
+
+
+def _metallic_rough(source: Any) -> Material:
+    factor = source.baseColorFactor
+    texture = _texture(source.baseColorTexture)
+    linear = np.ones(4) if factor is None else np.asarray(factor, dtype=np.float64)
+    if factor is not None and np.asarray(factor).dtype.kind in "iu":
+        linear = linear / 255
+    encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+    roughness = 1.0 if source.roughnessFactor is None else float(source.roughnessFactor)
+    alpha = max(roughness, 0.05) ** 2
+    shininess = max(2 / alpha**2 - 2, 0.0)
+    specular = min(DIELECTRIC * (shininess + 8) / 8, 1.0) if roughness < 1 else 0.0
+    cutoff = None
+    if source.alphaMode == "MASK":
+        cutoff = 0.5 if source.alphaCutoff is None else float(source.alphaCutoff)
+    color = None if factor is None else _rgb(np.rint(255 * encoded.clip(0, 1)))
+    return Material(color, texture, specular=specular, shininess=shininess, alpha_cutoff=cutoff)
+
+
+def _texture(image: Any) -> Texture | None:
+    if image is None:
+        return None
+    return Texture(np.asarray(image.convert("RGBA")))
+
+
+def _rgb(values: Any) -> Color:
+    red, green, blue = (int(value) for value in np.asarray(values)[:3])
+    return red, green, blue

@@ -20,8 +20,8 @@ from topleft._io.images import PICTURE_SUFFIXES, save_image
 from topleft.cli.animation import check_animation, save_animation
 from topleft.cli.arguments import UsageError
 from topleft.cli.job_file import read_jobs
-from topleft.cli.plan import Shoot, check_targets, plan_shoots
 from topleft.cli.sheet import make_sheet
+from topleft.cli.targets import Shoot, check_targets, plan_shoots
 from topleft.errors import MissingPackageError, TopleftError
 
 if TYPE_CHECKING:

@@ -9,12 +9,10 @@ import argparse
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from topleft._base.options import Sampling
 from topleft._batch.jobs import Job
@@ -91,7 +89,7 @@ class Orbit:
     def __call__(self, mesh: Mesh, size: tuple[int, int]) -> Camera:
         """Return it."""
         return Camera.framing(
-            mesh if not len(mesh.triangles) else outermost(mesh),
+            mesh,
             azimuth_deg=self.azimuth_deg,
             elevation_deg=self.elevation_deg,
             fov_y_deg=self.fov_y_deg,
@@ -99,20 +97,6 @@ class Orbit:
             ortho=self.ortho,
             aspect=size[0] / size[1],
         )
-
-
-@lru_cache(maxsize=4)
-def outermost(mesh: Mesh) -> npt.NDArray[np.floating[Any]]:
-    """The vertices in use (7, 3) that frame a mesh: two on each side of its box, and the farthest from its centre.
-
-    A camera that frames them is the same to the bit, and a turntable need not look at all vertices for every view.
-    """
-    points = mesh.vertices[mesh.triangles.ravel()]
-    rows = np.concatenate([points.argmin(axis=0), points.argmax(axis=0)])
-    exact = np.asarray(points, np.float64)
-    center = exact.min(axis=0) / 2 + exact.max(axis=0) / 2
-    farthest = ((exact - center) ** 2).sum(axis=1).argmax()
-    return points[np.append(rows, farthest)]
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from surface_samples import nearest_squared, points_on, sampled_distance
 
 from topleft import _engine, scenes
-from topleft._lod import surface_distance
-from topleft._lod.surface_distance import LEAST, SHARE, Surface, measure
+from topleft._lod import distance
+from topleft._lod.distance import LEAST, SHARE, Surface, measure
 
 ORIGIN = np.zeros(3)
 SQUARE = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]), np.array([[0, 1, 2], [0, 2, 3]], np.int32)
@@ -116,7 +116,7 @@ def test_measure_does_not_depend_on_threads_or_instruction_set(monkeypatch):
         for isa in _engine.isa_available():
             _engine.use_isa(isa)
             for threads in (1, 2, 3):
-                monkeypatch.setattr(surface_distance, "available_threads", lambda n=threads: n)
+                monkeypatch.setattr(distance, "available_threads", lambda n=threads: n)
                 found.add(measure(surface(points, triangles), surface(shaken, triangles)))
     finally:
         _engine.use_isa(in_use)

@@ -1,6 +1,6 @@
 """How far two surfaces lie apart: bounds on the two-sided Hausdorff distance, that hold for every point of both.
 
-In: points and triangles of two surfaces. Out: `Apart`: a distance that is met, and one that is not passed.
+In: points and triangles of two surfaces. Out: `DistanceBounds`: a distance that is met, and one that is not passed.
 
 The kernels (`csrc/mesh/nearest.c`, `reach.c`) look at triangles by branch and bound; this file puts the triangles of a
 surface in an order that keeps neighbours together, cuts the work in blocks, and adds what rounding may hide.
@@ -41,7 +41,7 @@ MOST_SAMPLES = 1 << 18
 PLACE_BITS = 11
 
 
-class Apart(NamedTuple):
+class DistanceBounds(NamedTuple):
     """How far two surfaces lie apart, in their own unit: `known <= distance <= bound`, but for rounding on the left."""
 
     known: float
@@ -110,12 +110,12 @@ class Surface:
         return max(run_parts(find, n_blocks(len(points)), available_threads()))
 
 
-def measure(one: Surface, other: Surface) -> Apart:
+def measure(one: Surface, other: Surface) -> DistanceBounds:
     """Bounds on the Hausdorff distance between two surfaces: of what is farthest from the other, either way.
 
     Returns
     -------
-    Apart
+    DistanceBounds
         `bound` holds for every point of both, rounding included.
     """
     ends = [(one, other), (other, one)]
@@ -126,7 +126,7 @@ def measure(one: Surface, other: Surface) -> Apart:
     largest = max(float(np.abs(surface.points).max()) for surface, _ in ends)
     # A corner of a piece has been cut out of one that was cut out of another: at most as often as there are pieces.
     rounding = (ROUNDING_OF_CUT * n_pieces + ROUNDING_OF_FOOT) * largest
-    return Apart(known, bound * (1 + ROUNDING_OF_ROOT) + rounding)
+    return DistanceBounds(known, bound * (1 + ROUNDING_OF_ROOT) + rounding)
 
 
 def reach(source: Surface, target: Surface, known: float, least: float) -> Reach:

@@ -13,9 +13,7 @@ from topleft._base.options import Sampling, Sink
 from topleft._base.threads import available_threads
 from topleft._lod.detail import Detail
 from topleft._plan.costs import Costs, features, sink_group
-from topleft._plan.plan_clusters import ClusterFacts
-from topleft._plan.plan_facts import Facts
-from topleft._plan.plan_memory import memory_of
+from topleft._plan.facts import ClusterFacts, Facts, memory_of
 from topleft._raster import choices
 from topleft._raster.choices import MIN_THREAD_NS
 from topleft.methods import METHODS

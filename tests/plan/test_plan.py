@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,10 @@ import topleft as tl
 from topleft import _engine
 from topleft._base.memory import KeptMemory
 from topleft._engine.isa import build_info
-from topleft._plan import costs, planner
+from topleft._plan import costs
+from topleft._plan.facts import find_facts
+from topleft._plan.plan import Plan
+from topleft._raster.view import View
 from topleft.scenes import random_triangles, shape
 
 SIZE = (320, 200)
@@ -67,7 +71,7 @@ def test_every_triangle_is_of_one_class(outputs, cull):
         n = int(rng.integers(1, 100))
         clip = np.concatenate([rng.uniform(-2, 2, (3 * n, 3)), rng.uniform(-0.5, 2, (3 * n, 1))], axis=1)
         plan = tl.plan(clip, np.arange(3 * n).reshape(n, 3), SIZE, outputs=outputs, cull=cull)
-        facts, _ = planner.find_facts(clip, np.arange(3 * n).reshape(n, 3), plan._view, plan.verb, (), None)
+        facts, _ = find_facts(clip, np.arange(3 * n).reshape(n, 3), plan._view, plan.verb, (), None)
         assert 0 <= facts.n_beyond <= min(n, facts.n_clipped)
         assert facts.n_cut <= n
 
@@ -78,8 +82,8 @@ def test_what_covers_is_about_what_is_counted(isa):
     _engine.use_isa(isa)
     try:
         vertices, triangles, _ = random_triangles(3000, 12, *SIZE)
-        facts, _ = planner.find_facts(
-            vertices, triangles, planner.View.parse(SIZE, {}), "overdraw", ("overdraw",), None
+        facts, _ = find_facts(
+            vertices, triangles, View.parse(SIZE, {}), "overdraw", ("overdraw",), None
         )
         drawn = tl.overdraw(vertices, triangles, SIZE).sum()
         assert drawn == pytest.approx(facts.covered, rel=0.05)  # areas against samples, and boxes cut by the frame
@@ -141,9 +145,9 @@ def test_memory_is_told_to_the_byte(monkeypatch, outputs, sampling, threads):
     vertices, triangles, _ = random_triangles(900, 12, *SIZE)
     plan = tl.plan(vertices, triangles.astype(np.int64), SIZE, outputs=outputs, sampling=sampling, threads=threads)
     memory = Counted()
-    plan_less = planner.replace(plan._view)
-    monkeypatch.setattr(planner.Plan, "fitted", lambda *_: plan_less)
-    planner.run(plan, memory)
+    plan_less = replace(plan._view)
+    monkeypatch.setattr(Plan, "fitted", lambda *_: plan_less)
+    plan._run(memory)
     assert sum(memory.bytes.values()) == sum(plan.scratch_bytes.values()) + sum(plan.result_bytes.values())
     assert set(plan.scratch_bytes) <= set(memory.bytes)
 

@@ -1,6 +1,6 @@
-"""What a scene is, found by the code that draws it: transform, clip and snap, then a census instead of a draw.
+"""Finds what decides how triangles are drawn: transform, clip and snap as in the draw, then a census in its place.
 
-In: the arrays of a call. Out: `Facts`, which `plan_stages` turns into sentences.
+In: the arrays of a call, or a mesh. Out: `Facts`, which `stages.py` turns into sentences; the bytes that a call needs.
 """
 
 from __future__ import annotations
@@ -10,22 +10,47 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from topleft import _engine
 from topleft._base.arrays import as_array
 from topleft._base.memory import FreshMemory
 from topleft._base.options import DepthTest, Sampling, Sink
-from topleft._plan.plan_clusters import ClusterFacts
+from topleft._model.mesh import Mesh
 from topleft._raster import choices
+from topleft._raster.clustered import ClusteredScene
+from topleft._raster.clusters import Clusters
 from topleft._raster.sampling import sample_positions
 from topleft._raster.snap import check_triangles, snap_scene
 from topleft._raster.view import View
 
-__all__ = ["CLASSES", "Facts", "find_facts"]
+__all__ = ["CLASSES", "ClusterFacts", "Facts", "find_cluster_facts", "find_facts", "memory_of"]
 
 #: The names of `tl_class` in ``csrc/topleft.h``.
 CLASSES = (
     "degenerate", "culled", "outside", "between", "tiny", "small", "middle", "rows", "long",
     "edge 64", "span 64", "edge 128", "span 128",
 )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class ClusterFacts:
+    """How the clusters of a mesh fare in a view.
+
+    Attributes
+    ----------
+    clusters : Clusters or None
+        What is drawn from; None when the mesh is drawn whole.
+    why_not : str
+        Why it is.
+    n_outside, n_turned, n_hidden, n_drawn : int
+        Clusters outside of the picture, turned away, hidden, and drawn.
+    """
+
+    clusters: Clusters | None
+    why_not: str = ""
+    n_outside: int = 0
+    n_turned: int = 0
+    n_hidden: int = 0
+    n_drawn: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,3 +191,72 @@ def find_sink(verb: str, view: View, test: DepthTest | None, *, has_depth: bool)
     if verb == "overdraw" or view.sampling is Sampling.AREA:
         return Sink.COUNT
     return Sink.SAMPLES if view.sampling.n_samples > 1 else Sink.MASK
+
+
+def find_cluster_facts(mesh: Mesh, view: View, verb: str, test: DepthTest | None) -> ClusterFacts:
+    """Return what `rasterize_mesh` does from the second picture of a mesh on; clusters are made for it if need be."""
+    n_triangles = len(mesh.triangles)
+    if verb != "rasterize":
+        return ClusterFacts(None, f"{verb} draws arrays, which may change")
+    if view.sampling is not Sampling.CENTER:
+        return ClusterFacts(None, "with several samples a pixel, bands of rows are drawn, a sample after the other")
+    sink = choices.fragment_sink(test, has_depth=True)
+    if not choices.can_cluster(view, sink):
+        return ClusterFacts(None, "the order of the triangles matters, or the window lies too far off")
+    if not choices.pays_to_cluster(n_triangles, 1):
+        return ClusterFacts(None, f"{n_triangles:,} triangles are done before sorting them would pay")
+    clusters = mesh.clusters
+    seen = ClusteredScene(clusters, view)
+    if not choices.pays_to_draw_clusters(view, n_triangles, seen.survey):
+        return ClusterFacts(None, "most of the mesh shows, and drawing that cluster by cluster takes longer")
+    n, found = len(clusters), seen.survey(len(clusters))
+    n_outside, n_turned, n_drawn = round(found.outside * n), round(found.turned * n), seen.count_drawn(sink)
+    return ClusterFacts(clusters, "", n_outside, n_turned, n - n_outside - n_turned - n_drawn, n_drawn)
+
+
+def memory_of(facts: Facts) -> tuple[dict[str, int], dict[str, int]]:
+    """Return the bytes of scratch, which is kept from call to call, and of results, by name.
+
+    What only the data can tell comes on top: a table of vertices beyond 2**30 sub-pixels, 16 bytes a vertex; the pieces
+    of cut triangles, about 100 bytes each; with several samples a pixel, triangles in several bands of rows.
+    """
+    view, n = facts.view, facts.n_triangles
+    width, height = view.size
+    n_pixels, n_samples = width * height, view.sampling.n_samples
+    is_empty = n_pixels == 0
+    scratch = {"records": 0 if is_empty or not n else _engine.VERTEX_BYTES * facts.n_vertices}
+    if facts.index_dtype not in ("int32", "uint32"):
+        scratch["triangles"] = 12 * n
+    results = result_bytes(facts)
+    if facts.sink in (Sink.MASK, Sink.SAMPLES) and not is_empty:
+        scratch["covered"] = 8 * height * _engine.Target.covered_shape(height, width, n_samples)[1]
+    if view.sampling is Sampling.AREA:
+        strips = facts.n_threads * _engine.blend_cells(width)
+        scratch["cells"] = 4 * (strips if facts.verb == "fill" else height * _engine.area_stride(width))
+    elif facts.verb == "fill" and n_samples == 1 and n and not facts.is_direct:
+        scratch["labels"] = 4 * n_pixels
+    elif facts.draws_planes and not is_empty and n and choices.can_share(view):
+        scratch["bins"] = 12 * (n + 16)
+        scratch["bands"] = 4 * (n + 1)
+    found = facts.clusters
+    if found is not None and found.clusters is not None:  # the records are not needed, unless a plane cuts
+        scratch["records"] = 0 if not facts.n_clipped else scratch["records"]
+        scratch["clusters"] = 12 * len(found.clusters) + 4 * facts.n_threads * n + found.clusters.n_bytes
+    elif facts.is_shared:
+        scratch["others"] = 4 * (n + 16 * facts.n_threads)
+    return scratch, results
+
+
+def result_bytes(facts: Facts) -> dict[str, int]:
+    """Return the bytes of what the verb returns; colours have four bytes a pixel."""
+    width, height = facts.view.size
+    n_pixels, n_samples = width * height, facts.view.sampling.n_samples
+    many = facts.view.sampling is Sampling.AREA or n_samples > 1
+    if facts.verb == "rasterize":
+        return {"triangle": 4 * n_pixels * n_samples, "depth": 4 * n_pixels * n_samples}
+    if facts.verb == "fill":
+        planes = {"sample labels": 4 * n_pixels * n_samples} if n_samples > 1 else {}
+        return {"color": 4 * n_pixels, **planes}
+    if facts.verb == "overdraw":
+        return {"overdraw": 4 * n_pixels * n_samples}
+    return {"coverage": (4 if many else 1) * n_pixels}

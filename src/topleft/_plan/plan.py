@@ -22,13 +22,13 @@ from topleft._lod.detail import choose_detail
 from topleft._model.adapt import MeshLike
 from topleft._model.mesh import Mesh
 from topleft._plan.costs import load_costs
-from topleft._plan.plan_clusters import find_cluster_facts
-from topleft._plan.plan_facts import CLASSES, find_facts
-from topleft._plan.plan_memory import memory_of
-from topleft._plan.plan_stages import Stage, find_stages, plan_detail
-from topleft._plan.plan_table import as_html, as_text
+from topleft._plan.facts import CLASSES, find_cluster_facts, find_facts, memory_of
+from topleft._plan.stages import Stage, find_stages, plan_detail
+from topleft._plan.table import as_html, as_text
 from topleft._raster.classic import refuse_classic
 from topleft._raster.clusters import Clusters
+from topleft._raster.fill import Style, draw_fill
+from topleft._raster.rasterize import draw_coverage, draw_fragments, draw_overdraw
 from topleft._raster.view import CULL_CODES, View, ViewOptions
 from topleft.methods import METHODS
 
@@ -181,11 +181,27 @@ class Plan:
         memory = KeptMemory()
         best: dict[str, int] = {}
         for _ in range(n_rounds + 1):  # the first one touches the memory
-            run(self, memory)
+            self._run(memory)
             if not best or sum(self._clock.ns.values()) < sum(best.values()):
                 best = self._clock.ns
         self._clock.ns = best
         return self
+
+    def _run(self, memory: KeptMemory) -> None:
+        """Draw the scene."""
+        vertices, depth_test = self._arguments
+        view = self.fitted(self._view)
+        if self.verb == "coverage":
+            draw_coverage(memory, vertices, self._triangles, view, None)
+        elif self.verb == "overdraw":
+            draw_overdraw(memory, vertices, self._triangles, view, None)
+        elif self.verb == "rasterize":
+            draw_fragments(memory, vertices, self._triangles, view, depth_test, None, None)
+        else:
+            colors = np.full((self.n_triangles, 4), 128, np.uint8)
+            style = Style("triangle", None, "replace", "straight", "values")
+            self._clock.start()
+            draw_fill(memory, vertices, self._triangles, colors, view, style, None)
 
     def fitted(self, view: View) -> View:
         """Return the view of a call with this plan.
@@ -243,26 +259,6 @@ class Plan:
     def mark(self, stage: str) -> None:
         """Note that a stage has ended."""
         self._clock.mark(stage)
-
-
-def run(plan: Plan, memory: KeptMemory) -> None:
-    """Draw the scene of a plan."""
-    from topleft._raster.fill import Style, draw_fill
-    from topleft._raster.rasterize import draw_coverage, draw_fragments, draw_overdraw
-
-    vertices, depth_test = plan._arguments
-    view = plan.fitted(plan._view)
-    if plan.verb == "coverage":
-        draw_coverage(memory, vertices, plan._triangles, view, None)
-    elif plan.verb == "overdraw":
-        draw_overdraw(memory, vertices, plan._triangles, view, None)
-    elif plan.verb == "rasterize":
-        draw_fragments(memory, vertices, plan._triangles, view, depth_test, None, None)
-    else:
-        colors = np.full((plan.n_triangles, 4), 128, np.uint8)
-        style = Style("triangle", None, "replace", "straight", "values")
-        plan._clock.start()
-        draw_fill(memory, vertices, plan._triangles, colors, view, style, None)
 
 
 def plan(
