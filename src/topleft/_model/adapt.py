@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._base.arrays import as_array
-from topleft._base.color import Color
+from topleft._base.color import Color, encode_srgb
 from topleft._model.material import Material
 from topleft._model.mesh import Mesh, coincident
 from topleft._model.normals import angle_weighted_normals
@@ -285,7 +285,6 @@ def _metallic_rough(source: Any) -> Material:
     linear = np.ones(4) if factor is None else np.asarray(factor, dtype=np.float64)
     if factor is not None and np.asarray(factor).dtype.kind in "iu":
         linear = linear / 255
-    encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
     roughness = 1.0 if source.roughnessFactor is None else float(source.roughnessFactor)
     alpha = max(roughness, 0.05) ** 2
     shininess = max(2 / alpha**2 - 2, 0.0)
@@ -293,7 +292,7 @@ def _metallic_rough(source: Any) -> Material:
     cutoff = None
     if source.alphaMode == "MASK":
         cutoff = 0.5 if source.alphaCutoff is None else float(source.alphaCutoff)
-    color = None if factor is None else _rgb(np.rint(255 * encoded.clip(0, 1)))
+    color = None if factor is None else _rgb(np.rint(255 * encode_srgb(linear).clip(0, 1)))
     return Material(color, texture, specular=specular, shininess=shininess, alpha_cutoff=cutoff)
 
 

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine
 from topleft._base.arrays import as_array
-from topleft._base.memory import FreshMemory
+from topleft._base.memory import FRESH
 from topleft._base.options import DepthTest, Sampling, Sink
 from topleft._model.mesh import Mesh
 from topleft._raster import choices
@@ -132,7 +132,7 @@ def find_facts(
         As the verb would.
     """
     with_depth = verb == "rasterize"
-    snapped = snap_scene(FreshMemory(), vertices, triangles, view, with_depth=with_depth, out=None)
+    snapped = snap_scene(FRESH, vertices, triangles, view, with_depth=with_depth, out=None)
     check_triangles(triangles, snapped.corners, snapped.n_vertices)
     given, indices = as_array("vertices", vertices), as_array("triangles", triangles)
     inputs = snapped.inputs
