@@ -8,7 +8,7 @@ from surface_samples import nearest_squared, points_on, sampled_distance
 
 from topleft import _engine, scenes
 from topleft._lod import distance
-from topleft._lod.distance import LEAST, SHARE, Surface, measure
+from topleft._lod.distance import LEAST, SHARE, TriangleTree, measure
 
 ORIGIN = np.zeros(3)
 SQUARE = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]), np.array([[0, 1, 2], [0, 2, 3]], np.int32)
@@ -18,7 +18,7 @@ ROUNDING = 2.0**-40
 
 
 def surface(points, triangles):
-    return Surface.of_mesh(np.asarray(points, np.float64), np.asarray(triangles, np.int32), ORIGIN)
+    return TriangleTree.of_mesh(np.asarray(points, np.float64), np.asarray(triangles, np.int32), ORIGIN)
 
 
 def corners(one):

@@ -56,7 +56,7 @@ class Reach(NamedTuple):
     n_pieces: int
 
 
-class Surface:
+class TriangleTree:
     """Triangles among which the nearest are found.
 
     Parameters
@@ -70,7 +70,7 @@ class Surface:
         self.points, self.triangles = np.ascontiguousarray(points), np.ascontiguousarray(triangles)
 
     @classmethod
-    def of_mesh(cls, vertices: npt.NDArray[Any], triangles: I32, center: F64) -> Surface:
+    def of_mesh(cls, vertices: npt.NDArray[Any], triangles: I32, center: F64) -> TriangleTree:
         """The surface of a mesh, without the vertices that no triangle uses, moved so that `center` is the origin."""
         points, corners = welded(vertices, triangles)
         return cls(points - center, corners)
@@ -110,7 +110,7 @@ class Surface:
         return max(run_parts(find, n_blocks(len(points)), available_threads()))
 
 
-def measure(one: Surface, other: Surface) -> DistanceBounds:
+def measure(one: TriangleTree, other: TriangleTree) -> DistanceBounds:
     """Bounds on the Hausdorff distance between two surfaces: of what is farthest from the other, either way.
 
     Returns
@@ -129,7 +129,7 @@ def measure(one: Surface, other: Surface) -> DistanceBounds:
     return DistanceBounds(known, bound * (1 + ROUNDING_OF_ROOT) + rounding)
 
 
-def reach(source: Surface, target: Surface, known: float, least: float) -> Reach:
+def reach(source: TriangleTree, target: TriangleTree, known: float, least: float) -> Reach:
     """How far the points of one surface are from another, and the roundings that are in it."""
     n, tree = len(source.triangles), target.tree
 
@@ -154,7 +154,7 @@ def blocks(first: int, end: int, n: int) -> list[tuple[int, int]]:
     return [(i, min(i + BLOCK, n)) for i in range(first * BLOCK, min(end * BLOCK, n), BLOCK)]
 
 
-def some_points(surface: Surface) -> F64:
+def some_points(surface: TriangleTree) -> F64:
     """At most about `MOST_SAMPLES` points of a surface: what is known of them only spares work."""
     step = max(1, len(surface.points) // MOST_SAMPLES)
     return np.ascontiguousarray(surface.points[::step])

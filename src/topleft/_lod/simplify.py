@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from topleft import _engine
 from topleft._lod.collapse import MOST_TO_COLLAPSE, STUCK, Collapsed, border_points, collapse, collapser
-from topleft._lod.distance import Surface, measure, welded
+from topleft._lod.distance import TriangleTree, measure, welded
 from topleft._lod.levels import Level, Levels, keep_levels, kept_levels
 from topleft._model.mesh import FloatArray, Mesh, coincident
 from topleft._model.normals import unit_or_zero
@@ -127,14 +127,14 @@ def coarser_levels(mesh: Mesh, ratio: float, smallest: int) -> list[Level]:
     corners = corners_of(mesh)
     center = corners.points.min(axis=0) / 2 + corners.points.max(axis=0) / 2 if len(corners.points) else np.zeros(3)
     has_more = bool(corners.attributes) or corners.material is not None
-    anchor: Surface | None = None
+    anchor: TriangleTree | None = None
     bound_of_anchor = 0.0
     while n_wanted := wanted_of(corners.triangles, ratio, smallest):
         if anchor is None:  # without attributes the corners are welded already
             anchor = (
-                Surface.of_mesh(mesh.vertices, mesh.triangles, center)
+                TriangleTree.of_mesh(mesh.vertices, mesh.triangles, center)
                 if has_more
-                else Surface(corners.points - center, corners.triangles)
+                else TriangleTree(corners.points - center, corners.triangles)
             )
         n_before = len(corners.triangles)
         collapsed = collapse(corners.points, corners.triangles, n_wanted, with_pairs=has_more)
@@ -142,7 +142,7 @@ def coarser_levels(mesh: Mesh, ratio: float, smallest: int) -> list[Level]:
             break
         corners = stored(next_corners(corners, collapsed), mesh)
         level = level_mesh(corners, mesh)
-        surface = Surface.of_mesh(level.vertices, level.triangles, center)
+        surface = TriangleTree.of_mesh(level.vertices, level.triangles, center)
         apart = measure(anchor, surface)
         bound = bound_of_anchor + apart.bound
         if found and bound > (n_before / len(corners.triangles)) ** MOST_POWER * found[-1].bound:

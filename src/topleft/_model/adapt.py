@@ -1,7 +1,7 @@
 """Adapters: the meshes of other libraries, told by their attributes, as a `Mesh`; none of those libraries is imported.
 
 Input: `trimesh.Trimesh` and `trimesh.Scene`, `meshio.Mesh`, `pyvista.PolyData`, `matplotlib.tri.Triangulation`,
-anything with `vertices` and `triangles` (or `faces`), or a pair of arrays. Output: `Mesh`, or `Surface` where points
+anything with `vertices` and `triangles` (or `faces`), or a pair of arrays. Output: `Mesh`, or `Polygons` where points
 may be flat. Arrays are taken without a copy where their numbers allow it.
 """
 
@@ -30,7 +30,7 @@ DIELECTRIC = 0.04
 """The share of light that glass, paint and skin reflect when seen along their normal."""
 
 
-class Surface(NamedTuple):
+class Polygons(NamedTuple):
     """Points, and triangles that know which face they were cut from."""
 
     points: npt.NDArray[Any]
@@ -83,14 +83,14 @@ def as_mesh(subject: MeshLike) -> Mesh:
         return joined(parts)
     if hasattr(subject, "visual") and hasattr(subject, "faces"):
         return placed(subject, np.eye(4))
-    surface = as_surface(subject)
-    points = surface.points
+    polygons = as_polygons(subject)
+    points = polygons.points
     if points.ndim == 2 and points.shape[1] == 2:
         points = np.column_stack([points, np.zeros(len(points))])
-    return Mesh(points, surface.triangles)
+    return Mesh(points, polygons.triangles)
 
 
-def as_surface(subject: MeshLike) -> Surface:
+def as_polygons(subject: MeshLike) -> Polygons:
     """The points and triangles of a subject that `as_mesh` takes; points stay flat where they are.
 
     Raises
@@ -131,21 +131,21 @@ def _is_scene(subject: object) -> bool:
     return hasattr(subject, "geometry") and hasattr(subject, "graph")
 
 
-def _plain(vertices: npt.ArrayLike, triangles: npt.ArrayLike) -> Surface:
+def _plain(vertices: npt.ArrayLike, triangles: npt.ArrayLike) -> Polygons:
     corners = as_array("triangles", triangles)
-    return Surface(as_array("vertices", vertices), corners, None, len(corners))
+    return Polygons(as_array("vertices", vertices), corners, None, len(corners))
 
 
-def _of_triangulation(subject: Any) -> Surface:
+def _of_triangulation(subject: Any) -> Polygons:
     points = np.column_stack([as_array("x", subject.x), as_array("y", subject.y)])
     triangles, mask = as_array("triangles", subject.triangles), getattr(subject, "mask", None)
     if mask is None:
-        return Surface(points, triangles, None, len(triangles))
+        return Polygons(points, triangles, None, len(triangles))
     kept = np.flatnonzero(~np.asarray(mask))
-    return Surface(points, triangles[kept], kept, len(triangles))
+    return Polygons(points, triangles[kept], kept, len(triangles))
 
 
-def _of_cells(points: npt.NDArray[Any], blocks: Iterable[Any]) -> Surface:
+def _of_cells(points: npt.NDArray[Any], blocks: Iterable[Any]) -> Polygons:
     """Triangles of the surface cells of meshio, block after block."""
     blocks = list(blocks)
     surfaces = [block for block in blocks if block.type in CORNERS_OF_CELL]
@@ -156,16 +156,16 @@ def _of_cells(points: npt.NDArray[Any], blocks: Iterable[Any]) -> Surface:
     return _fans(points, found)
 
 
-def _of_padded(subject: Any) -> Surface:
+def _of_padded(subject: Any) -> Polygons:
     """Triangles of the faces of pyvista: one array, before each face its number of corners."""
     points, padded = as_array("points", subject.points), as_array("faces", subject.faces)
     if padded.ndim == 2:
-        return Surface(points, padded, None, len(padded))
+        return Polygons(points, padded, None, len(padded))
     if getattr(subject, "n_strips", 0):
         raise ValueError("mesh has strips of triangles: take its triangulate()")
     if padded.size % 4 == 0 and (padded[::4] == 3).all():
         triangles = padded.reshape(-1, 4)[:, 1:]
-        return Surface(points, triangles, None, len(triangles))
+        return Polygons(points, triangles, None, len(triangles))
     faces, start = [], 0
     while start < len(padded):
         faces.append(padded[None, start + 1 : start + 1 + padded[start]])
@@ -173,11 +173,11 @@ def _of_padded(subject: Any) -> Surface:
     return _fans(points, faces)
 
 
-def _fans(points: npt.NDArray[Any], blocks: list[npt.NDArray[Any]]) -> Surface:
+def _fans(points: npt.NDArray[Any], blocks: list[npt.NDArray[Any]]) -> Polygons:
     """Faces (N, K) as K - 2 triangles each."""
     if all(block.shape[1] == 3 for block in blocks):
         triangles = blocks[0] if len(blocks) == 1 else np.concatenate(blocks)
-        return Surface(points, triangles, None, len(triangles))
+        return Polygons(points, triangles, None, len(triangles))
     fans, sources, n_faces = [], [], 0
     for block in blocks:
         n, n_corners = block.shape
@@ -186,7 +186,7 @@ def _fans(points: npt.NDArray[Any], blocks: list[npt.NDArray[Any]]) -> Surface:
         fans.append(block[:, fan].reshape(-1, 3))
         sources.append(np.repeat(np.arange(n_faces, n_faces + n), len(steps)))
         n_faces += n
-    return Surface(points, np.concatenate(fans), np.concatenate(sources), n_faces)
+    return Polygons(points, np.concatenate(fans), np.concatenate(sources), n_faces)
 
 
 def placed(geometry: Any, transform: npt.NDArray[np.float64]) -> Mesh:

@@ -12,14 +12,14 @@ from topleft._plan.costs import save_costs
 from topleft._plan.plan import plan
 from topleft._render.render import DEFAULT_SIZE
 from topleft.cli.arguments import positive, size, tolerance
-from topleft.cli.targets import Orbit, Source
+from topleft.cli.targets import Orbit, MeshSource
 
 __all__ = ["add_plan_commands", "run_calibrate", "run_explain"]
 
 
 def run_explain(options: argparse.Namespace) -> int:
     """Print how a view of a mesh is drawn: what is chosen at each stage, why, and what it takes."""
-    mesh = Source(options.mesh)()
+    mesh = MeshSource(options.mesh)()
     orbit = Orbit(options.azimuth, options.elevation, options.fov, options.up, options.ortho)
     camera = orbit(mesh, options.size)
     outputs = {"fill": ("color",), "rasterize": ("triangle", "depth")}.get(options.verb, (options.verb,))

@@ -1,6 +1,6 @@
-"""What is to be written where, before anything is: from arguments to jobs.
+"""Finds which picture goes to which file, before anything is drawn: from arguments to jobs.
 
-Input: parsed arguments. Output: a list of `Shoot`, each a mesh with its jobs.
+Input: parsed arguments. Output: a list of `MeshJobs`.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ from topleft.cli.arguments import UsageError
 from topleft.errors import ImageError, MeshError
 from topleft.scenes import SHAPES, shape
 
-__all__ = ["Shoot", "check_targets", "plan_shoots"]
+__all__ = ["MeshJobs", "check_targets", "plan_jobs"]
 
 SHADINGS_WITH_NUMBERS: Mapping[str, str] = {"ids": "triangle", "depth": "depth", "normals": "camera_normal"}
 """Shadings that are a layer made visible: .npy holds the layer."""
 
 
 @dataclass(frozen=True)
-class Source:
+class MeshSource:
     """The mesh of a file, or the built-in shape of that name."""
 
     name: str
@@ -100,7 +100,7 @@ class Orbit:
 
 
 @dataclass(frozen=True)
-class Shoot:
+class MeshJobs:
     """A mesh and its jobs, one for each view."""
 
     source: str
@@ -108,8 +108,8 @@ class Shoot:
     jobs: tuple[Job, ...]
 
 
-def plan_shoots(options: argparse.Namespace, start: int = 0) -> list[Shoot]:
-    """Return a shoot for each mesh of the arguments; `start` is the index of the first.
+def plan_jobs(options: argparse.Namespace, start: int = 0) -> list[MeshJobs]:
+    """Return the jobs of each mesh of the arguments; `start` is the index of the first mesh.
 
     Raises
     ------
@@ -117,8 +117,8 @@ def plan_shoots(options: argparse.Namespace, start: int = 0) -> list[Shoot]:
         If OUT cannot hold the pictures.
     """
     pattern = _pattern(options.out, options)
-    look = _render_options(options)
-    shoots = []
+    drawing = _render_options(options)
+    groups = []
     for i_mesh, source in enumerate(options.meshes, start):
         name = source if source in SHAPES else Path(source).stem
         jobs = []
@@ -129,15 +129,15 @@ def plan_shoots(options: argparse.Namespace, start: int = 0) -> list[Shoot]:
             orbit = Orbit(azimuth_deg, options.elevation, options.fov, options.up, options.ortho)
             path = filled.replace("{name}", name)
             layers = _layers(path, options)
-            jobs.append(Job(Source(source, options.texture), orbit, options.size, look, path, layers))
-        shoots.append(Shoot(source, name, tuple(jobs)))
-    return shoots
+            jobs.append(Job(MeshSource(source, options.texture), orbit, options.size, drawing, path, layers))
+        groups.append(MeshJobs(source, name, tuple(jobs)))
+    return groups
 
 
 def _render_options(options: argparse.Namespace) -> dict[str, Any]:
     if (options.shading == Shading.MATCAP) != (options.matcap is not None):
         raise UsageError("--shading matcap and --matcap FILE go together")
-    look = {
+    drawing = {
         "shading": options.shading,
         "color": options.color,
         "background": options.background,
@@ -146,12 +146,12 @@ def _render_options(options: argparse.Namespace) -> dict[str, Any]:
         "threads": options.threads,
     }
     if options.matcap is not None:
-        look["matcap"] = read_texture(options.matcap)
+        drawing["matcap"] = read_texture(options.matcap)
     if options.opacity is None:
-        return look | {"edges": options.wireframe, "sampling": options.sampling}
+        return drawing | {"edges": options.wireframe, "sampling": options.sampling}
     if options.wireframe or options.sampling != Sampling.CENTER:
         raise UsageError("--opacity goes with neither --wireframe nor --sampling")
-    return look | {"opacity": options.opacity}
+    return drawing | {"opacity": options.opacity}
 
 
 def _layers(path: str, options: argparse.Namespace) -> tuple[str, ...]:
@@ -183,7 +183,7 @@ def _pattern(out: str, options: argparse.Namespace) -> str:
     return str(path.with_name(stem + path.suffix))
 
 
-def check_targets(shoots: Sequence[Shoot], others: Iterable[Path] = ()) -> None:
+def check_targets(groups: Sequence[MeshJobs], others: Iterable[Path] = ()) -> None:
     """Raise an error if what is to be written cannot be, as far as that shows before anything is.
 
     `others` are files that are written besides: sheets and animations.
@@ -194,7 +194,7 @@ def check_targets(shoots: Sequence[Shoot], others: Iterable[Path] = ()) -> None:
         If two pictures would have the same name, or a picture that of a mesh, or a folder cannot be written to.
     """
     owner_of: dict[str, str] = {}
-    targets = [(file, shoot.source) for shoot in shoots for job in shoot.jobs for file in job.files]
+    targets = [(file, group.source) for group in groups for job in group.jobs for file in job.files]
     targets += [(path, str(path)) for path in others]
     for target, source in targets:
         key = str(target.absolute()).casefold()  # on some disks Bunny.png is bunny.png
@@ -204,7 +204,7 @@ def check_targets(shoots: Sequence[Shoot], others: Iterable[Path] = ()) -> None:
                 "put {index} into OUT or give each a folder"
             )
         owner_of[key] = source
-    files = (Path(shoot.source) for shoot in shoots if shoot.source not in SHAPES)
+    files = (Path(group.source) for group in groups if group.source not in SHAPES)
     meshes = {(status.st_dev, status.st_ino) for status in (file.stat() for file in files if file.exists())}
     for target, _ in targets:
         if target.exists() and (target.stat().st_dev, target.stat().st_ino) in meshes:
