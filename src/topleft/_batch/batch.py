@@ -9,11 +9,12 @@ import operator
 import os
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence, Sized
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy.typing as npt
 
@@ -21,9 +22,6 @@ from topleft._base.options import parse
 from topleft._batch.jobs import Job, JobRunner, Outcome, as_job
 from topleft._batch.workers import Workers, workers_of
 from topleft.errors import MissingPackageError
-
-if TYPE_CHECKING:
-    from concurrent.futures import Executor, Future
 
 __all__ = ["Batch", "Job", "Result", "Summary", "render_batch"]
 
@@ -298,8 +296,6 @@ class _InFlight:
 
     def _next_done(self) -> _Task:
         """Take out a task that is done, the earliest of them."""
-        from concurrent.futures import FIRST_COMPLETED, wait
-
         def is_done(task: _Task) -> bool:
             return task.future is None or task.future.done()
 

@@ -8,9 +8,10 @@ from __future__ import annotations
 import os
 from collections import OrderedDict
 from collections.abc import Sequence
+from concurrent.futures import Executor, Future, wait
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from topleft._batch.jobs import Job, JobRunner, Outcome
 from topleft._lod.levels import Level, Levels, keep_levels
@@ -18,9 +19,6 @@ from topleft._lod.simplify import levels_of
 from topleft._model.mesh import Mesh
 from topleft._model.scene import Scene
 from topleft.errors import MissingPackageError
-
-if TYPE_CHECKING:
-    from concurrent.futures import Executor, Future
 
 __all__ = ["Workers", "workers_of"]
 
@@ -46,7 +44,7 @@ def workers_of(executor: object) -> Workers | None:
         if executor < 1:
             raise ValueError(f"executor must be at least 1 thread, got {executor}")
         return OwnThreads(executor)
-    from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
+    from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor  # which take multiprocessing with them
 
     if not isinstance(executor, Executor):
         raise TypeError(f"executor must be None, a number of threads or an Executor, got {type(executor).__name__}")
@@ -78,8 +76,6 @@ class Workers:
 
     def stop(self, futures: Sequence[Future[Any]]) -> None:
         """Wait until what has begun is finished."""
-        from concurrent.futures import wait
-
         wait(futures)
 
 

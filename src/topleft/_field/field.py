@@ -95,10 +95,12 @@ def field(
     --------
     >>> import topleft as tl
     >>> tl.field(([[0, 0], [4, 0], [0, 4]], [[0, 1, 2]]), [0.0, 4.0, 8.0], (4, 4))
-    array([[7.5, nan, nan, nan],
-           [5.5, 6.5, nan, nan],
-           [3.5, 4.5, 5.5, nan],
-           [1.5, 2.5, 3.5, 4.5]])
+    array([[nan, nan, nan, nan],
+           [5.5, nan, nan, nan],
+           [3.5, 4.5, nan, nan],
+           [1.5, 2.5, 3.5, nan]])
+
+    The centres on the slanted side belong to the triangle on its other side, if there is one.
     """
     polygons = as_polygons(mesh)
     points = _plane_points(polygons)
@@ -171,8 +173,8 @@ def height_map(
     --------
     >>> import topleft as tl
     >>> tl.height_map(([[0, 0, 1], [2, 0, 1], [0, 2, 3]], [[0, 1, 2]]), 1.0)
-    array([[2.5, nan],
-           [1.5, 1.5]])
+    array([[nan, nan],
+           [1.5, nan]])
     """
     if surface not in ("upper", "lower"):
         raise ValueError(f'surface must be "upper" or "lower", got {surface!r}')

@@ -12,7 +12,7 @@ from topleft._plan.costs import save_costs
 from topleft._plan.plan import plan
 from topleft._render.render import DEFAULT_SIZE
 from topleft.cli.arguments import positive, size, tolerance
-from topleft.cli.targets import Orbit, MeshSource
+from topleft.cli.targets import MeshSource, Orbit
 
 __all__ = ["add_plan_commands", "run_calibrate", "run_explain"]
 

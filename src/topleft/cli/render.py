@@ -11,9 +11,10 @@ import signal
 import sys
 import tempfile
 from collections.abc import Sequence
+from concurrent.futures import Executor
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from topleft._batch.batch import Result, render_batch
 from topleft._io.images import PICTURE_SUFFIXES, save_image
@@ -23,9 +24,6 @@ from topleft.cli.job_file import read_jobs
 from topleft.cli.sheet import make_sheet
 from topleft.cli.targets import MeshJobs, check_targets, plan_jobs
 from topleft.errors import MissingPackageError, TopleftError
-
-if TYPE_CHECKING:
-    from concurrent.futures import Executor
 
 __all__ = ["FAILED", "complain", "one_line", "run_render"]
 
