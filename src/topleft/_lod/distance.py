@@ -2,8 +2,9 @@
 
 In: points and triangles of two surfaces. Out: `DistanceBounds`: a distance that is met, and one that is not passed.
 
-The kernels (`csrc/mesh/nearest.c`, `reach.c`) look at triangles by branch and bound; this file puts the triangles of a
-surface in an order that keeps neighbours together, cuts the work in blocks, and adds what rounding may hide.
+The kernels (`csrc/mesh/nearest.c`, `csrc/mesh/reach.c`) look at triangles by branch and bound; this file puts the
+triangles of a surface in an order that keeps neighbours together, cuts the work in blocks, and adds what rounding may
+hide.
 """
 
 from __future__ import annotations

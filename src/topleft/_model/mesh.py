@@ -166,7 +166,7 @@ class Mesh:
         """The triangles sorted into clusters, which a view needs only some of; made when it is first asked for.
 
         That takes about as long as drawing the mesh some twenty times, and keeps a copy of it of about 30 bytes a
-        triangle. Meshes that are drawn more than once ask for it themselves: `topleft.choices.pays_to_cluster`.
+        triangle. Meshes that are drawn more than once ask for it themselves: `pays_to_cluster` in `_raster/choices.py`.
         """
         return Clusters(self.vertices, self.triangles)
 
