@@ -32,8 +32,8 @@ from topleft._raster.peel import DepthLayers, peel
 from topleft._raster.verbs import Rasterizer, coverage, fill, overdraw, rasterize, wireframe
 from topleft._render.render import rasterize_mesh, render
 from topleft._render.scene_fragments import SceneDepthLayers, SceneFragments
+from topleft._render.scene_render import shade
 from topleft._render.silhouette import silhouette
-from topleft._shade.shade import shade
 from topleft.errors import MeshError, TopleftError
 
 if TYPE_CHECKING:

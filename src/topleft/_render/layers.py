@@ -17,7 +17,7 @@ from topleft._render.scene_render import camera_of
 from topleft._render.sight import PointKind, Sight, Surface, project
 from topleft._render.silhouette import silhouette as draw_silhouette
 from topleft._render.transparent import render_transparent
-from topleft._shade.pixel_normals import shade_normals
+from topleft._shade.shade import shade_normals
 
 __all__ = ["LAYERS", "check_layers", "draw_layers"]
 

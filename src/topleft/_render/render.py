@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from numpy.typing import ArrayLike, NDArray
 
-from topleft._base.color import DEFAULT_COLOR, as_color
+from topleft._base.color import DEFAULT_COLOR
 from topleft._camera.camera import Camera
 from topleft._lod.detail import detailed
 from topleft._model.adapt import MeshLike, as_mesh
@@ -29,11 +29,9 @@ from topleft._render.bend import BentMesh, bend
 from topleft._render.scene_cutout import cut_out_scene
 from topleft._render.scene_fragments import BentFragments
 from topleft._render.scene_lens import draw_seen
-from topleft._render.scene_render import camera_of, cull_of, shade_scene
-from topleft._shade.cutout import cut_out
-from topleft._shade.eye import distances
-from topleft._shade.multisample import shade_samples
-from topleft._shade.shade import LookOptions, Shading, shade
+from topleft._render.scene_render import camera_of, cull_of, shade
+from topleft._shade.alpha_test import cut_of, cut_out
+from topleft._shade.shade import LookOptions
 
 DEFAULT_SIZE = (640, 480)
 WHITE = (255, 255, 255, 255)
@@ -67,7 +65,7 @@ def render(
     size : (width, height), pixels
         640 x 480 unless given.
     shading : {"smooth", "flat", "unlit", "matcap", "ids", "depth", "normals"}
-        What the colours tell; `topleft.shade.shade` describes each.
+        What the colours tell; `topleft.shade` describes each.
     color : (3,) of 0 to 255
         sRGB colour of a mesh without colours.
     background : (3,) or (4,) of 0 to 255
@@ -88,7 +86,7 @@ def render(
     rasterizer : Rasterizer, optional
         Of this size: what is needed on the way lies in the memory that it keeps.
     **look
-        `lights`, `ambient`, `material`, `matcap` and `fog` of `topleft.shade.shade`.
+        `lights`, `ambient`, `material`, `matcap` and `fog` of `topleft.shade`.
 
     Returns
     -------
@@ -136,53 +134,27 @@ def picture_of(
 
     What materials cut out is taken out of the buffer.
     """
-    options: dict[str, Any] = {"shading": shading, "color": color, "threads": threads, **look}
-    options["background"] = as_color("background", background, 4)
-    make = picture_of_scene if isinstance(mesh, Scene) else picture_of_mesh
-    picture = make(frags, mesh, camera, options)  # type: ignore[arg-type]
+    frags = without_holes(frags, mesh, camera, look.get("material"), threads=threads)
+    picture = shade(frags, mesh, camera, shading=shading, color=color, background=background, threads=threads, **look)
     for instance in (mesh if isinstance(mesh, Scene) else [Instance(mesh)]) if edges else []:
         own_camera, own_cull = camera_of(camera, instance), cull_of(cull, instance)
         draw_edges(picture, frags, instance.mesh, own_camera, cull=own_cull, threads=threads)
     return picture
 
 
-def picture_of_mesh(
-    frags: Fragments, mesh: Mesh, camera: Camera, options: dict[str, Any]
-) -> npt.NDArray[np.uint8]:
-    """The picture of a mesh's visibility buffer, without what its materials cut out; options as `shade` takes them."""
-    shown, surface, view = frags, mesh, camera
-    if isinstance(frags, BentFragments):  # the kernels read what was drawn, triangle by triangle
-        shown, surface, view = frags.parts, frags.mesh_of_parts(mesh), camera.straightened()
-    cut_out(shown, surface, view, options.get("material"), threads=options["threads"])
-    if isinstance(frags, BentFragments) and options["shading"] in (Shading.IDS, Shading.DEPTH):
-        shown, surface = frags.again(), mesh
-    return shade(shown, surface, view, **options)
-
-
-def without_holes(frags: Fragments, mesh: Mesh | Scene, camera: Camera, material: Material | None) -> Fragments:
+def without_holes(
+    frags: Fragments, mesh: Mesh | Scene, camera: Camera, material: Material | None, *, threads: int | None = None
+) -> Fragments:
     """The visibility buffer without what materials (or this one) cut out; `frags` is changed."""
     if isinstance(mesh, Scene):
-        return cut_out_scene(frags, mesh, camera, material)
+        return cut_out_scene(frags, mesh, camera, material, threads=threads)
     if not isinstance(frags, BentFragments):
-        cut_out(frags, mesh, camera, material)
+        cut_out(frags, mesh, camera, material, threads=threads)
         return frags
-    cut_out(frags.parts, frags.mesh_of_parts(mesh), camera.straightened(), material)
+    if cut_of(mesh, material) is None:
+        return frags
+    cut_out(frags.parts, frags.mesh_of_parts(mesh), camera.straightened(), material, threads=threads)
     return frags.again()
-
-
-def picture_of_scene(
-    frags: Fragments, scene: Scene, camera: Camera, options: dict[str, Any]
-) -> npt.NDArray[np.uint8]:
-    """The picture of a scene's visibility buffer, without what materials cut out; options as `shade` takes them."""
-    frags = cut_out_scene(frags, scene, camera, options.get("material"), threads=options["threads"])
-    if options["shading"] == Shading.DEPTH:
-        options = {"depth_range": distances(frags, camera)} | options
-
-    def shade_one(sample: Fragments) -> npt.NDArray[np.uint8]:
-        return shade_scene(sample, scene, camera, **options)
-
-    has_samples = frags.samples_depth.shape[-1] > 1
-    return shade_samples(frags, shade_one, options["background"]) if has_samples else shade_one(frags)
 
 
 def rasterize_mesh(

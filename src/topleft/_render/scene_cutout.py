@@ -22,7 +22,7 @@ from topleft._raster.fragments import Fragments
 from topleft._render.scene_fragments import Placed, SceneFragments, mesh_of_parts
 from topleft._render.scene_lens import BentSceneFragments
 from topleft._render.scene_render import camera_of
-from topleft._shade.cutout import Cut, cut_of, draw_cut
+from topleft._shade.alpha_test import Cut, cut_of, draw_cut
 
 __all__ = ["cut_out_scene", "cuts_of", "draw_cuts", "solid_scene", "surfaces_of"]
 

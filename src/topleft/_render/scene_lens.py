@@ -62,9 +62,9 @@ class BentSceneFragments(SceneFragments):
         self._scene_of_wholes = scene
 
     @property
-    def first_ids(self) -> npt.NDArray[np.int64]:
-        """Where the ids of each instance begin, and their end: (N + 1,)."""
-        return self._scene_of_wholes.first_ids
+    def whole(self) -> Scene:
+        """The scene that `triangle` counts the triangles of."""
+        return self._scene_of_wholes
 
     def again(self) -> BentSceneFragments:
         """Return the same made anew from the parts, whose buffers have changed."""

@@ -24,7 +24,7 @@ from topleft._raster.verbs import Rasterizer
 from topleft._render.render import rasterize_mesh, without_holes
 from topleft._render.scene_fragments import Part, SceneFragments
 from topleft._render.scene_render import drawn_of
-from topleft._shade.cutout import cut_of
+from topleft._shade.alpha_test import cut_of
 
 __all__ = ["PointKind", "Sight", "Surface", "project"]
 
