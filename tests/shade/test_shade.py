@@ -15,7 +15,7 @@ from comparing import assert_same
 import topleft as tl
 from topleft import _engine
 from topleft._base.color import srgb_tables
-from topleft._render.scene_render import shade
+from topleft._render.scene_shade import shade
 
 SIZE = (150, 110)
 RNG = np.random.default_rng(6)
@@ -322,7 +322,7 @@ def test_shade_with_another_scene_is_refused():
         tl.shade(frags, KNOT, camera)
     with pytest.raises(ValueError, match="mesh must be the scene that was drawn, of 2 instances, got one of 1"):
         tl.shade(frags, tl.Scene([KNOT]), camera)
-    with pytest.raises(ValueError, match=r"mesh\[1\] must be the one that was drawn, with 24 vertices and 12 triangles"):
+    with pytest.raises(ValueError, match=r"mesh\[1\] must be the one that was drawn, with 24 vertices"):
         tl.shade(frags, tl.Scene([KNOT, KNOT]), camera)
 
 
