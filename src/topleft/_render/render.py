@@ -7,7 +7,7 @@ Input: `Mesh` or `Scene`, `Camera`. Output: the picture (H, W, 4) uint8 of `rend
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, NamedTuple, Unpack
+from typing import Any, Unpack
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +17,6 @@ from topleft._base.color import DEFAULT_COLOR
 from topleft._camera.camera import Camera
 from topleft._lod.detail import detailed
 from topleft._model.adapt import MeshLike, as_mesh
-from topleft._model.material import Material
 from topleft._model.mesh import Mesh
 from topleft._model.scene import Instance, Scene
 from topleft._raster import choices
@@ -25,12 +24,10 @@ from topleft._raster.clusters import Clusters
 from topleft._raster.fragments import Fragments
 from topleft._raster.verbs import Rasterizer, rasterize, wireframe
 from topleft._raster.view import View
-from topleft._render.bend import BentMesh, bend
-from topleft._render.scene_cutout import cut_out_scene
-from topleft._render.scene_fragments import BentFragments
-from topleft._render.scene_lens import draw_seen
-from topleft._render.scene_render import camera_of, cull_of, shade
-from topleft._shade.alpha_test import cut_of, cut_out
+from topleft._render.fragments import BentFragments
+from topleft._render.holes import without_holes
+from topleft._render.scene_shade import camera_of, cull_of, shade
+from topleft._render.through_lens import draw_seen, seen_through
 from topleft._shade.shade import LookOptions
 
 DEFAULT_SIZE = (640, 480)
@@ -142,21 +139,6 @@ def picture_of(
     return picture
 
 
-def without_holes(
-    frags: Fragments, mesh: Mesh | Scene, camera: Camera, material: Material | None, *, threads: int | None = None
-) -> Fragments:
-    """The visibility buffer without what materials (or this one) cut out; `frags` is changed."""
-    if isinstance(mesh, Scene):
-        return cut_out_scene(frags, mesh, camera, material, threads=threads)
-    if not isinstance(frags, BentFragments):
-        cut_out(frags, mesh, camera, material, threads=threads)
-        return frags
-    if cut_of(mesh, material) is None:
-        return frags
-    cut_out(frags.parts, frags.mesh_of_parts(mesh), camera.straightened(), material, threads=threads)
-    return frags.again()
-
-
 def rasterize_mesh(
     mesh: MeshLike | Scene,
     camera: Camera | None = None,
@@ -214,23 +196,6 @@ def rasterize_mesh(
         return frags
     bent = drawn.bent
     return BentFragments(frags, bent.triangles, bent.source, bent.weights, mesh.triangles, len(mesh.vertices))
-
-
-class Drawn(NamedTuple):
-    """What the verbs draw of a mesh."""
-
-    vertices: npt.NDArray[Any]
-    triangles: npt.NDArray[np.integer[Any]]
-    transform: npt.NDArray[np.float64]
-    bent: BentMesh | None
-
-
-def seen_through(mesh: Mesh, camera: Camera, frame: tuple[int, int], *, near_clip: bool = True) -> Drawn:
-    """The mesh as it is, and the camera's matrix for a whole picture of this size; or as the camera's lens bends it."""
-    if camera.lens is None:
-        return Drawn(mesh.vertices, mesh.triangles, camera.clip_from_world(frame), None)
-    bent = bend(mesh.vertices, mesh.triangles, camera, camera.lens, frame, near_clip=near_clip)
-    return Drawn(bent.points_eye, bent.triangles, camera.clip_from_eye(frame), bent)
 
 
 def draw_edges(

@@ -18,11 +18,11 @@ from topleft._model.material import Material
 from topleft._model.scene import Scene
 from topleft._raster.composite import composite
 from topleft._raster.peel import DepthLayers, peel
+from topleft._render.fragments import SceneDepthLayers
+from topleft._render.holes import cuts_of, draw_cuts, solid_scene, surfaces_of
+from topleft._render.instances import peel_scene
 from topleft._render.render import DEFAULT_SIZE, WHITE, default_camera
-from topleft._render.scene_cutout import cuts_of, draw_cuts, solid_scene, surfaces_of
-from topleft._render.scene_draw import peel_scene
-from topleft._render.scene_fragments import SceneDepthLayers
-from topleft._render.scene_render import shade
+from topleft._render.scene_shade import shade
 from topleft._shade.alpha_test import cut_of
 
 __all__ = ["render_transparent", "visible_layers"]

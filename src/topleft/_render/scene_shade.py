@@ -20,7 +20,7 @@ from topleft._model.mesh import Mesh
 from topleft._model.scene import Instance, Scene
 from topleft._model.texture import Texture
 from topleft._raster.fragments import Fragments
-from topleft._render.scene_fragments import BentFragments, SceneFragments
+from topleft._render.fragments import BentFragments, SceneFragments
 from topleft._shade.look import is_similarity
 from topleft._shade.shade import Shading, ShadingOptions, shade_mesh, shade_numbers, shade_samples
 
