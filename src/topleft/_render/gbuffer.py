@@ -51,7 +51,7 @@ def evaluate(
     threads: int | None = None,
     dtype: type[np.floating[Any]] = np.float32,
 ) -> npt.NDArray[Any]:
-    """What `csrc/points.c` tells of the points of the pixels, from numbers that are rows (N, 4) times (x, y, z, 1).
+    """What pixels/points.c tells of the points of the pixels, from numbers that are rows (N, 4) times (x, y, z, 1).
 
     Points are in the space of the mesh. A point has the float64 weights of its pixel in its triangle, before the snap,
     relative to a corner; all is float64 and rounded once. `size` is that of the whole picture, for the flow.

@@ -1,7 +1,7 @@
 """Makes the picture that a mesh or a visibility buffer shows of itself in a notebook.
 
 Input: `Mesh`, `Fragments`. Output: PNG as bytes, which their `_repr_png_` returns. Arrays stay plain arrays;
-docs/design.md tells why.
+docs/design/fields.md tells why.
 """
 
 from __future__ import annotations

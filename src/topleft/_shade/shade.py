@@ -3,7 +3,7 @@
 Input: `Fragments`, the mesh and the camera they were made with. Output: a picture (H, W, 4) uint8, sRGB with alpha.
 
 Light is added up in linear light: colours are decoded from sRGB, lit, and encoded again, so that a surface that gets
-half the light is half as bright on a screen. The kernel is csrc/shade.c.
+half the light is half as bright on a screen. The kernel is csrc/shade/shade.c.
 
 Based on: Phong, B. T., "Illumination for Computer Generated Pictures", Communications of the ACM 18(6), 1975 (normals
 interpolated, light computed in the pixel); Blinn, J. F., "Models of Light Reflection for Computer Synthesized

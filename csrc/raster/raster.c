@@ -1,0 +1,312 @@
+/* Raster: every triangle of a scene, a vector of them at a time, through setup and cull to the code for its size.
+ * In: vertex records and triangles.  Out: the target's buffers. */
+#ifndef TL_RASTER_C
+#define TL_RASTER_C
+
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+#include "clusters.h"
+#include "topleft.h"
+#include "lanes/lanes.h"
+#include "vertex/fixed.h"
+#include "vertex/snap.c"
+#include "clusters/cluster_view.c"
+#include "raster/alone.c"
+#include "raster/batch.c"
+#include "raster/census.c"
+#include "raster/covered.c"
+#include "raster/peel.c"
+#include "raster/rows.c"
+#include "raster/sampled.c"
+#include "raster/sampled_alone.c"
+#include "raster/setup.c"
+#include "raster/sink.c"
+
+TL_INLINE void draw_one(const tl_scene *scene, int64_t i, const tl_window *window, const tl_target *target,
+                        tl_sink sink)
+{
+    if (sink == TL_SINK_CENSUS)
+        draw_alone(scene, i, window, target, sink);
+    else if (sink == TL_SINK_SAMPLES)
+        draw_alone_each_sample(scene, i, window, target);
+    else
+        TL_SINK_CALL(draw_alone, sink, scene, i, window, target)
+}
+
+/* Lists the triangles that the passes which draw the rest of the picture are to draw, too. */
+TL_INLINE void list_others(const batch_state *s, const lane_batch *b, vi id)
+{
+    tl_share *share = s->share;
+    const batch_limits *limits = &s->limits;
+    const vi first = vi_max(b->top, vi_set1(limits->picture_top));
+    const vi end = vi_min(b->bottom, vi_set1(limits->picture_bottom));
+    const vm is_seen = vm_and(b->drawn, vm_and(vi_gt(b->n_cols, vi_set1(0)), vi_gt(end, first)));
+    const vm is_beyond = vm_or(vi_gt(b->row, first), vi_gt(end, vi_set1(limits->bottom)));
+    const vm m = vm_or(b->alone, vm_and(is_seen, is_beyond));
+    vi_compress(share->others + share->n_others, m, id);
+    share->n_others += __builtin_popcount(vm_bits(m));
+}
+
+/* The lesser side of boxes before the window cut them. */
+TL_INLINE vi shorter_side(const batch_state *s, const lane_batch *b)
+{
+    const int bits = s->window->subpixel_bits;
+    const vi first = extent_pixels(b->x_min, s->limits.round.first, bits);
+    const vi end = extent_pixels(b->x_max, s->limits.round.end, bits);
+    return vi_min(vi_sub(end, first), vi_sub(b->bottom, b->top));
+}
+
+/* Leaves to draw_alone what lanes could take but should not. */
+TL_INLINE void take_out(const batch_state *s, tl_sink sink, lane_batch *b)
+{
+    if (TL_LANES == 1) { /* one lane gains nothing from the rows of rows.c */
+        const vm over_small = vm_and(b->drawn, vi_gt(vi_max(b->n_cols, b->n_rows), vi_set1(TL_SMALL_BOX)));
+        b->alone = vm_or(b->alone, over_small);
+        b->drawn = vm_and_not(b->drawn, over_small);
+    }
+    if (sink_has_depth(sink_of(s->target, sink))) {
+        const vi size = vi_mul(vi_sub(b->x_max, b->x_min), vi_sub(b->y_max, b->y_min)), one = vi_set1(1);
+        const vi box = vi_shift_right(vi_sub(size, one), TL_SLIVER_BITS);
+        /* box > area * 2^12, as setup_plane */
+        const vm sliver = vm_and(b->drawn, vi_gt(box, vi_sub(b->absolute, one)));
+        b->alone = vm_or(b->alone, sliver);
+        b->drawn = vm_and_not(b->drawn, sliver);
+    }
+}
+
+TL_INLINE void draw_each_alone(const batch_state *s, tl_sink sink, vm alone, vi id)
+{
+    if (!vm_any(alone))
+        return;
+    int32_t ids[TL_MAX_LANES];
+    vi_store(ids, id);
+    for (unsigned lanes = vm_bits(alone); lanes; lanes &= lanes - 1)
+        draw_one(s->scene, ids[__builtin_ctz(lanes)], s->window, s->target, sink);
+}
+
+/* The triangles that lanes draw, by the size of their boxes: in the order of tl_class, from TL_CLASS_TINY on. */
+enum { BOX_TINY, BOX_SMALL, BOX_MIDDLE, BOX_ROWS, N_BOXES };
+
+TL_INLINE void sort_boxes(const lane_batch *b, vm *boxes)
+{
+    const vi longer = vi_max(b->n_cols, b->n_rows);
+    const vm over_tiny = vi_gt(longer, vi_set1(2)), over_small = vi_gt(longer, vi_set1(TL_SMALL_BOX));
+    const vm over = vm_and(b->drawn, over_small);
+    const vm beyond = vm_or(vi_gt(b->n_cols, vi_set1(TL_LANES)), vi_gt(b->n_rows, vi_set1(TL_MIDDLE_BOX)));
+    boxes[BOX_TINY] = vm_and_not(b->drawn, over_tiny);
+    boxes[BOX_SMALL] = vm_and(b->drawn, vm_and_not(over_tiny, over_small));
+    boxes[BOX_MIDDLE] = vm_and_not(over, beyond);
+    boxes[BOX_ROWS] = vm_and(over, beyond);
+}
+
+/* Tiny boxes at once; others wait until a vector is full of their kind. */
+TL_INLINE void draw_boxes(batch_state *s, tl_sink sink, const lane_batch *b, const vm *boxes, vi id)
+{
+    if (vm_any(boxes[BOX_TINY])) {
+        lane_triangles t;
+        vd z[3];
+        place_triangles(s, sink, &b->c, b->col, b->row, &t, z);
+        draw_tiny(s, sink, &t, z, boxes[BOX_TINY], b->n_cols, b->n_rows, names_of(s->scene, boxes[BOX_TINY], id));
+    }
+    if (vm_any(boxes[BOX_SMALL])) {
+        push(&s->small, boxes[BOX_SMALL], b->col, b->row, b->n_cols, b->n_rows, id);
+        if (s->small.n > TL_QUEUE - TL_LANES)
+            TL_SINK_CALL(flush_small, sink, s)
+    }
+    if (vm_any(boxes[BOX_MIDDLE])) {
+        push(&s->middle, boxes[BOX_MIDDLE], b->col, b->row, b->n_cols, b->n_rows, id);
+        if (s->middle.n > TL_QUEUE - TL_LANES)
+            TL_SINK_CALL(flush_middle, sink, s)
+    }
+    if (vm_any(boxes[BOX_ROWS])) {
+        push(&s->rows, boxes[BOX_ROWS], b->col, b->row, b->n_cols, b->n_rows, id);
+        if (s->rows.n > TL_QUEUE - TL_LANES)
+            TL_SINK_CALL(flush_rows, sink, s)
+    }
+}
+
+/* Setup and cull of TL_LANES triangles, and each to the code for its size. */
+TL_INLINE void draw_batch(batch_state *s, tl_sink sink, const int32_t *corners, vi id, vm live)
+{
+    lane_batch b;
+    vm boxes[N_BOXES];
+    for (int k = 0; k < 3 * TL_LANES; k += 16) /* 5 % of a million-triangle mesh */
+        __builtin_prefetch(corners + 12 * 48 + k);
+    if (!load_batch(s, corners, id, live, &b))
+        return;
+    count_faceless(s->target, sink, vm_and_not(vm_and_not(live, b.alone), b.drawn), b.area);
+    if (!vm_any(vm_or(b.drawn, b.alone)))
+        return;
+    find_boxes(s, &b);
+    if (s->share->others && !s->share->clusters)
+        list_others(s, &b, id);
+    count_unseen(s->target, sink, vm_and_not(b.drawn, has_box(&b)), shorter_side(s, &b));
+    b.drawn = vm_and(b.drawn, has_box(&b));
+    take_out(s, sink, &b);
+    draw_each_alone(s, sink, b.alone, id);
+    if (!vm_any(b.drawn))
+        return;
+    sort_boxes(&b, boxes);
+    if (sink == TL_SINK_CENSUS)
+        count_boxes(s->target->census, boxes, b.n_cols, b.n_rows, b.absolute, s->window->subpixel_bits);
+    else
+        draw_boxes(s, sink, &b, boxes, id);
+}
+
+TL_INLINE void flush_queues(batch_state *s, tl_sink sink)
+{
+    if (sink == TL_SINK_CENSUS)
+        return; /* nothing waits */
+    TL_SINK_CALL(flush_small, sink, s)
+    TL_SINK_CALL(flush_middle, sink, s)
+    TL_SINK_CALL(flush_rows, sink, s)
+}
+
+/* As start_batch, but for squares and several samples, and for the shares of a picture. */
+TL_INLINE void start_share(batch_state *s, const tl_scene *scene, const tl_window *window, const tl_target *target,
+                           tl_share *share, tl_sink sink)
+{
+    const int bits = window->subpixel_bits, of_samples = sink_of(target, sink) == TL_SINK_SAMPLES;
+    const int32_t reach = of_samples ? sample_reach(target) : 0;
+    const extent_rounding round = round_extent(window);
+    batch_limits *limits = &s->limits;
+    start_batch(s, scene, window, target);
+    s->share = share;
+    memset(s->fragments.sample, 0, sizeof s->fragments.sample); /* what is prefetched behind the end of the list */
+    limits->round = (extent_rounding){round.first - reach, round.end + reach};
+    if (window->test != TL_TEST_SAMPLE || of_samples)
+        limits->max_extent = (TL_MAX_BOX_PX - 2) << (bits < 8 ? bits : 8);
+    if (share->clusters) {
+        limits->last_vertex = vi_set1(TL_CLUSTER - 1);
+    } else if (share->others) {
+        limits->picture_top = (int32_t)share->picture->y_px;
+        limits->picture_bottom = (int32_t)min64(share->picture->y_px + share->picture->height, (int64_t)1 << 30);
+    }
+}
+
+/* Every triangle of a share; the window has fewer than 2^31 samples and lies within 2^30 pixels of 0. */
+TL_INLINE void draw_batches(const tl_scene *scene, const tl_window *window, const tl_target *target, tl_share *share,
+                            int64_t *bad_row, tl_sink sink)
+{
+    batch_state s;
+    start_share(&s, scene, window, target, share, sink);
+    tl_cluster_pass *clusters = share->clusters;
+    cluster_scene cluster;
+    tl_share part = *share;
+    const int64_t n_parts = clusters ? list_clusters(clusters, window, target) : 1;
+    for (int64_t next = 0; next < n_parts; next++) {
+        if (clusters) {
+            const tl_cluster *c = clusters->mesh->clusters + clusters->list[next];
+            if (clusters->may_be_hidden && is_cluster_hidden(c, clusters->seen, window, target))
+                continue;
+            part.first = 0, part.end = load_cluster(c, clusters, scene, share, &cluster);
+            clusters->n_drawn++;
+            s.scene = &cluster.scene;
+        }
+        for (int64_t i = part.first; i < part.end && s.bad_row < 0; i += TL_LANES) {
+            int32_t corners[3 * TL_LANES];
+            const vm live = vm_first(part.end - i);
+            const vi id = part.ids ? vi_load_masked(live, part.ids + i) : vi_add(vi_set1((int32_t)i), vi_iota());
+            draw_batch(&s, sink, share_corners(s.scene, &part, i, corners), id, live);
+        }
+        flush_queues(&s, sink);
+    }
+    flush_fragments(target, sink, &s.fragments, s.fragments.n);
+    *bad_row = s.bad_row;
+}
+
+TL_INLINE void draw_scene(const tl_scene *scene, const tl_window *window, const tl_target *target, tl_share *share,
+                          int64_t *bad_row, tl_sink sink)
+{
+    const int is_centre = window->test == TL_TEST_SAMPLE && sink_of(target, sink) != TL_SINK_SAMPLES;
+    const int fits_lanes = is_centre || window->subpixel_bits <= 8;
+    if (scene->method == TL_METHOD_AUTO && is_near(window) && fits_lanes) {
+        draw_batches(scene, window, target, share, bad_row, sink);
+        return;
+    }
+    *bad_row = first_bad_row(scene->triangles, scene->n_triangles, scene->mesh.n_vertices);
+    if (*bad_row >= 0)
+        return;
+    for (int64_t i = 0; i < scene->n_triangles; i++)
+        draw_one(scene, i, window, target, sink);
+}
+
+TL_SINK_COPIES(draw_scene,
+               (const tl_scene *scene, const tl_window *window, const tl_target *target, tl_share *share,
+                int64_t *bad_row),
+               scene, window, target, share, bad_row)
+
+/* Counts the triangles of a scene by what draw_scene does with them: in its own code. */
+static int64_t count_classes(const tl_scene *scene, const tl_window *window, const tl_target *target, tl_census *census)
+{
+    tl_target counted = *target;
+    tl_share share = {.end = scene->n_triangles};
+    int64_t bad_row = -1;
+    counted.sink = TL_SINK_CENSUS, counted.census = census;
+    draw_scene(scene, window, &counted, &share, &bad_row, TL_SINK_CENSUS);
+    return bad_row;
+}
+
+/* In vectors: a loop over single numbers took several times as long as the memset of the ids. */
+static void clear_depth(float *depth, int64_t n, float value)
+{
+    int64_t k = 0;
+    for (; k + TL_LANES <= n; k += TL_LANES)
+        vf_store(depth + k, vf_set1(value));
+    vf_store_masked(depth + k, vm_first(n - k), vf_set1(value));
+}
+
+/* What every sample of the window starts as. */
+static void clear(const tl_window *window, const tl_target *target)
+{
+    const float farthest = target->sink == TL_SINK_FARTHEST ? -INFINITY : INFINITY;
+    if (target->sink == TL_SINK_PEEL) {
+        clear_layers(window, target);
+        return;
+    }
+    if (target->sink == TL_SINK_MASK || target->sink == TL_SINK_SAMPLES) {
+        const int64_t n_bits = target->stride_px * window->height << target->sample_bits;
+        memset(target->covered, 0, (size_t)tl_covered_words(n_bits) * sizeof(uint64_t));
+        return;
+    }
+    for (int64_t row = 0; row < window->height; row++) {
+        const int64_t at = row * target->stride_px;
+        memset((int32_t *)target->pixels + at, target->sink == TL_SINK_COUNT ? 0 : 0xff,
+               (size_t)window->width * sizeof(int32_t));
+        if (sink_has_depth(target->sink))
+            clear_depth(target->depth + at, window->width, farthest);
+    }
+}
+
+static int64_t draw(const tl_scene *scene, const tl_window *window, const tl_target *target, tl_share *share)
+{
+    const int64_t pixel_bytes = target->sink == TL_SINK_MASK ? 1 : 4;
+    const int64_t rows_at_once = max64(1, (((int64_t)1 << 31) - 1) / target->stride_px);
+    if ((unsigned)target->sink > TL_SINK_PEEL)
+        __builtin_trap(); /* no sink of draw */
+    for (int64_t row = 0; row < window->height; row += rows_at_once) {
+        tl_window band = *window;
+        tl_target part = *target;
+        band.y_px += row;
+        band.height = min64(rows_at_once, window->height - row);
+        part.pixels = target->pixels ? (char *)target->pixels + row * target->stride_px * pixel_bytes : NULL;
+        part.depth = target->depth ? target->depth + row * target->stride_px : NULL;
+        part.n_samples = part.stride_px * (band.height - 1) + band.width;
+        int64_t bad_row = -1;
+        if (share->is_first)
+            clear(&band, &part);
+        if (share->first < share->end || share->clusters)
+            TL_SINK_CALL(draw_scene, target->sink, scene, &band, &part, share, &bad_row)
+        if (bad_row >= 0)
+            return bad_row;
+        if (target->sink == TL_SINK_MASK && share->is_last)
+            expand_covered(&band, &part);
+        if (target->sink == TL_SINK_SAMPLES && share->is_last)
+            share_samples(&band, &part);
+    }
+    return -1;
+}
+
+#endif
