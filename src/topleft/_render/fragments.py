@@ -164,22 +164,22 @@ class SceneFragments(Fragments):
     @cached_property
     def instance(self) -> NDArray[np.int32]:
         """Index of the instance that shows in each pixel, int32 (H, W), -1 where there is none."""
-        return instance_of_ids(self.id, self.whole.first_ids)
+        return instance_of_ids(self.id, self.placed.whole_first_ids)
 
     @cached_property
     def triangle(self) -> NDArray[np.int32]:
         """Index of the triangle in its mesh, int32 (H, W), -1 where there is none."""
-        return local_ids(self.id, self.instance, self.whole.first_ids)
+        return local_ids(self.id, self.instance, self.placed.whole_first_ids)
 
     @cached_property
     def samples_instance(self) -> NDArray[np.int32]:
         """Index of the instance that each sample sees, int32 (H, W, S)."""
-        return instance_of_ids(self.samples_id, self.whole.first_ids)
+        return instance_of_ids(self.samples_id, self.placed.whole_first_ids)
 
     @cached_property
     def samples_triangle(self) -> NDArray[np.int32]:
         """Index of the triangle in its mesh that each sample sees, int32 (H, W, S)."""
-        return local_ids(self.samples_id, self.samples_instance, self.whole.first_ids)
+        return local_ids(self.samples_id, self.samples_instance, self.placed.whole_first_ids)
 
     def sample(self, i: int) -> SceneFragments:
         """Return ids, depth and attributes at one sample of each pixel."""
@@ -210,7 +210,7 @@ class SceneFragments(Fragments):
         ends = [np.maximum.reduceat(axis, starts) + 1 for axis in (rows, columns)]
         for i, top, left, bottom, right in zip(found.tolist(), *lows, *ends, strict=True):
             box = slice(int(top), int(bottom)), slice(int(left), int(right))
-            first, end = self.placed.scene.first_ids[i : i + 2]
+            first, end = self.placed.first_ids[i : i + 2]
             ids = self.drawn_planes[0][0][box]
             own = np.where((ids >= first) & (ids < end), ids - np.int32(first), np.int32(-1))
             scene = self.placed.snap_part(i, own).seen_from(*self.positions[0]).moved(int(left), int(top))
@@ -274,7 +274,7 @@ class SceneDepthLayers(DepthLayers):
     @property
     def n_triangles(self) -> int:
         """Triangles of all instances together."""
-        return int(self.placed.whole.first_ids[-1])
+        return int(self.placed.whole_first_ids[-1])
 
     @property
     def n_vertices(self) -> None:
@@ -289,12 +289,12 @@ class SceneDepthLayers(DepthLayers):
     @cached_property
     def instance(self) -> NDArray[np.int32]:
         """Index of the instance of each layer, int32 (H, W, K)."""
-        return instance_of_ids(self.id, self.placed.whole.first_ids)
+        return instance_of_ids(self.id, self.placed.whole_first_ids)
 
     @cached_property
     def triangle(self) -> NDArray[np.int32]:
         """Index of the triangle in its mesh, int32 (H, W, K)."""
-        return local_ids(self.id, self.instance, self.placed.whole.first_ids)
+        return local_ids(self.id, self.instance, self.placed.whole_first_ids)
 
     def layer(self, k: int) -> SceneFragments:
         """Return layer k, 0 the nearest, as a visibility buffer of its own: attributes are computed there."""

@@ -62,12 +62,15 @@ class PlacedScene:
     ----------
     scene, whole : Scene
         What is drawn, and what ids count the triangles of: the same but for a lens.
+    first_ids, whole_first_ids : (N + 1,) int64
+        Where the ids of each instance begin in these, and their end.
     bent : sequence of BentMesh, optional
         The parts that a lens makes of each instance.
     """
 
     def __init__(self, drawn: DrawnScene, view: View, *, with_depth: bool, may_cluster: bool = True) -> None:
         self.scene, self.whole, self._clip_from_world, self.bent = self._drawn = drawn
+        self.first_ids, self.whole_first_ids = drawn.scene.first_ids, drawn.whole.first_ids
         self._view = view
         self._with_depth = with_depth
         self._may_cluster = may_cluster
@@ -81,7 +84,7 @@ class PlacedScene:
         """Return ids in terms of the whole scene: as they are, but for a lens."""
         if self.bent is None:
             return ids
-        firsts = zip(self.bent, self.whole.first_ids[:-1].tolist(), strict=True)
+        firsts = zip(self.bent, self.whole_first_ids[:-1].tolist(), strict=True)
         wholes = np.concatenate([*(one.source + first for one, first in firsts), [-1]]).astype(np.int32)
         return wholes[ids]  # part -1, none, is the last
 
@@ -90,7 +93,7 @@ class PlacedScene:
         mesh = self.scene[i].mesh
         view, with_depth = self._view_of(i), self._with_depth
         snapped = snap_scene(FRESH, mesh.vertices, mesh.triangles, view, with_depth=with_depth, out=None)
-        return replace(snapped, scene=snapped.scene.numbered_from(int(self.scene.first_ids[i])))
+        return replace(snapped, scene=snapped.scene.numbered_from(int(self.first_ids[i])))
 
     def snap_part(self, i: int, triangles: NDArray[np.int32]) -> _engine.Scene:
         """Return what some triangles of an instance need, snapped: all of it, unless its mesh is drawn in clusters."""
@@ -106,7 +109,7 @@ class PlacedScene:
 
     def clustered(self, i: int) -> tuple[Clusters, View, int]:
         """Return the clusters of an instance's mesh, how they are seen, and what triangle 0 is called."""
-        return self.scene[i].mesh.clusters, self._view_of(i), int(self.scene.first_ids[i])
+        return self.scene[i].mesh.clusters, self._view_of(i), int(self.first_ids[i])
 
     def chunks(self) -> Iterator[list[Snapped]]:
         """Yield the instances in their order, as many at a time as `VERTICES_AT_ONCE` allows."""
