@@ -10,28 +10,25 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks import (
-    accuracy,
-    atlas_page,
-    batch,
-    choices,
-    choices_plans,
-    choices_tables,
-    pages,
-    pictures_page,
-    report,
-    smooth_tables,
-    static,
-    static_tables,
-)
-from benchmarks import options as accuracy_options
-from benchmarks.cases import CASES, TRIALS
-from benchmarks.contestants import known_peers
-from benchmarks.machine import ROOT
+from benchmarks.accuracy import measure as accuracy
+from benchmarks.accuracy import options as accuracy_options
+from benchmarks.atlas import tables as atlas_page
+from benchmarks.choices import measure as choices
+from benchmarks.choices import plans as choices_plans
+from benchmarks.choices import tables as choices_tables
+from benchmarks.harness.contestants import known_peers
+from benchmarks.harness.machine import ROOT
+from benchmarks.harness.records import write_record, write_text
+from benchmarks.harness.rounds import Options, run
+from benchmarks.harness.yardstick import DEFAULT_PATTERN, Yardstick
 from benchmarks.peers import PEERS
-from benchmarks.records import write_record, write_text
-from benchmarks.rounds import Options, run
-from benchmarks.yardstick import DEFAULT_PATTERN, Yardstick
+from benchmarks.pictures import tables as pictures_page
+from benchmarks.report import pages
+from benchmarks.report import tables as report
+from benchmarks.scenes.cases import CASES, TRIALS
+from benchmarks.small import batch, smooth_tables
+from benchmarks.static import measure as static
+from benchmarks.static import tables as static_tables
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -251,7 +248,7 @@ def report_command(arguments: argparse.Namespace) -> int:
 
 def html_command(records: list[dict[str, Any]], arguments: argparse.Namespace) -> int:
     """Write the report."""
-    from benchmarks.html_report import make_report  # matplotlib
+    from benchmarks.accuracy.html_report import make_report  # matplotlib
 
     try:
         if len(records) != 1 or records[0].get("kind") != "accuracy":
@@ -311,7 +308,8 @@ def batch_command(arguments: argparse.Namespace) -> int:
 
 def atlas_command(arguments: argparse.Namespace) -> int:
     """Draw, compare, write, print."""
-    from benchmarks import atlas, atlas_shrink
+    from benchmarks.atlas import measure as atlas
+    from benchmarks.atlas import shrink as atlas_shrink
 
     try:
         record = atlas.run_atlas(sys.stderr, arguments.family, arguments.method)
@@ -367,7 +365,10 @@ def static_command(arguments: argparse.Namespace) -> int:
 
 def charts_command(arguments: argparse.Namespace) -> int:
     """Draw."""
-    from benchmarks import atlas_charts, chart_files, choices_charts, static_charts  # matplotlib
+    from benchmarks.atlas import charts as atlas_charts
+    from benchmarks.choices import charts as choices_charts
+    from benchmarks.report import charts as chart_files
+    from benchmarks.static import charts as static_charts
 
     record = json.loads(arguments.file.read_text())
     of_kind = {"atlas": atlas_charts, "choices": choices_charts, "static": static_charts}
@@ -378,7 +379,7 @@ def charts_command(arguments: argparse.Namespace) -> int:
 
 def samplings_command(arguments: argparse.Namespace) -> int:
     """Draw."""
-    from benchmarks.samplings import draw_samplings  # matplotlib
+    from benchmarks.small.samplings import draw_samplings  # matplotlib
 
     print(draw_samplings(arguments.out))
     return 0
@@ -386,7 +387,7 @@ def samplings_command(arguments: argparse.Namespace) -> int:
 
 def pictures_command(arguments: argparse.Namespace) -> int:
     """Draw, compare, write, print."""
-    from benchmarks.pictures import run_pictures
+    from benchmarks.pictures.measure import run_pictures
 
     try:
         record = run_pictures(sys.stderr, arguments.scene, arguments.sheets)
@@ -416,7 +417,7 @@ def document_command(arguments: argparse.Namespace) -> int:
 
 def levels_command(arguments: argparse.Namespace) -> int:
     """Measure, write the page, print."""
-    from benchmarks import levels  # matplotlib, fast-simplification
+    from benchmarks.levels import measure as levels
 
     options = levels.Options(tuple(arguments.mesh), arguments.triangles, arguments.rounds, arguments.keep)
     record = levels.run_levels(options)

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.cases import Scene
 from benchmarks.peers import Drawing
+from benchmarks.scenes.cases import Scene
 
 LIGHT = np.array([-0.35, 0.45, 1.0]) / np.linalg.norm([-0.35, 0.45, 1.0])
 AMBIENT = 0.1

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.cases import Scene
 from benchmarks.peers import Drawing
 from benchmarks.peers.llvmpipe_peer import environment as mesa_environment
+from benchmarks.scenes.cases import Scene
 
 MODULE = DISTRIBUTION = "vtk"
 TASKS = ("visibility", "views", "views-png")

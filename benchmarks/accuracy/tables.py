@@ -1,0 +1,149 @@
+"""Tables of an accuracy record: time beside error, the mesh, anti-aliasing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from benchmarks.accuracy.stability import CHANGES, EXACT, FAR_PX
+from benchmarks.report.tables import number
+
+DEFAULT_BITS = "8"
+
+Record = dict[str, Any]
+Row = dict[str, Any]
+
+
+def facts_text(record: Record) -> str:
+    """What the figures of charts (a) and (b) and of the mesh belong to."""
+    options, mesh = record["options"], record["mesh"]
+    families = "; ".join(
+        f"{family['name']}, {family['what']}: {family['n_timed']:,} timed, errors over {family['n_edge_px']:,} "
+        f"edge pixels of {family['n_triangles']:,}"
+        for family in record["families"]
+    )
+    return (
+        f"{machine_text(record)}; CPU time of one thread, {options['rounds']} rounds. "
+        f"Frame {options['frame_px']} px square. Triangles {families}. "
+        f"Mesh: {mesh['n_triangles']:,} triangles, {mesh['n_edge_px']:,} edge pixels."
+    )
+
+
+def machine_text(record: Record) -> str:
+    """Machine, versions, instruction set, commits, dates."""
+    machine = record["machine"]
+    return (
+        f"{machine['cpu']}, {machine['cpus']} CPUs, {machine['system']}, Python {machine['python']}, "
+        f"topleft {record['versions']['topleft']} ({record['isa']}) at {commits_text(record)}"
+    )
+
+
+def commits_text(record: Record) -> str:
+    """Commits of the checkout when the parts were measured, and the days."""
+    parts = record["parts"].values()
+    commits = dict.fromkeys(
+        (part["commit"] or "unknown")[:12] + (" with changes" if part["changed"] else "") for part in parts
+    )
+    return f"{', '.join(commits)}, {' to '.join(sorted({part['date'][:10] for part in parts}))}"
+
+
+def is_default(row: Row) -> bool:
+    """Whether it is a method at its usual precision."""
+    return not row["precision"].isdigit() or row["precision"] == DEFAULT_BITS
+
+
+def coverage_rows(record: Record, keep: Callable[[Row], bool]) -> tuple[list[str], list[list[str]]]:
+    """A row for each method and precision, time and error of every family."""
+    families = {family["name"]: family for family in record["families"]}
+    head = ["method", "precision"]
+    for name in families:
+        head += [f"{name}: ns", "wrong"]
+    cells: dict[tuple[str, str], list[str]] = {}
+    for row in filter(keep, record["coverage"]):
+        own = cells.setdefault((row["method"], row["precision"]), [f"`{row['method']}`", row["precision"]])
+        own += [number(row["ns_triangle"]), per_million(row["wrong_px"], families[row["family"]]["n_edge_px"])]
+    return head, list(cells.values())
+
+
+def bits_rows(record: Record) -> tuple[list[str], list[list[str]]]:
+    """Wrong pixels of the engine by sub-pixel bits, beside whole pixels and floats."""
+    head = ["vertices", "as drawn by", *(family["name"] for family in record["families"])]
+    n_edge_px = {family["name"]: family["n_edge_px"] for family in record["families"]}
+    shown = {"auto": "{} bits", "point_in_triangle/top-left": "{}", "float_barycentric": "{}",
+             "float_barycentric/float64": "{}"}  # fmt: skip
+    cells: dict[str, list[str]] = {}
+    for row in record["coverage"]:
+        if row["method"] in shown:
+            name = shown[row["method"]].format(row["precision"])
+            own = cells.setdefault(name, [name, f"`{row['method']}`"])
+            own.append(per_million(row["wrong_px"], n_edge_px[row["family"]]))
+    return head, list(cells.values())
+
+
+def stability_rows(record: Record, keep: Callable[[Row], bool]) -> tuple[list[str], list[list[str]]]:
+    """A row for the exact picture, and one for each method and precision."""
+    columns = ["missed", "overdrawn", "far_missed", "far_overdrawn", "wrong", *(change.name for change in CHANGES)]
+    n = record["mesh"]["n_edge_px"]
+    rows = [
+        [f"`{row['method']}`" if row["method"] != EXACT else "exact picture", row["precision"]]
+        + [per_million(row[column], n) for column in columns]
+        for row in record["stability"]
+        if row["method"] == EXACT or keep(row)
+    ]
+    return ["method", "precision", *(column.replace("_", " ") for column in columns)], rows
+
+
+def antialiasing_rows(record: Record) -> tuple[list[str], list[list[str]]]:
+    """A row for each way to sample and each peer: time and RMS error of every family."""
+    head = ["sampling", "gives"]
+    for family in record["families"]:
+        head += [f"{family['name']}: ns", "RMS"]
+    cells: dict[str, list[str]] = {}
+    for row in record["antialiasing"]:
+        if "skipped" in row:
+            continue
+        name = f'`"{row["sampling"]}"`' if "sampling" in row else row["peer"]
+        own = cells.setdefault(name, [name, row.get("gives", "topleft")])
+        own += [number(row["ns_triangle"]), f"{row['rms']:.2g}"]
+    return head, list(cells.values())
+
+
+def others_rows(record: Record) -> tuple[list[str], list[list[str]]]:
+    """A row for each peer and each pure twin: time and error of every family."""
+    families = {family["name"]: family for family in record["families"]}
+    head = ["drawn by", "gives"]
+    for name in families:
+        head += [f"{name}: ns", "wrong"]
+    cells: dict[str, list[str]] = {}
+    for row in record["peers"] + record["pure"]:
+        if "skipped" in row:
+            continue
+        name = row.get("peer") or row["twin"]
+        gives = row.get("gives") or f"counts, Python, as `{row['method']}`"
+        own = cells.setdefault(name, [name, gives])
+        own += [number(row["ns_triangle"]), per_million(row["wrong_px"], families[row["family"]]["n_edge_px"])]
+    return head, list(cells.values())
+
+
+def skipped_text(record: Record) -> str:
+    """Peers that did not take part, with the reason."""
+    rows = [row for row in record["peers"] + record["antialiasing"] if "skipped" in row]
+    skipped = dict.fromkeys(f"{row['peer']} ({row['skipped']})" for row in rows)
+    return f"Left out: {'; '.join(skipped)}." if skipped else "No program was missing."
+
+
+def changes_text(_: Record) -> str:
+    """What the columns of the mesh say."""
+    missed = "*missed*, *overdrawn*: pixels that no triangle of the mesh draws, or that are drawn more than once"
+    far = f"*far*: the same with the mesh {FAR_PX:,} px from the origin, in x and y; `-` beyond the method's range"
+    wrong = "*wrong*: pixels that do not show the triangle that the exact picture shows"
+    changes = "The others: pixels that show another triangle after a change of the mesh"
+    named = "; ".join(f"*{change.name}*, {change.what}" for change in CHANGES)
+    return "\n".join(f"- {line}." for line in (missed, far, wrong, f"{changes}: {named}"))
+
+
+def per_million(count: int | None, n: int) -> str:
+    """A rate."""
+    if count is None:
+        return "-"
+    return f"{1e6 * count / n:,.0f}" if count * 1e5 >= n or not count else f"{1e6 * count / n:.1f}"

@@ -1,0 +1,210 @@
+"""What is chosen before a draw, beside what could have been: time of both in turns, on many scenes, with the same bits.
+
+In: scenes of `choices_scenes`, ways of `choices_ways`. Out: a record with a row for each scene and choice.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TextIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+import topleft as tl
+from benchmarks.choices.builds import BUILDS, concerns, load_builds, ways_with
+from benchmarks.choices.scenes import Scene, scenes
+from benchmarks.choices.ways import CHOICES, THREADED, Picture, Way, Ways
+from benchmarks.harness.machine import describe_commit, describe_machine, now
+
+HOPELESS = 4.0
+"""A way that takes so many times as long as the planner's sits out after the first round."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """How much to do."""
+
+    choices: Sequence[str] = ()
+    """All of `CHOICES` and the builds for none."""
+    scenes: Sequence[str] = ()
+    """Beginnings of names; all for none."""
+    rounds: int = 7
+    seconds: float = 0.002
+    """Length of a turn, at least a call."""
+    scale: float = 1.0
+    builds: Path | None = None
+    """Where builds with other constants are kept; without it they are not measured."""
+
+
+def run_choices(
+    options: Options,
+    log: TextIO,
+    record: dict[str, Any] | None = None,
+    save: Callable[[dict[str, Any]], None] | None = None,
+) -> dict[str, Any]:
+    """Return a record, or what was measured anew in it; `save` gets it after each scene.
+
+    Raises
+    ------
+    ValueError
+        If a choice is unknown.
+    AssertionError
+        If two ways draw different bits.
+    """
+    known = [*CHOICES, *BUILDS]
+    if unknown := [name for name in options.choices if name not in known]:
+        raise ValueError(f"--choice must be some of {', '.join(known)}, got {', '.join(unknown)}")
+    makers = makers_of(options)
+    rows = []
+    for scene in chosen_scenes(options):
+        for choice, ways_of in makers.items():
+            row = measure_choice(choice, scene, ways_of(scene), options)
+            if row:
+                rows.append(row)
+                print(row_text(row), file=log, flush=True)
+        if save:
+            save(with_rows(record, rows))
+    return with_rows(record, rows)
+
+
+def makers_of(options: Options) -> dict[str, Callable[[Scene], Ways]]:
+    """Return what gives the ways of a scene, for each choice that is wanted."""
+    wanted = list(options.choices) or [*CHOICES, *BUILDS]
+    makers = {name: CHOICES[name] for name in wanted if name in CHOICES}
+    for name in wanted:
+        if name in BUILDS and options.builds:
+            libraries = load_builds(name, options.builds)
+            makers[name] = lambda scene, name=name, own=libraries: (
+                ways_with(scene, own) if concerns(name, scene) else []
+            )
+    return makers
+
+
+def chosen_scenes(options: Options) -> Iterator[Scene]:
+    """Give the scenes whose names begin as asked."""
+    for scene in scenes(options.scale):
+        if not options.scenes or scene.label.startswith(tuple(options.scenes)):
+            yield scene
+
+
+def measure_choice(choice: str, scene: Scene, ways: Ways, options: Options) -> dict[str, Any] | None:
+    """Return a row, None where there is nothing to choose."""
+    if len(ways) < 2:
+        return None
+    check_same_bits(scene, ways)
+    clock = time.perf_counter if choice in THREADED else time.thread_time
+    times = take_rounds(ways, options.rounds, options.seconds, clock)
+    own = times[0]
+    others = [
+        {"way": way.name, "ms": digits(np.median(took)), "chosen_by_other": by_other(own, took, choice)}
+        for way, took in zip(ways[1:], times[1:], strict=True)
+    ]
+    return {
+        "choice": choice,
+        "scene": scene.name,
+        "kind": scene.kind,
+        "verb": scene.verb,
+        "sampling": scene.sampling,
+        "size": list(scene.size),
+        "n_triangles": len(scene.arrays[1]),
+        "chosen": ways[0].name,
+        "ms": quartiles(own),
+        "others": others,
+        "ratio": max(1.0, *(other["chosen_by_other"][1] for other in others)),
+    }
+
+
+def by_other(own: NDArray[np.float64], took: NDArray[np.float64], choice: str) -> list[float]:
+    """Return the quartiles of the ratios of the rounds; for threads the ratio of the least times is the middle one.
+
+    What else runs on the machine takes a thread away from some rounds, and CPU time does not leave that out.
+    """
+    ratios = quartiles(own[: len(took)] / took)
+    return [ratios[0], digits(own.min() / took.min()), ratios[2]] if choice in THREADED else ratios
+
+
+def check_same_bits(scene: Scene, ways: Ways) -> None:
+    """Raise an AssertionError unless all ways draw the same."""
+    with ways[0].in_force():
+        expected = [array.copy() for array in ways[0].draw()]
+    for way in ways[1:]:
+        with way.in_force():
+            for own, other in zip(expected, way.draw(), strict=True):
+                if own.tobytes() != other.tobytes():
+                    raise AssertionError(f"{scene.label}: {way.name!r} draws other bits than {ways[0].name!r}")
+
+
+def take_rounds(
+    ways: Sequence[Way], n_rounds: int, seconds: float, clock: Callable[[], float], hopeless: float = HOPELESS
+) -> list[NDArray[np.float64]]:
+    """Return the least milliseconds of a call in each round, way by way; the order turns from round to round."""
+    found: list[list[float]] = [[] for _ in ways]
+    for i in range(n_rounds):
+        for k in (np.arange(len(ways)) + i) % len(ways):
+            if i and found[k][0] > hopeless * found[0][0]:
+                continue
+            with ways[k].in_force():
+                found[k].append(least_ms(ways[k].draw, seconds, clock))
+    return [np.array(took) for took in found]
+
+
+def least_ms(draw: Callable[[], Picture], seconds: float, clock: Callable[[], float]) -> float:
+    """Return the least time of some calls, after one that does not count."""
+    draw()
+    took: list[float] = []
+    while not took or sum(took) < seconds:
+        start = clock()
+        draw()
+        took.append(clock() - start)
+    return 1e3 * min(took)
+
+
+def quartiles(values: NDArray[np.float64]) -> list[float]:
+    """Return the first quartile, the median and the third."""
+    return [digits(value) for value in np.percentile(values, [25, 50, 75])]
+
+
+def digits(value: float) -> float:
+    """Return a number to four digits."""
+    return float(f"{value:.4g}")
+
+
+def with_rows(record: dict[str, Any] | None, rows: list[dict[str, Any]]) -> dict[str, Any]:
+    """Return a record with these rows in place of older ones of the same choice and scene."""
+    new = {key_of(row): row for row in rows}
+    old = {} if record is None else {key_of(row): row for row in record["rows"]}
+    order = {name: i for i, name in enumerate([*CHOICES, *BUILDS])}
+    merged = sorted((old | new).values(), key=lambda row: order.get(row["choice"], len(order)))
+    parts = {name: value for name, value in (record or {}).items() if name not in FACTS}
+    return facts() | parts | {"rows": merged}
+
+
+FACTS = ("kind", "date", "commit", "changed", "machine", "isa", "versions")
+
+
+def facts() -> dict[str, Any]:
+    """Return what figures belong to."""
+    return {
+        "kind": "choices",
+        "date": now(),
+        **describe_commit(),
+        "machine": describe_machine(),
+        "isa": tl.build_info()["isa"],
+        "versions": {"topleft": tl.__version__, "numpy": np.__version__},
+    }
+
+
+def key_of(row: dict[str, Any]) -> tuple[str, ...]:
+    """Return what tells rows apart."""
+    return row["choice"], row["scene"], row["verb"], row["sampling"]
+
+
+def row_text(row: dict[str, Any]) -> str:
+    """Return a row for the terminal."""
+    others = ", ".join(f"{other['way']} {other['chosen_by_other'][1]:.2f}" for other in row["others"])
+    what = f"{row['scene']}, {row['verb']} {row['sampling']}"
+    return f"{row['choice']:18} {what:58} {row['chosen']:16} {row['ms'][1]:9.3f} ms  x {row['ratio']:.2f}  ({others})"
