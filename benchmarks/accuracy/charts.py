@@ -1,17 +1,11 @@
-"""Charts (a) and (b) of an accuracy record, time against error, and the list of all charts. Needs matplotlib.
-
-Shapes tell families of methods apart as well as colours, which are those of M. Okabe and K. Ito, Color Universal
-Design, 2008; both survive print and colour-blindness.
-"""
+"""Charts (a) and (b) of an accuracy record, time against error, and the list of all charts. Needs matplotlib."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any, NamedTuple
-
-import matplotlib as mpl
-
-mpl.use("Agg")
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
+from pathlib import Path
+from typing import Any
 
 from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
@@ -19,31 +13,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullLocator
 
-
-class Look(NamedTuple):
-    """How the points of a method look."""
-
-    label: str
-    color: str
-    marker: str
-
-
-LOOKS = {
-    "auto": Look("engine (auto)", "#000000", "o"),
-    "edge": Look("engine, edge", "#0072B2", "s"),
-    "scanline": Look("engine, scanline", "#56B4E9", "D"),
-    "edge_increment": Look("edge_increment", "#009E73", "^"),
-    "zigzag": Look("zigzag", "#009E73", "v"),
-    "point_in_triangle": Look("point_in_triangle", "#D55E00", "P"),
-    "bresenham_scanline": Look("bresenham_scanline", "#CC79A7", "X"),
-    "lerp_scanline": Look("lerp_scanline", "#E69F00", "<"),
-    "row_crossing": Look("row_crossing", "#F0E442", ">"),
-    "float_barycentric": Look("float_barycentric", "#999999", "*"),
-}
-"""By the first part of the name; variants look alike, with a hollow marker."""
-
-STYLE = {"font.size": 9, "axes.spines.top": False, "axes.spines.right": False, "svg.hashsalt": "topleft",
-         "axes.titlesize": 10, "legend.frameon": False, "figure.dpi": 100}  # fmt: skip
+from benchmarks.accuracy import speed_charts
+from benchmarks.report.charts import LOOKS, Look, draw_grid, duration, figure_bytes, write_chart
 
 FAR_AWAY = 1e12
 """Beyond every axis: where the ends of a front go."""
@@ -171,8 +142,7 @@ def panels(record: dict[str, Any]) -> tuple[Figure, list[Axes]]:
         axis.set_axis_off()
     for axis, family in zip(axes, families, strict=False):
         axis.set_title(f"{family['name']}: {family['what']}", loc="left")
-        axis.grid(which="major", color="0.88", lw=0.6)
-        axis.set_axisbelow(True)
+        draw_grid(axis)
     return figure, axes[: len(families)]
 
 
@@ -186,14 +156,6 @@ def finish(figure: Figure, axes: list[Axes], y_label: str) -> None:
         if i >= len(axes) - 2:
             axis.set_xlabel("time per triangle")
     figure.supylabel(y_label, fontsize=9)
-
-
-def duration(ns: float) -> str:
-    """A round number of nanoseconds in the unit that fits."""
-    for unit, size in (("s", 1e9), ("ms", 1e6), ("µs", 1e3)):
-        if ns >= size:
-            return f"{ns / size:g} {unit}"
-    return f"{ns:g} ns"
 
 
 def draw_front(axis: Axes, points: list[Point]) -> None:
@@ -212,3 +174,24 @@ def pareto_front(points: list[Point]) -> Iterator[Point]:
         if y < best:
             best = y
             yield x, y
+
+
+CHARTS: Mapping[str, Callable[[dict[str, Any]], Figure]] = {
+    "accuracy-coverage": chart_coverage,
+    "accuracy-antialiasing": chart_antialiasing,
+    "accuracy-depth": speed_charts.chart_depth,
+    "speed-sizes": speed_charts.chart_sizes,
+    "speed-scaling": speed_charts.chart_scaling,
+    "speed-tutorial": speed_charts.chart_tutorial,
+}
+"""By the name of the file."""
+
+
+def draw_charts(record: dict[str, Any], folder: Path) -> list[Path]:
+    """Write the charts as SVG, return where they are."""
+    return [write_chart(partial(make, record), folder, name) for name, make in CHARTS.items()]
+
+
+def chart_svg(record: dict[str, Any], name: str) -> bytes:
+    """Return a chart of an accuracy record as SVG."""
+    return figure_bytes(partial(CHARTS[name], record))

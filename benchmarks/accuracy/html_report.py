@@ -14,9 +14,10 @@ from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from benchmarks.accuracy import tables as accuracy_tables
+from benchmarks.accuracy import tables
+from benchmarks.accuracy.charts import CHARTS, chart_svg
+from benchmarks.accuracy.study import PARTS
 from benchmarks.report import pages
-from benchmarks.report.charts import CHARTS, chart_svg
 from benchmarks.report.markdown import to_html
 
 PAGES = (
@@ -95,8 +96,8 @@ def make_report(record: dict[str, Any], folder: Path) -> str:
 
 def with_own_parts(text: str, record: dict[str, Any]) -> str:
     """Return the page with this record's figures; the markers of other records keep what they hold."""
-    known = {name for _, name, _, _ in pages.MARKED.findall(text)} <= pages.PARTS.keys()
-    return pages.with_parts(text, record) if known else text
+    known = {name for _, name, _, _ in pages.MARKED.findall(text)} <= PARTS.keys()
+    return pages.with_parts(text, record, PARTS) if known else text
 
 
 def facts_html(record: dict[str, Any]) -> str:
@@ -108,7 +109,7 @@ def facts_html(record: dict[str, Any]) -> str:
         "Machine": f"{machine['cpu']}; {machine['cpus']} CPUs, {machine['memory_gib']} GiB, {machine['architecture']}",
         "System": f"{machine['system']}, Python {machine['python']}, NumPy {record['versions']['numpy']}",
         "topleft": f"{record['versions']['topleft']}, instruction set {record['isa']}",
-        "Measured": accuracy_tables.commits_text(record),
+        "Measured": tables.commits_text(record),
         "Beside": ", ".join(versions) or "nothing",
     }
     items = "".join(f"<dt>{name}</dt><dd>{html.escape(text)}</dd>" for name, text in facts.items())

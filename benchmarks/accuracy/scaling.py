@@ -13,7 +13,7 @@ from typing import Any
 
 from benchmarks.accuracy.options import Options
 from benchmarks.harness.turns import Turn, spread, take_turns, turn_of
-from benchmarks.scenes.cases import FULL_HD, blob_scene
+from benchmarks.scenes.cases import HD, blob_scene
 
 N_TRIANGLES = (100, 1000, 10_000, 100_000, 1_000_000, 10_000_000)
 
@@ -36,7 +36,7 @@ def measure_scaling(options: Options) -> dict[str, Any]:
     import topleft as tl
 
     counts = thread_counts(options.max_threads)
-    rasterizers = [tl.Rasterizer(FULL_HD, threads=n) for n in counts]
+    rasterizers = [tl.Rasterizer(HD, threads=n) for n in counts]
     rows = []
     for n in N_TRIANGLES:
         scene = blob_scene(max(100, int(n * options.scale)))

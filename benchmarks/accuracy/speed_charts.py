@@ -1,22 +1,18 @@
 """Charts (c) to (f) of an accuracy record: depth, cost by size, by number and threads, pictures a second.
 
-Needs matplotlib. Looks are those of `charts.LOOKS`.
+Needs matplotlib.
 """
 
 from __future__ import annotations
 
-from typing import Any
-
 from matplotlib import pyplot as plt
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from benchmarks.accuracy.charts import LOOKS, duration
 from benchmarks.accuracy.tutorial import QUOTED
-
-Record = dict[str, Any]
+from benchmarks.harness.records import Record
+from benchmarks.report.charts import LOOKS, count_text, draw_grid, duration
 
 FORMAT_LOOKS = {
     "topleft, reversed": ("#000000", "-", "o", "float32, 1 near to 0 far (topleft)"),
@@ -130,12 +126,3 @@ def chart_tutorial(record: Record) -> Figure:
     return figure
 
 
-def count_text(value: float) -> str:
-    """A number that is not too long, with commas."""
-    return f"{value:,.0f}" if value >= 10 else f"{value:,.2g}"
-
-
-def draw_grid(axis: Axes) -> None:
-    """Draw what all charts have."""
-    axis.grid(which="major", color="0.88", lw=0.6)
-    axis.set_axisbelow(True)

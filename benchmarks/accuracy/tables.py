@@ -6,11 +6,11 @@ from collections.abc import Callable
 from typing import Any
 
 from benchmarks.accuracy.stability import CHANGES, EXACT, FAR_PX
-from benchmarks.report.tables import number
+from benchmarks.harness.records import Record
+from benchmarks.report.tables import commit_text, number
 
 DEFAULT_BITS = "8"
 
-Record = dict[str, Any]
 Row = dict[str, Any]
 
 
@@ -41,9 +41,7 @@ def machine_text(record: Record) -> str:
 def commits_text(record: Record) -> str:
     """Commits of the checkout when the parts were measured, and the days."""
     parts = record["parts"].values()
-    commits = dict.fromkeys(
-        (part["commit"] or "unknown")[:12] + (" with changes" if part["changed"] else "") for part in parts
-    )
+    commits = dict.fromkeys(map(commit_text, parts))
     return f"{', '.join(commits)}, {' to '.join(sorted({part['date'][:10] for part in parts}))}"
 
 

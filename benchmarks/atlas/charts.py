@@ -7,12 +7,9 @@ written in the cell as well.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
-
-import matplotlib as mpl
-
-mpl.use("Agg")
 
 import numpy as np
 from matplotlib import pyplot as plt
@@ -23,8 +20,10 @@ from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
 from benchmarks.atlas.depth import DEPTH_FAMILIES
-from benchmarks.atlas.magnified import draw_sheets
+from benchmarks.atlas.magnified import sheets
 from benchmarks.atlas.tables import steps_of
+from benchmarks.harness.records import Record
+from benchmarks.report.charts import write_chart
 
 STYLE = {"font.size": 8, "axes.titlesize": 9, "svg.hashsalt": "topleft", "figure.dpi": 100,
          "hatch.linewidth": 0.5, "hatch.color": "0.6"}  # fmt: skip
@@ -34,32 +33,22 @@ DARK = 0.03
 """Share from which text is white."""
 WITHOUT = "white: none; dot: with gaps; hatched: refuses to draw; % of edge pixels"
 
-Record = dict[str, Any]
 Row = dict[str, Any]
 
 
 def draw_charts(record: Record, folder: Path) -> list[Path]:
     """Write the charts as SVG, the magnified scenes as PNG, return where they are."""
-    folder.mkdir(parents=True, exist_ok=True)
-    paths = []
-    with plt.rc_context(STYLE):
-        for name, figure in figures(record):
-            suffix = "png" if name.startswith("scenes") else "svg"  # pixels gain nothing from SVG
-            paths.append(folder / f"atlas-{name}.{suffix}")
-            figure.savefig(paths[-1], dpi=120, metadata={"Date": None} if suffix == "svg" else {})
-            plt.close(figure)
-    return paths
+    drawn = [write_chart(make, folder, f"atlas-{name}", "svg", STYLE, 120) for name, make in charts(record)]
+    return drawn + [write_chart(make, folder, f"atlas-{name}", "png", STYLE, 120) for name, make in sheets()]
 
 
-def figures(record: Record) -> Iterator[tuple[str, Figure]]:
-    """Yield a figure for each family of pixels, one for those with depth, the sheets of magnified scenes."""
+def charts(record: Record) -> Iterator[tuple[str, Callable[[], Figure]]]:
+    """Yield what draws a figure for each family of pixels, and one for those with depth."""
     for facts in record["families"]:
         if facts["name"] not in DEPTH_FAMILIES:
-            chart = chart_family if len(facts["axes"]) == 1 else chart_pair
-            yield facts["name"], chart(record, facts)
+            yield facts["name"], partial(chart_family if len(facts["axes"]) == 1 else chart_pair, record, facts)
     if deep := [facts for facts in record["families"] if facts["name"] in DEPTH_FAMILIES]:
-        yield "depth", chart_depth(record, deep)
-    yield from draw_sheets()
+        yield "depth", partial(chart_depth, record, deep)
 
 
 def shares(row: Row, facts: Row, *fields: str) -> NDArray[np.float64]:

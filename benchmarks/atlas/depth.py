@@ -7,14 +7,15 @@ through the snapped vertices, in units in the last place of float32. Scenes are 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.atlas.families import MIDDLE_PX, Axis, direction, power_of_ten, power_of_two, square_rim
+from benchmarks.atlas.families import MIDDLE_PX, Axis, Family, direction, power_of_ten, power_of_two, square_rim
+from benchmarks.atlas.maps import tabulate, walk
 from benchmarks.exact.clip import draw_clip, pieces_picture
 from benchmarks.exact.integers import box_side, edge_values, signed_area, snapped_points
 
@@ -65,15 +66,10 @@ class Picture(NamedTuple):
 
 
 @dataclass(frozen=True)
-class DepthFamily:
-    """As `atlas_families.Family`, and what judges a picture that was drawn with so many bits."""
+class DepthFamily(Family):
+    """A family with depth: what judges a picture that was drawn with so many bits."""
 
-    name: str
-    what: str
-    axes: Sequence[Axis]
-    make: Callable[..., DepthScene]
-    judge: Callable[[DepthScene, Picture, int], DepthFaults]
-    n_seeds: int = 3
+    judge: Callable[[DepthScene, Picture, int], DepthFaults] = field(kw_only=True)
 
 
 def draw(scene: DepthScene, method: str, bits: int) -> Picture:
@@ -271,28 +267,27 @@ DEPTH_FAMILIES = {
     family.name: family
     for family in (
         DepthFamily("near", "a tube round the eye, cut by a near plane",
-                    [Axis("w of the near plane", W_VALUES)], tube, judge_clip),
+                    [Axis("w of the near plane", W_VALUES)], tube, judge=judge_clip),
         DepthFamily("eye", "a fan with corners close to the plane of the eye",
-                    [Axis("w of the corners", W_VALUES)], fan_at_the_eye, judge_clip),
+                    [Axis("w of the corners", W_VALUES)], fan_at_the_eye, judge=judge_clip),
         DepthFamily("slope", "two sheets that cut each other",
-                    [Axis("depth slope, per px", SLOPES)], slope, judge_depth),
+                    [Axis("depth slope, per px", SLOPES)], slope, judge=judge_depth),
         DepthFamily("sheets", "two parallel sheets at depths from 0.5 to 1",
                     [Axis("distance of the sheets", power_of_two(8, 12, 16, 18, 20, 22, 23, 24, 25, 26, 28, 32))],
-                    sheets, judge_depth),
+                    sheets, judge=judge_depth),
         DepthFamily("depth-layers", "layers in any order, all at depths of their own",
-                    [Axis("layers", {str(n): n for n in (1, 255, 256, 65535, 65536)})], deep_layers, judge_layers),
+                    [Axis("layers", {str(n): n for n in (1, 255, 256, 65535, 65536)})],
+                    deep_layers, judge=judge_layers),
         DepthFamily("slope-far", "two sheets that cut each other, far from the origin",
                     [Axis("distance from the origin, px", {"0": 0.0} | power_of_ten(3, 5, 7, 9, 12)),
                      Axis("depth slope, per px", power_of_ten(-3, 0, 3))],
-                    lambda offset, per_px, seed: slope(per_px, seed, offset), judge_depth, 2),
+                    lambda offset, per_px, seed: slope(per_px, seed, offset), 2, judge=judge_depth),
     )
 }  # fmt: skip
 
 
 def measure_depth(family: DepthFamily, names: Sequence[str]) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     """Return what was drawn, and a map for each of the engine's rows, as `atlas.map_family`."""
-    from benchmarks.atlas.measure import tabulate, walk
-
     cells: dict[str, list[list[DepthFaults | str]]] = {name: [] for name in names}
     n_px = []
     for _, values in walk(family):

@@ -50,7 +50,7 @@ class Family:
     name: str
     what: str
     axes: Sequence[Axis]
-    make: Callable[..., Scene]
+    make: Callable[..., Any]
     n_seeds: int = 3
 
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from fractions import Fraction
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -37,12 +38,12 @@ class Triptych(NamedTuple):
     methods: list[str]
 
 
-def draw_sheets() -> Iterator[tuple[str, Figure]]:
-    """Yield a sheet of scenes for each group of families."""
+def sheets() -> Iterator[tuple[str, Callable[[], Figure]]]:
+    """Yield what draws a sheet of scenes for each group of families."""
     for name, families in SHEETS.items():
         found = [own for scene in FAILURE_SCENES.values() if scene.family in families for own in triptychs(scene)]
         if found:
-            yield name, draw_sheet(found)
+            yield name, partial(draw_sheet, found)
 
 
 def triptychs(scene: FailureScene) -> Iterator[Triptych]:

@@ -9,16 +9,16 @@ times. A method that is exact and has the fill rule of the library has none of t
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, TextIO
+from typing import Any, TextIO
 
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.atlas.depth import DEPTH_FAMILIES, PRODUCTION, DepthFamily, DepthFaults, measure_depth
+from benchmarks.atlas.depth import DEPTH_FAMILIES, PRODUCTION, measure_depth
 from benchmarks.atlas.families import FAMILIES, Family, Scene
+from benchmarks.atlas.maps import Faults, tabulate, walk
 from benchmarks.exact.integers import Points, draw_points, signed_area, snapped_points
 from benchmarks.exact.unsnapped import ExactPicture
 
@@ -83,15 +83,6 @@ def entries() -> list[Entry]:
 
 SAMPLED = [Entry(f"auto, {sampling}", "auto", sampling=sampling) for sampling in ("msaa4", "area", "outer", "inner")]
 """More ways to count layers."""
-
-
-class Faults(NamedTuple):
-    """Pixels of a picture."""
-
-    wrong: int
-    gaps: int
-    overdrawn: int
-    inexact: int
 
 
 def draw_counts(entry: Entry, scene: Scene) -> NDArray[Any]:
@@ -161,12 +152,6 @@ def faults_of_bounds(sampling: str, counts: NDArray[Any], exact: Exact) -> Fault
     return Faults(0, 0, 0, int(is_broken.sum()))
 
 
-def walk(family: Family | DepthFamily) -> Iterator[tuple[list[str], list[Any]]]:
-    """Yield names and values of the parameters, from mild to harsh, the last parameter first."""
-    for steps in itertools.product(*(axis.values.items() for axis in family.axes)):
-        yield [name for name, _ in steps], [value for _, value in steps]
-
-
 def map_family(family: Family, rows: Sequence[Entry]) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     """Return what was drawn, and the map of each entry."""
     cells: dict[str, list[list[Any]]] = {entry.name: [] for entry in rows}
@@ -177,25 +162,6 @@ def map_family(family: Family, rows: Sequence[Entry]) -> tuple[dict[str, Any], l
         for entry in rows:
             cells[entry.name].append([measure(entry, exact) for exact in scenes])
     return tabulate(family, n_edge_px, cells)
-
-
-def tabulate(
-    family: Family | DepthFamily, n_px: list[int], cells: dict[str, list[list[Any]]]
-) -> tuple[dict[str, Any], list[dict[str, Any]]]:
-    """Return facts, and rows with a list for each field: sums over scenes step by step, None where a method refuses."""
-    facts = {"name": family.name, "what": family.what, "axes": {axis.what: list(axis.values) for axis in family.axes},
-             "n_scenes": family.n_seeds, "n_px": n_px}  # fmt: skip
-    maps = []
-    for name, steps in cells.items():
-        row: dict[str, Any] = {"family": family.name, "entry": name}
-        refusals = [fault for faults in steps for fault in faults if isinstance(fault, str)]
-        drawn = [None if any(isinstance(fault, str) for fault in faults) else faults for faults in steps]
-        for field in Faults._fields:
-            row[field] = [None if faults is None else sum(getattr(f, field) for f in faults) for faults in drawn]
-        if isinstance(steps[0][0], DepthFaults) and steps[0][0].ulp is not None:
-            row["ulp"] = [max(fault.ulp for fault in faults) for faults in steps]
-        maps.append(row | ({"refused": refusals[0]} if refusals else {}))
-    return facts, maps
 
 
 def run_atlas(

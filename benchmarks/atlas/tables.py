@@ -7,10 +7,10 @@ from typing import Any
 
 from benchmarks.atlas.depth import DEPTH_FAMILIES, PRODUCTION
 from benchmarks.atlas.measure import SAMPLED
-from benchmarks.report.tables import table
+from benchmarks.harness.records import Record
+from benchmarks.report.tables import left_table, table_text
 from topleft.failure_scenes import FAILURE_SCENES
 
-Record = dict[str, Any]
 Row = dict[str, Any]
 
 NEVER = "-"
@@ -37,14 +37,7 @@ def families_text(record: Record) -> str:
         axes = "; ".join(f"{what}: {values[0]} to {values[-1]}" for what, values in facts["axes"].items())
         n = f"{min(facts['n_px']):,} to {max(facts['n_px']):,}"
         rows.append([f"`{facts['name']}`", facts["what"], axes, str(facts["n_scenes"]), n])
-    return "\n".join(left_table(["family", "what", "parameter, from mild to harsh", "scenes a step", "pixels"], rows))
-
-
-def left_table(head: list[str], rows: list[list[str]]) -> Iterator[str]:
-    """A Markdown table of words: every column to the left."""
-    widths = [max(len(row[i]) for row in [head, *rows]) for i in range(len(head))]
-    for row in [head, ["-" * width for width in widths], *rows]:
-        yield "| " + " | ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) + " |"
+    return left_table(["family", "what", "parameter, from mild to harsh", "scenes a step", "pixels"], rows)
 
 
 def first_text(record: Record) -> str:
@@ -59,7 +52,7 @@ def first_text(record: Record) -> str:
             own = cells.setdefault(row["entry"], [f"`{row['entry']}`"])
             own.append(first_cell(row, steps_of(facts)))
     head = ["method", *(f"`{facts['name']}`" for facts in families)]
-    return "\n".join(left_table(head, list(cells.values())))
+    return left_table(head, list(cells.values()))
 
 
 def first_cell(row: Row, steps: list[str]) -> str:
@@ -88,7 +81,7 @@ def production_text(record: Record) -> str:
             ulp = f"{max(row['ulp']):.2g}" if "ulp" in row else ""
             rows.append([f"`{facts['name']}`", f"`{row['entry']}`", share, *sums, ulp, refused])
     head = ["family", "method", "wrong, at most", "gaps", "overdrawn", "inexact", "depth, ulp", "refuses from"]
-    return "\n".join(table(head, merge_walkers(rows)))
+    return table_text(head, merge_walkers(rows))
 
 
 def merge_walkers(rows: list[list[str]]) -> list[list[str]]:

@@ -17,8 +17,9 @@ from types import ModuleType
 from typing import Any
 
 from benchmarks.choices.scenes import Scene
-from benchmarks.choices.ways import MSAA, Way, Ways, drawing
+from benchmarks.choices.ways import MSAA, drawing
 from benchmarks.harness.machine import ROOT
+from benchmarks.harness.ways import Way, Ways
 
 SOURCES = ("csrc", "src", "setup.py", "pyproject.toml", "README.md", "LICENSE")
 

@@ -14,14 +14,12 @@ from typing import Any, TextIO
 import numpy as np
 from numpy.typing import NDArray
 
-import topleft as tl
 from benchmarks.choices.builds import BUILDS, concerns, load_builds, ways_with
 from benchmarks.choices.scenes import Scene, scenes
-from benchmarks.choices.ways import CHOICES, THREADED, Picture, Way, Ways
-from benchmarks.harness.machine import describe_commit, describe_machine, now
-
-HOPELESS = 4.0
-"""A way that takes so many times as long as the planner's sits out after the first round."""
+from benchmarks.choices.ways import CHOICES, THREADED
+from benchmarks.harness.machine import describe
+from benchmarks.harness.turns import digits, quartiles
+from benchmarks.harness.ways import Ways, check_same_bits, take_rounds
 
 
 @dataclass(frozen=True)
@@ -95,7 +93,7 @@ def measure_choice(choice: str, scene: Scene, ways: Ways, options: Options) -> d
     """Return a row, None where there is nothing to choose."""
     if len(ways) < 2:
         return None
-    check_same_bits(scene, ways)
+    check_same_bits(scene.label, ways)
     clock = time.perf_counter if choice in THREADED else time.thread_time
     times = take_rounds(ways, options.rounds, options.seconds, clock)
     own = times[0]
@@ -127,52 +125,6 @@ def by_other(own: NDArray[np.float64], took: NDArray[np.float64], choice: str) -
     return [ratios[0], digits(own.min() / took.min()), ratios[2]] if choice in THREADED else ratios
 
 
-def check_same_bits(scene: Scene, ways: Ways) -> None:
-    """Raise an AssertionError unless all ways draw the same."""
-    with ways[0].in_force():
-        expected = [array.copy() for array in ways[0].draw()]
-    for way in ways[1:]:
-        with way.in_force():
-            for own, other in zip(expected, way.draw(), strict=True):
-                if own.tobytes() != other.tobytes():
-                    raise AssertionError(f"{scene.label}: {way.name!r} draws other bits than {ways[0].name!r}")
-
-
-def take_rounds(
-    ways: Sequence[Way], n_rounds: int, seconds: float, clock: Callable[[], float], hopeless: float = HOPELESS
-) -> list[NDArray[np.float64]]:
-    """Return the least milliseconds of a call in each round, way by way; the order turns from round to round."""
-    found: list[list[float]] = [[] for _ in ways]
-    for i in range(n_rounds):
-        for k in (np.arange(len(ways)) + i) % len(ways):
-            if i and found[k][0] > hopeless * found[0][0]:
-                continue
-            with ways[k].in_force():
-                found[k].append(least_ms(ways[k].draw, seconds, clock))
-    return [np.array(took) for took in found]
-
-
-def least_ms(draw: Callable[[], Picture], seconds: float, clock: Callable[[], float]) -> float:
-    """Return the least time of some calls, after one that does not count."""
-    draw()
-    took: list[float] = []
-    while not took or sum(took) < seconds:
-        start = clock()
-        draw()
-        took.append(clock() - start)
-    return 1e3 * min(took)
-
-
-def quartiles(values: NDArray[np.float64]) -> list[float]:
-    """Return the first quartile, the median and the third."""
-    return [digits(value) for value in np.percentile(values, [25, 50, 75])]
-
-
-def digits(value: float) -> float:
-    """Return a number to four digits."""
-    return float(f"{value:.4g}")
-
-
 def with_rows(record: dict[str, Any] | None, rows: list[dict[str, Any]]) -> dict[str, Any]:
     """Return a record with these rows in place of older ones of the same choice and scene."""
     new = {key_of(row): row for row in rows}
@@ -180,22 +132,10 @@ def with_rows(record: dict[str, Any] | None, rows: list[dict[str, Any]]) -> dict
     order = {name: i for i, name in enumerate([*CHOICES, *BUILDS])}
     merged = sorted((old | new).values(), key=lambda row: order.get(row["choice"], len(order)))
     parts = {name: value for name, value in (record or {}).items() if name not in FACTS}
-    return facts() | parts | {"rows": merged}
+    return {"kind": "choices"} | describe() | parts | {"rows": merged}
 
 
 FACTS = ("kind", "date", "commit", "changed", "machine", "isa", "versions")
-
-
-def facts() -> dict[str, Any]:
-    """Return what figures belong to."""
-    return {
-        "kind": "choices",
-        "date": now(),
-        **describe_commit(),
-        "machine": describe_machine(),
-        "isa": tl.build_info()["isa"],
-        "versions": {"topleft": tl.__version__, "numpy": np.__version__},
-    }
 
 
 def key_of(row: dict[str, Any]) -> tuple[str, ...]:

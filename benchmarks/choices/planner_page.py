@@ -1,7 +1,8 @@
-"""docs/measured/planner.md: what a plan says, of ten scenes. `python -m benchmarks plans` writes it."""
+"""docs/measured/planner.md: what a plan says, of ten scenes. `python -m benchmarks planner` writes it."""
 
 from __future__ import annotations
 
+import argparse
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,9 +12,12 @@ from typing import Any
 import numpy as np
 
 import topleft as tl
+from benchmarks.harness.machine import PAGES
+from benchmarks.harness.records import Record, write_text
+from benchmarks.report.study import Save, Study
 from topleft.scenes import blob, planar_mesh, random_triangles, shape
 
-PAGE = Path(__file__).parents[2] / "docs" / "measured" / "planner.md"
+PAGE = PAGES / "planner.md"
 
 HEAD = """\
 # What a scene needs, and why
@@ -61,7 +65,7 @@ were not fitted. They are for memory that is kept, as a `Rasterizer` does, and f
 [choices.md](choices.md) has each choice beside what could have been chosen, estimates beside measurements, and what a
 plan takes.
 
-The plans below were written by `python -m benchmarks plans`, measured on the machine that they name.
+The plans below were written by `python -m benchmarks planner`, measured on the machine that they name.
 """
 
 PERSPECTIVE = np.array([[0.6, 0, 0, 0], [0, 1.0, 0, 0], [0, 0, -1, 1], [0, 0, -1, 3]])
@@ -107,15 +111,17 @@ def page() -> str:
     return "\n".join(parts)
 
 
-def main() -> None:
-    """Write docs/measured/planner.md with the costs that ship."""
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("-o", "--out", type=Path, default=PAGE, metavar="PAGE.md")
+
+
+def run(arguments: argparse.Namespace, _: Save) -> Record:
+    """Write the page with the costs that ship; the record is where it is."""
     with TemporaryDirectory() as empty:
         os.environ["XDG_CACHE_HOME"] = empty
-        text = page()
-    temporary = PAGE.with_suffix(".part")
-    temporary.write_text(text, encoding="utf-8")
-    temporary.replace(PAGE)
+        write_text(arguments.out, page())
+    return {"kind": "planner", "path": str(arguments.out)}
 
 
-if __name__ == "__main__":
-    main()
+STUDY = Study("planner", "write the page of plans of ten scenes", add_arguments, run, lambda record: [record["path"]])

@@ -8,9 +8,11 @@ from typing import Any
 import numpy as np
 
 import topleft as tl
-from benchmarks.choices.measure import Options, chosen_scenes, digits, take_rounds, with_rows
+from benchmarks.choices.measure import Options, chosen_scenes, with_rows
 from benchmarks.choices.scenes import Scene
-from benchmarks.choices.ways import Way, drawing, picture_of, verb_of
+from benchmarks.choices.ways import drawing, picture_of, verb_of
+from benchmarks.harness.turns import digits
+from benchmarks.harness.ways import Way, take_rounds
 
 PLANNED = ("mesh 1k", "mesh 10k", "mesh 100k", "mesh 100k float64 int64", "mesh 1M", "one large", "ten in 64x64")
 """Scenes whose plans are timed."""

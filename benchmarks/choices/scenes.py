@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-HD = (1920, 1080)
-UHD = (3840, 2160)
-
-Arrays = tuple[NDArray[Any], NDArray[Any]]
+from benchmarks.scenes.arrays import Arrays, blob_arrays, map_arrays, rounded, shrunk, sliver_arrays, strewn_arrays
+from benchmarks.scenes.cases import HD, UHD, orbit_camera
+from topleft._camera.camera import Camera, orbit_view
+from topleft.scenes import large_triangle
 
 
 @dataclass(frozen=True)
@@ -67,61 +67,14 @@ def forget_scenes() -> None:
     made.cache_clear()
 
 
-def shrunk(n: int, scale: float) -> int:
-    """Return a number of triangles times a scale, at least 8 of them."""
-    return max(8, round(n * scale))
-
-
-def strewn(n: int, size_px: float, size: tuple[int, int], z: float | None = None, far: float = 1.0) -> Arrays:
-    """Return triangles strewn over a frame, or over `far` times as much on each side; all at one depth if given."""
-    from topleft.scenes import random_triangles
-
-    width, height = (round(far * side) for side in size)
-    vertices, triangles, _ = random_triangles(n, size_px, width, height)
-    vertices[:, :2] -= [(width - size[0]) / 2, (height - size[1]) / 2]
-    if z is not None:
-        vertices[:, 2] = z
-    return vertices, triangles
-
-
-def sliver_scene(n: int, size: tuple[int, int]) -> Arrays:
-    """Return triangles 100 px long and up to 2 px thick."""
-    from benchmarks.scenes.families import slivers
-
-    vertices, triangles = slivers(n, 100, 1)
-    center_px = np.random.default_rng(1).uniform(0, size, (n, 2))
-    depth = np.repeat(np.random.default_rng(2).uniform(0, 1, n), 3)
-    return np.column_stack([vertices + np.repeat(center_px, 3, axis=0), depth]), triangles
-
-
-def blob_arrays(n: int, vertex: type = np.float32, index: type = np.int32) -> Arrays:
-    """Return a bumpy sphere in object space."""
-    from topleft.scenes import blob
-
-    vertices, triangles = blob(n)
-    return vertices.astype(vertex), triangles.astype(index)
-
-
-def map_arrays(n: int, size: tuple[int, int], *, is_whole: bool = False) -> Arrays:
-    """Return a mesh that tiles the frame, its vertices whole pixels if wanted."""
-    from topleft.scenes import planar_mesh
-
-    vertices, triangles = planar_mesh(n // 2, *size)
-    return (np.rint(vertices) if is_whole else vertices), triangles
-
-
 def inside_matrix(size: tuple[int, int]) -> NDArray[np.float64]:
     """Return clip from object for an eye within the sphere."""
-    from topleft._camera.camera import Camera, orbit_view
-
     view = orbit_view([0, 0, 0], 0.7, 30.0, 20.0)
     return Camera.perspective(view, near=0.05, far=100.0).clip_from_world(size)
 
 
 def geometries(scale: float) -> Iterator[Scene]:
     """Give scenes for `rasterize` with one sample a pixel; `scale`: of numbers of triangles and sides of the frame."""
-    from benchmarks.scenes.cases import orbit_camera
-
     hd, uhd = ((max(16, round(scale * w)), max(16, round(scale * h))) for w, h in (HD, UHD))
     eye = {"transform": orbit_camera(hd)}
     n_of = lambda n: shrunk(n, scale)  # noqa: E731
@@ -142,33 +95,25 @@ def geometries(scale: float) -> Iterator[Scene]:
     for label, n in (("10k", 10_000), ("1M", 1_000_000)):
         yield Scene(f"clip-crossing {label}", "clip-crossing", lambda n=n: blob_arrays(n_of(n)), hd, inside)
     for n, px in ((1_000_000, 4), (200_000, 8), (20_000, 40), (5_000, 100), (1_000, 300), (100, 800), (50, 60)):
-        yield Scene(f"random {n} of {px} px", "random", lambda n=n, px=px: strewn(n_of(n), px, hd), hd)
+        yield Scene(f"random {n} of {px} px", "random", lambda n=n, px=px: strewn_arrays(n_of(n), px, hd), hd)
     for n, px in ((200_000, 8), (20_000, 40), (1_000, 300), (2_000, 8), (300, 60)):
-        yield Scene(f"flat {n} of {px} px", "flat z", lambda n=n, px=px: strewn(n_of(n), px, hd, 0.5), hd)
+        yield Scene(f"flat {n} of {px} px", "flat z", lambda n=n, px=px: strewn_arrays(n_of(n), px, hd, 0.5), hd)
     for n, px, side in ((2000, 20, 256), (1000, 40, 128), (50, 20, 64)):
-        make = lambda n=n, px=px, side=side: strewn(n_of(n), px, (side, side), 0.5)  # noqa: E731
+        make = lambda n=n, px=px, side=side: strewn_arrays(n_of(n), px, (side, side), 0.5)  # noqa: E731
         yield Scene(f"flat {n} of {px} px in {side}x{side}", "flat z", make, (side, side))
-    yield Scene("slivers 20000 of 100 px", "slivers", lambda: sliver_scene(n_of(20_000), hd), hd)
+    yield Scene("slivers 20000 of 100 px", "slivers", lambda: sliver_arrays(n_of(20_000), hd), hd)
     yield Scene(
-        "partly outside 200000 of 20 px", "partly outside", lambda: strewn(n_of(200_000), 20, hd, None, 4.0), hd
+        "partly outside 200000 of 20 px", "partly outside", lambda: strewn_arrays(n_of(200_000), 20, hd, None, 4.0), hd
     )
-    yield Scene("partly outside 200 of 900 px", "partly outside", lambda: strewn(n_of(200), 900, hd, None, 2.0), hd)
+    few = lambda: strewn_arrays(n_of(200), 900, hd, None, 2.0)  # noqa: E731
+    yield Scene("partly outside 200 of 900 px", "partly outside", few, hd)
     yield Scene("map of 100000", "map", lambda: map_arrays(n_of(100_000), hd), hd)
     yield Scene("whole pixels, map of 10000", "whole pixels", lambda: map_arrays(n_of(10_000), hd, is_whole=True), hd)
-    whole = lambda: tuple_rint(strewn(n_of(200_000), 8, hd))  # noqa: E731
+    whole = lambda: rounded(strewn_arrays(n_of(200_000), 8, hd))  # noqa: E731
     yield Scene("whole pixels, 200000 of 8 px", "whole pixels", whole, hd)
-    from topleft.scenes import large_triangle
-
     yield Scene("one large", "single", lambda: large_triangle(*hd), hd)
     yield Scene("one large in 3840x2160", "single", lambda: large_triangle(*uhd), uhd)
-    yield Scene("ten in 64x64", "single", lambda: strewn(10, 20, (64, 64)), (64, 64))
-
-
-def tuple_rint(arrays: Arrays) -> Arrays:
-    """Return the same with x and y rounded to whole pixels."""
-    vertices = arrays[0].copy()
-    vertices[:, :2] = np.rint(vertices[:, :2])
-    return vertices, arrays[1]
+    yield Scene("ten in 64x64", "single", lambda: strewn_arrays(10, 20, (64, 64)), (64, 64))
 
 
 ASKED = (("rasterize", "center"), ("coverage", "center"))

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.report.tables import table
+from benchmarks.harness.records import Record
+from benchmarks.report.tables import facts_text, table_text
 
-Record = dict[str, Any]
 Row = dict[str, Any]
 
 NEAR, FAR = 1.15, 1.5
@@ -22,16 +22,6 @@ def lines(record: Record) -> Iterator[str]:
     for name, text in PARTS.items():
         if name != "choice-facts" and NEEDS.get(name, "rows") in record:
             yield from ("", text(record))
-
-
-def facts_text(record: Record) -> str:
-    """What was measured with what."""
-    commit = (record["commit"] or "unknown")[:12] + (" with changes" if record["changed"] else "")
-    machine, versions = record["machine"], record["versions"]
-    return (
-        f"{machine['cpu']}, {machine['cpus']} CPUs; topleft {versions['topleft']} at {commit}, {record['isa']}, "
-        f"NumPy {versions['numpy']}, Python {machine['python']}; {record['date'][:10]}."
-    )
 
 
 def by_choice(record: Record) -> dict[str, list[Row]]:
@@ -59,7 +49,7 @@ def summary_text(record: Record) -> str:
              f"{worst['ratio']:.2f}", f"{label_of(worst)}" if worst["ratio"] > 1.02 else "-", f"{max(gains):.1f}"]
         )  # fmt: skip
     head = ["choice", "chosen", "against", "scenes", "mean", "worst", "where", "saves up to"]
-    return "\n".join(table(head, rows))
+    return table_text(head, rows)
 
 
 def ways_text(rows: list[Row]) -> str:
@@ -87,7 +77,7 @@ def kinds_text(record: Record) -> str:
             some = [row["ratio"] for row in own if row["kind"] == kind]
             cells.append(f"{sum(some) / len(some):.2f} / {max(some):.2f}" if some else "-")
         rows.append(cells)
-    return "\n".join(table(["choice", *kinds], rows))
+    return table_text(["choice", *kinds], rows)
 
 
 def misses_text(record: Record) -> str:
@@ -101,7 +91,7 @@ def misses_text(record: Record) -> str:
     ]  # fmt: skip
     if not rows:
         return f"No way is {NEAR} times as fast as the chosen one in any scene."
-    return "\n".join(table(["choice", "scene", "chosen", "best", "ms", "best ms", "ratio", "quartiles"], rows))
+    return table_text(["choice", "scene", "chosen", "best", "ms", "best ms", "ratio", "quartiles"], rows)
 
 
 def estimates_text(record: Record) -> str:
@@ -118,7 +108,7 @@ def estimates_text(record: Record) -> str:
         ]
         rows.append([asked, str(len(own)), f"{middle:.2f}", f"{low:.2f} to {high:.2f}", ends[0], ends[-1]])
     head = ["verb", "scenes", "median", "four fifths", "least", "most"]
-    return "\n".join(table(head, rows))
+    return table_text(head, rows)
 
 
 def by_measured(row: Row) -> float:
@@ -134,7 +124,7 @@ def plans_text(record: Record) -> str:
         for row in record["plans"]
     ]  # fmt: skip
     head = ["scene", "triangles", "indices", "`tl.plan` ms", "`rasterize` ms", "with `plan=` ms", "saves us"]
-    return "\n".join(table(head, rows))
+    return table_text(head, rows)
 
 
 PARTS: Mapping[str, Callable[[Record], str]] = {

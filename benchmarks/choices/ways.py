@@ -6,9 +6,8 @@ option that the verbs have, or by calling the parts of the pipeline itself; noth
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 
 import topleft as tl
 from benchmarks.choices.scenes import Scene
+from benchmarks.harness.ways import Draw, Picture, Way, Ways
 from topleft import _engine
 from topleft._base import threads
 from topleft._base.memory import FreshMemory, KeptMemory
@@ -28,38 +28,9 @@ from topleft._raster.sampling import sample_positions
 from topleft._raster.snap import snap_scene
 from topleft._raster.view import View
 
-Picture = tuple[NDArray[Any], ...]
-Draw = Callable[[], Picture]
-Forced = tuple[tuple[Any, str, Any], ...]
-
 MSAA = ("msaa2", "msaa4", "msaa8", "msaa16")
 FAR_PX = 2**24
 """Beyond 2**30 sub-pixels with 8 bits: triangles there take 128 bits."""
-
-
-@dataclass(frozen=True)
-class Way:
-    """A way to draw: its name, what draws, and what it puts in place of what."""
-
-    name: str
-    draw: Draw
-    forced: Forced = ()
-
-    @contextmanager
-    def in_force(self) -> Iterator[None]:
-        """Put values in place, and back."""
-        kept = [(where, name, getattr(where, name)) for where, name, _ in self.forced]
-        try:
-            for where, name, value in self.forced:
-                setattr(where, name, value)
-            yield
-        finally:
-            for where, name, value in kept:
-                setattr(where, name, value)
-
-
-Ways = list[Way]
-"""The planner's own way first; fewer than two where there is nothing to choose."""
 
 
 def drawing(scene: Scene, *, library: Any = tl, **changes: Any) -> Draw:

@@ -11,6 +11,23 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[2]
+RECORDS = ROOT / "benchmarks" / "records"
+PAGES = ROOT / "docs" / "measured"
+"""The pages that studies write or fill."""
+IMAGES = ROOT / "docs" / "images"
+
+
+def describe(*distributions: str) -> dict[str, Any]:
+    """What figures belong to: date, machine, commit, instruction set, versions of topleft, NumPy and distributions."""
+    import topleft as tl
+
+    return {
+        "date": now(),
+        "machine": describe_machine(),
+        **describe_commit(),
+        "isa": tl.build_info()["isa"],
+        "versions": {"topleft": tl.__version__, **{name: version_of(name) for name in ("numpy", *distributions)}},
+    }
 
 
 def describe_machine() -> dict[str, Any]:

@@ -7,27 +7,38 @@ import os
 from pathlib import Path
 from typing import Any
 
-KINDS_OF_ROWS = ("accuracy", "atlas", "pictures", "choices", "static")
+Record = dict[str, Any]
 
 
-def write_record(path: Path, record: dict[str, Any]) -> None:
+def read_record(path: Path | None) -> Record | None:
+    """Return the record of a file, None where there is none yet."""
+    return json.loads(path.read_text()) if path and path.exists() else None
+
+
+def write_record(path: Path, record: Record) -> None:
     """Write JSON."""
     write_text(path, record_text(record) + "\n")
 
 
 def write_text(path: Path, text: str) -> None:
+    """Write text, never half of it."""
+    write_whole(path, text.encode())
+
+
+def write_whole(path: Path, data: bytes) -> None:
     """Write beside the place, then move it there: never half a file."""
+    path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".{path.name}.{os.getpid()}")
     try:
-        temporary.write_text(text, encoding="utf-8")
+        temporary.write_bytes(data)
         os.replace(temporary, path)
     finally:
         temporary.unlink(missing_ok=True)
 
 
-def record_text(record: dict[str, Any]) -> str:
-    """JSON; rows of figures take a line each."""
-    if record.get("kind") not in KINDS_OF_ROWS:
+def record_text(record: Record) -> str:
+    """JSON; rows of figures take a line each, but for a record of `run`, whose rows are long."""
+    if "kind" not in record:
         return json.dumps(record, indent=1)
     parts = []
     for key, value in record.items():

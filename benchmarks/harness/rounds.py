@@ -11,8 +11,8 @@ from typing import Any, TextIO
 import numpy as np
 
 from benchmarks.exact.pictures import Picture, compare, draw_exact
-from benchmarks.harness import machine
 from benchmarks.harness.contestants import Child, Contestant, SkippedError, choose
+from benchmarks.harness.machine import describe
 from benchmarks.harness.yardstick import Yardstick, YardstickError
 from benchmarks.peers import OURS
 from benchmarks.scenes.cases import CASES, Case, Scene
@@ -36,16 +36,13 @@ class Options:
     check: bool = True
 
 
-def run(
+def run_cases(
     options: Options, progress: TextIO | None = None, save: Callable[[dict[str, Any]], None] | None = None
 ) -> dict[str, Any]:
     """Measure, return the record that the report reads; `save` gets it after each scene, as far as it goes."""
     record: dict[str, Any] = {
         "schema": SCHEMA,
-        "date": machine.now(),
-        "machine": machine.describe_machine(),
-        **machine.describe_commit(),
-        "versions": {name: machine.version_of(name) for name in ("topleft", "numpy")},
+        **describe(),
         "options": {"repeats": options.repeats, "seconds": options.seconds, "pin": list(options.pin)},
         "scenes": [],
     }

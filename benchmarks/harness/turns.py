@@ -52,5 +52,15 @@ def take_turns(turns: Sequence[Turn], rounds: int, seconds: float) -> list[NDArr
 
 def spread(took_ms: NDArray[np.float64], scale: float = 1.0, unit: str = "ms") -> dict[str, float]:
     """Median and quartiles of the rounds, times `scale`, to four digits."""
-    low, middle, high = scale * np.percentile(took_ms, [25, 50, 75])
-    return {name: float(f"{value:.4g}") for name, value in ((unit, middle), ("q1", low), ("q3", high))}
+    low, middle, high = quartiles(scale * took_ms)
+    return {unit: middle, "q1": low, "q3": high}
+
+
+def quartiles(values: NDArray[np.float64]) -> list[float]:
+    """Return the first quartile, the median and the third."""
+    return [digits(value) for value in np.percentile(values, [25, 50, 75])]
+
+
+def digits(value: float) -> float:
+    """Return a number to four digits."""
+    return float(f"{value:.4g}")

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import io
+from functools import partial
 from typing import Any
 
 from matplotlib import pyplot as plt
+from matplotlib.figure import Figure
 
-from benchmarks.accuracy.charts import STYLE
+from benchmarks.report.charts import figure_bytes
 
 COLORS = ("#000000", "#0072B2", "#009E73", "#E69F00", "#D55E00")
 """By height, near to far: M. Okabe and K. Ito, Color Universal Design, 2008."""
@@ -18,28 +19,29 @@ SMALLEST_PX = 0.02
 
 def chart_png(record: dict[str, Any]) -> bytes:
     """Return the chart as PNG."""
+    return figure_bytes(partial(chart_levels, record), "png", dpi=140)
+
+
+def chart_levels(record: dict[str, Any]) -> Figure:
+    """Return a panel for each mesh."""
     meshes = record["meshes"]
     n_columns = min(2, len(meshes))
     n_rows = -(-len(meshes) // n_columns)
-    with plt.rc_context(STYLE):
-        figure, panels = plt.subplots(
-            n_rows, n_columns, figsize=(5.2 * n_columns, 3.5 * n_rows), squeeze=False, sharex=True, sharey=True,
-            layout="constrained",
-        )
-        for panel, mesh in zip(panels.flat, meshes, strict=False):
-            draw_mesh(panel, mesh, record["tolerance"])
-        for panel in list(panels.flat)[len(meshes) :]:
-            panel.axis("off")
-        for panel in panels[:, 0]:
-            panel.set_ylabel("rasterize, one thread, ms")
-        for panel in panels[-1]:
-            panel.set_xlabel("outlines are off by, px (measured)")
-        handles, labels = panels.flat[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
-        target = io.BytesIO()
-        figure.savefig(target, format="png", dpi=140)
-        plt.close(figure)
-    return target.getvalue()
+    figure, panels = plt.subplots(
+        n_rows, n_columns, figsize=(5.2 * n_columns, 3.5 * n_rows), squeeze=False, sharex=True, sharey=True,
+        layout="constrained",
+    )
+    for panel, mesh in zip(panels.flat, meshes, strict=False):
+        draw_mesh(panel, mesh, record["tolerance"])
+    for panel in list(panels.flat)[len(meshes) :]:
+        panel.axis("off")
+    for panel in panels[:, 0]:
+        panel.set_ylabel("rasterize, one thread, ms")
+    for panel in panels[-1]:
+        panel.set_xlabel("outlines are off by, px (measured)")
+    handles, labels = panels.flat[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
+    return figure
 
 
 def draw_mesh(panel: Any, mesh: dict[str, Any], tolerance: float) -> None:

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any
 
-from benchmarks.report.tables import table
-
-Record = dict[str, Any]
+from benchmarks.harness.records import Record
+from benchmarks.report.tables import commit_text, table_text
 
 HEAD = ["scene", "what", "triangles", "inside", "mean", "largest", "differ", "other outline", "other triangle",
         "off edge, px", "unexplained"]  # fmt: skip
@@ -20,12 +18,12 @@ def lines(record: Record) -> Iterator[str]:
 
 def facts_text(record: Record) -> str:
     """What was drawn with what."""
-    commit = (record["commit"] or "unknown")[:12] + (" with changes" if record["changed"] else "")
     width, height = record["size"]
     switches = ", ".join(f"`{name}={value}`" for name, value in record["environment"].items())
     return (
-        f"topleft {record['versions']['topleft']} at {commit}, {record['isa']}; {record['renderer']}, by moderngl "
-        f"{record['versions']['moderngl']}, with {switches}; {width}x{height} pixels; {record['date'][:10]}."
+        f"topleft {record['versions']['topleft']} at {commit_text(record)}, {record['isa']}; {record['renderer']}, "
+        f"by moderngl {record['versions']['moderngl']}, with {switches}; {width}x{height} pixels; "
+        f"{record['date'][:10]}."
     )
 
 
@@ -37,7 +35,7 @@ def differences_text(record: Record) -> str:
         + [f"{row['max_distance_px']:.5f}" if row["n_coverage"] + row["n_triangle"] else "-", str(row["n_unexplained"])]
         for row in record["scenes"]
     ]
-    return "\n".join(table(HEAD, rows))
+    return table_text(HEAD, rows)
 
 
 def outlines_text(record: Record) -> str:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-FULL_HD = (1920, 1080)
+HD = (1920, 1080)
 UHD = (3840, 2160)
 
 TASKS = {
@@ -107,7 +107,7 @@ def orbit_camera(size: tuple[int, int]) -> NDArray[np.float64]:
 
 
 def blob_scene(
-    n_triangles: int, *, wide: bool = False, cull: str = "back", size: tuple[int, int] = FULL_HD
+    n_triangles: int, *, wide: bool = False, cull: str = "back", size: tuple[int, int] = HD
 ) -> Scene:
     """The bumpy sphere under the orbit camera, in float32 and int32, or `wide`: in float64 and int64."""
     from topleft import scenes
@@ -119,7 +119,7 @@ def blob_scene(
     )
 
 
-def random_scene(task: str, n_triangles: int, size_px: float, size: tuple[int, int] = FULL_HD) -> Scene:
+def random_scene(task: str, n_triangles: int, size_px: float, size: tuple[int, int] = HD) -> Scene:
     """Triangles strewn over the frame, as they come: float64 pixels."""
     from topleft import scenes
 
@@ -141,12 +141,12 @@ def planar_scene(task: str = "labels", n_points: int = 100_000, *, is_white: boo
     """A mesh that tiles the frame."""
     from topleft import scenes
 
-    vertices, triangles = scenes.planar_mesh(n_points, *FULL_HD)
+    vertices, triangles = scenes.planar_mesh(n_points, *HD)
     colors = None
     if task == "smooth-fill":
         colors = np.random.default_rng(7).integers(0, 256, (len(triangles), 3), np.uint8)
         colors = np.full_like(colors, 255) if is_white else colors
-    return Scene(task, FULL_HD, vertices, triangles, colors=colors)
+    return Scene(task, HD, vertices, triangles, colors=colors)
 
 
 def singles_scene(n_across: int = 15, n_down: int = 10, size_px: int = 40, cell_px: int = 64) -> Scene:

@@ -6,6 +6,8 @@ table.
 
 from __future__ import annotations
 
+import argparse
+import sys
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -14,9 +16,12 @@ from typing import Any, TextIO
 
 import numpy as np
 
-from benchmarks.harness import machine
+from benchmarks.harness.arguments import add_names, add_number, add_out, add_pin, options_of, positive, set_options
 from benchmarks.harness.contestants import Child, Contestant, SkippedError
+from benchmarks.harness.machine import describe
+from benchmarks.harness.records import Record
 from benchmarks.peers import OURS, load_peer, why_not
+from benchmarks.report.study import Save, Study
 from benchmarks.scenes.cases import Case, views_scene
 
 PEERS = ("llvmpipe", "riley", "deodr", "vtk")
@@ -31,26 +36,20 @@ class Options:
     threads: Sequence[int] = (1, 2)
     n_triangles: int = 70_000
     n_views: int = 100
-    size: tuple[int, int] = (512, 512)
+    frame_px: int = 512
     repeats: int = 5
     pin: Sequence[int] = ()
 
 
 def run_batch(options: Options, progress: TextIO | None = None) -> dict[str, Any]:
     """Measure, return the record that `lines` reads."""
-    import topleft as tl
-
     record: dict[str, Any] = {
         "schema": 1,
         "kind": "batch",
-        "date": machine.now(),
-        "machine": machine.describe_machine(),
-        **machine.describe_commit(),
-        "versions": {name: machine.version_of(name) for name in ("topleft", "numpy", "isal", "pillow")},
-        "isa": tl.build_info()["isa"],
+        **describe("isal", "pillow"),
         "n_views": options.n_views,
         "n_triangles": options.n_triangles,
-        "size": list(options.size),
+        "size": [options.frame_px] * 2,
         "runs": [],
         "skipped": [],
     }
@@ -88,8 +87,9 @@ def run_batch(options: Options, progress: TextIO | None = None) -> dict[str, Any
 
 
 def _contestants(options: Options, skipped: list[dict[str, str]]) -> Iterator[Contestant]:
+    size = options.frame_px, options.frame_px
     for task in TASKS:
-        case = Case(task, task, lambda task=task: views_scene(task, options.n_triangles, options.n_views, options.size))
+        case = Case(task, task, lambda task=task: views_scene(task, options.n_triangles, options.n_views, size))
         for name in (OURS, *options.peers):
             for threads in options.threads:
                 contestant = Contestant(name, threads, case)
@@ -155,3 +155,26 @@ def _name(contestant: Contestant) -> str:
 def _tell(progress: TextIO | None, text: str) -> None:
     if progress:
         print(text, file=progress, flush=True)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    set_options(parser, Options())
+    add_names(parser, "--peer", "peers", ", ".join(PEERS), "*")
+    parser.add_argument("--threads", nargs="+", type=positive, metavar="N")
+    add_number(parser, "--triangles", "n_triangles")
+    add_number(parser, "--views", "n_views", "a call")
+    add_number(parser, "--frame", "frame_px", "side", "PX")
+    add_number(parser, "--repeats", "repeats", "rounds")
+    add_pin(parser)
+    add_out(parser)
+
+
+def run(arguments: argparse.Namespace, _: Save) -> Record:
+    """Measure."""
+    if unknown := [peer for peer in arguments.peers if peer not in PEERS]:
+        raise ValueError(f"--peer must be some of {', '.join(PEERS)}, got {', '.join(unknown)}")
+    return run_batch(options_of(Options, arguments), sys.stderr)
+
+
+STUDY = Study("batch", "measure many pictures: views a second, in memory and as PNG", add_arguments, run, lines)

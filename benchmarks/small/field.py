@@ -1,7 +1,5 @@
 """Time a field on 200,000 triangles at 1920x1080, beside matplotlib, datashader and SciPy in one run, on one core.
 
-    python -m benchmarks.small.field [-o FILE.json]
-
 Rounds go round the contestants, so that what slows the machine slows all of them; the fastest and the median round are
 printed. Also `height_map` of 2,000 faces on 400x400, two hundred times in a row. Each is asked for an array, or a
 canvas, of the whole frame; meshes, tables and triangulations are made before.
@@ -10,19 +8,24 @@ canvas, of the whole frame; meshes, tables and triangulations are made before.
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import statistics
 import sys
 import time
-from collections.abc import Callable
-from pathlib import Path
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from benchmarks.harness.arguments import add_out
+from benchmarks.harness.machine import describe
+from benchmarks.harness.records import Record
+from benchmarks.harness.turns import take_turns, turn_of
+from benchmarks.report.study import Save, Study
+
 SIZE = (1920, 1080)
 N_POINTS = 100_100
-N_ROUNDS = 7
+N_ROUNDS, N_HEIGHT_MAPS = 7, 200
+HEIGHT_MAP = "topleft height_map"
 Draw = Callable[[], object]
 
 
@@ -102,10 +105,13 @@ CONTESTANTS = {
 }
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("-o", "--output", type=Path, help="write the times, in milliseconds, as JSON")
-    options = parser.parse_args()
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    add_out(parser)
+
+
+def run(_: argparse.Namespace, __: Save) -> Record:
+    """Measure milliseconds of each call, on one core."""
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
     scene = mesh()
@@ -115,26 +121,18 @@ def main() -> None:
             draws[name] = prepare(*scene)
         except ImportError as error:
             print(f"{name}: {error}", file=sys.stderr)
-    times: dict[str, list[float]] = {name: [] for name in draws}
-    for i in range(N_ROUNDS + 1):
-        for name, draw in draws.items():
-            start = time.perf_counter()
-            draw()
-            if i:  # the first one compiles and warms up
-                times[name].append(1e3 * (time.perf_counter() - start))
-    ours = min(times["topleft field"])
-    times["topleft height_map"] = heights = []
-    draw = height_map()
-    for _ in range(200):
-        start = time.perf_counter()
-        draw()
-        heights.append(1e3 * (time.perf_counter() - start))
-    for name, found in times.items():
-        least, median = min(found), statistics.median(found)
-        print(f"{name:32} {least:9.2f} ms least {median:9.2f} ms median {least / ours:7.1f} times")
-    if options.output:
-        options.output.write_text(json.dumps(times, indent=1) + "\n")
+    times = take_turns([turn_of(draw, time.perf_counter) for draw in draws.values()], N_ROUNDS, 0.0)
+    times += take_turns([turn_of(height_map(), time.perf_counter)], N_HEIGHT_MAPS, 0.0)
+    rows = [{"name": name, "ms": took.tolist()} for name, took in zip([*draws, HEIGHT_MAP], times, strict=True)]
+    return {"kind": "field"} | describe() | {"rows": rows}
 
 
-if __name__ == "__main__":
-    main()
+def lines(record: Record) -> Iterator[str]:
+    """Least and median of each, and the least over that of the first."""
+    ours = min(record["rows"][0]["ms"])
+    for row in record["rows"]:
+        least, median = min(row["ms"]), statistics.median(row["ms"])
+        yield f"{row['name']:32} {least:9.2f} ms least {median:9.2f} ms median {least / ours:7.1f} times"
+
+
+STUDY = Study("field", "time a field beside matplotlib, datashader and SciPy", add_arguments, run, lines)

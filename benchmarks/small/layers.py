@@ -1,7 +1,5 @@
 """Time each layer of a view beside its picture: a mesh of 70,000 triangles at 512x512, shaded, on one thread.
 
-    python -m benchmarks.small.layers [--rounds N]
-
 Every round asks for each layer alone, so the visibility buffer is drawn for each of them; the fastest and the median
 round are printed, and the median over that of the picture.
 """
@@ -11,10 +9,17 @@ from __future__ import annotations
 import argparse
 import statistics
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
+
+from benchmarks.harness.arguments import add_out, positive
+from benchmarks.harness.machine import describe
+from benchmarks.harness.records import Record
+from benchmarks.harness.turns import take_turns, turn_of
+from benchmarks.report.study import Save, Study
+from benchmarks.report.tables import table
 
 SIZE = (512, 512)
 N_TRIANGLES = 70_000
@@ -43,29 +48,29 @@ def contestants() -> dict[str, Callable[[], object]]:
     return made
 
 
-def measure(draws: dict[str, Callable[[], object]], n_rounds: int) -> dict[str, list[float]]:
-    """Milliseconds of each call, round by round; one round is not counted."""
-    times: dict[str, list[float]] = {name: [] for name in draws}
-    for k in range(n_rounds + 1):
-        for name, draw in draws.items():
-            start = time.perf_counter()
-            draw()
-            if k:
-                times[name].append(1e3 * (time.perf_counter() - start))
-    return times
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("--rounds", type=positive, default=N_ROUNDS, metavar="N", help="(%(default)s)")
+    add_out(parser)
 
 
-def main() -> None:
-    """Print the table."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.small.layers", description=__doc__.splitlines()[0])
-    parser.add_argument("--rounds", type=int, default=N_ROUNDS, metavar="N", help="(%(default)s)")
-    times = measure(contestants(), parser.parse_args().rounds)
-    shaded = statistics.median(times["color"])
-    print("| layer | fastest, ms | median, ms | over the picture |\n|---|---|---|---|")
-    for name, own in times.items():
-        median = statistics.median(own)
-        print(f"| {name} | {min(own):.2f} | {median:.2f} | {median / shaded:.2f} |")
+def run(arguments: argparse.Namespace, _: Save) -> Record:
+    """Measure milliseconds of each call, round by round."""
+    draws = contestants()
+    times = take_turns([turn_of(draw, time.perf_counter) for draw in draws.values()], arguments.rounds, 0.0)
+    rows = [{"layer": name, "ms": took.tolist()} for name, took in zip(draws, times, strict=True)]
+    return {"kind": "layers"} | describe() | {"rows": rows}
 
 
-if __name__ == "__main__":
-    main()
+def lines(record: Record) -> Iterator[str]:
+    """The table: fastest and median round, and the median over that of the picture."""
+    medians = {row["layer"]: statistics.median(row["ms"]) for row in record["rows"]}
+    rows = []
+    for row in record["rows"]:
+        median = medians[row["layer"]]
+        figures = min(row["ms"]), median, median / medians["color"]
+        rows.append([row["layer"], *(f"{figure:.2f}" for figure in figures)])
+    yield from table(["layer", "fastest, ms", "median, ms", "over the picture"], rows)
+
+
+STUDY = Study("layers", "time each layer of a view beside its picture", add_arguments, run, lines)

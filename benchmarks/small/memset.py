@@ -1,28 +1,38 @@
-"""A yardstick: how long `memset` takes for the bytes of the 4K pictures. `python -m benchmarks.small.memset`."""
+"""A yardstick: how long `memset` takes for the bytes of the 4K pictures. `python -m benchmarks memset`."""
 
 from __future__ import annotations
 
+import argparse
 from time import perf_counter
 
 import numpy as np
 
+from benchmarks.harness.records import Record
+from benchmarks.harness.turns import turn_of
+from benchmarks.report.study import Save, Study
 from benchmarks.scenes.cases import UHD
 
 BYTES = {"large-4k": 1, "fill-4k": 4}
 """A pixel, by case."""
 
 
-def main(n_calls: int = 60) -> None:
-    """Print the shortest of many calls for each case."""
+def run(arguments: argparse.Namespace, _: Save) -> Record:
+    """Measure the shortest of many calls for each case."""
+    shortest = {}
     for case, n_bytes in BYTES.items():
         memory = np.zeros(UHD[0] * UHD[1] * n_bytes, np.uint8)
-        times = []
-        for _ in range(n_calls):
-            start = perf_counter()
-            memory.fill(1)
-            times.append(perf_counter() - start)
-        print(f"{case}: {1e3 * min(times):.4f} ms")
+        shortest[case] = min(turn_of(lambda memory=memory: memory.fill(1), perf_counter)(arguments.seconds))
+    return {"kind": "memset", "ms": shortest}
 
 
-if __name__ == "__main__":
-    main()
+def lines(record: Record) -> list[str]:
+    """What the pattern of a yardstick reads."""
+    return [f"{case}: {ms:.4f} ms" for case, ms in record["ms"].items()]
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("--seconds", type=float, default=0.2, metavar="S", help="of each case (%(default)s)")
+
+
+STUDY = Study("memset", "a yardstick: how long memset takes for the 4K pictures", add_arguments, run, lines)

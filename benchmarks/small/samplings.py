@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
+import argparse
 from pathlib import Path
-
-import matplotlib as mpl
-
-mpl.use("Agg")
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib import pyplot as plt
-from matplotlib.axes import Axes
-from matplotlib.collections import PolyCollection
-from matplotlib.figure import Figure
 
 import topleft as tl
+from benchmarks.harness.machine import IMAGES
+from benchmarks.harness.records import Record
+from benchmarks.report.study import Save, Study
 from topleft._base.options import Sampling
 from topleft._raster.sampling import POSITIONS
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 SIZE = (9, 7)
 VERTICES = np.array(
@@ -30,19 +31,10 @@ ORDER = ("center", "msaa2", "msaa4", "msaa8", "msaa16", "area", "outer", "inner"
 PAPER, INK = np.array([255, 255, 255]), np.array([86, 180, 233])
 
 
-def draw_samplings(folder: Path) -> Path:
-    """Write the picture, return where it is."""
-    folder.mkdir(parents=True, exist_ok=True)
-    path = folder / "samplings.png"
-    with plt.rc_context({"font.size": 8}):
-        figure = chart_samplings()
-        figure.savefig(path, dpi=130)
-        plt.close(figure)
-    return path
-
-
 def chart_samplings() -> Figure:
     """Return a panel for each sampling: coverage as colour and as number, triangles as lines, samples as dots."""
+    from matplotlib import pyplot as plt
+
     figure, grid = plt.subplots(2, 4, figsize=(13, 5.9), layout="constrained")
     for axis, sampling in zip(grid.flat, ORDER, strict=True):
         draw_panel(axis, sampling)
@@ -51,6 +43,8 @@ def chart_samplings() -> Figure:
 
 def draw_panel(axis: Axes, sampling: str) -> None:
     """Draw the scene in one sampling."""
+    from matplotlib.collections import PolyCollection
+
     width, height = SIZE
     coverage = tl.coverage(VERTICES, TRIANGLES, SIZE, sampling=sampling).astype(float)
     axis.imshow((PAPER + coverage[..., None] * (INK - PAPER)).astype(np.uint8), extent=(0, width, height, 0))
@@ -77,3 +71,21 @@ def number(value: float, sampling: str) -> str:
     if n > 1:
         return f"{round(value * n)}/{n}"
     return "<.001" if value < 0.001 else f".{int(1000 * value):03d}"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("-o", "--out", type=Path, default=IMAGES, metavar="FOLDER")
+
+
+def run(arguments: argparse.Namespace, _: Save) -> Record:
+    """Draw; the record is where the picture is."""
+    from benchmarks.report.charts import write_chart
+
+    path = write_chart(chart_samplings, arguments.out, "samplings", "png", {"font.size": 8}, 130)
+    return {"kind": "samplings", "path": str(path)}
+
+
+STUDY = Study(
+    "samplings", "draw one small scene in every sampling, PNG", add_arguments, run, lambda record: [record["path"]]
+)

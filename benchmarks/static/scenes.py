@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import topleft as tl
-from benchmarks.choices.scenes import HD, Arrays, blob_arrays, shrunk
+from benchmarks.scenes.arrays import Arrays, blob_arrays, shrunk
+from benchmarks.scenes.cases import HD
 
 Look = Callable[[Arrays, tuple[int, int]], tl.Camera]
 """From a mesh and the size of its picture to a camera."""

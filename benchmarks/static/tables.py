@@ -6,10 +6,9 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
-from benchmarks.choices.tables import facts_text
-from benchmarks.report.tables import table
+from benchmarks.harness.records import Record
+from benchmarks.report.tables import facts_text, table_text
 
-Record = dict[str, Any]
 Row = dict[str, Any]
 
 HD = [1920, 1080]
@@ -43,7 +42,7 @@ def goals_text(record: Record) -> str:
             rows.append([name, f"{asked:g}", *least_cells(own), yes(min(map(faster, own)) >= asked)])
     own = record["rows"]
     rows.append(["any scene", f"{SLOWER:g}", *least_cells(own), yes(min(map(faster, own)) >= SLOWER)])
-    return "\n".join(table(["scene", "asked for", "least", "where", "most", "met"], rows))
+    return table_text(["scene", "asked for", "least", "where", "most", "met"], rows)
 
 
 def matches(row: Row, wanted: Mapping[str, Any]) -> bool:
@@ -88,7 +87,7 @@ def blobs_text(record: Record) -> str:
         [f"{n:,}", f"{width}x{height}", cull, *(cell_of(of_view.get(view)) for view in views)]
         for (width, height, cull, n), of_view in sorted(groups.items(), key=place_of)
     ]
-    return "\n".join(table(["triangles", "picture", "cull", *views], rows))
+    return table_text(["triangles", "picture", "cull", *views], rows)
 
 
 def place_of(item: tuple[tuple[Any, ...], Any]) -> tuple[Any, ...]:
@@ -114,7 +113,7 @@ def details_text(record: Record, wanted: Callable[[Row], bool]) -> str:
     ]  # fmt: skip
     head = ["scene", "triangles", "whole ms", "planner ms", "times faster", "quartiles"]
     head += ["outside", "turned away", "hidden", "drawn", "paid after"]
-    return "\n".join(table(head, rows))
+    return table_text(head, rows)
 
 
 def shares_of(row: Row) -> list[str]:
@@ -149,7 +148,7 @@ def models_text(record: Record) -> str:
         )  # fmt: skip
     head = ["mesh", "triangles", "clusters", "ms to sort", "pictures", "ns a triangle", "MB kept", "bytes a triangle",
             "at most meanwhile"]  # fmt: skip
-    return "\n".join(table(head, rows))
+    return table_text(head, rows)
 
 
 def first_text(record: Record) -> str:
@@ -160,7 +159,7 @@ def first_text(record: Record) -> str:
         if row["is_clustered"] and matches(row, {"cull": "none", "sampling": "center", "verb": "rasterize"})
         if row["size"][0] != 512 and row["view"] in ("whole", "above", "200 in rows")
     ]
-    return "\n".join(table(["scene", "first, whole", "first", "second", "those that follow"], rows))
+    return table_text(["scene", "first, whole", "first", "second", "those that follow"], rows)
 
 
 def firsts_of(row: Row) -> list[float]:
@@ -177,7 +176,7 @@ def kept_whole_text(record: Record) -> str:
     ]
     if not rows:
         return "There are none."
-    return "\n".join(table(["scene", "whole ms", "planner: times faster", "clusters: times faster"], rows))
+    return table_text(["scene", "whole ms", "planner: times faster", "clusters: times faster"], rows)
 
 
 def is_large(row: Row) -> bool:

@@ -4,30 +4,24 @@ from __future__ import annotations
 
 import json
 from fractions import Fraction
-from pathlib import Path
 
 import numpy as np
 import pytest
 from benchmarks import cli
-from benchmarks.accuracy import measure as accuracy
+from benchmarks.accuracy import study as accuracy
 from benchmarks.accuracy.filling import samplings
 from benchmarks.accuracy.options import Options
 from benchmarks.accuracy.stability import CHANGES, count_flips, touch
 from benchmarks.exact.area import draw_area
 from benchmarks.exact.unsnapped import draw_unsnapped, edge_sign, meets_pixel
-from benchmarks.report import pages
 from benchmarks.scenes.families import FAMILIES, Entry, entries, in_cells
 
 import topleft as tl
 from topleft import scenes
 from topleft.methods import reference, reference_area
 
-ROOT = Path(__file__).parents[2]
-
 SIZE = (12, 11)
 METHODS = ["auto", "row_crossing/cull-front", "float_barycentric"]
-RECORD = ROOT / "benchmarks/records/accuracy.json"
-PAGES = [ROOT / "docs/measured/accuracy.md", ROOT / "docs/measured/speed.md"]
 CHARTS = [f"accuracy-{name}" for name in ("coverage", "antialiasing", "depth")]
 CHARTS += [f"speed-{name}" for name in ("sizes", "scaling", "tutorial")]
 
@@ -201,44 +195,3 @@ def test_pareto_front_keeps_what_nothing_beats():
     from benchmarks.accuracy.charts import pareto_front
 
     assert list(pareto_front([(3, 1), (1, 5), (2, 6), (4, 1), (2, 4)])) == [(1, 5), (2, 4), (3, 1)]
-
-
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_page_tables_are_those_of_the_record(page):
-    text = page.read_text(encoding="utf-8")
-    command = f"python -m benchmarks document {RECORD.relative_to(ROOT)} {page.relative_to(ROOT)}"
-    assert pages.with_parts(text, json.loads(RECORD.read_text())) == text, f"run: {command}"
-
-
-def test_pages_show_every_part_once():
-    marked = [found[1] for page in PAGES for found in pages.MARKED.findall(page.read_text(encoding="utf-8"))]
-    assert sorted(marked) == sorted(pages.PARTS)
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("nothing", "the page must hold <!-- table: NAME -->"),
-        ("<!-- table: nobody -->\n<!-- end -->", "a marker must be one of facts, .*, got 'nobody'"),
-        ("<!-- table: scaling -->\n<!-- end -->", "the record must hold 'scaling' for 'scaling'"),
-    ],
-)
-def test_page_or_record_that_lacks_a_part_is_refused(tiny, text, message):
-    with pytest.raises(ValueError, match=message):
-        pages.with_parts(text, {key: value for key, value in tiny.items() if key != "scaling"})
-
-
-def test_document_command_writes_the_tables(tiny, tmp_path):
-    page, record = tmp_path / "page.md", tmp_path / "tiny.json"
-    page.write_text("".join(f"<!-- table: {name} -->\n<!-- end -->\n" for name in pages.PARTS))
-    record.write_text(json.dumps(tiny))
-    assert cli.main(["document", str(record), str(page)]) == 0
-    assert "`row_crossing/cull-front`" in page.read_text()
-
-
-def test_document_command_page_without_markers_is_refused(tiny, tmp_path, capsys):
-    page, record = tmp_path / "page.md", tmp_path / "tiny.json"
-    page.write_text("nothing")
-    record.write_text(json.dumps(tiny))
-    assert cli.main(["document", str(record), str(page)]) == 2
-    assert "the page must hold" in capsys.readouterr().err

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import json
 from fractions import Fraction
-from pathlib import Path
 
 import numpy as np
 import pytest
 from benchmarks import cli
-from benchmarks.accuracy import measure as accuracy
 from benchmarks.accuracy import pure, speed_tables
+from benchmarks.accuracy import study as accuracy
 from benchmarks.accuracy.depth import BITS, FORMATS, RATIOS, clip_scene, covered, make_sheets
 from benchmarks.accuracy.filling import areas, measure_family
 from benchmarks.accuracy.options import Options
@@ -19,8 +18,6 @@ from benchmarks.accuracy.sizes import equilateral
 from benchmarks.accuracy.tutorial import eleven_triangles, per_second
 from benchmarks.harness.turns import SLOW_MS, SLOW_ROUNDS, take_turns
 from benchmarks.scenes.families import FAMILIES, in_cells
-
-ROOT = Path(__file__).parents[2]
 
 FRAME_PX = 128
 LITTLE = Options(["auto", "point_in_triangle"], rounds=1, seconds=0, edge_px=1, frame_px=320, scale=0.001)

@@ -4,27 +4,22 @@ from __future__ import annotations
 
 import itertools
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
 from benchmarks import cli
 from benchmarks.atlas import measure as atlas
 from benchmarks.atlas import shrink as atlas_shrink
-from benchmarks.atlas import tables as atlas_page
 from benchmarks.atlas.depth import DEPTH_FAMILIES, DepthScene, Picture, draw, judge_depth
 from benchmarks.atlas.families import FAMILIES
 from benchmarks.exact.clip import draw_clip, pieces_picture
 from benchmarks.exact.integers import draw_points, snapped_points, true_points
 from benchmarks.exact.unsnapped import draw_unsnapped
-from benchmarks.report import pages
+from benchmarks.harness.machine import IMAGES, PAGES, RECORDS, ROOT
 
 from topleft.failure_scenes import FAILURE_SCENES, picture
 from topleft.methods import CLASSICS, reference
 
-ROOT = Path(__file__).parents[2]
-RECORD = ROOT / "benchmarks/records/atlas.json"
-PAGE = ROOT / "docs/measured/atlas.md"
 SIZE = (12, 11)
 EVERY_FAMILY = pytest.mark.parametrize("name", [name for name in FAMILIES if name != "dense"])
 
@@ -39,7 +34,7 @@ def random_scene(bits, seed):
 @pytest.fixture(scope="module")
 def record():
     """The record that is kept."""
-    return json.loads(RECORD.read_text())
+    return json.loads((RECORDS / "atlas.json").read_text())
 
 
 # ---- exact pictures -------------------------------------------------------------------------------------------------
@@ -215,28 +210,19 @@ def test_rows_of_a_picture_are_read_back(name):
 # ---- the page -------------------------------------------------------------------------------------------------------
 
 
-def test_atlas_page_tables_are_those_of_the_record(record):
-    text = PAGE.read_text(encoding="utf-8")
-    command = f"python -m benchmarks document {RECORD.relative_to(ROOT)} {PAGE.relative_to(ROOT)}"
-    assert pages.with_parts(text, record, atlas_page.PARTS) == text, f"run: {command}"
-
-
 def test_atlas_page_shows_every_chart(record):
-    text = PAGE.read_text(encoding="utf-8")
-    shown = {path.stem for path in (ROOT / "docs/images").glob("atlas-*") if f"images/{path.name}" in text}
+    text = (PAGES / "atlas.md").read_text(encoding="utf-8")
+    shown = {path.stem for path in IMAGES.glob("atlas-*") if f"images/{path.name}" in text}
     assert shown == {f"atlas-{name}" for name in (*FAMILIES, "depth", "scenes-any", "scenes-far", "scenes-shape")}
 
 
-def test_atlas_command_writes_what_document_and_report_read(tmp_path, capsys):
-    target, page = tmp_path / "tiny.json", tmp_path / "page.md"
+def test_atlas_command_writes_what_report_prints(tmp_path, capsys):
+    target = tmp_path / "tiny.json"
     assert cli.main(["atlas", "--family", "layers", "eye", "--method", "auto", "zigzag", "-o", str(target)]) == 0
     printed = capsys.readouterr().out
     assert "`zigzag`" in printed
     assert cli.main(["report", str(target)]) == 0
     assert capsys.readouterr().out == printed
-    page.write_text("".join(f"<!-- table: {name} -->\n<!-- end -->\n" for name in atlas_page.PARTS))
-    assert cli.main(["document", str(target), str(page)]) == 0
-    assert "`eye`" in page.read_text()
 
 
 def test_atlas_command_unknown_names_are_refused(capsys):

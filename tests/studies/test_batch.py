@@ -1,18 +1,15 @@
 """The benchmark of many pictures: it runs, and all draw the same thing. Nothing is timed."""
 
 import json
-from pathlib import Path
 
 import pytest
 from benchmarks import cli
 from benchmarks.small import batch
 
-ROOT = Path(__file__).parents[2]
-
 
 @pytest.fixture(scope="module")
 def record():
-    return batch.run_batch(batch.Options(peers=(), n_triangles=500, n_views=3, size=(48, 48), repeats=2))
+    return batch.run_batch(batch.Options(peers=(), n_triangles=500, n_views=3, frame_px=48, repeats=2))
 
 
 def test_batch_record_is_json_and_says_where_it_was_made(record):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import json
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,14 +13,14 @@ from benchmarks.choices import measure as bench
 from benchmarks.choices import plans as choices_plans
 from benchmarks.choices import tables as choices_tables
 from benchmarks.choices.builds import BUILDS, imported_from, with_constant
-from benchmarks.choices.scenes import Scene, scenes, strewn
-from benchmarks.choices.ways import CHOICES, Way
-from benchmarks.report import pages
+from benchmarks.choices.scenes import Scene, scenes
+from benchmarks.choices.ways import CHOICES
+from benchmarks.harness.machine import ROOT
+from benchmarks.harness.ways import Way, check_same_bits, take_rounds
+from benchmarks.scenes.arrays import strewn_arrays
 
 from topleft._raster import choices
 
-ROOT = Path(__file__).parents[2]
-RECORD, PAGE = ROOT / "benchmarks/records/choices.json", ROOT / "docs/measured/choices.md"
 TINY = bench.Options(rounds=1, seconds=0.0, scale=0.02)
 
 
@@ -36,7 +35,7 @@ def record():
 
 def flat_scene(size=(300, 300)):
     """Triangles that cover a picture several times, at one depth."""
-    return Scene("flat", "flat z", lambda: strewn(400, 60, size, 0.5), size)
+    return Scene("flat", "flat z", lambda: strewn_arrays(400, 60, size, 0.5), size)
 
 
 def test_every_choice_is_measured(record):
@@ -61,7 +60,7 @@ def test_first_way_is_that_of_the_planner(choice, chosen):
 
 @pytest.mark.parametrize(("n", "names"), [(9, ["1 thread", "2 threads"]), (9000, ["2 threads", "1 thread"])])
 def test_threads_are_chosen_as_if_there_were_two(n, names):
-    scene = Scene("flat", "flat z", lambda: strewn(n, 60, (300, 300), 0.5), (300, 300))
+    scene = Scene("flat", "flat z", lambda: strewn_arrays(n, 60, (300, 300), 0.5), (300, 300))
     assert [way.name for way in CHOICES["threads"](scene)] == names
 
 
@@ -89,21 +88,21 @@ def test_forced_depth_test_is_another_decision():
 def test_other_bits_are_an_error():
     ways = [Way("a", lambda: (np.zeros(3),)), Way("b", lambda: (np.array([0.0, -0.0, 0]),))]
     with pytest.raises(AssertionError, match="'b' draws other bits than 'a'"):
-        bench.check_same_bits(flat_scene(), ways)
+        check_same_bits("flat", ways)
 
 
 def test_ratio_is_that_of_the_best_way():
     clock = iter(np.arange(1000.0)).__next__
     slow = Way("slow", lambda: (clock(), clock())[:0])
     fast = Way("fast", lambda: ())
-    took = bench.take_rounds([slow, fast], 3, 0.0, clock)
+    took = take_rounds([slow, fast], 3, 0.0, clock)
     assert (took[0] / took[1] == 3).all()
 
 
 def test_hopeless_way_sits_out():
     clock = iter(np.arange(1000.0)).__next__
     slow = Way("slow", lambda: tuple(clock() for _ in range(9))[:0])
-    assert [len(some) for some in bench.take_rounds([Way("", lambda: ()), slow], 5, 0.0, clock)] == [5, 1]
+    assert [len(some) for some in take_rounds([Way("", lambda: ()), slow], 5, 0.0, clock)] == [5, 1]
 
 
 def test_rows_replace_those_of_the_same_scene(record):
@@ -165,10 +164,3 @@ def test_library_of_a_folder_stands_beside_this_one(tmp_path):
         assert library.other.value == 7
     assert sys.modules["topleft"] is own
     assert "topleft.other" not in sys.modules
-
-
-def test_page_tables_are_those_of_the_record():
-    text = PAGE.read_text(encoding="utf-8")
-    command = f"python -m benchmarks document {RECORD.relative_to(ROOT)} {PAGE.relative_to(ROOT)}"
-    made = pages.with_parts(text, json.loads(RECORD.read_text()), choices_tables.PARTS)
-    assert made == text, f"run: {command}"

@@ -5,17 +5,16 @@ from __future__ import annotations
 import json
 import re
 from html.parser import HTMLParser
-from pathlib import Path
 
 import pytest
 
 pytest.importorskip("matplotlib")
 from benchmarks import cli
 from benchmarks.accuracy import html_report
+from benchmarks.harness.machine import RECORDS, ROOT
 from benchmarks.report.markdown import MANY_COLUMNS, to_html
 
-ROOT = Path(__file__).parents[2]
-RECORD = ROOT / "benchmarks/records/accuracy.json"
+RECORD = RECORDS / "accuracy.json"
 HEAD = '<thead><tr><th>a</th><th class="n">b</th></tr></thead>'
 ROW = '<tr><td><code>1</code></td><td class="n">2</td></tr>'
 PIXEL = bytes.fromhex("89504e470d0a1a0a")

@@ -1,15 +1,13 @@
 """The benchmark of levels of detail: it runs, its page says what was measured. Nothing is timed."""
 
 import json
-from pathlib import Path
 
 import pytest
 from benchmarks import cli
-from benchmarks.levels import measure as levels
+from benchmarks.levels import page as levels_page
+from benchmarks.levels import study as levels
 
 import topleft as tl
-
-ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +39,7 @@ def test_levels_command_writes_page_chart_and_record(tmp_path, monkeypatch, mesh
     assert cli.main(["levels", "--json", str(tmp_path / "levels.json"), "-o", str(tmp_path)]) == 0
     record = json.loads((tmp_path / "levels.json").read_text())
     page = (tmp_path / "measured" / "levels.md").read_text()
-    assert page == levels.page(record)
+    assert page == levels_page.page(record)
     assert "## torus, 2,304 triangles" in page
     assert "1000 px high" in capsys.readouterr().out
     assert (tmp_path / "images" / "levels.png").read_bytes().startswith(b"\x89PNG")

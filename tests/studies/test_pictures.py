@@ -4,23 +4,17 @@ from __future__ import annotations
 
 import json
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 from benchmarks import cli
-from benchmarks.pictures import measure as pictures
-from benchmarks.pictures import tables as pictures_page
-from benchmarks.pictures.measure import SNAP_PX, Drawn, compare, distance_to_edges, inside, outline_px, read_sheet
+from benchmarks.harness.machine import IMAGES, RECORDS
+from benchmarks.pictures import study as pictures
 from benchmarks.pictures.scenes import SCENES, SIZE, PictureScene, draw
-from benchmarks.report import pages
+from benchmarks.pictures.study import SNAP_PX, Drawn, compare, distance_to_edges, inside, outline_px, read_sheet
 
 import topleft as tl
 
-ROOT = Path(__file__).parents[2]
-RECORD = ROOT / "benchmarks/records/pictures.json"
-PAGE = ROOT / "docs/measured/pictures.md"
-IMAGES = ROOT / "docs/images"
 GOAL = 1.0
 """Grey levels, the mean inside."""
 
@@ -30,7 +24,7 @@ SQUARE = np.array([(0.5, 0.5), (4.5, 0.5), (4.5, 4.5), (0.5, 4.5)])
 @pytest.fixture(scope="module")
 def record():
     """The record that is kept."""
-    return json.loads(RECORD.read_text())
+    return json.loads((RECORDS / "pictures.json").read_text())
 
 
 # ---- what is counted ------------------------------------------------------------------------------------------------
@@ -119,21 +113,6 @@ def test_sheet_is_read_back(tmp_path):
     pictures.write_sheet(tmp_path / "a/sheet.png", ours, theirs)
     got = read_sheet(tmp_path / "a/sheet.png")
     assert np.array_equal(got, (ours, theirs))
-
-
-def test_pictures_page_tables_are_those_of_the_record(record):
-    text = PAGE.read_text(encoding="utf-8")
-    command = f"python -m benchmarks document {RECORD.relative_to(ROOT)} {PAGE.relative_to(ROOT)}"
-    assert pages.with_parts(text, record, pictures_page.PARTS) == text, f"run: {command}"
-
-
-def test_pictures_record_is_documented_and_reported(tmp_path, capsys):
-    page = tmp_path / "page.md"
-    page.write_text("".join(f"<!-- table: {name} -->\n<!-- end -->\n" for name in pictures_page.PARTS))
-    assert cli.main(["document", str(RECORD), str(page)]) == 0
-    assert "images/pictures-headlight.png" in page.read_text()
-    assert cli.main(["report", str(RECORD)]) == 0
-    assert "`headlight`" in capsys.readouterr().out
 
 
 # ---- the command ----------------------------------------------------------------------------------------------------

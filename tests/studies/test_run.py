@@ -11,15 +11,13 @@ import numpy as np
 import pytest
 from benchmarks import cli
 from benchmarks.exact.pictures import compare, draw_exact
-from benchmarks.harness.rounds import Options, run
+from benchmarks.harness.rounds import Options, run_cases
 from benchmarks.harness.yardstick import DEFAULT_PATTERN, Yardstick, YardstickError
 from benchmarks.peers import PEERS, load_peer, why_not
-from benchmarks.report import tables as report
+from benchmarks.run import tables
 from benchmarks.scenes.cases import CASES, TASKS, Scene, orbit_camera
 
 import topleft as tl
-
-ROOT = Path(__file__).parents[2]
 
 ISA = tl.build_info()["isa"]
 
@@ -33,7 +31,7 @@ def record():
         ["tiny"], ["broken"], [ISA], repeats=2, seconds=0.001,
         yardsticks=[(f"tiny={program}", r"tiny: (?P<ms>[\d.]+) ms")],
     )  # fmt: skip
-    return run(options, log)
+    return run_cases(options, log)
 
 
 def test_run_record_is_json_and_says_where_it_was_made(record):
@@ -67,7 +65,7 @@ def test_run_yardstick_is_read(record):
 
 
 def test_report_names_contestants_and_errors(record):
-    text = "\n".join(report.lines(record))
+    text = "\n".join(tables.lines(record))
     assert f"| topleft {ISA} " in text
     assert "## tiny" in text
     assert "## Summary" in text
@@ -105,7 +103,7 @@ def test_peer_file_has_its_parts_without_the_peer(name):
 
 
 def test_contestant_that_fails_is_skipped_with_the_reason():
-    record = run(Options(["tiny"], ["broken"], ["mmx"], repeats=1, seconds=0))
+    record = run_cases(Options(["tiny"], ["broken"], ["mmx"], repeats=1, seconds=0))
     (skipped,) = record["scenes"][0]["skipped"]
     assert skipped["name"] == "topleft mmx"
     assert "TOPLEFT_ISA" in skipped["reason"]

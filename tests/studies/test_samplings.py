@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 from benchmarks import cli
 from PIL import Image
 
 from topleft._base.options import Sampling
-
-ROOT = Path(__file__).parents[2]
 
 
 def test_samplings_command_draws_a_panel_for_each(tmp_path, capsys):

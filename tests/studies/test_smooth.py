@@ -2,31 +2,23 @@
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
-
 import numpy as np
 import pytest
-from benchmarks import cli
 from benchmarks.exact.pictures import area_error, draw_exact
-from benchmarks.harness.rounds import Options, run
+from benchmarks.harness.rounds import Options, run_cases
 from benchmarks.peers import load_peer
-from benchmarks.report import pages
+from benchmarks.run import smooth_tables
 from benchmarks.scenes.cases import CASES
-from benchmarks.small import smooth_tables
 
 import topleft as tl
 
-ROOT = Path(__file__).parents[2]
-
 ISA = tl.build_info()["isa"]
-RECORD, PAGE = ROOT / "benchmarks/records/smooth.json", ROOT / "docs/measured/performance.md"
 
 
 @pytest.fixture(scope="module")
 def record():
     """Our three ways to draw the smallest scene, and the scenes whose errors count."""
-    return run(Options(["tiny-smooth", "smooth-singles", "smooth-seams"], [], [ISA], repeats=1, seconds=0))
+    return run_cases(Options(["tiny-smooth", "smooth-singles", "smooth-seams"], [], [ISA], repeats=1, seconds=0))
 
 
 def test_area_error_by_hand():
@@ -64,18 +56,3 @@ def test_tables_name_each_way_once(record):
     for way in load_peer("topleft").WAYS["smooth-fill"]:
         assert text.count(f"| topleft {ISA} {way} ") == 1
     assert smooth_tables.times_text(record).count("\n") == 4
-
-
-def test_document_command_writes_smooth_tables(record, tmp_path):
-    page, source = tmp_path / "page.md", tmp_path / "smooth.json"
-    page.write_text("".join(f"<!-- table: {name} -->\n<!-- end -->\n" for name in smooth_tables.PARTS))
-    source.write_text(json.dumps(record))
-    assert cli.main(["document", str(source), str(page)]) == 0
-    assert "tiny" in page.read_text()
-
-
-def test_page_tables_are_those_of_the_smooth_record():
-    text = PAGE.read_text(encoding="utf-8")
-    command = f"python -m benchmarks document {RECORD.relative_to(ROOT)} {PAGE.relative_to(ROOT)}"
-    made = pages.with_parts(text, json.loads(RECORD.read_text()), smooth_tables.PARTS)
-    assert made == text, f"run: {command}"

@@ -4,21 +4,17 @@ from __future__ import annotations
 
 import io
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
 from benchmarks import cli
-from benchmarks.report import pages
-from benchmarks.static import measure as static
 from benchmarks.static import scenes as static_scenes
+from benchmarks.static import study as static
 from benchmarks.static import tables as static_tables
 
 import topleft as tl
 from topleft._raster import choices
 
-ROOT = Path(__file__).parents[2]
-RECORD, PAGE = ROOT / "benchmarks/records/static.json", ROOT / "docs/measured/static.md"
 SCALE = 0.02
 CUBE = "v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\nv -1 -1 1\nv 1 -1 1\nv 1 1 1\nv -1 1 1\n" + "".join(
     f"f {' '.join(map(str, face))}\n"
@@ -136,10 +132,3 @@ def test_command_measures_and_adds_to_its_file(tmp_path, capsys):
     assert {row["model"] for row in found["rows"]} == {"hills 1M", "soup, large, 30k"}
     assert {model["model"] for model in found["models"]} == {"hills 1M", "soup, large, 30k"}
     assert "| any scene" in capsys.readouterr().out
-
-
-def test_page_tables_are_those_of_the_record():
-    text = PAGE.read_text(encoding="utf-8")
-    command = f"python -m benchmarks document {RECORD.relative_to(ROOT)} {PAGE.relative_to(ROOT)}"
-    made = pages.with_parts(text, json.loads(RECORD.read_text()), static_tables.PARTS)
-    assert made == text, f"run: {command}"

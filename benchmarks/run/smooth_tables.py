@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from benchmarks.harness.records import Record
 from benchmarks.peers import OURS
-from benchmarks.report.tables import number, ratio, table
+from benchmarks.report.tables import commit_text, number, table_text
+from benchmarks.run.tables import ratio
 
-Record = dict[str, Any]
 Run = dict[str, Any]
 
 TASK = "smooth-fill"
@@ -31,13 +32,13 @@ def find_run(scene: dict[str, Any], name: str) -> Run | None:
 def facts_text(record: Record) -> str:
     """What the figures belong to, and who is missing."""
     machine, options = record["machine"], record["options"]
-    commit = (record["commit"] or "unknown")[:12] + (" with changes" if record["changed"] else "")
     runs = {run["peer"]: run for scene in timed_scenes(record) for run in scene["runs"]}
     versions = ", ".join(f"{name} {run['version']}" for name, run in runs.items())
     skipped = {f"{skip['name']}: {skip['reason']}" for scene in timed_scenes(record) for skip in scene["skipped"]}
     text = (
-        f"{machine['cpu']}, {machine['system']}, Python {machine['python']}, at {commit}, {record['date'][:10]}; one "
-        f"thread each, medians of {options['repeats']} rounds with their quartiles, ms. {versions}."
+        f"{machine['cpu']}, {machine['system']}, Python {machine['python']}, at {commit_text(record)}, "
+        f"{record['date'][:10]}; one thread each, medians of {options['repeats']} rounds with their quartiles, ms. "
+        f"{versions}."
     )
     return text + (f" Skipped: {'; '.join(sorted(skipped))}." if skipped else "")
 
@@ -51,7 +52,7 @@ def times_text(record: Record) -> str:
         runs = [find_run(scene, name) for scene in scenes]
         gives = next(run["gives"] for run in runs if run)
         rows.append([name, gives, *(time_text(run) for run in runs)])
-    return "\n".join(table(["contestant", "gives", *(column(scene) for scene in scenes)], rows))
+    return table_text(["contestant", "gives", *(column(scene) for scene in scenes)], rows)
 
 
 def column(scene: dict[str, Any]) -> str:
@@ -76,7 +77,7 @@ def ratios_text(record: Record) -> str:
             best = min(peers, key=lambda run: run["median_ms"], default=None)
             cells.append(f"{ratio(best, own):#.3g} ({best['name']})" if own and best else "-")
         rows.append(["fastest peer over", name, *cells])
-    return "\n".join(table(["", "", *(column(scene) for scene in scenes)], rows))
+    return table_text(["", "", *(column(scene) for scene in scenes)], rows)
 
 
 def errors_text(record: Record) -> str:
@@ -95,7 +96,7 @@ def errors_text(record: Record) -> str:
             f"{error['worst']:.2g}" if error else "-",
             f"{seam['wrong_px']:,}" + (f" ({255 * seam['darkest']:.0f})" if seam["wrong_px"] else "") if seam else "-",
         ])  # fmt: skip
-    return "\n".join(table(["contestant", "gives", "RMS error", "largest", "seam pixels (darkest)"], rows))
+    return table_text(["contestant", "gives", "RMS error", "largest", "seam pixels (darkest)"], rows)
 
 
 PARTS: dict[str, Callable[[Record], str]] = {

@@ -8,6 +8,7 @@ The planner's has been drawn before: it is in clusters where `topleft.choices` s
 
 from __future__ import annotations
 
+import argparse
 import copy
 import math
 import sys
@@ -20,8 +21,13 @@ from pathlib import Path
 from typing import Any, TextIO
 
 import topleft as tl
-from benchmarks.choices.measure import check_same_bits, digits, facts, quartiles, take_rounds
-from benchmarks.choices.ways import Draw, Forced, Picture, Way
+from benchmarks.harness.arguments import add_names, add_number, add_out, add_scale, options_of, set_options
+from benchmarks.harness.machine import describe
+from benchmarks.harness.records import Record, read_record
+from benchmarks.harness.turns import digits, quartiles
+from benchmarks.harness.ways import Draw, Forced, Picture, Way, check_same_bits, take_rounds
+from benchmarks.report.study import Save, Study
+from benchmarks.static import tables
 from benchmarks.static.scenes import StaticScene, scenes
 from topleft._raster import choices
 from topleft._raster.clustered import ClusteredScene
@@ -33,7 +39,6 @@ ASKED = ("pays_to_cluster", "pays_to_draw_clusters", "pays_to_draw_instances")
 FORCED: Forced = tuple((choices, name, lambda *_: True) for name in ASKED)
 
 Row = dict[str, Any]
-Record = dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -163,7 +168,7 @@ def measure_scene(scene: StaticScene, options: Options) -> Row:
         ways.append(Way("clusters", drawing(scene), FORCED))
         with Way("", ways[2].draw, (*FORCED, *counting(fates))).in_force():
             ways[2].draw()
-    check_same_bits(scene, ways)
+    check_same_bits(scene.label, ways)
     n_rounds = max(3, min(options.rounds, int(options.most_seconds * 1e3 / (4 * whole_first))))
     times = take_rounds(ways, n_rounds, options.seconds, time.thread_time, math.inf)
     row = {
@@ -236,7 +241,8 @@ def with_rows(record: Record | None, rows: list[Row], models: list[Row]) -> Reco
     old = record or {"rows": [], "models": []}
     merged = {key_of(row): row for row in [*old["rows"], *rows]}
     merged_models = {row["model"]: row for row in [*old["models"], *models]}
-    return facts() | {"kind": "static", "models": list(merged_models.values()), "rows": list(merged.values())}
+    rows_of = {"models": list(merged_models.values()), "rows": list(merged.values())}
+    return {"kind": "static"} | describe() | rows_of
 
 
 def key_of(row: Row) -> tuple[Any, ...]:
@@ -250,3 +256,24 @@ def row_text(row: Row) -> str:
     what = f"{row['model']}, {row['view']}, {row['cull']} {row['verb']} {row['sampling']} {width}x{height}"
     how = "in clusters" if row["is_clustered"] else f"whole (clusters x {row['clusters_faster'][1]:.2f})"
     return f"{what:72} {row['whole_ms'][1]:9.3f} -> {row['ms'][1]:9.3f} ms  x {row['faster'][1]:6.2f}  {how}"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    set_options(parser, Options())
+    add_names(parser, "--scene", "scenes", "beginnings of names; all unless given")
+    parser.add_argument("--mesh", dest="files", nargs="+", type=Path, metavar="FILE", help="closed meshes to draw, too")
+    add_number(parser, "--repeats", "rounds", "rounds")
+    add_scale(parser)
+    add_out(parser, "what it holds and is not measured stays")
+
+
+def run(arguments: argparse.Namespace, save: Save) -> Record:
+    """Measure."""
+    return run_static(options_of(Options, arguments), sys.stderr, read_record(arguments.record), save)
+
+
+STUDY = Study(
+    "static", "measure meshes that do not change, in clusters beside whole", add_arguments, run, tables.lines,
+    tables.PARTS, "benchmarks.static.charts",
+)  # fmt: skip

@@ -5,6 +5,8 @@ In: the scenes of `pictures_scenes.py`. Out: a record of counts and grey levels,
 
 from __future__ import annotations
 
+import argparse
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -14,8 +16,12 @@ from typing import Any, NamedTuple, TextIO
 import numpy as np
 
 import topleft as tl
-from benchmarks.harness import machine
+from benchmarks.harness.arguments import add_names, add_out
+from benchmarks.harness.machine import describe
+from benchmarks.harness.records import Record
+from benchmarks.pictures import tables
 from benchmarks.pictures.scenes import SCENES, SIZE, PictureScene, draw
+from benchmarks.report.study import Save, Study
 
 SNAP_PX = 2.0**-8
 """Either renderer moves a corner by half of 2^-8 px in x and in y, 0.71 of 2^-8 px in all; the rest is for float32."""
@@ -46,7 +52,7 @@ def run_pictures(log: TextIO, names: list[str], folder: Path | None = None) -> d
 
     if unknown := [name for name in names if name not in SCENES]:
         raise ValueError(f"--scene must be some of {', '.join(SCENES)}, got {', '.join(unknown)}")
-    commit = machine.describe_commit()
+    facts = describe("moderngl")
     peer = OpenGL()
     rows = []
     for name in names or SCENES:
@@ -59,13 +65,9 @@ def run_pictures(log: TextIO, names: list[str], folder: Path | None = None) -> d
             write_sheet(sheet_path(folder, name), ours.color, theirs.color)
     return {
         "kind": "pictures",
-        "machine": machine.describe_machine(),
-        "versions": {"topleft": tl.build_info()["version"], "moderngl": machine.version_of("moderngl")},
-        "isa": tl.build_info()["isa"],
+        **facts,
         "renderer": peer.renderer,
         "environment": ENVIRONMENT,
-        "date": machine.now(),
-        **commit,
         "size": list(SIZE),
         "scenes": rows,
         "outlines": compare_outlines(peer.draw),
@@ -196,3 +198,23 @@ def read_sheet(path: Path) -> tuple[np.ndarray, np.ndarray]:
         pixels = np.asarray(picture.convert("RGB"))
     width = (pixels.shape[1] - 2 * GAP_PX) // 3
     return pixels[:, :width], pixels[:, width + GAP_PX : 2 * width + GAP_PX]
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.set_defaults(scenes=[])
+    add_names(parser, "--scene", "scenes", "scenes; all unless given")
+    parser.add_argument("--sheets", type=Path, metavar="FOLDER",
+                        help="write them side by side with their difference, PNG")  # fmt: skip
+    add_out(parser)
+
+
+def run(arguments: argparse.Namespace, _: Save) -> Record:
+    """Draw and compare."""
+    try:
+        return run_pictures(sys.stderr, arguments.scenes, arguments.sheets)
+    except (ImportError, RuntimeError) as error:
+        raise ValueError(str(error)) from error
+
+
+STUDY = Study("pictures", "compare pictures with OpenGL on llvmpipe", add_arguments, run, tables.lines, tables.PARTS)
