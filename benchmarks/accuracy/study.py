@@ -6,10 +6,9 @@ Out: a record for JSON. A part that is measured again replaces its rows; the res
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
-from typing import Any, TextIO
+from typing import Any
 
 from benchmarks.accuracy import speed_tables, tables
 from benchmarks.accuracy.depth import measure_depth
@@ -20,10 +19,18 @@ from benchmarks.accuracy.sizes import measure_sizes
 from benchmarks.accuracy.stability import measure_stability
 from benchmarks.accuracy.tutorial import measure_tutorial
 from benchmarks.harness import machine
-from benchmarks.harness.arguments import add_names, add_number, add_out, add_scale, options_of, set_options
-from benchmarks.harness.records import Record, read_record
+from benchmarks.harness.arguments import (
+    add_names,
+    add_number,
+    add_out,
+    add_scale,
+    options_of,
+    refuse_unknown,
+    set_options,
+)  # fmt: skip
+from benchmarks.harness.records import Record, Save, forget, read_record, tell
 from benchmarks.peers import PEERS
-from benchmarks.report.study import Save, Study
+from benchmarks.report.study import Study
 from benchmarks.report.tables import table, table_text
 from benchmarks.scenes.families import FAMILIES, entries
 
@@ -45,8 +52,7 @@ def run_accuracy(
     options: Options,
     parts: Sequence[str] = (),
     record: Record | None = None,
-    progress: TextIO | None = None,
-    save: Callable[[Record], None] | None = None,
+    save: Save = forget,
 ) -> Record:
     """Measure the named parts, all for none, and return the record with them; `save` gets it after each.
 
@@ -55,18 +61,16 @@ def run_accuracy(
     ValueError
         If a part is unknown, or the record is of another machine, instruction set or version.
     """
-    import topleft as tl
-
     chosen = list(parts) or list(MEASURES)
-    if unknown := [part for part in chosen if part not in MEASURES]:
-        raise ValueError(f"parts must be some of {', '.join(MEASURES)}, got {', '.join(unknown)}")
+    refuse_unknown("parts", chosen, MEASURES)
     entries(options.methods)  # unknown names are refused before anything is measured
+    run = machine.describe()
     facts: Record = {
         "schema": SCHEMA,
         "kind": "accuracy",
-        "machine": {key: value for key, value in machine.describe_machine().items() if key != "load"},
-        "versions": {"topleft": tl.build_info()["version"], "numpy": machine.version_of("numpy")},
-        "isa": tl.build_info()["isa"],
+        "machine": {key: value for key, value in run["machine"].items() if key != "load"},
+        "versions": run["versions"],
+        "isa": run["isa"],
         "options": {"rounds": options.rounds, "seconds": options.seconds, "frame_px": options.frame_px},
     }
     if record is None:
@@ -75,14 +79,12 @@ def run_accuracy(
         if record.get(key) != value:
             raise ValueError(f"the record must be of the same {key} to add to it, {value!r}, got {record.get(key)!r}")
     for part in chosen:
-        if progress:
-            print(f"{part} ...", file=progress, flush=True)
+        tell(f"{part} ...")
         measured = MEASURES[part](options)
         for name, value in measured.items():
             record[name] = replace_rows(record.get(name, []), value) if isinstance(value, list) else value
         record["parts"][part] = {"date": machine.now(), **machine.describe_commit()}
-        if save:
-            save(record)
+        save(record)
     return record
 
 
@@ -97,7 +99,6 @@ def replace_rows(old: list[Record], new: list[Record]) -> list[Record]:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
     set_options(parser, Options(peers=list(PEERS)))
     parser.add_argument("--part", nargs="+", metavar="NAME", default=[],
                         help=f"measure these alone, leave the rest of FILE.json: {', '.join(MEASURES)}")  # fmt: skip
@@ -115,7 +116,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace, save: Save) -> Record:
     """Measure all parts, or those that are named."""
     old = read_record(arguments.record) if arguments.part else None
-    return run_accuracy(options_of(Options, arguments), arguments.part, old, sys.stderr, save)
+    return run_accuracy(options_of(Options, arguments), arguments.part, old, save)
 
 
 def text_of(rows: Callable[..., Any], *more: Any) -> Callable[[Record], str]:

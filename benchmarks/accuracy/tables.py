@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from benchmarks.accuracy.stability import CHANGES, EXACT, FAR_PX
@@ -12,6 +12,7 @@ from benchmarks.report.tables import commit_text, number
 DEFAULT_BITS = "8"
 
 Row = dict[str, Any]
+Table = tuple[list[str], list[list[str]]]
 
 
 def facts_text(record: Record) -> str:
@@ -50,17 +51,47 @@ def is_default(row: Row) -> bool:
     return not row["precision"].isdigit() or row["precision"] == DEFAULT_BITS
 
 
-def coverage_rows(record: Record, keep: Callable[[Row], bool]) -> tuple[list[str], list[list[str]]]:
-    """A row for each method and precision, time and error of every family."""
-    families = {family["name"]: family for family in record["families"]}
-    head = ["method", "precision"]
-    for name in families:
-        head += [f"{name}: ns", "wrong"]
+def family_rows(record: Record, head: list[str], rows: Iterable[tuple[str, str, Row, str]], error: str) -> Table:
+    """A row for each pair of names, the time and the error of every family; peers that sat out are left out."""
     cells: dict[tuple[str, str], list[str]] = {}
-    for row in filter(keep, record["coverage"]):
-        own = cells.setdefault((row["method"], row["precision"]), [f"`{row['method']}`", row["precision"]])
-        own += [number(row["ns_triangle"]), per_million(row["wrong_px"], families[row["family"]]["n_edge_px"])]
-    return head, list(cells.values())
+    for name, gives, row, error_text in rows:
+        cells.setdefault((name, gives), [name, gives]).extend([number(row["ns_triangle"]), error_text])
+    columns = [column for family in record["families"] for column in (f"{family['name']}: ns", error)]
+    return head + columns, list(cells.values())
+
+
+def coverage_rows(record: Record, keep: Callable[[Row], bool]) -> Table:
+    """A row for each method and precision, time and error of every family."""
+    rows = ((f"`{row['method']}`", row["precision"], row, wrong_text(record, row))
+            for row in record["coverage"] if keep(row))  # fmt: skip
+    return family_rows(record, ["method", "precision"], rows, "wrong")
+
+
+def others_rows(record: Record) -> Table:
+    """A row for each peer and each pure twin: time and error of every family."""
+    rows = (
+        (row.get("peer") or row["twin"], row.get("gives") or f"counts, Python, as `{row['method']}`", row,
+         wrong_text(record, row))
+        for row in record["peers"] + record["pure"]
+        if "skipped" not in row
+    )  # fmt: skip
+    return family_rows(record, ["drawn by", "gives"], rows, "wrong")
+
+
+def antialiasing_rows(record: Record) -> Table:
+    """A row for each way to sample and each peer: time and RMS error of every family."""
+    rows = (
+        (f'`"{row["sampling"]}"`' if "sampling" in row else row["peer"], row.get("gives", "topleft"), row,
+         f"{row['rms']:.2g}")
+        for row in record["antialiasing"]
+        if "skipped" not in row
+    )  # fmt: skip
+    return family_rows(record, ["sampling", "gives"], rows, "RMS")
+
+
+def wrong_text(record: Record, row: Row) -> str:
+    """Wrong pixels per million edge pixels of the family."""
+    return per_million(row["wrong_px"], next(f["n_edge_px"] for f in record["families"] if f["name"] == row["family"]))
 
 
 def bits_rows(record: Record) -> tuple[list[str], list[list[str]]]:
@@ -89,38 +120,6 @@ def stability_rows(record: Record, keep: Callable[[Row], bool]) -> tuple[list[st
         if row["method"] == EXACT or keep(row)
     ]
     return ["method", "precision", *(column.replace("_", " ") for column in columns)], rows
-
-
-def antialiasing_rows(record: Record) -> tuple[list[str], list[list[str]]]:
-    """A row for each way to sample and each peer: time and RMS error of every family."""
-    head = ["sampling", "gives"]
-    for family in record["families"]:
-        head += [f"{family['name']}: ns", "RMS"]
-    cells: dict[str, list[str]] = {}
-    for row in record["antialiasing"]:
-        if "skipped" in row:
-            continue
-        name = f'`"{row["sampling"]}"`' if "sampling" in row else row["peer"]
-        own = cells.setdefault(name, [name, row.get("gives", "topleft")])
-        own += [number(row["ns_triangle"]), f"{row['rms']:.2g}"]
-    return head, list(cells.values())
-
-
-def others_rows(record: Record) -> tuple[list[str], list[list[str]]]:
-    """A row for each peer and each pure twin: time and error of every family."""
-    families = {family["name"]: family for family in record["families"]}
-    head = ["drawn by", "gives"]
-    for name in families:
-        head += [f"{name}: ns", "wrong"]
-    cells: dict[str, list[str]] = {}
-    for row in record["peers"] + record["pure"]:
-        if "skipped" in row:
-            continue
-        name = row.get("peer") or row["twin"]
-        gives = row.get("gives") or f"counts, Python, as `{row['method']}`"
-        own = cells.setdefault(name, [name, gives])
-        own += [number(row["ns_triangle"]), per_million(row["wrong_px"], families[row["family"]]["n_edge_px"])]
-    return head, list(cells.values())
 
 
 def skipped_text(record: Record) -> str:

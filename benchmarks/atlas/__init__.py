@@ -2,9 +2,8 @@
 
 study.py      arguments
 measure.py    draws families with every method, counts faults
-families.py   scenes in pixels by one or two parameters
+families.py   scenes in pixels by one or two parameters, and maps of their faults
 depth.py      scenes in clip space and with depth
-maps.py       counts of a family, step by step
 shrink.py     from a first failure to a small scene
 tables.py     the page's tables
 charts.py     heat maps

@@ -1,6 +1,6 @@
 """Families of scenes with clip space or depth, which only the production methods take, and what they make of them.
 
-In: vertices in clip space, or pixels with depth. Out: as `atlas.py`, and how far depths are from those of the planes
+In: vertices in clip space, or pixels with depth. Out: as `measure.py`, and how far depths are from those of the planes
 through the snapped vertices, in units in the last place of float32. Scenes are the same bits on every machine.
 """
 
@@ -14,8 +14,17 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.atlas.families import MIDDLE_PX, Axis, Family, direction, power_of_ten, power_of_two, square_rim
-from benchmarks.atlas.maps import tabulate, walk
+from benchmarks.atlas.families import (
+    MIDDLE_PX,
+    Axis,
+    Family,
+    direction,
+    power_of_ten,
+    power_of_two,
+    square_rim,
+    tabulate,
+    walk,
+)  # fmt: skip
 from benchmarks.exact.clip import draw_clip, pieces_picture
 from benchmarks.exact.integers import box_side, edge_values, signed_area, snapped_points
 
@@ -287,7 +296,7 @@ DEPTH_FAMILIES = {
 
 
 def measure_depth(family: DepthFamily, names: Sequence[str]) -> tuple[dict[str, Any], list[dict[str, Any]]]:
-    """Return what was drawn, and a map for each of the engine's rows, as `atlas.map_family`."""
+    """Return what was drawn, and a map for each of the engine's rows, as `measure.map_family`."""
     cells: dict[str, list[list[DepthFaults | str]]] = {name: [] for name in names}
     n_px = []
     for _, values in walk(family):

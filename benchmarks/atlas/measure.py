@@ -11,16 +11,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, TextIO
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.atlas.depth import DEPTH_FAMILIES, PRODUCTION, measure_depth
-from benchmarks.atlas.families import FAMILIES, Family, Scene
-from benchmarks.atlas.maps import Faults, tabulate, walk
+from benchmarks.atlas.families import FAMILIES, Family, Faults, Scene, tabulate, walk
 from benchmarks.exact.integers import Points, draw_points, signed_area, snapped_points
 from benchmarks.exact.unsnapped import ExactPicture
+from benchmarks.harness.arguments import refuse_unknown
+from benchmarks.harness.records import Record, tell
 
 SCHEMA = 1
 NO_FILL = "not applicable, it draws outlines and fills nothing"
@@ -164,9 +165,7 @@ def map_family(family: Family, rows: Sequence[Entry]) -> tuple[dict[str, Any], l
     return tabulate(family, n_edge_px, cells)
 
 
-def run_atlas(
-    progress: TextIO | None = None, names: Sequence[str] = (), methods: Sequence[str] = ()
-) -> dict[str, Any]:
+def run_atlas(names: Sequence[str] = (), methods: Sequence[str] = ()) -> Record:
     """Draw every family, or the named ones, with every entry, or the named ones; return the record.
 
     Raises
@@ -174,16 +173,8 @@ def run_atlas(
     ValueError
         For a family or an entry that does not exist.
     """
-
-    def tell(text: str) -> None:
-        if progress:
-            print(text, file=progress, flush=True)
-
-    for what, wished, known in (
-        ("--family", names, [*FAMILIES, *DEPTH_FAMILIES]), ("--method", methods, [entry.name for entry in entries()])
-    ):  # fmt: skip
-        if unknown := [name for name in wished if name not in known]:
-            raise ValueError(f"{what} must be some of {', '.join(known)}, got {', '.join(unknown)}")
+    refuse_unknown("--family", names, [*FAMILIES, *DEPTH_FAMILIES])
+    refuse_unknown("--method", methods, [entry.name for entry in entries()])
     chosen = [entry for entry in entries() if not methods or entry.name in methods]
     record: dict[str, Any] = {"schema": SCHEMA, "kind": "atlas", "families": [], "maps": []}
     for family in FAMILIES.values():

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 
 from benchmarks.atlas import measure, shrink, tables
 from benchmarks.harness.arguments import add_names, add_out
-from benchmarks.harness.records import Record
-from benchmarks.report.study import Save, Study
+from benchmarks.harness.records import Record, Save
+from benchmarks.report.study import Study
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
     parser.set_defaults(methods=[], families=[])
     add_names(parser, "--method", "methods", "rows; all unless given")
     add_names(parser, "--family", "families", "families of scenes; all unless given")
@@ -24,7 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace, save: Save) -> Record:
     """Draw and compare, and shrink if wanted."""
-    record = measure.run_atlas(sys.stderr, arguments.families, arguments.methods)
+    record = measure.run_atlas(arguments.families, arguments.methods)
     save(record)
     if arguments.scenes:
         text = shrink.with_scenes(arguments.scenes.read_text(), shrink.shrink_all(record))

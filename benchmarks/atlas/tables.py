@@ -23,7 +23,7 @@ def lines(record: Record) -> Iterator[str]:
 
 
 def steps_of(facts: Row) -> list[str]:
-    """Return the values of a family as `atlas.walk` takes them, parameters joined by a comma."""
+    """Return the values of a family as `families.walk` takes them, parameters joined by a comma."""
     names = [""]
     for values in facts["axes"].values():
         names = [f"{head}, {value}" if head else value for head in names for value in values]

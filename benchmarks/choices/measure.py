@@ -1,6 +1,6 @@
 """What is chosen before a draw, beside what could have been: time of both in turns, on many scenes, with the same bits.
 
-In: scenes of `choices_scenes`, ways of `choices_ways`. Out: a record with a row for each scene and choice.
+In: scenes of `scenes.py`, ways of `ways.py`. Out: a record with a row for each scene and choice.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,9 @@ from numpy.typing import NDArray
 from benchmarks.choices.builds import BUILDS, concerns, load_builds, ways_with
 from benchmarks.choices.scenes import Scene, scenes
 from benchmarks.choices.ways import CHOICES, THREADED
+from benchmarks.harness.arguments import refuse_unknown
 from benchmarks.harness.machine import describe
+from benchmarks.harness.records import Record, Save, forget, tell
 from benchmarks.harness.turns import digits, quartiles
 from benchmarks.harness.ways import Ways, check_same_bits, take_rounds
 
@@ -38,12 +40,7 @@ class Options:
     """Where builds with other constants are kept; without it they are not measured."""
 
 
-def run_choices(
-    options: Options,
-    log: TextIO,
-    record: dict[str, Any] | None = None,
-    save: Callable[[dict[str, Any]], None] | None = None,
-) -> dict[str, Any]:
+def run_choices(options: Options, record: Record | None = None, save: Save = forget) -> Record:
     """Return a record, or what was measured anew in it; `save` gets it after each scene.
 
     Raises
@@ -54,8 +51,7 @@ def run_choices(
         If two ways draw different bits.
     """
     known = [*CHOICES, *BUILDS]
-    if unknown := [name for name in options.choices if name not in known]:
-        raise ValueError(f"--choice must be some of {', '.join(known)}, got {', '.join(unknown)}")
+    refuse_unknown("--choice", options.choices, known)
     makers = makers_of(options)
     rows = []
     for scene in chosen_scenes(options):
@@ -63,9 +59,8 @@ def run_choices(
             row = measure_choice(choice, scene, ways_of(scene), options)
             if row:
                 rows.append(row)
-                print(row_text(row), file=log, flush=True)
-        if save:
-            save(with_rows(record, rows))
+                tell(row_text(row))
+        save(with_rows(record, rows))
     return with_rows(record, rows)
 
 
@@ -131,11 +126,7 @@ def with_rows(record: dict[str, Any] | None, rows: list[dict[str, Any]]) -> dict
     old = {} if record is None else {key_of(row): row for row in record["rows"]}
     order = {name: i for i, name in enumerate([*CHOICES, *BUILDS])}
     merged = sorted((old | new).values(), key=lambda row: order.get(row["choice"], len(order)))
-    parts = {name: value for name, value in (record or {}).items() if name not in FACTS}
-    return {"kind": "choices"} | describe() | parts | {"rows": merged}
-
-
-FACTS = ("kind", "date", "commit", "changed", "machine", "isa", "versions")
+    return {"kind": "choices"} | (record or {}) | describe() | {"rows": merged}
 
 
 def key_of(row: dict[str, Any]) -> tuple[str, ...]:

@@ -13,8 +13,8 @@ import numpy as np
 
 import topleft as tl
 from benchmarks.harness.machine import PAGES
-from benchmarks.harness.records import Record, write_text
-from benchmarks.report.study import Save, Study
+from benchmarks.harness.records import Record, Save, write_text
+from benchmarks.report.study import Study
 from topleft.scenes import blob, planar_mesh, random_triangles, shape
 
 PAGE = PAGES / "planner.md"
@@ -112,7 +112,6 @@ def page() -> str:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
     parser.add_argument("-o", "--out", type=Path, default=PAGE, metavar="PAGE.md")
 
 

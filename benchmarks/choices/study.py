@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 
 from benchmarks.choices import measure, plans, tables
 from benchmarks.harness.arguments import add_names, add_number, add_out, add_scale, options_of, set_options
-from benchmarks.harness.records import Record, read_record
-from benchmarks.report.study import Save, Study
+from benchmarks.harness.records import Record, Save, read_record
+from benchmarks.report.study import Study
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
     set_options(parser, measure.Options())
     add_names(parser, "--choice", "choices", "measure these alone; all unless given")
     add_names(parser, "--scene", "scenes", "scenes, or beginnings of their names")
@@ -28,7 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace, save: Save) -> Record:
     """Measure the ways to draw, or plans."""
     options, old = options_of(measure.Options, arguments), read_record(arguments.record)
-    return plans.run_plans(options, old) if arguments.plans else measure.run_choices(options, sys.stderr, old, save)
+    return plans.run_plans(options, old) if arguments.plans else measure.run_choices(options, old, save)
 
 
 STUDY = Study(

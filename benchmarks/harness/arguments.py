@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterable
 from dataclasses import fields
 from pathlib import Path
 from typing import Any, TypeVar
@@ -21,6 +22,12 @@ def positive(text: str) -> int:
 def cpus(text: str) -> list[int]:
     """`1` or `1,0`."""
     return [int(part) for part in text.split(",")]
+
+
+def refuse_unknown(what: str, names: Iterable[str], known: Iterable[str]) -> None:
+    """Raise a ValueError for names that do not exist."""
+    if unknown := [name for name in names if name not in known]:
+        raise ValueError(f"{what} must be some of {', '.join(known)}, got {', '.join(unknown)}")
 
 
 def set_options(parser: argparse.ArgumentParser, options: Any) -> None:

@@ -4,10 +4,23 @@ from __future__ import annotations
 
 import json
 import os
+import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 Record = dict[str, Any]
+Save = Callable[[Record], None]
+"""Takes a record as far as it goes."""
+
+
+def forget(_: Record) -> None:
+    """Save nothing."""
+
+
+def tell(text: str) -> None:
+    """Tell how far a run has come."""
+    print(text, file=sys.stderr, flush=True)
 
 
 def read_record(path: Path | None) -> Record | None:

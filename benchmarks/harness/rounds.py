@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 import numpy as np
 
 from benchmarks.exact.pictures import Picture, compare, draw_exact
 from benchmarks.harness.contestants import Child, Contestant, SkippedError, choose
 from benchmarks.harness.machine import describe
+from benchmarks.harness.records import Record, Save, forget, tell
 from benchmarks.harness.yardstick import Yardstick, YardstickError
 from benchmarks.peers import OURS
 from benchmarks.scenes.cases import CASES, Case, Scene
@@ -36,9 +37,7 @@ class Options:
     check: bool = True
 
 
-def run_cases(
-    options: Options, progress: TextIO | None = None, save: Callable[[dict[str, Any]], None] | None = None
-) -> dict[str, Any]:
+def run_cases(options: Options, save: Save = forget) -> Record:
     """Measure, return the record that the report reads; `save` gets it after each scene, as far as it goes."""
     record: dict[str, Any] = {
         "schema": SCHEMA,
@@ -48,19 +47,13 @@ def run_cases(
     }
     with tempfile.TemporaryDirectory() as folder:
         for name in options.scenes:
-            record["scenes"].append(run_case(CASES[name], options, Path(folder), progress))
-            if save:
-                save(record)
+            record["scenes"].append(run_case(CASES[name], options, Path(folder)))
+            save(record)
     return record
 
 
-def run_case(case: Case, options: Options, folder: Path, progress: TextIO | None = None) -> dict[str, Any]:
+def run_case(case: Case, options: Options, folder: Path) -> Record:
     """All contestants of one case."""
-
-    def tell(text: str) -> None:
-        if progress:
-            print(text, file=progress, flush=True)
-
     beside = CASES[case.beside] if case.beside else None
     tell(f"{case.name}: scene")
     scenes = {c.name: c.make() for c in (case, beside) if c}
@@ -110,6 +103,17 @@ def take_turns(
     case: Case, children: list[Child], yardsticks: list[Yardstick], seconds: float, skipped: list[dict[str, str]]
 ) -> None:
     """One round: each in turn. Who fails leaves both lists."""
+    turn_of_each(children, seconds, skipped)
+    for yardstick in list(yardsticks):
+        try:
+            yardstick.take_turn(case)
+        except YardstickError as reason:
+            skipped.append({"name": yardstick.command, "reason": str(reason)})
+            yardsticks.remove(yardstick)
+
+
+def turn_of_each(children: list[Child], seconds: float, skipped: list[dict[str, str]]) -> None:
+    """The turns of the contestants."""
     for child in list(children):
         try:
             child.take_turn(seconds)
@@ -117,12 +121,6 @@ def take_turns(
             skipped.append({"name": child.contestant.name, "reason": str(reason)})
             children.remove(child)
             child.stop()
-    for yardstick in list(yardsticks):
-        try:
-            yardstick.take_turn(case)
-        except YardstickError as reason:
-            skipped.append({"name": yardstick.command, "reason": str(reason)})
-            yardsticks.remove(yardstick)
 
 
 def check_pictures(

@@ -17,9 +17,9 @@ import numpy as np
 import topleft as tl
 from benchmarks.harness.arguments import add_number, options_of, set_options
 from benchmarks.harness.machine import describe
-from benchmarks.harness.records import Record
+from benchmarks.harness.records import Record, Save
 from benchmarks.levels import page
-from benchmarks.report.study import Save, Study
+from benchmarks.report.study import Study
 from topleft._lod.detail import pixels_of_bound, window_of
 from topleft._render.render import StaticPlan
 
@@ -160,7 +160,6 @@ def outlines_px(one: Any, other: Any) -> float:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
     set_options(parser, Options())
     parser.add_argument("--mesh", dest="meshes", nargs="*", metavar="FILE", help="meshes besides the generated ones")
     add_number(parser, "--triangles", "n_triangles", "of the blob")

@@ -1,27 +1,26 @@
 """Pictures of topleft beside those of OpenGL on llvmpipe: how much they differ, where, and why.
 
-In: the scenes of `pictures_scenes.py`. Out: a record of counts and grey levels, and sheets of pictures.
+In: the scenes of `scenes.py`. Out: a record of counts and grey levels, and sheets of pictures.
 """
 
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple, TextIO
+from typing import Any, NamedTuple
 
 import numpy as np
 
 import topleft as tl
-from benchmarks.harness.arguments import add_names, add_out
+from benchmarks.harness.arguments import add_names, add_out, refuse_unknown
 from benchmarks.harness.machine import describe
-from benchmarks.harness.records import Record
+from benchmarks.harness.records import Record, Save, tell
 from benchmarks.pictures import tables
 from benchmarks.pictures.scenes import SCENES, SIZE, PictureScene, draw
-from benchmarks.report.study import Save, Study
+from benchmarks.report.study import Study
 
 SNAP_PX = 2.0**-8
 """Either renderer moves a corner by half of 2^-8 px in x and in y, 0.71 of 2^-8 px in all; the rest is for float32."""
@@ -38,7 +37,7 @@ class Drawn(NamedTuple):
     triangle: np.ndarray
 
 
-def run_pictures(log: TextIO, names: list[str], folder: Path | None = None) -> dict[str, Any]:
+def run_pictures(names: list[str], folder: Path | None = None) -> Record:
     """Draw and compare scenes, all unless named, and write their sheets into the folder.
 
     Raises
@@ -50,8 +49,7 @@ def run_pictures(log: TextIO, names: list[str], folder: Path | None = None) -> d
     """
     from benchmarks.pictures.opengl import ENVIRONMENT, OpenGL
 
-    if unknown := [name for name in names if name not in SCENES]:
-        raise ValueError(f"--scene must be some of {', '.join(SCENES)}, got {', '.join(unknown)}")
+    refuse_unknown("--scene", names, SCENES)
     facts = describe("moderngl")
     peer = OpenGL()
     rows = []
@@ -60,7 +58,7 @@ def run_pictures(log: TextIO, names: list[str], folder: Path | None = None) -> d
         ours, theirs = Drawn(*draw(scene)), Drawn(*peer.draw(scene))
         rows.append({"scene": name, "what": scene.what, "n_triangles": len(scene.mesh.triangles)})
         rows[-1] |= compare(ours, theirs, partial(outline_px, scene))
-        print(f"{name}: mean {rows[-1]['mean']}, {rows[-1]['n_unexplained']} pixels unexplained", file=log)
+        tell(f"{name}: mean {rows[-1]['mean']}, {rows[-1]['n_unexplained']} pixels unexplained")
         if folder is not None:
             write_sheet(sheet_path(folder, name), ours.color, theirs.color)
     return {
@@ -201,7 +199,6 @@ def read_sheet(path: Path) -> tuple[np.ndarray, np.ndarray]:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
     parser.set_defaults(scenes=[])
     add_names(parser, "--scene", "scenes", "scenes; all unless given")
     parser.add_argument("--sheets", type=Path, metavar="FOLDER",
@@ -212,7 +209,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace, _: Save) -> Record:
     """Draw and compare."""
     try:
-        return run_pictures(sys.stderr, arguments.scenes, arguments.sheets)
+        return run_pictures(arguments.scenes, arguments.sheets)
     except (ImportError, RuntimeError) as error:
         raise ValueError(str(error)) from error
 

@@ -8,9 +8,7 @@ from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
 
-from benchmarks.harness.records import Record
-
-Save = Callable[[Record], None]
+from benchmarks.harness.records import Record, Save
 
 
 @dataclass(frozen=True)

@@ -3,72 +3,62 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
-from benchmarks.harness.arguments import add_out, add_pin, positive
+from benchmarks.harness.arguments import (
+    add_names,
+    add_number,
+    add_out,
+    add_pin,
+    options_of,
+    positive,
+    refuse_unknown,
+    set_options,
+)  # fmt: skip
 from benchmarks.harness.contestants import known_peers
-from benchmarks.harness.records import Record
+from benchmarks.harness.records import Record, Save
 from benchmarks.harness.rounds import Options, run_cases
 from benchmarks.harness.yardstick import DEFAULT_PATTERN, Yardstick
 from benchmarks.peers import PEERS
-from benchmarks.report.study import Save, Study
+from benchmarks.report.study import Study
 from benchmarks.run import smooth_tables, tables
 from benchmarks.scenes.cases import CASES, TRIALS
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    add = parser.add_argument
-    add("--scene", nargs="+", metavar="NAME", default=[], help="cases, or beginnings of their names")
-    add("--peer", nargs="*", metavar="NAME", default=None, help="peers; all unless given, none: no names")
-    add("--isa", nargs="+", metavar="ISA", default=None, help="scalar, avx2, avx512; all unless given")
-    add("--threads", nargs="+", type=positive, metavar="N", default=[1])
-    add("--repeats", type=positive, default=9, metavar="N", help="rounds (9)")
-    add("--seconds", type=float, default=0.1, metavar="S", help="length of a turn, at least a call (0.1)")
+    set_options(parser, Options((), list(PEERS), ()))
+    add_names(parser, "--scene", "scenes", "cases, or beginnings of their names")
+    add_names(parser, "--peer", "peers", "peers; all unless given, none: no names", "*")
+    add_names(parser, "--isa", "isas", "scalar, avx2, avx512; all unless given")
+    parser.add_argument("--threads", nargs="+", type=positive, metavar="N")
+    add_number(parser, "--repeats", "repeats", "rounds")
+    parser.add_argument("--seconds", type=float, metavar="S", help="length of a turn, at least a call (%(default)s)")
     add_pin(parser)
-    add("--yardstick", action="append", default=[], metavar="[SCENE=]COMMAND")
-    add("--yardstick-pattern", action="append", default=[], metavar="REGEX",
-        help="finds its figure; one for each yardstick, the last one for the rest")  # fmt: skip
-    add("--yardstick-folder", type=Path, default=Path(), metavar="FOLDER", help="where yardsticks run")
-    add("--no-check", action="store_true", help="leave the pictures uncompared")
+    parser.add_argument("--yardstick", action="append", default=[], metavar="[SCENE=]COMMAND")
+    parser.add_argument("--yardstick-pattern", action="append", default=[], metavar="REGEX",
+                        help="finds its figure; one for each yardstick, the last one for the rest")  # fmt: skip
+    parser.add_argument("--yardstick-folder", type=Path, metavar="FOLDER", help="where yardsticks run")
+    parser.add_argument("--no-check", dest="check", action="store_false", help="leave the pictures uncompared")
     add_out(parser)
 
 
 def run(arguments: argparse.Namespace, save: Save) -> Record:
-    """Measure."""
-    return run_cases(options_of(arguments), sys.stderr, save)
-
-
-def options_of(arguments: argparse.Namespace) -> Options:
-    """What the arguments ask for, checked."""
+    """Measure what the arguments ask for, checked."""
     import topleft as tl
 
     available = tl.build_info()["isa_available"]
-    isas = arguments.isa if arguments.isa is not None else available[::-1]
-    if unknown := [isa for isa in isas if isa not in available]:
-        raise ValueError(f"--isa must be some of {', '.join(available)} here, got {', '.join(unknown)}")
-    peers = list(PEERS) if arguments.peer is None else arguments.peer
-    if unknown := [peer for peer in peers if peer not in known_peers()]:
-        raise ValueError(f"--peer must be some of {', '.join(PEERS)}, got {', '.join(unknown)}")
+    options = options_of(Options, arguments)
+    refuse_unknown("--isa", options.isas, available)
+    refuse_unknown("--peer", options.peers, known_peers())
     patterns = arguments.yardstick_pattern or [DEFAULT_PATTERN]
     patterns += [patterns[-1]] * (len(arguments.yardstick) - len(patterns))
     yardsticks = list(zip(arguments.yardstick, patterns, strict=False))
     for command, pattern in yardsticks:
-        Yardstick.parse(command, pattern, arguments.yardstick_folder, [])
-    return Options(
-        scenes=find_scenes(arguments.scene),
-        peers=peers,
-        isas=isas,
-        threads=arguments.threads,
-        repeats=arguments.repeats,
-        seconds=arguments.seconds,
-        pin=arguments.pin,
-        yardsticks=yardsticks,
-        yardstick_folder=arguments.yardstick_folder,
-        check=not arguments.no_check,
-    )
+        Yardstick.parse(command, pattern, options.yardstick_folder, [])
+    isas, scenes = options.isas or available[::-1], find_scenes(options.scenes)
+    return run_cases(replace(options, scenes=scenes, isas=isas, yardsticks=yardsticks), save)
 
 
 def find_scenes(names: Sequence[str]) -> list[str]:

@@ -1,27 +1,35 @@
 """Many pictures: views a second of one mesh, shaded, into memory and into PNG files, on one thread and on several.
 
-Contestants take turns in processes of their own, as in `rounds.py`; a call draws all views. Output: a record, and its
-table.
+Contestants take turns in processes of their own, as in `harness/rounds.py`; a call draws all views. Out: a record.
 """
 
 from __future__ import annotations
 
 import argparse
-import sys
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 import numpy as np
 
-from benchmarks.harness.arguments import add_names, add_number, add_out, add_pin, options_of, positive, set_options
+from benchmarks.harness.arguments import (
+    add_names,
+    add_number,
+    add_out,
+    add_pin,
+    options_of,
+    positive,
+    refuse_unknown,
+    set_options,
+)  # fmt: skip
 from benchmarks.harness.contestants import Child, Contestant, SkippedError
 from benchmarks.harness.machine import describe
-from benchmarks.harness.records import Record
+from benchmarks.harness.records import Record, Save, tell
+from benchmarks.harness.rounds import turn_of_each
 from benchmarks.peers import OURS, load_peer, why_not
-from benchmarks.report.study import Save, Study
+from benchmarks.report.study import Study
 from benchmarks.scenes.cases import Case, views_scene
 
 PEERS = ("llvmpipe", "riley", "deodr", "vtk")
@@ -41,7 +49,7 @@ class Options:
     pin: Sequence[int] = ()
 
 
-def run_batch(options: Options, progress: TextIO | None = None) -> dict[str, Any]:
+def run_batch(options: Options) -> dict[str, Any]:
     """Measure, return the record that `lines` reads."""
     record: dict[str, Any] = {
         "schema": 1,
@@ -63,18 +71,12 @@ def run_batch(options: Options, progress: TextIO | None = None) -> dict[str, Any
                     contestant.case.make().save(scene)
                 try:
                     children.append(Child.start(contestant, scene, options.pin, folder))
-                    _tell(progress, f"{_name(contestant)} is ready")
+                    tell(f"{_name(contestant)} is ready")
                 except SkippedError as reason:
                     record["skipped"].append({"name": _name(contestant), "reason": str(reason)})
             for i in range(options.repeats):
-                for child in list(children):
-                    try:
-                        child.take_turn(0.0)
-                    except SkippedError as reason:
-                        record["skipped"].append({"name": _name(child.contestant), "reason": str(reason)})
-                        children.remove(child)
-                        child.stop()
-                _tell(progress, f"round {i + 1} of {options.repeats}")
+                turn_of_each(children, 0.0, record["skipped"])
+                tell(f"round {i + 1} of {options.repeats}")
             seen = {child.contestant: _seen(child, folder) for child in children}
         finally:
             for child in children:
@@ -152,13 +154,7 @@ def _name(contestant: Contestant) -> str:
     return f"{contestant.name} {contestant.case.name}"
 
 
-def _tell(progress: TextIO | None, text: str) -> None:
-    if progress:
-        print(text, file=progress, flush=True)
-
-
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
     set_options(parser, Options())
     add_names(parser, "--peer", "peers", ", ".join(PEERS), "*")
     parser.add_argument("--threads", nargs="+", type=positive, metavar="N")
@@ -171,10 +167,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, _: Save) -> Record:
-    """Measure."""
-    if unknown := [peer for peer in arguments.peers if peer not in PEERS]:
-        raise ValueError(f"--peer must be some of {', '.join(PEERS)}, got {', '.join(unknown)}")
-    return run_batch(options_of(Options, arguments), sys.stderr)
+    refuse_unknown("--peer", arguments.peers, PEERS)
+    return run_batch(options_of(Options, arguments))
 
 
 STUDY = Study("batch", "measure many pictures: views a second, in memory and as PNG", add_arguments, run, lines)

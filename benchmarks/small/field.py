@@ -18,9 +18,9 @@ import numpy as np
 
 from benchmarks.harness.arguments import add_out
 from benchmarks.harness.machine import describe
-from benchmarks.harness.records import Record
+from benchmarks.harness.records import Record, Save
 from benchmarks.harness.turns import take_turns, turn_of
-from benchmarks.report.study import Save, Study
+from benchmarks.report.study import Study
 
 SIZE = (1920, 1080)
 N_POINTS = 100_100
@@ -106,7 +106,6 @@ CONTESTANTS = {
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
     add_out(parser)
 
 

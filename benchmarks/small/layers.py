@@ -16,9 +16,9 @@ import numpy as np
 
 from benchmarks.harness.arguments import add_out, positive
 from benchmarks.harness.machine import describe
-from benchmarks.harness.records import Record
+from benchmarks.harness.records import Record, Save
 from benchmarks.harness.turns import take_turns, turn_of
-from benchmarks.report.study import Save, Study
+from benchmarks.report.study import Study
 from benchmarks.report.tables import table
 
 SIZE = (512, 512)
@@ -49,7 +49,6 @@ def contestants() -> dict[str, Callable[[], object]]:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
     parser.add_argument("--rounds", type=positive, default=N_ROUNDS, metavar="N", help="(%(default)s)")
     add_out(parser)
 

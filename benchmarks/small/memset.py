@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import argparse
+from functools import partial
 from time import perf_counter
 
 import numpy as np
 
-from benchmarks.harness.records import Record
-from benchmarks.harness.turns import turn_of
-from benchmarks.report.study import Save, Study
+from benchmarks.harness.records import Record, Save
+from benchmarks.harness.ways import least_ms
+from benchmarks.report.study import Study
 from benchmarks.scenes.cases import UHD
 
 BYTES = {"large-4k": 1, "fill-4k": 4}
@@ -21,7 +22,7 @@ def run(arguments: argparse.Namespace, _: Save) -> Record:
     shortest = {}
     for case, n_bytes in BYTES.items():
         memory = np.zeros(UHD[0] * UHD[1] * n_bytes, np.uint8)
-        shortest[case] = min(turn_of(lambda memory=memory: memory.fill(1), perf_counter)(arguments.seconds))
+        shortest[case] = least_ms(partial(memory.fill, 1), arguments.seconds, perf_counter)
     return {"kind": "memset", "ms": shortest}
 
 
@@ -31,7 +32,6 @@ def lines(record: Record) -> list[str]:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
     parser.add_argument("--seconds", type=float, default=0.2, metavar="S", help="of each case (%(default)s)")
 
 

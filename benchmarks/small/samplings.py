@@ -10,8 +10,8 @@ import numpy as np
 
 import topleft as tl
 from benchmarks.harness.machine import IMAGES
-from benchmarks.harness.records import Record
-from benchmarks.report.study import Save, Study
+from benchmarks.harness.records import Record, Save
+from benchmarks.report.study import Study
 from topleft._base.options import Sampling
 from topleft._raster.sampling import POSITIONS
 
@@ -74,7 +74,6 @@ def number(value: float, sampling: str) -> str:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
     parser.add_argument("-o", "--out", type=Path, default=IMAGES, metavar="FOLDER")
 
 

@@ -113,6 +113,8 @@ VIEWS: dict[str, Look] = {
     "inside": looking((0, 0, 0), (0, 0, 1)),
 }
 """Ways to look at a closed mesh of radius 1 about."""
+HILLS_VIEWS = {"above": looking((0, 3, 0.01)), "grazing": looking((0, 0.16, 1.1))}
+SOUP_VIEWS = {"whole": looking((0, 0, 4.5)), "inside": VIEWS["inside"]}
 
 
 def field_arrays(n: int) -> Arrays:
@@ -152,9 +154,10 @@ def scenes(scale: float = 1.0, files: Sequence[Path] = ()) -> Iterator[StaticSce
     for path in files:
         yield from closed_scenes(path.stem, "file", partial(file_arrays, path), hd)
     for name, n in (("1M", 1_000_000), ("100k", 100_000)):
-        yield from open_scenes(f"hills {name}", "hills", partial(field_arrays, shrunk(n, scale)), hd)
+        yield from culled_scenes(f"hills {name}", "hills", partial(field_arrays, shrunk(n, scale)), hd, HILLS_VIEWS)
     for name, n, reach in (("small, 1M", 1_000_000, 0.01), ("small, 100k", 100_000, 0.02), ("large, 30k", 30_000, 0.3)):
-        yield from soup_scenes(f"soup, {name}", partial(soup_arrays, shrunk(n, scale), reach), hd)
+        make = partial(soup_arrays, shrunk(n, scale), reach)
+        yield from culled_scenes(f"soup, {name}", "soup", make, hd, SOUP_VIEWS)
     yield from instance_scenes("blob 70k", partial(blob_arrays, shrunk(70_000, scale)), hd)
     for path in files:
         yield from instance_scenes(path.stem, partial(file_arrays, path), hd)
@@ -169,22 +172,13 @@ def closed_scenes(model: str, kind: str, make: Callable[[], Arrays], size: Any) 
             yield StaticScene(model, kind, view, make, camera, size, verb="render")
 
 
-def open_scenes(model: str, kind: str, make: Callable[[], Arrays], size: Any) -> Iterator[StaticScene]:
-    """Give hills from above and over the tops of the first ones."""
-    above = looking((0, 3, 0.01))
-    grazing = looking((0, 0.16, 1.1))
-    for view, camera in (("above", above), ("grazing", grazing)):
+def culled_scenes(
+    model: str, kind: str, make: Callable[[], Arrays], size: Any, views: dict[str, Look]
+) -> Iterator[StaticScene]:
+    """Give the scenes of a mesh from some sides, with each way to cull."""
+    for view, look in views.items():
         for cull in CULLS:
-            yield StaticScene(model, kind, view, make, camera, size, cull)
-
-
-def soup_scenes(model: str, make: Callable[[], Arrays], size: Any) -> Iterator[StaticScene]:
-    """Give soup from outside and from inside."""
-    whole = looking((0, 0, 4.5))
-    inside = looking((0, 0, 0), (0, 0, 1))
-    for view, camera in (("whole", whole), ("inside", inside)):
-        for cull in CULLS:
-            yield StaticScene(model, "soup", view, make, camera, size, cull)
+            yield StaticScene(model, kind, view, make, look, size, cull)
 
 
 def instance_scenes(model: str, make: Callable[[], Arrays], size: Any) -> Iterator[StaticScene]:

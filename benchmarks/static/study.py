@@ -1,6 +1,6 @@
 """Static scenes, drawn in clusters beside whole: time of both in turns, with the same bits, and what the clusters cost.
 
-In: scenes of `static_scenes`. Out: a record with a row for each scene and one for each mesh.
+In: scenes of `scenes.py`. Out: a record with a row for each scene and one for each mesh.
 
 Both ways are the public call on memory that is kept, on one thread; each has a `Mesh` of its own, of the same arrays.
 The planner's has been drawn before: it is in clusters where `topleft.choices` says that this pays. The other never is.
@@ -18,15 +18,15 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 import topleft as tl
 from benchmarks.harness.arguments import add_names, add_number, add_out, add_scale, options_of, set_options
 from benchmarks.harness.machine import describe
-from benchmarks.harness.records import Record, read_record
+from benchmarks.harness.records import Record, Save, forget, read_record, tell
 from benchmarks.harness.turns import digits, quartiles
 from benchmarks.harness.ways import Draw, Forced, Picture, Way, check_same_bits, take_rounds
-from benchmarks.report.study import Save, Study
+from benchmarks.report.study import Study
 from benchmarks.static import tables
 from benchmarks.static.scenes import StaticScene, scenes
 from topleft._raster import choices
@@ -214,9 +214,7 @@ def measure_model(scene: StaticScene) -> Row:
     }
 
 
-def run_static(
-    options: Options, log: TextIO, record: Record | None = None, save: Callable[[Record], None] | None = None
-) -> Record:
+def run_static(options: Options, record: Record | None = None, save: Save = forget) -> Record:
     """Return a record, or what was measured anew in it; `save` gets it after each scene."""
     rows: list[Row] = []
     models: list[Row] = []
@@ -224,9 +222,8 @@ def run_static(
         if scene.model not in (model["model"] for model in models):
             models.append(measure_model(scene))
         rows.append(measure_scene(scene, options))
-        print(row_text(rows[-1]), file=log, flush=True)
-        if save:
-            save(with_rows(record, rows, models))
+        tell(row_text(rows[-1]))
+        save(with_rows(record, rows, models))
     return with_rows(record, rows, models)
 
 
@@ -259,7 +256,6 @@ def row_text(row: Row) -> str:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
     set_options(parser, Options())
     add_names(parser, "--scene", "scenes", "beginnings of names; all unless given")
     parser.add_argument("--mesh", dest="files", nargs="+", type=Path, metavar="FILE", help="closed meshes to draw, too")
@@ -269,8 +265,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, save: Save) -> Record:
-    """Measure."""
-    return run_static(options_of(Options, arguments), sys.stderr, read_record(arguments.record), save)
+    return run_static(options_of(Options, arguments), read_record(arguments.record), save)
 
 
 STUDY = Study(

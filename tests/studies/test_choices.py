@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 import sys
 
@@ -28,7 +27,7 @@ TINY = bench.Options(rounds=1, seconds=0.0, scale=0.02)
 def record():
     """Every choice and every scene, at a fiftieth of the size."""
     pytest.importorskip("scipy")
-    found = bench.run_choices(TINY, io.StringIO())
+    found = bench.run_choices(TINY)
     some = bench.Options(scenes=["mesh 1k,", "flat 20000"], rounds=1, seconds=0.0, scale=0.02)
     return choices_plans.run_plans(some, found)
 

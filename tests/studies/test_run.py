@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 import sys
 from pathlib import Path
@@ -25,13 +24,12 @@ ISA = tl.build_info()["isa"]
 @pytest.fixture(scope="module")
 def record():
     """One short run: topleft and a contestant that draws nothing."""
-    log = io.StringIO()
     program = f"{sys.executable} -c \"print('n= 7 total 0.5 ms; tiny: 0.25 ms')\""
     options = Options(
         ["tiny"], ["broken"], [ISA], repeats=2, seconds=0.001,
         yardsticks=[(f"tiny={program}", r"tiny: (?P<ms>[\d.]+) ms")],
     )  # fmt: skip
-    return run_cases(options, log)
+    return run_cases(options)
 
 
 def test_run_record_is_json_and_says_where_it_was_made(record):

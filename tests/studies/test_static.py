@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 
 import numpy as np
@@ -28,7 +27,7 @@ def record(tmp_path_factory):
     path = tmp_path_factory.mktemp("static") / "cube.obj"
     path.write_text(CUBE)
     options = static.Options(files=[path], rounds=1, seconds=0.0, most_seconds=0.0, scale=SCALE)
-    return static.run_static(options, io.StringIO())
+    return static.run_static(options)
 
 
 def scene_named(label):
