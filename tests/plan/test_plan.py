@@ -381,7 +381,7 @@ def test_cli_calibrates(capsys, monkeypatch, tmp_path):
 
 
 def test_page_has_a_plan_of_each_scene():
-    from benchmarks import planner_page
+    from benchmarks.choices import planner_page
 
     text = planner_page.PAGE.read_text(encoding="utf-8")
     assert text.startswith(planner_page.HEAD)
