@@ -22,9 +22,8 @@ from topleft._base import threads
 from topleft._base.memory import FreshMemory, KeptMemory
 from topleft._base.options import Sink
 from topleft._raster import choices, sampling
-from topleft._raster.area import sum_areas
 from topleft._raster.rasterize import draw
-from topleft._raster.sampling import sample_positions
+from topleft._raster.sampling import sample_positions, sum_areas
 from topleft._raster.snap import snap_scene
 from topleft._raster.view import View
 

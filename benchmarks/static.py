@@ -24,7 +24,7 @@ from benchmarks.choices import check_same_bits, digits, facts, quartiles, take_r
 from benchmarks.choices_ways import Draw, Forced, Picture, Way
 from benchmarks.static_scenes import StaticScene, scenes
 from topleft._raster import choices
-from topleft._raster.clustered import ClusteredScene
+from topleft._raster.cluster_draw import ClusteredScene
 from topleft._raster.clusters import Clusters
 from topleft._render import scene_clusters
 

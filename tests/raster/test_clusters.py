@@ -12,7 +12,7 @@ from topleft import _engine
 from topleft._base.memory import FreshMemory
 from topleft._base.options import Sink
 from topleft._raster import choices
-from topleft._raster.clustered import ClusteredScene, draw_clustered
+from topleft._raster.cluster_draw import ClusteredScene, draw_clustered
 from topleft._raster.clusters import Clusters
 from topleft._raster.rasterize import draw_coverage, draw_fragments, draw_overdraw
 from topleft._raster.view import View

@@ -6,7 +6,7 @@ import pytest
 import topleft as tl
 from topleft._base.options import Sink
 from topleft._raster import choices
-from topleft._raster.clustered import ClusteredScene
+from topleft._raster.cluster_draw import ClusteredScene
 from topleft._raster.clusters import Clusters, Patience, Survey
 from topleft._raster.view import View
 from topleft._render import scene_clusters

@@ -22,9 +22,8 @@ from topleft._base.memory import KeptMemory, allocate
 from topleft._base.options import Sink
 from topleft._base.threads import available_threads, run_parts
 from topleft._plan.costs import FEATURES, Costs, features
-from topleft._raster.area import sum_areas
 from topleft._raster.rasterize import draw
-from topleft._raster.sampling import sample_positions
+from topleft._raster.sampling import sample_positions, sum_areas
 from topleft._raster.snap import Snapped, snap_scene
 from topleft._raster.verbs import Rasterizer
 from topleft._raster.view import View, ViewOptions

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from topleft._base.options import DepthTest, Sampling
 from topleft._model.mesh import Mesh
 from topleft._raster import choices
-from topleft._raster.clustered import ClusteredScene
+from topleft._raster.cluster_draw import ClusteredScene
 from topleft._raster.clusters import Clusters
 from topleft._raster.view import View
 

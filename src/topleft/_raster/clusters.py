@@ -133,4 +133,3 @@ def box_of(points: NDArray[Any]) -> NDArray[np.float64]:
         finite = points[np.isfinite(points).all(axis=1)]
         low, high = (finite.min(axis=0), finite.max(axis=0)) if len(finite) else (np.zeros(3), np.zeros(3))
     return np.concatenate([low, high]).astype(np.float64)
-

@@ -19,12 +19,11 @@ from topleft._base.memory import FreshMemory, Memory
 from topleft._base.options import DepthTest, Sampling, Sink, parse
 from topleft._base.threads import count_threads, run_parts
 from topleft._raster import choices
-from topleft._raster.area import sum_areas
 from topleft._raster.classic import draw_classic, refuse_classic
-from topleft._raster.clustered import ClusteredScene, draw_clustered
+from topleft._raster.cluster_draw import ClusteredScene, draw_clustered
 from topleft._raster.clusters import Clusters
 from topleft._raster.fragments import Fragments
-from topleft._raster.sampling import draw_planes, sample_positions
+from topleft._raster.sampling import draw_planes, sample_positions, sum_areas
 from topleft._raster.snap import Snapped, check_triangles, snap_scene
 from topleft._raster.view import View
 

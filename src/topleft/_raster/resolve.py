@@ -1,4 +1,4 @@
-"""One colour a pixel from those of its samples: the mean of the values, or of the light that they stand for.
+"""Resolves MSAA: averages the samples of each pixel, their values or the light that they stand for.
 
 With straight alpha colours count as much as they are opaque: the mean of premultiplied colours, made straight again.
 """
@@ -19,14 +19,8 @@ from topleft._raster.view import View
 
 __all__ = ["parse_resolve", "resolve_colors", "resolve_flat", "resolve_gouraud"]
 
-#: Steps from no light to full light: 20 to the darkest level of sRGB.
 
-
-
-
-def parse_resolve(
-    resolve: object, colors: NDArray[Any], view: View, *, is_straight: bool
-) -> _engine.Transfer | None:
+def parse_resolve(resolve: object, colors: NDArray[Any], view: View, *, is_straight: bool) -> _engine.Transfer | None:
     """Return what is averaged; None when it is the values as they are.
 
     Raises

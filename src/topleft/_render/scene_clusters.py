@@ -16,7 +16,7 @@ from topleft import _engine
 from topleft._base.memory import KeptMemory
 from topleft._model.scene import Scene
 from topleft._raster import choices
-from topleft._raster.clustered import ClusteredScene, draw_clustered
+from topleft._raster.cluster_draw import ClusteredScene, draw_clustered
 from topleft._raster.clusters import Survey
 from topleft._raster.view import View
 

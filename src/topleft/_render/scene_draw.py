@@ -18,13 +18,12 @@ from topleft._base.options import DepthTest, Sampling, Sink, parse
 from topleft._base.threads import count_threads, run_parts
 from topleft._model.scene import Scene
 from topleft._raster import choices
-from topleft._raster.area import sum_areas
 from topleft._raster.classic import refuse_classic
-from topleft._raster.clustered import ClusteredScene
+from topleft._raster.cluster_draw import ClusteredScene
 from topleft._raster.clusters import Clusters
 from topleft._raster.peel import check_peel, peel_scenes
 from topleft._raster.rasterize import canvas_of, refuse_many
-from topleft._raster.sampling import sample_positions
+from topleft._raster.sampling import sample_positions, sum_areas
 from topleft._raster.snap import Snapped, snap_scene
 from topleft._raster.view import View
 from topleft._render.scene_clusters import draw_placed, front_to_back, pays_to_draw, wants_clusters

@@ -1,4 +1,4 @@
-"""Drawing clusters: a view takes what it needs of a mesh from vertices to pixels, cluster by cluster.
+"""Draws clusters: takes what a view shows of a mesh from vertices to pixels, cluster by cluster.
 
 In: `Clusters`, a view, a target. Out: the same picture that the whole mesh gives, and the scene that attributes need.
 """
@@ -27,8 +27,6 @@ __all__ = ["ClusteredScene", "draw_clustered"]
 SURVEYED = 50
 
 NO_RECORDS: NDArray[np.uint8] = np.empty(0, np.uint8)
-
-
 
 
 class ClusteredScene:
@@ -167,9 +165,7 @@ def draw_clustered(
     def draw_rows(i: int, _: int) -> list[NDArray[np.int32]]:
         rows = height * i // n_parts, height * (i + 1) // n_parts
         return [
-            scene.draw_rows(
-                memories[i], target, *rows, sample=sample, is_first=k == 0, is_last=k == last
-            )
+            scene.draw_rows(memories[i], target, *rows, sample=sample, is_first=k == 0, is_last=k == last)
             for k, scene in enumerate(scenes)
         ]
 
