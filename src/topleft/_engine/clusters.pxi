@@ -1,4 +1,4 @@
-# Meshes that are sorted into clusters, and passes that draw what a view needs of them. Included by _engine.pyx.
+# Meshes that are sorted into clusters, and passes that draw what a view needs of them.
 
 CLUSTER = TL_CLUSTER
 CLUSTER_GROUP = TL_CLUSTER_GROUP

@@ -1,4 +1,4 @@
-"""The types of the compiled module. What each does is told in _engine.pyx and the .pxi files."""
+"""The types of the compiled module. What each does stands in kernels.pyx and the .pxi files."""
 
 from collections.abc import Sequence
 from typing import Any

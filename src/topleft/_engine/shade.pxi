@@ -1,4 +1,4 @@
-# Shading. Included by _engine.pyx, which declares the kernels.
+# Shades pixels and tests their alpha: textures, materials and lights, and the passes that use them.
 
 
 cdef class Texture:

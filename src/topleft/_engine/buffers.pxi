@@ -1,4 +1,4 @@
-# What a pass reads and writes: views, vertices, buffers, indices, clipped pieces. Included by _engine.pyx.
+# Describes what a pass reads and writes: viewport, vertices, buffers of pixels, indices, clipped pieces.
 
 cdef enum:
     VERTEX_BLOCK = 16  # vertices that are snapped together when some of them are needed: whole vectors
