@@ -24,7 +24,7 @@ from benchmarks.choices import check_same_bits, digits, facts, quartiles, take_r
 from benchmarks.choices_ways import Draw, Forced, Picture, Way
 from benchmarks.static_scenes import StaticScene, scenes
 from topleft._raster import choices
-from topleft._raster.cluster_draw import ClusteredScene
+from topleft._raster.cluster_draw import ClusteredMesh
 from topleft._raster.clusters import Clusters
 from topleft._render import scene_clusters
 
@@ -93,7 +93,7 @@ class CountedEngine:
 def counting(fates: Fates) -> Forced:
     """Return what puts a scene in place of that of the library which counts its clusters."""
 
-    class CountedScene(ClusteredScene):
+    class CountedScene(ClusteredMesh):
         def __init__(self, clusters: Clusters, view: Any, first_id: int = 0) -> None:
             super().__init__(clusters, view, first_id)
             n, seen = len(clusters), self.survey(len(clusters))
@@ -108,7 +108,7 @@ def counting(fates: Fates) -> Forced:
             return super().draw_rows(*arguments, **options)
 
     rasterize = sys.modules["topleft._raster.rasterize"]  # not the verb of the same name
-    return (rasterize, "ClusteredScene", CountedScene), (scene_clusters, "ClusteredScene", CountedScene)
+    return (rasterize, "ClusteredMesh", CountedScene), (scene_clusters, "ClusteredMesh", CountedScene)
 
 
 @lru_cache(maxsize=1)

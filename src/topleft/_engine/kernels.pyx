@@ -74,12 +74,12 @@ cdef inline const void *data(const uint8_t[::1] view) noexcept nogil:
 
 
 def area_stride(int64_t width):
-    """Return how many cells `Scene.draw_area` needs for a row of pixels."""
+    """Return how many cells `SnappedMesh.draw_area` needs for a row of pixels."""
     return tl_area_stride(width)
 
 
 def blend_cells(int64_t width):
-    """Return how many cells `Scene.blend` needs for areas."""
+    """Return how many cells `SnappedMesh.blend` needs for areas."""
     return tl_blend_cells(width)
 
 

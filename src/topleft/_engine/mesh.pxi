@@ -66,10 +66,10 @@ def color_rows(const uint8_t[:, ::1] colors, int64_t first, int64_t end, float[:
             K.color_rows(&colors[0, 0], colors.shape[1], first, end, &rows[0, 0])
 
 
-cdef class Surface:
+cdef class Tree:
     """Triangles in a tree of boxes, to find the nearest of."""
 
-    cdef tl_surface surface
+    cdef tl_surface tree
     cdef object arrays
 
     def __init__(self, const double[:, ::1] points, const int32_t[:, ::1] triangles, double slack):
@@ -78,21 +78,21 @@ cdef class Surface:
         cdef int level = 0
         while level == 0 or n_below > 1:
             n_below = (n_below + TL_TREE_WIDTH - 1) // TL_TREE_WIDTH
-            self.surface.first_node[level] = n_all
-            self.surface.n_nodes[level] = n_below
+            self.tree.first_node[level] = n_all
+            self.tree.n_nodes[level] = n_below
             n_all += n_below
             level += 1
         nodes = np.empty(n_all * sizeof(tl_tree_node), np.uint8)
         cdef uint8_t[::1] memory = nodes
         self.arrays = (points, triangles, nodes)
-        self.surface.points = &points[0, 0]
-        self.surface.triangles = &triangles[0, 0]
-        self.surface.n_triangles = n
-        self.surface.nodes = <tl_tree_node *>&memory[0]
-        self.surface.n_levels = level
-        self.surface.slack = slack
+        self.tree.points = &points[0, 0]
+        self.tree.triangles = &triangles[0, 0]
+        self.tree.n_triangles = n
+        self.tree.nodes = <tl_tree_node *>&memory[0]
+        self.tree.n_levels = level
+        self.tree.slack = slack
         with nogil:
-            K.build_tree(&self.surface)
+            K.build_tree(&self.tree)
 
     def find_nearest(self, const double[:, ::1] points, int64_t first, int64_t end, int32_t[::1] triangle,
                      double[:, ::1] at=None):
@@ -101,7 +101,7 @@ cdef class Surface:
         cdef double largest = 0.0
         if first < end:
             with nogil:
-                largest = K.find_nearest(&self.surface, &points[0, 0], first, end, &triangle[0], out)
+                largest = K.find_nearest(&self.tree, &points[0, 0], first, end, &triangle[0], out)
         return largest
 
     def find_reach(self, const double[:, ::1] points, const int32_t[:, ::1] triangles,
@@ -111,7 +111,7 @@ cdef class Surface:
         reach.known, reach.bound, reach.n_pieces = known, 0.0, 0
         if first < end:
             with nogil:
-                K.find_reach(&self.surface, &points[0, 0], &triangles[0, 0], first, end, share, least, &reach)
+                K.find_reach(&self.tree, &points[0, 0], &triangles[0, 0], first, end, share, least, &reach)
         return reach.known, reach.bound, reach.n_pieces
 
 

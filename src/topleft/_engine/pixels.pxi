@@ -48,22 +48,22 @@ cdef class Palette:
                 self.mean(&labels[0, first_row, 0], sample_bits, labels.shape[1] * width, n_rows * width, &flat[0], first_row * width)
 
 
-def fill_bands(scenes, int32_t[:, ::1] labels, Palette palette, pixels, Bins bins, int64_t first_band, int64_t end_band):
-    """Write the mean colours of samples over bands of (H, W[, C]) pixels: `scenes` is the scene as each of them sees it.
+def fill_bands(meshes, int32_t[:, ::1] labels, Palette palette, pixels, Bins bins, int64_t first_band, int64_t end_band):
+    """Write the mean colours of samples over bands of (H, W[, C]) pixels: `meshes` is the mesh as each of them sees it.
 
     `labels`: memory for those of a band, (S, rows * W).
     """
     cdef tl_scene seen[16]
-    cdef Scene scene
+    cdef SnappedMesh mesh
     cdef tl_target target
     cdef tl_window window
     cdef tl_share share = no_share()
     cdef uint8_t[::1] flat = as_bytes(pixels)
-    cdef int k, n_samples = len(scenes), sample_bits = int(len(scenes)).bit_length() - 1
+    cdef int k, n_samples = len(meshes), sample_bits = int(len(meshes)).bit_length() - 1
     cdef int64_t band, first_row, n_rows, height = pixels.shape[0], width = pixels.shape[1]
     for k in range(n_samples):
-        scene = scenes[k]
-        seen[k] = scene.scene
+        mesh = meshes[k]
+        seen[k] = mesh.snapped
     memset(&target, 0, sizeof(target))
     target.sink, target.stride_px = <tl_sink>LABEL, width
     share.is_first = share.is_last = True
@@ -71,7 +71,7 @@ def fill_bands(scenes, int32_t[:, ::1] labels, Palette palette, pixels, Bins bin
         for band in range(first_band, end_band):
             first_row = band << bins.band_bits
             n_rows = min(<int64_t>1 << bins.band_bits, height - first_row)
-            window = scene.window(first_row, n_rows, width)
+            window = mesh.window(first_row, n_rows, width)
             share.ids = &bins.listed[0] + bins.starts[band]
             share.end = bins.starts[band + 1] - bins.starts[band]
             for k in range(n_samples):
@@ -131,14 +131,14 @@ cdef class Points:
             for k in range(4):
                 self.points.rows[i][k] = rows[i, k]
 
-    def fill(self, Scene scene, const int32_t[:, ::1] ids, out, int64_t first_row, int64_t n_rows):
+    def fill(self, SnappedMesh mesh, const int32_t[:, ::1] ids, out, int64_t first_row, int64_t n_rows):
         """Write rows of what is told of the pixels of a visibility buffer, (H, W) or (H, W, C)."""
-        cdef tl_window window = scene.window(first_row, n_rows, ids.shape[1])
+        cdef tl_window window = mesh.window(first_row, n_rows, ids.shape[1])
         cdef uint8_t[::1] flat
         if n_rows and ids.shape[1]:
             flat = as_bytes(out[first_row:first_row + n_rows])
             with nogil:
-                K.fill_points(&scene.scene, &window, &self.points, &ids[first_row, 0], &flat[0])
+                K.fill_points(&mesh.snapped, &window, &self.points, &ids[first_row, 0], &flat[0])
 
 
 PLANE_DOUBLES = TL_PLANE_DOUBLES
@@ -179,30 +179,30 @@ cdef class Valued:
             K.fill_planes(&self.mesh, &window, &ids[first_row, 0], is_f32, &flat[first_row * width * (4 if is_f32 else 8)])
 
 
-def list_edges(Scene scene, int64_t[::1] starts, int32_t[::1] last_low, int32_t[::1] highs, uint64_t[::1] edges):
+def list_edges(SnappedMesh mesh, int64_t[::1] starts, int32_t[::1] last_low, int32_t[::1] highs, uint64_t[::1] edges):
     """Write the edges of the triangles that are not culled; returns how many, -1 when an index is outside the vertices.
 
     `edges` has room for three a triangle; the others are scratch, as in `tl_edge_scratch`.
     """
     cdef tl_edge_scratch scratch
     cdef int64_t n = 0, bad_row = -1
-    if scene.scene.n_triangles and scene.scene.mesh.n_vertices:
+    if mesh.snapped.n_triangles and mesh.snapped.mesh.n_vertices:
         scratch.starts, scratch.last_low, scratch.highs = &starts[0], &last_low[0], &highs[0]
         with nogil:
-            bad_row = K.list_edges(&scene.scene, &scratch, &edges[0], &n)
+            bad_row = K.list_edges(&mesh.snapped, &scratch, &edges[0], &n)
     return n if bad_row < 0 else -1
 
 
-def draw_lines(Scene scene, View view, const uint64_t[::1] edges, uint8_t[::1] pixels, const float[:, ::1] depth, double depth_bias,
+def draw_lines(SnappedMesh mesh, const uint64_t[::1] edges, uint8_t[::1] pixels, const float[:, ::1] depth, double depth_bias,
                bint is_farthest, bint is_smooth, int64_t width, int64_t first_row, int64_t n_rows):
     """Clear the rows [first_row, first_row + n_rows) of a buffer that is `width` pixels wide and draw lines into them."""
     cdef tl_edges lines
     cdef tl_line_target target
-    cdef tl_window window = scene.window(first_row, n_rows, width)
+    cdef tl_window window = mesh.window(first_row, n_rows, width)
     if width == 0 or n_rows == 0:
         return
-    lines.mesh, lines.n_edges = scene.scene.mesh, edges.shape[0]
-    lines.view = &view.view if view is not None else NULL
+    lines.mesh, lines.n_edges = mesh.snapped.mesh, edges.shape[0]
+    lines.view = mesh.clip_view()
     lines.edges = <const int32_t *>&edges[0] if edges.shape[0] else NULL
     target.is_smooth, target.is_farthest, target.depth_bias, target.stride_px = is_smooth, is_farthest, depth_bias, width
     target.pixels = &pixels[first_row * width * (4 if is_smooth else 1)]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from topleft._base.options import DepthTest, Sampling
 from topleft._model.mesh import Mesh
 from topleft._raster import choices
-from topleft._raster.cluster_draw import ClusteredScene
+from topleft._raster.cluster_draw import ClusteredMesh
 from topleft._raster.clusters import Clusters
 from topleft._raster.view import View
 
@@ -49,7 +49,7 @@ def find_cluster_facts(mesh: Mesh, view: View, verb: str, test: DepthTest | None
     if not choices.pays_to_cluster(n_triangles, 1):
         return ClusterFacts(None, f"{n_triangles:,} triangles are done before sorting them would pay")
     clusters = mesh.clusters
-    seen = ClusteredScene(clusters, view)
+    seen = ClusteredMesh(clusters, view)
     if not choices.pays_to_draw_clusters(view, n_triangles, seen.survey):
         return ClusterFacts(None, "most of the mesh shows, and drawing that cluster by cluster takes longer")
     n, found = len(clusters), seen.survey(len(clusters))

@@ -18,7 +18,7 @@ from topleft._raster.classic import fill_classic
 from topleft._raster.rasterize import canvas_of, draw, draw_all_samples
 from topleft._raster.resolve import parse_resolve, resolve_colors, resolve_flat, resolve_gouraud
 from topleft._raster.sampling import draw_means, sample_positions
-from topleft._raster.snap import Snapped, check_triangles, snap_scene
+from topleft._raster.snap import Snapped, snap_mesh
 from topleft._raster.view import View
 
 __all__ = ["Style", "draw_fill"]
@@ -96,7 +96,7 @@ def draw_fill(
     transfer = parse_resolve(style.resolve, palette, view, is_straight=blending.is_straight)
     if view.classic:
         return fill_classic(view.classic, memory, vertices, triangles, palette, view, style.per, style.background, out)
-    snapped = snap_scene(memory, vertices, triangles, view, with_depth=False, out=out)
+    snapped = snap_mesh(memory, vertices, triangles, view, with_depth=False, out=out)
     is_flat = colors_are_flat(len(palette), snapped, style.per)
     shape = (*view.size[::-1], *palette.shape[1:])
     ground = as_background(style.background, palette)
@@ -104,7 +104,7 @@ def draw_fill(
         if ground is None and out is None:
             ground = np.zeros((), palette.dtype)
         is_drawn = bool(canvas.size and snapped.n_triangles)
-        is_blended = blending.is_needed or choices.is_direct(snapped.scene, view, palette.dtype, is_flat=is_flat)
+        is_blended = blending.is_needed or choices.is_direct(snapped, view, palette.dtype, is_flat=is_flat)
         can_lay = is_drawn and is_blended and palette.dtype == np.uint8 and view.sampling.n_samples == 1
         if ground is not None and not can_lay:
             lay_ground(canvas, ground)
@@ -166,9 +166,9 @@ def paint(
     n_channels = 1 if colors.ndim == 1 else colors.shape[1]
 
     def paint_rows(first: int, end: int) -> None:
-        snapped.scene.paint(labels, palette, flat, first, end - first, is_flat, colors.dtype == np.uint8, n_channels)
+        snapped.mesh.paint(labels, palette, flat, first, end - first, is_flat, colors.dtype == np.uint8, n_channels)
 
-    run_parts(paint_rows, height, choices.threads_to_draw(view, snapped.scene, snapped.n_triangles, Sink.LABEL))
+    run_parts(paint_rows, height, choices.threads_to_draw(view, snapped, Sink.LABEL))
 
 
 def paint_samples(
@@ -184,11 +184,11 @@ def paint_samples(
     """Draw coloured triangles over contiguous pixels, each pixel the mean of its samples."""
     width, height = view.size
     positions = sample_positions(view.sampling.n_samples, view.grid_bits)
-    n_threads = choices.threads_to_draw(view, snapped.scene, snapped.n_triangles, Sink.LABEL)
+    n_threads = choices.threads_to_draw(view, snapped, Sink.LABEL)
     if is_flat and choices.can_share(view):
         palette = _engine.Palette(colors, transfer)
-        if draw_means(memory, snapped.scene, snapped.n_triangles, positions, palette, pixels, n_threads):
-            check_triangles(snapped.triangles, snapped.corners, snapped.n_vertices)
+        if draw_means(memory, snapped.mesh, snapped.n_triangles, positions, palette, pixels, n_threads):
+            snapped.check_indices()
         view.mark("draw")
         return
     labels: NDArray[np.int32] = memory.empty("sample labels", (len(positions), height, width), np.int32)
@@ -196,8 +196,8 @@ def paint_samples(
     if is_flat:
         resolve_flat(labels, colors, pixels, transfer, n_threads)
         return
-    scenes = [snapped.scene.seen_from(x, y) for x, y in positions.tolist()]
-    resolve_gouraud(memory, scenes, labels, colors, pixels, transfer, n_threads)
+    meshes = [snapped.mesh.seen_from(x, y) for x, y in positions.tolist()]
+    resolve_gouraud(memory, meshes, labels, colors, pixels, transfer, n_threads)
 
 
 def blend(
@@ -216,17 +216,17 @@ def blend(
 
     `ground`, for uint8 with one sample a pixel: the colour that all pixels get before.
     """
-    n_threads = choices.threads_to_draw(view, snapped.scene, snapped.n_triangles, Sink.LABEL)
+    n_threads = choices.threads_to_draw(view, snapped, Sink.LABEL)
     if view.sampling.n_samples == 1:
-        pictures, scenes = pixels[None], [snapped.scene]
+        pictures, meshes = pixels[None], [snapped.mesh]
     else:
         positions = sample_positions(view.sampling.n_samples, view.grid_bits).tolist()
-        scenes = [snapped.scene.seen_from(x, y) for x, y in positions]
-        pictures = memory.empty("sample colors", (len(scenes), *pixels.shape), colors.dtype)
+        meshes = [snapped.mesh.seen_from(x, y) for x, y in positions]
+        pictures = memory.empty("sample colors", (len(meshes), *pixels.shape), colors.dtype)
         pictures[...] = pixels
-    for scene, picture in zip(scenes, pictures, strict=True):
-        if blend_colors(memory, scene, colors, picture, blending, n_threads, is_flat=is_flat, ground=ground):
-            check_triangles(snapped.triangles, snapped.corners, snapped.n_vertices)
+    for mesh, picture in zip(meshes, pictures, strict=True):
+        if blend_colors(memory, mesh, colors, picture, blending, n_threads, is_flat=is_flat, ground=ground):
+            snapped.check_indices()
     view.mark("draw")
     if view.sampling.n_samples > 1:
         resolve_colors(pictures, pixels, transfer, n_threads)
@@ -234,7 +234,7 @@ def blend(
 
 def blend_colors(
     memory: Memory,
-    scene: _engine.Scene,
+    mesh: _engine.SnappedMesh,
     colors: NDArray[Any],
     pixels: NDArray[Any],
     blending: Blending,
@@ -243,7 +243,7 @@ def blend_colors(
     is_flat: bool,
     ground: NDArray[Any] | None = None,
 ) -> bool:
-    """Blend a scene into contiguous pixels; returns whether a triangle has an index outside the vertices.
+    """Blend a mesh into contiguous pixels; returns whether a triangle has an index outside the vertices.
 
     `ground`, for uint8: the colour that all pixels get before.
     """
@@ -260,7 +260,7 @@ def blend_colors(
     def blend_part(i: int, _: int) -> int:
         first, end = height * i // n_parts, height * (i + 1) // n_parts
         own = None if cells is None else cells[n_cells * i : n_cells * (i + 1)]
-        return scene.blend(
+        return mesh.blend(
             flat, width, first, end - first, palette, n_channels, is_u8, is_flat,
             code, is_premultiplied, under, packed, own,
         )  # fmt: skip

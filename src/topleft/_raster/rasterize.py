@@ -20,11 +20,11 @@ from topleft._base.options import DepthTest, Sampling, Sink, parse
 from topleft._base.threads import count_threads, run_parts
 from topleft._raster import choices
 from topleft._raster.classic import draw_classic, refuse_classic
-from topleft._raster.cluster_draw import ClusteredScene, draw_clustered
+from topleft._raster.cluster_draw import ClusteredMesh, draw_clustered
 from topleft._raster.clusters import Clusters
 from topleft._raster.fragments import Fragments
 from topleft._raster.sampling import draw_planes, sample_positions, sum_areas
-from topleft._raster.snap import Snapped, check_triangles, snap_scene
+from topleft._raster.snap import Snapped, snap_mesh
 from topleft._raster.view import View
 
 __all__ = ["canvas_of", "draw", "draw_all_samples", "draw_coverage", "draw_fragments", "draw_overdraw"]
@@ -40,7 +40,7 @@ def draw(
     depth: NDArray[np.float32] | None = None,
     earlier_wins: bool = False,
 ) -> None:
-    """Clear contiguous buffers and draw a scene into them, in bands of rows."""
+    """Clear contiguous buffers and draw a mesh into them, in bands of rows."""
     width, height = view.size
     if 0 in view.size:
         return
@@ -52,17 +52,17 @@ def draw(
         n_samples = 1 if samples is None else len(samples)
         covered = memory.empty("covered", _engine.Target.covered_shape(height, width, n_samples), np.uint64)
     target = _engine.Target(sink, pixels, depth, covered, samples, earlier_wins)
-    n_parts = choices.threads_to_draw(view, snapped.scene, snapped.n_triangles, sink)
+    n_parts = choices.threads_to_draw(view, snapped, sink)
 
     def draw_rows(first: int, end: int) -> int:
-        return snapped.scene.draw(target, first, end - first)
+        return snapped.mesh.draw(target, first, end - first)
 
     if choices.is_shared(view, snapped.n_triangles, n_parts, sink):
         bad_rows = draw_shared(memory, snapped, target, height, n_parts)
     else:
         bad_rows = run_parts(draw_rows, height, n_parts)
     if max(bad_rows) >= 0:
-        check_triangles(snapped.triangles, snapped.corners, snapped.n_vertices)
+        snapped.check_indices()
     view.mark("draw")
 
 
@@ -83,25 +83,25 @@ def draw_flat(
     def set_depth(first: int, end: int) -> None:
         _engine.set_flat_depth(ids, depth, first, end - first, earlier_wins, flat_depth, background)
 
-    run_parts(set_depth, len(ids), choices.threads_to_draw(view, snapped.scene, snapped.n_triangles, Sink.LABEL))
+    run_parts(set_depth, len(ids), choices.threads_to_draw(view, snapped, Sink.LABEL))
     view.mark("depth")
 
 
 def draw_shared(memory: Memory, snapped: Snapped, target: _engine.Target, height: int, n_parts: int) -> list[int]:
     """Draw as `draw` does: each part a share of the triangles into its own rows, then what others have found for it."""
-    scene, n = snapped.scene, snapped.n_triangles
+    mesh, n = snapped.mesh, snapped.n_triangles
     rows = [height * i // n_parts for i in range(n_parts + 1)]
     shares = [n * i // n_parts for i in range(n_parts + 1)]
     room: NDArray[np.int32] = memory.empty("others", (n + 16 * n_parts,), np.int32)
     others = [room[shares[i] + 16 * i : shares[i + 1] + 16 * (i + 1)] for i in range(n_parts)]
 
     def draw_own(i: int, _: int) -> tuple[int, int]:
-        return scene.draw_share(target, rows[i], rows[i + 1] - rows[i], shares[i], others[i])
+        return mesh.draw_share(target, rows[i], rows[i + 1] - rows[i], shares[i], others[i])
 
     def draw_found(i: int, _: int) -> None:
         finders = [k for k in range(n_parts) if k != i]
         for k in finders:
-            scene.draw_listed(target, rows[i], rows[i + 1] - rows[i], others[k][: counts[k]], k == finders[-1])
+            mesh.draw_listed(target, rows[i], rows[i + 1] - rows[i], others[k][: counts[k]], k == finders[-1])
 
     bad_rows, counts = zip(*run_parts(draw_own, n_parts, n_parts), strict=True)
     if max(bad_rows) < 0:
@@ -131,9 +131,9 @@ def draw_area(
 ) -> NDArray[np.float32]:
     """Return the area that triangles cover of each pixel, or at most 1 of it."""
     with canvas_of(memory, f"{name} area", out, view.size[::-1], np.float32) as (result, canvas):
-        n_threads = choices.threads_to_draw(view, snapped.scene, snapped.n_triangles, Sink.COUNT)
-        if sum_areas(memory, snapped.scene, canvas, n_threads, is_clamped=is_clamped):
-            check_triangles(snapped.triangles, snapped.corners, snapped.n_vertices)
+        n_threads = choices.threads_to_draw(view, snapped, Sink.COUNT)
+        if sum_areas(memory, snapped.mesh, canvas, n_threads, is_clamped=is_clamped):
+            snapped.check_indices()
     view.mark("draw")
     return result
 
@@ -148,7 +148,7 @@ def draw_coverage(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, vie
     """`coverage`, on the memory given."""
     if view.classic:
         return draw_classic(view.classic, memory, vertices, triangles, view, Sink.MASK, out)
-    snapped = snap_scene(memory, vertices, triangles, view, with_depth=False, out=out)
+    snapped = snap_mesh(memory, vertices, triangles, view, with_depth=False, out=out)
     if view.sampling is Sampling.AREA:
         return draw_area(memory, "coverage", snapped, view, out, is_clamped=True)
     if view.sampling.n_samples > 1:
@@ -165,7 +165,7 @@ def draw_sample_counts(memory: Memory, snapped: Snapped, view: View, out: object
     n, (width, height) = view.sampling.n_samples, view.size
     planes = memory.empty("sample counts", (n, height, width), np.int32)
     for plane, at in zip(planes, sample_positions(n, view.grid_bits).tolist(), strict=True):
-        seen = replace(snapped, scene=snapped.scene.seen_from(*at))
+        seen = replace(snapped, mesh=snapped.mesh.seen_from(*at))
         draw(memory, seen, view, Sink.COUNT, plane)
     counts = np.moveaxis(planes, 0, -1)
     if out is None:
@@ -179,7 +179,7 @@ def draw_overdraw(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, vie
     """`overdraw`, on the memory given."""
     if view.classic:
         return draw_classic(view.classic, memory, vertices, triangles, view, Sink.COUNT, out)
-    snapped = snap_scene(memory, vertices, triangles, view, with_depth=False, out=out)
+    snapped = snap_mesh(memory, vertices, triangles, view, with_depth=False, out=out)
     if view.sampling is Sampling.AREA:
         return draw_area(memory, "overdraw", snapped, view, out, is_clamped=False)
     if view.sampling.n_samples > 1:
@@ -210,8 +210,8 @@ def draw_samples(
         if out is not None:
             result = as_out(f"out {name}", out, (height, width, n), planes.dtype.type)
             result[...] = np.moveaxis(planes, 0, -1)
-    scenes = [snapped.scene.seen_from(x, y) for x, y in positions.tolist()]
-    return Fragments.of_samples(ids, depth, scenes, snapped.n_vertices, snapped.n_triangles)
+    meshes = [snapped.mesh.seen_from(x, y) for x, y in positions.tolist()]
+    return Fragments.of_samples(ids, depth, meshes, snapped.n_vertices, snapped.n_triangles)
 
 
 def draw_all_samples(
@@ -227,12 +227,12 @@ def draw_all_samples(
     width, height = view.size
     if not (width and height):
         return
-    n_threads = choices.threads_to_draw(view, snapped.scene, snapped.n_triangles, sink)
+    n_threads = choices.threads_to_draw(view, snapped, sink)
     is_near = snapped.n_triangles > 0 and choices.can_share(view)
     if draw_planes(
-        memory, snapped.scene, snapped.n_triangles, positions, sink, pixels, depth, n_threads, is_near=is_near
+        memory, snapped.mesh, snapped.n_triangles, positions, sink, pixels, depth, n_threads, is_near=is_near
     ):
-        check_triangles(snapped.triangles, snapped.corners, snapped.n_vertices)
+        snapped.check_indices()
     view.mark("draw")
 
 
@@ -263,7 +263,7 @@ def draw_fragments(
         frags = draw_clustered_fragments(memory, clusters, view, sink, background_depth, ids_out, depth_out)
         if frags is not None:
             return frags
-    snapped = snap_scene(memory, vertices, triangles, view, with_depth=True, out=out)
+    snapped = snap_mesh(memory, vertices, triangles, view, with_depth=True, out=out)
     sink = choices.fragment_sink(test, has_depth=snapped.has_depth)
     if not snapped.has_depth:
         background_depth = -np.inf if test is DepthTest.GREATER and background_depth is None else background_depth
@@ -274,12 +274,12 @@ def draw_fragments(
         with canvas_of(memory, "triangle", ids_out, shape, np.int32) as (ids, canvas):
             draw(memory, snapped, view, Sink.LABEL, canvas)
         ground = np.inf if background_depth is None else background_depth
-        return Fragments(ids, ground, snapped.scene, snapped.n_vertices, snapped.n_triangles)
+        return Fragments(ids, ground, snapped.mesh, snapped.n_vertices, snapped.n_triangles)
     with (
         canvas_of(memory, "triangle", ids_out, shape, np.int32) as (ids, ids_canvas),
         canvas_of(memory, "depth", depth_out, shape, np.float32) as (depth, depth_canvas),
     ):
-        flat_depth = choices.flat_depth(snapped.scene, snapped.inputs, view, has_depth=snapped.has_depth)
+        flat_depth = choices.flat_depth(snapped, view)
         if flat_depth is not None:
             background = background_depth
             if background is None:
@@ -291,7 +291,7 @@ def draw_fragments(
             draw(memory, snapped, view, sink, ids_canvas, depth=depth_canvas)
             if background_depth is not None:
                 depth_canvas[ids_canvas < 0] = background_depth
-    return Fragments(ids, depth, snapped.scene, snapped.n_vertices, snapped.n_triangles)
+    return Fragments(ids, depth, snapped.mesh, snapped.n_vertices, snapped.n_triangles)
 
 
 def draw_clustered_fragments(
@@ -307,11 +307,11 @@ def draw_clustered_fragments(
 
     None where drawing them does not pay, or where only that can tell what is wrong.
     """
-    if not clusters.patience.is_over():
+    if not clusters.backoff.is_over():
         return None
-    seen = ClusteredScene(clusters, view)
+    seen = ClusteredMesh(clusters, view)
     pays = choices.pays_to_draw_clusters(view, clusters.n_triangles, seen.survey)
-    clusters.patience.note(pays=pays)
+    clusters.backoff.note(pays=pays)
     if not pays:
         return None
     shape = view.size[::-1]

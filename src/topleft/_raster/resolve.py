@@ -57,7 +57,7 @@ def resolve_flat(
 
 def resolve_gouraud(
     memory: Memory,
-    scenes: list[_engine.Scene],
+    meshes: list[_engine.SnappedMesh],
     labels: NDArray[np.int32],
     colors: NDArray[Any],
     pixels: NDArray[Any],
@@ -71,9 +71,9 @@ def resolve_gouraud(
 
     def resolve_rows(first: int, end: int) -> None:
         painted[:, first:end] = pixels[first:end]
-        for scene, own, picture in zip(scenes, labels, painted, strict=True):
+        for mesh, own, picture in zip(meshes, labels, painted, strict=True):
             flat = _engine.as_bytes(picture)
-            scene.paint(own, palette, flat, first, end - first, False, colors.dtype == np.uint8, n_channels)
+            mesh.paint(own, palette, flat, first, end - first, False, colors.dtype == np.uint8, n_channels)
         _engine.mean_colors(painted, pixels, first, end - first, n_channels, transfer)
 
     run_parts(resolve_rows, labels.shape[1], n_threads)

@@ -16,7 +16,7 @@ from topleft import _engine
 from topleft._base.memory import KeptMemory
 from topleft._model.scene import Scene
 from topleft._raster import choices
-from topleft._raster.cluster_draw import ClusteredScene, draw_clustered
+from topleft._raster.cluster_draw import ClusteredMesh, draw_clustered
 from topleft._raster.clusters import Survey
 from topleft._raster.view import View
 
@@ -57,13 +57,13 @@ def front_to_back(scene: Scene, clip_from_world: NDArray[np.float64]) -> NDArray
 def pays_to_draw(placed: PlacedScene, clip_from_world: NDArray[np.float64], view: View) -> bool:
     """Tell whether a scene whose meshes are in clusters is drawn from these."""
     scene = placed.scene
-    if not scene.patience.is_over():
+    if not scene.backoff.is_over():
         return False
     n_triangles = scene.n_triangles // len(scene)
     pays = choices.pays_to_draw_instances(
         view, n_triangles, lambda: survey_instances(placed), lambda: count_layers(scene, clip_from_world)
     )
-    scene.patience.note(pays=pays)
+    scene.backoff.note(pays=pays)
     return pays
 
 
@@ -71,7 +71,7 @@ def survey_instances(placed: PlacedScene) -> Survey:
     """Return what becomes of the clusters of a scene, by some of its instances."""
     some = range(0, len(placed.scene), -(-len(placed.scene) // SURVEYED_INSTANCES))
     weights = [placed.scene[i].mesh.triangles.shape[0] for i in some]
-    surveys = [ClusteredScene(*placed.clustered(i)).survey(SURVEYED_OF_EACH) for i in some]
+    surveys = [ClusteredMesh(*placed.clustered(i)).survey(SURVEYED_OF_EACH) for i in some]
     return Survey(*np.average(surveys, axis=0, weights=weights).tolist())
 
 
@@ -101,7 +101,7 @@ def draw_placed(
     n_threads: int,
 ) -> bool:
     """Clear targets, one a sample, and draw what each sees; returns as `draw_clustered` does."""
-    scenes = [ClusteredScene(*placed.clustered(i)) for i in order.tolist()]
+    scenes = [ClusteredMesh(*placed.clustered(i)) for i in order.tolist()]
     memories = [KeptMemory() for _ in range(n_threads)]
     seen = zip(targets, positions, strict=True)
     return all(draw_clustered(memories, scenes, target, height, at) for target, at in seen)

@@ -19,12 +19,12 @@ from topleft._base.threads import count_threads, run_parts
 from topleft._model.scene import Scene
 from topleft._raster import choices
 from topleft._raster.classic import refuse_classic
-from topleft._raster.cluster_draw import ClusteredScene
+from topleft._raster.cluster_draw import ClusteredMesh
 from topleft._raster.clusters import Clusters
-from topleft._raster.peel import check_peel, peel_scenes
+from topleft._raster.peel import check_peel, peel_meshes
 from topleft._raster.rasterize import canvas_of, refuse_many
 from topleft._raster.sampling import sample_positions, sum_areas
-from topleft._raster.snap import Snapped, snap_scene
+from topleft._raster.snap import Snapped, snap_mesh
 from topleft._raster.view import View
 from topleft._render.scene_clusters import draw_placed, front_to_back, pays_to_draw, wants_clusters
 from topleft._render.scene_fragments import SceneDepthLayers, SceneFragments
@@ -71,15 +71,15 @@ class PlacedScene:
         """Return an instance, snapped; in shared buffers it draws its own range of ids."""
         mesh = self.scene[i].mesh
         view, with_depth = self._view_of(i), self._with_depth
-        snapped = snap_scene(FRESH, mesh.vertices, mesh.triangles, view, with_depth=with_depth, out=None)
-        return replace(snapped, scene=snapped.scene.numbered_from(int(self.first_ids[i])))
+        snapped = snap_mesh(FRESH, mesh.vertices, mesh.triangles, view, with_depth=with_depth, out=None)
+        return replace(snapped, mesh=snapped.mesh.numbered_from(int(self.first_ids[i])))
 
-    def snap_part(self, i: int, triangles: NDArray[np.int32]) -> _engine.Scene:
+    def snap_part(self, i: int, triangles: NDArray[np.int32]) -> _engine.SnappedMesh:
         """Return what some triangles of an instance need, snapped: all of it, unless its mesh is drawn in clusters."""
         can_cluster = self._may_cluster and choices.can_cluster(self._view, Sink.NEAREST)
         if can_cluster and self.scene[i].mesh.has_clusters:
-            return ClusteredScene(*self.clustered(i)).part(triangles)
-        return self.snap(i).scene
+            return ClusteredMesh(*self.clustered(i)).part(triangles)
+        return self.snap(i).mesh
 
     def _view_of(self, i: int) -> View:
         instance, view = self.scene[i], self._view
@@ -116,13 +116,13 @@ class PlacedScene:
         for chunk in self.chunks():
             n_left -= len(chunk)
             for target, at in zip(targets, positions, strict=True):
-                scenes = [snapped.scene.seen_from(*at) for snapped in chunk]
+                scenes = [snapped.mesh.seen_from(*at) for snapped in chunk]
                 run_parts(rows_of(scenes, target, is_first=is_first, is_last=n_left == 0), height, n_parts)
             is_first = False
 
 
 def rows_of(
-    scenes: list[_engine.Scene], target: _engine.Target, *, is_first: bool, is_last: bool
+    scenes: list[_engine.SnappedMesh], target: _engine.Target, *, is_first: bool, is_last: bool
 ) -> Callable[[int, int], None]:
     """Return what draws rows [first, end) of several scenes into one target, which the first of all clears."""
 
@@ -177,7 +177,7 @@ def peel_scene(
     n, is_farthest = check_peel(view, layers, depth_test)
     placed = PlacedScene(scene, clip_from_world, view, with_depth=True)
     snapped = [placed.snap(i) for i in range(len(scene))]  # a band of rows is drawn once, with all instances
-    return SceneDepthLayers(*peel_scenes(SCRATCH, snapped, view, n, is_farthest=is_farthest), placed)
+    return SceneDepthLayers(*peel_meshes(SCRATCH, snapped, view, n, is_farthest=is_farthest), placed)
 
 
 def draw_scene_coverage(
@@ -212,6 +212,6 @@ def add_areas(placed: PlacedScene, view: View, canvas: NDArray[np.float32]) -> N
     for chunk in placed.chunks():
         for snapped in chunk:
             n_threads = count_threads(view.threads, snapped.n_triangles)
-            sum_areas(SCRATCH, snapped.scene, own, n_threads, is_clamped=True)
+            sum_areas(SCRATCH, snapped.mesh, own, n_threads, is_clamped=True)
             canvas += own
     np.minimum(canvas, 1, out=canvas)

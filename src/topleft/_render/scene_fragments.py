@@ -44,7 +44,7 @@ class Placed(Protocol):
     def snap(self, i: int) -> Snapped:
         """Return an instance, snapped."""
 
-    def snap_part(self, i: int, triangles: NDArray[np.int32]) -> _engine.Scene:
+    def snap_part(self, i: int, triangles: NDArray[np.int32]) -> _engine.SnappedMesh:
         """Return what some triangles of an instance need, snapped; maybe all of it."""
 
 
@@ -312,7 +312,7 @@ class BentFragments(Fragments):
         n_vertices: int,
     ) -> None:
         wholes = np.append(source, -1).astype(np.int32)  # part -1, none, is the last
-        super().__init__(wholes[parts.triangle], parts.depth, parts._scene, n_vertices, len(triangles))
+        super().__init__(wholes[parts.triangle], parts.depth, parts._snapped, n_vertices, len(triangles))
         self._samples = tuple(
             BentFragments(sample, drawn, source, weights, triangles, n_vertices) for sample in parts._samples
         )

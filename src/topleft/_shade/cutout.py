@@ -84,32 +84,34 @@ def cut_out(
     n_threads = count_threads(parse_threads(threads), len(mesh.triangles))
     for k in range(frags.samples_triangle.shape[-1]):
         sample = frags.sample(k)
-        scene = sample._scene_with(np.arange(len(mesh.triangles), dtype=np.int32))  # all are drawn anew
+        scene = sample._snapped_with(np.arange(len(mesh.triangles), dtype=np.int32))  # all are drawn anew
         ids, depth = sample.triangle, sample.depth
         look = look_of(scene, mesh, camera, ids.shape[::-1], cut)
 
         def cut_rows(
-            first: int, end: int, scene: _engine.Scene = scene, look: Look = look, ids: I32 = ids, depth: F32 = depth
+            first: int, end: int, scene: _engine.SnappedMesh = scene, look: Look = look, ids: I32 = ids,
+            depth: F32 = depth,
         ) -> None:
-            _engine.cut_out(scene, scene.view, look.shading, opaque, triangles, ids, depth, first, end - first)
+            _engine.cut_out(scene, look.shading, opaque, triangles, ids, depth, first, end - first)
 
         run_parts(cut_rows, len(ids), n_threads)
 
 
 def draw_cut(
-    scene: _engine.Scene, mesh: Mesh, camera: Camera, cut: Cut, ids: I32, depth: F32, *, is_peeled: bool, n_threads: int
+    scene: _engine.SnappedMesh, mesh: Mesh, camera: Camera, cut: Cut, ids: I32, depth: F32,
+    *, is_peeled: bool, n_threads: int,
 ) -> None:
     """Draw the triangles with holes over the planes of a visibility buffer (1, H, W), or of layers (K, H, W)."""
     triangles = cut.triangles
     look = look_of(scene, mesh, camera, ids.shape[:0:-1], cut)
 
     def draw_rows(first: int, end: int) -> None:
-        _engine.cut_out_over(scene, scene.view, look.shading, triangles, ids, depth, is_peeled, first, end - first)
+        _engine.cut_out_over(scene, look.shading, triangles, ids, depth, is_peeled, first, end - first)
 
     run_parts(draw_rows, ids.shape[1], n_threads)
 
 
-def look_of(scene: _engine.Scene, mesh: Mesh, camera: Camera, size: tuple[int, ...], cut: Cut) -> Look:
+def look_of(scene: _engine.SnappedMesh, mesh: Mesh, camera: Camera, size: tuple[int, ...], cut: Cut) -> Look:
     """What the kernel reads of materials with holes."""
     look = Look(scene, mesh, camera, (size[0], size[1]), cut.rows, is_flat=False)
     look.set_materials(mesh, cut.materials, is_unlit=True)

@@ -1,6 +1,6 @@
 """Looks: materials, lights and a camera as numbers for the shading kernels.
 
-Input: a mesh, its materials, lights and a camera. Output: `Look`, which fills `_engine.Shading`.
+Input: a mesh, its materials, lights and a camera. Output: `Look`, which fills `_engine.ShadingTable`.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class Look:
 
     def __init__(
         self,
-        scene: _engine.Scene,
+        scene: _engine.SnappedMesh,
         mesh: Mesh,
         camera: Camera,
         size: tuple[int, int],
@@ -44,17 +44,17 @@ class Look:
     ) -> None:
         in_eye_space = not is_similarity(camera.view)
         self.surface = Surface(mesh, camera.view) if in_eye_space else surface_of(mesh)
-        viewport = size if scene.view is None else scene.view.viewport
+        viewport = size if scene.viewport is None else scene.viewport.size
         self.frame = frame_of(camera, viewport, self.surface.center, in_eye_space=in_eye_space)
         self.view = camera.view
         self.back_side = -1.0 if np.linalg.det(camera.view[:3, :3]) > 0 else 1.0
         self.is_in_eye_space = in_eye_space
         self.uv = mesh.uv
         normals = self.surface.normals
-        if scene.view is not None and self.frame.has_perspective:
+        if scene.viewport is not None and self.frame.has_perspective:
             normals = np.empty_like(normals)
             _engine.set_inverse_w(scene, self.surface.normals, normals)
-        self.shading = _engine.Shading(
+        self.shading = _engine.ShadingTable(
             normals,
             self.surface.face_normals if is_flat else None,
             self.surface.positions,

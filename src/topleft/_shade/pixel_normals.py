@@ -44,13 +44,13 @@ def shade_normals(
     if not len(mesh.triangles) or 0 in ids.shape:
         return np.zeros((*ids.shape, 3), np.float32)
     out = np.empty((*ids.shape, 3), np.float32)
-    scene = frags._scene
+    scene = frags._snapped
     look = Look(scene, mesh, camera, ids.shape[::-1], None, is_flat=False)
     look.set_turn(SHOW_NORMALS, turn)
     n_threads = count_threads(parse_threads(threads), len(mesh.triangles))
 
     def shade_rows(first: int, end: int) -> None:
-        _engine.shade_normals(scene, scene.view, look.shading, ids, out, first, end - first)
+        _engine.shade_normals(scene, look.shading, ids, out, first, end - first)
 
     run_parts(shade_rows, len(ids), n_threads)
     return out

@@ -152,7 +152,7 @@ def shade(
 
         return number_one(frags) if n_samples == 1 else shade_samples(frags, number_one, behind)
     picture = np.empty((*frags.triangle.shape, 4), dtype=np.uint8)
-    scene = frags._scene
+    scene = frags._snapped
     plain = Material(own_color if mesh.colors is None else None)
     own = (material,) if material is not None else mesh.materials or (plain,)
     rows = mesh.material_of_triangle if own is mesh.materials and len(own) > 1 else None
@@ -170,9 +170,9 @@ def shade(
     def shade_rows(first: int, end: int) -> None:
         part = picture, first, end - first
         if positions is None:
-            _engine.shade(scene, scene.view, look.shading, ids[0], depth[0], *part)
+            _engine.shade(scene, look.shading, ids[0], depth[0], *part)
         else:
-            _engine.shade_samples(scene, scene.view, look.shading, positions, ids, depth, *part)
+            _engine.shade_samples(scene, look.shading, positions, ids, depth, *part)
 
     run_parts(shade_rows, len(picture), n_threads)
     return picture
