@@ -193,7 +193,7 @@ def drawing_shares(scene: Scene) -> Draw:
     def draw_shares() -> Picture:
         snapped = snap_mesh(memory, *scene.arrays, view, with_depth=False, out=None)
         shares = memory.empty("share", scene.size[::-1], np.float32)
-        draw(memory, snapped, view, Sink.SAMPLES, shares)
+        draw(memory, snapped, view, choices.drawing(view, snapped, Sink.SAMPLES), shares)
         return (shares,)
 
     return draw_shares
@@ -210,7 +210,8 @@ def drawing_every_sample(scene: Scene) -> Draw:
         count, mask = memory.empty("count", shape, np.uint8), memory.empty("mask", shape, np.bool_)
         count.fill(0)
         for x, y in sample_positions(n, view.grid_bits).tolist():
-            draw(memory, replace(snapped, mesh=snapped.mesh.seen_from(x, y)), one, Sink.MASK, mask)
+            seen = replace(snapped, mesh=snapped.mesh.seen_from(x, y))
+            draw(memory, seen, one, choices.drawing(one, seen, Sink.MASK), mask)
             np.add(count, mask.view(np.uint8), out=count)
         return (np.multiply(count, np.float32(1 / n), out=memory.empty("share", shape, np.float32)),)
 

@@ -20,6 +20,7 @@ from topleft._base.options import Per, Sink, parse
 from topleft._base.threads import count_threads, run_parts
 from topleft._field.grid import Extent, Grid, grid_around
 from topleft._model.adapt import MeshLike, Surface, as_surface
+from topleft._raster.choices import drawing
 from topleft._raster.rasterize import canvas_of, draw
 from topleft._raster.snap import snap_mesh
 from topleft._raster.view import View
@@ -238,7 +239,7 @@ def _visible(points: F64, triangles: I32, view: View, sink: Sink) -> I32:
     snapped = snap_mesh(SCRATCH, points, triangles, view, with_depth=sink is not Sink.LABEL, out=None)
     ids: I32 = SCRATCH.empty("labels", view.size[::-1], np.int32)
     depth = None if sink is Sink.LABEL else SCRATCH.empty("depth of heights", ids.shape, np.float32)
-    draw(SCRATCH, snapped, view, sink, ids, depth=depth)
+    draw(SCRATCH, snapped, view, drawing(view, snapped, sink), ids, depth=depth)
     return ids
 
 

@@ -22,6 +22,7 @@ from topleft._base.memory import KeptMemory, allocate
 from topleft._base.options import Sink
 from topleft._base.threads import available_threads, run_parts
 from topleft._plan.costs import FEATURES, Costs, features
+from topleft._raster import choices
 from topleft._raster.rasterize import draw
 from topleft._raster.sampling import sample_positions, sum_areas
 from topleft._raster.snap import Snapped, snap_mesh
@@ -141,7 +142,7 @@ def drawing(memory: KeptMemory, snapped: Snapped, view: View, group: str, sink: 
     dtype = {"mask": np.bool_, "samples": np.float32}.get(group, np.int32)
     pixels = memory.empty("pixels", shape, dtype)
     depth = memory.empty("depth", shape, np.float32) if group == "depth" else None
-    return lambda: draw(memory, snapped, view, sink, pixels, depth=depth)
+    return lambda: draw(memory, snapped, view, choices.drawing(view, snapped, sink), pixels, depth=depth)
 
 
 def fit(samples: list[Sample]) -> dict[str, float]:

@@ -114,10 +114,10 @@ def find_facts(
     xy = snapped.records.view(np.int32).reshape(-1, 4)[:, :2]
     is_special = xy[:, 0] == np.iinfo(np.int32).min
     sink = find_sink(verb, view, test, has_depth=snapped.has_depth)
-    flat = None
-    if with_depth and view.sampling is Sampling.CENTER and 0 not in view.size:
-        flat = choices.flat_depth(snapped, view)
     common = choices.common_depth(points, has_depth=snapped.has_depth, is_clip_space=source.is_clip_space)
+    flat = None
+    if with_depth and view.sampling is Sampling.CENTER and 0 not in view.size and choices.is_flat(snapped, view):
+        flat = common
     drawn_sink = sink if flat is None else Sink.LABEL
     samples = sample_positions(view.sampling.n_samples, view.grid_bits) if sink is Sink.SAMPLES else None
     census = [(0, 0.0, 0.0)] * len(CLASSES)

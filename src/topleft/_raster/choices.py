@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from enum import Enum
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,14 +24,18 @@ if TYPE_CHECKING:
     from topleft._raster.snap import Snapped
 
 __all__ = [
+    "Drawing",
+    "Route",
     "can_cluster",
     "can_share",
     "common_depth",
+    "drawing",
     "earlier_wins",
-    "flat_depth",
+    "first_depth",
     "fragment_sink",
     "is_affine",
     "is_direct",
+    "is_flat",
     "is_shared",
     "must_cut",
     "pays_to_cluster",
@@ -38,6 +43,7 @@ __all__ = [
     "pays_to_draw_instances",
     "pays_to_snap_all",
     "pays_without_depth",
+    "route",
     "threads_to_convert",
     "threads_to_draw",
     "threads_to_snap",
@@ -229,8 +235,15 @@ def common_depth(points: NDArray[Any], *, has_depth: bool, is_clip_space: bool) 
     first = z[0]
     if not (z[len(z) // 2] == first and z[-1] == first) or not (z == first).all():
         return None
+    return first_depth(points, has_depth=True)
+
+
+def first_depth(points: NDArray[Any], *, has_depth: bool) -> float:
+    """Return the depth of the first vertex as a depth buffer holds it."""
+    if not has_depth:
+        return 0.0
     with np.errstate(over="ignore"):  # what float32 cannot hold has been refused if a triangle uses it
-        return float(np.float32(first)) + 0.0  # -0 becomes 0, as it does in every depth buffer
+        return float(np.float32(points[0, 2])) + 0.0  # -0 becomes 0, as it does in every depth buffer
 
 
 def pays_without_depth(snapped: Snapped, view: View) -> bool:
@@ -243,12 +256,50 @@ def pays_without_depth(snapped: Snapped, view: View) -> bool:
     return compared_ns > FLAT_CALL_NS + FLAT_PIXEL_NS * n_pixels
 
 
-def flat_depth(snapped: Snapped, view: View) -> float | None:
-    """Return the depth of all triangles if samples need neither compare nor store it, and leaving that out pays."""
+def is_flat(snapped: Snapped, view: View) -> bool:
+    """Tell whether all triangles lie at one depth, so that samples need not compare it, and leaving that out pays."""
     is_clip_space = snapped.source.is_clip_space
     if is_clip_space or not pays_without_depth(snapped, view):
-        return None
-    return common_depth(snapped.points, has_depth=snapped.has_depth, is_clip_space=is_clip_space)
+        return False
+    return common_depth(snapped.points, has_depth=snapped.has_depth, is_clip_space=is_clip_space) is not None
+
+
+class Drawing(NamedTuple):
+    """What becomes of a covered sample, and how threads share the work."""
+
+    sink: Sink
+    n_threads: int
+    is_shared: bool  # each thread takes a share of the triangles; otherwise all of them, in its own rows
+
+
+def drawing(view: View, snapped: Snapped, sink: Sink) -> Drawing:
+    """Return how a mesh is drawn."""
+    n_threads = threads_to_draw(view, snapped, sink)
+    return Drawing(sink, n_threads, is_shared(view, snapped.n_triangles, n_threads, sink))
+
+
+class Route(Enum):
+    """How `rasterize` draws a mesh: `rasterize.ROUTES` has a function for each."""
+
+    LABELS = "ids alone"
+    FLAT = "ids alone, then the one depth wherever there is one"
+    DEPTH = "ids and depth"
+    SAMPLES = "ids and depth of each sample"
+
+
+def route(view: View, snapped: Snapped, test: DepthTest | None, *, wants_depth: bool) -> tuple[Route, Drawing]:
+    """Return how `rasterize` draws a mesh; `wants_depth`: into an array of the caller's."""
+    has_depth = snapped.has_depth
+    sink = fragment_sink(test, has_depth=has_depth)
+    if view.sampling.n_samples > 1:
+        found = Route.SAMPLES
+    elif not has_depth and not wants_depth:
+        found, sink = Route.LABELS, Sink.LABEL
+    elif is_flat(snapped, view):
+        found, sink = Route.FLAT, Sink.LABEL
+    else:
+        found = Route.DEPTH
+    return found, drawing(view, snapped, sink)
 
 
 def earlier_wins(test: DepthTest | None, *, has_depth: bool) -> bool:

@@ -161,14 +161,15 @@ def paint(
     """Draw coloured triangles over contiguous pixels: first which triangle shows in each, then its colour."""
     width, height = view.size
     labels = memory.empty("labels", (height, width), np.int32)
-    draw(memory, snapped, view, Sink.LABEL, labels)
+    drawing = choices.drawing(view, snapped, Sink.LABEL)
+    draw(memory, snapped, view, drawing, labels)
     palette, flat = _engine.as_bytes(colors), _engine.as_bytes(pixels)
     n_channels = 1 if colors.ndim == 1 else colors.shape[1]
 
     def paint_rows(first: int, end: int) -> None:
         snapped.mesh.paint(labels, palette, flat, first, end - first, is_flat, colors.dtype == np.uint8, n_channels)
 
-    run_parts(paint_rows, height, choices.threads_to_draw(view, snapped, Sink.LABEL))
+    run_parts(paint_rows, height, drawing.n_threads)
 
 
 def paint_samples(
@@ -184,7 +185,8 @@ def paint_samples(
     """Draw coloured triangles over contiguous pixels, each pixel the mean of its samples."""
     width, height = view.size
     positions = sample_positions(view.sampling.n_samples, view.grid_bits)
-    n_threads = choices.threads_to_draw(view, snapped, Sink.LABEL)
+    drawing = choices.drawing(view, snapped, Sink.LABEL)
+    n_threads = drawing.n_threads
     if is_flat and choices.can_share(view):
         palette = _engine.Palette(colors, transfer)
         if draw_means(memory, snapped.mesh, snapped.n_triangles, positions, palette, pixels, n_threads):
@@ -192,7 +194,7 @@ def paint_samples(
         view.mark("draw")
         return
     labels: NDArray[np.int32] = memory.empty("sample labels", (len(positions), height, width), np.int32)
-    draw_all_samples(memory, snapped, view, positions, Sink.LABEL, labels, None)
+    draw_all_samples(memory, snapped, view, positions, drawing, labels, None)
     if is_flat:
         resolve_flat(labels, colors, pixels, transfer, n_threads)
         return
