@@ -14,7 +14,7 @@ from topleft import _engine, scenes
 from topleft._base.memory import KeptMemory
 from topleft._raster.snap import snap_mesh
 from topleft._raster.view import View
-from topleft.methods import reference_area as ref
+from topleft.methods.reference import area as ref
 
 UNIT = 2.0**-24
 SIDE = 12

@@ -14,7 +14,7 @@ from topleft._base.memory import FreshMemory
 from topleft._raster import lines
 from topleft._raster.rasterize import snap_mesh
 from topleft._raster.view import View
-from topleft.methods import reference_lines as ref
+from topleft.methods.reference import lines as ref
 
 TRIANGLE = [[0.5, 0.5], [4.5, 0.5], [0.5, 4.5]]
 ONE = [[0, 1, 2]]

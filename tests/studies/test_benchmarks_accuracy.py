@@ -18,7 +18,8 @@ from benchmarks.stability import CHANGES, count_flips, touch
 
 import topleft as tl
 from topleft import scenes
-from topleft.methods import reference, reference_area
+from topleft.methods import reference
+from topleft.methods.reference import area as reference_area
 
 ROOT = Path(__file__).parents[2]
 
