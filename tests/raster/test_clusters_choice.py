@@ -9,9 +9,9 @@ from topleft._raster import choices
 from topleft._raster.cluster_draw import ClusteredMesh
 from topleft._raster.clusters import Backoff, Clusters, Survey
 from topleft._raster.view import View
-from topleft._render import scene_clusters
-from topleft._render.scene_clusters import count_layers, survey_instances
-from topleft._render.scene_draw import PlacedScene
+from topleft._render import instances
+from topleft._render.instances import PlacedScene, count_layers, survey_instances
+from topleft._render.through_lens import scene_through
 
 SIZE = (160, 120)
 CAMERA = tl.Camera.look_at((0, 0, 3), near=0.01, far=100.0)
@@ -96,11 +96,11 @@ def test_box_about_the_eye_is_no_layer():
 
 def test_survey_of_instances_weighs_them_by_their_triangles():
     scene = standing([(0, 0, 0), (500, 0, 0)], tl.Mesh(*FINE))
-    placed = PlacedScene(scene, CAMERA.clip_from_world(SIZE), View.parse(SIZE, {}), with_depth=True)
+    placed = PlacedScene(scene_through(scene, CAMERA, SIZE), View.parse(SIZE, {}), with_depth=True)
     assert survey_instances(placed).outside == 0.5
     small = tl.Mesh(*as_floats(*tl.scenes.blob(100_000)))
     both = tl.Scene([*scene[:1], (small, scene[1].transform)])
-    placed = PlacedScene(both, CAMERA.clip_from_world(SIZE), View.parse(SIZE, {}), with_depth=True)
+    placed = PlacedScene(scene_through(both, CAMERA, SIZE), View.parse(SIZE, {}), with_depth=True)
     share = len(small.triangles) / both.n_triangles
     assert survey_instances(placed).outside == pytest.approx(share, abs=1e-12)  # a quotient of sums of doubles
 
@@ -125,8 +125,8 @@ def test_instances_are_drawn_from_clusters_where_enough_is_left_out(view, outsid
 def test_scene_asks_before_it_draws_clusters(monkeypatch):
     scene = standing([(0, 0, -3.0 * k) for k in range(16)], tl.Mesh(*as_floats(*tl.scenes.blob(10_000))))
     drawn = []
-    draw = scene_clusters.draw_clustered
-    monkeypatch.setattr(scene_clusters, "draw_clustered", lambda *a, **k: drawn.append(1) or draw(*a, **k))
+    draw = instances.draw_clustered
+    monkeypatch.setattr(instances, "draw_clustered", lambda *a, **k: drawn.append(1) or draw(*a, **k))
     camera = tl.Camera.look_at((0, 0, 30), ortho_height=4.0, near=1.0, far=100.0)
     for layers, n_drawn in ((3.0, 1), (100.0, 0)):
         drawn.clear()

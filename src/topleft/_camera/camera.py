@@ -13,35 +13,30 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._camera.lens import Lens, lens_of_opencv
-from topleft._camera.poses import (
+from topleft._camera.matrices import (
+    F64,
     FRAMING_MARGIN,
     THREE_QUARTER_DEG,
-    bounding_sphere,
-    box_corners,
-    distance_to_fit,
-    orbit_view,
-    points_to_frame,
-    view_matrix,
-)
-from topleft._camera.projections import (
-    F64,
     as_square,
     as_vector,
+    bounding_sphere,
+    box_corners,
     box_matrix,
     check_fov,
     check_planes,
     check_positive,
     check_regular,
+    distance_to_fit,
     frustum_matrix,
+    orbit_view,
     orthographic_matrix,
     perspective_matrix,
+    points_to_frame,
+    view_matrix,
 )
 from topleft._model.adapt import MeshLike
 
-__all__ = [
-    "DEFAULT_FOV_Y_DEG", "THREE_QUARTER_DEG", "Camera", "bounding_sphere", "orbit_view", "perspective_matrix",
-    "view_matrix",
-]  # fmt: skip
+__all__ = ["DEFAULT_FOV_Y_DEG", "Camera"]
 
 DEFAULT_FOV_Y_DEG = 40.0
 
@@ -122,7 +117,7 @@ class Camera:
 
     def straightened(self) -> Camera:
         """The same camera without its lens."""
-        return replace(self, lens=None)
+        return self if self.lens is None else replace(self, lens=None)
 
     def project(self, points: npt.ArrayLike, size: tuple[int, int]) -> F64:
         """Where world points lie in a picture.

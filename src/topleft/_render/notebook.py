@@ -1,4 +1,4 @@
-"""What a result shows of itself in a notebook: a mesh its picture, a visibility buffer its triangles.
+"""Makes the picture that a mesh or a visibility buffer shows of itself in a notebook.
 
 Input: `Mesh`, `Fragments`. Output: PNG as bytes, which their `_repr_png_` returns. Arrays stay plain arrays;
 docs/design/fields.md tells why.
@@ -13,10 +13,10 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image
 
+from topleft._base.color import id_colors
 from topleft._model.mesh import Mesh
 from topleft._raster.fragments import Fragments
 from topleft._render.render import render
-from topleft._shade.shade import id_colors
 
 MESH_SIZE = (480, 360)
 MAX_SIDE_PX = 1024

@@ -1,4 +1,4 @@
-"""Rendering: a mesh or scene and a camera to a picture, in one call.
+"""Renders: a mesh or scene and a camera to a picture, in one call.
 
 Input: `Mesh` or `Scene`, `Camera`. Output: the picture (H, W, 4) uint8 of `render`, or the visibility buffer of
 `rasterize_mesh`.
@@ -7,17 +7,16 @@ Input: `Mesh` or `Scene`, `Camera`. Output: the picture (H, W, 4) uint8 of `rend
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, NamedTuple, Unpack
+from typing import Any, Unpack
 
 import numpy as np
 import numpy.typing as npt
 from numpy.typing import ArrayLike, NDArray
 
-from topleft._base.color import DEFAULT_COLOR, as_color
+from topleft._base.color import DEFAULT_COLOR
 from topleft._camera.camera import Camera
 from topleft._lod.detail import detailed
 from topleft._model.adapt import MeshLike, as_mesh
-from topleft._model.material import Material
 from topleft._model.mesh import Mesh
 from topleft._model.scene import Instance, Scene
 from topleft._raster import choices
@@ -25,15 +24,12 @@ from topleft._raster.clusters import Clusters
 from topleft._raster.fragments import Fragments
 from topleft._raster.verbs import Rasterizer, rasterize, wireframe
 from topleft._raster.view import View
-from topleft._render.bend import BentMesh, bend
-from topleft._render.scene_cutout import cut_out_scene
-from topleft._render.scene_fragments import BentFragments
-from topleft._render.scene_lens import draw_seen
-from topleft._render.scene_render import camera_of, cull_of, shade_scene
-from topleft._shade.cutout import cut_out
-from topleft._shade.eye import distances
-from topleft._shade.multisample import shade_samples
-from topleft._shade.shade import LookOptions, Shading, shade
+from topleft._render.fragments import BentFragments, camera_of, scene_of
+from topleft._render.holes import without_holes
+from topleft._render.instances import draw_scene
+from topleft._render.scene_shade import shade
+from topleft._render.through_lens import seen_through
+from topleft._shade.shade import LookOptions
 
 DEFAULT_SIZE = (640, 480)
 WHITE = (255, 255, 255, 255)
@@ -67,7 +63,7 @@ def render(
     size : (width, height), pixels
         640 x 480 unless given.
     shading : {"smooth", "flat", "unlit", "matcap", "ids", "depth", "normals"}
-        What the colours tell; `topleft.shade.shade` describes each.
+        What the colours tell; `topleft.shade` describes each.
     color : (3,) of 0 to 255
         sRGB colour of a mesh without colours.
     background : (3,) or (4,) of 0 to 255
@@ -88,7 +84,7 @@ def render(
     rasterizer : Rasterizer, optional
         Of this size: what is needed on the way lies in the memory that it keeps.
     **look
-        `lights`, `ambient`, `material`, `matcap` and `fog` of `topleft.shade.shade`.
+        `lights`, `ambient`, `material`, `matcap` and `fog` of `topleft.shade`.
 
     Returns
     -------
@@ -109,80 +105,49 @@ def render(
     >>> tl.render(mesh, size=(64, 48), background=(0, 0, 0, 0))[24, 32].tolist()[3]
     255
     """
-    mesh = mesh if isinstance(mesh, Scene) else as_mesh(mesh)
-    camera = default_camera(mesh, size) if camera is None else camera
-    mesh = detailed(mesh, camera, size, tolerance, cull=cull, material=look.get("material"))
-    frags = rasterize_mesh(mesh, camera, size, cull=cull, threads=threads, sampling=sampling, rasterizer=rasterizer)
+    subject, camera = subject_of(mesh, camera, size, tolerance, cull=cull, material=look.get("material"))
+    frags = rasterize_subject(
+        subject, camera, size, rasterizer, cull=cull, threads=threads, sampling=sampling
+    )
     return picture_of(
-        frags, mesh, camera, shading=shading, color=color, background=background, cull=cull, edges=edges,
+        frags, subject, camera, shading=shading, color=color, background=background, cull=cull, edges=edges,
         threads=threads, **look,
     )  # fmt: skip
 
 
+def subject_of(
+    mesh: MeshLike | Scene, camera: Camera | None, size: tuple[int, int], tolerance: float = 0.0, **options: Any
+) -> tuple[Mesh | Scene, Camera]:
+    """The mesh or scene as it is drawn within a tolerance, and who looks; options as for `choose_detail`."""
+    subject = mesh if isinstance(mesh, Scene) else as_mesh(mesh)
+    if camera is None:
+        width, height = size
+        framed = subject.extreme_points() if isinstance(subject, Scene) else subject
+        camera = Camera.framing(framed, aspect=width / height if width > 0 and height > 0 else 1.0)
+    return detailed(subject, camera, size, tolerance, **options), camera
+
+
 def picture_of(
     frags: Fragments,
-    mesh: Mesh | Scene,
+    subject: Mesh | Scene,
     camera: Camera,
     *,
-    shading: str = "smooth",
-    color: tuple[int, ...] = DEFAULT_COLOR,
-    background: tuple[int, ...] = WHITE,
     cull: str = "none",
     edges: bool = False,
     threads: int | None = None,
-    **look: Unpack[LookOptions],
+    background: tuple[int, ...] = WHITE,
+    **look: Any,
 ) -> npt.NDArray[np.uint8]:
     """The picture of the visibility buffer that `rasterize_mesh` returned; options as for `render`.
 
     What materials cut out is taken out of the buffer.
     """
-    options: dict[str, Any] = {"shading": shading, "color": color, "threads": threads, **look}
-    options["background"] = as_color("background", background, 4)
-    make = picture_of_scene if isinstance(mesh, Scene) else picture_of_mesh
-    picture = make(frags, mesh, camera, options)  # type: ignore[arg-type]
-    for instance in (mesh if isinstance(mesh, Scene) else [Instance(mesh)]) if edges else []:
+    frags = without_holes(frags, subject, camera, look.get("material"), threads=threads)
+    picture = shade(frags, subject, camera, background=background, threads=threads, **look)
+    for instance in scene_of(subject) if edges else ():
         own_camera, own_cull = camera_of(camera, instance), cull_of(cull, instance)
         draw_edges(picture, frags, instance.mesh, own_camera, cull=own_cull, threads=threads)
     return picture
-
-
-def picture_of_mesh(
-    frags: Fragments, mesh: Mesh, camera: Camera, options: dict[str, Any]
-) -> npt.NDArray[np.uint8]:
-    """The picture of a mesh's visibility buffer, without what its materials cut out; options as `shade` takes them."""
-    shown, surface, view = frags, mesh, camera
-    if isinstance(frags, BentFragments):  # the kernels read what was drawn, triangle by triangle
-        shown, surface, view = frags.parts, frags.mesh_of_parts(mesh), camera.straightened()
-    cut_out(shown, surface, view, options.get("material"), threads=options["threads"])
-    if isinstance(frags, BentFragments) and options["shading"] in (Shading.IDS, Shading.DEPTH):
-        shown, surface = frags.again(), mesh
-    return shade(shown, surface, view, **options)
-
-
-def without_holes(frags: Fragments, mesh: Mesh | Scene, camera: Camera, material: Material | None) -> Fragments:
-    """The visibility buffer without what materials (or this one) cut out; `frags` is changed."""
-    if isinstance(mesh, Scene):
-        return cut_out_scene(frags, mesh, camera, material)
-    if not isinstance(frags, BentFragments):
-        cut_out(frags, mesh, camera, material)
-        return frags
-    cut_out(frags.parts, frags.mesh_of_parts(mesh), camera.straightened(), material)
-    return frags.again()
-
-
-def picture_of_scene(
-    frags: Fragments, scene: Scene, camera: Camera, options: dict[str, Any]
-) -> npt.NDArray[np.uint8]:
-    """The picture of a scene's visibility buffer, without what materials cut out; options as `shade` takes them."""
-    frags = cut_out_scene(frags, scene, camera, options.get("material"), threads=options["threads"])
-    if options["shading"] == Shading.DEPTH:
-        options = {"depth_range": distances(frags, camera)} | options
-
-    def shade_one(sample: Fragments) -> npt.NDArray[np.uint8]:
-        return shade_scene(sample, scene, camera, **options)
-
-    has_samples = frags.samples_depth.shape[-1] > 1
-    return shade_samples(frags, shade_one, options["background"]) if has_samples else shade_one(frags)
 
 
 def rasterize_mesh(
@@ -221,44 +186,33 @@ def rasterize_mesh(
     ValueError
         If the mesh has no triangles and no camera is given, an option is unknown, or `rasterizer` has another size.
     """
-    mesh = mesh if isinstance(mesh, Scene) else as_mesh(mesh)
-    camera = default_camera(mesh, size) if camera is None else camera
     window = {"viewport": view.get("viewport"), "origin": view.get("origin", (0, 0))}
-    mesh = detailed(mesh, camera, size, tolerance, cull=cull, **window)
-    view |= {"cull": cull, "threads": threads}
-    if isinstance(mesh, Scene):
-        return draw_seen(mesh, camera, size, **view)
-    drawn = seen_through(mesh, camera, view.get("viewport") or size, near_clip=view.get("near_clip", True))
+    subject, camera = subject_of(mesh, camera, size, tolerance, cull=cull, **window)
+    return rasterize_subject(subject, camera, size, rasterizer, cull=cull, threads=threads, **view)
+
+
+def rasterize_subject(
+    subject: Mesh | Scene, camera: Camera, size: tuple[int, int], rasterizer: Rasterizer | None = None, **view: Any
+) -> Fragments:
+    """The visibility buffer of what `subject_of` returned; options as for `rasterize_mesh`."""
+    if isinstance(subject, Scene):
+        return draw_scene(subject, camera, size, **view)
+    drawn = seen_through(subject, camera, view.get("viewport") or size, near_clip=view.get("near_clip", True))
     view["transform"] = drawn.transform
     if rasterizer is not None and rasterizer.size != tuple(size):
         raise ValueError(f"rasterizer must have the size {tuple(size)}, got {rasterizer.size}")
     if drawn.bent is None:
-        view.setdefault("plan", StaticPlan(mesh))
+        view.setdefault("plan", StaticPlan(subject))
     if rasterizer is None:
         frags = rasterize(drawn.vertices, drawn.triangles, size, **view)
     else:
         frags = rasterizer.rasterize(drawn.vertices, drawn.triangles, **view)
-    if drawn.bent is None:
-        return frags
-    bent = drawn.bent
-    return BentFragments(frags, bent.triangles, bent.source, bent.weights, mesh.triangles, len(mesh.vertices))
+    return frags if drawn.bent is None else BentFragments(frags, drawn.bent, subject)
 
 
-class Drawn(NamedTuple):
-    """What the verbs draw of a mesh."""
-
-    vertices: npt.NDArray[Any]
-    triangles: npt.NDArray[np.integer[Any]]
-    transform: npt.NDArray[np.float64]
-    bent: BentMesh | None
-
-
-def seen_through(mesh: Mesh, camera: Camera, frame: tuple[int, int], *, near_clip: bool = True) -> Drawn:
-    """The mesh as it is, and the camera's matrix for a whole picture of this size; or as the camera's lens bends it."""
-    if camera.lens is None:
-        return Drawn(mesh.vertices, mesh.triangles, camera.clip_from_world(frame), None)
-    bent = bend(mesh.vertices, mesh.triangles, camera, camera.lens, frame, near_clip=near_clip)
-    return Drawn(bent.points_eye, bent.triangles, camera.clip_from_eye(frame), bent)
+def cull_of(cull: str, instance: Instance) -> str:
+    """What `cull` leaves out of an instance, whose winding is turned over where it is mirrored."""
+    return {"back": "front", "front": "back"}.get(cull, cull) if instance.is_mirrored else cull
 
 
 def draw_edges(
@@ -301,13 +255,6 @@ def depth_behind(depth: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
         slope = np.fmin(before, after)  # NaN: nothing on either side
         behind += np.where(np.isfinite(slope), slope, 0)
     return behind
-
-
-def default_camera(mesh: Mesh | Scene, size: tuple[int, int]) -> Camera:
-    """The three-quarter view of the mesh or scene with y up, for a picture of this size."""
-    width, height = size
-    subject = mesh.extreme_points() if isinstance(mesh, Scene) else mesh
-    return Camera.framing(subject, aspect=width / height if width > 0 and height > 0 else 1.0)
 
 
 class StaticPlan:

@@ -1,0 +1,305 @@
+"""Draws the instances of a scene into one buffer, whole or in clusters, from front to back.
+
+In: `Scene`, the matrix of a camera, the options of a view.  Out: `SceneFragments`, or a mask.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from topleft import _engine
+from topleft._base.memory import SCRATCH, FreshMemory, KeptMemory
+from topleft._base.options import DepthTest, Sampling, Sink, parse
+from topleft._base.threads import count_threads, run_parts
+from topleft._camera.camera import Camera
+from topleft._model.scene import Scene
+from topleft._raster import choices
+from topleft._raster.classic import refuse_classic
+from topleft._raster.cluster_draw import ClusteredMesh, draw_clustered
+from topleft._raster.clusters import Clusters, Survey
+from topleft._raster.peel import check_peel, peel_meshes
+from topleft._raster.rasterize import canvas_of, refuse_many
+from topleft._raster.sampling import sample_positions, sum_areas
+from topleft._raster.snap import Snapped, snap_mesh
+from topleft._raster.view import View, ViewOptions
+from topleft._render.fragments import SceneDepthLayers, SceneFragments
+from topleft._render.through_lens import DrawnScene, scene_through
+
+__all__ = ["PlacedScene", "draw_scene", "draw_scene_coverage", "peel_scene"]
+
+#: Snapped vertices that are held at a time: 16 bytes each.
+VERTICES_AT_ONCE = 1 << 20
+
+#: `tl_kernels.draw` begins a mask anew after 2**31 pixels, which one that is drawn in several calls must not meet.
+MOST_PIXELS_OF_PART = 1 << 30
+
+FRESH = FreshMemory()
+
+#: cull codes of a view (tl_cull) for an instance that mirrors.
+MIRRORED = {0: 0, 1: 2, 2: 1}
+
+#: Instances that tell what a picture shows of all, and clusters of each: less than a tenth of a millisecond.
+SURVEYED_INSTANCES, SURVEYED_OF_EACH = 4, 25
+
+#: Cells on each side of the picture in which layers are counted: of 15 by 8 pixels at 1920x1080.
+CELLS = 128
+
+#: Which end of a box each of its corners has, axis by axis.
+CORNERS = np.array([[k >> axis & 1 for axis in range(3)] for k in range(8)], np.bool_)
+
+
+class PlacedScene:
+    """A scene as a camera sees it: its instances are snapped when they are asked for.
+
+    Attributes
+    ----------
+    scene, whole : Scene
+        What is drawn, and what ids count the triangles of: the same but for a lens.
+    first_ids, whole_first_ids : (N + 1,) int64
+        Where the ids of each instance begin in these, and their end.
+    bent : sequence of BentMesh, optional
+        The parts that a lens makes of each instance.
+    """
+
+    def __init__(self, drawn: DrawnScene, view: View, *, with_depth: bool, may_cluster: bool = True) -> None:
+        self.scene, self.whole, self._clip_from_world, self.bent = self._drawn = drawn
+        self.first_ids, self.whole_first_ids = drawn.scene.first_ids, drawn.whole.first_ids
+        self._view = view
+        self._with_depth = with_depth
+        self._may_cluster = may_cluster
+
+    def of(self, scene: Scene) -> PlacedScene:
+        """Return another scene to draw, made for this picture alone, seen in the same way."""
+        drawn = self._drawn._replace(scene=scene)
+        return PlacedScene(drawn, self._view, with_depth=self._with_depth, may_cluster=False)
+
+    def whole_ids(self, ids: NDArray[np.int32]) -> NDArray[np.int32]:
+        """Return ids in terms of the whole scene: as they are, but for a lens."""
+        if self.bent is None:
+            return ids
+        firsts = zip(self.bent, self.whole_first_ids[:-1].tolist(), strict=True)
+        wholes = np.concatenate([*(one.source + first for one, first in firsts), [-1]]).astype(np.int32)
+        return wholes[ids]  # part -1, none, is the last
+
+    def snap(self, i: int) -> Snapped:
+        """Return an instance, snapped; in shared buffers it draws its own range of ids."""
+        mesh = self.scene[i].mesh
+        view, with_depth = self._view_of(i), self._with_depth
+        snapped = snap_mesh(FRESH, mesh.vertices, mesh.triangles, view, with_depth=with_depth, out=None)
+        return replace(snapped, mesh=snapped.mesh.numbered_from(int(self.first_ids[i])))
+
+    def snap_part(self, i: int, triangles: NDArray[np.int32]) -> _engine.SnappedMesh:
+        """Return what some triangles of an instance need, snapped: all of it, unless its mesh is drawn in clusters."""
+        can_cluster = self._may_cluster and choices.can_cluster(self._view, Sink.NEAREST)
+        if can_cluster and self.scene[i].mesh.has_clusters:
+            return ClusteredMesh(*self.clustered(i)).part(triangles)
+        return self.snap(i).mesh
+
+    def _view_of(self, i: int) -> View:
+        instance, view = self.scene[i], self._view
+        cull = MIRRORED[view.cull] if instance.is_mirrored else view.cull
+        return replace(view, transform=self._clip_from_world @ instance.transform, cull=cull)
+
+    def clustered(self, i: int) -> tuple[Clusters, View, int]:
+        """Return the clusters of an instance's mesh, how they are seen, and what triangle 0 is called."""
+        return self.scene[i].mesh.clusters, self._view_of(i), int(self.first_ids[i])
+
+    def chunks(self) -> Iterator[list[Snapped]]:
+        """Yield the instances in their order, as many at a time as `VERTICES_AT_ONCE` allows."""
+        chunk: list[Snapped] = []
+        for i in range(len(self.scene)):
+            chunk.append(self.snap(i))
+            if sum(snapped.n_vertices for snapped in chunk) >= VERTICES_AT_ONCE:
+                yield chunk
+                chunk = []
+        if chunk:
+            yield chunk
+
+    def draw(self, targets: list[_engine.Target], positions: Sequence[tuple[int, int]], height: int) -> None:
+        """Clear targets of that many rows, one a sample, and draw what each sees; (0, 0) is the pixel's centre."""
+        n_parts = count_threads(self._view.threads, self.scene.n_triangles)
+        n_parts = min(height, max(n_parts, height * self._view.size[0] // MOST_PIXELS_OF_PART))
+        can_cluster = self._may_cluster and choices.can_cluster(self._view, Sink(targets[0].sink))
+        seen = self._clip_from_world, self._view
+        if can_cluster and wants_clusters(self.scene) and pays_to_draw(self, *seen):
+            order = front_to_back(self.scene, self._clip_from_world)
+            if draw_placed(self, order, targets, positions, height, n_parts):
+                return
+        n_left = len(self.scene)
+        is_first = True
+        for chunk in self.chunks():
+            n_left -= len(chunk)
+            for target, at in zip(targets, positions, strict=True):
+                scenes = [snapped.mesh.seen_from(*at) for snapped in chunk]
+                run_parts(rows_of(scenes, target, is_first=is_first, is_last=n_left == 0), height, n_parts)
+            is_first = False
+
+
+def wants_clusters(scene: Scene) -> bool:
+    """Tell whether all meshes of a scene are to be drawn in clusters, and note that it is drawn."""
+    n_instances = Counter(id(instance.mesh) for instance in scene)
+    meshes = {id(instance.mesh): instance.mesh for instance in scene}
+    n_triangles = scene.n_triangles
+    pays = [choices.pays_to_cluster(n_triangles, mesh.note_drawn(), n_instances[key]) for key, mesh in meshes.items()]
+    return all(pays)
+
+
+def front_to_back(scene: Scene, clip_from_world: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Return the instances by the distance of the middle of their boxes: by w, or by z where all w are equal."""
+    boxes = {id(instance.mesh): instance.mesh.vertex_box.reshape(2, 3).mean(axis=0) for instance in scene}
+    middles = np.array([
+        instance.transform[:3, :3] @ boxes[id(instance.mesh)] + instance.transform[:3, 3] for instance in scene
+    ])  # fmt: skip
+    row = clip_from_world[3] if clip_from_world[3, :3].any() else clip_from_world[2]
+    return np.argsort(middles @ row[:3], kind="stable")
+
+
+def pays_to_draw(placed: PlacedScene, clip_from_world: NDArray[np.float64], view: View) -> bool:
+    """Tell whether a scene whose meshes are in clusters is drawn from these."""
+    scene = placed.scene
+    if not scene.backoff.is_over():
+        return False
+    n_triangles = scene.n_triangles // len(scene)
+    pays = choices.pays_to_draw_instances(
+        view, n_triangles, lambda: survey_instances(placed), lambda: count_layers(scene, clip_from_world)
+    )
+    scene.backoff.note(pays=pays)
+    return pays
+
+
+def survey_instances(placed: PlacedScene) -> Survey:
+    """Return what becomes of the clusters of a scene, by some of its instances."""
+    some = range(0, len(placed.scene), -(-len(placed.scene) // SURVEYED_INSTANCES))
+    weights = [placed.scene[i].mesh.triangles.shape[0] for i in some]
+    surveys = [ClusteredMesh(*placed.clustered(i)).survey(SURVEYED_OF_EACH) for i in some]
+    return Survey(*np.average(surveys, axis=0, weights=weights).tolist())
+
+
+def count_layers(scene: Scene, clip_from_world: NDArray[np.float64]) -> float:
+    """Return how many boxes of instances lie one behind the other, on the mean over the picture where there are any."""
+    boxes = {id(instance.mesh): instance.mesh.vertex_box for instance in scene}
+    lows, highs = np.array([boxes[id(instance.mesh)].reshape(2, 3) for instance in scene]).swapaxes(0, 1)
+    corners = np.where(CORNERS, highs[:, None], lows[:, None])
+    matrices = np.array([clip_from_world @ instance.transform for instance in scene])
+    clip = np.einsum("nij,nkj->nki", matrices[..., :3], corners) + matrices[:, None, :, 3]
+    clip = clip[(clip[..., 3] > 0).all(axis=1)]  # a box about the eye has no outline
+    cells = np.rint((clip[..., :2] / clip[..., 3:] + 1) * (0.5 * CELLS)).clip(0, CELLS).astype(np.intp)
+    (left, top), (right, bottom) = cells.min(axis=1).T, cells.max(axis=1).T
+    steps = np.zeros((CELLS + 1, CELLS + 1), np.intp)
+    for row, column, step in ((top, left, 1), (top, right, -1), (bottom, left, -1), (bottom, right, 1)):
+        np.add.at(steps, (row, column), step)
+    n_of_cell = steps.cumsum(axis=0).cumsum(axis=1)
+    return float(n_of_cell.sum() / max(1, np.count_nonzero(n_of_cell)))
+
+
+def draw_placed(
+    placed: PlacedScene,
+    order: NDArray[np.intp],
+    targets: Sequence[_engine.Target],
+    positions: Sequence[tuple[int, int]],
+    height: int,
+    n_threads: int,
+) -> bool:
+    """Clear targets, one a sample, and draw what each sees; returns as `draw_clustered` does."""
+    scenes = [ClusteredMesh(*placed.clustered(i)) for i in order.tolist()]
+    memories = [KeptMemory() for _ in range(n_threads)]
+    seen = zip(targets, positions, strict=True)
+    return all(draw_clustered(memories, scenes, target, height, at) for target, at in seen)
+
+
+def rows_of(
+    scenes: list[_engine.SnappedMesh], target: _engine.Target, *, is_first: bool, is_last: bool
+) -> Callable[[int, int], None]:
+    """Return what draws rows [first, end) of several scenes into one target, which the first of all clears."""
+
+    def draw_rows(first: int, end: int) -> None:
+        for i, scene in enumerate(scenes):
+            scene.draw(target, first, end - first, is_first and i == 0, is_last and i == len(scenes) - 1)
+
+    return draw_rows
+
+
+def place(
+    scene: Scene, camera: Camera, size: tuple[int, int], options: dict[str, Any], *, with_depth: bool = True
+) -> tuple[PlacedScene, View]:
+    """Return the scene as the camera sees it, and the checked options of a verb."""
+    view = View.parse(size, cast(ViewOptions, options))
+    refuse_classic(view, "depth" if with_depth else "a scene")
+    drawn = scene_through(scene, camera, view.viewport, near_clip=view.near_clip)
+    return PlacedScene(drawn, view, with_depth=with_depth), view
+
+
+def draw_scene(
+    scene: Scene,
+    camera: Camera,
+    size: tuple[int, int],
+    *,
+    depth_test: str | None = "less",
+    background_depth: float | None = None,
+    **options: Any,
+) -> SceneFragments:
+    """Return the visibility buffer of a scene; options as those of `rasterize`, without `out` and `transform`."""
+    placed, view = place(scene, camera, size, options)
+    refuse_many(view, "rasterize")
+    test = None if depth_test is None else parse(DepthTest, "depth_test", depth_test)
+    sink = {None: Sink.PAINT, DepthTest.LESS: Sink.NEAREST, DepthTest.GREATER: Sink.FARTHEST}[test]
+    (width, height), n = view.size, view.sampling.n_samples
+    positions = [(0, 0)] if n == 1 else [(x, y) for x, y in sample_positions(n, view.grid_bits).tolist()]
+    ids: NDArray[np.int32] = FRESH.empty("ids", (n, height, width), np.int32)
+    depth: NDArray[np.float32] = FRESH.empty("depth", (n, height, width), np.float32)
+    if width and height:
+        targets = [_engine.Target(sink, *planes, None) for planes in zip(ids, depth, strict=True)]
+        placed.draw(targets, positions, height)
+    if background_depth is not None:
+        depth[ids < 0] = background_depth
+    return SceneFragments(ids, depth, placed, positions)
+
+
+def peel_scene(
+    scene: Scene, camera: Camera, size: tuple[int, int], *, layers: int = 4, depth_test: str = "less", **options: Any
+) -> SceneDepthLayers:
+    """Return the nearest layers of a scene; options as those of `peel`, without `transform`."""
+    placed, view = place(scene, camera, size, options)
+    n, is_farthest = check_peel(view, layers, depth_test)
+    snapped = [placed.snap(i) for i in range(len(scene))]  # a band of rows is drawn once, with all instances
+    return SceneDepthLayers(*peel_meshes(SCRATCH, snapped, view, n, is_farthest=is_farthest), placed)
+
+
+def draw_scene_coverage(
+    scene: Scene, camera: Camera, size: tuple[int, int], out: object, **options: Any
+) -> NDArray[Any]:
+    """Return the mask of a scene, as `coverage` gives that of a mesh; options as there."""
+    placed, view = place(scene, camera, size, options, with_depth=False)
+    width, height = view.size
+    n = view.sampling.n_samples
+    is_share = n > 1 or view.sampling is Sampling.AREA
+    with canvas_of(FRESH, "coverage", out, (height, width), np.float32 if is_share else np.bool_) as (result, canvas):
+        if not (width and height):
+            pass
+        elif view.sampling is Sampling.AREA:
+            add_areas(placed, view, canvas)
+        else:
+            samples = sample_positions(n, view.grid_bits) if n > 1 else None
+            shape = _engine.Target.covered_shape(height, width, n)
+            sink = Sink.SAMPLES if n > 1 else Sink.MASK
+            target = _engine.Target(sink, canvas, None, SCRATCH.empty("covered", shape, np.uint64), samples)
+            placed.draw([target], [(0, 0)], height)
+    return result
+
+
+def add_areas(placed: PlacedScene, view: View, canvas: NDArray[np.float32]) -> None:
+    """Write the sum of the areas that the instances cover, at most 1."""
+    canvas[...] = 0
+    own = np.empty_like(canvas)
+    for chunk in placed.chunks():
+        for snapped in chunk:
+            n_threads = count_threads(view.threads, snapped.n_triangles)
+            sum_areas(SCRATCH, snapped.mesh, own, n_threads, is_clamped=True)
+            canvas += own
+    np.minimum(canvas, 1, out=canvas)

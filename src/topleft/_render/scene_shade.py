@@ -1,0 +1,151 @@
+"""Shades a visibility buffer, of a scene each instance by itself, in the rectangle that it shows in.
+
+Input: `Fragments`, the `Mesh` or `Scene` and the `Camera` they were made with. Output: a picture (H, W, 4) uint8, sRGB
+with alpha.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft._base.color import DEFAULT_COLOR, Color
+from topleft._camera.camera import Camera
+from topleft._model.light import Fog, Light, LightKind, LightSpace
+from topleft._model.material import Material
+from topleft._model.mesh import Mesh
+from topleft._model.scene import Instance, Scene
+from topleft._model.texture import Texture
+from topleft._raster.fragments import Fragments
+from topleft._render.fragments import SceneFragments, VisiblePart, join, meshes_of, parts_of
+from topleft._shade.look import is_similarity
+from topleft._shade.shade import Shading, ShadingOptions, shade_mesh, shade_numbers, shade_samples
+
+__all__ = ["shade"]
+
+U8 = npt.NDArray[np.uint8]
+
+
+def in_space_of(instance: Instance | None, options: ShadingOptions, camera: Camera) -> ShadingOptions:
+    """The options with lights as they stand in the object space of an instance, as bright as they are in the world."""
+    if options.lights is None or instance is None:
+        return options
+    object_from_world = np.linalg.inv(instance.transform)
+    # `ShadingInputs` measures distances in object space where the way to the eye keeps angles, else in eye space.
+    in_object_space = is_similarity(camera.view @ instance.transform)
+    scale = np.cbrt(abs(np.linalg.det(instance.transform[:3, :3]))) if in_object_space else 1.0
+    moved = []
+    for light in options.lights:
+        at = np.array([*light.at, light.kind == LightKind.POINT])
+        at = at if light.space == LightSpace.EYE else object_from_world @ at
+        moved.append(replace(light, at=tuple(at[:3]), falloff=float(light.falloff * scale**2)))
+    return replace(options, lights=moved)
+
+
+def shade(
+    frags: Fragments,
+    mesh: Mesh | Scene,
+    camera: Camera,
+    *,
+    shading: str = "smooth",
+    color: Color = DEFAULT_COLOR,
+    background: Color = (255, 255, 255, 255),
+    depth_range: tuple[float, float] | None = None,
+    lights: Sequence[Light] | None = None,
+    ambient: float | None = None,
+    material: Material | None = None,
+    matcap: Texture | None = None,
+    fog: Fog | None = None,
+    threads: int | None = None,
+) -> U8:
+    """The picture (H, W, 4) uint8 of a visibility buffer: sRGB, alpha 255 where a triangle shows.
+
+    Parameters
+    ----------
+    frags : Fragments
+        What `rasterize` or `rasterize_mesh` returned for the mesh or scene. With several samples a pixel a triangle is
+        shaded once in a pixel, at the first of the samples that see it, and the picture is the mean of the light of the
+        samples.
+    mesh : Mesh or Scene
+        Its materials, and its colours, are used if it has any. Each instance of a scene is shaded by itself.
+    camera : Camera
+        The camera of `frags`.
+    shading : {"smooth", "flat", "unlit", "matcap", "ids", "depth", "normals"}
+        "smooth": interpolated vertex normals, lit in the pixel. "flat": the same with the normals of the faces. Both
+        light the side that is seen, whichever it is. "unlit": colours and textures as they are. "matcap": the colour
+        that `matcap` has for the normal. "ids": a colour for each triangle. "depth": grey, bright is near, over a range
+        of distances. "normals": the smooth normal in eye space, x, y, z from -1..1 as red, green, blue; what
+        faces the viewer is light blue.
+    color : (3,) of 0 to 255
+        sRGB colour of a mesh without colours and materials.
+    background : (4,) of 0 to 255
+        sRGB and alpha where nothing shows.
+    depth_range : (float, float), optional
+        Distances along the view that are the brightest and the darkest grey of "depth", world units; unless given,
+        those of the picture.
+    lights : sequence of Light, optional
+        Lambert's cosine for each of them. Unless given: one headlight over the viewer's left shoulder, whose light
+        wraps round the mesh.
+    ambient : float, optional
+        Light from all sides, not negative, 0.03 unless given.
+    material : Material, optional
+        For all triangles, instead of those of the mesh.
+    matcap : Texture, optional
+        A picture of a lit sphere, for "matcap". It is clamped, so the rim holds where normals turn away.
+    fog : Fog, optional
+        The depth cue.
+    threads : int, optional
+        How many threads shade; never changes a bit.
+
+    Raises
+    ------
+    ValueError
+        If the mesh has other numbers of vertices or triangles than what was drawn, `shading` is unknown, a colour is
+        none, a number is outside its range, or "matcap" has no matcap.
+    TypeError
+        If `frags`, the mesh, a light, material or texture is none.
+    """
+    check_drawn(frags, mesh)
+    options = ShadingOptions.parse(
+        shading, color, background, depth_range, lights, ambient, material, matcap, fog, threads
+    )
+    if options.mode in (Shading.IDS, Shading.DEPTH):
+        return shade_numbers(frags, camera, options)
+
+    def shade_part(part: VisiblePart) -> U8:
+        return shade_mesh(*part.drawn, part.camera(camera), in_space_of(part.instance, options, camera))
+
+    def shade_one(sample: Fragments) -> U8:
+        return join(parts_of(sample, mesh), (*sample.id.shape, 4), options.background, shade_part, np.uint8)
+
+    # The kernel resolves the samples of one mesh; those of several are resolved here.
+    return shade_one(frags) if isinstance(mesh, Mesh) else shade_samples(frags, shade_one, options.background)
+
+
+def check_drawn(frags: Fragments, mesh: Mesh | Scene) -> None:
+    """Raise an error unless the mesh or scene can be the one that was drawn: kernels index its arrays by fragments."""
+    if not isinstance(frags, Fragments):
+        raise TypeError(f"frags must be Fragments, got {type(frags).__name__}")
+    whole = frags.whole if isinstance(frags, SceneFragments) else None
+    kind = Mesh if whole is None else Scene
+    if not isinstance(mesh, kind):
+        raise TypeError(f"mesh must be a {kind.__name__}, got {type(mesh).__name__}")
+    given = counts_of(mesh)
+    drawn = [(frags._n_vertices, frags._n_triangles)] if whole is None else counts_of(whole)
+    if len(drawn) != len(given):
+        raise ValueError(f"mesh must be the scene that was drawn, of {len(drawn)} instances, got one of {len(given)}")
+    for k, (old, new) in enumerate(zip(drawn, given, strict=True)):
+        if old != new:
+            name = "mesh" if whole is None else f"mesh[{k}]"
+            raise ValueError(
+                f"{name} must be the one that was drawn, with {old[0]} vertices and {old[1]} triangles, "
+                f"got {new[0]} and {new[1]}"
+            )
+
+
+def counts_of(subject: Mesh | Scene) -> list[tuple[int, int]]:
+    """Vertices and triangles of the mesh of each instance."""
+    return [(len(mesh.vertices), len(mesh.triangles)) for mesh in meshes_of(subject)]

@@ -1,0 +1,64 @@
+"""Finds what to draw of a mesh or scene: itself, or the parts that a lens makes of it.
+
+Input: `Mesh` or `Scene`, a camera with or without lens. Output: `DrawnMesh` or `DrawnScene`, what the verbs draw.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft._camera.camera import Camera
+from topleft._model.mesh import Mesh
+from topleft._model.scene import Instance, Scene
+from topleft._render.bend import BentMesh, bend
+from topleft._render.fragments import camera_of
+
+__all__ = ["DrawnMesh", "DrawnScene", "scene_through", "seen_through"]
+
+MIRROR = np.diag([-1.0, 1.0, 1.0, 1.0])
+
+
+class DrawnMesh(NamedTuple):
+    """What the verbs draw of a mesh."""
+
+    vertices: npt.NDArray[Any]
+    triangles: npt.NDArray[np.integer[Any]]
+    transform: npt.NDArray[np.float64]
+    bent: BentMesh | None
+
+
+def seen_through(mesh: Mesh, camera: Camera, frame: tuple[int, int], *, near_clip: bool = True) -> DrawnMesh:
+    """The mesh as it is, and the camera's matrix for a whole picture of this size; or as the camera's lens bends it."""
+    if camera.lens is None:
+        return DrawnMesh(mesh.vertices, mesh.triangles, camera.clip_from_world(frame), None)
+    bent = bend(mesh.vertices, mesh.triangles, camera, camera.lens, frame, near_clip=near_clip)
+    return DrawnMesh(bent.points_eye, bent.triangles, camera.clip_from_eye(frame), bent)
+
+
+class DrawnScene(NamedTuple):
+    """What is drawn of a scene, and the scene itself, which ids count the triangles of."""
+
+    scene: Scene
+    whole: Scene
+    clip_from_world: npt.NDArray[np.float64]
+    bent: tuple[BentMesh, ...] | None
+
+
+def scene_through(scene: Scene, camera: Camera, frame: tuple[int, int], *, near_clip: bool = True) -> DrawnScene:
+    """The scene as it is, and the camera's matrix for a whole picture of this size; or as the camera's lens bends it.
+
+    What is bent stands in eye space, mirrored instances mirrored twice: so they stay mirrored, for `cull`.
+    """
+    if camera.lens is None:
+        return DrawnScene(scene, scene, camera.clip_from_world(frame), None)
+    many, instances = [], []
+    for instance in scene:
+        mesh = instance.mesh
+        bent = bend(mesh.vertices, mesh.triangles, camera_of(camera, instance), camera.lens, frame, near_clip=near_clip)
+        place = MIRROR if instance.is_mirrored else np.eye(4)
+        many.append(bent)
+        instances.append(Instance(Mesh(bent.points_eye * np.diag(place)[:3], bent.triangles.astype(np.int32)), place))
+    return DrawnScene(Scene(instances), scene, camera.clip_from_eye(frame), tuple(many))
