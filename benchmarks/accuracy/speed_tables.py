@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from benchmarks.accuracy.tables import Record, machine_text
+from benchmarks.accuracy.tables import machine_text
 from benchmarks.accuracy.tutorial import QUOTED
+from benchmarks.harness.records import Record
 from benchmarks.report.tables import number
 
 WRONG_SHARE = 1e-3

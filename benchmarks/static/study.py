@@ -3,7 +3,8 @@
 In: scenes of `scenes.py`. Out: a record with a row for each scene and one for each mesh.
 
 Both ways are the public call on memory that is kept, on one thread; each has a `Mesh` of its own, of the same arrays.
-The planner's has been drawn before: it is in clusters where `topleft.choices` says that this pays. The other never is.
+The planner's has been drawn before: it is in clusters where `topleft._raster.choices` says that this pays. The other
+never is.
 """
 
 from __future__ import annotations

@@ -52,7 +52,7 @@ def test_exact_picture_on_the_grid_is_that_of_the_reference(bits, seed):
 def test_exact_area_on_the_grid_is_that_of_the_reference(bits, seed):
     vertices, triangles = random_scene(bits, seed)
     expected = reference_area.area(vertices, triangles, SIZE, subpixel_bits=bits).astype(float)
-    assert np.abs(draw_area(vertices, triangles, SIZE) - expected).max() < 1e-9  # what exact_area.py promises
+    assert np.abs(draw_area(vertices, triangles, SIZE) - expected).max() < 1e-9  # what exact/area.py promises
 
 
 def test_edge_sign_last_bit_decides():

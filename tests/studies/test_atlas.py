@@ -10,7 +10,7 @@ import pytest
 from benchmarks import cli
 from benchmarks.atlas import measure as atlas
 from benchmarks.atlas import shrink as atlas_shrink
-from benchmarks.atlas.depth import DEPTH_FAMILIES, DepthScene, Picture, draw, judge_depth
+from benchmarks.atlas.depth import DEPTH_FAMILIES, PRODUCTION, DepthScene, Picture, draw, judge_depth
 from benchmarks.atlas.families import FAMILIES
 from benchmarks.exact.clip import draw_clip, pieces_picture
 from benchmarks.exact.integers import draw_points, snapped_points, true_points
@@ -144,12 +144,12 @@ def test_atlas_of_a_family_is_that_of_the_record(record, family, methods):
 def test_atlas_record_has_a_map_of_every_entry_and_family(record):
     found = {(row["family"], row["entry"]) for row in record["maps"]}
     names = [entry.name for entry in atlas.entries()]
-    wished = {*itertools.product(FAMILIES, names), *itertools.product(DEPTH_FAMILIES, atlas.PRODUCTION)}
+    wished = {*itertools.product(FAMILIES, names), *itertools.product(DEPTH_FAMILIES, PRODUCTION)}
     assert found == wished | {("layers", entry.name) for entry in atlas.SAMPLED}
 
 
 def test_atlas_production_methods_are_exact_and_leave_no_gap(record):
-    rows = [row for row in record["maps"] if row["entry"] in [*atlas.PRODUCTION, *(e.name for e in atlas.SAMPLED)]]
+    rows = [row for row in record["maps"] if row["entry"] in [*PRODUCTION, *(e.name for e in atlas.SAMPLED)]]
     assert sum(n for row in rows for n in row["inexact"] if n) == 0
     assert sum(n for row in rows if row["entry"] != "auto, 0 bits" for n in row["gaps"] if n) == 0
 

@@ -1,15 +1,16 @@
 """The compiled unit, and the choice of its instruction set. It allocates scratch, calls csrc and returns its status.
 
-isa.py         chooses the instruction set that runs, and tells how this copy was built
-kernels.pyx    holds the kernel table in use; includes the parts below, whose names it gives to Python
-kernels.pyi    types what kernels.pyx gives
-contract.pxi   declares the structs and kernels of csrc
 buffers.pxi    describes what a pass reads and writes: viewport, vertices, buffers, indices, clipped pieces
-triangles.pxi  draws snapped triangles: whole, by bands of rows, in layers
 clusters.pxi   sorts a mesh into clusters and draws those that a view needs
+contract.pxi   declares the structs and kernels of csrc
+isa.py         chooses the instruction set that runs, and tells how this copy was built
+kernels.pyx    holds the kernel table in use; includes the parts, and gives their names to Python
+mesh.pxi       computes normals of a mesh, and distances between surfaces
 pixels.pxi     writes pixels that are not found by drawing triangles: means of samples, layers, points, planes, lines
 shade.pxi      shades pixels and tests their alpha
-mesh.pxi       computes normals of a mesh, and distances between surfaces
+triangles.pxi  draws snapped triangles: whole, by bands of rows, in layers
+
+kernels.pyi has the types of what kernels.pyx gives.
 """
 
 from topleft._engine.kernels import (
