@@ -11,7 +11,7 @@ from comparing import assert_same
 import topleft as tl
 from topleft._base.color import id_colors, srgb_tables
 from topleft._shade.shade import GREY_OF_FARTHEST, GREY_OF_NEAREST, picture_of_numbers
-from topleft.methods.reference_sampling import mean
+from topleft.methods.reference.sampling import mean
 
 SIZE = (48, 36)
 KNOT = tl.Mesh(*tl.scenes.shape("torus-knot"))

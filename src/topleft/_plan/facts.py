@@ -16,10 +16,10 @@ from topleft._base.memory import FRESH
 from topleft._base.options import DepthTest, Sampling, Sink
 from topleft._model.mesh import Mesh
 from topleft._raster import choices
-from topleft._raster.clustered import ClusteredScene
+from topleft._raster.cluster_draw import ClusteredMesh
 from topleft._raster.clusters import Clusters
 from topleft._raster.sampling import sample_positions
-from topleft._raster.snap import check_triangles, snap_scene
+from topleft._raster.snap import snap_mesh
 from topleft._raster.view import View
 
 __all__ = ["CLASSES", "ClusterFacts", "Facts", "find_cluster_facts", "find_facts", "memory_of"]
@@ -132,24 +132,23 @@ def find_facts(
         As the verb would.
     """
     with_depth = verb == "rasterize"
-    snapped = snap_scene(FRESH, vertices, triangles, view, with_depth=with_depth, out=None)
-    check_triangles(triangles, snapped.corners, snapped.n_vertices)
+    snapped = snap_mesh(FRESH, vertices, triangles, view, with_depth=with_depth, out=None)
+    snapped.check_indices()
     given, indices = as_array("vertices", vertices), as_array("triangles", triangles)
-    inputs = snapped.inputs
-    points, pieces = inputs.points, inputs.pieces
-    xy = inputs.records.view(np.int32).reshape(-1, 4)[:, :2]
+    points, pieces, source = snapped.points, snapped.pieces, snapped.source
+    xy = snapped.records.view(np.int32).reshape(-1, 4)[:, :2]
     is_special = xy[:, 0] == np.iinfo(np.int32).min
     sink = find_sink(verb, view, test, has_depth=snapped.has_depth)
+    common = choices.common_depth(points, has_depth=snapped.has_depth, is_clip_space=source.is_clip_space)
     flat = None
-    if with_depth and view.sampling is Sampling.CENTER and 0 not in view.size:
-        flat = choices.flat_depth(snapped.scene, inputs, view, has_depth=snapped.has_depth)
-    common = choices.common_depth(points, has_depth=snapped.has_depth, is_clip_space=inputs.is_clip_space)
+    if with_depth and view.sampling is Sampling.CENTER and 0 not in view.size and choices.is_flat(snapped, view):
+        flat = common
     drawn_sink = sink if flat is None else Sink.LABEL
     samples = sample_positions(view.sampling.n_samples, view.grid_bits) if sink is Sink.SAMPLES else None
     census = [(0, 0.0, 0.0)] * len(CLASSES)
     if 0 not in view.size and snapped.n_triangles:
-        _, census = snapped.scene.count_classes(drawn_sink, *view.size, samples)
-    in_pixels = not inputs.is_clip_space and len(points) > 0
+        _, census = snapped.mesh.count_classes(drawn_sink, *view.size, samples)
+    in_pixels = not source.is_clip_space and len(points) > 0
     facts = Facts(
         verb=verb,
         outputs=outputs,
@@ -163,8 +162,8 @@ def find_facts(
         n_vertices=len(points),
         n_components=points.shape[1],
         n_triangles=snapped.n_triangles,
-        is_clip_space=inputs.is_clip_space,
-        is_affine=inputs.is_affine,
+        is_clip_space=source.is_clip_space,
+        is_affine=source.is_affine,
         are_whole=in_pixels and bool((points[:, :2] == np.rint(points[:, :2])).all()),
         n_wide=int((is_special & (xy[:, 1] == 1)).sum()),
         n_clipped=int((is_special & (xy[:, 1] == 2)).sum()),
@@ -172,12 +171,12 @@ def find_facts(
         n_pieces=len(pieces) if pieces else 0,
         flat_depth=flat,
         common_depth=common,
-        is_direct=verb == "fill" and choices.is_direct(snapped.scene, view, np.dtype(np.uint8), is_flat=True),
-        n_threads=choices.threads_to_draw(view, snapped.scene, snapped.n_triangles, drawn_sink),
-        work_ms=choices.work_ns(view, snapped.scene, snapped.n_triangles, drawn_sink) / 1e6,
+        is_direct=verb == "fill" and choices.is_direct(snapped, view, np.dtype(np.uint8), is_flat=True),
+        n_threads=choices.threads_to_draw(view, snapped, drawn_sink),
+        work_ms=choices.work_ns(view, snapped, drawn_sink) / 1e6,
         census=tuple(census),
     )
-    corners = np.array(snapped.corners, np.int32)
+    corners = np.array(snapped.triangles, np.int32)
     corners.flags.writeable = False
     return facts, corners
 
@@ -206,7 +205,7 @@ def find_cluster_facts(mesh: Mesh, view: View, verb: str, test: DepthTest | None
     if not choices.pays_to_cluster(n_triangles, 1):
         return ClusterFacts(None, f"{n_triangles:,} triangles are done before sorting them would pay")
     clusters = mesh.clusters
-    seen = ClusteredScene(clusters, view)
+    seen = ClusteredMesh(clusters, view)
     if not choices.pays_to_draw_clusters(view, n_triangles, seen.survey):
         return ClusterFacts(None, "most of the mesh shows, and drawing that cluster by cluster takes longer")
     n, found = len(clusters), seen.survey(len(clusters))

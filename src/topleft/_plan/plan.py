@@ -223,7 +223,7 @@ class Plan:
         self._clock.start()
         return replace(view, threads=view.threads or self.threads, plan=self)
 
-    def corners_of(self, triangles: ArrayLike, n_vertices: int) -> NDArray[np.int32]:
+    def triangles_of(self, triangles: ArrayLike, n_vertices: int) -> NDArray[np.int32]:
         """Return the plan's own int32 triangles, whose indices have been checked.
 
         The array that the plan was made from is taken to be what it was then; any other is compared.
