@@ -16,7 +16,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_names(parser, "--method", "methods", "rows; all unless given")
     add_names(parser, "--family", "families", "families of scenes; all unless given")
     parser.add_argument("--scenes", type=Path, metavar="FILE.json",
-                        help="shrink the first failures and write them into src/topleft/failure_scenes.json")  # fmt: skip
+                        help="shrink first failures and write them into src/topleft/failure_scenes.json")  # fmt: skip
     add_out(parser)
 
 

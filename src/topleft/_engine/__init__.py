@@ -13,4 +13,4 @@ triangles.pxi  draws snapped triangles: whole, by bands of rows, in layers
 kernels.pyi has the types of what kernels.pyx gives.
 """
 
-from topleft._engine.kernels import *  # noqa: F403: the one place that gives the names of a module on
+from topleft._engine.kernels import *  # noqa: F403
