@@ -1,8 +1,8 @@
 """Small scenes on which methods fail: what a picture must hold, and what they draw instead.
 
 They stand in failure_scenes.json. `python -m benchmarks atlas --scenes` shrank them from the first failure of each
-method along the families of the atlas (docs/measured/atlas.md); `tests/methods/test_failure_scenes.py` draws them all. The
-production methods are right on each.
+method along the families of the atlas (docs/measured/atlas.md); `tests/methods/test_failure_scenes.py` draws them
+all. The production methods are right on each.
 """
 
 from __future__ import annotations
