@@ -93,8 +93,8 @@ typedef struct {
     int64_t first, end;
     const tl_polygon_box *boxes;
     int64_t width, top, bottom;
-    int32_t *cells; /* (tl_share_cells(box), TL_CELL_CLEAR, and left so) of the largest box within the rows */
-    int64_t n_cells;
+    int32_t *cells;  /* (tl_share_cells(box), TL_CELL_CLEAR, and left so) of the largest box within the rows */
+    int64_t n_cells; /* at least TL_LEAST_SHARE_CELLS */
     tl_piece_scratch *pieces;
     /* pixels: the sum of the shares, at most 1; or, with colours, the mix of what is there and the polygon's by its
      * share */
@@ -109,6 +109,9 @@ typedef struct {
     int is_long;    /* int64 indices */
     int64_t n_room; /* entries that there is room for, with 16 more behind them */
 } tl_share_job;
+
+/* Cells that there are at least: small polygons are drawn some at a time. */
+#define TL_LEAST_SHARE_CELLS 32768
 
 static inline int64_t tl_share_cells(int64_t width, int64_t height) { return (width + 63) / 16 * 16 * height + 64; }
 

@@ -26,6 +26,8 @@ class Painter:
     prepare: Prepare
     package: str
     n_lines: dict[str, int]
+    most_corners: int = 10_000
+    """Of a ring: those of more take minutes."""
 
 
 def offsets_of(polygons: Polygons) -> tuple[F64, np.ndarray, np.ndarray]:
@@ -152,8 +154,8 @@ def exactextract(polygons: Polygons, size: tuple[int, int], _: str, __: int) -> 
 
 
 PAINTERS = {
-    "topleft": Painter(topleft, "topleft", {"mask": 1, "labels": 1, "area": 1, "table": 1}),
-    "cv2.fillPoly": Painter(opencv, "opencv-python-headless", {"mask": 3, "labels": 4}),
+    "topleft": Painter(topleft, "topleft", {"mask": 1, "labels": 1, "area": 1, "table": 1}, 1 << 30),
+    "cv2.fillPoly": Painter(opencv, "opencv-python-headless", {"mask": 3, "labels": 4}, 1 << 30),
     "PIL ImageDraw": Painter(pillow, "pillow", {"mask": 5, "labels": 6}),
     "skimage.draw.polygon": Painter(skimage, "scikit-image", {"mask": 4, "labels": 5}),
     "rasterio.rasterize": Painter(rasterio, "rasterio", {"mask": 2, "labels": 2}),

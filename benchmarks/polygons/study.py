@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -33,6 +34,8 @@ class Options:
     threads: int = 1
     repeats: int = 7
     seconds: float = 0.05
+    slow_s: float = 1.0
+    """A call that takes longer is timed once, and takes no turns."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -41,6 +44,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_names(parser, "--painter", "painters", f"of {', '.join(PAINTERS)}")
     add_number(parser, "--threads", "threads", "of those that can use them")
     add_number(parser, "--repeats", "repeats", "rounds")
+    parser.add_argument("--seconds", type=float, metavar="S", help="how long a turn is, at least a call")
+    parser.add_argument("--slow", dest="slow_s", type=float, metavar="S", help="calls that take longer are timed once")
     add_out(parser)
 
 
@@ -63,11 +68,14 @@ def measure(case: PolygonCase, options: Options, record: Record) -> None:
     calls = {}
     for name in options.painters:
         painter = PAINTERS[name]
-        if case.task not in painter.n_lines or (name == "shapely" and len(polygons[0][0]) > 10_000):
+        if case.task not in painter.n_lines or len(polygons[0][0]) > painter.most_corners:
             continue
         try:
             calls[name] = painter.prepare(polygons, case.size, case.task, options.threads)
-            wrong, worst = errors(calls[name](), right, case)
+            start = time.perf_counter()
+            made = calls[name]()
+            took = time.perf_counter() - start
+            wrong, worst = errors(made, right, case)
         except ImportError as error:
             record["skipped"].append({"case": case.name, "painter": name, "reason": str(error)})
             continue
@@ -79,12 +87,15 @@ def measure(case: PolygonCase, options: Options, record: Record) -> None:
                 "lines": painter.n_lines[case.task],
                 "wrong_px": wrong,
                 "worst": worst,
+                "ms": [round(1e3 * took, 5)],
             }
         )
+        if took > options.slow_s:
+            del calls[name]
         tell(f"{case.name}: {name} is ready")
-    took = take_turns([turn_of(call) for call in calls.values()], options.repeats, options.seconds)
-    rows = [row for row in record["rows"] if row["case"] == case.name]
-    for row, times in zip(rows, took, strict=True):
+    turns = [turn_of(call, time.perf_counter) for call in calls.values()]
+    for name, times in zip(calls, take_turns(turns, options.repeats, options.seconds), strict=True):
+        (row,) = (row for row in record["rows"] if (row["case"], row["painter"]) == (case.name, name))
         row["ms"] = [round(float(t), 5) for t in times]
 
 
@@ -139,13 +150,12 @@ def table(record: Record) -> Iterator[str]:
     yield "|---|---|---|---|---|---|---|---|"
     last = None
     for row in record["rows"]:
-        if "ms" not in row:
-            continue
         title = CASES[row["case"]].title if row["case"] != last else ""
         last = row["case"]
         ours = next(r for r in record["rows"] if r["case"] == row["case"])
         times = np.array(row["ms"])
-        ratio = float(np.median(times / np.array(ours["ms"])))
+        own = np.array(ours["ms"])
+        ratio = float(np.median(times / own) if len(times) == len(own) else np.median(times) / np.median(own))
         low, high = np.quantile(times, [0.25, 0.75])
         wrong = f"{row['wrong_px']:,}" + (f" (at most {row['worst']:.0e})" if row["worst"] else "")
         yield (

@@ -22,6 +22,12 @@
 
 #define TL_WHOLE (1 << TL_AREA_BITS)
 
+/* Small polygons are drawn some at a time, one below the other: vectors of edges are then fuller, which takes a sixth
+ * off 20,000 cells of 28 px.  What an edge adds does not depend on where it is drawn. */
+#define TL_STACK_COLUMNS 64
+#define TL_STACK_ROWS 256
+#define TL_STACK_MAX 8 /* 4 is slower by 7 percent, 16 and 32 by 1 */
+
 typedef struct {
     const tl_share_job *job;
     int64_t polygon, n; /* n: entries of the table so far */
@@ -29,12 +35,16 @@ typedef struct {
 } share_output;
 
 /* Edges of a ring, a vector at a time, as push_edges in area.c; long ones by themselves. */
-TL_INLINE void push_ring_lanes(area_state *s, const tl_polygons *p, int64_t first, int64_t end, int64_t i, int weight)
+TL_INLINE void push_ring_lanes(area_state *s, const tl_polygons *p, int64_t first, int64_t end, int64_t i, int weight,
+                               int32_t right_fx, int32_t down_fx)
 {
     const area_plane *plane = &s->plane;
     const vi zero = vi_set1(0), one = vi_set1(1), last_kind = vi_set1(TL_EDGES_LONG), most = vi_set1(s->max_extent);
     vi ax, ay, bx, by;
-    const vm live = load_ring_edges(p, first, end, i, &ax, &ay, &bx, &by), is_up = vi_gt(ay, by);
+    const vm live = load_ring_edges(p, first, end, i, &ax, &ay, &bx, &by);
+    ax = vi_add(ax, vi_set1(right_fx)), ay = vi_add(ay, vi_set1(down_fx));
+    bx = vi_add(bx, vi_set1(right_fx)), by = vi_add(by, vi_set1(down_fx));
+    const vm is_up = vi_gt(ay, by);
     const vi x0 = vi_select(is_up, bx, ax), x1 = vi_select(is_up, ax, bx), y0 = vi_min(ay, by), y1 = vi_max(ay, by);
     const vi dx = vi_sub(x1, x0), dy = vi_sub(y1, y0), width = vi_max(dx, vi_sub(zero, dx)), dy2 = vi_add(dy, dy);
     const vm meets_rows = vm_and(vi_gt(vi_set1(plane->bottom_fx), y0), vi_gt(y1, vi_set1(plane->top_fx)));
@@ -43,7 +53,7 @@ TL_INLINE void push_ring_lanes(area_state *s, const tl_polygons *p, int64_t firs
     for (unsigned lanes = vm_bits(alone); lanes; lanes &= lanes - 1) {
         const int64_t a = i + __builtin_ctz(lanes), b = a + 1 < end ? a + 1 : first, from = weight > 0 ? a : b,
                       to = weight > 0 ? b : a;
-        push_edge(s, p->x_fx[from], p->y_fx[from], p->x_fx[to], p->y_fx[to]);
+        push_edge(s, p->x_fx[from] + right_fx, p->y_fx[from] + down_fx, p->x_fx[to] + right_fx, p->y_fx[to] + down_fx);
     }
     on = vm_and_not(on, alone);
     if (!vm_any(on))
@@ -63,8 +73,8 @@ TL_INLINE void push_ring_lanes(area_state *s, const tl_polygons *p, int64_t firs
     }
 }
 
-/* Draws a polygon whose rings do not meet into the cells of its plane. */
-static void push_polygon(area_state *s, const tl_polygons *p, int64_t polygon)
+/* Draws a polygon whose rings do not meet, moved so far, into the cells of the plane. */
+static void push_polygon(area_state *s, const tl_polygons *p, int64_t polygon, int32_t right_fx, int32_t down_fx)
 {
     for (int64_t ring = p->polygons[polygon]; ring < p->polygons[polygon + 1]; ring++) {
         const int64_t first = p->rings[ring], end = p->rings[ring + 1];
@@ -73,7 +83,7 @@ static void push_polygon(area_state *s, const tl_polygons *p, int64_t polygon)
             continue;
         if (!p->is_wide[polygon]) {
             for (int64_t i = first; i < end; i += TL_LANES) {
-                push_ring_lanes(s, p, first, end, i, weight);
+                push_ring_lanes(s, p, first, end, i, weight, right_fx, down_fx);
                 make_room_for_edges(s);
             }
             continue;
@@ -84,6 +94,10 @@ static void push_polygon(area_state *s, const tl_polygons *p, int64_t polygon)
             make_room_for_edges(s);
         }
     }
+}
+
+static void finish_cells(area_state *s)
+{
     for (int kind = 0; kind < TL_EDGES_NONE; kind++)
         if (s->n[kind])
             flush_edges(s, kind, 1);
@@ -225,10 +239,54 @@ static void share_simply(area_state *s, const tl_polygons *p, share_output *out,
             return;
         }
         place_plane(&window, &target, &s->plane);
-        push_polygon(s, p, out->polygon);
+        push_polygon(s, p, out->polygon, 0, 0);
+        finish_cells(s);
         for (int64_t row = first; row < end; row++)
             put_cells(out, job->cells + (row - first) * stride, row, box->left, box->right);
     }
+}
+
+/* Whether a polygon can be drawn below others: small, and nothing of it outside of the rows. */
+static inline int fits_stack(const tl_polygons *p, const tl_share_job *job, int64_t polygon)
+{
+    const tl_polygon_box *box = job->boxes + polygon;
+    return p->is_simple[polygon] && !p->is_wide[polygon] && box->left > 0 && box->right < job->width &&
+           box->top > job->top && box->bottom < job->bottom && box->right - box->left <= TL_STACK_COLUMNS &&
+           box->bottom - box->top <= TL_STACK_ROWS / 4;
+}
+
+/* Draws polygons from the i-th of the job on, as many as fit one below the other.  Returns how many. */
+static int64_t share_stack(area_state *s, const tl_polygons *p, share_output *out, int64_t i)
+{
+    const tl_share_job *job = out->job;
+    const tl_window window = {.width = TL_STACK_COLUMNS, .height = TL_STACK_ROWS, .subpixel_bits = p->bits};
+    const tl_area target = {.cells = job->cells};
+    const int64_t stride = tl_area_stride(TL_STACK_COLUMNS);
+    int64_t n = 0, n_rows = 0, n_entries = 0;
+    place_plane(&window, &target, &s->plane);
+    for (; n < TL_STACK_MAX && i + n < job->end; n++) {
+        const int64_t polygon = job->listed ? job->listed[i + n] : i + n;
+        const tl_polygon_box *box = job->boxes + polygon;
+        const int32_t height = box->bottom - box->top;
+        if (!fits_stack(p, job, polygon) || n_rows + height > TL_STACK_ROWS)
+            break;
+        n_entries += (int64_t)height * (box->right - box->left);
+        if (job->starts && out->n + n_entries > job->n_room)
+            break;
+        push_polygon(s, p, polygon, -box->left * (1 << p->bits), ((int32_t)n_rows - box->top) * (1 << p->bits));
+        n_rows += height;
+    }
+    finish_cells(s);
+    int32_t *cells = job->cells;
+    for (int64_t k = 0; k < n; k++) {
+        out->polygon = job->listed ? job->listed[i + k] : i + k;
+        const tl_polygon_box *box = job->boxes + out->polygon;
+        for (int64_t row = box->top; row < box->bottom; row++, cells += stride)
+            put_cells(out, cells, row, box->left, box->right);
+        if (job->starts)
+            job->starts[i + k + 1] = out->n;
+    }
+    return n;
 }
 
 /* Clears the rows of a job but for the box, which is written over. */
@@ -257,6 +315,13 @@ static int64_t share_polygons(const tl_polygons *p, const tl_share_job *job)
         const int64_t top = box->top > job->top ? box->top : job->top,
                       bottom = box->bottom < job->bottom ? box->bottom : job->bottom;
         out.polygon = polygon;
+        if (!job->is_alone && fits_stack(p, job, polygon)) {
+            const int64_t n = share_stack(&s, p, &out, i);
+            if (n == 0)
+                return i - job->first;
+            i += n - 1;
+            continue;
+        }
         if (job->is_alone)
             clear_beside(job, box, p->is_simple[polygon]);
         if (top < bottom && box->left < box->right) {

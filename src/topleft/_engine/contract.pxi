@@ -254,7 +254,7 @@ cdef extern from "topleft.h" nogil:
         double half_width_px, half_height_px, background
         int is_f64_out
     enum:
-        TL_POLYGON_PAD, TL_CERTIFY_WORDS, TL_PIECE_WORDS, TL_CELL_ROWS
+        TL_POLYGON_PAD, TL_CERTIFY_WORDS, TL_PIECE_WORDS, TL_CELL_ROWS, TL_LEAST_SHARE_CELLS
     ctypedef struct tl_polygons:
         const int32_t *x_fx
         const int32_t *y_fx

@@ -493,6 +493,7 @@ def color_rows(colors: NDArray[np.uint8], first: int, end: int, rows: NDArray[np
 CELL_ROWS: int
 CERTIFY_WORDS: int
 LABEL_SCRATCH_BYTES: int
+LEAST_SHARE_CELLS: int
 PIECE_BYTES: int
 PIECE_WORDS: int
 POLYGON_PAD: int

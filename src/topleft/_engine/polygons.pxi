@@ -6,6 +6,7 @@ PIECE_WORDS = TL_PIECE_WORDS
 PIECE_BYTES = sizeof(tl_edge_piece)
 LABEL_SCRATCH_BYTES = sizeof(tl_label_scratch)
 CELL_ROWS = TL_CELL_ROWS
+LEAST_SHARE_CELLS = TL_LEAST_SHARE_CELLS
 
 
 def polygon_stride(int64_t width):

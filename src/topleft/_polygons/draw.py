@@ -15,7 +15,7 @@ from topleft._base.memory import SCRATCH
 from topleft._base.threads import run_parts
 from topleft._polygons.prepared import Prepared
 
-__all__ = ["add_shares", "draw_labels", "draw_mask", "sort_bands"]
+__all__ = ["add_shares", "cells_for", "draw_labels", "draw_mask", "sort_bands"]
 
 #: Labels of a band of rows that is drawn at a time: it stays in the second-level cache.
 BAND_BYTES = 1 << 20
@@ -130,8 +130,8 @@ def cells_for(prepared: Prepared, n_rows: int) -> int:
     """Return how many cells the largest box needs, of up to n_rows rows, or those of a single row of it."""
     boxes = prepared.engine.boxes_px.astype(np.int64)
     if not len(boxes):
-        return 64
+        return _engine.LEAST_SHARE_CELLS
     width, height = boxes[:, 2] - boxes[:, 0], np.minimum(boxes[:, 3] - boxes[:, 1], n_rows)
     stride = (width + 63) // 16 * 16
     largest = int((stride * np.maximum(height, 1)).max()) + 64
-    return max(min(largest, MAX_CELLS), int(stride.max()) + 64)
+    return max(min(largest, MAX_CELLS), int(stride.max()) + 64, _engine.LEAST_SHARE_CELLS)

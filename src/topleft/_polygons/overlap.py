@@ -17,7 +17,7 @@ from topleft._base.memory import SCRATCH, FreshMemory
 from topleft._base.options import parse
 from topleft._base.threads import run_parts
 from topleft._field.grid import Grid
-from topleft._polygons.draw import MAX_CELLS
+from topleft._polygons.draw import cells_for
 from topleft._polygons.polygons import Rule, frame_of
 from topleft._polygons.prepared import Prepared, prepare
 from topleft._polygons.rings import as_points, as_rings, rings_of_triangles
@@ -200,9 +200,7 @@ def list_areas(prepared: Prepared, used: list[tuple[npt.NDArray[Any], npt.NDArra
     starts = np.zeros(n + 1, np.int64)
     n_threads = max(1, min(prepared.n_threads, n))
     at_once = max(1, MAX_ENTRIES_AT_ONCE // n_threads)
-    stride = (widths + 63) // 16 * 16
-    n_cells = int((stride * heights).max()) + 64 if n else 64
-    n_cells = max(min(n_cells, MAX_CELLS), int(stride.max()) + 64 if n else 64)
+    n_cells = cells_for(prepared, size[1])
     cells = SCRATCH.constant("cells", n_cells * n_threads, _engine.CELL_CLEAR)
     slots = list(range(n_threads))
 
