@@ -26,6 +26,8 @@ from topleft._model.mesh import Mesh
 from topleft._model.scene import Instance, Scene
 from topleft._model.texture import Texture
 from topleft._plan.plan import Plan, plan
+from topleft._polygons.overlap import Overlap, overlap
+from topleft._polygons.polygons import polygons
 from topleft._raster.classic import bresenham_line
 from topleft._raster.composite import composite
 from topleft._raster.fragments import Fragments
@@ -74,6 +76,7 @@ __all__ = [
     "MeshError",
     "MissingPackageError",
     "OpenCVLens",
+    "Overlap",
     "Plan",
     "Rasterizer",
     "Scene",
@@ -94,8 +97,10 @@ __all__ = [
     "height_map",
     "load",
     "overdraw",
+    "overlap",
     "peel",
     "plan",
+    "polygons",
     "rasterize",
     "rasterize_mesh",
     "release_memory",
