@@ -167,12 +167,7 @@ def polygons(
 
 
 def frame_of(
-    rings: RingSet,
-    size: tuple[int, int] | Grid,
-    origin: object,
-    subpixel_bits: object,
-    threads: object,
-    n_samples: int,
+    rings: RingSet, size: tuple[int, int] | Grid, origin: object, subpixel_bits: object, threads: object, n_samples: int
 ) -> tuple[RingSet, Frame]:
     """Return the rings in pixels, and the window that they are drawn in."""
     if isinstance(size, Grid):
