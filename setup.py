@@ -103,8 +103,8 @@ def digest(*parts: object) -> str:
 
 
 def files_in(folder: str, *suffixes: str) -> list[Path]:
-    """Return the files of a folder that end in one of the suffixes, sorted."""
-    return sorted(path for path in (ROOT / folder).iterdir() if path.suffix in suffixes)
+    """Return the files in and below a folder that end in one of the suffixes, sorted."""
+    return sorted(path for path in (ROOT / folder).rglob("*") if path.suffix in suffixes)
 
 
 def make_once(target: Path, key: str, make) -> None:

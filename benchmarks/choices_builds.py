@@ -23,11 +23,11 @@ from benchmarks.machine import ROOT
 SOURCES = ("csrc", "src", "setup.py", "pyproject.toml", "README.md", "LICENSE")
 
 BUILDS: Mapping[str, tuple[str, str, Mapping[str, str]]] = {
-    "boxes to 4x4": ("batch.c", "TL_SMALL_BOX", {"none": "2"}),
-    "boxes to 16x16": ("batch.c", "TL_MIDDLE_BOX", {"to 8x8": "8", "to 12x12": "12"}),
-    "boxes to 62x62": ("batch.c", "TL_MAX_BOX_PX", {"to 16x16": "16", "to 32x32": "32"}),
-    "bands of few": ("blend.c", "TL_FEW_TRIANGLES", {"never": "0", "always": "(1 << 30)"}),
-    "band of colours": ("blend.c", "TL_BAND_BYTES", {"64 KiB": "(1 << 16)", "1 MiB": "(1 << 20)"}),
+    "boxes to 4x4": ("raster/batch.c", "TL_SMALL_BOX", {"none": "2"}),
+    "boxes to 16x16": ("raster/batch.c", "TL_MIDDLE_BOX", {"to 8x8": "8", "to 12x12": "12"}),
+    "boxes to 62x62": ("raster/batch.c", "TL_MAX_BOX_PX", {"to 16x16": "16", "to 32x32": "32"}),
+    "bands of few": ("blend/blend.c", "TL_FEW_TRIANGLES", {"never": "0", "always": "(1 << 30)"}),
+    "band of colours": ("blend/blend.c", "TL_BAND_BYTES", {"64 KiB": "(1 << 16)", "1 MiB": "(1 << 20)"}),
 }
 """By choice: the file, the constant, and other values by name."""
 

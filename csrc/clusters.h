@@ -1,5 +1,7 @@
 /* Clusters: what a mesh in object space is sorted into, and what a pass over one needs.  Part of the contract of topleft.h, which
  * includes it behind the types that it uses. */
+#include "topleft.h" /* before the guard: it includes this file behind its types */
+
 #ifndef TOPLEFT_CLUSTERS_H
 #define TOPLEFT_CLUSTERS_H
 

@@ -1,5 +1,7 @@
 /* The kernel table: what an instruction set has, a function a line.  Part of the contract of topleft.h, which includes it behind all
  * types. */
+#include "topleft.h" /* before the guard: it includes this file behind its types */
+
 #ifndef TOPLEFT_KERNELS_H
 #define TOPLEFT_KERNELS_H
 

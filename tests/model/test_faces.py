@@ -62,7 +62,7 @@ def messy(rng, n_vertices, n_triangles, dtype):
 
 
 def mapped(vertices, triangles, threads):
-    """All that the kernels of faces.c and directions.c give of a mesh."""
+    """All that the kernels of csrc/mesh/normals.c give of a mesh."""
     normals = faces.angle_weighted_normals(vertices, triangles, threads=threads)
     rows = faces.unit_rows(normals, np.arange(9.0).reshape(3, 3) ** 2)
     return (

@@ -1,0 +1,126 @@
+/* Accumulate: one pass over the rows that sums the cells from the left, writes the sums as float32 and clears the cells.
+ * In: cells (ramp.c).  Out: pixels, and whether every sum is right.
+ *
+ * 32 bits hold sums below 192.  From a sum in [-2^-4, 192 - 2^-4) one cell, below 2^30 units, leads to where the two upper
+ * bits of sum + 2^20 are both set before it can lead around: such a sum is seen, and the scene is drawn again in 64 bits,
+ * with the same result wherever both are right.
+ *
+ * Based on: R. Levien, font-rs, 2015. */
+#ifndef TL_ACCUMULATE_C
+#define TL_ACCUMULATE_C
+
+#include <stdint.h>
+#include <string.h>
+
+#include "topleft.h"
+#include "lanes/lanes.h"
+#include "vertex/fixed.h"
+#include "area/ramp.c"
+
+#define TL_SUM_MARGIN (1 << 20) /* rounding may leave a few units less than nothing */
+#define TL_SUM_UNIT (1.0f / (1 << TL_AREA_BITS))
+
+/* Sums are unsigned, but for those just below 0. */
+TL_INLINE vf area_of_sums(vi sums, int is_clamped)
+{
+    const vi one = vi_set1(1 << TL_AREA_BITS);
+    const vi positive = vi_select(vi_gt_unsigned(sums, vi_set1(-TL_SUM_MARGIN - 1)), vi_set1(0), sums);
+    if (is_clamped)
+        return vf_mul(vf_from_vi(vi_select(vi_gt_unsigned(positive, one), one, positive)), vf_set1(TL_SUM_UNIT));
+    return vf_mul(vf_from_unsigned(positive), vf_set1(TL_SUM_UNIT));
+}
+
+/* Bit 31 is set where a sum has come near the end of its range. */
+TL_INLINE vi sum_alarm(vi sums)
+{
+    const vi shifted = vi_add(sums, vi_set1(TL_SUM_MARGIN));
+    return vi_and(shifted, vi_add(shifted, shifted));
+}
+
+/* The sum of the four cells left of column 0.  Only the whole of it is an area: in between it may be anything. */
+TL_INLINE vi left_sum(int32_t *row, vi *seen)
+{
+    int64_t sum = 0;
+    for (int k = TL_CELL_PAD - 4; k < TL_CELL_PAD; k++)
+        sum += (int64_t)row[k] - TL_CELL_ZERO;
+    if (sum < -TL_SUM_MARGIN || sum >= ((int64_t)3 << 30) - TL_SUM_MARGIN)
+        *seen = vi_set1(INT32_MIN);
+    for (int k = 0; k < TL_CELL_PAD; k += TL_LANES)
+        vi_store(row + k, vi_set1(TL_CELL_ZERO));
+    return vi_set1((int32_t)(uint32_t)sum);
+}
+
+TL_INLINE vi accumulate_lanes(int32_t *cells, vi *carry, vi *seen)
+{
+    const vi bias = vi_set1(TL_CELL_ZERO), sums = vi_add(vi_prefix_sum(vi_sub(vi_load(cells), bias)), *carry);
+    vi_store(cells, bias);
+    *carry = vi_last(sums);
+    *seen = vi_or(*seen, sum_alarm(sums));
+    return sums;
+}
+
+/* A masked store costs AMD twenty cycles with AVX2: only for the last vector of a row. */
+TL_INLINE void store_areas(float *out, int64_t n, vf areas)
+{
+    if (n >= TL_LANES)
+        vf_store(out, areas);
+    else
+        vf_store_masked(out, vm_first(n), areas);
+}
+
+/* Two rows at a time hide how long a carry takes. */
+TL_INLINE int accumulate_narrow(const area_plane *plane, const tl_area *target, int is_clamped)
+{
+    const int64_t stride = plane->stride, n_cols = plane->n_cols;
+    vi seen = vi_set1(0);
+    for (int64_t row = 0; row < plane->n_rows; row += 2) {
+        const int64_t below = row + 1 < plane->n_rows ? row + 1 : row; 
+        int32_t *a = plane->cells + row * stride + TL_CELL_PAD, *b = plane->cells + below * stride + TL_CELL_PAD;
+        float *out_a = target->pixels + row * target->stride_px, *out_b = target->pixels + below * target->stride_px;
+        vi carry_a = left_sum(a - TL_CELL_PAD, &seen), carry_b = left_sum(b - TL_CELL_PAD, &seen);
+        for (int64_t col = 0; col < n_cols; col += TL_LANES) {
+            const vi sums_a = accumulate_lanes(a + col, &carry_a, &seen);
+            const vf area_a = area_of_sums(sums_a, is_clamped);
+            if (below != row) {
+                const vi sums_b = accumulate_lanes(b + col, &carry_b, &seen);
+                store_areas(out_b + col, n_cols - col, area_of_sums(sums_b, is_clamped));
+            }
+            store_areas(out_a + col, n_cols - col, area_a);
+        }
+        for (int64_t col = n_cols / TL_LANES * TL_LANES; col < stride - TL_CELL_PAD; col += TL_LANES) {
+            vi_store(a + col, vi_set1(TL_CELL_ZERO));
+            vi_store(b + col, vi_set1(TL_CELL_ZERO));
+        }
+    }
+    return !vm_any(vi_gt(vi_set1(0), seen));
+}
+
+static void accumulate_wide(const area_plane *plane, const tl_area *target)
+{
+    for (int64_t row = 0; row < plane->n_rows; row++) {
+        int64_t *cells = plane->wide_cells + row * plane->stride, sum = 0;
+        for (int64_t k = TL_CELL_PAD - 4; k < TL_CELL_PAD; k++)
+            sum += cells[k];
+        for (int64_t col = 0; col < plane->n_cols; col++) {
+            sum += cells[TL_CELL_PAD + col];
+            const int64_t positive = max64(sum, 0), shown = target->is_clamped ? min64(positive, 1 << TL_AREA_BITS) : positive;
+            target->pixels[row * target->stride_px + col] = (float)shown * TL_SUM_UNIT;
+        }
+        memset(cells, 0, sizeof *cells * (size_t)plane->stride);
+    }
+}
+
+/* Returns whether the pixels are right; the cells are clear afterwards in any case. */
+static int accumulate(const area_plane *plane, const tl_area *target)
+{
+    if (target->is_wide) {
+        accumulate_wide(plane, target);
+        return 1;
+    }
+    int32_t seen[4];
+    v4_store(seen, plane->seen);
+    const int fits = target->is_clamped ? accumulate_narrow(plane, target, 1) : accumulate_narrow(plane, target, 0);
+    return fits && (seen[0] | seen[1] | seen[2] | seen[3]) >= 0;
+}
+
+#endif

@@ -1,0 +1,247 @@
+/* Area: the exact area of each pixel that the triangles of a scene cover, added up over the triangles.
+ * In: vertex records and triangles.  Out: float32 pixels.
+ *
+ * Triangles become edges, edges become differences in cells (ramp.c), and one pass over the rows sums these up
+ * (accumulate.c): the cost goes with the edges, not with what they enclose.  Sums are integers, so order, threads and
+ * vectors do not matter, and where a mesh tiles the plane they are 2^24 to the last bit. */
+#ifndef TL_AREA_C
+#define TL_AREA_C
+
+#include <stdint.h>
+#include <string.h>
+
+#include "topleft.h"
+#include "lanes/lanes.h"
+#include "vertex/clip.c"
+#include "vertex/fixed.h"
+#include "raster/batch.c"
+#include "raster/raster.c"
+#include "raster/setup.c"
+#include "area/accumulate.c"
+#include "area/ramp.c"
+
+#define TL_MAX_EDGE_BITS 14 /* pixels of an edge in lanes: see the error bound of ramp.c */
+#define TL_SHORT_ROWS 8
+#define TL_EDGE_QUEUE 112
+
+/* Edges wait until a vector is full of their kind: of 1 to 8 rows, or more; that pass up to 2 columns a row, or up to 6;
+ * or any number.  The last kind are no edges at all: horizontal, or without an effect here. */
+enum { TL_EDGES_LONG = TL_SHORT_ROWS, TL_EDGES_FLAT = TL_SHORT_ROWS + 1, TL_EDGES_SHALLOW = 2 * TL_EDGES_FLAT, TL_EDGES_NONE, TL_EDGE_KINDS };
+
+typedef struct {
+    area_plane plane;
+    const tl_scene *scene;
+    int64_t bad_row;
+    int32_t max_extent;
+    int is_wide;
+    int32_t n[TL_EDGE_KINDS];
+    edge_record edges[TL_EDGE_KINDS][TL_EDGE_QUEUE];
+} area_state;
+
+TL_INLINE void flush_kind(area_state *s, int is_wide, int kind, int n)
+{
+    const edge_record *edges = s->edges[kind];
+    if (kind == TL_EDGES_SHALLOW)
+        add_shallow_edges(&s->plane, is_wide, edges, n);
+    else if (kind < TL_EDGES_LONG)
+        add_short_edges(&s->plane, is_wide, 1, edges, n, kind + 1);
+    else if (kind == TL_EDGES_LONG)
+        add_long_edges(&s->plane, is_wide, 1, edges, n);
+    else if (kind < TL_EDGES_FLAT + TL_EDGES_LONG)
+        add_short_edges(&s->plane, is_wide, 2, edges, n, kind - TL_EDGES_FLAT + 1);
+    else
+        add_long_edges(&s->plane, is_wide, 2, edges, n);
+}
+
+static __attribute__((noinline)) void flush_narrow(area_state *s, int kind, int n) { flush_kind(s, 0, kind, n); }
+static __attribute__((noinline)) void flush_wide(area_state *s, int kind, int n) { flush_kind(s, 1, kind, n); }
+
+/* Draws the whole vectors of a kind and keeps the rest; at the end of the scene the rest as well. */
+static void flush_edges(area_state *s, int kind, int is_end)
+{
+    int n = s->n[kind];
+    const int n_rest = is_end ? 0 : n % TL_LANES;
+    n -= n_rest;
+    for (int k = n; is_end && k < n + TL_LANES; k++) /* below the window: no height */
+        s->edges[kind][k] = (edge_record){0, s->plane.bottom_fx, 0, 1};
+    if (n > 0 && s->is_wide)
+        flush_wide(s, kind, n);
+    else if (n > 0)
+        flush_narrow(s, kind, n);
+    memmove(s->edges[kind], s->edges[kind] + n, sizeof(edge_record) * (size_t)n_rest);
+    s->n[kind] = n_rest;
+}
+
+static void make_room_for_edges(area_state *s)
+{
+    for (int kind = 0; kind < TL_EDGES_NONE; kind++)
+        if (s->n[kind] > TL_EDGE_QUEUE - 4 * TL_MAX_LANES)
+            flush_edges(s, kind, 0);
+    s->n[TL_EDGES_NONE] = 0;
+}
+
+/* One edge of a triangle of positive area (y down).  What kind it is depends on the edge alone, or triangles that share
+ * it would not agree. */
+static void push_edge(area_state *s, int64_t x0, int64_t y0, int64_t x1, int64_t y1)
+{
+    const area_plane *p = &s->plane;
+    const int sign = y0 < y1 ? -1 : 1; /* the interior is right of edges that run upwards */
+    if (sign > 0) {
+        const int64_t x = x0, y = y0;
+        x0 = x1, y0 = y1, x1 = x, y1 = y;
+    }
+    const int64_t limit = (int64_t)1 << 30;
+    const int is_narrow = x0 > -limit && x0 < limit && x1 > -limit && x1 < limit && y0 > -limit && y1 < limit;
+    if (!is_narrow || max64(x1 - x0, x0 - x1) > s->max_extent || y1 - y0 > s->max_extent) {
+        add_exact_edge(&s->plane, x0, y0, x1, y1, sign);
+        return;
+    }
+    const int32_t dx = (int32_t)(x1 - x0), dy = (int32_t)(y1 - y0), width = dx < 0 ? -dx : dx;
+    if (dy == 0 || y0 >= p->bottom_fx || y1 <= p->top_fx || min64(x0, x1) >= p->right_fx)
+        return;
+    const int64_t rows = ((y1 - 1) >> p->bits) - (y0 >> p->bits);
+    const int kind = width > 6 * dy ? TL_EDGES_SHALLOW : (int)min64(rows, TL_EDGES_LONG) + (width > 2 * dy ? TL_EDGES_FLAT : 0);
+    s->edges[kind][s->n[kind]++] = (edge_record){(int32_t)x0, (int32_t)y0, dx, sign * dy};
+}
+
+static void push_triangle(area_state *s, const tl_vertex_set *set, const int32_t *corners)
+{
+    tl_triangle t;
+    const int sign = load_triangle(set, corners, &t);
+    const tl_cull cull = s->scene->cull;
+    if (sign == 0 || (sign > 0 && cull == TL_CULL_BACK) || (sign < 0 && cull == TL_CULL_FRONT))
+        return;
+    for (int k = 0; k < 3; k++) {
+        const int next = k == 2 ? 0 : k + 1;
+        push_edge(s, t.x_fx[k], t.y_fx[k], t.x_fx[next], t.y_fx[next]);
+    }
+    make_room_for_edges(s);
+}
+
+/* Triangle i, or its pieces, by itself. */
+static __attribute__((noinline)) void push_alone(area_state *s, int64_t i)
+{
+    const int32_t *corners = s->scene->triangles + 3 * i;
+    const tl_pieces *pieces = s->scene->pieces;
+    if (!is_clipped(&s->scene->mesh, corners)) {
+        push_triangle(s, &s->scene->mesh, corners);
+        return;
+    }
+    const tl_vertex_set set = pieces ? piece_set(pieces, &s->scene->mesh) : s->scene->mesh;
+    for (int64_t k = pieces ? first_piece(pieces, i) : 0; pieces && k < pieces->n_pieces && pieces->source[k] == i; k++)
+        push_triangle(s, &set, pieces->triangles + 3 * k);
+}
+
+/* The edges of the triangles in `drawn`; `turned` ones have negative area. */
+TL_INLINE void push_edges(area_state *s, const lane_corners *c, vm drawn, vm turned)
+{
+    const area_plane *p = &s->plane;
+    const vi zero = vi_set1(0), one = vi_set1(1), last_kind = vi_set1(TL_EDGES_LONG);
+    const vi down = vi_select(turned, one, vi_set1(-1)); /* sign of an edge that runs downwards */
+    for (int k = 0; k < 3; k++) {
+        const int next = k == 2 ? 0 : k + 1;
+        const vm is_up = vi_gt(c->y[k], c->y[next]);
+        const vi x0 = vi_select(is_up, c->x[next], c->x[k]), x1 = vi_select(is_up, c->x[k], c->x[next]);
+        const vi y0 = vi_min(c->y[k], c->y[next]), y1 = vi_max(c->y[k], c->y[next]);
+        const vi dx = vi_sub(x1, x0), dy = vi_sub(y1, y0), width = vi_max(dx, vi_sub(zero, dx)), dy2 = vi_add(dy, dy);
+        const vm meets_rows = vm_and(vi_gt(vi_set1(p->bottom_fx), y0), vi_gt(y1, vi_set1(p->top_fx)));
+        const vm on = vm_and(vm_and(drawn, vi_gt(dy, zero)), vm_and(meets_rows, vi_gt(vi_set1(p->right_fx), vi_min(x0, x1))));
+        const vi rows = vi_sub(vi_shift_right(vi_sub(y1, one), p->bits), vi_shift_right(y0, p->bits));
+        vi kind = vi_min(rows, last_kind);
+        kind = vi_select(vi_gt(width, dy2), vi_add(kind, vi_set1(TL_EDGES_FLAT)), kind);
+        kind = vi_select(vi_gt(width, vi_add(dy2, vi_shift_left(dy2, 1))), vi_set1(TL_EDGES_SHALLOW), kind);
+        kind = vi_select(on, kind, vi_set1(TL_EDGES_NONE));
+        const vi negative = vi_select(is_up, vi_sub(zero, down), down);
+        int32_t kinds[TL_LANES], records[4 * TL_LANES];
+        vi_store(kinds, kind);
+        vi_store_quads(records, (const vi[4]){x0, y0, dx, vi_select(vi_gt(negative, zero), dy, vi_sub(zero, dy))});
+        for (int lane = 0; lane < TL_LANES; lane++) /* no branch: what has no effect goes to a queue that is emptied */
+            v4_store(&s->edges[kinds[lane]][s->n[kinds[lane]]++].x_fx, v4_load(records + 4 * vi_quad_slot(lane)));
+    }
+    make_room_for_edges(s);
+}
+
+/* Setup and cull of the triangles [i, i + TL_LANES). */
+TL_INLINE void push_batch(area_state *s, int64_t i, const int32_t *corners, vm live)
+{
+    const area_plane *p = &s->plane;
+    const vi max_extent = vi_set1(s->max_extent);
+    if (has_bad_index(corners, vi_set1((int32_t)(s->scene->mesh.n_vertices - 1)))) {
+        s->bad_row = i;
+        return;
+    }
+    lane_corners c;
+    const tl_vertex *vertices = s->scene->mesh.vertices;
+    for (int k = 0; k < 3; k++)
+        load_vertices(vertices, corners + k, &c.x[k], &c.y[k], &c.z[k]);
+    const vi x_min = vi_min(vi_min(c.x[0], c.x[1]), c.x[2]), x_max = vi_max(vi_max(c.x[0], c.x[1]), c.x[2]);
+    const vi y_min = vi_min(vi_min(c.y[0], c.y[1]), c.y[2]), y_max = vi_max(vi_max(c.y[0], c.y[1]), c.y[2]);
+    /* a special vertex has x = INT32_MIN: its triangle is too wide, or special throughout */
+    vm alone = vm_or(vi_gt_unsigned(vi_sub(x_max, x_min), max_extent), vi_gt_unsigned(vi_sub(y_max, y_min), max_extent));
+    alone = vm_and(live, vm_or(alone, vi_eq(x_min, vi_set1(TL_SPECIAL))));
+    for (unsigned lanes = vm_bits(alone); lanes; lanes &= lanes - 1)
+        push_alone(s, i + __builtin_ctz(lanes));
+    const vm meets_rows = vm_and(vi_gt(vi_set1(p->bottom_fx), y_min), vi_gt(y_max, vi_set1(p->top_fx)));
+    /* heights are whole numbers of units: the edges of a triangle that lies left of the window add up to nothing there */
+    const vm meets_cols = vm_and(vi_gt(vi_set1(p->right_fx), x_min), vi_gt(x_max, vi_set1(p->left_fx)));
+    vm drawn = vm_and(vm_and_not(live, alone), vm_and(meets_rows, meets_cols));
+    if (!vm_any(drawn))
+        return;
+    /* twice the area: differences of at most 2^25, so every step is exact in float64 */
+    const vd x1 = vd_from_vi(vi_sub(c.x[1], c.x[0])), y1 = vd_from_vi(vi_sub(c.y[1], c.y[0]));
+    const vd x2 = vd_from_vi(vi_sub(c.x[2], c.x[0])), y2 = vd_from_vi(vi_sub(c.y[2], c.y[0]));
+    const vd area = vd_sub(vd_mul(x1, y2), vd_mul(y1, x2));
+    const vm is_positive = vd_ge(area, vd_set1(1.0)), is_negative = vd_ge(vd_set1(-1.0), area);
+    const tl_cull cull = s->scene->cull;
+    const vm either = cull == TL_CULL_BACK ? is_negative : cull == TL_CULL_FRONT ? is_positive : vm_or(is_positive, is_negative);
+    drawn = vm_and(drawn, either);
+    if (vm_any(drawn))
+        push_edges(s, &c, drawn, is_negative);
+}
+
+static void place_plane(const tl_window *window, const tl_area *area, area_plane *p)
+{
+    const int bits = window->subpixel_bits;
+    const int64_t far = (int64_t)1 << 30, beyond = (int64_t)1 << 29; /* no narrow edge, and no window that wide */
+    p->cells = area->is_wide ? NULL : area->cells;
+    p->wide_cells = area->is_wide ? area->cells : NULL;
+    p->stride = (int32_t)tl_area_stride(window->width);
+    p->n_cols = (int32_t)window->width;
+    p->n_rows = (int32_t)window->height;
+    p->x_px = window->x_px;
+    p->y_px = window->y_px;
+    p->left_px = clamp32(window->x_px, -far - beyond, far);
+    p->top_px = clamp32(window->y_px, -far - beyond, far);
+    p->top_fx = clamp32(window->y_px * ((int64_t)1 << bits), -far, far);
+    p->bottom_fx = clamp32((window->y_px + window->height) * ((int64_t)1 << bits), -far, far);
+    p->left_fx = clamp32(window->x_px * ((int64_t)1 << bits), -far, far);
+    p->right_fx = clamp32((window->x_px + window->width) * ((int64_t)1 << bits), -far, far);
+    p->bits = bits;
+    p->n_waiting = 0;
+    p->seen = v4_zero();
+}
+
+static int64_t draw_area(const tl_scene *scene, const tl_window *window, const tl_area *target)
+{
+    area_state s;
+    const int bits = window->subpixel_bits;
+    place_plane(window, target, &s.plane);
+    s.scene = scene, s.bad_row = -1, s.is_wide = target->is_wide;
+    s.max_extent = 1 << (bits + TL_MAX_EDGE_BITS < 25 ? bits + TL_MAX_EDGE_BITS : 25);
+    memset(s.n, 0, sizeof s.n);
+    int32_t tail[3 * TL_LANES] = {0};
+    const int64_t n_whole = scene->n_triangles / TL_LANES * TL_LANES;
+    memcpy(tail, scene->triangles + 3 * n_whole, sizeof(int32_t) * 3 * (size_t)(scene->n_triangles - n_whole));
+    for (int64_t i = 0; i < scene->n_triangles && s.bad_row < 0; i += TL_LANES)
+        push_batch(&s, i, i < n_whole ? scene->triangles + 3 * i : tail, vm_first(scene->n_triangles - i));
+    for (int kind = 0; kind < TL_EDGES_NONE; kind++)
+        flush_edges(&s, kind, 1);
+    if (s.is_wide)
+        flush_quads(&s.plane, 1);
+    else
+        flush_quads(&s.plane, 0);
+    const int fits = accumulate(&s.plane, target);
+    return s.bad_row >= 0 ? s.bad_row : fits ? -1 : TL_AREA_OVERFLOW;
+}
+
+#endif

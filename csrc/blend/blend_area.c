@@ -1,0 +1,178 @@
+/* Blend, by area: the pass that gives each triangle what of each pixel's square lies in it.
+ * In: triangles, one after the other.  Out: pixels.
+ *
+ * Small triangles take places below one another in an atlas of cells, moved there by whole pixels, which changes no bit: so edges
+ * of many triangles fill the lanes of ramp.c.  Only then are the cells summed and the colours blended, triangle by triangle.
+ * A triangle that is too large for that empties the atlas and is drawn by itself. */
+#ifndef TL_BLEND_AREA_C
+#define TL_BLEND_AREA_C
+
+#include <stdint.h>
+#include <string.h>
+
+#include "topleft.h"
+#include "lanes/lanes.h"
+#include "vertex/fixed.h"
+#include "vertex/snap.c"
+#include "raster/batch.c"
+#include "raster/raster.c"
+#include "area/area.c"
+#include "area/ramp.c"
+#include "blend/blend_strip.c"
+#include "blend/mix.c"
+#include "blend/mix.h"
+
+#define TL_ATLAS_COLS 16
+#define TL_ATLAS_TRIANGLES 256
+
+typedef struct {
+    area_state area; /* its plane: the atlas */
+    blend_state *mix;
+    int n, n_atlas_rows; /* triangles, and rows of theirs */
+    int32_t id[TL_ATLAS_TRIANGLES + TL_MAX_LANES], top[TL_ATLAS_TRIANGLES + TL_MAX_LANES], n_rows[TL_ATLAS_TRIANGLES + TL_MAX_LANES];
+    int32_t col[TL_ATLAS_TRIANGLES + TL_MAX_LANES], row[TL_ATLAS_TRIANGLES + TL_MAX_LANES]; /* of the window: where their first cells belong */
+} area_pass;
+
+/* ---- small triangles ----------------------------------------------------------------------------------------------- */
+
+/* Blends what the atlas holds, and clears it. */
+static __attribute__((noinline)) void flush_atlas(area_pass *p)
+{
+    blend_state *b = p->mix;
+    int32_t *cells = p->area.plane.cells + TL_CELL_PAD;
+    for (int kind = 0; kind < TL_EDGES_NONE; kind++)
+        if (p->area.n[kind])
+            flush_edges(&p->area, kind, 1);
+    flush_quads(&p->area.plane, 0);
+    for (int k = 0; k < p->n; k++) {
+        const int64_t id = p->id[k];
+        const int32_t row = p->row[k], col = p->col[k], next = k + 2 < p->n ? k + 2 : k;
+        fetch_pixels(b, p->row[next] * b->stride + p->col[next], p->n_rows[next], 8);
+        const int32_t first_row = row < 0 ? -row : 0, end_row = (int32_t)min64(p->n_rows[k], b->window->height - row);
+        if (b->is_flat && !begin_flat(b, id))
+            continue;
+        if (!b->is_flat)
+            begin_gouraud(b, id, &b->scene->mesh, b->scene->triangles + 3 * id, 0);
+        blend_block(b, &(cell_block){
+                           .cells = cells + (int64_t)(p->top[k] + first_row) * TL_ATLAS_COLS,
+                           .at = (row + first_row) * b->stride + col,
+                           .stride = TL_ATLAS_COLS,
+                           .n_rows = end_row - first_row,
+                           .first = col < 0 ? -col : 0,
+                           .end = (int32_t)min64(TL_ATLAS_COLS, b->window->width - col),
+                       });
+    }
+    for (int32_t k = 0; k < (p->n_atlas_rows + 2) * TL_ATLAS_COLS; k += TL_LANES)
+        vi_store(cells + k, vi_set1(TL_CELL_ZERO));
+    p->n = p->n_atlas_rows = 0;
+}
+
+/* Puts the triangles in m, which span n_rows pixels from (col, row) on, into the atlas. */
+static void push_atlas(area_pass *p, vm m, const lane_corners *c, vm turned, vi id, vi col, vi row, vi n_rows)
+{
+    const tl_window *window = p->mix->window;
+    const int bits = window->subpixel_bits;
+    const vi rows = vi_select(m, n_rows, vi_set1(0)), ends = vi_add(vi_prefix_sum(rows), vi_set1(p->n_atlas_rows));
+    const vi top = vi_sub(ends, rows);
+    int32_t last[TL_MAX_LANES];
+    vi_compress(p->id + p->n, m, id);
+    vi_compress(p->top + p->n, m, top);
+    vi_compress(p->n_rows + p->n, m, rows);
+    vi_compress(p->col + p->n, m, vi_sub(col, vi_set1((int32_t)window->x_px)));
+    vi_compress(p->row + p->n, m, vi_sub(row, vi_set1((int32_t)window->y_px)));
+    p->n += __builtin_popcount(vm_bits(m));
+    vi_store(last, ends);
+    p->n_atlas_rows = last[TL_LANES - 1];
+    lane_corners moved = *c;
+    const vi dx = vi_shift_left(col, bits), dy = vi_shift_left(vi_sub(row, top), bits);
+    for (int k = 0; k < 3; k++) {
+        moved.x[k] = vi_sub(c->x[k], dx);
+        moved.y[k] = vi_sub(c->y[k], dy);
+    }
+    push_edges(&p->area, &moved, m, turned);
+    if (p->n > TL_ATLAS_TRIANGLES - TL_LANES || p->n_atlas_rows > TL_ATLAS_ROWS - TL_ATLAS_COLS * TL_LANES)
+        flush_atlas(p);
+}
+
+/* ---- the scene ----------------------------------------------------------------------------------------------------- */
+
+/* Setup and cull of TL_LANES triangles, which come after all that wait. */
+TL_INLINE void blend_area_batch(area_pass *p, int64_t i, const int32_t *corners, vm live)
+{
+    const tl_scene *scene = p->mix->scene;
+    const tl_window *window = p->mix->window;
+    const int bits = window->subpixel_bits;
+    const vi max_extent = vi_set1(TL_ATLAS_COLS << bits), id = vi_add(vi_set1((int32_t)i), vi_iota());
+    if (has_bad_index(corners, vi_set1((int32_t)(scene->mesh.n_vertices - 1)))) {
+        p->area.bad_row = i;
+        return;
+    }
+    lane_corners c;
+    for (int k = 0; k < 3; k++)
+        load_vertices(scene->mesh.vertices, corners + k, &c.x[k], &c.y[k], &c.z[k]);
+    const vi x_min = vi_min(vi_min(c.x[0], c.x[1]), c.x[2]), x_max = vi_max(vi_max(c.x[0], c.x[1]), c.x[2]);
+    const vi y_min = vi_min(vi_min(c.y[0], c.y[1]), c.y[2]), y_max = vi_max(vi_max(c.y[0], c.y[1]), c.y[2]);
+    const vi col = vi_shift_right(x_min, bits), row = vi_shift_right(y_min, bits);
+    const vi last_col = vi_shift_right(x_max, bits), last_row = vi_shift_right(y_max, bits);
+    const vi n_cols = vi_sub(last_col, col), n_rows = vi_sub(last_row, row); /* less one */
+    /* the cell right of the last column holds what is left of it.  A special vertex has x = INT32_MIN. */
+    vm alone = vm_or(vi_gt_unsigned(vi_sub(x_max, x_min), max_extent), vi_gt_unsigned(vi_sub(y_max, y_min), max_extent));
+    alone = vm_or(alone, vm_or(vi_gt(n_cols, vi_set1(TL_ATLAS_COLS - 2)), vi_gt(n_rows, vi_set1(TL_ATLAS_COLS - 1))));
+    alone = vm_and(live, vm_or(alone, vi_eq(x_min, vi_set1(TL_SPECIAL))));
+    const vi right = vi_set1((int32_t)min64(window->x_px + window->width, INT32_MAX));
+    const vi bottom = vi_set1((int32_t)min64(window->y_px + window->height, INT32_MAX));
+    const vm meets_cols = vm_and(vi_gt(right, col), vi_gt(last_col, vi_set1((int32_t)window->x_px - 1)));
+    const vm meets_rows = vm_and(vi_gt(bottom, row), vi_gt(last_row, vi_set1((int32_t)window->y_px - 1)));
+    vm drawn = vm_and(vm_and_not(live, alone), vm_and(meets_cols, meets_rows));
+    if (!vm_any(vm_or(drawn, alone)))
+        return;
+    /* twice the area: differences below 2^21, so every step is exact in float64 */
+    const vd x1 = vd_from_vi(vi_sub(c.x[1], c.x[0])), y1 = vd_from_vi(vi_sub(c.y[1], c.y[0]));
+    const vd x2 = vd_from_vi(vi_sub(c.x[2], c.x[0])), y2 = vd_from_vi(vi_sub(c.y[2], c.y[0]));
+    const vd area = vd_sub(vd_mul(x1, y2), vd_mul(y1, x2));
+    const vm is_positive = vd_ge(area, vd_set1(1.0)), is_negative = vd_ge(vd_set1(-1.0), area);
+    const tl_cull cull = scene->cull;
+    drawn = vm_and(drawn, cull == TL_CULL_BACK ? is_negative : cull == TL_CULL_FRONT ? is_positive : vm_or(is_positive, is_negative));
+    const vi rows = vi_add(n_rows, vi_set1(1));
+    for (unsigned lanes = vm_bits(alone); lanes; lanes &= lanes - 1) {
+        const int lane = __builtin_ctz(lanes);
+        const vm before = vm_first(lane);
+        if (vm_any(vm_and(drawn, before)))
+            push_atlas(p, vm_and(drawn, before), &c, is_negative, id, col, row, rows);
+        drawn = vm_and_not(drawn, before);
+        if (p->n)
+            flush_atlas(p);
+        blend_area_alone(p->mix, i + lane);
+    }
+    if (vm_any(drawn))
+        push_atlas(p, drawn, &c, is_negative, id, col, row, rows);
+}
+
+/* The window has fewer than 2^31 samples. */
+static int64_t blend_areas(blend_state *b)
+{
+    const tl_scene *scene = b->scene;
+    const tl_window *window = b->window, atlas = {0, 0, TL_ATLAS_COLS, TL_ATLAS_ROWS, window->subpixel_bits, TL_TEST_SAMPLE};
+    const int64_t far = (int64_t)1 << 30;
+    if (window->x_px <= -far || window->x_px >= far || window->y_px <= -far || window->y_px >= far) {
+        const int64_t bad_row = first_bad_row(scene->triangles, scene->n_triangles, scene->mesh.n_vertices);
+        for (int64_t i = 0; bad_row < 0 && i < scene->n_triangles; i++)
+            blend_area_alone(b, i);
+        return bad_row;
+    }
+    area_pass p;
+    p.mix = b, p.n = p.n_atlas_rows = 0;
+    place_plane(&atlas, &(tl_area){.cells = b->canvas->cells}, &p.area.plane);
+    p.area.plane.stride = TL_ATLAS_COLS; /* what an edge adds right of a row is 0 */
+    p.area.scene = scene, p.area.bad_row = -1, p.area.is_wide = 0;
+    memset(p.area.n, 0, sizeof p.area.n);
+    const tl_share all = {.first = 0, .end = scene->n_triangles};
+    for (int64_t i = 0; i < all.end && p.area.bad_row < 0; i += TL_LANES) {
+        int32_t corners[3 * TL_LANES];
+        blend_area_batch(&p, i, share_corners(scene, &all, i, corners), vm_first(all.end - i));
+    }
+    flush_atlas(&p);
+    return p.area.bad_row;
+}
+
+#endif

@@ -1,0 +1,255 @@
+/* Blend, by area: a triangle by itself, by strips of rows whose cells stay in the first-level cache.
+ * In: a triangle, or the pieces that clip planes leave of it.  Out: pixels.
+ *
+ * The areas are those of area.c, in cells that no other triangle shares.  They are summed from the left, and what is covered
+ * blends; between two edges lies a run as it is without areas.
+ *
+ * Based on: R. Levien, font-rs, 2015. */
+#ifndef TL_BLEND_STRIP_C
+#define TL_BLEND_STRIP_C
+
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+#include "topleft.h"
+#include "lanes/lanes.h"
+#include "vertex/clip.c"
+#include "vertex/fixed.h"
+#include "raster/setup.c"
+#include "area/area.c"
+#include "area/ramp.c"
+#include "blend/mix.c"
+#include "blend/mix.h"
+#include "blend/mix_f32.c"
+#include "blend/mix_u8.c"
+
+/* The pixels [col, col + TL_LANES) of a row that begins at `at`; of them those in m that the areas say. */
+TL_INLINE void mix_block(blend_state *b, int64_t at, vm m, vi sums, int is_u8, tl_mix mode)
+{
+    const vi area = vi_min(sums, vi_set1(TL_WHOLE)); /* rounding may add a few units, and take as many */
+    const vm on = vm_and(m, vi_gt(area, vi_set1(0)));
+    if (!vm_any(on))
+        return;
+    if (!b->is_flat) {
+        const unsigned bits = vm_bits(on);
+        const int first = __builtin_ctz(bits), n = 32 - __builtin_clz(bits) - first;
+        color_run(b, at + first, n);
+        memmove(b->source + first, b->source, sizeof *b->source * (size_t)n);
+        memmove(b->source_f32 + first * b->n_channels, b->source_f32, sizeof *b->source_f32 * (size_t)(n * b->n_channels));
+    }
+    if (is_u8)
+        mix_block_u8(b, at, on, area, mode);
+    else
+        mix_block_f32(b, at, on, area, mode);
+}
+
+/* Cells of a triangle and where they belong. */
+typedef struct {
+    int32_t *cells; /* of column 0 */
+    int64_t at;     /* its sample; columns outside [first, end) are not drawn */
+    int32_t stride, n_rows, first, end;
+    int has_left; /* four cells before column 0 count */
+} cell_block;
+
+/* Sums the cells of each row from the left, blends, and clears the cells.  What is covered whole, from one edge to the next, is a
+ * run as it is without areas. */
+TL_INLINE void blend_cells(blend_state *b, const cell_block *c, int is_u8, tl_mix mode)
+{
+    const vi bias = vi_set1(TL_CELL_ZERO);
+    for (int32_t row = 0; row < c->n_rows; row++) {
+        int32_t *cells = c->cells + (int64_t)row * c->stride, whole_from = -1, sum = 0, last[TL_MAX_LANES];
+        const int64_t at = c->at + row * b->stride;
+        for (int k = c->has_left ? -4 : 0; k < 0; k++) {
+            sum += cells[k] - TL_CELL_ZERO;
+            cells[k] = TL_CELL_ZERO;
+        }
+        for (int32_t col = 0; col < c->end; col += TL_LANES) {
+            const vi values = vi_sub(vi_load(cells + col), bias);
+            const int is_constant = !vm_any(vm_and_not(vm_all(), vi_eq(values, vi_set1(0))));
+            if (is_constant && sum <= 0 && whole_from < 0)
+                continue;
+            if (is_constant && sum >= TL_WHOLE) {
+                whole_from = whole_from >= 0 ? whole_from : col > c->first ? col : c->first;
+                continue;
+            }
+            if (whole_from >= 0 && whole_from < col)
+                mix_run(b, at + whole_from, col - whole_from);
+            whole_from = -1;
+            const vi sums = vi_add(vi_prefix_sum(values), vi_set1(sum));
+            vi_store(cells + col, bias);
+            vi_store(last, sums);
+            sum = last[TL_LANES - 1];
+            mix_block(b, at + col, vm_and_not(vm_first(c->end - col), vm_first(c->first - col)), sums, is_u8, mode);
+        }
+        if (whole_from >= 0 && whole_from < c->end)
+            mix_run(b, at + whole_from, c->end - whole_from);
+    }
+}
+
+/* Fetches the pixels of n_rows x n_cols samples: what is done to a row is too long for the next one's loads to start early. */
+TL_INLINE void fetch_pixels(const blend_state *b, int64_t at, int64_t n_rows, int64_t n_cols)
+{
+    const int64_t pixel_bytes = b->canvas->is_u8 ? 4 : 4 * b->n_channels;
+    const char *pixels = b->canvas->is_u8 ? (const char *)b->packed : (const char *)b->floats;
+    for (int64_t row = 0; row < n_rows; row++) {
+        const char *p = pixels + (at + row * b->stride) * pixel_bytes;
+        for (int64_t k = 0; k <= n_cols * pixel_bytes; k += 64)
+            __builtin_prefetch(p + k, 1);
+    }
+}
+
+static __attribute__((noinline)) void blend_cells_u8(blend_state *b, const cell_block *c)
+{
+    TL_MIX_CALL(blend_cells, b->mode, b, c, 1)
+}
+
+/* One copy for all modes: memory is the limit. */
+static __attribute__((noinline)) void blend_cells_f32(blend_state *b, const cell_block *c) { blend_cells(b, c, 0, b->mode); }
+
+static void blend_block(blend_state *b, const cell_block *c)
+{
+    if (b->canvas->is_u8)
+        blend_cells_u8(b, c);
+    else
+        blend_cells_f32(b, c);
+}
+
+/* One edge into the cells of a strip.  The same bits as in a queue of area.c. */
+static void add_edge(area_plane *plane, int64_t x0, int64_t y0, int64_t x1, int64_t y1)
+{
+    const int sign = y0 < y1 ? -1 : 1, bits = plane->bits;
+    const int64_t limit = (int64_t)1 << 30, max_extent = (int64_t)1 << (bits + TL_MAX_EDGE_BITS < 25 ? bits + TL_MAX_EDGE_BITS : 25);
+    if (sign > 0) {
+        const int64_t x = x0, y = y0;
+        x0 = x1, y0 = y1, x1 = x, y1 = y;
+    }
+    const int is_narrow = x0 > -limit && x0 < limit && x1 > -limit && x1 < limit && y0 > -limit && y1 < limit;
+    if (!is_narrow || max64(x1 - x0, x0 - x1) > max_extent || y1 - y0 > max_extent) {
+        add_exact_edge(plane, x0, y0, x1, y1, sign);
+        return;
+    }
+    if (y0 == y1 || y0 >= plane->bottom_fx || y1 <= plane->top_fx || min64(x0, x1) >= plane->right_fx)
+        return;
+    const int32_t dx = (int32_t)(x1 - x0), dy = (int32_t)(y1 - y0), width = dx < 0 ? -dx : dx;
+    const edge_record record = {(int32_t)x0, (int32_t)y0, dx, sign * dy};
+    if (width > 6 * dy)
+        add_shallow_edges(plane, 0, &record, 1);
+    else if (width > 2 * dy)
+        add_long_edges(plane, 0, 2, &record, 1);
+    else
+        add_long_edges(plane, 0, 1, &record, 1);
+}
+
+/* fmin and fmax are calls unless NaN is ruled out. */
+static inline double lesser(double a, double b) { return a < b ? a : b; }
+static inline double greater(double a, double b) { return a > b ? a : b; }
+
+/* The columns that a triangle may touch between two heights, from `left` to `right` of the picture at most. */
+static void strip_columns(const tl_triangle *t, double top_fx, double bottom_fx, int bits, double *left, double *right)
+{
+    const double unit = (double)((int64_t)1 << bits);
+    double low = INFINITY, high = -INFINITY;
+    for (int k = 0; k < 3; k++) {
+        const int next = k == 2 ? 0 : k + 1;
+        const double x0 = (double)t->x_fx[k], x1 = (double)t->x_fx[next], y0 = (double)t->y_fx[k], y1 = (double)t->y_fx[next];
+        const double first = greater(lesser(y0, y1), top_fx), end = lesser(greater(y0, y1), bottom_fx);
+        if (first > end)
+            continue;
+        const double slope = y1 == y0 ? 0.0 : (x1 - x0) / (y1 - y0);
+        const double a = y1 == y0 ? x0 : x0 + (first - y0) * slope, b = y1 == y0 ? x1 : x0 + (end - y0) * slope;
+        low = lesser(low, lesser(a, b)), high = greater(high, greater(a, b));
+    }
+    /* below 2^30 the error is far below a pixel; beyond, nothing is left out */
+    *left = t->is_narrow ? floor(low / unit) - 1.0 : -INFINITY;
+    *right = t->is_narrow ? floor(high / unit) + 2.0 : INFINITY;
+}
+
+/* Rows of a strip n_cols wide: as many as leave its cells in half of the first-level cache, at least a vector of them. */
+static int strip_rows(int64_t n_cols)
+{
+    const int64_t rows = 4096 / tl_area_stride(n_cols) / TL_STRIP_ROWS * TL_STRIP_ROWS;
+    return (int)max64(rows, TL_STRIP_ROWS);
+}
+
+/* What of up to `n` triangles, the pieces of one, lies in rows [row, row + n_rows) of the window. */
+static void blend_strip(blend_state *b, const tl_triangle *pieces, int64_t n, int64_t row, int n_rows)
+{
+    const tl_window *window = b->window;
+    const int bits = window->subpixel_bits;
+    const double unit = (double)((int64_t)1 << bits);
+    double left = INFINITY, right = -INFINITY;
+    for (int64_t i = 0; i < n; i++) {
+        double from, to;
+        strip_columns(pieces + i, (double)(window->y_px + row) * unit, (double)(window->y_px + row + n_rows) * unit, bits, &from, &to);
+        left = lesser(left, from), right = greater(right, to);
+    }
+    left = greater(left - (double)window->x_px, 0.0), right = lesser(right - (double)window->x_px, (double)window->width);
+    if (!(left < right))
+        return;
+    const int64_t col = (int64_t)left;
+    const tl_window strip = {window->x_px + col, window->y_px + row, (int64_t)right - col, n_rows, bits, TL_TEST_SAMPLE};
+    area_plane plane;
+    fetch_pixels(b, row * b->stride + col, n_rows, min64(strip.width, 128));
+    place_plane(&strip, &(tl_area){.cells = b->canvas->cells}, &plane);
+    for (int64_t i = 0; i < n; i++)
+        for (int k = 0; k < 3; k++) {
+            const int next = k == 2 ? 0 : k + 1;
+            add_edge(&plane, pieces[i].x_fx[k], pieces[i].y_fx[k], pieces[i].x_fx[next], pieces[i].y_fx[next]);
+        }
+    flush_quads(&plane, 0);
+    blend_block(b, &(cell_block){
+                       .cells = plane.cells + TL_CELL_PAD,
+                       .at = row * b->stride + col,
+                       .stride = plane.stride,
+                       .n_rows = n_rows,
+                       .end = plane.n_cols,
+                       .has_left = 1,
+                   });
+    for (int64_t k = 0; k < n_rows; k++) /* what lies right of the window, for nobody */
+        for (int64_t i = plane.n_cols / TL_LANES * TL_LANES; i < plane.stride - TL_CELL_PAD; i += TL_LANES)
+            vi_store(plane.cells + k * plane.stride + TL_CELL_PAD + i, vi_set1(TL_CELL_ZERO));
+}
+
+
+/* Triangle i, all of its pieces as one. */
+static __attribute__((noinline)) void blend_area_alone(blend_state *b, int64_t i)
+{
+    const tl_window *window = b->window;
+    const tl_cull cull = b->scene->cull;
+    const int32_t *corners = b->scene->triangles + 3 * i;
+    const tl_pieces *pieces = b->scene->pieces;
+    const int is_cut = is_clipped(&b->scene->mesh, corners);
+    tl_vertex_set set = b->scene->mesh;
+    int64_t n_pieces = 1, n = 0, top = INT64_MAX, bottom = INT64_MIN, left = INT64_MAX, right = INT64_MIN;
+    tl_triangle t[TL_MAX_PIECES];
+    if (is_cut) {
+        const int64_t first = pieces ? first_piece(pieces, i) : 0;
+        for (n_pieces = 0; pieces && first + n_pieces < pieces->n_pieces && pieces->source[first + n_pieces] == i;)
+            n_pieces++;
+        if (n_pieces == 0)
+            return;
+        set = piece_set(pieces, &b->scene->mesh);
+        corners = pieces->triangles + 3 * first;
+    }
+    for (int64_t k = 0; k < n_pieces && n < TL_MAX_PIECES; k++) {
+        const int sign = load_triangle(&set, corners + 3 * k, t + n);
+        if (sign == 0 || (sign > 0 && cull == TL_CULL_BACK) || (sign < 0 && cull == TL_CULL_FRONT))
+            continue;
+        top = min64(top, min3(t[n].y_fx[0], t[n].y_fx[1], t[n].y_fx[2]) >> window->subpixel_bits);
+        bottom = max64(bottom, max3(t[n].y_fx[0], t[n].y_fx[1], t[n].y_fx[2]) >> window->subpixel_bits);
+        left = min64(left, min3(t[n].x_fx[0], t[n].x_fx[1], t[n].x_fx[2]) >> window->subpixel_bits);
+        right = max64(right, max3(t[n].x_fx[0], t[n].x_fx[1], t[n].x_fx[2]) >> window->subpixel_bits);
+        n++;
+    }
+    const int64_t first_row = max64(top - window->y_px, 0), end_row = n ? min64(bottom + 1 - window->y_px, window->height) : 0;
+    if (first_row >= end_row || (b->is_flat && !begin_flat(b, i)))
+        return;
+    if (!b->is_flat)
+        begin_gouraud(b, i, &set, corners, is_cut);
+    const int n_rows = strip_rows(min64(window->width, right - left + 4));
+    for (int64_t row = first_row; row < end_row; row += n_rows)
+        blend_strip(b, t, n, row, (int)min64(n_rows, end_row - row));
+}
+
+#endif

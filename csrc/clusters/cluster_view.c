@@ -1,0 +1,381 @@
+/* What a view draws of a clustered mesh: which clusters it needs, which of them lie behind what is drawn, and a cluster as a scene of
+ * its own, whose vertices stay in the first-level cache.
+ * In: a clustered mesh in object space, a matrix; then a depth buffer.  Out: the clusters that may draw a sample; snapped vertices
+ * and triangles, which raster.c draws.
+ *
+ * What is left out draws nothing, whatever the snap does to it: every test has the errors of the vertex stage and of the
+ * snap on its far side.
+ *
+ * Based on: U. Assarsson, T. Möller, Optimized View Frustum Culling Algorithms for Bounding Boxes, 2000;
+ * N. Greene, M. Kass, G. Miller, Hierarchical Z-Buffer Visibility, 1993 (with one level: clusters are small in the picture). */
+#ifndef TL_CLUSTER_VIEW_C
+#define TL_CLUSTER_VIEW_C
+
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+#include "clusters.h"
+#include "topleft.h"
+#include "lanes/lanes.h"
+#include "vertex/fixed.h"
+#include "vertex/project.c"
+
+/* Row i of the matrix over a box: its value at the centre, how far it goes from there, and a bound of its terms. */
+typedef struct {
+    double centre, reach, terms;
+} form_bounds;
+
+/* A box under a matrix. */
+typedef struct {
+    double centre[3], half[3];
+    form_bounds f[4];
+} seen_box;
+
+#define TL_N_SIDES 6 /* left, right, above, below, near, far */
+#define TL_IN_DEPTH 0x30u /* within near and far: no triangle is cut into pieces, whose corners are others */
+
+static inline seen_box place_box(const double *low, const double *high, const double *matrix)
+{
+    seen_box b;
+    for (int k = 0; k < 3; k++) {
+        b.centre[k] = 0.5 * (low[k] + high[k]);
+        b.half[k] = 0.5 * (high[k] - low[k]) + 0x1p-50 * (fabs(low[k]) + fabs(high[k]));
+    }
+    for (int i = 0; i < 4; i++) {
+        const double *row = matrix + 4 * i;
+        b.f[i] = (form_bounds){row[3], 0.0, fabs(row[3])};
+        for (int k = 0; k < 3; k++) {
+            b.f[i].centre += row[k] * b.centre[k];
+            b.f[i].reach += fabs(row[k]) * b.half[k];
+            b.f[i].terms += fabs(row[k]) * (fabs(b.centre[k]) + b.half[k]);
+        }
+    }
+    return b;
+}
+
+/* a * (row i) + b * w over a box: its value at the centre, and how far it may be from that with the errors of the vertex stage. */
+static inline double mixed_form(const seen_box *box, const tl_cluster_view *v, int i, double a, double b, double *reach)
+{
+    const double *row = v->matrix + 4 * i, *row_w = v->matrix + 12;
+    *reach = v->error * (fabs(a) * box->f[i].terms + fabs(b) * box->f[3].terms);
+    for (int k = 0; k < 3; k++)
+        *reach += fabs(a * row[k] + b * row_w[k]) * box->half[k];
+    return a * box->f[i].centre + b * box->f[3].centre;
+}
+
+/* Whether a box is certain to lie outside of the window; if not, the sides that it is certain to lie within are added to `within`.
+ * Those that are there already are not looked at. */
+static int is_outside(const seen_box *box, const tl_cluster_view *v, unsigned *within)
+{
+    const double near_w = v->zero_to_one ? 0.0 : 1.0;
+    for (int side = 0; side < TL_N_SIDES; side++) {
+        if (*within >> side & 1)
+            continue;
+        if ((side == 4 && !v->near_clip) || (side == 5 && !v->far_clip)) {
+            *within |= 1u << side;
+            continue;
+        }
+        double reach;
+        const double value = side < 4    ? mixed_form(box, v, side / 2, v->side[side][0], v->side[side][1], &reach)
+                             : side == 4 ? mixed_form(box, v, 2, 1.0, near_w, &reach)
+                                         : mixed_form(box, v, 2, -1.0, 1.0, &reach);
+        if (value + reach < 0.0)
+            return 1;
+        if (value - reach > 0.0)
+            *within |= 1u << side;
+    }
+    return 0;
+}
+
+/* Whether every triangle of a box within the near and far planes is certain to be turned the way that is culled after the snap.
+ *
+ * The screen area of a triangle is n . g(a) times a factor, with g(a) = k - k3 a, where (k, k3) is the eye: what the rows of x, y
+ * and w take to 0.  The vertex stage and the snap move corners by less than d sub-pixels, which changes twice the area by less
+ * than 4 d (lx + ly) + 8 d^2 sub-pixels^2 when no side is longer than (lx, ly). */
+static int is_turned_away(const tl_cluster *c, const tl_cluster_view *v, const seen_box *box)
+{
+    const form_bounds *f = box->f;
+    const double w_min = f[3].centre - f[3].reach - v->error * f[3].terms, w_max = f[3].centre + f[3].reach + v->error * f[3].terms;
+    if (!(c->cone_cos > 0.0 && w_min > 0.0))
+        return 0;
+    const double sign = v->cull == TL_CULL_BACK ? -1.0 : 1.0, radius = sqrt((box->half[0] * box->half[0] + box->half[1] * box->half[1]) + box->half[2] * box->half[2]);
+    double g[3], squares = 0.0, along = 0.0;
+    for (int k = 0; k < 3; k++) {
+        g[k] = sign * (v->eye[k] - v->eye[3] * box->centre[k]);
+        squares += g[k] * g[k];
+        along += g[k] * c->axis[k];
+    }
+    const double length = sqrt(squares);
+    along /= length;
+    const double across = sqrt(fmax(0.0, 1.0 - along * along)), cone_sin = sqrt(fmax(0.0, 1.0 - c->cone_cos * c->cone_cos));
+    const double least = 0.999 * length * (along * c->cone_cos - across * cone_sin) - 1.001 * fabs(v->eye[3]) * radius;
+    const double factor = least * (v->scale_x * v->scale_y) / (w_max * w_max * w_max);
+    double sides = 0.0, moved = 0.0;
+    const double scale[2] = {v->scale_x, v->scale_y};
+    for (int k = 0; k < 2; k++) {
+        const double largest = (fabs(f[k].centre) + f[k].reach) / w_min;
+        moved = fmax(moved, 0.75 + scale[k] * v->error * (f[k].terms + largest * f[3].terms) / w_min);
+        sides += 1.001 * scale[k] * (v->length[k] + largest * v->length[2]) / w_min;
+    }
+    return c->min_height * factor > 8.0 * moved * sides && c->min_area * factor > 16.0 * moved * moved;
+}
+
+/* Whether the cluster shows its back, or what is culled, about: it is drawn late then, when what is in front of it may hide it. */
+static int shows_back(const tl_cluster *c, const tl_cluster_view *v, const seen_box *box)
+{
+    double along = 0.0;
+    for (int k = 0; k < 3; k++)
+        along += (v->eye[k] - v->eye[3] * box->centre[k]) * c->axis[k];
+    return v->cull == TL_CULL_FRONT ? along > 0.0 : along < 0.0;
+}
+
+/* ---- occlusion ------------------------------------------------------------------------------------------- */
+
+/* Whether every depth of a rectangle of the window beats this one. */
+TL_INLINE int all_beat(const tl_target *target, int64_t row0, int64_t row1, int64_t col0, int64_t col1, float depth, int is_farthest)
+{
+    const vf bound = vf_set1(depth);
+    for (int64_t row = row0; row < row1; row++) {
+        const float *p = target->depth + row * target->stride_px;
+        for (int64_t col = col0; col < col1; col += TL_LANES) {
+            const vm live = vm_first(col1 - col);
+            const vf there = vf_load_masked(live, p + col);
+            if (vm_any(vm_and_not(live, is_farthest ? vf_lt(bound, there) : vf_lt(there, bound))))
+                return 0;
+        }
+    }
+    return 1;
+}
+
+/* The depth of the vertex stage for z / w. */
+static inline double depth_of_ndc(const tl_cluster_view *v, double z) { return v->zero_to_one ? z : (z + 1.0) * 0.5; }
+
+/* Whether the middle of a box lies before what the window shows there: then it is not hidden, and this is the cheaper test. */
+static inline int shows_middle(const seen_box *box, const tl_cluster_view *v, const tl_window *window, const tl_target *target)
+{
+    const double inverse = 1.0 / box->f[3].centre;
+    const double x_px = (box->f[0].centre * inverse + 1.0) * v->half_width_px - (double)window->x_px;
+    const double y_px = (1.0 - box->f[1].centre * inverse) * v->half_height_px - (double)window->y_px;
+    if (!(x_px >= 0.0 && x_px < (double)window->width && y_px >= 0.0 && y_px < (double)window->height))
+        return 0;
+    const double z = depth_of_ndc(v, box->f[2].centre * inverse), there = target->depth[(int64_t)y_px * target->stride_px + (int64_t)x_px];
+    return target->sink == TL_SINK_FARTHEST ? there < z : there > z;
+}
+
+/* Whether all of a box lies behind what the window shows where it is, found out by looking at so many pixels at most. */
+static int is_hidden(const seen_box *box, const tl_cluster_view *v, const tl_window *window, const tl_target *target, int64_t most_px)
+{
+    const int is_farthest = target->sink == TL_SINK_FARTHEST;
+    if (shows_middle(box, v, window, target))
+        return 0;
+    unsigned within = 0xf;
+    double corner[4][8], inverse[8], low[3], high[3], largest[3];
+    if (is_outside(box, v, &within) || (within & TL_IN_DEPTH) != TL_IN_DEPTH)
+        return 0;
+    for (int i = 0; i < 4; i++) {
+        const double *row = v->matrix + 4 * i;
+        for (int k = 0; k < 8; k++)
+            corner[i][k] = box->f[i].centre + (((k & 1 ? row[0] : -row[0]) * box->half[0] + (k & 2 ? row[1] : -row[1]) * box->half[1]) +
+                                              (k & 4 ? row[2] : -row[2]) * box->half[2]);
+    }
+    const double w_min = box->f[3].centre - box->f[3].reach - v->error * box->f[3].terms;
+    if (!(w_min > 0.0))
+        return 0;
+    for (int k = 0; k < 8; k++)
+        inverse[k] = 1.0 / corner[3][k];
+    for (int i = 0; i < 3; i++) { /* a quotient of two forms is largest and least at corners */
+        low[i] = INFINITY, high[i] = -INFINITY;
+        for (int k = 0; k < 8; k++) {
+            const double q = corner[i][k] * inverse[k];
+            low[i] = q < low[i] ? q : low[i];
+            high[i] = q > high[i] ? q : high[i];
+        }
+        largest[i] = fmax(fabs(low[i]), fabs(high[i]));
+        const double error = 2.0 * v->error * (box->f[i].terms + largest[i] * box->f[3].terms) / w_min;
+        low[i] -= error, high[i] += error;
+    }
+    /* one pixel more on each side than the snap can move it; sums of doubles up to 2^51 have their pixel right */
+    const double left = (low[0] + 1.0) * v->half_width_px - 1.5, right = (high[0] + 1.0) * v->half_width_px + 1.5;
+    const double top = (1.0 - high[1]) * v->half_height_px - 1.5, bottom = (1.0 - low[1]) * v->half_height_px + 1.5;
+    if (!(left > -0x1p50 && right < 0x1p50 && top > -0x1p50 && bottom < 0x1p50))
+        return 0;
+    const int64_t col0 = max64((int64_t)floor(left) - window->x_px, 0), col1 = min64((int64_t)floor(right) + 1 - window->x_px, window->width);
+    const int64_t row0 = max64((int64_t)floor(top) - window->y_px, 0), row1 = min64((int64_t)floor(bottom) + 1 - window->y_px, window->height);
+    if ((col1 - col0) * (row1 - row0) > most_px)
+        return 0;
+    /* docs/design.md, section 4: the error of a depth before it is rounded to float32 */
+    const double error = 0x1p-33 * (largest[2] + 1.0), z = depth_of_ndc(v, is_farthest ? high[2] : low[2]);
+    if (!(fabs(z) < 0x1p126)) /* the vertex stage has depths end at the largest float32 */
+        return 0;
+    return all_beat(target, row0, row1, col0, col1, (float)(is_farthest ? z + error : z - error), is_farthest);
+}
+
+#define TL_MAX_PX_OF_CULLED 1024 /* triangles that are culled one by one take no longer */
+
+static int is_cluster_hidden(const tl_cluster *c, const tl_cluster_view *v, const tl_window *window, const tl_target *target)
+{
+    const seen_box box = place_box(c->low, c->high, v->matrix);
+    const int is_culled_later = v->cull != TL_CULL_NONE && shows_back(c, v, &box);
+    return is_hidden(&box, v, window, target, is_culled_later ? TL_MAX_PX_OF_CULLED : INT64_MAX);
+}
+
+/* ---- the order in which they are drawn ------------------------------------------------------------------- */
+
+#define TL_SLABS 16 /* of depth; within one, neighbours stay together */
+
+typedef struct {
+    int32_t cluster;
+    float depth; /* w or z: how far from the eye */
+} found_cluster;
+
+static inline int slab_of(float depth, float low, float scale)
+{
+    const float at = (depth - low) * scale;
+    return at > 0.0f ? (int)(at < (float)(TL_SLABS - 1) ? at : (float)(TL_SLABS - 1)) : 0;
+}
+
+/* z / w of the middle of a cluster. */
+static double depth_of(const tl_cluster *c, const double *matrix)
+{
+    const seen_box box = place_box(c->low, c->high, matrix);
+    return box.f[2].centre / box.f[3].centre;
+}
+
+/* Sorts the clusters in `found`, those seen from behind with their numbers inverted, into slabs. */
+static void sort_by_depth(const tl_clustered *mesh, const tl_cluster_view *v, const found_cluster *found, int64_t n, int32_t *list)
+{
+    int64_t starts[2 * TL_SLABS + 1] = {0};
+    int64_t nearest = 0, farthest = 0;
+    for (int64_t i = 0; i < n; i++) {
+        nearest = found[i].depth < found[nearest].depth ? i : nearest;
+        farthest = found[i].depth > found[farthest].depth ? i : farthest;
+    }
+    const float low = found[nearest].depth, range = found[farthest].depth - low, scale = range > 0.0f ? TL_SLABS / range : 0.0f;
+    const int32_t a = found[nearest].cluster, b = found[farthest].cluster;
+    const double depth_a = depth_of(mesh->clusters + (a < 0 ? ~a : a), v->matrix), depth_b = depth_of(mesh->clusters + (b < 0 ? ~b : b), v->matrix);
+    const int is_upside_down = (depth_b < depth_a) != v->is_farthest;
+    for (int pass = 0; pass < 2; pass++) {
+        for (int64_t i = 0; i < n; i++) {
+            const int is_back = found[i].cluster < 0, slab = slab_of(found[i].depth, low, scale);
+            const int at = (is_back ? TL_SLABS : 0) + (is_upside_down ? TL_SLABS - 1 - slab : slab);
+            if (pass)
+                list[starts[at]++] = is_back ? ~found[i].cluster : found[i].cluster;
+            else
+                starts[at + 1]++;
+        }
+        for (int k = 0; !pass && k < 2 * TL_SLABS; k++)
+            starts[k + 1] += starts[k];
+    }
+}
+
+/* Lists the clusters that may draw something, about in the order of depth, those that are seen from behind last; with a target of
+ * depths, without groups of them that what it shows hides.  `room` has 8 bytes for each cluster.  Returns how many. */
+static int64_t cull_clusters(const tl_clustered *mesh, const tl_cluster_view *v, const tl_window *window, const tl_target *target,
+                             int32_t *list, void *room)
+{
+    found_cluster *found = room;
+    const double *row_w = v->matrix + 12;
+    const int has_perspective = row_w[0] != 0.0 || row_w[1] != 0.0 || row_w[2] != 0.0;
+    int64_t n = 0;
+    for (int64_t first = 0; first < mesh->n_clusters; first += TL_CLUSTER_GROUP) {
+        const double *box = mesh->group_boxes + 6 * (first / TL_CLUSTER_GROUP);
+        const seen_box group = place_box(box, box + 3, v->matrix);
+        unsigned within_group = 0;
+        if (is_outside(&group, v, &within_group) || (target && is_hidden(&group, v, window, target, INT64_MAX)))
+            continue;
+        const int64_t end = first + TL_CLUSTER_GROUP < mesh->n_clusters ? first + TL_CLUSTER_GROUP : mesh->n_clusters;
+        for (int64_t i = first; i < end; i++) {
+            const tl_cluster *c = mesh->clusters + i;
+            const seen_box own = place_box(c->low, c->high, v->matrix);
+            unsigned within = within_group;
+            if (is_outside(&own, v, &within))
+                continue;
+            if (v->cull != TL_CULL_NONE && (within & TL_IN_DEPTH) == TL_IN_DEPTH && is_turned_away(c, v, &own))
+                continue;
+            const int32_t number = (int32_t)i;
+            found[n++] = (found_cluster){shows_back(c, v, &own) ? ~number : number, (float)own.f[has_perspective ? 3 : 2].centre};
+        }
+    }
+    if (n)
+        sort_by_depth(mesh, v, found, n, list);
+    return n;
+}
+
+static void survey_clusters(const tl_clustered *mesh, const tl_cluster_view *v, int64_t step, int64_t n_of[TL_N_FATES])
+{
+    memset(n_of, 0, TL_N_FATES * sizeof *n_of);
+    for (int64_t i = 0; i < mesh->n_clusters; i += step) {
+        const tl_cluster *c = mesh->clusters + i;
+        const seen_box box = place_box(c->low, c->high, v->matrix);
+        unsigned within = 0;
+        if (is_outside(&box, v, &within))
+            n_of[TL_FATE_OUTSIDE]++;
+        else if (v->cull != TL_CULL_NONE && (within & TL_IN_DEPTH) == TL_IN_DEPTH && is_turned_away(c, v, &box))
+            n_of[TL_FATE_TURNED]++;
+        else
+            n_of[c->cone_cos > 0.0 && shows_back(c, v, &box) ? TL_FATE_BACK : TL_FATE_FRONT]++;
+    }
+}
+
+/* A cluster as a scene of its own. */
+typedef struct {
+    tl_scene scene;
+    tl_vertex vertices[TL_CLUSTER + TL_CLUSTER_TAIL];
+    int32_t corners[3 * (TL_CLUSTER + TL_MAX_LANES)];
+    int32_t names[TL_CLUSTER];
+} cluster_scene;
+
+/* Lists the triangles that have a special corner, and leaves the others, whose number it returns. */
+static __attribute__((noinline)) int64_t list_special(cluster_scene *own, int64_t n, tl_share *share)
+{
+    int64_t n_left = 0;
+    for (int64_t i = 0; i < n; i++) {
+        int32_t *corners = own->corners + 3 * i;
+        int is_special = 0;
+        for (int k = 0; k < 3; k++)
+            is_special |= own->vertices[corners[k]].x_fx == TL_SPECIAL;
+        const int32_t name = own->scene.names[i];
+        if (is_special) {
+            share->others[share->n_others++] = name;
+            continue;
+        }
+        memmove(own->corners + 3 * n_left, corners, 3 * sizeof *corners);
+        own->names[n_left++] = name;
+    }
+    own->scene.names = own->names;
+    return n_left;
+}
+
+/* Snaps the vertices of a cluster and unpacks its triangles; returns how many of them there are to draw. */
+static int64_t load_cluster(const tl_cluster *c, const tl_cluster_pass *pass, const tl_scene *scene, tl_share *share, cluster_scene *own)
+{
+    const uint8_t *corners = pass->mesh->corners + 3 * c->first_triangle;
+    const size_t row_bytes = (size_t)pass->source->n_components * (pass->source->scalar == TL_F32 ? sizeof(float) : sizeof(double));
+    tl_source source = *pass->source;
+    source.data = (const char *)source.data + (size_t)c->first_vertex * row_bytes;
+    source.n -= c->first_vertex;
+    /* whole vectors: those of other clusters that this snaps are not looked at */
+    const int64_t n = ((int64_t)c->n_vertices + TL_LANES - 1) / TL_LANES * TL_LANES;
+    const tl_vertex_counts counts = project(&source, 0, n, pass->view, own->vertices, NULL);
+    own->scene = *scene;
+    own->scene.mesh.vertices = own->vertices;
+    own->scene.mesh.n_vertices = TL_CLUSTER;
+    own->scene.triangles = own->corners;
+    own->scene.n_triangles = c->n_triangles;
+    own->scene.names = pass->mesh->names + c->first_triangle;
+    for (int i = 0; i < 3 * c->n_triangles; i++)
+        own->corners[i] = corners[i];
+    memset(own->corners + 3 * c->n_triangles, 0, 3 * TL_LANES * sizeof *own->corners);
+    return counts.n_bad || counts.n_wide || counts.n_clipped ? list_special(own, c->n_triangles, share) : c->n_triangles;
+}
+
+/* The clusters that a pass draws, unless they turn out to be hidden. */
+static int64_t list_clusters(tl_cluster_pass *pass, const tl_window *window, const tl_target *target)
+{
+    pass->n_drawn = 0;
+    pass->n_seen = cull_clusters(pass->mesh, pass->seen, window, pass->may_be_hidden ? target : NULL, pass->list, pass->room);
+    return pass->n_seen;
+}
+
+#endif

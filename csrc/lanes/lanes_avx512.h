@@ -1,0 +1,437 @@
+/* Sixteen lanes, masks in mask registers. */
+#ifndef TL_LANES_AVX512_H
+#define TL_LANES_AVX512_H
+
+#include <immintrin.h>
+#include <stdint.h>
+#include <string.h>
+
+#include "topleft.h"
+#include "lanes/inline.h"
+
+#define TL_LANES 16
+#define TL_HALF_LANES 8
+
+typedef __m512i vi;
+typedef __m512 vf;
+typedef struct { __m512d lo, hi; } vd;
+typedef __mmask16 vm;
+
+TL_INLINE vi vi_set1(int32_t a) { return _mm512_set1_epi32(a); }
+TL_INLINE vi vi_load(const int32_t *p) { return _mm512_loadu_si512(p); }
+TL_INLINE void vi_store(int32_t *p, vi a) { _mm512_storeu_si512(p, a); }
+TL_INLINE vi vi_iota(void) { return _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15); }
+TL_INLINE vi vi_add(vi a, vi b) { return _mm512_add_epi32(a, b); }
+TL_INLINE vi vi_sub(vi a, vi b) { return _mm512_sub_epi32(a, b); }
+TL_INLINE vi vi_mul(vi a, vi b) { return _mm512_mullo_epi32(a, b); }
+TL_INLINE vi vi_min(vi a, vi b) { return _mm512_min_epi32(a, b); }
+TL_INLINE vi vi_max(vi a, vi b) { return _mm512_max_epi32(a, b); }
+TL_INLINE vi vi_or(vi a, vi b) { return _mm512_or_si512(a, b); }
+TL_INLINE vi vi_xor(vi a, vi b) { return _mm512_xor_si512(a, b); }
+TL_INLINE vi vi_and(vi a, vi b) { return _mm512_and_si512(a, b); }
+TL_INLINE vi vi_shift_left(vi a, int n) { return _mm512_sll_epi32(a, _mm_cvtsi32_si128(n)); }
+TL_INLINE vi vi_shift_right(vi a, int n) { return _mm512_sra_epi32(a, _mm_cvtsi32_si128(n)); }
+TL_INLINE vi vi_mul_halves(vi a, vi b) { return _mm512_mullo_epi16(a, b); }
+TL_INLINE vi vi_mul_high_halves(vi a, vi b) { return _mm512_mulhi_epu16(a, b); }
+TL_INLINE vi vi_scale_halves(vi a, vi b) { return _mm512_mulhrs_epi16(a, b); }
+TL_INLINE vi vi_add_halves(vi a, vi b) { return _mm512_add_epi16(a, b); }
+TL_INLINE vi vi_sub_halves(vi a, vi b) { return _mm512_sub_epi16(a, b); }
+TL_INLINE vi vi_upper_bytes(vi a) { return _mm512_srli_epi16(a, 8); }
+TL_INLINE vi vi_add_bytes(vi a, vi b) { return _mm512_adds_epu8(a, b); }
+TL_INLINE vi vi_max_bytes(vi a, vi b) { return _mm512_max_epu8(a, b); }
+TL_INLINE vi vi_min_bytes(vi a, vi b) { return _mm512_min_epu8(a, b); }
+TL_INLINE vm vi_gt(vi a, vi b) { return _mm512_cmpgt_epi32_mask(a, b); }
+TL_INLINE vm vi_gt_unsigned(vi a, vi b) { return _mm512_cmpgt_epu32_mask(a, b); }
+TL_INLINE vm vi_eq(vi a, vi b) { return _mm512_cmpeq_epi32_mask(a, b); }
+TL_INLINE vi vi_select(vm m, vi a, vi b) { return _mm512_mask_mov_epi32(b, m, a); }
+/* compress in registers and store whole: a compress-store to memory is three times as slow */
+TL_INLINE void vi_compress(int32_t *p, vm m, vi a) { _mm512_storeu_si512(p, _mm512_maskz_compress_epi32(m, a)); }
+TL_INLINE vi vi_load_masked(vm m, const int32_t *p) { return _mm512_maskz_loadu_epi32(m, p); }
+TL_INLINE void vi_store_masked(int32_t *p, vm m, vi a) { _mm512_mask_storeu_epi32(p, m, a); }
+TL_INLINE void vi_store_some(int32_t *p, vm m, vi a, int has_room) { (void)has_room; vi_store_masked(p, m, a); }
+
+/* Four int32. */
+typedef __m128i v4;
+TL_INLINE v4 v4_zero(void) { return _mm_setzero_si128(); }
+TL_INLINE v4 v4_load(const int32_t *p) { return _mm_loadu_si128((const __m128i *)p); }
+TL_INLINE void v4_store(int32_t *p, v4 a) { _mm_storeu_si128((__m128i *)p, a); }
+TL_INLINE v4 v4_add(v4 a, v4 b) { return _mm_add_epi32(a, b); }
+TL_INLINE v4 v4_or(v4 a, v4 b) { return _mm_or_si128(a, b); }
+/* the 4x4 transposes within each 128 bits, their own inverse */
+TL_INLINE void transpose_quads(const vi *a, vi *b)
+{
+    const vi low01 = _mm512_unpacklo_epi32(a[0], a[1]), high01 = _mm512_unpackhi_epi32(a[0], a[1]);
+    const vi low23 = _mm512_unpacklo_epi32(a[2], a[3]), high23 = _mm512_unpackhi_epi32(a[2], a[3]);
+    b[0] = _mm512_unpacklo_epi64(low01, low23);
+    b[1] = _mm512_unpackhi_epi64(low01, low23);
+    b[2] = _mm512_unpacklo_epi64(high01, high23);
+    b[3] = _mm512_unpackhi_epi64(high01, high23);
+}
+TL_INLINE void vi_load_quads(const int32_t *p, vi *c)
+{
+    const vi rows[4] = {vi_load(p), vi_load(p + 16), vi_load(p + 32), vi_load(p + 48)};
+    transpose_quads(rows, c);
+}
+TL_INLINE void vi_store_quads(int32_t *p, const vi *c)
+{
+    vi rows[4];
+    transpose_quads(c, rows);
+    for (int k = 0; k < 4; k++)
+        vi_store(p + 16 * k, rows[k]);
+}
+TL_INLINE vi vi_prefix_sum(vi a)
+{
+    const vi zero = _mm512_setzero_si512();
+    a = _mm512_add_epi32(a, _mm512_alignr_epi32(a, zero, 15));
+    a = _mm512_add_epi32(a, _mm512_alignr_epi32(a, zero, 14));
+    a = _mm512_add_epi32(a, _mm512_alignr_epi32(a, zero, 12));
+    return _mm512_add_epi32(a, _mm512_alignr_epi32(a, zero, 8));
+}
+TL_INLINE vi vi_last(vi a) { return _mm512_permutexvar_epi32(_mm512_set1_epi32(15), a); }
+TL_INLINE vi vi_shift_in(vi a, vi before) { return _mm512_alignr_epi32(a, before, 15); }
+TL_INLINE vf vf_from_unsigned(vi a) { return _mm512_cvtepu32_ps(a); }
+TL_INLINE vi vi_gather(vm m, const int32_t *p, vi i) { return _mm512_mask_i32gather_epi32(_mm512_setzero_si512(), m, i, p, 4); }
+
+TL_INLINE vm vm_and(vm a, vm b) { return a & b; }
+TL_INLINE vm vm_or(vm a, vm b) { return a | b; }
+TL_INLINE vm vm_and_not(vm a, vm b) { return a & (vm)~b; }
+TL_INLINE int vm_any(vm a) { return a != 0; }
+TL_INLINE unsigned vm_bits(vm a) { return a; }
+TL_INLINE vm vm_all(void) { return 0xffff; }
+TL_INLINE vm vm_first(int64_t n) { return n >= 16 ? 0xffff : n <= 0 ? 0 : (vm)((1u << n) - 1); }
+TL_INLINE vm vm_from_bits(unsigned bits) { return (vm)bits; }
+/* 64 bytes of 0 or 1 */
+TL_INLINE void bytes_from_bits(uint8_t *p, uint64_t bits) { _mm512_storeu_si512(p, _mm512_maskz_set1_epi8(bits, 1)); }
+/* TL_LANES words of 64 bits; vw_add_range sets the bits [begin, end) that are in the pattern; begin, end >= 0. */
+typedef struct { __m512i lo, hi; } vw;
+TL_INLINE vw vw_zero(void) { return (vw){_mm512_setzero_si512(), _mm512_setzero_si512()}; }
+TL_INLINE vw vw_load(const uint64_t *p) { return (vw){_mm512_loadu_si512(p), _mm512_loadu_si512(p + 8)}; }
+TL_INLINE void vw_store(uint64_t *p, vw a) { _mm512_storeu_si512(p, a.lo), _mm512_storeu_si512(p + 8, a.hi); }
+TL_INLINE __m512i bit_range_64(__m256i begin, __m256i end)
+{
+    const __m512i ones = _mm512_set1_epi64(-1);
+    return _mm512_andnot_si512(_mm512_sllv_epi64(ones, _mm512_cvtepu32_epi64(end)), _mm512_sllv_epi64(ones, _mm512_cvtepu32_epi64(begin)));
+}
+TL_INLINE vw vw_add_range(vw a, vi begin, vi end, uint64_t pattern)
+{
+    const __m512i every = _mm512_set1_epi64((long long)pattern);
+    const __m512i lo = bit_range_64(_mm512_castsi512_si256(begin), _mm512_castsi512_si256(end));
+    const __m512i hi = bit_range_64(_mm512_extracti64x4_epi64(begin, 1), _mm512_extracti64x4_epi64(end, 1));
+    return (vw){_mm512_or_si512(a.lo, _mm512_and_si512(lo, every)), _mm512_or_si512(a.hi, _mm512_and_si512(hi, every))};
+}
+
+/* Numbers whose bits [begin, end) are set, none where begin >= end; begin >= 0, end in 0..31. */
+TL_INLINE vi vi_bit_ranges(vi begin, vi end)
+{
+    const vi ones = _mm512_set1_epi32(-1);
+    return _mm512_andnot_si512(_mm512_sllv_epi32(ones, end), _mm512_sllv_epi32(ones, begin));
+}
+
+
+TL_INLINE vf vf_set1(float a) { return _mm512_set1_ps(a); }
+TL_INLINE vf vf_add(vf a, vf b) { return _mm512_add_ps(a, b); }
+TL_INLINE vf vf_sub(vf a, vf b) { return _mm512_sub_ps(a, b); }
+TL_INLINE vf vf_mul(vf a, vf b) { return _mm512_mul_ps(a, b); }
+TL_INLINE vf vf_div(vf a, vf b) { return _mm512_div_ps(a, b); }
+TL_INLINE vf vf_sqrt(vf a) { return _mm512_sqrt_ps(a); }
+TL_INLINE vf vf_from_vi(vi a) { return _mm512_cvtepi32_ps(a); }
+TL_INLINE vf vf_select(vm m, vf a, vf b) { return _mm512_mask_mov_ps(b, m, a); }
+TL_INLINE void vf_store(float *p, vf a) { _mm512_storeu_ps(p, a); }
+TL_INLINE vi vi_floor(vf a) { return _mm512_cvt_roundps_epi32(a, _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC); }
+TL_INLINE vi vi_nearest(vf a) { return _mm512_cvtps_epi32(a); }
+TL_INLINE vf vf_last_of(vf a, int n) { return n == 4 ? _mm512_permute_ps(a, 0xff) : _mm512_movehdup_ps(a); }
+TL_INLINE vf vf_load_masked(vm m, const float *p) { return _mm512_maskz_loadu_ps(m, p); }
+TL_INLINE void vf_store_masked(float *p, vm m, vf a) { _mm512_mask_storeu_ps(p, m, a); }
+TL_INLINE void vf_store_some(float *p, vm m, vf a, int has_room) { (void)has_room; vf_store_masked(p, m, a); }
+TL_INLINE vm vf_lt(vf a, vf b) { return _mm512_cmp_ps_mask(a, b, _CMP_LT_OQ); }
+TL_INLINE vm vf_ge(vf a, vf b) { return _mm512_cmp_ps_mask(a, b, _CMP_GE_OQ); }
+TL_INLINE vm vf_eq(vf a, vf b) { return _mm512_cmp_ps_mask(a, b, _CMP_EQ_OQ); }
+TL_INLINE vi vi_bits_of_vf(vf a) { return _mm512_castps_si512(a); }
+
+TL_INLINE vd vd_set1(double a) { return (vd){_mm512_set1_pd(a), _mm512_set1_pd(a)}; }
+TL_INLINE vd vd_add(vd a, vd b) { return (vd){_mm512_add_pd(a.lo, b.lo), _mm512_add_pd(a.hi, b.hi)}; }
+TL_INLINE vd vd_sub(vd a, vd b) { return (vd){_mm512_sub_pd(a.lo, b.lo), _mm512_sub_pd(a.hi, b.hi)}; }
+TL_INLINE vd vd_mul(vd a, vd b) { return (vd){_mm512_mul_pd(a.lo, b.lo), _mm512_mul_pd(a.hi, b.hi)}; }
+TL_INLINE vd vd_div(vd a, vd b) { return (vd){_mm512_div_pd(a.lo, b.lo), _mm512_div_pd(a.hi, b.hi)}; }
+TL_INLINE vd vd_from_vi(vi a)
+{
+    return (vd){_mm512_cvtepi32_pd(_mm512_castsi512_si256(a)), _mm512_cvtepi32_pd(_mm512_extracti64x4_epi64(a, 1))};
+}
+TL_INLINE vf vf_from_vd(vd a)
+{
+    return _mm512_insertf32x8(_mm512_castps256_ps512(_mm512_cvtpd_ps(a.lo)), _mm512_cvtpd_ps(a.hi), 1);
+}
+/* a[k] / b for three a, each correctly rounded, for |b| and |a / b| within 2^+-500: one division.  The first step makes the
+ * quotient faithful, the second correct.  Of float32 numbers one step is enough: it errs by less than 2^-100 of the quotient, which
+ * is no nearer than 2^-77 to the middle of two float64.  Based on: P. Markstein, Computation of elementary functions on the IBM RISC
+ * System/6000 processor, 1990. */
+TL_INLINE __m512d one_quotient(__m512d a, __m512d b, __m512d inverse, int are_f32)
+{
+    __m512d q = _mm512_mul_pd(a, inverse);
+    if (!are_f32)
+        q = _mm512_fmadd_pd(_mm512_fnmadd_pd(q, b, a), inverse, q);
+    return _mm512_fmadd_pd(_mm512_fnmadd_pd(q, b, a), inverse, q);
+}
+TL_INLINE void vd_quotients(const vd *a, vd b, vd *q, int are_f32)
+{
+    const vd inverse = vd_div(vd_set1(1.0), b);
+    for (int k = 0; k < 3; k++)
+        q[k] = (vd){one_quotient(a[k].lo, b.lo, inverse.lo, are_f32), one_quotient(a[k].hi, b.hi, inverse.hi, are_f32)};
+}
+TL_INLINE vd vd_abs(vd a) { return (vd){_mm512_abs_pd(a.lo), _mm512_abs_pd(a.hi)}; }
+TL_INLINE vd vd_floor(vd a) { return (vd){_mm512_roundscale_pd(a.lo, 1), _mm512_roundscale_pd(a.hi, 1)}; }
+TL_INLINE vd vd_min(vd a, vd b) { return (vd){_mm512_min_pd(a.lo, b.lo), _mm512_min_pd(a.hi, b.hi)}; }
+TL_INLINE vd vd_max(vd a, vd b) { return (vd){_mm512_max_pd(a.lo, b.lo), _mm512_max_pd(a.hi, b.hi)}; }
+TL_INLINE vm vd_ge(vd a, vd b)
+{
+    return (vm)(_mm512_cmp_pd_mask(a.lo, b.lo, _CMP_GE_OQ) | _mm512_cmp_pd_mask(a.hi, b.hi, _CMP_GE_OQ) << 8);
+}
+TL_INLINE vd vd_from_vf(vf a)
+{
+    return (vd){_mm512_cvtps_pd(_mm512_castps512_ps256(a)), _mm512_cvtps_pd(_mm512_extractf32x8_ps(a, 1))};
+}
+TL_INLINE vi vi_round(vd a)
+{
+    return _mm512_inserti64x4(_mm512_castsi256_si512(_mm512_cvtpd_epi32(a.lo)), _mm512_cvtpd_epi32(a.hi), 1);
+}
+TL_INLINE vd vd_select(vm m, vd a, vd b)
+{
+    return (vd){_mm512_mask_mov_pd(b.lo, (__mmask8)m, a.lo), _mm512_mask_mov_pd(b.hi, (__mmask8)(m >> 8), a.hi)};
+}
+TL_INLINE void vd_store(double *p, vd a) { _mm512_storeu_pd(p, a.lo), _mm512_storeu_pd(p + 8, a.hi); }
+
+/* Plain 16-byte loads and transposes in registers: hardware gathers are three times as slow. */
+typedef struct { __m512d even, odd; } vz; /* z of lanes 0,1,4,5,8,9,12,13 and of 2,3,6,7,10,11,14,15 */
+TL_INLINE __m512i load_four(int step, const tl_vertex *v, const int32_t *first)
+{
+    const __m128i *a = (const __m128i *)v;
+    const __m256i low = _mm256_inserti128_si256(_mm256_castsi128_si256(_mm_loadu_si128(a + first[0])), _mm_loadu_si128(a + first[4 * step]), 1);
+    const __m256i high = _mm256_inserti128_si256(_mm256_castsi128_si256(_mm_loadu_si128(a + first[8 * step])), _mm_loadu_si128(a + first[12 * step]), 1);
+    return _mm512_inserti64x4(_mm512_castsi256_si512(low), high, 1);
+}
+TL_INLINE void load_vertices_by(int step, const tl_vertex *v, const int32_t *first, vi *x, vi *y, vz *z)
+{
+    const __m512i a = load_four(step, v, first), b = load_four(step, v, first + step);
+    const __m512i c = load_four(step, v, first + 2 * step), d = load_four(step, v, first + 3 * step);
+    const __m512i ab = _mm512_unpacklo_epi32(a, b), cd = _mm512_unpacklo_epi32(c, d);
+    *x = _mm512_unpacklo_epi64(ab, cd);
+    *y = _mm512_unpackhi_epi64(ab, cd);
+    z->even = _mm512_castsi512_pd(_mm512_unpackhi_epi64(a, b));
+    z->odd = _mm512_castsi512_pd(_mm512_unpackhi_epi64(c, d));
+}
+TL_INLINE void load_vertices(const tl_vertex *v, const int32_t *first, vi *x, vi *y, vz *z) { load_vertices_by(3, v, first, x, y, z); }
+TL_INLINE vd vd_from_vz(vz z)
+{
+    const __m512i low = _mm512_setr_epi64(0, 1, 8, 9, 2, 3, 10, 11), high = _mm512_setr_epi64(4, 5, 12, 13, 6, 7, 14, 15);
+    return (vd){_mm512_permutex2var_pd(z.even, low, z.odd), _mm512_permutex2var_pd(z.even, high, z.odd)};
+}
+
+/* The first four numbers of TL_LANES rows, as columns; reads up to two numbers past the last row. */
+TL_INLINE __m512 rows_f32(const float *p, int stride)
+{
+    const __m256 low = _mm256_insertf128_ps(_mm256_castps128_ps256(_mm_loadu_ps(p)), _mm_loadu_ps(p + 4 * stride), 1);
+    const __m256 high = _mm256_insertf128_ps(_mm256_castps128_ps256(_mm_loadu_ps(p + 8 * stride)), _mm_loadu_ps(p + 12 * stride), 1);
+    return _mm512_insertf32x8(_mm512_castps256_ps512(low), high, 1);
+}
+TL_INLINE void load_columns_f32(const float *p, int stride, vf *columns)
+{
+    if (stride == 3) { /* three whole loads, two permutations a column; there is no fourth number */
+        const __m512 a = _mm512_loadu_ps(p), b = _mm512_loadu_ps(p + 16), c = _mm512_loadu_ps(p + 32);
+        const __m512i x0 = _mm512_setr_epi32(0, 3, 6, 9, 12, 15, 18, 21, 24, 27, 30, 0, 0, 0, 0, 0);
+        const __m512i x1 = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 17, 20, 23, 26, 29);
+        const __m512i y0 = _mm512_setr_epi32(1, 4, 7, 10, 13, 16, 19, 22, 25, 28, 31, 0, 0, 0, 0, 0);
+        const __m512i y1 = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 18, 21, 24, 27, 30);
+        const __m512i z0 = _mm512_setr_epi32(2, 5, 8, 11, 14, 17, 20, 23, 26, 29, 0, 0, 0, 0, 0, 0);
+        const __m512i z1 = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 16, 19, 22, 25, 28, 31);
+        columns[0] = _mm512_permutex2var_ps(_mm512_permutex2var_ps(a, x0, b), x1, c);
+        columns[1] = _mm512_permutex2var_ps(_mm512_permutex2var_ps(a, y0, b), y1, c);
+        columns[2] = _mm512_permutex2var_ps(_mm512_permutex2var_ps(a, z0, b), z1, c);
+        columns[3] = _mm512_setzero_ps();
+        return;
+    }
+    const __m512 a = rows_f32(p, stride), b = rows_f32(p + stride, stride), c = rows_f32(p + 2 * stride, stride),
+                 d = rows_f32(p + 3 * stride, stride);
+    const __m512d ab = _mm512_castps_pd(_mm512_unpacklo_ps(a, b)), cd = _mm512_castps_pd(_mm512_unpacklo_ps(c, d));
+    const __m512d ab2 = _mm512_castps_pd(_mm512_unpackhi_ps(a, b)), cd2 = _mm512_castps_pd(_mm512_unpackhi_ps(c, d));
+    columns[0] = _mm512_castpd_ps(_mm512_unpacklo_pd(ab, cd));
+    columns[1] = _mm512_castpd_ps(_mm512_unpackhi_pd(ab, cd));
+    columns[2] = _mm512_castpd_ps(_mm512_unpacklo_pd(ab2, cd2));
+    columns[3] = _mm512_castpd_ps(_mm512_unpackhi_pd(ab2, cd2));
+}
+/* rows k and k + 4 */
+TL_INLINE __m512d rows_f64(const double *p, int stride)
+{
+    return _mm512_insertf64x4(_mm512_castpd256_pd512(_mm256_loadu_pd(p)), _mm256_loadu_pd(p + 4 * stride), 1);
+}
+TL_INLINE void eight_columns_f64(const double *p, int stride, __m512d *columns)
+{
+    const __m512d a = rows_f64(p, stride), b = rows_f64(p + stride, stride), c = rows_f64(p + 2 * stride, stride),
+                  d = rows_f64(p + 3 * stride, stride);
+    const __m512d x = _mm512_unpacklo_pd(a, b), y = _mm512_unpackhi_pd(a, b); /* x: x0 x1 z0 z1 x4 x5 z4 z5 */
+    const __m512d x2 = _mm512_unpacklo_pd(c, d), y2 = _mm512_unpackhi_pd(c, d);
+    const __m512i front = _mm512_setr_epi64(0, 1, 8, 9, 4, 5, 12, 13), back = _mm512_setr_epi64(2, 3, 10, 11, 6, 7, 14, 15);
+    columns[0] = _mm512_permutex2var_pd(x, front, x2);
+    columns[1] = _mm512_permutex2var_pd(y, front, y2);
+    columns[2] = _mm512_permutex2var_pd(x, back, x2);
+    columns[3] = _mm512_permutex2var_pd(y, back, y2);
+}
+TL_INLINE void load_columns_f64(const double *p, int stride, vd *columns)
+{
+    __m512d low[4], high[4];
+    eight_columns_f64(p, stride, low);
+    eight_columns_f64(p + 8 * stride, stride, high);
+    for (int k = 0; k < 4; k++)
+        columns[k] = (vd){low[k], high[k]};
+}
+
+TL_INLINE void store_eight(tl_vertex *v, __m512i xy, __m512d z)
+{
+    const __m512i front = _mm512_setr_epi64(0, 8, 1, 9, 2, 10, 3, 11), back = _mm512_setr_epi64(4, 12, 5, 13, 6, 14, 7, 15);
+    _mm512_storeu_si512(v, _mm512_permutex2var_epi64(xy, front, _mm512_castpd_si512(z)));
+    _mm512_storeu_si512(v + 4, _mm512_permutex2var_epi64(xy, back, _mm512_castpd_si512(z)));
+}
+TL_INLINE void store_vertices(tl_vertex *v, vi x, vi y, vd z)
+{
+    const __m512i low = _mm512_setr_epi32(0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23);
+    const __m512i high = _mm512_setr_epi32(8, 24, 9, 25, 10, 26, 11, 27, 12, 28, 13, 29, 14, 30, 15, 31);
+    store_eight(v, _mm512_permutex2var_epi32(x, low, y), z.lo);
+    store_eight(v + 8, _mm512_permutex2var_epi32(x, high, y), z.hi);
+}
+
+/* Half vectors: a 64-byte load or store at any column crosses a cache line, one of 32 bytes every other time. */
+typedef __m256i hi;
+typedef __m256 hf;
+typedef __m512d hd;
+typedef __mmask8 hm;
+TL_INLINE hm hm_and(hm a, hm b) { return a & b; }
+TL_INLINE hm hm_or(hm a, hm b) { return a | b; }
+TL_INLINE int hm_any(hm a) { return a != 0; }
+TL_INLINE hm hi_gt(hi a, hi b) { return _mm256_cmpgt_epi32_mask(a, b); }
+TL_INLINE hi hi_load_masked(hm m, const int32_t *p) { return _mm256_maskz_loadu_epi32(m, p); }
+TL_INLINE void hi_store_masked(int32_t *p, hm m, hi a) { _mm256_mask_storeu_epi32(p, m, a); }
+TL_INLINE void hi_store_some(int32_t *p, hm m, hi a, int has_room) { (void)has_room; hi_store_masked(p, m, a); }
+TL_INLINE hf hf_load_masked(hm m, const float *p) { return _mm256_maskz_loadu_ps(m, p); }
+TL_INLINE void hf_store_masked(float *p, hm m, hf a) { _mm256_mask_storeu_ps(p, m, a); }
+TL_INLINE void hf_store_some(float *p, hm m, hf a, int has_room) { (void)has_room; hf_store_masked(p, m, a); }
+TL_INLINE hm hf_lt(hf a, hf b) { return _mm256_cmp_ps_mask(a, b, _CMP_LT_OQ); }
+TL_INLINE hm hf_eq(hf a, hf b) { return _mm256_cmp_ps_mask(a, b, _CMP_EQ_OQ); }
+TL_INLINE hi hi_lower(vi a) { return _mm512_castsi512_si256(a); }
+TL_INLINE hd hd_lower(vd a) { return a.lo; }
+/* as sum_depth in sink.c */
+TL_INLINE hf hf_sum_depth(double row, hd col)
+{
+    return _mm256_add_ps(_mm512_cvtpd_ps(_mm512_add_pd(_mm512_set1_pd(row), col)), _mm256_setzero_ps());
+}
+
+/* What shading needs besides. */
+TL_INLINE vf vf_load(const float *p) { return _mm512_loadu_ps(p); }
+TL_INLINE vf vf_fma(vf a, vf b, vf c) { return _mm512_fmadd_ps(a, b, c); }
+TL_INLINE vf vf_min(vf a, vf b) { return _mm512_min_ps(a, b); }
+TL_INLINE vf vf_max(vf a, vf b) { return _mm512_max_ps(a, b); }
+TL_INLINE vi vi_rint(vf a) { return _mm512_cvtps_epi32(a); }
+TL_INLINE vf vf_of_bits(vi a) { return _mm512_castsi512_ps(a); }
+TL_INLINE vi vi_low_half(vi a) { return _mm512_and_si512(a, _mm512_set1_epi32(0xffff)); }
+TL_INLINE vi vi_high_half(vi a) { return _mm512_srli_epi32(a, 16); }
+TL_INLINE vf vf_lookup(const float *table, vi i) { return _mm512_permutexvar_ps(i, _mm512_loadu_ps(table)); }
+TL_INLINE vi vi_lookup(const int32_t *table, vi i) { return _mm512_permutexvar_epi32(i, _mm512_loadu_si512(table)); }
+TL_INLINE vf vf_pick(const float *p, vi i) { return _mm512_permutexvar_ps(i, _mm512_loadu_ps(p)); }
+TL_INLINE vd vd_load(const double *p) { return (vd){_mm512_loadu_pd(p), _mm512_loadu_pd(p + 8)}; }
+TL_INLINE vd vd_sqrt(vd a) { return (vd){_mm512_sqrt_pd(a.lo), _mm512_sqrt_pd(a.hi)}; }
+TL_INLINE __m512d bits_minus(__m512d a, uint64_t sum, uint64_t mask)
+{
+    const __m512i b = _mm512_and_si512(_mm512_castpd_si512(a), _mm512_set1_epi64((long long)mask));
+    return _mm512_castsi512_pd(_mm512_sub_epi64(_mm512_set1_epi64((long long)sum), b));
+}
+TL_INLINE vd vd_power(vd a, uint64_t sum, uint64_t mask) { return (vd){bits_minus(a.lo, sum, mask), bits_minus(a.hi, sum, mask)}; }
+TL_INLINE vd vd_pick(const double *p, vi i)
+{
+    const __m512d low = _mm512_loadu_pd(p), high = _mm512_loadu_pd(p + 8);
+    return (vd){_mm512_permutex2var_pd(low, _mm512_cvtepi32_epi64(_mm512_castsi512_si256(i)), high),
+                _mm512_permutex2var_pd(low, _mm512_cvtepi32_epi64(_mm512_extracti64x4_epi64(i, 1)), high)};
+}
+TL_INLINE vi vi_pick(const int32_t *p, vi i) { return _mm512_permutexvar_epi32(i, _mm512_loadu_si512(p)); }
+TL_INLINE vi vi_prefix_count(unsigned bits)
+{
+    const uint64_t ones = 0x0101010101010101u;
+    const uint64_t low = _pdep_u64(bits, ones) * ones, high = _pdep_u64(bits >> 8, ones) * ones + (low >> 56) * ones;
+    return _mm512_cvtepu8_epi32(_mm_set_epi64x((long long)high, (long long)low));
+}
+
+TL_INLINE __m512i load_four_records(const char *base, int scale, const int32_t *i)
+{
+    const __m128i a = _mm_loadu_si128((const __m128i *)(base + (int64_t)i[0] * scale)), b = _mm_loadu_si128((const __m128i *)(base + (int64_t)i[4] * scale));
+    const __m128i c = _mm_loadu_si128((const __m128i *)(base + (int64_t)i[8] * scale)), d = _mm_loadu_si128((const __m128i *)(base + (int64_t)i[12] * scale));
+    const __m256i low = _mm256_inserti128_si256(_mm256_castsi128_si256(a), b, 1), high = _mm256_inserti128_si256(_mm256_castsi128_si256(c), d, 1);
+    return _mm512_inserti64x4(_mm512_castsi256_si512(low), high, 1);
+}
+TL_INLINE void vi_load_records(const void *base, int scale, const int32_t *i, vi *c)
+{
+    const vi rows[4] = {load_four_records(base, scale, i), load_four_records(base, scale, i + 1), load_four_records(base, scale, i + 2),
+                        load_four_records(base, scale, i + 3)};
+    transpose_quads(rows, c);
+}
+TL_INLINE vi load_eight_pairs(const char *base, const int32_t *i)
+{
+    __m128i two[4];
+    for (int k = 0; k < 4; k++) {
+        const __m128i a = _mm_loadl_epi64((const __m128i *)(base + (int64_t)i[2 * k] * 8));
+        two[k] = _mm_castpd_si128(_mm_loadh_pd(_mm_castsi128_pd(a), (const double *)(base + (int64_t)i[2 * k + 1] * 8)));
+    }
+    const __m256i low = _mm256_inserti128_si256(_mm256_castsi128_si256(two[0]), two[1], 1);
+    const __m256i high = _mm256_inserti128_si256(_mm256_castsi128_si256(two[2]), two[3], 1);
+    return _mm512_inserti64x4(_mm512_castsi256_si512(low), high, 1);
+}
+TL_INLINE void vf_load_pairs(const void *base, const int32_t *i, vf *c)
+{
+    const vi even = _mm512_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
+    const vi a = load_eight_pairs(base, i), b = load_eight_pairs(base, i + 8);
+    c[0] = _mm512_castsi512_ps(_mm512_permutex2var_epi32(a, even, b));
+    c[1] = _mm512_castsi512_ps(_mm512_permutex2var_epi32(a, _mm512_add_epi32(even, _mm512_set1_epi32(1)), b));
+}
+/* Writes the fourth column over that of TL_LANES rows of four. */
+TL_INLINE void vf_store_fourths(const float *rows, vf fourth, float *out)
+{
+    for (int k = 0; k < 4; k++) {
+        const vi at = _mm512_add_epi32(_mm512_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3), _mm512_set1_epi32(4 * k));
+        _mm512_storeu_ps(out + 16 * k, _mm512_mask_permutexvar_ps(_mm512_loadu_ps(rows + 16 * k), 0x8888, at, fourth));
+    }
+}
+/* Pixels of two and of three numbers, one after the other. */
+TL_INLINE void vf_store_pairs(float *p, const vf *c)
+{
+    const vi low = _mm512_setr_epi32(0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23);
+    _mm512_storeu_ps(p, _mm512_permutex2var_ps(c[0], low, c[1]));
+    _mm512_storeu_ps(p + 16, _mm512_permutex2var_ps(c[0], _mm512_add_epi32(low, _mm512_set1_epi32(8)), c[1]));
+}
+TL_INLINE void vf_store_triples(float *p, const vf *c)
+{
+    static const int32_t from[48] = {0, 16, 0, 1, 17, 1, 2, 18, 2, 3, 19, 3, 4, 20, 4, 5, 21, 5, 6, 22, 6, 7, 23, 7, 8, 24, 8, 9, 25, 9, 10, 26, 10, 11, 27, 11, 12, 28, 12, 13, 29, 13, 14, 30, 14, 15, 31, 15};
+    static const __mmask16 is_third[3] = {0x4924, 0x2492, 0x9249};
+    for (int k = 0; k < 3; k++) {
+        const vi at = _mm512_loadu_si512(from + 16 * k);
+        _mm512_storeu_ps(p + 16 * k, _mm512_mask_permutexvar_ps(_mm512_permutex2var_ps(c[0], at, c[1]), is_third[k], at, c[2]));
+    }
+}
+/* Four doubles at base + 8 * stride * i[k], as columns. */
+TL_INLINE void vd_load_records(const double *base, int stride, const int32_t *i, vd *c)
+{
+    __m512d half[2][4];
+    for (int part = 0; part < 2; part++) {
+        __m512d row[4];
+        for (int k = 0; k < 4; k++) { /* lanes k and k + 4 */
+            const double *a = base + (int64_t)i[8 * part + k] * stride, *b = base + (int64_t)i[8 * part + k + 4] * stride;
+            row[k] = _mm512_insertf64x4(_mm512_castpd256_pd512(_mm256_loadu_pd(a)), _mm256_loadu_pd(b), 1);
+        }
+        const __m512d even[2] = {_mm512_unpacklo_pd(row[0], row[1]), _mm512_unpackhi_pd(row[0], row[1])};
+        const __m512d odd[2] = {_mm512_unpacklo_pd(row[2], row[3]), _mm512_unpackhi_pd(row[2], row[3])};
+        const __m512i low = _mm512_setr_epi64(0, 1, 8, 9, 4, 5, 12, 13), high = _mm512_setr_epi64(2, 3, 10, 11, 6, 7, 14, 15);
+        for (int k = 0; k < 2; k++) {
+            half[part][k] = _mm512_permutex2var_pd(even[k], low, odd[k]);
+            half[part][k + 2] = _mm512_permutex2var_pd(even[k], high, odd[k]);
+        }
+    }
+    for (int k = 0; k < 4; k++)
+        c[k] = (vd){half[0][k], half[1][k]};
+}
+
+#endif

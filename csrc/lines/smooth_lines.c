@@ -1,0 +1,192 @@
+/* Smooth lines: the edges of a mesh as lines one pixel wide with round ends, between the snapped ends themselves.
+ * In: snapped vertices, pairs of them.  Out: float coverage, max(0, 1 - distance of the pixel's centre from the edge),
+ * which is what a box one pixel wide, across the line, sees of it; of several lines the largest counts.
+ * Based on: S. Gupta, R. F. Sproull, Filtering Edges for Gray-Scale Displays, 1981.
+ *
+ * u runs along the longer side of the line, v across, both from its first end in half sub-pixels.  The line is at most as
+ * steep as a diagonal, so a centre nearer than 1 is in the line's pixel of its column or a neighbour of that across:
+ * the next ones are at least 1.5 away across, and 1.5 / sqrt(2) > 1. */
+#ifndef TL_SMOOTH_LINES_C
+#define TL_SMOOTH_LINES_C
+
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+#include "topleft.h"
+#include "lanes/lanes.h"
+#include "vertex/fixed.h"
+#include "lines/edges.c"
+
+typedef struct {
+    const tl_edges *lines;
+    const tl_window *window;
+    const tl_line_target *target;
+    int32_t n;
+    int32_t at[TL_MAX_PIXELS + TL_MAX_LANES], value[TL_MAX_PIXELS + TL_MAX_LANES], z[TL_MAX_PIXELS + TL_MAX_LANES];
+} smooth_state;
+
+/* One line: u is x, or y of a steep line. */
+typedef struct {
+    int is_steep;
+    int64_t u_fx, v_fx;         /* the first end */
+    int64_t du, dv;             /* to the other end, sub-pixels */
+    double z, dz;
+    int64_t first, end;         /* columns along u that can hold anything, of the window */
+    int64_t u_px, v_px, size_v; /* the window's origin along u and v, its extent along v */
+} smooth_line;
+
+/* No branch: which line is nearest cannot be predicted. */
+TL_INLINE void put_smooth(const tl_line_target *target, int64_t at, float value, float z, int has_depth)
+{
+    float *pixel = (float *)target->pixels + at;
+    if (has_depth)
+        value = shows_depth(target, at, z) ? value : 0.0f;
+    *pixel = value > *pixel ? value : *pixel;
+}
+
+TL_INLINE void flush_smooth(smooth_state *s, int has_depth)
+{
+    const tl_line_target own = *s->target, *target = &own; /* a copy that no store can change */
+    for (int32_t k = 0; k < s->n; k++) {
+        float value, z = 0.0f;
+        memcpy(&value, s->value + k, sizeof value);
+        if (has_depth)
+            memcpy(&z, s->z + k, sizeof z);
+        put_smooth(target, (uint32_t)s->at[k], value, z, has_depth);
+    }
+    s->n = 0;
+}
+
+/* Returns 0 when nothing of the line is in the window. */
+static int setup_smooth_line(const smooth_state *s, const int32_t *edge, smooth_line *l)
+{
+    const tl_window *w = s->window;
+    const int bits = w->subpixel_bits;
+    line_end e[2];
+    if (!find_ends(s->lines, edge, e))
+        return 0;
+    const int64_t dx = e[1].x_fx - e[0].x_fx, dy = e[1].y_fx - e[0].y_fx;
+    l->is_steep = dy > (dx < 0 ? -dx : dx);
+    l->u_fx = l->is_steep ? e[0].y_fx : e[0].x_fx, l->v_fx = l->is_steep ? e[0].x_fx : e[0].y_fx;
+    l->du = l->is_steep ? dy : dx, l->dv = l->is_steep ? dx : dy;
+    l->z = e[0].z, l->dz = e[1].z - e[0].z;
+    l->u_px = l->is_steep ? w->y_px : w->x_px, l->v_px = l->is_steep ? w->x_px : w->y_px;
+    l->size_v = l->is_steep ? w->width : w->height;
+    const int64_t u0 = min64(l->u_fx, l->u_fx + l->du), u1 = max64(l->u_fx, l->u_fx + l->du);
+    const int64_t v0 = min64(l->v_fx, l->v_fx + l->dv), v1 = max64(l->v_fx, l->v_fx + l->dv);
+    l->first = max64((u0 >> bits) - 1 - l->u_px, 0);
+    l->end = min64((u1 >> bits) + 2 - l->u_px, l->is_steep ? w->height : w->width);
+    return l->first < l->end && (v1 >> bits) + 1 >= l->v_px && (v0 >> bits) - 1 < l->v_px + l->size_v;
+}
+
+/* How far along the line, of twice the square of its length, a centre is; and the square of its distance. */
+TL_INLINE vd lane_square(vd u, vd v, vd du, vd dv, vd inverse, vd end, vd *along)
+{
+    const vd zero = vd_set1(0.0), two = vd_set1(2.0);
+    const vd across = vd_mul(vd_sub(vd_mul(u, dv), vd_mul(v, du)), inverse);
+    const vd u1 = vd_sub(u, vd_mul(two, du)), v1 = vd_sub(v, vd_mul(two, dv));
+    *along = vd_add(vd_mul(u, du), vd_mul(v, dv));
+    const vm before = vd_ge(zero, *along), behind = vd_ge(*along, end);
+    vd square = vd_mul(across, across);
+    square = vd_select(behind, vd_add(vd_mul(u1, u1), vd_mul(v1, v1)), square);
+    return vd_select(before, vd_add(vd_mul(u, u), vd_mul(v, v)), square);
+}
+
+/* A line of less than 2^24 sub-pixels: products of two distances are exact in float64. */
+TL_INLINE void walk_smooth_line(smooth_state *s, const smooth_line *l, int has_depth)
+{
+    const int bits = s->window->subpixel_bits;
+    const double unit = (double)(1 << bits);
+    const int64_t own_u = (l->u_fx >> bits) - l->u_px, own_v = (l->v_fx >> bits) - l->v_px; /* the first end's pixel */
+    const double rest_u = 2.0 * (double)(l->u_fx - ((own_u + l->u_px) << bits)), rest_v = 2.0 * (double)(l->v_fx - ((own_v + l->v_px) << bits));
+    const double length2 = (double)l->du * (double)l->du + (double)l->dv * (double)l->dv;
+    const vd du = vd_set1((double)l->du), dv = vd_set1((double)l->dv), end = vd_set1(2.0 * length2);
+    const vd inverse = vd_set1(length2 > 0.0 ? 1.0 / sqrt(length2) : 0.0), inverse_end = vd_set1(length2 > 0.0 ? 0.5 / length2 : 0.0);
+    const vd slope = vd_set1(l->du ? (double)l->dv / (double)l->du : 0.0), per_pixel = vd_set1(0.5 / unit);
+    const vd zero = vd_set1(0.0), one = vd_set1(1.0), per_pixel2 = vd_set1(0.25 / (unit * unit));
+    const vi stride_u = vi_set1(l->is_steep ? (int32_t)s->target->stride_px : 1), stride_v = vi_set1(l->is_steep ? 1 : (int32_t)s->target->stride_px);
+    const vi last_v = vi_set1((int32_t)l->size_v - 1);
+    for (int64_t first = l->first; first < l->end; first += TL_LANES) {
+        const vi column = vi_add(vi_set1((int32_t)first), vi_iota());
+        const vd u = vd_add(vd_mul(vd_set1(2.0 * unit), vd_from_vi(vi_sub(column, vi_set1((int32_t)own_u)))), vd_set1(unit - rest_u));
+        const vd middle = vd_floor(vd_mul(vd_add(vd_mul(u, slope), vd_set1(rest_v)), per_pixel));
+        for (int aside = -1; aside <= 1; aside++) {
+            const vd row = vd_add(middle, vd_set1((double)aside));
+            const vd v = vd_add(vd_mul(row, vd_set1(2.0 * unit)), vd_set1(unit - rest_v));
+            vd along;
+            const vd square = vd_mul(lane_square(u, v, du, dv, inverse, end, &along), per_pixel2);
+            const vf value = vf_sub(vf_set1(1.0f), vf_sqrt(vf_from_vd(square)));
+            const vi v_px = vi_add(vi_round(row), vi_set1((int32_t)own_v));
+            const vm inside = vm_and_not(vm_first(l->end - first), vi_gt_unsigned(v_px, last_v));
+            const vm on = vm_and(inside, vf_lt(vf_set1(0.0f), value));
+            vi_compress(s->at + s->n, on, vi_add(vi_mul(column, stride_u), vi_mul(v_px, stride_v)));
+            vi_compress(s->value + s->n, on, vi_bits_of_vf(value));
+            if (has_depth) {
+                const vd share = vd_min(vd_max(vd_mul(along, inverse_end), zero), one);
+                vi_compress(s->z + s->n, on, vi_bits_of_vf(vf_from_vd(vd_add(vd_set1(l->z), vd_mul(share, vd_set1(l->dz))))));
+            }
+            s->n += __builtin_popcount(vm_bits(on));
+        }
+        if (s->n > TL_MAX_PIXELS - 3 * TL_LANES)
+            flush_smooth(s, has_depth);
+    }
+}
+
+/* Any other line: its distances in 128-bit integers, rounded once where float64 takes over. */
+static void walk_far_line(const smooth_state *s, const smooth_line *l)
+{
+    const int bits = s->window->subpixel_bits;
+    const int64_t stride = s->target->stride_px;
+    const double du = (double)l->du, dv = (double)l->dv, len2 = du * du + dv * dv, per_pixel = 0.5 / (double)(1 << bits);
+    for (int64_t column = l->first; column < l->end; column++) {
+        const tl_int128 u = ((tl_int128)(column + l->u_px) * 2 + 1) * ((tl_int128)1 << bits) - (tl_int128)l->u_fx * 2;
+        const tl_int128 half = u * l->dv, across_u = half / l->du - (half % l->du != 0 && (half < 0) != (l->du < 0));
+        const tl_int128 middle = ((across_u + (tl_int128)l->v_fx * 2) >> (bits + 1)) - l->v_px;
+        for (int64_t aside = -1; aside <= 1; aside++) {
+            const tl_int128 row = middle + aside;
+            if (row < 0 || row >= l->size_v)
+                continue;
+            const tl_int128 v = (2 * (row + l->v_px) + 1) * ((tl_int128)1 << bits) - (tl_int128)l->v_fx * 2;
+            const double across = (double)(tl_int128)((tl_uint128)u * (tl_uint128)(tl_int128)l->dv - (tl_uint128)v * (tl_uint128)(tl_int128)l->du);
+            const double along = (double)u * du + (double)v * dv, u1 = (double)(u - (tl_int128)l->du * 2), v1 = (double)(v - (tl_int128)l->dv * 2);
+            double square = across * across / len2, share = along / (2.0 * len2);
+            if (along <= 0.0)
+                square = (double)u * (double)u + (double)v * (double)v, share = 0.0;
+            else if (along >= 2.0 * len2)
+                square = u1 * u1 + v1 * v1, share = 1.0;
+            const double value = 1.0 - sqrt(square) * per_pixel;
+            if (value > 0.0)
+                put_smooth(s->target, l->is_steep ? column * stride + (int64_t)row : (int64_t)row * stride + column, (float)value,
+                           (float)(l->z + share * l->dz), s->target->depth != NULL);
+        }
+    }
+}
+
+TL_INLINE void draw_all_smooth(smooth_state *s, int has_depth)
+{
+    const int64_t limit = (int64_t)1 << 24;
+    for (int64_t i = 0; i < s->lines->n_edges; i++) {
+        smooth_line l;
+        if (!setup_smooth_line(s, s->lines->edges + 2 * i, &l))
+            continue;
+        if (l.du > -limit && l.du < limit)
+            walk_smooth_line(s, &l, has_depth);
+        else
+            walk_far_line(s, &l);
+    }
+    flush_smooth(s, has_depth);
+}
+
+static void draw_smooth_lines(const tl_edges *lines, const tl_window *window, const tl_line_target *target)
+{
+    smooth_state s = {.lines = lines, .window = window, .target = target};
+    for (int64_t k = 0; k < window->height; k++)
+        memset((float *)target->pixels + k * target->stride_px, 0, (size_t)window->width * sizeof(float));
+    if (target->depth)
+        draw_all_smooth(&s, 1);
+    else
+        draw_all_smooth(&s, 0);
+}
+
+#endif

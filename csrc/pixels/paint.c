@@ -1,0 +1,174 @@
+/* Paint: colours from labels, once per visible sample.
+ * In: the label of each sample and the colours of triangles or vertices.  Out: colours; samples with label -1 are kept.
+ * Based on: H. Gouraud, Continuous Shading of Curved Surfaces, 1971. */
+#ifndef TL_PAINT_C
+#define TL_PAINT_C
+
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+#include "topleft.h"
+#include "lanes/lanes.h"
+#include "vertex/fixed.h"
+#include "raster/setup.c"
+#include "raster/sink.c"
+#include "pixels/weights_one.c"
+
+/* The first samples of paint_flat whose colours have four bytes, a vector at a time; returns how many. */
+TL_INLINE int64_t paint_words(const int32_t *labels, int64_t n, const uint8_t *colors, uint8_t *restrict out)
+{
+    int64_t k = 0;
+    for (; TL_LANES > 1 && k + TL_LANES <= n; k += TL_LANES) {
+        const vi label = vi_load(labels + k);
+        const vm m = vi_gt(label, vi_set1(-1));
+        if (vm_any(m))
+            vi_store_some((int32_t *)(out + 4 * k), m, vi_gather(m, (const int32_t *)colors, label), 1);
+    }
+    return k;
+}
+
+/* Copies the colour of each labelled sample's triangle; samples with label -1 stay as they are. */
+static void paint_flat(const int32_t *labels, int64_t n, const uint8_t *colors, int pixel_bytes, uint8_t *restrict out)
+{
+    switch (pixel_bytes) {
+    case 1:
+        for (int64_t k = 0; k < n; k++)
+            if (labels[k] >= 0)
+                out[k] = colors[labels[k]];
+        return;
+    case 3:
+        for (int64_t k = 0; k < n; k++)
+            if (labels[k] >= 0)
+                memcpy(out + 3 * k, colors + 3 * (int64_t)labels[k], 3);
+        return;
+    case 4:
+        for (int64_t k = paint_words(labels, n, colors, out); k < n; k++)
+            if (labels[k] >= 0)
+                memcpy(out + 4 * k, colors + 4 * (int64_t)labels[k], 4);
+        return;
+    default:
+        for (int64_t k = 0; k < n; k++)
+            if (labels[k] >= 0)
+                memcpy(out + k * pixel_bytes, colors + (int64_t)labels[k] * pixel_bytes, (size_t)pixel_bytes);
+    }
+}
+
+/* Sign of w1 * d1 + w2 * d2 - halves * w_sum / 2 in exact integers; |d|, |halves| <= 511. */
+static int compare_exactly(const tl_triangle *t, int64_t x_px, int64_t y_px, int bits, int d1, int d2, int halves)
+{
+    const tl_int128 terms[3] = {doubled_edge(t, 2, 0, x_px, y_px, bits), doubled_edge(t, 0, 1, x_px, y_px, bits), weight_sum(t)};
+    const int factors[3] = {2 * d1, 2 * d2, -halves};
+    tl_int128 high = 0, low = 0; /* the terms reach 2^127: two limbs */
+    for (int k = 0; k < 3; k++) {
+        high += (terms[k] >> 64) * factors[k];
+        low += (tl_int128)(uint64_t)terms[k] * factors[k];
+    }
+    high += low >> 64;
+    low = (tl_int128)(uint64_t)low;
+    return high < 0 ? -1 : high > 0 || low > 0;
+}
+
+/* The exact value of a channel rounded to nearest, ties to even; `value` decides unless it is next to a tie. */
+static inline uint8_t round_color(const tl_triangle *t, int64_t x_px, int64_t y_px, int bits, int c0, int d1, int d2, double value)
+{
+    const int below = (int)floor(value);
+    if (fabs(value - below - 0.5) >= 0x1p-20)
+        return (uint8_t)(int)rint(value);
+    const int side = compare_exactly(t, x_px, y_px, bits, d1, d2, 2 * (below - c0) + 1);
+    return (uint8_t)(below + (side > 0 || (side == 0 && (below & 1))));
+}
+
+/* One channel of n samples. */
+static inline void paint_run_u8(const tl_triangle *t, const uint8_t *c, int64_t x_px, int64_t y_px, int bits, const double *w1,
+                                const double *w2, int n, int n_channels, uint8_t *restrict out)
+{
+    const int c0 = c[0], d1 = c[1] - c0, d2 = c[2] - c0;
+    const double slope1 = d1 / t->w_sum, slope2 = d2 / t->w_sum;
+    for (int k = 0; k < n; k++)
+        out[k * n_channels] = round_color(t, x_px + k, y_px, bits, c0, d1, d2, c0 + (w1[k] * slope1 + w2[k] * slope2));
+}
+
+static inline void paint_run_f32(const tl_triangle *t, const float *c, const double *w1, const double *w2, int n, int n_channels,
+                                 float *restrict out)
+{
+    const double c0 = c[0], slope1 = (c[1] - c0) / t->w_sum, slope2 = (c[2] - c0) / t->w_sum;
+    for (int k = 0; k < n; k++)
+        out[k * n_channels] = (float)(c0 + (w1[k] * slope1 + w2[k] * slope2));
+}
+
+/* A sample of a piece: the colours of its corners are those of the cut points. */
+static void paint_piece(const resolve_state *s, const int32_t *corners, int64_t x_px, int64_t y_px, int bits, const void *colors,
+                        int n_channels, int is_u8, void *out)
+{
+    double part[3], sum = 0.0;
+    for (int k = 0; k < 3; k++) {
+        const int a = k == 2 ? 0 : k + 1, b = 3 - k - a;
+        const tl_int128 edge = doubled_edge(&s->triangle, a, b, x_px, y_px, bits);
+        part[k] = edge > 0 ? (double)edge : 0.0; /* below 0 only where a piece covers a pixel but not its centre */
+        sum += part[k];
+    }
+    for (int c = 0; c < n_channels; c++) {
+        double value = 0.0;
+        for (int j = 0; j < 3; j++) {
+            const int64_t at = (int64_t)corners[j] * n_channels + c;
+            const double weight = (part[0] * s->piece[0][j] + part[1] * s->piece[1][j] + part[2] * s->piece[2][j]) / sum;
+            value += weight * (is_u8 ? (double)((const uint8_t *)colors)[at] : (double)((const float *)colors)[at]);
+        }
+        if (is_u8)
+            ((uint8_t *)out)[c] = (uint8_t)rint(value < 0.0 ? 0.0 : value > 255.0 ? 255.0 : value);
+        else
+            ((float *)out)[c] = (float)value;
+    }
+}
+
+/* n samples of one triangle in a row. */
+static void paint_run(resolve_state *s, const tl_window *window, int64_t row, int64_t col, int n, const void *colors, int n_channels,
+                      int is_u8, void *out)
+{
+    double w1[TL_CHUNK], w2[TL_CHUNK];
+    tl_triangle *t = &s->triangle;
+    const int bits = window->subpixel_bits;
+    const int64_t x_px = col + window->x_px, y_px = row + window->y_px;
+    t->row0 = row, t->col0 = col;
+    setup_weights(t, window);
+    weights_at(t, window, row, col, n, w1, w2);
+    for (int c = 0; c < n_channels; c++) {
+        const int64_t at[3] = {(int64_t)t->corner[0] * n_channels + c, (int64_t)t->corner[1] * n_channels + c,
+                               (int64_t)t->corner[2] * n_channels + c};
+        if (is_u8) {
+            const uint8_t *all = colors, own[3] = {all[at[0]], all[at[1]], all[at[2]]};
+            paint_run_u8(t, own, x_px, y_px, bits, w1, w2, n, n_channels, (uint8_t *)out + c);
+        } else {
+            const float *all = colors, own[3] = {all[at[0]], all[at[1]], all[at[2]]};
+            paint_run_f32(t, own, w1, w2, n, n_channels, (float *)out + c);
+        }
+    }
+}
+
+static void paint_gouraud(const tl_scene *scene, const tl_window *window, const int32_t *labels, const void *colors, int n_channels,
+                          int is_u8, void *pixels)
+{
+    resolve_state s = {.id = -1};
+    const int pixel_bytes = n_channels * (is_u8 ? 1 : 4), bits = window->subpixel_bits;
+    for (int64_t row = 0; row < window->height; row++) {
+        const int32_t *label = labels + row * window->width;
+        char *out = (char *)pixels + row * window->width * pixel_bytes;
+        for (int64_t col = 0, n; col < window->width; col += n) {
+            for (n = 1; n < TL_CHUNK && col + n < window->width && label[col + n] == label[col];)
+                n++;
+            const int64_t x_px = col + window->x_px, y_px = row + window->y_px;
+            if (label[col] < 0 || !find_triangle(&s, scene, label[col], x_px, y_px, bits))
+                continue;
+            if (!s.piece[0]) {
+                paint_run(&s, window, row, col, (int)n, colors, n_channels, is_u8, out + col * pixel_bytes);
+                continue;
+            }
+            n = 1; /* the next sample may belong to another piece */
+            paint_piece(&s, scene->triangles + 3 * (int64_t)label[col], x_px, y_px, bits, colors, n_channels, is_u8,
+                        out + col * pixel_bytes);
+        }
+    }
+}
+
+#endif

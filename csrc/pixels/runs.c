@@ -1,0 +1,387 @@
+/* Runs: the parts of a row that one triangle owns, and what its pixels need to know of it, a vector of runs at a time.
+ * In: a row of ids, vertex records, attributes of vertices.  Out: coefficients, which reach the pixels by a load and a permutation.
+ *
+ * The weight of corner k at a pixel is E_k * q_k, its edge function times 1/w: a value is sum(E_k q_k a_k) / sum(E_k q_k).
+ * E_k is an exact integer, rounded once to float32; nothing depends on where a run, a window or a thread begins.  Edge functions
+ * are positive where the front is seen.  So the sum over the normals of the corners points to the viewer, whichever side is seen.
+ *
+ * Based on: C. A. Burns and W. A. Hunt, The Visibility Buffer, 2013; J. F. Blinn, Hyperbolic Interpolation, 1992;
+ * M. Olano and T. Greer, Triangle Scan Conversion using 2D Homogeneous Coordinates, 1997 (triangles cut by a clip plane). */
+#ifndef TL_RUNS_C
+#define TL_RUNS_C
+
+#include <math.h>
+#include <stdint.h>
+
+#include "shading.h"
+#include "topleft.h"
+#include "lanes/lanes.h"
+#include "vertex/clip.c"
+#include "vertex/project.c"
+#include "raster/setup.c"
+
+#define TL_SPAN 512 /* pixels of a row that are shaded together */
+#define TL_SPAN_ROOM (TL_SPAN + 2 * TL_MAX_LANES)
+
+/* |E| below this stay int32, with the step to anywhere else in the box. */
+#define TL_INT32_BOX 0x1p30f
+
+/* What interpolated normals that cancel are shorter than, and rounding could have made. */
+#define TL_NO_NORMAL 1e-6f
+
+enum { /* coefficients of runs, float32 */
+    RUN_NORMAL = 0,                  /* corner by corner, times q; the face's in the first three when flat */
+    RUN_SHORTEST = RUN_NORMAL + 9,   /* the squared length below which normals have cancelled */
+    RUN_Q = RUN_SHORTEST + 1,
+    RUN_U = RUN_Q + 3,               /* times q, as everything that follows */
+    RUN_V = RUN_U + 3,
+    RUN_COLOR = RUN_V + 3,
+    RUN_GRADIENT = RUN_COLOR + 9,    /* per column and per row: of sum(E q), sum(E q u), sum(E q v) */
+    N_RUN_FLOATS = RUN_GRADIENT + 6,
+};
+enum { RUN_E1, RUN_E2, RUN_STEP1, RUN_STEP2, RUN_SUM, RUN_MATERIAL, RUN_ID, RUN_SPECIAL, N_RUN_INTS };
+
+/* A triangle whose edge functions are float64: E_k = at[k] + step[k] * (x_fx - from[k]) in the row of the run. */
+typedef struct {
+    double at[3], step[3], from[3];
+    float area;
+} special_run;
+
+typedef struct {
+    const tl_scene *scene;
+    const tl_window *window;
+    const tl_shading *shading;
+    const tl_view *view;
+    int needs_q, needs_normal, needs_uv, needs_colors, needs_point; /* whether anything that is shown depends on it */
+    int is_grey;                       /* the light is the grey of srgb.c: per channel the line and the root of its colour */
+    float grey_line[3], grey_root[3];
+    int n_runs, n_special;
+    int first_run[TL_SPAN]; /* of each vector: how many runs have begun before it */
+    unsigned starts[TL_SPAN], visible[TL_SPAN];
+    /* vectors of runs begin with a cache line: one across two takes twice as long */
+    _Alignas(64) int32_t ints[N_RUN_INTS][TL_SPAN_ROOM];
+    _Alignas(64) float floats[N_RUN_FLOATS][TL_SPAN_ROOM];
+    special_run special[TL_SPAN];
+} shade_runs;
+
+/* Lists the runs of n ids; run r stands in slot TL_LANES + r.  Ids outside the scene count as background. */
+TL_INLINE void find_runs(shade_runs *s, const int32_t *ids, int n)
+{
+    const vi none = vi_set1(-1), end = vi_set1((int32_t)s->scene->n_triangles);
+    vi before = none;
+    int slot = TL_LANES;
+    for (int x = 0, i = 0; x < n; x += TL_LANES, i++) {
+        const vm inside = vm_first(n - x);
+        const vi id = n - x >= TL_LANES ? vi_load(ids + x) : vi_select(inside, vi_load_masked(inside, ids + x), none);
+        const vm visible = vm_and(vi_gt(id, none), vi_gt(end, id));
+        const vm starts = vm_and_not(visible, vi_eq(id, vi_shift_in(id, before)));
+        vi_compress(s->ints[RUN_ID] + slot, starts, id);
+        s->first_run[i] = slot;
+        s->starts[i] = vm_bits(starts), s->visible[i] = vm_bits(visible);
+        slot += __builtin_popcount(vm_bits(starts));
+        before = id;
+    }
+    s->n_runs = slot - TL_LANES;
+}
+
+/* The corners of the triangles of TL_LANES runs; indices that the vertices do not have are bent to some that they have.
+ * Returns the runs that needed none of that. */
+TL_INLINE vm run_corners(const shade_runs *s, int slot, int32_t corners[3][TL_MAX_LANES])
+{
+    const int32_t *ids = s->ints[RUN_ID] + slot;
+    const vi last = vi_set1((int32_t)s->scene->mesh.n_vertices - 1), zero = vi_set1(0);
+    vi c[4];
+    vm is_there = vm_all();
+    if (TL_LANES > 1 && !vm_any(vi_eq(vi_load(ids), zero))) {
+        vi_load_records((const char *)s->scene->triangles - 4, 12, ids, c); /* 16 bytes, from the number before the triangle on */
+    } else {
+        int32_t own[3][TL_MAX_LANES];
+        for (int lane = 0; lane < TL_LANES; lane++)
+            for (int k = 0; k < 3; k++)
+                own[k][lane] = s->scene->triangles[3 * (int64_t)ids[lane] + k];
+        for (int k = 0; k < 3; k++)
+            c[k + 1] = vi_load(own[k]);
+    }
+    for (int k = 0; k < 3; k++) {
+        const vi corner = vi_max(vi_min(c[k + 1], last), zero);
+        is_there = vm_and(is_there, vi_eq(corner, c[k + 1]));
+        vi_spill(corners[k], corner);
+    }
+    return is_there;
+}
+
+TL_INLINE void put(shade_runs *s, int coefficient, int slot, vf a) { vf_store(s->floats[coefficient] + slot, a); }
+
+/* Times q, corner by corner. */
+TL_INLINE void put_three(shade_runs *s, int first, int slot, const vf *q, vf a0, vf a1, vf a2)
+{
+    put(s, first, slot, vf_mul(q[0], a0));
+    put(s, first + 1, slot, vf_mul(q[1], a1));
+    put(s, first + 2, slot, vf_mul(q[2], a2));
+}
+
+/* What TL_LANES runs have in common with their triangles. */
+typedef struct {
+    _Alignas(64) int32_t corners[3][TL_MAX_LANES];
+    vf q[3], normal[3][3], area, col_step[3], row_step[3];
+} run_setup;
+
+/* What perspective makes of a value along a column or a row: the sum of the steps of the weights times the value. */
+TL_INLINE vf gradient_of(const vf *step, const vf *value) { return vf_fma(step[0], value[0], vf_fma(step[1], value[1], vf_mul(step[2], value[2]))); }
+
+TL_INLINE void set_uv(shade_runs *s, int slot, const run_setup *r)
+{
+    const vf *q = r->q;
+    vf u[3], v[3];
+    for (int k = 0; k < 3; k++) {
+        vf pair[2];
+        vf_load_pairs(s->shading->uv, r->corners[k], pair);
+        u[k] = vf_mul(q[k], pair[0]), v[k] = vf_mul(q[k], pair[1]);
+        put(s, RUN_U + k, slot, u[k]);
+        put(s, RUN_V + k, slot, v[k]);
+    }
+    const vf *steps[2] = {r->col_step, r->row_step};
+    for (int axis = 0; axis < 2; axis++) {
+        put(s, RUN_GRADIENT + 3 * axis, slot, gradient_of(steps[axis], q));
+        put(s, RUN_GRADIENT + 3 * axis + 1, slot, gradient_of(steps[axis], u));
+        put(s, RUN_GRADIENT + 3 * axis + 2, slot, gradient_of(steps[axis], v));
+    }
+}
+
+TL_INLINE void set_face_normals(shade_runs *s, int slot, vf area)
+{
+    vi c[4];
+    vi_load_records(s->shading->face_normals, 16, s->ints[RUN_ID] + slot, c);
+    const vf zero = vf_set1(0.0f);
+    const vm is_back = vf_lt(area, zero);
+    for (int k = 0; k < 3; k++)
+        put(s, RUN_NORMAL + k, slot, vf_select(is_back, vf_sub(zero, vf_of_bits(c[k])), vf_of_bits(c[k])));
+}
+
+/* +1, or -1 where the normals of the vertices point to the other side than the order of the corners. */
+TL_INLINE vf side_of_normals(const shade_runs *s, int slot)
+{
+    float side[TL_MAX_LANES];
+    for (int lane = 0; lane < TL_LANES; lane++)
+        side[lane] = s->shading->is_turned[s->ints[RUN_ID][slot + lane]] ? -1.0f : 1.0f;
+    return vf_load(side);
+}
+
+TL_INLINE void load_normals(const shade_runs *s, run_setup *r)
+{
+    for (int k = 0; k < 3; k++) {
+        vi c[4];
+        vi_load_records(s->shading->normals, 16, r->corners[k], c);
+        for (int axis = 0; axis < 3; axis++)
+            r->normal[k][axis] = vf_of_bits(c[axis]);
+        r->q[k] = vf_of_bits(c[3]);
+    }
+}
+
+/* Everything but edge functions of TL_LANES runs. */
+TL_INLINE void set_attributes(shade_runs *s, int slot, const run_setup *r)
+{
+    const tl_shading *shading = s->shading;
+    const vf *q = r->q;
+    if (shading->face_normals) {
+        set_face_normals(s, slot, r->area);
+    } else if (s->needs_normal) {
+        const vf most = vf_mul(vf_mul(r->area, vf_set1(TL_NO_NORMAL)), vf_max(q[0], vf_max(q[1], q[2])));
+        const vf side = shading->is_turned ? side_of_normals(s, slot) : vf_set1(1.0f);
+        put(s, RUN_SHORTEST, slot, vf_mul(most, most));
+        for (int k = 0; k < 3; k++) {
+            const vf turned = vf_mul(q[k], side), same[3] = {turned, turned, turned};
+            put_three(s, RUN_NORMAL + 3 * k, slot, same, r->normal[k][0], r->normal[k][1], r->normal[k][2]);
+        }
+    }
+    if (s->needs_q)
+        for (int k = 0; k < 3; k++)
+            put(s, RUN_Q + k, slot, q[k]);
+    if (s->needs_uv)
+        set_uv(s, slot, r);
+    if (s->needs_colors)
+        for (int k = 0; k < 3; k++) {
+            vi c[4];
+            vi_load_records(shading->colors, 16, r->corners[k], c);
+            const vf same[3] = {q[k], q[k], q[k]};
+            put_three(s, RUN_COLOR + 3 * k, slot, same, vf_of_bits(c[0]), vf_of_bits(c[1]), vf_of_bits(c[2]));
+        }
+}
+
+/* The centre of a pixel in the space of the snapped vertices, seen from the sample. */
+static inline double center_fx(int64_t at_px, int bits) { return ((double)at_px + 0.5) * (double)(1 << bits); }
+
+/* Edge functions of a triangle that no clip plane cuts, whatever its size: exact below 2^53. */
+static void special_edges(special_run *e, const double *x_fx, const double *y_fx, double y, float *row_step)
+{
+    double area = 0.0;
+    for (int k = 0; k < 3; k++) {
+        const int a = k == 2 ? 0 : k + 1, b = 3 - k - a; /* the other two corners */
+        e->at[k] = (x_fx[b] - x_fx[a]) * (y_fx[a] - y);
+        e->step[k] = y_fx[b] - y_fx[a];
+        e->from[k] = x_fx[a];
+        row_step[k] = (float)(x_fx[a] - x_fx[b]);
+        area += e->at[k] + e->step[k] * (x_fx[0] - e->from[k]);
+    }
+    e->area = (float)area;
+}
+
+/* The same of one that is cut: from homogeneous corners, with q in the edge functions; the area is +-1. */
+static void homogeneous_edges(special_run *e, const tl_view *view, const tl_vertex_set *set, const int32_t *corners, double y, double unit,
+                              float *row_step)
+{
+    double h[3][3], step[3], det = 0.0;
+    for (int k = 0; k < 3; k++) {
+        double p[4];
+        clip_position(set->source, corners[k], p);
+        h[k][0] = (p[0] + p[3]) * (view->half_width_px * unit) - p[3] * (double)set->sample_x_fx;
+        h[k][1] = (p[3] - p[1]) * (view->half_height_px * unit) - p[3] * ((double)set->sample_y_fx + y);
+        h[k][2] = p[3];
+    }
+    for (int k = 0; k < 3; k++) {
+        const int a = k == 2 ? 0 : k + 1, b = 3 - k - a;
+        e->at[k] = h[b][0] * h[a][1] - h[a][0] * h[b][1];
+        e->step[k] = h[a][2] * h[b][1] - h[b][2] * h[a][1];
+        e->from[k] = 0.0;
+        step[k] = h[a][0] * h[b][2] - h[b][0] * h[a][2];
+        det += h[k][2] * e->at[k];
+    }
+    const double scale = det == 0.0 ? 0.0 : 1.0 / fabs(det);
+    for (int k = 0; k < 3; k++) {
+        e->at[k] *= scale, e->step[k] *= scale;
+        row_step[k] = (float)(step[k] * scale);
+    }
+    e->area = det < 0.0 ? -1.0f : 1.0f;
+}
+
+/* Sets up one run by itself and puts it into its lane. */
+static void set_special(shade_runs *s, int slot, int lane, int64_t row, run_setup *r)
+{
+    const tl_vertex_set *set = &s->scene->mesh;
+    const int32_t corners[3] = {r->corners[0][lane], r->corners[1][lane], r->corners[2][lane]};
+    const int bits = s->window->subpixel_bits, is_cut = s->view && is_clipped(set, corners);
+    const double y = center_fx(row + s->window->y_px, bits), unit = (double)(1 << bits);
+    special_run *e = &s->special[s->n_special];
+    float row_step[3], lanes[TL_MAX_LANES];
+    if (is_cut) {
+        homogeneous_edges(e, s->view, set, corners, y, unit, row_step);
+    } else {
+        double x_fx[3], y_fx[3];
+        for (int k = 0; k < 3; k++) {
+            const tl_wide v = vertex_fx(set, corners[k]);
+            x_fx[k] = (double)v.x_fx, y_fx[k] = (double)v.y_fx;
+        }
+        special_edges(e, x_fx, y_fx, y, row_step);
+    }
+    s->ints[RUN_SPECIAL][slot + lane] = ++s->n_special;
+    vf *changed[10] = {&r->area, &r->col_step[0], &r->col_step[1], &r->col_step[2], &r->row_step[0], &r->row_step[1], &r->row_step[2],
+                       &r->q[0], &r->q[1], &r->q[2]};
+    const float values[10] = {e->area, (float)(e->step[0] * unit), (float)(e->step[1] * unit), (float)(e->step[2] * unit),
+                              (float)(row_step[0] * unit), (float)(row_step[1] * unit), (float)(row_step[2] * unit), 1.0f, 1.0f, 1.0f};
+    for (int k = 0; k < (is_cut ? 10 : 7); k++) {
+        vf_store(lanes, *changed[k]);
+        lanes[lane] = values[k];
+        *changed[k] = vf_load(lanes);
+    }
+}
+
+/* Edge functions of TL_LANES runs in a row, at column 0 of the row: what wraps on the way there comes back at the pixel. */
+TL_INLINE vm set_edges(shade_runs *s, int slot, int64_t row, run_setup *r)
+{
+    const tl_vertex_set *set = &s->scene->mesh;
+    const int bits = s->window->subpixel_bits;
+    const int32_t half = (1 << bits) >> 1;
+    const vi px = vi_set1((int32_t)((uint32_t)s->window->x_px << bits) + half + set->sample_x_fx);
+    const vi py = vi_set1((int32_t)((uint32_t)(row + s->window->y_px) << bits) + half + set->sample_y_fx);
+    vi x[3], y[3];
+    vm is_special = bits == 0 ? vm_all() : vm_first(0);
+    for (int k = 0; k < 3; k++) {
+        vz z;
+        load_vertices_by(1, set->vertices, r->corners[k], &x[k], &y[k], &z);
+        is_special = vm_or(is_special, vi_eq(x[k], vi_set1(TL_SPECIAL)));
+    }
+    const vf width = vf_from_vi(vi_sub(vi_max(x[0], vi_max(x[1], x[2])), vi_min(x[0], vi_min(x[1], x[2]))));
+    const vf height = vf_from_vi(vi_sub(vi_max(y[0], vi_max(y[1], y[2])), vi_min(y[0], vi_min(y[1], y[2]))));
+    is_special = vm_or(is_special, vf_ge(vf_mul(width, height), vf_set1(TL_INT32_BOX)));
+    for (int k = 0; k < 3; k++)
+        x[k] = vi_sub(x[k], px), y[k] = vi_sub(y[k], py);
+    vi sum = vi_set1(0);
+    for (int k = 0; k < 3; k++) {
+        const int a = k == 2 ? 0 : k + 1, b = 3 - k - a;
+        const vi e = vi_sub(vi_mul(x[b], y[a]), vi_mul(x[a], y[b])), step = vi_shift_left(vi_sub(y[b], y[a]), bits);
+        r->col_step[k] = vf_from_vi(step);
+        r->row_step[k] = vf_from_vi(vi_shift_left(vi_sub(x[a], x[b]), bits));
+        sum = vi_add(sum, e);
+        if (k) {
+            vi_store(s->ints[RUN_E1 + k - 1] + slot, e);
+            vi_store(s->ints[RUN_STEP1 + k - 1] + slot, step);
+        }
+    }
+    vi_store(s->ints[RUN_SUM] + slot, sum);
+    r->area = vf_from_vi(sum);
+    return is_special;
+}
+
+/* Prepares the runs of a row, a vector of them at a time. */
+TL_INLINE void set_runs(shade_runs *s, int64_t row)
+{
+    const tl_shading *shading = s->shading;
+    s->n_special = 0;
+    if (s->n_runs) /* the rest of the last vector: a triangle that is there */
+        vi_store(s->ints[RUN_ID] + TL_LANES + s->n_runs, vi_set1(s->ints[RUN_ID][TL_LANES + s->n_runs - 1]));
+    for (int slot = TL_LANES; slot < TL_LANES + s->n_runs; slot += TL_LANES) {
+        run_setup r;
+        run_corners(s, slot, r.corners);
+        vi_store(s->ints[RUN_SPECIAL] + slot, vi_set1(0));
+        const vm is_special = vm_and(set_edges(s, slot, row, &r), vm_first(TL_LANES + s->n_runs - slot));
+        load_normals(s, &r);
+        for (unsigned rest = vm_bits(is_special); rest; rest &= rest - 1)
+            set_special(s, slot, __builtin_ctz(rest), row, &r);
+        set_attributes(s, slot, &r);
+        if (shading->material_of)
+            for (int lane = 0; lane < TL_LANES; lane++)
+                s->ints[RUN_MATERIAL][slot + lane] = shading->material_of[s->ints[RUN_ID][slot + lane]];
+    }
+}
+
+/* A vector of pixels: where its lanes find their runs, and what they are to show. */
+typedef struct {
+    const shade_runs *s;
+    int first;  /* the slot of the run that lane 0 belongs to, or of the first one behind it */
+    vi run;     /* of each lane, from `first` on */
+    vm visible; /* lanes that show a triangle */
+    vi column;  /* in the window */
+    vf e[3];    /* edge functions */
+    vf area, q, inv_q;
+    vf normal[3];
+    vf color[3]; /* of the vertices */
+    vf uv[2], du[2], dv[2];
+    vf ray[3], point[3];
+} shaded_lanes;
+
+TL_INLINE vf pick(const shaded_lanes *p, int coefficient) { return vf_pick(p->s->floats[coefficient] + p->first, p->run); }
+TL_INLINE vi pick_int(const shaded_lanes *p, int coefficient) { return vi_pick(p->s->ints[coefficient] + p->first, p->run); }
+
+/* The sum of a value at the corners, weighted by the edge functions. */
+TL_INLINE vf weighed(const shaded_lanes *p, int c0, int c1, int c2)
+{
+    return vf_fma(p->e[0], pick(p, c0), vf_fma(p->e[1], pick(p, c1), vf_mul(p->e[2], pick(p, c2))));
+}
+
+/* The lanes of vector i of the span that begins at `column`, and their edge functions; but for those of special runs. */
+TL_INLINE void find_lanes(shaded_lanes *p, const shade_runs *s, int i, int64_t column, vi *e, vi *sum)
+{
+    const unsigned starts = s->starts[i];
+    const int begins = (int)(starts & 1);
+    p->s = s;
+    p->first = s->first_run[i] - 1 + begins;
+    p->run = vi_sub(vi_prefix_count(starts), vi_set1(begins));
+    p->visible = vm_from_bits(s->visible[i]);
+    p->column = vi_add(vi_iota(), vi_set1((int32_t)column + i * TL_LANES));
+    e[1] = vi_add(pick_int(p, RUN_E1), vi_mul(p->column, pick_int(p, RUN_STEP1)));
+    e[2] = vi_add(pick_int(p, RUN_E2), vi_mul(p->column, pick_int(p, RUN_STEP2)));
+    *sum = pick_int(p, RUN_SUM);
+    e[0] = vi_sub(vi_sub(*sum, e[1]), e[2]);
+}
+
+#endif

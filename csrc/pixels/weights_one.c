@@ -1,0 +1,113 @@
+/* The weights of one pixel, of any triangle whatever.  weights.c has the same a vector of pixels at a time.
+ * In: a triangle's id and the vertex records it was drawn from.  Out: barycentric weights, float64. */
+#ifndef TL_WEIGHTS_ONE_C
+#define TL_WEIGHTS_ONE_C
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "topleft.h"
+#include "vertex/clip.c"
+#include "vertex/fixed.h"
+#include "vertex/project.c"
+#include "raster/setup.c"
+
+/* The triangle (or piece) under the last pixel: neighbours mostly share it. */
+typedef struct {
+    int64_t id;             /* -1: none yet */
+    tl_triangle triangle;
+    const double *piece[3]; /* weights of a piece's corners in the source triangle, or NULL */
+    double inv_w[3];
+    int slot[3];            /* which of the input triangle's corners each turned corner is */
+} resolve_state;
+
+static inline int covers(const tl_triangle *t, int64_t x_px, int64_t y_px, int bits)
+{
+    for (int k = 0; k < 3; k++) {
+        const int next = k == 2 ? 0 : k + 1;
+        const tl_int128 dy = (tl_int128)t->y_fx[next] - t->y_fx[k], dx = (tl_int128)t->x_fx[next] - t->x_fx[k];
+        const int top_left = dy < 0 || (dy == 0 && dx > 0);
+        if (doubled_edge(t, k, next, x_px, y_px, bits) - !top_left < 0)
+            return 0;
+    }
+    return 1;
+}
+
+static double inverse_w(const tl_vertex_set *set, int32_t i)
+{
+    double p[4];
+    if (set->inv_w)
+        return set->inv_w[i];
+    if (!set->source)
+        return 1.0;
+    clip_position(set->source, i, p);
+    return 1.0 / p[3];
+}
+
+static int load_resolved(resolve_state *s, const tl_vertex_set *set, const int32_t *corners)
+{
+    if (load_triangle(set, corners, &s->triangle) == 0)
+        return 0;
+    for (int k = 0; k < 3; k++) {
+        s->slot[k] = k;
+        s->inv_w[k] = inverse_w(set, s->triangle.corner[k]);
+    }
+    if (s->triangle.corner[1] != corners[1])
+        s->slot[1] = 2, s->slot[2] = 1;
+    return 1;
+}
+
+/* Makes `s` describe the triangle or piece that shows at the pixel; 0 when the buffer does not belong to the scene. */
+static int find_triangle(resolve_state *s, const tl_scene *scene, int64_t id, int64_t x_px, int64_t y_px, int bits)
+{
+    if (id == s->id && !s->piece[0])
+        return 1;
+    s->id = -1;
+    if (id < 0 || id >= scene->n_triangles)
+        return 0;
+    const int32_t *corners = scene->triangles + 3 * id;
+    for (int k = 0; k < 3; k++)
+        if (corners[k] < 0 || corners[k] >= scene->mesh.n_vertices) /* the caller's array may have changed */
+            return 0;
+    if (!is_clipped(&scene->mesh, corners)) {
+        s->piece[0] = NULL;
+        if (!load_resolved(s, &scene->mesh, corners))
+            return 0;
+        s->id = id;
+        return 1;
+    }
+    if (!scene->pieces)
+        return 0;
+    const tl_pieces *p = scene->pieces;
+    const tl_vertex_set cut = piece_set(p, &scene->mesh);
+    for (int64_t i = first_piece(p, id); i < p->n_pieces && p->source[i] == id; i++) {
+        if (!load_resolved(s, &cut, p->triangles + 3 * i) || !covers(&s->triangle, x_px, y_px, bits))
+            continue;
+        for (int k = 0; k < 3; k++)
+            s->piece[k] = p->weights + 3 * (int64_t)s->triangle.corner[k];
+        s->id = id;
+        return 1;
+    }
+    return 0;
+}
+
+/* Perspective-correct weights of the input triangle's corners at a pixel: exact edge functions times 1/w, normalised. */
+static void weights_of_pixel(const resolve_state *s, int64_t x_px, int64_t y_px, int bits, double *weights)
+{
+    double part[3], sum = 0.0;
+    for (int k = 0; k < 3; k++) {
+        const int a = k == 2 ? 0 : k + 1, b = 3 - k - a;
+        part[k] = (double)doubled_edge(&s->triangle, a, b, x_px, y_px, bits) * s->inv_w[k];
+        sum += part[k];
+    }
+    weights[0] = weights[1] = weights[2] = 0.0;
+    for (int k = 0; k < 3; k++) {
+        if (s->piece[0])
+            for (int j = 0; j < 3; j++)
+                weights[j] += part[k] / sum * s->piece[k][j];
+        else
+            weights[s->slot[k]] = part[k] / sum;
+    }
+}
+
+#endif

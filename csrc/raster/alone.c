@@ -1,0 +1,239 @@
+/* Alone: one triangle by itself, of any size, range and method, through setup and a walker to the sink.
+ * In: vertex records, the pieces of cut triangles.  Out: samples to the sink. */
+#ifndef TL_ALONE_C
+#define TL_ALONE_C
+
+#include <math.h>
+#include <stdint.h>
+
+#include "topleft.h"
+#include "lanes/lanes.h"
+#include "vertex/clip.c"
+#include "vertex/fixed.h"
+#include "raster/census.c"
+#include "raster/setup.c"
+#include "raster/sink.c"
+
+#define TL_INT int64_t
+#define TL_UINT uint64_t
+#define TL_WALK(name) name##_64
+#include "raster/walk.h"
+
+#define TL_INT tl_int128
+#define TL_UINT tl_uint128
+#define TL_WALK(name) name##_128
+#include "raster/walk.h"
+
+/* One triangle of any size, by the ends of TL_LANES rows at a time in float64: as above, exact while |2E| < 2^51, for then
+ * |v / d| * 2^-52 < 0.5 / d. */
+TL_INLINE int rows_fit(const tl_triangle *t, const tl_window *window, int with_border)
+{
+    const double around = with_border ? (double)((int64_t)2 << window->subpixel_bits) : 0.0;
+    const double width = (double)(max3(t->x_fx[0], t->x_fx[1], t->x_fx[2]) - min3(t->x_fx[0], t->x_fx[1], t->x_fx[2]));
+    const double height = (double)(max3(t->y_fx[0], t->y_fx[1], t->y_fx[2]) - min3(t->y_fx[0], t->y_fx[1], t->y_fx[2]));
+    return TL_LANES > 1 && t->is_narrow && 2.0 * (width + around) * (height + around) < 0x1p50;
+}
+
+/* The columns [first, end) of TL_LANES rows, all within [low, high]. */
+TL_INLINE void find_row_ends(const edges_64 *e, vd rows, double low, double high, int32_t *first, int32_t *end)
+{
+    vd begins = vd_set1(low), ends = vd_set1(high);
+    for (int k = 0; k < 3; k++) {
+        if (e->dy[k] == 0)
+            continue;
+        const vd v = vd_add(vd_set1((double)e->value[k] + 0.5), vd_mul(vd_set1((double)e->dx[k]), rows));
+        const vd quotient = vd_floor(vd_mul(v, vd_set1(1.0 / fabs((double)e->dy[k]))));
+        if (e->dy[k] < 0)
+            begins = vd_max(begins, vd_sub(vd_set1(0.0), quotient));
+        else
+            ends = vd_min(ends, vd_add(quotient, vd_set1(1.0)));
+    }
+    vi_store(first, vi_round(vd_min(begins, vd_set1(high))));
+    vi_store(end, vi_round(vd_max(ends, vd_set1(low))));
+}
+
+TL_INLINE void walk_rows(const tl_triangle *t, const tl_window *window, const tl_target *shared, tl_sink sink)
+{
+    const tl_target own = *shared, *target = &own; /* a copy that no store can change */
+    const edges_64 e = setup_edges_64(t, window);
+    const vd lanes = vd_from_vi(vi_iota());
+    const double step = (double)((int64_t)2 << window->subpixel_bits), x0 = sample_x(t, window, t->col0);
+    const vd xs = vd_add(vd_set1(x0), ramp(step)), slope_x = vd_set1(t->slope_x);
+    int32_t first[TL_MAX_LANES], end[TL_MAX_LANES];
+    double z_row[TL_MAX_LANES];
+    for (int64_t row0 = t->row0; row0 < t->row1; row0 += TL_LANES) {
+        const vd rows = vd_add(vd_set1((double)(row0 - t->row0)), lanes);
+        find_row_ends(&e, rows, 0.0, (double)(t->col1 - t->col0), first, end);
+        if (sink_has_depth(sink)) {
+            const vd ys = vd_add(vd_set1(sample_y(t, window, row0)), ramp(step));
+            vd_store(z_row, vd_add(vd_set1(t->z[0]), vd_mul(vd_set1(t->slope_y), ys)));
+        }
+        const int n = t->row1 - row0 < TL_LANES ? (int)(t->row1 - row0) : TL_LANES;
+        for (int k = 0; k < n; k++) {
+            const int64_t at = (row0 + k) * target->stride_px + t->col0;
+            if (!sink_has_depth(sink)) {
+                if (first[k] < end[k])
+                    put_plain(target, sink, at + first[k], end[k] - first[k], t->id);
+                continue;
+            }
+            const vd z = vd_set1(z_row[k]);
+            for (int32_t col = first[k]; col < end[k]; col += TL_LANES) {
+                const vd x = vd_add(xs, vd_set1(col * step));
+                put_depths(target, sink, at + col, vm_first(end[k] - col), sum_depth(z, vd_mul(slope_x, x)), t->id);
+            }
+        }
+    }
+}
+
+/* A box at most this wide is walked sample by sample, a wider one by its row ends. */
+#define TL_EDGE_MAX_WIDTH 6
+
+/* What stands in the picture for triangles. */
+TL_INLINE vi names_of(const tl_scene *scene, vm m, vi id)
+{
+    return vi_add(scene->names ? vi_gather(m, scene->names, id) : id, vi_set1(scene->first_id));
+}
+TL_INLINE int32_t name_of(const tl_scene *scene, int32_t id) { return (scene->names ? scene->names[id] : id) + scene->first_id; }
+
+/* Whether a triangle that is set up is walked by float64 row ends; if not, sample by sample or by exact row ends. */
+TL_INLINE int takes_rows(const tl_triangle *t, const tl_scene *scene, const tl_window *window, tl_sink sink)
+{
+    return scene->method == TL_METHOD_AUTO && rows_fit(t, window, window->test != TL_TEST_SAMPLE) && (!sink_has_depth(sink) || t->has_plane);
+}
+TL_INLINE int takes_edge(const tl_triangle *t, const tl_scene *scene)
+{
+    return scene->method == TL_METHOD_EDGE || (scene->method == TL_METHOD_AUTO && t->col1 - t->col0 <= TL_EDGE_MAX_WIDTH);
+}
+
+/* Counts a triangle as draw_triangle would draw it. */
+TL_INLINE void count_drawn(tl_triangle *t, const tl_scene *scene, const tl_window *window, tl_census *census)
+{
+    t->has_plane = 0;
+    setup_sink(t, window, census->sink);
+    const tl_class narrow = takes_edge(t, scene) ? TL_CLASS_EDGE_64 : TL_CLASS_SPAN_64, wide = takes_edge(t, scene) ? TL_CLASS_EDGE_128 : TL_CLASS_SPAN_128;
+    const tl_class walker = takes_rows(t, scene, window, census->sink) ? TL_CLASS_LONG : t->is_narrow ? narrow : wide;
+    count_one(census, walker, t, window->subpixel_bits);
+}
+
+/* One triangle by itself: any range, any method. */
+TL_INLINE void draw_triangle(const tl_vertex_set *set, const int32_t *corners, int32_t id, const tl_scene *scene,
+                             const tl_window *window, const tl_target *target, tl_sink sink)
+{
+    tl_triangle t;
+    const int sign = load_triangle(set, corners, &t);
+    if (sign == 0 || (sign > 0 && scene->cull == TL_CULL_BACK) || (sign < 0 && scene->cull == TL_CULL_FRONT)) {
+        if (sink == TL_SINK_CENSUS)
+            target->census->n[sign ? TL_CLASS_CULLED : TL_CLASS_DEGENERATE]++;
+        return;
+    }
+    if (!clip_box(&t, window)) {
+        if (sink == TL_SINK_CENSUS)
+            count_unseen_one(target->census, &t, window);
+        return;
+    }
+    t.id = name_of(scene, id);
+    if (sink == TL_SINK_CENSUS) {
+        count_drawn(&t, scene, window, target->census);
+        return;
+    }
+    setup_sink(&t, window, sink);
+    const int by_edge = takes_edge(&t, scene);
+    if (takes_rows(&t, scene, window, sink))
+        walk_rows(&t, window, target, sink);
+    else if (t.is_narrow && by_edge)
+        walk_edge_64(&t, window, target, sink);
+    else if (t.is_narrow)
+        walk_scanline_64(&t, window, target, sink);
+    else if (by_edge)
+        walk_edge_128(&t, window, target, sink);
+    else
+        walk_scanline_128(&t, window, target, sink);
+}
+
+/* The squares [first, end) of a row that a triangle meets, or holds. */
+typedef struct {
+    int64_t first, end;
+} row_span;
+
+static row_span square_span(const tl_triangle *t, const tl_window *window, int64_t row)
+{
+    row_span span = {0, 0};
+    if (row < t->row0 || row >= t->row1)
+        return span;
+    const edges_128 e = setup_edges_128(t, window);
+    tl_int128 first = 0, end = t->col1 - t->col0;
+    for (int k = 0; k < 3; k++) {
+        tl_int128 quotient, remainder;
+        if (e.dy[k] == 0)
+            continue;
+        floor_divide_128(e.value[k] + e.dx[k] * (row - t->row0), e.dy[k] < 0 ? -e.dy[k] : e.dy[k], &quotient, &remainder);
+        if (e.dy[k] < 0)
+            first = -quotient > first ? -quotient : first;
+        else
+            end = quotient + 1 < end ? quotient + 1 : end;
+    }
+    if (first < end)
+        span = (row_span){t->col0 + (int64_t)first, t->col0 + (int64_t)end};
+    return span;
+}
+
+/* Counts the squares that any of a triangle's pieces meets, or holds: a square may meet several, and counts once. */
+static __attribute__((noinline)) void count_squares(const tl_vertex_set *set, const int32_t *corners, int n_pieces, const tl_scene *scene,
+                                                    const tl_window *window, const tl_target *target)
+{
+    tl_triangle t[TL_MAX_PIECES];
+    int64_t row0 = window->height, row1 = 0;
+    int n = 0;
+    for (int i = 0; i < n_pieces && n < TL_MAX_PIECES; i++) {
+        const int sign = load_triangle(set, corners + 3 * i, &t[n]);
+        const int is_culled = sign == 0 || (sign > 0 && scene->cull == TL_CULL_BACK) || (sign < 0 && scene->cull == TL_CULL_FRONT);
+        if (is_culled || !clip_box(&t[n], window))
+            continue;
+        row0 = min64(row0, t[n].row0);
+        row1 = max64(row1, t[n].row1);
+        n++;
+    }
+    for (int64_t row = row0; row < row1; row++)
+        for (int64_t done = 0, n_left = n; n_left > 0; n_left--) { /* the spans in the order of their beginnings */
+            int64_t first = window->width, end = 0;
+            for (int i = 0; i < n; i++) {
+                const row_span span = square_span(&t[i], window, row);
+                const int64_t begin = max64(span.first, done);
+                if (begin < span.end && (begin < first || (begin == first && span.end > end)))
+                    first = begin, end = span.end;
+            }
+            if (first >= end)
+                break;
+            put_plain(target, TL_SINK_COUNT, row * target->stride_px + first, end - first, 0);
+            done = end;
+        }
+}
+
+/* Triangle i, or its pieces, by itself. */
+TL_INLINE void draw_alone(const tl_scene *scene, int64_t i, const tl_window *window, const tl_target *target, tl_sink sink)
+{
+    const int32_t *corners = scene->triangles + 3 * i;
+    const tl_pieces *pieces = scene->pieces;
+    tl_vertex_set set = scene->mesh;
+    int64_t piece = 0, end = 1;
+    if (is_clipped(&set, corners)) {
+        if (!pieces)
+            return;
+        set = piece_set(pieces, &scene->mesh);
+        piece = first_piece(pieces, i);
+        for (end = piece; end < pieces->n_pieces && pieces->source[end] == i;)
+            end++;
+        corners = pieces->triangles + 3 * piece;
+    }
+    if (sink == TL_SINK_COUNT && window->test != TL_TEST_SAMPLE && end - piece > 1) {
+        count_squares(&set, corners, (int)(end - piece), scene, window, target);
+        return;
+    }
+    for (; piece < end; piece++, corners += 3)
+        draw_triangle(&set, corners, (int32_t)i, scene, window, target, sink);
+}
+
+TL_SINK_COPIES(draw_alone, (const tl_scene *scene, int64_t i, const tl_window *window, const tl_target *target), scene, i, window,
+               target)
+
+#endif

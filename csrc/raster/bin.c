@@ -1,0 +1,142 @@
+/* Bin: which triangles reach into which bands of rows, so that a scene is set up once for many samples and bands.
+ * In: vertex records and triangles.  Out: the triangles that can be seen, and the first and last band of each.
+ *
+ * A triangle is listed when a point within reach_fx of its extent, in x and in y, is a centre in the window: more than its samples
+ * cover.  Bands are 2^band_bits rows tall. */
+#ifndef TL_BIN_C
+#define TL_BIN_C
+
+#include <stdint.h>
+#include <string.h>
+
+#include "topleft.h"
+#include "lanes/lanes.h"
+#include "vertex/clip.c"
+#include "vertex/fixed.h"
+#include "raster/batch.c"
+#include "raster/raster.c"
+#include "raster/setup.c"
+
+typedef struct {
+    const tl_scene *scene;
+    const tl_window *window;
+    int32_t low_fx, high_fx; /* added to the ends of an extent before they become pixels */
+    int band_bits;
+    int32_t max_extent, left, top, right, bottom;
+} bin_limits;
+
+/* Widens the rows [*row0, *row1) of the window by those that a triangle may reach. */
+static void widen_rows(const bin_limits *b, const tl_vertex_set *set, const int32_t *corners, int64_t *row0, int64_t *row1)
+{
+    const tl_window *window = b->window;
+    const int bits = window->subpixel_bits;
+    tl_triangle t;
+    const int sign = load_triangle(set, corners, &t);
+    if (sign == 0 || (sign > 0 && b->scene->cull == TL_CULL_BACK) || (sign < 0 && b->scene->cull == TL_CULL_FRONT))
+        return;
+    const int64_t y0 = min3(t.y_fx[0], t.y_fx[1], t.y_fx[2]), y1 = max3(t.y_fx[0], t.y_fx[1], t.y_fx[2]);
+    const int64_t first = max64(((y0 + b->low_fx) >> bits) - window->y_px, 0);
+    const int64_t end = min64(((y1 + b->high_fx) >> bits) - window->y_px, window->height);
+    if (first < end)
+        *row0 = min64(*row0, first), *row1 = max64(*row1, end);
+}
+
+/* Triangle i, or its pieces, by itself. */
+static __attribute__((noinline)) void bin_alone(const bin_limits *b, int64_t i, tl_bins *bins)
+{
+    const tl_scene *scene = b->scene;
+    const tl_pieces *pieces = scene->pieces;
+    const int32_t *corners = scene->triangles + 3 * i;
+    int64_t row0 = b->window->height, row1 = 0;
+    if (!is_clipped(&scene->mesh, corners)) {
+        widen_rows(b, &scene->mesh, corners, &row0, &row1);
+    } else if (pieces) {
+        const tl_vertex_set set = piece_set(pieces, &scene->mesh);
+        for (int64_t k = first_piece(pieces, i); k < pieces->n_pieces && pieces->source[k] == i; k++)
+            widen_rows(b, &set, pieces->triangles + 3 * k, &row0, &row1);
+    }
+    if (row0 >= row1)
+        return;
+    bins->ids[bins->n] = (int32_t)i;
+    bins->first_band[bins->n] = (int32_t)(row0 >> b->band_bits);
+    bins->last_band[bins->n] = (int32_t)((row1 - 1) >> b->band_bits);
+    bins->n++;
+}
+
+TL_INLINE int bin_batch(const bin_limits *b, int64_t i, const int32_t *corners, vm live, tl_bins *bins)
+{
+    const int bits = b->window->subpixel_bits;
+    const tl_cull cull = b->scene->cull;
+    const vi zero = vi_set1(0), max_extent = vi_set1(b->max_extent);
+    if (has_bad_index(corners, vi_set1((int32_t)(b->scene->mesh.n_vertices - 1))))
+        return 0;
+    lane_corners c;
+    for (int k = 0; k < 3; k++)
+        load_vertices(b->scene->mesh.vertices, corners + k, &c.x[k], &c.y[k], &c.z[k]);
+    const vi x_min = vi_min(vi_min(c.x[0], c.x[1]), c.x[2]), x_max = vi_max(vi_max(c.x[0], c.x[1]), c.x[2]);
+    const vi y_min = vi_min(vi_min(c.y[0], c.y[1]), c.y[2]), y_max = vi_max(vi_max(c.y[0], c.y[1]), c.y[2]);
+    vm alone = vm_or(vi_gt_unsigned(vi_sub(x_max, x_min), max_extent), vi_gt_unsigned(vi_sub(y_max, y_min), max_extent));
+    alone = vm_and(live, vm_or(alone, vi_eq(x_min, vi_set1(TL_SPECIAL))));
+    for (unsigned lanes = vm_bits(alone); lanes; lanes &= lanes - 1)
+        bin_alone(b, i + __builtin_ctz(lanes), bins);
+    const vi area = area_lanes(&c);
+    const vm positive = vi_gt(area, zero), negative = vi_gt(zero, area);
+    const vm turned = cull == TL_CULL_BACK ? negative : cull == TL_CULL_FRONT ? positive : vm_or(positive, negative);
+    const vi col0 = vi_max(vi_shift_right(vi_add(x_min, vi_set1(b->low_fx)), bits), vi_set1(b->left));
+    const vi col1 = vi_min(vi_shift_right(vi_add(x_max, vi_set1(b->high_fx)), bits), vi_set1(b->right));
+    const vi row0 = vi_max(vi_shift_right(vi_add(y_min, vi_set1(b->low_fx)), bits), vi_set1(b->top));
+    const vi row1 = vi_min(vi_shift_right(vi_add(y_max, vi_set1(b->high_fx)), bits), vi_set1(b->bottom));
+    const vm seen = vm_and(vm_and(vm_and_not(live, alone), turned), vm_and(vi_gt(col1, col0), vi_gt(row1, row0)));
+    const vi first = vi_sub(row0, vi_set1(b->top)), last = vi_sub(vi_sub(row1, vi_set1(1)), vi_set1(b->top));
+    vi_compress(bins->ids + bins->n, seen, vi_add(vi_set1((int32_t)i), vi_iota()));
+    vi_compress(bins->first_band + bins->n, seen, vi_shift_right(first, b->band_bits));
+    vi_compress(bins->last_band + bins->n, seen, vi_shift_right(last, b->band_bits));
+    bins->n += __builtin_popcount(vm_bits(seen));
+    return 1;
+}
+
+static int64_t bin(const tl_scene *scene, const tl_window *window, int32_t reach_fx, int band_bits, tl_bins *bins)
+{
+    const int bits = window->subpixel_bits;
+    const int64_t farthest = (int64_t)1 << 30;
+    const extent_rounding round = round_extent(window);
+    const bin_limits b = {
+        .scene = scene,
+        .window = window,
+        .low_fx = round.first - reach_fx,
+        .high_fx = round.end + reach_fx,
+        .band_bits = band_bits,
+        .max_extent = TL_MAX_BOX_PX << (bits < 8 ? bits : 8),
+        .left = (int32_t)window->x_px,
+        .top = (int32_t)window->y_px,
+        .right = (int32_t)min64(window->x_px + window->width, farthest),
+        .bottom = (int32_t)min64(window->y_px + window->height, farthest),
+    };
+    int32_t tail[3 * TL_LANES] = {0};
+    const int64_t n_whole = scene->n_triangles / TL_LANES * TL_LANES;
+    memcpy(tail, scene->triangles + 3 * n_whole, sizeof(int32_t) * 3 * (size_t)(scene->n_triangles - n_whole));
+    bins->n = 0;
+    for (int64_t i = 0; i < scene->n_triangles; i += TL_LANES)
+        if (!bin_batch(&b, i, i < n_whole ? scene->triangles + 3 * i : tail, vm_first(scene->n_triangles - i), bins))
+            return i;
+    return -1;
+}
+
+/* Lists the triangles of each band, those of band k from starts[k] on to starts[k + 1]; with listed NULL only counts. */
+static void list_bins(const tl_bins *bins, int64_t n_bands, int64_t *starts, int32_t *listed)
+{
+    if (!listed) {
+        memset(starts, 0, sizeof(int64_t) * (size_t)(n_bands + 2));
+        for (int64_t i = 0; i < bins->n; i++)
+            for (int32_t k = bins->first_band[i]; k <= bins->last_band[i]; k++)
+                starts[k + 2]++;
+        for (int64_t k = 0; k < n_bands; k++)
+            starts[k + 2] += starts[k + 1];
+        return;
+    }
+    for (int64_t i = 0; i < bins->n; i++) /* starts[k + 1] is where band k goes on, and ends where band k + 1 begins */
+        for (int32_t k = bins->first_band[i]; k <= bins->last_band[i]; k++)
+            listed[starts[k + 1]++] = bins->ids[i];
+}
+
+#endif

@@ -1,0 +1,137 @@
+/* Alpha test: triangles with holes in their texture, drawn over a visibility buffer or over layers; samples with too little opacity are
+ * left out, so that what is behind them stays.
+ * In: the buffer of all other triangles, a list of triangles.  Out: the buffer, the nearest of what is left in every pixel.
+ *
+ * A triangle is drawn by itself into a tile, then tested pixel by pixel: the order of the list does not matter. */
+#ifndef TL_ALPHA_TEST_C
+#define TL_ALPHA_TEST_C
+
+#include <stdint.h>
+
+#include "shading.h"
+#include "topleft.h"
+#include "lanes/lanes.h"
+#include "vertex/clip.c"
+#include "vertex/fixed.h"
+#include "raster/peel.c"
+#include "raster/raster.c"
+#include "raster/setup.c"
+#include "pixels/runs.c"
+#include "shade/shade.c"
+#include "shade/shade_pixels.c"
+#include "shade/texture.c"
+
+#define TL_CUTOUT_TILE 64
+
+typedef struct {
+    int32_t ids[TL_CUTOUT_TILE * TL_CUTOUT_TILE];
+    float depth[TL_CUTOUT_TILE * TL_CUTOUT_TILE];
+} cutout_tile;
+
+/* The opacity of a material at the pixels of a run. */
+TL_INLINE vf opacity_of(shaded_lanes *p, const tl_material *m)
+{
+    vf texel[4];
+    if (!m->texture || !p->s->needs_uv)
+        return vf_set1(m->color[3]);
+    p->q = weighed(p, RUN_Q, RUN_Q + 1, RUN_Q + 2);
+    p->inv_q = vf_div(vf_set1(1.0f), p->q);
+    set_uv_lanes(p);
+    sample_texture(m->texture, p->uv[0], p->uv[1], p->du, p->dv, texel, 4);
+    return vf_mul(texel[3], vf_set1(m->color[3]));
+}
+
+/* Where triangles with holes go. */
+typedef struct {
+    const tl_target *target; /* NEAREST or PEEL */
+    tl_scene scene;          /* as the buffer's, but its first id is 0 */
+    int32_t first_id;        /* that of the buffer */
+    cutout_tile tile;
+} cutout;
+
+/* Leaves out of n pixels of a row what the buffer hides. */
+TL_INLINE void hide_nearest(const cutout *c, int n, int32_t *own, const float *own_depth, int64_t to)
+{
+    const int32_t *ids = (const int32_t *)c->target->pixels + to;
+    const float *depth = c->target->depth + to;
+    for (int x = 0; x < n; x += TL_LANES) {
+        const vm inside = vm_first(n - x);
+        const vi id = vi_load_masked(inside, own + x), there = vi_load_masked(inside, ids + x);
+        const vf z = vf_load_masked(inside, own_depth + x), z_there = vf_load_masked(inside, depth + x);
+        const vi name = vi_add(id, vi_set1(c->first_id));
+        const vm is_tie = vm_and(vf_eq(z, z_there), vm_or(vi_gt(vi_set1(0), there), vi_gt(there, name)));
+        const vm wins = vm_and(vm_and(inside, vi_gt(id, vi_set1(-1))), vm_or(vf_lt(z, z_there), is_tie));
+        vi_store_masked(own + x, inside, vi_select(wins, id, vi_set1(-1)));
+    }
+}
+
+/* Puts what is left of n pixels of a row of a tile into the buffer, from its pixel `to` on. */
+TL_INLINE void keep_opaque(cutout *c, shade_runs *s, const tl_material *m, int64_t row, int64_t column, int n, int64_t from, int64_t to)
+{
+    int32_t *own = c->tile.ids + from;
+    const float *own_depth = c->tile.depth + from;
+    const int is_nearest = c->target->sink == TL_SINK_NEAREST;
+    if (is_nearest)
+        hide_nearest(c, n, own, own_depth, to);
+    find_runs(s, own, n);
+    if (!s->n_runs)
+        return;
+    set_runs(s, row);
+    for (int x = 0, i = 0; x < n; x += TL_LANES, i++) {
+        if (!s->visible[i])
+            continue;
+        shaded_lanes p;
+        find_pixels(&p, s, i, column);
+        const vm is_opaque = vm_and(p.visible, vf_ge(opacity_of(&p, m), vf_set1(m->cutoff)));
+        if (!vm_any(is_opaque))
+            continue;
+        const int32_t name = s->ints[RUN_ID][TL_LANES] + c->first_id; /* one triangle is drawn at a time */
+        const vf z = vf_load_masked(is_opaque, own_depth + x);
+        if (is_nearest) {
+            vi_store_masked((int32_t *)c->target->pixels + to + x, is_opaque, vi_set1(name));
+            vf_store_masked(c->target->depth + to + x, is_opaque, z);
+        } else {
+            peel_lanes(c->target, to + x, is_opaque, z, name);
+        }
+    }
+}
+
+/* One triangle, tile by tile of the box that it can reach. */
+static void cut_triangle(cutout *c, shade_runs *s, const tl_window *window, int32_t id)
+{
+    const tl_shading *shading = s->shading;
+    const int32_t *corners = c->scene.triangles + 3 * (int64_t)id;
+    const int32_t material = shading->material_of ? shading->material_of[id] : 0;
+    tl_triangle t = {.col0 = 0, .col1 = window->width, .row0 = 0, .row1 = window->height};
+    if (!is_clipped(&c->scene.mesh, corners) && (load_triangle(&c->scene.mesh, corners, &t) == 0 || !clip_box(&t, window)))
+        return;
+    for (int64_t top = t.row0; top < t.row1; top += TL_CUTOUT_TILE)
+        for (int64_t left = t.col0; left < t.col1; left += TL_CUTOUT_TILE) {
+            tl_window part = *window;
+            part.x_px += left, part.y_px += top;
+            part.width = min64(TL_CUTOUT_TILE, t.col1 - left), part.height = min64(TL_CUTOUT_TILE, t.row1 - top);
+            const tl_target target = {.sink = TL_SINK_PAINT, .pixels = c->tile.ids, .depth = c->tile.depth, .stride_px = TL_CUTOUT_TILE};
+            tl_share share = {.ids = &id, .end = 1, .is_first = 1, .is_last = 1};
+            draw(&c->scene, &part, &target, &share);
+            for (int64_t row = 0; row < part.height; row++)
+                keep_opaque(c, s, &shading->materials[material], top + row, left, (int)part.width, row * TL_CUTOUT_TILE,
+                            (top + row) * c->target->stride_px + left);
+        }
+}
+
+/* Draws n triangles over what a target holds: a visibility buffer, or the layers of pixels. */
+static void cut_out(const tl_scene *scene, const tl_window *window, const tl_view *view, const tl_shading *shading,
+                    const int32_t *triangles, int64_t n, const tl_target *target)
+{
+    shade_runs s;
+    cutout c;
+    c.target = target, c.scene = *scene, c.first_id = scene->first_id;
+    c.scene.first_id = 0;
+    start_runs(&s, &c.scene, window, view, shading);
+    s.needs_normal = s.needs_colors = s.needs_point = 0;
+    s.needs_q = s.needs_uv;
+    for (int64_t k = 0; k < n; k++)
+        cut_triangle(&c, &s, window, triangles[k]);
+}
+
+#endif

@@ -1,0 +1,91 @@
+/* Light: how much of each colour a surface sends to the eye.
+ * In: a unit normal, where the surface is and from where it is seen.  Out: diffuse light and highlights, linear.
+ * Based on: J. H. Lambert, Photometria, 1760; J. F. Blinn, Models of Light Reflection for Computer Synthesized Pictures, 1977;
+ * J. Mitchell, G. McTaggart and C. Green, Shading in Valve's Source Engine, 2006 (the wrapped fall-off, there with the power 2). */
+#ifndef TL_LIGHT_C
+#define TL_LIGHT_C
+
+#include "shading.h"
+#include "lanes/lanes.h"
+#include "shade/texture.c"
+
+typedef struct {
+    vf normal[3];  /* unit, towards the viewer */
+    vf point[3];   /* read when there are lights at points */
+    vf to_eye[3];  /* unit; read when the material shines */
+} lit_surface;
+
+TL_INLINE vf dot3(const vf *a, const vf *b) { return vf_fma(a[0], b[0], vf_fma(a[1], b[1], vf_mul(a[2], b[2]))); }
+
+TL_INLINE void normalize3(vf *a)
+{
+    const vf scale = vf_div(vf_set1(1.0f), vf_sqrt(dot3(a, a)));
+    for (int k = 0; k < 3; k++)
+        a[k] = vf_mul(a[k], scale);
+}
+
+/* 2^a, within 2^-22 of it; 0 from -126 down. */
+TL_INLINE vf vf_exp2(vf a)
+{
+    const vf low = vf_max(a, vf_set1(-127.0f));
+    const vi whole = vi_rint(low);
+    const vf t = vf_sub(low, vf_from_vi(whole));
+    vf sum = vf_set1(0x1.5c08dc00p-10f);
+    sum = vf_fma(sum, t, vf_set1(0x1.3d0c5200p-7f));
+    sum = vf_fma(sum, t, vf_set1(0x1.c6b6e600p-5f));
+    sum = vf_fma(sum, t, vf_set1(0x1.ebf91800p-3f));
+    sum = vf_fma(sum, t, vf_set1(0x1.62e42800p-1f));
+    sum = vf_fma(sum, t, vf_set1(1.0f));
+    return vf_mul(sum, vf_of_bits(vi_shift_left(vi_add(whole, vi_set1(127)), 23)));
+}
+
+/* cos^shininess of the angle between the normal and the middle of light and eye. */
+TL_INLINE vf highlight(const lit_surface *s, const vf *to_light, vf n_dot_l, float shininess)
+{
+    vf half[3];
+    for (int k = 0; k < 3; k++)
+        half[k] = vf_add(to_light[k], s->to_eye[k]);
+    const vf zero = vf_set1(0.0f), tiny = vf_set1(0x1p-100f);
+    const vf cosine = vf_div(dot3(s->normal, half), vf_sqrt(vf_max(dot3(half, half), tiny)));
+    const vf power = vf_exp2(vf_mul(vf_set1(shininess), vf_log2(vf_min(vf_max(cosine, tiny), vf_set1(1.0f)))));
+    return vf_select(vf_lt(zero, n_dot_l), power, zero);
+}
+
+TL_INLINE void add_light(const lit_surface *s, const tl_light *light, float shininess, vf *diffuse, vf *specular)
+{
+    vf to_light[3] = {vf_set1(light->at[0]), vf_set1(light->at[1]), vf_set1(light->at[2])}, strength = vf_set1(1.0f);
+    const vf zero = vf_set1(0.0f), half = vf_set1(0.5f);
+    if (light->kind == TL_LIGHT_POINT) {
+        for (int k = 0; k < 3; k++)
+            to_light[k] = vf_sub(to_light[k], s->point[k]);
+        const vf squared = dot3(to_light, to_light), scale = vf_div(vf_set1(1.0f), vf_sqrt(vf_max(squared, vf_set1(0x1p-100f))));
+        for (int k = 0; k < 3; k++)
+            to_light[k] = vf_mul(to_light[k], scale);
+        strength = vf_div(strength, vf_fma(vf_set1(light->falloff), squared, vf_set1(1.0f)));
+    }
+    const vf n_dot_l = dot3(s->normal, to_light);
+    vf share = vf_max(n_dot_l, zero);
+    if (light->kind == TL_LIGHT_WRAPPED) {
+        const vf wrapped = vf_fma(half, n_dot_l, half);
+        share = vf_mul(wrapped, vf_mul(wrapped, wrapped));
+    }
+    share = vf_mul(share, strength);
+    for (int c = 0; c < 3; c++)
+        diffuse[c] = vf_fma(share, vf_set1(light->color[c]), diffuse[c]);
+    if (shininess > 0.0f) {
+        const vf shine = vf_mul(strength, highlight(s, to_light, n_dot_l, shininess));
+        for (int c = 0; c < 3; c++)
+            specular[c] = vf_fma(shine, vf_set1(light->color[c]), specular[c]);
+    }
+}
+
+/* The light of n lights. */
+TL_INLINE void add_lights(const lit_surface *s, const tl_shading *shading, float shininess, vf *diffuse, vf *specular)
+{
+    for (int c = 0; c < 3; c++)
+        diffuse[c] = vf_set1(shading->ambient[c]), specular[c] = vf_set1(0.0f);
+    for (int k = 0; k < shading->n_lights; k++)
+        add_light(s, &shading->lights[k], shininess, diffuse, specular);
+}
+
+#endif

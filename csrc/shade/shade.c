@@ -1,0 +1,130 @@
+/* Shades a visibility buffer: a picture in light, from light to sRGB; or the normals that shading has, as numbers.
+ * In: ids, the scene they were drawn from, materials and lights.  Out: red, green, blue and opacity, uint8; or unit vectors, float32,
+ * on the side that is seen, 0 where nothing is. */
+#ifndef TL_SHADE_C
+#define TL_SHADE_C
+
+#include <stdint.h>
+#include <string.h>
+
+#include "shading.h"
+#include "topleft.h"
+#include "lanes/lanes.h"
+#include "vertex/fixed.h"
+#include "vertex/project.c"
+#include "pixels/runs.c"
+#include "pixels/weights.c"
+#include "shade/light.c"
+#include "shade/shade_pixels.c"
+#include "shade/srgb.c"
+
+static void start_runs(shade_runs *s, const tl_scene *scene, const tl_window *window, const tl_view *view, const tl_shading *shading)
+{
+    int shines = 0, has_texture = 0, is_lit = 0, has_points = 0;
+    for (int k = 0; k < shading->n_materials; k++) {
+        const tl_material *m = &shading->materials[k];
+        has_texture |= m->texture != NULL;
+        is_lit |= !m->is_unlit;
+        shines |= !m->is_unlit && m->shininess > 0.0f;
+    }
+    for (int k = 0; k < shading->n_lights; k++)
+        has_points |= shading->lights[k].kind == TL_LIGHT_POINT;
+    const int shows_light = shading->show == TL_SHOW_LIGHT;
+    s->scene = scene, s->window = window, s->shading = shading, s->view = view;
+    s->needs_normal = !shows_light || is_lit;
+    s->needs_uv = shows_light && has_texture && shading->uv;
+    s->needs_colors = shows_light && shading->colors;
+    s->needs_point = shows_light && ((is_lit && has_points) || shines);
+    s->needs_q = s->needs_uv || s->needs_colors || s->needs_point || shading->fog_scale != 0.0f;
+    start_grey(s);
+    memset(s->ints, 0, sizeof s->ints);
+    for (int k = 0; k < N_RUN_FLOATS; k++)
+        memset(s->floats[k], 0, TL_MAX_LANES * sizeof(float));
+}
+
+TL_INLINE vi shaded_word(shaded_lanes *p, int64_t row, const float *depth)
+{
+    const tl_show show = p->s->shading->show;
+    vf rgb[3];
+    shade_pixels(p, row, depth, rgb);
+    return to_word(to_byte(show, rgb[0]), to_byte(show, rgb[1]), to_byte(show, rgb[2]), vi_set1(255));
+}
+
+/* The picture of a visibility buffer; rows of window->width. */
+static void shade(const tl_scene *scene, const tl_window *window, const tl_view *view, const tl_shading *shading, const int32_t *ids,
+                  const float *depth, uint8_t *pixels)
+{
+    shade_runs s;
+    int32_t background;
+    memcpy(&background, shading->background_bytes, 4);
+    start_runs(&s, scene, window, view, shading);
+    for (int64_t row = 0; row < window->height; row++)
+        for (int64_t column = 0; column < window->width; column += TL_SPAN) {
+            const int64_t at = row * window->width + column;
+            const int n = (int)min64(TL_SPAN, window->width - column);
+            find_runs(&s, ids + at, n);
+            set_runs(&s, row);
+            for (int x = 0, i = 0; x < n; x += TL_LANES, i++) {
+                vi word = vi_set1(background);
+                if (s.visible[i]) {
+                    shaded_lanes p;
+                    find_pixels(&p, &s, i, column);
+                    word = vi_select(p.visible, s.is_grey ? grey_word(&p) : shaded_word(&p, row, depth + at + x), word);
+                }
+                if (n - x >= TL_LANES)
+                    vi_store((int32_t *)pixels + at + x, word);
+                else
+                    vi_store_masked((int32_t *)pixels + at + x, vm_first(n - x), word);
+            }
+        }
+}
+
+/* Copies rows [first, end) of four numbers, the last of them replaced by 1/w of the vertex. */
+static void set_inverse_w(const tl_source *source, const float *rows, int64_t first, int64_t end, float *restrict out)
+{
+    int64_t i = first;
+    for (; TL_LANES > 1 && source->scalar == TL_F32 && source->matrix && i + TL_LANES <= end && i + TL_LANES < source->n; i += TL_LANES) {
+        vf p[4];
+        clip_lanes_f32((const float *)source->data + 3 * i, (const float *)source->matrix, 3, p);
+        vf_store_fourths(rows + 4 * i, vf_div(vf_set1(1.0f), p[3]), out + 4 * i);
+    }
+    for (; i < end; i++) {
+        double p[4];
+        clip_position(source, i, p);
+        for (int k = 0; k < 3; k++)
+            out[4 * i + k] = rows[4 * i + k];
+        out[4 * i + 3] = source->scalar == TL_F32 ? 1.0f / (float)p[3] : (float)(1.0 / p[3]);
+    }
+}
+
+static void shade_normals(const tl_scene *scene, const tl_window *window, const tl_view *view, const tl_shading *shading,
+                          const int32_t *ids, float *restrict out)
+{
+    shade_runs s;
+    const vf zero = vf_set1(0.0f);
+    start_runs(&s, scene, window, view, shading);
+    for (int64_t row = 0; row < window->height; row++)
+        for (int64_t column = 0; column < window->width; column += TL_SPAN) {
+            const int64_t at = row * window->width + column;
+            const int n = (int)min64(TL_SPAN, window->width - column);
+            find_runs(&s, ids + at, n);
+            set_runs(&s, row);
+            for (int x = 0, i = 0; x < n; x += TL_LANES, i++) {
+                vf normal[3] = {zero, zero, zero};
+                if (s.visible[i]) {
+                    shaded_lanes p;
+                    find_pixels(&p, &s, i, column);
+                    set_normals(&p);
+                    for (int axis = 0; axis < 3; axis++)
+                        normal[axis] = in_eye_space(&p, axis);
+                    const vf squared = dot3(normal, normal), scale = vf_div(vf_set1(1.0f), vf_sqrt(squared));
+                    const vm has_some = vm_and(p.visible, vf_lt(zero, squared));
+                    for (int axis = 0; axis < 3; axis++)
+                        normal[axis] = vf_select(has_some, vf_mul(normal[axis], scale), zero);
+                }
+                store_channels(out + 3 * (at + x), 3, (int)min64(n - x, TL_LANES), normal, 3);
+            }
+        }
+}
+
+#endif

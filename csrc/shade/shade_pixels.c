@@ -1,0 +1,265 @@
+/* Pixels: the light of a vector of pixels, from the runs they belong to.
+ * In: runs with their coefficients.  Out: linear red, green and blue (or values of 0 to 255 that tell a normal). */
+#ifndef TL_SHADE_PIXELS_C
+#define TL_SHADE_PIXELS_C
+
+#include <math.h>
+#include <stdint.h>
+
+#include "shading.h"
+#include "topleft.h"
+#include "lanes/lanes.h"
+#include "pixels/runs.c"
+#include "shade/light.c"
+#include "shade/texture.c"
+
+/* Edge functions of the lanes whose runs are special, run by run. */
+static void set_special_edges(shaded_lanes *p)
+{
+    const shade_runs *s = p->s;
+    const vi special = pick_int(p, RUN_SPECIAL);
+    const double unit = (double)(1 << s->window->subpixel_bits);
+    const vd x_fx = vd_mul(vd_add(vd_from_vi(p->column), vd_set1((double)s->window->x_px + 0.5)), vd_set1(unit));
+    int32_t number[TL_MAX_LANES];
+    vi_store(number, special);
+    vm rest = vm_and(p->visible, vi_gt(special, vi_set1(0)));
+    while (vm_any(rest)) {
+        const int32_t own = number[__builtin_ctz(vm_bits(rest))];
+        const vm lanes = vm_and(rest, vi_eq(special, vi_set1(own)));
+        const special_run *e = &s->special[own - 1];
+        for (int k = 0; k < 3; k++) {
+            const vd value = vd_add(vd_set1(e->at[k]), vd_mul(vd_set1(e->step[k]), vd_sub(x_fx, vd_set1(e->from[k]))));
+            p->e[k] = vf_select(lanes, vf_from_vd(value), p->e[k]);
+        }
+        p->area = vf_select(lanes, vf_set1(e->area), p->area);
+        rest = vm_and_not(rest, lanes);
+    }
+}
+
+/* The lanes of vector i of the span that begins at `column`, and their edge functions as float32, of all runs. */
+TL_INLINE void find_pixels(shaded_lanes *p, const shade_runs *s, int i, int64_t column)
+{
+    vi e[3], sum;
+    find_lanes(p, s, i, column, e, &sum);
+    p->area = vf_from_vi(sum);
+    for (int k = 0; k < 3; k++)
+        p->e[k] = vf_from_vi(e[k]);
+    if (s->n_special)
+        set_special_edges(p);
+}
+
+/* The normal of a face whose vertices have none that could be interpolated; 0 if it has no area. */
+static void face_normal(const shade_runs *s, int32_t id, double *n)
+{
+    const tl_shading *shading = s->shading;
+    double p[3][3], squared = 0.0;
+    for (int k = 0; k < 3; k++)
+        for (int axis = 0; axis < 3; axis++) {
+            const int64_t at = 3 * (int64_t)s->scene->triangles[3 * (int64_t)id + k] + axis;
+            p[k][axis] = shading->is_f64 ? ((const double *)shading->positions)[at] : (double)((const float *)shading->positions)[at];
+        }
+    for (int axis = 0; axis < 3; axis++) {
+        const int a = (axis + 1) % 3, b = (axis + 2) % 3;
+        n[axis] = (p[1][a] - p[0][a]) * (p[2][b] - p[0][b]) - (p[1][b] - p[0][b]) * (p[2][a] - p[0][a]);
+    }
+    for (int axis = 0; axis < 3; axis++)
+        squared += n[axis] * n[axis];
+    const double scale = squared > 0.0 ? 1.0 / sqrt(squared) : 0.0;
+    for (int axis = 0; axis < 3; axis++)
+        n[axis] *= scale;
+}
+
+static void replace_normals(shaded_lanes *p, vm lanes)
+{
+    float n[3][TL_MAX_LANES], area[TL_MAX_LANES];
+    int32_t id[TL_MAX_LANES];
+    vi_store(id, pick_int(p, RUN_ID));
+    vf_store(area, p->area);
+    for (int axis = 0; axis < 3; axis++)
+        vf_store(n[axis], p->normal[axis]);
+    for (unsigned rest = vm_bits(lanes); rest; rest &= rest - 1) {
+        const int lane = __builtin_ctz(rest);
+        double own[3];
+        face_normal(p->s, id[lane], own);
+        for (int axis = 0; axis < 3; axis++)
+            n[axis][lane] = (float)(area[lane] < 0.0f ? -own[axis] : own[axis]);
+    }
+    for (int axis = 0; axis < 3; axis++)
+        p->normal[axis] = vf_load(n[axis]);
+}
+
+/* Unit normals towards the viewer. */
+TL_INLINE void set_normals(shaded_lanes *p)
+{
+    if (p->s->shading->face_normals) {
+        for (int axis = 0; axis < 3; axis++)
+            p->normal[axis] = pick(p, RUN_NORMAL + axis);
+        return;
+    }
+    for (int axis = 0; axis < 3; axis++)
+        p->normal[axis] = weighed(p, RUN_NORMAL + axis, RUN_NORMAL + 3 + axis, RUN_NORMAL + 6 + axis);
+    const vf squared = dot3(p->normal, p->normal), scale = vf_div(vf_set1(1.0f), vf_sqrt(squared));
+    for (int axis = 0; axis < 3; axis++)
+        p->normal[axis] = vf_mul(p->normal[axis], scale);
+    const vm has_none = vm_and(p->visible, vf_ge(pick(p, RUN_SHORTEST), squared));
+    if (vm_any(has_none))
+        replace_normals(p, has_none);
+}
+
+TL_INLINE void set_uv_lanes(shaded_lanes *p)
+{
+    const vf u = vf_mul(weighed(p, RUN_U, RUN_U + 1, RUN_U + 2), p->inv_q), v = vf_mul(weighed(p, RUN_V, RUN_V + 1, RUN_V + 2), p->inv_q);
+    p->uv[0] = u, p->uv[1] = v;
+    for (int axis = 0; axis < 2; axis++) {
+        const vf q = pick(p, RUN_GRADIENT + 3 * axis);
+        p->du[axis] = vf_mul(vf_sub(pick(p, RUN_GRADIENT + 3 * axis + 1), vf_mul(u, q)), p->inv_q);
+        p->dv[axis] = vf_mul(vf_sub(pick(p, RUN_GRADIENT + 3 * axis + 2), vf_mul(v, q)), p->inv_q);
+    }
+}
+
+/* The colours of the vertices: interpolated as sRGB values, rounded to whole ones, then turned to light. */
+TL_INLINE void set_colors(shaded_lanes *p)
+{
+    for (int c = 0; c < 3; c++) {
+        const vf value = vf_mul(weighed(p, RUN_COLOR + c, RUN_COLOR + 3 + c, RUN_COLOR + 6 + c), p->inv_q);
+        const vi level = vi_max(vi_min(vi_rint(value), vi_set1(255)), vi_set1(0));
+        p->color[c] = vf_of_bits(vi_gather(vm_all(), (const int32_t *)p->s->shading->decode, level));
+    }
+}
+
+/* Where the pixel looks, and the point that it sees. */
+TL_INLINE void set_points(shaded_lanes *p, int64_t row, const float *depth)
+{
+    const tl_shading *shading = p->s->shading;
+    const tl_window *window = p->s->window;
+    const tl_vertex_set *set = &p->s->scene->mesh;
+    const float unit = (float)(1 << window->subpixel_bits);
+    const vf x = vf_add(vf_from_vi(vi_add(p->column, vi_set1((int32_t)window->x_px))), vf_set1(0.5f + (float)set->sample_x_fx / unit));
+    const vf y = vf_set1((float)(row + window->y_px) + (0.5f + (float)set->sample_y_fx / unit));
+    const vf w = vf_mul(p->area, p->inv_q);
+    for (int axis = 0; axis < 3; axis++) {
+        p->ray[axis] = vf_fma(y, vf_set1(shading->ray[2][axis]), vf_fma(x, vf_set1(shading->ray[1][axis]), vf_set1(shading->ray[0][axis])));
+        if (shading->has_perspective)
+            p->point[axis] = vf_fma(w, p->ray[axis], vf_set1(shading->eye[axis]));
+        else
+            p->point[axis] = vf_fma(vf_load_masked(p->visible, depth), vf_set1(shading->ray[3][axis]), p->ray[axis]);
+    }
+}
+
+/* The light of one material, as all lanes would see it. */
+TL_INLINE void shade_material(const shaded_lanes *p, const tl_material *m, vf *rgb)
+{
+    const tl_shading *shading = p->s->shading;
+    for (int c = 0; c < 3; c++)
+        rgb[c] = vf_set1(m->color[c]);
+    if (p->s->needs_colors)
+        for (int c = 0; c < 3; c++)
+            rgb[c] = vf_mul(rgb[c], p->color[c]);
+    if (m->texture) {
+        vf texel[4];
+        sample_texture(m->texture, p->uv[0], p->uv[1], p->du, p->dv, texel, 3);
+        for (int c = 0; c < 3; c++)
+            rgb[c] = vf_mul(rgb[c], texel[c]);
+    }
+    if (m->back_side != 0.0f) {
+        const vm is_back = vf_lt(vf_set1(0.0f), vf_mul(p->area, vf_set1(m->back_side)));
+        for (int c = 0; c < 3; c++)
+            rgb[c] = vf_select(is_back, vf_set1(m->back_color[c]), rgb[c]);
+    }
+    if (m->is_unlit)
+        return;
+    lit_surface surface;
+    vf diffuse[3], specular[3];
+    for (int axis = 0; axis < 3; axis++) {
+        surface.normal[axis] = p->normal[axis];
+        surface.point[axis] = p->point[axis];
+        surface.to_eye[axis] = shading->has_perspective ? vf_sub(vf_set1(0.0f), p->ray[axis]) : vf_set1(shading->eye[axis]);
+    }
+    if (m->shininess > 0.0f && shading->has_perspective)
+        normalize3(surface.to_eye);
+    add_lights(&surface, shading, m->shininess, diffuse, specular);
+    for (int c = 0; c < 3; c++)
+        rgb[c] = vf_mul(rgb[c], diffuse[c]);
+    if (m->shininess > 0.0f)
+        for (int c = 0; c < 3; c++)
+            rgb[c] = vf_fma(vf_set1(m->specular[c]), specular[c], rgb[c]);
+}
+
+/* Each lane by its own material. */
+static void shade_materials(const shaded_lanes *p, vf *rgb)
+{
+    const tl_shading *shading = p->s->shading;
+    const vi material = pick_int(p, RUN_MATERIAL);
+    int32_t number[TL_MAX_LANES];
+    vi_store(number, material);
+    for (vm rest = p->visible; vm_any(rest);) {
+        const int32_t own = number[__builtin_ctz(vm_bits(rest))];
+        const vm lanes = vm_and(rest, vi_eq(material, vi_set1(own)));
+        vf light[3];
+        shade_material(p, &shading->materials[own < 0 || own >= shading->n_materials ? 0 : own], light);
+        for (int c = 0; c < 3; c++)
+            rgb[c] = vf_select(lanes, light[c], rgb[c]);
+        rest = vm_and_not(rest, lanes);
+    }
+}
+
+TL_INLINE void fade(const shaded_lanes *p, const float *depth, vf *rgb)
+{
+    const tl_shading *shading = p->s->shading;
+    const vf way = shading->has_perspective ? vf_mul(p->area, p->inv_q) : vf_load_masked(p->visible, depth);
+    const vf distance = vf_fma(way, vf_set1(shading->distance_scale), vf_set1(shading->distance_start));
+    vf share = vf_mul(vf_sub(distance, vf_set1(shading->fog_near)), vf_set1(shading->fog_scale));
+    share = vf_min(vf_max(share, vf_set1(0.0f)), vf_set1(1.0f));
+    for (int c = 0; c < 3; c++)
+        rgb[c] = vf_fma(share, vf_sub(vf_set1(shading->fog_color[c]), rgb[c]), rgb[c]);
+}
+
+TL_INLINE vf in_eye_space(const shaded_lanes *p, int axis)
+{
+    const float *m = p->s->shading->eye_from[axis];
+    const vf row[3] = {vf_set1(m[0]), vf_set1(m[1]), vf_set1(m[2])};
+    return dot3(row, p->normal);
+}
+
+/* What vector i of a span shows.  `depth` is that of its first pixel; it is read without perspective only. */
+TL_INLINE void shade_pixels(shaded_lanes *p, int64_t row, const float *depth, vf *rgb)
+{
+    const shade_runs *s = p->s;
+    const tl_shading *shading = s->shading;
+    const vf zero = vf_set1(0.0f), half = vf_set1(0.5f);
+    if (s->needs_normal)
+        set_normals(p);
+    if (s->needs_q) {
+        p->q = weighed(p, RUN_Q, RUN_Q + 1, RUN_Q + 2);
+        p->inv_q = vf_div(vf_set1(1.0f), p->q);
+    }
+    if (shading->show == TL_SHOW_NORMALS) {
+        for (int axis = 0; axis < 3; axis++)
+            rgb[axis] = vf_fma(vf_set1(127.5f), in_eye_space(p, axis), vf_set1(127.5f));
+        return;
+    }
+    for (int c = 0; c < 3; c++)
+        rgb[c] = zero;
+    if (shading->show == TL_SHOW_MATCAP) {
+        vf texel[4];
+        const vf none[2] = {zero, zero};
+        sample_texture(shading->matcap, vf_fma(half, in_eye_space(p, 0), half), vf_fma(half, in_eye_space(p, 1), half), none, none, texel, 3);
+        for (int c = 0; c < 3; c++)
+            rgb[c] = texel[c];
+    } else {
+        if (s->needs_uv)
+            set_uv_lanes(p);
+        if (s->needs_colors)
+            set_colors(p);
+        if (s->needs_point)
+            set_points(p, row, depth);
+        if (shading->material_of)
+            shade_materials(p, rgb);
+        else
+            shade_material(p, shading->materials, rgb);
+    }
+    if (shading->fog_scale != 0.0f)
+        fade(p, depth, rgb);
+}
+
+#endif

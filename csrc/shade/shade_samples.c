@@ -1,0 +1,113 @@
+/* Shaded samples: a visibility buffer with several samples a pixel to a picture.  A triangle is shaded once in each pixel that it
+ * shows in, at the first of the samples that see it; what the pixel shows is the mean of the light at its samples.
+ * In: planes of ids, the scene.  Out: red, green, blue and opacity, uint8. */
+#ifndef TL_SHADE_SAMPLES_C
+#define TL_SHADE_SAMPLES_C
+
+#include <stdint.h>
+#include <string.h>
+
+#include "shading.h"
+#include "topleft.h"
+#include "lanes/lanes.h"
+#include "vertex/fixed.h"
+#include "pixels/runs.c"
+#include "shade/shade.c"
+#include "shade/shade_pixels.c"
+#include "shade/srgb.c"
+
+/* The light of a span of pixels, added up, and how many samples it comes from. */
+typedef struct {
+    float light[3][TL_SPAN_ROOM], n_lit[TL_SPAN_ROOM];
+    float n_seen[TL_SPAN_ROOM]; /* samples that see the triangle shaded now */
+    int32_t ids[TL_SPAN_ROOM];  /* the triangles that a sample is the first to see, -1 elsewhere */
+} sample_sums;
+
+/* Finds the triangles of n pixels that sample k is the first to see; returns whether there are any. */
+TL_INLINE int find_first_seen(sample_sums *sums, const int32_t *ids, int64_t stride, int sample_bits, int k, int n)
+{
+    const vi none = vi_set1(-1);
+    int any = 0;
+    for (int x = 0; x < n; x += TL_LANES) {
+        const vm inside = vm_first(n - x);
+        const vi own = vi_select(inside, vi_load_masked(inside, ids + k * stride + x), none);
+        vm first = vi_gt(own, none);
+        for (int before = 0; before < k && vm_any(first); before++)
+            first = vm_and_not(first, vi_eq(own, vi_load_masked(inside, ids + before * stride + x)));
+        vi_store(sums->ids + x, vi_select(first, own, none));
+        if (!vm_any(first))
+            continue;
+        vi count = vi_set1(1);
+        for (int after = k + 1; after < 1 << sample_bits; after++)
+            count = vi_add(count, vi_select(vi_eq(own, vi_load_masked(inside, ids + after * stride + x)), vi_set1(1), vi_set1(0)));
+        vf_store(sums->n_seen + x, vf_from_vi(count));
+        any = 1;
+    }
+    return any;
+}
+
+/* Shades what sums->ids names and adds it, times the samples that see it. */
+TL_INLINE void add_shaded(sample_sums *sums, shade_runs *s, int64_t row, int64_t column, int n, const float *depth)
+{
+    find_runs(s, sums->ids, n);
+    set_runs(s, row);
+    for (int x = 0, i = 0; x < n; x += TL_LANES, i++) {
+        if (!s->visible[i])
+            continue;
+        shaded_lanes p;
+        vf rgb[3];
+        find_pixels(&p, s, i, column);
+        shade_pixels(&p, row, depth + x, rgb);
+        const vf weight = vf_select(p.visible, vf_load(sums->n_seen + x), vf_set1(0.0f)), zero = vf_set1(0.0f);
+        for (int c = 0; c < 3; c++) {
+            const vf sum = vf_fma(weight, vf_select(p.visible, rgb[c], zero), vf_load(sums->light[c] + x));
+            vf_store(sums->light[c] + x, sum);
+        }
+        vf_store(sums->n_lit + x, vf_add(weight, vf_load(sums->n_lit + x)));
+    }
+}
+
+/* Mean light over the background ("over"), encoded.  A pixel of whose samples none or all see a triangle owes nothing to rounding. */
+TL_INLINE vi finish_lanes(const sample_sums *sums, const tl_shading *shading, int sample_bits, int x)
+{
+    const vf share = vf_mul(vf_load(sums->n_lit + x), vf_set1(1.0f / (float)(1 << sample_bits)));
+    const vf behind = vf_mul(vf_sub(vf_set1(1.0f), share), vf_set1(shading->background[3])), opacity = vf_add(share, behind);
+    const float *bytes = (float[3]){shading->background_bytes[0], shading->background_bytes[1], shading->background_bytes[2]};
+    const float *ground = shading->show == TL_SHOW_NORMALS ? bytes : shading->background;
+    vi byte[3];
+    int32_t background;
+    for (int c = 0; c < 3; c++) {
+        const vf mean = vf_mul(vf_load(sums->light[c] + x), vf_set1(1.0f / (float)(1 << sample_bits)));
+        byte[c] = to_byte(shading->show, vf_div(vf_fma(behind, vf_set1(ground[c]), mean), opacity));
+    }
+    memcpy(&background, shading->background_bytes, 4);
+    const vi word = to_word(byte[0], byte[1], byte[2], vi_rint(vf_mul(vf_set1(255.0f), opacity)));
+    return vi_select(vf_lt(vf_set1(0.0f), share), word, vi_set1(background));
+}
+
+/* The picture of planes of ids (and depth), `stride` pixels apart, for 2^sample_bits samples at (x, y) sub-pixels from the centre. */
+static void shade_samples(const tl_scene *scene, const tl_window *window, const tl_view *view, const tl_shading *shading,
+                          const int32_t *samples_fx, int sample_bits, int64_t stride, const int32_t *ids, const float *depth,
+                          uint8_t *pixels)
+{
+    shade_runs s;
+    sample_sums sums;
+    tl_scene seen = *scene;
+    start_runs(&s, &seen, window, view, shading);
+    for (int64_t row = 0; row < window->height; row++)
+        for (int64_t column = 0; column < window->width; column += TL_SPAN) {
+            const int64_t at = row * window->width + column;
+            const int n = (int)min64(TL_SPAN, window->width - column);
+            memset(&sums, 0, offsetof(sample_sums, n_seen));
+            for (int k = 0; k < 1 << sample_bits; k++) {
+                if (!find_first_seen(&sums, ids + at, stride, sample_bits, k, n))
+                    continue;
+                seen.mesh.sample_x_fx = samples_fx[2 * k], seen.mesh.sample_y_fx = samples_fx[2 * k + 1];
+                add_shaded(&sums, &s, row, column, n, depth + k * stride + at);
+            }
+            for (int x = 0; x < n; x += TL_LANES)
+                vi_store_masked((int32_t *)pixels + at + x, vm_first(n - x), finish_lanes(&sums, shading, sample_bits, x));
+        }
+}
+
+#endif

@@ -1,0 +1,229 @@
+/* Clip: the triangles that a clip plane cuts.
+ * In: homogeneous vertices.  Out: the pieces that are left, snapped.
+ * Based on: I. E. Sutherland, G. W. Hodgman, Reentrant Polygon Clipping, 1974. */
+#ifndef TL_CLIP_C
+#define TL_CLIP_C
+
+#include <stdint.h>
+#include <string.h>
+
+#include "topleft.h"
+#include "vertex/fixed.h"
+#include "vertex/project.c"
+
+#define TL_MAX_CORNERS (3 + TL_N_PLANES)
+#define TL_MAX_PIECES (TL_MAX_CORNERS - 2) /* of one triangle */
+
+typedef struct {
+    double pos[4];     /* x, y, z, w */
+    double weights[3]; /* barycentrics in the source triangle */
+} clip_corner;
+
+/* Puts a cut exactly on its plane, which rounding may have missed: far from the eye by more than the picture. */
+static inline void put_on_plane(double *p, int plane, const tl_view *view)
+{
+    switch (plane) {
+    case 0: p[3] = TL_MIN_W; return;
+    case 1: p[2] = view->zero_to_one ? 0.0 : -p[3]; return;
+    case 2: p[2] = p[3]; return;
+    case 3: p[0] = -(view->guard_band_x * p[3]); return;
+    case 4: p[0] = view->guard_band_x * p[3]; return;
+    case 5: p[1] = -(view->guard_band_y * p[3]); return;
+    default: p[1] = view->guard_band_y * p[3]; return;
+    }
+}
+
+/* The point where the edge from a (inside) to b (outside) meets the plane: both weights are positive, so w stays so. */
+static inline clip_corner cut_edge(const clip_corner *a, const clip_corner *b, double da, double db, int plane, const tl_view *view)
+{
+    clip_corner cut;
+    const double of_a = -db / (da - db), of_b = da / (da - db);
+    for (int k = 0; k < 4; k++)
+        cut.pos[k] = a->pos[k] * of_a + b->pos[k] * of_b;
+    for (int k = 0; k < 3; k++)
+        cut.weights[k] = a->weights[k] * of_a + b->weights[k] * of_b;
+    put_on_plane(cut.pos, plane, view);
+    return cut;
+}
+
+/* Cuts a convex polygon by one plane; returns the new number of corners. */
+static int clip_polygon(const clip_corner *in, int n_in, int plane, const tl_view *view, clip_corner *out)
+{
+    int n = 0;
+    for (int k = 0; k < n_in; k++) {
+        const clip_corner *a = in + k, *b = in + (k + 1) % n_in;
+        const double da = plane_distance(a->pos, plane, view), db = plane_distance(b->pos, plane, view);
+        if (da >= 0.0)
+            out[n++] = *a;
+        if (da >= 0.0 && db < 0.0)
+            out[n++] = cut_edge(a, b, da, db, plane, view);
+        else if (da < 0.0 && db >= 0.0)
+            out[n++] = cut_edge(b, a, db, da, plane, view);
+    }
+    return n;
+}
+
+/* What is left of one triangle; 0 corners when nothing is. */
+static int clip_triangle(const tl_source *source, const int32_t *corners, const tl_view *view, clip_corner *polygon)
+{
+    clip_corner other[TL_MAX_CORNERS];
+    unsigned any = 0, all = ~0u;
+    for (int k = 0; k < 3; k++) {
+        clip_position(source, corners[k], polygon[k].pos);
+        for (int j = 0; j < 3; j++)
+            polygon[k].weights[j] = j == k;
+        const unsigned out = outside_planes(polygon[k].pos, view);
+        any |= out;
+        all &= out;
+    }
+    if (all)
+        return 0;
+    int n = 3;
+    for (int plane = 0; plane < TL_N_PLANES && n; plane++) {
+        if (!(any >> plane & 1))
+            continue;
+        n = clip_polygon(polygon, n, plane, view, other);
+        memcpy(polygon, other, sizeof *polygon * (size_t)n);
+    }
+    for (int k = 0; k < n; k++)
+        if (!(polygon[k].pos[3] >= TL_MIN_W * 0.5)) /* overflowed or underflowed in the cut: beyond any picture */
+            return 0;
+    return n < 3 ? 0 : n;
+}
+
+static inline tl_wide snapped_corner(const tl_pieces *p, int64_t i)
+{
+    if (p->vertices[i].x_fx == TL_SPECIAL)
+        return p->wide[i];
+    return (tl_wide){p->vertices[i].x_fx, p->vertices[i].y_fx};
+}
+
+/* Signed area, doubled, of triangle i of the fan from an apex. */
+static inline tl_int128 fan_area(const tl_pieces *p, int64_t first, int n, int apex, int i)
+{
+    const tl_wide a = snapped_corner(p, first + apex), b = snapped_corner(p, first + (apex + i) % n),
+                  c = snapped_corner(p, first + (apex + i + 1) % n);
+    return ((tl_int128)b.x_fx - a.x_fx) * ((tl_int128)c.y_fx - a.y_fx) -
+           ((tl_int128)b.y_fx - a.y_fx) * ((tl_int128)c.x_fx - a.x_fx);
+}
+
+/* The turn of a triangle as drawn (y down) from its clip-space corners: the sign of its homogeneous determinant. */
+static inline int clip_turn(const tl_source *source, const int32_t *corners)
+{
+    double a[4], b[4], c[4];
+    clip_position(source, corners[0], a);
+    clip_position(source, corners[1], b);
+    clip_position(source, corners[2], c);
+    const double det = (a[0] * (b[1] * c[3] - b[3] * c[1]) - a[1] * (b[0] * c[3] - b[3] * c[0])) +
+                       a[3] * (b[0] * c[1] - b[1] * c[0]);
+    return (det < 0.0) - (det > 0.0);
+}
+
+/* The snap may dent a corner of the convex polygon inwards; a fan from that corner still turns one way only.  Corners that
+ * changed places leave no such fan: then the one with the least area turned over, whose triangles that turn against the
+ * source triangle are left out.  Returns the apex, and in *turn the sign of the triangles to draw. */
+static int fan_apex(const tl_pieces *p, int64_t first, int n, int source_turn, int *turn)
+{
+    tl_int128 least = 0;
+    int best = -1;
+    for (int apex = 0; apex < n; apex++) {
+        tl_int128 positive = 0, negative = 0;
+        for (int i = 1; i < n - 1; i++) {
+            const tl_int128 area = fan_area(p, first, n, apex, i);
+            *(area > 0 ? &positive : &negative) += area;
+        }
+        if (positive == 0 || negative == 0) {
+            *turn = (positive > 0) - (negative < 0);
+            return apex;
+        }
+        if (source_turn == 0)
+            source_turn = positive + negative >= 0 ? 1 : -1;
+        const tl_int128 wrong = source_turn > 0 ? -negative : positive;
+        if (best < 0 || wrong < least) {
+            best = apex;
+            least = wrong;
+        }
+    }
+    *turn = source_turn;
+    return best;
+}
+
+/* Snaps the polygon of one triangle and appends its fan. */
+static void append_pieces(tl_pieces *p, const clip_corner *polygon, int n, int32_t source, int source_turn,
+                          const tl_view *view)
+{
+    const int64_t first = p->n_vertices;
+    tl_vertex_counts counts = {0, 0, 0};
+    for (int k = 0; k < n; k++) {
+        store_projected(polygon[k].pos, view, first + k, p->vertices, p->wide, 1, &counts);
+        p->inv_w[first + k] = 1.0 / polygon[k].pos[3];
+        memcpy(p->weights + 3 * (first + k), polygon[k].weights, sizeof polygon[k].weights);
+    }
+    if (counts.n_bad)
+        return; /* beyond 2^62 in spite of the guard band: not representable, so not drawn */
+    int turn;
+    const int apex = fan_apex(p, first, n, source_turn, &turn);
+    for (int i = 1; i < n - 1; i++) {
+        const tl_int128 area = fan_area(p, first, n, apex, i);
+        if ((area > 0) - (area < 0) != turn || turn == 0)
+            continue;
+        int32_t *t = p->triangles + 3 * p->n_pieces;
+        t[0] = (int32_t)(first + apex);
+        t[1] = (int32_t)(first + (apex + i) % n);
+        t[2] = (int32_t)(first + (apex + i + 1) % n);
+        p->source[p->n_pieces++] = source;
+    }
+    p->n_vertices += n;
+}
+
+static void clip(const tl_source *source, const tl_vertex *vertices, const int32_t *triangles, const int32_t *ids, int64_t n_listed,
+                 const tl_view *view, tl_pieces *pieces)
+{
+    clip_corner polygon[TL_MAX_CORNERS];
+    pieces->n_vertices = pieces->n_pieces = 0;
+    for (int64_t i = 0; i < n_listed; i++) {
+        const int64_t t = ids ? ids[i] : i;
+        const int32_t *corners = triangles + 3 * t;
+        int cut = 0;
+        for (int k = 0; k < 3; k++)
+            cut |= vertices[corners[k]].x_fx == TL_SPECIAL && vertices[corners[k]].y_fx == TL_CLIPPED;
+        const int n = cut ? clip_triangle(source, corners, view, polygon) : 0;
+        if (n && pieces->vertices) {
+            append_pieces(pieces, polygon, n, (int32_t)t, clip_turn(source, corners), view);
+        } else if (n) {
+            pieces->n_vertices += n;
+            pieces->n_pieces += n - 2;
+        }
+    }
+}
+
+/* What reads the pieces. */
+static inline int is_clipped(const tl_vertex_set *set, const int32_t *corners)
+{
+    int clipped = 0;
+    for (int k = 0; k < 3; k++)
+        clipped |= set->vertices[corners[k]].x_fx == TL_SPECIAL && set->vertices[corners[k]].y_fx == TL_CLIPPED;
+    return clipped;
+}
+
+/* The vertices of the pieces, seen from the same sample. */
+static tl_vertex_set piece_set(const tl_pieces *p, const tl_vertex_set *mesh)
+{
+    return (tl_vertex_set){p->vertices, p->wide, p->inv_w, NULL, p->n_vertices, mesh->sample_x_fx, mesh->sample_y_fx};
+}
+
+/* First piece of a triangle, by bisection in the ascending sources. */
+static int64_t first_piece(const tl_pieces *p, int64_t id)
+{
+    int64_t low = 0, high = p->n_pieces;
+    while (low < high) {
+        const int64_t middle = low + (high - low) / 2;
+        if (p->source[middle] < id)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low;
+}
+
+#endif

@@ -1,0 +1,67 @@
+/* The fixed-point format: snapping, ranges, and why nothing overflows.
+ *
+ * A coordinate x_fx counts 2^-subpixel_bits pixels.  The centre of pixel j is (2j + 1) * 2^bits / 2, half a unit off
+ * the grid when bits = 0, so edge functions are evaluated doubled: 2E = dx * (2py - 2ay) - dy * (2px - 2ax).
+ *
+ * Range: at any point inside the bounding box of a triangle |E| <= width * height of the box (twice the area of a
+ * triangle in a rectangle is at most the rectangle), so
+ *   |x_fx| < 2^30:  width, height <= 2^31 - 2,  |2E| <= 2 (2^31 - 2)^2 < 2^63;
+ *   |x_fx| < 2^62:  width, height <= 2^63 - 2,  |2E| <= 2 (2^63 - 2)^2 < 2^127.
+ * The two products may each wrap; their difference, taken modulo 2^64 or 2^128, is right.
+ */
+#ifndef TL_FIXED_H
+#define TL_FIXED_H
+
+#include <float.h>
+#include <math.h>
+#include <stdint.h>
+
+#include "topleft.h"
+
+#define TL_NARROW_LIMIT 0x1p30
+#define TL_WIDE_LIMIT 0x1p62
+
+typedef __int128 tl_int128;
+typedef unsigned __int128 tl_uint128;
+
+_Static_assert(sizeof(tl_vertex) == 16, "a vertex is one 16-byte load");
+_Static_assert(sizeof(tl_int128) == 16, "the wide path needs 128-bit integers");
+_Static_assert((-3 >> 1) == -2, "a right shift of a negative number must floor");
+_Static_assert((tl_int128)2 * ((1LL << 31) - 2) * ((1LL << 31) - 2) < (tl_int128)1 << 63, "2E must fit 64 bits");
+
+static inline int64_t min64(int64_t a, int64_t b) { return a < b ? a : b; }
+static inline int64_t max64(int64_t a, int64_t b) { return a > b ? a : b; }
+static inline int64_t min3(int64_t a, int64_t b, int64_t c) { return min64(min64(a, b), c); }
+static inline int64_t max3(int64_t a, int64_t b, int64_t c) { return max64(max64(a, b), c); }
+
+/* Quotient and remainder for b > 0, rounded down. */
+static inline void floor_divide_64(int64_t a, int64_t b, int64_t *quotient, int64_t *remainder)
+{
+    const int64_t q = a / b, r = a % b;
+    *quotient = q - (r < 0);
+    *remainder = r < 0 ? r + b : r;
+}
+static inline void floor_divide_128(tl_int128 a, tl_int128 b, tl_int128 *quotient, tl_int128 *remainder)
+{
+    const tl_int128 q = a / b, r = a % b;
+    *quotient = q - (r < 0);
+    *remainder = r < 0 ? r + b : r;
+}
+
+/* Writes vertex i: its record, and its row of the wide table where there is one.  x_fx and y_fx are integers, infinite or NaN. */
+static inline void store_vertex(double x_fx, double y_fx, double z, int64_t i, tl_vertex *out, tl_wide *wide, tl_vertex_counts *n)
+{
+    if (fabs(x_fx) < TL_NARROW_LIMIT && fabs(y_fx) < TL_NARROW_LIMIT && fabs(z) <= FLT_MAX) {
+        out[i] = (tl_vertex){(int32_t)x_fx, (int32_t)y_fx, z};
+    } else if (fabs(x_fx) < TL_WIDE_LIMIT && fabs(y_fx) < TL_WIDE_LIMIT && fabs(z) <= FLT_MAX) {
+        out[i] = (tl_vertex){TL_SPECIAL, TL_WIDE, z};
+        n->n_wide++;
+        if (wide)
+            wide[i] = (tl_wide){(int64_t)x_fx, (int64_t)y_fx};
+    } else {
+        out[i] = (tl_vertex){TL_SPECIAL, TL_BAD, z};
+        n->n_bad++;
+    }
+}
+
+#endif
