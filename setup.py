@@ -221,7 +221,8 @@ class BuildTopleft(build_ext):
     def compile_unit(self, source: Path, flags: list[str], macros: list[tuple[str, str]]) -> Path:
         """Return the object of one source, compiled again when the source, a header or a flag changed."""
         target = self.temp / (source.stem + ".o")
-        sources = [source, *files_in("csrc", ".c", ".h")]
+        is_ours = source.is_relative_to(ROOT / "csrc")  # what Cython made includes the headers of the contract alone
+        sources = [source, *(files_in("csrc", ".c", ".h") if is_ours else sorted((ROOT / "csrc").glob("*.h")))]
 
         def make() -> None:
             with tempfile.TemporaryDirectory(dir=self.temp) as folder:

@@ -26,7 +26,7 @@ from benchmarks.atlas_depth import DEPTH_FAMILIES
 from benchmarks.atlas_page import steps_of
 from benchmarks.atlas_pictures import draw_sheets
 
-STYLE = {"font.size": 8, "axes.titlesize": 9, "svg.hashsalt": "topleft", "svg.fonttype": "none", "figure.dpi": 100,
+STYLE = {"font.size": 8, "axes.titlesize": 9, "svg.hashsalt": "topleft", "figure.dpi": 100,
          "hatch.linewidth": 0.5, "hatch.color": "0.6"}  # fmt: skip
 COLORS = "YlGnBu"
 NORM = LogNorm(1e-4, 1, clip=True)
@@ -39,16 +39,14 @@ Row = dict[str, Any]
 
 
 def draw_charts(record: Record, folder: Path) -> list[Path]:
-    """Write the charts as PNG and SVG, the magnified scenes as PNG, return where they are."""
+    """Write the charts as SVG, the magnified scenes as PNG, return where they are."""
     folder.mkdir(parents=True, exist_ok=True)
     paths = []
     with plt.rc_context(STYLE):
         for name, figure in figures(record):
-            is_sheet = name.startswith("scenes")  # pixels gain nothing from SVG
-            for suffix in ["png"] if is_sheet else ["png", "svg"]:
-                paths.append(folder / f"atlas-{name}.{suffix}")
-                metadata = {"Date": None} if suffix == "svg" else {}
-                figure.savefig(paths[-1], dpi=120, metadata=metadata)
+            suffix = "png" if name.startswith("scenes") else "svg"  # pixels gain nothing from SVG
+            paths.append(folder / f"atlas-{name}.{suffix}")
+            figure.savefig(paths[-1], dpi=120, metadata={"Date": None} if suffix == "svg" else {})
             plt.close(figure)
     return paths
 

@@ -29,7 +29,7 @@ PRODUCTION: dict[str, tuple[str, int]] = {
 
 SIZE = (32, 32)
 PLANE_ERROR = Fraction(1, 2**35)
-"""Of the largest |z| of a triangle: what a depth may be off by before it is rounded (docs/design.md, rule 8)."""
+"""Of the largest |z| of a triangle: what a depth may be off by before it is rounded (docs/design/rules.md, rule 8)."""
 
 
 class DepthScene(NamedTuple):

@@ -1,4 +1,4 @@
-"""Tables of an atlas, for the terminal and for docs/atlas.md, where they stand between markers."""
+"""Tables of an atlas, for the terminal and for docs/measured/atlas.md, where they stand between markers."""
 
 from __future__ import annotations
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -26,34 +26,28 @@ CHARTS: Mapping[str, Callable[[dict[str, Any]], Figure]] = {
 
 
 def draw_charts(record: dict[str, Any], folder: Path) -> list[Path]:
-    """Write the charts as PNG and SVG, return where they are."""
-    return [path for name, make in CHARTS.items() for path in write_chart(partial(make, record), folder, name)]
+    """Write the charts as SVG, return where they are."""
+    return [write_chart(partial(make, record), folder, name) for name, make in CHARTS.items()]
 
 
-def write_chart(make: Callable[[], Figure], folder: Path, name: str) -> list[Path]:
-    """Write a chart as PNG and SVG, return where they are."""
+def write_chart(make: Callable[[], Figure], folder: Path, name: str) -> Path:
+    """Write a chart as SVG, return where it is."""
     folder.mkdir(parents=True, exist_ok=True)
-    paths = []
-    for suffix, data in figure_bytes(make, ("png", "svg")).items():
-        paths.append(folder / f"{name}.{suffix}")
-        paths[-1].write_bytes(data)
-    return paths
+    path = folder / f"{name}.svg"
+    path.write_bytes(figure_svg(make))
+    return path
 
 
-def chart_bytes(record: dict[str, Any], name: str, suffixes: Sequence[str]) -> dict[str, bytes]:
-    """Return a chart of an accuracy record as PNG or SVG."""
-    return figure_bytes(partial(CHARTS[name], record), suffixes)
+def chart_svg(record: dict[str, Any], name: str) -> bytes:
+    """Return a chart of an accuracy record as SVG."""
+    return figure_svg(partial(CHARTS[name], record))
 
 
-def figure_bytes(make: Callable[[], Figure], suffixes: Sequence[str]) -> dict[str, bytes]:
-    """Return a chart as PNG or SVG; the same record gives the same bytes."""
-    found = {}
+def figure_svg(make: Callable[[], Figure]) -> bytes:
+    """Return a chart as SVG; the same record gives the same bytes."""
     with plt.rc_context(STYLE):
         figure = make()
-        for suffix in suffixes:
-            target = io.BytesIO()
-            metadata = {"Date": None} if suffix == "svg" else {}
-            figure.savefig(target, format=suffix, dpi=160, metadata=metadata)
-            found[suffix] = target.getvalue()
+        target = io.BytesIO()
+        figure.savefig(target, format="svg", metadata={"Date": None})
         plt.close(figure)
-    return found
+    return target.getvalue()

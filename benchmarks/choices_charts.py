@@ -18,8 +18,8 @@ MARKERS = "osD^vPX<>h"
 
 
 def draw_charts(record: dict[str, Any], folder: Path) -> list[Path]:
-    """Write the chart as PNG and SVG, return where they are."""
-    return write_chart(partial(chart_choices, record), folder, "choices")
+    """Write the chart as SVG, return where it is."""
+    return [write_chart(partial(chart_choices, record), folder, "choices")]
 
 
 def chart_choices(record: dict[str, Any]) -> Figure:

@@ -1,4 +1,4 @@
-"""Tables of a record of choices, for the terminal and for docs/choices.md, where they stand between markers."""
+"""Tables of a record of choices, for the terminal and, between markers, for docs/measured/choices.md."""
 
 from __future__ import annotations
 

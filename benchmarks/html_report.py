@@ -8,15 +8,20 @@ from __future__ import annotations
 
 import base64
 import html
+import posixpath
 import re
-from pathlib import Path
+from functools import partial
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 from benchmarks import accuracy_tables, pages
-from benchmarks.chart_files import CHARTS, chart_bytes
+from benchmarks.chart_files import CHARTS, chart_svg
 from benchmarks.markdown import to_html
 
-PAGES = ("accuracy.md", "speed.md", "atlas.md", "methods.md", "levels.md", "pictures.md", "choices.md", "static.md")
+PAGES = (
+    "measured/accuracy.md", "measured/speed.md", "measured/atlas.md", "guide/methods.md",
+    "measured/levels.md", "measured/pictures.md", "measured/choices.md", "measured/static.md",
+)  # fmt: skip
 """In the order of the report."""
 
 TYPES = {".svg": "image/svg+xml", ".png": "image/png", ".jpg": "image/jpeg"}
@@ -75,7 +80,7 @@ def make_report(record: dict[str, Any], folder: Path) -> str:
         text = (folder / name).read_text(encoding="utf-8")
         if pages.MARKED.search(text):
             text = with_own_parts(text, record)
-        body = to_html(text, lambda address: picture_data(record, folder, address), lambda to: link_to(found, to))
+        body = to_html(text, partial(picture_data, record, (folder / name).parent), partial(link_to, found, name))
         bodies.append(f'<section id="{anchor(name)}">\n{name_sections(body, name)}\n</section>')
         contents.append(contents_html(body, name))
     return (
@@ -113,23 +118,23 @@ def picture_data(record: dict[str, Any], folder: Path, address: str) -> str:
     """Return a picture as a data URI: a chart of the record by the name of its file, any other file as it is."""
     path = folder / address
     if path.stem in CHARTS:
-        data, suffix = chart_bytes(record, path.stem, ("svg",))["svg"], ".svg"
+        data, suffix = chart_svg(record, path.stem), ".svg"
     else:
         data, suffix = path.read_bytes(), path.suffix
     return f"data:{TYPES[suffix]};base64,{base64.b64encode(data).decode()}"
 
 
-def link_to(found: list[str], address: str) -> str:
-    """Return where a link leads in the report: to a page that it holds, or out; nothing for files that it lacks."""
-    page, _, _ = address.partition("#")
-    if page in found:
-        return f"#{anchor(page)}"
+def link_to(found: list[str], page: str, address: str) -> str:
+    """Return where a link of a page leads: to a page of the report, or out; nothing for files that it lacks."""
+    target = posixpath.normpath(posixpath.join(posixpath.dirname(page), address.partition("#")[0]))
+    if target in found:
+        return f"#{anchor(target)}"
     return address if address.startswith(("https://", "http://")) else ""
 
 
 def anchor(name: str) -> str:
     """Return the id of a page."""
-    return name.removesuffix(".md")
+    return PurePosixPath(name).stem
 
 
 def name_sections(body: str, page: str) -> str:

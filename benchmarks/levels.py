@@ -1,4 +1,4 @@
-"""Levels of detail: time beside error of each level, near and far. Makes docs/levels.md.
+"""Levels of detail: time beside error of each level, near and far. Makes docs/measured/levels.md.
 
 The error is measured on masks, not taken from the bound: how far a sample that one outline holds lies from the other.
 """
@@ -175,7 +175,7 @@ def rows_of(mesh: dict[str, Any], head: str = "mesh seen") -> tuple[list[str], l
 
 
 def page(record: dict[str, Any]) -> str:
-    """Return docs/levels.md."""
+    """Return docs/measured/levels.md."""
     machine = record["machine"]
     width, height = record["size"]
     parts = [HEAD.format(tolerance=record["tolerance"])]
@@ -222,7 +222,7 @@ The chart shows, for each mesh and each height in the picture, all levels: how f
 drawing takes. Filled: the level that is drawn at a tolerance of {tolerance} px. All of this is made by
 `python -m benchmarks levels`.
 
-![Time against error of levels, by mesh and height](images/levels.png)
+![Time against error of levels, by mesh and height](../images/levels.png)
 """
 
 
@@ -239,7 +239,7 @@ def write_page(record: dict[str, Any], docs: Path) -> list[Path]:
     from benchmarks.levels_chart import chart_png
 
     found = {
-        docs / "levels.md": page(record).encode(),
+        docs / "measured" / "levels.md": page(record).encode(),
         docs / "images" / "levels.png": chart_png(record),
     }
     for path, data in found.items():

@@ -1,4 +1,4 @@
-"""The light of topleft in GLSL: what docs/design.md says of shading, drawn by OpenGL on Mesa's llvmpipe.
+"""The light of topleft in GLSL: what docs/design/shading.md says, drawn by OpenGL on Mesa's llvmpipe.
 
 In: a scene of `pictures_scenes.py`. Out: its picture and its ids. Shares no code with the kernels or with `Look`.
 Needs moderngl and Mesa's EGL library. The vertex shader turns y over, so that row 0 is on top.

@@ -1,4 +1,4 @@
-"""Tables of a record of pictures, for the terminal and for docs/pictures.md, where they stand between markers."""
+"""Tables of a record of pictures, for the terminal and, between markers, for docs/measured/pictures.md."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def sheets_text(record: Record) -> str:
 
 def sheet_text(row: Record) -> str:
     """One of them, with what is in it."""
-    address = f"images/pictures-{row['scene']}.png"
+    address = f"../images/pictures-{row['scene']}.png"
     return f"`{row['scene']}`: {row['what']}\n\n![{row['what']}: topleft, llvmpipe, difference]({address})"
 
 

@@ -1,4 +1,4 @@
-"""docs/planner.md: what a plan says, of ten scenes. ``python -m benchmarks.planner_page`` writes it."""
+"""docs/measured/planner.md: what a plan says, of ten scenes. ``python -m benchmarks.planner_page`` writes it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import numpy as np
 import topleft as tl
 from topleft.scenes import blob, planar_mesh, random_triangles, shape
 
-PAGE = Path(__file__).parents[1] / "docs" / "planner.md"
+PAGE = Path(__file__).parents[1] / "docs" / "measured" / "planner.md"
 
 HEAD = """\
 # What a scene needs, and why
@@ -108,7 +108,7 @@ def page() -> str:
 
 
 def main() -> None:
-    """Write docs/planner.md with the costs that ship."""
+    """Write docs/measured/planner.md with the costs that ship."""
     with TemporaryDirectory() as empty:
         os.environ["XDG_CACHE_HOME"] = empty
         text = page()

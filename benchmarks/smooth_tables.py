@@ -1,4 +1,4 @@
-"""Tables of a record of the smooth scenes, for docs/performance.md, where they stand between markers."""
+"""Tables of a record of the smooth scenes, for docs/measured/performance.md, where they stand between markers."""
 
 from __future__ import annotations
 

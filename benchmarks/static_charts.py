@@ -28,8 +28,8 @@ TICKS = (0.5, 1, 2, 5, 10, 20, 50, 100, 200)
 
 
 def draw_charts(record: dict[str, Any], folder: Path) -> list[Path]:
-    """Write the chart as PNG and SVG, return where they are."""
-    return write_chart(partial(chart_static, record), folder, "static")
+    """Write the chart as SVG, return where it is."""
+    return [write_chart(partial(chart_static, record), folder, "static")]
 
 
 def chart_static(record: dict[str, Any]) -> Figure:

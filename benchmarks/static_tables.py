@@ -1,4 +1,4 @@
-"""Tables of a record of static scenes, for the terminal and for docs/static.md, where they stand between markers."""
+"""Tables of a record of static scenes, for the terminal and, between markers, for docs/measured/static.md."""
 
 from __future__ import annotations
 

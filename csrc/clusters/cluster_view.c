@@ -204,7 +204,7 @@ static int is_hidden(const seen_box *box, const tl_cluster_view *v, const tl_win
     const int64_t row0 = max64((int64_t)floor(top) - window->y_px, 0), row1 = min64((int64_t)floor(bottom) + 1 - window->y_px, window->height);
     if ((col1 - col0) * (row1 - row0) > most_px)
         return 0;
-    /* docs/design.md, section 4: the error of a depth before it is rounded to float32 */
+    /* docs/design/rules.md: the error of a depth before it is rounded to float32 */
     const double error = 0x1p-33 * (largest[2] + 1.0), z = depth_of_ndc(v, is_farthest ? high[2] : low[2]);
     if (!(fabs(z) < 0x1p126)) /* the vertex stage has depths end at the largest float32 */
         return 0;

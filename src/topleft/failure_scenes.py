@@ -1,7 +1,7 @@
 """Small scenes on which methods fail: what a picture must hold, and what they draw instead.
 
 Shrunk by `python -m benchmarks atlas --scenes` from the first failure of each method along the families of the atlas
-(docs/atlas.md), and kept: `tests/methods/test_failure_scenes.py` draws them all. The production methods are
+(docs/measured/atlas.md), and kept: `tests/methods/test_failure_scenes.py` draws them all. The production methods are
 right on each.
 """
 

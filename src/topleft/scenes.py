@@ -144,7 +144,7 @@ TUTORIAL_SCENES: Mapping[str, Callable[[], Shape]] = MappingProxyType(
 )
 """What tutorials test their triangles with, by name: functions that return vertices, on whole pixels, and triangles.
 
-`docs/methods.md` has what each method makes of them, in pixels.
+`docs/guide/methods.md` has what each method makes of them, in pixels.
 """
 
 

@@ -1,4 +1,4 @@
-"""The examples run as a user runs them, and the pictures of docs/examples.md are theirs."""
+"""The examples run as a user runs them, and the pictures of docs/guide/examples.md are theirs."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from PIL import Image
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = sorted(path.stem for path in ROOT.joinpath("examples").glob("*.py") if path.stem != "picture")
-PAGE = ROOT.joinpath("docs", "examples.md").read_text(encoding="utf-8")
+PAGE = ROOT.joinpath("docs", "guide", "examples.md").read_text(encoding="utf-8")
 
 
 def run(name, output, *options):
@@ -37,7 +37,7 @@ def test_example_makes_the_picture_of_the_page(name, tmp_path):
 def test_examples_are_nine_and_all_on_the_page():
     assert len(EXAMPLES) == 9
     assert sorted(re.findall(r"images/example-(\w+)\.png", PAGE)) == EXAMPLES
-    assert sorted(re.findall(r"\(../examples/(\w+)\.py\)", PAGE)) == EXAMPLES
+    assert sorted(re.findall(r"\(../../examples/(\w+)\.py\)", PAGE)) == EXAMPLES
 
 
 def test_pictures_of_the_page_are_small():

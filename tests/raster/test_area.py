@@ -1,4 +1,4 @@
-"""Exact areas: within the bound that docs/design.md proves, and to the last bit where they must be."""
+"""Exact areas: within the bound that docs/design/area.md proves, and to the last bit where they must be."""
 
 from fractions import Fraction
 from functools import lru_cache

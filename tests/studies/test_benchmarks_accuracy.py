@@ -25,7 +25,7 @@ ROOT = Path(__file__).parents[2]
 SIZE = (12, 11)
 METHODS = ["auto", "row_crossing/cull-front", "float_barycentric"]
 RECORD = ROOT / "benchmarks/accuracy.json"
-PAGES = [ROOT / "docs/accuracy.md", ROOT / "docs/speed.md"]
+PAGES = [ROOT / "docs/measured/accuracy.md", ROOT / "docs/measured/speed.md"]
 CHARTS = [f"accuracy-{name}" for name in ("coverage", "antialiasing", "depth")]
 CHARTS += [f"speed-{name}" for name in ("sizes", "scaling", "tutorial")]
 
@@ -186,11 +186,11 @@ def test_accuracy_command_unknown_method_is_refused(capsys):
     assert "method must be one of" in capsys.readouterr().err
 
 
-def test_charts_command_draws_png_and_svg(tiny, tmp_path, capsys):
+def test_charts_command_draws_svg(tiny, tmp_path, capsys):
     pytest.importorskip("matplotlib")
     (tmp_path / "tiny.json").write_text(json.dumps(tiny))
     assert cli.main(["charts", str(tmp_path / "tiny.json"), "-o", str(tmp_path / "images")]) == 0
-    names = [f"{name}.{suffix}" for name in CHARTS for suffix in ("png", "svg")]
+    names = [f"{name}.svg" for name in CHARTS]
     assert sorted(path.name for path in (tmp_path / "images").iterdir()) == sorted(names)
 
 

@@ -39,7 +39,7 @@ def test_levels_command_writes_page_chart_and_record(tmp_path, monkeypatch, mesh
     monkeypatch.setattr(levels, "measure_mesh", lambda *_: mesh_record)
     assert cli.main(["levels", "--json", str(tmp_path / "levels.json"), "-o", str(tmp_path)]) == 0
     record = json.loads((tmp_path / "levels.json").read_text())
-    page = (tmp_path / "levels.md").read_text()
+    page = (tmp_path / "measured" / "levels.md").read_text()
     assert page == levels.page(record)
     assert "## torus, 2,304 triangles" in page
     assert "1000 px high" in capsys.readouterr().out

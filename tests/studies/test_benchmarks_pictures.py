@@ -16,7 +16,7 @@ import topleft as tl
 
 ROOT = Path(__file__).parents[2]
 RECORD = ROOT / "benchmarks/pictures.json"
-PAGE = ROOT / "docs/pictures.md"
+PAGE = ROOT / "docs/measured/pictures.md"
 IMAGES = ROOT / "docs/images"
 GOAL = 1.0
 """Grey levels, the mean inside."""

@@ -18,7 +18,7 @@ import topleft as tl
 ROOT = Path(__file__).parents[2]
 
 ISA = tl.build_info()["isa"]
-RECORD, PAGE = ROOT / "benchmarks/smooth.json", ROOT / "docs/performance.md"
+RECORD, PAGE = ROOT / "benchmarks/smooth.json", ROOT / "docs/measured/performance.md"
 
 
 @pytest.fixture(scope="module")

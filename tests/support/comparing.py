@@ -103,7 +103,7 @@ def check_fragments(scene: Scene, depth_test):
 
 
 def depth_slack(fragment):
-    """Design, section 4: 25 * 2**-53 * box / area of the largest difference of depths; slivers by their weights."""
+    """25 * 2**-53 * box / area of the largest difference of depths; slivers by their weights (docs/design/rules.md)."""
     a, b, c = fragment.piece.vertices
     area = abs(ref.edge_function(a.xy_fx, b.xy_fx, c.xy_fx))
     box = 1

@@ -49,7 +49,7 @@ def expect(scene, tests=DEPTH_TESTS):
         exact, largest = loop.depth(ids)
         with np.errstate(invalid="ignore", over="ignore"):
             half_ulp = np.spacing(abs(depth[test])).astype(np.float64) / 2
-            assert not (abs(depth[test] - exact) > half_ulp + 2.0**-35 * largest).any()  # design, rule 8
+            assert not (abs(depth[test] - exact) > half_ulp + 2.0**-35 * largest).any()  # docs/design/rules.md, rule 8
     return Expected(loop.counts, loop.ids, depth)
 
 

@@ -1,4 +1,4 @@
-"""The tables of docs/methods.md, made from the registry and from what the methods draw.
+"""The tables of docs/guide/methods.md, made from the registry and from what the methods draw.
 
 `python tests/methods_tables.py` writes them anew; `test_tutorial_scenes.py` checks that they are up to date.
 """
@@ -9,7 +9,7 @@ import topleft as tl
 from topleft import scenes
 from topleft.methods import CLASSICS, METHODS, Claims
 
-DOCUMENT = Path(__file__).resolve().parents[2] / "docs/methods.md"
+DOCUMENT = Path(__file__).resolve().parents[2] / "docs/guide/methods.md"
 
 YES_NO = {"exact": "exact", "watertight": "watertight", "top_left": "top-left", "sub_pixel": "sub-pixel",
           "integer_vertices": "integer vertices", "overdraws_shared_edges": "overdraws shared edges"}  # fmt: skip

@@ -26,7 +26,7 @@ def many(seed=1, n=9):
 
 
 def clip_of(instance, clip_from_world):
-    """Clip space as rule 9 has it: float32 vertices in float32, others in float64; each operation rounds once."""
+    """Clip space, docs/design/rules.md: float32 vertices in float32, others in float64, each operation rounded once."""
     points = instance.mesh.vertices
     m = (clip_from_world @ instance.transform).astype(points.dtype)
     x, y, z = points.T

@@ -1,4 +1,4 @@
-"""Shading in float64 NumPy, as docs/design.md tells it: what the kernels are compared with.
+"""Shading in float64 NumPy, as docs/design/shading.md tells it: what the kernels are compared with.
 
 Shares no code with them but the snap and the halvings of textures. All vertices must lie in front of the camera.
 """

@@ -1,7 +1,7 @@
 """What is chosen before anything is drawn: a small function for each choice, asked by the pipeline and by the planner.
 
 None of them changes a bit of a picture; `tests/plan/test_choices.py` draws with each forced on and off. The numbers
-were measured on one and two cores of a Zen 4 with AVX-512; `docs/design.md`, section 20, has the scenes.
+were measured on one and two cores of a Zen 4 with AVX-512; `docs/design/choices.md` has the scenes.
 """
 
 from __future__ import annotations
@@ -85,7 +85,8 @@ MIN_INSTANCES_TO_CLUSTER = 16
 #: times as fast), and leave out what is outside, turned away or behind others. A view is drawn from them where no more
 #: of them face it, and as many are outside, as is said here: (below so many triangles, without culling, with it).
 #: Measured on blobs, scans, hills and soup in 512x512 and 1920x1080. Whole and culled, 30,000 to 300,000 triangles are
-#: 0.86 to 0.93 times as fast, 1,000,000 1.09; half in view, 0.85 to 1.05, 0.93 to 1.12, and 1.3. `docs/static.md`.
+#: 0.86 to 0.93 times as fast, 1,000,000 1.09; half in view, 0.85 to 1.05, 0.93 to 1.12, and 1.3.
+#: `docs/measured/static.md`.
 MAX_FRONT_TO_CLUSTER = 0.8
 MIN_OUTSIDE_TO_CLUSTER = ((60_000, 0.1, 0.6), (500_000, 0.0, 0.33), (math.inf, 0.0, 0.0))
 

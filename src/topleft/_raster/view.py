@@ -41,7 +41,7 @@ class Planned(Protocol):
 
 
 class ViewOptions(TypedDict, total=False):
-    """The options that all verbs share; `docs/design.md`, section 2, tells what each does."""
+    """The options that all verbs share; `docs/design/rules.md` tells what each does."""
 
     transform: ArrayLike | None
     origin: tuple[int, int]

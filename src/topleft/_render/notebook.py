@@ -1,7 +1,7 @@
 """What a result shows of itself in a notebook: a mesh its picture, a visibility buffer its triangles.
 
 Input: `Mesh`, `Fragments`. Output: PNG as bytes, which their `_repr_png_` returns. Arrays stay plain arrays;
-docs/design.md tells why.
+docs/design/fields.md tells why.
 """
 
 from __future__ import annotations
