@@ -26,7 +26,7 @@ from benchmarks.static_scenes import StaticScene, scenes
 from topleft._raster import choices
 from topleft._raster.clustered import ClusteredScene
 from topleft._raster.clusters import Clusters
-from topleft._render import scene_clusters
+from topleft._render import instances
 
 WHOLE: Forced = ((choices, "pays_to_cluster", lambda *_: False),)
 ASKED = ("pays_to_cluster", "pays_to_draw_clusters", "pays_to_draw_instances")
@@ -108,7 +108,7 @@ def counting(fates: Fates) -> Forced:
             return super().draw_rows(*arguments, **options)
 
     rasterize = sys.modules["topleft._raster.rasterize"]  # not the verb of the same name
-    return (rasterize, "ClusteredScene", CountedScene), (scene_clusters, "ClusteredScene", CountedScene)
+    return (rasterize, "ClusteredScene", CountedScene), (instances, "ClusteredScene", CountedScene)
 
 
 @lru_cache(maxsize=1)

@@ -7,7 +7,6 @@ import numpy as np
 from picture import beside, output_path, ramp
 
 import topleft as tl
-from topleft._shade.shade import eye_distance
 
 SIZE = (320, 240)
 INTRINSICS = np.array([[260.0, 0, 161.3], [0, 261.5, 118.7], [0, 0, 1]])
@@ -25,10 +24,10 @@ def main() -> None:
     mesh = tl.Mesh(np.vstack([knot, floor]), np.vstack([triangles, len(knot) + np.array([[0, 2, 1], [0, 3, 2]])]))
 
     camera = tl.Camera.from_intrinsics(INTRINSICS, POSE, SIZE, near=0.1, far=20, distortion=DISTORTION)
-    frags = tl.rasterize_mesh(mesh, camera, SIZE)
-    z = np.full(frags.depth.shape, np.nan)
-    z[frags.mask] = eye_distance(frags.depth[frags.mask], camera)  # metres along the axis
-    print(f"z from {np.nanmin(z):.3f} to {np.nanmax(z):.3f} m, {len(np.unique(frags.triangle)) - 1} triangles seen")
+    layers = tl.render_layers(mesh, camera, SIZE, layers=("distance", "triangle"))
+    z = np.where(np.isfinite(layers["distance"]), layers["distance"], np.nan)  # metres along the axis
+    n_seen = len(np.unique(layers["triangle"])) - 1
+    print(f"z from {np.nanmin(z):.3f} to {np.nanmax(z):.3f} m, {n_seen} triangles seen")
     ids = tl.render(mesh, camera, SIZE, shading="ids")
     tl.save_image(path, beside(ramp(-z), ids))
 

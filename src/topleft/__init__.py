@@ -30,10 +30,10 @@ from topleft._raster.composite import composite
 from topleft._raster.fragments import Fragments
 from topleft._raster.peel import DepthLayers, peel
 from topleft._raster.verbs import Rasterizer, coverage, fill, overdraw, rasterize, wireframe
+from topleft._render.fragments import SceneDepthLayers, SceneFragments
 from topleft._render.render import rasterize_mesh, render
-from topleft._render.scene_fragments import SceneDepthLayers, SceneFragments
+from topleft._render.scene_shade import shade
 from topleft._render.silhouette import silhouette
-from topleft._shade.shade import shade
 from topleft.errors import MeshError, TopleftError
 
 if TYPE_CHECKING:

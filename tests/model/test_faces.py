@@ -11,8 +11,7 @@ from engine_cases import ON_EACH_ISA, THREADS, on
 import topleft as tl
 from topleft._model import normals as faces
 from topleft._model.mesh import Mesh
-from topleft._shade.frame import turn_of_normals
-from topleft._shade.surface import Surface
+from topleft._shade.look import ShadingMesh, turn_of_normals
 
 PI = Decimal("3.14159265358979323846264338327950288419716939937510582097494")
 
@@ -235,7 +234,7 @@ def test_triangles_that_changed_for_the_worse_are_refused(work, index):
 def test_surface_in_eye_space_has_its_normals_at_right_angles():
     mesh = Mesh(*tl.scenes.shape("torus-knot"))
     view = np.array([[1, 2, 0, 3], [0, 1, 0.5, 1], [0, 0, -3, -9], [0, 0, 0, 1.0]])
-    surface = Surface(mesh, view)
+    surface = ShadingMesh(mesh, view)
     corners = surface.positions[mesh.triangles]
     sides = corners - np.roll(corners, 1, axis=1)
     flat = surface.face_normals[:, None, :3]
@@ -256,5 +255,5 @@ def test_turn_of_normals_is_the_inverse_but_for_the_scale():
 @pytest.mark.parametrize("n_channels", [3, 4])
 def test_surface_colors_are_rows_of_four(n_channels):
     colors = np.arange(3 * n_channels, dtype=np.uint8).reshape(3, n_channels)
-    surface = Surface(Mesh(np.eye(3), [[0, 1, 2]], colors=colors))
+    surface = ShadingMesh(Mesh(np.eye(3), [[0, 1, 2]], colors=colors))
     assert surface.colors.tolist() == [[*row[:3], 1] for row in colors.tolist()]

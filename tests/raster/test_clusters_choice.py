@@ -9,9 +9,8 @@ from topleft._raster import choices
 from topleft._raster.clustered import ClusteredScene
 from topleft._raster.clusters import Clusters, Patience, Survey
 from topleft._raster.view import View
-from topleft._render import scene_clusters
-from topleft._render.scene_clusters import count_layers, survey_instances
-from topleft._render.scene_draw import PlacedScene
+from topleft._render import instances
+from topleft._render.instances import PlacedScene, count_layers, survey_instances
 
 SIZE = (160, 120)
 CAMERA = tl.Camera.look_at((0, 0, 3), near=0.01, far=100.0)
@@ -125,8 +124,8 @@ def test_instances_are_drawn_from_clusters_where_enough_is_left_out(view, outsid
 def test_scene_asks_before_it_draws_clusters(monkeypatch):
     scene = standing([(0, 0, -3.0 * k) for k in range(16)], tl.Mesh(*as_floats(*tl.scenes.blob(10_000))))
     drawn = []
-    draw = scene_clusters.draw_clustered
-    monkeypatch.setattr(scene_clusters, "draw_clustered", lambda *a, **k: drawn.append(1) or draw(*a, **k))
+    draw = instances.draw_clustered
+    monkeypatch.setattr(instances, "draw_clustered", lambda *a, **k: drawn.append(1) or draw(*a, **k))
     camera = tl.Camera.look_at((0, 0, 30), ortho_height=4.0, near=1.0, far=100.0)
     for layers, n_drawn in ((3.0, 1), (100.0, 0)):
         drawn.clear()

@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 
 from topleft import scenes
+from topleft._base.color import id_colors
 from topleft._camera.camera import Camera
 from topleft._io import load as files
 from topleft._model.mesh import Mesh
 from topleft._render.render import EDGE_COLOR, depth_behind, rasterize_mesh, render
-from topleft._shade.shade import GREY_OF_FARTHEST, GREY_OF_NEAREST, eye_distance, id_colors, shade
+from topleft._render.scene_shade import shade
+from topleft._shade.shade import GREY_OF_FARTHEST, GREY_OF_NEAREST, eye_distance
 
 SHARED_MESHES = Path(__file__).resolve().parents[3] / "shared" / "meshes"
 SIZE = (64, 48)

@@ -11,9 +11,9 @@ from scene_cases import CAMERA, CUBE, SIZE, SPHERE, joined, many, told_apart
 import topleft as tl
 from topleft._camera.camera import Camera
 from topleft._model import scene as scene_module
-from topleft._render import scene_draw
+from topleft._render import instances
+from topleft._render.fragments import SceneFragments
 from topleft._render.render import rasterize_mesh
-from topleft._render.scene_fragments import SceneFragments
 
 
 def assert_same_as_joined(got, expected, scene):
@@ -55,7 +55,7 @@ def test_scene_samples_are_those_of_the_mesh_of_all(isa, sampling):
 
 @pytest.mark.parametrize("n_vertices", [1, 100, 1 << 20])
 def test_scene_any_number_of_instances_at_once_is_the_same(monkeypatch, n_vertices):
-    monkeypatch.setattr(scene_draw, "VERTICES_AT_ONCE", n_vertices)
+    monkeypatch.setattr(instances, "VERTICES_AT_ONCE", n_vertices)
     scene = many(3)
     assert_same_as_joined(rasterize_mesh(scene, CAMERA, SIZE), tl.rasterize(*joined(scene), SIZE), scene)
     for sampling in ("center", "msaa4", "outer", "inner"):

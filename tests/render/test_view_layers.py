@@ -10,8 +10,8 @@ from layer_views import CAMERAS, CUBE, FLOAT32, ON_EACH_CAMERA, SIZE, SNAP_PX, S
 import topleft as tl
 from topleft._camera.camera import Camera
 from topleft._render import view_layers
+from topleft._render.gbuffer import GBuffer
 from topleft._render.layers import LAYERS
-from topleft._render.sight import Sight
 from topleft._render.view_layers import render_layers
 
 
@@ -209,14 +209,14 @@ def test_uv_and_attributes_are_interpolated():
 
 
 def test_only_what_is_asked_for_is_computed():
-    sight = Sight(CUBE, CAMERAS["perspective"], SIZE)
-    assert "frags" not in vars(sight)
+    gbuffer = GBuffer(CUBE, CAMERAS["perspective"], SIZE)
+    assert "frags" not in vars(gbuffer)
     for name in ("color", "alpha", "silhouette", "depth", "triangle", "instance", "barycentric"):
-        LAYERS[name](sight)
-    assert "surfaces" not in vars(sight)
+        LAYERS[name](gbuffer)
+    assert "visible_parts" not in vars(gbuffer)
     for name in ("camera_normal", "world_normal"):
-        LAYERS[name](sight)
-    assert "points" not in vars(sight.surfaces[0])
+        LAYERS[name](gbuffer)
+    assert "points" not in vars(gbuffer.visible_parts[0])
 
 
 @pytest.mark.parametrize("size", [(0, 3), (3, 0)])

@@ -9,8 +9,8 @@ import pytest
 from comparing import assert_same
 
 import topleft as tl
-from topleft._base.color import srgb_tables
-from topleft._shade.shade import GREY_OF_FARTHEST, GREY_OF_NEAREST, id_colors, picture_of_numbers
+from topleft._base.color import id_colors, srgb_tables
+from topleft._shade.shade import GREY_OF_FARTHEST, GREY_OF_NEAREST, picture_of_numbers
 from topleft.methods.reference_sampling import mean
 
 SIZE = (48, 36)

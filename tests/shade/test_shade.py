@@ -15,7 +15,7 @@ from comparing import assert_same
 import topleft as tl
 from topleft import _engine
 from topleft._base.color import srgb_tables
-from topleft._shade.shade import shade
+from topleft._render.scene_shade import shade
 
 SIZE = (150, 110)
 RNG = np.random.default_rng(6)
@@ -304,6 +304,26 @@ def test_shade_through_a_lens_is_the_picture_of_render():
     camera = tl.Camera.from_intrinsics(intrinsics, np.eye(4), SIZE, near=0.1, far=50, distortion=[-0.3, 0.1, 0, 0])
     mesh = replace(KNOT, vertices=KNOT.vertices + [0, 0, 4])
     assert_same(tl.shade(tl.rasterize_mesh(mesh, camera, SIZE), mesh, camera), tl.render(mesh, camera, SIZE))
+
+
+@pytest.mark.parametrize("sampling", ["center", "msaa4"])
+@pytest.mark.parametrize("shading", ["smooth", "ids", "depth"])
+def test_shade_of_a_scene_is_the_picture_of_render(shading, sampling):
+    scene, camera = tl.Scene([KNOT, (KNOT, np.diag([-0.5, 1, 1, 1]))]), CAMERAS["ortho"]
+    frags = tl.rasterize_mesh(scene, camera, SIZE, sampling=sampling)
+    expected = tl.render(scene, camera, SIZE, sampling=sampling, shading=shading)
+    assert_same(tl.shade(frags, scene, camera, shading=shading), expected)
+
+
+def test_shade_with_another_scene_is_refused():
+    cube, camera = tl.Mesh(*tl.scenes.shape("cube")), CAMERAS["ortho"]
+    frags = tl.rasterize_mesh(tl.Scene([KNOT, cube]), camera, SIZE)
+    with pytest.raises(TypeError, match="mesh must be a Scene, got Mesh"):
+        tl.shade(frags, KNOT, camera)
+    with pytest.raises(ValueError, match="mesh must be the scene that was drawn, of 2 instances, got one of 1"):
+        tl.shade(frags, tl.Scene([KNOT]), camera)
+    with pytest.raises(ValueError, match=r"mesh\[1\] must be the one that was drawn, with 24 vertices"):
+        tl.shade(frags, tl.Scene([KNOT, KNOT]), camera)
 
 
 @pytest.mark.parametrize("draw", [tl.render, tl.render_transparent, lambda mesh: tl.render(tl.Scene([mesh]))])

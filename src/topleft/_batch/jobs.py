@@ -26,7 +26,7 @@ from topleft._raster.verbs import Rasterizer
 from topleft._render.layers import check_layers, draw_layers
 from topleft._render.render import DEFAULT_SIZE, render
 from topleft._render.transparent import render_transparent
-from topleft._render.view_layers import sight_of
+from topleft._render.view_layers import gbuffer_of
 
 __all__ = ["Job", "Outcome", "SceneFile", "Studio", "as_job"]
 
@@ -219,11 +219,11 @@ class Studio:
                 return picture
             save_image(files[0], picture, background=_opaque(job))
             return None
-        sight = sight_of(scene, camera, size, rasterizer=rasterizer, **options)
-        arrays = draw_layers(layers, sight)
+        gbuffer = gbuffer_of(scene, camera, size, rasterizer=rasterizer, **options)
+        arrays = draw_layers(layers, gbuffer)
         if path is None:
             return {name: array.copy() for name, array in arrays.items()}  # out of the memory that is kept
-        matrix = None if sight.camera.lens is not None else sight.camera.clip_from_world(size)
+        matrix = None if gbuffer.camera.lens is not None else gbuffer.camera.clip_from_world(size)
         save_layers(path, arrays, matrix=matrix, background=_opaque(job))
         return None
 

@@ -107,7 +107,7 @@ class BentMesh:
         return ends[:, [0, 1, 1]]
 
 
-class Sight:
+class LensMap:
     """What a lens sees of all directions, and where in a picture: made monotone beyond what the picture can show.
 
     The polynomials of a lens turn back somewhere beyond the angles that they were fitted to, and would fold what lies
@@ -180,9 +180,9 @@ def _rings(angles: F64, around: F64) -> F64:
 
 
 @lru_cache(maxsize=32)
-def _sight(lens: Lens, px_from_plane: bytes, size: tuple[int, int]) -> Sight:
+def _lens_map(lens: Lens, px_from_plane: bytes, size: tuple[int, int]) -> LensMap:
     matrix = np.frombuffer(px_from_plane).reshape(2, 3)
-    return Sight(lens, matrix, (size[0] / 2, size[1] / 2))
+    return LensMap(lens, matrix, (size[0] / 2, size[1] / 2))
 
 
 def bend(
@@ -217,18 +217,18 @@ def bend(
     # A place (x, y) in the image plane is the direction (x, -y, -1) in eye axes.
     half = np.array([[size[0] / 2], [size[1] / 2]])
     px_from_plane = half * projection[:2, :3] * FLIP
-    sight = _sight(lens, px_from_plane.tobytes(), (max(size[0], 1), max(size[1], 1)))
+    lens_map = _lens_map(lens, px_from_plane.tobytes(), (max(size[0], 1), max(size[1], 1)))
     points = (np.asarray(vertices, np.float64) @ camera.view[:3, :3].T + camera.view[:3, 3]) * FLIP
     # Window depth is below 0 for ranges under this one.
     near = projection[2, 3] / (projection[2, 2] - 1) if near_clip else 0.0
-    return _Subdivision(sight, points, lens.tolerance_px, near).run(np.asarray(triangles, np.int64))
+    return _Subdivision(lens_map, points, lens.tolerance_px, near).run(np.asarray(triangles, np.int64))
 
 
 class _Subdivision:
     """The vertices so far, in camera axes, with where they are seen."""
 
-    def __init__(self, sight: Sight, points: F64, tolerance_px: float, near: float) -> None:
-        self.sight, self.tolerance_px, self.near = sight, tolerance_px, near
+    def __init__(self, lens_map: LensMap, points: F64, tolerance_px: float, near: float) -> None:
+        self.lens_map, self.tolerance_px, self.near = lens_map, tolerance_px, near
         self.points = np.empty((0, 3))
         self.place, self.reach, self.direction = np.empty((0, 2)), np.empty(0), np.empty((0, 3))
         self._add(points)
@@ -266,7 +266,7 @@ class _Subdivision:
         return BentMesh(bent, triangles[order], source[order], weights[order], is_outline[order])
 
     def _add(self, points: F64) -> None:
-        place, reach = self.sight(points)
+        place, reach = self.lens_map(points)
         far = np.sqrt(np.einsum("ij,ij->i", points, points))[:, None]
         direction = np.divide(points, far, out=np.tile([0.0, 0.0, 1.0], (len(points), 1)), where=far > 0)
         self.points = np.concatenate([self.points, points])
@@ -287,7 +287,7 @@ class _Subdivision:
         off_axis = np.arctan2(np.hypot(middle[:, 0], middle[:, 1]), middle[:, 2])
         is_cap = (length > 1e-6) & (cosine > 1e-6)
         # Rounding of the arc cosine near 1: 1e-7 is more than it.
-        is_outside = is_cap & (off_axis - np.arccos(np.clip(cosine, -1, 1)) > self.sight.max_angle + 1e-7)
+        is_outside = is_cap & (off_axis - np.arccos(np.clip(cosine, -1, 1)) > self.lens_map.max_angle + 1e-7)
         is_too_near = (self.reach[triangles] < self.near).all(axis=1)
         return ~(is_outside | is_too_near)
 
@@ -297,15 +297,15 @@ class _Subdivision:
         is_bent = cosine < np.cos(MAX_EDGE_ANGLE)
         ask = np.flatnonzero(~is_bent)
         a, b = low[ask], high[ask]
-        px_a, px_b = self.sight.px(self.place[a]), self.sight.px(self.place[b])
+        px_a, px_b = self.lens_map.px(self.place[a]), self.lens_map.px(self.place[b])
         off = np.zeros(len(ask))
         for share in (0.25, 0.5, 0.75):
-            place, reach = self.sight((1 - share) * self.points[a] + share * self.points[b])
+            place, reach = self.lens_map((1 - share) * self.points[a] + share * self.points[b])
             weight_a, weight_b = (1 - share) * self.reach[a], share * self.reach[b]
             mean = weight_a + weight_b
             straight = (weight_a[:, None] * px_a + weight_b[:, None] * px_b) / mean[:, None]
-            off = np.maximum(off, np.abs(self.sight.px(place) - straight).max(axis=1) / self.tolerance_px)
-            if not self.sight.lens.has_planar_range:
+            off = np.maximum(off, np.abs(self.lens_map.px(place) - straight).max(axis=1) / self.tolerance_px)
+            if not self.lens_map.lens.has_planar_range:
                 off = np.maximum(off, np.abs(reach - mean) / (MAX_RANGE_ERROR * mean))
         is_bent[ask] = off > 1
         return is_bent

@@ -1,6 +1,6 @@
 """The registry of layers: what a view of a mesh or scene shows, by name.
 
-Input: a `Sight`. Output: an array for each name asked for; nothing else is computed.
+Input: a `GBuffer`. Output: an array for each name asked for; nothing else is computed.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from topleft._render.gbuffer import GBuffer, PointKind, VisiblePart, project
 from topleft._render.render import picture_of, render
-from topleft._render.scene_render import camera_of
-from topleft._render.sight import PointKind, Sight, Surface, project
+from topleft._render.scene_shade import camera_of
 from topleft._render.silhouette import silhouette as draw_silhouette
 from topleft._render.transparent import render_transparent
-from topleft._shade.pixel_normals import shade_normals
+from topleft._shade.shade import shade_normals
 
 __all__ = ["LAYERS", "check_layers", "draw_layers"]
 
@@ -25,128 +25,128 @@ Array = npt.NDArray[Any]
 F64 = npt.NDArray[np.float64]
 
 
-def color(sight: Sight) -> Array:
+def color(gbuffer: GBuffer) -> Array:
     """The picture (H, W, 4) uint8 of `render`, or of `render_transparent` if the look has an `opacity`."""
-    options = {**sight.options, **sight.look}
+    options = {**gbuffer.options, **gbuffer.look}
     if "opacity" in options:
-        return render_transparent(sight.subject, sight.camera, sight.size, **options)
+        return render_transparent(gbuffer.subject, gbuffer.camera, gbuffer.size, **options)
     sampling = options.pop("sampling", "center")
     if sampling == "center":
-        return picture_of(sight.frags, sight.subject, sight.camera, **options)
-    options |= {"sampling": sampling, "rasterizer": sight.rasterizer}
-    return render(sight.subject, sight.camera, sight.size, **options)
+        return picture_of(gbuffer.frags, gbuffer.subject, gbuffer.camera, **options)
+    options |= {"sampling": sampling, "rasterizer": gbuffer.rasterizer}
+    return render(gbuffer.subject, gbuffer.camera, gbuffer.size, **options)
 
 
-def alpha(sight: Sight) -> Array:
+def alpha(gbuffer: GBuffer) -> Array:
     """How much of the pixel is covered, (H, W) uint8, 255 for all of it."""
-    share = silhouette(sight)
+    share = silhouette(gbuffer)
     if share.dtype == np.bool_:
         return share.view(np.uint8) * np.uint8(255)
     return np.rint(share * np.float32(255)).astype(np.uint8)
 
 
-def silhouette(sight: Sight) -> Array:
+def silhouette(gbuffer: GBuffer) -> Array:
     """Where the subject is, (H, W): bool, or the share of samples, float32."""
-    sampling = sight.look.get("sampling", "center")
+    sampling = gbuffer.look.get("sampling", "center")
     if sampling == "center":
-        return sight.frags.mask
-    if sight.has_holes:
-        return (sight.sampled(sampling).samples_triangle >= 0).mean(axis=-1, dtype=np.float32)
-    return draw_silhouette(sight.subject, sight.camera, sight.size, sampling=sampling, **sight.options)
+        return gbuffer.frags.mask
+    if gbuffer.has_holes:
+        return (gbuffer.sampled(sampling).samples_triangle >= 0).mean(axis=-1, dtype=np.float32)
+    return draw_silhouette(gbuffer.subject, gbuffer.camera, gbuffer.size, sampling=sampling, **gbuffer.options)
 
 
-def depth(sight: Sight) -> Array:
+def depth(gbuffer: GBuffer) -> Array:
     """Window depth (H, W) float32, +inf where nothing is."""
-    return sight.frags.depth
+    return gbuffer.frags.depth
 
 
-def distance(sight: Sight) -> Array:
+def distance(gbuffer: GBuffer) -> Array:
     """Distance along the view (H, W) float32, world units, +inf where nothing is."""
-    rows = -sight.camera.view[2:3]
-    return sight.join((), np.inf, lambda one: sight.tell(one, PointKind.ROWS, rows @ one.instance.transform, np.inf))
+    rows = -gbuffer.camera.view[2:3]
+    return gbuffer.join((), np.inf, lambda one: gbuffer.evaluate(one, PointKind.ROWS, rows @ one.place, np.inf))
 
 
-def ray_distance(sight: Sight) -> Array:
+def ray_distance(gbuffer: GBuffer) -> Array:
     """Distance from the eye (H, W) float32, world units, +inf where nothing is; along the view without perspective."""
-    if not sight.camera.projection[3, :3].any():
-        return distance(sight)
-    rows = sight.camera.view[:3]
-    return sight.join((), np.inf, lambda one: sight.tell(one, PointKind.LENGTH, rows @ one.instance.transform, np.inf))
+    if not gbuffer.camera.projection[3, :3].any():
+        return distance(gbuffer)
+    rows = gbuffer.camera.view[:3]
+    return gbuffer.join((), np.inf, lambda one: gbuffer.evaluate(one, PointKind.LENGTH, rows @ one.place, np.inf))
 
 
-def triangle(sight: Sight) -> Array:
+def triangle(gbuffer: GBuffer) -> Array:
     """Index of the triangle in its mesh, (H, W) int32, -1 where nothing is."""
-    return sight.frags.triangle
+    return gbuffer.frags.triangle
 
 
-def instance(sight: Sight) -> Array:
+def instance(gbuffer: GBuffer) -> Array:
     """Index of the instance, (H, W) int32, -1 where nothing is."""
-    return sight.frags.instance
+    return gbuffer.frags.instance
 
 
-def barycentric(sight: Sight) -> Array:
+def barycentric(gbuffer: GBuffer) -> Array:
     """Weights of the triangle's vertices, (H, W, 3) float32, 0 where nothing is."""
-    return sight.frags.barycentric()
+    return gbuffer.frags.barycentric()
 
 
-def world_position(sight: Sight) -> Array:
+def world_position(gbuffer: GBuffer) -> Array:
     """The point of the surface, (H, W, 3) float32, NaN where nothing is."""
-    return sight.join((3,), np.nan, lambda one: sight.tell(one, PointKind.ROWS, one.instance.transform[:3], np.nan))
+    return gbuffer.join((3,), np.nan, lambda one: gbuffer.evaluate(one, PointKind.ROWS, one.place[:3], np.nan))
 
 
-def camera_normal(sight: Sight) -> Array:
+def camera_normal(gbuffer: GBuffer) -> Array:
     """Unit normal in eye space, (H, W, 3) float32, 0 where nothing is."""
-    return sight.join((3,), 0.0, lambda surface: normals_of(sight, surface, np.eye(3)))
+    return gbuffer.join((3,), 0.0, lambda visible: normals_of(gbuffer, visible, np.eye(3)))
 
 
-def world_normal(sight: Sight) -> Array:
+def world_normal(gbuffer: GBuffer) -> Array:
     """Unit normal in the world, (H, W, 3) float32, 0 where nothing is."""
-    back = sight.camera.view[:3, :3].T  # the transpose, where positions take the inverse
-    return sight.join((3,), 0.0, lambda surface: normals_of(sight, surface, back))
+    back = gbuffer.camera.view[:3, :3].T  # the transpose, where positions take the inverse
+    return gbuffer.join((3,), 0.0, lambda visible: normals_of(gbuffer, visible, back))
 
 
-def normals_of(sight: Sight, surface: Surface, turn: F64) -> npt.NDArray[np.float32]:
-    """Unit normals (H, W, 3) of a surface, from eye space by the matrix (3, 3) `turn`, on the side that is seen."""
-    own = camera_of(sight.camera, surface.instance).straightened()
-    return shade_normals(*surface.drawn, own, turn, threads=sight.options.get("threads"))
+def normals_of(gbuffer: GBuffer, visible: VisiblePart, turn: F64) -> npt.NDArray[np.float32]:
+    """Unit normals (H, W, 3) of a part, from eye space by the matrix (3, 3) `turn`, on the side that is seen."""
+    own = camera_of(gbuffer.camera, visible.instance).straightened()
+    return shade_normals(*visible.drawn, own, turn, threads=gbuffer.options.get("threads"))
 
 
-def uv(sight: Sight) -> Array:
+def uv(gbuffer: GBuffer) -> Array:
     """Texture coordinates, (H, W, 2) float32, NaN where nothing is or a mesh has none."""
-    if all(getattr(instance.mesh, "uv", None) is None for instance in sight.instances):
+    if all(getattr(instance.mesh, "uv", None) is None for instance in gbuffer.instances):
         raise ValueError("layer 'uv' needs a mesh that has texture coordinates")
 
-    def make(surface: Surface) -> Array:
-        coordinates = getattr(surface.instance.mesh, "uv", None)
+    def make(visible: VisiblePart) -> Array:
+        coordinates = getattr(visible.instance.mesh, "uv", None)
         if coordinates is None:
-            return np.full((*surface.seen.shape, 2), np.nan, np.float32)
-        return surface.part.frags.interpolate(coordinates, background=np.nan)
+            return np.full((*visible.seen.shape, 2), np.nan, np.float32)
+        return visible.part.frags.interpolate(coordinates, background=np.nan)
 
-    return sight.join((2,), np.nan, make)
+    return gbuffer.join((2,), np.nan, make)
 
 
-def flow(sight: Sight) -> Array:
+def flow(gbuffer: GBuffer) -> Array:
     """Where the point of each pixel moves to in the picture, (H, W, 2) float32 pixels, NaN where nothing is."""
-    if sight.camera_to is None and sight.transforms_to is None:
+    if gbuffer.camera_to is None and gbuffer.transforms_to is None:
         raise ValueError("layer 'flow' needs camera_to or transforms_to")
-    begin, end, size = sight.camera, sight.camera_to or sight.camera, sight.size
+    begin, end, size = gbuffer.camera, gbuffer.camera_to or gbuffer.camera, gbuffer.size
 
-    def make(surface: Surface) -> Array:
-        here = surface.instance.transform
-        there = here if sight.transforms_to is None else sight.transforms_to[surface.part.instance]
+    def make(visible: VisiblePart) -> Array:
+        here = visible.place
+        there = here if gbuffer.transforms_to is None else gbuffer.transforms_to[visible.part.instance]
         if begin.lens is None and end.lens is None:
             ways = [camera.clip_from_eye(size) @ camera.view @ at for camera, at in ((begin, here), (end, there))]
             rows = np.concatenate([way[[0, 1, 3]] for way in ways])
-            return sight.tell(surface, PointKind.FLOW, rows, np.nan, size=size)
-        picture = np.full((*surface.seen.shape, 2), np.nan, np.float32)
-        points = surface.points
-        picture[surface.seen] = project(points, end, there, size) - project(points, begin, here, size)
+            return gbuffer.evaluate(visible, PointKind.FLOW, rows, np.nan, size=size)
+        picture = np.full((*visible.seen.shape, 2), np.nan, np.float32)
+        points = visible.points
+        picture[visible.seen] = project(points, end, there, size) - project(points, begin, here, size)
         return picture
 
-    return sight.join((2,), np.nan, make)
+    return gbuffer.join((2,), np.nan, make)
 
 
-LAYERS: Mapping[str, Callable[[Sight], Array]] = MappingProxyType({
+LAYERS: Mapping[str, Callable[[GBuffer], Array]] = MappingProxyType({
     layer.__name__: layer
     for layer in (
         color, alpha, silhouette, depth, distance, ray_distance, triangle, instance, barycentric, world_position,
@@ -171,16 +171,16 @@ def check_layers(names: str | Iterable[str]) -> tuple[str, ...]:
     return checked
 
 
-def draw_layers(names: str | Iterable[str], sight: Sight) -> dict[str, Array]:
+def draw_layers(names: str | Iterable[str], gbuffer: GBuffer) -> dict[str, Array]:
     """Return arrays by name, in the order asked for.
 
     Raises
     ------
     ValueError
-        If there is no such layer, or one cannot be had of this sight.
+        If there is no such layer, or one cannot be had of this gbuffer.
     """
     checked = check_layers(names)
     # Colours first: in memory that is kept they may need other samples than the visibility buffer of all others.
-    drawn = {name: LAYERS[name](sight) for name in sorted(checked, key=lambda name: name != "color")}
+    drawn = {name: LAYERS[name](gbuffer) for name in sorted(checked, key=lambda name: name != "color")}
     return {name: drawn[name] for name in checked}
 

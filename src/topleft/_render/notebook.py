@@ -13,10 +13,10 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image
 
+from topleft._base.color import id_colors
 from topleft._model.mesh import Mesh
 from topleft._raster.fragments import Fragments
 from topleft._render.render import render
-from topleft._shade.shade import id_colors
 
 MESH_SIZE = (480, 360)
 MAX_SIDE_PX = 1024

@@ -7,17 +7,16 @@ Input: `Mesh` or `Scene`, `Camera`. Output: the picture (H, W, 4) uint8 of `rend
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, NamedTuple, Unpack
+from typing import Any, Unpack
 
 import numpy as np
 import numpy.typing as npt
 from numpy.typing import ArrayLike, NDArray
 
-from topleft._base.color import DEFAULT_COLOR, as_color
+from topleft._base.color import DEFAULT_COLOR
 from topleft._camera.camera import Camera
 from topleft._lod.detail import detailed
 from topleft._model.adapt import MeshLike, as_mesh
-from topleft._model.material import Material
 from topleft._model.mesh import Mesh
 from topleft._model.scene import Instance, Scene
 from topleft._raster import choices
@@ -25,15 +24,11 @@ from topleft._raster.clusters import Clusters
 from topleft._raster.fragments import Fragments
 from topleft._raster.verbs import Rasterizer, rasterize, wireframe
 from topleft._raster.view import View
-from topleft._render.bend import BentMesh, bend
-from topleft._render.scene_cutout import cut_out_scene
-from topleft._render.scene_fragments import BentFragments
-from topleft._render.scene_lens import draw_seen
-from topleft._render.scene_render import camera_of, cull_of, shade_scene
-from topleft._shade.cutout import cut_out
-from topleft._shade.eye import distances
-from topleft._shade.multisample import shade_samples
-from topleft._shade.shade import LookOptions, Shading, shade
+from topleft._render.fragments import BentFragments
+from topleft._render.holes import without_holes
+from topleft._render.scene_shade import camera_of, cull_of, shade
+from topleft._render.through_lens import draw_seen, seen_through
+from topleft._shade.shade import LookOptions
 
 DEFAULT_SIZE = (640, 480)
 WHITE = (255, 255, 255, 255)
@@ -67,7 +62,7 @@ def render(
     size : (width, height), pixels
         640 x 480 unless given.
     shading : {"smooth", "flat", "unlit", "matcap", "ids", "depth", "normals"}
-        What the colours tell; `topleft.shade.shade` describes each.
+        What the colours tell; `topleft.shade` describes each.
     color : (3,) of 0 to 255
         sRGB colour of a mesh without colours.
     background : (3,) or (4,) of 0 to 255
@@ -88,7 +83,7 @@ def render(
     rasterizer : Rasterizer, optional
         Of this size: what is needed on the way lies in the memory that it keeps.
     **look
-        `lights`, `ambient`, `material`, `matcap` and `fog` of `topleft.shade.shade`.
+        `lights`, `ambient`, `material`, `matcap` and `fog` of `topleft.shade`.
 
     Returns
     -------
@@ -136,53 +131,12 @@ def picture_of(
 
     What materials cut out is taken out of the buffer.
     """
-    options: dict[str, Any] = {"shading": shading, "color": color, "threads": threads, **look}
-    options["background"] = as_color("background", background, 4)
-    make = picture_of_scene if isinstance(mesh, Scene) else picture_of_mesh
-    picture = make(frags, mesh, camera, options)  # type: ignore[arg-type]
+    frags = without_holes(frags, mesh, camera, look.get("material"), threads=threads)
+    picture = shade(frags, mesh, camera, shading=shading, color=color, background=background, threads=threads, **look)
     for instance in (mesh if isinstance(mesh, Scene) else [Instance(mesh)]) if edges else []:
         own_camera, own_cull = camera_of(camera, instance), cull_of(cull, instance)
         draw_edges(picture, frags, instance.mesh, own_camera, cull=own_cull, threads=threads)
     return picture
-
-
-def picture_of_mesh(
-    frags: Fragments, mesh: Mesh, camera: Camera, options: dict[str, Any]
-) -> npt.NDArray[np.uint8]:
-    """The picture of a mesh's visibility buffer, without what its materials cut out; options as `shade` takes them."""
-    shown, surface, view = frags, mesh, camera
-    if isinstance(frags, BentFragments):  # the kernels read what was drawn, triangle by triangle
-        shown, surface, view = frags.parts, frags.mesh_of_parts(mesh), camera.straightened()
-    cut_out(shown, surface, view, options.get("material"), threads=options["threads"])
-    if isinstance(frags, BentFragments) and options["shading"] in (Shading.IDS, Shading.DEPTH):
-        shown, surface = frags.again(), mesh
-    return shade(shown, surface, view, **options)
-
-
-def without_holes(frags: Fragments, mesh: Mesh | Scene, camera: Camera, material: Material | None) -> Fragments:
-    """The visibility buffer without what materials (or this one) cut out; `frags` is changed."""
-    if isinstance(mesh, Scene):
-        return cut_out_scene(frags, mesh, camera, material)
-    if not isinstance(frags, BentFragments):
-        cut_out(frags, mesh, camera, material)
-        return frags
-    cut_out(frags.parts, frags.mesh_of_parts(mesh), camera.straightened(), material)
-    return frags.again()
-
-
-def picture_of_scene(
-    frags: Fragments, scene: Scene, camera: Camera, options: dict[str, Any]
-) -> npt.NDArray[np.uint8]:
-    """The picture of a scene's visibility buffer, without what materials cut out; options as `shade` takes them."""
-    frags = cut_out_scene(frags, scene, camera, options.get("material"), threads=options["threads"])
-    if options["shading"] == Shading.DEPTH:
-        options = {"depth_range": distances(frags, camera)} | options
-
-    def shade_one(sample: Fragments) -> npt.NDArray[np.uint8]:
-        return shade_scene(sample, scene, camera, **options)
-
-    has_samples = frags.samples_depth.shape[-1] > 1
-    return shade_samples(frags, shade_one, options["background"]) if has_samples else shade_one(frags)
 
 
 def rasterize_mesh(
@@ -242,23 +196,6 @@ def rasterize_mesh(
         return frags
     bent = drawn.bent
     return BentFragments(frags, bent.triangles, bent.source, bent.weights, mesh.triangles, len(mesh.vertices))
-
-
-class Drawn(NamedTuple):
-    """What the verbs draw of a mesh."""
-
-    vertices: npt.NDArray[Any]
-    triangles: npt.NDArray[np.integer[Any]]
-    transform: npt.NDArray[np.float64]
-    bent: BentMesh | None
-
-
-def seen_through(mesh: Mesh, camera: Camera, frame: tuple[int, int], *, near_clip: bool = True) -> Drawn:
-    """The mesh as it is, and the camera's matrix for a whole picture of this size; or as the camera's lens bends it."""
-    if camera.lens is None:
-        return Drawn(mesh.vertices, mesh.triangles, camera.clip_from_world(frame), None)
-    bent = bend(mesh.vertices, mesh.triangles, camera, camera.lens, frame, near_clip=near_clip)
-    return Drawn(bent.points_eye, bent.triangles, camera.clip_from_eye(frame), bent)
 
 
 def draw_edges(

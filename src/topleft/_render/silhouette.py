@@ -14,9 +14,9 @@ from topleft._lod.detail import detailed
 from topleft._model.adapt import MeshLike, as_mesh
 from topleft._model.scene import Scene
 from topleft._raster.verbs import coverage
-from topleft._render.render import DEFAULT_SIZE, default_camera, seen_through
-from topleft._render.scene_draw import draw_scene_coverage
-from topleft._render.scene_lens import scene_through
+from topleft._render.instances import draw_scene_coverage
+from topleft._render.render import DEFAULT_SIZE, default_camera
+from topleft._render.through_lens import scene_through, seen_through
 
 __all__ = ["silhouette"]
 

@@ -18,13 +18,12 @@ from topleft._model.material import Material
 from topleft._model.scene import Scene
 from topleft._raster.composite import composite
 from topleft._raster.peel import DepthLayers, peel
+from topleft._render.fragments import SceneDepthLayers
+from topleft._render.holes import cuts_of, draw_cuts, solid_scene, surfaces_of
+from topleft._render.instances import peel_scene
 from topleft._render.render import DEFAULT_SIZE, WHITE, default_camera
-from topleft._render.scene_cutout import cuts_of, draw_cuts, solid_scene, surfaces_of
-from topleft._render.scene_draw import peel_scene
-from topleft._render.scene_fragments import SceneDepthLayers
-from topleft._render.scene_render import shade_scene
-from topleft._shade.cutout import cut_of
-from topleft._shade.shade import shade
+from topleft._render.scene_shade import shade
+from topleft._shade.alpha_test import cut_of
 
 __all__ = ["render_transparent", "visible_layers"]
 
@@ -94,10 +93,7 @@ def render_transparent(
         frags = found.layer(k)
         if not frags.mask.any():
             break
-        if isinstance(mesh, Scene):
-            own = shade_scene(frags, mesh, camera, shading=shading, background=CLEAR, **look)
-        else:
-            own = shade(frags, mesh, camera, shading=shading, background=CLEAR, **look)
+        own = shade(frags, mesh, camera, shading=shading, background=CLEAR, **look)
         pictures[:, :, k] = own[..., :3]
     picture: npt.NDArray[np.uint8] = composite(found, pictures, opacity=opacity, background=ground, threads=threads)
     return picture

@@ -19,12 +19,12 @@ from topleft._lod.detail import detailed
 from topleft._model.adapt import MeshLike, as_mesh
 from topleft._model.scene import Scene
 from topleft._raster.verbs import Rasterizer
+from topleft._render.gbuffer import GBuffer
 from topleft._render.layers import LAYERS, check_layers, draw_layers
 from topleft._render.render import DEFAULT_SIZE, default_camera
-from topleft._render.sight import Sight
 from topleft._shade.shade import LookOptions
 
-__all__ = ["ViewLayers", "render_layers", "sight_of"]
+__all__ = ["ViewLayers", "gbuffer_of", "render_layers"]
 
 Array = npt.NDArray[Any]
 F64 = npt.NDArray[np.float64]
@@ -169,19 +169,19 @@ def render_layers(
         raise TypeError(f"option {option!r} is for layer 'color', which is not among {', '.join(names)}")
     if attributes and tolerance:
         raise ValueError("attributes are those of the mesh's own vertices, which a tolerance may leave out")
-    sight = sight_of(
+    gbuffer = gbuffer_of(
         mesh, camera, size, camera_to=camera_to, transforms_to=transforms_to, cull=cull,
         tolerance=tolerance, threads=threads, rasterizer=rasterizer, **look,
     )  # fmt: skip
-    found = draw_layers(names, sight)
+    found = draw_layers(names, gbuffer)
     for name, values in (attributes or {}).items():
         if name in LAYERS:
             raise ValueError(f"attributes must not have the name of a layer, got {name!r}")
-        found[name] = sight.frags.interpolate(values, background=np.nan)
+        found[name] = gbuffer.frags.interpolate(values, background=np.nan)
     return ViewLayers(found)
 
 
-def sight_of(
+def gbuffer_of(
     mesh: MeshLike | Scene,
     camera: Camera | None,
     size: tuple[int, int],
@@ -193,7 +193,7 @@ def sight_of(
     threads: int | None = None,
     rasterizer: Rasterizer | None = None,
     **look: Any,
-) -> Sight:
+) -> GBuffer:
     """Return what layers are taken of; arguments as for `render_layers`.
 
     Raises
@@ -208,7 +208,7 @@ def sight_of(
     subject = mesh if isinstance(mesh, Scene) else as_mesh(mesh)
     n_instances = len(subject) if isinstance(subject, Scene) else 1
     camera = default_camera(subject, size) if camera is None else camera
-    return Sight(
+    return GBuffer(
         subject=detailed(subject, camera, size, tolerance, cull=cull, material=look.get("material")),
         camera=camera,
         size=size,

@@ -1,13 +1,17 @@
-"""Looks: materials, lights and a camera as numbers for the shading kernels.
+"""Prepares what the shading kernels read: materials, lights and a camera as numbers, a mesh as rows of float32.
 
-Input: a mesh, its materials, lights and a camera. Output: `Look`, which fills `_engine.Shading`.
+Input: a mesh, its materials, lights, a camera and the size of the whole picture. Output: `ShadingInputs`, which fills
+`_engine.Shading`.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import numpy.typing as npt
@@ -18,18 +22,166 @@ from topleft._camera.camera import Camera
 from topleft._model.light import TO_HEADLIGHT, Fog, Light, LightKind, LightSpace
 from topleft._model.material import Material
 from topleft._model.mesh import Mesh
+from topleft._model.normals import box_of_triangles, color_rows, face_normal_rows, moved, turned_faces, unit_rows
 from topleft._model.texture import Texture
-from topleft._shade.frame import frame_of, is_similarity
-from topleft._shade.surface import Surface, surface_of
+
+__all__ = ["CameraRays", "ShadingInputs", "ShadingMesh", "is_similarity", "turn_of_normals"]
+
+F32 = npt.NDArray[np.float32]
+F64 = npt.NDArray[np.float64]
 
 LIGHT_CODES = {LightKind.DIRECTIONAL: 0, LightKind.POINT: 1}  # tl_light_kind in csrc/shading.h
 WRAPPED_LIGHT = 2
 
 
-F64 = npt.NDArray[np.float64]
+@dataclass(frozen=True, eq=False)
+class CameraRays:
+    """What `tl_shading` in csrc/shading.h tells of the camera, in a shading space whose origin is at `center`.
+
+    Attributes
+    ----------
+    eye : (3,) float64
+        Where the camera is; without perspective the unit vector to it.
+    ray : (4, 3) float64
+        The ray of pixel position (0, 0), what it gains per column and per row, and, without perspective, along the
+        depth.
+    eye_from, origin : (3, 3) and (3,) float64
+        Eye space from shading space: `eye_from @ p + origin` but for a scale.
+    scale : float
+        How many units of eye space one of the shading space is.
+    distance_start, distance_scale : float
+        The distance along the view: `start + scale * w`, or `start + scale * depth` without perspective.
+    """
+
+    has_perspective: bool
+    eye: F64
+    ray: F64
+    eye_from: F64
+    origin: F64
+    scale: float
+    distance_start: float
+    distance_scale: float
 
 
-class Look:
+def is_similarity(view: F64) -> bool:
+    """Whether a matrix (4, 4) keeps angles and does not mirror, so that light may be computed before it."""
+    rows = view[:3, :3].tolist()
+    (a, b, c), (d, e, f), (g, h, i) = rows
+    squares = a * a + b * b + c * c, d * d + e * e + f * f, g * g + h * h + i * i
+    products = a * d + b * e + c * f, a * g + b * h + c * i, d * g + e * h + f * i
+    scale = sum(squares) / 3
+    error = max(map(abs, (*products, *(square - scale for square in squares))))
+    return determinant(rows) > 0 and error <= 1e-9 * scale
+
+
+def rays_of(camera: Camera, size: tuple[int, int], center: F64, *, in_eye_space: bool) -> CameraRays:
+    """How the camera sees shading space: the world, or its own eye space, moved so that `center` is the origin."""
+    view = np.eye(4) if in_eye_space else camera.view
+    clip = camera.clip_from_eye(size) @ view
+    width, height = size
+    has_perspective = bool(clip[3, :3].any())
+    rows = clip[[0, 1, 3 if has_perspective else 2]]
+    world_from_rows = np.linalg.inv(rows[:, :3])
+    offset = world_from_rows @ rows[:, 3]
+    # the corner, one column, one row and the whole depth, of clip space
+    ends = [[-1, 1, 1 if has_perspective else -1], [2 / width, 0, 0], [0, -2 / height, 0], [0, 0, 2]]
+    ray = np.array(ends) @ world_from_rows.T
+    if has_perspective:
+        eye = -offset - center
+        start, scale = 0.0, 1.0 / -float(camera.projection[3, 2])
+    else:
+        ray[0] -= offset + center
+        eye = -ray[3] / np.linalg.norm(ray[3])
+        (a, b), (c, d) = camera.projection[2:, 2:]
+        near, far = ((ndc * d - b) / (ndc * c - a) for ndc in (-1.0, 1.0))
+        start, scale = near, far - near
+    size_of_unit = math.cbrt(determinant(view[:3, :3].tolist()))
+    linear = view[:3, :3]
+    origin = linear @ center + view[:3, 3]
+    return CameraRays(has_perspective, eye, ray, linear / size_of_unit, origin, size_of_unit, start, scale)
+
+
+def determinant(rows: list[list[float]]) -> float:
+    """Of a matrix (3, 3): NumPy's takes ten times as long for one."""
+    (a, b, c), (d, e, f), (g, h, i) = rows
+    return a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
+
+
+def turn_of_normals(view: F64) -> F64:
+    """The matrix (3, 3) that takes rows of normals to eye space, but for their lengths: the inverse of that of points.
+
+    Its numbers are sums of products, the same on every machine.
+    """
+    rows = view[:3, :3].tolist()
+    (a, b, c), (d, e, f), (g, h, i) = rows
+    adjugate = [
+        [e * i - f * h, c * h - b * i, b * f - c * e],
+        [f * g - d * i, a * i - c * g, c * d - a * f],
+        [d * h - e * g, b * g - a * h, a * e - b * d],
+    ]
+    return np.array(adjugate) * math.copysign(1.0, determinant(rows))
+
+
+class ShadingMesh:
+    """What shading needs of a mesh, each part made when it is first asked for.
+
+    Attributes
+    ----------
+    positions : (V, 3) float
+        As in the mesh, or in eye space.
+    center : (3,) float64
+        The middle of the mesh: the origin of the space that light is computed in, so that float32 is fine enough.
+    """
+
+    def __init__(self, mesh: Mesh, view: F64 | None = None) -> None:
+        """`view`: (4, 4), takes the mesh to eye space first."""
+        self._triangles = mesh.triangles
+        # The method would hold the mesh, which is the key of `_shading_meshes`.
+        self._vertex_normals = mesh.vertex_normals()
+        self._colors = mesh.colors
+        self._view = view
+        self.positions = mesh.vertices if view is None else moved(mesh.vertices, view)
+
+    @cached_property
+    def center(self) -> F64:
+        """The middle of the box round the vertices in use."""
+        low, high = box_of_triangles(self.positions, self._triangles).astype(self.positions.dtype)
+        return np.asarray(low / 2 + high / 2, np.float64)
+
+    @cached_property
+    def normals(self) -> F32:
+        """(V, 4): unit normals, 0 where there is none, and 1."""
+        return unit_rows(self._vertex_normals, None if self._view is None else turn_of_normals(self._view))
+
+    @cached_property
+    def face_normals(self) -> F32:
+        """(T, 4): unit normals of the triangles, on the side from which they run counter-clockwise, and 1."""
+        return face_normal_rows(self.positions, self._triangles)
+
+    @cached_property
+    def is_turned(self) -> npt.NDArray[np.uint8] | None:
+        """(T,): 1 where the normals of the corners point to the other side than the triangle; None if none does."""
+        turned = turned_faces(self.positions, self._triangles, self.normals)
+        return turned if turned.view(np.bool_).any() else None
+
+    @cached_property
+    def colors(self) -> F32 | None:
+        """(V, 4): sRGB of the vertices, 0 to 255, and 1; None if they have none."""
+        return None if self._colors is None else color_rows(self._colors)
+
+
+_shading_meshes: WeakKeyDictionary[Mesh, ShadingMesh] = WeakKeyDictionary()
+
+
+def shading_mesh_of(mesh: Mesh) -> ShadingMesh:
+    """The shading_mesh of a mesh in its own space, made once."""
+    shading_mesh = _shading_meshes.get(mesh)
+    if shading_mesh is None:
+        shading_mesh = _shading_meshes[mesh] = ShadingMesh(mesh)
+    return shading_mesh
+
+
+class ShadingInputs:
     """The numbers of one picture, as the kernels read them."""
 
     def __init__(
@@ -43,24 +195,24 @@ class Look:
         is_flat: bool,
     ) -> None:
         in_eye_space = not is_similarity(camera.view)
-        self.surface = Surface(mesh, camera.view) if in_eye_space else surface_of(mesh)
+        self.mesh = ShadingMesh(mesh, camera.view) if in_eye_space else shading_mesh_of(mesh)
         viewport = size if scene.view is None else scene.view.viewport
-        self.frame = frame_of(camera, viewport, self.surface.center, in_eye_space=in_eye_space)
+        self.rays = rays_of(camera, viewport, self.mesh.center, in_eye_space=in_eye_space)
         self.view = camera.view
         self.back_side = -1.0 if np.linalg.det(camera.view[:3, :3]) > 0 else 1.0
         self.is_in_eye_space = in_eye_space
         self.uv = mesh.uv
-        normals = self.surface.normals
-        if scene.view is not None and self.frame.has_perspective:
+        normals = self.mesh.normals
+        if scene.view is not None and self.rays.has_perspective:
             normals = np.empty_like(normals)
-            _engine.set_inverse_w(scene, self.surface.normals, normals)
+            _engine.set_inverse_w(scene, self.mesh.normals, normals)
         self.shading = _engine.Shading(
             normals,
-            self.surface.face_normals if is_flat else None,
-            self.surface.positions,
-            None if is_flat else self.surface.is_turned,
+            self.mesh.face_normals if is_flat else None,
+            self.mesh.positions,
+            None if is_flat else self.mesh.is_turned,
             mesh.uv,
-            self.surface.colors,
+            self.mesh.colors,
             material_of,
             LIGHT_OF_SRGB,
         )
@@ -85,44 +237,44 @@ class Look:
     def set_lights(self, lights: Sequence[Light] | None, ambient: float) -> None:
         """Take the lights, in shading space."""
         if lights is None:
-            at = self.frame.eye_from.T @ TO_HEADLIGHT
+            at = self.rays.eye_from.T @ TO_HEADLIGHT
             rows: list[tuple[Any, ...]] = [(WRAPPED_LIGHT, at, (max(0.0, 1 - ambient),) * 3, 0.0)]
         else:
             rows = [self._light(light) for light in lights]
         self.shading.set_lights(rows, (ambient,) * 3)
 
     def _light(self, light: Light) -> tuple[Any, ...]:
-        frame, at = self.frame, np.array(light.at)
+        rays, at = self.rays, np.array(light.at)
         in_eye_space = light.space is LightSpace.EYE
         if light.kind is LightKind.DIRECTIONAL:
             if in_eye_space or self.is_in_eye_space:
                 at = at if in_eye_space else self.view[:3, :3] @ at
-                at = frame.eye_from.T @ at
+                at = rays.eye_from.T @ at
             at = at / np.linalg.norm(at)
         elif in_eye_space:
-            at = frame.eye_from.T @ (at - frame.origin) / frame.scale
+            at = rays.eye_from.T @ (at - rays.origin) / rays.scale
         else:
-            at = (self.view[:3, :3] @ at + self.view[:3, 3] if self.is_in_eye_space else at) - self.surface.center
+            at = (self.view[:3, :3] @ at + self.view[:3, 3] if self.is_in_eye_space else at) - self.mesh.center
         rgb = light_of(light.color)[:3]
         return LIGHT_CODES[LightKind(light.kind)], at, tuple(light.intensity * c for c in rgb), light.falloff
 
     def set_view(self, show: int, matcap: Texture | None, background: Color) -> None:
         """Take what the picture tells, and its background."""
-        frame = self.frame
+        rays = self.rays
         engine = None if matcap is None else replace(matcap, filter="bilinear", wrap="clamp").engine
-        eyes = frame.eye_from.tolist(), frame.has_perspective, frame.eye.tolist(), frame.ray.tolist()
+        eyes = rays.eye_from.tolist(), rays.has_perspective, rays.eye.tolist(), rays.ray.tolist()
         self.shading.set_view(show, engine, *eyes, light_of(background), background)
 
     def set_turn(self, show: int, turn: F64) -> None:
         """Take what is told, in a space that the matrix (3, 3) takes eye space to."""
-        frame = self.frame
-        rows = (turn @ frame.eye_from).tolist()
-        eyes = rows, frame.has_perspective, frame.eye.tolist(), frame.ray.tolist()
+        rays = self.rays
+        rows = (turn @ rays.eye_from).tolist()
+        eyes = rows, rays.has_perspective, rays.eye.tolist(), rays.ray.tolist()
         self.shading.set_view(show, None, *eyes, (0, 0, 0, 0), (0, 0, 0, 0))
 
     def set_fog(self, fog: Fog | None) -> None:
         """Take the depth cue, if there is one."""
         if fog is not None:
-            frame = self.frame
+            rays = self.rays
             scale = 1 / (fog.far - fog.near)
-            self.shading.set_fog(light_of(fog.color), fog.near, scale, frame.distance_start, frame.distance_scale)
+            self.shading.set_fog(light_of(fog.color), fog.near, scale, rays.distance_start, rays.distance_scale)

@@ -12,7 +12,8 @@ Pictures", SIGGRAPH 1977 (highlights).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from enum import StrEnum
 from typing import TypedDict
 
@@ -20,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft import _engine
-from topleft._base.color import DEFAULT_COLOR, Color, as_color, id_colors
+from topleft._base.color import LINEAR_ONE, Color, as_color, id_colors, srgb_tables
 from topleft._base.options import parse
 from topleft._base.threads import count_threads, parse_threads, run_parts
 from topleft._camera.camera import Camera
@@ -30,12 +31,9 @@ from topleft._model.mesh import Mesh
 from topleft._model.texture import Texture
 from topleft._raster.fragments import Fragments
 from topleft._raster.sampling import sample_positions
-from topleft._render.scene_fragments import BentFragments
-from topleft._shade.eye import distances, eye_distance
-from topleft._shade.look import Look
-from topleft._shade.multisample import shade_samples
+from topleft._shade.look import ShadingInputs
 
-__all__ = ["DEFAULT_COLOR", "LookOptions", "Shading", "as_color", "eye_distance", "id_colors", "shade"]
+__all__ = ["LookOptions", "Shading", "ShadingOptions", "picture_of_numbers", "shade_mesh", "shade_numbers"]
 
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
@@ -69,103 +67,76 @@ class LookOptions(TypedDict, total=False):
     fog: Fog | None
 
 
-def shade(
-    frags: Fragments,
-    mesh: Mesh,
-    camera: Camera,
-    *,
-    shading: str = "smooth",
-    color: Color = DEFAULT_COLOR,
-    background: Color = (255, 255, 255, 255),
-    depth_range: tuple[float, float] | None = None,
-    lights: Sequence[Light] | None = None,
-    ambient: float | None = None,
-    material: Material | None = None,
-    matcap: Texture | None = None,
-    fog: Fog | None = None,
-    threads: int | None = None,
-) -> U8:
-    """The picture (H, W, 4) uint8 of a visibility buffer: sRGB, alpha 255 where a triangle shows.
+@dataclass(frozen=True, eq=False)
+class ShadingOptions:
+    """The options of `topleft.shade`, checked."""
 
-    Parameters
-    ----------
-    frags : Fragments
-        What `rasterize` returned for the mesh. With several samples a pixel a triangle is shaded once in a pixel, at
-        the first of the samples that see it, and the picture is the mean of the light of the samples.
-    mesh : Mesh
-        Its materials, and its colours, are used if it has any.
-    camera : Camera
-        The camera of `frags`.
-    shading : {"smooth", "flat", "unlit", "matcap", "ids", "depth", "normals"}
-        "smooth": interpolated vertex normals, lit in the pixel. "flat": the same with the normals of the faces. Both
-        light the side that is seen, whichever it is. "unlit": colours and textures as they are. "matcap": the colour
-        that `matcap` has for the normal. "ids": a colour for each triangle. "depth": grey, bright is near, over a range
-        of distances. "normals": the smooth normal in eye space, x, y, z from -1..1 as red, green, blue; what
-        faces the viewer is light blue.
-    color : (3,) of 0 to 255
-        sRGB colour of a mesh without colours and materials.
-    background : (4,) of 0 to 255
-        sRGB and alpha where nothing shows.
-    depth_range : (float, float), optional
-        Distances along the view that are the brightest and the darkest grey of "depth", world units; unless given,
-        those of the picture.
-    lights : sequence of Light, optional
-        Lambert's cosine for each of them. Unless given: one headlight over the viewer's left shoulder, whose light
-        wraps round the mesh.
-    ambient : float, optional
-        Light from all sides, not negative, 0.03 unless given.
-    material : Material, optional
-        For all triangles, instead of those of the mesh.
-    matcap : Texture, optional
-        A picture of a lit sphere, for "matcap". It is clamped, so the rim holds where normals turn away.
-    fog : Fog, optional
-        The depth cue.
-    threads : int, optional
-        How many threads shade; never changes a bit.
+    mode: Shading
+    color: Color
+    background: Color
+    depth_range: tuple[float, float] | None
+    lights: Sequence[Light] | None
+    ambient: float
+    material: Material | None
+    matcap: Texture | None
+    fog: Fog | None
+    threads: int | None
 
-    Raises
-    ------
-    ValueError
-        If the mesh has other numbers of vertices or triangles than what was drawn, `shading` is unknown, a colour is
-        none, a number is outside its range, or "matcap" has no matcap.
-    TypeError
-        If `frags`, the mesh, a light, material or texture is none.
+    @classmethod
+    def parse(
+        cls,
+        shading: str,
+        color: Color,
+        background: Color,
+        depth_range: tuple[float, float] | None,
+        lights: Sequence[Light] | None,
+        ambient: float | None,
+        material: Material | None,
+        matcap: Texture | None,
+        fog: Fog | None,
+        threads: int | None,
+    ) -> ShadingOptions:
+        """Check the options of a call."""
+        mode = parse(Shading, "shading", shading)
+        _check_types(lights=(lights or ()), material=material, matcap=matcap, fog=fog)
+        if mode is Shading.MATCAP and matcap is None:
+            raise ValueError("matcap must be a Texture for shading 'matcap', got None")
+        return cls(
+            mode,
+            as_color("color", color, 3),
+            as_color("background", background, 4),
+            depth_range,
+            lights,
+            AMBIENT if ambient is None else as_not_negative("ambient", ambient),
+            material,
+            matcap,
+            fog,
+            parse_threads(threads),
+        )
+
+
+def shade_mesh(frags: Fragments, mesh: Mesh, camera: Camera, options: ShadingOptions) -> U8:
+    """Shade the triangles that show, all samples of them: the picture (H, W, 4) uint8.
+
+    The kernel reads the mesh triangle by triangle, so it has to be the one that was drawn: of a lens its parts.
     """
-    _check_drawn(frags, mesh)
-    mode = parse(Shading, "shading", shading)
-    if isinstance(frags, BentFragments) and mode not in (Shading.IDS, Shading.DEPTH):
-        # The kernels read what was drawn, triangle by triangle.
-        mesh, camera, frags = frags.mesh_of_parts(mesh), camera.straightened(), frags.parts
-    own_color = as_color("color", color, 3)
-    behind = as_color("background", background, 4)
-    n_threads = count_threads(parse_threads(threads), len(mesh.triangles))
-    _check_types(lights=(lights or ()), material=material, matcap=matcap, fog=fog)
-    if mode is Shading.MATCAP and matcap is None:
-        raise ValueError("matcap must be a Texture for shading 'matcap', got None")
-    share = AMBIENT if ambient is None else as_not_negative("ambient", ambient)
-    n_samples = frags.samples_triangle.shape[-1]
-    if mode in (Shading.IDS, Shading.DEPTH) or not len(mesh.triangles) or 0 in frags.triangle.shape:
-        ends = depth_range or distances(frags, camera) if mode is Shading.DEPTH else None
-
-        def number_one(sample: Fragments) -> U8:
-            return picture_of_numbers(sample, camera, ends, behind)
-
-        return number_one(frags) if n_samples == 1 else shade_samples(frags, number_one, behind)
     picture = np.empty((*frags.triangle.shape, 4), dtype=np.uint8)
+    if not len(mesh.triangles) or 0 in frags.triangle.shape:
+        picture[...] = options.background
+        return picture
     scene = frags._scene
-    plain = Material(own_color if mesh.colors is None else None)
-    own = (material,) if material is not None else mesh.materials or (plain,)
+    plain = Material(options.color if mesh.colors is None else None)
+    own = (options.material,) if options.material is not None else mesh.materials or (plain,)
     rows = mesh.material_of_triangle if own is mesh.materials and len(own) > 1 else None
-    look = Look(scene, mesh, camera, picture.shape[1::-1], rows, is_flat=mode is Shading.FLAT)
-    look.set_materials(mesh, own, is_unlit=mode is Shading.UNLIT)
-    look.set_lights(lights, share)
-    look.set_view(SHOW_CODES.get(mode, 0), matcap, behind)
-    look.set_fog(fog)
+    look = ShadingInputs(scene, mesh, camera, picture.shape[1::-1], rows, is_flat=options.mode is Shading.FLAT)
+    look.set_materials(mesh, own, is_unlit=options.mode is Shading.UNLIT)
+    look.set_lights(options.lights, options.ambient)
+    look.set_view(SHOW_CODES.get(options.mode, 0), options.matcap, options.background)
+    look.set_fog(options.fog)
     planes = frags.samples_triangle.transpose(2, 0, 1), frags.samples_depth.transpose(2, 0, 1)
     kinds = np.int32, np.float32
     ids, depth = (np.require(array, kind, ["C", "A"]) for array, kind in zip(planes, kinds, strict=True))
-
-    positions = None if n_samples == 1 else sample_positions(n_samples, scene.subpixel_bits)
+    positions = None if len(ids) == 1 else sample_positions(len(ids), scene.subpixel_bits)
 
     def shade_rows(first: int, end: int) -> None:
         part = picture, first, end - first
@@ -174,8 +145,18 @@ def shade(
         else:
             _engine.shade_samples(scene, scene.view, look.shading, positions, ids, depth, *part)
 
-    run_parts(shade_rows, len(picture), n_threads)
+    run_parts(shade_rows, len(picture), count_threads(options.threads, len(mesh.triangles)))
     return picture
+
+
+def shade_numbers(frags: Fragments, camera: Camera, options: ShadingOptions) -> U8:
+    """Colour each triangle by its id, or by its distance: the picture (H, W, 4) uint8."""
+    ends = options.depth_range or distances(frags, camera) if options.mode is Shading.DEPTH else None
+
+    def picture_one(sample: Fragments) -> U8:
+        return picture_of_numbers(sample, camera, ends, options.background)
+
+    return shade_samples(frags, picture_one, options.background)
 
 
 def picture_of_numbers(
@@ -188,7 +169,7 @@ def picture_of_numbers(
     if not seen.any():
         return picture
     if depth_range is None:
-        picture[seen, :3] = id_colors(frags.triangle[seen])
+        picture[seen, :3] = id_colors(frags.id[seen])
     else:
         nearest, farthest = depth_range
         distance = eye_distance(frags.depth[seen], camera)
@@ -199,18 +180,95 @@ def picture_of_numbers(
     return picture
 
 
-def _check_drawn(frags: Fragments, mesh: Mesh) -> None:
-    """Raise an error unless the mesh can be the one that was drawn: the kernels index its arrays by the fragments."""
-    if not isinstance(frags, Fragments):
-        raise TypeError(f"frags must be Fragments, got {type(frags).__name__}")
-    if not isinstance(mesh, Mesh):
-        raise TypeError(f"mesh must be a Mesh, got {type(mesh).__name__}")
-    drawn, given = (frags._n_vertices, frags._n_triangles), (len(mesh.vertices), len(mesh.triangles))
-    if drawn != given:
-        raise ValueError(
-            f"mesh must be the one that was drawn, with {drawn[0]} vertices and {drawn[1]} triangles, "
-            f"got {given[0]} and {given[1]}"
-        )
+def eye_distance(depth: F32, camera: Camera) -> F64:
+    """Distance along the view, world units, of window depths in [0, 1]: `-z` in eye space."""
+    (a, b), (c, d) = camera.projection[2:, 2:]
+    ndc = 2.0 * depth.astype(np.float64) - 1
+    return (ndc * d - b) / (ndc * c - a)
+
+
+def distances(frags: Fragments, camera: Camera) -> tuple[float, float] | None:
+    """The least and the greatest distance along the view of what any sample shows; None where there is nothing."""
+    depth = frags.samples_depth[frags.samples_triangle >= 0]
+    if not depth.size:
+        return None
+    ends = eye_distance(np.array([depth.min(), depth.max()]), camera)
+    return float(ends[0]), float(ends[1])
+
+
+def shade_samples(frags: Fragments, shade_one: Callable[[Fragments], U8], background: tuple[int, ...]) -> U8:
+    """Return the mean colour of the samples, (H, W, 4) uint8: light is averaged, alpha as it is.
+
+    `shade_one` gives the picture of one sample; pixels whose triangle an earlier sample has shown are left out of it.
+    """
+    if frags.samples_depth.shape[-1] == 1:
+        return shade_one(frags)
+    ids = [frags.sample(k).id for k in range(frags.samples_depth.shape[-1])]
+    picture = shade_one(frags.sample(0))  # of the first sample; right wherever one triangle has all samples
+    is_split = np.zeros(ids[0].shape, np.bool_)
+    for other in ids[1:]:
+        is_split |= other != ids[0]
+    at = np.nonzero(is_split)
+    split = np.stack([own[at] for own in ids])  # (S, P)
+    decode, encode = srgb_tables()
+    light, alpha = np.zeros((split.shape[1], 3), np.int64), np.zeros(split.shape[1], np.int64)
+
+    def add(colors: U8, share: npt.NDArray[np.int64]) -> None:
+        weight = share * colors[:, 3]
+        light[...] += weight[:, None] * decode[colors[:, :3]]
+        alpha[...] += weight
+
+    ground = np.broadcast_to(np.array(background, np.uint8), (split.shape[1], 4))
+    add(ground, (split < 0).sum(0))
+    for k, own in enumerate(split):
+        is_new = (own >= 0) & (split[:k] != own).all(0)
+        share = (split == own).sum(0) * is_new
+        if k == 0:
+            add(picture[at], share)
+        elif is_new.any():
+            add(shade_one(frags.sample(k).only(at[0][is_new], at[1][is_new]))[at], share)
+    steps = (2 * light + alpha[:, None]) // np.maximum(2 * alpha, 1)[:, None]  # to nearest, of at most LINEAR_ONE
+    mean = np.empty((split.shape[1], 4), np.uint8)
+    mean[:, :3] = encode[np.minimum(steps, LINEAR_ONE)]
+    mean[:, 3] = np.rint(alpha / len(ids))  # exact sixteenths
+    picture[at] = mean
+    return picture
+
+
+def shade_normals(
+    frags: Fragments, mesh: Mesh, camera: Camera, turn: F64, *, threads: int | None = None
+) -> F32:
+    """Unit normals (H, W, 3) float32 of the visible pixels, on the side that is seen, 0 where nothing is.
+
+    Parameters
+    ----------
+    frags, mesh, camera
+        As in `topleft.shade`.
+    turn : (3, 3) float64
+        From eye space to where the normals are wanted.
+    threads : int, optional
+        Never changes a bit.
+
+    Notes
+    -----
+    A triangle seen from behind has its normals turned round as a whole, never pixel by pixel: so a mesh whose faces are
+    inverted looks like one whose faces are not, and no edge of light runs through a triangle. Where those of the
+    corners cancel, or there are none, it is the normal of the face.
+    """
+    ids = np.require(frags.triangle, np.int32, ["C", "A"])
+    if not len(mesh.triangles) or 0 in ids.shape:
+        return np.zeros((*ids.shape, 3), np.float32)
+    out = np.empty((*ids.shape, 3), np.float32)
+    scene = frags._scene
+    look = ShadingInputs(scene, mesh, camera, ids.shape[::-1], None, is_flat=False)
+    look.set_turn(SHOW_CODES[Shading.NORMALS], turn)
+    n_threads = count_threads(parse_threads(threads), len(mesh.triangles))
+
+    def shade_rows(first: int, end: int) -> None:
+        _engine.shade_normals(scene, scene.view, look.shading, ids, out, first, end - first)
+
+    run_parts(shade_rows, len(ids), n_threads)
+    return out
 
 
 def _check_types(lights: Sequence[Light], material: object, matcap: object, fog: object) -> None:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import argparse
 from typing import NoReturn
 
+from topleft._base.color import DEFAULT_COLOR
 from topleft._base.options import Cull, Sampling
 from topleft._camera.camera import DEFAULT_FOV_Y_DEG, THREE_QUARTER_DEG
 from topleft._io.images import PICTURE_SUFFIXES, SUFFIXES
 from topleft._render.layers import LAYERS, check_layers
 from topleft._render.render import DEFAULT_SIZE
-from topleft._shade.shade import DEFAULT_COLOR, Shading
+from topleft._shade.shade import Shading
 from topleft.cli.animation import ANIMATION_SUFFIXES
 from topleft.errors import TopleftError
 from topleft.scenes import SHAPES

@@ -15,13 +15,30 @@ from topleft._camera.camera import Camera
 from topleft._model.mesh import Mesh
 from topleft._model.scene import Instance, Scene
 from topleft._render.bend import BentMesh, bend
-from topleft._render.scene_draw import draw_scene
-from topleft._render.scene_fragments import BentFragments, Part, SceneFragments
-from topleft._render.scene_render import camera_of
+from topleft._render.fragments import BentFragments, Part, SceneFragments
+from topleft._render.instances import draw_scene
+from topleft._render.scene_shade import camera_of
 
 __all__ = ["BentSceneFragments", "DrawnScene", "draw_seen", "scene_through"]
 
 MIRROR = np.diag([-1.0, 1.0, 1.0, 1.0])
+
+
+class DrawnMesh(NamedTuple):
+    """What the verbs draw of a mesh."""
+
+    vertices: npt.NDArray[Any]
+    triangles: npt.NDArray[np.integer[Any]]
+    transform: npt.NDArray[np.float64]
+    bent: BentMesh | None
+
+
+def seen_through(mesh: Mesh, camera: Camera, frame: tuple[int, int], *, near_clip: bool = True) -> DrawnMesh:
+    """The mesh as it is, and the camera's matrix for a whole picture of this size; or as the camera's lens bends it."""
+    if camera.lens is None:
+        return DrawnMesh(mesh.vertices, mesh.triangles, camera.clip_from_world(frame), None)
+    bent = bend(mesh.vertices, mesh.triangles, camera, camera.lens, frame, near_clip=near_clip)
+    return DrawnMesh(bent.points_eye, bent.triangles, camera.clip_from_eye(frame), bent)
 
 
 class DrawnScene(NamedTuple):
@@ -62,9 +79,9 @@ class BentSceneFragments(SceneFragments):
         self._scene_of_wholes = scene
 
     @property
-    def first_ids(self) -> npt.NDArray[np.int64]:
-        """Where the ids of each instance begin, and their end: (N + 1,)."""
-        return self._scene_of_wholes.first_ids
+    def whole(self) -> Scene:
+        """The scene that `triangle` counts the triangles of."""
+        return self._scene_of_wholes
 
     def again(self) -> BentSceneFragments:
         """Return the same made anew from the parts, whose buffers have changed."""

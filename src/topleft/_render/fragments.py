@@ -111,7 +111,17 @@ class SceneFragments(Fragments):
     @property
     def first_ids(self) -> NDArray[np.int64]:
         """Where the ids of each instance begin, and their end: (N + 1,)."""
-        return self._placed.first_ids
+        return self.whole.first_ids
+
+    @property
+    def whole(self) -> Scene:
+        """The scene that `triangle` counts the triangles of."""
+        return self._placed.scene
+
+    @property
+    def n_drawn(self) -> list[tuple[int, int]]:
+        """Vertices and triangles of the mesh of each instance."""
+        return [(len(instance.mesh.vertices), len(instance.mesh.triangles)) for instance in self.whole]
 
     @property
     def positions(self) -> Sequence[tuple[int, int]]:

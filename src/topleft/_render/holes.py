@@ -19,12 +19,12 @@ from topleft._model.material import Material
 from topleft._model.mesh import Mesh
 from topleft._model.scene import Instance, Scene
 from topleft._raster.fragments import Fragments
-from topleft._render.scene_fragments import Placed, SceneFragments, mesh_of_parts
-from topleft._render.scene_lens import BentSceneFragments
-from topleft._render.scene_render import camera_of
-from topleft._shade.cutout import Cut, cut_of, draw_cut
+from topleft._render.fragments import BentFragments, Placed, SceneFragments, mesh_of_parts
+from topleft._render.scene_shade import camera_of
+from topleft._render.through_lens import BentSceneFragments
+from topleft._shade.alpha_test import Cut, cut_of, cut_out, draw_cut
 
-__all__ = ["cut_out_scene", "cuts_of", "draw_cuts", "solid_scene", "surfaces_of"]
+__all__ = ["cut_out_scene", "cuts_of", "draw_cuts", "solid_scene", "surfaces_of", "without_holes"]
 
 
 def cuts_of(scene: Scene, material: Material | None) -> list[Cut | None]:
@@ -106,3 +106,18 @@ def cut_planes(
     for k, at in enumerate(positions):
         draw_cuts(placed, surfaces, cuts, ids[k : k + 1], depth[k : k + 1], at=at, threads=threads)
     frags.forget()
+
+
+def without_holes(
+    frags: Fragments, mesh: Mesh | Scene, camera: Camera, material: Material | None, *, threads: int | None = None
+) -> Fragments:
+    """The visibility buffer without what materials (or this one) cut out; `frags` is changed."""
+    if isinstance(mesh, Scene):
+        return cut_out_scene(frags, mesh, camera, material, threads=threads)
+    if not isinstance(frags, BentFragments):
+        cut_out(frags, mesh, camera, material, threads=threads)
+        return frags
+    if cut_of(mesh, material) is None:
+        return frags
+    cut_out(frags.parts, frags.mesh_of_parts(mesh), camera.straightened(), material, threads=threads)
+    return frags.again()

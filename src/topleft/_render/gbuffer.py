@@ -1,6 +1,6 @@
 """What a camera sees of a mesh or scene, and where in space each visible pixel lies: computed when it is asked for.
 
-Input: `Mesh` or `Scene`, `Camera`. Output: `Sight`, from which `layers` are taken.
+Input: `Mesh` or `Scene`, `Camera`. Output: `GBuffer`, from which `layers` are taken.
 """
 
 from __future__ import annotations
@@ -21,12 +21,13 @@ from topleft._model.mesh import Mesh
 from topleft._model.scene import Instance, Scene
 from topleft._raster.fragments import Fragments
 from topleft._raster.verbs import Rasterizer
-from topleft._render.render import rasterize_mesh, without_holes
-from topleft._render.scene_fragments import Part, SceneFragments
-from topleft._render.scene_render import drawn_of
-from topleft._shade.cutout import cut_of
+from topleft._render.fragments import Part, SceneFragments
+from topleft._render.holes import without_holes
+from topleft._render.render import rasterize_mesh
+from topleft._render.scene_shade import drawn_of
+from topleft._shade.alpha_test import cut_of
 
-__all__ = ["PointKind", "Sight", "Surface", "project"]
+__all__ = ["GBuffer", "PointKind", "VisiblePart", "project"]
 
 F64 = npt.NDArray[np.float64]
 
@@ -43,11 +44,16 @@ N_NUMBERS = {PointKind.LENGTH: 1, PointKind.FLOW: 2}
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
+class VisiblePart:
     """The visible pixels of one instance, in row order."""
 
     part: Part
     instance: Instance
+
+    @property
+    def place(self) -> F64:
+        """World from object, (4, 4)."""
+        return self.instance.transform
 
     @cached_property
     def seen(self) -> npt.NDArray[np.bool_]:
@@ -59,7 +65,7 @@ class Surface:
         """The fragments and the mesh as they were drawn: through a lens those of its parts."""
         return drawn_of(self.part.frags, self.instance.mesh)
 
-    def tell(
+    def evaluate(
         self,
         what: PointKind,
         rows: F64,
@@ -90,12 +96,12 @@ class Surface:
     @property
     def points(self) -> F64:
         """Where the pixels that are seen lie on the mesh, in its own space: (P, 3) float64."""
-        points: F64 = self.tell(PointKind.ROWS, np.eye(4)[:3], np.nan, dtype=np.float64)[self.seen]
+        points: F64 = self.evaluate(PointKind.ROWS, np.eye(4)[:3], np.nan, dtype=np.float64)[self.seen]
         return points
 
 
 @dataclass(frozen=True, eq=False)
-class Sight:
+class GBuffer:
     """A mesh or scene and who looks at it.
 
     Parameters
@@ -154,31 +160,31 @@ class Sight:
         return without_holes(frags, self.subject, self.camera, self.look.get("material"))
 
     @cached_property
-    def surfaces(self) -> Sequence[Surface]:
+    def visible_parts(self) -> Sequence[VisiblePart]:
         """The visible pixels of each instance that shows any."""
         frags = self.frags
         if isinstance(frags, SceneFragments):
-            return [Surface(part, self.instances[part.instance]) for part in frags.parts]
+            return [VisiblePart(part, self.instances[part.instance]) for part in frags.parts]
         height, width = frags.depth.shape
-        return [Surface(Part(0, slice(0, height), slice(0, width), frags), self.instances[0])]
+        return [VisiblePart(Part(0, slice(0, height), slice(0, width), frags), self.instances[0])]
 
     def join(
-        self, channels: tuple[int, ...], background: float, make: Callable[[Surface], npt.NDArray[Any]]
+        self, channels: tuple[int, ...], background: float, make: Callable[[VisiblePart], npt.NDArray[Any]]
     ) -> npt.NDArray[np.float32]:
-        """Return a picture (H, W, *channels) of what `make` gives for the rectangle of each surface."""
+        """Return a picture (H, W, *channels) of what `make` gives for the rectangle of each visible."""
         width, height = self.size
         if not isinstance(self.frags, SceneFragments):
-            return make(self.surfaces[0])
+            return make(self.visible_parts[0])
         picture: npt.NDArray[np.float32] = np.full((height, width, *channels), background, np.float32)
-        for surface in self.surfaces:
-            picture[surface.part.box][surface.seen] = make(surface)[surface.seen]
+        for visible in self.visible_parts:
+            picture[visible.part.box][visible.seen] = make(visible)[visible.seen]
         return picture
 
-    def tell(
-        self, surface: Surface, what: PointKind, rows: F64, background: float, *, size: tuple[int, int] = (0, 0)
+    def evaluate(
+        self, visible: VisiblePart, what: PointKind, rows: F64, background: float, *, size: tuple[int, int] = (0, 0)
     ) -> npt.NDArray[Any]:
-        """What `Surface.tell` does, with the threads of this sight."""
-        return surface.tell(what, rows, background, size=size, threads=self.options.get("threads"))
+        """What `VisiblePart.evaluate` does, with the threads of this gbuffer."""
+        return visible.evaluate(what, rows, background, size=size, threads=self.options.get("threads"))
 
 
 def moved(points: F64, matrix: F64) -> F64:

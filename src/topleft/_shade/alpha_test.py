@@ -1,4 +1,4 @@
-"""Cut-outs: a visibility buffer without what the textures of its triangles leave out.
+"""Takes out of a visibility buffer what the textures of its triangles leave out: alpha test, holes, cut-outs.
 
 Input: `Fragments` of a whole mesh, its materials. Output: the same buffers, drawn again: first the triangles without
 holes, then the others, each tested pixel by pixel (or sample by sample), so what is behind a hole shows.
@@ -21,12 +21,10 @@ from topleft._camera.camera import Camera
 from topleft._model.material import Material
 from topleft._model.mesh import Mesh, has_holes
 from topleft._raster.fragments import Fragments
-from topleft._shade.look import Look
+from topleft._shade.look import ShadingInputs
 
 I32 = npt.NDArray[np.int32]
 F32 = npt.NDArray[np.float32]
-
-
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,28 +70,30 @@ def cut_out(
     frags : Fragments
         What `rasterize` returned for the mesh with `depth_test="less"`.
     mesh, camera, material
-        As in `topleft.shade.shade`.
+        As in `topleft.shade`.
     threads : int, optional
         Never changes a bit.
     """
     cut = cut_of(mesh, material)
     if cut is None or 0 in frags.triangle.shape:
         return
-    triangles = cut.triangles
-    opaque = np.append(np.flatnonzero(~cut.is_cut), 0).astype(np.int32)  # one more than is drawn
     n_threads = count_threads(parse_threads(threads), len(mesh.triangles))
     for k in range(frags.samples_triangle.shape[-1]):
-        sample = frags.sample(k)
-        scene = sample._scene_with(np.arange(len(mesh.triangles), dtype=np.int32))  # all are drawn anew
-        ids, depth = sample.triangle, sample.depth
-        look = look_of(scene, mesh, camera, ids.shape[::-1], cut)
+        cut_sample(frags.sample(k), mesh, camera, cut, n_threads)
 
-        def cut_rows(
-            first: int, end: int, scene: _engine.Scene = scene, look: Look = look, ids: I32 = ids, depth: F32 = depth
-        ) -> None:
-            _engine.cut_out(scene, scene.view, look.shading, opaque, triangles, ids, depth, first, end - first)
 
-        run_parts(cut_rows, len(ids), n_threads)
+def cut_sample(sample: Fragments, mesh: Mesh, camera: Camera, cut: Cut, n_threads: int) -> None:
+    """Draw the buffers of one sample anew: triangles without holes, then the others."""
+    triangles = cut.triangles
+    opaque = np.append(np.flatnonzero(~cut.is_cut), 0).astype(np.int32)  # one more than is drawn
+    scene = sample._scene_with(np.arange(len(mesh.triangles), dtype=np.int32))  # all are drawn anew
+    ids, depth = sample.triangle, sample.depth
+    inputs = inputs_of(scene, mesh, camera, ids.shape[::-1], cut)
+
+    def cut_rows(first: int, end: int) -> None:
+        _engine.cut_out(scene, scene.view, inputs.shading, opaque, triangles, ids, depth, first, end - first)
+
+    run_parts(cut_rows, len(ids), n_threads)
 
 
 def draw_cut(
@@ -101,17 +101,17 @@ def draw_cut(
 ) -> None:
     """Draw the triangles with holes over the planes of a visibility buffer (1, H, W), or of layers (K, H, W)."""
     triangles = cut.triangles
-    look = look_of(scene, mesh, camera, ids.shape[:0:-1], cut)
+    inputs = inputs_of(scene, mesh, camera, ids.shape[:0:-1], cut)
 
     def draw_rows(first: int, end: int) -> None:
-        _engine.cut_out_over(scene, scene.view, look.shading, triangles, ids, depth, is_peeled, first, end - first)
+        _engine.cut_out_over(scene, scene.view, inputs.shading, triangles, ids, depth, is_peeled, first, end - first)
 
     run_parts(draw_rows, ids.shape[1], n_threads)
 
 
-def look_of(scene: _engine.Scene, mesh: Mesh, camera: Camera, size: tuple[int, ...], cut: Cut) -> Look:
+def inputs_of(scene: _engine.Scene, mesh: Mesh, camera: Camera, size: tuple[int, ...], cut: Cut) -> ShadingInputs:
     """What the kernel reads of materials with holes."""
-    look = Look(scene, mesh, camera, (size[0], size[1]), cut.rows, is_flat=False)
-    look.set_materials(mesh, cut.materials, is_unlit=True)
-    look.set_view(0, None, (0, 0, 0, 0))
-    return look
+    inputs = ShadingInputs(scene, mesh, camera, (size[0], size[1]), cut.rows, is_flat=False)
+    inputs.set_materials(mesh, cut.materials, is_unlit=True)
+    inputs.set_view(0, None, (0, 0, 0, 0))
+    return inputs
