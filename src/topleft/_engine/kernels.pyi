@@ -290,7 +290,27 @@ def mean_colors(
 
 class Texture:
     def __init__(
-        self, texels: NDArray[np.uint16], levels: NDArray[np.int32], filter_code: int, wrap_u: int, wrap_v: int
+        self,
+        texels: NDArray[np.uint16],
+        levels: NDArray[np.int32],
+        filter_code: int,
+        wrap_u: int,
+        wrap_v: int,
+        uv_set: int = ...,
+        transform: Sequence[Sequence[float]] | None = ...,
+        tangent: Sequence[float] = ...,
+        hand: float = ...,
+    ) -> None: ...
+
+class Surroundings:
+    def __init__(
+        self,
+        texels: NDArray[np.float32] | None,
+        levels: NDArray[np.int32] | None,
+        sky: Sequence[float],
+        ground: Sequence[float],
+        diffuse: float,
+        from_shading: Sequence[Sequence[float]],
     ) -> None: ...
 
 class Shading:
@@ -301,12 +321,17 @@ class Shading:
         positions: NDArray[Any],
         is_turned: NDArray[np.uint8] | None,
         uv: NDArray[np.float32] | None,
+        uv1: NDArray[np.float32] | None,
         colors: NDArray[np.float32] | None,
+        has_alpha: bool,
+        front_side: float,
         material_of: NDArray[np.int32] | None,
         decode: NDArray[np.float32],
     ) -> None: ...
     def set_materials(self, materials: Sequence[tuple[Any, ...]]) -> None: ...
     def set_lights(self, lights: Sequence[tuple[Any, ...]], ambient: Sequence[float]) -> None: ...
+    def set_surroundings(self, surroundings: Surroundings) -> None: ...
+    def set_wants_opacity(self) -> None: ...
     def set_view(
         self,
         show: int,
