@@ -1,6 +1,7 @@
 """The light of topleft in GLSL: what docs/design/shading.md says, drawn by OpenGL on Mesa's llvmpipe.
 
-In: a scene of `pictures_scenes.py`. Out: its picture and its ids. Shares no code with the kernels or with `Look`.
+In: a scene of `pictures_scenes.py`. Out: its picture and its ids. Shares no code with the kernels or with
+`ShadingInputs`.
 Needs moderngl and Mesa's EGL library. The vertex shader turns y over, so that row 0 is on top.
 """
 

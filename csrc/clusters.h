@@ -1,5 +1,5 @@
-/* Clusters: what a mesh in object space is sorted into, and what a pass over one needs.  Part of the contract of topleft.h, which
- * includes it behind the types that it uses. */
+/* Clusters: what a mesh in object space is sorted into, and what a pass over one needs.  Part of the contract of
+ * topleft.h, which includes it behind the types that it uses. */
 #include "topleft.h" /* before the guard: it includes this file behind its types */
 
 #ifndef TOPLEFT_CLUSTERS_H
@@ -29,15 +29,16 @@ typedef struct {
 
 /* A view, as far as clusters are concerned. */
 typedef struct {
-    double matrix[16];          /* clip from object */
-    double side[4][2];          /* left, right, top, bottom: a pixel beyond it where side[0] * x (y) + side[1] * w < 0 */
-    double eye[4];              /* what the rows of x, y and w take to 0 */
-    double scale_x, scale_y;    /* sub-pixels a unit of normalized device coordinates */
+    double matrix[16]; /* clip from object */
+    /* left, right, top, bottom: a pixel beyond it where side[0] * x (y) + side[1] * w < 0 */
+    double side[4][2];
+    double eye[4];           /* what the rows of x, y and w take to 0 */
+    double scale_x, scale_y; /* sub-pixels a unit of normalized device coordinates */
     double half_width_px, half_height_px;
-    double length[3];           /* of the rows of x, y and w, without their last number */
-    double error;               /* of the vertex stage, as a share of the sum of all terms of a row */
+    double length[3]; /* of the rows of x, y and w, without their last number */
+    double error;     /* of the vertex stage, as a share of the sum of all terms of a row */
     int near_clip, far_clip, zero_to_one;
-    int is_farthest;            /* what lies farther is drawn first */
+    int is_farthest; /* what lies farther is drawn first */
     tl_cull cull;
 } tl_cluster_view;
 
@@ -50,9 +51,10 @@ typedef struct tl_cluster_pass {
     const tl_cluster_view *seen;
     const tl_source *source; /* the vertices of all clusters, with the matrix */
     const tl_view *view;
-    int32_t *list;           /* room for a number for each cluster, and for two */
+    int32_t *list; /* room for a number for each cluster, and for two */
     void *room;
-    int may_be_hidden;       /* whether clusters that lie behind all that is drawn are left out; NEAREST and FARTHEST alone */
+    /* whether clusters that lie behind all that is drawn are left out; NEAREST and FARTHEST alone */
+    int may_be_hidden;
     int64_t n_seen, n_drawn; /* out: clusters that the window may show, and those of them that were not hidden */
 } tl_cluster_pass;
 

@@ -1,7 +1,7 @@
 /* CPU probe and choice of the kernel unit: a name in, a kernel table out.
  *
- * setup.py defines TL_HAVE_<ISA> for each unit that it links, TL_FLAGS_<ISA> and TL_VERSION. Nothing here is kept between
- * calls; which table is in use is the caller's to remember. */
+ * setup.py defines TL_HAVE_<ISA> for each unit that it links, TL_FLAGS_<ISA> and TL_VERSION. Nothing here is kept
+ * between calls; which table is in use is the caller's to remember. */
 #include "dispatch.h"
 
 #include <stddef.h>
@@ -50,16 +50,16 @@ static const tl_isa_unit UNITS[TL_N_ISA] = {
     [TL_ISA_AVX512] = {"avx512", TL_FLAGS_AVX512, TL_TABLE_AVX512},
 };
 
-/* Each probe asks for all that its unit is compiled with in setup.py. __builtin_cpu_supports knows whether the operating
- * system saves the registers; not every clang knows "lzcnt", so that bit is read by hand. */
+/* Each probe asks for all that its unit is compiled with in setup.py. __builtin_cpu_supports knows whether the
+ * operating system saves the registers; not every clang knows "lzcnt", so that bit is read by hand. */
 static int cpu_has_avx2(void)
 {
 #if defined(__x86_64__)
     unsigned a, b, c, d;
     __builtin_cpu_init();
-    return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("bmi")
-        && __builtin_cpu_supports("bmi2") && __builtin_cpu_supports("popcnt")
-        && __get_cpuid(0x80000001u, &a, &b, &c, &d) && (c & bit_LZCNT);
+    return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("bmi") &&
+           __builtin_cpu_supports("bmi2") && __builtin_cpu_supports("popcnt") &&
+           __get_cpuid(0x80000001u, &a, &b, &c, &d) && (c & bit_LZCNT);
 #else
     return 0;
 #endif
@@ -68,28 +68,19 @@ static int cpu_has_avx2(void)
 static int cpu_has_avx512(void)
 {
 #if defined(__x86_64__)
-    return cpu_has_avx2() && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw")
-        && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl")
-        && __builtin_cpu_supports("avx512cd");
+    return cpu_has_avx2() && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
+           __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl") &&
+           __builtin_cpu_supports("avx512cd");
 #else
     return 0;
 #endif
 }
 
-const char *tl_isa_name(int i_isa)
-{
-    return i_isa >= 0 && i_isa < TL_N_ISA ? UNITS[i_isa].name : NULL;
-}
+const char *tl_isa_name(int i_isa) { return i_isa >= 0 && i_isa < TL_N_ISA ? UNITS[i_isa].name : NULL; }
 
-const char *tl_isa_flags(int i_isa)
-{
-    return i_isa >= 0 && i_isa < TL_N_ISA ? UNITS[i_isa].flags : "";
-}
+const char *tl_isa_flags(int i_isa) { return i_isa >= 0 && i_isa < TL_N_ISA ? UNITS[i_isa].flags : ""; }
 
-int tl_isa_built(int i_isa)
-{
-    return i_isa >= 0 && i_isa < TL_N_ISA && UNITS[i_isa].kernels != NULL;
-}
+int tl_isa_built(int i_isa) { return i_isa >= 0 && i_isa < TL_N_ISA && UNITS[i_isa].kernels != NULL; }
 
 int tl_isa_available(int i_isa)
 {
@@ -121,7 +112,4 @@ const char *tl_compiler(void)
 #endif
 }
 
-const char *tl_version(void)
-{
-    return TL_VERSION;
-}
+const char *tl_version(void) { return TL_VERSION; }

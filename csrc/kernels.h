@@ -1,5 +1,5 @@
-/* The kernel table: what an instruction set has, a function a line.  Part of the contract of topleft.h, which includes it behind all
- * types. */
+/* The kernel table: what an instruction set has, a function a line.  Part of the contract of topleft.h, which includes
+ * it behind all types. */
 #include "topleft.h" /* before the guard: it includes this file behind its types */
 
 #ifndef TOPLEFT_KERNELS_H
@@ -10,35 +10,40 @@ typedef struct tl_kernels {
 
     /* The pixels of vertices [first, end) to snapped vertices.  z is read when with_depth and n_components = 3.
      * `wide` may be NULL: wide vertices are then counted, and the caller comes again with a table. */
-    tl_vertex_counts (*snap)(const tl_source *source, int64_t first, int64_t end, int subpixel_bits, int with_depth, tl_vertex *out,
-                             tl_wide *wide);
+    tl_vertex_counts (*snap)(const tl_source *source, int64_t first, int64_t end, int subpixel_bits, int with_depth,
+                             tl_vertex *out, tl_wide *wide);
 
     /* The clip space, or object space by the matrix, of vertices [first, end) to snapped vertices; `wide` as above. */
-    tl_vertex_counts (*project)(const tl_source *source, int64_t first, int64_t end, const tl_view *view, tl_vertex *out, tl_wide *wide);
+    tl_vertex_counts (*project)(const tl_source *source, int64_t first, int64_t end, const tl_view *view,
+                                tl_vertex *out, tl_wide *wide);
 
-    /* Cuts the triangles that have TL_CLIPPED vertices: of all n, or of the n in ids, which ascend.  With pieces->vertices NULL
-     * only counts. */
-    void (*clip)(const tl_source *source, const tl_vertex *vertices, const int32_t *triangles, const int32_t *ids, int64_t n,
-                 const tl_view *view, tl_pieces *pieces);
+    /* Cuts the triangles that have TL_CLIPPED vertices: of all n, or of the n in ids, which ascend.  With
+     * pieces->vertices NULL only counts. */
+    void (*clip)(const tl_source *source, const tl_vertex *vertices, const int32_t *triangles, const int32_t *ids,
+                 int64_t n, const tl_view *view, tl_pieces *pieces);
 
-    /* Where the middles of triangles lie on a curve that keeps neighbours together; `box` is low and high of the vertices. */
-    void (*place_on_curve)(const tl_source *source, const int32_t *triangles, int64_t first, int64_t end, const double *box, uint32_t *keys);
+    /* Where the middles of triangles lie on a curve that keeps neighbours together; `box` is low and high of the
+     * vertices. */
+    void (*place_on_curve)(const tl_source *source, const int32_t *triangles, int64_t first, int64_t end,
+                           const double *box, uint32_t *keys);
 
     /* The order of n keys, equal ones as they stand; `room` has n pairs. */
     void (*sort_keys)(const uint32_t *keys, int64_t n, uint64_t *room, uint64_t *other_room, int32_t *order);
 
-    /* Cuts the triangles in `order` into clusters: sets their ranges, the mesh's vertices that theirs are, corners and names.
-     * `seen` is (n_vertices,), -1.  Returns the number of clusters; *n_used is that of their vertices. */
-    int64_t (*cut_clusters)(const int32_t *triangles, const int32_t *order, int64_t n, int32_t *seen, tl_cluster *clusters,
-                            int32_t *vertices, uint8_t *corners, int64_t *n_used);
+    /* Cuts the triangles in `order` into clusters: sets their ranges, the mesh's vertices that theirs are, corners and
+     * names.  `seen` is (n_vertices,), -1.  Returns the number of clusters; *n_used is that of their vertices. */
+    int64_t (*cut_clusters)(const int32_t *triangles, const int32_t *order, int64_t n, int32_t *seen,
+                            tl_cluster *clusters, int32_t *vertices, uint8_t *corners, int64_t *n_used);
 
-    /* Measures clusters [first, end), a multiple of TL_CLUSTER_GROUP, whose vertices `source` holds, and the boxes of their groups. */
-    void (*measure_clusters)(const tl_source *source, const uint8_t *corners, int64_t first, int64_t end, tl_cluster *clusters,
-                             double *group_boxes);
+    /* Measures clusters [first, end), a multiple of TL_CLUSTER_GROUP, whose vertices `source` holds, and the boxes of
+     * their groups. */
+    void (*measure_clusters)(const tl_source *source, const uint8_t *corners, int64_t first, int64_t end,
+                             tl_cluster *clusters, double *group_boxes);
 
-    /* Counts some clusters, one of each `step`, by what a view does with them, whatever hides them: outside of the window, turned
-     * away and culled, showing their backs, the others. */
-    void (*survey_clusters)(const tl_clustered *mesh, const tl_cluster_view *view, int64_t step, int64_t n_of[TL_N_FATES]);
+    /* Counts some clusters, one of each `step`, by what a view does with them, whatever hides them: outside of the
+     * window, turned away and culled, showing their backs, the others. */
+    void (*survey_clusters)(const tl_clustered *mesh, const tl_cluster_view *view, int64_t step,
+                            int64_t n_of[TL_N_FATES]);
 
     /* Lowest index of a TL_BAD vertex that a triangle uses, -1 if there is none. */
     int64_t (*first_bad)(const tl_vertex *vertices, const int32_t *triangles, int64_t n_triangles);
@@ -51,27 +56,29 @@ typedef struct tl_kernels {
 
     /* Returns -1, or, when it has met an index outside [0, n_vertices), the number of a row at or before which there is
      * one; what was drawn is then worthless.  The window's pixels are cleared first: 0, id -1, and the depth that every
-     * other beats.  A share of a part needs method AUTO, a picture of less than 2^31 samples within 2^30 pixels of 0. */
+     * other beats.  A share of a part needs method AUTO, a picture of less than 2^31 samples within 2^30 pixels of
+     * 0. */
     int64_t (*draw)(const tl_scene *scene, const tl_window *window, const tl_target *target, tl_share *share);
 
-    /* Counts the triangles of a scene by the code that `draw` has for them, with the sink of the census; the target's samples are read
-     * when that is SAMPLES.  Returns as `draw` does. */
-    int64_t (*count_classes)(const tl_scene *scene, const tl_window *window, const tl_target *target, tl_census *census);
+    /* Counts the triangles of a scene by the code that `draw` has for them, with the sink of the census; the target's
+     * samples are read when that is SAMPLES.  Returns as `draw` does. */
+    int64_t (*count_classes)(const tl_scene *scene, const tl_window *window, const tl_target *target,
+                             tl_census *census);
 
-    /* The depth of n pixels whose triangles all lie at one: `depth` where there is an id, `background` elsewhere.  The ids are xored
-     * with `flip` first. */
+    /* The depth of n pixels whose triangles all lie at one: `depth` where there is an id, `background` elsewhere.  The
+     * ids are xored with `flip` first. */
     void (*set_flat_depth)(int32_t *ids, int64_t n, int32_t flip, float depth, float background, float *out);
 
-    /* Lists the triangles that are in the window or within reach_fx of it, with their bands of 2^band_bits rows; they may be a few
-     * too many.  Returns as `draw` does; the window as for a share of a part. */
+    /* Lists the triangles that are in the window or within reach_fx of it, with their bands of 2^band_bits rows; they
+     * may be a few too many.  Returns as `draw` does; the window as for a share of a part. */
     int64_t (*bin)(const tl_scene *scene, const tl_window *window, int32_t reach_fx, int band_bits, tl_bins *bins);
 
-    /* The same by band: starts[k] to starts[k + 1] are the places of those of band k in `listed`.  `starts` has n_bands + 2 numbers.
-     * A first call with listed = NULL sets starts[n_bands + 1] to the length of `listed`. */
+    /* The same by band: starts[k] to starts[k + 1] are the places of those of band k in `listed`.  `starts` has n_bands
+     * + 2 numbers.  A first call with listed = NULL sets starts[n_bands + 1] to the length of `listed`. */
     void (*list_bins)(const tl_bins *bins, int64_t n_bands, int64_t *starts, int32_t *listed);
 
-    /* The exact area that triangles cover of each pixel, their sum; the window has fewer than 2^31 cells.  Returns as `draw`
-     * does, or TL_AREA_OVERFLOW; either way the pixels are then worthless. */
+    /* The exact area that triangles cover of each pixel, their sum; the window has fewer than 2^31 cells.  Returns as
+     * `draw` does, or TL_AREA_OVERFLOW; either way the pixels are then worthless. */
     int64_t (*draw_area)(const tl_scene *scene, const tl_window *window, const tl_area *target);
 
     /* Blends the colours of triangles into the canvas in their order.  Returns as `draw` does. */
@@ -84,20 +91,20 @@ typedef struct tl_kernels {
     void (*barycentric)(const tl_scene *scene, const tl_window *window, const int32_t *ids, float *out);
 
     /* The same, applied to float32 values (n_vertices, n_values), or (n_triangles, 3, n_values) per corner. */
-    void (*interpolate)(const tl_scene *scene, const tl_window *window, const int32_t *ids, const float *values, int n_values,
-                        int per_corner, float background, float *out);
+    void (*interpolate)(const tl_scene *scene, const tl_window *window, const int32_t *ids, const float *values,
+                        int n_values, int per_corner, float background, float *out);
 
     /* Colours where labels are not -1: per triangle, or interpolated screen-linearly from those of the vertices.
      * n_channels of uint8 or float32 a colour. */
     void (*paint_flat)(const int32_t *labels, int64_t n, const uint8_t *colors, int pixel_bytes, uint8_t *pixels);
-    void (*paint_gouraud)(const tl_scene *scene, const tl_window *window, const int32_t *labels, const void *colors, int n_channels,
-                          int is_u8, void *pixels);
+    void (*paint_gouraud)(const tl_scene *scene, const tl_window *window, const int32_t *labels, const void *colors,
+                          int n_channels, int is_u8, void *pixels);
 
-    /* The mean colour of the samples of n pixels: from planes of labels and the colours of the triangles, or from planes of colours.
-     * Planes lie `stride` pixels apart; transfer is NULL where all channels are averaged as they are.  A row of a palette of uint8
-     * has four numbers, whatever n_channels. */
-    void (*mean_flat)(const int32_t *labels, int sample_bits, int64_t stride, int64_t n, const void *palette, int n_channels, int is_u8,
-                      const tl_transfer *transfer, void *pixels);
+    /* The mean colour of the samples of n pixels: from planes of labels and the colours of the triangles, or from
+     * planes of colours.  Planes lie `stride` pixels apart; transfer is NULL where all channels are averaged as they
+     * are.  A row of a palette of uint8 has four numbers, whatever n_channels. */
+    void (*mean_flat)(const int32_t *labels, int sample_bits, int64_t stride, int64_t n, const void *palette,
+                      int n_channels, int is_u8, const tl_transfer *transfer, void *pixels);
     void (*mean_colors)(const void *colors, int sample_bits, int64_t stride, int64_t n, int n_channels, int is_u8,
                         const tl_transfer *transfer, void *pixels);
 
@@ -107,24 +114,28 @@ typedef struct tl_kernels {
     /* Copies rows [first, end) of four numbers, the last of them replaced by 1/w of the vertex. */
     void (*set_inverse_w)(const tl_source *source, const float *rows, int64_t first, int64_t end, float *out);
 
-    /* The picture of a visibility buffer, rows of window->width: uint8 red, green, blue, opacity.  `view` may be NULL in pixel space. */
-    void (*shade)(const tl_scene *scene, const tl_window *window, const tl_view *view, const tl_shading *shading, const int32_t *ids,
-                  const float *depth, uint8_t *pixels);
+    /* The picture of a visibility buffer, rows of window->width: uint8 red, green, blue, opacity.  `view` may be NULL
+     * in pixel space. */
+    void (*shade)(const tl_scene *scene, const tl_window *window, const tl_view *view, const tl_shading *shading,
+                  const int32_t *ids, const float *depth, uint8_t *pixels);
 
-    /* The same from planes of ids and depth that lie `stride` pixels apart, one a sample; samples_fx as in tl_target. */
-    void (*shade_samples)(const tl_scene *scene, const tl_window *window, const tl_view *view, const tl_shading *shading,
-                          const int32_t *samples_fx, int sample_bits, int64_t stride, const int32_t *ids, const float *depth,
-                          uint8_t *pixels);
+    /* The same from planes of ids and depth that lie `stride` pixels apart, one a sample; samples_fx as in
+     * tl_target. */
+    void (*shade_samples)(const tl_scene *scene, const tl_window *window, const tl_view *view,
+                          const tl_shading *shading, const int32_t *samples_fx, int sample_bits, int64_t stride,
+                          const int32_t *ids, const float *depth, uint8_t *pixels);
 
-    /* Unit normals on the side that is seen, float32 (x, y, z), 0 where nothing is: turned by shading->eye_from; show is NORMALS. */
-    void (*shade_normals)(const tl_scene *scene, const tl_window *window, const tl_view *view, const tl_shading *shading,
-                          const int32_t *ids, float *out);
+    /* Unit normals on the side that is seen, float32 (x, y, z), 0 where nothing is: turned by shading->eye_from; show
+     * is NORMALS. */
+    void (*shade_normals)(const tl_scene *scene, const tl_window *window, const tl_view *view,
+                          const tl_shading *shading, const int32_t *ids, float *out);
 
     /* Per pixel of `ids` (rows of window->width): what is told of its point, float32 or float64. */
-    void (*fill_points)(const tl_scene *scene, const tl_window *window, const tl_points *points, const int32_t *ids, void *out);
+    void (*fill_points)(const tl_scene *scene, const tl_window *window, const tl_points *points, const int32_t *ids,
+                        void *out);
 
-    /* Draws n triangles over a target, NEAREST or PEEL, of all others, but for what their materials cut out; the window as for a share of
-     * a part, and fewer than 2^31 pixels. */
+    /* Draws n triangles over a target, NEAREST or PEEL, of all others, but for what their materials cut out; the window
+     * as for a share of a part, and fewer than 2^31 pixels. */
     void (*cut_out)(const tl_scene *scene, const tl_window *window, const tl_view *view, const tl_shading *shading,
                     const int32_t *triangles, int64_t n, const tl_target *target);
 
@@ -138,28 +149,33 @@ typedef struct tl_kernels {
     /* The planes of triangles [first, end); the one of no triangle, with first = 0. */
     void (*list_planes)(const tl_valued *mesh, int64_t first, int64_t end);
 
-    /* Per pixel of `ids` (rows of window->width): the value of its centre on the plane of the triangle, float32 or float64. */
+    /* Per pixel of `ids` (rows of window->width): the value of its centre on the plane of the triangle, float32 or
+     * float64. */
     void (*fill_planes)(const tl_valued *mesh, const tl_window *window, const int32_t *ids, int is_f32, void *out);
 
-    /* Unit normals (n_vertices, 3) of the vertices [first, end): the faces round a vertex count by the angle there, in their order; 0 where
-     * nothing is left.  This one and the next three return -1, or a row with an index outside the vertices. */
-    int64_t (*vertex_normals)(const tl_source *source, const int32_t *triangles, int64_t n_triangles, int64_t first, int64_t end,
-                              double *out);
+    /* Unit normals (n_vertices, 3) of the vertices [first, end): the faces round a vertex count by the angle there, in
+     * their order; 0 where nothing is left.  This one and the next three return -1, or a row with an index outside the
+     * vertices. */
+    int64_t (*vertex_normals)(const tl_source *source, const int32_t *triangles, int64_t n_triangles, int64_t first,
+                              int64_t end, double *out);
 
-    /* Unit normals of triangles [first, end), on the side that is counter-clockwise, 0 without an area: float64 (n_triangles, 3), or
-     * float32 (n_triangles, 4) and 1; the other is NULL. */
-    int64_t (*face_normals)(const tl_source *source, const int32_t *triangles, int64_t first, int64_t end, double *out, float *rows);
+    /* Unit normals of triangles [first, end), on the side that is counter-clockwise, 0 without an area: float64
+     * (n_triangles, 3), or float32 (n_triangles, 4) and 1; the other is NULL. */
+    int64_t (*face_normals)(const tl_source *source, const int32_t *triangles, int64_t first, int64_t end, double *out,
+                            float *rows);
 
-    /* 1 for the triangles of [first, end) whose corners have normals, (n_vertices, 4), that point to the other side, else 0. */
-    int64_t (*find_turned)(const tl_source *source, const int32_t *triangles, int64_t first, int64_t end, const float *normals,
-                           uint8_t *is_turned);
+    /* 1 for the triangles of [first, end) whose corners have normals, (n_vertices, 4), that point to the other side,
+     * else 0. */
+    int64_t (*find_turned)(const tl_source *source, const int32_t *triangles, int64_t first, int64_t end,
+                           const float *normals, uint8_t *is_turned);
 
     /* Low and high of the corners of triangles [first, end): six numbers. */
     int64_t (*box_of_faces)(const tl_source *source, const int32_t *triangles, int64_t first, int64_t end, double *box);
 
-    /* Vectors [first, end), times a matrix (3, 3) from the right unless that is NULL, scaled to length 1; 0 where they have none, or
-     * are not finite.  Out as for face_normals. */
-    void (*unit_vectors)(const tl_source *vectors, const double *turn, int64_t first, int64_t end, double *out, float *rows);
+    /* Vectors [first, end), times a matrix (3, 3) from the right unless that is NULL, scaled to length 1; 0 where they
+     * have none, or are not finite.  Out as for face_normals. */
+    void (*unit_vectors)(const tl_source *vectors, const double *turn, int64_t first, int64_t end, double *out,
+                         float *rows);
 
     /* Points [first, end) by an affine matrix (3, 4), float64 (n, 3). */
     void (*move_points)(const tl_source *points, const double *matrix, int64_t first, int64_t end, double *out);
@@ -170,17 +186,20 @@ typedef struct tl_kernels {
     /* The boxes of a surface, all but whose nodes are there. */
     void (*build_tree)(tl_surface *surface);
 
-    /* The nearest triangle of points [first, end), and where on it unless `at` is NULL.  Returns the largest distance. */
-    double (*find_nearest)(const tl_surface *surface, const double *points, int64_t first, int64_t end, int32_t *triangle, double *at);
+    /* The nearest triangle of points [first, end), and where on it unless `at` is NULL.  Returns the largest
+     * distance. */
+    double (*find_nearest)(const tl_surface *surface, const double *points, int64_t first, int64_t end,
+                           int32_t *triangle, double *at);
 
-    /* How far triangles [first, end) can be from a surface.  A bound is near enough when it passes what is known by `least`, or by
-     * that share.  In and out: reach, of which `known` counts on entry. */
-    void (*find_reach)(const tl_surface *surface, const double *points, const int32_t *triangles, int64_t first, int64_t end,
-                       double share, double least, tl_reach *reach);
+    /* How far triangles [first, end) can be from a surface.  A bound is near enough when it passes what is known by
+     * `least`, or by that share.  In and out: reach, of which `known` counts on entry. */
+    void (*find_reach)(const tl_surface *surface, const double *points, const int32_t *triangles, int64_t first,
+                       int64_t end, double share, double least, tl_reach *reach);
 
-    /* For n pairs of a point of `from` and a triangle of `points`: where on it is nearest to the point, and the squared distance. */
-    void (*set_feet)(const double *points, const int32_t *triangles, const double *from, const int32_t *triangle, const int32_t *point,
-                     int64_t n, double *at, double *squared);
+    /* For n pairs of a point of `from` and a triangle of `points`: where on it is nearest to the point, and the squared
+     * distance. */
+    void (*set_feet)(const double *points, const int32_t *triangles, const double *from, const int32_t *triangle,
+                     const int32_t *point, int64_t n, double *at, double *squared);
 } tl_kernels;
 
 #endif

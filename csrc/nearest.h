@@ -6,10 +6,10 @@
 #include <stdint.h>
 
 enum {
-    TL_TREE_LEAF = 2,        /* triangles of a leaf */
-    TL_TREE_WIDTH = 8,       /* boxes of a node: leaves in the lowest level, nodes of the level below elsewhere */
-    TL_TREE_LEVELS = 12,     /* 2 * 8^11 triangles are more than int32 counts */
-    TL_TREE_BOX = 6,         /* numbers of a box: lower corner, upper corner */
+    TL_TREE_LEAF = 2,    /* triangles of a leaf */
+    TL_TREE_WIDTH = 8,   /* boxes of a node: leaves in the lowest level, nodes of the level below elsewhere */
+    TL_TREE_LEVELS = 12, /* 2 * 8^11 triangles are more than int32 counts */
+    TL_TREE_BOX = 6,     /* numbers of a box: lower corner, upper corner */
 };
 
 /* A node: box k has its lower x at [0][k], y at [1][k], z at [2][k], and its upper ones at [3][k] to [5][k]. */
@@ -23,8 +23,8 @@ typedef struct {
     int64_t n_triangles;
     tl_tree_node *nodes; /* level by level from the lowest */
     int64_t first_node[TL_TREE_LEVELS], n_nodes[TL_TREE_LEVELS];
-    int n_levels;  /* the last has one node */
-    float slack;   /* by which boxes are larger than their triangles */
+    int n_levels; /* the last has one node */
+    float slack;  /* by which boxes are larger than their triangles */
 } tl_surface;
 
 /* How far triangles may lie from a surface. */

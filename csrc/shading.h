@@ -1,5 +1,6 @@
 /* The contract of shading: what a surface is made of, what lights it, and where it is seen from.
- * Colours are linear light, 1 is white.  Vectors are those of one space, the shading space, whose origin is near the mesh. */
+ * Colours are linear light, 1 is white.  Vectors are those of one space, the shading space, whose origin is near the
+ * mesh. */
 #ifndef TOPLEFT_SHADING_H
 #define TOPLEFT_SHADING_H
 
@@ -10,8 +11,8 @@
 typedef enum { TL_FILTER_NEAREST = 0, TL_FILTER_BILINEAR = 1, TL_FILTER_TRILINEAR = 2 } tl_filter;
 typedef enum { TL_WRAP_REPEAT = 0, TL_WRAP_CLAMP = 1, TL_WRAP_MIRROR = 2 } tl_wrap;
 
-/* A picture and its halves.  A texel is four uint16, red, green, blue and alpha, in 65535ths; row 0 is v = 0.  Behind each row
- * stands its first texel again, so that two neighbours are one load. */
+/* A picture and its halves.  A texel is four uint16, red, green, blue and alpha, in 65535ths; row 0 is v = 0.  Behind
+ * each row stands its first texel again, so that two neighbours are one load. */
 typedef struct {
     const uint16_t *texels;
     int32_t offset[TL_MAX_LEVELS]; /* of each level, in texels */
@@ -33,14 +34,14 @@ typedef struct {
     float specular[3];
     float shininess; /* Blinn's exponent; 0: no highlight */
     int is_unlit;
-    float cutoff; /* samples with less opacity are left out by draw_cutout; 0: none */
+    float cutoff;              /* samples with less opacity are left out by draw_cutout; 0: none */
     const tl_texture *texture; /* or NULL, as all of them */
     /* What follows, and textures with a transform or of the second set, are read where `is_full` alone. */
     int is_full;
     int is_metallic; /* glTF's metallic-rough surface, instead of the highlight above */
     float metallic, roughness;
-    float occlusion, normal_scale;   /* how much of each texture counts */
-    float emission[3];               /* light, 0 up */
+    float occlusion, normal_scale;        /* how much of each texture counts */
+    float emission[3];                    /* light, 0 up */
     const tl_texture *metallic_roughness; /* roughness in green, metallic in blue */
     const tl_texture *occlusion_map;      /* in red: the share of the surroundings' light that arrives */
     const tl_texture *normal_map;
@@ -75,11 +76,13 @@ typedef struct {
 typedef enum { TL_SHOW_LIGHT = 0, TL_SHOW_NORMALS = 1, TL_SHOW_MATCAP = 2 } tl_show;
 
 typedef struct {
-    const float *normals;       /* (n_vertices, 4): the unit normal, or 0, and 1/w */
-    const float *face_normals;  /* (n_triangles, 4): unit, on the side that is counter-clockwise; NULL: interpolated ones */
-    const void *positions;      /* (n_vertices, 3) float32 or float64: the face normal where interpolated ones cancel */
+    const float *normals; /* (n_vertices, 4): the unit normal, or 0, and 1/w */
+    /* (n_triangles, 4): unit, on the side that is counter-clockwise; NULL: interpolated ones */
+    const float *face_normals;
+    const void *positions; /* (n_vertices, 3) float32 or float64: the face normal where interpolated ones cancel */
     int is_f64;
-    const uint8_t *is_turned;   /* (n_triangles,): the normals of its vertices point to the other side; NULL: those of none do */
+    /* (n_triangles,): the normals of its vertices point to the other side; NULL: those of none do */
+    const uint8_t *is_turned;
     const float *uv;            /* (n_vertices, 2), or NULL */
     const float *uv1;           /* the second set */
     const float *colors;        /* (n_vertices, 4): sRGB, 0 to 255, and opacity, 0 to 1; or NULL */
@@ -92,19 +95,20 @@ typedef struct {
     int n_lights;
     float ambient[3];
     const tl_surroundings *surroundings; /* or NULL */
-    int wants_opacity; /* the picture's alpha is that of the surface; materials are full then */
+    int wants_opacity;                   /* the picture's alpha is that of the surface; materials are full then */
     tl_show show;
     const tl_texture *matcap; /* MATCAP */
     float eye_from[3][4];     /* the rows of the rotation to eye space; the fourth number is not read */
-    /* Where the pixel (x, y) of the picture looks: from `eye` along ray[0] + x ray[1] + y ray[2], 1/w of which is the point that
-     * is seen.  Without perspective the ray starts at that point instead, and ends at `depth` times ray[3]. */
+    /* Where the pixel (x, y) of the picture looks: from `eye` along ray[0] + x ray[1] + y ray[2], 1/w of which is the
+     * point that is seen.  Without perspective the ray starts at that point instead, and ends at `depth` times
+     * ray[3]. */
     int has_perspective;
     float eye[3], ray[4][3];
-    /* The depth cue: a share (distance - near) * fog_scale of the light, 0 to 1, gives way to fog_color; fog_scale 0: none.
-     * The distance is w times distance_scale, or distance_start + depth * distance_scale without perspective. */
+    /* The depth cue: a share (distance - near) * fog_scale of the light, 0 to 1, gives way to fog_color; fog_scale 0:
+     * none.  The distance is w times distance_scale, or distance_start + depth * distance_scale without perspective. */
     float fog_color[3], fog_near, fog_scale, distance_start, distance_scale;
-    const float *decode;   /* (256,): the light of an sRGB value */
-    float background[4];   /* linear light and opacity */
+    const float *decode; /* (256,): the light of an sRGB value */
+    float background[4]; /* linear light and opacity */
     uint8_t background_bytes[4];
 } tl_shading;
 

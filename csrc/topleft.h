@@ -39,7 +39,7 @@ typedef enum { TL_F32 = 0, TL_F64 = 1, TL_I64 = 2 } tl_scalar;
 typedef struct {
     const void *data; /* (n, n_components) */
     tl_scalar scalar;
-    int n_components;   /* 2 or 3: pixels (and depth), 3: object space when there is a matrix, 4: clip space */
+    int n_components; /* 2 or 3: pixels (and depth), 3: object space when there is a matrix, 4: clip space */
     int64_t n;
     const void *matrix; /* (4, 4) row-major clip from object, of the same scalar type, or NULL */
     int is_affine;      /* the last row of the matrix is 0 0 0 1: every w is 1, and dividing by it changes no bit */
@@ -51,7 +51,8 @@ typedef struct {
     const double *inv_w;     /* 1/w per vertex, or NULL: see `source` */
     const tl_source *source; /* where w comes from when inv_w is NULL; NULL as well: all equal (pixel space) */
     int64_t n_vertices;
-    int32_t sample_x_fx, sample_y_fx; /* the sample from the pixel's centre, which vertices are seen from: |.| <= half a pixel */
+    /* the sample from the pixel's centre, which vertices are seen from: |.| <= half a pixel */
+    int32_t sample_x_fx, sample_y_fx;
 } tl_vertex_set;
 
 /* How many vertices of each special kind a vertex stage has seen, used by a triangle or not. */
@@ -72,19 +73,19 @@ typedef struct {
 /* What is left of the triangles that a clip plane cuts: fans of triangles over their own vertices, in order of
  * their source triangle. */
 typedef struct {
-    tl_vertex *vertices;  /* (n_vertices,) */
-    tl_wide *wide;        /* (n_vertices,) */
-    double *inv_w;        /* (n_vertices,) */
-    double *weights;      /* (n_vertices, 3): barycentrics in the source triangle */
-    int32_t *triangles;   /* (n_pieces, 3) into `vertices` */
-    int32_t *source;      /* (n_pieces,) index of the input triangle, ascending */
+    tl_vertex *vertices; /* (n_vertices,) */
+    tl_wide *wide;       /* (n_vertices,) */
+    double *inv_w;       /* (n_vertices,) */
+    double *weights;     /* (n_vertices, 3): barycentrics in the source triangle */
+    int32_t *triangles;  /* (n_pieces, 3) into `vertices` */
+    int32_t *source;     /* (n_pieces,) index of the input triangle, ascending */
     int64_t n_vertices, n_pieces;
 } tl_pieces;
 
 /* ---- drawing ------------------------------------------------------------------------------------------- */
 
-/* When a triangle covers a pixel: when it holds the sample, when it meets the pixel's square in positive area, or when it holds
- * the whole square.  The last two have no depth and no order: they draw masks and counts. */
+/* When a triangle covers a pixel: when it holds the sample, when it meets the pixel's square in positive area, or when
+ * it holds the whole square.  The last two have no depth and no order: they draw masks and counts. */
 typedef enum { TL_TEST_SAMPLE = 0, TL_TEST_OUTER = 1, TL_TEST_INNER = 2 } tl_test;
 
 /* The part of the picture that a buffer shows, in whole pixels. */
@@ -137,8 +138,8 @@ typedef struct {
     double covered[TL_N_CLASSES]; /* about how many of them are covered: the lesser of area and box, added up */
 } tl_census;
 
-/* The layers of pixels: of every covered sample of a pixel the n_layers that come first by depth, then id.  Planes, the first one
- * first; id -1 and the depth that every other comes before where there are fewer. */
+/* The layers of pixels: of every covered sample of a pixel the n_layers that come first by depth, then id.  Planes, the
+ * first one first; id -1 and the depth that every other comes before where there are fewer. */
 #define TL_MAX_LAYERS 16
 typedef struct {
     int n_layers;    /* 1 to TL_MAX_LAYERS */
@@ -154,8 +155,10 @@ typedef struct {
     float *depth; /* PAINT, NEAREST, FARTHEST; the same stride */
     int64_t stride_px;
     int64_t n_samples; /* from the first sample to the last, set by draw */
-    uint64_t *covered; /* MASK, SAMPLES: tl_covered_words(samples of stride_px * height of the window), at most 2^31 pixels */
-    int sample_bits;           /* SAMPLES: 2^sample_bits samples a pixel, 1 to 4; stride_px is the width of the window */
+    /* MASK, SAMPLES: tl_covered_words(samples of stride_px * height of the window), at most 2^31 pixels */
+    uint64_t *covered;
+    /* SAMPLES: 2^sample_bits samples a pixel, 1 to 4; stride_px is the width of the window */
+    int sample_bits;
     const int32_t *samples_fx; /* (2^sample_bits, 2): x, y of each from the pixel's centre */
     int sample;                /* the one that is being drawn; draw knows */
     int32_t flip;              /* LABEL: what ids are xored with, 0, or TL_FLIP: the earlier triangle wins */
@@ -172,20 +175,23 @@ typedef struct {
     tl_vertex_set mesh;
     const int32_t *triangles; /* (n_triangles, 3); draw checks the indices, everything else trusts them */
     int64_t n_triangles;
-    const tl_pieces *pieces;  /* of triangles with TL_CLIPPED vertices, or NULL */
+    const tl_pieces *pieces; /* of triangles with TL_CLIPPED vertices, or NULL */
     tl_cull cull;
     tl_method method;
     int32_t first_id; /* what triangle 0 is called in a buffer of ids that several scenes share; read by draw alone */
-    const int32_t *names; /* (n_triangles,): what each is called, from first_id on; NULL: its index; read by draw alone */
+    /* (n_triangles,): what each is called, from first_id on; NULL: its index; read by draw alone */
+    const int32_t *names;
 } tl_scene;
 
-/* The part of a scene that one pass draws.  Several passes may share a scene: each takes some of the triangles, draws what of
- * them lies in its own window and lists the others for the passes that own the rest of the picture. */
+/* The part of a scene that one pass draws.  Several passes may share a scene: each takes some of the triangles, draws
+ * what of them lies in its own window and lists the others for the passes that own the rest of the picture. */
 typedef struct {
-    const int32_t *ids;       /* the triangles ids[first] to ids[end - 1]; NULL: the triangles [first, end) */
+    const int32_t *ids; /* the triangles ids[first] to ids[end - 1]; NULL: the triangles [first, end) */
     int64_t first, end;
-    struct tl_cluster_pass *clusters; /* or NULL; then `scene` has no vertices and no triangles, and others lists those that have a TL_SPECIAL corner */
-    int32_t *others;          /* out, or NULL: those that reach into `picture` beyond the window; end - first + 16 numbers */
+    /* or NULL; then `scene` has no vertices and no triangles, and others lists those that have a TL_SPECIAL corner */
+    struct tl_cluster_pass *clusters;
+    /* out, or NULL: those that reach into `picture` beyond the window; end - first + 16 numbers */
+    int32_t *others;
     int64_t n_others;
     const tl_window *picture; /* what all the passes draw; read when there are `others` */
     int is_first, is_last;    /* of the passes over the window: the first clears it */
@@ -197,8 +203,8 @@ typedef struct {
     int32_t *ids, *first_band, *last_band; /* n_triangles + 16 numbers each */
 } tl_bins;
 
-/* What is averaged of the samples' colours: uint8 values become light and back in 65537 steps; alpha, behind the first n_channels,
- * does not.  With straight alpha colours count as much as they are opaque. */
+/* What is averaged of the samples' colours: uint8 values become light and back in 65537 steps; alpha, behind the first
+ * n_channels, does not.  With straight alpha colours count as much as they are opaque. */
 typedef struct {
     const int32_t *decode; /* (256,), 0 to 65536; NULL: the values as they are */
     const uint8_t *encode; /* (65537,) */
@@ -206,10 +212,10 @@ typedef struct {
     int is_straight;       /* channel n_channels is alpha, and colours have not been multiplied by it */
 } tl_transfer;
 
-/* Where exact areas go.  `cells` is memory between the edges and the pixels: tl_area_stride(width) numbers a row, int32 that
- * are all TL_CELL_CLEAR, or int64 that are all 0 when is_wide.  They are left as they were found. */
+/* Where exact areas go.  `cells` is memory between the edges and the pixels: tl_area_stride(width) numbers a row, int32
+ * that are all TL_CELL_CLEAR, or int64 that are all 0 when is_wide.  They are left as they were found. */
 typedef struct {
-    float *pixels;     /* rows of stride_px pixels */
+    float *pixels; /* rows of stride_px pixels */
     int64_t stride_px;
     void *cells;
     int is_wide;
@@ -239,11 +245,11 @@ typedef struct {
     const void *colors; /* (n_triangles, n_channels), or (n_vertices, n_channels) unless is_flat */
     int n_channels, is_u8, is_flat;
     tl_blend blend;
-    int is_premultiplied; /* colours hold alpha already; otherwise the last of 2 or 4 channels is alpha */
+    int is_premultiplied;  /* colours hold alpha already; otherwise the last of 2 or 4 channels is alpha */
     const uint8_t *ground; /* uint8: the colour that all pixels get first, or NULL: they stay as they are */
-    int is_area;          /* the share of the pixel that the triangle covers counts, not its centre */
-    int32_t *packed;      /* uint8 with other than 4 channels: room for the window, a row after the other */
-    int32_t *cells;       /* is_area: tl_blend_cells(width), all TL_CELL_CLEAR, and left so */
+    int is_area;           /* the share of the pixel that the triangle covers counts, not its centre */
+    int32_t *packed;       /* uint8 with other than 4 channels: room for the window, a row after the other */
+    int32_t *cells;        /* is_area: tl_blend_cells(width), all TL_CELL_CLEAR, and left so */
 } tl_canvas;
 
 /* Cells for small triangles, or for strips of the width of a window. */
@@ -260,9 +266,10 @@ typedef struct {
     const int32_t *ids; /* planes, of the first pixel on; -1 ends the layers of a pixel */
     int64_t plane_px;
     int n_layers;
-    int n_channels;          /* 2 or 4 */
-    int is_u8;               /* colours are 0 to 255, and pixels uint8; otherwise 0 to 1 and float32 */
-    int is_flat;             /* colours are of the triangles, uint8 or float32; otherwise float32 planes (n_layers, n, n_channels) */
+    int n_channels; /* 2 or 4 */
+    int is_u8;      /* colours are 0 to 255, and pixels uint8; otherwise 0 to 1 and float32 */
+    /* colours are of the triangles, uint8 or float32; otherwise float32 planes (n_layers, n, n_channels) */
+    int is_flat;
     const void *colors;
     const float *background; /* (n_channels,), of the same range, behind all layers; or NULL */
 } tl_composite;
@@ -299,7 +306,8 @@ typedef struct {
     const double *values;     /* (n_points,) */
     const int32_t *triangles; /* (n_triangles, 3) */
     int64_t n_points, n_triangles;
-    double *planes; /* (1 + n_triangles, TL_PLANE_DOUBLES) of list_planes, or NULL: fill_planes then computes them as it goes */
+    /* (1 + n_triangles, TL_PLANE_DOUBLES) of list_planes, or NULL: fill_planes then computes them as it goes */
+    double *planes;
 } tl_valued;
 
 #define TL_PLANE_DOUBLES 8
@@ -310,7 +318,8 @@ typedef struct {
 typedef enum {
     TL_POINT_ROWS_OF = 0, /* n_rows numbers, 1 or 3 */
     TL_POINT_LENGTH = 1,  /* the length of three */
-    TL_POINT_FLOW = 2,    /* the way in pixels, x and y, from where three numbers x, y, w lie to where three others do; NaN unless w > 0 */
+    /* the way in pixels, x and y, from where three numbers x, y, w lie to where three others do; NaN unless w > 0 */
+    TL_POINT_FLOW = 2,
 } tl_point_kind;
 
 #define TL_POINT_ROWS 6

@@ -1,9 +1,10 @@
-/* Accumulate: one pass over the rows that sums the cells from the left, writes the sums as float32 and clears the cells.
+/* Accumulate: one pass over the rows that sums the cells from the left, writes the sums as float32 and clears the
+ * cells.
  * In: cells (ramp.c).  Out: pixels, and whether every sum is right.
  *
- * 32 bits hold sums below 192.  From a sum in [-2^-4, 192 - 2^-4) one cell, below 2^30 units, leads to where the two upper
- * bits of sum + 2^20 are both set before it can lead around: such a sum is seen, and the scene is drawn again in 64 bits,
- * with the same result wherever both are right.
+ * 32 bits hold sums below 192.  From a sum in [-2^-4, 192 - 2^-4) one cell, below 2^30 units, leads to where the two
+ * upper bits of sum + 2^20 are both set before it can lead around: such a sum is seen, and the scene is drawn again in
+ * 64 bits, with the same result wherever both are right.
  *
  * Based on: R. Levien, font-rs, 2015. */
 #ifndef TL_ACCUMULATE_C
@@ -74,7 +75,7 @@ TL_INLINE int accumulate_narrow(const area_plane *plane, const tl_area *target, 
     const int64_t stride = plane->stride, n_cols = plane->n_cols;
     vi seen = vi_set1(0);
     for (int64_t row = 0; row < plane->n_rows; row += 2) {
-        const int64_t below = row + 1 < plane->n_rows ? row + 1 : row; 
+        const int64_t below = row + 1 < plane->n_rows ? row + 1 : row;
         int32_t *a = plane->cells + row * stride + TL_CELL_PAD, *b = plane->cells + below * stride + TL_CELL_PAD;
         float *out_a = target->pixels + row * target->stride_px, *out_b = target->pixels + below * target->stride_px;
         vi carry_a = left_sum(a - TL_CELL_PAD, &seen), carry_b = left_sum(b - TL_CELL_PAD, &seen);
@@ -103,7 +104,8 @@ static void accumulate_wide(const area_plane *plane, const tl_area *target)
             sum += cells[k];
         for (int64_t col = 0; col < plane->n_cols; col++) {
             sum += cells[TL_CELL_PAD + col];
-            const int64_t positive = max64(sum, 0), shown = target->is_clamped ? min64(positive, 1 << TL_AREA_BITS) : positive;
+            const int64_t positive = max64(sum, 0);
+            const int64_t shown = target->is_clamped ? min64(positive, 1 << TL_AREA_BITS) : positive;
             target->pixels[row * target->stride_px + col] = (float)shown * TL_SUM_UNIT;
         }
         memset(cells, 0, sizeof *cells * (size_t)plane->stride);

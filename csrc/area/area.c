@@ -15,7 +15,6 @@
 #include "vertex/clip.c"
 #include "vertex/fixed.h"
 #include "raster/batch.c"
-#include "raster/raster.c"
 #include "raster/setup.c"
 #include "area/accumulate.c"
 #include "area/ramp.c"
@@ -24,9 +23,15 @@
 #define TL_SHORT_ROWS 8
 #define TL_EDGE_QUEUE 112
 
-/* Edges wait until a vector is full of their kind: of 1 to 8 rows, or more; that pass up to 2 columns a row, or up to 6;
- * or any number.  The last kind are no edges at all: horizontal, or without an effect here. */
-enum { TL_EDGES_LONG = TL_SHORT_ROWS, TL_EDGES_FLAT = TL_SHORT_ROWS + 1, TL_EDGES_SHALLOW = 2 * TL_EDGES_FLAT, TL_EDGES_NONE, TL_EDGE_KINDS };
+/* Edges wait until a vector is full of their kind: of 1 to 8 rows, or more; that pass up to 2 columns a row, or up to
+ * 6; or any number.  The last kind are no edges at all: horizontal, or without an effect here. */
+enum {
+    TL_EDGES_LONG = TL_SHORT_ROWS,
+    TL_EDGES_FLAT = TL_SHORT_ROWS + 1,
+    TL_EDGES_SHALLOW = 2 * TL_EDGES_FLAT,
+    TL_EDGES_NONE,
+    TL_EDGE_KINDS
+};
 
 typedef struct {
     area_plane plane;
@@ -100,7 +105,8 @@ static void push_edge(area_state *s, int64_t x0, int64_t y0, int64_t x1, int64_t
     if (dy == 0 || y0 >= p->bottom_fx || y1 <= p->top_fx || min64(x0, x1) >= p->right_fx)
         return;
     const int64_t rows = ((y1 - 1) >> p->bits) - (y0 >> p->bits);
-    const int kind = width > 6 * dy ? TL_EDGES_SHALLOW : (int)min64(rows, TL_EDGES_LONG) + (width > 2 * dy ? TL_EDGES_FLAT : 0);
+    const int kind =
+        width > 6 * dy ? TL_EDGES_SHALLOW : (int)min64(rows, TL_EDGES_LONG) + (width > 2 * dy ? TL_EDGES_FLAT : 0);
     s->edges[kind][s->n[kind]++] = (edge_record){(int32_t)x0, (int32_t)y0, dx, sign * dy};
 }
 
@@ -108,8 +114,7 @@ static void push_triangle(area_state *s, const tl_vertex_set *set, const int32_t
 {
     tl_triangle t;
     const int sign = load_triangle(set, corners, &t);
-    const tl_cull cull = s->scene->cull;
-    if (sign == 0 || (sign > 0 && cull == TL_CULL_BACK) || (sign < 0 && cull == TL_CULL_FRONT))
+    if (is_culled(sign, s->scene->cull))
         return;
     for (int k = 0; k < 3; k++) {
         const int next = k == 2 ? 0 : k + 1;
@@ -121,15 +126,9 @@ static void push_triangle(area_state *s, const tl_vertex_set *set, const int32_t
 /* Triangle i, or its pieces, by itself. */
 static __attribute__((noinline)) void push_alone(area_state *s, int64_t i)
 {
-    const int32_t *corners = s->scene->triangles + 3 * i;
-    const tl_pieces *pieces = s->scene->pieces;
-    if (!is_clipped(&s->scene->mesh, corners)) {
-        push_triangle(s, &s->scene->mesh, corners);
-        return;
-    }
-    const tl_vertex_set set = pieces ? piece_set(pieces, &s->scene->mesh) : s->scene->mesh;
-    for (int64_t k = pieces ? first_piece(pieces, i) : 0; pieces && k < pieces->n_pieces && pieces->source[k] == i; k++)
-        push_triangle(s, &set, pieces->triangles + 3 * k);
+    const triangle_parts parts = parts_of(s->scene, i);
+    for (int k = 0; k < parts.n; k++)
+        push_triangle(s, &parts.set, parts.corners + 3 * k);
 }
 
 /* The edges of the triangles in `drawn`; `turned` ones have negative area. */
@@ -145,7 +144,8 @@ TL_INLINE void push_edges(area_state *s, const lane_corners *c, vm drawn, vm tur
         const vi y0 = vi_min(c->y[k], c->y[next]), y1 = vi_max(c->y[k], c->y[next]);
         const vi dx = vi_sub(x1, x0), dy = vi_sub(y1, y0), width = vi_max(dx, vi_sub(zero, dx)), dy2 = vi_add(dy, dy);
         const vm meets_rows = vm_and(vi_gt(vi_set1(p->bottom_fx), y0), vi_gt(y1, vi_set1(p->top_fx)));
-        const vm on = vm_and(vm_and(drawn, vi_gt(dy, zero)), vm_and(meets_rows, vi_gt(vi_set1(p->right_fx), vi_min(x0, x1))));
+        const vm on =
+            vm_and(vm_and(drawn, vi_gt(dy, zero)), vm_and(meets_rows, vi_gt(vi_set1(p->right_fx), vi_min(x0, x1))));
         const vi rows = vi_sub(vi_shift_right(vi_sub(y1, one), p->bits), vi_shift_right(y0, p->bits));
         vi kind = vi_min(rows, last_kind);
         kind = vi_select(vi_gt(width, dy2), vi_add(kind, vi_set1(TL_EDGES_FLAT)), kind);
@@ -177,12 +177,14 @@ TL_INLINE void push_batch(area_state *s, int64_t i, const int32_t *corners, vm l
     const vi x_min = vi_min(vi_min(c.x[0], c.x[1]), c.x[2]), x_max = vi_max(vi_max(c.x[0], c.x[1]), c.x[2]);
     const vi y_min = vi_min(vi_min(c.y[0], c.y[1]), c.y[2]), y_max = vi_max(vi_max(c.y[0], c.y[1]), c.y[2]);
     /* a special vertex has x = INT32_MIN: its triangle is too wide, or special throughout */
-    vm alone = vm_or(vi_gt_unsigned(vi_sub(x_max, x_min), max_extent), vi_gt_unsigned(vi_sub(y_max, y_min), max_extent));
+    vm alone =
+        vm_or(vi_gt_unsigned(vi_sub(x_max, x_min), max_extent), vi_gt_unsigned(vi_sub(y_max, y_min), max_extent));
     alone = vm_and(live, vm_or(alone, vi_eq(x_min, vi_set1(TL_SPECIAL))));
     for (unsigned lanes = vm_bits(alone); lanes; lanes &= lanes - 1)
         push_alone(s, i + __builtin_ctz(lanes));
     const vm meets_rows = vm_and(vi_gt(vi_set1(p->bottom_fx), y_min), vi_gt(y_max, vi_set1(p->top_fx)));
-    /* heights are whole numbers of units: the edges of a triangle that lies left of the window add up to nothing there */
+    /* heights are whole numbers of units: the edges of a triangle that lies left of the window add up to nothing
+     * there */
     const vm meets_cols = vm_and(vi_gt(vi_set1(p->right_fx), x_min), vi_gt(x_max, vi_set1(p->left_fx)));
     vm drawn = vm_and(vm_and_not(live, alone), vm_and(meets_rows, meets_cols));
     if (!vm_any(drawn))
@@ -193,7 +195,9 @@ TL_INLINE void push_batch(area_state *s, int64_t i, const int32_t *corners, vm l
     const vd area = vd_sub(vd_mul(x1, y2), vd_mul(y1, x2));
     const vm is_positive = vd_ge(area, vd_set1(1.0)), is_negative = vd_ge(vd_set1(-1.0), area);
     const tl_cull cull = s->scene->cull;
-    const vm either = cull == TL_CULL_BACK ? is_negative : cull == TL_CULL_FRONT ? is_positive : vm_or(is_positive, is_negative);
+    const vm either = cull == TL_CULL_BACK    ? is_negative
+                      : cull == TL_CULL_FRONT ? is_positive
+                                              : vm_or(is_positive, is_negative);
     drawn = vm_and(drawn, either);
     if (vm_any(drawn))
         push_edges(s, &c, drawn, is_negative);
@@ -229,11 +233,10 @@ static int64_t draw_area(const tl_scene *scene, const tl_window *window, const t
     s.scene = scene, s.bad_row = -1, s.is_wide = target->is_wide;
     s.max_extent = 1 << (bits + TL_MAX_EDGE_BITS < 25 ? bits + TL_MAX_EDGE_BITS : 25);
     memset(s.n, 0, sizeof s.n);
-    int32_t tail[3 * TL_LANES] = {0};
-    const int64_t n_whole = scene->n_triangles / TL_LANES * TL_LANES;
-    memcpy(tail, scene->triangles + 3 * n_whole, sizeof(int32_t) * 3 * (size_t)(scene->n_triangles - n_whole));
+    const tl_share all = {.end = scene->n_triangles};
+    int32_t tail[3 * TL_LANES];
     for (int64_t i = 0; i < scene->n_triangles && s.bad_row < 0; i += TL_LANES)
-        push_batch(&s, i, i < n_whole ? scene->triangles + 3 * i : tail, vm_first(scene->n_triangles - i));
+        push_batch(&s, i, share_corners(scene, &all, i, tail), vm_first(scene->n_triangles - i));
     for (int kind = 0; kind < TL_EDGES_NONE; kind++)
         flush_edges(&s, kind, 1);
     if (s.is_wide)

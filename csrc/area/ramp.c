@@ -2,15 +2,17 @@
  * In: edges, top to bottom.  Out: cells, whose sums from the left are the area right of the edges.
  *
  * In its row an edge runs from `low` to `high` and is `height` tall.  Of pixel [k, k + 1) the area right of it is
- * Q(k + 1) - Q(k), where Q(x) = steep * (min(x, high) - low)^2 + height * max(x - high, 0), steep = height / (2 (high - low)).
- * It is computed in float64 and rounded once, to 2^-24 px^2.  Nothing in it depends on the triangle but the sign, nor on the
- * window: what two triangles share cancels to the last bit.
+ * Q(k + 1) - Q(k), where Q(x) = steep * (min(x, high) - low)^2 + height * max(x - high, 0), steep = height / (2 (high -
+ * low)).  It is computed in float64 and rounded once, to 2^-24 px^2.  Nothing in it depends on the triangle but the
+ * sign, nor on the window: what two triangles share cancels to the last bit.
  *
- * Error: x is off by less than 2^-36 px (three roundings of numbers below 2^14 + 1), Q by less than 2^-11 of a unit, so an
- * area is off by less than 0.501 units of 2^-24 px^2, and is exact right of `high`: a height is a whole number of units.
+ * Error: x is off by less than 2^-36 px (three roundings of numbers below 2^14 + 1), Q by less than 2^-11 of a unit, so
+ * an area is off by less than 0.501 units of 2^-24 px^2, and is exact right of `high`: a height is a whole number of
+ * units.
  *
- * An edge of any length and anywhere, |x_fx| < 2^62, has the same differences (add_exact_edge): where it enters and leaves a row is
- * then an exact quotient of 128-bit integers; what is rounded to float64 is only its fraction and the length of the ramp.
+ * An edge of any length and anywhere, |x_fx| < 2^62, has the same differences (add_exact_edge): where it enters and
+ * leaves a row is then an exact quotient of 128-bit integers; what is rounded to float64 is only its fraction and the
+ * length of the ramp.
  *
  * Based on: R. Levien, font-rs (signed area, accumulated along rows), 2015; D. Turner, FreeType's smooth rasterizer
  * (cells of area and cover), 2001. */
@@ -25,7 +27,8 @@
 #include "vertex/fixed.h"
 
 #define TL_AREA_BITS 24
-#define TL_CELL_PAD 16 /* cells before column 0: rows start on a cache line, and the last four take what lies left of it */
+/* cells before column 0: rows start on a cache line, and the last four take what lies left of it */
+#define TL_CELL_PAD 16
 /* A cell holds this much more than its value.  No addition changes it by more than 2^24 + 1, so a value that leaves
  * [-2^30, 2^30) shows as a sign bit before it can wrap, and `seen` keeps it. */
 #define TL_CELL_ZERO TL_CELL_CLEAR
@@ -37,8 +40,8 @@ typedef struct {
     int32_t *cells;      /* (n_rows, stride), TL_CELL_ZERO where nothing is; or NULL */
     int64_t *wide_cells; /* the same in 64 bits, which cannot overflow, 0 where nothing is */
     int32_t stride, n_cols, n_rows;
-    int64_t x_px, y_px;                  /* picture pixel of the first cell */
-    int32_t left_px, top_px;             /* the same, as near as lanes need it */
+    int64_t x_px, y_px;                           /* picture pixel of the first cell */
+    int32_t left_px, top_px;                      /* the same, as near as lanes need it */
     int32_t top_fx, bottom_fx, left_fx, right_fx; /* the window's border, likewise */
     int bits;
     int n_waiting; /* cells [at, at + 4) and what will be added to them, in the order of vi_store_quads */
@@ -54,9 +57,9 @@ typedef struct {
 
 /* The same, ready for its rows; and TL_LANES of them. */
 typedef struct {
-    double x, slope;      /* px from the pixel column of the upper end; px per unit of y_fx */
-    double steep, height; /* cell units per px of x, halved; cell units per unit of y_fx */
-    int32_t col, row;     /* of the upper end, in the plane */
+    double x, slope;           /* px from the pixel column of the upper end; px per unit of y_fx */
+    double steep, height;      /* cell units per px of x, halved; cell units per unit of y_fx */
+    int32_t col, row;          /* of the upper end, in the plane */
     int32_t t, t_first, t_end; /* y_fx from the upper end: of the top of `row`, of the part in the plane */
 } edge_one;
 
@@ -65,7 +68,10 @@ typedef struct {
     vi col, row, t, t_first, t_end;
 } edge_lanes;
 
-static inline int32_t clamp32(int64_t a, int64_t low, int64_t high) { return (int32_t)(a < low ? low : a > high ? high : a); }
+static inline int32_t clamp32(int64_t a, int64_t low, int64_t high)
+{
+    return (int32_t)(a < low ? low : a > high ? high : a);
+}
 TL_INLINE vi vi_clamp(vi a, vi low, vi high) { return vi_min(vi_max(a, low), high); }
 
 TL_INLINE edge_lanes setup_edge_lanes(const area_plane *plane, const int32_t *records)
@@ -109,8 +115,8 @@ static inline edge_one setup_edge(const area_plane *plane, const edge_record *r)
     };
 }
 
-/* Adds what waits to the cells.  They are all over the memory, and beyond the second-level cache: to compute first, fetch
- * meanwhile and add later takes a third off 200,000 triangles of 8 px. */
+/* Adds what waits to the cells.  They are all over the memory, and beyond the second-level cache: to compute first,
+ * fetch meanwhile and add later takes a third off 200,000 triangles of 8 px. */
 TL_INLINE void flush_quads(area_plane *plane, int is_wide)
 {
     const int n = plane->n_waiting;
@@ -167,15 +173,18 @@ TL_INLINE void add_row(area_plane *plane, int is_wide, int n_quads, vd xa, vd xb
         before = q;
     }
     cells[n - 1] = vi_sub(vi_round(height), area);
-    const vi start = vi_add(vi_mul(row, vi_set1(plane->stride)), vi_set1(TL_CELL_PAD)), c = vi_add(col, vi_round(first));
-    for (int k = 0; k < n; k += 4) { /* cells beside the frame: all that is left of it counts as one, the rest as none */
+    const vi start = vi_add(vi_mul(row, vi_set1(plane->stride)), vi_set1(TL_CELL_PAD));
+    const vi c = vi_add(col, vi_round(first));
+    /* cells beside the frame: all that is left of it counts as one, the rest as none */
+    for (int k = 0; k < n; k += 4) {
         const vi at = vi_clamp(vi_add(c, vi_set1(k)), vi_set1(-4), vi_set1(plane->n_cols));
         add_quads(plane, is_wide, vi_add(start, at), cells + k);
     }
 }
 
 /* TL_LANES edges at a time, all of n_rows rows. */
-TL_INLINE void add_short_edges(area_plane *plane, int is_wide, int n_quads, const edge_record *records, int n, int n_rows)
+TL_INLINE void add_short_edges(area_plane *plane, int is_wide, int n_quads, const edge_record *records, int n,
+                               int n_rows)
 {
     const vi last_row = vi_set1(plane->n_rows - 1), zero = vi_set1(0);
     for (int i = 0; i < n; i += TL_LANES) {
@@ -184,7 +193,8 @@ TL_INLINE void add_short_edges(area_plane *plane, int is_wide, int n_quads, cons
         vd xa = vd_add(e.x, vd_mul(vd_from_vi(ta), e.slope));
         for (int j = 0; j < n_rows; j++) {
             const vi tb = vi_clamp(vi_add(e.t, vi_set1((j + 1) << plane->bits)), e.t_first, e.t_end);
-            const vd xb = vd_add(e.x, vd_mul(vd_from_vi(tb), e.slope)), height = vd_mul(vd_from_vi(vi_sub(tb, ta)), e.height);
+            const vd xb = vd_add(e.x, vd_mul(vd_from_vi(tb), e.slope));
+            const vd height = vd_mul(vd_from_vi(vi_sub(tb, ta)), e.height);
             const vi row = vi_clamp(vi_add(e.row, vi_set1(j)), zero, last_row); /* rows outside have no height */
             add_row(plane, is_wide, n_quads, xa, xb, e.steep, height, e.col, row);
             ta = tb;
@@ -214,13 +224,16 @@ TL_INLINE void add_long_edges(area_plane *plane, int is_wide, int n_quads, const
 }
 
 /* One row of one edge that passes many pixels, from low to high px right of column col; TL_LANES pixels at a time. */
-TL_INLINE void add_wide_row(area_plane *plane, int is_wide, int64_t row, int64_t col, double low, double high, double steep, double height)
+TL_INLINE void add_wide_row(area_plane *plane, int is_wide, int64_t row, int64_t col, double low, double high,
+                            double steep, double height)
 {
     if (col >= plane->n_cols)
         return;
-    /* what lies left of column 0 belongs to the cell before it: left_sum would take the rest there for less than nothing */
+    /* what lies left of column 0 belongs to the cell before it: left_sum would take the rest there for less than
+     * nothing */
     const int64_t first = col < 0 ? -col - 1 : 0, passed = (int64_t)high + 2;
-    const int64_t visible = passed < plane->n_cols - col ? passed : plane->n_cols - col, end = visible > first ? visible : first + 1;
+    const int64_t visible = passed < plane->n_cols - col ? passed : plane->n_cols - col;
+    const int64_t end = visible > first ? visible : first + 1;
     const vd zero = vd_set1(0.0), one = vd_set1(1.0), lo = vd_set1(low), hi = vd_set1(high);
     const int64_t at = row * plane->stride + TL_CELL_PAD + col;
     vi before = vi_set1(0);
@@ -230,7 +243,8 @@ TL_INLINE void add_wide_row(area_plane *plane, int is_wide, int64_t row, int64_t
         const vd a = vd_min(vd_max(x, lo), hi), b = vd_min(vd_max(next, lo), hi);
         const vd mean = vd_mul(vd_sub(vd_add(a, b), vd_add(lo, lo)), vd_set1(steep));
         const vd right = vd_mul(vd_min(vd_max(vd_sub(next, hi), zero), one), vd_set1(height));
-        const vi area = vi_round(vd_add(vd_mul(mean, vd_sub(b, a)), right)), cells = vi_sub(area, vi_shift_in(area, before));
+        const vi area = vi_round(vd_add(vd_mul(mean, vd_sub(b, a)), right));
+        const vi cells = vi_sub(area, vi_shift_in(area, before));
         before = area;
         if (is_wide) {
             int32_t values[TL_LANES];
@@ -253,10 +267,12 @@ TL_INLINE void add_shallow_edges(area_plane *plane, int is_wide, const edge_reco
         const edge_one e = setup_edge(plane, records + i);
         const int bits = plane->bits;
         for (int j = e.row < 0 ? -e.row : 0; ((int64_t)j << bits) + e.t < e.t_end; j++) {
-            const int32_t t = e.t + (j << bits), ta = clamp32(t, e.t_first, e.t_end), tb = clamp32((int64_t)t + (1 << bits), e.t_first, e.t_end);
+            const int32_t t = e.t + (j << bits), ta = clamp32(t, e.t_first, e.t_end);
+            const int32_t tb = clamp32((int64_t)t + (1 << bits), e.t_first, e.t_end);
             const double xa = e.x + (double)ta * e.slope, xb = e.x + (double)tb * e.slope;
             const double low = xa < xb ? xa : xb, high = xa < xb ? xb : xa, first = floor(low);
-            add_wide_row(plane, is_wide, e.row + j, e.col + (int64_t)first, low - first, high - first, e.steep, (tb - ta) * e.height);
+            add_wide_row(plane, is_wide, e.row + j, e.col + (int64_t)first, low - first, high - first, e.steep,
+                         (tb - ta) * e.height);
         }
     }
 }
@@ -275,7 +291,8 @@ static inline int32_t exact_area(int64_t k, double low, double high, double stee
 }
 
 /* One row, from low to high px right of column col. */
-static void add_exact_row(area_plane *plane, int64_t row, int64_t col, double low, double high, double steep, double height)
+static void add_exact_row(area_plane *plane, int64_t row, int64_t col, double low, double high, double steep,
+                          double height)
 {
     if (col >= plane->n_cols)
         return;
@@ -302,7 +319,8 @@ static void add_exact_edge(area_plane *plane, int64_t x0, int64_t y0, int64_t x1
     const int bits = plane->bits;
     const int64_t unit = (int64_t)1 << bits;
     const tl_int128 dx = (tl_int128)x1 - x0, dy = (tl_int128)y1 - y0, divisor = dy * unit;
-    const int64_t first = max64(y0 >> bits, plane->y_px), end = min64(((y1 - 1) >> bits) + 1, plane->y_px + plane->n_rows);
+    const int64_t first = max64(y0 >> bits, plane->y_px);
+    const int64_t end = min64(((y1 - 1) >> bits) + 1, plane->y_px + plane->n_rows);
     if (dy == 0)
         return;
     const double height = sign * (double)(1 << TL_AREA_BITS) / (double)unit;
@@ -314,7 +332,8 @@ static void add_exact_edge(area_plane *plane, int64_t x0, int64_t y0, int64_t x1
         floor_divide_128(step < 0 ? xa + step : xa, divisor, &quotient, &rest);
         const int64_t whole = (x0 >> bits) + (int64_t)quotient;
         const double low = (double)rest / (double)divisor, high = low + fabs((double)step) / (double)divisor;
-        add_exact_row(plane, row - plane->y_px, whole - plane->x_px, low, high, steep, (double)(int64_t)(tb - ta) * height);
+        add_exact_row(plane, row - plane->y_px, whole - plane->x_px, low, high, steep,
+                      (double)(int64_t)(tb - ta) * height);
     }
 }
 

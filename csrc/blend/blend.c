@@ -1,9 +1,10 @@
 /* Blend: the pass that puts the colours of triangles into the canvas, one triangle after the other.
  * In: vertex records, triangles and their colours.  Out: pixels.
  *
- * Nothing is drawn out of order: one queue of triangles, whose setup and row ends are computed a vector of triangles at a time,
- * as in rows.c, and whose rows are then drawn triangle by triangle.  What 32-bit lanes cannot take empties the queue and is drawn
- * by itself.  Bands of rows see the same triangles in the same order, so threads cannot change a bit. */
+ * Nothing is drawn out of order: one queue of triangles, whose setup and row ends are computed a vector of triangles at
+ * a time, as in rows.c, and whose rows are then drawn triangle by triangle.  What 32-bit lanes cannot take empties the
+ * queue and is drawn by itself.  Bands of rows see the same triangles in the same order, so threads cannot change a
+ * bit. */
 #ifndef TL_BLEND_C
 #define TL_BLEND_C
 
@@ -17,9 +18,7 @@
 #include "vertex/snap.c"
 #include "raster/alone.c"
 #include "raster/batch.c"
-#include "raster/raster.c"
 #include "raster/rows.c"
-#include "raster/setup.c"
 #include "blend/blend_area.c"
 #include "blend/mix.c"
 #include "blend/mix.h"
@@ -38,46 +37,26 @@ typedef struct {
 /* Triangle i, or its pieces, by itself. */
 static __attribute__((noinline)) void blend_alone(blend_state *b, int64_t i)
 {
-    const tl_scene *scene = b->scene;
-    const int32_t *corners = scene->triangles + 3 * i;
-    const tl_pieces *pieces = scene->pieces;
-    tl_vertex_set set = scene->mesh;
-    int64_t piece = 0, end = 1;
-    const int is_cut = is_clipped(&set, corners);
-    if (is_cut) {
-        if (!pieces)
-            return;
-        set = piece_set(pieces, &scene->mesh);
-        piece = first_piece(pieces, i);
-        for (end = piece; end < pieces->n_pieces && pieces->source[end] == i;)
-            end++;
-        corners = pieces->triangles + 3 * piece;
-    }
-    if (b->is_flat && !begin_flat(b, i))
+    const triangle_parts parts = parts_of(b->scene, i);
+    if (!parts.n || (b->is_flat && !begin_flat(b, i)))
         return;
-    for (; piece < end; piece++, corners += 3) {
+    for (int k = 0; k < parts.n; k++) {
+        const int32_t *corners = parts.corners + 3 * k;
         if (!b->is_flat)
-            begin_gouraud(b, i, &set, corners, is_cut);
-        draw_triangle(&set, corners, (int32_t)i, scene, b->window, &b->target, TL_SINK_BLEND);
+            begin_gouraud(b, i, &parts.set, corners, parts.is_cut);
+        draw_triangle(&parts.set, corners, (int32_t)i, b->scene, b->window, &b->target, TL_SINK_BLEND);
     }
 }
 
 /* Row ends of TL_LANES triangles of at most 62 x 62 samples: see rows.c for why they are exact. */
 TL_INLINE void setup_blend_rows(const lane_triangles *t, vi n_cols, int n_rows, vi stride, blend_rows *rows)
 {
-    const vi zero = vi_set1(0), one = vi_set1(1);
     lane_edges e;
     sort_edges(t, &e);
     vi sample = t->sample;
     for (int row = 0; row < n_rows; row++) {
-        vi quotient[3];
-        for (int side = 0; side < 3; side++) {
-            quotient[side] = vi_floor(vf_mul(e.start[side], e.inverse[side]));
-            e.start[side] = vf_add(e.start[side], e.step[side]);
-        }
-        const vi left = vi_select(e.third_is_left, vi_min(quotient[0], quotient[2]), quotient[0]);
-        const vi right = vi_select(e.third_is_right, vi_min(quotient[1], quotient[2]), quotient[1]);
-        const vi begin = vi_max(vi_sub(zero, left), zero), end = vi_min(vi_add(right, one), n_cols);
+        vi begin, end;
+        next_row(&e, n_cols, &begin, &end);
         vi_store(rows->first[row], vi_add(sample, begin));
         vi_store(rows->n[row], vi_sub(end, begin));
         sample = vi_add(sample, stride);
@@ -99,7 +78,8 @@ static __attribute__((noinline)) void flush_blend(blend_pass *p)
         pop(&p->batch, TL_SINK_BLEND, q, i, n, &t, no_depth);
         for (int k = 0; k < end; k++)
             max_rows = q->size[i + k] >> 16 > max_rows ? q->size[i + k] >> 16 : max_rows;
-        setup_blend_rows(&t, vi_and(vi_load(q->size + i), vi_set1(0xffff)), max_rows, vi_set1((int32_t)b->stride), &rows);
+        setup_blend_rows(&t, vi_and(vi_load(q->size + i), vi_set1(0xffff)), max_rows, vi_set1((int32_t)b->stride),
+                         &rows);
         for (int k = 0; k < end; k++) {
             const int64_t id = q->id[i + k];
             if (!b->is_flat)
@@ -115,29 +95,11 @@ static __attribute__((noinline)) void flush_blend(blend_pass *p)
 TL_INLINE void blend_batch(blend_pass *p, const int32_t *corners, vi id, vm live)
 {
     batch_state *s = &p->batch;
-    const batch_limits *limits = &s->limits;
-    const int bits = s->window->subpixel_bits;
-    const vi zero = vi_set1(0), max_extent = vi_set1(limits->max_extent);
-    if (has_bad_index(corners, limits->last_vertex)) {
-        int32_t ids[TL_MAX_LANES];
-        vi_store(ids, id);
-        s->bad_row = ids[0];
+    lane_batch b;
+    if (!load_batch(s, corners, id, live, &b))
         return;
-    }
-    lane_corners c;
-    load_corners(s, corners, &c);
-    const vi x_min = vi_min(vi_min(c.x[0], c.x[1]), c.x[2]), x_max = vi_max(vi_max(c.x[0], c.x[1]), c.x[2]);
-    const vi y_min = vi_min(vi_min(c.y[0], c.y[1]), c.y[2]), y_max = vi_max(vi_max(c.y[0], c.y[1]), c.y[2]);
-    /* a special vertex has x = INT32_MIN: its triangle is too wide, or special throughout */
-    vm alone = vm_or(vi_gt_unsigned(vi_sub(x_max, x_min), max_extent), vi_gt_unsigned(vi_sub(y_max, y_min), max_extent));
-    alone = vm_and(live, vm_or(alone, vi_eq(x_min, vi_set1(limits->special_x))));
-    const vi area = area_lanes(&c), absolute = s->scene->cull == TL_CULL_NONE ? vi_max(area, vi_sub(zero, area)) : area;
-    const vi col = vi_max(extent_pixels(x_min, limits->round.first, bits), vi_set1(limits->left));
-    const vi n_cols = vi_sub(vi_min(extent_pixels(x_max, limits->round.end, bits), vi_set1(limits->right)), col);
-    const vi row = vi_max(extent_pixels(y_min, limits->round.first, bits), vi_set1(limits->top));
-    const vi n_rows = vi_sub(vi_min(extent_pixels(y_max, limits->round.end, bits), vi_set1(limits->bottom)), row);
-    vm drawn = vm_and(live, vm_and(vi_gt(absolute, zero), vi_gt(vi_min(n_cols, n_rows), zero)));
-    drawn = vm_and_not(drawn, alone);
+    find_boxes(s, &b);
+    vm drawn = vm_and(b.drawn, has_box(&b)), alone = b.alone;
     if (TL_LANES == 1) { /* one lane gains nothing from the rows above */
         alone = vm_or(alone, drawn);
         drawn = vm_and_not(drawn, alone);
@@ -148,14 +110,14 @@ TL_INLINE void blend_batch(blend_pass *p, const int32_t *corners, vi id, vm live
         for (unsigned lanes = vm_bits(alone); lanes; lanes &= lanes - 1) {
             const int lane = __builtin_ctz(lanes);
             const vm before = vm_first(lane);
-            push(&s->rows, vm_and(drawn, before), col, row, n_cols, n_rows, id);
+            push(&s->rows, vm_and(drawn, before), b.col, b.row, b.n_cols, b.n_rows, id);
             drawn = vm_and_not(drawn, before);
             flush_blend(p);
             blend_alone(&p->mix, ids[lane]);
         }
     }
     if (vm_any(drawn)) {
-        push(&s->rows, drawn, col, row, n_cols, n_rows, id);
+        push(&s->rows, drawn, b.col, b.row, b.n_cols, b.n_rows, id);
         if (s->rows.n > TL_QUEUE - TL_LANES)
             flush_blend(p);
     }
@@ -169,7 +131,8 @@ static int64_t blend_batches(blend_pass *p)
     const tl_share all = {.first = 0, .end = scene->n_triangles};
     for (int64_t i = 0; i < all.end && s->bad_row < 0; i += TL_LANES) {
         int32_t corners[3 * TL_LANES];
-        blend_batch(p, share_corners(scene, &all, i, corners), vi_add(vi_set1((int32_t)i), vi_iota()), vm_first(all.end - i));
+        blend_batch(p, share_corners(scene, &all, i, corners), vi_add(vi_set1((int32_t)i), vi_iota()),
+                    vm_first(all.end - i));
     }
     flush_blend(p);
     return s->bad_row;
@@ -177,7 +140,8 @@ static int64_t blend_batches(blend_pass *p)
 
 static tl_mix mix_of(const tl_canvas *canvas)
 {
-    const int has_alpha = canvas->n_channels == 2 || canvas->n_channels == 4, is_straight = has_alpha && !canvas->is_premultiplied;
+    const int has_alpha = canvas->n_channels == 2 || canvas->n_channels == 4;
+    const int is_straight = has_alpha && !canvas->is_premultiplied;
     switch (canvas->blend) {
     case TL_BLEND_REPLACE: return is_straight ? TL_MIX_REPLACE_STRAIGHT : TL_MIX_REPLACE;
     case TL_BLEND_OVER: return is_straight ? TL_MIX_OVER_STRAIGHT : TL_MIX_OVER_PREMULTIPLIED;
@@ -188,32 +152,12 @@ static tl_mix mix_of(const tl_canvas *canvas)
     }
 }
 
-static void start_batch(batch_state *s, const tl_scene *scene, const tl_window *window, const tl_target *target)
-{
-    const int bits = window->subpixel_bits, is_back = scene->cull == TL_CULL_BACK;
-    const int64_t farthest = (int64_t)1 << 30;
-    s->scene = scene, s->window = window, s->target = target, s->bad_row = -1;
-    s->rows.n = 0;
-    s->limits = (batch_limits){
-        .left = (int32_t)window->x_px,
-        .top = (int32_t)window->y_px,
-        .right = (int32_t)min64(window->x_px + window->width, farthest),
-        .bottom = (int32_t)min64(window->y_px + window->height, farthest),
-        .max_extent = TL_MAX_BOX_PX << (bits < 8 ? bits : 8),
-        .round = round_extent(window),
-        .special_x = (int32_t)((uint32_t)TL_SPECIAL - (uint32_t)scene->mesh.sample_x_fx),
-        .second = is_back ? 2 : 1,
-        .third = is_back ? 1 : 2,
-        .last_vertex = vi_set1((int32_t)(scene->mesh.n_vertices - 1)),
-    };
-}
-
 /* A window of fewer than 2^31 samples. */
 static int64_t blend_window(const tl_scene *scene, const tl_window *window, const tl_canvas *canvas)
 {
     blend_pass p;
     blend_state *b = &p.mix;
-    const int64_t farthest = (int64_t)1 << 30, n_channels = canvas->n_channels;
+    const int64_t n_channels = canvas->n_channels;
     b->scene = scene, b->window = window, b->canvas = canvas;
     b->packed = canvas->is_u8 ? canvas->packed ? canvas->packed : canvas->pixels : NULL;
     b->floats = canvas->is_u8 ? NULL : canvas->pixels;
@@ -225,13 +169,12 @@ static int64_t blend_window(const tl_scene *scene, const tl_window *window, cons
     for (int64_t row = 0; canvas->ground && row < window->height; row++)
         put_solid(b->packed + row * b->stride, window->width, ground);
     for (int64_t row = 0; canvas->packed && !canvas->ground && row < window->height; row++)
-        pack_u8((const uint8_t *)canvas->pixels + row * canvas->stride_px * n_channels, window->width, canvas->n_channels,
-                canvas->packed + row * b->stride);
+        pack_u8((const uint8_t *)canvas->pixels + row * canvas->stride_px * n_channels, window->width,
+                canvas->n_channels, canvas->packed + row * b->stride);
     int64_t bad_row = -1;
     if (canvas->is_area) {
         bad_row = blend_areas(b);
-    } else if (scene->method == TL_METHOD_AUTO && window->x_px > -farthest && window->x_px < farthest && window->y_px > -farthest &&
-               window->y_px < farthest) {
+    } else if (scene->method == TL_METHOD_AUTO && is_near(window)) {
         start_batch(&p.batch, scene, window, &b->target);
         bad_row = blend_batches(&p);
     } else {
@@ -245,8 +188,8 @@ static int64_t blend_window(const tl_scene *scene, const tl_window *window, cons
     return bad_row;
 }
 
-/* Fewer triangles than these are set up for each band anew, so that a band is still in the cache when it is drawn over: half of a
- * frame of 33 MB in one triangle takes 1.1 ms instead of 1.7. */
+/* Fewer triangles than these are set up for each band anew, so that a band is still in the cache when it is drawn over:
+ * half of a frame of 33 MB in one triangle takes 1.1 ms instead of 1.7. */
 #define TL_FEW_TRIANGLES 64
 #define TL_BAND_BYTES (1 << 18)
 
@@ -255,7 +198,8 @@ static int64_t blend(const tl_scene *scene, const tl_window *window, const tl_ca
     const int64_t pixel_bytes = canvas->n_channels * (canvas->is_u8 ? 1 : 4);
     const int64_t fitting = max64(1, (((int64_t)1 << 31) - 1) / canvas->stride_px);
     const int64_t hot = max64(1, TL_BAND_BYTES / (canvas->stride_px * pixel_bytes));
-    const int64_t rows_at_once = canvas->ground && scene->n_triangles < TL_FEW_TRIANGLES ? min64(fitting, hot) : fitting;
+    const int64_t rows_at_once =
+        canvas->ground && scene->n_triangles < TL_FEW_TRIANGLES ? min64(fitting, hot) : fitting;
     for (int64_t row = 0; row < window->height; row += rows_at_once) {
         tl_window band = *window;
         tl_canvas part = *canvas;

@@ -1,9 +1,9 @@
 /* Blend, by area: the pass that gives each triangle what of each pixel's square lies in it.
  * In: triangles, one after the other.  Out: pixels.
  *
- * Small triangles take places below one another in an atlas of cells, moved there by whole pixels, which changes no bit: so edges
- * of many triangles fill the lanes of ramp.c.  Only then are the cells summed and the colours blended, triangle by triangle.
- * A triangle that is too large for that empties the atlas and is drawn by itself. */
+ * Small triangles take places below one another in an atlas of cells, moved there by whole pixels, which changes no
+ * bit: so edges of many triangles fill the lanes of ramp.c.  Only then are the cells summed and the colours blended,
+ * triangle by triangle.  A triangle that is too large for that empties the atlas and is drawn by itself. */
 #ifndef TL_BLEND_AREA_C
 #define TL_BLEND_AREA_C
 
@@ -15,7 +15,6 @@
 #include "vertex/fixed.h"
 #include "vertex/snap.c"
 #include "raster/batch.c"
-#include "raster/raster.c"
 #include "area/area.c"
 #include "area/ramp.c"
 #include "blend/blend_strip.c"
@@ -29,11 +28,13 @@ typedef struct {
     area_state area; /* its plane: the atlas */
     blend_state *mix;
     int n, n_atlas_rows; /* triangles, and rows of theirs */
-    int32_t id[TL_ATLAS_TRIANGLES + TL_MAX_LANES], top[TL_ATLAS_TRIANGLES + TL_MAX_LANES], n_rows[TL_ATLAS_TRIANGLES + TL_MAX_LANES];
-    int32_t col[TL_ATLAS_TRIANGLES + TL_MAX_LANES], row[TL_ATLAS_TRIANGLES + TL_MAX_LANES]; /* of the window: where their first cells belong */
+    int32_t id[TL_ATLAS_TRIANGLES + TL_MAX_LANES], top[TL_ATLAS_TRIANGLES + TL_MAX_LANES],
+        n_rows[TL_ATLAS_TRIANGLES + TL_MAX_LANES];
+    /* of the window: where their first cells belong */
+    int32_t col[TL_ATLAS_TRIANGLES + TL_MAX_LANES], row[TL_ATLAS_TRIANGLES + TL_MAX_LANES];
 } area_pass;
 
-/* ---- small triangles ----------------------------------------------------------------------------------------------- */
+/* ---- small triangles --------------------------------------------------------------------------------------------- */
 
 /* Blends what the atlas holds, and clears it. */
 static __attribute__((noinline)) void flush_atlas(area_pass *p)
@@ -94,7 +95,7 @@ static void push_atlas(area_pass *p, vm m, const lane_corners *c, vm turned, vi 
         flush_atlas(p);
 }
 
-/* ---- the scene ----------------------------------------------------------------------------------------------------- */
+/* ---- the scene --------------------------------------------------------------------------------------------------- */
 
 /* Setup and cull of TL_LANES triangles, which come after all that wait. */
 TL_INLINE void blend_area_batch(area_pass *p, int64_t i, const int32_t *corners, vm live)
@@ -116,7 +117,8 @@ TL_INLINE void blend_area_batch(area_pass *p, int64_t i, const int32_t *corners,
     const vi last_col = vi_shift_right(x_max, bits), last_row = vi_shift_right(y_max, bits);
     const vi n_cols = vi_sub(last_col, col), n_rows = vi_sub(last_row, row); /* less one */
     /* the cell right of the last column holds what is left of it.  A special vertex has x = INT32_MIN. */
-    vm alone = vm_or(vi_gt_unsigned(vi_sub(x_max, x_min), max_extent), vi_gt_unsigned(vi_sub(y_max, y_min), max_extent));
+    vm alone =
+        vm_or(vi_gt_unsigned(vi_sub(x_max, x_min), max_extent), vi_gt_unsigned(vi_sub(y_max, y_min), max_extent));
     alone = vm_or(alone, vm_or(vi_gt(n_cols, vi_set1(TL_ATLAS_COLS - 2)), vi_gt(n_rows, vi_set1(TL_ATLAS_COLS - 1))));
     alone = vm_and(live, vm_or(alone, vi_eq(x_min, vi_set1(TL_SPECIAL))));
     const vi right = vi_set1((int32_t)min64(window->x_px + window->width, INT32_MAX));
@@ -132,7 +134,9 @@ TL_INLINE void blend_area_batch(area_pass *p, int64_t i, const int32_t *corners,
     const vd area = vd_sub(vd_mul(x1, y2), vd_mul(y1, x2));
     const vm is_positive = vd_ge(area, vd_set1(1.0)), is_negative = vd_ge(vd_set1(-1.0), area);
     const tl_cull cull = scene->cull;
-    drawn = vm_and(drawn, cull == TL_CULL_BACK ? is_negative : cull == TL_CULL_FRONT ? is_positive : vm_or(is_positive, is_negative));
+    drawn = vm_and(drawn, cull == TL_CULL_BACK    ? is_negative
+                          : cull == TL_CULL_FRONT ? is_positive
+                                                  : vm_or(is_positive, is_negative));
     const vi rows = vi_add(n_rows, vi_set1(1));
     for (unsigned lanes = vm_bits(alone); lanes; lanes &= lanes - 1) {
         const int lane = __builtin_ctz(lanes);
@@ -152,7 +156,8 @@ TL_INLINE void blend_area_batch(area_pass *p, int64_t i, const int32_t *corners,
 static int64_t blend_areas(blend_state *b)
 {
     const tl_scene *scene = b->scene;
-    const tl_window *window = b->window, atlas = {0, 0, TL_ATLAS_COLS, TL_ATLAS_ROWS, window->subpixel_bits, TL_TEST_SAMPLE};
+    const tl_window *window = b->window,
+                    atlas = {0, 0, TL_ATLAS_COLS, TL_ATLAS_ROWS, window->subpixel_bits, TL_TEST_SAMPLE};
     const int64_t far = (int64_t)1 << 30;
     if (window->x_px <= -far || window->x_px >= far || window->y_px <= -far || window->y_px >= far) {
         const int64_t bad_row = first_bad_row(scene->triangles, scene->n_triangles, scene->mesh.n_vertices);

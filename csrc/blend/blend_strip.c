@@ -1,8 +1,8 @@
 /* Blend, by area: a triangle by itself, by strips of rows whose cells stay in the first-level cache.
  * In: a triangle, or the pieces that clip planes leave of it.  Out: pixels.
  *
- * The areas are those of area.c, in cells that no other triangle shares.  They are summed from the left, and what is covered
- * blends; between two edges lies a run as it is without areas.
+ * The areas are those of area.c, in cells that no other triangle shares.  They are summed from the left, and what is
+ * covered blends; between two edges lies a run as it is without areas.
  *
  * Based on: R. Levien, font-rs, 2015. */
 #ifndef TL_BLEND_STRIP_C
@@ -36,7 +36,8 @@ TL_INLINE void mix_block(blend_state *b, int64_t at, vm m, vi sums, int is_u8, t
         const int first = __builtin_ctz(bits), n = 32 - __builtin_clz(bits) - first;
         color_run(b, at + first, n);
         memmove(b->source + first, b->source, sizeof *b->source * (size_t)n);
-        memmove(b->source_f32 + first * b->n_channels, b->source_f32, sizeof *b->source_f32 * (size_t)(n * b->n_channels));
+        memmove(b->source_f32 + first * b->n_channels, b->source_f32,
+                sizeof *b->source_f32 * (size_t)(n * b->n_channels));
     }
     if (is_u8)
         mix_block_u8(b, at, on, area, mode);
@@ -52,8 +53,8 @@ typedef struct {
     int has_left; /* four cells before column 0 count */
 } cell_block;
 
-/* Sums the cells of each row from the left, blends, and clears the cells.  What is covered whole, from one edge to the next, is a
- * run as it is without areas. */
+/* Sums the cells of each row from the left, blends, and clears the cells.  What is covered whole, from one edge to the
+ * next, is a run as it is without areas. */
 TL_INLINE void blend_cells(blend_state *b, const cell_block *c, int is_u8, tl_mix mode)
 {
     const vi bias = vi_set1(TL_CELL_ZERO);
@@ -87,7 +88,8 @@ TL_INLINE void blend_cells(blend_state *b, const cell_block *c, int is_u8, tl_mi
     }
 }
 
-/* Fetches the pixels of n_rows x n_cols samples: what is done to a row is too long for the next one's loads to start early. */
+/* Fetches the pixels of n_rows x n_cols samples: what is done to a row is too long for the next one's loads to start
+ * early. */
 TL_INLINE void fetch_pixels(const blend_state *b, int64_t at, int64_t n_rows, int64_t n_cols)
 {
     const int64_t pixel_bytes = b->canvas->is_u8 ? 4 : 4 * b->n_channels;
@@ -105,7 +107,10 @@ static __attribute__((noinline)) void blend_cells_u8(blend_state *b, const cell_
 }
 
 /* One copy for all modes: memory is the limit. */
-static __attribute__((noinline)) void blend_cells_f32(blend_state *b, const cell_block *c) { blend_cells(b, c, 0, b->mode); }
+static __attribute__((noinline)) void blend_cells_f32(blend_state *b, const cell_block *c)
+{
+    blend_cells(b, c, 0, b->mode);
+}
 
 static void blend_block(blend_state *b, const cell_block *c)
 {
@@ -119,7 +124,8 @@ static void blend_block(blend_state *b, const cell_block *c)
 static void add_edge(area_plane *plane, int64_t x0, int64_t y0, int64_t x1, int64_t y1)
 {
     const int sign = y0 < y1 ? -1 : 1, bits = plane->bits;
-    const int64_t limit = (int64_t)1 << 30, max_extent = (int64_t)1 << (bits + TL_MAX_EDGE_BITS < 25 ? bits + TL_MAX_EDGE_BITS : 25);
+    const int64_t limit = (int64_t)1 << 30;
+    const int64_t max_extent = (int64_t)1 << (bits + TL_MAX_EDGE_BITS < 25 ? bits + TL_MAX_EDGE_BITS : 25);
     if (sign > 0) {
         const int64_t x = x0, y = y0;
         x0 = x1, y0 = y1, x1 = x, y1 = y;
@@ -152,7 +158,8 @@ static void strip_columns(const tl_triangle *t, double top_fx, double bottom_fx,
     double low = INFINITY, high = -INFINITY;
     for (int k = 0; k < 3; k++) {
         const int next = k == 2 ? 0 : k + 1;
-        const double x0 = (double)t->x_fx[k], x1 = (double)t->x_fx[next], y0 = (double)t->y_fx[k], y1 = (double)t->y_fx[next];
+        const double x0 = (double)t->x_fx[k], x1 = (double)t->x_fx[next], y0 = (double)t->y_fx[k];
+        const double y1 = (double)t->y_fx[next];
         const double first = greater(lesser(y0, y1), top_fx), end = lesser(greater(y0, y1), bottom_fx);
         if (first > end)
             continue;
@@ -165,7 +172,8 @@ static void strip_columns(const tl_triangle *t, double top_fx, double bottom_fx,
     *right = t->is_narrow ? floor(high / unit) + 2.0 : INFINITY;
 }
 
-/* Rows of a strip n_cols wide: as many as leave its cells in half of the first-level cache, at least a vector of them. */
+/* Rows of a strip n_cols wide: as many as leave its cells in half of the first-level cache, at least a vector of
+ * them. */
 static int strip_rows(int64_t n_cols)
 {
     const int64_t rows = 4096 / tl_area_stride(n_cols) / TL_STRIP_ROWS * TL_STRIP_ROWS;
@@ -181,14 +189,17 @@ static void blend_strip(blend_state *b, const tl_triangle *pieces, int64_t n, in
     double left = INFINITY, right = -INFINITY;
     for (int64_t i = 0; i < n; i++) {
         double from, to;
-        strip_columns(pieces + i, (double)(window->y_px + row) * unit, (double)(window->y_px + row + n_rows) * unit, bits, &from, &to);
+        strip_columns(pieces + i, (double)(window->y_px + row) * unit, (double)(window->y_px + row + n_rows) * unit,
+                      bits, &from, &to);
         left = lesser(left, from), right = greater(right, to);
     }
-    left = greater(left - (double)window->x_px, 0.0), right = lesser(right - (double)window->x_px, (double)window->width);
+    left = greater(left - (double)window->x_px, 0.0),
+    right = lesser(right - (double)window->x_px, (double)window->width);
     if (!(left < right))
         return;
     const int64_t col = (int64_t)left;
-    const tl_window strip = {window->x_px + col, window->y_px + row, (int64_t)right - col, n_rows, bits, TL_TEST_SAMPLE};
+    const tl_window strip = {window->x_px + col, window->y_px + row, (int64_t)right - col, n_rows, bits,
+                             TL_TEST_SAMPLE};
     area_plane plane;
     fetch_pixels(b, row * b->stride + col, n_rows, min64(strip.width, 128));
     place_plane(&strip, &(tl_area){.cells = b->canvas->cells}, &plane);
@@ -211,30 +222,15 @@ static void blend_strip(blend_state *b, const tl_triangle *pieces, int64_t n, in
             vi_store(plane.cells + k * plane.stride + TL_CELL_PAD + i, vi_set1(TL_CELL_ZERO));
 }
 
-
 /* Triangle i, all of its pieces as one. */
 static __attribute__((noinline)) void blend_area_alone(blend_state *b, int64_t i)
 {
     const tl_window *window = b->window;
-    const tl_cull cull = b->scene->cull;
-    const int32_t *corners = b->scene->triangles + 3 * i;
-    const tl_pieces *pieces = b->scene->pieces;
-    const int is_cut = is_clipped(&b->scene->mesh, corners);
-    tl_vertex_set set = b->scene->mesh;
-    int64_t n_pieces = 1, n = 0, top = INT64_MAX, bottom = INT64_MIN, left = INT64_MAX, right = INT64_MIN;
+    const triangle_parts parts = parts_of(b->scene, i);
+    int64_t n = 0, top = INT64_MAX, bottom = INT64_MIN, left = INT64_MAX, right = INT64_MIN;
     tl_triangle t[TL_MAX_PIECES];
-    if (is_cut) {
-        const int64_t first = pieces ? first_piece(pieces, i) : 0;
-        for (n_pieces = 0; pieces && first + n_pieces < pieces->n_pieces && pieces->source[first + n_pieces] == i;)
-            n_pieces++;
-        if (n_pieces == 0)
-            return;
-        set = piece_set(pieces, &b->scene->mesh);
-        corners = pieces->triangles + 3 * first;
-    }
-    for (int64_t k = 0; k < n_pieces && n < TL_MAX_PIECES; k++) {
-        const int sign = load_triangle(&set, corners + 3 * k, t + n);
-        if (sign == 0 || (sign > 0 && cull == TL_CULL_BACK) || (sign < 0 && cull == TL_CULL_FRONT))
+    for (int k = 0; k < parts.n && n < TL_MAX_PIECES; k++) {
+        if (is_culled(load_triangle(&parts.set, parts.corners + 3 * k, t + n), b->scene->cull))
             continue;
         top = min64(top, min3(t[n].y_fx[0], t[n].y_fx[1], t[n].y_fx[2]) >> window->subpixel_bits);
         bottom = max64(bottom, max3(t[n].y_fx[0], t[n].y_fx[1], t[n].y_fx[2]) >> window->subpixel_bits);
@@ -242,11 +238,12 @@ static __attribute__((noinline)) void blend_area_alone(blend_state *b, int64_t i
         right = max64(right, max3(t[n].x_fx[0], t[n].x_fx[1], t[n].x_fx[2]) >> window->subpixel_bits);
         n++;
     }
-    const int64_t first_row = max64(top - window->y_px, 0), end_row = n ? min64(bottom + 1 - window->y_px, window->height) : 0;
+    const int64_t first_row = max64(top - window->y_px, 0);
+    const int64_t end_row = n ? min64(bottom + 1 - window->y_px, window->height) : 0;
     if (first_row >= end_row || (b->is_flat && !begin_flat(b, i)))
         return;
     if (!b->is_flat)
-        begin_gouraud(b, i, &set, corners, is_cut);
+        begin_gouraud(b, i, &parts.set, parts.corners, parts.is_cut);
     const int n_rows = strip_rows(min64(window->width, right - left + 4));
     for (int64_t row = first_row; row < end_row; row += n_rows)
         blend_strip(b, t, n, row, (int)min64(n_rows, end_row - row));

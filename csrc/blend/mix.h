@@ -1,8 +1,8 @@
 /* Mix: what a colour does to pixels.  The state of one pass, and what every mode is called.
  *
- * uint8 pixels are four bytes in a 32-bit lane, alpha in the highest; pictures with fewer channels are packed into such lanes
- * before the pass and unpacked after it, with alpha 255 where they have none.  float32 pixels stay where they are: a lane holds a
- * channel. */
+ * uint8 pixels are four bytes in a 32-bit lane, alpha in the highest; pictures with fewer channels are packed into such
+ * lanes before the pass and unpacked after it, with alpha 255 where they have none.  float32 pixels stay where they
+ * are: a lane holds a channel. */
 #ifndef TL_MIX_H
 #define TL_MIX_H
 
@@ -14,8 +14,8 @@
 #include "area/ramp.c"
 #include "pixels/weights_one.c"
 
-/* STRAIGHT: the last channel is alpha, and the others are not multiplied by it.  The other modes treat all channels alike, but
- * for what OVER_PREMULTIPLIED reads in the last channel of the colour. */
+/* STRAIGHT: the last channel is alpha, and the others are not multiplied by it.  The other modes treat all channels
+ * alike, but for what OVER_PREMULTIPLIED reads in the last channel of the colour. */
 typedef enum {
     TL_MIX_REPLACE,
     TL_MIX_REPLACE_STRAIGHT, /* the same where a triangle covers the whole pixel */
@@ -54,16 +54,16 @@ typedef struct blend_state {
 } blend_state;
 
 /* f(..., mode) with the mode as a constant. */
-#define TL_MIX_CALL(f, mode, ...)                                                                   \
-    switch (mode) {                                                                                 \
-    case TL_MIX_REPLACE: f(__VA_ARGS__, TL_MIX_REPLACE); break;                                     \
-    case TL_MIX_REPLACE_STRAIGHT: f(__VA_ARGS__, TL_MIX_REPLACE_STRAIGHT); break;                   \
-    case TL_MIX_OVER_STRAIGHT: f(__VA_ARGS__, TL_MIX_OVER_STRAIGHT); break;                         \
-    case TL_MIX_OVER_PREMULTIPLIED: f(__VA_ARGS__, TL_MIX_OVER_PREMULTIPLIED); break;               \
-    case TL_MIX_ADD: f(__VA_ARGS__, TL_MIX_ADD); break;                                             \
-    case TL_MIX_MULTIPLY: f(__VA_ARGS__, TL_MIX_MULTIPLY); break;                                   \
-    case TL_MIX_MAX: f(__VA_ARGS__, TL_MIX_MAX); break;                                             \
-    default: f(__VA_ARGS__, TL_MIX_MIN); break;                                                     \
+#define TL_MIX_CALL(f, mode, ...)                                                     \
+    switch (mode) {                                                                   \
+    case TL_MIX_REPLACE: f(__VA_ARGS__, TL_MIX_REPLACE); break;                       \
+    case TL_MIX_REPLACE_STRAIGHT: f(__VA_ARGS__, TL_MIX_REPLACE_STRAIGHT); break;     \
+    case TL_MIX_OVER_STRAIGHT: f(__VA_ARGS__, TL_MIX_OVER_STRAIGHT); break;           \
+    case TL_MIX_OVER_PREMULTIPLIED: f(__VA_ARGS__, TL_MIX_OVER_PREMULTIPLIED); break; \
+    case TL_MIX_ADD: f(__VA_ARGS__, TL_MIX_ADD); break;                               \
+    case TL_MIX_MULTIPLY: f(__VA_ARGS__, TL_MIX_MULTIPLY); break;                     \
+    case TL_MIX_MAX: f(__VA_ARGS__, TL_MIX_MAX); break;                               \
+    default: f(__VA_ARGS__, TL_MIX_MIN); break;                                       \
     }
 
 #define TL_WHOLE (1 << TL_AREA_BITS) /* the area of a pixel, in the units of ramp.c */

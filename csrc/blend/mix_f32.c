@@ -1,8 +1,8 @@
 /* Mix, float32: a channel a lane, pixels where they are.
  * In: pixels, a colour, and perhaps how much of each pixel it covers.  Out: pixels.
  *
- * Every operation rounds once, in the order written: the same bits in every build.  A vector starts with the first channel of a
- * pixel unless there are three, and then nothing looks at a neighbour. */
+ * Every operation rounds once, in the order written: the same bits in every build.  A vector starts with the first
+ * channel of a pixel unless there are three, and then nothing looks at a neighbour. */
 #ifndef TL_MIX_F32_C
 #define TL_MIX_F32_C
 
@@ -67,8 +67,8 @@ TL_INLINE vf mix_partial_f32(vf d, vf s, vf c, const f32_alphas *a, tl_mix mode)
     return vf_add(vf_mul(mix_whole_f32(d, s, a, mode), c), vf_mul(d, vf_sub(one, c)));
 }
 
-/* 0 < c <= 1.  A pixel that is covered whole takes the formula without c: with c = 1 an infinity or the sign of a zero would
- * come out otherwise, and which pixels share a vector must not matter. */
+/* 0 < c <= 1.  A pixel that is covered whole takes the formula without c: with c = 1 an infinity or the sign of a zero
+ * would come out otherwise, and which pixels share a vector must not matter. */
 TL_INLINE vf mix_part_f32(vf d, vf s, vf c, const f32_alphas *a, tl_mix mode)
 {
     const vm whole = vf_eq(c, vf_set1(1.0f));
@@ -77,7 +77,8 @@ TL_INLINE vf mix_part_f32(vf d, vf s, vf c, const f32_alphas *a, tl_mix mode)
 }
 
 /* Channels i to i + TL_LANES of a run that begins at `p`; c: their coverage, or NULL where it is 1. */
-TL_INLINE void mix_lanes_f32(blend_state *b, float *p, int64_t i, vm m, const float *source, const float *c, tl_mix mode)
+TL_INLINE void mix_lanes_f32(blend_state *b, float *p, int64_t i, vm m, const float *source, const float *c,
+                             tl_mix mode)
 {
     const int n_channels = b->n_channels;
     const float *from = source ? source + i : b->pattern + (n_channels == 3 || TL_LANES == 1 ? i % n_channels : 0);

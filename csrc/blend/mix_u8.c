@@ -1,8 +1,9 @@
 /* Mix, uint8: pixels of four bytes, a pixel a lane.
  * In: pixels, a colour, and perhaps how much of each pixel it covers.  Out: pixels.
  *
- * All of it is integer arithmetic, or float arithmetic on integers that is exact or rounded once where that cannot change the
- * integer that comes out.  Of a quotient by 255 nothing lies nearer than 1/510 to the middle between two integers. */
+ * All of it is integer arithmetic, or float arithmetic on integers that is exact or rounded once where that cannot
+ * change the integer that comes out.  Of a quotient by 255 nothing lies nearer than 1/510 to the middle between two
+ * integers. */
 #ifndef TL_MIX_U8_C
 #define TL_MIX_U8_C
 
@@ -11,7 +12,7 @@
 #include "lanes/lanes.h"
 #include "blend/mix.h"
 
-/* ---- a colour over the whole pixel --------------------------------------------------------------------------------- */
+/* ---- a colour over the whole pixel ------------------------------------------------------------------------------- */
 
 /* Bytes 0 and 2, bytes 1 and 3, as 16-bit halves; and back. */
 TL_INLINE vi even_bytes(vi a) { return vi_and(a, vi_set1(0x00ff00ff)); }
@@ -20,8 +21,8 @@ TL_INLINE vi join_bytes(vi even, vi odd) { return vi_or(even, vi_shift_left(odd,
 TL_INLINE vi in_both_halves(vi a) { return vi_or(a, vi_shift_left(a, 16)); }
 TL_INLINE vi byte_of(vi a, int shift) { return vi_and(vi_shift_right(a, shift), vi_set1(255)); }
 
-/* Halves up to 255^2, divided by 255 and rounded to nearest: floor((x + 128) * 257 / 65536).  With x = 255 q + r, r in -127..127,
- * that is q + (257 r + 32896 - q) / 65536, and the fraction lies between 2 / 65536 and 65535 / 65536. */
+/* Halves up to 255^2, divided by 255 and rounded to nearest: floor((x + 128) * 257 / 65536).  With x = 255 q + r, r in
+ * -127..127, that is q + (257 r + 32896 - q) / 65536, and the fraction lies between 2 / 65536 and 65535 / 65536. */
 TL_INLINE vi divide_by_255(vi x) { return vi_mul_high_halves(vi_add(x, vi_set1(0x00800080)), vi_set1(0x01010101)); }
 
 /* Lanes whose pixel is not opaque. */
@@ -36,9 +37,9 @@ TL_INLINE vi over_opaque(vi d, vi s, vi alpha)
     return join_bytes(divide_by_255(even), divide_by_255(odd));
 }
 
-/* The quotient of integers below 2^24, rounded to nearest, ties to even.  It is at most 255, or the divisor is 255 and it is at
- * most 65536: then half a unit in the last place of float32, 2^-17 or 2^-9, is less than 1 / (2 * 255^2) or 1 / 510, the least
- * distance from the middle between two integers. */
+/* The quotient of integers below 2^24, rounded to nearest, ties to even.  It is at most 255, or the divisor is 255 and
+ * it is at most 65536: then half a unit in the last place of float32, 2^-17 or 2^-9, is less than 1 / (2 * 255^2) or 1
+ * / 510, the least distance from the middle between two integers. */
 TL_INLINE vi divide_24_bits(vi a, vi b) { return vi_nearest(vf_div(vf_from_vi(a), vf_from_vi(b))); }
 
 /* Straight alpha over pixels that may be translucent: divides by the alpha that comes out. */
@@ -64,16 +65,20 @@ TL_INLINE vi mix_whole_u8(vi d, vi s, vm m, tl_mix mode)
     }
     if (mode == TL_MIX_OVER_PREMULTIPLIED) {
         const vi rest = in_both_halves(vi_sub(vi_set1(255), byte_of(s, 24)));
-        const vi even = divide_by_255(vi_mul_halves(even_bytes(d), rest)), odd = divide_by_255(vi_mul_halves(odd_bytes(d), rest));
+        const vi even = divide_by_255(vi_mul_halves(even_bytes(d), rest));
+        const vi odd = divide_by_255(vi_mul_halves(odd_bytes(d), rest));
         return vi_add_bytes(s, join_bytes(even, odd));
     }
     if (mode == TL_MIX_MULTIPLY)
         return join_bytes(divide_by_255(vi_mul_halves(even_bytes(d), even_bytes(s))),
                           divide_by_255(vi_mul_halves(odd_bytes(d), odd_bytes(s))));
-    return mode == TL_MIX_ADD ? vi_add_bytes(d, s) : mode == TL_MIX_MAX ? vi_max_bytes(d, s) : mode == TL_MIX_MIN ? vi_min_bytes(d, s) : s;
+    return mode == TL_MIX_ADD   ? vi_add_bytes(d, s)
+           : mode == TL_MIX_MAX ? vi_max_bytes(d, s)
+           : mode == TL_MIX_MIN ? vi_min_bytes(d, s)
+                                : s;
 }
 
-/* ---- a colour over a part of the pixel ----------------------------------------------------------------------------- */
+/* ---- a colour over a part of the pixel --------------------------------------------------------------------------- */
 
 /* The coverage in 2^-15, ties up. */
 TL_INLINE vi coverage_15(vi area) { return vi_shift_right(vi_add(area, vi_set1(256)), 9); }
@@ -106,15 +111,15 @@ TL_INLINE vi trade_bytes(vi d, vi s, vi gain, vi loss)
     return out;
 }
 
-/* (a * b + c * d) / divisor, rounded to nearest, ties to even: sums below 2^39, the quotient at most 255 and, with the divisor
- * below 2^31, at least 2^-32 from the middle between two integers unless it is there. */
+/* (a * b + c * d) / divisor, rounded to nearest, ties to even: sums below 2^39, the quotient at most 255 and, with the
+ * divisor below 2^31, at least 2^-32 from the middle between two integers unless it is there. */
 TL_INLINE vi divide_sums(vi color, vd above, vi under, vd below, vd divisor)
 {
     return vi_round(vd_div(vd_add(vd_mul(vd_from_vi(color), above), vd_mul(vd_from_vi(under), below)), divisor));
 }
 
-/* Straight alpha where one of the two is translucent: `alpha`, of the colour in this pixel, and `rest`, what it leaves of the
- * other one, in 1 / (255 * 2^15). */
+/* Straight alpha where one of the two is translucent: `alpha`, of the colour in this pixel, and `rest`, what it leaves
+ * of the other one, in 1 / (255 * 2^15). */
 static __attribute__((noinline)) vi cover_translucent(vi d, vi s, vi alpha, vi rest)
 {
     const vi under = byte_of(d, 24), zero = vi_set1(0);
@@ -122,7 +127,8 @@ static __attribute__((noinline)) vi cover_translucent(vi d, vi s, vi alpha, vi r
     const vd sum = vd_add(above, below), divisor = vd_max(sum, vd_set1(1.0));
     vi out = vi_shift_left(vi_round(vd_div(sum, vd_set1(255.0 * 0x1p15))), 24);
     for (int shift = 0; shift < 24; shift += 8)
-        out = vi_or(out, vi_shift_left(divide_sums(byte_of(s, shift), above, byte_of(d, shift), below, divisor), shift));
+        out =
+            vi_or(out, vi_shift_left(divide_sums(byte_of(s, shift), above, byte_of(d, shift), below, divisor), shift));
     const vm nothing_under = vm_or(vi_eq(under, zero), vi_eq(rest, zero));
     return vi_select(vm_and(vi_eq(alpha, zero), nothing_under), d, out);
 }
@@ -137,7 +143,8 @@ TL_INLINE vi mix_part_u8(vi d, vi s, vi area, vm m, tl_mix mode)
         const vi moved = move_bytes(d, vi_or(s, opaque), weight);
         if (__builtin_expect(!vm_any(vm_and(m, either)), 1))
             return moved;
-        const vi fine = vi_mul(weight, vi_set1(255)), gone = mode == TL_MIX_OVER_STRAIGHT ? fine : vi_mul(coverage, vi_set1(255));
+        const vi fine = vi_mul(weight, vi_set1(255));
+        const vi gone = mode == TL_MIX_OVER_STRAIGHT ? fine : vi_mul(coverage, vi_set1(255));
         return vi_select(either, cover_translucent(d, s, fine, vi_sub(vi_set1(255 << 15), gone)), moved);
     }
     if (mode == TL_MIX_OVER_PREMULTIPLIED)
@@ -145,7 +152,8 @@ TL_INLINE vi mix_part_u8(vi d, vi s, vi area, vm m, tl_mix mode)
     return move_bytes(d, mode == TL_MIX_REPLACE ? s : mix_whole_u8(d, s, m, mode), coverage);
 }
 
-/* The same, and what it should be where the part is the whole: a weight in 2^-15 is too coarse for an alpha below 255. */
+/* The same, and what it should be where the part is the whole: a weight in 2^-15 is too coarse for an alpha below
+ * 255. */
 TL_INLINE vi mix_area_u8(vi d, vi s, vi area, vm m, tl_mix mode, tl_mix whole_mode)
 {
     const vi part = mix_part_u8(d, s, area, m, mode);
@@ -155,15 +163,15 @@ TL_INLINE vi mix_area_u8(vi d, vi s, vi area, vm m, tl_mix mode, tl_mix whole_mo
     return vi_select(whole, mix_whole_u8(d, s, m, mode), part);
 }
 
-/* ---- pixels of the canvas ------------------------------------------------------------------------------------------ */
+/* ---- pixels of the canvas ---------------------------------------------------------------------------------------- */
 
 TL_INLINE void store_u8(blend_state *b, int64_t at, vm m, vi pixels)
 {
     vi_store_some(b->packed + at, m, pixels, at >= 0 && at + TL_LANES <= b->n_samples);
 }
 
-/* n > 0 pixels of one colour.  A long run is stored in whole vectors: one at its beginning, one at its end, those between at
- * multiples of their size, for a store across two cache lines takes twice as long. */
+/* n > 0 pixels of one colour.  A long run is stored in whole vectors: one at its beginning, one at its end, those
+ * between at multiples of their size, for a store across two cache lines takes twice as long. */
 TL_INLINE void put_solid(int32_t *pixels, int64_t n, int32_t color)
 {
     const vi colors = vi_set1(color);
@@ -178,7 +186,8 @@ TL_INLINE void put_solid(int32_t *pixels, int64_t n, int32_t color)
     vi_store(last, colors);
 }
 
-/* n_rows runs of pixels that the triangle covers whole: n[k * step] of them from first[k * step] on, none where n <= 0. */
+/* n_rows runs of pixels that the triangle covers whole: n[k * step] of them from first[k * step] on, none where n <=
+ * 0. */
 TL_INLINE void mix_runs_u8(blend_state *b, const int32_t *first, const int32_t *n, int step, int n_rows, tl_mix mode)
 {
     const vi color = vi_set1(b->color);
@@ -210,7 +219,7 @@ TL_INLINE void mix_block_u8(blend_state *b, int64_t at, vm m, vi area, tl_mix mo
     store_u8(b, at, m, mix_area_u8(d, s, area, m, mode, b->whole_mode));
 }
 
-/* ---- fewer channels ------------------------------------------------------------------------------------------------ */
+/* ---- fewer channels ---------------------------------------------------------------------------------------------- */
 
 /* n pixels of 1 to 3 channels as four bytes, and back. */
 static void pack_u8(const uint8_t *pixels, int64_t n, int n_channels, int32_t *restrict out)
@@ -223,7 +232,8 @@ static void pack_u8(const uint8_t *pixels, int64_t n, int n_channels, int32_t *r
             out[k] = (int32_t)((uint32_t)pixels[2 * k + 1] << 24 | pixels[2 * k]);
     else
         for (int64_t k = 0; k < n; k++)
-            out[k] = (int32_t)(0xff000000u | (uint32_t)pixels[3 * k + 2] << 16 | (uint32_t)pixels[3 * k + 1] << 8 | pixels[3 * k]);
+            out[k] = (int32_t)(0xff000000u | (uint32_t)pixels[3 * k + 2] << 16 | (uint32_t)pixels[3 * k + 1] << 8 |
+                               pixels[3 * k]);
 }
 
 static void unpack_u8(const int32_t *packed, int64_t n, int n_channels, uint8_t *restrict pixels)

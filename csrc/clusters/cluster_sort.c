@@ -1,8 +1,10 @@
-/* Clusters: a mesh in object space as sets of neighbouring triangles, each measured once, of which a view needs only some.
- * In: vertices and triangles.  Out: clusters, what stands in them, and the boxes and normals that cluster_view.c looks at.
+/* Clusters: a mesh in object space as sets of neighbouring triangles, each measured once, of which a view needs only
+ * some.
+ * In: vertices and triangles.  Out: clusters, what stands in them, and the boxes and normals that cluster_view.c looks
+ * at.
  *
- * Based on: G. M. Morton, A Computer Oriented Geodetic Data Base, 1966 (the order); S. Kumar, D. Manocha, B. Garrett, M. Lin,
- * Hierarchical Back-Face Computation, 1996 (cones of normals). */
+ * Based on: G. M. Morton, A Computer Oriented Geodetic Data Base, 1966 (the order); S. Kumar, D. Manocha, B. Garrett,
+ * M. Lin, Hierarchical Back-Face Computation, 1996 (cones of normals). */
 #ifndef TL_CLUSTER_SORT_C
 #define TL_CLUSTER_SORT_C
 
@@ -19,7 +21,8 @@
 static inline void object_position(const tl_source *source, int64_t i, double *p)
 {
     for (int k = 0; k < 3; k++)
-        p[k] = source->scalar == TL_F32 ? (double)((const float *)source->data)[3 * i + k] : ((const double *)source->data)[3 * i + k];
+        p[k] = source->scalar == TL_F32 ? (double)((const float *)source->data)[3 * i + k]
+                                        : ((const double *)source->data)[3 * i + k];
 }
 
 /* A number below 2^10 with two zeros between its bits. */
@@ -31,7 +34,8 @@ static inline uint32_t spread_bits(uint32_t a)
     return (a | a << 2) & 0x09249249u;
 }
 
-static void place_on_curve(const tl_source *source, const int32_t *triangles, int64_t first, int64_t end, const double *box, uint32_t *keys)
+static void place_on_curve(const tl_source *source, const int32_t *triangles, int64_t first, int64_t end,
+                           const double *box, uint32_t *keys)
 {
     const double side = fmax(fmax(box[3] - box[0], box[4] - box[1]), box[5] - box[2]);
     const double last = (double)((1 << TL_CURVE_BITS) - 1), scale = side > 0.0 ? (last + 1.0) / 3.0 / side : 0.0;
@@ -75,8 +79,8 @@ static void sort_keys(const uint32_t *keys, int64_t n, uint64_t *room, uint64_t 
         order[i] = (int32_t)room[i];
 }
 
-static int64_t cut_clusters(const int32_t *triangles, const int32_t *order, int64_t n, int32_t *seen, tl_cluster *clusters,
-                            int32_t *vertices, uint8_t *corners, int64_t *n_used)
+static int64_t cut_clusters(const int32_t *triangles, const int32_t *order, int64_t n, int32_t *seen,
+                            tl_cluster *clusters, int32_t *vertices, uint8_t *corners, int64_t *n_used)
 {
     int64_t n_clusters = 0, n_vertices = 0;
     tl_cluster *c = NULL;
@@ -112,8 +116,8 @@ static inline void cross_3(const double *a, const double *b, double *out)
     out[2] = a[0] * b[1] - a[1] * b[0];
 }
 
-/* A triangle's normal, as long as twice its area, and its longest side; returns 0 when two corners are one point: then it has
- * no area after any snap. */
+/* A triangle's normal, as long as twice its area, and its longest side; returns 0 when two corners are one point: then
+ * it has no area after any snap. */
 static int triangle_normal(const double (*points)[3], const uint8_t *corners, double *normal, double *longest)
 {
     double side[3][3];
@@ -167,8 +171,8 @@ static void widen_box(double *low, double *high, const double *p)
     }
 }
 
-static void measure_clusters(const tl_source *source, const uint8_t *corners, int64_t first, int64_t end, tl_cluster *clusters,
-                             double *group_boxes)
+static void measure_clusters(const tl_source *source, const uint8_t *corners, int64_t first, int64_t end,
+                             tl_cluster *clusters, double *group_boxes)
 {
     double points[TL_CLUSTER][3];
     for (int64_t i = first; i < end; i++) {

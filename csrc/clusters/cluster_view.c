@@ -1,13 +1,14 @@
-/* What a view draws of a clustered mesh: which clusters it needs, which of them lie behind what is drawn, and a cluster as a scene of
- * its own, whose vertices stay in the first-level cache.
- * In: a clustered mesh in object space, a matrix; then a depth buffer.  Out: the clusters that may draw a sample; snapped vertices
- * and triangles, which raster.c draws.
+/* What a view draws of a clustered mesh: which clusters it needs, which of them lie behind what is drawn, and a cluster
+ * as a scene of its own, whose vertices stay in the first-level cache.
+ * In: a clustered mesh in object space, a matrix; then a depth buffer.  Out: the clusters that may draw a sample;
+ * snapped vertices and triangles, which raster.c draws.
  *
- * What is left out draws nothing, whatever the snap does to it: every test has the errors of the vertex stage and of the
- * snap on its far side.
+ * What is left out draws nothing, whatever the snap does to it: every test has the errors of the vertex stage and of
+ * the snap on its far side.
  *
  * Based on: U. Assarsson, T. Möller, Optimized View Frustum Culling Algorithms for Bounding Boxes, 2000;
- * N. Greene, M. Kass, G. Miller, Hierarchical Z-Buffer Visibility, 1993 (with one level: clusters are small in the picture). */
+ * N. Greene, M. Kass, G. Miller, Hierarchical Z-Buffer Visibility, 1993 (with one level: clusters are small in the
+ * picture). */
 #ifndef TL_CLUSTER_VIEW_C
 #define TL_CLUSTER_VIEW_C
 
@@ -32,7 +33,7 @@ typedef struct {
     form_bounds f[4];
 } seen_box;
 
-#define TL_N_SIDES 6 /* left, right, above, below, near, far */
+#define TL_N_SIDES 6      /* left, right, above, below, near, far */
 #define TL_IN_DEPTH 0x30u /* within near and far: no triangle is cut into pieces, whose corners are others */
 
 static inline seen_box place_box(const double *low, const double *high, const double *matrix)
@@ -54,7 +55,8 @@ static inline seen_box place_box(const double *low, const double *high, const do
     return b;
 }
 
-/* a * (row i) + b * w over a box: its value at the centre, and how far it may be from that with the errors of the vertex stage. */
+/* a * (row i) + b * w over a box: its value at the centre, and how far it may be from that with the errors of the
+ * vertex stage. */
 static inline double mixed_form(const seen_box *box, const tl_cluster_view *v, int i, double a, double b, double *reach)
 {
     const double *row = v->matrix + 4 * i, *row_w = v->matrix + 12;
@@ -64,8 +66,8 @@ static inline double mixed_form(const seen_box *box, const tl_cluster_view *v, i
     return a * box->f[i].centre + b * box->f[3].centre;
 }
 
-/* Whether a box is certain to lie outside of the window; if not, the sides that it is certain to lie within are added to `within`.
- * Those that are there already are not looked at. */
+/* Whether a box is certain to lie outside of the window; if not, the sides that it is certain to lie within are added
+ * to `within`.  Those that are there already are not looked at. */
 static int is_outside(const seen_box *box, const tl_cluster_view *v, unsigned *within)
 {
     const double near_w = v->zero_to_one ? 0.0 : 1.0;
@@ -88,18 +90,22 @@ static int is_outside(const seen_box *box, const tl_cluster_view *v, unsigned *w
     return 0;
 }
 
-/* Whether every triangle of a box within the near and far planes is certain to be turned the way that is culled after the snap.
+/* Whether every triangle of a box within the near and far planes is certain to be turned the way that is culled after
+ * the snap.
  *
- * The screen area of a triangle is n . g(a) times a factor, with g(a) = k - k3 a, where (k, k3) is the eye: what the rows of x, y
- * and w take to 0.  The vertex stage and the snap move corners by less than d sub-pixels, which changes twice the area by less
- * than 4 d (lx + ly) + 8 d^2 sub-pixels^2 when no side is longer than (lx, ly). */
+ * The screen area of a triangle is n . g(a) times a factor, with g(a) = k - k3 a, where (k, k3) is the eye: what the
+ * rows of x, y and w take to 0.  The vertex stage and the snap move corners by less than d sub-pixels, which changes
+ * twice the area by less than 4 d (lx + ly) + 8 d^2 sub-pixels^2 when no side is longer than (lx, ly). */
 static int is_turned_away(const tl_cluster *c, const tl_cluster_view *v, const seen_box *box)
 {
     const form_bounds *f = box->f;
-    const double w_min = f[3].centre - f[3].reach - v->error * f[3].terms, w_max = f[3].centre + f[3].reach + v->error * f[3].terms;
+    const double w_min = f[3].centre - f[3].reach - v->error * f[3].terms;
+    const double w_max = f[3].centre + f[3].reach + v->error * f[3].terms;
     if (!(c->cone_cos > 0.0 && w_min > 0.0))
         return 0;
-    const double sign = v->cull == TL_CULL_BACK ? -1.0 : 1.0, radius = sqrt((box->half[0] * box->half[0] + box->half[1] * box->half[1]) + box->half[2] * box->half[2]);
+    const double sign = v->cull == TL_CULL_BACK ? -1.0 : 1.0;
+    const double radius =
+        sqrt((box->half[0] * box->half[0] + box->half[1] * box->half[1]) + box->half[2] * box->half[2]);
     double g[3], squares = 0.0, along = 0.0;
     for (int k = 0; k < 3; k++) {
         g[k] = sign * (v->eye[k] - v->eye[3] * box->centre[k]);
@@ -108,7 +114,8 @@ static int is_turned_away(const tl_cluster *c, const tl_cluster_view *v, const s
     }
     const double length = sqrt(squares);
     along /= length;
-    const double across = sqrt(fmax(0.0, 1.0 - along * along)), cone_sin = sqrt(fmax(0.0, 1.0 - c->cone_cos * c->cone_cos));
+    const double across = sqrt(fmax(0.0, 1.0 - along * along));
+    const double cone_sin = sqrt(fmax(0.0, 1.0 - c->cone_cos * c->cone_cos));
     const double least = 0.999 * length * (along * c->cone_cos - across * cone_sin) - 1.001 * fabs(v->eye[3]) * radius;
     const double factor = least * (v->scale_x * v->scale_y) / (w_max * w_max * w_max);
     double sides = 0.0, moved = 0.0;
@@ -121,7 +128,8 @@ static int is_turned_away(const tl_cluster *c, const tl_cluster_view *v, const s
     return c->min_height * factor > 8.0 * moved * sides && c->min_area * factor > 16.0 * moved * moved;
 }
 
-/* Whether the cluster shows its back, or what is culled, about: it is drawn late then, when what is in front of it may hide it. */
+/* Whether the cluster shows its back, or what is culled, about: it is drawn late then, when what is in front of it may
+ * hide it. */
 static int shows_back(const tl_cluster *c, const tl_cluster_view *v, const seen_box *box)
 {
     double along = 0.0;
@@ -133,7 +141,8 @@ static int shows_back(const tl_cluster *c, const tl_cluster_view *v, const seen_
 /* ---- occlusion ------------------------------------------------------------------------------------------- */
 
 /* Whether every depth of a rectangle of the window beats this one. */
-TL_INLINE int all_beat(const tl_target *target, int64_t row0, int64_t row1, int64_t col0, int64_t col1, float depth, int is_farthest)
+TL_INLINE int all_beat(const tl_target *target, int64_t row0, int64_t row1, int64_t col0, int64_t col1, float depth,
+                       int is_farthest)
 {
     const vf bound = vf_set1(depth);
     for (int64_t row = row0; row < row1; row++) {
@@ -151,20 +160,25 @@ TL_INLINE int all_beat(const tl_target *target, int64_t row0, int64_t row1, int6
 /* The depth of the vertex stage for z / w. */
 static inline double depth_of_ndc(const tl_cluster_view *v, double z) { return v->zero_to_one ? z : (z + 1.0) * 0.5; }
 
-/* Whether the middle of a box lies before what the window shows there: then it is not hidden, and this is the cheaper test. */
-static inline int shows_middle(const seen_box *box, const tl_cluster_view *v, const tl_window *window, const tl_target *target)
+/* Whether the middle of a box lies before what the window shows there: then it is not hidden, and this is the cheaper
+ * test. */
+static inline int shows_middle(const seen_box *box, const tl_cluster_view *v, const tl_window *window,
+                               const tl_target *target)
 {
     const double inverse = 1.0 / box->f[3].centre;
     const double x_px = (box->f[0].centre * inverse + 1.0) * v->half_width_px - (double)window->x_px;
     const double y_px = (1.0 - box->f[1].centre * inverse) * v->half_height_px - (double)window->y_px;
     if (!(x_px >= 0.0 && x_px < (double)window->width && y_px >= 0.0 && y_px < (double)window->height))
         return 0;
-    const double z = depth_of_ndc(v, box->f[2].centre * inverse), there = target->depth[(int64_t)y_px * target->stride_px + (int64_t)x_px];
+    const double z = depth_of_ndc(v, box->f[2].centre * inverse);
+    const double there = target->depth[(int64_t)y_px * target->stride_px + (int64_t)x_px];
     return target->sink == TL_SINK_FARTHEST ? there < z : there > z;
 }
 
-/* Whether all of a box lies behind what the window shows where it is, found out by looking at so many pixels at most. */
-static int is_hidden(const seen_box *box, const tl_cluster_view *v, const tl_window *window, const tl_target *target, int64_t most_px)
+/* Whether all of a box lies behind what the window shows where it is, found out by looking at so many pixels at
+ * most. */
+static int is_hidden(const seen_box *box, const tl_cluster_view *v, const tl_window *window, const tl_target *target,
+                     int64_t most_px)
 {
     const int is_farthest = target->sink == TL_SINK_FARTHEST;
     if (shows_middle(box, v, window, target))
@@ -176,8 +190,9 @@ static int is_hidden(const seen_box *box, const tl_cluster_view *v, const tl_win
     for (int i = 0; i < 4; i++) {
         const double *row = v->matrix + 4 * i;
         for (int k = 0; k < 8; k++)
-            corner[i][k] = box->f[i].centre + (((k & 1 ? row[0] : -row[0]) * box->half[0] + (k & 2 ? row[1] : -row[1]) * box->half[1]) +
-                                              (k & 4 ? row[2] : -row[2]) * box->half[2]);
+            corner[i][k] = box->f[i].centre +
+                           (((k & 1 ? row[0] : -row[0]) * box->half[0] + (k & 2 ? row[1] : -row[1]) * box->half[1]) +
+                            (k & 4 ? row[2] : -row[2]) * box->half[2]);
     }
     const double w_min = box->f[3].centre - box->f[3].reach - v->error * box->f[3].terms;
     if (!(w_min > 0.0))
@@ -200,8 +215,10 @@ static int is_hidden(const seen_box *box, const tl_cluster_view *v, const tl_win
     const double top = (1.0 - high[1]) * v->half_height_px - 1.5, bottom = (1.0 - low[1]) * v->half_height_px + 1.5;
     if (!(left > -0x1p50 && right < 0x1p50 && top > -0x1p50 && bottom < 0x1p50))
         return 0;
-    const int64_t col0 = max64((int64_t)floor(left) - window->x_px, 0), col1 = min64((int64_t)floor(right) + 1 - window->x_px, window->width);
-    const int64_t row0 = max64((int64_t)floor(top) - window->y_px, 0), row1 = min64((int64_t)floor(bottom) + 1 - window->y_px, window->height);
+    const int64_t col0 = max64((int64_t)floor(left) - window->x_px, 0);
+    const int64_t col1 = min64((int64_t)floor(right) + 1 - window->x_px, window->width);
+    const int64_t row0 = max64((int64_t)floor(top) - window->y_px, 0);
+    const int64_t row1 = min64((int64_t)floor(bottom) + 1 - window->y_px, window->height);
     if ((col1 - col0) * (row1 - row0) > most_px)
         return 0;
     /* docs/design/rules.md: the error of a depth before it is rounded to float32 */
@@ -213,7 +230,8 @@ static int is_hidden(const seen_box *box, const tl_cluster_view *v, const tl_win
 
 #define TL_MAX_PX_OF_CULLED 1024 /* triangles that are culled one by one take no longer */
 
-static int is_cluster_hidden(const tl_cluster *c, const tl_cluster_view *v, const tl_window *window, const tl_target *target)
+static int is_cluster_hidden(const tl_cluster *c, const tl_cluster_view *v, const tl_window *window,
+                             const tl_target *target)
 {
     const seen_box box = place_box(c->low, c->high, v->matrix);
     const int is_culled_later = v->cull != TL_CULL_NONE && shows_back(c, v, &box);
@@ -243,7 +261,8 @@ static double depth_of(const tl_cluster *c, const double *matrix)
 }
 
 /* Sorts the clusters in `found`, those seen from behind with their numbers inverted, into slabs. */
-static void sort_by_depth(const tl_clustered *mesh, const tl_cluster_view *v, const found_cluster *found, int64_t n, int32_t *list)
+static void sort_by_depth(const tl_clustered *mesh, const tl_cluster_view *v, const found_cluster *found, int64_t n,
+                          int32_t *list)
 {
     int64_t starts[2 * TL_SLABS + 1] = {0};
     int64_t nearest = 0, farthest = 0;
@@ -251,9 +270,11 @@ static void sort_by_depth(const tl_clustered *mesh, const tl_cluster_view *v, co
         nearest = found[i].depth < found[nearest].depth ? i : nearest;
         farthest = found[i].depth > found[farthest].depth ? i : farthest;
     }
-    const float low = found[nearest].depth, range = found[farthest].depth - low, scale = range > 0.0f ? TL_SLABS / range : 0.0f;
+    const float low = found[nearest].depth, range = found[farthest].depth - low;
+    const float scale = range > 0.0f ? TL_SLABS / range : 0.0f;
     const int32_t a = found[nearest].cluster, b = found[farthest].cluster;
-    const double depth_a = depth_of(mesh->clusters + (a < 0 ? ~a : a), v->matrix), depth_b = depth_of(mesh->clusters + (b < 0 ? ~b : b), v->matrix);
+    const double depth_a = depth_of(mesh->clusters + (a < 0 ? ~a : a), v->matrix);
+    const double depth_b = depth_of(mesh->clusters + (b < 0 ? ~b : b), v->matrix);
     const int is_upside_down = (depth_b < depth_a) != v->is_farthest;
     for (int pass = 0; pass < 2; pass++) {
         for (int64_t i = 0; i < n; i++) {
@@ -269,10 +290,11 @@ static void sort_by_depth(const tl_clustered *mesh, const tl_cluster_view *v, co
     }
 }
 
-/* Lists the clusters that may draw something, about in the order of depth, those that are seen from behind last; with a target of
- * depths, without groups of them that what it shows hides.  `room` has 8 bytes for each cluster.  Returns how many. */
-static int64_t cull_clusters(const tl_clustered *mesh, const tl_cluster_view *v, const tl_window *window, const tl_target *target,
-                             int32_t *list, void *room)
+/* Lists the clusters that may draw something, about in the order of depth, those that are seen from behind last; with a
+ * target of depths, without groups of them that what it shows hides.  `room` has 8 bytes for each cluster.  Returns how
+ * many. */
+static int64_t cull_clusters(const tl_clustered *mesh, const tl_cluster_view *v, const tl_window *window,
+                             const tl_target *target, int32_t *list, void *room)
 {
     found_cluster *found = room;
     const double *row_w = v->matrix + 12;
@@ -294,7 +316,8 @@ static int64_t cull_clusters(const tl_clustered *mesh, const tl_cluster_view *v,
             if (v->cull != TL_CULL_NONE && (within & TL_IN_DEPTH) == TL_IN_DEPTH && is_turned_away(c, v, &own))
                 continue;
             const int32_t number = (int32_t)i;
-            found[n++] = (found_cluster){shows_back(c, v, &own) ? ~number : number, (float)own.f[has_perspective ? 3 : 2].centre};
+            found[n++] = (found_cluster){shows_back(c, v, &own) ? ~number : number,
+                                         (float)own.f[has_perspective ? 3 : 2].centre};
         }
     }
     if (n)
@@ -348,10 +371,12 @@ static __attribute__((noinline)) int64_t list_special(cluster_scene *own, int64_
 }
 
 /* Snaps the vertices of a cluster and unpacks its triangles; returns how many of them there are to draw. */
-static int64_t load_cluster(const tl_cluster *c, const tl_cluster_pass *pass, const tl_scene *scene, tl_share *share, cluster_scene *own)
+static int64_t load_cluster(const tl_cluster *c, const tl_cluster_pass *pass, const tl_scene *scene, tl_share *share,
+                            cluster_scene *own)
 {
     const uint8_t *corners = pass->mesh->corners + 3 * c->first_triangle;
-    const size_t row_bytes = (size_t)pass->source->n_components * (pass->source->scalar == TL_F32 ? sizeof(float) : sizeof(double));
+    const size_t row_bytes =
+        (size_t)pass->source->n_components * (pass->source->scalar == TL_F32 ? sizeof(float) : sizeof(double));
     tl_source source = *pass->source;
     source.data = (const char *)source.data + (size_t)c->first_vertex * row_bytes;
     source.n -= c->first_vertex;
@@ -367,14 +392,16 @@ static int64_t load_cluster(const tl_cluster *c, const tl_cluster_pass *pass, co
     for (int i = 0; i < 3 * c->n_triangles; i++)
         own->corners[i] = corners[i];
     memset(own->corners + 3 * c->n_triangles, 0, 3 * TL_LANES * sizeof *own->corners);
-    return counts.n_bad || counts.n_wide || counts.n_clipped ? list_special(own, c->n_triangles, share) : c->n_triangles;
+    return counts.n_bad || counts.n_wide || counts.n_clipped ? list_special(own, c->n_triangles, share)
+                                                             : c->n_triangles;
 }
 
 /* The clusters that a pass draws, unless they turn out to be hidden. */
 static int64_t list_clusters(tl_cluster_pass *pass, const tl_window *window, const tl_target *target)
 {
     pass->n_drawn = 0;
-    pass->n_seen = cull_clusters(pass->mesh, pass->seen, window, pass->may_be_hidden ? target : NULL, pass->list, pass->room);
+    pass->n_seen =
+        cull_clusters(pass->mesh, pass->seen, window, pass->may_be_hidden ? target : NULL, pass->list, pass->room);
     return pass->n_seen;
 }
 

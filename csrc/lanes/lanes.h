@@ -2,14 +2,14 @@
  *
  *   vi  TL_LANES int32      vf  TL_LANES float32      vd  TL_LANES float64      vm  TL_LANES bits
  *
- * Arithmetic is IEEE, rounded to nearest, multiply and add apart: every instruction set gives the same bits.  The scalar
- * lanes (TL_LANES = 1) are the definition.  vd_quotients(a, b, q, are_f32) divides three numbers by one, each correctly rounded.
- * Loads and stores need no alignment.  Intrinsics live in lanes_*.h alone.
+ * Arithmetic is IEEE, rounded to nearest, multiply and add apart: every instruction set gives the same bits.  The
+ * scalar lanes (TL_LANES = 1) are the definition.  vd_quotients(a, b, q, are_f32) divides three numbers by one, each
+ * correctly rounded.  Loads and stores need no alignment.  Intrinsics live in lanes_*.h alone.
  *
  *   v?_set1 v?_load v?_store v?_iota v?_add v?_sub v?_mul v?_div v?_min v?_max vf_sqrt   as their names say; vi wraps
  *   v?_select(m, a, b)      a where m, else b
  *   v?_load_masked, v?_store_masked    touch only the memory of lanes in m
- *   v?_store_some(p, m, a, has_room)   the lanes in m; with room for a whole vector the others may be written as they are
+ * v?_store_some(p, m, a, has_room) the lanes in m; with room for a whole vector the others may be written as they are
  *   vi_gather(m, p, i)      p[i] in the lanes of m
  *   vi_compress(p, m, v)    the lanes in m, packed, at p; writes a whole vector
  *   vm_first(n)             the first n lanes, none for n <= 0, all for n >= TL_LANES
@@ -26,7 +26,7 @@
  *   vd_power(a, sum, mask)  the number whose bits are `sum` less the bits of a in `mask`
  *   vd_load_records(base, stride, i, c)    four doubles at base + 8 * stride * i[k], as columns
  *   vf_store_pairs, vf_store_triples    pixels of two or three numbers, one after the other
- *   vi_load_records(base, scale, i, c), vf_load_pairs    16 bytes at base + scale * i[k], 8 at base + 8 * i[k], as columns
+ * vi_load_records(base, scale, i, c), vf_load_pairs 16 bytes at base + scale * i[k], 8 at base + 8 * i[k], as columns
  *   hm_, hf_, hi_, hd_      the few that short rows need, in half vectors of TL_HALF_LANES (0: there are none)
  *   vi_mul_halves, vi_mul_high_halves    lower and upper halves of the products of unsigned 16-bit halves
  *   vi_scale_halves(a, b)   (a * b + 2^14) >> 15 of signed 16-bit halves; b = -2^15 is -1
@@ -34,9 +34,10 @@
  *   vi_upper_bytes          the upper byte of each half, as its value
  *   vi_add_bytes, vi_max_bytes, vi_min_bytes    unsigned bytes; a sum is at most 255
  *   vf_last_of(a, n)        the last of every n = 2 or 4 lanes, in all of them (scalar: a)
- *   vd_from_vi, vd_from_vf, vf_from_vi, vf_from_vd, vi_floor(vf), vi_nearest(vf), vi_round(vd)    conversions; INT32_MIN when
+ * vd_from_vi, vd_from_vf, vf_from_vi, vf_from_vd, vi_floor(vf), vi_nearest(vf), vi_round(vd) conversions; INT32_MIN
+ * when
  *                           out of range; the last two to nearest, ties to even
- */
+ * / */
 #ifndef TL_LANES_H
 #define TL_LANES_H
 
@@ -52,12 +53,12 @@
 #include "lanes/lanes_scalar.h"
 #endif
 
-/* Stores lanes that are then read one by one.  Compilers that see both take them out of the vector, one shuffle each, which is
- * slower than memory: so they may not see it. */
+/* Stores lanes that are then read one by one.  Compilers that see both take them out of the vector, one shuffle each,
+ * which is slower than memory: so they may not see it. */
 TL_INLINE void vi_spill(int32_t *p, vi a)
 {
     vi_store(p, a);
-    __asm__("" : "+m"(*(int32_t(*)[TL_LANES])p));
+    __asm__("" : "+m"(*(int32_t (*)[TL_LANES])p));
 }
 
 /* Where vi_store_quads puts the four numbers of a lane, in units of four. */

@@ -14,7 +14,9 @@
 
 typedef __m256i vi;
 typedef __m256 vf;
-typedef struct { __m256d lo, hi; } vd;
+typedef struct {
+    __m256d lo, hi;
+} vd;
 typedef __m256i vm;
 
 TL_INLINE vi vi_set1(int32_t a) { return _mm256_set1_epi32(a); }
@@ -104,10 +106,14 @@ TL_INLINE vi vi_shift_in(vi a, vi before)
 /* the upper half scales without loss, so the sum is the only rounding */
 TL_INLINE vf vf_from_unsigned(vi a)
 {
-    const vf high = _mm256_cvtepi32_ps(_mm256_srli_epi32(a, 16)), low = _mm256_cvtepi32_ps(_mm256_and_si256(a, _mm256_set1_epi32(0xffff)));
+    const vf high = _mm256_cvtepi32_ps(_mm256_srli_epi32(a, 16));
+    const vf low = _mm256_cvtepi32_ps(_mm256_and_si256(a, _mm256_set1_epi32(0xffff)));
     return _mm256_add_ps(_mm256_mul_ps(high, _mm256_set1_ps(65536.0f)), low);
 }
-TL_INLINE vi vi_gather(vm m, const int32_t *p, vi i) { return _mm256_mask_i32gather_epi32(_mm256_setzero_si256(), p, i, m, 4); }
+TL_INLINE vi vi_gather(vm m, const int32_t *p, vi i)
+{
+    return _mm256_mask_i32gather_epi32(_mm256_setzero_si256(), p, i, m, 4);
+}
 
 TL_INLINE vm vm_and(vm a, vm b) { return _mm256_and_si256(a, b); }
 TL_INLINE vm vm_or(vm a, vm b) { return _mm256_or_si256(a, b); }
@@ -115,10 +121,7 @@ TL_INLINE vm vm_and_not(vm a, vm b) { return _mm256_andnot_si256(b, a); }
 TL_INLINE int vm_any(vm a) { return !_mm256_testz_si256(a, a); }
 TL_INLINE unsigned vm_bits(vm a) { return (unsigned)_mm256_movemask_ps(_mm256_castsi256_ps(a)); }
 TL_INLINE vm vm_all(void) { return _mm256_set1_epi32(-1); }
-TL_INLINE vm vm_first(int64_t n)
-{
-    return _mm256_cmpgt_epi32(_mm256_set1_epi32(n > 8 ? 8 : (int)n), vi_iota());
-}
+TL_INLINE vm vm_first(int64_t n) { return _mm256_cmpgt_epi32(_mm256_set1_epi32(n > 8 ? 8 : (int)n), vi_iota()); }
 
 TL_INLINE vm vm_from_bits(unsigned bits)
 {
@@ -137,14 +140,23 @@ TL_INLINE void bytes_from_bits(uint8_t *p, uint64_t bits)
     }
 }
 /* TL_LANES words of 64 bits; vw_add_range sets the bits [begin, end) that are in the pattern; begin, end >= 0. */
-typedef struct { __m256i lo, hi; } vw;
+typedef struct {
+    __m256i lo, hi;
+} vw;
 TL_INLINE vw vw_zero(void) { return (vw){_mm256_setzero_si256(), _mm256_setzero_si256()}; }
-TL_INLINE vw vw_load(const uint64_t *p) { return (vw){_mm256_loadu_si256((const __m256i *)p), _mm256_loadu_si256((const __m256i *)(p + 4))}; }
-TL_INLINE void vw_store(uint64_t *p, vw a) { _mm256_storeu_si256((__m256i *)p, a.lo), _mm256_storeu_si256((__m256i *)(p + 4), a.hi); }
+TL_INLINE vw vw_load(const uint64_t *p)
+{
+    return (vw){_mm256_loadu_si256((const __m256i *)p), _mm256_loadu_si256((const __m256i *)(p + 4))};
+}
+TL_INLINE void vw_store(uint64_t *p, vw a)
+{
+    _mm256_storeu_si256((__m256i *)p, a.lo), _mm256_storeu_si256((__m256i *)(p + 4), a.hi);
+}
 TL_INLINE __m256i bit_range_64(__m128i begin, __m128i end)
 {
     const __m256i ones = _mm256_set1_epi64x(-1);
-    return _mm256_andnot_si256(_mm256_sllv_epi64(ones, _mm256_cvtepu32_epi64(end)), _mm256_sllv_epi64(ones, _mm256_cvtepu32_epi64(begin)));
+    return _mm256_andnot_si256(_mm256_sllv_epi64(ones, _mm256_cvtepu32_epi64(end)),
+                               _mm256_sllv_epi64(ones, _mm256_cvtepu32_epi64(begin)));
 }
 TL_INLINE vw vw_add_range(vw a, vi begin, vi end, uint64_t pattern)
 {
@@ -161,14 +173,16 @@ TL_INLINE vi vi_bit_ranges(vi begin, vi end)
     return _mm256_andnot_si256(_mm256_sllv_epi32(ones, end), _mm256_sllv_epi32(ones, begin));
 }
 
-
 /* The order that moves the lanes in `bits` to the front: byte k of the packed list is the k-th lane set. */
 TL_INLINE vi compress_order(unsigned bits)
 {
     const uint64_t lanes = _pdep_u64(bits, 0x0101010101010101u) * 0xff;
     return _mm256_cvtepu8_epi32(_mm_cvtsi64_si128((long long)_pext_u64(0x0706050403020100u, lanes)));
 }
-TL_INLINE void vi_compress(int32_t *p, vm m, vi a) { vi_store(p, _mm256_permutevar8x32_epi32(a, compress_order(vm_bits(m)))); }
+TL_INLINE void vi_compress(int32_t *p, vm m, vi a)
+{
+    vi_store(p, _mm256_permutevar8x32_epi32(a, compress_order(vm_bits(m))));
+}
 
 TL_INLINE vf vf_set1(float a) { return _mm256_set1_ps(a); }
 TL_INLINE vf vf_add(vf a, vf b) { return _mm256_add_ps(a, b); }
@@ -206,10 +220,10 @@ TL_INLINE vf vf_from_vd(vd a)
 {
     return _mm256_insertf128_ps(_mm256_castps128_ps256(_mm256_cvtpd_ps(a.lo)), _mm256_cvtpd_ps(a.hi), 1);
 }
-/* a[k] / b for three a, each correctly rounded, for |b| and |a / b| within 2^+-500: one division.  The first step makes the
- * quotient faithful, the second correct.  Of float32 numbers one step is enough: it errs by less than 2^-100 of the quotient, which
- * is no nearer than 2^-77 to the middle of two float64.  Based on: P. Markstein, Computation of elementary functions on the IBM RISC
- * System/6000 processor, 1990. */
+/* a[k] / b for three a, each correctly rounded, for |b| and |a / b| within 2^+-500: one division.  The first step makes
+ * the quotient faithful, the second correct.  Of float32 numbers one step is enough: it errs by less than 2^-100 of the
+ * quotient, which is no nearer than 2^-77 to the middle of two float64.  Based on: P. Markstein, Computation of
+ * elementary functions on the IBM RISC System/6000 processor, 1990. */
 TL_INLINE __m256d one_quotient(__m256d a, __m256d b, __m256d inverse, int are_f32)
 {
     __m256d q = _mm256_mul_pd(a, inverse);
@@ -233,7 +247,8 @@ TL_INLINE vd vd_min(vd a, vd b) { return (vd){_mm256_min_pd(a.lo, b.lo), _mm256_
 TL_INLINE vd vd_max(vd a, vd b) { return (vd){_mm256_max_pd(a.lo, b.lo), _mm256_max_pd(a.hi, b.hi)}; }
 TL_INLINE vm vd_ge(vd a, vd b)
 {
-    const __m256 lo = _mm256_castpd_ps(_mm256_cmp_pd(a.lo, b.lo, _CMP_GE_OQ)), hi = _mm256_castpd_ps(_mm256_cmp_pd(a.hi, b.hi, _CMP_GE_OQ));
+    const __m256 lo = _mm256_castpd_ps(_mm256_cmp_pd(a.lo, b.lo, _CMP_GE_OQ));
+    const __m256 hi = _mm256_castpd_ps(_mm256_cmp_pd(a.hi, b.hi, _CMP_GE_OQ));
     const __m256i packed = _mm256_castps_si256(_mm256_shuffle_ps(lo, hi, 0x88)); /* 0 1 4 5 2 3 6 7 */
     return _mm256_permute4x64_epi64(packed, 0xd8);
 }
@@ -254,11 +269,14 @@ TL_INLINE vd vd_select(vm m, vd a, vd b)
 TL_INLINE void vd_store(double *p, vd a) { _mm256_storeu_pd(p, a.lo), _mm256_storeu_pd(p + 4, a.hi); }
 
 /* Plain 16-byte loads and transposes in registers: hardware gathers are three times as slow. */
-typedef struct { __m256d even, odd; } vz; /* z of lanes 0,1,4,5 and of 2,3,6,7 */
+typedef struct {
+    __m256d even, odd;
+} vz; /* z of lanes 0,1,4,5 and of 2,3,6,7 */
 TL_INLINE __m256i load_two(int step, const tl_vertex *v, const int32_t *first)
 {
     const __m128i *a = (const __m128i *)v;
-    return _mm256_inserti128_si256(_mm256_castsi128_si256(_mm_loadu_si128(a + first[0])), _mm_loadu_si128(a + first[4 * step]), 1);
+    return _mm256_inserti128_si256(_mm256_castsi128_si256(_mm_loadu_si128(a + first[0])),
+                                   _mm_loadu_si128(a + first[4 * step]), 1);
 }
 TL_INLINE void load_vertices_by(int step, const tl_vertex *v, const int32_t *first, vi *x, vi *y, vz *z)
 {
@@ -270,7 +288,10 @@ TL_INLINE void load_vertices_by(int step, const tl_vertex *v, const int32_t *fir
     z->even = _mm256_castsi256_pd(_mm256_unpackhi_epi64(a, b));
     z->odd = _mm256_castsi256_pd(_mm256_unpackhi_epi64(c, d));
 }
-TL_INLINE void load_vertices(const tl_vertex *v, const int32_t *first, vi *x, vi *y, vz *z) { load_vertices_by(3, v, first, x, y, z); }
+TL_INLINE void load_vertices(const tl_vertex *v, const int32_t *first, vi *x, vi *y, vz *z)
+{
+    load_vertices_by(3, v, first, x, y, z);
+}
 TL_INLINE vd vd_from_vz(vz z)
 {
     return (vd){_mm256_permute2f128_pd(z.even, z.odd, 0x20), _mm256_permute2f128_pd(z.even, z.odd, 0x31)};
@@ -296,7 +317,8 @@ TL_INLINE void four_columns_f64(const double *p, int stride, __m256d *columns)
 {
     const __m256d a = _mm256_loadu_pd(p), b = _mm256_loadu_pd(p + stride), c = _mm256_loadu_pd(p + 2 * stride),
                   d = _mm256_loadu_pd(p + 3 * stride);
-    const __m256d x = _mm256_unpacklo_pd(a, b), y = _mm256_unpackhi_pd(a, b), x2 = _mm256_unpacklo_pd(c, d), y2 = _mm256_unpackhi_pd(c, d);
+    const __m256d x = _mm256_unpacklo_pd(a, b), y = _mm256_unpackhi_pd(a, b), x2 = _mm256_unpacklo_pd(c, d);
+    const __m256d y2 = _mm256_unpackhi_pd(c, d);
     columns[0] = _mm256_permute2f128_pd(x, x2, 0x20);
     columns[1] = _mm256_permute2f128_pd(y, y2, 0x20);
     columns[2] = _mm256_permute2f128_pd(x, x2, 0x31);
@@ -314,7 +336,8 @@ TL_INLINE void load_columns_f64(const double *p, int stride, vd *columns)
 TL_INLINE void store_four(tl_vertex *v, __m128i x, __m128i y, __m256d z)
 {
     const __m256i xy = _mm256_or_si256(_mm256_cvtepu32_epi64(x), _mm256_slli_epi64(_mm256_cvtepu32_epi64(y), 32));
-    const __m256i even = _mm256_unpacklo_epi64(xy, _mm256_castpd_si256(z)), odd = _mm256_unpackhi_epi64(xy, _mm256_castpd_si256(z));
+    const __m256i even = _mm256_unpacklo_epi64(xy, _mm256_castpd_si256(z));
+    const __m256i odd = _mm256_unpackhi_epi64(xy, _mm256_castpd_si256(z));
     _mm256_storeu_si256((__m256i *)v, _mm256_permute2x128_si256(even, odd, 0x20));
     _mm256_storeu_si256((__m256i *)(v + 2), _mm256_permute2x128_si256(even, odd, 0x31));
 }
@@ -335,7 +358,8 @@ TL_INLINE vi vi_low_half(vi a) { return _mm256_blend_epi16(a, _mm256_setzero_si2
 TL_INLINE vi vi_high_half(vi a) { return _mm256_srli_epi32(a, 16); }
 TL_INLINE vf vf_lookup(const float *table, vi i)
 {
-    const vf low = _mm256_permutevar8x32_ps(_mm256_loadu_ps(table), i), high = _mm256_permutevar8x32_ps(_mm256_loadu_ps(table + 8), i);
+    const vf low = _mm256_permutevar8x32_ps(_mm256_loadu_ps(table), i);
+    const vf high = _mm256_permutevar8x32_ps(_mm256_loadu_ps(table + 8), i);
     return _mm256_blendv_ps(low, high, _mm256_castsi256_ps(_mm256_slli_epi32(i, 28)));
 }
 TL_INLINE vi vi_lookup(const int32_t *table, vi i) { return _mm256_castps_si256(vf_lookup((const float *)table, i)); }
@@ -347,12 +371,19 @@ TL_INLINE __m256d bits_minus(__m256d a, uint64_t sum, uint64_t mask)
     const __m256i b = _mm256_and_si256(_mm256_castpd_si256(a), _mm256_set1_epi64x((long long)mask));
     return _mm256_castsi256_pd(_mm256_sub_epi64(_mm256_set1_epi64x((long long)sum), b));
 }
-TL_INLINE vd vd_power(vd a, uint64_t sum, uint64_t mask) { return (vd){bits_minus(a.lo, sum, mask), bits_minus(a.hi, sum, mask)}; }
+TL_INLINE vd vd_power(vd a, uint64_t sum, uint64_t mask)
+{
+    return (vd){bits_minus(a.lo, sum, mask), bits_minus(a.hi, sum, mask)};
+}
 TL_INLINE vd vd_pick(const double *p, vi i)
 {
-    return (vd){_mm256_i32gather_pd(p, _mm256_castsi256_si128(i), 8), _mm256_i32gather_pd(p, _mm256_extracti128_si256(i, 1), 8)};
+    return (vd){_mm256_i32gather_pd(p, _mm256_castsi256_si128(i), 8),
+                _mm256_i32gather_pd(p, _mm256_extracti128_si256(i, 1), 8)};
 }
-TL_INLINE vi vi_pick(const int32_t *p, vi i) { return _mm256_permutevar8x32_epi32(_mm256_loadu_si256((const __m256i *)p), i); }
+TL_INLINE vi vi_pick(const int32_t *p, vi i)
+{
+    return _mm256_permutevar8x32_epi32(_mm256_loadu_si256((const __m256i *)p), i);
+}
 TL_INLINE vi vi_prefix_count(unsigned bits)
 {
     const uint64_t ones = 0x0101010101010101u;
@@ -361,13 +392,14 @@ TL_INLINE vi vi_prefix_count(unsigned bits)
 
 TL_INLINE __m256i load_two_records(const char *base, int scale, const int32_t *i)
 {
-    const __m128i a = _mm_loadu_si128((const __m128i *)(base + (int64_t)i[0] * scale)), b = _mm_loadu_si128((const __m128i *)(base + (int64_t)i[4] * scale));
+    const __m128i a = _mm_loadu_si128((const __m128i *)(base + (int64_t)i[0] * scale));
+    const __m128i b = _mm_loadu_si128((const __m128i *)(base + (int64_t)i[4] * scale));
     return _mm256_inserti128_si256(_mm256_castsi128_si256(a), b, 1);
 }
 TL_INLINE void vi_load_records(const void *base, int scale, const int32_t *i, vi *c)
 {
-    const vi rows[4] = {load_two_records(base, scale, i), load_two_records(base, scale, i + 1), load_two_records(base, scale, i + 2),
-                        load_two_records(base, scale, i + 3)};
+    const vi rows[4] = {load_two_records(base, scale, i), load_two_records(base, scale, i + 1),
+                        load_two_records(base, scale, i + 2), load_two_records(base, scale, i + 3)};
     transpose_quads(rows, c);
 }
 TL_INLINE __m256i load_four_pairs(const char *base, const int32_t *i)
@@ -375,14 +407,16 @@ TL_INLINE __m256i load_four_pairs(const char *base, const int32_t *i)
     __m128i two[2];
     for (int k = 0; k < 2; k++) {
         const __m128i a = _mm_loadl_epi64((const __m128i *)(base + (int64_t)i[2 * k] * 8));
-        two[k] = _mm_castpd_si128(_mm_loadh_pd(_mm_castsi128_pd(a), (const double *)(base + (int64_t)i[2 * k + 1] * 8)));
+        two[k] =
+            _mm_castpd_si128(_mm_loadh_pd(_mm_castsi128_pd(a), (const double *)(base + (int64_t)i[2 * k + 1] * 8)));
     }
     return _mm256_inserti128_si256(_mm256_castsi128_si256(two[0]), two[1], 1);
 }
 TL_INLINE void vf_load_pairs(const void *base, const int32_t *i, vf *c)
 {
     const vf a = _mm256_castsi256_ps(load_four_pairs(base, i)), b = _mm256_castsi256_ps(load_four_pairs(base, i + 4));
-    const __m256d first = _mm256_castps_pd(_mm256_shuffle_ps(a, b, 0x88)), second = _mm256_castps_pd(_mm256_shuffle_ps(a, b, 0xdd));
+    const __m256d first = _mm256_castps_pd(_mm256_shuffle_ps(a, b, 0x88));
+    const __m256d second = _mm256_castps_pd(_mm256_shuffle_ps(a, b, 0xdd));
     c[0] = _mm256_castpd_ps(_mm256_permute4x64_pd(first, 0xd8)); /* 0 1 4 5 2 3 6 7 */
     c[1] = _mm256_castpd_ps(_mm256_permute4x64_pd(second, 0xd8));
 }
@@ -391,7 +425,8 @@ TL_INLINE void vf_store_fourths(const float *rows, vf fourth, float *out)
 {
     for (int k = 0; k < 4; k++) {
         const vi at = _mm256_add_epi32(_mm256_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1), _mm256_set1_epi32(2 * k));
-        _mm256_storeu_ps(out + 8 * k, _mm256_blend_ps(_mm256_loadu_ps(rows + 8 * k), _mm256_permutevar8x32_ps(fourth, at), 0x88));
+        _mm256_storeu_ps(out + 8 * k,
+                         _mm256_blend_ps(_mm256_loadu_ps(rows + 8 * k), _mm256_permutevar8x32_ps(fourth, at), 0x88));
     }
 }
 /* Pixels of two and of three numbers, one after the other. */
@@ -407,7 +442,8 @@ TL_INLINE void vf_store_triples(float *p, const vf *c)
     vf turned[3][3];
     for (int k = 0; k < 3; k++)
         for (int channel = 0; channel < 3; channel++)
-            turned[k][channel] = _mm256_permutevar8x32_ps(c[channel], _mm256_loadu_si256((const __m256i *)(from + 8 * k)));
+            turned[k][channel] =
+                _mm256_permutevar8x32_ps(c[channel], _mm256_loadu_si256((const __m256i *)(from + 8 * k)));
     _mm256_storeu_ps(p, _mm256_blend_ps(_mm256_blend_ps(turned[0][0], turned[0][1], 0x92), turned[0][2], 0x24));
     _mm256_storeu_ps(p + 8, _mm256_blend_ps(_mm256_blend_ps(turned[1][0], turned[1][1], 0x24), turned[1][2], 0x49));
     _mm256_storeu_ps(p + 16, _mm256_blend_ps(_mm256_blend_ps(turned[2][0], turned[2][1], 0x49), turned[2][2], 0x92));

@@ -14,7 +14,9 @@
 
 typedef __m512i vi;
 typedef __m512 vf;
-typedef struct { __m512d lo, hi; } vd;
+typedef struct {
+    __m512d lo, hi;
+} vd;
 typedef __mmask16 vm;
 
 TL_INLINE vi vi_set1(int32_t a) { return _mm512_set1_epi32(a); }
@@ -48,7 +50,11 @@ TL_INLINE vi vi_select(vm m, vi a, vi b) { return _mm512_mask_mov_epi32(b, m, a)
 TL_INLINE void vi_compress(int32_t *p, vm m, vi a) { _mm512_storeu_si512(p, _mm512_maskz_compress_epi32(m, a)); }
 TL_INLINE vi vi_load_masked(vm m, const int32_t *p) { return _mm512_maskz_loadu_epi32(m, p); }
 TL_INLINE void vi_store_masked(int32_t *p, vm m, vi a) { _mm512_mask_storeu_epi32(p, m, a); }
-TL_INLINE void vi_store_some(int32_t *p, vm m, vi a, int has_room) { (void)has_room; vi_store_masked(p, m, a); }
+TL_INLINE void vi_store_some(int32_t *p, vm m, vi a, int has_room)
+{
+    (void)has_room;
+    vi_store_masked(p, m, a);
+}
 
 /* Four int32. */
 typedef __m128i v4;
@@ -90,7 +96,10 @@ TL_INLINE vi vi_prefix_sum(vi a)
 TL_INLINE vi vi_last(vi a) { return _mm512_permutexvar_epi32(_mm512_set1_epi32(15), a); }
 TL_INLINE vi vi_shift_in(vi a, vi before) { return _mm512_alignr_epi32(a, before, 15); }
 TL_INLINE vf vf_from_unsigned(vi a) { return _mm512_cvtepu32_ps(a); }
-TL_INLINE vi vi_gather(vm m, const int32_t *p, vi i) { return _mm512_mask_i32gather_epi32(_mm512_setzero_si512(), m, i, p, 4); }
+TL_INLINE vi vi_gather(vm m, const int32_t *p, vi i)
+{
+    return _mm512_mask_i32gather_epi32(_mm512_setzero_si512(), m, i, p, 4);
+}
 
 TL_INLINE vm vm_and(vm a, vm b) { return a & b; }
 TL_INLINE vm vm_or(vm a, vm b) { return a | b; }
@@ -103,14 +112,17 @@ TL_INLINE vm vm_from_bits(unsigned bits) { return (vm)bits; }
 /* 64 bytes of 0 or 1 */
 TL_INLINE void bytes_from_bits(uint8_t *p, uint64_t bits) { _mm512_storeu_si512(p, _mm512_maskz_set1_epi8(bits, 1)); }
 /* TL_LANES words of 64 bits; vw_add_range sets the bits [begin, end) that are in the pattern; begin, end >= 0. */
-typedef struct { __m512i lo, hi; } vw;
+typedef struct {
+    __m512i lo, hi;
+} vw;
 TL_INLINE vw vw_zero(void) { return (vw){_mm512_setzero_si512(), _mm512_setzero_si512()}; }
 TL_INLINE vw vw_load(const uint64_t *p) { return (vw){_mm512_loadu_si512(p), _mm512_loadu_si512(p + 8)}; }
 TL_INLINE void vw_store(uint64_t *p, vw a) { _mm512_storeu_si512(p, a.lo), _mm512_storeu_si512(p + 8, a.hi); }
 TL_INLINE __m512i bit_range_64(__m256i begin, __m256i end)
 {
     const __m512i ones = _mm512_set1_epi64(-1);
-    return _mm512_andnot_si512(_mm512_sllv_epi64(ones, _mm512_cvtepu32_epi64(end)), _mm512_sllv_epi64(ones, _mm512_cvtepu32_epi64(begin)));
+    return _mm512_andnot_si512(_mm512_sllv_epi64(ones, _mm512_cvtepu32_epi64(end)),
+                               _mm512_sllv_epi64(ones, _mm512_cvtepu32_epi64(begin)));
 }
 TL_INLINE vw vw_add_range(vw a, vi begin, vi end, uint64_t pattern)
 {
@@ -127,7 +139,6 @@ TL_INLINE vi vi_bit_ranges(vi begin, vi end)
     return _mm512_andnot_si512(_mm512_sllv_epi32(ones, end), _mm512_sllv_epi32(ones, begin));
 }
 
-
 TL_INLINE vf vf_set1(float a) { return _mm512_set1_ps(a); }
 TL_INLINE vf vf_add(vf a, vf b) { return _mm512_add_ps(a, b); }
 TL_INLINE vf vf_sub(vf a, vf b) { return _mm512_sub_ps(a, b); }
@@ -142,7 +153,11 @@ TL_INLINE vi vi_nearest(vf a) { return _mm512_cvtps_epi32(a); }
 TL_INLINE vf vf_last_of(vf a, int n) { return n == 4 ? _mm512_permute_ps(a, 0xff) : _mm512_movehdup_ps(a); }
 TL_INLINE vf vf_load_masked(vm m, const float *p) { return _mm512_maskz_loadu_ps(m, p); }
 TL_INLINE void vf_store_masked(float *p, vm m, vf a) { _mm512_mask_storeu_ps(p, m, a); }
-TL_INLINE void vf_store_some(float *p, vm m, vf a, int has_room) { (void)has_room; vf_store_masked(p, m, a); }
+TL_INLINE void vf_store_some(float *p, vm m, vf a, int has_room)
+{
+    (void)has_room;
+    vf_store_masked(p, m, a);
+}
 TL_INLINE vm vf_lt(vf a, vf b) { return _mm512_cmp_ps_mask(a, b, _CMP_LT_OQ); }
 TL_INLINE vm vf_ge(vf a, vf b) { return _mm512_cmp_ps_mask(a, b, _CMP_GE_OQ); }
 TL_INLINE vm vf_eq(vf a, vf b) { return _mm512_cmp_ps_mask(a, b, _CMP_EQ_OQ); }
@@ -161,10 +176,10 @@ TL_INLINE vf vf_from_vd(vd a)
 {
     return _mm512_insertf32x8(_mm512_castps256_ps512(_mm512_cvtpd_ps(a.lo)), _mm512_cvtpd_ps(a.hi), 1);
 }
-/* a[k] / b for three a, each correctly rounded, for |b| and |a / b| within 2^+-500: one division.  The first step makes the
- * quotient faithful, the second correct.  Of float32 numbers one step is enough: it errs by less than 2^-100 of the quotient, which
- * is no nearer than 2^-77 to the middle of two float64.  Based on: P. Markstein, Computation of elementary functions on the IBM RISC
- * System/6000 processor, 1990. */
+/* a[k] / b for three a, each correctly rounded, for |b| and |a / b| within 2^+-500: one division.  The first step makes
+ * the quotient faithful, the second correct.  Of float32 numbers one step is enough: it errs by less than 2^-100 of the
+ * quotient, which is no nearer than 2^-77 to the middle of two float64.  Based on: P. Markstein, Computation of
+ * elementary functions on the IBM RISC System/6000 processor, 1990. */
 TL_INLINE __m512d one_quotient(__m512d a, __m512d b, __m512d inverse, int are_f32)
 {
     __m512d q = _mm512_mul_pd(a, inverse);
@@ -201,12 +216,16 @@ TL_INLINE vd vd_select(vm m, vd a, vd b)
 TL_INLINE void vd_store(double *p, vd a) { _mm512_storeu_pd(p, a.lo), _mm512_storeu_pd(p + 8, a.hi); }
 
 /* Plain 16-byte loads and transposes in registers: hardware gathers are three times as slow. */
-typedef struct { __m512d even, odd; } vz; /* z of lanes 0,1,4,5,8,9,12,13 and of 2,3,6,7,10,11,14,15 */
+typedef struct {
+    __m512d even, odd;
+} vz; /* z of lanes 0,1,4,5,8,9,12,13 and of 2,3,6,7,10,11,14,15 */
 TL_INLINE __m512i load_four(int step, const tl_vertex *v, const int32_t *first)
 {
     const __m128i *a = (const __m128i *)v;
-    const __m256i low = _mm256_inserti128_si256(_mm256_castsi128_si256(_mm_loadu_si128(a + first[0])), _mm_loadu_si128(a + first[4 * step]), 1);
-    const __m256i high = _mm256_inserti128_si256(_mm256_castsi128_si256(_mm_loadu_si128(a + first[8 * step])), _mm_loadu_si128(a + first[12 * step]), 1);
+    const __m256i low = _mm256_inserti128_si256(_mm256_castsi128_si256(_mm_loadu_si128(a + first[0])),
+                                                _mm_loadu_si128(a + first[4 * step]), 1);
+    const __m256i high = _mm256_inserti128_si256(_mm256_castsi128_si256(_mm_loadu_si128(a + first[8 * step])),
+                                                 _mm_loadu_si128(a + first[12 * step]), 1);
     return _mm512_inserti64x4(_mm512_castsi256_si512(low), high, 1);
 }
 TL_INLINE void load_vertices_by(int step, const tl_vertex *v, const int32_t *first, vi *x, vi *y, vz *z)
@@ -219,10 +238,14 @@ TL_INLINE void load_vertices_by(int step, const tl_vertex *v, const int32_t *fir
     z->even = _mm512_castsi512_pd(_mm512_unpackhi_epi64(a, b));
     z->odd = _mm512_castsi512_pd(_mm512_unpackhi_epi64(c, d));
 }
-TL_INLINE void load_vertices(const tl_vertex *v, const int32_t *first, vi *x, vi *y, vz *z) { load_vertices_by(3, v, first, x, y, z); }
+TL_INLINE void load_vertices(const tl_vertex *v, const int32_t *first, vi *x, vi *y, vz *z)
+{
+    load_vertices_by(3, v, first, x, y, z);
+}
 TL_INLINE vd vd_from_vz(vz z)
 {
-    const __m512i low = _mm512_setr_epi64(0, 1, 8, 9, 2, 3, 10, 11), high = _mm512_setr_epi64(4, 5, 12, 13, 6, 7, 14, 15);
+    const __m512i low = _mm512_setr_epi64(0, 1, 8, 9, 2, 3, 10, 11);
+    const __m512i high = _mm512_setr_epi64(4, 5, 12, 13, 6, 7, 14, 15);
     return (vd){_mm512_permutex2var_pd(z.even, low, z.odd), _mm512_permutex2var_pd(z.even, high, z.odd)};
 }
 
@@ -230,7 +253,8 @@ TL_INLINE vd vd_from_vz(vz z)
 TL_INLINE __m512 rows_f32(const float *p, int stride)
 {
     const __m256 low = _mm256_insertf128_ps(_mm256_castps128_ps256(_mm_loadu_ps(p)), _mm_loadu_ps(p + 4 * stride), 1);
-    const __m256 high = _mm256_insertf128_ps(_mm256_castps128_ps256(_mm_loadu_ps(p + 8 * stride)), _mm_loadu_ps(p + 12 * stride), 1);
+    const __m256 high =
+        _mm256_insertf128_ps(_mm256_castps128_ps256(_mm_loadu_ps(p + 8 * stride)), _mm_loadu_ps(p + 12 * stride), 1);
     return _mm512_insertf32x8(_mm512_castps256_ps512(low), high, 1);
 }
 TL_INLINE void load_columns_f32(const float *p, int stride, vf *columns)
@@ -269,7 +293,8 @@ TL_INLINE void eight_columns_f64(const double *p, int stride, __m512d *columns)
                   d = rows_f64(p + 3 * stride, stride);
     const __m512d x = _mm512_unpacklo_pd(a, b), y = _mm512_unpackhi_pd(a, b); /* x: x0 x1 z0 z1 x4 x5 z4 z5 */
     const __m512d x2 = _mm512_unpacklo_pd(c, d), y2 = _mm512_unpackhi_pd(c, d);
-    const __m512i front = _mm512_setr_epi64(0, 1, 8, 9, 4, 5, 12, 13), back = _mm512_setr_epi64(2, 3, 10, 11, 6, 7, 14, 15);
+    const __m512i front = _mm512_setr_epi64(0, 1, 8, 9, 4, 5, 12, 13);
+    const __m512i back = _mm512_setr_epi64(2, 3, 10, 11, 6, 7, 14, 15);
     columns[0] = _mm512_permutex2var_pd(x, front, x2);
     columns[1] = _mm512_permutex2var_pd(y, front, y2);
     columns[2] = _mm512_permutex2var_pd(x, back, x2);
@@ -286,7 +311,8 @@ TL_INLINE void load_columns_f64(const double *p, int stride, vd *columns)
 
 TL_INLINE void store_eight(tl_vertex *v, __m512i xy, __m512d z)
 {
-    const __m512i front = _mm512_setr_epi64(0, 8, 1, 9, 2, 10, 3, 11), back = _mm512_setr_epi64(4, 12, 5, 13, 6, 14, 7, 15);
+    const __m512i front = _mm512_setr_epi64(0, 8, 1, 9, 2, 10, 3, 11);
+    const __m512i back = _mm512_setr_epi64(4, 12, 5, 13, 6, 14, 7, 15);
     _mm512_storeu_si512(v, _mm512_permutex2var_epi64(xy, front, _mm512_castpd_si512(z)));
     _mm512_storeu_si512(v + 4, _mm512_permutex2var_epi64(xy, back, _mm512_castpd_si512(z)));
 }
@@ -309,10 +335,18 @@ TL_INLINE int hm_any(hm a) { return a != 0; }
 TL_INLINE hm hi_gt(hi a, hi b) { return _mm256_cmpgt_epi32_mask(a, b); }
 TL_INLINE hi hi_load_masked(hm m, const int32_t *p) { return _mm256_maskz_loadu_epi32(m, p); }
 TL_INLINE void hi_store_masked(int32_t *p, hm m, hi a) { _mm256_mask_storeu_epi32(p, m, a); }
-TL_INLINE void hi_store_some(int32_t *p, hm m, hi a, int has_room) { (void)has_room; hi_store_masked(p, m, a); }
+TL_INLINE void hi_store_some(int32_t *p, hm m, hi a, int has_room)
+{
+    (void)has_room;
+    hi_store_masked(p, m, a);
+}
 TL_INLINE hf hf_load_masked(hm m, const float *p) { return _mm256_maskz_loadu_ps(m, p); }
 TL_INLINE void hf_store_masked(float *p, hm m, hf a) { _mm256_mask_storeu_ps(p, m, a); }
-TL_INLINE void hf_store_some(float *p, hm m, hf a, int has_room) { (void)has_room; hf_store_masked(p, m, a); }
+TL_INLINE void hf_store_some(float *p, hm m, hf a, int has_room)
+{
+    (void)has_room;
+    hf_store_masked(p, m, a);
+}
 TL_INLINE hm hf_lt(hf a, hf b) { return _mm256_cmp_ps_mask(a, b, _CMP_LT_OQ); }
 TL_INLINE hm hf_eq(hf a, hf b) { return _mm256_cmp_ps_mask(a, b, _CMP_EQ_OQ); }
 TL_INLINE hi hi_lower(vi a) { return _mm512_castsi512_si256(a); }
@@ -342,7 +376,10 @@ TL_INLINE __m512d bits_minus(__m512d a, uint64_t sum, uint64_t mask)
     const __m512i b = _mm512_and_si512(_mm512_castpd_si512(a), _mm512_set1_epi64((long long)mask));
     return _mm512_castsi512_pd(_mm512_sub_epi64(_mm512_set1_epi64((long long)sum), b));
 }
-TL_INLINE vd vd_power(vd a, uint64_t sum, uint64_t mask) { return (vd){bits_minus(a.lo, sum, mask), bits_minus(a.hi, sum, mask)}; }
+TL_INLINE vd vd_power(vd a, uint64_t sum, uint64_t mask)
+{
+    return (vd){bits_minus(a.lo, sum, mask), bits_minus(a.hi, sum, mask)};
+}
 TL_INLINE vd vd_pick(const double *p, vi i)
 {
     const __m512d low = _mm512_loadu_pd(p), high = _mm512_loadu_pd(p + 8);
@@ -359,15 +396,18 @@ TL_INLINE vi vi_prefix_count(unsigned bits)
 
 TL_INLINE __m512i load_four_records(const char *base, int scale, const int32_t *i)
 {
-    const __m128i a = _mm_loadu_si128((const __m128i *)(base + (int64_t)i[0] * scale)), b = _mm_loadu_si128((const __m128i *)(base + (int64_t)i[4] * scale));
-    const __m128i c = _mm_loadu_si128((const __m128i *)(base + (int64_t)i[8] * scale)), d = _mm_loadu_si128((const __m128i *)(base + (int64_t)i[12] * scale));
-    const __m256i low = _mm256_inserti128_si256(_mm256_castsi128_si256(a), b, 1), high = _mm256_inserti128_si256(_mm256_castsi128_si256(c), d, 1);
+    const __m128i a = _mm_loadu_si128((const __m128i *)(base + (int64_t)i[0] * scale));
+    const __m128i b = _mm_loadu_si128((const __m128i *)(base + (int64_t)i[4] * scale));
+    const __m128i c = _mm_loadu_si128((const __m128i *)(base + (int64_t)i[8] * scale));
+    const __m128i d = _mm_loadu_si128((const __m128i *)(base + (int64_t)i[12] * scale));
+    const __m256i low = _mm256_inserti128_si256(_mm256_castsi128_si256(a), b, 1);
+    const __m256i high = _mm256_inserti128_si256(_mm256_castsi128_si256(c), d, 1);
     return _mm512_inserti64x4(_mm512_castsi256_si512(low), high, 1);
 }
 TL_INLINE void vi_load_records(const void *base, int scale, const int32_t *i, vi *c)
 {
-    const vi rows[4] = {load_four_records(base, scale, i), load_four_records(base, scale, i + 1), load_four_records(base, scale, i + 2),
-                        load_four_records(base, scale, i + 3)};
+    const vi rows[4] = {load_four_records(base, scale, i), load_four_records(base, scale, i + 1),
+                        load_four_records(base, scale, i + 2), load_four_records(base, scale, i + 3)};
     transpose_quads(rows, c);
 }
 TL_INLINE vi load_eight_pairs(const char *base, const int32_t *i)
@@ -375,7 +415,8 @@ TL_INLINE vi load_eight_pairs(const char *base, const int32_t *i)
     __m128i two[4];
     for (int k = 0; k < 4; k++) {
         const __m128i a = _mm_loadl_epi64((const __m128i *)(base + (int64_t)i[2 * k] * 8));
-        two[k] = _mm_castpd_si128(_mm_loadh_pd(_mm_castsi128_pd(a), (const double *)(base + (int64_t)i[2 * k + 1] * 8)));
+        two[k] =
+            _mm_castpd_si128(_mm_loadh_pd(_mm_castsi128_pd(a), (const double *)(base + (int64_t)i[2 * k + 1] * 8)));
     }
     const __m256i low = _mm256_inserti128_si256(_mm256_castsi128_si256(two[0]), two[1], 1);
     const __m256i high = _mm256_inserti128_si256(_mm256_castsi128_si256(two[2]), two[3], 1);
@@ -392,7 +433,8 @@ TL_INLINE void vf_load_pairs(const void *base, const int32_t *i, vf *c)
 TL_INLINE void vf_store_fourths(const float *rows, vf fourth, float *out)
 {
     for (int k = 0; k < 4; k++) {
-        const vi at = _mm512_add_epi32(_mm512_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3), _mm512_set1_epi32(4 * k));
+        const vi at = _mm512_add_epi32(_mm512_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3),
+                                       _mm512_set1_epi32(4 * k));
         _mm512_storeu_ps(out + 16 * k, _mm512_mask_permutexvar_ps(_mm512_loadu_ps(rows + 16 * k), 0x8888, at, fourth));
     }
 }
@@ -405,11 +447,14 @@ TL_INLINE void vf_store_pairs(float *p, const vf *c)
 }
 TL_INLINE void vf_store_triples(float *p, const vf *c)
 {
-    static const int32_t from[48] = {0, 16, 0, 1, 17, 1, 2, 18, 2, 3, 19, 3, 4, 20, 4, 5, 21, 5, 6, 22, 6, 7, 23, 7, 8, 24, 8, 9, 25, 9, 10, 26, 10, 11, 27, 11, 12, 28, 12, 13, 29, 13, 14, 30, 14, 15, 31, 15};
+    static const int32_t from[48] = {0,  16, 0,  1,  17, 1,  2,  18, 2,  3,  19, 3,  4,  20, 4,  5,
+                                     21, 5,  6,  22, 6,  7,  23, 7,  8,  24, 8,  9,  25, 9,  10, 26,
+                                     10, 11, 27, 11, 12, 28, 12, 13, 29, 13, 14, 30, 14, 15, 31, 15};
     static const __mmask16 is_third[3] = {0x4924, 0x2492, 0x9249};
     for (int k = 0; k < 3; k++) {
         const vi at = _mm512_loadu_si512(from + 16 * k);
-        _mm512_storeu_ps(p + 16 * k, _mm512_mask_permutexvar_ps(_mm512_permutex2var_ps(c[0], at, c[1]), is_third[k], at, c[2]));
+        _mm512_storeu_ps(p + 16 * k,
+                         _mm512_mask_permutexvar_ps(_mm512_permutex2var_ps(c[0], at, c[1]), is_third[k], at, c[2]));
     }
 }
 /* Four doubles at base + 8 * stride * i[k], as columns. */
@@ -419,12 +464,14 @@ TL_INLINE void vd_load_records(const double *base, int stride, const int32_t *i,
     for (int part = 0; part < 2; part++) {
         __m512d row[4];
         for (int k = 0; k < 4; k++) { /* lanes k and k + 4 */
-            const double *a = base + (int64_t)i[8 * part + k] * stride, *b = base + (int64_t)i[8 * part + k + 4] * stride;
+            const double *a = base + (int64_t)i[8 * part + k] * stride,
+                         *b = base + (int64_t)i[8 * part + k + 4] * stride;
             row[k] = _mm512_insertf64x4(_mm512_castpd256_pd512(_mm256_loadu_pd(a)), _mm256_loadu_pd(b), 1);
         }
         const __m512d even[2] = {_mm512_unpacklo_pd(row[0], row[1]), _mm512_unpackhi_pd(row[0], row[1])};
         const __m512d odd[2] = {_mm512_unpacklo_pd(row[2], row[3]), _mm512_unpackhi_pd(row[2], row[3])};
-        const __m512i low = _mm512_setr_epi64(0, 1, 8, 9, 4, 5, 12, 13), high = _mm512_setr_epi64(2, 3, 10, 11, 6, 7, 14, 15);
+        const __m512i low = _mm512_setr_epi64(0, 1, 8, 9, 4, 5, 12, 13);
+        const __m512i high = _mm512_setr_epi64(2, 3, 10, 11, 6, 7, 14, 15);
         for (int k = 0; k < 2; k++) {
             half[part][k] = _mm512_permutex2var_pd(even[k], low, odd[k]);
             half[part][k + 2] = _mm512_permutex2var_pd(even[k], high, odd[k]);

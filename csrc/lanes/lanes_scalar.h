@@ -33,12 +33,14 @@ TL_INLINE vi vi_shift_left(vi a, int n) { return (vi)((uint32_t)a << n); }
 TL_INLINE vi vi_shift_right(vi a, int n) { return a >> n; }
 TL_INLINE vi vi_mul_halves(vi a, vi b)
 {
-    const uint32_t low = ((uint32_t)a & 0xffff) * ((uint32_t)b & 0xffff), high = ((uint32_t)a >> 16) * ((uint32_t)b >> 16);
+    const uint32_t low = ((uint32_t)a & 0xffff) * ((uint32_t)b & 0xffff);
+    const uint32_t high = ((uint32_t)a >> 16) * ((uint32_t)b >> 16);
     return (vi)(high << 16 | (low & 0xffff));
 }
 TL_INLINE vi vi_mul_high_halves(vi a, vi b)
 {
-    const uint32_t low = ((uint32_t)a & 0xffff) * ((uint32_t)b & 0xffff), high = ((uint32_t)a >> 16) * ((uint32_t)b >> 16);
+    const uint32_t low = ((uint32_t)a & 0xffff) * ((uint32_t)b & 0xffff);
+    const uint32_t high = ((uint32_t)a >> 16) * ((uint32_t)b >> 16);
     return (vi)((high & 0xffff0000) | low >> 16);
 }
 TL_INLINE vi vi_scale_halves(vi a, vi b)
@@ -46,8 +48,14 @@ TL_INLINE vi vi_scale_halves(vi a, vi b)
     const int32_t low = ((int16_t)a * (int16_t)b + (1 << 14)) >> 15, high = ((a >> 16) * (b >> 16) + (1 << 14)) >> 15;
     return (vi)((uint32_t)high << 16 | ((uint32_t)low & 0xffff));
 }
-TL_INLINE vi vi_add_halves(vi a, vi b) { return (vi)((((uint32_t)a & 0xffff0000) + ((uint32_t)b & 0xffff0000)) | (((uint32_t)a + (uint32_t)b) & 0xffff)); }
-TL_INLINE vi vi_sub_halves(vi a, vi b) { return (vi)((((uint32_t)a & 0xffff0000) - ((uint32_t)b & 0xffff0000)) | (((uint32_t)a - (uint32_t)b) & 0xffff)); }
+TL_INLINE vi vi_add_halves(vi a, vi b)
+{
+    return (vi)((((uint32_t)a & 0xffff0000) + ((uint32_t)b & 0xffff0000)) | (((uint32_t)a + (uint32_t)b) & 0xffff));
+}
+TL_INLINE vi vi_sub_halves(vi a, vi b)
+{
+    return (vi)((((uint32_t)a & 0xffff0000) - ((uint32_t)b & 0xffff0000)) | (((uint32_t)a - (uint32_t)b) & 0xffff));
+}
 TL_INLINE vi vi_upper_bytes(vi a) { return (vi)((uint32_t)a >> 8 & 0x00ff00ff); }
 TL_INLINE vi vi_add_bytes(vi a, vi b)
 {
@@ -68,13 +76,27 @@ TL_INLINE vm vi_gt(vi a, vi b) { return a > b; }
 TL_INLINE vm vi_gt_unsigned(vi a, vi b) { return (uint32_t)a > (uint32_t)b; }
 TL_INLINE vm vi_eq(vi a, vi b) { return a == b; }
 TL_INLINE vi vi_select(vm m, vi a, vi b) { return m ? a : b; }
-TL_INLINE void vi_compress(int32_t *p, vm m, vi a) { (void)m; *p = a; }
+TL_INLINE void vi_compress(int32_t *p, vm m, vi a)
+{
+    (void)m;
+    *p = a;
+}
 TL_INLINE vi vi_load_masked(vm m, const int32_t *p) { return m ? *p : 0; }
-TL_INLINE void vi_store_masked(int32_t *p, vm m, vi a) { if (m) *p = a; }
-TL_INLINE void vi_store_some(int32_t *p, vm m, vi a, int has_room) { (void)has_room; vi_store_masked(p, m, a); }
+TL_INLINE void vi_store_masked(int32_t *p, vm m, vi a)
+{
+    if (m)
+        *p = a;
+}
+TL_INLINE void vi_store_some(int32_t *p, vm m, vi a, int has_room)
+{
+    (void)has_room;
+    vi_store_masked(p, m, a);
+}
 
 /* Four int32. */
-typedef struct { int32_t k[4]; } v4;
+typedef struct {
+    int32_t k[4];
+} v4;
 TL_INLINE v4 v4_zero(void) { return (v4){{0, 0, 0, 0}}; }
 TL_INLINE v4 v4_load(const int32_t *p) { return (v4){{p[0], p[1], p[2], p[3]}}; }
 TL_INLINE void v4_store(int32_t *p, v4 a) { memcpy(p, a.k, sizeof a.k); }
@@ -95,7 +117,11 @@ TL_INLINE void vi_store_quads(int32_t *p, const vi *c)
 }
 TL_INLINE vi vi_prefix_sum(vi a) { return a; }
 TL_INLINE vi vi_last(vi a) { return a; }
-TL_INLINE vi vi_shift_in(vi a, vi before) { (void)a; return before; }
+TL_INLINE vi vi_shift_in(vi a, vi before)
+{
+    (void)a;
+    return before;
+}
 TL_INLINE vf vf_from_unsigned(vi a) { return (float)(uint32_t)a; }
 TL_INLINE vi vi_gather(vm m, const int32_t *p, vi i) { return m ? p[i] : 0; }
 
@@ -134,7 +160,6 @@ TL_INLINE vw vw_add_range(vw a, vi begin, vi end, uint64_t pattern)
 
 TL_INLINE vi vi_bit_ranges(vi begin, vi end) { return begin < 31 ? (vi)(~0u << begin & ~(~0u << end)) : 0; }
 
-
 TL_INLINE vf vf_set1(float a) { return a; }
 TL_INLINE vf vf_add(vf a, vf b) { return a + b; }
 TL_INLINE vf vf_sub(vf a, vf b) { return a - b; }
@@ -146,14 +171,31 @@ TL_INLINE vf vf_select(vm m, vf a, vf b) { return m ? a : b; }
 TL_INLINE void vf_store(float *p, vf a) { *p = a; }
 TL_INLINE vi vi_floor(vf a) { return fabsf(a) < 0x1p30f ? (vi)floorf(a) : INT32_MIN; }
 TL_INLINE vi vi_nearest(vf a) { return fabsf(a) < 0x1p30f ? (vi)rintf(a) : INT32_MIN; }
-TL_INLINE vf vf_last_of(vf a, int n) { (void)n; return a; }
+TL_INLINE vf vf_last_of(vf a, int n)
+{
+    (void)n;
+    return a;
+}
 TL_INLINE vf vf_load_masked(vm m, const float *p) { return m ? *p : 0.0f; }
-TL_INLINE void vf_store_masked(float *p, vm m, vf a) { if (m) *p = a; }
-TL_INLINE void vf_store_some(float *p, vm m, vf a, int has_room) { (void)has_room; vf_store_masked(p, m, a); }
+TL_INLINE void vf_store_masked(float *p, vm m, vf a)
+{
+    if (m)
+        *p = a;
+}
+TL_INLINE void vf_store_some(float *p, vm m, vf a, int has_room)
+{
+    (void)has_room;
+    vf_store_masked(p, m, a);
+}
 TL_INLINE vm vf_lt(vf a, vf b) { return a < b; }
 TL_INLINE vm vf_ge(vf a, vf b) { return a >= b; }
 TL_INLINE vm vf_eq(vf a, vf b) { return a == b; }
-TL_INLINE vi vi_bits_of_vf(vf a) { vi b; memcpy(&b, &a, 4); return b; }
+TL_INLINE vi vi_bits_of_vf(vf a)
+{
+    vi b;
+    memcpy(&b, &a, 4);
+    return b;
+}
 
 TL_INLINE vd vd_set1(double a) { return a; }
 TL_INLINE vd vd_add(vd a, vd b) { return a + b; }
@@ -178,7 +220,8 @@ TL_INLINE vi vi_round(vd a) { return fabs(a) < 0x1p31 ? (vi)rint(a) : INT32_MIN;
 TL_INLINE vd vd_select(vm m, vd a, vd b) { return m ? a : b; }
 TL_INLINE void vd_store(double *p, vd a) { *p = a; }
 
-/* The vertices first[step * lane] of TL_LANES pairs or triangles.  z is left in the order of the loads until it is needed. */
+/* The vertices first[step * lane] of TL_LANES pairs or triangles.  z is left in the order of the loads until it is
+ * needed. */
 typedef double vz;
 TL_INLINE void load_vertices_by(int step, const tl_vertex *v, const int32_t *first, vi *x, vi *y, vz *z)
 {
@@ -188,7 +231,10 @@ TL_INLINE void load_vertices_by(int step, const tl_vertex *v, const int32_t *fir
     *y = a.y_fx;
     *z = a.z;
 }
-TL_INLINE void load_vertices(const tl_vertex *v, const int32_t *first, vi *x, vi *y, vz *z) { load_vertices_by(3, v, first, x, y, z); }
+TL_INLINE void load_vertices(const tl_vertex *v, const int32_t *first, vi *x, vi *y, vz *z)
+{
+    load_vertices_by(3, v, first, x, y, z);
+}
 TL_INLINE vd vd_from_vz(vz z) { return z; }
 
 /* The first four numbers of TL_LANES rows, as columns; reads up to two numbers past the last row. */
@@ -212,20 +258,50 @@ TL_INLINE vf vf_fma(vf a, vf b, vf c) { return fmaf(a, b, c); }
 TL_INLINE vf vf_min(vf a, vf b) { return a < b ? a : b; } /* b when one is NaN */
 TL_INLINE vf vf_max(vf a, vf b) { return a > b ? a : b; }
 TL_INLINE vi vi_rint(vf a) { return fabsf(a) < 0x1p31f ? (vi)lrintf(a) : INT32_MIN; }
-TL_INLINE vf vf_of_bits(vi a) { vf b; memcpy(&b, &a, 4); return b; }
+TL_INLINE vf vf_of_bits(vi a)
+{
+    vf b;
+    memcpy(&b, &a, 4);
+    return b;
+}
 TL_INLINE vi vi_low_half(vi a) { return a & 0xffff; }
 TL_INLINE vi vi_high_half(vi a) { return (vi)((uint32_t)a >> 16); }
 TL_INLINE vf vf_lookup(const float *table, vi i) { return table[i & 15]; }
 TL_INLINE vi vi_lookup(const int32_t *table, vi i) { return table[i & 15]; }
-TL_INLINE vf vf_pick(const float *p, vi i) { (void)i; return *p; }
+TL_INLINE vf vf_pick(const float *p, vi i)
+{
+    (void)i;
+    return *p;
+}
 TL_INLINE vd vd_load(const double *p) { return *p; }
 TL_INLINE vd vd_sqrt(vd a) { return sqrt(a); }
-TL_INLINE vd vd_power(vd a, uint64_t sum, uint64_t mask) { uint64_t b; memcpy(&b, &a, 8); b = sum - (b & mask); memcpy(&a, &b, 8); return a; }
-TL_INLINE vd vd_pick(const double *p, vi i) { (void)i; return *p; }
-TL_INLINE vi vi_pick(const int32_t *p, vi i) { (void)i; return *p; }
+TL_INLINE vd vd_power(vd a, uint64_t sum, uint64_t mask)
+{
+    uint64_t b;
+    memcpy(&b, &a, 8);
+    b = sum - (b & mask);
+    memcpy(&a, &b, 8);
+    return a;
+}
+TL_INLINE vd vd_pick(const double *p, vi i)
+{
+    (void)i;
+    return *p;
+}
+TL_INLINE vi vi_pick(const int32_t *p, vi i)
+{
+    (void)i;
+    return *p;
+}
 TL_INLINE vi vi_prefix_count(unsigned bits) { return (vi)(bits & 1); }
-TL_INLINE void vi_load_records(const void *base, int scale, const int32_t *i, vi *c) { memcpy(c, (const char *)base + (int64_t)*i * scale, 16); }
-TL_INLINE void vf_load_pairs(const void *base, const int32_t *i, vf *c) { memcpy(c, (const char *)base + (int64_t)*i * 8, 8); }
+TL_INLINE void vi_load_records(const void *base, int scale, const int32_t *i, vi *c)
+{
+    memcpy(c, (const char *)base + (int64_t)*i * scale, 16);
+}
+TL_INLINE void vf_load_pairs(const void *base, const int32_t *i, vf *c)
+{
+    memcpy(c, (const char *)base + (int64_t)*i * 8, 8);
+}
 /* Writes the fourth column over that of TL_LANES rows of four. */
 TL_INLINE void vf_store_fourths(const float *rows, vf fourth, float *out)
 {
@@ -237,6 +313,9 @@ TL_INLINE void vf_store_fourths(const float *rows, vf fourth, float *out)
 TL_INLINE void vf_store_pairs(float *p, const vf *c) { p[0] = c[0], p[1] = c[1]; }
 TL_INLINE void vf_store_triples(float *p, const vf *c) { p[0] = c[0], p[1] = c[1], p[2] = c[2]; }
 /* Four doubles at base + 8 * stride * i[k], as columns. */
-TL_INLINE void vd_load_records(const double *base, int stride, const int32_t *i, vd *c) { memcpy(c, base + (int64_t)*i * stride, 32); }
+TL_INLINE void vd_load_records(const double *base, int stride, const int32_t *i, vd *c)
+{
+    memcpy(c, base + (int64_t)*i * stride, 32);
+}
 
 #endif

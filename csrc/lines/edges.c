@@ -1,10 +1,11 @@
-/* The edges of the triangles that are not culled, each shared one once, by ascending lower index; and where the line of an edge
- * begins and ends, and what of it is hidden.
- * In: triangles; two vertices, snapped or cut by a clip plane.  Out: pairs of vertices, the lower index first; two ends in fixed
- * point, in an order that is the edge's own.
+/* The edges of the triangles that are not culled, each shared one once, by ascending lower index; and where the line of
+ * an edge begins and ends, and what of it is hidden.
+ * In: triangles; two vertices, snapped or cut by a clip plane.  Out: pairs of vertices, the lower index first; two ends
+ * in fixed point, in an order that is the edge's own.
  *
- * A counting sort by the lower index, then a look at each vertex's own list: 2.9 ns an edge of a triangle of blob(100k),
- * where sorting all pairs takes twenty times as long, and a table of the edges seen last forgets half of them. */
+ * A counting sort by the lower index, then a look at each vertex's own list: 2.9 ns an edge of a triangle of
+ * blob(100k), where sorting all pairs takes twenty times as long, and a table of the edges seen last forgets half of
+ * them. */
 #ifndef TL_EDGES_C
 #define TL_EDGES_C
 
@@ -19,17 +20,11 @@
 /* Whether a triangle shows the side that is drawn: as draw_triangle, of the pieces where a plane cuts it. */
 static int shows_side(const tl_scene *scene, int64_t i)
 {
-    const int32_t *corners = scene->triangles + 3 * i;
     const int wanted = scene->cull == TL_CULL_BACK ? -1 : 1;
     tl_triangle t;
-    if (!is_clipped(&scene->mesh, corners))
-        return load_triangle(&scene->mesh, corners, &t) == wanted;
-    const tl_pieces *p = scene->pieces;
-    if (!p)
-        return 0;
-    const tl_vertex_set cut = piece_set(p, &scene->mesh);
-    for (int64_t k = first_piece(p, i); k < p->n_pieces && p->source[k] == i; k++)
-        if (load_triangle(&cut, p->triangles + 3 * k, &t) == wanted)
+    const triangle_parts parts = parts_of(scene, i);
+    for (int k = 0; k < parts.n; k++)
+        if (load_triangle(&parts.set, parts.corners + 3 * k, &t) == wanted)
             return 1;
     return 0;
 }
@@ -79,7 +74,8 @@ static void group_edges(const tl_scene *scene, int64_t *restrict starts, int32_t
     }
 }
 
-static int64_t list_edges(const tl_scene *scene, const tl_edge_scratch *scratch, uint64_t *restrict edges, int64_t *n_edges)
+static int64_t list_edges(const tl_scene *scene, const tl_edge_scratch *scratch, uint64_t *restrict edges,
+                          int64_t *n_edges)
 {
     const int64_t n_vertices = scene->mesh.n_vertices;
     int64_t *restrict starts = scratch->starts, n = 0;
@@ -115,8 +111,8 @@ static inline line_end snapped_end(tl_vertex v, tl_wide wide)
     return v.x_fx == TL_SPECIAL ? (line_end){wide.x_fx, wide.y_fx, v.z} : (line_end){v.x_fx, v.y_fx, v.z};
 }
 
-/* What the clip planes leave of an edge: the cuts are those of clip_polygon along the same edge.  Only planes that an end
- * is outside of cut it, so the line does not depend on the triangles that share it. */
+/* What the clip planes leave of an edge: the cuts are those of clip_polygon along the same edge.  Only planes that an
+ * end is outside of cut it, so the line does not depend on the triangles that share it. */
 static int cut_line(const tl_source *source, const int32_t *edge, const tl_view *view, line_end *ends)
 {
     clip_corner p[2];
@@ -151,8 +147,8 @@ static int cut_line(const tl_source *source, const int32_t *edge, const tl_view 
     return counts.n_bad == 0;
 }
 
-/* The ends of an edge, the upper one first, of a level edge the left one: both sides of an edge then draw the same line.
- * Returns 0 when the clip planes leave nothing. */
+/* The ends of an edge, the upper one first, of a level edge the left one: both sides of an edge then draw the same
+ * line.  Returns 0 when the clip planes leave nothing. */
 static int find_ends(const tl_edges *lines, const int32_t *edge, line_end *ends)
 {
     const tl_vertex *v = lines->mesh.vertices;

@@ -2,9 +2,10 @@
  * In: snapped vertices, pairs of them.  Out: a byte 1 for each pixel that a line holds and nothing hides.
  * Based on: J. E. Bresenham, Algorithm for computer control of a digital plotter, 1965.
  *
- * A line of d steps along its longer side and q <= d across is, at step k, floor((q k + floor(d / 2)) / d) pixels across:
- * a half step is taken.  The steps inside the window follow by floor divisions.  |x_px| < 2^62, so d < 2^63 and every
- * product of two of these is below 2^126; the remainder is below d and a step adds at most d, which fits 64 bits. */
+ * A line of d steps along its longer side and q <= d across is, at step k, floor((q k + floor(d / 2)) / d) pixels
+ * across: a half step is taken.  The steps inside the window follow by floor divisions.  |x_px| < 2^62, so d < 2^63 and
+ * every product of two of these is below 2^126; the remainder is below d and a step adds at most d, which fits 64
+ * bits. */
 #ifndef TL_LINES_C
 #define TL_LINES_C
 
@@ -17,7 +18,8 @@
 #include "lines/edges.c"
 #include "lines/smooth_lines.c"
 
-#define TL_MAX_STEPS 63   /* longer lines are drawn by themselves: the lanes step together, and most lines of a mesh are short */
+/* longer lines are drawn by themselves: the lanes step together, and most lines of a mesh are short */
+#define TL_MAX_STEPS 63
 
 /* Pixels of the lines of some vectors: storing bytes next to the arithmetic would stall it. */
 typedef struct {
@@ -112,8 +114,10 @@ static void draw_line(const line_state *s, const int32_t *edge)
     if (!find_ends(s->lines, edge, ends))
         return;
     const int64_t x0 = (ends[0].x_fx >> bits) - w->x_px, y0 = (ends[0].y_fx >> bits) - w->y_px;
-    const int64_t dx = (ends[1].x_fx >> bits) - (ends[0].x_fx >> bits), dy = (ends[1].y_fx >> bits) - (ends[0].y_fx >> bits);
-    const int64_t size_x = dx < 0 ? -dx : dx, d = max64(size_x, dy), q = min64(size_x, dy), stride = s->target->stride_px;
+    const int64_t dx = (ends[1].x_fx >> bits) - (ends[0].x_fx >> bits);
+    const int64_t dy = (ends[1].y_fx >> bits) - (ends[0].y_fx >> bits);
+    const int64_t size_x = dx < 0 ? -dx : dx, d = max64(size_x, dy), q = min64(size_x, dy);
+    const int64_t stride = s->target->stride_px;
     const int is_steep = dy > size_x, right = dx < 0 ? -1 : 1;
     step_range r = is_steep ? steps_along(y0, 1, w->height, d) : steps_along(x0, right, w->width, d);
     r = is_steep ? steps_across(r, x0, right, w->width, d, q) : steps_across(r, y0, 1, w->height, d, q);
@@ -144,7 +148,8 @@ typedef struct {
 /* Steps all lines together and lists their pixels. */
 TL_INLINE void walk_lines(line_state *s, const lane_lines *l, vm live, int has_depth)
 {
-    const vi one = vi_set1(1), none = vi_set1(-1), last = vi_sub(l->steps, one), across = l->across, along = l->along, aside = l->aside;
+    const vi one = vi_set1(1), none = vi_set1(-1), last = vi_sub(l->steps, one), across = l->across, along = l->along;
+    const vi aside = l->aside;
     vi at = vi_add(vi_mul(l->y, vi_set1((int32_t)s->target->stride_px)), l->x), rest = vi_shift_right(l->steps, 1);
     vi left = vi_select(live, l->steps, none);
     vm on = vi_gt(left, none);
@@ -181,8 +186,10 @@ TL_INLINE void draw_lanes(line_state *s, const int32_t *edges, vm live, int has_
     const vm is_special = vm_or(vi_eq(x0, special), vi_eq(x1, special));
     const vm swap = vm_or(vi_gt(y0, y1), vm_and(vi_eq(y0, y1), vi_gt(x0, x1)));
     const vi dx = vi_set1((int32_t)w->x_px), dy = vi_set1((int32_t)w->y_px);
-    const vi from_x = vi_sub(vi_shift_right(vi_select(swap, x1, x0), bits), dx), to_x = vi_sub(vi_shift_right(vi_select(swap, x0, x1), bits), dx);
-    const vi from_y = vi_sub(vi_shift_right(vi_select(swap, y1, y0), bits), dy), to_y = vi_sub(vi_shift_right(vi_select(swap, y0, y1), bits), dy);
+    const vi from_x = vi_sub(vi_shift_right(vi_select(swap, x1, x0), bits), dx);
+    const vi to_x = vi_sub(vi_shift_right(vi_select(swap, x0, x1), bits), dx);
+    const vi from_y = vi_sub(vi_shift_right(vi_select(swap, y1, y0), bits), dy);
+    const vi to_y = vi_sub(vi_shift_right(vi_select(swap, y0, y1), bits), dy);
     const vi last_x = vi_set1((int32_t)w->width - 1), last_y = vi_set1((int32_t)w->height - 1);
     const vm above = vm_or(vi_gt(zero, to_y), vi_gt(from_y, last_y));
     const vm beside = vm_or(vi_gt(zero, vi_max(from_x, to_x)), vi_gt(vi_min(from_x, to_x), last_x));
@@ -211,11 +218,9 @@ TL_INLINE void draw_lanes(line_state *s, const int32_t *edges, vm live, int has_
 
 TL_INLINE void draw_all_lines(line_state *s, int has_depth)
 {
-    const int64_t n = s->lines->n_edges, farthest = (int64_t)1 << 30;
-    const tl_window *w = s->window;
-    const int is_near = w->x_px > -farthest && w->x_px < farthest && w->y_px > -farthest && w->y_px < farthest;
+    const int64_t n = s->lines->n_edges;
     int64_t i = 0;
-    for (; !is_near && i < n; i++)
+    for (; !is_near(s->window) && i < n; i++)
         draw_line(s, s->lines->edges + 2 * i);
     for (; i + TL_LANES <= n; i += TL_LANES)
         draw_lanes(s, s->lines->edges + 2 * i, vm_all(), has_depth);

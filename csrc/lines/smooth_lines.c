@@ -3,8 +3,8 @@
  * which is what a box one pixel wide, across the line, sees of it; of several lines the largest counts.
  * Based on: S. Gupta, R. F. Sproull, Filtering Edges for Gray-Scale Displays, 1981.
  *
- * u runs along the longer side of the line, v across, both from its first end in half sub-pixels.  The line is at most as
- * steep as a diagonal, so a centre nearer than 1 is in the line's pixel of its column or a neighbour of that across:
+ * u runs along the longer side of the line, v across, both from its first end in half sub-pixels.  The line is at most
+ * as steep as a diagonal, so a centre nearer than 1 is in the line's pixel of its column or a neighbour of that across:
  * the next ones are at least 1.5 away across, and 1.5 / sqrt(2) > 1. */
 #ifndef TL_SMOOTH_LINES_C
 #define TL_SMOOTH_LINES_C
@@ -29,8 +29,8 @@ typedef struct {
 /* One line: u is x, or y of a steep line. */
 typedef struct {
     int is_steep;
-    int64_t u_fx, v_fx;         /* the first end */
-    int64_t du, dv;             /* to the other end, sub-pixels */
+    int64_t u_fx, v_fx; /* the first end */
+    int64_t du, dv;     /* to the other end, sub-pixels */
     double z, dz;
     int64_t first, end;         /* columns along u that can hold anything, of the window */
     int64_t u_px, v_px, size_v; /* the window's origin along u and v, its extent along v */
@@ -99,17 +99,21 @@ TL_INLINE void walk_smooth_line(smooth_state *s, const smooth_line *l, int has_d
     const int bits = s->window->subpixel_bits;
     const double unit = (double)(1 << bits);
     const int64_t own_u = (l->u_fx >> bits) - l->u_px, own_v = (l->v_fx >> bits) - l->v_px; /* the first end's pixel */
-    const double rest_u = 2.0 * (double)(l->u_fx - ((own_u + l->u_px) << bits)), rest_v = 2.0 * (double)(l->v_fx - ((own_v + l->v_px) << bits));
+    const double rest_u = 2.0 * (double)(l->u_fx - (own_u + l->u_px) * ((int64_t)1 << bits));
+    const double rest_v = 2.0 * (double)(l->v_fx - (own_v + l->v_px) * ((int64_t)1 << bits));
     const double length2 = (double)l->du * (double)l->du + (double)l->dv * (double)l->dv;
     const vd du = vd_set1((double)l->du), dv = vd_set1((double)l->dv), end = vd_set1(2.0 * length2);
-    const vd inverse = vd_set1(length2 > 0.0 ? 1.0 / sqrt(length2) : 0.0), inverse_end = vd_set1(length2 > 0.0 ? 0.5 / length2 : 0.0);
+    const vd inverse = vd_set1(length2 > 0.0 ? 1.0 / sqrt(length2) : 0.0);
+    const vd inverse_end = vd_set1(length2 > 0.0 ? 0.5 / length2 : 0.0);
     const vd slope = vd_set1(l->du ? (double)l->dv / (double)l->du : 0.0), per_pixel = vd_set1(0.5 / unit);
     const vd zero = vd_set1(0.0), one = vd_set1(1.0), per_pixel2 = vd_set1(0.25 / (unit * unit));
-    const vi stride_u = vi_set1(l->is_steep ? (int32_t)s->target->stride_px : 1), stride_v = vi_set1(l->is_steep ? 1 : (int32_t)s->target->stride_px);
+    const vi stride_u = vi_set1(l->is_steep ? (int32_t)s->target->stride_px : 1);
+    const vi stride_v = vi_set1(l->is_steep ? 1 : (int32_t)s->target->stride_px);
     const vi last_v = vi_set1((int32_t)l->size_v - 1);
     for (int64_t first = l->first; first < l->end; first += TL_LANES) {
         const vi column = vi_add(vi_set1((int32_t)first), vi_iota());
-        const vd u = vd_add(vd_mul(vd_set1(2.0 * unit), vd_from_vi(vi_sub(column, vi_set1((int32_t)own_u)))), vd_set1(unit - rest_u));
+        const vd u = vd_add(vd_mul(vd_set1(2.0 * unit), vd_from_vi(vi_sub(column, vi_set1((int32_t)own_u)))),
+                            vd_set1(unit - rest_u));
         const vd middle = vd_floor(vd_mul(vd_add(vd_mul(u, slope), vd_set1(rest_v)), per_pixel));
         for (int aside = -1; aside <= 1; aside++) {
             const vd row = vd_add(middle, vd_set1((double)aside));
@@ -124,7 +128,8 @@ TL_INLINE void walk_smooth_line(smooth_state *s, const smooth_line *l, int has_d
             vi_compress(s->value + s->n, on, vi_bits_of_vf(value));
             if (has_depth) {
                 const vd share = vd_min(vd_max(vd_mul(along, inverse_end), zero), one);
-                vi_compress(s->z + s->n, on, vi_bits_of_vf(vf_from_vd(vd_add(vd_set1(l->z), vd_mul(share, vd_set1(l->dz))))));
+                vi_compress(s->z + s->n, on,
+                            vi_bits_of_vf(vf_from_vd(vd_add(vd_set1(l->z), vd_mul(share, vd_set1(l->dz))))));
             }
             s->n += __builtin_popcount(vm_bits(on));
         }
@@ -138,7 +143,8 @@ static void walk_far_line(const smooth_state *s, const smooth_line *l)
 {
     const int bits = s->window->subpixel_bits;
     const int64_t stride = s->target->stride_px;
-    const double du = (double)l->du, dv = (double)l->dv, len2 = du * du + dv * dv, per_pixel = 0.5 / (double)(1 << bits);
+    const double du = (double)l->du, dv = (double)l->dv, len2 = du * du + dv * dv;
+    const double per_pixel = 0.5 / (double)(1 << bits);
     for (int64_t column = l->first; column < l->end; column++) {
         const tl_int128 u = ((tl_int128)(column + l->u_px) * 2 + 1) * ((tl_int128)1 << bits) - (tl_int128)l->u_fx * 2;
         const tl_int128 half = u * l->dv, across_u = half / l->du - (half % l->du != 0 && (half < 0) != (l->du < 0));
@@ -148,8 +154,10 @@ static void walk_far_line(const smooth_state *s, const smooth_line *l)
             if (row < 0 || row >= l->size_v)
                 continue;
             const tl_int128 v = (2 * (row + l->v_px) + 1) * ((tl_int128)1 << bits) - (tl_int128)l->v_fx * 2;
-            const double across = (double)(tl_int128)((tl_uint128)u * (tl_uint128)(tl_int128)l->dv - (tl_uint128)v * (tl_uint128)(tl_int128)l->du);
-            const double along = (double)u * du + (double)v * dv, u1 = (double)(u - (tl_int128)l->du * 2), v1 = (double)(v - (tl_int128)l->dv * 2);
+            const double across = (double)(tl_int128)((tl_uint128)u * (tl_uint128)(tl_int128)l->dv -
+                                                      (tl_uint128)v * (tl_uint128)(tl_int128)l->du);
+            const double along = (double)u * du + (double)v * dv, u1 = (double)(u - (tl_int128)l->du * 2);
+            const double v1 = (double)(v - (tl_int128)l->dv * 2);
             double square = across * across / len2, share = along / (2.0 * len2);
             if (along <= 0.0)
                 square = (double)u * (double)u + (double)v * (double)v, share = 0.0;
@@ -157,8 +165,8 @@ static void walk_far_line(const smooth_state *s, const smooth_line *l)
                 square = u1 * u1 + v1 * v1, share = 1.0;
             const double value = 1.0 - sqrt(square) * per_pixel;
             if (value > 0.0)
-                put_smooth(s->target, l->is_steep ? column * stride + (int64_t)row : (int64_t)row * stride + column, (float)value,
-                           (float)(l->z + share * l->dz), s->target->depth != NULL);
+                put_smooth(s->target, l->is_steep ? column * stride + (int64_t)row : (int64_t)row * stride + column,
+                           (float)value, (float)(l->z + share * l->dz), s->target->depth != NULL);
         }
     }
 }

@@ -4,8 +4,8 @@
  *
  * The point that is found lies on its triangle whatever happens in the tree, so the distance to it is never too small.
  *
- * Based on: N. Roussopoulos, S. Kelley, F. Vincent, Nearest Neighbor Queries, 1995 (boxes in the order of their distance);
- * C. Ericson, Real-Time Collision Detection, 2005 (the point of a segment nearest to a point). */
+ * Based on: N. Roussopoulos, S. Kelley, F. Vincent, Nearest Neighbor Queries, 1995 (boxes in the order of their
+ * distance); C. Ericson, Real-Time Collision Detection, 2005 (the point of a segment nearest to a point). */
 #ifndef TL_NEAREST_C
 #define TL_NEAREST_C
 
@@ -47,7 +47,8 @@ TL_INLINE double above_inside(const double p[3], const double a[3], const double
 {
     const double ab[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]}, ac[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
     const double ap[3] = {p[0] - a[0], p[1] - a[1], p[2] - a[2]};
-    const double bb = dot_f64(ab, ab), bc = dot_f64(ab, ac), cc = dot_f64(ac, ac), pb = dot_f64(ap, ab), pc = dot_f64(ap, ac);
+    const double bb = dot_f64(ab, ab), bc = dot_f64(ab, ac), cc = dot_f64(ac, ac), pb = dot_f64(ap, ab);
+    const double pc = dot_f64(ap, ac);
     const double area = bb * cc - bc * bc, v = cc * pb - bc * pc, w = bb * pc - bc * pb;
     if (!(area > 1e-12 * bb * cc && v > 0.0 && w > 0.0 && v + w < area))
         return INFINITY;
@@ -57,9 +58,10 @@ TL_INLINE double above_inside(const double p[3], const double a[3], const double
     return squared_between(p, at);
 }
 
-/* The point of the triangle that is nearest to p: above its inside, or on a side.  A needle whose inside is lost in rounding has
- * its sides. */
-static double nearest_of_triangle(const double p[3], const double a[3], const double b[3], const double c[3], double at[3])
+/* The point of the triangle that is nearest to p: above its inside, or on a side.  A needle whose inside is lost in
+ * rounding has its sides. */
+static double nearest_of_triangle(const double p[3], const double a[3], const double b[3], const double c[3],
+                                  double at[3])
 {
     const double inside = above_inside(p, a, b, c, at);
     if (inside < INFINITY)
@@ -84,7 +86,8 @@ TL_INLINE const double *corner_of(const tl_surface *s, int64_t triangle, int k)
 static void set_foot(const tl_surface *s, const double p[3], int64_t triangle, foot *out)
 {
     out->triangle = triangle;
-    out->squared = nearest_of_triangle(p, corner_of(s, triangle, 0), corner_of(s, triangle, 1), corner_of(s, triangle, 2), out->at);
+    out->squared = nearest_of_triangle(p, corner_of(s, triangle, 0), corner_of(s, triangle, 1),
+                                       corner_of(s, triangle, 2), out->at);
 }
 
 /* Squared distances of p from the boxes of a node. */
@@ -185,8 +188,10 @@ static void build_tree(tl_surface *s)
             tl_tree_node *node = s->nodes + s->first_node[level] + i;
             for (int k = 0; k < TL_TREE_WIDTH; k++) {
                 const int64_t child = i * TL_TREE_WIDTH + k;
-                float box[TL_TREE_BOX] = {INFINITY, INFINITY, INFINITY, -INFINITY, -INFINITY, -INFINITY}, own[TL_TREE_BOX];
-                for (int64_t t = child * TL_TREE_LEAF; level == 0 && t < (child + 1) * TL_TREE_LEAF && t < s->n_triangles; t++) {
+                float box[TL_TREE_BOX] = {INFINITY, INFINITY, INFINITY, -INFINITY, -INFINITY, -INFINITY},
+                      own[TL_TREE_BOX];
+                for (int64_t t = child * TL_TREE_LEAF;
+                     level == 0 && t < (child + 1) * TL_TREE_LEAF && t < s->n_triangles; t++) {
                     box_of_triangle(s, t, own);
                     join_box(box, own);
                 }
@@ -200,18 +205,19 @@ static void build_tree(tl_surface *s)
 }
 
 /* The foot of each of n points on one triangle: where it is, and its squared distance. */
-static void set_feet(const double *points, const int32_t *triangles, const double *from, const int32_t *triangle, const int32_t *point,
-                     int64_t n, double *at, double *squared)
+static void set_feet(const double *points, const int32_t *triangles, const double *from, const int32_t *triangle,
+                     const int32_t *point, int64_t n, double *at, double *squared)
 {
     for (int64_t i = 0; i < n; i++) {
         const int32_t *corner = triangles + 3 * (int64_t)triangle[i];
-        squared[i] = nearest_of_triangle(from + 3 * (int64_t)point[i], points + 3 * (int64_t)corner[0], points + 3 * (int64_t)corner[1],
-                                         points + 3 * (int64_t)corner[2], at + 3 * i);
+        squared[i] = nearest_of_triangle(from + 3 * (int64_t)point[i], points + 3 * (int64_t)corner[0],
+                                         points + 3 * (int64_t)corner[1], points + 3 * (int64_t)corner[2], at + 3 * i);
     }
 }
 
 /* The nearest triangle of points [first, end), and where on it; `at` may be NULL.  Returns the largest distance. */
-static double nearest_of_points(const tl_surface *s, const double *points, int64_t first, int64_t end, int32_t *triangle, double *at)
+static double nearest_of_points(const tl_surface *s, const double *points, int64_t first, int64_t end,
+                                int32_t *triangle, double *at)
 {
     double largest = 0.0;
     int64_t seed = 0;

@@ -1,14 +1,15 @@
-/* Normals of triangles and of vertices, which side these are on, and the box round a mesh; and rows of three numbers as unit
- * vectors, turned, moved, and as the rows of four that shading reads.
- * In: vertices, triangles, vectors or colours of a mesh.  Out: unit vectors, flags, a box; rows of float64 (n, 3), or of float32
- * (n, 4) whose last number is 1.
+/* Normals of triangles and of vertices, which side these are on, and the box round a mesh; and rows of three numbers as
+ * unit vectors, turned, moved, and as the rows of four that shading reads.
+ * In: vertices, triangles, vectors or colours of a mesh.  Out: unit vectors, flags, a box; rows of float64 (n, 3), or
+ * of float32 (n, 4) whose last number is 1.
  *
- * Triangles go by blocks: corners are gathered one by one, all that follows is computed a vector of triangles at a time, and sums are
- * scattered one by one.  Angles have an arctangent of their own, as those of C libraries differ.  All else is sums, products,
- * quotients and roots, each rounded once, in the order that is written: every machine has the same bits.
+ * Triangles go by blocks: corners are gathered one by one, all that follows is computed a vector of triangles at a
+ * time, and sums are scattered one by one.  Angles have an arctangent of their own, as those of C libraries differ.
+ * All else is sums, products, quotients and roots, each rounded once, in the order that is written: every machine has
+ * the same bits.
  *
- * Based on: G. Thurmer and C. A. Wuthrich, Computing Vertex Normals from Polygonal Facets, Journal of Graphics Tools 3(1), 1998;
- * W. Kahan, Miscalculating Area and Angles of a Needle-like Triangle, 2014. */
+ * Based on: G. Thurmer and C. A. Wuthrich, Computing Vertex Normals from Polygonal Facets, Journal of Graphics Tools
+ * 3(1), 1998; W. Kahan, Miscalculating Area and Angles of a Needle-like Triangle, 2014. */
 #ifndef TL_NORMALS_C
 #define TL_NORMALS_C
 
@@ -20,16 +21,20 @@
 #include "topleft.h"
 #include "lanes/lanes.h"
 
-/* The powers of two, 2^-1 to 2^1022, that take numbers up to 2^1022 to [1/2, 1): products with them are exact but for what is lost
- * below 2^-1074; and what undoes them. */
+/* The powers of two, 2^-1 to 2^1022, that take numbers up to 2^1022 to [1/2, 1): products with them are exact but for
+ * what is lost below 2^-1074; and what undoes them. */
 TL_INLINE vd power_to_one(vd a) { return vd_power(a, 2045ull << 52, 2047ull << 52); }
 TL_INLINE vd power_from_one(vd power) { return vd_power(power, 2046ull << 52, 2047ull << 52); }
 
 TL_INLINE vd largest_of(const vd *v) { return vd_max(vd_max(vd_abs(v[0]), vd_abs(v[1])), vd_abs(v[2])); }
 
-TL_INLINE vd dot_of(const vd *a, const vd *b) { return vd_add(vd_add(vd_mul(a[0], b[0]), vd_mul(a[1], b[1])), vd_mul(a[2], b[2])); }
+TL_INLINE vd dot_of(const vd *a, const vd *b)
+{
+    return vd_add(vd_add(vd_mul(a[0], b[0]), vd_mul(a[1], b[1])), vd_mul(a[2], b[2]));
+}
 
-/* Vectors, of numbers below 2^1022, scaled to length 1, however long they are; zero stays zero.  Returns their lengths. */
+/* Vectors, of numbers below 2^1022, scaled to length 1, however long they are; zero stays zero.  Returns their
+ * lengths. */
 TL_INLINE vd to_unit(vd *v)
 {
     const vd power = power_to_one(largest_of(v));
@@ -46,7 +51,8 @@ TL_INLINE vd to_unit(vd *v)
 static inline void load_three(const tl_source *source, int64_t i, double *p)
 {
     for (int k = 0; k < 3; k++)
-        p[k] = source->scalar == TL_F32 ? (double)((const float *)source->data)[3 * i + k] : ((const double *)source->data)[3 * i + k];
+        p[k] = source->scalar == TL_F32 ? (double)((const float *)source->data)[3 * i + k]
+                                        : ((const double *)source->data)[3 * i + k];
 }
 
 #define TL_DIRECTIONS 64 /* at a time, whole vectors of lanes */
@@ -94,7 +100,8 @@ static inline void store_rows(double (*v)[TL_DIRECTIONS], int n, int64_t first, 
     }
 }
 
-static void unit_vectors(const tl_source *vectors, const double *turn, int64_t first, int64_t end, double *out, float *rows)
+static void unit_vectors(const tl_source *vectors, const double *turn, int64_t first, int64_t end, double *out,
+                         float *rows)
 {
     double v[3][TL_DIRECTIONS] = {{0.0}};
     for (int64_t i = first; i < end; i += TL_DIRECTIONS) {
@@ -179,20 +186,23 @@ static void gather_corners(const tl_source *source, const int32_t *triangles, fa
         gather_as(source->data, 0, triangles, b);
 }
 
-/* The angle whose tangent is y / x, of y >= 0 and an x that is positive but for rounding; 0 of 0 and 0.  The quotient is turned back by
- * 0, 45 or 90 degrees to within tan(22.5 degrees) of 0, where the polynomial is within 2^-56 of atan(q) / q. */
+/* The angle whose tangent is y / x, of y >= 0 and an x that is positive but for rounding; 0 of 0 and 0.  The quotient
+ * is turned back by 0, 45 or 90 degrees to within tan(22.5 degrees) of 0, where the polynomial is within 2^-56 of
+ * atan(q) / q. */
 TL_INLINE vd angle_of(vd y, vd x)
 {
     const vd slope = vd_set1(0x1.a827999fcef32p-2), zero = vd_set1(0.0);
     const vm is_low = vd_ge(vd_mul(x, slope), y), is_high = vd_ge(vd_mul(y, slope), x);
     const vd above = vd_select(is_low, y, vd_select(is_high, vd_sub(zero, x), vd_sub(y, x)));
     const vd below = vd_select(is_low, x, vd_select(is_high, y, vd_add(y, x)));
-    const vd start = vd_select(is_low, zero, vd_select(is_high, vd_set1(0x1.921fb54442d18p+0), vd_set1(0x1.921fb54442d18p-1)));
+    const vd start =
+        vd_select(is_low, zero, vd_select(is_high, vd_set1(0x1.921fb54442d18p+0), vd_set1(0x1.921fb54442d18p-1)));
     const vm is_none = vd_ge(zero, below);
     const vd q = vd_div(above, vd_select(is_none, vd_set1(1.0), below)), z = vd_mul(q, q);
-    static const double RISING[] = {-0x1.3a2f1cc1ba3c5p-6, 0x1.4161b24be475bp-5, -0x1.a0993ef875d4ap-5, 0x1.dfe637a48099bp-5,
-                                    -0x1.10fa76aa9b02cp-4, 0x1.3b1262f3a2b5bp-4, -0x1.745d0b27da190p-4, 0x1.c71c7185386f1p-4,
-                                    -0x1.2492492436180p-3, 0x1.999999999934bp-3, -0x1.5555555555555p-2};
+    static const double RISING[] = {-0x1.3a2f1cc1ba3c5p-6, 0x1.4161b24be475bp-5,  -0x1.a0993ef875d4ap-5,
+                                    0x1.dfe637a48099bp-5,  -0x1.10fa76aa9b02cp-4, 0x1.3b1262f3a2b5bp-4,
+                                    -0x1.745d0b27da190p-4, 0x1.c71c7185386f1p-4,  -0x1.2492492436180p-3,
+                                    0x1.999999999934bp-3,  -0x1.5555555555555p-2};
     vd sum = vd_set1(RISING[0]);
     for (int k = 1; k < 11; k++)
         sum = vd_add(vd_mul(sum, z), vd_set1(RISING[k]));
@@ -204,10 +214,14 @@ typedef struct {
     vm is_first, is_not_last; /* corner 0 rather than 1; one of these rather than 2 */
 } widest_corner;
 
-TL_INLINE vd pick_widest(widest_corner w, vd at_0, vd at_1, vd at_2) { return vd_select(w.is_not_last, vd_select(w.is_first, at_0, at_1), at_2); }
+TL_INLINE vd pick_widest(widest_corner w, vd at_0, vd at_1, vd at_2)
+{
+    return vd_select(w.is_not_last, vd_select(w.is_first, at_0, at_1), at_2);
+}
 
-/* Normals and, where wanted, angles.  Both begin at the corner with the largest angle, between the two shortest sides: their product
- * loses least for needles.  With the corners the other way round, the normal changes its sign and nothing else. */
+/* Normals and, where wanted, angles.  Both begin at the corner with the largest angle, between the two shortest sides:
+ * their product loses least for needles.  With the corners the other way round, the normal changes its sign and nothing
+ * else. */
 TL_INLINE void measure_block(face_block *b, int with_angles)
 {
     for (int i = 0; i < b->n; i += TL_LANES) {
@@ -259,7 +273,8 @@ static int64_t load_block(const tl_source *source, const int32_t *triangles, int
 }
 
 /* Adds the block's faces to the sums of the vertices [first, end). */
-static void add_block(face_block *b, const tl_source *source, const int32_t *triangles, int64_t first, int64_t end, double *sums)
+static void add_block(face_block *b, const tl_source *source, const int32_t *triangles, int64_t first, int64_t end,
+                      double *sums)
 {
     gather_corners(source, triangles, b);
     measure_block(b, 1);
@@ -276,16 +291,17 @@ static void add_block(face_block *b, const tl_source *source, const int32_t *tri
     b->n = 0;
 }
 
-/* Goes through all triangles, and computes those that have one of the vertices: a range of vertices needs no other's sums, and each sum
- * has the order of the faces. */
-static int64_t vertex_normals(const tl_source *source, const int32_t *triangles, int64_t n_triangles, int64_t first, int64_t end,
-                              double *out)
+/* Goes through all triangles, and computes those that have one of the vertices: a range of vertices needs no other's
+ * sums, and each sum has the order of the faces. */
+static int64_t vertex_normals(const tl_source *source, const int32_t *triangles, int64_t n_triangles, int64_t first,
+                              int64_t end, double *out)
 {
     const uint32_t low = (uint32_t)first, n = (uint32_t)(end - first);
     face_block b = {.n = 0};
     memset(out + 3 * first, 0, (size_t)(end - first) * 3 * sizeof *out);
     for (int64_t i = 0; i < n_triangles; i += TL_FACES) {
-        const int64_t last = i + TL_FACES < n_triangles ? i + TL_FACES : n_triangles, bad = bad_face(triangles, i, last, source->n);
+        const int64_t last = i + TL_FACES < n_triangles ? i + TL_FACES : n_triangles;
+        const int64_t bad = bad_face(triangles, i, last, source->n);
         if (bad >= 0)
             return bad;
         for (int64_t face = i; face < last; face++) {
@@ -302,7 +318,8 @@ static int64_t vertex_normals(const tl_source *source, const int32_t *triangles,
     return -1;
 }
 
-static int64_t face_normals(const tl_source *source, const int32_t *triangles, int64_t first, int64_t end, double *out, float *rows)
+static int64_t face_normals(const tl_source *source, const int32_t *triangles, int64_t first, int64_t end, double *out,
+                            float *rows)
 {
     face_block b = {.n = 0};
     _Static_assert(TL_FACES == TL_DIRECTIONS, "a block of faces has a block of normals");
@@ -316,8 +333,8 @@ static int64_t face_normals(const tl_source *source, const int32_t *triangles, i
     return -1;
 }
 
-static int64_t find_turned(const tl_source *source, const int32_t *triangles, int64_t first, int64_t end, const float *normals,
-                           uint8_t *is_turned)
+static int64_t find_turned(const tl_source *source, const int32_t *triangles, int64_t first, int64_t end,
+                           const float *normals, uint8_t *is_turned)
 {
     face_block b = {.n = 0};
     for (int64_t i = first; i < end; i += b.n) {
@@ -329,10 +346,12 @@ static int64_t find_turned(const tl_source *source, const int32_t *triangles, in
         for (int j = 0; j < b.n; j++) {
             const int32_t *t = triangles + 3 * (i + j);
             for (int k = 0; k < 3; k++)
-                sum[k][j] = ((double)normals[4 * (int64_t)t[0] + k] + (double)normals[4 * (int64_t)t[1] + k]) + (double)normals[4 * (int64_t)t[2] + k];
+                sum[k][j] = ((double)normals[4 * (int64_t)t[0] + k] + (double)normals[4 * (int64_t)t[1] + k]) +
+                            (double)normals[4 * (int64_t)t[2] + k];
         }
         for (int j = 0; j < b.n; j++)
-            is_turned[i + j] = (sum[0][j] * b.normal[0][j] + sum[1][j] * b.normal[1][j]) + sum[2][j] * b.normal[2][j] < 0.0;
+            is_turned[i + j] =
+                (sum[0][j] * b.normal[0][j] + sum[1][j] * b.normal[1][j]) + sum[2][j] * b.normal[2][j] < 0.0;
     }
     return -1;
 }

@@ -1,16 +1,16 @@
 /* Reach: how far the points of triangles can lie from a surface, bounded from above, by branch and bound.
  * In: triangles and the surface.  Out: a distance that is met and one that is not passed.
  *
- * The distance from one triangle of the surface is a convex function, so over a convex piece of a triangle it is largest at a corner,
- * and the distance from the surface is not larger than that.  No point of a piece is farther from the surface than its middle by more
- * than its radius, either.  Where neither is near enough to what is known to be met, the piece is cut along the sides of the triangle
- * that is nearest to its middle: what lies above that triangle is judged by it, the rest by others.  Where that does not help, the
- * piece is halved.  A bound holds wherever the cuts are, and whichever triangle judges: those that did last are asked before the
- * tree.
+ * The distance from one triangle of the surface is a convex function, so over a convex piece of a triangle it is
+ * largest at a corner, and the distance from the surface is not larger than that.  No point of a piece is farther from
+ * the surface than its middle by more than its radius, either.  Where neither is near enough to what is known to be
+ * met, the piece is cut along the sides of the triangle that is nearest to its middle: what lies above that triangle is
+ * judged by it, the rest by others.  Where that does not help, the piece is halved.  A bound holds wherever the cuts
+ * are, and whichever triangle judges: those that did last are asked before the tree.
  *
- * Based on: M. Tang, M. Lee, Y. J. Kim, Interactive Hausdorff Distance Computation for General Polygonal Models, 2009; M. Guthe,
- * P. Borodin, R. Klein, Fast and Accurate Hausdorff Distance Calculation between Meshes, 2005 (branch and bound, and that the
- * distance is convex). */
+ * Based on: M. Tang, M. Lee, Y. J. Kim, Interactive Hausdorff Distance Computation for General Polygonal Models, 2009;
+ * M. Guthe, P. Borodin, R. Klein, Fast and Accurate Hausdorff Distance Calculation between Meshes, 2005 (branch and
+ * bound, and that the distance is convex). */
 #ifndef TL_REACH_C
 #define TL_REACH_C
 
@@ -56,9 +56,10 @@ static void add_corner(convex *p, const double at[3])
     p->n++;
 }
 
-/* Cuts a piece by the plane through `at`, into what lies in the direction of `normal` and what does not.  Returns 0 and cuts nothing
- * where either would be thinner than `slack`.  There must be room for two corners more. */
-static int cut(const convex *p, const double at[3], const double normal[3], double slack, convex *inside, convex *outside)
+/* Cuts a piece by the plane through `at`, into what lies in the direction of `normal` and what does not.  Returns 0 and
+ * cuts nothing where either would be thinner than `slack`.  There must be room for two corners more. */
+static int cut(const convex *p, const double at[3], const double normal[3], double slack, convex *inside,
+               convex *outside)
 {
     double height[TL_PIECE_CORNERS], lowest = 0.0, highest = 0.0;
     for (int i = 0; i < p->n; i++) {
@@ -132,8 +133,8 @@ static double enough_of(const reaching *r)
     return r->known + (more > r->least ? more : r->least);
 }
 
-/* The foot of the middle of a piece: on a triangle that is remembered, if the middle lies above its inside and not farther than what
- * is known to be met; else on the nearest. */
+/* The foot of the middle of a piece: on a triangle that is remembered, if the middle lies above its inside and not
+ * farther than what is known to be met; else on the nearest. */
 static foot foot_of_middle(reaching *r, const double middle[3])
 {
     const tl_surface *s = r->surface;
@@ -149,14 +150,16 @@ static foot foot_of_middle(reaching *r, const double middle[3])
     return foot_of(r, middle);
 }
 
-/* Cuts a piece along the sides of a triangle, across the triangle that it is of; pushes what lies outside.  Returns how many there are. */
+/* Cuts a piece along the sides of a triangle, across the triangle that it is of; pushes what lies outside.  Returns how
+ * many there are. */
 static int cut_along(const reaching *r, convex *p, int64_t triangle, double slack, convex *rest)
 {
     int n = 0;
     for (int k = 0; k < 3; k++) {
         const double *a = corner_of(r->surface, triangle, k), *b = corner_of(r->surface, triangle, k == 2 ? 0 : k + 1);
         const double *c = corner_of(r->surface, triangle, k == 0 ? 2 : k - 1);
-        const double side[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]}, third[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
+        const double side[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
+        const double third[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
         double normal[3];
         cross_f64(side, r->across, normal);
         const double length = sqrt(dot_f64(normal, normal)), towards = dot_f64(normal, third);
@@ -214,7 +217,8 @@ static double middle_of(const convex *p, double middle[3])
     return largest;
 }
 
-/* A bound for a piece, by the cheapest means that is enough; else what is left of it stays on top, and the rest below. */
+/* A bound for a piece, by the cheapest means that is enough; else what is left of it stays on top, and the rest
+ * below. */
 static double bound_piece(reaching *r, convex *stack, int *n)
 {
     convex *p = stack + *n - 1;
@@ -248,10 +252,10 @@ static double bound_piece(reaching *r, convex *stack, int *n)
     return 0.0;
 }
 
-/* How far triangles [first, end) can be from a surface.  Each is looked at by itself, beginning from `reach->known`, so that the
- * result does not depend on how many there are in a range. */
-static void find_reach(const tl_surface *s, const double *points, const int32_t *triangles, int64_t first, int64_t end, double share,
-                       double least, tl_reach *reach)
+/* How far triangles [first, end) can be from a surface.  Each is looked at by itself, beginning from `reach->known`, so
+ * that the result does not depend on how many there are in a range. */
+static void find_reach(const tl_surface *s, const double *points, const int32_t *triangles, int64_t first, int64_t end,
+                       double share, double least, tl_reach *reach)
 {
     convex stack[TL_PIECES];
     reaching r = {s, {0.0, 0.0, 0.0}, share, least, 0.0, {0}};
@@ -264,7 +268,8 @@ static void find_reach(const tl_surface *s, const double *points, const int32_t 
             add_corner(stack, points + 3 * (int64_t)triangles[3 * i + k]);
         double ab[3], ac[3];
         for (int k = 0; k < 3; k++)
-            ab[k] = stack[0].corner[1][k] - stack[0].corner[0][k], ac[k] = stack[0].corner[2][k] - stack[0].corner[0][k];
+            ab[k] = stack[0].corner[1][k] - stack[0].corner[0][k],
+            ac[k] = stack[0].corner[2][k] - stack[0].corner[0][k];
         cross_f64(ab, ac, r.across);
         r.known = known;
         while (n) {

@@ -1,8 +1,9 @@
 /* Composite: what is seen through the layers of a pixel, the nearest first.
  * In: planes of ids, colours of triangles or of the layers of pixels.  Out: pixels with alpha.
  *
- * A layer of opacity a lets 1 - a of what lies behind it through, so layer k counts w = a_k * (1 - a_0) * ... * (1 - a_(k-1)).
- * The colour is the mean of the colours by w, the alpha their sum.  All in float64, the operations in this order, rounded once.
+ * A layer of opacity a lets 1 - a of what lies behind it through, so layer k counts w = a_k * (1 - a_0) * ... * (1 -
+ * a_(k-1)).  The colour is the mean of the colours by w, the alpha their sum.  All in float64, the operations in this
+ * order, rounded once.
  *
  * Based on: T. Porter, T. Duff, Compositing Digital Images, 1984 ("over"). */
 #ifndef TL_COMPOSITE_C
@@ -15,14 +16,14 @@
 #include "lanes/lanes.h"
 
 /* The layer with its colour at `color`, of which one step is 1 / one. */
-#define TL_ADD_LAYER(NAME, T, ONE)                                                              \
+#define TL_ADD_LAYER(NAME, T, ONE)                                                                 \
     TL_INLINE void NAME(const T *color, int n_colors, double *through, double *sum, double *alpha) \
-    {                                                                                           \
-        const double own = (double)color[n_colors] / ONE, share = own * *through;               \
-        for (int c = 0; c < n_colors; c++)                                                      \
-            sum[c] += share * (double)color[c];                                                 \
-        *alpha += share;                                                                        \
-        *through *= 1.0 - own;                                                                  \
+    {                                                                                              \
+        const double own = (double)color[n_colors] / ONE, share = own * *through;                  \
+        for (int c = 0; c < n_colors; c++)                                                         \
+            sum[c] += share * (double)color[c];                                                    \
+        *alpha += share;                                                                           \
+        *through *= 1.0 - own;                                                                     \
     }
 TL_ADD_LAYER(add_layer_u8, uint8_t, 255.0)
 TL_ADD_LAYER(add_layer_f32, float, 1.0)
@@ -53,7 +54,9 @@ static void composite(const tl_composite *p, int64_t n, void *pixels)
         for (int c = 0; c < p->n_channels; c++) {
             const double value = c == n_colors ? alpha * one : alpha > 0.0 ? sum[c] / alpha : 0.0;
             if (p->is_u8)
-                ((uint8_t *)pixels)[i * p->n_channels + c] = (uint8_t)rint(value < 0.0 ? 0.0 : value > 255.0 ? 255.0 : value);
+                ((uint8_t *)pixels)[i * p->n_channels + c] = (uint8_t)rint(value < 0.0     ? 0.0
+                                                                           : value > 255.0 ? 255.0
+                                                                                           : value);
             else
                 ((float *)pixels)[i * p->n_channels + c] = (float)value;
         }

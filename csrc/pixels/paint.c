@@ -57,7 +57,8 @@ static void paint_flat(const int32_t *labels, int64_t n, const uint8_t *colors, 
 /* Sign of w1 * d1 + w2 * d2 - halves * w_sum / 2 in exact integers; |d|, |halves| <= 511. */
 static int compare_exactly(const tl_triangle *t, int64_t x_px, int64_t y_px, int bits, int d1, int d2, int halves)
 {
-    const tl_int128 terms[3] = {doubled_edge(t, 2, 0, x_px, y_px, bits), doubled_edge(t, 0, 1, x_px, y_px, bits), weight_sum(t)};
+    const tl_int128 terms[3] = {doubled_edge(t, 2, 0, x_px, y_px, bits), doubled_edge(t, 0, 1, x_px, y_px, bits),
+                                weight_sum(t)};
     const int factors[3] = {2 * d1, 2 * d2, -halves};
     tl_int128 high = 0, low = 0; /* the terms reach 2^127: two limbs */
     for (int k = 0; k < 3; k++) {
@@ -70,7 +71,8 @@ static int compare_exactly(const tl_triangle *t, int64_t x_px, int64_t y_px, int
 }
 
 /* The exact value of a channel rounded to nearest, ties to even; `value` decides unless it is next to a tie. */
-static inline uint8_t round_color(const tl_triangle *t, int64_t x_px, int64_t y_px, int bits, int c0, int d1, int d2, double value)
+static inline uint8_t round_color(const tl_triangle *t, int64_t x_px, int64_t y_px, int bits, int c0, int d1, int d2,
+                                  double value)
 {
     const int below = (int)floor(value);
     if (fabs(value - below - 0.5) >= 0x1p-20)
@@ -80,8 +82,8 @@ static inline uint8_t round_color(const tl_triangle *t, int64_t x_px, int64_t y_
 }
 
 /* One channel of n samples. */
-static inline void paint_run_u8(const tl_triangle *t, const uint8_t *c, int64_t x_px, int64_t y_px, int bits, const double *w1,
-                                const double *w2, int n, int n_channels, uint8_t *restrict out)
+static inline void paint_run_u8(const tl_triangle *t, const uint8_t *c, int64_t x_px, int64_t y_px, int bits,
+                                const double *w1, const double *w2, int n, int n_channels, uint8_t *restrict out)
 {
     const int c0 = c[0], d1 = c[1] - c0, d2 = c[2] - c0;
     const double slope1 = d1 / t->w_sum, slope2 = d2 / t->w_sum;
@@ -89,8 +91,8 @@ static inline void paint_run_u8(const tl_triangle *t, const uint8_t *c, int64_t 
         out[k * n_channels] = round_color(t, x_px + k, y_px, bits, c0, d1, d2, c0 + (w1[k] * slope1 + w2[k] * slope2));
 }
 
-static inline void paint_run_f32(const tl_triangle *t, const float *c, const double *w1, const double *w2, int n, int n_channels,
-                                 float *restrict out)
+static inline void paint_run_f32(const tl_triangle *t, const float *c, const double *w1, const double *w2, int n,
+                                 int n_channels, float *restrict out)
 {
     const double c0 = c[0], slope1 = (c[1] - c0) / t->w_sum, slope2 = (c[2] - c0) / t->w_sum;
     for (int k = 0; k < n; k++)
@@ -98,8 +100,8 @@ static inline void paint_run_f32(const tl_triangle *t, const float *c, const dou
 }
 
 /* A sample of a piece: the colours of its corners are those of the cut points. */
-static void paint_piece(const resolve_state *s, const int32_t *corners, int64_t x_px, int64_t y_px, int bits, const void *colors,
-                        int n_channels, int is_u8, void *out)
+static void paint_piece(const resolve_state *s, const int32_t *corners, int64_t x_px, int64_t y_px, int bits,
+                        const void *colors, int n_channels, int is_u8, void *out)
 {
     double part[3], sum = 0.0;
     for (int k = 0; k < 3; k++) {
@@ -112,7 +114,8 @@ static void paint_piece(const resolve_state *s, const int32_t *corners, int64_t 
         double value = 0.0;
         for (int j = 0; j < 3; j++) {
             const int64_t at = (int64_t)corners[j] * n_channels + c;
-            const double weight = (part[0] * s->piece[0][j] + part[1] * s->piece[1][j] + part[2] * s->piece[2][j]) / sum;
+            const double weight =
+                (part[0] * s->piece[0][j] + part[1] * s->piece[1][j] + part[2] * s->piece[2][j]) / sum;
             value += weight * (is_u8 ? (double)((const uint8_t *)colors)[at] : (double)((const float *)colors)[at]);
         }
         if (is_u8)
@@ -123,8 +126,8 @@ static void paint_piece(const resolve_state *s, const int32_t *corners, int64_t 
 }
 
 /* n samples of one triangle in a row. */
-static void paint_run(resolve_state *s, const tl_window *window, int64_t row, int64_t col, int n, const void *colors, int n_channels,
-                      int is_u8, void *out)
+static void paint_run(resolve_state *s, const tl_window *window, int64_t row, int64_t col, int n, const void *colors,
+                      int n_channels, int is_u8, void *out)
 {
     double w1[TL_CHUNK], w2[TL_CHUNK];
     tl_triangle *t = &s->triangle;
@@ -146,8 +149,8 @@ static void paint_run(resolve_state *s, const tl_window *window, int64_t row, in
     }
 }
 
-static void paint_gouraud(const tl_scene *scene, const tl_window *window, const int32_t *labels, const void *colors, int n_channels,
-                          int is_u8, void *pixels)
+static void paint_gouraud(const tl_scene *scene, const tl_window *window, const int32_t *labels, const void *colors,
+                          int n_channels, int is_u8, void *pixels)
 {
     resolve_state s = {.id = -1};
     const int pixel_bytes = n_channels * (is_u8 ? 1 : 4), bits = window->subpixel_bits;

@@ -1,8 +1,9 @@
 /* Planes: the value that each pixel has on its triangle, in float64, from vertices as they were before the snap.
- * In: triangle ids, float64 points in pixels, a value for each point.  Out: values at the pixel centres; NaN where no triangle is.
+ * In: triangle ids, float64 points in pixels, a value for each point.  Out: values at the pixel centres; NaN where no
+ * triangle is.
  *
- * A triangle owns pixels by its snapped vertices, so a centre may lie a fraction of a sub-pixel outside of the exact triangle: the
- * value is kept within the three of the triangle. */
+ * A triangle owns pixels by its snapped vertices, so a centre may lie a fraction of a sub-pixel outside of the exact
+ * triangle: the value is kept within the three of the triangle. */
 #ifndef TL_PLANES_C
 #define TL_PLANES_C
 
@@ -18,7 +19,8 @@ typedef struct {
     double x, y, value, slope_x, slope_y, low, high;
 } value_plane;
 
-/* Planes that were needed lately: rows come back to the triangles of the row above.  A power of two; 512 of them are 32 KiB. */
+/* Planes that were needed lately: rows come back to the triangles of the row above.  A power of two; 512 of them are 32
+ * KiB. */
 #define TL_N_RECENT_PLANES 512
 
 static inline double lower(double a, double b) { return b < a ? b : a; }
@@ -77,8 +79,8 @@ TL_INLINE void fill_pixel(const value_plane *p, int64_t col, double y_px, int is
 #define TL_PLANES_AHEAD 32
 
 /* Small triangles: a pixel at a time from listed planes, without a branch that depends on where a triangle ends. */
-TL_INLINE void fill_listed(const value_plane *planes, int64_t n_triangles, const int32_t *ids, int64_t width, double y_px, int is_f32,
-                           void *row)
+TL_INLINE void fill_listed(const value_plane *planes, int64_t n_triangles, const int32_t *ids, int64_t width,
+                           double y_px, int is_f32, void *row)
 {
     for (int64_t col = 0; col < width; col++) {
         const int64_t id = ids[col];

@@ -1,8 +1,10 @@
-/* Points: where in space the pixels of a visibility buffer lie, and what follows from that: distances, and ways in the picture.
+/* Points: where in space the pixels of a visibility buffer lie, and what follows from that: distances, and ways in the
+ * picture.
  * In: ids, the scene they were drawn from, positions of its vertices.  Out: float32, or float64, of each pixel.
  *
- * A point has the weights of its pixel in its triangle, relative to the first corner: it lies on the triangle.  A number that depends
- * linearly on the point is computed at the corners, and interpolated.  All is float64, rounded once at the end. */
+ * A point has the weights of its pixel in its triangle, relative to the first corner: it lies on the triangle.  A
+ * number that depends linearly on the point is computed at the corners, and interpolated.  All is float64, rounded once
+ * at the end. */
 #ifndef TL_POINTS_C
 #define TL_POINTS_C
 
@@ -18,7 +20,8 @@
 
 typedef struct {
     weighed_span weighed;
-    _Alignas(64) double value[3 * TL_POINT_ROWS][TL_SPAN_ROOM]; /* of each row at the first corner, and along the edges to the others */
+    /* of each row at the first corner, and along the edges to the others */
+    _Alignas(64) double value[3 * TL_POINT_ROWS][TL_SPAN_ROOM];
 } point_span;
 
 /* What the rows are at the corners of runs. */
@@ -61,7 +64,8 @@ TL_INLINE int make_numbers(const point_span *r, const tl_points *points, int i, 
     vd value[TL_POINT_ROWS];
     find_lanes(&p, &weighed->runs, i, 0, e, &sum);
     for (int k = 0; k < points->n_rows; k++) {
-        const vd first = vd_pick(r->value[3 * k] + p.first, p.run), along = vd_mul(vd_pick(r->value[3 * k + 1] + p.first, p.run), w1);
+        const vd first = vd_pick(r->value[3 * k] + p.first, p.run);
+        const vd along = vd_mul(vd_pick(r->value[3 * k + 1] + p.first, p.run), w1);
         value[k] = vd_add(vd_add(first, along), vd_mul(vd_pick(r->value[3 * k + 2] + p.first, p.run), w2));
     }
     if (points->kind == TL_POINT_LENGTH) {
@@ -115,7 +119,8 @@ TL_INLINE void write_points(point_span *r, const tl_points *points, int n_number
     }
 }
 
-static void fill_points(const tl_scene *scene, const tl_window *window, const tl_points *points, const int32_t *ids, void *out)
+static void fill_points(const tl_scene *scene, const tl_window *window, const tl_points *points, const int32_t *ids,
+                        void *out)
 {
     point_span r;
     start_weights(&r.weighed, scene, window);

@@ -1,10 +1,10 @@
-/* Resolves MSAA: the colour of a pixel from those of its samples, all with the same weight (a box filter one pixel wide); and the
- * depth of a picture whose triangles all lie at one, after the ids have been drawn without any.
- * In: the label of each sample, or colours of samples; ids.  Out: colours; a sample with label -1 counts as what the pixel holds;
- * ids and depth.
+/* Resolves MSAA: the colour of a pixel from those of its samples, all with the same weight (a box filter one pixel
+ * wide); and the depth of a picture whose triangles all lie at one, after the ids have been drawn without any.
+ * In: the label of each sample, or colours of samples; ids.  Out: colours; a sample with label -1 counts as what the
+ * pixel holds; ids and depth.
  *
- * uint8: the mean rounded to nearest, ties to even.  float32: summed in float64 in the order of the samples, rounded once.
- * Straight alpha that differs between the samples: colours are weighted by it.
+ * uint8: the mean rounded to nearest, ties to even.  float32: summed in float64 in the order of the samples, rounded
+ * once.  Straight alpha that differs between the samples: colours are weighted by it.
  *
  * Based on: T. Porter, T. Duff, Compositing Digital Images, 1984 (sums are of premultiplied colours). */
 #ifndef TL_RESOLVE_C
@@ -28,7 +28,8 @@ TL_INLINE uint8_t mean_u8(const uint8_t *values, int sample_bits, const tl_trans
 }
 
 /* The same, each sample as often as its alpha says. */
-TL_INLINE uint8_t weighted_mean_u8(const uint8_t *values, const uint8_t *alpha, int sample_bits, const tl_transfer *transfer)
+TL_INLINE uint8_t weighted_mean_u8(const uint8_t *values, const uint8_t *alpha, int sample_bits,
+                                   const tl_transfer *transfer)
 {
     int32_t sum = 0, total = 0; /* at most 16 * 255 * 65536 < 2^29 */
     for (int k = 0; k < 1 << sample_bits; k++) {
@@ -58,7 +59,8 @@ TL_INLINE float weighted_mean_f32(const float *values, const float *alpha, int s
 }
 
 /* One pixel: the colour of sample k stands at colors[k]. */
-TL_INLINE void mean_pixel_u8(const void *const *colors, int sample_bits, int n_channels, const tl_transfer *transfer, uint8_t *pixel)
+TL_INLINE void mean_pixel_u8(const void *const *colors, int sample_bits, int n_channels, const tl_transfer *transfer,
+                             uint8_t *pixel)
 {
     const tl_transfer *light = transfer && transfer->decode ? transfer : NULL;
     const int n_colors = transfer ? transfer->n_channels : 0;
@@ -77,7 +79,8 @@ TL_INLINE void mean_pixel_u8(const void *const *colors, int sample_bits, int n_c
     }
 }
 
-TL_INLINE void mean_pixel_f32(const void *const *colors, int sample_bits, int n_channels, const tl_transfer *transfer, float *pixel)
+TL_INLINE void mean_pixel_f32(const void *const *colors, int sample_bits, int n_channels, const tl_transfer *transfer,
+                              float *pixel)
 {
     const int n_colors = transfer ? transfer->n_channels : 0;
     float values[TL_MAX_SAMPLES], alpha[TL_MAX_SAMPLES];
@@ -97,7 +100,8 @@ TL_INLINE void mean_pixel_f32(const void *const *colors, int sample_bits, int n_
     }
 }
 
-TL_INLINE void mean_pixel(const void *const *colors, int sample_bits, int n_channels, int is_u8, const tl_transfer *transfer, void *pixel)
+TL_INLINE void mean_pixel(const void *const *colors, int sample_bits, int n_channels, int is_u8,
+                          const tl_transfer *transfer, void *pixel)
 {
     if (is_u8)
         mean_pixel_u8(colors, sample_bits, n_channels, transfer, pixel);
@@ -131,8 +135,8 @@ TL_INLINE void mean_labels(const mean_source *s, const int32_t *labels, char *pi
     mean_pixel(own, s->sample_bits, s->n_channels, s->is_u8, s->transfer, pixel);
 }
 
-/* The mean of the bytes of TL_LANES pixels, four a colour; `own` is what they hold.  Lanes in `rest` are weighted by an alpha that
- * differs, and left for others. */
+/* The mean of the bytes of TL_LANES pixels, four a colour; `own` is what they hold.  Lanes in `rest` are weighted by an
+ * alpha that differs, and left for others. */
 TL_INLINE vi mean_bytes(const mean_source *s, const int32_t *labels, vm live, vi own, vm *rest)
 {
     const tl_transfer *transfer = s->transfer;
@@ -156,7 +160,8 @@ TL_INLINE vi mean_bytes(const mean_source *s, const int32_t *labels, vm live, vi
         odd = vi_add(odd, vi_and(vi_shift_right(other, 8), bytes));
         *rest = vm_or(*rest, vm_and_not(is_mixed, vi_eq(vi_and(other, alpha), vi_and(color, alpha))));
     }
-    return vi_select(is_mixed, vi_or(mean_pairs(even, s->sample_bits), vi_shift_left(mean_pairs(odd, s->sample_bits), 8)), color);
+    return vi_select(is_mixed,
+                     vi_or(mean_pairs(even, s->sample_bits), vi_shift_left(mean_pairs(odd, s->sample_bits), 8)), color);
 }
 
 /* n pixels of n_channels bytes. */
@@ -202,8 +207,8 @@ TL_INLINE void mean_flat_pixels(const mean_source *s, const int32_t *labels, int
 }
 
 /* n pixels whose samples have the colours of their triangles; planes of labels lie `stride` apart. */
-static void mean_flat(const int32_t *labels, int sample_bits, int64_t stride, int64_t n, const void *palette, int n_channels, int is_u8,
-                      const tl_transfer *transfer, void *pixels)
+static void mean_flat(const int32_t *labels, int sample_bits, int64_t stride, int64_t n, const void *palette,
+                      int n_channels, int is_u8, const tl_transfer *transfer, void *pixels)
 {
     const mean_source s = {palette, is_u8 ? 4 : 4 * n_channels, n_channels, is_u8, sample_bits, stride, transfer};
     if (!is_u8 || (transfer && transfer->decode))
@@ -229,7 +234,8 @@ static void mean_colors(const void *colors, int sample_bits, int64_t stride, int
     }
 }
 
-static void set_flat_depth(int32_t *restrict ids, int64_t n, int32_t flip, float depth, float background, float *restrict out)
+static void set_flat_depth(int32_t *restrict ids, int64_t n, int32_t flip, float depth, float background,
+                           float *restrict out)
 {
     for (int64_t k = 0; k < n; k++) {
         const int32_t id = ids[k];

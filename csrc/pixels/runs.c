@@ -1,12 +1,15 @@
 /* Runs: the parts of a row that one triangle owns, and what its pixels need to know of it, a vector of runs at a time.
- * In: a row of ids, vertex records, attributes of vertices.  Out: coefficients, which reach the pixels by a load and a permutation.
+ * In: a row of ids, vertex records, attributes of vertices.  Out: coefficients, which reach the pixels by a load and a
+ * permutation.
  *
- * The weight of corner k at a pixel is E_k * q_k, its edge function times 1/w: a value is sum(E_k q_k a_k) / sum(E_k q_k).
- * E_k is an exact integer, rounded once to float32; nothing depends on where a run, a window or a thread begins.  Edge functions
- * are positive where the front is seen.  So the sum over the normals of the corners points to the viewer, whichever side is seen.
+ * The weight of corner k at a pixel is E_k * q_k, its edge function times 1/w: a value is sum(E_k q_k a_k) / sum(E_k
+ * q_k).  E_k is an exact integer, rounded once to float32; nothing depends on where a run, a window or a thread
+ * begins.  Edge functions are positive where the front is seen.  So the sum over the normals of the corners points to
+ * the viewer, whichever side is seen.
  *
  * Based on: C. A. Burns and W. A. Hunt, The Visibility Buffer, 2013; J. F. Blinn, Hyperbolic Interpolation, 1992;
- * M. Olano and T. Greer, Triangle Scan Conversion using 2D Homogeneous Coordinates, 1997 (triangles cut by a clip plane). */
+ * M. Olano and T. Greer, Triangle Scan Conversion using 2D Homogeneous Coordinates, 1997 (triangles cut by a clip
+ * plane). */
 #ifndef TL_RUNS_C
 #define TL_RUNS_C
 
@@ -29,20 +32,20 @@
 /* What interpolated normals that cancel are shorter than, and rounding could have made. */
 #define TL_NO_NORMAL 1e-6f
 
-enum { /* coefficients of runs, float32 */
-    RUN_NORMAL = 0,                  /* corner by corner, times q; the face's in the first three when flat */
-    RUN_SHORTEST = RUN_NORMAL + 9,   /* the squared length below which normals have cancelled */
-    RUN_Q = RUN_SHORTEST + 1,
-    RUN_U = RUN_Q + 3,               /* times q, as everything that follows */
-    RUN_V = RUN_U + 3,
-    RUN_COLOR = RUN_V + 3,
-    RUN_GRADIENT = RUN_COLOR + 9,    /* per column and per row: of sum(E q), sum(E q u), sum(E q v) */
-    RUN_ALPHA = RUN_GRADIENT + 6,    /* from here on of full materials and holes */
-    RUN_UV1 = RUN_ALPHA + 3,         /* as RUN_U and RUN_V, of the second set */
-    RUN_GRADIENT1 = RUN_UV1 + 6,
-    RUN_TANGENT = RUN_GRADIENT1 + 6, /* of both sets: see set_tangents; not times q */
-    N_TANGENT_FLOATS = 7,
-    N_RUN_FLOATS = RUN_TANGENT + 2 * N_TANGENT_FLOATS,
+enum {                                /* coefficients of runs, float32 */
+       RUN_NORMAL = 0,                /* corner by corner, times q; the face's in the first three when flat */
+       RUN_SHORTEST = RUN_NORMAL + 9, /* the squared length below which normals have cancelled */
+       RUN_Q = RUN_SHORTEST + 1,
+       RUN_U = RUN_Q + 3, /* times q, as everything that follows */
+       RUN_V = RUN_U + 3,
+       RUN_COLOR = RUN_V + 3,
+       RUN_GRADIENT = RUN_COLOR + 9, /* per column and per row: of sum(E q), sum(E q u), sum(E q v) */
+       RUN_ALPHA = RUN_GRADIENT + 6, /* from here on of full materials and holes */
+       RUN_UV1 = RUN_ALPHA + 3,      /* as RUN_U and RUN_V, of the second set */
+       RUN_GRADIENT1 = RUN_UV1 + 6,
+       RUN_TANGENT = RUN_GRADIENT1 + 6, /* of both sets: see set_tangents; not times q */
+       N_TANGENT_FLOATS = 7,
+       N_RUN_FLOATS = RUN_TANGENT + 2 * N_TANGENT_FLOATS,
 };
 enum { RUN_E1, RUN_E2, RUN_STEP1, RUN_STEP2, RUN_SUM, RUN_MATERIAL, RUN_ID, RUN_SPECIAL, N_RUN_INTS };
 
@@ -60,7 +63,8 @@ typedef struct {
     int needs_q, needs_normal, needs_uv, needs_colors, needs_point; /* whether anything that is shown depends on it */
     int needs_alpha, needs_uv1, needs_tangents[2];                  /* the same; tangents of each set of uv */
     int needs_more;                                                 /* any of these */
-    int is_grey;                       /* the light is the grey of srgb.c: per channel the line and the root of its colour */
+    /* the light is the grey of srgb.c: per channel the line and the root of its colour */
+    int is_grey;
     float grey_line[3], grey_root[3];
     int n_runs, n_special;
     int first_run[TL_SPAN]; /* of each vector: how many runs have begun before it */
@@ -100,7 +104,8 @@ TL_INLINE vm run_corners(const shade_runs *s, int slot, int32_t corners[3][TL_MA
     vi c[4];
     vm is_there = vm_all();
     if (TL_LANES > 1 && !vm_any(vi_eq(vi_load(ids), zero))) {
-        vi_load_records((const char *)s->scene->triangles - 4, 12, ids, c); /* 16 bytes, from the number before the triangle on */
+        /* 16 bytes, from the number before the triangle on */
+        vi_load_records((const char *)s->scene->triangles - 4, 12, ids, c);
     } else {
         int32_t own[3][TL_MAX_LANES];
         for (int lane = 0; lane < TL_LANES; lane++)
@@ -134,7 +139,10 @@ typedef struct {
 } run_setup;
 
 /* What perspective makes of a value along a column or a row: the sum of the steps of the weights times the value. */
-TL_INLINE vf gradient_of(const vf *step, const vf *value) { return vf_fma(step[0], value[0], vf_fma(step[1], value[1], vf_mul(step[2], value[2]))); }
+TL_INLINE vf gradient_of(const vf *step, const vf *value)
+{
+    return vf_fma(step[0], value[0], vf_fma(step[1], value[1], vf_mul(step[2], value[2])));
+}
 
 /* A set of uv; its coefficients begin at `first`, those of its gradients at `gradient`. */
 TL_INLINE void set_uv(shade_runs *s, int slot, const run_setup *r, const float *uv, int first, int gradient)
@@ -191,7 +199,8 @@ TL_INLINE void load_positions(const void *positions, int is_f64, const int32_t *
 {
     const double *p64 = positions;
     const float *p32 = positions;
-    if (TL_LANES > 1 && !vm_any(vi_eq(vi_load(vertices), vi_set1(0)))) { /* four numbers, from the one before the row on */
+    if (TL_LANES > 1 &&
+        !vm_any(vi_eq(vi_load(vertices), vi_set1(0)))) { /* four numbers, from the one before the row on */
         vd row[4];
         vi bits[4];
         if (is_f64)
@@ -335,8 +344,8 @@ static void special_edges(special_run *e, const double *x_fx, const double *y_fx
 }
 
 /* The same of one that is cut: from homogeneous corners, with q in the edge functions; the area is +-1. */
-static void homogeneous_edges(special_run *e, const tl_view *view, const tl_vertex_set *set, const int32_t *corners, double y, double unit,
-                              float *row_step)
+static void homogeneous_edges(special_run *e, const tl_view *view, const tl_vertex_set *set, const int32_t *corners,
+                              double y, double unit, float *row_step)
 {
     double h[3][3], step[3], det = 0.0;
     for (int k = 0; k < 3; k++) {
@@ -382,10 +391,18 @@ static void set_special(shade_runs *s, int slot, int lane, int64_t row, run_setu
         special_edges(e, x_fx, y_fx, y, row_step);
     }
     s->ints[RUN_SPECIAL][slot + lane] = ++s->n_special;
-    vf *changed[10] = {&r->area, &r->col_step[0], &r->col_step[1], &r->col_step[2], &r->row_step[0], &r->row_step[1], &r->row_step[2],
-                       &r->q[0], &r->q[1], &r->q[2]};
-    const float values[10] = {e->area, (float)(e->step[0] * unit), (float)(e->step[1] * unit), (float)(e->step[2] * unit),
-                              (float)(row_step[0] * unit), (float)(row_step[1] * unit), (float)(row_step[2] * unit), 1.0f, 1.0f, 1.0f};
+    vf *changed[10] = {&r->area,        &r->col_step[0], &r->col_step[1], &r->col_step[2], &r->row_step[0],
+                       &r->row_step[1], &r->row_step[2], &r->q[0],        &r->q[1],        &r->q[2]};
+    const float values[10] = {e->area,
+                              (float)(e->step[0] * unit),
+                              (float)(e->step[1] * unit),
+                              (float)(e->step[2] * unit),
+                              (float)(row_step[0] * unit),
+                              (float)(row_step[1] * unit),
+                              (float)(row_step[2] * unit),
+                              1.0f,
+                              1.0f,
+                              1.0f};
     for (int k = 0; k < (is_cut ? 10 : 7); k++) {
         vf_store(lanes, *changed[k]);
         lanes[lane] = values[k];
@@ -393,7 +410,8 @@ static void set_special(shade_runs *s, int slot, int lane, int64_t row, run_setu
     }
 }
 
-/* Edge functions of TL_LANES runs in a row, at column 0 of the row: what wraps on the way there comes back at the pixel. */
+/* Edge functions of TL_LANES runs in a row, at column 0 of the row: what wraps on the way there comes back at the
+ * pixel. */
 TL_INLINE vm set_edges(shade_runs *s, int slot, int64_t row, run_setup *r)
 {
     const tl_vertex_set *set = &s->scene->mesh;
@@ -471,8 +489,14 @@ typedef struct {
     vf opacity; /* of the surface */
 } shaded_lanes;
 
-TL_INLINE vf pick(const shaded_lanes *p, int coefficient) { return vf_pick(p->s->floats[coefficient] + p->first, p->run); }
-TL_INLINE vi pick_int(const shaded_lanes *p, int coefficient) { return vi_pick(p->s->ints[coefficient] + p->first, p->run); }
+TL_INLINE vf pick(const shaded_lanes *p, int coefficient)
+{
+    return vf_pick(p->s->floats[coefficient] + p->first, p->run);
+}
+TL_INLINE vi pick_int(const shaded_lanes *p, int coefficient)
+{
+    return vi_pick(p->s->ints[coefficient] + p->first, p->run);
+}
 
 /* The sum of a value at the corners, weighted by the edge functions. */
 TL_INLINE vf weighed(const shaded_lanes *p, int c0, int c1, int c2)
@@ -480,7 +504,8 @@ TL_INLINE vf weighed(const shaded_lanes *p, int c0, int c1, int c2)
     return vf_fma(p->e[0], pick(p, c0), vf_fma(p->e[1], pick(p, c1), vf_mul(p->e[2], pick(p, c2))));
 }
 
-/* The lanes of vector i of the span that begins at `column`, and their edge functions; but for those of special runs. */
+/* The lanes of vector i of the span that begins at `column`, and their edge functions; but for those of special
+ * runs. */
 TL_INLINE void find_lanes(shaded_lanes *p, const shade_runs *s, int i, int64_t column, vi *e, vi *sum)
 {
     const unsigned starts = s->starts[i];
@@ -494,6 +519,43 @@ TL_INLINE void find_lanes(shaded_lanes *p, const shade_runs *s, int i, int64_t c
     e[2] = vi_add(pick_int(p, RUN_E2), vi_mul(p->column, pick_int(p, RUN_STEP2)));
     *sum = pick_int(p, RUN_SUM);
     e[0] = vi_sub(vi_sub(*sum, e[1]), e[2]);
+}
+
+/* The lanes of a vector of pixels that belong to special runs, run by run. */
+typedef struct {
+    vd x_fx; /* of the pixels */
+    vi special;
+    int32_t number[TL_MAX_LANES]; /* the same, lane by lane */
+    vm rest;                      /* lanes whose runs are still to come */
+    const special_run *run;
+} special_lanes;
+
+TL_INLINE special_lanes start_special(const shaded_lanes *p, vi special)
+{
+    const tl_window *window = p->s->window;
+    const vd x_px = vd_add(vd_from_vi(p->column), vd_set1((double)window->x_px + 0.5));
+    special_lanes own = {.x_fx = vd_mul(x_px, vd_set1((double)(1 << window->subpixel_bits))), .special = special};
+    vi_store(own.number, special);
+    own.rest = vm_and(p->visible, vi_gt(special, vi_set1(0)));
+    return own;
+}
+
+/* Takes the next run; returns its lanes, none behind the last one. */
+TL_INLINE vm next_special(const shaded_lanes *p, special_lanes *own)
+{
+    if (!vm_any(own->rest))
+        return own->rest;
+    const int32_t number = own->number[__builtin_ctz(vm_bits(own->rest))];
+    const vm lanes = vm_and(own->rest, vi_eq(own->special, vi_set1(number)));
+    own->run = &p->s->special[number - 1];
+    own->rest = vm_and_not(own->rest, lanes);
+    return lanes;
+}
+
+TL_INLINE vd special_edge(const special_lanes *own, int k)
+{
+    const special_run *e = own->run;
+    return vd_add(vd_set1(e->at[k]), vd_mul(vd_set1(e->step[k]), vd_sub(own->x_fx, vd_set1(e->from[k]))));
 }
 
 #endif

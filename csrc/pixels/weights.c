@@ -1,9 +1,10 @@
 /* Weights: those of the three corners at the pixels of a visibility buffer, in float64, a vector of pixels at a time.
  * In: ids, the scene they were drawn from.  Out: barycentric weights, or values of the vertices.
  *
- * The bits are those of weights_of_pixel: edge functions are integers below 2^53, so float64 has them exactly, and every operation
- * after that is the same.  What does not fit is left to weights_of_pixel itself, pixel by pixel: triangles that a clip plane cuts,
- * coordinates beyond 2^30, boxes beyond 2^52, and 1/w that vd_quotients might not take. */
+ * The bits are those of weights_of_pixel: edge functions are integers below 2^53, so float64 has them exactly, and
+ * every operation after that is the same.  What does not fit is left to weights_of_pixel itself, pixel by pixel:
+ * triangles that a clip plane cuts, coordinates beyond 2^30, boxes beyond 2^52, and 1/w that vd_quotients might not
+ * take. */
 #ifndef TL_WEIGHTS_C
 #define TL_WEIGHTS_C
 
@@ -26,10 +27,10 @@
 typedef struct {
     shade_runs runs;
     resolve_state alone;
-    int n_alone;                                   /* runs that are left to weights_of_pixel */
-    int has_w;                                     /* whether w differs from vertex to vertex */
-    _Alignas(64) int32_t corners[3][TL_SPAN_ROOM]; /* by run: of vertices that are there */
-    _Alignas(64) double q[3][TL_SPAN_ROOM];        /* 1/w of the corners, by run */
+    int n_alone;                                      /* runs that are left to weights_of_pixel */
+    int has_w;                                        /* whether w differs from vertex to vertex */
+    _Alignas(64) int32_t corners[3][TL_SPAN_ROOM];    /* by run: of vertices that are there */
+    _Alignas(64) double q[3][TL_SPAN_ROOM];           /* 1/w of the corners, by run */
     _Alignas(64) double w[3][TL_SPAN + TL_MAX_LANES]; /* the weights of the pixels of the span */
 } weighed_span;
 
@@ -77,7 +78,8 @@ TL_INLINE void load_inverse_w(const tl_vertex_set *set, const int32_t *vertices,
             q[lane] = inverse_w(set, vertices[lane]);
 }
 
-/* The corners of runs and their 1/w: in a pass of its own, as what is stored number by number is not yet there for vectors. */
+/* The corners of runs and their 1/w: in a pass of its own, as what is stored number by number is not yet there for
+ * vectors. */
 TL_INLINE void load_run_corners(weighed_span *r)
 {
     shade_runs *s = &r->runs;
@@ -107,7 +109,8 @@ TL_INLINE void set_weighed_runs(weighed_span *r, int64_t row)
         for (int k = 0; k < 3; k++)
             vi_spill(setup.corners[k], vi_load(r->corners[k] + slot));
         const vm is_run = vm_first(TL_LANES + s->n_runs - slot);
-        vm is_alone = vi_gt(vi_set1(0), vi_load(s->ints[RUN_SPECIAL] + slot)), is_special = set_edges(s, slot, row, &setup);
+        vm is_alone = vi_gt(vi_set1(0), vi_load(s->ints[RUN_SPECIAL] + slot));
+        vm is_special = set_edges(s, slot, row, &setup);
         is_alone = vm_or(is_alone, vm_and_not(vi_eq(vi_load(s->ints[RUN_SUM] + slot), vi_set1(0)), is_special));
         for (int k = 0; r->has_w && k < 3; k++) {
             const vd q = vd_load(r->q[k] + slot);
@@ -128,27 +131,20 @@ TL_INLINE void set_weighed_runs(weighed_span *r, int64_t row)
 /* Edge functions of the lanes whose runs are float64. */
 static void set_float64_edges(const shaded_lanes *p, vi special, vd *e, vm *is_back)
 {
-    const shade_runs *s = p->s;
-    const double unit = (double)(1 << s->window->subpixel_bits);
-    const vd x_fx = vd_mul(vd_add(vd_from_vi(p->column), vd_set1((double)s->window->x_px + 0.5)), vd_set1(unit)), zero = vd_set1(0.0);
-    int32_t number[TL_MAX_LANES];
-    vi_store(number, special);
-    vm rest = vm_and(p->visible, vi_gt(special, vi_set1(0)));
-    while (vm_any(rest)) {
-        const int32_t own = number[__builtin_ctz(vm_bits(rest))];
-        const vm lanes = vm_and(rest, vi_eq(special, vi_set1(own)));
-        const special_run *run = &s->special[own - 1];
+    const vd zero = vd_set1(0.0);
+    special_lanes own = start_special(p, special);
+    for (vm lanes; vm_any(lanes = next_special(p, &own));) {
+        const int is_negative = own.run->area < 0.0f;
         for (int k = 0; k < 3; k++) {
-            vd value = vd_add(vd_set1(run->at[k]), vd_mul(vd_set1(run->step[k]), vd_sub(x_fx, vd_set1(run->from[k]))));
-            value = run->area < 0.0f ? vd_sub(zero, value) : vd_add(zero, value); /* never -0 */
-            e[k] = vd_select(lanes, value, e[k]);
+            const vd value = special_edge(&own, k);
+            e[k] = vd_select(lanes, is_negative ? vd_sub(zero, value) : vd_add(zero, value), e[k]); /* never -0 */
         }
-        *is_back = run->area < 0.0f ? vm_or(*is_back, lanes) : vm_and_not(*is_back, lanes);
-        rest = vm_and_not(rest, lanes);
+        *is_back = is_negative ? vm_or(*is_back, lanes) : vm_and_not(*is_back, lanes);
     }
 }
 
-/* Weights of the lanes whose runs are left to weights_of_pixel; lanes whose triangle is not there cease to be visible. */
+/* Weights of the lanes whose runs are left to weights_of_pixel; lanes whose triangle is not there cease to be
+ * visible. */
 static void set_lonely_weights(weighed_span *r, const shaded_lanes *p, vi special, int64_t row, int i)
 {
     const tl_window *window = r->runs.window;
@@ -170,8 +166,8 @@ static void set_lonely_weights(weighed_span *r, const shaded_lanes *p, vi specia
     }
 }
 
-/* The weights of vector i of a span.  They are summed up in the order of corners that makes the area positive, as weights_of_pixel
- * has them. */
+/* The weights of vector i of a span.  They are summed up in the order of corners that makes the area positive, as
+ * weights_of_pixel has them. */
 TL_INLINE void weigh_lanes(weighed_span *r, int i, int64_t column, int64_t row)
 {
     const shade_runs *s = &r->runs;
@@ -263,8 +259,10 @@ TL_INLINE void load_values(weighed_span *r, const vertex_values *values, int fir
         for (int k = 0; k < 3; k++) {
             const int32_t *corners = r->corners[k] + slot;
             vi c[4];
-            if (TL_LANES > 1 && n_channels == 3 && values->n_values == 3 && !values->per_corner && !vm_any(vi_eq(vi_load(corners), zero))) {
-                vi_load_records((const char *)values->rows - 4, 12, corners, c); /* 16 bytes, from the number before the row on */
+            if (TL_LANES > 1 && n_channels == 3 && values->n_values == 3 && !values->per_corner &&
+                !vm_any(vi_eq(vi_load(corners), zero))) {
+                /* 16 bytes, from the number before the row on */
+                vi_load_records((const char *)values->rows - 4, 12, corners, c);
                 for (int channel = 0; channel < 3; channel++)
                     vf_store(s->floats[3 * channel + k] + slot, vf_of_bits(c[channel + 1]));
                 continue;
@@ -278,7 +276,8 @@ TL_INLINE void load_values(weighed_span *r, const vertex_values *values, int fir
 }
 
 /* n_channels of the pixels of a span. */
-TL_INLINE void interpolate_span(weighed_span *r, const vertex_values *values, int first, int n_channels, int n, float *out)
+TL_INLINE void interpolate_span(weighed_span *r, const vertex_values *values, int first, int n_channels, int n,
+                                float *out)
 {
     const shade_runs *s = &r->runs;
     const vf background = vf_set1(values->background);
@@ -302,12 +301,13 @@ TL_INLINE void interpolate_span(weighed_span *r, const vertex_values *values, in
                 sums[c] = vf_select(visible, vf_from_vd(vd_add(vd_add(part[0], part[1]), part[2])), background);
             }
         }
-        store_channels(out + (int64_t)x * values->n_values + first, values->n_values, (int)min64(n - x, TL_LANES), sums, n_channels);
+        store_channels(out + (int64_t)x * values->n_values + first, values->n_values, (int)min64(n - x, TL_LANES), sums,
+                       n_channels);
     }
 }
 
-static void interpolate(const tl_scene *scene, const tl_window *window, const int32_t *ids, const float *values, int n_values,
-                        int per_corner, float background, float *restrict out)
+static void interpolate(const tl_scene *scene, const tl_window *window, const int32_t *ids, const float *values,
+                        int n_values, int per_corner, float background, float *restrict out)
 {
     const vertex_values read = {values, n_values, per_corner, background};
     weighed_span r;

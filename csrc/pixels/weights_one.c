@@ -14,11 +14,11 @@
 
 /* The triangle (or piece) under the last pixel: neighbours mostly share it. */
 typedef struct {
-    int64_t id;             /* -1: none yet */
+    int64_t id; /* -1: none yet */
     tl_triangle triangle;
     const double *piece[3]; /* weights of a piece's corners in the source triangle, or NULL */
     double inv_w[3];
-    int slot[3];            /* which of the input triangle's corners each turned corner is */
+    int slot[3]; /* which of the input triangle's corners each turned corner is */
 } resolve_state;
 
 static inline int covers(const tl_triangle *t, int64_t x_px, int64_t y_px, int bits)
@@ -91,7 +91,8 @@ static int find_triangle(resolve_state *s, const tl_scene *scene, int64_t id, in
     return 0;
 }
 
-/* Perspective-correct weights of the input triangle's corners at a pixel: exact edge functions times 1/w, normalised. */
+/* Perspective-correct weights of the input triangle's corners at a pixel: exact edge functions times 1/w,
+ * normalised. */
 static void weights_of_pixel(const resolve_state *s, int64_t x_px, int64_t y_px, int bits, double *weights)
 {
     double part[3], sum = 0.0;

@@ -24,8 +24,8 @@
 #define TL_WALK(name) name##_128
 #include "raster/walk.h"
 
-/* One triangle of any size, by the ends of TL_LANES rows at a time in float64: as above, exact while |2E| < 2^51, for then
- * |v / d| * 2^-52 < 0.5 / d. */
+/* One triangle of any size, by the ends of TL_LANES rows at a time in float64: as above, exact while |2E| < 2^51, for
+ * then |v / d| * 2^-52 < 0.5 / d. */
 TL_INLINE int rows_fit(const tl_triangle *t, const tl_window *window, int with_border)
 {
     const double around = with_border ? (double)((int64_t)2 << window->subpixel_bits) : 0.0;
@@ -93,16 +93,21 @@ TL_INLINE vi names_of(const tl_scene *scene, vm m, vi id)
 {
     return vi_add(scene->names ? vi_gather(m, scene->names, id) : id, vi_set1(scene->first_id));
 }
-TL_INLINE int32_t name_of(const tl_scene *scene, int32_t id) { return (scene->names ? scene->names[id] : id) + scene->first_id; }
+TL_INLINE int32_t name_of(const tl_scene *scene, int32_t id)
+{
+    return (scene->names ? scene->names[id] : id) + scene->first_id;
+}
 
 /* Whether a triangle that is set up is walked by float64 row ends; if not, sample by sample or by exact row ends. */
 TL_INLINE int takes_rows(const tl_triangle *t, const tl_scene *scene, const tl_window *window, tl_sink sink)
 {
-    return scene->method == TL_METHOD_AUTO && rows_fit(t, window, window->test != TL_TEST_SAMPLE) && (!sink_has_depth(sink) || t->has_plane);
+    return scene->method == TL_METHOD_AUTO && rows_fit(t, window, window->test != TL_TEST_SAMPLE) &&
+           (!sink_has_depth(sink) || t->has_plane);
 }
 TL_INLINE int takes_edge(const tl_triangle *t, const tl_scene *scene)
 {
-    return scene->method == TL_METHOD_EDGE || (scene->method == TL_METHOD_AUTO && t->col1 - t->col0 <= TL_EDGE_MAX_WIDTH);
+    return scene->method == TL_METHOD_EDGE ||
+           (scene->method == TL_METHOD_AUTO && t->col1 - t->col0 <= TL_EDGE_MAX_WIDTH);
 }
 
 /* Counts a triangle as draw_triangle would draw it. */
@@ -110,7 +115,8 @@ TL_INLINE void count_drawn(tl_triangle *t, const tl_scene *scene, const tl_windo
 {
     t->has_plane = 0;
     setup_sink(t, window, census->sink);
-    const tl_class narrow = takes_edge(t, scene) ? TL_CLASS_EDGE_64 : TL_CLASS_SPAN_64, wide = takes_edge(t, scene) ? TL_CLASS_EDGE_128 : TL_CLASS_SPAN_128;
+    const tl_class narrow = takes_edge(t, scene) ? TL_CLASS_EDGE_64 : TL_CLASS_SPAN_64;
+    const tl_class wide = takes_edge(t, scene) ? TL_CLASS_EDGE_128 : TL_CLASS_SPAN_128;
     const tl_class walker = takes_rows(t, scene, window, census->sink) ? TL_CLASS_LONG : t->is_narrow ? narrow : wide;
     count_one(census, walker, t, window->subpixel_bits);
 }
@@ -121,14 +127,12 @@ TL_INLINE void draw_triangle(const tl_vertex_set *set, const int32_t *corners, i
 {
     tl_triangle t;
     const int sign = load_triangle(set, corners, &t);
-    if (sign == 0 || (sign > 0 && scene->cull == TL_CULL_BACK) || (sign < 0 && scene->cull == TL_CULL_FRONT)) {
-        if (sink == TL_SINK_CENSUS)
-            target->census->n[sign ? TL_CLASS_CULLED : TL_CLASS_DEGENERATE]++;
+    if (is_culled(sign, scene->cull)) {
+        count_faceless_one(target, sink, sign);
         return;
     }
     if (!clip_box(&t, window)) {
-        if (sink == TL_SINK_CENSUS)
-            count_unseen_one(target->census, &t, window);
+        count_unseen_one(target, sink, &t, window);
         return;
     }
     t.id = name_of(scene, id);
@@ -166,7 +170,8 @@ static row_span square_span(const tl_triangle *t, const tl_window *window, int64
         tl_int128 quotient, remainder;
         if (e.dy[k] == 0)
             continue;
-        floor_divide_128(e.value[k] + e.dx[k] * (row - t->row0), e.dy[k] < 0 ? -e.dy[k] : e.dy[k], &quotient, &remainder);
+        floor_divide_128(e.value[k] + e.dx[k] * (row - t->row0), e.dy[k] < 0 ? -e.dy[k] : e.dy[k], &quotient,
+                         &remainder);
         if (e.dy[k] < 0)
             first = -quotient > first ? -quotient : first;
         else
@@ -178,16 +183,16 @@ static row_span square_span(const tl_triangle *t, const tl_window *window, int64
 }
 
 /* Counts the squares that any of a triangle's pieces meets, or holds: a square may meet several, and counts once. */
-static __attribute__((noinline)) void count_squares(const tl_vertex_set *set, const int32_t *corners, int n_pieces, const tl_scene *scene,
-                                                    const tl_window *window, const tl_target *target)
+static __attribute__((noinline)) void count_squares(const tl_vertex_set *set, const int32_t *corners, int n_pieces,
+                                                    const tl_scene *scene, const tl_window *window,
+                                                    const tl_target *target)
 {
     tl_triangle t[TL_MAX_PIECES];
     int64_t row0 = window->height, row1 = 0;
     int n = 0;
     for (int i = 0; i < n_pieces && n < TL_MAX_PIECES; i++) {
         const int sign = load_triangle(set, corners + 3 * i, &t[n]);
-        const int is_culled = sign == 0 || (sign > 0 && scene->cull == TL_CULL_BACK) || (sign < 0 && scene->cull == TL_CULL_FRONT);
-        if (is_culled || !clip_box(&t[n], window))
+        if (is_culled(sign, scene->cull) || !clip_box(&t[n], window))
             continue;
         row0 = min64(row0, t[n].row0);
         row1 = max64(row1, t[n].row1);
@@ -210,30 +215,19 @@ static __attribute__((noinline)) void count_squares(const tl_vertex_set *set, co
 }
 
 /* Triangle i, or its pieces, by itself. */
-TL_INLINE void draw_alone(const tl_scene *scene, int64_t i, const tl_window *window, const tl_target *target, tl_sink sink)
+TL_INLINE void draw_alone(const tl_scene *scene, int64_t i, const tl_window *window, const tl_target *target,
+                          tl_sink sink)
 {
-    const int32_t *corners = scene->triangles + 3 * i;
-    const tl_pieces *pieces = scene->pieces;
-    tl_vertex_set set = scene->mesh;
-    int64_t piece = 0, end = 1;
-    if (is_clipped(&set, corners)) {
-        if (!pieces)
-            return;
-        set = piece_set(pieces, &scene->mesh);
-        piece = first_piece(pieces, i);
-        for (end = piece; end < pieces->n_pieces && pieces->source[end] == i;)
-            end++;
-        corners = pieces->triangles + 3 * piece;
-    }
-    if (sink == TL_SINK_COUNT && window->test != TL_TEST_SAMPLE && end - piece > 1) {
-        count_squares(&set, corners, (int)(end - piece), scene, window, target);
+    const triangle_parts parts = parts_of(scene, i);
+    if (sink == TL_SINK_COUNT && window->test != TL_TEST_SAMPLE && parts.n > 1) {
+        count_squares(&parts.set, parts.corners, parts.n, scene, window, target);
         return;
     }
-    for (; piece < end; piece++, corners += 3)
-        draw_triangle(&set, corners, (int32_t)i, scene, window, target, sink);
+    for (int k = 0; k < parts.n; k++)
+        draw_triangle(&parts.set, parts.corners + 3 * k, (int32_t)i, scene, window, target, sink);
 }
 
-TL_SINK_COPIES(draw_alone, (const tl_scene *scene, int64_t i, const tl_window *window, const tl_target *target), scene, i, window,
-               target)
+TL_SINK_COPIES(draw_alone, (const tl_scene *scene, int64_t i, const tl_window *window, const tl_target *target), scene,
+               i, window, target)
 
 #endif

@@ -2,9 +2,10 @@
  * In: vertex records and triangles.  Out: samples of boxes up to 2x2, queues of boxes up to 4x4 and of larger ones for
  * rows.c, and the triangles that 32 bits cannot take, for draw_triangle.
  *
- * Range: extents of at most TL_MAX_EXTENT units, so |dx|, |dy| < 2^14, doubled relative coordinates fit 16 bits, products
- * 2^30, and doubled edge functions 2^29 (see fixed.h).  Squares and several samples: two pixels less and at most 8 bits, so that all this holds of
- * corners of pixels up to a pixel outside the extent, but that doubled edge functions are below 2^30. */
+ * Range: extents of at most TL_MAX_EXTENT units, so |dx|, |dy| < 2^14, doubled relative coordinates fit 16 bits,
+ * products 2^30, and doubled edge functions 2^29 (see fixed.h).  Squares and several samples: two pixels less and at
+ * most 8 bits, so that all this holds of corners of pixels up to a pixel outside the extent, but that doubled edge
+ * functions are below 2^30. */
 #ifndef TL_BATCH_C
 #define TL_BATCH_C
 
@@ -13,6 +14,7 @@
 
 #include "topleft.h"
 #include "lanes/lanes.h"
+#include "vertex/fixed.h"
 #include "raster/alone.c"
 #include "raster/fragments.h"
 #include "raster/hooks.h"
@@ -28,22 +30,22 @@
  * first-level cache, and packing twelve vectors a queue cost more. */
 typedef struct {
     int n;
-    int32_t col[TL_QUEUE + TL_MAX_LANES], row[TL_QUEUE + TL_MAX_LANES]; /* picture pixel of the first sample of the box */
-    int32_t size[TL_QUEUE + TL_MAX_LANES];                              /* columns | rows << 16 of the box */
+    /* picture pixel of the first sample of the box */
+    int32_t col[TL_QUEUE + TL_MAX_LANES], row[TL_QUEUE + TL_MAX_LANES];
+    int32_t size[TL_QUEUE + TL_MAX_LANES]; /* columns | rows << 16 of the box */
     int32_t id[TL_QUEUE + TL_MAX_LANES];
 } box_queue;
 
 /* What one pass needs to know of the window and the scene, in int32. */
 typedef struct {
-    int32_t left, top, right, bottom; /* picture pixels */
+    int32_t left, top, right, bottom;    /* picture pixels */
     int32_t picture_top, picture_bottom; /* rows of the picture that other passes draw */
-    int32_t max_extent;               /* of a triangle that 32-bit lanes can take, in units */
+    int32_t max_extent;                  /* of a triangle that 32-bit lanes can take, in units */
     extent_rounding round;
-    int32_t special_x;                /* TL_SPECIAL as load_corners gives it */
+    int32_t special_x; /* TL_SPECIAL as load_corners gives it */
     vi last_vertex;
-    int second, third;                /* which corner comes second and third: culled faces then have negative area */
+    int second, third; /* which corner comes second and third: culled faces then have negative area */
 } batch_limits;
-
 
 /* Everything that one pass over a scene needs; on the stack of draw. */
 typedef struct batch_state {
@@ -62,6 +64,17 @@ typedef struct {
     vi x[3], y[3];
     vz z[3];
 } lane_corners;
+
+/* TL_LANES triangles as loaded, and what becomes of them. */
+typedef struct {
+    lane_corners c;
+    vi x_min, x_max, y_min, y_max;
+    vi area, absolute;           /* twice the area; positive where the side that is drawn shows */
+    vi top, bottom;              /* rows of the extent in the picture */
+    vi col, row, n_cols, n_rows; /* the box of samples in the window */
+    vm alone;                    /* too large for 32-bit lanes, or special */
+    vm drawn;                    /* the others that are to be drawn */
+} lane_batch;
 
 /* TL_LANES triangles with positive area; corners doubled and relative to the first sample of their boxes. */
 typedef struct lane_triangles {
@@ -97,15 +110,73 @@ TL_INLINE vi area_lanes(const lane_corners *c)
     return vi_sub(vi_mul(x1, y2), vi_mul(y1, x2));
 }
 
+/* Whether the 3 * TL_LANES indices of a vector of triangles hold one outside [0, last_vertex]. */
+TL_INLINE int has_bad_index(const int32_t *corners, vi last_vertex)
+{
+    const vm bad01 =
+        vm_or(vi_gt_unsigned(vi_load(corners), last_vertex), vi_gt_unsigned(vi_load(corners + TL_LANES), last_vertex));
+    return vm_any(vm_or(bad01, vi_gt_unsigned(vi_load(corners + 2 * TL_LANES), last_vertex)));
+}
+
+/* As round_extent tells. */
+TL_INLINE vi extent_pixels(vi x_fx, int32_t round, int bits)
+{
+    return vi_shift_right(vi_add(x_fx, vi_set1(round)), bits);
+}
+
+/* Loads TL_LANES triangles, and finds those that lanes can take and that show the side which is drawn.  Returns 0, with
+ * the row in `bad_row`, when an index lies outside the vertices. */
+TL_INLINE int load_batch(batch_state *s, const int32_t *corners, vi id, vm live, lane_batch *b)
+{
+    const batch_limits *limits = &s->limits;
+    const vi zero = vi_set1(0), max_extent = vi_set1(limits->max_extent);
+    if (has_bad_index(corners, limits->last_vertex)) {
+        int32_t ids[TL_MAX_LANES];
+        vi_store(ids, id);
+        s->bad_row = ids[0];
+        return 0;
+    }
+    load_corners(s, corners, &b->c);
+    const lane_corners *c = &b->c;
+    b->x_min = vi_min(vi_min(c->x[0], c->x[1]), c->x[2]), b->x_max = vi_max(vi_max(c->x[0], c->x[1]), c->x[2]);
+    b->y_min = vi_min(vi_min(c->y[0], c->y[1]), c->y[2]), b->y_max = vi_max(vi_max(c->y[0], c->y[1]), c->y[2]);
+    /* a special vertex has x = INT32_MIN: its triangle is too wide, or special throughout */
+    const vm too_wide = vi_gt_unsigned(vi_sub(b->x_max, b->x_min), max_extent);
+    const vm too_tall = vi_gt_unsigned(vi_sub(b->y_max, b->y_min), max_extent);
+    b->alone = vm_and(live, vm_or(vm_or(too_wide, too_tall), vi_eq(b->x_min, vi_set1(limits->special_x))));
+    b->area = area_lanes(c);
+    b->absolute = s->scene->cull == TL_CULL_NONE ? vi_max(b->area, vi_sub(zero, b->area)) : b->area;
+    b->drawn = vm_and_not(vm_and(live, vi_gt(b->absolute, zero)), b->alone);
+    return 1;
+}
+
+/* The boxes of samples in the window; empty ones have no columns or no rows. */
+TL_INLINE void find_boxes(const batch_state *s, lane_batch *b)
+{
+    const batch_limits *limits = &s->limits;
+    const int bits = s->window->subpixel_bits;
+    b->col = vi_max(extent_pixels(b->x_min, limits->round.first, bits), vi_set1(limits->left));
+    b->n_cols = vi_sub(vi_min(extent_pixels(b->x_max, limits->round.end, bits), vi_set1(limits->right)), b->col);
+    b->top = extent_pixels(b->y_min, limits->round.first, bits);
+    b->bottom = extent_pixels(b->y_max, limits->round.end, bits);
+    b->row = vi_max(b->top, vi_set1(limits->top));
+    b->n_rows = vi_sub(vi_min(b->bottom, vi_set1(limits->bottom)), b->row);
+}
+
+/* Whether there is a sample in them. */
+TL_INLINE vm has_box(const lane_batch *b) { return vi_gt(vi_min(b->n_cols, b->n_rows), vi_set1(0)); }
+
 TL_INLINE void setup_edges_lanes(lane_triangles *t, const tl_window *window, tl_sink sink)
 {
-    const int bits = window->subpixel_bits, of_squares = (sink == TL_SINK_MASK || sink == TL_SINK_COUNT) && window->test != TL_TEST_SAMPLE;
+    const int bits = window->subpixel_bits;
+    const int of_squares = (sink == TL_SINK_MASK || sink == TL_SINK_COUNT) && window->test != TL_TEST_SAMPLE;
     for (int k = 0; k < 3; k++) {
         const vi doubled = vi_sub(vi_mul(t->dy[k], t->x[k]), vi_mul(t->dx[k], t->y[k]));
         if (of_squares) { /* from the centre to the corner that counts: half a pixel in x and in y */
             const vi zero = vi_set1(0), is_outer = vi_set1(window->test == TL_TEST_OUTER);
             const vi sides = vi_add(vi_max(t->dx[k], vi_sub(zero, t->dx[k])), vi_max(t->dy[k], vi_sub(zero, t->dy[k])));
-            const vi reach = vi_shift_left(sides, bits), inwards = window->test == TL_TEST_OUTER ? reach : vi_sub(zero, reach);
+            const vi reach = vi_shift_left(sides, bits);
+            const vi inwards = window->test == TL_TEST_OUTER ? reach : vi_sub(zero, reach);
             t->e[k] = vi_shift_right(vi_sub(vi_add(doubled, inwards), is_outer), bits + 1);
             continue;
         }
@@ -117,7 +188,8 @@ TL_INLINE void setup_edges_lanes(lane_triangles *t, const tl_window *window, tl_
 }
 
 /* Turns the triangles so that their areas are positive, and measures them from the first samples of their boxes. */
-TL_INLINE void place_triangles(const batch_state *s, tl_sink sink, const lane_corners *c, vi col, vi row, lane_triangles *t, vd *z)
+TL_INLINE void place_triangles(const batch_state *s, tl_sink sink, const lane_corners *c, vi col, vi row,
+                               lane_triangles *t, vd *z)
 {
     const int bits = s->window->subpixel_bits, either_turn = s->scene->cull == TL_CULL_NONE;
     const vi centre_x = vi_add(vi_shift_left(col, bits + 1), vi_set1(1 << bits));
@@ -169,8 +241,8 @@ TL_INLINE vf plane_depth(const lane_planes *p, vd x, vd y)
     return sum_depth(vd_add(p->z0, vd_mul(p->slope_y, y)), vd_mul(p->slope_x, x));
 }
 
-/* Appends the lanes in m to a list of n; returns its new length.  The length is passed by value: in memory, every call would
- * wait for the last one's store. */
+/* Appends the lanes in m to a list of n; returns its new length.  The length is passed by value: in memory, every call
+ * would wait for the last one's store. */
 TL_INLINE int emit(fragment_list *f, int n, tl_sink sink, vm m, vi sample, vi id, vf depth)
 {
     vi_compress(f->sample + n, m, sample);
@@ -191,7 +263,8 @@ TL_INLINE int make_room(batch_state *s, int n, tl_sink sink)
 }
 
 /* Boxes of up to 2x2 samples, tested where they are. */
-TL_INLINE void draw_tiny(batch_state *s, tl_sink sink, const lane_triangles *t, const vd *z, vm live, vi n_cols, vi n_rows, vi id)
+TL_INLINE void draw_tiny(batch_state *s, tl_sink sink, const lane_triangles *t, const vd *z, vm live, vi n_cols,
+                         vi n_rows, vi id)
 {
     const int bits = s->window->subpixel_bits;
     if (sink == TL_SINK_SAMPLES) {
@@ -234,11 +307,14 @@ TL_INLINE void draw_tiny(batch_state *s, tl_sink sink, const lane_triangles *t, 
         depth = plane_depth(&p, vd_select(on_right, x_right, p.x), vd_select(below, y_down, p.y));
     fragment_list *f = &s->fragments;
     int n = emit(f, f->n, sink, any, vi_select(below, vi_add(right, stride), right), id, depth);
-    const vm more01 = vm_and_not(in[0][1], first01), more10 = vm_and_not(in[1][0], first10), more11 = vm_and_not(in[1][1], first11);
+    const vm more01 = vm_and_not(in[0][1], first01), more10 = vm_and_not(in[1][0], first10);
+    const vm more11 = vm_and_not(in[1][1], first11);
     if (vm_any(more01))
-        n = emit(f, n, sink, more01, vi_add(sample, one), id, sink_has_depth(sink) ? plane_depth(&p, x_right, p.y) : depth);
+        n = emit(f, n, sink, more01, vi_add(sample, one), id,
+                 sink_has_depth(sink) ? plane_depth(&p, x_right, p.y) : depth);
     if (vm_any(more10))
-        n = emit(f, n, sink, more10, vi_add(sample, stride), id, sink_has_depth(sink) ? plane_depth(&p, p.x, y_down) : depth);
+        n = emit(f, n, sink, more10, vi_add(sample, stride), id,
+                 sink_has_depth(sink) ? plane_depth(&p, p.x, y_down) : depth);
     if (vm_any(more11))
         n = emit(f, n, sink, more11, vi_add(vi_add(sample, stride), one), id,
                  sink_has_depth(sink) ? plane_depth(&p, x_right, y_down) : depth);
@@ -260,7 +336,8 @@ TL_INLINE void pop(const batch_state *s, tl_sink sink, const box_queue *q, int i
     int32_t corners[3 * TL_LANES];
     lane_corners c;
     for (int k = 0; k < TL_LANES; k++) /* lanes behind the end repeat the last triangle */
-        memcpy(corners + 3 * k, s->scene->triangles + 3 * (int64_t)q->id[i + k < n ? i + k : n - 1], 3 * sizeof *corners);
+        memcpy(corners + 3 * k, s->scene->triangles + 3 * (int64_t)q->id[i + k < n ? i + k : n - 1],
+               3 * sizeof *corners);
     load_corners(s, corners, &c);
     place_triangles(s, sink, &c, vi_load(q->col + i), vi_load(q->row + i), t, z);
 }
@@ -307,8 +384,9 @@ TL_INLINE void flush_small(batch_state *s, tl_sink sink)
                 const vm in_box = vm_and(in_row, vi_gt(n_cols, vi_set1(col)));
                 const vm in = vm_and(in_box, vi_gt(vi_or(vi_or(e0, e1), e2), vi_set1(-1)));
                 if (TL_LANES > 1 || vm_any(in))
-                    n_fragments = emit(&s->fragments, n_fragments, sink, in, vi_add(sample, vi_set1(row * stride + col)), id,
-                                       sink_has_depth(sink) ? sum_depth(z_row, z_col[col]) : vf_set1(0.0f));
+                    n_fragments =
+                        emit(&s->fragments, n_fragments, sink, in, vi_add(sample, vi_set1(row * stride + col)), id,
+                             sink_has_depth(sink) ? sum_depth(z_row, z_col[col]) : vf_set1(0.0f));
                 e0 = vi_sub(e0, t.dy[0]), e1 = vi_sub(e1, t.dy[1]), e2 = vi_sub(e2, t.dy[2]);
             }
             for (int k = 0; k < 3; k++)
@@ -321,5 +399,45 @@ TL_INLINE void flush_small(batch_state *s, tl_sink sink)
 }
 
 TL_SINK_COPIES(flush_small, (batch_state *s), s)
+
+/* The corners of the triangles [i, i + TL_LANES) of a share, behind the end zeros; in `buffer` unless they lie there
+ * already. */
+TL_INLINE const int32_t *share_corners(const tl_scene *scene, const tl_share *share, int64_t i, int32_t *buffer)
+{
+    if (!share->ids && i + TL_LANES <= share->end)
+        return scene->triangles + 3 * i;
+    for (int k = 0; k < TL_LANES; k++) {
+        const int64_t id = i + k >= share->end ? -1 : share->ids ? share->ids[i + k] : i + k;
+        if (id >= 0)
+            memcpy(buffer + 3 * k, scene->triangles + 3 * id, 3 * sizeof *buffer);
+        else
+            memset(buffer + 3 * k, 0, 3 * sizeof *buffer);
+    }
+    return buffer;
+}
+
+/* For triangles that cover the centres of pixels; the window has fewer than 2^31 samples and lies within 2^30 pixels of
+ * 0. */
+static void start_batch(batch_state *s, const tl_scene *scene, const tl_window *window, const tl_target *target)
+{
+    const int bits = window->subpixel_bits, is_back = scene->cull == TL_CULL_BACK;
+    const int64_t farthest = (int64_t)1 << 30;
+    s->scene = scene, s->window = window, s->target = target, s->bad_row = -1;
+    s->small.n = s->middle.n = s->rows.n = s->fragments.n = 0;
+    s->limits = (batch_limits){
+        .left = (int32_t)window->x_px,
+        .top = (int32_t)window->y_px,
+        .right = (int32_t)min64(window->x_px + window->width, farthest),
+        .bottom = (int32_t)min64(window->y_px + window->height, farthest),
+        .picture_top = (int32_t)window->y_px,
+        .picture_bottom = (int32_t)min64(window->y_px + window->height, farthest),
+        .max_extent = TL_MAX_BOX_PX << (bits < 8 ? bits : 8),
+        .round = round_extent(window),
+        .special_x = (int32_t)((uint32_t)TL_SPECIAL - (uint32_t)scene->mesh.sample_x_fx),
+        .second = is_back ? 2 : 1,
+        .third = is_back ? 1 : 2,
+        .last_vertex = vi_set1((int32_t)(scene->mesh.n_vertices - 1)),
+    };
+}
 
 #endif

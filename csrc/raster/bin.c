@@ -1,8 +1,8 @@
 /* Bin: which triangles reach into which bands of rows, so that a scene is set up once for many samples and bands.
  * In: vertex records and triangles.  Out: the triangles that can be seen, and the first and last band of each.
  *
- * A triangle is listed when a point within reach_fx of its extent, in x and in y, is a centre in the window: more than its samples
- * cover.  Bands are 2^band_bits rows tall. */
+ * A triangle is listed when a point within reach_fx of its extent, in x and in y, is a centre in the window: more than
+ * its samples cover.  Bands are 2^band_bits rows tall. */
 #ifndef TL_BIN_C
 #define TL_BIN_C
 
@@ -14,7 +14,6 @@
 #include "vertex/clip.c"
 #include "vertex/fixed.h"
 #include "raster/batch.c"
-#include "raster/raster.c"
 #include "raster/setup.c"
 
 typedef struct {
@@ -26,13 +25,14 @@ typedef struct {
 } bin_limits;
 
 /* Widens the rows [*row0, *row1) of the window by those that a triangle may reach. */
-static void widen_rows(const bin_limits *b, const tl_vertex_set *set, const int32_t *corners, int64_t *row0, int64_t *row1)
+static void widen_rows(const bin_limits *b, const tl_vertex_set *set, const int32_t *corners, int64_t *row0,
+                       int64_t *row1)
 {
     const tl_window *window = b->window;
     const int bits = window->subpixel_bits;
     tl_triangle t;
     const int sign = load_triangle(set, corners, &t);
-    if (sign == 0 || (sign > 0 && b->scene->cull == TL_CULL_BACK) || (sign < 0 && b->scene->cull == TL_CULL_FRONT))
+    if (is_culled(sign, b->scene->cull))
         return;
     const int64_t y0 = min3(t.y_fx[0], t.y_fx[1], t.y_fx[2]), y1 = max3(t.y_fx[0], t.y_fx[1], t.y_fx[2]);
     const int64_t first = max64(((y0 + b->low_fx) >> bits) - window->y_px, 0);
@@ -44,17 +44,10 @@ static void widen_rows(const bin_limits *b, const tl_vertex_set *set, const int3
 /* Triangle i, or its pieces, by itself. */
 static __attribute__((noinline)) void bin_alone(const bin_limits *b, int64_t i, tl_bins *bins)
 {
-    const tl_scene *scene = b->scene;
-    const tl_pieces *pieces = scene->pieces;
-    const int32_t *corners = scene->triangles + 3 * i;
+    const triangle_parts parts = parts_of(b->scene, i);
     int64_t row0 = b->window->height, row1 = 0;
-    if (!is_clipped(&scene->mesh, corners)) {
-        widen_rows(b, &scene->mesh, corners, &row0, &row1);
-    } else if (pieces) {
-        const tl_vertex_set set = piece_set(pieces, &scene->mesh);
-        for (int64_t k = first_piece(pieces, i); k < pieces->n_pieces && pieces->source[k] == i; k++)
-            widen_rows(b, &set, pieces->triangles + 3 * k, &row0, &row1);
-    }
+    for (int k = 0; k < parts.n; k++)
+        widen_rows(b, &parts.set, parts.corners + 3 * k, &row0, &row1);
     if (row0 >= row1)
         return;
     bins->ids[bins->n] = (int32_t)i;
@@ -75,7 +68,8 @@ TL_INLINE int bin_batch(const bin_limits *b, int64_t i, const int32_t *corners, 
         load_vertices(b->scene->mesh.vertices, corners + k, &c.x[k], &c.y[k], &c.z[k]);
     const vi x_min = vi_min(vi_min(c.x[0], c.x[1]), c.x[2]), x_max = vi_max(vi_max(c.x[0], c.x[1]), c.x[2]);
     const vi y_min = vi_min(vi_min(c.y[0], c.y[1]), c.y[2]), y_max = vi_max(vi_max(c.y[0], c.y[1]), c.y[2]);
-    vm alone = vm_or(vi_gt_unsigned(vi_sub(x_max, x_min), max_extent), vi_gt_unsigned(vi_sub(y_max, y_min), max_extent));
+    vm alone =
+        vm_or(vi_gt_unsigned(vi_sub(x_max, x_min), max_extent), vi_gt_unsigned(vi_sub(y_max, y_min), max_extent));
     alone = vm_and(live, vm_or(alone, vi_eq(x_min, vi_set1(TL_SPECIAL))));
     for (unsigned lanes = vm_bits(alone); lanes; lanes &= lanes - 1)
         bin_alone(b, i + __builtin_ctz(lanes), bins);
@@ -112,17 +106,17 @@ static int64_t bin(const tl_scene *scene, const tl_window *window, int32_t reach
         .right = (int32_t)min64(window->x_px + window->width, farthest),
         .bottom = (int32_t)min64(window->y_px + window->height, farthest),
     };
-    int32_t tail[3 * TL_LANES] = {0};
-    const int64_t n_whole = scene->n_triangles / TL_LANES * TL_LANES;
-    memcpy(tail, scene->triangles + 3 * n_whole, sizeof(int32_t) * 3 * (size_t)(scene->n_triangles - n_whole));
+    const tl_share all = {.end = scene->n_triangles};
+    int32_t tail[3 * TL_LANES];
     bins->n = 0;
     for (int64_t i = 0; i < scene->n_triangles; i += TL_LANES)
-        if (!bin_batch(&b, i, i < n_whole ? scene->triangles + 3 * i : tail, vm_first(scene->n_triangles - i), bins))
+        if (!bin_batch(&b, i, share_corners(scene, &all, i, tail), vm_first(scene->n_triangles - i), bins))
             return i;
     return -1;
 }
 
-/* Lists the triangles of each band, those of band k from starts[k] on to starts[k + 1]; with listed NULL only counts. */
+/* Lists the triangles of each band, those of band k from starts[k] on to starts[k + 1]; with listed NULL only
+ * counts. */
 static void list_bins(const tl_bins *bins, int64_t n_bands, int64_t *starts, int32_t *listed)
 {
     if (!listed) {

@@ -11,19 +11,30 @@
 #include "raster/setup.c"
 
 /* The sink that triangles are drawn, or counted, for. */
-TL_INLINE tl_sink sink_of(const tl_target *target, tl_sink sink) { return sink == TL_SINK_CENSUS ? target->census->sink : sink; }
+TL_INLINE tl_sink sink_of(const tl_target *target, tl_sink sink)
+{
+    return sink == TL_SINK_CENSUS ? target->census->sink : sink;
+}
+
+/* What follows is empty for all sinks but the census, so that the code that draws reads without it. */
 
 /* Triangles without positive area: of none, or turned away. */
-static inline void count_faceless(tl_census *census, vm m, vi area)
+TL_INLINE void count_faceless(const tl_target *target, tl_sink sink, vm m, vi area)
 {
+    if (sink != TL_SINK_CENSUS)
+        return;
+    tl_census *census = target->census;
     const vm is_flat = vm_and(m, vi_eq(area, vi_set1(0)));
     census->n[TL_CLASS_DEGENERATE] += __builtin_popcount(vm_bits(is_flat));
     census->n[TL_CLASS_CULLED] += __builtin_popcount(vm_bits(vm_and_not(m, is_flat)));
 }
 
 /* Triangles with an empty box; side: the lesser one of the box before the window cut it. */
-static inline void count_unseen(tl_census *census, vm m, vi side)
+TL_INLINE void count_unseen(const tl_target *target, tl_sink sink, vm m, vi side)
 {
+    if (sink != TL_SINK_CENSUS)
+        return;
+    tl_census *census = target->census;
     const vm is_outside = vm_and(m, vi_gt(side, vi_set1(0)));
     census->n[TL_CLASS_OUTSIDE] += __builtin_popcount(vm_bits(is_outside));
     census->n[TL_CLASS_BETWEEN] += __builtin_popcount(vm_bits(vm_and_not(m, is_outside)));
@@ -49,15 +60,25 @@ static void count_boxes(tl_census *census, const vm *classes, vi n_cols, vi n_ro
         }
 }
 
-/* A triangle that clip_box leaves nothing of. */
-static inline void count_unseen_one(tl_census *census, const tl_triangle *t, const tl_window *window)
+/* A triangle of no area, or turned away. */
+TL_INLINE void count_faceless_one(const tl_target *target, tl_sink sink, int sign)
 {
+    if (sink == TL_SINK_CENSUS)
+        target->census->n[sign ? TL_CLASS_CULLED : TL_CLASS_DEGENERATE]++;
+}
+
+/* A triangle that clip_box leaves nothing of. */
+TL_INLINE void count_unseen_one(const tl_target *target, tl_sink sink, const tl_triangle *t, const tl_window *window)
+{
+    if (sink != TL_SINK_CENSUS)
+        return;
     const extent_rounding round = round_extent(window);
     const int64_t x0 = min3(t->x_fx[0], t->x_fx[1], t->x_fx[2]), x1 = max3(t->x_fx[0], t->x_fx[1], t->x_fx[2]);
     const int64_t y0 = min3(t->y_fx[0], t->y_fx[1], t->y_fx[2]), y1 = max3(t->y_fx[0], t->y_fx[1], t->y_fx[2]);
     const int bits = window->subpixel_bits;
-    const int is_empty = (x0 + round.first) >> bits >= (x1 + round.end) >> bits || (y0 + round.first) >> bits >= (y1 + round.end) >> bits;
-    census->n[is_empty ? TL_CLASS_BETWEEN : TL_CLASS_OUTSIDE]++;
+    const int is_empty = (x0 + round.first) >> bits >= (x1 + round.end) >> bits ||
+                         (y0 + round.first) >> bits >= (y1 + round.end) >> bits;
+    target->census->n[is_empty ? TL_CLASS_BETWEEN : TL_CLASS_OUTSIDE]++;
 }
 
 static inline void count_one(tl_census *census, tl_class walker, const tl_triangle *t, int bits)

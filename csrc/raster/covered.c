@@ -1,9 +1,10 @@
 /* Coverage while it is drawn, a bit a sample, and what the picture holds of it at the end.
- * In: samples as they are drawn.  Out: a byte of 0 or 1 each; or, of 2 to 16 samples a pixel, the covered share, float32.
+ * In: samples as they are drawn.  Out: a byte of 0 or 1 each; or, of 2 to 16 samples a pixel, the covered share,
+ * float32.
  *
- * An eighth of the memory stays in a nearer cache while triangles are drawn over one another, and the bytes are written once
- * instead of being cleared first.  Bits lie in the order of the pixels, row * stride_px + column, those of a pixel side by side in
- * the order of its samples: bit (pixel << sample_bits) + sample. */
+ * An eighth of the memory stays in a nearer cache while triangles are drawn over one another, and the bytes are written
+ * once instead of being cleared first.  Bits lie in the order of the pixels, row * stride_px + column, those of a pixel
+ * side by side in the order of its samples: bit (pixel << sample_bits) + sample. */
 #ifndef TL_COVERED_C
 #define TL_COVERED_C
 
@@ -51,15 +52,16 @@ TL_INLINE int64_t even_words(const uint64_t *words, int64_t n)
     int64_t k = 0;
     if (value + 1 > 1)
         return 0;
-    while (k + 4 <= n && !((words[k] ^ value) | (words[k + 1] ^ value) | (words[k + 2] ^ value) | (words[k + 3] ^ value)))
+    while (k + 4 <= n &&
+           !((words[k] ^ value) | (words[k + 1] ^ value) | (words[k + 2] ^ value) | (words[k + 3] ^ value)))
         k += 4;
     while (k < n && words[k] == value)
         k++;
     return k;
 }
 
-/* The bytes of the samples [at, at + n).  Long runs of one value are left to `memset`: an empty frame of 8 MB takes 0.15 ms
- * instead of 0.19. */
+/* The bytes of the samples [at, at + n).  Long runs of one value are left to `memset`: an empty frame of 8 MB takes
+ * 0.15 ms instead of 0.19. */
 static void expand_span(const tl_target *target, int64_t at, int64_t n)
 {
     uint8_t *const pixels = target->pixels;
@@ -95,7 +97,8 @@ static void expand_covered(const tl_window *window, const tl_target *target)
 /* Every 2^sample_bits-th bit, from the first. */
 TL_INLINE uint64_t sample_pattern(int sample_bits)
 {
-    static const uint64_t patterns[5] = {~0ull, 0x5555555555555555u, 0x1111111111111111u, 0x0101010101010101u, 0x0001000100010001u};
+    static const uint64_t patterns[5] = {~0ull, 0x5555555555555555u, 0x1111111111111111u, 0x0101010101010101u,
+                                         0x0001000100010001u};
     return patterns[sample_bits];
 }
 

@@ -1,12 +1,12 @@
 /* Peel: the nearest layers of every pixel, in one pass.
  * In: covered samples with depth and id, in any order.  Out: planes of ids and depths, sorted by depth, then id.
  *
- * Depth peeling draws the scene once a layer, each time what lies behind the layer before.  Here a sample goes through the planes
- * from the first to the last: where it comes before what is there it takes the place, and what was there goes on, until an
- * empty place ends it.  Neighbours on a surface do so together, a vector of them.
+ * Depth peeling draws the scene once a layer, each time what lies behind the layer before.  Here a sample goes through
+ * the planes from the first to the last: where it comes before what is there it takes the place, and what was there
+ * goes on, until an empty place ends it.  Neighbours on a surface do so together, a vector of them.
  *
- * Based on: C. Everitt, Interactive Order-Independent Transparency, 2001 (depth peeling); L. Carpenter, The A-buffer, 1984 (the
- * fragments of a pixel in a list). */
+ * Based on: C. Everitt, Interactive Order-Independent Transparency, 2001 (depth peeling); L. Carpenter, The A-buffer,
+ * 1984 (the fragments of a pixel in a list). */
 #ifndef TL_PEEL_C
 #define TL_PEEL_C
 

@@ -2,9 +2,10 @@
  * In: the queue of batch.c.  Out: rows of samples to the sink.
  *
  * An edge ends a row at floor(v / d), v = E' at the row's first sample, d = |dy|.  It is computed in float32 as
- * floor((v + 0.5) * (1 / d)), exactly: v + 0.5 has at most 22 bits; with |v / d| < 64 the two roundings err by less than
- * 64 * 2^-22 = 2^-16, while (v + 0.5) / d is at least 0.5 / d > 2^-15 from an integer.  Farther out the clamp to the box
- * swallows the error.  Squares (batch.c): 60 pixels of 2^8 make |v| < 2^22, which float32 still holds exactly, half included. */
+ * floor((v + 0.5) * (1 / d)), exactly: v + 0.5 has at most 22 bits; with |v / d| < 64 the two roundings err by less
+ * than 64 * 2^-22 = 2^-16, while (v + 0.5) / d is at least 0.5 / d > 2^-15 from an integer.  Farther out the clamp to
+ * the box swallows the error.  Squares (batch.c): 60 pixels of 2^8 make |v| < 2^22, which float32 still holds exactly,
+ * half included. */
 #ifndef TL_ROWS_C
 #define TL_ROWS_C
 
@@ -18,8 +19,8 @@
 #include "raster/hooks.h"
 #include "raster/sink.c"
 
-/* Which edge of TL_LANES triangles is the first on the left, the first on the right, and the third one, which is on either side or
- * horizontal: edge 0 or 1 by is0 and is1 of that place, else edge 2. */
+/* Which edge of TL_LANES triangles is the first on the left, the first on the right, and the third one, which is on
+ * either side or horizontal: edge 0 or 1 by is0 and is1 of that place, else edge 2. */
 typedef struct {
     vm is0[3], is1[3];
     vm third_is_left, third_is_right;
@@ -65,7 +66,8 @@ TL_INLINE void sort_edges(const lane_triangles *t, lane_edges *r)
         start[k] = vf_add(vf_from_vi(t->e[k]), vf_set1(0.5f));
         step[k] = vf_from_vi(t->dx[k]);
         /* a horizontal edge is never asked: 1 keeps infinities away */
-        inverse[k] = vf_div(vf_set1(1.0f), vf_from_vi(vi_max(vi_max(t->dy[k], vi_sub(vi_set1(0), t->dy[k])), vi_set1(1))));
+        inverse[k] =
+            vf_div(vf_set1(1.0f), vf_from_vi(vi_max(vi_max(t->dy[k], vi_sub(vi_set1(0), t->dy[k])), vi_set1(1))));
     }
     for (int side = 0; side < 3; side++) {
         const vm is0 = sides.is0[side], is1 = sides.is1[side];
@@ -97,15 +99,16 @@ TL_INLINE vi row_quotients(const row_edges *r, int side, int i, vf rows)
 }
 
 /* Rows of a block of at most TL_LANES columns; the depth of a sample is the sum of its row's and its column's. */
-TL_INLINE void draw_block(const tl_target *target, tl_sink sink, const int32_t *bits, const double *z_row, int stride_of_rows, int64_t at,
-                          int n_rows, int is_half, vd z_col, int32_t id)
+TL_INLINE void draw_block(const tl_target *target, tl_sink sink, const int32_t *bits, const double *z_row,
+                          int stride_of_rows, int64_t at, int n_rows, int is_half, vd z_col, int32_t id)
 {
     const int64_t stride = target->stride_px;
     (void)is_half;
 #if TL_HALF_LANES
     if (is_half && sink_has_depth(sink) && sink != TL_SINK_PEEL) {
         for (int row = 0; row < n_rows; row++, at += stride)
-            put_depths_half(target, sink, at, (hm)bits[row * stride_of_rows], hf_sum_depth(z_row[row * stride_of_rows], hd_lower(z_col)), hi_lower(vi_set1(id)));
+            put_depths_half(target, sink, at, (hm)bits[row * stride_of_rows],
+                            hf_sum_depth(z_row[row * stride_of_rows], hd_lower(z_col)), hi_lower(vi_set1(id)));
         return;
     }
 #endif
@@ -122,7 +125,8 @@ TL_INLINE void draw_block(const tl_target *target, tl_sink sink, const int32_t *
 }
 
 /* One triangle of the queue, in blocks of TL_LANES x TL_LANES samples. */
-TL_INLINE void draw_rows(batch_state *s, tl_sink sink, const row_edges *r, int i, int32_t sample, int32_t size, int32_t id)
+TL_INLINE void draw_rows(batch_state *s, tl_sink sink, const row_edges *r, int i, int32_t sample, int32_t size,
+                         int32_t id)
 {
     const tl_target own = *s->target, *target = &own; /* a copy that no store can change */
     const double unit2 = (double)(2 << s->window->subpixel_bits);
@@ -158,9 +162,25 @@ TL_INLINE void draw_rows(batch_state *s, tl_sink sink, const row_edges *r, int i
             if (sink_has_depth(sink))
                 z_col = vd_mul(vd_set1(r->slope_x[i]), vd_add(vd_set1(r->x[i] + col0 * unit2), steps));
             vi_store(bits, in_block);
-            draw_block(target, sink, bits + begin, z_row + begin, 1, at + col0 + begin * target->stride_px, n, width <= TL_HALF_LANES, z_col, id);
+            draw_block(target, sink, bits + begin, z_row + begin, 1, at + col0 + begin * target->stride_px, n,
+                       width <= TL_HALF_LANES, z_col, id);
         }
     }
+}
+
+/* The samples from `begin` on, up to `end`, of the row of each triangle that its edges are at; goes on to the next
+ * row. */
+TL_INLINE void next_row(lane_edges *e, vi n_cols, vi *begin, vi *end)
+{
+    const vi zero = vi_set1(0), one = vi_set1(1);
+    vi quotient[3];
+    for (int side = 0; side < 3; side++) {
+        quotient[side] = vi_floor(vf_mul(e->start[side], e->inverse[side]));
+        e->start[side] = vf_add(e->start[side], e->step[side]);
+    }
+    const vi left = vi_select(e->third_is_left, vi_min(quotient[0], quotient[2]), quotient[0]);
+    const vi right = vi_select(e->third_is_right, vi_min(quotient[1], quotient[2]), quotient[1]);
+    *begin = vi_max(vi_sub(zero, left), zero), *end = vi_min(vi_add(right, one), n_cols);
 }
 
 /* The rows of TL_LANES triangles: of each its covered samples, a bit each, and its depth at column 0. */
@@ -169,9 +189,10 @@ typedef struct {
     double z[TL_MIDDLE_BOX][TL_MAX_LANES];
 } middle_rows;
 
-TL_INLINE void setup_middle(tl_sink sink, const lane_triangles *t, const lane_planes *p, vi n_cols, int n_rows, double unit2, middle_rows *m)
+TL_INLINE void setup_middle(tl_sink sink, const lane_triangles *t, const lane_planes *p, vi n_cols, int n_rows,
+                            double unit2, middle_rows *m)
 {
-    const vi zero = vi_set1(0), one = vi_set1(1);
+    const vi zero = vi_set1(0);
     const vd step = vd_set1(unit2);
     lane_edges e;
     sort_edges(t, &e);
@@ -179,15 +200,9 @@ TL_INLINE void setup_middle(tl_sink sink, const lane_triangles *t, const lane_pl
     if (sink_has_depth(sink))
         y = p->y;
     for (int row = 0; row < n_rows; row++) {
-        vi quotient[3];
-        for (int side = 0; side < 3; side++) {
-            quotient[side] = vi_floor(vf_mul(e.start[side], e.inverse[side]));
-            e.start[side] = vf_add(e.start[side], e.step[side]);
-        }
-        const vi left = vi_select(e.third_is_left, vi_min(quotient[0], quotient[2]), quotient[0]);
-        const vi right = vi_select(e.third_is_right, vi_min(quotient[1], quotient[2]), quotient[1]);
-        const vi begin = vi_max(vi_sub(zero, left), zero), end = vi_max(vi_min(vi_add(right, one), n_cols), zero);
-        vi_store(m->bits[row], vi_bit_ranges(begin, end));
+        vi begin, end;
+        next_row(&e, n_cols, &begin, &end);
+        vi_store(m->bits[row], vi_bit_ranges(begin, vi_max(end, zero)));
         if (sink_has_depth(sink)) {
             vd_store(m->z[row], vd_add(p->z0, vd_mul(p->slope_y, y)));
             y = vd_add(y, step);
@@ -230,8 +245,8 @@ TL_INLINE void flush_middle(batch_state *s, tl_sink sink)
             vd z_cols;
             if (sink_has_depth(sink))
                 z_cols = vd_mul(vd_set1(slope_x[k]), vd_add(vd_set1(x[k]), ramp(unit2)));
-            draw_block(&target, sink, &m.bits[0][k], &m.z[0][k], TL_MAX_LANES, (uint32_t)sample[k], size >> 16, (size & 0xffff) <= TL_HALF_LANES,
-                       z_cols, name_of(s->scene, q->id[i + k]));
+            draw_block(&target, sink, &m.bits[0][k], &m.z[0][k], TL_MAX_LANES, (uint32_t)sample[k], size >> 16,
+                       (size & 0xffff) <= TL_HALF_LANES, z_cols, name_of(s->scene, q->id[i + k]));
         }
     }
 }

@@ -1,9 +1,9 @@
 /* Sampled: triangles in lanes, tested at all samples of a pixel at once.
  * In: triangles and queues of batch.c, in boxes that hold every pixel with a covered sample.  Out: bits of samples.
  *
- * A sample moves an edge function by 2 (dx * y - dy * x), from the centre, and nothing else: load, cull, setup and queues are
- * shared.  Ranges are those of squares (batch.c).  A box is up to a pixel too large, so where row ends decide, a horizontal edge
- * is tested. */
+ * A sample moves an edge function by 2 (dx * y - dy * x), from the centre, and nothing else: load, cull, setup and
+ * queues are shared.  Ranges are those of squares (batch.c).  A box is up to a pixel too large, so where row ends
+ * decide, a horizontal edge is tested. */
 #ifndef TL_SAMPLED_C
 #define TL_SAMPLED_C
 
@@ -46,18 +46,21 @@ TL_INLINE void draw_box_of_samples(batch_state *s, const lane_triangles *t, vm l
                 e[k] = vi_add(t->e[k], vi_shift_left(moved, bits + 1));
             }
             for (int i = 0; i < n_samples; i++) {
-                const vi all = vi_or(vi_or(vi_add(e[0], shift[i][0]), vi_add(e[1], shift[i][1])), vi_add(e[2], shift[i][2]));
+                const vi all =
+                    vi_or(vi_or(vi_add(e[0], shift[i][0]), vi_add(e[1], shift[i][1])), vi_add(e[2], shift[i][2]));
                 samples = vi_or(samples, vi_select(vi_gt(all, minus_one), vi_set1(1 << i), zero));
             }
             const vm in = vm_and(in_box, vi_gt(samples, zero));
             if (vm_any(in))
-                n = emit(&s->fragments, n, TL_SINK_SAMPLES, in, vi_add(t->sample, vi_set1(row * stride + col)), samples, vf_set1(0.0f));
+                n = emit(&s->fragments, n, TL_SINK_SAMPLES, in, vi_add(t->sample, vi_set1(row * stride + col)), samples,
+                         vf_set1(0.0f));
             n = make_room(s, n, TL_SINK_SAMPLES);
         }
     s->fragments.n = n;
 }
 
-static __attribute__((noinline)) void draw_tiny_of_samples(batch_state *s, const lane_triangles *t, vm live, vi n_cols, vi n_rows)
+static __attribute__((noinline)) void draw_tiny_of_samples(batch_state *s, const lane_triangles *t, vm live, vi n_cols,
+                                                           vi n_rows)
 {
     draw_box_of_samples(s, t, live, n_cols, n_rows, 2);
 }
@@ -72,7 +75,8 @@ static __attribute__((noinline)) void flush_small_of_samples(batch_state *s)
         vd z[3];
         pop(s, TL_SINK_SAMPLES, q, i, n, &t, z);
         const vi size = vi_load(q->size + i);
-        draw_box_of_samples(s, &t, vm_first(n - i), vi_and(size, vi_set1(0xffff)), vi_shift_right(size, 16), TL_SMALL_BOX);
+        draw_box_of_samples(s, &t, vm_first(n - i), vi_and(size, vi_set1(0xffff)), vi_shift_right(size, 16),
+                            TL_SMALL_BOX);
     }
 }
 
@@ -109,7 +113,8 @@ typedef struct {
     vi begin, end;
 } lane_span;
 
-TL_INLINE lane_span sampled_span(const vf *v, const vf *inverse, vm third_is_left, vm third_is_right, vi n_cols, int sample_bits)
+TL_INLINE lane_span sampled_span(const vf *v, const vf *inverse, vm third_is_left, vm third_is_right, vi n_cols,
+                                 int sample_bits)
 {
     const vi zero = vi_set1(0), minus_one = vi_set1(-1);
     vi quotient[3];
@@ -119,7 +124,8 @@ TL_INLINE lane_span sampled_span(const vf *v, const vf *inverse, vm third_is_lef
     const vi right = vi_select(third_is_right, vi_min(quotient[1], quotient[2]), quotient[1]);
     const vm beyond_flat = vm_and_not(vm_and_not(vi_gt(zero, quotient[2]), third_is_left), third_is_right);
     const vi end = vi_min(vi_sub(right, minus_one), n_cols);
-    const vi begin = vi_min(vi_max(vi_sub(zero, left), zero), n_cols), stop = vi_select(beyond_flat, zero, vi_max(end, zero));
+    const vi begin = vi_min(vi_max(vi_sub(zero, left), zero), n_cols);
+    const vi stop = vi_select(beyond_flat, zero, vi_max(end, zero));
     return (lane_span){vi_shift_left(begin, sample_bits), vi_shift_left(stop, sample_bits)};
 }
 
@@ -160,10 +166,12 @@ static __attribute__((noinline)) void flush_middle_of_samples(batch_state *s)
             for (int side = 0; side < 3; side++)
                 v[side] = sampled_start(&e, side, target.samples_fx + 2 * sample, bits);
             for (int row = 0; row < max_rows; row++) {
-                const lane_span span = sampled_span(v, e.inverse, e.sides.third_is_left, e.sides.third_is_right, n_cols, sample_bits);
+                const lane_span span =
+                    sampled_span(v, e.inverse, e.sides.third_is_left, e.sides.third_is_right, n_cols, sample_bits);
                 for (int word = 0; word < n_words; word++) {
                     uint64_t *const at = words[row][word];
-                    vw_store(at, add_span(sample ? vw_load(at) : vw_zero(), span, word * per_word, sample_bits, pattern));
+                    vw_store(at,
+                             add_span(sample ? vw_load(at) : vw_zero(), span, word * per_word, sample_bits, pattern));
                 }
                 for (int side = 0; side < 3; side++)
                     v[side] = vf_add(v[side], e.step[side]);
@@ -181,11 +189,12 @@ static __attribute__((noinline)) void flush_middle_of_samples(batch_state *s)
 }
 
 /* One triangle of the queue, TL_LANES rows at a time: the spans of all its samples, then a word after the other. */
-TL_INLINE void draw_sampled_rows(const tl_target *target, const float (*starts)[3][TL_MAX_LANES], const float (*steps)[TL_MAX_LANES],
-                                 const float (*inverses)[TL_MAX_LANES], int k, vm third_is_left, vm third_is_right, int32_t first,
-                                 int32_t size)
+TL_INLINE void draw_sampled_rows(const tl_target *target, const float (*starts)[3][TL_MAX_LANES],
+                                 const float (*steps)[TL_MAX_LANES], const float (*inverses)[TL_MAX_LANES], int k,
+                                 vm third_is_left, vm third_is_right, int32_t first, int32_t size)
 {
-    const int sample_bits = target->sample_bits, per_word = 64 >> sample_bits, n_cols = size & 0xffff, n_rows = size >> 16;
+    const int sample_bits = target->sample_bits, per_word = 64 >> sample_bits, n_cols = size & 0xffff;
+    const int n_rows = size >> 16;
     const vf inverse[3] = {vf_set1(inverses[0][k]), vf_set1(inverses[1][k]), vf_set1(inverses[2][k])};
     lane_span spans[TL_MAX_SAMPLES];
     uint64_t words[TL_MAX_LANES];
@@ -236,8 +245,10 @@ static __attribute__((noinline)) void flush_rows_of_samples(batch_state *s)
         const unsigned lefts = vm_bits(e.sides.third_is_left), rights = vm_bits(e.sides.third_is_right);
         const int end = n - i < TL_LANES ? n - i : TL_LANES;
         for (int k = 0; k < end; k++) {
-            const vm third_is_left = vm_first(lefts >> k & 1 ? TL_LANES : 0), third_is_right = vm_first(rights >> k & 1 ? TL_LANES : 0);
-            draw_sampled_rows(&target, starts, steps, inverses, k, third_is_left, third_is_right, first[k], q->size[i + k]);
+            const vm third_is_left = vm_first(lefts >> k & 1 ? TL_LANES : 0);
+            const vm third_is_right = vm_first(rights >> k & 1 ? TL_LANES : 0);
+            draw_sampled_rows(&target, starts, steps, inverses, k, third_is_left, third_is_right, first[k],
+                              q->size[i + k]);
         }
     }
 }

@@ -1,9 +1,9 @@
 /* Sampled alone: one triangle by itself, at all samples of a pixel.
  * In: vertex records.  Out: bits of samples.
  *
- * The rows of a large triangle are the same for all samples but for their ends: the pixels between these are stored as whole
- * words, and two words at each end are put together from the spans of the samples, a vector of rows at a time.  Rows whose ends
- * are more than two words wide, or that some samples miss, are put together word by word. */
+ * The rows of a large triangle are the same for all samples but for their ends: the pixels between these are stored as
+ * whole words, and two words at each end are put together from the spans of the samples, a vector of rows at a time.
+ * Rows whose ends are more than two words wide, or that some samples miss, are put together word by word. */
 #ifndef TL_SAMPLED_ALONE_C
 #define TL_SAMPLED_ALONE_C
 
@@ -17,8 +17,10 @@
 #include "raster/covered.c"
 #include "raster/setup.c"
 
-/* Marks the spans of all samples in a row, in the words that hold the pixels [from, to); `at` is the pixel of column 0. */
-TL_INLINE void cover_ends(const tl_target *target, int64_t at, int64_t from, int64_t to, const int32_t *first, const int32_t *end)
+/* Marks the spans of all samples in a row, in the words that hold the pixels [from, to); `at` is the pixel of column
+ * 0. */
+TL_INLINE void cover_ends(const tl_target *target, int64_t at, int64_t from, int64_t to, const int32_t *first,
+                          const int32_t *end)
 {
     const int sample_bits = target->sample_bits;
     const int64_t per_word = 64 >> sample_bits;
@@ -26,7 +28,8 @@ TL_INLINE void cover_ends(const tl_target *target, int64_t at, int64_t from, int
         const int64_t col = word * per_word - at;
         uint64_t bits = 0;
         for (int sample = 0; sample < 1 << sample_bits; sample++) {
-            const int64_t begin = max64(first[sample] - col, 0) << sample_bits, stop = min64(end[sample] - col, per_word) << sample_bits;
+            const int64_t begin = max64(first[sample] - col, 0) << sample_bits;
+            const int64_t stop = max64(min64(end[sample] - col, per_word), 0) << sample_bits;
             if (begin < stop)
                 bits |= (~0ull << begin & ~0ull >> (64 - stop) & sample_pattern(sample_bits)) << sample;
         }
@@ -64,8 +67,8 @@ typedef struct {
 } sampled_triangle;
 
 /* Returns whether the triangle's row ends fit float64. */
-static int setup_sampled_triangle(const tl_scene *scene, const int32_t *corners, const tl_window *window, const tl_target *target,
-                                     sampled_triangle *s)
+static int setup_sampled_triangle(const tl_scene *scene, const int32_t *corners, const tl_window *window,
+                                  const tl_target *target, sampled_triangle *s)
 {
     const int n_samples = 1 << target->sample_bits;
     tl_vertex_set seen = scene->mesh;
@@ -76,7 +79,7 @@ static int setup_sampled_triangle(const tl_scene *scene, const int32_t *corners,
         const int sign = load_triangle(&seen, corners, t);
         if (!rows_fit(t, window, 1))
             return 0;
-        if (sign == 0 || (sign > 0 && scene->cull == TL_CULL_BACK) || (sign < 0 && scene->cull == TL_CULL_FRONT))
+        if (is_culled(sign, scene->cull))
             return 1;
         if (!clip_box(t, window)) {
             t->row0 = t->row1 = 0;
@@ -103,7 +106,8 @@ static void find_sampled_ends(const sampled_triangle *s, int n_samples, int64_t 
     for (int k = 0; k < n_samples; k++) {
         const tl_triangle *t = &s->t[k];
         if (t->row0 < t->row1)
-            find_row_ends(&s->e[k], rows, (double)(t->col0 - s->col0), (double)(t->col1 - s->col0), ends->first[k], ends->end[k]);
+            find_row_ends(&s->e[k], rows, (double)(t->col0 - s->col0), (double)(t->col1 - s->col0), ends->first[k],
+                          ends->end[k]);
         for (int lane = 0; lane < TL_LANES; lane++)
             if (row + lane < t->row0 || row + lane >= t->row1)
                 ends->first[k][lane] = ends->end[k][lane] = 0;
@@ -129,10 +133,13 @@ TL_INLINE unsigned find_words(const sampled_ends *ends, int sample_bits, vi skip
         inner_end = vi_min(inner_end, end), most = vi_max(most, end);
         fits = vm_and(fits, vi_gt(end, first));
     }
-    const vi left = vi_shift_right(vi_add(least, skip), word_shift), right = vi_shift_right(vi_add(inner_end, skip), word_shift);
-    const vi from_left = vi_sub(skip, vi_shift_left(left, word_shift)), from_right = vi_sub(skip, vi_shift_left(right, word_shift));
+    const vi left = vi_shift_right(vi_add(least, skip), word_shift);
+    const vi right = vi_shift_right(vi_add(inner_end, skip), word_shift);
+    const vi from_left = vi_sub(skip, vi_shift_left(left, word_shift));
+    const vi from_right = vi_sub(skip, vi_shift_left(right, word_shift));
     const vi two_words = vi_add(per_word, per_word);
-    fits = vm_and_not(fits, vm_or(vi_gt(vi_add(inner, from_left), two_words), vi_gt(vi_add(most, from_right), two_words)));
+    fits =
+        vm_and_not(fits, vm_or(vi_gt(vi_add(inner, from_left), two_words), vi_gt(vi_add(most, from_right), two_words)));
     vi_store(w->left, left);
     vi_store(w->right, right);
     for (int k = 0; k < 4; k++) {
@@ -143,7 +150,8 @@ TL_INLINE unsigned find_words(const sampled_ends *ends, int sample_bits, vi skip
         for (int sample = 0; sample < 1 << sample_bits; sample++) {
             const vi begin = vi_max(vi_add(vi_load(ends->first[sample]), from), zero);
             const vi stop = vi_max(vi_add(vi_load(ends->end[sample]), from), zero);
-            words = vw_add_range(words, vi_shift_left(begin, sample_bits), vi_shift_left(stop, sample_bits), sample_pattern(sample_bits) << sample);
+            words = vw_add_range(words, vi_shift_left(begin, sample_bits), vi_shift_left(stop, sample_bits),
+                                 sample_pattern(sample_bits) << sample);
         }
         vw_store(k < 2 ? w->left_words[k] : w->right_words[k - 2], words);
     }
@@ -165,7 +173,9 @@ TL_INLINE void cover_rows(const tl_target *target, int64_t at, int n, const samp
             cover_row(target, at, first, end);
             continue;
         }
-        uint64_t *const left = target->covered + at / per_word + w.left[lane], *const right = target->covered + at / per_word + w.right[lane];
+        uint64_t *const left = target->covered + at / per_word + w.left[lane], *const right = target->covered +
+                                                                                              at / per_word +
+                                                                                              w.right[lane];
         left[0] |= w.left_words[0][lane];
         left[1] |= w.left_words[1][lane];
         for (uint64_t *word = left + 2; word < right; word++)
@@ -198,12 +208,14 @@ static int walk_samples(const tl_scene *scene, const int32_t *corners, const tl_
 }
 
 /* Triangle i by itself. */
-static __attribute__((noinline)) void draw_alone_each_sample(const tl_scene *scene, int64_t i, const tl_window *window, const tl_target *target)
+static __attribute__((noinline)) void draw_alone_each_sample(const tl_scene *scene, int64_t i, const tl_window *window,
+                                                             const tl_target *target)
 {
     const int32_t *corners = scene->triangles + 3 * i;
     tl_scene seen = *scene;
     tl_target one = *target;
-    if (scene->method == TL_METHOD_AUTO && !is_clipped(&scene->mesh, corners) && walk_samples(scene, corners, window, target))
+    if (scene->method == TL_METHOD_AUTO && !is_clipped(&scene->mesh, corners) &&
+        walk_samples(scene, corners, window, target))
         return;
     for (one.sample = 0; one.sample < 1 << target->sample_bits; one.sample++) {
         seen.mesh.sample_x_fx = target->samples_fx[2 * one.sample];

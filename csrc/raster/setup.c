@@ -13,7 +13,7 @@
 typedef struct {
     int64_t x_fx[3], y_fx[3];
     double z[3];
-    int32_t corner[3];              /* vertex indices, in the same order */
+    int32_t corner[3]; /* vertex indices, in the same order */
     int32_t id;
     int is_narrow;                  /* every |x_fx| < 2^30: edge functions fit 64 bits */
     int64_t col0, col1, row0, row1; /* half-open box of samples, relative to the window */
@@ -31,7 +31,8 @@ typedef struct {
     int32_t first, end;
 } extent_rounding;
 
-/* The centres at or right of low and left of high; the squares that the extent meets in more than a line; those inside it. */
+/* The centres at or right of low and left of high; the squares that the extent meets in more than a line; those inside
+ * it. */
 static inline extent_rounding round_extent(const tl_window *window)
 {
     const int32_t unit = (int32_t)1 << window->subpixel_bits, half = unit > 1 ? unit / 2 - 1 : 0;
@@ -98,8 +99,14 @@ static inline int load_triangle(const tl_vertex_set *set, const int32_t *corners
     return sign;
 }
 
-/* The box of pixels in the triangle's extent and the window.  Half-open on the right and at the bottom: no centre exactly at
- * the largest x or y can be covered under the top-left rule.  Returns whether any is left. */
+/* Whether a triangle whose area had a sign is not drawn. */
+static inline int is_culled(int sign, tl_cull cull)
+{
+    return sign == 0 || (sign > 0 && cull == TL_CULL_BACK) || (sign < 0 && cull == TL_CULL_FRONT);
+}
+
+/* The box of pixels in the triangle's extent and the window.  Half-open on the right and at the bottom: no centre
+ * exactly at the largest x or y can be covered under the top-left rule.  Returns whether any is left. */
 static inline int clip_box(tl_triangle *t, const tl_window *window)
 {
     const int bits = window->subpixel_bits;
@@ -140,14 +147,18 @@ static inline void setup_weights(tl_triangle *t, const tl_window *window)
     const int bits = window->subpixel_bits;
     const int64_t x_px = t->col0 + window->x_px, y_px = t->row0 + window->y_px;
     const double step = (double)((int64_t)2 << bits);
-    const double width = (double)max3(t->x_fx[0], t->x_fx[1], t->x_fx[2]) - (double)min3(t->x_fx[0], t->x_fx[1], t->x_fx[2]);
-    const double height = (double)max3(t->y_fx[0], t->y_fx[1], t->y_fx[2]) - (double)min3(t->y_fx[0], t->y_fx[1], t->y_fx[2]);
+    const double width =
+        (double)max3(t->x_fx[0], t->x_fx[1], t->x_fx[2]) - (double)min3(t->x_fx[0], t->x_fx[1], t->x_fx[2]);
+    const double height =
+        (double)max3(t->y_fx[0], t->y_fx[1], t->y_fx[2]) - (double)min3(t->y_fx[0], t->y_fx[1], t->y_fx[2]);
     t->weights_exact = 2.0 * width * height < 0x1p52; /* |2E| <= 2 * width * height */
     t->w_sum = (double)weight_sum(t);
     t->w1 = (double)doubled_edge(t, 2, 0, x_px, y_px, bits);
     t->w2 = (double)doubled_edge(t, 0, 1, x_px, y_px, bits);
-    t->w1_col = -step * ((double)t->y_fx[0] - (double)t->y_fx[2]), t->w1_row = step * ((double)t->x_fx[0] - (double)t->x_fx[2]);
-    t->w2_col = -step * ((double)t->y_fx[1] - (double)t->y_fx[0]), t->w2_row = step * ((double)t->x_fx[1] - (double)t->x_fx[0]);
+    t->w1_col = -step * ((double)t->y_fx[0] - (double)t->y_fx[2]),
+    t->w1_row = step * ((double)t->x_fx[0] - (double)t->x_fx[2]);
+    t->w2_col = -step * ((double)t->y_fx[1] - (double)t->y_fx[0]),
+    t->w2_row = step * ((double)t->x_fx[1] - (double)t->x_fx[0]);
 }
 
 /* The weights of corners 1 and 2, as parts of w_sum, for n samples of a row: correctly rounded integers. */
@@ -155,7 +166,8 @@ static inline void weights_at(const tl_triangle *t, const tl_window *window, int
                               double *restrict w1, double *restrict w2)
 {
     if (t->weights_exact) {
-        const double row1 = t->w1 + (double)(row - t->row0) * t->w1_row, row2 = t->w2 + (double)(row - t->row0) * t->w2_row;
+        const double row1 = t->w1 + (double)(row - t->row0) * t->w1_row;
+        const double row2 = t->w2 + (double)(row - t->row0) * t->w2_row;
         const int first = (int)(col - t->col0);
         for (int k = 0; k < n; k++) {
             w1[k] = row1 + (double)(first + k) * t->w1_col;

@@ -1,7 +1,7 @@
 /* Sinks: what covered samples do to the buffers.  The walkers know nothing of what is drawn.
  * In: lanes, spans or lists of samples.  Out: mask, counts, bits of samples, or ids with depth.
- * Every sink gives the same picture in whatever order triangles come: ids decide ties.  `sink` is always a constant, so that
- * each copy of the code keeps one case. */
+ * Every sink gives the same picture in whatever order triangles come: ids decide ties.  `sink` is always a constant, so
+ * that each copy of the code keeps one case. */
 #ifndef TL_SINK_C
 #define TL_SINK_C
 
@@ -20,28 +20,31 @@
 #define TL_CHUNK 64
 
 /* A copy of a function for each sink, so that inner loops know what they draw, and a call of the right one.
- * Such a function takes the sink last: TL_SINK_COPIES(f, (declared parameters), parameters ...), TL_SINK_CALL(f, sink, ...). */
+ * Such a function takes the sink last: TL_SINK_COPIES(f, (declared parameters), parameters ...), TL_SINK_CALL(f, sink,
+ * ...). */
 #define TL_SINK_COPY(f, name, sink, declared, ...) \
     static __attribute__((noinline)) void f##_##name declared { f(__VA_ARGS__, sink); }
-#define TL_SINK_COPIES(f, declared, ...)                                     \
-    TL_SINK_COPY(f, mask, TL_SINK_MASK, declared, __VA_ARGS__)               \
-    TL_SINK_COPY(f, count, TL_SINK_COUNT, declared, __VA_ARGS__)             \
-    TL_SINK_COPY(f, label, TL_SINK_LABEL, declared, __VA_ARGS__)             \
-    TL_SINK_COPY(f, paint, TL_SINK_PAINT, declared, __VA_ARGS__)             \
-    TL_SINK_COPY(f, nearest, TL_SINK_NEAREST, declared, __VA_ARGS__)         \
-    TL_SINK_COPY(f, farthest, TL_SINK_FARTHEST, declared, __VA_ARGS__)       \
-    TL_SINK_COPY(f, samples, TL_SINK_SAMPLES, declared, __VA_ARGS__)         \
+#define TL_SINK_COPIES(f, declared, ...)                               \
+    TL_SINK_COPY(f, mask, TL_SINK_MASK, declared, __VA_ARGS__)         \
+    TL_SINK_COPY(f, count, TL_SINK_COUNT, declared, __VA_ARGS__)       \
+    TL_SINK_COPY(f, label, TL_SINK_LABEL, declared, __VA_ARGS__)       \
+    TL_SINK_COPY(f, paint, TL_SINK_PAINT, declared, __VA_ARGS__)       \
+    TL_SINK_COPY(f, nearest, TL_SINK_NEAREST, declared, __VA_ARGS__)   \
+    TL_SINK_COPY(f, farthest, TL_SINK_FARTHEST, declared, __VA_ARGS__) \
+    TL_SINK_COPY(f, samples, TL_SINK_SAMPLES, declared, __VA_ARGS__)   \
     TL_SINK_COPY(f, peel, TL_SINK_PEEL, declared, __VA_ARGS__)
-#define TL_SINK_CALL(f, sink, ...)                                           \
-    switch (sink) {                                                          \
-    case TL_SINK_MASK: f##_mask(__VA_ARGS__); break;                         \
-    case TL_SINK_COUNT: f##_count(__VA_ARGS__); break;                       \
-    case TL_SINK_LABEL: f##_label(__VA_ARGS__); break;                       \
-    case TL_SINK_PAINT: f##_paint(__VA_ARGS__); break;                       \
-    case TL_SINK_NEAREST: f##_nearest(__VA_ARGS__); break;                   \
-    case TL_SINK_FARTHEST: f##_farthest(__VA_ARGS__); break;                 \
-    case TL_SINK_PEEL: f##_peel(__VA_ARGS__); break;                         \
-    default: f##_samples(__VA_ARGS__); break;                                \
+#define TL_SINK_CALL(f, sink, ...)                                            \
+    switch (sink) { /* no default: compilers name a sink that is forgotten */ \
+    case TL_SINK_MASK: f##_mask(__VA_ARGS__); break;                          \
+    case TL_SINK_COUNT: f##_count(__VA_ARGS__); break;                        \
+    case TL_SINK_LABEL: f##_label(__VA_ARGS__); break;                        \
+    case TL_SINK_PAINT: f##_paint(__VA_ARGS__); break;                        \
+    case TL_SINK_NEAREST: f##_nearest(__VA_ARGS__); break;                    \
+    case TL_SINK_FARTHEST: f##_farthest(__VA_ARGS__); break;                  \
+    case TL_SINK_SAMPLES: f##_samples(__VA_ARGS__); break;                    \
+    case TL_SINK_PEEL: f##_peel(__VA_ARGS__); break;                          \
+    case TL_SINK_BLEND: /* these two have no copies */                        \
+    case TL_SINK_CENSUS: __builtin_trap();                                    \
     }
 
 TL_INLINE int sink_has_depth(tl_sink sink)
@@ -49,24 +52,24 @@ TL_INLINE int sink_has_depth(tl_sink sink)
     return sink == TL_SINK_PAINT || sink == TL_SINK_NEAREST || sink == TL_SINK_FARTHEST || sink == TL_SINK_PEEL;
 }
 
-/* Ids and depths of the lanes in m that win.  Depths of new samples are never NaN or -0.  Written for whole vectors and, where
- * there are such, for half vectors. */
-#define TL_PUT_DEPTHS(NAME, M, F, I, P)                                                                                  \
-    TL_INLINE void NAME(const tl_target *target, tl_sink sink, int64_t at, M m, F depth, I id)                           \
-    {                                                                                                                    \
-        int32_t *ids = (int32_t *)target->pixels + at;                                                                   \
-        M wins;                                                                                                          \
-        if (sink == TL_SINK_PAINT) {                                                                                     \
-            wins = P##m_and(m, P##i_gt(id, P##i_load_masked(m, ids)));                                                   \
-        } else {                                                                                                         \
-            const F old = P##f_load_masked(m, target->depth + at);                                                       \
-            const M equal = P##m_and(m, P##f_eq(depth, old));                                                            \
-            wins = P##m_and(m, sink == TL_SINK_NEAREST ? P##f_lt(depth, old) : P##f_lt(old, depth));                     \
-            if (__builtin_expect(P##m_any(equal), 0))                                                                    \
-                wins = P##m_or(wins, P##m_and(equal, P##i_gt(P##i_load_masked(equal, ids), id)));                        \
-        }                                                                                                                \
-        P##f_store_some(target->depth + at, wins, depth, at + TL_LANES <= target->n_samples);                            \
-        P##i_store_some(ids, wins, id, at + TL_LANES <= target->n_samples);                                                                                \
+/* Ids and depths of the lanes in m that win.  Depths of new samples are never NaN or -0.  Written for whole vectors
+ * and, where there are such, for half vectors. */
+#define TL_PUT_DEPTHS(NAME, M, F, I, P)                                                              \
+    TL_INLINE void NAME(const tl_target *target, tl_sink sink, int64_t at, M m, F depth, I id)       \
+    {                                                                                                \
+        int32_t *ids = (int32_t *)target->pixels + at;                                               \
+        M wins;                                                                                      \
+        if (sink == TL_SINK_PAINT) {                                                                 \
+            wins = P##m_and(m, P##i_gt(id, P##i_load_masked(m, ids)));                               \
+        } else {                                                                                     \
+            const F old = P##f_load_masked(m, target->depth + at);                                   \
+            const M equal = P##m_and(m, P##f_eq(depth, old));                                        \
+            wins = P##m_and(m, sink == TL_SINK_NEAREST ? P##f_lt(depth, old) : P##f_lt(old, depth)); \
+            if (__builtin_expect(P##m_any(equal), 0))                                                \
+                wins = P##m_or(wins, P##m_and(equal, P##i_gt(P##i_load_masked(equal, ids), id)));    \
+        }                                                                                            \
+        P##f_store_some(target->depth + at, wins, depth, at + TL_LANES <= target->n_samples);        \
+        P##i_store_some(ids, wins, id, at + TL_LANES <= target->n_samples);                          \
     }
 TL_PUT_DEPTHS(put_buffers, vm, vf, vi, v)
 #if TL_HALF_LANES
@@ -87,7 +90,9 @@ TL_INLINE void put_numbers(const tl_target *target, tl_sink sink, int64_t at, vm
 {
     int32_t *pixels = (int32_t *)target->pixels + at;
     const vi old = vi_load_masked(m, pixels);
-    vi_store_some(pixels, m, sink == TL_SINK_COUNT ? vi_add(old, vi_set1(1)) : vi_max(old, vi_xor(id, vi_set1(target->flip))), at + TL_LANES <= target->n_samples);
+    vi_store_some(pixels, m,
+                  sink == TL_SINK_COUNT ? vi_add(old, vi_set1(1)) : vi_max(old, vi_xor(id, vi_set1(target->flip))),
+                  at + TL_LANES <= target->n_samples);
 }
 
 /* A span of samples without depth. */
@@ -110,7 +115,8 @@ TL_INLINE void put_plain(const tl_target *target, tl_sink sink, int64_t at, int6
     for (int64_t k = 0; k < n; k += TL_LANES) {
         const vm m = vm_first(n - k);
         const vi old = vi_load_masked(m, pixels + k);
-        vi_store_some(pixels + k, m, sink == TL_SINK_COUNT ? vi_add(old, vi_set1(1)) : vi_max(old, name), at + k + TL_LANES <= target->n_samples);
+        vi_store_some(pixels + k, m, sink == TL_SINK_COUNT ? vi_add(old, vi_set1(1)) : vi_max(old, name),
+                      at + k + TL_LANES <= target->n_samples);
     }
 }
 
@@ -120,8 +126,8 @@ TL_INLINE vf sum_depth(vd row, vd col) { return vf_add(vf_from_vd(vd_add(row, co
 /* 0, 1, 2, ... times a step. */
 TL_INLINE vd ramp(double step) { return vd_mul(vd_from_vi(vi_iota()), vd_set1(step)); }
 
-/* The centre of a picture pixel in half sub-pixels from a corner of a triangle that holds it: terms may wrap, the difference of
- * a triangle with a depth plane does not. */
+/* The centre of a picture pixel in half sub-pixels from a corner of a triangle that holds it: terms may wrap, the
+ * difference of a triangle with a depth plane does not. */
 TL_INLINE double half_units(int64_t pixel, int64_t corner_fx, int bits)
 {
     return (double)(int64_t)((((uint64_t)pixel * 2 + 1) << bits) - 2 * (uint64_t)corner_fx);
@@ -136,11 +142,12 @@ TL_INLINE double sample_y(const tl_triangle *t, const tl_window *window, int64_t
 }
 
 /* A span with depth from the plane: (z0 + slope_y * y) + slope_x * x. */
-TL_INLINE void put_plane(const tl_triangle *t, const tl_window *window, const tl_target *target, tl_sink sink, int64_t row,
-                         int64_t first, int64_t end)
+TL_INLINE void put_plane(const tl_triangle *t, const tl_window *window, const tl_target *target, tl_sink sink,
+                         int64_t row, int64_t first, int64_t end)
 {
     const double step = (double)((int64_t)2 << window->subpixel_bits), x = sample_x(t, window, first);
-    const vd z_row = vd_set1(t->z[0] + t->slope_y * sample_y(t, window, row)), slope_x = vd_set1(t->slope_x), steps = ramp(step);
+    const vd z_row = vd_set1(t->z[0] + t->slope_y * sample_y(t, window, row)), slope_x = vd_set1(t->slope_x);
+    const vd steps = ramp(step);
     const int64_t at = row * target->stride_px;
     for (int64_t col = first; col < end; col += TL_LANES) {
         const vd xs = vd_add(vd_set1(x + (double)(col - first) * step), steps);
@@ -149,8 +156,8 @@ TL_INLINE void put_plane(const tl_triangle *t, const tl_window *window, const tl
 }
 
 /* A span with depth from the exact weights. */
-static void put_weighted(const tl_triangle *t, const tl_window *window, const tl_target *target, tl_sink sink, int64_t row,
-                         int64_t first, int64_t end)
+static void put_weighted(const tl_triangle *t, const tl_window *window, const tl_target *target, tl_sink sink,
+                         int64_t row, int64_t first, int64_t end)
 {
     double w1[TL_CHUNK], w2[TL_CHUNK];
     float z[TL_CHUNK];
@@ -178,8 +185,8 @@ TL_INLINE void setup_sink(tl_triangle *t, const tl_window *window, tl_sink sink)
 }
 
 /* The samples [first, end) of a row; the window's own columns and rows. */
-TL_INLINE void put_span(const tl_triangle *t, const tl_window *window, const tl_target *target, tl_sink sink, int64_t row,
-                        int64_t first, int64_t end)
+TL_INLINE void put_span(const tl_triangle *t, const tl_window *window, const tl_target *target, tl_sink sink,
+                        int64_t row, int64_t first, int64_t end)
 {
     if (!sink_has_depth(sink))
         put_plain(target, sink, row * target->stride_px + first, end - first, t->id);

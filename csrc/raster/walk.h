@@ -1,11 +1,12 @@
-/* The two walkers, written once and compiled for 64-bit and 128-bit integers: alone.c includes this file twice.  (No guard, therefore.)
+/* The two walkers, written once and compiled for 64-bit and 128-bit integers: alone.c includes this file twice.  (No
+ * guard, therefore.)
  * In: a set-up triangle.  Out: the covered span of each row.  TL_INT is the integer, TL_WALK(name) names its copy.
  *
  * Both walk E' = (2E + bias) >> (bits + 1), bias -1 on edges that are neither top nor left.  2E changes by multiples of
  * 2^(bits+1) from sample to sample, so the floor keeps its sign at every sample, and E' changes by exactly -dy a column
- * and dx a row.  Squares are tested at one corner an edge: the square meets the triangle only where the corner that lies
- * farthest inside does not lie on the edge or outside, and is held by it only where the one farthest outside does.  No more
- * is needed: with the box, these are all the axes that can separate the two. */
+ * and dx a row.  Squares are tested at one corner an edge: the square meets the triangle only where the corner that
+ * lies farthest inside does not lie on the edge or outside, and is held by it only where the one farthest outside
+ * does.  No more is needed: with the box, these are all the axes that can separate the two. */
 #include <stdint.h>
 
 #include "topleft.h"
@@ -44,8 +45,8 @@ static inline TL_WALK(edges) TL_WALK(setup_edges)(const tl_triangle *t, const tl
             continue;
         }
         const int top_left = dy < 0 || (dy == 0 && dx > 0);
-        const TL_UINT doubled = (TL_UINT)dx * (TL_UINT)(py - (TL_INT)t->y_fx[k] * 2) -
-                                (TL_UINT)dy * (TL_UINT)(px - (TL_INT)t->x_fx[k] * 2);
+        const TL_UINT doubled =
+            (TL_UINT)dx * (TL_UINT)(py - (TL_INT)t->y_fx[k] * 2) - (TL_UINT)dy * (TL_UINT)(px - (TL_INT)t->x_fx[k] * 2);
         e.value[k] = ((TL_INT)doubled - !top_left) >> (bits + 1);
     }
     return e;
@@ -53,8 +54,7 @@ static inline TL_WALK(edges) TL_WALK(setup_edges)(const tl_triangle *t, const tl
 
 /* Edge functions stepped by additions, one test a sample.  Based on: J. Pineda, A Parallel Algorithm for Polygon
  * Rasterization, 1988. */
-TL_INLINE void TL_WALK(walk_edge)(const tl_triangle *t, const tl_window *window, const tl_target *target,
-                                       tl_sink sink)
+TL_INLINE void TL_WALK(walk_edge)(const tl_triangle *t, const tl_window *window, const tl_target *target, tl_sink sink)
 {
     const TL_WALK(edges) e = TL_WALK(setup_edges)(t, window);
     TL_INT row0 = e.value[0], row1 = e.value[1], row2 = e.value[2];
@@ -76,7 +76,7 @@ TL_INLINE void TL_WALK(walk_edge)(const tl_triangle *t, const tl_window *window,
  * division an edge, then quotient and remainder are stepped from row to row.  Horizontal edges say nothing that the box
  * does not.  Based on: J. E. Bresenham, Algorithm for computer control of a digital plotter, 1965. */
 TL_INLINE void TL_WALK(walk_scanline)(const tl_triangle *t, const tl_window *window, const tl_target *target,
-                                       tl_sink sink)
+                                      tl_sink sink)
 {
     const TL_WALK(edges) e = TL_WALK(setup_edges)(t, window);
     TL_INT quotient[3], remainder[3], divisor[3], quotient_step[3], remainder_step[3];

@@ -1,6 +1,7 @@
-/* Alpha test: triangles with holes in their texture, drawn over a visibility buffer or over layers; samples with too little opacity are
- * left out, so that what is behind them stays.
- * In: the buffer of all other triangles, a list of triangles.  Out: the buffer, the nearest of what is left in every pixel.
+/* Alpha test: triangles with holes in their texture, drawn over a visibility buffer or over layers; samples with too
+ * little opacity are left out, so that what is behind them stays.
+ * In: the buffer of all other triangles, a list of triangles.  Out: the buffer, the nearest of what is left in every
+ * pixel.
  *
  * A triangle is drawn by itself into a tile, then tested pixel by pixel: the order of the list does not matter. */
 #ifndef TL_ALPHA_TEST_C
@@ -73,7 +74,8 @@ TL_INLINE void hide_nearest(const cutout *c, int n, int32_t *own, const float *o
 }
 
 /* Puts what is left of n pixels of a row of a tile into the buffer, from its pixel `to` on. */
-TL_INLINE void keep_opaque(cutout *c, shade_runs *s, const tl_material *m, int64_t row, int64_t column, int n, int64_t from, int64_t to)
+TL_INLINE void keep_opaque(cutout *c, shade_runs *s, const tl_material *m, int64_t row, int64_t column, int n,
+                           int64_t from, int64_t to)
 {
     int32_t *own = c->tile.ids + from;
     const float *own_depth = c->tile.depth + from;
@@ -110,14 +112,16 @@ static void cut_triangle(cutout *c, shade_runs *s, const tl_window *window, int3
     const int32_t *corners = c->scene.triangles + 3 * (int64_t)id;
     const int32_t material = shading->material_of ? shading->material_of[id] : 0;
     tl_triangle t = {.col0 = 0, .col1 = window->width, .row0 = 0, .row1 = window->height};
-    if (!is_clipped(&c->scene.mesh, corners) && (load_triangle(&c->scene.mesh, corners, &t) == 0 || !clip_box(&t, window)))
+    if (!is_clipped(&c->scene.mesh, corners) &&
+        (load_triangle(&c->scene.mesh, corners, &t) == 0 || !clip_box(&t, window)))
         return;
     for (int64_t top = t.row0; top < t.row1; top += TL_CUTOUT_TILE)
         for (int64_t left = t.col0; left < t.col1; left += TL_CUTOUT_TILE) {
             tl_window part = *window;
             part.x_px += left, part.y_px += top;
             part.width = min64(TL_CUTOUT_TILE, t.col1 - left), part.height = min64(TL_CUTOUT_TILE, t.row1 - top);
-            const tl_target target = {.sink = TL_SINK_PAINT, .pixels = c->tile.ids, .depth = c->tile.depth, .stride_px = TL_CUTOUT_TILE};
+            const tl_target target = {
+                .sink = TL_SINK_PAINT, .pixels = c->tile.ids, .depth = c->tile.depth, .stride_px = TL_CUTOUT_TILE};
             tl_share share = {.ids = &id, .end = 1, .is_first = 1, .is_last = 1};
             draw(&c->scene, &part, &target, &share);
             for (int64_t row = 0; row < part.height; row++)

@@ -70,10 +70,12 @@ TL_INLINE void bend_normal(const shaded_lanes *p, const tl_material *m, vf *n)
 {
     const tl_texture *t = m->normal_map;
     const int first = RUN_TANGENT + N_TANGENT_FLOATS * t->uv_set;
-    const vf zero = vf_set1(0.0f), one = vf_set1(1.0f), two = vf_set1(2.0f), tiny = vf_set1(0x1p-40f), scale = vf_set1(m->normal_scale);
+    const vf zero = vf_set1(0.0f), one = vf_set1(1.0f), two = vf_set1(2.0f), tiny = vf_set1(0x1p-40f),
+             scale = vf_set1(m->normal_scale);
     vf texel[4], along[3], tangent[3], bent[3];
     look_up_rgb(p, t, texel);
-    const vf x = vf_mul(vf_fma(two, texel[0], vf_set1(-1.0f)), scale), y = vf_mul(vf_fma(two, texel[1], vf_set1(-1.0f)), scale);
+    const vf x = vf_mul(vf_fma(two, texel[0], vf_set1(-1.0f)), scale),
+             y = vf_mul(vf_fma(two, texel[1], vf_set1(-1.0f)), scale);
     const vf z = vf_fma(two, texel[2], vf_set1(-1.0f));
     for (int k = 0; k < 3; k++) {
         along[k] = pick(p, first + k);

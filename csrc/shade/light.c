@@ -1,7 +1,8 @@
 /* Light: how much of each colour a surface sends to the eye.
  * In: a unit normal, where the surface is and from where it is seen.  Out: diffuse light and highlights, linear.
- * Based on: J. H. Lambert, Photometria, 1760; J. F. Blinn, Models of Light Reflection for Computer Synthesized Pictures, 1977;
- * J. Mitchell, G. McTaggart and C. Green, Shading in Valve's Source Engine, 2006 (the wrapped fall-off, there with the power 2). */
+ * Based on: J. H. Lambert, Photometria, 1760; J. F. Blinn, Models of Light Reflection for Computer Synthesized
+ * Pictures, 1977; J. Mitchell, G. McTaggart and C. Green, Shading in Valve's Source Engine, 2006 (the wrapped fall-off,
+ * there with the power 2). */
 #ifndef TL_LIGHT_C
 #define TL_LIGHT_C
 
@@ -10,9 +11,9 @@
 #include "shade/texture.c"
 
 typedef struct {
-    vf normal[3];  /* unit, towards the viewer */
-    vf point[3];   /* read when there are lights at points */
-    vf to_eye[3];  /* unit; read when the material shines */
+    vf normal[3]; /* unit, towards the viewer */
+    vf point[3];  /* read when there are lights at points */
+    vf to_eye[3]; /* unit; read when the material shines */
 } lit_surface;
 
 TL_INLINE vf dot3(const vf *a, const vf *b) { return vf_fma(a[0], b[0], vf_fma(a[1], b[1], vf_mul(a[2], b[2]))); }
@@ -61,7 +62,8 @@ TL_INLINE vf find_light(const lit_surface *s, const tl_light *light, vf *to_ligh
     }
     for (int k = 0; k < 3; k++)
         to_light[k] = vf_sub(vf_set1(light->at[k]), s->point[k]);
-    const vf squared = dot3(to_light, to_light), scale = vf_div(vf_set1(1.0f), vf_sqrt(vf_max(squared, vf_set1(0x1p-100f))));
+    const vf squared = dot3(to_light, to_light),
+             scale = vf_div(vf_set1(1.0f), vf_sqrt(vf_max(squared, vf_set1(0x1p-100f))));
     for (int k = 0; k < 3; k++)
         to_light[k] = vf_mul(to_light[k], scale);
     return vf_div(vf_set1(1.0f), vf_fma(vf_set1(light->falloff), squared, vf_set1(1.0f)));

@@ -28,8 +28,8 @@
 typedef struct {
     lit_surface lit;
     vf roughness, alpha2, n_dot_v;
-    vf masked_view;         /* sqrt((n.v)^2 (1 - alpha^2) + alpha^2) */
-    vf f0[3], diffuse[3];   /* diffuse: (1 - metallic) base */
+    vf masked_view;       /* sqrt((n.v)^2 (1 - alpha^2) + alpha^2) */
+    vf f0[3], diffuse[3]; /* diffuse: (1 - metallic) base */
 } rough_surface;
 
 TL_INLINE vf masked_cosine(vf cosine, vf alpha2)
@@ -42,7 +42,8 @@ TL_INLINE void set_rough(rough_surface *s, const vf *base, vf metallic, vf rough
 {
     const vf one = vf_set1(1.0f), zero = vf_set1(0.0f), f0 = vf_set1(TL_F0_OF_DIELECTRICS);
     s->roughness = vf_min(vf_max(roughness, vf_set1(TL_LEAST_ROUGHNESS)), one);
-    const vf alpha = vf_mul(s->roughness, s->roughness), matt = vf_sub(one, metallic), cosine = dot3(s->lit.normal, s->lit.to_eye);
+    const vf alpha = vf_mul(s->roughness, s->roughness), matt = vf_sub(one, metallic),
+             cosine = dot3(s->lit.normal, s->lit.to_eye);
     s->alpha2 = vf_mul(alpha, alpha);
     s->n_dot_v = vf_min(vf_max(cosine, vf_sub(zero, cosine)), one);
     s->masked_view = masked_cosine(s->n_dot_v, s->alpha2);
@@ -117,7 +118,8 @@ TL_INLINE void add_rough_surroundings(const rough_surface *s, const tl_shading *
         }
     }
     for (int c = 0; c < 3; c++) {
-        const vf mirrors = vf_max(vf_fma(s->f0[c], share[0], share[1]), zero), rest = vf_max(vf_sub(one, mirrors), zero);
+        const vf mirrors = vf_max(vf_fma(s->f0[c], share[0], share[1]), zero),
+                 rest = vf_max(vf_sub(one, mirrors), zero);
         const vf matt = vf_mul(vf_mul(s->diffuse[c], rest), gathered[c]);
         rgb[c] = vf_fma(occlusion, vf_fma(mirrors, mirrored[c], matt), rgb[c]);
     }

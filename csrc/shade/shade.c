@@ -1,6 +1,6 @@
 /* Shades a visibility buffer: a picture in light, from light to sRGB; or the normals that shading has, as numbers.
- * In: ids, the scene they were drawn from, materials and lights.  Out: red, green, blue and opacity, uint8; or unit vectors, float32,
- * on the side that is seen, 0 where nothing is. */
+ * In: ids, the scene they were drawn from, materials and lights.  Out: red, green, blue and opacity, uint8; or unit
+ * vectors, float32, on the side that is seen, 0 where nothing is. */
 #ifndef TL_SHADE_C
 #define TL_SHADE_C
 
@@ -21,7 +21,8 @@
 /* Notes what a full material needs. */
 static void note_full(shade_runs *s, const tl_material *m)
 {
-    const tl_texture *const textures[5] = {m->texture, m->metallic_roughness, m->occlusion_map, m->normal_map, m->emission_map};
+    const tl_texture *const textures[5] = {m->texture, m->metallic_roughness, m->occlusion_map, m->normal_map,
+                                           m->emission_map};
     for (int k = 0; k < 5; k++)
         if (textures[k]) {
             s->needs_uv |= textures[k]->uv_set == 0;
@@ -31,7 +32,8 @@ static void note_full(shade_runs *s, const tl_material *m)
         s->needs_tangents[m->normal_map->uv_set] = 1;
 }
 
-static void start_runs(shade_runs *s, const tl_scene *scene, const tl_window *window, const tl_view *view, const tl_shading *shading)
+static void start_runs(shade_runs *s, const tl_scene *scene, const tl_window *window, const tl_view *view,
+                       const tl_shading *shading)
 {
     int shines = 0, has_texture = 0, is_lit = 0, has_points = 0;
     const int shows_light = shading->show == TL_SHOW_LIGHT;
@@ -62,6 +64,15 @@ static void start_runs(shade_runs *s, const tl_scene *scene, const tl_window *wi
         memset(s->floats[k], 0, TL_MAX_LANES * sizeof(float));
 }
 
+/* Prepares the runs of the pixels from `column` on in a row of ids; returns how many pixels. */
+TL_INLINE int start_span(shade_runs *s, const int32_t *ids, int64_t row, int64_t column)
+{
+    const int n = (int)min64(TL_SPAN, s->window->width - column);
+    find_runs(s, ids + row * s->window->width + column, n);
+    set_runs(s, row);
+    return n;
+}
+
 TL_INLINE vi shaded_word(shaded_lanes *p, int64_t row, const float *depth)
 {
     const tl_show show = p->s->shading->show;
@@ -72,8 +83,8 @@ TL_INLINE vi shaded_word(shaded_lanes *p, int64_t row, const float *depth)
 }
 
 /* The picture of a visibility buffer; rows of window->width. */
-static void shade(const tl_scene *scene, const tl_window *window, const tl_view *view, const tl_shading *shading, const int32_t *ids,
-                  const float *depth, uint8_t *pixels)
+static void shade(const tl_scene *scene, const tl_window *window, const tl_view *view, const tl_shading *shading,
+                  const int32_t *ids, const float *depth, uint8_t *pixels)
 {
     shade_runs s;
     int32_t background;
@@ -82,9 +93,7 @@ static void shade(const tl_scene *scene, const tl_window *window, const tl_view 
     for (int64_t row = 0; row < window->height; row++)
         for (int64_t column = 0; column < window->width; column += TL_SPAN) {
             const int64_t at = row * window->width + column;
-            const int n = (int)min64(TL_SPAN, window->width - column);
-            find_runs(&s, ids + at, n);
-            set_runs(&s, row);
+            const int n = start_span(&s, ids, row, column);
             for (int x = 0, i = 0; x < n; x += TL_LANES, i++) {
                 vi word = vi_set1(background);
                 if (s.visible[i]) {
@@ -104,7 +113,9 @@ static void shade(const tl_scene *scene, const tl_window *window, const tl_view 
 static void set_inverse_w(const tl_source *source, const float *rows, int64_t first, int64_t end, float *restrict out)
 {
     int64_t i = first;
-    for (; TL_LANES > 1 && source->scalar == TL_F32 && source->matrix && i + TL_LANES <= end && i + TL_LANES < source->n; i += TL_LANES) {
+    for (;
+         TL_LANES > 1 && source->scalar == TL_F32 && source->matrix && i + TL_LANES <= end && i + TL_LANES < source->n;
+         i += TL_LANES) {
         vf p[4];
         clip_lanes_f32((const float *)source->data + 3 * i, (const float *)source->matrix, 3, p);
         vf_store_fourths(rows + 4 * i, vf_div(vf_set1(1.0f), p[3]), out + 4 * i);
@@ -118,8 +129,8 @@ static void set_inverse_w(const tl_source *source, const float *rows, int64_t fi
     }
 }
 
-static void shade_normals(const tl_scene *scene, const tl_window *window, const tl_view *view, const tl_shading *shading,
-                          const int32_t *ids, float *restrict out)
+static void shade_normals(const tl_scene *scene, const tl_window *window, const tl_view *view,
+                          const tl_shading *shading, const int32_t *ids, float *restrict out)
 {
     shade_runs s;
     const vf zero = vf_set1(0.0f);
@@ -127,9 +138,7 @@ static void shade_normals(const tl_scene *scene, const tl_window *window, const 
     for (int64_t row = 0; row < window->height; row++)
         for (int64_t column = 0; column < window->width; column += TL_SPAN) {
             const int64_t at = row * window->width + column;
-            const int n = (int)min64(TL_SPAN, window->width - column);
-            find_runs(&s, ids + at, n);
-            set_runs(&s, row);
+            const int n = start_span(&s, ids, row, column);
             for (int x = 0, i = 0; x < n; x += TL_LANES, i++) {
                 vf normal[3] = {zero, zero, zero};
                 if (s.visible[i]) {

@@ -17,23 +17,11 @@
 /* Edge functions of the lanes whose runs are special, run by run. */
 static void set_special_edges(shaded_lanes *p)
 {
-    const shade_runs *s = p->s;
-    const vi special = pick_int(p, RUN_SPECIAL);
-    const double unit = (double)(1 << s->window->subpixel_bits);
-    const vd x_fx = vd_mul(vd_add(vd_from_vi(p->column), vd_set1((double)s->window->x_px + 0.5)), vd_set1(unit));
-    int32_t number[TL_MAX_LANES];
-    vi_store(number, special);
-    vm rest = vm_and(p->visible, vi_gt(special, vi_set1(0)));
-    while (vm_any(rest)) {
-        const int32_t own = number[__builtin_ctz(vm_bits(rest))];
-        const vm lanes = vm_and(rest, vi_eq(special, vi_set1(own)));
-        const special_run *e = &s->special[own - 1];
-        for (int k = 0; k < 3; k++) {
-            const vd value = vd_add(vd_set1(e->at[k]), vd_mul(vd_set1(e->step[k]), vd_sub(x_fx, vd_set1(e->from[k]))));
-            p->e[k] = vf_select(lanes, vf_from_vd(value), p->e[k]);
-        }
-        p->area = vf_select(lanes, vf_set1(e->area), p->area);
-        rest = vm_and_not(rest, lanes);
+    special_lanes own = start_special(p, pick_int(p, RUN_SPECIAL));
+    for (vm lanes; vm_any(lanes = next_special(p, &own));) {
+        for (int k = 0; k < 3; k++)
+            p->e[k] = vf_select(lanes, vf_from_vd(special_edge(&own, k)), p->e[k]);
+        p->area = vf_select(lanes, vf_set1(own.run->area), p->area);
     }
 }
 
@@ -57,7 +45,8 @@ static void face_normal(const shade_runs *s, int32_t id, double *n)
     for (int k = 0; k < 3; k++)
         for (int axis = 0; axis < 3; axis++) {
             const int64_t at = 3 * (int64_t)s->scene->triangles[3 * (int64_t)id + k] + axis;
-            p[k][axis] = shading->is_f64 ? ((const double *)shading->positions)[at] : (double)((const float *)shading->positions)[at];
+            p[k][axis] = shading->is_f64 ? ((const double *)shading->positions)[at]
+                                         : (double)((const float *)shading->positions)[at];
         }
     for (int axis = 0; axis < 3; axis++) {
         const int a = (axis + 1) % 3, b = (axis + 2) % 3;
@@ -148,11 +137,13 @@ TL_INLINE void set_points(shaded_lanes *p, int64_t row, const float *depth)
     const tl_window *window = p->s->window;
     const tl_vertex_set *set = &p->s->scene->mesh;
     const float unit = (float)(1 << window->subpixel_bits);
-    const vf x = vf_add(vf_from_vi(vi_add(p->column, vi_set1((int32_t)window->x_px))), vf_set1(0.5f + (float)set->sample_x_fx / unit));
+    const vf x = vf_add(vf_from_vi(vi_add(p->column, vi_set1((int32_t)window->x_px))),
+                        vf_set1(0.5f + (float)set->sample_x_fx / unit));
     const vf y = vf_set1((float)(row + window->y_px) + (0.5f + (float)set->sample_y_fx / unit));
     const vf w = vf_mul(p->area, p->inv_q);
     for (int axis = 0; axis < 3; axis++) {
-        p->ray[axis] = vf_fma(y, vf_set1(shading->ray[2][axis]), vf_fma(x, vf_set1(shading->ray[1][axis]), vf_set1(shading->ray[0][axis])));
+        p->ray[axis] = vf_fma(y, vf_set1(shading->ray[2][axis]),
+                              vf_fma(x, vf_set1(shading->ray[1][axis]), vf_set1(shading->ray[0][axis])));
         if (shading->has_perspective)
             p->point[axis] = vf_fma(w, p->ray[axis], vf_set1(shading->eye[axis]));
         else
@@ -191,7 +182,8 @@ TL_INLINE void shade_material(shaded_lanes *p, const tl_material *m, vf *rgb)
     for (int axis = 0; axis < 3; axis++) {
         surface.normal[axis] = p->normal[axis];
         surface.point[axis] = p->point[axis];
-        surface.to_eye[axis] = shading->has_perspective ? vf_sub(vf_set1(0.0f), p->ray[axis]) : vf_set1(shading->eye[axis]);
+        surface.to_eye[axis] =
+            shading->has_perspective ? vf_sub(vf_set1(0.0f), p->ray[axis]) : vf_set1(shading->eye[axis]);
     }
     if (m->shininess > 0.0f && shading->has_perspective)
         normalize3(surface.to_eye);
@@ -265,7 +257,8 @@ TL_INLINE void shade_pixels(shaded_lanes *p, int64_t row, const float *depth, vf
     if (shading->show == TL_SHOW_MATCAP) {
         vf texel[4];
         const vf none[2] = {zero, zero};
-        sample_texture(shading->matcap, vf_fma(half, in_eye_space(p, 0), half), vf_fma(half, in_eye_space(p, 1), half), none, none, texel, 3);
+        sample_texture(shading->matcap, vf_fma(half, in_eye_space(p, 0), half), vf_fma(half, in_eye_space(p, 1), half),
+                       none, none, texel, 3);
         for (int c = 0; c < 3; c++)
             rgb[c] = texel[c];
     } else {

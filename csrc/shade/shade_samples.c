@@ -1,5 +1,6 @@
-/* Shaded samples: a visibility buffer with several samples a pixel to a picture.  A triangle is shaded once in each pixel that it
- * shows in, at the first of the samples that see it; what the pixel shows is the mean of the light at its samples.
+/* Shaded samples: a visibility buffer with several samples a pixel to a picture.  A triangle is shaded once in each
+ * pixel that it shows in, at the first of the samples that see it; what the pixel shows is the mean of the light at its
+ * samples.
  * In: planes of ids, the scene.  Out: red, green, blue and opacity, uint8. */
 #ifndef TL_SHADE_SAMPLES_C
 #define TL_SHADE_SAMPLES_C
@@ -39,7 +40,8 @@ TL_INLINE int find_first_seen(sample_sums *sums, const int32_t *ids, int64_t str
             continue;
         vi count = vi_set1(1);
         for (int after = k + 1; after < 1 << sample_bits; after++)
-            count = vi_add(count, vi_select(vi_eq(own, vi_load_masked(inside, ids + after * stride + x)), vi_set1(1), vi_set1(0)));
+            count = vi_add(
+                count, vi_select(vi_eq(own, vi_load_masked(inside, ids + after * stride + x)), vi_set1(1), vi_set1(0)));
         vf_store(sums->n_seen + x, vf_from_vi(count));
         any = 1;
     }
@@ -67,12 +69,15 @@ TL_INLINE void add_shaded(sample_sums *sums, shade_runs *s, int64_t row, int64_t
     }
 }
 
-/* Mean light over the background ("over"), encoded.  A pixel of whose samples none or all see a triangle owes nothing to rounding. */
+/* Mean light over the background ("over"), encoded.  A pixel of whose samples none or all see a triangle owes nothing
+ * to rounding. */
 TL_INLINE vi finish_lanes(const sample_sums *sums, const tl_shading *shading, int sample_bits, int x)
 {
     const vf share = vf_mul(vf_load(sums->n_lit + x), vf_set1(1.0f / (float)(1 << sample_bits)));
-    const vf behind = vf_mul(vf_sub(vf_set1(1.0f), share), vf_set1(shading->background[3])), opacity = vf_add(share, behind);
-    const float *bytes = (float[3]){shading->background_bytes[0], shading->background_bytes[1], shading->background_bytes[2]};
+    const vf behind = vf_mul(vf_sub(vf_set1(1.0f), share), vf_set1(shading->background[3]));
+    const vf opacity = vf_add(share, behind);
+    const float *bytes =
+        (float[3]){shading->background_bytes[0], shading->background_bytes[1], shading->background_bytes[2]};
     const float *ground = shading->show == TL_SHOW_NORMALS ? bytes : shading->background;
     vi byte[3];
     int32_t background;
@@ -85,10 +90,11 @@ TL_INLINE vi finish_lanes(const sample_sums *sums, const tl_shading *shading, in
     return vi_select(vf_lt(vf_set1(0.0f), share), word, vi_set1(background));
 }
 
-/* The picture of planes of ids (and depth), `stride` pixels apart, for 2^sample_bits samples at (x, y) sub-pixels from the centre. */
-static void shade_samples(const tl_scene *scene, const tl_window *window, const tl_view *view, const tl_shading *shading,
-                          const int32_t *samples_fx, int sample_bits, int64_t stride, const int32_t *ids, const float *depth,
-                          uint8_t *pixels)
+/* The picture of planes of ids (and depth), `stride` pixels apart, for 2^sample_bits samples at (x, y) sub-pixels from
+ * the centre. */
+static void shade_samples(const tl_scene *scene, const tl_window *window, const tl_view *view,
+                          const tl_shading *shading, const int32_t *samples_fx, int sample_bits, int64_t stride,
+                          const int32_t *ids, const float *depth, uint8_t *pixels)
 {
     shade_runs s;
     sample_sums sums;
@@ -106,7 +112,8 @@ static void shade_samples(const tl_scene *scene, const tl_window *window, const 
                 add_shaded(&sums, &s, row, column, n, depth + k * stride + at);
             }
             for (int x = 0; x < n; x += TL_LANES)
-                vi_store_masked((int32_t *)pixels + at + x, vm_first(n - x), finish_lanes(&sums, shading, sample_bits, x));
+                vi_store_masked((int32_t *)pixels + at + x, vm_first(n - x),
+                                finish_lanes(&sums, shading, sample_bits, x));
         }
 }
 

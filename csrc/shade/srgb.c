@@ -1,12 +1,12 @@
-/* From light to the sRGB values of a picture; and grey light: a surface of one colour under white lights, where all channels are that
- * colour times the same light.
+/* From light to the sRGB values of a picture; and grey light: a surface of one colour under white lights, where all
+ * channels are that colour times the same light.
  * In: linear light, or the pixels of runs.  Out: whole numbers of 0 to 255.
  *
- * Light is rounded to steps of 2^-16, and a step to the nearest sRGB value of 0 to 255: the polynomial below gives that value
- * for each of the 65537 steps (the tests of shading look at all of them).
+ * Light is rounded to steps of 2^-16, and a step to the nearest sRGB value of 0 to 255: the polynomial below gives that
+ * value for each of the 65537 steps (the tests of shading look at all of them).
  *
- * The curve of sRGB is a power: that of a product is the product of the powers.  So under grey light one root is taken for three
- * channels, of the light as it is, where encode_srgb takes one of each channel's, rounded to a step.
+ * The curve of sRGB is a power: that of a product is the product of the powers.  So under grey light one root is taken
+ * for three channels, of the light as it is, where encode_srgb takes one of each channel's, rounded to a step.
  * Based on: IEC 61966-2-1, 1999. */
 #ifndef TL_SRGB_C
 #define TL_SRGB_C
@@ -24,9 +24,8 @@
 
 /* 255 * 1.055 * (2^(i - 127) / 2^16)^(1 / 2.4) for a biased exponent i, at i & 15: 1 to 2^15 steps of light. */
 static const float SRGB_SCALE[16] = {
-    0x1.c471be00p+1f, 0x1.2df86a00p+2f, 0x1.93150200p+2f, 0x1.0d066600p+3f,
-    0x1.671af400p+3f, 0x1.df591a00p+3f, 0x1.3fed2c00p+4f, 0x1.ab0cf200p+4f,
-    0x1.1d05a600p+5f, 0x1.7c757400p+5f, 0x1.fbda0000p+5f, 0x1.52f34400p+6f,
+    0x1.c471be00p+1f, 0x1.2df86a00p+2f, 0x1.93150200p+2f, 0x1.0d066600p+3f, 0x1.671af400p+3f, 0x1.df591a00p+3f,
+    0x1.3fed2c00p+4f, 0x1.ab0cf200p+4f, 0x1.1d05a600p+5f, 0x1.7c757400p+5f, 0x1.fbda0000p+5f, 0x1.52f34400p+6f,
     0x1.c471be00p+6f, 0x1.2df86a00p+7f, 0x1.93150200p+7f, 0x1.52f34400p+1f,
 };
 
@@ -52,7 +51,8 @@ TL_INLINE vi encode_srgb(vf light)
     const vf whole = vf_from_vi(vi_rint(vf_min(steps, vf_set1(TL_LIGHT_STEPS - 1.0f))));
     vf scale;
     const vf root = srgb_root(whole, &scale);
-    const vf curve = vf_fma(root, scale, vf_set1(-SRGB_OFFSET)), line = vf_mul(whole, vf_set1(SRGB_SLOPE / TL_LIGHT_STEPS));
+    const vf curve = vf_fma(root, scale, vf_set1(-SRGB_OFFSET));
+    const vf line = vf_mul(whole, vf_set1(SRGB_SLOPE / TL_LIGHT_STEPS));
     return vi_rint(vf_select(vf_lt(whole, vf_set1(SRGB_LINE_END)), line, curve));
 }
 
@@ -73,8 +73,8 @@ TL_INLINE vi to_word(vi r, vi g, vi b, vi a)
 #define TL_MOST_GREY 63.0f
 #define TL_GREY_STEPS 1024.0f
 
-/* 2^(35 / 12) / (255 * 1.055): what the product of two roots is too little by, of a colour in steps of 2^-15 and light in those of
- * 2^-10, where srgb_root has those of 2^-16; and its factor, which stands in both. */
+/* 2^(35 / 12) / (255 * 1.055): what the product of two roots is too little by, of a colour in steps of 2^-15 and light
+ * in those of 2^-10, where srgb_root has those of 2^-16; and its factor, which stands in both. */
 #define TL_GREY_SCALE 0x1.cbddbcp-6f
 
 static int is_white(const float *color) { return color[0] == color[1] && color[1] == color[2]; }
@@ -85,8 +85,9 @@ static void start_grey(shade_runs *s)
     const tl_shading *shading = s->shading;
     const tl_material *m = shading->materials;
     float most = shading->ambient[0];
-    s->is_grey = is_white(shading->ambient) && shading->show == TL_SHOW_LIGHT && !shading->material_of && shading->n_materials > 0 &&
-                 !m->is_unlit && !m->is_full && !m->texture && m->back_side == 0.0f && !(m->shininess > 0.0f) && !s->needs_q;
+    s->is_grey = is_white(shading->ambient) && shading->show == TL_SHOW_LIGHT && !shading->material_of &&
+                 shading->n_materials > 0 && !m->is_unlit && !m->is_full && !m->texture && m->back_side == 0.0f &&
+                 !(m->shininess > 0.0f) && !s->needs_q;
     for (int k = 0; k < shading->n_lights; k++) {
         s->is_grey &= is_white(shading->lights[k].color);
         most += shading->lights[k].color[0];
@@ -112,11 +113,14 @@ TL_INLINE vi grey_word(shaded_lanes *p)
     vi byte[3];
     set_normals(p);
     for (int axis = 0; axis < 3; axis++)
-        surface.normal[axis] = p->normal[axis], surface.point[axis] = surface.to_eye[axis] = vf_set1(0.0f); /* nothing shines */
+        /* nothing shines */
+        surface.normal[axis] = p->normal[axis], surface.point[axis] = surface.to_eye[axis] = vf_set1(0.0f);
     add_lights(&surface, s->shading, 0.0f, diffuse, specular);
-    const vf steps = vf_mul(diffuse[0], vf_set1(TL_GREY_STEPS)), root = srgb_root(steps, &scale), curve = vf_mul(root, scale);
+    const vf steps = vf_mul(diffuse[0], vf_set1(TL_GREY_STEPS)), root = srgb_root(steps, &scale);
+    const vf curve = vf_mul(root, scale);
     for (int c = 0; c < 3; c++) {
-        const vf line = vf_mul(steps, vf_set1(s->grey_line[c])), bent = vf_fma(curve, vf_set1(s->grey_root[c]), vf_set1(-SRGB_OFFSET));
+        const vf line = vf_mul(steps, vf_set1(s->grey_line[c]));
+        const vf bent = vf_fma(curve, vf_set1(s->grey_root[c]), vf_set1(-SRGB_OFFSET));
         byte[c] = vi_rint(vf_min(vf_select(vf_lt(line, line_end), line, bent), last));
     }
     return to_word(byte[0], byte[1], byte[2], vi_set1(255));

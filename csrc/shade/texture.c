@@ -1,7 +1,7 @@
 /* Textures: the light of a surface at (u, v), filtered; pictures of linear light, so their mean is a mean of light.
  * In: coordinates and how fast they change from pixel to pixel.  Out: red, green, blue and opacity, 0 to 1.
- * Based on: L. Williams, Pyramidal Parametrics, 1983 (mipmaps); P. Heckbert, Fundamentals of Texture Mapping and Image Warping, 1989
- * (the footprint of a pixel from derivatives). */
+ * Based on: L. Williams, Pyramidal Parametrics, 1983 (mipmaps); P. Heckbert, Fundamentals of Texture Mapping and Image
+ * Warping, 1989 (the footprint of a pixel from derivatives). */
 #ifndef TL_TEXTURE_C
 #define TL_TEXTURE_C
 
@@ -67,7 +67,10 @@ TL_INLINE texel_pair find_pair(vf a, vi size, tl_wrap wrap)
     return pair;
 }
 
-TL_INLINE vi find_nearest(vf a, vi size) { return vi_min(vi_floor(vf_mul(a, vf_from_vi(size))), vi_sub(size, vi_set1(1))); }
+TL_INLINE vi find_nearest(vf a, vi size)
+{
+    return vi_min(vi_floor(vf_mul(a, vf_from_vi(size))), vi_sub(size, vi_set1(1)));
+}
 
 TL_INLINE vf low_channel(vi texels) { return vf_from_vi(vi_low_half(texels)); }
 TL_INLINE vf high_channel(vi texels) { return vf_from_vi(vi_high_half(texels)); }

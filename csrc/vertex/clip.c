@@ -34,7 +34,8 @@ static inline void put_on_plane(double *p, int plane, const tl_view *view)
 }
 
 /* The point where the edge from a (inside) to b (outside) meets the plane: both weights are positive, so w stays so. */
-static inline clip_corner cut_edge(const clip_corner *a, const clip_corner *b, double da, double db, int plane, const tl_view *view)
+static inline clip_corner cut_edge(const clip_corner *a, const clip_corner *b, double da, double db, int plane,
+                                   const tl_view *view)
 {
     clip_corner cut;
     const double of_a = -db / (da - db), of_b = da / (da - db);
@@ -114,14 +115,14 @@ static inline int clip_turn(const tl_source *source, const int32_t *corners)
     clip_position(source, corners[0], a);
     clip_position(source, corners[1], b);
     clip_position(source, corners[2], c);
-    const double det = (a[0] * (b[1] * c[3] - b[3] * c[1]) - a[1] * (b[0] * c[3] - b[3] * c[0])) +
-                       a[3] * (b[0] * c[1] - b[1] * c[0]);
+    const double det =
+        (a[0] * (b[1] * c[3] - b[3] * c[1]) - a[1] * (b[0] * c[3] - b[3] * c[0])) + a[3] * (b[0] * c[1] - b[1] * c[0]);
     return (det < 0.0) - (det > 0.0);
 }
 
-/* The snap may dent a corner of the convex polygon inwards; a fan from that corner still turns one way only.  Corners that
- * changed places leave no such fan: then the one with the least area turned over, whose triangles that turn against the
- * source triangle are left out.  Returns the apex, and in *turn the sign of the triangles to draw. */
+/* The snap may dent a corner of the convex polygon inwards; a fan from that corner still turns one way only.  Corners
+ * that changed places leave no such fan: then the one with the least area turned over, whose triangles that turn
+ * against the source triangle are left out.  Returns the apex, and in *turn the sign of the triangles to draw. */
 static int fan_apex(const tl_pieces *p, int64_t first, int n, int source_turn, int *turn)
 {
     tl_int128 least = 0;
@@ -176,8 +177,8 @@ static void append_pieces(tl_pieces *p, const clip_corner *polygon, int n, int32
     p->n_vertices += n;
 }
 
-static void clip(const tl_source *source, const tl_vertex *vertices, const int32_t *triangles, const int32_t *ids, int64_t n_listed,
-                 const tl_view *view, tl_pieces *pieces)
+static void clip(const tl_source *source, const tl_vertex *vertices, const int32_t *triangles, const int32_t *ids,
+                 int64_t n_listed, const tl_view *view, tl_pieces *pieces)
 {
     clip_corner polygon[TL_MAX_CORNERS];
     pieces->n_vertices = pieces->n_pieces = 0;
@@ -224,6 +225,31 @@ static int64_t first_piece(const tl_pieces *p, int64_t id)
             high = middle;
     }
     return low;
+}
+
+/* What is drawn of a triangle: itself, or the pieces that clip planes leave of it; n of them, three of `corners`
+ * each. */
+typedef struct {
+    tl_vertex_set set;
+    const int32_t *corners;
+    int n, is_cut;
+} triangle_parts;
+
+static inline triangle_parts parts_of(const tl_scene *scene, int64_t i)
+{
+    const tl_pieces *pieces = scene->pieces;
+    triangle_parts parts = {scene->mesh, scene->triangles + 3 * i, 1, 0};
+    if (!is_clipped(&parts.set, parts.corners))
+        return parts;
+    parts.is_cut = 1, parts.n = 0;
+    if (!pieces)
+        return parts;
+    const int64_t first = first_piece(pieces, i);
+    while (first + parts.n < pieces->n_pieces && pieces->source[first + parts.n] == i)
+        parts.n++;
+    parts.set = piece_set(pieces, &scene->mesh);
+    parts.corners = pieces->triangles + 3 * first;
+    return parts;
 }
 
 #endif

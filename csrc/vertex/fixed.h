@@ -48,8 +48,17 @@ static inline void floor_divide_128(tl_int128 a, tl_int128 b, tl_int128 *quotien
     *remainder = r < 0 ? r + b : r;
 }
 
-/* Writes vertex i: its record, and its row of the wide table where there is one.  x_fx and y_fx are integers, infinite or NaN. */
-static inline void store_vertex(double x_fx, double y_fx, double z, int64_t i, tl_vertex *out, tl_wide *wide, tl_vertex_counts *n)
+/* Whether a window lies within 2^30 pixels of 0, so that 32-bit lanes hold its pixels. */
+static inline int is_near(const tl_window *window)
+{
+    const int64_t farthest = (int64_t)1 << 30;
+    return window->x_px > -farthest && window->x_px < farthest && window->y_px > -farthest && window->y_px < farthest;
+}
+
+/* Writes vertex i: its record, and its row of the wide table where there is one.  x_fx and y_fx are integers, infinite
+ * or NaN. */
+static inline void store_vertex(double x_fx, double y_fx, double z, int64_t i, tl_vertex *out, tl_wide *wide,
+                                tl_vertex_counts *n)
 {
     if (fabs(x_fx) < TL_NARROW_LIMIT && fabs(y_fx) < TL_NARROW_LIMIT && fabs(z) <= FLT_MAX) {
         out[i] = (tl_vertex){(int32_t)x_fx, (int32_t)y_fx, z};

@@ -27,7 +27,8 @@ static inline void clip_position(const tl_source *source, int64_t i, double *p)
         if (!source->matrix)
             p[k] = source->scalar == TL_F32 ? (double)v32[k] : v64[k];
         else if (source->scalar == TL_F32)
-            p[k] = (double)(((m32[4 * k] * v32[0] + m32[4 * k + 1] * v32[1]) + m32[4 * k + 2] * v32[2]) + m32[4 * k + 3]);
+            p[k] =
+                (double)(((m32[4 * k] * v32[0] + m32[4 * k + 1] * v32[1]) + m32[4 * k + 2] * v32[2]) + m32[4 * k + 3]);
         else
             p[k] = ((m64[4 * k] * v64[0] + m64[4 * k + 1] * v64[1]) + m64[4 * k + 2] * v64[2]) + m64[4 * k + 3];
     }
@@ -72,7 +73,8 @@ static inline void store_projected(const double *p, const tl_view *view, int64_t
 }
 
 /* One vertex, whatever it is. */
-static void project_one(const tl_source *source, int64_t i, const tl_view *view, tl_vertex *out, tl_wide *wide, tl_vertex_counts *counts)
+static void project_one(const tl_source *source, int64_t i, const tl_view *view, tl_vertex *out, tl_wide *wide,
+                        tl_vertex_counts *counts)
 {
     double p[4];
     clip_position(source, i, p);
@@ -141,8 +143,9 @@ TL_INLINE vm inside_lanes_f32(const vf *p, const tl_view *view)
 }
 
 /* `scalar`, `has_matrix` and `is_affine` are constants: a copy for each keeps the matrix in registers. */
-TL_INLINE int64_t project_lanes(const tl_source *source, int64_t first, int64_t end, const tl_view *view, tl_vertex *out, tl_wide *wide,
-                                tl_vertex_counts *counts, tl_scalar scalar, int has_matrix, int is_affine)
+TL_INLINE int64_t project_lanes(const tl_source *source, int64_t first, int64_t end, const tl_view *view,
+                                tl_vertex *out, tl_wide *wide, tl_vertex_counts *counts, tl_scalar scalar,
+                                int has_matrix, int is_affine)
 {
     const double unit = (double)(1 << view->subpixel_bits);
     const vd one = vd_set1(1.0), half = vd_set1(0.5), largest = vd_set1(FLT_MAX);
@@ -151,7 +154,8 @@ TL_INLINE int64_t project_lanes(const tl_source *source, int64_t first, int64_t 
     double m64[16];
     float m32[16];
     if (has_matrix)
-        memcpy(scalar == TL_F32 ? (void *)m32 : (void *)m64, source->matrix, scalar == TL_F32 ? sizeof m32 : sizeof m64);
+        memcpy(scalar == TL_F32 ? (void *)m32 : (void *)m64, source->matrix,
+               scalar == TL_F32 ? sizeof m32 : sizeof m64);
     int64_t i = first;
     /* loads read two numbers past the last row */
     for (; i + TL_LANES <= end && i + TL_LANES < source->n; i += TL_LANES) {
@@ -183,7 +187,8 @@ TL_INLINE int64_t project_lanes(const tl_source *source, int64_t first, int64_t 
     return i;
 }
 
-static tl_vertex_counts project(const tl_source *source, int64_t first, int64_t end, const tl_view *view, tl_vertex *out, tl_wide *wide)
+static tl_vertex_counts project(const tl_source *source, int64_t first, int64_t end, const tl_view *view,
+                                tl_vertex *out, tl_wide *wide)
 {
     tl_vertex_counts counts = {0, 0, 0};
     int64_t i = first;

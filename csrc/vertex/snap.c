@@ -24,8 +24,8 @@ static void snap_float(const tl_source *source, int64_t i, double scale, int wit
 }
 
 /* Integer pixels are shifted as integers: a float64 would lose the last bits beyond 2^53. */
-static void snap_integer(const tl_source *source, int64_t i, int subpixel_bits, int with_depth, tl_vertex *out, tl_wide *wide,
-                         tl_vertex_counts *counts)
+static void snap_integer(const tl_source *source, int64_t i, int subpixel_bits, int with_depth, tl_vertex *out,
+                         tl_wide *wide, tl_vertex_counts *counts)
 {
     const int64_t *v = (const int64_t *)source->data + i * source->n_components;
     const int64_t narrow = ((int64_t)1 << 30 >> subpixel_bits) - 1, limit = ((int64_t)1 << 62 >> subpixel_bits) - 1;
@@ -65,8 +65,8 @@ TL_INLINE void pixel_lanes(const tl_source *source, int64_t i, vd *v)
         v[k] = vd_from_vf(v32[k]);
 }
 
-static tl_vertex_counts snap(const tl_source *source, int64_t first, int64_t end, int subpixel_bits, int with_depth, tl_vertex *out,
-                             tl_wide *wide)
+static tl_vertex_counts snap(const tl_source *source, int64_t first, int64_t end, int subpixel_bits, int with_depth,
+                             tl_vertex *out, tl_wide *wide)
 {
     tl_vertex_counts counts = {0, 0, 0};
     const double scale = (double)(1 << subpixel_bits);
@@ -96,13 +96,15 @@ static int64_t first_bad_row(const int32_t *triangles, int64_t n_triangles, int6
 {
     const uint32_t n = (uint32_t)n_vertices;
     for (int64_t i = 0; i < n_triangles; i++)
-        if ((uint32_t)triangles[3 * i] >= n || (uint32_t)triangles[3 * i + 1] >= n || (uint32_t)triangles[3 * i + 2] >= n)
+        if ((uint32_t)triangles[3 * i] >= n || (uint32_t)triangles[3 * i + 1] >= n ||
+            (uint32_t)triangles[3 * i + 2] >= n)
             return i;
     return -1;
 }
 
 /* int64 indices as int32, checked: the first row with one outside [0, n_vertices), or -1. */
-static int64_t narrow_triangles(const int64_t *restrict triangles, int64_t n_triangles, int64_t n_vertices, int32_t *restrict out)
+static int64_t narrow_triangles(const int64_t *restrict triangles, int64_t n_triangles, int64_t n_vertices,
+                                int32_t *restrict out)
 {
     const uint64_t n = (uint64_t)n_vertices;
     const int64_t chunk = 3 * 1024;

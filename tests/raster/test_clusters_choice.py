@@ -11,6 +11,7 @@ from topleft._raster.clusters import Clusters, Patience, Survey
 from topleft._raster.view import View
 from topleft._render import instances
 from topleft._render.instances import PlacedScene, count_layers, survey_instances
+from topleft._render.through_lens import scene_through
 
 SIZE = (160, 120)
 CAMERA = tl.Camera.look_at((0, 0, 3), near=0.01, far=100.0)
@@ -95,11 +96,11 @@ def test_box_about_the_eye_is_no_layer():
 
 def test_survey_of_instances_weighs_them_by_their_triangles():
     scene = standing([(0, 0, 0), (500, 0, 0)], tl.Mesh(*FINE))
-    placed = PlacedScene(scene, CAMERA.clip_from_world(SIZE), View.parse(SIZE, {}), with_depth=True)
+    placed = PlacedScene(scene_through(scene, CAMERA, SIZE), View.parse(SIZE, {}), with_depth=True)
     assert survey_instances(placed).outside == 0.5
     small = tl.Mesh(*as_floats(*tl.scenes.blob(100_000)))
     both = tl.Scene([*scene[:1], (small, scene[1].transform)])
-    placed = PlacedScene(both, CAMERA.clip_from_world(SIZE), View.parse(SIZE, {}), with_depth=True)
+    placed = PlacedScene(scene_through(both, CAMERA, SIZE), View.parse(SIZE, {}), with_depth=True)
     share = len(small.triangles) / both.n_triangles
     assert survey_instances(placed).outside == pytest.approx(share, abs=1e-12)  # a quotient of sums of doubles
 

@@ -9,8 +9,8 @@ from layer_views import CAMERAS, CUBE, SIZE, SNAP_PX, SPHERE, look, pixels, scen
 from lens_cases import FRONT, LENSES, pierced
 
 import topleft as tl
+from topleft._render.fragments import camera_of
 from topleft._render.layers import LAYERS
-from topleft._render.scene_shade import camera_of
 
 ON_EACH_LENS = pytest.mark.parametrize("lens", LENSES.values(), ids=LENSES)
 STRAIGHT = CAMERAS["off-centre"]

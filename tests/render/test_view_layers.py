@@ -213,10 +213,10 @@ def test_only_what_is_asked_for_is_computed():
     assert "frags" not in vars(gbuffer)
     for name in ("color", "alpha", "silhouette", "depth", "triangle", "instance", "barycentric"):
         LAYERS[name](gbuffer)
-    assert "visible_parts" not in vars(gbuffer)
+    assert "parts" not in vars(gbuffer)
     for name in ("camera_normal", "world_normal"):
         LAYERS[name](gbuffer)
-    assert "points" not in vars(gbuffer.visible_parts[0])
+    assert "points" not in vars(gbuffer.parts[0])
 
 
 @pytest.mark.parametrize("size", [(0, 3), (3, 0)])

@@ -122,7 +122,7 @@ class Camera:
 
     def straightened(self) -> Camera:
         """The same camera without its lens."""
-        return replace(self, lens=None)
+        return self if self.lens is None else replace(self, lens=None)
 
     def project(self, points: npt.ArrayLike, size: tuple[int, int]) -> F64:
         """Where world points lie in a picture.

@@ -2,7 +2,7 @@
 
 In: points and triangles of two surfaces. Out: `Apart`: a distance that is met, and one that is not passed.
 
-The kernels (`csrc/nearest.c`, `csrc/reach.c`) look at triangles by branch and bound; this file puts the triangles of a
+The kernels (`csrc/mesh/nearest.c`, `reach.c`) look at triangles by branch and bound; this file puts the triangles of a
 surface in an order that keeps neighbours together, cuts the work in blocks, and adds what rounding may hide.
 """
 

@@ -1,17 +1,16 @@
 """From a mesh or a scene and a camera to pictures and layers.
 
-bend.py             bent edges: a mesh as a lens sees it, in triangles whose sides are straight in the picture to with
-layers.py           the registry of layers: what a view of a mesh or scene shows, by name
-notebook.py         what a result shows of itself in a notebook: a mesh its picture, a visibility buffer its triangles
-render.py           rendering: a mesh or scene and a camera to a picture, in one call
-scene_clusters.py   scenes of clustered meshes: instances are drawn from front to back, without what those before hide
-scene_cutout.py     cut-outs of scenes: what lies behind a hole may belong to another instance
-scene_draw.py       scenes into buffers: each instance is snapped and drawn over what the ones before have left
-scene_fragments.py  the visibility buffer of a scene: which instance, and which of its triangles, shows in each pixel
-scene_lens.py       scenes through a lens: each instance is bent by itself, then they are drawn as a scene that no len
-scene_render.py     pictures of scenes: each instance is shaded by itself, in the rectangle that it shows in
-sight.py            what a camera sees of a mesh or scene, and where in space each visible pixel lies: computed when i
-silhouette.py       silhouettes: where a mesh or scene is, seen by a camera, as a mask
-transparent.py      transparent pictures: every layer of a mesh or scene is shaded, then they are seen through each ot
-view_layers.py      layers for vision: depth, normals, positions, ids, flow and what else a view shows, as named array
+render.py        renders: a mesh or scene and a camera to a picture, or to its visibility buffer, in one call
+silhouette.py    draws silhouettes: where a mesh or scene is, as a mask
+transparent.py   draws transparent pictures: peels layers, shades each and composites them
+view_layers.py   draws layers for vision, as named arrays in one call: depth, normals, ids, flow and more
+layers.py        draws each layer by its name: the registry of all there are
+gbuffer.py       evaluates where in space each visible pixel lies, when a layer asks for it
+scene_shade.py   shades a visibility buffer, of a scene each instance by itself, where it shows
+holes.py         takes out what materials cut out, so that what lies behind a hole shows, of any instance
+instances.py     draws the instances of a scene into one buffer, whole or in clusters, from front to back
+fragments.py     holds what each instance shows: visibility buffers of scenes and through a lens, and their parts
+through_lens.py  finds what to draw of a mesh or scene: itself, or the parts that its lens makes of it
+bend.py          bends edges: splits triangles until their sides are straight in the picture of a lens
+notebook.py      makes the picture that a mesh or a visibility buffer shows of itself in a notebook
 """

@@ -1,4 +1,4 @@
-"""Bent edges: a mesh as a lens sees it, in triangles whose sides are straight in the picture to within a tolerance.
+"""Bends edges: splits triangles until their sides are straight in the picture of a lens, to within a tolerance.
 
 Input: vertices and triangles in world space, a camera with a lens. Output: `BentMesh`, which a camera without the lens
 draws as the lens would show the mesh.
@@ -21,6 +21,7 @@ import numpy.typing as npt
 from topleft._base.options import Cull, parse
 from topleft._camera.camera import Camera
 from topleft._camera.lens import FLIP, Lens
+from topleft._model.mesh import Mesh
 
 F64 = npt.NDArray[np.float64]
 I64 = npt.NDArray[np.int64]
@@ -92,6 +93,31 @@ class BentMesh:
     source: I64
     weights: F64
     is_outline: Bools
+
+    @property
+    def wholes(self) -> npt.NDArray[np.int32]:
+        """The triangle of the mesh that each part belongs to, (T' + 1,); the last is for part -1, none."""
+        return np.append(self.source, -1).astype(np.int32)
+
+    def mesh_of(self, mesh: Mesh) -> Mesh:
+        """Return the parts as a mesh: positions and attributes of the whole mesh where the parts have corners."""
+        corners = mesh.triangles[self.source]
+
+        def spread(values: npt.NDArray[Any]) -> F64:
+            of_parts = np.zeros((int(self.triangles.max(initial=-1)) + 1, values.shape[1]))
+            of_parts[self.triangles.ravel()] = np.matmul(self.weights, values[corners]).reshape(-1, values.shape[1])
+            return of_parts
+
+        rows = mesh.material_of_triangle
+        return Mesh(
+            spread(mesh.vertices),
+            self.triangles.astype(np.int32),
+            spread(mesh.vertex_normals()),
+            None if mesh.colors is None else np.rint(spread(mesh.colors)).astype(np.uint8),
+            None if mesh.uv is None else spread(mesh.uv).astype(np.float32),
+            mesh.materials,
+            None if rows is None else rows[self.source],
+        )
 
     def outline(self, projection: F64, cull: str) -> I64:
         """The parts of the mesh's own edges as triangles (N, 3) without area, each edge once, for `wireframe`.

@@ -1,4 +1,4 @@
-"""What a camera sees of a mesh or scene, and where in space each visible pixel lies: computed when it is asked for.
+"""Evaluates where in space each visible pixel of a mesh or scene lies, when a layer asks for it.
 
 Input: `Mesh` or `Scene`, `Camera`. Output: `GBuffer`, from which `layers` are taken.
 """
@@ -18,16 +18,14 @@ from topleft import _engine
 from topleft._base.threads import count_threads, parse_threads, run_parts
 from topleft._camera.camera import Camera
 from topleft._model.mesh import Mesh
-from topleft._model.scene import Instance, Scene
+from topleft._model.scene import Scene
 from topleft._raster.fragments import Fragments
 from topleft._raster.verbs import Rasterizer
-from topleft._render.fragments import Part, SceneFragments
-from topleft._render.holes import without_holes
+from topleft._render.fragments import VisiblePart, join, parts_of
+from topleft._render.holes import has_cuts, without_holes
 from topleft._render.render import rasterize_mesh
-from topleft._render.scene_shade import drawn_of
-from topleft._shade.alpha_test import cut_of
 
-__all__ = ["GBuffer", "PointKind", "VisiblePart", "project"]
+__all__ = ["GBuffer", "PointKind", "evaluate", "points_of", "project"]
 
 F64 = npt.NDArray[np.float64]
 
@@ -43,61 +41,37 @@ class PointKind(IntEnum):
 N_NUMBERS = {PointKind.LENGTH: 1, PointKind.FLOW: 2}
 
 
-@dataclass(frozen=True, eq=False)
-class VisiblePart:
-    """The visible pixels of one instance, in row order."""
+def evaluate(
+    part: VisiblePart,
+    what: PointKind,
+    rows: F64,
+    background: float,
+    *,
+    size: tuple[int, int] = (0, 0),
+    threads: int | None = None,
+    dtype: type[np.floating[Any]] = np.float32,
+) -> npt.NDArray[Any]:
+    """What pixels/points.c tells of the points of the pixels, from numbers that are rows (N, 4) times (x, y, z, 1).
 
-    part: Part
-    instance: Instance
+    Points are in the space of the mesh. A point has the float64 weights of its pixel in its triangle, before the snap,
+    relative to a corner; all is float64 and rounded once. `size` is that of the whole picture, for the flow.
+    """
+    frags, mesh = part.drawn
+    ids = np.require(frags.triangle, np.int32, ["C", "A"])
+    n = N_NUMBERS.get(what, len(rows))
+    out: npt.NDArray[Any] = np.empty((*ids.shape, n)[: 2 if n == 1 else 3], dtype)
+    half_size = size[0] / 2, size[1] / 2
+    points = _engine.Points(mesh.vertices, what, np.ascontiguousarray(rows), half_size, background, dtype is np.float64)
+    scene = frags._scene.with_inverse_w(ids.size)
+    n_threads = count_threads(parse_threads(threads), len(mesh.triangles))
+    run_parts(lambda first, end: points.fill(scene, ids, out, first, end - first), len(ids), n_threads)
+    return out
 
-    @property
-    def place(self) -> F64:
-        """World from object, (4, 4)."""
-        return self.instance.transform
 
-    @cached_property
-    def seen(self) -> npt.NDArray[np.bool_]:
-        """Where in the rectangle of the part the instance shows."""
-        return self.part.frags.mask
-
-    @cached_property
-    def drawn(self) -> tuple[Fragments, Mesh]:
-        """The fragments and the mesh as they were drawn: through a lens those of its parts."""
-        return drawn_of(self.part.frags, self.instance.mesh)
-
-    def evaluate(
-        self,
-        what: PointKind,
-        rows: F64,
-        background: float,
-        *,
-        size: tuple[int, int] = (0, 0),
-        threads: int | None = None,
-        dtype: type[np.floating[Any]] = np.float32,
-    ) -> npt.NDArray[Any]:
-        """What `csrc/points.c` tells of the points of the pixels, from numbers that are rows (N, 4) times (x, y, z, 1).
-
-        Points are in the space of the mesh. A point has the float64 weights of its pixel in its triangle, before the
-        snap, relative to a corner; all is float64 and rounded once. `size` is that of the whole picture, for the flow.
-        """
-        frags, mesh = self.drawn
-        ids = np.require(frags.triangle, np.int32, ["C", "A"])
-        n = N_NUMBERS.get(what, len(rows))
-        out: npt.NDArray[Any] = np.empty((*ids.shape, n)[: 2 if n == 1 else 3], dtype)
-        half_size = size[0] / 2, size[1] / 2
-        points = _engine.Points(
-            mesh.vertices, what, np.ascontiguousarray(rows), half_size, background, dtype is np.float64
-        )
-        scene = frags._scene.with_inverse_w(ids.size)
-        n_threads = count_threads(parse_threads(threads), len(mesh.triangles))
-        run_parts(lambda first, end: points.fill(scene, ids, out, first, end - first), len(ids), n_threads)
-        return out
-
-    @property
-    def points(self) -> F64:
-        """Where the pixels that are seen lie on the mesh, in its own space: (P, 3) float64."""
-        points: F64 = self.evaluate(PointKind.ROWS, np.eye(4)[:3], np.nan, dtype=np.float64)[self.seen]
-        return points
+def points_of(part: VisiblePart) -> F64:
+    """Where the pixels that are seen lie on the mesh, in its own space: (P, 3) float64."""
+    points: F64 = evaluate(part, PointKind.ROWS, np.eye(4)[:3], np.nan, dtype=np.float64)[part.seen]
+    return points
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,11 +104,6 @@ class GBuffer:
     transforms_to: F64 | None = None
     rasterizer: Rasterizer | None = None
 
-    @property
-    def instances(self) -> Sequence[Instance]:
-        """The instances of the scene; of a mesh the only one, which stands where it is."""
-        return self.subject.instances if isinstance(self.subject, Scene) else (Instance(self.subject),)
-
     @cached_property
     def frags(self) -> Fragments:
         """The visibility buffer, at the centres of the pixels, without what materials cut out."""
@@ -147,44 +116,31 @@ class GBuffer:
     @cached_property
     def has_holes(self) -> bool:
         """Whether materials cut something out."""
-        material = self.look.get("material")
-        return any(cut_of(instance.mesh, material) is not None for instance in self.instances)
+        return has_cuts(self.subject, self.look.get("material"))
 
     @property
     def _view(self) -> tuple[Mesh | Scene, Camera, tuple[int, int]]:
         return self.subject, self.camera, self.size
 
     def _cut(self, frags: Fragments) -> Fragments:
-        if not self.has_holes:
-            return frags
         return without_holes(frags, self.subject, self.camera, self.look.get("material"))
 
     @cached_property
-    def visible_parts(self) -> Sequence[VisiblePart]:
+    def parts(self) -> Sequence[VisiblePart]:
         """The visible pixels of each instance that shows any."""
-        frags = self.frags
-        if isinstance(frags, SceneFragments):
-            return [VisiblePart(part, self.instances[part.instance]) for part in frags.parts]
-        height, width = frags.depth.shape
-        return [VisiblePart(Part(0, slice(0, height), slice(0, width), frags), self.instances[0])]
+        return parts_of(self.frags, self.subject)
 
     def join(
         self, channels: tuple[int, ...], background: float, make: Callable[[VisiblePart], npt.NDArray[Any]]
     ) -> npt.NDArray[np.float32]:
-        """Return a picture (H, W, *channels) of what `make` gives for the rectangle of each visible."""
-        width, height = self.size
-        if not isinstance(self.frags, SceneFragments):
-            return make(self.visible_parts[0])
-        picture: npt.NDArray[np.float32] = np.full((height, width, *channels), background, np.float32)
-        for visible in self.visible_parts:
-            picture[visible.part.box][visible.seen] = make(visible)[visible.seen]
-        return picture
+        """Return a picture (H, W, *channels) of what `make` gives for the rectangle of each part."""
+        return join(self.parts, (*self.frags.depth.shape, *channels), background, make)
 
     def evaluate(
-        self, visible: VisiblePart, what: PointKind, rows: F64, background: float, *, size: tuple[int, int] = (0, 0)
+        self, part: VisiblePart, what: PointKind, rows: F64, background: float, *, size: tuple[int, int] = (0, 0)
     ) -> npt.NDArray[Any]:
-        """What `VisiblePart.evaluate` does, with the threads of this gbuffer."""
-        return visible.evaluate(what, rows, background, size=size, threads=self.options.get("threads"))
+        """What `evaluate` does, with the threads of this buffer."""
+        return evaluate(part, what, rows, background, size=size, threads=self.options.get("threads"))
 
 
 def moved(points: F64, matrix: F64) -> F64:

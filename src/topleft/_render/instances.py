@@ -1,4 +1,4 @@
-"""Scenes into buffers: each instance is snapped and drawn over what the ones before have left.
+"""Draws the instances of a scene into one buffer, whole or in clusters, from front to back.
 
 In: `Scene`, the matrix of a camera, the options of a view.  Out: `SceneFragments`, or a mask.
 """
@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ from topleft import _engine
 from topleft._base.memory import SCRATCH, FreshMemory, KeptMemory
 from topleft._base.options import DepthTest, Sampling, Sink, parse
 from topleft._base.threads import count_threads, run_parts
+from topleft._camera.camera import Camera
 from topleft._model.scene import Scene
 from topleft._raster import choices
 from topleft._raster.area import sum_areas
@@ -27,8 +28,9 @@ from topleft._raster.peel import check_peel, peel_scenes
 from topleft._raster.rasterize import canvas_of, refuse_many
 from topleft._raster.sampling import sample_positions
 from topleft._raster.snap import Snapped, snap_scene
-from topleft._raster.view import View
+from topleft._raster.view import View, ViewOptions
 from topleft._render.fragments import SceneDepthLayers, SceneFragments
+from topleft._render.through_lens import DrawnScene, scene_through
 
 __all__ = ["PlacedScene", "draw_scene", "draw_scene_coverage", "peel_scene"]
 
@@ -54,28 +56,37 @@ CORNERS = np.array([[k >> axis & 1 for axis in range(3)] for k in range(8)], np.
 
 
 class PlacedScene:
-    """A scene as a camera sees it: its instances are snapped when they are asked for."""
+    """A scene as a camera sees it: its instances are snapped when they are asked for.
 
-    def __init__(
-        self,
-        scene: Scene,
-        clip_from_world: NDArray[np.float64],
-        view: View,
-        *,
-        with_depth: bool,
-        may_cluster: bool = True,
-    ) -> None:
-        self.scene = scene
-        self.first_ids = scene.first_ids
-        self._clip_from_world = clip_from_world
+    Attributes
+    ----------
+    scene, whole : Scene
+        What is drawn, and what ids count the triangles of: the same but for a lens.
+    first_ids, whole_first_ids : (N + 1,) int64
+        Where the ids of each instance begin in these, and their end.
+    bent : sequence of BentMesh, optional
+        The parts that a lens makes of each instance.
+    """
+
+    def __init__(self, drawn: DrawnScene, view: View, *, with_depth: bool, may_cluster: bool = True) -> None:
+        self.scene, self.whole, self._clip_from_world, self.bent = self._drawn = drawn
+        self.first_ids, self.whole_first_ids = drawn.scene.first_ids, drawn.whole.first_ids
         self._view = view
         self._with_depth = with_depth
         self._may_cluster = may_cluster
 
     def of(self, scene: Scene) -> PlacedScene:
-        """Return another scene, made for this picture alone, seen in the same way."""
-        how = self._clip_from_world, self._view
-        return PlacedScene(scene, *how, with_depth=self._with_depth, may_cluster=False)
+        """Return another scene to draw, made for this picture alone, seen in the same way."""
+        drawn = self._drawn._replace(scene=scene)
+        return PlacedScene(drawn, self._view, with_depth=self._with_depth, may_cluster=False)
+
+    def whole_ids(self, ids: NDArray[np.int32]) -> NDArray[np.int32]:
+        """Return ids in terms of the whole scene: as they are, but for a lens."""
+        if self.bent is None:
+            return ids
+        firsts = zip(self.bent, self.whole_first_ids[:-1].tolist(), strict=True)
+        wholes = np.concatenate([*(one.source + first for one, first in firsts), [-1]]).astype(np.int32)
+        return wholes[ids]  # part -1, none, is the last
 
     def snap(self, i: int) -> Snapped:
         """Return an instance, snapped; in shared buffers it draws its own range of ids."""
@@ -215,9 +226,19 @@ def rows_of(
     return draw_rows
 
 
+def place(
+    scene: Scene, camera: Camera, size: tuple[int, int], options: dict[str, Any], *, with_depth: bool = True
+) -> tuple[PlacedScene, View]:
+    """Return the scene as the camera sees it, and the checked options of a verb."""
+    view = View.parse(size, cast(ViewOptions, options))
+    refuse_classic(view, "depth" if with_depth else "a scene")
+    drawn = scene_through(scene, camera, view.viewport, near_clip=view.near_clip)
+    return PlacedScene(drawn, view, with_depth=with_depth), view
+
+
 def draw_scene(
     scene: Scene,
-    clip_from_world: NDArray[np.float64],
+    camera: Camera,
     size: tuple[int, int],
     *,
     depth_test: str | None = "less",
@@ -225,9 +246,7 @@ def draw_scene(
     **options: Any,
 ) -> SceneFragments:
     """Return the visibility buffer of a scene; options as those of `rasterize`, without `out` and `transform`."""
-    view_options: Any = options
-    view = View.parse(size, view_options)
-    refuse_classic(view, "depth")
+    placed, view = place(scene, camera, size, options)
     refuse_many(view, "rasterize")
     test = None if depth_test is None else parse(DepthTest, "depth_test", depth_test)
     sink = {None: Sink.PAINT, DepthTest.LESS: Sink.NEAREST, DepthTest.GREATER: Sink.FARTHEST}[test]
@@ -235,7 +254,6 @@ def draw_scene(
     positions = [(0, 0)] if n == 1 else [(x, y) for x, y in sample_positions(n, view.grid_bits).tolist()]
     ids: NDArray[np.int32] = FRESH.empty("ids", (n, height, width), np.int32)
     depth: NDArray[np.float32] = FRESH.empty("depth", (n, height, width), np.float32)
-    placed = PlacedScene(scene, clip_from_world, view, with_depth=True)
     if width and height:
         targets = [_engine.Target(sink, *planes, None) for planes in zip(ids, depth, strict=True)]
         placed.draw(targets, positions, height)
@@ -245,32 +263,21 @@ def draw_scene(
 
 
 def peel_scene(
-    scene: Scene,
-    clip_from_world: NDArray[np.float64],
-    size: tuple[int, int],
-    *,
-    layers: int,
-    depth_test: str = "less",
-    **options: Any,
+    scene: Scene, camera: Camera, size: tuple[int, int], *, layers: int = 4, depth_test: str = "less", **options: Any
 ) -> SceneDepthLayers:
     """Return the nearest layers of a scene; options as those of `peel`, without `transform`."""
-    view_options: Any = options
-    view = View.parse(size, view_options)
+    placed, view = place(scene, camera, size, options)
     n, is_farthest = check_peel(view, layers, depth_test)
-    placed = PlacedScene(scene, clip_from_world, view, with_depth=True)
     snapped = [placed.snap(i) for i in range(len(scene))]  # a band of rows is drawn once, with all instances
     return SceneDepthLayers(*peel_scenes(SCRATCH, snapped, view, n, is_farthest=is_farthest), placed)
 
 
 def draw_scene_coverage(
-    scene: Scene, clip_from_world: NDArray[np.float64], size: tuple[int, int], out: object, **options: Any
+    scene: Scene, camera: Camera, size: tuple[int, int], out: object, **options: Any
 ) -> NDArray[Any]:
     """Return the mask of a scene, as `coverage` gives that of a mesh; options as there."""
-    view_options: Any = options
-    view = View.parse(size, view_options)
-    refuse_classic(view, "a scene")
+    placed, view = place(scene, camera, size, options, with_depth=False)
     width, height = view.size
-    placed = PlacedScene(scene, clip_from_world, view, with_depth=False)
     n = view.sampling.n_samples
     is_share = n > 1 or view.sampling is Sampling.AREA
     with canvas_of(FRESH, "coverage", out, (height, width), np.float32 if is_share else np.bool_) as (result, canvas):

@@ -1,4 +1,4 @@
-"""The registry of layers: what a view of a mesh or scene shows, by name.
+"""Draws the layers of a view by name: the registry of all there are.
 
 Input: a `GBuffer`. Output: an array for each name asked for; nothing else is computed.
 """
@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from topleft._render.gbuffer import GBuffer, PointKind, VisiblePart, project
+from topleft._render.fragments import VisiblePart, meshes_of
+from topleft._render.gbuffer import GBuffer, PointKind, points_of, project
 from topleft._render.render import picture_of, render
-from topleft._render.scene_shade import camera_of
 from topleft._render.silhouette import silhouette as draw_silhouette
 from topleft._render.transparent import render_transparent
 from topleft._shade.shade import shade_normals
@@ -96,31 +96,29 @@ def world_position(gbuffer: GBuffer) -> Array:
 
 def camera_normal(gbuffer: GBuffer) -> Array:
     """Unit normal in eye space, (H, W, 3) float32, 0 where nothing is."""
-    return gbuffer.join((3,), 0.0, lambda visible: normals_of(gbuffer, visible, np.eye(3)))
+    return gbuffer.join((3,), 0.0, lambda part: normals_of(gbuffer, part, np.eye(3)))
 
 
 def world_normal(gbuffer: GBuffer) -> Array:
     """Unit normal in the world, (H, W, 3) float32, 0 where nothing is."""
     back = gbuffer.camera.view[:3, :3].T  # the transpose, where positions take the inverse
-    return gbuffer.join((3,), 0.0, lambda visible: normals_of(gbuffer, visible, back))
+    return gbuffer.join((3,), 0.0, lambda part: normals_of(gbuffer, part, back))
 
 
-def normals_of(gbuffer: GBuffer, visible: VisiblePart, turn: F64) -> npt.NDArray[np.float32]:
+def normals_of(gbuffer: GBuffer, part: VisiblePart, turn: F64) -> npt.NDArray[np.float32]:
     """Unit normals (H, W, 3) of a part, from eye space by the matrix (3, 3) `turn`, on the side that is seen."""
-    own = camera_of(gbuffer.camera, visible.instance).straightened()
-    return shade_normals(*visible.drawn, own, turn, threads=gbuffer.options.get("threads"))
+    return shade_normals(*part.drawn, part.camera(gbuffer.camera), turn, threads=gbuffer.options.get("threads"))
 
 
 def uv(gbuffer: GBuffer) -> Array:
     """Texture coordinates, (H, W, 2) float32, NaN where nothing is or a mesh has none."""
-    if all(getattr(instance.mesh, "uv", None) is None for instance in gbuffer.instances):
+    if all(mesh.uv is None for mesh in meshes_of(gbuffer.subject)):
         raise ValueError("layer 'uv' needs a mesh that has texture coordinates")
 
-    def make(visible: VisiblePart) -> Array:
-        coordinates = getattr(visible.instance.mesh, "uv", None)
-        if coordinates is None:
-            return np.full((*visible.seen.shape, 2), np.nan, np.float32)
-        return visible.part.frags.interpolate(coordinates, background=np.nan)
+    def make(part: VisiblePart) -> Array:
+        if part.mesh.uv is None:
+            return np.full((*part.seen.shape, 2), np.nan, np.float32)
+        return part.frags.interpolate(part.mesh.uv, background=np.nan)
 
     return gbuffer.join((2,), np.nan, make)
 
@@ -131,16 +129,16 @@ def flow(gbuffer: GBuffer) -> Array:
         raise ValueError("layer 'flow' needs camera_to or transforms_to")
     begin, end, size = gbuffer.camera, gbuffer.camera_to or gbuffer.camera, gbuffer.size
 
-    def make(visible: VisiblePart) -> Array:
-        here = visible.place
-        there = here if gbuffer.transforms_to is None else gbuffer.transforms_to[visible.part.instance]
+    def make(part: VisiblePart) -> Array:
+        here = part.place
+        there = here if gbuffer.transforms_to is None else gbuffer.transforms_to[part.i]
         if begin.lens is None and end.lens is None:
             ways = [camera.clip_from_eye(size) @ camera.view @ at for camera, at in ((begin, here), (end, there))]
             rows = np.concatenate([way[[0, 1, 3]] for way in ways])
-            return gbuffer.evaluate(visible, PointKind.FLOW, rows, np.nan, size=size)
-        picture = np.full((*visible.seen.shape, 2), np.nan, np.float32)
-        points = visible.points
-        picture[visible.seen] = project(points, end, there, size) - project(points, begin, here, size)
+            return gbuffer.evaluate(part, PointKind.FLOW, rows, np.nan, size=size)
+        picture = np.full((*part.seen.shape, 2), np.nan, np.float32)
+        points = points_of(part)
+        picture[part.seen] = project(points, end, there, size) - project(points, begin, here, size)
         return picture
 
     return gbuffer.join((2,), np.nan, make)
@@ -177,7 +175,7 @@ def draw_layers(names: str | Iterable[str], gbuffer: GBuffer) -> dict[str, Array
     Raises
     ------
     ValueError
-        If there is no such layer, or one cannot be had of this gbuffer.
+        If there is no such layer, or one cannot be had of this view.
     """
     checked = check_layers(names)
     # Colours first: in memory that is kept they may need other samples than the visibility buffer of all others.

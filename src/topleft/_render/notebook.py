@@ -1,4 +1,4 @@
-"""What a result shows of itself in a notebook: a mesh its picture, a visibility buffer its triangles.
+"""Makes the picture that a mesh or a visibility buffer shows of itself in a notebook.
 
 Input: `Mesh`, `Fragments`. Output: PNG as bytes, which their `_repr_png_` returns. Arrays stay plain arrays;
 docs/design/fields.md tells why.

@@ -1,4 +1,4 @@
-"""Rendering: a mesh or scene and a camera to a picture, in one call.
+"""Renders: a mesh or scene and a camera to a picture, in one call.
 
 Input: `Mesh` or `Scene`, `Camera`. Output: the picture (H, W, 4) uint8 of `render`, or the visibility buffer of
 `rasterize_mesh`.
@@ -24,10 +24,11 @@ from topleft._raster.clusters import Clusters
 from topleft._raster.fragments import Fragments
 from topleft._raster.verbs import Rasterizer, rasterize, wireframe
 from topleft._raster.view import View
-from topleft._render.fragments import BentFragments
+from topleft._render.fragments import BentFragments, camera_of, scene_of
 from topleft._render.holes import without_holes
-from topleft._render.scene_shade import camera_of, cull_of, shade
-from topleft._render.through_lens import draw_seen, seen_through
+from topleft._render.instances import draw_scene
+from topleft._render.scene_shade import shade
+from topleft._render.through_lens import seen_through
 from topleft._shade.shade import LookOptions
 
 DEFAULT_SIZE = (640, 480)
@@ -104,36 +105,46 @@ def render(
     >>> tl.render(mesh, size=(64, 48), background=(0, 0, 0, 0))[24, 32].tolist()[3]
     255
     """
-    mesh = mesh if isinstance(mesh, Scene) else as_mesh(mesh)
-    camera = default_camera(mesh, size) if camera is None else camera
-    mesh = detailed(mesh, camera, size, tolerance, cull=cull, material=look.get("material"))
-    frags = rasterize_mesh(mesh, camera, size, cull=cull, threads=threads, sampling=sampling, rasterizer=rasterizer)
+    subject, camera = subject_of(mesh, camera, size, tolerance, cull=cull, material=look.get("material"))
+    frags = rasterize_subject(
+        subject, camera, size, rasterizer, cull=cull, threads=threads, sampling=sampling
+    )
     return picture_of(
-        frags, mesh, camera, shading=shading, color=color, background=background, cull=cull, edges=edges,
+        frags, subject, camera, shading=shading, color=color, background=background, cull=cull, edges=edges,
         threads=threads, **look,
     )  # fmt: skip
 
 
+def subject_of(
+    mesh: MeshLike | Scene, camera: Camera | None, size: tuple[int, int], tolerance: float = 0.0, **options: Any
+) -> tuple[Mesh | Scene, Camera]:
+    """The mesh or scene as it is drawn within a tolerance, and who looks; options as for `choose_detail`."""
+    subject = mesh if isinstance(mesh, Scene) else as_mesh(mesh)
+    if camera is None:
+        width, height = size
+        framed = subject.extreme_points() if isinstance(subject, Scene) else subject
+        camera = Camera.framing(framed, aspect=width / height if width > 0 and height > 0 else 1.0)
+    return detailed(subject, camera, size, tolerance, **options), camera
+
+
 def picture_of(
     frags: Fragments,
-    mesh: Mesh | Scene,
+    subject: Mesh | Scene,
     camera: Camera,
     *,
-    shading: str = "smooth",
-    color: tuple[int, ...] = DEFAULT_COLOR,
-    background: tuple[int, ...] = WHITE,
     cull: str = "none",
     edges: bool = False,
     threads: int | None = None,
-    **look: Unpack[LookOptions],
+    background: tuple[int, ...] = WHITE,
+    **look: Any,
 ) -> npt.NDArray[np.uint8]:
     """The picture of the visibility buffer that `rasterize_mesh` returned; options as for `render`.
 
     What materials cut out is taken out of the buffer.
     """
-    frags = without_holes(frags, mesh, camera, look.get("material"), threads=threads)
-    picture = shade(frags, mesh, camera, shading=shading, color=color, background=background, threads=threads, **look)
-    for instance in (mesh if isinstance(mesh, Scene) else [Instance(mesh)]) if edges else []:
+    frags = without_holes(frags, subject, camera, look.get("material"), threads=threads)
+    picture = shade(frags, subject, camera, background=background, threads=threads, **look)
+    for instance in scene_of(subject) if edges else ():
         own_camera, own_cull = camera_of(camera, instance), cull_of(cull, instance)
         draw_edges(picture, frags, instance.mesh, own_camera, cull=own_cull, threads=threads)
     return picture
@@ -175,27 +186,33 @@ def rasterize_mesh(
     ValueError
         If the mesh has no triangles and no camera is given, an option is unknown, or `rasterizer` has another size.
     """
-    mesh = mesh if isinstance(mesh, Scene) else as_mesh(mesh)
-    camera = default_camera(mesh, size) if camera is None else camera
     window = {"viewport": view.get("viewport"), "origin": view.get("origin", (0, 0))}
-    mesh = detailed(mesh, camera, size, tolerance, cull=cull, **window)
-    view |= {"cull": cull, "threads": threads}
-    if isinstance(mesh, Scene):
-        return draw_seen(mesh, camera, size, **view)
-    drawn = seen_through(mesh, camera, view.get("viewport") or size, near_clip=view.get("near_clip", True))
+    subject, camera = subject_of(mesh, camera, size, tolerance, cull=cull, **window)
+    return rasterize_subject(subject, camera, size, rasterizer, cull=cull, threads=threads, **view)
+
+
+def rasterize_subject(
+    subject: Mesh | Scene, camera: Camera, size: tuple[int, int], rasterizer: Rasterizer | None = None, **view: Any
+) -> Fragments:
+    """The visibility buffer of what `subject_of` returned; options as for `rasterize_mesh`."""
+    if isinstance(subject, Scene):
+        return draw_scene(subject, camera, size, **view)
+    drawn = seen_through(subject, camera, view.get("viewport") or size, near_clip=view.get("near_clip", True))
     view["transform"] = drawn.transform
     if rasterizer is not None and rasterizer.size != tuple(size):
         raise ValueError(f"rasterizer must have the size {tuple(size)}, got {rasterizer.size}")
     if drawn.bent is None:
-        view.setdefault("plan", StaticPlan(mesh))
+        view.setdefault("plan", StaticPlan(subject))
     if rasterizer is None:
         frags = rasterize(drawn.vertices, drawn.triangles, size, **view)
     else:
         frags = rasterizer.rasterize(drawn.vertices, drawn.triangles, **view)
-    if drawn.bent is None:
-        return frags
-    bent = drawn.bent
-    return BentFragments(frags, bent.triangles, bent.source, bent.weights, mesh.triangles, len(mesh.vertices))
+    return frags if drawn.bent is None else BentFragments(frags, drawn.bent, subject)
+
+
+def cull_of(cull: str, instance: Instance) -> str:
+    """What `cull` leaves out of an instance, whose winding is turned over where it is mirrored."""
+    return {"back": "front", "front": "back"}.get(cull, cull) if instance.is_mirrored else cull
 
 
 def draw_edges(
@@ -238,13 +255,6 @@ def depth_behind(depth: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
         slope = np.fmin(before, after)  # NaN: nothing on either side
         behind += np.where(np.isfinite(slope), slope, 0)
     return behind
-
-
-def default_camera(mesh: Mesh | Scene, size: tuple[int, int]) -> Camera:
-    """The three-quarter view of the mesh or scene with y up, for a picture of this size."""
-    width, height = size
-    subject = mesh.extreme_points() if isinstance(mesh, Scene) else mesh
-    return Camera.framing(subject, aspect=width / height if width > 0 and height > 0 else 1.0)
 
 
 class StaticPlan:

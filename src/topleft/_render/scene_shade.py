@@ -20,44 +20,29 @@ from topleft._model.mesh import Mesh
 from topleft._model.scene import Instance, Scene
 from topleft._model.texture import Texture
 from topleft._raster.fragments import Fragments
-from topleft._render.fragments import BentFragments, SceneFragments
+from topleft._render.fragments import SceneFragments, VisiblePart, join, meshes_of, parts_of
 from topleft._shade.look import is_similarity
 from topleft._shade.shade import Shading, ShadingOptions, shade_mesh, shade_numbers, shade_samples
 
-__all__ = ["camera_of", "cull_of", "drawn_of", "shade"]
+__all__ = ["shade"]
 
 U8 = npt.NDArray[np.uint8]
 
 
-def camera_of(camera: Camera, instance: Instance) -> Camera:
-    """The camera as it stands in the object space of an instance."""
-    return replace(camera, view=camera.view @ instance.transform)
-
-
-def drawn_of(frags: Fragments, mesh: Mesh) -> tuple[Fragments, Mesh]:
-    """The fragments and the mesh as they were drawn: through a lens those of its parts."""
-    return (frags.parts, frags.mesh_of_parts(mesh)) if isinstance(frags, BentFragments) else (frags, mesh)
-
-
-def cull_of(cull: str, instance: Instance) -> str:
-    """What `cull` leaves out of an instance, whose winding is turned over where it is mirrored."""
-    return {"back": "front", "front": "back"}.get(cull, cull) if instance.is_mirrored else cull
-
-
-def lights_of(lights: Sequence[Light] | None, camera: Camera, instance: Instance) -> Sequence[Light] | None:
-    """The lights as they stand in the object space of an instance, as bright as they are in the world."""
-    if lights is None:
-        return None
+def in_space_of(instance: Instance | None, options: ShadingOptions, camera: Camera) -> ShadingOptions:
+    """The options with lights as they stand in the object space of an instance, as bright as they are in the world."""
+    if options.lights is None or instance is None:
+        return options
     object_from_world = np.linalg.inv(instance.transform)
     # `ShadingInputs` measures distances in object space where the way to the eye keeps angles, else in eye space.
     in_object_space = is_similarity(camera.view @ instance.transform)
     scale = np.cbrt(abs(np.linalg.det(instance.transform[:3, :3]))) if in_object_space else 1.0
     moved = []
-    for light in lights:
+    for light in options.lights:
         at = np.array([*light.at, light.kind == LightKind.POINT])
         at = at if light.space == LightSpace.EYE else object_from_world @ at
         moved.append(replace(light, at=tuple(at[:3]), falloff=float(light.falloff * scale**2)))
-    return moved
+    return replace(options, lights=moved)
 
 
 def shade(
@@ -123,49 +108,44 @@ def shade(
     TypeError
         If `frags`, the mesh, a light, material or texture is none.
     """
+    check_drawn(frags, mesh)
     options = ShadingOptions.parse(
         shading, color, background, depth_range, lights, ambient, material, matcap, fog, threads
     )
-    check_drawn(frags, mesh)
     if options.mode in (Shading.IDS, Shading.DEPTH):
         return shade_numbers(frags, camera, options)
-    if isinstance(mesh, Scene):
-        return shade_samples(frags, lambda one: shade_instances(one, mesh, camera, options), options.background)
-    own_camera = camera.straightened() if isinstance(frags, BentFragments) else camera
-    return shade_mesh(*drawn_of(frags, mesh), own_camera, options)
 
+    def shade_part(part: VisiblePart) -> U8:
+        return shade_mesh(*part.drawn, part.camera(camera), in_space_of(part.instance, options, camera))
 
-def shade_instances(frags: Fragments, scene: Scene, camera: Camera, options: ShadingOptions) -> U8:
-    """The picture (H, W, 4) uint8 of a scene, one sample a pixel: each instance is shaded by itself."""
-    picture = np.empty((*frags.id.shape, 4), np.uint8)
-    picture[...] = options.background
-    assert isinstance(frags, SceneFragments)
-    for part in frags.parts:
-        instance = scene[part.instance]
-        lights = lights_of(options.lights, camera, instance)
-        own_camera = camera_of(camera, instance).straightened()
-        own = shade_mesh(*drawn_of(part.frags, instance.mesh), own_camera, replace(options, lights=lights))
-        seen = part.frags.mask
-        picture[part.box][seen] = own[seen]
-    return picture
+    def shade_one(sample: Fragments) -> U8:
+        return join(parts_of(sample, mesh), (*sample.id.shape, 4), options.background, shade_part, np.uint8)
+
+    # The kernel resolves the samples of one mesh; those of several are resolved here.
+    return shade_one(frags) if isinstance(mesh, Mesh) else shade_samples(frags, shade_one, options.background)
 
 
 def check_drawn(frags: Fragments, mesh: Mesh | Scene) -> None:
     """Raise an error unless the mesh or scene can be the one that was drawn: kernels index its arrays by fragments."""
     if not isinstance(frags, Fragments):
         raise TypeError(f"frags must be Fragments, got {type(frags).__name__}")
-    kind = Scene if isinstance(frags, SceneFragments) else Mesh
+    whole = frags.whole if isinstance(frags, SceneFragments) else None
+    kind = Mesh if whole is None else Scene
     if not isinstance(mesh, kind):
         raise TypeError(f"mesh must be a {kind.__name__}, got {type(mesh).__name__}")
-    meshes = [mesh] if isinstance(mesh, Mesh) else [instance.mesh for instance in mesh]
-    given = [(len(one.vertices), len(one.triangles)) for one in meshes]
-    counts = frags.n_drawn if isinstance(frags, SceneFragments) else [(frags._n_vertices, frags._n_triangles)]
-    if len(counts) != len(given):
-        raise ValueError(f"mesh must be the scene that was drawn, of {len(counts)} instances, got one of {len(given)}")
-    for k, (drawn, own) in enumerate(zip(counts, given, strict=True)):
-        if drawn != own:
-            name = "mesh" if isinstance(mesh, Mesh) else f"mesh[{k}]"
+    given = counts_of(mesh)
+    drawn = [(frags._n_vertices, frags._n_triangles)] if whole is None else counts_of(whole)
+    if len(drawn) != len(given):
+        raise ValueError(f"mesh must be the scene that was drawn, of {len(drawn)} instances, got one of {len(given)}")
+    for k, (old, new) in enumerate(zip(drawn, given, strict=True)):
+        if old != new:
+            name = "mesh" if whole is None else f"mesh[{k}]"
             raise ValueError(
-                f"{name} must be the one that was drawn, with {drawn[0]} vertices and {drawn[1]} triangles, "
-                f"got {own[0]} and {own[1]}"
+                f"{name} must be the one that was drawn, with {old[0]} vertices and {old[1]} triangles, "
+                f"got {new[0]} and {new[1]}"
             )
+
+
+def counts_of(subject: Mesh | Scene) -> list[tuple[int, int]]:
+    """Vertices and triangles of the mesh of each instance."""
+    return [(len(mesh.vertices), len(mesh.triangles)) for mesh in meshes_of(subject)]

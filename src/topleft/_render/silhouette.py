@@ -1,4 +1,4 @@
-"""Silhouettes: where a mesh or scene is, seen by a camera, as a mask.
+"""Draws silhouettes: where a mesh or scene is, seen by a camera, as a mask.
 
 Input: `Mesh` or `Scene`, `Camera`. Output: a mask (H, W), bool or float32.
 """
@@ -10,13 +10,12 @@ from typing import Any
 import numpy.typing as npt
 
 from topleft._camera.camera import Camera
-from topleft._lod.detail import detailed
-from topleft._model.adapt import MeshLike, as_mesh
+from topleft._model.adapt import MeshLike
 from topleft._model.scene import Scene
 from topleft._raster.verbs import coverage
 from topleft._render.instances import draw_scene_coverage
-from topleft._render.render import DEFAULT_SIZE, default_camera
-from topleft._render.through_lens import scene_through, seen_through
+from topleft._render.render import DEFAULT_SIZE, subject_of
+from topleft._render.through_lens import seen_through
 
 __all__ = ["silhouette"]
 
@@ -83,16 +82,12 @@ def silhouette(
     >>> round(float(tl.silhouette(mesh, size=(8, 6), sampling="area", cull="back").sum()), 2)
     16.2
     """
-    mesh = mesh if isinstance(mesh, Scene) else as_mesh(mesh)
-    camera = default_camera(mesh, size) if camera is None else camera
     window = {"viewport": view.get("viewport"), "origin": view.get("origin", (0, 0))}
-    mesh = detailed(mesh, camera, size, tolerance, cull=cull, **window)
+    subject, camera = subject_of(mesh, camera, size, tolerance, cull=cull, **window)
     options: Any = {"sampling": sampling, "cull": cull, "threads": threads} | view
-    frame = view.get("viewport") or size
-    if isinstance(mesh, Scene):
-        seen = scene_through(mesh, camera, frame, near_clip=view.get("near_clip", True))
-        return draw_scene_coverage(seen.scene, seen.clip_from_world, size, out, **options)
-    drawn = seen_through(mesh, camera, frame, near_clip=view.get("near_clip", True))
+    if isinstance(subject, Scene):
+        return draw_scene_coverage(subject, camera, size, out, **options)
+    drawn = seen_through(subject, camera, view.get("viewport") or size, near_clip=view.get("near_clip", True))
     options["transform"] = drawn.transform
     mask: npt.NDArray[Any] = coverage(drawn.vertices, drawn.triangles, size, out=out, **options)
     return mask

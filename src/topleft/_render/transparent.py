@@ -1,4 +1,4 @@
-"""Transparent pictures: every layer of a mesh or scene is shaded, then they are seen through each other.
+"""Draws transparent pictures: shades every layer of a mesh or scene, then composites them.
 
 Input: a mesh or `Scene`, `Camera`. Output: a picture (H, W, 4) uint8, sRGB with alpha.
 """
@@ -12,18 +12,16 @@ import numpy.typing as npt
 
 from topleft._base.color import as_color
 from topleft._camera.camera import Camera
-from topleft._lod.detail import detailed
-from topleft._model.adapt import MeshLike, as_mesh
+from topleft._model.adapt import MeshLike
 from topleft._model.material import Material
 from topleft._model.scene import Scene
 from topleft._raster.composite import composite
 from topleft._raster.peel import DepthLayers, peel
-from topleft._render.fragments import SceneDepthLayers
-from topleft._render.holes import cuts_of, draw_cuts, solid_scene, surfaces_of
+from topleft._render.fragments import SceneDepthLayers, scene_of
+from topleft._render.holes import draw_holed, has_cuts, holed_instances, solid_scene
 from topleft._render.instances import peel_scene
-from topleft._render.render import DEFAULT_SIZE, WHITE, default_camera
+from topleft._render.render import DEFAULT_SIZE, WHITE, subject_of
 from topleft._render.scene_shade import shade
-from topleft._shade.alpha_test import cut_of
 
 __all__ = ["render_transparent", "visible_layers"]
 
@@ -76,24 +74,21 @@ def render_transparent(
     >>> tl.render_transparent(mesh, size=(64, 48), opacity=0.5, background=(0, 0, 0, 0))[24, 32].tolist()[3]
     192
     """
-    mesh = mesh if isinstance(mesh, Scene) else as_mesh(mesh)
-    camera = default_camera(mesh, size) if camera is None else camera
     material = look.get("material")
-    mesh = detailed(mesh, camera, size, tolerance, cull=cull, material=material)
+    subject, camera = subject_of(mesh, camera, size, tolerance, cull=cull, material=material)
     ground = as_color("background", background, 4)
-    if not isinstance(mesh, Scene) and cut_of(mesh, material) is not None:
-        mesh = Scene([mesh])  # which is the same picture
     options: dict[str, Any] = {"layers": layers, "cull": cull, "threads": threads}
-    if isinstance(mesh, Scene):
-        found = solid_layers(mesh, camera, size, material, **options)
+    if has_cuts(subject, material):
+        subject = scene_of(subject)  # which is the same picture
+        found: DepthLayers = solid_layers(subject, camera, size, material, **options)
     else:
-        found = visible_layers(mesh, camera, size, **options)
+        found = visible_layers(subject, camera, size, **options)
     pictures = np.zeros((size[1], size[0], layers, 3), np.uint8)
     for k in range(layers):
         frags = found.layer(k)
         if not frags.mask.any():
             break
-        own = shade(frags, mesh, camera, shading=shading, background=CLEAR, **look)
+        own = shade(frags, subject, camera, shading=shading, background=CLEAR, **look)
         pictures[:, :, k] = own[..., :3]
     picture: npt.NDArray[np.uint8] = composite(found, pictures, opacity=opacity, background=ground, threads=threads)
     return picture
@@ -107,15 +102,22 @@ def solid_layers(
     *,
     threads: int | None,
     **options: Any,
-) -> DepthLayers:
+) -> SceneDepthLayers:
     """The nearest layers of a scene without what its materials, or this one, cut out."""
-    cuts = cuts_of(scene, material)
-    found = visible_layers(solid_scene(scene, cuts), camera, size, threads=threads, **options)
-    if not any(cuts) or not isinstance(found, SceneDepthLayers) or 0 in size:
+    check_straight(camera)
+    holed = holed_instances(scene, camera, material)
+    found = peel_scene(solid_scene(scene, holed), camera, size, threads=threads, **options)
+    if 0 in size:
         return found
     whole = SceneDepthLayers(*found.planes, found.placed.of(scene))
-    draw_cuts(whole.placed, surfaces_of(scene, camera), cuts, *whole.planes, is_peeled=True, threads=threads)
+    draw_holed(whole.placed, holed, *whole.planes, is_peeled=True, threads=threads)
     return whole
+
+
+def check_straight(camera: Camera) -> None:
+    """Raise an error if the camera has a lens."""
+    if camera.lens is not None:
+        raise ValueError("layers are not peeled through a lens, but camera has one: take its straightened()")
 
 
 def visible_layers(
@@ -140,11 +142,9 @@ def visible_layers(
     ValueError
         If the mesh has no triangles and no camera is given, an option is out of range, or the camera has a lens.
     """
-    mesh = mesh if isinstance(mesh, Scene) else as_mesh(mesh)
-    camera = default_camera(mesh, size) if camera is None else camera
-    if camera.lens is not None:
-        raise ValueError("layers are not peeled through a lens, but camera has one: take its straightened()")
+    subject, camera = subject_of(mesh, camera, size)
+    check_straight(camera)
+    if isinstance(subject, Scene):
+        return peel_scene(subject, camera, size, **options)
     transform = camera.clip_from_world(options.get("viewport") or size)
-    if isinstance(mesh, Scene):
-        return peel_scene(mesh, transform, size, **{"layers": 4} | options)
-    return peel(mesh.vertices, mesh.triangles, size, transform=transform, **options)
+    return peel(subject.vertices, subject.triangles, size, transform=transform, **options)

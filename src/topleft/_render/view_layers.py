@@ -1,4 +1,4 @@
-"""Layers for vision: depth, normals, positions, ids, flow and what else a view shows, as named arrays in one call.
+"""Draws layers for vision, as named arrays in one call: depth, normals, positions, ids, flow and more.
 
 Input: `Mesh` or `Scene`, `Camera`, names. Output: `ViewLayers`, arrays by name; nothing else is computed.
 """
@@ -15,13 +15,13 @@ import numpy.typing as npt
 
 from topleft._camera.camera import Camera
 from topleft._io.layer_files import save_layers
-from topleft._lod.detail import detailed
-from topleft._model.adapt import MeshLike, as_mesh
+from topleft._model.adapt import MeshLike
 from topleft._model.scene import Scene
 from topleft._raster.verbs import Rasterizer
+from topleft._render.fragments import meshes_of
 from topleft._render.gbuffer import GBuffer
 from topleft._render.layers import LAYERS, check_layers, draw_layers
-from topleft._render.render import DEFAULT_SIZE, default_camera
+from topleft._render.render import DEFAULT_SIZE, subject_of
 from topleft._shade.shade import LookOptions
 
 __all__ = ["ViewLayers", "gbuffer_of", "render_layers"]
@@ -205,17 +205,15 @@ def gbuffer_of(
     """
     for option in sorted(look.keys() - (GLASS_LOOKS if "opacity" in look else LOOKS)):
         raise TypeError(f"there is no option {option!r} of a picture")
-    subject = mesh if isinstance(mesh, Scene) else as_mesh(mesh)
-    n_instances = len(subject) if isinstance(subject, Scene) else 1
-    camera = default_camera(subject, size) if camera is None else camera
+    subject, camera = subject_of(mesh, camera, size, tolerance, cull=cull, material=look.get("material"))
     return GBuffer(
-        subject=detailed(subject, camera, size, tolerance, cull=cull, material=look.get("material")),
+        subject=subject,
         camera=camera,
         size=size,
         options={"cull": cull, "threads": threads},
         look=look,
         camera_to=camera_to,
-        transforms_to=None if transforms_to is None else as_transforms(transforms_to, n_instances),
+        transforms_to=None if transforms_to is None else as_transforms(transforms_to, len(meshes_of(subject))),
         rasterizer=rasterizer,
     )
 

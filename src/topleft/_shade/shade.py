@@ -1,9 +1,9 @@
-"""Shading: from the visibility buffer to colours, for the pixels in which a triangle shows.
+"""Shades the visible pixels of one mesh, resolves several samples a pixel, gives distances and normals.
 
 Input: `Fragments`, the mesh and the camera they were made with. Output: a picture (H, W, 4) uint8, sRGB with alpha.
 
 Light is added up in linear light: colours are decoded from sRGB, lit, and encoded again, so that a surface that gets
-half the light is half as bright on a screen. The kernel is csrc/shade.c.
+half the light is half as bright on a screen. The kernel is csrc/shade/shade.c.
 
 Based on: Phong, B. T., "Illumination for Computer Generated Pictures", Communications of the ACM 18(6), 1975 (normals
 interpolated, light computed in the pixel); Blinn, J. F., "Models of Light Reflection for Computer Synthesized
@@ -125,6 +125,9 @@ def shade_mesh(frags: Fragments, mesh: Mesh, camera: Camera, options: ShadingOpt
         picture[...] = options.background
         return picture
     scene = frags._scene
+    planes = frags.samples_triangle.transpose(2, 0, 1), frags.samples_depth.transpose(2, 0, 1)
+    kinds = np.int32, np.float32
+    ids, depth = (np.require(array, kind, ["C", "A"]) for array, kind in zip(planes, kinds, strict=True))
     plain = Material(options.color if mesh.colors is None else None)
     own = (options.material,) if options.material is not None else mesh.materials or (plain,)
     rows = mesh.material_of_triangle if own is mesh.materials and len(own) > 1 else None
@@ -133,9 +136,6 @@ def shade_mesh(frags: Fragments, mesh: Mesh, camera: Camera, options: ShadingOpt
     look.set_lights(options.lights, options.ambient)
     look.set_view(SHOW_CODES.get(options.mode, 0), options.matcap, options.background)
     look.set_fog(options.fog)
-    planes = frags.samples_triangle.transpose(2, 0, 1), frags.samples_depth.transpose(2, 0, 1)
-    kinds = np.int32, np.float32
-    ids, depth = (np.require(array, kind, ["C", "A"]) for array, kind in zip(planes, kinds, strict=True))
     positions = None if len(ids) == 1 else sample_positions(len(ids), scene.subpixel_bits)
 
     def shade_rows(first: int, end: int) -> None:

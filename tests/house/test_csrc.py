@@ -1,0 +1,133 @@
+"""The house rules of csrc: a ladder of folders, intrinsics in one of them, files that compile alone, complete maps."""
+
+import functools
+import os
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+CSRC = Path(__file__).resolve().parents[2] / "csrc"
+FILES = sorted(path.relative_to(CSRC).as_posix() for path in CSRC.rglob("*.[ch]"))
+FOLDERS = sorted({name.rpartition("/")[0] for name in FILES})
+
+#: From the lowest floor to the highest. A folder includes those of lower floors, its own files, and headers beside it.
+LADDER = (("lanes",), ("vertex",), ("clusters", "mesh"), ("raster",), ("area", "pixels"), ("blend", "lines", "shade"))
+FLOORS = {folder: floor for floor, folders in enumerate(LADDER) for folder in folders}
+
+#: Where lower files declare functions of higher ones: a sink is compiled into the walkers.
+HOOKS = "raster/hooks.h"
+
+FLAGS_AVX2 = ("-mavx2", "-mfma", "-mbmi", "-mbmi2", "-mlzcnt", "-mpopcnt")
+FLAGS_AVX512 = (*FLAGS_AVX2, "-mavx512f", "-mavx512bw", "-mavx512dq", "-mavx512vl", "-mavx512cd")
+FLAGS = {"avx2": FLAGS_AVX2, "avx512": FLAGS_AVX512}
+
+
+def text_of(name: str) -> str:
+    """Return the text of a file."""
+    return (CSRC / name).read_text(encoding="utf-8")
+
+
+def code_of(name: str) -> str:
+    """Return the text of a file without its comments."""
+    return re.sub(r"/\*.*?\*/", " ", text_of(name), flags=re.DOTALL)
+
+
+def includes_of(name: str) -> list[str]:
+    """Return the files of csrc that a file includes."""
+    return re.findall(r'^#include "([^"]+)"', text_of(name), flags=re.MULTILINE)
+
+
+def may_include(name: str, other: str) -> bool:
+    """Tell whether the ladder lets a file include another one."""
+    folder, other_folder = name.rpartition("/")[0], other.rpartition("/")[0]
+    if not other_folder:
+        return not folder or other.endswith(".h")
+    if not folder:
+        return name == "kernels.c"
+    return folder == other_folder or FLOORS[other_folder] < FLOORS[folder]
+
+
+def test_each_folder_has_a_floor():
+    assert sorted(["", *FLOORS]) == FOLDERS
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_includes_go_down_the_ladder(name):
+    assert [other for other in includes_of(name) if other not in FILES] == []
+    assert [other for other in includes_of(name) if not may_include(name, other)] == []
+
+
+def test_includes_of_folders_have_no_circle():
+    below = {name: [other for other in includes_of(name) if "/" in other] for name in FILES}
+    done: set[str] = set()
+
+    def visit(name: str, path: tuple[str, ...]) -> None:
+        assert name not in path, " -> ".join((*path, name))
+        if name not in done:
+            for other in below[name]:
+                visit(other, (*path, name))
+            done.add(name)
+
+    for name in FILES:
+        visit(name, ())
+
+
+@pytest.mark.parametrize("name", [name for name in FILES if "/" in name and name != HOOKS])
+def test_functions_are_defined_before_they_are_called(name):
+    """A declaration without a body would be a call upwards."""
+    assert re.findall(r"^(?:static|TL_INLINE|extern)[^;{}=]*\)\s*;", code_of(name), flags=re.MULTILINE) == []
+
+
+@pytest.mark.parametrize("name", [name for name in FILES if not name.startswith("lanes/")])
+def test_intrinsics_are_in_lanes_alone(name):
+    assert re.findall(r"\b_mm\w*|\b__m(?:128|256|512|mask)\w*|\w*intrin\.h", code_of(name)) == []
+
+
+@functools.cache
+def compiler() -> list[str]:
+    """Return the command of the C compiler, empty when there is none."""
+    for command in (os.environ.get("CC", ""), "cc", "gcc", "clang"):
+        if command.strip() and shutil.which(command.split()[0]):
+            return command.split()
+    return []
+
+
+def check_syntax(path: str | Path, flags: tuple[str, ...]) -> subprocess.CompletedProcess[str]:
+    """Parse a file with the compiler."""
+    command = [*compiler(), "-std=c11", "-fsyntax-only", f"-I{CSRC}", *flags, "-x", "c", str(path)]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+@functools.cache
+def has_instructions(isa: str) -> bool:
+    """Whether the compiler knows an instruction set."""
+    command = [*compiler(), "-fsyntax-only", *FLAGS[isa], "-include", "immintrin.h", "-x", "c", os.devnull]
+    return subprocess.run(command, capture_output=True, check=False).returncode == 0
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_file_compiles_alone(name):
+    if not compiler():
+        pytest.skip("no C compiler: $CC, cc, gcc or clang")
+    isa = Path(name).stem.rpartition("_")[2]
+    if isa in FLAGS and not has_instructions(isa):
+        pytest.skip(f"{compiler()[0]} does not know {isa}")
+    result = check_syntax(CSRC / name, FLAGS.get(isa, ()))
+    assert result.returncode == 0, result.stderr
+
+
+@pytest.mark.parametrize("folder", FOLDERS)
+def test_map_of_a_folder_lists_its_files(folder):
+    listed = re.findall(r"^- \[?`([^`]+)`", (CSRC / folder / "README.md").read_text(encoding="utf-8"), re.MULTILINE)
+    files = [name.rpartition("/")[2] for name in FILES if name.rpartition("/")[0] == folder]
+    folders = [] if folder else [f"{name}/" for name in FOLDERS if name]
+    assert sorted(listed) == sorted(files + folders)
+
+
+@pytest.mark.parametrize("path", sorted(CSRC.rglob("*.[chm]*")), ids=lambda path: path.relative_to(CSRC).as_posix())
+def test_lines_have_at_most_120_columns(path):
+    lines = path.read_text(encoding="utf-8").splitlines()
+    assert [f"{i}: {line}" for i, line in enumerate(lines, 1) if len(line) > 120] == []

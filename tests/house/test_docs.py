@@ -1,0 +1,80 @@
+"""The pages: links lead somewhere, every page and picture is shown by another, and api.md is that of the package."""
+
+import importlib.util
+import re
+from pathlib import Path
+
+import pytest
+
+import topleft as tl
+
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+PAGES = sorted(DOCS.rglob("*.md"))
+FRONT = sorted(ROOT.glob("*.md"))
+CHECKED = [*FRONT, *PAGES, *sorted(ROOT.glob("benchmarks/**/*.md")), *sorted(ROOT.glob("csrc/**/*.md"))]
+
+LINK = re.compile(r"\]\(([^()\s]+)\)")
+CODE = re.compile(r"```.*?```|`[^`\n]*`", re.DOTALL)
+
+
+def links(page):
+    """Files of the repository that a page leads to, each with the heading behind `#`."""
+    text = CODE.sub("", page.read_text(encoding="utf-8"))
+    found = [address.partition("#") for address in LINK.findall(text) if not re.match(r"[a-z]+:", address)]
+    return [(page.parent.joinpath(path).resolve() if path else page, part) for path, _, part in found]
+
+
+def anchors(page):
+    """The ids that headings have on GitHub: small letters, blanks as hyphens, no other signs."""
+    titles = re.findall(r"^#+ (.*)$", re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL), re.M)
+    return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
+
+
+@pytest.mark.parametrize("page", CHECKED, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_links_lead_to_files_and_headings_that_exist(page):
+    found = links(page)
+    assert [path.relative_to(ROOT).as_posix() for path, _ in found if not path.exists()] == []
+    assert [f"{path.name}#{part}" for path, part in found if part and part not in anchors(path)] == []
+
+
+@pytest.mark.parametrize("page", [*FRONT, *PAGES], ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_page_has_a_title_and_a_first_sentence(page):
+    title, blank, first = page.read_text(encoding="utf-8").split("\n", 3)[:3]
+    assert title.startswith("# ")
+    assert blank == ""
+    assert re.match(r"[\[`*\w]", first)
+
+
+def test_index_lists_every_page_once():
+    listed = [path for path, _ in links(DOCS / "README.md") if DOCS in path.parents]
+    assert sorted(listed) == [page for page in PAGES if page != DOCS / "README.md"]
+
+
+def test_every_picture_is_shown_by_a_page():
+    shown = {path for page in CHECKED for path, _ in links(page)}
+    assert [path.name for path in sorted(DOCS.joinpath("images").iterdir()) if path not in shown] == []
+
+
+@pytest.fixture(scope="module")
+def make_api():
+    spec = importlib.util.spec_from_file_location("make_api", DOCS / "make_api.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_api_page_is_that_of_the_package(make_api):
+    assert make_api.PAGE.read_text(encoding="utf-8") == make_api.page(), "run: python docs/make_api.py"
+
+
+def test_api_page_has_every_public_name_once(make_api):
+    titles = re.findall(r"^### `(\w+)`$", make_api.PAGE.read_text(encoding="utf-8"), re.M)
+    assert sorted(titles) == sorted(tl.__all__)
+
+
+def test_api_page_refuses_a_name_without_a_subject(make_api, monkeypatch):
+    monkeypatch.setattr(tl, "__all__", [*tl.__all__, "available_threads"])
+    monkeypatch.setattr(tl, "available_threads", len, raising=False)
+    with pytest.raises(ValueError, match=r"SUBJECTS in docs/make_api\.py must place available_threads"):
+        make_api.page()
