@@ -50,9 +50,9 @@ typedef struct {
 
 typedef enum { TL_SURROUNDINGS_SKY = 0, TL_SURROUNDINGS_IMAGE = 1 } tl_surroundings_kind;
 
-/* Light from all around, in a space of its own, up is y: a sky over a ground, or a picture of all directions, an octahedron
- * unfolded to a square.  Level k < n_levels - 1 is what a surface of roughness k / (n_levels - 2) sees of it, level n_levels - 1
- * what a matt one sees.  A texel is four float, round each level stands a border of one. */
+/* Light from all around, in a space of its own, up is y: a sky over a ground, or a picture of all directions, an
+ * octahedron unfolded to a square.  Level k < n_levels - 1 is what a surface of roughness k / (n_levels - 2) sees of
+ * it, level n_levels - 1 what a matt one sees.  A texel is four float, round each level stands a border of one. */
 typedef struct {
     tl_surroundings_kind kind;
     float from_shading[3][4]; /* rows; the fourth number is not read */

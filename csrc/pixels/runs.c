@@ -221,7 +221,7 @@ TL_INLINE void load_positions(const void *positions, int is_f64, const int32_t *
         p[axis] = vd_load(lanes[axis]);
 }
 
-/* The edges of the triangles of TL_LANES runs from their first corners on, over the length of the longest coordinate. */
+/* The edges of the triangles of TL_LANES runs from their first corners on, over the longest coordinate of each. */
 TL_INLINE void load_edges(const shade_runs *s, const run_setup *r, vf edge[2][3])
 {
     const tl_shading *shading = s->shading;
@@ -242,9 +242,9 @@ TL_INLINE void load_edges(const shade_runs *s, const run_setup *r, vf edge[2][3]
             edge[k][axis] = vf_mul(edge[k][axis], scale);
 }
 
-/* Tangents of TL_LANES triangles: the directions in which u and v grow, over the length of the longer one, and the hand (1: right)
- * that they make with the normal towards the viewer.  All are turned where the other side is lit than that of the normals of the
- * mesh, so that what they bend is turned as a whole.  0 where uv have no area. */
+/* Tangents of TL_LANES triangles: the directions in which u and v grow, over the length of the longer one, and the hand
+ * (1: right) that they make with the normal towards the viewer.  All are turned where the other side is lit than that
+ * of the normals of the mesh, so that what they bend is turned as a whole.  0 where uv have no area. */
 TL_INLINE void set_tangents(shade_runs *s, int slot, const run_setup *r, const float *uv, vf side, int first)
 {
     const vf zero = vf_set1(0.0f), one = vf_set1(1.0f), minus = vf_set1(-1.0f);

@@ -1,12 +1,14 @@
 /* Full materials: surfaces with more than a colour, a texture and a highlight.
  * In: a vector of pixels.  Out: their light, linear, and their opacity.
  *
- * The tangent frame of a normal map is that of the triangle: where u and v grow by their gradients over it, as per-pixel
- * derivatives would have it, but without their rounding.  The tangent is u's direction less what of it lies along the normal of the
- * pixel, the bitangent is at right angles to both, on the side to which v grows (uv with v up; maps with green up).  Meshes bring no
- * tangents of their own.  A surface that is seen from behind has its bent normal turned round as a whole (glTF 2.0, 3.9.5).
- * Based on: C. Schuler, Normal Mapping Without Precomputed Tangents, in ShaderX5, 2007; M. Mikkelsen, Simulation of Wrinkled
- * Surfaces Revisited, 2008 (the bitangent). */
+ * The tangent frame of a normal map is that of the triangle: where u and v grow by their gradients over it, as
+ * per-pixel derivatives would have it, but without their rounding.  The tangent is u's direction less what of it lies
+ * along the normal of the pixel, the bitangent is at right angles to both, on the side to which v grows (uv with v up;
+ * maps with green up).  Meshes bring no tangents of their own.  A surface that is seen from behind has its bent normal
+ * turned round as a whole (glTF 2.0, 3.9.5).
+ *
+ * Based on: C. Schuler, Normal Mapping Without Precomputed Tangents, in ShaderX5, 2007; M. Mikkelsen, Simulation of
+ * Wrinkled Surfaces Revisited, 2008 (the bitangent). */
 #ifndef TL_FULL_C
 #define TL_FULL_C
 

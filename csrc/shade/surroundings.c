@@ -1,14 +1,16 @@
 /* Surroundings: the light that comes from all around, as a matt surface gathers it and as a shiny one mirrors it.
  * In: directions in the shading space, a roughness.  Out: light, linear.
  *
- * A sky over a ground needs no picture.  A matt surface whose normal has the height h gets (1 + h) / 2 of the sky.  A rough one
- * sees the horizon blurred: the slopes of GGX facets along one axis have the cumulative distribution (1 + x / sqrt(x^2 + a^2)) / 2,
- * and a facet turns what it mirrors by twice its own angle, so x is the slope of the mirrored direction and a twice alpha; for
- * large alpha the half circle ends it.  SPREAD_* fit that: within 0.007 of the integral over the facets for every roughness and
- * height, and exact for a mirror and for alpha = 1, where it is (1 + h) / 2 again.
- * Based on: B. Walter et al., Microfacet Models for Refraction through Rough Surfaces, 2007 (the slopes of GGX); B. Karis, Real
- * Shading in Unreal Engine 4, 2013 (blurred levels by roughness); T. Engelhardt and C. Dachsbacher, Octahedron Environment Maps,
- * 2008. */
+ * A sky over a ground needs no picture.  A matt surface whose normal has the height h gets (1 + h) / 2 of the sky.  A
+ * rough one sees the horizon blurred: along one axis the slopes of GGX facets have the cumulative distribution
+ * (1 + x / sqrt(x^2 + a^2)) / 2, and a facet turns what it mirrors by twice its own angle, so x is the slope of the
+ * mirrored direction and a twice alpha; for large alpha the half circle ends it.  SPREAD_* fit that: within 0.007 of
+ * the integral over the facets for every roughness and height, exact for a mirror and for alpha = 1, which sees
+ * (1 + h) / 2 again.
+ *
+ * Based on: B. Walter et al., Microfacet Models for Refraction through Rough Surfaces, 2007 (the slopes of GGX);
+ * B. Karis, Real Shading in Unreal Engine 4, 2013 (blurred levels by roughness); T. Engelhardt and C. Dachsbacher,
+ * Octahedron Environment Maps, 2008. */
 #ifndef TL_SURROUNDINGS_C
 #define TL_SURROUNDINGS_C
 

@@ -2,6 +2,7 @@
 
 adapt.py     adapters: the meshes of other libraries, told by their attributes, as a `Mesh`; none of those libraries i
 imported.py  materials of files: what trimesh reads of MTL and glTF, as `Material`, and OBJ text cut by material
+environment.py  light from all around: a colour, a sky over a ground, a picture blurred once for every roughness
 light.py     lights: directions and points that light comes from, and the depth cue; values, checked once
 material.py  materials: what a surface is made of, as values
 mesh.py      A triangle mesh as arrays: positions, indices, and what else is known of its surface; checked once, here

@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from topleft._base.arrays import as_array, as_checked_triangles
 from topleft._model.material import Material
+from topleft._model.texture import Texture
 from topleft._model.normals import angle_weighted_normals, box_of_triangles
 from topleft._raster.clusters import Clusters, box_of
 
@@ -129,6 +130,11 @@ class Mesh:
         if self.normals is not None:
             return self.normals
         return self._computed_normals
+
+    @cached_property
+    def has_alpha(self) -> bool:
+        """Whether the colours of the vertices are not all opaque."""
+        return self.colors is not None and self.colors.shape[1] == 4 and bool((self.colors[:, 3] < 255).any())
 
     @cached_property
     def vertex_box(self) -> F64:
@@ -287,5 +293,15 @@ def _read_only(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
 
 def has_holes(material: Material, mesh: Mesh) -> bool:
     """Whether the material leaves something out of the triangles that have it."""
-    texture = material.texture if mesh.uv is not None else None
-    return bool(material.alpha_cutoff) and texture is not None and bool((texture.image[..., 3] < 255).any())
+    return material.alpha_mode == "mask" and bool(material.alpha_cutoff) and has_opacity(material, mesh)
+
+
+def has_opacity(material: Material, mesh: Mesh) -> bool:
+    """Whether some of the surface may not be opaque: by the material, its texture, or the colours of the vertices."""
+    texture = material.texture if is_laid(material.texture, mesh) else None
+    return material.opacity < 1 or mesh.has_alpha or (texture is not None and texture.has_alpha)
+
+
+def is_laid(texture: Texture | None, mesh: Mesh) -> bool:
+    """Whether there is a texture, and the mesh has its set of uv."""
+    return texture is not None and (mesh.uv, mesh.uv1)[texture.uv_set] is not None

@@ -84,7 +84,7 @@ def render(
     rasterizer : Rasterizer, optional
         Of this size: what is needed on the way lies in the memory that it keeps.
     **look
-        `lights`, `ambient`, `material`, `matcap` and `fog` of `topleft.shade`.
+        `lights`, `ambient`, `material`, `matcap`, `fog` and `environment` of `topleft.shade`.
 
     Returns
     -------
