@@ -311,6 +311,7 @@ cdef extern from "topleft.h" nogil:
         void (*paint_flat)(const int32_t *, int64_t, const uint8_t *, int, uint8_t *) noexcept nogil
         void (*paint_gouraud)(const tl_scene *, const tl_window *, const int32_t *, const void *, int, int, void *) noexcept nogil
         void (*composite)(const tl_composite *, int64_t, void *) noexcept nogil
+        void (*drop_sides)(const tl_scene *, const uint8_t *, int64_t, int64_t, int32_t *) noexcept nogil
         int64_t (*list_edges)(const tl_scene *, const tl_edge_scratch *, uint64_t *, int64_t *) noexcept nogil
         void (*draw_lines)(const tl_edges *, const tl_window *, const tl_line_target *) noexcept nogil
         void (*list_planes)(const tl_valued *, int64_t, int64_t) noexcept nogil

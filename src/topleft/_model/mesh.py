@@ -136,6 +136,17 @@ class Mesh:
         """Whether the colours of the vertices are not all opaque."""
         return self.colors is not None and self.colors.shape[1] == 4 and bool((self.colors[:, 3] < 255).any())
 
+    def single_sided(self, material: Material | None = None) -> npt.NDArray[np.uint8] | None:
+        """Which triangles (T,) have a back that does not show, by their material or by this one; None if none."""
+        materials = self.materials if material is None else (material,)
+        if all(one.double_sided for one in materials):
+            return None
+        rows = self.material_of_triangle if material is None else None
+        if rows is None:
+            is_single = not materials[0].double_sided
+            return np.ones(len(self.triangles), np.uint8) if is_single else None
+        return np.array([not one.double_sided for one in materials], np.uint8)[rows]
+
     @cached_property
     def vertex_box(self) -> F64:
         """Lowest and highest x, y, z of all finite vertices, (6,) float64; zeros without any."""

@@ -84,10 +84,24 @@ def snap_scene(
         wide = refine_scene(points, records, wide, corners, pieces, view)
     drawn = corners if n else corners[:0]
     how = (*view.origin, view.grid_bits, view.cull, view.method, view.test)
+    if view.single_sided is not None and n:
+        is_single, cull = view.single_sided
+        seen = _engine.Scene(source, records, wide, drawn, pieces, *view.origin, view.grid_bits, cull, 0)
+        drawn = without_sides(seen, drawn, is_single, view.threads)
     scene = _engine.Scene(source, records, wide, drawn, pieces, *how, engine_view)
     has_depth = source.is_clip_space or points.shape[1] == 3
     inputs = choices.Inputs(points, records, pieces, source.is_clip_space, is_affine)
     return Snapped(scene, triangles, corners, len(points), n_triangles, has_depth, inputs)
+
+
+def without_sides(
+    scene: _engine.Scene, corners: NDArray[np.int32], is_single: NDArray[np.uint8], threads: int | None
+) -> NDArray[np.int32]:
+    """Return triangles, those collapsed that are single-sided and turned the way that the scene culls."""
+    left = np.empty_like(corners)
+    n_parts = choices.threads_to_convert(threads, len(corners))
+    run_parts(lambda first, end: scene.drop_sides(is_single, first, end, left), len(corners), n_parts)
+    return left
 
 
 def refine_scene(

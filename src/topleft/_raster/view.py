@@ -79,6 +79,8 @@ class View:
     threads: int | None
     classic: Method | None = None
     plan: Planned | None = None
+    single_sided: tuple[NDArray[np.uint8], int] | None = None
+    """1 for each triangle of which one side is not drawn, and the `tl_cull` that names that side."""
 
     def engine_view(self) -> _engine.View:
         """Return how clip space maps to pixels."""
@@ -92,7 +94,7 @@ class View:
 
     def find_clusters(self, vertices: ArrayLike) -> Clusters | None:
         """Return the vertices and triangles in clusters, if the plan has them."""
-        return None if self.plan is None else self.plan.find_clusters(vertices)
+        return None if self.plan is None or self.single_sided else self.plan.find_clusters(vertices)
 
     @property
     def test(self) -> int:
