@@ -1,1 +1,13 @@
-"""What topleft is measured with: scenes, contestants that take turns, the exact result beside the time."""
+"""What topleft is measured with: scenes, contestants that take turns, the exact result beside the time.
+
+A room imports from those above it alone, and no study from another.
+
+scenes/    what is drawn
+exact/     the exact picture of it
+peers/     who draws it: topleft and others, one file each
+harness/   what measures: processes, turns, records
+report/    tables, charts and pages, and the protocol of a study
+run/ accuracy/ atlas/ choices/ static/ pictures/ levels/ small/   the studies
+cli.py     their commands
+records/   what was measured, as the pages show it
+"""

@@ -4,7 +4,7 @@ A peer file has
 
     MODULE         what has to be importable
     DISTRIBUTION   what pip calls it
-    TASKS          the tasks of `cases.TASKS` that it can do
+    TASKS          the tasks of `scenes.cases.TASKS` that it can do
     prepare(scene, threads) -> Drawing
 
 and may have `environment(threads)`, variables for its process, and `THREADS`: whether it can use more than one.

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from benchmarks.cases import Scene
 from benchmarks.peers import Drawing
+from benchmarks.scenes.cases import Scene
 
 MODULE, DISTRIBUTION = "blend2d", "blend2d-py"
 TASKS = ("smooth", "smooth-fill")

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.cases import TASKS as ALL_TASKS
-from benchmarks.cases import Scene
 from benchmarks.peers import Drawing
+from benchmarks.scenes.cases import TASKS as ALL_TASKS
+from benchmarks.scenes.cases import Scene
 
 MODULE, DISTRIBUTION = "numpy", "numpy"
 TASKS = tuple(ALL_TASKS)

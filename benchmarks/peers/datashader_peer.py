@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.cases import Scene
 from benchmarks.peers import Drawing
+from benchmarks.scenes.cases import Scene
 
 MODULE = DISTRIBUTION = "datashader"
 TASKS = ("labels",)

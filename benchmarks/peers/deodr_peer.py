@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.cases import Scene
-from benchmarks.exact import SUBPIXELS, snap
+from benchmarks.exact.pictures import SUBPIXELS, snap
 from benchmarks.peers import Drawing
+from benchmarks.scenes.cases import Scene
 
 MODULE, DISTRIBUTION = "deodr", "deodr"
 TASKS = ("visibility", "depth-2d", "labels", "views", "views-png")

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.cases import Scene
 from benchmarks.peers import Drawing
+from benchmarks.scenes.cases import Scene
 
 MODULE = DISTRIBUTION = "moderngl"
 TASKS = ("visibility", "depth-2d", "mask", "fill", "labels", "smooth", "smooth-fill", "views", "views-png")

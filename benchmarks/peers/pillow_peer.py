@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.cases import Scene
 from benchmarks.peers import Drawing
+from benchmarks.scenes.cases import Scene
 
 MODULE, DISTRIBUTION = "PIL", "pillow"
 TASKS = ("mask", "fill", "labels", "smooth", "smooth-fill")

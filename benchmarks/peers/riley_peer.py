@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.cases import Scene
 from benchmarks.peers import Drawing
+from benchmarks.peers.views import draw_by_riley, set_up_riley
+from benchmarks.scenes.cases import Scene
 
 MODULE, DISTRIBUTION = "riley", "riley-raster"
 TASKS = ("visibility", "views", "views-png")
@@ -19,8 +20,6 @@ THREADS = True
 def prepare(scene: Scene, threads: int) -> Drawing:
     """Read focal length and pixel size off the matrix of the scene."""
     if scene.views is not None:
-        from benchmarks.peers.views import draw_by_riley
-
         return draw_by_riley(scene, threads)
     import riley
 
@@ -33,19 +32,11 @@ def prepare(scene: Scene, threads: int) -> Drawing:
     eye = np.stack([matrix[0] / scale_x, matrix[1] / scale_y, -matrix[3]])
     vertices = scene.vertices @ eye[:, :3].T + eye[:, 3]
     ratio, offset = np.linalg.lstsq(np.stack([matrix[3], [0, 0, 0, 1]], axis=1), matrix[2], rcond=None)[0]
-    convention = riley.ConnectConvention(riley.EElemType.TRI3, riley.EConnectAxis.ROW, 0, riley.ENodeOrder.RILEY)
+    convention, camera, config = set_up_riley(scene.size, scale_y, threads)
     shader = riley.NodalShader(np.ascontiguousarray(-vertices[:, 2:]), scaling_type=riley.ScaleStrategy.none)
     mesh = riley.create_mesh(
         convention, riley.MeshType.tri3opt, vertices.astype(np.float64), scene.triangles.astype(np.int64), shader
     )
-    camera = riley.Camera(
-        pixels_num=(width, height), pixels_size=(2 / (scale_y * height),) * 2, pos_world=(0.0, 0.0, 0.0),
-        rot_world=(0.0, 0.0, 0.0), roi_cent_world=(0.0, 0.0, -1.0), focal_length=1.0, sub_sample=1,
-    )  # fmt: skip
-    config = riley.RasterConfig(
-        parallel=threads, save_strategy=riley.SaveStrategy.memory, image_save_mode=riley.ImageSaveMode.grey,
-        report=riley.ReportMode.off,
-    )  # fmt: skip
     found: list[np.ndarray] = []
 
     def draw() -> None:

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.cases import Scene
 from benchmarks.peers import Drawing
+from benchmarks.scenes.cases import Scene
 
 MODULE, DISTRIBUTION = "skia", "skia-python"
 TASKS = ("mask", "fill", "labels", "smooth", "smooth-fill")

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.cases import Scene
 from benchmarks.peers import Drawing
+from benchmarks.scenes.cases import Scene
 
 MODULE = DISTRIBUTION = "topleft"
 TASKS = ("visibility", "depth-2d", "mask", "fill", "labels", "smooth-fill", "empty", "views", "views-png")

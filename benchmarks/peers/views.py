@@ -10,11 +10,12 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from benchmarks.cases import Scene
 from benchmarks.peers import Drawing
+from benchmarks.scenes.cases import Scene
 
 LIGHT = np.array([-0.35, 0.45, 1.0]) / np.linalg.norm([-0.35, 0.45, 1.0])
 AMBIENT = 0.1
@@ -121,6 +122,22 @@ def draw_by_llvmpipe(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
     return drawing(scene, draw_view, "RGB", "upload")
 
 
+def open_vtk_window(scene: Scene, renderer: Any, window: Any) -> Any:
+    """Make a window off screen; return the camera, whose projection is the matrix of the scene."""
+    import vtk
+
+    window.SetOffScreenRendering(True)
+    window.SetMultiSamples(0)
+    window.SetSize(*scene.size)
+    window.AddRenderer(renderer)
+    matrix = vtk.vtkMatrix4x4()
+    matrix.DeepCopy(scene.transform.reshape(-1).tolist())
+    camera = renderer.GetActiveCamera()
+    camera.SetExplicitProjectionTransformMatrix(matrix)
+    camera.SetUseExplicitProjectionTransformMatrix(True)
+    return camera
+
+
 def draw_by_vtk(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
     """VTK: Gouraud or Phong as its mapper sees fit, a headlight, read back as RGB."""
     import vtk
@@ -149,15 +166,7 @@ def draw_by_vtk(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
     light.SetFocalPoint(0, 0, 0)
     renderer.AddLight(light)
     renderer.SetAutomaticLightCreation(False)
-    window.SetOffScreenRendering(True)
-    window.SetMultiSamples(0)
-    window.SetSize(width, height)
-    window.AddRenderer(renderer)
-    matrix = vtk.vtkMatrix4x4()
-    matrix.DeepCopy(scene.transform.reshape(-1).tolist())
-    camera = renderer.GetActiveCamera()
-    camera.SetExplicitProjectionTransformMatrix(matrix)
-    camera.SetUseExplicitProjectionTransformMatrix(True)
+    camera = open_vtk_window(scene, renderer, window)
     places = [np.linalg.inv(view) for view in scene.views]
     pixels = vtk.vtkUnsignedCharArray()
 
@@ -173,21 +182,29 @@ def draw_by_vtk(scene: Scene, threads: int) -> Drawing:  # noqa: ARG001
     return drawing(scene, draw_view, "RGB", "upload")
 
 
-def draw_by_riley(scene: Scene, threads: int) -> Drawing:
-    """riley-raster: light at the vertices, which are turned into eye space for every view."""
+def set_up_riley(size: tuple[int, int], scale_y: float, threads: int) -> tuple[Any, Any, Any]:
+    """Return how triangles are written, a camera in the origin with that focal length, and options."""
     import riley
 
-    width, height = scene.size
-    triangles = scene.triangles.astype(np.int64)
     convention = riley.ConnectConvention(riley.EElemType.TRI3, riley.EConnectAxis.ROW, 0, riley.ENodeOrder.RILEY)
     camera = riley.Camera(
-        pixels_num=(width, height), pixels_size=(2 / (scene.transform[1, 1] * height),) * 2, pos_world=(0.0, 0.0, 0.0),
+        pixels_num=size, pixels_size=(2 / (scale_y * size[1]),) * 2, pos_world=(0.0, 0.0, 0.0),
         rot_world=(0.0, 0.0, 0.0), roi_cent_world=(0.0, 0.0, -1.0), focal_length=1.0, sub_sample=1,
     )  # fmt: skip
     config = riley.RasterConfig(
         parallel=threads, save_strategy=riley.SaveStrategy.memory, image_save_mode=riley.ImageSaveMode.grey,
         report=riley.ReportMode.off,
     )  # fmt: skip
+    return convention, camera, config
+
+
+def draw_by_riley(scene: Scene, threads: int) -> Drawing:
+    """riley-raster: light at the vertices, which are turned into eye space for every view."""
+    import riley
+
+    width, height = scene.size
+    triangles = scene.triangles.astype(np.int64)
+    convention, camera, config = set_up_riley(scene.size, scene.transform[1, 1], threads)
 
     def draw_view(i: int) -> np.ndarray:
         points, values = _lit_vertices(scene, i)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.cases import Scene
 from benchmarks.peers import Drawing
 from benchmarks.peers.llvmpipe_peer import environment as mesa_environment
+from benchmarks.peers.views import draw_by_vtk, open_vtk_window
+from benchmarks.scenes.cases import Scene
 
 MODULE = DISTRIBUTION = "vtk"
 TASKS = ("visibility", "views", "views-png")
@@ -21,8 +22,6 @@ def environment(threads: int) -> dict[str, str]:
 def prepare(scene: Scene, threads: int) -> Drawing:
     """The matrix of the scene is the projection; the view is the identity."""
     if scene.views is not None:
-        from benchmarks.peers.views import draw_by_vtk
-
         return draw_by_vtk(scene, threads)
     import vtk
     from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray, vtk_to_numpy
@@ -41,17 +40,9 @@ def prepare(scene: Scene, threads: int) -> Drawing:
     actor.GetProperty().SetBackfaceCulling(scene.cull == "back")
     renderer, window = vtk.vtkRenderer(), vtk.vtkRenderWindow()
     renderer.AddActor(actor)
-    window.SetOffScreenRendering(True)
-    window.SetMultiSamples(0)
-    window.SetSize(width, height)
-    window.AddRenderer(renderer)
-    matrix = vtk.vtkMatrix4x4()
-    matrix.DeepCopy(scene.transform.reshape(-1).tolist())
-    camera = renderer.GetActiveCamera()
+    camera = open_vtk_window(scene, renderer, window)
     camera.SetPosition(0, 0, 0)
     camera.SetFocalPoint(0, 0, -1)
-    camera.SetExplicitProjectionTransformMatrix(matrix)
-    camera.SetUseExplicitProjectionTransformMatrix(True)
     buffer = vtk.vtkFloatArray()
 
     def draw() -> None:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_type_hints
 
 from topleft import scenes
 from topleft._base.memory import release_memory
@@ -25,7 +26,7 @@ from topleft._model.material import Material
 from topleft._model.mesh import Mesh
 from topleft._model.scene import Instance, Scene
 from topleft._model.texture import Texture
-from topleft._plan.planner import Plan, plan
+from topleft._plan.plan import Plan, plan
 from topleft._raster.classic import bresenham_line
 from topleft._raster.composite import composite
 from topleft._raster.fragments import Fragments
@@ -35,16 +36,17 @@ from topleft._render.fragments import SceneDepthLayers, SceneFragments
 from topleft._render.render import rasterize_mesh, render
 from topleft._render.scene_shade import shade
 from topleft._render.silhouette import silhouette
-from topleft.errors import MeshError, TopleftError
+from topleft.errors import ImageError, MeshError, MissingPackageError, TopleftError
 
 if TYPE_CHECKING:
-    from topleft._batch.batch import Job, render_batch
+    from topleft._batch.batch import render_batch
+    from topleft._batch.jobs import Job
     from topleft._render.transparent import render_transparent, visible_layers
     from topleft._render.view_layers import ViewLayers, render_layers
 
 # What most programs do without is imported when it is asked for: a third of the time that the package takes.
 _LATE = {
-    "Job": "topleft._batch.batch",
+    "Job": "topleft._batch.jobs",
     "ViewLayers": "topleft._render.view_layers",
     "render_batch": "topleft._batch.batch",
     "render_layers": "topleft._render.view_layers",
@@ -63,6 +65,7 @@ __all__ = [
     "Fog",
     "Fragments",
     "Grid",
+    "ImageError",
     "Instance",
     "Job",
     "Level",
@@ -71,6 +74,7 @@ __all__ = [
     "Material",
     "Mesh",
     "MeshError",
+    "MissingPackageError",
     "OpenCVLens",
     "Plan",
     "Rasterizer",
@@ -113,12 +117,31 @@ __all__ = [
 ]
 
 
+def _publish(value: Any) -> Any:
+    """Let a class or function say that it is of `topleft`: its pickles, reprs and tracebacks name no room."""
+    if isinstance(value, type):
+        hints = get_type_hints(value)  # while the module that they are looked up in is that of their file
+        value.__annotations__ = {name: hints[name] for name in vars(value).get("__annotations__", ())}
+        if "__firstlineno__" in vars(value):  # Python 3.13 would show that line of this file as its source
+            del value.__firstlineno__  # type: ignore[attr-defined]
+    value.__module__ = __name__
+    return value
+
+
 def __getattr__(name: str) -> Any:
     if name not in _LATE:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = globals()[name] = getattr(import_module(_LATE[name]), name)
-    return value
+    import_module(_LATE[name])
+    for late, file in _LATE.items():  # what came along says so, too
+        if hasattr(sys.modules.get(file), late):
+            globals()[late] = _publish(getattr(sys.modules[file], late))
+    return globals()[name]
 
 
 def __dir__() -> list[str]:
     return sorted(__all__)
+
+
+for _name in __all__:
+    if callable(globals().get(_name)):
+        _publish(globals()[_name])

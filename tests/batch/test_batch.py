@@ -15,7 +15,7 @@ from batch_jobs import BOX, CORNERS, EXECUTORS, FACES, SIZE, orbit, pictures, vi
 
 import topleft as tl
 from topleft._batch import jobs
-from topleft._batch.jobs import Studio
+from topleft._batch.jobs import JobRunner
 from topleft.errors import MissingPackageError
 
 
@@ -168,11 +168,11 @@ def test_batch_threads_end_with_it():
 
 
 def test_studio_keeps_one_rasterizer_a_thread():
-    studio = Studio()
-    first = studio._rasterizer(SIZE)
-    assert studio._rasterizer(SIZE) is first
+    runner = JobRunner()
+    first = runner._rasterizer(SIZE)
+    assert runner._rasterizer(SIZE) is first
     others = []
-    thread = threading.Thread(target=lambda: others.append(studio._rasterizer(SIZE)))
+    thread = threading.Thread(target=lambda: others.append(runner._rasterizer(SIZE)))
     thread.start()
     thread.join()
     assert others[0] is not first

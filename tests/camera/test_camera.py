@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from topleft import scenes
-from topleft._camera.camera import Camera, bounding_sphere, orbit_view, view_matrix
+from topleft._camera.camera import Camera
+from topleft._camera.matrices import bounding_sphere, orbit_view, view_matrix
 from topleft._model.mesh import Mesh
 
 SIZE = (640, 480)

@@ -19,8 +19,8 @@ from topleft._camera.camera import Camera
 from topleft._model.mesh import Mesh
 from topleft._render.render import rasterize_mesh, render
 from topleft.cli import animation
-from topleft.cli.plan import Orbit, outermost
 from topleft.cli.sheet import make_sheet
+from topleft.cli.targets import Orbit
 
 SMALL = ["--size", "64x48"]
 KNOT = Mesh(*scenes.shape("torus-knot"))
@@ -144,7 +144,7 @@ def test_orbit_frames_to_the_bit_as_framing_does(seed, dtype):
     )
     camera = orbit(mesh, (50, 100))
     assert np.array_equal(camera.clip_from_world((50, 100)), expected.clip_from_world((50, 100)))
-    assert outermost(mesh).shape == (7, 3)
+    assert mesh.extreme_points().shape == (7, 3)
 
 
 # Job files

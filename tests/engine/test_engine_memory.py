@@ -10,12 +10,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from comparing import assert_same, ref
+from comparing import assert_same
 from engine_cases import ON_EACH_ISA, THREADS, Expected, cases, check, check_all, mixed, on, plain
 from int64_loop import DEPTH_TESTS
 from strategies import Scene, perspective, soup
 
 import topleft as tl
+from topleft.methods import reference as ref
 
 N_MAX = 70  # more than four vectors of the widest instruction set
 

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from scipy import ndimage
 
 import topleft as tl
+from topleft._camera.matrices import orbit_view
 from topleft.cli import main
 
 SIZE = (96, 64)
@@ -65,7 +66,7 @@ def check_outlines(mesh, camera, tolerance):
     tolerance=st.sampled_from([0.25, 0.5, 1.0, 3.0, 8.0]),
 )
 def test_silhouette_never_moves_by_more_than_the_tolerance(mesh, azimuth, elevation, distance, fov, aside, tolerance):
-    view = tl.camera.orbit_view((*aside, 0), distance, azimuth, elevation)
+    view = orbit_view((*aside, 0), distance, azimuth, elevation)
     check_outlines(mesh, tl.Camera.perspective(view, near=0.01, far=1000, fov_y_deg=fov), tolerance)
 
 
@@ -77,7 +78,7 @@ def test_silhouette_never_moves_by_more_than_the_tolerance(mesh, azimuth, elevat
     tolerance=st.sampled_from([0.5, 1.0, 3.0]),
 )
 def test_silhouette_orthographic_and_stretched_never_moves_by_more(azimuth, height, stretch, tolerance):
-    view = tl.camera.orbit_view((0, 0, 0), 5.0, azimuth, 20)
+    view = orbit_view((0, 0, 0), 5.0, azimuth, 20)
     camera = tl.Camera.off_center(view, left=-height * stretch, right=height * stretch, bottom=-height, top=height,
                                   near=0.1, far=100, ortho=True)  # fmt: skip
     check_outlines(KNOT, camera, tolerance)
@@ -85,7 +86,7 @@ def test_silhouette_orthographic_and_stretched_never_moves_by_more(azimuth, heig
 
 def test_silhouette_at_the_edge_of_a_wide_frame_is_bounded():
     levels = [
-        check_outlines(BLOB, tl.Camera.perspective(tl.camera.orbit_view((x, 0, 0), 8.0, 0, 0), near=0.1, far=100,
+        check_outlines(BLOB, tl.Camera.perspective(orbit_view((x, 0, 0), 8.0, 0, 0), near=0.1, far=100,
                                                    fov_y_deg=130), 0.25)
         for x in (0, 6, 12, 16)
     ]  # fmt: skip

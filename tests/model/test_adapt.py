@@ -12,7 +12,7 @@ import pytest
 import topleft as tl
 from topleft import scenes
 from topleft._camera.camera import Camera
-from topleft._model.adapt import as_mesh, as_surface
+from topleft._model.adapt import as_mesh, as_polygons
 from topleft._model.mesh import Mesh
 
 SIZE = (64, 48)
@@ -107,17 +107,17 @@ def test_as_mesh_of_meshio_takes_surface_cells():
 
 def test_as_surface_of_cells_knows_the_faces():
     quads, triangles = block("quad8", [[0, 1, 2, 3, 9, 9, 9, 9]]), block("triangle6", [[1, 4, 2, 9, 9, 9]])
-    surface = as_surface(cells(POINTS, quads, triangles))
-    assert surface.triangles.tolist() == [[0, 1, 2], [0, 2, 3], [1, 4, 2]]
-    assert surface.faces.tolist() == [0, 0, 1]
-    assert surface.n_faces == 2
+    polygons = as_polygons(cells(POINTS, quads, triangles))
+    assert polygons.triangles.tolist() == [[0, 1, 2], [0, 2, 3], [1, 4, 2]]
+    assert polygons.faces.tolist() == [0, 0, 1]
+    assert polygons.n_faces == 2
 
 
 def test_as_surface_of_triangle_cells_is_no_copy():
     theirs = cells(POINTS, block("triangle", [[0, 1, 2]]))
-    surface = as_surface(theirs)
-    assert np.shares_memory(surface.triangles, theirs.cells[0].data)
-    assert surface.faces is None
+    polygons = as_polygons(theirs)
+    assert np.shares_memory(polygons.triangles, theirs.cells[0].data)
+    assert polygons.faces is None
 
 
 def test_as_mesh_of_cells_without_surface_is_refused():
@@ -133,9 +133,9 @@ def test_as_mesh_of_polydata_of_triangles_shares_its_points():
 
 
 def test_as_surface_of_polydata_of_mixed_faces():
-    surface = as_surface(poly(POINTS, [4, 0, 1, 2, 3, 3, 1, 4, 2]))
-    assert surface.triangles.tolist() == [[0, 1, 2], [0, 2, 3], [1, 4, 2]]
-    assert surface.faces.tolist() == [0, 0, 1]
+    polygons = as_polygons(poly(POINTS, [4, 0, 1, 2, 3, 3, 1, 4, 2]))
+    assert polygons.triangles.tolist() == [[0, 1, 2], [0, 2, 3], [1, 4, 2]]
+    assert polygons.faces.tolist() == [0, 0, 1]
 
 
 def test_as_mesh_of_strips_is_refused():
@@ -149,8 +149,8 @@ def test_as_mesh_of_a_triangulation_is_flat_and_masked():
     mesh = as_mesh(theirs)
     assert mesh.triangles.tolist() == [[0, 1, 2], [1, 4, 2]]
     assert mesh.vertices.tolist() == POINTS.tolist()
-    assert as_surface(theirs).faces.tolist() == [0, 2]
-    assert as_surface(theirs).n_faces == 3
+    assert as_polygons(theirs).faces.tolist() == [0, 2]
+    assert as_polygons(theirs).n_faces == 3
 
 
 @pytest.mark.parametrize("name", ["triangles", "faces"])

@@ -5,7 +5,7 @@ import pytest
 
 import topleft as tl
 from topleft._base.memory import KeptMemory
-from topleft._base.options import Sink
+from topleft._base.options import DepthTest, Sink
 from topleft._raster import choices, sampling
 from topleft._raster.snap import snap_scene
 from topleft._raster.view import View
@@ -197,9 +197,9 @@ def test_clip_space_is_never_flat():
 
 
 def test_sinks_of_fragments():
-    found = [choices.fragment_sink(test, has_depth=True) for test in (None, *choices.DepthTest)]
+    found = [choices.fragment_sink(test, has_depth=True) for test in (None, *DepthTest)]
     assert found == [Sink.PAINT, Sink.NEAREST, Sink.FARTHEST]
-    assert choices.fragment_sink(choices.DepthTest.LESS, has_depth=False) is Sink.PAINT
+    assert choices.fragment_sink(DepthTest.LESS, has_depth=False) is Sink.PAINT
 
 
 def test_depth_is_left_out_where_that_pays():

@@ -12,7 +12,7 @@ from strategies import CLIP_SCENES, PIXEL_SCENES, soup, with_depth
 import topleft as tl
 from topleft._base.memory import FreshMemory
 from topleft._raster import lines
-from topleft._raster.rasterize import snap_scene
+from topleft._raster.snap import snap_scene
 from topleft._raster.view import View
 from topleft.methods import reference_lines as ref
 

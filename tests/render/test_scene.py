@@ -1,6 +1,5 @@
 """Scenes: instances into one buffer, bit for bit the picture of one mesh that holds all of them."""
 
-import doctest
 
 import numpy as np
 import pytest
@@ -10,7 +9,6 @@ from scene_cases import CAMERA, CUBE, SIZE, SPHERE, joined, many, told_apart
 
 import topleft as tl
 from topleft._camera.camera import Camera
-from topleft._model import scene as scene_module
 from topleft._render import instances
 from topleft._render.fragments import SceneFragments
 from topleft._render.render import rasterize_mesh
@@ -246,7 +244,3 @@ def test_scene_unknown_option_is_refused():
         rasterize_mesh(many(), CAMERA, SIZE, sampling="area")
     with pytest.raises(ValueError, match="method 'bresenham_scanline' has no depth"):
         rasterize_mesh(many(), CAMERA, SIZE, method="bresenham_scanline")
-
-
-def test_scene_examples_hold():
-    assert doctest.testmod(scene_module).failed == 0

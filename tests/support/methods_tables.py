@@ -1,6 +1,6 @@
 """The tables of docs/guide/methods.md, made from the registry and from what the methods draw.
 
-`python tests/methods_tables.py` writes them anew; `test_tutorial_scenes.py` checks that they are up to date.
+`python tests/support/methods_tables.py` writes them anew; `test_tutorial_scenes.py` checks that they are up to date.
 """
 
 from pathlib import Path

@@ -1,8 +1,9 @@
-"""What every room stands on: checked arrays, options, memory, threads, colours. It knows no triangle.
+"""What every room stands on; it knows no triangle.
 
-arrays.py   coercion and checks: what the caller gives becomes contiguous native arrays, or an error that names the ar
-color.py    colours: sRGB values of 0 to 255, the light that they stand for, and a colour for each id
-memory.py   memory of a call: fresh arrays, arrays that are kept from call to call, and scratch that a thread keeps
-options.py  values that options take: every option is a string in the API and an enum inside
-threads.py  threads: rows of one picture, drawn side by side. The pool costs nothing until it is used and survives ``f
+arrays.py      checks what the caller gives and makes contiguous native arrays of it
+color.py       converts sRGB to linear light and back, and makes a colour for each id
+memory.py      gives arrays: new ones, ones that are kept from call to call, scratch of a thread
+options.py     defines the enums behind the options that are strings in the API
+threads.py     counts the threads that a call may use and runs parts of its work on them
+whole_file.py  writes a file that is whole or not there
 """

@@ -1,4 +1,7 @@
-"""Colours: sRGB values of 0 to 255, the light that they stand for, and a colour for each id."""
+"""Converts colours: sRGB to linear light and back; a colour for each id.
+
+Based on: IEC 61966-2-1, "Default RGB colour space - sRGB", 1999.
+"""
 
 from __future__ import annotations
 
@@ -8,20 +11,41 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from numpy.typing import NDArray
 
 F32 = npt.NDArray[np.float32]
+F64 = npt.NDArray[np.float64]
+I32 = npt.NDArray[np.int32]
 U8 = npt.NDArray[np.uint8]
 Color = tuple[int, ...]
 
 DEFAULT_COLOR = (224, 222, 217)
 """sRGB of a mesh without colours: a light warm grey, in which light and shadow both have room."""
 
-_VALUES = np.arange(256) / 255
-_LIGHT = np.where(_VALUES <= 0.04045, _VALUES / 12.92, ((_VALUES + 0.055) / 1.055) ** 2.4)
-LIGHT_OF_SRGB: F32 = _LIGHT.astype(np.float32)
+LINEAR_ONE = 1 << 16
+"""Steps of the light from 0 to 1 where it is kept as a whole number."""
+
+
+def decode_srgb(values: F64) -> F64:
+    """Linear light of sRGB values, both 0 to 1."""
+    return np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
+
+
+def encode_srgb(light: F64) -> F64:
+    """The sRGB values of linear light, both 0 to 1."""
+    return np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+
+
+LIGHT_OF_SRGB: F32 = decode_srgb(np.arange(256) / 255).astype(np.float32)
 """(256,) float32: the light, 0 to 1, of each sRGB value."""
 LIGHT_OF_SRGB.flags.writeable = False
+
+
+@lru_cache(maxsize=1)
+def srgb_tables() -> tuple[I32, U8]:
+    """Return the light of each sRGB value, in steps, and the sRGB value of each step."""
+    light = LINEAR_ONE * decode_srgb(np.arange(256) / 255)
+    values = 255 * encode_srgb(np.arange(LINEAR_ONE + 1) / LINEAR_ONE)
+    return np.rint(light).astype(np.int32), np.rint(values).astype(np.uint8)
 
 
 def as_color(name: str, color: Iterable[Any], n_channels: int) -> Color:
@@ -55,15 +79,3 @@ def id_colors(ids: npt.NDArray[np.integer[Any]]) -> U8:
     ramp = np.abs((6 * hue[:, None] + np.array([0, 4, 2], dtype=np.float32)) % 6 - 3) - 1
     rgb = value[:, None] * (1 - saturation[:, None] * (1 - np.clip(ramp, 0, 1)))
     return np.rint(255 * rgb).astype(np.uint8)
-
-
-LINEAR_ONE = 1 << 16
-
-
-@lru_cache(maxsize=1)
-def srgb_tables() -> tuple[NDArray[np.int32], NDArray[np.uint8]]:
-    """Return the light of each sRGB value, in steps, and the sRGB value of each step."""
-    value, light = np.arange(256) / 255, np.arange(LINEAR_ONE + 1) / LINEAR_ONE
-    decoded = np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
-    encoded = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
-    return np.rint(LINEAR_ONE * decoded).astype(np.int32), np.rint(255 * encoded).astype(np.uint8)

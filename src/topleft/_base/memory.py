@@ -67,7 +67,7 @@ class KeptMemory:
         """Return n int32 that are all `value`: filled once, put back by whoever changed them."""
         block = self._constants.get(name)
         if block is None or block.size < n:
-            block = self._constants[name] = FreshMemory().constant(name, n, value)
+            block = self._constants[name] = FRESH.constant(name, n, value)
         return block[:n]
 
 
@@ -100,6 +100,7 @@ class ScratchMemory(FreshMemory):
         self._threads.kept = None
 
 
+FRESH = FreshMemory()
 SCRATCH = ScratchMemory()
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, TypeVar
 if TYPE_CHECKING:
     from concurrent.futures import ThreadPoolExecutor
 
-__all__ = ["available_threads", "count_threads", "parse_threads", "run_parts"]
+__all__ = ["available_threads", "count_threads", "parse_threads", "run_parts", "threads_for"]
 
 Part = TypeVar("Part")
 
@@ -58,6 +58,11 @@ def count_threads(threads: int | None, n_triangles: int) -> int:
     if threads is None:
         return min(available_threads(), max(1, n_triangles // MIN_TRIANGLES_PER_THREAD))
     return threads
+
+
+def threads_for(threads: object, n_triangles: int) -> int:
+    """Return how many threads a scene is worth, of the number that a caller gave."""
+    return count_threads(parse_threads(threads), n_triangles)
 
 
 def run_parts(work: Callable[[int, int], Part], n: int, n_parts: int) -> list[Part]:

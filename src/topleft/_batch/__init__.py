@@ -1,6 +1,6 @@
-"""Many pictures: jobs and workers.
+"""Many pictures: jobs, and workers that draw them.
 
-batch.py    many pictures: jobs to files or arrays, on one thread, on several, or by worker processes
-jobs.py     jobs: a scene, a camera and where the picture goes; and the studio that draws them, one after the other, i
-workers.py  crews: who draws the jobs of a batch, threads or processes, and how meshes reach them
+batch.py    draws many jobs, in order or as they are done, with a bounded number on the way
+jobs.py     defines `Job` and draws one: a mesh, a camera and where the picture goes
+workers.py  hands jobs to threads or processes, and meshes to processes
 """

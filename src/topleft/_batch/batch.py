@@ -9,21 +9,19 @@ import operator
 import os
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence, Sized
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy.typing as npt
 
 from topleft._base.options import parse
-from topleft._batch.jobs import Job, Outcome, Studio, as_job
-from topleft._batch.workers import Crew, crew_of
+from topleft._batch.jobs import Job, JobRunner, Outcome, as_job
+from topleft._batch.workers import Workers, workers_of
 from topleft.errors import MissingPackageError
-
-if TYPE_CHECKING:
-    from concurrent.futures import Executor, Future
 
 __all__ = ["Batch", "Job", "Result", "Summary", "render_batch"]
 
@@ -139,12 +137,12 @@ def render_batch(
     n_chunk, n_window = _positive("chunk", chunk), None if window is None else _positive("window", window)
     wish = parse(Order, "order", order)
     collects = parse(OnError, "on_error", on_error) is OnError.COLLECT
-    crew = crew_of(executor)
+    workers = workers_of(executor)
     n_jobs = len(jobs) if isinstance(jobs, Sized) else None
-    if crew is None:
+    if workers is None:
         results = _one_by_one(iter(jobs), resume)
     else:
-        in_flight = _InFlight(crew, n_window or 2 * crew.n_workers + 2, wish is Order.COMPLETED)
+        in_flight = _InFlight(workers, n_window or 2 * workers.n_workers + 2, wish is Order.COMPLETED)
         results = in_flight.results(_chunks(iter(jobs), n_chunk, resume))
     return Batch(results, _bar(n_jobs) if progress is True else progress or None, collects=collects)
 
@@ -202,13 +200,13 @@ class Batch(Iterator[Result]):
 
 def _one_by_one(jobs: Iterator[object], resume: bool) -> Iterator[Result]:
     """Results of jobs that the calling thread draws."""
-    studio = Studio()
+    runner = JobRunner()
     for index, item in enumerate(jobs):
         job = as_job(item, index)
         if resume and _is_done(job):
             yield Result(index, job, is_skipped=True)
             continue
-        (outcome,) = studio.draw([(index, job)])
+        (outcome,) = runner.draw([(index, job)])
         yield Result(index, job, outcome.picture, outcome.error)
 
 
@@ -261,30 +259,30 @@ def _is_same(one: object, other: object) -> bool:
 class _InFlight:
     """Tasks that are on the way, a bounded number of them."""
 
-    def __init__(self, crew: Crew, window: int, as_completed: bool) -> None:
-        self._crew = crew
+    def __init__(self, workers: Workers, window: int, as_completed: bool) -> None:
+        self._workers = workers
         self._window = window
         self._as_completed = as_completed
         self._tasks: deque[_Task] = deque()
 
     def results(self, chunks: Iterator[tuple[list[tuple[int, Job]], bool]]) -> Iterator[Result]:
         """Yield the results of all."""
-        self._crew.start()
+        self._workers.start()
         try:
             while self._fill(chunks):
-                if self._crew.revive():  # a fork took the workers away: what was on the way begins again
+                if self._workers.restart_after_fork():  # a fork took the workers away: what was on the way begins again
                     for task in self._tasks:
                         if task.future is not None:
-                            task.future = self._crew.submit(task.jobs)
+                            task.future = self._workers.submit(task.jobs)
                 task = self._next_done() if self._as_completed else self._tasks.popleft()
                 results = task.results()
-                self._crew.forget(task.jobs)
+                self._workers.release(task.jobs)
                 yield from results
         finally:
             for task in self._tasks:
                 if task.future is not None:
                     task.future.cancel()
-            self._crew.stop([task.future for task in self._tasks if task.future is not None])
+            self._workers.stop([task.future for task in self._tasks if task.future is not None])
 
     def _fill(self, chunks: Iterator[tuple[list[tuple[int, Job]], bool]]) -> bool:
         """Put tasks on the way while there is room; tell whether there are any."""
@@ -293,13 +291,11 @@ class _InFlight:
             if found is None:
                 break
             jobs, is_done = found
-            self._tasks.append(_Task(jobs, None if is_done else self._crew.submit(jobs)))
+            self._tasks.append(_Task(jobs, None if is_done else self._workers.submit(jobs)))
         return bool(self._tasks)
 
     def _next_done(self) -> _Task:
         """Take out a task that is done, the earliest of them."""
-        from concurrent.futures import FIRST_COMPLETED, wait
-
         def is_done(task: _Task) -> bool:
             return task.future is None or task.future.done()
 

@@ -1,4 +1,4 @@
-"""Jobs: a scene, a camera and where the picture goes; and the studio that draws them, one after the other, in a thread.
+"""Draws jobs, one after the other: each a mesh or scene, a camera and where the picture goes.
 
 Input: `Job`. Output: arrays, or files that are whole or not there.
 """
@@ -28,7 +28,7 @@ from topleft._render.render import DEFAULT_SIZE, render
 from topleft._render.transparent import render_transparent
 from topleft._render.view_layers import gbuffer_of
 
-__all__ = ["Job", "Outcome", "SceneFile", "Studio", "as_job"]
+__all__ = ["Job", "JobRunner", "MeshFile", "Outcome", "as_job"]
 
 Array = npt.NDArray[Any]
 CameraMaker = Callable[[Any, tuple[int, int]], Camera]
@@ -113,7 +113,7 @@ class Outcome:
 
 
 @dataclass(frozen=True)
-class SceneFile:
+class MeshFile:
     """A mesh that is in a file."""
 
     path: str
@@ -140,7 +140,7 @@ class ForeignMesh:
         return as_mesh(self.subject)
 
 
-class SceneShelf:
+class MeshCache:
     """Meshes that were made, or the errors that came instead: the `n` latest, shared by all threads."""
 
     def __init__(self, n: int) -> None:
@@ -173,17 +173,17 @@ class SceneShelf:
             return None, error
 
 
-class Studio:
+class JobRunner:
     """Draws jobs: each thread on one thread and in memory of its own, which it keeps from picture to picture.
 
     Parameters
     ----------
-    n_scenes : int
+    n_meshes : int
         How many meshes that were read are kept for jobs to come.
     """
 
-    def __init__(self, n_scenes: int = 4) -> None:
-        self._shelf = SceneShelf(n_scenes)
+    def __init__(self, n_meshes: int = 4) -> None:
+        self._cache = MeshCache(n_meshes)
         self._threads = threading.local()
 
     def draw(self, jobs: Sequence[tuple[int, Job]]) -> list[Outcome]:
@@ -193,7 +193,7 @@ class Studio:
             try:
                 outcomes.append(Outcome(index, self.draw_one(job)))
             except Exception as error:
-                _let_go(error)
+                _clear_frames(error)
                 outcomes.append(Outcome(index, error=error))
         return outcomes
 
@@ -229,10 +229,10 @@ class Studio:
 
     def _scene(self, scene: Any) -> Any:
         if isinstance(scene, (str, os.PathLike)):
-            scene = SceneFile(os.fspath(scene))
+            scene = MeshFile(os.fspath(scene))
         elif not isinstance(scene, Mesh | Scene) and not callable(scene):
             scene = ForeignMesh(scene)
-        return self._shelf.get(scene) if callable(scene) else scene
+        return self._cache.get(scene) if callable(scene) else scene
 
     def _rasterizer(self, size: tuple[int, int]) -> Rasterizer:
         kept: Rasterizer | None = getattr(self._threads, "rasterizer", None)
@@ -241,7 +241,7 @@ class Studio:
         return kept
 
 
-def _let_go(error: BaseException | None) -> None:
+def _clear_frames(error: BaseException | None) -> None:
     """Free what the frames of an error hold, pictures among it: results carry errors for long."""
     import traceback
 

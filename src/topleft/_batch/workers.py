@@ -1,4 +1,4 @@
-"""Crews: who draws the jobs of a batch, threads or processes, and how meshes reach them.
+"""Hands the jobs of a batch to threads or processes, and meshes to processes through files.
 
 Input: the `executor` of a batch, and jobs. Output: futures of outcomes.
 """
@@ -8,21 +8,19 @@ from __future__ import annotations
 import os
 from collections import OrderedDict
 from collections.abc import Sequence
+from concurrent.futures import Executor, Future, wait
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from topleft._batch.jobs import Job, Outcome, Studio
+from topleft._batch.jobs import Job, JobRunner, Outcome
 from topleft._lod.levels import Level, Levels, keep_levels
 from topleft._lod.simplify import levels_of
 from topleft._model.mesh import Mesh
 from topleft._model.scene import Scene
 from topleft.errors import MissingPackageError
 
-if TYPE_CHECKING:
-    from concurrent.futures import Executor, Future
-
-__all__ = ["Crew", "crew_of"]
+__all__ = ["Workers", "workers_of"]
 
 Jobs = Sequence[tuple[int, Job]]
 
@@ -30,8 +28,8 @@ N_SPOOLED = 8
 """Meshes whose files are kept for jobs to come, besides those that a job on the way needs."""
 
 
-def crew_of(executor: object) -> Crew | None:
-    """Return who draws: None for the calling thread.
+def workers_of(executor: object) -> Workers | None:
+    """Return the workers that draw: None for the calling thread.
 
     Raises
     ------
@@ -45,17 +43,17 @@ def crew_of(executor: object) -> Crew | None:
     if isinstance(executor, int) and not isinstance(executor, bool):
         if executor < 1:
             raise ValueError(f"executor must be at least 1 thread, got {executor}")
-        return ThreadCrew(executor)
-    from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
+        return OwnThreads(executor)
+    from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor  # which take multiprocessing with them
 
     if not isinstance(executor, Executor):
         raise TypeError(f"executor must be None, a number of threads or an Executor, got {type(executor).__name__}")
     if isinstance(executor, ThreadPoolExecutor):
-        return HiredThreads(executor)
-    return ProcessCrew(executor) if isinstance(executor, ProcessPoolExecutor) else Strangers(executor)
+        return BorrowedThreads(executor)
+    return LocalProcesses(executor) if isinstance(executor, ProcessPoolExecutor) else RemoteWorkers(executor)
 
 
-class Crew:
+class Workers:
     """Workers of an executor that the caller owns; jobs are sent as they are."""
 
     def __init__(self, executor: Executor) -> None:
@@ -66,36 +64,34 @@ class Crew:
         """Get ready; called before the first job."""
 
     def submit(self, jobs: Jobs) -> Future[list[Outcome]]:
-        """Put jobs on the way."""
+        """Submit jobs together."""
         raise NotImplementedError
 
-    def forget(self, jobs: Jobs) -> None:
-        """Let go of what jobs needed that are done."""
+    def release(self, jobs: Jobs) -> None:
+        """Free what jobs needed that are done."""
 
-    def revive(self) -> bool:
-        """Tell whether workers were lost by a fork and are there again."""
+    def restart_after_fork(self) -> bool:
+        """Return whether a fork had ended the workers, which have been started again."""
         return False
 
     def stop(self, futures: Sequence[Future[Any]]) -> None:
         """Wait until what has begun is finished."""
-        from concurrent.futures import wait
-
         wait(futures)
 
 
-class HiredThreads(Crew):
+class BorrowedThreads(Workers):
     """Threads of the caller's executor: they see the meshes as they are."""
 
     def start(self) -> None:
         """Get ready."""
-        self._studio = Studio(max(4, 2 * self.n_workers))
+        self._runner = JobRunner(max(4, 2 * self.n_workers))
 
     def submit(self, jobs: Jobs) -> Future[list[Outcome]]:
-        """Put jobs on the way."""
-        return self._executor.submit(self._studio.draw, jobs)
+        """Submit jobs together."""
+        return self._executor.submit(self._runner.draw, jobs)
 
 
-class ThreadCrew(HiredThreads):
+class OwnThreads(BorrowedThreads):
     """Threads of the batch's own, which end with it."""
 
     def __init__(self, n_workers: int) -> None:
@@ -109,8 +105,8 @@ class ThreadCrew(HiredThreads):
         self._executor = ThreadPoolExecutor(self.n_workers, thread_name_prefix="topleft-batch")
         self._pid = os.getpid()
 
-    def revive(self) -> bool:
-        """Begin anew in a forked child: the threads stayed with the parent, and so did locks that they held."""
+    def restart_after_fork(self) -> bool:
+        """Start again in a forked child: the threads stayed with the parent, and so did locks that they held."""
         if self._pid == os.getpid():
             return False
         self.start()
@@ -122,15 +118,15 @@ class ThreadCrew(HiredThreads):
             self._executor.shutdown(cancel_futures=True)
 
 
-class Strangers(Crew):
-    """Workers of which nothing is known, perhaps on other machines: each job carries all that it needs."""
+class RemoteWorkers(Workers):
+    """Workers that may be on other machines: each job carries all that it needs."""
 
     def submit(self, jobs: Jobs) -> Future[list[Outcome]]:
-        """Put jobs on the way."""
+        """Submit jobs together."""
         return self._executor.submit(draw_in_process, str(os.getpid()), list(jobs))
 
 
-class ProcessCrew(Crew):
+class LocalProcesses(Workers):
     """Processes on this machine: meshes reach them through files that each reads once."""
 
     def start(self) -> None:
@@ -138,12 +134,12 @@ class ProcessCrew(Crew):
         self._spool = Spool()
 
     def submit(self, jobs: Jobs) -> Future[list[Outcome]]:
-        """Put jobs on the way, their meshes replaced by where to find them."""
+        """Submit jobs together, their meshes replaced by where to find them."""
         light = [(index, replace(job, scene=self._spool.hold(job.scene, _needs_levels(job)))) for index, job in jobs]
         return self._executor.submit(draw_in_process, self._spool.token, light)
 
-    def forget(self, jobs: Jobs) -> None:
-        """Let go of their meshes."""
+    def release(self, jobs: Jobs) -> None:
+        """Free their meshes."""
         for _, job in jobs:
             self._spool.release(job.scene, _needs_levels(job))
 
@@ -154,7 +150,7 @@ class ProcessCrew(Crew):
 
 
 @dataclass(frozen=True)
-class SpooledScene:
+class SpooledMesh:
     """A mesh that another process has put into a file, and its levels of detail."""
 
     path: str
@@ -173,7 +169,7 @@ class SpooledScene:
 @dataclass
 class _Spooled:
     scene: Any  # held, so that no other object gets its id
-    at: SpooledScene
+    at: SpooledMesh
     n_users: int = 0
 
 
@@ -210,7 +206,7 @@ class Spool:
             coarser = coarser_levels_of(scene) if with_levels else []
             with open(path, "xb") as file:
                 pickle.dump((scene, coarser), file, pickle.HIGHEST_PROTOCOL)
-            entry = self._entries[key] = _Spooled(scene, SpooledScene(str(path)))
+            entry = self._entries[key] = _Spooled(scene, SpooledMesh(str(path)))
             self._trim()
         self._entries.move_to_end(key)
         entry.n_users += 1
@@ -251,12 +247,12 @@ def _needs_levels(job: Job) -> bool:
     return bool(job.options.get("tolerance", 0))
 
 
-_studio: tuple[str, Studio] | None = None
+_runner: tuple[str, JobRunner] | None = None
 
 
 def draw_in_process(token: str, jobs: Jobs) -> list[Outcome]:
     """Draw jobs in a worker process, which keeps what it has read for the rest of the batch."""
-    global _studio
-    if _studio is None or _studio[0] != token:
-        _studio = token, Studio()
-    return _studio[1].draw(jobs)
+    global _runner
+    if _runner is None or _runner[0] != token:
+        _runner = token, JobRunner()
+    return _runner[1].draw(jobs)

@@ -13,35 +13,30 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._camera.lens import Lens, lens_of_opencv
-from topleft._camera.poses import (
+from topleft._camera.matrices import (
+    F64,
     FRAMING_MARGIN,
     THREE_QUARTER_DEG,
-    bounding_sphere,
-    box_corners,
-    distance_to_fit,
-    orbit_view,
-    points_to_frame,
-    view_matrix,
-)
-from topleft._camera.projections import (
-    F64,
     as_square,
     as_vector,
+    bounding_sphere,
+    box_corners,
     box_matrix,
     check_fov,
     check_planes,
     check_positive,
     check_regular,
+    distance_to_fit,
     frustum_matrix,
+    orbit_view,
     orthographic_matrix,
     perspective_matrix,
+    points_to_frame,
+    view_matrix,
 )
 from topleft._model.adapt import MeshLike
 
-__all__ = [
-    "DEFAULT_FOV_Y_DEG", "THREE_QUARTER_DEG", "Camera", "bounding_sphere", "orbit_view", "perspective_matrix",
-    "view_matrix",
-]  # fmt: skip
+__all__ = ["DEFAULT_FOV_Y_DEG", "Camera"]
 
 DEFAULT_FOV_Y_DEG = 40.0
 

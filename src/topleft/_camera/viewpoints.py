@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._camera.camera import Camera
-from topleft._camera.poses import THREE_QUARTER_DEG, bounding_sphere
+from topleft._camera.matrices import THREE_QUARTER_DEG, bounding_sphere
 from topleft._model.adapt import MeshLike
 
 GOLDEN_ANGLE_DEG = 180 * (3 - 5**0.5)

@@ -1,5 +1,5 @@
 """Values and heights of meshes on a grid.
 
-field.py  fields: values on an unstructured mesh, and heights of its surface, on a regular grid
-grid.py   regular grids over data: which part of the plane a picture shows, in units of the data
+field.py  resamples values of a mesh, and the heights of its surface, on a regular grid
+grid.py   defines `Grid`: which part of the plane a picture shows, in units of the data
 """

@@ -19,7 +19,7 @@ from topleft._base.memory import SCRATCH
 from topleft._base.options import Per, Sink, parse
 from topleft._base.threads import count_threads, run_parts
 from topleft._field.grid import Extent, Grid, grid_around
-from topleft._model.adapt import MeshLike, Surface, as_surface
+from topleft._model.adapt import MeshLike, Polygons, as_polygons
 from topleft._raster.rasterize import canvas_of, draw
 from topleft._raster.snap import snap_scene
 from topleft._raster.view import View
@@ -95,24 +95,26 @@ def field(
     --------
     >>> import topleft as tl
     >>> tl.field(([[0, 0], [4, 0], [0, 4]], [[0, 1, 2]]), [0.0, 4.0, 8.0], (4, 4))
-    array([[7.5, nan, nan, nan],
-           [5.5, 6.5, nan, nan],
-           [3.5, 4.5, 5.5, nan],
-           [1.5, 2.5, 3.5, 4.5]])
+    array([[nan, nan, nan, nan],
+           [5.5, nan, nan, nan],
+           [3.5, 4.5, nan, nan],
+           [1.5, 2.5, 3.5, nan]])
+
+    The centres on the slanted side belong to the triangle on its other side, if there is one.
     """
-    surface = as_surface(mesh)
-    points = _plane_points(surface)
+    polygons = as_polygons(mesh)
+    points = _plane_points(polygons)
     array = as_array("values", values)
     if array.dtype.kind not in "fiub":
         raise TypeError(f"values must be real numbers, got dtype {array.dtype}")
-    is_per_face = _is_per_face(array, len(points), surface.n_faces, parse(Per, "per", per))
-    grid = _grid_of(surface, size, pixel_size, extent, y)
-    points_px, triangles = grid.to_pixels(points), as_checked_triangles(surface.triangles, len(points))
+    is_per_face = _is_per_face(array, len(points), polygons.n_faces, parse(Per, "per", per))
+    grid = _grid_of(polygons, size, pixel_size, extent, y)
+    points_px, triangles = grid.to_pixels(points), as_checked_triangles(polygons.triangles, len(points))
     view = View.parse(grid.size, {"subpixel_bits": subpixel_bits, "threads": threads})
     ids = _visible(points_px, triangles, view, Sink.LABEL)
     dtype = np.float32 if array.dtype == np.float32 else np.float64
     if is_per_face:
-        own = array if surface.faces is None else array[surface.faces]
+        own = array if polygons.faces is None else array[polygons.faces]
         with canvas_of(SCRATCH, "field", out, ids.shape, dtype) as (result, canvas):
             np.take(np.append(own, np.nan).astype(dtype), ids, out=canvas, mode="wrap")  # id -1 is the last
         return result
@@ -171,18 +173,18 @@ def height_map(
     --------
     >>> import topleft as tl
     >>> tl.height_map(([[0, 0, 1], [2, 0, 1], [0, 2, 3]], [[0, 1, 2]]), 1.0)
-    array([[2.5, nan],
-           [1.5, 1.5]])
+    array([[nan, nan],
+           [1.5, nan]])
     """
     if surface not in ("upper", "lower"):
         raise ValueError(f'surface must be "upper" or "lower", got {surface!r}')
-    shape = as_surface(mesh)
-    points = _plane_points(shape)
+    polygons = as_polygons(mesh)
+    points = _plane_points(polygons)
     if points.shape[1] != 3:
         raise ValueError(f"a height map needs points of shape (V, 3), got {points.shape}")
     is_grid = isinstance(spacing, Grid)
-    grid = _grid_of(shape, spacing, None, extent, y) if is_grid else _grid_of(shape, None, spacing, extent, y)
-    triangles = as_checked_triangles(shape.triangles, len(points))
+    grid = _grid_of(polygons, spacing, None, extent, y) if is_grid else _grid_of(polygons, None, spacing, extent, y)
+    triangles = as_checked_triangles(polygons.triangles, len(points))
     points_px, heights = grid.to_pixels(points), np.ascontiguousarray(points[:, 2], np.float64)
     view = View.parse(grid.size, {"subpixel_bits": subpixel_bits, "threads": threads})
     sink = Sink.FARTHEST if surface == "upper" else Sink.NEAREST
@@ -190,8 +192,8 @@ def height_map(
     return _on_planes(ids, points_px, triangles, heights, np.float64, view, out)
 
 
-def _plane_points(surface: Surface) -> npt.NDArray[Any]:
-    points = as_array("points", surface.points)
+def _plane_points(polygons: Polygons) -> npt.NDArray[Any]:
+    points = as_array("points", polygons.points)
     if points.ndim != 2 or points.shape[1] not in (2, 3):
         raise ValueError(f"points must have shape (V, 2) or (V, 3), got {points.shape}")
     if points.dtype.kind not in "fiu":
@@ -199,12 +201,12 @@ def _plane_points(surface: Surface) -> npt.NDArray[Any]:
     return points
 
 
-def _grid_of(surface: Surface, size: Any, pixel_size: Any, extent: Extent | None, y: str) -> Grid:
+def _grid_of(polygons: Polygons, size: Any, pixel_size: Any, extent: Extent | None, y: str) -> Grid:
     if isinstance(size, Grid):
         if extent is not None or pixel_size is not None or y != "up":
             raise ValueError("a Grid says extent, pixel_size and y itself: give none of them beside it")
         return size
-    return grid_around(surface, size, pixel_size, extent, y)
+    return grid_around(polygons, size, pixel_size, extent, y)
 
 
 def _is_per_face(values: npt.NDArray[Any], n_vertices: int, n_faces: int, per: Per) -> bool:

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._base.arrays import as_size
-from topleft._model.adapt import MeshLike, Surface, as_surface
+from topleft._model.adapt import MeshLike, Polygons, as_polygons
 
 F64 = npt.NDArray[np.float64]
 Extent = tuple[float, float, float, float]
@@ -95,7 +95,7 @@ class Grid:
             If neither or both of `size` and `pixel_size` are given, the mesh has no triangles or no area, or a number
             is outside its range.
         """
-        return grid_around(as_surface(subject), size, pixel_size, extent, y)
+        return grid_around(as_polygons(subject), size, pixel_size, extent, y)
 
     @property
     def pixel_size(self) -> tuple[float, float]:
@@ -134,7 +134,7 @@ class Grid:
 
 
 def grid_around(
-    surface: Surface,
+    polygons: Polygons,
     size: tuple[int, int] | None,
     pixel_size: float | tuple[float, float] | None,
     extent: Extent | None,
@@ -144,7 +144,7 @@ def grid_around(
     if (size is None) == (pixel_size is None):
         raise ValueError("a grid needs either size or pixel_size")
     if extent is None:
-        extent = extent_of(surface)
+        extent = extent_of(polygons)
     if pixel_size is None:
         return Grid(as_size(size), extent, y)
     x_min, x_max, y_min, y_max = Grid((1, 1), extent, y).extent
@@ -157,10 +157,10 @@ def grid_around(
     return Grid((width, height), (x_min, x_min + width * step[0], y_min, y_min + height * step[1]), y)
 
 
-def extent_of(surface: Surface) -> Extent:
+def extent_of(polygons: Polygons) -> Extent:
     """The box round the points that triangles use."""
-    if not len(surface.triangles):
+    if not len(polygons.triangles):
         raise ValueError("a mesh without triangles has no extent")
-    points, corners = np.asarray(surface.points), np.asarray(surface.triangles)
+    points, corners = np.asarray(polygons.points), np.asarray(polygons.triangles)
     x, y = points[:, 0][corners], points[:, 1][corners]  # by column: NumPy is slow along short rows
     return float(x.min()), float(x.max()), float(y.min()), float(y.max())

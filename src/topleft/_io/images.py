@@ -7,18 +7,18 @@ from __future__ import annotations
 
 import io
 import os
-from collections.abc import Callable, Mapping
-from contextlib import suppress
+from collections.abc import Mapping
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from topleft._base.whole_file import write_whole
 from topleft._io import png
 from topleft.errors import ImageError
 
-__all__ = ["PICTURE_SUFFIXES", "SUFFIXES", "composite", "save_image", "write_whole"]
+__all__ = ["PICTURE_SUFFIXES", "SUFFIXES", "composite", "save_image"]
 
 PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff")
 BUFFER_SUFFIXES = (".npy", ".npz")
@@ -114,30 +114,6 @@ def composite(image: npt.NDArray[np.uint8], background: tuple[int, int, int]) ->
     alpha = image[..., 3:].astype(np.uint32)
     mixed = image[..., :3] * alpha + np.asarray(background, dtype=np.uint32) * (255 - alpha)
     return ((mixed + 127) // 255).astype(np.uint8)
-
-
-def write_whole(path: Path, write: Callable[[IO[bytes]], object]) -> None:
-    """Write to a new name in the same folder, then rename: a reader or a crash never meets half a file."""
-    if path.is_dir():
-        raise IsADirectoryError(f"cannot write {str(path)!r}: it is a folder")
-    temporary = path.with_name(f".{path.name[:100]}.{os.urandom(4).hex()}.part")
-    try:
-        with open(temporary, "xb") as file:
-            write(file)
-        os.replace(temporary, path)
-    except OSError as error:
-        _remove(temporary)
-        if error.errno is None:
-            raise
-        raise type(error)(error.errno, f"cannot write: {error.strerror}", str(path)) from error
-    except BaseException:
-        _remove(temporary)
-        raise
-
-
-def _remove(temporary: Path) -> None:
-    with suppress(OSError):  # it was never made
-        temporary.unlink()
 
 
 def _check_holds(path: Path, image: npt.NDArray[Any]) -> None:

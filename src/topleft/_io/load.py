@@ -12,8 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from topleft._model.adapt import joined, placed
-from topleft._model.imported import obj_by_material
+from topleft._model.adapt import joined, material_of, placed
 from topleft._model.material import Material
 from topleft._model.mesh import Mesh
 from topleft.errors import MeshError, MissingPackageError
@@ -34,8 +33,8 @@ def load(path: str | os.PathLike[str]) -> Mesh:
         are placed by their transforms. Normals are those of the file. A file without normals gets its vertices merged
         where they are equal, so that shading has no seams where a format (STL) or a texture had to double them.
         Colours are those of the vertices or the faces, if there are any; `uv` those of the file. Materials are those of
-        MTL (colour, its map, highlights) and glTF (base colour; metallic-rough surfaces are approximated, see
-        `topleft.imported`); the triangles of an OBJ file stand together by material.
+        MTL (colour, its map, highlights) and glTF (base colour; metallic-rough surfaces are
+        approximated); the triangles of an OBJ file stand together by material.
 
     Raises
     ------
@@ -45,6 +44,12 @@ def load(path: str | os.PathLike[str]) -> Mesh:
         If the file is broken, has no triangles, or is of an unsupported format.
     MissingPackageError
         If trimesh, or a package that it needs for this format, is not installed.
+
+    Notes
+    -----
+    Of a metallic-rough surface the base colour is shaded by Lambert's cosine, the roughness by a Blinn highlight of the
+    same width with the reflectance of a dielectric. Metals keep their diffuse colour, since there is no surrounding
+    that they could mirror; normal, occlusion and emission maps are not read.
     """
     path = Path(path)
     if not path.exists():
@@ -122,8 +127,46 @@ def _obj_texts(path: Path) -> Iterator[tuple[bytes, Material | None]]:
     text = re.sub(r"^[ \t]*[ogs]\b.*$", "", text, flags=re.MULTILINE)
     if re.search(r"^[ \t]*f\b.*-\d", text, flags=re.MULTILINE):
         text = "\n".join(_absolute_indices(text.split("\n")))
-    for own, material in obj_by_material(text, path):
+    for own, material in _by_material(text, path):
         yield re.sub(r"^[ \t]*(usemtl|mtllib)\b.*$", "", own, flags=re.MULTILINE).encode(), material
+
+
+def _by_material(text: str, path: Path) -> Iterator[tuple[str, Material | None]]:
+    """The OBJ text of each material, in the order of their first use: all vertices, and the faces that use it.
+
+    The whole text when the library has none of the materials.
+    """
+    if "usemtl" not in text or "mtllib" not in text:
+        yield text, None
+        return
+    import trimesh
+
+    used: dict[str, list[str]] = {}
+    vertices, name = [], ""
+    known: dict[str, Any] = {}
+    parse_mtl: Any = trimesh.exchange.obj.parse_mtl
+    for line in text.split("\n"):
+        words = line.split(maxsplit=1)
+        match words[0] if words else "":
+            case "usemtl":
+                name = words[1].strip() if len(words) > 1 else ""
+            case "mtllib" if len(words) > 1:
+                library = path.parent / words[1].strip()
+                if library.is_file():
+                    resolver = trimesh.resolvers.FilePathResolver(str(library.parent))
+                    known |= parse_mtl(library.read_bytes(), resolver=resolver)
+            case "f":
+                used.setdefault(name, []).append(line)
+            case "v" | "vt" | "vn":
+                vertices.append(line)
+    if not known.keys() & used.keys():
+        yield text, None
+        return
+    for name, faces in used.items():
+        own = known.get(name)
+        make: Any = trimesh.visual.material.SimpleMaterial
+        source = None if own is None else make(**own)
+        yield "\n".join([*vertices, *faces]), None if source is None else material_of(source)
 
 
 def _absolute_indices(lines: list[str]) -> Iterator[str]:
@@ -140,13 +183,3 @@ def _absolute_indices(lines: list[str]) -> Iterator[str]:
 
 def _absolute(index: str, n_above: int) -> str:
     return str(n_above + 1 + int(index)) if index.startswith("-") else index
-
-
-
-
-
-
-
-
-
-

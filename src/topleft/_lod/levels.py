@@ -17,7 +17,8 @@ from weakref import WeakKeyDictionary
 import numpy as np
 import numpy.typing as npt
 
-from topleft._camera.poses import bounding_sphere
+from topleft._base.whole_file import write_whole
+from topleft._camera.matrices import bounding_sphere
 from topleft._model.mesh import Mesh
 from topleft.errors import MeshError
 
@@ -96,8 +97,6 @@ class Levels(Sequence[Level]):
         ValueError
             If the name does not end in .npz.
         """
-        import tempfile  # it takes shutil with it
-
         path = _checked_path(path)
         arrays: dict[str, npt.NDArray[Any]] = {
             "mesh": np.array(digest_of(self[0].mesh)),
@@ -109,14 +108,7 @@ class Levels(Sequence[Level]):
                 array = getattr(level.mesh, name)
                 if array is not None:
                     arrays[f"{name}_{i}"] = array
-        handle, made = tempfile.mkstemp(dir=path.parent, prefix=path.stem, suffix=".npz")
-        try:
-            with os.fdopen(handle, "wb") as file:
-                np.savez(file, **arrays)  # type: ignore[arg-type]
-            os.replace(made, path)
-        except BaseException:
-            Path(made).unlink(missing_ok=True)
-            raise
+        write_whole(path, lambda file: np.savez(file, **arrays))  # type: ignore[arg-type]
 
     @classmethod
     def load(cls, path: str | os.PathLike[str], mesh: Mesh) -> Levels:

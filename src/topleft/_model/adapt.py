@@ -1,7 +1,7 @@
 """Adapters: the meshes of other libraries, told by their attributes, as a `Mesh`; none of those libraries is imported.
 
 Input: `trimesh.Trimesh` and `trimesh.Scene`, `meshio.Mesh`, `pyvista.PolyData`, `matplotlib.tri.Triangulation`,
-anything with `vertices` and `triangles` (or `faces`), or a pair of arrays. Output: `Mesh`, or `Surface` where points
+anything with `vertices` and `triangles` (or `faces`), or a pair of arrays. Output: `Mesh`, or `Polygons` where points
 may be flat. Arrays are taken without a copy where their numbers allow it.
 """
 
@@ -14,10 +14,11 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._base.arrays import as_array
-from topleft._model.imported import material_of
+from topleft._base.color import Color, encode_srgb
 from topleft._model.material import Material
 from topleft._model.mesh import Mesh, coincident
 from topleft._model.normals import angle_weighted_normals
+from topleft._model.texture import Texture
 
 MeshLike: TypeAlias = Any
 """What `as_mesh` takes."""
@@ -25,8 +26,11 @@ MeshLike: TypeAlias = Any
 CORNERS_OF_CELL = {"triangle": 3, "triangle6": 3, "triangle7": 3, "quad": 4, "quad8": 4, "quad9": 4, "polygon": None}
 """Corners of the surface cells of meshio, which come first in a row; `None`: all of the row."""
 
+DIELECTRIC = 0.04
+"""The share of light that glass, paint and skin reflect when seen along their normal."""
 
-class Surface(NamedTuple):
+
+class Polygons(NamedTuple):
     """Points, and triangles that know which face they were cut from."""
 
     points: npt.NDArray[Any]
@@ -79,14 +83,14 @@ def as_mesh(subject: MeshLike) -> Mesh:
         return joined(parts)
     if hasattr(subject, "visual") and hasattr(subject, "faces"):
         return placed(subject, np.eye(4))
-    surface = as_surface(subject)
-    points = surface.points
+    polygons = as_polygons(subject)
+    points = polygons.points
     if points.ndim == 2 and points.shape[1] == 2:
         points = np.column_stack([points, np.zeros(len(points))])
-    return Mesh(points, surface.triangles)
+    return Mesh(points, polygons.triangles)
 
 
-def as_surface(subject: MeshLike) -> Surface:
+def as_polygons(subject: MeshLike) -> Polygons:
     """The points and triangles of a subject that `as_mesh` takes; points stay flat where they are.
 
     Raises
@@ -127,21 +131,21 @@ def _is_scene(subject: object) -> bool:
     return hasattr(subject, "geometry") and hasattr(subject, "graph")
 
 
-def _plain(vertices: npt.ArrayLike, triangles: npt.ArrayLike) -> Surface:
+def _plain(vertices: npt.ArrayLike, triangles: npt.ArrayLike) -> Polygons:
     corners = as_array("triangles", triangles)
-    return Surface(as_array("vertices", vertices), corners, None, len(corners))
+    return Polygons(as_array("vertices", vertices), corners, None, len(corners))
 
 
-def _of_triangulation(subject: Any) -> Surface:
+def _of_triangulation(subject: Any) -> Polygons:
     points = np.column_stack([as_array("x", subject.x), as_array("y", subject.y)])
     triangles, mask = as_array("triangles", subject.triangles), getattr(subject, "mask", None)
     if mask is None:
-        return Surface(points, triangles, None, len(triangles))
+        return Polygons(points, triangles, None, len(triangles))
     kept = np.flatnonzero(~np.asarray(mask))
-    return Surface(points, triangles[kept], kept, len(triangles))
+    return Polygons(points, triangles[kept], kept, len(triangles))
 
 
-def _of_cells(points: npt.NDArray[Any], blocks: Iterable[Any]) -> Surface:
+def _of_cells(points: npt.NDArray[Any], blocks: Iterable[Any]) -> Polygons:
     """Triangles of the surface cells of meshio, block after block."""
     blocks = list(blocks)
     surfaces = [block for block in blocks if block.type in CORNERS_OF_CELL]
@@ -152,16 +156,16 @@ def _of_cells(points: npt.NDArray[Any], blocks: Iterable[Any]) -> Surface:
     return _fans(points, found)
 
 
-def _of_padded(subject: Any) -> Surface:
+def _of_padded(subject: Any) -> Polygons:
     """Triangles of the faces of pyvista: one array, before each face its number of corners."""
     points, padded = as_array("points", subject.points), as_array("faces", subject.faces)
     if padded.ndim == 2:
-        return Surface(points, padded, None, len(padded))
+        return Polygons(points, padded, None, len(padded))
     if getattr(subject, "n_strips", 0):
         raise ValueError("mesh has strips of triangles: take its triangulate()")
     if padded.size % 4 == 0 and (padded[::4] == 3).all():
         triangles = padded.reshape(-1, 4)[:, 1:]
-        return Surface(points, triangles, None, len(triangles))
+        return Polygons(points, triangles, None, len(triangles))
     faces, start = [], 0
     while start < len(padded):
         faces.append(padded[None, start + 1 : start + 1 + padded[start]])
@@ -169,11 +173,11 @@ def _of_padded(subject: Any) -> Surface:
     return _fans(points, faces)
 
 
-def _fans(points: npt.NDArray[Any], blocks: list[npt.NDArray[Any]]) -> Surface:
+def _fans(points: npt.NDArray[Any], blocks: list[npt.NDArray[Any]]) -> Polygons:
     """Faces (N, K) as K - 2 triangles each."""
     if all(block.shape[1] == 3 for block in blocks):
         triangles = blocks[0] if len(blocks) == 1 else np.concatenate(blocks)
-        return Surface(points, triangles, None, len(triangles))
+        return Polygons(points, triangles, None, len(triangles))
     fans, sources, n_faces = [], [], 0
     for block in blocks:
         n, n_corners = block.shape
@@ -182,7 +186,7 @@ def _fans(points: npt.NDArray[Any], blocks: list[npt.NDArray[Any]]) -> Surface:
         fans.append(block[:, fan].reshape(-1, 3))
         sources.append(np.repeat(np.arange(n_faces, n_faces + n), len(steps)))
         n_faces += n
-    return Surface(points, np.concatenate(fans), np.concatenate(sources), n_faces)
+    return Polygons(points, np.concatenate(fans), np.concatenate(sources), n_faces)
 
 
 def placed(geometry: Any, transform: npt.NDArray[np.float64]) -> Mesh:
@@ -260,3 +264,44 @@ def _rgba(part: Mesh) -> npt.NDArray[np.uint8]:
     if part.colors is None:
         return np.full((len(part.vertices), 4), 255, dtype=np.uint8)
     return part.colors
+
+
+def material_of(source: Any) -> Material | None:
+    """The material of a trimesh visual: `SimpleMaterial` (MTL) or `PBRMaterial` (glTF); None for anything else."""
+    if hasattr(source, "baseColorFactor"):
+        return _metallic_rough(source)
+    if hasattr(source, "diffuse"):
+        shininess = float(source.glossiness or 0)
+        specular = 0.0 if source.specular is None else float(np.mean(np.asarray(source.specular)[:3])) / 255
+        texture = _texture(source.image)
+        color = None if texture else _rgb(source.diffuse)
+        return Material(color, texture, specular=min(specular, 1.0) if shininess else 0.0, shininess=shininess)
+    return None
+
+
+def _metallic_rough(source: Any) -> Material:
+    factor = source.baseColorFactor
+    texture = _texture(source.baseColorTexture)
+    linear = np.ones(4) if factor is None else np.asarray(factor, dtype=np.float64)
+    if factor is not None and np.asarray(factor).dtype.kind in "iu":
+        linear = linear / 255
+    roughness = 1.0 if source.roughnessFactor is None else float(source.roughnessFactor)
+    alpha = max(roughness, 0.05) ** 2
+    shininess = max(2 / alpha**2 - 2, 0.0)
+    specular = min(DIELECTRIC * (shininess + 8) / 8, 1.0) if roughness < 1 else 0.0
+    cutoff = None
+    if source.alphaMode == "MASK":
+        cutoff = 0.5 if source.alphaCutoff is None else float(source.alphaCutoff)
+    color = None if factor is None else _rgb(np.rint(255 * encode_srgb(linear).clip(0, 1)))
+    return Material(color, texture, specular=specular, shininess=shininess, alpha_cutoff=cutoff)
+
+
+def _texture(image: Any) -> Texture | None:
+    if image is None:
+        return None
+    return Texture(np.asarray(image.convert("RGBA")))
+
+
+def _rgb(values: Any) -> Color:
+    red, green, blue = (int(value) for value in np.asarray(values)[:3])
+    return red, green, blue

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._base.arrays import INT32_MAX
-from topleft._model.mesh import Mesh
+from topleft._model.mesh import Mesh, extreme_points, used_vertices
 from topleft._raster.clusters import Patience
 
 __all__ = ["Instance", "Scene"]
@@ -157,10 +157,7 @@ class Scene:
         used = [world_corners(instance) for instance in self.instances if len(instance.mesh.triangles)]
         if not used:
             raise ValueError("a scene without triangles has no bounds")
-        ends = np.concatenate([points[[*points.argmin(axis=0), *points.argmax(axis=0)]] for points in used])
-        center = ends.min(axis=0) / 2 + ends.max(axis=0) / 2
-        farthest = [points[((points - center) ** 2).sum(axis=1).argmax()] for points in used]
-        return np.concatenate([ends, farthest])
+        return extreme_points(*used)
 
 
 def as_instance(value: object) -> Instance:
@@ -178,8 +175,5 @@ def as_instance(value: object) -> Instance:
 
 def world_corners(instance: Instance) -> F64:
     """The vertices that triangles of an instance use, in the world: (N, 3) float64."""
-    mesh = instance.mesh
-    is_used = np.zeros(len(mesh.vertices), np.bool_)
-    is_used[mesh.triangles.ravel()] = True
     linear, offset = instance.transform[:3, :3], instance.transform[:3, 3]
-    return mesh.vertices[is_used].astype(np.float64) @ linear.T + offset
+    return used_vertices(instance.mesh).astype(np.float64) @ linear.T + offset

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from topleft._base.options import Sampling, Sink
+from topleft._base.whole_file import write_whole
 from topleft._raster.choices import NEAR_PIXELS
 
 __all__ = ["FEATURES", "Costs", "cache_file", "features", "load_costs", "save_costs", "sink_group"]
@@ -120,17 +121,13 @@ def load_costs() -> Costs:
 
 
 def save_costs(costs: Costs, path: Path | None = None) -> Path:
-    """Write costs under a temporary name, rename the file, and return its path."""
+    """Write costs to a file, whole or not at all, and return its path."""
     import json
 
     target = cache_file() if path is None else path
     target.parent.mkdir(parents=True, exist_ok=True)
-    temporary = target.with_name(f".{target.name}.{os.getpid()}")
-    try:
-        temporary.write_text(json.dumps(rounded(asdict(costs)), indent=1) + "\n", encoding="utf-8")
-        os.replace(temporary, target)
-    finally:
-        temporary.unlink(missing_ok=True)
+    text = json.dumps(rounded(asdict(costs)), indent=1) + "\n"
+    write_whole(target, lambda file: file.write(text.encode()))
     return target
 
 

@@ -2,7 +2,7 @@
 
 area.py       exact areas: the cells between edges and pixels, and what is done when 32 bits do not hold a sum
 blend.py      blending: colours of triangles into a picture, one triangle after the other, in bands of rows
-choices.py    what is chosen before anything is drawn: a small function for each choice, asked by the pipeline and by 
+choices.py    what is chosen before anything is drawn: a small function for each choice, asked by the pipeline and by
 classic.py    the classics behind the public verbs: checks, one kernel call, the same buffers
 clustered.py  drawing clusters: a view takes what it needs of a mesh from vertices to pixels, cluster by cluster
 clusters.py   clusters: a mesh sorted once, so that a view leaves out what cannot show in it

@@ -55,7 +55,7 @@ class ViewLayers(Mapping[str, Array]):
     def save(
         self, path: str | os.PathLike[str], layer: str | None = None, *, scale: float | None = None
     ) -> tuple[Path, ...]:
-        """Write the layers, or one of them, and return the files; see `topleft.layer_files.save_layers`.
+        """Write the layers, or one of them, and return the files; see `topleft._io.layer_files.save_layers`.
 
         Raises
         ------

@@ -124,35 +124,29 @@ def turn_of_normals(view: F64) -> F64:
 
 
 class ShadingMesh:
-    """What shading needs of a mesh, each part made when it is first asked for.
+    """What shading needs of a mesh.
 
     Attributes
     ----------
     positions : (V, 3) float
         As in the mesh, or in eye space.
     center : (3,) float64
-        The middle of the mesh: the origin of the space that light is computed in, so that float32 is fine enough.
+        The middle of the box round the vertices in use: the origin of the space that light is computed in, so that
+        float32 is fine enough.
+    normals : (V, 4) float32
+        Unit normals, 0 where there is none, and 1.
+    colors : (V, 4) float32, optional
+        sRGB of the vertices, 0 to 255, and opacity, 0 to 1.
     """
 
     def __init__(self, mesh: Mesh, view: F64 | None = None) -> None:
         """`view`: (4, 4), takes the mesh to eye space first."""
-        self._triangles = mesh.triangles
-        # The method would hold the mesh, which is the key of `_shading_meshes`.
-        self._vertex_normals = mesh.vertex_normals()
-        self._colors = mesh.colors
-        self._view = view
+        normals, self._triangles = mesh.vertex_normals(), mesh.triangles
         self.positions = mesh.vertices if view is None else moved(mesh.vertices, view)
-
-    @cached_property
-    def center(self) -> F64:
-        """The middle of the box round the vertices in use."""
         low, high = box_of_triangles(self.positions, self._triangles).astype(self.positions.dtype)
-        return np.asarray(low / 2 + high / 2, np.float64)
-
-    @cached_property
-    def normals(self) -> F32:
-        """(V, 4): unit normals, 0 where there is none, and 1."""
-        return unit_rows(self._vertex_normals, None if self._view is None else turn_of_normals(self._view))
+        self.center: F64 = np.asarray(low / 2 + high / 2, np.float64)
+        self.normals = unit_rows(normals, None if view is None else turn_of_normals(view))
+        self.colors = None if mesh.colors is None else color_rows(mesh.colors)
 
     @cached_property
     def face_normals(self) -> F32:
@@ -164,16 +158,6 @@ class ShadingMesh:
         """(T,): 1 where the normals of the corners point to the other side than the triangle; None if none does."""
         turned = turned_faces(self.positions, self._triangles, self.normals)
         return turned if turned.view(np.bool_).any() else None
-
-    @cached_property
-    def has_alpha(self) -> bool:
-        """Whether colours of the vertices are not all opaque."""
-        return self._colors is not None and self._colors.shape[1] == 4 and bool((self._colors[:, 3] < 255).any())
-
-    @cached_property
-    def colors(self) -> F32 | None:
-        """(V, 4): sRGB of the vertices, 0 to 255, and opacity, 0 to 1; None if they have none."""
-        return None if self._colors is None else color_rows(self._colors)
 
 
 _shading_meshes: WeakKeyDictionary[Mesh, ShadingMesh] = WeakKeyDictionary()
@@ -245,7 +229,7 @@ class ShadingInputs:
             mesh.uv,
             mesh.uv1,
             self.mesh.colors,
-            self.mesh.has_alpha,
+            mesh.has_alpha,
             -self.back_side,
             material_of,
             LIGHT_OF_SRGB,

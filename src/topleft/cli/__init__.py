@@ -2,6 +2,14 @@
 
 Exit status: 0, all pictures were written; 1, some of several inputs failed and the rest were written; 2, nothing could
 be done with what was asked, told in one line on stderr.
+
+animation.py  writes the views of a mesh one after the other, by Pillow or ffmpeg
+arguments.py  defines what `topleft render` takes
+explain.py    runs `topleft explain` and `topleft calibrate`
+job_file.py   reads jobs from TOML or JSON
+render.py     runs `topleft render`: from arguments to files
+sheet.py      puts many pictures, reduced, on one
+targets.py    finds which picture goes to which file, before anything is drawn
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ from itertools import chain
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, cast
 
-from topleft._io.images import write_whole
+from topleft._base.whole_file import write_whole
 from topleft.errors import ImageError, MissingPackageError
 
 if TYPE_CHECKING:

@@ -7,7 +7,8 @@ from typing import NoReturn
 
 from topleft._base.color import DEFAULT_COLOR
 from topleft._base.options import Cull, Sampling
-from topleft._camera.camera import DEFAULT_FOV_Y_DEG, THREE_QUARTER_DEG
+from topleft._camera.camera import DEFAULT_FOV_Y_DEG
+from topleft._camera.matrices import THREE_QUARTER_DEG
 from topleft._io.images import PICTURE_SUFFIXES, SUFFIXES
 from topleft._render.layers import LAYERS, check_layers
 from topleft._render.render import DEFAULT_SIZE
@@ -16,7 +17,9 @@ from topleft.cli.animation import ANIMATION_SUFFIXES
 from topleft.errors import TopleftError
 from topleft.scenes import SHAPES
 
-__all__ = ["REFUSED", "Parser", "UsageError", "add_picture_arguments", "add_render_arguments"]
+__all__ = [
+    "REFUSED", "Parser", "UsageError", "add_picture_arguments", "add_render_arguments", "positive", "size", "tolerance",
+]  # fmt: skip
 
 REFUSED = 2
 """Exit status: nothing could be done."""
@@ -75,7 +78,7 @@ def add_render_arguments(parser: Parser) -> None:
     add_picture_arguments(parser)
     many = parser.add_argument_group("many pictures")
     add = many.add_argument
-    add("--jobs", type=_positive, default=1, metavar="N", help="pictures that are drawn side by side (default 1)")
+    add("--jobs", type=positive, default=1, metavar="N", help="pictures that are drawn side by side (default 1)")
     add("--jobs-file", metavar="FILE", help="what to render, as TOML or JSON; see below")
     add("--resume", action="store_true", help="leave out pictures whose files are there")
     add("--sheet", metavar="FILE", help=f"all pictures on one sheet: {' '.join(PICTURE_SUFFIXES)}")
@@ -90,10 +93,10 @@ def add_picture_arguments(parser: argparse.ArgumentParser) -> None:
     width, height = DEFAULT_SIZE
     add = parser.add_argument
     add("-o", "--out", metavar="OUT", help="a file, a folder or a pattern")
-    add("--size", type=_size, default=DEFAULT_SIZE, metavar="WxH", help=f"pixels (default {width}x{height})")
-    add("--views", type=_positive, default=1, metavar="N", help="a turntable of N pictures (default 1)")
+    add("--size", type=size, default=DEFAULT_SIZE, metavar="WxH", help=f"pixels (default {width}x{height})")
+    add("--views", type=positive, default=1, metavar="N", help="a turntable of N pictures (default 1)")
     add("--layers", type=_layers, default=(), metavar="NAME,...", help="what to write; see below (default color)")
-    add("--threads", type=_positive, default=None, metavar="N",
+    add("--threads", type=positive, default=None, metavar="N",
         help="of a picture (default: as many as there are cores, 1 with --jobs)")
     add = parser.add_argument_group("camera").add_argument
     add("--azimuth", type=float, default=azimuth, metavar="DEG", help="right of the front (default %(default)g)")
@@ -110,7 +113,7 @@ def add_picture_arguments(parser: argparse.ArgumentParser) -> None:
     add("--texture", metavar="FILE", help="a picture for all of a mesh that has texture coordinates")
     add("--matcap", metavar="FILE", help="a picture of a lit sphere, for --shading matcap")
     add("--opacity", type=_share, default=None, metavar="X", help="0 to 1: as if of glass, of which each layer hides X")
-    add("--tolerance", type=_tolerance, default=0.0, metavar="PX",
+    add("--tolerance", type=tolerance, default=0.0, metavar="PX",
         help="draw a coarser level of the mesh whose outline is off by at most PX pixels (default 0: the mesh)")
     add("--wireframe", action="store_true", help="draw the edges over it")
     add("--cull", choices=[str(side) for side in Cull], default="none", help="leave out triangles (default none)")
@@ -119,14 +122,16 @@ def add_picture_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"samples of a pixel: {', '.join(samplings)} (default center)")
 
 
-def _size(text: str) -> tuple[int, int]:
+def size(text: str) -> tuple[int, int]:
+    """The width and height of a picture."""
     width, cross, height = text.lower().partition("x")
     if not (cross and width.isdecimal() and height.isdecimal() and int(width) and int(height)):
         raise argparse.ArgumentTypeError(f"must be WIDTHxHEIGHT, 1280x720 say, got {text!r}")
     return int(width), int(height)
 
 
-def _positive(text: str) -> int:
+def positive(text: str) -> int:
+    """A positive whole number."""
     if not (text.isdecimal() and int(text)):
         raise argparse.ArgumentTypeError(f"must be a positive whole number, got {text!r}")
     return int(text)
@@ -142,14 +147,15 @@ def _share(text: str) -> float:
     return share
 
 
-def _tolerance(text: str) -> float:
+def tolerance(text: str) -> float:
+    """A number of pixels, 0 or more."""
     try:
-        tolerance = float(text)
+        pixels = float(text)
     except ValueError:
-        tolerance = -1.0
-    if not 0 <= tolerance < float("inf"):
+        pixels = -1.0
+    if not 0 <= pixels < float("inf"):
         raise argparse.ArgumentTypeError(f"must be a number of pixels, 0 or more, got {text!r}")
-    return tolerance
+    return pixels
 
 
 def _rate(text: str) -> float:

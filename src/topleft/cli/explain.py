@@ -6,19 +6,20 @@ import argparse
 from typing import Any
 
 from topleft._base.options import Cull, Sampling
-from topleft._camera.camera import DEFAULT_FOV_Y_DEG, THREE_QUARTER_DEG
+from topleft._camera.camera import DEFAULT_FOV_Y_DEG
+from topleft._camera.matrices import THREE_QUARTER_DEG
+from topleft._plan.costs import save_costs
+from topleft._plan.plan import plan
 from topleft._render.render import DEFAULT_SIZE
-from topleft.cli.arguments import _positive, _size, _tolerance
-from topleft.cli.plan import Orbit, Source
+from topleft.cli.arguments import positive, size, tolerance
+from topleft.cli.targets import MeshSource, Orbit
 
 __all__ = ["add_plan_commands", "run_calibrate", "run_explain"]
 
 
 def run_explain(options: argparse.Namespace) -> int:
     """Print how a view of a mesh is drawn: what is chosen at each stage, why, and what it takes."""
-    from topleft._plan.planner import plan
-
-    mesh = Source(options.mesh)()
+    mesh = MeshSource(options.mesh)()
     orbit = Orbit(options.azimuth, options.elevation, options.fov, options.up, options.ortho)
     camera = orbit(mesh, options.size)
     outputs = {"fill": ("color",), "rasterize": ("triangle", "depth")}.get(options.verb, (options.verb,))
@@ -46,7 +47,6 @@ def run_explain(options: argparse.Namespace) -> int:
 def run_calibrate(_: argparse.Namespace) -> int:
     """Measure this machine for some ten seconds and keep what estimates are made from."""
     from topleft._plan.calibrate import calibrate
-    from topleft._plan.costs import save_costs
 
     costs = calibrate()
     print(f"{save_costs(costs)}: {costs.source}; the worst is off by a factor of {costs.residual['worst']:.1f}")
@@ -63,7 +63,7 @@ def add_plan_commands(commands: Any) -> None:
     add("mesh", metavar="MESH", help="a file or a built-in shape")
     verbs = ["rasterize", "coverage", "overdraw", "fill"]
     add("--verb", choices=verbs, default=verbs[0], help="(default %(default)s)")
-    add("--size", type=_size, default=DEFAULT_SIZE, metavar="WxH", help=f"pixels (default {width}x{height})")
+    add("--size", type=size, default=DEFAULT_SIZE, metavar="WxH", help=f"pixels (default {width}x{height})")
     add("--azimuth", type=float, default=azimuth, metavar="DEG", help="right of the front (default %(default)g)")
     add("--elevation", type=float, default=elevation, metavar="DEG", help="above level (default %(default)g)")
     add("--fov", type=float, default=DEFAULT_FOV_Y_DEG, metavar="DEG", help="bottom to top (default %(default)g)")
@@ -71,8 +71,8 @@ def add_plan_commands(commands: Any) -> None:
     add("--up", choices=["y", "z"], default="y", help="the axis that points up (default y)")
     add("--cull", choices=[str(side) for side in Cull], default="none", help="leave out triangles (default none)")
     add("--sampling", choices=[str(mode) for mode in Sampling], default="center", help="of a pixel (default center)")
-    add("--tolerance", type=_tolerance, default=0.0, metavar="PX", help="by which outlines may be off (default 0)")
-    add("--threads", type=_positive, default=None, metavar="N", help="(default: as many as pay)")
+    add("--tolerance", type=tolerance, default=0.0, metavar="PX", help="by which outlines may be off (default 0)")
+    add("--threads", type=positive, default=None, metavar="N", help="(default: as many as pay)")
     add("--measure", action="store_true", help="draw it, and show what the stages took")
     add("--json", action="store_true", help="numbers and sentences as JSON")
     calibrate = commands.add_parser("calibrate", help="measure this machine", description=run_calibrate.__doc__)

@@ -11,21 +11,19 @@ import signal
 import sys
 import tempfile
 from collections.abc import Sequence
+from concurrent.futures import Executor
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from topleft._batch.batch import Result, render_batch
 from topleft._io.images import PICTURE_SUFFIXES, save_image
 from topleft.cli.animation import check_animation, save_animation
 from topleft.cli.arguments import UsageError
 from topleft.cli.job_file import read_jobs
-from topleft.cli.plan import Shoot, check_targets, plan_shoots
 from topleft.cli.sheet import make_sheet
+from topleft.cli.targets import MeshJobs, check_targets, plan_jobs
 from topleft.errors import MissingPackageError, TopleftError
-
-if TYPE_CHECKING:
-    from concurrent.futures import Executor
 
 __all__ = ["FAILED", "complain", "one_line", "run_render"]
 
@@ -39,42 +37,42 @@ MOST_VIEWS_TOGETHER = 16
 def run_render(options: argparse.Namespace) -> int:
     """Render every mesh and return the exit status."""
     with ExitStack() as stack:
-        shoots = _plan(options, stack)
-        animations = _animations(shoots, options)
+        groups = _plan(options, stack)
+        animations = _animations(groups, options)
         extras = [path for path, _ in animations] + ([Path(options.sheet)] if options.sheet else [])
         for path, _ in animations:
             check_animation(path)
         if extras:
-            _check_pictures(shoots, options)
-        check_targets(shoots, extras)
-        failed = _render(shoots, options)
+            _check_pictures(groups, options)
+        check_targets(groups, extras)
+        failed = _render(groups, options)
         for _, message in failed:
             complain(message)
-        for path, shoot in animations:
-            if all(file.is_file() for file in _color_files(shoot)):
+        for path, group in animations:
+            if all(file.is_file() for file in _color_files(group)):
                 path.parent.mkdir(parents=True, exist_ok=True)
-                background = shoot.jobs[0].options["background"]
+                background = group.jobs[0].options["background"]
                 opaque = background[:3] if background[3] else (255, 255, 255)
-                save_animation(path, _color_files(shoot), fps=options.fps, background=opaque)
+                save_animation(path, _color_files(group), fps=options.fps, background=opaque)
         if options.sheet:
             Path(options.sheet).parent.mkdir(parents=True, exist_ok=True)
-            sheet = make_sheet([_color_files(shoot) for shoot in shoots], [shoot.name for shoot in shoots])
+            sheet = make_sheet([_color_files(group) for group in groups], [group.name for group in groups])
             save_image(options.sheet, sheet)
     if failed:
         sources = list(dict.fromkeys(source for source, _ in failed))
-        complain(f"{len(sources)} of {len(shoots)} meshes failed: {' '.join(sources)}")
+        complain(f"{len(sources)} of {len(groups)} meshes failed: {' '.join(sources)}")
         return FAILED
     return 0
 
 
-def _plan(options: argparse.Namespace, stack: ExitStack) -> list[Shoot]:
-    """Return the shoots of the command line or the job file."""
+def _plan(options: argparse.Namespace, stack: ExitStack) -> list[MeshJobs]:
+    """Return the jobs of the command line or the job file, by mesh."""
     if options.jobs_file and options.meshes:
         raise UsageError("a job file names its meshes itself: give MESH or --jobs-file, not both")
     if not options.jobs_file and not options.meshes:
         raise UsageError("there is nothing to render: give MESH or --jobs-file (try: topleft render --help)")
     given = read_jobs(Path(options.jobs_file), options) if options.jobs_file else [options]
-    shoots: list[Shoot] = []
+    groups: list[MeshJobs] = []
     for each in given:
         if each.out is None:
             if not (options.sheet or options.animation):
@@ -83,19 +81,19 @@ def _plan(options: argparse.Namespace, stack: ExitStack) -> list[Shoot]:
             each.out = str(Path(folder, "{index}-{view}.png"))
         if each.threads is None and options.jobs > 1:
             each.threads = 1
-        shoots += plan_shoots(each, len(shoots))
-    return shoots
+        groups += plan_jobs(each, len(groups))
+    return groups
 
 
-def _render(shoots: Sequence[Shoot], options: argparse.Namespace) -> list[tuple[str, str]]:
+def _render(groups: Sequence[MeshJobs], options: argparse.Namespace) -> list[tuple[str, str]]:
     """Render all; the sources of what failed, each with the reason, once."""
-    jobs = [job for shoot in shoots for job in shoot.jobs]
-    source_of = [shoot.source for shoot in shoots for _ in shoot.jobs]
+    jobs = [job for group in groups for job in group.jobs]
+    source_of = [group.source for group in groups for _ in group.jobs]
     failed: dict[tuple[str, str], None] = {}
     with ExitStack() as stack:
         bar = stack.enter_context(_Progress(len(jobs)))
-        executor = _executor(shoots, options.jobs, stack)
-        chunk = min(MOST_VIEWS_TOGETHER, max(len(shoot.jobs) for shoot in shoots))
+        executor = _executor(groups, options.jobs, stack)
+        chunk = min(MOST_VIEWS_TOGETHER, max(len(group.jobs) for group in groups))
         results = stack.enter_context(
             render_batch(
                 jobs, executor=executor, progress=bar.step, on_error="collect", order="completed",
@@ -106,20 +104,20 @@ def _render(shoots: Sequence[Shoot], options: argparse.Namespace) -> list[tuple[
             if result.error is None:
                 continue
             known = isinstance(result.error, (TopleftError, OSError, ValueError, MemoryError))
-            if len(shoots) == 1 or isinstance(result.error, MissingPackageError) or not known:
+            if len(groups) == 1 or isinstance(result.error, MissingPackageError) or not known:
                 raise result.error
             failed[source_of[result.index], one_line(result.error)] = None
-    order = {shoot.source: i for i, shoot in reversed(list(enumerate(shoots)))}
+    order = {group.source: i for i, group in reversed(list(enumerate(groups)))}
     return sorted(failed, key=lambda entry: order[entry[0]])
 
 
-def _executor(shoots: Sequence[Shoot], n: int, stack: ExitStack) -> Executor | int | None:
+def _executor(groups: Sequence[MeshJobs], n: int, stack: ExitStack) -> Executor | int | None:
     """Who draws: processes for several meshes, since readers are Python and so one thread's work; else threads."""
-    if n == 1 or len(shoots) == 1:
+    if n == 1 or len(groups) == 1:
         return n if n > 1 else None
     from concurrent.futures import ProcessPoolExecutor
 
-    pool = ProcessPoolExecutor(min(n, len(shoots)), initializer=_ignore_interrupt)
+    pool = ProcessPoolExecutor(min(n, len(groups)), initializer=_ignore_interrupt)
     stack.callback(pool.shutdown, cancel_futures=True)
     return pool
 
@@ -129,22 +127,22 @@ def _ignore_interrupt() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def _animations(shoots: Sequence[Shoot], options: argparse.Namespace) -> list[tuple[Path, Shoot]]:
+def _animations(groups: Sequence[MeshJobs], options: argparse.Namespace) -> list[tuple[Path, MeshJobs]]:
     if not options.animation:
         return []
-    if len(shoots) > 1 and "{name}" not in options.animation and "{index}" not in options.animation:
+    if len(groups) > 1 and "{name}" not in options.animation and "{index}" not in options.animation:
         raise UsageError(f"several meshes need {{name}} in --animation, got {options.animation!r}")
     return [
-        (Path(options.animation.replace("{name}", shoot.name).replace("{index}", f"{i:03d}")), shoot)
-        for i, shoot in enumerate(shoots)
+        (Path(options.animation.replace("{name}", group.name).replace("{index}", f"{i:03d}")), group)
+        for i, group in enumerate(groups)
     ]
 
 
-def _check_pictures(shoots: Sequence[Shoot], options: argparse.Namespace) -> None:
+def _check_pictures(groups: Sequence[MeshJobs], options: argparse.Namespace) -> None:
     """Raise an error if there are no pictures for a sheet or an animation."""
     if options.sheet and Path(options.sheet).suffix.lower() not in PICTURE_SUFFIXES:
         raise UsageError(f"--sheet must end in one of {' '.join(PICTURE_SUFFIXES)}, got {options.sheet!r}")
-    for job in (job for shoot in shoots for job in shoot.jobs):
+    for job in (job for group in groups for job in group.jobs):
         if job.layers and "color" not in job.layers:
             raise UsageError(f"--sheet and --animation show the layer color, got --layers {','.join(job.layers)}")
         if Path(os.fspath(job.destination or "")).suffix.lower() not in PICTURE_SUFFIXES:
@@ -152,9 +150,9 @@ def _check_pictures(shoots: Sequence[Shoot], options: argparse.Namespace) -> Non
             raise UsageError(f"--sheet and --animation need pictures: OUT must end in one of {known}")
 
 
-def _color_files(shoot: Shoot) -> list[Path]:
+def _color_files(group: MeshJobs) -> list[Path]:
     """The pictures of a mesh, view by view."""
-    return [Path(os.fspath(job.destination or "").replace("{layer}", "color")) for job in shoot.jobs]
+    return [Path(os.fspath(job.destination or "").replace("{layer}", "color")) for job in group.jobs]
 
 
 class _Progress:

@@ -1,0 +1,167 @@
+"""The accuracy record: time beside error for every method, and what else is charted; measured part by part.
+
+Out: a record for JSON. A part that is measured again replaces its rows; the rest of the record stays.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
+from typing import Any
+
+from benchmarks.accuracy import speed_tables, tables
+from benchmarks.accuracy.depth import measure_depth
+from benchmarks.accuracy.filling import measure_family
+from benchmarks.accuracy.options import Options
+from benchmarks.accuracy.scaling import measure_scaling
+from benchmarks.accuracy.sizes import measure_sizes
+from benchmarks.accuracy.stability import measure_stability
+from benchmarks.accuracy.tutorial import measure_tutorial
+from benchmarks.harness import machine
+from benchmarks.harness.arguments import (
+    add_names,
+    add_number,
+    add_out,
+    add_scale,
+    options_of,
+    refuse_unknown,
+    set_options,
+)  # fmt: skip
+from benchmarks.harness.records import Record, Save, forget, read_record, tell
+from benchmarks.peers import PEERS
+from benchmarks.report.study import Study
+from benchmarks.report.tables import table, table_text
+from benchmarks.scenes.families import FAMILIES, entries
+
+SCHEMA = 2
+
+
+MEASURES: Mapping[str, Callable[[Options], Record]] = {
+    **{name: partial(measure_family, family) for name, family in FAMILIES.items()},
+    "mesh": lambda options: measure_stability(entries(options.methods), options.frame_px, options.scale),
+    "depth": measure_depth,
+    "sizes": measure_sizes,
+    "scaling": measure_scaling,
+    "tutorial": measure_tutorial,
+}
+"""What measures each part: it returns lists of rows, and objects of facts, by name."""
+
+
+def run_accuracy(
+    options: Options,
+    parts: Sequence[str] = (),
+    record: Record | None = None,
+    save: Save = forget,
+) -> Record:
+    """Measure the named parts, all for none, and return the record with them; `save` gets it after each.
+
+    Raises
+    ------
+    ValueError
+        If a part is unknown, or the record is of another machine, instruction set or version.
+    """
+    chosen = list(parts) or list(MEASURES)
+    refuse_unknown("parts", chosen, MEASURES)
+    entries(options.methods)  # unknown names are refused before anything is measured
+    run = machine.describe()
+    facts: Record = {
+        "schema": SCHEMA,
+        "kind": "accuracy",
+        "machine": {key: value for key, value in run["machine"].items() if key != "load"},
+        "versions": run["versions"],
+        "isa": run["isa"],
+        "options": {"rounds": options.rounds, "seconds": options.seconds, "frame_px": options.frame_px},
+    }
+    if record is None:
+        record = facts | {"parts": {}}
+    for key, value in facts.items():
+        if record.get(key) != value:
+            raise ValueError(f"the record must be of the same {key} to add to it, {value!r}, got {record.get(key)!r}")
+    for part in chosen:
+        tell(f"{part} ...")
+        measured = MEASURES[part](options)
+        for name, value in measured.items():
+            record[name] = replace_rows(record.get(name, []), value) if isinstance(value, list) else value
+        record["parts"][part] = {"date": machine.now(), **machine.describe_commit()}
+        save(record)
+    return record
+
+
+def replace_rows(old: list[Record], new: list[Record]) -> list[Record]:
+    """Return the rows with those of the same family taken out, families in their order."""
+    families = {row.get("family", row.get("name")) for row in new}
+    rows = [row for row in old if row.get("family", row.get("name")) not in families] + new
+    order = list(FAMILIES)
+    if not families <= set(order):
+        return new
+    return sorted(rows, key=lambda row: order.index(row.get("family", row.get("name"))))
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    set_options(parser, Options(peers=list(PEERS)))
+    parser.add_argument("--part", nargs="+", metavar="NAME", default=[],
+                        help=f"measure these alone, leave the rest of FILE.json: {', '.join(MEASURES)}")  # fmt: skip
+    add_names(parser, "--method", "methods", "all that fill unless given")
+    add_names(parser, "--peer", "peers", "peers; all unless given, none: no names", "*")
+    add_number(parser, "--threads", "max_threads", "how far threads are charted")
+    add_number(parser, "--repeats", "rounds", "rounds")
+    parser.add_argument("--seconds", type=float, metavar="S", help="length of a turn, at least a call (%(default)s)")
+    add_number(parser, "--edge-pixels", "edge_px", "edge pixels to compare in each family, at least")
+    add_number(parser, "--frame", "frame_px", "side", "PX")
+    add_scale(parser, "of the numbers of triangles timed")
+    add_out(parser)
+
+
+def run(arguments: argparse.Namespace, save: Save) -> Record:
+    """Measure all parts, or those that are named."""
+    old = read_record(arguments.record) if arguments.part else None
+    return run_accuracy(options_of(Options, arguments), arguments.part, old, save)
+
+
+def text_of(rows: Callable[..., Any], *more: Any) -> Callable[[Record], str]:
+    """Return what makes the table of some rows."""
+    return lambda record: table_text(*rows(record, *more))
+
+
+PARTS: Mapping[str, Callable[[Record], str]] = {
+    "facts": tables.facts_text,
+    "coverage": text_of(tables.coverage_rows, tables.is_default),
+    "bits": text_of(tables.bits_rows),
+    "others": text_of(tables.others_rows),
+    "skipped": tables.skipped_text,
+    "changes": tables.changes_text,
+    "stability": text_of(tables.stability_rows, tables.is_default),
+    "antialiasing": text_of(tables.antialiasing_rows),
+    "depth": text_of(speed_tables.depth_rows),
+    "speed-facts": speed_tables.speed_facts_text,
+    "sizes": text_of(speed_tables.sizes_rows),
+    "memory": speed_tables.memory_text,
+    "scaling": text_of(speed_tables.scaling_rows),
+    "tutorial": text_of(speed_tables.tutorial_rows),
+    "tutorial-ratio": speed_tables.tutorial_text,
+}
+"""What the markers `<!-- table: NAME -->` of a page stand for."""
+
+
+def lines(record: Record) -> Iterator[str]:
+    """The report of one record, Markdown: every method at every precision, as far as the record goes."""
+    yield tables.machine_text(record)
+    for title, needs, rows in (
+        ("Time and error", "coverage", partial(tables.coverage_rows, record, lambda _: True)),
+        ("Peers and pure twins", "peers", partial(tables.others_rows, record)),
+        ("Mesh: per million edge pixels", "stability", partial(tables.stability_rows, record, lambda _: True)),
+        ("Anti-aliasing", "antialiasing", partial(tables.antialiasing_rows, record)),
+        ("Depth: sheets told apart", "depth", partial(speed_tables.depth_rows, record)),
+        ("Time by area, ns a triangle", "sizes", partial(speed_tables.sizes_rows, record)),
+        ("Time by number and threads", "scaling", partial(speed_tables.scaling_rows, record)),
+        ("Pictures a second", "tutorial", partial(speed_tables.tutorial_rows, record)),
+    ):
+        if needs in record:
+            yield from ("", f"## {title}", "", *table(*rows()))
+
+
+STUDY = Study(
+    "accuracy", "measure time beside error, and stability, of every method", add_arguments, run, lines, PARTS,
+    "benchmarks.accuracy.charts",
+)  # fmt: skip

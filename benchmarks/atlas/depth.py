@@ -1,0 +1,315 @@
+"""Families of scenes with clip space or depth, which only the production methods take, and what they make of them.
+
+In: vertices in clip space, or pixels with depth. Out: as `measure.py`, and how far depths are from those of the planes
+through the snapped vertices, in units in the last place of float32. Scenes are the same bits on every machine.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.atlas.families import (
+    MIDDLE_PX,
+    Axis,
+    Family,
+    direction,
+    power_of_ten,
+    power_of_two,
+    square_rim,
+    tabulate,
+    walk,
+)  # fmt: skip
+from benchmarks.exact.clip import draw_clip, pieces_picture
+from benchmarks.exact.integers import box_side, edge_values, signed_area, snapped_points
+
+F64 = NDArray[np.float64]
+I32 = NDArray[np.int32]
+
+PRODUCTION: dict[str, tuple[str, int]] = {
+    "auto": ("auto", 8), "edge": ("edge", 8), "scanline": ("scanline", 8),
+    "auto, 0 bits": ("auto", 0), "auto, 16 bits": ("auto", 16),
+}  # fmt: skip
+"""The engine's rows: method and sub-pixel bits."""
+
+SIZE = (32, 32)
+PLANE_ERROR = Fraction(1, 2**35)
+"""Of the largest |z| of a triangle: what a depth may be off by before it is rounded (docs/design/rules.md, rule 8)."""
+
+
+class DepthScene(NamedTuple):
+    """Vertices in clip space (V, 4), or pixels with depth (V, 3)."""
+
+    vertices: F64
+    triangles: I32
+    size: tuple[int, int] = SIZE
+    origin: tuple[int, int] = (0, 0)
+
+
+class DepthFaults(NamedTuple):
+    """Pixels, and the largest error of a depth; None where depth is not looked at."""
+
+    wrong: int
+    gaps: int
+    overdrawn: int
+    inexact: int
+    ulp: float | None = None
+
+
+class Picture(NamedTuple):
+    """What a method drew: ids, depths, how many triangles cover each centre."""
+
+    ids: I32
+    depth: NDArray[np.float32]
+    counts: I32
+
+    @property
+    def key(self) -> bytes:
+        """The same for equal pictures."""
+        return b"".join(plane.tobytes() for plane in self)
+
+
+@dataclass(frozen=True)
+class DepthFamily(Family):
+    """A family with depth: what judges a picture that was drawn with so many bits."""
+
+    judge: Callable[[DepthScene, Picture, int], DepthFaults] = field(kw_only=True)
+
+
+def draw(scene: DepthScene, method: str, bits: int) -> Picture:
+    """Draw with a depth test."""
+    import topleft as tl
+
+    options: dict[str, Any] = {"method": method, "subpixel_bits": bits, "threads": 1, "origin": scene.origin}
+    frags = tl.rasterize(scene.vertices, scene.triangles, scene.size, **options)
+    return Picture(frags.triangle, frags.depth, tl.overdraw(scene.vertices, scene.triangles, scene.size, **options))
+
+
+# Clip space
+
+
+def tube(near: float, seed: int) -> DepthScene:
+    """Return a closed square tube round the eye, from behind it to w = 6, cut by a near plane at w = `near`."""
+    rng = np.random.default_rng(seed)
+    rim = square_rim(8, 1.0, 0.0)
+    rings = np.array([-5.0, -1.5, 1.5, 4, 6])
+    xy = np.repeat(rim[None], len(rings), axis=0)
+    w = np.repeat(rings[:, None], 8, axis=1)
+    w[1:-1] += rng.uniform(-0.8, 0.8, (len(rings) - 2, 8))
+    u = direction(rng)
+    turned = xy @ np.array([u, [-u[1], u[0]]])
+    points = np.concatenate([turned * 1.5, w[..., None]], axis=-1).reshape(-1, 3)
+    points = np.concatenate([points, [[0.0, 0, 6]]])
+    i, j = (a.ravel() for a in np.meshgrid(np.arange(len(rings) - 1), np.arange(8), indexing="ij"))
+    a, b = i * 8 + j, i * 8 + (j + 1) % 8
+    last = 8 * (len(rings) - 1)
+    cap = np.stack([last + np.arange(8), last + (np.arange(8) + 1) % 8, np.full(8, len(points) - 1)], -1)
+    triangles = np.concatenate([np.stack([a, b, a + 8], -1), np.stack([b, b + 8, a + 8], -1), cap])
+    return in_clip(points, near, triangles)
+
+
+def fan_at_the_eye(w: float, seed: int) -> DepthScene:
+    """Return a fan round a point of the picture, every other corner of its rim at that w, before the near plane."""
+    rng = np.random.default_rng(seed)
+    rim = square_rim(8, 4.0, rng.uniform())
+    points = np.concatenate([rim, np.where(np.arange(8) % 2, 1.0, w)[:, None]], axis=-1)
+    hub = np.append(rng.uniform(-0.5, 0.5, 2), 1.0)
+    i = np.arange(8)
+    return in_clip(np.concatenate([[hub], points]), w / 2, np.stack([0 * i, 1 + i, 1 + (i + 1) % 8], -1))
+
+
+def in_clip(points: F64, near: float, triangles: NDArray[Any]) -> DepthScene:
+    """Return x, y, w in clip space: the near plane at w = `near`, none far."""
+    x, y, w = points.T
+    return DepthScene(np.stack([x, y, w - 2 * near, w], -1), triangles.astype(np.int32))
+
+
+def judge_clip(scene: DepthScene, picture: Picture, bits: int) -> DepthFaults:
+    """Compare the triangles that show, and how many cover each pixel, with the exact picture of the clip space."""
+    counts = picture.counts
+    true_ids, true_count = draw_clip(scene.vertices, scene.triangles, scene.size)
+    snapped = pieces_picture(scene.vertices, scene.triangles, scene.size, bits)
+    return DepthFaults(
+        int((picture.ids != true_ids).sum()), int((counts < true_count).sum()), int((counts > true_count).sum()),
+        int((counts != snapped.count).sum()),
+    )  # fmt: skip
+
+
+# Pixels with depth
+
+
+def sheet(rng: np.random.Generator, middle: F64, z: Callable[[F64], F64]) -> tuple[F64, I32]:
+    """Return a square of two triangles that covers the frame, its depth a function of the place from the middle."""
+    local = np.array([[-96.0, -96], [96, -96], [-96, 96], [96, 96]]) + rng.uniform(-16, 16, (4, 2))
+    return np.concatenate([middle + local, z(local)[:, None]], axis=-1), np.array([[0, 1, 2], [1, 3, 2]], np.int32)
+
+
+def two_sheets(first: tuple[F64, I32], second: tuple[F64, I32], middle: float) -> DepthScene:
+    """Return both in one scene."""
+    vertices = np.concatenate([first[0], second[0]])
+    triangles = np.concatenate([first[1], second[1] + np.int32(4)])
+    origin = int(middle) - SIZE[0] // 2
+    return DepthScene(vertices, triangles, SIZE, (origin, origin))
+
+
+def slope(per_px: float, seed: int, offset_px: float = 0) -> DepthScene:
+    """Return two sheets that cut each other, as steep as that, one the mirror of the other."""
+    rng = np.random.default_rng(seed)
+    middle = MIDDLE_PX + offset_px
+    along, shift = per_px * direction(rng), rng.uniform(-8, 8)
+    sheets = [
+        sheet(rng, np.array([middle, middle]), lambda local, sign=sign: sign * (local @ along + shift * per_px))
+        for sign in (1, -1)
+    ]
+    return two_sheets(*sheets, middle)
+
+
+def sheets(distance: float, seed: int) -> DepthScene:
+    """Return two sheets one behind the other, that far apart, at depths from 0.5 to 1; the nearer one comes last."""
+    rng = np.random.default_rng(seed)
+    middle = np.array([MIDDLE_PX, MIDDLE_PX])
+    along = direction(rng) / 1024
+    far_sheet = sheet(rng, middle, lambda local: 0.75 + local @ along)
+    near_sheet = far_sheet[0] - [0, 0, distance]
+    return two_sheets(far_sheet, (near_sheet, far_sheet[1]), MIDDLE_PX)
+
+
+def deep_layers(n: int, seed: int) -> DepthScene:
+    """Return n squares in any order, at depths 1/n to 1."""
+    rng = np.random.default_rng(seed)
+    square = np.array([[4.0, 4], [28, 4], [4, 28], [28, 28]])
+    z = (rng.permutation(n) + 1) / n
+    vertices = np.concatenate([np.tile(square, (n, 1)), np.repeat(z, 4)[:, None]], axis=-1)
+    triangles = (4 * np.arange(n)[:, None, None] + np.array([[0, 1, 2], [1, 3, 2]])).reshape(-1, 3)
+    return DepthScene(vertices, triangles.astype(np.int32), (6, 6), (13, 13))
+
+
+def judge_layers(scene: DepthScene, picture: Picture, _: int) -> DepthFaults:
+    """Compare with the nearest layer, which is known, and its depth, which is that of its corners."""
+    nearest = int(np.argmin(scene.vertices[::4, 2]))
+    n = len(scene.triangles) // 2
+    is_wrong = picture.ids // 2 != nearest
+    is_inexact = (picture.counts != n) | (picture.depth != np.float32(scene.vertices[4 * nearest, 2]))
+    n_gaps, n_overdrawn = int((picture.counts < n).sum()), int((picture.counts > n).sum())
+    return DepthFaults(int(is_wrong.sum()), n_gaps, n_overdrawn, int(is_inexact.sum()))
+
+
+def plane_values(scene: DepthScene, snap: str) -> tuple[NDArray[Any], NDArray[Any], NDArray[np.bool_]]:
+    """Return numerators (T, H, W) and denominators (T,) of exact depths in Python integers, and what is covered."""
+    points = snapped_points(scene.vertices, snap)
+    z = [x.as_integer_ratio() for x in scene.vertices[:, 2].tolist()]
+    unit = max(denominator for _, denominator in z)
+    width, height = scene.size
+    here = [tuple(c - (o << points.bits) for c, o in zip(p, scene.origin, strict=True)) for p in points.xy]
+    numerators = np.zeros((len(scene.triangles), height, width), object)
+    denominators = np.zeros(len(scene.triangles), object)
+    covered = np.zeros(numerators.shape, bool)
+    for i, triangle in enumerate(scene.triangles.tolist()):
+        if signed_area(points, triangle) < 0:
+            triangle = [triangle[0], triangle[2], triangle[1]]
+        corners = [here[k] for k in triangle]
+        assert all(len(box_side(corners, k, n, points.bits)) == n for k, n in enumerate(scene.size))
+        is_inside = np.ones((height, width), bool)
+        for k in range(3):
+            p, q = corners[(k + 1) % 3], corners[(k + 2) % 3]
+            value, _ = edge_values(p, q, range(width), range(height), points.bits)
+            is_owner = (p[1] == q[1] and q[0] > p[0]) or q[1] < p[1]
+            is_inside &= np.asarray(value >= 0 if is_owner else value > 0, bool)
+            numerator, denominator = z[triangle[k]]
+            numerators[i] += value.astype(object) * (numerator * (unit // denominator))
+        denominators[i] = abs(signed_area(points, triangle)) * unit
+        covered[i] = is_inside
+    return numerators, denominators, covered
+
+
+def judge_depth(scene: DepthScene, picture: Picture, bits: int) -> DepthFaults:
+    """Compare ids with the exact picture of the planes as they are, depths with the planes after the snap.
+
+    A depth beyond its bound is inexact, and so is a triangle that lies behind another by more than both may err.
+    """
+    ids, counts = picture.ids, picture.counts
+    true = plane_values(scene, "true")
+    numerators, denominators, covered = plane_values(scene, str(bits))
+    true_count = true[2].sum(axis=0)
+    is_inexact = counts != covered.sum(axis=0)
+    largest_z = [max(abs(Fraction(z)) for z in scene.vertices[t, 2].tolist()) for t in scene.triangles]
+    slack = PLANE_ERROR * max(largest_z)
+    largest_ulp = 0.0
+    for at in zip(*np.nonzero(ids >= 0), strict=True):
+        here = {int(t): Fraction(numerators[t][at], denominators[t]) for t in np.flatnonzero(covered[:, *at])}
+        exact = here.get(int(ids[at]))
+        if exact is None:
+            is_inexact[at] = True
+            continue
+        ulp = Fraction(float(np.spacing(np.abs(np.float32(exact)))))
+        error = abs(Fraction(float(picture.depth[at])) - exact)
+        largest_ulp = max(largest_ulp, float(error / ulp))
+        is_off = error > ulp / 2 + PLANE_ERROR * largest_z[ids[at]]
+        is_inexact[at] |= is_off or exact - min(here.values()) > ulp + 2 * slack
+    return DepthFaults(
+        int((ids != nearest_ids(*true)).sum()), int((counts < true_count).sum()), int((counts > true_count).sum()),
+        int(is_inexact.sum()), float(f"{largest_ulp:.3g}"),
+    )  # fmt: skip
+
+
+def nearest_ids(numerators: NDArray[Any], denominators: NDArray[Any], covered: NDArray[np.bool_]) -> I32:
+    """Return the nearest triangle of each pixel, the lowest of equals, -1 for none: exact."""
+    ids = np.full(covered.shape[1:], -1, np.int32)
+    best = np.zeros(covered.shape[1:], object)
+    best_denominator = np.ones(covered.shape[1:], object)
+    for i in range(len(covered)):
+        is_nearer = (numerators[i] * best_denominator < best * denominators[i]).astype(bool)
+        is_new = covered[i] & (is_nearer | (ids < 0))
+        ids[is_new], best[is_new], best_denominator[is_new] = i, numerators[i][is_new], denominators[i]
+    return ids
+
+
+W_VALUES = power_of_ten(0, -1, -2, -3, -4, -6, -8, -10, -12)
+SLOPES = power_of_ten(-6, -4, -2, -1, 0, 1, 2, 4, 6)
+
+DEPTH_FAMILIES = {
+    family.name: family
+    for family in (
+        DepthFamily("near", "a tube round the eye, cut by a near plane",
+                    [Axis("w of the near plane", W_VALUES)], tube, judge=judge_clip),
+        DepthFamily("eye", "a fan with corners close to the plane of the eye",
+                    [Axis("w of the corners", W_VALUES)], fan_at_the_eye, judge=judge_clip),
+        DepthFamily("slope", "two sheets that cut each other",
+                    [Axis("depth slope, per px", SLOPES)], slope, judge=judge_depth),
+        DepthFamily("sheets", "two parallel sheets at depths from 0.5 to 1",
+                    [Axis("distance of the sheets", power_of_two(8, 12, 16, 18, 20, 22, 23, 24, 25, 26, 28, 32))],
+                    sheets, judge=judge_depth),
+        DepthFamily("depth-layers", "layers in any order, all at depths of their own",
+                    [Axis("layers", {str(n): n for n in (1, 255, 256, 65535, 65536)})],
+                    deep_layers, judge=judge_layers),
+        DepthFamily("slope-far", "two sheets that cut each other, far from the origin",
+                    [Axis("distance from the origin, px", {"0": 0.0} | power_of_ten(3, 5, 7, 9, 12)),
+                     Axis("depth slope, per px", power_of_ten(-3, 0, 3))],
+                    lambda offset, per_px, seed: slope(per_px, seed, offset), 2, judge=judge_depth),
+    )
+}  # fmt: skip
+
+
+def measure_depth(family: DepthFamily, names: Sequence[str]) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+    """Return what was drawn, and a map for each of the engine's rows, as `measure.map_family`."""
+    cells: dict[str, list[list[DepthFaults | str]]] = {name: [] for name in names}
+    n_px = []
+    for _, values in walk(family):
+        scenes = [family.make(*values, seed) for seed in range(family.n_seeds)]
+        n_px.append(sum(width * height for width, height in (scene.size for scene in scenes)))
+        judged: dict[tuple[int, int, bytes], DepthFaults] = {}
+        for name in names:
+            method, bits = PRODUCTION[name]
+            faults: list[DepthFaults | str] = []
+            for i, scene in enumerate(scenes):
+                picture = draw(scene, method, bits)
+                key = i, bits, picture.key
+                judged[key] = judged.get(key) or family.judge(scene, picture, bits)
+                faults.append(judged[key])
+            cells[name].append(faults)
+    return tabulate(family, n_px, cells)

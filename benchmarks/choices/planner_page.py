@@ -1,0 +1,126 @@
+"""docs/measured/planner.md: what a plan says, of ten scenes. `python -m benchmarks planner` writes it."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+import topleft as tl
+from benchmarks.harness.machine import PAGES
+from benchmarks.harness.records import Record, Save, write_text
+from benchmarks.report.study import Study
+from topleft.scenes import blob, planar_mesh, random_triangles, shape
+
+PAGE = PAGES / "planner.md"
+
+HEAD = """\
+# What a scene needs, and why
+
+`tl.plan` says how a scene is drawn before it is drawn: what is chosen at each stage, why, and what was left out.
+The picture never changes: `tests/plan/test_choices.py` draws thousands of scenes with each choice forced on and off,
+and compares bits. On the command line: `topleft explain MESH`.
+
+```python
+plan = tl.plan(vertices, triangles, (1920, 1080), transform=matrix)
+print(plan.explain())
+frags = tl.rasterize(vertices, triangles, (1920, 1080), transform=next_matrix, plan=plan)
+
+print(tl.plan(mesh, camera, (1920, 1080)).explain())  # of a Mesh, which does not change
+```
+
+With `plan=` a verb takes the triangles that the plan has converted and checked, and the plan's threads. Vertices,
+transform, origin and viewport may change from frame to frame; size, sampling, method, cull, sub-pixel bits, triangles
+and the number of vertices may not (`ValueError`). The array of triangles that the plan was made from is taken to be
+what it was then: the plan has a copy. After such a call, or `plan.measure()`, the column *measured* is filled.
+`plan.to_dict()` holds all of it for JSON.
+
+| row | what it tells |
+|---|---|
+| input | whether vertices and indices are read where they are or copied; the time includes the call itself |
+| detail | of a mesh: the level of detail that is drawn, and how far off its outline may be ([levels.md](levels.md)) |
+| clusters | of a mesh: what is left out of its clusters, or why it is drawn whole ([static.md](static.md)) |
+| transform | none for pixels; the matrix; whether there is a divide by w |
+| clip | how many triangles the near and far planes cut, and into how many pieces |
+| snap | sub-pixel bits; the time is that of transform and snap, which are one pass over the vertices |
+| arithmetic | how many triangles need 32, 64 or 128 bits |
+| cull | how many triangles cannot cover a sample, and why |
+| method | how many triangles each piece of drawing code takes; the time of the whole draw |
+| depth | what is kept of a pixel, and whether depths are compared at all |
+| sampling | where a pixel is sampled |
+| shade | what is computed from ids afterwards, and for which outputs |
+| threads | how many, and what each of them takes |
+| memory | bytes of scratch, of results, and at most, before anything is allocated |
+
+*Estimates* come from costs per vertex, triangle and pixel, fitted to measurements. Those of one machine ship with the
+package; `topleft calibrate` measures yours in about ten seconds, and keeps the result in `~/.cache/topleft/costs.json`
+(`$XDG_CACHE_HOME`). The last line of each plan says whose costs they are, and how far off they were for scenes that
+were not fitted. They are for memory that is kept, as a `Rasterizer` does, and for threads that have a core each.
+
+[choices.md](choices.md) has each choice beside what could have been chosen, estimates beside measurements, and what a
+plan takes.
+
+The plans below were written by `python -m benchmarks planner`, measured on the machine that they name.
+"""
+
+PERSPECTIVE = np.array([[0.6, 0, 0, 0], [0, 1.0, 0, 0], [0, 0, -1, 1], [0, 0, -1, 3]])
+
+
+def scenes() -> Iterator[tuple[str, tuple[Any, ...], dict[str, Any]]]:
+    """Give a title, the arrays and size, and options."""
+    size = (1920, 1080)
+    knot, sphere = shape("torus-knot"), blob(1_000_000)
+    vertices, triangles, _ = random_triangles(200_000, 8)
+    yield "A knot in perspective", (*knot, size), {"transform": PERSPECTIVE, "threads": 1}
+    yield (
+        "The same without perspective, in float32, back faces left out",
+        (knot[0].astype(np.float32), knot[1], size),
+        {"transform": np.diag([0.5, 0.8, 0.5, 1]), "cull": "back", "threads": 1},
+    )
+    inside = PERSPECTIVE.copy()
+    inside[2:, 3] = [-0.2, 0.1]
+    yield "From inside of a million triangles", (*sphere, size), {"transform": inside, "threads": 2}
+    yield "200,000 small triangles, each at a depth", (vertices, triangles, size), {"threads": 1}
+    flat = vertices[:, :2].copy()
+    yield "The same without depth, with int64 indices", (flat, triangles.astype(np.int64), size), {"threads": 1}
+    yield (
+        "A map of whole pixels, coloured",
+        (np.rint(planar_mesh(5_000)[0]), planar_mesh(5_000)[1], size),
+        {"outputs": "color", "threads": 1},
+    )
+    far = np.array([[-3.0e7, 100], [3.0e7, 500], [200, 3.0e7], [20, 20], [60, 20], [20, 60]])
+    yield "Corners far away", (far, [[0, 1, 2], [3, 4, 5]], (640, 480)), {"outputs": "coverage", "sampling": "msaa4"}
+    camera = tl.Camera.framing(mesh := tl.Mesh(*sphere), aspect=16 / 9)
+    yield "A mesh of a million triangles, drawn again", (mesh, camera, size), {"threads": 1}
+    away, knot_mesh = tl.Camera.look_at((30, 20, 60), fov_y_deg=30), tl.Mesh(*knot)
+    yield "A mesh far away, half a pixel off at most", (knot_mesh, away, size), {"tolerance": 0.5, "threads": 1}
+    yield "Exact areas", (flat, triangles, size), {"outputs": "coverage", "sampling": "area", "threads": 2}
+
+
+def page() -> str:
+    """Return the page."""
+    parts = [HEAD]
+    for title, arguments, options in scenes():
+        plan = tl.plan(*arguments, **options).measure()
+        parts.append(f"## {title}\n\n```\n{plan.explain()}\n```\n")
+    return "\n".join(parts)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("-o", "--out", type=Path, default=PAGE, metavar="PAGE.md")
+
+
+def run(arguments: argparse.Namespace, _: Save) -> Record:
+    """Write the page with the costs that ship; the record is where it is."""
+    with TemporaryDirectory() as empty:
+        os.environ["XDG_CACHE_HOME"] = empty
+        write_text(arguments.out, page())
+    return {"kind": "planner", "path": str(arguments.out)}
+
+
+STUDY = Study("planner", "write the page of plans of ten scenes", add_arguments, run, lambda record: [record["path"]])

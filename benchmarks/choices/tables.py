@@ -1,0 +1,140 @@
+"""Tables of a record of choices, for the terminal and, between markers, for docs/measured/choices.md."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from benchmarks.harness.records import Record
+from benchmarks.report.tables import facts_text, table_text
+
+Row = dict[str, Any]
+
+NEAR, FAR = 1.15, 1.5
+"""What the mean over scenes, and any scene, may be."""
+
+
+def lines(record: Record) -> Iterator[str]:
+    """The report of one record, Markdown."""
+    yield facts_text(record)
+    for name, text in PARTS.items():
+        if name != "choice-facts" and NEEDS.get(name, "rows") in record:
+            yield from ("", text(record))
+
+
+def by_choice(record: Record) -> dict[str, list[Row]]:
+    """Return the rows of each choice, in their order."""
+    found: dict[str, list[Row]] = {}
+    for row in record["rows"]:
+        found.setdefault(row["choice"], []).append(row)
+    return found
+
+
+def mean(rows: list[Row]) -> float:
+    """Return the mean ratio."""
+    return sum(row["ratio"] for row in rows) / len(rows)
+
+
+def summary_text(record: Record) -> str:
+    """A row for each choice: how far from the best way, over all scenes and at worst."""
+    rows = []
+    for choice, own in by_choice(record).items():
+        worst = max(own, key=lambda row: row["ratio"])
+        gains = [1 / other["chosen_by_other"][1] for row in own for other in row["others"]]
+        rows.append(
+            [choice, ", ".join(dict.fromkeys(row["chosen"] for row in own)), ways_text(own), str(len(own)),
+             f"{mean(own):.2f}",
+             f"{worst['ratio']:.2f}", f"{label_of(worst)}" if worst["ratio"] > 1.02 else "-", f"{max(gains):.1f}"]
+        )  # fmt: skip
+    head = ["choice", "chosen", "against", "scenes", "mean", "worst", "where", "saves up to"]
+    return table_text(head, rows)
+
+
+def ways_text(rows: list[Row]) -> str:
+    """Name the ways that were not chosen."""
+    return ", ".join(dict.fromkeys(other["way"] for row in rows for other in row["others"]))
+
+
+def label_of(row: Row) -> str:
+    """Name a scene and what is asked of it."""
+    return f"{row['scene']}, {asked_of(row)}"
+
+
+def asked_of(row: Row) -> str:
+    """Name what is asked of a scene."""
+    return str(row["verb"]) if row["sampling"] == "center" else f"{row['verb']} {row['sampling']}"
+
+
+def kinds_text(record: Record) -> str:
+    """Mean and worst ratio of each choice by kind of scene."""
+    kinds = list(dict.fromkeys(row["kind"] for row in record["rows"]))
+    rows = []
+    for choice, own in by_choice(record).items():
+        cells = [choice]
+        for kind in kinds:
+            some = [row["ratio"] for row in own if row["kind"] == kind]
+            cells.append(f"{sum(some) / len(some):.2f} / {max(some):.2f}" if some else "-")
+        rows.append(cells)
+    return table_text(["choice", *kinds], rows)
+
+
+def misses_text(record: Record) -> str:
+    """The scenes in which another way takes a sixth less time or more."""
+    rows = [
+        [row["choice"], label_of(row), row["chosen"], best["way"], f"{row['ms'][1]:.3g}", f"{best['ms']:.3g}",
+         f"{row['ratio']:.2f}", "{:.2f} to {:.2f}".format(*best["chosen_by_other"][::2])]
+        for row in sorted(record["rows"], key=lambda row: -row["ratio"])
+        if row["ratio"] > NEAR
+        for best in [max(row["others"], key=lambda other: other["chosen_by_other"][1])]
+    ]  # fmt: skip
+    if not rows:
+        return f"No way is {NEAR} times as fast as the chosen one in any scene."
+    return table_text(["choice", "scene", "chosen", "best", "ms", "best ms", "ratio", "quartiles"], rows)
+
+
+def estimates_text(record: Record) -> str:
+    """Estimated by measured time of all scenes, for each verb: the median, the middle four fifths, the ends."""
+    groups: dict[str, list[Row]] = {}
+    for row in record["estimates"]:
+        groups.setdefault(asked_of(row), []).append(row)
+    rows = []
+    for asked, own in groups.items():
+        ordered = sorted(own, key=by_measured)
+        low, middle, high = np.percentile([by_measured(row) for row in own], [10, 50, 90])
+        ends = [
+            f"{by_measured(row):.2f} ({row['scene']}, {row['measured_ms']:.3g} ms)" for row in (ordered[0], ordered[-1])
+        ]
+        rows.append([asked, str(len(own)), f"{middle:.2f}", f"{low:.2f} to {high:.2f}", ends[0], ends[-1]])
+    head = ["verb", "scenes", "median", "four fifths", "least", "most"]
+    return table_text(head, rows)
+
+
+def by_measured(row: Row) -> float:
+    """Return the estimated by the measured time."""
+    return float(row["estimated_ms"] / row["measured_ms"])
+
+
+def plans_text(record: Record) -> str:
+    """What a plan takes, and what drawing with one saves."""
+    rows = [
+        [row["scene"], f"{row['n_triangles']:,}", row["indices"], f"{row['plan_ms']:.3g}", f"{row['without_ms']:.3g}",
+         f"{row['with_ms']:.3g}", f"{row['saves_us']:.1f}"]
+        for row in record["plans"]
+    ]  # fmt: skip
+    head = ["scene", "triangles", "indices", "`tl.plan` ms", "`rasterize` ms", "with `plan=` ms", "saves us"]
+    return table_text(head, rows)
+
+
+PARTS: Mapping[str, Callable[[Record], str]] = {
+    "choice-facts": facts_text,
+    "choice-summary": summary_text,
+    "choice-kinds": kinds_text,
+    "choice-misses": misses_text,
+    "plan-estimates": estimates_text,
+    "plan-overhead": plans_text,
+}
+"""What the markers of the page stand for."""
+
+NEEDS = {"plan-estimates": "estimates", "plan-overhead": "plans"}

@@ -1,0 +1,299 @@
+"""Choices, and the ways that a scene could be drawn instead: each draws the same bits, in another time.
+
+A way forces a choice by putting a value in the place of a function or constant of the library while it draws, by an
+option that the verbs have, or by calling the parts of the pipeline itself; nothing in the library is made for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import topleft as tl
+from benchmarks.choices.scenes import Scene
+from benchmarks.harness.ways import Draw, Picture, Way, Ways
+from topleft import _engine
+from topleft._base import threads
+from topleft._base.memory import FreshMemory, KeptMemory
+from topleft._base.options import Sink
+from topleft._raster import choices, sampling
+from topleft._raster.area import sum_areas
+from topleft._raster.rasterize import draw
+from topleft._raster.sampling import sample_positions
+from topleft._raster.snap import snap_scene
+from topleft._raster.view import View
+
+MSAA = ("msaa2", "msaa4", "msaa8", "msaa16")
+FAR_PX = 2**24
+"""Beyond 2**30 sub-pixels with 8 bits: triangles there take 128 bits."""
+
+
+def drawing(scene: Scene, *, library: Any = tl, **changes: Any) -> Draw:
+    """Return what draws a scene on memory that is kept."""
+    vertices, triangles = changes.pop("arrays", None) or scene.arrays
+    return verb_of(scene, picture_of(library, scene.size), vertices, triangles, (), scene.asked(**changes))
+
+
+@lru_cache(maxsize=8)
+def picture_of(library: Any, size: tuple[int, int]) -> Any:
+    """Return the one `Rasterizer` of a size: all ways draw into the same memory, wherever the system has put it."""
+    return library.Rasterizer(size)
+
+
+@lru_cache(maxsize=1)
+def memory_of(_: tuple[int, int]) -> KeptMemory:
+    """Return the one memory of a size, for ways that call the parts of the pipeline."""
+    return KeptMemory()
+
+
+def verb_of(scene: Scene, owner: Any, vertices: Any, triangles: Any, size: tuple[Any, ...], options: Any) -> Draw:
+    """Return a call of a scene's verb of a module, which wants a size, or of a `Rasterizer`, which has one."""
+    if scene.verb == "rasterize":
+
+        def draw_ids() -> Picture:
+            frags = owner.rasterize(vertices, triangles, *size, **options)
+            if scene.sampling == "center":
+                return frags.triangle, frags.depth
+            return frags.samples_triangle, frags.samples_depth
+
+        return draw_ids
+    extra = (scene.colors(),) if scene.verb == "fill" else ()
+    function = getattr(owner, scene.verb)
+    return lambda: (function(vertices, triangles, *extra, *size, **options),)
+
+
+def other_than(scene: Scene, where: Any, name: str, names: Mapping[bool, str], **changes: Any) -> Ways:
+    """Return the way that a yes or no is decided, and the other; one alone if it is not asked."""
+    decided: list[bool] = []
+    asked = getattr(where, name)
+
+    def spy(*arguments: Any, **options: Any) -> bool:
+        decided.append(bool(asked(*arguments, **options)))
+        return decided[-1]
+
+    chosen = drawing(scene, **changes)
+    with Way("", chosen, ((where, name, spy),)).in_force():
+        chosen()
+    if not decided:
+        return []
+    other = not decided[0]
+    forced = ((where, name, lambda *_, **__: other),)
+    return [Way(names[decided[0]], chosen), Way(names[other], drawing(scene, **changes), forced)]
+
+
+def constant(scene: Scene, where: Any, name: str, values: Mapping[str, Any], **changes: Any) -> Ways:
+    """Return the way with a constant as it is, and with others."""
+    others = [Way(label, drawing(scene, **changes), ((where, name, value),)) for label, value in values.items()]
+    return [Way("as it is", drawing(scene, **changes)), *others]
+
+
+def of_method(scene: Scene) -> Ways:
+    """Code by the size of each triangle, or one for all."""
+    if scene.verb == "fill" or scene.sampling not in ("center", "msaa4"):
+        return []
+    return [Way(name, drawing(scene, method=name)) for name in ("auto", "edge", "scanline")]
+
+
+def of_arithmetic(scene: Scene) -> Ways:
+    """Lanes of 32 bits where they do, or 64 or 128 for all triangles."""
+    if "transform" in scene.options or scene.verb == "fill" or scene.sampling != "center":
+        return []
+    vertices, triangles = scene.arrays
+    near = np.array(vertices, np.float64)
+    near[:, :2] = np.rint(near[:, :2] * 256) / 256
+    away = near.copy()
+    away[:, :2] += [FAR_PX, -FAR_PX]
+    return [
+        Way("by extent", drawing(scene, arrays=(near, triangles))),
+        Way("64 bits", drawing(scene, arrays=(near, triangles), method="scanline")),
+        Way("128 bits", drawing(scene, arrays=(away, triangles), origin=(FAR_PX, -FAR_PX))),
+    ]
+
+
+def of_subpixel_bits(scene: Scene) -> Ways:
+    """Whole pixels with the bits that they do not need."""
+    if scene.kind != "whole pixels" or scene.sampling not in ("center", "area"):
+        return []
+    return [Way(f"{bits} bits", drawing(scene, subpixel_bits=bits)) for bits in (8, 0)]
+
+
+def of_clip(scene: Scene) -> Ways:
+    """The search for cut triangles, where no vertex is outside of a plane."""
+    if "transform" not in scene.options or scene.kind == "clip-crossing" or scene.sampling != "center":
+        return []
+    return other_than(scene, choices, "must_cut", {True: "searched", False: "left out"})
+
+
+def of_divide(scene: Scene) -> Ways:
+    """The divide by w, where it is 1."""
+    if scene.kind != "orthographic" or scene.sampling != "center":
+        return []
+    return other_than(scene, choices, "is_affine", {True: "left out", False: "divided"})
+
+
+def of_depth(scene: Scene) -> Ways:
+    """Ids alone, where every vertex lies at one depth."""
+    is_flat = scene.kind == "flat z" or len(scene.arrays[0]) == 3
+    if not is_flat or scene.verb != "rasterize" or scene.sampling != "center" or not scene.has_depth:
+        return []
+    return other_than(scene, choices, "pays_without_depth", {True: "ids alone", False: "compared"})
+
+
+def of_direct(scene: Scene) -> Ways:
+    """Colours stored as triangles come, or labels first."""
+    if scene.verb != "fill" or scene.sampling != "center":
+        return []
+    return other_than(scene, choices, "is_direct", {True: "as they come", False: "labels first"})
+
+
+def of_samples(scene: Scene) -> Ways:
+    """Samples of all pixels at once, or only where an edge crosses them apart: against a picture a sample."""
+    if scene.verb != "coverage" or scene.sampling not in MSAA:
+        return []
+    return [Way("where edges cross", drawing_shares(scene)), Way("all samples", drawing_every_sample(scene))]
+
+
+def drawing_shares(scene: Scene) -> Draw:
+    """Return what draws the samples of all pixels as the verb does, without its checks."""
+    memory, view = memory_of(scene.size), View.parse(scene.size, scene.asked())
+
+    def draw_shares() -> Picture:
+        snapped = snap_scene(memory, *scene.arrays, view, with_depth=False, out=None)
+        shares = memory.empty("share", scene.size[::-1], np.float32)
+        draw(memory, snapped, view, Sink.SAMPLES, shares)
+        return (shares,)
+
+    return draw_shares
+
+
+def drawing_every_sample(scene: Scene) -> Draw:
+    """Return what draws a mask for each sample and averages them."""
+    memory, view = memory_of(scene.size), View.parse(scene.size, scene.asked())
+    n, shape = view.sampling.n_samples, scene.size[::-1]
+
+    def draw_all() -> Picture:
+        snapped = snap_scene(memory, *scene.arrays, view, with_depth=False, out=None)
+        one = replace(view, sampling=View.parse(scene.size, {}).sampling)
+        count, mask = memory.empty("count", shape, np.uint8), memory.empty("mask", shape, np.bool_)
+        count.fill(0)
+        for x, y in sample_positions(n, view.grid_bits).tolist():
+            draw(memory, replace(snapped, scene=snapped.scene.seen_from(x, y)), one, Sink.MASK, mask)
+            np.add(count, mask.view(np.uint8), out=count)
+        return (np.multiply(count, np.float32(1 / n), out=memory.empty("share", shape, np.float32)),)
+
+    return draw_all
+
+
+def of_planes(scene: Scene) -> Ways:
+    """Samples of ids in bands of rows, set up once, or a whole picture for each."""
+    if scene.verb not in ("rasterize", "fill") or scene.sampling not in MSAA:
+        return []
+    return other_than(scene, choices, "can_share", {True: "bands", False: "a picture each"})
+
+
+def of_bands(scene: Scene) -> Ways:
+    """Bytes of a band of rows in which several samples are drawn."""
+    if scene.sampling not in MSAA or scene.verb not in ("rasterize", "fill"):
+        return []
+    name = "BAND_BYTES" if scene.verb == "rasterize" else "LABEL_BAND_BYTES"
+    sizes = {f"{kib} KiB": kib << 10 for kib in (128, 256, 1024, 4096)}
+    return constant(scene, sampling, name, sizes)
+
+
+def of_sums(scene: Scene) -> Ways:
+    """Areas in 32 bits, tried first, or in 64."""
+    if scene.sampling != "area" or scene.verb != "coverage":
+        return []
+    return [Way("32 bits", drawing_sums(scene, is_wide=False)), Way("64 bits", drawing_sums(scene, is_wide=True))]
+
+
+def drawing_sums(scene: Scene, *, is_wide: bool) -> Draw:
+    """Return what adds areas, in 64 bits at once if wanted."""
+    memory, view = memory_of(scene.size), View.parse(scene.size, scene.asked())
+    width, height = scene.size
+
+    def draw_areas() -> Picture:
+        snapped = snap_scene(memory, *scene.arrays, view, with_depth=False, out=None)
+        areas: NDArray[np.float32] = memory.empty("areas", (height, width), np.float32)
+        if is_wide:
+            cells = np.zeros(height * _engine.area_stride(width), np.int64)
+            snapped.scene.draw_area(areas, _engine.as_bytes(cells), 0, height, True, True)
+        else:
+            sum_areas(memory, snapped.scene, areas, 1, is_clamped=True)
+        return (areas,)
+
+    return draw_areas
+
+
+def of_memory(scene: Scene) -> Ways:
+    """Scratch that a thread keeps, or fresh memory; results are fresh either way."""
+    if scene.verb == "rasterize" or scene.sampling not in ("center", "area"):
+        return []
+    from topleft._raster import verbs as api
+
+    call = verb_of(scene, tl, *scene.arrays, (scene.size,), scene.asked())
+    return [Way("kept", call), Way("fresh", call, ((api, "SCRATCH", FreshMemory()),))]
+
+
+def of_threads(scene: Scene) -> Ways:
+    """As many threads as are said to pay, or one, or two."""
+    if scene.sampling not in ("center", "area") or scene.verb == "overdraw":
+        return []
+    found: list[int] = []
+
+    def spy(*arguments: Any) -> int:
+        found.append(asked(*arguments))
+        return found[-1]
+
+    asked, chosen = choices.threads_to_draw, drawing(scene, threads=None)
+    two = (threads, "available_threads", lambda: 2), (choices, "available_threads", lambda: 2)
+    with Way("", chosen, ((choices, "threads_to_draw", spy), *two)).in_force():
+        chosen()
+    names = {1: "1 thread", 2: "2 threads"}
+    n_other = 3 - found[0]
+    return [Way(names[found[0]], chosen, two), Way(names[n_other], drawing(scene, threads=n_other))]
+
+
+def of_shares(scene: Scene) -> Ways:
+    """Two threads: shares of the triangles or bands of rows."""
+    if scene.sampling != "center" or scene.verb == "fill":
+        return []
+    return other_than(scene, choices, "is_shared", {True: "shares", False: "bands"}, threads=2)
+
+
+def of_array_threads(scene: Scene) -> Ways:
+    """Two threads that draw: vertices and indices by both of them or by one."""
+    if scene.verb != "coverage" or scene.sampling != "center":
+        return []
+    n = max(len(scene.arrays[0]), len(scene.arrays[1]))
+    other = ("one", 1 << 62) if n >= choices.MIN_TO_SHARE_ARRAYS else ("both", 0)
+    ways = constant(scene, choices, "MIN_TO_SHARE_ARRAYS", dict([other]), threads=2)
+    return [replace(ways[0], name="one" if other[0] == "both" else "both"), ways[1]]
+
+
+CHOICES: Mapping[str, Callable[[Scene], Ways]] = {
+    "method": of_method,
+    "arithmetic": of_arithmetic,
+    "sub-pixel bits": of_subpixel_bits,
+    "clip": of_clip,
+    "divide": of_divide,
+    "depth test": of_depth,
+    "colours": of_direct,
+    "samples": of_samples,
+    "planes": of_planes,
+    "band size": of_bands,
+    "sums of areas": of_sums,
+    "memory": of_memory,
+    "threads": of_threads,
+    "shares": of_shares,
+    "threads of arrays": of_array_threads,
+}
+"""By name: the ways to draw a scene."""
+
+THREADED = ("threads", "shares", "threads of arrays")
+"""Choices between numbers of threads: their time is that which passes, not that of a thread."""

@@ -1,0 +1,65 @@
+"""The chart of levels of detail: error in pixels against time, a panel a mesh. Needs matplotlib."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+from matplotlib import pyplot as plt
+from matplotlib.figure import Figure
+
+from benchmarks.report.charts import figure_bytes
+
+COLORS = ("#000000", "#0072B2", "#009E73", "#E69F00", "#D55E00")
+"""By height, near to far: M. Okabe and K. Ito, Color Universal Design, 2008."""
+
+SMALLEST_PX = 0.02
+"""Where errors stand that are nothing, on a logarithmic axis."""
+
+
+def chart_png(record: dict[str, Any]) -> bytes:
+    """Return the chart as PNG."""
+    return figure_bytes(partial(chart_levels, record), "png", dpi=140)
+
+
+def chart_levels(record: dict[str, Any]) -> Figure:
+    """Return a panel for each mesh."""
+    meshes = record["meshes"]
+    n_columns = min(2, len(meshes))
+    n_rows = -(-len(meshes) // n_columns)
+    figure, panels = plt.subplots(
+        n_rows, n_columns, figsize=(5.2 * n_columns, 3.5 * n_rows), squeeze=False, sharex=True, sharey=True,
+        layout="constrained",
+    )
+    for panel, mesh in zip(panels.flat, meshes, strict=False):
+        draw_mesh(panel, mesh, record["tolerance"])
+    for panel in list(panels.flat)[len(meshes) :]:
+        panel.axis("off")
+    for panel in panels[:, 0]:
+        panel.set_ylabel("rasterize, one thread, ms")
+    for panel in panels[-1]:
+        panel.set_xlabel("outlines are off by, px (measured)")
+    handles, labels = panels.flat[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
+    return figure
+
+
+def draw_mesh(panel: Any, mesh: dict[str, Any], tolerance: float) -> None:
+    """Draw a line for each height: its levels, the full mesh on the left."""
+    for color, view in zip(COLORS, mesh["views"], strict=False):
+        errors = [max(row["error_px"], SMALLEST_PX) for row in view["levels"]]
+        times = [min(row["turns_ms"]) for row in view["levels"]]
+        label = f"{view['height_px']} px high"
+        panel.plot(errors, times, "o-", color=color, mfc="white", ms=4, lw=1, label=label)
+        panel.plot(errors[view["level"]], times[view["level"]], "o", color=color, ms=6)
+    panel.axvline(tolerance, color="#888888", lw=0.8, ls=":")
+    panel.annotate(f"{tolerance:g} px", (tolerance, 1), xycoords=("data", "axes fraction"), xytext=(3, -9),
+                   textcoords="offset points", fontsize=8, color="#666666")  # fmt: skip
+    panel.set_xscale("log")
+    panel.set_yscale("log")
+    ticks = [SMALLEST_PX, 0.1, 0.5, 1, 10, 100]
+    panel.set_xticks(ticks, ["0", *(f"{tick:g}" for tick in ticks[1:])])
+    panel.yaxis.set_major_formatter("{x:g}")
+    panel.minorticks_off()
+    panel.set_title(f"{mesh['name']}, {mesh['n_triangles']:,} triangles")
+    panel.grid(visible=True, color="#eeeeee", lw=0.6)

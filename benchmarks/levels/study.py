@@ -1,0 +1,183 @@
+"""Levels of detail: time beside error of each level, near and far.
+
+The error is measured on masks, not taken from the bound: how far a sample that one outline holds lies from the other.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import topleft as tl
+from benchmarks.harness.arguments import add_number, options_of, set_options
+from benchmarks.harness.machine import describe
+from benchmarks.harness.records import Record, Save
+from benchmarks.levels import page
+from benchmarks.report.study import Study
+from topleft._lod.detail import pixels_of_bound, window_of
+from topleft._render.render import StaticPlan
+
+SIZE = (1920, 1080)
+HEIGHTS_PX = (1000, 300, 100, 30, 10)
+"""How high meshes stand in the picture: near to far."""
+
+SAMPLES = 1200
+"""About how many samples high the masks are that are compared."""
+
+TOLERANCE = 0.5
+FOV_Y_DEG = 40.0
+
+@dataclass(frozen=True)
+class Options:
+    """What to measure."""
+
+    meshes: tuple[str, ...] = ()
+    n_triangles: int = 10_000_000
+    rounds: int = 5
+    levels: Path | None = None
+    "Folder in which levels are kept from run to run."
+
+
+def run_levels(options: Options) -> dict[str, Any]:
+    """Return the record."""
+    record: dict[str, Any] = {
+        "kind": "levels", **describe("fast-simplification"), "size": list(SIZE), "tolerance": TOLERANCE,
+        "rounds": options.rounds, "meshes": [],
+    }  # fmt: skip
+    found = [(name, mesh, *find_levels(name, mesh, options.levels)) for name, mesh in subjects(options)]
+    times = [draw_times(mesh, levels, options.rounds) for _, mesh, levels, _ in found]  # all in one go
+    for (name, mesh, levels, made_s), own in zip(found, times, strict=True):
+        record["meshes"].append(measure_mesh(name, mesh, levels, own) | {"made_s": made_s})
+    return record
+
+
+def subjects(options: Options) -> Iterator[tuple[str, tl.Mesh]]:
+    """Give the meshes: a shape that ships, those of files, and a large blob."""
+    yield "torus-knot", tl.Mesh(*tl.scenes.shape("torus-knot"))
+    for path in options.meshes:
+        yield Path(path).stem, tl.load(path)
+    yield "blob", tl.Mesh(*tl.scenes.blob(options.n_triangles))
+
+
+def find_levels(name: str, mesh: tl.Mesh, folder: Path | None) -> tuple[tl.Levels, float]:
+    """Return levels, of an earlier run if they are kept, and what making them took: seconds of CPU time."""
+    if folder is None:
+        return make_levels(mesh)
+    path = folder / f"{name}-{len(mesh.triangles)}.npz"
+    seconds = path.with_suffix(".seconds")
+    if path.exists() and seconds.exists():
+        return tl.Levels.load(path, mesh), float(seconds.read_text())
+    levels, made_s = make_levels(mesh)
+    folder.mkdir(parents=True, exist_ok=True)
+    levels.save(path)
+    seconds.write_text(repr(made_s))
+    return levels, made_s
+
+
+def make_levels(mesh: tl.Mesh) -> tuple[tl.Levels, float]:
+    """Return new levels, and the CPU time of all threads: how many there are, and neighbours, hardly change it."""
+    started = time.process_time()
+    return tl.simplify(mesh), time.process_time() - started
+
+
+def measure_mesh(name: str, mesh: tl.Mesh, levels: tl.Levels, times: list[dict[str, Any]]) -> dict[str, Any]:
+    """Return what all levels of a mesh take, and how far they are off, at each height."""
+    extent = extent_of(mesh)
+    views = []
+    for height_px, own in zip(HEIGHTS_PX, times, strict=True):
+        camera = camera_at(mesh, extent, height_px)
+        chosen = tl.choose_detail(mesh, camera, SIZE, tolerance=TOLERANCE)
+        matrix = camera.clip_from_world(SIZE)
+        fineness = max(1, min(8, SAMPLES // height_px))
+        masks = [mask_of(level.mesh, matrix, fineness, height_px) for level in levels]
+        rows = []
+        for level, mask, turns in zip(levels, masks, own["turns_ms"], strict=True):
+            bound_px = pixels_of_bound(matrix, SIZE, window_of(SIZE, None, (0, 0)), levels[0], level)
+            rows.append({"turns_ms": turns, "bound_px": bound_px, "error_px": outlines_px(masks[0], mask) / fineness})
+        views.append({"height_px": height_px, "level": chosen.level, "resolution_px": 1 / fineness, "levels": rows,
+                      "clustered_ms": own["clustered_ms"]})  # fmt: skip
+    sizes = [{"n_triangles": len(one.mesh.triangles), "bound": one.bound / extent, "known": one.known / extent}
+             for one in levels]  # fmt: skip
+    return {"name": name, "n_triangles": len(mesh.triangles), "levels": sizes, "views": views}
+
+
+def extent_of(mesh: tl.Mesh) -> float:
+    """Return the longest side of the box."""
+    return float(np.ptp(mesh.bounds, axis=0).max())
+
+
+def camera_at(mesh: tl.Mesh, extent: float, height_px: int) -> tl.Camera:
+    """A camera that sees the longest side of the mesh about so many pixels long."""
+    middle = mesh.bounds.mean(axis=0)
+    distance = extent * SIZE[1] / height_px / (2 * np.tan(np.radians(FOV_Y_DEG) / 2)) + extent / 2
+    return tl.Camera.look_at(middle + [0, 0, distance], middle, fov_y_deg=FOV_Y_DEG)
+
+
+def draw_times(mesh: tl.Mesh, levels: tl.Levels, rounds: int) -> list[dict[str, Any]]:
+    """Return what `rasterize` takes at each height, on memory that is kept, one thread, in turns; milliseconds.
+
+    `turns_ms`: of each level, from arrays; `clustered_ms`: of the mesh as one that is drawn again, in clusters.
+    """
+    rasterizer = tl.Rasterizer(SIZE, threads=1)
+    arrays: list[tuple[Any, Any, Any]] = [(one.mesh.vertices, one.mesh.triangles, None) for one in levels]
+    arrays.append((mesh.vertices, mesh.triangles, StaticPlan(mesh)))
+    _ = mesh.clusters
+    found = []
+    for height_px in HEIGHTS_PX:
+        matrix = camera_at(mesh, extent_of(mesh), height_px).clip_from_world(SIZE)
+        turns: list[list[float]] = [[] for _ in arrays]
+        for i in range(rounds + 2):
+            for (vertices, triangles, plan), own in zip(arrays, turns, strict=True):
+                started = time.perf_counter_ns()
+                rasterizer.rasterize(vertices, triangles, transform=matrix, plan=plan)
+                if i > 1:  # the first one touches the memory, and from the second on there are clusters
+                    own.append((time.perf_counter_ns() - started) / 1e6)
+        found.append({"turns_ms": turns[:-1], "clustered_ms": turns[-1]})
+    return found
+
+
+def mask_of(mesh: tl.Mesh, matrix: Any, fineness: int, height_px: int) -> Any:
+    """Return the mask in the middle of the picture, with so many samples a pixel along each axis."""
+    width, height = (fineness * n for n in SIZE)
+    side = min(height, int(1.3 * fineness * height_px) + 8 * fineness)
+    origin = (width - side) // 2, (height - side) // 2
+    size = side, side
+    return tl.coverage(mesh.vertices, mesh.triangles, size, transform=matrix, viewport=(width, height), origin=origin)
+
+
+def outlines_px(one: Any, other: Any) -> float:
+    """Return how far a sample of either mask is from the other."""
+    from scipy.ndimage import distance_transform_edt
+
+    ways = ((one, other), (other, one))
+    return max(float(distance_transform_edt(~b)[a].max(initial=0.0)) for a, b in ways if b.any())
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    set_options(parser, Options())
+    parser.add_argument("--mesh", dest="meshes", nargs="*", metavar="FILE", help="meshes besides the generated ones")
+    add_number(parser, "--triangles", "n_triangles", "of the blob")
+    add_number(parser, "--rounds", "rounds")
+    parser.add_argument("--json", dest="record", type=Path, metavar="FILE.json", help="the record")
+    parser.add_argument("--keep", dest="levels", type=Path, metavar="FOLDER",
+                        help="where levels are kept from run to run")  # fmt: skip
+    parser.add_argument("-o", "--out", type=Path, default=Path("docs"), metavar="FOLDER", help="(%(default)s)")
+
+
+def run(arguments: argparse.Namespace, save: Save) -> Record:
+    """Measure, write the page and its chart."""
+    record = run_levels(options_of(Options, arguments))
+    save(record)
+    page.write_page(record, arguments.out)
+    return record
+
+
+STUDY = Study(
+    "levels", "measure levels of detail, and write their page: time beside error", add_arguments, run, page.lines
+)

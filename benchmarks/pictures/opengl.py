@@ -1,0 +1,245 @@
+"""The light of topleft in GLSL: what docs/design/shading.md says, drawn by OpenGL on Mesa's llvmpipe.
+
+In: a scene of `scenes.py`. Out: its picture and its ids. Shares no code with the kernels or with
+`ShadingInputs`.
+Needs moderngl and Mesa's EGL library. The vertex shader turns y over, so that row 0 is on top.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+import topleft as tl
+from benchmarks.pictures.scenes import SIZE, PictureScene
+from topleft._base.color import DEFAULT_COLOR
+
+ENVIRONMENT = {
+    "LIBGL_ALWAYS_SOFTWARE": "1",
+    "GALLIUM_DRIVER": "llvmpipe",
+    "LP_NUM_THREADS": "0",
+}
+
+MAX_LIGHTS = 8
+"""That the shader has room for."""
+
+VERTEX_SHADER = """
+#version 330
+uniform mat4 clip_from_world;
+in vec3 position, normal, color;
+in vec2 uv;
+out vec3 position_world, normal_world, color_srgb;
+out vec2 at;
+void main() {
+    position_world = position;
+    normal_world = normal;
+    color_srgb = color;
+    at = uv;
+    gl_Position = clip_from_world * vec4(position, 1);
+}
+"""
+
+# Integer targets are cleared to 0: ids go in one higher.
+FRAGMENT_SHADER = """
+#version 330
+const int HEADLIGHT = 0, LIGHTS = 1, MATCAP = 2, MAX_LIGHTS = 8;
+uniform int kind, n_lights;
+uniform bool own_level;
+uniform bool mirror_u, mirror_v; // moderngl knows repeat and clamp alone
+uniform bool has_texture, has_colors, has_back;
+uniform vec3 front_color, back_color, ambient, to_headlight, eye, fog_color;
+uniform vec2 fog;                // near, far
+uniform bool has_fog, has_perspective;
+uniform float specular, shininess;
+uniform mat4 eye_from_world;
+uniform sampler2D image;
+uniform vec4 light_at[MAX_LIGHTS];        // a direction if w = 0
+uniform vec4 light_color[MAX_LIGHTS];     // linear, and the falloff
+in vec3 position_world, normal_world, color_srgb;
+in vec2 at;
+layout(location = 0) out vec4 color;
+layout(location = 1) out int id;
+
+vec3 light_of(vec3 srgb) {
+    return mix(pow((srgb + 0.055) / 1.055, vec3(2.4)), srgb / 12.92, lessThanEqual(srgb, vec3(0.04045)));
+}
+vec3 srgb_of(vec3 light) {
+    light = clamp(light, 0, 1);
+    return mix(1.055 * pow(light, vec3(1 / 2.4)) - 0.055, 12.92 * light, lessThanEqual(light, vec3(0.0031308)));
+}
+void main() {
+    vec3 n = normalize(normal_world) * (gl_FrontFacing ? 1 : -1);
+    vec3 n_eye = normalize(mat3(eye_from_world) * n);
+    vec3 base = light_of(front_color / 255);
+    if (has_colors) base *= light_of(floor(color_srgb + 0.5) / 255);
+    if (has_texture) {
+        vec2 folded = 1 - abs(mod(at, 2) - 1);
+        vec2 uv = vec2(mirror_u ? folded.x : at.x, mirror_v ? folded.y : at.y);
+        vec2 right = dFdx(at) * textureSize(image, 0), up = dFdy(at) * textureSize(image, 0);
+        float level = 0.5 * log2(max(dot(right, right), dot(up, up)));
+        base *= (own_level ? textureLod(image, uv, level) : texture(image, uv)).rgb;
+    }
+    if (has_back && !gl_FrontFacing) base = light_of(back_color / 255);
+    vec3 light;
+    if (kind == MATCAP) {
+        light = texture(image, 0.5 + 0.5 * n_eye.xy).rgb;
+    } else if (kind == HEADLIGHT) {
+        light = base * (ambient + (1 - ambient) * pow((1 + dot(n_eye, to_headlight)) / 2, 3));
+    } else {
+        vec3 diffuse = ambient, shine = vec3(0);
+        vec3 viewer = has_perspective ? normalize(eye - position_world) : eye;
+        for (int k = 0; k < n_lights; k++) {
+            vec3 way = light_at[k].xyz - light_at[k].w * position_world;
+            vec3 l = normalize(way);
+            vec3 strength = light_color[k].rgb / (1 + light_at[k].w * light_color[k].a * dot(way, way));
+            diffuse += strength * max(0, dot(n, l));
+            if (dot(n, l) > 0) shine += strength * specular * pow(max(0, dot(n, normalize(l + viewer))), shininess);
+        }
+        light = base * diffuse + shine;
+    }
+    float far_off = -(eye_from_world * vec4(position_world, 1)).z;
+    if (has_fog) light = mix(light, light_of(fog_color / 255), clamp((far_off - fog.x) / (fog.y - fog.x), 0, 1));
+    color = vec4(srgb_of(light), 1);
+    id = gl_PrimitiveID + 1;
+}
+"""
+
+
+class OpenGL:
+    """A context on llvmpipe that draws scenes.
+
+    Raises
+    ------
+    ImportError
+        If moderngl is not installed.
+    RuntimeError
+        If OpenGL runs on something else than llvmpipe.
+    """
+
+    def __init__(self) -> None:
+        import moderngl
+
+        os.environ.update(ENVIRONMENT)
+        self.context = moderngl.create_standalone_context(require=330, backend="egl")
+        self.renderer = f"{self.context.info['GL_RENDERER']}, OpenGL {self.context.info['GL_VERSION']}"
+        if "llvmpipe" not in self.renderer:
+            raise RuntimeError(f"OpenGL runs on {self.renderer}, not on llvmpipe")
+        self.program = self.context.program(vertex_shader=VERTEX_SHADER, fragment_shader=FRAGMENT_SHADER)
+        targets = [self.context.texture(SIZE, 4), self.context.texture(SIZE, 1, dtype="i4")]
+        self.frame = self.context.framebuffer(targets, self.context.depth_texture(SIZE))
+        self.context.enable_only(moderngl.DEPTH_TEST)
+        self.context.front_face = "cw"  # turned over
+
+    def draw(self, scene: PictureScene) -> tuple[np.ndarray, np.ndarray]:
+        """Return the picture (H, W, 3) uint8 on white and the ids (H, W) int32, -1 where nothing shows."""
+        for name, value in uniforms(scene).items():
+            uniform = self.program[name]
+            if np.ndim(value):
+                uniform.write(np.ascontiguousarray(value, np.float32).tobytes())
+            else:
+                uniform.value = value
+        texture = texture_of(scene)
+        if texture is not None:
+            self.upload(texture).use(0)
+        buffer = self.context.buffer(corner_rows(scene).tobytes())
+        names = "position", "normal", "color", "uv"
+        mesh = self.context.vertex_array(self.program, [(buffer, "3f 3f 3f 2f", *names)])
+        self.frame.use()
+        self.frame.clear(0, 0, 0, 0, depth=1.0)
+        mesh.render()
+        width, height = SIZE
+        pixels, numbers = self.frame.read(alignment=1), self.frame.read(attachment=1, components=1, dtype="i4")
+        picture = np.frombuffer(pixels, np.uint8).reshape(height, width, 3)
+        ids = np.frombuffer(numbers, np.int32).reshape(height, width) - 1
+        return np.where(ids[..., None] < 0, np.uint8(255), picture), ids
+
+    def upload(self, texture: tl.Texture) -> Any:
+        """The texture as linear light in float32, row 0 at v = 0, with OpenGL's own halvings."""
+        gl = self.context
+        height, width = texture.image.shape[:2]
+        light = decode(texture.image[::-1, :, :3]).astype(np.float32)
+        uploaded = gl.texture((width, height), 3, light.tobytes(), dtype="f4", alignment=1)
+        if texture.filter == "trilinear":
+            uploaded.build_mipmaps()
+        uploaded.filter = {
+            "nearest": (gl.NEAREST, gl.NEAREST),
+            "bilinear": (gl.LINEAR, gl.LINEAR),
+            "trilinear": (gl.LINEAR_MIPMAP_LINEAR, gl.LINEAR),
+        }[texture.filter]
+        uploaded.repeat_x, uploaded.repeat_y = (one == "repeat" for one in texture.wrap)
+        return uploaded
+
+
+def decode(srgb: np.ndarray) -> np.ndarray:
+    """Linear light, 0 to 1, of sRGB values of 0 to 255 (IEC 61966-2-1)."""
+    value = np.asarray(srgb, np.float64) / 255
+    return np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
+
+
+def texture_of(scene: PictureScene) -> tl.Texture | None:
+    """The picture that the shader reads: the matcap, or the texture."""
+    return scene.options.get("matcap") or scene.material.texture
+
+
+def corner_rows(scene: PictureScene) -> np.ndarray:
+    """A row (3 T, 11) float32 for each corner of each triangle: position, normal, colour, uv."""
+    mesh = scene.mesh
+    corners = mesh.vertices[mesh.triangles]
+    if scene.options.get("shading") == "flat":
+        faces = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        normals = np.repeat(faces[:, None], 3, axis=1)
+    else:
+        normals = mesh.vertex_normals()[mesh.triangles]
+    colors = np.zeros_like(corners) if mesh.colors is None else mesh.colors[:, :3][mesh.triangles]
+    uv = np.zeros_like(corners[..., :2]) if mesh.uv is None else mesh.uv[mesh.triangles]
+    return np.concatenate([corners, normals, colors, uv], axis=-1).reshape(-1, 11).astype(np.float32)
+
+
+def uniforms(scene: PictureScene) -> dict[str, Any]:
+    """The uniforms of the shaders by name; matrices are turned, for OpenGL has columns first."""
+    options, material, view = scene.options, scene.material, scene.camera.view
+    texture, mesh = material.texture, scene.mesh
+    lights = options.get("lights")
+    fog = options.get("fog")
+    has_perspective = bool(scene.camera.projection[3, 2])
+    eye_axes = np.linalg.inv(view)
+    has_colors = texture is not None or mesh.colors is not None
+    color = material.color or ((255, 255, 255) if has_colors else options.get("color", DEFAULT_COLOR))
+    wraps = texture.wrap if texture else ("repeat", "repeat")
+    return {
+        "clip_from_world": (np.diag([1.0, -1.0, 1.0, 1.0]) @ scene.camera.clip_from_world(SIZE)).T,
+        "eye_from_world": view.T,
+        "has_perspective": has_perspective,
+        "eye": eye_axes[:3, 3] if has_perspective else eye_axes[:3, 2],
+        "kind": 2 if options.get("shading") == "matcap" else 0 if lights is None else 1,
+        "has_texture": texture is not None,
+        "own_level": scene.own_level,
+        "mirror_u": wraps[0] == "mirror",
+        "mirror_v": wraps[1] == "mirror",
+        "has_colors": mesh.colors is not None,
+        "front_color": color,
+        "has_back": material.back_color is not None,
+        "back_color": material.back_color or (0, 0, 0),
+        "ambient": (options.get("ambient", 0.03),) * 3,
+        "to_headlight": np.array([-0.35, 0.45, 1.0]) / np.linalg.norm([-0.35, 0.45, 1.0]),
+        "specular": material.specular,
+        "shininess": material.shininess,
+        "has_fog": fog is not None,
+        "fog": (fog.near, fog.far) if fog else (0, 1),
+        "fog_color": fog.color if fog else (0, 0, 0),
+        **light_uniforms(lights or (), eye_axes),
+    }
+
+
+def light_uniforms(lights: Sequence[tl.Light], world_from_eye: np.ndarray) -> dict[str, Any]:
+    """Lights in the world: rows of `at`, and 1 for a point; linear colours, and the fall-off."""
+    at, color = np.zeros((2, MAX_LIGHTS, 4))
+    for row, light in enumerate(lights):
+        at[row] = (*light.at, light.kind == "point")
+        if light.space == "eye":
+            at[row] = world_from_eye @ at[row]
+        color[row] = (*light.intensity * decode(light.color), light.falloff)
+    return {"n_lights": len(lights), "light_at": at, "light_color": color}

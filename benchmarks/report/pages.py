@@ -1,0 +1,34 @@
+"""Pages of the documentation that show parts of a record, between markers."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+
+from benchmarks.harness.records import Record
+
+MARKED = re.compile(r"(<!-- table: ([\w-]+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
+
+
+def with_parts(text: str, record: Record, parts: Mapping[str, Callable[[Record], str]]) -> str:
+    """Return a page with what stands between its markers made anew, by `parts`.
+
+    Raises
+    ------
+    ValueError
+        If the page has no marker or an unknown one, or the record lacks what one needs.
+    """
+
+    def made(found: re.Match[str]) -> str:
+        head, name, _, end = found.groups()
+        if name not in parts:
+            raise ValueError(f"a marker must be one of {', '.join(parts)}, got {name!r}")
+        try:
+            return f"{head}{parts[name](record)}\n{end}"
+        except KeyError as key:
+            raise ValueError(f"the record must hold {key} for {name!r}: measure that part") from None
+
+    page, n = MARKED.subn(made, text)
+    if not n:
+        raise ValueError("the page must hold <!-- table: NAME --> and <!-- end --> after it")
+    return page

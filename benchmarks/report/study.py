@@ -1,0 +1,39 @@
+"""The protocol that every study keeps: a command that measures, a record, and the ways in which it is shown."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from importlib import import_module
+from pathlib import Path
+
+from benchmarks.harness.records import Record, Save
+
+
+@dataclass(frozen=True)
+class Study:
+    """What is measured together."""
+
+    kind: str
+    """Of its record; and the command."""
+    help: str
+    add_arguments: Callable[[argparse.ArgumentParser], None]
+    """Declare the arguments; the one called `record` is the file that the record goes to."""
+    run: Callable[[argparse.Namespace, Save], Record]
+    """Measure and return the record; the function that it gets takes the record as far as it goes.
+
+    Raises a ValueError for arguments that are refused.
+    """
+    lines: Callable[[Record], Iterable[str]]
+    """What is printed of a record."""
+    parts: Mapping[str, Callable[[Record], str]] = field(default_factory=dict)
+    """What the markers `<!-- table: NAME -->` of its pages stand for."""
+    charts: str | None = None
+    """The module that draws its charts; it needs matplotlib."""
+
+    def draw_charts(self, record: Record, folder: Path) -> list[Path]:
+        """Write the charts of a record into a folder, return where they are."""
+        if self.charts is None:
+            raise ValueError(f"there are no charts of a record of {self.kind}")
+        return import_module(self.charts).draw_charts(record, folder)

@@ -1,0 +1,8 @@
+"""Studies of one file each.
+
+batch.py      many pictures: views a second
+layers.py     each layer of a view beside its picture
+field.py      a field beside matplotlib, datashader and SciPy
+samplings.py  one scene in every sampling, as a picture
+memset.py     a yardstick: memset of the 4K pictures
+"""

@@ -1,0 +1,174 @@
+"""Many pictures: views a second of one mesh, shaded, into memory and into PNG files, on one thread and on several.
+
+Contestants take turns in processes of their own, as in `harness/rounds.py`; a call draws all views. Out: a record.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.harness.arguments import (
+    add_names,
+    add_number,
+    add_out,
+    add_pin,
+    options_of,
+    positive,
+    refuse_unknown,
+    set_options,
+)  # fmt: skip
+from benchmarks.harness.contestants import Child, Contestant, SkippedError
+from benchmarks.harness.machine import describe
+from benchmarks.harness.records import Record, Save, tell
+from benchmarks.harness.rounds import turn_of_each
+from benchmarks.peers import OURS, load_peer, why_not
+from benchmarks.report.study import Study
+from benchmarks.scenes.cases import Case, views_scene
+
+PEERS = ("llvmpipe", "riley", "deodr", "vtk")
+TASKS = ("views", "views-png")
+
+
+@dataclass(frozen=True)
+class Options:
+    """What to run and how."""
+
+    peers: Sequence[str] = PEERS
+    threads: Sequence[int] = (1, 2)
+    n_triangles: int = 70_000
+    n_views: int = 100
+    frame_px: int = 512
+    repeats: int = 5
+    pin: Sequence[int] = ()
+
+
+def run_batch(options: Options) -> dict[str, Any]:
+    """Measure, return the record that `lines` reads."""
+    record: dict[str, Any] = {
+        "schema": 1,
+        "kind": "batch",
+        **describe("isal", "pillow"),
+        "n_views": options.n_views,
+        "n_triangles": options.n_triangles,
+        "size": [options.frame_px] * 2,
+        "runs": [],
+        "skipped": [],
+    }
+    children: list[Child] = []
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        try:
+            for contestant in _contestants(options, record["skipped"]):
+                scene = folder / contestant.case.name
+                if not scene.exists():
+                    contestant.case.make().save(scene)
+                try:
+                    children.append(Child.start(contestant, scene, options.pin, folder))
+                    tell(f"{_name(contestant)} is ready")
+                except SkippedError as reason:
+                    record["skipped"].append({"name": _name(contestant), "reason": str(reason)})
+            for i in range(options.repeats):
+                turn_of_each(children, 0.0, record["skipped"])
+                tell(f"round {i + 1} of {options.repeats}")
+            seen = {child.contestant: _seen(child, folder) for child in children}
+        finally:
+            for child in children:
+                child.stop()
+    ours = seen[children[0].contestant]
+    record["runs"] = [
+        _summary(child, children, options.n_views, int((seen[child.contestant] != ours).sum())) for child in children
+    ]
+    return record
+
+
+def _contestants(options: Options, skipped: list[dict[str, str]]) -> Iterator[Contestant]:
+    size = options.frame_px, options.frame_px
+    for task in TASKS:
+        case = Case(task, task, lambda task=task: views_scene(task, options.n_triangles, options.n_views, size))
+        for name in (OURS, *options.peers):
+            for threads in options.threads:
+                contestant = Contestant(name, threads, case)
+                reason = why_not(load_peer(name), task, threads)
+                if reason is None:
+                    yield contestant
+                elif not reason.startswith("runs on one"):
+                    skipped.append({"name": _name(contestant), "reason": reason})
+
+
+def _seen(child: Child, folder: Path) -> np.ndarray:
+    """Where the last view shows the mesh, bool (H, W)."""
+    color = child.picture(folder / f"picture-{_name(child.contestant).replace(' ', '-')}")["color"]
+    return (color != 0).any(axis=2)
+
+
+def _summary(child: Child, children: Sequence[Child], n_views: int, n_different: int) -> dict[str, Any]:
+    contestant = child.contestant
+    seconds = np.array([np.median(turn) for turn in child.turns]) / 1e3
+    alone = next((c for c in children if c.contestant == Contestant(contestant.peer, 1, contestant.case)), child)
+    first = next(c for c in children if c.contestant.case.name == contestant.case.name)
+    return {
+        "name": contestant.peer,
+        "task": contestant.case.name,
+        "threads": contestant.threads,
+        "gives": child.facts["gives"],
+        "version": child.facts["version"],
+        "views_per_s": float(n_views / np.median(seconds)),
+        "best_views_per_s": float(n_views / seconds.min()),
+        "ours_is_faster": float(np.median(seconds / [np.median(turn) / 1e3 for turn in first.turns])),
+        "over_one_thread": float(np.median([np.median(turn) / 1e3 for turn in alone.turns] / seconds)),
+        "cpu_share": float(np.median(child.cpu_shares)),
+        "different_px": n_different,
+        "turns_s": seconds.round(6).tolist(),
+    }
+
+
+def lines(record: dict[str, Any]) -> Iterator[str]:
+    """The table, in Markdown."""
+    width, height = record["size"]
+    yield f"## {record['n_views']} views of {record['n_triangles']:,} triangles, {width}x{height}, shaded"
+    yield ""
+    yield f"{record['machine']['cpu']}; {record['isa']}; {record['date']}; commit {record['commit']}"
+    yield ""
+    yield "| | gives | threads | views/s | best round | over one thread | time over ours on 1 | other outline, px |"
+    yield "|---|---|---|---|---|---|---|---|"
+    for task, label in zip(TASKS, ("", ", PNG"), strict=True):
+        for run in sorted((run for run in record["runs"] if run["task"] == task), key=lambda run: -run["views_per_s"]):
+            yield (
+                f"| {run['name']}{label} | {run['gives']} | {run['threads']} | {run['views_per_s']:.0f} "
+                f"| {run['best_views_per_s']:.0f} | {run['over_one_thread']:.2f}x | {run['ours_is_faster']:.2f}x "
+                f"| {run['different_px']} |"
+            )
+    if record["skipped"]:
+        yield ""
+        yield "Skipped: " + "; ".join(f"{entry['name']}: {entry['reason']}" for entry in record["skipped"])
+
+
+def _name(contestant: Contestant) -> str:
+    return f"{contestant.name} {contestant.case.name}"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    set_options(parser, Options())
+    add_names(parser, "--peer", "peers", ", ".join(PEERS), "*")
+    parser.add_argument("--threads", nargs="+", type=positive, metavar="N")
+    add_number(parser, "--triangles", "n_triangles")
+    add_number(parser, "--views", "n_views", "a call")
+    add_number(parser, "--frame", "frame_px", "side", "PX")
+    add_number(parser, "--repeats", "repeats", "rounds")
+    add_pin(parser)
+    add_out(parser)
+
+
+def run(arguments: argparse.Namespace, _: Save) -> Record:
+    refuse_unknown("--peer", arguments.peers, PEERS)
+    return run_batch(options_of(Options, arguments))
+
+
+STUDY = Study("batch", "measure many pictures: views a second, in memory and as PNG", add_arguments, run, lines)

@@ -1,0 +1,241 @@
+"""Makes the 4x4 matrices of cameras: where they stand, how they project, what has a subject in the frame.
+
+Spaces: world; eye (OpenGL: x right, y up, the view along -z); clip (-w <= x, y, z <= w inside).
+
+Based on: Segal, M., and K. Akeley, "The OpenGL Graphics System", 1992 (the matrices of glFrustum and glOrtho).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft._model.adapt import MeshLike, as_mesh, is_mesh_like
+from topleft._model.mesh import extreme_points, used_vertices
+
+F64 = npt.NDArray[np.float64]
+
+THREE_QUARTER_DEG = (35.0, 20.0)
+"""Azimuth and elevation of the three-quarter view: front, right side and top all show."""
+
+FRAMING_MARGIN = 1.05
+"""What fits fills 1 / 1.05 of the frame, so that no outline touches its border."""
+
+
+def points_to_frame(subject: MeshLike | npt.ArrayLike) -> F64:
+    """The points (N, 3) float64 of a subject that count: vertices that triangles use, each once, or all points.
+
+    Raises
+    ------
+    ValueError
+        If there is no point, or one is not finite.
+    """
+    if is_mesh_like(subject):
+        points = np.asarray(used_vertices(as_mesh(subject)), np.float64)
+    else:
+        points = np.asarray(subject, np.float64)
+    if points.ndim != 2 or points.shape[1] != 3:
+        raise ValueError(f"points to frame must have shape (N, 3), got {points.shape}")
+    if not len(points):
+        raise ValueError("there is nothing to frame: the mesh has no triangles")
+    if not np.isfinite(points).all():
+        raise ValueError("points to frame must be finite")
+    return points
+
+
+def ends_to_frame(subject: MeshLike | npt.ArrayLike) -> F64:
+    """A few of those points, which have the box and the bounding sphere of all."""
+    if is_mesh_like(subject):
+        mesh = as_mesh(subject)
+        if len(mesh.triangles):
+            return mesh.extreme_points()
+    return extreme_points(points_to_frame(subject))
+
+
+def bounding_sphere(subject: MeshLike | npt.ArrayLike) -> tuple[F64, float]:
+    """Centre (3,) of the box round the subject, and the distance of its farthest point (1 if they are all one).
+
+    Raises
+    ------
+    ValueError
+        If there is no point, or one is not finite.
+    """
+    ends = ends_to_frame(subject)
+    center = ends.min(axis=0) / 2 + ends.max(axis=0) / 2
+    radius = math.sqrt(float(((ends - center) ** 2).sum(axis=1).max()))
+    return center, radius if radius > 0 else 1.0
+
+
+def box_corners(subject: MeshLike | npt.ArrayLike) -> F64:
+    """The corners (8, 3) float64 of the box round the subject; raises as `bounding_sphere` does."""
+    ends = ends_to_frame(subject)
+    low, high = ends.min(axis=0), ends.max(axis=0)
+    return np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
+
+
+def distance_to_fit(points: F64, tan_x: float, tan_y: float) -> float:
+    """How far in front of the origin a camera has to stand to have all points just inside its frame.
+
+    Parameters
+    ----------
+    points : (N, 3) float64
+        In eye axes, relative to the point that the camera looks at.
+    tan_x, tan_y : float
+        Tangents of half the fields of view.
+    """
+    x, y, z = points.T
+    needed = z + FRAMING_MARGIN * np.maximum(np.abs(x) / tan_x, np.abs(y) / tan_y)
+    farthest = np.sqrt((points**2).sum(axis=1).max())
+    return float(max(needed.max(), 1e-2 * farthest)) or 1.0
+
+
+def view_matrix(eye: npt.ArrayLike, target: npt.ArrayLike, up: npt.ArrayLike = (0.0, 1.0, 0.0)) -> F64:
+    """Eye from world (4, 4) float64, for a camera at `eye` that looks at `target`.
+
+    Raises
+    ------
+    ValueError
+        If eye and target coincide, or if `up` is zero or parallel to the view.
+    """
+    eye, target, up = as_vector(eye, "eye"), as_vector(target, "target"), as_vector(up, "up")
+    forward = target - eye
+    distance = np.linalg.norm(forward)
+    if distance == 0:
+        raise ValueError(f"eye and target must differ, got {eye.tolist()} for both")
+    forward = forward / distance
+    right = np.cross(forward, up)
+    # Below 1e-12 of the length of `up` the direction is made of rounding errors.
+    if np.linalg.norm(right) <= 1e-12 * np.linalg.norm(up):
+        raise ValueError(f"up must not be zero or parallel to the view, got {up.tolist()}")
+    right /= np.linalg.norm(right)
+    view = np.eye(4)
+    view[:3, :3] = right, np.cross(right, forward), -forward
+    view[:3, 3] = -view[:3, :3] @ eye
+    return view
+
+
+def orbit_view(
+    target: npt.ArrayLike,
+    distance: float,
+    azimuth_deg: float = THREE_QUARTER_DEG[0],
+    elevation_deg: float = THREE_QUARTER_DEG[1],
+    *,
+    up: Literal["y", "z"] = "y",
+) -> F64:
+    """Eye from world (4, 4) float64, for a camera on a sphere round the target; the angles of `Camera.framing`.
+
+    Raises
+    ------
+    ValueError
+        If the elevation is outside -90 to 90 degrees or `up` is neither "y" nor "z".
+    """
+    if up not in ("y", "z"):
+        raise ValueError(f'up must be "y" or "z", got {up!r}')
+    if not np.isfinite(azimuth_deg):
+        raise ValueError(f"azimuth_deg must be finite, got {azimuth_deg}")
+    if not -90 <= elevation_deg <= 90:
+        raise ValueError(f"elevation_deg must lie in -90 to 90, got {elevation_deg}")
+    azimuth, elevation = np.radians([azimuth_deg, elevation_deg])
+    outward = np.array(
+        [np.cos(elevation) * np.sin(azimuth), np.sin(elevation), np.cos(elevation) * np.cos(azimuth)]
+    )
+    axis = np.array([0.0, 1.0, 0.0])
+    if abs(elevation_deg) > 89:  # from a pole: the limit of the pictures on the way there
+        axis = np.array([-np.sin(azimuth), 0, -np.cos(azimuth)]) * np.sign(elevation)
+    if up == "z":
+        outward, axis = outward[[0, 2, 1]] * [1, -1, 1], axis[[0, 2, 1]] * [1, -1, 1]
+    target = as_vector(target, "target")
+    return view_matrix(target + distance * outward, target, axis)
+
+
+def perspective_matrix(fov_y_deg: float, near: float, far: float) -> F64:
+    """Clip from eye (4, 4) float64 for a square picture; see `Camera.perspective`."""
+    check_fov(fov_y_deg)
+    check_planes(near, far)
+    scale = 1 / np.tan(np.radians(fov_y_deg) / 2)
+    matrix = np.diag([scale, scale, (far + near) / (near - far), 0])
+    matrix[2, 3] = 2 * far * near / (near - far)
+    matrix[3, 2] = -1
+    return matrix
+
+
+def orthographic_matrix(height: float, near: float, far: float) -> F64:
+    """Clip from eye (4, 4) float64 for a square picture; see `Camera.orthographic`."""
+    check_positive("height", height)
+    if not (np.isfinite([near, far]).all() and near < far):
+        raise ValueError(f"near and far must be finite and near < far, got {near} and {far}")
+    matrix = np.diag([2 / height, 2 / height, 2 / (near - far), 1])
+    matrix[2, 3] = (far + near) / (near - far)
+    return matrix
+
+
+def frustum_matrix(left: float, right: float, bottom: float, top: float, near: float, far: float) -> F64:
+    """Clip from eye (4, 4) float64 for a window of the plane at `near`; see `Camera.off_center`."""
+    check_window(left, right, bottom, top)
+    check_planes(near, far)
+    matrix = perspective_matrix(90, near, far)
+    matrix[0, 0], matrix[0, 2] = 2 * near / (right - left), (right + left) / (right - left)
+    matrix[1, 1], matrix[1, 2] = 2 * near / (top - bottom), (top + bottom) / (top - bottom)
+    return matrix
+
+
+def box_matrix(left: float, right: float, bottom: float, top: float, near: float, far: float) -> F64:
+    """Clip from eye (4, 4) float64 for a box without perspective; see `Camera.off_center`."""
+    check_window(left, right, bottom, top)
+    matrix = orthographic_matrix(1, near, far)
+    matrix[0, 0], matrix[0, 3] = 2 / (right - left), -(right + left) / (right - left)
+    matrix[1, 1], matrix[1, 3] = 2 / (top - bottom), -(top + bottom) / (top - bottom)
+    return matrix
+
+
+def as_vector(values: npt.ArrayLike, name: str) -> F64:
+    """Three finite numbers as float64."""
+    vector = np.asarray(values, dtype=np.float64)
+    if vector.shape != (3,) or not np.isfinite(vector).all():
+        raise ValueError(f"{name} must be three finite numbers, got {values!r}")
+    return vector
+
+
+def as_square(values: npt.ArrayLike, n: int, name: str) -> F64:
+    """A finite matrix (n, n) as float64, always a copy."""
+    matrix = np.array(values, dtype=np.float64)
+    if matrix.shape != (n, n):
+        raise ValueError(f"{name} must have shape ({n}, {n}), got {matrix.shape}")
+    if not np.isfinite(matrix).all():
+        raise ValueError(f"{name} must hold finite numbers, got {matrix.tolist()}")
+    return matrix
+
+
+def check_regular(matrix: F64, name: str) -> None:
+    """Raise a `ValueError` if the matrix is singular."""
+    if np.linalg.matrix_rank(matrix) < len(matrix):
+        raise ValueError(f"{name} must not be singular, got {matrix.tolist()}")
+
+
+def check_positive(name: str, value: float) -> None:
+    """Raise a `ValueError` unless the number is finite and above 0."""
+    if not (np.isfinite(value) and value > 0):
+        raise ValueError(f"{name} must be positive, got {value}")
+
+
+def check_fov(fov_y_deg: float) -> None:
+    """Raise a `ValueError` unless the field of view is one."""
+    if not 0 < fov_y_deg < 180:
+        raise ValueError(f"fov_y_deg must lie between 0 and 180, got {fov_y_deg}")
+
+
+def check_planes(near: float, far: float) -> None:
+    """Raise a `ValueError` unless 0 < near < far, finite."""
+    if not (np.isfinite(near) and np.isfinite(far) and 0 < near < far):
+        raise ValueError(f"near and far must be finite and 0 < near < far, got {near} and {far}")
+
+
+def check_window(left: float, right: float, bottom: float, top: float) -> None:
+    """Raise a `ValueError` unless the four sides are finite and in order."""
+    if not (np.isfinite([left, right, bottom, top]).all() and left < right and bottom < top):
+        raise ValueError(
+            f"left < right and bottom < top must be finite, got {left} and {right}, {bottom} and {top}"
+        )

@@ -1,0 +1,262 @@
+"""Finds what decides how triangles are drawn: transform, clip and snap as in the draw, then a census in its place.
+
+In: the arrays of a call, or a mesh. Out: `Facts`, which `stages.py` turns into sentences; the bytes that a call needs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from topleft import _engine
+from topleft._base.arrays import as_array
+from topleft._base.memory import FRESH
+from topleft._base.options import DepthTest, Sampling, Sink
+from topleft._model.mesh import Mesh
+from topleft._raster import choices
+from topleft._raster.clustered import ClusteredScene
+from topleft._raster.clusters import Clusters
+from topleft._raster.sampling import sample_positions
+from topleft._raster.snap import check_triangles, snap_scene
+from topleft._raster.view import View
+
+__all__ = ["CLASSES", "ClusterFacts", "Facts", "find_cluster_facts", "find_facts", "memory_of"]
+
+#: The names of `tl_class` in ``csrc/topleft.h``.
+CLASSES = (
+    "degenerate", "culled", "outside", "between", "tiny", "small", "middle", "rows", "long",
+    "edge 64", "span 64", "edge 128", "span 128",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class ClusterFacts:
+    """How the clusters of a mesh fare in a view.
+
+    Attributes
+    ----------
+    clusters : Clusters or None
+        What is drawn from; None when the mesh is drawn whole.
+    why_not : str
+        Why it is.
+    n_outside, n_turned, n_hidden, n_drawn : int
+        Clusters outside of the picture, turned away, hidden, and drawn.
+    """
+
+    clusters: Clusters | None
+    why_not: str = ""
+    n_outside: int = 0
+    n_turned: int = 0
+    n_hidden: int = 0
+    n_drawn: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Facts:
+    """What decides how a scene is drawn."""
+
+    verb: str
+    outputs: tuple[str, ...]
+    view: View
+    test: DepthTest | None
+    sink: Sink
+    vertex_dtype: str  # as given
+    point_dtype: str  # as worked on
+    is_vertex_copy: bool
+    index_dtype: str
+    n_vertices: int
+    n_components: int
+    n_triangles: int
+    is_clip_space: bool
+    is_affine: bool
+    are_whole: bool  # vertices in pixels are whole numbers
+    n_wide: int  # vertices beyond 2**30 sub-pixels
+    n_clipped: int  # vertices outside of a clip plane
+    n_cut: int  # triangles that a plane cuts and that are drawn as pieces
+    n_pieces: int
+    flat_depth: float | None  # when ids are drawn alone
+    common_depth: float | None  # of all vertices, whatever is made of it
+    is_direct: bool  # uint8 colours of triangles are stored without labels in between
+    n_threads: int  # that draw
+    work_ms: float  # of one thread, as guessed before the draw
+    census: tuple[tuple[int, float, float], ...]  # of each of CLASSES: triangles, samples in boxes, covered
+    clusters: ClusterFacts | None = None  # of a mesh
+
+    def count(self, *names: str) -> int:
+        """Return how many triangles or pieces are of some classes."""
+        return sum(self.census[CLASSES.index(name)][0] for name in names)
+
+    @property
+    def n_beyond(self) -> int:
+        """Triangles of which the clip planes leave nothing."""
+        return self.n_triangles - self.n_cut + self.n_pieces - sum(row[0] for row in self.census)
+
+    @property
+    def draws_planes(self) -> bool:
+        """Whether each sample is a picture of its own."""
+        return self.view.sampling.n_samples > 1 and self.verb in ("rasterize", "fill")
+
+    @property
+    def is_shared(self) -> bool:
+        """Whether each thread takes a share of the triangles."""
+        if self.view.sampling is Sampling.AREA or self.draws_planes or self.is_direct:
+            return False
+        return choices.is_shared(self.view, self.n_triangles, self.n_threads, self.sink)
+
+    @property
+    def n_drawn(self) -> int:
+        """Triangles and pieces that may cover a sample."""
+        return self.count(*CLASSES[4:])
+
+    @property
+    def covered(self) -> float:
+        """Return about how many samples are covered, each as often as it is."""
+        return sum(row[2] for row in self.census)
+
+
+def find_facts(
+    vertices: ArrayLike,
+    triangles: ArrayLike,
+    view: View,
+    verb: str,
+    outputs: tuple[str, ...],
+    test: DepthTest | None,
+) -> tuple[Facts, NDArray[np.int32]]:
+    """Return what a scene is, and its triangles as a copy that nobody changes.
+
+    Raises
+    ------
+    ValueError, TypeError, IndexError
+        As the verb would.
+    """
+    with_depth = verb == "rasterize"
+    snapped = snap_scene(FRESH, vertices, triangles, view, with_depth=with_depth, out=None)
+    check_triangles(triangles, snapped.corners, snapped.n_vertices)
+    given, indices = as_array("vertices", vertices), as_array("triangles", triangles)
+    inputs = snapped.inputs
+    points, pieces = inputs.points, inputs.pieces
+    xy = inputs.records.view(np.int32).reshape(-1, 4)[:, :2]
+    is_special = xy[:, 0] == np.iinfo(np.int32).min
+    sink = find_sink(verb, view, test, has_depth=snapped.has_depth)
+    flat = None
+    if with_depth and view.sampling is Sampling.CENTER and 0 not in view.size:
+        flat = choices.flat_depth(snapped.scene, inputs, view, has_depth=snapped.has_depth)
+    common = choices.common_depth(points, has_depth=snapped.has_depth, is_clip_space=inputs.is_clip_space)
+    drawn_sink = sink if flat is None else Sink.LABEL
+    samples = sample_positions(view.sampling.n_samples, view.grid_bits) if sink is Sink.SAMPLES else None
+    census = [(0, 0.0, 0.0)] * len(CLASSES)
+    if 0 not in view.size and snapped.n_triangles:
+        _, census = snapped.scene.count_classes(drawn_sink, *view.size, samples)
+    in_pixels = not inputs.is_clip_space and len(points) > 0
+    facts = Facts(
+        verb=verb,
+        outputs=outputs,
+        view=view,
+        test=test,
+        sink=drawn_sink,
+        vertex_dtype=str(given.dtype),
+        point_dtype=str(points.dtype),
+        is_vertex_copy=not np.shares_memory(given, points),
+        index_dtype=str(indices.dtype),
+        n_vertices=len(points),
+        n_components=points.shape[1],
+        n_triangles=snapped.n_triangles,
+        is_clip_space=inputs.is_clip_space,
+        is_affine=inputs.is_affine,
+        are_whole=in_pixels and bool((points[:, :2] == np.rint(points[:, :2])).all()),
+        n_wide=int((is_special & (xy[:, 1] == 1)).sum()),
+        n_clipped=int((is_special & (xy[:, 1] == 2)).sum()),
+        n_cut=len(np.unique(pieces.arrays[5][: len(pieces)])) if pieces else 0,  # type: ignore[index]
+        n_pieces=len(pieces) if pieces else 0,
+        flat_depth=flat,
+        common_depth=common,
+        is_direct=verb == "fill" and choices.is_direct(snapped.scene, view, np.dtype(np.uint8), is_flat=True),
+        n_threads=choices.threads_to_draw(view, snapped.scene, snapped.n_triangles, drawn_sink),
+        work_ms=choices.work_ns(view, snapped.scene, snapped.n_triangles, drawn_sink) / 1e6,
+        census=tuple(census),
+    )
+    corners = np.array(snapped.corners, np.int32)
+    corners.flags.writeable = False
+    return facts, corners
+
+
+def find_sink(verb: str, view: View, test: DepthTest | None, *, has_depth: bool) -> Sink:
+    """Return what a verb does with a covered sample."""
+    if verb == "rasterize":
+        return choices.fragment_sink(test, has_depth=has_depth)
+    if verb == "fill":
+        return Sink.LABEL
+    if verb == "overdraw" or view.sampling is Sampling.AREA:
+        return Sink.COUNT
+    return Sink.SAMPLES if view.sampling.n_samples > 1 else Sink.MASK
+
+
+def find_cluster_facts(mesh: Mesh, view: View, verb: str, test: DepthTest | None) -> ClusterFacts:
+    """Return what `rasterize_mesh` does from the second picture of a mesh on; clusters are made for it if need be."""
+    n_triangles = len(mesh.triangles)
+    if verb != "rasterize":
+        return ClusterFacts(None, f"{verb} draws arrays, which may change")
+    if view.sampling is not Sampling.CENTER:
+        return ClusterFacts(None, "with several samples a pixel, bands of rows are drawn, a sample after the other")
+    sink = choices.fragment_sink(test, has_depth=True)
+    if not choices.can_cluster(view, sink):
+        return ClusterFacts(None, "the order of the triangles matters, or the window lies too far off")
+    if not choices.pays_to_cluster(n_triangles, 1):
+        return ClusterFacts(None, f"{n_triangles:,} triangles are done before sorting them would pay")
+    clusters = mesh.clusters
+    seen = ClusteredScene(clusters, view)
+    if not choices.pays_to_draw_clusters(view, n_triangles, seen.survey):
+        return ClusterFacts(None, "most of the mesh shows, and drawing that cluster by cluster takes longer")
+    n, found = len(clusters), seen.survey(len(clusters))
+    n_outside, n_turned, n_drawn = round(found.outside * n), round(found.turned * n), seen.count_drawn(sink)
+    return ClusterFacts(clusters, "", n_outside, n_turned, n - n_outside - n_turned - n_drawn, n_drawn)
+
+
+def memory_of(facts: Facts) -> tuple[dict[str, int], dict[str, int]]:
+    """Return the bytes of scratch, which is kept from call to call, and of results, by name.
+
+    What only the data can tell comes on top: a table of vertices beyond 2**30 sub-pixels, 16 bytes a vertex; the pieces
+    of cut triangles, about 100 bytes each; with several samples a pixel, triangles in several bands of rows.
+    """
+    view, n = facts.view, facts.n_triangles
+    width, height = view.size
+    n_pixels, n_samples = width * height, view.sampling.n_samples
+    is_empty = n_pixels == 0
+    scratch = {"records": 0 if is_empty or not n else _engine.VERTEX_BYTES * facts.n_vertices}
+    if facts.index_dtype not in ("int32", "uint32"):
+        scratch["triangles"] = 12 * n
+    results = result_bytes(facts)
+    if facts.sink in (Sink.MASK, Sink.SAMPLES) and not is_empty:
+        scratch["covered"] = 8 * height * _engine.Target.covered_shape(height, width, n_samples)[1]
+    if view.sampling is Sampling.AREA:
+        strips = facts.n_threads * _engine.blend_cells(width)
+        scratch["cells"] = 4 * (strips if facts.verb == "fill" else height * _engine.area_stride(width))
+    elif facts.verb == "fill" and n_samples == 1 and n and not facts.is_direct:
+        scratch["labels"] = 4 * n_pixels
+    elif facts.draws_planes and not is_empty and n and choices.can_share(view):
+        scratch["bins"] = 12 * (n + 16)
+        scratch["bands"] = 4 * (n + 1)
+    found = facts.clusters
+    if found is not None and found.clusters is not None:  # the records are not needed, unless a plane cuts
+        scratch["records"] = 0 if not facts.n_clipped else scratch["records"]
+        scratch["clusters"] = 12 * len(found.clusters) + 4 * facts.n_threads * n + found.clusters.n_bytes
+    elif facts.is_shared:
+        scratch["others"] = 4 * (n + 16 * facts.n_threads)
+    return scratch, results
+
+
+def result_bytes(facts: Facts) -> dict[str, int]:
+    """Return the bytes of what the verb returns; colours have four bytes a pixel."""
+    width, height = facts.view.size
+    n_pixels, n_samples = width * height, facts.view.sampling.n_samples
+    many = facts.view.sampling is Sampling.AREA or n_samples > 1
+    if facts.verb == "rasterize":
+        return {"triangle": 4 * n_pixels * n_samples, "depth": 4 * n_pixels * n_samples}
+    if facts.verb == "fill":
+        planes = {"sample labels": 4 * n_pixels * n_samples} if n_samples > 1 else {}
+        return {"color": 4 * n_pixels, **planes}
+    if facts.verb == "overdraw":
+        return {"overdraw": 4 * n_pixels * n_samples}
+    return {"coverage": (4 if many else 1) * n_pixels}

@@ -1,0 +1,225 @@
+"""The law of the house, where the linter cannot see it: names, maps, and what comments tell of files.
+
+`lint-imports` holds the floors.
+"""
+
+import ast
+import inspect
+import pickle
+import pkgutil
+import re
+import subprocess
+import sys
+import tokenize
+import typing
+from collections import Counter
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+import topleft as tl
+
+ROOT = Path(__file__).parents[2]
+SRC = ROOT / "src" / "topleft"
+PUBLIC = [name for name in tl.__all__ if callable(getattr(tl, name))]
+ROOMS = sorted(path.parent for path in SRC.rglob("__init__.py") if path.parent != SRC)
+PYTHON = sorted(path for folder in ("src", "tests", "benchmarks", "examples") for path in (ROOT / folder).rglob("*.py"))
+CYTHON = sorted([*SRC.rglob("*.pyx"), *SRC.rglob("*.pxi")])
+C = sorted([*(ROOT / "csrc").rglob("*.c"), *(ROOT / "csrc").rglob("*.h")])
+
+#: Where modules are found: those of the package, of the benchmarks, of tests/support and of the examples.
+PLACES = [ROOT / "src", ROOT, ROOT / "tests" / "support", ROOT / "examples"]
+
+
+@cache
+def parsed(path):
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+def short(path):
+    return path.relative_to(ROOT).as_posix()
+
+
+# Names
+
+
+def test_namespace_is_exact():
+    assert dir(tl) == sorted(tl.__all__)
+
+
+def test_no_public_name_is_that_of_a_module_but_scenes():
+    assert [name for name in tl.__all__ if find_spec(f"topleft.{name}")] == ["scenes"]
+
+
+@pytest.mark.parametrize("name", PUBLIC)
+def test_public_name_is_of_topleft_and_can_be_pickled_and_looked_into(name):
+    value = getattr(tl, name)
+    assert value.__module__ == "topleft"
+    assert pickle.loads(pickle.dumps(value)) is value
+    typing.get_type_hints(value)
+    if not isinstance(value, type):
+        assert inspect.getsource(value).startswith("def " + name)
+
+
+def test_late_names_say_topleft_however_they_come():
+    code = (
+        "import sys, topleft as tl; import topleft._batch.batch as batch;"
+        "tl.render_layers; print(batch.Job.__module__, batch.render_batch.__module__)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["topleft", "topleft"]
+
+
+def test_no_two_classes_have_one_name():
+    found = Counter()
+    for path in [*SRC.rglob("*.py"), *CYTHON]:
+        found.update(re.findall(r"^ *(?:cdef +)?class +(\w+)", path.read_text(encoding="utf-8"), flags=re.MULTILINE))
+    assert not [name for name, n in found.items() if n > 1]
+
+
+# Imports
+
+
+@cache
+def file_of(module):
+    """The file of a module by its dotted name, or None for those of others and compiled ones."""
+    for place in PLACES:
+        path = place.joinpath(*module.split("."))
+        for file in (path / "__init__.py", path.with_suffix(".py")):
+            if file.is_file():
+                return file
+    return None
+
+
+@cache
+def names_of(path):
+    """What a file defines at its top level, also under `if` and `try`; of the package, what it says."""
+    if path == SRC / "__init__.py":
+        return set(tl.__all__)
+    found, waiting = set(), list(parsed(path).body)
+    if path == SRC / "_engine" / "__init__.py":  # the face of the compiled unit
+        return set(ast.literal_eval(next(node.value for node in waiting if is_named(node, "__all__"))))
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            found.add(node.name)
+        elif not isinstance(node, ast.Import | ast.ImportFrom):
+            stored = (inner for inner in ast.walk(node) if isinstance(inner, ast.Name))
+            found |= {inner.id for inner in stored if isinstance(inner.ctx, ast.Store)}
+            waiting += [inner for inner in ast.iter_child_nodes(node) if isinstance(inner, ast.stmt)]
+    return found
+
+
+def is_named(node, name):
+    return isinstance(node, ast.Assign) and any(isinstance(one, ast.Name) and one.id == name for one in node.targets)
+
+
+def taken_by(path):
+    """The modules of ours that a file imports, by the names it gives them, and what it takes out of others."""
+    modules, taken = {}, set()
+    for node in ast.walk(parsed(path)):
+        if isinstance(node, ast.Import):
+            modules |= {alias.asname: alias.name for alias in node.names if alias.asname and file_of(alias.name)}
+        elif isinstance(node, ast.ImportFrom) and file_of(node.module):
+            for alias in node.names:
+                module = f"{node.module}.{alias.name}"
+                if file_of(module):
+                    modules[alias.asname or alias.name] = module
+                elif not SRC.parent.joinpath(*module.split(".")).with_suffix(".pyx").is_file():
+                    taken.add((node.module, alias.name))
+    return modules, taken
+
+
+def used_by(path):
+    """The attributes of modules of ours that a file uses."""
+    modules = taken_by(path)[0]
+    for node in ast.walk(parsed(path)):
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id in modules:
+            module = modules[node.value.id]
+            if not node.attr.startswith("__") and not file_of(f"{module}.{node.attr}"):
+                yield module, node.attr
+
+
+def test_names_are_imported_from_the_file_that_defines_them():
+    found = {(path, *pair) for path in PYTHON for pair in (*taken_by(path)[1], *used_by(path))}
+    lost = [(path, module, name) for path, module, name in found if name not in names_of(file_of(module))]
+    assert not lost, "\n".join(sorted(f"{short(path)}: {module}.{name}" for path, module, name in lost))
+
+
+def test_private_names_stay_in_their_file():
+    found = {(path, *pair) for path in PYTHON for pair in taken_by(path)[1]}
+    found |= {(path, *pair) for path in PYTHON if ROOT / "tests" not in path.parents for pair in used_by(path)}
+    lost = sorted(f"{short(path)}: {module}.{name}" for path, module, name in found if re.match("_[^_]", name))
+    assert not lost, "\n".join(lost)
+
+
+# Rooms
+
+
+@pytest.mark.parametrize("room", ROOMS, ids=short)
+def test_map_of_a_room_lists_its_files(room):
+    files = {path.name for path in room.iterdir() if path.suffix in (".py", ".pyx", ".pxi")} - {"__init__.py"}
+    folders = {f"{path.parent.name}/" for path in room.glob("*/__init__.py")}
+    lines = (ast.get_docstring(parsed(room / "__init__.py")) or "").splitlines()
+    listed = [line.split()[0] for line in lines if re.match(r"\w+(\.(py|pyx|pxi)|/) +\S", line)]
+    assert sorted(listed) == sorted(files | folders)  # in the order to read them
+    assert len(files) <= 15
+
+
+# Comments
+
+FILE_NAME = r"(?<![\w*{<])((?:[\w-]+/)*[\w-]+\.(?:py|pyx|pxi|pyi|c|h|md))\b(?![*}])"
+
+
+def comments_of(path):
+    """The comments and docstrings of a file."""
+    if path in C:
+        yield from re.findall(r"/\*.*?\*/|//[^\n]*", path.read_text(encoding="utf-8"), flags=re.DOTALL)
+        return
+    begins = True
+    with open(path, "rb") as file:
+        for token in tokenize.tokenize(file.readline):
+            if token.type == tokenize.COMMENT or (token.type == tokenize.STRING and begins):
+                yield token.string
+            begins = token.type in (tokenize.NEWLINE, tokenize.NL, tokenize.INDENT, tokenize.DEDENT, tokenize.ENCODING)
+
+
+@cache
+def known_files():
+    """The files of the project, by every end of their paths."""
+    paths = [path.relative_to(ROOT).parts for path in ROOT.rglob("*.*") if not {".git", "build"} & set(path.parts)]
+    return {"/".join(parts[i:]) for parts in paths for i in range(len(parts))}
+
+
+@cache
+def members():
+    """Class.member of all classes of the package."""
+    found = set()
+    for path in SRC.rglob("*.py"):
+        for node in ast.walk(parsed(path)):
+            if isinstance(node, ast.ClassDef):
+                found |= {f"{node.name}.{getattr(getattr(one, 'target', one), 'id', '')}" for one in node.body}
+                found |= {f"{node.name}.{getattr(one, 'name', '')}" for one in node.body}
+    return found
+
+
+def test_files_and_names_in_comments_exist():
+    lost = []
+    for path in [*PYTHON, *CYTHON, *C]:
+        text = "\n".join(comments_of(path))
+        names = [name for name in re.findall(FILE_NAME, text) if name not in known_files()]
+        names += [name for name in re.findall(r"`(topleft(?:\.\w+)+)", text) if not resolves(name)]
+        names += [name for name in re.findall(r"\bsee `([A-Z]\w+\.\w+)`", text) if name not in members()]
+        lost += [f"{short(path)}: {name}" for name in names]
+    assert not lost, "\n".join(lost)
+
+
+@cache
+def resolves(name):
+    try:
+        pkgutil.resolve_name(name)
+    except (ImportError, AttributeError):
+        return False
+    return True

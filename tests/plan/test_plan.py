@@ -1,0 +1,394 @@
+"""Plans: what they say is what happens; what they save changes nothing; what does not fit them is refused."""
+
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from comparing import assert_same
+
+import topleft as tl
+from topleft import _engine
+from topleft._base.memory import KeptMemory
+from topleft._engine.isa import build_info
+from topleft._plan import costs
+from topleft._plan.facts import find_facts
+from topleft._plan.plan import Plan
+from topleft._raster.view import View
+from topleft.scenes import random_triangles, shape
+
+SIZE = (320, 200)
+EYE = np.array([[1.0, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0.5, 1]])
+
+
+@pytest.fixture(autouse=True)
+def no_cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+
+
+def boxes(*sizes):
+    """Right triangles in boxes of these many pixels, one below the other, and their indices."""
+    corners = np.array([[0.0, 0], [1, 0], [0, 1]])
+    vertices = np.concatenate([corners * size + [3, 3 + 5 * i] for i, size in enumerate(sizes)])
+    return vertices, np.arange(len(vertices), dtype=np.int32).reshape(-1, 3)
+
+
+def stage(plan, name):
+    return next(one for one in plan.stages if one.name == name)
+
+
+def test_classes_are_told_by_the_box():
+    found = tl.plan(*boxes(2, 2, 4, 62, 63, 1e4), SIZE, outputs="coverage").classes
+    drawn = [(name, n) for name, n in found.items() if n]
+    if build_info()["isa"] == "scalar":
+        assert drawn == [("tiny", 2), ("small", 1), ("span 64", 3)]
+    else:
+        assert drawn == [("tiny", 2), ("small", 1), ("rows", 1), ("long", 2)]
+
+
+def test_classes_of_what_draws_nothing():
+    vertices = [[1, 1], [5, 5], [9, 9], [500, 1], [540, 1], [500, 40], [3.6, 3.6], [4.4, 3.6], [3.6, 4.4]]
+    triangles = [[0, 1, 2], [3, 4, 5], [6, 7, 8], [3, 5, 4]]
+    found = tl.plan(vertices, triangles, SIZE, outputs="coverage", cull="back").classes
+    assert {name: n for name, n in found.items() if n} == {"degenerate": 1, "culled": 2, "outside": 1}
+    found = tl.plan(vertices, [[6, 8, 7]], SIZE, outputs="coverage", cull="back").classes
+    assert {name: n for name, n in found.items() if n} == {"between": 1}
+
+
+def test_classes_beyond_64_bits():
+    vertices, triangles = boxes(40, 40)
+    vertices[0] += 2.0**24
+    found = tl.plan(vertices, triangles, SIZE).classes
+    assert found["edge 128"] + found["span 128"] == 1
+
+
+@pytest.mark.parametrize("outputs", ["coverage", "overdraw", "color", "triangle"])
+@pytest.mark.parametrize("cull", ["none", "back"])
+def test_every_triangle_is_of_one_class(outputs, cull):
+    rng = np.random.default_rng(8)
+    for _ in range(40):
+        n = int(rng.integers(1, 100))
+        clip = np.concatenate([rng.uniform(-2, 2, (3 * n, 3)), rng.uniform(-0.5, 2, (3 * n, 1))], axis=1)
+        plan = tl.plan(clip, np.arange(3 * n).reshape(n, 3), SIZE, outputs=outputs, cull=cull)
+        facts, _ = find_facts(clip, np.arange(3 * n).reshape(n, 3), plan._view, plan.verb, (), None)
+        assert 0 <= facts.n_beyond <= min(n, facts.n_clipped)
+        assert facts.n_cut <= n
+
+
+@pytest.mark.parametrize("isa", _engine.isa_available())
+def test_what_covers_is_about_what_is_counted(isa):
+    was = _engine.isa_in_use()
+    _engine.use_isa(isa)
+    try:
+        vertices, triangles, _ = random_triangles(3000, 12, *SIZE)
+        facts, _ = find_facts(
+            vertices, triangles, View.parse(SIZE, {}), "overdraw", ("overdraw",), None
+        )
+        drawn = tl.overdraw(vertices, triangles, SIZE).sum()
+        assert drawn == pytest.approx(facts.covered, rel=0.05)  # areas against samples, and boxes cut by the frame
+    finally:
+        _engine.use_isa(was)
+
+
+def test_stages_say_what_was_chosen():
+    vertices, triangles = boxes(8, 80, 4000, 4000)
+    plan = tl.plan(np.rint(vertices), triangles.astype(np.int64), (400, 200))
+    assert [one.name for one in plan.stages] == [
+        "input", "transform", "clip", "snap", "arithmetic", "cull", "method", "depth", "sampling", "shade", "threads",
+        "memory",
+    ]  # fmt: skip
+    assert stage(plan, "input").choice.endswith("indices made int32, checked on the way")
+    assert stage(plan, "depth").choice == "no test, ids alone"
+    assert any("0 sub-pixel bits" in text for text in stage(plan, "snap").rejected)
+    assert stage(plan, "threads").choice == "1, the caller's own"
+
+
+@pytest.mark.parametrize(
+    ("matrix", "choice"), [(np.eye(4), "matrix in float64, no divide"), (EYE, "matrix and divide by w in float64")]
+)
+def test_transform_says_whether_it_divides(matrix, choice):
+    plan = tl.plan(*shape("cube"), SIZE, transform=matrix)
+    assert stage(plan, "transform").choice == choice
+
+
+def test_clip_counts_the_triangles_that_are_cut():
+    clip = [[-1, -1, 0, 1], [1, -1, 0, 1], [0, 1, -3, 1], [0, 0, 0, 1], [1, 0, 0, 1], [0, 1, 0, 1]]
+    plan = tl.plan(clip, [[0, 1, 2], [3, 4, 5]], SIZE)
+    assert stage(plan, "clip").choice == "1 triangle cut into 2 pieces"
+    assert stage(tl.plan(clip, [[3, 4, 5]], SIZE, near_clip=False), "clip").choice == "none"
+
+
+class Counted(KeptMemory):
+    """Memory that writes down what it is asked for."""
+
+    def __init__(self):
+        super().__init__()
+        self.bytes = {}
+
+    def empty(self, name, shape, dtype):
+        self.bytes[name] = max(self.bytes.get(name, 0), int(np.prod(shape)) * np.dtype(dtype).itemsize)
+        return super().empty(name, shape, dtype)
+
+    def constant(self, name, n, value):
+        self.bytes[name] = 4 * n
+        return super().constant(name, n, value)
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+@pytest.mark.parametrize(("outputs", "sampling"), [
+    ("coverage", "center"), ("coverage", "msaa4"), ("coverage", "area"), ("overdraw", "center"), ("overdraw", "area"),
+    ("color", "center"), ("color", "area"), ("depth", "center"), ("overdraw", "msaa2"),
+])  # fmt: skip
+def test_memory_is_told_to_the_byte(monkeypatch, outputs, sampling, threads):
+    monkeypatch.setattr("topleft._raster.choices.MIN_TRIANGLES_TO_SHARE", 1000)
+    vertices, triangles, _ = random_triangles(900, 12, *SIZE)
+    plan = tl.plan(vertices, triangles.astype(np.int64), SIZE, outputs=outputs, sampling=sampling, threads=threads)
+    memory = Counted()
+    plan_less = replace(plan._view)
+    monkeypatch.setattr(Plan, "fitted", lambda *_: plan_less)
+    plan._run(memory)
+    assert sum(memory.bytes.values()) == sum(plan.scratch_bytes.values()) + sum(plan.result_bytes.values())
+    assert set(plan.scratch_bytes) <= set(memory.bytes)
+
+
+@pytest.mark.parametrize("dtype", [np.int32, np.int64])
+def test_verbs_draw_the_same_with_a_plan(dtype):
+    vertices, triangles, colors = random_triangles(500, 20, *SIZE)
+    triangles = triangles.astype(dtype)
+    plan = tl.plan(vertices, triangles, SIZE)
+    moved = vertices + [3.5, 0, 0]
+    assert (tl.coverage(moved, triangles, SIZE, plan=plan) == tl.coverage(moved, triangles, SIZE)).all()
+    assert (tl.overdraw(moved, triangles, SIZE, plan=plan) == tl.overdraw(moved, triangles, SIZE)).all()
+    assert (tl.wireframe(moved, triangles, SIZE, plan=plan) == tl.wireframe(moved, triangles, SIZE)).all()
+    filled = [tl.fill(moved, triangles, colors, SIZE, plan=one) for one in (plan, None)]
+    assert (filled[0] == filled[1]).all()
+    drawn = [tl.rasterize(moved, triangles, SIZE, plan=one) for one in (plan, None)]
+    assert (drawn[0].triangle == drawn[1].triangle).all()
+    assert (drawn[0].depth == drawn[1].depth).all()
+    kept = tl.Rasterizer(SIZE).rasterize(moved, triangles, plan=plan)
+    assert (kept.triangle == drawn[1].triangle).all()
+
+
+def test_plan_keeps_its_triangles():
+    vertices, triangles = boxes(8, 9)
+    plan = tl.plan(vertices, triangles, SIZE)
+    first = tl.rasterize(vertices, triangles, SIZE, plan=plan).triangle
+    triangles[:] = 10**9
+    assert (tl.rasterize(vertices, triangles, SIZE, plan=plan).triangle == first).all()
+
+
+def test_plan_takes_equal_triangles():
+    vertices, triangles = boxes(8, 9)
+    plan = tl.plan(vertices, triangles, SIZE)
+    assert tl.coverage(vertices, triangles.tolist(), SIZE, plan=plan).any()
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"size": (320, 201)}, r"plan is for size=\(320, 200\), got \(320, 201\): make another with topleft.plan"),
+        ({"subpixel_bits": 4}, "plan is for subpixel_bits=8, got 4"),
+        ({"sampling": "msaa4"}, "plan is for sampling=center, got msaa4"),
+        ({"method": "edge"}, "plan is for method=auto, got edge"),
+        ({"cull": "back"}, "plan is for cull=none, got back"),
+        ({"method": "lerp_scanline"}, "method 'lerp_scanline' has no plan"),
+        ({"vertices": np.zeros((7, 2))}, "plan is for 6 vertices, got 7"),
+        ({"triangles": [[0, 1, 2]]}, "plan is for 2 triangles, got 1"),
+        ({"triangles": [[0, 1, 2], [3, 5, 4]]}, r"plan is for other triangles: row 1 was \[3, 4, 5\], got \[3, 5, 4\]"),
+    ],
+)
+def test_plan_that_does_not_fit_is_refused(changed, message):
+    vertices, triangles = boxes(8, 9)
+    plan = tl.plan(vertices, triangles, SIZE)
+    arguments = {"vertices": vertices, "triangles": triangles, "size": SIZE} | changed
+    with pytest.raises(ValueError, match=message):
+        tl.coverage(plan=plan, **arguments)
+
+
+def test_plan_of_another_type_is_refused():
+    with pytest.raises(TypeError, match="plan must be a Plan or None, got dict"):
+        tl.coverage(*boxes(8), SIZE, plan={})
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "message"),
+    [
+        ({"outputs": "colour"}, ValueError, "outputs must be some of 'coverage', .*, got 'colour'"),
+        ({"outputs": ()}, ValueError, r"outputs must be some of .*, got \(\)"),
+        ({"outputs": ("color", "depth")}, ValueError, "outputs must come from one verb, got fill and rasterize"),
+        ({"sampling": "area"}, ValueError, "sampling 'area' gives no ids: outputs must be 'coverage' or 'overdraw'"),
+        ({"method": "lerp_scanline"}, ValueError, "method 'lerp_scanline' has no plan"),
+        ({"depth_test": "lest"}, ValueError, "depth_test must be one of 'less', 'greater', got 'lest'"),
+        ({"plan": 1}, TypeError, "plan takes no plan="),
+    ],
+)
+def test_plan_refuses_what_no_verb_does(options, error, message):
+    with pytest.raises(error, match=message):
+        tl.plan(*boxes(8), SIZE, **options)
+
+
+def test_plan_checks_indices():
+    with pytest.raises(IndexError, match=r"triangles must hold indices in \[0, 3\)"):
+        tl.plan(boxes(8)[0], [[0, 1, 3]], SIZE)
+
+
+@pytest.mark.parametrize(("size", "triangles"), [((0, 5), [[0, 1, 2]]), (SIZE, np.empty((0, 3), np.int32))])
+@pytest.mark.parametrize("outputs", ["coverage", "color", "depth"])
+def test_plan_of_nothing(size, triangles, outputs):
+    plan = tl.plan(boxes(8)[0], triangles, size, outputs=outputs).measure(1)
+    assert plan.explain().startswith(plan.verb)
+
+
+@pytest.mark.parametrize("sampling", ["center", "msaa4", "area"])
+@pytest.mark.parametrize("outputs", ["coverage", "overdraw", "color", ("triangle", "interpolate")])
+def test_measured_times_stand_beside_estimates(outputs, sampling):
+    vertices, triangles, _ = random_triangles(500, 20, *SIZE)
+    if sampling == "area" and "triangle" in outputs:
+        sampling = "msaa2"
+    plan = tl.plan(vertices, triangles, SIZE, outputs=outputs, sampling=sampling)
+    assert plan.to_dict()["measured_ms"] is None
+    told = plan.measure(2).to_dict()
+    measured = {one["name"] for one in told["stages"] if one["measured_ms"] is not None}
+    assert {"input", "snap", "method"} <= measured
+    assert told["measured_ms"] == pytest.approx(sum(plan.measured_ms.values()))
+    assert json.loads(json.dumps(told)) == told
+
+
+def test_a_verb_with_a_plan_notes_its_times():
+    vertices, triangles, _ = random_triangles(500, 20, *SIZE)
+    plan = tl.plan(vertices, triangles, SIZE)
+    tl.rasterize(vertices, triangles, SIZE, plan=plan)
+    assert list(plan.measured_ms) == ["input", "vertices", "clip", "draw"]
+
+
+def test_explain_is_a_table():
+    plan = tl.plan(*boxes(8, 9), SIZE)
+    lines = plan.explain().splitlines()
+    assert lines[0] == "rasterize -> triangle, depth: 320x200 pixels, 2 triangles, 6 vertices, 1 thread"
+    assert lines[2].split() == ["stage", "choice", "estimated", "measured"]
+    assert max(map(len, lines)) <= 110
+    for one in plan.stages:
+        assert any(line.startswith(one.name) for line in lines)
+
+
+def test_repr_is_short_and_html_is_escaped():
+    plan = tl.plan(*boxes(8, 9), SIZE)
+    assert repr(plan).startswith("<Plan: rasterize 320x200, 2 triangles, 1 thread, about ")
+    assert plan._repr_html_().startswith("<table><caption>rasterize -&gt; triangle, depth")
+
+
+def test_plan_of_a_mesh_counts_its_clusters():
+    mesh = tl.Mesh(*tl.scenes.blob(60_000))
+    near = tl.Camera.look_at((0, 0, 2.5), fov_y_deg=15)
+    plan = tl.plan(mesh, near, (320, 240), threads=1)
+    row, n = stage(plan, "clusters"), len(mesh.clusters)
+    drawn, whole = (int(number.replace(",", "")) for number in re.findall(r"[0-9][0-9,]*", row.choice)[:2])
+    left_out = [int(number) for number in re.findall(r"([0-9]+) (?:outside|turned|hidden)", row.why)]
+    assert whole == n == drawn + sum(left_out)
+    assert len(left_out) == 2
+    assert 0 < drawn < n / 2
+    assert plan.scratch_bytes["clusters"] > mesh.clusters.n_bytes > 0
+
+
+@pytest.mark.parametrize(
+    ("n_triangles", "options", "why"),
+    [
+        (500, {}, "done before sorting"),
+        (60_000, {"sampling": "msaa4"}, "several samples"),
+        (60_000, {"depth_test": None}, "order of the triangles"),
+        (60_000, {"cull": "back"}, "most of the mesh shows"),
+        (60_000, {"outputs": "coverage"}, "arrays, which may change"),
+    ],
+)
+def test_plan_of_a_mesh_tells_why_it_is_drawn_whole(n_triangles, options, why):
+    mesh = tl.Mesh(*tl.scenes.blob(n_triangles))
+    row = stage(tl.plan(mesh, tl.Camera.framing(mesh), (320, 240), **options), "clusters")
+    assert (row.choice, why in row.why) == ("none", True)
+
+
+def test_plan_of_a_mesh_draws_its_clusters_and_no_other_vertices():
+    mesh = tl.Mesh(*tl.scenes.blob(130_000))
+    camera = tl.Camera.framing(mesh)
+    plan = tl.plan(mesh, camera, (320, 240))
+    matrix = camera.clip_from_world((320, 240))
+    assert plan.find_clusters(mesh.vertices) is mesh.clusters
+    assert plan.find_clusters(mesh.vertices * 2) is None
+    for vertices in (mesh.vertices, mesh.vertices * 0.7):
+        expected = tl.rasterize(vertices, mesh.triangles, (320, 240), transform=matrix)
+        got = tl.rasterize(vertices, mesh.triangles, (320, 240), transform=matrix, plan=plan)
+        assert_same(got.triangle, expected.triangle)
+        assert_same(got.depth, expected.depth)
+    assert plan.measured_ms["draw"] > 0
+    frags = tl.rasterize_mesh(mesh, camera, (320, 240), plan=plan)
+    assert_same(frags.triangle, tl.rasterize_mesh(mesh, camera, (320, 240)).triangle)
+
+
+def test_plan_is_frozen():
+    with pytest.raises(AttributeError, match="cannot assign to field 'verb'"):
+        tl.plan(*boxes(8), SIZE).verb = "fill"
+
+
+def test_costs_of_the_cache_come_first(tmp_path):
+    own = costs.load_costs()
+    changed = costs.Costs(**{**vars_of(own), "machine": "mine"})
+    path = costs.save_costs(changed)
+    assert path == tmp_path / "topleft" / "costs.json"
+    assert [file.name for file in path.parent.iterdir()] == ["costs.json"]
+    assert costs.load_costs().machine == "mine"
+    assert "mine" in tl.plan(*boxes(8), SIZE).costs
+
+
+@pytest.mark.parametrize("text", ["", "{}", "[1]", '{"machine": 1}'])
+def test_costs_that_cannot_be_read_are_passed_over(text):
+    shipped = costs.load_costs()
+    costs.cache_file().parent.mkdir()
+    costs.cache_file().write_text(text)
+    assert costs.load_costs() == shipped
+
+
+def vars_of(own):
+    return {name: getattr(own, name) for name in own.__dataclass_fields__}
+
+
+def test_calibrate_measures_all_that_is_estimated_from():
+    from topleft._plan.calibrate import calibrate
+
+    own, shipped = calibrate(n_rounds=1), costs.load_costs()
+    for name in ("call", "vertex", "draw", "other"):
+        assert getattr(own, name).keys() == getattr(shipped, name).keys()
+    assert all(ns >= 0 for group in own.draw.values() for ns in group.values())
+    assert 1 <= own.parallel <= 2
+    assert own.residual["median"] >= 1
+
+
+def test_cli_explains(capsys):
+    from topleft import cli
+
+    assert cli.main(["explain", "torus", "--size", "64x48", "--measure"]) == 0
+    assert capsys.readouterr().out.startswith("rasterize -> triangle, depth: 64x48 pixels")
+    assert cli.main(["explain", "cube", "--verb", "fill", "--json", "--ortho"]) == 0
+    assert json.loads(capsys.readouterr().out)["verb"] == "fill"
+
+
+def test_cli_calibrates(capsys, monkeypatch, tmp_path):
+    from topleft import cli
+    from topleft._plan import calibrate
+
+    monkeypatch.setattr(calibrate, "calibrate", costs.load_costs)
+    assert cli.main(["calibrate"]) == 0
+    assert capsys.readouterr().out.startswith(str(tmp_path / "topleft" / "costs.json"))
+
+
+def test_page_has_a_plan_of_each_scene():
+    from benchmarks.choices import planner_page
+
+    text = planner_page.PAGE.read_text(encoding="utf-8")
+    assert text.startswith(planner_page.HEAD)
+    for title, arguments, options in planner_page.scenes():
+        section = text.partition(f"\n## {title}\n")[2].partition("\n## ")[0]
+        found = tl.plan(*arguments, **options)
+        assert found.explain().splitlines()[0] in section
+        words = " ".join(section.split())
+        for name in ("transform", "clip", "snap", "depth"):
+            assert " ".join(stage(found, name).why.split()) in words

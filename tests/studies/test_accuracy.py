@@ -1,0 +1,197 @@
+"""Time against error: the exact pictures that errors are counted with, tiny runs of the commands, the page."""
+
+from __future__ import annotations
+
+import json
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from benchmarks import cli
+from benchmarks.accuracy import study as accuracy
+from benchmarks.accuracy.filling import samplings
+from benchmarks.accuracy.options import Options
+from benchmarks.accuracy.stability import CHANGES, count_flips, touch
+from benchmarks.exact.area import draw_area
+from benchmarks.exact.unsnapped import draw_unsnapped, edge_sign, meets_pixel
+from benchmarks.scenes.families import FAMILIES, Entry, entries, in_cells
+
+import topleft as tl
+from topleft import scenes
+from topleft.methods import reference, reference_area
+
+SIZE = (12, 11)
+METHODS = ["auto", "row_crossing/cull-front", "float_barycentric"]
+CHARTS = [f"accuracy-{name}" for name in ("coverage", "antialiasing", "depth")]
+CHARTS += [f"speed-{name}" for name in ("sizes", "scaling", "tutorial")]
+
+
+def random_scene(bits, seed):
+    """Triangles on a grid of 2**-bits px, degenerate ones among them: a snap to these bits changes nothing."""
+    rng = np.random.default_rng(seed)
+    vertices = np.rint(rng.uniform(-3, 15, (9, 2)) * 2**bits) / 2**bits
+    return vertices, rng.integers(0, 9, (6, 3)).astype(np.int32)
+
+
+@pytest.mark.parametrize("bits", [0, 1, 4, 8])
+@pytest.mark.parametrize("seed", range(5))
+def test_exact_picture_on_the_grid_is_that_of_the_reference(bits, seed):
+    vertices, triangles = random_scene(bits, seed)
+    ids, count = np.full(SIZE[::-1], -1), np.zeros(SIZE[::-1], int)
+    for fragment in reference.fragments(vertices, triangles, SIZE, subpixel_bits=bits):
+        count[fragment.row, fragment.column] += 1
+        ids[fragment.row, fragment.column] = fragment.piece.triangle
+    exact = draw_unsnapped(vertices, triangles, SIZE)
+    assert exact.count.tolist() == count.tolist()
+    assert exact.triangle.tolist() == ids.tolist()
+
+
+@pytest.mark.parametrize("bits", [0, 1, 8])
+@pytest.mark.parametrize("seed", range(3))
+def test_exact_area_on_the_grid_is_that_of_the_reference(bits, seed):
+    vertices, triangles = random_scene(bits, seed)
+    expected = reference_area.area(vertices, triangles, SIZE, subpixel_bits=bits).astype(float)
+    assert np.abs(draw_area(vertices, triangles, SIZE) - expected).max() < 1e-9  # what exact/area.py promises
+
+
+def test_edge_sign_last_bit_decides():
+    p, q = np.array([[0.1, 0.1]]), np.array([[1000.3, 1000.3]])
+    for nudge, sign in ((-np.inf, -1), (0.1, 0), (np.inf, 1)):
+        s = np.array([[0.1, np.nextafter(0.1, nudge)]])
+        assert edge_sign(p, q, s).tolist() == [sign]
+
+
+def test_exact_picture_a_vertex_one_ulp_beyond_a_centre_covers_it():
+    triangles = np.array([[0, 1, 2]], np.int32)
+    for x, is_covered in ((2.5, False), (np.nextafter(2.5, 3), True)):  # the right corner is open
+        vertices = np.array([[0.0, 0.0], [x, 1.5], [0.0, 3.0]])
+        assert draw_unsnapped(vertices, triangles, (4, 4)).count[1, 2] == is_covered
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_meets_pixel_agrees_with_a_segment_cut_by_fractions(seed):
+    p, q = np.random.default_rng(seed).integers(-8, 25, (2, 2)) / 8
+    row, column = np.divmod(np.arange(9), 3)
+    expected = [clipped_segment_is_left(p, q, j, i) for i, j in zip(row.tolist(), column.tolist(), strict=True)]
+    assert meets_pixel(np.tile(p, (9, 1)), np.tile(q, (9, 1)), column, row).tolist() == expected
+
+
+def clipped_segment_is_left(p, q, column, row):
+    """Whether part of p to q lies in the square, by Liang and Barsky's cut."""
+    first, last = Fraction(0), Fraction(1)
+    for start, end, low in zip(map(Fraction, p.tolist()), map(Fraction, q.tolist()), (column, row), strict=True):
+        if start == end:
+            if not low <= start <= low + 1:
+                return False
+            continue
+        cuts = sorted([(low - start) / (end - start), (low + 1 - start) / (end - start)])
+        first, last = max(first, cuts[0]), min(last, cuts[1])
+    return first <= last
+
+
+def test_exact_picture_of_a_mesh_covers_each_pixel_once():
+    exact = draw_unsnapped(*scenes.planar_mesh(200, 64, 48), (64, 48))
+    assert (exact.count == 1).all()
+    assert 0 < exact.is_edge.sum() < exact.is_edge.size
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+def test_family_in_cells_no_triangle_meets_another(name):
+    vertices, triangles = in_cells(FAMILIES[name], 1, 700)
+    assert draw_unsnapped(vertices, triangles, (700, 700)).count.max() == 1
+
+
+def test_entries_every_method_that_fills_at_every_precision():
+    found = entries()
+    assert {entry.method for entry in found if entry.bits is None} >= {"lerp_scanline", "float_barycentric/float64"}
+    assert [entry.precision for entry in found if entry.method == "auto"] == ["0", "4", "8", "12", "16"]
+    assert Entry("point_in_triangle").precision == "whole px"
+    assert not any("wireframe" in entry.method for entry in found)
+
+
+@pytest.mark.parametrize("method", ["row_crossing/cull-back", "row_crossing/cull-front"])
+def test_entry_orient_turns_triangles_the_way_the_method_draws(method):
+    entry = Entry(method)
+    for order in ([0, 1, 2], [0, 2, 1]):
+        scene = np.array([[0.0, 0.0], [9.0, 0.0], [0.0, 9.0]]), np.array([order], np.int32)
+        assert tl.coverage(*entry.orient(scene), SIZE, method=method).any()
+
+
+@pytest.mark.parametrize("change", [change.name for change in CHANGES])
+def test_touch_changes_little_and_keeps_the_triangles(change):
+    vertices, triangles = scenes.planar_mesh(20, 64, 64)
+    touched = touch(change, (vertices, triangles), 64)
+    assert np.abs(touched.scene[0] - vertices).max() <= 1
+    assert (touched.scene[1] == triangles[touched.ids]).all()
+    assert (change == "reorder") == bool((touched.scene[0] == vertices).all())
+
+
+def test_count_flips_shifted_picture_compares_what_both_show():
+    before = np.arange(12, dtype=np.int32).reshape(3, 4)
+    after = np.roll(before, (1, 1), (0, 1))
+    assert count_flips(before, after, 1) == 0
+    assert count_flips(before, after, 0) == 12
+
+
+@pytest.fixture(scope="module")
+def tiny():
+    """A tiny run."""
+    options = Options(
+        METHODS, ["pillow", "broken"], rounds=1, seconds=0, edge_px=1, frame_px=320, scale=0.001, max_threads=2
+    )
+    return accuracy.run_accuracy(options)
+
+
+def test_accuracy_record_has_a_row_for_each_method_family_and_precision(tiny):
+    assert json.loads(json.dumps(tiny)) == tiny
+    assert len(tiny["coverage"]) == len(FAMILIES) * 7  # five precisions of auto, one of each of the others
+    assert all(row["ns_triangle"] > 0 for row in tiny["coverage"])
+    assert {row["sampling"] for row in tiny["antialiasing"] if "sampling" in row} == set(samplings())
+
+
+def test_accuracy_more_bits_are_less_wrong(tiny):
+    wrong = [row["wrong_px"] for row in tiny["coverage"] if (row["family"], row["method"]) == ("small", "auto")]
+    assert wrong[0] > wrong[1] > wrong[2] >= wrong[4]
+
+
+def test_stability_engine_is_watertight_and_takes_any_order(tiny):
+    rows = [row for row in tiny["stability"] if row["method"] in ("exact", "auto")]
+    faults = ("missed", "overdrawn", "far_missed", "far_overdrawn", "pixel", "reorder")
+    assert [row[fault] for row in rows for fault in faults] == [0] * 36
+
+
+def test_stability_inclusive_spans_overdraw(tiny):
+    (row,) = (row for row in tiny["stability"] if row["method"].startswith("row_crossing"))
+    assert row["overdrawn"] > 0
+    assert row["reorder"] > 0
+
+
+def test_accuracy_command_writes_what_report_prints(tmp_path, capsys):
+    target = tmp_path / "record.json"
+    little = ["--repeats", "1", "--seconds", "0", "--edge-pixels", "1", "--frame", "310", "--scale", "0.001",
+              "--peer", "--part", "slivers", "sizes"]  # fmt: skip
+    assert cli.main(["accuracy", *little, "--method", "lerp_scanline", "-o", str(target)]) == 0
+    printed = capsys.readouterr().out
+    assert "`lerp_scanline`" in printed
+    assert cli.main(["report", str(target)]) == 0
+    assert capsys.readouterr().out == printed
+
+
+def test_accuracy_command_unknown_method_is_refused(capsys):
+    assert cli.main(["accuracy", "--method", "nothing"]) == 2
+    assert "method must be one of" in capsys.readouterr().err
+
+
+def test_charts_command_draws_svg(tiny, tmp_path, capsys):
+    pytest.importorskip("matplotlib")
+    (tmp_path / "tiny.json").write_text(json.dumps(tiny))
+    assert cli.main(["charts", str(tmp_path / "tiny.json"), "-o", str(tmp_path / "images")]) == 0
+    names = [f"{name}.svg" for name in CHARTS]
+    assert sorted(path.name for path in (tmp_path / "images").iterdir()) == sorted(names)
+
+
+def test_pareto_front_keeps_what_nothing_beats():
+    pytest.importorskip("matplotlib")
+    from benchmarks.accuracy.charts import pareto_front
+
+    assert list(pareto_front([(3, 1), (1, 5), (2, 6), (4, 1), (2, 4)])) == [(1, 5), (2, 4), (3, 1)]

@@ -1,0 +1,264 @@
+"""The atlas: its exact pictures, its scenes, its counts against the record, shrinking, the page."""
+
+from __future__ import annotations
+
+import itertools
+import json
+
+import numpy as np
+import pytest
+from benchmarks import cli
+from benchmarks.atlas import measure as atlas
+from benchmarks.atlas import shrink as atlas_shrink
+from benchmarks.atlas.depth import DEPTH_FAMILIES, PRODUCTION, DepthScene, Picture, draw, judge_depth
+from benchmarks.atlas.families import FAMILIES
+from benchmarks.exact.clip import draw_clip, pieces_picture
+from benchmarks.exact.integers import draw_points, snapped_points, true_points
+from benchmarks.exact.unsnapped import draw_unsnapped
+from benchmarks.harness.machine import IMAGES, PAGES, RECORDS, ROOT
+
+from topleft.failure_scenes import FAILURE_SCENES, picture
+from topleft.methods import CLASSICS, reference
+
+SIZE = (12, 11)
+EVERY_FAMILY = pytest.mark.parametrize("name", [name for name in FAMILIES if name != "dense"])
+
+
+def random_scene(bits, seed):
+    """Triangles on a grid of 2**-bits px, degenerate ones among them."""
+    rng = np.random.default_rng(seed)
+    vertices = np.rint(rng.uniform(-3, 15, (9, 2)) * 2.0**bits) / 2.0**bits
+    return vertices, rng.integers(0, 9, (6, 3)).astype(np.int32)
+
+
+@pytest.fixture(scope="module")
+def record():
+    """The record that is kept."""
+    return json.loads((RECORDS / "atlas.json").read_text())
+
+
+# ---- exact pictures -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("bits", [0, 1, 8, 30])
+def test_exact_integers_are_those_of_fractions(bits):
+    for seed in range(4):
+        vertices, triangles = random_scene(bits, seed)
+        exact, got = draw_unsnapped(vertices, triangles, SIZE), draw_points(true_points(vertices), triangles, SIZE)
+        assert got.triangle.tolist() == exact.triangle.tolist()
+        assert got.count.tolist() == exact.count.tolist()
+        assert got.is_edge.tolist() == exact.is_edge.tolist()
+
+
+@pytest.mark.parametrize("bits", [0, 8])
+def test_exact_integers_after_a_snap_far_away_are_those_of_the_reference(bits):
+    vertices, triangles = random_scene(3, 1)
+    vertices = vertices + 2.0**45
+    origin = (2**45, 2**45)
+    expected = reference.overdraw(vertices, triangles, SIZE, origin=origin, subpixel_bits=bits)
+    assert draw_points(snapped_points(vertices, str(bits)), triangles, SIZE, origin).count.tolist() == expected.tolist()
+
+
+def test_exact_integers_bottom_right_is_top_left_turned_half_round():
+    vertices, triangles = random_scene(1, 2)
+    turned = draw_points(true_points(np.array(SIZE) - vertices), triangles, SIZE).count[::-1, ::-1]
+    assert draw_points(true_points(vertices), triangles, SIZE, rule="bottom-right").count.tolist() == turned.tolist()
+
+
+def test_snapped_points_by_kind():
+    vertices = np.array([[-1.75, 2.5], [1 / 3, 3.0]])
+    assert snapped_points(vertices, "px").xy == [(-1, 5), (1, 7)]
+    assert snapped_points(vertices, "0").xy == [(-4, 4), (0, 6)]
+    assert snapped_points(vertices, "8").xy == [(-896, 1280), (170, 1536)]
+    assert snapped_points(vertices, "float32") == true_points(vertices.astype(np.float32))
+
+
+def test_exact_clip_of_what_lies_before_the_near_plane_is_that_of_pixels():
+    vertices, triangles = random_scene(4, 3)
+    ndc = vertices / (np.array(SIZE) / 2) * [1, -1] + [-1, 1]
+    w = np.array([0.5, 1, 2, 4, 8, 1, 2, 4, 0.25])[:, None]
+    clip = np.concatenate([ndc * w, 0 * w, w], axis=-1)
+    vertices = (ndc * [1, -1] + 1) * (np.array(SIZE) / 2)  # rounded as the corners of the picture are
+    ids, count = draw_clip(clip, triangles, SIZE)
+    exact = draw_unsnapped(vertices, triangles, SIZE)
+    assert (count != exact.count).sum() + (ids != exact.triangle).sum() == 0
+
+
+def test_exact_clip_near_plane_cuts_a_floor():
+    floor = np.array([[-9.0, -1, -5, -4], [9, -1, -5, -4], [0, -1, 7, 9]])  # from behind the eye to w = 9
+    ids, count = draw_clip(floor, np.array([[0, 1, 2]]), (8, 8))
+    snapped = pieces_picture(floor, np.array([[0, 1, 2]]), (8, 8), 16)
+    assert count.sum() > 0
+    assert not count[:4].any()  # below the horizon
+    assert count.tolist() == snapped.count.tolist()
+    assert ids.tolist() == snapped.triangle.tolist()
+
+
+def test_judge_depth_sees_a_depth_that_is_off_and_a_triangle_that_hides_a_nearer_one():
+    square = np.array([[-9.0, -9], [99, -9], [-9, 99]])
+    vertices = np.concatenate([np.c_[square, [0.25, 0.5, 0.5]], np.c_[square, [0.125, 0.25, 0.5]]])
+    scene = DepthScene(vertices, np.array([[0, 1, 2], [3, 4, 5]], np.int32), (4, 4))
+    drawn = draw(scene, "auto", 8)
+    assert judge_depth(scene, drawn, 8)[:4] == (0, 0, 0, 0)
+    depth = drawn.depth.copy()
+    depth[1, 2] = np.nextafter(depth[1, 2], np.float32(1), dtype=np.float32)
+    depth[1, 2] = np.nextafter(depth[1, 2], np.float32(1), dtype=np.float32)
+    assert judge_depth(scene, Picture(drawn.ids, depth, drawn.counts), 8)[:4] == (0, 0, 0, 1)
+    hidden = Picture(drawn.ids * 0, drawn.depth, drawn.counts)
+    assert judge_depth(scene, hidden, 8)[:4] == (16, 0, 0, 16)
+
+
+# ---- scenes and counts ----------------------------------------------------------------------------------------------
+
+
+@EVERY_FAMILY
+def test_family_first_and_last_scene_cover_the_frame_once(name):
+    family = FAMILIES[name]
+    for pick in (0, -1):
+        scene = family.make(*(list(axis.values.values())[pick] for axis in family.axes), 0)
+        exact = draw_points(true_points(scene.vertices), scene.triangles, scene.size, scene.origin)
+        assert (exact.count == 1).all()
+        assert exact.is_edge.any()
+
+
+def test_entries_every_method_that_fills():
+    assert {entry.method for entry in atlas.entries()} == {"auto", "edge", "scanline", *CLASSICS} - {
+        "bresenham_scanline/wireframe"
+    }
+    assert {atlas.Entry(name, name).snap for name in ("lerp_scanline", "float_barycentric", "zigzag")} == {
+        "px", "float32", "8"
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(("family", "methods"), [
+    ("layers", []), ("edge", ["auto", "float_barycentric", "row_crossing/cull-back"]), ("eye", []),
+])  # fmt: skip
+def test_atlas_of_a_family_is_that_of_the_record(record, family, methods):
+    again = json.loads(json.dumps(atlas.run_atlas(names=[family], methods=methods)))
+    assert again["families"] == [facts for facts in record["families"] if facts["name"] == family]
+    rows = {row["entry"]: row for row in record["maps"] if row["family"] == family}
+    assert again["maps"] == [rows[row["entry"]] for row in again["maps"]]
+    assert len(again["maps"]) == (len(methods) or len(rows))
+
+
+def test_atlas_record_has_a_map_of_every_entry_and_family(record):
+    found = {(row["family"], row["entry"]) for row in record["maps"]}
+    names = [entry.name for entry in atlas.entries()]
+    wished = {*itertools.product(FAMILIES, names), *itertools.product(DEPTH_FAMILIES, PRODUCTION)}
+    assert found == wished | {("layers", entry.name) for entry in atlas.SAMPLED}
+
+
+def test_atlas_production_methods_are_exact_and_leave_no_gap(record):
+    rows = [row for row in record["maps"] if row["entry"] in [*PRODUCTION, *(e.name for e in atlas.SAMPLED)]]
+    assert sum(n for row in rows for n in row["inexact"] if n) == 0
+    assert sum(n for row in rows if row["entry"] != "auto, 0 bits" for n in row["gaps"] if n) == 0
+
+
+def test_atlas_exact_claims_hold(record):
+    exact = [name for name, method in CLASSICS.items()
+             if method.claims.exact and not method.claims.overdraws_shared_edges]  # fmt: skip
+    counts = [n for row in record["maps"] if row["entry"] in exact for n in row["inexact"] if n is not None]
+    assert len(counts) > 100
+    assert sum(counts) == 0
+
+
+# ---- shrinking ------------------------------------------------------------------------------------------------------
+
+
+def test_first_failures_gaps_and_overdraw_before_wrong_pixels():
+    row = {"family": "far", "entry": "lerp_scanline", "wrong": [1, 2], "gaps": [0, 1], "overdrawn": [None, 0]}
+    (found,) = atlas_shrink.first_failures({"maps": [row]})
+    assert (found.kind, found.step, found.entry.method) == ("gap", 1, "lerp_scanline")
+
+
+def test_simpler_values_have_fewer_bits():
+    assert list(atlas_shrink.simpler(-5.5, -4)) == [0, -4, -5]
+    assert list(atlas_shrink.simpler(0.0, -4)) == []
+
+
+def test_shrink_float32_edge_through_centres_is_two_triangles_on_small_numbers():
+    entry = atlas.Entry("float_barycentric", "float_barycentric")
+    kept = atlas_shrink.Shrinker(atlas_shrink.Failure("edge", 13, "overdraw", entry), 0.0)
+    small = kept.shrink(kept.start(FAMILIES["edge"]))
+    assert len(small.triangles) == 2
+    assert kept.fails(small)
+    assert np.abs(small.vertices[np.unique(small.triangles)]).max() <= 600
+    assert len(atlas_shrink.compact(small).vertices) == 4
+
+
+def test_failure_scenes_source_says_what_they_are():
+    scenes = list(FAILURE_SCENES.values())
+    path = ROOT / "src/topleft/failure_scenes.py"
+    text = path.read_text(encoding="utf-8")
+    assert atlas_shrink.with_scenes(text, scenes) == text
+    with pytest.raises(ValueError, match="the module must hold '# begin"):
+        atlas_shrink.with_scenes("nothing", scenes)
+
+
+def test_first_failures_of_the_record_each_have_their_scene(record):
+    for failure in atlas_shrink.first_failures(record):
+        kinds = {scene.kind for scene in FAILURE_SCENES.values() if atlas_shrink.has_method(scene, failure.entry)}
+        assert failure.kind in kinds
+
+
+@pytest.mark.parametrize("name", ["any-gap", "any-overdraw"])
+def test_rows_of_a_picture_are_read_back(name):
+    rows = FAILURE_SCENES[name].expected
+    assert atlas_shrink.rows_of(picture(rows)) == rows
+
+
+# ---- the page -------------------------------------------------------------------------------------------------------
+
+
+def test_atlas_page_shows_every_chart(record):
+    text = (PAGES / "atlas.md").read_text(encoding="utf-8")
+    shown = {path.stem for path in IMAGES.glob("atlas-*") if f"images/{path.name}" in text}
+    assert shown == {f"atlas-{name}" for name in (*FAMILIES, "depth", "scenes-any", "scenes-far", "scenes-shape")}
+
+
+def test_atlas_command_writes_what_report_prints(tmp_path, capsys):
+    target = tmp_path / "tiny.json"
+    assert cli.main(["atlas", "--family", "layers", "eye", "--method", "auto", "zigzag", "-o", str(target)]) == 0
+    printed = capsys.readouterr().out
+    assert "`zigzag`" in printed
+    assert cli.main(["report", str(target)]) == 0
+    assert capsys.readouterr().out == printed
+
+
+def test_atlas_command_unknown_names_are_refused(capsys):
+    assert cli.main(["atlas", "--family", "nothing"]) == 2
+    assert "--family must be some of far" in capsys.readouterr().err
+    assert cli.main(["atlas", "--method", "nothing"]) == 2
+    assert "--method must be some of auto" in capsys.readouterr().err
+
+
+def test_atlas_charts_have_a_row_a_method_and_a_number_where_it_fails(record):
+    pytest.importorskip("matplotlib")
+    from benchmarks.atlas import charts as atlas_charts
+    from matplotlib import pyplot as plt
+
+    (facts,) = (facts for facts in record["families"] if facts["name"] == "layers")
+    figure = atlas_charts.chart_family(record, facts)
+    rows = [label.get_text() for label in figure.axes[0].get_yticklabels()]
+    assert rows == [row["entry"] for row in record["maps"] if row["family"] == "layers"]
+    right = figure.axes[1].texts  # a number in each cell that is not 0
+    assert len(right) == sum(bool(n) for row in record["maps"] if row["family"] == "layers" for n in row["overdrawn"])
+    assert [atlas_charts.share_text(x) for x in (0.5, 0.042, 0.0021, 0.0002, 0.00001)] == [
+        "50", "4.2", "0.2", ".02", "<.01"
+    ]  # fmt: skip
+    plt.close(figure)
+
+
+def test_magnified_pictures_show_each_wrong_picture_once():
+    pytest.importorskip("matplotlib")
+    from benchmarks.atlas import magnified as atlas_pictures
+
+    families = {family for group in atlas_pictures.SHEETS.values() for family in group}
+    assert families >= {scene.family for scene in FAILURE_SCENES.values()}
+    for scene in FAILURE_SCENES.values():
+        found = list(atlas_pictures.triptychs(scene))
+        assert {own.rows for own in found} == {got.rows for got in scene.got}
+        assert sum(len(own.methods) for own in found) == len(scene.got)
+    inside = list(atlas_pictures.edges_in_window(FAILURE_SCENES["far-1e14-overdraw"]))
+    assert len(inside) == 4  # the fifth passes outside
+    assert all(-1 <= x <= 8 for segment in inside for point in segment for x in point)

@@ -1,0 +1,69 @@
+"""Pages of the documentation hold the figures of the records that are kept, and what does not fit is refused."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from benchmarks import cli
+from benchmarks.harness.machine import PAGES, RECORDS, ROOT
+from benchmarks.report.pages import MARKED, with_parts
+
+FILLED = {
+    "accuracy": ["accuracy.md", "speed.md"], "atlas": ["atlas.md"], "choices": ["choices.md"],
+    "pictures": ["pictures.md"], "smooth": ["performance.md"], "static": ["static.md"],
+}  # fmt: skip
+"""Pages by the record that they show."""
+
+
+def record_of(name):
+    """A record that is kept."""
+    return json.loads((RECORDS / f"{name}.json").read_text())
+
+
+@pytest.mark.parametrize(("name", "page"), [(name, page) for name, pages in FILLED.items() for page in pages])
+def test_page_tables_are_those_of_the_record(name, page):
+    text, record = (PAGES / page).read_text(encoding="utf-8"), record_of(name)
+    files = " ".join(str(path.relative_to(ROOT)) for path in (RECORDS / f"{name}.json", PAGES / page))
+    assert with_parts(text, record, cli.study_of(record).parts) == text, f"run: python -m benchmarks document {files}"
+
+
+@pytest.mark.parametrize("name", FILLED)
+def test_pages_show_every_part_once(name):
+    texts = [(PAGES / page).read_text(encoding="utf-8") for page in FILLED[name]]
+    marked = [found[1] for text in texts for found in MARKED.findall(text)]
+    assert sorted(marked) == sorted(cli.study_of(record_of(name)).parts)
+
+
+@pytest.mark.parametrize("name", FILLED)
+def test_document_and_report_commands_show_a_record(name, tmp_path, capsys):
+    page, parts = tmp_path / "page.md", cli.study_of(record_of(name)).parts
+    page.write_text("".join(f"<!-- table: {part} -->\n<!-- end -->\n" for part in parts))
+    assert cli.main(["document", str(RECORDS / f"{name}.json"), str(page)]) == 0
+    assert len(page.read_text().splitlines()) > 3 * len(parts)
+    assert cli.main(["report", str(RECORDS / f"{name}.json")]) == 0
+    assert len(capsys.readouterr().out.splitlines()) > 10
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("nothing", "the page must hold <!-- table: NAME -->"),
+        ("<!-- table: nobody -->\n<!-- end -->", "a marker must be one of facts, .*, got 'nobody'"),
+        ("<!-- table: scaling -->\n<!-- end -->", "the record must hold 'scaling' for 'scaling'"),
+    ],
+)
+def test_page_or_record_that_lacks_a_part_is_refused(text, message):
+    record = record_of("accuracy")
+    del record["scaling"]
+    with pytest.raises(ValueError, match=message):
+        with_parts(text, record, cli.study_of(record).parts)
+
+
+def test_commands_refuse_what_does_not_fit(tmp_path, capsys):
+    page = tmp_path / "page.md"
+    page.write_text("nothing")
+    assert cli.main(["document", str(RECORDS / "accuracy.json"), str(page)]) == 2
+    assert "the page must hold" in capsys.readouterr().err
+    assert cli.main(["charts", str(RECORDS / "smooth.json"), "-o", str(tmp_path)]) == 2
+    assert "there are no charts of a record of run" in capsys.readouterr().err

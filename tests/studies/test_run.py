@@ -1,0 +1,166 @@
+"""The benchmark suite: it runs, says what it left out, and tells a wrong picture from a right one. Nothing is timed."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from benchmarks import cli
+from benchmarks.exact.pictures import compare, draw_exact
+from benchmarks.harness.rounds import Options, run_cases
+from benchmarks.harness.yardstick import DEFAULT_PATTERN, Yardstick, YardstickError
+from benchmarks.peers import PEERS, load_peer, why_not
+from benchmarks.run import tables
+from benchmarks.scenes.cases import CASES, TASKS, Scene, orbit_camera
+
+import topleft as tl
+
+ISA = tl.build_info()["isa"]
+
+
+@pytest.fixture(scope="module")
+def record():
+    """One short run: topleft and a contestant that draws nothing."""
+    program = f"{sys.executable} -c \"print('n= 7 total 0.5 ms; tiny: 0.25 ms')\""
+    options = Options(
+        ["tiny"], ["broken"], [ISA], repeats=2, seconds=0.001,
+        yardsticks=[(f"tiny={program}", r"tiny: (?P<ms>[\d.]+) ms")],
+    )  # fmt: skip
+    return run_cases(options)
+
+
+def test_run_record_is_json_and_says_where_it_was_made(record):
+    assert json.loads(json.dumps(record)) == record
+    assert {"date", "machine", "commit", "versions", "options", "scenes"} <= set(record)
+    assert record["machine"]["cpu"]
+
+
+def test_run_contestants_took_turns(record):
+    (scene,) = record["scenes"]
+    assert [entry["name"] for entry in scene["runs"]] == [f"topleft {ISA}", "broken"]
+    for entry in scene["runs"]:
+        assert len(entry["turn_medians_ms"]) == 2
+        assert 0 < entry["min_ms"] <= entry["median_ms"]
+        assert entry["q1_ms"] <= entry["median_ms"] <= entry["q3_ms"]
+    assert scene["runs"][0]["isa"] == ISA
+    assert scene["runs"][0]["ratio"] == 1
+
+
+def test_run_wrong_pixels_none_of_ours_all_of_the_broken_one(record):
+    ours, broken = (entry["error"] for entry in record["scenes"][0]["runs"])
+    assert ours["wrong_px"] == 0
+    assert ours["max_depth_error"] < 2**-24
+    assert broken["wrong_px"] > 1000
+
+
+def test_run_yardstick_is_read(record):
+    (yardstick,) = record["scenes"][0]["yardsticks"]
+    assert yardstick["turns_ms"] == [0.25, 0.25]
+    assert list(yardstick["ratios_of_minima"]) == [f"topleft {ISA}"]
+
+
+def test_report_names_contestants_and_errors(record):
+    text = "\n".join(tables.lines(record))
+    assert f"| topleft {ISA} " in text
+    assert "## tiny" in text
+    assert "## Summary" in text
+
+
+def test_run_command_writes_the_record(tmp_path, capsys):
+    target = tmp_path / "record.json"
+    arguments = ["run", "--scene", "tiny-fill", "--peer", "--isa", ISA, "--repeats", "1", "--seconds", "0"]
+    assert cli.main([*arguments, "-o", str(target)]) == 0
+    assert [path.name for path in tmp_path.iterdir()] == ["record.json"]
+    printed = capsys.readouterr().out
+    assert cli.main(["report", str(target)]) == 0
+    assert capsys.readouterr().out == printed
+
+
+@pytest.mark.parametrize("words", [["--scene", "nothing"], ["--peer", "nobody"], ["--isa", "mmx"]])
+def test_run_command_unknown_name_is_refused(words, capsys):
+    assert cli.main(["run", *words]) == 2
+    assert words[1] in capsys.readouterr().err
+
+
+def test_peer_that_is_not_installed_gives_its_name(monkeypatch):
+    peer = load_peer("cairo")
+    monkeypatch.setattr(peer, "MODULE", "no_such_module")
+    assert why_not(peer, "fill", 1) == "pycairo is not installed"
+    assert why_not(peer, "visibility", 1) == "does not do visibility"
+    assert why_not(peer, "fill", 2) == "runs on one thread"
+
+
+@pytest.mark.parametrize("name", ["topleft", "broken", *PEERS])
+def test_peer_file_has_its_parts_without_the_peer(name):
+    peer = load_peer(name)
+    assert set(peer.TASKS) <= set(TASKS)
+    assert callable(peer.prepare)
+
+
+def test_contestant_that_fails_is_skipped_with_the_reason():
+    record = run_cases(Options(["tiny"], ["broken"], ["mmx"], repeats=1, seconds=0))
+    (skipped,) = record["scenes"][0]["skipped"]
+    assert skipped["name"] == "topleft mmx"
+    assert "TOPLEFT_ISA" in skipped["reason"]
+
+
+def test_exact_square_of_two_triangles_by_hand():
+    vertices = np.array([[0.5, 0.5], [2.5, 0.5], [2.5, 2.5], [0.5, 2.5]])
+    picture = draw_exact(Scene("labels", (4, 4), vertices, np.array([[0, 1, 2], [0, 2, 3]])))
+    assert picture["triangle"].tolist() == [[0, 0, -1, -1], [1, 0, -1, -1], [-1] * 4, [-1] * 4]
+
+
+def test_compare_counts_each_kind_of_wrong_pixel():
+    exact = draw_exact(CASES["tiny"].make())
+    ids, depth = exact["triangle"].copy(), exact["depth"].copy()
+    row, column = np.argwhere(ids >= 0)[0]
+    assert compare({"triangle": ids, "depth": depth}, exact).as_dict() == {"wrong_px": 0, "max_depth_error": 0}
+    depth[row, column] += 0.25
+    assert compare({"depth": depth}, exact).as_dict() == {"wrong_px": 1, "max_depth_error": 0.25}
+    ids[row, column] += 1
+    assert compare({"triangle": ids, "depth": depth}, exact).as_dict() == {"wrong_px": 1, "max_depth_error": 0}
+    assert compare({"mask": exact["mask"] ^ True}, exact).wrong_px == exact["mask"].size
+
+
+def test_orbit_camera_sees_the_origin_in_the_middle():
+    x, y, _, w = orbit_camera((64, 48)) @ [0, 0, 0, 1]
+    assert (abs(x) < 1e-12, abs(y) < 1e-12, round(w, 9)) == (True, True, 3)
+
+
+@pytest.mark.parametrize(
+    ("case", "line", "expected"),
+    [
+        ("blob-10k", "n=   10000 total   1.581 ms = 158.1 ns/tri | clear 0.538 ms", 1.581),
+        ("random-1000x400", "rand1000_400: setup+raster 12.284 ms 12284.0 ns/tri (scalar snap 0.007 ms)", 12.284),
+    ],
+)
+def test_yardstick_default_pattern_reads_its_line(case, line, expected):
+    other = "n=      7 total   9.000 ms\nrand9_9: setup+raster 8.000 ms\n"
+    assert Yardstick.parse("program", DEFAULT_PATTERN, Path(), []).read(other + line, CASES[case]) == expected
+
+
+def test_yardstick_groups_are_added_in_their_units():
+    yardstick = Yardstick.parse("large-4k=program", r"(?P<us>\d+) us, clear (?P<ms_clear>\d+) ms", Path(), [])
+    assert (yardstick.only, yardstick.command) == ("large-4k", "program")
+    assert yardstick.read("500 us, clear 2 ms", CASES["large-4k"]) == 2.5
+
+
+def test_yardstick_without_a_figure_tells():
+    with pytest.raises(YardstickError, match="no figure for blob-10k"):
+        Yardstick.parse("program", DEFAULT_PATTERN, Path(), []).read("hello", CASES["blob-10k"])
+
+
+def test_fields_that_are_timed_are_whole():
+    from benchmarks.small import field
+
+    points, triangles, values = field.mesh()
+    found = field.topleft_field(points, triangles, values)()
+    assert found.shape == field.SIZE[::-1]
+    assert np.isfinite(found).all()
+    assert len(triangles) > 200_000
+    heights = field.height_map()()
+    assert heights.shape == (400, 400)
+    assert np.isfinite(heights).all()
