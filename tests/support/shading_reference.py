@@ -213,7 +213,9 @@ def metallic_rough(base, n, viewer, lights, around, metallic, roughness):
     light = occlusion * (mirrors * mirrored + matt * (1 - mirrors) * gathered)
     for direction, color, share in lights:
         half = unit_or_zero(direction + viewer)
-        n_dot_l, n_dot_h, v_dot_h = ((a * b).sum(axis=1, keepdims=True) for a, b in ((n, direction), (n, half), (viewer, half)))
+        n_dot_l, n_dot_h, v_dot_h = (
+            (a * b).sum(axis=1, keepdims=True) for a, b in ((n, direction), (n, half), (viewer, half))
+        )
         fresnel = f0 + (1 - f0) * (1 - v_dot_h) ** 5
         d = alpha2 / (n_dot_h**2 * (alpha2 - 1) + 1) ** 2  # times pi
         from_light, from_eye = (np.sqrt(c**2 * (1 - alpha2) + alpha2) for c in (n_dot_l, n_dot_v))
@@ -262,7 +264,9 @@ def picture(
     if material.unlit:
         light = base
     elif material.is_metallic_rough:
-        metallic, roughness = (np.full((len(n), 1), 1.0 if a is None else a) for a in (material.metallic, material.roughness))
+        metallic, roughness = (
+            np.full((len(n), 1), 1.0 if a is None else a) for a in (material.metallic, material.roughness)
+        )
         if material.metallic_roughness_texture is not None:
             texels = look_up(material.metallic_roughness_texture, w, mesh)
             roughness, metallic = roughness * texels[:, 1:2], metallic * texels[:, 2:3]

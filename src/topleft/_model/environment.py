@@ -14,7 +14,6 @@ GPU Gems 3, 2007 (halvings by the density of the directions).
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from enum import StrEnum
 from functools import cached_property
 from typing import Any
 

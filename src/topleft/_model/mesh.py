@@ -15,8 +15,8 @@ import numpy.typing as npt
 
 from topleft._base.arrays import as_array, as_checked_triangles
 from topleft._model.material import Material
-from topleft._model.texture import Texture
 from topleft._model.normals import angle_weighted_normals, box_of_triangles
+from topleft._model.texture import Texture
 from topleft._raster.clusters import Clusters, box_of
 
 FloatArray = npt.NDArray[np.floating[Any]]

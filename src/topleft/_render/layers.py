@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from topleft._render.blended import is_blended
 from topleft._render.fragments import VisiblePart, meshes_of
 from topleft._render.gbuffer import GBuffer, PointKind, points_of, project
 from topleft._render.render import picture_of, render
@@ -31,7 +32,8 @@ def color(gbuffer: GBuffer) -> Array:
     if "opacity" in options:
         return render_transparent(gbuffer.subject, gbuffer.camera, gbuffer.size, **options)
     sampling = options.pop("sampling", "center")
-    if sampling == "center":
+    is_glass = is_blended(gbuffer.subject, options.get("material"), options.get("shading", "smooth"))
+    if sampling == "center" and not is_glass:
         return picture_of(gbuffer.frags, gbuffer.subject, gbuffer.camera, **options)
     options |= {"sampling": sampling, "rasterizer": gbuffer.rasterizer}
     return render(gbuffer.subject, gbuffer.camera, gbuffer.size, **options)
@@ -181,4 +183,3 @@ def draw_layers(names: str | Iterable[str], gbuffer: GBuffer) -> dict[str, Array
     # Colours first: in memory that is kept they may need other samples than the visibility buffer of all others.
     drawn = {name: LAYERS[name](gbuffer) for name in sorted(checked, key=lambda name: name != "color")}
     return {name: drawn[name] for name in checked}
-

@@ -25,7 +25,7 @@ from topleft._render.fragments import SceneFragments, VisiblePart, join, meshes_
 from topleft._shade.look import is_similarity
 from topleft._shade.shade import Shading, ShadingOptions, shade_mesh, shade_numbers, shade_samples
 
-__all__ = ["shade"]
+__all__ = ["shade", "shade_by"]
 
 U8 = npt.NDArray[np.uint8]
 
@@ -121,6 +121,11 @@ def shade(
     options = ShadingOptions.parse(
         shading, color, background, depth_range, lights, ambient, material, matcap, fog, environment, threads
     )
+    return shade_by(frags, mesh, camera, options)
+
+
+def shade_by(frags: Fragments, mesh: Mesh | Scene, camera: Camera, options: ShadingOptions) -> U8:
+    """The picture of a visibility buffer by checked options."""
     if options.mode in (Shading.IDS, Shading.DEPTH):
         return shade_numbers(frags, camera, options)
 

@@ -95,14 +95,14 @@ class ShadingOptions:
         shading: str,
         color: Color,
         background: Color,
-        depth_range: tuple[float, float] | None,
-        lights: Sequence[Light] | None,
-        ambient: float | None,
-        material: Material | None,
-        matcap: Texture | None,
-        fog: Fog | None,
-        environment: Environment | None,
-        threads: int | None,
+        depth_range: tuple[float, float] | None = None,
+        lights: Sequence[Light] | None = None,
+        ambient: float | None = None,
+        material: Material | None = None,
+        matcap: Texture | None = None,
+        fog: Fog | None = None,
+        environment: Environment | None = None,
+        threads: int | None = None,
     ) -> ShadingOptions:
         """Check the options of a call."""
         mode = parse(Shading, "shading", shading)
@@ -251,9 +251,7 @@ def shade_samples(frags: Fragments, shade_one: Callable[[Fragments], U8], backgr
     return picture
 
 
-def shade_normals(
-    frags: Fragments, mesh: Mesh, camera: Camera, turn: F64, *, threads: int | None = None
-) -> F32:
+def shade_normals(frags: Fragments, mesh: Mesh, camera: Camera, turn: F64, *, threads: int | None = None) -> F32:
     """Unit normals (H, W, 3) float32 of the visible pixels, on the side that is seen, 0 where nothing is.
 
     Parameters
@@ -287,9 +285,7 @@ def shade_normals(
     return out
 
 
-def _check_types(
-    lights: Sequence[Light], material: object, matcap: object, fog: object, environment: object
-) -> None:
+def _check_types(lights: Sequence[Light], material: object, matcap: object, fog: object, environment: object) -> None:
     for light in lights:
         if not isinstance(light, Light):
             raise TypeError(f"lights must be of Light, got {type(light).__name__}")
