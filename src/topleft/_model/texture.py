@@ -124,7 +124,7 @@ class Texture:
             keep(self, "transform", matrix)
 
     @cached_property
-    def engine(self) -> _engine.Texture:
+    def engine(self) -> _engine.Mipmap:
         """What the kernels read; made when it is first needed."""
         height, width = self.image.shape[:2]
         rows = level_rows(width, height, has_halves=self.filter is Filter.TRILINEAR)
@@ -133,10 +133,10 @@ class Texture:
         filter_code = FILTER_CODES[Filter(self.filter)]
         table = np.array(rows, dtype=np.int32)
         if self.transform is None:
-            return _engine.Texture(texels, table, filter_code, wrap_u, wrap_v, self.uv_set)
+            return _engine.Mipmap(texels, table, filter_code, wrap_u, wrap_v, self.uv_set)
         (a, b, _), (c, d, _) = rows_of_transform = self.transform.tolist()
         hand = -1.0 if a * d < b * c else 1.0
-        return _engine.Texture(
+        return _engine.Mipmap(
             texels, table, filter_code, wrap_u, wrap_v, self.uv_set, rows_of_transform, (d * hand, -c * hand), hand
         )
 

@@ -26,7 +26,7 @@ from topleft._camera.camera import Camera
 from topleft._model.material import AlphaMode, Material
 from topleft._model.mesh import Mesh, has_opacity, is_laid
 from topleft._model.scene import Instance, Scene
-from topleft._raster.peel import peel_scenes
+from topleft._raster.peel import peel_meshes
 from topleft._raster.rasterize import refuse_many
 from topleft._raster.view import View
 from topleft._render.fragments import SceneFragments, meshes_of, scene_of
@@ -167,10 +167,10 @@ class Glass:
 
     def peel(self, frags: SceneFragments, k: int) -> tuple[npt.NDArray[np.int32], F32]:
         """The layers of a sample that nothing opaque hides, planes (K, H, W) of ids and depths."""
-        seen = [replace(one, scene=one.scene.seen_from(*frags.positions[k])) for one in self.snapped]
+        seen = [replace(one, mesh=one.mesh.seen_from(*frags.positions[k])) for one in self.snapped]
         there, nearest = (planes[k] for planes in frags.drawn_planes)
         for n in (LAYERS, MOST_LAYERS):
-            ids, depth = peel_scenes(SCRATCH, seen, self.view, n, is_farthest=False)
+            ids, depth = peel_meshes(SCRATCH, seen, self.view, n, is_farthest=False)
             ids[(depth > nearest) | ((depth == nearest) & (ids > there) & (there >= 0))] = -1
             if not (ids[-1] >= 0).any():
                 break

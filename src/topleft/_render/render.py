@@ -311,7 +311,7 @@ class StaticPlan:
         """Return the view with this plan."""
         return replace(view, plan=self)
 
-    def corners_of(self, triangles: ArrayLike, n_vertices: int) -> NDArray[np.int32]:  # noqa: ARG002
+    def triangles_of(self, triangles: ArrayLike, n_vertices: int) -> NDArray[np.int32]:  # noqa: ARG002
         """Return the triangles of the mesh, which has checked them."""
         return self._mesh.triangles
 

@@ -1,7 +1,7 @@
 """Prepares what the shading kernels read: materials, lights and a camera as numbers, a mesh as rows of float32.
 
 Input: a mesh, its materials, lights, a camera and the size of the whole picture. Output: `ShadingInputs`, which fills
-`_engine.Shading`.
+`_engine.ShadingTable`.
 """
 
 from __future__ import annotations
@@ -202,7 +202,7 @@ class ShadingInputs:
 
     def __init__(
         self,
-        scene: _engine.Scene,
+        scene: _engine.SnappedMesh,
         mesh: Mesh,
         camera: Camera,
         size: tuple[int, int],
@@ -212,16 +212,16 @@ class ShadingInputs:
     ) -> None:
         in_eye_space = not is_similarity(camera.view)
         self.mesh = ShadingMesh(mesh, camera.view) if in_eye_space else shading_mesh_of(mesh)
-        viewport = size if scene.view is None else scene.view.viewport
+        viewport = size if scene.viewport is None else scene.viewport.size
         self.rays = rays_of(camera, viewport, self.mesh.center, in_eye_space=in_eye_space)
         self.view = camera.view
         self.back_side = -1.0 if np.linalg.det(camera.view[:3, :3]) > 0 else 1.0
         self.is_in_eye_space = in_eye_space
         normals = self.mesh.normals
-        if scene.view is not None and self.rays.has_perspective:
+        if scene.viewport is not None and self.rays.has_perspective:
             normals = np.empty_like(normals)
             _engine.set_inverse_w(scene, self.mesh.normals, normals)
-        self.shading = _engine.Shading(
+        self.shading = _engine.ShadingTable(
             normals,
             self.mesh.face_normals if is_flat else None,
             self.mesh.positions,
