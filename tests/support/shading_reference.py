@@ -77,7 +77,7 @@ def look_up(texture, w, mesh):
 
 
 def bent(n, side, w, mesh, material):
-    """Normals as the normal map bends them: tangent along u, bitangent towards v, each at right angles to the normal."""
+    """Normals as the normal map bends them: tangent along u, bitangent towards v, at right angles to the normal."""
     texture, own = material.normal_texture, side * n  # as the mesh has it
     corners, uv = mesh.vertices[w.corners].astype(np.float64), uv_of(texture, mesh)[w.corners]
     edges, steps = corners[:, 1:] - corners[:, :1], uv[:, 1:] - uv[:, :1]
@@ -185,7 +185,7 @@ def octahedral(texels, row, at):
 
 
 def lights_at(lights, points, n, camera, ambient):
-    """Direction, strength (P, 3), and what a matt surface sends on of each light; the headlight unless there are any."""
+    """Direction, strength (P, 3), and what a matt surface sends on of each light; the headlight unless given."""
     if lights is None:
         direction = np.broadcast_to(TO_HEADLIGHT @ camera.view[:3, :3], n.shape)
         cosine = (n * direction).sum(axis=1, keepdims=True)
@@ -203,7 +203,7 @@ def lights_at(lights, points, n, camera, ambient):
 
 
 def metallic_rough(base, n, viewer, lights, around, metallic, roughness):
-    """glTF 2.0, appendix B, with the height-correlated visibility; `around`: (gathered, mirrored) light and occlusion."""
+    """glTF 2.0, appendix B, height-correlated visibility; `around` gives gathered and mirrored light, occlusion."""
     roughness = np.clip(roughness, 0.045, 1)
     alpha2, f0, matt = roughness**4, 0.04 + metallic * (base - 0.04), (1 - metallic) * base
     n_dot_v = np.minimum(np.abs((n * viewer).sum(axis=1, keepdims=True)), 1)
@@ -275,11 +275,10 @@ def picture(
         light = base * occlusion * around(n, np.ones((len(n), 1)))[0]
         for direction, color, share in found:
             light = light + base * color * share
-            if lights is not None:
-                half = (n * unit_or_zero(direction + viewer)).sum(axis=1, keepdims=True)
-                is_lit = (n * direction).sum(axis=1, keepdims=True) > 0
-                shine = np.where(is_lit, np.maximum(half, 0) ** material.shininess, 0)
-                light = light + shine * color * material.specular
+            half = (n * unit_or_zero(direction + viewer)).sum(axis=1, keepdims=True)
+            is_lit = (n * direction).sum(axis=1, keepdims=True) > 0
+            shine = np.where(is_lit, np.maximum(half, 0) ** material.shininess, 0)
+            light = light + shine * color * material.specular
     if any(material.emission) and not material.unlit:
         shining = np.array(material.emission)
         has_map = material.emission_texture is not None

@@ -2,9 +2,10 @@
 
 Input: colours, or a picture of all directions. Output: what the kernels read.
 
-A picture is turned from its equirectangular form into an octahedron unfolded to a square. Level k of `Levels` is what a
-surface of roughness k / 8 sees: light averaged over the facets of GGX seen from straight above (normal, view and
-mirrored direction are one), by 64 directions each, from halvings as large as the part that a direction stands for.
+A picture is turned from its equirectangular form into an octahedron unfolded to a square. Level k is what a surface of
+roughness k / 8 sees: light averaged over the facets of GGX seen from straight above (normal, view and mirrored
+direction are one). The two that see least of it are means of 64 directions, from halvings as large as the part that a
+direction stands for; the others are sums over all texels of a halving.
 
 Based on: Engelhardt, T. and C. Dachsbacher, "Octahedron Environment Maps", 2008; Karis, B., "Real Shading in Unreal
 Engine 4", SIGGRAPH 2013 courses (levels by roughness); Colbert, M. and J. Krivanek, "GPU-Based Importance Sampling",
@@ -13,6 +14,7 @@ GPU Gems 3, 2007 (halvings by the density of the directions).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any
@@ -34,12 +36,15 @@ __all__ = ["DEFAULT_ENVIRONMENT", "Environment"]
 N_ROUGH = 8
 """Levels beyond that of a mirror; roughness lies between them linearly."""
 
-SIZES_OF_ROUGH = (128, 128, 64, 64, 32, 32, 32, 32)
-"""Sides of these levels: texels are smaller than half of what the facets blur, but for the first, where they are as large."""
+SIZES_OF_ROUGH = (128, 128, 64, 32, 32, 32, 32, 32)
+"""Sides of these levels: texels are smaller than half of what the facets blur; those of the first are as large."""
 
 LARGEST_MIRROR = 512
 N_DIRECTIONS = 64
 SIZE_OF_MATT = 32
+
+LEAST_SUMMED, SIZE_OF_SUMS = 0.3, 64
+"""From which roughness on all texels of a halving are added up, and its side: 3 degrees, where facets blur by 10."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,8 +60,8 @@ class Environment:
     ground : (3,) of 0 to 255, optional
         sRGB of what is below.
     image : (H, W, 3) array_like, optional
-        Instead of these: uint8 as sRGB, or float as linear light, 0 up. Longitude runs along the rows, the middle column
-        is +x, and a quarter to its left -z; row 0 is the top.
+        Instead of these: uint8 as sRGB, or float as linear light, 0 up. Longitude runs along the rows, the middle
+        column is +x, and a quarter to its left -z; row 0 is the top.
     intensity : float
         Not negative; 1: a white matt surface in a white environment is white.
     up : (3,) of float
@@ -125,14 +130,14 @@ class Environment:
 
     @cached_property
     def levels(self) -> tuple[F32, I32] | None:
-        """Texels (N, 4) and rows (offset, size) of the levels of a picture, made when they are first needed, or None."""
+        """Texels (N, 4) and rows (offset, size) of the levels of a picture, made when first needed, or None."""
         if self.image is None:
             return None
         halvings = mirrored_levels(self.image)
         mirror = halvings[0]
         sides = [min(size, len(mirror)) for size in SIZES_OF_ROUGH]
-        rough = [blurred(halvings, sides[k], (k + 1) / N_ROUGH) for k in range(N_ROUGH)]
-        levels = [mirror, *rough, matt_level(halvings, min(SIZE_OF_MATT, len(mirror)))]
+        rough = [blurred(halvings, side, (k + 1) / N_ROUGH) for k, side in enumerate(sides)]
+        levels = [mirror, *rough, gathered(halvings, min(SIZE_OF_MATT, len(mirror)), lambda cosine: cosine)]
         padded = [bordered(level) for level in levels]
         ends = np.cumsum([0] + [side * side for side in map(len, padded)])
         rows = [(end, len(level)) for end, level in zip(ends[:-1], levels, strict=True)]
@@ -167,7 +172,7 @@ def _as_light(image: npt.ArrayLike) -> F32:
 
 
 def octahedral_directions(n: int) -> tuple[F32, F32]:
-    """Unit vectors (n, n, 3) at the centres of the texels of an unfolded octahedron, and the solid angle of each (n, n)."""
+    """Unit vectors (n, n, 3) at the centres of the texels of an unfolded octahedron, and their solid angles (n, n)."""
     axis = (2 * np.arange(n, dtype=np.float32) + 1) / np.float32(n) - 1
     x, z = np.meshgrid(axis, axis)
     y = 1 - np.abs(x) - np.abs(z)
@@ -243,6 +248,12 @@ def look_up_octahedron(level: F32, at: F32) -> F32:
 def blurred(halvings: list[F32], size: int, roughness: float) -> F32:
     """What a surface of this roughness sees in each direction, (size, size, 3)."""
     alpha2 = roughness**4
+    if roughness > LEAST_SUMMED:
+
+        def facets(cosine: F32) -> F32:
+            return cosine * (np.float32(0.5 * (alpha2 - 1)) * (1 + cosine) + 1) ** np.float32(-2)
+
+        return gathered(halvings, size, facets)
     normal = octahedral_directions(size)[0].reshape(-1, 3)
     helper = np.where(np.abs(normal[:, 1:2]) < 0.9, [[0, 1, 0]], [[1, 0, 0]]).astype(np.float32)
     tangent = np.cross(helper, normal)
@@ -271,11 +282,16 @@ def blurred(halvings: list[F32], size: int, roughness: float) -> F32:
     return (light / np.float32(weights)).reshape(size, size, 3)
 
 
-def matt_level(halvings: list[F32], size: int) -> F32:
-    """What a matt surface gathers for each normal, over pi, (size, size, 3)."""
-    source = next((level for level in halvings if len(level) <= 64), halvings[-1])
+def gathered(halvings: list[F32], size: int, weigh: Callable[[F32], F32]) -> F32:
+    """The mean of all light by a weight of the cosine, 0 below the horizon, in each direction, (size, size, 3)."""
+    source = next((level for level in halvings if len(level) <= SIZE_OF_SUMS), halvings[-1])
     to, angle = octahedral_directions(len(source))
-    normal = octahedral_directions(size)[0].reshape(-1, 3)
-    cosine = np.maximum(normal @ to.reshape(-1, 3).T, 0) * angle.reshape(-1)
-    gathered: F32 = (cosine @ source.reshape(-1, 3)) / cosine.sum(axis=1, keepdims=True)
-    return gathered.reshape(size, size, 3)
+    light = np.concatenate([source, np.ones_like(angle)[..., None]], axis=2) * angle[..., None]
+    toward = np.ascontiguousarray(to.reshape(-1, 3).T)
+    sums = [
+        weigh(np.maximum(some @ toward, 0)) @ light.reshape(-1, 4)
+        for some in np.array_split(octahedral_directions(size)[0].reshape(-1, 3), max(1, size // 8))
+    ]
+    total = np.concatenate(sums)
+    mean: F32 = total[:, :3] / total[:, 3:]
+    return mean.reshape(size, size, 3)

@@ -1,7 +1,7 @@
 """Draws pictures with materials that what is behind shows through: `alpha_mode="blend"`, and colours with alpha.
 
-Input: `Mesh` or `Scene`, `Camera`. Output: a picture (H, W, 4) uint8, sRGB with alpha, and the visibility buffer of what is
-opaque.
+Input: `Mesh` or `Scene`, `Camera`. Output: a picture (H, W, 4) uint8, sRGB with alpha, and the visibility buffer of
+what is opaque.
 
 What is opaque is drawn as ever. The other triangles are peeled, layers that it hides are left out, the rest is shaded,
 each with its own opacity, and laid over it front to back, in linear light: their order in the mesh does not matter.
