@@ -117,10 +117,6 @@ class View:
         if self.plan is not None:
             self.plan.mark(stage)
 
-    def find_clusters(self, vertices: ArrayLike) -> Clusters | None:
-        """Return the vertices and triangles in clusters, if the plan has them."""
-        return None if self.plan is None or self.single_sided else self.plan.find_clusters(vertices)
-
     @property
     def test(self) -> int:
         """When a triangle covers a pixel: `tl_test` in ``csrc/topleft.h``."""
