@@ -49,7 +49,8 @@ def expected_of(mesh, camera, size, background, **look):
     order = np.argsort(np.stack([depth for depth, _, _ in layers]), axis=0)
     light, through = np.zeros((*size[::-1], 3)), np.ones(size[::-1])
     for k in order:
-        own_light, alpha = (np.choose(k[..., None] if a[0].ndim == 3 else k, a) for a in zip(*(l[1:] for l in layers)))
+        own_light = np.choose(k[..., None], [own for _, own, _ in layers])
+        alpha = np.choose(k, [own for _, _, own in layers])
         light += (through * alpha)[..., None] * own_light
         through = through * (1 - alpha)
     ground = reference.decode(background[:3]) * (background[3] / 255)

@@ -193,11 +193,11 @@ def mirrored_levels(image: F32) -> list[F32]:
     if step > 1 and height // step:
         rows, columns = height // step, width // step
         blocks = image[: rows * step, : columns * step].reshape(rows, step, columns, step, 3)
-        image = blocks.mean(axis=(1, 3))
-    fine = look_up_sphere(image, octahedral_directions(2 * n)[0].reshape(-1, 3)).reshape(2 * n, 2 * n, 3)
-    levels = []
+        image = blocks.mean(axis=(1, 3), dtype=np.float32)
+    fine: F32 = look_up_sphere(image, octahedral_directions(2 * n)[0].reshape(-1, 3)).reshape(2 * n, 2 * n, 3)
+    levels: list[F32] = []
     while len(fine) > 1:
-        fine = (fine[::2, ::2] + fine[1::2, ::2] + fine[::2, 1::2] + fine[1::2, 1::2]) / 4
+        fine = (fine[::2, ::2] + fine[1::2, ::2] + fine[::2, 1::2] + fine[1::2, 1::2]) / np.float32(4)
         levels.append(fine)
     return levels
 
@@ -293,5 +293,5 @@ def gathered(halvings: list[F32], size: int, weigh: Callable[[F32], F32]) -> F32
         for some in np.array_split(octahedral_directions(size)[0].reshape(-1, 3), max(1, size // 8))
     ]
     total = np.concatenate(sums)
-    mean: F32 = total[:, :3] / total[:, 3:]
-    return mean.reshape(size, size, 3)
+    mean = total[:, :3] / total[:, 3:]
+    return mean.astype(np.float32).reshape(size, size, 3)

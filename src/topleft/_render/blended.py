@@ -162,8 +162,8 @@ class Glass:
             alpha += own_alpha
         color = light / np.maximum(alpha, np.float32(1e-20))[:, None]
         steps = np.rint(np.minimum(color, 1) * LINEAR_ONE).astype(np.int64)
-        picture[(*at, slice(0, 3))] = srgb_tables()[1][steps]
-        picture[(*at, 3)] = np.rint(alpha * np.float32(255 / len(positions))).astype(np.uint8)
+        picture[at[0], at[1], :3] = srgb_tables()[1][steps]
+        picture[at[0], at[1], 3] = np.rint(alpha * np.float32(255 / len(positions))).astype(np.uint8)
 
     def peel(self, frags: SceneFragments, k: int) -> tuple[npt.NDArray[np.int32], F32]:
         """The layers of a sample that nothing opaque hides, planes (K, H, W) of ids and depths."""
