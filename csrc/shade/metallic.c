@@ -1,12 +1,12 @@
 /* Metallic-rough surfaces, as glTF describes them: microfacets of GGX over a matt ground.
  * In: base colour, metallic, roughness; lights and surroundings.  Out: the light sent to the eye, linear.
  *
- *   f = (1 - F) (1 - metallic) base / pi + F D V,   F = f0 + (1 - f0) (1 - v.h)^5,   f0 = mix(0.04, base, metallic)
- *   D = alpha^2 / (pi ((n.h)^2 (alpha^2 - 1) + 1)^2),   alpha = roughness^2
- *   V = 1 / (2 (n.l sqrt((n.v)^2 (1 - alpha^2) + alpha^2) + n.v sqrt((n.l)^2 (1 - alpha^2) + alpha^2)))
+ *   f = (1 - F) (1 - metallic) base / pi + F D V,   F = f0 + (1 - f0) (1 - v . h)^5,   f0 = mix(0.04, base, metallic)
+ *   D = alpha^2 / (pi ((n . h)^2 (alpha^2 - 1) + 1)^2),   alpha = roughness^2
+ *   V = 1 / (2 (n . l sqrt((n . v)^2 (1 - alpha^2) + alpha^2) + n . v sqrt((n . l)^2 (1 - alpha^2) + alpha^2)))
  *
  * A light of intensity 1 makes a white matt surface white that faces it: so its light is pi, which cancels that of f.
- * The denominator of D is (n.h)^2 alpha^2 + |n x h|^2: there nothing cancels.  Roughness counts as at least
+ * The denominator of D is (n . h)^2 alpha^2 + |n x h|^2: there nothing cancels.  Roughness counts as at least
  * TL_LEAST_ROUGHNESS, so that alpha^4 stays far from the rounding of float32 and a highlight is no smaller than a lamp.
  * What the surroundings send is their blurred light in the mirrored direction times the share that a surface mirrors of
  * white surroundings (the split sum); the rest of it, times the base, is what the matt ground gets.
@@ -30,7 +30,7 @@
 typedef struct {
     lit_surface lit;
     vf roughness, alpha2, n_dot_v;
-    vf masked_view;       /* sqrt((n.v)^2 (1 - alpha^2) + alpha^2) */
+    vf masked_view;       /* sqrt((n . v)^2 (1 - alpha^2) + alpha^2) */
     vf f0[3], diffuse[3]; /* diffuse: (1 - metallic) base */
 } rough_surface;
 

@@ -8,9 +8,10 @@ import shading_reference as reference
 
 import topleft as tl
 from topleft._model import environment as module
+from topleft._model.normals import unit_or_zero
 
 RNG = np.random.default_rng(4)
-DIRECTIONS = reference.unit_or_zero(RNG.normal(size=(300, 3)))
+DIRECTIONS = unit_or_zero(RNG.normal(size=(300, 3)))
 
 
 def sphere(n=200):
