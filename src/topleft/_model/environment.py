@@ -22,10 +22,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from topleft._base.arrays import as_array
+from topleft._base.arrays import as_array, as_vector
 from topleft._base.color import LIGHT_OF_SRGB, Color, as_color, light_of
 from topleft._base.options import parse
-from topleft._model.light import TO_HEADLIGHT, LightSpace, as_not_negative, as_point
+from topleft._model.light import TO_HEADLIGHT, LightSpace, as_not_negative
 
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
@@ -100,7 +100,7 @@ class Environment:
         if self.image is not None:
             keep(self, "image", _as_light(self.image))
         keep(self, "intensity", as_not_negative("intensity", self.intensity))
-        keep(self, "up", as_point("up", self.up))
+        keep(self, "up", tuple(as_vector("up", self.up).tolist()))
         if not any(self.up):
             raise ValueError(f"up must be a direction, got {self.up}")
         if not np.isfinite(self.turn):

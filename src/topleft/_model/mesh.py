@@ -42,7 +42,8 @@ class Mesh:
     normals : (V, 3) array_like of real numbers, optional
         Directions, of any length; `None`: not known, `vertex_normals` computes them.
     colors : (V, 3) or (V, 4) array_like of uint8, optional
-        sRGB colours, with or without alpha.
+        sRGB colours, with or without alpha: what is behind shows through where a mesh has no materials, or materials
+        that blend.
     uv : (V, 2) array_like of real numbers, optional
         Where each vertex lies in a texture: u from left to right, v from the bottom up, 0 to 1. Kept as float32. Where
         a texture has a seam, vertices stand twice.

@@ -65,13 +65,14 @@ def render(
     size : (width, height), pixels
         640 x 480 unless given.
     shading : {"smooth", "flat", "unlit", "matcap", "ids", "depth", "normals"}
-        What the colours tell; `topleft.shade` describes each.
+        What the colours tell; `topleft.shade` describes each. The first three composite what shows through, materials
+        with `alpha_mode="blend"` and colours with alpha, in linear light; the others show it as if it were opaque.
     color : (3,) of 0 to 255
         sRGB colour of a mesh without colours.
     background : (3,) or (4,) of 0 to 255
         sRGB, and alpha if it is not opaque; white unless given, `(0, 0, 0, 0)` is transparent.
     cull : {"none", "back", "front"}
-        Triangles to leave out, by the side that is seen.
+        Triangles to leave out, by the side that is seen; besides the backs of materials that are not double-sided.
     edges : bool
         Whether the edges that show are drawn over it, as smooth dark lines.
     sampling : {"center", "msaa2", "msaa4", "msaa8", "msaa16"}
