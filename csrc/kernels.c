@@ -10,6 +10,7 @@
 #include "clusters/cluster_view.c"
 #include "raster/raster.c"
 #include "raster/bin.c"
+#include "raster/sides.c"
 #include "area/area.c"
 #include "pixels/weights_one.c"
 #include "pixels/weights.c"
@@ -63,6 +64,7 @@ const tl_kernels TL_KERNELS = {
     .cut_clusters = cut_clusters,
     .measure_clusters = measure_clusters,
     .survey_clusters = survey_clusters,
+    .drop_sides = drop_sides,
     .list_edges = list_edges,
     .draw_lines = draw_lines,
     .composite = composite,

@@ -139,6 +139,10 @@ typedef struct tl_kernels {
     void (*cut_out)(const tl_scene *scene, const tl_window *window, const tl_view *view, const tl_shading *shading,
                     const int32_t *triangles, int64_t n, const tl_target *target);
 
+    /* Copies triangles [first, end); what is single-sided and turned the way that the scene culls is collapsed to a
+     * point, of what a plane cuts the pieces, in place.  The result is drawn with any cull. */
+    void (*drop_sides)(const tl_scene *scene, const uint8_t *is_single, int64_t first, int64_t end, int32_t *triangles);
+
     /* The edges of the triangles that are not culled, each once, as lower index + 2^32 * higher index; room for three a
      * triangle.  Returns the first row with an index outside the vertices, or -1. */
     int64_t (*list_edges)(const tl_scene *scene, const tl_edge_scratch *scratch, uint64_t *edges, int64_t *n_edges);

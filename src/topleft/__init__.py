@@ -20,6 +20,7 @@ from topleft._lod.detail import Detail, choose_detail
 from topleft._lod.levels import Level, Levels
 from topleft._lod.simplify import simplify
 from topleft._model.adapt import as_mesh
+from topleft._model.environment import Environment
 from topleft._model.light import Fog, Light
 from topleft._model.material import Material
 from topleft._model.mesh import Mesh
@@ -61,6 +62,7 @@ __all__ = [
     "Camera",
     "DepthLayers",
     "Detail",
+    "Environment",
     "FisheyeLens",
     "Fog",
     "Fragments",

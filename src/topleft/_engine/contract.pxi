@@ -181,6 +181,10 @@ cdef extern from "topleft.h" nogil:
         int n_levels
         tl_filter filter
         tl_wrap wrap_u, wrap_v
+        int uv_set, has_transform
+        float[2][3] transform
+        float *tangent
+        float hand
     ctypedef struct tl_material:
         float *color
         float *back_color
@@ -188,6 +192,24 @@ cdef extern from "topleft.h" nogil:
         float back_side, shininess, cutoff
         int is_unlit
         const tl_texture *texture
+        int is_full, is_metallic
+        float metallic, roughness, occlusion, normal_scale
+        float *emission
+        const tl_texture *metallic_roughness
+        const tl_texture *occlusion_map
+        const tl_texture *normal_map
+        const tl_texture *emission_map
+    ctypedef int tl_surroundings_kind
+    ctypedef struct tl_surroundings:
+        tl_surroundings_kind kind
+        float[3][4] from_shading
+        float *sky
+        float *ground
+        float diffuse
+        const float *texels
+        int32_t *offset
+        int32_t *size
+        int n_levels
     ctypedef struct tl_light:
         tl_light_kind kind
         float *at
@@ -200,13 +222,18 @@ cdef extern from "topleft.h" nogil:
         int is_f64
         const uint8_t *is_turned
         const float *uv
+        const float *uv1
         const float *colors
+        int has_alpha
+        float front_side
         const int32_t *material_of
         const tl_material *materials
         int n_materials
         const tl_light *lights
         int n_lights
         float *ambient
+        const tl_surroundings *surroundings
+        int wants_opacity
         tl_show show
         const tl_texture *matcap
         float[3][4] eye_from
@@ -343,6 +370,7 @@ cdef extern from "topleft.h" nogil:
         void (*paint_flat)(const int32_t *, int64_t, const uint8_t *, int, uint8_t *) noexcept nogil
         void (*paint_gouraud)(const tl_scene *, const tl_window *, const int32_t *, const void *, int, int, void *) noexcept nogil
         void (*composite)(const tl_composite *, int64_t, void *) noexcept nogil
+        void (*drop_sides)(const tl_scene *, const uint8_t *, int64_t, int64_t, int32_t *) noexcept nogil
         int64_t (*list_edges)(const tl_scene *, const tl_edge_scratch *, uint64_t *, int64_t *) noexcept nogil
         void (*draw_lines)(const tl_edges *, const tl_window *, const tl_line_target *) noexcept nogil
         void (*list_planes)(const tl_valued *, int64_t, int64_t) noexcept nogil

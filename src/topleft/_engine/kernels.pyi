@@ -120,6 +120,9 @@ class SnappedMesh:
     def with_inverse_w(self, n_pixels: int) -> SnappedMesh: ...
     def numbered_from(self, first_id: int) -> SnappedMesh: ...
     def moved(self, x_px: int, y_px: int) -> SnappedMesh: ...
+    def drop_sides(
+        self, is_single: NDArray[np.uint8], first: int, end: int, triangles: NDArray[np.int32]
+    ) -> None: ...
     def draw(self, target: Target, first_row: int, n_rows: int, is_first: bool = True, is_last: bool = True) -> int: ...
     def draw_share(
         self, target: Target, first_row: int, n_rows: int, first: int, others: NDArray[np.int32]
@@ -277,7 +280,27 @@ def mean_colors(
 
 class Mipmap:
     def __init__(
-        self, texels: NDArray[np.uint16], levels: NDArray[np.int32], filter_code: int, wrap_u: int, wrap_v: int
+        self,
+        texels: NDArray[np.uint16],
+        levels: NDArray[np.int32],
+        filter_code: int,
+        wrap_u: int,
+        wrap_v: int,
+        uv_set: int = ...,
+        transform: Sequence[Sequence[float]] | None = ...,
+        tangent: Sequence[float] = ...,
+        hand: float = ...,
+    ) -> None: ...
+
+class Surroundings:
+    def __init__(
+        self,
+        texels: NDArray[np.float32] | None,
+        levels: NDArray[np.int32] | None,
+        sky: Sequence[float],
+        ground: Sequence[float],
+        diffuse: float,
+        from_shading: Sequence[Sequence[float]],
     ) -> None: ...
 
 class ShadingTable:
@@ -288,12 +311,17 @@ class ShadingTable:
         positions: NDArray[Any],
         is_turned: NDArray[np.uint8] | None,
         uv: NDArray[np.float32] | None,
+        uv1: NDArray[np.float32] | None,
         colors: NDArray[np.float32] | None,
+        has_alpha: bool,
+        front_side: float,
         material_of: NDArray[np.int32] | None,
         decode: NDArray[np.float32],
     ) -> None: ...
     def set_materials(self, materials: Sequence[tuple[Any, ...]]) -> None: ...
     def set_lights(self, lights: Sequence[tuple[Any, ...]], ambient: Sequence[float]) -> None: ...
+    def set_surroundings(self, surroundings: Surroundings) -> None: ...
+    def set_wants_opacity(self) -> None: ...
     def set_view(
         self,
         show: int,
