@@ -76,13 +76,7 @@ def is_blended(subject: Mesh | Scene, material: Material | None, shading: str = 
 
 
 def draw_blended(
-    subject: Mesh | Scene,
-    camera: Camera,
-    size: tuple[int, int],
-    *,
-    sampling: str,
-    cull: str,
-    options: ShadingOptions,
+    subject: Mesh | Scene, camera: Camera, size: tuple[int, int], *, sampling: str, cull: str, options: ShadingOptions
 ) -> tuple[U8, SceneFragments]:
     """The picture, and what is opaque in it."""
     scene = scene_of(subject)
