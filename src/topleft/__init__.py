@@ -72,6 +72,7 @@ __all__ = [
     "Material",
     "Mesh",
     "MeshError",
+    "MeshWarning",
     "MissingPackageError",
     "OpenCVLens",
     "Plan",
