@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, get_type_hints
 from topleft import scenes
 from topleft._base.memory import release_memory
 from topleft._camera.camera import Camera
+from topleft._camera.file_cameras import load_cameras
 from topleft._camera.lens import FisheyeLens, OpenCVLens
 from topleft._camera.viewpoints import turntable, viewpoints
 from topleft._engine.isa import build_info
@@ -94,6 +95,7 @@ __all__ = [
     "fill",
     "height_map",
     "load",
+    "load_cameras",
     "overdraw",
     "peel",
     "plan",

@@ -13,32 +13,45 @@ from __future__ import annotations
 import json
 import struct
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from topleft._base.color import encode_srgb
-from topleft._io.gltf_accessors import Accessors, Tree, entry
+from topleft._io.gltf_accessors import Accessors, Tree, entry, normalized
 from topleft._io.gltf_materials import Materials
 from topleft._io.references import Source
 from topleft._model.mesh import Mesh
-from topleft.errors import MeshError
+from topleft.errors import MeshError, MissingPackageError
 
 Array = npt.NDArray[Any]
 F64 = npt.NDArray[np.float64]
 
-GLB_MAGIC, JSON_CHUNK, BIN_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942
+GLTF_SUFFIXES = (".gltf", ".glb", ".vrm")
+JSON_CHUNK, BIN_CHUNK = 0x4E4F534A, 0x004E4942
 POINTS, TRIANGLES, STRIP, FAN = 0, 4, 5, 6
 
 READ_EXTENSIONS = frozenset({
-    "EXT_mesh_gpu_instancing", "EXT_texture_avif", "EXT_texture_webp", "KHR_materials_emissive_strength",
+    "EXT_mesh_gpu_instancing", "EXT_texture_avif", "EXT_texture_webp", "KHR_draco_mesh_compression",
+    "KHR_materials_emissive_strength",
     "KHR_materials_pbrSpecularGlossiness", "KHR_materials_unlit", "KHR_mesh_quantization", "KHR_texture_transform",
-    "KHR_xmp", "KHR_xmp_json_ld",
 })  # fmt: skip
 
-MAY_BE_LEFT_OUT = ("KHR_materials_", "KHR_lights_", "KHR_animation_", "KHR_node_", "KHR_audio", "EXT_lights_")
+WITHOUT_LOOK = ("KHR_xmp", "FB_ngon_", "EXT_structural_", "EXT_mesh_features", "EXT_instance_features", "KHR_physics_")
+"""Beginnings of the names of extensions that say nothing of the look."""
+
+MAY_BE_LEFT_OUT = (
+    *WITHOUT_LOOK,
+    "KHR_materials_",
+    "KHR_technique",
+    "KHR_lights_",
+    "KHR_animation_",
+    "KHR_node_",
+    "KHR_audio",
+    "EXT_lights_",
+)
 """Beginnings of the names of extensions whose lack changes the look of a file, but not its shapes."""
 
 
@@ -118,7 +131,9 @@ def _tree_and_blob(source: Source) -> tuple[Tree, bytes | None]:
 
 
 def _glTF1(source: Source) -> MeshError:  # noqa: N802
-    return MeshError(f"cannot read {str(source.path)!r}: it is glTF 1.0, and 2.0 is read: convert it, by gltf-pipeline say")
+    return MeshError(
+        f"cannot read {str(source.path)!r}: it is glTF 1.0, and 2.0 is read: convert it, by gltf-pipeline say"
+    )
 
 
 def _chunks(content: bytes, source: Source) -> tuple[bytes, bytes | None]:
@@ -150,9 +165,11 @@ def _check_extensions(tree: Tree, source: Source) -> None:
     """Raise an error for what the file cannot do without, and note what it can."""
     for name in tree.get("extensionsRequired", []):
         if name not in READ_EXTENSIONS and not str(name).startswith(MAY_BE_LEFT_OUT):
-            raise MeshError(f"cannot read {str(source.path)!r}: it needs the extension {str(name)[:80]}, which is not read")
+            raise MeshError(
+                f"cannot read {str(source.path)!r}: it needs the extension {str(name)[:80]}, which is not read"
+            )
     for name in [*tree.get("extensionsUsed", []), *tree.get("extensionsRequired", [])]:
-        if name not in READ_EXTENSIONS:
+        if name not in READ_EXTENSIONS and not str(name).startswith(WITHOUT_LOOK):
             source.notes.add("extensions not read", str(name))
 
 
@@ -245,7 +262,7 @@ def rotations(quaternions: F64) -> F64:
 
 @dataclass(frozen=True)
 class _Shape:
-    """The vertices of a primitive, in the space of its mesh or, moved by a skin, in the world."""
+    """The vertices and triangles of a primitive, in the space of its mesh or, moved by a skin, in the world."""
 
     positions: Array
     triangles: Array
@@ -276,15 +293,13 @@ class _Reader:
             weights = node.get("weights", mesh.get("weights", ()))
             places: list[F64] | None = None
             for i, primitive in enumerate(mesh["primitives"]):
-                shape = self._shape(node["mesh"], i, primitive, weights)
+                shape = self._shape(node, i, primitive, weights)
                 if shape is None:
                     continue
                 if places is None:
                     places = self._places(index, node)
-                matrices = places
-                if "skin" in node and "JOINTS_0" in primitive["attributes"]:
-                    shape = self._skinned(shape, primitive["attributes"], node["skin"])
-                    matrices = [np.eye(4)]
+                is_skinned = "skin" in node and "JOINTS_0" in primitive["attributes"]
+                matrices = [np.eye(4)] if is_skinned else places  # joints place a skin, its node does not
                 row = primitive.get("material")
                 materials = () if row is None else (self._materials.material(row),)
                 for matrix in matrices:
@@ -309,11 +324,13 @@ class _Reader:
             matrices[:, :3, 3] = given["TRANSLATION"][:n]
         return list(world @ matrices)
 
-    def _shape(self, i_mesh: int, i: int, primitive: Tree, weights: Any) -> _Shape | None:
-        """The triangles of a primitive with its morph targets added; None if it has none."""
+    def _shape(self, node: Tree, i: int, primitive: Tree, weights: Any) -> _Shape | None:
+        """The triangles of a primitive, moved by its morph targets and its skin; None if it has none."""
         has_targets = bool(primitive.get("targets")) and any(weights)
-        key = (i_mesh, i)
-        if not has_targets and key in self._shapes:
+        key = (node["mesh"], i)
+        skin = node["skin"] if "skin" in node and "JOINTS_0" in primitive["attributes"] else None
+        is_shared = not has_targets and skin is None
+        if is_shared and key in self._shapes:
             return self._shapes[key]
         attributes = primitive["attributes"]
         mode = primitive.get("mode", TRIANGLES)
@@ -322,23 +339,17 @@ class _Reader:
             return None
         if "POSITION" not in attributes:
             return None
-        if "KHR_draco_mesh_compression" in primitive.get("extensions", {}):
-            accessor = entry(self._tree, "accessors", attributes["POSITION"])
-            if "bufferView" not in accessor:
-                raise MeshError(
-                    f"cannot read {str(self._source.path)!r}: it is compressed by KHR_draco_mesh_compression, which is not read"
-                )
-        values = {name: self._accessors.array(index) for name, index in attributes.items() if name in USED_ATTRIBUTES}
+        values, corners = self._arrays(primitive, attributes)
         n = len(values["POSITION"])
         for name, rows in values.items():
             if len(rows) != n:
                 raise MeshError(f"{name} has {len(rows)} rows for {n} vertices")
         if has_targets:
             values |= self._morphed(values, primitive["targets"], weights)
-        corners = self._accessors.array(primitive["indices"])[:, 0] if "indices" in primitive else np.arange(n)
-        triangles = triangles_of(corners, mode)
-        shape = _shape_of(values, triangles)
-        if not has_targets:
+        if skin is not None:
+            values |= self._skinned(values, attributes, skin)
+        shape = _shape_of(values, triangles_of(corners, mode))
+        if is_shared:
             self._shapes[key] = shape
         return shape
 
@@ -357,8 +368,36 @@ class _Reader:
                     sum_[:, : delta.shape[1]] += float(weight) * delta
         return moved
 
-    def _skinned(self, shape: _Shape, attributes: Tree, skin: Any) -> _Shape:
-        """The vertices moved to where the joints hold them, in the world."""
+    def _arrays(self, primitive: Tree, attributes: Tree) -> tuple[dict[str, Array], Array]:
+        """The attributes of a primitive, and its corners as a list, a strip or a fan."""
+        draco = primitive.get("extensions", {}).get("KHR_draco_mesh_compression")
+        if draco is not None and "bufferView" not in entry(self._tree, "accessors", attributes["POSITION"]):
+            return self._unpacked(draco, attributes)
+        values = {name: self._accessors.array(index) for name, index in attributes.items() if name in USED_ATTRIBUTES}
+        if "indices" not in primitive:
+            return values, np.arange(len(values["POSITION"]))
+        return values, self._accessors.array(primitive["indices"])[:, 0]
+
+    def _unpacked(self, draco: Tree, attributes: Tree) -> tuple[dict[str, Array], Array]:
+        """The same of a primitive that Draco has compressed."""
+        try:
+            import DracoPy
+        except ImportError:
+            raise MissingPackageError(
+                f"{str(self._source.path)!r} is compressed by Draco: reading it needs pip install 'topleft[formats]'"
+            ) from None
+        mesh = DracoPy.decode(self._accessors.view(draco["bufferView"]).tobytes())
+        self._source.check_n_vertices(len(mesh.points))
+        values = {}
+        for name, number in draco["attributes"].items():
+            if name in attributes:
+                rows = np.asarray(mesh.get_attribute_by_unique_id(number)["data"]).reshape(len(mesh.points), -1)
+                accessor = entry(self._tree, "accessors", attributes[name])
+                values[name] = normalized(rows) if accessor.get("normalized") else rows
+        return values, np.asarray(mesh.faces).ravel()
+
+    def _skinned(self, values: dict[str, Array], attributes: Tree, skin: Any) -> dict[str, Array]:
+        """Positions and normals moved to where the joints hold them, in the world."""
         row = entry(self._tree, "skins", skin)
         joints = row["joints"]
         matrices = np.array([self._nodes.matrix(_checked(self._tree, joint)) for joint in joints])
@@ -367,29 +406,31 @@ class _Reader:
             if inverse.shape[1] != 16 or len(inverse) < len(joints):
                 raise MeshError(f"skins[{skin}] has {len(inverse)} inverse bind matrices for {len(joints)} joints")
             matrices = matrices @ inverse[: len(joints)].astype(np.float64).reshape(-1, 4, 4).transpose(0, 2, 1)
-        n = len(shape.positions)
+        n = len(values["POSITION"])
         blended = np.zeros((n, 3, 4))
         total = np.zeros((n, 1, 1))
         for k in range(len(attributes)):
             if f"JOINTS_{k}" not in attributes or f"WEIGHTS_{k}" not in attributes:
                 break
-            at, share = (self._accessors.array(attributes[f"{name}_{k}"]) for name in ("JOINTS", "WEIGHTS"))
-            if at.shape != share.shape or at.dtype.kind != "u" or len(at) != n:
+            at, share = (
+                values[f"{name}_{k}"] if f"{name}_{k}" in values else self._accessors.array(attributes[f"{name}_{k}"])
+                for name in ("JOINTS", "WEIGHTS")
+            )
+            if at.shape != share.shape or at.dtype.kind not in "iu" or len(at) != n:
                 raise MeshError(f"JOINTS_{k} {at.shape} and WEIGHTS_{k} {share.shape} do not go with {n} vertices")
-            if at.size and int(at.max()) >= len(joints):
+            if at.size and not 0 <= int(at.min()) <= int(at.max()) < len(joints):
                 raise MeshError(f"JOINTS_{k} names joint {int(at.max())} of {len(joints)}")
             for column in range(at.shape[1]):
                 weight = share[:, column, None, None].astype(np.float64)
                 blended += weight * matrices[at[:, column], :3]
                 total += weight
         blended /= np.where(total == 0, 1, total)
-        positions = np.einsum("nij,nj->ni", blended[:, :, :3], shape.positions) + blended[:, :, 3]
-        normals = shape.normals
-        if normals is not None:
+        moved = {"POSITION": np.einsum("nij,nj->ni", blended[:, :, :3], values["POSITION"]) + blended[:, :, 3]}
+        if "NORMAL" in values:
             a, b, c = blended[:, 0, :3], blended[:, 1, :3], blended[:, 2, :3]
             cofactors = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
-            normals = np.einsum("nij,nj->ni", cofactors, normals)
-        return replace(shape, positions=positions, normals=normals)
+            moved["NORMAL"] = np.einsum("nij,nj->ni", cofactors, values["NORMAL"])
+        return moved
 
 
 USED_ATTRIBUTES = ("POSITION", "NORMAL", "COLOR_0", "TEXCOORD_0", "TEXCOORD_1")

@@ -133,10 +133,7 @@ class Accessors:
                 raise MeshError(f"accessors[{index}] sets row {int(at.max())} of {n}")
             values = values.copy()
             values[at[:, 0].astype(np.intp)] = new
-        if row.get("normalized") and dtype.kind != "f":
-            steps = np.float32(np.iinfo(dtype).max)
-            values = np.maximum(values / steps, np.float32(-1)).astype(np.float32, copy=False)
-        return values
+        return normalized(values) if row.get("normalized") else values
 
     def _rows(self, view: Any, offset: int, n: int, n_columns: int, dtype: np.dtype[Any], stride: int) -> Array:
         """Rows of numbers of a view, `stride` bytes from one to the next (0: without gaps)."""
@@ -161,11 +158,20 @@ class Accessors:
         if index not in self._buffers:
             content = self._blob if "uri" not in row else uri_content(row["uri"], self._source, "buffers")
             if content is None:
-                raise MeshError(f"buffers[{index}] ({str(row.get('uri', 'without a name'))[:80]!r}) is not there")
+                name = str(row.get("uri", "in the file"))[:80]
+                raise MeshError(f"cannot read {str(self._source.path)!r}: its buffer {name!r} is not there")
             if len(content) < whole(row, "byteLength"):
                 raise MeshError(f"buffers[{index}] has {len(content)} of its {row['byteLength']} bytes")
             self._buffers[index] = np.frombuffer(content, np.uint8)
         return self._buffers[index]
+
+
+def normalized(values: Array) -> Array:
+    """Whole numbers as float32 of -1 or 0 to 1; others as they are."""
+    if values.dtype.kind == "f":
+        return values
+    steps = np.float32(np.iinfo(values.dtype).max)
+    return np.maximum(values / steps, np.float32(-1)).astype(np.float32, copy=False)
 
 
 def uri_content(uri: Any, source: Source, what: str) -> bytes | None:

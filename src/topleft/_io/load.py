@@ -15,7 +15,7 @@ from typing import TypeVar
 import numpy as np
 
 from topleft._io.foreign import read_by_trimesh
-from topleft._io.gltf import read_gltf
+from topleft._io.gltf import GLTF_SUFFIXES, read_gltf
 from topleft._io.notes import tell
 from topleft._io.obj import read_obj
 from topleft._io.ply import read_ply
@@ -81,7 +81,7 @@ def load(
 
 def _mesh(source: Source) -> Mesh:
     match source.path.suffix.lower():
-        case ".gltf" | ".glb" | ".vrm":
+        case suffix if suffix in GLTF_SUFFIXES:
             parts = read_gltf(source)
         case ".obj":
             parts = read_obj(source)

@@ -132,7 +132,8 @@ def _map_of(rest: str) -> _Map:
         if not option:
             i += 1
         elif option in OPTION_LENGTHS:
-            j, values = i + 1, []
+            j = i + 1
+            values: list[str] = []
             while j < len(words) and len(values) < OPTION_LENGTHS[option] and (not values or _is_number(words[j])):
                 if words[j]:
                     values.append(words[j])
@@ -205,11 +206,11 @@ class _Makers:
         return {"specular": _share(float(np.mean(strength))), "shininess": exponent[0]}
 
     def _opacity(self, numbers: dict[str, list[float]], maps: dict[str, _Map]) -> dict[str, Any]:
-        """Opacity: of `d`, else `Tr`; times the map of it, which becomes the alpha of the texture."""
+        """Opacity: of `d`, else 1 - `Tr`; times the map of it, which becomes the alpha of the texture."""
         opacity = 1.0
         if numbers.get("d"):
             opacity = _share(numbers["d"][0])
-        elif numbers.get("Tr"):
+        elif numbers.get("Tr") and numbers["Tr"][0] < 1:  # MeshLab writes 1 for opaque
             opacity = 1 - _share(numbers["Tr"][0])
         if opacity == 0:
             self._source.notes.add("materials that are wholly transparent")

@@ -51,11 +51,13 @@ def read_obj(source: Source) -> list[Mesh]:
     positions, colors = _positions(*text.numbers(b"v"))
     source.check_n_vertices(len(positions))
     uv, normals = (_columns(*text.numbers(key), n) for key, n in ((b"vt", 2), (b"vn", 3)))
-    corners, n_corners = _faces(text, (len(positions), len(uv), len(normals)))
+    corners, n_corners = _faces(text, (len(positions), len(uv), len(normals)), source)
     for key, note in UNREAD.items():
         if text.lines_of(key).size:
             source.notes.add(note)
     if not len(n_corners):
+        if len(positions) and not source.notes.lines:
+            source.notes.add("points not drawn")
         return []
     materials, row_of_face = _materials(text, source)
     triangles, faces = triangulate(positions, corners[:, 0], n_corners)
@@ -102,8 +104,9 @@ def _mesh(
     if normals is not None:
         own_normals = normals[normal_at]
     return Mesh(
-        positions[vertices], at.reshape(-1, 3), own_normals, None if colors is None else colors[vertices], own_uv,
-        materials, None if rows is None else rows,
+        positions[vertices], at.astype(np.int32).reshape(-1, 3), own_normals,
+        None if colors is None else colors[vertices], own_uv, materials,
+        None if rows is None else rows.astype(np.int32),
     )  # fmt: skip
 
 
@@ -130,6 +133,9 @@ class _Text:
     """
 
     def __init__(self, content: bytes) -> None:
+        if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
+            content = content.decode("utf-16", errors="replace").encode()
+        content = content.removeprefix(b"\xef\xbb\xbf")
         if b"\0" in content:
             raise MeshError("it is not text")
         if b"\\" in content:
@@ -257,7 +263,7 @@ def _positions(numbers: F64, n_of_line: I64) -> tuple[F64, U8 | None]:
     return positions, np.rint(np.column_stack([bytes_[:, :3], alpha])).astype(np.uint8)
 
 
-def _faces(text: _Text, n_above_all: tuple[int, int, int]) -> tuple[I64, I64]:
+def _faces(text: _Text, n_above_all: tuple[int, int, int], source: Source) -> tuple[I64, I64]:
     """The corners (C, 3) of all faces, as rows of positions, texture coordinates and normals, and how many each has."""
     body = text.bodies(b"f")
     n_corners = words_of_lines(body)
@@ -275,6 +281,12 @@ def _faces(text: _Text, n_above_all: tuple[int, int, int]) -> tuple[I64, I64]:
                 raise MeshError(f"a face names a {key.decode()} line before the first")
         n = n_above_all[column]
         if len(own) and int(own.max()) > n:
+            if column:
+                source.notes.add(
+                    {b"vt": "texture coordinates", b"vn": "normals"}[key] + " that faces name and that are not there"
+                )
+                own[own > n] = 0
+                continue
             raise MeshError(f"a face names {key.decode()} {int(own.max())} of {n}")
     if len(corners) and int(corners[:, 0].min()) < 1:
         raise MeshError("a face names v 0: they count from 1")

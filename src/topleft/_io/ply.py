@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import io
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -27,12 +27,11 @@ I64 = npt.NDArray[np.int64]
 
 DTYPES = {
     "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4", "float": "f4",
-    "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4", "float32": "f4",
-    "float64": "f8", "long": "i4", "ulong": "u4", "int64": "i8", "uint64": "u8",
+    "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4",
+    "float32": "f4", "float64": "f8", "long": "i4", "ulong": "u4", "int64": "i8", "uint64": "u8",
 }  # fmt: skip
 ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 MAX_HEADER_BYTES = 1 << 20
-N_ROWS_AT_ONCE = 1 << 16
 
 
 @dataclass
@@ -78,7 +77,7 @@ def read_ply(source: Source) -> Mesh | None:
     content = source.path.read_bytes()
     order, elements, textures, start = _header(content)
     body: _Numbers | _Bytes
-    body = _Numbers(content[start:]) if order == "" else _Bytes(content, start, order)
+    body = _Numbers(content[start:]) if order == "" else _Bytes(content, start, "<" if order == "<" else ">")
     found: dict[str, Rows] = {}
     for element in elements:
         if element.name == "vertex":
@@ -125,10 +124,10 @@ def _header(content: bytes) -> tuple[str, list[_Element], list[str], int]:
                 elements[-1].properties.append(_Property(name, np.dtype(DTYPES[kind]), np.dtype(DTYPES[count])))
             case ["property", kind, name] if elements and kind in DTYPES:
                 elements[-1].properties.append(_Property(name, np.dtype(DTYPES[kind])))
-            case ["ply"] | ["comment" | "obj_info", *_] | []:
-                pass
-            case _:
+            case ["element" | "property" | "format", *_]:
                 raise MeshError(f"its header says {' '.join(words)[:60]!r}")
+            case _:  # comments, also those that go on in a second line
+                pass
     raise MeshError("its header does not end")
 
 
@@ -179,7 +178,7 @@ class _Numbers:
         self._at = at
         made: Rows = {}
         for i, own in enumerate(element.properties):
-            first, many = np.array(starts[i]), np.array(lengths[i])
+            first, many = np.array(starts[i], np.int64), np.array(lengths[i], np.int64)
             picked = _cast(values[_ranges(first, many)], own.dtype)
             made[own.name] = picked if own.count_dtype is None else _List(picked, many)
         return made
@@ -210,10 +209,10 @@ def _ranges(starts: I64, lengths: I64) -> I64:
 class _Bytes:
     """A body of binary numbers."""
 
-    def __init__(self, content: bytes, start: int, order: str) -> None:
+    def __init__(self, content: bytes, start: int, order: Literal["<", ">"]) -> None:
         self._bytes = np.frombuffer(content, np.uint8)
         self._at = start
-        self._order = order
+        self._order: Literal["<", ">"] = order
 
     def rows(self, element: _Element) -> Rows:
         """The next element."""
@@ -298,7 +297,7 @@ class _Bytes:
         self._at = at
         made: Rows = {}
         for i, own in enumerate(element.properties):
-            first, many = np.array(starts[i]), np.array(lengths[i])
+            first, many = np.array(starts[i], np.int64), np.array(lengths[i], np.int64)
             dtype = own.dtype.newbyteorder(self._order)
             at_bytes = _ranges(first, many * dtype.itemsize)
             values = self._bytes[at_bytes].view(dtype)
@@ -361,7 +360,7 @@ def _mesh(vertex: Rows, corners: I64, n_corners: I64, face: Rows, textures: list
     normals = _together(vertex, (("nx", "ny", "nz"),))
     colors = _colors(vertex)
     uv = _together(vertex, UV_NAMES)
-    names = corners[triangles]
+    names = corners[triangles].astype(np.int32)
     on_corners = face.get("texcoord")
     color_of_face = _colors(face)
     if isinstance(on_corners, _List) and (on_corners.lengths == 2 * n_corners).all():
@@ -378,7 +377,7 @@ def _mesh(vertex: Rows, corners: I64, n_corners: I64, face: Rows, textures: list
     elif colors is not None:
         colors = colors[names.ravel()]
     own_normals = None if normals is None else normals[names.ravel()]
-    rows = np.arange(names.size).reshape(-1, 3)
+    rows = np.arange(names.size, dtype=np.int32).reshape(-1, 3)
     return _textured(Mesh(positions[names.ravel()], rows, own_normals, colors, uv), textures, source)
 
 

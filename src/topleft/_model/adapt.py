@@ -329,7 +329,8 @@ def joined(parts: list[Mesh]) -> Mesh:
         own_normals = angle_weighted_normals(vertices[first], group[triangles].astype(np.int32))[group]
     attributes = [vertices, own_normals, colors, uv, uv1]
     first, group = coincident(*(array for array in attributes if array is not None))
-    own_normals, colors, uv, uv1 = (None if array is None else array[first] for array in (own_normals, colors, uv, uv1))
+    own_normals, uv, uv1 = (None if array is None else array[first] for array in (own_normals, uv, uv1))
+    colors = None if colors is None else colors[first]
     return Mesh(vertices[first], group[triangles], own_normals, colors, uv, materials, rows, uv1)
 
 
