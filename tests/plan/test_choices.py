@@ -202,11 +202,20 @@ def test_sinks_of_fragments():
     assert choices.fragment_sink(DepthTest.LESS, has_depth=False) is Sink.PAINT
 
 
+def test_vertices_without_depth_are_planned_as_they_are_drawn():
+    vertices, triangles = random_triangles(np.random.default_rng(5))
+    plan = tl.plan(vertices, triangles, SIZE).measure(1)
+    (stage,) = (one for one in plan.stages if one.name == "depth")
+    assert (stage.choice, stage.timed_in) == ("no test, ids alone", "method")
+    assert "depth" not in plan.measured_ms
+
+
 def test_depth_is_left_out_where_that_pays():
     def is_left_out(n, size_px, size):
         rng = np.random.default_rng(9)
         corners = np.array([[0, 0], [size_px, 0], [0, size_px]])
         vertices = (rng.uniform(0, size[0], (n, 1, 2)) + corners).reshape(-1, 2)
+        vertices = np.hstack([vertices, np.full((3 * n, 1), 0.5)])
         plan = tl.plan(vertices, np.arange(3 * n).reshape(n, 3), size)
         return next(one.choice for one in plan.stages if one.name == "depth") == "no test, ids alone"
 

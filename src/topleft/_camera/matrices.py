@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from topleft._base.arrays import as_vector
 from topleft._model.adapt import MeshLike, as_mesh, is_mesh_like
 from topleft._model.mesh import extreme_points, used_vertices
 
@@ -100,7 +101,7 @@ def view_matrix(eye: npt.ArrayLike, target: npt.ArrayLike, up: npt.ArrayLike = (
     ValueError
         If eye and target coincide, or if `up` is zero or parallel to the view.
     """
-    eye, target, up = as_vector(eye, "eye"), as_vector(target, "target"), as_vector(up, "up")
+    eye, target, up = as_vector("eye", eye), as_vector("target", target), as_vector("up", up)
     forward = target - eye
     distance = np.linalg.norm(forward)
     if distance == 0:
@@ -139,15 +140,13 @@ def orbit_view(
     if not -90 <= elevation_deg <= 90:
         raise ValueError(f"elevation_deg must lie in -90 to 90, got {elevation_deg}")
     azimuth, elevation = np.radians([azimuth_deg, elevation_deg])
-    outward = np.array(
-        [np.cos(elevation) * np.sin(azimuth), np.sin(elevation), np.cos(elevation) * np.cos(azimuth)]
-    )
+    outward = np.array([np.cos(elevation) * np.sin(azimuth), np.sin(elevation), np.cos(elevation) * np.cos(azimuth)])
     axis = np.array([0.0, 1.0, 0.0])
     if abs(elevation_deg) > 89:  # from a pole: the limit of the pictures on the way there
         axis = np.array([-np.sin(azimuth), 0, -np.cos(azimuth)]) * np.sign(elevation)
     if up == "z":
         outward, axis = outward[[0, 2, 1]] * [1, -1, 1], axis[[0, 2, 1]] * [1, -1, 1]
-    target = as_vector(target, "target")
+    target = as_vector("target", target)
     return view_matrix(target + distance * outward, target, axis)
 
 
@@ -191,30 +190,6 @@ def box_matrix(left: float, right: float, bottom: float, top: float, near: float
     return matrix
 
 
-def as_vector(values: npt.ArrayLike, name: str) -> F64:
-    """Three finite numbers as float64."""
-    vector = np.asarray(values, dtype=np.float64)
-    if vector.shape != (3,) or not np.isfinite(vector).all():
-        raise ValueError(f"{name} must be three finite numbers, got {values!r}")
-    return vector
-
-
-def as_square(values: npt.ArrayLike, n: int, name: str) -> F64:
-    """A finite matrix (n, n) as float64, always a copy."""
-    matrix = np.array(values, dtype=np.float64)
-    if matrix.shape != (n, n):
-        raise ValueError(f"{name} must have shape ({n}, {n}), got {matrix.shape}")
-    if not np.isfinite(matrix).all():
-        raise ValueError(f"{name} must hold finite numbers, got {matrix.tolist()}")
-    return matrix
-
-
-def check_regular(matrix: F64, name: str) -> None:
-    """Raise a `ValueError` if the matrix is singular."""
-    if np.linalg.matrix_rank(matrix) < len(matrix):
-        raise ValueError(f"{name} must not be singular, got {matrix.tolist()}")
-
-
 def check_positive(name: str, value: float) -> None:
     """Raise a `ValueError` unless the number is finite and above 0."""
     if not (np.isfinite(value) and value > 0):
@@ -236,6 +211,4 @@ def check_planes(near: float, far: float) -> None:
 def check_window(left: float, right: float, bottom: float, top: float) -> None:
     """Raise a `ValueError` unless the four sides are finite and in order."""
     if not (np.isfinite([left, right, bottom, top]).all() and left < right and bottom < top):
-        raise ValueError(
-            f"left < right and bottom < top must be finite, got {left} and {right}, {bottom} and {top}"
-        )
+        raise ValueError(f"left < right and bottom < top must be finite, got {left} and {right}, {bottom} and {top}")

@@ -16,6 +16,7 @@ from topleft._base.memory import FRESH
 from topleft._base.options import DepthTest, Sampling, Sink
 from topleft._model.mesh import Mesh
 from topleft._raster import choices
+from topleft._raster.choices import Drawing, Route
 from topleft._raster.cluster_draw import ClusteredMesh
 from topleft._raster.clusters import Clusters
 from topleft._raster.sampling import sample_positions
@@ -61,7 +62,8 @@ class Facts:
     outputs: tuple[str, ...]
     view: View
     test: DepthTest | None
-    sink: Sink
+    route: Route | None  # of `rasterize`
+    drawing: Drawing
     vertex_dtype: str  # as given
     point_dtype: str  # as worked on
     is_vertex_copy: bool
@@ -76,10 +78,8 @@ class Facts:
     n_clipped: int  # vertices outside of a clip plane
     n_cut: int  # triangles that a plane cuts and that are drawn as pieces
     n_pieces: int
-    flat_depth: float | None  # when ids are drawn alone
     common_depth: float | None  # of all vertices, whatever is made of it
     is_direct: bool  # uint8 colours of triangles are stored without labels in between
-    n_threads: int  # that draw
     work_ms: float  # of one thread, as guessed before the draw
     census: tuple[tuple[int, float, float], ...]  # of each of CLASSES: triangles, samples in boxes, covered
     clusters: ClusterFacts | None = None  # of a mesh
@@ -103,7 +103,7 @@ class Facts:
         """Whether each thread takes a share of the triangles."""
         if self.view.sampling is Sampling.AREA or self.draws_planes or self.is_direct:
             return False
-        return choices.is_shared(self.view, self.n_triangles, self.n_threads, self.sink)
+        return self.drawing.is_shared
 
     @property
     def n_drawn(self) -> int:
@@ -117,12 +117,7 @@ class Facts:
 
 
 def find_facts(
-    vertices: ArrayLike,
-    triangles: ArrayLike,
-    view: View,
-    verb: str,
-    outputs: tuple[str, ...],
-    test: DepthTest | None,
+    vertices: ArrayLike, triangles: ArrayLike, view: View, verb: str, outputs: tuple[str, ...], test: DepthTest | None
 ) -> tuple[Facts, NDArray[np.int32]]:
     """Return what a scene is, and its triangles as a copy that nobody changes.
 
@@ -131,30 +126,28 @@ def find_facts(
     ValueError, TypeError, IndexError
         As the verb would.
     """
-    with_depth = verb == "rasterize"
-    snapped = snap_mesh(FRESH, vertices, triangles, view, with_depth=with_depth, out=None)
+    snapped = snap_mesh(FRESH, vertices, triangles, view, with_depth=verb == "rasterize", out=None)
     snapped.check_indices()
     given, indices = as_array("vertices", vertices), as_array("triangles", triangles)
     points, pieces, source = snapped.points, snapped.pieces, snapped.source
     xy = snapped.records.view(np.int32).reshape(-1, 4)[:, :2]
     is_special = xy[:, 0] == np.iinfo(np.int32).min
-    sink = find_sink(verb, view, test, has_depth=snapped.has_depth)
+    route, drawing = None, choices.drawing(view, snapped, find_sink(verb, view))
+    if verb == "rasterize":
+        route, drawing = choices.route(view, snapped, test, wants_depth=False)
     common = choices.common_depth(points, has_depth=snapped.has_depth, is_clip_space=source.is_clip_space)
-    flat = None
-    if with_depth and view.sampling is Sampling.CENTER and 0 not in view.size and choices.is_flat(snapped, view):
-        flat = common
-    drawn_sink = sink if flat is None else Sink.LABEL
-    samples = sample_positions(view.sampling.n_samples, view.grid_bits) if sink is Sink.SAMPLES else None
+    samples = sample_positions(view.sampling.n_samples, view.grid_bits) if drawing.sink is Sink.SAMPLES else None
     census = [(0, 0.0, 0.0)] * len(CLASSES)
     if 0 not in view.size and snapped.n_triangles:
-        _, census = snapped.mesh.count_classes(drawn_sink, *view.size, samples)
+        _, census = snapped.mesh.count_classes(drawing.sink, *view.size, samples)
     in_pixels = not source.is_clip_space and len(points) > 0
     facts = Facts(
         verb=verb,
         outputs=outputs,
         view=view,
         test=test,
-        sink=drawn_sink,
+        route=route,
+        drawing=drawing,
         vertex_dtype=str(given.dtype),
         point_dtype=str(points.dtype),
         is_vertex_copy=not np.shares_memory(given, points),
@@ -169,22 +162,18 @@ def find_facts(
         n_clipped=int((is_special & (xy[:, 1] == 2)).sum()),
         n_cut=len(np.unique(pieces.arrays[5][: len(pieces)])) if pieces else 0,  # type: ignore[index]
         n_pieces=len(pieces) if pieces else 0,
-        flat_depth=flat,
         common_depth=common,
         is_direct=verb == "fill" and choices.is_direct(snapped, view, np.dtype(np.uint8), is_flat=True),
-        n_threads=choices.threads_to_draw(view, snapped, drawn_sink),
-        work_ms=choices.work_ns(view, snapped, drawn_sink) / 1e6,
+        work_ms=choices.work_ns(view, snapped, drawing.sink) / 1e6,
         census=tuple(census),
     )
-    corners = np.array(snapped.triangles, np.int32)
-    corners.flags.writeable = False
-    return facts, corners
+    checked = np.array(snapped.triangles, np.int32)
+    checked.flags.writeable = False
+    return facts, checked
 
 
-def find_sink(verb: str, view: View, test: DepthTest | None, *, has_depth: bool) -> Sink:
-    """Return what a verb does with a covered sample."""
-    if verb == "rasterize":
-        return choices.fragment_sink(test, has_depth=has_depth)
+def find_sink(verb: str, view: View) -> Sink:
+    """Return what a verb other than `rasterize` does with a covered sample."""
     if verb == "fill":
         return Sink.LABEL
     if verb == "overdraw" or view.sampling is Sampling.AREA:
@@ -227,10 +216,10 @@ def memory_of(facts: Facts) -> tuple[dict[str, int], dict[str, int]]:
     if facts.index_dtype not in ("int32", "uint32"):
         scratch["triangles"] = 12 * n
     results = result_bytes(facts)
-    if facts.sink in (Sink.MASK, Sink.SAMPLES) and not is_empty:
+    if facts.drawing.sink in (Sink.MASK, Sink.SAMPLES) and not is_empty:
         scratch["covered"] = 8 * height * _engine.Target.covered_shape(height, width, n_samples)[1]
     if view.sampling is Sampling.AREA:
-        strips = facts.n_threads * _engine.blend_cells(width)
+        strips = facts.drawing.n_threads * _engine.blend_cells(width)
         scratch["cells"] = 4 * (strips if facts.verb == "fill" else height * _engine.area_stride(width))
     elif facts.verb == "fill" and n_samples == 1 and n and not facts.is_direct:
         scratch["labels"] = 4 * n_pixels
@@ -240,9 +229,9 @@ def memory_of(facts: Facts) -> tuple[dict[str, int], dict[str, int]]:
     found = facts.clusters
     if found is not None and found.clusters is not None:  # the records are not needed, unless a plane cuts
         scratch["records"] = 0 if not facts.n_clipped else scratch["records"]
-        scratch["clusters"] = 12 * len(found.clusters) + 4 * facts.n_threads * n + found.clusters.n_bytes
+        scratch["clusters"] = 12 * len(found.clusters) + 4 * facts.drawing.n_threads * n + found.clusters.n_bytes
     elif facts.is_shared:
-        scratch["others"] = 4 * (n + 16 * facts.n_threads)
+        scratch["others"] = 4 * (n + 16 * facts.drawing.n_threads)
     return scratch, results
 
 

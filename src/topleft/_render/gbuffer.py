@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft import _engine
-from topleft._base.threads import count_threads, parse_threads, run_parts
+from topleft._base.threads import run_parts, threads_for
 from topleft._camera.camera import Camera
 from topleft._model.mesh import Mesh
 from topleft._model.scene import Scene
@@ -63,7 +63,7 @@ def evaluate(
     half_size = size[0] / 2, size[1] / 2
     points = _engine.Points(mesh.vertices, what, np.ascontiguousarray(rows), half_size, background, dtype is np.float64)
     scene = frags._snapped.with_inverse_w(ids.size)
-    n_threads = count_threads(parse_threads(threads), len(mesh.triangles))
+    n_threads = threads_for(threads, len(mesh.triangles))
     run_parts(lambda first, end: points.fill(scene, ids, out, first, end - first), len(ids), n_threads)
     return out
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from topleft import _engine
-from topleft._base.memory import SCRATCH, FreshMemory, KeptMemory
+from topleft._base.memory import FRESH, SCRATCH, KeptMemory
 from topleft._base.options import DepthTest, Sampling, Sink, parse
 from topleft._base.threads import count_threads, run_parts
 from topleft._camera.camera import Camera
@@ -38,8 +38,6 @@ VERTICES_AT_ONCE = 1 << 20
 
 #: `tl_kernels.draw` begins a mask anew after 2**31 pixels, which one that is drawn in several calls must not meet.
 MOST_PIXELS_OF_PART = 1 << 30
-
-FRESH = FreshMemory()
 
 #: cull codes of a view (tl_cull) for an instance that mirrors.
 MIRRORED = {0: 0, 1: 2, 2: 1}

@@ -23,7 +23,7 @@ import numpy.typing as npt
 from topleft import _engine
 from topleft._base.color import LINEAR_ONE, Color, as_color, id_colors, srgb_tables
 from topleft._base.options import parse
-from topleft._base.threads import count_threads, parse_threads, run_parts
+from topleft._base.threads import count_threads, parse_threads, run_parts, threads_for
 from topleft._camera.camera import Camera
 from topleft._model.light import AMBIENT, Fog, Light, as_not_negative
 from topleft._model.material import Material
@@ -235,9 +235,7 @@ def shade_samples(frags: Fragments, shade_one: Callable[[Fragments], U8], backgr
     return picture
 
 
-def shade_normals(
-    frags: Fragments, mesh: Mesh, camera: Camera, turn: F64, *, threads: int | None = None
-) -> F32:
+def shade_normals(frags: Fragments, mesh: Mesh, camera: Camera, turn: F64, *, threads: int | None = None) -> F32:
     """Unit normals (H, W, 3) float32 of the visible pixels, on the side that is seen, 0 where nothing is.
 
     Parameters
@@ -262,7 +260,7 @@ def shade_normals(
     scene = frags._snapped
     look = ShadingInputs(scene, mesh, camera, ids.shape[::-1], None, is_flat=False)
     look.set_turn(SHOW_CODES[Shading.NORMALS], turn)
-    n_threads = count_threads(parse_threads(threads), len(mesh.triangles))
+    n_threads = threads_for(threads, len(mesh.triangles))
 
     def shade_rows(first: int, end: int) -> None:
         _engine.shade_normals(scene, look.shading, ids, out, first, end - first)

@@ -234,9 +234,7 @@ CLASSICS = {
             "row_crossing/cull-back",
             "the same without area or back faces",
             WYLIE,
-            Claims(
-                watertight=True, integer_vertices=True, overdraws_shared_edges=True, winding="counter-clockwise"
-            ),
+            Claims(watertight=True, integer_vertices=True, overdraws_shared_edges=True, winding="counter-clockwise"),
             limit=INT_LIMIT,
         ),
         Method(
