@@ -141,7 +141,7 @@ class _Text:
         if b"\\" in content:
             content = re.sub(rb"\\\r?\n", b" ", content)
         content = content.translate(BLANKS) + b"\n\n"
-        if re.search(rb"(?:^|\n) ", content):
+        if content[:1] == b" " or b"\n " in content:
             content = re.sub(rb"(?m)^ +", b"", content)
         self._bytes = np.frombuffer(content, np.uint8).copy()
         self._content = content
@@ -217,20 +217,28 @@ def parsed(body: U8, dtype: Any) -> Array:
     if not len(body):
         return np.zeros(0, dtype)
     try:
-        return np.fromstring(body.tobytes().decode("latin-1"), dtype, sep=" ")
+        return np.fromstring(body.tobytes(), dtype, sep=" ")
     except (ValueError, DeprecationWarning):
         raise MeshError("a number in it is none") from None
 
 
 def words_of_lines(body: U8) -> I64:
     """How many words each line has."""
-    if not len(body):
-        return np.zeros(0, np.int64)
+    line_ends = np.flatnonzero(body == NEWLINE)
+    return _counts(_starts_of_words(body), line_ends)
+
+
+def _starts_of_words(body: U8) -> I64:
     is_word = body > BLANK
-    begins = is_word.copy()
-    begins[1:] &= ~is_word[:-1]
-    starts = np.concatenate([[0], np.flatnonzero(body == NEWLINE)[:-1] + 1])
-    return np.add.reduceat(begins, starts, dtype=np.int64)
+    is_word[1:] &= ~(is_word[:-1])
+    return np.flatnonzero(is_word)
+
+
+def _counts(places: I64, ends: I64) -> I64:
+    """How many of the places, ascending, lie before each end and not before the one before."""
+    counts = np.searchsorted(places, ends)
+    counts[1:] -= counts[:-1].copy()
+    return counts
 
 
 def _columns(numbers: F64, n_of_line: I64, n: int) -> F64:
@@ -295,27 +303,29 @@ def _faces(text: _Text, n_above_all: tuple[int, int, int], source: Source) -> tu
 
 def _indices(body: U8) -> I64:
     """Corners (C, 3) of the words v, v/vt, v//vn and v/vt/vn as they stand; 0 where there is none."""
-    is_word = body > BLANK
-    begins = is_word.copy()
-    begins[1:] &= ~is_word[:-1]
-    starts = np.flatnonzero(begins)
+    starts = _starts_of_words(body)
     corners = np.zeros((len(starts), 3), np.int64)
     if not len(starts):
         return corners
-    is_slash = body == SLASH
-    n_slashes = np.add.reduceat(is_slash, starts, dtype=np.int64)
-    is_double = is_slash.copy()
-    is_double[:-1] &= is_slash[1:]
-    is_double[-1:] = False
-    n_doubles = np.add.reduceat(is_double, starts, dtype=np.int64)
-    kinds = 3 * n_slashes + n_doubles
-    numbers = np.where(is_slash, BLANK, body).astype(np.uint8)
-    for kind in np.unique(kinds).tolist():
+    slashes = np.flatnonzero(body == SLASH)
+    if not len(slashes):
+        values = parsed(body, np.int64)
+        if len(values) != len(starts):
+            raise MeshError("a face of it is no list of indices")
+        corners[:, 0] = values
+        return corners
+    doubles = slashes[:-1][np.diff(slashes) == 1]
+    next_starts = np.append(starts[1:], len(body))
+    kinds = 3 * _counts(slashes, next_starts) + _counts(doubles, next_starts)
+    numbers = body.copy()
+    numbers[slashes] = BLANK
+    is_one = bool((kinds == kinds[0]).all())
+    for kind in kinds[:1].tolist() if is_one else np.unique(kinds).tolist():
         columns = COLUMNS_OF_KIND.get(kind)
         if columns is None:
             raise MeshError("a face of it is no list of indices")
         own = kinds == kind
-        if own.all():
+        if is_one:
             values = parsed(numbers, np.int64)
         else:
             lengths = np.diff(np.append(starts, len(body)))
@@ -324,7 +334,8 @@ def _indices(body: U8) -> I64:
         if len(values) != len(columns) * int(own.sum()):
             corners[own] = [_corner(body, start) for start in starts[own].tolist()]
             continue
-        corners[np.ix_(own, columns)] = values.reshape(-1, len(columns))
+        for i, column in enumerate(columns):
+            corners[own, column] = values[i :: len(columns)]
     return corners
 
 

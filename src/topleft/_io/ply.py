@@ -136,7 +136,7 @@ class _Numbers:
 
     def __init__(self, content: bytes) -> None:
         try:
-            self._values = np.fromstring(content.decode("latin-1"), np.float64, sep=" ")
+            self._values = np.fromstring(content, np.float64, sep=" ")
         except (ValueError, DeprecationWarning):
             raise MeshError("a number in it is none") from None
         self._at = 0

@@ -49,11 +49,11 @@ def triangulate(points: Array, corners: Array, n_corners: Array) -> tuple[I64, I
         If a corner is no point.
     """
     n_corners = n_corners.astype(np.int64)
+    if (n_corners == 3).all():
+        return np.arange(3 * len(n_corners)).reshape(-1, 3), np.arange(len(n_corners))
     starts = np.cumsum(n_corners) - n_corners
     n_triangles = np.maximum(n_corners - 2, 0)
     faces = np.repeat(np.arange(len(n_corners)), n_triangles)
-    if (n_corners == 3).all():
-        return np.arange(3 * len(n_corners)).reshape(-1, 3), faces
     if len(corners) and not (0 <= corners.min() and corners.max() < len(points)):
         bad = int(((corners < 0) | (corners >= len(points))).argmax())
         raise IndexError(f"corner {bad} = {corners[bad]} must be one of {len(points)} points")
