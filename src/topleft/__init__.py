@@ -36,7 +36,7 @@ from topleft._render.fragments import SceneDepthLayers, SceneFragments
 from topleft._render.render import rasterize_mesh, render
 from topleft._render.scene_shade import shade
 from topleft._render.silhouette import silhouette
-from topleft.errors import ImageError, MeshError, MissingPackageError, TopleftError
+from topleft.errors import ImageError, MeshError, MeshWarning, MissingPackageError, TopleftError
 
 if TYPE_CHECKING:
     from topleft._batch.batch import render_batch

@@ -14,7 +14,7 @@ from topleft._camera.camera import Camera
 from topleft._camera.matrices import F64, box_matrix, frustum_matrix
 from topleft._io.gltf import GLTF_SUFFIXES, CameraOfFile, read_cameras
 from topleft._io.load import reading
-from topleft._io.references import Source
+from topleft._io.references import InputFile
 from topleft.errors import MeshError
 
 
@@ -39,7 +39,7 @@ def load_cameras(path: str | os.PathLike[str]) -> list[Camera]:
     MeshError
         If the file is broken, or a camera of it has numbers that none can have.
     """
-    source = Source(Path(path))
+    source = InputFile(Path(path))
 
     def cameras() -> list[Camera]:
         return [_camera(own, source) for own in read_cameras(source)] if is_gltf else []
@@ -48,7 +48,7 @@ def load_cameras(path: str | os.PathLike[str]) -> list[Camera]:
     return reading(source, cameras)
 
 
-def _camera(own: CameraOfFile, source: Source) -> Camera:
+def _camera(own: CameraOfFile, source: InputFile) -> Camera:
     numbers = own.numbers
     if not np.isfinite(own.world_from_eye).all() or not np.isfinite(list(numbers.values())).all():
         raise MeshError("a camera of it stands nowhere")

@@ -1,4 +1,4 @@
-"""Reads by trimesh what has no reader here: STL, OFF, 3MF, COLLADA and what else it knows.
+"""Reads by trimesh what has no reader here: OFF, 3MF, COLLADA and what else it knows.
 
 Input: a file, unchecked. Output: `Mesh` parts, placed.
 """
@@ -7,15 +7,13 @@ from __future__ import annotations
 
 import contextlib
 import io
-import logging
-import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 
-from topleft._io.references import Source
+from topleft._io.references import InputFile
 from topleft._model.adapt import placed
 from topleft._model.mesh import Mesh
 from topleft.errors import MeshError, MissingPackageError
@@ -35,7 +33,7 @@ MAX_UNPACKED_BYTES = 1 << 29
 """Of all files of an archive."""
 
 
-def read_by_trimesh(source: Source) -> list[Mesh]:
+def read_by_trimesh(source: InputFile) -> list[Mesh]:
     """The meshes of a file, in its order.
 
     Raises
@@ -56,7 +54,7 @@ def read_by_trimesh(source: Source) -> list[Mesh]:
             scene = trimesh.load_scene(str(source.path), process=False)
             parts = list(_parts(scene, source))
     except NotImplementedError:
-        readable = " ".join(sorted(trimesh.available_formats() | {"obj", "ply", "gltf", "glb"}))
+        readable = " ".join(sorted(trimesh.available_formats() | {"obj", "ply", "stl", "gltf", "glb"}))
         raise MeshError(
             f"cannot read {str(source.path)!r}: format {source.path.suffix!r} is none of {readable}"
         ) from None
@@ -71,7 +69,7 @@ def read_by_trimesh(source: Source) -> list[Mesh]:
     return parts
 
 
-def _check_what_it_is(source: Source, suffix: str) -> None:
+def _check_what_it_is(source: InputFile, suffix: str) -> None:
     """Raise an error for what trimesh would fail on in words that do not say why."""
     with source.path.open("rb") as file:
         head = file.read(64)
@@ -80,6 +78,8 @@ def _check_what_it_is(source: Source, suffix: str) -> None:
     if suffix in (".svg", ".binvox"):
         raise MeshError(f"cannot draw {str(source.path)!r}: {NO_TRIANGLES[suffix]}")
     if head.startswith(b"PK\3\4"):
+        import zipfile
+
         try:
             with zipfile.ZipFile(source.path) as archive:
                 n_bytes = sum(row.file_size for row in archive.infolist())
@@ -89,7 +89,7 @@ def _check_what_it_is(source: Source, suffix: str) -> None:
             raise MeshError(f"its archive holds {n_bytes} bytes, more than {MAX_UNPACKED_BYTES}")
 
 
-def _parts(scene: Any, source: Source) -> Iterator[Mesh]:
+def _parts(scene: Any, source: InputFile) -> Iterator[Mesh]:
     """The meshes of a trimesh scene, in its order, placed."""
     n_vertices = 0
     for transform, name in (scene.graph[node] for node in scene.graph.nodes_geometry):
@@ -107,6 +107,8 @@ def _parts(scene: Any, source: Source) -> Iterator[Mesh]:
 @contextmanager
 def quiet() -> Iterator[None]:
     """Keep what trimesh and meshio print off the terminal; errors say what is wrong."""
+    import logging
+
     logger = logging.getLogger("trimesh")
     handler = logging.NullHandler()
     logger.addHandler(handler)  # a logger without a handler prints its warnings

@@ -10,7 +10,6 @@ Based on: Khronos Group, "glTF 2.0 Specification", 2021.
 
 from __future__ import annotations
 
-import json
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -22,7 +21,7 @@ import numpy.typing as npt
 from topleft._base.color import encode_srgb
 from topleft._io.gltf_accessors import Accessors, Tree, entry, normalized
 from topleft._io.gltf_materials import Materials
-from topleft._io.references import Source
+from topleft._io.references import InputFile
 from topleft._model.mesh import Mesh
 from topleft.errors import MeshError, MissingPackageError
 
@@ -69,7 +68,7 @@ class CameraOfFile:
     """`yfov` (radians) or `xmag` and `ymag`; `znear` and, unless it is infinite, `zfar`."""
 
 
-def read_gltf(source: Source) -> list[Mesh]:
+def read_gltf(source: InputFile) -> list[Mesh]:
     """The parts of a glTF or GLB file, as its nodes place them.
 
     Raises
@@ -87,7 +86,7 @@ def read_gltf(source: Source) -> list[Mesh]:
     return parts
 
 
-def read_cameras(source: Source) -> list[CameraOfFile]:
+def read_cameras(source: InputFile) -> list[CameraOfFile]:
     """The cameras of a glTF or GLB file, in the order of the nodes that hold them.
 
     Raises
@@ -110,8 +109,10 @@ def read_cameras(source: Source) -> list[CameraOfFile]:
     return cameras
 
 
-def _tree_and_blob(source: Source) -> tuple[Tree, bytes | None]:
+def _tree_and_blob(source: InputFile) -> tuple[Tree, bytes | None]:
     """The JSON of the file, and the binary chunk of a GLB."""
+    import json  # here, as the package is imported by many that read no glTF
+
     content, blob = source.path.read_bytes(), None
     if content[:4] == b"glTF":
         content, blob = _chunks(content, source)
@@ -130,13 +131,13 @@ def _tree_and_blob(source: Source) -> tuple[Tree, bytes | None]:
     return tree, blob
 
 
-def _glTF1(source: Source) -> MeshError:  # noqa: N802
+def _glTF1(source: InputFile) -> MeshError:  # noqa: N802
     return MeshError(
         f"cannot read {str(source.path)!r}: it is glTF 1.0, and 2.0 is read: convert it, by gltf-pipeline say"
     )
 
 
-def _chunks(content: bytes, source: Source) -> tuple[bytes, bytes | None]:
+def _chunks(content: bytes, source: InputFile) -> tuple[bytes, bytes | None]:
     if len(content) < 20:
         raise MeshError("it ends within its header")
     _, version, length = struct.unpack_from("<III", content)
@@ -161,7 +162,7 @@ def _chunks(content: bytes, source: Source) -> tuple[bytes, bytes | None]:
     return text, blob
 
 
-def _check_extensions(tree: Tree, source: Source) -> None:
+def _check_extensions(tree: Tree, source: InputFile) -> None:
     """Raise an error for what the file cannot do without, and note what it can."""
     for name in tree.get("extensionsRequired", []):
         if name not in READ_EXTENSIONS and not str(name).startswith(MAY_BE_LEFT_OUT):
@@ -274,7 +275,7 @@ class _Shape:
 
 
 class _Reader:
-    def __init__(self, tree: Tree, accessors: Accessors, materials: Materials, source: Source) -> None:
+    def __init__(self, tree: Tree, accessors: Accessors, materials: Materials, source: InputFile) -> None:
         self._tree = tree
         self._accessors = accessors
         self._materials = materials

@@ -16,7 +16,7 @@ from urllib.parse import unquote, unquote_to_bytes
 import numpy as np
 import numpy.typing as npt
 
-from topleft._io.references import Source
+from topleft._io.references import InputFile
 from topleft.errors import MeshError
 
 Array = npt.NDArray[Any]
@@ -69,11 +69,11 @@ class Accessors:
         The JSON.
     blob : bytes, optional
         The binary chunk of a GLB file.
-    source : Source
+    source : InputFile
         Where the buffers are.
     """
 
-    def __init__(self, tree: Tree, blob: bytes | None, source: Source) -> None:
+    def __init__(self, tree: Tree, blob: bytes | None, source: InputFile) -> None:
         self._tree = tree
         self._blob = blob
         self._source = source
@@ -174,7 +174,7 @@ def normalized(values: Array) -> Array:
     return np.maximum(values / steps, np.float32(-1)).astype(np.float32, copy=False)
 
 
-def uri_content(uri: Any, source: Source, what: str) -> bytes | None:
+def uri_content(uri: Any, source: InputFile, what: str) -> bytes | None:
     """The bytes of a URI: of a file beside the mesh, or its own.
 
     Raises

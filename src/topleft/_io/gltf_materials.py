@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from topleft._base.color import Color, encode_srgb
 from topleft._io.gltf_accessors import Accessors, Tree, entry, uri_content, whole
-from topleft._io.references import Source
+from topleft._io.references import InputFile
 from topleft._model.material import AlphaMode, Material
 from topleft._model.texture import Encoding, Filter, Texture, Wrap
 from topleft.errors import MeshError
@@ -36,11 +36,11 @@ class Materials:
         The JSON.
     accessors : Accessors
         Where pictures inside the file are.
-    source : Source
+    source : InputFile
         Where those beside it are.
     """
 
-    def __init__(self, tree: Tree, accessors: Accessors, source: Source) -> None:
+    def __init__(self, tree: Tree, accessors: Accessors, source: InputFile) -> None:
         self._tree = tree
         self._accessors = accessors
         self._source = source

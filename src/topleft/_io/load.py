@@ -19,7 +19,8 @@ from topleft._io.gltf import GLTF_SUFFIXES, read_gltf
 from topleft._io.notes import tell
 from topleft._io.obj import read_obj
 from topleft._io.ply import read_ply
-from topleft._io.references import MAX_TEXTURE_PIXELS, MAX_VERTICES, Source
+from topleft._io.references import MAX_TEXTURE_PIXELS, MAX_VERTICES, InputFile
+from topleft._io.stl import read_stl
 from topleft._model.adapt import joined
 from topleft._model.mesh import Mesh
 from topleft.errors import MeshError, MissingPackageError
@@ -33,7 +34,7 @@ def load(
     max_vertices: int = MAX_VERTICES,
     max_texture_pixels: int = MAX_TEXTURE_PIXELS,
 ) -> Mesh:
-    """A mesh read from a file: OBJ, PLY, glTF and GLB; by trimesh STL, OFF and what else it has readers for.
+    """A mesh read from a file: OBJ, PLY, STL, glTF and GLB; by trimesh OFF, 3MF and what else it has readers for.
 
     Parameters
     ----------
@@ -73,21 +74,22 @@ def load(
     Files that a mesh names are read from its folder, and from the folders in it; nothing else is opened. What is read
     of each format is told in docs/guide/files.md.
     """
-    source = Source(Path(path), max_vertices=max_vertices, max_texture_pixels=max_texture_pixels)
+    source = InputFile(Path(path), max_vertices=max_vertices, max_texture_pixels=max_texture_pixels)
     mesh = reading(source, lambda: _mesh(source))
     tell(source.notes.lines, stacklevel=2)
     return mesh
 
 
-def _mesh(source: Source) -> Mesh:
+def _mesh(source: InputFile) -> Mesh:
     match source.path.suffix.lower():
         case suffix if suffix in GLTF_SUFFIXES:
             parts = read_gltf(source)
         case ".obj":
             parts = read_obj(source)
         case ".ply":
-            part = read_ply(source)
-            parts = [] if part is None else [part]
+            parts = [part for part in [read_ply(source)] if part is not None]
+        case ".stl" | ".stl_ascii":
+            parts = [part for part in [read_stl(source)] if part is not None]
         case _:
             parts = read_by_trimesh(source)
     if not any(len(part.triangles) for part in parts):
@@ -98,7 +100,7 @@ def _mesh(source: Source) -> Mesh:
     return joined(parts)
 
 
-def reading(source: Source, read: Callable[[], Made]) -> Made:
+def reading(source: InputFile, read: Callable[[], Made]) -> Made:
     """What a reader makes of a file; whatever goes wrong in it is told in one line.
 
     Raises

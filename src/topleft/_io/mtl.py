@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._base.color import Color, decode_srgb
-from topleft._io.references import Source
+from topleft._io.references import InputFile
 from topleft._model.material import AlphaMode, Material
 from topleft._model.texture import Encoding, Texture, Wrap
 from topleft.errors import MeshError
@@ -64,7 +64,7 @@ class _Entry:
     maps: dict[str, _Map] = field(default_factory=dict)
 
 
-def read_mtl(text: str, folder: Path, source: Source) -> dict[str, Callable[[], Material]]:
+def read_mtl(text: str, folder: Path, source: InputFile) -> dict[str, Callable[[], Material]]:
     """The materials of a library: functions, since the pictures of those that nobody uses are not read.
 
     Parameters
@@ -73,7 +73,7 @@ def read_mtl(text: str, folder: Path, source: Source) -> dict[str, Callable[[], 
         The library.
     folder : Path
         Where its pictures are.
-    source : Source
+    source : InputFile
         The mesh file, which gets the notes.
     """
     entries: dict[str, _Entry] = {}
@@ -175,7 +175,7 @@ def _maker(makers: _Makers, entry: _Entry) -> Callable[[], Material]:
 class _Makers:
     """Materials with the pictures that they share."""
 
-    def __init__(self, folder: Path, source: Source) -> None:
+    def __init__(self, folder: Path, source: InputFile) -> None:
         self._folder = folder
         self._source = source
         self._textures: dict[tuple[Any, ...], Texture] = {}

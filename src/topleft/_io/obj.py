@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._io.mtl import read_mtl
-from topleft._io.references import Source
+from topleft._io.references import InputFile, numbers_of_text
 from topleft._model.material import Material
 from topleft._model.mesh import Mesh
 from topleft._model.polygons import triangulate
@@ -39,7 +39,7 @@ UNREAD = {
 }
 
 
-def read_obj(source: Source) -> list[Mesh]:
+def read_obj(source: InputFile) -> list[Mesh]:
     """The faces of an OBJ file, cut into triangles, in the order of the file.
 
     Raises
@@ -203,23 +203,7 @@ class _Text:
     def numbers(self, key: bytes) -> tuple[F64, I64]:
         """All numbers of the lines of that word, and how many each line has."""
         body = self.bodies(key)
-        return parsed(body, np.float64), words_of_lines(body)
-
-
-def parsed(body: U8, dtype: Any) -> Array:
-    """The numbers of a text.
-
-    Raises
-    ------
-    MeshError
-        If something else is in it.
-    """
-    if not len(body):
-        return np.zeros(0, dtype)
-    try:
-        return np.fromstring(body.tobytes(), dtype, sep=" ")
-    except (ValueError, DeprecationWarning):
-        raise MeshError("a number in it is none") from None
+        return numbers_of_text(body.tobytes()), words_of_lines(body)
 
 
 def words_of_lines(body: U8) -> I64:
@@ -271,7 +255,7 @@ def _positions(numbers: F64, n_of_line: I64) -> tuple[F64, U8 | None]:
     return positions, np.rint(np.column_stack([bytes_[:, :3], alpha])).astype(np.uint8)
 
 
-def _faces(text: _Text, n_above_all: tuple[int, int, int], source: Source) -> tuple[I64, I64]:
+def _faces(text: _Text, n_above_all: tuple[int, int, int], source: InputFile) -> tuple[I64, I64]:
     """The corners (C, 3) of all faces, as rows of positions, texture coordinates and normals, and how many each has."""
     body = text.bodies(b"f")
     n_corners = words_of_lines(body)
@@ -309,7 +293,7 @@ def _indices(body: U8) -> I64:
         return corners
     slashes = np.flatnonzero(body == SLASH)
     if not len(slashes):
-        values = parsed(body, np.int64)
+        values = numbers_of_text(body.tobytes(), np.int64)
         if len(values) != len(starts):
             raise MeshError("a face of it is no list of indices")
         corners[:, 0] = values
@@ -326,11 +310,11 @@ def _indices(body: U8) -> I64:
             raise MeshError("a face of it is no list of indices")
         own = kinds == kind
         if is_one:
-            values = parsed(numbers, np.int64)
+            values = numbers_of_text(numbers.tobytes(), np.int64)
         else:
             lengths = np.diff(np.append(starts, len(body)))
             # what stands before the first word is left out
-            values = parsed(numbers[starts[0] :][np.repeat(own, lengths)], np.int64)
+            values = numbers_of_text(numbers[starts[0] :][np.repeat(own, lengths)].tobytes(), np.int64)
         if len(values) != len(columns) * int(own.sum()):
             corners[own] = [_corner(body, start) for start in starts[own].tolist()]
             continue
@@ -349,7 +333,7 @@ def _corner(body: U8, start: int) -> list[int]:
     return [int(part) if part else 0 for part in (*word, "", "")[:3]]
 
 
-def _materials(text: _Text, source: Source) -> tuple[tuple[Material, ...], I64 | None]:
+def _materials(text: _Text, source: InputFile) -> tuple[tuple[Material, ...], I64 | None]:
     """The materials that faces use, in the order of their first use, and the row of each face."""
     uses = text.lines_of(b"usemtl")
     if not len(uses):
@@ -380,7 +364,7 @@ def _materials(text: _Text, source: Source) -> tuple[tuple[Material, ...], I64 |
     return tuple(materials), place[use_of_face]
 
 
-def _library(text: _Text, source: Source) -> dict[str, Callable[[], Material]]:
+def _library(text: _Text, source: InputFile) -> dict[str, Callable[[], Material]]:
     known: dict[str, Callable[[], Material]] = {}
     for line in text.lines_of(b"mtllib").tolist():
         rest = text.rest_of(line)

@@ -15,7 +15,7 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from topleft._io.references import Source
+from topleft._io.references import InputFile, numbers_of_text
 from topleft._model.material import Material
 from topleft._model.mesh import Mesh
 from topleft._model.polygons import triangulate
@@ -66,7 +66,7 @@ Rows = dict[str, Any]
 """An element: arrays (N,) by the name of the property, and lists."""
 
 
-def read_ply(source: Source) -> Mesh | None:
+def read_ply(source: InputFile) -> Mesh | None:
     """The faces of a PLY file; None if it has none.
 
     Raises
@@ -135,10 +135,7 @@ class _Numbers:
     """A body of text."""
 
     def __init__(self, content: bytes) -> None:
-        try:
-            self._values = np.fromstring(content, np.float64, sep=" ")
-        except (ValueError, DeprecationWarning):
-            raise MeshError("a number in it is none") from None
+        self._values = numbers_of_text(content)
         self._at = 0
 
     def rows(self, element: _Element) -> Rows:
@@ -347,7 +344,7 @@ def triangles_of_strips(values: I64, lengths: I64) -> I64:
     return triangles[(a != b) & (b != c) & (a != c)]
 
 
-def _mesh(vertex: Rows, corners: I64, n_corners: I64, face: Rows, textures: list[str], source: Source) -> Mesh | None:
+def _mesh(vertex: Rows, corners: I64, n_corners: I64, face: Rows, textures: list[str], source: InputFile) -> Mesh | None:
     positions = _together(vertex, (("x", "y", "z"),))
     if positions is None:
         raise MeshError("its vertices have no x, y and z")
@@ -381,7 +378,7 @@ def _mesh(vertex: Rows, corners: I64, n_corners: I64, face: Rows, textures: list
     return _textured(Mesh(positions[names.ravel()], rows, own_normals, colors, uv), textures, source)
 
 
-def _textured(mesh: Mesh, textures: list[str], source: Source) -> Mesh:
+def _textured(mesh: Mesh, textures: list[str], source: InputFile) -> Mesh:
     """The mesh with the texture that a comment names."""
     if not textures or mesh.uv is None:
         return mesh

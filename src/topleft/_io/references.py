@@ -10,6 +10,7 @@ import io
 import re
 import warnings
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -31,7 +32,7 @@ PICTURE_FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "TGA", "GIF", "TIFF", "PPM", "D
 """Formats of Pillow that are data and nothing else: EPS, say, would run a program."""
 
 
-class Source:
+class InputFile:
     """A mesh file, the files beside it, what may be taken from them, and what was missing.
 
     Parameters
@@ -118,6 +119,24 @@ class Source:
         except Exception:  # broken bytes end in whatever the decoder meets: OSError, SyntaxError, struct.error, ...
             self.notes.add("textures that cannot be read", name)
         return None
+
+
+def numbers_of_text(content: bytes, dtype: Any = np.float64) -> npt.NDArray[Any]:
+    """The numbers that a text holds and nothing else does.
+
+    Raises
+    ------
+    MeshError
+        If something else is in it.
+    """
+    if not content.strip():
+        return np.zeros(0, dtype)
+    try:
+        with warnings.catch_warnings():
+            warnings.filterwarnings("error", message="string or file could not be read")
+            return np.fromstring(content, dtype, sep=" ")
+    except (ValueError, DeprecationWarning):
+        raise MeshError("a number in it is none") from None
 
 
 def decoded(content: bytes, max_pixels: int = MAX_TEXTURE_PIXELS) -> U8:
