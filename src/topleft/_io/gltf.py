@@ -452,7 +452,8 @@ def triangles_of(corners: Array, mode: int) -> Array:
         return np.stack([np.full(len(corners) - 2, corners[0]), corners[1:-1], corners[2:]], axis=1)
     triangles = np.stack([corners[:-2], corners[1:-1], corners[2:]], axis=1)
     triangles[1::2] = triangles[1::2, [1, 0, 2]]
-    return triangles[(triangles[:, 0] != triangles[:, 1]) & (triangles[:, 1] != triangles[:, 2])]
+    a, b, c = triangles.T
+    return triangles[(a != b) & (b != c) & (a != c)]  # those that turn a strip round have no area
 
 
 def _shape_of(values: dict[str, Array], triangles: Array) -> _Shape | None:

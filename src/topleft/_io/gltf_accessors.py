@@ -23,7 +23,7 @@ Array = npt.NDArray[Any]
 Tree = dict[str, Any]
 
 DTYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
-N_COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
+N_COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 
 
 def entry(tree: Tree, kind: str, index: Any) -> Tree:
@@ -139,16 +139,10 @@ class Accessors:
         """Rows of numbers of a view, `stride` bytes from one to the next (0: without gaps)."""
         data = self.view(view)
         size = dtype.itemsize
-        # The columns of small matrices begin at multiples of four bytes.
-        rows_of_matrix = {4: 2, 9: 3}.get(n_columns, 0) if size < 4 else 0
-        padded = rows_of_matrix and -(-rows_of_matrix * size // 4) * 4 * rows_of_matrix
-        width = int(padded or n_columns * size)
+        width = n_columns * size
         stride = stride or width
         if n and offset + stride * (n - 1) + width > len(data):
             raise MeshError(f"an accessor of {n} rows of {width} bytes ends beyond its {len(data)} bytes")
-        if padded and n_columns == 9:
-            shape, strides = (n, 3, 3), (stride, width // 3, size)
-            return np.ndarray(shape, dtype, data.data, offset, strides).reshape(n, 9)
         if n == 0:
             return np.zeros((0, n_columns), dtype)
         return np.ndarray((n, n_columns), dtype, data.data, offset, (stride, size))

@@ -344,7 +344,9 @@ def triangles_of_strips(values: I64, lengths: I64) -> I64:
     return triangles[(a != b) & (b != c) & (a != c)]
 
 
-def _mesh(vertex: Rows, corners: I64, n_corners: I64, face: Rows, textures: list[str], source: InputFile) -> Mesh | None:
+def _mesh(
+    vertex: Rows, corners: I64, n_corners: I64, face: Rows, textures: list[str], source: InputFile
+) -> Mesh | None:  # fmt: skip
     positions = _together(vertex, (("x", "y", "z"),))
     if positions is None:
         raise MeshError("its vertices have no x, y and z")
