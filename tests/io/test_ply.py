@@ -82,7 +82,7 @@ def test_ply_texture_that_is_missing_is_told(load):
 
 
 def test_ply_cloud_of_points_is_refused_in_true_words(load):
-    with pytest.raises(MeshError, match="cannot draw .*a.ply': it is a cloud of 4 points without faces"):
+    with pytest.raises(MeshError, match=r"cannot draw .*a.ply': it is a cloud of 4 points without faces"):
         load("element vertex 4\n" + XYZ, SQUARE)
 
 

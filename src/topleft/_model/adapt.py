@@ -225,8 +225,15 @@ def _skin(points: npt.NDArray[Any], solids: list[tuple[str, npt.NDArray[Any]]]) 
     """Triangles of the sides of solid cells that no second cell has."""
     sides: dict[int, list[npt.NDArray[np.int64]]] = {3: [], 4: []}
     for kind, cells in solids:
-        for side in SIDES_OF_SOLID[kind]:
-            sides[len(side)].append(cells[:, side].astype(np.int64))
+        sides_of_cell = SIDES_OF_SOLID[kind]
+        middle = points[cells[:, : 1 + max(max(side) for side in sides_of_cell)]].mean(axis=1)
+        for side in sides_of_cell:
+            rows = cells[:, side].astype(np.int64)
+            first, *_, last = corners = np.moveaxis(points[rows], 1, 0)
+            # Programs do not agree which way round a wedge goes.
+            is_inwards = (np.cross(corners[1] - first, last - first) * (corners.mean(axis=0) - middle)).sum(axis=1) < 0
+            rows[is_inwards] = rows[is_inwards][:, ::-1]
+            sides[len(side)].append(rows)
     blocks = []
     for rows in (np.concatenate(own) for own in sides.values() if own):
         _, first, n_cells = np.unique(np.sort(rows, axis=1), axis=0, return_index=True, return_counts=True)
