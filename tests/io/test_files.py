@@ -8,12 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import topleft as tl
 from topleft import scenes
 from topleft._io import load as files
 from topleft._io.images import save_image
 from topleft._model.mesh import Mesh
 from topleft._model.normals import face_normals
-from topleft.errors import MeshError, MissingPackageError
+from topleft.errors import MeshError, MeshWarning, MissingPackageError
 
 trimesh = pytest.importorskip("trimesh")
 
@@ -58,7 +59,8 @@ def test_load_obj_quads_and_polygons_become_triangles(write):
 def test_load_obj_groups_are_one_mesh_in_the_order_of_the_file(write):
     groups = "g one\nusemtl red\nf 1 2 3\ns off\ng two\nusemtl blue\nf 1 3 4\nf 4 2 1\n"
     text = "mtllib no.mtl\no thing\n" + SQUARE + groups
-    mesh = files.load(write("a.obj", text))
+    with pytest.warns(MeshWarning, match="material libraries not found: 'no.mtl'"):
+        mesh = files.load(write("a.obj", text))
     assert mesh.vertices.tolist() == [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
     assert mesh.triangles.tolist() == [[0, 1, 2], [0, 2, 3], [3, 1, 0]]
 
@@ -257,3 +259,37 @@ def test_load_real_mesh_has_all_of_it(name, n_vertices, n_triangles):
         pytest.skip("the mesh is not on this machine")
     mesh = files.load(SHARED_MESHES / name)
     assert (len(mesh.vertices), len(mesh.triangles)) == (n_vertices, n_triangles)
+
+
+# By trimesh
+
+
+def test_as_mesh_of_trimesh_takes_no_highlights_that_nobody_gave():
+    material = trimesh.visual.material.SimpleMaterial(diffuse=(0, 255, 0, 255))
+    vertices, triangles = scenes.shape("cube")
+    visual = trimesh.visual.TextureVisuals(uv=np.zeros((len(vertices), 2)), material=material)
+    (made,) = tl.as_mesh(trimesh.Trimesh(vertices, triangles, visual=visual, process=False)).materials
+    assert (made.color, made.specular) == ((0, 255, 0), 0)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("a.dxf", b"AutoCAD Binary DXF\r\n\x1a\0", "it is a binary DXF: save it as text"),
+        ("a.svg", "<svg/>", "cannot draw .*a.svg': it holds curves in a plane"),
+        ("a.binvox", "#binvox 1", "it holds voxels: make a mesh of them"),
+    ],
+)
+def test_load_of_what_is_no_mesh_is_refused_in_true_words(write, name, content, message):
+    with pytest.raises(MeshError, match=message):
+        files.load(write(name, content))
+
+
+def test_load_by_meshio_prints_nothing(write, capfd):
+    meshio = pytest.importorskip("meshio")
+    path = write("a.msh", b"")
+    meshio.Mesh(np.eye(3), [("triangle", [[0, 1, 2]])]).write(path, file_format="gmsh")
+    assert len(files.load(path).triangles) == 1
+    with pytest.raises(MeshError):
+        files.load(write("b.msh", b"$MeshFormat\n9 0 8\n"))
+    assert capfd.readouterr() == ("", "")

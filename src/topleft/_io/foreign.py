@@ -7,9 +7,11 @@ from __future__ import annotations
 
 import contextlib
 import io
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
+from urllib.parse import unquote
 
 import numpy as np
 
@@ -64,6 +66,8 @@ def read_by_trimesh(source: InputFile) -> list[Mesh]:
             raise MeshError("it is not text") from error
         extra = "pip install 'topleft[formats]'" if suffix in FORMATS_OF_EXTRA else f"another package: {error}"
         raise MissingPackageError(f"reading {source.path.suffix!r} needs {extra}") from error
+    if suffix == ".dae":
+        _note_missing_pictures(source)
     if not parts and suffix in NO_TRIANGLES:
         raise MeshError(f"cannot draw {str(source.path)!r}: {NO_TRIANGLES[suffix]}")
     return parts
@@ -87,6 +91,13 @@ def _check_what_it_is(source: InputFile, suffix: str) -> None:
             raise MeshError(f"its archive is broken ({error})") from error
         if n_bytes > MAX_UNPACKED_BYTES:
             raise MeshError(f"its archive holds {n_bytes} bytes, more than {MAX_UNPACKED_BYTES}")
+
+
+def _note_missing_pictures(source: InputFile) -> None:
+    """Note the textures of a COLLADA file that are not where it says, which trimesh leaves out without a word."""
+    names = re.findall(rb"<init_from>\s*(?:<ref>)?\s*([^<\s][^<]*\.[A-Za-z]{3,4})\s*<", source.path.read_bytes())
+    for name in names:
+        source.find(unquote(name.decode("utf-8", errors="replace")).removeprefix("file://"), "textures")
 
 
 def _parts(scene: Any, source: InputFile) -> Iterator[Mesh]:

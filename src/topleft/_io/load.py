@@ -29,10 +29,7 @@ Made = TypeVar("Made")
 
 
 def load(
-    path: str | os.PathLike[str],
-    *,
-    max_vertices: int = MAX_VERTICES,
-    max_texture_pixels: int = MAX_TEXTURE_PIXELS,
+    path: str | os.PathLike[str], *, max_vertices: int = MAX_VERTICES, max_texture_pixels: int = MAX_TEXTURE_PIXELS
 ) -> Mesh:
     """A mesh read from a file: OBJ, PLY, STL, glTF and GLB; by trimesh OFF, 3MF and what else it has readers for.
 
@@ -138,6 +135,8 @@ def reading(source: InputFile, read: Callable[[], Made]) -> Made:
         raise MeshError(f"cannot read {str(path)!r}: broken, or not a {path.suffix!r} file ({error})") from error
     except Exception as error:  # a reader meets broken bytes in its own way: KeyError, struct.error, ...
         reason = " ".join(str(error).split())[:200] or type(error).__name__
+        if path.suffix.lower() in GLTF_SUFFIXES and isinstance(error, AttributeError | KeyError | TypeError):
+            reason = f"its JSON is not that of glTF: {reason}"
         raise MeshError(f"cannot read {str(path)!r}: broken, or not a {path.suffix!r} file ({reason})") from error
 
 
