@@ -27,6 +27,11 @@
 #include "mesh/normals.c"
 #include "mesh/nearest.c"
 #include "mesh/reach.c"
+#include "polygons/points.c"
+#include "polygons/simple.c"
+#include "polygons/mask.c"
+#include "polygons/labels.c"
+#include "polygons/shares.c"
 
 #ifndef TL_KERNELS /* read by itself, as an editor does */
 #define TL_ISA_NAME "none"
@@ -82,4 +87,13 @@ const tl_kernels TL_KERNELS = {
     .find_nearest = nearest_of_points,
     .find_reach = find_reach,
     .set_feet = set_feet,
+    .snap_points = snap_points,
+    .bound_polygons = bound_polygons,
+    .sort_polygons = sort_polygons,
+    .certify_polygons = certify_polygons,
+    .trust_polygons = trust_polygons,
+    .mask_even_odd = mask_even_odd,
+    .mask_nonzero = mask_nonzero,
+    .label_polygons = label_polygons,
+    .share_polygons = share_polygons,
 };

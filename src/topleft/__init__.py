@@ -27,6 +27,8 @@ from topleft._model.mesh import Mesh
 from topleft._model.scene import Instance, Scene
 from topleft._model.texture import Texture
 from topleft._plan.plan import Plan, plan
+from topleft._polygons.overlap import Overlap, overlap
+from topleft._polygons.polygons import polygons
 from topleft._raster.classic import bresenham_line
 from topleft._raster.composite import composite
 from topleft._raster.fragments import Fragments
@@ -76,6 +78,7 @@ __all__ = [
     "MeshWarning",
     "MissingPackageError",
     "OpenCVLens",
+    "Overlap",
     "Plan",
     "Rasterizer",
     "Scene",
@@ -97,8 +100,10 @@ __all__ = [
     "load",
     "load_cameras",
     "overdraw",
+    "overlap",
     "peel",
     "plan",
+    "polygons",
     "rasterize",
     "rasterize_mesh",
     "release_memory",

@@ -489,3 +489,111 @@ def move_points(
     points: Source, matrix: NDArray[np.float64], first: int, end: int, out: NDArray[np.float64]
 ) -> None: ...
 def color_rows(colors: NDArray[np.uint8], first: int, end: int, rows: NDArray[np.float32]) -> None: ...
+
+CELL_ROWS: int
+CERTIFY_WORDS: int
+LABEL_SCRATCH_BYTES: int
+LEAST_SHARE_CELLS: int
+PIECE_BYTES: int
+PIECE_WORDS: int
+POLYGON_PAD: int
+
+def polygon_stride(width: int) -> int: ...
+def share_cells(width: int, height: int) -> int: ...
+def snap_points(
+    source: Source,
+    first: int,
+    end: int,
+    bits: int,
+    grid_bits: int,
+    x_px: int,
+    y_px: int,
+    x_fx: NDArray[np.int32],
+    y_fx: NDArray[np.int32],
+    wide_fx: NDArray[np.int64] | None,
+) -> tuple[int, int]: ...
+
+class PieceScratch:
+    def __init__(self, n_pieces: int, height: int, width: int) -> None: ...
+
+class SnappedPolygons:
+    n_polygons: int
+    n_rings: int
+    width: int
+    height: int
+    def __init__(
+        self,
+        x_fx: NDArray[np.int32],
+        y_fx: NDArray[np.int32],
+        wide_fx: NDArray[np.int64] | None,
+        rings: NDArray[np.int64],
+        polygons: NDArray[np.int64],
+        width: int,
+        height: int,
+        bits: int,
+        is_nonzero: bool,
+    ) -> None: ...
+    @property
+    def boxes_px(self) -> NDArray[np.int32]: ...
+    def bound(self, first: int, end: int) -> int: ...
+    def make_weights(self) -> None: ...
+    def certify(self, first: int, end: int, room: NDArray[np.int64] | None) -> None: ...
+    def which_are_simple(self) -> NDArray[np.bool_]: ...
+    def seen_from(self, sample_x_fx: int, sample_y_fx: int) -> None: ...
+    def sort(
+        self, band_rows: int, n_bands: int, starts: NDArray[np.int64], listed: NDArray[np.int32] | None
+    ) -> None: ...
+    def mask_even_odd(
+        self, polygon: int, out: NDArray[np.uint8], top: int, bottom: int, bits: NDArray[np.int32]
+    ) -> None: ...
+    def mask_nonzero(
+        self,
+        polygon: int,
+        out: NDArray[np.uint8],
+        top: int,
+        bottom: int,
+        at: NDArray[np.uint32],
+        room: NDArray[np.int32],
+        cells: NDArray[np.int32],
+        bits: NDArray[np.uint64],
+    ) -> None: ...
+    def label(
+        self,
+        pixels: NDArray[np.uint8],
+        n_bytes: int,
+        values: NDArray[np.int32] | None,
+        background: int,
+        test: int,
+        waits: bool,
+        band_rows: int,
+        starts: NDArray[np.int64] | None,
+        listed: NDArray[np.int32] | None,
+        first_band: int,
+        end_band: int,
+        cells: NDArray[np.int32],
+        scratch: NDArray[np.uint8],
+        pieces: PieceScratch | None,
+    ) -> None: ...
+    def add_shares(
+        self,
+        pixels: NDArray[np.float32],
+        colors: NDArray[np.float32] | None,
+        band_rows: int,
+        starts: NDArray[np.int64],
+        listed: NDArray[np.int32],
+        first_band: int,
+        end_band: int,
+        cells: NDArray[np.int32],
+        pieces: PieceScratch | None,
+        is_alone: bool,
+    ) -> None: ...
+    def list_shares(
+        self,
+        first: int,
+        end: int,
+        starts: NDArray[np.int64],
+        indices: NDArray[Any],
+        areas: NDArray[np.float32],
+        cells: NDArray[np.int32],
+        pieces: PieceScratch | None,
+    ) -> int: ...

@@ -11,6 +11,7 @@ mtl.py             reads material libraries of OBJ files
 notes.py           collects what a mesh lacks of its file, and warns of it
 obj.py             reads OBJ
 ply.py             reads PLY
+polygon_files.py   reads polygons from GeoJSON and COCO annotations
 png.py             encodes PNG, with one filter and the fastest compressor there is
 references.py      reads the files that a mesh file names, from its folder and nowhere else
 stl.py             reads STL
