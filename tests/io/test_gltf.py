@@ -272,13 +272,34 @@ def test_gltf_instances_are_all_there(load):
     assert load(file).vertices[:, 0].tolist() == [1, 2, 1, 5, 6, 5]
 
 
-def test_gltf_spec_gloss_material_is_approximated_and_told(tmp_path):
-    gloss = {"diffuseFactor": [1, 0, 0, 1], "specularFactor": [0.5, 0.5, 0.5], "glossinessFactor": 0.5}
+@pytest.mark.parametrize(
+    ("diffuse", "specular", "expected", "metallic"),
+    [([1, 0, 0, 0.5], [0.04] * 3, (255, 0, 0), 0), ([0, 0, 0, 0.5], [1, 0.5, 0], (255, 188, 0), 1)],
+)
+def test_gltf_spec_gloss_material_is_made_metallic_rough_and_told(tmp_path, diffuse, specular, expected, metallic):
+    gloss = {"diffuseFactor": diffuse, "specularFactor": specular, "glossinessFactor": 0.75}
     file = GltfFile(materials=[{"extensions": {"KHR_materials_pbrSpecularGlossiness": gloss}}]).shown(material=0)
     (tmp_path / "a.glb").write_bytes(file.glb())
-    with pytest.warns(MeshWarning, match="approximated by Blinn-Phong"):
+    with pytest.warns(MeshWarning, match="made metallic-rough"):
         (material,) = tl.load(tmp_path / "a.glb").materials
-    assert (material.color, material.specular, material.shininess) == ((255, 0, 0), 0.5, 30)
+    assert material.color == pytest.approx(expected, abs=1)
+    assert (material.metallic, material.roughness) == (pytest.approx(metallic, abs=1e-3), 0.25)
+    assert material.opacity == 0.5
+
+
+def test_gltf_spec_gloss_textures_become_metallic_rough_ones(tmp_path):
+    file = GltfFile()
+    info = {"index": file.texture(np.full((2, 2, 4), (255, 0, 0, 100), np.uint8))}
+    shiny = {"index": file.texture(np.full((1, 1, 4), (56, 56, 56, 55), np.uint8))}
+    gloss = {"diffuseTexture": info, "specularGlossinessTexture": shiny}
+    file.tree["materials"] = [{"extensions": {"KHR_materials_pbrSpecularGlossiness": gloss}}]
+    (tmp_path / "a.glb").write_bytes(file.shown(TEXCOORD_0=[[0, 0]] * 3, material=0).glb())
+    with pytest.warns(MeshWarning, match="made metallic-rough"):
+        (material,) = tl.load(tmp_path / "a.glb").materials
+    assert material.texture.image[1, 1].tolist() == [255, 0, 0, 100]
+    _, rough, metal, _ = material.metallic_roughness_texture.image[1, 1].tolist()
+    assert rough == 200
+    assert metal <= 1
 
 
 @pytest.mark.parametrize(

@@ -394,6 +394,8 @@ class _Reader:
             if name in attributes:
                 rows = np.asarray(mesh.get_attribute_by_unique_id(number)["data"]).reshape(len(mesh.points), -1)
                 accessor = entry(self._tree, "accessors", attributes[name])
+                if name.startswith("JOINTS"):  # which some files keep as float
+                    rows = np.rint(rows).astype(np.int64)
                 values[name] = normalized(rows) if accessor.get("normalized") else rows
         return values, np.asarray(mesh.faces).ravel()
 

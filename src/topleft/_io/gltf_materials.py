@@ -9,20 +9,29 @@ KHR_materials_unlit, KHR_materials_emissive_strength, KHR_materials_pbrSpecularG
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from topleft._base.color import Color, encode_srgb
+from topleft._base.color import LIGHT_OF_SRGB, Color, encode_srgb
 from topleft._io.gltf_accessors import Accessors, Tree, entry, uri_content, whole
 from topleft._io.references import InputFile
 from topleft._model.material import AlphaMode, Material
 from topleft._model.texture import Encoding, Filter, Texture, Wrap
 from topleft.errors import MeshError
 
+F64 = npt.NDArray[np.float64]
+
 NEAREST, LINEAR = 9728, 9729
 WRAPS = {10497: Wrap.REPEAT, 33071: Wrap.CLAMP, 33648: Wrap.MIRROR}
+DIELECTRIC = 0.04
+"""The share of light that a surface without metal reflects when seen along its normal."""
+
+N_ROWS_AT_ONCE = 64
+"""Rows of a picture whose light is computed together."""
+
 UP = np.array([[1.0, 0, 0], [0, -1, 1]])
 """From v downwards, as in the file, to v upwards and back."""
 
@@ -99,18 +108,38 @@ class Materials:
         return Material(**own)
 
     def _glossy(self, row: Tree) -> dict[str, Any]:
-        """Diffuse and specular colour with a glossiness: Blinn-Phong of the same strength and width of highlights."""
-        self._source.notes.add("materials of KHR_materials_pbrSpecularGlossiness approximated by Blinn-Phong")
-        factor = _numbers(row, "diffuseFactor", (1, 1, 1, 1))
-        alpha = max(1 - _share(_number(row, "glossinessFactor", 1)), 0.05) ** 2
-        shininess = max(2 / alpha**2 - 2, 0.0)
-        specular = float(np.mean(_numbers(row, "specularFactor", (1, 1, 1))))
+        """Diffuse and specular colour with a glossiness, as a metallic-rough surface that looks nearly the same."""
+        self._source.notes.add("materials of KHR_materials_pbrSpecularGlossiness made metallic-rough")
+        diffuse_factor = np.array(_numbers(row, "diffuseFactor", (1, 1, 1, 1)))
+        specular_factor = np.array(_numbers(row, "specularFactor", (1, 1, 1)))
+        gloss = _share(_number(row, "glossinessFactor", 1))
+        diffuse = self._texture(row.get("diffuseTexture"), Encoding.SRGB)
+        specular = self._texture(row.get("specularGlossinessTexture"), Encoding.SRGB)
+        own: dict[str, Any] = {"opacity": _share(diffuse_factor[3])}
+        there = [each for each in (diffuse, specular) if each is not None]
+        if not there:
+            base, metallic = metallic_of_specular(diffuse_factor[:3], specular_factor)
+            return {**own, "color": srgb_of_light(base), "metallic": float(metallic), "roughness": 1 - gloss}
+        laid = there[0]
+        size = max((each.image.shape[:2] for each in there), key=math.prod)
+        colors = _resized(None if diffuse is None else diffuse.image, size)
+        strengths = _resized(None if specular is None else specular.image, size)
+        bases, roughs = colors.copy(), np.zeros((*size, 3), np.uint8)
+        for i in range(0, size[0], N_ROWS_AT_ONCE):
+            rows = slice(i, i + N_ROWS_AT_ONCE)
+            light = LIGHT_OF_SRGB[colors[rows, :, :3]] * diffuse_factor[:3]
+            base, metallic = metallic_of_specular(light, LIGHT_OF_SRGB[strengths[rows, :, :3]] * specular_factor)
+            bases[rows, :, :3] = np.rint(255 * encode_srgb(base))
+            roughs[rows, :, 1] = np.rint(255 - gloss * strengths[rows, :, 3])
+            roughs[rows, :, 2] = np.rint(255 * metallic)
+        rough = replace(there[-1], image=roughs, encoding=Encoding.LINEAR)
         return {
-            "color": srgb_of_light(factor[:3]),
-            "opacity": _share(factor[3]),
-            "texture": self._texture(row.get("diffuseTexture"), Encoding.SRGB),
-            "specular": _share(specular),
-            "shininess": shininess,
+            **own,
+            "color": (255, 255, 255),
+            "texture": replace(laid, image=bases),
+            "metallic": 1.0,
+            "roughness": 1.0,
+            "metallic_roughness_texture": rough,
         }
 
     def _texture(self, info: Any, encoding: Encoding) -> Texture | None:
@@ -161,6 +190,36 @@ class Materials:
             name = name if str(uri).startswith("data:") else str(uri)
             content = uri_content(uri, self._source, "textures")
         return None if content is None else self._source.decode(bytes(content), name)
+
+
+def metallic_of_specular(diffuse: F64, specular: F64) -> tuple[F64, F64]:
+    """Base colour (..., 3) and metallic (...) of linear diffuse and specular colours, both (..., 3), 0 to 1.
+
+    A surface with that base colour reflects 0.04 (1 - metallic) + base metallic, and scatters base (1 - metallic).
+
+    Based on: KhronosGroup/glTF, extensions/2.0/Archived/KHR_materials_pbrSpecularGlossiness/examples.
+    """
+    brightness = np.array([0.299, 0.587, 0.114])
+    d, s = (np.sqrt((colors**2) @ brightness) for colors in (diffuse, specular))
+    left = 1 - specular.max(axis=-1)
+    b = d * left / (1 - DIELECTRIC) + s - 2 * DIELECTRIC
+    root = np.sqrt(np.maximum(b**2 - 4 * DIELECTRIC * (DIELECTRIC - s), 0))
+    metallic = np.where(s < DIELECTRIC, 0, (root - b) / (2 * DIELECTRIC)).clip(0, 1)
+    share = metallic[..., None]
+    of_diffuse = diffuse * left[..., None] / (1 - DIELECTRIC) / np.maximum(1 - share, 1e-6)
+    of_specular = (specular - DIELECTRIC * (1 - share)) / np.maximum(share, 1e-6)
+    return (of_diffuse + (of_specular - of_diffuse) * share**2).clip(0, 1), metallic
+
+
+def _resized(picture: npt.NDArray[np.uint8] | None, size: tuple[int, ...]) -> npt.NDArray[np.uint8]:
+    """The picture in another size; white where there is none."""
+    if picture is None:
+        return np.full((*size, 4), 255, np.uint8)
+    if picture.shape[:2] == size:
+        return picture
+    from PIL import Image
+
+    return np.asarray(Image.fromarray(picture).resize((size[1], size[0]), Image.Resampling.BILINEAR))
 
 
 def _filter_of(sampler: Tree) -> Filter:
