@@ -49,6 +49,8 @@ class Mesh:
         What the triangles are made of.
     material_of_triangle : (T,) array_like of integers, optional
         The row of `materials` that each triangle has; the first unless given.
+    uv1 : (V, 2) array_like of real numbers, optional
+        A second set of texture coordinates, for textures with `uv_set=1`.
 
     Raises
     ------
@@ -77,6 +79,7 @@ class Mesh:
     uv: F32 | None = None
     materials: tuple[Material, ...] = ()
     material_of_triangle: I32 | None = None
+    uv1: F32 | None = None
 
     def __post_init__(self) -> None:
         vertices = _real_array(self.vertices, "vertices")
@@ -92,8 +95,9 @@ class Mesh:
             keep(self, "normals", _read_only(normals))
         if self.colors is not None:
             keep(self, "colors", _read_only(_color_array(self.colors, len(vertices))))
-        if self.uv is not None:
-            keep(self, "uv", _read_only(_uv_array(self.uv, len(vertices))))
+        for name in ("uv", "uv1"):
+            if getattr(self, name) is not None:
+                keep(self, name, _read_only(_uv_array(name, getattr(self, name), len(vertices))))
         keep(self, "materials", _material_tuple(self.materials))
         if self.material_of_triangle is not None:
             rows = _material_rows(self.material_of_triangle, len(triangles), len(self.materials))
@@ -288,12 +292,12 @@ def _color_array(values: npt.ArrayLike, n_vertices: int) -> U8:
     return np.ascontiguousarray(array)
 
 
-def _uv_array(values: npt.ArrayLike, n_vertices: int) -> F32:
-    array = as_array("uv", values)
+def _uv_array(name: str, values: npt.ArrayLike, n_vertices: int) -> F32:
+    array = as_array(name, values)
     if array.dtype.kind not in "fiu":
-        raise TypeError(f"uv must hold real numbers, got {array.dtype}")
+        raise TypeError(f"{name} must hold real numbers, got {array.dtype}")
     if array.shape != (n_vertices, 2):
-        raise ValueError(f"uv must have shape ({n_vertices}, 2), got {array.shape}")
+        raise ValueError(f"{name} must have shape ({n_vertices}, 2), got {array.shape}")
     return np.ascontiguousarray(array, np.float32)
 
 

@@ -7,7 +7,7 @@ Based on: Williams, L., "Pyramidal Parametrics", SIGGRAPH 1983.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from enum import StrEnum
 from functools import cached_property
 from typing import Any
@@ -36,6 +36,13 @@ class Filter(StrEnum):
     TRILINEAR = "trilinear"
 
 
+class Encoding(StrEnum):
+    """What the values of a picture stand for."""
+
+    SRGB = "srgb"
+    LINEAR = "linear"
+
+
 class Wrap(StrEnum):
     """What lies beyond a texture."""
 
@@ -61,6 +68,12 @@ class Texture:
         "bilinear": between the four texels next to the point. "nearest": the texel that the point lies in.
     wrap : {"repeat", "clamp", "mirror"}, or a pair of them for u and v
         What lies beyond 0 and 1.
+    encoding : {"srgb", "linear"}
+        "srgb": red, green and blue are colours. "linear": they are numbers, 0 to 255 for 0 to 1, as in normal maps.
+    uv_set : {0, 1}
+        Laid on by `uv` or by `uv1` of the mesh.
+    transform : (2, 3) array_like of float, optional
+        Takes (u, v, 1) of the mesh to where the texture is looked up.
 
     Raises
     ------
@@ -83,6 +96,9 @@ class Texture:
     image: U8
     filter: str = "trilinear"
     wrap: str | tuple[str, str] = "repeat"
+    encoding: str = "srgb"
+    uv_set: int = 0
+    transform: F64 | None = None
 
     def __post_init__(self) -> None:
         keep = object.__setattr__  # the dataclass is frozen, and its values are coerced
@@ -92,6 +108,15 @@ class Texture:
         if len(both) != 2:
             raise ValueError(f"wrap must be one word, or two for u and v, got {self.wrap!r}")
         keep(self, "wrap", tuple(parse(Wrap, "wrap", one) for one in both))
+        keep(self, "encoding", parse(Encoding, "encoding", self.encoding))
+        if self.uv_set not in (0, 1):
+            raise ValueError(f"uv_set must be 0 or 1, got {self.uv_set!r}")
+        if self.transform is not None:
+            matrix = as_array("transform", self.transform).astype(np.float64)
+            if matrix.shape != (2, 3) or not np.isfinite(matrix).all():
+                raise ValueError(f"transform must be (2, 3) finite numbers, got shape {matrix.shape}")
+            matrix.flags.writeable = False
+            keep(self, "transform", matrix)
 
     @cached_property
     def engine(self) -> _engine.Texture:
@@ -113,7 +138,7 @@ class Texture:
 
     def __getstate__(self) -> dict[str, Any]:
         """What another process needs: the texels are made there."""
-        return {name: self.__dict__[name] for name in ("image", "filter", "wrap")}
+        return {field.name: self.__dict__[field.name] for field in fields(self)}
 
 
 def as_image(name: str, pixels: npt.ArrayLike) -> U8:
