@@ -24,6 +24,7 @@
 #include "shade/shade.c"
 #include "shade/shade_samples.c"
 #include "shade/alpha_test.c"
+#include "mesh/creases.c"
 #include "mesh/normals.c"
 #include "mesh/nearest.c"
 #include "mesh/reach.c"
@@ -74,6 +75,10 @@ const tl_kernels TL_KERNELS = {
     .vertex_normals = vertex_normals,
     .face_normals = face_normals,
     .find_turned = find_turned,
+    .face_angles = face_angles,
+    .list_corners = list_corners,
+    .find_creases = find_creases,
+    .sum_creases = sum_creases,
     .box_of_faces = box_of_faces,
     .unit_vectors = unit_vectors,
     .move_points = move_points,
