@@ -1,5 +1,5 @@
 """Build `topleft._engine.kernels`: one Cython unit, one dispatcher and one kernel unit per instruction set; and the
-classics in `topleft.methods`: one Cython unit each, for the compiler's default instruction set.
+classics in `topleft.methods.classics`: one Cython unit each, for the compiler's default instruction set.
 
 Everything that is not about compiling stands in `pyproject.toml`. setuptools gives all sources of an extension the same
 flags, so `BuildTopleft` compiles each unit by itself and links the objects.
@@ -215,7 +215,7 @@ class BuildTopleft(build_ext):
 
         included = files_in(str(source.parent.relative_to(ROOT)), ".pxd", ".pxi")
         with self.cython_lock:
-            make_once(target, digest(Cython.__version__, source, *included), make)
+            make_once(target, digest(Cython.__version__, ext.name, source, *included), make)
         return target
 
     def compile_unit(self, source: Path, flags: list[str], macros: list[tuple[str, str]]) -> Path:
@@ -246,8 +246,8 @@ def quoted(text: str) -> str:
 
 
 def extensions() -> list[Extension]:
-    """Return the engine, and an extension for each kernel in `methods`."""
-    kernels = [path.relative_to(ROOT).as_posix() for path in files_in("src/topleft/methods", ".pyx")]
+    """Return the engine, and an extension for each kernel of the classics."""
+    kernels = [path.relative_to(ROOT).as_posix() for path in files_in("src/topleft/methods/classics", ".pyx")]
     classics = [Extension(path.removeprefix("src/").removesuffix(".pyx").replace("/", "."), [path]) for path in kernels]
     return [Extension(ENGINE, ["src/topleft/_engine/kernels.pyx"]), *classics]
 

@@ -22,10 +22,9 @@ from topleft._base import threads
 from topleft._base.memory import FreshMemory, KeptMemory
 from topleft._base.options import Sink
 from topleft._raster import choices, sampling
-from topleft._raster.area import sum_areas
 from topleft._raster.rasterize import draw
-from topleft._raster.sampling import sample_positions
-from topleft._raster.snap import snap_scene
+from topleft._raster.sampling import sample_positions, sum_areas
+from topleft._raster.snap import snap_mesh
 from topleft._raster.view import View
 
 MSAA = ("msaa2", "msaa4", "msaa8", "msaa16")
@@ -163,9 +162,9 @@ def drawing_shares(scene: Scene) -> Draw:
     memory, view = memory_of(scene.size), View.parse(scene.size, scene.asked())
 
     def draw_shares() -> Picture:
-        snapped = snap_scene(memory, *scene.arrays, view, with_depth=False, out=None)
+        snapped = snap_mesh(memory, *scene.arrays, view, with_depth=False, out=None)
         shares = memory.empty("share", scene.size[::-1], np.float32)
-        draw(memory, snapped, view, Sink.SAMPLES, shares)
+        draw(memory, snapped, view, choices.drawing(view, snapped, Sink.SAMPLES), shares)
         return (shares,)
 
     return draw_shares
@@ -177,12 +176,13 @@ def drawing_every_sample(scene: Scene) -> Draw:
     n, shape = view.sampling.n_samples, scene.size[::-1]
 
     def draw_all() -> Picture:
-        snapped = snap_scene(memory, *scene.arrays, view, with_depth=False, out=None)
+        snapped = snap_mesh(memory, *scene.arrays, view, with_depth=False, out=None)
         one = replace(view, sampling=View.parse(scene.size, {}).sampling)
         count, mask = memory.empty("count", shape, np.uint8), memory.empty("mask", shape, np.bool_)
         count.fill(0)
         for x, y in sample_positions(n, view.grid_bits).tolist():
-            draw(memory, replace(snapped, scene=snapped.scene.seen_from(x, y)), one, Sink.MASK, mask)
+            seen = replace(snapped, mesh=snapped.mesh.seen_from(x, y))
+            draw(memory, seen, one, choices.drawing(one, seen, Sink.MASK), mask)
             np.add(count, mask.view(np.uint8), out=count)
         return (np.multiply(count, np.float32(1 / n), out=memory.empty("share", shape, np.float32)),)
 
@@ -218,13 +218,13 @@ def drawing_sums(scene: Scene, *, is_wide: bool) -> Draw:
     width, height = scene.size
 
     def draw_areas() -> Picture:
-        snapped = snap_scene(memory, *scene.arrays, view, with_depth=False, out=None)
+        snapped = snap_mesh(memory, *scene.arrays, view, with_depth=False, out=None)
         areas: NDArray[np.float32] = memory.empty("areas", (height, width), np.float32)
         if is_wide:
             cells = np.zeros(height * _engine.area_stride(width), np.int64)
-            snapped.scene.draw_area(areas, _engine.as_bytes(cells), 0, height, True, True)
+            snapped.mesh.draw_area(areas, _engine.as_bytes(cells), 0, height, True, True)
         else:
-            sum_areas(memory, snapped.scene, areas, 1, is_clamped=True)
+            sum_areas(memory, snapped.mesh, areas, 1, is_clamped=True)
         return (areas,)
 
     return draw_areas

@@ -31,7 +31,7 @@ from benchmarks.report.study import Study
 from benchmarks.static import tables
 from benchmarks.static.scenes import StaticScene, scenes
 from topleft._raster import choices
-from topleft._raster.clustered import ClusteredScene
+from topleft._raster.cluster_draw import ClusteredMesh
 from topleft._raster.clusters import Clusters
 from topleft._render import instances
 
@@ -99,7 +99,7 @@ class CountedEngine:
 def counting(fates: Fates) -> Forced:
     """Return what puts a scene in place of that of the library which counts its clusters."""
 
-    class CountedScene(ClusteredScene):
+    class CountedScene(ClusteredMesh):
         def __init__(self, clusters: Clusters, view: Any, first_id: int = 0) -> None:
             super().__init__(clusters, view, first_id)
             n, seen = len(clusters), self.survey(len(clusters))
@@ -114,7 +114,7 @@ def counting(fates: Fates) -> Forced:
             return super().draw_rows(*arguments, **options)
 
     rasterize = sys.modules["topleft._raster.rasterize"]  # not the verb of the same name
-    return (rasterize, "ClusteredScene", CountedScene), (instances, "ClusteredScene", CountedScene)
+    return (rasterize, "ClusteredMesh", CountedScene), (instances, "ClusteredMesh", CountedScene)
 
 
 @lru_cache(maxsize=1)

@@ -14,6 +14,9 @@ PAGES = sorted(DOCS.rglob("*.md"))
 FRONT = sorted(ROOT.glob("*.md"))
 CHECKED = [*FRONT, *PAGES, *sorted(ROOT.glob("benchmarks/**/*.md")), *sorted(ROOT.glob("csrc/**/*.md"))]
 
+ROOMS = ("src", "csrc", "tests", "benchmarks", "examples", "docs")
+SOURCES = [path.as_posix() for path in [ROOT / "setup.py", *(p for name in ROOMS for p in (ROOT / name).rglob("*.*"))]]
+NAMED = re.compile(r"(?<![\w./])[\w./]*[a-z0-9_]\.(?:c|h|py|pyi|pyx|pxi)\b(?!\()")
 LINK = re.compile(r"\]\(([^()\s]+)\)")
 CODE = re.compile(r"```.*?```|`[^`\n]*`", re.DOTALL)
 
@@ -54,6 +57,13 @@ def test_index_lists_every_page_once():
 def test_every_picture_is_shown_by_a_page():
     shown = {path for page in CHECKED for path, _ in links(page)}
     assert [path.name for path in sorted(DOCS.joinpath("images").iterdir()) if path not in shown] == []
+
+
+@pytest.mark.parametrize("page", [*FRONT, *PAGES], ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_source_files_that_a_page_names_exist(page):
+    named = {name for code in CODE.findall(page.read_text(encoding="utf-8")) for name in NAMED.findall(code)}
+    named -= {name for name in named if re.search(r"NAME|Python\.h|\.ci/", name)}  # to be filled in; not in an sdist
+    assert sorted(name for name in named if not any(path.endswith(f"/{name}") for path in SOURCES)) == []
 
 
 @pytest.fixture(scope="module")

@@ -6,6 +6,7 @@ import subprocess
 import sys
 from importlib import import_module, metadata, resources
 from inspect import ismodule
+from pathlib import Path
 
 import pytest
 from packaging.requirements import Requirement
@@ -72,10 +73,12 @@ def test_metadata_command_is_topleft():
 
 
 #: The engine, and a kernel for each classic.
-UNITS = ["_engine.kernels", *(f"methods.{name}" for name in dict.fromkeys(name.partition("/")[0] for name in CLASSICS))]
+UNITS = ["_engine.kernels", *{f"methods.classics.{name.partition('/')[0]}": None for name in CLASSICS}]
+#: Those of them that are imported by name, and so have a stub.
+STUBS = ["_engine.kernels", "methods.classics.bresenham_scanline"]
 
 
-@pytest.mark.parametrize("name", ["py.typed", *(unit.replace(".", "/") + ".pyi" for unit in UNITS)])
+@pytest.mark.parametrize("name", ["py.typed", *(unit.replace(".", "/") + ".pyi" for unit in STUBS)])
 def test_package_is_typed(name):
     assert resources.files("topleft").joinpath(name).is_file()
 
@@ -85,7 +88,7 @@ def public_names(body: list[ast.stmt]) -> dict[str, ast.stmt]:
     return {name: node for name, node in named.items() if not name.startswith("_")}
 
 
-@pytest.mark.parametrize("unit", UNITS)
+@pytest.mark.parametrize("unit", STUBS)
 def test_stub_declares_what_the_compiled_module_has(unit):
     module = import_module(f"topleft.{unit}")
     path = resources.files("topleft").joinpath(unit.replace(".", "/") + ".pyi")
@@ -97,12 +100,17 @@ def test_stub_declares_what_the_compiled_module_has(unit):
             assert set(public_names(node.body)) == {n for n in vars(getattr(module, name)) if not n.startswith("_")}
 
 
+@pytest.mark.parametrize("unit", UNITS[1:])
+def test_classic_has_a_kernel_and_names_its_forms(unit):
+    assert {"FORMS", "draw"} <= vars(import_module(f"topleft.{unit}")).keys()
+
+
 def test_classics_use_no_engine_and_are_loaded_when_asked_for():
     kernels = {f"topleft.{unit}" for unit in UNITS[1:]}
     code = f"import topleft, sys; print(*sorted({kernels} & set(sys.modules)))"
     assert run_python(code).stdout.split() == []
-    folder = resources.files("topleft.methods")
-    sources = [path for path in folder.iterdir() if path.name.endswith((".py", ".pyx", ".pxi"))]
+    folder = Path(str(resources.files("topleft.methods") / "__init__.py")).parent
+    sources = [path for path in folder.rglob("*") if path.name.endswith((".py", ".pyx", ".pxi"))]
     lines = [line for path in sources for line in path.read_text(encoding="utf-8").splitlines()]
     assert not [line for line in lines if "_engine" in line and "import" in line]
 

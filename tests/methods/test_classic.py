@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import topleft as tl
-from topleft.methods import CLASSICS, METHODS, load_kernel, production_method
+from topleft.methods import CLASSICS, load_kernel
 
 EVERY_CLASSIC = pytest.mark.parametrize("name", CLASSICS)
 SUBPIXEL = [name for name, method in CLASSICS.items() if method.has_subpixel_bits]
@@ -25,7 +25,7 @@ def soup(seed, n=8, low=-12, high=36, *, whole=False):
 @pytest.mark.parametrize("name", TWINS)
 def test_kernel_equals_its_pure_twin(name):
     module, _, variant = name.partition("/")
-    twin = import_module(f"topleft.methods.{module}_pure").overdraw
+    twin = import_module(f"topleft.methods.classics.{module}_pure").overdraw
     size = (25, 23)
     for seed in range(12):
         small = soup(seed, low=0, high=4, whole=True)  # mostly without area
@@ -37,7 +37,7 @@ def test_kernel_equals_its_pure_twin(name):
 @EVERY_CLASSIC
 def test_kernel_knows_the_variants_of_the_registry(name):
     module, _, variant = name.partition("/")
-    forms = import_module(f"topleft.methods.{module}").FORMS
+    forms = import_module(f"topleft.methods.classics.{module}").FORMS
     assert load_kernel(CLASSICS[name])[1] == variant
     assert set(forms) == {other.partition("/")[2] for other in CLASSICS if other.partition("/")[0] == module}
 
@@ -147,12 +147,6 @@ def test_fill_per_vertex_raises_and_leaves_out_alone():
 def test_unknown_variant_raises():
     with pytest.raises(ValueError, match="got 'zigzag/fast'; methods to compare with are 'point_in_triangle', "):
         tl.coverage([], [], (4, 4), method="zigzag/fast")
-
-
-def test_production_method_of_a_classic_raises():
-    assert [production_method(name) for name in METHODS] == [0, 1, 2]
-    with pytest.raises(ValueError, match="method must be one of 'auto', 'edge', 'scanline' here, got 'zigzag'"):
-        production_method("zigzag")
 
 
 @EVERY_CLASSIC

@@ -10,7 +10,7 @@ from comparing import assert_same
 from strategies import few_bits, floor, on_centres, slivers
 
 from topleft.methods import reference as ref
-from topleft.methods import reference_sampling as sampling
+from topleft.methods.reference import sampling as sampling
 
 ONE = [[0, 1, 2]]
 COUNTS = (1, 2, 4, 8, 16)

@@ -7,7 +7,7 @@ import topleft as tl
 from topleft._base.memory import KeptMemory
 from topleft._base.options import DepthTest, Sink
 from topleft._raster import choices, sampling
-from topleft._raster.snap import snap_scene
+from topleft._raster.snap import snap_mesh
 from topleft._raster.view import View
 
 SIZE = (21, 17)
@@ -202,11 +202,20 @@ def test_sinks_of_fragments():
     assert choices.fragment_sink(DepthTest.LESS, has_depth=False) is Sink.PAINT
 
 
+def test_vertices_without_depth_are_planned_as_they_are_drawn():
+    vertices, triangles = random_triangles(np.random.default_rng(5))
+    plan = tl.plan(vertices, triangles, SIZE).measure(1)
+    (stage,) = (one for one in plan.stages if one.name == "depth")
+    assert (stage.choice, stage.timed_in) == ("no test, ids alone", "method")
+    assert "depth" not in plan.measured_ms
+
+
 def test_depth_is_left_out_where_that_pays():
     def is_left_out(n, size_px, size):
         rng = np.random.default_rng(9)
         corners = np.array([[0, 0], [size_px, 0], [0, size_px]])
         vertices = (rng.uniform(0, size[0], (n, 1, 2)) + corners).reshape(-1, 2)
+        vertices = np.hstack([vertices, np.full((3 * n, 1), 0.5)])
         plan = tl.plan(vertices, np.arange(3 * n).reshape(n, 3), size)
         return next(one.choice for one in plan.stages if one.name == "depth") == "no test, ids alone"
 
@@ -272,9 +281,9 @@ def listed_in_bands(vertices, cull="none"):
     """How many triangles the four bands of a picture of 16x16 pixels list together."""
     view = View.parse((16, 16), {"sampling": "msaa4", "cull": cull})
     triangles = np.arange(len(vertices), dtype=np.int32).reshape(-1, 3)
-    snapped = snap_scene(KeptMemory(), vertices, triangles, view, with_depth=False, out=None)
+    snapped = snap_mesh(KeptMemory(), vertices, triangles, view, with_depth=False, out=None)
     positions = sampling.sample_positions(4, view.grid_bits)
-    bins = sampling.sort_bands(KeptMemory(), snapped.scene, len(triangles), positions, (16, 16), 64, 1)
+    bins = sampling.sort_bands(KeptMemory(), snapped.mesh, len(triangles), positions, (16, 16), 64, 1)
     assert bins.n_bands == 4
     return bins.n_listed
 
@@ -302,7 +311,7 @@ def guess_of(vertices, size, **view):
     """What a scene in pixels seems to hold: triangles in the picture, layers, and rows."""
     triangles = np.arange(len(vertices), dtype=np.int32).reshape(-1, 3)
     checked = View.parse(size, view)
-    return snap_scene(KeptMemory(), vertices, triangles, checked, with_depth=False, out=None).scene.guess_seen(*size)
+    return snap_mesh(KeptMemory(), vertices, triangles, checked, with_depth=False, out=None).mesh.guess_seen(*size)
 
 
 def test_guess_counts_triangles_in_the_picture():
@@ -358,8 +367,8 @@ def test_work_grows_with_what_is_seen_and_asked():
     def work(n, size_px, sink, **view):
         vertices, triangles, _ = tl.scenes.random_triangles(n, size_px)
         checked = View.parse((1920, 1080), view)
-        snapped = snap_scene(KeptMemory(), vertices, triangles, checked, with_depth=True, out=None)
-        return choices.work_ns(checked, snapped.scene, n, sink)
+        snapped = snap_mesh(KeptMemory(), vertices, triangles, checked, with_depth=True, out=None)
+        return choices.work_ns(checked, snapped, sink)
 
     few = work(1000, 40, Sink.NEAREST)
     assert few < work(2000, 40, Sink.NEAREST) < work(2000, 80, Sink.NEAREST)

@@ -12,9 +12,9 @@ from strategies import Scene, needles, perspective, soup
 import topleft as tl
 from topleft import _engine, scenes
 from topleft._base.memory import KeptMemory
-from topleft._raster.snap import snap_scene
+from topleft._raster.snap import snap_mesh
 from topleft._raster.view import View
-from topleft.methods import reference_area as ref
+from topleft.methods.reference import area as ref
 
 UNIT = 2.0**-24
 SIDE = 12
@@ -298,12 +298,12 @@ def test_area_reference_adds_up_to_the_triangle():
 def test_shallow_edge_across_the_left_border_needs_no_wide_cells():
     corners = np.array([[0.82, 18.04], [-13.3, 15.85], [-7.85, 4.55]])
     view = View.parse((40, 30), {"sampling": "area"})
-    snapped = snap_scene(KeptMemory(), corners, np.array([[0, 1, 2]], np.int32), view, with_depth=False, out=None)
+    snapped = snap_mesh(KeptMemory(), corners, np.array([[0, 1, 2]], np.int32), view, with_depth=False, out=None)
     cells = KeptMemory().constant("cells", 30 * _engine.area_stride(40), _engine.CELL_CLEAR)
     narrow, wide = np.empty((30, 40), np.float32), np.empty((30, 40), np.float32)
-    assert snapped.scene.draw_area(narrow, _engine.as_bytes(cells), 0, 30, False, True) == -1
+    assert snapped.mesh.draw_area(narrow, _engine.as_bytes(cells), 0, 30, False, True) == -1
     wide_cells = np.zeros(len(cells), np.int64)
-    assert snapped.scene.draw_area(wide, _engine.as_bytes(wide_cells), 0, 30, True, True) == -1
+    assert snapped.mesh.draw_area(wide, _engine.as_bytes(wide_cells), 0, 30, True, True) == -1
     assert (narrow == wide).all()
     assert narrow[:, 0].any()
 

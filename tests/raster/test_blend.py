@@ -12,8 +12,8 @@ from strategies import Scene, fan, jittered_grid, perspective, soup
 import topleft as tl
 from topleft._raster.sampling import POSITIONS
 from topleft.methods import reference as exact
-from topleft.methods import reference_blend as ref
-from topleft.methods.reference_sampling import mean
+from topleft.methods.reference import blend as ref
+from topleft.methods.reference.sampling import mean
 
 MODES = ("replace", "over", "add", "multiply", "max", "min")
 CHANNELS = (1, 2, 3, 4)

@@ -12,7 +12,7 @@ from topleft import _engine
 from topleft._base.memory import FreshMemory
 from topleft._base.options import Sink
 from topleft._raster import choices
-from topleft._raster.clustered import ClusteredScene, draw_clustered
+from topleft._raster.cluster_draw import ClusteredMesh, draw_clustered
 from topleft._raster.clusters import Clusters
 from topleft._raster.rasterize import draw_coverage, draw_fragments, draw_overdraw
 from topleft._raster.view import View
@@ -76,8 +76,8 @@ class Drawn:
     def fitted(self, view):
         return dataclasses.replace(view, plan=self)
 
-    def corners_of(self, triangles, n_vertices):
-        return self._clusters.corners
+    def triangles_of(self, triangles, n_vertices):
+        return self._clusters.triangles
 
     def find_clusters(self, vertices):
         return self._clusters
@@ -100,7 +100,7 @@ def assert_same_fragments(got, expected):
 def share_left(mesh, **view):
     """The share of the clusters of a mesh that a view leaves, hidden or not."""
     clusters = Clusters(*mesh)
-    seen = ClusteredScene(clusters, View.parse(SIZE, view)).survey(len(clusters))
+    seen = ClusteredMesh(clusters, View.parse(SIZE, view)).survey(len(clusters))
     return 1 - seen.outside - seen.turned
 
 
@@ -142,7 +142,7 @@ def test_masks_and_counts_have_the_same_bits(isa, sink):
             pixels = np.empty_like(expected)
             covered = np.empty(_engine.Target.covered_shape(SIZE[1], SIZE[0]), np.uint64)
             target = _engine.Target(sink, pixels, None, covered)
-            memories, seen = [FreshMemory() for _ in range(2)], ClusteredScene(clusters, view)
+            memories, seen = [FreshMemory() for _ in range(2)], ClusteredMesh(clusters, view)
             if not draw_clustered(memories, [seen], target, SIZE[1]):
                 continue  # a vertex does not fit 32 bits
         assert_same(pixels, expected)
@@ -185,7 +185,7 @@ def test_far_side_is_left_out():
 def count_drawn(mesh, **view):
     """Clusters that a view draws, and those that it would draw if none was hidden."""
     clusters = Clusters(*mesh)
-    scene = ClusteredScene(clusters, View.parse(SIZE, view))
+    scene = ClusteredMesh(clusters, View.parse(SIZE, view))
     target = _engine.Target(Sink.NEAREST, np.empty(SIZE[::-1], np.int32), np.empty(SIZE[::-1], np.float32), None)
     seen = clusters.seen_in(scene._exact, scene._empty, 0, SIZE[1], SIZE[0], is_farthest=False)
     room, others = np.empty(3 * len(clusters) + 1, np.int32), np.empty(len(mesh[1]) + 1, np.int32)

@@ -5,9 +5,9 @@ import pytest
 
 import topleft as tl
 from topleft._base.options import Sink
-from topleft._raster import choices
-from topleft._raster.clustered import ClusteredScene
-from topleft._raster.clusters import Clusters, Patience, Survey
+from topleft._raster import choices, cluster_draw
+from topleft._raster.cluster_draw import ClusteredMesh
+from topleft._raster.clusters import Backoff, Clusters, Survey
 from topleft._raster.view import View
 from topleft._render import instances
 from topleft._render.instances import PlacedScene, count_layers, survey_instances
@@ -48,7 +48,7 @@ def test_survey_counts_what_is_left_out(cull):
     clusters = Clusters(*FINE)
     camera = tl.Camera.look_at((0, 0, 3), near=0.01, far=100.0, fov_y_deg=20)
     view = {"transform": camera.clip_from_world(SIZE), "cull": cull}
-    scene = ClusteredScene(clusters, View.parse(SIZE, view))
+    scene = ClusteredMesh(clusters, View.parse(SIZE, view))
     seen = scene.survey(len(clusters))
     assert 0 < scene.count_drawn(Sink.NEAREST) <= round(len(clusters) * (seen.back + seen.front)) < len(clusters) / 2
     assert round(sum(seen), 9) == 1
@@ -61,7 +61,7 @@ def test_survey_counts_what_is_left_out(cull):
 def test_survey_of_nothing_is_nothing():
     clusters = Clusters(np.zeros((3, 3), np.float32), np.empty((0, 3), np.int32))
     view = View.parse(SIZE, {"transform": np.eye(4)})
-    assert ClusteredScene(clusters, view).survey() == (0, 0, 0, 0)
+    assert ClusteredMesh(clusters, view).survey() == (0, 0, 0, 0)
 
 
 def standing(places, mesh=None):
@@ -125,7 +125,7 @@ def test_instances_are_drawn_from_clusters_where_enough_is_left_out(view, outsid
 def test_scene_asks_before_it_draws_clusters(monkeypatch):
     scene = standing([(0, 0, -3.0 * k) for k in range(16)], tl.Mesh(*as_floats(*tl.scenes.blob(10_000))))
     drawn = []
-    draw = instances.draw_clustered
+    draw = cluster_draw.draw_clustered
     monkeypatch.setattr(instances, "draw_clustered", lambda *a, **k: drawn.append(1) or draw(*a, **k))
     camera = tl.Camera.look_at((0, 0, 30), ortho_height=4.0, near=1.0, far=100.0)
     for layers, n_drawn in ((3.0, 1), (100.0, 0)):
@@ -135,12 +135,12 @@ def test_scene_asks_before_it_draws_clusters(monkeypatch):
         assert len(drawn) == n_drawn
 
 
-def test_patience_doubles_and_ends_when_clusters_pay():
-    patience, asked = Patience(), []
+def test_backoff_doubles_and_ends_when_clusters_pay():
+    backoff, asked = Backoff(), []
     for i in range(40):
-        if patience.is_over():
+        if backoff.is_over():
             asked.append(i)
-            patience.note(pays=i > 20)
+            backoff.note(pays=i > 20)
     assert asked == [0, 3, 8, 17, 26, *range(27, 40)]
 
 

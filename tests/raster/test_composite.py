@@ -10,7 +10,7 @@ from engine_cases import ON_EACH_ISA, mixed, on
 
 import topleft as tl
 from topleft._raster import composite as composite_function
-from topleft.methods import reference_peel as ref
+from topleft.methods.reference import peel as ref
 
 SIZE = (24, 18)
 

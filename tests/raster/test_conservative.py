@@ -7,7 +7,7 @@ from engine_cases import ON_EACH_ISA, THREADS, mixed, on, sharing
 from strategies import CLIP_SCENES, PIXEL_SCENES, Scene, few_bits, floor, on_centres, soup
 
 import topleft as tl
-from topleft.methods import reference_sampling as ref
+from topleft.methods.reference import sampling as ref
 
 KINDS = {"outer": ref.outer, "inner": ref.inner}
 SCENES = PIXEL_SCENES | CLIP_SCENES

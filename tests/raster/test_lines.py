@@ -12,9 +12,9 @@ from strategies import CLIP_SCENES, PIXEL_SCENES, soup, with_depth
 import topleft as tl
 from topleft._base.memory import FreshMemory
 from topleft._raster import lines
-from topleft._raster.snap import snap_scene
+from topleft._raster.snap import snap_mesh
 from topleft._raster.view import View
-from topleft.methods import reference_lines as ref
+from topleft.methods.reference import lines as ref
 
 TRIANGLE = [[0.5, 0.5], [4.5, 0.5], [0.5, 4.5]]
 ONE = [[0, 1, 2]]
@@ -81,7 +81,7 @@ def test_wireframe_cull_keeps_the_edges_of_what_is_left():
 def test_edges_are_listed_once_by_ascending_lower_index():
     triangles = np.random.default_rng(1).integers(0, 30, (400, 3))
     view = View.parse((9, 9), {})
-    snapped = snap_scene(FreshMemory(), np.zeros((30, 2)), triangles, view, with_depth=False, out=None)
+    snapped = snap_mesh(FreshMemory(), np.zeros((30, 2)), triangles, view, with_depth=False, out=None)
     edges = lines.list_edges(FreshMemory(), snapped)
     expected = {tuple(sorted(pair)) for a, b, c in triangles.tolist() for pair in ((a, b), (b, c), (c, a))}
     assert sorted((int(e) & 0xFFFFFFFF, int(e) >> 32) for e in edges) == sorted(expected)

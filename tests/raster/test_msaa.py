@@ -8,7 +8,7 @@ from strategies import CLIP_SCENES, PIXEL_SCENES, Scene, few_bits, floor, on_cen
 
 import topleft as tl
 from topleft._raster.sampling import POSITIONS
-from topleft.methods import reference_sampling as ref
+from topleft.methods.reference import sampling as ref
 
 COUNTS = (2, 4, 8, 16)
 SCENES = {name: f for name, f in (PIXEL_SCENES | CLIP_SCENES).items() if name not in ("far_away", "far_integers")}

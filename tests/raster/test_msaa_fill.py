@@ -10,7 +10,7 @@ from strategies import floor
 
 import topleft as tl
 from topleft._base.color import srgb_tables
-from topleft.methods.reference_sampling import mean
+from topleft.methods.reference.sampling import mean
 
 COUNTS = (2, 4, 8, 16)
 SQUARE = ([[0, 0], [0.5, 0], [0.5, 1], [0, 1]], [[0, 1, 2], [0, 2, 3]])  # half of a pixel

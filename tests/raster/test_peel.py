@@ -10,7 +10,7 @@ from strategies import CLIP_SCENES, PIXEL_SCENES, Scene, with_depth
 
 import topleft as tl
 from topleft._raster import peel as peel_module
-from topleft.methods import reference_peel as ref
+from topleft.methods.reference import peel as ref
 
 LAST = {"less": np.inf, "greater": -np.inf}
 

@@ -11,7 +11,7 @@ from comparing import assert_same
 import topleft as tl
 from topleft._base.color import id_colors, srgb_tables
 from topleft._shade.shade import GREY_OF_FARTHEST, GREY_OF_NEAREST, picture_of_numbers
-from topleft.methods.reference_sampling import mean
+from topleft.methods.reference.sampling import mean
 
 SIZE = (48, 36)
 KNOT = tl.Mesh(*tl.scenes.shape("torus-knot"))
@@ -79,5 +79,3 @@ def test_empty_picture_and_picture_of_nothing():
 def test_samplings_without_an_order_are_refused(sampling):
     with pytest.raises(ValueError, match=f"sampling '{sampling}' gives no ids"):
         tl.render(KNOT, size=SIZE, sampling=sampling)
-
-

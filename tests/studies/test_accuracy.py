@@ -18,7 +18,8 @@ from benchmarks.scenes.families import FAMILIES, Entry, entries, in_cells
 
 import topleft as tl
 from topleft import scenes
-from topleft.methods import reference, reference_area
+from topleft.methods import reference
+from topleft.methods.reference import area as reference_area
 
 SIZE = (12, 11)
 METHODS = ["auto", "row_crossing/cull-front", "float_barycentric"]

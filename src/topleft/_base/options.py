@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from enum import IntEnum, StrEnum
-from functools import cache
+from functools import cache, cached_property
 from typing import TypeVar
 
 __all__ = ["Alpha", "Blend", "ClipDepth", "Cull", "DepthTest", "Per", "Resolve", "Sampling", "Sink", "parse"]
@@ -21,7 +21,7 @@ class Sampling(StrEnum):
     OUTER = "outer"
     INNER = "inner"
 
-    @property
+    @cached_property
     def n_samples(self) -> int:
         """Samples of a pixel, 1 unless there are several."""
         return int(self.removeprefix("msaa")) if self.startswith("msaa") else 1

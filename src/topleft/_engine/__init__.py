@@ -1,8 +1,16 @@
-"""The compiled unit, and the choice of its instruction set.
+"""The compiled unit, and the choice of its instruction set. It allocates scratch, calls csrc and returns its status.
 
-kernels.pyx      memoryviews in, one nogil call of csrc, status out; its parts are the .pxi files
-kernels.pyi      its types
-isa.py           which instruction set runs, and how this copy was built
+buffers.pxi    describes what a pass reads and writes: viewport, vertices, buffers, indices, clipped pieces
+clusters.pxi   sorts a mesh into clusters and draws those that a view needs
+contract.pxi   declares the structs and kernels of csrc
+isa.py         chooses the instruction set that runs, and tells how this copy was built
+kernels.pyx    holds the kernel table in use; includes the parts, and gives their names to Python
+mesh.pxi       computes normals of a mesh, and distances between surfaces
+pixels.pxi     writes pixels that are not found by drawing triangles: means of samples, layers, points, planes, lines
+shade.pxi      shades pixels and tests their alpha
+triangles.pxi  draws snapped triangles: whole, by bands of rows, in layers
+
+kernels.pyi has the types of what kernels.pyx gives.
 """
 
 from topleft._engine.kernels import (
@@ -20,18 +28,19 @@ from topleft._engine.kernels import (
     Bins,
     Clustered,
     ClusterView,
+    Mipmap,
+    Fans,
     Palette,
     Pieces,
     Points,
-    Scene,
-    Shading,
+    ShadingTable,
+    SnappedMesh,
     Source,
-    Surface,
     Target,
-    Texture,
     Transfer,
+    Tree,
     Valued,
-    View,
+    Viewport,
     area_stride,
     as_bytes,
     blend_cells,
@@ -88,18 +97,19 @@ __all__ = [
     "Bins",
     "ClusterView",
     "Clustered",
+    "Mipmap",
+    "Fans",
     "Palette",
     "Pieces",
     "Points",
-    "Scene",
-    "Shading",
+    "ShadingTable",
+    "SnappedMesh",
     "Source",
-    "Surface",
     "Target",
-    "Texture",
     "Transfer",
+    "Tree",
     "Valued",
-    "View",
+    "Viewport",
     "area_stride",
     "as_bytes",
     "blend_cells",

@@ -1,4 +1,4 @@
-# Meshes that are sorted into clusters, and passes that draw what a view needs of them. Included by _engine.pyx.
+# Meshes that are sorted into clusters, and passes that draw what a view needs of them.
 
 CLUSTER = TL_CLUSTER
 CLUSTER_GROUP = TL_CLUSTER_GROUP
@@ -80,14 +80,14 @@ cdef class ClusterView:
 
     cdef tl_cluster_view view
 
-    def __init__(self, matrix, Scene scene, int64_t first_row, int64_t n_rows, int64_t width, double margin_px, double error, bint is_farthest):
-        """`matrix`: clip from object; `scene`: how it is seen; beyond `margin_px` around the window nothing shows.
+    def __init__(self, matrix, SnappedMesh mesh, int64_t first_row, int64_t n_rows, int64_t width, double margin_px, double error, bint is_farthest):
+        """`matrix`: clip from object; `mesh`: how it is seen; beyond `margin_px` around the window nothing shows.
 
         `error`: of the vertex stage, as a share of the terms that it adds up.
         """
         cdef tl_cluster_view *v = &self.view
-        cdef const tl_view *how = &scene.view.view
-        cdef tl_window window = scene.window(first_row, n_rows, width)
+        cdef const tl_view *how = &mesh.viewport.view
+        cdef tl_window window = mesh.window(first_row, n_rows, width)
         cdef double *x = v.matrix
         cdef double *y = v.matrix + 4
         cdef double *w = v.matrix + 12
@@ -107,7 +107,7 @@ cdef class ClusterView:
         v.length[1] = sqrt(y[0] * y[0] + y[1] * y[1] + y[2] * y[2])
         v.length[2] = sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
         v.error, v.near_clip, v.far_clip, v.zero_to_one = error, how.near_clip, how.far_clip, how.zero_to_one
-        v.is_farthest, v.cull = is_farthest, scene.scene.cull
+        v.is_farthest, v.cull = is_farthest, mesh.snapped.cull
 
 
 cdef class Clustered:
@@ -135,22 +135,22 @@ cdef class Clustered:
         with nogil:
             K.survey_clusters(&self.mesh, &view.view, step, &n_of[0])
 
-    def draw(self, Scene scene, Source source, ClusterView seen, bint may_be_hidden, Target target, int64_t first_row, int64_t n_rows,
+    def draw(self, SnappedMesh mesh, Source source, ClusterView seen, bint may_be_hidden, Target target, int64_t first_row, int64_t n_rows,
              int32_t[::1] room, int32_t[::1] others, bint is_first, bint is_last):
         """Draw what the rows of a picture show.
 
-        `scene`: how, and what triangle 0 is called; its own triangles are not read. `room`: three numbers a cluster, and one.
+        `mesh`: how, and what triangle 0 is called; its own triangles are not read. `room`: three numbers a cluster, and one.
         `others`, a number for each triangle, gets those that a clip plane may cut, or that 64 bits cannot hold. Returns how
         many of these there are, how many clusters the window may show, and how many of them were not hidden.
         """
         cdef tl_target rows = target.rows(first_row)
-        cdef tl_window window = scene.window(first_row, n_rows, target.width)
+        cdef tl_window window = mesh.window(first_row, n_rows, target.width)
         cdef tl_share share = no_share()
         cdef tl_cluster_pass clusters
         memset(&clusters, 0, sizeof(clusters))
-        clusters.mesh, clusters.seen, clusters.source, clusters.view = &self.mesh, &seen.view, &source.source, &scene.view.view
+        clusters.mesh, clusters.seen, clusters.source, clusters.view = &self.mesh, &seen.view, &source.source, &mesh.viewport.view
         clusters.list, clusters.room, clusters.may_be_hidden = &room[0], &room[self.mesh.n_clusters], may_be_hidden
         share.clusters, share.others, share.is_first, share.is_last = &clusters, &others[0], is_first, is_last
         with nogil:
-            K.draw(&scene.scene, &window, &rows, &share)
+            K.draw(&mesh.snapped, &window, &rows, &share)
         return share.n_others, clusters.n_seen, clusters.n_drawn

@@ -1,4 +1,4 @@
-# The contract with the kernels, as csrc/topleft.h and its parts have it. Included by _engine.pyx.
+# The contract with the kernels, as csrc/topleft.h and its parts have it.
 
 cdef extern from "topleft.h" nogil:
     ctypedef struct tl_vertex:

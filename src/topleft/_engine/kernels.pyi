@@ -1,4 +1,4 @@
-"""The types of the compiled module. What each does is told in _engine.pyx and the .pxi files."""
+"""The types of the compiled module. What each does stands in kernels.pyx and the .pxi files."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -53,10 +53,10 @@ class Target:
     @staticmethod
     def covered_shape(height: int, width: int, n_samples: int = 1) -> tuple[int, int]: ...
 
-class View:
+class Viewport:
     def __init__(
         self,
-        viewport: tuple[int, int],
+        size: tuple[int, int],
         subpixel_bits: int,
         guard_bits: int,
         zero_to_one: bool,
@@ -64,13 +64,12 @@ class View:
         far_clip: bool,
     ) -> None: ...
     @property
-    def viewport(self) -> tuple[int, int]: ...
+    def size(self) -> tuple[int, int]: ...
 
 class Source:
     is_clip_space: bool
-    def __init__(
-        self, vertices: NDArray[Any], matrix: NDArray[Any] | None = None, is_affine: bool = False
-    ) -> None: ...
+    is_affine: bool
+    def __init__(self, vertices: NDArray[Any], matrix: NDArray[Any] | None = None, is_affine: bool = False) -> None: ...
     def snap(
         self,
         first: int,
@@ -81,10 +80,10 @@ class Source:
         wide: NDArray[np.int64] | None,
     ) -> tuple[int, int, int]: ...
     def project_blocks(
-        self, is_used: NDArray[np.uint8], view: View, records: NDArray[np.uint8]
+        self, is_used: NDArray[np.uint8], viewport: Viewport, records: NDArray[np.uint8]
     ) -> tuple[int, int, int]: ...
     def project(
-        self, first: int, end: int, view: View, records: NDArray[np.uint8], wide: NDArray[np.int64] | None
+        self, first: int, end: int, viewport: Viewport, records: NDArray[np.uint8], wide: NDArray[np.int64] | None
     ) -> tuple[int, int, int]: ...
 
 class Pieces:
@@ -94,13 +93,13 @@ class Pieces:
         source: Source,
         records: NDArray[np.uint8],
         triangles: NDArray[np.int32],
-        view: View,
+        viewport: Viewport,
         ids: NDArray[np.int32] | None = None,
     ) -> None: ...
     def __len__(self) -> int: ...
 
-class Scene:
-    view: View | None
+class SnappedMesh:
+    viewport: Viewport | None
     subpixel_bits: int
     def __init__(
         self,
@@ -109,26 +108,19 @@ class Scene:
         wide: NDArray[np.int64] | None,
         triangles: NDArray[np.int32],
         pieces: Pieces | None,
-        x_px: int,
-        y_px: int,
-        subpixel_bits: int,
-        cull: int,
-        method: int,
-        test: int = 0,
-        view: View | None = None,
+        how: tuple[int, int, int, int, int, int],
+        viewport: Viewport | None,
         is_used: NDArray[np.uint8] | None = None,
     ) -> None: ...
-    def seen_from(self, x_fx: int, y_fx: int) -> Scene: ...
+    def seen_from(self, x_fx: int, y_fx: int) -> SnappedMesh: ...
     def guess_seen(self, width: int, height: int) -> tuple[float, float, float]: ...
     def count_classes(
         self, sink: int, width: int, height: int, samples: NDArray[np.int32] | None = None
     ) -> tuple[int, list[tuple[int, float, float]]]: ...
-    def with_inverse_w(self, n_pixels: int) -> Scene: ...
-    def numbered_from(self, first_id: int) -> Scene: ...
-    def moved(self, x_px: int, y_px: int) -> Scene: ...
-    def draw(
-        self, target: Target, first_row: int, n_rows: int, is_first: bool = True, is_last: bool = True
-    ) -> int: ...
+    def with_inverse_w(self, n_pixels: int) -> SnappedMesh: ...
+    def numbered_from(self, first_id: int) -> SnappedMesh: ...
+    def moved(self, x_px: int, y_px: int) -> SnappedMesh: ...
+    def draw(self, target: Target, first_row: int, n_rows: int, is_first: bool = True, is_last: bool = True) -> int: ...
     def draw_share(
         self, target: Target, first_row: int, n_rows: int, first: int, others: NDArray[np.int32]
     ) -> tuple[int, int]: ...
@@ -182,15 +174,14 @@ class Scene:
     ) -> None: ...
 
 def list_edges(
-    scene: Scene,
+    mesh: SnappedMesh,
     starts: NDArray[np.int64],
     last_low: NDArray[np.int32],
     highs: NDArray[np.int32],
     edges: NDArray[np.uint64],
 ) -> int: ...
 def draw_lines(
-    scene: Scene,
-    view: View | None,
+    mesh: SnappedMesh,
     edges: NDArray[np.uint64],
     pixels: NDArray[np.uint8],
     depth: NDArray[np.float32] | None,
@@ -223,7 +214,9 @@ class Points:
         background: float,
         is_f64_out: bool,
     ) -> None: ...
-    def fill(self, scene: Scene, ids: NDArray[np.int32], out: NDArray[Any], first_row: int, n_rows: int) -> None: ...
+    def fill(
+        self, mesh: SnappedMesh, ids: NDArray[np.int32], out: NDArray[Any], first_row: int, n_rows: int
+    ) -> None: ...
 
 class Bins:
     bad_row: int
@@ -231,15 +224,15 @@ class Bins:
     n_listed: int
     band_bits: int
     def __init__(
-        self, scene: Scene, height: int, width: int, reach_fx: int, band_bits: int, room: NDArray[np.int32]
+        self, mesh: SnappedMesh, height: int, width: int, reach_fx: int, band_bits: int, room: NDArray[np.int32]
     ) -> None: ...
     def fill(self, listed: NDArray[np.int32]) -> None: ...
 
 def draw_bands(
-    scenes: Sequence[Scene], targets: Sequence[Target], bins: Bins, first_band: int, end_band: int
+    meshes: Sequence[SnappedMesh], targets: Sequence[Target], bins: Bins, first_band: int, end_band: int
 ) -> None: ...
 def peel(
-    scenes: Sequence[Scene],
+    meshes: Sequence[SnappedMesh],
     bins: Sequence[Bins | None],
     ids: NDArray[np.int32],
     depth: NDArray[np.float32],
@@ -248,7 +241,6 @@ def peel(
     first_band: int,
     end_band: int,
 ) -> int: ...
-
 def composite(
     ids: NDArray[np.int32],
     first_row: int,
@@ -271,7 +263,7 @@ class Palette:
     def mean_flat(self, labels: NDArray[np.int32], pixels: NDArray[Any], first_row: int, n_rows: int) -> None: ...
 
 def fill_bands(
-    scenes: Sequence[Scene],
+    meshes: Sequence[SnappedMesh],
     labels: NDArray[np.int32],
     palette: Palette,
     pixels: NDArray[Any],
@@ -280,20 +272,15 @@ def fill_bands(
     end_band: int,
 ) -> None: ...
 def mean_colors(
-    painted: NDArray[Any],
-    pixels: NDArray[Any],
-    first_row: int,
-    n_rows: int,
-    n_channels: int,
-    transfer: Transfer | None,
+    painted: NDArray[Any], pixels: NDArray[Any], first_row: int, n_rows: int, n_channels: int, transfer: Transfer | None
 ) -> None: ...
 
-class Texture:
+class Mipmap:
     def __init__(
         self, texels: NDArray[np.uint16], levels: NDArray[np.int32], filter_code: int, wrap_u: int, wrap_v: int
     ) -> None: ...
 
-class Shading:
+class ShadingTable:
     def __init__(
         self,
         normals: NDArray[np.float32],
@@ -311,7 +298,7 @@ class Shading:
     def set_view(
         self,
         show: int,
-        matcap: Texture | None,
+        matcap: Mipmap | None,
         eye_from: Sequence[Sequence[float]],
         has_perspective: bool,
         eye: Sequence[float],
@@ -324,12 +311,11 @@ class Shading:
     ) -> None: ...
 
 def set_inverse_w(
-    scene: Scene, rows: NDArray[np.float32], vertex_of_row: NDArray[np.int32] | None, out: NDArray[np.float32]
+    mesh: SnappedMesh, rows: NDArray[np.float32], vertex_of_row: NDArray[np.int32] | None, out: NDArray[np.float32]
 ) -> None: ...
 def shade(
-    scene: Scene,
-    view: View | None,
-    shading: Shading,
+    mesh: SnappedMesh,
+    shading: ShadingTable,
     ids: NDArray[np.int32],
     depth: NDArray[np.float32],
     pixels: NDArray[np.uint8],
@@ -337,9 +323,8 @@ def shade(
     n_rows: int,
 ) -> None: ...
 def shade_samples(
-    scene: Scene,
-    view: View | None,
-    shading: Shading,
+    mesh: SnappedMesh,
+    shading: ShadingTable,
     positions: NDArray[np.int32],
     ids: NDArray[np.int32],
     depth: NDArray[np.float32],
@@ -348,18 +333,16 @@ def shade_samples(
     n_rows: int,
 ) -> None: ...
 def shade_normals(
-    scene: Scene,
-    view: View | None,
-    shading: Shading,
+    mesh: SnappedMesh,
+    shading: ShadingTable,
     ids: NDArray[np.int32],
     out: NDArray[np.float32],
     first_row: int,
     n_rows: int,
 ) -> None: ...
 def cut_out_over(
-    scene: Scene,
-    view: View | None,
-    shading: Shading,
+    mesh: SnappedMesh,
+    shading: ShadingTable,
     triangles: NDArray[np.int32],
     ids: NDArray[np.int32],
     depth: NDArray[np.float32],
@@ -368,9 +351,8 @@ def cut_out_over(
     n_rows: int,
 ) -> None: ...
 def cut_out(
-    scene: Scene,
-    view: View | None,
-    shading: Shading,
+    mesh: SnappedMesh,
+    shading: ShadingTable,
     opaque: NDArray[np.int32],
     triangles: NDArray[np.int32],
     ids: NDArray[np.int32],
@@ -378,7 +360,6 @@ def cut_out(
     first_row: int,
     n_rows: int,
 ) -> None: ...
-
 def mark_vertices(ids: NDArray[np.int32], corners: NDArray[np.int32], is_used: NDArray[np.uint8]) -> None: ...
 def list_cut(
     ids: NDArray[np.int32], corners: NDArray[np.int32], records: NDArray[np.uint8], cut: NDArray[np.int32]
@@ -412,7 +393,7 @@ class ClusterView:
     def __init__(
         self,
         matrix: NDArray[np.float64],
-        scene: Scene,
+        mesh: SnappedMesh,
         first_row: int,
         n_rows: int,
         width: int,
@@ -434,7 +415,7 @@ class Clustered:
     def survey(self, view: ClusterView, step: int, n_of: NDArray[np.int64]) -> None: ...
     def draw(
         self,
-        scene: Scene,
+        mesh: SnappedMesh,
         source: Source,
         seen: ClusterView,
         may_be_hidden: bool,
@@ -447,7 +428,7 @@ class Clustered:
         is_last: bool,
     ) -> tuple[int, int, int]: ...
 
-class Surface:
+class Tree:
     def __init__(self, points: NDArray[np.float64], triangles: NDArray[np.int32], slack: float) -> None: ...
     def find_nearest(
         self,
@@ -477,7 +458,6 @@ def set_feet(
     at: NDArray[np.float64],
     squared: NDArray[np.float64],
 ) -> None: ...
-
 def vertex_normals(
     source: Source, triangles: NDArray[np.int32], first: int, end: int, out: NDArray[np.float64]
 ) -> int: ...

@@ -8,7 +8,56 @@ from libc.string cimport memset
 import numpy as np
 
 include "contract.pxi"
-include "dispatch.pxi"
+
+cdef extern from "dispatch.h" nogil:
+    enum:
+        TL_N_ISA
+    const char *tl_isa_name(int i_isa)
+    bint tl_isa_built(int i_isa)
+    bint tl_isa_available(int i_isa)
+    const char *tl_isa_flags(int i_isa)
+    const tl_kernels *tl_kernels_for(const char *name)
+    const char *tl_compiler()
+    const char *tl_version()
+
+# The kernels in use. Scalar until `isa.py` has chosen: never NULL.
+cdef const tl_kernels *K = tl_kernels_for(b"scalar")
+cdef str isa_name = "scalar"
+
+
+def use_isa(name: str) -> None:
+    """Let all further calls run on the kernels of one available instruction set."""
+    global K, isa_name
+    cdef bytes key = name.encode()
+    cdef const tl_kernels *kernels = tl_kernels_for(key)
+    if kernels == NULL:
+        raise ValueError(f"instruction set must be one of {', '.join(isa_available())}, got {name!r}")
+    K = kernels
+    isa_name = name
+
+
+def isa_in_use() -> str:
+    """Return the name of the instruction set that the kernels in use were compiled for."""
+    return isa_name
+
+
+def isa_built() -> list[str]:
+    """Return the instruction sets in this binary, the plainest first."""
+    return [tl_isa_name(i).decode() for i in range(TL_N_ISA) if tl_isa_built(i)]
+
+
+def isa_available() -> list[str]:
+    """Return the instruction sets in this binary that this machine can run, the plainest first."""
+    return [tl_isa_name(i).decode() for i in range(TL_N_ISA) if tl_isa_available(i)]
+
+
+def compiler_info() -> dict[str, object]:
+    """Return what this binary was made from and how: version, compiler, flags of each unit."""
+    return {
+        "version": tl_version().decode(),
+        "compiler": tl_compiler().decode().strip(),
+        "flags": {tl_isa_name(i).decode(): tl_isa_flags(i).decode() for i in range(TL_N_ISA) if tl_isa_built(i)},
+    }
 
 cdef enum:
     LABEL = 2  # TL_SINK_LABEL
@@ -25,12 +74,12 @@ cdef inline const void *data(const uint8_t[::1] view) noexcept nogil:
 
 
 def area_stride(int64_t width):
-    """Return how many cells `Scene.draw_area` needs for a row of pixels."""
+    """Return how many cells `SnappedMesh.draw_area` needs for a row of pixels."""
     return tl_area_stride(width)
 
 
 def blend_cells(int64_t width):
-    """Return how many cells `Scene.blend` needs for areas."""
+    """Return how many cells `SnappedMesh.blend` needs for areas."""
     return tl_blend_cells(width)
 
 
@@ -39,14 +88,9 @@ def as_bytes(array):
     return array.reshape(-1).view(np.uint8)
 
 
-include "inputs.pxi"
-include "scene.pxi"
-include "bands.pxi"
+include "buffers.pxi"
+include "triangles.pxi"
 include "clusters.pxi"
-include "means.pxi"
-include "lines.pxi"
+include "pixels.pxi"
 include "shade.pxi"
-include "faces.pxi"
-include "planes.pxi"
-include "nearest.pxi"
-include "points.pxi"
+include "mesh.pxi"

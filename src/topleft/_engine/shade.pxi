@@ -1,7 +1,7 @@
-# Shading. Included by _engine.pyx, which declares the kernels.
+# Shades pixels and tests their alpha: textures, materials and lights, and the passes that use them.
 
 
-cdef class Texture:
+cdef class Mipmap:
     """A picture of linear light and its halves: uint16 texels as `tl_texture` has them, a row (offset, width, height) a level."""
 
     cdef tl_texture texture
@@ -25,7 +25,7 @@ cdef void copy_floats(float *out, values, int n) except *:
         out[k] = values[k]
 
 
-cdef class Shading:
+cdef class ShadingTable:
     """What `tl_shading` holds; keeps what it points to alive."""
 
     cdef tl_shading shading
@@ -55,7 +55,7 @@ cdef class Shading:
     def set_materials(self, materials):
         """Take rows (color, back_color, back_side, specular, shininess, is_unlit, cutoff, texture or None)."""
         cdef tl_material *m
-        cdef Texture texture
+        cdef Mipmap texture
         cdef int k
         self.materials = np.zeros(max(1, len(materials)) * sizeof(tl_material), np.uint8)
         m = <tl_material *>&self.materials[0]
@@ -82,7 +82,7 @@ cdef class Shading:
         copy_floats(self.shading.ambient, ambient, 3)
         self.shading.lights, self.shading.n_lights = light, len(lights)
 
-    def set_view(self, int show, Texture matcap, eye_from, bint has_perspective, eye, ray, background, background_bytes):
+    def set_view(self, int show, Mipmap matcap, eye_from, bint has_perspective, eye, ray, background, background_bytes):
         """Take what the picture tells, where it is seen from, and what is behind it."""
         cdef tl_shading *s = &self.shading
         cdef int k
@@ -106,7 +106,7 @@ cdef class Shading:
         s.fog_near, s.fog_scale, s.distance_start, s.distance_scale = near, scale, distance_start, distance_scale
 
 
-def set_inverse_w(Scene scene, const float[:, ::1] rows, const int32_t[::1] vertex_of_row, float[:, ::1] out):
+def set_inverse_w(SnappedMesh mesh, const float[:, ::1] rows, const int32_t[::1] vertex_of_row, float[:, ::1] out):
     """Copy rows of four numbers, and write 1/w over the fourth; of vertices that have been snapped.
 
     The first rows are those of the vertices, one each; `vertex_of_row`, or None, has the vertices of the rows behind.
@@ -115,18 +115,18 @@ def set_inverse_w(Scene scene, const float[:, ::1] rows, const int32_t[::1] vert
     cdef int64_t n = rows.shape[0] - n_more, n_blocks
     if n == 0:
         return
-    if scene.is_used is None:
+    if mesh.is_used is None:
         with nogil:
-            K.set_inverse_w(scene.scene.mesh.source, &rows[0, 0], 0, n, &out[0, 0])
+            K.set_inverse_w(mesh.snapped.mesh.source, &rows[0, 0], 0, n, &out[0, 0])
     else:
-        n_blocks = scene.is_used.shape[0]
+        n_blocks = mesh.is_used.shape[0]
         with nogil:
             while i < n_blocks:
                 end = i
-                while end < n_blocks and scene.is_used[end]:
+                while end < n_blocks and mesh.is_used[end]:
                     end += 1
                 if end > i:
-                    K.set_inverse_w(scene.scene.mesh.source, &rows[0, 0], i * VERTEX_BLOCK, min(end * VERTEX_BLOCK, n), &out[0, 0])
+                    K.set_inverse_w(mesh.snapped.mesh.source, &rows[0, 0], i * VERTEX_BLOCK, min(end * VERTEX_BLOCK, n), &out[0, 0])
                 i = end + 1
     with nogil:
         for i in range(n_more):
@@ -135,44 +135,40 @@ def set_inverse_w(Scene scene, const float[:, ::1] rows, const int32_t[::1] vert
             out[n + i, 3] = out[vertex_of_row[i], 3]
 
 
-def shade(Scene scene, View view, Shading shading, const int32_t[:, ::1] ids, const float[:, ::1] depth, uint8_t[:, :, ::1] pixels,
+def shade(SnappedMesh mesh, ShadingTable shading, const int32_t[:, ::1] ids, const float[:, ::1] depth, uint8_t[:, :, ::1] pixels,
           int64_t first_row, int64_t n_rows):
     """Write rows of the picture (H, W, 4) of a visibility buffer."""
-    cdef tl_window window = scene.window(first_row, n_rows, ids.shape[1])
-    cdef const tl_view *own = &view.view if view is not None else NULL
+    cdef tl_window window = mesh.window(first_row, n_rows, ids.shape[1])
     if n_rows and ids.shape[1]:
         with nogil:
-            K.shade(&scene.scene, &window, own, &shading.shading, &ids[first_row, 0], &depth[first_row, 0], &pixels[first_row, 0, 0])
+            K.shade(&mesh.snapped, &window, mesh.clip_view(), &shading.shading, &ids[first_row, 0], &depth[first_row, 0], &pixels[first_row, 0, 0])
 
 
-def shade_samples(Scene scene, View view, Shading shading, const int32_t[:, ::1] positions, const int32_t[:, :, ::1] ids,
+def shade_samples(SnappedMesh mesh, ShadingTable shading, const int32_t[:, ::1] positions, const int32_t[:, :, ::1] ids,
                   const float[:, :, ::1] depth, uint8_t[:, :, ::1] pixels, int64_t first_row, int64_t n_rows):
     """Write rows of the picture (H, W, 4) of a visibility buffer with several samples a pixel, ids and depth (S, H, W)."""
-    cdef tl_window window = scene.window(first_row, n_rows, ids.shape[2])
-    cdef const tl_view *own = &view.view if view is not None else NULL
+    cdef tl_window window = mesh.window(first_row, n_rows, ids.shape[2])
     cdef int sample_bits = int(ids.shape[0]).bit_length() - 1
     cdef int64_t stride = ids.shape[1] * ids.shape[2]
     if n_rows and ids.shape[2]:
         with nogil:
-            K.shade_samples(&scene.scene, &window, own, &shading.shading, &positions[0, 0], sample_bits, stride, &ids[0, first_row, 0],
+            K.shade_samples(&mesh.snapped, &window, mesh.clip_view(), &shading.shading, &positions[0, 0], sample_bits, stride, &ids[0, first_row, 0],
                             &depth[0, first_row, 0], &pixels[first_row, 0, 0])
 
 
-def shade_normals(Scene scene, View view, Shading shading, const int32_t[:, ::1] ids, float[:, :, ::1] out, int64_t first_row,
+def shade_normals(SnappedMesh mesh, ShadingTable shading, const int32_t[:, ::1] ids, float[:, :, ::1] out, int64_t first_row,
                   int64_t n_rows):
     """Write rows of the unit normals (H, W, 3) of a visibility buffer."""
-    cdef tl_window window = scene.window(first_row, n_rows, ids.shape[1])
-    cdef const tl_view *own = &view.view if view is not None else NULL
+    cdef tl_window window = mesh.window(first_row, n_rows, ids.shape[1])
     if n_rows and ids.shape[1]:
         with nogil:
-            K.shade_normals(&scene.scene, &window, own, &shading.shading, &ids[first_row, 0], &out[first_row, 0, 0])
+            K.shade_normals(&mesh.snapped, &window, mesh.clip_view(), &shading.shading, &ids[first_row, 0], &out[first_row, 0, 0])
 
 
-def cut_out(Scene scene, View view, Shading shading, const int32_t[::1] opaque, const int32_t[::1] triangles, int32_t[:, ::1] ids,
+def cut_out(SnappedMesh mesh, ShadingTable shading, const int32_t[::1] opaque, const int32_t[::1] triangles, int32_t[:, ::1] ids,
             float[:, ::1] depth, int64_t first_row, int64_t n_rows):
     """Clear rows of a visibility buffer, draw the opaque triangles, and over them what the others' materials leave of them."""
-    cdef tl_window window = scene.window(first_row, n_rows, ids.shape[1])
-    cdef const tl_view *own = &view.view if view is not None else NULL
+    cdef tl_window window = mesh.window(first_row, n_rows, ids.shape[1])
     cdef tl_target target
     cdef tl_share share = no_share()
     if n_rows == 0 or ids.shape[1] == 0:
@@ -183,16 +179,15 @@ def cut_out(Scene scene, View view, Shading shading, const int32_t[::1] opaque, 
     share.ids, share.end = &opaque[0], opaque.shape[0] - 1  # the last is there to be read
     share.is_first = share.is_last = True
     with nogil:
-        K.draw(&scene.scene, &window, &target, &share)
-        K.cut_out(&scene.scene, &window, own, &shading.shading, &triangles[0], triangles.shape[0], &target)
+        K.draw(&mesh.snapped, &window, &target, &share)
+        K.cut_out(&mesh.snapped, &window, mesh.clip_view(), &shading.shading, &triangles[0], triangles.shape[0], &target)
 
 
-def cut_out_over(Scene scene, View view, Shading shading, const int32_t[::1] triangles, int32_t[:, :, ::1] ids, float[:, :, ::1] depth,
+def cut_out_over(SnappedMesh mesh, ShadingTable shading, const int32_t[::1] triangles, int32_t[:, :, ::1] ids, float[:, :, ::1] depth,
                  bint is_peeled, int64_t first_row, int64_t n_rows):
     """Draw triangles, but for what their materials cut out, over rows of a visibility buffer (1, H, W) or of layers (K, H, W)."""
     cdef int64_t height = ids.shape[1], width = ids.shape[2]
-    cdef tl_window window = scene.window(first_row, n_rows, width)
-    cdef const tl_view *own = &view.view if view is not None else NULL
+    cdef tl_window window = mesh.window(first_row, n_rows, width)
     cdef tl_target target
     cdef tl_peeled peeled
     if n_rows == 0 or width == 0 or triangles.shape[0] == 0:
@@ -203,4 +198,4 @@ def cut_out_over(Scene scene, View view, Shading shading, const int32_t[::1] tri
     target.sink, target.stride_px, target.n_samples = <tl_sink>(TL_SINK_PEEL if is_peeled else 4), width, n_rows * width  # 4: nearest
     target.pixels, target.depth, target.peeled = peeled.ids, peeled.depth, &peeled
     with nogil:
-        K.cut_out(&scene.scene, &window, own, &shading.shading, &triangles[0], triangles.shape[0], &target)
+        K.cut_out(&mesh.snapped, &window, mesh.clip_view(), &shading.shading, &triangles[0], triangles.shape[0], &target)

@@ -20,8 +20,9 @@ from topleft._base.options import Per, Sink, parse
 from topleft._base.threads import count_threads, run_parts
 from topleft._field.grid import Extent, Grid, grid_around
 from topleft._model.adapt import MeshLike, Polygons, as_polygons
+from topleft._raster.choices import drawing
 from topleft._raster.rasterize import canvas_of, draw
-from topleft._raster.snap import snap_scene
+from topleft._raster.snap import snap_mesh
 from topleft._raster.view import View
 
 F64 = npt.NDArray[np.float64]
@@ -213,8 +214,7 @@ def _is_per_face(values: npt.NDArray[Any], n_vertices: int, n_faces: int, per: P
     fits_vertices, fits_faces = values.shape == (n_vertices,), values.shape == (n_faces,)
     if per is Per.AUTO and fits_vertices and fits_faces:
         raise ValueError(
-            f"values has {n_faces} numbers, and there are as many faces as vertices: "
-            "say per='triangle' or per='vertex'"
+            f"values has {n_faces} numbers, and there are as many faces as vertices: say per='triangle' or per='vertex'"
         )
     if fits_faces and per is not Per.VERTEX:
         return True
@@ -237,10 +237,10 @@ def _depth_of(heights: F64, triangles: I32) -> F64:
 
 def _visible(points: F64, triangles: I32, view: View, sink: Sink) -> I32:
     """Ids (H, W) of the triangles that show, in memory that the thread's next call overwrites."""
-    snapped = snap_scene(SCRATCH, points, triangles, view, with_depth=sink is not Sink.LABEL, out=None)
+    snapped = snap_mesh(SCRATCH, points, triangles, view, with_depth=sink is not Sink.LABEL, out=None)
     ids: I32 = SCRATCH.empty("labels", view.size[::-1], np.int32)
     depth = None if sink is Sink.LABEL else SCRATCH.empty("depth of heights", ids.shape, np.float32)
-    draw(SCRATCH, snapped, view, sink, ids, depth=depth)
+    draw(SCRATCH, snapped, view, drawing(view, snapped, sink), ids, depth=depth)
     return ids
 
 

@@ -96,10 +96,10 @@ class TriangleTree:
         return self.triangles[self.order]
 
     @cached_property
-    def tree(self) -> _engine.Surface:
+    def tree(self) -> _engine.Tree:
         """The triangles in their order, in boxes that are a little larger than they."""
         slack = float(np.abs(self.points).max()) * 2.0**-22
-        return _engine.Surface(self.points, self.in_order, slack)
+        return _engine.Tree(self.points, self.in_order, slack)
 
     def farthest(self, points: F64) -> float:
         """How far the farthest of points is from the surface."""

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from topleft._base.arrays import INT32_MAX
 from topleft._model.mesh import Mesh, extreme_points, used_vertices
-from topleft._raster.clusters import Patience
+from topleft._raster.clusters import Backoff
 
 __all__ = ["Instance", "Scene"]
 
@@ -120,9 +120,9 @@ class Scene:
         return f"Scene({n} instance{many} of {n_meshes} mesh{kinds}, {self.n_triangles} triangles)"
 
     @cached_property
-    def patience(self) -> Patience:
+    def backoff(self) -> Backoff:
         """How long to go on drawing the meshes whole."""
-        return Patience()
+        return Backoff()
 
     @property
     def n_triangles(self) -> int:

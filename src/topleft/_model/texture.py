@@ -119,7 +119,7 @@ class Texture:
             keep(self, "transform", matrix)
 
     @cached_property
-    def engine(self) -> _engine.Texture:
+    def engine(self) -> _engine.Mipmap:
         """What the kernels read; made when it is first needed."""
         levels = [light_of_image(self.image)[::-1]]  # row 0 of the kernels is v = 0
         while self.filter is Filter.TRILINEAR and max(levels[-1].shape[:2]) > 1:
@@ -134,7 +134,7 @@ class Texture:
         texels.append(np.zeros((1, 4), np.uint16))  # pairs may be read one texel past the end
         wrap_u, wrap_v = (WRAP_CODES[Wrap(one)] for one in self.wrap)
         table = np.array(rows, dtype=np.int32)
-        return _engine.Texture(np.concatenate(texels), table, FILTER_CODES[Filter(self.filter)], wrap_u, wrap_v)
+        return _engine.Mipmap(np.concatenate(texels), table, FILTER_CODES[Filter(self.filter)], wrap_u, wrap_v)
 
     def __getstate__(self) -> dict[str, Any]:
         """What another process needs: the texels are made there."""

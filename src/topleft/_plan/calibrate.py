@@ -22,10 +22,10 @@ from topleft._base.memory import KeptMemory, allocate
 from topleft._base.options import Sink
 from topleft._base.threads import available_threads, run_parts
 from topleft._plan.costs import FEATURES, Costs, features
-from topleft._raster.area import sum_areas
+from topleft._raster import choices
 from topleft._raster.rasterize import draw
-from topleft._raster.sampling import sample_positions
-from topleft._raster.snap import Snapped, snap_scene
+from topleft._raster.sampling import sample_positions, sum_areas
+from topleft._raster.snap import Snapped, snap_mesh
 from topleft._raster.verbs import Rasterizer
 from topleft._raster.view import View, ViewOptions
 from topleft.scenes import blob, random_triangles
@@ -126,10 +126,10 @@ def measure_draw(scene: Any, view: View, group: str, sink: Sink, n_rounds: int) 
     options: ViewOptions = {"threads": 1, "sampling": {"samples": "msaa4", "area": "area"}.get(group, "center")}
     chosen = View.parse(view.size, options) if group in ("samples", "area") else view
     vertices, triangles = scene
-    snapped = snap_scene(memory, vertices, triangles, chosen, with_depth=group == "depth", out=None)
+    snapped = snap_mesh(memory, vertices, triangles, chosen, with_depth=group == "depth", out=None)
     width, height = view.size
     samples = sample_positions(4, chosen.grid_bits) if group == "samples" else None
-    _, census = snapped.scene.count_classes(sink, width, height, samples)
+    _, census = snapped.mesh.count_classes(sink, width, height, samples)
     return Sample(features(census, width * height), least_ns(drawing(memory, snapped, chosen, group, sink), n_rounds))
 
 
@@ -138,11 +138,11 @@ def drawing(memory: KeptMemory, snapped: Snapped, view: View, group: str, sink: 
     shape = view.size[::-1]
     if group == "area":
         areas = memory.empty("pixels", shape, np.float32)
-        return lambda: sum_areas(memory, snapped.scene, areas, 1, is_clamped=True)
+        return lambda: sum_areas(memory, snapped.mesh, areas, 1, is_clamped=True)
     dtype = {"mask": np.bool_, "samples": np.float32}.get(group, np.int32)
     pixels = memory.empty("pixels", shape, dtype)
     depth = memory.empty("depth", shape, np.float32) if group == "depth" else None
-    return lambda: draw(memory, snapped, view, sink, pixels, depth=depth)
+    return lambda: draw(memory, snapped, view, choices.drawing(view, snapped, sink), pixels, depth=depth)
 
 
 def fit(samples: list[Sample]) -> dict[str, float]:
@@ -190,7 +190,7 @@ def measure_vertices(n_rounds: int) -> dict[str, float]:
         for name, (values, matrix) in kinds.items():
             array = values.astype(dtype)
             view = View.parse((640, 360), {"threads": 1, "transform": matrix})
-            work = partial(snap_scene, KeptMemory(), array, triangles, view, with_depth=True, out=None)
+            work = partial(snap_mesh, KeptMemory(), array, triangles, view, with_depth=True, out=None)
             found[f"{name} {array.dtype}"] = least_ns(work, n_rounds) / n
     return found
 
@@ -226,10 +226,10 @@ def measure_beyond(n_rounds: int) -> tuple[float, float]:
     vertices[:, 3] = 1
     triangles = np.arange(3 * n, dtype=np.int32).reshape(n, 3)
     memory, view = KeptMemory(), View.parse((64, 64), {"threads": 1})
-    inside = least_ns(partial(snap_scene, memory, vertices, triangles, view, with_depth=False, out=None), n_rounds)
+    inside = least_ns(partial(snap_mesh, memory, vertices, triangles, view, with_depth=False, out=None), n_rounds)
     vertices[np.arange(3 * n) % 150 != 0, 2] -= 3  # one triangle of fifty is cut, not dropped
-    outside = least_ns(partial(snap_scene, memory, vertices, triangles, view, with_depth=False, out=None), n_rounds)
-    snapped = snap_scene(memory, vertices, triangles, view, with_depth=False, out=None)
+    outside = least_ns(partial(snap_mesh, memory, vertices, triangles, view, with_depth=False, out=None), n_rounds)
+    snapped = snap_mesh(memory, vertices, triangles, view, with_depth=False, out=None)
     drawn = least_ns(drawing(memory, snapped, view, "count", Sink.COUNT), n_rounds)
     return max(0.0, outside - inside) / n, drawn / n
 

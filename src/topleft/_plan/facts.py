@@ -16,10 +16,11 @@ from topleft._base.memory import FRESH
 from topleft._base.options import DepthTest, Sampling, Sink
 from topleft._model.mesh import Mesh
 from topleft._raster import choices
-from topleft._raster.clustered import ClusteredScene
+from topleft._raster.choices import Drawing, Route
+from topleft._raster.cluster_draw import ClusteredMesh
 from topleft._raster.clusters import Clusters
 from topleft._raster.sampling import sample_positions
-from topleft._raster.snap import check_triangles, snap_scene
+from topleft._raster.snap import snap_mesh
 from topleft._raster.view import View
 
 __all__ = ["CLASSES", "ClusterFacts", "Facts", "find_cluster_facts", "find_facts", "memory_of"]
@@ -61,7 +62,8 @@ class Facts:
     outputs: tuple[str, ...]
     view: View
     test: DepthTest | None
-    sink: Sink
+    route: Route | None  # of `rasterize`
+    drawing: Drawing
     vertex_dtype: str  # as given
     point_dtype: str  # as worked on
     is_vertex_copy: bool
@@ -76,10 +78,8 @@ class Facts:
     n_clipped: int  # vertices outside of a clip plane
     n_cut: int  # triangles that a plane cuts and that are drawn as pieces
     n_pieces: int
-    flat_depth: float | None  # when ids are drawn alone
     common_depth: float | None  # of all vertices, whatever is made of it
     is_direct: bool  # uint8 colours of triangles are stored without labels in between
-    n_threads: int  # that draw
     work_ms: float  # of one thread, as guessed before the draw
     census: tuple[tuple[int, float, float], ...]  # of each of CLASSES: triangles, samples in boxes, covered
     clusters: ClusterFacts | None = None  # of a mesh
@@ -103,7 +103,7 @@ class Facts:
         """Whether each thread takes a share of the triangles."""
         if self.view.sampling is Sampling.AREA or self.draws_planes or self.is_direct:
             return False
-        return choices.is_shared(self.view, self.n_triangles, self.n_threads, self.sink)
+        return self.drawing.is_shared
 
     @property
     def n_drawn(self) -> int:
@@ -117,12 +117,7 @@ class Facts:
 
 
 def find_facts(
-    vertices: ArrayLike,
-    triangles: ArrayLike,
-    view: View,
-    verb: str,
-    outputs: tuple[str, ...],
-    test: DepthTest | None,
+    vertices: ArrayLike, triangles: ArrayLike, view: View, verb: str, outputs: tuple[str, ...], test: DepthTest | None
 ) -> tuple[Facts, NDArray[np.int32]]:
     """Return what a scene is, and its triangles as a copy that nobody changes.
 
@@ -131,31 +126,28 @@ def find_facts(
     ValueError, TypeError, IndexError
         As the verb would.
     """
-    with_depth = verb == "rasterize"
-    snapped = snap_scene(FRESH, vertices, triangles, view, with_depth=with_depth, out=None)
-    check_triangles(triangles, snapped.corners, snapped.n_vertices)
+    snapped = snap_mesh(FRESH, vertices, triangles, view, with_depth=verb == "rasterize", out=None)
+    snapped.check_indices()
     given, indices = as_array("vertices", vertices), as_array("triangles", triangles)
-    inputs = snapped.inputs
-    points, pieces = inputs.points, inputs.pieces
-    xy = inputs.records.view(np.int32).reshape(-1, 4)[:, :2]
+    points, pieces, source = snapped.points, snapped.pieces, snapped.source
+    xy = snapped.records.view(np.int32).reshape(-1, 4)[:, :2]
     is_special = xy[:, 0] == np.iinfo(np.int32).min
-    sink = find_sink(verb, view, test, has_depth=snapped.has_depth)
-    flat = None
-    if with_depth and view.sampling is Sampling.CENTER and 0 not in view.size:
-        flat = choices.flat_depth(snapped.scene, inputs, view, has_depth=snapped.has_depth)
-    common = choices.common_depth(points, has_depth=snapped.has_depth, is_clip_space=inputs.is_clip_space)
-    drawn_sink = sink if flat is None else Sink.LABEL
-    samples = sample_positions(view.sampling.n_samples, view.grid_bits) if sink is Sink.SAMPLES else None
+    route, drawing = None, choices.drawing(view, snapped, find_sink(verb, view))
+    if verb == "rasterize":
+        route, drawing = choices.route(view, snapped, test, wants_depth=False)
+    common = choices.common_depth(points, has_depth=snapped.has_depth, is_clip_space=source.is_clip_space)
+    samples = sample_positions(view.sampling.n_samples, view.grid_bits) if drawing.sink is Sink.SAMPLES else None
     census = [(0, 0.0, 0.0)] * len(CLASSES)
     if 0 not in view.size and snapped.n_triangles:
-        _, census = snapped.scene.count_classes(drawn_sink, *view.size, samples)
-    in_pixels = not inputs.is_clip_space and len(points) > 0
+        _, census = snapped.mesh.count_classes(drawing.sink, *view.size, samples)
+    in_pixels = not source.is_clip_space and len(points) > 0
     facts = Facts(
         verb=verb,
         outputs=outputs,
         view=view,
         test=test,
-        sink=drawn_sink,
+        route=route,
+        drawing=drawing,
         vertex_dtype=str(given.dtype),
         point_dtype=str(points.dtype),
         is_vertex_copy=not np.shares_memory(given, points),
@@ -163,29 +155,25 @@ def find_facts(
         n_vertices=len(points),
         n_components=points.shape[1],
         n_triangles=snapped.n_triangles,
-        is_clip_space=inputs.is_clip_space,
-        is_affine=inputs.is_affine,
+        is_clip_space=source.is_clip_space,
+        is_affine=source.is_affine,
         are_whole=in_pixels and bool((points[:, :2] == np.rint(points[:, :2])).all()),
         n_wide=int((is_special & (xy[:, 1] == 1)).sum()),
         n_clipped=int((is_special & (xy[:, 1] == 2)).sum()),
         n_cut=len(np.unique(pieces.arrays[5][: len(pieces)])) if pieces else 0,  # type: ignore[index]
         n_pieces=len(pieces) if pieces else 0,
-        flat_depth=flat,
         common_depth=common,
-        is_direct=verb == "fill" and choices.is_direct(snapped.scene, view, np.dtype(np.uint8), is_flat=True),
-        n_threads=choices.threads_to_draw(view, snapped.scene, snapped.n_triangles, drawn_sink),
-        work_ms=choices.work_ns(view, snapped.scene, snapped.n_triangles, drawn_sink) / 1e6,
+        is_direct=verb == "fill" and choices.is_direct(snapped, view, np.dtype(np.uint8), is_flat=True),
+        work_ms=choices.work_ns(view, snapped, drawing.sink) / 1e6,
         census=tuple(census),
     )
-    corners = np.array(snapped.corners, np.int32)
-    corners.flags.writeable = False
-    return facts, corners
+    checked = np.array(snapped.triangles, np.int32)
+    checked.flags.writeable = False
+    return facts, checked
 
 
-def find_sink(verb: str, view: View, test: DepthTest | None, *, has_depth: bool) -> Sink:
-    """Return what a verb does with a covered sample."""
-    if verb == "rasterize":
-        return choices.fragment_sink(test, has_depth=has_depth)
+def find_sink(verb: str, view: View) -> Sink:
+    """Return what a verb other than `rasterize` does with a covered sample."""
     if verb == "fill":
         return Sink.LABEL
     if verb == "overdraw" or view.sampling is Sampling.AREA:
@@ -206,7 +194,7 @@ def find_cluster_facts(mesh: Mesh, view: View, verb: str, test: DepthTest | None
     if not choices.pays_to_cluster(n_triangles, 1):
         return ClusterFacts(None, f"{n_triangles:,} triangles are done before sorting them would pay")
     clusters = mesh.clusters
-    seen = ClusteredScene(clusters, view)
+    seen = ClusteredMesh(clusters, view)
     if not choices.pays_to_draw_clusters(view, n_triangles, seen.survey):
         return ClusterFacts(None, "most of the mesh shows, and drawing that cluster by cluster takes longer")
     n, found = len(clusters), seen.survey(len(clusters))
@@ -228,10 +216,10 @@ def memory_of(facts: Facts) -> tuple[dict[str, int], dict[str, int]]:
     if facts.index_dtype not in ("int32", "uint32"):
         scratch["triangles"] = 12 * n
     results = result_bytes(facts)
-    if facts.sink in (Sink.MASK, Sink.SAMPLES) and not is_empty:
+    if facts.drawing.sink in (Sink.MASK, Sink.SAMPLES) and not is_empty:
         scratch["covered"] = 8 * height * _engine.Target.covered_shape(height, width, n_samples)[1]
     if view.sampling is Sampling.AREA:
-        strips = facts.n_threads * _engine.blend_cells(width)
+        strips = facts.drawing.n_threads * _engine.blend_cells(width)
         scratch["cells"] = 4 * (strips if facts.verb == "fill" else height * _engine.area_stride(width))
     elif facts.verb == "fill" and n_samples == 1 and n and not facts.is_direct:
         scratch["labels"] = 4 * n_pixels
@@ -241,9 +229,9 @@ def memory_of(facts: Facts) -> tuple[dict[str, int], dict[str, int]]:
     found = facts.clusters
     if found is not None and found.clusters is not None:  # the records are not needed, unless a plane cuts
         scratch["records"] = 0 if not facts.n_clipped else scratch["records"]
-        scratch["clusters"] = 12 * len(found.clusters) + 4 * facts.n_threads * n + found.clusters.n_bytes
+        scratch["clusters"] = 12 * len(found.clusters) + 4 * facts.drawing.n_threads * n + found.clusters.n_bytes
     elif facts.is_shared:
-        scratch["others"] = 4 * (n + 16 * facts.n_threads)
+        scratch["others"] = 4 * (n + 16 * facts.drawing.n_threads)
     return scratch, results
 
 

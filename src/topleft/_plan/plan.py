@@ -112,8 +112,8 @@ class Plan:
     threads: int
     costs: str
     _view: View = field(repr=False)
-    _corners: NDArray[np.int32] = field(repr=False)
-    _triangles: ArrayLike = field(repr=False)
+    _triangles: NDArray[np.int32] = field(repr=False)
+    _triangles_given: ArrayLike = field(repr=False)
     _arguments: tuple[Any, ...] = field(repr=False)
     _clusters: Clusters | None = field(repr=False, default=None)
     _clock: Clock = field(repr=False, default_factory=Clock)
@@ -192,16 +192,16 @@ class Plan:
         vertices, depth_test = self._arguments
         view = self.fitted(self._view)
         if self.verb == "coverage":
-            draw_coverage(memory, vertices, self._triangles, view, None)
+            draw_coverage(memory, vertices, self._triangles_given, view, None)
         elif self.verb == "overdraw":
-            draw_overdraw(memory, vertices, self._triangles, view, None)
+            draw_overdraw(memory, vertices, self._triangles_given, view, None)
         elif self.verb == "rasterize":
-            draw_fragments(memory, vertices, self._triangles, view, depth_test, None, None)
+            draw_fragments(memory, vertices, self._triangles_given, view, depth_test, None, None)
         else:
             colors = np.full((self.n_triangles, 4), 128, np.uint8)
             style = Style("triangle", None, "replace", "straight", "values")
             self._clock.start()
-            draw_fill(memory, vertices, self._triangles, colors, view, style, None)
+            draw_fill(memory, vertices, self._triangles_given, colors, view, style, None)
 
     def fitted(self, view: View) -> View:
         """Return the view of a call with this plan.
@@ -223,7 +223,7 @@ class Plan:
         self._clock.start()
         return replace(view, threads=view.threads or self.threads, plan=self)
 
-    def corners_of(self, triangles: ArrayLike, n_vertices: int) -> NDArray[np.int32]:
+    def triangles_of(self, triangles: ArrayLike, n_vertices: int) -> NDArray[np.int32]:
         """Return the plan's own int32 triangles, whose indices have been checked.
 
         The array that the plan was made from is taken to be what it was then; any other is compared.
@@ -237,20 +237,20 @@ class Plan:
             raise ValueError(
                 f"plan is for {self.n_vertices} vertices, got {n_vertices}: make another with topleft.plan"
             )
-        if triangles is not self._triangles:
+        if triangles is not self._triangles_given:
             others = as_triangles(triangles)
-            if others.shape != self._corners.shape:
+            if others.shape != self._triangles.shape:
                 raise ValueError(
-                    f"plan is for {len(self._corners)} triangles, got {len(others)}: make another with topleft.plan"
+                    f"plan is for {len(self._triangles)} triangles, got {len(others)}: make another with topleft.plan"
                 )
-            differs = (others != self._corners).any(axis=1)
+            differs = (others != self._triangles).any(axis=1)
             if differs.any():
                 row = int(np.argmax(differs))
                 raise ValueError(
-                    f"plan is for other triangles: row {row} was {self._corners[row].tolist()}, "
+                    f"plan is for other triangles: row {row} was {self._triangles[row].tolist()}, "
                     f"got {others[row].tolist()}; make another with topleft.plan"
                 )
-        return self._corners
+        return self._triangles
 
     def find_clusters(self, vertices: ArrayLike) -> Clusters | None:
         """Return the clusters of the mesh that the plan was made for, if these are its vertices; others may change."""
@@ -331,7 +331,7 @@ def plan(
     if checked.sampling in (Sampling.OUTER, Sampling.INNER, Sampling.AREA) and verb == "rasterize":
         raise ValueError(f"sampling {str(checked.sampling)!r} gives no ids: outputs must be 'coverage' or 'overdraw'")
     found = None if mesh is None else find_cluster_facts(mesh, checked, verb, test)
-    facts, corners = find_facts(vertices, triangles, checked, verb, wanted, test)
+    facts, own_triangles = find_facts(vertices, triangles, checked, verb, wanted, test)
     facts = replace(facts, clusters=found)
     costs = load_costs()
     scratch, results = memory_of(facts)
@@ -345,11 +345,11 @@ def plan(
         classes=MappingProxyType(dict(zip(CLASSES, (row[0] for row in facts.census), strict=True))),
         scratch_bytes=MappingProxyType(scratch),
         result_bytes=MappingProxyType(results),
-        threads=max(1, facts.n_threads),
+        threads=max(1, facts.drawing.n_threads),
         costs=costs.source,
         _view=checked,
-        _corners=corners,
-        _triangles=triangles,
+        _triangles=own_triangles,
+        _triangles_given=triangles,
         _arguments=(vertices, depth_test),
         _clusters=None if found is None else found.clusters,
     )

@@ -15,7 +15,7 @@ from topleft._lod.detail import Detail
 from topleft._plan.costs import Costs, features, sink_group
 from topleft._plan.facts import ClusterFacts, Facts, memory_of
 from topleft._raster import choices
-from topleft._raster.choices import MIN_THREAD_NS
+from topleft._raster.choices import MIN_THREAD_NS, Route
 from topleft.methods import METHODS
 
 __all__ = ["Stage", "find_stages"]
@@ -246,10 +246,10 @@ def plan_method(facts: Facts, costs: Costs) -> Stage:
     """Tell how triangles of each size find their samples."""
     view = facts.view
     n_pixels = view.size[0] * view.size[1]
-    group = sink_group(facts.sink, view.sampling)
+    group = sink_group(facts.drawing.sink, view.sampling)
     times = view.sampling.n_samples / 4 if group == "samples" else view.sampling.n_samples
     counts = features(facts.census, n_pixels)
-    ms = times * costs.draw_ms(group, counts, facts.n_threads, is_shared=facts.is_shared) if n_pixels else 0.0
+    ms = times * costs.draw_ms(group, counts, facts.drawing.n_threads, is_shared=facts.is_shared) if n_pixels else 0.0
     if view.sampling is Sampling.AREA:
         why = f"the picture is {n_pixels:,} pixels; an edge costs the rows that it passes, an interior nothing"
         choice = f"areas right of {3 * facts.n_drawn:,} edges, summed along rows"
@@ -295,19 +295,22 @@ def plan_sink(facts: Facts, costs: Costs) -> Iterator[Stage]:
 
 def plan_depth(facts: Facts, costs: Costs) -> Stage:
     """Tell whether samples compare depths."""
-    what = SINKS[facts.sink] if facts.view.sampling is not Sampling.AREA else "a sum of areas a pixel"
+    what = SINKS[facts.drawing.sink] if facts.view.sampling is not Sampling.AREA else "a sum of areas a pixel"
     if facts.is_direct:
         what = "the colour of the later triangle a pixel"
     if facts.verb != "rasterize":
         return Stage("depth", "none", f"{facts.verb} needs {what}", timed_in="method")
-    if facts.flat_depth is not None:
+    if facts.route is Route.LABELS:
+        why = "vertices have no depth: the later triangle wins, and depth 0 is written when it is asked for"
+        return Stage("depth", "no test, ids alone", why, timed_in="method")
+    if facts.route is Route.FLAT:
         n_pixels = facts.view.size[0] * facts.view.size[1]
         earlier = choices.earlier_wins(facts.test, has_depth=facts.n_components > 2)
         order = "the earlier triangle wins" if earlier else "the later triangle wins"
-        why = f"every vertex lies at depth {facts.flat_depth:g}: {order}; one pass over {n_pixels:,} pixels writes it"
+        why = f"every vertex lies at depth {facts.common_depth:g}: {order}; one pass over {n_pixels:,} pixels writes it"
         compared = f"a comparison for each of about {facts.covered:,.0f} samples"
         rejected = (f"{compared}: planes through equal depths are equal to the bit",)
-        ms = costs.other["flat"] * n_pixels / facts.n_threads / 1e6
+        ms = costs.other["flat"] * n_pixels / facts.drawing.n_threads / 1e6
         return Stage("depth", "no test, ids alone", why, rejected, ms, "depth")
     rejected = ("float32 slopes: faster, but coplanar triangles would hide each other at random",)
     why = "depths differ" if facts.test else "no test was asked for, but the depth of what shows is returned"
@@ -320,7 +323,7 @@ def plan_depth(facts: Facts, costs: Costs) -> Stage:
 def plan_threads(facts: Facts, costs: Costs) -> Stage:
     """Tell how many threads draw, and what each takes."""
     view, n = facts.view, facts.n_triangles
-    n_threads, usable = facts.n_threads, available_threads()
+    n_threads, usable = facts.drawing.n_threads, available_threads()
     wake = f"waking a thread takes {costs.other['wake'] / 1e3:.0f} us"
     if view.threads is not None:
         why = f"threads={view.threads} was asked for"

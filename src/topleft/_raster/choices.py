@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from enum import Enum
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from topleft import _engine
 from topleft._base.options import Cull, DepthTest, Sampling, Sink
 from topleft._base.threads import available_threads, count_threads
 from topleft._raster.view import CULL_CODES, View
@@ -21,17 +21,21 @@ from topleft.methods import METHODS
 
 if TYPE_CHECKING:
     from topleft._raster.clusters import Survey
+    from topleft._raster.snap import Snapped
 
 __all__ = [
-    "Inputs",
+    "Drawing",
+    "Route",
     "can_cluster",
     "can_share",
     "common_depth",
+    "drawing",
     "earlier_wins",
-    "flat_depth",
+    "first_depth",
     "fragment_sink",
     "is_affine",
     "is_direct",
+    "is_flat",
     "is_shared",
     "must_cut",
     "pays_to_cluster",
@@ -39,6 +43,7 @@ __all__ = [
     "pays_to_draw_instances",
     "pays_to_snap_all",
     "pays_without_depth",
+    "route",
     "threads_to_convert",
     "threads_to_draw",
     "threads_to_snap",
@@ -111,16 +116,6 @@ ORDER_FREE = frozenset({Sink.MASK, Sink.COUNT, Sink.NEAREST, Sink.FARTHEST, Sink
 MIN_PIXELS_A_TRIANGLE = 45
 
 
-class Inputs(NamedTuple):
-    """A scene before and after the snap: what choices look at."""
-
-    points: NDArray[Any]
-    records: NDArray[np.uint8]
-    pieces: _engine.Pieces | None
-    is_clip_space: bool
-    is_affine: bool
-
-
 def is_affine(matrix: NDArray[Any] | None) -> bool:
     """Tell whether every w is 1 behind a transform: dividing by it changes no bit, so it is left out."""
     return matrix is not None and matrix[3].tolist() == [0, 0, 0, 1]
@@ -141,26 +136,26 @@ def threads_to_snap(threads: int | None, n_vertices: int, n_triangles: int) -> i
     return count_threads(threads, n_triangles) if n_vertices >= MIN_TO_SHARE_ARRAYS else 1
 
 
-def threads_to_draw(view: View, scene: _engine.Scene, n_triangles: int, sink: Sink) -> int:
+def threads_to_draw(view: View, snapped: Snapped, sink: Sink) -> int:
     """Return how many threads draw, in bands of rows: as many as are asked for, or as many as the work is worth."""
     n_threads = view.threads
     if n_threads is None:
         n_threads = available_threads()
         if n_threads > 1:
-            n_threads = min(n_threads, max(1, int(work_ns(view, scene, n_triangles, sink) / MIN_THREAD_NS)))
+            n_threads = min(n_threads, max(1, int(work_ns(view, snapped, sink) / MIN_THREAD_NS)))
     return min(view.size[1], n_threads)
 
 
-def work_ns(view: View, scene: _engine.Scene, n_triangles: int, sink: Sink) -> float:
+def work_ns(view: View, snapped: Snapped, sink: Sink) -> float:
     """Return about how long one thread draws, from a guess of what is seen."""
     kind = "area" if view.sampling is Sampling.AREA else WORK_OF.get(sink, "ids")
     row_ns, sample_ns, pixel_ns = WORK_NS[kind]
     n_pixels = view.size[0] * view.size[1]
     if n_pixels <= NEAR_PIXELS:
         row_ns, pixel_ns = min(row_ns, NEAR_ROW_NS), min(pixel_ns, NEAR_PIXEL_NS)
-    _, n_layers, n_rows = scene.guess_seen(*view.size)
+    _, n_layers, n_rows = snapped.mesh.guess_seen(*view.size)
     drawn_ns = row_ns * n_rows + n_pixels * (sample_ns * n_layers + pixel_ns)
-    return TRIANGLE_NS * n_triangles + view.sampling.n_samples * drawn_ns
+    return TRIANGLE_NS * snapped.n_triangles + view.sampling.n_samples * drawn_ns
 
 
 def can_share(view: View) -> bool:
@@ -240,25 +235,71 @@ def common_depth(points: NDArray[Any], *, has_depth: bool, is_clip_space: bool) 
     first = z[0]
     if not (z[len(z) // 2] == first and z[-1] == first) or not (z == first).all():
         return None
+    return first_depth(points, has_depth=True)
+
+
+def first_depth(points: NDArray[Any], *, has_depth: bool) -> float:
+    """Return the depth of the first vertex as a depth buffer holds it."""
+    if not has_depth:
+        return 0.0
     with np.errstate(over="ignore"):  # what float32 cannot hold has been refused if a triangle uses it
-        return float(np.float32(first)) + 0.0  # -0 becomes 0, as it does in every depth buffer
+        return float(np.float32(points[0, 2])) + 0.0  # -0 becomes 0, as it does in every depth buffer
 
 
-def pays_without_depth(scene: _engine.Scene, view: View) -> bool:
+def pays_without_depth(snapped: Snapped, view: View) -> bool:
     """Tell whether one pass over all pixels costs less than comparing depths wherever triangles are."""
     n_pixels = view.size[0] * view.size[1]
-    _, n_layers, n_rows = scene.guess_seen(*view.size)
+    _, n_layers, n_rows = snapped.mesh.guess_seen(*view.size)
     compared_ns = COMPARED_SAMPLE_NS * n_layers * n_pixels
     if n_pixels > NEAR_PIXELS:
         compared_ns += COMPARED_ROW_NS * n_rows
     return compared_ns > FLAT_CALL_NS + FLAT_PIXEL_NS * n_pixels
 
 
-def flat_depth(scene: _engine.Scene, inputs: Inputs, view: View, *, has_depth: bool) -> float | None:
-    """Return the depth of the whole scene if samples need neither compare nor store it, and leaving that out pays."""
-    if (inputs.is_clip_space and has_depth) or not pays_without_depth(scene, view):
-        return None
-    return common_depth(inputs.points, has_depth=has_depth, is_clip_space=inputs.is_clip_space)
+def is_flat(snapped: Snapped, view: View) -> bool:
+    """Tell whether all triangles lie at one depth, so that samples need not compare it, and leaving that out pays."""
+    is_clip_space = snapped.source.is_clip_space
+    if is_clip_space or not pays_without_depth(snapped, view):
+        return False
+    return common_depth(snapped.points, has_depth=snapped.has_depth, is_clip_space=is_clip_space) is not None
+
+
+class Drawing(NamedTuple):
+    """What becomes of a covered sample, and how threads share the work."""
+
+    sink: Sink
+    n_threads: int
+    is_shared: bool  # each thread takes a share of the triangles; otherwise all of them, in its own rows
+
+
+def drawing(view: View, snapped: Snapped, sink: Sink) -> Drawing:
+    """Return how a mesh is drawn."""
+    n_threads = threads_to_draw(view, snapped, sink)
+    return Drawing(sink, n_threads, is_shared(view, snapped.n_triangles, n_threads, sink))
+
+
+class Route(Enum):
+    """How `rasterize` draws a mesh: `rasterize.ROUTES` has a function for each."""
+
+    LABELS = "ids alone"
+    FLAT = "ids alone, then the one depth wherever there is one"
+    DEPTH = "ids and depth"
+    SAMPLES = "ids and depth of each sample"
+
+
+def route(view: View, snapped: Snapped, test: DepthTest | None, *, wants_depth: bool) -> tuple[Route, Drawing]:
+    """Return how `rasterize` draws a mesh; `wants_depth`: into an array of the caller's."""
+    has_depth = snapped.has_depth
+    sink = fragment_sink(test, has_depth=has_depth)
+    if view.sampling.n_samples > 1:
+        found = Route.SAMPLES
+    elif not has_depth and not wants_depth:
+        found, sink = Route.LABELS, Sink.LABEL
+    elif is_flat(snapped, view):
+        found, sink = Route.FLAT, Sink.LABEL
+    else:
+        found = Route.DEPTH
+    return found, drawing(view, snapped, sink)
 
 
 def earlier_wins(test: DepthTest | None, *, has_depth: bool) -> bool:
@@ -266,12 +307,12 @@ def earlier_wins(test: DepthTest | None, *, has_depth: bool) -> bool:
     return test is not None and has_depth
 
 
-def is_direct(scene: _engine.Scene, view: View, dtype: np.dtype[Any], *, is_flat: bool) -> bool:
+def is_direct(snapped: Snapped, view: View, dtype: np.dtype[Any], *, is_flat: bool) -> bool:
     """Tell whether colours are best stored triangle by triangle, without labels in between.
 
     Labels cost a pass to clear and one to colour them, and less a triangle that is seen.
     """
     if not is_flat or dtype != np.uint8 or view.sampling.n_samples > 1:
         return False
-    n_seen, _, _ = scene.guess_seen(*view.size)
+    n_seen, _, _ = snapped.mesh.guess_seen(*view.size)
     return n_seen * MIN_PIXELS_A_TRIANGLE <= view.size[0] * view.size[1]

@@ -57,7 +57,7 @@ def bresenham_line(x0: int, y0: int, x1: int, y1: int) -> NDArray[np.int64]:
     >>> bresenham_line(3, 2, 0, 0).tolist()
     [[0, 0], [1, 1], [2, 1], [3, 2]]
     """
-    from topleft.methods import bresenham_scanline
+    from topleft.methods.classics import bresenham_scanline
 
     try:
         ends = [operator.index(value) for value in (x0, y0, x1, y1)]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from topleft import _engine
 from topleft._base.threads import count_threads, run_parts
 
-__all__ = ["Clusters", "Patience", "Survey"]
+__all__ = ["Backoff", "Clusters", "Survey"]
 
 #: A bound of the error of the vertex stage as a share of the terms that it adds up: four roundings, and the same again
 #: for how the bounds themselves are computed, in float64; twice that.
@@ -34,8 +34,8 @@ class Survey(NamedTuple):
     front: float
 
 
-class Patience:
-    """How long to go on drawing a mesh whole before its clusters are asked again whether they pay.
+class Backoff:
+    """Exponential back-off: how long a mesh is drawn whole before its clusters are asked again whether they pay.
 
     After a picture for which they did not, that is not found out for the next two, then four, then eight pictures:
     cameras move little between pictures, and finding out takes 5 % of a small one.
@@ -62,25 +62,25 @@ class Clusters:
     ----------
     points : ndarray, shape (V, 3), contiguous float32 or float64
         The vertices of the mesh.
-    corners : ndarray of int32, shape (T, 3)
+    triangles : ndarray of int32, shape (T, 3)
         Its triangles, whose indices have been checked.
     own_points : ndarray, shape (N, 3)
         The vertices cluster by cluster, those on borders several times, and some rows that may be read past the end.
     """
 
-    def __init__(self, points: NDArray[Any], corners: NDArray[np.int32], threads: int | None = None) -> None:
-        """Sort and measure (V, 3) contiguous points and (T, 3) checked corners."""
-        self.points, self.corners, self.patience = points, corners, Patience()
-        n_triangles = len(corners)
+    def __init__(self, points: NDArray[Any], triangles: NDArray[np.int32], threads: int | None = None) -> None:
+        """Sort and measure (V, 3) contiguous points and (T, 3) checked triangles."""
+        self.points, self.triangles, self.backoff = points, triangles, Backoff()
+        n_triangles = len(triangles)
         order: NDArray[np.int32] = np.empty(n_triangles, np.int32)
         keys: NDArray[np.uint32] = np.empty(n_triangles, np.uint32)
         room: NDArray[np.uint64] = np.empty((2, n_triangles), np.uint64)
-        _engine.order_triangles(_engine.Source(points), corners, box_of(points), keys, room, order)
+        _engine.order_triangles(_engine.Source(points), triangles, box_of(points), keys, room, order)
         clusters: NDArray[np.uint8] = np.empty(max(1, n_triangles) * _engine.CLUSTER_BYTES, np.uint8)
         vertices: NDArray[np.int32] = np.empty(3 * n_triangles, np.int32)
         own_corners: NDArray[np.uint8] = np.empty((n_triangles, 3), np.uint8)
         seen: NDArray[np.int32] = np.full(len(points), -1, np.int32)
-        n, n_vertices = _engine.cut_clusters(corners, order, seen, clusters, vertices, own_corners)
+        n, n_vertices = _engine.cut_clusters(triangles, order, seen, clusters, vertices, own_corners)
         records = clusters[: n * _engine.CLUSTER_BYTES].copy()
         self.own_points = np.zeros((n_vertices + _engine.CLUSTER_TAIL, 3), points.dtype)
         np.take(points, vertices[:n_vertices], axis=0, out=self.own_points[:n_vertices])
@@ -107,14 +107,21 @@ class Clusters:
     @property
     def n_triangles(self) -> int:
         """How many triangles the mesh has."""
-        return len(self.corners)
+        return len(self.triangles)
 
     def seen_in(
-        self, matrix: NDArray[np.float64], scene: _engine.Scene, first: int, end: int, width: int, *, is_farthest: bool
+        self,
+        matrix: NDArray[np.float64],
+        mesh: _engine.SnappedMesh,
+        first: int,
+        end: int,
+        width: int,
+        *,
+        is_farthest: bool,
     ) -> _engine.ClusterView:
-        """Return what clusters need to know of rows [first, end) of a scene's window; `matrix` is clip from object."""
+        """Return what clusters need to know of rows [first, end) of a picture; `matrix`: clip from object."""
         error = STAGE_ERROR[self.points.dtype]
-        return _engine.ClusterView(matrix, scene, first, end - first, width, MARGIN_PX, error, is_farthest)
+        return _engine.ClusterView(matrix, mesh, first, end - first, width, MARGIN_PX, error, is_farthest)
 
     def survey(self, seen: _engine.ClusterView, n_most: int) -> Survey:
         """Return what becomes of some clusters, about `n_most`, evenly spread over the mesh."""
@@ -133,4 +140,3 @@ def box_of(points: NDArray[Any]) -> NDArray[np.float64]:
         finite = points[np.isfinite(points).all(axis=1)]
         low, high = (finite.min(axis=0), finite.max(axis=0)) if len(finite) else (np.zeros(3), np.zeros(3))
     return np.concatenate([low, high]).astype(np.float64)
-

@@ -1,4 +1,4 @@
-"""Colours of triangles into a picture: which triangle shows in each pixel, or each triangle blended in its turn."""
+"""Fills a picture with the colours of triangles: of the one that shows in a pixel, or blended one after the other."""
 
 from __future__ import annotations
 
@@ -11,18 +11,20 @@ from numpy.typing import ArrayLike, NDArray
 from topleft import _engine
 from topleft._base.arrays import as_background, as_colors
 from topleft._base.memory import Memory
-from topleft._base.options import Per, Sampling, Sink, parse
+from topleft._base.options import Alpha, Blend, Per, Sampling, Sink, parse
 from topleft._base.threads import run_parts
 from topleft._raster import choices
-from topleft._raster.blend import Blending, blend_colors
 from topleft._raster.classic import fill_classic
 from topleft._raster.rasterize import canvas_of, draw, draw_all_samples
 from topleft._raster.resolve import parse_resolve, resolve_colors, resolve_flat, resolve_gouraud
 from topleft._raster.sampling import draw_means, sample_positions
-from topleft._raster.snap import Snapped, check_triangles, snap_scene
+from topleft._raster.snap import Snapped, snap_mesh
 from topleft._raster.view import View
 
 __all__ = ["Style", "draw_fill"]
+
+BLEND_CODES = {mode: code for code, mode in enumerate(Blend)}  # tl_blend in csrc/topleft.h
+
 
 @dataclass(frozen=True, slots=True)
 class Style:
@@ -35,14 +37,48 @@ class Style:
     resolve: str
 
 
+@dataclass(frozen=True, slots=True)
+class Blending:
+    """How `fill` puts a colour into a pixel."""
+
+    mode: Blend
+    alpha: Alpha
+    by_area: bool
+    has_alpha: bool
+
+    @classmethod
+    def parse(cls, mode: object, alpha: object, colors: NDArray[Any], view: View) -> Blending:
+        """Check the options of a call.
+
+        Raises
+        ------
+        ValueError
+            If an option is unknown, "over" lacks alpha, or a classic is to blend.
+        """
+        n_channels = 1 if colors.ndim == 1 else colors.shape[1]
+        modes = parse(Blend, "blend", mode), parse(Alpha, "alpha", alpha)
+        chosen = cls(*modes, by_area=view.sampling is Sampling.AREA, has_alpha=n_channels in (2, 4))
+        if chosen.mode is Blend.OVER and not chosen.has_alpha:
+            raise ValueError(
+                f"colors must have 2 or 4 channels, the last of them alpha, for blend 'over', got {n_channels}"
+            )
+        if view.classic and chosen.mode is not Blend.REPLACE:
+            raise ValueError(f"blend must be 'replace' for method {view.classic.name!r}, got {str(chosen.mode)!r}")
+        return chosen
+
+    @property
+    def is_needed(self) -> bool:
+        """False when a triangle simply replaces what its samples held."""
+        return self.by_area or self.mode is not Blend.REPLACE
+
+    @property
+    def is_straight(self) -> bool:
+        """Whether the mode treats the last channel as alpha that colours have not been multiplied by."""
+        return self.has_alpha and self.alpha is Alpha.STRAIGHT and self.mode in (Blend.OVER, Blend.REPLACE)
+
+
 def draw_fill(
-    memory: Memory,
-    vertices: ArrayLike,
-    triangles: ArrayLike,
-    colors: ArrayLike,
-    view: View,
-    style: Style,
-    out: object,
+    memory: Memory, vertices: ArrayLike, triangles: ArrayLike, colors: ArrayLike, view: View, style: Style, out: object
 ) -> NDArray[Any]:
     """`fill`, on the memory given."""
     if view.sampling in (Sampling.OUTER, Sampling.INNER):
@@ -54,7 +90,7 @@ def draw_fill(
     transfer = parse_resolve(style.resolve, palette, view, is_straight=blending.is_straight)
     if view.classic:
         return fill_classic(view.classic, memory, vertices, triangles, palette, view, style.per, style.background, out)
-    snapped = snap_scene(memory, vertices, triangles, view, with_depth=False, out=out)
+    snapped = snap_mesh(memory, vertices, triangles, view, with_depth=False, out=out)
     is_flat = colors_are_flat(len(palette), snapped, style.per)
     shape = (*view.size[::-1], *palette.shape[1:])
     ground = as_background(style.background, palette)
@@ -62,7 +98,7 @@ def draw_fill(
         if ground is None and out is None:
             ground = np.zeros((), palette.dtype)
         is_drawn = bool(canvas.size and snapped.n_triangles)
-        is_blended = blending.is_needed or choices.is_direct(snapped.scene, view, palette.dtype, is_flat=is_flat)
+        is_blended = blending.is_needed or choices.is_direct(snapped, view, palette.dtype, is_flat=is_flat)
         can_lay = is_drawn and is_blended and palette.dtype == np.uint8 and view.sampling.n_samples == 1
         if ground is not None and not can_lay:
             lay_ground(canvas, ground)
@@ -108,25 +144,20 @@ def lay_ground(pixels: NDArray[Any], ground: NDArray[Any]) -> None:
 
 
 def paint(
-    memory: Memory,
-    snapped: Snapped,
-    view: View,
-    colors: NDArray[Any],
-    pixels: NDArray[Any],
-    *,
-    is_flat: bool,
+    memory: Memory, snapped: Snapped, view: View, colors: NDArray[Any], pixels: NDArray[Any], *, is_flat: bool
 ) -> None:
     """Draw coloured triangles over contiguous pixels: first which triangle shows in each, then its colour."""
     width, height = view.size
     labels = memory.empty("labels", (height, width), np.int32)
-    draw(memory, snapped, view, Sink.LABEL, labels)
+    drawing = choices.drawing(view, snapped, Sink.LABEL)
+    draw(memory, snapped, view, drawing, labels)
     palette, flat = _engine.as_bytes(colors), _engine.as_bytes(pixels)
     n_channels = 1 if colors.ndim == 1 else colors.shape[1]
 
     def paint_rows(first: int, end: int) -> None:
-        snapped.scene.paint(labels, palette, flat, first, end - first, is_flat, colors.dtype == np.uint8, n_channels)
+        snapped.mesh.paint(labels, palette, flat, first, end - first, is_flat, colors.dtype == np.uint8, n_channels)
 
-    run_parts(paint_rows, height, choices.threads_to_draw(view, snapped.scene, snapped.n_triangles, Sink.LABEL))
+    run_parts(paint_rows, height, drawing.n_threads)
 
 
 def paint_samples(
@@ -142,20 +173,21 @@ def paint_samples(
     """Draw coloured triangles over contiguous pixels, each pixel the mean of its samples."""
     width, height = view.size
     positions = sample_positions(view.sampling.n_samples, view.grid_bits)
-    n_threads = choices.threads_to_draw(view, snapped.scene, snapped.n_triangles, Sink.LABEL)
+    drawing = choices.drawing(view, snapped, Sink.LABEL)
+    n_threads = drawing.n_threads
     if is_flat and choices.can_share(view):
         palette = _engine.Palette(colors, transfer)
-        if draw_means(memory, snapped.scene, snapped.n_triangles, positions, palette, pixels, n_threads):
-            check_triangles(snapped.triangles, snapped.corners, snapped.n_vertices)
+        if draw_means(memory, snapped.mesh, snapped.n_triangles, positions, palette, pixels, n_threads):
+            snapped.check_indices()
         view.mark("draw")
         return
     labels: NDArray[np.int32] = memory.empty("sample labels", (len(positions), height, width), np.int32)
-    draw_all_samples(memory, snapped, view, positions, Sink.LABEL, labels, None)
+    draw_all_samples(memory, snapped, view, positions, drawing, labels, None)
     if is_flat:
         resolve_flat(labels, colors, pixels, transfer, n_threads)
         return
-    scenes = [snapped.scene.seen_from(x, y) for x, y in positions.tolist()]
-    resolve_gouraud(memory, scenes, labels, colors, pixels, transfer, n_threads)
+    meshes = [snapped.mesh.seen_from(x, y) for x, y in positions.tolist()]
+    resolve_gouraud(memory, meshes, labels, colors, pixels, transfer, n_threads)
 
 
 def blend(
@@ -174,17 +206,53 @@ def blend(
 
     `ground`, for uint8 with one sample a pixel: the colour that all pixels get before.
     """
-    n_threads = choices.threads_to_draw(view, snapped.scene, snapped.n_triangles, Sink.LABEL)
+    n_threads = choices.threads_to_draw(view, snapped, Sink.LABEL)
     if view.sampling.n_samples == 1:
-        pictures, scenes = pixels[None], [snapped.scene]
+        pictures, meshes = pixels[None], [snapped.mesh]
     else:
         positions = sample_positions(view.sampling.n_samples, view.grid_bits).tolist()
-        scenes = [snapped.scene.seen_from(x, y) for x, y in positions]
-        pictures = memory.empty("sample colors", (len(scenes), *pixels.shape), colors.dtype)
+        meshes = [snapped.mesh.seen_from(x, y) for x, y in positions]
+        pictures = memory.empty("sample colors", (len(meshes), *pixels.shape), colors.dtype)
         pictures[...] = pixels
-    for scene, picture in zip(scenes, pictures, strict=True):
-        if blend_colors(memory, scene, colors, picture, blending, n_threads, is_flat=is_flat, ground=ground):
-            check_triangles(snapped.triangles, snapped.corners, snapped.n_vertices)
+    for mesh, picture in zip(meshes, pictures, strict=True):
+        if blend_colors(memory, mesh, colors, picture, blending, n_threads, is_flat=is_flat, ground=ground):
+            snapped.check_indices()
     view.mark("draw")
     if view.sampling.n_samples > 1:
         resolve_colors(pictures, pixels, transfer, n_threads)
+
+
+def blend_colors(
+    memory: Memory,
+    mesh: _engine.SnappedMesh,
+    colors: NDArray[Any],
+    pixels: NDArray[Any],
+    blending: Blending,
+    n_threads: int,
+    *,
+    is_flat: bool,
+    ground: NDArray[Any] | None = None,
+) -> bool:
+    """Blend a mesh into contiguous pixels; returns whether a triangle has an index outside the vertices.
+
+    `ground`, for uint8: the colour that all pixels get before.
+    """
+    height, width = pixels.shape[:2]
+    n_parts = min(height, n_threads)
+    n_channels, is_u8 = 1 if colors.ndim == 1 else colors.shape[1], colors.dtype == np.uint8
+    flat, palette = _engine.as_bytes(pixels), _engine.as_bytes(colors)
+    packed = memory.empty("packed", (height * width,), np.int32) if is_u8 and n_channels != 4 else None
+    n_cells = _engine.blend_cells(width)
+    cells = memory.constant("cells", n_parts * n_cells, _engine.CELL_CLEAR) if blending.by_area else None
+    under = None if ground is None else _engine.as_bytes(np.full(pixels.shape[2:] or 1, ground))
+    code, is_premultiplied = BLEND_CODES[blending.mode], blending.alpha is Alpha.PREMULTIPLIED
+
+    def blend_part(i: int, _: int) -> int:
+        first, end = height * i // n_parts, height * (i + 1) // n_parts
+        own = None if cells is None else cells[n_cells * i : n_cells * (i + 1)]
+        return mesh.blend(
+            flat, width, first, end - first, palette, n_channels, is_u8, is_flat,
+            code, is_premultiplied, under, packed, own,
+        )  # fmt: skip
+
+    return max(run_parts(blend_part, n_parts, n_parts)) >= 0

@@ -14,8 +14,8 @@ from topleft._base.arrays import as_values
 
 __all__ = ["Fragments"]
 
-#: Makes the scene that attributes of some triangles need: these are snapped, no others.
-PartOfScene = Callable[..., _engine.Scene]
+#: Makes the snapped mesh that attributes of some triangles need: these are snapped, no others.
+PartOfMesh = Callable[..., _engine.SnappedMesh]
 
 
 class Fragments:
@@ -48,13 +48,13 @@ class Fragments:
         self,
         triangle: NDArray[np.int32],
         depth: NDArray[np.float32] | float,
-        scene: _engine.Scene | PartOfScene,
+        snapped: _engine.SnappedMesh | PartOfMesh,
         n_vertices: int,
         n_triangles: int,
     ) -> None:
         self.id = triangle
         self._depth = depth
-        self._scene_or_maker = scene
+        self._snapped_or_maker = snapped
         self._n_vertices = n_vertices
         self._n_triangles = n_triangles
 
@@ -104,13 +104,13 @@ class Fragments:
         cls,
         triangle: NDArray[np.int32],
         depth: NDArray[np.float32],
-        scenes: Sequence[_engine.Scene],
+        meshes: Sequence[_engine.SnappedMesh],
         n_vertices: int,
         n_triangles: int,
     ) -> Fragments:
-        """Return the fragments of several samples: planes (S, H, W), and the scene as each sample sees it."""
-        samples = tuple(cls(*planes, n_vertices, n_triangles) for planes in zip(triangle, depth, scenes, strict=True))
-        frags = cls(triangle[0], depth[0], scenes[0], n_vertices, n_triangles)
+        """Return the fragments of several samples: planes (S, H, W), and the mesh as each sample sees it."""
+        samples = tuple(cls(*planes, n_vertices, n_triangles) for planes in zip(triangle, depth, meshes, strict=True))
+        frags = cls(triangle[0], depth[0], meshes[0], n_vertices, n_triangles)
         frags._samples = samples
         frags._planes = triangle, depth
         return frags
@@ -123,7 +123,7 @@ class Fragments:
         """Return what is left when no other pixels than these show a triangle."""
         triangle = np.full_like(self.triangle, -1)
         triangle[rows, cols] = self.triangle[rows, cols]
-        return Fragments(triangle, self.depth, self._scene_or_maker, self._n_vertices, self._n_triangles)
+        return Fragments(triangle, self.depth, self._snapped_or_maker, self._n_vertices, self._n_triangles)
 
     def barycentric(self) -> NDArray[np.float32]:
         """Return the weights of the three vertices of the triangle that shows in each pixel.
@@ -151,7 +151,7 @@ class Fragments:
         array([0.5 , 0.25, 0.25], dtype=float32)
         """
         out = np.empty((*self.triangle.shape, 3), np.float32)
-        self._scene.with_inverse_w(self.id.size).barycentric(self._ids(), out)
+        self._snapped.with_inverse_w(self.id.size).barycentric(self._ids(), out)
         return out
 
     def interpolate(self, values: ArrayLike, *, background: float = 0.0) -> NDArray[np.float32]:
@@ -188,24 +188,20 @@ class Fragments:
         channels = array.shape[-1] if array.ndim > 1 else 1
         out: NDArray[Any] = np.empty((*self.triangle.shape, channels), np.float32)
         rows = array.reshape(-1, channels) if array.size else np.empty((0, channels), np.float32)
-        scene = self._scene.with_inverse_w(self.id.size)
-        scene.interpolate(self._ids(), rows, array.ndim == 3, float(background), out)
+        snapped = self._snapped.with_inverse_w(self.id.size)
+        snapped.interpolate(self._ids(), rows, array.ndim == 3, float(background), out)
         return out if array.ndim > 1 else out[..., 0]
 
     @cached_property
-    def _scene(self) -> _engine.Scene:
+    def _snapped(self) -> _engine.SnappedMesh:
         """The triangles that show, snapped; maybe the others too."""
-        return self._scene_with()
+        return self._snapped_with()
 
-    def _scene_with(self, *triangles: NDArray[np.int32]) -> _engine.Scene:
+    def _snapped_with(self, *triangles: NDArray[np.int32]) -> _engine.SnappedMesh:
         """Return the triangles that show and these, snapped; maybe the others too."""
-        if isinstance(self._scene_or_maker, _engine.Scene):
-            return self._scene_or_maker
-        return self._scene_or_maker(self.id, *triangles)
+        if isinstance(self._snapped_or_maker, _engine.SnappedMesh):
+            return self._snapped_or_maker
+        return self._snapped_or_maker(self.id, *triangles)
 
     def _ids(self) -> NDArray[np.int32]:
         return np.require(self.triangle, np.int32, ["C", "A"])
-
-
-
-

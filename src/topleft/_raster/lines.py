@@ -17,7 +17,7 @@ from topleft._base.options import DepthTest, parse
 from topleft._base.threads import count_threads, run_parts
 from topleft._raster.fragments import Fragments
 from topleft._raster.rasterize import canvas_of
-from topleft._raster.snap import Snapped, check_triangles, snap_scene
+from topleft._raster.snap import Snapped, snap_mesh
 from topleft._raster.view import View
 
 __all__ = ["draw_wireframe"]
@@ -30,9 +30,9 @@ def list_edges(memory: Memory, snapped: Snapped) -> NDArray[np.uint64]:
     starts = memory.empty("edge starts", (n_vertices + 1,), np.int64)
     last_low = memory.empty("edge last_low", (n_vertices,), np.int32)
     highs = memory.empty("edge highs", (n_edges,), np.int32)
-    n = _engine.list_edges(snapped.scene, starts, last_low, highs, edges)
+    n = _engine.list_edges(snapped.mesh, starts, last_low, highs, edges)
     if n < 0:
-        check_triangles(snapped.triangles, snapped.corners, snapped.n_vertices)
+        snapped.check_indices()
     return edges[:n]
 
 
@@ -66,8 +66,7 @@ def draw_wireframe(
     bias = float(depth_bias)
     if not math.isfinite(bias):
         raise ValueError(f"depth_bias must be finite, got {depth_bias!r}")
-    snapped = snap_scene(memory, vertices, triangles, view, with_depth=depth is not None, out=out)
-    engine_view = None if 0 in view.size else view.engine_view()
+    snapped = snap_mesh(memory, vertices, triangles, view, with_depth=depth is not None, out=out)
     edges = list_edges(memory, snapped)
     dtype = np.float32 if antialias else np.bool_
     with canvas_of(memory, "wireframe", out, (height, width), dtype) as (result, canvas):
@@ -75,7 +74,7 @@ def draw_wireframe(
 
         def draw_rows(first: int, end: int) -> None:
             _engine.draw_lines(
-                snapped.scene, engine_view, edges, flat, hides, bias, is_farthest, antialias, width, first, end - first
+                snapped.mesh, edges, flat, hides, bias, is_farthest, antialias, width, first, end - first
             )
 
         run_parts(draw_rows, height, count_threads(view.threads, snapped.n_triangles))

@@ -1,6 +1,6 @@
 """Depth peeling: the nearest layers of every pixel, sorted.
 
-In: scenes after the snap.  Out: `DepthLayers`, ids and depths of K layers, and attributes of each.
+In: meshes after the snap.  Out: `DepthLayers`, ids and depths of K layers, and attributes of each.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from topleft._base.threads import count_threads, run_parts
 from topleft._raster.choices import can_share
 from topleft._raster.classic import refuse_classic
 from topleft._raster.fragments import Fragments
-from topleft._raster.snap import Snapped, check_triangles, snap_scene
+from topleft._raster.snap import Snapped, snap_mesh
 from topleft._raster.view import View, ViewOptions
 
-__all__ = ["DepthLayers", "check_peel", "peel", "peel_scenes"]
+__all__ = ["DepthLayers", "check_peel", "peel", "peel_meshes"]
 
 #: All layers of a band of rows, which stay in a cache while the band is drawn.
 BAND_BYTES = 1 << 20
@@ -86,8 +86,7 @@ class DepthLayers:
         """Return rows [top, top + n_rows) of layer k in the same way."""
         (ids, depth), box = self.planes, (k, slice(top, top + n_rows))
         snapped = self._snapped
-        scene = snapped.scene.moved(0, top)
-        return Fragments(ids[box], depth[box], scene, snapped.n_vertices, snapped.n_triangles)
+        return Fragments(ids[box], depth[box], snapped.mesh.moved(0, top), snapped.n_vertices, snapped.n_triangles)
 
 
 def peel(
@@ -144,8 +143,8 @@ def peel(
     """
     checked = View.parse(size, view)
     n, is_farthest = check_peel(checked, layers, depth_test)
-    snapped = snap_scene(FRESH, vertices, triangles, checked, with_depth=True, out=None)
-    ids, depth = peel_scenes(SCRATCH, [snapped], checked, n, is_farthest=is_farthest)
+    snapped = snap_mesh(FRESH, vertices, triangles, checked, with_depth=True, out=None)
+    ids, depth = peel_meshes(SCRATCH, [snapped], checked, n, is_farthest=is_farthest)
     return DepthLayers(ids, depth, snapped)
 
 
@@ -172,31 +171,31 @@ def as_layers(layers: object) -> int:
     return n
 
 
-def peel_scenes(
-    memory: Memory, scenes: Sequence[Snapped], view: View, n_layers: int, *, is_farthest: bool
+def peel_meshes(
+    memory: Memory, meshes: Sequence[Snapped], view: View, n_layers: int, *, is_farthest: bool
 ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-    """Return planes (K, H, W) of ids and depths of all scenes together; the engine's scenes know their first ids."""
+    """Return planes (K, H, W) of ids and depths of all meshes together, which know their first ids."""
     width, height = view.size
     ids: NDArray[np.int32] = FRESH.empty("layer ids", (n_layers, height, width), np.int32)
     depth: NDArray[np.float32] = FRESH.empty("layer depth", (n_layers, height, width), np.float32)
     if 0 in view.size:
         return ids, depth
-    n_threads = min(height, count_threads(view.threads, sum(snapped.n_triangles for snapped in scenes)))
+    n_threads = min(height, count_threads(view.threads, sum(snapped.n_triangles for snapped in meshes)))
     # without bins each band looks at all triangles: few bands; a band has less than 2**31 pixels
     n_rows = BAND_BYTES // (8 * n_layers * width) if can_share(view) else min(height, (2**31 - 1) // width)
     band_bits = max(0, n_rows.bit_length() - 1)
     while band_bits and height >> band_bits < 2 * n_threads:
         band_bits -= 1
-    bins = [bins_of(memory, snapped, view, band_bits) for snapped in scenes]
+    bins = [bins_of(memory, snapped, view, band_bits) for snapped in meshes]
     n_bands = -(-height >> band_bits)
 
     def peel_bands(first: int, end: int) -> int:
-        drawn = [snapped.scene for snapped in scenes]
+        drawn = [snapped.mesh for snapped in meshes]
         return _engine.peel(drawn, bins, ids, depth, is_farthest, band_bits, first, end)
 
     if max(run_parts(peel_bands, n_bands, n_threads)) >= 0:
-        for snapped in scenes:
-            check_triangles(snapped.triangles, snapped.corners, snapped.n_vertices)
+        for snapped in meshes:
+            snapped.check_indices()
     return ids, depth
 
 
@@ -206,9 +205,9 @@ def bins_of(memory: Memory, snapped: Snapped, view: View, band_bits: int) -> _en
     if not (snapped.n_triangles and can_share(view)):
         return None
     bins = _engine.Bins(
-        snapped.scene, height, width, 0, band_bits, memory.empty("bins", (3, snapped.n_triangles + 16), np.int32)
+        snapped.mesh, height, width, 0, band_bits, memory.empty("bins", (3, snapped.n_triangles + 16), np.int32)
     )
     if bins.bad_row >= 0:
-        check_triangles(snapped.triangles, snapped.corners, snapped.n_vertices)
+        snapped.check_indices()
     bins.fill(np.empty(bins.n_listed + 1, np.int32))
     return bins

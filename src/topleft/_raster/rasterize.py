@@ -1,6 +1,6 @@
-"""The pipeline as named stages, and what each verb does with it.
+"""Draws masks, counts and visibility buffers.
 
-arrays -> transform -> clip -> snap -> draw
+Each verb checks what it is asked for, snaps the mesh (transform, index, snap, clip), chooses a route and draws.
 """
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,13 +19,12 @@ from topleft._base.memory import FreshMemory, Memory
 from topleft._base.options import DepthTest, Sampling, Sink, parse
 from topleft._base.threads import count_threads, run_parts
 from topleft._raster import choices
-from topleft._raster.area import sum_areas
+from topleft._raster.choices import Drawing, Route
 from topleft._raster.classic import draw_classic, refuse_classic
-from topleft._raster.clustered import ClusteredScene, draw_clustered
-from topleft._raster.clusters import Clusters
+from topleft._raster.cluster_draw import ClusteredMesh, draw_clustered
 from topleft._raster.fragments import Fragments
-from topleft._raster.sampling import draw_planes, sample_positions
-from topleft._raster.snap import Snapped, check_triangles, snap_scene
+from topleft._raster.sampling import draw_planes, sample_positions, sum_areas
+from topleft._raster.snap import Snapped, snap_mesh
 from topleft._raster.view import View
 
 __all__ = ["canvas_of", "draw", "draw_all_samples", "draw_coverage", "draw_fragments", "draw_overdraw"]
@@ -35,14 +34,14 @@ def draw(
     memory: Memory,
     snapped: Snapped,
     view: View,
-    sink: Sink,
+    drawing: Drawing,
     pixels: NDArray[Any],
     *,
     depth: NDArray[np.float32] | None = None,
     earlier_wins: bool = False,
 ) -> None:
-    """Clear contiguous buffers and draw a scene into them, in bands of rows."""
-    width, height = view.size
+    """Clear contiguous buffers and draw a mesh into them, in bands of rows."""
+    (width, height), (sink, n_parts, is_shared) = view.size, drawing
     if 0 in view.size:
         return
     covered: NDArray[np.uint64] | None = None
@@ -53,56 +52,34 @@ def draw(
         n_samples = 1 if samples is None else len(samples)
         covered = memory.empty("covered", _engine.Target.covered_shape(height, width, n_samples), np.uint64)
     target = _engine.Target(sink, pixels, depth, covered, samples, earlier_wins)
-    n_parts = choices.threads_to_draw(view, snapped.scene, snapped.n_triangles, sink)
 
     def draw_rows(first: int, end: int) -> int:
-        return snapped.scene.draw(target, first, end - first)
+        return snapped.mesh.draw(target, first, end - first)
 
-    if choices.is_shared(view, snapped.n_triangles, n_parts, sink):
+    if is_shared:
         bad_rows = draw_shared(memory, snapped, target, height, n_parts)
     else:
         bad_rows = run_parts(draw_rows, height, n_parts)
     if max(bad_rows) >= 0:
-        check_triangles(snapped.triangles, snapped.corners, snapped.n_vertices)
+        snapped.check_indices()
     view.mark("draw")
-
-
-def draw_flat(
-    memory: Memory,
-    snapped: Snapped,
-    view: View,
-    ids: NDArray[np.int32],
-    depth: NDArray[np.float32],
-    flat_depth: float,
-    background: float,
-    *,
-    earlier_wins: bool,
-) -> None:
-    """Draw ids and depth of triangles that all lie at one depth: ids alone, which tell where that depth is."""
-    draw(memory, snapped, view, Sink.LABEL, ids, earlier_wins=earlier_wins)
-
-    def set_depth(first: int, end: int) -> None:
-        _engine.set_flat_depth(ids, depth, first, end - first, earlier_wins, flat_depth, background)
-
-    run_parts(set_depth, len(ids), choices.threads_to_draw(view, snapped.scene, snapped.n_triangles, Sink.LABEL))
-    view.mark("depth")
 
 
 def draw_shared(memory: Memory, snapped: Snapped, target: _engine.Target, height: int, n_parts: int) -> list[int]:
     """Draw as `draw` does: each part a share of the triangles into its own rows, then what others have found for it."""
-    scene, n = snapped.scene, snapped.n_triangles
+    mesh, n = snapped.mesh, snapped.n_triangles
     rows = [height * i // n_parts for i in range(n_parts + 1)]
     shares = [n * i // n_parts for i in range(n_parts + 1)]
     room: NDArray[np.int32] = memory.empty("others", (n + 16 * n_parts,), np.int32)
     others = [room[shares[i] + 16 * i : shares[i + 1] + 16 * (i + 1)] for i in range(n_parts)]
 
     def draw_own(i: int, _: int) -> tuple[int, int]:
-        return scene.draw_share(target, rows[i], rows[i + 1] - rows[i], shares[i], others[i])
+        return mesh.draw_share(target, rows[i], rows[i + 1] - rows[i], shares[i], others[i])
 
     def draw_found(i: int, _: int) -> None:
         finders = [k for k in range(n_parts) if k != i]
         for k in finders:
-            scene.draw_listed(target, rows[i], rows[i + 1] - rows[i], others[k][: counts[k]], k == finders[-1])
+            mesh.draw_listed(target, rows[i], rows[i + 1] - rows[i], others[k][: counts[k]], k == finders[-1])
 
     bad_rows, counts = zip(*run_parts(draw_own, n_parts, n_parts), strict=True)
     if max(bad_rows) < 0:
@@ -118,8 +95,7 @@ def canvas_of(
 
     `keep`: what is in `out` shows through where nothing is drawn.
     """
-    result = memory.empty(name, shape, dtype) if out is None else as_out("out", out, shape, dtype)
-    canvas = result if result.flags.carray else np.empty(shape, dtype)
+    result, canvas = open_canvas(memory, name, out, shape, dtype)
     if keep and canvas is not result:
         canvas[...] = result
     yield result, canvas
@@ -127,14 +103,22 @@ def canvas_of(
         result[...] = canvas
 
 
+def open_canvas(
+    memory: Memory, name: str, out: object, shape: tuple[int, ...], dtype: type
+) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Return the array to return, and a contiguous aligned one: the same wherever that one is."""
+    result = memory.empty(name, shape, dtype) if out is None else as_out("out", out, shape, dtype)
+    return result, result if result.flags.carray else np.empty(shape, dtype)
+
+
 def draw_area(
     memory: Memory, name: str, snapped: Snapped, view: View, out: object, *, is_clamped: bool
 ) -> NDArray[np.float32]:
     """Return the area that triangles cover of each pixel, or at most 1 of it."""
     with canvas_of(memory, f"{name} area", out, view.size[::-1], np.float32) as (result, canvas):
-        n_threads = choices.threads_to_draw(view, snapped.scene, snapped.n_triangles, Sink.COUNT)
-        if sum_areas(memory, snapped.scene, canvas, n_threads, is_clamped=is_clamped):
-            check_triangles(snapped.triangles, snapped.corners, snapped.n_vertices)
+        n_threads = choices.threads_to_draw(view, snapped, Sink.COUNT)
+        if sum_areas(memory, snapped.mesh, canvas, n_threads, is_clamped=is_clamped):
+            snapped.check_indices()
     view.mark("draw")
     return result
 
@@ -149,15 +133,15 @@ def draw_coverage(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, vie
     """`coverage`, on the memory given."""
     if view.classic:
         return draw_classic(view.classic, memory, vertices, triangles, view, Sink.MASK, out)
-    snapped = snap_scene(memory, vertices, triangles, view, with_depth=False, out=out)
+    snapped = snap_mesh(memory, vertices, triangles, view, with_depth=False, out=out)
     if view.sampling is Sampling.AREA:
         return draw_area(memory, "coverage", snapped, view, out, is_clamped=True)
     if view.sampling.n_samples > 1:
         with canvas_of(memory, "coverage share", out, view.size[::-1], np.float32) as (result, canvas):
-            draw(memory, snapped, view, Sink.SAMPLES, canvas)
+            draw(memory, snapped, view, choices.drawing(view, snapped, Sink.SAMPLES), canvas)
         return result
     with canvas_of(memory, "coverage", out, view.size[::-1], np.bool_) as (result, canvas):
-        draw(memory, snapped, view, Sink.MASK, canvas)
+        draw(memory, snapped, view, choices.drawing(view, snapped, Sink.MASK), canvas)
     return result
 
 
@@ -166,8 +150,8 @@ def draw_sample_counts(memory: Memory, snapped: Snapped, view: View, out: object
     n, (width, height) = view.sampling.n_samples, view.size
     planes = memory.empty("sample counts", (n, height, width), np.int32)
     for plane, at in zip(planes, sample_positions(n, view.grid_bits).tolist(), strict=True):
-        seen = replace(snapped, scene=snapped.scene.seen_from(*at))
-        draw(memory, seen, view, Sink.COUNT, plane)
+        seen = replace(snapped, mesh=snapped.mesh.seen_from(*at))
+        draw(memory, seen, view, choices.drawing(view, seen, Sink.COUNT), plane)
     counts = np.moveaxis(planes, 0, -1)
     if out is None:
         return counts
@@ -180,39 +164,14 @@ def draw_overdraw(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, vie
     """`overdraw`, on the memory given."""
     if view.classic:
         return draw_classic(view.classic, memory, vertices, triangles, view, Sink.COUNT, out)
-    snapped = snap_scene(memory, vertices, triangles, view, with_depth=False, out=out)
+    snapped = snap_mesh(memory, vertices, triangles, view, with_depth=False, out=out)
     if view.sampling is Sampling.AREA:
         return draw_area(memory, "overdraw", snapped, view, out, is_clamped=False)
     if view.sampling.n_samples > 1:
         return draw_sample_counts(memory, snapped, view, out)
     with canvas_of(memory, "overdraw", out, view.size[::-1], np.int32) as (result, canvas):
-        draw(memory, snapped, view, Sink.COUNT, canvas)
+        draw(memory, snapped, view, choices.drawing(view, snapped, Sink.COUNT), canvas)
     return result
-
-
-def draw_samples(
-    memory: Memory,
-    snapped: Snapped,
-    view: View,
-    sink: Sink,
-    background_depth: float | None,
-    ids_out: object,
-    depth_out: object,
-) -> Fragments:
-    """Return the visibility buffer of every sample: a plane a sample in memory."""
-    (width, height), n = view.size, view.sampling.n_samples
-    positions = sample_positions(n, view.grid_bits)
-    ids: NDArray[np.int32] = memory.empty("sample ids", (n, height, width), np.int32)
-    depth: NDArray[np.float32] = memory.empty("sample depth", (n, height, width), np.float32)
-    draw_all_samples(memory, snapped, view, positions, sink, ids, depth)
-    if background_depth is not None:
-        depth[ids < 0] = background_depth
-    for name, out, planes in (("triangle", ids_out, ids), ("depth", depth_out, depth)):
-        if out is not None:
-            result = as_out(f"out {name}", out, (height, width, n), planes.dtype.type)
-            result[...] = np.moveaxis(planes, 0, -1)
-    scenes = [snapped.scene.seen_from(x, y) for x, y in positions.tolist()]
-    return Fragments.of_samples(ids, depth, scenes, snapped.n_vertices, snapped.n_triangles)
 
 
 def draw_all_samples(
@@ -220,7 +179,7 @@ def draw_all_samples(
     snapped: Snapped,
     view: View,
     positions: NDArray[np.int32],
-    sink: Sink,
+    drawing: Drawing,
     pixels: NDArray[np.int32],
     depth: NDArray[np.float32] | None,
 ) -> None:
@@ -228,13 +187,34 @@ def draw_all_samples(
     width, height = view.size
     if not (width and height):
         return
-    n_threads = choices.threads_to_draw(view, snapped.scene, snapped.n_triangles, sink)
+    sink, n_threads, _ = drawing
     is_near = snapped.n_triangles > 0 and choices.can_share(view)
     if draw_planes(
-        memory, snapped.scene, snapped.n_triangles, positions, sink, pixels, depth, n_threads, is_near=is_near
+        memory, snapped.mesh, snapped.n_triangles, positions, sink, pixels, depth, n_threads, is_near=is_near
     ):
-        check_triangles(snapped.triangles, snapped.corners, snapped.n_vertices)
+        snapped.check_indices()
     view.mark("draw")
+
+
+class Asked(NamedTuple):
+    """What `rasterize` is asked for besides the options of all verbs."""
+
+    test: DepthTest | None
+    background: float  # depth where nothing is
+    ids_out: object
+    depth_out: object
+
+    @classmethod
+    def parse(cls, depth_test: str | None, background_depth: float | None, out: object) -> Asked:
+        """Check the options of a call."""
+        test = None if depth_test is None else parse(DepthTest, "depth_test", depth_test)
+        if background_depth is None:
+            background_depth = -np.inf if test is DepthTest.GREATER else np.inf
+        try:
+            ids_out, depth_out = (None, None) if out is None else cast("tuple[object, object]", out)
+        except (TypeError, ValueError):
+            raise TypeError(f"out must be a pair (triangle, depth) of arrays, got {type(out).__name__}") from None
+        return cls(test, background_depth, ids_out, depth_out)
 
 
 def draw_fragments(
@@ -249,83 +229,108 @@ def draw_fragments(
     """`rasterize`, on the memory given."""
     refuse_classic(view, "depth")
     refuse_many(view, "rasterize")
-    test = None if depth_test is None else parse(DepthTest, "depth_test", depth_test)
-    if out is None:
-        ids_out = depth_out = None
-    else:
-        try:
-            ids_out, depth_out = out  # type: ignore[misc]
-        except (TypeError, ValueError):
-            raise TypeError(f"out must be a pair (triangle, depth) of arrays, got {type(out).__name__}") from None
-    sink = choices.fragment_sink(test, has_depth=True)
-    may_cluster = view.sampling.n_samples == 1 and view.transform is not None and choices.can_cluster(view, sink)
-    clusters = view.find_clusters(vertices) if may_cluster else None
-    if clusters is not None:
-        frags = draw_clustered_fragments(memory, clusters, view, sink, background_depth, ids_out, depth_out)
-        if frags is not None:
-            return frags
-    snapped = snap_scene(memory, vertices, triangles, view, with_depth=True, out=out)
-    sink = choices.fragment_sink(test, has_depth=snapped.has_depth)
-    if not snapped.has_depth:
-        background_depth = -np.inf if test is DepthTest.GREATER and background_depth is None else background_depth
-    if view.sampling.n_samples > 1:
-        return draw_samples(memory, snapped, view, sink, background_depth, ids_out, depth_out)
-    shape = view.size[::-1]
-    if not snapped.has_depth and depth_out is None:
-        with canvas_of(memory, "triangle", ids_out, shape, np.int32) as (ids, canvas):
-            draw(memory, snapped, view, Sink.LABEL, canvas)
-        ground = np.inf if background_depth is None else background_depth
-        return Fragments(ids, ground, snapped.scene, snapped.n_vertices, snapped.n_triangles)
-    with (
-        canvas_of(memory, "triangle", ids_out, shape, np.int32) as (ids, ids_canvas),
-        canvas_of(memory, "depth", depth_out, shape, np.float32) as (depth, depth_canvas),
-    ):
-        flat_depth = choices.flat_depth(snapped.scene, snapped.inputs, view, has_depth=snapped.has_depth)
-        if flat_depth is not None:
-            background = background_depth
-            if background is None:
-                background = -np.inf if test is DepthTest.GREATER else np.inf
-            earlier_wins = choices.earlier_wins(test, has_depth=snapped.has_depth)
-            flat = flat_depth, background
-            draw_flat(memory, snapped, view, ids_canvas, depth_canvas, *flat, earlier_wins=earlier_wins)
-        else:
-            draw(memory, snapped, view, sink, ids_canvas, depth=depth_canvas)
-            if background_depth is not None:
-                depth_canvas[ids_canvas < 0] = background_depth
-    return Fragments(ids, depth, snapped.scene, snapped.n_vertices, snapped.n_triangles)
+    asked = Asked.parse(depth_test, background_depth, out)
+    frags = draw_clusters(memory, vertices, view, asked)
+    if frags is not None:
+        return frags
+    snapped = snap_mesh(memory, vertices, triangles, view, with_depth=True, out=out)
+    route, drawing = choices.route(view, snapped, asked.test, wants_depth=asked.depth_out is not None)
+    return ROUTES[route](memory, snapped, view, asked, drawing)
 
 
-def draw_clustered_fragments(
-    memory: Memory,
-    clusters: Clusters,
-    view: View,
-    sink: Sink,
-    background_depth: float | None,
-    ids_out: object,
-    depth_out: object,
-) -> Fragments | None:
-    """Return what `draw_fragments` does, of a mesh in clusters.
+def draw_labels(memory: Memory, snapped: Snapped, view: View, asked: Asked, drawing: Drawing) -> Fragments:
+    """Draw ids of triangles at depth 0, which is written when it is asked for."""
+    with canvas_of(memory, "triangle", asked.ids_out, view.size[::-1], np.int32) as (ids, canvas):
+        draw(memory, snapped, view, drawing, canvas)
+    return Fragments(ids, asked.background, snapped.mesh, snapped.n_vertices, snapped.n_triangles)
 
-    None where drawing them does not pay, or where only that can tell what is wrong.
+
+def draw_flat(memory: Memory, snapped: Snapped, view: View, asked: Asked, drawing: Drawing) -> Fragments:
+    """Draw ids of triangles that all lie at one depth, and write it where they are."""
+    earlier_wins = choices.earlier_wins(asked.test, has_depth=snapped.has_depth)
+    flat_depth = choices.first_depth(snapped.points, has_depth=snapped.has_depth)
+    with buffers_of(memory, view, asked) as ((ids, depth), (ids_canvas, depth_canvas)):
+        draw(memory, snapped, view, drawing, ids_canvas, earlier_wins=earlier_wins)
+
+        def set_depth(first: int, end: int) -> None:
+            n_rows, background = end - first, asked.background
+            _engine.set_flat_depth(ids_canvas, depth_canvas, first, n_rows, earlier_wins, flat_depth, background)
+
+        run_parts(set_depth, len(ids), drawing.n_threads)
+        view.mark("depth")
+    return Fragments(ids, depth, snapped.mesh, snapped.n_vertices, snapped.n_triangles)
+
+
+def draw_depth(memory: Memory, snapped: Snapped, view: View, asked: Asked, drawing: Drawing) -> Fragments:
+    """Draw ids and depth, compared at each sample."""
+    with buffers_of(memory, view, asked) as ((ids, depth), (ids_canvas, depth_canvas)):
+        draw(memory, snapped, view, drawing, ids_canvas, depth=depth_canvas)
+        lay_background(ids_canvas, depth_canvas, drawing.sink, asked)
+    return Fragments(ids, depth, snapped.mesh, snapped.n_vertices, snapped.n_triangles)
+
+
+def draw_samples(memory: Memory, snapped: Snapped, view: View, asked: Asked, drawing: Drawing) -> Fragments:
+    """Draw ids and depth of every sample: a plane a sample in memory."""
+    (width, height), n = view.size, view.sampling.n_samples
+    positions = sample_positions(n, view.grid_bits)
+    ids: NDArray[np.int32] = memory.empty("sample ids", (n, height, width), np.int32)
+    depth: NDArray[np.float32] = memory.empty("sample depth", (n, height, width), np.float32)
+    draw_all_samples(memory, snapped, view, positions, drawing, ids, depth)
+    lay_background(ids, depth, drawing.sink, asked)
+    for name, out, planes in (("triangle", asked.ids_out, ids), ("depth", asked.depth_out, depth)):
+        if out is not None:
+            result = as_out(f"out {name}", out, (height, width, n), planes.dtype.type)
+            result[...] = np.moveaxis(planes, 0, -1)
+    meshes = [snapped.mesh.seen_from(x, y) for x, y in positions.tolist()]
+    return Fragments.of_samples(ids, depth, meshes, snapped.n_vertices, snapped.n_triangles)
+
+
+ROUTES = {Route.LABELS: draw_labels, Route.FLAT: draw_flat, Route.DEPTH: draw_depth, Route.SAMPLES: draw_samples}
+
+
+def draw_clusters(memory: Memory, vertices: ArrayLike, view: View, asked: Asked) -> Fragments | None:
+    """Draw a mesh that the plan has in clusters.
+
+    None where there are no clusters, where drawing them does not pay, or where only the mesh can tell what is wrong.
     """
-    if not clusters.patience.is_over():
+    if view.plan is None or view.transform is None or view.sampling.n_samples > 1:
         return None
-    seen = ClusteredScene(clusters, view)
+    sink = choices.fragment_sink(asked.test, has_depth=True)
+    clusters = view.plan.find_clusters(vertices) if choices.can_cluster(view, sink) else None
+    if clusters is None or not clusters.backoff.is_over():
+        return None
+    seen = ClusteredMesh(clusters, view)
     pays = choices.pays_to_draw_clusters(view, clusters.n_triangles, seen.survey)
-    clusters.patience.note(pays=pays)
+    clusters.backoff.note(pays=pays)
     if not pays:
         return None
-    shape = view.size[::-1]
-    with (
-        canvas_of(memory, "triangle", ids_out, shape, np.int32) as (ids, ids_canvas),
-        canvas_of(memory, "depth", depth_out, shape, np.float32) as (depth, depth_canvas),
-    ):
+    with buffers_of(memory, view, asked) as ((ids, depth), (ids_canvas, depth_canvas)):
         n_threads = count_threads(view.threads, clusters.n_triangles)
         memories = [memory] if n_threads == 1 else [FreshMemory() for _ in range(n_threads)]
         target = _engine.Target(sink, ids_canvas, depth_canvas, None)
         if not draw_clustered(memories, [seen], target, view.size[1]):
             return None
-        if background_depth is not None:
-            depth_canvas[ids_canvas < 0] = background_depth
+        lay_background(ids_canvas, depth_canvas, sink, asked)
     view.mark("draw")
     return Fragments(ids, depth, seen.part, len(clusters.points), clusters.n_triangles)
+
+
+Buffers = tuple[NDArray[np.int32], NDArray[np.float32]]
+
+
+@contextmanager
+def buffers_of(memory: Memory, view: View, asked: Asked) -> Iterator[tuple[Buffers, Buffers]]:
+    """Give ids and depth to return, and contiguous ones to draw into, as `canvas_of` does."""
+    shape = view.size[::-1]
+    ids, ids_canvas = open_canvas(memory, "triangle", asked.ids_out, shape, np.int32)
+    depth, depth_canvas = open_canvas(memory, "depth", asked.depth_out, shape, np.float32)
+    yield (ids, depth), (ids_canvas, depth_canvas)
+    for result, canvas in ((ids, ids_canvas), (depth, depth_canvas)):
+        if canvas is not result:
+            result[...] = canvas
+
+
+def lay_background(ids: NDArray[np.int32], depth: NDArray[np.float32], sink: Sink, asked: Asked) -> None:
+    """Write the depth of the background where nothing is, unless the engine has cleared the buffer to it."""
+    if asked.background != (-np.inf if sink is Sink.FARTHEST else np.inf):
+        depth[ids < 0] = asked.background

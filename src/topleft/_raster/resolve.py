@@ -1,4 +1,4 @@
-"""One colour a pixel from those of its samples: the mean of the values, or of the light that they stand for.
+"""Resolves MSAA: averages the samples of each pixel, their values or the light that they stand for.
 
 With straight alpha colours count as much as they are opaque: the mean of premultiplied colours, made straight again.
 """
@@ -19,14 +19,8 @@ from topleft._raster.view import View
 
 __all__ = ["parse_resolve", "resolve_colors", "resolve_flat", "resolve_gouraud"]
 
-#: Steps from no light to full light: 20 to the darkest level of sRGB.
 
-
-
-
-def parse_resolve(
-    resolve: object, colors: NDArray[Any], view: View, *, is_straight: bool
-) -> _engine.Transfer | None:
+def parse_resolve(resolve: object, colors: NDArray[Any], view: View, *, is_straight: bool) -> _engine.Transfer | None:
     """Return what is averaged; None when it is the values as they are.
 
     Raises
@@ -63,7 +57,7 @@ def resolve_flat(
 
 def resolve_gouraud(
     memory: Memory,
-    scenes: list[_engine.Scene],
+    meshes: list[_engine.SnappedMesh],
     labels: NDArray[np.int32],
     colors: NDArray[Any],
     pixels: NDArray[Any],
@@ -77,9 +71,9 @@ def resolve_gouraud(
 
     def resolve_rows(first: int, end: int) -> None:
         painted[:, first:end] = pixels[first:end]
-        for scene, own, picture in zip(scenes, labels, painted, strict=True):
+        for mesh, own, picture in zip(meshes, labels, painted, strict=True):
             flat = _engine.as_bytes(picture)
-            scene.paint(own, palette, flat, first, end - first, False, colors.dtype == np.uint8, n_channels)
+            mesh.paint(own, palette, flat, first, end - first, False, colors.dtype == np.uint8, n_channels)
         _engine.mean_colors(painted, pixels, first, end - first, n_channels, transfer)
 
     run_parts(resolve_rows, labels.shape[1], n_threads)

@@ -1,4 +1,4 @@
-"""Several samples a pixel: where they lie, and the grid that holds them."""
+"""Draws several samples a pixel, or the exact area of it: sample positions, bands of rows, cells between edges."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from topleft._base.memory import Memory
 from topleft._base.options import Sink
 from topleft._base.threads import run_parts
 
-__all__ = ["SAMPLE_GRID_BITS", "draw_means", "draw_planes", "refine_grid", "sample_positions"]
+__all__ = ["SAMPLE_GRID_BITS", "draw_means", "draw_planes", "refine_grid", "sample_positions", "sum_areas"]
 
 #: From the centre of the pixel, x right and y down, in sixteenths of a pixel: the standard patterns of Direct3D 11.
 POSITIONS: dict[int, tuple[tuple[int, int], ...]] = {
@@ -33,6 +33,9 @@ BAND_BYTES = 512 << 10
 
 #: Labels of all samples in a band of rows that is resolved at once.
 LABEL_BAND_BYTES = 512 << 10
+
+#: Cells that are held at a time; a larger picture is drawn in several passes over the triangles.
+MAX_CELLS = 1 << 28
 
 SPECIAL, BAD, WIDE = np.iinfo(np.int32).min, 0, 1  # x_fx and y_fx of vertices that are not narrow: csrc/topleft.h
 
@@ -71,7 +74,7 @@ def refine_grid(
 
 def draw_planes(
     memory: Memory,
-    scene: _engine.Scene,
+    mesh: _engine.SnappedMesh,
     n_triangles: int,
     positions: NDArray[np.int32],
     sink: Sink,
@@ -83,29 +86,29 @@ def draw_planes(
 ) -> bool:
     """Draw each sample into its plane of (S, H, W) arrays; returns whether an index lies outside the vertices.
 
-    The scene is set up once, its triangles sorted into bands of rows, and band after band is drawn for one sample after
-    the other. A scene that is not near (see `tl_kernels.draw`) is drawn as a whole for each sample.
+    The mesh is set up once, its triangles sorted into bands of rows, and band after band is drawn for one sample after
+    the other. A mesh that is not near (see `tl_kernels.draw`) is drawn as a whole for each sample.
     """
     n_samples, height, width = pixels.shape
-    scenes = [scene.seen_from(x, y) for x, y in positions.tolist()]
+    meshes = [mesh.seen_from(x, y) for x, y in positions.tolist()]
     depths = [None] * n_samples if depth is None else list(depth)
     targets = [_engine.Target(sink, plane, z, None) for plane, z in zip(pixels, depths, strict=True)]
     if not is_near:
         bad_rows = [
             max(run_parts(lambda first, end, s=s, t=t: s.draw(t, first, end - first), height, n_threads))  # type: ignore[misc]
-            for s, t in zip(scenes, targets, strict=True)
+            for s, t in zip(meshes, targets, strict=True)
         ]
         return max(bad_rows) >= 0
-    bins = sort_bands(memory, scene, n_triangles, positions, (height, width), BAND_BYTES // 8, n_threads)
+    bins = sort_bands(memory, mesh, n_triangles, positions, (height, width), BAND_BYTES // 8, n_threads)
     if bins.bad_row >= 0:
         return True
-    run_parts(lambda first, end: _engine.draw_bands(scenes, targets, bins, first, end), bins.n_bands, n_threads)
+    run_parts(lambda first, end: _engine.draw_bands(meshes, targets, bins, first, end), bins.n_bands, n_threads)
     return False
 
 
 def draw_means(
     memory: Memory,
-    scene: _engine.Scene,
+    mesh: _engine.SnappedMesh,
     n_triangles: int,
     positions: NDArray[np.int32],
     palette: _engine.Palette,
@@ -114,18 +117,18 @@ def draw_means(
 ) -> bool:
     """Write the mean colour of the samples over (H, W[, C]) pixels, in painter's order; returns as `draw_planes` does.
 
-    The scene is near, and labels live no longer than a band of rows.
+    The mesh is near, and labels live no longer than a band of rows.
     """
     height, width = pixels.shape[:2]
     n = len(positions)
-    bins = sort_bands(memory, scene, n_triangles, positions, (height, width), LABEL_BAND_BYTES // (4 * n), n_threads)
+    bins = sort_bands(memory, mesh, n_triangles, positions, (height, width), LABEL_BAND_BYTES // (4 * n), n_threads)
     if bins.bad_row >= 0:
         return True
-    scenes = [scene.seen_from(x, y) for x, y in positions.tolist()]
+    meshes = [mesh.seen_from(x, y) for x, y in positions.tolist()]
     n_parts = max(1, min(n_threads, bins.n_bands))
     labels = list(memory.empty("sample labels", (n_parts, n, width << bins.band_bits), np.int32))
     run_parts(
-        lambda first, end: _engine.fill_bands(scenes, labels.pop(), palette, pixels, bins, first, end),
+        lambda first, end: _engine.fill_bands(meshes, labels.pop(), palette, pixels, bins, first, end),
         bins.n_bands,
         n_parts,
     )
@@ -134,7 +137,7 @@ def draw_means(
 
 def sort_bands(
     memory: Memory,
-    scene: _engine.Scene,
+    mesh: _engine.SnappedMesh,
     n_triangles: int,
     positions: NDArray[np.int32],
     shape: tuple[int, int],
@@ -147,7 +150,37 @@ def sort_bands(
     while band_bits and height >> band_bits < 2 * n_threads:
         band_bits -= 1
     room = memory.empty("bins", (3, n_triangles + 16), np.int32)
-    bins = _engine.Bins(scene, height, width, int(np.abs(positions).max()), band_bits, room)
+    bins = _engine.Bins(mesh, height, width, int(np.abs(positions).max()), band_bits, room)
     if bins.bad_row < 0:
         bins.fill(memory.empty("bands", (bins.n_listed + 1,), np.int32))
     return bins
+
+
+def sum_areas(
+    memory: Memory, mesh: _engine.SnappedMesh, pixels: NDArray[np.float32], n_threads: int, *, is_clamped: bool
+) -> bool:
+    """Write the area that triangles cover of each pixel; returns whether a triangle has an index outside the vertices.
+
+    Sums are taken in 32 bits. Rows in which these might not do are drawn again in 64 bits, with the same result
+    wherever both are right.
+    """
+    height, width = pixels.shape
+    if not pixels.size:
+        return False
+    stride = _engine.area_stride(width)
+    rows_at_once = min(height, max(1, MAX_CELLS // stride))
+    cells = memory.constant("cells", rows_at_once * stride, _engine.CELL_CLEAR)
+
+    def draw_rows(first: int, end: int) -> int:
+        own = _engine.as_bytes(cells[(first - top) * stride : (end - top) * stride])
+        status = mesh.draw_area(pixels, own, first, end - first, False, is_clamped)
+        if status != _engine.AREA_OVERFLOW:
+            return status
+        wide = _engine.as_bytes(np.zeros((end - first) * stride, np.int64))
+        return mesh.draw_area(pixels, wide, first, end - first, True, is_clamped)
+
+    bad_rows = []
+    for top in range(0, height, rows_at_once):
+        n_rows = min(rows_at_once, height - top)
+        bad_rows += run_parts(lambda first, end: draw_rows(top + first, top + end), n_rows, n_threads)  # noqa: B023
+    return max(bad_rows) >= 0

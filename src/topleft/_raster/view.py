@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol, TypedDict
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypedDict
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -30,7 +30,7 @@ class Planned(Protocol):
     def fitted(self, view: View) -> View:
         """Return the view with what was chosen for it, or raise an error where the plan is for another one."""
 
-    def corners_of(self, triangles: ArrayLike, n_vertices: int) -> NDArray[np.int32]:
+    def triangles_of(self, triangles: ArrayLike, n_vertices: int) -> NDArray[np.int32]:
         """Return the checked int32 triangles, or raise an error where the plan is for others."""
 
     def find_clusters(self, vertices: ArrayLike) -> Clusters | None:
@@ -60,6 +60,17 @@ class ViewOptions(TypedDict, total=False):
 OPTIONS = frozenset(ViewOptions.__annotations__)
 
 
+class How(NamedTuple):
+    """How the engine draws triangles: the window's first pixel, its grid, and codes of `csrc/topleft.h`."""
+
+    x_px: int
+    y_px: int
+    grid_bits: int
+    cull: int
+    method: int
+    test: int
+
+
 @dataclass(frozen=True, slots=True)
 class View:
     """Checked `ViewOptions`."""
@@ -80,19 +91,20 @@ class View:
     classic: Method | None = None
     plan: Planned | None = None
 
-    def engine_view(self) -> _engine.View:
+    @property
+    def how(self) -> How:
+        """How the engine draws triangles."""
+        return How(*self.origin, self.grid_bits, self.cull, self.method, self.test)
+
+    def engine_viewport(self) -> _engine.Viewport:
         """Return how clip space maps to pixels."""
         bits = self.subpixel_bits, self.grid_bits
-        return _engine.View(self.viewport, *bits, self.zero_to_one, self.near_clip, self.far_clip)
+        return _engine.Viewport(self.viewport, *bits, self.zero_to_one, self.near_clip, self.far_clip)
 
     def mark(self, stage: str) -> None:
         """Note for the plan that a stage has ended."""
         if self.plan is not None:
             self.plan.mark(stage)
-
-    def find_clusters(self, vertices: ArrayLike) -> Clusters | None:
-        """Return the vertices and triangles in clusters, if the plan has them."""
-        return None if self.plan is None else self.plan.find_clusters(vertices)
 
     @property
     def test(self) -> int:

@@ -323,7 +323,7 @@ class BentFragments(Fragments):
 
     def __init__(self, drawn: Fragments, bent: BentMesh, mesh: Mesh) -> None:
         wholes = bent.wholes
-        super().__init__(wholes[drawn.triangle], drawn.depth, drawn._scene, len(mesh.vertices), len(mesh.triangles))
+        super().__init__(wholes[drawn.triangle], drawn.depth, drawn._snapped, len(mesh.vertices), len(mesh.triangles))
         self._samples = tuple(BentFragments(sample, bent, mesh) for sample in drawn._samples)
         self._planes = drawn._planes and (wholes[drawn._planes[0]], drawn._planes[1])
         self.drawn, self.bent = drawn, bent

@@ -62,7 +62,7 @@ def evaluate(
     out: npt.NDArray[Any] = np.empty((*ids.shape, n)[: 2 if n == 1 else 3], dtype)
     half_size = size[0] / 2, size[1] / 2
     points = _engine.Points(mesh.vertices, what, np.ascontiguousarray(rows), half_size, background, dtype is np.float64)
-    scene = frags._scene.with_inverse_w(ids.size)
+    scene = frags._snapped.with_inverse_w(ids.size)
     n_threads = count_threads(parse_threads(threads), len(mesh.triangles))
     run_parts(lambda first, end: points.fill(scene, ids, out, first, end - first), len(ids), n_threads)
     return out

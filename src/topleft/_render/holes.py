@@ -99,6 +99,6 @@ def draw_holed(
 ) -> None:
     """Draw the triangles with holes over the planes of what one sample sees (1, H, W), or over layers (K, H, W)."""
     for i, mesh, camera, cut in holed:
-        scene = placed.snap(i).scene.seen_from(*at)
+        scene = placed.snap(i).mesh.seen_from(*at)
         n_threads = count_threads(parse_threads(threads), len(mesh.triangles))
         draw_cut(scene, mesh, camera, cut, ids, depth, is_peeled=is_peeled, n_threads=n_threads)

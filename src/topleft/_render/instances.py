@@ -20,14 +20,13 @@ from topleft._base.threads import count_threads, run_parts
 from topleft._camera.camera import Camera
 from topleft._model.scene import Scene
 from topleft._raster import choices
-from topleft._raster.area import sum_areas
 from topleft._raster.classic import refuse_classic
-from topleft._raster.clustered import ClusteredScene, draw_clustered
+from topleft._raster.cluster_draw import ClusteredMesh, draw_clustered
 from topleft._raster.clusters import Clusters, Survey
-from topleft._raster.peel import check_peel, peel_scenes
+from topleft._raster.peel import check_peel, peel_meshes
 from topleft._raster.rasterize import canvas_of, refuse_many
-from topleft._raster.sampling import sample_positions
-from topleft._raster.snap import Snapped, snap_scene
+from topleft._raster.sampling import sample_positions, sum_areas
+from topleft._raster.snap import Snapped, snap_mesh
 from topleft._raster.view import View, ViewOptions
 from topleft._render.fragments import SceneDepthLayers, SceneFragments
 from topleft._render.through_lens import DrawnScene, scene_through
@@ -92,15 +91,15 @@ class PlacedScene:
         """Return an instance, snapped; in shared buffers it draws its own range of ids."""
         mesh = self.scene[i].mesh
         view, with_depth = self._view_of(i), self._with_depth
-        snapped = snap_scene(FRESH, mesh.vertices, mesh.triangles, view, with_depth=with_depth, out=None)
-        return replace(snapped, scene=snapped.scene.numbered_from(int(self.first_ids[i])))
+        snapped = snap_mesh(FRESH, mesh.vertices, mesh.triangles, view, with_depth=with_depth, out=None)
+        return replace(snapped, mesh=snapped.mesh.numbered_from(int(self.first_ids[i])))
 
-    def snap_part(self, i: int, triangles: NDArray[np.int32]) -> _engine.Scene:
+    def snap_part(self, i: int, triangles: NDArray[np.int32]) -> _engine.SnappedMesh:
         """Return what some triangles of an instance need, snapped: all of it, unless its mesh is drawn in clusters."""
         can_cluster = self._may_cluster and choices.can_cluster(self._view, Sink.NEAREST)
         if can_cluster and self.scene[i].mesh.has_clusters:
-            return ClusteredScene(*self.clustered(i)).part(triangles)
-        return self.snap(i).scene
+            return ClusteredMesh(*self.clustered(i)).part(triangles)
+        return self.snap(i).mesh
 
     def _view_of(self, i: int) -> View:
         instance, view = self.scene[i], self._view
@@ -137,7 +136,7 @@ class PlacedScene:
         for chunk in self.chunks():
             n_left -= len(chunk)
             for target, at in zip(targets, positions, strict=True):
-                scenes = [snapped.scene.seen_from(*at) for snapped in chunk]
+                scenes = [snapped.mesh.seen_from(*at) for snapped in chunk]
                 run_parts(rows_of(scenes, target, is_first=is_first, is_last=n_left == 0), height, n_parts)
             is_first = False
 
@@ -164,13 +163,13 @@ def front_to_back(scene: Scene, clip_from_world: NDArray[np.float64]) -> NDArray
 def pays_to_draw(placed: PlacedScene, clip_from_world: NDArray[np.float64], view: View) -> bool:
     """Tell whether a scene whose meshes are in clusters is drawn from these."""
     scene = placed.scene
-    if not scene.patience.is_over():
+    if not scene.backoff.is_over():
         return False
     n_triangles = scene.n_triangles // len(scene)
     pays = choices.pays_to_draw_instances(
         view, n_triangles, lambda: survey_instances(placed), lambda: count_layers(scene, clip_from_world)
     )
-    scene.patience.note(pays=pays)
+    scene.backoff.note(pays=pays)
     return pays
 
 
@@ -178,7 +177,7 @@ def survey_instances(placed: PlacedScene) -> Survey:
     """Return what becomes of the clusters of a scene, by some of its instances."""
     some = range(0, len(placed.scene), -(-len(placed.scene) // SURVEYED_INSTANCES))
     weights = [placed.scene[i].mesh.triangles.shape[0] for i in some]
-    surveys = [ClusteredScene(*placed.clustered(i)).survey(SURVEYED_OF_EACH) for i in some]
+    surveys = [ClusteredMesh(*placed.clustered(i)).survey(SURVEYED_OF_EACH) for i in some]
     return Survey(*np.average(surveys, axis=0, weights=weights).tolist())
 
 
@@ -208,14 +207,14 @@ def draw_placed(
     n_threads: int,
 ) -> bool:
     """Clear targets, one a sample, and draw what each sees; returns as `draw_clustered` does."""
-    scenes = [ClusteredScene(*placed.clustered(i)) for i in order.tolist()]
+    scenes = [ClusteredMesh(*placed.clustered(i)) for i in order.tolist()]
     memories = [KeptMemory() for _ in range(n_threads)]
     seen = zip(targets, positions, strict=True)
     return all(draw_clustered(memories, scenes, target, height, at) for target, at in seen)
 
 
 def rows_of(
-    scenes: list[_engine.Scene], target: _engine.Target, *, is_first: bool, is_last: bool
+    scenes: list[_engine.SnappedMesh], target: _engine.Target, *, is_first: bool, is_last: bool
 ) -> Callable[[int, int], None]:
     """Return what draws rows [first, end) of several scenes into one target, which the first of all clears."""
 
@@ -269,7 +268,7 @@ def peel_scene(
     placed, view = place(scene, camera, size, options)
     n, is_farthest = check_peel(view, layers, depth_test)
     snapped = [placed.snap(i) for i in range(len(scene))]  # a band of rows is drawn once, with all instances
-    return SceneDepthLayers(*peel_scenes(SCRATCH, snapped, view, n, is_farthest=is_farthest), placed)
+    return SceneDepthLayers(*peel_meshes(SCRATCH, snapped, view, n, is_farthest=is_farthest), placed)
 
 
 def draw_scene_coverage(
@@ -301,6 +300,6 @@ def add_areas(placed: PlacedScene, view: View, canvas: NDArray[np.float32]) -> N
     for chunk in placed.chunks():
         for snapped in chunk:
             n_threads = count_threads(view.threads, snapped.n_triangles)
-            sum_areas(SCRATCH, snapped.scene, own, n_threads, is_clamped=True)
+            sum_areas(SCRATCH, snapped.mesh, own, n_threads, is_clamped=True)
             canvas += own
     np.minimum(canvas, 1, out=canvas)

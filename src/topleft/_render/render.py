@@ -106,9 +106,7 @@ def render(
     255
     """
     subject, camera = subject_of(mesh, camera, size, tolerance, cull=cull, material=look.get("material"))
-    frags = rasterize_subject(
-        subject, camera, size, rasterizer, cull=cull, threads=threads, sampling=sampling
-    )
+    frags = rasterize_subject(subject, camera, size, rasterizer, cull=cull, threads=threads, sampling=sampling)
     return picture_of(
         frags, subject, camera, shading=shading, color=color, background=background, cull=cull, edges=edges,
         threads=threads, **look,
@@ -267,7 +265,7 @@ class StaticPlan:
         """Return the view with this plan."""
         return replace(view, plan=self)
 
-    def corners_of(self, triangles: ArrayLike, n_vertices: int) -> NDArray[np.int32]:  # noqa: ARG002
+    def triangles_of(self, triangles: ArrayLike, n_vertices: int) -> NDArray[np.int32]:  # noqa: ARG002
         """Return the triangles of the mesh, which has checked them."""
         return self._mesh.triangles
 

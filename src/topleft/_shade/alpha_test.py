@@ -86,30 +86,38 @@ def cut_sample(sample: Fragments, mesh: Mesh, camera: Camera, cut: Cut, n_thread
     """Draw the buffers of one sample anew: triangles without holes, then the others."""
     triangles = cut.triangles
     opaque = np.append(np.flatnonzero(~cut.is_cut), 0).astype(np.int32)  # one more than is drawn
-    scene = sample._scene_with(np.arange(len(mesh.triangles), dtype=np.int32))  # all are drawn anew
+    scene = sample._snapped_with(np.arange(len(mesh.triangles), dtype=np.int32))  # all are drawn anew
     ids, depth = sample.triangle, sample.depth
     inputs = inputs_of(scene, mesh, camera, ids.shape[::-1], cut)
 
     def cut_rows(first: int, end: int) -> None:
-        _engine.cut_out(scene, scene.view, inputs.shading, opaque, triangles, ids, depth, first, end - first)
+        _engine.cut_out(scene, inputs.shading, opaque, triangles, ids, depth, first, end - first)
 
     run_parts(cut_rows, len(ids), n_threads)
 
 
 def draw_cut(
-    scene: _engine.Scene, mesh: Mesh, camera: Camera, cut: Cut, ids: I32, depth: F32, *, is_peeled: bool, n_threads: int
+    scene: _engine.SnappedMesh,
+    mesh: Mesh,
+    camera: Camera,
+    cut: Cut,
+    ids: I32,
+    depth: F32,
+    *,
+    is_peeled: bool,
+    n_threads: int,
 ) -> None:
     """Draw the triangles with holes over the planes of a visibility buffer (1, H, W), or of layers (K, H, W)."""
     triangles = cut.triangles
     inputs = inputs_of(scene, mesh, camera, ids.shape[:0:-1], cut)
 
     def draw_rows(first: int, end: int) -> None:
-        _engine.cut_out_over(scene, scene.view, inputs.shading, triangles, ids, depth, is_peeled, first, end - first)
+        _engine.cut_out_over(scene, inputs.shading, triangles, ids, depth, is_peeled, first, end - first)
 
     run_parts(draw_rows, ids.shape[1], n_threads)
 
 
-def inputs_of(scene: _engine.Scene, mesh: Mesh, camera: Camera, size: tuple[int, ...], cut: Cut) -> ShadingInputs:
+def inputs_of(scene: _engine.SnappedMesh, mesh: Mesh, camera: Camera, size: tuple[int, ...], cut: Cut) -> ShadingInputs:
     """What the kernel reads of materials with holes."""
     inputs = ShadingInputs(scene, mesh, camera, (size[0], size[1]), cut.rows, is_flat=False)
     inputs.set_materials(mesh, cut.materials, is_unlit=True)

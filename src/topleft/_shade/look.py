@@ -1,7 +1,7 @@
 """Prepares what the shading kernels read: materials, lights and a camera as numbers, a mesh as rows of float32.
 
 Input: a mesh, its materials, lights, a camera and the size of the whole picture. Output: `ShadingInputs`, which fills
-`_engine.Shading`.
+`_engine.ShadingTable`.
 """
 
 from __future__ import annotations
@@ -123,35 +123,29 @@ def turn_of_normals(view: F64) -> F64:
 
 
 class ShadingMesh:
-    """What shading needs of a mesh, each part made when it is first asked for.
+    """What shading needs of a mesh.
 
     Attributes
     ----------
     positions : (V, 3) float
         As in the mesh, or in eye space.
     center : (3,) float64
-        The middle of the mesh: the origin of the space that light is computed in, so that float32 is fine enough.
+        The middle of the box round the vertices in use: the origin of the space that light is computed in, so that
+        float32 is fine enough.
+    normals : (V, 4) float32
+        Unit normals, 0 where there is none, and 1.
+    colors : (V, 4) float32, optional
+        sRGB of the vertices, 0 to 255, and 1.
     """
 
     def __init__(self, mesh: Mesh, view: F64 | None = None) -> None:
         """`view`: (4, 4), takes the mesh to eye space first."""
-        self._triangles = mesh.triangles
-        # The method would hold the mesh, which is the key of `_shading_meshes`.
-        self._vertex_normals = mesh.vertex_normals()
-        self._colors = mesh.colors
-        self._view = view
+        normals, self._triangles = mesh.vertex_normals(), mesh.triangles
         self.positions = mesh.vertices if view is None else moved(mesh.vertices, view)
-
-    @cached_property
-    def center(self) -> F64:
-        """The middle of the box round the vertices in use."""
         low, high = box_of_triangles(self.positions, self._triangles).astype(self.positions.dtype)
-        return np.asarray(low / 2 + high / 2, np.float64)
-
-    @cached_property
-    def normals(self) -> F32:
-        """(V, 4): unit normals, 0 where there is none, and 1."""
-        return unit_rows(self._vertex_normals, None if self._view is None else turn_of_normals(self._view))
+        self.center: F64 = np.asarray(low / 2 + high / 2, np.float64)
+        self.normals = unit_rows(normals, None if view is None else turn_of_normals(view))
+        self.colors = None if mesh.colors is None else color_rows(mesh.colors)
 
     @cached_property
     def face_normals(self) -> F32:
@@ -163,11 +157,6 @@ class ShadingMesh:
         """(T,): 1 where the normals of the corners point to the other side than the triangle; None if none does."""
         turned = turned_faces(self.positions, self._triangles, self.normals)
         return turned if turned.view(np.bool_).any() else None
-
-    @cached_property
-    def colors(self) -> F32 | None:
-        """(V, 4): sRGB of the vertices, 0 to 255, and 1; None if they have none."""
-        return None if self._colors is None else color_rows(self._colors)
 
 
 _shading_meshes: WeakKeyDictionary[Mesh, ShadingMesh] = WeakKeyDictionary()
@@ -186,7 +175,7 @@ class ShadingInputs:
 
     def __init__(
         self,
-        scene: _engine.Scene,
+        scene: _engine.SnappedMesh,
         mesh: Mesh,
         camera: Camera,
         size: tuple[int, int],
@@ -196,17 +185,17 @@ class ShadingInputs:
     ) -> None:
         in_eye_space = not is_similarity(camera.view)
         self.mesh = ShadingMesh(mesh, camera.view) if in_eye_space else shading_mesh_of(mesh)
-        viewport = size if scene.view is None else scene.view.viewport
+        viewport = size if scene.viewport is None else scene.viewport.size
         self.rays = rays_of(camera, viewport, self.mesh.center, in_eye_space=in_eye_space)
         self.view = camera.view
         self.back_side = -1.0 if np.linalg.det(camera.view[:3, :3]) > 0 else 1.0
         self.is_in_eye_space = in_eye_space
         self.uv = mesh.uv
         normals = self.mesh.normals
-        if scene.view is not None and self.rays.has_perspective:
+        if scene.viewport is not None and self.rays.has_perspective:
             normals = np.empty_like(normals)
             _engine.set_inverse_w(scene, self.mesh.normals, normals)
-        self.shading = _engine.Shading(
+        self.shading = _engine.ShadingTable(
             normals,
             self.mesh.face_normals if is_flat else None,
             self.mesh.positions,

@@ -124,7 +124,7 @@ def shade_mesh(frags: Fragments, mesh: Mesh, camera: Camera, options: ShadingOpt
     if not len(mesh.triangles) or 0 in frags.triangle.shape:
         picture[...] = options.background
         return picture
-    scene = frags._scene
+    scene = frags._snapped
     planes = frags.samples_triangle.transpose(2, 0, 1), frags.samples_depth.transpose(2, 0, 1)
     kinds = np.int32, np.float32
     ids, depth = (np.require(array, kind, ["C", "A"]) for array, kind in zip(planes, kinds, strict=True))
@@ -141,9 +141,9 @@ def shade_mesh(frags: Fragments, mesh: Mesh, camera: Camera, options: ShadingOpt
     def shade_rows(first: int, end: int) -> None:
         part = picture, first, end - first
         if positions is None:
-            _engine.shade(scene, scene.view, look.shading, ids[0], depth[0], *part)
+            _engine.shade(scene, look.shading, ids[0], depth[0], *part)
         else:
-            _engine.shade_samples(scene, scene.view, look.shading, positions, ids, depth, *part)
+            _engine.shade_samples(scene, look.shading, positions, ids, depth, *part)
 
     run_parts(shade_rows, len(picture), count_threads(options.threads, len(mesh.triangles)))
     return picture
@@ -235,9 +235,7 @@ def shade_samples(frags: Fragments, shade_one: Callable[[Fragments], U8], backgr
     return picture
 
 
-def shade_normals(
-    frags: Fragments, mesh: Mesh, camera: Camera, turn: F64, *, threads: int | None = None
-) -> F32:
+def shade_normals(frags: Fragments, mesh: Mesh, camera: Camera, turn: F64, *, threads: int | None = None) -> F32:
     """Unit normals (H, W, 3) float32 of the visible pixels, on the side that is seen, 0 where nothing is.
 
     Parameters
@@ -259,13 +257,13 @@ def shade_normals(
     if not len(mesh.triangles) or 0 in ids.shape:
         return np.zeros((*ids.shape, 3), np.float32)
     out = np.empty((*ids.shape, 3), np.float32)
-    scene = frags._scene
+    scene = frags._snapped
     look = ShadingInputs(scene, mesh, camera, ids.shape[::-1], None, is_flat=False)
     look.set_turn(SHOW_CODES[Shading.NORMALS], turn)
     n_threads = count_threads(parse_threads(threads), len(mesh.triangles))
 
     def shade_rows(first: int, end: int) -> None:
-        _engine.shade_normals(scene, scene.view, look.shading, ids, out, first, end - first)
+        _engine.shade_normals(scene, look.shading, ids, out, first, end - first)
 
     run_parts(shade_rows, len(ids), n_threads)
     return out

@@ -2,6 +2,9 @@
 
 `METHODS` are the production ones: exact, identical buffers. `CLASSICS` are those of the literature, as published, to be
 compared; a variant's name stands after a slash. Their kernels are imported when they are first asked for.
+
+classics/    draws triangles as the literature does: a compiled kernel for each classic, and a twin in Python
+reference/   draws triangles exactly and slowly, in integers and fractions: what all others are held against
 """
 
 from __future__ import annotations
@@ -13,7 +16,7 @@ from typing import Protocol, cast
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["CLASSICS", "METHODS", "Claims", "Kernel", "Method", "find_method", "load_kernel", "production_method"]
+__all__ = ["CLASSICS", "METHODS", "Claims", "Kernel", "Method", "find_method", "load_kernel"]
 
 
 class Kernel(Protocol):
@@ -231,9 +234,7 @@ CLASSICS = {
             "row_crossing/cull-back",
             "the same without area or back faces",
             WYLIE,
-            Claims(
-                watertight=True, integer_vertices=True, overdraws_shared_edges=True, winding="counter-clockwise"
-            ),
+            Claims(watertight=True, integer_vertices=True, overdraws_shared_edges=True, winding="counter-clockwise"),
             limit=INT_LIMIT,
         ),
         Method(
@@ -276,21 +277,7 @@ def find_method(name: object) -> Method:
     return method
 
 
-def production_method(name: object) -> int:
-    """Return the code of an exact method of the engine.
-
-    Raises
-    ------
-    ValueError
-        If there is no such method, or it is a classic.
-    """
-    code = find_method(name).code
-    if code is None:
-        raise ValueError(f"method must be one of {', '.join(map(repr, METHODS))} here, got {name!r}")
-    return code
-
-
 def load_kernel(method: Method) -> tuple[Kernel, str]:
     """Return the kernel of a classic and the name of its variant ("" for the first form)."""
     module, _, variant = method.name.partition("/")
-    return cast(Kernel, import_module(f"{__name__}.{module}").draw), variant
+    return cast(Kernel, import_module(f"{__name__}.classics.{module}").draw), variant

@@ -1,22 +1,22 @@
-# What a pass reads and writes: views, vertices, buffers, indices, clipped pieces. Included by _engine.pyx.
+# Describes what a pass reads and writes: viewport, vertices, buffers of pixels, indices, clipped pieces.
 
 cdef enum:
     VERTEX_BLOCK = 16  # vertices that are snapped together when some of them are needed: whole vectors
 
 
-cdef class View:
+cdef class Viewport:
     """How clip space maps to pixels."""
 
     cdef tl_view view
 
-    def __init__(self, viewport, int subpixel_bits, int guard_bits, bint zero_to_one, bint near_clip, bint far_clip):
-        self.view.half_width_px, self.view.half_height_px = viewport[0] / 2, viewport[1] / 2
-        self.view.guard_band_x, self.view.guard_band_y = (2.0**60 / (side / 2 * 2**guard_bits) for side in viewport)
+    def __init__(self, size, int subpixel_bits, int guard_bits, bint zero_to_one, bint near_clip, bint far_clip):
+        self.view.half_width_px, self.view.half_height_px = size[0] / 2, size[1] / 2
+        self.view.guard_band_x, self.view.guard_band_y = (2.0**60 / (side / 2 * 2**guard_bits) for side in size)
         self.view.subpixel_bits, self.view.zero_to_one = subpixel_bits, zero_to_one
         self.view.near_clip, self.view.far_clip = near_clip, far_clip
 
     @property
-    def viewport(self):
+    def size(self):
         """Width and height of the whole picture."""
         return int(2 * self.view.half_width_px), int(2 * self.view.half_height_px)
 
@@ -26,7 +26,7 @@ cdef class Source:
 
     cdef tl_source source
     cdef object arrays
-    cdef readonly bint is_clip_space
+    cdef readonly bint is_clip_space, is_affine
 
     def __init__(self, vertices, matrix=None, bint is_affine=False):
         cdef const uint8_t[::1] raw = as_bytes(vertices)
@@ -34,7 +34,7 @@ cdef class Source:
         self.arrays = (raw, raw_matrix)
         self.source.data = data(raw)
         self.source.matrix = data(raw_matrix)
-        self.source.is_affine = matrix is not None and is_affine
+        self.source.is_affine = self.is_affine = matrix is not None and is_affine
         self.source.scalar = <tl_scalar><int>SCALARS[vertices.dtype]
         self.source.n, self.source.n_components = vertices.shape
         self.is_clip_space = matrix is not None or self.source.n_components == 4
@@ -47,15 +47,15 @@ cdef class Source:
             counts = K.snap(&self.source, first, end, subpixel_bits, with_depth, <tl_vertex *>&records[0], table)
         return counts.n_bad, counts.n_wide, counts.n_clipped
 
-    def project(self, int64_t first, int64_t end, View view, uint8_t[::1] records, int64_t[:, ::1] wide):
+    def project(self, int64_t first, int64_t end, Viewport viewport, uint8_t[::1] records, int64_t[:, ::1] wide):
         """Project and snap vertices [first, end) into records; returns the numbers of bad, wide and clipped vertices."""
         cdef tl_wide *table = <tl_wide *>&wide[0, 0] if wide is not None else NULL
         cdef tl_vertex_counts counts
         with nogil:
-            counts = K.project(&self.source, first, end, &view.view, <tl_vertex *>&records[0], table)
+            counts = K.project(&self.source, first, end, &viewport.view, <tl_vertex *>&records[0], table)
         return counts.n_bad, counts.n_wide, counts.n_clipped
 
-    def project_blocks(self, const uint8_t[::1] is_used, View view, uint8_t[::1] records):
+    def project_blocks(self, const uint8_t[::1] is_used, Viewport viewport, uint8_t[::1] records):
         """Project and snap the blocks of VERTEX_BLOCK vertices that are used; returns as `project` does."""
         cdef int64_t i = 0, end, n = is_used.shape[0], n_bad = 0, n_wide = 0, n_clipped = 0
         cdef tl_vertex_counts counts
@@ -65,7 +65,7 @@ cdef class Source:
                 while end < n and is_used[end]:
                     end += 1
                 if end > i:
-                    counts = K.project(&self.source, i * VERTEX_BLOCK, min(end * VERTEX_BLOCK, self.source.n), &view.view, <tl_vertex *>&records[0], NULL)
+                    counts = K.project(&self.source, i * VERTEX_BLOCK, min(end * VERTEX_BLOCK, self.source.n), &viewport.view, <tl_vertex *>&records[0], NULL)
                     n_bad += counts.n_bad
                     n_wide += counts.n_wide
                     n_clipped += counts.n_clipped
@@ -155,7 +155,7 @@ cdef class Pieces:
     cdef tl_pieces pieces
     cdef readonly object arrays
 
-    def __init__(self, Source source, const uint8_t[::1] records, const int32_t[:, ::1] triangles, View view, const int32_t[::1] ids=None):
+    def __init__(self, Source source, const uint8_t[::1] records, const int32_t[:, ::1] triangles, Viewport viewport, const int32_t[::1] ids=None):
         """`ids`: the triangles that may be cut, ascending; unless given, all of them."""
         cdef tl_pieces *p = &self.pieces
         cdef int64_t n = triangles.shape[0] if ids is None else ids.shape[0]
@@ -171,7 +171,7 @@ cdef class Pieces:
         if n == 0:
             return
         with nogil:
-            K.clip(&source.source, <const tl_vertex *>&records[0], &triangles[0, 0], listed, n, &view.view, p)
+            K.clip(&source.source, <const tl_vertex *>&records[0], &triangles[0, 0], listed, n, &viewport.view, p)
         if p.n_pieces == 0:
             return
         vertices, wide = np.empty(p.n_vertices * VERTEX_BYTES, np.uint8), np.empty((p.n_vertices, 2), np.int64)
@@ -182,7 +182,7 @@ cdef class Pieces:
         p.inv_w, p.weights = &inv_w[0], &weights[0, 0]
         p.triangles, p.source = &corners[0, 0], &owners[0]
         with nogil:
-            K.clip(&source.source, <const tl_vertex *>&records[0], &triangles[0, 0], listed, n, &view.view, p)
+            K.clip(&source.source, <const tl_vertex *>&records[0], &triangles[0, 0], listed, n, &viewport.view, p)
 
     def __len__(self):
         return self.pieces.n_pieces

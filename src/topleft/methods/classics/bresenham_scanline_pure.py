@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from topleft.methods._pure import Pixel, Span, corners_of, new_picture, to_pixels
+from topleft.methods.classics._pure import Pixel, Span, corners_of, new_picture, to_pixels
 
 
 def line(a: Pixel, b: Pixel) -> Iterator[Pixel]:

@@ -1,5 +1,5 @@
-# Normals, and other arrays that shading needs of a mesh. Included by _engine.pyx, which declares the kernels.
-# What has to do with triangles returns -1, or a row with an index outside the vertices.
+# What is computed of a mesh: normals, other arrays that shading needs, distances between surfaces.
+# What reads triangles returns -1, or a row with an index outside the vertices.
 
 
 def vertex_normals(Source source, const int32_t[:, ::1] triangles, int64_t first, int64_t end, double[:, ::1] out):
@@ -117,3 +117,61 @@ def color_rows(const uint8_t[:, ::1] colors, int64_t first, int64_t end, float[:
     if end > first:
         with nogil:
             K.color_rows(&colors[0, 0], colors.shape[1], first, end, &rows[0, 0])
+
+
+cdef class Tree:
+    """Triangles in a tree of boxes, to find the nearest of."""
+
+    cdef tl_surface tree
+    cdef object arrays
+
+    def __init__(self, const double[:, ::1] points, const int32_t[:, ::1] triangles, double slack):
+        """`triangles`: at least one, neighbours near each other; `slack`: by which boxes are widened."""
+        cdef int64_t n = triangles.shape[0], n_below = (n + TL_TREE_LEAF - 1) // TL_TREE_LEAF, n_all = 0
+        cdef int level = 0
+        while level == 0 or n_below > 1:
+            n_below = (n_below + TL_TREE_WIDTH - 1) // TL_TREE_WIDTH
+            self.tree.first_node[level] = n_all
+            self.tree.n_nodes[level] = n_below
+            n_all += n_below
+            level += 1
+        nodes = np.empty(n_all * sizeof(tl_tree_node), np.uint8)
+        cdef uint8_t[::1] memory = nodes
+        self.arrays = (points, triangles, nodes)
+        self.tree.points = &points[0, 0]
+        self.tree.triangles = &triangles[0, 0]
+        self.tree.n_triangles = n
+        self.tree.nodes = <tl_tree_node *>&memory[0]
+        self.tree.n_levels = level
+        self.tree.slack = slack
+        with nogil:
+            K.build_tree(&self.tree)
+
+    def find_nearest(self, const double[:, ::1] points, int64_t first, int64_t end, int32_t[::1] triangle,
+                     double[:, ::1] at=None):
+        """Write the nearest triangle of points [first, end), and where on it; return the largest distance."""
+        cdef double *out = &at[0, 0] if at is not None and at.shape[0] > 0 else NULL
+        cdef double largest = 0.0
+        if first < end:
+            with nogil:
+                largest = K.find_nearest(&self.tree, &points[0, 0], first, end, &triangle[0], out)
+        return largest
+
+    def find_reach(self, const double[:, ::1] points, const int32_t[:, ::1] triangles,
+                   int64_t first, int64_t end, double known, double share, double least):
+        """Return how far triangles [first, end) are at least and at most, and the most pieces that one was cut into."""
+        cdef tl_reach reach
+        reach.known, reach.bound, reach.n_pieces = known, 0.0, 0
+        if first < end:
+            with nogil:
+                K.find_reach(&self.tree, &points[0, 0], &triangles[0, 0], first, end, share, least, &reach)
+        return reach.known, reach.bound, reach.n_pieces
+
+
+def set_feet(const double[:, ::1] points, const int32_t[:, ::1] triangles, const double[:, ::1] from_points,
+             const int32_t[::1] triangle, const int32_t[::1] point, double[:, ::1] at, double[::1] squared):
+    """Write where on a triangle is nearest to a point, and the squared distance, of each pair of row numbers."""
+    cdef int64_t n = triangle.shape[0]
+    if n:
+        with nogil:
+            K.set_feet(&points[0, 0], &triangles[0, 0], &from_points[0, 0], &triangle[0], &point[0], n, &at[0, 0], &squared[0])

@@ -1,6 +1,6 @@
-"""Drawing clusters: a view takes what it needs of a mesh from vertices to pixels, cluster by cluster.
+"""Draws clusters: takes what a view shows of a mesh from vertices to pixels, cluster by cluster.
 
-In: `Clusters`, a view, a target. Out: the same picture that the whole mesh gives, and the scene that attributes need.
+In: `Clusters`, a view, a target. Out: the picture that the whole mesh gives, and what attributes need, snapped.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from topleft._base.options import Sink
 from topleft._base.threads import run_parts
 from topleft._raster import choices
 from topleft._raster.clusters import Clusters, Survey
-from topleft._raster.snap import snap_scene
+from topleft._raster.snap import snap_mesh
 from topleft._raster.view import View
 
-__all__ = ["ClusteredScene", "draw_clustered"]
+__all__ = ["ClusteredMesh", "draw_clustered"]
 
 #: Clusters that tell what a view shows of all: 5 microseconds.
 SURVEYED = 50
@@ -29,9 +29,7 @@ SURVEYED = 50
 NO_RECORDS: NDArray[np.uint8] = np.empty(0, np.uint8)
 
 
-
-
-class ClusteredScene:
+class ClusteredMesh:
     """A mesh in clusters behind a view with a `transform`; triangle 0 is called `first_id` where it is drawn."""
 
     def __init__(self, clusters: Clusters, view: View, first_id: int = 0) -> None:
@@ -39,9 +37,9 @@ class ClusteredScene:
         self._matrix = as_matrix(view.transform, clusters.points.dtype)  # type: ignore[arg-type]
         self._exact = self._matrix.astype(np.float64)
         self._is_affine = choices.is_affine(self._matrix)
-        self._engine_view = view.engine_view()
+        self._viewport = view.engine_viewport()
         self._own = self._source_of(clusters.own_points)
-        self._empty = self._scene_of(self._own, NO_RECORDS, clusters.corners[:0], None)
+        self._empty = self._snapped(self._own, NO_RECORDS, clusters.triangles[:0], None)
 
     def survey(self, n_most: int = SURVEYED) -> Survey:
         """Return what becomes of the clusters, by some of them: outside, turned away, and so on."""
@@ -60,7 +58,7 @@ class ClusteredScene:
         is_first: bool = True,
         is_last: bool = True,
     ) -> NDArray[np.int32]:
-        """Draw rows [first, end) of a target that the first of several scenes clears and the last one finishes.
+        """Draw rows [first, end) of a target that the first of several meshes clears and the last one finishes.
 
         Returns the triangles that are still to be drawn: the planes of clip space may cut them, or they do not fit.
         """
@@ -87,41 +85,41 @@ class ClusteredScene:
     ) -> tuple[NDArray[np.int32], int]:
         """Return what is still to be drawn, and how many clusters were."""
         clusters = self.clusters
-        scene = self._empty if sample == (0, 0) else self._empty.seen_from(*sample)
+        empty = self._empty if sample == (0, 0) else self._empty.seen_from(*sample)
         is_farthest = target.sink == Sink.FARTHEST
-        seen = clusters.seen_in(self._exact, scene, first, end, self._view.size[0], is_farthest=is_farthest)
+        seen = clusters.seen_in(self._exact, empty, first, end, self._view.size[0], is_farthest=is_farthest)
         room: NDArray[np.int32] = memory.empty("clusters", (3 * len(clusters) + 1,), np.int32)
         others: NDArray[np.int32] = memory.empty("others", (clusters.n_triangles + 1,), np.int32)
         may_be_hidden = is_farthest or target.sink == Sink.NEAREST
         place = target, first, end - first, room, others
-        n_others, _, n_drawn = clusters.engine.draw(scene, self._own, seen, may_be_hidden, *place, is_first, is_last)
+        n_others, _, n_drawn = clusters.engine.draw(empty, self._own, seen, may_be_hidden, *place, is_first, is_last)
         return others[:n_others].copy(), n_drawn
 
-    def part(self, *triangles: NDArray[np.int32]) -> _engine.Scene:
+    def part(self, *triangles: NDArray[np.int32]) -> _engine.SnappedMesh:
         """Return the mesh with what some triangles use snapped, maybe more; -1 is no triangle."""
-        points, corners, view = self.clusters.points, self.clusters.corners, self._view
-        scene = None
+        points, own, view = self.clusters.points, self.clusters.triangles, self._view
+        mesh = None
         if choices.pays_to_snap_all(len(points), view.size[0] * view.size[1]):
-            scene = self.try_part(None, FreshMemory())
-        if scene is None:
-            scene = self.try_part(triangles, FreshMemory())
-        if scene is None:  # a vertex beside one of them, which need not be used, does not fit
-            scene = snap_scene(FreshMemory(), points, corners, view, with_depth=True, out=None).scene
-        return scene
+            mesh = self.try_part(None, FreshMemory())
+        if mesh is None:
+            mesh = self.try_part(triangles, FreshMemory())
+        if mesh is None:  # a vertex beside one of them, which need not be used, does not fit
+            mesh = snap_mesh(FreshMemory(), points, own, view, with_depth=True, out=None).mesh
+        return mesh
 
-    def try_part(self, triangles: Sequence[NDArray[np.int32]] | None, memory: Memory) -> _engine.Scene | None:
+    def try_part(self, triangles: Sequence[NDArray[np.int32]] | None, memory: Memory) -> _engine.SnappedMesh | None:
         """Return the mesh with what some triangles use snapped; None where a vertex does not fit or is not finite.
 
         Without triangles: with all vertices snapped, or None where a clip plane may cut a triangle, too.
         """
-        points, corners = self.clusters.points, self.clusters.corners
+        points, own = self.clusters.points, self.clusters.triangles
         source = self._source_of(points)
         is_used: NDArray[np.uint8] = np.full(len(points) // _engine.BLOCK + 1, triangles is None, np.uint8)
         ids = [np.ascontiguousarray(array, np.int32).ravel() for array in triangles or ()]
         for array in ids:
-            _engine.mark_vertices(array, corners, is_used)
+            _engine.mark_vertices(array, own, is_used)
         records: NDArray[np.uint8] = memory.empty("records", (len(points) * _engine.VERTEX_BYTES,), np.uint8)
-        bad, wide, clipped = source.project_blocks(is_used, self._engine_view, records)
+        bad, wide, clipped = source.project_blocks(is_used, self._viewport, records)
         if bad or wide or (clipped and triangles is None):
             return None
         pieces = None
@@ -129,70 +127,67 @@ class ClusteredScene:
             cut = np.empty(sum(map(len, ids)), np.int32)
             n_cut = 0
             for array in ids:
-                n_cut += _engine.list_cut(array, corners, records, cut[n_cut:])
-            pieces = _engine.Pieces(source, records, corners, self._engine_view, np.unique(cut[:n_cut]))
-        return self._scene_of(source, records, corners, pieces, is_used)
+                n_cut += _engine.list_cut(array, own, records, cut[n_cut:])
+            pieces = _engine.Pieces(source, records, own, self._viewport, np.unique(cut[:n_cut]))
+        return self._snapped(source, records, own, pieces, is_used)
 
     def _source_of(self, points: NDArray[Any]) -> _engine.Source:
         return _engine.Source(points, self._matrix, self._is_affine)
 
-    def _scene_of(
+    def _snapped(
         self,
         source: _engine.Source,
         records: NDArray[np.uint8],
-        corners: NDArray[np.int32],
+        triangles: NDArray[np.int32],
         pieces: _engine.Pieces | None,
         is_used: NDArray[np.uint8] | None = None,
-    ) -> _engine.Scene:
-        view = self._view
-        how = (*view.origin, view.grid_bits, view.cull, view.method, view.test)
-        scene = _engine.Scene(source, records, None, corners, pieces, *how, self._engine_view, is_used)
-        return scene.numbered_from(self._first_id)
+    ) -> _engine.SnappedMesh:
+        how, viewport = self._view.how, self._viewport
+        mesh = _engine.SnappedMesh(source, records, None, triangles, pieces, how, viewport, is_used)
+        return mesh.numbered_from(self._first_id)
 
 
 def draw_clustered(
     memories: Sequence[Memory],
-    scenes: Sequence[ClusteredScene],
+    meshes: Sequence[ClusteredMesh],
     target: _engine.Target,
     height: int,
     sample: tuple[int, int] = (0, 0),
 ) -> bool:
-    """Clear a target and draw scenes, a thread for each memory.
+    """Clear a target and draw meshes, a thread for each memory.
 
     Returns False, with the target in any state, where a vertex does not fit or is not finite: the whole meshes are then
     to be drawn, which tells why.
     """
-    n_parts, last = min(height, len(memories)), len(scenes) - 1
+    n_parts, last = min(height, len(memories)), len(meshes) - 1
 
     def draw_rows(i: int, _: int) -> list[NDArray[np.int32]]:
         rows = height * i // n_parts, height * (i + 1) // n_parts
         return [
-            scene.draw_rows(
-                memories[i], target, *rows, sample=sample, is_first=k == 0, is_last=k == last
-            )
-            for k, scene in enumerate(scenes)
+            mesh.draw_rows(memories[i], target, *rows, sample=sample, is_first=k == 0, is_last=k == last)
+            for k, mesh in enumerate(meshes)
         ]
 
     found = zip(*run_parts(draw_rows, n_parts, n_parts), strict=True)
-    for scene, parts in zip(scenes, found, strict=True):
+    for mesh, parts in zip(meshes, found, strict=True):
         if not any(map(len, parts)):
             continue
         others = np.unique(np.concatenate(parts))
-        if not draw_others(memories, scene, others, target, height, sample):
+        if not draw_others(memories, mesh, others, target, height, sample):
             return False
     return True
 
 
 def draw_others(
     memories: Sequence[Memory],
-    scene: ClusteredScene,
+    mesh: ClusteredMesh,
     triangles: NDArray[np.int32],
     target: _engine.Target,
     height: int,
     sample: tuple[int, int],
 ) -> bool:
-    """Draw some triangles of a scene over what is there; returns as `draw_clustered` does."""
-    part = scene.try_part([triangles], memories[0])
+    """Draw some triangles of a mesh over what is there; returns as `draw_clustered` does."""
+    part = mesh.try_part([triangles], memories[0])
     if part is None:
         return False
     seen = part.seen_from(*sample)

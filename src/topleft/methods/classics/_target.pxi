@@ -7,7 +7,7 @@
 from libc.math cimport floor
 from libc.stdint cimport int32_t, int64_t, uint8_t
 
-cdef enum:  # Sink in models.py
+cdef enum:  # Sink in options.py
     MASK = 0
     COUNT = 1
     LABEL = 2

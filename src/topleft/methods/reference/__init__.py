@@ -10,6 +10,12 @@ Microsoft, Direct3D 11.3 Functional Specification, 2015 (top-left rule);
 I. E. Sutherland, G. W. Hodgman, Reentrant Polygon Clipping, 1974, and J. F. Blinn, M. E. Newell, Clipping Using
 Homogeneous Coordinates, 1978 (clip before the divide);
 P. S. Heckbert, H. P. Moreton, Interpolation for Polygon Texture Mapping and Shading, 1991 (perspective weights).
+
+area.py       cuts each triangle to each pixel square: exact areas
+blend.py      blends a colour into a pixel
+lines.py      draws the edges of a mesh as lines
+peel.py       sorts the layers of each pixel, and composites them
+sampling.py   draws several samples a pixel, and conservative coverage
 """
 
 from __future__ import annotations
@@ -157,9 +163,9 @@ class Projection(NamedTuple):
                 if d_here >= 0:
                     walked.append(here)
                 if d_here >= 0 > d_there:
-                    walked.append(self.put_on_plane(_cut(here, there, d_here, d_there), k))
+                    walked.append(self.put_on_plane(cut(here, there, d_here, d_there), k))
                 elif d_there >= 0 > d_here:
-                    walked.append(self.put_on_plane(_cut(there, here, d_there, d_here), k))
+                    walked.append(self.put_on_plane(cut(there, here, d_there, d_here), k))
             polygon = walked
         return polygon
 
@@ -187,7 +193,7 @@ class Projection(NamedTuple):
         return Vertex(snap([(x_px, y_px)], self.subpixel_bits)[0], z_px, w, p[4:])
 
 
-def _cut(a: Position, b: Position, da: float, db: float) -> Position:
+def cut(a: Position, b: Position, da: float, db: float) -> Position:
     """Return the cut between the inside end a and the outside end b, the same bits for all who share the edge."""
     of_a, of_b = -db / (da - db), da / (da - db)
     return tuple(p * of_a + q * of_b for p, q in zip(a, b, strict=True))

@@ -1,4 +1,4 @@
-# Snapped triangles, and what is drawn and resolved of them. Included by _engine.pyx.
+# Snapped triangles, and the passes that draw them: whole, by bands of rows, in layers.
 
 
 cdef inline tl_share no_share() noexcept nogil:
@@ -8,75 +8,81 @@ cdef inline tl_share no_share() noexcept nogil:
     return share
 
 
-cdef class Scene:
+cdef class SnappedMesh:
     """Snapped vertices and triangles, ready to be drawn or resolved; keeps what it points to alive."""
 
-    cdef tl_scene scene
+    cdef tl_scene snapped
     cdef int64_t x_px, y_px
     cdef readonly int subpixel_bits
     cdef tl_test test
     cdef object arrays
-    cdef readonly View view
+    cdef readonly Viewport viewport
     cdef const uint8_t[::1] is_used  # the blocks of vertices that have been snapped; None: all
 
     def __init__(
         self, Source source, const uint8_t[::1] records, const int64_t[:, ::1] wide, const int32_t[:, ::1] triangles,
-        Pieces pieces, int64_t x_px, int64_t y_px, int subpixel_bits, int cull, int method, int test=0, View view=None,
-        const uint8_t[::1] is_used=None,
+        Pieces pieces, how, Viewport viewport, const uint8_t[::1] is_used=None,
     ):
-        self.view, self.is_used = view, is_used
+        """`how`: that of a view, see `topleft._raster.view.How`."""
+        cdef int test
+        self.viewport, self.is_used = viewport, is_used
         self.arrays = (source, records, wide, triangles, pieces)
-        self.scene.mesh.vertices = <const tl_vertex *>data(records)
-        self.scene.mesh.wide = <const tl_wide *>&wide[0, 0] if wide is not None and wide.shape[0] else NULL
-        self.scene.mesh.inv_w = NULL
-        self.scene.mesh.source = &source.source if source.is_clip_space else NULL
-        self.scene.mesh.n_vertices = records.shape[0] // <int64_t>sizeof(tl_vertex)
-        self.scene.n_triangles = triangles.shape[0]
-        self.scene.triangles = &triangles[0, 0] if triangles.shape[0] else NULL
-        self.scene.pieces = &pieces.pieces if pieces is not None and len(pieces) else NULL
-        self.scene.cull, self.scene.method, self.scene.first_id, self.scene.names = cull, method, 0, NULL
-        self.x_px, self.y_px, self.subpixel_bits, self.test = x_px, y_px, subpixel_bits, test
+        self.snapped.mesh.vertices = <const tl_vertex *>data(records)
+        self.snapped.mesh.wide = <const tl_wide *>&wide[0, 0] if wide is not None and wide.shape[0] else NULL
+        self.snapped.mesh.inv_w = NULL
+        self.snapped.mesh.source = &source.source if source.is_clip_space else NULL
+        self.snapped.mesh.n_vertices = records.shape[0] // <int64_t>sizeof(tl_vertex)
+        self.snapped.n_triangles = triangles.shape[0]
+        self.snapped.triangles = &triangles[0, 0] if triangles.shape[0] else NULL
+        self.snapped.pieces = &pieces.pieces if pieces is not None and len(pieces) else NULL
+        self.snapped.first_id, self.snapped.names = 0, NULL
+        self.x_px, self.y_px, self.subpixel_bits, self.snapped.cull, self.snapped.method, test = how
+        self.test = <tl_test>test
 
     def seen_from(self, int32_t x_fx, int32_t y_fx):
-        """Return the same scene with its samples off the centres of the pixels, in sub-pixels."""
-        cdef Scene seen = self.copy()
-        seen.scene.mesh.sample_x_fx, seen.scene.mesh.sample_y_fx = x_fx, y_fx
+        """Return the same mesh with its samples off the centres of the pixels, in sub-pixels."""
+        cdef SnappedMesh seen = self.copy()
+        seen.snapped.mesh.sample_x_fx, seen.snapped.mesh.sample_y_fx = x_fx, y_fx
         return seen
 
     def numbered_from(self, int32_t first_id):
-        """Return the same scene with other ids in the buffers that `draw` fills: triangle 0 is called `first_id`."""
-        cdef Scene named = self.copy()
-        named.scene.first_id = first_id
+        """Return the same mesh with other ids in the buffers that `draw` fills: triangle 0 is called `first_id`."""
+        cdef SnappedMesh named = self.copy()
+        named.snapped.first_id = first_id
         return named
 
     def moved(self, int64_t x_px, int64_t y_px):
-        """Return the same scene behind a window that begins x_px columns and y_px rows later."""
-        cdef Scene part = self.copy()
+        """Return the same mesh behind a window that begins x_px columns and y_px rows later."""
+        cdef SnappedMesh part = self.copy()
         part.x_px += x_px
         part.y_px += y_px
         return part
 
     def with_inverse_w(self, int64_t n_pixels):
-        """Return the same scene with 1/w of all vertices at hand, if so many pixels ask for enough of them."""
-        cdef const tl_source *source = self.scene.mesh.source
+        """Return the same mesh with 1/w of all vertices at hand, if so many pixels ask for enough of them."""
+        cdef const tl_source *source = self.snapped.mesh.source
         cdef double[::1] inv_w
-        cdef Scene other
-        if source == NULL or source.is_affine or self.scene.mesh.inv_w != NULL or self.scene.mesh.n_vertices > 2 * n_pixels:
+        cdef SnappedMesh other
+        if source == NULL or source.is_affine or self.snapped.mesh.inv_w != NULL or self.snapped.mesh.n_vertices > 2 * n_pixels:
             return self
-        inv_w = np.empty(max(1, self.scene.mesh.n_vertices))
+        inv_w = np.empty(max(1, self.snapped.mesh.n_vertices))
         with nogil:
-            K.inverse_w(source, 0, self.scene.mesh.n_vertices, &inv_w[0])
+            K.inverse_w(source, 0, self.snapped.mesh.n_vertices, &inv_w[0])
         other = self.copy()
-        other.scene.mesh.inv_w = &inv_w[0]
+        other.snapped.mesh.inv_w = &inv_w[0]
         other.arrays = (self.arrays, inv_w)
         return other
 
-    cdef Scene copy(self):
-        cdef Scene other = Scene.__new__(Scene)
-        other.scene, other.arrays = self.scene, self.arrays
+    cdef SnappedMesh copy(self):
+        cdef SnappedMesh other = SnappedMesh.__new__(SnappedMesh)
+        other.snapped, other.arrays = self.snapped, self.arrays
         other.x_px, other.y_px, other.subpixel_bits, other.test = self.x_px, self.y_px, self.subpixel_bits, self.test
-        other.view, other.is_used = self.view, self.is_used
+        other.viewport, other.is_used = self.viewport, self.is_used
         return other
+
+    cdef const tl_view *clip_view(self) noexcept nogil:
+        """How clip space maps to pixels; NULL where vertices are in pixels."""
+        return &self.viewport.view if self.viewport is not None else NULL
 
     cdef tl_window window(self, int64_t first_row, int64_t n_rows, int64_t width) noexcept nogil:
         cdef tl_window w
@@ -90,17 +96,17 @@ cdef class Scene:
         From the boxes and areas of up to 128 of them; one with a vertex that is wide or outside of a clip plane counts as
         if it covered the picture.
         """
-        cdef const tl_vertex *v = self.scene.mesh.vertices
+        cdef const tl_vertex *v = self.snapped.mesh.vertices
         cdef const tl_vertex *a
         cdef const tl_vertex *b
         cdef const tl_vertex *c
-        cdef int64_t n = min(self.scene.n_triangles, 128), i, n_seen = 0, last = self.scene.mesh.n_vertices - 1
+        cdef int64_t n = min(self.snapped.n_triangles, 128), i, n_seen = 0, last = self.snapped.mesh.n_vertices - 1
         cdef const int32_t *t
         cdef double unit = 2.0**self.subpixel_bits, area, total = 0, n_rows = 0, n_pixels = <double>width * height
         cdef double left = self.x_px * unit, top = self.y_px * unit, cols, rows, each
         cdef double right = (self.x_px + width) * unit, bottom = (self.y_px + height) * unit
         for i in range(n):
-            t = self.scene.triangles + 3 * (i * self.scene.n_triangles // n)
+            t = self.snapped.triangles + 3 * (i * self.snapped.n_triangles // n)
             if not (0 <= t[0] <= last and 0 <= t[1] <= last and 0 <= t[2] <= last):
                 return 0.0, 0.0, 0.0  # an error that draw finds
             a, b, c = &v[t[0]], &v[t[1]], &v[t[2]]
@@ -120,7 +126,7 @@ cdef class Scene:
             total += min(0.5 * abs(area), cols * rows) / (unit * unit)
         if not n or not n_pixels:
             return 0.0, 0.0, 0.0
-        each = self.scene.n_triangles / <double>n
+        each = self.snapped.n_triangles / <double>n
         return n_seen * each, total * each / n_pixels, n_rows * each
 
     def count_classes(self, int sink, int64_t width, int64_t height, const int32_t[:, ::1] samples=None):
@@ -138,11 +144,11 @@ cdef class Scene:
         if samples is not None:
             target.samples_fx, target.sample_bits = &samples[0, 0], samples.shape[0].bit_length() - 1
         with nogil:
-            bad_row = K.count_classes(&self.scene, &window, &target, &census)
+            bad_row = K.count_classes(&self.snapped, &window, &target, &census)
         return bad_row, [(census.n[k], census.boxes[k], census.covered[k]) for k in range(TL_N_CLASSES)]
 
     def draw(self, Target target, int64_t first_row, int64_t n_rows, bint is_first=True, bint is_last=True):
-        """Draw rows of a picture, which the first of several scenes clears and the last one finishes.
+        """Draw rows of a picture, which the first of several meshes clears and the last one finishes.
 
         Returns -1, or a number that is not negative when a triangle has an index outside the vertices.
         """
@@ -150,9 +156,9 @@ cdef class Scene:
         cdef tl_window window = self.window(first_row, n_rows, target.width)
         cdef tl_share share = no_share()
         cdef int64_t bad_row
-        share.first, share.end, share.is_first, share.is_last = 0, self.scene.n_triangles, is_first, is_last
+        share.first, share.end, share.is_first, share.is_last = 0, self.snapped.n_triangles, is_first, is_last
         with nogil:
-            bad_row = K.draw(&self.scene, &window, &rows, &share)
+            bad_row = K.draw(&self.snapped, &window, &rows, &share)
         return bad_row
 
     def draw_share(self, Target target, int64_t first_row, int64_t n_rows, int64_t first, int32_t[::1] others):
@@ -167,7 +173,7 @@ cdef class Scene:
         share.others, share.picture = &others[0], &picture
         share.first, share.end, share.is_first, share.is_last = first, first + others.shape[0] - 16, True, False
         with nogil:
-            bad_row = K.draw(&self.scene, &window, &rows, &share)
+            bad_row = K.draw(&self.snapped, &window, &rows, &share)
         return bad_row, share.n_others
 
     def draw_listed(self, Target target, int64_t first_row, int64_t n_rows, const int32_t[::1] ids, bint is_last):
@@ -178,7 +184,7 @@ cdef class Scene:
         share.ids = &ids[0] if ids.shape[0] else NULL
         share.first, share.end, share.is_first, share.is_last = 0, ids.shape[0], False, is_last
         with nogil:
-            K.draw(&self.scene, &window, &rows, &share)
+            K.draw(&self.snapped, &window, &rows, &share)
 
     def draw_area(self, float[:, ::1] pixels, uint8_t[::1] cells, int64_t first_row, int64_t n_rows, bint is_wide, bint is_clamped):
         """Write the area that triangles cover of the pixels in rows [first_row, first_row + n_rows).
@@ -193,7 +199,7 @@ cdef class Scene:
         target.pixels, target.stride_px, target.cells = &pixels[first_row, 0], pixels.shape[1], &cells[0]
         target.is_wide, target.is_clamped = is_wide, is_clamped
         with nogil:
-            status = K.draw_area(&self.scene, &window, &target)
+            status = K.draw_area(&self.snapped, &window, &target)
         return status
 
     def paint(self, const int32_t[:, ::1] labels, const uint8_t[::1] colors, uint8_t[::1] pixels, int64_t first_row, int64_t n_rows,
@@ -202,14 +208,14 @@ cdef class Scene:
         cdef int64_t width = labels.shape[1]
         cdef int pixel_bytes = n_channels if is_u8 else 4 * n_channels
         cdef tl_window window = self.window(first_row, n_rows, width)
-        if width == 0 or n_rows == 0 or self.scene.n_triangles == 0:
+        if width == 0 or n_rows == 0 or self.snapped.n_triangles == 0:
             return
         with nogil:
             if is_flat:
                 K.paint_flat(&labels[first_row, 0], n_rows * width, <const uint8_t *>data(colors), pixel_bytes,
                              &pixels[first_row * width * pixel_bytes])
             else:
-                K.paint_gouraud(&self.scene, &window, &labels[first_row, 0], data(colors), n_channels, is_u8,
+                K.paint_gouraud(&self.snapped, &window, &labels[first_row, 0], data(colors), n_channels, is_u8,
                                 &pixels[first_row * width * pixel_bytes])
 
     def blend(self, uint8_t[::1] pixels, int64_t width, int64_t first_row, int64_t n_rows, const uint8_t[::1] colors, int n_channels,
@@ -222,7 +228,7 @@ cdef class Scene:
         cdef tl_window window = self.window(first_row, n_rows, width)
         cdef int pixel_bytes = n_channels if is_u8 else 4 * n_channels
         cdef int64_t bad_row
-        if width == 0 or n_rows == 0 or self.scene.n_triangles == 0:
+        if width == 0 or n_rows == 0 or self.snapped.n_triangles == 0:
             return -1
         canvas.pixels, canvas.stride_px = &pixels[first_row * width * pixel_bytes], width
         canvas.colors, canvas.n_channels, canvas.is_u8, canvas.is_flat = data(colors), n_channels, is_u8, is_flat
@@ -231,7 +237,7 @@ cdef class Scene:
         canvas.packed = &packed[first_row * width] if packed is not None else NULL
         canvas.cells = &cells[0] if cells is not None else NULL
         with nogil:
-            bad_row = K.blend(&self.scene, &window, &canvas)
+            bad_row = K.blend(&self.snapped, &window, &canvas)
         return bad_row
 
     def barycentric(self, const int32_t[:, ::1] ids, float[:, :, ::1] out):
@@ -239,7 +245,7 @@ cdef class Scene:
         cdef tl_window window = self.window(0, ids.shape[0], ids.shape[1])
         if ids.shape[0] and ids.shape[1]:
             with nogil:
-                K.barycentric(&self.scene, &window, &ids[0, 0], &out[0, 0, 0])
+                K.barycentric(&self.snapped, &window, &ids[0, 0], &out[0, 0, 0])
 
     def interpolate(self, const int32_t[:, ::1] ids, const float[:, ::1] values, bint per_corner, float background,
                     float[:, :, ::1] out):
@@ -248,5 +254,92 @@ cdef class Scene:
         cdef int n_values = out.shape[2]
         if ids.shape[0] and ids.shape[1] and n_values:
             with nogil:
-                K.interpolate(&self.scene, &window, &ids[0, 0], &values[0, 0] if values.shape[0] else NULL, n_values,
+                K.interpolate(&self.snapped, &window, &ids[0, 0], &values[0, 0] if values.shape[0] else NULL, n_values,
                               per_corner, background, &out[0, 0, 0])
+
+
+cdef class Bins:
+    """The triangles that reach into each band of 2**band_bits rows of a picture."""
+
+    cdef tl_bins bins
+    cdef int64_t[::1] starts
+    cdef int32_t[::1] listed
+    cdef object room
+    cdef readonly int band_bits
+    cdef readonly int64_t bad_row, n_bands, n_listed
+
+    def __init__(self, SnappedMesh mesh, int64_t height, int64_t width, int32_t reach_fx, int band_bits, int32_t[:, ::1] room):
+        """`room`: (3, n_triangles + 16). `bad_row` is -1, or a triangle has an index outside the vertices."""
+        cdef tl_window window = mesh.window(0, height, width)
+        self.room, self.band_bits, self.n_bands = room, band_bits, (height + (1 << band_bits) - 1) >> band_bits
+        self.starts = np.empty(self.n_bands + 2, np.int64)
+        self.bins.n = self.n_listed = 0
+        self.bins.ids, self.bins.first_band, self.bins.last_band = &room[0, 0], &room[1, 0], &room[2, 0]
+        with nogil:
+            self.bad_row = K.bin(&mesh.snapped, &window, reach_fx, band_bits, &self.bins)
+            if self.bad_row < 0:
+                K.list_bins(&self.bins, self.n_bands, &self.starts[0], NULL)
+                self.n_listed = self.starts[self.n_bands + 1]
+
+    def fill(self, int32_t[::1] listed):
+        """Sort the triangles into `listed`, which has room for `n_listed` and one more."""
+        self.listed = listed
+        with nogil:
+            K.list_bins(&self.bins, self.n_bands, &self.starts[0], &listed[0])
+
+
+def draw_bands(meshes, targets, Bins bins, int64_t first_band, int64_t end_band):
+    """Clear and draw bands of several pictures, a mesh each, one band of all after the other."""
+    cdef SnappedMesh mesh
+    cdef Target target
+    cdef tl_target rows
+    cdef tl_window window
+    cdef tl_share share = no_share()
+    cdef int64_t band, first_row
+    cdef list pairs = list(zip(meshes, targets, strict=True))
+    share.is_first = share.is_last = True
+    for band in range(first_band, end_band):
+        first_row = band << bins.band_bits
+        share.ids = &bins.listed[0] + bins.starts[band]
+        share.end = bins.starts[band + 1] - bins.starts[band]
+        for mesh, target in pairs:
+            rows = target.rows(first_row)
+            window = mesh.window(first_row, min(<int64_t>1 << bins.band_bits, target.height - first_row), target.width)
+            with nogil:
+                K.draw(&mesh.snapped, &window, &rows, &share)
+
+
+def peel(meshes, bins, int32_t[:, :, ::1] ids, float[:, :, ::1] depth, bint is_farthest, int band_bits,
+         int64_t first_band, int64_t end_band):
+    """Write the nearest layers of all meshes together, as planes (K, H, W), in bands of 2**band_bits rows.
+
+    `bins`: those of each mesh, or None, where a band is to look at all triangles. Returns as `SnappedMesh.draw` does.
+    """
+    cdef tl_peeled peeled
+    cdef tl_target target
+    cdef tl_window window
+    cdef tl_share share = no_share()
+    cdef SnappedMesh mesh
+    cdef Bins own
+    cdef int64_t band, first_row, height = ids.shape[1], width = ids.shape[2], bad_row = -1
+    cdef list pairs = list(zip(meshes, bins, strict=True))
+    cdef int64_t i, n = len(pairs)
+    peeled.n_layers, peeled.is_farthest = ids.shape[0], is_farthest
+    peeled.plane_px = height * width
+    memset(&target, 0, sizeof(target))
+    target.sink, target.stride_px, target.peeled = <tl_sink>TL_SINK_PEEL, width, &peeled
+    for band in range(first_band, end_band):
+        first_row = band << band_bits
+        peeled.ids, peeled.depth = &ids[0, first_row, 0], &depth[0, first_row, 0]
+        for i in range(n):
+            mesh, own = pairs[i]
+            share.ids, share.end = NULL, mesh.snapped.n_triangles
+            if own is not None:
+                share.ids, share.end = &own.listed[0] + own.starts[band], own.starts[band + 1] - own.starts[band]
+            share.is_first, share.is_last = i == 0, i == n - 1
+            window = mesh.window(first_row, min(<int64_t>1 << band_bits, height - first_row), width)
+            with nogil:
+                bad_row = K.draw(&mesh.snapped, &window, &target, &share)
+            if bad_row >= 0:
+                return bad_row
+    return bad_row

@@ -1,0 +1,211 @@
+# Writes pixels that are not found by drawing triangles: means of samples, colours of layers, points, planes, lines.
+
+
+cdef class Transfer:
+    """What is averaged of colours with several samples a pixel: their light, or as much of them as their alpha tells."""
+
+    cdef tl_transfer transfer
+    cdef object arrays
+
+    def __init__(self, tables, int n_channels, bint is_straight):
+        cdef const int32_t[::1] decode
+        cdef const uint8_t[::1] encode
+        self.transfer.n_channels, self.transfer.is_straight = n_channels, is_straight
+        if tables is not None:
+            decode, encode = self.arrays = tables
+            self.transfer.decode, self.transfer.encode = &decode[0], &encode[0]
+
+
+cdef class Palette:
+    """The colours of triangles, (T[, C]) uint8 or float32, and how those of samples become one."""
+
+    cdef const uint8_t[::1] colors
+    cdef int n_channels
+    cdef bint is_u8
+    cdef Transfer transfer
+
+    def __init__(self, colors, Transfer transfer):
+        self.n_channels, self.is_u8, self.transfer = 1 if colors.ndim == 1 else colors.shape[1], colors.dtype == np.uint8, transfer
+        if self.is_u8:  # four bytes a colour, aligned
+            wide = np.zeros(max(1, len(colors)), np.int32)
+            wide.view(np.uint8).reshape(-1, 4)[: len(colors), : self.n_channels] = colors.reshape(len(colors), -1)
+            colors = wide
+        self.colors = as_bytes(colors)
+
+    cdef void mean(self, const int32_t *labels, int sample_bits, int64_t stride, int64_t n, uint8_t *pixels, int64_t first) noexcept nogil:
+        """Write the means of n pixels from the first on: planes of labels lie `stride` apart."""
+        cdef const tl_transfer *own = NULL if self.transfer is None else &self.transfer.transfer
+        K.mean_flat(labels, sample_bits, stride, n, data(self.colors), self.n_channels, self.is_u8, own,
+                    &pixels[first * self.n_channels * (1 if self.is_u8 else 4)])
+
+    def mean_flat(self, const int32_t[:, :, ::1] labels, pixels, int64_t first_row, int64_t n_rows):
+        """Write the mean colour of the triangles that the samples see over rows of pixels; labels (S, H, W)."""
+        cdef uint8_t[::1] flat = as_bytes(pixels)
+        cdef int64_t width = labels.shape[2]
+        cdef int sample_bits = int(labels.shape[0]).bit_length() - 1
+        if n_rows and width and self.colors.shape[0]:
+            with nogil:
+                self.mean(&labels[0, first_row, 0], sample_bits, labels.shape[1] * width, n_rows * width, &flat[0], first_row * width)
+
+
+def fill_bands(meshes, int32_t[:, ::1] labels, Palette palette, pixels, Bins bins, int64_t first_band, int64_t end_band):
+    """Write the mean colours of samples over bands of (H, W[, C]) pixels: `meshes` is the mesh as each of them sees it.
+
+    `labels`: memory for those of a band, (S, rows * W).
+    """
+    cdef tl_scene seen[16]
+    cdef SnappedMesh mesh
+    cdef tl_target target
+    cdef tl_window window
+    cdef tl_share share = no_share()
+    cdef uint8_t[::1] flat = as_bytes(pixels)
+    cdef int k, n_samples = len(meshes), sample_bits = int(len(meshes)).bit_length() - 1
+    cdef int64_t band, first_row, n_rows, height = pixels.shape[0], width = pixels.shape[1]
+    for k in range(n_samples):
+        mesh = meshes[k]
+        seen[k] = mesh.snapped
+    memset(&target, 0, sizeof(target))
+    target.sink, target.stride_px = <tl_sink>LABEL, width
+    share.is_first = share.is_last = True
+    with nogil:
+        for band in range(first_band, end_band):
+            first_row = band << bins.band_bits
+            n_rows = min(<int64_t>1 << bins.band_bits, height - first_row)
+            window = mesh.window(first_row, n_rows, width)
+            share.ids = &bins.listed[0] + bins.starts[band]
+            share.end = bins.starts[band + 1] - bins.starts[band]
+            for k in range(n_samples):
+                target.pixels = &labels[k, 0]
+                K.draw(&seen[k], &window, &target, &share)
+            palette.mean(&labels[0, 0], sample_bits, labels.shape[1], n_rows * width, &flat[0], first_row * width)
+
+
+def mean_colors(painted, pixels, int64_t first_row, int64_t n_rows, int n_channels, Transfer transfer):
+    """Write the mean of planes of colours (S, H, W[, C]) over rows of pixels."""
+    cdef const uint8_t[::1] planes = as_bytes(painted)
+    cdef uint8_t[::1] flat = as_bytes(pixels)
+    cdef int is_u8 = painted.dtype == np.uint8
+    cdef int64_t height = painted.shape[1], width = painted.shape[2], first
+    cdef int sample_bits = int(painted.shape[0]).bit_length() - 1
+    cdef const tl_transfer *own = NULL if transfer is None else &transfer.transfer
+    first = first_row * width * n_channels * (1 if is_u8 else 4)
+    if n_rows and width:
+        with nogil:
+            K.mean_colors(&planes[first], sample_bits, height * width, n_rows * width, n_channels, is_u8, own, &flat[first])
+
+
+def composite(const int32_t[:, :, ::1] ids, int64_t first_row, int64_t n_rows, const uint8_t[::1] colors, bint is_flat, bint is_u8,
+              int n_channels, const float[::1] background, uint8_t[::1] pixels):
+    """Write what is seen through layers, planes (K, H, W), in rows [first_row, first_row + n_rows) of a picture.
+
+    `colors`: of the triangles, or of the layers of these rows, (K, n_rows, W, n_channels) float32. `background` may be None.
+    """
+    cdef tl_composite layers
+    cdef int64_t width = ids.shape[2], n = n_rows * width
+    cdef int pixel_bytes = n_channels if is_u8 else 4 * n_channels
+    if n == 0:
+        return
+    layers.ids, layers.plane_px, layers.n_layers = &ids[0, first_row, 0], ids.shape[1] * width, ids.shape[0]
+    layers.n_channels, layers.is_u8, layers.is_flat, layers.colors = n_channels, is_u8, is_flat, data(colors)
+    layers.background = &background[0] if background is not None else NULL
+    with nogil:
+        K.composite(&layers, n, &pixels[first_row * width * pixel_bytes])
+
+
+cdef class Points:
+    """What `tl_points` holds: positions of vertices, and what is told of a point."""
+
+    cdef tl_points points
+    cdef object array
+
+    def __init__(self, positions, int kind, const double[:, ::1] rows, half_size, double background, bint is_f64_out):
+        """`positions`: (V, 3) float32 or float64; `rows`: (N, 4); `half_size`: half of width and height of the whole picture."""
+        cdef const uint8_t[::1] raw = as_bytes(positions)
+        cdef int i, k
+        self.array = raw
+        self.points.positions, self.points.is_f64 = data(raw), positions.dtype == np.float64
+        self.points.kind, self.points.n_rows, self.points.background = <tl_point_kind>kind, rows.shape[0], background
+        self.points.half_width_px, self.points.half_height_px = half_size
+        self.points.is_f64_out = is_f64_out
+        for i in range(rows.shape[0]):
+            for k in range(4):
+                self.points.rows[i][k] = rows[i, k]
+
+    def fill(self, SnappedMesh mesh, const int32_t[:, ::1] ids, out, int64_t first_row, int64_t n_rows):
+        """Write rows of what is told of the pixels of a visibility buffer, (H, W) or (H, W, C)."""
+        cdef tl_window window = mesh.window(first_row, n_rows, ids.shape[1])
+        cdef uint8_t[::1] flat
+        if n_rows and ids.shape[1]:
+            flat = as_bytes(out[first_row:first_row + n_rows])
+            with nogil:
+                K.fill_points(&mesh.snapped, &window, &self.points, &ids[first_row, 0], &flat[0])
+
+
+PLANE_DOUBLES = TL_PLANE_DOUBLES
+
+
+cdef class Valued:
+    """Triangles with a value at each point."""
+
+    cdef tl_valued mesh
+    cdef object arrays
+
+    def __init__(self, const double[:, ::1] points_px, const int32_t[:, ::1] triangles, const double[::1] values,
+                 double[::1] planes=None):
+        """`planes`: (1 + n_triangles) * PLANE_DOUBLES, for `list_planes`."""
+        self.arrays = (points_px, triangles, values, planes)
+        self.mesh.points_px = &points_px[0, 0] if points_px.shape[0] else NULL
+        self.mesh.values = &values[0] if values.shape[0] else NULL
+        self.mesh.triangles = &triangles[0, 0] if triangles.shape[0] else NULL
+        self.mesh.n_points, self.mesh.n_triangles = points_px.shape[0], triangles.shape[0]
+        self.mesh.planes = &planes[0] if planes is not None else NULL
+
+    def list_planes(self, int64_t first, int64_t end):
+        """Compute the planes of triangles [first, end); those of all must be there before `fill_planes`."""
+        with nogil:
+            K.list_planes(&self.mesh, first, end)
+
+    def fill_planes(self, const int32_t[:, ::1] ids, out, int64_t first_row, int64_t n_rows):
+        """Write the values of the pixels in the rows [first_row, first_row + n_rows) of a float32 or float64 array."""
+        cdef tl_window window
+        cdef bint is_f32 = out.dtype == np.float32
+        cdef uint8_t[::1] flat = as_bytes(out)
+        cdef int64_t width = ids.shape[1]
+        if width == 0 or n_rows == 0:
+            return
+        window.x_px, window.y_px, window.width, window.height = 0, first_row, width, n_rows
+        window.subpixel_bits, window.test = 0, 0
+        with nogil:
+            K.fill_planes(&self.mesh, &window, &ids[first_row, 0], is_f32, &flat[first_row * width * (4 if is_f32 else 8)])
+
+
+def list_edges(SnappedMesh mesh, int64_t[::1] starts, int32_t[::1] last_low, int32_t[::1] highs, uint64_t[::1] edges):
+    """Write the edges of the triangles that are not culled; returns how many, -1 when an index is outside the vertices.
+
+    `edges` has room for three a triangle; the others are scratch, as in `tl_edge_scratch`.
+    """
+    cdef tl_edge_scratch scratch
+    cdef int64_t n = 0, bad_row = -1
+    if mesh.snapped.n_triangles and mesh.snapped.mesh.n_vertices:
+        scratch.starts, scratch.last_low, scratch.highs = &starts[0], &last_low[0], &highs[0]
+        with nogil:
+            bad_row = K.list_edges(&mesh.snapped, &scratch, &edges[0], &n)
+    return n if bad_row < 0 else -1
+
+
+def draw_lines(SnappedMesh mesh, const uint64_t[::1] edges, uint8_t[::1] pixels, const float[:, ::1] depth, double depth_bias,
+               bint is_farthest, bint is_smooth, int64_t width, int64_t first_row, int64_t n_rows):
+    """Clear the rows [first_row, first_row + n_rows) of a buffer that is `width` pixels wide and draw lines into them."""
+    cdef tl_edges lines
+    cdef tl_line_target target
+    cdef tl_window window = mesh.window(first_row, n_rows, width)
+    if width == 0 or n_rows == 0:
+        return
+    lines.mesh, lines.n_edges = mesh.snapped.mesh, edges.shape[0]
+    lines.view = mesh.clip_view()
+    lines.edges = <const int32_t *>&edges[0] if edges.shape[0] else NULL
+    target.is_smooth, target.is_farthest, target.depth_bias, target.stride_px = is_smooth, is_farthest, depth_bias, width
+    target.pixels = &pixels[first_row * width * (4 if is_smooth else 1)]
+    target.depth = &depth[first_row, 0] if depth is not None else NULL
+    with nogil:
+        K.draw_lines(&lines, &window, &target)
