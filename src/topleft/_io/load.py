@@ -12,19 +12,22 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from topleft._model.adapt import joined, material_of, placed
+from topleft._model.adapt import DEFAULT_CREASE, joined, material_of, placed
 from topleft._model.material import Material
-from topleft._model.mesh import Mesh
+from topleft._model.mesh import Mesh, as_crease
 from topleft.errors import MeshError, MissingPackageError
 
 
-def load(path: str | os.PathLike[str]) -> Mesh:
+def load(path: str | os.PathLike[str], *, crease: float = DEFAULT_CREASE) -> Mesh:
     """A mesh read from a file, by trimesh: OBJ, PLY, STL, glTF and GLB, OFF, and what else it has readers for.
 
     Parameters
     ----------
     path : path
         The end of its name tells the format.
+    crease : float
+        Degrees, 0 to 180: edges at which triangles bend by more are sharp, where the file has no normals; see `Mesh`.
+        180: none is, 0: all are.
 
     Returns
     -------
@@ -51,7 +54,7 @@ def load(path: str | os.PathLike[str]) -> Mesh:
     same width with the reflectance of a dielectric. Metals keep their diffuse colour, since there is no surrounding
     that they could mirror; normal, occlusion and emission maps are not read.
     """
-    path = Path(path)
+    path, crease = Path(path), as_crease(crease)
     if not path.exists():
         raise FileNotFoundError(f"there is no file {str(path)!r}")
     if path.is_dir():
@@ -72,7 +75,7 @@ def load(path: str | os.PathLike[str]) -> Mesh:
                 parts = _parts(trimesh.load_scene(str(path), process=False))
         if not parts:
             raise MeshError(f"{str(path)!r} has no triangles")
-        return joined(parts)
+        return joined(parts, crease)
     except FileNotFoundError as error:  # the mesh is there: glTF and others name more files
         raise MeshError(f"cannot read {str(path)!r}: broken, or without a file that it names ({error})") from error
     except (MeshError, OSError, MemoryError):

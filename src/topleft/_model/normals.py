@@ -203,12 +203,7 @@ def face_normal_rows(vertices: FloatArray, triangles: I32, *, threads: int | Non
 
 
 def turned_faces(
-    vertices: FloatArray,
-    triangles: I32,
-    normals: F32,
-    row_of_corner: I32 | None = None,
-    *,
-    threads: int | None = None,
+    vertices: FloatArray, triangles: I32, normals: F32, row_of_corner: I32 | None = None, *, threads: int | None = None
 ) -> U8:
     """(T,) uint8: 1 where the normals of the corners, added up, point to the other side than the triangle.
 

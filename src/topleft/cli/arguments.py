@@ -10,6 +10,8 @@ from topleft._base.options import Cull, Sampling
 from topleft._camera.camera import DEFAULT_FOV_Y_DEG
 from topleft._camera.matrices import THREE_QUARTER_DEG
 from topleft._io.images import PICTURE_SUFFIXES, SUFFIXES
+from topleft._model.adapt import DEFAULT_CREASE
+from topleft._model.mesh import as_crease
 from topleft._render.layers import LAYERS, check_layers
 from topleft._render.render import DEFAULT_SIZE
 from topleft._shade.shade import Shading
@@ -128,6 +130,13 @@ def add_picture_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="COLOR",
         help="a name, #rrggbb[aa] or transparent (default white)",
     )
+    add(
+        "--crease",
+        type=_crease,
+        default=DEFAULT_CREASE,
+        metavar="DEG",
+        help="edges that bend by more are sharp, of a mesh without normals; 0: all, 180: none (default %(default)g)",
+    )
     add("--texture", metavar="FILE", help="a picture for all of a mesh that has texture coordinates")
     add("--matcap", metavar="FILE", help="a picture of a lit sphere, for --shading matcap")
     add("--opacity", type=_share, default=None, metavar="X", help="0 to 1: as if of glass, of which each layer hides X")
@@ -173,6 +182,13 @@ def _share(text: str) -> float:
     if not 0 <= share <= 1:
         raise argparse.ArgumentTypeError(f"must be a number from 0 to 1, got {text!r}")
     return share
+
+
+def _crease(text: str) -> float:
+    try:
+        return as_crease(float(text))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"must be an angle from 0 to 180 degrees, got {text!r}") from None
 
 
 def tolerance(text: str) -> float:

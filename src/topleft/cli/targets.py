@@ -19,6 +19,7 @@ from topleft._batch.jobs import Job
 from topleft._camera.camera import Camera
 from topleft._io.images import SUFFIXES
 from topleft._io.load import load
+from topleft._model.adapt import DEFAULT_CREASE
 from topleft._model.material import Material
 from topleft._model.mesh import Mesh
 from topleft._model.texture import Texture
@@ -39,6 +40,7 @@ class MeshSource:
 
     name: str
     texture: str | None = None
+    crease: float = DEFAULT_CREASE
 
     def __call__(self) -> Mesh:
         """Read it."""
@@ -51,10 +53,10 @@ class MeshSource:
 
     def _mesh(self) -> Mesh:
         if self.name in SHAPES:
-            return Mesh(*shape(self.name))
+            return Mesh(*shape(self.name), crease=self.crease)
         if not Path(self.name).exists() and Path(self.name).name == self.name and "." not in self.name:
             raise UsageError(f"there is no file and no built-in shape {self.name!r}; shapes: {', '.join(SHAPES)}")
-        return load(self.name)
+        return load(self.name, crease=self.crease)
 
 
 def read_texture(path: str) -> Texture:
@@ -129,7 +131,9 @@ def plan_jobs(options: argparse.Namespace, start: int = 0) -> list[MeshJobs]:
             orbit = Orbit(azimuth_deg, options.elevation, options.fov, options.up, options.ortho)
             path = filled.replace("{name}", name)
             layers = _layers(path, options)
-            jobs.append(Job(MeshSource(source, options.texture), orbit, options.size, drawing, path, layers))
+            jobs.append(
+                Job(MeshSource(source, options.texture, options.crease), orbit, options.size, drawing, path, layers)
+            )
         groups.append(MeshJobs(source, name, tuple(jobs)))
     return groups
 
