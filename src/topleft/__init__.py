@@ -23,6 +23,7 @@ from topleft._model.adapt import as_mesh
 from topleft._model.light import Fog, Light
 from topleft._model.material import Material
 from topleft._model.mesh import Mesh
+from topleft._model.points import Points
 from topleft._model.scene import Instance, Scene
 from topleft._model.texture import Texture
 from topleft._plan.plan import Plan, plan
@@ -75,6 +76,7 @@ __all__ = [
     "MissingPackageError",
     "OpenCVLens",
     "Plan",
+    "Points",
     "Rasterizer",
     "Scene",
     "SceneDepthLayers",

@@ -91,27 +91,27 @@ class Mesh:
     crease: float = NO_CREASE
 
     def __post_init__(self) -> None:
-        vertices = _real_array(self.vertices, "vertices")
+        vertices = as_real_array(self.vertices, "vertices")
         triangles = as_checked_triangles(self.triangles, len(vertices))
         keep = object.__setattr__  # the dataclass is frozen, and its arrays are coerced
-        keep(self, "vertices", _read_only(vertices))
-        keep(self, "triangles", _read_only(triangles))
+        keep(self, "vertices", read_only(vertices))
+        keep(self, "triangles", read_only(triangles))
         _check_finite(vertices, triangles)
         if self.normals is not None:
-            normals = _real_array(self.normals, "normals")
+            normals = as_real_array(self.normals, "normals")
             if len(normals) != len(vertices):
                 raise ValueError(f"normals must have shape ({len(vertices)}, 3), got {normals.shape}")
-            keep(self, "normals", _read_only(normals))
+            keep(self, "normals", read_only(normals))
         if self.colors is not None:
-            keep(self, "colors", _read_only(_color_array(self.colors, len(vertices))))
+            keep(self, "colors", read_only(as_color_array(self.colors, len(vertices))))
         for name in ("uv", "uv1"):
             if getattr(self, name) is not None:
-                keep(self, name, _read_only(_uv_array(name, getattr(self, name), len(vertices))))
+                keep(self, name, read_only(_uv_array(name, getattr(self, name), len(vertices))))
         keep(self, "crease", as_crease(self.crease))
         keep(self, "materials", _material_tuple(self.materials))
         if self.material_of_triangle is not None:
             rows = _material_rows(self.material_of_triangle, len(triangles), len(self.materials))
-            keep(self, "material_of_triangle", _read_only(rows))
+            keep(self, "material_of_triangle", read_only(rows))
 
     def _repr_png_(self) -> bytes | None:
         from topleft._render.notebook import png_of_mesh  # which imports this module
@@ -145,7 +145,7 @@ class Mesh:
 
     @cached_property
     def _extreme_points(self) -> F64:
-        return _read_only(extreme_points(used_vertices(self)))
+        return read_only(extreme_points(used_vertices(self)))
 
     def vertex_normals(self) -> FloatArray:
         """Normals (V, 3): those of the mesh where it has them, else angle-weighted ones, float64.
@@ -204,11 +204,11 @@ class Mesh:
     @cached_property
     def _computed_normals(self) -> tuple[FloatArray, CornerNormals | None]:
         if self.crease == NO_CREASE:
-            return _read_only(angle_weighted_normals(self.vertices, self.triangles)), None
+            return read_only(angle_weighted_normals(self.vertices, self.triangles)), None
         first, group = self._places
         places = None if len(first) == len(group) else (first, group)
         rows, of_corners = creased_normals(self.vertices, self.triangles, self.crease, places)
-        return _read_only(rows), of_corners
+        return read_only(rows), of_corners
 
     @cached_property
     def _places(self) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
@@ -222,7 +222,7 @@ class Mesh:
 
 def keep_corner_normals(mesh: Mesh, normals: CornerNormals) -> None:
     """Have a mesh without normals take these instead of computing them."""
-    mesh.__dict__["_computed_normals"] = _read_only(normals.rows[: len(mesh.vertices)]), normals
+    mesh.__dict__["_computed_normals"] = read_only(normals.rows[: len(mesh.vertices)]), normals
 
 
 def with_normals(mesh: Mesh) -> Mesh:
@@ -342,7 +342,7 @@ def _differ(columns: list[npt.NDArray[Any]], order: npt.NDArray[np.intp]) -> npt
     return starts
 
 
-def _real_array(values: npt.ArrayLike, name: str) -> FloatArray:
+def as_real_array(values: npt.ArrayLike, name: str) -> FloatArray:
     array = as_array(name, values)
     if array.dtype.kind not in "fiu":
         raise TypeError(f"{name} must hold real numbers, got {array.dtype}")
@@ -352,7 +352,7 @@ def _real_array(values: npt.ArrayLike, name: str) -> FloatArray:
     return np.ascontiguousarray(array, native if native in (np.float32, np.float64) else np.float64)
 
 
-def _color_array(values: npt.ArrayLike, n_vertices: int) -> U8:
+def as_color_array(values: npt.ArrayLike, n_vertices: int) -> U8:
     array = as_array("colors", values)
     if array.dtype != np.uint8:
         raise TypeError(f"colors must be uint8, got {array.dtype}")
@@ -402,7 +402,7 @@ def _check_finite(vertices: FloatArray, triangles: I32) -> None:
         raise ValueError(f"vertices[{row}] = {vertices[row].tolist()} must be finite: a triangle uses it")
 
 
-def _read_only(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
+def read_only(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
     view = array.view()
     view.flags.writeable = False
     return view
