@@ -18,6 +18,7 @@
 #include "pixels/points.c"
 #include "pixels/planes.c"
 #include "pixels/composite.c"
+#include "points/cloud.c"
 #include "lines/edges.c"
 #include "lines/lines.c"
 #include "blend/blend.c"
@@ -61,6 +62,7 @@ const tl_kernels TL_KERNELS = {
     .survey_clusters = survey_clusters,
     .list_edges = list_edges,
     .draw_lines = draw_lines,
+    .draw_cloud = draw_cloud,
     .composite = composite,
     .set_inverse_w = set_inverse_w,
     .shade = shade,

@@ -146,6 +146,9 @@ typedef struct tl_kernels {
     /* Clears the window's pixels and draws lines. */
     void (*draw_lines)(const tl_edges *lines, const tl_window *window, const tl_line_target *target);
 
+    /* Clears the window's pixels and draws points: ids and depth, NEAREST or FARTHEST; at equal depth the lower id. */
+    void (*draw_cloud)(const tl_cloud *cloud, const tl_window *window, const tl_target *target);
+
     /* The planes of triangles [first, end); the one of no triangle, with first = 0. */
     void (*list_planes)(const tl_valued *mesh, int64_t first, int64_t end);
 

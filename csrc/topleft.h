@@ -299,6 +299,19 @@ typedef struct {
     int64_t stride_px;
 } tl_line_target;
 
+/* ---- clouds of points ---------------------------------------------------------------------------------- */
+
+/* Points as discs or squares. */
+typedef struct {
+    const tl_vertex *vertices; /* TL_SPECIAL ones are not drawn */
+    int64_t n;
+    /* sub-pixels: the diameter of the disc, the side of the square, below 2^30; of all, unless sizes_fx has each */
+    int64_t size_fx;
+    const int32_t *sizes_fx;
+    int is_disc;
+    int32_t sample_x_fx, sample_y_fx; /* of the sample, from the pixel's centre */
+} tl_cloud;
+
 /* ---- creases ------------------------------------------------------------------------------------------- */
 
 /* Sides at a vertex that more triangles share join nothing: what is compared is bounded. */

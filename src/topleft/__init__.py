@@ -31,6 +31,7 @@ from topleft._raster.classic import bresenham_line
 from topleft._raster.composite import composite
 from topleft._raster.fragments import Fragments
 from topleft._raster.peel import DepthLayers, peel
+from topleft._raster.points import PointFragments, points
 from topleft._raster.verbs import Rasterizer, coverage, fill, overdraw, rasterize, wireframe
 from topleft._render.fragments import SceneDepthLayers, SceneFragments
 from topleft._render.render import rasterize_mesh, render
@@ -76,6 +77,7 @@ __all__ = [
     "MissingPackageError",
     "OpenCVLens",
     "Plan",
+    "PointFragments",
     "Points",
     "Rasterizer",
     "Scene",
@@ -98,6 +100,7 @@ __all__ = [
     "overdraw",
     "peel",
     "plan",
+    "points",
     "rasterize",
     "rasterize_mesh",
     "release_memory",

@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from topleft._model.adapt import MeshLike, as_mesh, is_mesh_like
 from topleft._model.mesh import extreme_points, used_vertices
+from topleft._model.points import Points
 
 F64 = npt.NDArray[np.float64]
 
@@ -33,7 +34,9 @@ def points_to_frame(subject: MeshLike | npt.ArrayLike) -> F64:
     ValueError
         If there is no point, or one is not finite.
     """
-    if is_mesh_like(subject):
+    if isinstance(subject, Points):
+        points = np.asarray(subject.positions, np.float64)
+    elif is_mesh_like(subject):
         points = np.asarray(used_vertices(as_mesh(subject)), np.float64)
     else:
         points = np.asarray(subject, np.float64)
@@ -48,6 +51,8 @@ def points_to_frame(subject: MeshLike | npt.ArrayLike) -> F64:
 
 def ends_to_frame(subject: MeshLike | npt.ArrayLike) -> F64:
     """A few of those points, which have the box and the bounding sphere of all."""
+    if isinstance(subject, Points) and len(subject):
+        return subject.extreme_points()
     if is_mesh_like(subject):
         mesh = as_mesh(subject)
         if len(mesh.triangles):

@@ -168,6 +168,13 @@ cdef extern from "topleft.h" nogil:
         int64_t stride_px
     enum:
         TL_N_CLASSES, TL_FLIP, TL_SPECIAL
+    ctypedef struct tl_cloud:
+        const tl_vertex *vertices
+        int64_t n
+        int64_t size_fx
+        const int32_t *sizes_fx
+        int is_disc
+        int32_t sample_x_fx, sample_y_fx
     ctypedef struct tl_fans:
         const int32_t *triangles
         const int32_t *starts
@@ -301,6 +308,7 @@ cdef extern from "topleft.h" nogil:
         void (*paint_gouraud)(const tl_scene *, const tl_window *, const int32_t *, const void *, int, int, void *) noexcept nogil
         void (*composite)(const tl_composite *, int64_t, void *) noexcept nogil
         int64_t (*list_edges)(const tl_scene *, const tl_edge_scratch *, uint64_t *, int64_t *) noexcept nogil
+        void (*draw_cloud)(const tl_cloud *, const tl_window *, const tl_target *) noexcept nogil
         void (*draw_lines)(const tl_edges *, const tl_window *, const tl_line_target *) noexcept nogil
         void (*list_planes)(const tl_valued *, int64_t, int64_t) noexcept nogil
         void (*fill_planes)(const tl_valued *, const tl_window *, const int32_t *, int, void *) noexcept nogil

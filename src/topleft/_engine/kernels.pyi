@@ -458,6 +458,20 @@ def set_feet(
     at: NDArray[np.float64],
     squared: NDArray[np.float64],
 ) -> None: ...
+def draw_cloud(
+    records: NDArray[np.uint8],
+    size_fx: int,
+    sizes_fx: NDArray[np.int32] | None,
+    is_disc: bool,
+    x_fx: int,
+    y_fx: int,
+    target: Target,
+    x_px: int,
+    y_px: int,
+    subpixel_bits: int,
+    first_row: int,
+    n_rows: int,
+) -> None: ...
 def vertex_normals(
     source: Source, triangles: NDArray[np.int32], first: int, end: int, out: NDArray[np.float64]
 ) -> int: ...

@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from topleft._base.arrays import INT32_MAX, as_array
-from topleft._base.options import parse
+from topleft._base.arrays import INT32_MAX, as_point_size
+from topleft._base.options import PointShape, parse
 from topleft._model.mesh import FloatArray, as_color_array, as_real_array, extreme_points, read_only
 
-__all__ = ["DEFAULT_POINT_SIZE", "PointShape", "PointUnit", "Points"]
+__all__ = ["DEFAULT_POINT_SIZE", "PointUnit", "Points"]
 
 F64 = npt.NDArray[np.float64]
 U8 = npt.NDArray[np.uint8]
@@ -31,13 +31,6 @@ class PointUnit(StrEnum):
 
     PX = "px"
     WORLD = "world"
-
-
-class PointShape(StrEnum):
-    """What a point covers."""
-
-    DISC = "disc"
-    SQUARE = "square"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -148,27 +141,3 @@ class Points:
         """What another process needs: what is computed from it is computed there."""
         names = ("positions", "colors", "normals", "size", "unit", "shape")
         return {name: self.__dict__[name] for name in names}
-
-
-def as_point_size(name: str, value: npt.ArrayLike, n_points: int) -> float | F64:
-    """Return a positive size, or one of each point, (N,) float64.
-
-    Raises
-    ------
-    ValueError
-        If there is another number of them, or one is not positive.
-    TypeError
-        If they are no real numbers.
-    """
-    array = as_array(name, value)
-    if array.dtype.kind not in "fiu":
-        raise TypeError(f"{name} must hold real numbers, got {array.dtype}")
-    if array.shape not in ((), (n_points,)):
-        raise ValueError(f"{name} must be one number or have shape ({n_points},), got {array.shape}")
-    bad = np.flatnonzero(~((array > 0) & np.isfinite(array)))
-    if len(bad):
-        raise ValueError(f"{name} must be finite and positive, got {array.ravel()[bad[0]]}")
-    if array.ndim == 0:
-        return float(array)
-    sizes: F64 = read_only(np.ascontiguousarray(array, np.float64))
-    return sizes
