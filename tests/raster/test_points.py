@@ -144,7 +144,7 @@ def test_options_that_points_do_not_have_are_refused(options, message):
 
 
 def test_positions_must_be_finite():
-    with pytest.raises(ValueError, match="positions must be finite, got .* in row 1"):
+    with pytest.raises(ValueError, match=r"positions must be finite, got .* in row 1"):
         tl.points([[0, 0], [np.nan, 1]], (4, 3))
 
 

@@ -231,8 +231,9 @@ def with_normals(mesh: Mesh) -> Mesh:
     if corners is None:
         return mesh if mesh.normals is not None else replace(mesh, normals=mesh.vertex_normals())
     rows = np.concatenate([np.arange(len(mesh.vertices)), corners.vertex_of_row])
-    spread = {name: None if (own := getattr(mesh, name)) is None else own[rows] for name in ("colors", "uv", "uv1")}
-    return replace(mesh, vertices=mesh.vertices[rows], triangles=corners.of_corner, normals=corners.rows, **spread)
+    colors, uv, uv1 = (None if own is None else own[rows] for own in (mesh.colors, mesh.uv, mesh.uv1))
+    split: dict[str, Any] = {"vertices": mesh.vertices[rows], "triangles": corners.of_corner, "normals": corners.rows}
+    return replace(mesh, **split, colors=colors, uv=uv, uv1=uv1)
 
 
 def as_crease(value: float) -> float:

@@ -5,7 +5,7 @@ Input: positions in pixels or clip space, sizes. Output: `PointFragments`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Unpack
 
 import numpy as np
@@ -192,20 +192,21 @@ def draw_points(
         return frags
     records = snap_points(memory, array, source, view) if is_near else np.empty(0, np.uint8)
     size_fx, sizes_fx = sizes_in_fx(sizes_px, view.grid_bits)
-    samples: Sequence[Sequence[int]] = [(0, 0)]
+    samples: Sequence[tuple[int, int]] = [(0, 0)]
     if n_samples > 1:
-        samples = sample_positions(n_samples, view.grid_bits).tolist()
-    how = *view.origin, view.grid_bits
+        samples = [(x, y) for x, y in sample_positions(n_samples, view.grid_bits).tolist()]
     is_disc = shape is PointShape.DISC
     sink = Sink.FARTHEST if is_farthest else Sink.NEAREST
-    for at, *planes in zip(samples, ids, depth, strict=True):
-        target = _engine.Target(sink, *planes, None)
-
-        def draw_rows(first: int, end: int, at: Sequence[int] = at, target: _engine.Target = target) -> None:
-            _engine.draw_cloud(records, size_fx, sizes_fx, is_disc, *at, target, *how, first, end - first)
-
-        run_parts(draw_rows, height, count_threads(view.threads, n_points))
+    for (x_fx, y_fx), own_ids, own_depth in zip(samples, ids, depth, strict=True):
+        target = _engine.Target(sink, own_ids, own_depth, None)
+        cloud = records, size_fx, sizes_fx, is_disc, x_fx, y_fx, target, view.origin, view.grid_bits
+        run_parts(rows_of(cloud), height, count_threads(view.threads, n_points))
     return frags
+
+
+def rows_of(cloud: Any) -> Callable[[int, int], None]:
+    """What draws rows [first, end) of points, all but whose last arguments are given."""
+    return lambda first, end: _engine.draw_cloud(*cloud, first, end - first)
 
 
 def snap_points(memory: Memory, array: NDArray[Any], source: _engine.Source, view: View) -> NDArray[np.uint8]:

@@ -221,7 +221,7 @@ class CloudBuffer:
         """The visibility buffer, at the centres of the pixels."""
         return draw_cloud(self.subject, self.camera, self.size, **self.options)
 
-    def spread(self, values: F64, background: float) -> F32:
+    def spread(self, values: npt.NDArray[np.floating[Any]], background: float) -> F32:
         """Values of the points, (N,) or (N, K), at the pixels."""
         return self.frags.interpolate(values, background=background)
 

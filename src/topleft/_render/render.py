@@ -112,8 +112,8 @@ def render(
         if edges:
             raise ValueError("points have no edges")
         camera = framing_of(mesh, camera, size)
-        frags = draw_cloud(mesh, camera, size, cull=cull, threads=threads, sampling=sampling)
-        return shade(frags, mesh, camera, shading=shading, color=color, background=background, threads=threads, **look)
+        cloud = draw_cloud(mesh, camera, size, cull=cull, threads=threads, sampling=sampling)
+        return shade(cloud, mesh, camera, shading=shading, color=color, background=background, threads=threads, **look)
     subject, camera = subject_of(mesh, camera, size, tolerance, cull=cull, material=look.get("material"))
     frags = rasterize_subject(subject, camera, size, rasterizer, cull=cull, threads=threads, sampling=sampling)
     return picture_of(
