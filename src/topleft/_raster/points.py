@@ -191,22 +191,33 @@ def draw_points(
     if 0 in view.size:
         return frags
     records = snap_points(memory, array, source, view) if is_near else np.empty(0, np.uint8)
-    size_fx, sizes_fx = sizes_in_fx(sizes_px, view.grid_bits)
+    sizes = sizes_in_fx(sizes_px, view.grid_bits)
     samples: Sequence[tuple[int, int]] = [(0, 0)]
     if n_samples > 1:
         samples = [(x, y) for x, y in sample_positions(n_samples, view.grid_bits).tolist()]
-    is_disc = shape is PointShape.DISC
     sink = Sink.FARTHEST if is_farthest else Sink.NEAREST
-    for (x_fx, y_fx), own_ids, own_depth in zip(samples, ids, depth, strict=True):
+    for at, own_ids, own_depth in zip(samples, ids, depth, strict=True):
         target = _engine.Target(sink, own_ids, own_depth, None)
-        cloud = records, size_fx, sizes_fx, is_disc, x_fx, y_fx, target, view.origin, view.grid_bits
-        run_parts(rows_of(cloud), height, count_threads(view.threads, n_points))
+        draw_rows = rows_of(records, sizes, shape, at, target, view)
+        run_parts(draw_rows, height, count_threads(view.threads, n_points))
     return frags
 
 
-def rows_of(cloud: Any) -> Callable[[int, int], None]:
-    """What draws rows [first, end) of points, all but whose last arguments are given."""
-    return lambda first, end: _engine.draw_cloud(*cloud, first, end - first)
+def rows_of(
+    records: NDArray[np.uint8],
+    sizes_fx: tuple[int, NDArray[np.int32] | None],
+    shape: PointShape,
+    at: tuple[int, int],
+    target: _engine.Target,
+    view: View,
+) -> Callable[[int, int], None]:
+    """Return what draws rows [first, end) of points, as one sample sees them."""
+    is_disc = shape is PointShape.DISC
+
+    def draw_rows(first: int, end: int) -> None:
+        _engine.draw_cloud(records, *sizes_fx, is_disc, *at, target, view.origin, view.grid_bits, first, end - first)
+
+    return draw_rows
 
 
 def snap_points(memory: Memory, array: NDArray[Any], source: _engine.Source, view: View) -> NDArray[np.uint8]:
