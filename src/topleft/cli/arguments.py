@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterable
-from difflib import get_close_matches
 from typing import NoReturn
 
 from topleft._base.arrays import as_point_size
@@ -93,6 +92,8 @@ class Parser(argparse.ArgumentParser):
 
 def meant(word: str, known: Iterable[str]) -> str:
     """What a person may have meant by a word that is not known, as the end of a message."""
+    from difflib import get_close_matches  # 3 ms that only errors need
+
     found = get_close_matches(word, list(known), 1)
     return f"; did you mean {found[0]}?" if found else ""
 
