@@ -74,7 +74,9 @@ def test_a_mesh_through_a_prism_and_a_tilt_lies_where_its_vertices_are_projected
     frags = tl.rasterize_mesh(mesh, camera, SIZE)
     rows, columns = np.nonzero(frags.mask)
     places = camera.project(frags.interpolate(POINTS)[rows, columns].astype(float), SIZE)[:, :2]
-    assert np.abs(places - np.stack([columns, rows], axis=1) - 0.5).max() < 0.13  # tolerance_px of the lens, and the snap
+    assert (
+        np.abs(places - np.stack([columns, rows], axis=1) - 0.5).max() < 0.13
+    )  # tolerance_px of the lens, and the snap
 
 
 @pytest.mark.parametrize("n_terms", [4, 5, 8, 12, 14])

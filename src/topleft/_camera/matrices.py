@@ -127,7 +127,7 @@ def place_to_fill(points: F64, tan_x: float, tan_y: float, *, ortho: bool = Fals
     ends = [_planes_of(axis, z, tan) for axis, tan in sides]
     distance = max((low + high) / (2 * tan) for (low, high), (_, tan) in zip(ends, sides, strict=True))
     nearest = float(z.max())
-    distance = max(distance, nearest + 1e-2 * float(np.ptp(points, axis=0).max()))
+    distance = max(distance, nearest + (1e-2 * float(np.ptp(points, axis=0).max()) or 1.0))
     return np.array([*(_middle(axis, z, tan, distance) for axis, tan in sides), distance])
 
 
