@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import topleft as tl
 from topleft._camera.camera import Camera
 from topleft._camera.lens import FisheyeLens, OpenCVLens
 
@@ -70,7 +71,7 @@ def test_terms_that_are_zero_change_nothing(n_terms):
 
 def test_a_mesh_through_a_prism_and_a_tilt_lies_where_its_vertices_are_projected_to():
     camera = camera_of(distortion=ALL_TERMS)
-    mesh = Mesh(POINTS, np.arange(198).reshape(-1, 3))
+    mesh = tl.Mesh(POINTS, np.arange(198).reshape(-1, 3))
     frags = tl.rasterize_mesh(mesh, camera, SIZE)
     rows, columns = np.nonzero(frags.mask)
     places = camera.project(frags.interpolate(POINTS)[rows, columns].astype(float), SIZE)[:, :2]
