@@ -20,6 +20,7 @@ from topleft._lod.detail import Detail, choose_detail
 from topleft._lod.levels import Level, Levels
 from topleft._lod.simplify import simplify
 from topleft._model.adapt import as_mesh
+from topleft._model.environment import Environment
 from topleft._model.light import Fog, Light
 from topleft._model.material import Material
 from topleft._model.mesh import Mesh
@@ -27,6 +28,8 @@ from topleft._model.points import Points
 from topleft._model.scene import Instance, Scene
 from topleft._model.texture import Texture
 from topleft._plan.plan import Plan, plan
+from topleft._polygons.overlap import Overlap, overlap
+from topleft._polygons.polygons import polygons
 from topleft._raster.classic import bresenham_line
 from topleft._raster.composite import composite
 from topleft._raster.fragments import Fragments
@@ -61,6 +64,7 @@ __all__ = [
     "Camera",
     "DepthLayers",
     "Detail",
+    "Environment",
     "FisheyeLens",
     "Fog",
     "Fragments",
@@ -76,6 +80,7 @@ __all__ = [
     "MeshError",
     "MissingPackageError",
     "OpenCVLens",
+    "Overlap",
     "Plan",
     "PointFragments",
     "Points",
@@ -98,9 +103,11 @@ __all__ = [
     "height_map",
     "load",
     "overdraw",
+    "overlap",
     "peel",
     "plan",
     "points",
+    "polygons",
     "rasterize",
     "rasterize_mesh",
     "release_memory",

@@ -76,8 +76,8 @@ def test_a_mesh_through_a_prism_and_a_tilt_lies_where_its_vertices_are_projected
     rows, columns = np.nonzero(frags.mask)
     places = camera.project(frags.interpolate(POINTS)[rows, columns].astype(float), SIZE)[:, :2]
     assert (
-        np.abs(places - np.stack([columns, rows], axis=1) - 0.5).max() < 0.13
-    )  # tolerance_px of the lens, and the snap
+        np.abs(places - np.stack([columns, rows], axis=1) - 0.5).max() < 0.15
+    )  # tolerance_px at the quarters of an edge, the snap
 
 
 @pytest.mark.parametrize("n_terms", [4, 5, 8, 12, 14])

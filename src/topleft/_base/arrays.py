@@ -16,12 +16,15 @@ __all__ = [
     "as_out",
     "as_point_size",
     "as_size",
+    "as_square",
     "as_subpixel_bits",
     "as_triangles",
     "as_values",
+    "as_vector",
     "as_vertices",
     "as_window",
     "bad_triangle",
+    "check_regular",
 ]
 
 #: The largest side of a picture and the largest number of triangles or vertices: ids and indices are int32.
@@ -112,6 +115,30 @@ def as_matrix(values: ArrayLike, dtype: np.dtype[Any]) -> NDArray[Any]:
     if not np.isfinite(matrix).all():
         raise ValueError("transform must fit float32, because the vertices are float32; pass float64 vertices")
     return matrix
+
+
+def as_vector(name: str, values: ArrayLike) -> NDArray[np.float64]:
+    """Return three finite numbers."""
+    vector = np.asarray(values, dtype=np.float64)
+    if vector.shape != (3,) or not np.isfinite(vector).all():
+        raise ValueError(f"{name} must be three finite numbers, got {values!r}")
+    return vector
+
+
+def as_square(name: str, values: ArrayLike, n: int) -> NDArray[np.float64]:
+    """Return a finite matrix (n, n), always a copy."""
+    matrix = np.array(values, dtype=np.float64)
+    if matrix.shape != (n, n):
+        raise ValueError(f"{name} must have shape ({n}, {n}), got {matrix.shape}")
+    if not np.isfinite(matrix).all():
+        raise ValueError(f"{name} must hold finite numbers, got {matrix.tolist()}")
+    return matrix
+
+
+def check_regular(name: str, matrix: NDArray[np.float64]) -> None:
+    """Raise a `ValueError` if the matrix is singular."""
+    if np.linalg.matrix_rank(matrix) < len(matrix):
+        raise ValueError(f"{name} must not be singular, got {matrix.tolist()}")
 
 
 def as_pair(name: str, values: object) -> tuple[int, int]:

@@ -12,21 +12,19 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from topleft._base.arrays import as_square, as_vector, check_regular
 from topleft._camera.lens import Lens, lens_of_opencv
 from topleft._camera.matrices import (
     F64,
     FRAMING_MARGIN,
     SILHOUETTE_MARGIN,
     THREE_QUARTER_DEG,
-    as_square,
-    as_vector,
     bounding_sphere,
     box_corners,
     box_matrix,
     check_fov,
     check_planes,
     check_positive,
-    check_regular,
     distance_to_fit,
     frustum_matrix,
     orbit_view,
@@ -81,7 +79,7 @@ class Camera:
 
     def __post_init__(self) -> None:
         for name in ("view", "projection"):
-            matrix = as_square(getattr(self, name), 4, name)
+            matrix = as_square(name, getattr(self, name), 4)
             matrix.flags.writeable = False
             object.__setattr__(self, name, matrix)
         if self.aspect is not None:
@@ -179,7 +177,7 @@ class Camera:
         ValueError
             If the field of view or the planes are outside their range.
         """
-        return cls(as_square(view, 4, "view"), perspective_matrix(fov_y_deg, near, far), aspect=1.0)
+        return cls(as_square("view", view, 4), perspective_matrix(fov_y_deg, near, far), aspect=1.0)
 
     @classmethod
     def orthographic(cls, view: npt.ArrayLike, *, near: float, far: float, height: float) -> Camera:
@@ -199,7 +197,7 @@ class Camera:
         ValueError
             If the height or the planes are outside their range.
         """
-        return cls(as_square(view, 4, "view"), orthographic_matrix(height, near, far), aspect=1.0)
+        return cls(as_square("view", view, 4), orthographic_matrix(height, near, far), aspect=1.0)
 
     @classmethod
     def off_center(
@@ -234,7 +232,7 @@ class Camera:
             If the sides or the planes are out of order.
         """
         matrix = (box_matrix if ortho else frustum_matrix)(left, right, bottom, top, near, far)
-        return cls(as_square(view, 4, "view"), matrix)
+        return cls(as_square("view", view, 4), matrix)
 
     @classmethod
     def look_at(
@@ -269,7 +267,7 @@ class Camera:
             If eye and target coincide, `up` is parallel to the view, or another number is outside its range.
         """
         view = view_matrix(eye, target, up)
-        distance = float(np.linalg.norm(as_vector(target, "target") - as_vector(eye, "eye")))
+        distance = float(np.linalg.norm(as_vector("target", target) - as_vector("eye", eye)))
         near = 0.01 * distance if near is None else near
         far = 100 * distance if far is None else far
         if ortho_height is not None:
@@ -318,8 +316,8 @@ class Camera:
         OpenCV puts the centre of the top-left pixel at (0, 0), `topleft` at (0.5, 0.5). So the point that the matrix
         projects to (u, v) is drawn at x_px = u + 0.5, y_px = v + 0.5: in the same pixel.
         """
-        matrix = as_square(intrinsics, 3, "intrinsics")
-        pose = as_square(camera_from_world, 4, "camera_from_world")
+        matrix = as_square("intrinsics", intrinsics, 3)
+        pose = as_square("camera_from_world", camera_from_world, 4)
         width, height = size
         check_positive("width", width)
         check_positive("height", height)
@@ -331,8 +329,8 @@ class Camera:
             raise ValueError(f"the last row of intrinsics must be [0, 0, 1], got {matrix[2].tolist()}")
         if not np.array_equal(pose[3], [0, 0, 0, 1]):
             raise ValueError(f"the last row of camera_from_world must be [0, 0, 0, 1], got {pose[3].tolist()}")
-        check_regular(matrix, "intrinsics")
-        check_regular(pose, "camera_from_world")
+        check_regular("intrinsics", matrix)
+        check_regular("camera_from_world", pose)
         px_of_center = np.array([[1, 0, 0.5], [0, 1, 0.5], [0, 0, 1]])
         ndc_of_px = np.array([[2 / width, 0, -1], [0, -2 / height, 1], [0, 0, 1]])
         eye_of_camera = np.diag([1.0, -1.0, -1.0, 1.0])

@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from topleft._base.arrays import as_vector
 from topleft._model.adapt import MeshLike, as_mesh, is_mesh_like
 from topleft._model.mesh import extreme_points, used_vertices
 from topleft._model.points import Points
@@ -158,7 +159,7 @@ def view_matrix(eye: npt.ArrayLike, target: npt.ArrayLike, up: npt.ArrayLike = (
     ValueError
         If eye and target coincide, or if `up` is zero or parallel to the view.
     """
-    eye, target, up = as_vector(eye, "eye"), as_vector(target, "target"), as_vector(up, "up")
+    eye, target, up = as_vector("eye", eye), as_vector("target", target), as_vector("up", up)
     forward = target - eye
     distance = np.linalg.norm(forward)
     if distance == 0:
@@ -203,7 +204,7 @@ def orbit_view(
         axis = np.array([-np.sin(azimuth), 0, -np.cos(azimuth)]) * np.sign(elevation)
     if up == "z":
         outward, axis = outward[[0, 2, 1]] * [1, -1, 1], axis[[0, 2, 1]] * [1, -1, 1]
-    target = as_vector(target, "target")
+    target = as_vector("target", target)
     return view_matrix(target + distance * outward, target, axis)
 
 
@@ -245,30 +246,6 @@ def box_matrix(left: float, right: float, bottom: float, top: float, near: float
     matrix[0, 0], matrix[0, 3] = 2 / (right - left), -(right + left) / (right - left)
     matrix[1, 1], matrix[1, 3] = 2 / (top - bottom), -(top + bottom) / (top - bottom)
     return matrix
-
-
-def as_vector(values: npt.ArrayLike, name: str) -> F64:
-    """Three finite numbers as float64."""
-    vector = np.asarray(values, dtype=np.float64)
-    if vector.shape != (3,) or not np.isfinite(vector).all():
-        raise ValueError(f"{name} must be three finite numbers, got {values!r}")
-    return vector
-
-
-def as_square(values: npt.ArrayLike, n: int, name: str) -> F64:
-    """A finite matrix (n, n) as float64, always a copy."""
-    matrix = np.array(values, dtype=np.float64)
-    if matrix.shape != (n, n):
-        raise ValueError(f"{name} must have shape ({n}, {n}), got {matrix.shape}")
-    if not np.isfinite(matrix).all():
-        raise ValueError(f"{name} must hold finite numbers, got {matrix.tolist()}")
-    return matrix
-
-
-def check_regular(matrix: F64, name: str) -> None:
-    """Raise a `ValueError` if the matrix is singular."""
-    if np.linalg.matrix_rank(matrix) < len(matrix):
-        raise ValueError(f"{name} must not be singular, got {matrix.tolist()}")
 
 
 def check_positive(name: str, value: float) -> None:

@@ -17,6 +17,7 @@ import numpy.typing as npt
 from topleft._base.arrays import as_array, as_checked_triangles
 from topleft._model.material import Material
 from topleft._model.normals import CornerNormals, angle_weighted_normals, box_of_triangles, creased_normals
+from topleft._model.texture import Texture
 from topleft._raster.clusters import Clusters, box_of
 
 FloatArray = npt.NDArray[np.floating[Any]]
@@ -45,7 +46,8 @@ class Mesh:
     normals : (V, 3) array_like of real numbers, optional
         Directions, of any length; `None`: not known, `vertex_normals` computes them.
     colors : (V, 3) or (V, 4) array_like of uint8, optional
-        sRGB colours, with or without alpha.
+        sRGB colours, with or without alpha: what is behind shows through where a mesh has no materials, or materials
+        that blend.
     uv : (V, 2) array_like of real numbers, optional
         Where each vertex lies in a texture: u from left to right, v from the bottom up, 0 to 1. Kept as float32. Where
         a texture has a seam, vertices stand twice.
@@ -175,6 +177,22 @@ class Mesh:
     def is_faceted(self) -> bool:
         """Whether every edge is sharp: each triangle has the normal of its face."""
         return self.normals is None and self.crease == 0
+
+    @cached_property
+    def has_alpha(self) -> bool:
+        """Whether the colours of the vertices are not all opaque."""
+        return self.colors is not None and self.colors.shape[1] == 4 and bool((self.colors[:, 3] < 255).any())
+
+    def single_sided(self, material: Material | None = None) -> npt.NDArray[np.uint8] | None:
+        """Which triangles (T,) have a back that does not show, by their material or by this one; None if none."""
+        materials = self.materials if material is None else (material,)
+        if all(one.double_sided for one in materials):
+            return None
+        rows = self.material_of_triangle if material is None else None
+        if rows is None:
+            is_single = not materials[0].double_sided
+            return np.ones(len(self.triangles), np.uint8) if is_single else None
+        return np.array([not one.double_sided for one in materials], np.uint8)[rows]
 
     @cached_property
     def vertex_box(self) -> F64:
@@ -411,5 +429,15 @@ def read_only(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
 
 def has_holes(material: Material, mesh: Mesh) -> bool:
     """Whether the material leaves something out of the triangles that have it."""
-    texture = material.texture if mesh.uv is not None else None
-    return bool(material.alpha_cutoff) and texture is not None and bool((texture.image[..., 3] < 255).any())
+    return material.alpha_mode == "mask" and bool(material.alpha_cutoff) and has_opacity(material, mesh)
+
+
+def has_opacity(material: Material, mesh: Mesh) -> bool:
+    """Whether some of the surface may not be opaque: by the material, its texture, or the colours of the vertices."""
+    texture = material.texture if is_laid(material.texture, mesh) else None
+    return material.opacity < 1 or mesh.has_alpha or (texture is not None and texture.has_alpha)
+
+
+def is_laid(texture: Texture | None, mesh: Mesh) -> bool:
+    """Whether there is a texture, and the mesh has its set of uv."""
+    return texture is not None and (mesh.uv, mesh.uv1)[texture.uv_set] is not None

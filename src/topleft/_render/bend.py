@@ -120,6 +120,7 @@ class BentMesh:
             None if mesh.uv is None else spread(mesh.uv).astype(np.float32),
             mesh.materials,
             None if rows is None else rows[self.source],
+            None if mesh.uv1 is None else spread(mesh.uv1).astype(np.float32),
             crease=mesh.crease,
         )
         if creased is not None and of_vertices is not None:

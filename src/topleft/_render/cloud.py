@@ -109,8 +109,8 @@ def shade_cloud(frags: PointFragments, cloud: Points, camera: Camera, options: S
     ValueError
         If an option has no meaning for points.
     """
-    if options.mode is Shading.MATCAP or options.material is not None:
-        raise ValueError("points have colours of their own: they take neither a material nor a matcap")
+    if options.mode is Shading.MATCAP or options.material is not None or options.environment is not None:
+        raise ValueError("points have colours of their own: they take neither a material, a matcap nor an environment")
     if options.mode is Shading.NORMALS and cloud.normals is None:
         raise ValueError("shading 'normals' needs points that have normals")
     if options.mode in (Shading.IDS, Shading.DEPTH):
