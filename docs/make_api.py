@@ -22,7 +22,7 @@ SUBJECTS: Mapping[str, tuple[str, ...]] = {
     "Polygons": ("polygons", "overlap", "Overlap"),
     "Layers of triangles, sorted by depth": ("peel", "DepthLayers", "composite"),
     "Meshes and scenes": ("Mesh", "load", "as_mesh", "Instance", "Scene"),
-    "Materials and light": ("Material", "Texture", "Light", "Fog"),
+    "Materials and light": ("Material", "Texture", "Light", "Fog", "Environment"),
     "Cameras": ("Camera", "OpenCVLens", "FisheyeLens", "load_cameras", "turntable", "viewpoints"),
     "Pictures": ("render", "render_transparent", "silhouette", "save_image"),
     "Buffers and layers of a mesh": (

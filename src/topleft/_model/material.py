@@ -44,10 +44,11 @@ class Material:
         0 to 1: what has less opacity in the texture is cut out, and what is behind it shows. Unless given everything is
         opaque.
     opacity : float
-        0 to 1, times the opacity of the texture and of the colours of the vertices.
+        0 to 1, times the opacity of the texture and of the colours of the vertices; looked at by "mask" and "blend".
     alpha_mode : {"opaque", "mask", "blend"}, optional
         "opaque": opacity is not looked at. "mask": what has less than `alpha_cutoff` (0.5 unless given) is cut out.
-        "blend": what is behind shows through. Unless given: "mask" with an `alpha_cutoff`, else "opaque".
+        "blend": what is behind shows through, in pictures of `render`, up to 16 layers of a pixel. Unless given: "mask"
+        with an `alpha_cutoff`, else "opaque".
     double_sided : bool
         Whether the back of the triangles shows, too; if not it is culled.
     emission : (3,) of float
@@ -64,7 +65,7 @@ class Material:
     occlusion_strength : float
         0 to 1: how much of that is taken away.
     normal_texture : Texture, optional
-        Linear: the normal in the tangent space of `uv`, -1..1 as 0..255.
+        Linear: the normal in the tangent space of `uv`, -1..1 as 0..255: red along u, green along v, which runs up.
     normal_scale : float
         Times x and y of it.
 

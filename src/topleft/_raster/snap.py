@@ -101,6 +101,10 @@ def snap_mesh(
         if is_bad:
             check_used_vertices(points, records, indices, view)
     drawn = indices if n else indices[:0]
+    if view.single_sided is not None and n:
+        is_single, cull = view.single_sided
+        seen = _engine.SnappedMesh(source, records, wide, drawn, pieces, view.how._replace(cull=cull), viewport)
+        drawn = without_sides(seen, drawn, is_single, view.threads)
     mesh = _engine.SnappedMesh(source, records, wide, drawn, pieces, view.how, viewport)
     return Snapped(mesh, indices, triangles, points, source, records, pieces)
 
@@ -160,6 +164,16 @@ def snap(
         wide = np.empty((n, 2), np.int64)
         snap_part(0, n)
     return Vertices(records, wide, n_bad, n_clipped)
+
+
+def without_sides(
+    mesh: _engine.SnappedMesh, triangles: NDArray[np.int32], is_single: NDArray[np.uint8], threads: int | None
+) -> NDArray[np.int32]:
+    """Return triangles, those collapsed that are single-sided and turned the way that the mesh culls."""
+    left = np.empty_like(triangles)
+    n_parts = choices.threads_to_convert(threads, len(triangles))
+    run_parts(lambda first, end: mesh.drop_sides(is_single, first, end, left), len(triangles), n_parts)
+    return left
 
 
 def refine(
