@@ -10,6 +10,7 @@
 #include "clusters/cluster_view.c"
 #include "raster/raster.c"
 #include "raster/bin.c"
+#include "raster/sides.c"
 #include "area/area.c"
 #include "pixels/weights_one.c"
 #include "pixels/weights.c"
@@ -27,6 +28,11 @@
 #include "mesh/normals.c"
 #include "mesh/nearest.c"
 #include "mesh/reach.c"
+#include "polygons/points.c"
+#include "polygons/simple.c"
+#include "polygons/mask.c"
+#include "polygons/labels.c"
+#include "polygons/shares.c"
 
 #ifndef TL_KERNELS /* read by itself, as an editor does */
 #define TL_ISA_NAME "none"
@@ -58,6 +64,7 @@ const tl_kernels TL_KERNELS = {
     .cut_clusters = cut_clusters,
     .measure_clusters = measure_clusters,
     .survey_clusters = survey_clusters,
+    .drop_sides = drop_sides,
     .list_edges = list_edges,
     .draw_lines = draw_lines,
     .composite = composite,
@@ -82,4 +89,13 @@ const tl_kernels TL_KERNELS = {
     .find_nearest = nearest_of_points,
     .find_reach = find_reach,
     .set_feet = set_feet,
+    .snap_points = snap_points,
+    .bound_polygons = bound_polygons,
+    .sort_polygons = sort_polygons,
+    .certify_polygons = certify_polygons,
+    .trust_polygons = trust_polygons,
+    .mask_even_odd = mask_even_odd,
+    .mask_nonzero = mask_nonzero,
+    .label_polygons = label_polygons,
+    .share_polygons = share_polygons,
 };

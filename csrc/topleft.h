@@ -336,6 +336,7 @@ typedef struct {
 } tl_points;
 
 #include "clusters.h"
+#include "polygons.h"
 #include "kernels.h"
 
 #endif

@@ -20,9 +20,10 @@ PAGE = Path(__file__).with_name("api.md")
 
 SUBJECTS: Mapping[str, tuple[str, ...]] = {
     "Triangles to pixels": ("coverage", "overdraw", "fill", "rasterize", "Fragments", "wireframe", "Rasterizer"),
+    "Polygons": ("polygons", "overlap", "Overlap"),
     "Layers of triangles, sorted by depth": ("peel", "DepthLayers", "composite"),
     "Meshes and scenes": ("Mesh", "load", "as_mesh", "Instance", "Scene"),
-    "Materials and light": ("Material", "Texture", "Light", "Fog"),
+    "Materials and light": ("Material", "Texture", "Light", "Fog", "Environment"),
     "Cameras": ("Camera", "OpenCVLens", "FisheyeLens", "turntable", "viewpoints"),
     "Pictures": ("render", "render_transparent", "silhouette", "save_image"),
     "Buffers and layers of a mesh": (
@@ -39,7 +40,7 @@ SUBJECTS: Mapping[str, tuple[str, ...]] = {
 """In reading order."""
 
 RETURNED = frozenset({
-    "DepthLayers", "Detail", "Fragments", "Plan", "SceneDepthLayers", "SceneFragments", "ViewLayers",
+    "DepthLayers", "Detail", "Fragments", "Overlap", "Plan", "SceneDepthLayers", "SceneFragments", "ViewLayers",
 })  # fmt: skip
 """Classes that functions return: nobody calls them."""
 
@@ -48,6 +49,7 @@ MEMBERS: Mapping[str, tuple[str, ...]] = {
         "triangle", "depth", "mask", "barycentric", "interpolate", "samples_triangle", "samples_depth", "sample",
         "only",
     ),
+    "Overlap": ("means", "sums", "totals", "spread", "to_scipy"),
     "DepthLayers": ("triangle", "depth", "count", "layer"),
     "Mesh": ("bounds", "vertex_normals"),
     "Instance": ("is_mirrored",),

@@ -132,7 +132,8 @@ static void color_rows(const uint8_t *colors, int n_channels, int64_t first, int
     for (int64_t i = first; i < end; i++) {
         const uint8_t *color = colors + n_channels * i;
         float *row = rows + 4 * i;
-        row[0] = (float)color[0], row[1] = (float)color[1], row[2] = (float)color[2], row[3] = 1.0f;
+        row[0] = (float)color[0], row[1] = (float)color[1], row[2] = (float)color[2];
+        row[3] = n_channels == 4 ? (float)color[3] / 255.0f : 1.0f;
     }
 }
 

@@ -20,12 +20,15 @@ from topleft._lod.detail import Detail, choose_detail
 from topleft._lod.levels import Level, Levels
 from topleft._lod.simplify import simplify
 from topleft._model.adapt import as_mesh
+from topleft._model.environment import Environment
 from topleft._model.light import Fog, Light
 from topleft._model.material import Material
 from topleft._model.mesh import Mesh
 from topleft._model.scene import Instance, Scene
 from topleft._model.texture import Texture
 from topleft._plan.plan import Plan, plan
+from topleft._polygons.overlap import Overlap, overlap
+from topleft._polygons.polygons import polygons
 from topleft._raster.classic import bresenham_line
 from topleft._raster.composite import composite
 from topleft._raster.fragments import Fragments
@@ -59,6 +62,7 @@ __all__ = [
     "Camera",
     "DepthLayers",
     "Detail",
+    "Environment",
     "FisheyeLens",
     "Fog",
     "Fragments",
@@ -74,6 +78,7 @@ __all__ = [
     "MeshError",
     "MissingPackageError",
     "OpenCVLens",
+    "Overlap",
     "Plan",
     "Rasterizer",
     "Scene",
@@ -94,8 +99,10 @@ __all__ = [
     "height_map",
     "load",
     "overdraw",
+    "overlap",
     "peel",
     "plan",
+    "polygons",
     "rasterize",
     "rasterize_mesh",
     "release_memory",

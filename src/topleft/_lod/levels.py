@@ -27,7 +27,7 @@ __all__ = ["Level", "Levels", "keep_levels", "kept_levels"]
 F64 = npt.NDArray[np.float64]
 
 #: The arrays of a mesh, by the names that they have in files.
-ARRAYS = ("vertices", "triangles", "normals", "colors", "uv", "material_of_triangle")
+ARRAYS = ("vertices", "triangles", "normals", "colors", "uv", "uv1", "material_of_triangle")
 
 
 @dataclass(frozen=True, eq=False)

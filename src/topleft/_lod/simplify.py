@@ -37,7 +37,7 @@ MOST_OF_LEVEL = 1_000_000
 MOST_POWER = 2.0
 
 #: The attributes of vertices, by their names in a mesh.
-ATTRIBUTES = ("normals", "colors", "uv")
+ATTRIBUTES = ("normals", "colors", "uv", "uv1")
 
 F64 = npt.NDArray[np.float64]
 I32 = npt.NDArray[np.int32]

@@ -1,6 +1,7 @@
 """What is drawn: meshes, scenes, materials, textures and lights.
 
 adapt.py     makes a `Mesh` of the meshes and materials of other libraries
+environment.py  defines `Environment`: light from all around, with its blurred levels
 light.py     defines `Light` and `Fog`
 material.py  defines `Material`: what a surface is made of
 mesh.py      defines `Mesh`: vertices, triangles and their attributes, checked once

@@ -16,6 +16,7 @@ import numpy.typing as npt
 from topleft._base.arrays import as_array, as_checked_triangles
 from topleft._model.material import Material
 from topleft._model.normals import angle_weighted_normals, box_of_triangles
+from topleft._model.texture import Texture
 from topleft._raster.clusters import Clusters, box_of
 
 FloatArray = npt.NDArray[np.floating[Any]]
@@ -41,7 +42,8 @@ class Mesh:
     normals : (V, 3) array_like of real numbers, optional
         Directions, of any length; `None`: not known, `vertex_normals` computes them.
     colors : (V, 3) or (V, 4) array_like of uint8, optional
-        sRGB colours, with or without alpha.
+        sRGB colours, with or without alpha: what is behind shows through where a mesh has no materials, or materials
+        that blend.
     uv : (V, 2) array_like of real numbers, optional
         Where each vertex lies in a texture: u from left to right, v from the bottom up, 0 to 1. Kept as float32. Where
         a texture has a seam, vertices stand twice.
@@ -49,6 +51,8 @@ class Mesh:
         What the triangles are made of.
     material_of_triangle : (T,) array_like of integers, optional
         The row of `materials` that each triangle has; the first unless given.
+    uv1 : (V, 2) array_like of real numbers, optional
+        A second set of texture coordinates, for textures with `uv_set=1`.
 
     Raises
     ------
@@ -77,6 +81,7 @@ class Mesh:
     uv: F32 | None = None
     materials: tuple[Material, ...] = ()
     material_of_triangle: I32 | None = None
+    uv1: F32 | None = None
 
     def __post_init__(self) -> None:
         vertices = _real_array(self.vertices, "vertices")
@@ -92,8 +97,9 @@ class Mesh:
             keep(self, "normals", _read_only(normals))
         if self.colors is not None:
             keep(self, "colors", _read_only(_color_array(self.colors, len(vertices))))
-        if self.uv is not None:
-            keep(self, "uv", _read_only(_uv_array(self.uv, len(vertices))))
+        for name in ("uv", "uv1"):
+            if getattr(self, name) is not None:
+                keep(self, name, _read_only(_uv_array(name, getattr(self, name), len(vertices))))
         keep(self, "materials", _material_tuple(self.materials))
         if self.material_of_triangle is not None:
             rows = _material_rows(self.material_of_triangle, len(triangles), len(self.materials))
@@ -144,6 +150,22 @@ class Mesh:
         if self.normals is not None:
             return self.normals
         return self._computed_normals
+
+    @cached_property
+    def has_alpha(self) -> bool:
+        """Whether the colours of the vertices are not all opaque."""
+        return self.colors is not None and self.colors.shape[1] == 4 and bool((self.colors[:, 3] < 255).any())
+
+    def single_sided(self, material: Material | None = None) -> npt.NDArray[np.uint8] | None:
+        """Which triangles (T,) have a back that does not show, by their material or by this one; None if none."""
+        materials = self.materials if material is None else (material,)
+        if all(one.double_sided for one in materials):
+            return None
+        rows = self.material_of_triangle if material is None else None
+        if rows is None:
+            is_single = not materials[0].double_sided
+            return np.ones(len(self.triangles), np.uint8) if is_single else None
+        return np.array([not one.double_sided for one in materials], np.uint8)[rows]
 
     @cached_property
     def vertex_box(self) -> F64:
@@ -288,12 +310,12 @@ def _color_array(values: npt.ArrayLike, n_vertices: int) -> U8:
     return np.ascontiguousarray(array)
 
 
-def _uv_array(values: npt.ArrayLike, n_vertices: int) -> F32:
-    array = as_array("uv", values)
+def _uv_array(name: str, values: npt.ArrayLike, n_vertices: int) -> F32:
+    array = as_array(name, values)
     if array.dtype.kind not in "fiu":
-        raise TypeError(f"uv must hold real numbers, got {array.dtype}")
+        raise TypeError(f"{name} must hold real numbers, got {array.dtype}")
     if array.shape != (n_vertices, 2):
-        raise ValueError(f"uv must have shape ({n_vertices}, 2), got {array.shape}")
+        raise ValueError(f"{name} must have shape ({n_vertices}, 2), got {array.shape}")
     return np.ascontiguousarray(array, np.float32)
 
 
@@ -337,5 +359,15 @@ def _read_only(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
 
 def has_holes(material: Material, mesh: Mesh) -> bool:
     """Whether the material leaves something out of the triangles that have it."""
-    texture = material.texture if mesh.uv is not None else None
-    return bool(material.alpha_cutoff) and texture is not None and bool((texture.image[..., 3] < 255).any())
+    return material.alpha_mode == "mask" and bool(material.alpha_cutoff) and has_opacity(material, mesh)
+
+
+def has_opacity(material: Material, mesh: Mesh) -> bool:
+    """Whether some of the surface may not be opaque: by the material, its texture, or the colours of the vertices."""
+    texture = material.texture if is_laid(material.texture, mesh) else None
+    return material.opacity < 1 or mesh.has_alpha or (texture is not None and texture.has_alpha)
+
+
+def is_laid(texture: Texture | None, mesh: Mesh) -> bool:
+    """Whether there is a texture, and the mesh has its set of uv."""
+    return texture is not None and (mesh.uv, mesh.uv1)[texture.uv_set] is not None

@@ -117,6 +117,7 @@ class BentMesh:
             None if mesh.uv is None else spread(mesh.uv).astype(np.float32),
             mesh.materials,
             None if rows is None else rows[self.source],
+            None if mesh.uv1 is None else spread(mesh.uv1).astype(np.float32),
         )
 
     def outline(self, projection: F64, cull: str) -> I64:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from topleft._render.blended import is_blended
 from topleft._render.fragments import VisiblePart, meshes_of
 from topleft._render.gbuffer import GBuffer, PointKind, points_of, project
 from topleft._render.render import picture_of, render
@@ -31,7 +32,8 @@ def color(gbuffer: GBuffer) -> Array:
     if "opacity" in options:
         return render_transparent(gbuffer.subject, gbuffer.camera, gbuffer.size, **options)
     sampling = options.pop("sampling", "center")
-    if sampling == "center":
+    is_glass = is_blended(gbuffer.subject, options.get("material"), options.get("shading", "smooth"))
+    if sampling == "center" and not is_glass:
         return picture_of(gbuffer.frags, gbuffer.subject, gbuffer.camera, **options)
     options |= {"sampling": sampling, "rasterizer": gbuffer.rasterizer}
     return render(gbuffer.subject, gbuffer.camera, gbuffer.size, **options)

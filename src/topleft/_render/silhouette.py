@@ -88,6 +88,6 @@ def silhouette(
     if isinstance(subject, Scene):
         return draw_scene_coverage(subject, camera, size, out, **options)
     drawn = seen_through(subject, camera, view.get("viewport") or size, near_clip=view.get("near_clip", True))
-    options["transform"] = drawn.transform
+    options |= {"transform": drawn.transform, "plan": drawn.sided(view.get("plan"), subject.single_sided())}
     mask: npt.NDArray[Any] = coverage(drawn.vertices, drawn.triangles, size, out=out, **options)
     return mask

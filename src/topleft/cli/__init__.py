@@ -1,4 +1,4 @@
-"""The command line: `topleft render MESH [MESH ...] -o OUT`, `topleft explain MESH`, `calibrate` and `info`.
+"""The command line: `topleft render MESH [MESH ...] -o OUT`, `topleft explain MESH`, `mask`, `calibrate` and `info`.
 
 Exit status: 0, all pictures were written; 1, some of several inputs failed and the rest were written; 2, nothing could
 be done with what was asked, told in one line on stderr.
@@ -7,6 +7,7 @@ animation.py  writes the views of a mesh one after the other, by Pillow or ffmpe
 arguments.py  defines what `topleft render` takes
 explain.py    runs `topleft explain` and `topleft calibrate`
 job_file.py   reads jobs from TOML or JSON
+mask.py       runs `topleft mask`
 render.py     runs `topleft render`: from arguments to files
 sheet.py      puts many pictures, reduced, on one
 targets.py    finds which picture goes to which file, before anything is drawn
@@ -21,6 +22,7 @@ from collections.abc import Mapping, Sequence
 from topleft._engine.isa import build_info
 from topleft.cli.arguments import REFUSED, Parser, UsageError, add_render_arguments
 from topleft.cli.explain import add_plan_commands
+from topleft.cli.mask import add_mask_command
 from topleft.cli.render import FAILED, complain, one_line, run_render
 from topleft.errors import TopleftError
 
@@ -61,4 +63,5 @@ def _parser() -> Parser:
     add_render_arguments(render)
     render.set_defaults(run=run_render)
     add_plan_commands(commands)
+    add_mask_command(commands)
     return parser

@@ -130,6 +130,11 @@ def add_picture_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add("--texture", metavar="FILE", help="a picture for all of a mesh that has texture coordinates")
     add("--matcap", metavar="FILE", help="a picture of a lit sphere, for --shading matcap")
+    add(
+        "--environment",
+        metavar="SKY,GROUND",
+        help="light from all around: a colour, one above and one below, or a picture of all directions",
+    )
     add("--opacity", type=_share, default=None, metavar="X", help="0 to 1: as if of glass, of which each layer hides X")
     add(
         "--tolerance",

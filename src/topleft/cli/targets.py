@@ -13,12 +13,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from topleft._base.options import Sampling
 from topleft._batch.jobs import Job
 from topleft._camera.camera import Camera
 from topleft._io.images import SUFFIXES
 from topleft._io.load import load
+from topleft._model.environment import Environment
 from topleft._model.material import Material
 from topleft._model.mesh import Mesh
 from topleft._model.texture import Texture
@@ -58,7 +60,36 @@ class MeshSource:
 
 
 def read_texture(path: str) -> Texture:
-    """The picture of a file.
+    """The picture of a file; errors as of `read_image`."""
+    return Texture(read_image(path))
+
+
+def read_environment(text: str, up: str) -> Environment:
+    """The light from all around that a colour, two of them, or the picture of a file tells.
+
+    Raises
+    ------
+    UsageError
+        If it is neither.
+    ImageError, OSError
+        As of `read_image`.
+    """
+    from PIL import ImageColor
+
+    top = (0.0, 0.0, 1.0) if up == "z" else (0.0, 1.0, 0.0)
+    try:
+        colors = [ImageColor.getcolor(name.strip(), "RGB") for name in text.split(",")]
+    except ValueError:
+        if not Path(text).suffix:
+            raise UsageError(f"--environment must be one or two colours or a picture, got {text!r}") from None
+        return Environment(image=read_image(text)[..., :3], up=top)
+    if len(colors) > 2:
+        raise UsageError(f"--environment must be one or two colours, got {len(colors)}")
+    return Environment(colors[0], colors[1] if len(colors) == 2 else None, up=top)  # type: ignore[arg-type]
+
+
+def read_image(path: str) -> npt.NDArray[np.uint8]:
+    """The picture (H, W, 4) of a file.
 
     Raises
     ------
@@ -71,7 +102,7 @@ def read_texture(path: str) -> Texture:
 
     try:
         with Image.open(path) as image:
-            return Texture(np.asarray(image.convert("RGBA")))
+            return np.asarray(image.convert("RGBA"))
     except UnidentifiedImageError:
         raise ImageError(f"cannot read {path!r}: it is no picture that Pillow knows") from None
 
@@ -147,6 +178,8 @@ def _render_options(options: argparse.Namespace) -> dict[str, Any]:
     }
     if options.matcap is not None:
         drawing["matcap"] = read_texture(options.matcap)
+    if options.environment is not None:
+        drawing["environment"] = read_environment(options.environment, options.up)
     if options.opacity is None:
         return drawing | {"edges": options.wireframe, "sampling": options.sampling}
     if options.wireframe or options.sampling != Sampling.CENTER:
