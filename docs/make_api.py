@@ -24,7 +24,7 @@ SUBJECTS: Mapping[str, tuple[str, ...]] = {
     "Layers of triangles, sorted by depth": ("peel", "DepthLayers", "composite"),
     "Meshes and scenes": ("Mesh", "load", "as_mesh", "Instance", "Scene"),
     "Materials and light": ("Material", "Texture", "Light", "Fog", "Environment"),
-    "Cameras": ("Camera", "OpenCVLens", "FisheyeLens", "turntable", "viewpoints"),
+    "Cameras": ("Camera", "OpenCVLens", "FisheyeLens", "load_cameras", "turntable", "viewpoints"),
     "Pictures": ("render", "render_transparent", "silhouette", "save_image"),
     "Buffers and layers of a mesh": (
         "rasterize_mesh", "SceneFragments", "shade", "render_layers", "ViewLayers", "visible_layers",

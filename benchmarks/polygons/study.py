@@ -75,6 +75,10 @@ def measure(case: PolygonCase, options: Options, record: Record) -> None:
             start = time.perf_counter()
             made = calls[name]()
             took = time.perf_counter() - start
+            if took > options.slow_s:  # what comes first may be slow for other reasons
+                start = time.perf_counter()
+                made = calls[name]()
+                took = min(took, time.perf_counter() - start)
             wrong, worst = errors(made, right, case)
         except ImportError as error:
             record["skipped"].append({"case": case.name, "painter": name, "reason": str(error)})

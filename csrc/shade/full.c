@@ -20,6 +20,28 @@
 #include "shade/surroundings.c"
 #include "shade/texture.c"
 
+/* A set of uv whose coefficients begin at `first`, those of its gradients at `gradient`. */
+TL_INLINE void find_uv(const shaded_lanes *p, int first, int gradient, vf *uv, vf *du, vf *dv)
+{
+    const vf u = vf_mul(weighed(p, first, first + 1, first + 2), p->inv_q);
+    const vf v = vf_mul(weighed(p, first + 3, first + 4, first + 5), p->inv_q);
+    uv[0] = u, uv[1] = v;
+    for (int axis = 0; axis < 2; axis++) {
+        const vf q = pick(p, gradient + 3 * axis);
+        du[axis] = vf_mul(vf_sub(pick(p, gradient + 3 * axis + 1), vf_mul(u, q)), p->inv_q);
+        dv[axis] = vf_mul(vf_sub(pick(p, gradient + 3 * axis + 2), vf_mul(v, q)), p->inv_q);
+    }
+}
+
+/* What only full materials and holes need. */
+static void set_more(shaded_lanes *p)
+{
+    if (p->s->needs_uv1)
+        find_uv(p, RUN_UV1, RUN_GRADIENT1, p->uv1, p->du1, p->dv1);
+    if (p->s->needs_alpha)
+        p->alpha = vf_mul(weighed(p, RUN_ALPHA, RUN_ALPHA + 1, RUN_ALPHA + 2), p->inv_q);
+}
+
 /* A texture where its set of uv and its transform lay it. */
 TL_INLINE void look_up(const shaded_lanes *p, const tl_texture *t, vf *rgba, int n_channels)
 {
@@ -162,6 +184,8 @@ static void light_rough(const shaded_lanes *p, const tl_material *m, const vf *f
 static void shade_full(shaded_lanes *p, const tl_material *m, vf *rgb)
 {
     vf found[4], occlusion = vf_set1(1.0f);
+    if (p->s->needs_more)
+        set_more(p);
     find_base(p, m, rgb);
     if (m->is_unlit)
         return;

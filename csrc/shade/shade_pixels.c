@@ -96,29 +96,7 @@ TL_INLINE void set_normals(shaded_lanes *p)
         replace_normals(p, has_none);
 }
 
-/* A set of uv whose coefficients begin at `first`, those of its gradients at `gradient`. */
-TL_INLINE void find_uv(const shaded_lanes *p, int first, int gradient, vf *uv, vf *du, vf *dv)
-{
-    const vf u = vf_mul(weighed(p, first, first + 1, first + 2), p->inv_q);
-    const vf v = vf_mul(weighed(p, first + 3, first + 4, first + 5), p->inv_q);
-    uv[0] = u, uv[1] = v;
-    for (int axis = 0; axis < 2; axis++) {
-        const vf q = pick(p, gradient + 3 * axis);
-        du[axis] = vf_mul(vf_sub(pick(p, gradient + 3 * axis + 1), vf_mul(u, q)), p->inv_q);
-        dv[axis] = vf_mul(vf_sub(pick(p, gradient + 3 * axis + 2), vf_mul(v, q)), p->inv_q);
-    }
-}
-
 TL_INLINE void set_uv_lanes(shaded_lanes *p) { find_uv(p, RUN_U, RUN_GRADIENT, p->uv, p->du, p->dv); }
-
-/* What only full materials and holes need. */
-static void set_more(shaded_lanes *p)
-{
-    if (p->s->needs_uv1)
-        find_uv(p, RUN_UV1, RUN_GRADIENT1, p->uv1, p->du1, p->dv1);
-    if (p->s->needs_alpha)
-        p->alpha = vf_mul(weighed(p, RUN_ALPHA, RUN_ALPHA + 1, RUN_ALPHA + 2), p->inv_q);
-}
 
 /* The colours of the vertices: interpolated as sRGB values, rounded to whole ones, then turned to light. */
 TL_INLINE void set_colors(shaded_lanes *p)
@@ -268,8 +246,6 @@ TL_INLINE void shade_pixels(shaded_lanes *p, int64_t row, const float *depth, vf
             set_colors(p);
         if (s->needs_point)
             set_points(p, row, depth);
-        if (s->needs_more)
-            set_more(p);
         if (shading->material_of)
             shade_materials(p, rgb);
         else

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, get_type_hints
 from topleft import scenes
 from topleft._base.memory import release_memory
 from topleft._camera.camera import Camera
+from topleft._camera.file_cameras import load_cameras
 from topleft._camera.lens import FisheyeLens, OpenCVLens
 from topleft._camera.viewpoints import turntable, viewpoints
 from topleft._engine.isa import build_info
@@ -38,7 +39,7 @@ from topleft._render.fragments import SceneDepthLayers, SceneFragments
 from topleft._render.render import rasterize_mesh, render
 from topleft._render.scene_shade import shade
 from topleft._render.silhouette import silhouette
-from topleft.errors import ImageError, MeshError, MissingPackageError, TopleftError
+from topleft.errors import ImageError, MeshError, MeshWarning, MissingPackageError, TopleftError
 
 if TYPE_CHECKING:
     from topleft._batch.batch import render_batch
@@ -76,6 +77,7 @@ __all__ = [
     "Material",
     "Mesh",
     "MeshError",
+    "MeshWarning",
     "MissingPackageError",
     "OpenCVLens",
     "Overlap",
@@ -98,6 +100,7 @@ __all__ = [
     "fill",
     "height_map",
     "load",
+    "load_cameras",
     "overdraw",
     "overlap",
     "peel",

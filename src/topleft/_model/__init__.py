@@ -6,6 +6,7 @@ light.py     defines `Light` and `Fog`
 material.py  defines `Material`: what a surface is made of
 mesh.py      defines `Mesh`: vertices, triangles and their attributes, checked once
 normals.py   computes the normals of triangles and vertices, and the box round triangles
+polygons.py  cuts polygons into triangles
 scene.py     defines `Scene` and `Instance`: meshes placed in one world
 texture.py   defines `Texture`: a picture as linear light, with its mip levels
 """

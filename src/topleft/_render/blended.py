@@ -29,10 +29,10 @@ from topleft._model.scene import Instance, Scene
 from topleft._raster.peel import peel_meshes
 from topleft._raster.rasterize import refuse_many
 from topleft._raster.view import View
-from topleft._render.fragments import SceneFragments, meshes_of, scene_of
+from topleft._render.fragments import SceneFragments, meshes_of, parts_of, scene_of
 from topleft._render.holes import without_holes
 from topleft._render.instances import PlacedScene, draw_nearest, place
-from topleft._render.scene_shade import shade_by
+from topleft._render.scene_shade import shade_by, shade_part
 from topleft._shade.shade import Shading, ShadingOptions
 
 __all__ = ["draw_blended", "is_blended"]
@@ -76,13 +76,7 @@ def is_blended(subject: Mesh | Scene, material: Material | None, shading: str = 
 
 
 def draw_blended(
-    subject: Mesh | Scene,
-    camera: Camera,
-    size: tuple[int, int],
-    *,
-    sampling: str,
-    cull: str,
-    options: ShadingOptions,
+    subject: Mesh | Scene, camera: Camera, size: tuple[int, int], *, sampling: str, cull: str, options: ShadingOptions
 ) -> tuple[U8, SceneFragments]:
     """The picture, and what is opaque in it."""
     scene = scene_of(subject)
@@ -151,15 +145,14 @@ class Glass:
         layers = [self.peel(frags, k) for k in range(len(positions))]
         is_seen = np.logical_or.reduce([ids[0] >= 0 for ids, _ in layers])
         at = np.nonzero(is_seen)
+        numbers = np.empty(is_seen.shape, np.int32)
+        numbers[at] = np.arange(len(at[0]), dtype=np.int32)
         light, alpha = np.zeros((len(at[0]), 3), np.float32), np.zeros(len(at[0]), np.float32)
         for k, planes in enumerate(layers):
-            sample = frags.sample(k)
             under = picture
             if len(positions) > 1:
-                under = shade_by(sample.only(*at), self.scene, self.camera, self.under)
-            own_light, own_alpha = self.composite(*planes, positions[k], under, at)
-            light += own_light
-            alpha += own_alpha
+                under = shade_by(frags.sample(k).only(*at), self.scene, self.camera, self.under)
+            self.composite(*planes, positions[k], under[at], numbers, light, alpha)
         color = light / np.maximum(alpha, np.float32(1e-20))[:, None]
         steps = np.rint(np.minimum(color, 1) * LINEAR_ONE).astype(np.int64)
         picture[at[0], at[1], :3] = srgb_tables()[1][steps]
@@ -171,25 +164,38 @@ class Glass:
         there, nearest = (planes[k] for planes in frags.drawn_planes)
         for n in (LAYERS, MOST_LAYERS):
             ids, depth = peel_meshes(SCRATCH, seen, self.view, n, is_farthest=False)
-            ids[(depth > nearest) | ((depth == nearest) & (ids > there) & (there >= 0))] = -1
+            for own_ids, own_depth in zip(ids, depth, strict=True):
+                if not (own_ids >= 0).any():
+                    break
+                own_ids[(own_depth > nearest) | ((own_depth == nearest) & (own_ids > there) & (there >= 0))] = -1
             if not (ids[-1] >= 0).any():
                 break
         return ids, depth
 
     def composite(
-        self, ids: npt.NDArray[np.int32], depth: F32, at_sample: tuple[int, int], under: U8, at: tuple[Any, ...]
-    ) -> tuple[F32, F32]:
-        """Light times opacity (P, 3), and opacity (P,), of the layers over what is opaque, at some pixels."""
-        through = np.ones(len(at[0]), np.float32)
-        light = np.zeros((len(at[0]), 3), np.float32)
+        self,
+        ids: npt.NDArray[np.int32],
+        depth: F32,
+        at_sample: tuple[int, int],
+        under: U8,
+        numbers: npt.NDArray[np.int32],
+        light: F32,
+        alpha: F32,
+    ) -> None:
+        """Add what a sample sees to light times opacity (P, 3), and to opacity (P,); `numbers` (H, W) names the pixels.
+
+        `under` (P, 4): the colours of what is opaque.
+        """
+        through = np.ones(len(under), np.float32)
         for k in range(len(ids)):
             if not (ids[k] >= 0).any():
                 break
             layer = SceneFragments(ids[k : k + 1], depth[k : k + 1], self.placed, [at_sample])
-            own = shade_by(layer, self.scene, self.camera, self.options)[at]
-            share = through * (own[:, 3] / np.float32(255))
-            light += share[:, None] * LIGHT_OF_SRGB[own[:, :3]]
-            through -= share
-        behind = under[at]
-        share = through * (behind[:, 3] / np.float32(255))
-        return light + share[:, None] * LIGHT_OF_SRGB[behind[:, :3]], 1 - through + share
+            for part in parts_of(layer, self.scene):
+                own, pixels = shade_part(part, self.camera, self.options)[part.seen], numbers[part.box][part.seen]
+                share = through[pixels] * (own[:, 3] / np.float32(255))
+                light[pixels] += share[:, None] * LIGHT_OF_SRGB[own[:, :3]]
+                through[pixels] -= share
+        share = through * (under[:, 3] / np.float32(255))
+        light += share[:, None] * LIGHT_OF_SRGB[under[:, :3]]
+        alpha += 1 - through + share

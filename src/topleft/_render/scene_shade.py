@@ -25,7 +25,7 @@ from topleft._render.fragments import SceneFragments, VisiblePart, join, meshes_
 from topleft._shade.look import is_similarity
 from topleft._shade.shade import Shading, ShadingOptions, shade_mesh, shade_numbers, shade_samples
 
-__all__ = ["shade", "shade_by"]
+__all__ = ["shade", "shade_by", "shade_part"]
 
 U8 = npt.NDArray[np.uint8]
 
@@ -129,14 +129,19 @@ def shade_by(frags: Fragments, mesh: Mesh | Scene, camera: Camera, options: Shad
     if options.mode in (Shading.IDS, Shading.DEPTH):
         return shade_numbers(frags, camera, options)
 
-    def shade_part(part: VisiblePart) -> U8:
-        return shade_mesh(*part.drawn, part.camera(camera), in_space_of(part.instance, options, camera))
+    def shade_own(part: VisiblePart) -> U8:
+        return shade_part(part, camera, options)
 
     def shade_one(sample: Fragments) -> U8:
-        return join(parts_of(sample, mesh), (*sample.id.shape, 4), options.background, shade_part, np.uint8)
+        return join(parts_of(sample, mesh), (*sample.id.shape, 4), options.background, shade_own, np.uint8)
 
     # The kernel resolves the samples of one mesh; those of several are resolved here.
     return shade_one(frags) if isinstance(mesh, Mesh) else shade_samples(frags, shade_one, options.background)
+
+
+def shade_part(part: VisiblePart, camera: Camera, options: ShadingOptions) -> U8:
+    """The picture of the rectangle of a part."""
+    return shade_mesh(*part.drawn, part.camera(camera), in_space_of(part.instance, options, camera))
 
 
 def check_drawn(frags: Fragments, mesh: Mesh | Scene) -> None:

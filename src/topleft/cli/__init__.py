@@ -1,6 +1,7 @@
 """The command line: `topleft render MESH [MESH ...] -o OUT`, `topleft explain MESH`, `mask`, `calibrate` and `info`.
 
-Exit status: 0, all pictures were written; 1, some of several inputs failed and the rest were written; 2, nothing could
+Exit status: 0, all pictures were written; 1, some of several inputs failed and the rest were written, or, with
+--strict, a mesh lacks something of its file; 2, nothing could
 be done with what was asked, told in one line on stderr.
 
 animation.py  writes the views of a mesh one after the other, by Pillow or ffmpeg
@@ -20,10 +21,11 @@ import sys
 from collections.abc import Mapping, Sequence
 
 from topleft._engine.isa import build_info
+from topleft._io.notes import listening
 from topleft.cli.arguments import REFUSED, Parser, UsageError, add_render_arguments
 from topleft.cli.explain import add_plan_commands
 from topleft.cli.mask import add_mask_command
-from topleft.cli.render import FAILED, complain, one_line, run_render
+from topleft.cli.render import FAILED, complain, complain_of_lacks, one_line, run_render
 from topleft.errors import TopleftError
 
 __all__ = ["FAILED", "REFUSED", "UsageError", "main"]
@@ -33,7 +35,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Return the exit status of the command line, `sys.argv` unless arguments are given."""
     options = _parser().parse_args(arguments)
     try:
-        status: int = options.run(options)
+        with listening() as lacks:
+            status: int = options.run(options)
+        complain_of_lacks(lacks)
     except (TopleftError, OSError, ValueError, MemoryError) as error:
         complain(one_line(error))
         return REFUSED

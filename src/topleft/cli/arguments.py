@@ -28,7 +28,7 @@ LAYERS_OF_ONE_VIEW = tuple(name for name in LAYERS if name != "flow")
 """Flow needs a second camera, or a second place."""
 
 RENDER_HELP = f"""\
-MESH is a file that trimesh reads (OBJ, PLY, STL, glTF, GLB, OFF, ...) or the name of a built-in shape:
+MESH is a file (OBJ, PLY, glTF, GLB, STL, OFF, and what else trimesh reads) or the name of a built-in shape:
 {", ".join(SHAPES)}.
 
 OUT is a file or a folder:
@@ -54,7 +54,10 @@ what stands outside of jobs, or on the command line, holds where a job does not 
   out = "thumbs/{{name}}-{{view}}.png"              "out": "thumbs/{{name}}-{{view}}.png",
   views = 12                                     "views": 12}}]}}
 
-Exit status: 0, all was written; 1, something failed, which is listed, and the rest was written; 2, nothing was.
+What a mesh lacks of its file (textures that are not there, say) is told in one line at the end.
+
+Exit status: 0, all was written; 1, something failed, which is listed, and the rest was written, or --strict and a
+mesh lacks something; 2, nothing was written.
 """
 
 
@@ -81,6 +84,7 @@ def add_render_arguments(parser: Parser) -> None:
     add("--jobs", type=positive, default=1, metavar="N", help="pictures that are drawn side by side (default 1)")
     add("--jobs-file", metavar="FILE", help="what to render, as TOML or JSON; see below")
     add("--resume", action="store_true", help="leave out pictures whose files are there")
+    add("--strict", action="store_true", help="exit with 1 if a mesh lacks something of its file: a texture, say")
     add("--sheet", metavar="FILE", help=f"all pictures on one sheet: {' '.join(PICTURE_SUFFIXES)}")
     add(
         "--animation",
@@ -111,6 +115,7 @@ def add_picture_arguments(parser: argparse.ArgumentParser) -> None:
     add("--elevation", type=float, default=elevation, metavar="DEG", help="above level (default %(default)g)")
     add("--fov", type=float, default=DEFAULT_FOV_Y_DEG, metavar="DEG", help="bottom to top (default %(default)g)")
     add("--ortho", action="store_true", help="no perspective")
+    add("--camera", type=_index, default=None, metavar="N", help="the camera N of a glTF file, from 0")
     add("--up", choices=["y", "z"], default="y", help="the axis that points up (default y)")
     add = parser.add_argument_group("look").add_argument
     add(
@@ -167,6 +172,12 @@ def positive(text: str) -> int:
     """A positive whole number."""
     if not (text.isdecimal() and int(text)):
         raise argparse.ArgumentTypeError(f"must be a positive whole number, got {text!r}")
+    return int(text)
+
+
+def _index(text: str) -> int:
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"must be a whole number from 0, got {text!r}")
     return int(text)
 
 

@@ -18,8 +18,10 @@ import numpy.typing as npt
 from topleft._base.options import Sampling
 from topleft._batch.jobs import Job
 from topleft._camera.camera import Camera
+from topleft._camera.file_cameras import load_cameras
 from topleft._io.images import SUFFIXES
 from topleft._io.load import load
+from topleft._io.references import decoded
 from topleft._model.environment import Environment
 from topleft._model.material import Material
 from topleft._model.mesh import Mesh
@@ -98,12 +100,15 @@ def read_image(path: str) -> npt.NDArray[np.uint8]:
     OSError
         If it cannot be read.
     """
-    from PIL import Image, UnidentifiedImageError
-
+    if not Path(path).is_file() and Path(path).exists():
+        raise ImageError(f"cannot read {path!r}: it is no file")
     try:
-        with Image.open(path) as image:
-            return np.asarray(image.convert("RGBA"))
-    except UnidentifiedImageError:
+        return decoded(Path(path).read_bytes())
+    except MeshError as error:
+        raise ImageError(f"cannot read {path!r}: it is {error}") from None
+    except (OSError, ValueError, SyntaxError, EOFError) as error:
+        if isinstance(error, OSError) and error.filename is not None:
+            raise
         raise ImageError(f"cannot read {path!r}: it is no picture that Pillow knows") from None
 
 
@@ -131,6 +136,21 @@ class Orbit:
 
 
 @dataclass(frozen=True)
+class FileCamera:
+    """A camera of the file of the mesh."""
+
+    path: str
+    index: int
+
+    def __call__(self, mesh: Mesh, size: tuple[int, int]) -> Camera:  # noqa: ARG002
+        """Read it."""
+        cameras = [] if self.path in SHAPES else load_cameras(self.path)
+        if self.index >= len(cameras):
+            raise MeshError(f"--camera {self.index}: {self.path!r} has {len(cameras)} cameras")
+        return cameras[self.index]
+
+
+@dataclass(frozen=True)
 class MeshJobs:
     """A mesh and its jobs, one for each view."""
 
@@ -147,6 +167,8 @@ def plan_jobs(options: argparse.Namespace, start: int = 0) -> list[MeshJobs]:
     UsageError
         If OUT cannot hold the pictures.
     """
+    if options.camera is not None and options.views > 1:
+        raise UsageError("--camera does not go with --views: a camera of a file stands still")
     pattern = _pattern(options.out, options)
     drawing = _render_options(options)
     groups = []
@@ -157,10 +179,12 @@ def plan_jobs(options: argparse.Namespace, start: int = 0) -> list[MeshJobs]:
             # Not str.format: a folder may have other braces in its name.
             filled = pattern.replace("{view}", f"{i_view:03d}").replace("{index}", f"{i_mesh:03d}")
             azimuth_deg = options.azimuth + 360 * i_view / options.views
-            orbit = Orbit(azimuth_deg, options.elevation, options.fov, options.up, options.ortho)
+            camera: Orbit | FileCamera = Orbit(azimuth_deg, options.elevation, options.fov, options.up, options.ortho)
+            if options.camera is not None:
+                camera = FileCamera(source, options.camera)
             path = filled.replace("{name}", name)
             layers = _layers(path, options)
-            jobs.append(Job(MeshSource(source, options.texture), orbit, options.size, drawing, path, layers))
+            jobs.append(Job(MeshSource(source, options.texture), camera, options.size, drawing, path, layers))
         groups.append(MeshJobs(source, name, tuple(jobs)))
     return groups
 
