@@ -582,31 +582,31 @@ def points_of_ids(glctx: RasterizeContext, meshes: Meshes, ids: Any, *, grad_db:
     flat = torch.from_numpy(ids).reshape(-1)
     pixels = (flat >= 0).nonzero().squeeze(1)
     i_tri = flat[pixels].long()
-    corners = meshes.tri[i_tri].long()
+    corners = meshes.tri[i_tri].long().T
     if meshes.pos.ndim == 3:
-        corners = corners + (pixels // (height * width) * meshes.pos.shape[1])[:, None]
-    x, y, z, w = meshes.pos.reshape(-1, 4)[corners].double().unbind(2)
+        corners = corners + pixels // (height * width) * meshes.pos.shape[1]
+    x, y, z, w = meshes.pos.reshape(-1, 4)[corners].double().movedim(2, 0).contiguous()  # each (3, N)
     x_ndc = ((pixels % width).double() * 2 + 1) / width - 1
     y_ndc = ((pixels // width % height).double() * 2 + 1) / height - 1
-    x, y = x - x_ndc[:, None] * w, y - y_ndc[:, None] * w
+    x, y = x - x_ndc * w, y - y_ndc * w
 
     # Twice the areas, times w, between the eye's ray and two corners, and how they change across the picture.
-    (x1, y1, w1), (x2, y2, w2) = ([one.roll(-k, 1) for one in (x, y, w)] for k in (1, 2))
+    (x1, y1, w1), (x2, y2, w2) = ([one.roll(-k, 0) for one in (x, y, w)] for k in (1, 2))
     area = x1 * y2 - y1 * x2
-    total = nonzero(area.sum(1, keepdim=True))
+    total = nonzero(area.sum(0))
     weights = area / total
-    zw = ((z * area).sum(1) / nonzero((w * area).sum(1))).clamp(-1, 1)
-    uv = weights[:, :2].clamp(0, 1)
-    uv = uv / uv.sum(1, keepdim=True).clamp(min=1)
+    zw = ((z * area).sum(0) / nonzero((w * area).sum(0))).clamp(-1, 1)
+    uv = weights[:2].clamp(0, 1)
+    uv = uv / uv.sum(0).clamp(min=1)
     channel = torch.from_numpy(floats_of_ids(i_tri.numpy() + 1, np.dtype(str(meshes.pos.dtype).split(".")[1])))
-    rows = torch.cat([uv, zw[:, None]], 1).to(meshes.pos.dtype)
-    rast = spread(torch.cat([rows, channel[:, None]], 1), pixels, ids.shape)
+    rows = [*(one.to(meshes.pos.dtype) for one in (*uv, zw)), channel]
+    rast = spread(torch.stack(rows, 1), pixels, ids.shape)
     if not glctx.output_db:
         return rast, rast.new_zeros((*ids.shape, 0))
     by_x, by_y = (2 / width) * (y1 * w2 - w1 * y2), (2 / height) * (w1 * x2 - x1 * w2)
-    slopes = [(by - weights * by.sum(1, keepdim=True)) / total for by in (by_x, by_y)]
-    rows_db = torch.stack([slopes[0][:, 0], slopes[1][:, 0], slopes[0][:, 1], slopes[1][:, 1]], 1)
-    rast_db = spread(rows_db.to(meshes.pos.dtype), pixels, ids.shape)
+    (u_x, v_x), (u_y, v_y) = ((by[:2] - weights[:2] * by.sum(0)) / total for by in (by_x, by_y))
+    rows = [one.to(meshes.pos.dtype) for one in (u_x, u_y, v_x, v_y)]
+    rast_db = spread(torch.stack(rows, 1), pixels, ids.shape)
     return rast, rast_db if grad_db else rast_db.detach()
 
 
