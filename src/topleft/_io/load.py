@@ -21,15 +21,19 @@ from topleft._io.obj import read_obj
 from topleft._io.ply import read_ply
 from topleft._io.references import MAX_TEXTURE_PIXELS, MAX_VERTICES, InputFile
 from topleft._io.stl import read_stl
-from topleft._model.adapt import joined
-from topleft._model.mesh import Mesh
+from topleft._model.adapt import DEFAULT_CREASE, joined
+from topleft._model.mesh import Mesh, as_crease
 from topleft.errors import MeshError, MissingPackageError
 
 Made = TypeVar("Made")
 
 
 def load(
-    path: str | os.PathLike[str], *, max_vertices: int = MAX_VERTICES, max_texture_pixels: int = MAX_TEXTURE_PIXELS
+    path: str | os.PathLike[str],
+    *,
+    crease: float = DEFAULT_CREASE,
+    max_vertices: int = MAX_VERTICES,
+    max_texture_pixels: int = MAX_TEXTURE_PIXELS,
 ) -> Mesh:
     """A mesh read from a file: OBJ, PLY, STL, glTF and GLB; by trimesh OFF, 3MF and what else it has readers for.
 
@@ -37,6 +41,9 @@ def load(
     ----------
     path : path
         The end of its name tells the format.
+    crease : float
+        Degrees, 0 to 180: edges at which triangles bend by more are sharp, where the file has no normals; see `Mesh`.
+        180: none is, 0: all are.
     max_vertices : int
         A file with more, or one that says so, is refused.
     max_texture_pixels : int
@@ -71,13 +78,14 @@ def load(
     Files that a mesh names are read from its folder, and from the folders in it; nothing else is opened. What is read
     of each format is told in docs/guide/files.md.
     """
+    crease = as_crease(crease)
     source = InputFile(Path(path), max_vertices=max_vertices, max_texture_pixels=max_texture_pixels)
-    mesh = reading(source, lambda: _mesh(source))
+    mesh = reading(source, lambda: _mesh(source, crease))
     tell(source.notes.lines, stacklevel=2)
     return mesh
 
 
-def _mesh(source: InputFile) -> Mesh:
+def _mesh(source: InputFile, crease: float) -> Mesh:
     match source.path.suffix.lower():
         case suffix if suffix in GLTF_SUFFIXES:
             parts = read_gltf(source)
@@ -94,7 +102,7 @@ def _mesh(source: InputFile) -> Mesh:
             line.partition(": ")[2].removesuffix(" not drawn") for line in source.notes.lines if "not drawn" in line
         ]
         raise MeshError(f"{str(source.path)!r} has no triangles" + (f", but {' and '.join(drawn)}" if drawn else ""))
-    return joined(parts)
+    return joined(parts, crease)
 
 
 def reading(source: InputFile, read: Callable[[], Made]) -> Made:
