@@ -263,7 +263,8 @@ static inline int64_t tl_blend_cells(int64_t width)
 
 /* The layers that are seen through each other, and their colours: straight, alpha last. */
 typedef struct {
-    const int32_t *ids; /* planes, of the first pixel on; -1 ends the layers of a pixel */
+    const int32_t *ids;  /* planes, of the first pixel on; -1, or what is no triangle, ends the layers of a pixel */
+    int64_t n_triangles; /* that were peeled */
     int64_t plane_px;
     int n_layers;
     int n_channels; /* 2 or 4 */

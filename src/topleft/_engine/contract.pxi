@@ -146,7 +146,7 @@ cdef extern from "topleft.h" nogil:
         int is_first, is_last
     ctypedef struct tl_composite:
         const int32_t *ids
-        int64_t plane_px
+        int64_t n_triangles, plane_px
         int n_layers, n_channels, is_u8, is_flat
         const void *colors
         const float *background

@@ -243,6 +243,7 @@ def peel(
 ) -> int: ...
 def composite(
     ids: NDArray[np.int32],
+    n_triangles: int,
     first_row: int,
     n_rows: int,
     colors: NDArray[np.uint8],

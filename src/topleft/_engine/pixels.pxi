@@ -94,7 +94,7 @@ def mean_colors(painted, pixels, int64_t first_row, int64_t n_rows, int n_channe
             K.mean_colors(&planes[first], sample_bits, height * width, n_rows * width, n_channels, is_u8, own, &flat[first])
 
 
-def composite(const int32_t[:, :, ::1] ids, int64_t first_row, int64_t n_rows, const uint8_t[::1] colors, bint is_flat, bint is_u8,
+def composite(const int32_t[:, :, ::1] ids, int64_t n_triangles, int64_t first_row, int64_t n_rows, const uint8_t[::1] colors, bint is_flat, bint is_u8,
               int n_channels, const float[::1] background, uint8_t[::1] pixels):
     """Write what is seen through layers, planes (K, H, W), in rows [first_row, first_row + n_rows) of a picture.
 
@@ -106,7 +106,8 @@ def composite(const int32_t[:, :, ::1] ids, int64_t first_row, int64_t n_rows, c
     if n == 0:
         return
     layers.ids, layers.plane_px, layers.n_layers = &ids[0, first_row, 0], ids.shape[1] * width, ids.shape[0]
-    layers.n_channels, layers.is_u8, layers.is_flat, layers.colors = n_channels, is_u8, is_flat, data(colors)
+    layers.n_triangles, layers.colors = n_triangles, data(colors)
+    layers.n_channels, layers.is_u8, layers.is_flat = n_channels, is_u8, is_flat
     layers.background = &background[0] if background is not None else NULL
     with nogil:
         K.composite(&layers, n, &pixels[first_row * width * pixel_bytes])
