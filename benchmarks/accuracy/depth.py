@@ -107,9 +107,7 @@ def shows_behind_as(keep: Callable[[F64, F64], NDArray[Any]]) -> Count:
 
     def count(sheets: Sheets, frame_px: int, pixels: Pixels) -> int:  # noqa: ARG001
         i_cell, weights = pixels
-        front, behind = (
-            keep(weights, standard_z(w, sheets.far)[i_cell]) for w in (sheets.front_w, sheets.behind_w)
-        )
+        front, behind = (keep(weights, standard_z(w, sheets.far)[i_cell]) for w in (sheets.front_w, sheets.behind_w))
         is_wrong = (behind < front) | ((behind == front) & sheets.is_behind_first[i_cell])
         return int(is_wrong.sum())
 

@@ -124,5 +124,3 @@ def chart_tutorial(record: Record) -> Figure:
     ]
     axis.legend(handles=handles, loc="lower right", fontsize=8.5)
     return figure
-
-

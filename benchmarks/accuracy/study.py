@@ -49,10 +49,7 @@ MEASURES: Mapping[str, Callable[[Options], Record]] = {
 
 
 def run_accuracy(
-    options: Options,
-    parts: Sequence[str] = (),
-    record: Record | None = None,
-    save: Save = forget,
+    options: Options, parts: Sequence[str] = (), record: Record | None = None, save: Save = forget
 ) -> Record:
     """Measure the named parts, all for none, and return the record with them; `save` gets it after each.
 

@@ -84,8 +84,10 @@ def methods_text(methods: list[str]) -> str:
     shown = methods if len(methods) < 5 else [*methods[:4], f"{len(methods) - 4} more"]
     text = ", ".join(shown)
     if len(text) > 62:
-        text = ", ".join(shown[: len(shown) // 2 + len(shown) % 2]) + ",\n" + ", ".join(
-            shown[len(shown) // 2 + len(shown) % 2 :]
+        text = (
+            ", ".join(shown[: len(shown) // 2 + len(shown) % 2])
+            + ",\n"
+            + ", ".join(shown[len(shown) // 2 + len(shown) % 2 :])
         )
     return text
 

@@ -214,10 +214,7 @@ def simpler(value: float, least: int) -> Iterator[float]:
 def windows(scene: Scene, is_fault: NDArray[np.bool_]) -> Iterator[Scene]:
     """Yield what lies in small windows round pixels that are at fault."""
     for row, column in np.argwhere(is_fault)[:20].tolist():
-        at = (
-            max(0, scene.origin[0] + column - WINDOW_PX // 2),
-            max(0, scene.origin[1] + row - WINDOW_PX // 2),
-        )
+        at = (max(0, scene.origin[0] + column - WINDOW_PX // 2), max(0, scene.origin[1] + row - WINDOW_PX // 2))
         corners = scene.vertices[scene.triangles] - at
         is_near = (corners.max(axis=1) > -1).all(axis=1) & (corners.min(axis=1) < WINDOW_PX + 1).all(axis=1)
         yield scene._replace(triangles=scene.triangles[is_near], size=(WINDOW_PX, WINDOW_PX), origin=at)

@@ -28,7 +28,12 @@ def chart_levels(record: dict[str, Any]) -> Figure:
     n_columns = min(2, len(meshes))
     n_rows = -(-len(meshes) // n_columns)
     figure, panels = plt.subplots(
-        n_rows, n_columns, figsize=(5.2 * n_columns, 3.5 * n_rows), squeeze=False, sharex=True, sharey=True,
+        n_rows,
+        n_columns,
+        figsize=(5.2 * n_columns, 3.5 * n_rows),
+        squeeze=False,
+        sharex=True,
+        sharey=True,
         layout="constrained",
     )
     for panel, mesh in zip(panels.flat, meshes, strict=False):

@@ -61,11 +61,11 @@ def page(record: dict[str, Any]) -> str:
     parts = [HEAD.format(tolerance=record["tolerance"])]
     parts.append(
         f"Measured {record['date'][:10]} on {machine['cpu']}, {record['isa']}: `rasterize` of {width}x{height} pixels "
-        f"on one thread, on memory that is kept, the best of {record['rounds']} rounds in turns. \"Measured\" is how "
+        f'on one thread, on memory that is kept, the best of {record["rounds"]} rounds in turns. "Measured" is how '
         "far a sample of one outline lies from the other, to the spacing of samples (an eighth of a pixel for small "
         "pictures of the mesh, a whole one for the largest): one sample more or less counts as that, whatever the "
-        "bound. \"Full\" and \"level\" are drawn from arrays, \"in clusters\" is the full mesh as one that is drawn "
-        "again; \"faster\" is the level beside the first, and beside the second.\n"
+        'bound. "Full" and "level" are drawn from arrays, "in clusters" is the full mesh as one that is drawn '
+        'again; "faster" is the level beside the first, and beside the second.\n'
     )
     for mesh in record["meshes"]:
         parts.append(f"## {mesh['name']}, {mesh['n_triangles']:,} triangles\n")
@@ -91,10 +91,7 @@ def write_page(record: dict[str, Any], docs: Path) -> list[Path]:
     """Write the page and its chart."""
     from benchmarks.levels.charts import chart_png
 
-    found = {
-        docs / "measured" / "levels.md": page(record).encode(),
-        docs / "images" / "levels.png": chart_png(record),
-    }
+    found = {docs / "measured" / "levels.md": page(record).encode(), docs / "images" / "levels.png": chart_png(record)}
     for path, data in found.items():
         write_whole(path, data)
     return list(found)

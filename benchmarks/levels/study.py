@@ -33,6 +33,7 @@ SAMPLES = 1200
 TOLERANCE = 0.5
 FOV_Y_DEG = 40.0
 
+
 @dataclass(frozen=True)
 class Options:
     """What to measure."""

@@ -17,11 +17,7 @@ import topleft as tl
 from benchmarks.pictures.scenes import SIZE, PictureScene
 from topleft._base.color import DEFAULT_COLOR
 
-ENVIRONMENT = {
-    "LIBGL_ALWAYS_SOFTWARE": "1",
-    "GALLIUM_DRIVER": "llvmpipe",
-    "LP_NUM_THREADS": "0",
-}
+ENVIRONMENT = {"LIBGL_ALWAYS_SOFTWARE": "1", "GALLIUM_DRIVER": "llvmpipe", "LP_NUM_THREADS": "0"}
 
 MAX_LIGHTS = 8
 """That the shader has room for."""

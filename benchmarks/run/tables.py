@@ -38,10 +38,7 @@ def scene_lines(scene: dict[str, Any]) -> Iterator[str]:
     yield ""
     runs = scene["runs"]
     if runs:
-        yield from table(
-            [*HEAD[:5], f"x {runs[0]['name']}", *HEAD[5:]],
-            [run_cells(run) for run in runs],
-        )
+        yield from table([*HEAD[:5], f"x {runs[0]['name']}", *HEAD[5:]], [run_cells(run) for run in runs])
     for yardstick in scene["yardsticks"]:
         yield ""
         yield (

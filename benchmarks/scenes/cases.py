@@ -65,11 +65,7 @@ class Scene:
     def load(cls, folder: Path) -> Scene:
         """Read what `save` wrote."""
         facts = json.loads((folder / "scene.json").read_text())
-        arrays = {
-            name: np.load(folder / f"{name}.npy")
-            for name in ARRAYS
-            if (folder / f"{name}.npy").exists()
-        }
+        arrays = {name: np.load(folder / f"{name}.npy") for name in ARRAYS if (folder / f"{name}.npy").exists()}
         return cls(task=facts["task"], size=tuple(facts["size"]), cull=facts["cull"], **arrays)
 
 
@@ -107,9 +103,7 @@ def orbit_camera(size: tuple[int, int]) -> NDArray[np.float64]:
     return Camera.perspective(orbit_view([0, 0, 0], 3.0, 30.0, 20.0), near=0.1, far=100.0).clip_from_world(size)
 
 
-def blob_scene(
-    n_triangles: int, *, wide: bool = False, cull: str = "back", size: tuple[int, int] = HD
-) -> Scene:
+def blob_scene(n_triangles: int, *, wide: bool = False, cull: str = "back", size: tuple[int, int] = HD) -> Scene:
     """The bumpy sphere under the orbit camera, in float32 and int32, or `wide`: in float64 and int64."""
     from topleft import scenes
 

@@ -88,6 +88,7 @@ def picture(rows: str) -> npt.NDArray[np.int32]:
     return np.array([[-1 if sign == "." else int(sign, 36) for sign in row] for row in rows.split("/")], np.int32)
 
 
+# fmt: off
 _SCENES: tuple[FailureScene, ...] = (
     # begin: written by `python -m benchmarks atlas --scenes`
     FailureScene(
@@ -369,6 +370,7 @@ _SCENES: tuple[FailureScene, ...] = (
     ),
     # end
 )
+# fmt: on
 
 FAILURE_SCENES: Mapping[str, FailureScene] = MappingProxyType({scene.name: scene for scene in _SCENES})
 """By name."""

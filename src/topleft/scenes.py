@@ -159,9 +159,7 @@ def to_clip(vertices: F64, matrix: F64) -> F64:
 def to_pixels(clip: F64, width: int = 1920, height: int = 1080) -> F64:
     """Pixel-space vertices (V, 3) of clip-space vertices (V, 4) with w > 0: x px, y px (down), z in [0, 1]."""
     ndc = clip[:, :3] / clip[:, 3:]
-    return np.stack(
-        [(ndc[:, 0] + 1) * width / 2, (1 - ndc[:, 1]) * height / 2, (ndc[:, 2] + 1) / 2], axis=-1
-    )
+    return np.stack([(ndc[:, 0] + 1) * width / 2, (1 - ndc[:, 1]) * height / 2, (ndc[:, 2] + 1) / 2], axis=-1)
 
 
 # Shapes in object space: closed, outward counter-clockwise
@@ -185,11 +183,7 @@ def blob(n_triangles: int, seed: int = 3) -> Shape:  # noqa: ARG001
     small_bumps = 0.03 * np.cos(23 * phi + 17 * theta) * np.sin(theta) ** 2
     radius = 1 + large_bumps + small_bumps
     vertices = np.stack(
-        [
-            radius * np.sin(theta) * np.cos(phi),
-            radius * np.cos(theta) + 0 * phi,
-            radius * np.sin(theta) * np.sin(phi),
-        ],
+        [radius * np.sin(theta) * np.cos(phi), radius * np.cos(theta) + 0 * phi, radius * np.sin(theta) * np.sin(phi)],
         axis=-1,
     )
     return vertices.reshape(-1, 3), _grid_triangles(rows, columns)
@@ -216,18 +210,14 @@ def torus(radius: float = 1.0, tube_radius: float = 0.4, segments: int = 128, se
     return _tube(curve, tangent, -curve, tube_radius, sections)
 
 
-def torus_knot(
-    p: int = 2, q: int = 3, tube_radius: float = 0.32, segments: int = 512, sections: int = 48
-) -> Shape:
+def torus_knot(p: int = 2, q: int = 3, tube_radius: float = 0.32, segments: int = 512, sections: int = 48) -> Shape:
     """The (p, q) knot on a torus of radii 1 and 0.5 about the z axis, with a round tube."""
     t = np.linspace(0, 2 * np.pi, segments, endpoint=False)
     ring = 1 + 0.5 * np.cos(q * t)
     ring_t = -0.5 * q * np.sin(q * t)
     cos, sin = np.cos(p * t), np.sin(p * t)
     curve = np.stack([ring * cos, ring * sin, 0.5 * np.sin(q * t)], axis=-1)
-    tangent = np.stack(
-        [ring_t * cos - p * ring * sin, ring_t * sin + p * ring * cos, 0.5 * q * np.cos(q * t)], axis=-1
-    )
+    tangent = np.stack([ring_t * cos - p * ring * sin, ring_t * sin + p * ring * cos, 0.5 * q * np.cos(q * t)], axis=-1)
     outward_of_torus = np.stack([np.cos(q * t) * cos, np.cos(q * t) * sin, np.sin(q * t)], axis=-1)
     return _tube(curve, tangent, outward_of_torus, tube_radius, sections)
 

@@ -25,10 +25,7 @@ def opencv_px(point, terms):
     x, y = point[0] / point[2], point[1] / point[2]
     r2 = x**2 + y**2
     radial = (1 + k1 * r2 + k2 * r2**2 + k3 * r2**3) / (1 + k4 * r2 + k5 * r2**2 + k6 * r2**3)
-    x, y = (
-        x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x**2),
-        y * radial + p1 * (r2 + 2 * y**2) + 2 * p2 * x * y,
-    )
+    x, y = (x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x**2), y * radial + p1 * (r2 + 2 * y**2) + 2 * p2 * x * y)
     return K[0, 0] * x + K[0, 1] * y + K[0, 2], K[1, 1] * y + K[1, 2]
 
 
@@ -72,9 +69,7 @@ def test_project_fisheye_is_that_of_opencv():
     cv2 = pytest.importorskip("cv2")
     rotation, _ = cv2.Rodrigues(POSE[:3, :3])
     straight = K * [[1, 0, 1], [1, 1, 1], [1, 1, 1]]
-    expected, _ = cv2.fisheye.projectPoints(
-        POINTS[:, None], rotation, POSE[:3, 3], straight, np.array(FISHEYE_TERMS)
-    )
+    expected, _ = cv2.fisheye.projectPoints(POINTS[:, None], rotation, POSE[:3, 3], straight, np.array(FISHEYE_TERMS))
     camera = Camera.from_intrinsics(straight, POSE, SIZE, near=0.1, far=10, fisheye=FISHEYE_TERMS)
     assert np.abs(camera.project(POINTS, SIZE)[:, :2] - 0.5 - expected[:, 0]).max() < 1e-9
 

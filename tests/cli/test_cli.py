@@ -96,9 +96,7 @@ def test_render_camera_options_reach_the_camera(run):
     others = ["--ortho", "--up", "z", "--cull", "back", "--threads", "1"]
     assert run("render", "cube", "-o", "cube.png", *SMALL, *angles, *others)[0] == 0
     mesh = Mesh(*scenes.shape("cube"))
-    camera = Camera.framing(
-        mesh, azimuth_deg=-30, elevation_deg=10, fov_y_deg=25, ortho=True, up="z", aspect=64 / 48
-    )
+    camera = Camera.framing(mesh, azimuth_deg=-30, elevation_deg=10, fov_y_deg=25, ortho=True, up="z", aspect=64 / 48)
     assert np.array_equal(np.asarray(Image.open("cube.png")), render(mesh, camera, (64, 48)))
 
 
@@ -249,10 +247,7 @@ def test_render_many_goes_on_after_a_failure(run, folder):
     status, lines = run("render", "cube", "broken.obj", "nope.ply", "torus", "-o", "out", *SMALL)
     assert status == 1
     assert lines[0].startswith("topleft: cannot read 'broken.obj'")
-    assert lines[1:] == [
-        "topleft: there is no file 'nope.ply'",
-        "topleft: 2 of 4 meshes failed: broken.obj nope.ply",
-    ]
+    assert lines[1:] == ["topleft: there is no file 'nope.ply'", "topleft: 2 of 4 meshes failed: broken.obj nope.ply"]
     assert names(folder) == ["broken.obj", "out/cube.png", "out/torus.png"]
 
 

@@ -204,9 +204,7 @@ def test_scene_instances_have_a_level_each():
     far[:3, 3], large[:3, 3] = [-3, 0, -200], [30, 0, -100]
     scene = tl.Scene([BLOB, (BLOB, far), (BLOB, large)])
     camera = tl.Camera.look_at((0, 0, 4), far=1000)
-    meshes = [
-        tl.choose_detail(BLOB, camera, SIZE, tolerance=0.5, transform=one.transform).mesh for one in scene
-    ]
+    meshes = [tl.choose_detail(BLOB, camera, SIZE, tolerance=0.5, transform=one.transform).mesh for one in scene]
     assert len(meshes[1].triangles) < len(meshes[0].triangles)
     assert len(meshes[2].triangles) > len(meshes[1].triangles)
     same = tl.Scene([(mesh, one.transform) for mesh, one in zip(meshes, scene, strict=True)])

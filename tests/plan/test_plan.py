@@ -82,9 +82,7 @@ def test_what_covers_is_about_what_is_counted(isa):
     _engine.use_isa(isa)
     try:
         vertices, triangles, _ = random_triangles(3000, 12, *SIZE)
-        facts, _ = find_facts(
-            vertices, triangles, View.parse(SIZE, {}), "overdraw", ("overdraw",), None
-        )
+        facts, _ = find_facts(vertices, triangles, View.parse(SIZE, {}), "overdraw", ("overdraw",), None)
         drawn = tl.overdraw(vertices, triangles, SIZE).sum()
         assert drawn == pytest.approx(facts.covered, rel=0.05)  # areas against samples, and boxes cut by the frame
     finally:

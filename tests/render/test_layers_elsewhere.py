@@ -102,10 +102,6 @@ def test_color_with_an_opacity_is_that_of_glass():
 # Cut-outs
 
 
-
-
-
-
 @pytest.mark.parametrize("lens", [None, LENSES["barrel"]])
 def test_layers_show_what_is_behind_a_hole(lens):
     found = look(replace(FRONT, lens=lens), "triangle", "distance", subject=pierced())

@@ -1,6 +1,5 @@
 """Scenes: instances into one buffer, bit for bit the picture of one mesh that holds all of them."""
 
-
 import numpy as np
 import pytest
 from comparing import assert_same

@@ -30,8 +30,6 @@ def expected_ids(mesh):
     return ids
 
 
-
-
 @pytest.mark.parametrize("order", [(0, 1, 2, 3), (3, 2, 1, 0), (2, 0, 3, 1)])
 def test_cutout_shows_the_nearest_that_is_left(order):
     mesh = layers(order)

@@ -79,5 +79,3 @@ def test_empty_picture_and_picture_of_nothing():
 def test_samplings_without_an_order_are_refused(sampling):
     with pytest.raises(ValueError, match=f"sampling '{sampling}' gives no ids"):
         tl.render(KNOT, size=SIZE, sampling=sampling)
-
-

@@ -46,10 +46,7 @@ def test_every_kind_of_scene_is_measured(record):
     assert {row["kind"] for row in record["rows"]} == {scene.kind for scene in scenes(0.02)}
 
 
-@pytest.mark.parametrize(
-    ("choice", "chosen"),
-    [("depth test", "ids alone"), ("method", "auto"), ("shares", "bands")],
-)
+@pytest.mark.parametrize(("choice", "chosen"), [("depth test", "ids alone"), ("method", "auto"), ("shares", "bands")])
 def test_first_way_is_that_of_the_planner(choice, chosen):
     ways = CHOICES[choice](flat_scene())
     assert ways[0].name == chosen

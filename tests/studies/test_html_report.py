@@ -36,10 +36,7 @@ def html_of(text):
         ("[a](b.md) & ![c](d.png)", '<p><a href="b.md">a</a> &amp; <img alt="c" src="d.png"></p>'),
         ("![a](b.png)", '<figure><img alt="a" src="b.png"></figure>'),
         ("<!-- table: x -->\ntext\n<!-- end -->", "<p>text</p>"),
-        (
-            "| a | b |\n|---|--:|\n| `1` | 2 |",
-            f'<div class="wide"><table>{HEAD}<tbody>{ROW}</tbody></table></div>',
-        ),
+        ("| a | b |\n|---|--:|\n| `1` | 2 |", f'<div class="wide"><table>{HEAD}<tbody>{ROW}</tbody></table></div>'),
     ],
 )
 def test_markdown_block_becomes_html(text, expected):

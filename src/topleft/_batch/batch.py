@@ -296,6 +296,7 @@ class _InFlight:
 
     def _next_done(self) -> _Task:
         """Take out a task that is done, the earliest of them."""
+
         def is_done(task: _Task) -> bool:
             return task.future is None or task.future.done()
 

@@ -139,9 +139,7 @@ def orbit_view(
     if not -90 <= elevation_deg <= 90:
         raise ValueError(f"elevation_deg must lie in -90 to 90, got {elevation_deg}")
     azimuth, elevation = np.radians([azimuth_deg, elevation_deg])
-    outward = np.array(
-        [np.cos(elevation) * np.sin(azimuth), np.sin(elevation), np.cos(elevation) * np.cos(azimuth)]
-    )
+    outward = np.array([np.cos(elevation) * np.sin(azimuth), np.sin(elevation), np.cos(elevation) * np.cos(azimuth)])
     axis = np.array([0.0, 1.0, 0.0])
     if abs(elevation_deg) > 89:  # from a pole: the limit of the pictures on the way there
         axis = np.array([-np.sin(azimuth), 0, -np.cos(azimuth)]) * np.sign(elevation)
@@ -236,6 +234,4 @@ def check_planes(near: float, far: float) -> None:
 def check_window(left: float, right: float, bottom: float, top: float) -> None:
     """Raise a `ValueError` unless the four sides are finite and in order."""
     if not (np.isfinite([left, right, bottom, top]).all() and left < right and bottom < top):
-        raise ValueError(
-            f"left < right and bottom < top must be finite, got {left} and {right}, {bottom} and {top}"
-        )
+        raise ValueError(f"left < right and bottom < top must be finite, got {left} and {right}, {bottom} and {top}")

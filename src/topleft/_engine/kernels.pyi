@@ -273,12 +273,7 @@ def fill_bands(
     end_band: int,
 ) -> None: ...
 def mean_colors(
-    painted: NDArray[Any],
-    pixels: NDArray[Any],
-    first_row: int,
-    n_rows: int,
-    n_channels: int,
-    transfer: Transfer | None,
+    painted: NDArray[Any], pixels: NDArray[Any], first_row: int, n_rows: int, n_channels: int, transfer: Transfer | None
 ) -> None: ...
 
 class Mipmap:

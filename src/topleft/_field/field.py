@@ -214,8 +214,7 @@ def _is_per_face(values: npt.NDArray[Any], n_vertices: int, n_faces: int, per: P
     fits_vertices, fits_faces = values.shape == (n_vertices,), values.shape == (n_faces,)
     if per is Per.AUTO and fits_vertices and fits_faces:
         raise ValueError(
-            f"values has {n_faces} numbers, and there are as many faces as vertices: "
-            "say per='triangle' or per='vertex'"
+            f"values has {n_faces} numbers, and there are as many faces as vertices: say per='triangle' or per='vertex'"
         )
     if fits_faces and per is not Per.VERTEX:
         return True

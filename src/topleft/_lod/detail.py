@@ -186,9 +186,7 @@ def window_of(size: tuple[int, int], viewport: tuple[int, int] | None, origin: t
     return ends
 
 
-def pixels_of_bound(
-    matrix: F64, viewport: tuple[int, int], window: F64, original: Level, level: Level
-) -> float | None:
+def pixels_of_bound(matrix: F64, viewport: tuple[int, int], window: F64, original: Level, level: Level) -> float | None:
     """How far a point that shows may be off, pixels; None where nothing is known of that.
 
     Parameters

@@ -117,12 +117,7 @@ class Facts:
 
 
 def find_facts(
-    vertices: ArrayLike,
-    triangles: ArrayLike,
-    view: View,
-    verb: str,
-    outputs: tuple[str, ...],
-    test: DepthTest | None,
+    vertices: ArrayLike, triangles: ArrayLike, view: View, verb: str, outputs: tuple[str, ...], test: DepthTest | None
 ) -> tuple[Facts, NDArray[np.int32]]:
     """Return what a scene is, and its triangles as a copy that nobody changes.
 

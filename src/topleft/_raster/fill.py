@@ -78,13 +78,7 @@ class Blending:
 
 
 def draw_fill(
-    memory: Memory,
-    vertices: ArrayLike,
-    triangles: ArrayLike,
-    colors: ArrayLike,
-    view: View,
-    style: Style,
-    out: object,
+    memory: Memory, vertices: ArrayLike, triangles: ArrayLike, colors: ArrayLike, view: View, style: Style, out: object
 ) -> NDArray[Any]:
     """`fill`, on the memory given."""
     if view.sampling in (Sampling.OUTER, Sampling.INNER):
@@ -150,13 +144,7 @@ def lay_ground(pixels: NDArray[Any], ground: NDArray[Any]) -> None:
 
 
 def paint(
-    memory: Memory,
-    snapped: Snapped,
-    view: View,
-    colors: NDArray[Any],
-    pixels: NDArray[Any],
-    *,
-    is_flat: bool,
+    memory: Memory, snapped: Snapped, view: View, colors: NDArray[Any], pixels: NDArray[Any], *, is_flat: bool
 ) -> None:
     """Draw coloured triangles over contiguous pixels: first which triangle shows in each, then its colour."""
     width, height = view.size

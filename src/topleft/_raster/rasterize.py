@@ -285,12 +285,7 @@ def draw_samples(memory: Memory, snapped: Snapped, view: View, asked: Asked, dra
     return Fragments.of_samples(ids, depth, meshes, snapped.n_vertices, snapped.n_triangles)
 
 
-ROUTES = {
-    Route.LABELS: draw_labels,
-    Route.FLAT: draw_flat,
-    Route.DEPTH: draw_depth,
-    Route.SAMPLES: draw_samples,
-}
+ROUTES = {Route.LABELS: draw_labels, Route.FLAT: draw_flat, Route.DEPTH: draw_depth, Route.SAMPLES: draw_samples}
 
 
 def draw_clusters(memory: Memory, vertices: ArrayLike, view: View, asked: Asked) -> Fragments | None:

@@ -375,23 +375,13 @@ class Rasterizer:
         return View.parse(self.size, options)
 
     def coverage(
-        self,
-        vertices: ArrayLike,
-        triangles: ArrayLike,
-        *,
-        out: NDArray[Any] | None = None,
-        **view: Unpack[ViewOptions],
+        self, vertices: ArrayLike, triangles: ArrayLike, *, out: NDArray[Any] | None = None, **view: Unpack[ViewOptions]
     ) -> NDArray[Any]:
         """Return the mask of the pixels that a triangle covers, as `topleft.coverage` does."""
         return draw_coverage(self._memory, vertices, triangles, self._view(view), out)
 
     def overdraw(
-        self,
-        vertices: ArrayLike,
-        triangles: ArrayLike,
-        *,
-        out: NDArray[Any] | None = None,
-        **view: Unpack[ViewOptions],
+        self, vertices: ArrayLike, triangles: ArrayLike, *, out: NDArray[Any] | None = None, **view: Unpack[ViewOptions]
     ) -> NDArray[Any]:
         """Return how many triangles cover each pixel, as `topleft.overdraw` does."""
         return draw_overdraw(self._memory, vertices, triangles, self._view(view), out)

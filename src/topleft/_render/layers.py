@@ -181,4 +181,3 @@ def draw_layers(names: str | Iterable[str], gbuffer: GBuffer) -> dict[str, Array
     # Colours first: in memory that is kept they may need other samples than the visibility buffer of all others.
     drawn = {name: LAYERS[name](gbuffer) for name in sorted(checked, key=lambda name: name != "color")}
     return {name: drawn[name] for name in checked}
-

@@ -106,9 +106,7 @@ def render(
     255
     """
     subject, camera = subject_of(mesh, camera, size, tolerance, cull=cull, material=look.get("material"))
-    frags = rasterize_subject(
-        subject, camera, size, rasterizer, cull=cull, threads=threads, sampling=sampling
-    )
+    frags = rasterize_subject(subject, camera, size, rasterizer, cull=cull, threads=threads, sampling=sampling)
     return picture_of(
         frags, subject, camera, shading=shading, color=color, background=background, cull=cull, edges=edges,
         threads=threads, **look,

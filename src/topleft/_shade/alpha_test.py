@@ -97,8 +97,15 @@ def cut_sample(sample: Fragments, mesh: Mesh, camera: Camera, cut: Cut, n_thread
 
 
 def draw_cut(
-    scene: _engine.SnappedMesh, mesh: Mesh, camera: Camera, cut: Cut, ids: I32, depth: F32,
-    *, is_peeled: bool, n_threads: int,
+    scene: _engine.SnappedMesh,
+    mesh: Mesh,
+    camera: Camera,
+    cut: Cut,
+    ids: I32,
+    depth: F32,
+    *,
+    is_peeled: bool,
+    n_threads: int,
 ) -> None:
     """Draw the triangles with holes over the planes of a visibility buffer (1, H, W), or of layers (K, H, W)."""
     triangles = cut.triangles

@@ -235,9 +235,7 @@ def shade_samples(frags: Fragments, shade_one: Callable[[Fragments], U8], backgr
     return picture
 
 
-def shade_normals(
-    frags: Fragments, mesh: Mesh, camera: Camera, turn: F64, *, threads: int | None = None
-) -> F32:
+def shade_normals(frags: Fragments, mesh: Mesh, camera: Camera, turn: F64, *, threads: int | None = None) -> F32:
     """Unit normals (H, W, 3) float32 of the visible pixels, on the side that is seen, 0 where nothing is.
 
     Parameters

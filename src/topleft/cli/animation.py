@@ -80,6 +80,7 @@ def save_animation(
 
     check_animation(path)
     suffix = path.suffix.lower()
+
     def read() -> Iterator[Picture]:
         for file in files:
             with Image.open(file) as image:

@@ -29,17 +29,17 @@ LAYERS_OF_ONE_VIEW = tuple(name for name in LAYERS if name != "flow")
 
 RENDER_HELP = f"""\
 MESH is a file that trimesh reads (OBJ, PLY, STL, glTF, GLB, OFF, ...) or the name of a built-in shape:
-{', '.join(SHAPES)}.
+{", ".join(SHAPES)}.
 
 OUT is a file or a folder:
   knot.png           one picture; with --views 12: knot-000.png to knot-011.png
   pictures/          a folder, made if need be: pictures/bunny.png, or pictures/bunny-000.png, ...
   a/{{name}}-{{view}}.jpg   a pattern: {{name}} of the mesh, {{view}} and {{index}} of the mesh in the list, as numbers,
                      {{layer}}; several layers without it: knot-color.png, knot-depth.png, ...
-Formats: {' '.join(SUFFIXES)} (PNG in a folder). A picture of that name is replaced, a mesh never.
+Formats: {" ".join(SUFFIXES)} (PNG in a folder). A picture of that name is replaced, a mesh never.
 
---layers: {', '.join(LAYERS_OF_ONE_VIEW[:8])},
-{', '.join(LAYERS_OF_ONE_VIEW[8:])}; id is short for triangle.
+--layers: {", ".join(LAYERS_OF_ONE_VIEW[:8])},
+{", ".join(LAYERS_OF_ONE_VIEW[8:])}; id is short for triangle.
 .npz holds all layers of a view in one file, and clip_from_world, the 4x4 matrix; without --layers color, triangle and
 depth. .npy and TIFF hold ids as int32 (-1: nothing) and all other numbers as float32 (depth and distances: +inf where
 nothing is). In a PNG they are 16-bit numbers, 0 where nothing is: ids plus 1, distances in thousandths, depth from 1
@@ -82,8 +82,11 @@ def add_render_arguments(parser: Parser) -> None:
     add("--jobs-file", metavar="FILE", help="what to render, as TOML or JSON; see below")
     add("--resume", action="store_true", help="leave out pictures whose files are there")
     add("--sheet", metavar="FILE", help=f"all pictures on one sheet: {' '.join(PICTURE_SUFFIXES)}")
-    add("--animation", metavar="FILE",
-        help=f"the views of a mesh one after the other ({{name}} of the mesh): {' '.join(ANIMATION_SUFFIXES)}")
+    add(
+        "--animation",
+        metavar="FILE",
+        help=f"the views of a mesh one after the other ({{name}} of the mesh): {' '.join(ANIMATION_SUFFIXES)}",
+    )
     add("--fps", type=_rate, default=20.0, metavar="N", help="views a second of an animation (default 20)")
 
 
@@ -96,8 +99,13 @@ def add_picture_arguments(parser: argparse.ArgumentParser) -> None:
     add("--size", type=size, default=DEFAULT_SIZE, metavar="WxH", help=f"pixels (default {width}x{height})")
     add("--views", type=positive, default=1, metavar="N", help="a turntable of N pictures (default 1)")
     add("--layers", type=_layers, default=(), metavar="NAME,...", help="what to write; see below (default color)")
-    add("--threads", type=positive, default=None, metavar="N",
-        help="of a picture (default: as many as there are cores, 1 with --jobs)")
+    add(
+        "--threads",
+        type=positive,
+        default=None,
+        metavar="N",
+        help="of a picture (default: as many as there are cores, 1 with --jobs)",
+    )
     add = parser.add_argument_group("camera").add_argument
     add("--azimuth", type=float, default=azimuth, metavar="DEG", help="right of the front (default %(default)g)")
     add("--elevation", type=float, default=elevation, metavar="DEG", help="above level (default %(default)g)")
@@ -105,21 +113,41 @@ def add_picture_arguments(parser: argparse.ArgumentParser) -> None:
     add("--ortho", action="store_true", help="no perspective")
     add("--up", choices=["y", "z"], default="y", help="the axis that points up (default y)")
     add = parser.add_argument_group("look").add_argument
-    add("--shading", choices=[str(mode) for mode in Shading], default="smooth", metavar="NAME",
-        help=f"{', '.join(Shading)} (default smooth)")
+    add(
+        "--shading",
+        choices=[str(mode) for mode in Shading],
+        default="smooth",
+        metavar="NAME",
+        help=f"{', '.join(Shading)} (default smooth)",
+    )
     add("--color", type=_rgb, default=DEFAULT_COLOR, metavar="COLOR", help="of a mesh without colours")
-    add("--background", type=_rgba, default=(255, 255, 255, 255), metavar="COLOR",
-        help="a name, #rrggbb[aa] or transparent (default white)")
+    add(
+        "--background",
+        type=_rgba,
+        default=(255, 255, 255, 255),
+        metavar="COLOR",
+        help="a name, #rrggbb[aa] or transparent (default white)",
+    )
     add("--texture", metavar="FILE", help="a picture for all of a mesh that has texture coordinates")
     add("--matcap", metavar="FILE", help="a picture of a lit sphere, for --shading matcap")
     add("--opacity", type=_share, default=None, metavar="X", help="0 to 1: as if of glass, of which each layer hides X")
-    add("--tolerance", type=tolerance, default=0.0, metavar="PX",
-        help="draw a coarser level of the mesh whose outline is off by at most PX pixels (default 0: the mesh)")
+    add(
+        "--tolerance",
+        type=tolerance,
+        default=0.0,
+        metavar="PX",
+        help="draw a coarser level of the mesh whose outline is off by at most PX pixels (default 0: the mesh)",
+    )
     add("--wireframe", action="store_true", help="draw the edges over it")
     add("--cull", choices=[str(side) for side in Cull], default="none", help="leave out triangles (default none)")
     samplings = [str(mode) for mode in Sampling if mode is Sampling.CENTER or mode.n_samples > 1]
-    add("--sampling", choices=samplings, default="center", metavar="NAME",
-        help=f"samples of a pixel: {', '.join(samplings)} (default center)")
+    add(
+        "--sampling",
+        choices=samplings,
+        default="center",
+        metavar="NAME",
+        help=f"samples of a pixel: {', '.join(samplings)} (default center)",
+    )
 
 
 def size(text: str) -> tuple[int, int]:

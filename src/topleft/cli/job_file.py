@@ -40,7 +40,7 @@ def read_jobs(path: Path, options: argparse.Namespace) -> list[argparse.Namespac
     document = _parsed(path)
     jobs = document.pop("job", None)
     if not isinstance(jobs, list) or not jobs or not all(isinstance(job, dict) for job in jobs):
-        raise UsageError(f"{str(path)!r} must have jobs: [[job]] in TOML, a list \"job\" of objects in JSON")
+        raise UsageError(f'{str(path)!r} must have jobs: [[job]] in TOML, a list "job" of objects in JSON')
     parser = JobParser(add_help=False, allow_abbrev=False)
     add_picture_arguments(parser)
     keys = {action.dest: action for action in parser._actions}
