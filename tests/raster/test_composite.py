@@ -189,7 +189,7 @@ def test_composite_examples_hold():
 @pytest.mark.parametrize("per", ["triangle", "vertex"])
 @ON_EACH_ISA
 def test_composite_with_an_id_that_no_triangle_has_ends_the_layers_of_that_pixel(isa, per, wrong):
-    scene, layers = peeled()
+    _, layers = peeled()
     colors = palette_of(np.random.default_rng(2), layers.n_triangles if per == "triangle" else layers.n_vertices, "u1")
     y, x = np.argwhere(layers.count >= 2)[0]
     layers.planes[0][1, y, x] = -1
