@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import operator
 import os
+import threading
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from itertools import pairwise
 from typing import TYPE_CHECKING, TypeVar
+
+from topleft import _engine
+from topleft._base.memory import SCRATCH
 
 if TYPE_CHECKING:
     from concurrent.futures import Future, ThreadPoolExecutor
@@ -30,6 +34,15 @@ def _forget_pool() -> None:
 
 
 os.register_at_fork(after_in_child=_forget_pool)
+
+
+def _hear_signals() -> None:
+    """Let kernels answer Ctrl-C in the main thread, which is the one that forked in a child."""
+    _engine.hear_signals_in(threading.main_thread().ident or 0, SCRATCH.threads)
+
+
+_hear_signals()
+os.register_at_fork(after_in_child=_hear_signals)
 
 
 def available_threads() -> int:
@@ -89,12 +102,14 @@ def run_parts(work: Callable[[int, int], Part], n: int, n_parts: int) -> list[Pa
             results[i] = work(*part)
 
     jobs: list[Future[None]] = []
+    stop = _engine.Stop()
     try:
-        _start(take, n_parts - 1, jobs)
+        _start(lambda: stop.run(take), n_parts - 1, jobs)
         take()
         _finish(jobs)
     except BaseException:
         waiting.clear()
+        stop.set()
         _finish_whatever_comes(jobs)  # never leave while another thread writes to the caller's memory
         raise
     return [results[i] for i in range(n_parts)]

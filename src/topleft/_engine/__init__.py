@@ -6,6 +6,7 @@ contract.pxi   declares the structs and kernels of csrc
 isa.py         chooses the instruction set that runs, and tells how this copy was built
 kernels.pyx    holds the kernel table in use; includes the parts, and gives their names to Python
 mesh.pxi       computes normals of a mesh, and distances between surfaces
+pause.pxi      ends a draw: Ctrl-C, and threads whose part is given up
 pixels.pxi     writes pixels that are not found by drawing triangles: means of samples, layers, points, planes, lines
 shade.pxi      shades pixels and tests their alpha
 triangles.pxi  draws snapped triangles: whole, by bands of rows, in layers
@@ -35,6 +36,7 @@ from topleft._engine.kernels import (
     ShadingTable,
     SnappedMesh,
     Source,
+    Stop,
     Target,
     Transfer,
     Tree,
@@ -57,6 +59,7 @@ from topleft._engine.kernels import (
     find_turned,
     first_bad,
     first_bad_row,
+    hear_signals_in,
     isa_available,
     isa_built,
     isa_in_use,
@@ -102,6 +105,7 @@ __all__ = [
     "ShadingTable",
     "SnappedMesh",
     "Source",
+    "Stop",
     "Target",
     "Transfer",
     "Tree",
@@ -124,6 +128,7 @@ __all__ = [
     "find_turned",
     "first_bad",
     "first_bad_row",
+    "hear_signals_in",
     "isa_available",
     "isa_built",
     "isa_in_use",

@@ -78,6 +78,7 @@ def fill_bands(meshes, int32_t[:, ::1] labels, Palette palette, pixels, Bins bin
                 target.pixels = &labels[k, 0]
                 K.draw(&seen[k], &window, &target, &share)
             palette.mean(&labels[0, 0], sample_bits, labels.shape[1], n_rows * width, &flat[0], first_row * width)
+    raise_if_given_up()
 
 
 def mean_colors(painted, pixels, int64_t first_row, int64_t n_rows, int n_channels, Transfer transfer):
@@ -175,7 +176,7 @@ cdef class Valued:
         if width == 0 or n_rows == 0:
             return
         window.x_px, window.y_px, window.width, window.height = 0, first_row, width, n_rows
-        window.subpixel_bits, window.test = 0, 0
+        window.subpixel_bits, window.test, window.pause = 0, 0, NULL
         with nogil:
             K.fill_planes(&self.mesh, &window, &ids[first_row, 0], is_f32, &flat[first_row * width * (4 if is_f32 else 8)])
 
@@ -210,3 +211,4 @@ def draw_lines(SnappedMesh mesh, const uint64_t[::1] edges, uint8_t[::1] pixels,
     target.depth = &depth[first_row, 0] if depth is not None else NULL
     with nogil:
         K.draw_lines(&lines, &window, &target)
+    raise_if_given_up()
