@@ -121,7 +121,10 @@ def allocate(n_bytes: int) -> NDArray[np.uint8]:
     if n_bytes < 2 * HUGE_PAGE:
         return np.empty(n_bytes, np.uint8)
     n_whole = -(-n_bytes // HUGE_PAGE) * HUGE_PAGE
-    block = np.empty(n_whole + HUGE_PAGE, np.uint8)
+    try:
+        block = np.empty(n_whole + HUGE_PAGE, np.uint8)
+    except (MemoryError, ValueError):  # ValueError: beyond what addresses can tell
+        raise MemoryError(f"no memory for an array of {n_bytes:,} bytes, which this size or scene needs") from None
     skip = -block.ctypes.data % HUGE_PAGE
     return block[skip : skip + n_whole]
 
