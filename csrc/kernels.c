@@ -19,12 +19,14 @@
 #include "pixels/points.c"
 #include "pixels/planes.c"
 #include "pixels/composite.c"
+#include "points/cloud.c"
 #include "lines/edges.c"
 #include "lines/lines.c"
 #include "blend/blend.c"
 #include "shade/shade.c"
 #include "shade/shade_samples.c"
 #include "shade/alpha_test.c"
+#include "mesh/creases.c"
 #include "mesh/normals.c"
 #include "mesh/nearest.c"
 #include "mesh/reach.c"
@@ -67,6 +69,7 @@ const tl_kernels TL_KERNELS = {
     .drop_sides = drop_sides,
     .list_edges = list_edges,
     .draw_lines = draw_lines,
+    .draw_cloud = draw_cloud,
     .composite = composite,
     .set_inverse_w = set_inverse_w,
     .shade = shade,
@@ -81,6 +84,10 @@ const tl_kernels TL_KERNELS = {
     .vertex_normals = vertex_normals,
     .face_normals = face_normals,
     .find_turned = find_turned,
+    .face_angles = face_angles,
+    .list_corners = list_corners,
+    .find_creases = find_creases,
+    .sum_creases = sum_creases,
     .box_of_faces = box_of_faces,
     .unit_vectors = unit_vectors,
     .move_points = move_points,

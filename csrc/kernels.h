@@ -150,6 +150,9 @@ typedef struct tl_kernels {
     /* Clears the window's pixels and draws lines. */
     void (*draw_lines)(const tl_edges *lines, const tl_window *window, const tl_line_target *target);
 
+    /* Clears the window's pixels and draws points: ids and depth, NEAREST or FARTHEST; at equal depth the lower id. */
+    void (*draw_cloud)(const tl_cloud *cloud, const tl_window *window, const tl_target *target);
+
     /* The planes of triangles [first, end); the one of no triangle, with first = 0. */
     void (*list_planes)(const tl_valued *mesh, int64_t first, int64_t end);
 
@@ -168,10 +171,26 @@ typedef struct tl_kernels {
     int64_t (*face_normals)(const tl_source *source, const int32_t *triangles, int64_t first, int64_t end, double *out,
                             float *rows);
 
-    /* 1 for the triangles of [first, end) whose corners have normals, (n_vertices, 4), that point to the other side,
-     * else 0. */
+    /* 1 for the triangles of [first, end) whose corners have normals, rows of four, that point to the other side, else
+     * 0; row_of_corner is (n_triangles, 3), the triangles themselves where vertices have a row each. */
     int64_t (*find_turned)(const tl_source *source, const int32_t *triangles, int64_t first, int64_t end,
-                           const float *normals, uint8_t *is_turned);
+                           const float *normals, const int32_t *row_of_corner, uint8_t *is_turned);
+
+    /* Unit normals and angles of triangles [first, end), both float64 (n_triangles, 3).  Returns as vertex_normals. */
+    int64_t (*face_angles)(const tl_source *source, const int32_t *triangles, int64_t first, int64_t end,
+                           double *normals, double *angles);
+
+    /* `starts` and `corners` of tl_fans. */
+    void (*list_corners)(const int32_t *triangles, int64_t n_triangles, int64_t n_vertices, int32_t *starts,
+                         int32_t *corners);
+
+    /* Groups of the corners of vertices [first, end), and how many each vertex has, 0 for one; room for five numbers a
+     * corner of the vertex that has most. */
+    void (*find_creases)(const tl_fans *fans, int64_t first, int64_t end, uint64_t *room, int32_t *groups,
+                         int32_t *n_groups);
+
+    /* Normals of vertices [first, end) as vertex_normals has them, and of their groups. */
+    void (*sum_creases)(const tl_fans *fans, const tl_creases *creases, int64_t first, int64_t end);
 
     /* Low and high of the corners of triangles [first, end): six numbers. */
     int64_t (*box_of_faces)(const tl_source *source, const int32_t *triangles, int64_t first, int64_t end, double *box);

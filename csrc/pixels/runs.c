@@ -183,11 +183,20 @@ TL_INLINE vf side_of_normals(const shade_runs *s, int slot)
     return vf_load(side);
 }
 
-TL_INLINE void load_normals(const shade_runs *s, run_setup *r)
+/* The rows of the normals of TL_LANES triangles whose corners have some of their own. */
+TL_INLINE void load_normal_rows(const shade_runs *s, int slot, int32_t rows[3][TL_MAX_LANES])
+{
+    for (int lane = 0; lane < TL_LANES; lane++)
+        for (int k = 0; k < 3; k++)
+            rows[k][lane] = s->shading->normal_of_corner[3 * (int64_t)s->ints[RUN_ID][slot + lane] + k];
+}
+
+/* Normals and q of the corners in these rows. */
+TL_INLINE void load_normals(const shade_runs *s, int32_t rows[3][TL_MAX_LANES], run_setup *r)
 {
     for (int k = 0; k < 3; k++) {
         vi c[4];
-        vi_load_records(s->shading->normals, 16, r->corners[k], c);
+        vi_load_records(s->shading->normals, 16, rows[k], c);
         for (int axis = 0; axis < 3; axis++)
             r->normal[k][axis] = vf_of_bits(c[axis]);
         r->q[k] = vf_of_bits(c[3]);
@@ -460,7 +469,13 @@ TL_INLINE void set_runs(shade_runs *s, int64_t row)
         run_corners(s, slot, r.corners);
         vi_store(s->ints[RUN_SPECIAL] + slot, vi_set1(0));
         const vm is_special = vm_and(set_edges(s, slot, row, &r), vm_first(TL_LANES + s->n_runs - slot));
-        load_normals(s, &r);
+        if (shading->normal_of_corner) {
+            _Alignas(64) int32_t rows[3][TL_MAX_LANES];
+            load_normal_rows(s, slot, rows);
+            load_normals(s, rows, &r);
+        } else {
+            load_normals(s, r.corners, &r);
+        }
         for (unsigned rest = vm_bits(is_special); rest; rest &= rest - 1)
             set_special(s, slot, __builtin_ctz(rest), row, &r);
         set_attributes(s, slot, &r);

@@ -25,6 +25,7 @@ from topleft._model.environment import Environment
 from topleft._model.light import Fog, Light
 from topleft._model.material import Material
 from topleft._model.mesh import Mesh
+from topleft._model.points import Points
 from topleft._model.scene import Instance, Scene
 from topleft._model.texture import Texture
 from topleft._plan.plan import Plan, plan
@@ -34,6 +35,7 @@ from topleft._raster.classic import bresenham_line
 from topleft._raster.composite import composite
 from topleft._raster.fragments import Fragments
 from topleft._raster.peel import DepthLayers, peel
+from topleft._raster.points import PointFragments, points
 from topleft._raster.verbs import Rasterizer, coverage, fill, overdraw, rasterize, wireframe
 from topleft._render.fragments import SceneDepthLayers, SceneFragments
 from topleft._render.render import rasterize_mesh, render
@@ -82,6 +84,8 @@ __all__ = [
     "OpenCVLens",
     "Overlap",
     "Plan",
+    "PointFragments",
+    "Points",
     "Rasterizer",
     "Scene",
     "SceneDepthLayers",
@@ -105,6 +109,7 @@ __all__ = [
     "overlap",
     "peel",
     "plan",
+    "points",
     "polygons",
     "rasterize",
     "rasterize_mesh",

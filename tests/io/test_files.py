@@ -250,7 +250,7 @@ def test_load_without_trimesh_says_how_to_get_it(write, monkeypatch):
         ("african_head.obj", 1339, 2492),
         ("spot.obj", 3225, 5856),
         ("teapot.obj", 3241, 6320),
-        ("stanford-bunny.obj", 34834, 69451),
+        ("stanford-bunny.obj", 35947, 69451),
         ("nefertiti.obj", 49971, 99938),
     ],
 )

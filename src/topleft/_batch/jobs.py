@@ -22,6 +22,7 @@ from topleft._io.load import load
 from topleft._io.notes import listening, tell
 from topleft._model.adapt import MeshLike, as_mesh
 from topleft._model.mesh import Mesh
+from topleft._model.points import Points
 from topleft._model.scene import Scene
 from topleft._raster.verbs import Rasterizer
 from topleft._render.layers import check_layers, draw_layers
@@ -41,7 +42,7 @@ class Job:
 
     Parameters
     ----------
-    scene : Mesh, Scene, whatever `as_mesh` takes, path, or function without arguments that returns one of the first
+    scene : Mesh, Scene, Points, whatever `as_mesh` takes, path, or function without arguments that returns one of them
         A file is read where it is drawn, once for jobs that follow each other. The same goes for what a function makes
         where functions are equal; for worker processes it must be picklable. A mesh of another library is made ours
         once, and must not change between its jobs.
@@ -173,7 +174,7 @@ class MeshCache:
         with listening() as lines:
             try:
                 made = make()
-                return made if isinstance(made, Scene) else as_mesh(made), None, lines
+                return made if isinstance(made, Scene | Points) else as_mesh(made), None, lines
             except Exception as error:
                 return None, error, lines
 
@@ -237,7 +238,7 @@ class JobRunner:
     def _scene(self, scene: Any) -> Any:
         if isinstance(scene, (str, os.PathLike)):
             scene = MeshFile(os.fspath(scene))
-        elif not isinstance(scene, Mesh | Scene) and not callable(scene):
+        elif not isinstance(scene, Mesh | Scene | Points) and not callable(scene):
             scene = ForeignMesh(scene)
         return self._cache.get(scene) if callable(scene) else scene
 

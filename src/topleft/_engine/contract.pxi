@@ -34,10 +34,14 @@ cdef extern from "topleft.h" nogil:
         int32_t *source
         int64_t n_vertices, n_pieces
     ctypedef int tl_test
+    ctypedef struct tl_pause:
+        int64_t left_px
+        int (*ask)(tl_pause *) noexcept nogil
     ctypedef struct tl_window:
         int64_t x_px, y_px, width, height
         int subpixel_bits
         tl_test test
+        tl_pause *pause
     ctypedef int tl_cull
     ctypedef int tl_method
     ctypedef int tl_sink
@@ -146,7 +150,7 @@ cdef extern from "topleft.h" nogil:
         int is_first, is_last
     ctypedef struct tl_composite:
         const int32_t *ids
-        int64_t plane_px
+        int64_t n_triangles, plane_px
         int n_layers, n_channels, is_u8, is_flat
         const void *colors
         const float *background
@@ -168,6 +172,28 @@ cdef extern from "topleft.h" nogil:
         int64_t stride_px
     enum:
         TL_N_CLASSES, TL_FLIP, TL_SPECIAL
+    ctypedef struct tl_cloud:
+        const tl_vertex *vertices
+        int64_t n
+        int64_t size_fx
+        const int32_t *sizes_fx
+        int is_disc
+        int32_t sample_x_fx, sample_y_fx
+    ctypedef struct tl_fans:
+        const int32_t *triangles
+        const int32_t *starts
+        const int32_t *corners
+        const double *normals
+        const double *angles
+        double least_cosine
+    ctypedef struct tl_creases:
+        const int32_t *starts
+        const int32_t *groups
+        const int32_t *own_triangles
+        int64_t first_row
+        double *of_vertices
+        double *of_groups
+        int32_t *row_of_corner
     ctypedef int tl_filter
     ctypedef int tl_wrap
     ctypedef int tl_light_kind
@@ -217,6 +243,7 @@ cdef extern from "topleft.h" nogil:
         float falloff
     ctypedef struct tl_shading:
         const float *normals
+        const int32_t *normal_of_corner
         const float *face_normals
         const void *positions
         int is_f64
@@ -372,6 +399,7 @@ cdef extern from "topleft.h" nogil:
         void (*composite)(const tl_composite *, int64_t, void *) noexcept nogil
         void (*drop_sides)(const tl_scene *, const uint8_t *, int64_t, int64_t, int32_t *) noexcept nogil
         int64_t (*list_edges)(const tl_scene *, const tl_edge_scratch *, uint64_t *, int64_t *) noexcept nogil
+        void (*draw_cloud)(const tl_cloud *, const tl_window *, const tl_target *) noexcept nogil
         void (*draw_lines)(const tl_edges *, const tl_window *, const tl_line_target *) noexcept nogil
         void (*list_planes)(const tl_valued *, int64_t, int64_t) noexcept nogil
         void (*fill_planes)(const tl_valued *, const tl_window *, const int32_t *, int, void *) noexcept nogil
@@ -379,7 +407,11 @@ cdef extern from "topleft.h" nogil:
         void (*mean_colors)(const void *, int, int64_t, int64_t, int, int, const tl_transfer *, void *) noexcept nogil
         int64_t (*vertex_normals)(const tl_source *, const int32_t *, int64_t, int64_t, int64_t, double *) noexcept nogil
         int64_t (*face_normals)(const tl_source *, const int32_t *, int64_t, int64_t, double *, float *) noexcept nogil
-        int64_t (*find_turned)(const tl_source *, const int32_t *, int64_t, int64_t, const float *, uint8_t *) noexcept nogil
+        int64_t (*find_turned)(const tl_source *, const int32_t *, int64_t, int64_t, const float *, const int32_t *, uint8_t *) noexcept nogil
+        int64_t (*face_angles)(const tl_source *, const int32_t *, int64_t, int64_t, double *, double *) noexcept nogil
+        void (*list_corners)(const int32_t *, int64_t, int64_t, int32_t *, int32_t *) noexcept nogil
+        void (*find_creases)(const tl_fans *, int64_t, int64_t, uint64_t *, int32_t *, int32_t *) noexcept nogil
+        void (*sum_creases)(const tl_fans *, const tl_creases *, int64_t, int64_t) noexcept nogil
         int64_t (*box_of_faces)(const tl_source *, const int32_t *, int64_t, int64_t, double *) noexcept nogil
         void (*unit_vectors)(const tl_source *, const double *, int64_t, int64_t, double *, float *) noexcept nogil
         void (*move_points)(const tl_source *, const double *, int64_t, int64_t, double *) noexcept nogil

@@ -1,6 +1,6 @@
 """The types of the compiled module. What each does stands in kernels.pyx and the .pxi files."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -23,6 +23,12 @@ def isa_in_use() -> str: ...
 def isa_built() -> list[str]: ...
 def isa_available() -> list[str]: ...
 def compiler_info() -> dict[str, object]: ...
+def hear_signals_in(thread: int, threads: object) -> None: ...
+
+class Stop:
+    def set(self) -> None: ...
+    def run(self, work: Callable[[], object]) -> None: ...
+
 def area_stride(width: int) -> int: ...
 def blend_cells(width: int) -> int: ...
 def as_bytes(array: NDArray[Any]) -> NDArray[np.uint8]: ...
@@ -244,6 +250,7 @@ def peel(
 ) -> int: ...
 def composite(
     ids: NDArray[np.int32],
+    n_triangles: int,
     first_row: int,
     n_rows: int,
     colors: NDArray[np.uint8],
@@ -305,6 +312,7 @@ class ShadingTable:
     def __init__(
         self,
         normals: NDArray[np.float32],
+        normal_of_corner: NDArray[np.int32] | None,
         face_normals: NDArray[np.float32] | None,
         positions: NDArray[Any],
         is_turned: NDArray[np.uint8] | None,
@@ -335,7 +343,9 @@ class ShadingTable:
         self, color: Sequence[float], near: float, scale: float, distance_start: float, distance_scale: float
     ) -> None: ...
 
-def set_inverse_w(mesh: SnappedMesh, rows: NDArray[np.float32], out: NDArray[np.float32]) -> None: ...
+def set_inverse_w(
+    mesh: SnappedMesh, rows: NDArray[np.float32], vertex_of_row: NDArray[np.int32] | None, out: NDArray[np.float32]
+) -> None: ...
 def shade(
     mesh: SnappedMesh,
     shading: ShadingTable,
@@ -481,6 +491,19 @@ def set_feet(
     at: NDArray[np.float64],
     squared: NDArray[np.float64],
 ) -> None: ...
+def draw_cloud(
+    records: NDArray[np.uint8],
+    size_fx: int,
+    sizes_fx: NDArray[np.int32] | None,
+    is_disc: bool,
+    x_fx: int,
+    y_fx: int,
+    target: Target,
+    origin: tuple[int, int],
+    subpixel_bits: int,
+    first_row: int,
+    n_rows: int,
+) -> None: ...
 def vertex_normals(
     source: Source, triangles: NDArray[np.int32], first: int, end: int, out: NDArray[np.float64]
 ) -> int: ...
@@ -498,8 +521,41 @@ def find_turned(
     first: int,
     end: int,
     normals: NDArray[np.float32],
+    row_of_corner: NDArray[np.int32],
     is_turned: NDArray[np.uint8],
 ) -> int: ...
+def face_angles(
+    source: Source,
+    triangles: NDArray[np.int32],
+    first: int,
+    end: int,
+    normals: NDArray[np.float64],
+    angles: NDArray[np.float64],
+) -> int: ...
+
+class Fans:
+    def __init__(
+        self,
+        triangles: NDArray[np.int32],
+        n_vertices: int,
+        normals: NDArray[np.float64],
+        angles: NDArray[np.float64],
+        least_cosine: float,
+    ) -> None: ...
+    def find_creases(self, first: int, end: int, groups: NDArray[np.int32], n_groups: NDArray[np.int32]) -> None: ...
+    def sum_creases(
+        self,
+        first: int,
+        end: int,
+        starts: NDArray[np.int32],
+        groups: NDArray[np.int32],
+        own_triangles: NDArray[np.int32],
+        first_row: int,
+        of_vertices: NDArray[np.float64],
+        of_groups: NDArray[np.float64],
+        row_of_corner: NDArray[np.int32] | None,
+    ) -> None: ...
+
 def box_of_faces(
     source: Source, triangles: NDArray[np.int32], first: int, end: int, box: NDArray[np.float64]
 ) -> int: ...

@@ -14,22 +14,23 @@ from typing import TypeVar
 
 import numpy as np
 
-from topleft._io.foreign import read_by_trimesh
-from topleft._io.gltf import GLTF_SUFFIXES, read_gltf
 from topleft._io.notes import tell
-from topleft._io.obj import read_obj
-from topleft._io.ply import read_ply
 from topleft._io.references import MAX_TEXTURE_PIXELS, MAX_VERTICES, InputFile
-from topleft._io.stl import read_stl
-from topleft._model.adapt import joined
-from topleft._model.mesh import Mesh
+from topleft._model.adapt import DEFAULT_CREASE, joined
+from topleft._model.mesh import Mesh, as_crease
 from topleft.errors import MeshError, MissingPackageError
 
 Made = TypeVar("Made")
 
+GLTF_SUFFIXES = (".gltf", ".glb", ".vrm")
+
 
 def load(
-    path: str | os.PathLike[str], *, max_vertices: int = MAX_VERTICES, max_texture_pixels: int = MAX_TEXTURE_PIXELS
+    path: str | os.PathLike[str],
+    *,
+    crease: float = DEFAULT_CREASE,
+    max_vertices: int = MAX_VERTICES,
+    max_texture_pixels: int = MAX_TEXTURE_PIXELS,
 ) -> Mesh:
     """A mesh read from a file: OBJ, PLY, STL, glTF and GLB; by trimesh OFF, 3MF and what else it has readers for.
 
@@ -37,6 +38,9 @@ def load(
     ----------
     path : path
         The end of its name tells the format.
+    crease : float
+        Degrees, 0 to 180: edges at which triangles bend by more are sharp, where the file has no normals; see `Mesh`.
+        180: none is, 0: all are.
     max_vertices : int
         A file with more, or one that says so, is refused.
     max_texture_pixels : int
@@ -71,30 +75,42 @@ def load(
     Files that a mesh names are read from its folder, and from the folders in it; nothing else is opened. What is read
     of each format is told in docs/guide/files.md.
     """
+    crease = as_crease(crease)
     source = InputFile(Path(path), max_vertices=max_vertices, max_texture_pixels=max_texture_pixels)
-    mesh = reading(source, lambda: _mesh(source))
+    mesh = reading(source, lambda: _mesh(source, crease))
     tell(source.notes.lines, stacklevel=2)
     return mesh
 
 
-def _mesh(source: InputFile) -> Mesh:
+def _mesh(source: InputFile, crease: float) -> Mesh:
+    """The mesh of the file; a reader is imported when a file needs it."""
     match source.path.suffix.lower():
         case suffix if suffix in GLTF_SUFFIXES:
+            from topleft._io.gltf import read_gltf
+
             parts = read_gltf(source)
         case ".obj":
+            from topleft._io.obj import read_obj
+
             parts = read_obj(source)
         case ".ply":
-            parts = [part for part in [read_ply(source)] if part is not None]
+            from topleft._io.ply import read_ply
+
+            parts = read_ply(source)
         case ".stl" | ".stl_ascii":
-            parts = [part for part in [read_stl(source)] if part is not None]
+            from topleft._io.stl import read_stl
+
+            parts = read_stl(source)
         case _:
+            from topleft._io.foreign import read_by_trimesh
+
             parts = read_by_trimesh(source)
     if not any(len(part.triangles) for part in parts):
         drawn = [
             line.partition(": ")[2].removesuffix(" not drawn") for line in source.notes.lines if "not drawn" in line
         ]
         raise MeshError(f"{str(source.path)!r} has no triangles" + (f", but {' and '.join(drawn)}" if drawn else ""))
-    return joined(parts)
+    return joined(parts, crease)
 
 
 def reading(source: InputFile, read: Callable[[], Made]) -> Made:

@@ -8,6 +8,7 @@ Input: `trimesh.Trimesh` and `trimesh.Scene`, `meshio.Mesh`, `pyvista.PolyData` 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -16,10 +17,14 @@ import numpy.typing as npt
 from topleft._base.arrays import as_array
 from topleft._base.color import Color, encode_srgb
 from topleft._model.material import Material
-from topleft._model.mesh import Mesh, coincident
+from topleft._model.mesh import NO_CREASE, Mesh, as_crease, coincident, with_normals
 from topleft._model.normals import angle_weighted_normals
 from topleft._model.polygons import triangulate
 from topleft._model.texture import Texture
+
+DEFAULT_CREASE = 30.0
+"""Degrees by which triangles of a mesh without normals bend at an edge before it is sharp: round things of 12 sides and
+more stay round."""
 
 MeshLike: TypeAlias = Any
 """What `as_mesh` takes."""
@@ -69,7 +74,7 @@ class Polygons(NamedTuple):
     n_faces: int
 
 
-def as_mesh(subject: MeshLike) -> Mesh:
+def as_mesh(subject: MeshLike, *, crease: float = DEFAULT_CREASE) -> Mesh:
     """The subject as a `Mesh`.
 
     Parameters
@@ -77,6 +82,10 @@ def as_mesh(subject: MeshLike) -> Mesh:
     subject : Mesh, trimesh.Trimesh, trimesh.Scene, meshio.Mesh, pyvista.PolyData, matplotlib.tri.Triangulation
         Or pyvista.UnstructuredGrid, or anything with `vertices` and `triangles` or `faces`, or a pair (vertices,
         triangles). Faces are (T, 3), (F, K) with K corners each, or a list of lists.
+
+    crease : float
+        Degrees, 0 to 180: edges at which triangles bend by more are sharp, where the subject has no normals of its own;
+        see `Mesh`. A `Mesh` stays as it is.
 
     Returns
     -------
@@ -102,20 +111,21 @@ def as_mesh(subject: MeshLike) -> Mesh:
     """
     if isinstance(subject, Mesh):
         return subject
+    crease = as_crease(crease)
     if _is_scene(subject):
         nodes = [subject.graph[node] for node in subject.graph.nodes_geometry]
         shapes = [(subject.geometry[name], transform) for transform, name in nodes]
         parts = [placed(shape, transform) for shape, transform in shapes if len(getattr(shape, "faces", ()))]
         if not parts:
             raise ValueError("mesh has no triangles: nothing in the scene has faces")
-        return joined(parts)
+        return joined(parts, crease)
     if hasattr(subject, "visual") and hasattr(subject, "faces"):
-        return placed(subject, np.eye(4))
+        return replace(placed(subject, np.eye(4)), crease=crease)
     polygons = as_polygons(subject)
     points = polygons.points
     if points.ndim == 2 and points.shape[1] == 2:
         points = np.column_stack([points, np.zeros(len(points))])
-    return Mesh(points, polygons.triangles)
+    return Mesh(points, polygons.triangles, crease=crease)
 
 
 def as_polygons(subject: MeshLike) -> Polygons:
@@ -312,10 +322,15 @@ def placed(geometry: Any, transform: npt.NDArray[np.float64]) -> Mesh:
     return Mesh(vertices, triangles, normals, colors, uv, materials)
 
 
-def joined(parts: list[Mesh]) -> Mesh:
-    """One mesh of several; vertices that are equal become one unless the file has normals."""
+def joined(parts: list[Mesh], crease: float = NO_CREASE) -> Mesh:
+    """One mesh of several; vertices that are equal become one unless the file has normals.
+
+    `crease` is that of the parts without normals.
+    """
     if len(parts) == 1 and parts[0].normals is not None:
         return parts[0]
+    if len({part.normals is None for part in parts}) > 1:
+        parts = [with_normals(replace(part, crease=crease)) for part in parts]
     starts = np.cumsum([0] + [len(part.vertices) for part in parts[:-1]])
     vertices = np.concatenate([part.vertices for part in parts])
     triangles = np.concatenate([part.triangles + np.int32(start) for part, start in zip(parts, starts, strict=True)])
@@ -328,9 +343,7 @@ def joined(parts: list[Mesh]) -> Mesh:
         normals = np.concatenate([part.vertex_normals() for part in parts])
         return Mesh(vertices, triangles, normals, colors, uv, materials, rows, uv1)
     own_normals: npt.NDArray[Any] | None = None
-    if any(part.normals is not None for part in parts):
-        own_normals = np.concatenate([part.vertex_normals() for part in parts])
-    elif colors is not None or uv is not None:
+    if crease == NO_CREASE and (colors is not None or uv is not None):
         # Vertices of two colours, or on both sides of a seam, stay two, and still share a normal.
         first, group = coincident(vertices)
         own_normals = angle_weighted_normals(vertices[first], group[triangles].astype(np.int32))[group]
@@ -338,7 +351,7 @@ def joined(parts: list[Mesh]) -> Mesh:
     first, group = coincident(*(array for array in attributes if array is not None))
     own_normals, uv, uv1 = (None if array is None else array[first] for array in (own_normals, uv, uv1))
     colors = None if colors is None else colors[first]
-    return Mesh(vertices[first], group[triangles], own_normals, colors, uv, materials, rows, uv1)
+    return Mesh(vertices[first], group[triangles], own_normals, colors, uv, materials, rows, uv1, crease=crease)
 
 
 def _joined_materials(parts: list[Mesh]) -> tuple[tuple[Material, ...], npt.NDArray[np.int32] | None]:

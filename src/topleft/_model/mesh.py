@@ -6,8 +6,9 @@ Input: anything NumPy can read. Output: a `Mesh` whose arrays the other stages u
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ import numpy.typing as npt
 
 from topleft._base.arrays import as_array, as_checked_triangles
 from topleft._model.material import Material
-from topleft._model.normals import angle_weighted_normals, box_of_triangles
+from topleft._model.normals import CornerNormals, angle_weighted_normals, box_of_triangles, creased_normals
 from topleft._model.texture import Texture
 from topleft._raster.clusters import Clusters, box_of
 
@@ -24,6 +25,9 @@ F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
 I32 = npt.NDArray[np.int32]
 U8 = npt.NDArray[np.uint8]
+
+NO_CREASE = 180.0
+"""The crease angle at which no edge is sharp, degrees."""
 
 POINTS_AT_ONCE = 1 << 14
 """Points whose distances are computed together: they stay in the second-level cache."""
@@ -53,6 +57,10 @@ class Mesh:
         The row of `materials` that each triangle has; the first unless given.
     uv1 : (V, 2) array_like of real numbers, optional
         A second set of texture coordinates, for textures with `uv_set=1`.
+    crease : float
+        Degrees, 0 to 180: where two triangles bend by more at an edge, each side has its own normal, so that the edge
+        is sharp; of a mesh without `normals`. 180: no edge is; 0: every one is ("flat"). With less than 180 vertices
+        at one place count as one for the normals.
 
     Raises
     ------
@@ -82,28 +90,30 @@ class Mesh:
     materials: tuple[Material, ...] = ()
     material_of_triangle: I32 | None = None
     uv1: F32 | None = None
+    crease: float = NO_CREASE
 
     def __post_init__(self) -> None:
-        vertices = _real_array(self.vertices, "vertices")
+        vertices = as_real_array(self.vertices, "vertices")
         triangles = as_checked_triangles(self.triangles, len(vertices))
         keep = object.__setattr__  # the dataclass is frozen, and its arrays are coerced
-        keep(self, "vertices", _read_only(vertices))
-        keep(self, "triangles", _read_only(triangles))
+        keep(self, "vertices", read_only(vertices))
+        keep(self, "triangles", read_only(triangles))
         _check_finite(vertices, triangles)
         if self.normals is not None:
-            normals = _real_array(self.normals, "normals")
+            normals = as_real_array(self.normals, "normals")
             if len(normals) != len(vertices):
                 raise ValueError(f"normals must have shape ({len(vertices)}, 3), got {normals.shape}")
-            keep(self, "normals", _read_only(normals))
+            keep(self, "normals", read_only(normals))
         if self.colors is not None:
-            keep(self, "colors", _read_only(_color_array(self.colors, len(vertices))))
+            keep(self, "colors", read_only(as_color_array(self.colors, len(vertices))))
         for name in ("uv", "uv1"):
             if getattr(self, name) is not None:
-                keep(self, name, _read_only(_uv_array(name, getattr(self, name), len(vertices))))
+                keep(self, name, read_only(_uv_array(name, getattr(self, name), len(vertices))))
+        keep(self, "crease", as_crease(self.crease))
         keep(self, "materials", _material_tuple(self.materials))
         if self.material_of_triangle is not None:
             rows = _material_rows(self.material_of_triangle, len(triangles), len(self.materials))
-            keep(self, "material_of_triangle", _read_only(rows))
+            keep(self, "material_of_triangle", read_only(rows))
 
     def _repr_png_(self) -> bytes | None:
         from topleft._render.notebook import png_of_mesh  # which imports this module
@@ -137,7 +147,7 @@ class Mesh:
 
     @cached_property
     def _extreme_points(self) -> F64:
-        return _read_only(extreme_points(used_vertices(self)))
+        return read_only(extreme_points(used_vertices(self)))
 
     def vertex_normals(self) -> FloatArray:
         """Normals (V, 3): those of the mesh where it has them, else angle-weighted ones, float64.
@@ -145,11 +155,28 @@ class Mesh:
         Returns
         -------
         (V, 3) float
-            Read-only. Unit length where computed here, once; (0, 0, 0) for a vertex that no triangle with an area uses.
+            Read-only. Unit length where computed here, once, of all triangles at the vertex, whatever the crease angle;
+            (0, 0, 0) for a vertex that no triangle with an area uses.
         """
         if self.normals is not None:
             return self.normals
-        return self._computed_normals
+        return self._computed_normals[0]
+
+    def corner_normals(self) -> CornerNormals | None:
+        """Normals of the corners of triangles, where some differ from those of their vertices; else None.
+
+        Returns
+        -------
+        CornerNormals or None
+            `rows` (N, 3) float64, the first V those of `vertex_normals`, and `of_corner` (T, 3) int32, the row of
+            each corner. None for a mesh with normals, with a crease angle of 180, or without an edge that is sharp.
+        """
+        return self._computed_normals[1] if self.normals is None else None
+
+    @property
+    def is_faceted(self) -> bool:
+        """Whether every edge is sharp: each triangle has the normal of its face."""
+        return self.normals is None and self.crease == 0
 
     @cached_property
     def has_alpha(self) -> bool:
@@ -193,12 +220,55 @@ class Mesh:
         return Clusters(self.vertices, self.triangles)
 
     @cached_property
-    def _computed_normals(self) -> FloatArray:
-        return _read_only(angle_weighted_normals(self.vertices, self.triangles))
+    def _computed_normals(self) -> tuple[FloatArray, CornerNormals | None]:
+        if self.crease == NO_CREASE:
+            return read_only(angle_weighted_normals(self.vertices, self.triangles)), None
+        first, group = self._places
+        places = None if len(first) == len(group) else (first, group)
+        rows, of_corners = creased_normals(self.vertices, self.triangles, self.crease, places)
+        return read_only(rows), of_corners
+
+    @cached_property
+    def _places(self) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+        """Which vertices are at one place, as `coincident` says it."""
+        return coincident(self.vertices)
 
     def __getstate__(self) -> dict[str, Any]:
         """What another process needs: what is computed from it is computed there."""
         return {field.name: self.__dict__[field.name] for field in fields(self)}
+
+
+def keep_corner_normals(mesh: Mesh, normals: CornerNormals) -> None:
+    """Have a mesh without normals take these instead of computing them."""
+    mesh.__dict__["_computed_normals"] = read_only(normals.rows[: len(mesh.vertices)]), normals
+
+
+def with_normals(mesh: Mesh) -> Mesh:
+    """The mesh with `normals`: computed where it has none; vertices at creases then stand several times."""
+    corners = mesh.corner_normals()
+    if corners is None:
+        return mesh if mesh.normals is not None else replace(mesh, normals=mesh.vertex_normals())
+    rows = np.concatenate([np.arange(len(mesh.vertices)), corners.vertex_of_row])
+    colors, uv, uv1 = (None if own is None else own[rows] for own in (mesh.colors, mesh.uv, mesh.uv1))
+    split: dict[str, Any] = {"vertices": mesh.vertices[rows], "triangles": corners.of_corner, "normals": corners.rows}
+    return replace(mesh, **split, colors=colors, uv=uv, uv1=uv1)
+
+
+def as_crease(value: float) -> float:
+    """Return a crease angle, degrees.
+
+    Raises
+    ------
+    TypeError
+        If it is no number.
+    ValueError
+        If it is outside of 0 to 180.
+    """
+    if not isinstance(value, Real) or isinstance(value, bool):
+        raise TypeError(f"crease must be an angle in degrees, got {value!r}")
+    if not 0 <= value <= NO_CREASE:
+        raise ValueError(f"crease must lie in 0 to 180 degrees, got {value!r}")
+    return float(value)
 
 
 def used_vertices(mesh: Mesh) -> FloatArray:
@@ -291,7 +361,7 @@ def _differ(columns: list[npt.NDArray[Any]], order: npt.NDArray[np.intp]) -> npt
     return starts
 
 
-def _real_array(values: npt.ArrayLike, name: str) -> FloatArray:
+def as_real_array(values: npt.ArrayLike, name: str) -> FloatArray:
     array = as_array(name, values)
     if array.dtype.kind not in "fiu":
         raise TypeError(f"{name} must hold real numbers, got {array.dtype}")
@@ -301,7 +371,7 @@ def _real_array(values: npt.ArrayLike, name: str) -> FloatArray:
     return np.ascontiguousarray(array, native if native in (np.float32, np.float64) else np.float64)
 
 
-def _color_array(values: npt.ArrayLike, n_vertices: int) -> U8:
+def as_color_array(values: npt.ArrayLike, n_vertices: int) -> U8:
     array = as_array("colors", values)
     if array.dtype != np.uint8:
         raise TypeError(f"colors must be uint8, got {array.dtype}")
@@ -351,7 +421,7 @@ def _check_finite(vertices: FloatArray, triangles: I32) -> None:
         raise ValueError(f"vertices[{row}] = {vertices[row].tolist()} must be finite: a triangle uses it")
 
 
-def _read_only(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
+def read_only(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
     view = array.view()
     view.flags.writeable = False
     return view

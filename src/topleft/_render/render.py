@@ -19,6 +19,7 @@ from topleft._lod.detail import detailed
 from topleft._model.adapt import MeshLike, as_mesh
 from topleft._model.material import Material
 from topleft._model.mesh import Mesh
+from topleft._model.points import Points
 from topleft._model.scene import Instance, Scene
 from topleft._raster import choices
 from topleft._raster.clusters import Clusters
@@ -26,6 +27,7 @@ from topleft._raster.fragments import Fragments
 from topleft._raster.verbs import Rasterizer, rasterize, wireframe
 from topleft._raster.view import View
 from topleft._render.blended import draw_blended, is_blended
+from topleft._render.cloud import draw_cloud, framing_of
 from topleft._render.fragments import BentFragments, camera_of, scene_of
 from topleft._render.holes import without_holes
 from topleft._render.instances import draw_scene
@@ -39,7 +41,7 @@ EDGE_COLOR = (24, 28, 40)
 
 
 def render(
-    mesh: MeshLike | Scene,
+    mesh: MeshLike | Scene | Points,
     camera: Camera | None = None,
     size: tuple[int, int] = DEFAULT_SIZE,
     *,
@@ -58,8 +60,9 @@ def render(
 
     Parameters
     ----------
-    mesh : Mesh, Scene, or whatever `as_mesh` takes
-        What to draw: a mesh of trimesh, meshio, pyvista, say. Its colours are used if it has any.
+    mesh : Mesh, Scene, Points, or whatever `as_mesh` takes
+        What to draw: a mesh of trimesh, meshio, pyvista, say. Its colours are used if it has any. Points have no
+        edges, sides to cull, materials and levels; they are lit where they have normals.
     camera : Camera, optional
         Unless given, the three-quarter view of `Camera.framing`, with y up.
     size : (width, height), pixels
@@ -108,6 +111,12 @@ def render(
     >>> tl.render(mesh, size=(64, 48), background=(0, 0, 0, 0))[24, 32].tolist()[3]
     255
     """
+    if isinstance(mesh, Points):
+        if edges:
+            raise ValueError("points have no edges")
+        camera = framing_of(mesh, camera, size)
+        cloud = draw_cloud(mesh, camera, size, cull=cull, threads=threads, sampling=sampling)
+        return shade(cloud, mesh, camera, shading=shading, color=color, background=background, threads=threads, **look)
     material = look.get("material")
     subject, camera = subject_of(mesh, camera, size, tolerance, cull=cull, material=material)
     view: dict[str, Any] = {"cull": cull, "sampling": sampling}
@@ -159,7 +168,7 @@ def picture_of(
 
 
 def rasterize_mesh(
-    mesh: MeshLike | Scene,
+    mesh: MeshLike | Scene | Points,
     camera: Camera | None = None,
     size: tuple[int, int] = DEFAULT_SIZE,
     *,
@@ -187,13 +196,15 @@ def rasterize_mesh(
     Fragments
         `.triangle` (H, W) int32, -1 where there is nothing; `.depth` (H, W) float32, window depth in [0, 1], +inf where
         there is nothing. Of a scene `SceneFragments`: also `.instance` (H, W) int32, and `.triangle` counts the
-        triangles of its mesh.
+        triangles of its mesh. Of `Points` `PointFragments`: `.point` is the same as `.triangle`.
 
     Raises
     ------
     ValueError
         If the mesh has no triangles and no camera is given, an option is unknown, or `rasterizer` has another size.
     """
+    if isinstance(mesh, Points):
+        return draw_cloud(mesh, framing_of(mesh, camera, size), size, cull=cull, threads=threads, **view)
     window = {"viewport": view.get("viewport"), "origin": view.get("origin", (0, 0))}
     subject, camera = subject_of(mesh, camera, size, tolerance, cull=cull, **window)
     return rasterize_subject(subject, camera, size, rasterizer, cull=cull, threads=threads, **view)

@@ -18,9 +18,12 @@ from topleft._model.environment import Environment
 from topleft._model.light import Fog, Light, LightKind, LightSpace
 from topleft._model.material import Material
 from topleft._model.mesh import Mesh
+from topleft._model.points import Points
 from topleft._model.scene import Instance, Scene
 from topleft._model.texture import Texture
 from topleft._raster.fragments import Fragments
+from topleft._raster.points import PointFragments
+from topleft._render.cloud import shade_cloud
 from topleft._render.fragments import SceneFragments, VisiblePart, join, meshes_of, parts_of
 from topleft._shade.look import is_similarity
 from topleft._shade.shade import Shading, ShadingOptions, shade_mesh, shade_numbers, shade_samples
@@ -52,7 +55,7 @@ def in_space_of(instance: Instance | None, options: ShadingOptions, camera: Came
 
 def shade(
     frags: Fragments,
-    mesh: Mesh | Scene,
+    mesh: Mesh | Scene | Points,
     camera: Camera,
     *,
     shading: str = "smooth",
@@ -75,7 +78,7 @@ def shade(
         What `rasterize` or `rasterize_mesh` returned for the mesh or scene. With several samples a pixel a triangle is
         shaded once in a pixel, at the first of the samples that see it, and the picture is the mean of the light of the
         samples.
-    mesh : Mesh or Scene
+    mesh : Mesh, Scene or Points
         Its materials, and its colours, are used if it has any. Each instance of a scene is shaded by itself.
     camera : Camera
         The camera of `frags`.
@@ -117,10 +120,15 @@ def shade(
     TypeError
         If `frags`, the mesh, a light, material, texture or environment is none.
     """
-    check_drawn(frags, mesh)
+    if not isinstance(mesh, Points):
+        check_drawn(frags, mesh)
     options = ShadingOptions.parse(
         shading, color, background, depth_range, lights, ambient, material, matcap, fog, environment, threads
     )
+    if isinstance(mesh, Points):
+        if not (isinstance(frags, PointFragments) and frags._n_vertices == len(mesh)):
+            raise ValueError(f"frags must be those of the {len(mesh)} points, got {frags!r}")
+        return shade_cloud(frags, mesh, camera, options)
     return shade_by(frags, mesh, camera, options)
 
 

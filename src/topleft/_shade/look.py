@@ -133,19 +133,26 @@ class ShadingMesh:
     center : (3,) float64
         The middle of the box round the vertices in use: the origin of the space that light is computed in, so that
         float32 is fine enough.
-    normals : (V, 4) float32
-        Unit normals, 0 where there is none, and 1.
+    normals : (N, 4) float32
+        Unit normals of the vertices, then of creased corners, 0 where there is none, and 1.
     colors : (V, 4) float32, optional
         sRGB of the vertices, 0 to 255, and opacity, 0 to 1.
     """
 
     def __init__(self, mesh: Mesh, view: F64 | None = None) -> None:
         """`view`: (4, 4), takes the mesh to eye space first."""
-        normals, self._triangles = mesh.vertex_normals(), mesh.triangles
+        corners = None if mesh.is_faceted else mesh.corner_normals()
+        self._triangles = mesh.triangles
+        self.normal_of_corner = None if corners is None else corners.of_corner
+        self.vertex_of_row = None if corners is None else corners.vertex_of_row
         self.positions = mesh.vertices if view is None else moved(mesh.vertices, view)
         low, high = box_of_triangles(self.positions, self._triangles).astype(self.positions.dtype)
         self.center: F64 = np.asarray(low / 2 + high / 2, np.float64)
-        self.normals = unit_rows(normals, None if view is None else turn_of_normals(view))
+        if mesh.is_faceted:  # nobody reads normals of vertices where every face has its own
+            self.normals = np.ones((len(mesh.vertices), 4), np.float32)
+        else:
+            normals = mesh.vertex_normals() if corners is None else corners.rows
+            self.normals = unit_rows(normals, None if view is None else turn_of_normals(view))
         self.colors = None if mesh.colors is None else color_rows(mesh.colors)
 
     @cached_property
@@ -156,7 +163,7 @@ class ShadingMesh:
     @cached_property
     def is_turned(self) -> npt.NDArray[np.uint8] | None:
         """(T,): 1 where the normals of the corners point to the other side than the triangle; None if none does."""
-        turned = turned_faces(self.positions, self._triangles, self.normals)
+        turned = turned_faces(self.positions, self._triangles, self.normals, self.normal_of_corner)
         return turned if turned.view(np.bool_).any() else None
 
 
@@ -210,6 +217,7 @@ class ShadingInputs:
         *,
         is_flat: bool,
     ) -> None:
+        is_flat = is_flat or mesh.is_faceted
         in_eye_space = not is_similarity(camera.view)
         self.mesh = ShadingMesh(mesh, camera.view) if in_eye_space else shading_mesh_of(mesh)
         viewport = size if scene.viewport is None else scene.viewport.size
@@ -220,9 +228,10 @@ class ShadingInputs:
         normals = self.mesh.normals
         if scene.viewport is not None and self.rays.has_perspective:
             normals = np.empty_like(normals)
-            _engine.set_inverse_w(scene, self.mesh.normals, normals)
+            _engine.set_inverse_w(scene, self.mesh.normals, self.mesh.vertex_of_row, normals)
         self.shading = _engine.ShadingTable(
             normals,
+            self.mesh.normal_of_corner,
             self.mesh.face_normals if is_flat else None,
             self.mesh.positions,
             None if is_flat else self.mesh.is_turned,

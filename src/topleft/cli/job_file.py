@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NoReturn
 
-from topleft.cli.arguments import UsageError, add_picture_arguments
+from topleft.cli.arguments import UsageError, add_picture_arguments, meant
 
 __all__ = ["read_jobs"]
 
@@ -60,6 +60,8 @@ def _parsed(path: Path) -> dict[str, Any]:
     try:
         text = data.decode()
         document = tomllib.loads(text) if path.suffix.lower() == ".toml" else json.loads(text)
+    except RecursionError:
+        raise UsageError(f"cannot read {str(path)!r}: it is nested too deeply") from None
     except ValueError as error:  # what both readers, and decoding, raise
         raise UsageError(f"cannot read {str(path)!r}: {error}") from None
     if not isinstance(document, dict):
@@ -76,7 +78,8 @@ def _arguments(
             continue
         action = keys.get(key)
         if action is None:
-            raise UsageError(f"there is no key {key!r}; there are mesh, {', '.join(keys)}")
+            guess = meant(key, ["mesh", *keys])
+            raise UsageError(f"there is no key {key!r}{guess or '; there are mesh, ' + ', '.join(keys)}")
         words += _words(action, key, value)
     meshes = [meshes] if isinstance(meshes, str) else meshes
     if not isinstance(meshes, list) or not meshes or not all(isinstance(mesh, str) for mesh in meshes):

@@ -23,7 +23,7 @@ from topleft.cli.animation import check_animation, save_animation
 from topleft.cli.arguments import UsageError
 from topleft.cli.job_file import read_jobs
 from topleft.cli.sheet import make_sheet
-from topleft.cli.targets import MeshJobs, check_targets, plan_jobs
+from topleft.cli.targets import MeshJobs, check_targets, check_words, plan_jobs
 from topleft.errors import MeshWarning, MissingPackageError, TopleftError
 
 __all__ = ["FAILED", "complain", "complain_of_lacks", "one_line", "run_render"]
@@ -140,6 +140,7 @@ def _ignore_interrupt() -> None:
 def _animations(groups: Sequence[MeshJobs], options: argparse.Namespace) -> list[tuple[Path, MeshJobs]]:
     if not options.animation:
         return []
+    check_words("--animation", Path(options.animation), ("name", "index"))
     if len(groups) > 1 and "{name}" not in options.animation and "{index}" not in options.animation:
         raise UsageError(f"several meshes need {{name}} in --animation, got {options.animation!r}")
     return [
