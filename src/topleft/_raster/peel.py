@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Unpack
 
 import numpy as np
@@ -169,9 +170,20 @@ def as_layers(layers: object) -> int:
 
 
 def peel_meshes(
-    memory: Memory, meshes: Sequence[Snapped], view: View, n_layers: int, *, is_farthest: bool
+    memory: Memory,
+    meshes: Sequence[Snapped],
+    view: View,
+    n_layers: int,
+    *,
+    is_farthest: bool,
+    at_fx: tuple[int, int] = (0, 0),
 ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-    """Return planes (K, H, W) of ids and depths of all meshes together, which know their first ids."""
+    """Return planes (K, H, W) of ids and depths of all meshes together, which know their first ids.
+
+    `at_fx`: where in the pixel they are looked at, in sub-pixels of the view's grid from the centre.
+    """
+    meshes = [replace(snapped, mesh=snapped.mesh.seen_from(*at_fx)) for snapped in meshes] if any(at_fx) else meshes
+    reach_fx = max(map(abs, at_fx))
     width, height = view.size
     ids: NDArray[np.int32] = FRESH.empty("layer ids", (n_layers, height, width), np.int32)
     depth: NDArray[np.float32] = FRESH.empty("layer depth", (n_layers, height, width), np.float32)
@@ -183,7 +195,7 @@ def peel_meshes(
     band_bits = max(0, n_rows.bit_length() - 1)
     while band_bits and height >> band_bits < 2 * n_threads:
         band_bits -= 1
-    bins = [bins_of(memory, snapped, view, band_bits) for snapped in meshes]
+    bins = [bins_of(memory, snapped, view, band_bits, reach_fx) for snapped in meshes]
     n_bands = -(-height >> band_bits)
 
     def peel_bands(first: int, end: int) -> int:
@@ -196,13 +208,13 @@ def peel_meshes(
     return ids, depth
 
 
-def bins_of(memory: Memory, snapped: Snapped, view: View, band_bits: int) -> _engine.Bins | None:
+def bins_of(memory: Memory, snapped: Snapped, view: View, band_bits: int, reach_fx: int) -> _engine.Bins | None:
     """Return the triangles of each band of rows; None where every band looks at all of them."""
     width, height = view.size
     if not (snapped.n_triangles and can_share(view)):
         return None
     bins = _engine.Bins(
-        snapped.mesh, height, width, 0, band_bits, memory.empty("bins", (3, snapped.n_triangles + 16), np.int32)
+        snapped.mesh, height, width, reach_fx, band_bits, memory.empty("bins", (3, snapped.n_triangles + 16), np.int32)
     )
     if bins.bad_row >= 0:
         snapped.check_indices()

@@ -163,10 +163,9 @@ class Glass:
 
     def peel(self, frags: SceneFragments, k: int) -> tuple[npt.NDArray[np.int32], F32]:
         """The layers of a sample that nothing opaque hides, planes (K, H, W) of ids and depths."""
-        seen = [replace(one, mesh=one.mesh.seen_from(*frags.positions[k])) for one in self.snapped]
         there, nearest = (planes[k] for planes in frags.drawn_planes)
         for n in (LAYERS, MOST_LAYERS):
-            ids, depth = peel_meshes(SCRATCH, seen, self.view, n, is_farthest=False)
+            ids, depth = peel_meshes(SCRATCH, self.snapped, self.view, n, is_farthest=False, at_fx=frags.positions[k])
             for own_ids, own_depth in zip(ids, depth, strict=True):
                 if not (own_ids >= 0).any():
                     break
