@@ -112,14 +112,15 @@ def field(
     grid = _grid_of(polygons, size, pixel_size, extent, y)
     points_px, triangles = grid.to_pixels(points), as_checked_triangles(polygons.triangles, len(points))
     view = View.parse(grid.size, {"subpixel_bits": subpixel_bits, "threads": threads})
-    ids = _visible(points_px, triangles, view, Sink.LABEL)
     dtype = np.float32 if array.dtype == np.float32 else np.float64
-    if is_per_face:
-        own = array if polygons.faces is None else array[polygons.faces]
-        with canvas_of(SCRATCH, "field", out, ids.shape, dtype) as (result, canvas):
+    with canvas_of(SCRATCH, "field", out, view.size[::-1], dtype) as (result, canvas):
+        ids = _visible(points_px, triangles, view, Sink.LABEL)
+        if is_per_face:
+            own = array if polygons.faces is None else array[polygons.faces]
             np.take(np.append(own, np.nan).astype(dtype), ids, out=canvas, mode="wrap")  # id -1 is the last
-        return result
-    return _on_planes(ids, points_px, triangles, array.astype(np.float64, copy=False), dtype, view, out)
+        else:
+            _fill_planes(ids, points_px, triangles, array.astype(np.float64, copy=False), view, canvas)
+    return result
 
 
 def height_map(
@@ -189,8 +190,10 @@ def height_map(
     points_px, heights = grid.to_pixels(points), np.ascontiguousarray(points[:, 2], np.float64)
     view = View.parse(grid.size, {"subpixel_bits": subpixel_bits, "threads": threads})
     sink = Sink.FARTHEST if surface == "upper" else Sink.NEAREST
-    ids = _visible(np.column_stack([points_px, _depth_of(heights, triangles)]), triangles, view, sink)
-    return _on_planes(ids, points_px, triangles, heights, np.float64, view, out)
+    with canvas_of(SCRATCH, "field", out, view.size[::-1], np.float64) as (result, canvas):
+        ids = _visible(np.column_stack([points_px, _depth_of(heights, triangles)]), triangles, view, sink)
+        _fill_planes(ids, points_px, triangles, heights, view, canvas)
+    return result
 
 
 def _plane_points(polygons: Polygons) -> npt.NDArray[Any]:
@@ -244,9 +247,7 @@ def _visible(points: F64, triangles: I32, view: View, sink: Sink) -> I32:
     return ids
 
 
-def _on_planes(
-    ids: I32, points_px: F64, triangles: I32, values: F64, dtype: type[np.floating[Any]], view: View, out: object
-) -> npt.NDArray[Any]:
+def _fill_planes(ids: I32, points_px: F64, triangles: I32, values: F64, view: View, canvas: npt.NDArray[Any]) -> None:
     n, n_threads = len(triangles), count_threads(view.threads, len(triangles))
     planes: F64 | None = None
     if ids.size < MAX_PIXELS_TO_LIST * n and n < MAX_LISTED_PLANES:
@@ -254,10 +255,8 @@ def _on_planes(
     valued = _engine.Valued(points_px, triangles, np.ascontiguousarray(values), planes)
     if planes is not None:
         run_parts(valued.list_planes, n, n_threads)
-    with canvas_of(SCRATCH, "field", out, ids.shape, dtype) as (result, canvas):
 
-        def fill_rows(first: int, end: int) -> None:
-            valued.fill_planes(ids, canvas, first, end - first)
+    def fill_rows(first: int, end: int) -> None:
+        valued.fill_planes(ids, canvas, first, end - first)
 
-        run_parts(fill_rows, ids.shape[0], n_threads)
-    return result
+    run_parts(fill_rows, ids.shape[0], n_threads)
