@@ -101,3 +101,9 @@ def test_batch_results_carry_warnings_and_warn_once(lacking, executor):
     line = "'a.obj': textures not found: 'gone.png'"
     assert [result.warnings for result in results] == [(line,), (line,), ()]
     assert [(each.category, str(each.message)) for each in told] == [(MeshWarning, line)]
+
+
+def test_explain_of_points_is_refused(run, folder):
+    (folder / "a.obj").write_text("v 0 0 0\nv 1 0 0\n")
+    assert run("explain", "a.obj") == (2, ["topleft: 'a.obj' holds points, of which there is no plan"])
+    assert run("render", "a.obj", "-o", "a.png", *SMALL) == (0, [])

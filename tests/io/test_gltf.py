@@ -68,9 +68,21 @@ def test_gltf_points_and_lines_are_told(tmp_path, mode, kind):
     (tmp_path / "a.glb").write_bytes(file.glb())
     with pytest.warns(MeshWarning, match=f"a.glb': {kind} not drawn"):
         assert len(tl.load(tmp_path / "a.glb").triangles) == 1
+    if mode == 0:
+        return
     (tmp_path / "b.glb").write_bytes(GltfFile().shown(mode=mode).glb())
     with pytest.raises(MeshError, match=f"b.glb' has no triangles, but {kind}"):
         tl.load(tmp_path / "b.glb")
+
+
+def test_gltf_of_points_alone_becomes_points(load):
+    file = GltfFile(materials=[{"pbrMetallicRoughness": {"baseColorFactor": [1, 0, 0, 1]}}])
+    own = file.primitive(mode=0, COLOR_0=np.array([[0, 0.5, 1]] * 3, np.float32))
+    file.node(mesh=file.mesh(own, file.primitive(mode=0, material=0)), translation=[0, 0, 2])
+    cloud = load(file)
+    assert isinstance(cloud, tl.Points)
+    assert cloud.positions.tolist() == 2 * (TRIANGLE + [0, 0, 2]).tolist()
+    assert cloud.colors[[0, 3]].tolist() == [[0, 188, 255, 255], [255, 0, 0, 255]]
 
 
 def test_gltf_nodes_place_by_matrix_and_by_trs(load):

@@ -235,3 +235,9 @@ def test_mtl_paths_of_other_machines_are_found_by_name(load, tmp_path):
     picture(tmp_path, "a.png", np.zeros((1, 1, 3)))
     for name in (r"C:\users\me\a.png", "/home/me/a.png", "../x/A.PNG", "./a.png"):
         assert material_of(load, f"map_Kd {name}\n").texture is not None
+
+
+def test_obj_of_points_alone_becomes_points(load):
+    cloud = load("v 0 0 0 1 0 0\nv 1 2 3 0 1 0\n")
+    assert isinstance(cloud, tl.Points)
+    assert cloud.colors.tolist() == [[255, 0, 0, 255], [0, 255, 0, 255]]

@@ -81,9 +81,19 @@ def test_ply_texture_that_is_missing_is_told(load):
     assert mesh.uv is not None
 
 
-def test_ply_cloud_of_points_is_refused_in_true_words(load):
-    with pytest.raises(MeshError, match=r"cannot draw .*a.ply': it is a cloud of 4 points without faces"):
-        load("element vertex 4\n" + XYZ, SQUARE)
+def test_ply_cloud_of_points_becomes_points(load):
+    rgb = "property uchar red\nproperty uchar green\nproperty uchar blue\n"
+    cloud = load("element vertex 2\n" + XYZ + rgb, "0 0 0 9 8 7\n1 2 3 1 2 3\n")
+    assert isinstance(cloud, tl.Points)
+    assert cloud.positions.tolist() == [[0, 0, 0], [1, 2, 3]]
+    assert cloud.colors.tolist() == [[9, 8, 7, 255], [1, 2, 3, 255]]
+
+
+def test_ply_points_that_are_nowhere_are_left_out(load):
+    with pytest.warns(MeshWarning, match="points that are not finite left out"):
+        assert len(load("element vertex 2\n" + XYZ, "0 0 nan\n1 2 3\n")) == 1
+    with pytest.raises(MeshError, match="has no points that are finite"):
+        load("element vertex 1\n" + XYZ, "0 0 nan\n")
 
 
 @pytest.mark.parametrize("form", ["ascii", "binary_little_endian"])

@@ -15,7 +15,7 @@ from urllib.parse import unquote
 
 import numpy as np
 
-from topleft._io.references import InputFile
+from topleft._io.references import Cloud, InputFile
 from topleft._model.adapt import placed
 from topleft._model.mesh import Mesh
 from topleft.errors import MeshError, MissingPackageError
@@ -24,8 +24,6 @@ NO_TRIANGLES = {
     ".svg": "it holds curves in a plane",
     ".dxf": "only its curves are read",
     ".binvox": "it holds voxels: make a mesh of them, by trimesh's VoxelGrid.marching_cubes say",
-    ".xyz": "it is a cloud of points without faces",
-    ".pcd": "it is a cloud of points without faces",
 }
 """What trimesh may read that is no mesh."""
 
@@ -68,7 +66,7 @@ def read_by_trimesh(source: InputFile) -> list[Mesh]:
         raise MissingPackageError(f"reading {source.path.suffix!r} needs {extra}") from error
     if suffix == ".dae":
         _note_missing_pictures(source)
-    if not parts and suffix in NO_TRIANGLES:
+    if not parts and not source.clouds and suffix in NO_TRIANGLES:
         raise MeshError(f"cannot draw {str(source.path)!r}: {NO_TRIANGLES[suffix]}")
     return parts
 
@@ -111,6 +109,10 @@ def _parts(scene: Any, source: InputFile) -> Iterator[Mesh]:
             yield placed(geometry, transform)
         elif hasattr(geometry, "colors") and len(getattr(geometry, "vertices", ())):
             source.notes.add("points not drawn")
+            points = np.asarray(geometry.vertices) @ transform[:3, :3].T + transform[:3, 3]
+            source.check_n_vertices(len(points))
+            colors = np.asarray(geometry.colors)
+            source.clouds.append(Cloud(points, colors if colors.shape == (len(points), 4) else None))
         elif hasattr(geometry, "entities"):
             source.notes.add("lines not drawn")
 

@@ -21,7 +21,7 @@ import numpy.typing as npt
 from topleft._base.color import encode_srgb
 from topleft._io.gltf_accessors import Accessors, Tree, entry, normalized
 from topleft._io.gltf_materials import Materials
-from topleft._io.references import InputFile
+from topleft._io.references import Cloud, InputFile
 from topleft._model.mesh import Mesh
 from topleft.errors import MeshError, MissingPackageError
 
@@ -294,6 +294,8 @@ class _Reader:
             places: list[F64] | None = None
             for i, primitive in enumerate(mesh["primitives"]):
                 shape = self._shape(node, i, primitive, weights)
+                if primitive.get("mode") == POINTS and "POSITION" in primitive["attributes"]:
+                    self._add_cloud(primitive, self._nodes.matrix(index))
                 if shape is None:
                     continue
                 if places is None:
@@ -306,6 +308,23 @@ class _Reader:
                     self._n_vertices += len(shape.positions)
                     self._source.check_n_vertices(self._n_vertices)
                     yield _placed(shape, matrix, materials)
+
+    def _add_cloud(self, primitive: Tree, matrix: F64) -> None:
+        """Keep the points of a primitive, in the colours of its vertices or its material."""
+        attributes = primitive["attributes"]
+        points = self._accessors.array(attributes["POSITION"])
+        if points.shape[1] != 3:
+            raise MeshError(f"POSITION has {points.shape[1]} numbers a vertex")
+        self._n_vertices += len(points)
+        self._source.check_n_vertices(self._n_vertices)
+        colors: npt.NDArray[np.uint8] | None = None
+        if "COLOR_0" in attributes:
+            light = _light_of_colors(self._accessors.array(attributes["COLOR_0"]))
+            colors = _srgb_bytes(light) if len(light) == len(points) else None
+        elif "material" in primitive:
+            color = self._materials.material(primitive["material"]).color or (255, 255, 255)
+            colors = np.tile(np.array([*color, 255], np.uint8), (len(points), 1))
+        self._source.clouds.append(Cloud(points @ matrix[:3, :3].T + matrix[:3, 3], colors))
 
     def _places(self, index: int, node: Tree) -> list[F64]:
         """World from mesh: once, or once for each instance."""
@@ -465,13 +484,20 @@ def _shape_of(values: dict[str, Array], triangles: Array) -> _Shape | None:
         if name in values and values[name].shape[1] not in n_columns:
             raise MeshError(f"{name} has {values[name].shape[1]} numbers a vertex")
     if colors is not None:
-        if colors.dtype.kind != "f":  # which should say that it is normalized
-            colors = colors / np.iinfo(colors.dtype).max
-        colors = colors if colors.shape[1] == 4 else np.column_stack([colors, np.ones(len(colors))])
+        colors = _light_of_colors(colors)
     shape = _Shape(
         positions, triangles, values.get("NORMAL"), colors, values.get("TEXCOORD_0"), values.get("TEXCOORD_1")
     )
     return shape if shape.normals is not None else _flat(shape)
+
+
+def _light_of_colors(colors: Array) -> Array:
+    """Linear light and opacity (V, 4) of COLOR_0."""
+    if colors.dtype.kind != "f":  # which should say that it is normalized
+        colors = colors / np.iinfo(colors.dtype).max
+    if colors.shape[1] not in (3, 4):
+        raise MeshError(f"COLOR_0 has {colors.shape[1]} numbers a vertex")
+    return colors if colors.shape[1] == 4 else np.column_stack([colors, np.ones(len(colors))])
 
 
 def _flat(shape: _Shape) -> _Shape:

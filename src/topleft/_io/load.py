@@ -18,6 +18,7 @@ from topleft._io.notes import tell
 from topleft._io.references import MAX_TEXTURE_PIXELS, MAX_VERTICES, InputFile
 from topleft._model.adapt import DEFAULT_CREASE, joined
 from topleft._model.mesh import Mesh, as_crease
+from topleft._model.points import Points
 from topleft.errors import MeshError, MissingPackageError
 
 Made = TypeVar("Made")
@@ -31,7 +32,7 @@ def load(
     crease: float = DEFAULT_CREASE,
     max_vertices: int = MAX_VERTICES,
     max_texture_pixels: int = MAX_TEXTURE_PIXELS,
-) -> Mesh:
+) -> Mesh | Points:
     """A mesh read from a file: OBJ, PLY, STL, glTF and GLB; by trimesh OFF, 3MF and what else it has readers for.
 
     Parameters
@@ -48,13 +49,13 @@ def load(
 
     Returns
     -------
-    Mesh
-        Polygons are cut into triangles, groups and objects are one mesh, in the order of the file; the nodes of a scene
-        are placed by their transforms, skins and morph targets are at rest. Normals are those of the file. A file
-        without normals gets its vertices merged where they are equal, so that shading has no seams where a format (STL)
-        or a texture had to double them; triangles of glTF without normals are flat, as its standard says. Colours are
-        those of the vertices or the faces, if there are any; `uv` those of the file. Materials are those of MTL and
-        glTF.
+    Mesh, or Points
+        `Points` of a file that holds points and no triangles. Of a mesh polygons are cut into triangles, groups and
+        objects are one mesh, in the order of the file; the nodes of a scene are placed by their transforms, skins and
+        morph targets are at rest. Normals are those of the file. A file without normals gets its vertices merged where
+        they are equal, so that shading has no seams where a format (STL) or a texture had to double them; triangles of
+        glTF without normals are flat, as its standard says. Colours are those of the vertices or the faces, if there
+        are any; `uv` those of the file. Materials are those of MTL and glTF.
 
     Raises
     ------
@@ -82,7 +83,7 @@ def load(
     return mesh
 
 
-def _mesh(source: InputFile, crease: float) -> Mesh:
+def _mesh(source: InputFile, crease: float) -> Mesh | Points:
     """The mesh of the file; a reader is imported when a file needs it."""
     match source.path.suffix.lower():
         case suffix if suffix in GLTF_SUFFIXES:
@@ -105,12 +106,36 @@ def _mesh(source: InputFile, crease: float) -> Mesh:
             from topleft._io.foreign import read_by_trimesh
 
             parts = read_by_trimesh(source)
+    if not parts and source.clouds:
+        return _points(source)
     if not any(len(part.triangles) for part in parts):
         drawn = [
             line.partition(": ")[2].removesuffix(" not drawn") for line in source.notes.lines if "not drawn" in line
         ]
         raise MeshError(f"{str(source.path)!r} has no triangles" + (f", but {' and '.join(drawn)}" if drawn else ""))
     return joined(parts, crease)
+
+
+def _points(source: InputFile) -> Points:
+    """The points of a file without triangles; those that are nowhere are left out."""
+    source.notes.remove("points not drawn")
+    clouds = source.clouds
+    positions = np.concatenate([cloud.positions for cloud in clouds])
+    colors = normals = None
+    if any(cloud.colors is not None for cloud in clouds):
+        white = [np.full((len(cloud.positions), 4), 255, np.uint8) for cloud in clouds]
+        own = [cloud.colors for cloud in clouds]
+        colors = np.concatenate([one if one is not None else other for one, other in zip(own, white, strict=True)])
+    if all(cloud.normals is not None for cloud in clouds):
+        normals = np.concatenate([cloud.normals for cloud in clouds if cloud.normals is not None])
+    is_somewhere = np.isfinite(positions).all(axis=1)
+    if not is_somewhere.all():
+        source.notes.add("points that are not finite left out")
+        positions = positions[is_somewhere]
+        colors, normals = (None if rows is None else rows[is_somewhere] for rows in (colors, normals))
+    if not len(positions):
+        raise MeshError(f"{str(source.path)!r} has no points that are finite")
+    return Points(positions, colors, normals)
 
 
 def reading(source: InputFile, read: Callable[[], Made]) -> Made:

@@ -31,6 +31,10 @@ class Notes:
         if name:
             names[name] = None
 
+    def remove(self, kind: str) -> None:
+        """Forget a kind."""
+        self._names.pop(kind, None)
+
     @property
     def lines(self) -> list[str]:
         """A line for each kind, in the order in which they were found."""

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._io.mtl import read_mtl
-from topleft._io.references import InputFile, numbers_of_text
+from topleft._io.references import Cloud, InputFile, numbers_of_text
 from topleft._model.material import Material
 from topleft._model.mesh import Mesh
 from topleft._model.polygons import triangulate
@@ -56,8 +56,8 @@ def read_obj(source: InputFile) -> list[Mesh]:
         if text.lines_of(key).size:
             source.notes.add(note)
     if not len(n_corners):
-        if len(positions) and not source.notes.lines:
-            source.notes.add("points not drawn")
+        if len(positions) and not text.lines_of(b"l").size:
+            source.clouds.append(Cloud(positions, colors))
         return []
     materials, row_of_face = _materials(text, source)
     triangles, faces = triangulate(positions, corners[:, 0], n_corners)

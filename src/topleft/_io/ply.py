@@ -15,7 +15,7 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from topleft._io.references import InputFile, numbers_of_text
+from topleft._io.references import Cloud, InputFile, numbers_of_text
 from topleft._model.material import Material
 from topleft._model.mesh import Mesh
 from topleft._model.polygons import triangulate
@@ -67,12 +67,12 @@ Rows = dict[str, Any]
 
 
 def read_ply(source: InputFile) -> list[Mesh]:
-    """The faces of a PLY file, in one mesh; none if it has none.
+    """The faces of a PLY file, in one mesh; none, and a cloud of its points, if it has none.
 
     Raises
     ------
     MeshError
-        If the file is broken, or holds points alone.
+        If the file is broken.
     """
     content = source.path.read_bytes()
     order, elements, textures, start = _header(content)
@@ -92,9 +92,9 @@ def read_ply(source: InputFile) -> list[Mesh]:
         raise MeshError("it has no vertices")
     corners, n_corners, faces = _corners(found)
     if not len(n_corners):
-        n = len(next(iter(vertex.values()), ()))
-        if n:
-            raise MeshError(f"cannot draw {str(source.path)!r}: it is a cloud of {n} points without faces")
+        positions = _together(vertex, (("x", "y", "z"),))
+        if positions is not None and len(positions):
+            source.clouds.append(Cloud(positions, _colors(vertex), _together(vertex, (("nx", "ny", "nz"),))))
         return []
     mesh = _mesh(vertex, corners, n_corners, faces, textures, source)
     return [] if mesh is None else [mesh]

@@ -10,7 +10,7 @@ import io
 import re
 import warnings
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -32,6 +32,15 @@ PICTURE_FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "TGA", "GIF", "TIFF", "PPM", "D
 """Formats of Pillow that are data and nothing else: EPS, say, would run a program."""
 
 
+class Cloud(NamedTuple):
+    """Points of a file that belong to no triangle."""
+
+    positions: npt.NDArray[Any]
+    colors: U8 | None = None
+    """(N, 4) sRGB."""
+    normals: npt.NDArray[Any] | None = None
+
+
 class InputFile:
     """A mesh file, the files beside it, what may be taken from them, and what was missing.
 
@@ -48,6 +57,7 @@ class InputFile:
     ) -> None:
         self.path = path
         self.notes = Notes(str(path))
+        self.clouds: list[Cloud] = []
         self.max_vertices = max_vertices
         self.max_texture_pixels = max_texture_pixels
         self._pictures: dict[tuple[Path, str], U8 | None] = {}

@@ -8,10 +8,11 @@ from typing import Any
 from topleft._base.options import Cull, Sampling
 from topleft._camera.camera import DEFAULT_FOV_Y_DEG
 from topleft._camera.matrices import THREE_QUARTER_DEG
+from topleft._model.points import Points
 from topleft._plan.costs import save_costs
 from topleft._plan.plan import plan
 from topleft._render.render import DEFAULT_SIZE
-from topleft.cli.arguments import UP_HELP, positive, size, tolerance
+from topleft.cli.arguments import UP_HELP, UsageError, positive, size, tolerance
 from topleft.cli.targets import MeshSource, Orbit
 
 __all__ = ["add_plan_commands", "run_calibrate", "run_explain"]
@@ -20,6 +21,8 @@ __all__ = ["add_plan_commands", "run_calibrate", "run_explain"]
 def run_explain(options: argparse.Namespace) -> int:
     """Print how a view of a mesh is drawn: what is chosen at each stage, why, and what it takes."""
     mesh = MeshSource(options.mesh)()
+    if isinstance(mesh, Points):
+        raise UsageError(f"{options.mesh!r} holds points, of which there is no plan")
     orbit = Orbit(options.azimuth, options.elevation, options.fov, options.up, options.ortho)
     camera = orbit(mesh, options.size)
     outputs = {"fill": ("color",), "rasterize": ("triangle", "depth")}.get(options.verb, (options.verb,))
