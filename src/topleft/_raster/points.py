@@ -19,8 +19,8 @@ from topleft._base.threads import count_threads, run_parts
 from topleft._raster.classic import refuse_classic
 from topleft._raster.fragments import Fragments
 from topleft._raster.rasterize import refuse_many
-from topleft._raster.sampling import refine_grid, sample_positions
-from topleft._raster.snap import snap, transform
+from topleft._raster.sampling import sample_positions
+from topleft._raster.snap import refine, snap, transform
 from topleft._raster.view import View, ViewOptions
 
 __all__ = ["MOST_POINT_PX", "PointFragments", "draw_points", "points"]
@@ -236,7 +236,7 @@ def snap_points(memory: Memory, array: NDArray[Any], source: _engine.Source, vie
         if len(bad):
             raise ValueError(f"positions must be finite, got {array[bad[0]].tolist()} in row {bad[0]}")
     if view.grid_bits > view.subpixel_bits:
-        refine_grid(records, None, view.grid_bits - view.subpixel_bits)
+        refine(records, None, None, view.grid_bits - view.subpixel_bits)
     return records
 
 
