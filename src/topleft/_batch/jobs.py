@@ -119,7 +119,7 @@ class MeshFile:
 
     path: str
 
-    def __call__(self) -> Mesh:
+    def __call__(self) -> Mesh | Points:
         """Read it."""
         return load(self.path)
 

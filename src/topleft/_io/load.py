@@ -12,14 +12,17 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from topleft._model.adapt import DEFAULT_CREASE, joined, material_of, placed
 from topleft._model.material import Material
 from topleft._model.mesh import Mesh, as_crease
+from topleft._model.points import Points
 from topleft.errors import MeshError, MissingPackageError
 
 
-def load(path: str | os.PathLike[str], *, crease: float = DEFAULT_CREASE) -> Mesh:
-    """A mesh read from a file, by trimesh: OBJ, PLY, STL, glTF and GLB, OFF, and what else it has readers for.
+def load(path: str | os.PathLike[str], *, crease: float = DEFAULT_CREASE) -> Mesh | Points:
+    """A mesh or cloud read from a file, by trimesh: OBJ, PLY, STL, glTF and GLB, OFF, and what else it has readers for.
 
     Parameters
     ----------
@@ -31,8 +34,9 @@ def load(path: str | os.PathLike[str], *, crease: float = DEFAULT_CREASE) -> Mes
 
     Returns
     -------
-    Mesh
-        Polygons are cut into triangles, groups and objects are one mesh, in the order of the file; the nodes of a scene
+    Mesh, or Points
+        `Points` of a file that holds points and no faces, with their colours. Of a mesh polygons are cut into
+        triangles, groups and objects are one mesh, in the order of the file; the nodes of a scene
         are placed by their transforms. Normals are those of the file. A file without normals gets its vertices merged
         where they are equal, so that shading has no seams where a format (STL) or a texture had to double them.
         Colours are those of the vertices or the faces, if there are any; `uv` those of the file. Materials are those of
@@ -63,6 +67,7 @@ def load(path: str | os.PathLike[str], *, crease: float = DEFAULT_CREASE) -> Mes
         import trimesh
     except ImportError:
         raise MissingPackageError("reading a mesh needs trimesh: pip install 'topleft[render]'") from None
+    cloud = None
     try:
         with _strict_parsing():
             if path.suffix.lower() == ".obj":
@@ -72,7 +77,10 @@ def load(path: str | os.PathLike[str], *, crease: float = DEFAULT_CREASE) -> Mes
                     for part in _parts(trimesh.load_scene(io.BytesIO(text), file_type="obj", process=False))
                 ]
             else:
-                parts = _parts(trimesh.load_scene(str(path), process=False))
+                scene = trimesh.load_scene(str(path), process=False)
+                parts, cloud = _parts(scene), _cloud(scene)
+        if not parts and cloud is not None:
+            return cloud
         if not parts:
             raise MeshError(f"{str(path)!r} has no triangles")
         return joined(parts, crease)
@@ -116,6 +124,22 @@ def _parts(scene: Any) -> list[Mesh]:
         for transform, geometry in (scene.graph[node] for node in scene.graph.nodes_geometry)
         if len(getattr(scene.geometry[geometry], "faces", ()))
     ]
+
+
+def _cloud(scene: Any) -> Points | None:
+    """The points of a trimesh scene that belong to no faces, placed; None without any."""
+    found = []
+    for transform, name in (scene.graph[node] for node in scene.graph.nodes_geometry):
+        geometry = scene.geometry[name]
+        if hasattr(geometry, "colors") and not hasattr(geometry, "faces") and len(geometry.vertices):
+            own = np.asarray(geometry.colors)
+            places = geometry.vertices @ transform[:3, :3].T + transform[:3, 3]
+            found.append((places, own[:, :3] if own.shape == (len(places), 4) else None))
+    if not found:
+        return None
+    colors = [own for _, own in found if own is not None]
+    places = np.concatenate([places for places, _ in found])
+    return Points(places, np.concatenate(colors) if len(colors) == len(found) else None)
 
 
 def _obj_texts(path: Path) -> Iterator[tuple[bytes, Material | None]]:
