@@ -1,4 +1,4 @@
-"""Files: meshes in. `load` reads what trimesh reads and returns one `Mesh`."""
+"""Files: meshes in. `load` reads what trimesh reads and returns one `Mesh`, or `Points`."""
 
 from __future__ import annotations
 
