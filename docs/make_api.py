@@ -23,6 +23,7 @@ SUBJECTS: Mapping[str, tuple[str, ...]] = {
     "Polygons": ("polygons", "overlap", "Overlap"),
     "Layers of triangles, sorted by depth": ("peel", "DepthLayers", "composite"),
     "Meshes and scenes": ("Mesh", "load", "as_mesh", "Instance", "Scene"),
+    "Clouds of points": ("points", "PointFragments", "Points"),
     "Materials and light": ("Material", "Texture", "Light", "Fog", "Environment"),
     "Cameras": ("Camera", "OpenCVLens", "FisheyeLens", "load_cameras", "turntable", "viewpoints"),
     "Pictures": ("render", "render_transparent", "silhouette", "save_image"),
@@ -51,7 +52,9 @@ MEMBERS: Mapping[str, tuple[str, ...]] = {
     ),
     "Overlap": ("means", "sums", "totals", "spread", "to_scipy"),
     "DepthLayers": ("triangle", "depth", "count", "layer"),
-    "Mesh": ("bounds", "vertex_normals"),
+    "Mesh": ("bounds", "vertex_normals", "corner_normals"),
+    "Points": ("bounds",),
+    "PointFragments": ("point", "depth", "mask", "interpolate", "sample", "only"),
     "Instance": ("is_mirrored",),
     "Scene": ("n_triangles", "bounds"),
     "Camera": (

@@ -186,9 +186,17 @@ TL_INLINE vf side_of_normals(const shade_runs *s, int slot)
 /* The rows of the normals of TL_LANES triangles whose corners have some of their own. */
 TL_INLINE void load_normal_rows(const shade_runs *s, int slot, int32_t rows[3][TL_MAX_LANES])
 {
+    const int32_t *ids = s->ints[RUN_ID] + slot, *of_corner = s->shading->normal_of_corner;
+    if (TL_LANES > 1 && !vm_any(vi_eq(vi_load(ids), vi_set1(0)))) { /* 16 bytes, as in run_corners */
+        vi c[4];
+        vi_load_records((const char *)of_corner - 4, 12, ids, c);
+        for (int k = 0; k < 3; k++)
+            vi_spill(rows[k], c[k + 1]);
+        return;
+    }
     for (int lane = 0; lane < TL_LANES; lane++)
         for (int k = 0; k < 3; k++)
-            rows[k][lane] = s->shading->normal_of_corner[3 * (int64_t)s->ints[RUN_ID][slot + lane] + k];
+            rows[k][lane] = of_corner[3 * (int64_t)ids[lane] + k];
 }
 
 /* Normals and q of the corners in these rows. */

@@ -2,8 +2,8 @@
  * In: snapped vertices, a size each.  Out: ids and depth, as those of triangles.
  *
  * A point covers the samples in its disc, the rim included, or in its square, of whose sides the left one and the upper
- * one count; and in any case those in the square of a pixel's size round it, so that no point is too small to show.  All
- * of it is decided in whole numbers, doubled: the sample of a pixel lies half a pixel off the grid. */
+ * one count; and in any case those in the square of a pixel's size round it, so that no point is too small to show.
+ * All of it is decided in whole numbers, doubled: the sample of a pixel lies half a pixel off the grid. */
 #ifndef TL_CLOUD_C
 #define TL_CLOUD_C
 

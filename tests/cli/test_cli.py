@@ -12,6 +12,7 @@ import pytest
 from first_pictures import camera_of, first_picture, shape_of
 from PIL import Image
 
+import topleft as tl
 from topleft import cli, scenes
 from topleft._camera.camera import Camera
 from topleft._io import png
@@ -120,6 +121,23 @@ def test_render_crease_makes_edges_sharp_or_not(run, folder):
         colors[degrees] = len(np.unique(pixels, axis=0))
     assert colors[0] == colors[30] == 3  # two sides and the ground
     assert colors[180] > 20
+
+
+def test_render_cloud_of_points_is_the_picture_of_points(run, folder):
+    pytest.importorskip("trimesh")
+    head = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+    colors = "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n"
+    (folder / "a.ply").write_text(head + colors + "0 0 0 255 0 0\n1 0 0.5 0 255 0\n0 1 0 0 0 255\n")
+    assert run("render", "a.ply", "-o", "a.png", "--point-size", "9", *SMALL) == (0, [])
+    rgb = np.eye(3, dtype=np.uint8) * 255
+    cloud = tl.Points([[0, 0, 0], [1, 0, 0.5], [0, 1, 0]], rgb, size=9)
+    expected = tl.render(cloud, camera_of(cloud), (64, 48), sampling="msaa4")
+    assert np.array_equal(np.asarray(Image.open("a.png")), expected)
+    assert run("render", "a.ply", "-o", "a.npz", "--point-size", "9", *SMALL) == (0, [])
+    assert np.unique(np.load("a.npz")["triangle"]).tolist() == [-1, 0, 1, 2]
+    status, lines = run("render", "a.ply", "-o", "a.png", "--point-size", "none")
+    assert (status, len(lines)) == (2, 1)
+    assert "must be a positive number of pixels, got 'none'" in lines[0]
 
 
 def test_render_word_in_braces_that_stands_for_nothing_is_refused(run, folder):

@@ -59,8 +59,8 @@ def test_render_environment_is_light_from_all_around(run, checks, text, up, envi
     if "image" in environment:
         environment = {"image": checks.image[..., :3]}
     assert run("render", "torus-knot", "-o", "a.png", "--environment", text, "--up", up, *SMALL) == (0, [])
-    camera = tl.Camera.framing(KNOT, aspect=64 / 48, up=up)
-    expected = tl.render(KNOT, camera, SIZE, environment=tl.Environment(**environment))
+    environment = tl.Environment(**environment)
+    expected = tl.render(KNOT, camera_of(KNOT, up=up), SIZE, environment=environment, sampling="msaa4")
     assert np.array_equal(pixels("a.png"), expected)
 
 

@@ -211,7 +211,7 @@ class Valued:
     def list_planes(self, first: int, end: int) -> None: ...
     def fill_planes(self, ids: NDArray[np.int32], out: NDArray[Any], first_row: int, n_rows: int) -> None: ...
 
-class Points:
+class PixelPoints:
     def __init__(
         self,
         positions: NDArray[Any],
@@ -534,6 +534,7 @@ def face_angles(
 ) -> int: ...
 
 class Fans:
+    most_corners: int
     def __init__(
         self,
         triangles: NDArray[np.int32],

@@ -114,7 +114,7 @@ def composite(const int32_t[:, :, ::1] ids, int64_t n_triangles, int64_t first_r
         K.composite(&layers, n, &pixels[first_row * width * pixel_bytes])
 
 
-cdef class Points:
+cdef class PixelPoints:
     """What `tl_points` holds: positions of vertices, and what is told of a point."""
 
     cdef tl_points points

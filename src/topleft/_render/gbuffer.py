@@ -61,7 +61,9 @@ def evaluate(
     n = N_NUMBERS.get(what, len(rows))
     out: npt.NDArray[Any] = np.empty((*ids.shape, n)[: 2 if n == 1 else 3], dtype)
     half_size = size[0] / 2, size[1] / 2
-    points = _engine.Points(mesh.vertices, what, np.ascontiguousarray(rows), half_size, background, dtype is np.float64)
+    points = _engine.PixelPoints(
+        mesh.vertices, what, np.ascontiguousarray(rows), half_size, background, dtype is np.float64
+    )
     scene = frags._snapped.with_inverse_w(ids.size)
     n_threads = threads_for(threads, len(mesh.triangles))
     run_parts(lambda first, end: points.fill(scene, ids, out, first, end - first), len(ids), n_threads)

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from topleft._points.cloud import CLOUD_LAYERS, CloudBuffer
 from topleft._render.blended import is_blended
-from topleft._render.cloud import CLOUD_LAYERS, CloudBuffer
 from topleft._render.fragments import VisiblePart, meshes_of
 from topleft._render.gbuffer import GBuffer, PointKind, points_of, project
 from topleft._render.render import picture_of, render

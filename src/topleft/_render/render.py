@@ -21,13 +21,13 @@ from topleft._model.material import Material
 from topleft._model.mesh import Mesh
 from topleft._model.points import Points
 from topleft._model.scene import Instance, Scene
+from topleft._points.cloud import draw_cloud, framing_of
 from topleft._raster import choices
 from topleft._raster.clusters import Clusters
 from topleft._raster.fragments import Fragments
 from topleft._raster.verbs import Rasterizer, rasterize, wireframe
 from topleft._raster.view import View
 from topleft._render.blended import draw_blended, is_blended
-from topleft._render.cloud import draw_cloud, framing_of
 from topleft._render.fragments import BentFragments, camera_of, scene_of
 from topleft._render.holes import without_holes
 from topleft._render.instances import draw_scene

@@ -21,9 +21,9 @@ from topleft._model.mesh import Mesh
 from topleft._model.points import Points
 from topleft._model.scene import Instance, Scene
 from topleft._model.texture import Texture
+from topleft._points.cloud import shade_cloud
+from topleft._points.points import PointFragments
 from topleft._raster.fragments import Fragments
-from topleft._raster.points import PointFragments
-from topleft._render.cloud import shade_cloud
 from topleft._render.fragments import SceneFragments, VisiblePart, join, meshes_of, parts_of
 from topleft._shade.look import is_similarity
 from topleft._shade.shade import Shading, ShadingOptions, shade_mesh, shade_numbers, shade_samples

@@ -15,8 +15,8 @@ from topleft._camera.camera import Camera
 from topleft._model.adapt import MeshLike
 from topleft._model.points import Points
 from topleft._model.scene import Scene
+from topleft._points.cloud import draw_cloud, framing_of
 from topleft._raster.verbs import coverage
-from topleft._render.cloud import draw_cloud, framing_of
 from topleft._render.instances import draw_scene_coverage
 from topleft._render.render import DEFAULT_SIZE, subject_of
 from topleft._render.through_lens import seen_through

@@ -18,8 +18,8 @@ from topleft._io.layer_files import save_layers
 from topleft._model.adapt import MeshLike
 from topleft._model.points import Points
 from topleft._model.scene import Scene
+from topleft._points.cloud import CloudBuffer, framing_of
 from topleft._raster.verbs import Rasterizer
-from topleft._render.cloud import CloudBuffer, framing_of
 from topleft._render.fragments import meshes_of
 from topleft._render.gbuffer import GBuffer
 from topleft._render.layers import LAYERS, check_layers, draw_layers

@@ -21,8 +21,8 @@ from topleft._camera.camera import Camera
 from topleft._model.light import TO_HEADLIGHT, Light, LightKind, LightSpace
 from topleft._model.normals import moved, unit_or_zero
 from topleft._model.points import Points, PointUnit
+from topleft._points.points import PointFragments, draw_points
 from topleft._raster.classic import refuse_classic
-from topleft._raster.points import PointFragments, draw_points
 from topleft._raster.rasterize import refuse_many
 from topleft._raster.view import View, ViewOptions
 from topleft._shade.look import determinant, turn_of_normals
