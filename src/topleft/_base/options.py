@@ -6,7 +6,19 @@ from enum import IntEnum, StrEnum
 from functools import cache, cached_property
 from typing import TypeVar
 
-__all__ = ["Alpha", "Blend", "ClipDepth", "Cull", "DepthTest", "Per", "Resolve", "Sampling", "Sink", "parse"]
+__all__ = [
+    "Alpha",
+    "Blend",
+    "ClipDepth",
+    "Cull",
+    "DepthTest",
+    "Per",
+    "Resolve",
+    "Sampling",
+    "Sink",
+    "check_choice",
+    "parse",
+]
 
 
 class Sampling(StrEnum):
@@ -116,3 +128,10 @@ def parse(kind: type[Option], name: str, value: object) -> Option:
         choices = ", ".join(repr(str(member)) for member in kind)
         raise ValueError(f"{name} must be one of {choices}, got {value!r}")
     return member
+
+
+def check_choice(name: str, value: object, choices: tuple[str, ...]) -> None:
+    """Raise a `ValueError` unless the value is one of a few words."""
+    if not (isinstance(value, str) and value in choices):
+        *others, last = (f'"{choice}"' for choice in choices)
+        raise ValueError(f"{name} must be {', '.join(others)} or {last}, got {value!r}")

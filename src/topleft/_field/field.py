@@ -16,7 +16,7 @@ import numpy.typing as npt
 from topleft import _engine
 from topleft._base.arrays import as_array, as_checked_triangles
 from topleft._base.memory import SCRATCH
-from topleft._base.options import Per, Sink, parse
+from topleft._base.options import Per, Sink, check_choice, parse
 from topleft._base.threads import count_threads, run_parts
 from topleft._field.grid import Extent, Grid, grid_around
 from topleft._model.adapt import MeshLike, Polygons, as_polygons
@@ -177,8 +177,7 @@ def height_map(
     array([[nan, nan],
            [1.5, nan]])
     """
-    if surface not in ("upper", "lower"):
-        raise ValueError(f'surface must be "upper" or "lower", got {surface!r}')
+    check_choice("surface", surface, ("upper", "lower"))
     polygons = as_polygons(mesh)
     points = _plane_points(polygons)
     if points.shape[1] != 3:

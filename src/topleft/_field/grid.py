@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from topleft._base.arrays import as_size
+from topleft._base.arrays import as_real, as_size, shown
+from topleft._base.options import check_choice
 from topleft._model.adapt import MeshLike, Polygons, as_polygons
 
 F64 = npt.NDArray[np.float64]
@@ -60,8 +61,7 @@ class Grid:
                 f"extent must be finite with x_min < x_max and y_min < y_max, got {x_min}, {x_max}, {y_min}, {y_max}"
             )
         object.__setattr__(self, "extent", (x_min, x_max, y_min, y_max))
-        if self.y not in ("up", "down"):
-            raise ValueError(f'y must be "up" or "down", got {self.y!r}')
+        check_choice("y", self.y, ("up", "down"))
 
     @classmethod
     def around(
@@ -148,7 +148,10 @@ def grid_around(
     if pixel_size is None:
         return Grid(as_size(size), extent, y)
     x_min, x_max, y_min, y_max = Grid((1, 1), extent, y).extent
-    step = np.broadcast_to(np.asarray(pixel_size, np.float64), 2)
+    step = as_real("pixel_size", pixel_size)
+    if step.shape not in ((), (2,)):
+        raise ValueError(f"pixel_size must be one number or two, got {shown(pixel_size)}")
+    step = np.broadcast_to(step, 2)
     if not (np.isfinite(step).all() and (step > 0).all()):
         raise ValueError(f"pixel_size must be positive, got {pixel_size}")
     # A box of 3.0000000000000004 pixels, after the roundings of its sides, has three.

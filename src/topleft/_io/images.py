@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from topleft._base.arrays import as_path
 from topleft._base.whole_file import write_whole
 from topleft._io import png
 from topleft.errors import ImageError
@@ -73,7 +74,7 @@ def save_image(
     OSError
         If the file cannot be written.
     """
-    path = Path(path)
+    path = as_path("path", path)
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
         raise ImageError(f"cannot write {str(path)!r}: format {path.suffix!r} is none of {' '.join(SUFFIXES)}")

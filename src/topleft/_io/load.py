@@ -12,7 +12,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from topleft._model.adapt import joined, material_of, placed
+from topleft._base.arrays import as_path
+from topleft._model.adapt import FILE_READERS, joined, material_of, placed
 from topleft._model.material import Material
 from topleft._model.mesh import Mesh
 from topleft.errors import MeshError, MissingPackageError
@@ -51,7 +52,7 @@ def load(path: str | os.PathLike[str]) -> Mesh:
     same width with the reflectance of a dielectric. Metals keep their diffuse colour, since there is no surrounding
     that they could mirror; normal, occlusion and emission maps are not read.
     """
-    path = Path(path)
+    path = as_path("path", path)
     if not path.exists():
         raise FileNotFoundError(f"there is no file {str(path)!r}")
     if path.is_dir():
@@ -88,6 +89,9 @@ def load(path: str | os.PathLike[str]) -> Mesh:
     except Exception as error:  # a reader meets broken bytes in its own way: KeyError, struct.error, ...
         reason = " ".join(str(error).split()) or type(error).__name__
         raise MeshError(f"cannot read {str(path)!r}: broken, or not a {path.suffix!r} file ({reason})") from error
+
+
+FILE_READERS.append(load)
 
 
 @contextmanager

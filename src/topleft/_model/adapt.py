@@ -7,7 +7,8 @@ may be flat. Arrays are taken without a copy where their numbers allow it.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import os
+from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -22,6 +23,9 @@ from topleft._model.texture import Texture
 
 MeshLike: TypeAlias = Any
 """What `as_mesh` takes."""
+
+FILE_READERS: list[Callable[[str | os.PathLike[str]], Mesh]] = []
+"""What reads a mesh where a path is given: `load`, which puts itself here, for it stands on a floor above this one."""
 
 CORNERS_OF_CELL = {"triangle": 3, "triangle6": 3, "triangle7": 3, "quad": 4, "quad8": 4, "quad9": 4, "polygon": None}
 """Corners of the surface cells of meshio, which come first in a row; `None`: all of the row."""
@@ -50,13 +54,14 @@ def as_mesh(subject: MeshLike) -> Mesh:
 
     Parameters
     ----------
-    subject : Mesh, trimesh.Trimesh, trimesh.Scene, meshio.Mesh, pyvista.PolyData, matplotlib.tri.Triangulation
+    subject : Mesh, path, trimesh.Trimesh, trimesh.Scene, meshio.Mesh, pyvista.PolyData, matplotlib.tri.Triangulation
         Or anything with `vertices` and `triangles` or `faces`, or a pair (vertices, triangles).
 
     Returns
     -------
     Mesh
-        Vertices share the memory of the subject's where they are float32 or float64 (V, 3). Flat points get z = 0.
+        Of a path what `load` reads. Vertices share the memory of the subject's where they are float32 or float64
+        (V, 3). Flat points get z = 0.
         Faces with more corners become fans of triangles, in the order of the faces; masked triangles are left out. Of
         trimesh come colours, and the normals that it has already; a scene is placed and joined as `load` does it.
 
@@ -74,6 +79,8 @@ def as_mesh(subject: MeshLike) -> Mesh:
     """
     if isinstance(subject, Mesh):
         return subject
+    if isinstance(subject, str | os.PathLike) and FILE_READERS:
+        return FILE_READERS[0](subject)
     if _is_scene(subject):
         nodes = [subject.graph[node] for node in subject.graph.nodes_geometry]
         shapes = [(subject.geometry[name], transform) for transform, name in nodes]
@@ -100,7 +107,7 @@ def as_polygons(subject: MeshLike) -> Polygons:
     ValueError
         If it has no faces that are surfaces.
     """
-    if _is_scene(subject):
+    if _is_scene(subject) or isinstance(subject, str | os.PathLike):
         subject = as_mesh(subject)
     if hasattr(subject, "x") and hasattr(subject, "y") and hasattr(subject, "triangles"):
         return _of_triangulation(subject)
@@ -124,6 +131,10 @@ def as_polygons(subject: MeshLike) -> Polygons:
 
 def is_mesh_like(subject: object) -> bool:
     """Whether a subject has faces, rather than being an array of points."""
+    if isinstance(subject, str | os.PathLike):
+        return True
+    if isinstance(subject, tuple) and len(subject) == 2:  # (vertices, triangles), not two points
+        return all(hasattr(part, "__len__") and len(part) > 0 and hasattr(part[0], "__len__") for part in subject)
     return _is_scene(subject) or any(hasattr(subject, name) for name in ("triangles", "faces", "cells"))
 
 
@@ -132,8 +143,12 @@ def _is_scene(subject: object) -> bool:
 
 
 def _plain(vertices: npt.ArrayLike, triangles: npt.ArrayLike) -> Polygons:
-    corners = as_array("triangles", triangles)
-    return Polygons(as_array("vertices", vertices), corners, None, len(corners))
+    points, corners = as_array("vertices", vertices), as_array("triangles", triangles)
+    if points.ndim != 2 or points.shape[1] not in (2, 3):
+        raise ValueError(f"points must have shape (V, 2) or (V, 3), got {points.shape}")
+    if corners.ndim == 2 and corners.shape[1] > 3 and corners.dtype.kind in "iu":
+        return _fans(points, [corners])
+    return Polygons(points, corners, None, corners.shape[0] if corners.ndim else 0)
 
 
 def _of_triangulation(subject: Any) -> Polygons:

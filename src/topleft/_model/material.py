@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
+from topleft._base.arrays import as_number
 from topleft._base.color import Color, as_color
 from topleft._model.light import as_not_negative
 from topleft._model.texture import Texture
@@ -46,6 +47,13 @@ class Material:
     unlit: bool = False
     alpha_cutoff: float | None = None
 
+    def __repr__(self) -> str:
+        """One line: what differs from a plain material."""
+        own = ((one.name, getattr(self, one.name), one.default) for one in fields(self))
+        told = ((name, str(value) if isinstance(value, str) else value) for name, value, plain in own if value != plain)
+        words = (f"{name}={value!r}" for name, value in told)
+        return f"Material({', '.join(words)})"
+
     def __post_init__(self) -> None:
         keep = object.__setattr__  # the dataclass is frozen, and its values are coerced
         for name in ("color", "back_color"):
@@ -53,8 +61,9 @@ class Material:
                 keep(self, name, as_color(name, getattr(self, name), 3))
         for name in ("specular", "shininess"):
             keep(self, name, as_not_negative(name, getattr(self, name)))
-        for name, value in (("specular", self.specular), ("alpha_cutoff", self.alpha_cutoff or 0.0)):
-            if not 0 <= value <= 1:
+        for name in ("specular", "alpha_cutoff"):
+            value = getattr(self, name)
+            if value is not None and not 0 <= as_number(name, value) <= 1:
                 raise ValueError(f"{name} must lie in 0 to 1, got {value!r}")
         if self.texture is not None and not isinstance(self.texture, Texture):
             raise TypeError(f"texture must be a Texture, got {type(self.texture).__name__}")

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine
-from topleft._base.arrays import as_values
+from topleft._base.arrays import as_number, as_values, shown
 
 __all__ = ["Fragments"]
 
@@ -117,7 +117,12 @@ class Fragments:
 
     def sample(self, i: int) -> Fragments:
         """Return ids, depth and attributes at one sample of each pixel."""
-        return (self._samples or (self,))[i]
+        samples = self._samples or (self,)
+        if not isinstance(i, int | np.integer):
+            raise TypeError(f"i must be an integer, got {shown(i)}")
+        if not -len(samples) <= i < len(samples):
+            raise IndexError(f"i must lie in 0 to {len(samples) - 1}, got {i}")
+        return samples[i]
 
     def only(self, rows: NDArray[np.intp], cols: NDArray[np.intp]) -> Fragments:
         """Return what is left when no other pixels than these show a triangle."""
@@ -189,7 +194,7 @@ class Fragments:
         out: NDArray[Any] = np.empty((*self.triangle.shape, channels), np.float32)
         rows = array.reshape(-1, channels) if array.size else np.empty((0, channels), np.float32)
         snapped = self._snapped.with_inverse_w(self.id.size)
-        snapped.interpolate(self._ids(), rows, array.ndim == 3, float(background), out)
+        snapped.interpolate(self._ids(), rows, array.ndim == 3, as_number("background", background), out)
         return out if array.ndim > 1 else out[..., 0]
 
     @cached_property

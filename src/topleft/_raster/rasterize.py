@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine
-from topleft._base.arrays import as_out
+from topleft._base.arrays import as_number, as_out
 from topleft._base.memory import FRESH, Memory
 from topleft._base.options import DepthTest, Sampling, Sink, parse
 from topleft._base.threads import count_threads, run_parts
@@ -210,6 +210,7 @@ class Asked(NamedTuple):
         test = None if depth_test is None else parse(DepthTest, "depth_test", depth_test)
         if background_depth is None:
             background_depth = -np.inf if test is DepthTest.GREATER else np.inf
+        background_depth = as_number("background_depth", background_depth)
         try:
             ids_out, depth_out = (None, None) if out is None else cast("tuple[object, object]", out)
         except (TypeError, ValueError):

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy.typing as npt
 
-from topleft._camera.camera import Camera
+from topleft._base.arrays import as_size
+from topleft._camera.camera import CameraLike
 from topleft._model.adapt import MeshLike
 from topleft._model.scene import Scene
 from topleft._raster.verbs import coverage
@@ -22,8 +23,8 @@ __all__ = ["silhouette"]
 
 def silhouette(
     mesh: MeshLike | Scene,
-    camera: Camera | None = None,
-    size: tuple[int, int] = DEFAULT_SIZE,
+    camera: CameraLike | None = None,
+    size: int | tuple[int, int] = DEFAULT_SIZE,
     *,
     sampling: str = "center",
     cull: str = "none",
@@ -82,6 +83,7 @@ def silhouette(
     >>> round(float(tl.silhouette(mesh, size=(8, 6), sampling="area", cull="back").sum()), 2)
     16.2
     """
+    size = as_size(size)
     window = {"viewport": view.get("viewport"), "origin": view.get("origin", (0, 0))}
     subject, camera = subject_of(mesh, camera, size, tolerance, cull=cull, **window)
     options: Any = {"sampling": sampling, "cull": cull, "threads": threads} | view
