@@ -275,7 +275,9 @@ def as_colors(values: ArrayLike) -> NDArray[Any]:
     if array.dtype.kind not in "iu":
         raise TypeError(f"colors must be uint8 or float32, got dtype {array.dtype}")
     if array.dtype != np.uint8 and array.size and not (0 <= array.min() and array.max() <= 255):
-        raise ValueError(f"colors must lie in 0..255 when they are integers, got {array.min()}..{array.max()}")
+        raise ValueError(
+            f"colors must lie in 0..255 when they are integers, got {array.min()}..{array.max()}; dtype= fills labels"
+        )
     return np.ascontiguousarray(array, dtype=np.uint8)
 
 

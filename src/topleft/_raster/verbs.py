@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, Unpack
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from topleft._base.arrays import as_size
 from topleft._base.memory import FRESH, SCRATCH, KeptMemory
@@ -142,6 +142,7 @@ def fill(
     blend: str = "replace",
     alpha: str = "straight",
     resolve: str = "values",
+    dtype: DTypeLike | None = None,
     out: NDArray[Any] | None = None,
     **view: Unpack[ViewOptions],
 ) -> NDArray[Any]:
@@ -171,7 +172,9 @@ def fill(
     resolve : "values" or "linear"
         With several samples a pixel ("msaa4", say) each pixel is the mean of its samples: of their values as they are,
         or, for uint8, of the light that sRGB values stand for (alpha, the last of 2 or 4 channels, as it is).
-    out : ndarray of uint8 or float32, shape (H, W, C) or (H, W), optional
+    dtype : dtype of integers, optional
+        `colors` are labels, (T,) or (T, C), and so is the picture: a pixel has exactly the numbers of its triangle.
+    out : ndarray of uint8, float32 or `dtype`, shape (H, W, C) or (H, W), optional
         Is drawn over.
 
     Returns
@@ -192,16 +195,19 @@ def fill(
 
     Examples
     --------
-    >>> import topleft as tl
+    >>> import numpy as np, topleft as tl
     >>> tl.fill([[0, 0], [4, 0], [0, 4]], [[0, 1, 2]], [0, 200, 0], (4, 2), per="vertex", background=9)
     array([[ 25,  75, 125,   9],
            [ 25,  75,   9,   9]], dtype=uint8)
     >>> twice, half_white = [[0, 1, 2]] * 2, [[255, 128]] * 2
     >>> tl.fill([[0, 0], [4, 0], [0, 4]], twice, half_white, (4, 1), blend="over", background=(0, 255))[..., 0]
     array([[192, 192, 192,   0]], dtype=uint8)
+    >>> tl.fill([[0, 0], [4, 0], [0, 4]], [[0, 1, 2]], [70000], (4, 2), background=-1, dtype=np.int32)
+    array([[70000, 70000, 70000,    -1],
+           [70000, 70000,    -1,    -1]], dtype=int32)
     """
     checked = View.parse(size, view)
-    style = Style(per, background, blend, alpha, resolve)
+    style = Style(per, background, blend, alpha, resolve, dtype)
     return draw_fill(SCRATCH, vertices, triangles, colors, checked, style, out)
 
 
@@ -395,11 +401,12 @@ class Rasterizer:
         blend: str = "replace",
         alpha: str = "straight",
         resolve: str = "values",
+        dtype: DTypeLike | None = None,
         out: NDArray[Any] | None = None,
         **view: Unpack[ViewOptions],
     ) -> NDArray[Any]:
         """Return a picture of coloured triangles in painter's order, as `topleft.fill` does."""
-        style = Style(per, background, blend, alpha, resolve)
+        style = Style(per, background, blend, alpha, resolve, dtype)
         return draw_fill(self._memory, vertices, triangles, colors, self._view(view), style, out)
 
     def rasterize(
