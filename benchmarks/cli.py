@@ -18,6 +18,7 @@ from benchmarks.harness.records import Record, write_record, write_text
 from benchmarks.levels.study import STUDY as LEVELS
 from benchmarks.peers import PEERS
 from benchmarks.pictures.study import STUDY as PICTURES
+from benchmarks.polygons.study import STUDY as POLYGONS
 from benchmarks.report.pages import with_parts
 from benchmarks.report.study import Study
 from benchmarks.run.study import STUDY as RUN
@@ -32,7 +33,8 @@ from benchmarks.static.study import STUDY as STATIC
 STUDIES = {
     study.kind: study
     for study in (
-        RUN, ACCURACY, BATCH, ATLAS, CHOICES, STATIC, PICTURES, LEVELS, LAYERS, FIELD, SAMPLINGS, PLANNER, MEMSET
+        RUN, ACCURACY, BATCH, ATLAS, CHOICES, STATIC, PICTURES, LEVELS, LAYERS, FIELD, SAMPLINGS, PLANNER, MEMSET,
+        POLYGONS,
     )
 }  # fmt: skip
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, get_type_hints
 from topleft import scenes
 from topleft._base.memory import release_memory
 from topleft._camera.camera import Camera
+from topleft._camera.file_cameras import load_cameras
 from topleft._camera.lens import FisheyeLens, OpenCVLens
 from topleft._camera.viewpoints import turntable, viewpoints
 from topleft._engine.isa import build_info
@@ -20,26 +21,32 @@ from topleft._lod.detail import Detail, choose_detail
 from topleft._lod.levels import Level, Levels
 from topleft._lod.simplify import simplify
 from topleft._model.adapt import as_mesh
+from topleft._model.environment import Environment
 from topleft._model.light import Fog, Light
 from topleft._model.material import Material
 from topleft._model.mesh import Mesh
+from topleft._model.points import Points
 from topleft._model.scene import Instance, Scene
 from topleft._model.texture import Texture
 from topleft._plan.plan import Plan, plan
+from topleft._polygons.overlap import Overlap, overlap
+from topleft._polygons.polygons import polygons
 from topleft._raster.classic import bresenham_line
 from topleft._raster.composite import composite
-from topleft._raster.fragments import Fragments
+from topleft._raster.fragments import Fragments, FragmentsBatch
 from topleft._raster.peel import DepthLayers, peel
+from topleft._raster.points import PointFragments, points
 from topleft._raster.verbs import Rasterizer, coverage, fill, overdraw, rasterize, wireframe
 from topleft._render.fragments import SceneDepthLayers, SceneFragments
 from topleft._render.render import rasterize_mesh, render
 from topleft._render.scene_shade import shade
 from topleft._render.silhouette import silhouette
-from topleft.errors import ImageError, MeshError, MissingPackageError, TopleftError
+from topleft.errors import ImageError, MeshError, MeshWarning, MissingPackageError, TopleftError
 
 if TYPE_CHECKING:
     from topleft._batch.batch import render_batch
     from topleft._batch.jobs import Job
+    from topleft._diagram.pixel_grid import pixel_grid
     from topleft._render.transparent import render_transparent, visible_layers
     from topleft._render.view_layers import ViewLayers, render_layers
 
@@ -47,6 +54,7 @@ if TYPE_CHECKING:
 _LATE = {
     "Job": "topleft._batch.jobs",
     "ViewLayers": "topleft._render.view_layers",
+    "pixel_grid": "topleft._diagram.pixel_grid",
     "render_batch": "topleft._batch.batch",
     "render_layers": "topleft._render.view_layers",
     "render_transparent": "topleft._render.transparent",
@@ -59,9 +67,11 @@ __all__ = [
     "Camera",
     "DepthLayers",
     "Detail",
+    "Environment",
     "FisheyeLens",
     "Fog",
     "Fragments",
+    "FragmentsBatch",
     "Grid",
     "ImageError",
     "Instance",
@@ -72,9 +82,13 @@ __all__ = [
     "Material",
     "Mesh",
     "MeshError",
+    "MeshWarning",
     "MissingPackageError",
     "OpenCVLens",
+    "Overlap",
     "Plan",
+    "PointFragments",
+    "Points",
     "Rasterizer",
     "Scene",
     "SceneDepthLayers",
@@ -93,9 +107,14 @@ __all__ = [
     "fill",
     "height_map",
     "load",
+    "load_cameras",
     "overdraw",
+    "overlap",
     "peel",
+    "pixel_grid",
     "plan",
+    "points",
+    "polygons",
     "rasterize",
     "rasterize_mesh",
     "release_memory",

@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import topleft as tl
 
@@ -119,3 +120,16 @@ def test_quads_are_cut():
     assert tl.Scene([(QUAD, [[0, 1, 2, 3]])]).n_triangles == 2
     with raises(ValueError, "(T, 3), got (1, 4); topleft.as_mesh((vertices, faces)).triangles cuts quads"):
         tl.Mesh(QUAD, [[0, 1, 2, 3]])
+
+
+def test_mask_is_saved_black_and_white_and_ids_are_refused(tmp_path):
+    frags = tl.rasterize_mesh(CUBE, CAMERA, SIZE)
+    for name in ("mask.png", "mask.tif", "mask.webp"):
+        tl.save_image(tmp_path / name, frags.mask)
+    with Image.open(tmp_path / "mask.png") as image:
+        assert np.array_equal(np.asarray(image), frags.mask * np.uint8(255))
+    for array in (frags.triangle, frags.depth):
+        with raises(tl.ImageError, ".tif and .npy hold ids and floats"):
+            tl.save_image(tmp_path / "a.png", array)
+        tl.save_image(tmp_path / "a.tif", array)
+        tl.save_image(tmp_path / "a.npy", array)

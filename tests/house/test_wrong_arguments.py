@@ -71,9 +71,10 @@ CALLS = {
     "coverage": (tl.coverage, {"vertices": FLAT, "triangles": ONE, "size": SIZE, "out": None, **VIEW}),
     "field": (tl.field, {"mesh": (FLAT, ONE), "values": [1.0, 2.0, 3.0], "size": SIZE, "extent": None,
                          "pixel_size": None, "y": "up", "per": "vertex", "subpixel_bits": 8, "threads": None,
-                         "out": None}),
+                         "out": None, "origin": (0, 0), "window": None, "nodata": None}),
     "fill": (tl.fill, {"vertices": FLAT, "triangles": ONE, "colors": [[9, 9, 9]], "size": SIZE, "per": "triangle",
-                       "background": None, "blend": "replace", "alpha": "straight", "resolve": "values", "out": None}),
+                       "background": None, "blend": "replace", "alpha": "straight", "resolve": "values",
+                       "dtype": None, "out": None}),
     "height_map": (tl.height_map, {"mesh": (POINTS, ONE), "spacing": 1.0, "surface": "upper", "extent": None,
                                    "y": "up", "subpixel_bits": 8, "threads": None, "out": None}),
     "load": (tl.load, {"path": "nothing.obj"}),
@@ -108,8 +109,14 @@ CALLS = {
     "visible_layers": (tl.visible_layers, {"mesh": CUBE, "camera": CAMERA, "size": SIZE, "layers": 2}),
     "wireframe": (tl.wireframe, {"vertices": FLAT, "triangles": ONE, "size": SIZE, "depth": None,
                                  "depth_test": "less", "depth_bias": 0.1, "out": None}),
+    "pixel_grid": (tl.pixel_grid, {"values": np.eye(3), "vertices": FLAT, "triangles": ONE, "size": None,
+                                   "sampling": None, "cell": 9, "edge_color": "red", "path": None}),
+    "Grid.from_transform": (tl.Grid.from_transform, {"transform": (1, 0, 0, 0, -1, 0), "size": 3}),
+    "Fragments.sample texture": (FRAGS.sample, {"texture": np.eye(3), "uv": CUBE.vertices[:, :2], "filter": "nearest",
+                                                "wrap": "clamp", "encoding": "linear", "background": 0.0}),
+    "Fragments.distance": (FRAGS.distance, {"camera": CAMERA}),
     "Fragments.interpolate": (FRAGS.interpolate, {"values": CUBE.vertices, "background": 0.0}),
-    "Fragments.sample": (FRAGS.sample, {"i": 0}),
+    "Fragments.sample": (FRAGS.sample, {"texture": 0}),
 }  # fmt: skip
 
 WRONG = {
@@ -195,7 +202,8 @@ def test_wrong_arguments_work_or_are_named(name):
 
 def test_every_public_callable_is_tried():
     others = {"simplify", "release_memory", "build_info"}  # the first takes seconds, the others nothing
-    made = {"DepthLayers", "Detail", "Fragments", "Level", "Levels", "Plan", "SceneDepthLayers", "SceneFragments",
-            "ViewLayers", "ImageError", "MeshError", "MissingPackageError", "TopleftError"}  # fmt: skip
+    made = {"DepthLayers", "Detail", "Fragments", "FragmentsBatch", "Level", "Levels", "Plan", "SceneDepthLayers",
+            "SceneFragments", "ViewLayers", "ImageError", "MeshError", "MissingPackageError", "TopleftError",
+            "MeshWarning", "Overlap", "PointFragments"}  # fmt: skip
     public = {name for name in tl.__all__ if callable(getattr(tl, name)) and not inspect.ismodule(getattr(tl, name))}
     assert public <= set(CALLS) | others | made

@@ -21,6 +21,7 @@ __all__ = [
     "as_number",
     "as_out",
     "as_path",
+    "as_point_size",
     "as_real",
     "as_size",
     "as_square",
@@ -324,3 +325,28 @@ def as_out(name: str, array: object, shape: tuple[int, ...], dtype: type) -> NDA
     if not array.flags.writeable:
         raise ValueError(f"{name} must be writeable, got a read-only array")
     return array
+
+
+def as_point_size(name: str, value: ArrayLike, n_points: int) -> float | NDArray[np.float64]:
+    """Return a positive size, or one of each point, (N,) float64.
+
+    Raises
+    ------
+    ValueError
+        If there is another number of them, or one is not positive.
+    TypeError
+        If they are no real numbers.
+    """
+    array = as_array(name, value)
+    if array.dtype.kind not in "fiu":
+        raise TypeError(f"{name} must hold real numbers, got {array.dtype}")
+    if array.shape not in ((), (n_points,)):
+        raise ValueError(f"{name} must be one number or have shape ({n_points},), got {array.shape}")
+    bad = np.flatnonzero(~((array > 0) & np.isfinite(array)))
+    if len(bad):
+        raise ValueError(f"{name} must be finite and positive, got {array.ravel()[bad[0]]}")
+    if array.ndim == 0:
+        return float(array)
+    sizes = np.ascontiguousarray(array, np.float64).view()
+    sizes.flags.writeable = False
+    return sizes

@@ -13,6 +13,7 @@ __all__ = [
     "Cull",
     "DepthTest",
     "Per",
+    "PointShape",
     "Resolve",
     "Sampling",
     "Sink",
@@ -92,6 +93,13 @@ class Resolve(StrEnum):
 
     VALUES = "values"
     LINEAR = "linear"
+
+
+class PointShape(StrEnum):
+    """What a point covers."""
+
+    DISC = "disc"
+    SQUARE = "square"
 
 
 class Sink(IntEnum):

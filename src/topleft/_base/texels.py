@@ -52,8 +52,8 @@ def as_texels(texture: object, filter: str, wrap: str | Wraps, encoding: str | N
     encoding = "linear" if encoding is None else encoding
     check_choice("filter", filter, ("trilinear", "bilinear", "nearest"))
     check_choice("encoding", encoding, ("linear", "srgb"))
-    wraps = (wrap, wrap) if isinstance(wrap, str) else tuple(wrap)
-    if len(wraps) != 2:
+    wraps = (wrap, wrap) if isinstance(wrap, str) else wrap
+    if not isinstance(wraps, tuple | list) or len(wraps) != 2:
         raise ValueError(f"wrap must be one word, or two for u and v, got {wrap!r}")
     for one in wraps:
         check_choice("wrap", str(one), ("repeat", "clamp", "mirror"))

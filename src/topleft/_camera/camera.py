@@ -18,6 +18,7 @@ from topleft._camera.lens import Lens, lens_of_opencv
 from topleft._camera.matrices import (
     F64,
     FRAMING_MARGIN,
+    SILHOUETTE_MARGIN,
     THREE_QUARTER_DEG,
     bounding_sphere,
     box_corners,
@@ -30,6 +31,7 @@ from topleft._camera.matrices import (
     orbit_view,
     orthographic_matrix,
     perspective_matrix,
+    place_to_fill,
     points_to_frame,
     split_matrix,
     view_matrix,
@@ -334,8 +336,8 @@ class Camera:
         camera_from_world: npt.ArrayLike,
         size: int | tuple[int, int],
         *,
-        near: float,
-        far: float,
+        near: float | None = None,
+        far: float | None = None,
         distortion: npt.ArrayLike | None = None,
         fisheye: npt.ArrayLike | None = None,
     ) -> Camera:
@@ -349,10 +351,13 @@ class Camera:
             The pose. Camera axes are those of OpenCV: x right, y down, z forward.
         size : (width, height), pixels
             The picture that the intrinsics belong to. A picture rendered at another size is that one, scaled.
-        near, far : float
-            Distances of the planes along z, world units, 0 < near < far. With `fisheye` they are spheres.
-        distortion : (4,), (5,) or (8,) array_like, optional
-            `k1, k2, p1, p2[, k3[, k4, k5, k6]]` as `cv2.calibrateCamera` returns them.
+        near, far : float, optional
+            Distances of the planes along z, world units, 0 < near < far. With `fisheye` they are spheres. Unless given
+            a thousandth of the distance d of the world's origin, and a thousand times the larger of d and 1; d counts
+            as 1 for a camera at the origin.
+        distortion : (4,), (5,), (8,), (12,) or (14,) array_like, optional
+            `k1, k2, p1, p2[, k3[, k4, k5, k6[, s1, s2, s3, s4[, tau_x, tau_y]]]]`, as `cv2.calibrateCamera` returns
+            them.
         fisheye : (4,) array_like, optional
             `k1, k2, k3, k4` as `cv2.fisheye.calibrate` returns them. Not together with `distortion`.
 
@@ -369,6 +374,9 @@ class Camera:
         matrix = as_square("intrinsics", intrinsics, 3)
         pose = as_square("camera_from_world", camera_from_world, 4)
         width, height = as_size(size, smallest=1)
+        away = float(np.sqrt((pose[:3, 3] ** 2).sum())) or 1.0
+        near = 1e-3 * away if near is None else near
+        far = max(1e3 * max(away, 1.0), 1e3 * near) if far is None else far
         check_planes(near, far)
         if not np.array_equal(matrix[2], [0, 0, 1]):
             raise ValueError(f"the last row of intrinsics must be [0, 0, 1], got {matrix[2].tolist()}")
@@ -394,7 +402,7 @@ class Camera:
         up: Literal["y", "z"] = "y",
         ortho: bool = False,
         aspect: float = 1.0,
-        fit: Literal["sphere", "box", "points"] = "sphere",
+        fit: Literal["sphere", "box", "points", "silhouette"] = "sphere",
     ) -> Camera:
         """A camera that has the whole subject just inside its frame; three-quarter view by default.
 
@@ -414,9 +422,11 @@ class Camera:
             Without perspective.
         aspect : float
             Width / height of the picture to be made.
-        fit : {"sphere", "box", "points"}
+        fit : {"sphere", "box", "points", "silhouette"}
             What just fits: the sphere round the subject, which keeps its size from every side; its box; or all of its
-            points, which comes nearest.
+            points, which comes nearest; each with the middle of the box in the middle of the picture. "silhouette": the
+            box round the picture of all points is in the middle and fills the frame but for a margin of 5 % at each
+            end of its longer side.
 
         Raises
         ------
@@ -426,19 +436,28 @@ class Camera:
         center, radius = bounding_sphere(subject)
         check_fov(fov_y_deg)
         check_positive("aspect", aspect)
-        check_choice("fit", fit, ("sphere", "box", "points"))
+        check_choice("fit", fit, ("sphere", "box", "points", "silhouette"))
         tan_y = np.tan(np.radians(fov_y_deg) / 2)
         # The sphere touches the pyramid of view at sin, not tan, of the half angle.
         distance = radius * FRAMING_MARGIN / np.sin(np.arctan(tan_y * min(1.0, aspect)))
         height = 2 * radius * FRAMING_MARGIN / min(1.0, aspect)
+        right, above = 0.0, 0.0
         if fit != "sphere":
             turn = orbit_view((0, 0, 0), 1.0, azimuth_deg, elevation_deg, up=up)[:3, :3]
             points = box_corners(subject) if fit == "box" else points_to_frame(subject)
             points = (points - center) @ turn.T
-            distance = distance_to_fit(points, tan_y * aspect, tan_y)
-            height = 2 * FRAMING_MARGIN * max(np.abs(points[:, 1]).max(), np.abs(points[:, 0]).max() / aspect)
+            if fit == "silhouette":
+                share = 1 - 2 * SILHOUETTE_MARGIN
+                right, above, distance = place_to_fill(points, share * tan_y * aspect, share * tan_y)
+                if ortho:
+                    right, above, half = place_to_fill(points, aspect, 1.0, ortho=True)
+                    distance, height = radius / np.sin(np.arctan(tan_y)), 2 * half / share
+            else:
+                distance = distance_to_fit(points, tan_y * aspect, tan_y)
+                height = 2 * FRAMING_MARGIN * max(np.abs(points[:, 1]).max(), np.abs(points[:, 0]).max() / aspect)
             height = height or 2 * FRAMING_MARGIN
         view = orbit_view(center, distance, azimuth_deg, elevation_deg, up=up)
+        view[:2, 3] -= right, above
         near, far = max(distance - 1.01 * radius, 1e-3 * radius), distance + 1.01 * radius
         if ortho:
             return cls.orthographic(view, near=near, far=far, height=height)

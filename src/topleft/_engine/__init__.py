@@ -7,6 +7,7 @@ isa.py         chooses the instruction set that runs, and tells how this copy wa
 kernels.pyx    holds the kernel table in use; includes the parts, and gives their names to Python
 mesh.pxi       computes normals of a mesh, and distances between surfaces
 pixels.pxi     writes pixels that are not found by drawing triangles: means of samples, layers, points, planes, lines
+polygons.pxi   draws snapped polygons: masks, labels, shares
 shade.pxi      shades pixels and tests their alpha
 triangles.pxi  draws snapped triangles: whole, by bands of rows, in layers
 

@@ -215,9 +215,7 @@ def _window_of(grid: Grid, origin: tuple[int, int]) -> tuple[int, int]:
     """The pixels of a grid from one of them on."""
     (width, height), (x, y) = grid.size, as_pair("origin", origin)
     if not (x <= width and y <= height):
-        raise ValueError(
-            f"origin must lie in the grid, of {width} x {height} pixels, unless a window is given, got {origin}"
-        )
+        raise ValueError(f"origin must lie in the grid, of {width} x {height} pixels, or window be given, got {origin}")
     return width - x, height - y
 
 

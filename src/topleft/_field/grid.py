@@ -121,7 +121,7 @@ class Grid:
         >>> Grid.from_transform((0.5, 0.0, 500000.0, 0.0, -0.5, 11.0), (4, 2))
         Grid(size=(4, 2), extent=(500000.0, 500002.0, 10.0, 11.0), y='up')
         """
-        numbers = as_real("transform", transform if np.ndim(transform) else [np.nan]).ravel()
+        numbers = as_real("transform", transform).ravel()
         if len(numbers) not in (6, 9) or not np.isfinite(numbers).all():
             raise ValueError(f"transform must be six finite numbers (a, b, c, d, e, f), got {shown(transform)}")
         a, b, c, d, e, f = numbers[:6].tolist()

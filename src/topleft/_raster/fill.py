@@ -122,11 +122,12 @@ def draw_labels(
     memory: Memory, vertices: ArrayLike, triangles: ArrayLike, labels: ArrayLike, view: View, style: Style, out: object
 ) -> NDArray[Any]:
     """`fill` with integers that are no colours: each pixel has exactly the label of its triangle."""
-    dtype = np.dtype(style.dtype)
+    try:
+        dtype = np.dtype(style.dtype)
+    except (TypeError, ValueError):
+        raise TypeError(f"dtype must be one of integers, for labels, got {shown(style.dtype)}") from None
     if dtype.kind not in "iub":
-        raise TypeError(
-            f"dtype must be one of integers, for labels, got {dtype}: colors are uint8 or float32 without it"
-        )
+        raise TypeError(f"dtype must be one of integers, for labels, got {dtype}")
     array = as_array("colors", labels)
     if array.dtype.kind not in "iub" or array.ndim not in (1, 2):
         raise TypeError(f"colors must be integers of shape (T,) or (T, C) with dtype=, got {array.dtype} {array.shape}")

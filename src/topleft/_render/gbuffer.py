@@ -23,7 +23,7 @@ from topleft._raster.fragments import Fragments
 from topleft._raster.verbs import Rasterizer
 from topleft._render.fragments import VisiblePart, join, parts_of
 from topleft._render.holes import has_cuts, without_holes
-from topleft._render.render import rasterize_mesh
+from topleft._render.render import rasterize_subject
 
 __all__ = ["GBuffer", "PointKind", "evaluate", "points_of", "project"]
 
@@ -107,11 +107,12 @@ class GBuffer:
     @cached_property
     def frags(self) -> Fragments:
         """The visibility buffer, at the centres of the pixels, without what materials cut out."""
-        return self._cut(rasterize_mesh(*self._view, rasterizer=self.rasterizer, **self.options))
+        return self._cut(rasterize_subject(*self._view, self.rasterizer, self.look.get("material"), **self.options))
 
     def sampled(self, sampling: str) -> Fragments:
         """Return the same with several samples a pixel."""
-        return self._cut(rasterize_mesh(*self._view, sampling=sampling, **self.options))
+        material = self.look.get("material")
+        return self._cut(rasterize_subject(*self._view, material=material, sampling=sampling, **self.options))
 
     @cached_property
     def has_holes(self) -> bool:

@@ -20,18 +20,21 @@ from topleft._lod.detail import detailed
 from topleft._model.adapt import MeshLike, as_mesh
 from topleft._model.material import Material
 from topleft._model.mesh import Mesh
+from topleft._model.points import Points
 from topleft._model.scene import Instance, Scene
 from topleft._raster import choices
 from topleft._raster.clusters import Clusters
 from topleft._raster.fragments import Fragments
 from topleft._raster.verbs import Rasterizer, rasterize, wireframe
 from topleft._raster.view import View
+from topleft._render.blended import draw_blended, is_blended
+from topleft._render.cloud import draw_cloud, framing_of
 from topleft._render.fragments import BentFragments, camera_of, scene_of
 from topleft._render.holes import without_holes
 from topleft._render.instances import draw_scene
 from topleft._render.scene_shade import shade
 from topleft._render.through_lens import seen_through
-from topleft._shade.shade import LookOptions
+from topleft._shade.shade import LookOptions, ShadingOptions
 
 DEFAULT_SIZE = (640, 480)
 WHITE = (255, 255, 255, 255)
@@ -39,7 +42,7 @@ EDGE_COLOR = (24, 28, 40)
 
 
 def render(
-    mesh: MeshLike | Scene,
+    mesh: MeshLike | Scene | Points,
     camera: CameraLike | None = None,
     size: int | tuple[int, int] = DEFAULT_SIZE,
     *,
@@ -58,21 +61,23 @@ def render(
 
     Parameters
     ----------
-    mesh : Mesh, Scene, or whatever `as_mesh` takes
+    mesh : Mesh, Scene, Points, or whatever `as_mesh` takes
         What to draw: a path, or a mesh of trimesh, meshio, pyvista, say. Its colours are used if it has any.
+        Points have no edges, sides to cull, materials and levels; they are lit where they have normals.
     camera : Camera or (4, 4) array, optional
         Unless given, the three-quarter view of `Camera.framing`, with y up. A matrix is clip from world, see
         `Camera.from_matrix`.
     size : (width, height), or one number for a square; pixels
         640 x 480 unless given.
     shading : {"smooth", "flat", "unlit", "matcap", "ids", "depth", "normals"}
-        What the colours tell; `topleft.shade` describes each.
+        What the colours tell; `topleft.shade` describes each. The first three composite what shows through, materials
+        with `alpha_mode="blend"` and colours with alpha, in linear light; the others show it as if it were opaque.
     color : str, (3,) integers of 0 to 255 or (3,) floats of 0 to 1
         sRGB colour of a mesh without colours: "red", "#f00", (255, 0, 0) and (1.0, 0.0, 0.0) are the same.
     background : str, (3,) or (4,) integers of 0 to 255 or floats of 0 to 1
         sRGB, and alpha if it is not opaque; white unless given, "transparent" is `(0, 0, 0, 0)`.
     cull : {"none", "back", "front"}
-        Triangles to leave out, by the side that is seen.
+        Triangles to leave out, by the side that is seen; besides the backs of materials that are not double-sided.
     edges : bool
         Whether the edges that show are drawn over it, as smooth dark lines.
     sampling : {"center", "msaa2", "msaa4", "msaa8", "msaa16"}
@@ -87,7 +92,7 @@ def render(
     rasterizer : Rasterizer, optional
         Of this size: what is needed on the way lies in the memory that it keeps.
     **look
-        `lights`, `ambient`, `material`, `matcap` and `fog` of `topleft.shade`.
+        `lights`, `ambient`, `material`, `matcap`, `fog` and `environment` of `topleft.shade`.
 
     Returns
     -------
@@ -109,8 +114,22 @@ def render(
     255
     """
     size = as_size(size)
-    subject, camera = subject_of(mesh, camera, size, tolerance, cull=cull, material=look.get("material"))
-    frags = rasterize_subject(subject, camera, size, rasterizer, cull=cull, threads=threads, sampling=sampling)
+    if isinstance(mesh, Points):
+        if edges:
+            raise ValueError("points have no edges")
+        camera = framing_of(mesh, camera, size)
+        cloud = draw_cloud(mesh, camera, size, cull=cull, threads=threads, sampling=sampling)
+        return shade(cloud, mesh, camera, shading=shading, color=color, background=background, threads=threads, **look)
+    material = look.get("material")
+    subject, camera = subject_of(mesh, camera, size, tolerance, cull=cull, material=material)
+    view: dict[str, Any] = {"cull": cull, "sampling": sampling}
+    if is_blended(subject, material, shading):
+        options = ShadingOptions.parse(shading=shading, color=color, background=background, threads=threads, **look)
+        picture, opaque = draw_blended(subject, camera, size, options=options, **view)
+        if edges:
+            draw_all_edges(picture, opaque, subject, camera, material, cull=cull, threads=threads)
+        return picture
+    frags = rasterize_subject(subject, camera, size, rasterizer, material, threads=threads, **view)
     return picture_of(
         frags, subject, camera, shading=shading, color=color, background=background, cull=cull, edges=edges,
         threads=threads, **look,
@@ -150,14 +169,13 @@ def picture_of(
     """
     frags = without_holes(frags, subject, camera, look.get("material"), threads=threads)
     picture = shade(frags, subject, camera, background=background, threads=threads, **look)
-    for instance in scene_of(subject) if edges else ():
-        own_camera, own_cull = camera_of(camera, instance), cull_of(cull, instance)
-        draw_edges(picture, frags, instance.mesh, own_camera, cull=own_cull, threads=threads)
+    if edges:
+        draw_all_edges(picture, frags, subject, camera, look.get("material"), cull=cull, threads=threads)
     return picture
 
 
 def rasterize_mesh(
-    mesh: MeshLike | Scene,
+    mesh: MeshLike | Scene | Points,
     camera: CameraLike | None = None,
     size: int | tuple[int, int] = DEFAULT_SIZE,
     *,
@@ -185,7 +203,7 @@ def rasterize_mesh(
     Fragments
         `.triangle` (H, W) int32, -1 where there is nothing; `.depth` (H, W) float32, window depth in [0, 1], +inf where
         there is nothing. Of a scene `SceneFragments`: also `.instance` (H, W) int32, and `.triangle` counts the
-        triangles of its mesh.
+        triangles of its mesh. Of `Points` `PointFragments`: `.point` is the same as `.triangle`.
 
     Raises
     ------
@@ -195,17 +213,27 @@ def rasterize_mesh(
     size = as_size(size)
     if view.get("viewport") is not None:
         view["viewport"] = as_size(view["viewport"], "viewport", smallest=1)
+    if isinstance(mesh, Points):
+        return draw_cloud(mesh, framing_of(mesh, camera, size), size, cull=cull, threads=threads, **view)
     window = {"viewport": view.get("viewport"), "origin": view.get("origin", (0, 0))}
     subject, camera = subject_of(mesh, camera, size, tolerance, cull=cull, **window)
     return rasterize_subject(subject, camera, size, rasterizer, cull=cull, threads=threads, **view)
 
 
 def rasterize_subject(
-    subject: Mesh | Scene, camera: Camera, size: tuple[int, int], rasterizer: Rasterizer | None = None, **view: Any
+    subject: Mesh | Scene,
+    camera: Camera,
+    size: tuple[int, int],
+    rasterizer: Rasterizer | None = None,
+    material: Material | None = None,
+    **view: Any,
 ) -> Fragments:
-    """The visibility buffer of what `subject_of` returned; options as for `rasterize_mesh`."""
+    """The visibility buffer of what `subject_of` returned; options as for `rasterize_mesh`.
+
+    `material`: whose backs are culled, instead of those that the meshes have.
+    """
     if isinstance(subject, Scene):
-        return draw_scene(subject, camera, size, **view)
+        return draw_scene(subject, camera, size, material=material, **view)
     drawn = seen_through(subject, camera, view.get("viewport") or size, near_clip=view.get("near_clip", True))
     view["transform"] = drawn.transform
     if not isinstance(rasterizer, Rasterizer | None):
@@ -214,11 +242,40 @@ def rasterize_subject(
         raise ValueError(f"rasterizer must have the size {tuple(size)}, got {rasterizer.size}")
     if drawn.bent is None:
         view.setdefault("plan", StaticPlan(subject))
+    view["plan"] = drawn.sided(view.get("plan"), subject.single_sided(material))
     if rasterizer is None:
         frags = rasterize(drawn.vertices, drawn.triangles, size, **view)
     else:
         frags = rasterizer.rasterize(drawn.vertices, drawn.triangles, **view)
     return frags if drawn.bent is None else BentFragments(frags, drawn.bent, subject)
+
+
+def draw_all_edges(
+    picture: npt.NDArray[np.uint8],
+    frags: Fragments,
+    subject: Mesh | Scene,
+    camera: Camera,
+    material: Material | None,
+    *,
+    cull: str,
+    threads: int | None,
+) -> None:
+    """Draw the edges of every instance that the visibility buffer does not hide."""
+    for instance in scene_of(subject):
+        own_camera, own_cull, back = camera_of(camera, instance), cull_of(cull, instance), cull_of("back", instance)
+        is_single = instance.mesh.single_sided(material)
+        kinds = [(instance.mesh, own_cull)]
+        if is_single is not None and own_cull != back:
+            kinds = [(some_of(instance.mesh, is_single == 0), own_cull)]
+            if own_cull == "none":  # of the others the edges of what shows its front
+                kinds.append((some_of(instance.mesh, is_single == 1), back))
+        for mesh, side in kinds:
+            draw_edges(picture, frags, mesh, own_camera, cull=side, threads=threads)
+
+
+def some_of(mesh: Mesh, is_some: npt.NDArray[np.bool_]) -> Mesh:
+    """A mesh of some of its triangles, for edges."""
+    return Mesh(mesh.vertices, mesh.triangles[is_some])
 
 
 def cull_of(cull: str, instance: Instance) -> str:

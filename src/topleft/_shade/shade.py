@@ -26,6 +26,7 @@ from topleft._base.color import LINEAR_ONE, Color, ColorLike, as_color, id_color
 from topleft._base.options import parse
 from topleft._base.threads import count_threads, parse_threads, run_parts, threads_for
 from topleft._camera.camera import Camera
+from topleft._model.environment import Environment
 from topleft._model.light import AMBIENT, Fog, Light, as_not_negative
 from topleft._model.material import Material
 from topleft._model.mesh import Mesh
@@ -66,6 +67,7 @@ class LookOptions(TypedDict, total=False):
     material: Material | None
     matcap: Texture | None
     fog: Fog | None
+    environment: Environment | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +83,12 @@ class ShadingOptions:
     material: Material | None
     matcap: Texture | None
     fog: Fog | None
+    environment: Environment | None
     threads: int | None
+    world_from_mesh: F64 | None = None
+    """(3, 3): of an instance of a scene."""
+    shows_opacity: bool = False
+    """Whether the picture's alpha is the opacity of the surface."""
 
     @classmethod
     def parse(
@@ -89,22 +96,25 @@ class ShadingOptions:
         shading: str,
         color: ColorLike,
         background: ColorLike,
-        depth_range: tuple[float, float] | None,
-        lights: Light | Sequence[Light] | None,
-        ambient: float | None,
-        material: Material | None,
-        matcap: Texture | None,
-        fog: Fog | None,
-        threads: int | None,
+        depth_range: tuple[float, float] | None = None,
+        lights: Light | Sequence[Light] | None = None,
+        ambient: float | None = None,
+        material: Material | None = None,
+        matcap: Texture | None = None,
+        fog: Fog | None = None,
+        environment: Environment | None = None,
+        threads: int | None = None,
     ) -> ShadingOptions:
         """Check the options of a call."""
         mode = parse(Shading, "shading", shading)
         lights = (lights,) if isinstance(lights, Light) else lights
         if lights is not None and (not isinstance(lights, Iterable) or isinstance(lights, np.ndarray | str | dict)):
             raise TypeError(f"lights must be a Light or a sequence of them, got {shown(lights)}")
-        _check_types(lights=(lights or ()), material=material, matcap=matcap, fog=fog)
+        _check_types(lights=(lights or ()), material=material, matcap=matcap, fog=fog, environment=environment)
         if mode is Shading.MATCAP and matcap is None:
             raise ValueError("matcap must be a Texture for shading 'matcap', got None")
+        if environment is not None:  # which lights by itself
+            lights, ambient = lights or (), ambient or 0.0
         return cls(
             mode,
             as_color("color", color, 3),
@@ -115,6 +125,7 @@ class ShadingOptions:
             material,
             matcap,
             fog,
+            environment,
             parse_threads(threads),
         )
 
@@ -136,8 +147,13 @@ def shade_mesh(frags: Fragments, mesh: Mesh, camera: Camera, options: ShadingOpt
     own = (options.material,) if options.material is not None else mesh.materials or (plain,)
     rows = mesh.material_of_triangle if own is mesh.materials and len(own) > 1 else None
     look = ShadingInputs(scene, mesh, camera, picture.shape[1::-1], rows, is_flat=options.mode is Shading.FLAT)
-    look.set_materials(mesh, own, is_unlit=options.mode is Shading.UNLIT)
+    all_full = options.environment is not None or options.shows_opacity
+    look.set_materials(mesh, own, is_unlit=options.mode is Shading.UNLIT, all_full=all_full)
     look.set_lights(options.lights, options.ambient)
+    if options.environment is not None or any(one.is_metallic_rough for one in own):
+        look.set_environment(options.environment, options.world_from_mesh)
+    if options.shows_opacity:
+        look.set_opacity()
     look.set_view(SHOW_CODES.get(options.mode, 0), options.matcap, options.background)
     look.set_fog(options.fog)
     positions = None if len(ids) == 1 else sample_positions(len(ids), scene.subpixel_bits)
@@ -273,10 +289,15 @@ def shade_normals(frags: Fragments, mesh: Mesh, camera: Camera, turn: F64, *, th
     return out
 
 
-def _check_types(lights: Sequence[Light], material: object, matcap: object, fog: object) -> None:
+def _check_types(lights: Sequence[Light], material: object, matcap: object, fog: object, environment: object) -> None:
     for light in lights:
         if not isinstance(light, Light):
             raise TypeError(f"lights must be of Light, got {type(light).__name__}")
-    for name, value, kind in (("material", material, Material), ("matcap", matcap, Texture), ("fog", fog, Fog)):
+    kinds = (
+        ("material", material, Material), ("matcap", matcap, Texture), ("fog", fog, Fog),
+        ("environment", environment, Environment),
+    )  # fmt: skip
+    for name, value, kind in kinds:
         if value is not None and not isinstance(value, kind):
-            raise TypeError(f"{name} must be a {kind.__name__}, got {type(value).__name__}")
+            article = "an" if kind is Environment else "a"
+            raise TypeError(f"{name} must be {article} {kind.__name__}, got {type(value).__name__}")
