@@ -19,7 +19,10 @@ import topleft as tl
 PAGE = Path(__file__).with_name("api.md")
 
 SUBJECTS: Mapping[str, tuple[str, ...]] = {
-    "Triangles to pixels": ("coverage", "overdraw", "fill", "rasterize", "Fragments", "wireframe", "Rasterizer"),
+    "Triangles to pixels": (
+        "coverage", "overdraw", "fill", "rasterize", "Fragments", "FragmentsBatch", "wireframe",
+        "Rasterizer", "pixel_grid",
+    ),
     "Polygons": ("polygons", "overlap", "Overlap"),
     "Layers of triangles, sorted by depth": ("peel", "DepthLayers", "composite"),
     "Meshes and scenes": ("Mesh", "load", "as_mesh", "Instance", "Scene"),
@@ -41,15 +44,17 @@ SUBJECTS: Mapping[str, tuple[str, ...]] = {
 """In reading order."""
 
 RETURNED = frozenset({
-    "DepthLayers", "Detail", "Fragments", "Overlap", "Plan", "SceneDepthLayers", "SceneFragments", "ViewLayers",
+    "DepthLayers", "Detail", "Fragments", "FragmentsBatch", "Overlap", "Plan", "SceneDepthLayers", "SceneFragments",
+    "ViewLayers",
 })  # fmt: skip
 """Classes that functions return: nobody calls them."""
 
 MEMBERS: Mapping[str, tuple[str, ...]] = {
     "Fragments": (
         "triangle", "depth", "mask", "barycentric", "interpolate", "samples_triangle", "samples_depth", "sample",
-        "only",
+        "distance", "only",
     ),
+    "FragmentsBatch": ("triangle", "depth", "mask", "barycentric", "interpolate"),
     "Overlap": ("means", "sums", "totals", "spread", "to_scipy"),
     "DepthLayers": ("triangle", "depth", "count", "layer"),
     "Mesh": ("bounds", "vertex_normals", "corner_normals"),
@@ -58,8 +63,8 @@ MEMBERS: Mapping[str, tuple[str, ...]] = {
     "Instance": ("is_mirrored",),
     "Scene": ("n_triangles", "bounds"),
     "Camera": (
-        "framing", "look_at", "from_intrinsics", "perspective", "orthographic", "off_center", "clip_from_world",
-        "clip_from_eye", "project", "straightened",
+        "framing", "look_at", "from_matrix", "from_intrinsics", "perspective", "orthographic", "off_center",
+        "clip_from_world", "clip_from_eye", "project", "straightened",
     ),
     "OpenCVLens": ("distort",),
     "FisheyeLens": ("distort",),

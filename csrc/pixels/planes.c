@@ -63,10 +63,15 @@ static void list_planes(const tl_valued *mesh, int64_t first, int64_t end)
         load_plane(planes + 1 + id, mesh, id);
 }
 
-TL_INLINE void fill_pixel(const value_plane *p, int64_t col, double y_px, int is_f32, void *row)
+/* The centre of the first pixel of a row. */
+typedef struct {
+    double x_px, y_px;
+} row_start;
+
+TL_INLINE void fill_pixel(const value_plane *p, int64_t col, row_start at, int is_f32, void *row)
 {
-    const double start = p->value + p->slope_y * (y_px - p->y);
-    double value = start + p->slope_x * ((double)col + 0.5 - p->x);
+    const double start = p->value + p->slope_y * (at.y_px - p->y);
+    double value = start + p->slope_x * ((double)col + at.x_px - p->x);
     value = value < p->low ? p->low : value;
     value = value > p->high ? p->high : value;
     if (is_f32)
@@ -80,22 +85,22 @@ TL_INLINE void fill_pixel(const value_plane *p, int64_t col, double y_px, int is
 
 /* Small triangles: a pixel at a time from listed planes, without a branch that depends on where a triangle ends. */
 TL_INLINE void fill_listed(const value_plane *planes, int64_t n_triangles, const int32_t *ids, int64_t width,
-                           double y_px, int is_f32, void *row)
+                           row_start at, int is_f32, void *row)
 {
     for (int64_t col = 0; col < width; col++) {
         const int64_t id = ids[col];
         if (col + TL_PLANES_AHEAD < width)
             __builtin_prefetch(planes + 1 + ids[col + TL_PLANES_AHEAD]);
-        fill_pixel(planes + (id >= 0 && id < n_triangles ? 1 + id : 0), col, y_px, is_f32, row);
+        fill_pixel(planes + (id >= 0 && id < n_triangles ? 1 + id : 0), col, at, is_f32, row);
     }
 }
 
 /* Large ones: a run of one triangle at a time. */
-TL_INLINE void fill_run(const value_plane *p, int64_t first, int64_t end, double y_px, int is_f32, void *row)
+TL_INLINE void fill_run(const value_plane *p, int64_t first, int64_t end, row_start at, int is_f32, void *row)
 {
     const value_plane plane = *p; /* the row cannot change it */
     for (int64_t col = first; col < end; col++)
-        fill_pixel(&plane, col, y_px, is_f32, row);
+        fill_pixel(&plane, col, at, is_f32, row);
 }
 
 static void fill_planes(const tl_valued *mesh, const tl_window *window, const int32_t *ids, int is_f32, void *out)
@@ -105,13 +110,13 @@ static void fill_planes(const tl_valued *mesh, const tl_window *window, const in
         recent[k].id = -1;
     for (int64_t i = 0; i < window->height; i++, ids += window->width) {
         void *row = (char *)out + i * window->width * (is_f32 ? 4 : 8);
-        const double y_px = (double)(window->y_px + i) + 0.5;
+        const row_start at = {(double)window->x_px + 0.5, (double)(window->y_px + i) + 0.5};
         if (mesh->planes) {
             const value_plane *planes = (const value_plane *)mesh->planes;
             if (is_f32)
-                fill_listed(planes, mesh->n_triangles, ids, window->width, y_px, 1, row);
+                fill_listed(planes, mesh->n_triangles, ids, window->width, at, 1, row);
             else
-                fill_listed(planes, mesh->n_triangles, ids, window->width, y_px, 0, row);
+                fill_listed(planes, mesh->n_triangles, ids, window->width, at, 0, row);
             continue;
         }
         for (int64_t first = 0, end; first < window->width; first = end) {
@@ -126,9 +131,9 @@ static void fill_planes(const tl_valued *mesh, const tl_window *window, const in
                 plane = own;
             }
             if (is_f32)
-                fill_run(plane, first, end, y_px, 1, row);
+                fill_run(plane, first, end, at, 1, row);
             else
-                fill_run(plane, first, end, y_px, 0, row);
+                fill_run(plane, first, end, at, 0, row);
         }
     }
 }

@@ -34,7 +34,7 @@ from topleft._polygons.overlap import Overlap, overlap
 from topleft._polygons.polygons import polygons
 from topleft._raster.classic import bresenham_line
 from topleft._raster.composite import composite
-from topleft._raster.fragments import Fragments
+from topleft._raster.fragments import Fragments, FragmentsBatch
 from topleft._raster.peel import DepthLayers, peel
 from topleft._raster.verbs import Rasterizer, coverage, fill, overdraw, rasterize, wireframe
 from topleft._render.fragments import SceneDepthLayers, SceneFragments
@@ -46,6 +46,7 @@ from topleft.errors import ImageError, MeshError, MeshWarning, MissingPackageErr
 if TYPE_CHECKING:
     from topleft._batch.batch import render_batch
     from topleft._batch.jobs import Job
+    from topleft._diagram.pixel_grid import pixel_grid
     from topleft._render.transparent import render_transparent, visible_layers
     from topleft._render.view_layers import ViewLayers, render_layers
 
@@ -53,6 +54,7 @@ if TYPE_CHECKING:
 _LATE = {
     "Job": "topleft._batch.jobs",
     "ViewLayers": "topleft._render.view_layers",
+    "pixel_grid": "topleft._diagram.pixel_grid",
     "render_batch": "topleft._batch.batch",
     "render_layers": "topleft._render.view_layers",
     "render_transparent": "topleft._render.transparent",
@@ -69,6 +71,7 @@ __all__ = [
     "FisheyeLens",
     "Fog",
     "Fragments",
+    "FragmentsBatch",
     "Grid",
     "ImageError",
     "Instance",
@@ -108,6 +111,7 @@ __all__ = [
     "overdraw",
     "overlap",
     "peel",
+    "pixel_grid",
     "plan",
     "points",
     "polygons",

@@ -130,9 +130,9 @@ def test_batch_layers_are_copies_by_name():
     listed = [tl.Job(BOX, camera, SIZE, layers=("triangle", "color")) for camera in orbit(BOX, 3)]
     results = list(tl.render_batch(listed))
     for result, camera, color in zip(results, orbit(BOX, 3), pictures(3), strict=True):
-        assert list(result.picture) == ["triangle", "color"]
-        assert np.array_equal(result.picture["color"], color)
-        assert np.array_equal(result.picture["triangle"], tl.rasterize_mesh(BOX, camera, SIZE).triangle)
+        assert list(result.layers) == ["triangle", "color"]
+        assert np.array_equal(result.layers["color"], color)
+        assert np.array_equal(result.layers["triangle"], tl.rasterize_mesh(BOX, camera, SIZE).triangle)
 
 
 def test_batch_camera_may_be_made_of_mesh_and_size():

@@ -126,7 +126,8 @@ def two_boxes():
 def test_batch_draws_scenes_and_their_layers(executor):
     scene = two_boxes()
     listed = [tl.Job(scene, None, SIZE), tl.Job(scene, None, SIZE, {"shading": "flat"}, None, ("instance", "color"))]
-    whole, layers = (result.picture for result in tl.render_batch(listed, executor=executor))
+    first, second = tl.render_batch(listed, executor=executor)
+    whole, layers = first.picture, second.layers
     assert np.array_equal(whole, tl.render(scene, None, SIZE))
     assert np.array_equal(layers["color"], tl.render(scene, None, SIZE, shading="flat"))
     assert np.array_equal(layers["instance"], tl.rasterize_mesh(scene, None, SIZE).instance)
@@ -173,7 +174,7 @@ def test_batch_draws_through_a_lens_and_leaves_no_matrix(tmp_path):
     (result,) = tl.render_batch([tl.Job(BOX, camera, SIZE, layers=names)])
     expected = tl.render_layers(BOX, camera, SIZE, layers=names)
     assert (expected["triangle"] >= 0).any()
-    assert all(np.array_equal(result.picture[name], expected[name]) for name in names)
+    assert all(np.array_equal(result.layers[name], expected[name]) for name in names)
     tl.render_batch([tl.Job(BOX, camera, SIZE, {}, tmp_path / "a.npz", names)]).finish()
     with np.load(tmp_path / "a.npz") as arrays:
         assert sorted(arrays) == sorted(names)
@@ -182,7 +183,8 @@ def test_batch_draws_through_a_lens_and_leaves_no_matrix(tmp_path):
 def test_batch_draws_glass():
     options = {"opacity": 0.4, "background": (0, 0, 0, 0)}
     listed = [tl.Job(BOX, None, SIZE, options), tl.Job(BOX, None, SIZE, options, None, ("alpha", "color"))]
-    picture, layers = (result.picture for result in tl.render_batch(listed))
+    first, second = tl.render_batch(listed)
+    picture, layers = first.picture, second.layers
     expected = tl.render_transparent(BOX, None, SIZE, **options)
     assert np.array_equal(picture, expected)
     assert np.array_equal(layers["color"], expected)
@@ -192,7 +194,7 @@ def test_batch_layers_flow_to_the_camera_of_the_options():
     begin, end = orbit(BOX, 2)
     (result,) = tl.render_batch([tl.Job(BOX, begin, SIZE, {"camera_to": end}, None, ("flow",))])
     expected = tl.render_layers(BOX, begin, SIZE, layers="flow", camera_to=end)["flow"]
-    assert np.array_equal(result.picture["flow"], expected, equal_nan=True)
+    assert np.array_equal(result.layers["flow"], expected, equal_nan=True)
 
 
 def test_batch_layers_are_those_without_kept_memory():
@@ -201,8 +203,8 @@ def test_batch_layers_are_those_without_kept_memory():
     listed = [tl.Job(BOX, camera, SIZE, options, None, names) for camera in orbit(BOX, 3)]
     for result, camera in zip(list(tl.render_batch(listed)), orbit(BOX, 3), strict=True):
         expected = tl.render_layers(BOX, camera, SIZE, layers=names, **options)
-        assert list(result.picture) == names
-        assert all(np.array_equal(result.picture[n], expected[n], equal_nan=n != "color") for n in names)
+        assert list(result.layers) == names
+        assert all(np.array_equal(result.layers[n], expected[n], equal_nan=n != "color") for n in names)
 
 
 @pytest.mark.parametrize("options", [{"shade": "flat"}, {"opacity": 0.5, "sampling": "msaa4"}])

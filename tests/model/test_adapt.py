@@ -173,9 +173,9 @@ def test_framing_takes_what_render_takes():
     assert np.array_equal(Camera.framing(poly(VERTICES, np.insert(TRIANGLES, 0, 3, axis=1).ravel())).view, expected)
 
 
-@pytest.mark.parametrize("subject", [None, 3, "bunny.obj", VERTICES, SimpleNamespace(points=POINTS)])
+@pytest.mark.parametrize("subject", [None, 3, b"bunny.obj", VERTICES, SimpleNamespace(points=POINTS)])
 def test_as_mesh_of_something_else_is_refused(subject):
-    with pytest.raises(TypeError, match=r"mesh must be a Mesh, .* got (NoneType|int|str|ndarray|SimpleNamespace)"):
+    with pytest.raises(TypeError, match=r"mesh must be a Mesh, .* got (NoneType|int|bytes|ndarray|SimpleNamespace)"):
         as_mesh(subject)
 
 

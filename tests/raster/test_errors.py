@@ -141,10 +141,11 @@ def test_vertices_that_no_triangle_uses_are_never_looked_at():
 @pytest.mark.parametrize(
     ("size", "kind", "message"),
     [
-        (4, TypeError, "size must be two integers, got 4"),
-        ((4.5, 4), TypeError, "size must be two integers, got (4.5, 4)"),
+        ("4", TypeError, "size must be two integers (width, height), or one for a square, got '4'"),
+        (-1, ValueError, "size must be (width, height) in 0..2147483647, got (-1, -1)"),
+        ((4.5, 4), TypeError, "size must be two integers (width, height), or one for a square, got (4.5, 4)"),
         ((4, -1), ValueError, "size must be (width, height) in 0..2147483647, got (4, -1)"),
-        ((1, 2, 3), TypeError, "size must be two integers, got (1, 2, 3)"),
+        ((1, 2, 3), TypeError, "got (1, 2, 3); the shape of a picture begins with its height: image.shape[1::-1] is"),
     ],
 )
 def test_bad_size_raises(size, kind, message):

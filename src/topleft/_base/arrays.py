@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import operator
-from typing import Any
+import os
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,9 +15,14 @@ __all__ = [
     "as_background",
     "as_checked_triangles",
     "as_colors",
+    "as_count",
     "as_matrix",
+    "as_names",
+    "as_number",
     "as_out",
+    "as_path",
     "as_point_size",
+    "as_real",
     "as_size",
     "as_square",
     "as_subpixel_bits",
@@ -25,10 +33,13 @@ __all__ = [
     "as_window",
     "bad_triangle",
     "check_regular",
+    "shown",
 ]
 
 #: The largest side of a picture and the largest number of triangles or vertices: ids and indices are int32.
 INT32_MAX = 2**31 - 1
+
+SIZE_HINT = "; the shape of a picture begins with its height: image.shape[1::-1] is its size"
 
 #: Device types of DLPack whose memory the CPU reads: CPU, pinned for CUDA or ROCm, CUDA managed.
 CPU_DEVICES = frozenset({1, 3, 11, 13})
@@ -97,7 +108,11 @@ def as_triangles(values: ArrayLike) -> NDArray[np.signedinteger[Any]]:
     if array.size == 0 and array.ndim == 1:
         return np.empty((0, 3), np.int32)
     if array.ndim != 2 or array.shape[1] != 3:
-        raise ValueError(f"triangles must have shape (T, 3), got {array.shape}")
+        has_quads = array.ndim == 2 and array.shape[1] == 4
+        raise ValueError(
+            f"triangles must have shape (T, 3), got {array.shape}"
+            + "; topleft.as_mesh((vertices, faces)).triangles cuts quads" * has_quads
+        )
     if array.shape[0] > INT32_MAX:
         raise ValueError(f"triangles must have at most {INT32_MAX} rows, got {array.shape[0]}")
     if array.dtype.kind not in "iu":
@@ -141,9 +156,69 @@ def as_matrix(values: ArrayLike, dtype: np.dtype[Any]) -> NDArray[Any]:
     return matrix
 
 
+def as_real(name: str, values: ArrayLike) -> NDArray[np.float64]:
+    """Return real numbers as float64, a copy only where the dtype is another."""
+    array = as_array(name, values)
+    if array.dtype.kind not in "fiu" and array.size:
+        raise TypeError(f"{name} must be real numbers, got {shown(values)}")
+    return array.astype(np.float64, copy=False)
+
+
+def as_number(name: str, value: object) -> float:
+    """Return a real number as a float, which may be infinite or NaN."""
+    if isinstance(value, float | int | np.floating | np.integer) and not isinstance(value, bool):
+        return float(value)
+    try:
+        array = as_real(name, value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        array = np.zeros(2)
+    if array.ndim:
+        raise TypeError(f"{name} must be a number, got {shown(value)}")
+    return float(array)
+
+
+def as_count(name: str, value: object) -> int:
+    """Return a whole number of at least 1."""
+    try:
+        n = operator.index(value)  # type: ignore[arg-type]
+    except TypeError:
+        raise TypeError(f"{name} must be an integer, got {shown(value)}") from None
+    if n < 1:
+        raise ValueError(f"{name} must be at least 1, got {n}")
+    return n
+
+
+def as_path(name: str, value: object) -> Path:
+    """Return where a file is."""
+    if not isinstance(value, str | os.PathLike):
+        raise TypeError(f"{name} must be a path, got {shown(value)}")
+    return Path(value)
+
+
+def as_names(name: str, values: object) -> tuple[str, ...]:
+    """Return strings, of one or of a sequence of them."""
+    if isinstance(values, str):
+        return (values,)
+    try:
+        names = tuple(cast("Iterable[Any]", values))
+    except TypeError:
+        names = (values,)
+    if not all(isinstance(one, str) for one in names):
+        raise TypeError(f"{name} must be a name or a sequence of names, got {shown(values)}")
+    return names
+
+
+def shown(value: object) -> str:
+    """What a message says of a wrong value: the value if it is short, else its type, and its shape if it has one."""
+    if isinstance(value, str | int | float | bool | tuple | list | None) and len(text := repr(value)) <= 60:
+        return text
+    shape = getattr(value, "shape", None)
+    return type(value).__name__ + (f" of shape {shape}" if isinstance(shape, tuple) else "")
+
+
 def as_vector(name: str, values: ArrayLike) -> NDArray[np.float64]:
     """Return three finite numbers."""
-    vector = np.asarray(values, dtype=np.float64)
+    vector = as_real(name, values)
     if vector.shape != (3,) or not np.isfinite(vector).all():
         raise ValueError(f"{name} must be three finite numbers, got {values!r}")
     return vector
@@ -151,7 +226,7 @@ def as_vector(name: str, values: ArrayLike) -> NDArray[np.float64]:
 
 def as_square(name: str, values: ArrayLike, n: int) -> NDArray[np.float64]:
     """Return a finite matrix (n, n), always a copy."""
-    matrix = np.array(values, dtype=np.float64)
+    matrix = as_real(name, values).copy()
     if matrix.shape != (n, n):
         raise ValueError(f"{name} must have shape ({n}, {n}), got {matrix.shape}")
     if not np.isfinite(matrix).all():
@@ -175,8 +250,17 @@ def as_pair(name: str, values: object) -> tuple[int, int]:
 
 
 def as_size(values: object, name: str = "size", smallest: int = 0) -> tuple[int, int]:
-    """Return ``(width, height)``."""
-    width, height = as_pair(name, values)
+    """Return ``(width, height)``, a square of one number."""
+    try:
+        width, height = as_pair(name, values)
+    except TypeError:
+        if isinstance(values, int | np.integer) and not isinstance(values, bool):
+            width = height = int(values)
+        else:
+            raise TypeError(
+                f"{name} must be two integers (width, height), or one for a square, got {shown(values)}"
+                + SIZE_HINT * (isinstance(values, tuple | list) and len(values) == 3)
+            ) from None
     if not (smallest <= width <= INT32_MAX and smallest <= height <= INT32_MAX):
         raise ValueError(f"{name} must be (width, height) in {smallest}..{INT32_MAX}, got ({width}, {height})")
     return width, height
@@ -216,7 +300,9 @@ def as_colors(values: ArrayLike) -> NDArray[Any]:
     if array.dtype.kind not in "iu":
         raise TypeError(f"colors must be uint8 or float32, got dtype {array.dtype}")
     if array.dtype != np.uint8 and array.size and not (0 <= array.min() and array.max() <= 255):
-        raise ValueError(f"colors must lie in 0..255 when they are integers, got {array.min()}..{array.max()}")
+        raise ValueError(
+            f"colors must lie in 0..255 when they are integers, got {array.min()}..{array.max()}; dtype= fills labels"
+        )
     return np.ascontiguousarray(array, dtype=np.uint8)
 
 
@@ -224,7 +310,7 @@ def as_background(background: ArrayLike | None, palette: NDArray[Any]) -> NDArra
     """Return the colour of empty pixels in the picture's dtype: one number, or one per channel."""
     if background is None:
         return None
-    ground = np.asarray(background)
+    ground = as_array("background", background)
     if ground.shape not in ((), palette.shape[1:]):
         raise ValueError(f"background must be one number or have shape {palette.shape[1:]}, got {ground.shape}")
     if ground.dtype.kind not in "fiu":
@@ -255,8 +341,10 @@ def as_out(name: str, array: object, shape: tuple[int, ...], dtype: type) -> NDA
     if not isinstance(array, np.ndarray):
         raise TypeError(f"{name} must be a NumPy array, got {type(array).__name__}")
     if array.shape != shape or array.dtype != dtype:
+        is_turned = array.shape[:2] == shape[1::-1] != shape[:2]
         raise ValueError(
             f"{name} must have shape {shape} and dtype {np.dtype(dtype)}, got {array.shape} and {array.dtype}"
+            + "; size is (width, height), shapes are (height, width)" * is_turned
         )
     if not array.flags.writeable:
         raise ValueError(f"{name} must be writeable, got a read-only array")

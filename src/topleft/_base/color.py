@@ -5,18 +5,22 @@ Based on: IEC 61966-2-1, "Default RGB colour space - sRGB", 1999.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from functools import lru_cache
-from typing import Any
+from typing import Any, TypeAlias, cast
 
 import numpy as np
 import numpy.typing as npt
+
+from topleft._base.arrays import as_array, shown
 
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
 I32 = npt.NDArray[np.int32]
 U8 = npt.NDArray[np.uint8]
 Color = tuple[int, ...]
+ColorLike: TypeAlias = str | Sequence[float] | npt.NDArray[Any]
+"""What `as_color` takes."""
 
 DEFAULT_COLOR = (224, 222, 217)
 """sRGB of a mesh without colours: a light warm grey, in which light and shadow both have room."""
@@ -48,20 +52,67 @@ def srgb_tables() -> tuple[I32, U8]:
     return np.rint(light).astype(np.int32), np.rint(values).astype(np.uint8)
 
 
-def as_color(name: str, color: Iterable[Any], n_channels: int) -> Color:
+def as_color(name: str, color: ColorLike, n_channels: int) -> Color:
     """The colour as whole numbers of 0 to 255; RGB becomes opaque where RGBA is asked for.
+
+    Parameters
+    ----------
+    name : str
+        Of the argument, for messages.
+    color : str, or 3 or 4 numbers
+        A name of CSS ("red", "#f2a65a", "rgb(255, 0, 0)", for a background "transparent"); integers of 0 to 255; or
+        floats of 0 to 1, which one float among the numbers makes of them all: (1.0, 0, 0) is red, (1, 0, 0) nearly
+        black.
+    n_channels : 3 or 4
 
     Raises
     ------
     ValueError
-        If it has another number of channels or a channel outside its range.
+        If it is no name of a colour, has another number of channels or a channel outside its range.
+    TypeError
+        If it is something else.
     """
-    channels = tuple(int(channel) for channel in color)
-    if n_channels == 4 and len(channels) == 3:
-        channels = (*channels, 255)
+    if isinstance(color, str) and color == "transparent" and n_channels == 4:
+        return (0, 0, 0, 0)
+    if isinstance(color, str):
+        named = color_of_name(name, color)
+        channels: tuple[int, ...] = named if n_channels == 4 or named[3] < 255 else named[:3]
+    else:
+        array = as_array(name, color)
+        if array.ndim != 1 or array.dtype.kind not in "fiu":
+            raise TypeError(
+                f"{name} must be a name, '#rrggbb', {n_channels} integers of 0 to 255 or floats of 0 to 1, "
+                f"got {shown(color)}"
+            )
+        if array.dtype.kind == "f":
+            if not ((array >= 0) & (array <= 1)).all():
+                raise ValueError(
+                    f"{name} must be floats of 0 to 1 or integers of 0 to 255, got floats {array.tolist()}"
+                )
+            array = np.rint(255 * array.astype(np.float64))
+        channels = tuple(map(int, array.tolist()))
+        if n_channels == 4 and len(channels) == 3:
+            channels = (*channels, 255)
     if len(channels) != n_channels or not all(0 <= channel <= 255 for channel in channels):
-        raise ValueError(f"{name} must be {n_channels} numbers of 0 to 255, got {color!r}")
+        raise ValueError(f"{name} must be {n_channels} numbers of 0 to 255, got {shown(color)}")
     return channels
+
+
+def color_of_name(name: str, text: str) -> tuple[int, int, int, int]:
+    """Red, green, blue and alpha of 0 to 255 of a colour by its name.
+
+    Raises
+    ------
+    ValueError
+        If no colour is called so.
+    """
+    from PIL import ImageColor  # which colours as numbers do without
+
+    try:
+        red, green, blue, alpha = cast("tuple[int, int, int, int]", ImageColor.getcolor(text.strip(), "RGBA"))
+    except ValueError:
+        raise ValueError(f"{name} must be a name of CSS like 'red', or '#rrggbb', got {text[:40]!r}") from None
+    return red, green, blue, alpha
 
 
 def light_of(color: Color) -> tuple[float, ...]:

@@ -17,6 +17,7 @@ __all__ = [
     "Resolve",
     "Sampling",
     "Sink",
+    "check_choice",
     "parse",
 ]
 
@@ -135,3 +136,10 @@ def parse(kind: type[Option], name: str, value: object) -> Option:
         choices = ", ".join(repr(str(member)) for member in kind)
         raise ValueError(f"{name} must be one of {choices}, got {value!r}")
     return member
+
+
+def check_choice(name: str, value: object, choices: tuple[str, ...]) -> None:
+    """Raise a `ValueError` unless the value is one of a few words."""
+    if not (isinstance(value, str) and value in choices):
+        *others, last = (f'"{choice}"' for choice in choices)
+        raise ValueError(f"{name} must be {', '.join(others)} or {last}, got {value!r}")

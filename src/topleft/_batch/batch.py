@@ -5,11 +5,10 @@ Input: jobs, as many as a generator gives. Output: results, in the order of the 
 
 from __future__ import annotations
 
-import operator
 import os
 import warnings
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence, Sized
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Sized
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from dataclasses import dataclass
 from enum import StrEnum
@@ -17,8 +16,10 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
+import numpy as np
 import numpy.typing as npt
 
+from topleft._base.arrays import as_count, shown
 from topleft._base.options import parse
 from topleft._batch.jobs import Job, JobRunner, Outcome, as_job
 from topleft._batch.workers import Workers, workers_of
@@ -53,8 +54,12 @@ class Result:
     index : int
         Which job it was, from 0.
     job : Job
-    picture : ndarray (H, W, 4) uint8, or dict of str to ndarray, or None
-        The picture, or its layers by name; None where they went to files, or were not made.
+    made : ndarray, dict of str to ndarray, or None
+        What the job gave: its picture, or its layers by name; None where they went to files, or were not made.
+    picture : ndarray (H, W, 4) uint8, or None
+        The picture; of a job with layers the one of "color", if that is among them.
+    layers : dict of str to ndarray
+        The layers by name; empty for a job without any.
     error : Exception or None
         Why it failed.
     is_skipped : bool
@@ -65,10 +70,34 @@ class Result:
 
     index: int
     job: Job
-    picture: Array | dict[str, Array] | None = None
+    made: Array | dict[str, Array] | None = None
     error: Exception | None = None
     is_skipped: bool = False
     warnings: tuple[str, ...] = ()
+
+    @property
+    def picture(self) -> npt.NDArray[np.uint8] | None:
+        """The picture (H, W, 4) uint8; None where it went to a file, or was not made."""
+        return self.made.get("color") if isinstance(self.made, dict) else self.made
+
+    @property
+    def layers(self) -> dict[str, Array]:
+        """The layers by name; empty for a job without any, and where they went to files."""
+        return self.made if isinstance(self.made, dict) else {}
+
+    def __repr__(self) -> str:
+        """One line: which job it was, and what came of it."""
+        if self.error is not None:
+            what = f"{type(self.error).__name__}: {self.error}"
+        elif self.is_skipped:
+            what = "skipped"
+        elif self.layers:
+            what = ", ".join(f"{name} {array.shape} {array.dtype}" for name, array in self.layers.items())
+        elif self.picture is not None:
+            what = f"picture {self.picture.shape} {self.picture.dtype}"
+        else:
+            what = "written"
+        return f"Result({self.index}, {self.job.name}: {what})"
 
 
 @dataclass(frozen=True)
@@ -143,7 +172,11 @@ def render_batch(
     >>> [result.picture.shape for result in tl.render_batch(jobs, executor=2)]
     [(48, 64, 4), (48, 64, 4), (48, 64, 4), (48, 64, 4)]
     """
-    n_chunk, n_window = _positive("chunk", chunk), None if window is None else _positive("window", window)
+    n_chunk, n_window = as_count("chunk", chunk), None if window is None else as_count("window", window)
+    if not isinstance(jobs, Iterable) or isinstance(jobs, str | bytes | Mapping | np.ndarray):
+        raise TypeError(f"jobs must be an iterable of Job, got {shown(jobs)}")
+    if not (progress is None or isinstance(progress, bool) or callable(progress)):
+        raise TypeError(f"progress must be a function of a Result, True or None, got {shown(progress)}")
     wish = parse(Order, "order", order)
     collects = parse(OnError, "on_error", on_error) is OnError.COLLECT
     workers = workers_of(executor)
@@ -331,16 +364,6 @@ def _is_done(job: Job) -> bool:
     except ValueError:
         return False
     return bool(files) and all(file.is_file() for file in files)
-
-
-def _positive(name: str, value: object) -> int:
-    try:
-        n = operator.index(value)  # type: ignore[arg-type]
-    except TypeError:
-        raise TypeError(f"{name} must be an integer, got {value!r}") from None
-    if n < 1:
-        raise ValueError(f"{name} must be at least 1, got {n}")
-    return n
 
 
 class _Bar:

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy.typing as npt
 
+from topleft._base.arrays import as_path, as_size, shown
 from topleft._camera.camera import Camera
 from topleft._io.images import save_image
 from topleft._io.layer_files import layer_paths, save_layers
@@ -65,6 +66,23 @@ class Job:
     options: Mapping[str, Any] = field(default_factory=dict)
     destination: str | os.PathLike[str] | None = None
     layers: Sequence[str] = ()
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.options, Mapping) or not all(isinstance(name, str) for name in self.options):
+            raise TypeError(f"options must map names of options of render to values, got {shown(self.options)}")
+        if isinstance(self.camera, type):
+            raise TypeError(f"camera must be a Camera, a function of the mesh and the size or None, got {self.camera}")
+        if self.destination is not None:
+            as_path("destination", self.destination)
+
+    def __repr__(self) -> str:
+        """One line: what is drawn, how large, where to."""
+        scene = os.fspath(self.scene) if isinstance(self.scene, str | os.PathLike) else type(self.scene).__name__
+        words = [str(scene), f"size={self.size}"]
+        words += [f"layers={tuple(self.layers)}"] if self.layers else []
+        words += [f"options={', '.join(self.options)}"] if self.options else []
+        words += [f"destination={os.fspath(self.destination)!r}"] if self.destination is not None else []
+        return f"Job({', '.join(words)})"
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -214,7 +232,7 @@ class JobRunner:
             if not file.parent.is_dir():
                 file.parent.mkdir(parents=True, exist_ok=True)
         scene = self._scene(job.scene)
-        size = (int(job.size[0]), int(job.size[1]))
+        size = as_size(job.size)
         camera = job.camera(scene, size) if callable(job.camera) else job.camera
         options = {"threads": 1, **job.options}
         rasterizer = self._rasterizer(size)

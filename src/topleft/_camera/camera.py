@@ -7,12 +7,13 @@ Matrices act on columns: `clip = projection @ view @ [x, y, z, 1]`. A lens bends
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from topleft._base.arrays import as_square, as_vector, check_regular
+from topleft._base.arrays import as_array, as_real, as_size, as_square, as_vector, check_regular, shown
+from topleft._base.options import check_choice
 from topleft._camera.lens import Lens, lens_of_opencv
 from topleft._camera.matrices import (
     F64,
@@ -32,11 +33,12 @@ from topleft._camera.matrices import (
     perspective_matrix,
     place_to_fill,
     points_to_frame,
+    split_matrix,
     view_matrix,
 )
 from topleft._model.adapt import MeshLike
 
-__all__ = ["DEFAULT_FOV_Y_DEG", "Camera"]
+__all__ = ["DEFAULT_FOV_Y_DEG", "Camera", "CameraLike", "as_camera"]
 
 DEFAULT_FOV_Y_DEG = 40.0
 
@@ -77,6 +79,12 @@ class Camera:
     aspect: float | None = None
     lens: Lens | None = None
 
+    if TYPE_CHECKING:  # what is given may be anything that NumPy reads; what is kept is float64
+
+        def __init__(
+            self, view: npt.ArrayLike, projection: npt.ArrayLike, aspect: float | None = None, lens: Lens | None = None
+        ) -> None: ...
+
     def __post_init__(self) -> None:
         for name in ("view", "projection"):
             matrix = as_square(name, getattr(self, name), 4)
@@ -84,12 +92,31 @@ class Camera:
             object.__setattr__(self, name, matrix)
         if self.aspect is not None:
             check_positive("aspect", self.aspect)
+        if not (self.lens is None or hasattr(self.lens, "bend")):
+            raise TypeError(f"lens must be an OpenCVLens, a FisheyeLens or None, got {shown(self.lens)}")
         if self.lens is not None and not np.array_equal(self.projection[3], [0, 0, -1, 0]):
             raise ValueError(
                 f"a lens needs a projection whose last row is [0, 0, -1, 0], got {self.projection[3].tolist()}"
             )
 
-    def clip_from_world(self, size: tuple[int, int]) -> F64:
+    def __repr__(self) -> str:
+        """One line: where it stands, where it looks, how wide."""
+        try:
+            eye = np.linalg.solve(self.view[:3, :3], -self.view[:3, 3])
+        except np.linalg.LinAlgError:
+            return "Camera(singular view)"
+        forward = -self.view[2, :3] / (np.linalg.norm(self.view[2, :3]) or 1.0)
+        words = [f"eye=({', '.join(f'{x:.4g}' for x in eye)})", f"forward=({', '.join(f'{x:.3g}' for x in forward)})"]
+        up = float(self.projection[1, 1])
+        if up and self.projection[3, :3].any():
+            words.append(f"fov_y_deg={np.degrees(2 * np.arctan(1 / abs(up))):.4g}")
+        elif up:
+            words.append(f"ortho_height={2 / abs(up):.4g}")
+        if self.lens is not None:
+            words.append(f"lens={type(self.lens).__name__}")
+        return f"Camera({', '.join(words)})"
+
+    def clip_from_world(self, size: int | tuple[int, int]) -> F64:
         """The matrix (4, 4) float64 that `rasterize` takes as `transform=`, for a picture of this size.
 
         Parameters
@@ -107,9 +134,9 @@ class Camera:
             raise ValueError("no matrix describes a camera with a lens; rasterize_mesh draws through it")
         return self.clip_from_eye(size) @ self.view
 
-    def clip_from_eye(self, size: tuple[int, int]) -> F64:
+    def clip_from_eye(self, size: int | tuple[int, int]) -> F64:
         """The projection (4, 4) float64 for a picture of this size; with a lens it acts on what the lens has bent."""
-        width, height = size
+        width, height = as_size(size)
         projection = self.projection.copy()
         if self.aspect is not None and width > 0 and height > 0:
             projection[0] = projection[0] * (self.aspect * height) / width
@@ -119,7 +146,7 @@ class Camera:
         """The same camera without its lens."""
         return self if self.lens is None else replace(self, lens=None)
 
-    def project(self, points: npt.ArrayLike, size: tuple[int, int]) -> F64:
+    def project(self, points: npt.ArrayLike, size: int | tuple[int, int]) -> F64:
         """Where world points lie in a picture.
 
         Parameters
@@ -144,7 +171,7 @@ class Camera:
         >>> Camera.look_at((0, 0, 5)).project([(0, 0, 0)], (200, 100))[0, :2].tolist()
         [100.0, 50.0]
         """
-        world = np.asarray(points, dtype=np.float64)
+        world, (width, height) = as_real("points", points), as_size(size)
         if world.ndim != 2 or world.shape[1] != 3:
             raise ValueError(f"points must have shape (N, 3), got {world.shape}")
         eye = world @ self.view[:3, :3].T + self.view[:3, 3]
@@ -154,8 +181,36 @@ class Camera:
         clip = eye @ projection[:, :3].T + projection[:, 3]
         with np.errstate(divide="ignore", invalid="ignore"):
             ndc = clip[:, :3] / clip[:, 3:]
-        width, height = size
         return np.stack([(ndc[:, 0] + 1) * (width / 2), (1 - ndc[:, 1]) * (height / 2), (ndc[:, 2] + 1) / 2], axis=1)
+
+    @classmethod
+    def from_matrix(cls, clip_from_world: npt.ArrayLike) -> Camera:
+        """The camera of one matrix, a projection times a view: what OpenGL and nvdiffrast call the mvp.
+
+        Parameters
+        ----------
+        clip_from_world : (4, 4) array_like
+            Acts on columns, into OpenGL's clip space; its scale does not matter. Whatever takes a camera takes such a
+            matrix, too.
+
+        Returns
+        -------
+        Camera
+            Whose `clip_from_world` is the matrix, up to its scale and the rounding of float64, for pictures of every
+            size: a picture of another shape is stretched. Without perspective the eye is put into the near plane.
+
+        Raises
+        ------
+        ValueError
+            If the matrix is singular, is a pose without a projection, or its near and far planes lie aslant.
+
+        Examples
+        --------
+        >>> camera = Camera.look_at((0, 0, 5), fov_y_deg=40)
+        >>> Camera.from_matrix(camera.clip_from_world((64, 64)))
+        Camera(eye=(0, 0, 5), forward=(0, 0, -1), fov_y_deg=40)
+        """
+        return cls(*split_matrix(as_square("clip_from_world", clip_from_world, 4)))
 
     @classmethod
     def perspective(
@@ -279,7 +334,7 @@ class Camera:
         cls,
         intrinsics: npt.ArrayLike,
         camera_from_world: npt.ArrayLike,
-        size: tuple[int, int],
+        size: int | tuple[int, int],
         *,
         near: float | None = None,
         far: float | None = None,
@@ -318,9 +373,7 @@ class Camera:
         """
         matrix = as_square("intrinsics", intrinsics, 3)
         pose = as_square("camera_from_world", camera_from_world, 4)
-        width, height = size
-        check_positive("width", width)
-        check_positive("height", height)
+        width, height = as_size(size, smallest=1)
         away = float(np.sqrt((pose[:3, 3] ** 2).sum())) or 1.0
         near = 1e-3 * away if near is None else near
         far = max(1e3 * max(away, 1.0), 1e3 * near) if far is None else far
@@ -383,8 +436,7 @@ class Camera:
         center, radius = bounding_sphere(subject)
         check_fov(fov_y_deg)
         check_positive("aspect", aspect)
-        if fit not in ("sphere", "box", "points", "silhouette"):
-            raise ValueError(f'fit must be "sphere", "box", "points" or "silhouette", got {fit!r}')
+        check_choice("fit", fit, ("sphere", "box", "points", "silhouette"))
         tan_y = np.tan(np.radians(fov_y_deg) / 2)
         # The sphere touches the pyramid of view at sin, not tan, of the half angle.
         distance = radius * FRAMING_MARGIN / np.sin(np.arctan(tan_y * min(1.0, aspect)))
@@ -410,3 +462,34 @@ class Camera:
         if ortho:
             return cls.orthographic(view, near=near, far=far, height=height)
         return cls.perspective(view, near=near, far=far, fov_y_deg=fov_y_deg)
+
+
+CameraLike: TypeAlias = Camera | npt.NDArray[Any]
+"""What takes a camera takes its matrix (4, 4), clip from world, too: see `Camera.from_matrix`."""
+
+
+def as_camera(camera: object, name: str = "camera") -> Camera:
+    """The camera, or that of a matrix (4, 4), clip from world.
+
+    Raises
+    ------
+    TypeError
+        If it is neither.
+    ValueError
+        As `Camera.from_matrix` does.
+    """
+    if isinstance(camera, Camera):
+        return camera
+    wish = f"{name} must be a Camera or a (4, 4) matrix, clip from world"
+    hint = ""
+    if isinstance(camera, int) or (isinstance(camera, tuple | list) and len(camera) == 2):
+        hint = "; the size comes after the camera: size=(640, 480)"
+    elif camera is not None and not isinstance(camera, str | bytes | dict):
+        try:
+            matrix = as_array(name, camera)  # type: ignore[arg-type]
+        except (TypeError, ValueError):
+            matrix = np.zeros(0)
+        if matrix.shape == (4, 4) and matrix.dtype.kind in "fiu":
+            return Camera.from_matrix(matrix)
+        hint = "; Camera.from_intrinsics takes those of OpenCV" * (matrix.shape in ((3, 3), (3, 4)))
+    raise TypeError(f"{wish}, got {shown(camera)}{hint}")

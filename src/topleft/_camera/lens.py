@@ -9,11 +9,14 @@ Fish-Eye Lenses", IEEE PAMI 28(8), 2006 (the fisheye); both with the terms and n
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
 import numpy as np
 import numpy.typing as npt
+
+from topleft._base.arrays import as_number, as_real
 
 F64 = npt.NDArray[np.float64]
 
@@ -205,7 +208,7 @@ def lens_of_opencv(distortion: npt.ArrayLike | None, fisheye: npt.ArrayLike | No
     if distortion is not None and fisheye is not None:
         raise ValueError("distortion and fisheye are two models of a lens: give one of them")
     if distortion is not None:
-        terms = np.asarray(distortion, dtype=np.float64).ravel().tolist()
+        terms = as_real("distortion", distortion).ravel().tolist()
         if len(terms) not in (4, 5, 8, 12, 14):
             raise ValueError(
                 "distortion must be k1, k2, p1, p2[, k3[, k4, k5, k6[, s1, s2, s3, s4[, tau_x, tau_y]]]]: 4, 5, 8, 12 "
@@ -213,7 +216,7 @@ def lens_of_opencv(distortion: npt.ArrayLike | None, fisheye: npt.ArrayLike | No
             )
         return OpenCVLens(*terms[:8], **dict(zip(("s1", "s2", "s3", "s4", "tau_x", "tau_y"), terms[8:], strict=False)))
     if fisheye is not None:
-        terms = np.asarray(fisheye, dtype=np.float64).ravel().tolist()
+        terms = as_real("fisheye", fisheye).ravel().tolist()
         if len(terms) != 4:
             raise ValueError(f"fisheye must be k1, k2, k3, k4: 4 numbers, got {len(terms)}")
         return FisheyeLens(*terms)
@@ -221,9 +224,9 @@ def lens_of_opencv(distortion: npt.ArrayLike | None, fisheye: npt.ArrayLike | No
 
 
 def _check_terms(terms: list[float], tolerance_px: float) -> None:
-    if not np.isfinite(terms).all():
+    if not all(math.isfinite(as_number("terms of a lens", term)) for term in terms):
         raise ValueError(f"the terms of a lens must be finite, got {terms}")
-    if not (np.isfinite(tolerance_px) and tolerance_px >= FINEST_TOLERANCE_PX):
+    if not FINEST_TOLERANCE_PX <= as_number("tolerance_px", tolerance_px) < math.inf:
         raise ValueError(f"tolerance_px must be at least {FINEST_TOLERANCE_PX}, got {tolerance_px}")
 
 

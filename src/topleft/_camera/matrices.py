@@ -13,7 +13,8 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from topleft._base.arrays import as_vector
+from topleft._base.arrays import as_number, as_real, as_vector, check_regular
+from topleft._base.options import check_choice
 from topleft._model.adapt import MeshLike, as_mesh, is_mesh_like
 from topleft._model.mesh import extreme_points, used_vertices
 from topleft._model.points import Points
@@ -43,7 +44,7 @@ def points_to_frame(subject: MeshLike | npt.ArrayLike) -> F64:
     elif is_mesh_like(subject):
         points = np.asarray(used_vertices(as_mesh(subject)), np.float64)
     else:
-        points = np.asarray(subject, np.float64)
+        points = as_real("subject", subject)
     if points.ndim != 2 or points.shape[1] != 3:
         raise ValueError(f"points to frame must have shape (N, 3), got {points.shape}")
     if not len(points):
@@ -99,6 +100,47 @@ def distance_to_fit(points: F64, tan_x: float, tan_y: float) -> float:
     needed = z + FRAMING_MARGIN * np.maximum(np.abs(x) / tan_x, np.abs(y) / tan_y)
     farthest = np.sqrt((points**2).sum(axis=1).max())
     return float(max(needed.max(), 1e-2 * farthest)) or 1.0
+
+
+def split_matrix(clip_from_world: F64) -> tuple[F64, F64]:
+    """View and projection (4, 4) float64 of their product, up to its scale; the view turns and moves, nothing else.
+
+    Without perspective the eye is put into the near plane, in the middle of the picture: no matrix tells where it is.
+
+    Raises
+    ------
+    ValueError
+        If the matrix is singular, is a pose, or its depth is not that of planes across the view.
+    """
+    name = "clip_from_world"
+    check_regular(name, clip_from_world)
+    has_perspective = bool(clip_from_world[3, :3].any())
+    linear = clip_from_world[:3, :3]
+    if not has_perspective and np.allclose(linear @ linear.T, np.eye(3), rtol=0, atol=1e-6):
+        raise ValueError(
+            f"{name} must be a projection times a view, got a pose: Camera.perspective(view, near=, far=) adds one"
+        )
+    scale = np.linalg.norm(clip_from_world[3, :3]) if has_perspective else clip_from_world[3, 3]
+    matrix = clip_from_world / scale
+    rows = matrix[[0, 1, 3 if has_perspective else 2]]
+    ends = np.array([0.0, 0.0, 0.0 if has_perspective else -1.0])
+    try:
+        eye = np.linalg.solve(rows[:, :3], ends - rows[:, 3])
+    except np.linalg.LinAlgError:
+        raise ValueError(f"{name} must have an eye, got {clip_from_world.tolist()}") from None
+    back = -rows[2, :3] / np.linalg.norm(rows[2, :3])
+    up = rows[1, :3] - (rows[1, :3] @ back) * back
+    up /= np.linalg.norm(up)
+    view = np.eye(4)
+    view[:3, :3] = np.cross(up, back), up, back
+    view[:3, 3] = -view[:3, :3] @ eye
+    projection = matrix @ np.linalg.inv(view)
+    error = 1e-9 * np.abs(projection).max()
+    if np.abs(projection[2, :2]).max() > error:
+        raise ValueError(f"{name} must have depth along the view alone, got planes that lie aslant")
+    projection[2, :2] = 0
+    projection[3] = [0, 0, -1, 0] if has_perspective else [0, 0, 0, 1]
+    return view, projection
 
 
 def place_to_fill(points: F64, tan_x: float, tan_y: float, *, ortho: bool = False) -> F64:
@@ -191,11 +233,10 @@ def orbit_view(
     ValueError
         If the elevation is outside -90 to 90 degrees or `up` is neither "y" nor "z".
     """
-    if up not in ("y", "z"):
-        raise ValueError(f'up must be "y" or "z", got {up!r}')
-    if not np.isfinite(azimuth_deg):
+    check_choice("up", up, ("y", "z"))
+    if not math.isfinite(as_number("azimuth_deg", azimuth_deg)):
         raise ValueError(f"azimuth_deg must be finite, got {azimuth_deg}")
-    if not -90 <= elevation_deg <= 90:
+    if not -90 <= as_number("elevation_deg", elevation_deg) <= 90:
         raise ValueError(f"elevation_deg must lie in -90 to 90, got {elevation_deg}")
     azimuth, elevation = np.radians([azimuth_deg, elevation_deg])
     outward = np.array([np.cos(elevation) * np.sin(azimuth), np.sin(elevation), np.cos(elevation) * np.cos(azimuth)])
@@ -222,7 +263,7 @@ def perspective_matrix(fov_y_deg: float, near: float, far: float) -> F64:
 def orthographic_matrix(height: float, near: float, far: float) -> F64:
     """Clip from eye (4, 4) float64 for a square picture; see `Camera.orthographic`."""
     check_positive("height", height)
-    if not (np.isfinite([near, far]).all() and near < far):
+    if not -math.inf < as_number("near", near) < as_number("far", far) < math.inf:
         raise ValueError(f"near and far must be finite and near < far, got {near} and {far}")
     matrix = np.diag([2 / height, 2 / height, 2 / (near - far), 1])
     matrix[2, 3] = (far + near) / (near - far)
@@ -250,23 +291,24 @@ def box_matrix(left: float, right: float, bottom: float, top: float, near: float
 
 def check_positive(name: str, value: float) -> None:
     """Raise a `ValueError` unless the number is finite and above 0."""
-    if not (np.isfinite(value) and value > 0):
+    if not 0 < as_number(name, value) < math.inf:
         raise ValueError(f"{name} must be positive, got {value}")
 
 
 def check_fov(fov_y_deg: float) -> None:
     """Raise a `ValueError` unless the field of view is one."""
-    if not 0 < fov_y_deg < 180:
+    if not 0 < as_number("fov_y_deg", fov_y_deg) < 180:
         raise ValueError(f"fov_y_deg must lie between 0 and 180, got {fov_y_deg}")
 
 
 def check_planes(near: float, far: float) -> None:
     """Raise a `ValueError` unless 0 < near < far, finite."""
-    if not (np.isfinite(near) and np.isfinite(far) and 0 < near < far):
+    if not 0 < as_number("near", near) < as_number("far", far) < math.inf:
         raise ValueError(f"near and far must be finite and 0 < near < far, got {near} and {far}")
 
 
 def check_window(left: float, right: float, bottom: float, top: float) -> None:
     """Raise a `ValueError` unless the four sides are finite and in order."""
-    if not (np.isfinite([left, right, bottom, top]).all() and left < right and bottom < top):
+    numbers = {"left": left, "right": right, "bottom": bottom, "top": top}
+    if not all(math.isfinite(as_number(*one)) for one in numbers.items()) or left >= right or bottom >= top:
         raise ValueError(f"left < right and bottom < top must be finite, got {left} and {right}, {bottom} and {top}")

@@ -8,12 +8,12 @@ Geosciences 42, 2010.
 
 from __future__ import annotations
 
-import operator
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from topleft._base.arrays import as_count
 from topleft._camera.camera import Camera
 from topleft._camera.matrices import THREE_QUARTER_DEG, bounding_sphere
 from topleft._model.adapt import MeshLike
@@ -58,7 +58,7 @@ def turntable(
     >>> len(turntable([(-1, -1, -1), (1, 1, 1)], 12))
     12
     """
-    n = _count(n)
+    n = as_count("n", n)
     sphere = _corners_of_sphere(subject) if framing.get("fit", "sphere") == "sphere" else subject
     return [
         Camera.framing(sphere, azimuth_deg=azimuth_deg + 360 * i / n, elevation_deg=elevation_deg, **framing)
@@ -100,20 +100,13 @@ def viewpoints(subject: MeshLike | npt.ArrayLike, n: int, **framing: Any) -> lis
     >>> bool(np.abs(np.mean(eye, axis=0)).max() < 0.05)
     True
     """
-    n = _count(n)
+    n = as_count("n", n)
     sphere = _corners_of_sphere(subject) if framing.get("fit", "sphere") == "sphere" else subject
     height = 1 - (2 * np.arange(n) + 1) / n
     return [
         Camera.framing(sphere, azimuth_deg=i * GOLDEN_ANGLE_DEG % 360, elevation_deg=elevation_deg, **framing)
         for i, elevation_deg in enumerate(np.degrees(np.arcsin(height)).tolist())
     ]
-
-
-def _count(n: int) -> int:
-    n = operator.index(n)
-    if n < 1:
-        raise ValueError(f"n must be at least 1, got {n}")
-    return n
 
 
 def _corners_of_sphere(subject: MeshLike | npt.ArrayLike) -> npt.NDArray[np.float64]:

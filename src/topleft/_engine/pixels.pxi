@@ -167,15 +167,18 @@ cdef class Valued:
         with nogil:
             K.list_planes(&self.mesh, first, end)
 
-    def fill_planes(self, const int32_t[:, ::1] ids, out, int64_t first_row, int64_t n_rows):
-        """Write the values of the pixels in the rows [first_row, first_row + n_rows) of a float32 or float64 array."""
+    def fill_planes(self, const int32_t[:, ::1] ids, out, int64_t first_row, int64_t n_rows, int64_t x_px, int64_t y_px):
+        """Write the values of the pixels in the rows [first_row, first_row + n_rows) of a float32 or float64 array.
+
+        Pixel (0, 0) of the array is (x_px, y_px) of the whole picture.
+        """
         cdef tl_window window
         cdef bint is_f32 = out.dtype == np.float32
         cdef uint8_t[::1] flat = as_bytes(out)
         cdef int64_t width = ids.shape[1]
         if width == 0 or n_rows == 0:
             return
-        window.x_px, window.y_px, window.width, window.height = 0, first_row, width, n_rows
+        window.x_px, window.y_px, window.width, window.height = x_px, y_px + first_row, width, n_rows
         window.subpixel_bits, window.test, window.pause = 0, 0, NULL
         with nogil:
             K.fill_planes(&self.mesh, &window, &ids[first_row, 0], is_f32, &flat[first_row * width * (4 if is_f32 else 8)])

@@ -14,9 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft import _engine
-from topleft._base.arrays import as_array, as_checked_triangles
+from topleft._base.arrays import as_array, as_checked_triangles, as_number, as_pair
 from topleft._base.memory import SCRATCH
-from topleft._base.options import Per, Sink, parse
+from topleft._base.options import Per, Sink, check_choice, parse
 from topleft._base.threads import count_threads, run_parts
 from topleft._field.grid import Extent, Grid, grid_around
 from topleft._model.adapt import MeshLike, Polygons, as_polygons
@@ -39,8 +39,11 @@ MAX_LISTED_PLANES = 1_000_000
 def field(
     mesh: MeshLike,
     values: npt.ArrayLike,
-    size: tuple[int, int] | Grid | None = None,
+    size: int | tuple[int, int] | Grid | None = None,
     *,
+    origin: tuple[int, int] = (0, 0),
+    window: int | tuple[int, int] | None = None,
+    nodata: float | None = None,
     extent: Extent | None = None,
     pixel_size: float | tuple[float, float] | None = None,
     y: str = "up",
@@ -48,7 +51,7 @@ def field(
     subpixel_bits: int = 8,
     threads: int | None = None,
     out: npt.NDArray[Any] | None = None,
-) -> npt.NDArray[np.floating[Any]]:
+) -> npt.NDArray[Any]:
     """Return a field of an unstructured mesh on a regular grid, one value a pixel.
 
     Parameters
@@ -59,6 +62,12 @@ def field(
         Faces are the triangles, or the polygons that they were cut from. A NaN makes its triangles NaN.
     size : (width, height) or Grid, optional
         How many pixels; or the grid, which then says all.
+    origin : (column, row), pixels
+        The pixel of the grid that is row 0, column 0 of the result, which is the crop of the whole bit for bit.
+    window : (width, height), optional
+        How large the result is; from `origin` to the end of the grid unless given.
+    nodata : number, optional
+        What stands where the mesh is not, instead of NaN. With it integers of faces stay what they are.
     extent : (x_min, x_max, y_min, y_max), optional
         What the picture shows, data units; the box of the mesh unless given.
     pixel_size : float or (float, float), optional
@@ -75,12 +84,14 @@ def field(
     Returns
     -------
     ndarray of float32, or float64 unless `values` are float32, shape (H, W)
-        Linear over each triangle, or constant; NaN outside of the mesh.
+        Linear over each triangle, or constant; NaN, or `nodata`, outside of the mesh. Of integers of faces and with
+        `nodata` in the dtype of `values`.
 
     Raises
     ------
     ValueError
-        If the number of values fits neither, or both; if a point in use is not finite; or as `Grid.around`.
+        If the number of values fits neither, or both; if a point in use is not finite; if `nodata` is no number of the
+        result's dtype; or as `Grid.around`.
     TypeError
         If the values are no real numbers, or the mesh is none.
 
@@ -111,15 +122,21 @@ def field(
     is_per_face = _is_per_face(array, len(points), polygons.n_faces, parse(Per, "per", per))
     grid = _grid_of(polygons, size, pixel_size, extent, y)
     points_px, triangles = grid.to_pixels(points), as_checked_triangles(polygons.triangles, len(points))
-    view = View.parse(grid.size, {"subpixel_bits": subpixel_bits, "threads": threads})
-    dtype = np.float32 if array.dtype == np.float32 else np.float64
+    size = _window_of(grid, origin) if window is None else window
+    view = View.parse(size, {"subpixel_bits": subpixel_bits, "threads": threads, "origin": origin})
+    dtype: type[Any] = np.float32 if array.dtype == np.float32 else np.float64
+    if is_per_face and nodata is not None and array.dtype.kind in "iub":
+        dtype = array.dtype.type
+    empty = _nodata_of(nodata, dtype)
     with canvas_of(SCRATCH, "field", out, view.size[::-1], dtype) as (result, canvas):
         ids = _visible(points_px, triangles, view, Sink.LABEL)
         if is_per_face:
             own = array if polygons.faces is None else array[polygons.faces]
-            np.take(np.append(own, np.nan).astype(dtype), ids, out=canvas, mode="wrap")  # id -1 is the last
+            np.take(np.append(own.astype(dtype), empty), ids, out=canvas, mode="wrap")  # id -1 is the last
         else:
             _fill_planes(ids, points_px, triangles, array.astype(np.float64, copy=False), view, canvas)
+            if nodata is not None:
+                canvas[ids < 0] = empty
     return result
 
 
@@ -178,8 +195,7 @@ def height_map(
     array([[nan, nan],
            [1.5, nan]])
     """
-    if surface not in ("upper", "lower"):
-        raise ValueError(f'surface must be "upper" or "lower", got {surface!r}')
+    check_choice("surface", surface, ("upper", "lower"))
     polygons = as_polygons(mesh)
     points = _plane_points(polygons)
     if points.shape[1] != 3:
@@ -194,6 +210,27 @@ def height_map(
         ids = _visible(np.column_stack([points_px, _depth_of(heights, triangles)]), triangles, view, sink)
         _fill_planes(ids, points_px, triangles, heights, view, canvas)
     return result
+
+
+def _window_of(grid: Grid, origin: tuple[int, int]) -> tuple[int, int]:
+    """The pixels of a grid from one of them on."""
+    (width, height), (x, y) = grid.size, as_pair("origin", origin)
+    if not (x <= width and y <= height):
+        raise ValueError(f"origin must lie in the grid, of {width} x {height} pixels, or window be given, got {origin}")
+    return width - x, height - y
+
+
+def _nodata_of(nodata: object, dtype: type[Any]) -> npt.NDArray[Any]:
+    """What stands where the mesh is not, as an array of one number of the dtype."""
+    if nodata is None:
+        return np.array([np.nan], dtype)
+    number = as_number("nodata", nodata)
+    kind = np.dtype(dtype).kind
+    low, high = (0, 1) if kind == "b" else (np.iinfo(dtype).min, np.iinfo(dtype).max) if kind in "iu" else (0, 0)
+    fits = kind == "f" or (number == np.floor(number) and low <= number <= high)
+    if not fits:
+        raise ValueError(f"nodata must be one of {np.dtype(dtype)}, as the values are, got {nodata!r}")
+    return np.array([number], dtype)
 
 
 def _plane_points(polygons: Polygons) -> npt.NDArray[Any]:
@@ -257,6 +294,6 @@ def _fill_planes(ids: I32, points_px: F64, triangles: I32, values: F64, view: Vi
         run_parts(valued.list_planes, n, n_threads)
 
     def fill_rows(first: int, end: int) -> None:
-        valued.fill_planes(ids, canvas, first, end - first)
+        valued.fill_planes(ids, canvas, first, end - first, *view.origin)
 
     run_parts(fill_rows, ids.shape[0], n_threads)

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from topleft._base.arrays import as_size
+from topleft._base.arrays import as_real, as_size, shown
+from topleft._base.options import check_choice
 from topleft._model.adapt import MeshLike, Polygons, as_polygons
 
 F64 = npt.NDArray[np.float64]
@@ -60,8 +61,7 @@ class Grid:
                 f"extent must be finite with x_min < x_max and y_min < y_max, got {x_min}, {x_max}, {y_min}, {y_max}"
             )
         object.__setattr__(self, "extent", (x_min, x_max, y_min, y_max))
-        if self.y not in ("up", "down"):
-            raise ValueError(f'y must be "up" or "down", got {self.y!r}')
+        check_choice("y", self.y, ("up", "down"))
 
     @classmethod
     def around(
@@ -96,6 +96,50 @@ class Grid:
             is outside its range.
         """
         return grid_around(as_polygons(subject), size, pixel_size, extent, y)
+
+    @classmethod
+    def from_transform(cls, transform: Any, size: int | tuple[int, int]) -> Grid:
+        """The grid of a raster of rasterio, GDAL or a world file.
+
+        Parameters
+        ----------
+        transform : affine.Affine, or six numbers (a, b, c, d, e, f)
+            x = a column + b row + c and y = d column + e row + f, from corners of pixels: rasterio's `src.transform`.
+            GDAL's `GetGeoTransform()` has them in another order: (c, a, b, f, d, e).
+        size : (width, height), pixels
+            rasterio's `src.width, src.height`.
+
+        Raises
+        ------
+        ValueError
+            If the grid is turned, sheared or mirrored (b or d is not 0, or a is not positive).
+        TypeError
+            If these are no numbers.
+
+        Examples
+        --------
+        >>> Grid.from_transform((0.5, 0.0, 500000.0, 0.0, -0.5, 11.0), (4, 2))
+        Grid(size=(4, 2), extent=(500000.0, 500002.0, 10.0, 11.0), y='up')
+        """
+        numbers = as_real("transform", transform).ravel()
+        if len(numbers) not in (6, 9) or not np.isfinite(numbers).all():
+            raise ValueError(f"transform must be six finite numbers (a, b, c, d, e, f), got {shown(transform)}")
+        a, b, c, d, e, f = numbers[:6].tolist()
+        if b or d or a <= 0 or e == 0:
+            raise ValueError(
+                f"transform must neither turn nor mirror: b = d = 0, a > 0, e not 0, got {(a, b, c, d, e, f)}"
+            )
+        width, height = as_size(size, smallest=1)
+        y_first, y_last = f, f + e * height
+        extent = (c, c + a * width, min(y_first, y_last), max(y_first, y_last))
+        return cls((width, height), extent, "up" if e < 0 else "down")
+
+    @property
+    def transform(self) -> tuple[float, float, float, float, float, float]:
+        """(a, b, c, d, e, f) as `from_transform` takes it: ``affine.Affine(*grid.transform)`` for rasterio."""
+        x_min, _, y_min, y_max = self.extent
+        a, e = self.pixel_size
+        return (a, 0.0, x_min, 0.0, -e, y_max) if self.y == "up" else (a, 0.0, x_min, 0.0, e, y_min)
 
     @property
     def pixel_size(self) -> tuple[float, float]:
@@ -148,7 +192,10 @@ def grid_around(
     if pixel_size is None:
         return Grid(as_size(size), extent, y)
     x_min, x_max, y_min, y_max = Grid((1, 1), extent, y).extent
-    step = np.broadcast_to(np.asarray(pixel_size, np.float64), 2)
+    step = as_real("pixel_size", pixel_size)
+    if step.shape not in ((), (2,)):
+        raise ValueError(f"pixel_size must be one number or two, got {shown(pixel_size)}")
+    step = np.broadcast_to(step, 2)
     if not (np.isfinite(step).all() and (step > 0).all()):
         raise ValueError(f"pixel_size must be positive, got {pixel_size}")
     # A box of 3.0000000000000004 pixels, after the roundings of its sides, has three.

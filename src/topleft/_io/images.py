@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from topleft._base.arrays import as_array
+from topleft._base.arrays import as_array, as_path
 from topleft._base.whole_file import write_whole
 from topleft._io import png
 from topleft.errors import ImageError
@@ -58,10 +58,11 @@ def save_image(
     ----------
     path : path
         PNG, JPEG, WebP (lossless), TIFF, .npy or .npz, by the end of the name. A file of that name is replaced.
-    image : (H, W), (H, W, 3) or (H, W, 4) uint8
-        The picture. PNG also holds (H, W, 2) uint8, grey with alpha, and (H, W) uint16; TIFF also (H, W) of uint16,
-        int32 or float32, and (H, W, K) float32, a page for each channel. For .npy any array, for .npz any array or
-        several by name.
+    image : (H, W), (H, W, 3) or (H, W, 4) uint8, or (H, W) bool
+        The picture; a mask becomes 0 and 255. PNG also holds (H, W, 2) uint8, grey with alpha, and (H, W) uint16; TIFF
+        also (H, W) of uint16, int32 or float32, and (H, W, K) float32, a page for each channel. For .npy any array, for
+        .npz any array or several by name. PNG holds neither ids nor floats: they are refused, for they would have to be
+        scaled, which `ViewLayers.save` does (ids plus 1, distances in millimetres); .tif and .npy hold both.
     background : (3,) of 0 to 255
         What shows through in JPEG, which has no alpha.
     text : mapping of str to str, optional
@@ -74,7 +75,7 @@ def save_image(
     OSError
         If the file cannot be written.
     """
-    path = Path(path)
+    path = as_path("path", path)
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
         raise ImageError(f"cannot write {str(path)!r}: format {path.suffix!r} is none of {' '.join(SUFFIXES)}")
@@ -90,6 +91,8 @@ def save_image(
     if suffix == ".npy":
         write_whole(path, lambda file: np.save(file, picture, allow_pickle=False))
         return
+    if picture.dtype == np.bool_:
+        picture = np.where(picture, np.uint8(255), np.uint8(0))
     _check_holds(path, picture)
     if suffix == ".png":
         write_whole(path, lambda file: file.writelines(png.pieces(picture, text=text)))
@@ -125,6 +128,7 @@ def _check_holds(path: Path, image: npt.NDArray[Any]) -> None:
     if image.ndim < 2 or not found & set(kinds):
         raise ImageError(
             f"cannot write {str(path)!r}: {path.suffix} holds {', '.join(kinds)}; got {image.dtype} {image.shape}"
+            + "; .tif and .npy hold ids and floats" * (image.dtype.kind in "if")
         )
     if image.size == 0:
         raise ImageError(f"cannot write {str(path)!r}: a picture of shape {image.shape} has no pixels")

@@ -9,14 +9,14 @@ import os
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
 
+from topleft._base.arrays import as_path
 from topleft._io.notes import tell
 from topleft._io.references import MAX_TEXTURE_PIXELS, MAX_VERTICES, InputFile
-from topleft._model.adapt import DEFAULT_CREASE, joined
+from topleft._model.adapt import DEFAULT_CREASE, FILE_READERS, joined
 from topleft._model.mesh import Mesh, as_crease
 from topleft._model.points import Points
 from topleft.errors import MeshError, MissingPackageError
@@ -77,10 +77,13 @@ def load(
     of each format is told in docs/guide/files.md.
     """
     crease = as_crease(crease)
-    source = InputFile(Path(path), max_vertices=max_vertices, max_texture_pixels=max_texture_pixels)
+    source = InputFile(as_path("path", path), max_vertices=max_vertices, max_texture_pixels=max_texture_pixels)
     mesh = reading(source, lambda: _mesh(source, crease))
     tell(source.notes.lines, stacklevel=2)
     return mesh
+
+
+FILE_READERS.append(load)
 
 
 def _mesh(source: InputFile, crease: float) -> Mesh | Points:

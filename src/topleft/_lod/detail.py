@@ -14,6 +14,7 @@ pixels, shear, the edge of the frame and instances that are scaled are in the ma
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
@@ -21,7 +22,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from topleft._camera.camera import Camera
+from topleft._base.arrays import as_number, as_size
+from topleft._camera.camera import Camera, CameraLike, as_camera
 from topleft._lod.levels import Level
 from topleft._lod.simplify import levels_of
 from topleft._model.adapt import MeshLike, as_mesh
@@ -68,8 +70,8 @@ class Detail:
 
 def choose_detail(
     mesh: MeshLike,
-    camera: Camera,
-    size: tuple[int, int],
+    camera: CameraLike,
+    size: int | tuple[int, int],
     *,
     tolerance: float,
     cull: str = "none",
@@ -120,7 +122,8 @@ def choose_detail(
     >>> tl.choose_detail(cube, tl.Camera.framing(cube), (64, 48), tolerance=0).level
     0
     """
-    mesh = as_mesh(mesh)
+    mesh, camera, size = as_mesh(mesh), as_camera(camera), as_size(size)
+    viewport = None if viewport is None else as_size(viewport, "viewport", smallest=1)
     tolerance = check_tolerance(tolerance)
     n = len(mesh.triangles)
 
@@ -152,7 +155,7 @@ def choose_detail(
 
 def check_tolerance(tolerance: float) -> float:
     """The tolerance, if it is one."""
-    if not (np.isfinite(tolerance) and tolerance >= 0):
+    if not 0 <= as_number("tolerance", tolerance) < math.inf:
         raise ValueError(f"tolerance must be at least 0 pixels, got {tolerance!r}")
     return float(tolerance)
 

@@ -7,7 +7,8 @@ Input: `trimesh.Trimesh` and `trimesh.Scene`, `meshio.Mesh`, `pyvista.PolyData` 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import os
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Any, NamedTuple, TypeAlias
 
@@ -28,6 +29,9 @@ more stay round."""
 
 MeshLike: TypeAlias = Any
 """What `as_mesh` takes."""
+
+FILE_READERS: list[Callable[[str | os.PathLike[str]], Mesh]] = []
+"""What reads a mesh where a path is given: `load`, which puts itself here, for it stands on a floor above this one."""
 
 CORNERS_OF_CELL = {"triangle": 3, "triangle6": 3, "triangle7": 3, "quad": 4, "quad8": 4, "quad9": 4, "polygon": None}
 """Corners of the surface cells of meshio, which come first in a row; `None`: all of the row. Of curved cells the points
@@ -79,7 +83,7 @@ def as_mesh(subject: MeshLike, *, crease: float = DEFAULT_CREASE) -> Mesh:
 
     Parameters
     ----------
-    subject : Mesh, trimesh.Trimesh, trimesh.Scene, meshio.Mesh, pyvista.PolyData, matplotlib.tri.Triangulation
+    subject : Mesh, path, trimesh.Trimesh, trimesh.Scene, meshio.Mesh, pyvista.PolyData, matplotlib.tri.Triangulation
         Or pyvista.UnstructuredGrid, or anything with `vertices` and `triangles` or `faces`, or a pair (vertices,
         triangles). Faces are (T, 3), (F, K) with K corners each, or a list of lists.
 
@@ -90,7 +94,8 @@ def as_mesh(subject: MeshLike, *, crease: float = DEFAULT_CREASE) -> Mesh:
     Returns
     -------
     Mesh
-        Vertices share the memory of the subject's where they are float32 or float64 (V, 3). Flat points get z = 0.
+        Of a path what `load` reads. Vertices share the memory of the subject's where they are float32 or float64
+        (V, 3). Flat points get z = 0.
         Faces with more corners, concave ones too, are cut into triangles, in the order of the faces; masked triangles
         are left out. Curved cells of meshio and VTK (triangle6, quad8, ...) are drawn straight, from corner to corner.
         Of solid cells (tetra, hexahedron, wedge, pyramid) comes the skin: the sides that no second cell has. Of
@@ -111,6 +116,8 @@ def as_mesh(subject: MeshLike, *, crease: float = DEFAULT_CREASE) -> Mesh:
     """
     if isinstance(subject, Mesh):
         return subject
+    if isinstance(subject, str | os.PathLike) and FILE_READERS:
+        return FILE_READERS[0](subject)
     crease = as_crease(crease)
     if _is_scene(subject):
         nodes = [subject.graph[node] for node in subject.graph.nodes_geometry]
@@ -138,7 +145,7 @@ def as_polygons(subject: MeshLike) -> Polygons:
     ValueError
         If it has no faces that are surfaces.
     """
-    if _is_scene(subject):
+    if _is_scene(subject) or isinstance(subject, str | os.PathLike):
         subject = as_mesh(subject)
     if hasattr(subject, "x") and hasattr(subject, "y") and hasattr(subject, "triangles"):
         return _of_triangulation(subject)
@@ -164,6 +171,10 @@ def as_polygons(subject: MeshLike) -> Polygons:
 
 def is_mesh_like(subject: object) -> bool:
     """Whether a subject has faces, rather than being an array of points."""
+    if isinstance(subject, str | os.PathLike):
+        return True
+    if isinstance(subject, tuple) and len(subject) == 2:  # (vertices, triangles), not two points
+        return all(hasattr(part, "__len__") and len(part) > 0 and hasattr(part[0], "__len__") for part in subject)
     return _is_scene(subject) or any(hasattr(subject, name) for name in ("triangles", "faces", "cells"))
 
 
@@ -173,6 +184,8 @@ def _is_scene(subject: object) -> bool:
 
 def _plain(vertices: npt.ArrayLike, triangles: npt.ArrayLike) -> Polygons:
     points = as_array("vertices", vertices)
+    if points.ndim != 2 or points.shape[1] not in (2, 3):
+        raise ValueError(f"points must have shape (V, 2) or (V, 3), got {points.shape}")
     if isinstance(triangles, list | tuple) and len({np.size(face) for face in triangles}) > 1:
         n_corners = np.array([np.size(face) for face in triangles])
         corners = np.concatenate([np.asarray(face).ravel() for face in triangles])
@@ -182,7 +195,7 @@ def _plain(vertices: npt.ArrayLike, triangles: npt.ArrayLike) -> Polygons:
     corners = as_array("triangles", triangles)
     if corners.ndim == 2 and corners.shape[1] > 3 and corners.dtype.kind in "iu":
         return _of_blocks(points, [corners])
-    return Polygons(points, corners, None, len(corners))
+    return Polygons(points, corners, None, corners.shape[0] if corners.ndim else 0)
 
 
 def _of_triangulation(subject: Any) -> Polygons:

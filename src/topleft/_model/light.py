@@ -6,13 +6,14 @@ Engine", SIGGRAPH 2006 courses (the half-Lambert fall-off of the headlight, ther
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
 import numpy.typing as npt
 
-from topleft._base.arrays import as_vector
+from topleft._base.arrays import as_number, as_vector
 from topleft._base.color import Color, as_color
 from topleft._base.options import parse
 
@@ -117,7 +118,7 @@ class Fog:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "color", as_color("color", self.color, 3))
-        if not (np.isfinite([self.near, self.far]).all() and self.near < self.far):
+        if not -math.inf < as_number("near", self.near) < as_number("far", self.far) < math.inf:
             raise ValueError(f"near and far must be finite and near < far, got {self.near} and {self.far}")
 
 
@@ -129,6 +130,6 @@ def as_not_negative(name: str, value: float) -> float:
     ValueError
         If it is negative or not finite.
     """
-    if not (np.isfinite(value) and value >= 0):
+    if not 0 <= as_number(name, value) < math.inf:
         raise ValueError(f"{name} must be finite and not negative, got {value!r}")
     return float(value)

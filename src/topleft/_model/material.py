@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from enum import StrEnum
 
+from topleft._base.arrays import as_number, as_vector
 from topleft._base.color import Color, as_color
 from topleft._base.options import parse
 from topleft._model.light import as_not_negative
@@ -95,6 +96,17 @@ class Material:
     normal_texture: Texture | None = None
     normal_scale: float = 1.0
 
+    def __repr__(self) -> str:
+        """One line: what differs from a plain material."""
+        own = ((one.name, getattr(self, one.name), one.default) for one in fields(self))
+        told = (
+            (name, str(value) if isinstance(value, str) else value)
+            for name, value, plain in own
+            if value not in (plain, AlphaMode.OPAQUE)
+        )
+        words = (f"{name}={value!r}" for name, value in told)
+        return f"Material({', '.join(words)})"
+
     def __post_init__(self) -> None:
         keep = object.__setattr__  # the dataclass is frozen, and its values are coerced
         for name in ("color", "back_color"):
@@ -106,11 +118,11 @@ class Material:
             if getattr(self, name) is not None:
                 keep(self, name, as_not_negative(name, getattr(self, name)))
         for name in ("specular", "alpha_cutoff", "opacity", "metallic", "roughness", "occlusion_strength"):
-            if not 0 <= (getattr(self, name) or 0.0) <= 1:
-                raise ValueError(f"{name} must lie in 0 to 1, got {getattr(self, name)!r}")
-        keep(self, "emission", tuple(as_not_negative("emission", value) for value in self.emission))
-        if len(self.emission) != 3:
-            raise ValueError(f"emission must be three numbers, got {len(self.emission)}")
+            value = getattr(self, name)
+            if value is not None and not 0 <= as_number(name, value) <= 1:
+                raise ValueError(f"{name} must lie in 0 to 1, got {value!r}")
+        emission = as_vector("emission", self.emission).tolist()
+        keep(self, "emission", tuple(as_not_negative("emission", value) for value in emission))
         if self.alpha_mode is None:
             keep(self, "alpha_mode", AlphaMode.OPAQUE if self.alpha_cutoff is None else AlphaMode.MASK)
         keep(self, "alpha_mode", parse(AlphaMode, "alpha_mode", self.alpha_mode))

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from topleft._base.arrays import as_array, as_checked_triangles
+from topleft._base.arrays import as_array, as_checked_triangles, shown
 from topleft._model.material import Material
 from topleft._model.normals import CornerNormals, angle_weighted_normals, box_of_triangles, creased_normals
 from topleft._model.texture import Texture
@@ -114,6 +114,13 @@ class Mesh:
         if self.material_of_triangle is not None:
             rows = _material_rows(self.material_of_triangle, len(triangles), len(self.materials))
             keep(self, "material_of_triangle", read_only(rows))
+
+    def __repr__(self) -> str:
+        """One line: how much there is of what."""
+        words = [f"{len(self.vertices):,} vertices", f"{len(self.triangles):,} triangles"]
+        words += [name for name in ("normals", "colors", "uv") if getattr(self, name) is not None]
+        words += [f"{len(self.materials)} material{'s' * (len(self.materials) > 1)}"] if self.materials else []
+        return f"Mesh({', '.join(words)})"
 
     def _repr_png_(self) -> bytes | None:
         from topleft._render.notebook import png_of_mesh  # which imports this module
@@ -390,6 +397,10 @@ def _uv_array(name: str, values: npt.ArrayLike, n_vertices: int) -> F32:
 
 
 def _material_tuple(values: Iterable[Material]) -> tuple[Material, ...]:
+    if isinstance(values, Material):
+        return (values,)
+    if not isinstance(values, Iterable) or isinstance(values, np.ndarray):
+        raise TypeError(f"materials must be a sequence of Material, got {shown(values)}")
     materials = tuple(values)
     for value in materials:
         if not isinstance(value, Material):

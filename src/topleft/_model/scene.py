@@ -9,11 +9,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
+from html import escape
 
 import numpy as np
 import numpy.typing as npt
 
-from topleft._base.arrays import INT32_MAX, as_square, check_regular
+from topleft._base.arrays import INT32_MAX, as_square, check_regular, shown
+from topleft._model.adapt import MeshLike, as_mesh, is_mesh_like
 from topleft._model.mesh import Mesh, extreme_points, used_vertices
 from topleft._raster.clusters import Backoff
 
@@ -48,13 +50,21 @@ class Instance:
 
     def __post_init__(self) -> None:
         if not isinstance(self.mesh, Mesh):
-            raise TypeError(f"an instance needs a Mesh, got {type(self.mesh).__name__}")
+            raise TypeError(f"mesh must be a Mesh, got {shown(self.mesh)}: topleft.as_mesh makes one of others")
+        if not isinstance(self.name, str | None):
+            raise TypeError(f"name must be a str or None, got {shown(self.name)}")
         matrix = as_square("transform", self.transform, 4)
         if not np.array_equal(matrix[3], [0, 0, 0, 1]):
             raise ValueError(f"the last row of transform must be [0, 0, 0, 1], got {matrix[3].tolist()}")
         check_regular("transform", matrix)
         matrix.flags.writeable = False
         object.__setattr__(self, "transform", matrix)
+
+    def __repr__(self) -> str:
+        """One line: the mesh and where its origin stands."""
+        place = ", ".join(f"{x:.4g}" for x in self.transform[:3, 3])
+        name = "" if self.name is None else f", name={self.name!r}"
+        return f"Instance({self.mesh!r}, at=({place}){name})"
 
     @property
     def is_mirrored(self) -> bool:
@@ -68,8 +78,9 @@ class Scene:
 
     Parameters
     ----------
-    instances : iterable of Instance, Mesh, (Mesh, transform) or (Mesh, transform, name)
-        At least one. A mesh by itself stands where its vertices are.
+    instances : iterable of Instance, mesh, (mesh, transform) or (mesh, transform, name)
+        At least one. A mesh is whatever `as_mesh` takes: a `Mesh`, a path, a mesh of trimesh, (vertices, triangles).
+        By itself it stands where its vertices are. What is to be shared by several instances is made a `Mesh` first.
 
     Raises
     ------
@@ -93,12 +104,24 @@ class Scene:
 
     instances: tuple[Instance, ...]
 
-    def __init__(self, instances: Iterable[Instance | Mesh | tuple[object, ...]]) -> None:
+    def __init__(self, instances: Iterable[Instance | MeshLike | tuple[object, ...]]) -> None:
+        if isinstance(instances, Mesh | str | np.ndarray) or not isinstance(instances, Iterable):
+            raise TypeError(f"instances must be a sequence of meshes, got {shown(instances)}: Scene([mesh])")
         object.__setattr__(self, "instances", tuple(map(as_instance, instances)))
         if not self.instances:
             raise ValueError("a scene needs at least one instance, got none")
         if self.n_triangles > INT32_MAX:
             raise ValueError(f"a scene must have at most {INT32_MAX} triangles, got {self.n_triangles}")
+
+    def _repr_html_(self) -> str:
+        """A table of the instances, the first hundred of them."""
+        rows = [
+            (i, one.name or "", len(one.mesh.vertices), len(one.mesh.triangles), one.transform[:3, 3].round(4).tolist())
+            for i, one in enumerate(self.instances[:100])
+        ]
+        head = "".join(f"<th>{escape(name)}</th>" for name in ("", "name", "vertices", "triangles", "at"))
+        body = "".join("<tr>" + "".join(f"<td>{escape(str(cell))}</td>" for cell in row) + "</tr>" for row in rows)
+        return f"<p>{escape(repr(self))}</p><table><tr>{head}</tr>{body}</table>"
 
     def __len__(self) -> int:
         return len(self.instances)
@@ -159,13 +182,34 @@ def as_instance(value: object) -> Instance:
     """Return an instance of what a scene is made from."""
     if isinstance(value, Instance):
         return value
-    if isinstance(value, Mesh):
-        return Instance(value)
-    if isinstance(value, tuple) and 2 <= len(value) <= 3:
-        return Instance(*value)
+    if isinstance(value, Scene):
+        raise TypeError("instances must be meshes, got a Scene: Scene([*scene, mesh]) joins them")
+    if isinstance(value, tuple) and 2 <= len(value) <= 3 and not is_pair(value):
+        mesh, *place = value
+        if is_subject(mesh):
+            return Instance(as_mesh(mesh), *place)
+    elif is_subject(value):
+        return Instance(as_mesh(value))
     raise TypeError(
-        f"instances must be Instance, Mesh, (Mesh, transform) or (Mesh, transform, name), got {type(value).__name__}"
+        "instances must be Instance, a mesh, (mesh, transform) or (mesh, transform, name), a mesh being a Mesh, a "
+        f"path, a mesh of another library or (vertices, triangles), got {shown(value)}"
     )
+
+
+def is_subject(value: object) -> bool:
+    """Whether `as_mesh` is to be asked what it makes of it."""
+    return isinstance(value, Mesh) or is_mesh_like(value) or is_pair(value) or hasattr(value, "vertices")
+
+
+def is_pair(value: object) -> bool:
+    """Whether it is (vertices, triangles), and not (mesh, transform)."""
+    if not isinstance(value, tuple | list) or len(value) != 2:
+        return False
+    try:
+        first, second = (np.shape(part) for part in value)
+    except ValueError:  # polygons of several numbers of corners
+        return not is_mesh_like(value[0])
+    return len(first) == 2 and first[1] in (2, 3) and len(second) == 2
 
 
 def world_corners(instance: Instance) -> F64:

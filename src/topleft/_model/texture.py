@@ -109,8 +109,8 @@ class Texture:
         keep = object.__setattr__  # the dataclass is frozen, and its values are coerced
         keep(self, "image", as_image("image", self.image))
         keep(self, "filter", parse(Filter, "filter", self.filter))
-        both = (self.wrap, self.wrap) if isinstance(self.wrap, str) else tuple(self.wrap)
-        if len(both) != 2:
+        both = (self.wrap, self.wrap) if isinstance(self.wrap, str) else self.wrap
+        if not isinstance(both, tuple | list) or len(both) != 2:
             raise ValueError(f"wrap must be one word, or two for u and v, got {self.wrap!r}")
         keep(self, "wrap", tuple(parse(Wrap, "wrap", one) for one in both))
         keep(self, "encoding", parse(Encoding, "encoding", self.encoding))
@@ -122,6 +122,12 @@ class Texture:
                 raise ValueError(f"transform must be (2, 3) finite numbers, got shape {matrix.shape}")
             matrix.flags.writeable = False
             keep(self, "transform", matrix)
+
+    def __repr__(self) -> str:
+        """One line: its size and how it is looked up."""
+        height, width = self.image.shape[:2]
+        wraps = list(dict.fromkeys(map(str, self.wrap)))
+        return f"Texture({width}x{height}, filter={str(self.filter)!r}, wrap={'/'.join(wraps)!r})"
 
     @cached_property
     def engine(self) -> _engine.Mipmap:

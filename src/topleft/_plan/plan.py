@@ -14,11 +14,11 @@ from typing import Any, Unpack
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from topleft._base.arrays import as_triangles
+from topleft._base.arrays import as_names, as_size, as_triangles
 from topleft._base.memory import KeptMemory
 from topleft._base.options import DepthTest, Sampling, parse
 from topleft._camera.camera import Camera
-from topleft._lod.detail import choose_detail
+from topleft._lod.detail import check_tolerance, choose_detail
 from topleft._model.adapt import MeshLike
 from topleft._model.mesh import Mesh
 from topleft._plan.costs import load_costs
@@ -313,7 +313,7 @@ def plan(
     >>> tl.rasterize(square, halves, (300, 300), plan=flat).triangle[1, :4]
     array([1, 0, 0, 0], dtype=int32)
     """
-    wanted = (outputs,) if isinstance(outputs, str) else tuple(outputs)
+    wanted = as_names("outputs", outputs)
     verb = find_verb(wanted)
     test = None if depth_test is None else parse(DepthTest, "depth_test", depth_test)
     options = ViewOptions(**view)
@@ -321,8 +321,9 @@ def plan(
         raise TypeError("plan takes no plan=")
     detail: tuple[Stage, ...] = ()
     mesh: Mesh | None = None
+    tolerance = check_tolerance(tolerance)
     if isinstance(triangles, Camera):
-        mesh, stage = plan_mesh(vertices, triangles, size, tolerance, options)
+        mesh, stage = plan_mesh(vertices, triangles, as_size(size), tolerance, options)
         detail, vertices, triangles = (stage,), mesh.vertices, mesh.triangles
     elif tolerance:
         raise ValueError("tolerance needs a mesh and a camera in the place of vertices and triangles")

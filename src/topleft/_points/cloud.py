@@ -17,7 +17,7 @@ import numpy.typing as npt
 from topleft._base.color import DEFAULT_COLOR, LINEAR_ONE, light_of, srgb_tables
 from topleft._base.memory import FreshMemory
 from topleft._base.options import PointShape
-from topleft._camera.camera import Camera
+from topleft._camera.camera import Camera, CameraLike, as_camera
 from topleft._model.light import TO_HEADLIGHT, Light, LightKind, LightSpace
 from topleft._model.normals import moved, unit_or_zero
 from topleft._model.points import Points, PointUnit
@@ -40,10 +40,12 @@ NOWHERE_PX = 1e12
 """Where points stand that a lens does not see: no window shows it."""
 
 
-def framing_of(cloud: Points, camera: Camera | None, size: tuple[int, int]) -> Camera:
+def framing_of(cloud: Points, camera: CameraLike | None, size: tuple[int, int]) -> Camera:
     """The camera, or the three-quarter view of the cloud."""
     width, height = size
-    return camera or Camera.framing(cloud, aspect=width / height if width > 0 and height > 0 else 1.0)
+    if camera is not None:
+        return as_camera(camera)
+    return Camera.framing(cloud, aspect=width / height if width > 0 and height > 0 else 1.0)
 
 
 def draw_cloud(

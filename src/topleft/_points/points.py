@@ -72,7 +72,7 @@ class PointFragments(Fragments):
         """Raise a `ValueError`: a point has no corners."""
         raise ValueError("points have no barycentric weights")
 
-    def interpolate(self, values: ArrayLike, *, background: float = 0.0) -> NDArray[np.float32]:
+    def interpolate(self, values: Any, *, background: float = 0.0, derivatives: bool = False) -> Any:
         """Return an attribute of the points at each visible pixel.
 
         Parameters
@@ -81,6 +81,8 @@ class PointFragments(Fragments):
             Used as float32.
         background : float
             Value where there is no point.
+        derivatives : bool
+            Points have none: True is refused.
 
         Returns
         -------
@@ -89,8 +91,10 @@ class PointFragments(Fragments):
         Raises
         ------
         ValueError
-            If the number of rows is not that of the points.
+            If the number of rows is not that of the points, or derivatives are asked for.
         """
+        if derivatives:
+            raise ValueError("derivatives are those of triangles: a point has one value")
         array = np.asarray(values, np.float32)
         if array.ndim not in (1, 2) or len(array) != self._n_vertices:
             raise ValueError(

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine
-from topleft._base.arrays import as_array, as_background, as_out
+from topleft._base.arrays import as_array, as_background, as_number, as_out
 from topleft._base.options import Per, parse
 from topleft._base.threads import available_threads, parse_threads, run_parts
 from topleft._raster.peel import DepthLayers
@@ -134,7 +134,7 @@ def as_palette(colors: ArrayLike, opacity: float | None) -> NDArray[Any]:
             f"(H, W, K, C), got {array.shape}"
         )
     if opacity is not None:
-        if not 0 <= opacity <= 1:
+        if not 0 <= as_number("opacity", opacity) <= 1:
             raise ValueError(f"opacity must lie in 0 to 1, got {opacity}")
         alpha = np.rint(255 * opacity) if array.dtype == np.uint8 else opacity
         array = np.concatenate([array, np.full((*array.shape[:-1], 1), alpha, array.dtype)], -1)

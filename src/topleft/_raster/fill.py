@@ -6,15 +6,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from topleft import _engine
-from topleft._base.arrays import as_background, as_colors
+from topleft._base.arrays import as_array, as_background, as_colors, shown
 from topleft._base.memory import Memory
 from topleft._base.options import Alpha, Blend, Per, Sampling, Sink, parse
 from topleft._base.threads import run_parts
 from topleft._raster import choices
-from topleft._raster.classic import fill_classic
+from topleft._raster.classic import fill_classic, refuse_classic
 from topleft._raster.rasterize import canvas_of, draw, draw_all_samples
 from topleft._raster.resolve import parse_resolve, resolve_colors, resolve_flat, resolve_gouraud
 from topleft._raster.sampling import draw_means, sample_positions
@@ -35,6 +35,7 @@ class Style:
     blend: str
     alpha: str
     resolve: str
+    dtype: DTypeLike | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,6 +86,8 @@ def draw_fill(
         raise ValueError(
             f"sampling {str(view.sampling)!r} gives no order: fill takes 'center', 'msaa2' to 'msaa16' and 'area'"
         )
+    if style.dtype is not None:
+        return draw_labels(memory, vertices, triangles, colors, view, style, out)
     palette = as_colors(colors)
     blending = Blending.parse(style.blend, style.alpha, palette, view)
     transfer = parse_resolve(style.resolve, palette, view, is_straight=blending.is_straight)
@@ -112,6 +115,50 @@ def draw_fill(
         else:
             paint(memory, snapped, view, palette, canvas, is_flat=is_flat)
     view.mark("shade")
+    return result
+
+
+def draw_labels(
+    memory: Memory, vertices: ArrayLike, triangles: ArrayLike, labels: ArrayLike, view: View, style: Style, out: object
+) -> NDArray[Any]:
+    """`fill` with integers that are no colours: each pixel has exactly the label of its triangle."""
+    try:
+        dtype = np.dtype(style.dtype)
+    except (TypeError, ValueError):
+        raise TypeError(f"dtype must be one of integers, for labels, got {shown(style.dtype)}") from None
+    if dtype.kind not in "iub":
+        raise TypeError(f"dtype must be one of integers, for labels, got {dtype}")
+    array = as_array("colors", labels)
+    if array.dtype.kind not in "iub" or array.ndim not in (1, 2):
+        raise TypeError(f"colors must be integers of shape (T,) or (T, C) with dtype=, got {array.dtype} {array.shape}")
+    own = array.astype(dtype)
+    if not np.array_equal(own, array):
+        raise ValueError(f"colors must fit {dtype}, got {array.min()}..{array.max()}")
+    wishes = (
+        ("per", style.per, ("auto", "triangle")), ("blend", style.blend, ("replace",)),
+        ("sampling", str(view.sampling), ("center",)),
+    )  # fmt: skip
+    for name, value, choices_of in wishes:
+        if value not in choices_of:
+            raise ValueError(f"{name} must be {choices_of[-1]!r} for labels, which do not mix, got {value!r}")
+    refuse_classic(view, "labels")
+    snapped = snap_mesh(memory, vertices, triangles, view, with_depth=False, out=out)
+    if len(own) != snapped.n_triangles:
+        raise ValueError(f"colors must have {snapped.n_triangles} rows, one per triangle, for labels, got {len(own)}")
+    ground = as_array("background", 0 if style.background is None else style.background)
+    if ground.shape not in ((), own.shape[1:]) or not np.array_equal(ground.astype(dtype), ground):
+        raise ValueError(f"background must be one {dtype}, or one for each channel, got {shown(style.background)}")
+    ids: NDArray[np.int32] = memory.empty("labels", view.size[::-1], np.int32)
+    draw(memory, snapped, view, choices.drawing(view, snapped, Sink.LABEL), ids)
+    if 0 in view.size or not snapped.n_triangles:
+        ids[...] = -1
+    shape = (*ids.shape, *own.shape[1:])
+    with canvas_of(memory, "fill", out, shape, dtype.type, keep=style.background is None) as (result, canvas):
+        if out is not None and style.background is None:
+            canvas[ids >= 0] = own[ids[ids >= 0]]
+        else:
+            rows = np.concatenate([own, np.broadcast_to(ground.astype(dtype), (1, *own.shape[1:]))])
+            np.take(rows, ids, axis=0, out=canvas, mode="wrap")  # id -1 is the last
     return result
 
 

@@ -4,18 +4,63 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal, NamedTuple, Protocol, Self, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine
-from topleft._base.arrays import as_values
+from topleft._base.arrays import as_array, as_number, as_values, shown
+from topleft._base.texels import as_texels, look_up
 
-__all__ = ["Fragments"]
+__all__ = ["Corners", "Fragments", "FragmentsBatch", "as_sample", "view_of"]
 
 #: Makes the snapped mesh that attributes of some triangles need: these are snapped, no others.
 PartOfMesh = Callable[..., _engine.SnappedMesh]
+
+
+class Viewer(Protocol):
+    """What `distance` asks of a camera."""
+
+    @property
+    def view(self) -> NDArray[np.float64]:
+        """Eye from world, (4, 4)."""
+
+
+class Corners(NamedTuple):
+    """What a visibility buffer was drawn from, as it was given: what changes from pixel to pixel is found in it."""
+
+    vertices: ArrayLike
+    triangles: ArrayLike
+    transform: ArrayLike | None
+    viewport: tuple[int, int]
+
+    def homogeneous(self, ids: NDArray[np.int32]) -> NDArray[np.float64]:
+        """Corners of triangles (N, 3, 3) float64 as (x w, y w, w), x and y in pixels, not snapped."""
+        rows = np.asarray(as_array("triangles", self.triangles))[ids].astype(np.intp)
+        points = as_array("vertices", self.vertices)[rows].astype(np.float64)
+        if self.transform is not None:
+            matrix = np.asarray(as_array("transform", self.transform), np.float64)
+            points = points @ matrix[:, :3].T + matrix[:, 3]
+        if points.shape[-1] < 4:
+            return np.stack([points[..., 0], points[..., 1], np.ones(points.shape[:-1])], axis=-1)
+        (width, height), (x, y, _, w) = self.viewport, np.moveaxis(points, -1, 0)
+        return np.stack([(w + x) * (width / 2), (w - y) * (height / 2), w], axis=-1)
+
+    def slopes(self, ids: NDArray[np.int32], weights: NDArray[np.float64]) -> NDArray[np.float64]:
+        """What the weights (P, 3) of pixels in their triangles (P,) change by along x and y, (P, 3, 2) float64.
+
+        The weights are l / (l0 + l1 + l2), and l = M^-1 (x, y, 1), where the columns of M are the corners.
+        """
+        unique, of_unique = np.unique(ids, return_inverse=True)
+        corners = self.homogeneous(unique)
+        crossed = np.cross(np.roll(corners, -1, axis=1), np.roll(corners, -2, axis=1))
+        area = np.einsum("nk,nk->n", corners[:, 0], crossed[:, 0])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            steps = (crossed[..., :2] / area[:, None, None])[of_unique]
+            w = np.einsum("pk,pk->p", weights, corners[of_unique][..., 2])
+            slopes = w[:, None, None] * (steps - weights[..., None] * steps.sum(axis=1)[:, None, :])
+        return np.nan_to_num(slopes, nan=0.0, posinf=0.0, neginf=0.0)  # of triangles without area before the snap
 
 
 class Fragments:
@@ -41,6 +86,8 @@ class Fragments:
 
     #: Fragments of each sample when there are several.
     _samples: tuple[Fragments, ...] = ()
+    #: What it was drawn from; None where that is not kept.
+    corners: Corners | None = None
     #: Ids and depth of these, (S, H, W).
     _planes: tuple[NDArray[np.int32], NDArray[np.float32]] | None = None
 
@@ -57,6 +104,13 @@ class Fragments:
         self._snapped_or_maker = snapped
         self._n_vertices = n_vertices
         self._n_triangles = n_triangles
+
+    def drawn_from(self, corners: Corners) -> Self:
+        """Keep what it was drawn from, for derivatives and distances; returns itself."""
+        self.corners = corners
+        for sample in self._samples:
+            sample.corners = corners
+        return self
 
     def __repr__(self) -> str:
         height, width = self.triangle.shape
@@ -115,15 +169,133 @@ class Fragments:
         frags._planes = triangle, depth
         return frags
 
-    def sample(self, i: int) -> Fragments:
+    @overload
+    def sample(self, texture: int) -> Fragments: ...
+    @overload
+    def sample(
+        self,
+        texture: object,
+        uv: Any,
+        *,
+        filter: str = "trilinear",
+        wrap: str | tuple[str, str] = "repeat",
+        encoding: str | None = None,
+        background: float = 0.0,
+    ) -> NDArray[np.float32]: ...
+    def sample(
+        self,
+        texture: Any,
+        uv: Any = None,
+        *,
+        filter: str = "trilinear",  # noqa: A002
+        wrap: str | tuple[str, str] = "repeat",
+        encoding: str | None = None,
+        background: float = 0.0,
+    ) -> Any:
+        """Return a texture at each visible pixel; or, of a number alone, the fragments at that sample of each pixel.
+
+        Parameters
+        ----------
+        texture : Texture, or array_like of real numbers, shape (H, W) or (H, W, C); or int
+            Any number of channels. Row 0 is the top, where v = 1; bytes are taken as 0 to 1. A `Texture` says itself
+            what follows. A number without `uv`: ids, depth and attributes at that sample, with several a pixel.
+        uv : array_like, shape (V, 2) per vertex or (T, 3, 2) per corner; of a scene one for each instance
+            Where the vertices lie in the texture: u from left to right, v from the bottom up, 0 to 1.
+        filter : {"trilinear", "bilinear", "nearest"}
+            "trilinear": between texels, and between the two halvings next to the longer side of the pixel's footprint,
+            which is that of the analytic derivatives of `uv`.
+        wrap : {"repeat", "clamp", "mirror"}, or a pair of them for u and v
+            What lies beyond 0 and 1.
+        encoding : {"linear", "srgb"}, optional
+            "linear", unless given: values are taken as they are. "srgb": the first three channels are decoded, and
+            what is returned is light.
+        background : float
+            Value where there is no triangle.
+
+        Returns
+        -------
+        ndarray of float32, shape (H, W, C), or (H, W) for a texture of shape (H, W)
+            Of a `Texture` linear light and opacity, (H, W, 4), 0 to 1.
+
+        Raises
+        ------
+        ValueError
+            If a shape does not fit or an option is unknown.
+        TypeError
+            If the texture holds no real numbers.
+
+        References
+        ----------
+        L. Williams, Pyramidal Parametrics, 1983.
+
+        Examples
+        --------
+        >>> import topleft as tl
+        >>> frags = tl.rasterize([[0, 0], [4, 0], [0, 4]], [[0, 1, 2]], (4, 2))
+        >>> frags.sample([[0.0, 10.0]], [[0, 0], [1, 0], [0, 1]], filter="nearest")
+        array([[ 0.,  0., 10.,  0.],
+               [ 0.,  0.,  0.,  0.]], dtype=float32)
+        """
+        if uv is None:
+            return self._at_sample(texture)
+        texels, filter, wraps, is_flat = as_texels(texture, filter, wrap, encoding)  # noqa: A001
+        mask = self.mask
+        if filter == "trilinear":
+            found, slopes = self.interpolate(uv, derivatives=True)
+        else:
+            found, slopes = self.interpolate(uv), None
+        if found.shape[2:] != (2,):
+            raise ValueError(f"uv must have two columns, (V, 2) or (T, 3, 2), got {found.shape[2:] or 'one'}")
+        out = np.full((*mask.shape, texels.shape[2]), as_number("background", background), np.float32)
+        footprint = None if slopes is None else slopes[mask].astype(np.float64)
+        out[mask] = look_up(texels, found[mask].astype(np.float64), footprint, filter, wraps)
+        return out[..., 0] if is_flat else out
+
+    def _at_sample(self, i: int) -> Fragments:
         """Return ids, depth and attributes at one sample of each pixel."""
-        return (self._samples or (self,))[i]
+        samples = self._samples or (self,)
+        return samples[as_sample(i, len(samples))]
+
+    def distance(self, camera: Viewer) -> NDArray[np.float32]:
+        """Return the distance along the view of what each pixel shows ("metric z"), in units of the world.
+
+        Parameters
+        ----------
+        camera : Camera
+            Who looked.
+
+        Returns
+        -------
+        ndarray of float32, shape (H, W)
+            +inf where there is no triangle. Computed from the vertices, not from the depth buffer, so a far plane far
+            away costs no digits: the relative error is that of float32.
+
+        Raises
+        ------
+        ValueError
+            If the vertices were not given in the world: pixels, or clip space.
+
+        Examples
+        --------
+        >>> import topleft as tl
+        >>> mesh = tl.Mesh([[0, 0, -3], [1, 0, -3], [0, 1, -3]], [[0, 1, 2]])
+        >>> camera = tl.Camera.look_at((0, 0, 0), (0, 0, -1), near=1, far=9)
+        >>> tl.rasterize_mesh(mesh, camera, (4, 4)).distance(camera)[1].tolist()
+        [inf, inf, 3.0, inf]
+        """
+        view = view_of(camera)
+        if self.corners is None or self.corners.transform is None:
+            raise ValueError("distance needs vertices (V, 3) in the world, drawn with transform= or by rasterize_mesh")
+        points = np.asarray(as_array("vertices", self.corners.vertices), np.float64)
+        return self.interpolate(-(points @ view[2, :3] + view[2, 3]), background=np.inf)
 
     def only(self, rows: NDArray[np.intp], cols: NDArray[np.intp]) -> Fragments:
         """Return what is left when no other pixels than these show a triangle."""
         triangle = np.full_like(self.triangle, -1)
         triangle[rows, cols] = self.triangle[rows, cols]
-        return Fragments(triangle, self.depth, self._snapped_or_maker, self._n_vertices, self._n_triangles)
+        found = Fragments(triangle, self.depth, self._snapped_or_maker, self._n_vertices, self._n_triangles)
+        found.corners = self.corners
+        return found
 
     def barycentric(self) -> NDArray[np.float32]:
         """Return the weights of the three vertices of the triangle that shows in each pixel.
@@ -154,8 +326,18 @@ class Fragments:
         self._snapped.with_inverse_w(self.id.size).barycentric(self._ids(), out)
         return out
 
-    def interpolate(self, values: ArrayLike, *, background: float = 0.0) -> NDArray[np.float32]:
-        """Return an attribute of the vertices at each visible pixel.
+    @overload
+    def interpolate(
+        self, values: Any, *, background: float = 0.0, derivatives: Literal[False] = False
+    ) -> NDArray[np.float32]: ...
+    @overload
+    def interpolate(
+        self, values: Any, *, background: float = 0.0, derivatives: Literal[True]
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]: ...
+    def interpolate(
+        self, values: Any, *, background: float = 0.0, derivatives: bool = False
+    ) -> NDArray[np.float32] | tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Return an attribute of the vertices at each visible pixel, and what it changes by from pixel to pixel.
 
         Parameters
         ----------
@@ -163,11 +345,15 @@ class Fragments:
             Used as float32.
         background : float
             Value where there is no triangle.
+        derivatives : bool
+            Whether to return the derivatives, too.
 
         Returns
         -------
         ndarray of float32, shape (H, W, K), or (H, W) for values of shape (V,)
-            Perspective-correct for clip-space vertices, screen-linear for pixels.
+            Perspective-correct for clip-space vertices, screen-linear for pixels. With `derivatives` a pair of this and
+            (H, W, K, 2), or (H, W, 2): the derivatives along x (to the right) and y (down), per pixel, 0 where there
+            is no triangle. They are those of the triangle before the snap, in float64, not differences of pixels.
 
         Raises
         ------
@@ -185,12 +371,35 @@ class Fragments:
                [0.5, 1.5, 0. , 0. ]], dtype=float32)
         """
         array = as_values(values, self._n_vertices, self._n_triangles)
+        found = self._interpolated(array, as_number("background", background))
+        return (found, self._derivatives(array)) if derivatives else found
+
+    def _interpolated(self, array: NDArray[np.float32], background: float) -> NDArray[np.float32]:
+        """The attribute of checked values."""
         channels = array.shape[-1] if array.ndim > 1 else 1
         out: NDArray[Any] = np.empty((*self.triangle.shape, channels), np.float32)
         rows = array.reshape(-1, channels) if array.size else np.empty((0, channels), np.float32)
         snapped = self._snapped.with_inverse_w(self.id.size)
-        snapped.interpolate(self._ids(), rows, array.ndim == 3, float(background), out)
+        snapped.interpolate(self._ids(), rows, array.ndim == 3, background, out)
         return out if array.ndim > 1 else out[..., 0]
+
+    def _derivatives(self, array: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The derivatives of checked values along x and y, (H, W, K, 2) or (H, W, 2) float32."""
+        if self.corners is None:
+            raise ValueError("derivatives are those of rasterize and rasterize_mesh, not of layers")
+        mask = self.mask
+        ids = self.triangle[mask]
+        channels = array.shape[-1] if array.ndim > 1 else 1
+        out = np.zeros((*mask.shape, channels, 2), np.float32)
+        if ids.size:
+            slopes = self.corners.slopes(ids, self.barycentric()[mask].astype(np.float64))
+            if array.ndim == 3:
+                corners = array[ids]
+            else:
+                rows = np.asarray(as_array("triangles", self.corners.triangles))[ids].astype(np.intp)
+                corners = array.reshape(len(array), -1)[rows]
+            out[mask] = np.einsum("pck,pcd->pkd", corners.astype(np.float64), slopes)
+        return out if array.ndim > 1 else out[..., 0, :]
 
     @cached_property
     def _snapped(self) -> _engine.SnappedMesh:
@@ -205,3 +414,88 @@ class Fragments:
 
     def _ids(self) -> NDArray[np.int32]:
         return np.require(self.triangle, np.int32, ["C", "A"])
+
+
+class FragmentsBatch(Sequence[Fragments]):
+    """What `rasterize` returns of a batch: a visibility buffer for each of B poses, behind each other.
+
+    Attributes
+    ----------
+    triangle : ndarray of int32, shape (B, H, W)
+        Index of the triangle that shows in the pixel, -1 where there is none.
+    depth : ndarray of float32, shape (B, H, W)
+        Its depth.
+    """
+
+    def __init__(self, triangle: NDArray[np.int32], depth: NDArray[np.float32], frags: Sequence[Fragments]) -> None:
+        self.triangle, self.depth = triangle, depth
+        self._frags = tuple(frags)
+
+    def __repr__(self) -> str:
+        n, height, width = self.triangle.shape
+        return f"FragmentsBatch({n} of {width}x{height})"
+
+    def __len__(self) -> int:
+        return len(self._frags)
+
+    @overload
+    def __getitem__(self, i: int) -> Fragments: ...
+    @overload
+    def __getitem__(self, i: slice) -> Sequence[Fragments]: ...
+    def __getitem__(self, i: int | slice) -> Fragments | Sequence[Fragments]:
+        """Return one of them, whose arrays are views."""
+        return self._frags[i]
+
+    @property
+    def mask(self) -> NDArray[np.bool_]:
+        """Where there is a triangle, bool (B, H, W)."""
+        return self.triangle >= 0
+
+    def barycentric(self) -> NDArray[np.float32]:
+        """Return the weights of the triangles' vertices, (B, H, W, 3) float32; see `Fragments.barycentric`."""
+        return self._stacked([frags.barycentric() for frags in self], (3,))
+
+    def interpolate(self, values: ArrayLike, *, background: float = 0.0) -> NDArray[np.float32]:
+        """Return an attribute of the vertices at each visible pixel, (B, H, W, K) or (B, H, W) float32.
+
+        Parameters
+        ----------
+        values : array_like of real numbers
+            Those of all, as `Fragments.interpolate` takes them, (V, K), say; or with a leading axis of B, (B, V, K).
+        background : float
+            Value where there is no triangle.
+
+        Raises
+        ------
+        ValueError
+            If there are neither one nor B arrays of values, or they do not fit.
+        """
+        array = as_array("values", values)
+        has_own = array.ndim == 4 or (array.ndim == 3 and array.shape[1] == (self[0]._n_vertices if self else 0))
+        if has_own and len(array) != len(self):
+            raise ValueError(f"values must be those of all, or {len(self)} of them, got {len(array)}")
+        own = array if has_own else [array] * len(self)
+        channels = array.shape[(2 if array.ndim == 3 and has_own else array.ndim - 1) :] if array.ndim > 1 else ()
+        found = [frags.interpolate(one, background=background) for frags, one in zip(self, own, strict=True)]
+        return self._stacked(found, channels)
+
+    def _stacked(self, found: list[NDArray[np.float32]], channels: tuple[int, ...]) -> NDArray[np.float32]:
+        shape = *self.triangle.shape, *channels
+        return np.stack(found) if found else np.empty(shape, np.float32)
+
+
+def as_sample(i: object, n: int) -> int:
+    """Return which of n samples a number means, the last for -1."""
+    if not isinstance(i, int | np.integer):
+        raise TypeError(f"sample takes the number of a sample, or a texture and uv, got {shown(i)} alone")
+    if not -n <= i < n:
+        raise IndexError(f"the number of a sample must lie in 0 to {n - 1}, got {i}")
+    return int(i) % n
+
+
+def view_of(camera: object) -> NDArray[np.float64]:
+    """Return eye from world, (4, 4), of a camera."""
+    view = getattr(camera, "view", None)
+    if not isinstance(view, np.ndarray) or view.shape != (4, 4):
+        raise TypeError(f"camera must be a Camera, got {shown(camera)}")
+    return view

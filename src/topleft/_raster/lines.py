@@ -6,12 +6,13 @@ arrays -> transform -> snap -> edges -> lines
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine
+from topleft._base.arrays import as_array, as_number
 from topleft._base.memory import Memory
 from topleft._base.options import DepthTest, parse
 from topleft._base.threads import count_threads, run_parts
@@ -40,7 +41,7 @@ def as_depth(depth: object, shape: tuple[int, ...]) -> NDArray[np.float32] | Non
     """Return the buffer that hides lines, contiguous."""
     if depth is None:
         return None
-    array = depth.depth if isinstance(depth, Fragments) else np.asarray(depth)
+    array = depth.depth if isinstance(depth, Fragments) else as_array("depth", cast("ArrayLike", depth))
     if array.dtype != np.float32:
         raise TypeError(f"depth must be Fragments or a float32 array, got dtype {array.dtype}")
     if array.shape != shape:
@@ -63,7 +64,7 @@ def draw_wireframe(
     width, height = view.size
     hides = as_depth(depth, (height, width))
     is_farthest = parse(DepthTest, "depth_test", depth_test) is DepthTest.GREATER
-    bias = float(depth_bias)
+    bias = as_number("depth_bias", depth_bias)
     if not math.isfinite(bias):
         raise ValueError(f"depth_bias must be finite, got {depth_bias!r}")
     snapped = snap_mesh(memory, vertices, triangles, view, with_depth=depth is not None, out=out)

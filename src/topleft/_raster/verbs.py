@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any, Unpack
+from typing import Any, Unpack, cast
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from topleft._base.arrays import as_size
 from topleft._base.memory import FRESH, SCRATCH, KeptMemory
@@ -13,7 +13,7 @@ from topleft._base.threads import parse_threads
 from topleft._raster.fill import Style, draw_fill
 from topleft._raster.fragments import Fragments
 from topleft._raster.lines import draw_wireframe
-from topleft._raster.rasterize import draw_coverage, draw_fragments, draw_overdraw
+from topleft._raster.rasterize import draw_batch, draw_coverage, draw_fragments, draw_overdraw, n_poses
 from topleft._raster.view import View, ViewOptions
 
 __all__ = ["Rasterizer", "coverage", "fill", "overdraw", "rasterize", "wireframe"]
@@ -22,7 +22,7 @@ __all__ = ["Rasterizer", "coverage", "fill", "overdraw", "rasterize", "wireframe
 def coverage(
     vertices: ArrayLike,
     triangles: ArrayLike,
-    size: tuple[int, int],
+    size: int | tuple[int, int],
     *,
     out: NDArray[Any] | None = None,
     **view: Unpack[ViewOptions],
@@ -35,7 +35,7 @@ def coverage(
         Pixels (x right, y down), pixels and depth, or clip space. Object space (V, 3) with `transform`. Any real dtype.
     triangles : array_like of integers, shape (T, 3)
         Indices of vertices; either winding.
-    size : (int, int)
+    size : (int, int), or int for a square
         Width and height of the picture in pixels.
     out : ndarray of bool (float32 for several samples and "area"), shape (H, W), optional
         Where the result goes. A fresh array costs its first touch, several times what drawing a small mesh costs.
@@ -94,7 +94,7 @@ def coverage(
 def overdraw(
     vertices: ArrayLike,
     triangles: ArrayLike,
-    size: tuple[int, int],
+    size: int | tuple[int, int],
     *,
     out: NDArray[Any] | None = None,
     **view: Unpack[ViewOptions],
@@ -135,13 +135,14 @@ def fill(
     vertices: ArrayLike,
     triangles: ArrayLike,
     colors: ArrayLike,
-    size: tuple[int, int],
+    size: int | tuple[int, int],
     *,
     per: str = "auto",
     background: ArrayLike | None = None,
     blend: str = "replace",
     alpha: str = "straight",
     resolve: str = "values",
+    dtype: DTypeLike | None = None,
     out: NDArray[Any] | None = None,
     **view: Unpack[ViewOptions],
 ) -> NDArray[Any]:
@@ -171,7 +172,9 @@ def fill(
     resolve : "values" or "linear"
         With several samples a pixel ("msaa4", say) each pixel is the mean of its samples: of their values as they are,
         or, for uint8, of the light that sRGB values stand for (alpha, the last of 2 or 4 channels, as it is).
-    out : ndarray of uint8 or float32, shape (H, W, C) or (H, W), optional
+    dtype : dtype of integers, optional
+        `colors` are labels, (T,) or (T, C), and so is the picture: a pixel has exactly the numbers of its triangle.
+    out : ndarray of uint8, float32 or `dtype`, shape (H, W, C) or (H, W), optional
         Is drawn over.
 
     Returns
@@ -192,23 +195,26 @@ def fill(
 
     Examples
     --------
-    >>> import topleft as tl
+    >>> import numpy as np, topleft as tl
     >>> tl.fill([[0, 0], [4, 0], [0, 4]], [[0, 1, 2]], [0, 200, 0], (4, 2), per="vertex", background=9)
     array([[ 25,  75, 125,   9],
            [ 25,  75,   9,   9]], dtype=uint8)
     >>> twice, half_white = [[0, 1, 2]] * 2, [[255, 128]] * 2
     >>> tl.fill([[0, 0], [4, 0], [0, 4]], twice, half_white, (4, 1), blend="over", background=(0, 255))[..., 0]
     array([[192, 192, 192,   0]], dtype=uint8)
+    >>> tl.fill([[0, 0], [4, 0], [0, 4]], [[0, 1, 2]], [70000], (4, 2), background=-1, dtype=np.int32)
+    array([[70000, 70000, 70000,    -1],
+           [70000, 70000,    -1,    -1]], dtype=int32)
     """
     checked = View.parse(size, view)
-    style = Style(per, background, blend, alpha, resolve)
+    style = Style(per, background, blend, alpha, resolve, dtype)
     return draw_fill(SCRATCH, vertices, triangles, colors, checked, style, out)
 
 
 def rasterize(
     vertices: ArrayLike,
     triangles: ArrayLike,
-    size: tuple[int, int],
+    size: int | tuple[int, int],
     *,
     depth_test: str | None = "less",
     background_depth: float | None = None,
@@ -220,14 +226,15 @@ def rasterize(
     Parameters
     ----------
     vertices, triangles, size, **view
-        As in `coverage`. The depth of pixel-space vertices (V, 3) is their third column; (V, 2) vertices lie at depth 0
+        As in `coverage`; vertices (B, V, C), `transform` (B, 4, 4), or both, draw a batch of B poses, on all cores.
+        The depth of pixel-space vertices (V, 3) is their third column; (V, 2) vertices lie at depth 0
         and are drawn in painter's order.
     depth_test : "less", "greater" or None
         Which triangle is kept: the one with the smaller depth, with the larger depth, or the later one. At equal depth
         the triangle with the lower index.
     background_depth : float, optional
         Depth where nothing is; +inf, or -inf with "greater", unless given.
-    out : (ndarray of int32, ndarray of float32), each of shape (H, W), or (H, W, S) for S samples, optional
+    out : (ndarray of int32, ndarray of float32), each of shape (H, W), (H, W, S) for S samples or (B, H, W), optional
         Where ids and depth go; either may be None. Without an array for it, the depth of vertices (V, 2) is made when
         it is asked for: ids alone take half the time.
 
@@ -237,7 +244,8 @@ def rasterize(
         ``.triangle`` (H, W) int32 with -1 for none, ``.depth`` (H, W) float32, ``.mask`` (H, W) bool,
         ``.barycentric()``, ``.interpolate(values)``. With several samples a pixel also ``.samples_triangle`` and
         ``.samples_depth`` (H, W, S); all else is then of the first sample, which is nearest to the centre, and
-        ``.sample(i)`` gives the same of another.
+        ``.sample(i)`` gives the same of another. Of a batch `FragmentsBatch`: ``.triangle`` and ``.depth`` (B, H, W),
+        ``[i]`` is the `Fragments` of a pose, and each is what it is when it is drawn alone.
 
     Raises
     ------
@@ -266,6 +274,10 @@ def rasterize(
     array([[ 1. ,  0.5,  0.5, -inf],
            [ 0.5,  0.5, -inf, -inf]], dtype=float32)
     """
+    n = n_poses(vertices, view.get("transform"))
+    if n is not None:
+        batch = draw_batch(n, vertices, triangles, size, view, depth_test, background_depth, out)
+        return cast("Fragments", batch)  # the rare case: whoever passes a batch knows what comes back
     # Fragments refer to what they were drawn from, so nothing of it can be reused.
     return draw_fragments(FRESH, vertices, triangles, View.parse(size, view), depth_test, background_depth, out)
 
@@ -273,7 +285,7 @@ def rasterize(
 def wireframe(
     vertices: ArrayLike,
     triangles: ArrayLike,
-    size: tuple[int, int],
+    size: int | tuple[int, int],
     *,
     depth: Fragments | NDArray[np.float32] | None = None,
     depth_test: str = "less",
@@ -347,7 +359,7 @@ class Rasterizer:
 
     Parameters
     ----------
-    size : (int, int)
+    size : (int, int), or int for a square
         Width and height of the picture in pixels.
     threads : int or None
         For every call that does not say otherwise.
@@ -360,7 +372,7 @@ class Rasterizer:
     6
     """
 
-    def __init__(self, size: tuple[int, int], *, threads: int | None = None) -> None:
+    def __init__(self, size: int | tuple[int, int], *, threads: int | None = None) -> None:
         self.size = as_size(size)
         self.threads = parse_threads(threads)
         self._memory = KeptMemory()
@@ -395,11 +407,12 @@ class Rasterizer:
         blend: str = "replace",
         alpha: str = "straight",
         resolve: str = "values",
+        dtype: DTypeLike | None = None,
         out: NDArray[Any] | None = None,
         **view: Unpack[ViewOptions],
     ) -> NDArray[Any]:
         """Return a picture of coloured triangles in painter's order, as `topleft.fill` does."""
-        style = Style(per, background, blend, alpha, resolve)
+        style = Style(per, background, blend, alpha, resolve, dtype)
         return draw_fill(self._memory, vertices, triangles, colors, self._view(view), style, out)
 
     def rasterize(

@@ -75,7 +75,11 @@ def has_opaque_rest(material: Material, mesh: Mesh) -> bool:
 
 def is_blended(subject: Mesh | Scene, material: Material | None, shading: str = "smooth") -> bool:
     """Whether a picture of the subject has to be drawn by `draw_blended`."""
-    return shading in BLENDING and any(blended_triangles(mesh, material) is not None for mesh in meshes_of(subject))
+    return (
+        isinstance(shading, str)
+        and shading in BLENDING
+        and any(blended_triangles(mesh, material) is not None for mesh in meshes_of(subject))
+    )
 
 
 def draw_blended(

@@ -6,20 +6,20 @@ Input: ids that count the triangles of all instances, and what they were drawn f
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, TypeVar, cast
+from typing import TYPE_CHECKING, Any, Literal, TypeVar, cast, overload
 
 import numpy as np
 import numpy.typing as npt
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from topleft._base.arrays import as_values
+from topleft._base.arrays import as_array, shown
 from topleft._camera.camera import Camera
 from topleft._model.mesh import Mesh
 from topleft._model.scene import Instance, Scene
-from topleft._raster.fragments import Fragments
+from topleft._raster.fragments import Fragments, Viewer, as_sample, view_of
 from topleft._raster.peel import DepthLayers
 from topleft._render.bend import BentMesh
 
@@ -181,9 +181,9 @@ class SceneFragments(Fragments):
         """Index of the triangle in its mesh that each sample sees, int32 (H, W, S)."""
         return local_ids(self.samples_id, self.samples_instance, self.placed.whole_first_ids)
 
-    def sample(self, i: int) -> SceneFragments:
+    def _at_sample(self, i: int) -> SceneFragments:
         """Return ids, depth and attributes at one sample of each pixel."""
-        i = range(len(self.positions))[i]
+        i = as_sample(i, len(self.positions))
         ids, depth = self.drawn_planes
         return SceneFragments(ids[i : i + 1], depth[i : i + 1], self.placed, self.positions[i : i + 1])
 
@@ -216,6 +216,7 @@ class SceneFragments(Fragments):
             scene = self.placed.snap_part(i, own).seen_from(*self.positions[0]).moved(int(left), int(top))
             mesh = self.placed.scene[i].mesh
             frags = Fragments(own, self.depth[box], scene, len(mesh.vertices), len(mesh.triangles))
+            frags.corners = self.placed.corners(i)
             bent = self.placed.bent
             yield Part(i, box, frags if bent is None else BentFragments(frags, bent[i], self.whole[i].mesh))
 
@@ -223,8 +224,26 @@ class SceneFragments(Fragments):
         """Return the weights of the three vertices of the triangle that shows in each pixel; see `Fragments`."""
         return join(self.parts, (*self.id.shape, 3), 0.0, lambda part: part.frags.barycentric())
 
-    def interpolate(self, values: ArrayLike | Sequence[ArrayLike], *, background: float = 0.0) -> NDArray[np.float32]:
-        """Return an attribute of the vertices at each visible pixel.
+    def distance(self, camera: Viewer) -> NDArray[np.float32]:
+        """Return the distance along the view of what each pixel shows, as `Fragments.distance` does."""
+        view = view_of(camera)
+        rows = [view[2] @ instance.transform for instance in self.whole]
+        meshes = meshes_of(self.whole)
+        values = [-(mesh.vertices @ row[:3] + row[3]) for mesh, row in zip(meshes, rows, strict=True)]
+        return self.interpolate(values, background=np.inf)
+
+    @overload
+    def interpolate(
+        self, values: Any, *, background: float = 0.0, derivatives: Literal[False] = False
+    ) -> NDArray[np.float32]: ...
+    @overload
+    def interpolate(
+        self, values: Any, *, background: float = 0.0, derivatives: Literal[True]
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]: ...
+    def interpolate(
+        self, values: Any, *, background: float = 0.0, derivatives: bool = False
+    ) -> NDArray[np.float32] | tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Return an attribute of the vertices at each visible pixel, and what it changes by from pixel to pixel.
 
         Parameters
         ----------
@@ -232,6 +251,8 @@ class SceneFragments(Fragments):
             One of each instance, as `Fragments.interpolate` takes it; all with as many channels.
         background : float
             Value where there is no triangle.
+        derivatives : bool
+            Whether to return the derivatives, too; as `Fragments.interpolate` does.
 
         Returns
         -------
@@ -243,15 +264,22 @@ class SceneFragments(Fragments):
             If the number of arrays is not that of the instances, or they fit neither these nor each other.
         """
         n = len(self.whole)
-        arrays = [np.asarray(array) for array in values]  # type: ignore[union-attr]
+        if not isinstance(values, Iterable):
+            raise TypeError(f"values must be one array for each of {n} instances, got {shown(values)}")
+        arrays = [as_array("values", array) for array in values]
         if len(arrays) != n:
             raise ValueError(f"values must be one array for each of {n} instances, got {len(arrays)}")
         shapes = {() if array.ndim < 2 else array.shape[-1:] for array in arrays}
         if len(shapes) > 1:
             raise ValueError(f"values must have as many channels for each instance, got {sorted(shapes)}")
         shape = *self.id.shape, *shapes.pop()
-        return join(
+        found = join(
             self.parts, shape, background, lambda part: part.frags.interpolate(arrays[part.i], background=background)
+        )
+        if not derivatives:
+            return found
+        return found, join(
+            self.parts, (*shape, 2), 0.0, lambda part: part.frags.interpolate(arrays[part.i], derivatives=True)[1]
         )
 
 
@@ -345,15 +373,31 @@ class BentFragments(Fragments):
             return np.zeros((*self.triangle.shape, 3), np.float32)
         return self.drawn.interpolate(self.bent.weights)
 
-    def interpolate(self, values: ArrayLike, *, background: float = 0.0) -> NDArray[np.float32]:
-        """Return an attribute of the vertices at each visible pixel, as `Fragments.interpolate` does."""
-        array = as_values(values, self._n_vertices, self._n_triangles)
+    def distance(self, camera: Viewer) -> NDArray[np.float32]:
+        """Return the distance along the view of what each pixel shows, as `Fragments.distance` does."""
+        view = view_of(camera)
+        return self.interpolate(-(self._mesh.vertices @ view[2, :3] + view[2, 3]), background=np.inf)
+
+    def _interpolated(self, array: NDArray[np.float32], background: float) -> NDArray[np.float32]:
+        """The attribute of checked values, by way of the parts."""
         if not len(self.bent.source):
             channels = array.shape[-1:] if array.ndim > 1 else ()
             return np.full((*self.triangle.shape, *channels), background, np.float32)
+        out = self.drawn.interpolate(self._corners_of_parts(array), background=background)
+        return out if array.ndim > 1 else out[..., 0]
+
+    def _derivatives(self, array: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The derivatives of checked values, by way of the parts."""
+        if not len(self.bent.source):
+            channels = array.shape[-1:] if array.ndim > 1 else ()
+            return np.zeros((*self.triangle.shape, *channels, 2), np.float32)
+        _, slopes = self.drawn.interpolate(self._corners_of_parts(array), derivatives=True)
+        return slopes if array.ndim > 1 else slopes[..., 0, :]
+
+    def _corners_of_parts(self, array: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Checked values at the corners of the parts, (T, 3, K)."""
         if array.ndim == 3:
             corners = array[self.bent.source]
         else:
             corners = array.reshape(len(array), -1)[self._mesh.triangles[self.bent.source]]
-        out = self.drawn.interpolate(np.matmul(self.bent.weights, corners), background=background)
-        return out if array.ndim > 1 else out[..., 0]
+        return np.matmul(self.bent.weights, corners)

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from topleft._base.arrays import as_names
 from topleft._points.cloud import CLOUD_LAYERS, CloudBuffer
 from topleft._render.blended import is_blended
 from topleft._render.fragments import VisiblePart, meshes_of
@@ -180,7 +181,7 @@ def check_layers(names: str | Iterable[str]) -> tuple[str, ...]:
     ValueError
         If there is no such layer.
     """
-    checked = tuple(dict.fromkeys((names,) if isinstance(names, str) else names))
+    checked = tuple(dict.fromkeys(as_names("layers", names)))
     for name in checked:
         if name not in LAYERS:
             raise ValueError(f"layers must be some of {', '.join(LAYERS)}, got {name!r}")

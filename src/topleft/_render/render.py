@@ -13,8 +13,9 @@ import numpy as np
 import numpy.typing as npt
 from numpy.typing import ArrayLike, NDArray
 
-from topleft._base.color import DEFAULT_COLOR
-from topleft._camera.camera import Camera
+from topleft._base.arrays import as_size, shown
+from topleft._base.color import DEFAULT_COLOR, ColorLike
+from topleft._camera.camera import Camera, CameraLike, as_camera
 from topleft._lod.detail import detailed
 from topleft._model.adapt import MeshLike, as_mesh
 from topleft._model.material import Material
@@ -42,12 +43,12 @@ EDGE_COLOR = (24, 28, 40)
 
 def render(
     mesh: MeshLike | Scene | Points,
-    camera: Camera | None = None,
-    size: tuple[int, int] = DEFAULT_SIZE,
+    camera: CameraLike | None = None,
+    size: int | tuple[int, int] = DEFAULT_SIZE,
     *,
     shading: str = "smooth",
-    color: tuple[int, ...] = DEFAULT_COLOR,
-    background: tuple[int, ...] = WHITE,
+    color: ColorLike = DEFAULT_COLOR,
+    background: ColorLike = WHITE,
     cull: str = "none",
     edges: bool = False,
     sampling: str = "center",
@@ -61,19 +62,20 @@ def render(
     Parameters
     ----------
     mesh : Mesh, Scene, Points, or whatever `as_mesh` takes
-        What to draw: a mesh of trimesh, meshio, pyvista, say. Its colours are used if it has any. Points have no
-        edges, sides to cull, materials and levels; they are lit where they have normals.
-    camera : Camera, optional
-        Unless given, the three-quarter view of `Camera.framing`, with y up.
-    size : (width, height), pixels
+        What to draw: a path, or a mesh of trimesh, meshio, pyvista, say. Its colours are used if it has any.
+        Points have no edges, sides to cull, materials and levels; they are lit where they have normals.
+    camera : Camera or (4, 4) array, optional
+        Unless given, the three-quarter view of `Camera.framing`, with y up. A matrix is clip from world, see
+        `Camera.from_matrix`.
+    size : (width, height), or one number for a square; pixels
         640 x 480 unless given.
     shading : {"smooth", "flat", "unlit", "matcap", "ids", "depth", "normals"}
         What the colours tell; `topleft.shade` describes each. The first three composite what shows through, materials
         with `alpha_mode="blend"` and colours with alpha, in linear light; the others show it as if it were opaque.
-    color : (3,) of 0 to 255
-        sRGB colour of a mesh without colours.
-    background : (3,) or (4,) of 0 to 255
-        sRGB, and alpha if it is not opaque; white unless given, `(0, 0, 0, 0)` is transparent.
+    color : str, (3,) integers of 0 to 255 or (3,) floats of 0 to 1
+        sRGB colour of a mesh without colours: "red", "#f00", (255, 0, 0) and (1.0, 0.0, 0.0) are the same.
+    background : str, (3,) or (4,) integers of 0 to 255 or floats of 0 to 1
+        sRGB, and alpha if it is not opaque; white unless given, "transparent" is `(0, 0, 0, 0)`.
     cull : {"none", "back", "front"}
         Triangles to leave out, by the side that is seen; besides the backs of materials that are not double-sided.
     edges : bool
@@ -111,6 +113,7 @@ def render(
     >>> tl.render(mesh, size=(64, 48), background=(0, 0, 0, 0))[24, 32].tolist()[3]
     255
     """
+    size = as_size(size)
     if isinstance(mesh, Points):
         if edges:
             raise ValueError("points have no edges")
@@ -134,12 +137,16 @@ def render(
 
 
 def subject_of(
-    mesh: MeshLike | Scene, camera: Camera | None, size: tuple[int, int], tolerance: float = 0.0, **options: Any
+    mesh: MeshLike | Scene, camera: CameraLike | None, size: tuple[int, int], tolerance: float = 0.0, **options: Any
 ) -> tuple[Mesh | Scene, Camera]:
     """The mesh or scene as it is drawn within a tolerance, and who looks; options as for `choose_detail`."""
     subject = mesh if isinstance(mesh, Scene) else as_mesh(mesh)
-    if camera is None:
-        width, height = size
+    width, height = size
+    if not isinstance(options.get("material"), Material | None):
+        raise TypeError(f"material must be a Material, got {shown(options['material'])}")
+    if camera is not None:
+        camera = as_camera(camera)
+    else:
         framed = subject.extreme_points() if isinstance(subject, Scene) else subject
         camera = Camera.framing(framed, aspect=width / height if width > 0 and height > 0 else 1.0)
     return detailed(subject, camera, size, tolerance, **options), camera
@@ -153,7 +160,7 @@ def picture_of(
     cull: str = "none",
     edges: bool = False,
     threads: int | None = None,
-    background: tuple[int, ...] = WHITE,
+    background: ColorLike = WHITE,
     **look: Any,
 ) -> npt.NDArray[np.uint8]:
     """The picture of the visibility buffer that `rasterize_mesh` returned; options as for `render`.
@@ -169,8 +176,8 @@ def picture_of(
 
 def rasterize_mesh(
     mesh: MeshLike | Scene | Points,
-    camera: Camera | None = None,
-    size: tuple[int, int] = DEFAULT_SIZE,
+    camera: CameraLike | None = None,
+    size: int | tuple[int, int] = DEFAULT_SIZE,
     *,
     cull: str = "none",
     tolerance: float = 0.0,
@@ -203,6 +210,9 @@ def rasterize_mesh(
     ValueError
         If the mesh has no triangles and no camera is given, an option is unknown, or `rasterizer` has another size.
     """
+    size = as_size(size)
+    if view.get("viewport") is not None:
+        view["viewport"] = as_size(view["viewport"], "viewport", smallest=1)
     if isinstance(mesh, Points):
         return draw_cloud(mesh, framing_of(mesh, camera, size), size, cull=cull, threads=threads, **view)
     window = {"viewport": view.get("viewport"), "origin": view.get("origin", (0, 0))}
@@ -226,6 +236,8 @@ def rasterize_subject(
         return draw_scene(subject, camera, size, material=material, **view)
     drawn = seen_through(subject, camera, view.get("viewport") or size, near_clip=view.get("near_clip", True))
     view["transform"] = drawn.transform
+    if not isinstance(rasterizer, Rasterizer | None):
+        raise TypeError(f"rasterizer must be a Rasterizer or None, got {shown(rasterizer)}")
     if rasterizer is not None and rasterizer.size != tuple(size):
         raise ValueError(f"rasterizer must have the size {tuple(size)}, got {rasterizer.size}")
     if drawn.bent is None:

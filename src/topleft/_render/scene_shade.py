@@ -12,8 +12,8 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from topleft._base.color import DEFAULT_COLOR, Color
-from topleft._camera.camera import Camera
+from topleft._base.color import DEFAULT_COLOR, ColorLike
+from topleft._camera.camera import Camera, CameraLike, as_camera
 from topleft._model.environment import Environment
 from topleft._model.light import Fog, Light, LightKind, LightSpace
 from topleft._model.material import Material
@@ -56,13 +56,13 @@ def in_space_of(instance: Instance | None, options: ShadingOptions, camera: Came
 def shade(
     frags: Fragments,
     mesh: Mesh | Scene | Points,
-    camera: Camera,
+    camera: CameraLike,
     *,
     shading: str = "smooth",
-    color: Color = DEFAULT_COLOR,
-    background: Color = (255, 255, 255, 255),
+    color: ColorLike = DEFAULT_COLOR,
+    background: ColorLike = (255, 255, 255, 255),
     depth_range: tuple[float, float] | None = None,
-    lights: Sequence[Light] | None = None,
+    lights: Light | Sequence[Light] | None = None,
     ambient: float | None = None,
     material: Material | None = None,
     matcap: Texture | None = None,
@@ -88,14 +88,12 @@ def shade(
         that `matcap` has for the normal. "ids": a colour for each triangle. "depth": grey, bright is near, over a range
         of distances. "normals": the smooth normal in eye space, x, y, z from -1..1 as red, green, blue; what
         faces the viewer is light blue.
-    color : (3,) of 0 to 255
-        sRGB colour of a mesh without colours and materials.
-    background : (4,) of 0 to 255
-        sRGB and alpha where nothing shows.
+    color, background : str, integers of 0 to 255 or floats of 0 to 1
+        sRGB of a mesh without colours and materials, and with alpha where nothing shows; as for `render`.
     depth_range : (float, float), optional
         Distances along the view that are the brightest and the darkest grey of "depth", world units; unless given,
         those of the picture.
-    lights : sequence of Light, optional
+    lights : Light or sequence of Light, optional
         Lambert's cosine for each of them, or GGX on metallic-rough materials. Unless given: one headlight over the
         viewer's left shoulder, whose light wraps round the mesh; none in an environment.
     ambient : float, optional
@@ -120,6 +118,7 @@ def shade(
     TypeError
         If `frags`, the mesh, a light, material, texture or environment is none.
     """
+    camera = as_camera(camera)
     if not isinstance(mesh, Points):
         check_drawn(frags, mesh)
     options = ShadingOptions.parse(

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from topleft._base.arrays import as_out
-from topleft._camera.camera import Camera
+from topleft._base.arrays import as_out, as_size
+from topleft._camera.camera import CameraLike
 from topleft._model.adapt import MeshLike
 from topleft._model.points import Points
 from topleft._model.scene import Scene
@@ -26,8 +26,8 @@ __all__ = ["silhouette"]
 
 def silhouette(
     mesh: MeshLike | Scene | Points,
-    camera: Camera | None = None,
-    size: tuple[int, int] = DEFAULT_SIZE,
+    camera: CameraLike | None = None,
+    size: int | tuple[int, int] = DEFAULT_SIZE,
     *,
     sampling: str = "center",
     cull: str = "none",
@@ -86,6 +86,7 @@ def silhouette(
     >>> round(float(tl.silhouette(mesh, size=(8, 6), sampling="area", cull="back").sum()), 2)
     16.2
     """
+    size = as_size(size)
     if isinstance(mesh, Points):
         frags = draw_cloud(
             mesh, framing_of(mesh, camera, size), size, sampling=sampling, cull=cull, threads=threads, **view

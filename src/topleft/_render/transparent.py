@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from topleft._base.color import as_color
-from topleft._camera.camera import Camera
+from topleft._base.arrays import as_count, as_size
+from topleft._base.color import ColorLike, as_color
+from topleft._camera.camera import Camera, CameraLike
 from topleft._model.adapt import MeshLike
 from topleft._model.material import Material
 from topleft._model.scene import Scene
@@ -31,13 +32,13 @@ CLEAR = (0, 0, 0, 0)
 
 def render_transparent(
     mesh: MeshLike | Scene,
-    camera: Camera | None = None,
-    size: tuple[int, int] = DEFAULT_SIZE,
+    camera: CameraLike | None = None,
+    size: int | tuple[int, int] = DEFAULT_SIZE,
     *,
     opacity: float = 0.5,
     layers: int = 8,
     shading: str = "smooth",
-    background: tuple[int, ...] = WHITE,
+    background: ColorLike = WHITE,
     cull: str = "none",
     tolerance: float = 0.0,
     threads: int | None = None,
@@ -75,7 +76,7 @@ def render_transparent(
     >>> tl.render_transparent(mesh, size=(64, 48), opacity=0.5, background=(0, 0, 0, 0))[24, 32].tolist()[3]
     192
     """
-    material = look.get("material")
+    size, layers, material = as_size(size), as_count("layers", layers), look.get("material")
     subject, camera = subject_of(mesh, camera, size, tolerance, cull=cull, material=material)
     ground = as_color("background", background, 4)
     options: dict[str, Any] = {"layers": layers, "cull": cull, "threads": threads}
@@ -122,7 +123,7 @@ def check_straight(camera: Camera) -> None:
 
 
 def visible_layers(
-    mesh: MeshLike | Scene, camera: Camera | None = None, size: tuple[int, int] = DEFAULT_SIZE, **options: Any
+    mesh: MeshLike | Scene, camera: CameraLike | None = None, size: int | tuple[int, int] = DEFAULT_SIZE, **options: Any
 ) -> DepthLayers:
     """The nearest layers of every pixel of a mesh or scene, whatever its materials cut out; options as for `peel`.
 
@@ -143,6 +144,7 @@ def visible_layers(
     ValueError
         If the mesh has no triangles and no camera is given, an option is out of range, or the camera has a lens.
     """
+    size = as_size(size)
     subject, camera = subject_of(mesh, camera, size)
     check_straight(camera)
     if isinstance(subject, Scene):

@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from topleft._camera.camera import Camera
+from topleft._base.arrays import as_real, as_size, shown
+from topleft._camera.camera import CameraLike, as_camera
 from topleft._io.layer_files import save_layers
 from topleft._model.adapt import MeshLike
 from topleft._model.points import Points
@@ -71,12 +72,12 @@ class ViewLayers(Mapping[str, Array]):
 
 def render_layers(
     mesh: MeshLike | Scene | Points,
-    camera: Camera | None = None,
-    size: tuple[int, int] = DEFAULT_SIZE,
+    camera: CameraLike | None = None,
+    size: int | tuple[int, int] = DEFAULT_SIZE,
     *,
     layers: str | Iterable[str] = ("color", "depth"),
     attributes: Mapping[str, Any] | None = None,
-    camera_to: Camera | None = None,
+    camera_to: CameraLike | None = None,
     transforms_to: npt.ArrayLike | None = None,
     cull: str = "none",
     tolerance: float = 0.0,
@@ -171,6 +172,8 @@ def render_layers(
     names = check_layers(layers)
     for option in look.keys() - {"sampling"} if "color" not in names else ():
         raise TypeError(f"option {option!r} is for layer 'color', which is not among {', '.join(names)}")
+    if not isinstance(attributes, Mapping | None):
+        raise TypeError(f"attributes must map names to values, got {shown(attributes)}")
     if attributes and tolerance:
         raise ValueError("attributes are those of the mesh's own vertices, which a tolerance may leave out")
     gbuffer = gbuffer_of(
@@ -187,10 +190,10 @@ def render_layers(
 
 def gbuffer_of(
     mesh: MeshLike | Scene | Points,
-    camera: Camera | None,
-    size: tuple[int, int],
+    camera: CameraLike | None,
+    size: int | tuple[int, int],
     *,
-    camera_to: Camera | None = None,
+    camera_to: CameraLike | None = None,
     transforms_to: npt.ArrayLike | None = None,
     cull: str = "none",
     tolerance: float = 0.0,
@@ -209,6 +212,7 @@ def gbuffer_of(
     """
     for option in sorted(look.keys() - (GLASS_LOOKS if "opacity" in look else LOOKS)):
         raise TypeError(f"there is no option {option!r} of a picture")
+    size = as_size(size)
     if isinstance(mesh, Points):
         return CloudBuffer(
             mesh,
@@ -216,7 +220,7 @@ def gbuffer_of(
             size,
             {"cull": cull, "threads": threads},
             look,
-            camera_to,
+            None if camera_to is None else as_camera(camera_to, "camera_to"),
             None if transforms_to is None else as_transforms(transforms_to, 1),
         )
     subject, camera = subject_of(mesh, camera, size, tolerance, cull=cull, material=look.get("material"))
@@ -226,7 +230,7 @@ def gbuffer_of(
         size=size,
         options={"cull": cull, "threads": threads},
         look=look,
-        camera_to=camera_to,
+        camera_to=None if camera_to is None else as_camera(camera_to, "camera_to"),
         transforms_to=None if transforms_to is None else as_transforms(transforms_to, len(meshes_of(subject))),
         rasterizer=rasterizer,
     )
@@ -234,7 +238,7 @@ def gbuffer_of(
 
 def as_transforms(transforms: npt.ArrayLike, n: int) -> F64:
     """Return a matrix for each instance, (N, 4, 4) float64."""
-    array = np.asarray(transforms, np.float64)
+    array = as_real("transforms_to", transforms)
     if n == 1 and array.shape == (4, 4):
         array = array[None]
     if array.shape != (n, 4, 4):

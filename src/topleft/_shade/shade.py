@@ -12,7 +12,7 @@ Pictures", SIGGRAPH 1977 (highlights).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import lru_cache
@@ -22,7 +22,8 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft import _engine
-from topleft._base.color import LINEAR_ONE, Color, as_color, id_colors, srgb_tables
+from topleft._base.arrays import shown
+from topleft._base.color import LINEAR_ONE, Color, ColorLike, as_color, id_colors, srgb_tables
 from topleft._base.options import parse
 from topleft._base.threads import count_threads, parse_threads, run_parts, threads_for
 from topleft._camera.camera import Camera
@@ -62,7 +63,7 @@ GREY_OF_NEAREST, GREY_OF_FARTHEST = 224, 32
 class LookOptions(TypedDict, total=False):
     """The options of `shade` that `render` passes on."""
 
-    lights: Sequence[Light] | None
+    lights: Light | Sequence[Light] | None
     ambient: float | None
     material: Material | None
     matcap: Texture | None
@@ -94,10 +95,10 @@ class ShadingOptions:
     def parse(
         cls,
         shading: str,
-        color: Color,
-        background: Color,
+        color: ColorLike,
+        background: ColorLike,
         depth_range: tuple[float, float] | None = None,
-        lights: Sequence[Light] | None = None,
+        lights: Light | Sequence[Light] | None = None,
         ambient: float | None = None,
         material: Material | None = None,
         matcap: Texture | None = None,
@@ -107,6 +108,9 @@ class ShadingOptions:
     ) -> ShadingOptions:
         """Check the options of a call."""
         mode = parse(Shading, "shading", shading)
+        lights = (lights,) if isinstance(lights, Light) else lights
+        if lights is not None and (not isinstance(lights, Iterable) or isinstance(lights, np.ndarray | str | dict)):
+            raise TypeError(f"lights must be a Light or a sequence of them, got {shown(lights)}")
         _check_types(lights=(lights or ()), material=material, matcap=matcap, fog=fog, environment=environment)
         if mode is Shading.MATCAP and matcap is None:
             raise ValueError("matcap must be a Texture for shading 'matcap', got None")

@@ -33,7 +33,11 @@ __all__ = ["FAILED", "REFUSED", "UsageError", "main"]
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Return the exit status of the command line, `sys.argv` unless arguments are given."""
-    options = _parser().parse_args(arguments)
+    parser = _parser()
+    options = parser.parse_args(arguments)
+    if options.run is None:
+        parser.print_help()
+        return 0
     try:
         with listening() as lacks:
             status: int = options.run(options)
@@ -60,7 +64,8 @@ def run_info(_: argparse.Namespace) -> int:
 def _parser() -> Parser:
     parser = Parser(prog="topleft", description="Exact triangle rasterization on the CPU.")
     parser.add_argument("--version", action="version", version=f"topleft {build_info()['version']}")
-    commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND")
+    parser.set_defaults(run=None)
     info = commands.add_parser("info", help="print the version and what was built", description=run_info.__doc__)
     info.set_defaults(run=run_info)
     render = commands.add_parser("render", help="render meshes to pictures", description="Render meshes to pictures.")

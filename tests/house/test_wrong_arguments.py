@@ -1,0 +1,209 @@
+"""Whatever is given for an argument, a public function works or says in a line of its own what is wrong with it."""
+
+import inspect
+import linecache
+import traceback
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import topleft as tl
+
+ROOT = Path(tl.__file__).parent
+CUBE = tl.Mesh(*tl.scenes.shape("cube"))
+SCENE = tl.Scene([CUBE])
+CAMERA = tl.Camera.framing(CUBE)
+SIZE = (8, 6)
+FLAT = [[0.0, 0.0], [4.0, 0.0], [0.0, 4.0]]
+POINTS = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.5], [0.0, 4.0, 0.0]]
+ONE = [[0, 1, 2]]
+FRAGS = tl.rasterize_mesh(CUBE, CAMERA, SIZE)
+LAYERS = tl.peel(CUBE.vertices, CUBE.triangles, SIZE, transform=CAMERA.clip_from_world(SIZE), layers=2)
+VIEW = {
+    "transform": None, "origin": (0, 0), "viewport": None, "subpixel_bits": 8, "sampling": "center", "method": "auto",
+    "cull": "none", "clip_depth": "minus_one_to_one", "threads": None, "plan": None,
+}  # fmt: skip
+LOOK = {
+    "lights": None, "ambient": None, "material": None, "matcap": None, "fog": None, "shading": "smooth",
+    "color": (9, 9, 9), "background": (9, 9, 9),
+}  # fmt: skip
+
+#: Each function with arguments that suit it.
+CALLS = {
+    "Camera": (tl.Camera, {"view": np.eye(4), "projection": np.eye(4), "aspect": 1.0, "lens": None}),
+    "Camera.framing": (tl.Camera.framing, {"subject": CUBE, "azimuth_deg": 1, "elevation_deg": 2, "fov_y_deg": 30,
+                                           "up": "y", "aspect": 1.0, "fit": "sphere"}),
+    "Camera.look_at": (tl.Camera.look_at, {"eye": (0, 0, 5), "target": (0, 0, 0), "up": (0, 1, 0), "fov_y_deg": 30,
+                                           "ortho_height": None, "near": None, "far": None}),
+    "Camera.perspective": (tl.Camera.perspective, {"view": np.eye(4), "near": 1, "far": 2, "fov_y_deg": 40}),
+    "Camera.orthographic": (tl.Camera.orthographic, {"view": np.eye(4), "near": 1, "far": 2, "height": 1}),
+    "Camera.off_center": (tl.Camera.off_center, {"view": np.eye(4), "left": -1, "right": 1, "bottom": -1, "top": 1,
+                                                 "near": 1, "far": 2}),
+    "Camera.from_matrix": (tl.Camera.from_matrix, {"clip_from_world": CAMERA.clip_from_world(SIZE)}),
+    "Camera.from_intrinsics": (tl.Camera.from_intrinsics, {"intrinsics": np.eye(3), "camera_from_world": np.eye(4),
+                                                           "size": SIZE, "near": 1, "far": 2, "distortion": None,
+                                                           "fisheye": None}),
+    "Camera.project": (CAMERA.project, {"points": [[0, 0, 0]], "size": SIZE}),
+    "Camera.clip_from_world": (CAMERA.clip_from_world, {"size": SIZE}),
+    "FisheyeLens": (tl.FisheyeLens, {"k1": 0.1}),
+    "Fog": (tl.Fog, {"near": 1, "far": 2, "color": (0, 0, 0)}),
+    "Grid": (tl.Grid, {"size": SIZE, "extent": (0, 1, 0, 1), "y": "up"}),
+    "Grid.around": (tl.Grid.around, {"subject": (FLAT, ONE), "size": SIZE, "pixel_size": None, "extent": None,
+                                     "y": "up"}),
+    "Instance": (tl.Instance, {"mesh": CUBE, "transform": np.eye(4), "name": None}),
+    "Light": (tl.Light, {"at": (0, 0, 1), "kind": "point", "color": (1, 2, 3), "intensity": 1, "falloff": 0,
+                         "space": "eye"}),
+    "Material": (tl.Material, {"color": None, "texture": None, "specular": 0, "shininess": 1, "back_color": None,
+                               "alpha_cutoff": None}),
+    "Mesh": (tl.Mesh, {"vertices": POINTS, "triangles": ONE, "normals": None, "colors": None, "uv": None,
+                       "materials": (), "material_of_triangle": None}),
+    "OpenCVLens": (tl.OpenCVLens, {"k1": 0.1}),
+    "Rasterizer": (tl.Rasterizer, {"size": SIZE, "threads": None}),
+    "Scene": (tl.Scene, {"instances": [CUBE]}),
+    "Texture": (tl.Texture, {"image": np.zeros((2, 2), np.uint8), "filter": "nearest", "wrap": "clamp"}),
+    "as_mesh": (tl.as_mesh, {"subject": CUBE}),
+    "bresenham_line": (tl.bresenham_line, {"x0": 0, "y0": 0, "x1": 3, "y1": 2}),
+    "choose_detail": (tl.choose_detail, {"mesh": CUBE, "camera": CAMERA, "size": SIZE, "tolerance": 0.0,
+                                         "viewport": None, "cull": "none"}),
+    "composite": (tl.composite, {"layers": LAYERS, "colors": np.zeros((12, 3), np.uint8), "opacity": 0.5,
+                                 "background": None, "threads": None}),
+    "coverage": (tl.coverage, {"vertices": FLAT, "triangles": ONE, "size": SIZE, "out": None, **VIEW}),
+    "field": (tl.field, {"mesh": (FLAT, ONE), "values": [1.0, 2.0, 3.0], "size": SIZE, "extent": None,
+                         "pixel_size": None, "y": "up", "per": "vertex", "subpixel_bits": 8, "threads": None,
+                         "out": None, "origin": (0, 0), "window": None, "nodata": None}),
+    "fill": (tl.fill, {"vertices": FLAT, "triangles": ONE, "colors": [[9, 9, 9]], "size": SIZE, "per": "triangle",
+                       "background": None, "blend": "replace", "alpha": "straight", "resolve": "values",
+                       "dtype": None, "out": None}),
+    "height_map": (tl.height_map, {"mesh": (POINTS, ONE), "spacing": 1.0, "surface": "upper", "extent": None,
+                                   "y": "up", "subpixel_bits": 8, "threads": None, "out": None}),
+    "load": (tl.load, {"path": "nothing.obj"}),
+    "overdraw": (tl.overdraw, {"vertices": FLAT, "triangles": ONE, "size": SIZE, "out": None}),
+    "peel": (tl.peel, {"vertices": POINTS, "triangles": ONE, "size": SIZE, "layers": 2}),
+    "plan": (tl.plan, {"vertices": POINTS, "triangles": ONE, "size": SIZE, "outputs": "triangle",
+                       "depth_test": "less", "tolerance": 0.0}),
+    "rasterize": (tl.rasterize, {"vertices": POINTS, "triangles": ONE, "size": SIZE, "depth_test": "less",
+                                 "background_depth": None, "out": None, **VIEW}),
+    "rasterize_mesh": (tl.rasterize_mesh, {"mesh": CUBE, "camera": CAMERA, "size": SIZE, "cull": "none",
+                                           "tolerance": 0.0, "threads": None, "rasterizer": None, "origin": (0, 0),
+                                           "viewport": None}),
+    "render": (tl.render, {"mesh": CUBE, "camera": CAMERA, "size": SIZE, "cull": "none", "sampling": "center",
+                           "tolerance": 0.0, "threads": None, "rasterizer": None, **LOOK}),
+    "render_batch": (lambda **given: list(tl.render_batch(**given)),
+                     {"jobs": [tl.Job(CUBE, CAMERA, SIZE)], "executor": None, "progress": None, "on_error": "raise",
+                      "order": "jobs", "chunk": 1, "window": None}),
+    "Job": (lambda **given: list(tl.render_batch([tl.Job(**given)])),
+            {"scene": CUBE, "camera": CAMERA, "size": SIZE, "options": {}, "destination": None, "layers": ()}),
+    "render_layers": (tl.render_layers, {"mesh": CUBE, "camera": CAMERA, "size": SIZE, "layers": "depth",
+                                         "attributes": None, "camera_to": None, "transforms_to": None,
+                                         "cull": "none", "tolerance": 0.0, "threads": None, "rasterizer": None}),
+    "render_transparent": (tl.render_transparent, {"mesh": CUBE, "camera": CAMERA, "size": SIZE, "opacity": 0.5,
+                                                   "layers": 2, "shading": "smooth", "background": (0, 0, 0),
+                                                   "cull": "none", "tolerance": 0.0, "threads": None}),
+    "save_image": (tl.save_image, {"path": "x.nothing", "image": np.zeros((2, 2), np.uint8), "text": None}),
+    "shade": (tl.shade, {"frags": FRAGS, "mesh": CUBE, "camera": CAMERA, "depth_range": None, "threads": None, **LOOK}),
+    "silhouette": (tl.silhouette, {"mesh": CUBE, "camera": CAMERA, "size": SIZE, "sampling": "center", "cull": "none",
+                                   "tolerance": 0.0, "threads": None, "out": None}),
+    "turntable": (tl.turntable, {"subject": CUBE, "n": 2}),
+    "viewpoints": (tl.viewpoints, {"subject": CUBE, "n": 2}),
+    "visible_layers": (tl.visible_layers, {"mesh": CUBE, "camera": CAMERA, "size": SIZE, "layers": 2}),
+    "wireframe": (tl.wireframe, {"vertices": FLAT, "triangles": ONE, "size": SIZE, "depth": None,
+                                 "depth_test": "less", "depth_bias": 0.1, "out": None}),
+    "pixel_grid": (tl.pixel_grid, {"values": np.eye(3), "vertices": FLAT, "triangles": ONE, "size": None,
+                                   "sampling": None, "cell": 9, "edge_color": "red", "path": None}),
+    "Grid.from_transform": (tl.Grid.from_transform, {"transform": (1, 0, 0, 0, -1, 0), "size": 3}),
+    "Fragments.sample texture": (FRAGS.sample, {"texture": np.eye(3), "uv": CUBE.vertices[:, :2], "filter": "nearest",
+                                                "wrap": "clamp", "encoding": "linear", "background": 0.0}),
+    "Fragments.distance": (FRAGS.distance, {"camera": CAMERA}),
+    "Fragments.interpolate": (FRAGS.interpolate, {"values": CUBE.vertices, "background": 0.0}),
+    "Fragments.sample": (FRAGS.sample, {"texture": 0}),
+}  # fmt: skip
+
+WRONG = {
+    "None": None,
+    "object": object(),
+    "word": "word",
+    "bytes": b"word",
+    "number": 3,
+    "negative": -1,
+    "float": 3.5,
+    "nan": float("nan"),
+    "bool": True,
+    "empty": (),
+    "list of None": [None],
+    "dict": {"a": 1},
+    "set": {1},
+    "size": (640, 480),
+    "floats": (4.5, 3.5),
+    "three": (3, 4, 3),
+    "words": ["a", "b", "c"],
+    "ragged": [[1, 2], [3]],
+    "ndarray of words": np.array([["a", "b"]]),
+    "complex": np.ones((3, 3), complex),
+    "matrix": np.eye(4),
+    "singular": np.zeros((4, 4)),
+    "rows": np.ones((3, 5)),
+    "scalar": np.array(3.0),
+    "structured": np.zeros(2, [("a", int)]),
+    "function": len,
+    "type": int,
+    "Mesh": CUBE,
+    "Camera": CAMERA,
+    "Scene": SCENE,
+    "Path": Path("nothing.obj"),
+    "pair": (FLAT, ONE),
+}
+
+
+def complaint_of(error: BaseException) -> str | None:
+    """None if a function of topleft raised the error by itself, in words; else where it came from."""
+    if not isinstance(error, (TypeError, ValueError, IndexError, OSError, tl.TopleftError)):
+        return f"a {type(error).__name__}: {error}"
+    frames = traceback.extract_tb(error.__traceback__)
+    frame = frames[-1]
+    if len(frames) == 1 or ("argument" in str(error) and "() " in str(error)):
+        return None  # by Python itself, for a name that the function does not have
+    line = frame.line or linecache.getline(frame.filename, frame.lineno or 0)
+    if ROOT not in Path(frame.filename).parents or not line.strip().startswith("raise"):
+        return f"{type(error).__name__}: {error} (from {frame.filename}:{frame.lineno}: {line.strip()})"
+    return None if str(error) else f"an empty {type(error).__name__}"
+
+
+def complaints(function, right, wrong_names, arguments):
+    for argument in arguments:
+        for name in wrong_names:
+            if (argument, name) == ("progress", "function"):
+                continue  # `len` of a `Result`: the caller's own function fails
+            try:
+                function(**{**right, argument: WRONG[name]})
+            except Exception as error:
+                found = complaint_of(error)
+                if found:
+                    yield f"{argument}={name}: {found}"
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_arguments_that_suit_are_taken(name):
+    function, right = CALLS[name]
+    if name in ("load", "save_image"):
+        with pytest.raises((OSError, tl.TopleftError)):
+            function(**right)
+    else:
+        function(**right)
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("name", CALLS)
+def test_wrong_arguments_work_or_are_named(name):
+    function, right = CALLS[name]
+    found = list(complaints(function, right, WRONG, right))
+    assert not found, f"{len(found)} of {len(right) * len(WRONG)}:\n" + "\n".join(found)
+
+
+def test_every_public_callable_is_tried():
+    others = {"simplify", "release_memory", "build_info"}  # the first takes seconds, the others nothing
+    made = {"DepthLayers", "Detail", "Fragments", "FragmentsBatch", "Level", "Levels", "Plan", "SceneDepthLayers",
+            "SceneFragments", "ViewLayers", "ImageError", "MeshError", "MissingPackageError", "TopleftError",
+            "MeshWarning", "Overlap", "PointFragments"}  # fmt: skip
+    public = {name for name in tl.__all__ if callable(getattr(tl, name)) and not inspect.ismodule(getattr(tl, name))}
+    assert public <= set(CALLS) | others | made
