@@ -30,7 +30,7 @@ more stay round."""
 MeshLike: TypeAlias = Any
 """What `as_mesh` takes."""
 
-FILE_READERS: list[Callable[[str | os.PathLike[str]], Mesh]] = []
+FILE_READERS: list[Callable[[str | os.PathLike[str]], Any]] = []
 """What reads a mesh where a path is given: `load`, which puts itself here, for it stands on a floor above this one."""
 
 CORNERS_OF_CELL = {"triangle": 3, "triangle6": 3, "triangle7": 3, "quad": 4, "quad8": 4, "quad9": 4, "polygon": None}
