@@ -88,13 +88,37 @@ typedef struct {
  * it holds the whole square.  The last two have no depth and no order: they draw masks and counts. */
 typedef enum { TL_TEST_SAMPLE = 0, TL_TEST_OUTER = 1, TL_TEST_INNER = 2 } tl_test;
 
+/* What drawing asks now and then: whether to go on. */
+typedef struct tl_pause {
+    int64_t left_px;               /* about how many pixels are drawn before it asks again */
+    int (*ask)(struct tl_pause *); /* sets left_px anew; unless it returns 0 the picture is given up */
+} tl_pause;
+
 /* The part of the picture that a buffer shows, in whole pixels. */
 typedef struct {
     int64_t x_px, y_px; /* picture pixel of column 0, row 0 */
     int64_t width, height;
     int subpixel_bits;
     tl_test test;
+    tl_pause *pause; /* or NULL: what has begun is drawn to its end */
 } tl_window;
+
+/* Counts work that takes as long as so many pixels of a large triangle. */
+static inline void tl_count_work(const tl_window *window, int64_t n_px)
+{
+    if (window->pause)
+        window->pause->left_px -= n_px;
+}
+
+/* Whether to give up the picture: kernels return soon, buffers of which they say so are left as they were found, and
+ * what else they return means nothing. */
+static inline int tl_is_given_up(const tl_window *window)
+{
+    return window->pause && window->pause->left_px < 0 && window->pause->ask(window->pause);
+}
+
+/* What setup and cull of a triangle take. */
+#define TL_SETUP_PX 32
 
 typedef enum { TL_CULL_NONE = 0, TL_CULL_BACK = 1, TL_CULL_FRONT = 2 } tl_cull;
 typedef enum { TL_METHOD_AUTO = 0, TL_METHOD_EDGE = 1, TL_METHOD_SCANLINE = 2 } tl_method;
@@ -263,7 +287,8 @@ static inline int64_t tl_blend_cells(int64_t width)
 
 /* The layers that are seen through each other, and their colours: straight, alpha last. */
 typedef struct {
-    const int32_t *ids; /* planes, of the first pixel on; -1 ends the layers of a pixel */
+    const int32_t *ids;  /* planes, of the first pixel on; -1, or what is no triangle, ends the layers of a pixel */
+    int64_t n_triangles; /* that were peeled */
     int64_t plane_px;
     int n_layers;
     int n_channels; /* 2 or 4 */

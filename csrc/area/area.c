@@ -36,6 +36,7 @@ enum {
 typedef struct {
     area_plane plane;
     const tl_scene *scene;
+    const tl_window *window;
     int64_t bad_row;
     int32_t max_extent;
     int is_wide;
@@ -69,6 +70,8 @@ static void flush_edges(area_state *s, int kind, int is_end)
     n -= n_rest;
     for (int k = n; is_end && k < n + TL_LANES; k++) /* below the window: no height */
         s->edges[kind][k] = (edge_record){0, s->plane.bottom_fx, 0, 1};
+    if (n > 0 && (kind == TL_EDGES_LONG || kind >= TL_EDGES_FLAT + TL_EDGES_LONG))
+        tl_count_work(s->window, 8 * n * s->window->height); /* at most: as long as eight pixels each row */
     if (n > 0 && s->is_wide)
         flush_wide(s, kind, n);
     else if (n > 0)
@@ -98,6 +101,7 @@ static void push_edge(area_state *s, int64_t x0, int64_t y0, int64_t x1, int64_t
     const int64_t limit = (int64_t)1 << 30;
     const int is_narrow = x0 > -limit && x0 < limit && x1 > -limit && x1 < limit && y0 > -limit && y1 < limit;
     if (!is_narrow || max64(x1 - x0, x0 - x1) > s->max_extent || y1 - y0 > s->max_extent) {
+        tl_count_work(s->window, 16 * s->window->height);
         add_exact_edge(&s->plane, x0, y0, x1, y1, sign);
         return;
     }
@@ -180,7 +184,7 @@ TL_INLINE void push_batch(area_state *s, int64_t i, const int32_t *corners, vm l
     vm alone =
         vm_or(vi_gt_unsigned(vi_sub(x_max, x_min), max_extent), vi_gt_unsigned(vi_sub(y_max, y_min), max_extent));
     alone = vm_and(live, vm_or(alone, vi_eq(x_min, vi_set1(TL_SPECIAL))));
-    for (unsigned lanes = vm_bits(alone); lanes; lanes &= lanes - 1)
+    for (unsigned lanes = vm_bits(alone); lanes && !tl_is_given_up(s->window); lanes &= lanes - 1)
         push_alone(s, i + __builtin_ctz(lanes));
     const vm meets_rows = vm_and(vi_gt(vi_set1(p->bottom_fx), y_min), vi_gt(y_max, vi_set1(p->top_fx)));
     /* heights are whole numbers of units: the edges of a triangle that lies left of the window add up to nothing
@@ -230,13 +234,15 @@ static int64_t draw_area(const tl_scene *scene, const tl_window *window, const t
     area_state s;
     const int bits = window->subpixel_bits;
     place_plane(window, target, &s.plane);
-    s.scene = scene, s.bad_row = -1, s.is_wide = target->is_wide;
+    s.scene = scene, s.window = window, s.bad_row = -1, s.is_wide = target->is_wide;
     s.max_extent = 1 << (bits + TL_MAX_EDGE_BITS < 25 ? bits + TL_MAX_EDGE_BITS : 25);
     memset(s.n, 0, sizeof s.n);
     const tl_share all = {.end = scene->n_triangles};
     int32_t tail[3 * TL_LANES];
-    for (int64_t i = 0; i < scene->n_triangles && s.bad_row < 0; i += TL_LANES)
+    for (int64_t i = 0; i < scene->n_triangles && s.bad_row < 0 && !tl_is_given_up(window); i += TL_LANES) {
+        tl_count_work(window, TL_SETUP_PX * TL_LANES);
         push_batch(&s, i, share_corners(scene, &all, i, tail), vm_first(scene->n_triangles - i));
+    }
     for (int kind = 0; kind < TL_EDGES_NONE; kind++)
         flush_edges(&s, kind, 1);
     if (s.is_wide)

@@ -113,6 +113,8 @@ TL_INLINE void blend_batch(blend_pass *p, const int32_t *corners, vi id, vm live
             push(&s->rows, vm_and(drawn, before), b.col, b.row, b.n_cols, b.n_rows, id);
             drawn = vm_and_not(drawn, before);
             flush_blend(p);
+            if (tl_is_given_up(p->mix.window))
+                return;
             blend_alone(&p->mix, ids[lane]);
         }
     }
@@ -129,8 +131,9 @@ static int64_t blend_batches(blend_pass *p)
     batch_state *s = &p->batch;
     const tl_scene *scene = s->scene;
     const tl_share all = {.first = 0, .end = scene->n_triangles};
-    for (int64_t i = 0; i < all.end && s->bad_row < 0; i += TL_LANES) {
+    for (int64_t i = 0; i < all.end && s->bad_row < 0 && !tl_is_given_up(p->mix.window); i += TL_LANES) {
         int32_t corners[3 * TL_LANES];
+        tl_count_work(p->mix.window, TL_SETUP_PX * TL_LANES);
         blend_batch(p, share_corners(scene, &all, i, corners), vi_add(vi_set1((int32_t)i), vi_iota()),
                     vm_first(all.end - i));
     }
@@ -179,8 +182,10 @@ static int64_t blend_window(const tl_scene *scene, const tl_window *window, cons
         bad_row = blend_batches(&p);
     } else {
         bad_row = first_bad_row(scene->triangles, scene->n_triangles, scene->mesh.n_vertices);
-        for (int64_t i = 0; bad_row < 0 && i < scene->n_triangles; i++)
+        for (int64_t i = 0; bad_row < 0 && i < scene->n_triangles && !tl_is_given_up(window); i++) {
+            tl_count_work(window, TL_SETUP_PX);
             blend_alone(b, i);
+        }
     }
     for (int64_t row = 0; canvas->packed && row < window->height; row++)
         unpack_u8(canvas->packed + row * b->stride, window->width, canvas->n_channels,

@@ -146,6 +146,8 @@ TL_INLINE void blend_area_batch(area_pass *p, int64_t i, const int32_t *corners,
         drawn = vm_and_not(drawn, before);
         if (p->n)
             flush_atlas(p);
+        if (tl_is_given_up(window))
+            return;
         blend_area_alone(p->mix, i + lane);
     }
     if (vm_any(drawn))
@@ -157,11 +159,11 @@ static int64_t blend_areas(blend_state *b)
 {
     const tl_scene *scene = b->scene;
     const tl_window *window = b->window,
-                    atlas = {0, 0, TL_ATLAS_COLS, TL_ATLAS_ROWS, window->subpixel_bits, TL_TEST_SAMPLE};
+                    atlas = {0, 0, TL_ATLAS_COLS, TL_ATLAS_ROWS, window->subpixel_bits, TL_TEST_SAMPLE, NULL};
     const int64_t far = (int64_t)1 << 30;
     if (window->x_px <= -far || window->x_px >= far || window->y_px <= -far || window->y_px >= far) {
         const int64_t bad_row = first_bad_row(scene->triangles, scene->n_triangles, scene->mesh.n_vertices);
-        for (int64_t i = 0; bad_row < 0 && i < scene->n_triangles; i++)
+        for (int64_t i = 0; bad_row < 0 && i < scene->n_triangles && !tl_is_given_up(window); i++)
             blend_area_alone(b, i);
         return bad_row;
     }
@@ -169,11 +171,12 @@ static int64_t blend_areas(blend_state *b)
     p.mix = b, p.n = p.n_atlas_rows = 0;
     place_plane(&atlas, &(tl_area){.cells = b->canvas->cells}, &p.area.plane);
     p.area.plane.stride = TL_ATLAS_COLS; /* what an edge adds right of a row is 0 */
-    p.area.scene = scene, p.area.bad_row = -1, p.area.is_wide = 0;
+    p.area.scene = scene, p.area.window = &atlas, p.area.bad_row = -1, p.area.is_wide = 0;
     memset(p.area.n, 0, sizeof p.area.n);
     const tl_share all = {.first = 0, .end = scene->n_triangles};
-    for (int64_t i = 0; i < all.end && p.area.bad_row < 0; i += TL_LANES) {
+    for (int64_t i = 0; i < all.end && p.area.bad_row < 0 && !tl_is_given_up(window); i += TL_LANES) {
         int32_t corners[3 * TL_LANES];
+        tl_count_work(window, TL_SETUP_PX * TL_LANES);
         blend_area_batch(&p, i, share_corners(scene, &all, i, corners), vm_first(all.end - i));
     }
     flush_atlas(&p);

@@ -199,7 +199,7 @@ static void blend_strip(blend_state *b, const tl_triangle *pieces, int64_t n, in
         return;
     const int64_t col = (int64_t)left;
     const tl_window strip = {window->x_px + col, window->y_px + row, (int64_t)right - col, n_rows, bits,
-                             TL_TEST_SAMPLE};
+                             TL_TEST_SAMPLE, NULL};
     area_plane plane;
     fetch_pixels(b, row * b->stride + col, n_rows, min64(strip.width, 128));
     place_plane(&strip, &(tl_area){.cells = b->canvas->cells}, &plane);
@@ -245,6 +245,7 @@ static __attribute__((noinline)) void blend_area_alone(blend_state *b, int64_t i
     if (!b->is_flat)
         begin_gouraud(b, i, &parts.set, parts.corners, parts.is_cut);
     const int n_rows = strip_rows(min64(window->width, right - left + 4));
+    tl_count_work(window, 4 * (end_row - first_row) * (16 + min64(window->width, right - left)));
     for (int64_t row = first_row; row < end_row; row += n_rows)
         blend_strip(b, t, n, row, (int)min64(n_rows, end_row - row));
 }

@@ -121,6 +121,7 @@ static void draw_line(const line_state *s, const int32_t *edge)
     const int is_steep = dy > size_x, right = dx < 0 ? -1 : 1;
     step_range r = is_steep ? steps_along(y0, 1, w->height, d) : steps_along(x0, right, w->width, d);
     r = is_steep ? steps_across(r, x0, right, w->width, d, q) : steps_across(r, y0, 1, w->height, d, q);
+    tl_count_work(w, TL_SETUP_PX + 4 * max64(0, r.last - r.first)); /* a pixel takes as long as four of a row */
     if (r.first > r.last)
         return;
     const tl_int128 across = (tl_int128)q * r.first + d / 2;
@@ -201,6 +202,7 @@ TL_INLINE void draw_lanes(line_state *s, const int32_t *edges, vm live, int has_
     const vm outside = vm_and_not(vm_or(above, beside), is_special);
     const vm alone = vm_or(is_special, vm_or(astride, vi_gt(l.steps, vi_set1(TL_MAX_STEPS))));
     live = vm_and_not(live, outside);
+    tl_count_work(w, TL_SETUP_PX * TL_LANES);
     for (unsigned rest = vm_bits(vm_and(live, alone)); rest; rest &= rest - 1)
         draw_line(s, edges + 2 * __builtin_ctz(rest));
     const vi sideways = vi_select(is_left, vi_set1(-1), one), stride = vi_set1((int32_t)s->target->stride_px);
@@ -220,9 +222,9 @@ TL_INLINE void draw_all_lines(line_state *s, int has_depth)
 {
     const int64_t n = s->lines->n_edges;
     int64_t i = 0;
-    for (; !is_near(s->window) && i < n; i++)
+    for (; !is_near(s->window) && i < n && !tl_is_given_up(s->window); i++)
         draw_line(s, s->lines->edges + 2 * i);
-    for (; i + TL_LANES <= n; i += TL_LANES)
+    for (; i + TL_LANES <= n && !tl_is_given_up(s->window); i += TL_LANES)
         draw_lanes(s, s->lines->edges + 2 * i, vm_all(), has_depth);
     if (i < n) {
         int32_t last[2 * TL_MAX_LANES];

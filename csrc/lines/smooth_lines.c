@@ -174,10 +174,12 @@ static void walk_far_line(const smooth_state *s, const smooth_line *l)
 TL_INLINE void draw_all_smooth(smooth_state *s, int has_depth)
 {
     const int64_t limit = (int64_t)1 << 24;
-    for (int64_t i = 0; i < s->lines->n_edges; i++) {
+    for (int64_t i = 0; i < s->lines->n_edges && !tl_is_given_up(s->window); i++) {
         smooth_line l;
+        tl_count_work(s->window, TL_SETUP_PX);
         if (!setup_smooth_line(s, s->lines->edges + 2 * i, &l))
             continue;
+        tl_count_work(s->window, 16 * (l.end - l.first)); /* three pixels a step, each with a root */
         if (l.du > -limit && l.du < limit)
             walk_smooth_line(s, &l, has_depth);
         else

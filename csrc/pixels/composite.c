@@ -37,9 +37,9 @@ static void composite(const tl_composite *p, int64_t n, void *pixels)
         double sum[3] = {0.0, 0.0, 0.0}, alpha = 0.0, through = 1.0;
         for (int k = 0; k < p->n_layers; k++) {
             const int64_t id = p->ids[k * p->plane_px + i];
-            const int64_t at = (p->is_flat ? id : k * n + i) * p->n_channels;
-            if (id < 0)
+            if (id < 0 || id >= p->n_triangles) /* the caller may have written into the layers */
                 break;
+            const int64_t at = (p->is_flat ? id : k * n + i) * p->n_channels;
             if (!p->is_u8)
                 add_layer_f32((const float *)p->colors + at, n_colors, &through, sum, &alpha);
             else if (p->is_flat)

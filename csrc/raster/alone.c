@@ -135,6 +135,7 @@ TL_INLINE void draw_triangle(const tl_vertex_set *set, const int32_t *corners, i
         count_unseen_one(target, sink, &t, window);
         return;
     }
+    tl_count_work(window, (t.row1 - t.row0) * (t.col1 - t.col0));
     t.id = name_of(scene, id);
     if (sink == TL_SINK_CENSUS) {
         count_drawn(&t, scene, window, target->census);

@@ -82,7 +82,7 @@ TL_INLINE void draw_each_alone(const batch_state *s, tl_sink sink, vm alone, vi 
         return;
     int32_t ids[TL_MAX_LANES];
     vi_store(ids, id);
-    for (unsigned lanes = vm_bits(alone); lanes; lanes &= lanes - 1)
+    for (unsigned lanes = vm_bits(alone); lanes && !tl_is_given_up(s->window); lanes &= lanes - 1)
         draw_one(s->scene, ids[__builtin_ctz(lanes)], s->window, s->target, sink);
 }
 
@@ -196,7 +196,8 @@ TL_INLINE void draw_batches(const tl_scene *scene, const tl_window *window, cons
     cluster_scene cluster;
     tl_share part = *share;
     const int64_t n_parts = clusters ? list_clusters(clusters, window, target) : 1;
-    for (int64_t next = 0; next < n_parts; next++) {
+    int is_given_up = 0;
+    for (int64_t next = 0; next < n_parts && !is_given_up; next++) {
         if (clusters) {
             const tl_cluster *c = clusters->mesh->clusters + clusters->list[next];
             if (clusters->may_be_hidden && is_cluster_hidden(c, clusters->seen, window, target))
@@ -205,8 +206,10 @@ TL_INLINE void draw_batches(const tl_scene *scene, const tl_window *window, cons
             clusters->n_drawn++;
             s.scene = &cluster.scene;
         }
-        for (int64_t i = part.first; i < part.end && s.bad_row < 0; i += TL_LANES) {
+        for (int64_t i = part.first; i < part.end && s.bad_row < 0 && !is_given_up; i += TL_LANES) {
             int32_t corners[3 * TL_LANES];
+            tl_count_work(window, TL_SETUP_PX * TL_LANES);
+            is_given_up = tl_is_given_up(window);
             const vm live = vm_first(part.end - i);
             const vi id = part.ids ? vi_load_masked(live, part.ids + i) : vi_add(vi_set1((int32_t)i), vi_iota());
             draw_batch(&s, sink, share_corners(s.scene, &part, i, corners), id, live);
@@ -229,8 +232,10 @@ TL_INLINE void draw_scene(const tl_scene *scene, const tl_window *window, const 
     *bad_row = first_bad_row(scene->triangles, scene->n_triangles, scene->mesh.n_vertices);
     if (*bad_row >= 0)
         return;
-    for (int64_t i = 0; i < scene->n_triangles; i++)
+    for (int64_t i = 0; i < scene->n_triangles && !tl_is_given_up(window); i++) {
+        tl_count_work(window, TL_SETUP_PX);
         draw_one(scene, i, window, target, sink);
+    }
 }
 
 TL_SINK_COPIES(draw_scene,

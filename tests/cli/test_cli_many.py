@@ -200,6 +200,8 @@ def test_job_file_takes_from_the_command_line_what_it_does_not_say(run, folder):
         ("jobs.toml", "size = [", "topleft: cannot read 'jobs.toml': "),
         ("jobs.json", "{", "topleft: cannot read 'jobs.json': "),
         ("jobs.json", b"\xff", "topleft: cannot read 'jobs.json': "),
+        ("jobs.json", "[" * 100_000, "topleft: cannot read 'jobs.json': it is nested too deeply"),
+        ("jobs.toml", "a = " + "[" * 100_000, "topleft: cannot read 'jobs.toml': it is nested too deeply"),
         ("jobs.json", "[]", "topleft: 'jobs.json' must hold an object, got list"),
         ("jobs.json", "{}", "topleft: 'jobs.json' must have jobs: [[job]] in TOML, a list \"job\" of objects in JSON"),
     ],
@@ -361,6 +363,9 @@ def test_video_without_ffmpeg_gives_the_hint_before_any_work(run, folder, monkey
         (["-o", "p/", "--layers", "ids"], "topleft: argument --layers: layers must be some of color, alpha,"),
         (["-o", "p/", "--layers", "flow"], "topleft: argument --layers: layer 'flow' needs two cameras"),
         (["-o", "p/", "--fps", "0"], "topleft: argument --fps: must be a number from 0.1 to 100, got '0'"),
+        (["-o", "p/" * 2000 + "a.png"], "topleft: OUT must lie in at most 200 folders, got 2000"),
+        (["-o", "p/", "--views", "1000000000"], "topleft: argument --views: must be at most 100000, got 1,000,000,000"),
+        (["-o", "p/", "--views", "9" * 4000], "topleft: argument --views: is too large"),
         (["-o", "p/", "--jobs", "0"], "topleft: argument --jobs: must be a positive whole number, got '0'"),
     ],
 )

@@ -198,6 +198,42 @@ def test_levels_broken_file_is_refused(tmp_path):
         tl.Levels.load(tmp_path / "other.npz", torus())
 
 
+CRAFTED = {
+    "bound": [np.zeros(3), np.array(None), np.zeros((1, 1)), np.array([np.nan]), np.array(["x"]), np.array([-1.0])],
+    "known": [np.zeros(0), np.array(1.0)],
+    "mesh": [np.array(["a", "b"])],
+    "triangles_1": [np.array([[0, 1, 10**6]]), np.zeros(4), np.array("x")],
+    "vertices_1": [np.zeros((3, 2)), np.full((4, 3), 1j)],
+}
+
+
+@pytest.mark.parametrize(("name", "value"), [(name, value) for name, values in CRAFTED.items() for value in values])
+def test_levels_crafted_file_is_refused(tmp_path, name, value):
+    tl.simplify(torus()).save(tmp_path / "torus.npz")
+    with np.load(tmp_path / "torus.npz") as file:
+        arrays = dict(file) | {name: value}
+    np.savez(tmp_path / "torus.npz", **arrays)
+    with pytest.raises(tl.MeshError, match=r"torus.npz'"):
+        tl.Levels.load(tmp_path / "torus.npz", torus())
+
+
+def test_levels_file_of_another_kind_is_refused(tmp_path):
+    with open(tmp_path / "array.npz", "wb") as file:
+        np.save(file, np.zeros(3))
+    with pytest.raises(tl.MeshError, match=r"array.npz': broken, or not levels of detail"):
+        tl.Levels.load(tmp_path / "array.npz", torus())
+
+
+@pytest.mark.parametrize("n_points", [1, 2])
+def test_simplify_of_a_mesh_that_is_a_point_or_a_line_has_levels_of_it(n_points):
+    rng = np.random.default_rng(0)
+    points = np.ones((300, 3)) * rng.integers(0, n_points, (300, 1))
+    mesh = tl.Mesh(points, rng.integers(0, 300, (600, 3)), uv=rng.random((300, 2)))
+    levels = tl.simplify(mesh, smallest=10)
+    assert len(levels[0].mesh.triangles) == 600
+    assert all(level.bound <= 2 for level in levels)
+
+
 def test_levels_file_that_is_not_there_is_named(tmp_path):
     with pytest.raises(FileNotFoundError, match=r"there is no file .*none.npz"):
         tl.Levels.load(tmp_path / "none.npz", torus())

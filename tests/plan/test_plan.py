@@ -231,7 +231,9 @@ def test_plan_checks_indices():
         tl.plan(boxes(8)[0], [[0, 1, 3]], SIZE)
 
 
-@pytest.mark.parametrize(("size", "triangles"), [((0, 5), [[0, 1, 2]]), (SIZE, np.empty((0, 3), np.int32))])
+@pytest.mark.parametrize(
+    ("size", "triangles"), [((0, 5), [[0, 1, 2]]), ((7, 0), [[0, 1, 2]]), (SIZE, np.empty((0, 3), np.int32))]
+)
 @pytest.mark.parametrize("outputs", ["coverage", "color", "depth"])
 def test_plan_of_nothing(size, triangles, outputs):
     plan = tl.plan(boxes(8)[0], triangles, size, outputs=outputs).measure(1)
@@ -337,11 +339,22 @@ def test_costs_of_the_cache_come_first(tmp_path):
     assert "mine" in tl.plan(*boxes(8), SIZE).costs
 
 
-@pytest.mark.parametrize("text", ["", "{}", "[1]", '{"machine": 1}'])
+@pytest.mark.parametrize("text", ["", "{}", "[1]", '{"machine": 1}', "[" * 100_000])
 def test_costs_that_cannot_be_read_are_passed_over(text):
     shipped = costs.load_costs()
     costs.cache_file().parent.mkdir()
     costs.cache_file().write_text(text)
+    assert costs.load_costs() == shipped
+
+
+@pytest.mark.parametrize("value", [None, {}, [], "x", True, {"x": 1.0}, float("nan")])
+@pytest.mark.parametrize("name", ["call", "vertex", "draw", "other", "residual"])
+def test_costs_that_are_incomplete_are_passed_over(name, value):
+    shipped = costs.load_costs()
+    costs.cache_file().parent.mkdir()
+    costs.cache_file().write_text(json.dumps({**vars_of(shipped), name: value}))
+    assert costs.load_costs() == shipped
+    costs.cache_file().write_text(json.dumps({**vars_of(shipped), name: {**getattr(shipped, name), "mask": value}}))
     assert costs.load_costs() == shipped
 
 

@@ -181,13 +181,13 @@ def test_module_level_calls_keep_scratch_until_it_is_released():
 
     tl.release_memory()
     tl.fill(SQUARE, HALVES, [1, 2], SIZE)
-    kept = memory.SCRATCH._threads.kept._blocks
+    kept = memory.SCRATCH.threads.kept._blocks
     assert set(kept) == {"labels", "records", "triangles"}
     records = kept["records"]
     tl.coverage(SQUARE, LEFT, SIZE)
     assert kept["records"] is records
     tl.release_memory()
-    assert memory.SCRATCH._threads.kept is None
+    assert memory.SCRATCH.threads.kept is None
 
 
 def test_module_level_calls_do_not_keep_more_than_the_bound(monkeypatch):
@@ -196,7 +196,7 @@ def test_module_level_calls_do_not_keep_more_than_the_bound(monkeypatch):
     tl.release_memory()
     monkeypatch.setattr(memory, "MAX_SCRATCH_BYTES", 63)
     tl.fill(SQUARE, HALVES, [1, 2], SIZE)  # 4 records of 16 bytes, 16 labels of 4, 6 indices of 4
-    assert set(memory.SCRATCH._threads.kept._blocks) == {"triangles"}
+    assert set(memory.SCRATCH.threads.kept._blocks) == {"triangles"}
     tl.release_memory()
 
 

@@ -9,7 +9,6 @@ from comparing import assert_same, half_ulp
 from engine_cases import ON_EACH_ISA, mixed, on
 
 import topleft as tl
-from topleft._raster import composite as composite_function
 from topleft.methods.reference import peel as ref
 
 SIZE = (24, 18)
@@ -181,6 +180,20 @@ def test_composite_bad_types_are_refused():
 def test_composite_examples_hold():
     finder = doctest.DocTestFinder()
     runner = doctest.DocTestRunner()
-    for found in finder.find(composite_function, "composite", module=False, globs={}):
+    for found in finder.find(tl.composite, "composite", module=False, globs={}):
         assert runner.run(found).failed == 0
     assert runner.tries > 0
+
+
+@pytest.mark.parametrize("wrong", [10**8, 2**31 - 1, -(2**31)])
+@pytest.mark.parametrize("per", ["triangle", "vertex"])
+@ON_EACH_ISA
+def test_composite_with_an_id_that_no_triangle_has_ends_the_layers_of_that_pixel(isa, per, wrong):
+    _, layers = peeled()
+    colors = palette_of(np.random.default_rng(2), layers.n_triangles if per == "triangle" else layers.n_vertices, "u1")
+    y, x = np.argwhere(layers.count >= 2)[0]
+    layers.planes[0][1, y, x] = -1
+    with on(isa):
+        ended = tl.composite(layers, colors, per=per)
+        layers.planes[0][1, y, x] = wrong  # a public array
+        assert_same(tl.composite(layers, colors, per=per), ended)

@@ -269,3 +269,10 @@ def test_values_of_wrong_shape_raise(values):
 def test_values_of_wrong_dtype_raise():
     with raises(TypeError, "values must be real numbers, got dtype"):
         tl.rasterize(SQUARE, HALVES, SIZE).interpolate(["a", "b", "c", "d"])
+
+
+@pytest.mark.parametrize("verb", ["coverage", "overdraw", "rasterize", "wireframe", "peel"])
+@pytest.mark.parametrize("size", [(2**31 - 1, 2**31 - 1), (2**31 - 1, 2**20)])
+def test_a_picture_that_no_memory_holds_is_refused_with_the_bytes(verb, size):
+    with pytest.raises(MemoryError, match=r"no memory for an array of [\d,]+ bytes, which this size or scene needs"):
+        getattr(tl, verb)([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]], size)

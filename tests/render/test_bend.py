@@ -11,6 +11,7 @@ import topleft as tl
 from topleft import scenes
 from topleft._camera.camera import Camera
 from topleft._model.mesh import Mesh
+from topleft._render import bend as bend_file
 from topleft._render.bend import MAX_HALVINGS, PIECES, bend
 
 SIZE = (160, 120)
@@ -312,3 +313,21 @@ def test_texture_through_a_lens_is_that_of_a_fine_mesh(lens):
     both = (got[..., :3] != 255).any(-1) & (expected[..., :3] != 255).any(-1)
     assert both.sum() > 2000
     assert np.abs(got[both].astype(int) - expected[both]).mean() < 4  # an eighth of a pixel of a texture with edges
+
+
+def large_triangles(n, size=20.0):
+    return np.random.default_rng(3).normal(size=(3 * n, 3)) * size, np.arange(3 * n).reshape(-1, 3)
+
+
+def test_bend_in_a_small_picture_makes_no_more_parts_than_it_has_pixels_for():
+    camera = Camera.from_intrinsics(K / [[10.0], [10.0], [1.0]], TURNED, (16, 12), near=0.1, far=200.0, **FISHEYE)
+    n_triangles = 40
+    bent = bend(*large_triangles(n_triangles), camera, camera.lens, (16, 12))
+    assert len(bent.triangles) < 3 * n_triangles * 16 * 12  # 79,090 where the depth of parts of a pixel counted
+
+
+def test_bend_into_too_many_parts_is_refused_with_the_number(monkeypatch):
+    camera = camera_of(FISHEYE)
+    monkeypatch.setattr(bend_file, "MAX_PARTS", 1000)
+    with pytest.raises(ValueError, match=r"the lens splits 20 triangles into more than 1160 parts: give it a larger"):
+        bend(*large_triangles(20), camera, camera.lens, SIZE)

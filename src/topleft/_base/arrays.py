@@ -41,16 +41,40 @@ INT32_MAX = 2**31 - 1
 
 SIZE_HINT = "; the shape of a picture begins with its height: image.shape[1::-1] is its size"
 
+#: Device types of DLPack whose memory the CPU reads: CPU, pinned for CUDA or ROCm, CUDA managed.
+CPU_DEVICES = frozenset({1, 3, 11, 13})
+DEVICES = {2: "CUDA device", 4: "OpenCL device", 7: "Vulkan device", 8: "Metal device", 10: "ROCm device",
+           14: "oneAPI device", 15: "WebGPU device"}  # fmt: skip
+
 
 def as_array(name: str, values: ArrayLike) -> NDArray[Any]:
     """Return what NumPy makes of `values`, aligned for the kernels, without a copy where it can."""
-    if not isinstance(values, np.ndarray) and hasattr(values, "__dlpack__") and not hasattr(values, "__array__"):
-        values = np.from_dlpack(values)  # type: ignore[arg-type]
+    if not isinstance(values, np.ndarray) and (hasattr(values, "__dlpack__") or hasattr(values, "__array__")):
+        values = array_of_tensor(name, values)
     try:
         array = np.asarray(values)
     except ValueError as error:
         raise ValueError(f"{name} must be array_like, got rows of different lengths ({error})") from None
     return array if array.flags.aligned else array.copy()
+
+
+def array_of_tensor(name: str, tensor: Any) -> NDArray[Any]:
+    """Return the memory of another library's array: of PyTorch, JAX, or whatever speaks DLPack or the array API."""
+    kind = f"{type(tensor).__module__.partition('.')[0]}.{type(tensor).__name__}"
+    if hasattr(tensor, "__dlpack_device__"):
+        try:
+            device, number = tensor.__dlpack_device__()
+        except Exception as error:  # a device that DLPack has no number for
+            raise TypeError(f"{name} must lie in the memory of the CPU, got a {kind} elsewhere ({error})") from None
+        if device not in CPU_DEVICES:
+            where = f"{DEVICES.get(device, f'DLPack device type {int(device)}')} {number}"
+            raise TypeError(f"{name} must lie in the memory of the CPU, got a {kind} on {where}: copy it to the CPU")
+    if getattr(tensor, "requires_grad", False) is True:
+        raise TypeError(f"{name} must not ask for gradients, got a {kind} that requires grad: pass {name}.detach()")
+    try:
+        return np.asarray(tensor) if hasattr(tensor, "__array__") else np.from_dlpack(tensor)
+    except Exception as error:  # theirs: a dtype or a layout that NumPy has not
+        raise TypeError(f"{name} must be an array that NumPy can read, got a {kind} ({error})") from None
 
 
 def as_vertices(values: ArrayLike, *, has_transform: bool) -> NDArray[Any]:
@@ -112,7 +136,7 @@ def bad_triangle(values: ArrayLike, row: int, n_vertices: int) -> IndexError:
     """Return the error for a row of `triangles` that names a vertex that does not exist."""
     return IndexError(
         f"triangles must hold indices in [0, {n_vertices}), the number of vertices; "
-        f"row {row} is {np.asarray(values)[row].tolist()}"
+        f"row {row} is {as_array('triangles', values)[row].tolist()}"
     )
 
 

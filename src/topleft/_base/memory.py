@@ -75,7 +75,7 @@ class ScratchMemory(FreshMemory):
     """Results are new; scratch is the calling thread's own and kept, up to `MAX_SCRATCH_BYTES` a name."""
 
     def __init__(self) -> None:
-        self._threads = threading.local()
+        self.threads = threading.local()  # `kept`: of each thread
 
     def empty(self, name: str, shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
         """Return an uninitialised array."""
@@ -90,14 +90,14 @@ class ScratchMemory(FreshMemory):
         return self._kept().constant(name, n, value)
 
     def _kept(self) -> KeptMemory:
-        kept: KeptMemory | None = getattr(self._threads, "kept", None)
+        kept: KeptMemory | None = getattr(self.threads, "kept", None)
         if kept is None:
-            kept = self._threads.kept = KeptMemory()
+            kept = self.threads.kept = KeptMemory()
         return kept
 
     def release(self) -> None:
         """Give the calling thread's scratch back."""
-        self._threads.kept = None
+        self.threads.kept = None
 
 
 FRESH = FreshMemory()
@@ -121,7 +121,10 @@ def allocate(n_bytes: int) -> NDArray[np.uint8]:
     if n_bytes < 2 * HUGE_PAGE:
         return np.empty(n_bytes, np.uint8)
     n_whole = -(-n_bytes // HUGE_PAGE) * HUGE_PAGE
-    block = np.empty(n_whole + HUGE_PAGE, np.uint8)
+    try:
+        block = np.empty(n_whole + HUGE_PAGE, np.uint8)
+    except (MemoryError, ValueError):  # ValueError: beyond what addresses can tell
+        raise MemoryError(f"no memory for an array of {n_bytes:,} bytes, which this size or scene needs") from None
     skip = -block.ctypes.data % HUGE_PAGE
     return block[skip : skip + n_whole]
 

@@ -4,12 +4,18 @@ from __future__ import annotations
 
 import operator
 import os
+import threading
+from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
 from itertools import pairwise
 from typing import TYPE_CHECKING, TypeVar
 
+from topleft import _engine
+from topleft._base.memory import SCRATCH
+
 if TYPE_CHECKING:
-    from concurrent.futures import ThreadPoolExecutor
+    from concurrent.futures import Future, ThreadPoolExecutor
 
 __all__ = ["available_threads", "count_threads", "parse_threads", "run_parts", "threads_for"]
 
@@ -28,6 +34,15 @@ def _forget_pool() -> None:
 
 
 os.register_at_fork(after_in_child=_forget_pool)
+
+
+def _hear_signals() -> None:
+    """Let kernels answer Ctrl-C in the main thread, which is the one that forked in a child."""
+    _engine.hear_signals_in(threading.main_thread().ident or 0, SCRATCH.threads)
+
+
+_hear_signals()
+os.register_at_fork(after_in_child=_hear_signals)
 
 
 def available_threads() -> int:
@@ -66,26 +81,70 @@ def threads_for(threads: object, n_triangles: int) -> int:
 
 
 def run_parts(work: Callable[[int, int], Part], n: int, n_parts: int) -> list[Part]:
-    """Return ``work(first, end)`` of ranges that together are [0, n); the calling thread takes the first of them."""
+    """Return ``work(first, end)`` of ranges that together are [0, n); the calling thread takes the first of them.
+
+    It also takes those that no other thread has begun: all of them where there are no threads, or no longer any, as
+    while Python ends.
+    """
     n_parts = max(1, min(n_parts, n))
     if n_parts == 1:
         return [work(0, n)]
-    from concurrent.futures import wait  # 4 ms that one thread does without
-
     bounds = [n * i // n_parts for i in range(n_parts + 1)]
-    first, *others = pairwise(bounds)
-    jobs = [_shared_pool().submit(work, *part) for part in others]
+    waiting = deque(enumerate(pairwise(bounds)))
+    results: dict[int, Part] = {}
+
+    def take() -> None:
+        while waiting:
+            try:
+                i, part = waiting.popleft()
+            except IndexError:  # another thread was faster
+                return
+            results[i] = work(*part)
+
+    jobs: list[Future[None]] = []
+    stop = _engine.Stop()
     try:
-        results = [work(*first)]
-    finally:
-        wait(jobs)  # never leave while another thread writes to the caller's memory
-    return results + [job.result() for job in jobs]
+        _start(lambda: stop.run(take), n_parts - 1, jobs)
+        take()
+        _finish(jobs)
+    except BaseException:
+        waiting.clear()
+        stop.set()
+        _finish_whatever_comes(jobs)  # never leave while another thread writes to the caller's memory
+        raise
+    return [results[i] for i in range(n_parts)]
+
+
+def _start(take: Callable[[], None], n: int, jobs: list[Future[None]]) -> None:
+    """Let up to n threads take parts; fewer where the system or a Python that ends refuses them."""
+    try:
+        pool = _shared_pool()
+        for _ in range(n):
+            jobs.append(pool.submit(take))
+    except RuntimeError:  # "can't start new thread", "cannot schedule new futures after shutdown"
+        return
+
+
+def _finish(jobs: list[Future[None]]) -> None:
+    """Wait for the jobs that have begun; raise what they raised."""
+    for job in jobs:
+        if not job.cancel():
+            job.result()
+
+
+def _finish_whatever_comes(jobs: list[Future[None]]) -> None:
+    """Wait for the jobs that have begun, through every further Ctrl-C."""
+    for job in jobs:
+        is_over = False
+        while not is_over:
+            with suppress(BaseException):  # an error is on its way already
+                is_over = job.cancel() or (job.exception(), True)[1]
 
 
 def _shared_pool() -> ThreadPoolExecutor:
     global _pool
     if _pool is None:
-        from concurrent.futures import ThreadPoolExecutor
+        from concurrent.futures import ThreadPoolExecutor  # 4 ms that one thread does without
 
         _pool = ThreadPoolExecutor(max_workers=os.cpu_count() or 1, thread_name_prefix="topleft")
     return _pool

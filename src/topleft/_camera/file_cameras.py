@@ -7,15 +7,18 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from topleft._camera.camera import Camera
 from topleft._camera.matrices import F64, box_matrix, frustum_matrix
-from topleft._io.gltf import GLTF_SUFFIXES, CameraOfFile, read_cameras
-from topleft._io.load import reading
+from topleft._io.load import GLTF_SUFFIXES, reading
 from topleft._io.references import InputFile
 from topleft.errors import MeshError
+
+if TYPE_CHECKING:
+    from topleft._io.gltf import CameraOfFile
 
 
 def load_cameras(path: str | os.PathLike[str]) -> list[Camera]:
@@ -42,9 +45,12 @@ def load_cameras(path: str | os.PathLike[str]) -> list[Camera]:
     source = InputFile(Path(path))
 
     def cameras() -> list[Camera]:
-        return [_camera(own, source) for own in read_cameras(source)] if is_gltf else []
+        if source.path.suffix.lower() not in GLTF_SUFFIXES:
+            return []
+        from topleft._io.gltf import read_cameras  # as late as in `load`
 
-    is_gltf = source.path.suffix.lower() in GLTF_SUFFIXES
+        return [_camera(own, source) for own in read_cameras(source)]
+
     return reading(source, cameras)
 
 

@@ -6,6 +6,7 @@ contract.pxi   declares the structs and kernels of csrc
 isa.py         chooses the instruction set that runs, and tells how this copy was built
 kernels.pyx    holds the kernel table in use; includes the parts, and gives their names to Python
 mesh.pxi       computes normals of a mesh, and distances between surfaces
+pause.pxi      ends a draw: Ctrl-C, and threads whose part is given up
 pixels.pxi     writes pixels that are not found by drawing triangles: means of samples, layers, points, planes, lines
 polygons.pxi   draws snapped polygons: masks, labels, shares
 shade.pxi      shades pixels and tests their alpha

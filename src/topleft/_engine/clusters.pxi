@@ -153,4 +153,5 @@ cdef class Clustered:
         share.clusters, share.others, share.is_first, share.is_last = &clusters, &others[0], is_first, is_last
         with nogil:
             K.draw(&mesh.snapped, &window, &rows, &share)
+        raise_if_given_up()
         return share.n_others, clusters.n_seen, clusters.n_drawn

@@ -34,10 +34,14 @@ cdef extern from "topleft.h" nogil:
         int32_t *source
         int64_t n_vertices, n_pieces
     ctypedef int tl_test
+    ctypedef struct tl_pause:
+        int64_t left_px
+        int (*ask)(tl_pause *) noexcept nogil
     ctypedef struct tl_window:
         int64_t x_px, y_px, width, height
         int subpixel_bits
         tl_test test
+        tl_pause *pause
     ctypedef int tl_cull
     ctypedef int tl_method
     ctypedef int tl_sink
@@ -146,7 +150,7 @@ cdef extern from "topleft.h" nogil:
         int is_first, is_last
     ctypedef struct tl_composite:
         const int32_t *ids
-        int64_t plane_px
+        int64_t n_triangles, plane_px
         int n_layers, n_channels, is_u8, is_flat
         const void *colors
         const float *background

@@ -88,6 +88,7 @@ def as_bytes(array):
     return array.reshape(-1).view(np.uint8)
 
 
+include "pause.pxi"
 include "buffers.pxi"
 include "triangles.pxi"
 include "clusters.pxi"

@@ -78,6 +78,7 @@ def fill_bands(meshes, int32_t[:, ::1] labels, Palette palette, pixels, Bins bin
                 target.pixels = &labels[k, 0]
                 K.draw(&seen[k], &window, &target, &share)
             palette.mean(&labels[0, 0], sample_bits, labels.shape[1], n_rows * width, &flat[0], first_row * width)
+    raise_if_given_up()
 
 
 def mean_colors(painted, pixels, int64_t first_row, int64_t n_rows, int n_channels, Transfer transfer):
@@ -94,7 +95,7 @@ def mean_colors(painted, pixels, int64_t first_row, int64_t n_rows, int n_channe
             K.mean_colors(&planes[first], sample_bits, height * width, n_rows * width, n_channels, is_u8, own, &flat[first])
 
 
-def composite(const int32_t[:, :, ::1] ids, int64_t first_row, int64_t n_rows, const uint8_t[::1] colors, bint is_flat, bint is_u8,
+def composite(const int32_t[:, :, ::1] ids, int64_t n_triangles, int64_t first_row, int64_t n_rows, const uint8_t[::1] colors, bint is_flat, bint is_u8,
               int n_channels, const float[::1] background, uint8_t[::1] pixels):
     """Write what is seen through layers, planes (K, H, W), in rows [first_row, first_row + n_rows) of a picture.
 
@@ -106,7 +107,8 @@ def composite(const int32_t[:, :, ::1] ids, int64_t first_row, int64_t n_rows, c
     if n == 0:
         return
     layers.ids, layers.plane_px, layers.n_layers = &ids[0, first_row, 0], ids.shape[1] * width, ids.shape[0]
-    layers.n_channels, layers.is_u8, layers.is_flat, layers.colors = n_channels, is_u8, is_flat, data(colors)
+    layers.n_triangles, layers.colors = n_triangles, data(colors)
+    layers.n_channels, layers.is_u8, layers.is_flat = n_channels, is_u8, is_flat
     layers.background = &background[0] if background is not None else NULL
     with nogil:
         K.composite(&layers, n, &pixels[first_row * width * pixel_bytes])
@@ -177,7 +179,7 @@ cdef class Valued:
         if width == 0 or n_rows == 0:
             return
         window.x_px, window.y_px, window.width, window.height = x_px, y_px + first_row, width, n_rows
-        window.subpixel_bits, window.test = 0, 0
+        window.subpixel_bits, window.test, window.pause = 0, 0, NULL
         with nogil:
             K.fill_planes(&self.mesh, &window, &ids[first_row, 0], is_f32, &flat[first_row * width * (4 if is_f32 else 8)])
 
@@ -212,6 +214,7 @@ def draw_lines(SnappedMesh mesh, const uint64_t[::1] edges, uint8_t[::1] pixels,
     target.depth = &depth[first_row, 0] if depth is not None else NULL
     with nogil:
         K.draw_lines(&lines, &window, &target)
+    raise_if_given_up()
 
 
 def draw_cloud(const uint8_t[::1] records, int64_t size_fx, const int32_t[::1] sizes_fx, bint is_disc, int32_t x_fx, int32_t y_fx,
@@ -233,3 +236,4 @@ def draw_cloud(const uint8_t[::1] records, int64_t size_fx, const int32_t[::1] s
     cloud.is_disc, cloud.sample_x_fx, cloud.sample_y_fx = is_disc, x_fx, y_fx
     with nogil:
         K.draw_cloud(&cloud, &window, &rows)
+    raise_if_given_up()

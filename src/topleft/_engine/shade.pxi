@@ -229,6 +229,7 @@ def cut_out(SnappedMesh mesh, ShadingTable shading, const int32_t[::1] opaque, c
     with nogil:
         K.draw(&mesh.snapped, &window, &target, &share)
         K.cut_out(&mesh.snapped, &window, mesh.clip_view(), &shading.shading, &triangles[0], triangles.shape[0], &target)
+    raise_if_given_up()
 
 
 def cut_out_over(SnappedMesh mesh, ShadingTable shading, const int32_t[::1] triangles, int32_t[:, :, ::1] ids, float[:, :, ::1] depth,
@@ -247,3 +248,4 @@ def cut_out_over(SnappedMesh mesh, ShadingTable shading, const int32_t[::1] tria
     target.pixels, target.depth, target.peeled = peeled.ids, peeled.depth, &peeled
     with nogil:
         K.cut_out(&mesh.snapped, &window, mesh.clip_view(), &shading.shading, &triangles[0], triangles.shape[0], &target)
+    raise_if_given_up()

@@ -87,7 +87,7 @@ cdef class SnappedMesh:
     cdef tl_window window(self, int64_t first_row, int64_t n_rows, int64_t width) noexcept nogil:
         cdef tl_window w
         w.x_px, w.y_px, w.subpixel_bits = self.x_px, self.y_px + first_row, self.subpixel_bits
-        w.width, w.height, w.test = width, n_rows, self.test
+        w.width, w.height, w.test, w.pause = width, n_rows, self.test, pause_of_thread()
         return w
 
     def guess_seen(self, int64_t width, int64_t height):
@@ -145,6 +145,7 @@ cdef class SnappedMesh:
             target.samples_fx, target.sample_bits = &samples[0, 0], samples.shape[0].bit_length() - 1
         with nogil:
             bad_row = K.count_classes(&self.snapped, &window, &target, &census)
+        raise_if_given_up()
         return bad_row, [(census.n[k], census.boxes[k], census.covered[k]) for k in range(TL_N_CLASSES)]
 
     def drop_sides(self, const uint8_t[::1] is_single, int64_t first, int64_t end, int32_t[:, ::1] triangles):
@@ -165,6 +166,7 @@ cdef class SnappedMesh:
         share.first, share.end, share.is_first, share.is_last = 0, self.snapped.n_triangles, is_first, is_last
         with nogil:
             bad_row = K.draw(&self.snapped, &window, &rows, &share)
+        raise_if_given_up()
         return bad_row
 
     def draw_share(self, Target target, int64_t first_row, int64_t n_rows, int64_t first, int32_t[::1] others):
@@ -180,6 +182,7 @@ cdef class SnappedMesh:
         share.first, share.end, share.is_first, share.is_last = first, first + others.shape[0] - 16, True, False
         with nogil:
             bad_row = K.draw(&self.snapped, &window, &rows, &share)
+        raise_if_given_up()
         return bad_row, share.n_others
 
     def draw_listed(self, Target target, int64_t first_row, int64_t n_rows, const int32_t[::1] ids, bint is_last):
@@ -191,6 +194,7 @@ cdef class SnappedMesh:
         share.first, share.end, share.is_first, share.is_last = 0, ids.shape[0], False, is_last
         with nogil:
             K.draw(&self.snapped, &window, &rows, &share)
+        raise_if_given_up()
 
     def draw_area(self, float[:, ::1] pixels, uint8_t[::1] cells, int64_t first_row, int64_t n_rows, bint is_wide, bint is_clamped):
         """Write the area that triangles cover of the pixels in rows [first_row, first_row + n_rows).
@@ -206,6 +210,7 @@ cdef class SnappedMesh:
         target.is_wide, target.is_clamped = is_wide, is_clamped
         with nogil:
             status = K.draw_area(&self.snapped, &window, &target)
+        raise_if_given_up()
         return status
 
     def paint(self, const int32_t[:, ::1] labels, const uint8_t[::1] colors, uint8_t[::1] pixels, int64_t first_row, int64_t n_rows,
@@ -244,6 +249,7 @@ cdef class SnappedMesh:
         canvas.cells = &cells[0] if cells is not None else NULL
         with nogil:
             bad_row = K.blend(&self.snapped, &window, &canvas)
+        raise_if_given_up()
         return bad_row
 
     def barycentric(self, const int32_t[:, ::1] ids, float[:, :, ::1] out):
@@ -313,6 +319,7 @@ def draw_bands(meshes, targets, Bins bins, int64_t first_band, int64_t end_band)
             window = mesh.window(first_row, min(<int64_t>1 << bins.band_bits, target.height - first_row), target.width)
             with nogil:
                 K.draw(&mesh.snapped, &window, &rows, &share)
+            raise_if_given_up()
 
 
 def peel(meshes, bins, int32_t[:, :, ::1] ids, float[:, :, ::1] depth, bint is_farthest, int band_bits,
@@ -346,6 +353,7 @@ def peel(meshes, bins, int32_t[:, :, ::1] ids, float[:, :, ::1] depth, bint is_f
             window = mesh.window(first_row, min(<int64_t>1 << band_bits, height - first_row), width)
             with nogil:
                 bad_row = K.draw(&mesh.snapped, &window, &target, &share)
+            raise_if_given_up()
             if bad_row >= 0:
                 return bad_row
     return bad_row

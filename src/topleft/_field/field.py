@@ -128,17 +128,16 @@ def field(
     if is_per_face and nodata is not None and array.dtype.kind in "iub":
         dtype = array.dtype.type
     empty = _nodata_of(nodata, dtype)
-    ids = _visible(points_px, triangles, view, Sink.LABEL)
-    if is_per_face:
-        own = array if polygons.faces is None else array[polygons.faces]
-        with canvas_of(SCRATCH, "field", out, ids.shape, dtype) as (result, canvas):
-            rows = np.append(own.astype(dtype), empty)
-            np.take(rows, ids, out=canvas, mode="wrap")  # id -1 is the last
-        return result
-    found = _on_planes(ids, points_px, triangles, array.astype(np.float64, copy=False), dtype, view, out)
-    if nodata is not None:
-        found[ids < 0] = empty
-    return found
+    with canvas_of(SCRATCH, "field", out, view.size[::-1], dtype) as (result, canvas):
+        ids = _visible(points_px, triangles, view, Sink.LABEL)
+        if is_per_face:
+            own = array if polygons.faces is None else array[polygons.faces]
+            np.take(np.append(own.astype(dtype), empty), ids, out=canvas, mode="wrap")  # id -1 is the last
+        else:
+            _fill_planes(ids, points_px, triangles, array.astype(np.float64, copy=False), view, canvas)
+            if nodata is not None:
+                canvas[ids < 0] = empty
+    return result
 
 
 def height_map(
@@ -207,8 +206,10 @@ def height_map(
     points_px, heights = grid.to_pixels(points), np.ascontiguousarray(points[:, 2], np.float64)
     view = View.parse(grid.size, {"subpixel_bits": subpixel_bits, "threads": threads})
     sink = Sink.FARTHEST if surface == "upper" else Sink.NEAREST
-    ids = _visible(np.column_stack([points_px, _depth_of(heights, triangles)]), triangles, view, sink)
-    return _on_planes(ids, points_px, triangles, heights, np.float64, view, out)
+    with canvas_of(SCRATCH, "field", out, view.size[::-1], np.float64) as (result, canvas):
+        ids = _visible(np.column_stack([points_px, _depth_of(heights, triangles)]), triangles, view, sink)
+        _fill_planes(ids, points_px, triangles, heights, view, canvas)
+    return result
 
 
 def _window_of(grid: Grid, origin: tuple[int, int]) -> tuple[int, int]:
@@ -283,9 +284,7 @@ def _visible(points: F64, triangles: I32, view: View, sink: Sink) -> I32:
     return ids
 
 
-def _on_planes(
-    ids: I32, points_px: F64, triangles: I32, values: F64, dtype: type[np.floating[Any]], view: View, out: object
-) -> npt.NDArray[Any]:
+def _fill_planes(ids: I32, points_px: F64, triangles: I32, values: F64, view: View, canvas: npt.NDArray[Any]) -> None:
     n, n_threads = len(triangles), count_threads(view.threads, len(triangles))
     planes: F64 | None = None
     if ids.size < MAX_PIXELS_TO_LIST * n and n < MAX_LISTED_PLANES:
@@ -293,10 +292,8 @@ def _on_planes(
     valued = _engine.Valued(points_px, triangles, np.ascontiguousarray(values), planes)
     if planes is not None:
         run_parts(valued.list_planes, n, n_threads)
-    with canvas_of(SCRATCH, "field", out, ids.shape, dtype) as (result, canvas):
 
-        def fill_rows(first: int, end: int) -> None:
-            valued.fill_planes(ids, canvas, first, end - first, *view.origin)
+    def fill_rows(first: int, end: int) -> None:
+        valued.fill_planes(ids, canvas, first, end - first, *view.origin)
 
-        run_parts(fill_rows, ids.shape[0], n_threads)
-    return result
+    run_parts(fill_rows, ids.shape[0], n_threads)

@@ -28,7 +28,6 @@ from topleft.errors import MeshError, MissingPackageError
 Array = npt.NDArray[Any]
 F64 = npt.NDArray[np.float64]
 
-GLTF_SUFFIXES = (".gltf", ".glb", ".vrm")
 JSON_CHUNK, BIN_CHUNK = 0x4E4F534A, 0x004E4942
 POINTS, TRIANGLES, STRIP, FAN = 0, 4, 5, 6
 

@@ -14,18 +14,15 @@ from typing import TypeVar
 import numpy as np
 
 from topleft._base.arrays import as_path
-from topleft._io.foreign import read_by_trimesh
-from topleft._io.gltf import GLTF_SUFFIXES, read_gltf
 from topleft._io.notes import tell
-from topleft._io.obj import read_obj
-from topleft._io.ply import read_ply
 from topleft._io.references import MAX_TEXTURE_PIXELS, MAX_VERTICES, InputFile
-from topleft._io.stl import read_stl
 from topleft._model.adapt import DEFAULT_CREASE, FILE_READERS, joined
 from topleft._model.mesh import Mesh, as_crease
 from topleft.errors import MeshError, MissingPackageError
 
 Made = TypeVar("Made")
+
+GLTF_SUFFIXES = (".gltf", ".glb", ".vrm")
 
 
 def load(
@@ -89,16 +86,27 @@ FILE_READERS.append(load)
 
 
 def _mesh(source: InputFile, crease: float) -> Mesh:
+    """The mesh of the file; a reader is imported when a file needs it."""
     match source.path.suffix.lower():
         case suffix if suffix in GLTF_SUFFIXES:
+            from topleft._io.gltf import read_gltf
+
             parts = read_gltf(source)
         case ".obj":
+            from topleft._io.obj import read_obj
+
             parts = read_obj(source)
         case ".ply":
-            parts = [part for part in [read_ply(source)] if part is not None]
+            from topleft._io.ply import read_ply
+
+            parts = read_ply(source)
         case ".stl" | ".stl_ascii":
-            parts = [part for part in [read_stl(source)] if part is not None]
+            from topleft._io.stl import read_stl
+
+            parts = read_stl(source)
         case _:
+            from topleft._io.foreign import read_by_trimesh
+
             parts = read_by_trimesh(source)
     if not any(len(part.triangles) for part in parts):
         drawn = [

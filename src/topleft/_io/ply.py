@@ -1,6 +1,6 @@
 """Reads PLY: polygons and strips of triangles, text and binary, with normals, colours and texture coordinates.
 
-Input: a file, unchecked. Output: a `Mesh`, or None where nothing has faces; no memory is taken for more than it holds.
+Input: a file, unchecked. Output: a `Mesh`, or none where nothing has faces; no memory is taken for more than it holds.
 
 Based on: Turk, G., "The PLY Polygon File Format", 1994; names of properties as MeshLab, Blender and Stanford's scans
 have them.
@@ -66,8 +66,8 @@ Rows = dict[str, Any]
 """An element: arrays (N,) by the name of the property, and lists."""
 
 
-def read_ply(source: InputFile) -> Mesh | None:
-    """The faces of a PLY file; None if it has none.
+def read_ply(source: InputFile) -> list[Mesh]:
+    """The faces of a PLY file, in one mesh; none if it has none.
 
     Raises
     ------
@@ -95,8 +95,9 @@ def read_ply(source: InputFile) -> Mesh | None:
         n = len(next(iter(vertex.values()), ()))
         if n:
             raise MeshError(f"cannot draw {str(source.path)!r}: it is a cloud of {n} points without faces")
-        return None
-    return _mesh(vertex, corners, n_corners, faces, textures, source)
+        return []
+    mesh = _mesh(vertex, corners, n_corners, faces, textures, source)
+    return [] if mesh is None else [mesh]
 
 
 def _header(content: bytes) -> tuple[str, list[_Element], list[str], int]:

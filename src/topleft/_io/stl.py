@@ -18,8 +18,8 @@ from topleft.errors import MeshError
 N_HEADER_BYTES, N_TRIANGLE_BYTES = 84, 50
 
 
-def read_stl(source: InputFile) -> Mesh | None:
-    """The triangles of an STL file; None if it has none.
+def read_stl(source: InputFile) -> list[Mesh]:
+    """The triangles of an STL file, in one mesh; none if it has none.
 
     Raises
     ------
@@ -39,7 +39,7 @@ def read_stl(source: InputFile) -> Mesh | None:
         rows = np.frombuffer(content, np.dtype([("", "V12"), ("corners", "<f4", 9), ("", "V2")]), n, N_HEADER_BYTES)
         corners = rows["corners"].reshape(-1, 3)
     source.check_n_vertices(len(corners))
-    return Mesh(corners, np.arange(len(corners), dtype=np.int32).reshape(-1, 3)) if len(corners) else None
+    return [Mesh(corners, np.arange(len(corners), dtype=np.int32).reshape(-1, 3))] if len(corners) else []
 
 
 def _corners_of_text(content: bytes) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:

@@ -202,11 +202,16 @@ def collapse_at(points: F64, triangles: I32, n_wanted: int, fineness: float, *, 
         )  # fmt: skip
     left = np.asarray(left, np.int32)
     into = rows_of_pairs(pairs[0], triangles, len(points), left) if with_pairs else None
+    if with_pairs and into is None:
+        return Collapsed(points, triangles, np.arange(len(points), dtype=np.int32))
     return Collapsed(np.asarray(moved, np.float64) / scale + center, left, into)
 
 
-def rows_of_pairs(pairs: Any, triangles: I32, n_points: int, left: I32) -> I32:
-    """The row that each point went into, from pairs of points of which the second went into the first."""
+def rows_of_pairs(pairs: Any, triangles: I32, n_points: int, left: I32) -> I32 | None:
+    """The row that each point went into, from pairs of points of which the second went into the first.
+
+    None where the pairs leave other triangles than the package does, as of a mesh that is one point or one line.
+    """
     pairs = np.asarray(pairs).reshape(-1, 2)
     into = np.arange(n_points, dtype=np.int32)
     into[pairs[:, 1]] = pairs[:, 0]
@@ -222,5 +227,5 @@ def rows_of_pairs(pairs: Any, triangles: I32, n_points: int, left: I32) -> I32:
     is_left[corners.ravel()] = True
     row: I32 = np.where(is_left, np.cumsum(is_left) - 1, -1).astype(np.int32)
     if not np.array_equal(row[corners], left):
-        raise RuntimeError("fast-simplification has returned other triangles than its collapses leave")
+        return None
     return row[into]

@@ -128,31 +128,42 @@ class Levels(Sequence[Level]):
             If the file is broken, or its levels are those of another mesh.
         """
         import zipfile
+        import zlib
 
         path = _checked_path(path)
         try:
             with np.load(path, allow_pickle=False) as file:
                 arrays = dict(file)
-            digest, bounds, knowns = str(arrays["mesh"]), arrays["bound"], arrays["known"]
+            if str(arrays["mesh"]) != digest_of(mesh):
+                raise MeshError(f"{str(path)!r} holds the levels of another mesh: make them anew with topleft.simplify")
+            bounds, knowns = (as_bounds(arrays[name]) for name in ("bound", "known"))
+            coarser = [
+                Level(
+                    Mesh(
+                        **{name: arrays.get(f"{name}_{i}") for name in ARRAYS},  # type: ignore[arg-type]
+                        materials=mesh.materials,
+                        crease=mesh.crease,
+                    ),
+                    bound,
+                    known,
+                )
+                for i, (bound, known) in enumerate(zip(bounds, knowns, strict=True), 1)
+            ]
         except FileNotFoundError:
             raise FileNotFoundError(f"there is no file {str(path)!r}") from None
-        except (KeyError, ValueError, EOFError, zipfile.BadZipFile) as error:
+        except (MeshError, OSError):
+            raise
+        except (ArithmeticError, AttributeError, EOFError, LookupError, MemoryError, RuntimeError, TypeError,
+                ValueError, zipfile.BadZipFile, zlib.error) as error:  # fmt: skip
             raise MeshError(f"cannot read {str(path)!r}: broken, or not levels of detail ({error})") from error
-        if digest != digest_of(mesh):
-            raise MeshError(f"{str(path)!r} holds the levels of another mesh: make them anew with topleft.simplify")
-        coarser = [
-            Level(
-                Mesh(
-                    **{name: arrays.get(f"{name}_{i}") for name in ARRAYS},  # type: ignore[arg-type]
-                    materials=mesh.materials,
-                    crease=mesh.crease,
-                ),
-                float(bounds[i - 1]),
-                float(knowns[i - 1]),
-            )
-            for i in range(1, len(bounds) + 1)
-        ]
         return keep_levels(mesh, cls(mesh, coarser))
+
+
+def as_bounds(values: npt.NDArray[Any]) -> list[float]:
+    """Return distances of levels after checking them."""
+    if values.ndim != 1 or values.dtype.kind != "f" or not (np.isfinite(values) & (values >= 0)).all():
+        raise ValueError("bounds must be finite and at least 0")
+    return [float(value) for value in values]
 
 
 def digest_of(mesh: Mesh) -> str:

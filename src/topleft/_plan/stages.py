@@ -337,7 +337,7 @@ def plan_threads(facts: Facts, costs: Costs) -> Stage:
         rejected = (f"bands alone: each of {n_threads} threads would set up all {n:,} triangles",)
         return Stage("threads", f"{n_threads}, each a share of the triangles and its own rows", why, rejected)
     rejected = ("shares of the triangles: threads would have to meet twice",)
-    return Stage("threads", f"{n_threads} bands of {-(-view.size[1] // n_threads):,} rows", why, rejected)
+    return Stage("threads", f"{n_threads} bands of {-(-view.size[1] // max(1, n_threads)):,} rows", why, rejected)
 
 
 def plan_memory(facts: Facts, costs: Costs) -> Stage:

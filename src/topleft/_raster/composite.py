@@ -106,8 +106,8 @@ def composite(
             n_rows = min(rows_at_once, end - top)
             own = palette if wish == "triangle" else colors_of_rows(layers, palette, wish, top, n_rows)
             _engine.composite(
-                layers.planes[0], top, n_rows, _engine.as_bytes(own), wish == "triangle", is_u8, n_channels, ground,
-                _engine.as_bytes(canvas),
+                layers.planes[0], layers.n_triangles, top, n_rows, _engine.as_bytes(own), wish == "triangle", is_u8,
+                n_channels, ground, _engine.as_bytes(canvas),
             )  # fmt: skip
 
     n_threads = parse_threads(threads) or min(available_threads(), max(1, height * width // MIN_PIXELS_PER_THREAD))

@@ -4,8 +4,9 @@ Input: vertices and triangles in world space, a camera with a lens. Output: `Ben
 draws as the lens would show the mesh.
 
 An edge is halved (in space) where its picture, at a quarter, half or three quarters of its length, is off by more than
-the tolerance from what a straight edge would show there, its depth too, or where it spans a large angle. That is a
-question to the edge alone, and triangles that share an edge share its ends: so they split it alike, and no gap opens.
+the tolerance from what a straight edge would show there, its depth too, unless it is shorter than a pixel there, or
+where it spans a large angle. That is a question to the edge alone, and triangles that share an edge share its ends: so
+they split it alike, and no gap opens.
 """
 
 from __future__ import annotations
@@ -43,6 +44,12 @@ that pass the test have a cap of less than 10 degrees and end before that."""
 
 MAX_HALVINGS = 24
 """No edge is halved more often; only one that passes through the lens would be."""
+
+SHORT_PX = 0.5
+"""An edge that stays so near to its middle in the picture is not halved for its bend: no pixel would tell."""
+
+MAX_PARTS, MAX_PARTS_OF_ONE = 1 << 22, 8
+"""Most parts of a mesh, beside so many for each of its triangles: 1.5 GB while they are made."""
 
 N_ANGLES, N_AZIMUTHS = 513, 128
 """Rings of directions that are asked where they lie in the picture."""
@@ -296,11 +303,20 @@ class _Subdivision:
             done.append(_rows(parts, masks == 0))
             pieces = [_split(_rows(parts, masks == mask), middles[masks == mask], mask) for mask in PIECES]
             parts = _joined(pieces)
+            self._check_number(sum(len(each[0]) for each in (*done, parts)), len(triangles))
         done.append(_rows(parts, self._may_show(parts[0])))
         triangles, source, weights, is_outline = _joined(done)
         order = np.argsort(source, kind="stable")
         bent = np.stack([self.place[:, 0] * self.reach, -self.place[:, 1] * self.reach, -self.reach], axis=1)
         return BentMesh(bent, triangles[order], source[order], weights[order], is_outline[order])
+
+    def _check_number(self, n_parts: int, n_triangles: int) -> None:
+        most = MAX_PARTS + MAX_PARTS_OF_ONE * n_triangles
+        if n_parts > most:
+            raise ValueError(
+                f"the lens splits {n_triangles} triangles into more than {most} parts: give it a larger tolerance_px "
+                f"than {self.tolerance_px:g}, or leave out the triangles that are far larger than the picture shows"
+            )
 
     def _add(self, points: F64) -> None:
         place, reach = self.lens_map(points)
@@ -336,15 +352,19 @@ class _Subdivision:
         a, b = low[ask], high[ask]
         px_a, px_b = self.lens_map.px(self.place[a]), self.lens_map.px(self.place[b])
         off = np.zeros(len(ask))
+        middle = (px_a + px_b) / 2
+        spread_px = np.abs(px_a - middle).max(axis=1)
         for share in (0.25, 0.5, 0.75):
             place, reach = self.lens_map((1 - share) * self.points[a] + share * self.points[b])
             weight_a, weight_b = (1 - share) * self.reach[a], share * self.reach[b]
             mean = weight_a + weight_b
             straight = (weight_a[:, None] * px_a + weight_b[:, None] * px_b) / mean[:, None]
-            off = np.maximum(off, np.abs(self.lens_map.px(place) - straight).max(axis=1) / self.tolerance_px)
+            px = self.lens_map.px(place)
+            spread_px = np.maximum(spread_px, np.abs(px - middle).max(axis=1))
+            off = np.maximum(off, np.abs(px - straight).max(axis=1) / self.tolerance_px)
             if not self.lens_map.lens.has_planar_range:
                 off = np.maximum(off, np.abs(reach - mean) / (MAX_RANGE_ERROR * mean))
-        is_bent[ask] = off > 1
+        is_bent[ask] = (off > 1) & (spread_px > SHORT_PX)
         return is_bent
 
 

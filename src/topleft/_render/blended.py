@@ -49,11 +49,14 @@ LAYERS, MOST_LAYERS = 4, 16
 
 CLEAR = (0, 0, 0, 0)
 
+COLORED = Material(alpha_mode=AlphaMode.BLEND)
+"""Of a mesh with nothing but colours, which means their alpha."""
+
 
 def blended_triangles(mesh: Mesh, material: Material | None) -> Mask | None:
     """The triangles (T,) that something shows through, by the materials of the mesh or this one; None if none does."""
     given = mesh.materials if material is None else (material,)
-    materials = given or (Material(alpha_mode=AlphaMode.BLEND),)  # a mesh with nothing but colours means their alpha
+    materials = given or (COLORED,)
     are_blended = [one.alpha_mode is AlphaMode.BLEND and has_opacity(one, mesh) for one in materials]
     if not any(are_blended):
         return None

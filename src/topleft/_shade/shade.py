@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import lru_cache
 from typing import TypedDict
 
 import numpy as np
@@ -130,6 +131,12 @@ class ShadingOptions:
         )
 
 
+@lru_cache(maxsize=64)
+def plain_material(color: Color | None) -> Material:
+    """The material of a mesh that has none; checking one takes a hundredth of a small picture."""
+    return Material(color)
+
+
 def shade_mesh(frags: Fragments, mesh: Mesh, camera: Camera, options: ShadingOptions) -> U8:
     """Shade the triangles that show, all samples of them: the picture (H, W, 4) uint8.
 
@@ -143,8 +150,8 @@ def shade_mesh(frags: Fragments, mesh: Mesh, camera: Camera, options: ShadingOpt
     planes = frags.samples_triangle.transpose(2, 0, 1), frags.samples_depth.transpose(2, 0, 1)
     kinds = np.int32, np.float32
     ids, depth = (np.require(array, kind, ["C", "A"]) for array, kind in zip(planes, kinds, strict=True))
-    plain = Material(options.color if mesh.colors is None else None)
-    own = (options.material,) if options.material is not None else mesh.materials or (plain,)
+    own = (options.material,) if options.material is not None else mesh.materials
+    own = own or (plain_material(options.color if mesh.colors is None else None),)
     rows = mesh.material_of_triangle if own is mesh.materials and len(own) > 1 else None
     look = ShadingInputs(scene, mesh, camera, picture.shape[1::-1], rows, is_flat=options.mode is Shading.FLAT)
     all_full = options.environment is not None or options.shows_opacity

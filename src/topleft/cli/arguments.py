@@ -70,6 +70,9 @@ Exit status: 0, all was written; 1, something failed, which is listed, and the r
 mesh lacks something; 2, nothing was written.
 """
 
+MAX_VIEWS = 100_000
+"""Most views of a turntable: each is a job that is made before the first is drawn."""
+
 
 class UsageError(TopleftError):
     """What was asked for makes no sense."""
@@ -128,7 +131,7 @@ def add_picture_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("-o", "--out", metavar="OUT", help="a file, a folder or a pattern")
     add("--size", type=size, default=DEFAULT_SIZE, metavar="WxH", help=f"pixels (default {width}x{height})")
-    add("--views", type=positive, default=1, metavar="N", help="a turntable of N pictures (default 1)")
+    add("--views", type=views, default=1, metavar="N", help="a turntable of N pictures (default 1)")
     add("--layers", type=_layers, default=(), metavar="NAME,...", help="what to write; see below (default color)")
     add(
         "--threads",
@@ -208,6 +211,14 @@ def size(text: str) -> tuple[int, int]:
     if not (cross and width.isdecimal() and height.isdecimal() and int(width) and int(height)):
         raise argparse.ArgumentTypeError(f"must be WIDTHxHEIGHT, 1280x720 say, got {text!r}")
     return int(width), int(height)
+
+
+def views(text: str) -> int:
+    """A number of views."""
+    n = positive(text)
+    if n > MAX_VIEWS:
+        raise argparse.ArgumentTypeError(f"must be at most {MAX_VIEWS}, got {n:,}" if n < 10**18 else "is too large")
+    return n
 
 
 def positive(text: str) -> int:

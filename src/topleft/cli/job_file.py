@@ -60,6 +60,8 @@ def _parsed(path: Path) -> dict[str, Any]:
     try:
         text = data.decode()
         document = tomllib.loads(text) if path.suffix.lower() == ".toml" else json.loads(text)
+    except RecursionError:
+        raise UsageError(f"cannot read {str(path)!r}: it is nested too deeply") from None
     except ValueError as error:  # what both readers, and decoding, raise
         raise UsageError(f"cannot read {str(path)!r}: {error}") from None
     if not isinstance(document, dict):

@@ -39,6 +39,9 @@ __all__ = ["MeshJobs", "MeshSource", "Orbit", "check_targets", "check_words", "p
 SHADINGS_WITH_NUMBERS: Mapping[str, str] = {"ids": "triangle", "depth": "depth", "normals": "camera_normal"}
 """Shadings that are a layer made visible: .npy holds the layer."""
 
+MAX_FOLDERS = 200
+"""Most folders of a path of a picture, one in the other."""
+
 
 @dataclass(frozen=True)
 class MeshSource:
@@ -317,6 +320,8 @@ def check_targets(groups: Sequence[MeshJobs], others: Iterable[Path] = ()) -> No
 
 def _check_writable(folder: Path) -> None:
     """Find out before any work whether pictures can be put into a folder, made or yet to be made."""
+    if len(folder.parts) > MAX_FOLDERS:
+        raise UsageError(f"OUT must lie in at most {MAX_FOLDERS} folders, got {len(folder.parts)}")
     existing = next(path for path in (folder, *folder.absolute().parents) if path.exists())
     if not existing.is_dir():
         raise UsageError(f"cannot write to the folder {str(folder)!r}: {str(existing)!r} is a file")

@@ -1,0 +1,130 @@
+"""Ctrl-C, and other signals, while a kernel draws: heard soon, and nothing that is kept is left in disorder."""
+
+import os
+import signal
+import threading
+import time
+
+import numpy as np
+import pytest
+from comparing import assert_same
+
+import topleft as tl
+
+SIZE = (2000, 2000)
+LATEST_S = 2.0  # 0.2 on a machine that does nothing else
+
+
+def random_triangles(n, extent_px):
+    rng = np.random.default_rng(1)
+    corners = rng.random((n, 1, 2)) * SIZE + (rng.random((n, 3, 2)) - 0.5) * 2 * extent_px
+    vertices = np.column_stack([corners.reshape(-1, 2), rng.random(3 * n)])
+    return vertices, np.arange(3 * n, dtype=np.int32).reshape(-1, 3)
+
+
+LARGE, SMALL = random_triangles(100_000, 2000), random_triangles(1_000_000, 30)
+FLAT = LARGE[0][:, :2], LARGE[1]
+COLORS = np.random.default_rng(2).integers(0, 256, (100_000, 4), dtype=np.uint8)
+
+DRAWS = {
+    "coverage by edges": lambda n: tl.coverage(*FLAT, SIZE, method="edge", threads=n),
+    "coverage by area": lambda n: tl.coverage(*FLAT, SIZE, sampling="area", threads=n),
+    "coverage of msaa16": lambda n: tl.coverage(*FLAT, SIZE, sampling="msaa16", threads=n),
+    "overdraw of squares": lambda n: tl.overdraw(*FLAT, SIZE, sampling="outer", threads=n),
+    "overdraw far away": lambda n: tl.overdraw(FLAT[0] * 1e6 - 1e9, FLAT[1], SIZE, threads=n),
+    "rasterize": lambda n: tl.rasterize(*LARGE, SIZE, threads=n),
+    "rasterize msaa16": lambda n: tl.rasterize(*SMALL, SIZE, sampling="msaa16", threads=n),
+    "fill over": lambda n: tl.fill(*FLAT, COLORS, SIZE, per="triangle", blend="over", threads=n),
+    "fill over by area": lambda n: tl.fill(
+        *FLAT, COLORS, SIZE, per="triangle", blend="over", sampling="area", threads=n
+    ),
+    "peel": lambda n: tl.peel(*LARGE, SIZE, threads=n),
+    "smooth wireframe": lambda n: tl.wireframe(*FLAT, SIZE, antialias=True, threads=n),
+    "height_map": lambda n: tl.height_map(LARGE, tl.Grid(SIZE, (0, 2000, 0, 2000)), threads=n),
+}
+
+
+def seconds_after_interrupt(draw):
+    """How long a draw goes on after a Ctrl-C that comes while it lasts."""
+    sent = []
+
+    def interrupt():
+        time.sleep(0.3)
+        sent.append(time.perf_counter())
+        os.kill(os.getpid(), signal.SIGINT)
+
+    thread = threading.Thread(target=interrupt)
+    thread.start()
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            draw()
+        return time.perf_counter() - sent[0]
+    finally:
+        thread.join()
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+@pytest.mark.parametrize("name", DRAWS)
+def test_a_long_draw_interrupted_ends_soon(name, threads):
+    assert seconds_after_interrupt(lambda: DRAWS[name](threads)) < LATEST_S
+
+
+@pytest.mark.parametrize("name", ["coverage by area", "fill over by area", "coverage of msaa16", "fill over"])
+def test_a_draw_after_one_that_was_interrupted_is_right(name):
+    few = FLAT[0], FLAT[1][:20]
+    draws = {
+        "coverage by area": lambda where: where.coverage(*few, sampling="area"),
+        "coverage of msaa16": lambda where: where.coverage(*few, sampling="msaa16"),
+        "fill over": lambda where: where.fill(*few, COLORS[:20], per="triangle", blend="over"),
+        "fill over by area": lambda where: where.fill(*few, COLORS[:20], per="triangle", blend="over", sampling="area"),
+    }
+    kept = tl.Rasterizer(SIZE, threads=2)
+    kept_draws = {
+        "coverage by area": lambda: kept.coverage(*FLAT, sampling="area"),
+        "coverage of msaa16": lambda: kept.coverage(*FLAT, sampling="msaa16"),
+        "fill over": lambda: kept.fill(*FLAT, COLORS, per="triangle", blend="over"),
+        "fill over by area": lambda: kept.fill(*FLAT, COLORS, per="triangle", blend="over", sampling="area"),
+    }
+    seconds_after_interrupt(kept_draws[name])
+    assert_same(draws[name](kept), draws[name](tl.Rasterizer(SIZE, threads=1)))
+
+
+def test_out_after_an_interrupt_changes_no_more():
+    out = np.zeros(SIZE[::-1], np.int32)
+    seconds_after_interrupt(lambda: tl.overdraw(*FLAT, SIZE, threads=2, out=out))
+    before = out.copy()
+    time.sleep(0.3)
+    assert_same(out, before)
+
+
+def test_a_signal_whose_handler_draws_leaves_the_picture_as_it_is():
+    few = np.ascontiguousarray(FLAT[0][:30_000]), FLAT[1][:10_000]
+    expected, n_drawn = tl.overdraw(*few, SIZE, threads=1), []
+    small = random_triangles(3000, 30)
+
+    def draw(*_):
+        n_drawn.append(int(tl.coverage(*small, (100, 100), threads=1).sum()))
+
+    before = signal.signal(signal.SIGALRM, draw)
+    signal.setitimer(signal.ITIMER_REAL, 0.2)  # while the kernel draws
+    try:
+        got = tl.overdraw(*few, SIZE, threads=1)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+    assert n_drawn
+    assert_same(got, expected)
+
+
+def test_an_error_of_a_signal_handler_is_raised_by_the_draw():
+    def complain(*_):
+        raise TimeoutError("too long")
+
+    before = signal.signal(signal.SIGALRM, complain)
+    signal.setitimer(signal.ITIMER_REAL, 0.2)
+    try:
+        with pytest.raises(TimeoutError, match="too long"):
+            tl.overdraw(*FLAT, SIZE, threads=1)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
