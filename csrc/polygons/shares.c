@@ -238,7 +238,6 @@ static void share_simply(area_state *s, const tl_polygons *p, share_output *out,
             out->is_full = 1;
             return;
         }
-        s->window = &window;
         place_plane(&window, &target, &s->plane);
         push_polygon(s, p, out->polygon, 0, 0);
         finish_cells(s);
@@ -264,7 +263,6 @@ static int64_t share_stack(area_state *s, const tl_polygons *p, share_output *ou
     const tl_area target = {.cells = job->cells};
     const int64_t stride = tl_area_stride(TL_STACK_COLUMNS);
     int64_t n = 0, n_rows = 0, n_entries = 0;
-    s->window = &window;
     place_plane(&window, &target, &s->plane);
     for (; n < TL_STACK_MAX && i + n < job->end; n++) {
         const int64_t polygon = job->listed ? job->listed[i + n] : i + n;
@@ -311,7 +309,7 @@ static int64_t share_polygons(const tl_polygons *p, const tl_share_job *job)
     s.scene = NULL, s.bad_row = -1, s.is_wide = 0;
     s.max_extent = 1 << (p->bits + TL_MAX_EDGE_BITS < 25 ? p->bits + TL_MAX_EDGE_BITS : 25);
     const tl_window whole = {.width = job->width, .height = job->bottom - job->top};
-    s.window = &whole; /* for what counts its work before a polygon has a window of its own */
+    s.window = &whole; /* its size alone is read, to count work */
     memset(s.n, 0, sizeof s.n);
     for (int64_t i = job->first; i < job->end; i++) {
         const int64_t polygon = job->listed ? job->listed[i] : i;

@@ -109,6 +109,18 @@ CALLS = {
     "visible_layers": (tl.visible_layers, {"mesh": CUBE, "camera": CAMERA, "size": SIZE, "layers": 2}),
     "wireframe": (tl.wireframe, {"vertices": FLAT, "triangles": ONE, "size": SIZE, "depth": None,
                                  "depth_test": "less", "depth_bias": 0.1, "out": None}),
+    "Environment": (tl.Environment, {"sky": (1, 2, 3), "ground": None, "image": None, "intensity": 1.0,
+                                     "up": (0, 1, 0), "turn": 0.0, "space": "world"}),
+    "Points": (tl.Points, {"positions": POINTS, "colors": None, "normals": None, "size": 2.0, "unit": "px",
+                           "shape": "disc"}),
+    "points": (tl.points, {"positions": FLAT, "size": SIZE, "point_size": 1.0, "shape": "square",
+                           "depth_test": "less"}),
+    "polygons": (tl.polygons, {"rings": [FLAT], "size": SIZE, "rule": "evenodd", "values": None, "background": None,
+                               "sampling": "center", "origin": (0, 0), "subpixel_bits": 8, "threads": None,
+                               "out": None}),
+    "overlap": (tl.overlap, {"rings": [FLAT], "size": SIZE, "rule": "evenodd", "origin": (0, 0), "subpixel_bits": 8,
+                             "threads": None, "out": None}),
+    "load_cameras": (tl.load_cameras, {"path": "nothing.gltf"}),
     "pixel_grid": (tl.pixel_grid, {"values": np.eye(3), "vertices": FLAT, "triangles": ONE, "size": None,
                                    "sampling": None, "cell": 9, "edge_color": "red", "path": None}),
     "Grid.from_transform": (tl.Grid.from_transform, {"transform": (1, 0, 0, 0, -1, 0), "size": 3}),
@@ -185,7 +197,7 @@ def complaints(function, right, wrong_names, arguments):
 @pytest.mark.parametrize("name", CALLS)
 def test_arguments_that_suit_are_taken(name):
     function, right = CALLS[name]
-    if name in ("load", "save_image"):
+    if name in ("load", "load_cameras", "save_image"):
         with pytest.raises((OSError, tl.TopleftError)):
             function(**right)
     else:

@@ -9,12 +9,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from topleft._base.arrays import as_number, as_vector
-from topleft._base.color import Color, as_color
+from topleft._base.color import Color, ColorLike, as_color
 from topleft._base.options import parse
 
 F64 = npt.NDArray[np.float64]
@@ -83,6 +84,18 @@ class Light:
     falloff: float = 0.0
     space: str = "world"
 
+    if TYPE_CHECKING:  # what is given may be anything that NumPy reads; what is kept is as above
+
+        def __init__(
+            self,
+            at: npt.ArrayLike,
+            kind: str = "directional",
+            color: ColorLike = (255, 255, 255),
+            intensity: float = 1.0,
+            falloff: float = 0.0,
+            space: str = "world",
+        ) -> None: ...
+
     def __post_init__(self) -> None:
         keep = object.__setattr__  # the dataclass is frozen, and its values are coerced
         keep(self, "kind", parse(LightKind, "kind", self.kind))
@@ -115,6 +128,10 @@ class Fog:
     near: float
     far: float
     color: Color = (255, 255, 255)
+
+    if TYPE_CHECKING:  # what is given may be anything that NumPy reads; what is kept is as above
+
+        def __init__(self, near: float, far: float, color: ColorLike = (255, 255, 255)) -> None: ...
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "color", as_color("color", self.color, 3))

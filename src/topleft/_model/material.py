@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from enum import StrEnum
+from typing import TYPE_CHECKING
 
 from topleft._base.arrays import as_number, as_vector
-from topleft._base.color import Color, as_color
+from topleft._base.color import Color, ColorLike, as_color
 from topleft._base.options import parse
 from topleft._model.light import as_not_negative
 from topleft._model.texture import Texture
@@ -95,6 +96,31 @@ class Material:
     occlusion_strength: float = 1.0
     normal_texture: Texture | None = None
     normal_scale: float = 1.0
+
+    if TYPE_CHECKING:  # what is given may be anything that NumPy reads; what is kept is as above
+
+        def __init__(
+            self,
+            color: ColorLike | None = None,
+            texture: Texture | None = None,
+            specular: float = 0.0,
+            shininess: float = 32.0,
+            back_color: ColorLike | None = None,
+            unlit: bool = False,
+            alpha_cutoff: float | None = None,
+            opacity: float = 1.0,
+            alpha_mode: str | None = None,
+            double_sided: bool = True,
+            emission: tuple[float, float, float] = (0.0, 0.0, 0.0),
+            emission_texture: Texture | None = None,
+            metallic: float | None = None,
+            roughness: float | None = None,
+            metallic_roughness_texture: Texture | None = None,
+            occlusion_texture: Texture | None = None,
+            occlusion_strength: float = 1.0,
+            normal_texture: Texture | None = None,
+            normal_scale: float = 1.0,
+        ) -> None: ...
 
     def __repr__(self) -> str:
         """One line: what differs from a plain material."""

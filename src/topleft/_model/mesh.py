@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from numbers import Real
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -91,6 +91,21 @@ class Mesh:
     material_of_triangle: I32 | None = None
     uv1: F32 | None = None
     crease: float = NO_CREASE
+
+    if TYPE_CHECKING:  # what is given may be anything that NumPy reads; what is kept is as above
+
+        def __init__(
+            self,
+            vertices: npt.ArrayLike,
+            triangles: npt.ArrayLike,
+            normals: npt.ArrayLike | None = None,
+            colors: npt.ArrayLike | None = None,
+            uv: npt.ArrayLike | None = None,
+            materials: Iterable[Material] | Material = (),
+            material_of_triangle: npt.ArrayLike | None = None,
+            uv1: npt.ArrayLike | None = None,
+            crease: float = NO_CREASE,
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         vertices = as_real_array(self.vertices, "vertices")

@@ -10,6 +10,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from html import escape
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -47,6 +48,10 @@ class Instance:
     mesh: Mesh
     transform: F64 = field(default_factory=lambda: np.eye(4))
     name: str | None = None
+
+    if TYPE_CHECKING:  # what is given may be anything that NumPy reads; what is kept is as above
+
+        def __init__(self, mesh: Mesh, transform: npt.ArrayLike = ..., name: str | None = None) -> None: ...
 
     def __post_init__(self) -> None:
         if not isinstance(self.mesh, Mesh):

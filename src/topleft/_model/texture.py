@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from enum import StrEnum
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -104,6 +104,18 @@ class Texture:
     encoding: str = "srgb"
     uv_set: int = 0
     transform: F64 | None = None
+
+    if TYPE_CHECKING:  # what is given may be anything that NumPy reads; what is kept is as above
+
+        def __init__(
+            self,
+            image: npt.ArrayLike,
+            filter: Literal["trilinear", "bilinear", "nearest"] | str = "trilinear",  # noqa: A002
+            wrap: str | tuple[str, str] = "repeat",
+            encoding: Literal["srgb", "linear"] | str = "srgb",
+            uv_set: int = 0,
+            transform: npt.ArrayLike | None = None,
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         keep = object.__setattr__  # the dataclass is frozen, and its values are coerced
