@@ -54,7 +54,7 @@ MEMBERS: Mapping[str, tuple[str, ...]] = {
         "triangle", "depth", "mask", "barycentric", "interpolate", "samples_triangle", "samples_depth", "sample",
         "distance", "only",
     ),
-    "FragmentsBatch": ("triangle", "depth", "mask", "barycentric", "interpolate"),
+    "FragmentsBatch": ("mask", "barycentric", "interpolate"),
     "Overlap": ("means", "sums", "totals", "spread", "to_scipy"),
     "DepthLayers": ("triangle", "depth", "count", "layer"),
     "Mesh": ("bounds", "vertex_normals", "corner_normals"),

@@ -6,11 +6,11 @@ Input: a path. Output: `Camera`, one for each node that holds one.
 from __future__ import annotations
 
 import os
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from topleft._base.arrays import as_path
 from topleft._camera.camera import Camera
 from topleft._camera.matrices import F64, box_matrix, frustum_matrix
 from topleft._io.load import GLTF_SUFFIXES, reading
@@ -42,7 +42,7 @@ def load_cameras(path: str | os.PathLike[str]) -> list[Camera]:
     MeshError
         If the file is broken, or a camera of it has numbers that none can have.
     """
-    source = InputFile(Path(path))
+    source = InputFile(as_path("path", path))
 
     def cameras() -> list[Camera]:
         if source.path.suffix.lower() not in GLTF_SUFFIXES:

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from topleft._base.arrays import as_array, as_vector
+from topleft._base.arrays import as_array, as_number, as_vector
 from topleft._base.color import LIGHT_OF_SRGB, Color, as_color, light_of
 from topleft._base.options import parse
 from topleft._model.light import TO_HEADLIGHT, LightSpace, as_not_negative
@@ -103,9 +103,9 @@ class Environment:
         keep(self, "up", tuple(as_vector("up", self.up).tolist()))
         if not any(self.up):
             raise ValueError(f"up must be a direction, got {self.up}")
+        keep(self, "turn", as_number("turn", self.turn))
         if not np.isfinite(self.turn):
             raise ValueError(f"turn must be finite, got {self.turn!r}")
-        keep(self, "turn", float(self.turn))
         keep(self, "space", parse(LightSpace, "space", self.space))
 
     @property

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine
-from topleft._base.arrays import as_point_size
+from topleft._base.arrays import as_array, as_point_size
 from topleft._base.memory import FreshMemory, Memory
 from topleft._base.options import DepthTest, PointShape, Sink, parse
 from topleft._base.threads import count_threads, run_parts
@@ -166,7 +166,7 @@ def points(
     if checked.cull:
         raise ValueError("points have no side to cull")
     kind, test = parse(PointShape, "shape", shape), parse(DepthTest, "depth_test", depth_test)
-    n_points = len(np.shape(positions)) and len(positions)  # type: ignore[arg-type]
+    n_points = (as_array("positions", positions).shape or (0,))[0]
     sizes = as_point_size("point_size", point_size, n_points)
     largest = float(np.max(sizes, initial=0.0))
     if largest > MOST_POINT_PX:

@@ -187,6 +187,8 @@ def overlap(
     found, frame = frame_of(given, size, origin, subpixel_bits, threads, 1)
     prepared = prepare(SCRATCH, found, frame, is_nonzero=is_nonzero)
     prepared.certify(assume_valid=assume_valid)
+    if out is not None and not isinstance(out, Overlap):
+        raise TypeError(f"out must be an Overlap, got {type(out).__name__}")
     return list_areas(prepared, [] if out is None else out._room)
 
 

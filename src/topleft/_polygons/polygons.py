@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from topleft._base.arrays import as_size, as_subpixel_bits, as_window
+from topleft._base.arrays import as_array, as_size, as_subpixel_bits, as_window
 from topleft._base.memory import SCRATCH, FreshMemory
 from topleft._base.options import Sampling, parse
 from topleft._base.threads import parse_threads, run_parts
@@ -219,7 +219,7 @@ def as_paint(values: Any, background: Any, n: int, how: Sampling) -> Paint:
         table: npt.NDArray[Any] = np.arange(n, dtype=np.int32)
         background = -1 if background is None else background
     else:
-        table = np.asarray(values)
+        table = as_array("values", values)
         if table.dtype.kind not in "biuf":
             raise TypeError(f"values must be real numbers, got dtype {table.dtype}")
         if table.ndim == 0:

@@ -140,6 +140,7 @@ def _from_shapely(values: Any) -> RingSet | None:
         values = values.to_numpy()
     if (
         not isinstance(values, (list, tuple, np.ndarray))
+        or (isinstance(values, np.ndarray) and not values.ndim)
         or not len(values)
         or not isinstance(values[0], shapely.Geometry)
     ):

@@ -13,7 +13,7 @@ from topleft import _engine
 from topleft._base.arrays import as_array, as_number, as_values, shown
 from topleft._base.texels import as_texels, look_up
 
-__all__ = ["Corners", "Fragments", "FragmentsBatch", "as_sample", "view_of"]
+__all__ = ["Fragments", "FragmentsBatch", "GivenCorners", "as_sample", "view_of"]
 
 #: Makes the snapped mesh that attributes of some triangles need: these are snapped, no others.
 PartOfMesh = Callable[..., _engine.SnappedMesh]
@@ -27,7 +27,7 @@ class Viewer(Protocol):
         """Eye from world, (4, 4)."""
 
 
-class Corners(NamedTuple):
+class GivenCorners(NamedTuple):
     """What a visibility buffer was drawn from, as it was given: what changes from pixel to pixel is found in it."""
 
     vertices: ArrayLike
@@ -87,7 +87,7 @@ class Fragments:
     #: Fragments of each sample when there are several.
     _samples: tuple[Fragments, ...] = ()
     #: What it was drawn from; None where that is not kept.
-    corners: Corners | None = None
+    corners: GivenCorners | None = None
     #: Ids and depth of these, (S, H, W).
     _planes: tuple[NDArray[np.int32], NDArray[np.float32]] | None = None
 
@@ -105,7 +105,7 @@ class Fragments:
         self._n_vertices = n_vertices
         self._n_triangles = n_triangles
 
-    def drawn_from(self, corners: Corners) -> Self:
+    def drawn_from(self, corners: GivenCorners) -> Self:
         """Keep what it was drawn from, for derivatives and distances; returns itself."""
         self.corners = corners
         for sample in self._samples:

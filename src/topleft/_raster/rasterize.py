@@ -22,7 +22,7 @@ from topleft._raster import choices
 from topleft._raster.choices import Drawing, Route
 from topleft._raster.classic import draw_classic, refuse_classic
 from topleft._raster.cluster_draw import ClusteredMesh, draw_clustered
-from topleft._raster.fragments import Corners, Fragments, FragmentsBatch
+from topleft._raster.fragments import Fragments, FragmentsBatch, GivenCorners
 from topleft._raster.sampling import draw_planes, sample_positions, sum_areas
 from topleft._raster.snap import Snapped, snap_mesh
 from topleft._raster.view import View, ViewOptions
@@ -231,7 +231,7 @@ def draw_fragments(
     refuse_classic(view, "depth")
     refuse_many(view, "rasterize")
     asked = Asked.parse(depth_test, background_depth, out)
-    corners = Corners(vertices, triangles, view.transform, view.viewport)
+    corners = GivenCorners(vertices, triangles, view.transform, view.viewport)
     frags = draw_clusters(memory, vertices, view, asked)
     if frags is not None:
         return frags.drawn_from(corners)

@@ -25,7 +25,7 @@ from topleft._raster import choices
 from topleft._raster.classic import refuse_classic
 from topleft._raster.cluster_draw import ClusteredMesh, draw_clustered
 from topleft._raster.clusters import Clusters, Survey
-from topleft._raster.fragments import Corners
+from topleft._raster.fragments import GivenCorners
 from topleft._raster.peel import check_peel, peel_meshes
 from topleft._raster.rasterize import canvas_of, refuse_many
 from topleft._raster.sampling import sample_positions, sum_areas
@@ -104,10 +104,10 @@ class PlacedScene:
         snapped = snap_mesh(FRESH, mesh.vertices, mesh.triangles, view, with_depth=with_depth, out=None)
         return replace(snapped, mesh=snapped.mesh.numbered_from(int(self.first_ids[i])))
 
-    def corners(self, i: int) -> Corners:
+    def corners(self, i: int) -> GivenCorners:
         """Return what an instance is drawn from."""
         mesh, view = self.scene[i].mesh, self._view_of(i)
-        return Corners(mesh.vertices, mesh.triangles, view.transform, view.viewport)
+        return GivenCorners(mesh.vertices, mesh.triangles, view.transform, view.viewport)
 
     def snap_part(self, i: int, triangles: NDArray[np.int32]) -> _engine.SnappedMesh:
         """Return what some triangles of an instance need, snapped: all of it, unless its mesh is drawn in clusters."""
