@@ -149,13 +149,13 @@ def test_batch_makes_a_mesh_of_another_library_ours_once(executor, monkeypatch):
     results = list(tl.render_batch(listed, executor=executor))
     assert len([subject for subject in made if subject is foreign]) == 1
     for result, camera in zip(results, orbit(BOX, 4), strict=False):
-        assert np.array_equal(result.picture, tl.render(BOX, camera, SIZE))
+        assert np.array_equal(result.picture, tl.render(tl.as_mesh(foreign), camera, SIZE))
     assert np.array_equal(results[4].picture, tl.render(tl.as_mesh(other), None, SIZE))
 
 
 def test_batch_takes_functions_and_processes_that_give_meshes_of_others(processes):
     pair = BOX.vertices, BOX.triangles
-    expected = tl.render(BOX, None, SIZE)
+    expected = tl.render(pair, None, SIZE)
     assert np.array_equal(next(tl.render_batch([tl.Job(lambda: pair, None, SIZE)])).picture, expected)
     assert np.array_equal(next(tl.render_batch([tl.Job(pair, None, SIZE)], executor=processes)).picture, expected)
 

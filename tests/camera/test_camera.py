@@ -244,7 +244,8 @@ def test_framing_points_fills_the_frame_more_than_sphere_and_box(ortho):
 def test_framing_silhouette_fills_the_frame_but_for_five_percent(name, aspect, ortho):
     mesh = Mesh(*scenes.shape(name))
     camera = Camera.framing(mesh, azimuth_deg=50, elevation_deg=33, aspect=aspect, ortho=ortho, fit="silhouette")
-    places = camera.project(mesh.vertices, (aspect, 1)) / [aspect, 1, 1]
+    size = round(1000 * aspect), 1000
+    places = camera.project(mesh.vertices, size) / [*size, 1]
     low, high = places.min(axis=0), places.max(axis=0)
     free = np.stack([low, 1 - high], axis=1)[:2]
 

@@ -58,7 +58,7 @@ def test_wrong_textures_are_named(options, error, message):
         ({"metallic": 1.5}, ValueError, "metallic must lie in 0 to 1, got 1.5"),
         ({"roughness": -0.5}, ValueError, "roughness must be finite and not negative, got -0.5"),
         ({"opacity": 2}, ValueError, "opacity must lie in 0 to 1, got 2"),
-        ({"emission": (1, 2)}, ValueError, "emission must be three numbers, got 2"),
+        ({"emission": (1, 2)}, ValueError, r"emission must be three finite numbers, got \(1, 2\)"),
         ({"emission": (1, 2, -3)}, ValueError, "emission must be finite and not negative, got -3"),
         ({"alpha_mode": "glass"}, ValueError, "alpha_mode must be one of 'opaque', 'mask', 'blend', got 'glass'"),
         ({"normal_texture": 3}, TypeError, "normal_texture must be a Texture, got int"),
