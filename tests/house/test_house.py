@@ -215,6 +215,8 @@ def test_files_and_names_in_comments_exist():
 
 @cache
 def resolves(name):
+    if file_of(name):  # `topleft.torch` needs PyTorch to be imported
+        return True
     try:
         pkgutil.resolve_name(name)
     except (ImportError, AttributeError):
