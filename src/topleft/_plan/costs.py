@@ -118,7 +118,8 @@ def load_costs() -> Costs:
         own = json.loads(cache_file().read_text(encoding="utf-8")) if cache_file().is_file() else None
     except (OSError, ValueError, RecursionError):
         own = None
-    return Costs(**(own if is_like(own, shipped) else shipped))
+    chosen: dict[str, Any] = own if is_like(own, shipped) else shipped  # type: ignore[assignment]
+    return Costs(**chosen)
 
 
 def is_like(value: Any, shipped: Any) -> bool:

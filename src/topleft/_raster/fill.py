@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine
-from topleft._base.arrays import as_background, as_colors
+from topleft._base.arrays import apart_from, as_background, as_colors
 from topleft._base.memory import Memory
 from topleft._base.options import Alpha, Blend, Per, Sampling, Sink, parse
 from topleft._base.threads import run_parts
@@ -85,7 +85,7 @@ def draw_fill(
         raise ValueError(
             f"sampling {str(view.sampling)!r} gives no order: fill takes 'center', 'msaa2' to 'msaa16' and 'area'"
         )
-    palette = as_colors(colors)
+    palette = as_colors(apart_from(out, "colors", colors))
     blending = Blending.parse(style.blend, style.alpha, palette, view)
     transfer = parse_resolve(style.resolve, palette, view, is_straight=blending.is_straight)
     if view.classic:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine
+from topleft._base.arrays import apart_from, as_array
 from topleft._base.memory import Memory
 from topleft._base.options import DepthTest, parse
 from topleft._base.threads import count_threads, run_parts
@@ -40,7 +41,7 @@ def as_depth(depth: object, shape: tuple[int, ...]) -> NDArray[np.float32] | Non
     """Return the buffer that hides lines, contiguous."""
     if depth is None:
         return None
-    array = depth.depth if isinstance(depth, Fragments) else np.asarray(depth)
+    array = as_array("depth", depth.depth if isinstance(depth, Fragments) else depth)  # type: ignore[arg-type]
     if array.dtype != np.float32:
         raise TypeError(f"depth must be Fragments or a float32 array, got dtype {array.dtype}")
     if array.shape != shape:
@@ -62,6 +63,7 @@ def draw_wireframe(
     """`wireframe`, on the memory given."""
     width, height = view.size
     hides = as_depth(depth, (height, width))
+    hides = None if hides is None else np.asarray(apart_from(out, "depth", hides))
     is_farthest = parse(DepthTest, "depth_test", depth_test) is DepthTest.GREATER
     bias = float(depth_bias)
     if not math.isfinite(bias):
