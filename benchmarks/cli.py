@@ -13,11 +13,12 @@ from benchmarks.accuracy.study import STUDY as ACCURACY
 from benchmarks.atlas.study import STUDY as ATLAS
 from benchmarks.choices.planner_page import STUDY as PLANNER
 from benchmarks.choices.study import STUDY as CHOICES
-from benchmarks.harness.machine import IMAGES, ROOT
+from benchmarks.harness.machine import IMAGES
 from benchmarks.harness.records import Record, write_record, write_text
 from benchmarks.levels.study import STUDY as LEVELS
 from benchmarks.peers import PEERS
 from benchmarks.pictures.study import STUDY as PICTURES
+from benchmarks.polygons.study import STUDY as POLYGONS
 from benchmarks.report.pages import with_parts
 from benchmarks.report.study import Study
 from benchmarks.run.study import STUDY as RUN
@@ -32,7 +33,8 @@ from benchmarks.static.study import STUDY as STATIC
 STUDIES = {
     study.kind: study
     for study in (
-        RUN, ACCURACY, BATCH, ATLAS, CHOICES, STATIC, PICTURES, LEVELS, LAYERS, FIELD, SAMPLINGS, PLANNER, MEMSET
+        RUN, ACCURACY, BATCH, ATLAS, CHOICES, STATIC, PICTURES, LEVELS, LAYERS, FIELD, SAMPLINGS, PLANNER, MEMSET,
+        POLYGONS,
     )
 }  # fmt: skip
 
@@ -60,9 +62,6 @@ def parser() -> argparse.ArgumentParser:
     add = commands.add_parser("report", help="print tables again")
     add.set_defaults(action=report)
     add.add_argument("files", nargs="+", type=Path, metavar="FILE.json")
-    add.add_argument("--html", type=Path, metavar="FILE.html",
-                     help="write a page with all charts and words instead, of one accuracy record")  # fmt: skip
-    add.add_argument("--pages", type=Path, default=ROOT / "docs", metavar="FOLDER", help="where its words are (docs)")
 
     with_charts = ", ".join(study.kind for study in STUDIES.values() if study.charts)
     add = commands.add_parser("charts", help=f"draw the charts of a record of {with_charts}")
@@ -94,17 +93,9 @@ def measure(study: Study, arguments: argparse.Namespace) -> None:
 
 
 def report(arguments: argparse.Namespace) -> None:
-    """Print tables of records, or write the report of one."""
-    records = [json.loads(path.read_text()) for path in arguments.files]
-    if arguments.html:
-        from benchmarks.accuracy.html_report import make_report  # matplotlib
-
-        if [study_of(record) for record in records] != [ACCURACY]:
-            raise ValueError("--html takes one accuracy record")
-        write_text(arguments.html, make_report(records[0], arguments.pages))
-        print(arguments.html)
-        return
-    for record in records:
+    """Print tables of records."""
+    for path in arguments.files:
+        record = json.loads(path.read_text())
         print(*study_of(record).lines(record), sep="\n")
 
 

@@ -10,6 +10,7 @@
 #include "clusters/cluster_view.c"
 #include "raster/raster.c"
 #include "raster/bin.c"
+#include "raster/sides.c"
 #include "area/area.c"
 #include "pixels/weights_one.c"
 #include "pixels/weights.c"
@@ -18,15 +19,22 @@
 #include "pixels/points.c"
 #include "pixels/planes.c"
 #include "pixels/composite.c"
+#include "points/cloud.c"
 #include "lines/edges.c"
 #include "lines/lines.c"
 #include "blend/blend.c"
 #include "shade/shade.c"
 #include "shade/shade_samples.c"
 #include "shade/alpha_test.c"
+#include "mesh/creases.c"
 #include "mesh/normals.c"
 #include "mesh/nearest.c"
 #include "mesh/reach.c"
+#include "polygons/points.c"
+#include "polygons/simple.c"
+#include "polygons/mask.c"
+#include "polygons/labels.c"
+#include "polygons/shares.c"
 
 #ifndef TL_KERNELS /* read by itself, as an editor does */
 #define TL_ISA_NAME "none"
@@ -58,8 +66,10 @@ const tl_kernels TL_KERNELS = {
     .cut_clusters = cut_clusters,
     .measure_clusters = measure_clusters,
     .survey_clusters = survey_clusters,
+    .drop_sides = drop_sides,
     .list_edges = list_edges,
     .draw_lines = draw_lines,
+    .draw_cloud = draw_cloud,
     .composite = composite,
     .set_inverse_w = set_inverse_w,
     .shade = shade,
@@ -74,6 +84,10 @@ const tl_kernels TL_KERNELS = {
     .vertex_normals = vertex_normals,
     .face_normals = face_normals,
     .find_turned = find_turned,
+    .face_angles = face_angles,
+    .list_corners = list_corners,
+    .find_creases = find_creases,
+    .sum_creases = sum_creases,
     .box_of_faces = box_of_faces,
     .unit_vectors = unit_vectors,
     .move_points = move_points,
@@ -82,4 +96,13 @@ const tl_kernels TL_KERNELS = {
     .find_nearest = nearest_of_points,
     .find_reach = find_reach,
     .set_feet = set_feet,
+    .snap_points = snap_points,
+    .bound_polygons = bound_polygons,
+    .sort_polygons = sort_polygons,
+    .certify_polygons = certify_polygons,
+    .trust_polygons = trust_polygons,
+    .mask_even_odd = mask_even_odd,
+    .mask_nonzero = mask_nonzero,
+    .label_polygons = label_polygons,
+    .share_polygons = share_polygons,
 };

@@ -139,12 +139,19 @@ typedef struct tl_kernels {
     void (*cut_out)(const tl_scene *scene, const tl_window *window, const tl_view *view, const tl_shading *shading,
                     const int32_t *triangles, int64_t n, const tl_target *target);
 
+    /* Copies triangles [first, end); what is single-sided and turned the way that the scene culls is collapsed to a
+     * point, of what a plane cuts the pieces, in place.  The result is drawn with any cull. */
+    void (*drop_sides)(const tl_scene *scene, const uint8_t *is_single, int64_t first, int64_t end, int32_t *triangles);
+
     /* The edges of the triangles that are not culled, each once, as lower index + 2^32 * higher index; room for three a
      * triangle.  Returns the first row with an index outside the vertices, or -1. */
     int64_t (*list_edges)(const tl_scene *scene, const tl_edge_scratch *scratch, uint64_t *edges, int64_t *n_edges);
 
     /* Clears the window's pixels and draws lines. */
     void (*draw_lines)(const tl_edges *lines, const tl_window *window, const tl_line_target *target);
+
+    /* Clears the window's pixels and draws points: ids and depth, NEAREST or FARTHEST; at equal depth the lower id. */
+    void (*draw_cloud)(const tl_cloud *cloud, const tl_window *window, const tl_target *target);
 
     /* The planes of triangles [first, end); the one of no triangle, with first = 0. */
     void (*list_planes)(const tl_valued *mesh, int64_t first, int64_t end);
@@ -164,10 +171,26 @@ typedef struct tl_kernels {
     int64_t (*face_normals)(const tl_source *source, const int32_t *triangles, int64_t first, int64_t end, double *out,
                             float *rows);
 
-    /* 1 for the triangles of [first, end) whose corners have normals, (n_vertices, 4), that point to the other side,
-     * else 0. */
+    /* 1 for the triangles of [first, end) whose corners have normals, rows of four, that point to the other side, else
+     * 0; row_of_corner is (n_triangles, 3), the triangles themselves where vertices have a row each. */
     int64_t (*find_turned)(const tl_source *source, const int32_t *triangles, int64_t first, int64_t end,
-                           const float *normals, uint8_t *is_turned);
+                           const float *normals, const int32_t *row_of_corner, uint8_t *is_turned);
+
+    /* Unit normals and angles of triangles [first, end), both float64 (n_triangles, 3).  Returns as vertex_normals. */
+    int64_t (*face_angles)(const tl_source *source, const int32_t *triangles, int64_t first, int64_t end,
+                           double *normals, double *angles);
+
+    /* `starts` and `corners` of tl_fans. */
+    void (*list_corners)(const int32_t *triangles, int64_t n_triangles, int64_t n_vertices, int32_t *starts,
+                         int32_t *corners);
+
+    /* Groups of the corners of vertices [first, end), and how many each vertex has, 0 for one; room for five numbers a
+     * corner of the vertex that has most. */
+    void (*find_creases)(const tl_fans *fans, int64_t first, int64_t end, uint64_t *room, int32_t *groups,
+                         int32_t *n_groups);
+
+    /* Normals of vertices [first, end) as vertex_normals has them, and of their groups. */
+    void (*sum_creases)(const tl_fans *fans, const tl_creases *creases, int64_t first, int64_t end);
 
     /* Low and high of the corners of triangles [first, end): six numbers. */
     int64_t (*box_of_faces)(const tl_source *source, const int32_t *triangles, int64_t first, int64_t end, double *box);
@@ -200,6 +223,42 @@ typedef struct tl_kernels {
      * distance. */
     void (*set_feet)(const double *points, const int32_t *triangles, const double *from, const int32_t *triangle,
                      const int32_t *point, int64_t n, double *at, double *squared);
+
+    /* The pixels of points [first, end) to columns of coordinates: rounded to 2^-bits pixels, counted in 2^-grid_bits
+     * from the corner.  With wide_fx NULL points that are not narrow are counted, and the caller comes again with a
+     * table. */
+    tl_vertex_counts (*snap_points)(const tl_source *source, int64_t first, int64_t end, int bits, int grid_bits,
+                                    const int64_t *corner_px, int32_t *x_fx, int32_t *y_fx, int64_t *wide_fx);
+
+    /* Boxes of polygons [first, end) in a window, and which are wide.  Returns the largest number of edges of one. */
+    int64_t (*bound_polygons)(const tl_polygons *polygons, int64_t first, int64_t end, int64_t width, int64_t height,
+                              uint8_t *is_wide, tl_polygon_box *boxes);
+
+    /* The polygons of each band of rows, in their order: those of band k are listed[starts[k]] to listed[starts[k +
+     * 1] - 1]. A first call with listed = NULL sets starts[n_bands + 1] to the length of `listed`; `starts` has
+     * n_bands + 2 numbers. */
+    void (*sort_polygons)(const tl_polygon_box *boxes, int64_t n, int64_t band_rows, int64_t n_bands, int64_t *starts,
+                          int32_t *listed);
+
+    /* Sets weights and is_simple of polygons [first, end); room as TL_CERTIFY_WORDS tells.  `trust_polygons`: of
+     * polygons that are known to be valid, the first ring of each its border and the others holes. */
+    void (*certify_polygons)(const tl_polygons *polygons, int64_t first, int64_t end, int8_t *weights,
+                             uint8_t *is_simple, int64_t *room);
+    void (*trust_polygons)(const tl_polygons *polygons, int64_t first, int64_t end, int8_t *weights,
+                           uint8_t *is_simple);
+
+    /* Rows [top, bottom) of the mask of one polygon: see mask.c for the memory. */
+    void (*mask_even_odd)(const tl_polygons *polygons, int64_t polygon, int64_t width, int64_t top, int64_t bottom,
+                          uint64_t *bits, uint8_t *out);
+    void (*mask_nonzero)(const tl_polygons *polygons, int64_t polygon, int64_t width, int64_t top, int64_t bottom,
+                         uint32_t *at, int32_t *list, int64_t n_list, int32_t *cells, uint64_t *bits, uint8_t *out);
+
+    /* Paints polygons over rows, the later over the earlier. */
+    void (*label_polygons)(const tl_polygons *polygons, const tl_label_job *job);
+
+    /* Exact shares of pixels.  Returns how many polygons of the job are finished: fewer than all when the table is
+     * full. */
+    int64_t (*share_polygons)(const tl_polygons *polygons, const tl_share_job *job);
 } tl_kernels;
 
 #endif

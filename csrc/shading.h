@@ -20,6 +20,11 @@ typedef struct {
     int n_levels;
     tl_filter filter;
     tl_wrap wrap_u, wrap_v;
+    int uv_set;            /* 0 or 1 */
+    int has_transform;     /* of (u, v, 1) to where the texture is looked up: */
+    float transform[2][3]; /* two rows; nothing is 0 but where it is looked up as it is */
+    float tangent[2];      /* how much of the directions of u and of v makes up that of the transformed u */
+    float hand;            /* -1 where the transform mirrors, else 1 */
 } tl_texture;
 
 typedef struct {
@@ -30,8 +35,33 @@ typedef struct {
     float shininess; /* Blinn's exponent; 0: no highlight */
     int is_unlit;
     float cutoff;              /* samples with less opacity are left out by draw_cutout; 0: none */
-    const tl_texture *texture; /* or NULL */
+    const tl_texture *texture; /* or NULL, as all of them */
+    /* What follows, and textures with a transform or of the second set, are read where `is_full` alone. */
+    int is_full;
+    int is_metallic; /* glTF's metallic-rough surface, instead of the highlight above */
+    float metallic, roughness;
+    float occlusion, normal_scale;        /* how much of each texture counts */
+    float emission[3];                    /* light, 0 up */
+    const tl_texture *metallic_roughness; /* roughness in green, metallic in blue */
+    const tl_texture *occlusion_map;      /* in red: the share of the surroundings' light that arrives */
+    const tl_texture *normal_map;
+    const tl_texture *emission_map;
 } tl_material;
+
+typedef enum { TL_SURROUNDINGS_SKY = 0, TL_SURROUNDINGS_IMAGE = 1 } tl_surroundings_kind;
+
+/* Light from all around, in a space of its own, up is y: a sky over a ground, or a picture of all directions, an
+ * octahedron unfolded to a square.  Level k < n_levels - 1 is what a surface of roughness k / (n_levels - 2) sees of
+ * it, level n_levels - 1 what a matt one sees.  A texel is four float, round each level stands a border of one. */
+typedef struct {
+    tl_surroundings_kind kind;
+    float from_shading[3][4]; /* rows; the fourth number is not read */
+    float sky[3], ground[3];
+    float diffuse; /* its share of what matt surfaces get: 0 where they are lit otherwise, else 1 */
+    const float *texels;
+    int32_t offset[TL_MAX_LEVELS], size[TL_MAX_LEVELS]; /* in texels; the size without the border */
+    int n_levels;
+} tl_surroundings;
 
 typedef enum { TL_LIGHT_DIRECTION = 0, TL_LIGHT_POINT = 1, TL_LIGHT_WRAPPED = 2 } tl_light_kind;
 
@@ -46,7 +76,9 @@ typedef struct {
 typedef enum { TL_SHOW_LIGHT = 0, TL_SHOW_NORMALS = 1, TL_SHOW_MATCAP = 2 } tl_show;
 
 typedef struct {
-    const float *normals; /* (n_vertices, 4): the unit normal, or 0, and 1/w */
+    const float *normals; /* rows of four: the unit normal, or 0, and 1/w; of the vertices, then of creases */
+    /* (n_triangles, 3): the row that each corner has; NULL: that of its vertex */
+    const int32_t *normal_of_corner;
     /* (n_triangles, 4): unit, on the side that is counter-clockwise; NULL: interpolated ones */
     const float *face_normals;
     const void *positions; /* (n_vertices, 3) float32 or float64: the face normal where interpolated ones cancel */
@@ -54,13 +86,18 @@ typedef struct {
     /* (n_triangles,): the normals of its vertices point to the other side; NULL: those of none do */
     const uint8_t *is_turned;
     const float *uv;            /* (n_vertices, 2), or NULL */
-    const float *colors;        /* (n_vertices, 4): sRGB, 0 to 255, or NULL */
+    const float *uv1;           /* the second set */
+    const float *colors;        /* (n_vertices, 4): sRGB, 0 to 255, and opacity, 0 to 1; or NULL */
+    int has_alpha;              /* some of them are not opaque */
+    float front_side;           /* sign of the area where the front is seen: 1, in a mirror -1 */
     const int32_t *material_of; /* (n_triangles,), or NULL: all have the first */
     const tl_material *materials;
     int n_materials;
     const tl_light *lights;
     int n_lights;
     float ambient[3];
+    const tl_surroundings *surroundings; /* or NULL */
+    int wants_opacity;                   /* the picture's alpha is that of the surface; materials are full then */
     tl_show show;
     const tl_texture *matcap; /* MATCAP */
     float eye_from[3][4];     /* the rows of the rotation to eye space; the fourth number is not read */

@@ -324,6 +324,45 @@ typedef struct {
     int64_t stride_px;
 } tl_line_target;
 
+/* ---- clouds of points ---------------------------------------------------------------------------------- */
+
+/* Points as discs or squares. */
+typedef struct {
+    const tl_vertex *vertices; /* TL_SPECIAL ones are not drawn */
+    int64_t n;
+    /* sub-pixels: the diameter of the disc, the side of the square, below 2^30; of all, unless sizes_fx has each */
+    int64_t size_fx;
+    const int32_t *sizes_fx;
+    int is_disc;
+    int32_t sample_x_fx, sample_y_fx; /* of the sample, from the pixel's centre */
+} tl_cloud;
+
+/* ---- creases ------------------------------------------------------------------------------------------- */
+
+/* Sides at a vertex that more triangles share join nothing: what is compared is bounded. */
+#define TL_MOST_AT_SIDE 32
+
+/* The triangles round vertices. */
+typedef struct {
+    const int32_t *triangles; /* (n_triangles, 3) */
+    const int32_t *starts;    /* (n_vertices + 1,): where the corners of each vertex begin, and their end */
+    const int32_t *corners;   /* (3 n_triangles,): 3 * triangle + corner, vertex by vertex */
+    const double *normals;    /* (n_triangles, 3), unit, 0 without an area */
+    const double *angles;     /* (n_triangles, 3) */
+    double least_cosine;      /* of the angle between triangles that are not creased */
+} tl_fans;
+
+/* Where normals of creased vertices go. */
+typedef struct {
+    const int32_t *starts;        /* (n_vertices + 1,): the rows of each vertex's groups, none if there is but one */
+    const int32_t *groups;        /* (3 n_triangles,): the group of each corner at its vertex, -1 without an area */
+    const int32_t *own_triangles; /* (n_triangles, 3): the rows of corners that are in no row of a group */
+    int64_t first_row;            /* what row 0 of the groups is called in row_of_corner */
+    double *of_vertices;          /* (n_vertices, 3) */
+    double *of_groups;            /* (rows, 3) */
+    int32_t *row_of_corner;       /* (n_triangles, 3), or NULL */
+} tl_creases;
+
 /* ---- values on triangles ------------------------------------------------------------------------------- */
 
 typedef struct {
@@ -361,6 +400,7 @@ typedef struct {
 } tl_points;
 
 #include "clusters.h"
+#include "polygons.h"
 #include "kernels.h"
 
 #endif

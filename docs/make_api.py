@@ -6,10 +6,11 @@ to the package. A new public name has to be given a subject here; exceptions fin
 
 from __future__ import annotations
 
+import ast
 import inspect
 from collections.abc import Iterator, Mapping
 from functools import cached_property
-from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -19,10 +20,11 @@ PAGE = Path(__file__).with_name("api.md")
 
 SUBJECTS: Mapping[str, tuple[str, ...]] = {
     "Triangles to pixels": ("coverage", "overdraw", "fill", "rasterize", "Fragments", "wireframe", "Rasterizer"),
+    "Polygons": ("polygons", "overlap", "Overlap"),
     "Layers of triangles, sorted by depth": ("peel", "DepthLayers", "composite"),
     "Meshes and scenes": ("Mesh", "load", "as_mesh", "Instance", "Scene"),
-    "Materials and light": ("Material", "Texture", "Light", "Fog"),
-    "Cameras": ("Camera", "OpenCVLens", "FisheyeLens", "turntable", "viewpoints"),
+    "Materials and light": ("Material", "Texture", "Light", "Fog", "Environment"),
+    "Cameras": ("Camera", "OpenCVLens", "FisheyeLens", "load_cameras", "turntable", "viewpoints"),
     "Pictures": ("render", "render_transparent", "silhouette", "save_image"),
     "Buffers and layers of a mesh": (
         "rasterize_mesh", "SceneFragments", "shade", "render_layers", "ViewLayers", "visible_layers",
@@ -38,7 +40,7 @@ SUBJECTS: Mapping[str, tuple[str, ...]] = {
 """In reading order."""
 
 RETURNED = frozenset({
-    "DepthLayers", "Detail", "Fragments", "Plan", "SceneDepthLayers", "SceneFragments", "ViewLayers",
+    "DepthLayers", "Detail", "Fragments", "Overlap", "Plan", "SceneDepthLayers", "SceneFragments", "ViewLayers",
 })  # fmt: skip
 """Classes that functions return: nobody calls them."""
 
@@ -47,6 +49,7 @@ MEMBERS: Mapping[str, tuple[str, ...]] = {
         "triangle", "depth", "mask", "barycentric", "interpolate", "samples_triangle", "samples_depth", "sample",
         "only",
     ),
+    "Overlap": ("means", "sums", "totals", "spread", "to_scipy"),
     "DepthLayers": ("triangle", "depth", "count", "layer"),
     "Mesh": ("bounds", "vertex_normals"),
     "Instance": ("is_mirrored",),
@@ -72,7 +75,7 @@ MEMBERS: Mapping[str, tuple[str, ...]] = {
 }  # fmt: skip
 """What is promised of a class beside its signature; others of its members are for the package itself."""
 
-MODULES = ("scenes", "failure_scenes", "errors", "methods", "methods.reference", "cli")
+MODULES = ("scenes", "failure_scenes", "errors", "methods", "methods.reference", "cli", "torch")
 """Modules that may be imported. All others are private, as the underscore in their path says."""
 
 HEAD = """\
@@ -106,7 +109,7 @@ def page() -> str:
         parts.append(f"## {subject}\n")
         parts += (entry(name) for name in names)
     parts.append("## Modules\n\n| module | what it holds |\n|---|---|")
-    parts += (f"| `topleft.{name}` | {summary(import_module(f'topleft.{name}'))} |" for name in MODULES)
+    parts += (f"| `topleft.{name}` | {one_line(docstring_of(f'topleft.{name}'))} |" for name in MODULES)
     return "\n".join(parts) + "\n"
 
 
@@ -149,7 +152,20 @@ def signature(thing: Any) -> str:
 
 def summary(thing: Any) -> str:
     """Return the first paragraph of the docstring in one line."""
-    return " ".join((inspect.getdoc(thing) or "").partition("\n\n")[0].split()).replace("|", "\\|")
+    return one_line(inspect.getdoc(thing) or "")
+
+
+def docstring_of(module: str) -> str:
+    """Return the docstring of a module, which need not be importable: one of them is for PyTorch."""
+    spec = find_spec(module)
+    assert spec is not None
+    assert spec.origin is not None
+    return ast.get_docstring(ast.parse(Path(spec.origin).read_text(encoding="utf-8"))) or ""
+
+
+def one_line(text: str) -> str:
+    """Return the first paragraph in one line, to stand in a table."""
+    return " ".join(text.partition("\n\n")[0].split()).replace("|", "\\|")
 
 
 if __name__ == "__main__":

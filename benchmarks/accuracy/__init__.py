@@ -13,5 +13,4 @@ tables.py        time, error, mesh, anti-aliasing
 speed_tables.py  depth and cost
 charts.py        time against error, and the list of charts
 speed_charts.py  depth and cost
-html_report.py   all pages in one HTML file
 """

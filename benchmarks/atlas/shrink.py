@@ -10,9 +10,8 @@ from __future__ import annotations
 
 import functools
 import json
-import textwrap
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -24,7 +23,6 @@ from topleft.failure_scenes import FailureScene, Got
 from topleft.methods import find_method
 
 WINDOW_PX = 7
-BEGIN, END = "    # begin: written by `python -m benchmarks atlas --scenes`\n", "    # end\n"
 KINDS = {"gap": "gaps", "overdraw": "overdrawn", "wrong": "wrong"}
 SIGNS = ".0123456789abcdefghijklmnopqrstuvwxyz"
 FAR_PX = 1000.0
@@ -298,26 +296,6 @@ def has_method(kept: FailureScene, entry: Entry) -> bool:
     return any((got.method, got.subpixel_bits) == (entry.method, entry.bits) for got in kept.got)
 
 
-def scene_source(scene: FailureScene) -> str:
-    """Return the lines that make it in `topleft/failure_scenes.py`."""
-    head = ", ".join(json.dumps(text) for text in (scene.name, scene.family, scene.value, scene.kind))
-    points = textwrap.fill(repr(scene.points), 108, break_long_words=False)
-    lines = [
-        f"{head},",
-        *f"{points},".splitlines(),
-        f"{scene.triangles}, {scene.size}, {scene.origin}, {scene.subpixel_bits},",
-        f"{json.dumps(scene.expected)},",
-        "(",
-        *(f"    Got({json.dumps(got.method)}, {got.subpixel_bits}, {json.dumps(got.rows)})," for got in scene.got),
-        "),",
-    ]
-    return "\n".join(["    FailureScene(", *(f"        {line}" for line in lines), "    ),"])
-
-
-def with_scenes(text: str, scenes: Sequence[FailureScene]) -> str:
-    """Return the source of the module with other scenes."""
-    head, begin, rest = text.partition(BEGIN)
-    _, end, tail = rest.partition(END)
-    if not end:
-        raise ValueError(f"the module must hold {BEGIN.strip()!r} and {END.strip()!r}")
-    return head + begin + "\n".join(map(scene_source, scenes)) + "\n" + end + tail
+def scenes_text(scenes: Iterable[FailureScene]) -> str:
+    """Return `topleft/failure_scenes.json`: a scene a line."""
+    return "[\n" + ",\n".join(json.dumps(asdict(scene)) for scene in scenes) + "\n]\n"

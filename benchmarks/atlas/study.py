@@ -7,7 +7,7 @@ from pathlib import Path
 
 from benchmarks.atlas import measure, shrink, tables
 from benchmarks.harness.arguments import add_names, add_out
-from benchmarks.harness.records import Record, Save
+from benchmarks.harness.records import Record, Save, write_text
 from benchmarks.report.study import Study
 
 
@@ -15,8 +15,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(methods=[], families=[])
     add_names(parser, "--method", "methods", "rows; all unless given")
     add_names(parser, "--family", "families", "families of scenes; all unless given")
-    parser.add_argument("--scenes", type=Path, metavar="FILE.py",
-                        help="shrink the first failures and write them into src/topleft/failure_scenes.py")  # fmt: skip
+    parser.add_argument("--scenes", type=Path, metavar="FILE.json",
+                        help="shrink first failures and write them into src/topleft/failure_scenes.json")  # fmt: skip
     add_out(parser)
 
 
@@ -25,8 +25,7 @@ def run(arguments: argparse.Namespace, save: Save) -> Record:
     record = measure.run_atlas(arguments.families, arguments.methods)
     save(record)
     if arguments.scenes:
-        text = shrink.with_scenes(arguments.scenes.read_text(), shrink.shrink_all(record))
-        arguments.scenes.write_text(text)
+        write_text(arguments.scenes, shrink.scenes_text(shrink.shrink_all(record)))
     return record
 
 

@@ -16,6 +16,7 @@ import numpy as np
 import topleft as tl
 from benchmarks.pictures.scenes import SIZE, PictureScene
 from topleft._base.color import DEFAULT_COLOR
+from topleft._model.environment import DEFAULT_ENVIRONMENT
 
 ENVIRONMENT = {"LIBGL_ALWAYS_SOFTWARE": "1", "GALLIUM_DRIVER": "llvmpipe", "LP_NUM_THREADS": "0"}
 
@@ -52,6 +53,11 @@ uniform bool has_fog, has_perspective;
 uniform float specular, shininess;
 uniform mat4 eye_from_world;
 uniform sampler2D image;
+uniform bool is_metallic, has_metallic_map, has_occlusion_map, has_normal_map, has_emission_map;
+uniform sampler2D metallic_map, occlusion_map, normal_map, emission_map;
+uniform float metallic, roughness, occlusion_strength, normal_scale, diffuse_of_around;
+uniform vec3 emission, sky, ground;
+uniform mat4 around_from_world;  // up is y
 uniform vec4 light_at[MAX_LIGHTS];        // a direction if w = 0
 uniform vec4 light_color[MAX_LIGHTS];     // linear, and the falloff
 in vec3 position_world, normal_world, color_srgb;
@@ -66,8 +72,50 @@ vec3 srgb_of(vec3 light) {
     light = clamp(light, 0, 1);
     return mix(1.055 * pow(light, vec3(1 / 2.4)) - 0.055, 12.92 * light, lessThanEqual(light, vec3(0.0031308)));
 }
+vec3 bent(vec3 own) {   // the normal that the mesh has, the frame from derivatives across pixels
+    vec3 px = dFdx(position_world), py = dFdy(position_world);
+    vec2 ux = dFdx(at), uy = dFdy(at);
+    float det = ux.x * uy.y - uy.x * ux.y;
+    vec3 along_u = (uy.y * px - ux.y * py) / det, along_v = (ux.x * py - uy.x * px) / det;
+    vec3 t = normalize(along_u - dot(along_u, own) * own);
+    vec3 b = cross(own, t) * sign(dot(cross(own, along_u), along_v));
+    vec3 m = 2 * texture(normal_map, at).rgb - 1;
+    return normalize(normal_scale * m.x * t + normal_scale * m.y * b + m.z * own);
+}
+vec3 mirrored_light(float height, float alpha) {
+    float spread = 4 * alpha * alpha / (1 + 1.6 * alpha + 1.4 * alpha * alpha);
+    return mix(ground, sky, 0.5 + 0.5 * height / sqrt(height * height + spread * (1 - height * height)));
+}
+vec3 metallic_rough(vec3 base, vec3 n, vec3 viewer, float m, float r, float occlusion) { // glTF 2.0, appendix B
+    const float PI = 3.14159265358979;
+    r = clamp(r, 0.045, 1);
+    float a2 = r * r * r * r, nv = abs(dot(n, viewer));
+    vec3 f0 = mix(vec3(0.04), base, m), matt = base * (1 - m);
+    float offset = 0.0425 - 0.0275 * r, slope = min((1 - r) * (1 - r), exp2(-9.28 * nv)) * (1 - r) + offset;
+    vec3 mirrors = max(f0 * (1.04 - 0.572 * r - 1.04 * slope) + 1.04 * slope + 0.022 * r - 0.04, 0);
+    vec3 d = mat3(around_from_world) * reflect(-viewer, n), up = mat3(around_from_world) * n;
+    vec3 gathered = ambient + diffuse_of_around * mix(ground, sky, 0.5 + 0.5 * up.y);
+    vec3 light = occlusion * (mirrors * (ambient + mirrored_light(d.y, r * r)) + matt * (1 - mirrors) * gathered);
+    for (int k = 0; k < n_lights || (kind == HEADLIGHT && k == 0); k++) {
+        vec3 way = light_at[k].xyz - light_at[k].w * position_world;
+        vec3 l = kind == HEADLIGHT ? transpose(mat3(eye_from_world)) * to_headlight : normalize(way);
+        vec3 strength = light_color[k].rgb / (1 + light_at[k].w * light_color[k].a * dot(way, way));
+        if (kind == HEADLIGHT) strength = 1 - ambient;
+        vec3 h = normalize(l + viewer);
+        float nl = dot(n, l), nh = dot(n, h), share = kind == HEADLIGHT ? pow((1 + nl) / 2, 3) : max(0, nl);
+        vec3 f = f0 + (1 - f0) * pow(1 - dot(viewer, h), 5);
+        float shine = 0;
+        if (nl > 0 && nh > 0) {
+            float ggx = a2 / (PI * pow(nh * nh * (a2 - 1) + 1, 2));
+            shine = ggx * 0.5 / (nl * sqrt(nv * nv * (1 - a2) + a2) + nv * sqrt(nl * nl * (1 - a2) + a2)) * nl;
+        }
+        light += PI * strength * ((1 - f) * matt / PI * share + f * shine);
+    }
+    return light;
+}
 void main() {
-    vec3 n = normalize(normal_world) * (gl_FrontFacing ? 1 : -1);
+    vec3 own = normalize(normal_world), n = own * (gl_FrontFacing ? 1 : -1);
+    if (has_normal_map) n = bent(own) * (gl_FrontFacing ? 1 : -1);
     vec3 n_eye = normalize(mat3(eye_from_world) * n);
     vec3 base = light_of(front_color / 255);
     if (has_colors) base *= light_of(floor(color_srgb + 0.5) / 255);
@@ -80,12 +128,18 @@ void main() {
     }
     if (has_back && !gl_FrontFacing) base = light_of(back_color / 255);
     vec3 light;
-    if (kind == MATCAP) {
+    float m = metallic, r = roughness, occlusion = 1;
+    if (has_metallic_map) m *= texture(metallic_map, at).b;
+    if (has_metallic_map) r *= texture(metallic_map, at).g;
+    if (has_occlusion_map) occlusion = 1 + occlusion_strength * (texture(occlusion_map, at).r - 1);
+    if (is_metallic) {
+        light = metallic_rough(base, n, has_perspective ? normalize(eye - position_world) : eye, m, r, occlusion);
+    } else if (kind == MATCAP) {
         light = texture(image, 0.5 + 0.5 * n_eye.xy).rgb;
     } else if (kind == HEADLIGHT) {
         light = base * (ambient + (1 - ambient) * pow((1 + dot(n_eye, to_headlight)) / 2, 3));
     } else {
-        vec3 diffuse = ambient, shine = vec3(0);
+        vec3 diffuse = ambient * occlusion, shine = vec3(0);
         vec3 viewer = has_perspective ? normalize(eye - position_world) : eye;
         for (int k = 0; k < n_lights; k++) {
             vec3 way = light_at[k].xyz - light_at[k].w * position_world;
@@ -96,6 +150,7 @@ void main() {
         }
         light = base * diffuse + shine;
     }
+    light += emission * (has_emission_map ? texture(emission_map, at).rgb : vec3(1));
     float far_off = -(eye_from_world * vec4(position_world, 1)).z;
     if (has_fog) light = mix(light, light_of(fog_color / 255), clamp((far_off - fog.x) / (fog.y - fog.x), 0, 1));
     color = vec4(srgb_of(light), 1);
@@ -140,6 +195,10 @@ class OpenGL:
         texture = texture_of(scene)
         if texture is not None:
             self.upload(texture).use(0)
+        for unit, (name, own) in enumerate(maps_of(scene.material).items(), 1):
+            self.program[name].value = unit
+            if own is not None:
+                self.upload(own).use(unit)
         buffer = self.context.buffer(corner_rows(scene).tobytes())
         names = "position", "normal", "color", "uv"
         mesh = self.context.vertex_array(self.program, [(buffer, "3f 3f 3f 2f", *names)])
@@ -156,7 +215,8 @@ class OpenGL:
         """The texture as linear light in float32, row 0 at v = 0, with OpenGL's own halvings."""
         gl = self.context
         height, width = texture.image.shape[:2]
-        light = decode(texture.image[::-1, :, :3]).astype(np.float32)
+        values = texture.image[::-1, :, :3]
+        light = (decode(values) if texture.encoding == "srgb" else values / 255).astype(np.float32)
         uploaded = gl.texture((width, height), 3, light.tobytes(), dtype="f4", alignment=1)
         if texture.filter == "trilinear":
             uploaded.build_mipmaps()
@@ -178,6 +238,16 @@ def decode(srgb: np.ndarray) -> np.ndarray:
 def texture_of(scene: PictureScene) -> tl.Texture | None:
     """The picture that the shader reads: the matcap, or the texture."""
     return scene.options.get("matcap") or scene.material.texture
+
+
+def maps_of(material: tl.Material) -> dict[str, tl.Texture | None]:
+    """The other pictures by the names of their samplers."""
+    return {
+        "metallic_map": material.metallic_roughness_texture,
+        "occlusion_map": material.occlusion_texture,
+        "normal_map": material.normal_texture,
+        "emission_map": material.emission_texture,
+    }
 
 
 def corner_rows(scene: PictureScene) -> np.ndarray:
@@ -210,7 +280,7 @@ def uniforms(scene: PictureScene) -> dict[str, Any]:
         "eye_from_world": view.T,
         "has_perspective": has_perspective,
         "eye": eye_axes[:3, 3] if has_perspective else eye_axes[:3, 2],
-        "kind": 2 if options.get("shading") == "matcap" else 0 if lights is None else 1,
+        "kind": kind_of(options),
         "has_texture": texture is not None,
         "own_level": scene.own_level,
         "mirror_u": wraps[0] == "mirror",
@@ -219,7 +289,7 @@ def uniforms(scene: PictureScene) -> dict[str, Any]:
         "front_color": color,
         "has_back": material.back_color is not None,
         "back_color": material.back_color or (0, 0, 0),
-        "ambient": (options.get("ambient", 0.03),) * 3,
+        "ambient": (options.get("ambient", 0.0 if options.get("environment") else 0.03),) * 3,
         "to_headlight": np.array([-0.35, 0.45, 1.0]) / np.linalg.norm([-0.35, 0.45, 1.0]),
         "specular": material.specular,
         "shininess": material.shininess,
@@ -227,7 +297,37 @@ def uniforms(scene: PictureScene) -> dict[str, Any]:
         "fog": (fog.near, fog.far) if fog else (0, 1),
         "fog_color": fog.color if fog else (0, 0, 0),
         **light_uniforms(lights or (), eye_axes),
+        **full_uniforms(material, options.get("environment"), view),
     }
+
+
+def full_uniforms(material: tl.Material, environment: tl.Environment | None, view: np.ndarray) -> dict[str, Any]:
+    """What metallic-rough materials need, maps, and what is all around: a sky over a ground."""
+    is_metallic = material.metallic is not None or material.roughness is not None
+    around = environment or DEFAULT_ENVIRONMENT
+    sky, ground = around.colors
+    turned = np.eye(4)
+    turned[:3, :3] = around.axes @ (view[:3, :3] if around.space == "eye" else np.eye(3))
+    return {
+        "is_metallic": is_metallic,
+        "metallic": 1.0 if material.metallic is None else material.metallic,
+        "roughness": 1.0 if material.roughness is None else material.roughness,
+        "occlusion_strength": material.occlusion_strength,
+        "normal_scale": material.normal_scale,
+        "emission": material.emission,
+        "sky": sky,
+        "ground": ground,
+        "diffuse_of_around": 0.0 if environment is None else 1.0,
+        "around_from_world": turned.T,
+        **{f"has_{name}": own is not None for name, own in maps_of(material).items()},
+    }
+
+
+def kind_of(options: dict[str, Any]) -> int:
+    """What lights: the headlight, lights, or a matcap."""
+    if options.get("shading") == "matcap":
+        return 2
+    return 0 if options.get("lights") is None and options.get("environment") is None else 1
 
 
 def light_uniforms(lights: Sequence[tl.Light], world_from_eye: np.ndarray) -> dict[str, Any]:

@@ -228,6 +228,75 @@ def level() -> PictureScene:
     return trilinear("the same, level of detail in the shader", own_level=True)
 
 
+def waves(side: int = 64) -> np.ndarray:
+    """A normal map (side, side, 3) uint8: waves along both axes, unlike its mirror images."""
+    row, column = 2 * np.pi * np.mgrid[:side, :side] / side
+    x, y = 0.5 * np.cos(2 * column) + 0.2 * np.sin(3 * column), 0.4 * np.sin(3 * row + 1)
+    normal = np.stack([x, y, np.ones_like(x)], -1)
+    return np.rint(127.5 + 127.5 * normal / np.linalg.norm(normal, axis=-1, keepdims=True)).astype(np.uint8)
+
+
+def shares(side: int = 32) -> np.ndarray:
+    """Occlusion, roughness and metallic as red, green and blue (side, side, 3) uint8."""
+    row, column = np.mgrid[:side, :side] / side
+    red, green = 0.6 + 0.4 * np.cos(2 * np.pi * row), 0.55 + 0.4 * np.sin(2 * np.pi * column)
+    return np.rint(255 * np.stack([red, green, (column + row) % 1 > 0.5], -1)).astype(np.uint8)
+
+
+def data(image: np.ndarray) -> tl.Texture:
+    """Numbers, between which the texture is linear."""
+    return tl.Texture(image, "bilinear", encoding="linear")
+
+
+SKY = tl.Environment((170, 205, 255), ground=(95, 75, 50), up=(0.2, 1, 0.1))
+LAMPS = [tl.Light((1, 2, 1.5), intensity=0.8), tl.Light((-1.5, 0.6, 1.2), "point", (255, 150, 90), 1.2, falloff=0.3)]
+
+
+def metal() -> PictureScene:
+    """A metallic-rough surface without textures, as it looks when nothing is said of lights."""
+    mesh = tl.Mesh(*tl.scenes.shape("torus-knot"), materials=[tl.Material((255, 200, 110), metallic=1, roughness=0.35)])
+    return PictureScene("torus knot, metal, headlight", mesh, tl.Camera.framing(mesh, aspect=aspect()))
+
+
+def metallic() -> PictureScene:
+    """Metal and what is none side by side, smooth and rough, with occlusion and emission, under lights and a sky."""
+    vertices, triangles = tl.scenes.shape("torus")
+    material = tl.Material(
+        texture=tl.Texture(tiles(16), "bilinear"),
+        metallic=0.9,
+        roughness=0.8,
+        metallic_roughness_texture=data(shares()),
+        occlusion_texture=data(shares()),
+        occlusion_strength=0.8,
+        emission=(0.05, 0.0, 0.1),
+        emission_texture=tl.Texture(tiles(16)[::-1], "bilinear"),
+    )
+    mesh = tl.Mesh(vertices, triangles, uv=vertices[:, [0, 2]], materials=[material])
+    camera = tl.Camera.framing(mesh, aspect=aspect(), elevation_deg=30)
+    options = {"lights": LAMPS, "environment": SKY}
+    return PictureScene("torus, metallic-roughness textures, lights, sky", mesh, camera, options)
+
+
+def normal_map() -> PictureScene:
+    """Waves by a normal map, mirrored on one half, under Blinn-Phong lights."""
+    vertices, triangles = tl.scenes.shape("torus")
+    material = tl.Material((210, 190, 170), specular=0.4, shininess=25, normal_texture=data(waves()), normal_scale=0.8)
+    mesh = tl.Mesh(vertices, triangles, uv=1.5 * vertices[:, [0, 2]], materials=[material])
+    camera = tl.Camera.framing(mesh, aspect=aspect(), elevation_deg=30)
+    return PictureScene("torus, normal map, Blinn-Phong", mesh, camera, {"lights": LAMPS, "ambient": 0.05})
+
+
+def metallic_waves() -> PictureScene:
+    """Both together, seen from outside and from inside."""
+    vertices, triangles = tl.scenes.shape("torus")
+    is_behind = vertices[triangles][..., 2].max(axis=1) < 1e-9
+    material = tl.Material((240, 215, 170), metallic=0.7, roughness=0.4, normal_texture=data(waves()))
+    mesh = tl.Mesh(vertices, triangles[is_behind], uv=1.5 * vertices[:, :2], materials=[material])
+    camera = tl.Camera.look_at((0.9, 1.0, 3.4), (0, 0, -0.4), fov_y_deg=36)
+    options = {"lights": LAMPS, "environment": SKY}
+    return PictureScene("half a torus, both sides, metallic, normal map", mesh, camera, options)
+
+
 SCENES: Mapping[str, Callable[[], PictureScene]] = {
     "headlight": headlight,
     "flat": flat,
@@ -241,4 +310,8 @@ SCENES: Mapping[str, Callable[[], PictureScene]] = {
     "bilinear": bilinear,
     "trilinear": trilinear,
     "level": level,
+    "metal": metal,
+    "metallic": metallic,
+    "normal-map": normal_map,
+    "metallic-waves": metallic_waves,
 }

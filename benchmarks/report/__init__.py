@@ -4,5 +4,4 @@ study.py     the protocol of a study
 tables.py    Markdown tables, numbers, commits
 pages.py     tables between the markers of a page
 charts.py    looks, axes, files; needs matplotlib
-markdown.py  the pages as HTML
 """

@@ -16,18 +16,7 @@
 #include "vertex/clip.c"
 #include "vertex/project.c"
 #include "raster/setup.c"
-
-/* Whether a triangle shows the side that is drawn: as draw_triangle, of the pieces where a plane cuts it. */
-static int shows_side(const tl_scene *scene, int64_t i)
-{
-    const int wanted = scene->cull == TL_CULL_BACK ? -1 : 1;
-    tl_triangle t;
-    const triangle_parts parts = parts_of(scene, i);
-    for (int k = 0; k < parts.n; k++)
-        if (load_triangle(&parts.set, parts.corners + 3 * k, &t) == wanted)
-            return 1;
-    return 0;
-}
+#include "raster/sides.c"
 
 /* The corners in ascending order: the lowest is the lower index of two edges, the middle one of the third. */
 static inline void sort_corners(const int32_t *c, int32_t *sorted)

@@ -132,7 +132,8 @@ static void color_rows(const uint8_t *colors, int n_channels, int64_t first, int
     for (int64_t i = first; i < end; i++) {
         const uint8_t *color = colors + n_channels * i;
         float *row = rows + 4 * i;
-        row[0] = (float)color[0], row[1] = (float)color[1], row[2] = (float)color[2], row[3] = 1.0f;
+        row[0] = (float)color[0], row[1] = (float)color[1], row[2] = (float)color[2];
+        row[3] = n_channels == 4 ? (float)color[3] / 255.0f : 1.0f;
     }
 }
 
@@ -333,7 +334,7 @@ static int64_t face_normals(const tl_source *source, const int32_t *triangles, i
 }
 
 static int64_t find_turned(const tl_source *source, const int32_t *triangles, int64_t first, int64_t end,
-                           const float *normals, uint8_t *is_turned)
+                           const float *normals, const int32_t *row_of_corner, uint8_t *is_turned)
 {
     face_block b = {.n = 0};
     for (int64_t i = first; i < end; i += b.n) {
@@ -343,7 +344,7 @@ static int64_t find_turned(const tl_source *source, const int32_t *triangles, in
             return bad;
         measure_block(&b, 0);
         for (int j = 0; j < b.n; j++) {
-            const int32_t *t = triangles + 3 * (i + j);
+            const int32_t *t = row_of_corner + 3 * (i + j);
             for (int k = 0; k < 3; k++)
                 sum[k][j] = ((double)normals[4 * (int64_t)t[0] + k] + (double)normals[4 * (int64_t)t[1] + k]) +
                             (double)normals[4 * (int64_t)t[2] + k];

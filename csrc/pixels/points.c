@@ -24,33 +24,6 @@ typedef struct {
     _Alignas(64) double value[3 * TL_POINT_ROWS][TL_SPAN_ROOM];
 } point_span;
 
-/* The positions (x, y, z) of TL_LANES vertices. */
-TL_INLINE void load_positions(const tl_points *points, const int32_t *vertices, vd *p)
-{
-    const double *p64 = points->positions;
-    const float *p32 = points->positions;
-    /* four numbers, from the one before the row on */
-    if (TL_LANES > 1 && !vm_any(vi_eq(vi_load(vertices), vi_set1(0)))) {
-        vd row[4];
-        vi bits[4];
-        if (points->is_f64)
-            vd_load_records(p64 - 1, 3, vertices, row);
-        else
-            vi_load_records((const char *)p32 - 4, 12, vertices, bits);
-        for (int axis = 0; axis < 3; axis++)
-            p[axis] = points->is_f64 ? row[axis + 1] : vd_from_vf(vf_of_bits(bits[axis + 1]));
-        return;
-    }
-    double lanes[3][TL_MAX_LANES];
-    for (int lane = 0; lane < TL_LANES; lane++)
-        for (int axis = 0; axis < 3; axis++) {
-            const int64_t at = 3 * (int64_t)vertices[lane] + axis;
-            lanes[axis][lane] = points->is_f64 ? p64[at] : (double)p32[at];
-        }
-    for (int axis = 0; axis < 3; axis++)
-        p[axis] = vd_load(lanes[axis]);
-}
-
 /* What the rows are at the corners of runs. */
 TL_INLINE void set_values(point_span *r, const tl_points *points)
 {
@@ -58,7 +31,7 @@ TL_INLINE void set_values(point_span *r, const tl_points *points)
     for (int slot = TL_LANES; slot < end; slot += TL_LANES) {
         vd p[9];
         for (int k = 0; k < 3; k++)
-            load_positions(points, r->weighed.corners[k] + slot, p + 3 * k);
+            load_positions(points->positions, points->is_f64, r->weighed.corners[k] + slot, p + 3 * k);
         for (int k = 3; k < 9; k++)
             p[k] = vd_sub(p[k], p[k % 3]);
         for (int i = 0; i < points->n_rows; i++)

@@ -40,7 +40,12 @@ enum {                                /* coefficients of runs, float32 */
        RUN_V = RUN_U + 3,
        RUN_COLOR = RUN_V + 3,
        RUN_GRADIENT = RUN_COLOR + 9, /* per column and per row: of sum(E q), sum(E q u), sum(E q v) */
-       N_RUN_FLOATS = RUN_GRADIENT + 6,
+       RUN_ALPHA = RUN_GRADIENT + 6, /* from here on of full materials and holes */
+       RUN_UV1 = RUN_ALPHA + 3,      /* as RUN_U and RUN_V, of the second set */
+       RUN_GRADIENT1 = RUN_UV1 + 6,
+       RUN_TANGENT = RUN_GRADIENT1 + 6, /* of both sets: see set_tangents; not times q */
+       N_TANGENT_FLOATS = 7,
+       N_RUN_FLOATS = RUN_TANGENT + 2 * N_TANGENT_FLOATS,
 };
 enum { RUN_E1, RUN_E2, RUN_STEP1, RUN_STEP2, RUN_SUM, RUN_MATERIAL, RUN_ID, RUN_SPECIAL, N_RUN_INTS };
 
@@ -56,6 +61,8 @@ typedef struct {
     const tl_shading *shading;
     const tl_view *view;
     int needs_q, needs_normal, needs_uv, needs_colors, needs_point; /* whether anything that is shown depends on it */
+    int needs_alpha, needs_uv1, needs_tangents[2];                  /* the same; tangents of each set of uv */
+    int needs_more;                                                 /* any of these */
     /* the light is the grey of srgb.c: per channel the line and the root of its colour */
     int is_grey;
     float grey_line[3], grey_root[3];
@@ -137,22 +144,23 @@ TL_INLINE vf gradient_of(const vf *step, const vf *value)
     return vf_fma(step[0], value[0], vf_fma(step[1], value[1], vf_mul(step[2], value[2])));
 }
 
-TL_INLINE void set_uv(shade_runs *s, int slot, const run_setup *r)
+/* A set of uv; its coefficients begin at `first`, those of its gradients at `gradient`. */
+TL_INLINE void set_uv(shade_runs *s, int slot, const run_setup *r, const float *uv, int first, int gradient)
 {
     const vf *q = r->q;
     vf u[3], v[3];
     for (int k = 0; k < 3; k++) {
         vf pair[2];
-        vf_load_pairs(s->shading->uv, r->corners[k], pair);
+        vf_load_pairs(uv, r->corners[k], pair);
         u[k] = vf_mul(q[k], pair[0]), v[k] = vf_mul(q[k], pair[1]);
-        put(s, RUN_U + k, slot, u[k]);
-        put(s, RUN_V + k, slot, v[k]);
+        put(s, first + k, slot, u[k]);
+        put(s, first + 3 + k, slot, v[k]);
     }
     const vf *steps[2] = {r->col_step, r->row_step};
     for (int axis = 0; axis < 2; axis++) {
-        put(s, RUN_GRADIENT + 3 * axis, slot, gradient_of(steps[axis], q));
-        put(s, RUN_GRADIENT + 3 * axis + 1, slot, gradient_of(steps[axis], u));
-        put(s, RUN_GRADIENT + 3 * axis + 2, slot, gradient_of(steps[axis], v));
+        put(s, gradient + 3 * axis, slot, gradient_of(steps[axis], q));
+        put(s, gradient + 3 * axis + 1, slot, gradient_of(steps[axis], u));
+        put(s, gradient + 3 * axis + 2, slot, gradient_of(steps[axis], v));
     }
 }
 
@@ -175,15 +183,123 @@ TL_INLINE vf side_of_normals(const shade_runs *s, int slot)
     return vf_load(side);
 }
 
-TL_INLINE void load_normals(const shade_runs *s, run_setup *r)
+/* The rows of the normals of TL_LANES triangles whose corners have some of their own. */
+TL_INLINE void load_normal_rows(const shade_runs *s, int slot, int32_t rows[3][TL_MAX_LANES])
+{
+    for (int lane = 0; lane < TL_LANES; lane++)
+        for (int k = 0; k < 3; k++)
+            rows[k][lane] = s->shading->normal_of_corner[3 * (int64_t)s->ints[RUN_ID][slot + lane] + k];
+}
+
+/* Normals and q of the corners in these rows. */
+TL_INLINE void load_normals(const shade_runs *s, int32_t rows[3][TL_MAX_LANES], run_setup *r)
 {
     for (int k = 0; k < 3; k++) {
         vi c[4];
-        vi_load_records(s->shading->normals, 16, r->corners[k], c);
+        vi_load_records(s->shading->normals, 16, rows[k], c);
         for (int axis = 0; axis < 3; axis++)
             r->normal[k][axis] = vf_of_bits(c[axis]);
         r->q[k] = vf_of_bits(c[3]);
     }
+}
+
+/* The positions (x, y, z) of TL_LANES vertices, of rows of three float32 or float64. */
+TL_INLINE void load_positions(const void *positions, int is_f64, const int32_t *vertices, vd *p)
+{
+    const double *p64 = positions;
+    const float *p32 = positions;
+    if (TL_LANES > 1 &&
+        !vm_any(vi_eq(vi_load(vertices), vi_set1(0)))) { /* four numbers, from the one before the row on */
+        vd row[4];
+        vi bits[4];
+        if (is_f64)
+            vd_load_records(p64 - 1, 3, vertices, row);
+        else
+            vi_load_records((const char *)p32 - 4, 12, vertices, bits);
+        for (int axis = 0; axis < 3; axis++)
+            p[axis] = is_f64 ? row[axis + 1] : vd_from_vf(vf_of_bits(bits[axis + 1]));
+        return;
+    }
+    double lanes[3][TL_MAX_LANES];
+    for (int lane = 0; lane < TL_LANES; lane++)
+        for (int axis = 0; axis < 3; axis++) {
+            const int64_t at = 3 * (int64_t)vertices[lane] + axis;
+            lanes[axis][lane] = is_f64 ? p64[at] : (double)p32[at];
+        }
+    for (int axis = 0; axis < 3; axis++)
+        p[axis] = vd_load(lanes[axis]);
+}
+
+/* The edges of the triangles of TL_LANES runs from their first corners on, over the longest coordinate of each. */
+TL_INLINE void load_edges(const shade_runs *s, const run_setup *r, vf edge[2][3])
+{
+    const tl_shading *shading = s->shading;
+    const vf zero = vf_set1(0.0f);
+    vf longest = vf_set1(0x1p-120f);
+    vd first[3], other[3];
+    load_positions(shading->positions, shading->is_f64, r->corners[0], first);
+    for (int k = 0; k < 2; k++) {
+        load_positions(shading->positions, shading->is_f64, r->corners[k + 1], other);
+        for (int axis = 0; axis < 3; axis++) {
+            edge[k][axis] = vf_from_vd(vd_sub(other[axis], first[axis]));
+            longest = vf_max(longest, vf_max(edge[k][axis], vf_sub(zero, edge[k][axis])));
+        }
+    }
+    const vf scale = vf_div(vf_set1(1.0f), longest);
+    for (int k = 0; k < 2; k++)
+        for (int axis = 0; axis < 3; axis++)
+            edge[k][axis] = vf_mul(edge[k][axis], scale);
+}
+
+/* Tangents of TL_LANES triangles: the directions in which u and v grow, over the length of the longer one, and the hand
+ * (1: right) that they make with the normal towards the viewer.  All are turned where the other side is lit than that
+ * of the normals of the mesh, so that what they bend is turned as a whole.  0 where uv have no area. */
+TL_INLINE void set_tangents(shade_runs *s, int slot, const run_setup *r, const float *uv, vf side, int first)
+{
+    const vf zero = vf_set1(0.0f), one = vf_set1(1.0f), minus = vf_set1(-1.0f);
+    vf edge[2][3], pair[3][2], along_u[3], along_v[3], length[2] = {zero, zero};
+    load_edges(s, r, edge);
+    for (int k = 0; k < 3; k++)
+        vf_load_pairs(uv, r->corners[k], pair[k]);
+    const vf u1 = vf_sub(pair[1][0], pair[0][0]), v1 = vf_sub(pair[1][1], pair[0][1]);
+    const vf u2 = vf_sub(pair[2][0], pair[0][0]), v2 = vf_sub(pair[2][1], pair[0][1]);
+    const vf area_uv = vf_sub(vf_mul(u1, v2), vf_mul(u2, v1));
+    for (int axis = 0; axis < 3; axis++) {
+        along_u[axis] = vf_sub(vf_mul(v2, edge[0][axis]), vf_mul(v1, edge[1][axis]));
+        along_v[axis] = vf_sub(vf_mul(u1, edge[1][axis]), vf_mul(u2, edge[0][axis]));
+        length[0] = vf_fma(along_u[axis], along_u[axis], length[0]);
+        length[1] = vf_fma(along_v[axis], along_v[axis], length[1]);
+    }
+    const vf longer = vf_max(length[0], length[1]), turn = vf_select(vf_lt(r->area, zero), minus, one);
+    const vf hand = vf_select(vf_lt(area_uv, zero), minus, one);
+    const vm has_some = vm_and(vf_lt(zero, longer), vm_or(vf_lt(area_uv, zero), vf_lt(zero, area_uv)));
+    const vf scale = vf_select(has_some, vf_div(vf_mul(vf_mul(hand, turn), side), vf_sqrt(longer)), zero);
+    for (int axis = 0; axis < 3; axis++) {
+        put(s, first + axis, slot, vf_select(has_some, vf_mul(along_u[axis], scale), zero));
+        put(s, first + 3 + axis, slot, vf_select(has_some, vf_mul(along_v[axis], scale), zero));
+    }
+    put(s, first + 6, slot, vf_mul(hand, turn));
+}
+
+/* What only full materials and holes need. */
+static void set_more_attributes(shade_runs *s, int slot, const run_setup *r)
+{
+    const tl_shading *shading = s->shading;
+    if (s->needs_uv1)
+        set_uv(s, slot, r, shading->uv1, RUN_UV1, RUN_GRADIENT1);
+    if (s->needs_alpha) {
+        vi c[3][4];
+        for (int k = 0; k < 3; k++)
+            vi_load_records(shading->colors, 16, r->corners[k], c[k]);
+        put_three(s, RUN_ALPHA, slot, r->q, vf_of_bits(c[0][3]), vf_of_bits(c[1][3]), vf_of_bits(c[2][3]));
+    }
+    for (int set = 0; set < 2; set++)
+        if (s->needs_tangents[set]) {
+            vf side = vf_set1(shading->front_side);
+            if (!shading->face_normals)
+                side = shading->is_turned ? side_of_normals(s, slot) : vf_set1(1.0f);
+            set_tangents(s, slot, r, set ? shading->uv1 : shading->uv, side, RUN_TANGENT + N_TANGENT_FLOATS * set);
+        }
 }
 
 /* Everything but edge functions of TL_LANES runs. */
@@ -206,7 +322,7 @@ TL_INLINE void set_attributes(shade_runs *s, int slot, const run_setup *r)
         for (int k = 0; k < 3; k++)
             put(s, RUN_Q + k, slot, q[k]);
     if (s->needs_uv)
-        set_uv(s, slot, r);
+        set_uv(s, slot, r, shading->uv, RUN_U, RUN_GRADIENT);
     if (s->needs_colors)
         for (int k = 0; k < 3; k++) {
             vi c[4];
@@ -214,6 +330,8 @@ TL_INLINE void set_attributes(shade_runs *s, int slot, const run_setup *r)
             const vf same[3] = {q[k], q[k], q[k]};
             put_three(s, RUN_COLOR + 3 * k, slot, same, vf_of_bits(c[0]), vf_of_bits(c[1]), vf_of_bits(c[2]));
         }
+    if (s->needs_more)
+        set_more_attributes(s, slot, r);
 }
 
 /* The centre of a pixel in the space of the snapped vertices, seen from the sample. */
@@ -351,7 +469,13 @@ TL_INLINE void set_runs(shade_runs *s, int64_t row)
         run_corners(s, slot, r.corners);
         vi_store(s->ints[RUN_SPECIAL] + slot, vi_set1(0));
         const vm is_special = vm_and(set_edges(s, slot, row, &r), vm_first(TL_LANES + s->n_runs - slot));
-        load_normals(s, &r);
+        if (shading->normal_of_corner) {
+            _Alignas(64) int32_t rows[3][TL_MAX_LANES];
+            load_normal_rows(s, slot, rows);
+            load_normals(s, rows, &r);
+        } else {
+            load_normals(s, r.corners, &r);
+        }
         for (unsigned rest = vm_bits(is_special); rest; rest &= rest - 1)
             set_special(s, slot, __builtin_ctz(rest), row, &r);
         set_attributes(s, slot, &r);
@@ -374,6 +498,10 @@ typedef struct {
     vf color[3]; /* of the vertices */
     vf uv[2], du[2], dv[2];
     vf ray[3], point[3];
+    /* of full materials and holes: */
+    vf alpha; /* of the vertices */
+    vf uv1[2], du1[2], dv1[2];
+    vf opacity; /* of the surface */
 } shaded_lanes;
 
 TL_INLINE vf pick(const shaded_lanes *p, int coefficient)

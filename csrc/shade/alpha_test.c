@@ -18,6 +18,7 @@
 #include "raster/raster.c"
 #include "raster/setup.c"
 #include "pixels/runs.c"
+#include "shade/full.c"
 #include "shade/shade.c"
 #include "shade/shade_pixels.c"
 #include "shade/texture.c"
@@ -32,14 +33,20 @@ typedef struct {
 /* The opacity of a material at the pixels of a run. */
 TL_INLINE vf opacity_of(shaded_lanes *p, const tl_material *m)
 {
-    vf texel[4];
-    if (!m->texture || !p->s->needs_uv)
-        return vf_set1(m->color[3]);
+    vf texel[4], opacity = vf_set1(m->color[3]);
+    if (!p->s->needs_q)
+        return opacity;
     p->q = weighed(p, RUN_Q, RUN_Q + 1, RUN_Q + 2);
     p->inv_q = vf_div(vf_set1(1.0f), p->q);
-    set_uv_lanes(p);
-    sample_texture(m->texture, p->uv[0], p->uv[1], p->du, p->dv, texel, 4);
-    return vf_mul(texel[3], vf_set1(m->color[3]));
+    if (p->s->needs_more)
+        set_more(p);
+    if (m->texture) {
+        if (p->s->needs_uv)
+            set_uv_lanes(p);
+        look_up(p, m->texture, texel, 4);
+        opacity = vf_mul(texel[3], opacity);
+    }
+    return p->s->needs_alpha ? vf_mul(p->alpha, opacity) : opacity;
 }
 
 /* Where triangles with holes go. */
@@ -133,7 +140,10 @@ static void cut_out(const tl_scene *scene, const tl_window *window, const tl_vie
     c.scene.first_id = 0;
     start_runs(&s, &c.scene, window, view, shading);
     s.needs_normal = s.needs_colors = s.needs_point = 0;
-    s.needs_q = s.needs_uv;
+    s.needs_tangents[0] = s.needs_tangents[1] = 0;
+    s.needs_alpha = shading->colors && shading->has_alpha;
+    s.needs_more = s.needs_alpha || s.needs_uv1;
+    s.needs_q = s.needs_uv || s.needs_more;
     for (int64_t k = 0; k < n; k++)
         cut_triangle(&c, &s, window, triangles[k]);
 }

@@ -52,26 +52,38 @@ TL_INLINE vf highlight(const lit_surface *s, const vf *to_light, vf n_dot_l, flo
     return vf_select(vf_lt(zero, n_dot_l), power, zero);
 }
 
+/* The unit vector to a light; returns how strong it is there. */
+TL_INLINE vf find_light(const lit_surface *s, const tl_light *light, vf *to_light)
+{
+    if (light->kind != TL_LIGHT_POINT) {
+        for (int k = 0; k < 3; k++)
+            to_light[k] = vf_set1(light->at[k]);
+        return vf_set1(1.0f);
+    }
+    for (int k = 0; k < 3; k++)
+        to_light[k] = vf_sub(vf_set1(light->at[k]), s->point[k]);
+    const vf squared = dot3(to_light, to_light),
+             scale = vf_div(vf_set1(1.0f), vf_sqrt(vf_max(squared, vf_set1(0x1p-100f))));
+    for (int k = 0; k < 3; k++)
+        to_light[k] = vf_mul(to_light[k], scale);
+    return vf_div(vf_set1(1.0f), vf_fma(vf_set1(light->falloff), squared, vf_set1(1.0f)));
+}
+
+/* The share of a light that a matt surface sends on, from n . l. */
+TL_INLINE vf diffuse_share(const tl_light *light, vf n_dot_l)
+{
+    const vf half = vf_set1(0.5f);
+    if (light->kind != TL_LIGHT_WRAPPED)
+        return vf_max(n_dot_l, vf_set1(0.0f));
+    const vf wrapped = vf_fma(half, n_dot_l, half);
+    return vf_mul(wrapped, vf_mul(wrapped, wrapped));
+}
+
 TL_INLINE void add_light(const lit_surface *s, const tl_light *light, float shininess, vf *diffuse, vf *specular)
 {
-    vf to_light[3] = {vf_set1(light->at[0]), vf_set1(light->at[1]), vf_set1(light->at[2])}, strength = vf_set1(1.0f);
-    const vf zero = vf_set1(0.0f), half = vf_set1(0.5f);
-    if (light->kind == TL_LIGHT_POINT) {
-        for (int k = 0; k < 3; k++)
-            to_light[k] = vf_sub(to_light[k], s->point[k]);
-        const vf squared = dot3(to_light, to_light);
-        const vf scale = vf_div(vf_set1(1.0f), vf_sqrt(vf_max(squared, vf_set1(0x1p-100f))));
-        for (int k = 0; k < 3; k++)
-            to_light[k] = vf_mul(to_light[k], scale);
-        strength = vf_div(strength, vf_fma(vf_set1(light->falloff), squared, vf_set1(1.0f)));
-    }
-    const vf n_dot_l = dot3(s->normal, to_light);
-    vf share = vf_max(n_dot_l, zero);
-    if (light->kind == TL_LIGHT_WRAPPED) {
-        const vf wrapped = vf_fma(half, n_dot_l, half);
-        share = vf_mul(wrapped, vf_mul(wrapped, wrapped));
-    }
-    share = vf_mul(share, strength);
+    vf to_light[3];
+    const vf strength = find_light(s, light, to_light), n_dot_l = dot3(s->normal, to_light);
+    const vf share = vf_mul(diffuse_share(light, n_dot_l), strength);
     for (int c = 0; c < 3; c++)
         diffuse[c] = vf_fma(share, vf_set1(light->color[c]), diffuse[c]);
     if (shininess > 0.0f) {

@@ -18,25 +18,46 @@
 #include "shade/shade_pixels.c"
 #include "shade/srgb.c"
 
+/* Notes what a full material needs. */
+static void note_full(shade_runs *s, const tl_material *m)
+{
+    const tl_texture *const textures[5] = {m->texture, m->metallic_roughness, m->occlusion_map, m->normal_map,
+                                           m->emission_map};
+    for (int k = 0; k < 5; k++)
+        if (textures[k]) {
+            s->needs_uv |= textures[k]->uv_set == 0;
+            s->needs_uv1 |= textures[k]->uv_set == 1;
+        }
+    if (m->normal_map && !m->is_unlit)
+        s->needs_tangents[m->normal_map->uv_set] = 1;
+}
+
 static void start_runs(shade_runs *s, const tl_scene *scene, const tl_window *window, const tl_view *view,
                        const tl_shading *shading)
 {
     int shines = 0, has_texture = 0, is_lit = 0, has_points = 0;
+    const int shows_light = shading->show == TL_SHOW_LIGHT;
+    s->scene = scene, s->window = window, s->shading = shading, s->view = view;
+    s->needs_uv = s->needs_uv1 = s->needs_tangents[0] = s->needs_tangents[1] = 0;
     for (int k = 0; k < shading->n_materials; k++) {
         const tl_material *m = &shading->materials[k];
-        has_texture |= m->texture != NULL;
+        has_texture |= m->texture != NULL && !m->is_full;
         is_lit |= !m->is_unlit;
-        shines |= !m->is_unlit && m->shininess > 0.0f;
+        shines |= !m->is_unlit && (m->shininess > 0.0f || m->is_metallic);
+        if (m->is_full && shows_light)
+            note_full(s, m);
     }
     for (int k = 0; k < shading->n_lights; k++)
         has_points |= shading->lights[k].kind == TL_LIGHT_POINT;
-    const int shows_light = shading->show == TL_SHOW_LIGHT;
-    s->scene = scene, s->window = window, s->shading = shading, s->view = view;
     s->needs_normal = !shows_light || is_lit;
-    s->needs_uv = shows_light && has_texture && shading->uv;
+    s->needs_uv = shading->uv && (s->needs_uv || (shows_light && has_texture));
+    s->needs_uv1 &= shading->uv1 != NULL;
+    s->needs_tangents[0] &= shading->uv != NULL, s->needs_tangents[1] &= shading->uv1 != NULL;
     s->needs_colors = shows_light && shading->colors;
+    s->needs_alpha = s->needs_colors && shading->has_alpha && shading->wants_opacity;
     s->needs_point = shows_light && ((is_lit && has_points) || shines);
-    s->needs_q = s->needs_uv || s->needs_colors || s->needs_point || shading->fog_scale != 0.0f;
+    s->needs_more = s->needs_uv1 || s->needs_alpha || s->needs_tangents[0] || s->needs_tangents[1];
+    s->needs_q = s->needs_uv || s->needs_more || s->needs_colors || s->needs_point || shading->fog_scale != 0.0f;
     start_grey(s);
     memset(s->ints, 0, sizeof s->ints);
     for (int k = 0; k < N_RUN_FLOATS; k++)
@@ -57,7 +78,8 @@ TL_INLINE vi shaded_word(shaded_lanes *p, int64_t row, const float *depth)
     const tl_show show = p->s->shading->show;
     vf rgb[3];
     shade_pixels(p, row, depth, rgb);
-    return to_word(to_byte(show, rgb[0]), to_byte(show, rgb[1]), to_byte(show, rgb[2]), vi_set1(255));
+    const vi opacity = p->s->shading->wants_opacity ? vi_rint(vf_mul(vf_set1(255.0f), p->opacity)) : vi_set1(255);
+    return to_word(to_byte(show, rgb[0]), to_byte(show, rgb[1]), to_byte(show, rgb[2]), opacity);
 }
 
 /* The picture of a visibility buffer; rows of window->width. */

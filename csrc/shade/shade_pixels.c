@@ -10,6 +10,7 @@
 #include "topleft.h"
 #include "lanes/lanes.h"
 #include "pixels/runs.c"
+#include "shade/full.c"
 #include "shade/light.c"
 #include "shade/texture.c"
 
@@ -95,17 +96,7 @@ TL_INLINE void set_normals(shaded_lanes *p)
         replace_normals(p, has_none);
 }
 
-TL_INLINE void set_uv_lanes(shaded_lanes *p)
-{
-    const vf u = vf_mul(weighed(p, RUN_U, RUN_U + 1, RUN_U + 2), p->inv_q);
-    const vf v = vf_mul(weighed(p, RUN_V, RUN_V + 1, RUN_V + 2), p->inv_q);
-    p->uv[0] = u, p->uv[1] = v;
-    for (int axis = 0; axis < 2; axis++) {
-        const vf q = pick(p, RUN_GRADIENT + 3 * axis);
-        p->du[axis] = vf_mul(vf_sub(pick(p, RUN_GRADIENT + 3 * axis + 1), vf_mul(u, q)), p->inv_q);
-        p->dv[axis] = vf_mul(vf_sub(pick(p, RUN_GRADIENT + 3 * axis + 2), vf_mul(v, q)), p->inv_q);
-    }
-}
+TL_INLINE void set_uv_lanes(shaded_lanes *p) { find_uv(p, RUN_U, RUN_GRADIENT, p->uv, p->du, p->dv); }
 
 /* The colours of the vertices: interpolated as sRGB values, rounded to whole ones, then turned to light. */
 TL_INLINE void set_colors(shaded_lanes *p)
@@ -139,9 +130,13 @@ TL_INLINE void set_points(shaded_lanes *p, int64_t row, const float *depth)
 }
 
 /* The light of one material, as all lanes would see it. */
-TL_INLINE void shade_material(const shaded_lanes *p, const tl_material *m, vf *rgb)
+TL_INLINE void shade_material(shaded_lanes *p, const tl_material *m, vf *rgb)
 {
     const tl_shading *shading = p->s->shading;
+    if (m->is_full) {
+        shade_full(p, m, rgb);
+        return;
+    }
     for (int c = 0; c < 3; c++)
         rgb[c] = vf_set1(m->color[c]);
     if (p->s->needs_colors)
@@ -179,8 +174,9 @@ TL_INLINE void shade_material(const shaded_lanes *p, const tl_material *m, vf *r
 }
 
 /* Each lane by its own material. */
-static void shade_materials(const shaded_lanes *p, vf *rgb)
+static void shade_materials(shaded_lanes *p, vf *rgb)
 {
+    vf opacity = vf_set1(1.0f);
     const tl_shading *shading = p->s->shading;
     const vi material = pick_int(p, RUN_MATERIAL);
     int32_t number[TL_MAX_LANES];
@@ -192,8 +188,11 @@ static void shade_materials(const shaded_lanes *p, vf *rgb)
         shade_material(p, &shading->materials[own < 0 || own >= shading->n_materials ? 0 : own], light);
         for (int c = 0; c < 3; c++)
             rgb[c] = vf_select(lanes, light[c], rgb[c]);
+        if (shading->wants_opacity)
+            opacity = vf_select(lanes, p->opacity, opacity);
         rest = vm_and_not(rest, lanes);
     }
+    p->opacity = opacity;
 }
 
 TL_INLINE void fade(const shaded_lanes *p, const float *depth, vf *rgb)

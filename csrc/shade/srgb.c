@@ -86,7 +86,7 @@ static void start_grey(shade_runs *s)
     const tl_material *m = shading->materials;
     float most = shading->ambient[0];
     s->is_grey = is_white(shading->ambient) && shading->show == TL_SHOW_LIGHT && !shading->material_of &&
-                 shading->n_materials > 0 && !m->is_unlit && !m->texture && m->back_side == 0.0f &&
+                 shading->n_materials > 0 && !m->is_unlit && !m->is_full && !m->texture && m->back_side == 0.0f &&
                  !(m->shininess > 0.0f) && !s->needs_q;
     for (int k = 0; k < shading->n_lights; k++) {
         s->is_grey &= is_white(shading->lights[k].color);

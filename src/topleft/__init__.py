@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, get_type_hints
 from topleft import scenes
 from topleft._base.memory import release_memory
 from topleft._camera.camera import Camera
+from topleft._camera.file_cameras import load_cameras
 from topleft._camera.lens import FisheyeLens, OpenCVLens
 from topleft._camera.viewpoints import turntable, viewpoints
 from topleft._engine.isa import build_info
@@ -20,22 +21,27 @@ from topleft._lod.detail import Detail, choose_detail
 from topleft._lod.levels import Level, Levels
 from topleft._lod.simplify import simplify
 from topleft._model.adapt import as_mesh
+from topleft._model.environment import Environment
 from topleft._model.light import Fog, Light
 from topleft._model.material import Material
 from topleft._model.mesh import Mesh
+from topleft._model.points import Points
 from topleft._model.scene import Instance, Scene
 from topleft._model.texture import Texture
 from topleft._plan.plan import Plan, plan
+from topleft._polygons.overlap import Overlap, overlap
+from topleft._polygons.polygons import polygons
 from topleft._raster.classic import bresenham_line
 from topleft._raster.composite import composite
 from topleft._raster.fragments import Fragments
 from topleft._raster.peel import DepthLayers, peel
+from topleft._raster.points import PointFragments, points
 from topleft._raster.verbs import Rasterizer, coverage, fill, overdraw, rasterize, wireframe
 from topleft._render.fragments import SceneDepthLayers, SceneFragments
 from topleft._render.render import rasterize_mesh, render
 from topleft._render.scene_shade import shade
 from topleft._render.silhouette import silhouette
-from topleft.errors import ImageError, MeshError, MissingPackageError, TopleftError
+from topleft.errors import ImageError, MeshError, MeshWarning, MissingPackageError, TopleftError
 
 if TYPE_CHECKING:
     from topleft._batch.batch import render_batch
@@ -59,6 +65,7 @@ __all__ = [
     "Camera",
     "DepthLayers",
     "Detail",
+    "Environment",
     "FisheyeLens",
     "Fog",
     "Fragments",
@@ -72,9 +79,13 @@ __all__ = [
     "Material",
     "Mesh",
     "MeshError",
+    "MeshWarning",
     "MissingPackageError",
     "OpenCVLens",
+    "Overlap",
     "Plan",
+    "PointFragments",
+    "Points",
     "Rasterizer",
     "Scene",
     "SceneDepthLayers",
@@ -93,9 +104,13 @@ __all__ = [
     "fill",
     "height_map",
     "load",
+    "load_cameras",
     "overdraw",
+    "overlap",
     "peel",
     "plan",
+    "points",
+    "polygons",
     "rasterize",
     "rasterize_mesh",
     "release_memory",

@@ -20,3 +20,7 @@ class ImageError(TopleftError, ValueError):
 
 class MissingPackageError(TopleftError, ImportError):
     """An optional package that the call needs is not installed; the message says how to get it."""
+
+
+class MeshWarning(UserWarning):
+    """A part of a mesh file is not read, or a file that it names is missing: the picture will be without it."""

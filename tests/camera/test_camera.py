@@ -238,6 +238,37 @@ def test_framing_points_fills_the_frame_more_than_sphere_and_box(ortho):
     assert sizes[2] > 0.85
 
 
+@pytest.mark.parametrize("ortho", [False, True])
+@pytest.mark.parametrize("aspect", [0.4, 1.0, 2.5])
+@pytest.mark.parametrize("name", ["cube", "tetrahedron", "torus-knot"])
+def test_framing_silhouette_fills_the_frame_but_for_five_percent(name, aspect, ortho):
+    mesh = Mesh(*scenes.shape(name))
+    camera = Camera.framing(mesh, azimuth_deg=50, elevation_deg=33, aspect=aspect, ortho=ortho, fit="silhouette")
+    places = camera.project(mesh.vertices, (aspect, 1)) / [aspect, 1, 1]
+    low, high = places.min(axis=0), places.max(axis=0)
+    free = np.stack([low, 1 - high], axis=1)[:2]
+
+    assert np.abs(free[:, 0] - free[:, 1]).max() < 1e-5
+    assert abs(free.min() - 0.05) < 1e-9
+    assert (low[2], high[2]) > (0, 0)
+    assert high[2] < 1
+
+
+def test_framing_silhouette_of_a_single_point_has_it_in_the_middle():
+    for ortho in (False, True):
+        camera = Camera.framing([(3, 4, 5)], fit="silhouette", ortho=ortho)
+        assert np.allclose(camera.project([(3, 4, 5)], (100, 100))[0, :2], 50)
+
+
+@pytest.mark.parametrize(("away", "near", "far"), [(0, 1e-3, 1e3), (5, 5e-3, 5e3), (0.01, 1e-5, 1e3)])
+def test_from_intrinsics_without_planes_has_those_of_the_distance_to_the_origin(away, near, far):
+    pose = np.eye(4)
+    pose[2, 3] = away
+    found, expected = (Camera.from_intrinsics(K, pose, SIZE, **planes) for planes in ({}, {"near": near, "far": far}))
+
+    assert np.allclose(found.projection, expected.projection, rtol=1e-12, atol=0)
+
+
 def test_framing_box_comes_nearer_than_the_sphere():
     long_box = [(-5, -1, -1), (5, 1, 1)]
     sphere, box = (Camera.framing(long_box, fit=fit, azimuth_deg=90) for fit in ("sphere", "box"))
@@ -289,7 +320,10 @@ def test_off_center_halves_make_the_whole(ortho):
             lambda: Camera.off_center(np.eye(4), left=0, right=np.inf, bottom=0, top=1, near=1, far=2, ortho=True),
             "left < right and bottom < top must be finite, got 0 and inf",
         ),
-        (lambda: Camera.framing([(0, 0, 0)], fit="tight"), 'fit must be "sphere", "box" or "points", got \'tight\''),
+        (
+            lambda: Camera.framing([(0, 0, 0)], fit="tight"),
+            'fit must be "sphere", "box", "points" or "silhouette", got \'tight\'',
+        ),
     ],
 )
 def test_camera_more_impossible_is_refused(make, message):

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from first_pictures import camera_of, first_picture, shape_of
 from PIL import Image
 
 from topleft import cli, scenes
@@ -17,6 +18,7 @@ from topleft._io import png
 from topleft._model.mesh import Mesh
 from topleft._render.render import render
 
+PYRAMID = "v 0 0 0\nv 1 0 0\nv 1 0 1\nv 0 0 1\nv 0.5 1 0.5\nf 2 1 5\nf 3 2 5\nf 4 3 5\nf 1 4 5\nf 1 2 3\nf 1 3 4\n"
 SMALL = ["--size", "64x48"]
 QUADS = "g a\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\ng b\nv 0 0 1\nf 1 2 5\n"
 
@@ -30,13 +32,12 @@ def names(folder):
 
 def test_render_shape_is_the_picture_of_the_library(run):
     assert run("render", "torus-knot", "-o", "knot.png", "--size", "96x64") == (0, [])
-    mesh = Mesh(*scenes.shape("torus-knot"))
-    assert np.array_equal(np.asarray(Image.open("knot.png")), render(mesh, size=(96, 64)))
+    assert np.array_equal(np.asarray(Image.open("knot.png")), first_picture("torus-knot", (96, 64)))
 
 
 def test_render_wireframe_is_the_picture_with_edges(run):
     assert run("render", "cube", "-o", "cube.png", "--wireframe", *SMALL) == (0, [])
-    expected = render(Mesh(*scenes.shape("cube")), size=(64, 48), edges=True)
+    expected = first_picture("cube", edges=True)
     assert np.array_equal(np.asarray(Image.open("cube.png")), expected)
 
 
@@ -46,7 +47,7 @@ def test_render_file_of_each_format_shows_the_mesh(run, folder, kind):
     vertices, triangles = scenes.shape("icosphere")
     trimesh.Trimesh(vertices, triangles, process=False).export(folder / f"ball.{kind}")
     assert run("render", f"ball.{kind}", "-o", "ball.png", *SMALL) == (0, [])
-    expected = render(Mesh(vertices, triangles), size=(64, 48)).astype(int)
+    expected = first_picture("icosphere").astype(int)
     # Formats round positions to float32 or decimals, and may write normals of their own.
     assert np.abs(np.asarray(Image.open("ball.png")) - expected).mean() < 1
 
@@ -87,7 +88,7 @@ def test_render_npz_holds_all_buffers_and_the_matrix(run):
     with np.load("cube.npz") as arrays:
         assert sorted(arrays) == ["clip_from_world", "color", "depth", "triangle"]
         assert np.array_equal(arrays["triangle"] >= 0, np.isfinite(arrays["depth"]))
-        camera = Camera.framing(Mesh(*scenes.shape("cube")), aspect=64 / 48)
+        camera = camera_of(shape_of("cube"))
         assert np.array_equal(arrays["clip_from_world"], camera.clip_from_world((64, 48)))
 
 
@@ -95,9 +96,52 @@ def test_render_camera_options_reach_the_camera(run):
     angles = ["--azimuth", "-30", "--elevation", "10", "--fov", "25"]
     others = ["--ortho", "--up", "z", "--cull", "back", "--threads", "1"]
     assert run("render", "cube", "-o", "cube.png", *SMALL, *angles, *others)[0] == 0
-    mesh = Mesh(*scenes.shape("cube"))
-    camera = Camera.framing(mesh, azimuth_deg=-30, elevation_deg=10, fov_y_deg=25, ortho=True, up="z", aspect=64 / 48)
-    assert np.array_equal(np.asarray(Image.open("cube.png")), render(mesh, camera, (64, 48)))
+    mesh = shape_of("cube")
+    camera = camera_of(mesh, azimuth_deg=-30, elevation_deg=10, fov_y_deg=25, ortho=True, up="z")
+    assert np.array_equal(np.asarray(Image.open("cube.png")), render(mesh, camera, (64, 48), sampling="msaa4"))
+
+
+def test_render_fills_the_frame_but_for_the_margin(run):
+    assert run("render", "torus", "-o", "a.npy", "--shading", "ids", "--size", "400x100") == (0, [])
+    rows = np.flatnonzero((np.load("a.npy") >= 0).any(axis=1))
+    assert (rows[0], rows[-1]) == (5, 94)
+
+
+def test_render_crease_makes_edges_sharp_or_not(run, folder):
+    pytest.importorskip("trimesh")
+    (folder / "a.obj").write_text(PYRAMID)
+    colors = {}
+    for degrees in (0, 30, 180):
+        options = ["--crease", degrees, "--sampling", "center", *SMALL]
+        assert run("render", "a.obj", "-o", f"{degrees}.png", *options)[0] == 0
+        pixels = np.asarray(Image.open(f"{degrees}.png")).reshape(-1, 4)
+        colors[degrees] = len(np.unique(pixels, axis=0))
+    assert colors[0] == colors[30] == 3  # two sides and the ground
+    assert colors[180] > 20
+
+
+def test_render_word_in_braces_that_stands_for_nothing_is_refused(run, folder):
+    status, lines = run("render", "cube", "-o", "{nam}.png")
+    message = "topleft: OUT may have {name}, {view}, {index}, {layer}, got {nam} in '{nam}.png'; did you mean name?"
+    assert (status, lines) == (2, [message])
+    (folder / "{nam}").mkdir()
+    assert run("render", "cube", "-o", "{nam}/{name}.png", *SMALL) == (0, [])
+    assert names(folder) == ["{nam}/cube.png"]
+
+
+def test_render_unknown_option_is_told_what_it_may_mean(run):
+    status, lines = run("render", "cube", "-o", "a.png", "--colour", "red")
+    assert (status, len(lines)) == (2, 1)
+    assert "unrecognized arguments: --colour red; did you mean --color?" in lines[0]
+
+
+def test_render_files_that_differ_in_their_formats_have_these_in_their_names(run, folder):
+    pytest.importorskip("trimesh")
+    (folder / "a.obj").write_text(QUADS)
+    (folder / "a.off").write_text("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")
+    (folder / "b.obj").write_text(QUADS)
+    assert run("render", "a.obj", "a.off", "b.obj", "-o", "p/", *SMALL) == (0, [])
+    assert names(folder / "p") == ["a-obj.png", "a-off.png", "b.png"]
 
 
 @pytest.mark.parametrize(
@@ -151,17 +195,23 @@ def test_render_views_go_round_the_mesh(run):
         assert np.array_equal(np.load(f"a-00{i_view}.npy") >= 0, expected)
 
 
-def test_render_file_and_shape_of_one_name_would_collide(run, folder):
-    (folder / "cube.obj").write_text(QUADS)
-    status, lines = run("render", "cube", "cube.obj", "-o", "out/")
+def test_render_files_of_one_name_would_collide(run, folder):
+    for place in ("a", "b"):
+        (folder / place).mkdir()
+        (folder / place / "cube.obj").write_text(QUADS)
+    status, lines = run("render", "a/cube.obj", "b/cube.obj", "-o", "out/")
     assert (status, len(lines)) == (2, 1)
-    assert lines[0].startswith("topleft: 'cube' and 'cube.obj' would both be written to 'out/cube.png'; put {index}")
-    assert names(folder) == ["cube.obj"]
+    assert lines[0].startswith(
+        "topleft: 'a/cube.obj' and 'b/cube.obj' would both be written to 'out/cube.png'; put {index}"
+    )
+    assert names(folder) == ["a/cube.obj", "b/cube.obj"]
 
 
 def test_render_names_that_differ_by_case_would_collide(run, folder):
-    (folder / "Cube.obj").write_text(QUADS)
-    assert run("render", "cube", "Cube.obj", "-o", "out/")[0] == 2
+    for place, name in (("a", "cube.obj"), ("b", "Cube.obj")):
+        (folder / place).mkdir()
+        (folder / place / name).write_text(QUADS)
+    assert run("render", "a/cube.obj", "b/Cube.obj", "-o", "out/")[0] == 2
 
 
 def test_render_never_replaces_a_mesh(run, folder):
@@ -253,9 +303,9 @@ def test_render_many_goes_on_after_a_failure(run, folder):
 
 def test_render_without_trimesh_gives_the_hint(run, folder, monkeypatch):
     monkeypatch.setitem(sys.modules, "trimesh", None)
-    (folder / "a.obj").write_text(QUADS)
+    (folder / "a.off").write_text("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")
     expected = "topleft: reading a mesh needs trimesh: pip install 'topleft[render]'"
-    assert run("render", "a.obj", "cube", "-o", "out/", *SMALL) == (2, [expected])
+    assert run("render", "a.off", "cube", "-o", "out/", *SMALL) == (2, [expected])
 
 
 def test_render_shape_needs_no_optional_package(run, monkeypatch):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from first_pictures import camera_of, first_picture
 from PIL import Image
 
 import topleft as tl
@@ -35,7 +36,7 @@ def test_render_texture_is_laid_on_the_mesh(run, folder, checks):
     mesh = tl.load(folder / "a.obj")
     assert mesh.uv is not None
     camera = tl.Camera.framing(mesh, aspect=64 / 48)
-    expected = tl.render(mesh, camera, SIZE, shading="unlit", material=tl.Material(texture=checks))
+    expected = tl.render(mesh, camera, SIZE, shading="unlit", material=tl.Material(texture=checks), sampling="msaa4")
     assert np.array_equal(pixels("a-000.png"), expected)
     assert {(220, 100, 50, 255), (20, 20, 20, 255)} <= {tuple(color) for color in expected.reshape(-1, 4).tolist()}
 
@@ -43,17 +44,35 @@ def test_render_texture_is_laid_on_the_mesh(run, folder, checks):
 def test_render_matcap_is_the_picture_of_the_library(run, checks):
     look = ["--shading", "matcap", "--matcap", "checks.png"]
     assert run("render", "torus-knot", "-o", "a.png", *look, *SMALL) == (0, [])
-    assert np.array_equal(pixels("a.png"), tl.render(KNOT, None, SIZE, shading="matcap", matcap=checks))
+    assert np.array_equal(pixels("a.png"), first_picture("torus-knot", shading="matcap", matcap=checks))
+
+
+@pytest.mark.parametrize(
+    ("text", "up", "environment"),
+    [
+        ("#8ac", "y", {"sky": (136, 170, 204)}),
+        ("white,#321", "z", {"sky": (255, 255, 255), "ground": (51, 34, 17), "up": (0, 0, 1)}),
+        ("checks.png", "y", {"image": True}),
+    ],
+)
+def test_render_environment_is_light_from_all_around(run, checks, text, up, environment):
+    if "image" in environment:
+        environment = {"image": checks.image[..., :3]}
+    assert run("render", "torus-knot", "-o", "a.png", "--environment", text, "--up", up, *SMALL) == (0, [])
+    camera = tl.Camera.framing(KNOT, aspect=64 / 48, up=up)
+    expected = tl.render(KNOT, camera, SIZE, environment=tl.Environment(**environment))
+    assert np.array_equal(pixels("a.png"), expected)
 
 
 @pytest.mark.parametrize("layers", [[], ["--layers", "color"]])
 def test_render_opacity_is_glass(run, layers):
     assert run("render", "torus-knot", "-o", "a.png", "--opacity", 0.4, *layers, *SMALL) == (0, [])
-    assert np.array_equal(pixels("a.png"), tl.render_transparent(KNOT, None, SIZE, opacity=0.4))
+    assert np.array_equal(pixels("a.png"), tl.render_transparent(KNOT, camera_of(KNOT), SIZE, opacity=0.4))
 
 
 def test_render_unlit_shows_the_color(run):
-    assert run("render", "cube", "-o", "a.png", "--shading", "unlit", "--color", "#123456", *SMALL) == (0, [])
+    options = ["--shading", "unlit", "--color", "#123456", "--sampling", "center", *SMALL]
+    assert run("render", "cube", "-o", "a.png", *options) == (0, [])
     assert np.unique(pixels("a.png").reshape(-1, 4), axis=0).tolist() == [[18, 52, 86, 255], [255, 255, 255, 255]]
 
 
@@ -65,6 +84,10 @@ def test_render_unlit_shows_the_color(run):
         (["--matcap", "checks.png"], "topleft: --shading matcap and --matcap FILE go together"),
         (["--shading", "matcap", "--matcap", "gone.png"], "topleft: No such file or directory: '"),
         (["--shading", "matcap", "--matcap", "notes.png"], "topleft: cannot read 'notes.png': it is no picture that P"),
+        (["--environment", "blau"], "topleft: --environment must be one or two colours or a picture, got 'blau'"),
+        (["--environment", "red,red,red"], "topleft: --environment must be one or two colours, got 3"),
+        (["--environment", "gone.png"], "topleft: No such file or directory: '"),
+        (["--environment", "notes.png"], "topleft: cannot read 'notes.png': it is no picture that P"),
         (["--opacity", "2"], "topleft: argument --opacity: must be a number from 0 to 1, got '2'"),
         (["--opacity", "half"], "topleft: argument --opacity: must be a number from 0 to 1, got 'half'"),
         (["--opacity", "0.5", "--wireframe"], "topleft: --opacity goes with neither --wireframe nor --sampling"),

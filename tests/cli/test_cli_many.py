@@ -12,6 +12,7 @@ import time
 
 import numpy as np
 import pytest
+from first_pictures import camera_of, first_picture, shape_of
 from PIL import Image
 
 from topleft import scenes
@@ -49,9 +50,9 @@ def names(folder):
     return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
 
 
-def knots(n, size=(64, 48)):
+def knots(n, size=(64, 48), sampling="msaa4"):
     cameras = [Camera.framing(KNOT, azimuth_deg=35 + 360 * i / n, aspect=size[0] / size[1]) for i in range(n)]
-    return [render(KNOT, camera, size) for camera in cameras]
+    return [render(KNOT, camera, size, sampling=sampling) for camera in cameras]
 
 
 def pixels(path):
@@ -88,15 +89,16 @@ def test_render_layer_id_is_short_for_triangle(run, folder):
 
 def test_render_layers_are_those_of_the_mesh(run):
     assert run("render", "torus-knot", "-o", "p/", "--layers", "color,depth,triangle", *SMALL) == (0, [])
-    frags = rasterize_mesh(KNOT, None, (64, 48))
-    assert np.array_equal(pixels("p/torus-knot-color.png"), render(KNOT, None, (64, 48)))
+    frags = rasterize_mesh(KNOT, camera_of(KNOT), (64, 48))
+    assert np.array_equal(pixels("p/torus-knot-color.png"), first_picture("torus-knot", sampling="center"))
     assert np.array_equal(pixels("p/torus-knot-triangle.png").astype(int) - 1, frags.triangle)
     assert np.array_equal(pixels("p/torus-knot-depth.png") > 0, frags.mask)
 
 
 def test_render_sampling_reaches_the_picture(run):
-    assert run("render", "torus-knot", "-o", "a.png", "--sampling", "msaa4", *SMALL) == (0, [])
-    assert np.array_equal(pixels("a.png"), render(KNOT, None, (64, 48), sampling="msaa4"))
+    for sampling in ("center", "msaa8"):
+        assert run("render", "torus-knot", "-o", "a.png", "--sampling", sampling, *SMALL) == (0, [])
+        assert np.array_equal(pixels("a.png"), first_picture("torus-knot", sampling=sampling))
 
 
 # Workers
@@ -138,12 +140,13 @@ def test_render_resume_draws_what_is_missing(run, folder):
 def test_orbit_frames_to_the_bit_as_framing_does(seed, dtype):
     rng = np.random.default_rng(seed)
     mesh = Mesh(rng.normal(size=(60, 3)).astype(dtype), rng.integers(0, 50, (40, 3)))
-    orbit = Orbit(30.0, -20.0, 35.0, "z", ortho=bool(seed % 2))
-    expected = Camera.framing(
-        mesh, azimuth_deg=30, elevation_deg=-20, fov_y_deg=35, up="z", ortho=bool(seed % 2), aspect=0.5
-    )
-    camera = orbit(mesh, (50, 100))
-    assert np.array_equal(camera.clip_from_world((50, 100)), expected.clip_from_world((50, 100)))
+    for fit in ("silhouette", "sphere"):
+        orbit = Orbit(30.0, -20.0, 35.0, "z", ortho=bool(seed % 2), fits=fit == "silhouette")
+        expected = Camera.framing(
+            mesh, azimuth_deg=30, elevation_deg=-20, fov_y_deg=35, up="z", ortho=bool(seed % 2), aspect=0.5, fit=fit
+        )
+        camera = orbit(mesh, (50, 100))
+        assert np.array_equal(camera.clip_from_world((50, 100)), expected.clip_from_world((50, 100)))
     assert mesh.extreme_points().shape == (7, 3)
 
 
@@ -171,8 +174,8 @@ def test_job_file_is_what_it_says(run, folder):
     assert run("render", "--jobs-file", "jobs.toml") == (0, [])
     b = [f"b/{name}-{layer}.png" for name in ("cube", "torus") for layer in ("color", "triangle")]
     assert names(folder) == ["a/000.png", "a/001.png", "a/002.png", *b, "jobs.toml"]
-    cube = Mesh(*scenes.shape("cube"))
-    camera = Camera.framing(cube, azimuth_deg=-30.5, aspect=64 / 48)
+    cube = shape_of("cube")
+    camera = camera_of(cube, azimuth_deg=-30.5)
     assert np.array_equal(pixels("b/cube-color.png"), render(cube, camera, (64, 48), edges=True))
 
 
@@ -180,7 +183,7 @@ def test_job_file_json_is_the_same_as_toml(run, folder):
     document = {"job": [{"mesh": "cube", "size": [64, 48], "out": "a.png", "wireframe": False}]}
     (folder / "jobs.json").write_text(json.dumps(document))
     assert run("render", "--jobs-file", "jobs.json") == (0, [])
-    assert np.array_equal(pixels("a.png"), render(Mesh(*scenes.shape("cube")), None, (64, 48)))
+    assert np.array_equal(pixels("a.png"), first_picture("cube"))
 
 
 def test_job_file_takes_from_the_command_line_what_it_does_not_say(run, folder):
@@ -300,10 +303,11 @@ def test_animation_shows_all_views(run, folder, suffix, kind):
 
 
 def test_animation_gif_keeps_what_is_transparent(run):
-    arguments = ["--animation", "a.gif", "--views", 3, "--background", "transparent", *SMALL]
+    options = ["--background", "transparent", "--sampling", "center"]
+    arguments = ["--animation", "a.gif", "--views", 3, *options, *SMALL]
     assert run("render", "torus-knot", *arguments) == (0, [])
     with Image.open("a.gif") as image:
-        for i, expected in enumerate(knots(3)):
+        for i, expected in enumerate(knots(3, sampling="center")):
             image.seek(i)
             is_clear = np.asarray(image.convert("RGBA"))[..., 3] == 0
             assert np.array_equal(is_clear, (expected == 255).all(-1))

@@ -14,7 +14,10 @@ FILES = sorted(path.relative_to(CSRC).as_posix() for path in CSRC.rglob("*.[ch]"
 FOLDERS = sorted({name.rpartition("/")[0] for name in FILES})
 
 #: From the lowest floor to the highest. A folder includes those of lower floors, its own files, and headers beside it.
-LADDER = (("lanes",), ("vertex",), ("clusters", "mesh"), ("raster",), ("area", "pixels"), ("blend", "lines", "shade"))
+LADDER = (
+    ("lanes",), ("vertex",), ("clusters", "mesh"), ("raster",), ("area", "pixels", "points"),
+    ("blend", "lines", "polygons", "shade"),
+)  # fmt: skip
 FLOORS = {folder: floor for floor, folders in enumerate(LADDER) for folder in folders}
 
 #: Where lower files declare functions of higher ones: a sink is compiled into the walkers.

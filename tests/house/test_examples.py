@@ -25,6 +25,8 @@ def run(name, output, *options):
 def test_example_makes_the_picture_of_the_page(name, tmp_path):
     if name == "thumbnails":
         pytest.importorskip("trimesh")
+    if name == "parcels":
+        pytest.importorskip("shapely")
     run(name, tmp_path / "out.png")
     on_page = ROOT / "docs" / "images" / f"example-{name}.png"
     with Image.open(tmp_path / "out.png") as made, Image.open(on_page) as shown:
@@ -34,8 +36,8 @@ def test_example_makes_the_picture_of_the_page(name, tmp_path):
     assert (difference.max(axis=-1) > 3).mean() < 0.01
 
 
-def test_examples_are_nine_and_all_on_the_page():
-    assert len(EXAMPLES) == 9
+def test_examples_are_eleven_and_all_on_the_page():
+    assert len(EXAMPLES) == 11
     assert sorted(re.findall(r"images/example-(\w+)\.png", PAGE)) == EXAMPLES
     assert sorted(re.findall(r"\(../../examples/(\w+)\.py\)", PAGE)) == EXAMPLES
 

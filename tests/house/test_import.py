@@ -8,7 +8,7 @@ import pytest
 import topleft as tl
 
 LATE = ["PIL", "trimesh", "tqdm", "isal", "scipy", "matplotlib", "concurrent.futures", "multiprocessing"]
-LATE += ["argparse", "logging", "shutil", "tempfile", "traceback", "tomllib", "json"]
+LATE += ["torch", "argparse", "logging", "shutil", "tempfile", "traceback", "tomllib", "json"]
 
 
 @pytest.mark.parametrize("name", LATE)

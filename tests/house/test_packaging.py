@@ -48,11 +48,15 @@ def test_metadata_runtime_dependencies_state_a_floor():
 
 def test_metadata_extras_are_the_documented_ones():
     found = set(metadata.metadata("topleft").get_all("Provides-Extra"))
-    assert found == {"render", "simplify", "test", "bench", "dev", "all"}
+    assert found == {"render", "simplify", "torch", "test", "bench", "docs", "dev", "all"}
 
 
 def test_metadata_render_extra_is_isal_trimesh_and_tqdm():
     assert requirements_of("render") == {"isal", "trimesh", "tqdm"}
+
+
+def test_metadata_torch_extra_is_torch():
+    assert requirements_of("torch") == {"torch"}
 
 
 def test_metadata_simplify_extra_is_fast_simplification():

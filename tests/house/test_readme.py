@@ -10,7 +10,11 @@ from PIL import Image
 from topleft import scenes
 
 README = Path(__file__).parents[2].joinpath("README.md").read_text(encoding="utf-8")
-PROGRAMS = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
+SECTIONS = re.findall(r"^## ([^\n]*)\n(.*?)(?=^## |\Z)", README, flags=re.DOTALL | re.MULTILINE)
+#: The program of each section that has one, by its heading.
+PROGRAMS = {
+    title: code for title, text in SECTIONS for code in re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
+}
 
 
 @pytest.fixture
@@ -20,7 +24,7 @@ def folder(tmp_path, monkeypatch):
 
 
 def test_readme_mask_is_a_star(folder):
-    exec(PROGRAMS[0], {})
+    exec(PROGRAMS["A mask"], {})
     with Image.open(folder / "star.png") as image:
         assert image.size == (256, 256)
         assert (np.asarray(image)[128, [0, 128, 255]] != 0).tolist() == [False, True, False]
@@ -31,7 +35,7 @@ def test_readme_layers_agree(folder):
     vertices, triangles = scenes.shape("icosahedron")
     lines = [f"v {x} {y} {z}" for x, y, z in vertices] + [f"f {a} {b} {c}" for a, b, c in triangles + 1]
     folder.joinpath("bunny.obj").write_text("\n".join(lines) + "\n")
-    exec(PROGRAMS[1], {})
+    exec(PROGRAMS["Depth, ids, normals: layers for vision"], {})
     with np.load("view.npz") as view:
         assert view["triangle"].shape == (480, 640)
         assert view["triangle"].max() < len(triangles)
@@ -47,7 +51,7 @@ def view_mask(folder):
 
 
 def test_readme_pictures_show_the_scene(folder):
-    exec(PROGRAMS[2], {})
+    exec(PROGRAMS["Pictures"], {})
     for name in ("scene.png", "glass.png"):
         with Image.open(name) as image:
             assert image.size == (640, 480)
@@ -55,22 +59,32 @@ def test_readme_pictures_show_the_scene(folder):
 
 
 def test_readme_batch_writes_all_views(folder):
-    exec(PROGRAMS[3], {})
+    exec(PROGRAMS["Many pictures"], {})
     assert sorted(path.name for path in (folder / "views").iterdir()) == [f"{i:03}.png" for i in range(100)]
 
 
 def test_readme_heights_and_fields_are_those_of_the_sphere(folder):
     pytest.importorskip("trimesh")
     found = {}
-    exec(PROGRAMS[4], found)
+    exec(PROGRAMS["Meshes of other libraries, fields and heights"], found)
     assert found["picture"].shape == (240, 320, 4)
     assert np.nanmax(found["heights"]) == pytest.approx(1, abs=1e-3)  # a polyhedron in the unit sphere
     assert found["grid"].shape == (400, 400)
     assert np.isnan(found["grid"][0, 0])
 
 
+def test_readme_polygons_have_a_hole_of_another_label(folder):
+    found = {}
+    exec(PROGRAMS["Polygons"], found)
+    assert [bool(found["inside"][y, 50]) for y in (5, 25, 38, 60)] == [False, True, False, True]
+    assert [int(found["labels"][y, 50]) for y in (5, 25, 38)] == [-1, 0, 1]
+    assert found["shares"].areas.sum() == pytest.approx(3650 + 150, rel=1e-6)  # of the border's ring and of the hole's
+
+
 def test_readme_programs_are_all_run():
-    assert len(PROGRAMS) == 5
+    source = Path(__file__).read_text(encoding="utf-8")
+    assert [title for title in PROGRAMS if f'PROGRAMS["{title}"]' not in source] == []
+    assert len(PROGRAMS) == README.count("```python")
 
 
 def test_readme_has_the_two_commands():

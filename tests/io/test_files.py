@@ -8,18 +8,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import topleft as tl
 from topleft import scenes
 from topleft._io import load as files
 from topleft._io.images import save_image
 from topleft._model.mesh import Mesh
 from topleft._model.normals import face_normals
-from topleft.errors import MeshError, MissingPackageError
+from topleft.errors import MeshError, MeshWarning, MissingPackageError
 
 trimesh = pytest.importorskip("trimesh")
 
 SHARED_MESHES = Path(__file__).resolve().parents[3] / "shared" / "meshes"
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
-GLTF_WITHOUT_ITS_BUFFER = """{"asset": {"version": "2.0"}, "buffers": [{"uri": "gone.bin", "byteLength": 36}]}"""
+GLTF_WITHOUT_ITS_BUFFER = """{"asset": {"version": "2.0"}, "nodes": [{"mesh": 0}],
+"meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+"accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
+"bufferViews": [{"buffer": 0, "byteLength": 36}], "buffers": [{"uri": "gone.bin", "byteLength": 36}]}"""
 
 
 @pytest.fixture
@@ -55,7 +59,8 @@ def test_load_obj_quads_and_polygons_become_triangles(write):
 def test_load_obj_groups_are_one_mesh_in_the_order_of_the_file(write):
     groups = "g one\nusemtl red\nf 1 2 3\ns off\ng two\nusemtl blue\nf 1 3 4\nf 4 2 1\n"
     text = "mtllib no.mtl\no thing\n" + SQUARE + groups
-    mesh = files.load(write("a.obj", text))
+    with pytest.warns(MeshWarning, match="material libraries not found: 'no.mtl'"):
+        mesh = files.load(write("a.obj", text))
     assert mesh.vertices.tolist() == [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
     assert mesh.triangles.tolist() == [[0, 1, 2], [0, 2, 3], [3, 1, 0]]
 
@@ -98,8 +103,8 @@ def test_load_gltf_base_color_is_light_and_its_cutout_is_kept(tmp_path):
     (material,) = files.load(tmp_path / "a.glb").materials
     assert material.color[0] == pytest.approx(188, abs=1)  # half the light, in bytes
     assert material.color[1:] == (0, 255)
-    assert (material.alpha_cutoff, material.shininess) == (0.25, pytest.approx(30))
-    assert 0 < material.specular < 1
+    assert (material.alpha_mode, material.alpha_cutoff) == ("mask", 0.25)
+    assert (material.metallic, material.roughness) == (1, 0.5)
 
 
 def test_load_obj_doubled_vertices_become_one(write):
@@ -197,15 +202,15 @@ def test_load_scaled_node_normals_stay_at_right_angles(write):
         ("a.obj", SQUARE + "f 1 2 9\n", "cannot read '.*a.obj': broken, or not a '.obj' file"),
         ("a.obj", SQUARE + "f 1 two 3\n", "cannot read '.*a.obj': broken"),
         ("a.obj", "v 0 0 0\nv 1 0 zero\nv 0 1 0\nf 1 2 3\n", "cannot read '.*a.obj': broken"),
-        ("a.obj", "v 0 0\nv 1 0\nv 0 1\nf 1 2 3\n", r"vertices must have shape \(V, 3\), got \(3, 2\)"),
+        ("a.obj", "v 0 0\nv 1 0\nv 0 1\nf 1 2 3\n", "its vertex 1 has 2 of 3 numbers"),
         ("a.obj", "v 0 0 0\nv 1 0 nan\nv 0 1 0\nf 1 2 3\n", r"vertices\[1\] = \[1.0, 0.0, nan\] must be finite"),
         ("a.obj", b"\0\1\2\377", "broken, or not a '.obj' file .it is not text"),
         ("a.stl", b"", "has no triangles|broken"),
-        ("a.stl", b"\200\0\3\377" * 50, "cannot read '.*a.stl': broken"),
+        ("a.stl", b"\200\0\3\377" * 50, "cannot read '.*a.stl': broken, or not a '.stl' file .it has 2 of"),
         ("a.ply", b"ply\nformat", "cannot read '.*a.ply': broken"),
         ("a.glb", b"glTF\2\0\0\0", "cannot read '.*a.glb': broken"),
         ("a.gltf", "{", "cannot read '.*a.gltf': broken"),
-        ("a.gltf", GLTF_WITHOUT_ITS_BUFFER, "broken, or without a file that it names .*gone.bin"),
+        ("a.gltf", GLTF_WITHOUT_ITS_BUFFER, "its buffer 'gone.bin' is not there"),
         ("a.txt", "v", "cannot read '.*a.txt': format '.txt' is none of .*obj.*ply"),
         ("a", "v", "cannot read '.*a': format '' is none of"),
     ],
@@ -235,7 +240,7 @@ def test_load_folder_is_refused(tmp_path):
 def test_load_without_trimesh_says_how_to_get_it(write, monkeypatch):
     monkeypatch.setitem(sys.modules, "trimesh", None)
     with pytest.raises(MissingPackageError, match=r"needs trimesh: pip install 'topleft\[render\]'"):
-        files.load(write("a.obj", SQUARE + "f 1 2 3\n"))
+        files.load(write("a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"))
 
 
 @pytest.mark.parametrize(
@@ -245,7 +250,7 @@ def test_load_without_trimesh_says_how_to_get_it(write, monkeypatch):
         ("african_head.obj", 1339, 2492),
         ("spot.obj", 3225, 5856),
         ("teapot.obj", 3241, 6320),
-        ("stanford-bunny.obj", 34834, 69451),
+        ("stanford-bunny.obj", 35947, 69451),
         ("nefertiti.obj", 49971, 99938),
     ],
 )
@@ -254,3 +259,37 @@ def test_load_real_mesh_has_all_of_it(name, n_vertices, n_triangles):
         pytest.skip("the mesh is not on this machine")
     mesh = files.load(SHARED_MESHES / name)
     assert (len(mesh.vertices), len(mesh.triangles)) == (n_vertices, n_triangles)
+
+
+# By trimesh
+
+
+def test_as_mesh_of_trimesh_takes_no_highlights_that_nobody_gave():
+    material = trimesh.visual.material.SimpleMaterial(diffuse=(0, 255, 0, 255))
+    vertices, triangles = scenes.shape("cube")
+    visual = trimesh.visual.TextureVisuals(uv=np.zeros((len(vertices), 2)), material=material)
+    (made,) = tl.as_mesh(trimesh.Trimesh(vertices, triangles, visual=visual, process=False)).materials
+    assert (made.color, made.specular) == ((0, 255, 0), 0)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("a.dxf", b"AutoCAD Binary DXF\r\n\x1a\0", "it is a binary DXF: save it as text"),
+        ("a.svg", "<svg/>", "cannot draw .*a.svg': it holds curves in a plane"),
+        ("a.binvox", "#binvox 1", "it holds voxels: make a mesh of them"),
+    ],
+)
+def test_load_of_what_is_no_mesh_is_refused_in_true_words(write, name, content, message):
+    with pytest.raises(MeshError, match=message):
+        files.load(write(name, content))
+
+
+def test_load_by_meshio_prints_nothing(write, capfd):
+    meshio = pytest.importorskip("meshio")
+    path = write("a.msh", b"")
+    meshio.Mesh(np.eye(3), [("triangle", [[0, 1, 2]])]).write(path, file_format="gmsh")
+    assert len(files.load(path).triangles) == 1
+    with pytest.raises(MeshError):
+        files.load(write("b.msh", b"$MeshFormat\n9 0 8\n"))
+    assert capfd.readouterr() == ("", "")

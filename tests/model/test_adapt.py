@@ -121,8 +121,8 @@ def test_as_surface_of_triangle_cells_is_no_copy():
 
 
 def test_as_mesh_of_cells_without_surface_is_refused():
-    with pytest.raises(ValueError, match="mesh has no triangles: its cells are tetra, line"):
-        as_mesh(cells(POINTS, block("tetra", [[0, 1, 2, 3]]), block("line", [[0, 1]])))
+    with pytest.raises(ValueError, match="mesh has no triangles: its cells are vertex, line"):
+        as_mesh(cells(POINTS, block("vertex", [[0]]), block("line", [[0, 1]])))
 
 
 def test_as_mesh_of_polydata_of_triangles_shares_its_points():

@@ -256,4 +256,5 @@ def test_turn_of_normals_is_the_inverse_but_for_the_scale():
 def test_surface_colors_are_rows_of_four(n_channels):
     colors = np.arange(3 * n_channels, dtype=np.uint8).reshape(3, n_channels)
     surface = ShadingMesh(Mesh(np.eye(3), [[0, 1, 2]], colors=colors))
-    assert surface.colors.tolist() == [[*row[:3], 1] for row in colors.tolist()]
+    opacity = colors[:, 3] / np.float32(255) if n_channels == 4 else np.ones(3)
+    assert surface.colors.tolist() == [[*row[:3], alpha] for row, alpha in zip(colors.tolist(), opacity, strict=True)]

@@ -186,13 +186,9 @@ def test_shrink_float32_edge_through_centres_is_two_triangles_on_small_numbers()
     assert len(atlas_shrink.compact(small).vertices) == 4
 
 
-def test_failure_scenes_source_says_what_they_are():
-    scenes = list(FAILURE_SCENES.values())
-    path = ROOT / "src/topleft/failure_scenes.py"
-    text = path.read_text(encoding="utf-8")
-    assert atlas_shrink.with_scenes(text, scenes) == text
-    with pytest.raises(ValueError, match="the module must hold '# begin"):
-        atlas_shrink.with_scenes("nothing", scenes)
+def test_failure_scenes_file_is_what_is_written_of_them():
+    path = ROOT / "src/topleft/failure_scenes.json"
+    assert atlas_shrink.scenes_text(FAILURE_SCENES.values()) == path.read_text(encoding="utf-8")
 
 
 def test_first_failures_of_the_record_each_have_their_scene(record):

@@ -5,6 +5,7 @@ Shares no code with them but the snap and the halvings of textures. All vertices
 
 import numpy as np
 
+from topleft._model.environment import DEFAULT_ENVIRONMENT
 from topleft._model.normals import face_normals, unit_or_zero
 from topleft._model.texture import halved, light_of_image
 
@@ -53,14 +54,44 @@ class Weights:
 
 
 def normals(w, mesh, *, is_flat):
-    faces = face_normals(mesh.vertices, mesh.triangles)[w.ids] * np.where(w.is_front, 1, -1)[:, None]
+    """Unit normals (P, 3) on the side that is seen, and 1, or -1 where that is not the side of the mesh's own."""
+    faces, side = face_normals(mesh.vertices, mesh.triangles)[w.ids], np.where(w.is_front, 1, -1)[:, None]
     if is_flat:
-        return faces
+        return faces * side, side
     own = unit_or_zero(np.asarray(mesh.vertex_normals(), np.float64))
-    turned = np.where((own[w.corners].sum(axis=1) * faces).sum(axis=1) < 0, -1, 1)[:, None]
+    turned = np.where((own[w.corners].sum(axis=1) * faces * side).sum(axis=1) < 0, -1, 1)[:, None]
     mixed = w.of(own) * turned
     length = np.linalg.norm(mixed, axis=1, keepdims=True)
-    return np.where(length > 1e-6, mixed / np.maximum(length, 1e-6), faces)
+    return np.where(length > 1e-6, mixed / np.maximum(length, 1e-6), faces * side), turned
+
+
+def uv_of(texture, mesh):
+    """The coordinates of the vertices as the texture is laid on."""
+    uv = np.asarray((mesh.uv, mesh.uv1)[texture.uv_set], np.float64)
+    return uv if texture.transform is None else np.c_[uv, np.ones(len(uv))] @ texture.transform.T
+
+
+def look_up(texture, w, mesh):
+    uv = uv_of(texture, mesh)
+    return sample(texture, w.of(uv), w.slopes_of(uv))
+
+
+def bent(n, side, w, mesh, material):
+    """Normals as the normal map bends them: tangent along u, bitangent towards v, at right angles to the normal."""
+    texture, own = material.normal_texture, side * n  # as the mesh has it
+    corners, uv = mesh.vertices[w.corners].astype(np.float64), uv_of(texture, mesh)[w.corners]
+    edges, steps = corners[:, 1:] - corners[:, :1], uv[:, 1:] - uv[:, :1]
+    gradient = np.linalg.inv(steps) @ edges  # rows: along u, along v
+    along_u, along_v = gradient[:, 0], gradient[:, 1]
+    tangent = unit_or_zero(along_u - (own * along_u).sum(axis=1, keepdims=True) * own)
+    bitangent = np.cross(own, tangent)
+    faces = np.cross(edges[:, 0], edges[:, 1])
+    hand = np.sign((np.cross(along_u, along_v) * faces).sum(axis=1))
+    own_side = np.where((w.is_front == (side[:, 0] > 0)), 1, -1)  # normals of a mesh that point into it
+    x, y, z = 2 * look_up(texture, w, mesh)[:, :3].T - 1
+    x, y = material.normal_scale * x, material.normal_scale * y
+    turned = x[:, None] * tangent + (y * hand * own_side)[:, None] * bitangent + z[:, None] * own
+    return side * unit_or_zero(turned)
 
 
 def folded(a, wrap):
@@ -83,7 +114,7 @@ def sample_level(level, uv, wrap):
 
 
 def sample(texture, uv, slopes):
-    levels = [light_of_image(texture.image)[::-1]]
+    levels = [light_of_image(texture.image, texture.encoding)[::-1]]
     height, width = levels[0].shape[:2]
     uv = np.stack([folded(uv[:, k], texture.wrap[k]) for k in range(2)], axis=1)
     if texture.filter == "nearest":
@@ -108,43 +139,150 @@ def to_eye(camera, points):
     return unit_or_zero(-np.linalg.inv(linear) @ camera.view[:3, 3] - points)
 
 
-def light_up(n, points, viewer, lights, ambient, material):
-    """Diffuse light and highlights (P, 3) of lights in the world."""
-    diffuse, shine = np.full((len(n), 3), ambient), np.zeros((len(n), 3))
+def mirrored_share(roughness, n_dot_v):
+    """Karis's fit of what a surface mirrors of white surroundings: scale and offset of f0."""
+    offset = 0.0425 - 0.0275 * roughness
+    a = np.minimum((1 - roughness) ** 2, 2 ** (-9.28 * n_dot_v)) * (1 - roughness) + offset
+    return 1.04 - 0.572 * roughness - 1.04 * a, 1.04 * a + 0.022 * roughness - 0.04
+
+
+def blurred_sky(height, roughness):
+    """The share of the sky that a rough surface sees round a direction."""
+    alpha = roughness**2
+    spread = 4 * alpha**2 / (1 + 1.6 * alpha + 1.4 * alpha**2)
+    return 0.5 + 0.5 * height / np.sqrt(height**2 + spread * (1 - height**2))
+
+
+def environment_light(environment, at, roughness):
+    """Light (P, 3) from directions in the world: gathered by a matt surface if there is no roughness, else mirrored."""
+    at = unit_or_zero(at) @ environment.axes.T
+    if environment.image is None:
+        share = 0.5 + 0.5 * at[:, 1:2] if roughness is None else blurred_sky(at[:, 1:2], roughness)
+        sky, ground = (np.array(color) for color in environment.colors)
+        return ground + share * (sky - ground)
+    texels, rows = environment.levels
+    if roughness is None:
+        return octahedral(texels, rows[-1], at)
+    level = roughness[:, 0] * (len(rows) - 2)
+    stack = np.stack([octahedral(texels, row, at) for row in rows[:-1]])
+    low = np.minimum(np.floor(level).astype(int), len(rows) - 3)
+    share, every = (level - low)[:, None], np.arange(len(at))
+    return (1 - share) * stack[low, every] + share * stack[low + 1, every]
+
+
+def octahedral(texels, row, at):
+    offset, n = row
+    level = texels[offset : offset + (n + 2) ** 2, :3].reshape(n + 2, n + 2, 3).astype(np.float64)
+    at = at / np.abs(at).sum(axis=1, keepdims=True)
+    x, z = at[:, 0], at[:, 2]
+    beyond_x, beyond_z = (1 - np.abs(z)) * np.where(x < 0, -1, 1), (1 - np.abs(x)) * np.where(z < 0, -1, 1)
+    flat = np.where(at[:, 1:2] < 0, np.c_[beyond_x, beyond_z], np.c_[x, z])
+    where = (flat + 1) / 2 * n + 0.5
+    first = np.clip(np.floor(where).astype(int), 0, n)
+    (fx, fy), (column, line) = (where - first).T[..., None], first.T
+    upper, lower = ((1 - fx) * level[line + k, column] + fx * level[line + k, column + 1] for k in (0, 1))
+    return (1 - fy) * upper + fy * lower
+
+
+def lights_at(lights, points, n, camera, ambient):
+    """Direction, strength (P, 3), and what a matt surface sends on of each light; the headlight unless given."""
+    if lights is None:
+        direction = np.broadcast_to(TO_HEADLIGHT @ camera.view[:3, :3], n.shape)
+        cosine = (n * direction).sum(axis=1, keepdims=True)
+        yield direction, np.full((len(n), 3), 1 - ambient), (0.5 + 0.5 * cosine) ** 3
+        return
     for light in lights:
         at, strength = np.array(light.at, np.float64), np.ones((len(n), 1))
+        direction = np.broadcast_to(at, n.shape)
         if light.kind == "point":
-            way = at - points
-            strength = 1 / (1 + light.falloff * (way**2).sum(axis=1, keepdims=True))
-            direction = unit_or_zero(way)
-        else:
-            direction = np.broadcast_to(at / np.linalg.norm(at), n.shape)
+            strength = 1 / (1 + light.falloff * ((at - points) ** 2).sum(axis=1, keepdims=True))
+            direction = at - points
+        direction = unit_or_zero(direction)
         cosine = (n * direction).sum(axis=1, keepdims=True)
-        color = light.intensity * strength * decode(light.color)
-        diffuse += np.maximum(cosine, 0) * color
-        half = (n * unit_or_zero(direction + viewer)).sum(axis=1, keepdims=True)
-        shine += np.where(cosine > 0, np.maximum(half, 0) ** material.shininess, 0) * color * material.specular
-    return diffuse, shine
+        yield direction, light.intensity * strength * decode(light.color), np.maximum(cosine, 0)
 
 
-def picture(frags, mesh, camera, size, material, lights=None, ambient=0.03, *, is_flat=False, fog=None, origin=(0, 0)):
+def metallic_rough(base, n, viewer, lights, around, metallic, roughness):
+    """glTF 2.0, appendix B, height-correlated visibility; `around` gives gathered and mirrored light, occlusion."""
+    roughness = np.clip(roughness, 0.045, 1)
+    alpha2, f0, matt = roughness**4, 0.04 + metallic * (base - 0.04), (1 - metallic) * base
+    n_dot_v = np.minimum(np.abs((n * viewer).sum(axis=1, keepdims=True)), 1)
+    scale, offset = mirrored_share(roughness, n_dot_v)
+    mirrors = np.maximum(f0 * scale + offset, 0)
+    gathered, mirrored, occlusion = around(2 * (n * viewer).sum(axis=1, keepdims=True) * n - viewer, roughness)
+    light = occlusion * (mirrors * mirrored + matt * (1 - mirrors) * gathered)
+    for direction, color, share in lights:
+        half = unit_or_zero(direction + viewer)
+        n_dot_l, n_dot_h, v_dot_h = (
+            (a * b).sum(axis=1, keepdims=True) for a, b in ((n, direction), (n, half), (viewer, half))
+        )
+        fresnel = f0 + (1 - f0) * (1 - v_dot_h) ** 5
+        d = alpha2 / (n_dot_h**2 * (alpha2 - 1) + 1) ** 2  # times pi
+        from_light, from_eye = (np.sqrt(c**2 * (1 - alpha2) + alpha2) for c in (n_dot_l, n_dot_v))
+        v = 0.5 / np.maximum(n_dot_l * from_eye + n_dot_v * from_light, 1e-30)
+        shine = np.where((n_dot_l > 0) & (n_dot_h > 0), d * v * n_dot_l, 0)
+        light = light + color * ((1 - fresnel) * matt * share + fresnel * shine)
+    return light
+
+
+def picture(
+    frags, mesh, camera, size, material, lights=None, ambient=None, *,
+    is_flat=False, fog=None, origin=(0, 0), environment=None,
+):  # fmt: skip
     """sRGB (H, W, 3) float64, not rounded; NaN where nothing shows."""
     w = Weights(frags, mesh, camera, size, origin)
-    n, points = normals(w, mesh, is_flat=is_flat), w.of(mesh.vertices)
+    (n, side), points = normals(w, mesh, is_flat=is_flat), w.of(mesh.vertices)
     has_texture = material.texture is not None and mesh.uv is not None
-    light = decode(material.color or (255, 255, 255)) * np.ones((len(n), 3))
+    base = decode(material.color or (255, 255, 255)) * np.ones((len(n), 3))
     if mesh.colors is not None:
-        light = light * decode(np.rint(w.of(mesh.colors[:, :3])))
+        base = base * decode(np.rint(w.of(mesh.colors[:, :3])))
     if has_texture:
-        light = light * sample(material.texture, w.of(mesh.uv), w.slopes_of(mesh.uv))[:, :3]
+        base = base * look_up(material.texture, w, mesh)[:, :3]
     if material.back_color is not None:
-        light = np.where(w.is_front[:, None], light, decode(material.back_color))
-    if lights is None:
-        cosine = (n @ camera.view[:3, :3].T @ TO_HEADLIGHT)[:, None]
-        light = light * (ambient + (1 - ambient) * (0.5 + 0.5 * cosine) ** 3)
+        base = np.where(w.is_front[:, None], base, decode(material.back_color))
+    if material.normal_texture is not None:
+        n = bent(n, side, w, mesh, material)
+    if ambient is None:
+        ambient = 0.03 if environment is None else 0.0
+    if environment is not None and lights is None:
+        lights = ()
+    viewer, occlusion = to_eye(camera, points), 1.0
+    if material.occlusion_texture is not None:
+        occlusion = 1 + material.occlusion_strength * (look_up(material.occlusion_texture, w, mesh)[:, :1] - 1)
+
+    def around(mirrored_at, roughness):
+        gathered = mirrored = np.full((len(n), 3), ambient)
+        if environment is not None:
+            gathered = gathered + environment_light(environment, n, None)
+            mirrored = mirrored + environment_light(environment, mirrored_at, roughness)
+        elif material.is_metallic_rough:
+            turned = mirrored_at @ camera.view[:3, :3].T
+            mirrored = mirrored + environment_light(DEFAULT_ENVIRONMENT, turned, roughness)
+        return gathered, mirrored, occlusion
+
+    found = list(lights_at(lights, points, n, camera, ambient))
+    if material.unlit:
+        light = base
+    elif material.is_metallic_rough:
+        metallic, roughness = (
+            np.full((len(n), 1), 1.0 if a is None else a) for a in (material.metallic, material.roughness)
+        )
+        if material.metallic_roughness_texture is not None:
+            texels = look_up(material.metallic_roughness_texture, w, mesh)
+            roughness, metallic = roughness * texels[:, 1:2], metallic * texels[:, 2:3]
+        light = metallic_rough(base, n, viewer, found, around, metallic, roughness)
     else:
-        diffuse, shine = light_up(n, points, to_eye(camera, points), lights, ambient, material)
-        light = light * diffuse + shine
+        light = base * occlusion * around(n, np.ones((len(n), 1)))[0]
+        for direction, color, share in found:
+            light = light + base * color * share
+            half = (n * unit_or_zero(direction + viewer)).sum(axis=1, keepdims=True)
+            is_lit = (n * direction).sum(axis=1, keepdims=True) > 0
+            shine = np.where(is_lit, np.maximum(half, 0) ** material.shininess, 0)
+            light = light + shine * color * material.specular
+    if any(material.emission) and not material.unlit:
+        shining = np.array(material.emission)
+        has_map = material.emission_texture is not None
+        light = light + shining * (look_up(material.emission_texture, w, mesh)[:, :3] if has_map else 1)
     if fog is not None:
         distance = -(points @ camera.view[2, :3] + camera.view[2, 3])
         share = np.clip((distance - fog.near) / (fog.far - fog.near), 0, 1)[:, None]

@@ -15,23 +15,32 @@ __all__ = [
     "as_colors",
     "as_matrix",
     "as_out",
+    "as_point_size",
     "as_size",
+    "as_square",
     "as_subpixel_bits",
     "as_triangles",
     "as_values",
+    "as_vector",
     "as_vertices",
     "as_window",
     "bad_triangle",
+    "check_regular",
 ]
 
 #: The largest side of a picture and the largest number of triangles or vertices: ids and indices are int32.
 INT32_MAX = 2**31 - 1
 
+#: Device types of DLPack whose memory the CPU reads: CPU, pinned for CUDA or ROCm, CUDA managed.
+CPU_DEVICES = frozenset({1, 3, 11, 13})
+DEVICES = {2: "CUDA device", 4: "OpenCL device", 7: "Vulkan device", 8: "Metal device", 10: "ROCm device",
+           14: "oneAPI device", 15: "WebGPU device"}  # fmt: skip
+
 
 def as_array(name: str, values: ArrayLike) -> NDArray[Any]:
     """Return what NumPy makes of `values`, aligned for the kernels, without a copy where it can."""
-    if not isinstance(values, np.ndarray) and hasattr(values, "__dlpack__") and not hasattr(values, "__array__"):
-        values = np.from_dlpack(values)  # type: ignore[arg-type]
+    if not isinstance(values, np.ndarray) and (hasattr(values, "__dlpack__") or hasattr(values, "__array__")):
+        values = array_of_tensor(name, values)
     try:
         array = np.asarray(values)
     except ValueError as error:
@@ -47,6 +56,25 @@ def apart_from(out: object, name: str, values: ArrayLike) -> ArrayLike:
     array = as_array(name, values)
     overlaps = any(isinstance(one, np.ndarray) and np.may_share_memory(array, one) for one in outs)
     return array.copy() if overlaps else values
+
+
+def array_of_tensor(name: str, tensor: Any) -> NDArray[Any]:
+    """Return the memory of another library's array: of PyTorch, JAX, or whatever speaks DLPack or the array API."""
+    kind = f"{type(tensor).__module__.partition('.')[0]}.{type(tensor).__name__}"
+    if hasattr(tensor, "__dlpack_device__"):
+        try:
+            device, number = tensor.__dlpack_device__()
+        except Exception as error:  # a device that DLPack has no number for
+            raise TypeError(f"{name} must lie in the memory of the CPU, got a {kind} elsewhere ({error})") from None
+        if device not in CPU_DEVICES:
+            where = f"{DEVICES.get(device, f'DLPack device type {int(device)}')} {number}"
+            raise TypeError(f"{name} must lie in the memory of the CPU, got a {kind} on {where}: copy it to the CPU")
+    if getattr(tensor, "requires_grad", False) is True:
+        raise TypeError(f"{name} must not ask for gradients, got a {kind} that requires grad: pass {name}.detach()")
+    try:
+        return np.asarray(tensor) if hasattr(tensor, "__array__") else np.from_dlpack(tensor)
+    except Exception as error:  # theirs: a dtype or a layout that NumPy has not
+        raise TypeError(f"{name} must be an array that NumPy can read, got a {kind} ({error})") from None
 
 
 def as_vertices(values: ArrayLike, *, has_transform: bool) -> NDArray[Any]:
@@ -104,7 +132,7 @@ def bad_triangle(values: ArrayLike, row: int, n_vertices: int) -> IndexError:
     """Return the error for a row of `triangles` that names a vertex that does not exist."""
     return IndexError(
         f"triangles must hold indices in [0, {n_vertices}), the number of vertices; "
-        f"row {row} is {np.asarray(values)[row].tolist()}"
+        f"row {row} is {as_array('triangles', values)[row].tolist()}"
     )
 
 
@@ -122,6 +150,30 @@ def as_matrix(values: ArrayLike, dtype: np.dtype[Any]) -> NDArray[Any]:
     if not np.isfinite(matrix).all():
         raise ValueError("transform must fit float32, because the vertices are float32; pass float64 vertices")
     return matrix
+
+
+def as_vector(name: str, values: ArrayLike) -> NDArray[np.float64]:
+    """Return three finite numbers."""
+    vector = np.asarray(values, dtype=np.float64)
+    if vector.shape != (3,) or not np.isfinite(vector).all():
+        raise ValueError(f"{name} must be three finite numbers, got {values!r}")
+    return vector
+
+
+def as_square(name: str, values: ArrayLike, n: int) -> NDArray[np.float64]:
+    """Return a finite matrix (n, n), always a copy."""
+    matrix = np.array(values, dtype=np.float64)
+    if matrix.shape != (n, n):
+        raise ValueError(f"{name} must have shape ({n}, {n}), got {matrix.shape}")
+    if not np.isfinite(matrix).all():
+        raise ValueError(f"{name} must hold finite numbers, got {matrix.tolist()}")
+    return matrix
+
+
+def check_regular(name: str, matrix: NDArray[np.float64]) -> None:
+    """Raise a `ValueError` if the matrix is singular."""
+    if np.linalg.matrix_rank(matrix) < len(matrix):
+        raise ValueError(f"{name} must not be singular, got {matrix.tolist()}")
 
 
 def as_pair(name: str, values: object) -> tuple[int, int]:
@@ -220,3 +272,28 @@ def as_out(name: str, array: object, shape: tuple[int, ...], dtype: type) -> NDA
     if not array.flags.writeable:
         raise ValueError(f"{name} must be writeable, got a read-only array")
     return array
+
+
+def as_point_size(name: str, value: ArrayLike, n_points: int) -> float | NDArray[np.float64]:
+    """Return a positive size, or one of each point, (N,) float64.
+
+    Raises
+    ------
+    ValueError
+        If there is another number of them, or one is not positive.
+    TypeError
+        If they are no real numbers.
+    """
+    array = as_array(name, value)
+    if array.dtype.kind not in "fiu":
+        raise TypeError(f"{name} must hold real numbers, got {array.dtype}")
+    if array.shape not in ((), (n_points,)):
+        raise ValueError(f"{name} must be one number or have shape ({n_points},), got {array.shape}")
+    bad = np.flatnonzero(~((array > 0) & np.isfinite(array)))
+    if len(bad):
+        raise ValueError(f"{name} must be finite and positive, got {array.ravel()[bad[0]]}")
+    if array.ndim == 0:
+        return float(array)
+    sizes = np.ascontiguousarray(array, np.float64).view()
+    sizes.flags.writeable = False
+    return sizes

@@ -6,7 +6,19 @@ from enum import IntEnum, StrEnum
 from functools import cache, cached_property
 from typing import TypeVar
 
-__all__ = ["Alpha", "Blend", "ClipDepth", "Cull", "DepthTest", "Per", "Resolve", "Sampling", "Sink", "parse"]
+__all__ = [
+    "Alpha",
+    "Blend",
+    "ClipDepth",
+    "Cull",
+    "DepthTest",
+    "Per",
+    "PointShape",
+    "Resolve",
+    "Sampling",
+    "Sink",
+    "parse",
+]
 
 
 class Sampling(StrEnum):
@@ -80,6 +92,13 @@ class Resolve(StrEnum):
 
     VALUES = "values"
     LINEAR = "linear"
+
+
+class PointShape(StrEnum):
+    """What a point covers."""
+
+    DISC = "disc"
+    SQUARE = "square"
 
 
 class Sink(IntEnum):

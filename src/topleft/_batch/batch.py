@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import operator
 import os
+import warnings
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence, Sized
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
@@ -21,7 +22,7 @@ import numpy.typing as npt
 from topleft._base.options import parse
 from topleft._batch.jobs import Job, JobRunner, Outcome, as_job
 from topleft._batch.workers import Workers, workers_of
-from topleft.errors import MissingPackageError
+from topleft.errors import MeshWarning, MissingPackageError
 
 __all__ = ["Batch", "Job", "Result", "Summary", "render_batch"]
 
@@ -58,6 +59,8 @@ class Result:
         Why it failed.
     is_skipped : bool
         Whether its files were there and it was left out (`resume`).
+    warnings : tuple of str
+        What the mesh lacks of its file, a line each: textures that are not there, say.
     """
 
     index: int
@@ -65,6 +68,7 @@ class Result:
     picture: Array | dict[str, Array] | None = None
     error: Exception | None = None
     is_skipped: bool = False
+    warnings: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -121,6 +125,11 @@ def render_batch(
     ValueError, TypeError
         If an option is none of those. Errors of jobs come as `on_error` says, with the job in their notes.
 
+    Warns
+    -----
+    MeshWarning
+        Of what meshes lack of their files, once a batch.
+
     Notes
     -----
     Pictures are the unit of threading: each is drawn by one thread, unless its options say otherwise.
@@ -154,6 +163,7 @@ class Batch(Iterator[Result]):
         self._results = results
         self._progress = progress
         self._collects = collects
+        self._told: set[str] = set()
 
     def __iter__(self) -> Batch:
         return self
@@ -164,6 +174,10 @@ class Batch(Iterator[Result]):
         except BaseException:
             self.close()
             raise
+        for line in result.warnings:
+            if line not in self._told:
+                self._told.add(line)
+                warnings.warn(line, MeshWarning, stacklevel=2)
         if self._progress:
             self._progress(result)
         if result.error is not None and not self._collects:
@@ -207,7 +221,7 @@ def _one_by_one(jobs: Iterator[object], resume: bool) -> Iterator[Result]:
             yield Result(index, job, is_skipped=True)
             continue
         (outcome,) = runner.draw([(index, job)])
-        yield Result(index, job, outcome.picture, outcome.error)
+        yield Result(index, job, outcome.picture, outcome.error, warnings=outcome.warnings)
 
 
 @dataclass
@@ -226,7 +240,10 @@ class _Task:
         except Exception as error:  # what a worker could not even send back
             return [Result(index, job, error=error) for index, job in self.jobs]
         pairs = zip(self.jobs, outcomes, strict=True)
-        return [Result(index, job, outcome.picture, outcome.error) for (index, job), outcome in pairs]
+        return [
+            Result(index, job, outcome.picture, outcome.error, warnings=outcome.warnings)
+            for (index, job), outcome in pairs
+        ]
 
 
 def _chunks(jobs: Iterator[object], n: int, resume: bool) -> Iterator[tuple[list[tuple[int, Job]], bool]]:

@@ -19,8 +19,10 @@ from topleft._camera.camera import Camera
 from topleft._io.images import save_image
 from topleft._io.layer_files import layer_paths, save_layers
 from topleft._io.load import load
+from topleft._io.notes import listening, tell
 from topleft._model.adapt import MeshLike, as_mesh
 from topleft._model.mesh import Mesh
+from topleft._model.points import Points
 from topleft._model.scene import Scene
 from topleft._raster.verbs import Rasterizer
 from topleft._render.layers import check_layers, draw_layers
@@ -40,7 +42,7 @@ class Job:
 
     Parameters
     ----------
-    scene : Mesh, Scene, whatever `as_mesh` takes, path, or function without arguments that returns one of the first
+    scene : Mesh, Scene, Points, whatever `as_mesh` takes, path, or function without arguments that returns one of them
         A file is read where it is drawn, once for jobs that follow each other. The same goes for what a function makes
         where functions are equal; for worker processes it must be picklable. A mesh of another library is made ours
         once, and must not change between its jobs.
@@ -110,6 +112,8 @@ class Outcome:
     index: int
     picture: Array | dict[str, Array] | None = None
     error: Exception | None = None
+    warnings: tuple[str, ...] = ()
+    """What its mesh lacks of its file."""
 
 
 @dataclass(frozen=True)
@@ -145,7 +149,7 @@ class MeshCache:
 
     def __init__(self, n: int) -> None:
         self._n = n
-        self._made: OrderedDict[Hashable, tuple[Any, Exception | None]] = OrderedDict()
+        self._made: OrderedDict[Hashable, tuple[Any, Exception | None, list[str]]] = OrderedDict()
         # One at a time: readers are not safe in threads (they change the process's warning filters).
         self._lock = threading.Lock()
 
@@ -159,18 +163,20 @@ class MeshCache:
                     found = self._made[make] = self._call(make)
                     if len(self._made) > self._n:
                         self._made.popitem(last=False)
-        scene, error = found
+        scene, error, lines = found
+        tell(lines, stacklevel=1)
         if error is not None:
             raise error.with_traceback(None)
         return scene
 
     @staticmethod
-    def _call(make: Callable[[], Any]) -> tuple[Any, Exception | None]:
-        try:
-            made = make()
-            return made if isinstance(made, Scene) else as_mesh(made), None
-        except Exception as error:
-            return None, error
+    def _call(make: Callable[[], Any]) -> tuple[Any, Exception | None, list[str]]:
+        with listening() as lines:
+            try:
+                made = make()
+                return made if isinstance(made, Scene | Points) else as_mesh(made), None, lines
+            except Exception as error:
+                return None, error, lines
 
 
 class JobRunner:
@@ -190,11 +196,13 @@ class JobRunner:
         """Return what came of each job; an error of one does not stop the next."""
         outcomes = []
         for index, job in jobs:
-            try:
-                outcomes.append(Outcome(index, self.draw_one(job)))
-            except Exception as error:
-                _clear_frames(error)
-                outcomes.append(Outcome(index, error=error))
+            with listening() as lines:
+                try:
+                    picture = self.draw_one(job)
+                    outcomes.append(Outcome(index, picture, warnings=tuple(lines)))
+                except Exception as error:
+                    _clear_frames(error)
+                    outcomes.append(Outcome(index, error=error, warnings=tuple(lines)))
         return outcomes
 
     def draw_one(self, job: Job) -> Array | dict[str, Array] | None:
@@ -230,7 +238,7 @@ class JobRunner:
     def _scene(self, scene: Any) -> Any:
         if isinstance(scene, (str, os.PathLike)):
             scene = MeshFile(os.fspath(scene))
-        elif not isinstance(scene, Mesh | Scene) and not callable(scene):
+        elif not isinstance(scene, Mesh | Scene | Points) and not callable(scene):
             scene = ForeignMesh(scene)
         return self._cache.get(scene) if callable(scene) else scene
 

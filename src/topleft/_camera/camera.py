@@ -12,25 +12,25 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from topleft._base.arrays import as_square, as_vector, check_regular
 from topleft._camera.lens import Lens, lens_of_opencv
 from topleft._camera.matrices import (
     F64,
     FRAMING_MARGIN,
+    SILHOUETTE_MARGIN,
     THREE_QUARTER_DEG,
-    as_square,
-    as_vector,
     bounding_sphere,
     box_corners,
     box_matrix,
     check_fov,
     check_planes,
     check_positive,
-    check_regular,
     distance_to_fit,
     frustum_matrix,
     orbit_view,
     orthographic_matrix,
     perspective_matrix,
+    place_to_fill,
     points_to_frame,
     view_matrix,
 )
@@ -79,7 +79,7 @@ class Camera:
 
     def __post_init__(self) -> None:
         for name in ("view", "projection"):
-            matrix = as_square(getattr(self, name), 4, name)
+            matrix = as_square(name, getattr(self, name), 4)
             matrix.flags.writeable = False
             object.__setattr__(self, name, matrix)
         if self.aspect is not None:
@@ -177,7 +177,7 @@ class Camera:
         ValueError
             If the field of view or the planes are outside their range.
         """
-        return cls(as_square(view, 4, "view"), perspective_matrix(fov_y_deg, near, far), aspect=1.0)
+        return cls(as_square("view", view, 4), perspective_matrix(fov_y_deg, near, far), aspect=1.0)
 
     @classmethod
     def orthographic(cls, view: npt.ArrayLike, *, near: float, far: float, height: float) -> Camera:
@@ -197,7 +197,7 @@ class Camera:
         ValueError
             If the height or the planes are outside their range.
         """
-        return cls(as_square(view, 4, "view"), orthographic_matrix(height, near, far), aspect=1.0)
+        return cls(as_square("view", view, 4), orthographic_matrix(height, near, far), aspect=1.0)
 
     @classmethod
     def off_center(
@@ -232,7 +232,7 @@ class Camera:
             If the sides or the planes are out of order.
         """
         matrix = (box_matrix if ortho else frustum_matrix)(left, right, bottom, top, near, far)
-        return cls(as_square(view, 4, "view"), matrix)
+        return cls(as_square("view", view, 4), matrix)
 
     @classmethod
     def look_at(
@@ -267,7 +267,7 @@ class Camera:
             If eye and target coincide, `up` is parallel to the view, or another number is outside its range.
         """
         view = view_matrix(eye, target, up)
-        distance = float(np.linalg.norm(as_vector(target, "target") - as_vector(eye, "eye")))
+        distance = float(np.linalg.norm(as_vector("target", target) - as_vector("eye", eye)))
         near = 0.01 * distance if near is None else near
         far = 100 * distance if far is None else far
         if ortho_height is not None:
@@ -281,8 +281,8 @@ class Camera:
         camera_from_world: npt.ArrayLike,
         size: tuple[int, int],
         *,
-        near: float,
-        far: float,
+        near: float | None = None,
+        far: float | None = None,
         distortion: npt.ArrayLike | None = None,
         fisheye: npt.ArrayLike | None = None,
     ) -> Camera:
@@ -296,10 +296,13 @@ class Camera:
             The pose. Camera axes are those of OpenCV: x right, y down, z forward.
         size : (width, height), pixels
             The picture that the intrinsics belong to. A picture rendered at another size is that one, scaled.
-        near, far : float
-            Distances of the planes along z, world units, 0 < near < far. With `fisheye` they are spheres.
-        distortion : (4,), (5,) or (8,) array_like, optional
-            `k1, k2, p1, p2[, k3[, k4, k5, k6]]` as `cv2.calibrateCamera` returns them.
+        near, far : float, optional
+            Distances of the planes along z, world units, 0 < near < far. With `fisheye` they are spheres. Unless given
+            a thousandth of the distance d of the world's origin, and a thousand times the larger of d and 1; d counts
+            as 1 for a camera at the origin.
+        distortion : (4,), (5,), (8,), (12,) or (14,) array_like, optional
+            `k1, k2, p1, p2[, k3[, k4, k5, k6[, s1, s2, s3, s4[, tau_x, tau_y]]]]`, as `cv2.calibrateCamera` returns
+            them.
         fisheye : (4,) array_like, optional
             `k1, k2, k3, k4` as `cv2.fisheye.calibrate` returns them. Not together with `distortion`.
 
@@ -313,18 +316,21 @@ class Camera:
         OpenCV puts the centre of the top-left pixel at (0, 0), `topleft` at (0.5, 0.5). So the point that the matrix
         projects to (u, v) is drawn at x_px = u + 0.5, y_px = v + 0.5: in the same pixel.
         """
-        matrix = as_square(intrinsics, 3, "intrinsics")
-        pose = as_square(camera_from_world, 4, "camera_from_world")
+        matrix = as_square("intrinsics", intrinsics, 3)
+        pose = as_square("camera_from_world", camera_from_world, 4)
         width, height = size
         check_positive("width", width)
         check_positive("height", height)
+        away = float(np.sqrt((pose[:3, 3] ** 2).sum())) or 1.0
+        near = 1e-3 * away if near is None else near
+        far = max(1e3 * max(away, 1.0), 1e3 * near) if far is None else far
         check_planes(near, far)
         if not np.array_equal(matrix[2], [0, 0, 1]):
             raise ValueError(f"the last row of intrinsics must be [0, 0, 1], got {matrix[2].tolist()}")
         if not np.array_equal(pose[3], [0, 0, 0, 1]):
             raise ValueError(f"the last row of camera_from_world must be [0, 0, 0, 1], got {pose[3].tolist()}")
-        check_regular(matrix, "intrinsics")
-        check_regular(pose, "camera_from_world")
+        check_regular("intrinsics", matrix)
+        check_regular("camera_from_world", pose)
         px_of_center = np.array([[1, 0, 0.5], [0, 1, 0.5], [0, 0, 1]])
         ndc_of_px = np.array([[2 / width, 0, -1], [0, -2 / height, 1], [0, 0, 1]])
         eye_of_camera = np.diag([1.0, -1.0, -1.0, 1.0])
@@ -343,7 +349,7 @@ class Camera:
         up: Literal["y", "z"] = "y",
         ortho: bool = False,
         aspect: float = 1.0,
-        fit: Literal["sphere", "box", "points"] = "sphere",
+        fit: Literal["sphere", "box", "points", "silhouette"] = "sphere",
     ) -> Camera:
         """A camera that has the whole subject just inside its frame; three-quarter view by default.
 
@@ -363,9 +369,11 @@ class Camera:
             Without perspective.
         aspect : float
             Width / height of the picture to be made.
-        fit : {"sphere", "box", "points"}
+        fit : {"sphere", "box", "points", "silhouette"}
             What just fits: the sphere round the subject, which keeps its size from every side; its box; or all of its
-            points, which comes nearest.
+            points, which comes nearest; each with the middle of the box in the middle of the picture. "silhouette": the
+            box round the picture of all points is in the middle and fills the frame but for a margin of 5 % at each
+            end of its longer side.
 
         Raises
         ------
@@ -375,20 +383,29 @@ class Camera:
         center, radius = bounding_sphere(subject)
         check_fov(fov_y_deg)
         check_positive("aspect", aspect)
-        if fit not in ("sphere", "box", "points"):
-            raise ValueError(f'fit must be "sphere", "box" or "points", got {fit!r}')
+        if fit not in ("sphere", "box", "points", "silhouette"):
+            raise ValueError(f'fit must be "sphere", "box", "points" or "silhouette", got {fit!r}')
         tan_y = np.tan(np.radians(fov_y_deg) / 2)
         # The sphere touches the pyramid of view at sin, not tan, of the half angle.
         distance = radius * FRAMING_MARGIN / np.sin(np.arctan(tan_y * min(1.0, aspect)))
         height = 2 * radius * FRAMING_MARGIN / min(1.0, aspect)
+        right, above = 0.0, 0.0
         if fit != "sphere":
             turn = orbit_view((0, 0, 0), 1.0, azimuth_deg, elevation_deg, up=up)[:3, :3]
             points = box_corners(subject) if fit == "box" else points_to_frame(subject)
             points = (points - center) @ turn.T
-            distance = distance_to_fit(points, tan_y * aspect, tan_y)
-            height = 2 * FRAMING_MARGIN * max(np.abs(points[:, 1]).max(), np.abs(points[:, 0]).max() / aspect)
+            if fit == "silhouette":
+                share = 1 - 2 * SILHOUETTE_MARGIN
+                right, above, distance = place_to_fill(points, share * tan_y * aspect, share * tan_y)
+                if ortho:
+                    right, above, half = place_to_fill(points, aspect, 1.0, ortho=True)
+                    distance, height = radius / np.sin(np.arctan(tan_y)), 2 * half / share
+            else:
+                distance = distance_to_fit(points, tan_y * aspect, tan_y)
+                height = 2 * FRAMING_MARGIN * max(np.abs(points[:, 1]).max(), np.abs(points[:, 0]).max() / aspect)
             height = height or 2 * FRAMING_MARGIN
         view = orbit_view(center, distance, azimuth_deg, elevation_deg, up=up)
+        view[:2, 3] -= right, above
         near, far = max(distance - 1.01 * radius, 1e-3 * radius), distance + 1.01 * radius
         if ortho:
             return cls.orthographic(view, near=near, far=far, height=height)

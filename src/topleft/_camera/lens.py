@@ -53,7 +53,7 @@ class Lens(Protocol):
 
 @dataclass(frozen=True)
 class OpenCVLens:
-    """Radial and tangential distortion, as `cv2.projectPoints` has it.
+    """Radial and tangential distortion, thin prism and tilt, as `cv2.projectPoints` has them.
 
     Parameters
     ----------
@@ -63,6 +63,10 @@ class OpenCVLens:
         Tangential terms.
     k4, k5, k6 : float
         Radial terms, denominator.
+    s1, s2, s3, s4 : float
+        Terms of the thin prism.
+    tau_x, tau_y : float
+        The tilt of the sensor, radians, each below 90 degrees.
     tolerance_px : float
         How far, in pixels, a straight piece of a bent edge may lie from where it belongs.
 
@@ -74,7 +78,8 @@ class OpenCVLens:
     Notes
     -----
     With x = X/Z, y = Y/Z, r2 = x*x + y*y and q = (1 + k1 r2 + k2 r2^2 + k3 r2^3) / (1 + k4 r2 + k5 r2^2 + k6 r2^3) the
-    point is seen at x q + 2 p1 x y + p2 (r2 + 2 x x), y q + p1 (r2 + 2 y y) + 2 p2 x y. Depth stays that of Z.
+    point is seen at x q + 2 p1 x y + p2 (r2 + 2 x x) + s1 r2 + s2 r2^2, y q + p1 (r2 + 2 y y) + 2 p2 x y + s3 r2 +
+    s4 r2^2, and from there on the plane that the tilt turns about its axes x, then y. Depth stays that of Z.
     """
 
     k1: float = 0.0
@@ -86,12 +91,22 @@ class OpenCVLens:
     k5: float = 0.0
     k6: float = 0.0
     tolerance_px: float = DEFAULT_TOLERANCE_PX
+    s1: float = 0.0
+    s2: float = 0.0
+    s3: float = 0.0
+    s4: float = 0.0
+    tau_x: float = 0.0
+    tau_y: float = 0.0
 
     max_angle: ClassVar[float] = np.radians(89.4)
     has_planar_range: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        _check_terms([self.k1, self.k2, self.p1, self.p2, self.k3, self.k4, self.k5, self.k6], self.tolerance_px)
+        radial = [self.k1, self.k2, self.p1, self.p2, self.k3, self.k4, self.k5, self.k6]
+        rest = [self.s1, self.s2, self.s3, self.s4, self.tau_x, self.tau_y]
+        _check_terms(radial + rest, self.tolerance_px)
+        if max(abs(self.tau_x), abs(self.tau_y)) >= np.pi / 2:
+            raise ValueError(f"tau_x and tau_y must be below 90 degrees, got {self.tau_x} and {self.tau_y} radians")
 
     def distort(self, points: F64) -> F64:
         """Places (N, 2) in the image plane of points (N, 3) with Z > 0."""
@@ -99,13 +114,23 @@ class OpenCVLens:
         r2 = x * x + y * y
         numerator = 1 + r2 * (self.k1 + r2 * (self.k2 + r2 * self.k3))
         radial = numerator / (1 + r2 * (self.k4 + r2 * (self.k5 + r2 * self.k6)))
-        return np.stack(
-            [
-                x * radial + 2 * self.p1 * x * y + self.p2 * (r2 + 2 * x * x),
-                y * radial + self.p1 * (r2 + 2 * y * y) + 2 * self.p2 * x * y,
-            ],
-            axis=1,
-        )
+        u = x * radial + 2 * self.p1 * x * y + self.p2 * (r2 + 2 * x * x)
+        v = y * radial + self.p1 * (r2 + 2 * y * y) + 2 * self.p2 * x * y
+        if any((self.s1, self.s2, self.s3, self.s4)):
+            u += r2 * (self.s1 + r2 * self.s2)
+            v += r2 * (self.s3 + r2 * self.s4)
+        if self.tau_x or self.tau_y:
+            u, v = self._tilt(u, v)
+        return np.stack([u, v], axis=1)
+
+    def _tilt(self, u: F64, v: F64) -> tuple[F64, F64]:
+        """Places in a plane that is turned about x, then y, seen from the lens."""
+        (cos_x, cos_y), (sin_x, sin_y) = (f([self.tau_x, self.tau_y]) for f in (np.cos, np.sin))
+        a = cos_y * u + sin_x * sin_y * v - sin_y * cos_x
+        b = cos_x * v + sin_x
+        c = sin_y * u - cos_y * sin_x * v + cos_y * cos_x
+        depth = cos_y * cos_x
+        return (depth * a + sin_y * cos_x * c) / c, (depth * b - sin_x * c) / c
 
     def range_along(self, points: F64) -> F64:
         """Z."""
@@ -181,11 +206,12 @@ def lens_of_opencv(distortion: npt.ArrayLike | None, fisheye: npt.ArrayLike | No
         raise ValueError("distortion and fisheye are two models of a lens: give one of them")
     if distortion is not None:
         terms = np.asarray(distortion, dtype=np.float64).ravel().tolist()
-        if len(terms) not in (4, 5, 8):
+        if len(terms) not in (4, 5, 8, 12, 14):
             raise ValueError(
-                f"distortion must be k1, k2, p1, p2[, k3[, k4, k5, k6]]: 4, 5 or 8 numbers, got {len(terms)}"
+                "distortion must be k1, k2, p1, p2[, k3[, k4, k5, k6[, s1, s2, s3, s4[, tau_x, tau_y]]]]: 4, 5, 8, 12 "
+                f"or 14 numbers, got {len(terms)}"
             )
-        return OpenCVLens(*terms)
+        return OpenCVLens(*terms[:8], **dict(zip(("s1", "s2", "s3", "s4", "tau_x", "tau_y"), terms[8:], strict=False)))
     if fisheye is not None:
         terms = np.asarray(fisheye, dtype=np.float64).ravel().tolist()
         if len(terms) != 4:

@@ -13,8 +13,10 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from topleft._base.arrays import as_vector
 from topleft._model.adapt import MeshLike, as_mesh, is_mesh_like
 from topleft._model.mesh import extreme_points, used_vertices
+from topleft._model.points import Points
 
 F64 = npt.NDArray[np.float64]
 
@@ -23,6 +25,9 @@ THREE_QUARTER_DEG = (35.0, 20.0)
 
 FRAMING_MARGIN = 1.05
 """What fits fills 1 / 1.05 of the frame, so that no outline touches its border."""
+
+SILHOUETTE_MARGIN = 0.05
+"""The share of the frame that `fit="silhouette"` leaves free at each end of the side that is filled."""
 
 
 def points_to_frame(subject: MeshLike | npt.ArrayLike) -> F64:
@@ -33,7 +38,9 @@ def points_to_frame(subject: MeshLike | npt.ArrayLike) -> F64:
     ValueError
         If there is no point, or one is not finite.
     """
-    if is_mesh_like(subject):
+    if isinstance(subject, Points):
+        points = np.asarray(subject.positions, np.float64)
+    elif is_mesh_like(subject):
         points = np.asarray(used_vertices(as_mesh(subject)), np.float64)
     else:
         points = np.asarray(subject, np.float64)
@@ -48,6 +55,8 @@ def points_to_frame(subject: MeshLike | npt.ArrayLike) -> F64:
 
 def ends_to_frame(subject: MeshLike | npt.ArrayLike) -> F64:
     """A few of those points, which have the box and the bounding sphere of all."""
+    if isinstance(subject, Points) and len(subject):
+        return subject.extreme_points()
     if is_mesh_like(subject):
         mesh = as_mesh(subject)
         if len(mesh.triangles):
@@ -92,6 +101,56 @@ def distance_to_fit(points: F64, tan_x: float, tan_y: float) -> float:
     return float(max(needed.max(), 1e-2 * farthest)) or 1.0
 
 
+def place_to_fill(points: F64, tan_x: float, tan_y: float, *, ortho: bool = False) -> F64:
+    """Where a camera has to stand so that the box round the picture of all points fills its frame, in the middle of it.
+
+    In the middle also along the axis that it does not fill, to within 1e-6 of its width.
+
+    Parameters
+    ----------
+    points : (N, 3) float64
+        In eye axes: z towards the viewer.
+    tan_x, tan_y : float
+        Tangents of half the fields of view; without perspective half the sides of the frame, of which only the shape
+        counts.
+
+    Returns
+    -------
+    (3,) float64
+        The eye; without perspective x and y, and half the height of the frame.
+    """
+    x, y, z = points.T
+    if ortho:
+        (left, right), (bottom, top) = (x.min(), x.max()), (y.min(), y.max())
+        half = max((top - bottom) / 2, (right - left) / 2 * tan_y / tan_x)
+        return np.array([(left + right) / 2, (bottom + top) / 2, half])
+    sides = (x, tan_x), (y, tan_y)
+    ends = [_planes_of(axis, z, tan) for axis, tan in sides]
+    distance = max((low + high) / (2 * tan) for (low, high), (_, tan) in zip(ends, sides, strict=True))
+    nearest = float(z.max())
+    distance = max(distance, nearest + (1e-2 * float(np.ptp(points, axis=0).max()) or 1.0))
+    return np.array([*(_middle(axis, z, tan, distance) for axis, tan in sides), distance])
+
+
+def _planes_of(axis: F64, z: F64, tan: float) -> tuple[float, float]:
+    """How far out the two planes lie that a frame of this half angle touches the points with: low and high."""
+    return float((tan * z - axis).max()), float((tan * z + axis).max())
+
+
+def _middle(axis: F64, z: F64, tan: float, distance: float) -> float:
+    """The place along an axis from which the picture of the points, from this distance, has its middle on the axis."""
+    depth = distance - z
+    for _ in range(20):
+        low, high = _planes_of(axis, z, tan)
+        place = (high - low) / 2
+        seen = (axis - place) / depth
+        widest = float(np.abs(seen).max())
+        if abs(float(seen.max() + seen.min())) <= 1e-6 * widest or widest == 0:
+            break
+        tan = widest
+    return place
+
+
 def view_matrix(eye: npt.ArrayLike, target: npt.ArrayLike, up: npt.ArrayLike = (0.0, 1.0, 0.0)) -> F64:
     """Eye from world (4, 4) float64, for a camera at `eye` that looks at `target`.
 
@@ -100,7 +159,7 @@ def view_matrix(eye: npt.ArrayLike, target: npt.ArrayLike, up: npt.ArrayLike = (
     ValueError
         If eye and target coincide, or if `up` is zero or parallel to the view.
     """
-    eye, target, up = as_vector(eye, "eye"), as_vector(target, "target"), as_vector(up, "up")
+    eye, target, up = as_vector("eye", eye), as_vector("target", target), as_vector("up", up)
     forward = target - eye
     distance = np.linalg.norm(forward)
     if distance == 0:
@@ -145,7 +204,7 @@ def orbit_view(
         axis = np.array([-np.sin(azimuth), 0, -np.cos(azimuth)]) * np.sign(elevation)
     if up == "z":
         outward, axis = outward[[0, 2, 1]] * [1, -1, 1], axis[[0, 2, 1]] * [1, -1, 1]
-    target = as_vector(target, "target")
+    target = as_vector("target", target)
     return view_matrix(target + distance * outward, target, axis)
 
 
@@ -187,30 +246,6 @@ def box_matrix(left: float, right: float, bottom: float, top: float, near: float
     matrix[0, 0], matrix[0, 3] = 2 / (right - left), -(right + left) / (right - left)
     matrix[1, 1], matrix[1, 3] = 2 / (top - bottom), -(top + bottom) / (top - bottom)
     return matrix
-
-
-def as_vector(values: npt.ArrayLike, name: str) -> F64:
-    """Three finite numbers as float64."""
-    vector = np.asarray(values, dtype=np.float64)
-    if vector.shape != (3,) or not np.isfinite(vector).all():
-        raise ValueError(f"{name} must be three finite numbers, got {values!r}")
-    return vector
-
-
-def as_square(values: npt.ArrayLike, n: int, name: str) -> F64:
-    """A finite matrix (n, n) as float64, always a copy."""
-    matrix = np.array(values, dtype=np.float64)
-    if matrix.shape != (n, n):
-        raise ValueError(f"{name} must have shape ({n}, {n}), got {matrix.shape}")
-    if not np.isfinite(matrix).all():
-        raise ValueError(f"{name} must hold finite numbers, got {matrix.tolist()}")
-    return matrix
-
-
-def check_regular(matrix: F64, name: str) -> None:
-    """Raise a `ValueError` if the matrix is singular."""
-    if np.linalg.matrix_rank(matrix) < len(matrix):
-        raise ValueError(f"{name} must not be singular, got {matrix.tolist()}")
 
 
 def check_positive(name: str, value: float) -> None:

@@ -172,6 +172,28 @@ cdef extern from "topleft.h" nogil:
         int64_t stride_px
     enum:
         TL_N_CLASSES, TL_FLIP, TL_SPECIAL
+    ctypedef struct tl_cloud:
+        const tl_vertex *vertices
+        int64_t n
+        int64_t size_fx
+        const int32_t *sizes_fx
+        int is_disc
+        int32_t sample_x_fx, sample_y_fx
+    ctypedef struct tl_fans:
+        const int32_t *triangles
+        const int32_t *starts
+        const int32_t *corners
+        const double *normals
+        const double *angles
+        double least_cosine
+    ctypedef struct tl_creases:
+        const int32_t *starts
+        const int32_t *groups
+        const int32_t *own_triangles
+        int64_t first_row
+        double *of_vertices
+        double *of_groups
+        int32_t *row_of_corner
     ctypedef int tl_filter
     ctypedef int tl_wrap
     ctypedef int tl_light_kind
@@ -185,6 +207,10 @@ cdef extern from "topleft.h" nogil:
         int n_levels
         tl_filter filter
         tl_wrap wrap_u, wrap_v
+        int uv_set, has_transform
+        float[2][3] transform
+        float *tangent
+        float hand
     ctypedef struct tl_material:
         float *color
         float *back_color
@@ -192,6 +218,24 @@ cdef extern from "topleft.h" nogil:
         float back_side, shininess, cutoff
         int is_unlit
         const tl_texture *texture
+        int is_full, is_metallic
+        float metallic, roughness, occlusion, normal_scale
+        float *emission
+        const tl_texture *metallic_roughness
+        const tl_texture *occlusion_map
+        const tl_texture *normal_map
+        const tl_texture *emission_map
+    ctypedef int tl_surroundings_kind
+    ctypedef struct tl_surroundings:
+        tl_surroundings_kind kind
+        float[3][4] from_shading
+        float *sky
+        float *ground
+        float diffuse
+        const float *texels
+        int32_t *offset
+        int32_t *size
+        int n_levels
     ctypedef struct tl_light:
         tl_light_kind kind
         float *at
@@ -199,18 +243,24 @@ cdef extern from "topleft.h" nogil:
         float falloff
     ctypedef struct tl_shading:
         const float *normals
+        const int32_t *normal_of_corner
         const float *face_normals
         const void *positions
         int is_f64
         const uint8_t *is_turned
         const float *uv
+        const float *uv1
         const float *colors
+        int has_alpha
+        float front_side
         const int32_t *material_of
         const tl_material *materials
         int n_materials
         const tl_light *lights
         int n_lights
         float *ambient
+        const tl_surroundings *surroundings
+        int wants_opacity
         tl_show show
         const tl_texture *matcap
         float[3][4] eye_from
@@ -257,6 +307,65 @@ cdef extern from "topleft.h" nogil:
         double rows[TL_POINT_ROWS][4]
         double half_width_px, half_height_px, background
         int is_f64_out
+    enum:
+        TL_POLYGON_PAD, TL_CERTIFY_WORDS, TL_PIECE_WORDS, TL_CELL_ROWS, TL_LEAST_SHARE_CELLS
+    ctypedef struct tl_polygons:
+        const int32_t *x_fx
+        const int32_t *y_fx
+        const int64_t *wide_fx
+        const int64_t *rings
+        const int64_t *polygons
+        const uint8_t *is_wide
+        const int8_t *weights
+        const uint8_t *is_simple
+        int64_t n_polygons
+        int bits, is_nonzero
+        int32_t sample_x_fx, sample_y_fx
+    ctypedef struct tl_polygon_box:
+        int32_t left, top, right, bottom
+    ctypedef int tl_polygon_test
+    ctypedef struct tl_label_scratch:
+        pass
+    ctypedef struct tl_edge_piece:
+        pass
+    ctypedef struct tl_piece_scratch:
+        tl_edge_piece *pieces
+        int64_t *room
+        int64_t n_pieces
+        int64_t *row_starts
+        double *shares
+    ctypedef struct tl_label_job:
+        const int32_t *listed
+        int64_t first, end
+        const int32_t *values
+        const tl_polygon_box *boxes
+        tl_polygon_test test
+        int64_t width, top, bottom
+        int n_bytes
+        int32_t background
+        int waits
+        void *pixels
+        int32_t *cells
+        tl_label_scratch *scratch
+        tl_piece_scratch *pieces
+    ctypedef struct tl_share_job:
+        const int32_t *listed
+        int64_t first, end
+        const tl_polygon_box *boxes
+        int64_t width, top, bottom
+        int32_t *cells
+        int64_t n_cells
+        tl_piece_scratch *pieces
+        float *pixels
+        const float *colors
+        int n_channels, is_alone
+        int64_t *starts
+        void *indices
+        float *areas
+        int is_long
+        int64_t n_room
+    int64_t tl_polygon_stride(int64_t width)
+    int64_t tl_share_cells(int64_t width, int64_t height)
     ctypedef struct tl_kernels:
         void (*shade_normals)(const tl_scene *, const tl_window *, const tl_view *, const tl_shading *, const int32_t *, float *) noexcept nogil
         void (*fill_points)(const tl_scene *, const tl_window *, const tl_points *, const int32_t *, void *) noexcept nogil
@@ -288,7 +397,9 @@ cdef extern from "topleft.h" nogil:
         void (*paint_flat)(const int32_t *, int64_t, const uint8_t *, int, uint8_t *) noexcept nogil
         void (*paint_gouraud)(const tl_scene *, const tl_window *, const int32_t *, const void *, int, int, void *) noexcept nogil
         void (*composite)(const tl_composite *, int64_t, void *) noexcept nogil
+        void (*drop_sides)(const tl_scene *, const uint8_t *, int64_t, int64_t, int32_t *) noexcept nogil
         int64_t (*list_edges)(const tl_scene *, const tl_edge_scratch *, uint64_t *, int64_t *) noexcept nogil
+        void (*draw_cloud)(const tl_cloud *, const tl_window *, const tl_target *) noexcept nogil
         void (*draw_lines)(const tl_edges *, const tl_window *, const tl_line_target *) noexcept nogil
         void (*list_planes)(const tl_valued *, int64_t, int64_t) noexcept nogil
         void (*fill_planes)(const tl_valued *, const tl_window *, const int32_t *, int, void *) noexcept nogil
@@ -296,7 +407,11 @@ cdef extern from "topleft.h" nogil:
         void (*mean_colors)(const void *, int, int64_t, int64_t, int, int, const tl_transfer *, void *) noexcept nogil
         int64_t (*vertex_normals)(const tl_source *, const int32_t *, int64_t, int64_t, int64_t, double *) noexcept nogil
         int64_t (*face_normals)(const tl_source *, const int32_t *, int64_t, int64_t, double *, float *) noexcept nogil
-        int64_t (*find_turned)(const tl_source *, const int32_t *, int64_t, int64_t, const float *, uint8_t *) noexcept nogil
+        int64_t (*find_turned)(const tl_source *, const int32_t *, int64_t, int64_t, const float *, const int32_t *, uint8_t *) noexcept nogil
+        int64_t (*face_angles)(const tl_source *, const int32_t *, int64_t, int64_t, double *, double *) noexcept nogil
+        void (*list_corners)(const int32_t *, int64_t, int64_t, int32_t *, int32_t *) noexcept nogil
+        void (*find_creases)(const tl_fans *, int64_t, int64_t, uint64_t *, int32_t *, int32_t *) noexcept nogil
+        void (*sum_creases)(const tl_fans *, const tl_creases *, int64_t, int64_t) noexcept nogil
         int64_t (*box_of_faces)(const tl_source *, const int32_t *, int64_t, int64_t, double *) noexcept nogil
         void (*unit_vectors)(const tl_source *, const double *, int64_t, int64_t, double *, float *) noexcept nogil
         void (*move_points)(const tl_source *, const double *, int64_t, int64_t, double *) noexcept nogil
@@ -305,3 +420,12 @@ cdef extern from "topleft.h" nogil:
         double (*find_nearest)(const tl_surface *, const double *, int64_t, int64_t, int32_t *, double *) noexcept nogil
         void (*find_reach)(const tl_surface *, const double *, const int32_t *, int64_t, int64_t, double, double, tl_reach *) noexcept nogil
         void (*set_feet)(const double *, const int32_t *, const double *, const int32_t *, const int32_t *, int64_t, double *, double *) noexcept nogil
+        tl_vertex_counts (*snap_points)(const tl_source *, int64_t, int64_t, int, int, const int64_t *, int32_t *, int32_t *, int64_t *) noexcept nogil
+        int64_t (*bound_polygons)(const tl_polygons *, int64_t, int64_t, int64_t, int64_t, uint8_t *, tl_polygon_box *) noexcept nogil
+        void (*sort_polygons)(const tl_polygon_box *, int64_t, int64_t, int64_t, int64_t *, int32_t *) noexcept nogil
+        void (*certify_polygons)(const tl_polygons *, int64_t, int64_t, int8_t *, uint8_t *, int64_t *) noexcept nogil
+        void (*trust_polygons)(const tl_polygons *, int64_t, int64_t, int8_t *, uint8_t *) noexcept nogil
+        void (*mask_even_odd)(const tl_polygons *, int64_t, int64_t, int64_t, int64_t, uint64_t *, uint8_t *) noexcept nogil
+        void (*mask_nonzero)(const tl_polygons *, int64_t, int64_t, int64_t, int64_t, uint32_t *, int32_t *, int64_t, int32_t *, uint64_t *, uint8_t *) noexcept nogil
+        void (*label_polygons)(const tl_polygons *, const tl_label_job *) noexcept nogil
+        int64_t (*share_polygons)(const tl_polygons *, const tl_share_job *) noexcept nogil

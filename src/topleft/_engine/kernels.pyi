@@ -126,6 +126,7 @@ class SnappedMesh:
     def with_inverse_w(self, n_pixels: int) -> SnappedMesh: ...
     def numbered_from(self, first_id: int) -> SnappedMesh: ...
     def moved(self, x_px: int, y_px: int) -> SnappedMesh: ...
+    def drop_sides(self, is_single: NDArray[np.uint8], first: int, end: int, triangles: NDArray[np.int32]) -> None: ...
     def draw(self, target: Target, first_row: int, n_rows: int, is_first: bool = True, is_last: bool = True) -> int: ...
     def draw_share(
         self, target: Target, first_row: int, n_rows: int, first: int, others: NDArray[np.int32]
@@ -284,23 +285,49 @@ def mean_colors(
 
 class Mipmap:
     def __init__(
-        self, texels: NDArray[np.uint16], levels: NDArray[np.int32], filter_code: int, wrap_u: int, wrap_v: int
+        self,
+        texels: NDArray[np.uint16],
+        levels: NDArray[np.int32],
+        filter_code: int,
+        wrap_u: int,
+        wrap_v: int,
+        uv_set: int = ...,
+        transform: Sequence[Sequence[float]] | None = ...,
+        tangent: Sequence[float] = ...,
+        hand: float = ...,
+    ) -> None: ...
+
+class Surroundings:
+    def __init__(
+        self,
+        texels: NDArray[np.float32] | None,
+        levels: NDArray[np.int32] | None,
+        sky: Sequence[float],
+        ground: Sequence[float],
+        diffuse: float,
+        from_shading: Sequence[Sequence[float]],
     ) -> None: ...
 
 class ShadingTable:
     def __init__(
         self,
         normals: NDArray[np.float32],
+        normal_of_corner: NDArray[np.int32] | None,
         face_normals: NDArray[np.float32] | None,
         positions: NDArray[Any],
         is_turned: NDArray[np.uint8] | None,
         uv: NDArray[np.float32] | None,
+        uv1: NDArray[np.float32] | None,
         colors: NDArray[np.float32] | None,
+        has_alpha: bool,
+        front_side: float,
         material_of: NDArray[np.int32] | None,
         decode: NDArray[np.float32],
     ) -> None: ...
     def set_materials(self, materials: Sequence[tuple[Any, ...]]) -> None: ...
     def set_lights(self, lights: Sequence[tuple[Any, ...]], ambient: Sequence[float]) -> None: ...
+    def set_surroundings(self, surroundings: Surroundings) -> None: ...
+    def set_wants_opacity(self) -> None: ...
     def set_view(
         self,
         show: int,
@@ -316,7 +343,9 @@ class ShadingTable:
         self, color: Sequence[float], near: float, scale: float, distance_start: float, distance_scale: float
     ) -> None: ...
 
-def set_inverse_w(mesh: SnappedMesh, rows: NDArray[np.float32], out: NDArray[np.float32]) -> None: ...
+def set_inverse_w(
+    mesh: SnappedMesh, rows: NDArray[np.float32], vertex_of_row: NDArray[np.int32] | None, out: NDArray[np.float32]
+) -> None: ...
 def shade(
     mesh: SnappedMesh,
     shading: ShadingTable,
@@ -464,6 +493,19 @@ def set_feet(
     at: NDArray[np.float64],
     squared: NDArray[np.float64],
 ) -> None: ...
+def draw_cloud(
+    records: NDArray[np.uint8],
+    size_fx: int,
+    sizes_fx: NDArray[np.int32] | None,
+    is_disc: bool,
+    x_fx: int,
+    y_fx: int,
+    target: Target,
+    origin: tuple[int, int],
+    subpixel_bits: int,
+    first_row: int,
+    n_rows: int,
+) -> None: ...
 def vertex_normals(
     source: Source, triangles: NDArray[np.int32], first: int, end: int, out: NDArray[np.float64]
 ) -> int: ...
@@ -481,8 +523,41 @@ def find_turned(
     first: int,
     end: int,
     normals: NDArray[np.float32],
+    row_of_corner: NDArray[np.int32],
     is_turned: NDArray[np.uint8],
 ) -> int: ...
+def face_angles(
+    source: Source,
+    triangles: NDArray[np.int32],
+    first: int,
+    end: int,
+    normals: NDArray[np.float64],
+    angles: NDArray[np.float64],
+) -> int: ...
+
+class Fans:
+    def __init__(
+        self,
+        triangles: NDArray[np.int32],
+        n_vertices: int,
+        normals: NDArray[np.float64],
+        angles: NDArray[np.float64],
+        least_cosine: float,
+    ) -> None: ...
+    def find_creases(self, first: int, end: int, groups: NDArray[np.int32], n_groups: NDArray[np.int32]) -> None: ...
+    def sum_creases(
+        self,
+        first: int,
+        end: int,
+        starts: NDArray[np.int32],
+        groups: NDArray[np.int32],
+        own_triangles: NDArray[np.int32],
+        first_row: int,
+        of_vertices: NDArray[np.float64],
+        of_groups: NDArray[np.float64],
+        row_of_corner: NDArray[np.int32] | None,
+    ) -> None: ...
+
 def box_of_faces(
     source: Source, triangles: NDArray[np.int32], first: int, end: int, box: NDArray[np.float64]
 ) -> int: ...
@@ -498,3 +573,111 @@ def move_points(
     points: Source, matrix: NDArray[np.float64], first: int, end: int, out: NDArray[np.float64]
 ) -> None: ...
 def color_rows(colors: NDArray[np.uint8], first: int, end: int, rows: NDArray[np.float32]) -> None: ...
+
+CELL_ROWS: int
+CERTIFY_WORDS: int
+LABEL_SCRATCH_BYTES: int
+LEAST_SHARE_CELLS: int
+PIECE_BYTES: int
+PIECE_WORDS: int
+POLYGON_PAD: int
+
+def polygon_stride(width: int) -> int: ...
+def share_cells(width: int, height: int) -> int: ...
+def snap_points(
+    source: Source,
+    first: int,
+    end: int,
+    bits: int,
+    grid_bits: int,
+    x_px: int,
+    y_px: int,
+    x_fx: NDArray[np.int32],
+    y_fx: NDArray[np.int32],
+    wide_fx: NDArray[np.int64] | None,
+) -> tuple[int, int]: ...
+
+class PieceScratch:
+    def __init__(self, n_pieces: int, height: int, width: int) -> None: ...
+
+class SnappedPolygons:
+    n_polygons: int
+    n_rings: int
+    width: int
+    height: int
+    def __init__(
+        self,
+        x_fx: NDArray[np.int32],
+        y_fx: NDArray[np.int32],
+        wide_fx: NDArray[np.int64] | None,
+        rings: NDArray[np.int64],
+        polygons: NDArray[np.int64],
+        width: int,
+        height: int,
+        bits: int,
+        is_nonzero: bool,
+    ) -> None: ...
+    @property
+    def boxes_px(self) -> NDArray[np.int32]: ...
+    def bound(self, first: int, end: int) -> int: ...
+    def make_weights(self) -> None: ...
+    def certify(self, first: int, end: int, room: NDArray[np.int64] | None) -> None: ...
+    def which_are_simple(self) -> NDArray[np.bool_]: ...
+    def seen_from(self, sample_x_fx: int, sample_y_fx: int) -> None: ...
+    def sort(
+        self, band_rows: int, n_bands: int, starts: NDArray[np.int64], listed: NDArray[np.int32] | None
+    ) -> None: ...
+    def mask_even_odd(
+        self, polygon: int, out: NDArray[np.uint8], top: int, bottom: int, bits: NDArray[np.int32]
+    ) -> None: ...
+    def mask_nonzero(
+        self,
+        polygon: int,
+        out: NDArray[np.uint8],
+        top: int,
+        bottom: int,
+        at: NDArray[np.uint32],
+        room: NDArray[np.int32],
+        cells: NDArray[np.int32],
+        bits: NDArray[np.uint64],
+    ) -> None: ...
+    def label(
+        self,
+        pixels: NDArray[np.uint8],
+        n_bytes: int,
+        values: NDArray[np.int32] | None,
+        background: int,
+        test: int,
+        waits: bool,
+        band_rows: int,
+        starts: NDArray[np.int64] | None,
+        listed: NDArray[np.int32] | None,
+        first_band: int,
+        end_band: int,
+        cells: NDArray[np.int32],
+        scratch: NDArray[np.uint8],
+        pieces: PieceScratch | None,
+    ) -> None: ...
+    def add_shares(
+        self,
+        pixels: NDArray[np.float32],
+        colors: NDArray[np.float32] | None,
+        band_rows: int,
+        starts: NDArray[np.int64],
+        listed: NDArray[np.int32],
+        first_band: int,
+        end_band: int,
+        cells: NDArray[np.int32],
+        pieces: PieceScratch | None,
+        is_alone: bool,
+    ) -> None: ...
+    def list_shares(
+        self,
+        first: int,
+        end: int,
+        starts: NDArray[np.int64],
+        indices: NDArray[Any],
+        areas: NDArray[np.float32],
+        cells: NDArray[np.int32],
+        pieces: PieceScratch | None,
+    ) -> int: ...

@@ -1,7 +1,7 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, initializedcheck=False, embedsignature=False
 """Memoryviews in, one nogil kernel call, status out. The array layer has checked every shape, dtype and index."""
 
-from libc.stdint cimport int32_t, int64_t, uint8_t, uint16_t, uint32_t, uint64_t
+from libc.stdint cimport int8_t, int32_t, int64_t, uint8_t, uint16_t, uint32_t, uint64_t
 from libc.math cimport sqrt
 from libc.string cimport memset
 
@@ -95,3 +95,4 @@ include "clusters.pxi"
 include "pixels.pxi"
 include "shade.pxi"
 include "mesh.pxi"
+include "polygons.pxi"

@@ -23,15 +23,68 @@ def face_normals(Source source, const int32_t[:, ::1] triangles, int64_t first, 
     return bad
 
 
-def find_turned(Source source, const int32_t[:, ::1] triangles, int64_t first, int64_t end, const float[:, ::1] normals, uint8_t[::1] is_turned):
+def find_turned(Source source, const int32_t[:, ::1] triangles, int64_t first, int64_t end, const float[:, ::1] normals,
+                const int32_t[:, ::1] row_of_corner, uint8_t[::1] is_turned):
     """Write 1 for the triangles of [first, end) whose corners have normals that point to the other side, else 0."""
     cdef int64_t bad = -1
     if end > first:
         if not normals.shape[0]:
             return first
         with nogil:
-            bad = K.find_turned(&source.source, &triangles[0, 0], first, end, &normals[0, 0], &is_turned[0])
+            bad = K.find_turned(&source.source, &triangles[0, 0], first, end, &normals[0, 0], &row_of_corner[0, 0], &is_turned[0])
     return bad
+
+
+def face_angles(Source source, const int32_t[:, ::1] triangles, int64_t first, int64_t end, double[:, ::1] normals,
+                double[:, ::1] angles):
+    """Write the unit normals and the angles of triangles [first, end)."""
+    cdef int64_t bad = -1
+    if end > first:
+        with nogil:
+            bad = K.face_angles(&source.source, &triangles[0, 0], first, end, &normals[0, 0], &angles[0, 0])
+    return bad
+
+
+cdef class Fans:
+    """The triangles round the vertices of a mesh: `tl_fans`, at least one triangle. The indices have been checked."""
+
+    cdef tl_fans fans
+    cdef object arrays
+    cdef int64_t n_vertices
+    cdef readonly int most_corners
+
+    def __init__(self, const int32_t[:, ::1] triangles, int64_t n_vertices, const double[:, ::1] normals,
+                 const double[:, ::1] angles, double least_cosine):
+        cdef int32_t[::1] starts = np.empty(n_vertices + 1, np.int32)
+        cdef int32_t[::1] corners = np.empty(3 * triangles.shape[0], np.int32)
+        cdef tl_fans *f = &self.fans
+        self.arrays = (triangles, starts, corners, normals, angles)
+        self.n_vertices = n_vertices
+        f.triangles, f.starts, f.corners = &triangles[0, 0], &starts[0], &corners[0]
+        f.normals, f.angles, f.least_cosine = &normals[0, 0], &angles[0, 0], least_cosine
+        with nogil:
+            K.list_corners(f.triangles, triangles.shape[0], n_vertices, &starts[0], &corners[0])
+        self.most_corners = int(np.diff(starts).max())
+
+    def find_creases(self, int64_t first, int64_t end, int32_t[:, ::1] groups, int32_t[::1] n_groups):
+        """Write the groups of the corners of vertices [first, end), and how many each vertex has."""
+        cdef uint64_t[::1] room = np.empty(5 * self.most_corners, np.uint64)
+        if end > first:
+            with nogil:
+                K.find_creases(&self.fans, first, end, &room[0], &groups[0, 0], &n_groups[0])
+
+    def sum_creases(self, int64_t first, int64_t end, const int32_t[::1] starts, const int32_t[:, ::1] groups,
+                    const int32_t[:, ::1] own_triangles, int64_t first_row, double[:, ::1] of_vertices,
+                    double[:, ::1] of_groups, int32_t[:, ::1] row_of_corner):
+        """Write the normals of vertices [first, end) and of their groups, and the rows of their corners unless that is None."""
+        cdef tl_creases c
+        c.starts, c.groups, c.own_triangles = &starts[0], &groups[0, 0], &own_triangles[0, 0]
+        c.first_row, c.of_vertices = first_row, &of_vertices[0, 0]
+        c.of_groups = &of_groups[0, 0] if of_groups.shape[0] else NULL
+        c.row_of_corner = &row_of_corner[0, 0] if row_of_corner is not None else NULL
+        if end > first:
+            with nogil:
+                K.sum_creases(&self.fans, &c, first, end)
 
 
 def box_of_faces(Source source, const int32_t[:, ::1] triangles, int64_t first, int64_t end, double[::1] box):

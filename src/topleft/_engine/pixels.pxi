@@ -1,4 +1,4 @@
-# Writes pixels that are not found by drawing triangles: means of samples, colours of layers, points, planes, lines.
+# Writes pixels that are not found by drawing triangles: means of samples, colours of layers, points, planes, lines, clouds.
 
 
 cdef class Transfer:
@@ -212,3 +212,24 @@ def draw_lines(SnappedMesh mesh, const uint64_t[::1] edges, uint8_t[::1] pixels,
     with nogil:
         K.draw_lines(&lines, &window, &target)
     raise_if_given_up()
+
+
+def draw_cloud(const uint8_t[::1] records, int64_t size_fx, const int32_t[::1] sizes_fx, bint is_disc, int32_t x_fx, int32_t y_fx,
+               Target target, origin, int subpixel_bits, int64_t first_row, int64_t n_rows):
+    """Clear rows of ids and depth and draw snapped points there, as the sample (x_fx, y_fx) off the centre sees them.
+
+    `sizes_fx`: a size each, or None: all have `size_fx`. Column 0 and row 0 of the target are the pixel `origin`.
+    """
+    cdef tl_cloud cloud
+    cdef tl_window window
+    cdef tl_target rows = target.rows(first_row)
+    memset(&window, 0, sizeof(window))
+    window.x_px, window.y_px = origin
+    window.y_px += first_row
+    window.width, window.height = target.width, n_rows
+    window.subpixel_bits = subpixel_bits
+    cloud.vertices, cloud.n = <const tl_vertex *>data(records), records.shape[0] // <int64_t>sizeof(tl_vertex)
+    cloud.size_fx, cloud.sizes_fx = size_fx, &sizes_fx[0] if sizes_fx is not None and sizes_fx.shape[0] else NULL
+    cloud.is_disc, cloud.sample_x_fx, cloud.sample_y_fx = is_disc, x_fx, y_fx
+    with nogil:
+        K.draw_cloud(&cloud, &window, &rows)

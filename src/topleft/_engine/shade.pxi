@@ -7,7 +7,8 @@ cdef class Mipmap:
     cdef tl_texture texture
     cdef object texels
 
-    def __init__(self, const uint16_t[:, ::1] texels, const int32_t[:, ::1] levels, int filter_code, int wrap_u, int wrap_v):
+    def __init__(self, const uint16_t[:, ::1] texels, const int32_t[:, ::1] levels, int filter_code, int wrap_u, int wrap_v,
+                 int uv_set=0, transform=None, tangent=(1, 0), float hand=1):
         cdef int k
         self.texels = texels
         self.texture.texels = &texels[0, 0]
@@ -17,6 +18,35 @@ cdef class Mipmap:
         for k in range(levels.shape[0], TL_MAX_LEVELS):
             self.texture.offset[k], self.texture.width[k], self.texture.height[k] = 0, 1, 1
         self.texture.filter, self.texture.wrap_u, self.texture.wrap_v = <tl_filter>filter_code, <tl_wrap>wrap_u, <tl_wrap>wrap_v
+        self.texture.uv_set, self.texture.has_transform, self.texture.hand = uv_set, transform is not None, hand
+        for k in range(2):
+            copy_floats(self.texture.transform[k], (0, 0, 0) if transform is None else transform[k], 3)
+        copy_floats(self.texture.tangent, tangent, 2)
+
+
+cdef class Surroundings:
+    """Light from all around, as `tl_surroundings` has it; texels (N, 4) of a picture, a row (offset, size) a level, or None."""
+
+    cdef tl_surroundings surroundings
+    cdef object texels
+
+    def __init__(self, const float[:, ::1] texels, const int32_t[:, ::1] levels, sky, ground, float diffuse, from_shading):
+        cdef tl_surroundings *e = &self.surroundings
+        cdef int k
+        self.texels = texels
+        e.kind, e.texels, e.n_levels, e.diffuse = <tl_surroundings_kind>0, NULL, 0, diffuse
+        copy_floats(e.sky, sky, 3)
+        copy_floats(e.ground, ground, 3)
+        for k in range(3):
+            copy_floats(e.from_shading[k], from_shading[k], 3)
+        if texels is not None:
+            e.kind, e.texels, e.n_levels = <tl_surroundings_kind>1, &texels[0, 0], levels.shape[0]
+            for k in range(levels.shape[0]):
+                e.offset[k], e.size[k] = levels[k, 0], levels[k, 1]
+
+
+cdef const tl_texture *texture_of(Mipmap texture) noexcept:
+    return &texture.texture if texture is not None else NULL
 
 
 cdef void copy_floats(float *out, values, int n) except *:
@@ -33,16 +63,23 @@ cdef class ShadingTable:
     cdef uint8_t[::1] materials
     cdef uint8_t[::1] lights
 
-    def __init__(self, const float[:, ::1] normals, const float[:, ::1] face_normals, positions, const uint8_t[::1] is_turned,
-                 const float[:, ::1] uv, const float[:, ::1] colors, const int32_t[::1] material_of, const float[::1] decode):
+    def __init__(self, const float[:, ::1] normals, const int32_t[:, ::1] normal_of_corner,
+                 const float[:, ::1] face_normals, positions, const uint8_t[::1] is_turned,
+                 const float[:, ::1] uv, const float[:, ::1] uv1, const float[:, ::1] colors, bint has_alpha, float front_side,
+                 const int32_t[::1] material_of, const float[::1] decode):
         cdef const uint8_t[::1] raw = as_bytes(positions)
         cdef tl_shading *s = &self.shading
-        self.arrays = (normals, face_normals, raw, is_turned, uv, colors, material_of, decode)
+        self.arrays = (normals, normal_of_corner, face_normals, raw, is_turned, uv, uv1, colors, material_of, decode)
         s.normals = &normals[0, 0] if normals.shape[0] else NULL
+        s.normal_of_corner = NULL
+        if normal_of_corner is not None and normal_of_corner.shape[0]:
+            s.normal_of_corner = &normal_of_corner[0, 0]
         s.face_normals = &face_normals[0, 0] if face_normals is not None and face_normals.shape[0] else NULL
         s.positions, s.is_f64 = data(raw), positions.dtype == np.float64
         s.is_turned = <const uint8_t *>data(is_turned)
         s.uv = &uv[0, 0] if uv is not None and uv.shape[0] else NULL
+        s.uv1 = &uv1[0, 0] if uv1 is not None and uv1.shape[0] else NULL
+        s.has_alpha, s.front_side, s.surroundings, s.wants_opacity = has_alpha, front_side, NULL, False
         s.colors = &colors[0, 0] if colors is not None and colors.shape[0] else NULL
         s.material_of = &material_of[0] if material_of is not None and material_of.shape[0] else NULL
         s.decode = &decode[0]
@@ -50,20 +87,25 @@ cdef class ShadingTable:
         s.matcap = NULL
 
     def set_materials(self, materials):
-        """Take rows (color, back_color, back_side, specular, shininess, is_unlit, cutoff, texture or None)."""
+        """Take rows (color, back_color, back_side, specular, shininess, is_unlit, cutoff, texture or None, None or what makes
+        it full: (is_metallic, metallic, roughness, occlusion, normal_scale, emission, four textures or None))."""
         cdef tl_material *m
-        cdef Mipmap texture
         cdef int k
         self.materials = np.zeros(max(1, len(materials)) * sizeof(tl_material), np.uint8)
         m = <tl_material *>&self.materials[0]
         self.arrays += (materials,)
-        for k, (color, back_color, back_side, specular, shininess, is_unlit, cutoff, own) in enumerate(materials):
+        for k, (color, back_color, back_side, specular, shininess, is_unlit, cutoff, texture, full) in enumerate(materials):
             copy_floats(m[k].color, color, 4)
             copy_floats(m[k].back_color, back_color, 3)
             copy_floats(m[k].specular, specular, 3)
             m[k].back_side, m[k].shininess, m[k].is_unlit, m[k].cutoff = back_side, shininess, is_unlit, cutoff
-            texture = own
-            m[k].texture = &texture.texture if texture is not None else NULL
+            m[k].texture = texture_of(texture)
+            if full is not None:
+                m[k].is_full = True
+                m[k].is_metallic, m[k].metallic, m[k].roughness, m[k].occlusion, m[k].normal_scale = full[:5]
+                copy_floats(m[k].emission, full[5], 3)
+                m[k].metallic_roughness, m[k].occlusion_map = texture_of(full[6]), texture_of(full[7])
+                m[k].normal_map, m[k].emission_map = texture_of(full[8]), texture_of(full[9])
         self.shading.materials, self.shading.n_materials = m, len(materials)
 
     def set_lights(self, lights, ambient):
@@ -78,6 +120,15 @@ cdef class ShadingTable:
             copy_floats(light[k].color, color, 3)
         copy_floats(self.shading.ambient, ambient, 3)
         self.shading.lights, self.shading.n_lights = light, len(lights)
+
+    def set_surroundings(self, Surroundings surroundings):
+        """Take the light that comes from all around."""
+        self.arrays += (surroundings,)
+        self.shading.surroundings = &surroundings.surroundings
+
+    def set_wants_opacity(self):
+        """Have the opacity of the surface in the picture's alpha; the materials are full."""
+        self.shading.wants_opacity = True
 
     def set_view(self, int show, Mipmap matcap, eye_from, bint has_perspective, eye, ray, background, background_bytes):
         """Take what the picture tells, where it is seen from, and what is behind it."""
@@ -103,24 +154,33 @@ cdef class ShadingTable:
         s.fog_near, s.fog_scale, s.distance_start, s.distance_scale = near, scale, distance_start, distance_scale
 
 
-def set_inverse_w(SnappedMesh mesh, const float[:, ::1] rows, float[:, ::1] out):
-    """Copy rows of four numbers, one a vertex, and write 1/w over the fourth; of vertices that have been snapped."""
-    cdef int64_t i = 0, end, n = rows.shape[0], n_blocks
+def set_inverse_w(SnappedMesh mesh, const float[:, ::1] rows, const int32_t[::1] vertex_of_row, float[:, ::1] out):
+    """Copy rows of four numbers, and write 1/w over the fourth; of vertices that have been snapped.
+
+    The first rows are those of the vertices, one each; `vertex_of_row`, or None, has the vertices of the rows behind.
+    """
+    cdef int64_t i = 0, k, end, n_more = 0 if vertex_of_row is None else vertex_of_row.shape[0]
+    cdef int64_t n = rows.shape[0] - n_more, n_blocks
     if n == 0:
         return
     if mesh.is_used is None:
         with nogil:
             K.set_inverse_w(mesh.snapped.mesh.source, &rows[0, 0], 0, n, &out[0, 0])
-        return
-    n_blocks = mesh.is_used.shape[0]
+    else:
+        n_blocks = mesh.is_used.shape[0]
+        with nogil:
+            while i < n_blocks:
+                end = i
+                while end < n_blocks and mesh.is_used[end]:
+                    end += 1
+                if end > i:
+                    K.set_inverse_w(mesh.snapped.mesh.source, &rows[0, 0], i * VERTEX_BLOCK, min(end * VERTEX_BLOCK, n), &out[0, 0])
+                i = end + 1
     with nogil:
-        while i < n_blocks:
-            end = i
-            while end < n_blocks and mesh.is_used[end]:
-                end += 1
-            if end > i:
-                K.set_inverse_w(mesh.snapped.mesh.source, &rows[0, 0], i * VERTEX_BLOCK, min(end * VERTEX_BLOCK, n), &out[0, 0])
-            i = end + 1
+        for i in range(n_more):
+            for k in range(3):
+                out[n + i, k] = rows[n + i, k]
+            out[n + i, 3] = out[vertex_of_row[i], 3]
 
 
 def shade(SnappedMesh mesh, ShadingTable shading, const int32_t[:, ::1] ids, const float[:, ::1] depth, uint8_t[:, :, ::1] pixels,

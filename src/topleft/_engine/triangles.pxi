@@ -152,6 +152,12 @@ cdef class SnappedMesh:
         raise_if_given_up()
         return bad_row, [(census.n[k], census.boxes[k], census.covered[k]) for k in range(TL_N_CLASSES)]
 
+    def drop_sides(self, const uint8_t[::1] is_single, int64_t first, int64_t end, int32_t[:, ::1] triangles):
+        """Copy triangles [first, end), those collapsed that are single-sided and turned the way that this mesh culls."""
+        if end > first:
+            with nogil:
+                K.drop_sides(&self.snapped, &is_single[0], first, end, &triangles[0, 0])
+
     def draw(self, Target target, int64_t first_row, int64_t n_rows, bint is_first=True, bint is_last=True):
         """Draw rows of a picture, which the first of several meshes clears and the last one finishes.
 

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from topleft._base.arrays import as_array
 from topleft._base.whole_file import write_whole
 from topleft._io import png
 from topleft.errors import ImageError
@@ -85,7 +86,7 @@ def save_image(
         return
     if isinstance(image, Mapping):
         raise ImageError(f"cannot write {str(path)!r}: several arrays by name need .npz")
-    picture = image
+    picture = as_array("image", image)
     if suffix == ".npy":
         write_whole(path, lambda file: np.save(file, picture, allow_pickle=False))
         return

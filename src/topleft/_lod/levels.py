@@ -27,7 +27,7 @@ __all__ = ["Level", "Levels", "keep_levels", "kept_levels"]
 F64 = npt.NDArray[np.float64]
 
 #: The arrays of a mesh, by the names that they have in files.
-ARRAYS = ("vertices", "triangles", "normals", "colors", "uv", "material_of_triangle")
+ARRAYS = ("vertices", "triangles", "normals", "colors", "uv", "uv1", "material_of_triangle")
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +90,7 @@ class Levels(Sequence[Level]):
         Parameters
         ----------
         path : path
-            Materials are not written: `load` takes those of the mesh.
+            Materials and the crease angle are not written: `load` takes those of the mesh.
 
         Raises
         ------
@@ -139,7 +139,11 @@ class Levels(Sequence[Level]):
             bounds, knowns = (as_bounds(arrays[name]) for name in ("bound", "known"))
             coarser = [
                 Level(
-                    Mesh(**{name: arrays.get(f"{name}_{i}") for name in ARRAYS}, materials=mesh.materials),  # type: ignore[arg-type]
+                    Mesh(
+                        **{name: arrays.get(f"{name}_{i}") for name in ARRAYS},  # type: ignore[arg-type]
+                        materials=mesh.materials,
+                        crease=mesh.crease,
+                    ),
                     bound,
                     known,
                 )

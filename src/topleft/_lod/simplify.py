@@ -37,7 +37,7 @@ MOST_OF_LEVEL = 1_000_000
 MOST_POWER = 2.0
 
 #: The attributes of vertices, by their names in a mesh.
-ATTRIBUTES = ("normals", "colors", "uv")
+ATTRIBUTES = ("normals", "colors", "uv", "uv1")
 
 F64 = npt.NDArray[np.float64]
 I32 = npt.NDArray[np.int32]
@@ -96,7 +96,8 @@ def simplify(mesh: Mesh, *, ratio: float = 0.25, smallest: int = 200) -> Levels:
     the mesh has of normals, colours and texture coordinates a vertex of a level takes from the point of the level
     before that is nearest to it, among the triangles round the vertices that went into it. Open borders stay as they
     are, vertex by vertex, and so do the seams where attributes jump or materials meet: nothing bleeds across and
-    nothing cracks, but no level is coarser than its borders and seams. A mesh without normals has levels without.
+    nothing cracks, but no level is coarser than its borders and seams. A mesh without normals
+    has levels without, which crease at the same angle.
 
     Examples
     --------
@@ -258,5 +259,10 @@ def level_mesh(corners: Corners, original: Mesh) -> Mesh:
     vertices: FloatArray = corners.points.astype(original.vertices.dtype)
     rows = None if corners.material is None else corners.material[corners.triangles[:, 0]]
     return Mesh(
-        vertices, corners.triangles, materials=original.materials, material_of_triangle=rows, **corners.attributes
+        vertices,
+        corners.triangles,
+        materials=original.materials,
+        material_of_triangle=rows,
+        crease=original.crease,
+        **corners.attributes,
     )

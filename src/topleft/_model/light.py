@@ -12,6 +12,7 @@ from enum import StrEnum
 import numpy as np
 import numpy.typing as npt
 
+from topleft._base.arrays import as_vector
 from topleft._base.color import Color, as_color
 from topleft._base.options import parse
 
@@ -86,7 +87,7 @@ class Light:
         keep(self, "kind", parse(LightKind, "kind", self.kind))
         keep(self, "space", parse(LightSpace, "space", self.space))
         keep(self, "color", as_color("color", self.color, 3))
-        keep(self, "at", as_point("at", self.at))
+        keep(self, "at", tuple(as_vector("at", self.at).tolist()))
         if self.kind == LightKind.DIRECTIONAL and not any(self.at):
             raise ValueError(f"at must be a direction, got {self.at}")
         for name in ("intensity", "falloff"):
@@ -118,21 +119,6 @@ class Fog:
         object.__setattr__(self, "color", as_color("color", self.color, 3))
         if not (np.isfinite([self.near, self.far]).all() and self.near < self.far):
             raise ValueError(f"near and far must be finite and near < far, got {self.near} and {self.far}")
-
-
-def as_point(name: str, values: object) -> tuple[float, float, float]:
-    """Three finite numbers.
-
-    Raises
-    ------
-    ValueError
-        If they are none.
-    """
-    array = np.asarray(values, dtype=np.float64)
-    if array.shape != (3,) or not np.isfinite(array).all():
-        raise ValueError(f"{name} must be three finite numbers, got {values!r}")
-    x, y, z = array.tolist()
-    return x, y, z
 
 
 def as_not_negative(name: str, value: float) -> float:

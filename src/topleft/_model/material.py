@@ -3,10 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import StrEnum
 
 from topleft._base.color import Color, as_color
+from topleft._base.options import parse
 from topleft._model.light import as_not_negative
 from topleft._model.texture import Texture
+
+TEXTURES = ("texture", "emission_texture", "metallic_roughness_texture", "occlusion_texture", "normal_texture")
+
+
+class AlphaMode(StrEnum):
+    """What the opacity of a material does."""
+
+    OPAQUE = "opaque"
+    MASK = "mask"
+    BLEND = "blend"
 
 
 @dataclass(frozen=True)
@@ -31,6 +43,31 @@ class Material:
     alpha_cutoff : float, optional
         0 to 1: what has less opacity in the texture is cut out, and what is behind it shows. Unless given everything is
         opaque.
+    opacity : float
+        0 to 1, times the opacity of the texture and of the colours of the vertices; looked at by "mask" and "blend".
+    alpha_mode : {"opaque", "mask", "blend"}, optional
+        "opaque": opacity is not looked at. "mask": what has less than `alpha_cutoff` (0.5 unless given) is cut out.
+        "blend": what is behind shows through, in pictures of `render`, up to 16 layers of a pixel. Unless given: "mask"
+        with an `alpha_cutoff`, else "opaque".
+    double_sided : bool
+        Whether the back of the triangles shows, too; if not it is culled.
+    emission : (3,) of float
+        Linear light that the surface sends out by itself, 0 up; 1 is white.
+    emission_texture : Texture, optional
+        Times `emission`.
+    metallic, roughness : float, optional
+        0 to 1. Where one of them is given the surface is a metallic-rough one of glTF (the other is 1), lit by GGX
+        microfacets, and `specular` and `shininess` are not looked at.
+    metallic_roughness_texture : Texture, optional
+        Linear: green times `roughness`, blue times `metallic`.
+    occlusion_texture : Texture, optional
+        Linear: red is the share of the surroundings' light that arrives.
+    occlusion_strength : float
+        0 to 1: how much of that is taken away.
+    normal_texture : Texture, optional
+        Linear: the normal in the tangent space of `uv`, -1..1 as 0..255: red along u, green along v, which runs up.
+    normal_scale : float
+        Times x and y of it.
 
     Raises
     ------
@@ -45,16 +82,46 @@ class Material:
     back_color: Color | None = None
     unlit: bool = False
     alpha_cutoff: float | None = None
+    opacity: float = 1.0
+    alpha_mode: str | None = None
+    double_sided: bool = True
+    emission: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    emission_texture: Texture | None = None
+    metallic: float | None = None
+    roughness: float | None = None
+    metallic_roughness_texture: Texture | None = None
+    occlusion_texture: Texture | None = None
+    occlusion_strength: float = 1.0
+    normal_texture: Texture | None = None
+    normal_scale: float = 1.0
 
     def __post_init__(self) -> None:
         keep = object.__setattr__  # the dataclass is frozen, and its values are coerced
         for name in ("color", "back_color"):
             if getattr(self, name) is not None:
                 keep(self, name, as_color(name, getattr(self, name), 3))
-        for name in ("specular", "shininess"):
+        for name in ("specular", "shininess", "opacity", "occlusion_strength", "normal_scale"):
             keep(self, name, as_not_negative(name, getattr(self, name)))
-        for name, value in (("specular", self.specular), ("alpha_cutoff", self.alpha_cutoff or 0.0)):
-            if not 0 <= value <= 1:
-                raise ValueError(f"{name} must lie in 0 to 1, got {value!r}")
-        if self.texture is not None and not isinstance(self.texture, Texture):
-            raise TypeError(f"texture must be a Texture, got {type(self.texture).__name__}")
+        for name in ("metallic", "roughness"):
+            if getattr(self, name) is not None:
+                keep(self, name, as_not_negative(name, getattr(self, name)))
+        for name in ("specular", "alpha_cutoff", "opacity", "metallic", "roughness", "occlusion_strength"):
+            if not 0 <= (getattr(self, name) or 0.0) <= 1:
+                raise ValueError(f"{name} must lie in 0 to 1, got {getattr(self, name)!r}")
+        keep(self, "emission", tuple(as_not_negative("emission", value) for value in self.emission))
+        if len(self.emission) != 3:
+            raise ValueError(f"emission must be three numbers, got {len(self.emission)}")
+        if self.alpha_mode is None:
+            keep(self, "alpha_mode", AlphaMode.OPAQUE if self.alpha_cutoff is None else AlphaMode.MASK)
+        keep(self, "alpha_mode", parse(AlphaMode, "alpha_mode", self.alpha_mode))
+        if self.alpha_mode is AlphaMode.MASK and self.alpha_cutoff is None:
+            keep(self, "alpha_cutoff", 0.5)
+        for name in TEXTURES:
+            value = getattr(self, name)
+            if value is not None and not isinstance(value, Texture):
+                raise TypeError(f"{name} must be a Texture, got {type(value).__name__}")
+
+    @property
+    def is_metallic_rough(self) -> bool:
+        """Whether light is that of a metallic-rough surface of glTF."""
+        return self.metallic is not None or self.roughness is not None

@@ -6,8 +6,9 @@ Input: anything NumPy can read. Output: a `Mesh` whose arrays the other stages u
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,8 @@ import numpy.typing as npt
 
 from topleft._base.arrays import as_array, as_checked_triangles
 from topleft._model.material import Material
-from topleft._model.normals import angle_weighted_normals, box_of_triangles
+from topleft._model.normals import CornerNormals, angle_weighted_normals, box_of_triangles, creased_normals
+from topleft._model.texture import Texture
 from topleft._raster.clusters import Clusters, box_of
 
 FloatArray = npt.NDArray[np.floating[Any]]
@@ -23,6 +25,9 @@ F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
 I32 = npt.NDArray[np.int32]
 U8 = npt.NDArray[np.uint8]
+
+NO_CREASE = 180.0
+"""The crease angle at which no edge is sharp, degrees."""
 
 POINTS_AT_ONCE = 1 << 14
 """Points whose distances are computed together: they stay in the second-level cache."""
@@ -41,7 +46,8 @@ class Mesh:
     normals : (V, 3) array_like of real numbers, optional
         Directions, of any length; `None`: not known, `vertex_normals` computes them.
     colors : (V, 3) or (V, 4) array_like of uint8, optional
-        sRGB colours, with or without alpha.
+        sRGB colours, with or without alpha: what is behind shows through where a mesh has no materials, or materials
+        that blend.
     uv : (V, 2) array_like of real numbers, optional
         Where each vertex lies in a texture: u from left to right, v from the bottom up, 0 to 1. Kept as float32. Where
         a texture has a seam, vertices stand twice.
@@ -49,6 +55,12 @@ class Mesh:
         What the triangles are made of.
     material_of_triangle : (T,) array_like of integers, optional
         The row of `materials` that each triangle has; the first unless given.
+    uv1 : (V, 2) array_like of real numbers, optional
+        A second set of texture coordinates, for textures with `uv_set=1`.
+    crease : float
+        Degrees, 0 to 180: where two triangles bend by more at an edge, each side has its own normal, so that the edge
+        is sharp; of a mesh without `normals`. 180: no edge is; 0: every one is ("flat"). With less than 180 vertices
+        at one place count as one for the normals.
 
     Raises
     ------
@@ -78,27 +90,31 @@ class Mesh:
     uv: F32 | None = None
     materials: tuple[Material, ...] = ()
     material_of_triangle: I32 | None = None
+    uv1: F32 | None = None
+    crease: float = NO_CREASE
 
     def __post_init__(self) -> None:
-        vertices = _real_array(self.vertices, "vertices")
+        vertices = as_real_array(self.vertices, "vertices")
         triangles = as_checked_triangles(self.triangles, len(vertices))
         keep = object.__setattr__  # the dataclass is frozen, and its arrays are coerced
-        keep(self, "vertices", _read_only(vertices))
-        keep(self, "triangles", _read_only(triangles))
+        keep(self, "vertices", read_only(vertices))
+        keep(self, "triangles", read_only(triangles))
         _check_finite(vertices, triangles)
         if self.normals is not None:
-            normals = _real_array(self.normals, "normals")
+            normals = as_real_array(self.normals, "normals")
             if len(normals) != len(vertices):
                 raise ValueError(f"normals must have shape ({len(vertices)}, 3), got {normals.shape}")
-            keep(self, "normals", _read_only(normals))
+            keep(self, "normals", read_only(normals))
         if self.colors is not None:
-            keep(self, "colors", _read_only(_color_array(self.colors, len(vertices))))
-        if self.uv is not None:
-            keep(self, "uv", _read_only(_uv_array(self.uv, len(vertices))))
+            keep(self, "colors", read_only(as_color_array(self.colors, len(vertices))))
+        for name in ("uv", "uv1"):
+            if getattr(self, name) is not None:
+                keep(self, name, read_only(_uv_array(name, getattr(self, name), len(vertices))))
+        keep(self, "crease", as_crease(self.crease))
         keep(self, "materials", _material_tuple(self.materials))
         if self.material_of_triangle is not None:
             rows = _material_rows(self.material_of_triangle, len(triangles), len(self.materials))
-            keep(self, "material_of_triangle", _read_only(rows))
+            keep(self, "material_of_triangle", read_only(rows))
 
     def _repr_png_(self) -> bytes | None:
         from topleft._render.notebook import png_of_mesh  # which imports this module
@@ -132,7 +148,7 @@ class Mesh:
 
     @cached_property
     def _extreme_points(self) -> F64:
-        return _read_only(extreme_points(used_vertices(self)))
+        return read_only(extreme_points(used_vertices(self)))
 
     def vertex_normals(self) -> FloatArray:
         """Normals (V, 3): those of the mesh where it has them, else angle-weighted ones, float64.
@@ -140,11 +156,44 @@ class Mesh:
         Returns
         -------
         (V, 3) float
-            Read-only. Unit length where computed here, once; (0, 0, 0) for a vertex that no triangle with an area uses.
+            Read-only. Unit length where computed here, once, of all triangles at the vertex, whatever the crease angle;
+            (0, 0, 0) for a vertex that no triangle with an area uses.
         """
         if self.normals is not None:
             return self.normals
-        return self._computed_normals
+        return self._computed_normals[0]
+
+    def corner_normals(self) -> CornerNormals | None:
+        """Normals of the corners of triangles, where some differ from those of their vertices; else None.
+
+        Returns
+        -------
+        CornerNormals or None
+            `rows` (N, 3) float64, the first V those of `vertex_normals`, and `of_corner` (T, 3) int32, the row of
+            each corner. None for a mesh with normals, with a crease angle of 180, or without an edge that is sharp.
+        """
+        return self._computed_normals[1] if self.normals is None else None
+
+    @property
+    def is_faceted(self) -> bool:
+        """Whether every edge is sharp: each triangle has the normal of its face."""
+        return self.normals is None and self.crease == 0
+
+    @cached_property
+    def has_alpha(self) -> bool:
+        """Whether the colours of the vertices are not all opaque."""
+        return self.colors is not None and self.colors.shape[1] == 4 and bool((self.colors[:, 3] < 255).any())
+
+    def single_sided(self, material: Material | None = None) -> npt.NDArray[np.uint8] | None:
+        """Which triangles (T,) have a back that does not show, by their material or by this one; None if none."""
+        materials = self.materials if material is None else (material,)
+        if all(one.double_sided for one in materials):
+            return None
+        rows = self.material_of_triangle if material is None else None
+        if rows is None:
+            is_single = not materials[0].double_sided
+            return np.ones(len(self.triangles), np.uint8) if is_single else None
+        return np.array([not one.double_sided for one in materials], np.uint8)[rows]
 
     @cached_property
     def vertex_box(self) -> F64:
@@ -172,8 +221,18 @@ class Mesh:
         return Clusters(self.vertices, self.triangles)
 
     @cached_property
-    def _computed_normals(self) -> FloatArray:
-        return _read_only(angle_weighted_normals(self.vertices, self.triangles))
+    def _computed_normals(self) -> tuple[FloatArray, CornerNormals | None]:
+        if self.crease == NO_CREASE:
+            return read_only(angle_weighted_normals(self.vertices, self.triangles)), None
+        first, group = self._places
+        places = None if len(first) == len(group) else (first, group)
+        rows, of_corners = creased_normals(self.vertices, self.triangles, self.crease, places)
+        return read_only(rows), of_corners
+
+    @cached_property
+    def _places(self) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+        """Which vertices are at one place, as `coincident` says it."""
+        return coincident(self.vertices)
 
     def __getstate__(self) -> dict[str, Any]:
         """What another process needs: what is computed from it is computed there."""
@@ -182,7 +241,40 @@ class Mesh:
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Take it, the arrays read-only as they were."""
         for name, value in state.items():
-            self.__dict__[name] = _read_only(value) if isinstance(value, np.ndarray) else value
+            self.__dict__[name] = read_only(value) if isinstance(value, np.ndarray) else value
+
+
+def keep_corner_normals(mesh: Mesh, normals: CornerNormals) -> None:
+    """Have a mesh without normals take these instead of computing them."""
+    mesh.__dict__["_computed_normals"] = read_only(normals.rows[: len(mesh.vertices)]), normals
+
+
+def with_normals(mesh: Mesh) -> Mesh:
+    """The mesh with `normals`: computed where it has none; vertices at creases then stand several times."""
+    corners = mesh.corner_normals()
+    if corners is None:
+        return mesh if mesh.normals is not None else replace(mesh, normals=mesh.vertex_normals())
+    rows = np.concatenate([np.arange(len(mesh.vertices)), corners.vertex_of_row])
+    colors, uv, uv1 = (None if own is None else own[rows] for own in (mesh.colors, mesh.uv, mesh.uv1))
+    split: dict[str, Any] = {"vertices": mesh.vertices[rows], "triangles": corners.of_corner, "normals": corners.rows}
+    return replace(mesh, **split, colors=colors, uv=uv, uv1=uv1)
+
+
+def as_crease(value: float) -> float:
+    """Return a crease angle, degrees.
+
+    Raises
+    ------
+    TypeError
+        If it is no number.
+    ValueError
+        If it is outside of 0 to 180.
+    """
+    if not isinstance(value, Real) or isinstance(value, bool):
+        raise TypeError(f"crease must be an angle in degrees, got {value!r}")
+    if not 0 <= value <= NO_CREASE:
+        raise ValueError(f"crease must lie in 0 to 180 degrees, got {value!r}")
+    return float(value)
 
 
 def used_vertices(mesh: Mesh) -> FloatArray:
@@ -275,7 +367,7 @@ def _differ(columns: list[npt.NDArray[Any]], order: npt.NDArray[np.intp]) -> npt
     return starts
 
 
-def _real_array(values: npt.ArrayLike, name: str) -> FloatArray:
+def as_real_array(values: npt.ArrayLike, name: str) -> FloatArray:
     array = as_array(name, values)
     if array.dtype.kind not in "fiu":
         raise TypeError(f"{name} must hold real numbers, got {array.dtype}")
@@ -285,7 +377,7 @@ def _real_array(values: npt.ArrayLike, name: str) -> FloatArray:
     return np.ascontiguousarray(array, native if native in (np.float32, np.float64) else np.float64)
 
 
-def _color_array(values: npt.ArrayLike, n_vertices: int) -> U8:
+def as_color_array(values: npt.ArrayLike, n_vertices: int) -> U8:
     array = as_array("colors", values)
     if array.dtype != np.uint8:
         raise TypeError(f"colors must be uint8, got {array.dtype}")
@@ -294,12 +386,12 @@ def _color_array(values: npt.ArrayLike, n_vertices: int) -> U8:
     return np.ascontiguousarray(array)
 
 
-def _uv_array(values: npt.ArrayLike, n_vertices: int) -> F32:
-    array = as_array("uv", values)
+def _uv_array(name: str, values: npt.ArrayLike, n_vertices: int) -> F32:
+    array = as_array(name, values)
     if array.dtype.kind not in "fiu":
-        raise TypeError(f"uv must hold real numbers, got {array.dtype}")
+        raise TypeError(f"{name} must hold real numbers, got {array.dtype}")
     if array.shape != (n_vertices, 2):
-        raise ValueError(f"uv must have shape ({n_vertices}, 2), got {array.shape}")
+        raise ValueError(f"{name} must have shape ({n_vertices}, 2), got {array.shape}")
     return np.ascontiguousarray(array, np.float32)
 
 
@@ -335,7 +427,7 @@ def _check_finite(vertices: FloatArray, triangles: I32) -> None:
         raise ValueError(f"vertices[{row}] = {vertices[row].tolist()} must be finite: a triangle uses it")
 
 
-def _read_only(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
+def read_only(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
     view = array.view()
     view.flags.writeable = False
     return view
@@ -343,5 +435,15 @@ def _read_only(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
 
 def has_holes(material: Material, mesh: Mesh) -> bool:
     """Whether the material leaves something out of the triangles that have it."""
-    texture = material.texture if mesh.uv is not None else None
-    return bool(material.alpha_cutoff) and texture is not None and bool((texture.image[..., 3] < 255).any())
+    return material.alpha_mode == "mask" and bool(material.alpha_cutoff) and has_opacity(material, mesh)
+
+
+def has_opacity(material: Material, mesh: Mesh) -> bool:
+    """Whether some of the surface may not be opaque: by the material, its texture, or the colours of the vertices."""
+    texture = material.texture if is_laid(material.texture, mesh) else None
+    return material.opacity < 1 or mesh.has_alpha or (texture is not None and texture.has_alpha)
+
+
+def is_laid(texture: Texture | None, mesh: Mesh) -> bool:
+    """Whether there is a texture, and the mesh has its set of uv."""
+    return texture is not None and (mesh.uv, mesh.uv1)[texture.uv_set] is not None

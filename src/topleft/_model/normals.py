@@ -1,4 +1,4 @@
-"""Faces: normals of triangles and of vertices, the side that these are on, the box round a mesh.
+"""Faces: normals of triangles, of vertices and of creased corners, the side that these are on, the box round a mesh.
 
 Input: vertices and triangles. Output: arrays whose bits depend neither on the machine nor on the number of threads.
 
@@ -8,8 +8,9 @@ Tools 3(1), 1998 (normals weighted by the angle at the vertex).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -19,8 +20,8 @@ from topleft._base.arrays import bad_triangle
 from topleft._base.threads import count_threads, run_parts
 
 __all__ = [
-    "angle_weighted_normals", "box_of_triangles", "color_rows", "face_normal_rows", "face_normals", "moved",
-    "turned_faces", "unit_or_zero", "unit_rows",
+    "CornerNormals", "angle_weighted_normals", "box_of_triangles", "color_rows", "creased_normals", "face_normal_rows",
+    "face_normals", "moved", "turned_faces", "unit_or_zero", "unit_rows",
 ]  # fmt: skip
 
 FloatArray = npt.NDArray[np.floating[Any]]
@@ -34,6 +35,104 @@ MIN_PER_THREAD = 50_000
 
 MAX_THREADS_OF_VERTICES = 8
 """Each thread that sums the normals of vertices goes through all triangles."""
+
+
+EQUAL_ANGLE_DEG = 1 / 16
+"""Angles that are so little larger than the crease angle do not crease: a cylinder of 12 sides, whose numbers a file
+rounds, is round all over at 30 degrees, or at no edge."""
+
+
+class CornerNormals(NamedTuple):
+    """Normals of corners: a table, and the row of it that each corner has."""
+
+    rows: F64
+    """(N, 3): of the V vertices, each over all its triangles, then those of creased corners. Unit length, or 0."""
+
+    of_corner: I32
+    """(T, 3): the row that each corner has."""
+
+    vertex_of_row: I32
+    """(N - V,): a vertex at the place of each row behind those of the vertices."""
+
+
+def creased_normals(
+    vertices: FloatArray,
+    triangles: I32,
+    crease_deg: float,
+    places: tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]] | None = None,
+    *,
+    threads: int | None = None,
+) -> tuple[F64, CornerNormals | None]:
+    """Normals of vertices, and of corners where edges bend by more than an angle.
+
+    Parameters
+    ----------
+    vertices : (V, 3) float
+    triangles : (T, 3) int32, counter-clockwise seen from outside
+    crease_deg : float
+        Degrees, 0 to 180.
+    places : (first, group), optional
+        What `coincident` gives of the vertices: those of a group count as one. Unless given all are told apart.
+    threads : int, optional
+        Never changes a bit.
+
+    Returns
+    -------
+    of_vertices : (V, 3) float64
+        Over all triangles at the vertex, as `angle_weighted_normals`.
+    of_corners : CornerNormals or None
+        None where no vertex has corners with different normals.
+
+    Raises
+    ------
+    IndexError
+        If a triangle names a vertex that does not exist.
+    ValueError
+        If there are 2**28 triangles or more.
+
+    Notes
+    -----
+    Two corners of a vertex belong together when their triangles share a side at that vertex and the angle between their
+    normals is at most the crease angle, or 1/16 degree more; so do corners that a chain of such pairs joins. A corner's
+    normal is that of `angle_weighted_normals`, over the corners that belong together. Sides are told by their vertices,
+    not by their direction: any two of the triangles at a side that has three or more are compared, and at one that has
+    more than 32 none. A triangle without area stands for an edge: its sides at a vertex count as one, and its own
+    corners have the normals of their vertices.
+    """
+    n_vertices, n_triangles = len(vertices), len(triangles)
+    if n_triangles >= 1 << 28:
+        raise ValueError(f"a mesh with a crease angle must have fewer than 2**28 triangles, got {n_triangles}")
+    own = np.array(triangles, np.int32)  # a copy: what has been checked is what is used
+    _check([_engine.first_bad_row(own, n_vertices)], own, n_vertices)
+    if not n_triangles:
+        return np.zeros((n_vertices, 3)), None
+    first, group = (None, None) if places is None else places
+    points = _contiguous(vertices if first is None else vertices[first])
+    corners = own if group is None else group.astype(np.int32)[own]
+    source, n_threads = _engine.Source(points), _threads(n_triangles, threads)
+    normals, angles = np.empty((n_triangles, 3)), np.empty((n_triangles, 3))
+    run_parts(lambda a, b: _engine.face_angles(source, corners, a, b, normals, angles), n_triangles, n_threads)
+    least_cosine = math.cos(math.radians(min(crease_deg + EQUAL_ANGLE_DEG, 180.0)))
+    fans = _engine.Fans(corners, len(points), normals, angles, least_cosine)
+    groups, n_groups = np.empty((n_triangles, 3), np.int32), np.empty(len(points), np.int32)
+    run_parts(lambda a, b: fans.find_creases(a, b, groups, n_groups), len(points), n_threads)
+    starts = np.zeros(len(points) + 1, np.int32)
+    np.cumsum(n_groups, out=starts[1:])
+    n_more = int(starts[-1])
+    rows, of_places = np.empty((n_vertices + n_more, 3)), np.empty((len(points), 3))
+    of_corner = np.empty((n_triangles, 3), np.int32) if n_more else None
+    more = rows[n_vertices:]
+
+    def add_up(a: int, b: int) -> None:
+        fans.sum_creases(a, b, starts, groups, own, n_vertices, of_places, more, of_corner)
+
+    run_parts(add_up, len(points), n_threads)
+    rows[:n_vertices] = of_places if group is None else of_places[group]
+    if of_corner is None:
+        return rows, None
+    places_of_rows = np.repeat(np.arange(len(points)), n_groups)
+    vertex_of_row = (places_of_rows if first is None else first[places_of_rows]).astype(np.int32)
+    return rows[:n_vertices], CornerNormals(rows, of_corner, vertex_of_row)
 
 
 def angle_weighted_normals(vertices: FloatArray, triangles: I32, *, threads: int | None = None) -> F64:
@@ -103,14 +202,20 @@ def face_normal_rows(vertices: FloatArray, triangles: I32, *, threads: int | Non
     return rows
 
 
-def turned_faces(vertices: FloatArray, triangles: I32, normals: F32, *, threads: int | None = None) -> U8:
-    """(T,) uint8: 1 where the normals (V, 4) of the corners, added up, point to the other side than the triangle."""
+def turned_faces(
+    vertices: FloatArray, triangles: I32, normals: F32, row_of_corner: I32 | None = None, *, threads: int | None = None
+) -> U8:
+    """(T,) uint8: 1 where the normals of the corners, added up, point to the other side than the triangle.
+
+    `normals` are (V, 4), or rows (N, 4) of which `row_of_corner` (T, 3) tells each corner's.
+    """
     turned = np.empty(len(triangles), np.uint8)
-    if len(normals) != len(vertices):
+    if len(normals) != len(vertices) and row_of_corner is None:
         raise ValueError(f"normals must have shape ({len(vertices)}, 4), got {normals.shape}")
 
     def compare(source: _engine.Source, corners: I32, first: int, end: int) -> int:
-        return _engine.find_turned(source, corners, first, end, normals, turned)
+        rows = corners if row_of_corner is None else row_of_corner
+        return _engine.find_turned(source, corners, first, end, normals, rows, turned)
 
     _over_faces(vertices, triangles, threads, compare)
     return turned

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from topleft._base.arrays import INT32_MAX
+from topleft._base.arrays import INT32_MAX, as_square, check_regular
 from topleft._model.mesh import Mesh, extreme_points, used_vertices
 from topleft._raster.clusters import Backoff
 
@@ -49,15 +49,10 @@ class Instance:
     def __post_init__(self) -> None:
         if not isinstance(self.mesh, Mesh):
             raise TypeError(f"an instance needs a Mesh, got {type(self.mesh).__name__}")
-        matrix = np.array(self.transform, dtype=np.float64)
-        if matrix.shape != (4, 4):
-            raise ValueError(f"transform must have shape (4, 4), got {matrix.shape}")
-        if not np.isfinite(matrix).all():
-            raise ValueError(f"transform must hold finite numbers, got {matrix.tolist()}")
+        matrix = as_square("transform", self.transform, 4)
         if not np.array_equal(matrix[3], [0, 0, 0, 1]):
             raise ValueError(f"the last row of transform must be [0, 0, 0, 1], got {matrix[3].tolist()}")
-        if np.linalg.matrix_rank(matrix) < 4:
-            raise ValueError(f"transform must not be singular, got {matrix.tolist()}")
+        check_regular("transform", matrix)
         matrix.flags.writeable = False
         object.__setattr__(self, "transform", matrix)
 

@@ -7,7 +7,7 @@ Based on: Williams, L., "Pyramidal Parametrics", SIGGRAPH 1983.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from enum import StrEnum
 from functools import cached_property
 from typing import Any
@@ -36,6 +36,18 @@ class Filter(StrEnum):
     TRILINEAR = "trilinear"
 
 
+class Encoding(StrEnum):
+    """What the values of a picture stand for."""
+
+    SRGB = "srgb"
+    LINEAR = "linear"
+
+
+LIGHT_OF_BYTE = {Encoding.SRGB: LIGHT_OF_SRGB.astype(np.float64), Encoding.LINEAR: np.arange(256) / 255}
+BLOCK_TEXELS = 1 << 17
+"""Texels that are halved together: 4 MB of float64, which stay in a cache."""
+
+
 class Wrap(StrEnum):
     """What lies beyond a texture."""
 
@@ -61,6 +73,12 @@ class Texture:
         "bilinear": between the four texels next to the point. "nearest": the texel that the point lies in.
     wrap : {"repeat", "clamp", "mirror"}, or a pair of them for u and v
         What lies beyond 0 and 1.
+    encoding : {"srgb", "linear"}
+        "srgb": red, green and blue are colours. "linear": they are numbers, 0 to 255 for 0 to 1, as in normal maps.
+    uv_set : {0, 1}
+        Laid on by `uv` or by `uv1` of the mesh.
+    transform : (2, 3) array_like of float, optional
+        Takes (u, v, 1) of the mesh to where the texture is looked up.
 
     Raises
     ------
@@ -83,6 +101,9 @@ class Texture:
     image: U8
     filter: str = "trilinear"
     wrap: str | tuple[str, str] = "repeat"
+    encoding: str = "srgb"
+    uv_set: int = 0
+    transform: F64 | None = None
 
     def __post_init__(self) -> None:
         keep = object.__setattr__  # the dataclass is frozen, and its values are coerced
@@ -92,28 +113,41 @@ class Texture:
         if len(both) != 2:
             raise ValueError(f"wrap must be one word, or two for u and v, got {self.wrap!r}")
         keep(self, "wrap", tuple(parse(Wrap, "wrap", one) for one in both))
+        keep(self, "encoding", parse(Encoding, "encoding", self.encoding))
+        if self.uv_set not in (0, 1):
+            raise ValueError(f"uv_set must be 0 or 1, got {self.uv_set!r}")
+        if self.transform is not None:
+            matrix = as_array("transform", self.transform).astype(np.float64)
+            if matrix.shape != (2, 3) or not np.isfinite(matrix).all():
+                raise ValueError(f"transform must be (2, 3) finite numbers, got shape {matrix.shape}")
+            matrix.flags.writeable = False
+            keep(self, "transform", matrix)
 
     @cached_property
     def engine(self) -> _engine.Mipmap:
         """What the kernels read; made when it is first needed."""
-        levels = [light_of_image(self.image)[::-1]]  # row 0 of the kernels is v = 0
-        while self.filter is Filter.TRILINEAR and max(levels[-1].shape[:2]) > 1:
-            levels.append(halved(levels[-1]))
-        offset, rows, texels = 0, [], []
-        for level in levels:
-            height, width = level.shape[:2]
-            rows.append((offset, width, height))
-            offset += height * (width + 1)
-            padded = np.concatenate([level, level[:, :1]], axis=1)
-            texels.append(np.rint(65535 * padded).astype(np.uint16).reshape(-1, 4))
-        texels.append(np.zeros((1, 4), np.uint16))  # pairs may be read one texel past the end
+        height, width = self.image.shape[:2]
+        rows = level_rows(width, height, has_halves=self.filter is Filter.TRILINEAR)
+        texels = texels_of(self.image, rows, light=LIGHT_OF_BYTE[Encoding(self.encoding)])
         wrap_u, wrap_v = (WRAP_CODES[Wrap(one)] for one in self.wrap)
+        filter_code = FILTER_CODES[Filter(self.filter)]
         table = np.array(rows, dtype=np.int32)
-        return _engine.Mipmap(np.concatenate(texels), table, FILTER_CODES[Filter(self.filter)], wrap_u, wrap_v)
+        if self.transform is None:
+            return _engine.Mipmap(texels, table, filter_code, wrap_u, wrap_v, self.uv_set)
+        (a, b, _), (c, d, _) = rows_of_transform = self.transform.tolist()
+        hand = -1.0 if a * d < b * c else 1.0
+        return _engine.Mipmap(
+            texels, table, filter_code, wrap_u, wrap_v, self.uv_set, rows_of_transform, (d * hand, -c * hand), hand
+        )
+
+    @cached_property
+    def has_alpha(self) -> bool:
+        """Whether some of it is not opaque."""
+        return int(self.image[..., 3].min()) < 255
 
     def __getstate__(self) -> dict[str, Any]:
         """What another process needs: the texels are made there."""
-        return {name: self.__dict__[name] for name in ("image", "filter", "wrap")}
+        return {field.name: self.__dict__[field.name] for field in fields(self)}
 
 
 def as_image(name: str, pixels: npt.ArrayLike) -> U8:
@@ -141,24 +175,120 @@ def as_image(name: str, pixels: npt.ArrayLike) -> U8:
     return rgba
 
 
-def light_of_image(rgba: U8) -> F64:
-    """Linear light and opacity (H, W, 4) float64, 0 to 1, of an sRGB picture."""
+def level_rows(width: int, height: int, *, has_halves: bool) -> list[tuple[int, int, int]]:
+    """A row (offset in texels, width, height) of each level; behind each row of texels stands its first one again."""
+    rows = [(0, width, height)]
+    while has_halves and max(width, height) > 1:
+        offset, width, height = rows[-1]
+        offset, width, height = offset + height * (width + 1), max(1, width // 2), max(1, height // 2)
+        rows.append((offset, width, height))
+    return rows
+
+
+def texels_of(image: U8, rows: list[tuple[int, int, int]], *, light: F64) -> U16:
+    """The texels (N, 4) of all levels in 65535ths, row 0 at v = 0; `light` is that of each value of a byte.
+
+    A few rows at a time go through all levels, so that nothing but the texels themselves is large.
+    """
+    offset, width, height = rows[-1]
+    texels = np.zeros((offset + height * (width + 1) + 1, 4), np.uint16)  # pairs may be read one texel past the end
+    level = None
+    for row in reversed(rows):
+        level = LevelWriter(texels, row, level)
+    first, (_, width, height) = level, rows[0]
+    n = max(1, BLOCK_TEXELS // width)
+    for begin in range(0, height, n):
+        block = image[::-1][begin : begin + n]
+        own = np.empty(block.shape)
+        own[..., :3] = light[block[..., :3]]
+        own[..., 3] = block[..., 3] / 255
+        if first is not None:
+            first.take(own)
+    return texels
+
+
+class LevelWriter:
+    """Writes the rows of a level as they come, and hands their halvings on to the next one."""
+
+    def __init__(self, texels: U16, row: tuple[int, int, int], half: LevelWriter | None) -> None:
+        offset, width, height = row
+        self.texels = texels[offset : offset + height * (width + 1)].reshape(height, width + 1, 4)
+        self.n_taken = 0
+        self.half = half
+        self.rows = RowPairs() if height % 2 == 0 else RowAreas(height) if height > 1 else None
+
+    def take(self, block: F64) -> None:
+        """Take the next rows (n, width, 4)."""
+        own = self.texels[self.n_taken : self.n_taken + len(block)]
+        np.rint(65535 * block, out=own[:, :-1], casting="unsafe")
+        own[:, -1] = own[:, 0]
+        self.n_taken += len(block)
+        if self.half is not None:
+            lower = block if self.rows is None else self.rows.halve(block)
+            if len(lower):
+                self.half.take(halved_along(lower, 1))
+
+
+class RowPairs:
+    """Means of two rows each, of rows that come in blocks."""
+
+    def __init__(self) -> None:
+        self.rest: F64 | None = None
+
+    def halve(self, block: F64) -> F64:
+        """The rows that are complete with this block."""
+        if self.rest is not None:
+            block = np.concatenate([self.rest, block])
+        n = len(block) // 2 * 2
+        self.rest = block[n:].copy() if n < len(block) else None
+        return halved_along(block[:n], 0)
+
+
+class RowAreas:
+    """Means over equal parts of an odd number of rows, of rows that come in blocks."""
+
+    def __init__(self, n: int) -> None:
+        self.n, self.m = n, n // 2
+        self.border = np.arange(self.m + 1) * n / self.m
+        self.below = np.minimum(self.border.astype(int), n - 1)
+        self.n_taken = 0
+        self.sum: F64 | None = None  # of the rows before, and the area up to the last border
+        self.area: F64 | None = None
+
+    def halve(self, block: F64) -> F64:
+        """The rows that are complete with this block."""
+        before = np.zeros_like(block[:1]) if self.sum is None else self.sum
+        sums = np.cumsum(np.concatenate([before, block]), axis=0)
+        first, end = np.searchsorted(self.below, [self.n_taken, self.n_taken + len(block)])
+        at = self.below[first:end] - self.n_taken
+        share = (self.border - self.below)[first:end, None, None]
+        area = sums[at] + share * block[at]
+        if self.area is not None:
+            area = np.concatenate([self.area, area])
+        self.n_taken, self.sum, self.area = self.n_taken + len(block), sums[-1:], area[-1:]
+        return np.diff(area, axis=0) * (self.m / self.n)
+
+
+def light_of_image(rgba: U8, encoding: str = "srgb") -> F64:
+    """Linear light and opacity (H, W, 4) float64, 0 to 1, of a picture."""
     light = np.empty(rgba.shape)
-    light[..., :3] = LIGHT_OF_SRGB[rgba[..., :3]]
+    light[..., :3] = LIGHT_OF_BYTE[Encoding(encoding)][rgba[..., :3]]
     light[..., 3] = rgba[..., 3] / 255
     return light
 
 
 def halved(level: F64) -> F64:
     """The next halving (max(1, H // 2), max(1, W // 2), 4): each texel the mean over its area."""
-    for axis in range(2):
-        n = level.shape[axis]
-        if n % 2 == 0:
-            even, odd = (level.take(range(first, n, 2), axis) for first in (0, 1))
-            level = (even + odd) / 2
-        elif n > 1:
-            level = mean_over_area(level, n // 2, axis)
-    return level
+    return halved_along(halved_along(level, 0), 1)
+
+
+def halved_along(level: F64, axis: int) -> F64:
+    """One axis of it."""
+    n = level.shape[axis]
+    if n % 2 == 0:
+        even, odd = (level[::2], level[1::2]) if axis == 0 else (level[:, ::2], level[:, 1::2])
+        return (even + odd) / 2
+    return mean_over_area(level, n // 2, axis) if n > 1 else level
 
 
 def mean_over_area(level: F64, m: int, axis: int) -> F64:

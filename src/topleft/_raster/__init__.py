@@ -9,6 +9,7 @@ fill.py          fills a picture with the colours of triangles, or blends them o
 fragments.py     holds a visibility buffer and interpolates attributes on it
 lines.py         draws the edges of a mesh as lines
 peel.py          peels depth: keeps the nearest layers of every pixel, sorted
+points.py        draws points as discs or squares, and holds which of them shows
 rasterize.py     draws masks, counts and visibility buffers: the stages of a verb, and a function for each route
 resolve.py       resolves MSAA: averages the samples of each pixel
 sampling.py      draws several samples a pixel, or the exact area of it

@@ -183,6 +183,8 @@ def fragment_sink(test: DepthTest | None, *, has_depth: bool) -> Sink:
 def can_cluster(view: View, sink: Sink) -> bool:
     """Tell whether the clusters of a mesh may be drawn one by one, in any order: where that decides nothing."""
     is_on_grid = view.grid_bits == view.subpixel_bits and (sink is not Sink.SAMPLES or view.grid_bits <= 8)
+    if view.single_sided is not None:  # clusters do not know which triangles are
+        return False
     return sink in ORDER_FREE and is_on_grid and 0 not in view.size and can_share(view)
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from topleft import _engine
 from topleft._base.arrays import as_matrix, bad_triangle
-from topleft._base.memory import FreshMemory, Memory
+from topleft._base.memory import FRESH, Memory
 from topleft._base.options import Sink
 from topleft._base.threads import run_parts
 from topleft._raster import choices
@@ -70,7 +70,7 @@ class ClusteredMesh:
         width, height = self._view.size
         ids: NDArray[np.int32] = np.empty((height, width), np.int32)
         target = _engine.Target(sink, ids, np.empty((height, width), np.float32), None)
-        return self._draw_rows(FreshMemory(), target, 0, height, (0, 0), is_first=True, is_last=True)[1]
+        return self._draw_rows(FRESH, target, 0, height, (0, 0), is_first=True, is_last=True)[1]
 
     def _draw_rows(
         self,
@@ -100,11 +100,11 @@ class ClusteredMesh:
         points, own, view = self.clusters.points, self.clusters.triangles, self._view
         mesh = None
         if choices.pays_to_snap_all(len(points), view.size[0] * view.size[1]):
-            mesh = self.try_part(None, FreshMemory())
+            mesh = self.try_part(None, FRESH)
         if mesh is None:
-            mesh = self.try_part(triangles, FreshMemory())
+            mesh = self.try_part(triangles, FRESH)
         if mesh is None:  # a vertex beside one of them, which need not be used, does not fit
-            mesh = snap_mesh(FreshMemory(), points, own, view, with_depth=True, out=None).mesh
+            mesh = snap_mesh(FRESH, points, own, view, with_depth=True, out=None).mesh
         return mesh
 
     def try_part(self, triangles: Sequence[NDArray[np.int32]] | None, memory: Memory) -> _engine.SnappedMesh | None:

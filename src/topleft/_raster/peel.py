@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine
-from topleft._base.memory import SCRATCH, FreshMemory, Memory
+from topleft._base.memory import FRESH, SCRATCH, Memory
 from topleft._base.options import DepthTest, Sampling, parse
 from topleft._base.threads import count_threads, run_parts
 from topleft._raster.choices import can_share
@@ -143,13 +143,10 @@ def peel(
     """
     checked = View.parse(size, view)
     n, is_farthest = check_peel(checked, layers, depth_test)
+    # Layers refer to what they were drawn from, so nothing of it can be reused.
     snapped = snap_mesh(FRESH, vertices, triangles, checked, with_depth=True, out=None)
     ids, depth = peel_meshes(SCRATCH, [snapped], checked, n, is_farthest=is_farthest)
     return DepthLayers(ids, depth, snapped)
-
-
-#: Layers refer to what they were drawn from, so nothing of it can be reused.
-FRESH = FreshMemory()
 
 
 def check_peel(view: View, layers: int, depth_test: str) -> tuple[int, bool]:

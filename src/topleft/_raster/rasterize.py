@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine
 from topleft._base.arrays import as_out
-from topleft._base.memory import FreshMemory, Memory
+from topleft._base.memory import FRESH, Memory
 from topleft._base.options import DepthTest, Sampling, Sink, parse
 from topleft._base.threads import count_threads, run_parts
 from topleft._raster import choices
@@ -306,7 +306,7 @@ def draw_clusters(memory: Memory, vertices: ArrayLike, view: View, asked: Asked)
         return None
     with buffers_of(memory, view, asked) as ((ids, depth), (ids_canvas, depth_canvas)):
         n_threads = count_threads(view.threads, clusters.n_triangles)
-        memories = [memory] if n_threads == 1 else [FreshMemory() for _ in range(n_threads)]
+        memories = [memory] if n_threads == 1 else [FRESH] * n_threads
         target = _engine.Target(sink, ids_canvas, depth_canvas, None)
         if not draw_clustered(memories, [seen], target, view.size[1]):
             return None

@@ -12,7 +12,7 @@ from topleft._base.memory import Memory
 from topleft._base.options import Sink
 from topleft._base.threads import run_parts
 
-__all__ = ["SAMPLE_GRID_BITS", "draw_means", "draw_planes", "refine_grid", "sample_positions", "sum_areas"]
+__all__ = ["SAMPLE_GRID_BITS", "draw_means", "draw_planes", "sample_positions", "sum_areas"]
 
 #: From the centre of the pixel, x right and y down, in sixteenths of a pixel: the standard patterns of Direct3D 11.
 POSITIONS: dict[int, tuple[tuple[int, int], ...]] = {
@@ -37,39 +37,10 @@ LABEL_BAND_BYTES = 512 << 10
 #: Cells that are held at a time; a larger picture is drawn in several passes over the triangles.
 MAX_CELLS = 1 << 28
 
-SPECIAL, BAD, WIDE = np.iinfo(np.int32).min, 0, 1  # x_fx and y_fx of vertices that are not narrow: csrc/topleft.h
-
 
 def sample_positions(n_samples: int, grid_bits: int) -> NDArray[np.int32]:
     """Return where the samples lie from the pixel's centre, int32 (S, 2), in units of ``2**-grid_bits`` pixels."""
     return np.array(POSITIONS[n_samples], np.int32) << np.int32(grid_bits - SAMPLE_GRID_BITS)
-
-
-def refine_grid(
-    records: NDArray[np.uint8], wide: NDArray[np.int64] | None, n_bits: int
-) -> tuple[NDArray[np.int64] | None, bool]:
-    """Shift snapped vertices in place to a grid that is `n_bits` finer.
-
-    Returns the table of wide vertices, a new one if there was none and one is needed, and whether a vertex has left the
-    range; such vertices are marked.
-    """
-    xy = records.view(np.int32).reshape(-1, 4)[:, :2]
-    is_special = xy[:, 0] == SPECIAL
-    is_wide = is_special & (xy[:, 1] == WIDE)
-    leaves = ~is_special & (np.abs(xy) >= 2 ** (30 - n_bits)).any(axis=1)
-    stays = ~is_special & ~leaves
-    xy[stays] <<= np.int32(n_bits)
-    is_wide |= leaves
-    if not is_wide.any():
-        return wide, False
-    if wide is None:
-        wide = np.zeros((len(xy), 2), np.int64)
-    wide[leaves] = xy[leaves]
-    is_far = is_wide & (np.abs(wide) >= 2 ** (62 - n_bits)).any(axis=1)
-    wide[is_wide] <<= n_bits
-    xy[is_wide] = SPECIAL, WIDE
-    xy[is_far] = SPECIAL, BAD
-    return wide, bool(is_far.any())
 
 
 def draw_planes(

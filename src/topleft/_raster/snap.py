@@ -13,10 +13,12 @@ from topleft._base.arrays import apart_from, as_matrix, as_triangles, as_vertice
 from topleft._base.memory import Memory
 from topleft._base.threads import run_parts
 from topleft._raster import choices
-from topleft._raster.sampling import refine_grid
 from topleft._raster.view import View
 
 __all__ = ["Snapped", "snap_mesh"]
+
+SPECIAL, BAD, WIDE = np.iinfo(np.int32).min, 0, 1  # x_fx and y_fx of vertices that are not narrow: csrc/topleft.h
+UNCHECKED = -2  # instead of the row of a bad triangle; -1: there is none
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +50,9 @@ class Snapped:
 
     def check_indices(self) -> None:
         """Raise an error for the first triangle that names a vertex that does not exist."""
-        check_indices(self.triangles, self.triangles_given, len(self.points))
+        row = _engine.first_bad_row(self.triangles, self.n_vertices)
+        if row >= 0:
+            raise bad_triangle(self.triangles_given, row, self.n_vertices)
 
 
 class Vertices(NamedTuple):
@@ -77,14 +81,16 @@ def snap_mesh(
     """
     vertices, triangles = apart_from(out, "vertices", vertices), apart_from(out, "triangles", triangles)
     points, source = transform(vertices, view)
-    indices, is_checked = index(memory, triangles, len(points), view)
+    indices, bad_row = index(memory, triangles, len(points), view)
     view.mark("input")
     n = len(points) if len(indices) and 0 not in view.size else 0
     viewport = view.engine_viewport() if source.is_clip_space and n else None
     records, wide, n_bad, n_clipped = snap(memory, source, n, len(indices), view, viewport, with_depth=with_depth)
     view.mark("vertices")
-    if not is_checked and (out is not None or n == 0 or n_bad or n_clipped):
-        check_indices(indices, triangles, len(points))
+    if bad_row == UNCHECKED and (out is not None or n == 0 or n_bad or n_clipped):
+        bad_row = _engine.first_bad_row(indices, len(points))
+    if bad_row >= 0:
+        raise bad_triangle(triangles, bad_row, len(points))
     if n_bad:
         check_used_vertices(points, records, indices, view)
     pieces = None
@@ -92,8 +98,14 @@ def snap_mesh(
         pieces = _engine.Pieces(source, records, indices, viewport)
     view.mark("clip")
     if view.grid_bits > view.subpixel_bits:
-        wide = refine(points, records, wide, indices, pieces, view)
+        wide, is_bad = refine(records, wide, pieces, view.grid_bits - view.subpixel_bits)
+        if is_bad:
+            check_used_vertices(points, records, indices, view)
     drawn = indices if n else indices[:0]
+    if view.single_sided is not None and n:
+        is_single, cull = view.single_sided
+        seen = _engine.SnappedMesh(source, records, wide, drawn, pieces, view.how._replace(cull=cull), viewport)
+        drawn = without_sides(seen, drawn, is_single, view.threads)
     mesh = _engine.SnappedMesh(source, records, wide, drawn, pieces, view.how, viewport)
     return Snapped(mesh, indices, triangles, points, source, records, pieces)
 
@@ -107,13 +119,13 @@ def transform(vertices: ArrayLike, view: View) -> tuple[NDArray[Any], _engine.So
     return points, _engine.Source(points, matrix, choices.is_affine(matrix))
 
 
-def index(memory: Memory, triangles: ArrayLike, n_vertices: int, view: View) -> tuple[NDArray[np.int32], bool]:
-    """Return triangles as int32, and whether their indices have been checked on the way."""
+def index(memory: Memory, triangles: ArrayLike, n_vertices: int, view: View) -> tuple[NDArray[np.int32], int]:
+    """Return triangles as int32, and the first that names a vertex that does not exist, if that was looked at."""
     if view.plan is not None:
-        return view.plan.triangles_of(triangles, n_vertices), True
+        return view.plan.triangles_of(triangles, n_vertices), -1
     given = as_triangles(triangles)
     if given.dtype == np.int32:
-        return cast("NDArray[np.int32]", given), False
+        return cast("NDArray[np.int32]", given), UNCHECKED
     indices: NDArray[np.int32] = memory.empty("triangles", given.shape, np.int32)
     wide = cast("NDArray[np.int64]", given)
 
@@ -122,10 +134,8 @@ def index(memory: Memory, triangles: ArrayLike, n_vertices: int, view: View) -> 
         return first + row if row >= 0 else -1
 
     n = len(given)
-    for row in run_parts(narrow, n, choices.threads_to_convert(view.threads, n)):
-        if row >= 0:
-            raise bad_triangle(triangles, row, n_vertices)
-    return indices, True
+    bad_rows = run_parts(narrow, n, choices.threads_to_convert(view.threads, n))
+    return indices, next((row for row in bad_rows if row >= 0), -1)
 
 
 def snap(
@@ -157,29 +167,43 @@ def snap(
     return Vertices(records, wide, n_bad, n_clipped)
 
 
+def without_sides(
+    mesh: _engine.SnappedMesh, triangles: NDArray[np.int32], is_single: NDArray[np.uint8], threads: int | None
+) -> NDArray[np.int32]:
+    """Return triangles, those collapsed that are single-sided and turned the way that the mesh culls."""
+    left = np.empty_like(triangles)
+    n_parts = choices.threads_to_convert(threads, len(triangles))
+    run_parts(lambda first, end: mesh.drop_sides(is_single, first, end, left), len(triangles), n_parts)
+    return left
+
+
 def refine(
-    points: NDArray[Any],
-    records: NDArray[np.uint8],
-    wide: NDArray[np.int64] | None,
-    triangles: NDArray[np.int32],
-    pieces: _engine.Pieces | None,
-    view: View,
-) -> NDArray[np.int64] | None:
-    """Shift vertices and pieces to the grid of the samples; returns the table of wide vertices."""
-    n_bits = view.grid_bits - view.subpixel_bits
+    records: NDArray[np.uint8], wide: NDArray[np.int64] | None, pieces: _engine.Pieces | None, n_bits: int
+) -> tuple[NDArray[np.int64] | None, bool]:
+    """Shift vertices and pieces in place to the grid of the samples, which is `n_bits` finer.
+
+    Returns the table of wide vertices, a new one if there was none and one is needed, and whether a vertex has left the
+    range; such vertices are marked.
+    """
     if pieces:
-        refine_grid(pieces.arrays[0], pieces.arrays[1], n_bits)  # type: ignore[index]
-    wide, is_bad = refine_grid(records, wide, n_bits)
-    if is_bad:
-        check_used_vertices(points, records, triangles, view)
-    return wide
-
-
-def check_indices(triangles: NDArray[np.int32], triangles_given: ArrayLike, n_vertices: int) -> None:
-    """Raise an error for the first triangle that names a vertex that does not exist."""
-    row = _engine.first_bad_row(triangles, n_vertices)
-    if row >= 0:
-        raise bad_triangle(triangles_given, row, n_vertices)
+        refine(pieces.arrays[0], pieces.arrays[1], None, n_bits)  # type: ignore[index]
+    xy = records.view(np.int32).reshape(-1, 4)[:, :2]
+    is_special = xy[:, 0] == SPECIAL
+    is_wide = is_special & (xy[:, 1] == WIDE)
+    leaves = ~is_special & (np.abs(xy) >= 2 ** (30 - n_bits)).any(axis=1)
+    stays = ~is_special & ~leaves
+    xy[stays] <<= np.int32(n_bits)
+    is_wide |= leaves
+    if not is_wide.any():
+        return wide, False
+    if wide is None:
+        wide = np.zeros((len(xy), 2), np.int64)
+    wide[leaves] = xy[leaves]
+    is_far = is_wide & (np.abs(wide) >= 2 ** (62 - n_bits)).any(axis=1)
+    wide[is_wide] <<= n_bits
+    xy[is_wide] = SPECIAL, WIDE
+    xy[is_far] = SPECIAL, BAD
+    return wide, bool(is_far.any())
 
 
 def check_used_vertices(

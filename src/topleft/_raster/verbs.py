@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from topleft._base.arrays import as_size
-from topleft._base.memory import SCRATCH, FreshMemory, KeptMemory
+from topleft._base.memory import FRESH, SCRATCH, KeptMemory
 from topleft._base.threads import parse_threads
 from topleft._raster.fill import Style, draw_fill
 from topleft._raster.fragments import Fragments
@@ -19,9 +19,6 @@ from topleft._raster.rasterize import draw_coverage, draw_fragments, draw_overdr
 from topleft._raster.view import View, ViewOptions
 
 __all__ = ["Rasterizer", "coverage", "fill", "overdraw", "rasterize", "wireframe"]
-
-#: Fragments refer to what they were drawn from, so nothing of it can be reused.
-FRESH = FreshMemory()
 
 
 def coverage(
@@ -271,6 +268,7 @@ def rasterize(
     array([[ 1. ,  0.5,  0.5, -inf],
            [ 0.5,  0.5, -inf, -inf]], dtype=float32)
     """
+    # Fragments refer to what they were drawn from, so nothing of it can be reused.
     return draw_fragments(FRESH, vertices, triangles, View.parse(size, view), depth_test, background_depth, out)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypedDict
 
 import numpy as np
@@ -90,6 +90,8 @@ class View:
     threads: int | None
     classic: Method | None = None
     plan: Planned | None = None
+    single_sided: tuple[NDArray[np.uint8], int] | None = None
+    """1 for each triangle of which one side is not drawn, and the `tl_cull` that names that side."""
 
     @property
     def how(self) -> How:
@@ -100,6 +102,15 @@ class View:
         """Return how clip space maps to pixels."""
         bits = self.subpixel_bits, self.grid_bits
         return _engine.Viewport(self.viewport, *bits, self.zero_to_one, self.near_clip, self.far_clip)
+
+    def without_backs(self, is_single: NDArray[np.uint8] | None, *, is_mirrored: bool = False) -> View:
+        """Return the view without the backs of these triangles (T,); in a mirror their winding is turned over."""
+        back = CULL_CODES[Cull.FRONT if is_mirrored else Cull.BACK]
+        if is_single is None or self.cull == back:
+            return self
+        if not self.cull and is_single.all():
+            return replace(self, cull=back)
+        return replace(self, single_sided=(is_single, back))
 
     def mark(self, stage: str) -> None:
         """Note for the plan that a stage has ended."""

@@ -1,6 +1,8 @@
 """From a mesh or a scene and a camera to pictures and layers.
 
 bend.py          bends edges: splits triangles until their sides are straight in the picture of a lens
+blended.py       draws materials that what is behind shows through, over what is opaque
+cloud.py         draws clouds of points: their buffer, their picture and their layers
 fragments.py     holds what each instance shows: visibility buffers of scenes and through a lens, and their parts
 gbuffer.py       evaluates where in space each visible pixel lies, when a layer asks for it
 holes.py         takes out what materials cut out, so that what lies behind a hole shows, of any instance

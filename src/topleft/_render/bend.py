@@ -22,7 +22,8 @@ import numpy.typing as npt
 from topleft._base.options import Cull, parse
 from topleft._camera.camera import Camera
 from topleft._camera.lens import FLIP, Lens
-from topleft._model.mesh import Mesh
+from topleft._model.mesh import Mesh, keep_corner_normals
+from topleft._model.normals import CornerNormals
 
 F64 = npt.NDArray[np.float64]
 I64 = npt.NDArray[np.int64]
@@ -116,15 +117,25 @@ class BentMesh:
             return of_parts
 
         rows = mesh.material_of_triangle
-        return Mesh(
+        creased = None if mesh.is_faceted else mesh.corner_normals()
+        of_vertices = None if mesh.is_faceted else spread(mesh.vertex_normals())
+        parts = Mesh(
             spread(mesh.vertices),
             self.triangles.astype(np.int32),
-            spread(mesh.vertex_normals()),
+            None if creased is not None else of_vertices,
             None if mesh.colors is None else np.rint(spread(mesh.colors)).astype(np.uint8),
             None if mesh.uv is None else spread(mesh.uv).astype(np.float32),
             mesh.materials,
             None if rows is None else rows[self.source],
+            None if mesh.uv1 is None else spread(mesh.uv1).astype(np.float32),
+            crease=mesh.crease,
         )
+        if creased is not None and of_vertices is not None:
+            own = np.matmul(self.weights, creased.rows[creased.of_corner[self.source]]).reshape(-1, 3)
+            of_corner = len(of_vertices) + np.arange(self.triangles.size, dtype=np.int32).reshape(-1, 3)
+            table = np.concatenate([of_vertices, own])
+            keep_corner_normals(parts, CornerNormals(table, of_corner, parts.triangles.ravel()))
+        return parts
 
     def outline(self, projection: F64, cull: str) -> I64:
         """The parts of the mesh's own edges as triangles (N, 3) without area, each edge once, for `wireframe`.

@@ -305,6 +305,8 @@ class SceneDepthLayers(DepthLayers):
 
 def instance_of_ids(ids: NDArray[np.int32], first_ids: NDArray[np.int64]) -> NDArray[np.int32]:
     """Return the instance that each id belongs to, -1 for -1."""
+    if len(first_ids) == 2:
+        return ids >> 31
     return (np.searchsorted(first_ids, ids.ravel(), side="right") - 1).astype(np.int32).reshape(ids.shape)
 
 

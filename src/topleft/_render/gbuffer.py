@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft import _engine
-from topleft._base.threads import count_threads, parse_threads, run_parts
+from topleft._base.threads import run_parts, threads_for
 from topleft._camera.camera import Camera
 from topleft._model.mesh import Mesh
 from topleft._model.scene import Scene
@@ -23,7 +23,7 @@ from topleft._raster.fragments import Fragments
 from topleft._raster.verbs import Rasterizer
 from topleft._render.fragments import VisiblePart, join, parts_of
 from topleft._render.holes import has_cuts, without_holes
-from topleft._render.render import rasterize_mesh
+from topleft._render.render import rasterize_subject
 
 __all__ = ["GBuffer", "PointKind", "evaluate", "points_of", "project"]
 
@@ -63,7 +63,7 @@ def evaluate(
     half_size = size[0] / 2, size[1] / 2
     points = _engine.Points(mesh.vertices, what, np.ascontiguousarray(rows), half_size, background, dtype is np.float64)
     scene = frags._snapped.with_inverse_w(ids.size)
-    n_threads = count_threads(parse_threads(threads), len(mesh.triangles))
+    n_threads = threads_for(threads, len(mesh.triangles))
     run_parts(lambda first, end: points.fill(scene, ids, out, first, end - first), len(ids), n_threads)
     return out
 
@@ -107,11 +107,12 @@ class GBuffer:
     @cached_property
     def frags(self) -> Fragments:
         """The visibility buffer, at the centres of the pixels, without what materials cut out."""
-        return self._cut(rasterize_mesh(*self._view, rasterizer=self.rasterizer, **self.options))
+        return self._cut(rasterize_subject(*self._view, self.rasterizer, self.look.get("material"), **self.options))
 
     def sampled(self, sampling: str) -> Fragments:
         """Return the same with several samples a pixel."""
-        return self._cut(rasterize_mesh(*self._view, sampling=sampling, **self.options))
+        material = self.look.get("material")
+        return self._cut(rasterize_subject(*self._view, material=material, sampling=sampling, **self.options))
 
     @cached_property
     def has_holes(self) -> bool:

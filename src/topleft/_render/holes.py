@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from topleft import _engine
 from topleft._base.options import Sink
-from topleft._base.threads import count_threads, parse_threads
+from topleft._base.threads import threads_for
 from topleft._camera.camera import Camera
 from topleft._model.material import Material
 from topleft._model.mesh import Mesh
@@ -100,5 +100,5 @@ def draw_holed(
     """Draw the triangles with holes over the planes of what one sample sees (1, H, W), or over layers (K, H, W)."""
     for i, mesh, camera, cut in holed:
         scene = placed.snap(i).mesh.seen_from(*at)
-        n_threads = count_threads(parse_threads(threads), len(mesh.triangles))
+        n_threads = threads_for(threads, len(mesh.triangles))
         draw_cut(scene, mesh, camera, cut, ids, depth, is_peeled=is_peeled, n_threads=n_threads)

@@ -8,16 +8,18 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from topleft import _engine
-from topleft._base.memory import SCRATCH, FreshMemory, KeptMemory
+from topleft._base.memory import FRESH, SCRATCH, KeptMemory
 from topleft._base.options import DepthTest, Sampling, Sink, parse
 from topleft._base.threads import count_threads, run_parts
 from topleft._camera.camera import Camera
+from topleft._model.material import Material
 from topleft._model.scene import Scene
 from topleft._raster import choices
 from topleft._raster.classic import refuse_classic
@@ -31,15 +33,13 @@ from topleft._raster.view import View, ViewOptions
 from topleft._render.fragments import SceneDepthLayers, SceneFragments
 from topleft._render.through_lens import DrawnScene, scene_through
 
-__all__ = ["PlacedScene", "draw_scene", "draw_scene_coverage", "peel_scene"]
+__all__ = ["PlacedScene", "draw_nearest", "draw_scene", "draw_scene_coverage", "peel_scene", "place"]
 
 #: Snapped vertices that are held at a time: 16 bytes each.
 VERTICES_AT_ONCE = 1 << 20
 
 #: `tl_kernels.draw` begins a mask anew after 2**31 pixels, which one that is drawn in several calls must not meet.
 MOST_PIXELS_OF_PART = 1 << 30
-
-FRESH = FreshMemory()
 
 #: cull codes of a view (tl_cull) for an instance that mirrors.
 MIRRORED = {0: 0, 1: 2, 2: 1}
@@ -67,17 +67,26 @@ class PlacedScene:
         The parts that a lens makes of each instance.
     """
 
-    def __init__(self, drawn: DrawnScene, view: View, *, with_depth: bool, may_cluster: bool = True) -> None:
+    def __init__(
+        self,
+        drawn: DrawnScene,
+        view: View,
+        *,
+        with_depth: bool,
+        may_cluster: bool = True,
+        material: Material | None = None,
+    ) -> None:
         self.scene, self.whole, self._clip_from_world, self.bent = self._drawn = drawn
         self.first_ids, self.whole_first_ids = drawn.scene.first_ids, drawn.whole.first_ids
         self._view = view
+        self._material = material  # instead of those of the meshes
         self._with_depth = with_depth
         self._may_cluster = may_cluster
 
     def of(self, scene: Scene) -> PlacedScene:
         """Return another scene to draw, made for this picture alone, seen in the same way."""
         drawn = self._drawn._replace(scene=scene)
-        return PlacedScene(drawn, self._view, with_depth=self._with_depth, may_cluster=False)
+        return PlacedScene(drawn, self._view, with_depth=self._with_depth, may_cluster=False, material=self._material)
 
     def whole_ids(self, ids: NDArray[np.int32]) -> NDArray[np.int32]:
         """Return ids in terms of the whole scene: as they are, but for a lens."""
@@ -96,7 +105,7 @@ class PlacedScene:
 
     def snap_part(self, i: int, triangles: NDArray[np.int32]) -> _engine.SnappedMesh:
         """Return what some triangles of an instance need, snapped: all of it, unless its mesh is drawn in clusters."""
-        can_cluster = self._may_cluster and choices.can_cluster(self._view, Sink.NEAREST)
+        can_cluster = self._may_cluster and choices.can_cluster(self._view, Sink.NEAREST) and not self.has_sides
         if can_cluster and self.scene[i].mesh.has_clusters:
             return ClusteredMesh(*self.clustered(i)).part(triangles)
         return self.snap(i).mesh
@@ -104,7 +113,18 @@ class PlacedScene:
     def _view_of(self, i: int) -> View:
         instance, view = self.scene[i], self._view
         cull = MIRRORED[view.cull] if instance.is_mirrored else view.cull
-        return replace(view, transform=self._clip_from_world @ instance.transform, cull=cull)
+        own = replace(view, transform=self._clip_from_world @ instance.transform, cull=cull)
+        is_single = self.whole[i].mesh.single_sided(self._material)
+        if is_single is None:
+            return own
+        is_single = is_single if self.bent is None else is_single[self.bent[i].source]
+        return own.without_backs(is_single, is_mirrored=instance.is_mirrored)
+
+    @cached_property
+    def has_sides(self) -> bool:
+        """Whether some triangles of a mesh are single-sided and others are not, which clusters do not know."""
+        masks = (instance.mesh.single_sided(self._material) for instance in self.whole)
+        return any(mask is not None and not mask.all() for mask in masks)
 
     def clustered(self, i: int) -> tuple[Clusters, View, int]:
         """Return the clusters of an instance's mesh, how they are seen, and what triangle 0 is called."""
@@ -126,6 +146,7 @@ class PlacedScene:
         n_parts = count_threads(self._view.threads, self.scene.n_triangles)
         n_parts = min(height, max(n_parts, height * self._view.size[0] // MOST_PIXELS_OF_PART))
         can_cluster = self._may_cluster and choices.can_cluster(self._view, Sink(targets[0].sink))
+        can_cluster = can_cluster and not self.has_sides
         seen = self._clip_from_world, self._view
         if can_cluster and wants_clusters(self.scene) and pays_to_draw(self, *seen):
             order = front_to_back(self.scene, self._clip_from_world)
@@ -226,13 +247,19 @@ def rows_of(
 
 
 def place(
-    scene: Scene, camera: Camera, size: tuple[int, int], options: dict[str, Any], *, with_depth: bool = True
+    scene: Scene,
+    camera: Camera,
+    size: tuple[int, int],
+    options: dict[str, Any],
+    *,
+    with_depth: bool = True,
+    material: Material | None = None,
 ) -> tuple[PlacedScene, View]:
-    """Return the scene as the camera sees it, and the checked options of a verb."""
+    """Return the scene as the camera sees it, and the checked options of a verb; `material`: whose backs are culled."""
     view = View.parse(size, cast(ViewOptions, options))
     refuse_classic(view, "depth" if with_depth else "a scene")
     drawn = scene_through(scene, camera, view.viewport, near_clip=view.near_clip)
-    return PlacedScene(drawn, view, with_depth=with_depth), view
+    return PlacedScene(drawn, view, with_depth=with_depth, material=material), view
 
 
 def draw_scene(
@@ -242,12 +269,22 @@ def draw_scene(
     *,
     depth_test: str | None = "less",
     background_depth: float | None = None,
+    material: Material | None = None,
     **options: Any,
 ) -> SceneFragments:
     """Return the visibility buffer of a scene; options as those of `rasterize`, without `out` and `transform`."""
-    placed, view = place(scene, camera, size, options)
+    placed, view = place(scene, camera, size, options, material=material)
     refuse_many(view, "rasterize")
     test = None if depth_test is None else parse(DepthTest, "depth_test", depth_test)
+    frags = draw_nearest(placed, view, test)
+    if background_depth is not None:
+        ids, depth = frags.drawn_planes
+        depth[ids < 0] = background_depth
+    return frags
+
+
+def draw_nearest(placed: PlacedScene, view: View, test: DepthTest | None = DepthTest.LESS) -> SceneFragments:
+    """Return the visibility buffer of what `place` returned."""
     sink = {None: Sink.PAINT, DepthTest.LESS: Sink.NEAREST, DepthTest.GREATER: Sink.FARTHEST}[test]
     (width, height), n = view.size, view.sampling.n_samples
     positions = [(0, 0)] if n == 1 else [(x, y) for x, y in sample_positions(n, view.grid_bits).tolist()]
@@ -256,26 +293,37 @@ def draw_scene(
     if width and height:
         targets = [_engine.Target(sink, *planes, None) for planes in zip(ids, depth, strict=True)]
         placed.draw(targets, positions, height)
-    if background_depth is not None:
-        depth[ids < 0] = background_depth
     return SceneFragments(ids, depth, placed, positions)
 
 
 def peel_scene(
-    scene: Scene, camera: Camera, size: tuple[int, int], *, layers: int = 4, depth_test: str = "less", **options: Any
+    scene: Scene,
+    camera: Camera,
+    size: tuple[int, int],
+    *,
+    layers: int = 4,
+    depth_test: str = "less",
+    material: Material | None = None,
+    **options: Any,
 ) -> SceneDepthLayers:
     """Return the nearest layers of a scene; options as those of `peel`, without `transform`."""
-    placed, view = place(scene, camera, size, options)
+    placed, view = place(scene, camera, size, options, material=material)
     n, is_farthest = check_peel(view, layers, depth_test)
     snapped = [placed.snap(i) for i in range(len(scene))]  # a band of rows is drawn once, with all instances
     return SceneDepthLayers(*peel_meshes(SCRATCH, snapped, view, n, is_farthest=is_farthest), placed)
 
 
 def draw_scene_coverage(
-    scene: Scene, camera: Camera, size: tuple[int, int], out: object, **options: Any
+    scene: Scene,
+    camera: Camera,
+    size: tuple[int, int],
+    out: object,
+    *,
+    material: Material | None = None,
+    **options: Any,
 ) -> NDArray[Any]:
     """Return the mask of a scene, as `coverage` gives that of a mesh; options as there."""
-    placed, view = place(scene, camera, size, options, with_depth=False)
+    placed, view = place(scene, camera, size, options, with_depth=False, material=material)
     width, height = view.size
     n = view.sampling.n_samples
     is_share = n > 1 or view.sampling is Sampling.AREA

@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from topleft._render.blended import is_blended
+from topleft._render.cloud import CLOUD_LAYERS, CloudBuffer
 from topleft._render.fragments import VisiblePart, meshes_of
 from topleft._render.gbuffer import GBuffer, PointKind, points_of, project
 from topleft._render.render import picture_of, render
@@ -31,10 +33,16 @@ def color(gbuffer: GBuffer) -> Array:
     if "opacity" in options:
         return render_transparent(gbuffer.subject, gbuffer.camera, gbuffer.size, **options)
     sampling = options.pop("sampling", "center")
-    if sampling == "center":
+    is_glass = is_blended(gbuffer.subject, options.get("material"), options.get("shading", "smooth"))
+    if sampling == "center" and not is_glass:
         return picture_of(gbuffer.frags, gbuffer.subject, gbuffer.camera, **options)
     options |= {"sampling": sampling, "rasterizer": gbuffer.rasterizer}
     return render(gbuffer.subject, gbuffer.camera, gbuffer.size, **options)
+
+
+def cloud_color(buffer: CloudBuffer) -> Array:
+    """The picture (H, W, 4) uint8 of points."""
+    return render(buffer.subject, buffer.camera, buffer.size, **buffer.options, **buffer.look)
 
 
 def alpha(gbuffer: GBuffer) -> Array:
@@ -144,6 +152,16 @@ def flow(gbuffer: GBuffer) -> Array:
     return gbuffer.join((2,), np.nan, make)
 
 
+def cloud_flow(buffer: CloudBuffer) -> Array:
+    """Where the point of each pixel moves to in the picture, (H, W, 2) float32 pixels."""
+    if buffer.camera_to is None and buffer.transforms_to is None:
+        raise ValueError("layer 'flow' needs camera_to or transforms_to")
+    points = buffer.subject.positions.astype(np.float64)
+    there = np.eye(4) if buffer.transforms_to is None else buffer.transforms_to[0]
+    ends = project(points, buffer.camera_to or buffer.camera, there, buffer.size)
+    return buffer.spread(ends - project(points, buffer.camera, np.eye(4), buffer.size), np.nan)
+
+
 LAYERS: Mapping[str, Callable[[GBuffer], Array]] = MappingProxyType({
     layer.__name__: layer
     for layer in (
@@ -169,7 +187,7 @@ def check_layers(names: str | Iterable[str]) -> tuple[str, ...]:
     return checked
 
 
-def draw_layers(names: str | Iterable[str], gbuffer: GBuffer) -> dict[str, Array]:
+def draw_layers(names: str | Iterable[str], gbuffer: GBuffer | CloudBuffer) -> dict[str, Array]:
     """Return arrays by name, in the order asked for.
 
     Raises
@@ -179,5 +197,11 @@ def draw_layers(names: str | Iterable[str], gbuffer: GBuffer) -> dict[str, Array
     """
     checked = check_layers(names)
     # Colours first: in memory that is kept they may need other samples than the visibility buffer of all others.
-    drawn = {name: LAYERS[name](gbuffer) for name in sorted(checked, key=lambda name: name != "color")}
+    table: Mapping[str, Callable[[Any], Array]] = LAYERS
+    if isinstance(gbuffer, CloudBuffer):
+        table = {"color": cloud_color, **CLOUD_LAYERS, "flow": cloud_flow}
+    for name in checked:
+        if name not in table:
+            raise ValueError(f"points have no layer {name!r}; they have {', '.join(table)}")
+    drawn = {name: table[name](gbuffer) for name in sorted(checked, key=lambda name: name != "color")}
     return {name: drawn[name] for name in checked}

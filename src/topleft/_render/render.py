@@ -17,19 +17,23 @@ from topleft._base.color import DEFAULT_COLOR
 from topleft._camera.camera import Camera
 from topleft._lod.detail import detailed
 from topleft._model.adapt import MeshLike, as_mesh
+from topleft._model.material import Material
 from topleft._model.mesh import Mesh
+from topleft._model.points import Points
 from topleft._model.scene import Instance, Scene
 from topleft._raster import choices
 from topleft._raster.clusters import Clusters
 from topleft._raster.fragments import Fragments
 from topleft._raster.verbs import Rasterizer, rasterize, wireframe
 from topleft._raster.view import View
+from topleft._render.blended import draw_blended, is_blended
+from topleft._render.cloud import draw_cloud, framing_of
 from topleft._render.fragments import BentFragments, camera_of, scene_of
 from topleft._render.holes import without_holes
 from topleft._render.instances import draw_scene
 from topleft._render.scene_shade import shade
 from topleft._render.through_lens import seen_through
-from topleft._shade.shade import LookOptions
+from topleft._shade.shade import LookOptions, ShadingOptions
 
 DEFAULT_SIZE = (640, 480)
 WHITE = (255, 255, 255, 255)
@@ -37,7 +41,7 @@ EDGE_COLOR = (24, 28, 40)
 
 
 def render(
-    mesh: MeshLike | Scene,
+    mesh: MeshLike | Scene | Points,
     camera: Camera | None = None,
     size: tuple[int, int] = DEFAULT_SIZE,
     *,
@@ -56,20 +60,22 @@ def render(
 
     Parameters
     ----------
-    mesh : Mesh, Scene, or whatever `as_mesh` takes
-        What to draw: a mesh of trimesh, meshio, pyvista, say. Its colours are used if it has any.
+    mesh : Mesh, Scene, Points, or whatever `as_mesh` takes
+        What to draw: a mesh of trimesh, meshio, pyvista, say. Its colours are used if it has any. Points have no
+        edges, sides to cull, materials and levels; they are lit where they have normals.
     camera : Camera, optional
         Unless given, the three-quarter view of `Camera.framing`, with y up.
     size : (width, height), pixels
         640 x 480 unless given.
     shading : {"smooth", "flat", "unlit", "matcap", "ids", "depth", "normals"}
-        What the colours tell; `topleft.shade` describes each.
+        What the colours tell; `topleft.shade` describes each. The first three composite what shows through, materials
+        with `alpha_mode="blend"` and colours with alpha, in linear light; the others show it as if it were opaque.
     color : (3,) of 0 to 255
         sRGB colour of a mesh without colours.
     background : (3,) or (4,) of 0 to 255
         sRGB, and alpha if it is not opaque; white unless given, `(0, 0, 0, 0)` is transparent.
     cull : {"none", "back", "front"}
-        Triangles to leave out, by the side that is seen.
+        Triangles to leave out, by the side that is seen; besides the backs of materials that are not double-sided.
     edges : bool
         Whether the edges that show are drawn over it, as smooth dark lines.
     sampling : {"center", "msaa2", "msaa4", "msaa8", "msaa16"}
@@ -84,7 +90,7 @@ def render(
     rasterizer : Rasterizer, optional
         Of this size: what is needed on the way lies in the memory that it keeps.
     **look
-        `lights`, `ambient`, `material`, `matcap` and `fog` of `topleft.shade`.
+        `lights`, `ambient`, `material`, `matcap`, `fog` and `environment` of `topleft.shade`.
 
     Returns
     -------
@@ -105,8 +111,22 @@ def render(
     >>> tl.render(mesh, size=(64, 48), background=(0, 0, 0, 0))[24, 32].tolist()[3]
     255
     """
-    subject, camera = subject_of(mesh, camera, size, tolerance, cull=cull, material=look.get("material"))
-    frags = rasterize_subject(subject, camera, size, rasterizer, cull=cull, threads=threads, sampling=sampling)
+    if isinstance(mesh, Points):
+        if edges:
+            raise ValueError("points have no edges")
+        camera = framing_of(mesh, camera, size)
+        cloud = draw_cloud(mesh, camera, size, cull=cull, threads=threads, sampling=sampling)
+        return shade(cloud, mesh, camera, shading=shading, color=color, background=background, threads=threads, **look)
+    material = look.get("material")
+    subject, camera = subject_of(mesh, camera, size, tolerance, cull=cull, material=material)
+    view: dict[str, Any] = {"cull": cull, "sampling": sampling}
+    if is_blended(subject, material, shading):
+        options = ShadingOptions.parse(shading=shading, color=color, background=background, threads=threads, **look)
+        picture, opaque = draw_blended(subject, camera, size, options=options, **view)
+        if edges:
+            draw_all_edges(picture, opaque, subject, camera, material, cull=cull, threads=threads)
+        return picture
+    frags = rasterize_subject(subject, camera, size, rasterizer, material, threads=threads, **view)
     return picture_of(
         frags, subject, camera, shading=shading, color=color, background=background, cull=cull, edges=edges,
         threads=threads, **look,
@@ -142,14 +162,13 @@ def picture_of(
     """
     frags = without_holes(frags, subject, camera, look.get("material"), threads=threads)
     picture = shade(frags, subject, camera, background=background, threads=threads, **look)
-    for instance in scene_of(subject) if edges else ():
-        own_camera, own_cull = camera_of(camera, instance), cull_of(cull, instance)
-        draw_edges(picture, frags, instance.mesh, own_camera, cull=own_cull, threads=threads)
+    if edges:
+        draw_all_edges(picture, frags, subject, camera, look.get("material"), cull=cull, threads=threads)
     return picture
 
 
 def rasterize_mesh(
-    mesh: MeshLike | Scene,
+    mesh: MeshLike | Scene | Points,
     camera: Camera | None = None,
     size: tuple[int, int] = DEFAULT_SIZE,
     *,
@@ -177,35 +196,74 @@ def rasterize_mesh(
     Fragments
         `.triangle` (H, W) int32, -1 where there is nothing; `.depth` (H, W) float32, window depth in [0, 1], +inf where
         there is nothing. Of a scene `SceneFragments`: also `.instance` (H, W) int32, and `.triangle` counts the
-        triangles of its mesh.
+        triangles of its mesh. Of `Points` `PointFragments`: `.point` is the same as `.triangle`.
 
     Raises
     ------
     ValueError
         If the mesh has no triangles and no camera is given, an option is unknown, or `rasterizer` has another size.
     """
+    if isinstance(mesh, Points):
+        return draw_cloud(mesh, framing_of(mesh, camera, size), size, cull=cull, threads=threads, **view)
     window = {"viewport": view.get("viewport"), "origin": view.get("origin", (0, 0))}
     subject, camera = subject_of(mesh, camera, size, tolerance, cull=cull, **window)
     return rasterize_subject(subject, camera, size, rasterizer, cull=cull, threads=threads, **view)
 
 
 def rasterize_subject(
-    subject: Mesh | Scene, camera: Camera, size: tuple[int, int], rasterizer: Rasterizer | None = None, **view: Any
+    subject: Mesh | Scene,
+    camera: Camera,
+    size: tuple[int, int],
+    rasterizer: Rasterizer | None = None,
+    material: Material | None = None,
+    **view: Any,
 ) -> Fragments:
-    """The visibility buffer of what `subject_of` returned; options as for `rasterize_mesh`."""
+    """The visibility buffer of what `subject_of` returned; options as for `rasterize_mesh`.
+
+    `material`: whose backs are culled, instead of those that the meshes have.
+    """
     if isinstance(subject, Scene):
-        return draw_scene(subject, camera, size, **view)
+        return draw_scene(subject, camera, size, material=material, **view)
     drawn = seen_through(subject, camera, view.get("viewport") or size, near_clip=view.get("near_clip", True))
     view["transform"] = drawn.transform
     if rasterizer is not None and rasterizer.size != tuple(size):
         raise ValueError(f"rasterizer must have the size {tuple(size)}, got {rasterizer.size}")
     if drawn.bent is None:
         view.setdefault("plan", StaticPlan(subject))
+    view["plan"] = drawn.sided(view.get("plan"), subject.single_sided(material))
     if rasterizer is None:
         frags = rasterize(drawn.vertices, drawn.triangles, size, **view)
     else:
         frags = rasterizer.rasterize(drawn.vertices, drawn.triangles, **view)
     return frags if drawn.bent is None else BentFragments(frags, drawn.bent, subject)
+
+
+def draw_all_edges(
+    picture: npt.NDArray[np.uint8],
+    frags: Fragments,
+    subject: Mesh | Scene,
+    camera: Camera,
+    material: Material | None,
+    *,
+    cull: str,
+    threads: int | None,
+) -> None:
+    """Draw the edges of every instance that the visibility buffer does not hide."""
+    for instance in scene_of(subject):
+        own_camera, own_cull, back = camera_of(camera, instance), cull_of(cull, instance), cull_of("back", instance)
+        is_single = instance.mesh.single_sided(material)
+        kinds = [(instance.mesh, own_cull)]
+        if is_single is not None and own_cull != back:
+            kinds = [(some_of(instance.mesh, is_single == 0), own_cull)]
+            if own_cull == "none":  # of the others the edges of what shows its front
+                kinds.append((some_of(instance.mesh, is_single == 1), back))
+        for mesh, side in kinds:
+            draw_edges(picture, frags, mesh, own_camera, cull=side, threads=threads)
+
+
+def some_of(mesh: Mesh, is_some: npt.NDArray[np.bool_]) -> Mesh:
+    """A mesh of some of its triangles, for edges."""
+    return Mesh(mesh.vertices, mesh.triangles[is_some])
 
 
 def cull_of(cull: str, instance: Instance) -> str:

@@ -14,24 +14,32 @@ import numpy.typing as npt
 
 from topleft._base.color import DEFAULT_COLOR, Color
 from topleft._camera.camera import Camera
+from topleft._model.environment import Environment
 from topleft._model.light import Fog, Light, LightKind, LightSpace
 from topleft._model.material import Material
 from topleft._model.mesh import Mesh
+from topleft._model.points import Points
 from topleft._model.scene import Instance, Scene
 from topleft._model.texture import Texture
 from topleft._raster.fragments import Fragments
+from topleft._raster.points import PointFragments
+from topleft._render.cloud import shade_cloud
 from topleft._render.fragments import SceneFragments, VisiblePart, join, meshes_of, parts_of
 from topleft._shade.look import is_similarity
 from topleft._shade.shade import Shading, ShadingOptions, shade_mesh, shade_numbers, shade_samples
 
-__all__ = ["shade"]
+__all__ = ["shade", "shade_by", "shade_part"]
 
 U8 = npt.NDArray[np.uint8]
 
 
 def in_space_of(instance: Instance | None, options: ShadingOptions, camera: Camera) -> ShadingOptions:
     """The options with lights as they stand in the object space of an instance, as bright as they are in the world."""
-    if options.lights is None or instance is None:
+    if instance is None:
+        return options
+    if options.environment is not None:
+        options = replace(options, world_from_mesh=instance.transform[:3, :3])
+    if not options.lights:
         return options
     object_from_world = np.linalg.inv(instance.transform)
     # `ShadingInputs` measures distances in object space where the way to the eye keeps angles, else in eye space.
@@ -47,7 +55,7 @@ def in_space_of(instance: Instance | None, options: ShadingOptions, camera: Came
 
 def shade(
     frags: Fragments,
-    mesh: Mesh | Scene,
+    mesh: Mesh | Scene | Points,
     camera: Camera,
     *,
     shading: str = "smooth",
@@ -59,6 +67,7 @@ def shade(
     material: Material | None = None,
     matcap: Texture | None = None,
     fog: Fog | None = None,
+    environment: Environment | None = None,
     threads: int | None = None,
 ) -> U8:
     """The picture (H, W, 4) uint8 of a visibility buffer: sRGB, alpha 255 where a triangle shows.
@@ -69,7 +78,7 @@ def shade(
         What `rasterize` or `rasterize_mesh` returned for the mesh or scene. With several samples a pixel a triangle is
         shaded once in a pixel, at the first of the samples that see it, and the picture is the mean of the light of the
         samples.
-    mesh : Mesh or Scene
+    mesh : Mesh, Scene or Points
         Its materials, and its colours, are used if it has any. Each instance of a scene is shaded by itself.
     camera : Camera
         The camera of `frags`.
@@ -87,16 +96,19 @@ def shade(
         Distances along the view that are the brightest and the darkest grey of "depth", world units; unless given,
         those of the picture.
     lights : sequence of Light, optional
-        Lambert's cosine for each of them. Unless given: one headlight over the viewer's left shoulder, whose light
-        wraps round the mesh.
+        Lambert's cosine for each of them, or GGX on metallic-rough materials. Unless given: one headlight over the
+        viewer's left shoulder, whose light wraps round the mesh; none in an environment.
     ambient : float, optional
-        Light from all sides, not negative, 0.03 unless given.
+        Light from all sides, not negative, 0.03 unless given, 0 in an environment.
     material : Material, optional
         For all triangles, instead of those of the mesh.
     matcap : Texture, optional
         A picture of a lit sphere, for "matcap". It is clamped, so the rim holds where normals turn away.
     fog : Fog, optional
         The depth cue.
+    environment : Environment, optional
+        Light from all around. Unless given, metallic-rough materials mirror a bright side, that of the headlight, and
+        a dark one, and nothing else is lit by it.
     threads : int, optional
         How many threads shade; never changes a bit.
 
@@ -106,23 +118,38 @@ def shade(
         If the mesh has other numbers of vertices or triangles than what was drawn, `shading` is unknown, a colour is
         none, a number is outside its range, or "matcap" has no matcap.
     TypeError
-        If `frags`, the mesh, a light, material or texture is none.
+        If `frags`, the mesh, a light, material, texture or environment is none.
     """
-    check_drawn(frags, mesh)
+    if not isinstance(mesh, Points):
+        check_drawn(frags, mesh)
     options = ShadingOptions.parse(
-        shading, color, background, depth_range, lights, ambient, material, matcap, fog, threads
+        shading, color, background, depth_range, lights, ambient, material, matcap, fog, environment, threads
     )
+    if isinstance(mesh, Points):
+        if not (isinstance(frags, PointFragments) and frags._n_vertices == len(mesh)):
+            raise ValueError(f"frags must be those of the {len(mesh)} points, got {frags!r}")
+        return shade_cloud(frags, mesh, camera, options)
+    return shade_by(frags, mesh, camera, options)
+
+
+def shade_by(frags: Fragments, mesh: Mesh | Scene, camera: Camera, options: ShadingOptions) -> U8:
+    """The picture of a visibility buffer by checked options."""
     if options.mode in (Shading.IDS, Shading.DEPTH):
         return shade_numbers(frags, camera, options)
 
-    def shade_part(part: VisiblePart) -> U8:
-        return shade_mesh(*part.drawn, part.camera(camera), in_space_of(part.instance, options, camera))
+    def shade_own(part: VisiblePart) -> U8:
+        return shade_part(part, camera, options)
 
     def shade_one(sample: Fragments) -> U8:
-        return join(parts_of(sample, mesh), (*sample.id.shape, 4), options.background, shade_part, np.uint8)
+        return join(parts_of(sample, mesh), (*sample.id.shape, 4), options.background, shade_own, np.uint8)
 
     # The kernel resolves the samples of one mesh; those of several are resolved here.
     return shade_one(frags) if isinstance(mesh, Mesh) else shade_samples(frags, shade_one, options.background)
+
+
+def shade_part(part: VisiblePart, camera: Camera, options: ShadingOptions) -> U8:
+    """The picture of the rectangle of a part."""
+    return shade_mesh(*part.drawn, part.camera(camera), in_space_of(part.instance, options, camera))
 
 
 def check_drawn(frags: Fragments, mesh: Mesh | Scene) -> None:

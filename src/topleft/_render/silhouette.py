@@ -7,12 +7,16 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import numpy.typing as npt
 
+from topleft._base.arrays import as_out
 from topleft._camera.camera import Camera
 from topleft._model.adapt import MeshLike
+from topleft._model.points import Points
 from topleft._model.scene import Scene
 from topleft._raster.verbs import coverage
+from topleft._render.cloud import draw_cloud, framing_of
 from topleft._render.instances import draw_scene_coverage
 from topleft._render.render import DEFAULT_SIZE, subject_of
 from topleft._render.through_lens import seen_through
@@ -21,7 +25,7 @@ __all__ = ["silhouette"]
 
 
 def silhouette(
-    mesh: MeshLike | Scene,
+    mesh: MeshLike | Scene | Points,
     camera: Camera | None = None,
     size: tuple[int, int] = DEFAULT_SIZE,
     *,
@@ -36,7 +40,7 @@ def silhouette(
 
     Parameters
     ----------
-    mesh : Mesh, Scene, or whatever `as_mesh` takes
+    mesh : Mesh, Scene, Points, or whatever `as_mesh` takes
         What to look at.
     camera : Camera, optional
         Unless given, the three-quarter view of `Camera.framing`, with y up.
@@ -82,12 +86,23 @@ def silhouette(
     >>> round(float(tl.silhouette(mesh, size=(8, 6), sampling="area", cull="back").sum()), 2)
     16.2
     """
+    if isinstance(mesh, Points):
+        frags = draw_cloud(
+            mesh, framing_of(mesh, camera, size), size, sampling=sampling, cull=cull, threads=threads, **view
+        )
+        is_seen = frags.samples_triangle >= 0
+        found = frags.mask if is_seen.shape[-1] == 1 else is_seen.mean(axis=-1, dtype=np.float32)
+        if out is None:
+            return found
+        result = as_out("out", out, found.shape, found.dtype.type)
+        result[...] = found
+        return result
     window = {"viewport": view.get("viewport"), "origin": view.get("origin", (0, 0))}
     subject, camera = subject_of(mesh, camera, size, tolerance, cull=cull, **window)
     options: Any = {"sampling": sampling, "cull": cull, "threads": threads} | view
     if isinstance(subject, Scene):
         return draw_scene_coverage(subject, camera, size, out, **options)
     drawn = seen_through(subject, camera, view.get("viewport") or size, near_clip=view.get("near_clip", True))
-    options["transform"] = drawn.transform
+    options |= {"transform": drawn.transform, "plan": drawn.sided(view.get("plan"), subject.single_sided())}
     mask: npt.NDArray[Any] = coverage(drawn.vertices, drawn.triangles, size, out=out, **options)
     return mask

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from topleft._camera.camera import Camera
 from topleft._model.mesh import Mesh
 from topleft._model.scene import Instance, Scene
+from topleft._raster.view import Planned, View
 from topleft._render.bend import BentMesh, bend
 from topleft._render.fragments import camera_of
 
@@ -28,6 +29,24 @@ class DrawnMesh(NamedTuple):
     triangles: npt.NDArray[np.integer[Any]]
     transform: npt.NDArray[np.float64]
     bent: BentMesh | None
+
+    def sided(self, plan: Planned | None, is_single: npt.NDArray[np.uint8] | None) -> Planned | SidedPlan | None:
+        """The plan, without the backs of the triangles of the mesh that are single-sided."""
+        if is_single is None:
+            return plan
+        return SidedPlan(plan, is_single if self.bent is None else is_single[self.bent.source])
+
+
+class SidedPlan:
+    """A plan for triangles some of which show no back."""
+
+    def __init__(self, plan: Planned | None, is_single: npt.NDArray[np.uint8]) -> None:
+        self._plan, self._is_single = plan, is_single
+
+    def fitted(self, view: View) -> View:
+        """Return the view with the plan, and without these backs."""
+        own = view if self._plan is None else self._plan.fitted(view)
+        return own.without_backs(self._is_single)
 
 
 def seen_through(mesh: Mesh, camera: Camera, frame: tuple[int, int], *, near_clip: bool = True) -> DrawnMesh:

@@ -22,6 +22,7 @@ from topleft._render.holes import draw_holed, has_cuts, holed_instances, solid_s
 from topleft._render.instances import peel_scene
 from topleft._render.render import DEFAULT_SIZE, WHITE, subject_of
 from topleft._render.scene_shade import shade
+from topleft._render.through_lens import seen_through
 
 __all__ = ["render_transparent", "visible_layers"]
 
@@ -146,5 +147,6 @@ def visible_layers(
     check_straight(camera)
     if isinstance(subject, Scene):
         return peel_scene(subject, camera, size, **options)
-    transform = camera.clip_from_world(options.get("viewport") or size)
-    return peel(subject.vertices, subject.triangles, size, transform=transform, **options)
+    drawn = seen_through(subject, camera, options.get("viewport") or size)
+    options |= {"transform": drawn.transform, "plan": drawn.sided(options.get("plan"), subject.single_sided())}
+    return peel(subject.vertices, subject.triangles, size, **options)

@@ -16,8 +16,10 @@ import numpy.typing as npt
 from topleft._camera.camera import Camera
 from topleft._io.layer_files import save_layers
 from topleft._model.adapt import MeshLike
+from topleft._model.points import Points
 from topleft._model.scene import Scene
 from topleft._raster.verbs import Rasterizer
+from topleft._render.cloud import CloudBuffer, framing_of
 from topleft._render.fragments import meshes_of
 from topleft._render.gbuffer import GBuffer
 from topleft._render.layers import LAYERS, check_layers, draw_layers
@@ -68,7 +70,7 @@ class ViewLayers(Mapping[str, Array]):
 
 
 def render_layers(
-    mesh: MeshLike | Scene,
+    mesh: MeshLike | Scene | Points,
     camera: Camera | None = None,
     size: tuple[int, int] = DEFAULT_SIZE,
     *,
@@ -86,7 +88,7 @@ def render_layers(
 
     Parameters
     ----------
-    mesh : Mesh, Scene, or whatever `as_mesh` takes
+    mesh : Mesh, Scene, Points, or whatever `as_mesh` takes
         What to look at.
     camera : Camera, optional
         Unless given, the three-quarter view of `Camera.framing`, with y up.
@@ -150,7 +152,9 @@ def render_layers(
     sub-pixel, which is what the snap moves a vertex by; float32 then rounds it. Flow is the difference of its two
     projections in float64, so what does not move has flow 0, to the bit.
 
-    All layers show the mesh or scene without what its materials cut out.
+    All layers show the mesh or scene without what its materials cut out. Of `Points` "triangle" is the index of the
+    point, and positions, distances and normals are those of its centre all over it; there are no "barycentric" and no
+    "uv", and attributes are of the points.
 
     Through a lens a point projects to within its `tolerance_px` and half a sub-pixel of the centre. "distance" is along
     the axis, also through a fisheye, whose "depth" is that of the distance from the eye.
@@ -182,7 +186,7 @@ def render_layers(
 
 
 def gbuffer_of(
-    mesh: MeshLike | Scene,
+    mesh: MeshLike | Scene | Points,
     camera: Camera | None,
     size: tuple[int, int],
     *,
@@ -193,7 +197,7 @@ def gbuffer_of(
     threads: int | None = None,
     rasterizer: Rasterizer | None = None,
     **look: Any,
-) -> GBuffer:
+) -> GBuffer | CloudBuffer:
     """Return what layers are taken of; arguments as for `render_layers`.
 
     Raises
@@ -205,6 +209,16 @@ def gbuffer_of(
     """
     for option in sorted(look.keys() - (GLASS_LOOKS if "opacity" in look else LOOKS)):
         raise TypeError(f"there is no option {option!r} of a picture")
+    if isinstance(mesh, Points):
+        return CloudBuffer(
+            mesh,
+            framing_of(mesh, camera, size),
+            size,
+            {"cull": cull, "threads": threads},
+            look,
+            camera_to,
+            None if transforms_to is None else as_transforms(transforms_to, 1),
+        )
     subject, camera = subject_of(mesh, camera, size, tolerance, cull=cull, material=look.get("material"))
     return GBuffer(
         subject=subject,

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft import _engine
-from topleft._base.threads import count_threads, parse_threads, run_parts
+from topleft._base.threads import run_parts, threads_for
 from topleft._camera.camera import Camera
 from topleft._model.material import Material
 from topleft._model.mesh import Mesh, has_holes
@@ -77,7 +77,7 @@ def cut_out(
     cut = cut_of(mesh, material)
     if cut is None or 0 in frags.triangle.shape:
         return
-    n_threads = count_threads(parse_threads(threads), len(mesh.triangles))
+    n_threads = threads_for(threads, len(mesh.triangles))
     for k in range(frags.samples_triangle.shape[-1]):
         cut_sample(frags.sample(k), mesh, camera, cut, n_threads)
 

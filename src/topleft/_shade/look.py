@@ -19,9 +19,10 @@ import numpy.typing as npt
 from topleft import _engine
 from topleft._base.color import DEFAULT_COLOR, LIGHT_OF_SRGB, Color, light_of
 from topleft._camera.camera import Camera
+from topleft._model.environment import DEFAULT_ENVIRONMENT, Environment
 from topleft._model.light import TO_HEADLIGHT, Fog, Light, LightKind, LightSpace
-from topleft._model.material import Material
-from topleft._model.mesh import Mesh
+from topleft._model.material import AlphaMode, Material
+from topleft._model.mesh import Mesh, is_laid
 from topleft._model.normals import box_of_triangles, color_rows, face_normal_rows, moved, turned_faces, unit_rows
 from topleft._model.texture import Texture
 
@@ -132,19 +133,26 @@ class ShadingMesh:
     center : (3,) float64
         The middle of the box round the vertices in use: the origin of the space that light is computed in, so that
         float32 is fine enough.
-    normals : (V, 4) float32
-        Unit normals, 0 where there is none, and 1.
+    normals : (N, 4) float32
+        Unit normals of the vertices, then of creased corners, 0 where there is none, and 1.
     colors : (V, 4) float32, optional
-        sRGB of the vertices, 0 to 255, and 1.
+        sRGB of the vertices, 0 to 255, and opacity, 0 to 1.
     """
 
     def __init__(self, mesh: Mesh, view: F64 | None = None) -> None:
         """`view`: (4, 4), takes the mesh to eye space first."""
-        normals, self._triangles = mesh.vertex_normals(), mesh.triangles
+        corners = None if mesh.is_faceted else mesh.corner_normals()
+        self._triangles = mesh.triangles
+        self.normal_of_corner = None if corners is None else corners.of_corner
+        self.vertex_of_row = None if corners is None else corners.vertex_of_row
         self.positions = mesh.vertices if view is None else moved(mesh.vertices, view)
         low, high = box_of_triangles(self.positions, self._triangles).astype(self.positions.dtype)
         self.center: F64 = np.asarray(low / 2 + high / 2, np.float64)
-        self.normals = unit_rows(normals, None if view is None else turn_of_normals(view))
+        if mesh.is_faceted:  # nobody reads normals of vertices where every face has its own
+            self.normals = np.ones((len(mesh.vertices), 4), np.float32)
+        else:
+            normals = mesh.vertex_normals() if corners is None else corners.rows
+            self.normals = unit_rows(normals, None if view is None else turn_of_normals(view))
         self.colors = None if mesh.colors is None else color_rows(mesh.colors)
 
     @cached_property
@@ -155,7 +163,7 @@ class ShadingMesh:
     @cached_property
     def is_turned(self) -> npt.NDArray[np.uint8] | None:
         """(T,): 1 where the normals of the corners point to the other side than the triangle; None if none does."""
-        turned = turned_faces(self.positions, self._triangles, self.normals)
+        turned = turned_faces(self.positions, self._triangles, self.normals, self.normal_of_corner)
         return turned if turned.view(np.bool_).any() else None
 
 
@@ -168,6 +176,32 @@ def shading_mesh_of(mesh: Mesh) -> ShadingMesh:
     if shading_mesh is None:
         shading_mesh = _shading_meshes[mesh] = ShadingMesh(mesh)
     return shading_mesh
+
+
+def is_full(material: Material) -> bool:
+    """Whether a surface has more than a colour, a texture and a highlight."""
+    texture = material.texture
+    return (
+        material.is_metallic_rough
+        or any(material.emission)
+        or material.occlusion_texture is not None
+        or material.normal_texture is not None
+        or (texture is not None and (texture.uv_set == 1 or texture.transform is not None))
+    )
+
+
+def full_part(material: Material, mesh: Mesh) -> tuple[Any, ...]:
+    """What `tl_material` has of a full material."""
+    metallic, roughness = (1.0 if value is None else value for value in (material.metallic, material.roughness))
+    maps = (
+        material.metallic_roughness_texture if material.is_metallic_rough else None,
+        material.occlusion_texture,
+        material.normal_texture,
+        material.emission_texture if any(material.emission) else None,
+    )
+    engines = [one.engine if one is not None and is_laid(one, mesh) else None for one in maps]
+    numbers = material.is_metallic_rough, metallic, roughness, material.occlusion_strength, material.normal_scale
+    return (*numbers, material.emission, *engines)
 
 
 class ShadingInputs:
@@ -183,6 +217,7 @@ class ShadingInputs:
         *,
         is_flat: bool,
     ) -> None:
+        is_flat = is_flat or mesh.is_faceted
         in_eye_space = not is_similarity(camera.view)
         self.mesh = ShadingMesh(mesh, camera.view) if in_eye_space else shading_mesh_of(mesh)
         viewport = size if scene.viewport is None else scene.viewport.size
@@ -190,38 +225,50 @@ class ShadingInputs:
         self.view = camera.view
         self.back_side = -1.0 if np.linalg.det(camera.view[:3, :3]) > 0 else 1.0
         self.is_in_eye_space = in_eye_space
-        self.uv = mesh.uv
         normals = self.mesh.normals
         if scene.viewport is not None and self.rays.has_perspective:
             normals = np.empty_like(normals)
-            _engine.set_inverse_w(scene, self.mesh.normals, normals)
+            _engine.set_inverse_w(scene, self.mesh.normals, self.mesh.vertex_of_row, normals)
         self.shading = _engine.ShadingTable(
             normals,
+            self.mesh.normal_of_corner,
             self.mesh.face_normals if is_flat else None,
             self.mesh.positions,
             None if is_flat else self.mesh.is_turned,
             mesh.uv,
+            mesh.uv1,
             self.mesh.colors,
+            mesh.has_alpha,
+            -self.back_side,
             material_of,
             LIGHT_OF_SRGB,
         )
 
-    def set_materials(self, mesh: Mesh, materials: Sequence[Material], *, is_unlit: bool) -> None:
-        """Take the materials; a row that several triangles name may be one for all."""
+    def set_materials(
+        self, mesh: Mesh, materials: Sequence[Material], *, is_unlit: bool, all_full: bool = False
+    ) -> None:
+        """Take the materials; a row that several triangles name may be one for all.
+
+        `all_full`: for an environment that lights them all, or their opacity; others are full where they need it.
+        """
         rows = []
         for one in materials:
-            texture = one.texture if mesh.uv is not None else None
+            texture = one.texture if is_laid(one.texture, mesh) else None
             has_colors = texture is not None or mesh.colors is not None
-            color = one.color or ((255, 255, 255) if has_colors else DEFAULT_COLOR)
+            color = (*light_of(one.color or ((255, 255, 255) if has_colors else DEFAULT_COLOR))[:3], one.opacity)
             back = light_of(one.back_color or (0, 0, 0))[:3]
             side = 0.0 if one.back_color is None else self.back_side
             shininess = one.shininess if one.specular > 0 else 0.0
-            cutoff = one.alpha_cutoff or 0.0
+            cutoff = (one.alpha_cutoff or 0.0) if one.alpha_mode is AlphaMode.MASK else 0.0
+            full = full_part(one, mesh) if all_full or is_full(one) else None
             engine = None if texture is None else texture.engine
-            rows.append(
-                (light_of(color), back, side, (one.specular,) * 3, shininess, is_unlit or one.unlit, cutoff, engine)
-            )
+            row = color, back, side, (one.specular,) * 3, shininess, is_unlit or one.unlit, cutoff, engine, full
+            rows.append(row)
         self.shading.set_materials(rows)
+
+    def set_opacity(self) -> None:
+        """Have the opacity of the surface in the alpha of the picture; all materials are full."""
+        self.shading.set_wants_opacity()
 
     def set_lights(self, lights: Sequence[Light] | None, ambient: float) -> None:
         """Take the lights, in shading space."""
@@ -231,6 +278,21 @@ class ShadingInputs:
         else:
             rows = [self._light(light) for light in lights]
         self.shading.set_lights(rows, (ambient,) * 3)
+
+    def set_environment(self, environment: Environment | None, world_from_mesh: F64 | None = None) -> None:
+        """Take the environment, or what metallic surfaces mirror without one.
+
+        `world_from_mesh`: (3, 3) for a mesh that stands in the world by a matrix, whose camera is the one in its space.
+        """
+        own = DEFAULT_ENVIRONMENT if environment is None else environment
+        rows = self.rays.eye_from
+        if own.space is LightSpace.WORLD:
+            rows = np.linalg.inv(self.view[:3, :3]) @ rows
+            rows = rows if world_from_mesh is None else world_from_mesh @ rows
+        rows = own.axes @ (rows / math.cbrt(abs(determinant(rows.tolist()))))
+        texels, table = own.levels or (None, None)
+        diffuse = 0.0 if environment is None else 1.0
+        self.shading.set_surroundings(_engine.Surroundings(texels, table, *own.colors, diffuse, rows.tolist()))
 
     def _light(self, light: Light) -> tuple[Any, ...]:
         rays, at = self.rays, np.array(light.at)

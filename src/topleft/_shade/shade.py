@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import lru_cache
 from typing import TypedDict
 
 import numpy as np
@@ -23,8 +24,9 @@ import numpy.typing as npt
 from topleft import _engine
 from topleft._base.color import LINEAR_ONE, Color, as_color, id_colors, srgb_tables
 from topleft._base.options import parse
-from topleft._base.threads import count_threads, parse_threads, run_parts
+from topleft._base.threads import count_threads, parse_threads, run_parts, threads_for
 from topleft._camera.camera import Camera
+from topleft._model.environment import Environment
 from topleft._model.light import AMBIENT, Fog, Light, as_not_negative
 from topleft._model.material import Material
 from topleft._model.mesh import Mesh
@@ -65,6 +67,7 @@ class LookOptions(TypedDict, total=False):
     material: Material | None
     matcap: Texture | None
     fog: Fog | None
+    environment: Environment | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +83,12 @@ class ShadingOptions:
     material: Material | None
     matcap: Texture | None
     fog: Fog | None
+    environment: Environment | None
     threads: int | None
+    world_from_mesh: F64 | None = None
+    """(3, 3): of an instance of a scene."""
+    shows_opacity: bool = False
+    """Whether the picture's alpha is the opacity of the surface."""
 
     @classmethod
     def parse(
@@ -88,19 +96,22 @@ class ShadingOptions:
         shading: str,
         color: Color,
         background: Color,
-        depth_range: tuple[float, float] | None,
-        lights: Sequence[Light] | None,
-        ambient: float | None,
-        material: Material | None,
-        matcap: Texture | None,
-        fog: Fog | None,
-        threads: int | None,
+        depth_range: tuple[float, float] | None = None,
+        lights: Sequence[Light] | None = None,
+        ambient: float | None = None,
+        material: Material | None = None,
+        matcap: Texture | None = None,
+        fog: Fog | None = None,
+        environment: Environment | None = None,
+        threads: int | None = None,
     ) -> ShadingOptions:
         """Check the options of a call."""
         mode = parse(Shading, "shading", shading)
-        _check_types(lights=(lights or ()), material=material, matcap=matcap, fog=fog)
+        _check_types(lights=(lights or ()), material=material, matcap=matcap, fog=fog, environment=environment)
         if mode is Shading.MATCAP and matcap is None:
             raise ValueError("matcap must be a Texture for shading 'matcap', got None")
+        if environment is not None:  # which lights by itself
+            lights, ambient = lights or (), ambient or 0.0
         return cls(
             mode,
             as_color("color", color, 3),
@@ -111,8 +122,15 @@ class ShadingOptions:
             material,
             matcap,
             fog,
+            environment,
             parse_threads(threads),
         )
+
+
+@lru_cache(maxsize=64)
+def plain_material(color: Color | None) -> Material:
+    """The material of a mesh that has none; checking one takes a hundredth of a small picture."""
+    return Material(color)
 
 
 def shade_mesh(frags: Fragments, mesh: Mesh, camera: Camera, options: ShadingOptions) -> U8:
@@ -128,12 +146,17 @@ def shade_mesh(frags: Fragments, mesh: Mesh, camera: Camera, options: ShadingOpt
     planes = frags.samples_triangle.transpose(2, 0, 1), frags.samples_depth.transpose(2, 0, 1)
     kinds = np.int32, np.float32
     ids, depth = (np.require(array, kind, ["C", "A"]) for array, kind in zip(planes, kinds, strict=True))
-    plain = Material(options.color if mesh.colors is None else None)
-    own = (options.material,) if options.material is not None else mesh.materials or (plain,)
+    own = (options.material,) if options.material is not None else mesh.materials
+    own = own or (plain_material(options.color if mesh.colors is None else None),)
     rows = mesh.material_of_triangle if own is mesh.materials and len(own) > 1 else None
     look = ShadingInputs(scene, mesh, camera, picture.shape[1::-1], rows, is_flat=options.mode is Shading.FLAT)
-    look.set_materials(mesh, own, is_unlit=options.mode is Shading.UNLIT)
+    all_full = options.environment is not None or options.shows_opacity
+    look.set_materials(mesh, own, is_unlit=options.mode is Shading.UNLIT, all_full=all_full)
     look.set_lights(options.lights, options.ambient)
+    if options.environment is not None or any(one.is_metallic_rough for one in own):
+        look.set_environment(options.environment, options.world_from_mesh)
+    if options.shows_opacity:
+        look.set_opacity()
     look.set_view(SHOW_CODES.get(options.mode, 0), options.matcap, options.background)
     look.set_fog(options.fog)
     positions = None if len(ids) == 1 else sample_positions(len(ids), scene.subpixel_bits)
@@ -260,7 +283,7 @@ def shade_normals(frags: Fragments, mesh: Mesh, camera: Camera, turn: F64, *, th
     scene = frags._snapped
     look = ShadingInputs(scene, mesh, camera, ids.shape[::-1], None, is_flat=False)
     look.set_turn(SHOW_CODES[Shading.NORMALS], turn)
-    n_threads = count_threads(parse_threads(threads), len(mesh.triangles))
+    n_threads = threads_for(threads, len(mesh.triangles))
 
     def shade_rows(first: int, end: int) -> None:
         _engine.shade_normals(scene, look.shading, ids, out, first, end - first)
@@ -269,10 +292,15 @@ def shade_normals(frags: Fragments, mesh: Mesh, camera: Camera, turn: F64, *, th
     return out
 
 
-def _check_types(lights: Sequence[Light], material: object, matcap: object, fog: object) -> None:
+def _check_types(lights: Sequence[Light], material: object, matcap: object, fog: object, environment: object) -> None:
     for light in lights:
         if not isinstance(light, Light):
             raise TypeError(f"lights must be of Light, got {type(light).__name__}")
-    for name, value, kind in (("material", material, Material), ("matcap", matcap, Texture), ("fog", fog, Fog)):
+    kinds = (
+        ("material", material, Material), ("matcap", matcap, Texture), ("fog", fog, Fog),
+        ("environment", environment, Environment),
+    )  # fmt: skip
+    for name, value, kind in kinds:
         if value is not None and not isinstance(value, kind):
-            raise TypeError(f"{name} must be a {kind.__name__}, got {type(value).__name__}")
+            article = "an" if kind is Environment else "a"
+            raise TypeError(f"{name} must be {article} {kind.__name__}, got {type(value).__name__}")

@@ -1,12 +1,14 @@
-"""The command line: `topleft render MESH [MESH ...] -o OUT`, `topleft explain MESH`, `calibrate` and `info`.
+"""The command line: `topleft render MESH [MESH ...] -o OUT`, `topleft explain MESH`, `mask`, `calibrate` and `info`.
 
-Exit status: 0, all pictures were written; 1, some of several inputs failed and the rest were written; 2, nothing could
+Exit status: 0, all pictures were written; 1, some of several inputs failed and the rest were written, or, with
+--strict, a mesh lacks something of its file; 2, nothing could
 be done with what was asked, told in one line on stderr.
 
 animation.py  writes the views of a mesh one after the other, by Pillow or ffmpeg
 arguments.py  defines what `topleft render` takes
 explain.py    runs `topleft explain` and `topleft calibrate`
 job_file.py   reads jobs from TOML or JSON
+mask.py       runs `topleft mask`
 render.py     runs `topleft render`: from arguments to files
 sheet.py      puts many pictures, reduced, on one
 targets.py    finds which picture goes to which file, before anything is drawn
@@ -19,9 +21,11 @@ import sys
 from collections.abc import Mapping, Sequence
 
 from topleft._engine.isa import build_info
+from topleft._io.notes import listening
 from topleft.cli.arguments import REFUSED, Parser, UsageError, add_render_arguments
 from topleft.cli.explain import add_plan_commands
-from topleft.cli.render import FAILED, complain, one_line, run_render
+from topleft.cli.mask import add_mask_command
+from topleft.cli.render import FAILED, complain, complain_of_lacks, one_line, run_render
 from topleft.errors import TopleftError
 
 __all__ = ["FAILED", "REFUSED", "UsageError", "main"]
@@ -31,7 +35,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Return the exit status of the command line, `sys.argv` unless arguments are given."""
     options = _parser().parse_args(arguments)
     try:
-        status: int = options.run(options)
+        with listening() as lacks:
+            status: int = options.run(options)
+        complain_of_lacks(lacks)
     except (TopleftError, OSError, ValueError, MemoryError) as error:
         complain(one_line(error))
         return REFUSED
@@ -61,4 +67,5 @@ def _parser() -> Parser:
     add_render_arguments(render)
     render.set_defaults(run=run_render)
     add_plan_commands(commands)
+    add_mask_command(commands)
     return parser

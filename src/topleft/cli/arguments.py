@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterable
 from typing import NoReturn
 
+from topleft._base.arrays import as_point_size
 from topleft._base.color import DEFAULT_COLOR
 from topleft._base.options import Cull, Sampling
 from topleft._camera.camera import DEFAULT_FOV_Y_DEG
 from topleft._camera.matrices import THREE_QUARTER_DEG
 from topleft._io.images import PICTURE_SUFFIXES, SUFFIXES
+from topleft._model.adapt import DEFAULT_CREASE
+from topleft._model.mesh import as_crease
+from topleft._model.points import DEFAULT_POINT_SIZE
 from topleft._render.layers import LAYERS, check_layers
 from topleft._render.render import DEFAULT_SIZE
 from topleft._shade.shade import Shading
@@ -18,17 +23,20 @@ from topleft.errors import TopleftError
 from topleft.scenes import SHAPES
 
 __all__ = [
-    "REFUSED", "Parser", "UsageError", "add_picture_arguments", "add_render_arguments", "positive", "size", "tolerance",
+    "REFUSED", "Parser", "UsageError", "add_picture_arguments", "add_render_arguments", "meant", "positive", "size",
+    "tolerance",
 ]  # fmt: skip
 
 REFUSED = 2
 """Exit status: nothing could be done."""
 
+UP_HELP = "the axis that points up: z for most CAD, print, scan and map files; never guessed (default y)"
+
 LAYERS_OF_ONE_VIEW = tuple(name for name in LAYERS if name != "flow")
 """Flow needs a second camera, or a second place."""
 
 RENDER_HELP = f"""\
-MESH is a file that trimesh reads (OBJ, PLY, STL, glTF, GLB, OFF, ...) or the name of a built-in shape:
+MESH is a file (OBJ, PLY, glTF, GLB, STL, OFF, and what else trimesh reads) or the name of a built-in shape:
 {", ".join(SHAPES)}.
 
 OUT is a file or a folder:
@@ -36,6 +44,7 @@ OUT is a file or a folder:
   pictures/          a folder, made if need be: pictures/bunny.png, or pictures/bunny-000.png, ...
   a/{{name}}-{{view}}.jpg   a pattern: {{name}} of the mesh, {{view}} and {{index}} of the mesh in the list, as numbers,
                      {{layer}}; several layers without it: knot-color.png, knot-depth.png, ...
+Meshes of one name and different formats have the format in theirs: bunny-obj.png, bunny-ply.png.
 Formats: {" ".join(SUFFIXES)} (PNG in a folder). A picture of that name is replaced, a mesh never.
 
 --layers: {", ".join(LAYERS_OF_ONE_VIEW[:8])},
@@ -54,7 +63,11 @@ what stands outside of jobs, or on the command line, holds where a job does not 
   out = "thumbs/{{name}}-{{view}}.png"              "out": "thumbs/{{name}}-{{view}}.png",
   views = 12                                     "views": 12}}]}}
 
-Exit status: 0, all was written; 1, something failed, which is listed, and the rest was written; 2, nothing was.
+The picture fills the frame but for 5 %; those of --views keep one distance, so that the size does not change. What a
+mesh lacks of its file (textures that are not there, say) is told in one line at the end.
+
+Exit status: 0, all was written; 1, something failed, which is listed, and the rest was written, or --strict and a
+mesh lacks something; 2, nothing was written.
 """
 
 MAX_VIEWS = 100_000
@@ -70,7 +83,24 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Leave with exit status 2."""
-        self.exit(REFUSED, f"topleft: {message} (try: {self.prog} --help)\n")
+        words = message.split() if message.startswith("unrecognized") else []
+        unknown = [word.partition("=")[0] for word in words if word.startswith("-")]
+        guess = meant(unknown[0], self._options()) if unknown else ""
+        self.exit(REFUSED, f"topleft: {message}{guess} (try: {self.prog} --help)\n")
+
+    def _options(self) -> list[str]:
+        """The options of this parser and of its commands."""
+        found = [name for action in self._actions for name in action.option_strings]
+        commands = [action.choices for action in self._actions if isinstance(action, argparse._SubParsersAction)]
+        return found + [name for parsers in commands for parser in parsers.values() for name in parser._options()]
+
+
+def meant(word: str, known: Iterable[str]) -> str:
+    """What a person may have meant by a word that is not known, as the end of a message."""
+    from difflib import get_close_matches  # 3 ms that only errors need
+
+    found = get_close_matches(word, list(known), 1)
+    return f"; did you mean {found[0]}?" if found else ""
 
 
 def add_render_arguments(parser: Parser) -> None:
@@ -84,6 +114,7 @@ def add_render_arguments(parser: Parser) -> None:
     add("--jobs", type=positive, default=1, metavar="N", help="pictures that are drawn side by side (default 1)")
     add("--jobs-file", metavar="FILE", help="what to render, as TOML or JSON; see below")
     add("--resume", action="store_true", help="leave out pictures whose files are there")
+    add("--strict", action="store_true", help="exit with 1 if a mesh lacks something of its file: a texture, say")
     add("--sheet", metavar="FILE", help=f"all pictures on one sheet: {' '.join(PICTURE_SUFFIXES)}")
     add(
         "--animation",
@@ -114,7 +145,8 @@ def add_picture_arguments(parser: argparse.ArgumentParser) -> None:
     add("--elevation", type=float, default=elevation, metavar="DEG", help="above level (default %(default)g)")
     add("--fov", type=float, default=DEFAULT_FOV_Y_DEG, metavar="DEG", help="bottom to top (default %(default)g)")
     add("--ortho", action="store_true", help="no perspective")
-    add("--up", choices=["y", "z"], default="y", help="the axis that points up (default y)")
+    add("--camera", type=_index, default=None, metavar="N", help="the camera N of a glTF file, from 0")
+    add("--up", choices=["y", "z"], default="y", help=UP_HELP)
     add = parser.add_argument_group("look").add_argument
     add(
         "--shading",
@@ -131,8 +163,20 @@ def add_picture_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="COLOR",
         help="a name, #rrggbb[aa] or transparent (default white)",
     )
+    add(
+        "--crease",
+        type=_crease,
+        default=DEFAULT_CREASE,
+        metavar="DEG",
+        help="edges that bend by more are sharp, of a mesh without normals; 0: all, 180: none (default %(default)g)",
+    )
     add("--texture", metavar="FILE", help="a picture for all of a mesh that has texture coordinates")
     add("--matcap", metavar="FILE", help="a picture of a lit sphere, for --shading matcap")
+    add(
+        "--environment",
+        metavar="SKY,GROUND",
+        help="light from all around: a colour, one above and one below, or a picture of all directions",
+    )
     add("--opacity", type=_share, default=None, metavar="X", help="0 to 1: as if of glass, of which each layer hides X")
     add(
         "--tolerance",
@@ -147,9 +191,17 @@ def add_picture_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--sampling",
         choices=samplings,
-        default="center",
+        default=None,
         metavar="NAME",
-        help=f"samples of a pixel: {', '.join(samplings)} (default center)",
+        help=f"samples of a pixel: {', '.join(samplings)} (default msaa4; center with --layers, .npz, --opacity and "
+        "--shading ids or depth)",
+    )
+    add(
+        "--point-size",
+        type=_point_size,
+        default=DEFAULT_POINT_SIZE,
+        metavar="PX",
+        help="of clouds of points: the diameter of a point, pixels (default %(default)g)",
     )
 
 
@@ -176,6 +228,12 @@ def positive(text: str) -> int:
     return int(text)
 
 
+def _index(text: str) -> int:
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"must be a whole number from 0, got {text!r}")
+    return int(text)
+
+
 def _share(text: str) -> float:
     try:
         share = float(text)
@@ -184,6 +242,20 @@ def _share(text: str) -> float:
     if not 0 <= share <= 1:
         raise argparse.ArgumentTypeError(f"must be a number from 0 to 1, got {text!r}")
     return share
+
+
+def _point_size(text: str) -> float:
+    try:
+        return float(as_point_size("--point-size", float(text), 1))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"must be a positive number of pixels, got {text!r}") from None
+
+
+def _crease(text: str) -> float:
+    try:
+        return as_crease(float(text))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"must be an angle from 0 to 180 degrees, got {text!r}") from None
 
 
 def tolerance(text: str) -> float:

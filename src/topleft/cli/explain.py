@@ -11,7 +11,7 @@ from topleft._camera.matrices import THREE_QUARTER_DEG
 from topleft._plan.costs import save_costs
 from topleft._plan.plan import plan
 from topleft._render.render import DEFAULT_SIZE
-from topleft.cli.arguments import positive, size, tolerance
+from topleft.cli.arguments import UP_HELP, positive, size, tolerance
 from topleft.cli.targets import MeshSource, Orbit
 
 __all__ = ["add_plan_commands", "run_calibrate", "run_explain"]
@@ -68,7 +68,7 @@ def add_plan_commands(commands: Any) -> None:
     add("--elevation", type=float, default=elevation, metavar="DEG", help="above level (default %(default)g)")
     add("--fov", type=float, default=DEFAULT_FOV_Y_DEG, metavar="DEG", help="bottom to top (default %(default)g)")
     add("--ortho", action="store_true", help="no perspective")
-    add("--up", choices=["y", "z"], default="y", help="the axis that points up (default y)")
+    add("--up", choices=["y", "z"], default="y", help=UP_HELP)
     add("--cull", choices=[str(side) for side in Cull], default="none", help="leave out triangles (default none)")
     add("--sampling", choices=[str(mode) for mode in Sampling], default="center", help="of a pixel (default center)")
     add("--tolerance", type=tolerance, default=0.0, metavar="PX", help="by which outlines may be off (default 0)")

@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NoReturn
 
-from topleft.cli.arguments import UsageError, add_picture_arguments
+from topleft.cli.arguments import UsageError, add_picture_arguments, meant
 
 __all__ = ["read_jobs"]
 
@@ -78,7 +78,8 @@ def _arguments(
             continue
         action = keys.get(key)
         if action is None:
-            raise UsageError(f"there is no key {key!r}; there are mesh, {', '.join(keys)}")
+            guess = meant(key, ["mesh", *keys])
+            raise UsageError(f"there is no key {key!r}{guess or '; there are mesh, ' + ', '.join(keys)}")
         words += _words(action, key, value)
     meshes = [meshes] if isinstance(meshes, str) else meshes
     if not isinstance(meshes, list) or not meshes or not all(isinstance(mesh, str) for mesh in meshes):

@@ -10,6 +10,7 @@ import os
 import signal
 import sys
 import tempfile
+import warnings
 from collections.abc import Sequence
 from concurrent.futures import Executor
 from contextlib import ExitStack
@@ -22,16 +23,20 @@ from topleft.cli.animation import check_animation, save_animation
 from topleft.cli.arguments import UsageError
 from topleft.cli.job_file import read_jobs
 from topleft.cli.sheet import make_sheet
-from topleft.cli.targets import MeshJobs, check_targets, plan_jobs
-from topleft.errors import MissingPackageError, TopleftError
+from topleft.cli.targets import MeshJobs, check_targets, check_words, plan_jobs
+from topleft.errors import MeshWarning, MissingPackageError, TopleftError
 
-__all__ = ["FAILED", "complain", "one_line", "run_render"]
+__all__ = ["FAILED", "complain", "complain_of_lacks", "one_line", "run_render"]
 
 FAILED = 1
 """Exit status: a part of the work failed."""
 
 MOST_VIEWS_TOGETHER = 16
 """Views of a mesh that a process draws before it gives word: it reads the mesh once for them."""
+
+
+MOST_LACKS = 8
+"""What meshes lack that one line tells."""
 
 
 def run_render(options: argparse.Namespace) -> int:
@@ -45,9 +50,10 @@ def run_render(options: argparse.Namespace) -> int:
         if extras:
             _check_pictures(groups, options)
         check_targets(groups, extras)
-        failed = _render(groups, options)
+        failed, lacks = _render(groups, options)
         for _, message in failed:
             complain(message)
+        complain_of_lacks(lacks)
         for path, group in animations:
             if all(file.is_file() for file in _color_files(group)):
                 path.parent.mkdir(parents=True, exist_ok=True)
@@ -62,7 +68,7 @@ def run_render(options: argparse.Namespace) -> int:
         sources = list(dict.fromkeys(source for source, _ in failed))
         complain(f"{len(sources)} of {len(groups)} meshes failed: {' '.join(sources)}")
         return FAILED
-    return 0
+    return FAILED if lacks and options.strict else 0
 
 
 def _plan(options: argparse.Namespace, stack: ExitStack) -> list[MeshJobs]:
@@ -85,12 +91,15 @@ def _plan(options: argparse.Namespace, stack: ExitStack) -> list[MeshJobs]:
     return groups
 
 
-def _render(groups: Sequence[MeshJobs], options: argparse.Namespace) -> list[tuple[str, str]]:
-    """Render all; the sources of what failed, each with the reason, once."""
+def _render(groups: Sequence[MeshJobs], options: argparse.Namespace) -> tuple[list[tuple[str, str]], list[str]]:
+    """Render all; the sources of what failed, each with the reason, once, and what meshes lack of their files."""
     jobs = [job for group in groups for job in group.jobs]
     source_of = [group.source for group in groups for _ in group.jobs]
     failed: dict[tuple[str, str], None] = {}
+    lacks: dict[str, None] = {}
     with ExitStack() as stack:
+        stack.enter_context(warnings.catch_warnings())
+        warnings.simplefilter("ignore", MeshWarning)  # results have them
         bar = stack.enter_context(_Progress(len(jobs)))
         executor = _executor(groups, options.jobs, stack)
         chunk = min(MOST_VIEWS_TOGETHER, max(len(group.jobs) for group in groups))
@@ -101,6 +110,7 @@ def _render(groups: Sequence[MeshJobs], options: argparse.Namespace) -> list[tup
             )
         )  # fmt: skip
         for result in results:
+            lacks |= dict.fromkeys(result.warnings)
             if result.error is None:
                 continue
             known = isinstance(result.error, (TopleftError, OSError, ValueError, MemoryError))
@@ -108,7 +118,7 @@ def _render(groups: Sequence[MeshJobs], options: argparse.Namespace) -> list[tup
                 raise result.error
             failed[source_of[result.index], one_line(result.error)] = None
     order = {group.source: i for i, group in reversed(list(enumerate(groups)))}
-    return sorted(failed, key=lambda entry: order[entry[0]])
+    return sorted(failed, key=lambda entry: order[entry[0]]), list(lacks)
 
 
 def _executor(groups: Sequence[MeshJobs], n: int, stack: ExitStack) -> Executor | int | None:
@@ -130,6 +140,7 @@ def _ignore_interrupt() -> None:
 def _animations(groups: Sequence[MeshJobs], options: argparse.Namespace) -> list[tuple[Path, MeshJobs]]:
     if not options.animation:
         return []
+    check_words("--animation", Path(options.animation), ("name", "index"))
     if len(groups) > 1 and "{name}" not in options.animation and "{index}" not in options.animation:
         raise UsageError(f"several meshes need {{name}} in --animation, got {options.animation!r}")
     return [
@@ -182,6 +193,13 @@ class _Progress:
 def complain(message: str) -> None:
     """Print one line on stderr."""
     print(f"topleft: {message}", file=sys.stderr)
+
+
+def complain_of_lacks(lines: Sequence[str]) -> None:
+    """Print what meshes lack of their files, in one line."""
+    if lines:
+        more = f"; and {len(lines) - MOST_LACKS} more" if len(lines) > MOST_LACKS else ""
+        complain("; ".join(lines[:MOST_LACKS]) + more)
 
 
 def one_line(error: BaseException) -> str:

@@ -7,27 +7,34 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from topleft._base.options import Sampling
 from topleft._batch.jobs import Job
 from topleft._camera.camera import Camera
+from topleft._camera.file_cameras import load_cameras
 from topleft._io.images import SUFFIXES
 from topleft._io.load import load
+from topleft._io.references import decoded
+from topleft._model.adapt import DEFAULT_CREASE
+from topleft._model.environment import Environment
 from topleft._model.material import Material
 from topleft._model.mesh import Mesh
+from topleft._model.points import DEFAULT_POINT_SIZE, Points
 from topleft._model.texture import Texture
 from topleft._shade.shade import Shading
-from topleft.cli.arguments import UsageError
+from topleft.cli.arguments import UsageError, meant
 from topleft.errors import ImageError, MeshError
 from topleft.scenes import SHAPES, shape
 
-__all__ = ["MeshJobs", "check_targets", "plan_jobs"]
+__all__ = ["MeshJobs", "MeshSource", "Orbit", "check_targets", "check_words", "plan_jobs"]
 
 SHADINGS_WITH_NUMBERS: Mapping[str, str] = {"ids": "triangle", "depth": "depth", "normals": "camera_normal"}
 """Shadings that are a layer made visible: .npy holds the layer."""
@@ -42,26 +49,59 @@ class MeshSource:
 
     name: str
     texture: str | None = None
+    crease: float = DEFAULT_CREASE
+    point_size: float = DEFAULT_POINT_SIZE
 
-    def __call__(self) -> Mesh:
+    def __call__(self) -> Mesh | Points:
         """Read it."""
         mesh = self._mesh()
+        if isinstance(mesh, Points):
+            return replace(mesh, size=self.point_size)
         if self.texture is None:
             return mesh
         if mesh.uv is None:
             raise MeshError(f"--texture needs texture coordinates, and {self.name!r} has none")
         return replace(mesh, materials=(Material(texture=read_texture(self.texture)),), material_of_triangle=None)
 
-    def _mesh(self) -> Mesh:
+    def _mesh(self) -> Mesh | Points:
         if self.name in SHAPES:
-            return Mesh(*shape(self.name))
+            return Mesh(*shape(self.name), crease=self.crease)
         if not Path(self.name).exists() and Path(self.name).name == self.name and "." not in self.name:
             raise UsageError(f"there is no file and no built-in shape {self.name!r}; shapes: {', '.join(SHAPES)}")
-        return load(self.name)
+        return load(self.name, crease=self.crease)
 
 
 def read_texture(path: str) -> Texture:
-    """The picture of a file.
+    """The picture of a file; errors as of `read_image`."""
+    return Texture(read_image(path))
+
+
+def read_environment(text: str, up: str) -> Environment:
+    """The light from all around that a colour, two of them, or the picture of a file tells.
+
+    Raises
+    ------
+    UsageError
+        If it is neither.
+    ImageError, OSError
+        As of `read_image`.
+    """
+    from PIL import ImageColor
+
+    top = (0.0, 0.0, 1.0) if up == "z" else (0.0, 1.0, 0.0)
+    try:
+        colors = [ImageColor.getcolor(name.strip(), "RGB") for name in text.split(",")]
+    except ValueError:
+        if not Path(text).suffix:
+            raise UsageError(f"--environment must be one or two colours or a picture, got {text!r}") from None
+        return Environment(image=read_image(text)[..., :3], up=top)
+    if len(colors) > 2:
+        raise UsageError(f"--environment must be one or two colours, got {len(colors)}")
+    return Environment(colors[0], colors[1] if len(colors) == 2 else None, up=top)  # type: ignore[arg-type]
+
+
+def read_image(path: str) -> npt.NDArray[np.uint8]:
+    """The picture (H, W, 4) of a file.
 
     Raises
     ------
@@ -70,26 +110,30 @@ def read_texture(path: str) -> Texture:
     OSError
         If it cannot be read.
     """
-    from PIL import Image, UnidentifiedImageError
-
+    if not Path(path).is_file() and Path(path).exists():
+        raise ImageError(f"cannot read {path!r}: it is no file")
     try:
-        with Image.open(path) as image:
-            return Texture(np.asarray(image.convert("RGBA")))
-    except UnidentifiedImageError:
+        return decoded(Path(path).read_bytes())
+    except MeshError as error:
+        raise ImageError(f"cannot read {path!r}: it is {error}") from None
+    except (OSError, ValueError, SyntaxError, EOFError) as error:
+        if isinstance(error, OSError) and error.filename is not None:
+            raise
         raise ImageError(f"cannot read {path!r}: it is no picture that Pillow knows") from None
 
 
 @dataclass(frozen=True)
 class Orbit:
-    """The camera of `Camera.framing`, for whatever mesh."""
+    """The camera of `Camera.framing`, for whatever mesh; `fits`: its picture fills the frame."""
 
     azimuth_deg: float
     elevation_deg: float
     fov_y_deg: float
     up: Any
     ortho: bool
+    fits: bool = True
 
-    def __call__(self, mesh: Mesh, size: tuple[int, int]) -> Camera:
+    def __call__(self, mesh: Mesh | Points, size: tuple[int, int]) -> Camera:
         """Return it."""
         return Camera.framing(
             mesh,
@@ -99,7 +143,23 @@ class Orbit:
             up=self.up,
             ortho=self.ortho,
             aspect=size[0] / size[1],
+            fit="silhouette" if self.fits else "sphere",
         )
+
+
+@dataclass(frozen=True)
+class FileCamera:
+    """A camera of the file of the mesh."""
+
+    path: str
+    index: int
+
+    def __call__(self, mesh: Mesh, size: tuple[int, int]) -> Camera:  # noqa: ARG002
+        """Read it."""
+        cameras = [] if self.path in SHAPES else load_cameras(self.path)
+        if self.index >= len(cameras):
+            raise MeshError(f"--camera {self.index}: {self.path!r} has {len(cameras)} cameras")
+        return cameras[self.index]
 
 
 @dataclass(frozen=True)
@@ -119,22 +179,50 @@ def plan_jobs(options: argparse.Namespace, start: int = 0) -> list[MeshJobs]:
     UsageError
         If OUT cannot hold the pictures.
     """
+    if options.camera is not None and options.views > 1:
+        raise UsageError("--camera does not go with --views: a camera of a file stands still")
     pattern = _pattern(options.out, options)
     drawing = _render_options(options)
     groups = []
+    names = names_of(options.meshes)
     for i_mesh, source in enumerate(options.meshes, start):
-        name = source if source in SHAPES else Path(source).stem
+        name = names[i_mesh - start]
+        mesh = MeshSource(source, options.texture, options.crease, options.point_size)
         jobs = []
         for i_view in range(options.views):
             # Not str.format: a folder may have other braces in its name.
             filled = pattern.replace("{view}", f"{i_view:03d}").replace("{index}", f"{i_mesh:03d}")
             azimuth_deg = options.azimuth + 360 * i_view / options.views
-            orbit = Orbit(azimuth_deg, options.elevation, options.fov, options.up, options.ortho)
+            camera: Orbit | FileCamera = Orbit(
+                azimuth_deg, options.elevation, options.fov, options.up, options.ortho, fits=options.views == 1
+            )
+            if options.camera is not None:
+                camera = FileCamera(source, options.camera)
             path = filled.replace("{name}", name)
             layers = _layers(path, options)
-            jobs.append(Job(MeshSource(source, options.texture), orbit, options.size, drawing, path, layers))
+            jobs.append(Job(mesh, camera, options.size, drawing, path, layers))
         groups.append(MeshJobs(source, name, tuple(jobs)))
     return groups
+
+
+def names_of(sources: Sequence[str]) -> list[str]:
+    """What {name} stands for: the file without its suffix, or with it where another file differs in nothing else."""
+    stems = [source if source in SHAPES else Path(source).stem for source in sources]
+    suffixes = [Path(source).suffix.casefold().removeprefix(".") for source in sources]
+    suffixes_of: dict[str, set[str]] = {}
+    for stem, suffix in zip(stems, suffixes, strict=True):
+        suffixes_of.setdefault(stem.casefold(), set()).add(suffix)
+    return [
+        f"{stem}-{suffix}" if suffix and len(suffixes_of[stem.casefold()]) > 1 else stem
+        for stem, suffix in zip(stems, suffixes, strict=True)
+    ]
+
+
+def default_sampling(options: argparse.Namespace) -> str:
+    """Several samples where light is shown, one where numbers are written or pixels stand for ids or distances."""
+    is_light = options.shading not in (Shading.IDS, Shading.DEPTH) and options.opacity is None
+    is_picture = not options.layers and Path(options.out).suffix.lower() != ".npz"
+    return str(Sampling.MSAA4 if is_light and is_picture else Sampling.CENTER)
 
 
 def _render_options(options: argparse.Namespace) -> dict[str, Any]:
@@ -150,9 +238,11 @@ def _render_options(options: argparse.Namespace) -> dict[str, Any]:
     }
     if options.matcap is not None:
         drawing["matcap"] = read_texture(options.matcap)
+    if options.environment is not None:
+        drawing["environment"] = read_environment(options.environment, options.up)
     if options.opacity is None:
-        return drawing | {"edges": options.wireframe, "sampling": options.sampling}
-    if options.wireframe or options.sampling != Sampling.CENTER:
+        return drawing | {"edges": options.wireframe, "sampling": options.sampling or default_sampling(options)}
+    if options.wireframe or options.sampling not in (None, Sampling.CENTER):
         raise UsageError("--opacity goes with neither --wireframe nor --sampling")
     return drawing | {"opacity": options.opacity}
 
@@ -169,6 +259,7 @@ def _layers(path: str, options: argparse.Namespace) -> tuple[str, ...]:
 def _pattern(out: str, options: argparse.Namespace) -> str:
     """OUT as a file name with {name}, {view}, {index} and {layer} where several pictures need them."""
     path = Path(out)
+    check_words("OUT", path, ("name", "view", "index", "layer"))
     is_folder = out.endswith(("/", "\\")) or path.is_dir() or not path.suffix
     if not out or (path.suffix.lower() not in SUFFIXES and not is_folder):
         raise UsageError(f"OUT must end in one of {' '.join(SUFFIXES)}, or in / for a folder, got {out!r}")
@@ -184,6 +275,17 @@ def _pattern(out: str, options: argparse.Namespace) -> str:
     if several_layers and "{layer}" not in out:
         stem += "-{layer}"
     return str(path.with_name(stem + path.suffix))
+
+
+def check_words(what: str, path: Path, known: Sequence[str]) -> None:
+    """Raise a `UsageError` for a word in braces that stands for nothing, unless a folder is called so."""
+    folder = Path()
+    for part in path.parts:
+        folder /= part
+        for word in re.findall(r"\{(\w*)\}", part):
+            if word not in known and not folder.exists():
+                words = ", ".join(f"{{{each}}}" for each in known)
+                raise UsageError(f"{what} may have {words}, got {{{word}}} in {str(path)!r}{meant(word, known)}")
 
 
 def check_targets(groups: Sequence[MeshJobs], others: Iterable[Path] = ()) -> None:

@@ -15,6 +15,8 @@ area.py       cuts each triangle to each pixel square: exact areas
 blend.py      blends a colour into a pixel
 lines.py      draws the edges of a mesh as lines
 peel.py       sorts the layers of each pixel, and composites them
+points.py     draws points as discs or squares
+polygons.py   counts winding numbers of rings: masks, and exact areas
 sampling.py   draws several samples a pixel, and conservative coverage
 """
 

@@ -1,0 +1,196 @@
+"""The study of polygons: every painter in turns on each case, one process, with its wrong pixels beside the time.
+
+What is right comes from topleft's scalar kernels by another way (a polygon at a time, the mask of each one), which the
+tests hold against integers; of areas, from the table of the scalar kernels. A pixel is wrong where an area is off by
+more than 1e-6.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from benchmarks.harness.arguments import add_names, add_number, add_out, options_of, refuse_unknown, set_options
+from benchmarks.harness.machine import describe, version_of
+from benchmarks.harness.records import Record, Save, tell
+from benchmarks.harness.turns import take_turns, turn_of
+from benchmarks.polygons.cases import CASES, PolygonCase
+from benchmarks.polygons.painters import PAINTERS
+from benchmarks.report.study import Study
+
+
+@dataclass(frozen=True)
+class Options:
+    """What to run and how."""
+
+    cases: tuple[str, ...] = tuple(CASES)
+    painters: tuple[str, ...] = tuple(PAINTERS)
+    threads: int = 1
+    repeats: int = 7
+    seconds: float = 0.05
+    slow_s: float = 1.0
+    """A call that takes longer is timed once, and takes no turns."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    set_options(parser, Options())
+    add_names(parser, "--case", "cases", f"of {', '.join(CASES)}")
+    add_names(parser, "--painter", "painters", f"of {', '.join(PAINTERS)}")
+    add_number(parser, "--threads", "threads", "of those that can use them")
+    add_number(parser, "--repeats", "repeats", "rounds")
+    parser.add_argument("--seconds", type=float, metavar="S", help="how long a turn is, at least a call")
+    parser.add_argument("--slow", dest="slow_s", type=float, metavar="S", help="calls that take longer are timed once")
+    add_out(parser)
+
+
+def run(arguments: argparse.Namespace, save: Save) -> Record:
+    """Measure milliseconds of each call, in turns."""
+    options = options_of(Options, arguments)
+    refuse_unknown("case", options.cases, CASES)
+    refuse_unknown("painter", options.painters, PAINTERS)
+    record: Record = {"kind": "polygons"} | describe() | {"threads": options.threads, "rows": [], "skipped": []}
+    for name in options.cases:
+        measure(CASES[name], options, record)
+        save(record)
+    return record
+
+
+def measure(case: PolygonCase, options: Options, record: Record) -> None:
+    """Add the rows of one case."""
+    polygons = case.make(case.size)
+    right = right_picture(polygons, case)
+    calls = {}
+    for name in options.painters:
+        painter = PAINTERS[name]
+        if case.task not in painter.n_lines or len(polygons[0][0]) > painter.most_corners:
+            continue
+        try:
+            calls[name] = painter.prepare(polygons, case.size, case.task, options.threads)
+            start = time.perf_counter()
+            made = calls[name]()
+            took = time.perf_counter() - start
+            if took > options.slow_s:  # what comes first may be slow for other reasons
+                start = time.perf_counter()
+                made = calls[name]()
+                took = min(took, time.perf_counter() - start)
+            wrong, worst = errors(made, right, case)
+        except ImportError as error:
+            record["skipped"].append({"case": case.name, "painter": name, "reason": str(error)})
+            continue
+        record["rows"].append(
+            {
+                "case": case.name,
+                "painter": name,
+                "version": version_of(painter.package),
+                "lines": painter.n_lines[case.task],
+                "wrong_px": wrong,
+                "worst": worst,
+                "ms": [round(1e3 * took, 5)],
+            }
+        )
+        if took > options.slow_s:
+            del calls[name]
+        tell(f"{case.name}: {name} is ready")
+    turns = [turn_of(call, time.perf_counter) for call in calls.values()]
+    for name, times in zip(calls, take_turns(turns, options.repeats, options.seconds), strict=True):
+        (row,) = (row for row in record["rows"] if (row["case"], row["painter"]) == (case.name, name))
+        row["ms"] = [round(float(t), 5) for t in times]
+
+
+def right_picture(polygons: list[list[Any]], case: PolygonCase) -> Any:
+    """Return what must be there."""
+    import topleft as tl
+    from topleft import _engine
+
+    before = _engine.isa_in_use()
+    _engine.use_isa("scalar")
+    try:
+        if case.task == "table":
+            table = tl.overlap(polygons, case.size, threads=1)
+            return table.pixels, table.areas, table.starts
+        if case.task == "area":
+            (one,) = polygons
+            return tl.polygons(one, case.size, sampling="area", threads=1)
+        if case.task == "mask":
+            (one,) = polygons
+            return tl.polygons(one, case.size, threads=1)
+        return tl.polygons(polygons, case.size, values="index", threads=1)
+    finally:
+        _engine.use_isa(before)
+
+
+def errors(made: Any, right: Any, case: PolygonCase) -> tuple[int, float]:
+    """Return how many pixels, or entries of a table, are wrong, and by how much an area is off at most."""
+    if case.task in ("mask", "labels"):
+        return int((np.asarray(made) != right).sum()), 0.0
+    if case.task == "area":
+        off = abs(np.asarray(made, float) - right)
+        return int((off > 1e-6).sum()), float(off.max())
+    n = case.size[0] * case.size[1]
+
+    def keyed(table: Any) -> tuple[np.ndarray, np.ndarray]:
+        pixels, areas, starts = table
+        keys = np.repeat(np.arange(len(starts) - 1), np.diff(starts)) * n + np.asarray(pixels, np.int64)
+        order = np.argsort(keys, kind="stable")
+        return keys[order], np.asarray(areas, float)[order]
+
+    (keys, areas), (others, expected) = keyed(made), keyed(right)
+    every = np.union1d(keys, others)
+    off = np.zeros(len(every))
+    off[np.searchsorted(every, keys)] += areas
+    off[np.searchsorted(every, others)] -= expected
+    return int((abs(off) > 1e-6).sum()), float(abs(off).max(initial=0))
+
+
+def table(record: Record) -> Iterator[str]:
+    """The rows in Markdown."""
+    yield "| | | ms, median | shortest | quartiles | times topleft | wrong pixels | lines |"
+    yield "|---|---|---|---|---|---|---|---|"
+    last = None
+    for row in record["rows"]:
+        title = CASES[row["case"]].title if row["case"] != last else ""
+        last = row["case"]
+        ours = next(r for r in record["rows"] if r["case"] == row["case"])
+        times = np.array(row["ms"])
+        own = np.array(ours["ms"])
+        ratio = float(np.median(times / own) if len(times) == len(own) else np.median(times) / np.median(own))
+        low, high = np.quantile(times, [0.25, 0.75])
+        wrong = f"{row['wrong_px']:,}" + (f" (at most {row['worst']:.0e})" if row["worst"] else "")
+        yield (
+            f"| {title} | {row['painter']} | {np.median(times):.3g} | {times.min():.3g} | {low:.3g} to {high:.3g} "
+            f"| {ratio:.3g} | {wrong} | {row['lines']} |"
+        )
+
+
+def lines(record: Record) -> Iterator[str]:
+    """What is printed: machine, instruction set, threads, and the table."""
+    yield facts(record)
+    yield ""
+    yield from table(record)
+    for row in record["skipped"]:
+        print(f"{row['case']}: {row['painter']} was skipped: {row['reason']}", file=sys.stderr)
+
+
+def facts(record: Record) -> str:
+    """The machine, in a line."""
+    versions = {row["painter"]: row["version"] for row in record["rows"]}
+    return (
+        f"{record['machine']['cpu']}; {record['isa']}; {record['threads']} thread(s); {record['date']}; commit "
+        f"{record['commit']}. " + ", ".join(f"{name} {version}" for name, version in versions.items()) + "."
+    )
+
+
+STUDY = Study(
+    "polygons",
+    "time masks, labels and areas of polygons beside other programs",
+    add_arguments,
+    run,
+    lines,
+    parts={"polygons": lambda record: "\n".join(table(record)), "polygons-facts": facts},
+)

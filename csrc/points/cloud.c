@@ -1,0 +1,95 @@
+/* Clouds: points drawn as discs or squares, the nearest in every pixel.
+ * In: snapped vertices, a size each.  Out: ids and depth, as those of triangles.
+ *
+ * A point covers the samples in its disc, the rim included, or in its square, of whose sides the left one and the upper
+ * one count; and in any case those in the square of a pixel's size round it, so that no point is too small to show.  All
+ * of it is decided in whole numbers, doubled: the sample of a pixel lies half a pixel off the grid. */
+#ifndef TL_CLOUD_C
+#define TL_CLOUD_C
+
+#include <math.h>
+#include <stdint.h>
+
+#include "topleft.h"
+#include "lanes/lanes.h"
+#include "vertex/fixed.h"
+
+/* The largest whole number whose square is at most a, 0 <= a <= 2^60. */
+static inline int64_t floor_root(int64_t a)
+{
+    int64_t root = (int64_t)sqrt((double)a);
+    root -= root * root > a;
+    return root + ((root + 1) * (root + 1) <= a);
+}
+
+/* Pixels of a row, or rows of a window, whose samples are off a centre by low to high: first to last, cut to [0, n).
+ * `sample` is that of pixel 0 in units of half a sub-pixel, pixels are 2^shift apart. */
+static inline void span_of(int64_t center, int64_t low, int64_t high, int64_t sample, int shift, int64_t n,
+                           int64_t *first, int64_t *last)
+{
+    *first = max64((center + low - sample + ((int64_t)1 << shift) - 1) >> shift, 0);
+    *last = min64((center + high - sample) >> shift, n - 1);
+}
+
+TL_INLINE void keep_span(const tl_target *target, int64_t at, int64_t n, float depth, int32_t id)
+{
+    const vf z = vf_set1(depth);
+    float *depths = target->depth + at;
+    int32_t *ids = (int32_t *)target->pixels + at;
+    for (int64_t x = 0; x < n; x += TL_LANES) {
+        const vm inside = vm_first((int)min64(n - x, TL_LANES));
+        const vf there = vf_load_masked(inside, depths + x);
+        const vm wins = vm_and(inside, target->sink == TL_SINK_FARTHEST ? vf_lt(there, z) : vf_lt(z, there));
+        vf_store_masked(depths + x, wins, z);
+        vi_store_masked(ids + x, wins, vi_set1(id));
+    }
+}
+
+/* How far samples of a row, off the centre by y, may be off to the sides: low to high. */
+static inline void reach_of(const tl_cloud *cloud, int64_t size, int64_t unit, int64_t y, int64_t *low, int64_t *high)
+{
+    *low = 0, *high = -1;
+    if (-unit <= y && y < unit)
+        *low = -unit, *high = unit - 1;
+    if (cloud->is_disc && -size <= y && y <= size) {
+        const int64_t half = floor_root(size * size - y * y);
+        *low = min64(*low, -half), *high = max64(*high, half);
+    } else if (!cloud->is_disc && -size <= y && y < size) {
+        *low = min64(*low, -size), *high = max64(*high, size - 1);
+    }
+}
+
+static void draw_point(const tl_cloud *cloud, const tl_window *window, const tl_target *target, int64_t i)
+{
+    const tl_vertex v = cloud->vertices[i];
+    const int shift = window->subpixel_bits + 1;
+    const int64_t unit = (int64_t)1 << window->subpixel_bits,
+                  size = cloud->sizes_fx ? cloud->sizes_fx[i] : cloud->size_fx;
+    const int64_t x = 2 * (int64_t)v.x_fx, y = 2 * (int64_t)v.y_fx, widest = max64(size, unit);
+    const int64_t sample_x = (2 * window->x_px + 1) * unit + 2 * (int64_t)cloud->sample_x_fx;
+    const int64_t sample_y = (2 * window->y_px + 1) * unit + 2 * (int64_t)cloud->sample_y_fx;
+    int64_t top, bottom;
+    span_of(y, -widest, widest, sample_y, shift, window->height, &top, &bottom);
+    for (int64_t row = top; row <= bottom; row++) {
+        int64_t low, high, left, right;
+        reach_of(cloud, size, unit, sample_y + (row << shift) - y, &low, &high);
+        span_of(x, low, high, sample_x, shift, window->width, &left, &right);
+        if (low <= high && left <= right)
+            keep_span(target, row * target->stride_px + left, right - left + 1, (float)v.z, (int32_t)i);
+    }
+}
+
+static void draw_cloud(const tl_cloud *cloud, const tl_window *window, const tl_target *target)
+{
+    const float background = target->sink == TL_SINK_FARTHEST ? -INFINITY : INFINITY;
+    for (int64_t row = 0; row < window->height; row++)
+        for (int64_t x = 0; x < window->width; x++) {
+            target->depth[row * target->stride_px + x] = background;
+            ((int32_t *)target->pixels)[row * target->stride_px + x] = -1;
+        }
+    for (int64_t i = 0; i < cloud->n; i++)
+        if (cloud->vertices[i].x_fx != TL_SPECIAL)
+            draw_point(cloud, window, target, i);
+}
+
+#endif

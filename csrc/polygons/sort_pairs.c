@@ -1,0 +1,38 @@
+/* A stable sort of keys with numbers. */
+#ifndef TL_POLYGON_SORT_PAIRS_C
+#define TL_POLYGON_SORT_PAIRS_C
+
+#include <stdint.h>
+
+typedef struct {
+    int64_t key, i;
+} keyed;
+
+/* Sorts n pairs by key, equal ones as they stand: runs by insertion, then merges between `a` and `room`.  Returns
+ * where they are. */
+static keyed *sort_pairs(keyed *a, keyed *room, int64_t n)
+{
+    const int64_t run = 16;
+    for (int64_t first = 0; first < n; first += run)
+        for (int64_t i = first + 1; i < n && i < first + run; i++) {
+            const keyed x = a[i];
+            int64_t j = i;
+            for (; j > first && a[j - 1].key > x.key; j--)
+                a[j] = a[j - 1];
+            a[j] = x;
+        }
+    for (int64_t size = run; size < n; size *= 2) {
+        for (int64_t first = 0; first < n; first += 2 * size) {
+            const int64_t middle = first + size < n ? first + size : n,
+                          end = first + 2 * size < n ? first + 2 * size : n;
+            int64_t i = first, j = middle;
+            for (int64_t k = first; k < end; k++)
+                room[k] = j >= end || (i < middle && a[i].key <= a[j].key) ? a[i++] : a[j++];
+        }
+        keyed *const other = a;
+        a = room, room = other;
+    }
+    return a;
+}
+
+#endif

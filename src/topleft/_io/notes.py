@@ -1,0 +1,65 @@
+"""Notes of what a mesh file says and its mesh lacks, one line a kind; told as warnings, or to who listens.
+
+Input: kinds and names, from the readers. Output: `MeshWarning`, or lines.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+
+from topleft.errors import MeshWarning
+
+N_NAMES = 3
+"""Names of a kind that a line lists."""
+
+_listener: ContextVar[list[str] | None] = ContextVar("topleft_notes", default=None)
+
+
+class Notes:
+    """What a mesh will lack, by kind."""
+
+    def __init__(self, path: str) -> None:
+        self._path = path
+        self._names: dict[str, dict[str, None]] = {}
+
+    def add(self, kind: str, name: str = "") -> None:
+        """Note one thing of a kind; its name is listed once."""
+        names = self._names.setdefault(kind, {})
+        if name:
+            names[name] = None
+
+    @property
+    def lines(self) -> list[str]:
+        """A line for each kind, in the order in which they were found."""
+        return [f"{self._path!r}: {kind}{_list_of(list(names))}" for kind, names in self._names.items()]
+
+
+def _list_of(names: list[str]) -> str:
+    if not names:
+        return ""
+    more = f" and {len(names) - N_NAMES} more" if len(names) > N_NAMES else ""
+    return ": " + ", ".join(f"{name[:80]!r}" for name in names[:N_NAMES]) + more
+
+
+def tell(lines: Iterable[str], stacklevel: int) -> None:
+    """Warn of each line, as if where the caller was called; who listens gets them instead."""
+    heard = _listener.get()
+    if heard is not None:
+        heard.extend(lines)
+        return
+    for line in lines:
+        warnings.warn(line, MeshWarning, stacklevel=stacklevel + 1)
+
+
+@contextmanager
+def listening() -> Iterator[list[str]]:
+    """A list that gets the lines that this thread would be warned of."""
+    heard: list[str] = []
+    token = _listener.set(heard)
+    try:
+        yield heard
+    finally:
+        _listener.reset(token)

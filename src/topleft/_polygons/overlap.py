@@ -1,0 +1,246 @@
+"""`overlap`: the exact share of each pixel in each polygon, as a sparse table.
+
+Input: rings and a size. Output: `Overlap`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft import _engine
+from topleft._base.arrays import as_checked_triangles
+from topleft._base.memory import SCRATCH, FreshMemory
+from topleft._base.options import parse
+from topleft._base.threads import run_parts
+from topleft._field.grid import Grid
+from topleft._polygons.draw import cells_for
+from topleft._polygons.polygons import Rule, frame_of
+from topleft._polygons.prepared import Prepared, prepare
+from topleft._polygons.rings import as_points, as_rings, rings_of_triangles
+
+__all__ = ["Overlap", "overlap"]
+
+#: Entries that memory is asked for at a time, beyond those of the largest polygon; what is not written costs nothing.
+MAX_ENTRIES_AT_ONCE = 1 << 28
+
+#: What the kernel writes beyond the last entry: a whole vector.
+TAIL = 16
+
+INT32_MAX = 2**31 - 1
+
+FRESH = FreshMemory()
+
+
+@dataclass(frozen=True)
+class Overlap:
+    """The areas that polygons and pixels share: a sparse matrix, a row for each polygon and a column for each pixel.
+
+    Parameters
+    ----------
+    starts : ndarray of int64, shape (P + 1,)
+        The entries of polygon i are ``[starts[i], starts[i + 1])``: `indptr` of a CSR matrix.
+    pixels : ndarray of int32 (int64 for pictures of 2**31 pixels), shape (E,)
+        ``row * width + column`` of each entry, ascending within a polygon: `indices`.
+    areas : ndarray of float32, shape (E,)
+        The area of the pixel that lies in the polygon, in pixels, above 0 and at most 1: `data`.
+    size : (int, int)
+        Width and height of the picture.
+    """
+
+    starts: npt.NDArray[np.int64]
+    pixels: npt.NDArray[Any]
+    areas: npt.NDArray[np.float32]
+    size: tuple[int, int]
+    _room: list[tuple[npt.NDArray[Any], npt.NDArray[np.float32]]] = field(
+        default_factory=list, repr=False, compare=False
+    )
+
+    def __len__(self) -> int:
+        """Return the number of polygons."""
+        return len(self.starts) - 1
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Polygons, pixels."""
+        return len(self), self.size[0] * self.size[1]
+
+    @property
+    def polygons(self) -> npt.NDArray[np.int32]:
+        """The polygon (E,) of each entry."""
+        return np.repeat(np.arange(len(self), dtype=np.int32), np.diff(self.starts))
+
+    @property
+    def rows_columns(self) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
+        """Row and column (E,) of the pixel of each entry."""
+        return self.pixels // max(1, self.size[0]), self.pixels % max(1, self.size[0])
+
+    def to_scipy(self) -> Any:
+        """Return the table as `scipy.sparse.csr_array` (P, H * W), without a copy."""
+        from scipy.sparse import csr_array
+
+        return csr_array((self.areas, self.pixels, self.starts), shape=self.shape)
+
+    def sums(self, raster: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """Return the integral (P,) of a raster (H, W) over each polygon; NaN counts as nothing."""
+        values = self._values_of(raster)
+        return self._added(np.where(np.isnan(values), 0.0, values) * self.areas)
+
+    def means(self, raster: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """Return the mean (P,) of a raster (H, W) over each polygon; where that is NaN does not count."""
+        values = self._values_of(raster)
+        is_known = ~np.isnan(values)
+        weights = self._added(self.areas * is_known)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return self._added(np.where(is_known, values, 0.0) * self.areas) / weights
+
+    def totals(self) -> npt.NDArray[np.float64]:
+        """Return the area (P,) of each polygon inside of the frame, in pixels."""
+        return self._added(self.areas)
+
+    def spread(self, values: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """Return a raster (H, W): the values (P,) of polygons, each pixel with as much of them as it shares.
+
+        Amounts a pixel's area are conserved: the sum of the raster is that of values times areas.
+        """
+        own = np.asarray(values, np.float64)
+        if own.shape != (len(self),):
+            raise ValueError(f"values must have shape ({len(self)},), a number for each polygon, got {own.shape}")
+        weights = np.repeat(own, np.diff(self.starts)) * self.areas
+        picture: npt.NDArray[np.float64] = np.bincount(self.pixels, weights, minlength=self.shape[1])  # type: ignore[assignment]
+        return picture.reshape(self.size[::-1])
+
+    def _values_of(self, raster: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        values = np.asarray(raster)
+        if values.shape != self.size[::-1]:
+            raise ValueError(f"raster must have shape {self.size[::-1]}, got {values.shape}")
+        return values.reshape(-1)[self.pixels].astype(np.float64)
+
+    def _added(self, entries: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
+        """Return the sum over the entries of each polygon."""
+        is_full = np.diff(self.starts) > 0
+        result = np.zeros(len(self))
+        if is_full.any():
+            result[is_full] = np.add.reduceat(entries.astype(np.float64), self.starts[:-1][is_full])
+        return result
+
+
+def overlap(
+    rings: Any,
+    size: tuple[int, int] | Grid,
+    *,
+    triangles: npt.ArrayLike | None = None,
+    rule: str = "evenodd",
+    origin: tuple[int, int] = (0, 0),
+    subpixel_bits: int = 8,
+    assume_valid: bool = False,
+    threads: int | None = None,
+    out: Overlap | None = None,
+) -> Overlap:
+    """Return the exact area that each polygon shares with each pixel, a sparse table.
+
+    Parameters
+    ----------
+    rings, size, rule, origin, subpixel_bits, assume_valid, threads
+        As in `polygons`.
+    triangles : array_like of integers, shape (T, 3), optional
+        Then `rings` are the vertices (V, 2) of a mesh, and its triangles the polygons.
+    out : Overlap, optional
+        A table that is no longer needed: its memory is used again, where it is large enough.
+
+    Returns
+    -------
+    Overlap
+        ``.starts``, ``.pixels`` and ``.areas``, the arrays of a CSR matrix; ``.means(raster)`` and ``.sums(raster)``
+        over polygons, ``.spread(values)`` to pixels, ``.to_scipy()``.
+
+    Raises
+    ------
+    ValueError, TypeError
+        As in `polygons`.
+    IndexError
+        For an index outside the vertices; names the row.
+
+    Notes
+    -----
+    Each area has an error below ``2**-24`` for each edge that passes its pixel. Where polygons tile a pixel, its areas
+    sum to 1 within as much; those of a polygon sum to its area inside of the frame.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> table = tl.overlap([[[(0, 0), (2, 0), (0, 2)]], [[(2, 0), (2, 2), (0, 2)]]], (2, 2))
+    >>> table.starts, table.pixels, table.areas
+    (array([0, 3, 6]), array([0, 1, 2, 1, 2, 3], dtype=int32), array([1. , 0.5, 0.5, 0.5, 0.5, 1. ], dtype=float32))
+    >>> table.means([[1, 2], [3, 4]])
+    array([1.75, 3.25])
+    """
+    is_nonzero = parse(Rule, "rule", rule) is Rule.NONZERO
+    if triangles is None:
+        given = as_rings(rings)
+    else:
+        vertices = as_points(rings, "vertices")
+        given = rings_of_triangles(vertices, as_checked_triangles(triangles, len(vertices)))
+    found, frame = frame_of(given, size, origin, subpixel_bits, threads, 1)
+    prepared = prepare(SCRATCH, found, frame, is_nonzero=is_nonzero)
+    prepared.certify(assume_valid=assume_valid)
+    return list_areas(prepared, [] if out is None else out._room)
+
+
+def list_areas(prepared: Prepared, used: list[tuple[npt.NDArray[Any], npt.NDArray[np.float32]]]) -> Overlap:
+    """Return the table of snapped polygons; `used` is memory to take, if it fits."""
+    size, n = prepared.frame.size, len(prepared)
+    boxes = prepared.engine.boxes_px.astype(np.int64)
+    widths, heights = boxes[:, 2] - boxes[:, 0], boxes[:, 3] - boxes[:, 1]
+    room = np.concatenate([[0], np.cumsum(widths * heights)])  # entries that there can be before each polygon
+    dtype = np.int32 if size[0] * size[1] <= INT32_MAX else np.int64
+    starts = np.zeros(n + 1, np.int64)
+    n_threads = max(1, min(prepared.n_threads, n))
+    at_once = max(1, MAX_ENTRIES_AT_ONCE // n_threads)
+    n_cells = cells_for(prepared, size[1])
+    cells = SCRATCH.constant("cells", n_cells * n_threads, _engine.CELL_CLEAR)
+    slots = list(range(n_threads))
+
+    def list_part(first: int, end: int) -> list[tuple[npt.NDArray[Any], npt.NDArray[np.float32]]]:
+        """Return the entries of polygons [first, end) in chunks; `starts` gets how many each has."""
+        slot, pieces = slots.pop(), prepared.piece_scratch()
+        own_cells = cells[slot * n_cells : (slot + 1) * n_cells]
+        own = np.zeros(n + 1, np.int64) if n_threads > 1 else starts
+        chunks = []
+        while first < end:
+            last = int(np.searchsorted(room, room[first] + at_once, "right")) - 1
+            last = min(end, max(last, first + 1))
+            n_room = int(room[last] - room[first]) + TAIL
+            pixels, areas = take_room(n_room + TAIL)
+            before, own[first] = int(own[first]), 0
+            done = prepared.engine.list_shares(first, last, own, pixels, areas, own_cells, pieces)
+            n_entries = int(own[first + done])
+            own[first : first + done + 1] += before
+            chunks.append((pixels[:n_entries], areas[:n_entries]))
+            rooms.append((pixels, areas))
+            first += done
+        counts.append((own, first))
+        return chunks
+
+    def take_room(n_entries: int) -> tuple[npt.NDArray[Any], npt.NDArray[np.float32]]:
+        for i, (pixels, areas) in enumerate(used):
+            if len(pixels) >= n_entries and pixels.dtype == dtype:
+                del used[i]
+                return pixels, areas
+        return FRESH.empty("pixels", (n_entries,), dtype), FRESH.empty("areas", (n_entries,), np.float32)
+
+    rooms: list[tuple[npt.NDArray[Any], npt.NDArray[np.float32]]] = []
+    counts: list[tuple[npt.NDArray[np.int64], int]] = []
+    if not n or 0 in size:
+        return Overlap(starts, np.empty(0, dtype), np.empty(0, np.float32), size)
+    parts = run_parts(list_part, n, n_threads)
+    if n_threads > 1:
+        lengths = sum(np.diff(own, prepend=0).clip(min=0) for own, _ in counts)
+        starts[:] = np.cumsum(lengths)
+    chunks = [chunk for part in parts for chunk in part]
+    if len(chunks) == 1:
+        return Overlap(starts, *chunks[0], size, rooms)
+    return Overlap(starts, np.concatenate([c[0] for c in chunks]), np.concatenate([c[1] for c in chunks]), size)

@@ -1,0 +1,121 @@
+"""Polygons ready to be drawn: points on the grid of sub-pixels, boxes, and whether rings meet."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft import _engine
+from topleft._base.memory import Memory
+from topleft._base.threads import available_threads, run_parts
+from topleft._polygons.rings import RingSet
+
+__all__ = ["Frame", "Prepared", "prepare", "threads_for"]
+
+#: Points, and pixels, that are worth a thread: below, one is done before the other has begun.
+MIN_POINTS_PER_THREAD = 50_000
+MIN_PIXELS_PER_THREAD = 1 << 20
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """The window that is drawn, and the grid that points snap to."""
+
+    size: tuple[int, int]
+    origin: tuple[int, int]
+    subpixel_bits: int
+    grid_bits: int  # of the grid that holds points and samples
+    threads: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class Prepared:
+    """Snapped polygons in a window."""
+
+    engine: _engine.SnappedPolygons
+    most_edges: int  # of a polygon
+    n_points: int
+    frame: Frame
+
+    def __len__(self) -> int:
+        return self.engine.n_polygons
+
+    @property
+    def n_threads(self) -> int:
+        """How many threads drawing is worth."""
+        return threads_for(self.frame, self.n_points)
+
+    def certify(self, *, assume_valid: bool) -> None:
+        """Find out of which polygons the rings do not meet, and what the area of each ring counts."""
+        engine, n = self.engine, len(self)
+        engine.make_weights()
+
+        def certify_part(first: int, end: int) -> None:
+            room = None if assume_valid else np.empty(_engine.CERTIFY_WORDS * max(1, self.most_edges), np.int64)
+            engine.certify(first, end, room)
+
+        run_parts(certify_part, n, min(self.n_threads, n))
+
+    def piece_scratch(self) -> _engine.PieceScratch | None:
+        """Return memory for polygons whose rings meet, None when there are none."""
+        if self.engine.which_are_simple().all():
+            return None
+        width, height = self.frame.size
+        return _engine.PieceScratch(max(4096, self.most_edges), height, width)
+
+
+def threads_for(frame: Frame, n_points: int) -> int:
+    """Return how many threads a picture is worth."""
+    if frame.threads is not None:
+        return frame.threads
+    n_worth = max(n_points // MIN_POINTS_PER_THREAD, frame.size[0] * frame.size[1] // MIN_PIXELS_PER_THREAD)
+    return 1 if n_worth < 2 else min(available_threads(), n_worth)
+
+
+def prepare(memory: Memory, rings: RingSet, frame: Frame, *, is_nonzero: bool) -> Prepared:
+    """Snap the points of polygons and find their boxes.
+
+    Raises
+    ------
+    ValueError
+        If a point is not finite, or lies beyond 2**60 sub-pixels.
+    """
+    points, n = rings.points, len(rings.points)
+    source = _engine.Source(points)
+    x: npt.NDArray[np.int32] = memory.empty("polygon x", (n + _engine.POLYGON_PAD,), np.int32)
+    y: npt.NDArray[np.int32] = memory.empty("polygon y", (n + _engine.POLYGON_PAD,), np.int32)
+    wide: npt.NDArray[np.int64] | None = None
+    how = frame.subpixel_bits, frame.grid_bits, *frame.origin
+
+    def snap(first: int, end: int) -> tuple[int, int]:
+        return _engine.snap_points(source, first, end, *how, x, y, wide)
+
+    n_threads = threads_for(frame, n)
+    if n:
+        bad, n_wide = (sum(counts) for counts in zip(*run_parts(snap, n, n_threads), strict=True))
+        if bad:
+            raise bad_point(rings, x[:n], frame)
+        if n_wide:
+            wide = np.empty((n, 2), np.int64)
+            snap(0, n)
+    sides = rings.rings, rings.polygons, *frame.size
+    engine = _engine.SnappedPolygons(x, y, wide, *sides, frame.grid_bits, is_nonzero)
+    most = max(run_parts(engine.bound, len(rings), n_threads)) if len(rings) else 0
+    return Prepared(engine, most, n, frame)
+
+
+def bad_point(rings: RingSet, x: npt.NDArray[np.int32], frame: Frame) -> ValueError:
+    """Return the error for the first point that cannot be drawn."""
+    limit = 2.0 ** (60 - frame.grid_bits)
+    for i in np.flatnonzero(x == np.iinfo(np.int32).min).tolist():
+        at = rings.points[i]
+        if not np.isfinite(at).all():
+            return ValueError(f"rings must be finite, got {at.tolist()} in point {i}")
+        if not (abs(at.astype(float) - frame.origin) < limit).all():
+            return ValueError(
+                f"rings must lie within 2**{60 - frame.grid_bits} pixels of the window with {frame.grid_bits} "
+                f"sub-pixel bits, got {at.tolist()} in point {i}"
+            )
+    return ValueError("rings must lie within the range of fixed point")

@@ -1,0 +1,408 @@
+"""glTF: each feature in the smallest file that has it."""
+
+from __future__ import annotations
+
+import json
+import warnings
+
+import numpy as np
+import pytest
+from gltf_files import QUAD, TRIANGLE, GltfFile, glb_of
+
+import topleft as tl
+from topleft.errors import MeshError, MeshWarning
+
+QUAD_STRIP = [0, 1, 3, 2]
+
+
+@pytest.fixture
+def load(tmp_path):
+    def read(file, name="a.glb"):
+        path = tmp_path / name
+        path.write_bytes(file.glb() if name.endswith(".glb") else file.gltf())
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            return tl.load(path)
+
+    return read
+
+
+def corners(mesh):
+    return mesh.vertices[mesh.triangles].tolist()
+
+
+def material_of(load, **row):
+    file = GltfFile(materials=[row]).shown(material=0)
+    return load(file).materials[0]
+
+
+@pytest.mark.parametrize("name", ["a.gltf", "a.glb"])
+def test_gltf_triangle_without_indices_is_read(load, name):
+    mesh = load(GltfFile().shown(), name)
+    assert corners(mesh) == [TRIANGLE.tolist()]
+    assert mesh.normals.tolist() == [[0, 0, 1]] * 3
+
+
+@pytest.mark.parametrize(
+    ("mode", "indices", "expected"),
+    [
+        (4, [0, 1, 2, 0, 2, 3], [[0, 1, 2], [0, 2, 3]]),
+        (5, QUAD_STRIP, [[0, 1, 3], [3, 1, 2]]),
+        (6, [0, 1, 2, 3], [[0, 1, 2], [0, 2, 3]]),
+        (5, [0, 1, 3, 3, 2, 1], [[0, 1, 3], [1, 2, 3]]),
+    ],
+)
+def test_gltf_lists_strips_and_fans_turn_one_way(load, mode, indices, expected):
+    mesh = load(GltfFile().shown(QUAD, indices, mode=mode))
+    found = mesh.vertices[mesh.triangles]
+    area = np.cross(found[:, 1] - found[:, 0], found[:, 2] - found[:, 0])[:, 2] / 2
+    assert (area > 0).all()
+    assert area.sum() == 0.5 * len(expected)
+    assert [sorted(row) for row in found.tolist()] == [sorted(QUAD[row].tolist()) for row in expected]
+
+
+@pytest.mark.parametrize(("mode", "kind"), [(0, "points"), (1, "lines"), (2, "lines"), (3, "lines")])
+def test_gltf_points_and_lines_are_told(tmp_path, mode, kind):
+    file = GltfFile()
+    file.node(mesh=file.mesh(file.primitive(mode=mode), file.primitive()))
+    (tmp_path / "a.glb").write_bytes(file.glb())
+    with pytest.warns(MeshWarning, match=f"a.glb': {kind} not drawn"):
+        assert len(tl.load(tmp_path / "a.glb").triangles) == 1
+    (tmp_path / "b.glb").write_bytes(GltfFile().shown(mode=mode).glb())
+    with pytest.raises(MeshError, match=f"b.glb' has no triangles, but {kind}"):
+        tl.load(tmp_path / "b.glb")
+
+
+def test_gltf_nodes_place_by_matrix_and_by_trs(load):
+    file = GltfFile()
+    mesh = file.mesh(file.primitive())
+    half = float(np.sqrt(0.5))
+    child = file.node(mesh=mesh, rotation=[0, 0, half, half], scale=[2, 1, 1], translation=[0, 0, 1])
+    file.node(children=[child], matrix=[1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 10, 0, 0, 1])
+    found = load(file)
+    assert found.vertices == pytest.approx(np.array([[10, 0, 1], [10, 2, 1], [9, 0, 1]]), abs=1e-6)
+
+
+def test_gltf_mirrored_node_keeps_the_outside(load):
+    file = GltfFile()
+    file.node(mesh=file.mesh(file.primitive(NORMAL=[[0, 0, 1]] * 3)), scale=[-1, 1, 1])
+    found = load(file)
+    a, b, c = found.vertices[found.triangles[0]]
+    assert np.cross(b - a, c - a)[2] > 0
+    assert found.normals[:, 2].tolist() == [1, 1, 1]
+
+
+def test_gltf_shows_the_scene_that_it_names(load):
+    file = GltfFile(scenes=[{"nodes": [0]}, {"nodes": [1]}], scene=1)
+    mesh = file.mesh(file.primitive())
+    file.node(mesh=mesh)
+    file.node(mesh=mesh, translation=[5, 0, 0])
+    assert load(file).bounds[:, 0].tolist() == [5, 6]
+
+
+@pytest.mark.parametrize("nodes", [[[1], [0]], [[0]], [[1, 1], []]])
+def test_gltf_node_below_itself_is_refused(tmp_path, nodes):
+    file = GltfFile(scenes=[{"nodes": [0]}], scene=0)
+    for children in nodes:
+        file.node(children=children)
+    (tmp_path / "a.gltf").write_bytes(file.gltf())
+    with pytest.raises(MeshError, match=r"is below itself|has two parents"):
+        tl.load(tmp_path / "a.gltf")
+
+
+def test_gltf_chain_of_50_000_nodes_is_read(load):
+    file = GltfFile(scenes=[{"nodes": [0]}])
+    n = 50_000
+    mesh = file.mesh(file.primitive())
+    file.tree["nodes"] = [{"children": [i + 1], "translation": [1, 0, 0]} for i in range(n)] + [{"mesh": mesh}]
+    assert load(file).bounds[0, 0] == n
+
+
+def test_gltf_sparse_accessor_sets_rows(load):
+    file = GltfFile()
+    at, values = file.view(np.array([1], np.uint16).tobytes()), file.view(np.array([7, 8, 9], np.float32).tobytes())
+    sparse = {"count": 1, "indices": {"bufferView": at, "componentType": 5123}, "values": {"bufferView": values}}
+    dense = file.accessor(TRIANGLE, sparse=sparse)
+    empty = file.add("accessors", {"componentType": 5126, "count": 3, "type": "VEC3", "sparse": sparse})
+    file.node(mesh=file.mesh({"attributes": {"POSITION": dense}}, {"attributes": {"POSITION": empty}}))
+    assert corners(load(file)) == [[[0, 0, 0], [7, 8, 9], [0, 1, 0]], [[0, 0, 0], [7, 8, 9], [0, 0, 0]]]
+
+
+def test_gltf_interleaved_and_quantized_attributes_are_read(load):
+    rows = np.zeros(3, [("position", "<i2", 3), ("pad", "<i2"), ("normal", "i1", 3), ("pad1", "i1")])
+    rows["position"], rows["normal"] = 32767 * TRIANGLE, [0, 0, 127]
+    file = GltfFile(extensionsRequired=["KHR_mesh_quantization"])
+    view = file.view(rows.tobytes(), byteStride=12)
+    common = {"bufferView": view, "count": 3, "type": "VEC3", "normalized": True}
+    position = file.add("accessors", {**common, "componentType": 5122})
+    normal = file.add("accessors", {**common, "componentType": 5120, "byteOffset": 8})
+    file.node(mesh=file.mesh({"attributes": {"POSITION": position, "NORMAL": normal}}), scale=[2, 2, 2])
+    mesh = load(file)
+    assert corners(mesh) == [(2 * TRIANGLE).tolist()]
+    assert (mesh.normals[:, 2] > 0).all()
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32])
+def test_gltf_vertex_colors_are_light_beside_a_material(load, dtype):
+    light = np.array([[0, 0.5, 1, 0.25]] * 3)
+    colors = light.astype(np.float32) if dtype == np.float32 else np.rint(light * np.iinfo(dtype).max).astype(dtype)
+    file = GltfFile(materials=[{"pbrMetallicRoughness": {"baseColorFactor": [1, 0, 0, 1]}}])
+    row = file.accessor(colors, normalized=dtype != np.float32)
+    mesh = load(file.shown(COLOR_0=row, material=0))
+    assert mesh.colors[0].tolist() == [0, 188, 255, 64]
+    assert mesh.materials[0].color == (255, 0, 0)
+
+
+def test_gltf_material_says_what_the_file_says(load):
+    material = material_of(
+        load,
+        doubleSided=True,
+        alphaMode="MASK",
+        alphaCutoff=0.25,
+        emissiveFactor=[0.5, 0, 1],
+        extensions={"KHR_materials_emissive_strength": {"emissiveStrength": 4}},
+        pbrMetallicRoughness={"baseColorFactor": [0.5, 0, 1, 0.75], "metallicFactor": 0.25, "roughnessFactor": 0.5},
+    )
+    assert material.color == (188, 0, 255)
+    assert (material.opacity, material.alpha_mode, material.alpha_cutoff) == (0.75, "mask", 0.25)
+    assert (material.metallic, material.roughness) == (0.25, 0.5)
+    assert material.emission == (2, 0, 4)
+    assert material.double_sided
+
+
+def test_gltf_material_defaults_are_those_of_the_standard(load):
+    material = material_of(load)
+    assert (material.color, material.metallic, material.roughness) == ((255, 255, 255), 1, 1)
+    assert (material.double_sided, material.alpha_mode, material.unlit) == (False, "opaque", False)
+
+
+def test_gltf_unlit_material_is_unlit(load):
+    material = material_of(load, extensions={"KHR_materials_unlit": {}}, alphaMode="BLEND")
+    assert (material.unlit, material.is_metallic_rough, material.alpha_mode) == (True, False, "blend")
+
+
+def test_gltf_textures_have_their_places(load):
+    file = GltfFile()
+    grey = np.full((2, 2, 3), 100, np.uint8)
+    one, two = file.texture(grey), file.texture(grey, wrapS=33071, wrapT=33648, magFilter=9728)
+    file.tree["materials"] = [
+        {
+            "pbrMetallicRoughness": {
+                "baseColorTexture": {"index": one},
+                "metallicRoughnessTexture": {"index": two, "texCoord": 1},
+            },
+            "occlusionTexture": {"index": two, "texCoord": 1, "strength": 0.5},
+            "normalTexture": {"index": one, "scale": 2},
+            "emissiveTexture": {"index": one},
+        }
+    ]
+    uv = [[0, 0], [1, 0], [0, 0.25]]
+    mesh = load(file.shown(TEXCOORD_0=uv, TEXCOORD_1=uv, material=0))
+    (material,) = mesh.materials
+    assert mesh.uv.tolist() == [[0, 1], [1, 1], [0, 0.75]]
+    assert mesh.uv1.tolist() == mesh.uv.tolist()
+    rough = material.metallic_roughness_texture
+    assert (rough.encoding, rough.uv_set, rough.wrap, rough.filter) == ("linear", 1, ("clamp", "mirror"), "nearest")
+    assert material.occlusion_texture is rough
+    assert (material.texture.encoding, material.texture.filter) == ("srgb", "trilinear")
+    assert material.emission_texture is material.texture
+    assert (material.normal_texture.encoding, material.normal_scale) == ("linear", 2)
+    assert material.occlusion_strength == 0.5
+
+
+def test_gltf_texture_transform_turns_about_the_upper_left_corner(load):
+    file = GltfFile(extensionsUsed=["KHR_texture_transform"])
+    transform = {"offset": [0.5, 0.25], "rotation": np.pi / 2, "scale": [2, 3], "texCoord": 1}
+    info = {"index": file.texture(np.zeros((1, 1, 3))), "extensions": {"KHR_texture_transform": transform}}
+    file.tree["materials"] = [{"pbrMetallicRoughness": {"baseColorTexture": info}}]
+    uv = [[0, 0], [1, 0], [0, 1]]
+    mesh = load(file.shown(TEXCOORD_0=uv, TEXCOORD_1=uv, material=0))
+    texture = mesh.materials[0].texture
+    assert texture.uv_set == 1
+    found = np.column_stack([mesh.uv1, np.ones(3)]) @ texture.transform.T
+    down = np.column_stack([found[:, 0], 1 - found[:, 1]])
+    # of (u, v) downwards: (2 u, 3 v), turned counter-clockwise as one sees it, then moved
+    assert down == pytest.approx(np.array([[0.5, 0.25], [0.5, 0.25 - 2], [3.5, 0.25]]), abs=1e-6)
+
+
+def test_gltf_webp_texture_is_read(load):
+    import io
+
+    from PIL import Image
+
+    stream = io.BytesIO()
+    Image.new("RGB", (2, 1), (10, 200, 30)).save(stream, format="WEBP", lossless=True)
+    file = GltfFile(extensionsRequired=["EXT_texture_webp"])
+    image = file.add("images", {"bufferView": file.view(stream.getvalue()), "mimeType": "image/webp"})
+    file.add("textures", {"extensions": {"EXT_texture_webp": {"source": image}}})
+    file.tree["materials"] = [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}]
+    mesh = load(file.shown(TEXCOORD_0=[[0, 0]] * 3, material=0))
+    assert mesh.materials[0].texture.image[0, 0].tolist() == [10, 200, 30, 255]
+
+
+def test_gltf_morph_weights_at_rest_move_vertices(load):
+    file = GltfFile()
+    targets = [{"POSITION": file.accessor([[0, 0, z]] * 3)} for z in (1.0, 10.0)]
+    primitive = file.primitive(targets=targets)
+    mesh = file.mesh(primitive, weights=[0.5, 0])
+    file.node(mesh=mesh)
+    file.node(mesh=mesh, weights=[0, 0.25])
+    assert sorted({z for row in corners(load(file)) for _, _, z in row}) == [0.5, 2.5]
+
+
+def test_gltf_skin_at_rest_stands_where_its_joints_are(load):
+    file = GltfFile()
+    bind = np.tile(np.eye(4), (2, 1, 1))
+    bind[1, 3, :3] = [0, -1, 0]  # columns are rows in the file
+    primitive = file.primitive(
+        JOINTS_0=np.array([[0, 1, 0, 0]] * 3, np.uint8),
+        WEIGHTS_0=np.array([[1, 0, 0, 0], [1, 0, 0, 0], [0, 1, 0, 0]], np.float32),
+    )
+    skin = file.add("skins", {"joints": [1, 2], "inverseBindMatrices": file.accessor(bind.reshape(2, 16))})
+    file.node(mesh=file.mesh(primitive), skin=skin, translation=[100, 0, 0])
+    file.node(translation=[0, 0, 1])
+    file.node(translation=[3, 1, 0])
+    assert corners(load(file)) == [[[0, 0, 1], [1, 0, 1], [3, 1, 0]]]
+
+
+def test_gltf_instances_are_all_there(load):
+    file = GltfFile(extensionsRequired=["EXT_mesh_gpu_instancing"])
+    places = {"attributes": {"TRANSLATION": file.accessor([[1.0, 0, 0], [5, 0, 0]])}}
+    file.node(mesh=file.mesh(file.primitive()), extensions={"EXT_mesh_gpu_instancing": places})
+    assert load(file).vertices[:, 0].tolist() == [1, 2, 1, 5, 6, 5]
+
+
+@pytest.mark.parametrize(
+    ("diffuse", "specular", "expected", "metallic"),
+    [([1, 0, 0, 0.5], [0.04] * 3, (255, 0, 0), 0), ([0, 0, 0, 0.5], [1, 0.5, 0], (255, 188, 0), 1)],
+)
+def test_gltf_spec_gloss_material_is_made_metallic_rough_and_told(tmp_path, diffuse, specular, expected, metallic):
+    gloss = {"diffuseFactor": diffuse, "specularFactor": specular, "glossinessFactor": 0.75}
+    file = GltfFile(materials=[{"extensions": {"KHR_materials_pbrSpecularGlossiness": gloss}}]).shown(material=0)
+    (tmp_path / "a.glb").write_bytes(file.glb())
+    with pytest.warns(MeshWarning, match="made metallic-rough"):
+        (material,) = tl.load(tmp_path / "a.glb").materials
+    assert material.color == pytest.approx(expected, abs=1)
+    assert (material.metallic, material.roughness) == (pytest.approx(metallic, abs=1e-3), 0.25)
+    assert material.opacity == 0.5
+
+
+def test_gltf_spec_gloss_textures_become_metallic_rough_ones(tmp_path):
+    file = GltfFile()
+    info = {"index": file.texture(np.full((2, 2, 4), (255, 0, 0, 100), np.uint8))}
+    shiny = {"index": file.texture(np.full((1, 1, 4), (56, 56, 56, 55), np.uint8))}
+    gloss = {"diffuseTexture": info, "specularGlossinessTexture": shiny}
+    file.tree["materials"] = [{"extensions": {"KHR_materials_pbrSpecularGlossiness": gloss}}]
+    (tmp_path / "a.glb").write_bytes(file.shown(TEXCOORD_0=[[0, 0]] * 3, material=0).glb())
+    with pytest.warns(MeshWarning, match="made metallic-rough"):
+        (material,) = tl.load(tmp_path / "a.glb").materials
+    assert material.texture.image[1, 1].tolist() == [255, 0, 0, 100]
+    _, rough, metal, _ = material.metallic_roughness_texture.image[1, 1].tolist()
+    assert rough == 200
+    assert metal <= 1
+
+
+@pytest.mark.parametrize(
+    ("tree", "message"),
+    [
+        ({"extensionsUsed": ["KHR_materials_clearcoat"]}, "extensions not read: 'KHR_materials_clearcoat'"),
+        ({"animations": [{}]}, "animations not played: everything is at rest"),
+    ],
+)
+def test_gltf_what_is_not_read_is_told_once(tmp_path, tree, message):
+    (tmp_path / "a.glb").write_bytes(GltfFile(**tree).shown().glb())
+    with pytest.warns(MeshWarning, match=message) as caught:
+        tl.load(tmp_path / "a.glb")
+    assert len(caught) == 1
+    assert caught[0].filename == __file__
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b'{"asset": {"version": "1.0"}}', "it is glTF 1.0, and 2.0 is read"),
+        (b'{"meshes": {}}', "it is glTF 1.0, and 2.0 is read"),
+        (b"glTF\1\0\0\0" + bytes(12), "it is glTF 1.0, and 2.0 is read"),
+        (b'{"asset": {"version": "3.0"}}', "its version of glTF is '3.0'"),
+        (b'{"asset": {"version": "2.0"}, "extensionsRequired": ["EXT_new"]}', "needs the extension EXT_new"),
+        (b"[1, 2]", "its JSON is no object"),
+        (b"[" * 100_000, "nested too deeply|broken"),
+        (glb_of(b"{", b""), "broken, or not a '.gltf' file"),
+    ],
+)
+def test_gltf_of_another_kind_is_refused_in_true_words(tmp_path, content, message):
+    (tmp_path / "a.gltf").write_bytes(content)
+    with pytest.raises(MeshError, match=message) as caught:
+        tl.load(tmp_path / "a.gltf")
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda tree: tree["accessors"][0].update(count=4), "ends beyond its 36 bytes"),
+        (lambda tree: tree["accessors"][0].update(count=1 << 40), "more than the 200000000 of max_vertices"),
+        (lambda tree: tree["accessors"][0].update(byteOffset=4), "ends beyond its 36 bytes"),
+        (lambda tree: tree["accessors"][0].update(count=-1), "count must be a whole number, got -1"),
+        (lambda tree: tree["bufferViews"][0].update(byteLength=37), "ends at byte 37 of a buffer of 36"),
+        (lambda tree: tree["bufferViews"][0].update(byteOffset=-4), "byteOffset must be a whole number"),
+        (lambda tree: tree["buffers"][0].update(byteLength=1 << 50), "has 36 of its"),
+        (lambda tree: tree["nodes"][0].update(mesh=-1), r"meshes\[-1\] is not one of 1"),
+        (lambda tree: tree["nodes"][0].update(mesh=True), r"meshes\[True\] is no entry"),
+        (lambda tree: tree["accessors"][0].update(componentType=7), "which is no type"),
+        (lambda tree: tree["meshes"][0]["primitives"][0].update(material=9), r"materials\[9\] is not one of 0"),
+    ],
+)
+def test_gltf_numbers_that_lie_are_refused(tmp_path, change, message):
+    tree = json.loads(GltfFile().shown().gltf())
+    change(tree)
+    (tmp_path / "a.gltf").write_text(json.dumps(tree))
+    with pytest.raises(MeshError, match=message):
+        tl.load(tmp_path / "a.gltf")
+
+
+def test_gltf_index_beyond_the_vertices_is_refused(tmp_path):
+    file = GltfFile().shown(TRIANGLE, [0, 1, 3], NORMAL=[[0, 0, 1]] * 3)
+    (tmp_path / "a.glb").write_bytes(file.glb())
+    with pytest.raises(MeshError, match=r"indices in \[0, 3\)"):
+        tl.load(tmp_path / "a.glb")
+
+
+def test_gltf_many_instances_stop_at_max_vertices(tmp_path):
+    file = GltfFile()
+    mesh = file.mesh(file.primitive())
+    for _ in range(20):
+        file.node(mesh=mesh)
+    (tmp_path / "a.glb").write_bytes(file.glb())
+    with pytest.raises(MeshError, match="has 33 vertices, more than the 30 of max_vertices"):
+        tl.load(tmp_path / "a.glb", max_vertices=30)
+
+
+# Cameras
+
+
+def test_load_cameras_of_gltf_see_what_the_file_means(tmp_path):
+    file = GltfFile().shown()
+    lens = {"yfov": np.pi / 2, "znear": 0.1}
+    file.tree["cameras"] = [
+        {"type": "perspective", "perspective": lens},
+        {"type": "orthographic", "orthographic": {"xmag": 3, "ymag": 2, "znear": 1, "zfar": 9}},
+    ]
+    file.node(camera=0, translation=[0, 0, 5], scale=[2, 2, 2])
+    file.node(camera=1, translation=[0, 0, 5])
+    (tmp_path / "a.glb").write_bytes(file.glb())
+    perspective, ortho = tl.load_cameras(tmp_path / "a.glb")
+    clip = perspective.clip_from_world((200, 100)) @ [2.5, 2.5, 0, 1]
+    assert clip[:2] / clip[3] == pytest.approx([0.25, 0.5])
+    far = perspective.clip_from_world((100, 100)) @ [0, 0, -1e9, 1]
+    assert far[2] / far[3] == pytest.approx(1)
+    clip = ortho.clip_from_world((200, 100)) @ [2, 1, 4, 1]
+    assert clip.tolist() == pytest.approx([0.5, 0.5, -1, 1])
+    assert tl.render(tmp_path and tl.load(tmp_path / "a.glb"), perspective, (64, 48)).min() < 255
+
+
+def test_load_cameras_of_other_formats_are_none(tmp_path):
+    (tmp_path / "a.obj").write_text("v 0 0 0\n")
+    assert tl.load_cameras(tmp_path / "a.obj") == []
+    with pytest.raises(FileNotFoundError, match="there is no file"):
+        tl.load_cameras(tmp_path / "b.glb")

@@ -1,0 +1,318 @@
+"""Files that nobody meant: mutated, truncated, pointing elsewhere. Each ends in a mesh or in one line of MeshError.
+
+`TOPLEFT_MUTATIONS` is the number of mutated files of each format; 150 unless set.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import socket
+import threading
+import time
+import warnings
+
+import numpy as np
+import pytest
+from gltf_files import QUAD, GltfFile, glb_of
+from PIL import Image
+
+import topleft as tl
+from topleft.errors import MeshError, MeshWarning, MissingPackageError
+
+N_MUTATIONS = int(os.environ.get("TOPLEFT_MUTATIONS", "150"))
+MOST_SECONDS = 10
+
+WORDS = [b"0", b"-1", b"1e999", b"nan", b"inf", b"4294967295", b"99999999999999999999", b"1.5", b"", b"/", b"//", b"\0"]
+JSON_VALUES = [
+    None,
+    True,
+    -1,
+    0,
+    1,
+    1.5,
+    1e308,
+    2**31,
+    2**53,
+    2**70,
+    "",
+    "x",
+    [],
+    {},
+    [0],
+    {"a": 0},
+    [[]],
+    "data:,",
+    "../a",
+]
+
+
+def rich_gltf():
+    """A file with one of everything."""
+    file = GltfFile(extensionsUsed=["KHR_texture_transform", "EXT_mesh_gpu_instancing"], scenes=[{"nodes": [0, 3, 4]}])
+    info = {"index": file.texture(np.full((4, 4, 3), 9), wrapS=33071), "extensions": {"KHR_texture_transform": {}}}
+    file.tree["materials"] = [
+        {"pbrMetallicRoughness": {"baseColorTexture": info}, "normalTexture": info, "alphaMode": "MASK"},
+        {"extensions": {"KHR_materials_pbrSpecularGlossiness": {"diffuseTexture": info}}},
+    ]
+    sparse_at, sparse_values = file.view(bytes([1, 0])), file.view(np.array([7, 8, 9], np.float32).tobytes())
+    sparse = {
+        "count": 1,
+        "indices": {"bufferView": sparse_at, "componentType": 5123},
+        "values": {"bufferView": sparse_values},
+    }
+    skinned = file.primitive(
+        QUAD, [0, 1, 2, 0, 2, 3], TEXCOORD_0=QUAD[:, :2], COLOR_0=np.ones((4, 4), np.float32), material=0,
+        JOINTS_0=np.zeros((4, 4), np.uint8), WEIGHTS_0=np.tile(np.float32([1, 0, 0, 0]), (4, 1)),
+    )  # fmt: skip
+    strip = file.primitive(QUAD, mode=5, material=1, targets=[{"POSITION": file.accessor(QUAD)}])
+    strip["attributes"]["POSITION"] = file.accessor(QUAD, sparse=sparse)
+    skin = file.add("skins", {"joints": [2], "inverseBindMatrices": file.accessor(np.eye(4).reshape(1, 16))})
+    file.node(children=[1], rotation=[0, 0, 0, 1])
+    file.node(mesh=file.mesh(skinned), skin=skin, children=[2])
+    file.node(translation=[1, 2, 3])
+    instances = {"attributes": {"TRANSLATION": file.accessor([[1.0, 0, 0], [2, 0, 0]])}}
+    file.node(mesh=file.mesh(strip, weights=[0.5]), extensions={"EXT_mesh_gpu_instancing": instances})
+    file.node(camera=file.add("cameras", {"type": "perspective", "perspective": {"yfov": 1, "znear": 0.1}}))
+    return file
+
+
+def places_of(tree, path=()):
+    """Where values stand in a JSON document."""
+    rows = tree.items() if isinstance(tree, dict) else enumerate(tree)
+    for key, value in rows:
+        yield (*path, key)
+        if isinstance(value, dict | list):
+            yield from places_of(value, (*path, key))
+
+
+def mutated_tree(rng, tree):
+    tree = json.loads(json.dumps(tree))
+    for _ in range(int(rng.integers(1, 3))):
+        places = list(places_of(tree))
+        *path, key = places[int(rng.integers(len(places)))]
+        holder = tree
+        for step in path:
+            holder = holder[step]
+        if rng.random() < 0.25:
+            del holder[key]
+        else:
+            holder[key] = JSON_VALUES[int(rng.integers(len(JSON_VALUES)))]
+    return tree
+
+
+def mutated_bytes(rng, content):
+    """Cut off, or with bytes changed, words replaced, parts doubled or taken out."""
+    content = bytearray(content)
+    for _ in range(int(rng.integers(1, 4))):
+        if not content:
+            break
+        at = int(rng.integers(len(content)))
+        match int(rng.integers(6)):
+            case 0:
+                del content[at:]
+            case 1:
+                content[at] = int(rng.integers(256))
+            case 2:
+                content[at : at + 4] = int(rng.integers(2**32)).to_bytes(4, "little")
+            case 3:
+                content[at:at] = content[at : at + int(rng.integers(60))]
+            case 4:
+                del content[at : at + int(rng.integers(1, 30))]
+            case _:
+                words = bytes(content).split(b" ")
+                words[int(rng.integers(len(words)))] = WORDS[int(rng.integers(len(WORDS)))]
+                content = bytearray(b" ".join(words))
+    return bytes(content)
+
+
+def glb_variant(rng):
+    file = rich_gltf()
+    if rng.random() < 0.4:
+        return mutated_bytes(rng, file.glb())
+    tree = {**file.tree, "buffers": [{"byteLength": len(file.blob)}]}
+    return glb_of(json.dumps(mutated_tree(rng, tree)).encode(), file.blob)
+
+
+def gltf_variant(rng):
+    content = rich_gltf().gltf()
+    if rng.random() < 0.3:
+        return mutated_bytes(rng, content)
+    return json.dumps(mutated_tree(rng, json.loads(content))).encode()
+
+
+OBJ = (
+    b"mtllib a.mtl\nv 0 0 0\nv 1 0 0 \nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvn 0 0 1\nusemtl m\n"
+    b"f 1/1/1 2/2/1 3/3/1 4/1/1\ns 1\nf -1 -2 -3\nusemtl n\nf 1//1 2//1 3//1\nf 1 2 3 4\nl 1 2\n"
+)
+MTL = (
+    b"newmtl m\nKd 1 0 0\nKs .5 .5 .5\nNs 20\nd 0.5\nmap_Kd -s 2 2 2 -o 1 a.png\nmap_d a.png\nmap_Bump -bm 2 a.png\n"
+    b"newmtl n\nKe 1 1 1\nmap_Ke a.png\nPr 0.5\nmap_Pm a.png\nillum 2\nTr 0.5\n"
+)
+PLY_HEADER = (
+    b"ply\nformat %s 1.0\ncomment TextureFile a.png\nelement vertex 4\nproperty float x\nproperty float y\n"
+    b"property float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\nelement face 2\n"
+    b"property list uchar int vertex_indices\nproperty list uchar float texcoord\nelement tristrips 1\n"
+    b"property list int int vertex_indices\nend_header\n"
+)
+
+
+def ply_text(rng):
+    body = b"0 0 0 1 2 3\n1 0 0 1 2 3\n1 1 0 1 2 3\n0 1 0 1 2 3\n"
+    return mutated_bytes(rng, PLY_HEADER % b"ascii" + body + b"3 0 1 2 6 0 0 1 0 1 1\n4 0 1 2 3 0\n4 0 1 2 3\n")
+
+
+def ply_binary(rng):
+    body = b"".join(np.float32(row).tobytes() + b"\1\2\3" for row in QUAD)
+    body += bytes([3]) + np.int32([0, 1, 2]).tobytes() + bytes([6]) + np.zeros(6, np.float32).tobytes()
+    body += bytes([4]) + np.int32([0, 1, 2, 3]).tobytes() + bytes([0]) + np.int32([4, 0, 1, 2, 3]).tobytes()
+    return mutated_bytes(rng, PLY_HEADER % b"binary_little_endian" + body)
+
+
+def stl_binary(rng):
+    return mutated_bytes(rng, bytes(80) + np.uint32(3).tobytes() + bytes(150))
+
+
+def stl_text(rng):
+    facet = b"facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n"
+    return mutated_bytes(rng, b"solid a\n" + 2 * facet + b"endsolid a\n")
+
+
+def off(rng):
+    return mutated_bytes(rng, b"OFF\n4 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n4 0 1 2 3\n")
+
+
+FORMATS = {
+    "glb": ("a.glb", glb_variant),
+    "gltf": ("a.gltf", gltf_variant),
+    "obj": ("a.obj", lambda rng: mutated_bytes(rng, OBJ)),
+    "mtl": ("a.mtl", lambda rng: mutated_bytes(rng, MTL)),
+    "ply_text": ("a.ply", ply_text),
+    "ply_binary": ("a.ply", ply_binary),
+    "stl_text": ("a.stl", stl_text),
+    "stl_binary": ("a.stl", stl_binary),
+    "off": ("a.off", off),
+    "png": ("a.png", None),
+}
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "a.obj").write_bytes(OBJ)
+    (tmp_path / "a.mtl").write_bytes(MTL)
+    Image.fromarray(np.full((4, 4, 4), 100, np.uint8)).save(tmp_path / "a.png")
+    return tmp_path
+
+
+@pytest.mark.parametrize("kind", FORMATS)
+def test_load_of_mutated_files_ends_in_a_mesh_or_one_line(folder, kind):
+    if kind == "off":
+        pytest.importorskip("trimesh")
+    name, variant = FORMATS[kind]
+    picture = (folder / "a.png").read_bytes()
+    path = folder / ("a.obj" if kind in ("mtl", "png") else name)
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    n_read = 0
+    lines = set()
+    for seed in range(N_MUTATIONS):
+        rng = np.random.default_rng(seed)
+        (folder / name).write_bytes(mutated_bytes(rng, picture) if variant is None else variant(rng))
+        start = time.monotonic()
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            warnings.simplefilter("ignore", MeshWarning)
+            try:
+                mesh = tl.load(path)
+                n_read += 1
+                assert np.isfinite(mesh.bounds).all(), seed
+                if kind in ("glb", "gltf"):
+                    tl.load_cameras(path)
+            except (MeshError, MissingPackageError) as error:
+                lines.add(str(error))
+        assert time.monotonic() - start < MOST_SECONDS, seed
+    assert n_read > 0
+    assert [line for line in lines if "\n" in line or len(line) > 600] == []
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 600_000  # KiB
+
+
+# What lies elsewhere
+
+
+@pytest.mark.parametrize("name", ["../secret.png", "{outside}/secret.png", "link.png", "link/secret.png"])
+def test_load_opens_nothing_outside_of_the_folder(tmp_path, name):
+    outside, inside = tmp_path, tmp_path / "mesh"
+    inside.mkdir()
+    Image.new("RGB", (1, 1), (1, 2, 3)).save(outside / "secret.png")
+    (inside / "link.png").symlink_to(outside / "secret.png")
+    (inside / "link").symlink_to(outside)
+    (inside / "a.mtl").write_text("newmtl m\nmap_Kd " + name.format(outside=outside) + "\n")
+    (inside / "a.obj").write_text("mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl m\nf 1/1 2/1 3/1\n")
+    with pytest.warns(MeshWarning, match="textures outside of its folder not read"):
+        assert tl.load(inside / "a.obj").materials[0].texture is None
+
+
+@pytest.mark.parametrize(
+    "uri", ["../a.bin", "%2e%2e/a.bin", "/etc/hostname", "file:///etc/hostname", "http://a.example/b"]
+)
+def test_load_gltf_buffers_stay_in_the_folder(tmp_path, uri):
+    (tmp_path / "mesh").mkdir()
+    (tmp_path / "a.bin").write_bytes(bytes(36))
+    tree = GltfFile().shown().tree
+    (tmp_path / "mesh" / "a.gltf").write_text(json.dumps({**tree, "buffers": [{"uri": uri, "byteLength": 36}]}))
+    with pytest.raises(MeshError, match=r"its buffer .* is not there"):
+        tl.load(tmp_path / "mesh" / "a.gltf")
+
+
+@pytest.mark.parametrize("suffix", [".obj", ".ply", ".stl", ".gltf", ".off"])
+def test_load_of_pipes_devices_and_sockets_is_refused(tmp_path, suffix):
+    os.mkfifo(tmp_path / f"pipe{suffix}")
+    (tmp_path / f"device{suffix}").symlink_to("/dev/zero")
+    with socket.socket(socket.AF_UNIX) as other:
+        other.bind(str(tmp_path / f"s{suffix}"))
+        for name in ("pipe", "device", "s"):
+            with pytest.raises(MeshError, match="is a pipe or a device, not a file"):
+                tl.load(tmp_path / f"{name}{suffix}")
+
+
+def test_load_does_not_wait_for_a_pipe_that_a_file_names(tmp_path):
+    os.mkfifo(tmp_path / "a.mtl")
+    (tmp_path / "a.obj").write_text("mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl m\nf 1 2 3\n")
+    found = []
+
+    def read():
+        with warnings.catch_warnings(record=True) as told:
+            warnings.simplefilter("always")
+            tl.load(tmp_path / "a.obj")
+        found.extend(str(each.message) for each in told)
+
+    thread = threading.Thread(target=read, daemon=True)
+    thread.start()
+    thread.join(10)
+    assert not thread.is_alive()
+    assert "material libraries not found: 'a.mtl'" in found[0]
+
+
+def test_load_leaves_out_pictures_with_too_many_pixels(folder):
+    Image.new("L", (20_000, 10_000)).save(folder / "a.png")  # 200 million, which Pillow calls a bomb
+    with pytest.warns(MeshWarning, match="textures of more than 67108864 pixels not read: 'a.png'"):
+        tl.load(folder / "a.obj")
+    Image.new("L", (9, 9)).save(folder / "a.png")
+    with pytest.warns(MeshWarning, match="textures of more than 80 pixels not read"):
+        tl.load(folder / "a.obj", max_texture_pixels=80)
+
+
+def test_load_stops_at_max_vertices(folder):
+    with pytest.raises(MeshError, match="has 4 vertices, more than the 3 of max_vertices"):
+        tl.load(folder / "a.obj", max_vertices=3)
+
+
+def test_load_of_an_archive_that_unpacks_to_too_much_is_refused(tmp_path, monkeypatch):
+    import zipfile
+
+    pytest.importorskip("trimesh")
+    monkeypatch.setattr("topleft._io.foreign.MAX_UNPACKED_BYTES", 1000)
+    with zipfile.ZipFile(tmp_path / "a.zip", "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("a.obj", bytes(1001))
+    with pytest.raises(MeshError, match="its archive holds 1001 bytes, more than 1000"):
+        tl.load(tmp_path / "a.zip")

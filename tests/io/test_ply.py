@@ -1,0 +1,113 @@
+"""PLY: text and binary, polygons and strips, what corners and faces say."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import topleft as tl
+from topleft.errors import MeshError, MeshWarning
+
+XYZ = "property float x\nproperty float y\nproperty float z\n"
+SQUARE = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n"
+FACES = "element face {}\nproperty list uchar int vertex_indices\n"
+
+
+@pytest.fixture
+def load(tmp_path):
+    def read(header, body, form="ascii"):
+        text = f"ply\nformat {form} 1.0\n{header}end_header\n"
+        (tmp_path / "a.ply").write_bytes(text.encode() + (body if isinstance(body, bytes) else body.encode()))
+        return tl.load(tmp_path / "a.ply")
+
+    return read
+
+
+@pytest.mark.parametrize("order", ["<", ">"])
+def test_ply_binary_faces_of_mixed_sizes_are_read(load, order):
+    points = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 0]], order + "f4")
+    faces = bytes([4]) + np.array([0, 1, 2, 3], order + "i4").tobytes()
+    faces += bytes([3]) + np.array([1, 4, 2], order + "i4").tobytes()
+    form = "binary_little_endian" if order == "<" else "binary_big_endian"
+    mesh = load("element vertex 5\n" + XYZ + FACES.format(2), points.tobytes() + faces, form)
+    assert mesh.triangles.tolist() == [[0, 1, 2], [0, 2, 3], [1, 4, 2]]
+
+
+def test_ply_text_faces_of_mixed_sizes_are_read(load):
+    mesh = load("element vertex 4\n" + XYZ + FACES.format(2), SQUARE + "4 0 1 2 3\n3 0 1 2\n")
+    assert mesh.triangles.tolist() == [[0, 1, 2], [0, 2, 3], [0, 1, 2]]
+
+
+def test_ply_strips_turn_one_way_and_end_at_minus_one(load):
+    strips = "element tristrips 1\nproperty list int int vertex_indices\n"
+    mesh = load("element vertex 4\n" + XYZ + strips, SQUARE + "9 0 1 3 2 -1 1 2 0 -1\n")
+    assert mesh.triangles.tolist() == [[0, 1, 3], [3, 1, 2], [1, 2, 0]]
+
+
+def test_ply_colors_keep_opacity_and_have_no_haze(load):
+    rgba = "".join(f"property uchar {name}\n" for name in ("red", "green", "blue", "alpha"))
+    body = "0 0 0 200 0 0 128\n1 0 0 0 1 0 255\n0 1 0 0 0 1 0\n"
+    mesh = load("element vertex 3\n" + XYZ + rgba + FACES.format(1), body + "3 0 1 2\n")
+    assert mesh.colors.tolist() == [[200, 0, 0, 128], [0, 1, 0, 255], [0, 0, 1, 0]]
+    assert mesh.materials == ()
+
+
+@pytest.mark.parametrize(("kind", "value"), [("float", "0.5"), ("ushort", "32896"), ("double", "0.5")])
+def test_ply_colors_of_other_numbers_become_bytes(load, kind, value):
+    rgb = "".join(f"property {kind} {name}\n" for name in ("red", "green", "blue"))
+    one = "0" if kind == "ushort" else "1"
+    body = f"0 0 0 {value} 0 {one}\n1 0 0 0 0 0\n0 1 0 0 0 0\n"
+    colors = load("element vertex 3\n" + XYZ + rgb + FACES.format(1), body + "3 0 1 2\n").colors
+    assert colors[0, 0] == 128
+
+
+def test_ply_texture_and_corner_coordinates(load, tmp_path):
+    from PIL import Image
+
+    Image.new("RGB", (1, 1), (200, 0, 0)).save(tmp_path / "a b.png")
+    header = "comment TextureFile a b.png\nelement vertex 4\n" + XYZ + FACES.format(2)
+    faces = "3 0 1 2 6 0 0 1 0 1 1\n3 0 2 3 6 .5 .5 1 1 0 1\n"
+    mesh = load(header + "property list uchar float texcoord\n", SQUARE + faces)
+    assert mesh.uv[mesh.triangles].tolist() == [[[0, 0], [1, 0], [1, 1]], [[0.5, 0.5], [1, 1], [0, 1]]]
+    (material,) = mesh.materials
+    assert material.specular == 0
+    assert material.texture.image[0, 0].tolist() == [200, 0, 0, 255]
+
+
+def test_ply_texture_that_is_missing_is_told(load):
+    header = "comment TextureFile no.png\nelement vertex 3\n" + XYZ + "property float s\nproperty float t\n"
+    with pytest.warns(MeshWarning, match="textures not found: 'no.png'"):
+        mesh = load(header + FACES.format(1), "0 0 0 0 0\n1 0 0 1 0\n0 1 0 0 1\n3 0 1 2\n")
+    assert mesh.uv is not None
+
+
+def test_ply_cloud_of_points_is_refused_in_true_words(load):
+    with pytest.raises(MeshError, match=r"cannot draw .*a.ply': it is a cloud of 4 points without faces"):
+        load("element vertex 4\n" + XYZ, SQUARE)
+
+
+@pytest.mark.parametrize("form", ["ascii", "binary_little_endian"])
+@pytest.mark.parametrize("n", [4, 10**6, 10**15 - 1])
+def test_ply_counts_that_lie_are_refused(load, form, n):
+    with pytest.raises(MeshError, match=r"it ends within its|more than the 200000000 of max_vertices"):
+        load(f"element vertex {n}\n" + XYZ + FACES.format(n), "0 0 0\n" if form == "ascii" else bytes(13), form)
+
+
+def test_ply_lists_longer_than_the_file_are_refused(load):
+    header = "element vertex 0\n" + XYZ + "element face 1\nproperty list uint int vertex_indices\n"
+    with pytest.raises(MeshError, match="it ends within its 1 rows of face"):
+        load(header, b"\xff\xff\xff\xff", "binary_little_endian")
+
+
+@pytest.mark.parametrize(
+    ("header", "message"),
+    [
+        ("element vertex x\n", "its header says 'element vertex x'"),
+        ("property float x\n", "its header says 'property float x'"),
+        ("element vertex 1\nproperty half x\n", "its header says 'property half x'"),
+        ("", "it has no vertices"),
+    ],
+)
+def test_ply_header_that_makes_no_sense_is_refused(load, header, message):
+    with pytest.raises(MeshError, match=message):
+        load(header, "")

@@ -1,0 +1,99 @@
+"""Arrays of other libraries are read where they lie, and refused with a sentence where the CPU cannot."""
+
+import re
+
+import numpy as np
+import pytest
+
+import topleft as tl
+
+SQUARE = np.array([[0.0, 0], [4, 0], [4, 4], [0, 4]])
+HALVES = np.array([[0, 1, 2], [0, 2, 3]])
+
+
+class Tensor:
+    """Speaks DLPack alone, of memory on a device."""
+
+    def __init__(self, array, device=1):
+        self.array, self.device = array, device
+
+    def __dlpack__(self, **options):
+        return self.array.__dlpack__(**options)
+
+    def __dlpack_device__(self):
+        return self.device, 0
+
+
+class Legacy:
+    """Says what it is by `__array__` alone."""
+
+    def __init__(self, array):
+        self.array = array
+
+    def __array__(self, dtype=None, copy=None):
+        return self.array
+
+
+@pytest.mark.parametrize("kind", [Tensor, Legacy])
+def test_verbs_take_what_speaks_dlpack_or_has_an_array(kind):
+    colors = np.array([[9], [7]], np.uint8)
+    vertices, triangles = kind(SQUARE), kind(HALVES)
+    assert tl.coverage(vertices, triangles, (4, 4)).all()
+    assert np.array_equal(tl.fill(vertices, triangles, kind(colors), (4, 4)), tl.fill(SQUARE, HALVES, colors, (4, 4)))
+    frags = tl.rasterize(vertices, triangles, (4, 4))
+    assert np.array_equal(frags.interpolate(kind(SQUARE)), frags.interpolate(SQUARE))
+    mesh = tl.Mesh(kind(np.column_stack([SQUARE, SQUARE[:, 0]])), triangles, uv=kind(SQUARE / 4))
+    assert np.array_equal(mesh.uv, SQUARE / 4)
+
+
+@pytest.mark.parametrize("kind", [Tensor, Legacy])
+def test_bad_index_of_a_tensor_names_the_row(kind):
+    with pytest.raises(IndexError, match=re.escape("row 1 is [0, 2, 9]")):
+        tl.coverage(SQUARE, kind(np.array([[0, 1, 2], [0, 2, 9]])), (4, 4))
+
+
+@pytest.mark.parametrize(
+    ("device", "where"),
+    [(2, "CUDA device 0"), (8, "Metal device 0"), (10, "ROCm device 0"), (99, "DLPack device type 99 0")],
+)
+def test_tensor_elsewhere_is_refused_by_device(device, where):
+    with pytest.raises(TypeError) as raised:
+        tl.coverage(Tensor(SQUARE, device), HALVES, (4, 4))
+    wish = "vertices must lie in the memory of the CPU"
+    assert re.fullmatch(f"{wish}, got a [\\w.]*Tensor on {where}: copy it to the CPU", str(raised.value))
+
+
+def test_array_that_refuses_to_become_one_is_a_type_error():
+    class Strange(Legacy):
+        def __array__(self, dtype=None, copy=None):
+            raise RuntimeError("no such dtype")
+
+    with pytest.raises(TypeError, match=r"vertices must be an array that NumPy can read, got a .*\(no such dtype\)"):
+        tl.coverage(Strange(SQUARE), HALVES, (4, 4))
+
+
+def test_tensors_of_torch_are_read_in_place():
+    torch = pytest.importorskip("torch")
+    from topleft._base.arrays import as_array
+
+    tensor = torch.tensor(SQUARE)
+    assert np.shares_memory(as_array("vertices", tensor), tensor.numpy())
+    assert tl.coverage(tensor, torch.tensor(HALVES), (4, 4)).all()
+
+
+def test_tensors_of_torch_are_refused_with_what_to_do():
+    torch = pytest.importorskip("torch")
+    for tensor, message in (
+        (torch.tensor(SQUARE, requires_grad=True), "got a torch.Tensor that requires grad: pass vertices.detach()"),
+        (torch.tensor(SQUARE, device="meta"), "must lie in the memory of the CPU, got a torch.Tensor elsewhere"),
+        (torch.tensor(SQUARE).bfloat16(), "must be an array that NumPy can read, got a torch.Tensor"),
+        (torch.tensor(SQUARE).to_sparse(), "must be an array that NumPy can read, got a torch.Tensor"),
+    ):
+        with pytest.raises(TypeError, match=re.escape(message)):
+            tl.coverage(tensor, HALVES, (4, 4))
+
+
+@pytest.mark.parametrize("module", ["jax.numpy", "array_api_strict"])
+def test_arrays_of_the_array_api_are_taken(module):
+    xp = pytest.importorskip(module)
+    assert tl.coverage(xp.asarray(SQUARE), xp.asarray(HALVES), (4, 4)).all()

@@ -1,0 +1,464 @@
+"""`topleft.torch` beside float64 loops, beside finite differences, and in programs like the samples of nvdiffrast."""
+
+import math
+import re
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import tensor_reference as reference
+
+torch = pytest.importorskip("torch")
+
+import topleft.torch as dr  # noqa: E402 (imports torch)
+from topleft import scenes  # noqa: E402
+from topleft._raster.verbs import rasterize as draw  # noqa: E402
+
+CTX = dr.RasterizeContext(threads=1)
+F64 = torch.float64
+BOUNDARIES = ("wrap", "clamp", "zero")
+
+
+def matrix(azimuth=0.6, distance=3.5, near=1.0, far=10.0):
+    """Clip space from a world that turns about y, seen from a distance."""
+    c, s = math.cos(azimuth), math.sin(azimuth)
+    turn = np.array([[c, 0, s, 0], [0.2 * s, 1, -0.2 * c, 0], [-s, 0.2, c, -distance], [0, 0, 0, 1]])
+    a, b = -(far + near) / (far - near), -2 * far * near / (far - near)
+    return np.array([[2.0, 0, 0, 0], [0, 2, 0, 0], [0, 0, a, b], [0, 0, -1, 0]]) @ turn
+
+
+def in_clip(vertices, **pose):
+    return np.column_stack([vertices, np.ones(len(vertices))]) @ matrix(**pose).T
+
+
+def cube(dtype=F64, **pose):
+    """A cube of 8 vertices in clip space (1, 8, 4), and its 12 triangles."""
+    vertices = np.array([[x, y, z] for x in (-1.0, 1) for y in (-1, 1) for z in (-1, 1)])
+    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    tri = [part for a, b, c, d in quads for part in ((a, b, c), (a, c, d))]
+    return torch.tensor(in_clip(vertices, **pose), dtype=dtype)[None], torch.tensor(tri, dtype=torch.int32)
+
+
+def soup(n=12, seed=3):
+    """Random triangles in clip space, some behind the eye or cut by the near plane."""
+    rng = np.random.default_rng(seed)
+    pos = rng.normal(size=(3 * n, 4)) * [1, 1, 0.7, 0.4] + [0, 0, 0, 1]
+    return torch.tensor(pos)[None], torch.arange(3 * n, dtype=torch.int32).reshape(n, 3)
+
+
+def random(*shape, seed=0, dtype=F64):
+    return torch.tensor(np.random.default_rng(seed).random(shape), dtype=dtype)
+
+
+def raises(kind, message):
+    return pytest.raises(kind, match=re.escape(message))
+
+
+# rasterize
+
+
+@pytest.mark.parametrize("scene", [cube, soup])
+def test_rasterize_is_the_loop_over_pixels_and_triangles(scene):
+    pos, tri = scene()
+    rast, rast_db = dr.rasterize(CTX, pos, tri, (20, 28))
+    expected, expected_db, is_close = reference.rasterize(pos[0].numpy(), tri.numpy(), 20, 28)
+    same = rast[0, ..., 3].numpy() == expected[..., 3]
+    assert (same | is_close).all()
+    assert (same & (expected[..., 3] > 0)).sum() > 100
+    np.testing.assert_allclose(rast[0].numpy()[same], expected[same], rtol=0, atol=1e-11)
+    # Central differences of 1e-4 pixel: their error is that of float64 over the step.
+    np.testing.assert_allclose(rast_db[0].numpy()[same], expected_db[same], rtol=1e-6, atol=1e-7)
+
+
+def test_rasterize_of_float32_is_that_of_float64_rounded():
+    pos, tri = cube(torch.float32)
+    found = dr.rasterize(CTX, pos, tri, (20, 28))
+    exact = dr.rasterize(CTX, pos.double(), tri, (20, 28))
+    assert [one.dtype for one in found] == [torch.float32] * 2
+    assert all(torch.equal(one, other.float()) for one, other in zip(found, exact, strict=True))
+
+
+def test_rasterize_row_0_is_at_the_bottom():
+    pos = torch.tensor([[[-1.0, -1, 0, 1], [3, -1, 0, 1], [-1, 0, 0, 1]]])
+    rast, _ = dr.rasterize(CTX, pos, torch.tensor([[0, 1, 2]]), (4, 2))
+    assert rast[0, :, 0, 3].tolist() == [1, 1, 0, 0]
+
+
+def test_rasterize_of_several_pictures_is_each_by_itself():
+    views = [cube(azimuth=a)[0] for a in (0.1, 0.7)]
+    tri = cube()[1]
+    both = dr.rasterize(CTX, torch.cat(views), tri, (16, 16))
+    for k, view in enumerate(views):
+        alone = dr.rasterize(CTX, view, tri, (16, 16))
+        assert all(torch.equal(one[k], other[0]) for one, other in zip(both, alone, strict=True))
+
+
+def test_rasterize_of_ranges_has_ids_of_the_whole_tri():
+    pos, tri = cube()
+    ranges = torch.tensor([[0, 12], [4, 3], [12, 0]], dtype=torch.int32)
+    rast, _ = dr.rasterize(CTX, pos[0], tri, (16, 16), ranges=ranges)
+    alone, _ = dr.rasterize(CTX, pos, tri[4:7], (16, 16))
+    assert torch.equal(rast[1, ..., 3], torch.where(alone[0, ..., 3] > 0, alone[0, ..., 3] + 4, 0))
+    assert torch.equal(rast[0], dr.rasterize(CTX, pos, tri, (16, 16))[0][0])
+    assert not rast[2].any()
+
+
+def test_rasterize_reads_tensors_without_a_copy(monkeypatch):
+    pos, tri = cube(torch.float32)
+    seen = []
+    monkeypatch.setattr(dr, "draw", lambda v, t, *rest, **more: seen.append((v, t)) or draw(v, t, *rest, **more))
+    dr.rasterize(CTX, pos, tri, (8, 8))
+    assert [one.ctypes.data for one in seen[0]] == [pos.data_ptr(), tri.data_ptr()]
+
+
+def test_rasterize_without_derivatives_returns_none_of_them():
+    pos, tri = cube()
+    _, rast_db = dr.rasterize(dr.RasterizeGLContext(output_db=False), pos, tri, (8, 6))
+    assert rast_db.shape == (1, 8, 6, 0)
+
+
+def test_rasterize_of_nothing_is_zeros():
+    pos, tri = cube()
+    rast, rast_db = dr.rasterize(CTX, pos, tri[:0], (3, 4))
+    assert rast.shape == rast_db.shape == (1, 3, 4, 4)
+    assert not rast.any()
+
+
+def test_ids_beyond_float32_come_back():
+    ids = np.array([1, (1 << 24) - 1, 1 << 24, (1 << 24) + 1, (1 << 24) + 2, 1 << 25, 1 << 29], np.int64)
+    rast = torch.zeros((1, 1, len(ids), 4))
+    rast[0, 0, :, 3] = torch.from_numpy(dr.floats_of_ids(ids, np.dtype("float32")))
+    assert dr.ids_of(rast).flatten().tolist() == ids.tolist()
+    assert rast[0, 0, :3, 3].tolist() == ids[:3].tolist()
+
+
+def test_peeler_shows_what_is_behind():
+    pos, tri = cube()
+    with dr.DepthPeeler(CTX, pos, tri, (24, 24)) as peeler:
+        layers = [peeler.rasterize_next_layer() for _ in range(6)]
+    first = dr.rasterize(CTX, pos, tri, (24, 24))
+    assert all(torch.equal(one, other) for one, other in zip(layers[0], first, strict=True))
+    front, back = layers[0][0][0], layers[1][0][0]
+    both = (front[..., 3] > 0) & (back[..., 3] > 0)
+    assert both.sum() > 100
+    assert (front[..., 2] < back[..., 2])[both].all()
+    assert not layers[5][0].any()
+
+
+# interpolate
+
+
+def test_interpolate_is_the_loop():
+    pos, tri = cube()
+    rast, _ = dr.rasterize(CTX, pos, tri, (20, 28))
+    attr = random(8, 5)
+    out, out_da = dr.interpolate(attr[None], rast, tri)
+    np.testing.assert_allclose(out[0].numpy(), reference.interpolate(attr.numpy(), rast[0].numpy(), tri.numpy()))
+    assert out_da.shape == (1, 20, 28, 0)
+    assert torch.equal(out, dr.interpolate(attr, rast, tri)[0])
+
+
+def test_interpolate_has_the_attributes_of_each_picture():
+    pos, tri = cube()
+    rast, _ = dr.rasterize(CTX, torch.cat([pos, pos]), tri, (12, 12))
+    attr = random(2, 8, 3)
+    out, _ = dr.interpolate(attr, rast, tri)
+    assert torch.equal(out[1], dr.interpolate(attr[1], rast[1:], tri)[0][0])
+
+
+def test_interpolate_derivatives_are_differences_of_pixels():
+    pos, tri = cube()
+    rast, rast_db = dr.rasterize(CTX, pos, tri, (20, 28))
+    attr = random(8, 3)
+    _, some = dr.interpolate(attr, rast, tri, rast_db, diff_attrs=[2, -3])
+    _, all_of_them = dr.interpolate(attr, rast, tri, rast_db, diff_attrs="all")
+    assert torch.equal(some, all_of_them[..., [4, 5, 0, 1]])
+    for i, j in (rast[0, ..., 3] > 0).nonzero().tolist()[::17]:
+        row = tri[int(rast[0, i, j, 3]) - 1].numpy()
+        x, y = reference.center(i, j, 20, 28)
+
+        def value(x, y, row=row):
+            return reference.weights_at(pos[0].numpy()[row], x, y) @ attr.numpy()[row]
+
+        by_x = (value(x + 1e-4 / 28, y) - value(x - 1e-4 / 28, y)) / 1e-4
+        by_y = (value(x, y + 1e-4 / 20) - value(x, y - 1e-4 / 20)) / 1e-4
+        expected = np.stack([by_x, by_y], 1).ravel()
+        np.testing.assert_allclose(all_of_them[0, i, j].numpy(), expected, rtol=1e-6, atol=1e-7)
+
+
+# texture
+
+
+@pytest.mark.parametrize("boundary", BOUNDARIES)
+@pytest.mark.parametrize("mode", ["nearest", "linear"])
+def test_texture_is_the_loop(mode, boundary):
+    tex, uv = random(2, 5, 7, 3), 4 * random(2, 6, 8, 2, seed=1) - 1.5
+    out = dr.texture(tex, uv, filter_mode=mode, boundary_mode=boundary)
+    one = getattr(reference, mode)
+    for b, i, j in np.ndindex(2, 6, 8):
+        expected = one(tex[b].numpy(), *uv[b, i, j].tolist(), boundary)
+        np.testing.assert_allclose(out[b, i, j].numpy(), expected, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("boundary", BOUNDARIES)
+def test_texture_of_a_mipmap_is_the_loop(boundary):
+    tex, uv = random(1, 8, 16, 2), 3 * random(2, 5, 6, 2, seed=1) - 1
+    uv_da = torch.exp2(-8 * random(2, 5, 6, 1, seed=2)) * (random(2, 5, 6, 4, seed=3) - 0.5)
+    uv_da[0, 0, 0] = 0
+    bias = random(2, 5, 6, seed=4) - 0.5
+    out = dr.texture(tex, uv, uv_da, bias, boundary_mode=boundary)
+    levels = reference.halvings(tex[0].numpy())
+    for place in np.ndindex(2, 5, 6):
+        given = *uv[place].tolist(), uv_da[place].numpy(), bias[place].item()
+        np.testing.assert_allclose(out[place].numpy(), reference.trilinear(levels, *given, boundary), atol=1e-12)
+
+
+def test_texture_of_the_nearest_level_is_that_level():
+    tex, uv = random(1, 8, 8, 1), random(1, 1, 4, 2, seed=1)
+    level = torch.tensor([[[-1.0, 0.4, 0.6, 9.0]]])
+    out = dr.texture(tex, uv, mip_level_bias=level, filter_mode="linear-mipmap-nearest", max_mip_level=2)
+    levels = reference.halvings(tex[0].numpy())
+    expected = [reference.linear(levels[k], *uv[0, 0, j].tolist(), "wrap") for j, k in enumerate((0, 0, 1, 2))]
+    np.testing.assert_allclose(out[0, 0].numpy(), expected, atol=1e-12)
+
+
+def test_texture_takes_levels_that_are_made_before():
+    tex, uv, uv_da = random(1, 8, 8, 3), random(1, 4, 4, 2), random(1, 4, 4, 4) / 4
+    mip = dr.texture_construct_mip(tex)
+    for one, other in zip([tex, *mip], reference.halvings(tex[0].numpy()), strict=True):
+        np.testing.assert_allclose(one[0].numpy(), other)
+    assert torch.equal(dr.texture(tex, uv, uv_da, mip=mip), dr.texture(tex, uv, uv_da))
+    assert torch.equal(
+        dr.texture(tex, uv, uv_da, mip=mip, max_mip_level=1), dr.texture(tex, uv, uv_da, max_mip_level=1)
+    )
+
+
+def test_texture_at_no_place_is_that_at_the_origin():
+    uv = torch.tensor([[[[math.nan, 0.0], [math.inf, 0], [-math.inf, 0], [1e30, 0]]]])
+    for boundary in BOUNDARIES:
+        assert torch.isfinite(dr.texture(random(1, 4, 4, 1), uv, boundary_mode=boundary)).all()
+
+
+# antialias
+
+
+@pytest.mark.parametrize("azimuth", [0.0, 0.6, 1.3])
+def test_antialias_is_the_loop(azimuth):
+    pos, tri = cube(azimuth=azimuth)
+    rast, _ = dr.rasterize(CTX, pos, tri, (20, 28))
+    color = random(1, 20, 28, 3)
+    out = dr.antialias(color, rast, pos, tri)
+    expected = reference.antialias(color[0].numpy(), rast[0].numpy(), pos[0].numpy(), tri.numpy())
+    assert not torch.equal(out, color)
+    np.testing.assert_allclose(out[0].numpy(), expected, rtol=0, atol=1e-12)
+    again = dr.antialias(color, rast, pos, tri, topology_hash=dr.antialias_construct_topology_hash(tri))
+    assert torch.equal(out, again)
+
+
+@pytest.mark.parametrize("shift", [0.0, 0.1, 0.4, 0.6, 0.9])
+@pytest.mark.parametrize("axes", [(0, 1), (1, 0)])
+def test_antialias_of_an_upright_edge_is_the_exact_area(shift, axes):
+    pos = torch.tensor([[[-2.0, -2, 0, 1], [shift / 4, -2, 0, 1], [shift / 4, 2, 0, 1], [-2, 2, 0, 1]]])
+    pos = pos[..., [*axes, 2, 3]]
+    tri = torch.tensor([[0, 1, 2], [0, 2, 3]])
+    rast, _ = dr.rasterize(CTX, pos, tri, (8, 8))
+    picture = dr.antialias((rast[..., 3:] > 0).double(), rast, pos, tri)[0, ..., 0]
+    row = picture[3] if axes == (0, 1) else picture[:, 3]
+    np.testing.assert_allclose(row.numpy(), [1, 1, 1, 1, shift, 0, 0, 0], atol=1e-6)  # edges are float32
+
+
+def test_antialias_leaves_edges_within_a_surface():
+    pos, tri = soup(1)
+    pos = torch.tensor([[[-1.0, -1, 0, 1], [1, -1, 0, 1], [1, 1, 0, 1], [-1, 1, 0, 1]]])
+    tri = torch.tensor([[0, 1, 2], [0, 2, 3]])
+    rast, _ = dr.rasterize(CTX, pos, tri, (8, 8))
+    color = random(1, 8, 8, 3, dtype=torch.float32)
+    assert torch.equal(dr.antialias(color, rast, pos, tri), color)
+
+
+# gradients, against finite differences
+
+
+def test_gradients_of_rasterize_and_interpolate():
+    pos, tri = cube()
+    attr = random(8, 2)
+
+    def run(pos, attr):
+        rast, rast_db = dr.rasterize(CTX, pos, tri, (5, 6))
+        return dr.interpolate(attr, rast, tri, rast_db, "all")
+
+    assert torch.autograd.gradcheck(run, (pos.requires_grad_(), attr.requires_grad_()))
+
+
+@pytest.mark.parametrize("boundary", BOUNDARIES)
+def test_gradients_of_texture(boundary):
+    tex, uv, uv_da = random(1, 4, 4, 2), 2 * random(1, 3, 3, 2, seed=1) - 0.5, random(1, 3, 3, 4, seed=2) / 2
+    given = [one.requires_grad_() for one in (tex, uv, uv_da)]
+    assert torch.autograd.gradcheck(lambda *args: dr.texture(*args, boundary_mode=boundary), given)
+
+
+def test_gradients_of_antialias():
+    pos, tri = cube()
+    rast, _ = dr.rasterize(CTX, pos, tri, (7, 7))
+    color = random(1, 7, 7, 2)
+    given = color.requires_grad_(), pos.requires_grad_()
+    assert torch.autograd.gradcheck(lambda color, pos: dr.antialias(color, rast, pos, tri), given)
+    once, twice = (
+        torch.autograd.grad(dr.antialias(color, rast, pos, tri, pos_gradient_boost=boost)[..., 0].sum(), pos)[0]
+        for boost in (1.0, 2.0)
+    )
+    torch.testing.assert_close(twice, 2 * once)
+
+
+# programs like the samples of nvdiffrast
+
+
+def test_sample_triangle_has_the_colours_of_its_corners():
+    glctx = dr.RasterizeCudaContext()
+    pos = torch.tensor([[[-0.8, -0.8, 0, 1], [0.8, -0.8, 0, 1], [-0.8, 0.8, 0, 1]]])
+    tri = torch.tensor([[0, 1, 2]], dtype=torch.int32)
+    rast, _ = dr.rasterize(glctx, pos, tri, resolution=[256, 256])
+    out, _ = dr.interpolate(torch.eye(3)[None], rast, tri)
+    image = out.numpy()[0, ::-1]  # row 0 on top
+    expected = [(231 - i + 0.5 - 0.6) / 204.8 for i in (60, 200)]  # green and blue grow by 1 in 204.8 pixels
+    for row, blue in zip((60, 200), expected, strict=True):
+        green = (40 + 0.5 - 25.6) / 204.8
+        blue = (255 - row + 0.5 - 25.6) / 204.8
+        np.testing.assert_allclose(image[row, 40], [1 - green - blue, green, blue], atol=1e-6)
+    assert not image[20, 200].any()
+
+
+def test_sample_cube_finds_its_colours_again():
+    pos, tri = cube(torch.float32)
+    glctx = dr.RasterizeGLContext()
+
+    def render(colors, resolution=24):
+        rast, _ = dr.rasterize(glctx, pos, tri, resolution=[resolution, resolution])
+        picture, _ = dr.interpolate(colors[None], rast, tri)
+        return dr.antialias(picture, rast, pos, tri)
+
+    wanted = render(random(8, 3, dtype=torch.float32))
+    colors = torch.full((8, 3), 0.5, requires_grad=True)
+    optimizer = torch.optim.Adam([colors], lr=0.05)
+    losses = []
+    for _ in range(60):
+        loss = ((render(colors) - wanted) ** 2).mean()
+        optimizer.zero_grad()
+        loss.backward()
+        optimizer.step()
+        losses.append(loss.item())
+    assert losses[-1] < losses[0] / 100
+
+
+def test_silhouettes_move_a_triangle_to_where_it_should_be():
+    corners = torch.tensor([[-0.5, -0.5, 0, 1], [0.5, -0.4, 0, 1], [0.0, 0.6, 0, 1]])
+    tri = torch.tensor([[0, 1, 2]])
+    white = torch.ones((3, 1))
+
+    def render(shift):
+        pos = (corners + torch.cat([shift, torch.zeros(2)]))[None]
+        rast, _ = dr.rasterize(CTX, pos, tri, (32, 32))
+        return dr.antialias(dr.interpolate(white, rast, tri)[0], rast, pos, tri)
+
+    wanted = render(torch.tensor([0.15, -0.1]))
+    shift = torch.zeros(2, requires_grad=True)
+    optimizer = torch.optim.Adam([shift], lr=0.01)
+    for _ in range(80):
+        loss = ((render(shift) - wanted) ** 2).mean()
+        optimizer.zero_grad()
+        loss.backward()
+        optimizer.step()
+    np.testing.assert_allclose(shift.detach().numpy(), [0.15, -0.1], atol=0.005)
+
+
+def test_sample_earth_is_the_loop():
+    vertices, triangles = scenes.icosphere(1)
+    uv = torch.tensor(
+        np.column_stack([np.arctan2(vertices[:, 0], vertices[:, 2]) / 6.3 + 0.5, vertices[:, 1] / 2 + 0.5])
+    )
+    pos, tri, tex = torch.tensor(in_clip(vertices))[None], torch.tensor(triangles, dtype=torch.int32), random(16, 32, 3)
+    rast, rast_db = dr.rasterize(CTX, pos, tri, resolution=[12, 12])
+    texc, texd = dr.interpolate(uv[None], rast, tri, rast_db=rast_db, diff_attrs="all")
+    color = dr.texture(tex[None], texc, texd, filter_mode="linear-mipmap-linear", max_mip_level=3)
+    color = color * torch.clamp(rast[..., -1:], 0, 1)
+    expected = np.zeros((12, 12, 3))
+    found, found_db, _ = reference.rasterize(pos[0].numpy(), tri.numpy(), 12, 12)
+    at = reference.interpolate(uv.numpy(), found, triangles)
+    levels = reference.halvings(tex.numpy())[:4]
+    for i, j in zip(*found[..., 3].nonzero(), strict=True):
+        a, b, c = uv.numpy()[triangles[int(found[i, j, 3]) - 1]]
+        uv_da = np.outer(a - c, found_db[i, j, :2]) + np.outer(b - c, found_db[i, j, 2:])
+        expected[i, j] = reference.trilinear(levels, *at[i, j], uv_da, 0, "wrap")
+    assert np.array_equal(rast[0, ..., 3].numpy(), found[..., 3])
+    np.testing.assert_allclose(color[0].numpy(), expected, atol=1e-6)
+
+
+# what is refused
+
+
+POS, TRI = cube(torch.float32)
+RAST = torch.zeros((1, 4, 4, 4))
+COLOR = torch.zeros((1, 4, 4, 3))
+UV = torch.zeros((1, 4, 4, 2))
+
+
+@pytest.mark.parametrize(
+    ("call", "kind", "message"),
+    [
+        (lambda: dr.RasterizeContext("cuda"), ValueError, "device must be 'cpu' or None, got 'cuda'"),
+        (lambda: dr.rasterize(None, POS, TRI, (4, 4)), TypeError, "glctx must be a RasterizeContext, got NoneType"),
+        (lambda: dr.rasterize(CTX, POS[0], TRI, (4, 4)), ValueError, "pos must have shape (B, V, 4), or (V, 4) with"),
+        (lambda: dr.rasterize(CTX, POS.half(), TRI, (4, 4)), TypeError, "pos must be float32 or float64, got"),
+        (lambda: dr.rasterize(CTX, POS.numpy(), TRI, (4, 4)), TypeError, "pos must be a torch.Tensor, got ndarray"),
+        (lambda: dr.rasterize(CTX, POS.to("meta"), TRI, (4, 4)), TypeError, "pos must be on the CPU, got device"),
+        (lambda: dr.rasterize(CTX, POS, TRI.float(), (4, 4)), TypeError, "tri must be int32 or int64, got torch"),
+        (lambda: dr.rasterize(CTX, POS, TRI[:, :2], (4, 4)), ValueError, "tri must have shape (T, 3), got (12, 2)"),
+        (lambda: dr.rasterize(CTX, POS, TRI + 1, (4, 4)), IndexError, "triangles must hold indices in [0, 8)"),
+        (lambda: dr.rasterize(CTX, POS, TRI, 4), TypeError, "resolution must be two integers, got 4"),
+        (
+            lambda: dr.rasterize(CTX, POS[0], TRI, (4, 4), ranges=torch.tensor([[0, 13]])),
+            ValueError,
+            "ranges must lie within the 12 triangles, row 0 is [0, 13]",
+        ),
+        (lambda: dr.interpolate(POS, RAST[..., :3], TRI), ValueError, "rast must have shape (B, H, W, 4), got"),
+        (lambda: dr.interpolate(POS[:, :7], RAST, TRI), IndexError, "triangles must hold indices in [0, 7)"),
+        (lambda: dr.interpolate(POS, RAST + 13, TRI), IndexError, "rast must hold ids of the 12 triangles of tri plus"),
+        (lambda: dr.interpolate(POS, RAST, TRI, diff_attrs="all"), ValueError, "rast_db must have shape (1, 4, 4, 4)"),
+        (lambda: dr.interpolate(POS, RAST, TRI, RAST, [4]), IndexError, "diff_attrs must lie in [0, 4)"),
+        (lambda: dr.interpolate(POS, RAST, TRI, RAST, "some"), ValueError, "diff_attrs must be 'all', integers or"),
+        (lambda: dr.texture(COLOR, UV, boundary_mode="cube"), NotImplementedError, "topleft.torch has no cube maps"),
+        (lambda: dr.texture(COLOR, UV, boundary_mode="mirror"), ValueError, "boundary_mode must be 'wrap', 'clamp'"),
+        (lambda: dr.texture(COLOR, UV, filter_mode="cubic"), ValueError, "filter_mode must be 'auto', 'nearest'"),
+        (lambda: dr.texture(COLOR, UV, filter_mode="linear-mipmap-linear"), ValueError, "needs uv_da or mip_level"),
+        (lambda: dr.texture(COLOR[0], UV), ValueError, "tex must have shape (1, Ht, Wt, C) or (1, Ht, Wt, C), got"),
+        (lambda: dr.texture(COLOR, COLOR), ValueError, "uv must have shape (B, H, W, 2), got (1, 4, 4, 3)"),
+        (lambda: dr.texture(COLOR, UV, UV), ValueError, "uv_da must have shape (1, 4, 4, 4), got (1, 4, 4, 2)"),
+        (lambda: dr.texture(COLOR, UV, RAST, mip=[COLOR]), ValueError, "mip[0] must have shape (1, 2, 2, 3), got"),
+        (
+            lambda: dr.texture_construct_mip(torch.zeros(1, 6, 8, 3)),
+            ValueError,
+            "tex must have sides that halve down to level 2, got (6, 8); max_mip_level=1 stops before",
+        ),
+        (lambda: dr.texture_construct_mip(COLOR, -1), ValueError, "max_mip_level must be at least 0, got -1"),
+        (lambda: dr.texture_construct_mip(COLOR, cube_mode=True), NotImplementedError, "cube_mode must be False"),
+        (lambda: dr.antialias(COLOR, RAST[:, :3], POS, TRI), ValueError, "rast must have shape (1, 4, 4, 4), got"),
+        (lambda: dr.antialias(COLOR, RAST, POS, TRI, TRI[1:]), ValueError, "topology_hash must have shape (12, 3)"),
+    ],
+)  # fmt: skip
+def test_wrong_arguments_raise(call, kind, message):
+    with raises(kind, message):
+        call()
+
+
+def test_peeler_has_at_most_16_layers():
+    peeler = dr.DepthPeeler(CTX, POS, TRI, (2, 2))
+    for _ in range(16):
+        peeler.rasterize_next_layer()
+    with raises(ValueError, "a DepthPeeler has at most 16 layers"):
+        peeler.rasterize_next_layer()
+
+
+def test_import_of_topleft_leaves_torch_for_later():
+    code = "import sys, topleft; print('torch' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout == "False\n"
