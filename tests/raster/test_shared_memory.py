@@ -99,6 +99,11 @@ def test_a_copy_of_a_mesh_is_read_only_as_the_mesh(through):
     assert not (again.triangles.flags.writeable)
 
 
+@pytest.mark.parametrize("through", [copy.deepcopy, lambda texture: pickle.loads(pickle.dumps(texture))])
+def test_a_copy_of_a_texture_is_read_only_as_the_texture(through):
+    assert not through(tl.Texture(np.zeros((2, 2, 4), np.uint8))).image.flags.writeable
+
+
 def test_rasterizer_in_two_threads_is_refused():
     rasterizer, refused = tl.Rasterizer(SIZE, threads=1), []
     few, many = [[0, 1, 2]], np.tile(np.array([[0, 1, 2]], np.int32), (20_000, 1))
