@@ -70,10 +70,8 @@ def main() -> int:
     options = parser.parse_args()
     start = time.monotonic()
     n = differing(options.calls, options.threads)
-    seconds = time.monotonic() - start
-    print(
-        f"{n} of {options.calls:,} calls from {options.threads} threads differ from the same call alone; {seconds:.0f} s"
-    )
+    whose = f"{options.calls:,} calls of {options.threads} threads"
+    print(f"{n} of {whose} differ from the same call alone; {time.monotonic() - start:.0f} s")
     return n > 0
 
 

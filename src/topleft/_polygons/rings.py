@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from topleft._base.arrays import apart_from
+from topleft._base.arrays import apart_from, as_array
 
 __all__ = ["RingSet", "as_rings", "rings_of_triangles"]
 
@@ -103,7 +103,7 @@ def _from_offsets(values: Any) -> RingSet | None:
 
 
 def _as_offsets(values: Any, name: str, n: int, of: str) -> I64:
-    offsets = np.asarray(values)
+    offsets = as_array(name, values)
     if offsets.dtype.kind not in "iu":
         raise TypeError(f"{name} must be integers, got dtype {offsets.dtype}")
     if offsets.ndim != 1 or len(offsets) < 1:
