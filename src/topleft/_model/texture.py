@@ -168,6 +168,13 @@ class Texture:
         """What another process needs: the texels are made there."""
         return {field.name: self.__dict__[field.name] for field in fields(self)}
 
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Take it, the arrays read-only as they were."""
+        for name, value in state.items():
+            self.__dict__[name] = value
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False
+
 
 def as_image(name: str, pixels: npt.ArrayLike) -> U8:
     """The picture as its own read-only (H, W, 4) uint8.

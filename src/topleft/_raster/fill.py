@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from topleft import _engine
-from topleft._base.arrays import as_array, as_background, as_colors, shown
+from topleft._base.arrays import apart_from, as_array, as_background, as_colors, shown
 from topleft._base.memory import Memory
 from topleft._base.options import Alpha, Blend, Per, Sampling, Sink, parse
 from topleft._base.threads import run_parts
@@ -87,6 +87,7 @@ def draw_fill(
         raise ValueError(
             f"sampling {str(view.sampling)!r} gives no order: fill takes 'center', 'msaa2' to 'msaa16' and 'area'"
         )
+    colors = apart_from(out, "colors", colors)
     if style.dtype is not None:
         return draw_labels(memory, vertices, triangles, colors, view, style, out)
     palette = as_colors(colors)

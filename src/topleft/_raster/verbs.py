@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+from threading import Lock
 from typing import Any, Unpack, cast
 
 import numpy as np
@@ -352,11 +354,25 @@ def wireframe(
     return draw_wireframe(SCRATCH, vertices, triangles, checked, depth, depth_test, depth_bias, antialias, out)
 
 
+class Turn:
+    """One call at a time: what comes meanwhile is refused."""
+
+    def __init__(self) -> None:
+        self._lock = Lock()
+
+    def __enter__(self) -> None:
+        if not self._lock.acquire(blocking=False):
+            raise RuntimeError("a Rasterizer draws one picture at a time, and this one draws: give each thread its own")
+
+    def __exit__(self, *_: object) -> None:
+        self._lock.release()
+
+
 class Rasterizer:
     """The five verbs for one size, on memory that is kept from call to call.
 
     What a verb returns is overwritten by the next call of the same verb; copy what must last. Not for use from several
-    threads at once: give each its own.
+    threads at once: give each its own. A copy, and one that has been pickled, has memory of its own.
 
     Parameters
     ----------
@@ -377,6 +393,10 @@ class Rasterizer:
         self.size = as_size(size)
         self.threads = parse_threads(threads)
         self._memory = KeptMemory()
+        self._turn = Turn()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return partial(type(self), threads=self.threads), (self.size,)
 
     def __repr__(self) -> str:
         return f"Rasterizer(size={self.size}, threads={self.threads})"
@@ -389,13 +409,15 @@ class Rasterizer:
         self, vertices: ArrayLike, triangles: ArrayLike, *, out: NDArray[Any] | None = None, **view: Unpack[ViewOptions]
     ) -> NDArray[Any]:
         """Return the mask of the pixels that a triangle covers, as `topleft.coverage` does."""
-        return draw_coverage(self._memory, vertices, triangles, self._view(view), out)
+        with self._turn:
+            return draw_coverage(self._memory, vertices, triangles, self._view(view), out)
 
     def overdraw(
         self, vertices: ArrayLike, triangles: ArrayLike, *, out: NDArray[Any] | None = None, **view: Unpack[ViewOptions]
     ) -> NDArray[Any]:
         """Return how many triangles cover each pixel, as `topleft.overdraw` does."""
-        return draw_overdraw(self._memory, vertices, triangles, self._view(view), out)
+        with self._turn:
+            return draw_overdraw(self._memory, vertices, triangles, self._view(view), out)
 
     def fill(
         self,
@@ -414,7 +436,8 @@ class Rasterizer:
     ) -> NDArray[Any]:
         """Return a picture of coloured triangles in painter's order, as `topleft.fill` does."""
         style = Style(per, background, blend, alpha, resolve, dtype)
-        return draw_fill(self._memory, vertices, triangles, colors, self._view(view), style, out)
+        with self._turn:
+            return draw_fill(self._memory, vertices, triangles, colors, self._view(view), style, out)
 
     def rasterize(
         self,
@@ -427,7 +450,10 @@ class Rasterizer:
         **view: Unpack[ViewOptions],
     ) -> Fragments:
         """Return the visibility buffer, as `topleft.rasterize` does; its attributes also end with the next call."""
-        return draw_fragments(self._memory, vertices, triangles, self._view(view), depth_test, background_depth, out)
+        with self._turn:
+            return draw_fragments(
+                self._memory, vertices, triangles, self._view(view), depth_test, background_depth, out
+            )
 
     def wireframe(
         self,
@@ -443,4 +469,7 @@ class Rasterizer:
     ) -> NDArray[Any]:
         """Return the edges of the triangles as lines, as `topleft.wireframe` does."""
         checked = self._view(view)
-        return draw_wireframe(self._memory, vertices, triangles, checked, depth, depth_test, depth_bias, antialias, out)
+        with self._turn:
+            return draw_wireframe(
+                self._memory, vertices, triangles, checked, depth, depth_test, depth_bias, antialias, out
+            )
