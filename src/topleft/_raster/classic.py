@@ -18,6 +18,7 @@ from topleft._base.memory import Memory
 from topleft._base.options import Per, Sampling, Sink, parse
 from topleft._raster.view import View
 from topleft.methods import Method, load_kernel
+from topleft.typing import PerOption
 
 __all__ = ["bresenham_line", "draw_classic", "fill_classic", "refuse_classic"]
 
@@ -108,7 +109,7 @@ def fill_classic(
     triangles: ArrayLike,
     colors: NDArray[Any],
     view: View,
-    per: str,
+    per: PerOption,
     background: ArrayLike | None,
     out: object,
 ) -> NDArray[Any]:

@@ -15,6 +15,7 @@ from topleft._base.arrays import apart_from, as_array, as_background, as_number,
 from topleft._base.options import Per, parse
 from topleft._base.threads import available_threads, parse_threads, run_parts
 from topleft._raster.peel import DepthLayers
+from topleft.typing import PerOption
 
 __all__ = ["composite"]
 
@@ -30,7 +31,7 @@ def composite(
     colors: ArrayLike,
     *,
     opacity: float | None = None,
-    per: str = "auto",
+    per: PerOption = "auto",
     background: ArrayLike | None = None,
     out: NDArray[Any] | None = None,
     threads: int | None = None,

@@ -6,6 +6,7 @@ Input: `Mesh` or `Scene`, `Camera`. Output: the picture (H, W, 4) uint8 of `rend
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, Unpack
 
@@ -27,7 +28,7 @@ from topleft._raster import choices
 from topleft._raster.clusters import Clusters
 from topleft._raster.fragments import Fragments
 from topleft._raster.verbs import Rasterizer, rasterize, wireframe
-from topleft._raster.view import View
+from topleft._raster.view import View, WindowOptions
 from topleft._render.blended import draw_blended, is_blended
 from topleft._render.fragments import BentFragments, camera_of, scene_of
 from topleft._render.holes import without_holes
@@ -35,10 +36,21 @@ from topleft._render.instances import draw_scene
 from topleft._render.scene_shade import shade
 from topleft._render.through_lens import seen_through
 from topleft._shade.shade import LookOptions, ShadingOptions
+from topleft.typing import CullOption, DepthTestOption, SamplesOption, SamplingOption, ShadingOption
 
 DEFAULT_SIZE = (640, 480)
 WHITE = (255, 255, 255, 255)
 EDGE_COLOR = (24, 28, 40)
+TURNED: Mapping[str, CullOption] = {"back": "front", "front": "back"}
+
+
+class RasterizeOptions(WindowOptions, total=False):
+    """The options of `rasterize` that `rasterize_mesh` passes on."""
+
+    sampling: SamplingOption
+    depth_test: DepthTestOption | None
+    background_depth: float | None
+    out: tuple[NDArray[np.int32] | None, NDArray[np.float32] | None] | None
 
 
 def render(
@@ -46,12 +58,12 @@ def render(
     camera: CameraLike | None = None,
     size: int | tuple[int, int] = DEFAULT_SIZE,
     *,
-    shading: str = "smooth",
+    shading: ShadingOption = "smooth",
     color: ColorLike = DEFAULT_COLOR,
     background: ColorLike = WHITE,
-    cull: str = "none",
+    cull: CullOption = "none",
     edges: bool = False,
-    sampling: str = "center",
+    sampling: SamplesOption = "center",
     tolerance: float = 0.0,
     threads: int | None = None,
     rasterizer: Rasterizer | None = None,
@@ -157,7 +169,7 @@ def picture_of(
     subject: Mesh | Scene,
     camera: Camera,
     *,
-    cull: str = "none",
+    cull: CullOption = "none",
     edges: bool = False,
     threads: int | None = None,
     background: ColorLike = WHITE,
@@ -179,11 +191,11 @@ def rasterize_mesh(
     camera: CameraLike | None = None,
     size: int | tuple[int, int] = DEFAULT_SIZE,
     *,
-    cull: str = "none",
+    cull: CullOption = "none",
     tolerance: float = 0.0,
     threads: int | None = None,
     rasterizer: Rasterizer | None = None,
-    **view: Any,
+    **view: Unpack[RasterizeOptions],
 ) -> Fragments:
     """The visibility buffer of the mesh or scene: ids and depth per pixel, and attributes interpolated on demand.
 
@@ -257,7 +269,7 @@ def draw_all_edges(
     camera: Camera,
     material: Material | None,
     *,
-    cull: str,
+    cull: CullOption,
     threads: int | None,
 ) -> None:
     """Draw the edges of every instance that the visibility buffer does not hide."""
@@ -278,9 +290,9 @@ def some_of(mesh: Mesh, is_some: npt.NDArray[np.bool_]) -> Mesh:
     return Mesh(mesh.vertices, mesh.triangles[is_some])
 
 
-def cull_of(cull: str, instance: Instance) -> str:
+def cull_of(cull: CullOption, instance: Instance) -> CullOption:
     """What `cull` leaves out of an instance, whose winding is turned over where it is mirrored."""
-    return {"back": "front", "front": "back"}.get(cull, cull) if instance.is_mirrored else cull
+    return TURNED.get(cull, cull) if instance.is_mirrored else cull
 
 
 def draw_edges(
@@ -289,7 +301,7 @@ def draw_edges(
     mesh: Mesh,
     camera: Camera,
     *,
-    cull: str = "none",
+    cull: CullOption = "none",
     threads: int | None = None,
 ) -> None:
     """Draw the edges of the mesh over its picture (H, W, 4), those that the visibility buffer does not hide."""

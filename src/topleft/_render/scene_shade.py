@@ -27,6 +27,7 @@ from topleft._raster.fragments import Fragments
 from topleft._render.fragments import SceneFragments, VisiblePart, join, meshes_of, parts_of
 from topleft._shade.look import is_similarity
 from topleft._shade.shade import Shading, ShadingOptions, shade_mesh, shade_numbers, shade_samples
+from topleft.typing import ShadingOption
 
 __all__ = ["shade", "shade_by", "shade_part"]
 
@@ -58,7 +59,7 @@ def shade(
     mesh: Mesh | Scene | Points,
     camera: CameraLike,
     *,
-    shading: str = "smooth",
+    shading: ShadingOption = "smooth",
     color: ColorLike = DEFAULT_COLOR,
     background: ColorLike = (255, 255, 255, 255),
     depth_range: tuple[float, float] | None = None,
