@@ -28,8 +28,9 @@ ENGINE = "topleft._engine.kernels"
 
 WARNINGS = ["-Wall", "-Wextra"]
 # -ffp-contract=off and -fno-fast-math stand after whatever CFLAGS holds: the same bits on every machine depend on them.
-# -O2 makes the kernels 5 to 25 % slower. Link-time optimisation could move code between units of different instruction sets. Debug information, which Python's
-# own flags ask for, would be nine tenths of the library and a third of the time: only `build_ext --debug` makes it.
+# -O2 makes the kernels 5 to 25 % slower. Link-time optimisation could move code between units of different instruction
+# sets. Debug information, which Python asks for, would be nine tenths of the library and a third of the time: only
+# `build_ext --debug` makes it.
 FLAGS_C = [
     "-std=c11", "-O3", "-g0", "-ffp-contract=off", "-fno-fast-math", "-fno-math-errno", "-fvisibility=hidden",
     "-fno-lto",
