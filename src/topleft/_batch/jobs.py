@@ -30,6 +30,7 @@ from topleft._render.transparent import render_transparent
 from topleft._render.view_layers import gbuffer_of
 from topleft._scene.adapt import MeshLike, as_mesh
 from topleft._scene.scene import Scene
+from topleft.typing import LayerOption
 
 __all__ = ["Job", "JobRunner", "MeshFile", "Outcome", "as_job"]
 
@@ -62,10 +63,10 @@ class Job:
 
     scene: Any
     camera: Camera | CameraMaker | None = None
-    size: tuple[int, int] = DEFAULT_SIZE
+    size: int | tuple[int, int] = DEFAULT_SIZE
     options: Mapping[str, Any] = field(default_factory=dict)
     destination: str | os.PathLike[str] | None = None
-    layers: Sequence[str] = ()
+    layers: Sequence[LayerOption | str] = ()
 
     def __post_init__(self) -> None:
         if not isinstance(self.options, Mapping) or not all(isinstance(name, str) for name in self.options):

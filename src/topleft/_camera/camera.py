@@ -7,7 +7,7 @@ Matrices act on columns: `clip = projection @ view @ [x, y, z, 1]`. A lens bends
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -42,6 +42,7 @@ from topleft._model.mesh import Mesh
 from topleft._model.points import Points
 from topleft._scene.adapt import MeshLike
 from topleft._scene.scene import Scene
+from topleft.typing import FitOption, UpOption
 
 __all__ = ["DEFAULT_FOV_Y_DEG", "Camera", "CameraLike", "as_camera", "camera_for"]
 
@@ -404,10 +405,10 @@ class Camera:
         azimuth_deg: float = THREE_QUARTER_DEG[0],
         elevation_deg: float = THREE_QUARTER_DEG[1],
         fov_y_deg: float = DEFAULT_FOV_Y_DEG,
-        up: Literal["y", "z"] = "y",
+        up: UpOption = "y",
         ortho: bool = False,
         aspect: float = 1.0,
-        fit: Literal["sphere", "box", "points", "silhouette"] = "sphere",
+        fit: FitOption = "sphere",
     ) -> Camera:
         """A camera that has the whole subject just inside its frame; three-quarter view by default.
 
@@ -443,7 +444,7 @@ class Camera:
         center, radius = bounding_sphere(ends)
         check_fov(fov_y_deg)
         check_positive("aspect", aspect)
-        check_choice("fit", fit, ("sphere", "box", "points", "silhouette"))
+        check_choice("fit", fit, get_args(FitOption))
         tan_y = np.tan(np.radians(fov_y_deg) / 2)
         # The sphere touches the pyramid of view at sin, not tan, of the half angle.
         distance = radius * FRAMING_MARGIN / np.sin(np.arctan(tan_y * min(1.0, aspect)))

@@ -8,7 +8,7 @@ Based on: Segal, M., and K. Akeley, "The OpenGL Graphics System", 1992 (the matr
 from __future__ import annotations
 
 import math
-from typing import Literal, TypeAlias
+from typing import TypeAlias, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +19,7 @@ from topleft._model.mesh import Mesh, extreme_points, used_vertices
 from topleft._model.points import Points
 from topleft._scene.adapt import MeshLike, is_mesh_like
 from topleft._scene.subject import as_subject
+from topleft.typing import UpOption
 
 F64 = npt.NDArray[np.float64]
 Framed: TypeAlias = Mesh | Points | F64
@@ -219,7 +220,7 @@ def orbit_view(
     azimuth_deg: float = THREE_QUARTER_DEG[0],
     elevation_deg: float = THREE_QUARTER_DEG[1],
     *,
-    up: Literal["y", "z"] = "y",
+    up: UpOption = "y",
 ) -> F64:
     """Eye from world (4, 4) float64, for a camera on a sphere round the target; the angles of `Camera.framing`.
 
@@ -228,7 +229,7 @@ def orbit_view(
     ValueError
         If the elevation is outside -90 to 90 degrees or `up` is neither "y" nor "z".
     """
-    check_choice("up", up, ("y", "z"))
+    check_choice("up", up, get_args(UpOption))
     if not math.isfinite(as_number("azimuth_deg", azimuth_deg)):
         raise ValueError(f"azimuth_deg must be finite, got {azimuth_deg}")
     if not -90 <= as_number("elevation_deg", elevation_deg) <= 90:

@@ -8,7 +8,7 @@ Geosciences 42, 2010.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TypedDict, Unpack
 
 import numpy as np
 import numpy.typing as npt
@@ -17,8 +17,19 @@ from topleft._base.arrays import as_count
 from topleft._camera.camera import Camera
 from topleft._camera.matrices import THREE_QUARTER_DEG, Framed, as_framed, bounding_sphere, ends_to_frame
 from topleft._scene.adapt import MeshLike
+from topleft.typing import FitOption, UpOption
 
 GOLDEN_ANGLE_DEG = 180 * (3 - 5**0.5)
+
+
+class FramingOptions(TypedDict, total=False):
+    """The options of `Camera.framing` that `turntable` and `viewpoints` pass on."""
+
+    fov_y_deg: float
+    up: UpOption
+    ortho: bool
+    aspect: float
+    fit: FitOption
 
 
 def turntable(
@@ -27,7 +38,7 @@ def turntable(
     *,
     azimuth_deg: float = THREE_QUARTER_DEG[0],
     elevation_deg: float = THREE_QUARTER_DEG[1],
-    **framing: Any,
+    **framing: Unpack[FramingOptions],
 ) -> list[Camera]:
     """Cameras that go once round the subject at one height, in equal steps.
 
@@ -66,7 +77,7 @@ def turntable(
     ]
 
 
-def viewpoints(subject: MeshLike | npt.ArrayLike, n: int, **framing: Any) -> list[Camera]:
+def viewpoints(subject: MeshLike | npt.ArrayLike, n: int, **framing: Unpack[FramingOptions]) -> list[Camera]:
     """Cameras spread evenly over the sphere round the subject, from the top to the bottom.
 
     Parameters

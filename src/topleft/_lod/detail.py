@@ -30,6 +30,7 @@ from topleft._model.material import Material
 from topleft._model.mesh import Mesh, has_holes
 from topleft._scene.adapt import MeshLike, as_mesh
 from topleft._scene.scene import Scene
+from topleft.typing import CullOption
 
 __all__ = ["Detail", "check_tolerance", "choose_detail", "detailed", "pixels_of_bound"]
 
@@ -74,7 +75,7 @@ def choose_detail(
     size: int | tuple[int, int],
     *,
     tolerance: float,
-    cull: str = "none",
+    cull: CullOption = "none",
     material: Material | None = None,
     transform: npt.ArrayLike | None = None,
     viewport: tuple[int, int] | None = None,

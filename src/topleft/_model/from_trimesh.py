@@ -14,9 +14,11 @@ from topleft._base.color import Color, encode_srgb
 from topleft._model.material import Material
 from topleft._model.mesh import Mesh
 from topleft._model.texture import Texture
+from topleft.typing import AlphaModeOption, EncodingOption
 
 __all__ = ["placed"]
 
+ALPHA_MODES: dict[str, AlphaModeOption] = {"OPAQUE": "opaque", "MASK": "mask", "BLEND": "blend"}
 DEFAULT_OF_TRIMESH = ((102, 102, 102), 1.0)
 """Specular colour and glossiness of trimesh's materials where nobody gave them."""
 
@@ -73,14 +75,14 @@ def _metallic_rough(source: Any) -> Material:
         given = np.asarray(factor, np.float64).ravel() / (255 if np.asarray(factor).dtype.kind in "iu" else 1)
         linear[: len(given)] = given[:4]
     emission = np.zeros(3) if source.emissiveFactor is None else np.asarray(source.emissiveFactor, np.float64)
-    mode = source.alphaMode if source.alphaMode in ("MASK", "BLEND") else "OPAQUE"
+    mode = source.alphaMode if source.alphaMode in ALPHA_MODES else "OPAQUE"
     cutoff = 0.5 if source.alphaCutoff is None else float(source.alphaCutoff)
     return Material(
         None if factor is None else _rgb(np.rint(255 * encode_srgb(linear).clip(0, 1))),
         _texture(source.baseColorTexture),
         alpha_cutoff=min(max(cutoff, 0.0), 1.0) if mode == "MASK" else None,
         opacity=min(max(float(linear[3]), 0.0), 1.0),
-        alpha_mode=mode.lower(),
+        alpha_mode=ALPHA_MODES[mode],
         double_sided=source.doubleSided is not False,
         emission=tuple(np.maximum(emission, 0).tolist()),
         emission_texture=_texture(source.emissiveTexture),
@@ -92,7 +94,7 @@ def _metallic_rough(source: Any) -> Material:
     )
 
 
-def _texture(image: Any, encoding: str = "srgb") -> Texture | None:
+def _texture(image: Any, encoding: EncodingOption = "srgb") -> Texture | None:
     if image is None:
         return None
     return Texture(np.asarray(image.convert("RGBA")), encoding=encoding)

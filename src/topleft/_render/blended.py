@@ -50,7 +50,7 @@ LAYERS, MOST_LAYERS = 4, 16
 
 CLEAR = (0, 0, 0, 0)
 
-COLORED = Material(alpha_mode=AlphaMode.BLEND)
+COLORED = Material(alpha_mode="blend")
 """Of a mesh with nothing but colours, which means their alpha."""
 
 

@@ -6,6 +6,7 @@ Input: `Mesh` or `Scene`, `Camera`. Output: the picture (H, W, 4) uint8 of `rend
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, Unpack
 
@@ -25,7 +26,7 @@ from topleft._raster import choices
 from topleft._raster.clusters import Clusters
 from topleft._raster.fragments import Fragments
 from topleft._raster.verbs import Rasterizer, rasterize, wireframe
-from topleft._raster.view import View
+from topleft._raster.view import View, WindowOptions
 from topleft._render.blended import draw_blended, is_blended
 from topleft._render.fragments import BentFragments, camera_of
 from topleft._render.holes import without_holes
@@ -36,9 +37,20 @@ from topleft._scene.adapt import MeshLike
 from topleft._scene.scene import Instance, Scene
 from topleft._scene.subject import as_subject, scene_of
 from topleft._shade.shade import LookOptions, ShadingOptions
+from topleft.typing import CullOption, DepthTestOption, SamplesOption, SamplingOption, ShadingOption
 
 DEFAULT_SIZE = (640, 480)
 EDGE_COLOR = (24, 28, 40)
+TURNED: Mapping[str, CullOption] = {"back": "front", "front": "back"}
+
+
+class RasterizeOptions(WindowOptions, total=False):
+    """The options of `rasterize` that `rasterize_mesh` passes on."""
+
+    sampling: SamplingOption
+    depth_test: DepthTestOption | None
+    background_depth: float | None
+    out: tuple[NDArray[np.int32] | None, NDArray[np.float32] | None] | None
 
 
 def render(
@@ -46,12 +58,12 @@ def render(
     camera: CameraLike | None = None,
     size: int | tuple[int, int] = DEFAULT_SIZE,
     *,
-    shading: str = "smooth",
+    shading: ShadingOption = "smooth",
     color: ColorLike = DEFAULT_COLOR,
     background: ColorLike = WHITE,
-    cull: str = "none",
+    cull: CullOption = "none",
     edges: bool = False,
-    sampling: str = "center",
+    sampling: SamplesOption = "center",
     tolerance: float = 0.0,
     threads: int | None = None,
     rasterizer: Rasterizer | None = None,
@@ -143,11 +155,11 @@ def rasterize_mesh(
     camera: CameraLike | None = None,
     size: int | tuple[int, int] = DEFAULT_SIZE,
     *,
-    cull: str = "none",
+    cull: CullOption = "none",
     tolerance: float = 0.0,
     threads: int | None = None,
     rasterizer: Rasterizer | None = None,
-    **view: Any,
+    **view: Unpack[RasterizeOptions],
 ) -> Fragments:
     """The visibility buffer of the mesh or scene: ids and depth per pixel, and attributes interpolated on demand.
 
@@ -223,7 +235,7 @@ def draw_all_edges(
     camera: Camera,
     options: ShadingOptions,
     *,
-    cull: str,
+    cull: CullOption,
 ) -> None:
     """Draw the edges of every instance that the visibility buffer does not hide."""
     for instance in scene_of(subject):
@@ -243,9 +255,9 @@ def some_of(mesh: Mesh, is_some: npt.NDArray[np.bool_]) -> Mesh:
     return Mesh(mesh.vertices, mesh.triangles[is_some])
 
 
-def cull_of(cull: str, instance: Instance) -> str:
+def cull_of(cull: CullOption, instance: Instance) -> CullOption:
     """What `cull` leaves out of an instance, whose winding is turned over where it is mirrored."""
-    return {"back": "front", "front": "back"}.get(cull, cull) if instance.is_mirrored else cull
+    return TURNED.get(cull, cull) if instance.is_mirrored else cull
 
 
 def draw_edges(
@@ -254,7 +266,7 @@ def draw_edges(
     mesh: Mesh,
     camera: Camera,
     *,
-    cull: str = "none",
+    cull: CullOption = "none",
     threads: int | None = None,
 ) -> None:
     """Draw the edges of the mesh over its picture (H, W, 4), those that the visibility buffer does not hide."""

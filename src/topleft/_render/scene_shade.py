@@ -28,6 +28,7 @@ from topleft._scene.scene import Instance, Scene
 from topleft._scene.subject import meshes_of
 from topleft._shade.look import is_similarity
 from topleft._shade.shade import Shading, ShadingOptions, shade_mesh, shade_numbers, shade_samples
+from topleft.typing import ShadingOption
 
 __all__ = ["shade", "shade_by", "shade_part"]
 
@@ -59,7 +60,7 @@ def shade(
     mesh: Mesh | Scene | Points,
     camera: CameraLike,
     *,
-    shading: str = "smooth",
+    shading: ShadingOption = "smooth",
     color: ColorLike = DEFAULT_COLOR,
     background: ColorLike = WHITE,
     depth_range: tuple[float, float] | None = None,

@@ -5,7 +5,7 @@ Input: `Mesh` or `Scene`, `Camera`. Output: a mask (H, W), bool or float32.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 import numpy.typing as npt
@@ -16,12 +16,14 @@ from topleft._lod.detail import detailed
 from topleft._model.points import Points
 from topleft._points.cloud import draw_cloud
 from topleft._raster.verbs import coverage
+from topleft._raster.view import WindowOptions
 from topleft._render.instances import draw_scene_coverage
 from topleft._render.render import DEFAULT_SIZE
 from topleft._render.through_lens import seen_through
 from topleft._scene.adapt import MeshLike
 from topleft._scene.scene import Scene
 from topleft._scene.subject import as_subject
+from topleft.typing import CullOption, SamplingOption
 
 __all__ = ["silhouette"]
 
@@ -31,12 +33,12 @@ def silhouette(
     camera: CameraLike | None = None,
     size: int | tuple[int, int] = DEFAULT_SIZE,
     *,
-    sampling: str = "center",
-    cull: str = "none",
+    sampling: SamplingOption = "center",
+    cull: CullOption = "none",
     tolerance: float = 0.0,
     threads: int | None = None,
     out: npt.NDArray[Any] | None = None,
-    **view: Any,
+    **view: Unpack[WindowOptions],
 ) -> npt.NDArray[Any]:
     """Return the mask of the mesh or scene: where it is seen, or how much of each pixel it covers.
 

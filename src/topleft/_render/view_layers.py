@@ -8,12 +8,13 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 import numpy.typing as npt
 
 from topleft._base.arrays import as_real, as_size, shown
+from topleft._base.color import ColorLike
 from topleft._camera.camera import CameraLike, as_camera, camera_for
 from topleft._io.layer_files import save_layers
 from topleft._lod.detail import detailed
@@ -27,6 +28,7 @@ from topleft._scene.adapt import MeshLike
 from topleft._scene.scene import Scene
 from topleft._scene.subject import as_subject, meshes_of
 from topleft._shade.shade import LookOptions
+from topleft.typing import CullOption, LayerOption, SamplesOption, ShadingOption
 
 __all__ = ["ViewLayers", "gbuffer_of", "render_layers"]
 
@@ -71,20 +73,31 @@ class ViewLayers(Mapping[str, Array]):
         return save_layers(path, self if layer is None else {layer: self[layer]}, scale=scale)
 
 
+class LayerLookOptions(LookOptions, total=False):
+    """The options of `render` and `render_transparent` that `render_layers` passes on."""
+
+    shading: ShadingOption
+    color: ColorLike
+    background: ColorLike
+    edges: bool
+    sampling: SamplesOption
+    opacity: float
+
+
 def render_layers(
     mesh: MeshLike | Scene | Points,
     camera: CameraLike | None = None,
     size: int | tuple[int, int] = DEFAULT_SIZE,
     *,
-    layers: str | Iterable[str] = ("color", "depth"),
+    layers: LayerOption | str | Iterable[LayerOption | str] = ("color", "depth"),
     attributes: Mapping[str, Any] | None = None,
     camera_to: CameraLike | None = None,
     transforms_to: npt.ArrayLike | None = None,
-    cull: str = "none",
+    cull: CullOption = "none",
     tolerance: float = 0.0,
     threads: int | None = None,
     rasterizer: Rasterizer | None = None,
-    **look: Any,
+    **look: Unpack[LayerLookOptions],
 ) -> ViewLayers:
     """Layers of one view by name: depth, normals, positions, ids and flow beside the colours.
 
@@ -196,7 +209,7 @@ def gbuffer_of(
     *,
     camera_to: CameraLike | None = None,
     transforms_to: npt.ArrayLike | None = None,
-    cull: str = "none",
+    cull: CullOption = "none",
     tolerance: float = 0.0,
     threads: int | None = None,
     rasterizer: Rasterizer | None = None,

@@ -35,6 +35,7 @@ from topleft._model.texture import Texture
 from topleft._raster.fragments import Fragments
 from topleft._raster.sampling import sample_positions
 from topleft._shade.look import ShadingInputs
+from topleft.typing import ShadingOption
 
 __all__ = ["LookOptions", "Shading", "ShadingOptions", "picture_of_numbers", "shade_mesh", "shade_numbers"]
 
@@ -94,7 +95,7 @@ class ShadingOptions:
     @classmethod
     def parse(
         cls,
-        shading: str = "smooth",
+        shading: ShadingOption = "smooth",
         color: ColorLike = DEFAULT_COLOR,
         background: ColorLike = WHITE,
         depth_range: tuple[float, float] | None = None,

@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._base.options import Sampling
+from topleft._base.whole_file import remove_stale_parts
 from topleft._batch.jobs import Job
 from topleft._camera.camera import Camera
 from topleft._camera.file_cameras import load_cameras
@@ -315,6 +316,7 @@ def check_targets(groups: Sequence[MeshJobs], others: Iterable[Path] = ()) -> No
             raise UsageError(f"OUT would overwrite the mesh {str(target)!r}")
     for folder in dict.fromkeys(target.parent for target, _ in targets):
         _check_writable(folder)
+    remove_stale_parts(target for target, _ in targets)
 
 
 def _check_writable(folder: Path) -> None:
