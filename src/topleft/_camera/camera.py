@@ -20,6 +20,7 @@ from topleft._camera.matrices import (
     FRAMING_MARGIN,
     SILHOUETTE_MARGIN,
     THREE_QUARTER_DEG,
+    as_framed,
     bounding_sphere,
     box_corners,
     box_matrix,
@@ -27,6 +28,7 @@ from topleft._camera.matrices import (
     check_planes,
     check_positive,
     distance_to_fit,
+    ends_to_frame,
     frustum_matrix,
     orbit_view,
     orthographic_matrix,
@@ -36,10 +38,13 @@ from topleft._camera.matrices import (
     split_matrix,
     view_matrix,
 )
-from topleft._model.adapt import MeshLike
+from topleft._model.mesh import Mesh
+from topleft._model.points import Points
+from topleft._scene.adapt import MeshLike
+from topleft._scene.scene import Scene
 from topleft.typing import FitOption, UpOption
 
-__all__ = ["DEFAULT_FOV_Y_DEG", "Camera", "CameraLike", "as_camera"]
+__all__ = ["DEFAULT_FOV_Y_DEG", "Camera", "CameraLike", "as_camera", "camera_for"]
 
 DEFAULT_FOV_Y_DEG = 40.0
 
@@ -434,7 +439,9 @@ class Camera:
         ValueError
             If there is nothing to frame or a number is outside its range.
         """
-        center, radius = bounding_sphere(subject)
+        framed = as_framed(subject)
+        ends = ends_to_frame(framed)
+        center, radius = bounding_sphere(ends)
         check_fov(fov_y_deg)
         check_positive("aspect", aspect)
         check_choice("fit", fit, get_args(FitOption))
@@ -445,7 +452,7 @@ class Camera:
         right, above = 0.0, 0.0
         if fit != "sphere":
             turn = orbit_view((0, 0, 0), 1.0, azimuth_deg, elevation_deg, up=up)[:3, :3]
-            points = box_corners(subject) if fit == "box" else points_to_frame(subject)
+            points = box_corners(ends) if fit == "box" else points_to_frame(framed)
             points = (points - center) @ turn.T
             if fit == "silhouette":
                 share = 1 - 2 * SILHOUETTE_MARGIN
@@ -494,3 +501,21 @@ def as_camera(camera: object, name: str = "camera") -> Camera:
             return Camera.from_matrix(matrix)
         hint = "; Camera.from_intrinsics takes those of OpenCV" * (matrix.shape in ((3, 3), (3, 4)))
     raise TypeError(f"{wish}, got {shown(camera)}{hint}")
+
+
+def camera_for(subject: Mesh | Scene | Points, camera: CameraLike | None, size: tuple[int, int]) -> Camera:
+    """The camera, or the three-quarter view of the subject in a picture of this size.
+
+    Raises
+    ------
+    TypeError
+        If the camera is none.
+    ValueError
+        If there is none, and nothing to frame.
+    """
+    if camera is not None:
+        return as_camera(camera)
+    if isinstance(subject, Mesh) and not len(subject.triangles):
+        raise ValueError("there is nothing to frame: the mesh has no triangles")
+    width, height = size
+    return Camera.framing(subject.extreme_points(), aspect=width / height if width > 0 and height > 0 else 1.0)

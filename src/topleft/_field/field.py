@@ -19,11 +19,12 @@ from topleft._base.memory import SCRATCH
 from topleft._base.options import Per, Sink, check_choice, parse
 from topleft._base.threads import count_threads, run_parts
 from topleft._field.grid import ExtentLike, Grid, grid_around
-from topleft._model.adapt import MeshLike, Polygons, as_polygons
 from topleft._raster.choices import drawing
 from topleft._raster.rasterize import canvas_of, draw
 from topleft._raster.snap import snap_mesh
 from topleft._raster.view import View
+from topleft._scene.adapt import MeshLike, as_polygons
+from topleft._scene.cells import Polygons
 from topleft.typing import PerOption, SurfaceOption, YOption
 
 F64 = npt.NDArray[np.float64]

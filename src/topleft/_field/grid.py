@@ -14,7 +14,8 @@ import numpy.typing as npt
 
 from topleft._base.arrays import as_real, as_size, shown
 from topleft._base.options import check_choice
-from topleft._model.adapt import MeshLike, Polygons, as_polygons
+from topleft._scene.adapt import MeshLike, as_polygons
+from topleft._scene.cells import Polygons
 from topleft.typing import YOption
 
 F64 = npt.NDArray[np.float64]

@@ -19,7 +19,6 @@ from topleft._base.memory import KeptMemory
 from topleft._base.options import DepthTest, Sampling, parse
 from topleft._camera.camera import Camera
 from topleft._lod.detail import check_tolerance, choose_detail
-from topleft._model.adapt import MeshLike
 from topleft._model.mesh import Mesh
 from topleft._plan.costs import load_costs
 from topleft._plan.facts import CLASSES, find_cluster_facts, find_facts, memory_of
@@ -30,6 +29,7 @@ from topleft._raster.clusters import Clusters
 from topleft._raster.fill import Style, draw_fill
 from topleft._raster.rasterize import draw_coverage, draw_fragments, draw_overdraw
 from topleft._raster.view import CULL_CODES, View, ViewOptions
+from topleft._scene.adapt import MeshLike
 from topleft.methods import METHODS
 from topleft.typing import DepthTestOption, OutputOption
 

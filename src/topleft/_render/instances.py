@@ -20,7 +20,6 @@ from topleft._base.options import DepthTest, Sampling, Sink, parse
 from topleft._base.threads import count_threads, run_parts
 from topleft._camera.camera import Camera
 from topleft._model.material import Material
-from topleft._model.scene import Scene
 from topleft._raster import choices
 from topleft._raster.classic import refuse_classic
 from topleft._raster.cluster_draw import ClusteredMesh, draw_clustered
@@ -33,6 +32,7 @@ from topleft._raster.snap import Snapped, snap_mesh
 from topleft._raster.view import View, ViewOptions
 from topleft._render.fragments import SceneDepthLayers, SceneFragments
 from topleft._render.through_lens import DrawnScene, scene_through
+from topleft._scene.scene import Scene
 from topleft.typing import DepthTestOption
 
 __all__ = ["PlacedScene", "draw_nearest", "draw_scene", "draw_scene_coverage", "peel_scene", "place"]

@@ -11,20 +11,22 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._base.arrays import as_count, as_size
-from topleft._base.color import ColorLike, as_color
-from topleft._camera.camera import Camera, CameraLike
-from topleft._model.adapt import MeshLike
+from topleft._base.color import WHITE, ColorLike, as_color
+from topleft._camera.camera import Camera, CameraLike, camera_for
+from topleft._lod.detail import detailed
 from topleft._model.material import Material
-from topleft._model.scene import Scene
 from topleft._raster.composite import composite
 from topleft._raster.peel import DepthLayers, peel
 from topleft._raster.view import WindowOptions
-from topleft._render.fragments import SceneDepthLayers, scene_of
+from topleft._render.fragments import SceneDepthLayers
 from topleft._render.holes import draw_holed, has_cuts, holed_instances, solid_scene
 from topleft._render.instances import peel_scene
-from topleft._render.render import DEFAULT_SIZE, WHITE, subject_of
+from topleft._render.render import DEFAULT_SIZE
 from topleft._render.scene_shade import shade
 from topleft._render.through_lens import seen_through
+from topleft._scene.adapt import MeshLike
+from topleft._scene.scene import Scene
+from topleft._scene.subject import as_meshes, scene_of
 from topleft._shade.shade import LookOptions
 from topleft.typing import CullOption, DepthTestOption, SamplesOption, ShadingOption
 
@@ -97,7 +99,9 @@ def render_transparent(
     192
     """
     size, layers, material = as_size(size), as_count("layers", layers), look.get("material")
-    subject, camera = subject_of(mesh, camera, size, tolerance, cull=cull, material=material)
+    subject = as_meshes(mesh)
+    camera = camera_for(subject, camera, size)
+    subject = detailed(subject, camera, size, tolerance, cull=cull, material=material)
     ground = as_color("background", background, 4)
     options: dict[str, Any] = {"layers": layers, "cull": cull, "threads": threads}
     if has_cuts(subject, material):
@@ -168,7 +172,8 @@ def visible_layers(
         If the mesh has no triangles and no camera is given, an option is out of range, or the camera has a lens.
     """
     size = as_size(size)
-    subject, camera = subject_of(mesh, camera, size)
+    subject = as_meshes(mesh)
+    camera = camera_for(subject, camera, size)
     check_straight(camera)
     if isinstance(subject, Scene):
         return peel_scene(subject, camera, size, **options)
