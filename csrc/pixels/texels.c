@@ -103,7 +103,7 @@ TL_INLINE void add_level(const tl_levels *t, int level, double u, double v, doub
     }
 }
 
-/* How many halvings down the texels are as large as a pixel: log2 of the longer side of its footprint, 0 to the last. */
+/* How many halvings down the texels are as large as a pixel: log2 of the longer side of its footprint. */
 TL_INLINE double level_of(const tl_levels *t, const float *slopes)
 {
     const double width = (double)t->rows[1], height = (double)t->rows[2], last = (double)(t->n_levels - 1);
@@ -161,7 +161,7 @@ static void fill_texels(const tl_levels *t, const int32_t *ids, const float *uv,
     }
 }
 
-/* The texels of an axis that texel i of its halving is the mean over, and their weights: 1, 2, or 3 of an odd number. */
+/* The texels of an axis that texel i of its halving is the mean over, and their weights: 1 to 3 of them. */
 typedef struct {
     int64_t first;
     int n;
