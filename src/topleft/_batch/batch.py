@@ -24,6 +24,7 @@ from topleft._base.options import parse
 from topleft._batch.jobs import Job, JobRunner, Outcome, as_job
 from topleft._batch.workers import Workers, workers_of
 from topleft.errors import MeshWarning, MissingPackageError
+from topleft.typing import OnErrorOption, OrderOption
 
 __all__ = ["Batch", "Job", "Result", "Summary", "render_batch"]
 
@@ -114,8 +115,8 @@ def render_batch(
     *,
     executor: Executor | int | None = None,
     progress: Progress | bool | None = None,
-    on_error: str = "raise",
-    order: str = "jobs",
+    on_error: OnErrorOption = "raise",
+    order: OrderOption = "jobs",
     resume: bool = False,
     chunk: int = 1,
     window: int | None = None,

@@ -29,6 +29,10 @@ U8 = npt.NDArray[np.uint8]
 NO_CREASE = 180.0
 """The crease angle at which no edge is sharp, degrees."""
 
+DEFAULT_CREASE = 30.0
+"""Degrees by which triangles of a mesh without normals bend at an edge before it is sharp: round things of 12 sides and
+more stay round."""
+
 POINTS_AT_ONCE = 1 << 14
 """Points whose distances are computed together: they stay in the second-level cache."""
 

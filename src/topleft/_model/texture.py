@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from enum import StrEnum
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +19,8 @@ from topleft import _engine
 from topleft._base.arrays import as_array
 from topleft._base.color import LIGHT_OF_SRGB
 from topleft._base.options import parse
+from topleft._base.texels import MOST_KEPT_BYTES, ValueLevels, as_light, levels_of
+from topleft.typing import EncodingOption, FilterOption, WrapOption
 
 U8 = npt.NDArray[np.uint8]
 U16 = npt.NDArray[np.uint16]
@@ -110,9 +112,9 @@ class Texture:
         def __init__(
             self,
             image: npt.ArrayLike,
-            filter: Literal["trilinear", "bilinear", "nearest"] | str = "trilinear",  # noqa: A002
-            wrap: str | tuple[str, str] = "repeat",
-            encoding: Literal["srgb", "linear"] | str = "srgb",
+            filter: FilterOption = "trilinear",  # noqa: A002
+            wrap: WrapOption | tuple[WrapOption, WrapOption] = "repeat",
+            encoding: EncodingOption = "srgb",
             uv_set: int = 0,
             transform: npt.ArrayLike | None = None,
         ) -> None: ...
@@ -157,6 +159,16 @@ class Texture:
         return _engine.Mipmap(
             texels, table, filter_code, wrap_u, wrap_v, self.uv_set, rows_of_transform, (d * hand, -c * hand), hand
         )
+
+    def value_levels(self) -> ValueLevels:
+        """Light and opacity as float32, and their halvings; made when they are first needed, and kept unless large."""
+        found: ValueLevels | None = self.__dict__.get("_value_levels")
+        if found is None:
+            wrap_u, wrap_v = map(str, self.wrap)
+            found = levels_of(as_light(self.image, str(self.encoding)), str(self.filter), (wrap_u, wrap_v))
+            if found.texels.nbytes <= MOST_KEPT_BYTES:
+                self.__dict__["_value_levels"] = found
+        return found
 
     @cached_property
     def has_alpha(self) -> bool:

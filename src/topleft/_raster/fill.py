@@ -20,6 +20,7 @@ from topleft._raster.resolve import parse_resolve, resolve_colors, resolve_flat,
 from topleft._raster.sampling import draw_means, sample_positions
 from topleft._raster.snap import Snapped, snap_mesh
 from topleft._raster.view import View
+from topleft.typing import AlphaOption, BlendOption, PerOption, ResolveOption
 
 __all__ = ["Style", "draw_fill"]
 
@@ -30,11 +31,11 @@ BLEND_CODES = {mode: code for code, mode in enumerate(Blend)}  # tl_blend in csr
 class Style:
     """The options of `fill` besides those that all verbs share, not yet checked."""
 
-    per: str
+    per: PerOption
     background: ArrayLike | None
-    blend: str
-    alpha: str
-    resolve: str
+    blend: BlendOption
+    alpha: AlphaOption
+    resolve: ResolveOption
     dtype: DTypeLike | None = None
 
 

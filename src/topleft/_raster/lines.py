@@ -20,6 +20,7 @@ from topleft._raster.fragments import Fragments
 from topleft._raster.rasterize import canvas_of
 from topleft._raster.snap import Snapped, snap_mesh
 from topleft._raster.view import View
+from topleft.typing import DepthTestOption
 
 __all__ = ["draw_wireframe"]
 
@@ -55,7 +56,7 @@ def draw_wireframe(
     triangles: ArrayLike,
     view: View,
     depth: object,
-    depth_test: str,
+    depth_test: DepthTestOption,
     depth_bias: float,
     antialias: bool,
     out: object,

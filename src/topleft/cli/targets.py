@@ -24,10 +24,9 @@ from topleft._camera.file_cameras import load_cameras
 from topleft._io.images import SUFFIXES
 from topleft._io.load import load
 from topleft._io.references import decoded
-from topleft._model.adapt import DEFAULT_CREASE
 from topleft._model.environment import Environment
 from topleft._model.material import Material
-from topleft._model.mesh import Mesh
+from topleft._model.mesh import DEFAULT_CREASE, Mesh
 from topleft._model.points import DEFAULT_POINT_SIZE, Points
 from topleft._model.texture import Texture
 from topleft._shade.shade import Shading
