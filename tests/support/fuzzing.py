@@ -514,7 +514,7 @@ def memory_of(array: np.ndarray) -> bytes:
 
 def guards_of(outs: Sequence[np.ndarray]) -> list[bytes]:
     """What lies before and behind the memory to draw into."""
-    return [memory_of(out)[:GUARD] + memory_of(out)[-GUARD:] for out in outs if owner_of(out).dtype == np.uint8]
+    return [memory_of(out)[:GUARD] + memory_of(out)[-GUARD:] for out in outs if owner_of(out).ndim == 1]
 
 
 def must(holds: bool, case: Case, words: str) -> None:
