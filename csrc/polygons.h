@@ -70,6 +70,15 @@ typedef struct {
     double *shares;      /* (width + 16,) */
 } tl_piece_scratch;
 
+/* Counts the work of a polygon with so many points and so many pixels in its box. */
+static inline void tl_count_polygon(tl_pause *pause, int64_t n_points, int64_t n_box_px)
+{
+    if (pause)
+        pause->left_px -= TL_SETUP_PX + 8 * n_points + n_box_px;
+}
+
+static inline int tl_is_polygon_given_up(tl_pause *pause) { return pause && pause->left_px < 0 && pause->ask(pause); }
+
 /* What is painted: value of a polygon is values[i], or its number when that is NULL. */
 typedef struct {
     const int32_t *listed; /* the polygons listed[first] to listed[end - 1]; NULL: first to end - 1 */
@@ -85,6 +94,7 @@ typedef struct {
     int32_t *cells;             /* (TL_CELL_ROWS * tl_polygon_stride(width),), all 0, and left so */
     tl_label_scratch *scratch;
     tl_piece_scratch *pieces; /* OUTER, INNER */
+    tl_pause *pause; /* or NULL; asked between polygons, and what is drawn of them when given up means nothing */
 } tl_label_job;
 
 /* What is computed of shares: the areas of each pixel that lie in polygons. */
@@ -96,6 +106,7 @@ typedef struct {
     int32_t *cells;  /* (tl_share_cells(box), TL_CELL_CLEAR, and left so) of the largest box within the rows */
     int64_t n_cells; /* at least TL_LEAST_SHARE_CELLS */
     tl_piece_scratch *pieces;
+    tl_pause *pause; /* as above */
     /* pixels: the sum of the shares, at most 1; or, with colours, the mix of what is there and the polygon's by its
      * share */
     float *pixels;       /* the window's first pixel, rows of `width` pixels of n_channels */

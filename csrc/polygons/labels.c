@@ -208,6 +208,7 @@ TL_INLINE void label_polygon(const tl_polygons *p, int64_t polygon, const tl_lab
     const int32_t value = job->values ? job->values[polygon] : (int32_t)polygon;
     if (top >= bottom || box->left >= box->right)
         return;
+    tl_count_polygon(job->pause, n_points, (bottom - top) * (box->right - box->left));
     const int is_small = !p->is_wide[polygon] && n_points <= TL_LABEL_EDGES && job->test == TL_POLYGON_CENTER;
     if (is_small && bottom - top <= TL_LABEL_ROWS) {
         int n_down, low, high;
@@ -231,14 +232,14 @@ TL_INLINE void label_polygon(const tl_polygons *p, int64_t polygon, const tl_lab
 
 static __attribute__((noinline)) void label_bytes(const tl_polygons *p, const tl_label_job *job)
 {
-    for (int64_t i = job->first; i < job->end; i++)
+    for (int64_t i = job->first; i < job->end && !tl_is_polygon_given_up(job->pause); i++)
         label_polygon(p, job->listed ? job->listed[i] : i, job, 1);
     write_all_waiting(job, 1);
 }
 
 static __attribute__((noinline)) void label_words(const tl_polygons *p, const tl_label_job *job)
 {
-    for (int64_t i = job->first; i < job->end; i++)
+    for (int64_t i = job->first; i < job->end && !tl_is_polygon_given_up(job->pause); i++)
         label_polygon(p, job->listed ? job->listed[i] : i, job, 4);
     write_all_waiting(job, 4);
 }

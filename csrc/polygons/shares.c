@@ -311,12 +311,14 @@ static int64_t share_polygons(const tl_polygons *p, const tl_share_job *job)
     const tl_window whole = {.width = job->width, .height = job->bottom - job->top};
     s.window = &whole; /* its size alone is read, to count work */
     memset(s.n, 0, sizeof s.n);
-    for (int64_t i = job->first; i < job->end; i++) {
+    for (int64_t i = job->first; i < job->end && !tl_is_polygon_given_up(job->pause); i++) {
         const int64_t polygon = job->listed ? job->listed[i] : i;
         const tl_polygon_box *box = job->boxes + polygon;
         const int64_t top = box->top > job->top ? box->top : job->top,
                       bottom = box->bottom < job->bottom ? box->bottom : job->bottom;
         out.polygon = polygon;
+        tl_count_polygon(job->pause, 4 * (p->rings[p->polygons[polygon + 1]] - p->rings[p->polygons[polygon]]),
+                         4 * (bottom > top ? bottom - top : 0) * (box->right - box->left));
         if (!job->is_alone && fits_stack(p, job, polygon)) {
             const int64_t n = share_stack(&s, p, &out, i);
             if (n == 0)

@@ -360,6 +360,7 @@ cdef extern from "topleft.h" nogil:
         int32_t *cells
         tl_label_scratch *scratch
         tl_piece_scratch *pieces
+        tl_pause *pause
     ctypedef struct tl_share_job:
         const int32_t *listed
         int64_t first, end
@@ -368,6 +369,7 @@ cdef extern from "topleft.h" nogil:
         int32_t *cells
         int64_t n_cells
         tl_piece_scratch *pieces
+        tl_pause *pause
         float *pixels
         const float *colors
         int n_channels, is_alone

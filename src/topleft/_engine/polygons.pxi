@@ -136,13 +136,14 @@ cdef class SnappedPolygons:
         job.boxes, job.test, job.width = self.box(), <tl_polygon_test>test, self.width
         job.n_bytes, job.background, job.waits = n_bytes, background, waits
         job.pixels, job.cells, job.scratch = &pixels[0], &cells[0], <tl_label_scratch *>&scratch[0]
-        job.pieces = &pieces.scratch if pieces is not None else NULL
+        job.pieces, job.pause = &pieces.scratch if pieces is not None else NULL, pause_of_thread()
         with nogil:
             for band in range(first_band, end_band):
                 job.top, job.bottom = band * band_rows, min((band + 1) * band_rows, self.height)
                 job.first = 0 if job.listed == NULL else starts[band]
                 job.end = self.n_polygons if job.listed == NULL else starts[band + 1]
                 K.label_polygons(&self.set, &job)
+        raise_if_given_up()
 
     def add_shares(self, float[::1] pixels, const float[:, ::1] colors, int64_t band_rows, const int64_t[::1] starts,
                    const int32_t[::1] listed, int64_t first_band, int64_t end_band, int32_t[::1] cells,
@@ -156,7 +157,7 @@ cdef class SnappedPolygons:
         memset(&job, 0, sizeof(job))
         job.listed, job.boxes, job.width = &listed[0], self.box(), self.width
         job.cells, job.n_cells = &cells[0], cells.shape[0]
-        job.pieces = &pieces.scratch if pieces is not None else NULL
+        job.pieces, job.pause = &pieces.scratch if pieces is not None else NULL, pause_of_thread()
         job.pixels, job.colors = &pixels[0], &colors[0, 0] if colors is not None else NULL
         job.n_channels, job.is_alone = colors.shape[1] if colors is not None else 1, is_alone
         with nogil:
@@ -166,6 +167,7 @@ cdef class SnappedPolygons:
                 if is_alone:  # also where it is not
                     job.listed, job.first, job.end = NULL, 0, 1
                 K.share_polygons(&self.set, &job)
+        raise_if_given_up()
 
     def list_shares(self, int64_t first, int64_t end, int64_t[::1] starts, indices, float[::1] areas,
                     int32_t[::1] cells, PieceScratch pieces):
@@ -179,9 +181,10 @@ cdef class SnappedPolygons:
         memset(&job, 0, sizeof(job))
         job.first, job.end, job.boxes, job.width = first, end, self.box(), self.width
         job.bottom, job.cells, job.n_cells = self.height, &cells[0], cells.shape[0]
-        job.pieces = &pieces.scratch if pieces is not None else NULL
+        job.pieces, job.pause = &pieces.scratch if pieces is not None else NULL, pause_of_thread()
         job.starts, job.indices, job.areas = &starts[0], &raw[0], &areas[0]
         job.is_long, job.n_room = indices.itemsize == 8, areas.shape[0] - 16
         with nogil:
             n = K.share_polygons(&self.set, &job)
+        raise_if_given_up()
         return n
