@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine
 from topleft._base.arrays import as_array, as_number, as_values, shown
+from topleft._base.memory import empty
 from topleft._base.texels import as_texels, look_up
 from topleft.typing import EncodingOption, FilterOption, WrapOption
 
@@ -323,8 +324,8 @@ class Fragments:
         >>> frags.barycentric()[0, 0]
         array([0.5 , 0.25, 0.25], dtype=float32)
         """
-        out = np.empty((*self.triangle.shape, 3), np.float32)
-        self._snapped.with_inverse_w(self.id.size).barycentric(self._ids(), out)
+        out = empty((*self.triangle.shape, 3), np.float32)
+        self._snapped.with_inverse_w(self.id.size, empty).barycentric(self._ids(), out)
         return out
 
     @overload
@@ -382,9 +383,9 @@ class Fragments:
     def _interpolated(self, array: NDArray[np.float32], background: float) -> NDArray[np.float32]:
         """The attribute of checked values."""
         channels = array.shape[-1] if array.ndim > 1 else 1
-        out: NDArray[Any] = np.empty((*self.triangle.shape, channels), np.float32)
+        out: NDArray[Any] = empty((*self.triangle.shape, channels), np.float32)
         rows = array.reshape(-1, channels) if array.size else np.empty((0, channels), np.float32)
-        snapped = self._snapped.with_inverse_w(self.id.size)
+        snapped = self._snapped.with_inverse_w(self.id.size, empty)
         snapped.interpolate(self._ids(), rows, array.ndim == 3, background, out)
         return out if array.ndim > 1 else out[..., 0]
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from topleft._base.arrays import as_array, as_out
-from topleft._base.memory import FRESH
+from topleft._base.memory import FRESH, empty
 from topleft._base.options import Sampling
 from topleft._base.threads import available_threads, run_parts
 from topleft._raster.fragments import Fragments
@@ -89,7 +89,7 @@ class FragmentsBatch(Sequence[Fragments]):
 
     def _stacked(self, found: list[NDArray[np.float32]], channels: tuple[int, ...]) -> NDArray[np.float32]:
         shape = *self.triangle.shape, *channels
-        return np.stack(found) if found else np.empty(shape, np.float32)
+        return np.stack(found) if found else empty(shape, np.float32)
 
 
 def n_poses(vertices: object, transform: object) -> int | None:
@@ -135,9 +135,9 @@ def draw_batch(
     if view.plan is not None:
         raise ValueError("plan is for one pose: a batch takes none")
     shape = (n, *view.size[::-1])
-    ids = np.empty(shape, np.int32) if asked.ids_out is None else as_out("out triangle", asked.ids_out, shape, np.int32)
+    ids = empty(shape, np.int32) if asked.ids_out is None else as_out("out triangle", asked.ids_out, shape, np.int32)
     planes = asked.depth_out
-    depth = np.empty(shape, np.float32) if planes is None else as_out("out depth", planes, shape, np.float32)
+    depth = empty(shape, np.float32) if planes is None else as_out("out depth", planes, shape, np.float32)
     points = as_array("vertices", vertices)
     matrices = None if view.transform is None else as_array("transform", view.transform)
     n_threads = min(n, available_threads() if view.threads is None else view.threads)

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine
 from topleft._base.arrays import as_number, as_out
-from topleft._base.memory import FRESH, Memory
+from topleft._base.memory import FRESH, Memory, empty
 from topleft._base.options import DepthTest, Sampling, Sink, parse
 from topleft._base.threads import count_threads, run_parts
 from topleft._raster import choices
@@ -109,7 +109,7 @@ def open_canvas(
 ) -> tuple[NDArray[Any], NDArray[Any]]:
     """Return the array to return, and a contiguous aligned one: the same wherever that one is."""
     result = memory.empty(name, shape, dtype) if out is None else as_out("out", out, shape, dtype)
-    return result, result if result.flags.carray else np.empty(shape, dtype)
+    return result, result if result.flags.carray else empty(shape, dtype)
 
 
 def draw_area(

@@ -16,6 +16,7 @@ import numpy.typing as npt
 from numpy.typing import NDArray
 
 from topleft._base.arrays import as_array, shown
+from topleft._base.memory import empty
 from topleft._camera.camera import Camera
 from topleft._model.mesh import Mesh
 from topleft._raster.fragments import Fragments, Viewer, as_sample, view_of
@@ -90,7 +91,7 @@ def join(
     """A picture made part by part; what is made of a part that is all of it is returned, not copied."""
     if len(parts) == 1 and parts[0].box == WHOLE:
         return make(parts[0])
-    picture = np.empty(shape, dtype)
+    picture = empty(shape, dtype)
     picture[...] = background
     for part in parts:
         picture[part.box][part.seen] = make(part)[part.seen]
