@@ -120,7 +120,7 @@ def test_a_copy_of_what_holds_arrays_is_read_only_as_it_was(name, through):
 def test_a_copy_of_scene_fragments_whose_parts_were_asked_for_shows_the_same(through):
     mesh = tl.Mesh(*scenes.shape("cube"))
     scene = tl.Scene([mesh, tl.Instance(mesh, np.diag([0.5, 2, 0.5, 1]))])
-    frags = tl.rasterize_mesh(scene, tl.Camera.framing(scene), SIZE)
+    frags = tl.rasterize_mesh(scene, tl.Camera.framing(mesh), SIZE)
     weights = frags.barycentric()
     again = through(frags)
     assert_same(again.triangle, frags.triangle)
