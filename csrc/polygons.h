@@ -5,6 +5,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "pause.h"
+
 #define TL_POLYGON_PAD 16                   /* points behind the last one, which may be read */
 #define TL_POLYGON_LIMIT ((int64_t)1 << 60) /* of |x_fx| and |y_fx| */
 #define TL_NARROW_POLYGON (1 << 24)         /* of those that lanes take */
@@ -69,15 +71,6 @@ typedef struct {
     int64_t *row_starts; /* (rows of the window + 2,) */
     double *shares;      /* (width + 16,) */
 } tl_piece_scratch;
-
-/* Counts the work of a polygon with so many points and so many pixels in its box. */
-static inline void tl_count_polygon(tl_pause *pause, int64_t n_points, int64_t n_box_px)
-{
-    if (pause)
-        pause->left_px -= TL_SETUP_PX + 8 * n_points + n_box_px;
-}
-
-static inline int tl_is_polygon_given_up(tl_pause *pause) { return pause && pause->left_px < 0 && pause->ask(pause); }
 
 /* What is painted: value of a polygon is values[i], or its number when that is NULL. */
 typedef struct {

@@ -209,3 +209,11 @@ def test_field_into_memory_of_its_inputs_is_that_of_separate_memory(name):
 
 def assert_same_or_nan(got, expected):
     assert np.array_equal(got, expected, equal_nan=True)
+
+
+@pytest.mark.parametrize("wrong", [1, 10**8])
+def test_slopes_of_ids_that_their_owner_has_changed_are_refused(wrong):
+    frags = tl.rasterize([[0.0, 0, 0], [8, 0, 1], [0, 8, 0]], [[0, 1, 2]], (8, 8))
+    frags.triangle[2, 2] = wrong
+    with pytest.raises(IndexError, match=f"triangle must hold ids below 1, got {wrong}"):
+        frags.interpolate(np.zeros((3, 2)), derivatives=True)
