@@ -1,4 +1,4 @@
-/* What kernels ask now and then: whether to go on, as after Ctrl-C.  Part of the contract of topleft.h, which includes it. */
+/* What kernels ask now and then: whether to go on.  Part of the contract of topleft.h, which includes it. */
 #ifndef TOPLEFT_PAUSE_H
 #define TOPLEFT_PAUSE_H
 
