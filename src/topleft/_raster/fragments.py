@@ -429,6 +429,8 @@ class FragmentsBatch(Sequence[Fragments]):
         Index of the triangle that shows in the pixel, -1 where there is none.
     depth : ndarray of float32, shape (B, H, W)
         Its depth.
+    samples_triangle, samples_depth : ndarray of int32 and of float32, shape (B, H, W, S)
+        The same for each sample, with several a pixel; all else is then of the first sample.
     """
 
     def __init__(self, triangle: NDArray[np.int32], depth: NDArray[np.float32], frags: Sequence[Fragments]) -> None:
@@ -459,7 +461,72 @@ class FragmentsBatch(Sequence[Fragments]):
         """Return the weights of the triangles' vertices, (B, H, W, 3) float32; see `Fragments.barycentric`."""
         return self._stacked([frags.barycentric() for frags in self], (3,))
 
-    def interpolate(self, values: ArrayLike, *, background: float = 0.0) -> NDArray[np.float32]:
+    @classmethod
+    def stacked(cls, frags: Sequence[Fragments], size: tuple[int, int]) -> FragmentsBatch:
+        """Return the batch of visibility buffers (H, W), each of which keeps its arrays."""
+        shape = (0, *size[::-1])
+        triangle = np.stack([one.triangle for one in frags]) if frags else np.empty(shape, np.int32)
+        depth = np.stack([one.depth for one in frags]) if frags else np.empty(shape, np.float32)
+        return cls(triangle, depth, frags)
+
+    @property
+    def samples_triangle(self) -> NDArray[np.int32]:
+        """Indices of triangles by sample, int32 (B, H, W, S)."""
+        found = [frags.samples_triangle for frags in self]
+        return np.stack(found) if found else self.triangle[..., None]
+
+    @property
+    def samples_depth(self) -> NDArray[np.float32]:
+        """Depth by sample, float32 (B, H, W, S)."""
+        found = [frags.samples_depth for frags in self]
+        return np.stack(found) if found else self.depth[..., None]
+
+    @overload
+    def sample(self, texture: int) -> FragmentsBatch: ...
+    @overload
+    def sample(
+        self,
+        texture: object,
+        uv: Any,
+        *,
+        filter: FilterOption = "trilinear",
+        wrap: WrapOption | tuple[WrapOption, WrapOption] = "repeat",
+        encoding: EncodingOption | None = None,
+        background: float = 0.0,
+    ) -> NDArray[np.float32]: ...
+    def sample(self, texture: Any, uv: Any = None, **options: Any) -> Any:
+        """Return a texture at each visible pixel, (B, H, W, C) float32; or, of a number alone, that sample of pixels.
+
+        Parameters
+        ----------
+        texture, **options
+            As `Fragments.sample` takes them.
+        uv : array_like
+            Those of all, (V, 2), say; or with a leading axis of B, (B, V, 2).
+
+        Raises
+        ------
+        ValueError, TypeError, IndexError
+            As `Fragments.sample`; also for neither one nor B arrays of uv.
+        """
+        if uv is None:
+            height, width = self.triangle.shape[1:]
+            return FragmentsBatch.stacked([frags.sample(texture) for frags in self], (width, height))
+        found = [frags.sample(texture, one, **options) for frags, one in zip(self, self._each(uv), strict=True)]
+        channels = np.shape(getattr(texture, "image", texture))[2:]
+        return self._stacked(found, channels)
+
+    @overload
+    def interpolate(
+        self, values: ArrayLike, *, background: float = 0.0, derivatives: Literal[False] = False
+    ) -> NDArray[np.float32]: ...
+    @overload
+    def interpolate(
+        self, values: ArrayLike, *, background: float = 0.0, derivatives: Literal[True]
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]: ...
+    def interpolate(
+        self, values: ArrayLike, *, background: float = 0.0, derivatives: bool = False
+    ) -> NDArray[np.float32] | tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Return an attribute of the vertices at each visible pixel, (B, H, W, K) or (B, H, W) float32.
 
         Parameters
@@ -468,20 +535,32 @@ class FragmentsBatch(Sequence[Fragments]):
             Those of all, as `Fragments.interpolate` takes them, (V, K), say; or with a leading axis of B, (B, V, K).
         background : float
             Value where there is no triangle.
+        derivatives : bool
+            Whether to return the derivatives, too, (B, H, W, K, 2) or (B, H, W, 2).
 
         Raises
         ------
         ValueError
             If there are neither one nor B arrays of values, or they do not fit.
         """
+        own = self._each(values)
+        channels = () if np.ndim(own[0] if len(own) else as_array("values", values)) < 2 else own[0].shape[-1:]
+        pairs = zip(self, own, strict=True)
+        if not derivatives:
+            return self._stacked([frags.interpolate(one, background=background) for frags, one in pairs], channels)
+        both = [frags.interpolate(one, background=background, derivatives=True) for frags, one in pairs]
+        return (
+            self._stacked([found for found, _ in both], channels),
+            self._stacked([slopes for _, slopes in both], (*channels, 2)),
+        )
+
+    def _each(self, values: ArrayLike) -> Sequence[NDArray[Any]]:
+        """Return the values of each pose: its own, or those of all."""
         array = as_array("values", values)
         has_own = array.ndim == 4 or (array.ndim == 3 and array.shape[1] == (self[0]._n_vertices if self else 0))
         if has_own and len(array) != len(self):
             raise ValueError(f"values must be those of all, or {len(self)} of them, got {len(array)}")
-        own = array if has_own else [array] * len(self)
-        channels = array.shape[(2 if array.ndim == 3 and has_own else array.ndim - 1) :] if array.ndim > 1 else ()
-        found = [frags.interpolate(one, background=background) for frags, one in zip(self, own, strict=True)]
-        return self._stacked(found, channels)
+        return list(array) if has_own else [array] * len(self)
 
     def _stacked(self, found: list[NDArray[np.float32]], channels: tuple[int, ...]) -> NDArray[np.float32]:
         shape = *self.triangle.shape, *channels
