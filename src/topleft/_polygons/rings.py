@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from topleft._base.arrays import as_array
+from topleft._base.arrays import apart_from, as_array
 
 __all__ = ["RingSet", "as_rings", "rings_of_triangles"]
 
@@ -30,6 +30,13 @@ class RingSet:
 
     def __len__(self) -> int:
         return len(self.polygons) - 1
+
+    def apart_from(self, out: object) -> RingSet:
+        """Return it with copies of what `out` may share memory with."""
+        points, rings, polygons = (
+            np.asarray(apart_from(out, "rings", each)) for each in (self.points, self.rings, self.polygons)
+        )
+        return RingSet(points, rings, polygons)
 
 
 def as_rings(values: Any) -> RingSet:

@@ -11,10 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine
 from topleft._base.arrays import as_array, as_number, as_values, shown
+from topleft._base.memory import empty
 from topleft._base.texels import as_levels
 from topleft.typing import EncodingOption, FilterOption, WrapOption
 
-__all__ = ["Fragments", "FragmentsBatch", "GivenCorners", "as_sample", "view_of"]
+__all__ = ["Fragments", "GivenCorners", "as_sample", "view_of"]
 
 #: Makes the snapped mesh that attributes of some triangles need: these are snapped, no others.
 PartOfMesh = Callable[..., _engine.SnappedMesh]
@@ -321,8 +322,8 @@ class Fragments:
         >>> frags.barycentric()[0, 0]
         array([0.5 , 0.25, 0.25], dtype=float32)
         """
-        out = np.empty((*self.triangle.shape, 3), np.float32)
-        self._snapped.with_inverse_w(self.id.size).barycentric(self._ids(), out)
+        out = empty((*self.triangle.shape, 3), np.float32)
+        self._snapped.with_inverse_w(self.id.size, empty).barycentric(self._ids(), out)
         return out
 
     @overload
@@ -369,16 +370,20 @@ class Fragments:
         array([[0.5, 1.5, 2.5, 0. ],
                [0.5, 1.5, 0. , 0. ]], dtype=float32)
         """
-        array = as_values(values, self._n_vertices, self._n_triangles)
-        found = self._interpolated(array, as_number("background", background))
-        return (found, self._derivatives(array)) if derivatives else found
+        checked = self._checked(values)
+        found = self._interpolated(checked, as_number("background", background))
+        return (found, self._derivatives(checked)) if derivatives else found
+
+    def _checked(self, values: Any) -> Any:
+        """What the two following methods take of an attribute."""
+        return as_values(values, self._n_vertices, self._n_triangles)
 
     def _interpolated(self, array: NDArray[np.float32], background: float) -> NDArray[np.float32]:
         """The attribute of checked values."""
         channels = array.shape[-1] if array.ndim > 1 else 1
-        out: NDArray[Any] = np.empty((*self.triangle.shape, channels), np.float32)
+        out: NDArray[Any] = empty((*self.triangle.shape, channels), np.float32)
         rows = array.reshape(-1, channels) if array.size else np.empty((0, channels), np.float32)
-        snapped = self._snapped.with_inverse_w(self.id.size)
+        snapped = self._snapped.with_inverse_w(self.id.size, empty)
         snapped.interpolate(self._ids(), rows, array.ndim == 3, background, out)
         return out if array.ndim > 1 else out[..., 0]
 
@@ -418,153 +423,6 @@ class Fragments:
 
     def _ids(self) -> NDArray[np.int32]:
         return np.require(self.triangle, np.int32, ["C", "A"])
-
-
-class FragmentsBatch(Sequence[Fragments]):
-    """What `rasterize` returns of a batch: a visibility buffer for each of B poses, behind each other.
-
-    Attributes
-    ----------
-    triangle : ndarray of int32, shape (B, H, W)
-        Index of the triangle that shows in the pixel, -1 where there is none.
-    depth : ndarray of float32, shape (B, H, W)
-        Its depth.
-    samples_triangle, samples_depth : ndarray of int32 and of float32, shape (B, H, W, S)
-        The same for each sample, with several a pixel; all else is then of the first sample.
-    """
-
-    def __init__(self, triangle: NDArray[np.int32], depth: NDArray[np.float32], frags: Sequence[Fragments]) -> None:
-        self.triangle, self.depth = triangle, depth
-        self._frags = tuple(frags)
-
-    def __repr__(self) -> str:
-        n, height, width = self.triangle.shape
-        return f"FragmentsBatch({n} of {width}x{height})"
-
-    def __len__(self) -> int:
-        return len(self._frags)
-
-    @overload
-    def __getitem__(self, i: int) -> Fragments: ...
-    @overload
-    def __getitem__(self, i: slice) -> Sequence[Fragments]: ...
-    def __getitem__(self, i: int | slice) -> Fragments | Sequence[Fragments]:
-        """Return one of them, whose arrays are views."""
-        return self._frags[i]
-
-    @property
-    def mask(self) -> NDArray[np.bool_]:
-        """Where there is a triangle, bool (B, H, W)."""
-        return self.triangle >= 0
-
-    def barycentric(self) -> NDArray[np.float32]:
-        """Return the weights of the triangles' vertices, (B, H, W, 3) float32; see `Fragments.barycentric`."""
-        return self._stacked([frags.barycentric() for frags in self], (3,))
-
-    @classmethod
-    def stacked(cls, frags: Sequence[Fragments], size: tuple[int, int]) -> FragmentsBatch:
-        """Return the batch of visibility buffers (H, W), each of which keeps its arrays."""
-        shape = (0, *size[::-1])
-        triangle = np.stack([one.triangle for one in frags]) if frags else np.empty(shape, np.int32)
-        depth = np.stack([one.depth for one in frags]) if frags else np.empty(shape, np.float32)
-        return cls(triangle, depth, frags)
-
-    @property
-    def samples_triangle(self) -> NDArray[np.int32]:
-        """Indices of triangles by sample, int32 (B, H, W, S)."""
-        found = [frags.samples_triangle for frags in self]
-        return np.stack(found) if found else self.triangle[..., None]
-
-    @property
-    def samples_depth(self) -> NDArray[np.float32]:
-        """Depth by sample, float32 (B, H, W, S)."""
-        found = [frags.samples_depth for frags in self]
-        return np.stack(found) if found else self.depth[..., None]
-
-    @overload
-    def sample(self, texture: int) -> FragmentsBatch: ...
-    @overload
-    def sample(
-        self,
-        texture: object,
-        uv: Any,
-        *,
-        filter: FilterOption = "trilinear",
-        wrap: WrapOption | tuple[WrapOption, WrapOption] = "repeat",
-        encoding: EncodingOption | None = None,
-        background: float = 0.0,
-    ) -> NDArray[np.float32]: ...
-    def sample(self, texture: Any, uv: Any = None, **options: Any) -> Any:
-        """Return a texture at each visible pixel, (B, H, W, C) float32; or, of a number alone, that sample of pixels.
-
-        Parameters
-        ----------
-        texture, **options
-            As `Fragments.sample` takes them.
-        uv : array_like
-            Those of all, (V, 2), say; or with a leading axis of B, (B, V, 2).
-
-        Raises
-        ------
-        ValueError, TypeError, IndexError
-            As `Fragments.sample`; also for neither one nor B arrays of uv.
-        """
-        if uv is None:
-            height, width = self.triangle.shape[1:]
-            return FragmentsBatch.stacked([frags.sample(texture) for frags in self], (width, height))
-        found = [frags.sample(texture, one, **options) for frags, one in zip(self, self._each(uv), strict=True)]
-        channels = np.shape(getattr(texture, "image", texture))[2:]
-        return self._stacked(found, channels)
-
-    @overload
-    def interpolate(
-        self, values: ArrayLike, *, background: float = 0.0, derivatives: Literal[False] = False
-    ) -> NDArray[np.float32]: ...
-    @overload
-    def interpolate(
-        self, values: ArrayLike, *, background: float = 0.0, derivatives: Literal[True]
-    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]: ...
-    def interpolate(
-        self, values: ArrayLike, *, background: float = 0.0, derivatives: bool = False
-    ) -> NDArray[np.float32] | tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Return an attribute of the vertices at each visible pixel, (B, H, W, K) or (B, H, W) float32.
-
-        Parameters
-        ----------
-        values : array_like of real numbers
-            Those of all, as `Fragments.interpolate` takes them, (V, K), say; or with a leading axis of B, (B, V, K).
-        background : float
-            Value where there is no triangle.
-        derivatives : bool
-            Whether to return the derivatives, too, (B, H, W, K, 2) or (B, H, W, 2).
-
-        Raises
-        ------
-        ValueError
-            If there are neither one nor B arrays of values, or they do not fit.
-        """
-        own = self._each(values)
-        channels = () if np.ndim(own[0] if len(own) else as_array("values", values)) < 2 else own[0].shape[-1:]
-        pairs = zip(self, own, strict=True)
-        if not derivatives:
-            return self._stacked([frags.interpolate(one, background=background) for frags, one in pairs], channels)
-        both = [frags.interpolate(one, background=background, derivatives=True) for frags, one in pairs]
-        return (
-            self._stacked([found for found, _ in both], channels),
-            self._stacked([slopes for _, slopes in both], (*channels, 2)),
-        )
-
-    def _each(self, values: ArrayLike) -> Sequence[NDArray[Any]]:
-        """Return the values of each pose: its own, or those of all."""
-        array = as_array("values", values)
-        has_own = array.ndim == 4 or (array.ndim == 3 and array.shape[1] == (self[0]._n_vertices if self else 0))
-        if has_own and len(array) != len(self):
-            raise ValueError(f"values must be those of all, or {len(self)} of them, got {len(array)}")
-        return list(array) if has_own else [array] * len(self)
-
-    def _stacked(self, found: list[NDArray[np.float32]], channels: tuple[int, ...]) -> NDArray[np.float32]:
-        shape = *self.triangle.shape, *channels
-        return np.stack(found) if found else np.empty(shape, np.float32)
 
 
 def as_sample(i: object, n: int) -> int:

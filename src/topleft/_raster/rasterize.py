@@ -5,7 +5,7 @@ Each verb checks what it is asked for, snaps the mesh (transform, index, snap, c
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any, NamedTuple, cast
@@ -14,22 +14,30 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine
-from topleft._base.arrays import as_array, as_checked_triangles, as_number, as_out, as_triangles
-from topleft._base.memory import FRESH, Memory
+from topleft._base.arrays import as_number, as_out
+from topleft._base.memory import FRESH, Memory, empty
 from topleft._base.options import DepthTest, Sampling, Sink, parse
-from topleft._base.threads import available_threads, count_threads, run_parts
+from topleft._base.threads import count_threads, run_parts
 from topleft._raster import choices
 from topleft._raster.choices import Drawing, Route
 from topleft._raster.classic import draw_classic, refuse_classic
 from topleft._raster.cluster_draw import ClusteredMesh, draw_clustered
-from topleft._raster.clusters import Clusters
-from topleft._raster.fragments import Fragments, FragmentsBatch, GivenCorners
+from topleft._raster.fragments import Fragments, GivenCorners
 from topleft._raster.sampling import draw_planes, sample_positions, sum_areas
 from topleft._raster.snap import Snapped, snap_mesh
-from topleft._raster.view import Planned, View, ViewOptions
+from topleft._raster.view import View
 from topleft.typing import DepthTestOption
 
-__all__ = ["canvas_of", "draw", "draw_all_samples", "draw_coverage", "draw_fragments", "draw_overdraw"]
+__all__ = [
+    "Asked",
+    "canvas_of",
+    "draw",
+    "draw_all_samples",
+    "draw_coverage",
+    "draw_fragments",
+    "draw_overdraw",
+    "refuse_many",
+]
 
 
 def draw(
@@ -110,7 +118,7 @@ def open_canvas(
 ) -> tuple[NDArray[Any], NDArray[Any]]:
     """Return the array to return, and a contiguous aligned one: the same wherever that one is."""
     result = memory.empty(name, shape, dtype) if out is None else as_out("out", out, shape, dtype)
-    return result, result if result.flags.carray else np.empty(shape, dtype)
+    return result, result if result.flags.carray else empty(shape, dtype)
 
 
 def draw_area(
@@ -240,99 +248,6 @@ def draw_fragments(
     snapped = snap_mesh(memory, vertices, triangles, view, with_depth=True, out=out)
     route, drawing = choices.route(view, snapped, asked.test, wants_depth=asked.depth_out is not None)
     return ROUTES[route](memory, snapped, view, asked, drawing).drawn_from(corners)
-
-
-def n_poses(vertices: object, transform: object) -> int | None:
-    """How many poses vertices (B, V, C) or transforms (B, 4, 4) have; None where they have no leading axis."""
-    counts = {}
-    for name, array in (("vertices", vertices), ("transform", transform)):
-        shape = getattr(array, "shape", ())
-        if len(shape) == 3 or depth_of_lists(array) == 3:
-            counts[name] = len(cast("Sequence[Any]", array))
-    if len(set(counts.values())) > 1:
-        raise ValueError(f"vertices and transform must have one number of poses, got {counts}")
-    return next(iter(counts.values()), None)
-
-
-def depth_of_lists(values: object) -> int:
-    """How many axes nested lists have, told by their first items."""
-    if isinstance(values, list | tuple):
-        return 1 + (depth_of_lists(values[0]) if values else 0)
-    return 0
-
-
-def draw_batch(
-    n: int,
-    vertices: ArrayLike,
-    triangles: ArrayLike,
-    size: object,
-    options: ViewOptions,
-    depth_test: DepthTestOption | None,
-    background_depth: float | None,
-    out: object,
-) -> FragmentsBatch:
-    """`rasterize` of n poses: each is drawn by one thread, so many side by side as there are.
-
-    Raises
-    ------
-    ValueError, TypeError, IndexError
-        As `rasterize`.
-    """
-    view = View.parse(size, options)
-    refuse_many(view, "rasterize")
-    asked = Asked.parse(depth_test, background_depth, out)
-    (width, height), n_samples = view.size, view.sampling.n_samples
-    shape = (n, height, width) if n_samples == 1 else (n, height, width, n_samples)
-    outs: list[NDArray[Any] | None] = []
-    for name, array, dtype in (("triangle", asked.ids_out, np.int32), ("depth", asked.depth_out, np.float32)):
-        if array is not None:
-            outs.append(as_out(f"out {name}", array, shape, dtype))
-        else:  # the planes of samples are each pose's own
-            outs.append(np.empty(shape, dtype) if n_samples == 1 else None)
-    points = as_array("vertices", vertices)
-    corners = triangles if view.plan is not None else as_triangles(triangles)
-    if isinstance(corners, np.ndarray) and corners.dtype == np.int64 and view.plan is None:  # once, not for each pose
-        corners = as_checked_triangles(corners, points.shape[-2] if points.ndim > 1 else 0)
-    matrices = None if view.transform is None else as_array("transform", view.transform)
-    n_threads = min(n, available_threads() if view.threads is None else view.threads)
-    one = replace(view, threads=1) if n_threads > 1 else view
-    if view.plan is not None:
-        one = replace(one, plan=PlanOfPoses(view.plan))
-
-    def draw_some(first: int, end: int) -> list[Fragments]:
-        found = []
-        for i in range(first, end):
-            own = points[i] if points.ndim == 3 else points
-            transform = matrices[i] if matrices is not None and matrices.ndim == 3 else matrices
-            pose, arrays = replace(one, transform=transform), tuple(None if to is None else to[i] for to in outs)
-            found.append(draw_fragments(FRESH, own, corners, pose, depth_test, background_depth, arrays))
-        return found
-
-    drawn = [frags for part in run_parts(draw_some, n, n_threads) for frags in part] if n else []
-    ids, depth = outs
-    if n_samples == 1 and ids is not None and depth is not None:
-        return FragmentsBatch(ids, depth, drawn)
-    return FragmentsBatch.stacked(drawn, view.size)
-
-
-class PlanOfPoses(NamedTuple):
-    """A plan whose triangles many poses use at once: it notes no times, and draws no clusters."""
-
-    plan: Planned
-
-    def fitted(self, view: View) -> View:
-        """Return the view: it has been fitted."""
-        return view
-
-    def triangles_of(self, triangles: ArrayLike, n_vertices: int) -> NDArray[np.int32]:
-        """Return the plan's own triangles, as `Planned` does."""
-        return self.plan.triangles_of(triangles, n_vertices)
-
-    def find_clusters(self, vertices: ArrayLike) -> Clusters | None:
-        """Return None."""
-
-    def mark(self, stage: str) -> None:
-        """Note nothing: stages of several poses overlap."""
 
 
 def draw_labels(memory: Memory, snapped: Snapped, view: View, asked: Asked, drawing: Drawing) -> Fragments:
