@@ -122,5 +122,5 @@ OrderOption: TypeAlias = Literal["jobs", "completed"]
 
 # `topleft.torch`, in the words of nvdiffrast
 
-BoundaryOption: TypeAlias = Literal["wrap", "clamp", "zero"]
+BoundaryOption: TypeAlias = Literal["wrap", "clamp", "zero", "cube"]
 FilterModeOption: TypeAlias = Literal["auto", "nearest", "linear", "linear-mipmap-nearest", "linear-mipmap-linear"]
