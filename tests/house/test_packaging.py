@@ -48,7 +48,7 @@ def test_metadata_runtime_dependencies_state_a_floor():
 
 def test_metadata_extras_are_the_documented_ones():
     found = set(metadata.metadata("topleft").get_all("Provides-Extra"))
-    assert found == {"formats", "render", "simplify", "torch", "test", "bench", "docs", "dev", "all"}
+    assert found == {"dask", "formats", "render", "simplify", "tiles", "torch", "test", "bench", "docs", "dev", "all"}
 
 
 def test_metadata_render_extra_is_isal_trimesh_and_tqdm():
