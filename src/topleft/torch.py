@@ -23,6 +23,7 @@ from topleft._base.threads import parse_threads
 from topleft._raster.peel import DepthLayers, peel
 from topleft._raster.verbs import rasterize as draw
 from topleft.errors import MissingPackageError
+from topleft.typing import BoundaryOption, FilterModeOption
 
 try:
     import torch
@@ -298,8 +299,8 @@ def texture(
     uv_da: Tensor | None = None,
     mip_level_bias: Tensor | None = None,
     mip: Sequence[Tensor] | None = None,
-    filter_mode: str = "auto",
-    boundary_mode: str = "wrap",
+    filter_mode: FilterModeOption = "auto",
+    boundary_mode: BoundaryOption = "wrap",
     max_mip_level: int | None = None,
 ) -> Tensor:
     """Return what a texture is at each pixel.

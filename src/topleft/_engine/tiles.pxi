@@ -1,7 +1,7 @@
 # Windows of huge rasters: which triangles each of them needs; visibility buffers put together. Included by kernels.pyx.
 
 
-def list_spans((int64_t, int64_t, int64_t, int64_t, int) tiling, const double[:, :, ::1] corners_px,
+def list_spans(tuple tiling, const double[:, :, ::1] corners_px,
                int64_t first_triangle, int64_t[::1] starts, int32_t[:, ::1] spans):
     """Count the spans of each row of windows into starts[row + 1], or write them where spans is not None.
 

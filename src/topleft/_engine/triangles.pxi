@@ -39,6 +39,10 @@ cdef class SnappedMesh:
         self.x_px, self.y_px, self.subpixel_bits, self.snapped.cull, self.snapped.method, test = how
         self.test = <tl_test>test
 
+    def __reduce__(self):
+        raise TypeError("what has been drawn refers to memory of this process and is not pickled or copied deeply: take "
+                        "its arrays, such as .triangle and .depth")
+
     def seen_from(self, int32_t x_fx, int32_t y_fx):
         """Return the same mesh with its samples off the centres of the pixels, in sub-pixels."""
         cdef SnappedMesh seen = self.copy()

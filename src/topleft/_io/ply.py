@@ -101,8 +101,10 @@ def read_ply(source: InputFile) -> list[Mesh]:
     return [] if mesh is None else [mesh]
 
 
-def mapped_elements(path: Path) -> tuple[tuple[Array, Array, Array], Array] | None:
-    """The columns x, y, z (V,) and the triangles (T, 3) of a binary file, mapped; None where faces are no triangles.
+def mapped_elements(path: Path) -> tuple[dict[str, Array], Array, dict[str, Array]] | None:
+    """Numbers of the vertices by name (V,), the triangles (T, 3) and numbers of these (T,) of a binary file, mapped.
+
+    None where faces are no triangles, or something else stands before them.
 
     Raises
     ------
@@ -144,8 +146,10 @@ def mapped_elements(path: Path) -> tuple[tuple[Array, Array, Array], Array] | No
         for first in range(0, len(rows), 1 << 20)
     ):
         return None
-    x, y, z = (block[f"{k}"] for block, k in (vertex[name] for name in "xyz"))
-    return ((x, y, z), rows[f"{i}"]) if len(rows) else None
+    if not len(rows):
+        return None
+    of_vertices = {name: block[f"{k}"] for name, (block, k) in vertex.items()}
+    return of_vertices, rows[f"{i}"], {name: rows[f"{k}"] for name, (_, k) in found["face"].items() if k != i}
 
 
 def _header(content: bytes) -> tuple[str, list[_Element], list[str], int]:

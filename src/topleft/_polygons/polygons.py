@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +22,7 @@ from topleft._polygons.prepared import Frame, Prepared, prepare
 from topleft._polygons.rings import RingSet, as_rings
 from topleft._raster.rasterize import canvas_of
 from topleft._raster.sampling import SAMPLE_GRID_BITS, sample_positions
+from topleft.typing import RuleOption, SamplingOption
 
 __all__ = ["Rule", "frame_of", "polygons"]
 
@@ -45,12 +46,12 @@ class Paint:
 
 def polygons(
     rings: Any,
-    size: tuple[int, int] | Grid,
+    size: int | tuple[int, int] | Grid,
     *,
-    rule: str = "evenodd",
-    values: npt.ArrayLike | str | None = None,
+    rule: RuleOption = "evenodd",
+    values: npt.ArrayLike | Literal["index"] | None = None,
     background: npt.ArrayLike | None = None,
-    sampling: str = "center",
+    sampling: SamplingOption = "center",
     origin: tuple[int, int] = (0, 0),
     subpixel_bits: int = 8,
     assume_valid: bool = False,
@@ -167,7 +168,12 @@ def polygons(
 
 
 def frame_of(
-    rings: RingSet, size: tuple[int, int] | Grid, origin: object, subpixel_bits: object, threads: object, n_samples: int
+    rings: RingSet,
+    size: int | tuple[int, int] | Grid,
+    origin: object,
+    subpixel_bits: object,
+    threads: object,
+    n_samples: int,
 ) -> tuple[RingSet, Frame]:
     """Return the rings in pixels, and the window that they are drawn in."""
     if isinstance(size, Grid):

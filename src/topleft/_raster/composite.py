@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine
-from topleft._base.arrays import as_array, as_background, as_number, as_out
+from topleft._base.arrays import apart_from, as_array, as_background, as_number, as_out
 from topleft._base.options import Per, parse
 from topleft._base.threads import available_threads, parse_threads, run_parts
 from topleft._raster.peel import DepthLayers
+from topleft.typing import PerOption
 
 __all__ = ["composite"]
 
@@ -30,7 +31,7 @@ def composite(
     colors: ArrayLike,
     *,
     opacity: float | None = None,
-    per: str = "auto",
+    per: PerOption = "auto",
     background: ArrayLike | None = None,
     out: NDArray[Any] | None = None,
     threads: int | None = None,
@@ -90,7 +91,7 @@ def composite(
     if not isinstance(layers, DepthLayers):
         raise TypeError(f"layers must be what peel returns, got {type(layers).__name__}")
     n_layers, height, width = layers.planes[0].shape
-    palette = as_palette(colors, opacity)
+    palette = as_palette(apart_from(out, "colors", colors), opacity)
     wish = find_owner(palette, per, layers)
     n_channels, is_u8 = palette.shape[-1], palette.dtype == np.uint8
     ground = as_background(background, palette.reshape(-1, n_channels))

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from topleft import _engine
 from topleft._base.arrays import as_array, as_number, as_values, shown
 from topleft._base.texels import as_texels, look_up
+from topleft.typing import EncodingOption, FilterOption, WrapOption
 
 __all__ = ["Fragments", "FragmentsBatch", "GivenCorners", "as_sample", "view_of"]
 
@@ -177,9 +178,9 @@ class Fragments:
         texture: object,
         uv: Any,
         *,
-        filter: str = "trilinear",
-        wrap: str | tuple[str, str] = "repeat",
-        encoding: str | None = None,
+        filter: FilterOption = "trilinear",
+        wrap: WrapOption | tuple[WrapOption, WrapOption] = "repeat",
+        encoding: EncodingOption | None = None,
         background: float = 0.0,
     ) -> NDArray[np.float32]: ...
     def sample(
@@ -187,9 +188,9 @@ class Fragments:
         texture: Any,
         uv: Any = None,
         *,
-        filter: str = "trilinear",  # noqa: A002
-        wrap: str | tuple[str, str] = "repeat",
-        encoding: str | None = None,
+        filter: FilterOption = "trilinear",  # noqa: A002
+        wrap: WrapOption | tuple[WrapOption, WrapOption] = "repeat",
+        encoding: EncodingOption | None = None,
         background: float = 0.0,
     ) -> Any:
         """Return a texture at each visible pixel; or, of a number alone, the fragments at that sample of each pixel.
@@ -238,9 +239,9 @@ class Fragments:
         """
         if uv is None:
             return self._at_sample(texture)
-        texels, filter, wraps, is_flat = as_texels(texture, filter, wrap, encoding)  # noqa: A001
+        texels, how, wraps, is_flat = as_texels(texture, filter, wrap, encoding)
         mask = self.mask
-        if filter == "trilinear":
+        if how == "trilinear":
             found, slopes = self.interpolate(uv, derivatives=True)
         else:
             found, slopes = self.interpolate(uv), None
@@ -248,7 +249,7 @@ class Fragments:
             raise ValueError(f"uv must have two columns, (V, 2) or (T, 3, 2), got {found.shape[2:] or 'one'}")
         out = np.full((*mask.shape, texels.shape[2]), as_number("background", background), np.float32)
         footprint = None if slopes is None else slopes[mask].astype(np.float64)
-        out[mask] = look_up(texels, found[mask].astype(np.float64), footprint, filter, wraps)
+        out[mask] = look_up(texels, found[mask].astype(np.float64), footprint, how, wraps)
         return out[..., 0] if is_flat else out
 
     def _at_sample(self, i: int) -> Fragments:

@@ -26,6 +26,7 @@ from topleft._raster.fragments import Fragments, FragmentsBatch, GivenCorners
 from topleft._raster.sampling import draw_planes, sample_positions, sum_areas
 from topleft._raster.snap import Snapped, snap_mesh
 from topleft._raster.view import View, ViewOptions
+from topleft.typing import DepthTestOption
 
 __all__ = ["canvas_of", "draw", "draw_all_samples", "draw_coverage", "draw_fragments", "draw_overdraw"]
 
@@ -223,7 +224,7 @@ def draw_fragments(
     vertices: ArrayLike,
     triangles: ArrayLike,
     view: View,
-    depth_test: str | None,
+    depth_test: DepthTestOption | None,
     background_depth: float | None,
     out: object,
 ) -> Fragments:
@@ -265,7 +266,7 @@ def draw_batch(
     triangles: ArrayLike,
     size: object,
     options: ViewOptions,
-    depth_test: str | None,
+    depth_test: DepthTestOption | None,
     background_depth: float | None,
     out: object,
 ) -> FragmentsBatch:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine
-from topleft._base.arrays import as_matrix, as_triangles, as_vertices, bad_triangle
+from topleft._base.arrays import apart_from, as_matrix, as_triangles, as_vertices, bad_triangle
 from topleft._base.memory import Memory
 from topleft._base.threads import run_parts
 from topleft._raster import choices
@@ -79,6 +79,7 @@ def snap_mesh(
     IndexError
         If a triangle names a vertex that does not exist, and indices are checked here.
     """
+    vertices, triangles = apart_from(out, "vertices", vertices), apart_from(out, "triangles", triangles)
     points, source = transform(vertices, view)
     indices, bad_row = index(memory, triangles, len(points), view)
     view.mark("input")

@@ -18,12 +18,12 @@ from topleft import _engine
 from topleft._base.threads import run_parts, threads_for
 from topleft._camera.camera import Camera
 from topleft._model.mesh import Mesh
-from topleft._model.scene import Scene
 from topleft._raster.fragments import Fragments
 from topleft._raster.verbs import Rasterizer
 from topleft._render.fragments import VisiblePart, join, parts_of
 from topleft._render.holes import has_cuts, without_holes
 from topleft._render.render import rasterize_subject
+from topleft._scene.scene import Scene
 
 __all__ = ["GBuffer", "PointKind", "evaluate", "points_of", "project"]
 

@@ -23,7 +23,7 @@ import numpy.typing as npt
 
 from topleft import _engine
 from topleft._base.arrays import shown
-from topleft._base.color import LINEAR_ONE, Color, ColorLike, as_color, id_colors, srgb_tables
+from topleft._base.color import DEFAULT_COLOR, LINEAR_ONE, WHITE, Color, ColorLike, as_color, id_colors, srgb_tables
 from topleft._base.options import parse
 from topleft._base.threads import count_threads, parse_threads, run_parts, threads_for
 from topleft._camera.camera import Camera
@@ -35,6 +35,7 @@ from topleft._model.texture import Texture
 from topleft._raster.fragments import Fragments
 from topleft._raster.sampling import sample_positions
 from topleft._shade.look import ShadingInputs
+from topleft.typing import ShadingOption
 
 __all__ = ["LookOptions", "Shading", "ShadingOptions", "picture_of_numbers", "shade_mesh", "shade_numbers"]
 
@@ -94,9 +95,9 @@ class ShadingOptions:
     @classmethod
     def parse(
         cls,
-        shading: str,
-        color: ColorLike,
-        background: ColorLike,
+        shading: ShadingOption = "smooth",
+        color: ColorLike = DEFAULT_COLOR,
+        background: ColorLike = WHITE,
         depth_range: tuple[float, float] | None = None,
         lights: Light | Sequence[Light] | None = None,
         ambient: float | None = None,

@@ -15,7 +15,7 @@ import os
 import tempfile
 import weakref
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -26,7 +26,7 @@ from topleft._base.arrays import INT32_MAX, as_array, shown
 from topleft._io.load import load
 from topleft._io.ply import mapped_elements
 from topleft._io.stl import mapped_corners
-from topleft._model.adapt import as_polygons
+from topleft._scene.adapt import as_polygons
 from topleft.errors import MeshError
 
 Array = npt.NDArray[Any]
@@ -66,6 +66,7 @@ class IndexedTriangles:
     faces: Array | None = None
     n_faces: int = 0
     owner: object = None  # what removes temporary files
+    named: dict[str, Array] = field(default_factory=dict)  # what a file says of vertices and faces besides
 
     def __post_init__(self) -> None:
         first = self.columns[0]
@@ -106,7 +107,7 @@ class IndexedTriangles:
 
     def __getstate__(self) -> dict[str, Any]:
         state = {**vars(self), "columns": tuple(map(sent, self.columns)), "triangles": sent(self.triangles)}
-        return {**state, "owner": None}
+        return {**state, "owner": None, "named": {}}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         columns = tuple(map(received, state["columns"]))
@@ -186,6 +187,8 @@ def triangles_of(mesh: Any, folder: str | os.PathLike[str] | None) -> Triangles:
     TypeError, ValueError
         If it is none of those, or arrays have the wrong shape.
     """
+    if isinstance(mesh, IndexedTriangles | SeparateTriangles):
+        return mesh
     if isinstance(mesh, str | os.PathLike):
         return triangles_of_file(Path(mesh))
     if isinstance(mesh, tuple | list) and len(mesh) == 2 and all(isinstance(part, str | os.PathLike) for part in mesh):
@@ -229,8 +232,9 @@ def triangles_of_file(path: Path) -> Triangles:
         if suffix == ".stl" and (rows := mapped_corners(path)) is not None:
             return SeparateTriangles(rows)
         if suffix == ".ply" and (found := mapped_elements(path)) is not None:
-            columns, triangles = found
-            return IndexedTriangles(columns, triangles)
+            of_vertices, triangles, of_faces = found
+            columns = of_vertices["x"], of_vertices["y"], of_vertices["z"]
+            return IndexedTriangles(columns, triangles, named={**of_faces, **of_vertices})
     except MeshError as error:
         raise MeshError(f"cannot read {path}: {error}") from None
     mesh: Any = load(path)

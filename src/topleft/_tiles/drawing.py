@@ -195,7 +195,7 @@ class FragmentsPainter(Painter):
         """Check options and values against the mesh."""
         asked = Asked.parse(self.options.get("depth_test", "less"), self.options.get("background_depth"), None)
         self.asked = asked
-        self.depth_test = None if asked.test is None else str(asked.test)
+        self.depth_test = self.options.get("depth_test", "less")
 
     def drawn(self, payload: Payload, origin: Size, size: Size, threads: int | None, out: Any) -> Any:
         """The fragments of a window, in memory that the thread's next window overwrites."""

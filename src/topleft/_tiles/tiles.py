@@ -18,10 +18,11 @@ import numpy.typing as npt
 from topleft._base.arrays import as_count, as_path, as_size
 from topleft._base.options import check_choice
 from topleft._base.threads import parse_threads
-from topleft._field.grid import Extent, Grid, grid_around
+from topleft._field.grid import Extent, ExtentLike, Grid, grid_around
 from topleft._tiles.blocks import BLOCK, Triangles, fingerprint_of, triangles_of
 from topleft._tiles.drawing import KINDS, ON_GRIDS, Painter, painter_of
 from topleft._tiles.spans import SPAN_BYTES, Tiling, WindowIndex
+from topleft.typing import RasterKindOption, TiffCompressionOption, YOption, ZarrCompressionOption
 
 if TYPE_CHECKING:
     from topleft._tiles.levels import Progress, Written
@@ -75,12 +76,12 @@ def tiles(
     mesh: Any,
     size: int | tuple[int, int] | Grid | None = None,
     *,
-    kind: str = "labels",
+    kind: RasterKindOption = "labels",
     values: npt.ArrayLike | None = None,
     window: int | tuple[int, int] = WINDOW,
-    extent: Extent | None = None,
+    extent: ExtentLike | None = None,
     pixel_size: float | tuple[float, float] | None = None,
-    y: str = "up",
+    y: YOption = "up",
     threads: int | None = None,
     memory: int = INDEX_BYTES,
     folder: Path | None = None,
@@ -399,7 +400,7 @@ class Tiles:
         path: Path,
         *,
         chunk: int | tuple[int, int] | None = None,
-        compression: str = "gzip",
+        compression: ZarrCompressionOption = "gzip",
         levels: int = 1,
         resume: bool = False,
         progress: Progress | bool | None = None,
@@ -444,7 +445,7 @@ class Tiles:
         *,
         crs: str | int | None = None,
         nodata: float | None = None,
-        compression: str = "deflate",
+        compression: TiffCompressionOption = "deflate",
         tile: int = 512,
         overviews: bool = True,
         resume: bool = False,
