@@ -13,11 +13,12 @@ from __future__ import annotations
 import os
 import threading
 import warnings
-from collections import OrderedDict
-from collections.abc import Callable, Iterator, Sequence
+from collections import OrderedDict, deque
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, wait
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 from topleft._batch.jobs import Job, JobRunner, Outcome
@@ -36,6 +37,9 @@ TASK_MS = 200.0
 MOST_TOGETHER = 64
 UNKNOWN_TOGETHER = 4
 """Jobs of a task whose mesh only the worker reads."""
+
+MOST_TRIALS = 2
+"""How often a job that workers died over is tried by itself."""
 
 MOST_RESTARTS = 5
 """How often a task is sent again that was cancelled or lost with the scheduler."""
@@ -84,6 +88,9 @@ class ClusterWorkers(Workers):
         self._lock = threading.RLock()
         self._kept: OrderedDict[tuple[int, bool], _Kept] = OrderedDict()
         self._ends = False
+        self._suspects: deque[tuple[tuple[int, Job], Future[list[Outcome]], int]] = deque()
+        self._is_trying = False
+        self._dropped: set[Future[list[Outcome]]] = set()
         self._token = f"{os.getpid()}-{os.urandom(6).hex()}"
         self._together: dict[int, int] = {}
 
@@ -115,10 +122,12 @@ class ClusterWorkers(Workers):
     def submit(self, jobs: Jobs) -> Future[list[Outcome]]:
         """Submit jobs together, their mesh by itself."""
         promise: Future[list[Outcome]] = Future()
-        self._send(list(jobs), promise, 0)
+        self._send(list(jobs), promise)
         return promise
 
-    def _send(self, jobs: list[tuple[int, Job]], promise: Future[list[Outcome]], n_restarts: int) -> None:
+    def _send(
+        self, jobs: list[tuple[int, Job]], promise: Future[list[Outcome]], n_restarts: int = 0, n_trials: int = 0
+    ) -> None:
         with_levels = needs_levels(jobs[0][1])
         held = self._hold(jobs[0][1].scene, with_levels)
         light = [(index, replace(job, scene=None) if held is not None else job) for index, job in jobs]
@@ -129,58 +138,71 @@ class ClusterWorkers(Workers):
 
         def end(done: Any) -> None:
             try:
-                self._end(done, jobs, promise, n_restarts)
+                self._end(done, jobs, promise, n_restarts, n_trials)
             except BaseException as error:
                 if not promise.done():
                     promise.set_exception(error)
 
         task.add_done_callback(end)
-        promise.add_done_callback(lambda made: task.cancel() if made.cancelled() else None)
 
-    def _end(self, task: Any, jobs: list[tuple[int, Job]], promise: Future[list[Outcome]], n_restarts: int) -> None:
+        def drop(made: Future[list[Outcome]]) -> None:
+            if made.cancelled():
+                task.cancel()
+                if not made.running() and made not in self._dropped:
+                    self._dropped.add(made)
+                    made.set_running_or_notify_cancel()  # whoever waits learns of it
+
+        promise.add_done_callback(drop)
+
+    def _end(
+        self, task: Any, jobs: list[tuple[int, Job]], promise: Future[list[Outcome]], n_restarts: int, n_trials: int
+    ) -> None:
         """Hand on what a task came to, or try again."""
+        if n_trials:
+            self._is_trying = False
         if promise.done():
             return
-        if task.status == "finished":
-            promise.set_result(task.result())
-            return
-        if task.status in ("cancelled", "lost"):
-            if self._ends or n_restarts >= MOST_RESTARTS:
-                promise.cancel()
-                promise.set_running_or_notify_cancel()
-                return
+        outcomes, error = came_of(task)
+        if outcomes is not None:
+            promise.set_result(outcomes)
+        elif error is None and not self._ends and n_restarts < MOST_RESTARTS:
             self._forget_cancelled()
-            self._send(jobs, promise, n_restarts + 1)
-            return
-        error = told(task.exception())
-        if type(error).__name__ == "KilledWorker" and len(jobs) > 1:
-            self._one_by_one(jobs, promise)
+            self._send(jobs, promise, n_restarts + 1, n_trials)
+            self._is_trying = self._is_trying or n_trials > 0
+        elif type(error).__name__ == "KilledWorker" and n_trials < MOST_TRIALS and not self._ends:
+            self._suspect(jobs, promise, n_trials + 1)
         else:
-            promise.set_exception(error)
+            promise.set_exception(error or TopleftError(f"the cluster has lost the job {1 + n_restarts} times"))
+        self._try_next()
 
-    def _one_by_one(self, jobs: list[tuple[int, Job]], promise: Future[list[Outcome]]) -> None:
-        """Send each job by itself, since one of them kills workers."""
+    def _suspect(self, jobs: list[tuple[int, Job]], promise: Future[list[Outcome]], n_trials: int) -> None:
+        """Let each job be tried by itself, and no two at a time: workers died over them, but maybe for another job."""
+        if len(jobs) == 1:
+            self._suspects.append((jobs[0], promise, n_trials))
+            return
         parts: list[Future[list[Outcome]]] = [Future() for _ in jobs]
         outcomes: dict[int, Outcome] = {}
 
-        def collect(i: int) -> Callable[[Future[list[Outcome]]], None]:
-            def end(part: Future[list[Outcome]]) -> None:
-                index = jobs[i][0]
-                try:
-                    (outcomes[i],) = part.result()
-                except BaseException as error:
-                    wrong = error if isinstance(error, Exception) else TopleftError(f"job {index} was cancelled")
-                    outcomes[i] = Outcome(index, error=wrong)
-                with self._lock:
-                    is_last = len(outcomes) == len(jobs) and not promise.done()
-                    if is_last:
-                        promise.set_result([outcomes[k] for k in range(len(jobs))])
-
-            return end
+        def collect(i: int, part: Future[list[Outcome]]) -> None:
+            try:
+                (outcomes[i],) = part.result()
+            except Exception as error:
+                outcomes[i] = Outcome(jobs[i][0], error=error)
+            if len(outcomes) == len(jobs) and not promise.done():
+                promise.set_result([outcomes[k] for k in range(len(jobs))])
 
         for i, (part, job) in enumerate(zip(parts, jobs, strict=True)):
-            part.add_done_callback(collect(i))
-            self._send([job], part, 0)
+            part.add_done_callback(partial(collect, i))
+            self._suspects.append((job, part, n_trials))
+
+    def _try_next(self) -> None:
+        """Send a job that workers died over, if none of these is on the way."""
+        with self._lock:
+            if self._is_trying or not self._suspects or self._ends:
+                return
+            self._is_trying = True
+            job, promise, n_trials = self._suspects.popleft()
+        self._send([job], promise, n_trials=n_trials)
 
     def together(self, job: Job) -> int:
         """How many jobs of a scene make a task: by what the plan of the first one says."""
@@ -231,6 +253,19 @@ class ClusterWorkers(Workers):
         wait(futures)
         with self._lock:
             self._kept.clear()
+
+
+def came_of(task: Any) -> tuple[list[Outcome] | None, BaseException | None]:
+    """What a task has given, or its error; neither of them where it was cancelled or lost with the scheduler."""
+    try:
+        if task.status == "finished":
+            return task.result(), None
+        if task.status == "error":
+            return None, told(task.exception())
+    except BaseException as error:
+        if "Cancelled" not in type(error).__name__:
+            return None, error
+    return None, None
 
 
 def version_here() -> str:

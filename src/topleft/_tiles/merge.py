@@ -18,6 +18,7 @@ from topleft._base.arrays import INT32_MAX, as_array, shown
 from topleft._base.options import DepthTest, parse
 from topleft._base.threads import parse_threads, run_parts
 from topleft._raster.fragments import Fragments
+from topleft.typing import DepthTestOption
 
 __all__ = ["merge"]
 
@@ -34,7 +35,7 @@ def merge(
     buffers: Iterable[Any],
     *,
     triangles: Sequence[Any] | None = None,
-    depth_test: str | None = "less",
+    depth_test: DepthTestOption | None = "less",
     threads: int | None = None,
 ) -> tuple[I32, F32]:
     """Return the visibility buffer of all triangles, of those that shares of them were drawn to.
