@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._base.color import DEFAULT_COLOR, LINEAR_ONE, light_of, srgb_tables
-from topleft._base.memory import FreshMemory
+from topleft._base.memory import FreshMemory, empty
 from topleft._base.options import PointShape
 from topleft._camera.camera import Camera
 from topleft._model.light import TO_HEADLIGHT, Light, LightKind, LightSpace
@@ -111,7 +111,7 @@ def shade_cloud(frags: PointFragments, cloud: Points, camera: Camera, options: S
         return shade_numbers(frags, camera, options)
 
     def shade_one(sample: Any) -> U8:
-        picture = np.empty((*sample.id.shape, 4), np.uint8)
+        picture = empty((*sample.id.shape, 4), np.uint8)
         picture[...] = options.background
         seen = sample.mask
         picture[seen, :3] = colors_of(sample.id[seen], sample.depth[seen], cloud, camera, options)

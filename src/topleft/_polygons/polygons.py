@@ -12,8 +12,8 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from topleft._base.arrays import as_array, as_size, as_subpixel_bits, as_window
-from topleft._base.memory import SCRATCH, FreshMemory
+from topleft._base.arrays import apart_from, as_array, as_size, as_subpixel_bits, as_window
+from topleft._base.memory import SCRATCH, FreshMemory, empty
 from topleft._base.options import Sampling, parse
 from topleft._base.threads import parse_threads, run_parts
 from topleft._field.grid import Grid
@@ -139,7 +139,7 @@ def polygons(
     """
     how = parse(Sampling, "sampling", sampling)
     is_nonzero = parse(Rule, "rule", rule) is Rule.NONZERO
-    found, frame = frame_of(as_rings(rings), size, origin, subpixel_bits, threads, how.n_samples)
+    found, frame = frame_of(as_rings(rings).apart_from(out), size, origin, subpixel_bits, threads, how.n_samples)
     shape = frame.size[::-1]
     if values is None:
         if background is not None:
@@ -159,7 +159,7 @@ def polygons(
             else:
                 mean_of_samples(prepared, canvas, None, how, is_nonzero=is_nonzero)
         return result
-    paint = as_paint(values, background, len(found), how)
+    paint = as_paint(apart_from(out, "values", values), background, len(found), how)
     prepared = prepare(SCRATCH, found, frame, is_nonzero=is_nonzero)
     with canvas_of(FRESH, "values", out, (*shape, *paint.table.shape[1:]), paint.table.dtype.type) as (result, canvas):
         if canvas.size:
@@ -202,8 +202,8 @@ def mean_of_samples(
     """Write the mean of what the samples of each pixel see: 0 or 1, or colours."""
     height, width = out.shape[:2]
     positions = sample_positions(how.n_samples, prepared.frame.grid_bits).tolist()
-    mask = np.empty((height, width), np.uint8) if paint is None else None
-    labels = None if paint is None else np.empty((height, width), np.int32)
+    mask = empty((height, width), np.uint8) if paint is None else None
+    labels = None if paint is None else empty((height, width), np.int32)
     table = None if paint is None else np.concatenate([paint.table, paint.background[None]]).astype(np.float32)
     out.fill(0)
     for at in positions:
@@ -255,7 +255,7 @@ def paint_values(
     if how in (Sampling.OUTER, Sampling.INNER, Sampling.AREA):
         prepared.certify(assume_valid=assume_valid)
     if how is Sampling.AREA or how.n_samples > 1:
-        picture = out if out.dtype == np.float32 else np.empty(out.shape, np.float32)
+        picture = out if out.dtype == np.float32 else empty(out.shape, np.float32)
         if how is Sampling.AREA:
             picture[...] = paint.background
             colors = np.ascontiguousarray(paint.table.reshape(len(paint.table), -1), np.float32)

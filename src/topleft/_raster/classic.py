@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from topleft._base.arrays import apart_from, as_background, as_checked_triangles, as_out, as_triangles, as_vertices
-from topleft._base.memory import Memory
+from topleft._base.memory import Memory, empty
 from topleft._base.options import Per, Sampling, Sink, parse
 from topleft._raster.view import View
 from topleft.methods import Method, load_kernel
@@ -92,7 +92,7 @@ def draw_classic(
     points, corners = as_scene(method, vertices, triangles, view)
     shape, dtype = view.size[::-1], np.dtype(np.bool_ if sink is Sink.MASK else np.int32)
     result = memory.empty(NAMES[sink], shape, dtype) if out is None else as_out("out", out, shape, dtype.type)
-    canvas = result if result.flags.c_contiguous else np.empty(shape, dtype)
+    canvas = result if result.flags.c_contiguous else empty(shape, dtype)
     canvas.fill(-1 if sink is Sink.LABEL else 0)
     draw, variant = load_kernel(method)
     pixels = canvas.reshape(-1).view(np.uint8)

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine
 from topleft._base.arrays import apart_from, as_array, as_background, as_number, as_out
+from topleft._base.memory import empty
 from topleft._base.options import Per, parse
 from topleft._base.threads import available_threads, parse_threads, run_parts
 from topleft._raster.peel import DepthLayers
@@ -98,8 +99,8 @@ def composite(
     if ground is not None:
         ground = np.ascontiguousarray(np.broadcast_to(ground, (n_channels,)), np.float32)
     shape = (height, width, n_channels)
-    result = np.empty(shape, palette.dtype) if out is None else as_out("out", out, shape, palette.dtype.type)
-    canvas = result if result.flags.carray else np.empty(shape, palette.dtype)
+    result = empty(shape, palette.dtype) if out is None else as_out("out", out, shape, palette.dtype.type)
+    canvas = result if result.flags.carray else empty(shape, palette.dtype)
     rows_at_once = max(1, BAND_BYTES // max(1, 4 * n_layers * width * n_channels))
 
     def draw_rows(first: int, end: int) -> None:

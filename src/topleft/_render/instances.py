@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from topleft import _engine
-from topleft._base.memory import FRESH, SCRATCH, KeptMemory
+from topleft._base.memory import FRESH, SCRATCH, KeptMemory, empty
 from topleft._base.options import DepthTest, Sampling, Sink, parse
 from topleft._base.threads import count_threads, run_parts
 from topleft._camera.camera import Camera
@@ -351,7 +351,7 @@ def draw_scene_coverage(
 def add_areas(placed: PlacedScene, view: View, canvas: NDArray[np.float32]) -> None:
     """Write the sum of the areas that the instances cover, at most 1."""
     canvas[...] = 0
-    own = np.empty_like(canvas)
+    own = empty(canvas.shape, np.float32)
     for chunk in placed.chunks():
         for snapped in chunk:
             n_threads = count_threads(view.threads, snapped.n_triangles)
