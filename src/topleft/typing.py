@@ -28,6 +28,7 @@ __all__ = [
     "PerOption",
     "PointShapeOption",
     "PointUnitOption",
+    "RasterKindOption",
     "ResolveOption",
     "RuleOption",
     "SamplesOption",
@@ -35,10 +36,12 @@ __all__ = [
     "ShadingOption",
     "SpaceOption",
     "SurfaceOption",
+    "TiffCompressionOption",
     "UpOption",
     "WindingOption",
     "WrapOption",
     "YOption",
+    "ZarrCompressionOption",
 ]
 
 # Options of the verbs on arrays
@@ -119,6 +122,12 @@ LayerOption: TypeAlias = Literal[
 ]
 OnErrorOption: TypeAlias = Literal["raise", "collect"]
 OrderOption: TypeAlias = Literal["jobs", "completed"]
+
+# Huge rasters
+
+RasterKindOption: TypeAlias = Literal["labels", "depth", "coverage", "overdraw", "fill", "field", "height_map"]
+TiffCompressionOption: TypeAlias = Literal["deflate", "none"]
+ZarrCompressionOption: TypeAlias = Literal["gzip", "zstd", "none"]
 
 # `topleft.torch`, in the words of nvdiffrast
 

@@ -128,6 +128,11 @@ CALLS = {
                                                 "wrap": "clamp", "encoding": "linear", "background": 0.0}),
     "Fragments.distance": (FRAGS.distance, {"camera": CAMERA}),
     "Fragments.interpolate": (FRAGS.interpolate, {"values": CUBE.vertices, "background": 0.0}),
+    "merge": (tl.merge, {"buffers": [tl.rasterize(FLAT, ONE, SIZE)], "triangles": [0], "depth_test": "less",
+                         "threads": None}),
+    "tiles": (tl.tiles, {"mesh": (FLAT, ONE), "size": SIZE, "kind": "labels", "values": None, "window": 32,
+                         "extent": None, "pixel_size": None, "y": "up", "threads": None, "memory": 1 << 20,
+                         "folder": None}),
     "Fragments.sample": (FRAGS.sample, {"texture": 0}),
 }  # fmt: skip
 
@@ -248,6 +253,6 @@ def test_every_public_callable_is_tried():
     others = {"simplify", "release_memory", "build_info"}  # the first takes seconds, the others nothing
     made = {"DepthLayers", "Detail", "Fragments", "FragmentsBatch", "Level", "Levels", "Plan", "SceneDepthLayers",
             "SceneFragments", "ViewLayers", "ImageError", "MeshError", "MissingPackageError", "TopleftError",
-            "MeshWarning", "Overlap", "PointFragments"}  # fmt: skip
+            "MeshWarning", "Overlap", "PointFragments", "Tiles", "Window"}  # fmt: skip
     public = {name for name in tl.__all__ if callable(getattr(tl, name)) and not inspect.ismodule(getattr(tl, name))}
     assert public <= set(CALLS) | others | made
