@@ -37,7 +37,7 @@ LABEL_BAND_BYTES = 512 << 10
 #: Cells that are held at a time; a larger picture is drawn in several passes over the triangles.
 MAX_CELLS = 1 << 28
 
-#: Cells of a band of rows that stays in the second-level cache: one triangle of 3840x2160 takes 1.3 ms instead of 3.1.
+#: Cells of a band of rows that stays in the second-level cache: one triangle over 3840x2160 takes 2.3 ms, not 3.2.
 AREA_BAND_BYTES = 512 << 10
 
 #: Pixels that are summed 0.2 ns faster in the nearer cache for each time that a triangle is looked at, 10 ns.
