@@ -239,7 +239,7 @@ def test_load_folder_is_refused(tmp_path):
 def test_load_without_trimesh_says_how_to_get_it(write, monkeypatch):
     monkeypatch.setitem(sys.modules, "trimesh", None)
     with pytest.raises(MissingPackageError, match=r"needs trimesh: pip install 'topleft\[render\]'"):
-        files.load(write("a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"))
+        files.load(write("a.3mf", "PK"))
 
 
 @pytest.mark.parametrize(
@@ -275,6 +275,7 @@ def test_as_mesh_of_trimesh_takes_no_highlights_that_nobody_gave():
     ("name", "content", "message"),
     [
         ("a.dxf", b"AutoCAD Binary DXF\r\n\x1a\0", "it is a binary DXF: save it as text"),
+        ("a.dxf", "0\nSECTION\n", "cannot draw .*a.dxf': it is a drawing, of which only curves could be read"),
         ("a.svg", "<svg/>", "cannot draw .*a.svg': it holds curves in a plane"),
         ("a.binvox", "#binvox 1", "it holds voxels: make a mesh of them"),
     ],

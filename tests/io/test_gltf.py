@@ -140,6 +140,12 @@ def test_gltf_sparse_accessor_sets_rows(load):
     assert corners(load(file)) == [[[0, 0, 0], [7, 8, 9], [0, 1, 0]], [[0, 0, 0], [7, 8, 9], [0, 0, 0]]]
 
 
+def test_gltf_texture_coordinates_that_are_whole_numbers_do_not_wrap(load):
+    file = GltfFile(extensionsRequired=["KHR_mesh_quantization"])
+    uv = np.array([[0, 0], [4095, 0], [0, 65535]], np.uint16)
+    assert load(file.shown(TEXCOORD_0=uv)).uv.tolist() == [[0, 1], [4095, 1], [0, -65534]]
+
+
 def test_gltf_interleaved_and_quantized_attributes_are_read(load):
     rows = np.zeros(3, [("position", "<i2", 3), ("pad", "<i2"), ("normal", "i1", 3), ("pad1", "i1")])
     rows["position"], rows["normal"] = 32767 * TRIANGLE, [0, 0, 127]

@@ -525,10 +525,14 @@ def _placed(shape: _Shape, matrix: F64, materials: tuple[Any, ...]) -> Mesh:
         if normals is not None:
             normals = normals @ np.linalg.pinv(linear)
     colors = None if shape.colors is None else _srgb_bytes(shape.colors)
-    uv, uv1 = (
-        None if rows is None else np.column_stack([rows[:, 0], 1 - rows[:, 1]]) for rows in (shape.uv, shape.uv1)
-    )
+    uv, uv1 = (None if rows is None else _upwards(rows) for rows in (shape.uv, shape.uv1))
     return Mesh(positions, triangles, normals, colors, uv, materials, None, uv1)
+
+
+def _upwards(uv: Array) -> Array:
+    """Texture coordinates with v from the bottom; also of whole numbers, as quantized files have them."""
+    rows = uv if uv.dtype.kind == "f" else uv.astype(np.float32)  # 16 bits are exact in it
+    return np.column_stack([rows[:, 0], 1 - rows[:, 1]])
 
 
 def _srgb_bytes(colors: Array) -> npt.NDArray[np.uint8]:
