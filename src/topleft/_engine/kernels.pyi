@@ -574,6 +574,13 @@ def move_points(
     points: Source, matrix: NDArray[np.float64], first: int, end: int, out: NDArray[np.float64]
 ) -> None: ...
 def color_rows(colors: NDArray[np.uint8], first: int, end: int, rows: NDArray[np.float32]) -> None: ...
+def group_rows(
+    rows: NDArray[np.uint32],
+    table_bits: int,
+    table: NDArray[np.int32],
+    first: NDArray[np.int32],
+    group: NDArray[np.int32],
+) -> int: ...
 
 CELL_ROWS: int
 CERTIFY_WORDS: int
