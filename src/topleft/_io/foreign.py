@@ -24,7 +24,7 @@ import numpy.typing as npt
 
 from topleft._io.notes import Notes
 from topleft._io.references import Cloud, InputFile, numbers_of_text
-from topleft._model.adapt import placed
+from topleft._model.from_trimesh import placed
 from topleft._model.mesh import Mesh
 from topleft._model.polygons import triangulate
 from topleft.errors import MeshError, MissingPackageError
