@@ -244,6 +244,7 @@ cdef extern from "topleft.h" nogil:
     ctypedef struct tl_shading:
         const float *normals
         const int32_t *normal_of_corner
+        const float *corner_normals
         const float *face_normals
         const void *positions
         int is_f64

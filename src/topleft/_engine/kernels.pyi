@@ -323,6 +323,7 @@ class ShadingTable:
         self,
         normals: NDArray[np.float32],
         normal_of_corner: NDArray[np.int32] | None,
+        corner_normals: NDArray[np.float32] | None,
         face_normals: NDArray[np.float32] | None,
         positions: NDArray[Any],
         is_turned: NDArray[np.uint8] | None,
@@ -353,9 +354,7 @@ class ShadingTable:
         self, color: Sequence[float], near: float, scale: float, distance_start: float, distance_scale: float
     ) -> None: ...
 
-def set_inverse_w(
-    mesh: SnappedMesh, rows: NDArray[np.float32], vertex_of_row: NDArray[np.int32] | None, out: NDArray[np.float32]
-) -> None: ...
+def set_inverse_w(mesh: SnappedMesh, rows: NDArray[np.float32], out: NDArray[np.float32]) -> None: ...
 def shade(
     mesh: SnappedMesh,
     shading: ShadingTable,
