@@ -94,6 +94,18 @@ typedef struct tl_kernels {
     void (*interpolate)(const tl_scene *scene, const tl_window *window, const int32_t *ids, const float *values,
                         int n_values, int per_corner, float background, float *out);
 
+    /* What values change by along x and y at n pixels: (n, n_values, 2), 0 where ids are -1. */
+    void (*fill_slopes)(const tl_sloped *values, const int32_t *ids, const float *weights, int64_t n, float *out);
+
+    /* The values (n, n_channels) of an array at n pixels where ids are not -1: uv (n, 2), and where there are halvings
+     * slopes of u and v along x and y, (n, 2, 2). */
+    void (*fill_texels)(const tl_levels *array, const int32_t *ids, const float *uv, const float *slopes,
+                        float background, int64_t n, float *out);
+
+    /* Rows [first, end) of the halving of a level of such an array, (max(1, height / 2), max(1, width / 2)). */
+    void (*halve_rows)(const float *level, int64_t width, int64_t height, int n_channels, int64_t first, int64_t end,
+                       float *out);
+
     /* Colours where labels are not -1: per triangle, or interpolated screen-linearly from those of the vertices.
      * n_channels of uint8 or float32 a colour. */
     void (*paint_flat)(const int32_t *labels, int64_t n, const uint8_t *colors, int pixel_bytes, uint8_t *pixels);

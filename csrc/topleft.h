@@ -399,6 +399,15 @@ typedef struct {
     int is_f64_out;
 } tl_points;
 
+/* Values of vertices, or of corners, whose slopes are wanted, and the triangles that show. */
+typedef struct {
+    const int32_t *slot; /* of each triangle its place among those that show */
+    const double *steps; /* of each corner what its weight over w changes by along x and y, and its w: (n, 3, 3) */
+    const int32_t *rows; /* of each corner its row of `values`: (n, 3) */
+    const float *values; /* (rows, n_values) */
+    int64_t n_values;
+} tl_sloped;
+
 #include "clusters.h"
 #include "polygons.h"
 #include "kernels.h"

@@ -148,6 +148,12 @@ cdef extern from "topleft.h" nogil:
         int64_t n_others
         const tl_window *picture
         int is_first, is_last
+    ctypedef struct tl_sloped:
+        const int32_t *slot
+        const double *steps
+        const int32_t *rows
+        const float *values
+        int64_t n_values
     ctypedef struct tl_composite:
         const int32_t *ids
         int64_t n_triangles, plane_px
@@ -211,6 +217,12 @@ cdef extern from "topleft.h" nogil:
         float[2][3] transform
         float *tangent
         float hand
+    ctypedef struct tl_levels:
+        const float *texels
+        const int64_t *rows
+        int n_levels, n_channels
+        tl_filter filter
+        tl_wrap wrap_u, wrap_v
     ctypedef struct tl_material:
         float *color
         float *back_color
@@ -397,6 +409,9 @@ cdef extern from "topleft.h" nogil:
         void (*interpolate)(const tl_scene *, const tl_window *, const int32_t *, const float *, int, int, float, float *) noexcept nogil
         void (*paint_flat)(const int32_t *, int64_t, const uint8_t *, int, uint8_t *) noexcept nogil
         void (*paint_gouraud)(const tl_scene *, const tl_window *, const int32_t *, const void *, int, int, void *) noexcept nogil
+        void (*fill_slopes)(const tl_sloped *, const int32_t *, const float *, int64_t, float *) noexcept nogil
+        void (*fill_texels)(const tl_levels *, const int32_t *, const float *, const float *, float, int64_t, float *) noexcept nogil
+        void (*halve_rows)(const float *, int64_t, int64_t, int, int64_t, int64_t, float *) noexcept nogil
         void (*composite)(const tl_composite *, int64_t, void *) noexcept nogil
         void (*drop_sides)(const tl_scene *, const uint8_t *, int64_t, int64_t, int32_t *) noexcept nogil
         int64_t (*list_edges)(const tl_scene *, const tl_edge_scratch *, uint64_t *, int64_t *) noexcept nogil

@@ -270,6 +270,28 @@ def composite(
     background: NDArray[np.float32] | None,
     pixels: NDArray[np.uint8],
 ) -> None: ...
+def fill_slopes(
+    ids: NDArray[np.int32],
+    weights: NDArray[np.float32],
+    slot: NDArray[np.int32],
+    steps: NDArray[np.float64],
+    rows: NDArray[np.int32],
+    values: NDArray[np.float32],
+    out: NDArray[np.float32],
+) -> None: ...
+def fill_texels(
+    texels: NDArray[np.float32],
+    rows: NDArray[np.int64],
+    codes: tuple[int, int, int],
+    ids: NDArray[np.int32],
+    uv: NDArray[np.float32],
+    slopes: NDArray[np.float32] | None,
+    background: float,
+    out: NDArray[np.float32],
+) -> None: ...
+def halve_rows(
+    level: NDArray[np.float32], width: int, height: int, first: int, end: int, out: NDArray[np.float32]
+) -> None: ...
 
 class Transfer:
     def __init__(

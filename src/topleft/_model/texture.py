@@ -19,6 +19,7 @@ from topleft import _engine
 from topleft._base.arrays import as_array
 from topleft._base.color import LIGHT_OF_SRGB
 from topleft._base.options import parse
+from topleft._base.texels import MOST_KEPT_BYTES, ValueLevels, as_light, levels_of
 from topleft.typing import EncodingOption, FilterOption, WrapOption
 
 U8 = npt.NDArray[np.uint8]
@@ -158,6 +159,16 @@ class Texture:
         return _engine.Mipmap(
             texels, table, filter_code, wrap_u, wrap_v, self.uv_set, rows_of_transform, (d * hand, -c * hand), hand
         )
+
+    def value_levels(self) -> ValueLevels:
+        """Light and opacity as float32, and their halvings; made when they are first needed, and kept unless large."""
+        found: ValueLevels | None = self.__dict__.get("_value_levels")
+        if found is None:
+            wrap_u, wrap_v = map(str, self.wrap)
+            found = levels_of(as_light(self.image, str(self.encoding)), str(self.filter), (wrap_u, wrap_v))
+            if found.texels.nbytes <= MOST_KEPT_BYTES:
+                self.__dict__["_value_levels"] = found
+        return found
 
     @cached_property
     def has_alpha(self) -> bool:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from topleft import _engine
 from topleft._base.arrays import as_array, as_number, as_values, shown
 from topleft._base.memory import empty
-from topleft._base.texels import as_texels, look_up
+from topleft._base.texels import as_levels
 from topleft.typing import EncodingOption, FilterOption, WrapOption
 
 __all__ = ["Fragments", "FragmentsBatch", "GivenCorners", "as_sample", "view_of"]
@@ -49,20 +49,19 @@ class GivenCorners(NamedTuple):
         (width, height), (x, y, _, w) = self.viewport, np.moveaxis(points, -1, 0)
         return np.stack([(w + x) * (width / 2), (w - y) * (height / 2), w], axis=-1)
 
-    def slopes(self, ids: NDArray[np.int32], weights: NDArray[np.float64]) -> NDArray[np.float64]:
-        """What the weights (P, 3) of pixels in their triangles (P,) change by along x and y, (P, 3, 2) float64.
+    def steps(self, ids: NDArray[np.int32]) -> NDArray[np.float64]:
+        """What l of each corner changes by along x and y, and its w: (N, 3, 3) float64.
 
-        The weights are l / (l0 + l1 + l2), and l = M^-1 (x, y, 1), where the columns of M are the corners.
+        The weights of a pixel are l / (l0 + l1 + l2), and l = M^-1 (x, y, 1), where the columns of M are the corners.
         """
-        unique, of_unique = np.unique(ids, return_inverse=True)
-        corners = self.homogeneous(unique)
+        corners = self.homogeneous(ids)
         crossed = np.cross(np.roll(corners, -1, axis=1), np.roll(corners, -2, axis=1))
         area = np.einsum("nk,nk->n", corners[:, 0], crossed[:, 0])
-        with np.errstate(divide="ignore", invalid="ignore"):
-            steps = (crossed[..., :2] / area[:, None, None])[of_unique]
-            w = np.einsum("pk,pk->p", weights, corners[of_unique][..., 2])
-            slopes = w[:, None, None] * (steps - weights[..., None] * steps.sum(axis=1)[:, None, :])
-        return np.nan_to_num(slopes, nan=0.0, posinf=0.0, neginf=0.0)  # of triangles without area before the snap
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            steps = crossed / area[:, None, None]
+        steps[..., 2] = corners[..., 2]
+        steps[~np.isfinite(steps).all(axis=(1, 2))] = 0  # of triangles without area before the snap
+        return steps
 
 
 class Fragments:
@@ -240,18 +239,17 @@ class Fragments:
         """
         if uv is None:
             return self._at_sample(texture)
-        texels, how, wraps, is_flat = as_texels(texture, filter, wrap, encoding)
-        mask = self.mask
-        if how == "trilinear":
+        levels = as_levels(texture, filter, wrap, encoding)
+        ground = as_number("background", background)
+        if len(levels.rows) > 1:
             found, slopes = self.interpolate(uv, derivatives=True)
         else:
             found, slopes = self.interpolate(uv), None
         if found.shape[2:] != (2,):
             raise ValueError(f"uv must have two columns, (V, 2) or (T, 3, 2), got {found.shape[2:] or 'one'}")
-        out = np.full((*mask.shape, texels.shape[2]), as_number("background", background), np.float32)
-        footprint = None if slopes is None else slopes[mask].astype(np.float64)
-        out[mask] = look_up(texels, found[mask].astype(np.float64), footprint, how, wraps)
-        return out[..., 0] if is_flat else out
+        of_pixels = None if slopes is None else slopes.reshape(-1, 2, 2)
+        out = levels.look_up(self._ids().reshape(-1), found.reshape(-1, 2), of_pixels, ground)
+        return out.reshape(self.id.shape if levels.is_flat else (*self.id.shape, levels.n_channels))
 
     def _at_sample(self, i: int) -> Fragments:
         """Return ids, depth and attributes at one sample of each pixel."""
@@ -389,18 +387,23 @@ class Fragments:
         """The derivatives of checked values along x and y, (H, W, K, 2) or (H, W, 2) float32."""
         if self.corners is None:
             raise ValueError("derivatives are those of rasterize and rasterize_mesh, not of layers")
-        mask = self.mask
-        ids = self.triangle[mask]
         channels = array.shape[-1] if array.ndim > 1 else 1
-        out = np.zeros((*mask.shape, channels, 2), np.float32)
-        if ids.size:
-            slopes = self.corners.slopes(ids, self.barycentric()[mask].astype(np.float64))
-            if array.ndim == 3:
-                corners = array[ids]
-            else:
-                rows = np.asarray(as_array("triangles", self.corners.triangles))[ids].astype(np.intp)
-                corners = array.reshape(len(array), -1)[rows]
-            out[mask] = np.einsum("pck,pcd->pkd", corners.astype(np.float64), slopes)
+        out = np.empty((*self.triangle.shape, channels, 2), np.float32)
+        ids = self._ids().reshape(-1)
+        is_seen = np.zeros(self._n_triangles + 1, np.bool_)
+        is_seen[ids] = True  # the last, too, by -1
+        seen = np.flatnonzero(is_seen[:-1]).astype(np.int32)
+        slot = np.empty(self._n_triangles, np.int32)
+        slot[seen] = np.arange(len(seen), dtype=np.int32)
+        if array.ndim == 3:
+            rows = (3 * seen[:, None] + np.arange(3)).astype(np.int32)
+        else:
+            rows = np.asarray(as_array("triangles", self.corners.triangles))[seen].astype(np.int32)
+        _engine.fill_slopes(
+            ids, self.barycentric().reshape(-1, 3), slot, self.corners.steps(seen), rows,
+            array.reshape(-1, channels) if array.size else np.empty((0, channels), np.float32),
+            out.reshape(-1, channels, 2),
+        )  # fmt: skip
         return out if array.ndim > 1 else out[..., 0, :]
 
     @cached_property

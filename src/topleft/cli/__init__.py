@@ -1,11 +1,11 @@
-"""The command line: `topleft render MESH [MESH ...] -o OUT`, `topleft explain MESH`, `mask`, `calibrate` and `info`.
+"""The command line: `topleft render`, `mask`, `explain`, `calibrate`, `doctor` and `info`.
 
 Exit status: 0, all pictures were written; 1, some of several inputs failed and the rest were written, or, with
---strict, a mesh lacks something of its file; 2, nothing could
-be done with what was asked, told in one line on stderr.
+--strict, a mesh lacks something of its file; 2, nothing could be done with what was asked, told in one line on stderr.
 
 animation.py  writes the views of a mesh one after the other, by Pillow or ffmpeg
 arguments.py  defines what `topleft render` takes
+doctor.py     runs `topleft doctor`
 explain.py    runs `topleft explain` and `topleft calibrate`
 job_file.py   reads jobs from TOML or JSON
 mask.py       runs `topleft mask`
@@ -28,6 +28,7 @@ from typing import NoReturn
 from topleft._engine.isa import build_info
 from topleft._io.notes import listening
 from topleft.cli.arguments import REFUSED, Parser, UsageError, add_render_arguments
+from topleft.cli.doctor import add_doctor_command
 from topleft.cli.explain import add_plan_commands
 from topleft.cli.mask import add_mask_command
 from topleft.cli.render import FAILED, complain, complain_of_lacks, one_line, run_render
@@ -108,4 +109,5 @@ def _parser() -> Parser:
     render.set_defaults(run=run_render)
     add_plan_commands(commands)
     add_mask_command(commands)
+    add_doctor_command(commands)
     return parser
