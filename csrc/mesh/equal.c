@@ -46,11 +46,10 @@ static int64_t group_rows(const uint32_t *rows, int n_words, int64_t n, int tabl
         for (int64_t i = start; i < end; i++) {
             uint64_t slot = slots[i - start];
             while (table[slot] >= 0 && memcmp(rows + (int64_t)first[table[slot]] * n_words, rows + i * n_words, size)) {
+                if (--probes_left < 0)
+                    return -1;
                 slot = (slot + 1) & mask;
-                probes_left--;
             }
-            if (probes_left < 0)
-                return -1;
             if (table[slot] < 0) {
                 first[n_groups] = (int32_t)i;
                 table[slot] = (int32_t)n_groups++;

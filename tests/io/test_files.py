@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -283,6 +284,17 @@ def test_as_mesh_of_trimesh_takes_no_highlights_that_nobody_gave():
 def test_load_of_what_is_no_mesh_is_refused_in_true_words(write, name, content, message):
     with pytest.raises(MeshError, match=message):
         files.load(write(name, content))
+
+
+def test_load_of_3mf_with_objects_in_further_files_is_refused_in_true_words(tmp_path):
+    for package in ("lxml", "networkx"):
+        pytest.importorskip(package, reason="3MF needs it, of the extra formats")
+    model = '<model xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02"><resources/><build/></model>'
+    with zipfile.ZipFile(tmp_path / "a.3mf", "w") as archive:
+        archive.writestr("3D/3dmodel.model", model)
+        archive.writestr("3D/Objects/a.model", model)
+    with pytest.raises(MeshError, match=r"a.3mf': its objects are in further files of the archive"):
+        files.load(tmp_path / "a.3mf")
 
 
 def test_load_by_meshio_prints_nothing(write, capfd):

@@ -82,8 +82,6 @@ def read_by_trimesh(source: InputFile) -> list[Mesh]:
         raise MissingPackageError(f"reading {source.path.suffix!r} needs {extra}") from error
     if suffix == ".dae":
         _note_missing_pictures(source)
-    if not parts and not source.clouds and suffix in NO_TRIANGLES:
-        raise MeshError(f"cannot draw {str(source.path)!r}: {NO_TRIANGLES[suffix]}")
     return parts
 
 
@@ -100,18 +98,32 @@ def _check_what_it_is(source: InputFile, suffix: str) -> None:
 
         try:
             with zipfile.ZipFile(source.path) as archive:
-                n_bytes = sum(row.file_size for row in archive.infolist())
+                rows = archive.infolist()
+                n_bytes = sum(row.file_size for row in rows)
+                models = [row for row in rows if row.filename.lower().endswith(".model")]
+                main = [row for row in models if row.filename.lower().endswith("3d/3dmodel.model")]
+                has_objects = not main or n_bytes > MAX_UNPACKED_BYTES or b"<object" in archive.read(main[0])
         except (zipfile.BadZipFile, NotImplementedError) as error:
             raise MeshError(f"its archive is broken ({error})") from error
         if n_bytes > MAX_UNPACKED_BYTES:
             raise MeshError(f"its archive holds {n_bytes} bytes, more than {MAX_UNPACKED_BYTES}")
+        if len(models) > 1 and not has_objects:
+            raise MeshError(f"cannot read {str(source.path)!r}: its objects are in further files of the archive")
 
 
 def _scene(trimesh: Any, source: InputFile, suffix: str) -> Any:
     """What trimesh reads of a file; of COLLADA, after its polygons have been cut."""
     if suffix not in (".dae", ".zae"):
         return trimesh.load_scene(str(source.path), process=False)
-    resolver: Any = trimesh.resolvers.FilePathResolver(str(source.path))
+
+    class Beside(trimesh.resolvers.FilePathResolver):  # type: ignore[misc]
+        def get(self, name: str) -> bytes:
+            path = source.find(unquote(name), "textures")
+            if path is None:
+                raise FileNotFoundError(name)
+            return path.read_bytes()
+
+    resolver: Any = Beside(str(source.path))
     if suffix == ".zae":
         with source.path.open("rb") as file:
             archive = trimesh.util.decompress(file, file_type="zip")
@@ -190,10 +202,10 @@ def simplified(content: bytes, notes: Notes) -> bytes:
                 _cut(row, space, named, notes)
         if mesh.find(f"{space}lines") is not None or mesh.find(f"{space}linestrips") is not None:
             notes.add("lines not drawn")
-    for node in root.iter(f"{space}node"):
+    for node in list(root.iter(f"{space}node")):
         for row in node.findall(f"{space}instance_controller"):
             _uncontrol(node, row, space, named, notes)
-    for bound in root.iter(f"{space}technique_common"):
+    for bound in list(root.iter(f"{space}technique_common")):
         for row in bound.findall(f"{space}instance_material"):
             if not _is_material(row.get("target", ""), space, named):
                 bound.remove(row)
