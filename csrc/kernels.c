@@ -10,7 +10,7 @@
 #include "clusters/cluster_view.c"
 #include "raster/raster.c"
 #include "raster/bin.c"
-#include "raster/sides.c"
+#include "raster/setup.c"
 #include "area/area.c"
 #include "pixels/weights_one.c"
 #include "pixels/weights.c"

@@ -32,8 +32,9 @@ from topleft._polygons.overlap import Overlap, overlap
 from topleft._polygons.polygons import polygons
 from topleft._raster.classic import bresenham_line
 from topleft._raster.composite import composite
-from topleft._raster.fragments import Fragments, FragmentsBatch
+from topleft._raster.fragments import Fragments
 from topleft._raster.peel import DepthLayers, peel
+from topleft._raster.poses import FragmentsBatch
 from topleft._raster.verbs import Rasterizer, coverage, fill, overdraw, rasterize, wireframe
 from topleft._render.fragments import SceneDepthLayers, SceneFragments
 from topleft._render.render import rasterize_mesh, render

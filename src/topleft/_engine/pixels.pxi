@@ -53,7 +53,7 @@ def fill_bands(meshes, int32_t[:, ::1] labels, Palette palette, pixels, Bins bin
 
     `labels`: memory for those of a band, (S, rows * W).
     """
-    cdef tl_scene seen[16]
+    cdef tl_snapped seen[16]
     cdef SnappedMesh mesh
     cdef tl_target target
     cdef tl_window window

@@ -306,21 +306,8 @@ class RowAreas:
         return np.diff(area, axis=0) * (self.m / self.n)
 
 
-def light_of_image(rgba: U8, encoding: str = "srgb") -> F64:
-    """Linear light and opacity (H, W, 4) float64, 0 to 1, of a picture."""
-    light = np.empty(rgba.shape)
-    light[..., :3] = LIGHT_OF_BYTE[Encoding(encoding)][rgba[..., :3]]
-    light[..., 3] = rgba[..., 3] / 255
-    return light
-
-
-def halved(level: F64) -> F64:
-    """The next halving (max(1, H // 2), max(1, W // 2), 4): each texel the mean over its area."""
-    return halved_along(halved_along(level, 0), 1)
-
-
 def halved_along(level: F64, axis: int) -> F64:
-    """One axis of it."""
+    """One axis of the next halving (max(1, H // 2), max(1, W // 2), 4): each texel the mean over its area."""
     n = level.shape[axis]
     if n % 2 == 0:
         even, odd = (level[::2], level[1::2]) if axis == 0 else (level[:, ::2], level[:, 1::2])

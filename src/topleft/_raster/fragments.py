@@ -15,7 +15,7 @@ from topleft._base.memory import empty
 from topleft._base.texels import as_levels
 from topleft.typing import EncodingOption, FilterOption, WrapOption
 
-__all__ = ["Fragments", "FragmentsBatch", "GivenCorners", "as_sample", "view_of"]
+__all__ = ["Fragments", "GivenCorners", "as_sample", "view_of"]
 
 #: Makes the snapped mesh that attributes of some triangles need: these are snapped, no others.
 PartOfMesh = Callable[..., _engine.SnappedMesh]
@@ -370,9 +370,13 @@ class Fragments:
         array([[0.5, 1.5, 2.5, 0. ],
                [0.5, 1.5, 0. , 0. ]], dtype=float32)
         """
-        array = as_values(values, self._n_vertices, self._n_triangles)
-        found = self._interpolated(array, as_number("background", background))
-        return (found, self._derivatives(array)) if derivatives else found
+        checked = self._checked(values)
+        found = self._interpolated(checked, as_number("background", background))
+        return (found, self._derivatives(checked)) if derivatives else found
+
+    def _checked(self, values: Any) -> Any:
+        """What the two following methods take of an attribute."""
+        return as_values(values, self._n_vertices, self._n_triangles)
 
     def _interpolated(self, array: NDArray[np.float32], background: float) -> NDArray[np.float32]:
         """The attribute of checked values."""
@@ -419,74 +423,6 @@ class Fragments:
 
     def _ids(self) -> NDArray[np.int32]:
         return np.require(self.triangle, np.int32, ["C", "A"])
-
-
-class FragmentsBatch(Sequence[Fragments]):
-    """What `rasterize` returns of a batch: a visibility buffer for each of B poses, behind each other.
-
-    Attributes
-    ----------
-    triangle : ndarray of int32, shape (B, H, W)
-        Index of the triangle that shows in the pixel, -1 where there is none.
-    depth : ndarray of float32, shape (B, H, W)
-        Its depth.
-    """
-
-    def __init__(self, triangle: NDArray[np.int32], depth: NDArray[np.float32], frags: Sequence[Fragments]) -> None:
-        self.triangle, self.depth = triangle, depth
-        self._frags = tuple(frags)
-
-    def __repr__(self) -> str:
-        n, height, width = self.triangle.shape
-        return f"FragmentsBatch({n} of {width}x{height})"
-
-    def __len__(self) -> int:
-        return len(self._frags)
-
-    @overload
-    def __getitem__(self, i: int) -> Fragments: ...
-    @overload
-    def __getitem__(self, i: slice) -> Sequence[Fragments]: ...
-    def __getitem__(self, i: int | slice) -> Fragments | Sequence[Fragments]:
-        """Return one of them, whose arrays are views."""
-        return self._frags[i]
-
-    @property
-    def mask(self) -> NDArray[np.bool_]:
-        """Where there is a triangle, bool (B, H, W)."""
-        return self.triangle >= 0
-
-    def barycentric(self) -> NDArray[np.float32]:
-        """Return the weights of the triangles' vertices, (B, H, W, 3) float32; see `Fragments.barycentric`."""
-        return self._stacked([frags.barycentric() for frags in self], (3,))
-
-    def interpolate(self, values: ArrayLike, *, background: float = 0.0) -> NDArray[np.float32]:
-        """Return an attribute of the vertices at each visible pixel, (B, H, W, K) or (B, H, W) float32.
-
-        Parameters
-        ----------
-        values : array_like of real numbers
-            Those of all, as `Fragments.interpolate` takes them, (V, K), say; or with a leading axis of B, (B, V, K).
-        background : float
-            Value where there is no triangle.
-
-        Raises
-        ------
-        ValueError
-            If there are neither one nor B arrays of values, or they do not fit.
-        """
-        array = as_array("values", values)
-        has_own = array.ndim == 4 or (array.ndim == 3 and array.shape[1] == (self[0]._n_vertices if self else 0))
-        if has_own and len(array) != len(self):
-            raise ValueError(f"values must be those of all, or {len(self)} of them, got {len(array)}")
-        own = array if has_own else [array] * len(self)
-        channels = array.shape[(2 if array.ndim == 3 and has_own else array.ndim - 1) :] if array.ndim > 1 else ()
-        found = [frags.interpolate(one, background=background) for frags, one in zip(self, own, strict=True)]
-        return self._stacked(found, channels)
-
-    def _stacked(self, found: list[NDArray[np.float32]], channels: tuple[int, ...]) -> NDArray[np.float32]:
-        shape = *self.triangle.shape, *channels
-        return np.stack(found) if found else np.empty(shape, np.float32)
 
 
 def as_sample(i: object, n: int) -> int:

@@ -15,7 +15,8 @@ from topleft._base.threads import parse_threads
 from topleft._raster.fill import Style, draw_fill
 from topleft._raster.fragments import Fragments
 from topleft._raster.lines import draw_wireframe
-from topleft._raster.rasterize import draw_batch, draw_coverage, draw_fragments, draw_overdraw, n_poses
+from topleft._raster.poses import draw_batch, n_poses
+from topleft._raster.rasterize import draw_coverage, draw_fragments, draw_overdraw
 from topleft._raster.view import View, ViewOptions
 from topleft.typing import AlphaOption, BlendOption, DepthTestOption, PerOption, ResolveOption
 
