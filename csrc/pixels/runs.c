@@ -210,7 +210,7 @@ TL_INLINE void load_normals(const shade_runs *s, int slot, run_setup *r)
         vi c[4];
         if (shading->normal_of_corner) {
             const vi at = vi_add(vi_shift_left(vi_load(r->corners[k]), 2), vi_set1(3));
-            if (s->scene->mesh.n_vertices >> 29) /* places of numbers need more than 31 bits */
+            if (s->snapped->mesh.n_vertices >> 29) /* places of numbers need more than 31 bits */
                 vi_load_records(shading->normals, 16, r->corners[k], c);
             else
                 c[3] = vi_gather(vm_all(), (const int32_t *)shading->normals, at);
