@@ -220,8 +220,8 @@ typedef struct tl_kernels {
     void (*color_rows)(const uint8_t *colors, int n_channels, int64_t first, int64_t end, float *rows);
 
     /* Groups of n equal rows of n_words words, in the order of their first rows: the first row of each, and the group
-     * of every row.  `table`: 2^table_bits numbers of -1, more than n.  Returns how many groups there are, or -1 if many
-     * hashes meet. */
+     * of every row.  `table`: 2^table_bits numbers of -1, more than n.  Returns how many groups there are, or -1 where
+     * many hashes meet. */
     int64_t (*group_rows)(const uint32_t *rows, int n_words, int64_t n, int table_bits, int32_t *table, int32_t *first,
                           int32_t *group);
 
