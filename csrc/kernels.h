@@ -219,6 +219,12 @@ typedef struct tl_kernels {
     /* The first three of n_channels of colours [first, end) as float32 (n, 4) and 1. */
     void (*color_rows)(const uint8_t *colors, int n_channels, int64_t first, int64_t end, float *rows);
 
+    /* Groups of n equal rows of n_words words, in the order of their first rows: the first row of each, and the group
+     * of every row.  `table`: 2^table_bits numbers of -1, more than n.  Returns how many groups there are, or -1 where
+     * many hashes meet. */
+    int64_t (*group_rows)(const uint32_t *rows, int n_words, int64_t n, int table_bits, int32_t *table, int32_t *first,
+                          int32_t *group);
+
     /* The boxes of a surface, all but whose nodes are there. */
     void (*build_tree)(tl_surface *surface);
 

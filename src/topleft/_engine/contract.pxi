@@ -256,6 +256,7 @@ cdef extern from "topleft.h" nogil:
     ctypedef struct tl_shading:
         const float *normals
         const int32_t *normal_of_corner
+        const float *corner_normals
         const float *face_normals
         const void *positions
         int is_f64
@@ -445,6 +446,7 @@ cdef extern from "topleft.h" nogil:
         void (*unit_vectors)(const tl_source *, const double *, int64_t, int64_t, double *, float *) noexcept nogil
         void (*move_points)(const tl_source *, const double *, int64_t, int64_t, double *) noexcept nogil
         void (*color_rows)(const uint8_t *, int, int64_t, int64_t, float *) noexcept nogil
+        int64_t (*group_rows)(const uint32_t *, int, int64_t, int, int32_t *, int32_t *, int32_t *) noexcept nogil
         void (*build_tree)(tl_surface *) noexcept nogil
         double (*find_nearest)(const tl_surface *, const double *, int64_t, int64_t, int32_t *, double *) noexcept nogil
         void (*find_reach)(const tl_surface *, const double *, const int32_t *, int64_t, int64_t, double, double, tl_reach *) noexcept nogil
