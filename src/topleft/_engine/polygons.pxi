@@ -1,7 +1,6 @@
 # Polygons of rings: masks, labels and shares of pixels. Included by kernels.pyx, which declares the kernels.
 
 POLYGON_PAD = TL_POLYGON_PAD
-CERTIFY_WORDS = TL_CERTIFY_WORDS
 PIECE_WORDS = TL_PIECE_WORDS
 PIECE_BYTES = sizeof(tl_edge_piece)
 LABEL_SCRATCH_BYTES = sizeof(tl_label_scratch)
@@ -88,6 +87,14 @@ cdef class SnappedPolygons:
         """Make room for what `certify` finds."""
         self.weights, self.is_simple = np.zeros(self.n_rings + 1, np.int8), np.zeros(self.n_polygons + 1, np.uint8)
         self.set.weights, self.set.is_simple = &self.weights[0], &self.is_simple[0]
+
+    def certify_words(self):
+        """Return how many int64 of room `certify` needs."""
+        cdef int64_t most = 1, i, first, end
+        for i in range(self.n_polygons):
+            first, end = self.set.polygons[i], self.set.polygons[i + 1]
+            most = max(most, tl_certify_words(self.set.rings[end] - self.set.rings[first], end - first))
+        return most
 
     def certify(self, int64_t first, int64_t end, int64_t[::1] room):
         """Find out of polygons [first, end) whether their rings meet; without `room` they are trusted not to."""
