@@ -136,7 +136,7 @@ def test_framing_looks_only_at_vertices_in_use():
 
 
 def test_framing_takes_the_corners_of_a_box():
-    assert bounding_sphere([(-1, -1, -1), (1, 1, 1)])[1] == pytest.approx(3**0.5)
+    assert bounding_sphere(np.array([(-1.0, -1, -1), (1, 1, 1)]))[1] == pytest.approx(3**0.5)
 
 
 def test_framing_a_single_point_has_a_picture():

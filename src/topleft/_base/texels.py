@@ -8,7 +8,7 @@ Image Warping", 1989 (the footprint of a pixel from derivatives).
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from topleft._base.arrays import as_array
 from topleft._base.color import decode_srgb
 from topleft._base.options import check_choice
+from topleft.typing import EncodingOption, FilterOption, WrapOption
 
 __all__ = ["as_texels", "look_up"]
 
@@ -50,13 +51,13 @@ def as_texels(texture: object, filter: str, wrap: str | Wraps, encoding: str | N
         filter, wrap = str(texture.filter), texture.wrap  # noqa: A001
         encoding, texture = str(getattr(texture, "encoding", "srgb")), texture.image
     encoding = "linear" if encoding is None else encoding
-    check_choice("filter", filter, ("trilinear", "bilinear", "nearest"))
-    check_choice("encoding", encoding, ("linear", "srgb"))
+    check_choice("filter", filter, get_args(FilterOption))
+    check_choice("encoding", encoding, get_args(EncodingOption))
     wraps = (wrap, wrap) if isinstance(wrap, str) else wrap
     if not isinstance(wraps, tuple | list) or len(wraps) != 2:
         raise ValueError(f"wrap must be one word, or two for u and v, got {wrap!r}")
     for one in wraps:
-        check_choice("wrap", str(one), ("repeat", "clamp", "mirror"))
+        check_choice("wrap", str(one), get_args(WrapOption))
     array = as_array("texture", texture)  # type: ignore[arg-type]
     if array.dtype.kind not in "fiub":
         raise TypeError(f"texture must be a Texture or real numbers, got dtype {array.dtype}")

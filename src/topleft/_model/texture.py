@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from enum import StrEnum
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +19,7 @@ from topleft import _engine
 from topleft._base.arrays import as_array
 from topleft._base.color import LIGHT_OF_SRGB
 from topleft._base.options import parse
+from topleft.typing import EncodingOption, FilterOption, WrapOption
 
 U8 = npt.NDArray[np.uint8]
 U16 = npt.NDArray[np.uint16]
@@ -110,9 +111,9 @@ class Texture:
         def __init__(
             self,
             image: npt.ArrayLike,
-            filter: Literal["trilinear", "bilinear", "nearest"] | str = "trilinear",  # noqa: A002
-            wrap: str | tuple[str, str] = "repeat",
-            encoding: Literal["srgb", "linear"] | str = "srgb",
+            filter: FilterOption = "trilinear",  # noqa: A002
+            wrap: WrapOption | tuple[WrapOption, WrapOption] = "repeat",
+            encoding: EncodingOption = "srgb",
             uv_set: int = 0,
             transform: npt.ArrayLike | None = None,
         ) -> None: ...
@@ -166,6 +167,13 @@ class Texture:
     def __getstate__(self) -> dict[str, Any]:
         """What another process needs: the texels are made there."""
         return {field.name: self.__dict__[field.name] for field in fields(self)}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Take it, the arrays read-only as they were."""
+        for name, value in state.items():
+            self.__dict__[name] = value
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False
 
 
 def as_image(name: str, pixels: npt.ArrayLike) -> U8:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from topleft import _engine
-from topleft._base.arrays import as_array, as_background, as_colors, shown
+from topleft._base.arrays import apart_from, as_array, as_background, as_colors, shown
 from topleft._base.memory import Memory
 from topleft._base.options import Alpha, Blend, Per, Sampling, Sink, parse
 from topleft._base.threads import run_parts
@@ -20,6 +20,7 @@ from topleft._raster.resolve import parse_resolve, resolve_colors, resolve_flat,
 from topleft._raster.sampling import draw_means, sample_positions
 from topleft._raster.snap import Snapped, snap_mesh
 from topleft._raster.view import View
+from topleft.typing import AlphaOption, BlendOption, PerOption, ResolveOption
 
 __all__ = ["Style", "draw_fill"]
 
@@ -30,11 +31,11 @@ BLEND_CODES = {mode: code for code, mode in enumerate(Blend)}  # tl_blend in csr
 class Style:
     """The options of `fill` besides those that all verbs share, not yet checked."""
 
-    per: str
+    per: PerOption
     background: ArrayLike | None
-    blend: str
-    alpha: str
-    resolve: str
+    blend: BlendOption
+    alpha: AlphaOption
+    resolve: ResolveOption
     dtype: DTypeLike | None = None
 
 
@@ -86,6 +87,7 @@ def draw_fill(
         raise ValueError(
             f"sampling {str(view.sampling)!r} gives no order: fill takes 'center', 'msaa2' to 'msaa16' and 'area'"
         )
+    colors = apart_from(out, "colors", colors)
     if style.dtype is not None:
         return draw_labels(memory, vertices, triangles, colors, view, style, out)
     palette = as_colors(colors)

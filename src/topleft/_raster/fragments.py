@@ -11,7 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine
 from topleft._base.arrays import as_array, as_number, as_values, shown
+from topleft._base.memory import empty
 from topleft._base.texels import as_texels, look_up
+from topleft.typing import EncodingOption, FilterOption, WrapOption
 
 __all__ = ["Fragments", "FragmentsBatch", "GivenCorners", "as_sample", "view_of"]
 
@@ -177,9 +179,9 @@ class Fragments:
         texture: object,
         uv: Any,
         *,
-        filter: str = "trilinear",
-        wrap: str | tuple[str, str] = "repeat",
-        encoding: str | None = None,
+        filter: FilterOption = "trilinear",
+        wrap: WrapOption | tuple[WrapOption, WrapOption] = "repeat",
+        encoding: EncodingOption | None = None,
         background: float = 0.0,
     ) -> NDArray[np.float32]: ...
     def sample(
@@ -187,9 +189,9 @@ class Fragments:
         texture: Any,
         uv: Any = None,
         *,
-        filter: str = "trilinear",  # noqa: A002
-        wrap: str | tuple[str, str] = "repeat",
-        encoding: str | None = None,
+        filter: FilterOption = "trilinear",  # noqa: A002
+        wrap: WrapOption | tuple[WrapOption, WrapOption] = "repeat",
+        encoding: EncodingOption | None = None,
         background: float = 0.0,
     ) -> Any:
         """Return a texture at each visible pixel; or, of a number alone, the fragments at that sample of each pixel.
@@ -238,9 +240,9 @@ class Fragments:
         """
         if uv is None:
             return self._at_sample(texture)
-        texels, filter, wraps, is_flat = as_texels(texture, filter, wrap, encoding)  # noqa: A001
+        texels, how, wraps, is_flat = as_texels(texture, filter, wrap, encoding)
         mask = self.mask
-        if filter == "trilinear":
+        if how == "trilinear":
             found, slopes = self.interpolate(uv, derivatives=True)
         else:
             found, slopes = self.interpolate(uv), None
@@ -248,7 +250,7 @@ class Fragments:
             raise ValueError(f"uv must have two columns, (V, 2) or (T, 3, 2), got {found.shape[2:] or 'one'}")
         out = np.full((*mask.shape, texels.shape[2]), as_number("background", background), np.float32)
         footprint = None if slopes is None else slopes[mask].astype(np.float64)
-        out[mask] = look_up(texels, found[mask].astype(np.float64), footprint, filter, wraps)
+        out[mask] = look_up(texels, found[mask].astype(np.float64), footprint, how, wraps)
         return out[..., 0] if is_flat else out
 
     def _at_sample(self, i: int) -> Fragments:
@@ -322,8 +324,8 @@ class Fragments:
         >>> frags.barycentric()[0, 0]
         array([0.5 , 0.25, 0.25], dtype=float32)
         """
-        out = np.empty((*self.triangle.shape, 3), np.float32)
-        self._snapped.with_inverse_w(self.id.size).barycentric(self._ids(), out)
+        out = empty((*self.triangle.shape, 3), np.float32)
+        self._snapped.with_inverse_w(self.id.size, empty).barycentric(self._ids(), out)
         return out
 
     @overload
@@ -377,9 +379,9 @@ class Fragments:
     def _interpolated(self, array: NDArray[np.float32], background: float) -> NDArray[np.float32]:
         """The attribute of checked values."""
         channels = array.shape[-1] if array.ndim > 1 else 1
-        out: NDArray[Any] = np.empty((*self.triangle.shape, channels), np.float32)
+        out: NDArray[Any] = empty((*self.triangle.shape, channels), np.float32)
         rows = array.reshape(-1, channels) if array.size else np.empty((0, channels), np.float32)
-        snapped = self._snapped.with_inverse_w(self.id.size)
+        snapped = self._snapped.with_inverse_w(self.id.size, empty)
         snapped.interpolate(self._ids(), rows, array.ndim == 3, background, out)
         return out if array.ndim > 1 else out[..., 0]
 

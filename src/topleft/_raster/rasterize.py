@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine
 from topleft._base.arrays import as_array, as_number, as_out
-from topleft._base.memory import FRESH, Memory
+from topleft._base.memory import FRESH, Memory, empty
 from topleft._base.options import DepthTest, Sampling, Sink, parse
 from topleft._base.threads import available_threads, count_threads, run_parts
 from topleft._raster import choices
@@ -26,6 +26,7 @@ from topleft._raster.fragments import Fragments, FragmentsBatch, GivenCorners
 from topleft._raster.sampling import draw_planes, sample_positions, sum_areas
 from topleft._raster.snap import Snapped, snap_mesh
 from topleft._raster.view import View, ViewOptions
+from topleft.typing import DepthTestOption
 
 __all__ = ["canvas_of", "draw", "draw_all_samples", "draw_coverage", "draw_fragments", "draw_overdraw"]
 
@@ -108,7 +109,7 @@ def open_canvas(
 ) -> tuple[NDArray[Any], NDArray[Any]]:
     """Return the array to return, and a contiguous aligned one: the same wherever that one is."""
     result = memory.empty(name, shape, dtype) if out is None else as_out("out", out, shape, dtype)
-    return result, result if result.flags.carray else np.empty(shape, dtype)
+    return result, result if result.flags.carray else empty(shape, dtype)
 
 
 def draw_area(
@@ -223,7 +224,7 @@ def draw_fragments(
     vertices: ArrayLike,
     triangles: ArrayLike,
     view: View,
-    depth_test: str | None,
+    depth_test: DepthTestOption | None,
     background_depth: float | None,
     out: object,
 ) -> Fragments:
@@ -265,7 +266,7 @@ def draw_batch(
     triangles: ArrayLike,
     size: object,
     options: ViewOptions,
-    depth_test: str | None,
+    depth_test: DepthTestOption | None,
     background_depth: float | None,
     out: object,
 ) -> FragmentsBatch:
@@ -283,9 +284,9 @@ def draw_batch(
     if view.plan is not None:
         raise ValueError("plan is for one pose: a batch takes none")
     shape = (n, *view.size[::-1])
-    ids = np.empty(shape, np.int32) if asked.ids_out is None else as_out("out triangle", asked.ids_out, shape, np.int32)
+    ids = empty(shape, np.int32) if asked.ids_out is None else as_out("out triangle", asked.ids_out, shape, np.int32)
     planes = asked.depth_out
-    depth = np.empty(shape, np.float32) if planes is None else as_out("out depth", planes, shape, np.float32)
+    depth = empty(shape, np.float32) if planes is None else as_out("out depth", planes, shape, np.float32)
     points = as_array("vertices", vertices)
     matrices = None if view.transform is None else as_array("transform", view.transform)
     n_threads = min(n, available_threads() if view.threads is None else view.threads)

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine
-from topleft._base.arrays import as_matrix, as_triangles, as_vertices, bad_triangle
-from topleft._base.memory import Memory
+from topleft._base.arrays import apart_from, as_matrix, as_triangles, as_vertices, bad_triangle
+from topleft._base.memory import Memory, empty
 from topleft._base.threads import run_parts
 from topleft._raster import choices
 from topleft._raster.view import View
@@ -79,6 +79,7 @@ def snap_mesh(
     IndexError
         If a triangle names a vertex that does not exist, and indices are checked here.
     """
+    vertices, triangles = apart_from(out, "vertices", vertices), apart_from(out, "triangles", triangles)
     points, source = transform(vertices, view)
     indices, bad_row = index(memory, triangles, len(points), view)
     view.mark("input")
@@ -161,7 +162,7 @@ def snap(
     counts = run_parts(snap_part, n, choices.threads_to_snap(view.threads, n, n_triangles))
     n_bad, n_wide, n_clipped = map(sum, zip(*counts, strict=True))
     if n_wide:
-        wide = np.empty((n, 2), np.int64)
+        wide = empty((n, 2), np.int64)
         snap_part(0, n)
     return Vertices(records, wide, n_bad, n_clipped)
 
@@ -170,7 +171,7 @@ def without_sides(
     mesh: _engine.SnappedMesh, triangles: NDArray[np.int32], is_single: NDArray[np.uint8], threads: int | None
 ) -> NDArray[np.int32]:
     """Return triangles, those collapsed that are single-sided and turned the way that the mesh culls."""
-    left = np.empty_like(triangles)
+    left: NDArray[np.int32] = empty(triangles.shape, np.int32)
     n_parts = choices.threads_to_convert(threads, len(triangles))
     run_parts(lambda first, end: mesh.drop_sides(is_single, first, end, left), len(triangles), n_parts)
     return left

@@ -16,19 +16,21 @@ import numpy.typing as npt
 from numpy.typing import NDArray
 
 from topleft._base.arrays import as_array, shown
+from topleft._base.memory import empty
 from topleft._camera.camera import Camera
 from topleft._model.mesh import Mesh
-from topleft._model.scene import Instance, Scene
 from topleft._raster.fragments import Fragments, Viewer, as_sample, view_of
 from topleft._raster.peel import DepthLayers
 from topleft._render.bend import BentMesh
+from topleft._scene.scene import Instance, Scene
+from topleft._scene.subject import meshes_of
 
 if TYPE_CHECKING:
     from topleft._render.instances import PlacedScene
 
 __all__ = [
     "BentFragments", "Part", "SceneDepthLayers", "SceneFragments", "VisiblePart", "camera_of", "drawn_of", "join",
-    "meshes_of", "parts_of", "scene_of",
+    "parts_of",
 ]  # fmt: skip
 
 WHOLE = slice(None), slice(None)
@@ -89,7 +91,7 @@ def join(
     """A picture made part by part; what is made of a part that is all of it is returned, not copied."""
     if len(parts) == 1 and parts[0].box == WHOLE:
         return make(parts[0])
-    picture = np.empty(shape, dtype)
+    picture = empty(shape, dtype)
     picture[...] = background
     for part in parts:
         picture[part.box][part.seen] = make(part)[part.seen]
@@ -99,16 +101,6 @@ def join(
 def drawn_of(frags: Fragments, mesh: Mesh) -> tuple[Fragments, Mesh]:
     """The fragments and the mesh as they were drawn: through a lens those of its parts."""
     return (frags.drawn, frags.bent.mesh_of(mesh)) if isinstance(frags, BentFragments) else (frags, mesh)
-
-
-def meshes_of(subject: Mesh | Scene) -> list[Mesh]:
-    """The mesh of each instance."""
-    return [subject] if isinstance(subject, Mesh) else [instance.mesh for instance in subject]
-
-
-def scene_of(subject: Mesh | Scene) -> Scene:
-    """The scene, or that of a mesh alone."""
-    return subject if isinstance(subject, Scene) else Scene([subject])
 
 
 def camera_of(camera: Camera, instance: Instance) -> Camera:

@@ -17,8 +17,13 @@ targets.py    finds which picture goes to which file, before anything is drawn
 from __future__ import annotations
 
 import argparse
+import signal
 import sys
-from collections.abc import Mapping, Sequence
+import threading
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import NoReturn
 
 from topleft._engine.isa import build_info
 from topleft._io.notes import listening
@@ -39,7 +44,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.print_help()
         return 0
     try:
-        with listening() as lacks:
+        with warnings.catch_warnings(), listening() as lacks, hearing_sigterm():
+            warnings.simplefilter("ignore", RuntimeWarning)  # of NumPy, for numbers that overflow: lines of its own
             status: int = options.run(options)
         complain_of_lacks(lacks)
     except (TopleftError, OSError, ValueError, MemoryError) as error:
@@ -48,7 +54,36 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         complain("interrupted")
         return 130
+    except Terminated:
+        complain("terminated")
+        return 143
+    except RuntimeError as error:
+        if type(error).__name__ != "BrokenProcessPool":  # whose module is not imported for one mesh
+            raise
+        complain("a process that draws was killed, maybe for want of memory: try fewer --jobs, then --resume")
+        return FAILED
     return status
+
+
+class Terminated(BaseException):
+    """SIGTERM: like Ctrl-C it ends what goes on, and processes and temporary files with it."""
+
+
+@contextmanager
+def hearing_sigterm() -> Iterator[None]:
+    """Raise `Terminated` on SIGTERM meanwhile, in the main thread, which alone may say so."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def end(*_: object) -> NoReturn:
+        raise Terminated
+
+    before = signal.signal(signal.SIGTERM, end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def run_info(_: argparse.Namespace) -> int:
