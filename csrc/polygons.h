@@ -23,6 +23,7 @@ typedef struct {
     int bits;
     int is_nonzero;                   /* the rule: winding other than 0 instead of odd */
     int32_t sample_x_fx, sample_y_fx; /* the sample from the pixel's centre */
+    struct tl_pause *pause;           /* of this call, or NULL: what has begun is drawn to its end */
 } tl_polygons;
 
 /* The pixels [left, right) x [top, bottom) that a polygon reaches into, cut off at the window. */

@@ -367,6 +367,8 @@ static int64_t share_polygons(const tl_polygons *p, const tl_share_job *job)
         const int64_t top = box->top > job->top ? box->top : job->top,
                       bottom = box->bottom < job->bottom ? box->bottom : job->bottom;
         out.polygon = polygon;
+        if (is_polygon_given_up(p, (int64_t)(box->bottom - box->top) * (box->right - box->left)))
+            return i - job->first;
         if (!job->is_alone && fits_stack(p, job, polygon)) {
             const int64_t n = share_stack(&s, p, &out, i);
             if (n == 0)

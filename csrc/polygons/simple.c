@@ -474,6 +474,8 @@ static int is_free(simple_search *s, const chain_node *a)
         return 1;
     if (a->left < 0)
         return are_leaves_apart(s, a, a);
+    if (is_polygon_given_up(s->p, 256))
+        return 0;
     return is_free(s, s->nodes + a->left) && is_free(s, s->nodes + a->right) &&
            are_apart(s, s->nodes + a->left, s->nodes + a->right);
 }
@@ -549,7 +551,7 @@ TL_INLINE int is_simple(const tl_polygons *p, int is_wide, int64_t polygon, int8
 static void certify_polygons(const tl_polygons *p, int64_t first, int64_t end, int8_t *weights, uint8_t *is_simple_out,
                              int64_t *room)
 {
-    for (int64_t i = first; i < end; i++)
+    for (int64_t i = first; i < end && !is_polygon_given_up(p, 64); i++)
         is_simple_out[i] =
             (uint8_t)(p->is_wide[i] ? is_simple(p, 1, i, weights, room) : is_simple(p, 0, i, weights, room));
 }
