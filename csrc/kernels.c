@@ -10,7 +10,7 @@
 #include "clusters/cluster_view.c"
 #include "raster/raster.c"
 #include "raster/bin.c"
-#include "raster/sides.c"
+#include "raster/setup.c"
 #include "area/area.c"
 #include "pixels/weights_one.c"
 #include "pixels/weights.c"
@@ -18,6 +18,8 @@
 #include "pixels/resolve.c"
 #include "pixels/points.c"
 #include "pixels/planes.c"
+#include "pixels/slopes.c"
+#include "pixels/texels.c"
 #include "pixels/composite.c"
 #include "points/cloud.c"
 #include "lines/edges.c"
@@ -35,6 +37,8 @@
 #include "polygons/mask.c"
 #include "polygons/labels.c"
 #include "polygons/shares.c"
+#include "tiles/spans.c"
+#include "tiles/merge.c"
 
 #ifndef TL_KERNELS /* read by itself, as an editor does */
 #define TL_ISA_NAME "none"
@@ -71,6 +75,9 @@ const tl_kernels TL_KERNELS = {
     .draw_lines = draw_lines,
     .draw_cloud = draw_cloud,
     .composite = composite,
+    .fill_slopes = fill_slopes,
+    .fill_texels = fill_texels,
+    .halve_rows = halve_rows,
     .set_inverse_w = set_inverse_w,
     .shade = shade,
     .shade_normals = shade_normals,
@@ -105,4 +112,7 @@ const tl_kernels TL_KERNELS = {
     .mask_nonzero = mask_nonzero,
     .label_polygons = label_polygons,
     .share_polygons = share_polygons,
+    .list_spans = list_spans,
+    .merge_fragments = merge_fragments,
+    .name_triangles = name_triangles,
 };

@@ -32,8 +32,9 @@ from topleft._polygons.overlap import Overlap, overlap
 from topleft._polygons.polygons import polygons
 from topleft._raster.classic import bresenham_line
 from topleft._raster.composite import composite
-from topleft._raster.fragments import Fragments, FragmentsBatch
+from topleft._raster.fragments import Fragments
 from topleft._raster.peel import DepthLayers, peel
+from topleft._raster.poses import FragmentsBatch
 from topleft._raster.verbs import Rasterizer, coverage, fill, overdraw, rasterize, wireframe
 from topleft._render.fragments import SceneDepthLayers, SceneFragments
 from topleft._render.render import rasterize_mesh, render
@@ -49,15 +50,21 @@ if TYPE_CHECKING:
     from topleft._diagram.pixel_grid import pixel_grid
     from topleft._render.transparent import render_transparent, visible_layers
     from topleft._render.view_layers import ViewLayers, render_layers
+    from topleft._tiles.merge import merge
+    from topleft._tiles.tiles import Tiles, Window, tiles
 
 # What most programs do without is imported when it is asked for: a third of the time that the package takes.
 _LATE = {
     "Job": "topleft._batch.jobs",
+    "Tiles": "topleft._tiles.tiles",
     "ViewLayers": "topleft._render.view_layers",
+    "Window": "topleft._tiles.tiles",
+    "merge": "topleft._tiles.merge",
     "pixel_grid": "topleft._diagram.pixel_grid",
     "render_batch": "topleft._batch.batch",
     "render_layers": "topleft._render.view_layers",
     "render_transparent": "topleft._render.transparent",
+    "tiles": "topleft._tiles.tiles",
     "visible_layers": "topleft._render.transparent",
 }
 
@@ -94,8 +101,10 @@ __all__ = [
     "SceneDepthLayers",
     "SceneFragments",
     "Texture",
+    "Tiles",
     "TopleftError",
     "ViewLayers",
+    "Window",
     "__version__",
     "as_mesh",
     "bresenham_line",
@@ -108,6 +117,7 @@ __all__ = [
     "height_map",
     "load",
     "load_cameras",
+    "merge",
     "overdraw",
     "overlap",
     "peel",
@@ -127,6 +137,7 @@ __all__ = [
     "shade",
     "silhouette",
     "simplify",
+    "tiles",
     "turntable",
     "viewpoints",
     "visible_layers",

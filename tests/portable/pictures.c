@@ -73,7 +73,7 @@ static void make_buffers(void)
 
 /* ---- what is drawn of a scene --------------------------------------------------------------------------- */
 
-static void draw(const tl_scene *scene, const tl_window *window, tl_target target, const char *name, const char *what,
+static void draw(const tl_snapped *scene, const tl_window *window, tl_target target, const char *name, const char *what,
                  int with_depth)
 {
     tl_share share = {.end = scene->n_triangles, .is_first = 1, .is_last = 1};
@@ -91,7 +91,7 @@ static void draw(const tl_scene *scene, const tl_window *window, tl_target targe
     }
 }
 
-static void draw_all(tl_scene *scene, tl_window *window, const char *name)
+static void draw_all(tl_snapped *scene, tl_window *window, const char *name)
 {
     static const char *const METHODS[] = {"auto", "edge", "scanline"};
     static const int32_t GRID[4][2] = {{-32, -96}, {96, -32}, {-96, 32}, {32, 96}};
@@ -113,7 +113,7 @@ static void draw_all(tl_scene *scene, tl_window *window, const char *name)
     window->test = TL_TEST_SAMPLE;
 }
 
-static void draw_values(const tl_scene *scene, const tl_window *window, const char *name)
+static void draw_values(const tl_snapped *scene, const tl_window *window, const char *name)
 {
     const tl_share whole = {.end = scene->n_triangles, .is_first = 1, .is_last = 1};
     tl_share share = whole;
@@ -180,7 +180,7 @@ static void draw_scene(const char *name, const tl_source *source, const tl_view 
     }
     tell(name, "vertices", vertices, (size_t)source->n * sizeof *vertices);
 
-    tl_scene scene = {
+    tl_snapped scene = {
         .mesh = {.vertices = vertices, .wide = wide, .source = view ? source : NULL, .n_vertices = source->n},
         .triangles = triangles,
         .n_triangles = n_triangles,

@@ -13,49 +13,13 @@ import numpy as np
 
 import topleft as tl
 from topleft._render.layers import LAYERS
+from topleft.testing import HARD_SCENES, SIZE, hard_scenes, words_of
 
-SIZE = (61, 47)
 FILE = pathlib.Path(__file__).with_name("golden.json")
 SAMPLINGS = ("center", "msaa2", "msaa4", "msaa8", "msaa16")
-SEEDS = range(5)
-
-#: Kinds of scenes: the extent of triangles in pixels, and how many there are.
-PIXEL_SCENES = {
-    "dust": (0.7, 900),
-    "small": (3.0, 400),
-    "middle": (12.0, 120),
-    "large": (70.0, 40),
-    "huge": (1e5, 20),
-    "wide": (1e12, 12),
-}
-CLIP_SCENES = {"near": (0.5, 60), "cut": (2.0, 40), "behind": (8.0, 30)}
-LATTICE = ("lattice", "shared", "slivers")
 
 VIEW = np.array([[1.0, 0, 0, 0], [0, 0.75, 0.5, 0], [0, -0.5, 0.75, -3], [0, 0, 0, 1]])
 PROJECTION = np.array([[1.5, 0, 0, 0], [0, 2.0, 0, 0], [0, 0, -1.5, -1.0], [0, 0, -1, 0]])
-
-
-def scenes(kind: str) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Yield vertices and triangles of the scenes of a kind."""
-    for seed in SEEDS:
-        rng = np.random.default_rng([len(kind), ord(kind[0]), seed])
-        if kind in PIXEL_SCENES:
-            extent, n = PIXEL_SCENES[kind]
-            corners = rng.random((n, 1, 3)) * [*SIZE, 1] + (rng.random((n, 3, 3)) - 0.5) * [extent, extent, 1]
-            yield corners.reshape(-1, 3), np.arange(3 * n).reshape(-1, 3)
-        elif kind in CLIP_SCENES:
-            extent, n = CLIP_SCENES[kind]
-            corners = (rng.random((3 * n, 4)) - [0.5, 0.5, 0.5, 0.3]) * [2 * extent, 2 * extent, 2, 1]
-            yield corners, np.arange(3 * n).reshape(-1, 3)
-        elif kind == "lattice":  # vertices on centres and sides of pixels: every tie there is
-            vertices = rng.integers(-4, 2 * np.array([*SIZE, 2]), (200, 3)) / 2
-            yield vertices, rng.integers(0, 200, (150, 3))
-        elif kind == "shared":
-            yield rng.random((40, 3)).astype(np.float32) * np.float32(60), rng.integers(0, 40, (200, 3))
-        else:
-            ends = rng.random((80, 2, 3)) * [*SIZE, 1]
-            corners = np.concatenate([ends, ends[:, :1] + [0.01, 0.02, 0]], axis=1)
-            yield corners.reshape(-1, 3), np.arange(240).reshape(-1, 3)
 
 
 def buffers(vertices: np.ndarray, triangles: np.ndarray, threads: int) -> Iterator[tuple[str, np.ndarray]]:
@@ -111,21 +75,14 @@ def layers(threads: int) -> Iterator[tuple[str, np.ndarray]]:
 def hashes(threads: int = 1) -> dict[str, dict[str, str]]:
     """Return the hashes, by the kind of the scenes and the name of the buffer."""
     found: dict[str, dict[str, str]] = {}
-    for kind in (*PIXEL_SCENES, *CLIP_SCENES, *LATTICE):
+    for kind in HARD_SCENES:
         sums: dict[str, hashlib._Hash] = {}
-        for vertices, triangles in scenes(kind):
+        for vertices, triangles in hard_scenes(kind):
             for name, buffer in buffers(vertices, triangles, threads):
                 sums.setdefault(name, hashlib.sha256()).update(words_of(buffer))
         found[kind] = {name: each.hexdigest()[:12] for name, each in sums.items()}
     found["octahedron"] = {name: hashlib.sha256(words_of(buffer)).hexdigest()[:12] for name, buffer in layers(threads)}
     return found
-
-
-def words_of(buffer: np.ndarray) -> bytes:
-    """Return dtype, shape and contents; all NaN as one, for their bits are the CPU's."""
-    if buffer.dtype.kind == "f":
-        buffer = np.where(np.isnan(buffer), buffer.dtype.type(np.nan), buffer)
-    return f"{buffer.dtype.str} {buffer.shape} ".encode() + np.ascontiguousarray(buffer).tobytes()
 
 
 if __name__ == "__main__":

@@ -227,7 +227,7 @@ class Camera:
         Parameters
         ----------
         view : (4, 4) array_like
-            Eye from world; `view_matrix` makes one.
+            Eye from world; the `view` of another camera, say.
         near, far : float
             Distances of the planes in front of the eye, world units, 0 < near < far.
         fov_y_deg : float
@@ -238,7 +238,7 @@ class Camera:
         ValueError
             If the field of view or the planes are outside their range.
         """
-        return cls(as_square("view", view, 4), perspective_matrix(fov_y_deg, near, far), aspect=1.0)
+        return cls(view, perspective_matrix(fov_y_deg, near, far), aspect=1.0)
 
     @classmethod
     def orthographic(cls, view: npt.ArrayLike, *, near: float, far: float, height: float) -> Camera:
@@ -247,7 +247,7 @@ class Camera:
         Parameters
         ----------
         view : (4, 4) array_like
-            Eye from world; `view_matrix` makes one.
+            Eye from world; the `view` of another camera, say.
         near, far : float
             Distances of the planes in front of the eye, world units, near < far; negative ones lie behind it.
         height : float
@@ -258,7 +258,7 @@ class Camera:
         ValueError
             If the height or the planes are outside their range.
         """
-        return cls(as_square("view", view, 4), orthographic_matrix(height, near, far), aspect=1.0)
+        return cls(view, orthographic_matrix(height, near, far), aspect=1.0)
 
     @classmethod
     def off_center(
@@ -278,7 +278,7 @@ class Camera:
         Parameters
         ----------
         view : (4, 4) array_like
-            Eye from world; `view_matrix` makes one.
+            Eye from world; the `view` of another camera, say.
         left, right, bottom, top : float
             Sides of the picture in the plane at `near`, world units from the axis, as for glFrustum and glOrtho. A
             picture of another shape is stretched.
@@ -293,7 +293,7 @@ class Camera:
             If the sides or the planes are out of order.
         """
         matrix = (box_matrix if ortho else frustum_matrix)(left, right, bottom, top, near, far)
-        return cls(as_square("view", view, 4), matrix)
+        return cls(view, matrix)
 
     @classmethod
     def look_at(
@@ -327,8 +327,9 @@ class Camera:
         ValueError
             If eye and target coincide, `up` is parallel to the view, or another number is outside its range.
         """
+        eye, target, up = as_vector("eye", eye), as_vector("target", target), as_vector("up", up)
         view = view_matrix(eye, target, up)
-        distance = float(np.linalg.norm(as_vector("target", target) - as_vector("eye", eye)))
+        distance = float(np.linalg.norm(target - eye))
         near = 0.01 * distance if near is None else near
         far = 100 * distance if far is None else far
         if ortho_height is not None:

@@ -189,7 +189,7 @@ def _middle(axis: F64, z: F64, tan: float, distance: float) -> float:
     return place
 
 
-def view_matrix(eye: npt.ArrayLike, target: npt.ArrayLike, up: npt.ArrayLike = (0.0, 1.0, 0.0)) -> F64:
+def view_matrix(eye: F64, target: F64, up: F64) -> F64:
     """Eye from world (4, 4) float64, for a camera at `eye` that looks at `target`.
 
     Raises
@@ -197,7 +197,6 @@ def view_matrix(eye: npt.ArrayLike, target: npt.ArrayLike, up: npt.ArrayLike = (
     ValueError
         If eye and target coincide, or if `up` is zero or parallel to the view.
     """
-    eye, target, up = as_vector("eye", eye), as_vector("target", target), as_vector("up", up)
     forward = target - eye
     distance = np.linalg.norm(forward)
     if distance == 0:

@@ -11,7 +11,7 @@ cdef inline tl_share no_share() noexcept nogil:
 cdef class SnappedMesh:
     """Snapped vertices and triangles, ready to be drawn or resolved; keeps what it points to alive."""
 
-    cdef tl_scene snapped
+    cdef tl_snapped snapped
     cdef int64_t x_px, y_px
     cdef readonly int subpixel_bits
     cdef tl_test test

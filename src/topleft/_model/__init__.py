@@ -2,7 +2,7 @@
 
 environment.py  defines `Environment`: light from all around, with its blurred levels
 from_trimesh.py  makes a `Mesh` of a geometry of trimesh, with its material
-joined.py    joins meshes to one
+joined.py    places the parts of a mesh and joins them to one
 light.py     defines `Light` and `Fog`
 material.py  defines `Material`: what a surface is made of
 mesh.py      defines `Mesh`: vertices, triangles and their attributes, checked once

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._base.color import Color, encode_srgb
+from topleft._model.joined import placed_arrays
 from topleft._model.material import Material
 from topleft._model.mesh import Mesh
 from topleft._model.texture import Texture
@@ -42,14 +43,7 @@ def placed(geometry: Any, transform: npt.NDArray[np.float64]) -> Mesh:
         vertices = vertices[triangles.ravel()]
         normals = None if normals is None else normals[triangles.ravel()]
         triangles = np.arange(triangles.size).reshape(-1, 3)
-    if not np.array_equal(transform, np.eye(4)):
-        linear = transform[:3, :3]
-        vertices = vertices @ linear.T + transform[:3, 3]
-        if np.linalg.det(linear) < 0:  # a mirror turns the triangles over
-            triangles = triangles[:, ::-1]
-        if normals is not None:
-            normals = normals @ np.linalg.pinv(linear)
-    return Mesh(vertices, triangles, normals, colors, uv, materials)
+    return Mesh(*placed_arrays(vertices, triangles, normals, transform), colors, uv, materials)
 
 
 def material_of(source: Any) -> Material | None:

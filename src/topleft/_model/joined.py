@@ -1,6 +1,6 @@
-"""Joins meshes to one: vertices that are equal become one where no normals are given.
+"""Places the parts of a mesh, and joins them to one: vertices that are equal become one where no normals are given.
 
-Input: `Mesh` parts. Output: `Mesh`, with the attributes and materials of all of them.
+Input: arrays and their place; `Mesh` parts. Output: arrays; `Mesh`, with the attributes and materials of all of them.
 """
 
 from __future__ import annotations
@@ -15,7 +15,22 @@ from topleft._model.material import Material
 from topleft._model.mesh import NO_CREASE, Mesh, coincident, with_normals
 from topleft._model.normals import angle_weighted_normals
 
-__all__ = ["joined"]
+__all__ = ["joined", "placed_arrays"]
+
+Array = npt.NDArray[Any]
+
+
+def placed_arrays(
+    vertices: Array, triangles: Array, normals: Array | None, transform: npt.NDArray[np.float64]
+) -> tuple[Array, Array, Array | None]:
+    """Vertices, triangles and normals, placed by a matrix (4, 4); they are themselves where it does nothing."""
+    if np.array_equal(transform, np.eye(4)):
+        return vertices, triangles, normals
+    linear = transform[:3, :3]
+    if np.linalg.det(linear) < 0:  # a mirror turns the triangles over
+        triangles = triangles[:, ::-1]
+    normals = None if normals is None else normals @ np.linalg.pinv(linear)
+    return vertices @ linear.T + transform[:3, 3], triangles, normals
 
 
 def joined(parts: list[Mesh], crease: float = NO_CREASE) -> Mesh:

@@ -19,6 +19,7 @@ from topleft import _engine
 from topleft._base.arrays import as_array
 from topleft._base.color import LIGHT_OF_SRGB
 from topleft._base.options import parse
+from topleft._base.texels import MOST_KEPT_BYTES, ValueLevels, as_light, levels_of
 from topleft.typing import EncodingOption, FilterOption, WrapOption
 
 U8 = npt.NDArray[np.uint8]
@@ -159,6 +160,16 @@ class Texture:
             texels, table, filter_code, wrap_u, wrap_v, self.uv_set, rows_of_transform, (d * hand, -c * hand), hand
         )
 
+    def value_levels(self) -> ValueLevels:
+        """Light and opacity as float32, and their halvings; made when they are first needed, and kept unless large."""
+        found: ValueLevels | None = self.__dict__.get("_value_levels")
+        if found is None:
+            wrap_u, wrap_v = map(str, self.wrap)
+            found = levels_of(as_light(self.image, str(self.encoding)), str(self.filter), (wrap_u, wrap_v))
+            if found.texels.nbytes <= MOST_KEPT_BYTES:
+                self.__dict__["_value_levels"] = found
+        return found
+
     @cached_property
     def has_alpha(self) -> bool:
         """Whether some of it is not opaque."""
@@ -295,21 +306,8 @@ class RowAreas:
         return np.diff(area, axis=0) * (self.m / self.n)
 
 
-def light_of_image(rgba: U8, encoding: str = "srgb") -> F64:
-    """Linear light and opacity (H, W, 4) float64, 0 to 1, of a picture."""
-    light = np.empty(rgba.shape)
-    light[..., :3] = LIGHT_OF_BYTE[Encoding(encoding)][rgba[..., :3]]
-    light[..., 3] = rgba[..., 3] / 255
-    return light
-
-
-def halved(level: F64) -> F64:
-    """The next halving (max(1, H // 2), max(1, W // 2), 4): each texel the mean over its area."""
-    return halved_along(halved_along(level, 0), 1)
-
-
 def halved_along(level: F64, axis: int) -> F64:
-    """One axis of it."""
+    """One axis of the next halving (max(1, H // 2), max(1, W // 2), 4): each texel the mean over its area."""
     n = level.shape[axis]
     if n % 2 == 0:
         even, odd = (level[::2], level[1::2]) if axis == 0 else (level[:, ::2], level[:, 1::2])

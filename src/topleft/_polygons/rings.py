@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from topleft._base.arrays import apart_from, as_array
+
 __all__ = ["RingSet", "as_rings", "rings_of_triangles"]
 
 I64 = npt.NDArray[np.int64]
@@ -29,6 +31,13 @@ class RingSet:
     def __len__(self) -> int:
         return len(self.polygons) - 1
 
+    def apart_from(self, out: object) -> RingSet:
+        """Return it with copies of what `out` may share memory with."""
+        points, rings, polygons = (
+            np.asarray(apart_from(out, "rings", each)) for each in (self.points, self.rings, self.polygons)
+        )
+        return RingSet(points, rings, polygons)
+
 
 def as_rings(values: Any) -> RingSet:
     """Return polygons as points and offsets.
@@ -42,6 +51,7 @@ def as_rings(values: Any) -> RingSet:
     """
     if isinstance(values, RingSet):
         return values
+    values = _without_tensors(values)
     found = _from_offsets(values)
     if found is None:
         found = _from_shapely(values)
@@ -60,10 +70,7 @@ def rings_of_triangles(points: npt.NDArray[Any], triangles: npt.NDArray[np.int32
 
 def as_points(values: Any, name: str) -> npt.NDArray[Any]:
     """Return (N, 2) points as a contiguous float32, float64 or int64 array."""
-    try:
-        array = np.asarray(values)
-    except ValueError as error:
-        raise ValueError(f"{name} must be array_like, got rows of different lengths ({error})") from None
+    array = as_array(name, values)
     if array.size == 0:
         return np.empty((0, 2))
     if array.dtype.kind not in "fiu":
@@ -76,6 +83,27 @@ def as_points(values: Any, name: str) -> npt.NDArray[Any]:
     dtype = np.int64 if array.dtype.kind in "iu" else np.float32 if single else np.float64
     array = np.ascontiguousarray(array, dtype)
     return array if array.flags.aligned else array.copy()
+
+
+def _without_tensors(values: Any) -> Any:
+    """Return arrays of other libraries as NumPy's, by themselves or in lists, as the first elements tell."""
+    if _is_tensor(values):
+        return as_array("rings", values)
+    if isinstance(values, (list, tuple)) and _has_tensors(values):
+        return [*map(_without_tensors, values)] if isinstance(values, list) else (*map(_without_tensors, values),)
+    return values
+
+
+def _is_tensor(value: Any) -> bool:
+    if isinstance(value, (np.ndarray, np.generic)) or hasattr(value, "to_numpy") or hasattr(value, "__geo_interface__"):
+        return False
+    return hasattr(value, "__dlpack__") or hasattr(value, "__array__")
+
+
+def _has_tensors(values: Any) -> bool:
+    if isinstance(values, (list, tuple)):
+        return bool(len(values)) and _has_tensors(values[0])
+    return _is_tensor(values)
 
 
 def _from_offsets(values: Any) -> RingSet | None:
@@ -94,7 +122,7 @@ def _from_offsets(values: Any) -> RingSet | None:
 
 
 def _as_offsets(values: Any, name: str, n: int, of: str) -> I64:
-    offsets = np.asarray(values)
+    offsets = as_array(name, values)
     if offsets.dtype.kind not in "iu":
         raise TypeError(f"{name} must be integers, got dtype {offsets.dtype}")
     if offsets.ndim != 1 or len(offsets) < 1:

@@ -79,8 +79,8 @@ def snap_mesh(
     IndexError
         If a triangle names a vertex that does not exist, and indices are checked here.
     """
-    vertices, triangles = apart_from(out, "vertices", vertices), apart_from(out, "triangles", triangles)
-    points, source = transform(vertices, view)
+    points, source = transform(vertices, view, out)
+    triangles = apart_from(out, "triangles", triangles)
     indices, bad_row = index(memory, triangles, len(points), view)
     view.mark("input")
     n = len(points) if len(indices) and 0 not in view.size else 0
@@ -110,9 +110,9 @@ def snap_mesh(
     return Snapped(mesh, indices, triangles, points, source, records, pieces)
 
 
-def transform(vertices: ArrayLike, view: View) -> tuple[NDArray[Any], _engine.Source]:
+def transform(vertices: ArrayLike, view: View, out: object = None) -> tuple[NDArray[Any], _engine.Source]:
     """Return vertices as a contiguous array, and the same with the matrix that the snap applies to each of them."""
-    points = as_vertices(vertices, has_transform=view.transform is not None)
+    points = as_vertices(apart_from(out, "vertices", vertices), has_transform=view.transform is not None)
     if view.transform is None:
         return points, _engine.Source(points)
     matrix = as_matrix(view.transform, points.dtype)

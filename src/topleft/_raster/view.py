@@ -37,8 +37,9 @@ class Planned(Protocol):
     def find_clusters(self, vertices: ArrayLike) -> Clusters | None:
         """Return vertices and triangles in clusters, if the plan is for a mesh that does not change and has these."""
 
-    def mark(self, stage: str) -> None:
-        """Note that a stage has ended."""
+    def mark(self, stage: str) -> None:  # noqa: ARG002
+        """Note that a stage has ended: nothing, unless a plan measures."""
+        return
 
 
 class WindowOptions(TypedDict, total=False):

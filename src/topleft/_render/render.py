@@ -26,7 +26,7 @@ from topleft._raster import choices
 from topleft._raster.clusters import Clusters
 from topleft._raster.fragments import Fragments
 from topleft._raster.verbs import Rasterizer, rasterize, wireframe
-from topleft._raster.view import View, WindowOptions
+from topleft._raster.view import Planned, View, WindowOptions
 from topleft._render.blended import draw_blended, is_blended
 from topleft._render.fragments import BentFragments, camera_of
 from topleft._render.holes import without_holes
@@ -302,7 +302,7 @@ def depth_behind(depth: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
     return behind
 
 
-class StaticPlan:
+class StaticPlan(Planned):
     """The plan of a mesh that does not change: from its second picture on it is drawn in clusters, where that pays."""
 
     def __init__(self, mesh: Mesh) -> None:
@@ -320,6 +320,3 @@ class StaticPlan:
         """Return the clusters of the mesh if it is drawn often enough; this is one time more."""
         mesh = self._mesh
         return mesh.clusters if choices.pays_to_cluster(len(mesh.triangles), mesh.note_drawn()) else None
-
-    def mark(self, stage: str) -> None:
-        """Nothing is measured."""
