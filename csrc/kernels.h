@@ -259,7 +259,7 @@ typedef struct tl_kernels {
     void (*sort_polygons)(const tl_polygon_box *boxes, int64_t n, int64_t band_rows, int64_t n_bands, int64_t *starts,
                           int32_t *listed);
 
-    /* Sets weights and is_simple of polygons [first, end); room as TL_CERTIFY_WORDS tells.  `trust_polygons`: of
+    /* Sets weights and is_simple of polygons [first, end); room as tl_certify_words tells.  `trust_polygons`: of
      * polygons that are known to be valid, the first ring of each its border and the others holes. */
     void (*certify_polygons)(const tl_polygons *polygons, int64_t first, int64_t end, int8_t *weights,
                              uint8_t *is_simple, int64_t *room);

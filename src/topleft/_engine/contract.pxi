@@ -321,7 +321,7 @@ cdef extern from "topleft.h" nogil:
         double half_width_px, half_height_px, background
         int is_f64_out
     enum:
-        TL_POLYGON_PAD, TL_CERTIFY_WORDS, TL_PIECE_WORDS, TL_CELL_ROWS, TL_LEAST_SHARE_CELLS
+        TL_POLYGON_PAD, TL_PIECE_WORDS, TL_CELL_ROWS, TL_LEAST_SHARE_CELLS
     ctypedef struct tl_polygons:
         const int32_t *x_fx
         const int32_t *y_fx
@@ -334,6 +334,7 @@ cdef extern from "topleft.h" nogil:
         int64_t n_polygons
         int bits, is_nonzero
         int32_t sample_x_fx, sample_y_fx
+        tl_pause *pause
     ctypedef struct tl_polygon_box:
         int32_t left, top, right, bottom
     ctypedef int tl_polygon_test
@@ -378,6 +379,7 @@ cdef extern from "topleft.h" nogil:
         int is_long
         int64_t n_room
     int64_t tl_polygon_stride(int64_t width)
+    int64_t tl_certify_words(int64_t n_points, int64_t n_rings)
     int64_t tl_share_cells(int64_t width, int64_t height)
     ctypedef struct tl_tiling:
         int64_t width_px, height_px, window_width_px, window_height_px
