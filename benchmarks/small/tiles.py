@@ -26,7 +26,7 @@ from benchmarks.harness.machine import describe
 from benchmarks.harness.records import Record, Save
 from benchmarks.report.study import Study
 
-WINDOW = 4096
+WINDOW, ONE = 2048, 4096
 WAYS = ("windows", "zarr", "one window")
 PEERS = ("topleft", "rasterio", "datashader")
 
@@ -86,7 +86,7 @@ def draw_one(folder: Path, side: int) -> dict[str, float]:
 
     vertices, triangles = mesh_of(folder)
     n = round((len(triangles) / 2) ** 0.5)
-    edge = min(side, WINDOW)
+    edge = min(side, ONE)
     n_rows = min(n, int(edge / side * n) + 2)
     rows = np.array(triangles[: 2 * n * n_rows]).reshape(n_rows, n, 2, 3)[:, :n_rows].reshape(-1, 3)
     used, index = np.unique(rows, return_inverse=True)
