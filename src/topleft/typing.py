@@ -131,5 +131,5 @@ ZarrCompressionOption: TypeAlias = Literal["gzip", "zstd", "none"]
 
 # `topleft.torch`, in the words of nvdiffrast
 
-BoundaryOption: TypeAlias = Literal["wrap", "clamp", "zero"]
+BoundaryOption: TypeAlias = Literal["wrap", "clamp", "zero", "cube"]
 FilterModeOption: TypeAlias = Literal["auto", "nearest", "linear", "linear-mipmap-nearest", "linear-mipmap-linear"]

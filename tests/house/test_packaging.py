@@ -89,7 +89,12 @@ def test_package_is_typed(name):
 
 def public_names(body: list[ast.stmt]) -> dict[str, ast.stmt]:
     named = {getattr(node, "name", None) or getattr(getattr(node, "target", None), "id", "_"): node for node in body}
-    return {name: node for name, node in named.items() if not name.startswith("_")}
+    return {name: node for name, node in named.items() if not name.startswith("_") and not is_alias(node)}
+
+
+def is_alias(node: ast.stmt) -> bool:
+    """Tell whether a statement of a stub names a type for the others."""
+    return isinstance(node, ast.AnnAssign) and ast.unparse(node.annotation) == "TypeAlias"
 
 
 @pytest.mark.parametrize("unit", STUBS)

@@ -136,6 +136,35 @@ CALLS = {
     "Fragments.sample": (FRAGS.sample, {"texture": 0}),
 }  # fmt: skip
 
+
+class OnDevice:
+    """What cupy's arrays are: of DLPack on a device, and no array of NumPy by itself."""
+
+    shape = (3, 3)
+
+    def __dlpack__(self, **options):
+        raise BufferError("on a device")
+
+    def __dlpack_device__(self):
+        return 2, 0
+
+    def __array__(self, dtype=None, copy=None):
+        raise TypeError("Implicit conversion to a NumPy array is not allowed")
+
+
+class OnCpu:
+    """What arrays of other libraries are at the least: DLPack alone."""
+
+    def __init__(self, array):
+        self.array = array
+
+    def __dlpack__(self, **options):
+        return self.array.__dlpack__(**options)
+
+    def __dlpack_device__(self):
+        return 1, 0
+
+
 WRONG = {
     "None": None,
     "object": object(),
@@ -169,6 +198,9 @@ WRONG = {
     "Scene": SCENE,
     "Path": Path("nothing.obj"),
     "pair": (FLAT, ONE),
+    "on a device": OnDevice(),
+    "list on a device": [OnDevice(), OnDevice()],
+    "of DLPack": OnCpu(np.ones((3, 3))),
 }
 
 

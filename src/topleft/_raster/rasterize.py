@@ -28,7 +28,16 @@ from topleft._raster.snap import Snapped, snap_mesh
 from topleft._raster.view import View
 from topleft.typing import DepthTestOption
 
-__all__ = ["canvas_of", "draw", "draw_all_samples", "draw_coverage", "draw_fragments", "draw_overdraw"]
+__all__ = [
+    "Asked",
+    "canvas_of",
+    "draw",
+    "draw_all_samples",
+    "draw_coverage",
+    "draw_fragments",
+    "draw_overdraw",
+    "refuse_many",
+]
 
 
 def draw(
