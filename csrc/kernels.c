@@ -29,6 +29,7 @@
 #include "shade/shade_samples.c"
 #include "shade/alpha_test.c"
 #include "mesh/creases.c"
+#include "mesh/equal.c"
 #include "mesh/normals.c"
 #include "mesh/nearest.c"
 #include "mesh/reach.c"
@@ -37,6 +38,8 @@
 #include "polygons/mask.c"
 #include "polygons/labels.c"
 #include "polygons/shares.c"
+#include "tiles/spans.c"
+#include "tiles/merge.c"
 
 #ifndef TL_KERNELS /* read by itself, as an editor does */
 #define TL_ISA_NAME "none"
@@ -97,6 +100,7 @@ const tl_kernels TL_KERNELS = {
     .unit_vectors = unit_vectors,
     .move_points = move_points,
     .color_rows = color_rows,
+    .group_rows = group_rows,
     .build_tree = build_tree,
     .find_nearest = nearest_of_points,
     .find_reach = find_reach,
@@ -110,4 +114,7 @@ const tl_kernels TL_KERNELS = {
     .mask_nonzero = mask_nonzero,
     .label_polygons = label_polygons,
     .share_polygons = share_polygons,
+    .list_spans = list_spans,
+    .merge_fragments = merge_fragments,
+    .name_triangles = name_triangles,
 };

@@ -219,6 +219,12 @@ typedef struct tl_kernels {
     /* The first three of n_channels of colours [first, end) as float32 (n, 4) and 1. */
     void (*color_rows)(const uint8_t *colors, int n_channels, int64_t first, int64_t end, float *rows);
 
+    /* Groups of n equal rows of n_words words, in the order of their first rows: the first row of each, and the group
+     * of every row.  `table`: 2^table_bits numbers of -1, more than n.  Returns how many groups there are, or -1 where
+     * many hashes meet. */
+    int64_t (*group_rows)(const uint32_t *rows, int n_words, int64_t n, int table_bits, int32_t *table, int32_t *first,
+                          int32_t *group);
+
     /* The boxes of a surface, all but whose nodes are there. */
     void (*build_tree)(tl_surface *surface);
 
@@ -253,7 +259,7 @@ typedef struct tl_kernels {
     void (*sort_polygons)(const tl_polygon_box *boxes, int64_t n, int64_t band_rows, int64_t n_bands, int64_t *starts,
                           int32_t *listed);
 
-    /* Sets weights and is_simple of polygons [first, end); room as TL_CERTIFY_WORDS tells.  `trust_polygons`: of
+    /* Sets weights and is_simple of polygons [first, end); room as tl_certify_words tells.  `trust_polygons`: of
      * polygons that are known to be valid, the first ring of each its border and the others holes. */
     void (*certify_polygons)(const tl_polygons *polygons, int64_t first, int64_t end, int8_t *weights,
                              uint8_t *is_simple, int64_t *room);
@@ -272,6 +278,18 @@ typedef struct tl_kernels {
     /* Exact shares of pixels.  Returns how many polygons of the job are finished: fewer than all when the table is
      * full. */
     int64_t (*share_polygons)(const tl_polygons *polygons, const tl_share_job *job);
+
+    /* The windows that n triangles may touch, whose corners (n, 3, 2) are in pixels.  With out = NULL adds to
+     * starts[row + 1] how many spans a row of windows has, and returns the first triangle that cannot be snapped, or
+     * -1.  Otherwise writes the spans of each row from starts[row] on, which is then where they end. */
+    int64_t (*list_spans)(const tl_tiling *tiling, const double *corners_px, int64_t n, int64_t first_triangle,
+                          int64_t *starts, tl_window_span *out);
+
+    /* Pixels [first, end) of two visibility buffers into the first. */
+    void (*merge_fragments)(const tl_merge *merge, int64_t first, int64_t end);
+
+    /* Ids [first, end) become names[1 + id]. */
+    void (*name_triangles)(int32_t *ids, int64_t first, int64_t end, const int32_t *names);
 } tl_kernels;
 
 #endif

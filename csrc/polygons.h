@@ -5,8 +5,6 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "pause.h"
-
 #define TL_POLYGON_PAD 16                   /* points behind the last one, which may be read */
 #define TL_POLYGON_LIMIT ((int64_t)1 << 60) /* of |x_fx| and |y_fx| */
 #define TL_NARROW_POLYGON (1 << 24)         /* of those that lanes take */
@@ -25,6 +23,7 @@ typedef struct {
     int bits;
     int is_nonzero;                   /* the rule: winding other than 0 instead of odd */
     int32_t sample_x_fx, sample_y_fx; /* the sample from the pixel's centre */
+    struct tl_pause *pause;           /* of this call, or NULL: what has begun is drawn to its end */
 } tl_polygons;
 
 /* The pixels [left, right) x [top, bottom) that a polygon reaches into, cut off at the window. */
@@ -87,7 +86,6 @@ typedef struct {
     int32_t *cells;             /* (TL_CELL_ROWS * tl_polygon_stride(width),), all 0, and left so */
     tl_label_scratch *scratch;
     tl_piece_scratch *pieces; /* OUTER, INNER */
-    tl_pause *pause; /* or NULL; asked between polygons, and what is drawn of them when given up means nothing */
 } tl_label_job;
 
 /* What is computed of shares: the areas of each pixel that lie in polygons. */
@@ -99,7 +97,6 @@ typedef struct {
     int32_t *cells;  /* (tl_share_cells(box), TL_CELL_CLEAR, and left so) of the largest box within the rows */
     int64_t n_cells; /* at least TL_LEAST_SHARE_CELLS */
     tl_piece_scratch *pieces;
-    tl_pause *pause; /* as above */
     /* pixels: the sum of the shares, at most 1; or, with colours, the mix of what is there and the polygon's by its
      * share */
     float *pixels;       /* the window's first pixel, rows of `width` pixels of n_channels */
@@ -115,11 +112,14 @@ typedef struct {
 } tl_share_job;
 
 /* Cells that there are at least: small polygons are drawn some at a time. */
-#define TL_LEAST_SHARE_CELLS 32768
+#define TL_LEAST_SHARE_CELLS 49152
 
 static inline int64_t tl_share_cells(int64_t width, int64_t height) { return (width + 63) / 16 * 16 * height + 64; }
 
-/* int64 for each edge of the largest polygon that `certify_polygons` needs. */
-#define TL_CERTIFY_WORDS 11
+/* int64 that `certify_polygons` needs for a polygon: two keys for each ring, and the nodes of a tree. */
+static inline int64_t tl_certify_words(int64_t n_points, int64_t n_rings)
+{
+    return 4 * n_rings + 18 * (n_points / 16 + n_rings);
+}
 
 #endif

@@ -10,8 +10,8 @@
 #include <stdint.h>
 
 #include "nearest.h"
-#include "pause.h"
 #include "shading.h"
+#include "tiles.h"
 
 /* ---- vertices ------------------------------------------------------------------------------------------ */
 
@@ -88,6 +88,12 @@ typedef struct {
 /* When a triangle covers a pixel: when it holds the sample, when it meets the pixel's square in positive area, or when
  * it holds the whole square.  The last two have no depth and no order: they draw masks and counts. */
 typedef enum { TL_TEST_SAMPLE = 0, TL_TEST_OUTER = 1, TL_TEST_INNER = 2 } tl_test;
+
+/* What drawing asks now and then: whether to go on. */
+typedef struct tl_pause {
+    int64_t left_px;               /* about how many pixels are drawn before it asks again */
+    int (*ask)(struct tl_pause *); /* sets left_px anew; unless it returns 0 the picture is given up */
+} tl_pause;
 
 /* The part of the picture that a buffer shows, in whole pixels. */
 typedef struct {

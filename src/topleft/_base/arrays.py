@@ -57,6 +57,13 @@ def as_array(name: str, values: ArrayLike) -> NDArray[Any]:
         array = np.asarray(values)
     except ValueError as error:
         raise ValueError(f"{name} must be array_like, got rows of different lengths ({error})") from None
+    except Exception as error:  # of arrays of other libraries in a list
+        first: Any = values
+        while isinstance(first, (list, tuple)) and len(first):
+            first = first[0]
+        if hasattr(first, "__dlpack_device__"):
+            array_of_tensor(name, first)
+        raise TypeError(f"{name} must be array_like, got {shown(values)} ({error})") from None
     return array if array.flags.aligned else array.copy()
 
 
@@ -280,6 +287,7 @@ def as_size(values: object, name: str = "size", smallest: int = 0) -> tuple[int,
             raise TypeError(
                 f"{name} must be two integers (width, height), or one for a square, got {shown(values)}"
                 + SIZE_HINT * (isinstance(values, tuple | list) and len(values) == 3)
+                + "; the camera comes before the size" * hasattr(values, "projection")
             ) from None
     if not (smallest <= width <= INT32_MAX and smallest <= height <= INT32_MAX):
         raise ValueError(f"{name} must be (width, height) in {smallest}..{INT32_MAX}, got ({width}, {height})")
