@@ -22,6 +22,19 @@ def random_triangles(n, extent_px):
     return vertices, np.arange(3 * n, dtype=np.int32).reshape(-1, 3)
 
 
+def chords(n):
+    """A ring from side to side of the picture."""
+    return np.random.default_rng(3).random((n, 2)) * SIZE
+
+
+def crossing_star(n):
+    """A ring whose corners are out of order: its pixels are resolved one by one."""
+    rng = np.random.default_rng(4)
+    angles = np.linspace(0, 2 * np.pi, n) + rng.normal(0, 5e-4, n)
+    radius = 800 + rng.normal(0, 20, n)
+    return 1000 + radius[:, None] * np.stack([np.cos(angles), np.sin(angles)], 1)
+
+
 LARGE, SMALL = random_triangles(100_000, 2000), random_triangles(1_000_000, 30)
 FLAT = LARGE[0][:, :2], LARGE[1]
 COLORS = np.random.default_rng(2).integers(0, 256, (100_000, 4), dtype=np.uint8)
@@ -40,6 +53,13 @@ DRAWS = {
     ),
     "peel": lambda n: tl.peel(*LARGE, SIZE, threads=n),
     "smooth wireframe": lambda n: tl.wireframe(*FLAT, SIZE, antialias=True, threads=n),
+    "mask of a polygon": lambda n: tl.polygons(chords(8_000_000), SIZE, threads=n),
+    "mask of a nonzero polygon": lambda n: tl.polygons(chords(4_000_000), SIZE, rule="nonzero", threads=n),
+    "labels of polygons": lambda n: tl.polygons(
+        (chords(1_000_000), np.arange(0, 1_000_001, 100), np.arange(10_001)), SIZE, values="index", threads=n
+    ),
+    "area of a polygon": lambda n: tl.polygons(crossing_star(100_000), SIZE, sampling="area", threads=n),
+    "table of a polygon": lambda n: tl.overlap([[crossing_star(100_000)]] * 2, SIZE, threads=n),
     "height_map": lambda n: tl.height_map(LARGE, tl.Grid(SIZE, (0, 2000, 0, 2000)), threads=n),
 }
 

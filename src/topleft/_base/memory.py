@@ -31,7 +31,7 @@ MAX_SCRATCH_BYTES = 64 << 20
 SCRATCH_NAMES = frozenset(
     {"bands", "bins", "covered", "labels", "others", "packed", "records", "sample colors", "sample labels", "triangles"}
     | {"edge highs", "edge last_low", "edge starts", "edges"}
-    | {"depth of heights", "planes", "polygon x", "polygon y"}
+    | {"chains", "depth of heights", "planes", "polygon points"}
 )
 
 

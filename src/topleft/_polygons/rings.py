@@ -128,7 +128,7 @@ def _as_offsets(values: Any, name: str, n: int, of: str) -> I64:
     if offsets.ndim != 1 or len(offsets) < 1:
         raise ValueError(f"{name} must have shape (n + 1,), got {offsets.shape}")
     offsets = np.ascontiguousarray(offsets, np.int64)
-    if offsets[0] != 0 or offsets[-1] != n or (len(offsets) > 1 and (offsets[1:] < offsets[:-1]).any()):
+    if offsets[0] != 0 or offsets[-1] != n or np.minimum.reduce(offsets[1:] - offsets[:-1], initial=0) < 0:
         raise ValueError(f"{name} must rise from 0 to the number of {of}, {n}; got {_short(offsets)}")
     return offsets
 
@@ -277,7 +277,7 @@ def _join(listed: list[list[Any]]) -> RingSet:
 def _checked(found: RingSet) -> RingSet:
     """Return rings of at least three points each."""
     lengths = found.rings[1:] - found.rings[:-1]
-    if len(lengths) and lengths.min() < 3:
+    if np.minimum.reduce(lengths, initial=3) < 3:
         k = int(np.argmax(lengths < 3))
         raise ValueError(f"rings must have at least 3 points, ring {k} has {lengths[k]}")
     if max(len(found.points), len(found.rings)) > 2**31 - 1:
