@@ -278,6 +278,7 @@ def as_size(values: object, name: str = "size", smallest: int = 0) -> tuple[int,
             raise TypeError(
                 f"{name} must be two integers (width, height), or one for a square, got {shown(values)}"
                 + SIZE_HINT * (isinstance(values, tuple | list) and len(values) == 3)
+                + "; the camera comes before the size" * hasattr(values, "projection")
             ) from None
     if not (smallest <= width <= INT32_MAX and smallest <= height <= INT32_MAX):
         raise ValueError(f"{name} must be (width, height) in {smallest}..{INT32_MAX}, got ({width}, {height})")
