@@ -11,6 +11,8 @@
 #include "raster/raster.c"
 #include "raster/bin.c"
 #include "raster/sides.c"
+#include "exact/take_points.c"
+#include "exact/draw_exact.c"
 #include "area/area.c"
 #include "pixels/weights_one.c"
 #include "pixels/weights.c"
@@ -50,6 +52,8 @@ const tl_kernels TL_KERNELS = {
     .first_bad_row = first_bad_row,
     .narrow_triangles = narrow_triangles,
     .draw = draw,
+    .draw_exact = draw_exact,
+    .take_points = take_points,
     .count_classes = count_classes,
     .set_flat_depth = set_flat_depth,
     .bin = bin,

@@ -60,6 +60,15 @@ typedef struct tl_kernels {
      * 0. */
     int64_t (*draw)(const tl_scene *scene, const tl_window *window, const tl_target *target, tl_share *share);
 
+    /* The numbers of vertices [first, end) as float64 in `points`, or NULL: they stay where they are.  Returns how many
+     * cannot be drawn: what is not finite, integers beyond 2^53, a depth outside float32. */
+    int64_t (*take_points)(const tl_source *source, int64_t first, int64_t end, double *points);
+
+    /* As `draw`, with vertices that are not snapped: of the scene only triangles, cull and names are read.  Sinks MASK to
+     * FARTHEST, method AUTO.  A bad row may also be that of a vertex that is not finite. */
+    int64_t (*draw_exact)(const tl_scene *scene, const tl_exact_points *points, const tl_window *window,
+                          const tl_target *target, const tl_share *share, tl_exact_counts *counts);
+
     /* Counts the triangles of a scene by the code that `draw` has for them, with the sink of the census; the target's
      * samples are read when that is SAMPLES.  Returns as `draw` does. */
     int64_t (*count_classes)(const tl_scene *scene, const tl_window *window, const tl_target *target,

@@ -400,6 +400,7 @@ typedef struct {
 } tl_points;
 
 #include "clusters.h"
+#include "exact.h"
 #include "polygons.h"
 #include "kernels.h"
 

@@ -15,6 +15,7 @@ from matplotlib.ticker import LogLocator, NullLocator
 
 from benchmarks.accuracy import speed_charts
 from benchmarks.report.charts import LOOKS, Look, draw_grid, duration, figure_bytes, write_chart
+from benchmarks.scenes.families import NO_SNAP
 
 FAR_AWAY = 1e12
 """Beyond every axis: where the ends of a front go."""
@@ -56,7 +57,8 @@ def chart_coverage(record: dict[str, Any]) -> Figure:
             draw_peer(axis, row["peer"], place(row))
         for row, (_, y) in zip(rows, points, strict=True):
             if row["method"] == "auto":
-                axis.text(0.015, y, f"{row['precision']} bits", transform=axis.get_yaxis_transform(), va="center",
+                bits = "exact" if row["precision"] == NO_SNAP else f"{row['precision']} bits"
+                axis.text(0.015, y, bits, transform=axis.get_yaxis_transform(), va="center",
                           fontsize=8, color="0.25")  # fmt: skip
         axis.set(xscale="log", yscale="log", ylim=(none_wrong / 3, 3e6))
         axis.axhspan(none_wrong / 3, none_wrong * 1.8, color="0.93", zorder=0)

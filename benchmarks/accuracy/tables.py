@@ -8,6 +8,7 @@ from typing import Any
 from benchmarks.accuracy.stability import CHANGES, EXACT, FAR_PX
 from benchmarks.harness.records import Record
 from benchmarks.report.tables import commit_text, number
+from benchmarks.scenes.families import NO_SNAP
 
 DEFAULT_BITS = "8"
 
@@ -103,7 +104,7 @@ def bits_rows(record: Record) -> tuple[list[str], list[list[str]]]:
     cells: dict[str, list[str]] = {}
     for row in record["coverage"]:
         if row["method"] in shown:
-            name = shown[row["method"]].format(row["precision"])
+            name = shown[row["method"]].format(row["precision"]) if row["precision"] != NO_SNAP else "not snapped"
             own = cells.setdefault(name, [name, f"`{row['method']}`"])
             own.append(per_million(row["wrong_px"], n_edge_px[row["family"]]))
     return head, list(cells.values())

@@ -47,6 +47,13 @@ cdef class Source:
             counts = K.snap(&self.source, first, end, subpixel_bits, with_depth, <tl_vertex *>&records[0], table)
         return counts.n_bad, counts.n_wide, counts.n_clipped
 
+    def take(self, int64_t first, int64_t end, double[:, ::1] points):
+        """Widen the numbers of vertices [first, end) into points, or only look at them; returns how many cannot be drawn."""
+        cdef int64_t n_bad
+        with nogil:
+            n_bad = K.take_points(&self.source, first, end, &points[0, 0] if points is not None else NULL)
+        return n_bad
+
     def project(self, int64_t first, int64_t end, Viewport viewport, uint8_t[::1] records, int64_t[:, ::1] wide):
         """Project and snap vertices [first, end) into records; returns the numbers of bad, wide and clipped vertices."""
         cdef tl_wide *table = <tl_wide *>&wide[0, 0] if wide is not None else NULL

@@ -148,6 +148,14 @@ cdef extern from "topleft.h" nogil:
         int64_t n_others
         const tl_window *picture
         int is_first, is_last
+    ctypedef struct tl_exact_counts:
+        int64_t n_triangles, n_on_grid, n_asked, n_turns, n_expansions, n_integers
+    ctypedef struct tl_exact_points:
+        const double *points
+        int stride
+        int64_t n_points
+        double sample_x_px, sample_y_px
+        double band
     ctypedef struct tl_composite:
         const int32_t *ids
         int64_t n_triangles, plane_px
@@ -385,6 +393,9 @@ cdef extern from "topleft.h" nogil:
         int64_t (*first_bad_row)(const int32_t *, int64_t, int64_t) noexcept nogil
         int64_t (*narrow_triangles)(const int64_t *, int64_t, int64_t, int32_t *) noexcept nogil
         int64_t (*draw)(const tl_scene *, const tl_window *, const tl_target *, tl_share *) noexcept nogil
+        int64_t (*take_points)(const tl_source *, int64_t, int64_t, double *) noexcept nogil
+        int64_t (*draw_exact)(const tl_scene *, const tl_exact_points *, const tl_window *, const tl_target *,
+                              const tl_share *, tl_exact_counts *) noexcept nogil
         int64_t (*count_classes)(const tl_scene *, const tl_window *, const tl_target *, tl_census *) noexcept nogil
         void (*set_flat_depth)(int32_t *, int64_t, int32_t, float, float, float *) noexcept nogil
         int64_t (*bin)(const tl_scene *, const tl_window *, int32_t, int, tl_bins *) noexcept nogil

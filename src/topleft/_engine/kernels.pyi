@@ -91,6 +91,7 @@ class Source:
     def project(
         self, first: int, end: int, viewport: Viewport, records: NDArray[np.uint8], wide: NDArray[np.int64] | None
     ) -> tuple[int, int, int]: ...
+    def take(self, first: int, end: int, points: NDArray[np.float64] | None) -> int: ...
 
 class Pieces:
     arrays: tuple[Any, ...] | None
@@ -179,6 +180,18 @@ class SnappedMesh:
         background: float,
         out: NDArray[np.float32],
     ) -> None: ...
+
+class ExactMesh(SnappedMesh):  # has draw, seen_from, guess_seen and paint; what asks for more is refused before
+    def __init__(
+        self,
+        points: NDArray[np.float64],
+        triangles: NDArray[np.int32],
+        how: tuple[int, int, int, int, int, int],
+        band: float = 1.0,
+    ) -> None: ...
+    def draw_counted(
+        self, target: Target, first_row: int, n_rows: int, is_first: bool = True, is_last: bool = True
+    ) -> tuple[int, tuple[int, ...]]: ...
 
 def list_edges(
     mesh: SnappedMesh,

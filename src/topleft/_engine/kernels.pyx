@@ -91,6 +91,7 @@ def as_bytes(array):
 include "pause.pxi"
 include "buffers.pxi"
 include "triangles.pxi"
+include "exact.pxi"
 include "clusters.pxi"
 include "pixels.pxi"
 include "shade.pxi"

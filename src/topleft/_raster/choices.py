@@ -163,7 +163,7 @@ def can_share(view: View) -> bool:
     width, height = view.size
     is_near = max(map(abs, view.origin)) < 2**29 and width * height < 2**31
     fits_lanes = not view.test or view.subpixel_bits <= 8
-    return is_near and fits_lanes and view.method == METHODS["auto"].code
+    return is_near and fits_lanes and view.method == METHODS["auto"].code and not view.is_exact
 
 
 def is_shared(view: View, n_triangles: int, n_parts: int, sink: Sink) -> bool:
@@ -314,7 +314,7 @@ def is_direct(snapped: Snapped, view: View, dtype: np.dtype[Any], *, is_flat: bo
 
     Labels cost a pass to clear and one to colour them, and less a triangle that is seen.
     """
-    if not is_flat or dtype != np.uint8 or view.sampling.n_samples > 1:
+    if not is_flat or dtype != np.uint8 or view.sampling.n_samples > 1 or view.is_exact:
         return False
     n_seen, _, _ = snapped.mesh.guess_seen(*view.size)
     return n_seen * MIN_PIXELS_A_TRIANGLE <= view.size[0] * view.size[1]

@@ -136,12 +136,27 @@ def draw_coverage(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, vie
     snapped = snap_mesh(memory, vertices, triangles, view, with_depth=False, out=out)
     if view.sampling is Sampling.AREA:
         return draw_area(memory, "coverage", snapped, view, out, is_clamped=True)
+    if view.sampling.n_samples > 1 and view.is_exact:
+        return draw_share_of_masks(memory, snapped, view, out)
     if view.sampling.n_samples > 1:
         with canvas_of(memory, "coverage share", out, view.size[::-1], np.float32) as (result, canvas):
             draw(memory, snapped, view, choices.drawing(view, snapped, Sink.SAMPLES), canvas)
         return result
     with canvas_of(memory, "coverage", out, view.size[::-1], np.bool_) as (result, canvas):
         draw(memory, snapped, view, choices.drawing(view, snapped, Sink.MASK), canvas)
+    return result
+
+
+def draw_share_of_masks(memory: Memory, snapped: Snapped, view: View, out: object) -> NDArray[np.float32]:
+    """Return the share of samples that triangles cover, from a mask of each sample."""
+    n, shape = view.sampling.n_samples, view.size[::-1]
+    mask: NDArray[np.bool_] = memory.empty("sample mask", shape, np.bool_)
+    with canvas_of(memory, "coverage share", out, shape, np.float32) as (result, canvas):
+        canvas[...] = 0.0
+        for at in sample_positions(n, view.grid_bits).tolist() if canvas.size else ():
+            seen = replace(snapped, mesh=snapped.mesh.seen_from(*at))
+            draw(memory, seen, view, choices.drawing(view, seen, Sink.MASK), mask)
+            np.add(canvas, 1.0 / n, out=canvas, where=mask)  # exact: n is a power of two
     return result
 
 
@@ -276,7 +291,7 @@ def draw_batch(
     ValueError
         If several samples a pixel, or a plan, are asked for; else as `rasterize`.
     """
-    view = View.parse(size, options)
+    view = View.parse(size, options, takes_exact=True)
     asked = Asked.parse(depth_test, background_depth, out)
     if view.sampling is not Sampling.CENTER:
         raise ValueError(f"sampling must be 'center' for a batch, got {str(view.sampling)!r}")

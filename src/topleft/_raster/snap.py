@@ -1,4 +1,7 @@
-"""Snaps a mesh: vertices go through transform, snap and clip; indices are made int32 and checked."""
+"""Snaps a mesh: vertices go through transform, snap and clip; indices are made int32 and checked.
+
+Or takes it as it is: vertices in pixels as float64, which no grid moves.
+"""
 
 from __future__ import annotations
 
@@ -55,6 +58,16 @@ class Snapped:
             raise bad_triangle(self.triangles_given, row, self.n_vertices)
 
 
+@dataclass(frozen=True, slots=True)
+class Unsnapped(Snapped):
+    """A mesh whose vertices stay where they are: `mesh` is an `_engine.ExactMesh`."""
+
+    def check_indices(self) -> None:
+        """Raise an error for the first triangle with an index or a vertex that cannot be drawn."""
+        Snapped.check_indices(self)
+        check_finite(self.points, self.triangles, with_depth=False)
+
+
 class Vertices(NamedTuple):
     """Snapped vertices, and how many of them cannot be drawn, or lie outside of a clip plane."""
 
@@ -79,6 +92,8 @@ def snap_mesh(
     IndexError
         If a triangle names a vertex that does not exist, and indices are checked here.
     """
+    if view.is_exact:
+        return take_mesh(memory, vertices, triangles, view, with_depth=with_depth, out=out)
     points, source = transform(vertices, view)
     indices, bad_row = index(memory, triangles, len(points), view)
     view.mark("input")
@@ -107,6 +122,54 @@ def snap_mesh(
         drawn = without_sides(seen, drawn, is_single, view.threads)
     mesh = _engine.SnappedMesh(source, records, wide, drawn, pieces, view.how, viewport)
     return Snapped(mesh, indices, triangles, points, source, records, pieces)
+
+
+def take_mesh(
+    memory: Memory, vertices: ArrayLike, triangles: ArrayLike, view: View, *, with_depth: bool, out: object
+) -> Unsnapped:
+    """Take arrays as they are: for ``subpixel_bits="exact"``.
+
+    Indices and positions are checked while drawing, or here where an error may not leave a trace in the caller's `out`.
+    """
+    points, source = transform(vertices, view)
+    if source.is_clip_space:
+        raise ValueError("vertices must be pixels, (V, 2) or (V, 3) without transform, for subpixel_bits 'exact'")
+    indices, bad_row = index(memory, triangles, len(points), view)
+    view.mark("input")
+    n = len(points) if len(indices) and 0 not in view.size else 0
+    has_depth = with_depth and points.shape[1] == 3
+    taken, n_bad = take_points(memory, source, points, n, len(indices), view, must_check=out is not None or has_depth)
+    view.mark("vertices")
+    if bad_row == UNCHECKED and (out is not None or n == 0 or n_bad):
+        bad_row = _engine.first_bad_row(indices, len(points))
+    if bad_row >= 0:
+        raise bad_triangle(triangles, bad_row, len(points))
+    if n_bad:
+        check_finite(points, indices, with_depth=has_depth)
+    mesh = _engine.ExactMesh(taken, indices if n else indices[:0], view.how)
+    return Unsnapped(mesh, indices, triangles, points, source, np.empty(0, np.uint8), None)
+
+
+def take_points(
+    memory: Memory,
+    source: _engine.Source,
+    points: NDArray[Any],
+    n: int,
+    n_triangles: int,
+    view: View,
+    *,
+    must_check: bool,
+) -> tuple[NDArray[np.float64], int]:
+    """Return the first `n` points as float64, and how many of their numbers cannot be drawn, if that was looked at."""
+    is_same = points.dtype == np.float64
+    if not n or (is_same and not must_check):
+        return points[:n].astype(np.float64, copy=False), 0
+    taken = points if is_same else memory.empty("points", (n, points.shape[1]), np.float64)
+
+    def take_part(first: int, end: int) -> int:
+        return source.take(first, end, None if is_same else taken)
+
+    return taken, sum(run_parts(take_part, n, choices.threads_to_snap(view.threads, n, n_triangles)))
 
 
 def transform(vertices: ArrayLike, view: View) -> tuple[NDArray[Any], _engine.Source]:
@@ -223,3 +286,21 @@ def check_used_vertices(
         f"vertices must lie within 2**{62 - view.grid_bits} pixels of 0 with {view.grid_bits} sub-pixel bits, "
         f"got {row.tolist()} in row {i}"
     )
+
+
+def check_finite(points: NDArray[Any], triangles: NDArray[np.int32], *, with_depth: bool) -> None:
+    """Raise an error for the first vertex whose numbers cannot be drawn as they are, if a triangle uses it."""
+    is_bad = ~(abs(points[:, :2].astype(float)) <= (2.0**53 if points.dtype.kind == "i" else np.inf)).all(axis=1)
+    is_bad |= ~np.isfinite(points).all(axis=1)
+    if with_depth:
+        is_bad |= ~(abs(points[:, 2].astype(float)) <= np.finfo(np.float32).max)
+    used = triangles[is_bad[triangles]]
+    if not used.size:
+        return
+    i = used.min()
+    row = points[i]
+    if not np.isfinite(row).all():
+        raise ValueError(f"vertices must be finite where a triangle uses them, got {row.tolist()} in row {i}")
+    if points.dtype.kind == "i" and abs(row[:2].astype(float)).max() > 2.0**53:
+        raise ValueError(f"vertices must lie within 2**53 as integers for 'exact', got {row.tolist()} in row {i}")
+    raise ValueError(f"vertices must have a depth that float32 can hold, got {row.tolist()} in row {i}")
