@@ -10,7 +10,7 @@
 #include "clusters/cluster_view.c"
 #include "raster/raster.c"
 #include "raster/bin.c"
-#include "raster/sides.c"
+#include "raster/setup.c"
 #include "exact/take_points.c"
 #include "exact/draw_exact.c"
 #include "area/area.c"
@@ -20,6 +20,8 @@
 #include "pixels/resolve.c"
 #include "pixels/points.c"
 #include "pixels/planes.c"
+#include "pixels/slopes.c"
+#include "pixels/texels.c"
 #include "pixels/composite.c"
 #include "points/cloud.c"
 #include "lines/edges.c"
@@ -75,6 +77,9 @@ const tl_kernels TL_KERNELS = {
     .draw_lines = draw_lines,
     .draw_cloud = draw_cloud,
     .composite = composite,
+    .fill_slopes = fill_slopes,
+    .fill_texels = fill_texels,
+    .halve_rows = halve_rows,
     .set_inverse_w = set_inverse_w,
     .shade = shade,
     .shade_normals = shade_normals,

@@ -58,20 +58,20 @@ typedef struct tl_kernels {
      * one; what was drawn is then worthless.  The window's pixels are cleared first: 0, id -1, and the depth that every
      * other beats.  A share of a part needs method AUTO, a picture of less than 2^31 samples within 2^30 pixels of
      * 0. */
-    int64_t (*draw)(const tl_scene *scene, const tl_window *window, const tl_target *target, tl_share *share);
+    int64_t (*draw)(const tl_snapped *snapped, const tl_window *window, const tl_target *target, tl_share *share);
 
     /* The numbers of vertices [first, end) as float64 in `points`, or NULL: they stay where they are.  Returns how many
      * cannot be drawn: what is not finite, integers beyond 2^53, a depth outside float32. */
     int64_t (*take_points)(const tl_source *source, int64_t first, int64_t end, double *points);
 
-    /* As `draw`, with vertices that are not snapped: of the scene only triangles, cull and names are read.  Sinks MASK to
+    /* As `draw`, with vertices that are not snapped: of the mesh only triangles, cull and names are read.  Sinks MASK to
      * FARTHEST, method AUTO.  A bad row may also be that of a vertex that is not finite. */
-    int64_t (*draw_exact)(const tl_scene *scene, const tl_exact_points *points, const tl_window *window,
+    int64_t (*draw_exact)(const tl_snapped *snapped, const tl_exact_points *points, const tl_window *window,
                           const tl_target *target, const tl_share *share, tl_exact_counts *counts);
 
-    /* Counts the triangles of a scene by the code that `draw` has for them, with the sink of the census; the target's
+    /* Counts the triangles of a mesh by the code that `draw` has for them, with the sink of the census; the target's
      * samples are read when that is SAMPLES.  Returns as `draw` does. */
-    int64_t (*count_classes)(const tl_scene *scene, const tl_window *window, const tl_target *target,
+    int64_t (*count_classes)(const tl_snapped *snapped, const tl_window *window, const tl_target *target,
                              tl_census *census);
 
     /* The depth of n pixels whose triangles all lie at one: `depth` where there is an id, `background` elsewhere.  The
@@ -80,7 +80,7 @@ typedef struct tl_kernels {
 
     /* Lists the triangles that are in the window or within reach_fx of it, with their bands of 2^band_bits rows; they
      * may be a few too many.  Returns as `draw` does; the window as for a share of a part. */
-    int64_t (*bin)(const tl_scene *scene, const tl_window *window, int32_t reach_fx, int band_bits, tl_bins *bins);
+    int64_t (*bin)(const tl_snapped *snapped, const tl_window *window, int32_t reach_fx, int band_bits, tl_bins *bins);
 
     /* The same by band: starts[k] to starts[k + 1] are the places of those of band k in `listed`.  `starts` has n_bands
      * + 2 numbers.  A first call with listed = NULL sets starts[n_bands + 1] to the length of `listed`. */
@@ -88,25 +88,37 @@ typedef struct tl_kernels {
 
     /* The exact area that triangles cover of each pixel, their sum; the window has fewer than 2^31 cells.  Returns as
      * `draw` does, or TL_AREA_OVERFLOW; either way the pixels are then worthless. */
-    int64_t (*draw_area)(const tl_scene *scene, const tl_window *window, const tl_area *target);
+    int64_t (*draw_area)(const tl_snapped *snapped, const tl_window *window, const tl_area *target);
 
     /* Blends the colours of triangles into the canvas in their order.  Returns as `draw` does. */
-    int64_t (*blend)(const tl_scene *scene, const tl_window *window, const tl_canvas *canvas);
+    int64_t (*blend)(const tl_snapped *snapped, const tl_window *window, const tl_canvas *canvas);
 
     /* 1/w of vertices [first, end) of clip space, for tl_vertex_set; nothing of it is checked. */
     void (*inverse_w)(const tl_source *source, int64_t first, int64_t end, double *out);
 
     /* Per pixel of `ids` (rows of window->width): float32 weights of the triangle's three vertices. */
-    void (*barycentric)(const tl_scene *scene, const tl_window *window, const int32_t *ids, float *out);
+    void (*barycentric)(const tl_snapped *snapped, const tl_window *window, const int32_t *ids, float *out);
 
     /* The same, applied to float32 values (n_vertices, n_values), or (n_triangles, 3, n_values) per corner. */
-    void (*interpolate)(const tl_scene *scene, const tl_window *window, const int32_t *ids, const float *values,
+    void (*interpolate)(const tl_snapped *snapped, const tl_window *window, const int32_t *ids, const float *values,
                         int n_values, int per_corner, float background, float *out);
+
+    /* What values change by along x and y at n pixels: (n, n_values, 2), 0 where ids are -1. */
+    void (*fill_slopes)(const tl_sloped *values, const int32_t *ids, const float *weights, int64_t n, float *out);
+
+    /* The values (n, n_channels) of an array at n pixels where ids are not -1: uv (n, 2), and where there are halvings
+     * slopes of u and v along x and y, (n, 2, 2). */
+    void (*fill_texels)(const tl_levels *array, const int32_t *ids, const float *uv, const float *slopes,
+                        float background, int64_t n, float *out);
+
+    /* Rows [first, end) of the halving of a level of such an array, (max(1, height / 2), max(1, width / 2)). */
+    void (*halve_rows)(const float *level, int64_t width, int64_t height, int n_channels, int64_t first, int64_t end,
+                       float *out);
 
     /* Colours where labels are not -1: per triangle, or interpolated screen-linearly from those of the vertices.
      * n_channels of uint8 or float32 a colour. */
     void (*paint_flat)(const int32_t *labels, int64_t n, const uint8_t *colors, int pixel_bytes, uint8_t *pixels);
-    void (*paint_gouraud)(const tl_scene *scene, const tl_window *window, const int32_t *labels, const void *colors,
+    void (*paint_gouraud)(const tl_snapped *snapped, const tl_window *window, const int32_t *labels, const void *colors,
                           int n_channels, int is_u8, void *pixels);
 
     /* The mean colour of the samples of n pixels: from planes of labels and the colours of the triangles, or from
@@ -125,36 +137,37 @@ typedef struct tl_kernels {
 
     /* The picture of a visibility buffer, rows of window->width: uint8 red, green, blue, opacity.  `view` may be NULL
      * in pixel space. */
-    void (*shade)(const tl_scene *scene, const tl_window *window, const tl_view *view, const tl_shading *shading,
+    void (*shade)(const tl_snapped *snapped, const tl_window *window, const tl_view *view, const tl_shading *shading,
                   const int32_t *ids, const float *depth, uint8_t *pixels);
 
     /* The same from planes of ids and depth that lie `stride` pixels apart, one a sample; samples_fx as in
      * tl_target. */
-    void (*shade_samples)(const tl_scene *scene, const tl_window *window, const tl_view *view,
+    void (*shade_samples)(const tl_snapped *snapped, const tl_window *window, const tl_view *view,
                           const tl_shading *shading, const int32_t *samples_fx, int sample_bits, int64_t stride,
                           const int32_t *ids, const float *depth, uint8_t *pixels);
 
     /* Unit normals on the side that is seen, float32 (x, y, z), 0 where nothing is: turned by shading->eye_from; show
      * is NORMALS. */
-    void (*shade_normals)(const tl_scene *scene, const tl_window *window, const tl_view *view,
+    void (*shade_normals)(const tl_snapped *snapped, const tl_window *window, const tl_view *view,
                           const tl_shading *shading, const int32_t *ids, float *out);
 
     /* Per pixel of `ids` (rows of window->width): what is told of its point, float32 or float64. */
-    void (*fill_points)(const tl_scene *scene, const tl_window *window, const tl_points *points, const int32_t *ids,
+    void (*fill_points)(const tl_snapped *snapped, const tl_window *window, const tl_points *points, const int32_t *ids,
                         void *out);
 
     /* Draws n triangles over a target, NEAREST or PEEL, of all others, but for what their materials cut out; the window
      * as for a share of a part, and fewer than 2^31 pixels. */
-    void (*cut_out)(const tl_scene *scene, const tl_window *window, const tl_view *view, const tl_shading *shading,
+    void (*cut_out)(const tl_snapped *snapped, const tl_window *window, const tl_view *view, const tl_shading *shading,
                     const int32_t *triangles, int64_t n, const tl_target *target);
 
-    /* Copies triangles [first, end); what is single-sided and turned the way that the scene culls is collapsed to a
+    /* Copies triangles [first, end); what is single-sided and turned the way that the mesh culls is collapsed to a
      * point, of what a plane cuts the pieces, in place.  The result is drawn with any cull. */
-    void (*drop_sides)(const tl_scene *scene, const uint8_t *is_single, int64_t first, int64_t end, int32_t *triangles);
+    void (*drop_sides)(const tl_snapped *snapped, const uint8_t *is_single, int64_t first, int64_t end,
+                       int32_t *triangles);
 
     /* The edges of the triangles that are not culled, each once, as lower index + 2^32 * higher index; room for three a
      * triangle.  Returns the first row with an index outside the vertices, or -1. */
-    int64_t (*list_edges)(const tl_scene *scene, const tl_edge_scratch *scratch, uint64_t *edges, int64_t *n_edges);
+    int64_t (*list_edges)(const tl_snapped *snapped, const tl_edge_scratch *scratch, uint64_t *edges, int64_t *n_edges);
 
     /* Clears the window's pixels and draws lines. */
     void (*draw_lines)(const tl_edges *lines, const tl_window *window, const tl_line_target *target);

@@ -27,6 +27,16 @@ typedef struct {
     float hand;            /* -1 where the transform mirrors, else 1 */
 } tl_texture;
 
+/* An array of values and its halvings, row 0 at v = 1. */
+typedef struct {
+    const float *texels;
+    const int64_t *rows; /* of each level where it begins, in texels, and its width and height */
+    int n_levels;        /* 1 unless `filter` is TL_FILTER_TRILINEAR */
+    int n_channels;
+    tl_filter filter;
+    tl_wrap wrap_u, wrap_v;
+} tl_levels;
+
 typedef struct {
     float color[4];      /* times the texture and the colours of the vertices; the fourth is opacity, for the cut-out */
     float back_color[3]; /* instead of `color` and all that where the back is seen */

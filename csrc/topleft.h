@@ -18,7 +18,7 @@
  * take; y_fx then holds the reason, a tl_special. */
 typedef struct {
     int32_t x_fx, y_fx; /* |.| < 2^30 */
-    double z;           /* depth; 0 when the scene has none */
+    double z;           /* depth; 0 when the mesh has none */
 } tl_vertex;
 
 #define TL_SPECIAL INT32_MIN
@@ -195,6 +195,7 @@ typedef struct {
 /* A bit a sample, and a word behind the end. */
 static inline int64_t tl_covered_words(int64_t n_samples) { return n_samples / 64 + 2; }
 
+/* A mesh after the snap: what kernels draw. */
 typedef struct {
     tl_vertex_set mesh;
     const int32_t *triangles; /* (n_triangles, 3); draw checks the indices, everything else trusts them */
@@ -202,17 +203,17 @@ typedef struct {
     const tl_pieces *pieces; /* of triangles with TL_CLIPPED vertices, or NULL */
     tl_cull cull;
     tl_method method;
-    int32_t first_id; /* what triangle 0 is called in a buffer of ids that several scenes share; read by draw alone */
+    int32_t first_id; /* what triangle 0 is called in a buffer of ids that several meshes share; read by draw alone */
     /* (n_triangles,): what each is called, from first_id on; NULL: its index; read by draw alone */
     const int32_t *names;
-} tl_scene;
+} tl_snapped;
 
-/* The part of a scene that one pass draws.  Several passes may share a scene: each takes some of the triangles, draws
+/* The part of a mesh that one pass draws.  Several passes may share a mesh: each takes some of the triangles, draws
  * what of them lies in its own window and lists the others for the passes that own the rest of the picture. */
 typedef struct {
     const int32_t *ids; /* the triangles ids[first] to ids[end - 1]; NULL: the triangles [first, end) */
     int64_t first, end;
-    /* or NULL; then `scene` has no vertices and no triangles, and others lists those that have a TL_SPECIAL corner */
+    /* or NULL; then `snapped` has no vertices and no triangles, and others lists those that have a TL_SPECIAL corner */
     struct tl_cluster_pass *clusters;
     /* out, or NULL: those that reach into `picture` beyond the window; end - first + 16 numbers */
     int32_t *others;
@@ -398,6 +399,15 @@ typedef struct {
     double background;
     int is_f64_out;
 } tl_points;
+
+/* Values of vertices, or of corners, whose slopes are wanted, and the triangles that show. */
+typedef struct {
+    const int32_t *slot; /* of each triangle its place among those that show */
+    const double *steps; /* of each corner what its weight over w changes by along x and y, and its w: (n, 3, 3) */
+    const int32_t *rows; /* of each corner its row of `values`: (n, 3) */
+    const float *values; /* (rows, n_values) */
+    int64_t n_values;
+} tl_sloped;
 
 #include "clusters.h"
 #include "exact.h"

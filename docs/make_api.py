@@ -83,7 +83,7 @@ MEMBERS: Mapping[str, tuple[str, ...]] = {
 }  # fmt: skip
 """What is promised of a class beside its signature; others of its members are for the package itself."""
 
-MODULES = ("scenes", "failure_scenes", "errors", "methods", "methods.reference", "cli", "torch")
+MODULES = ("scenes", "failure_scenes", "errors", "typing", "methods", "methods.reference", "testing", "cli", "torch")
 """Modules that may be imported. All others are private, as the underscore in their path says."""
 
 HEAD = """\

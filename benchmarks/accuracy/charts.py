@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullLocator
 
 from benchmarks.accuracy import speed_charts
-from benchmarks.report.charts import LOOKS, Look, draw_grid, duration, figure_bytes, write_chart
+from benchmarks.report.charts import LOOKS, Look, draw_grid, duration, write_chart
 from benchmarks.scenes.families import NO_SNAP
 
 FAR_AWAY = 1e12
@@ -192,8 +192,3 @@ CHARTS: Mapping[str, Callable[[dict[str, Any]], Figure]] = {
 def draw_charts(record: dict[str, Any], folder: Path) -> list[Path]:
     """Write the charts as SVG, return where they are."""
     return [write_chart(partial(make, record), folder, name) for name, make in CHARTS.items()]
-
-
-def chart_svg(record: dict[str, Any], name: str) -> bytes:
-    """Return a chart of an accuracy record as SVG."""
-    return figure_bytes(partial(CHARTS[name], record))

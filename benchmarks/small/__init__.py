@@ -1,6 +1,8 @@
 """Studies of one file each.
 
 batch.py      many pictures: views a second
+fresh.py      results of their own beside `Rasterizer`
+gate.py       two commits: instructions, and time in turns
 layers.py     each layer of a view beside its picture
 field.py      a field beside matplotlib, datashader and SciPy
 samplings.py  one scene in every sampling, as a picture

@@ -3,7 +3,7 @@
  * In: cells (ramp.c).  Out: pixels, and whether every sum is right.
  *
  * 32 bits hold sums below 192.  From a sum in [-2^-4, 192 - 2^-4) one cell, below 2^30 units, leads to where the two
- * upper bits of sum + 2^20 are both set before it can lead around: such a sum is seen, and the scene is drawn again in
+ * upper bits of sum + 2^20 are both set before it can lead around: such a sum is seen, and the mesh is drawn again in
  * 64 bits, with the same result wherever both are right.
  *
  * Based on: R. Levien, font-rs, 2015. */

@@ -1,4 +1,4 @@
-/* Area: the exact area of each pixel that the triangles of a scene cover, added up over the triangles.
+/* Area: the exact area of each pixel that the triangles of a mesh cover, added up over the triangles.
  * In: vertex records and triangles.  Out: float32 pixels.
  *
  * Triangles become edges, edges become differences in cells (ramp.c), and one pass over the rows sums these up
@@ -35,7 +35,7 @@ enum {
 
 typedef struct {
     area_plane plane;
-    const tl_scene *scene;
+    const tl_snapped *snapped;
     const tl_window *window;
     int64_t bad_row;
     int32_t max_extent;
@@ -62,7 +62,7 @@ TL_INLINE void flush_kind(area_state *s, int is_wide, int kind, int n)
 static __attribute__((noinline)) void flush_narrow(area_state *s, int kind, int n) { flush_kind(s, 0, kind, n); }
 static __attribute__((noinline)) void flush_wide(area_state *s, int kind, int n) { flush_kind(s, 1, kind, n); }
 
-/* Draws the whole vectors of a kind and keeps the rest; at the end of the scene the rest as well. */
+/* Draws the whole vectors of a kind and keeps the rest; at the end of the mesh the rest as well. */
 static void flush_edges(area_state *s, int kind, int is_end)
 {
     int n = s->n[kind];
@@ -118,7 +118,7 @@ static void push_triangle(area_state *s, const tl_vertex_set *set, const int32_t
 {
     tl_triangle t;
     const int sign = load_triangle(set, corners, &t);
-    if (is_culled(sign, s->scene->cull))
+    if (is_culled(sign, s->snapped->cull))
         return;
     for (int k = 0; k < 3; k++) {
         const int next = k == 2 ? 0 : k + 1;
@@ -130,7 +130,7 @@ static void push_triangle(area_state *s, const tl_vertex_set *set, const int32_t
 /* Triangle i, or its pieces, by itself. */
 static __attribute__((noinline)) void push_alone(area_state *s, int64_t i)
 {
-    const triangle_parts parts = parts_of(s->scene, i);
+    const triangle_parts parts = parts_of(s->snapped, i);
     for (int k = 0; k < parts.n; k++)
         push_triangle(s, &parts.set, parts.corners + 3 * k);
 }
@@ -170,12 +170,12 @@ TL_INLINE void push_batch(area_state *s, int64_t i, const int32_t *corners, vm l
 {
     const area_plane *p = &s->plane;
     const vi max_extent = vi_set1(s->max_extent);
-    if (has_bad_index(corners, vi_set1((int32_t)(s->scene->mesh.n_vertices - 1)))) {
+    if (has_bad_index(corners, vi_set1((int32_t)(s->snapped->mesh.n_vertices - 1)))) {
         s->bad_row = i;
         return;
     }
     lane_corners c;
-    const tl_vertex *vertices = s->scene->mesh.vertices;
+    const tl_vertex *vertices = s->snapped->mesh.vertices;
     for (int k = 0; k < 3; k++)
         load_vertices(vertices, corners + k, &c.x[k], &c.y[k], &c.z[k]);
     const vi x_min = vi_min(vi_min(c.x[0], c.x[1]), c.x[2]), x_max = vi_max(vi_max(c.x[0], c.x[1]), c.x[2]);
@@ -198,7 +198,7 @@ TL_INLINE void push_batch(area_state *s, int64_t i, const int32_t *corners, vm l
     const vd x2 = vd_from_vi(vi_sub(c.x[2], c.x[0])), y2 = vd_from_vi(vi_sub(c.y[2], c.y[0]));
     const vd area = vd_sub(vd_mul(x1, y2), vd_mul(y1, x2));
     const vm is_positive = vd_ge(area, vd_set1(1.0)), is_negative = vd_ge(vd_set1(-1.0), area);
-    const tl_cull cull = s->scene->cull;
+    const tl_cull cull = s->snapped->cull;
     const vm either = cull == TL_CULL_BACK    ? is_negative
                       : cull == TL_CULL_FRONT ? is_positive
                                               : vm_or(is_positive, is_negative);
@@ -229,19 +229,19 @@ static void place_plane(const tl_window *window, const tl_area *area, area_plane
     p->seen = v4_zero();
 }
 
-static int64_t draw_area(const tl_scene *scene, const tl_window *window, const tl_area *target)
+static int64_t draw_area(const tl_snapped *snapped, const tl_window *window, const tl_area *target)
 {
     area_state s;
     const int bits = window->subpixel_bits;
     place_plane(window, target, &s.plane);
-    s.scene = scene, s.window = window, s.bad_row = -1, s.is_wide = target->is_wide;
+    s.snapped = snapped, s.window = window, s.bad_row = -1, s.is_wide = target->is_wide;
     s.max_extent = 1 << (bits + TL_MAX_EDGE_BITS < 25 ? bits + TL_MAX_EDGE_BITS : 25);
     memset(s.n, 0, sizeof s.n);
-    const tl_share all = {.end = scene->n_triangles};
+    const tl_share all = {.end = snapped->n_triangles};
     int32_t tail[3 * TL_LANES];
-    for (int64_t i = 0; i < scene->n_triangles && s.bad_row < 0 && !tl_is_given_up(window); i += TL_LANES) {
+    for (int64_t i = 0; i < snapped->n_triangles && s.bad_row < 0 && !tl_is_given_up(window); i += TL_LANES) {
         tl_count_work(window, TL_SETUP_PX * TL_LANES);
-        push_batch(&s, i, share_corners(scene, &all, i, tail), vm_first(scene->n_triangles - i));
+        push_batch(&s, i, share_corners(snapped, &all, i, tail), vm_first(snapped->n_triangles - i));
     }
     for (int kind = 0; kind < TL_EDGES_NONE; kind++)
         flush_edges(&s, kind, 1);

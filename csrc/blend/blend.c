@@ -37,14 +37,14 @@ typedef struct {
 /* Triangle i, or its pieces, by itself. */
 static __attribute__((noinline)) void blend_alone(blend_state *b, int64_t i)
 {
-    const triangle_parts parts = parts_of(b->scene, i);
+    const triangle_parts parts = parts_of(b->snapped, i);
     if (!parts.n || (b->is_flat && !begin_flat(b, i)))
         return;
     for (int k = 0; k < parts.n; k++) {
         const int32_t *corners = parts.corners + 3 * k;
         if (!b->is_flat)
             begin_gouraud(b, i, &parts.set, corners, parts.is_cut);
-        draw_triangle(&parts.set, corners, (int32_t)i, b->scene, b->window, &b->target, TL_SINK_BLEND);
+        draw_triangle(&parts.set, corners, (int32_t)i, b->snapped, b->window, &b->target, TL_SINK_BLEND);
     }
 }
 
@@ -83,7 +83,7 @@ static __attribute__((noinline)) void flush_blend(blend_pass *p)
         for (int k = 0; k < end; k++) {
             const int64_t id = q->id[i + k];
             if (!b->is_flat)
-                begin_gouraud(b, id, &b->scene->mesh, b->scene->triangles + 3 * id, 0);
+                begin_gouraud(b, id, &b->snapped->mesh, b->snapped->triangles + 3 * id, 0);
             else if (!begin_flat(b, id))
                 continue;
             mix_runs(b, &rows.first[0][k], &rows.n[0][k], TL_MAX_LANES, q->size[i + k] >> 16);
@@ -129,12 +129,12 @@ TL_INLINE void blend_batch(blend_pass *p, const int32_t *corners, vi id, vm live
 static int64_t blend_batches(blend_pass *p)
 {
     batch_state *s = &p->batch;
-    const tl_scene *scene = s->scene;
-    const tl_share all = {.first = 0, .end = scene->n_triangles};
+    const tl_snapped *snapped = s->snapped;
+    const tl_share all = {.first = 0, .end = snapped->n_triangles};
     for (int64_t i = 0; i < all.end && s->bad_row < 0 && !tl_is_given_up(p->mix.window); i += TL_LANES) {
         int32_t corners[3 * TL_LANES];
         tl_count_work(p->mix.window, TL_SETUP_PX * TL_LANES);
-        blend_batch(p, share_corners(scene, &all, i, corners), vi_add(vi_set1((int32_t)i), vi_iota()),
+        blend_batch(p, share_corners(snapped, &all, i, corners), vi_add(vi_set1((int32_t)i), vi_iota()),
                     vm_first(all.end - i));
     }
     flush_blend(p);
@@ -156,12 +156,12 @@ static tl_mix mix_of(const tl_canvas *canvas)
 }
 
 /* A window of fewer than 2^31 samples. */
-static int64_t blend_window(const tl_scene *scene, const tl_window *window, const tl_canvas *canvas)
+static int64_t blend_window(const tl_snapped *snapped, const tl_window *window, const tl_canvas *canvas)
 {
     blend_pass p;
     blend_state *b = &p.mix;
     const int64_t n_channels = canvas->n_channels;
-    b->scene = scene, b->window = window, b->canvas = canvas;
+    b->snapped = snapped, b->window = window, b->canvas = canvas;
     b->packed = canvas->is_u8 ? canvas->packed ? canvas->packed : canvas->pixels : NULL;
     b->floats = canvas->is_u8 ? NULL : canvas->pixels;
     b->stride = canvas->packed ? window->width : canvas->stride_px;
@@ -177,12 +177,12 @@ static int64_t blend_window(const tl_scene *scene, const tl_window *window, cons
     int64_t bad_row = -1;
     if (canvas->is_area) {
         bad_row = blend_areas(b);
-    } else if (scene->method == TL_METHOD_AUTO && is_near(window)) {
-        start_batch(&p.batch, scene, window, &b->target);
+    } else if (snapped->method == TL_METHOD_AUTO && is_near(window)) {
+        start_batch(&p.batch, snapped, window, &b->target);
         bad_row = blend_batches(&p);
     } else {
-        bad_row = first_bad_row(scene->triangles, scene->n_triangles, scene->mesh.n_vertices);
-        for (int64_t i = 0; bad_row < 0 && i < scene->n_triangles && !tl_is_given_up(window); i++) {
+        bad_row = first_bad_row(snapped->triangles, snapped->n_triangles, snapped->mesh.n_vertices);
+        for (int64_t i = 0; bad_row < 0 && i < snapped->n_triangles && !tl_is_given_up(window); i++) {
             tl_count_work(window, TL_SETUP_PX);
             blend_alone(b, i);
         }
@@ -198,13 +198,13 @@ static int64_t blend_window(const tl_scene *scene, const tl_window *window, cons
 #define TL_FEW_TRIANGLES 64
 #define TL_BAND_BYTES (1 << 18)
 
-static int64_t blend(const tl_scene *scene, const tl_window *window, const tl_canvas *canvas)
+static int64_t blend(const tl_snapped *snapped, const tl_window *window, const tl_canvas *canvas)
 {
     const int64_t pixel_bytes = canvas->n_channels * (canvas->is_u8 ? 1 : 4);
     const int64_t fitting = max64(1, (((int64_t)1 << 31) - 1) / canvas->stride_px);
     const int64_t hot = max64(1, TL_BAND_BYTES / (canvas->stride_px * pixel_bytes));
     const int64_t rows_at_once =
-        canvas->ground && scene->n_triangles < TL_FEW_TRIANGLES ? min64(fitting, hot) : fitting;
+        canvas->ground && snapped->n_triangles < TL_FEW_TRIANGLES ? min64(fitting, hot) : fitting;
     for (int64_t row = 0; row < window->height; row += rows_at_once) {
         tl_window band = *window;
         tl_canvas part = *canvas;
@@ -212,7 +212,7 @@ static int64_t blend(const tl_scene *scene, const tl_window *window, const tl_ca
         band.height = min64(rows_at_once, window->height - row);
         part.pixels = (char *)canvas->pixels + row * canvas->stride_px * pixel_bytes;
         part.packed = canvas->packed ? canvas->packed + row * window->width : NULL;
-        const int64_t bad_row = blend_window(scene, &band, &part);
+        const int64_t bad_row = blend_window(snapped, &band, &part);
         if (bad_row >= 0)
             return bad_row;
     }

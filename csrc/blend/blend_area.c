@@ -53,7 +53,7 @@ static __attribute__((noinline)) void flush_atlas(area_pass *p)
         if (b->is_flat && !begin_flat(b, id))
             continue;
         if (!b->is_flat)
-            begin_gouraud(b, id, &b->scene->mesh, b->scene->triangles + 3 * id, 0);
+            begin_gouraud(b, id, &b->snapped->mesh, b->snapped->triangles + 3 * id, 0);
         blend_block(b, &(cell_block){
                            .cells = cells + (int64_t)(p->top[k] + first_row) * TL_ATLAS_COLS,
                            .at = (row + first_row) * b->stride + col,
@@ -95,22 +95,22 @@ static void push_atlas(area_pass *p, vm m, const lane_corners *c, vm turned, vi 
         flush_atlas(p);
 }
 
-/* ---- the scene --------------------------------------------------------------------------------------------------- */
+/* ---- the mesh ---------------------------------------------------------------------------------------------------- */
 
 /* Setup and cull of TL_LANES triangles, which come after all that wait. */
 TL_INLINE void blend_area_batch(area_pass *p, int64_t i, const int32_t *corners, vm live)
 {
-    const tl_scene *scene = p->mix->scene;
+    const tl_snapped *snapped = p->mix->snapped;
     const tl_window *window = p->mix->window;
     const int bits = window->subpixel_bits;
     const vi max_extent = vi_set1(TL_ATLAS_COLS << bits), id = vi_add(vi_set1((int32_t)i), vi_iota());
-    if (has_bad_index(corners, vi_set1((int32_t)(scene->mesh.n_vertices - 1)))) {
+    if (has_bad_index(corners, vi_set1((int32_t)(snapped->mesh.n_vertices - 1)))) {
         p->area.bad_row = i;
         return;
     }
     lane_corners c;
     for (int k = 0; k < 3; k++)
-        load_vertices(scene->mesh.vertices, corners + k, &c.x[k], &c.y[k], &c.z[k]);
+        load_vertices(snapped->mesh.vertices, corners + k, &c.x[k], &c.y[k], &c.z[k]);
     const vi x_min = vi_min(vi_min(c.x[0], c.x[1]), c.x[2]), x_max = vi_max(vi_max(c.x[0], c.x[1]), c.x[2]);
     const vi y_min = vi_min(vi_min(c.y[0], c.y[1]), c.y[2]), y_max = vi_max(vi_max(c.y[0], c.y[1]), c.y[2]);
     const vi col = vi_shift_right(x_min, bits), row = vi_shift_right(y_min, bits);
@@ -133,7 +133,7 @@ TL_INLINE void blend_area_batch(area_pass *p, int64_t i, const int32_t *corners,
     const vd x2 = vd_from_vi(vi_sub(c.x[2], c.x[0])), y2 = vd_from_vi(vi_sub(c.y[2], c.y[0]));
     const vd area = vd_sub(vd_mul(x1, y2), vd_mul(y1, x2));
     const vm is_positive = vd_ge(area, vd_set1(1.0)), is_negative = vd_ge(vd_set1(-1.0), area);
-    const tl_cull cull = scene->cull;
+    const tl_cull cull = snapped->cull;
     drawn = vm_and(drawn, cull == TL_CULL_BACK    ? is_negative
                           : cull == TL_CULL_FRONT ? is_positive
                                                   : vm_or(is_positive, is_negative));
@@ -157,13 +157,13 @@ TL_INLINE void blend_area_batch(area_pass *p, int64_t i, const int32_t *corners,
 /* The window has fewer than 2^31 samples. */
 static int64_t blend_areas(blend_state *b)
 {
-    const tl_scene *scene = b->scene;
+    const tl_snapped *snapped = b->snapped;
     const tl_window *window = b->window,
                     atlas = {0, 0, TL_ATLAS_COLS, TL_ATLAS_ROWS, window->subpixel_bits, TL_TEST_SAMPLE, NULL};
     const int64_t far = (int64_t)1 << 30;
     if (window->x_px <= -far || window->x_px >= far || window->y_px <= -far || window->y_px >= far) {
-        const int64_t bad_row = first_bad_row(scene->triangles, scene->n_triangles, scene->mesh.n_vertices);
-        for (int64_t i = 0; bad_row < 0 && i < scene->n_triangles && !tl_is_given_up(window); i++)
+        const int64_t bad_row = first_bad_row(snapped->triangles, snapped->n_triangles, snapped->mesh.n_vertices);
+        for (int64_t i = 0; bad_row < 0 && i < snapped->n_triangles && !tl_is_given_up(window); i++)
             blend_area_alone(b, i);
         return bad_row;
     }
@@ -171,13 +171,13 @@ static int64_t blend_areas(blend_state *b)
     p.mix = b, p.n = p.n_atlas_rows = 0;
     place_plane(&atlas, &(tl_area){.cells = b->canvas->cells}, &p.area.plane);
     p.area.plane.stride = TL_ATLAS_COLS; /* what an edge adds right of a row is 0 */
-    p.area.scene = scene, p.area.window = &atlas, p.area.bad_row = -1, p.area.is_wide = 0;
+    p.area.snapped = snapped, p.area.window = &atlas, p.area.bad_row = -1, p.area.is_wide = 0;
     memset(p.area.n, 0, sizeof p.area.n);
-    const tl_share all = {.first = 0, .end = scene->n_triangles};
+    const tl_share all = {.first = 0, .end = snapped->n_triangles};
     for (int64_t i = 0; i < all.end && p.area.bad_row < 0 && !tl_is_given_up(window); i += TL_LANES) {
         int32_t corners[3 * TL_LANES];
         tl_count_work(window, TL_SETUP_PX * TL_LANES);
-        blend_area_batch(&p, i, share_corners(scene, &all, i, corners), vm_first(all.end - i));
+        blend_area_batch(&p, i, share_corners(snapped, &all, i, corners), vm_first(all.end - i));
     }
     flush_atlas(&p);
     return p.area.bad_row;

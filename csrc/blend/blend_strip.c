@@ -198,8 +198,8 @@ static void blend_strip(blend_state *b, const tl_triangle *pieces, int64_t n, in
     if (!(left < right))
         return;
     const int64_t col = (int64_t)left;
-    const tl_window strip = {window->x_px + col, window->y_px + row, (int64_t)right - col, n_rows, bits,
-                             TL_TEST_SAMPLE, NULL};
+    const tl_window strip = {
+        window->x_px + col, window->y_px + row, (int64_t)right - col, n_rows, bits, TL_TEST_SAMPLE, NULL};
     area_plane plane;
     fetch_pixels(b, row * b->stride + col, n_rows, min64(strip.width, 128));
     place_plane(&strip, &(tl_area){.cells = b->canvas->cells}, &plane);
@@ -226,11 +226,11 @@ static void blend_strip(blend_state *b, const tl_triangle *pieces, int64_t n, in
 static __attribute__((noinline)) void blend_area_alone(blend_state *b, int64_t i)
 {
     const tl_window *window = b->window;
-    const triangle_parts parts = parts_of(b->scene, i);
+    const triangle_parts parts = parts_of(b->snapped, i);
     int64_t n = 0, top = INT64_MAX, bottom = INT64_MIN, left = INT64_MAX, right = INT64_MIN;
     tl_triangle t[TL_MAX_PIECES];
     for (int k = 0; k < parts.n && n < TL_MAX_PIECES; k++) {
-        if (is_culled(load_triangle(&parts.set, parts.corners + 3 * k, t + n), b->scene->cull))
+        if (is_culled(load_triangle(&parts.set, parts.corners + 3 * k, t + n), b->snapped->cull))
             continue;
         top = min64(top, min3(t[n].y_fx[0], t[n].y_fx[1], t[n].y_fx[2]) >> window->subpixel_bits);
         bottom = max64(bottom, max3(t[n].y_fx[0], t[n].y_fx[1], t[n].y_fx[2]) >> window->subpixel_bits);

@@ -49,7 +49,8 @@ static void begin_gouraud(blend_state *b, int64_t id, const tl_vertex_set *set, 
     b->id = id;
     load_triangle(set, corners, &b->resolve.triangle);
     for (int k = 0; k < 3; k++)
-        b->resolve.piece[k] = is_piece ? b->scene->pieces->weights + 3 * (int64_t)b->resolve.triangle.corner[k] : NULL;
+        b->resolve.piece[k] =
+            is_piece ? b->snapped->pieces->weights + 3 * (int64_t)b->resolve.triangle.corner[k] : NULL;
 }
 
 /* Colours at the centres of n pixels of a row, of which the triangle may cover any part: where the centre lies outside,
@@ -96,8 +97,8 @@ static void color_partly_covered(blend_state *b, int64_t row, int64_t col, int n
  * least of its weights. */
 static void find_piece(blend_state *b, int64_t x_px, int64_t y_px)
 {
-    const tl_pieces *p = b->scene->pieces;
-    const tl_vertex_set set = piece_set(p, &b->scene->mesh);
+    const tl_pieces *p = b->snapped->pieces;
+    const tl_vertex_set set = piece_set(p, &b->snapped->mesh);
     resolve_state best = b->resolve;
     double best_weight = -INFINITY;
     for (int64_t i = first_piece(p, b->id); i < p->n_pieces && p->source[i] == b->id; i++) {
@@ -132,7 +133,7 @@ static __attribute__((noinline)) void color_run(blend_state *b, int64_t at, int 
             const int64_t x_px = col + k + b->window->x_px, y_px = row + b->window->y_px;
             if (canvas->is_area)
                 find_piece(b, x_px, y_px);
-            paint_piece(&b->resolve, b->scene->triangles + 3 * b->id, x_px, y_px, b->window->subpixel_bits,
+            paint_piece(&b->resolve, b->snapped->triangles + 3 * b->id, x_px, y_px, b->window->subpixel_bits,
                         canvas->colors, b->n_channels, canvas->is_u8, (char *)out + k * pixel_bytes);
         }
     } else if (canvas->is_area) {

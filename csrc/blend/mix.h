@@ -33,7 +33,7 @@ TL_INLINE int reads_alpha(tl_mix mode)
 }
 
 typedef struct blend_state {
-    const tl_scene *scene;
+    const tl_snapped *snapped;
     const tl_window *window;
     const tl_canvas *canvas;
     tl_target target; /* for the walkers */

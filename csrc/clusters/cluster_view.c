@@ -1,5 +1,5 @@
 /* What a view draws of a clustered mesh: which clusters it needs, which of them lie behind what is drawn, and a cluster
- * as a scene of its own, whose vertices stay in the first-level cache.
+ * as a mesh of its own, whose vertices stay in the first-level cache.
  * In: a clustered mesh in object space, a matrix; then a depth buffer.  Out: the clusters that may draw a sample;
  * snapped vertices and triangles, which raster.c draws.
  *
@@ -341,16 +341,16 @@ static void survey_clusters(const tl_clustered *mesh, const tl_cluster_view *v, 
     }
 }
 
-/* A cluster as a scene of its own. */
+/* A cluster as a mesh of its own. */
 typedef struct {
-    tl_scene scene;
+    tl_snapped snapped;
     tl_vertex vertices[TL_CLUSTER + TL_CLUSTER_TAIL];
     int32_t corners[3 * (TL_CLUSTER + TL_MAX_LANES)];
     int32_t names[TL_CLUSTER];
-} cluster_scene;
+} cluster_mesh;
 
 /* Lists the triangles that have a special corner, and leaves the others, whose number it returns. */
-static __attribute__((noinline)) int64_t list_special(cluster_scene *own, int64_t n, tl_share *share)
+static __attribute__((noinline)) int64_t list_special(cluster_mesh *own, int64_t n, tl_share *share)
 {
     int64_t n_left = 0;
     for (int64_t i = 0; i < n; i++) {
@@ -358,7 +358,7 @@ static __attribute__((noinline)) int64_t list_special(cluster_scene *own, int64_
         int is_special = 0;
         for (int k = 0; k < 3; k++)
             is_special |= own->vertices[corners[k]].x_fx == TL_SPECIAL;
-        const int32_t name = own->scene.names[i];
+        const int32_t name = own->snapped.names[i];
         if (is_special) {
             share->others[share->n_others++] = name;
             continue;
@@ -366,13 +366,13 @@ static __attribute__((noinline)) int64_t list_special(cluster_scene *own, int64_
         memmove(own->corners + 3 * n_left, corners, 3 * sizeof *corners);
         own->names[n_left++] = name;
     }
-    own->scene.names = own->names;
+    own->snapped.names = own->names;
     return n_left;
 }
 
 /* Snaps the vertices of a cluster and unpacks its triangles; returns how many of them there are to draw. */
-static int64_t load_cluster(const tl_cluster *c, const tl_cluster_pass *pass, const tl_scene *scene, tl_share *share,
-                            cluster_scene *own)
+static int64_t load_cluster(const tl_cluster *c, const tl_cluster_pass *pass, const tl_snapped *snapped,
+                            tl_share *share, cluster_mesh *own)
 {
     const uint8_t *corners = pass->mesh->corners + 3 * c->first_triangle;
     const size_t row_bytes =
@@ -383,12 +383,12 @@ static int64_t load_cluster(const tl_cluster *c, const tl_cluster_pass *pass, co
     /* whole vectors: those of other clusters that this snaps are not looked at */
     const int64_t n = ((int64_t)c->n_vertices + TL_LANES - 1) / TL_LANES * TL_LANES;
     const tl_vertex_counts counts = project(&source, 0, n, pass->view, own->vertices, NULL);
-    own->scene = *scene;
-    own->scene.mesh.vertices = own->vertices;
-    own->scene.mesh.n_vertices = TL_CLUSTER;
-    own->scene.triangles = own->corners;
-    own->scene.n_triangles = c->n_triangles;
-    own->scene.names = pass->mesh->names + c->first_triangle;
+    own->snapped = *snapped;
+    own->snapped.mesh.vertices = own->vertices;
+    own->snapped.mesh.n_vertices = TL_CLUSTER;
+    own->snapped.triangles = own->corners;
+    own->snapped.n_triangles = c->n_triangles;
+    own->snapped.names = pass->mesh->names + c->first_triangle;
     for (int i = 0; i < 3 * c->n_triangles; i++)
         own->corners[i] = corners[i];
     memset(own->corners + 3 * c->n_triangles, 0, 3 * TL_LANES * sizeof *own->corners);

@@ -163,7 +163,7 @@ TL_INLINE void draw_far_batch(exact_state *s, tl_sink sink, const int32_t *corne
 }
 
 /* The window has fewer than 2^31 samples and lies within 2^48 pixels of 0, where centres and samples are float64. */
-static void start_exact(exact_state *s, const tl_scene *scene, const tl_exact_points *points, const tl_window *window,
+static void start_exact(exact_state *s, const tl_snapped *scene, const tl_exact_points *points, const tl_window *window,
                         const tl_target *target, tl_exact_counts *counts)
 {
     s->scene = scene, s->points = points, s->window = window, s->target = target, s->counts = counts;
@@ -176,7 +176,7 @@ static void start_exact(exact_state *s, const tl_scene *scene, const tl_exact_po
     memset(s->fragments.sample, 0, sizeof s->fragments.sample); /* what is prefetched behind the end of the list */
 }
 
-TL_INLINE void draw_exact_scene(const tl_scene *scene, const tl_exact_points *points, const tl_window *window,
+TL_INLINE void draw_exact_scene(const tl_snapped *scene, const tl_exact_points *points, const tl_window *window,
                                 const tl_target *target, const tl_share *share, tl_exact_counts *counts,
                                 int64_t *bad_row, tl_sink sink)
 {
@@ -207,11 +207,11 @@ TL_INLINE void draw_exact_scene(const tl_scene *scene, const tl_exact_points *po
 }
 
 TL_SINK_COPIES(draw_exact_scene,
-               (const tl_scene *scene, const tl_exact_points *points, const tl_window *window, const tl_target *target,
+               (const tl_snapped *scene, const tl_exact_points *points, const tl_window *window, const tl_target *target,
                 const tl_share *share, tl_exact_counts *counts, int64_t *bad_row),
                scene, points, window, target, share, counts, bad_row)
 
-static int64_t draw_exact(const tl_scene *scene, const tl_exact_points *points, const tl_window *window,
+static int64_t draw_exact(const tl_snapped *scene, const tl_exact_points *points, const tl_window *window,
                           const tl_target *target, const tl_share *share, tl_exact_counts *counts)
 {
     const int64_t pixel_bytes = target->sink == TL_SINK_MASK ? 1 : 4;

@@ -46,7 +46,7 @@ typedef struct {
 
 /* Everything that one pass over a scene needs; on the stack of draw_exact. */
 typedef struct {
-    const tl_scene *scene;
+    const tl_snapped *scene;
     const tl_exact_points *points;
     const tl_window *window;
     const tl_target *target;

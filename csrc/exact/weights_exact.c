@@ -64,7 +64,7 @@ static int64_t first_exact_piece(const tl_exact_pieces *p, int64_t id)
 }
 
 /* Makes `t` describe the triangle or piece that shows at the sample; 0 when the buffer does not belong to the scene. */
-static int find_weighed(weighed_exact *t, const tl_scene *scene, const tl_exact_points *points,
+static int find_weighed(weighed_exact *t, const tl_snapped *scene, const tl_exact_points *points,
                         const tl_exact_pieces *pieces, int64_t id, exact_point sample)
 {
     if (id == t->id && !t->piece[0])
@@ -121,7 +121,7 @@ static void weights_of_sample(const weighed_exact *t, exact_point s, double *wei
             weights[j] += part[k] / sum * t->piece[k][j];
 }
 
-static void weigh_exact(const tl_scene *scene, const tl_exact_points *points, const tl_exact_pieces *pieces,
+static void weigh_exact(const tl_snapped *scene, const tl_exact_points *points, const tl_exact_pieces *pieces,
                         const tl_window *window, const int32_t *ids, const float *values, int n_values, int per_corner,
                         float background, float *restrict out)
 {

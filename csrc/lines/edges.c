@@ -16,7 +16,6 @@
 #include "vertex/clip.c"
 #include "vertex/project.c"
 #include "raster/setup.c"
-#include "raster/sides.c"
 
 /* The corners in ascending order: the lowest is the lower index of two edges, the middle one of the third. */
 static inline void sort_corners(const int32_t *c, int32_t *sorted)
@@ -30,15 +29,15 @@ static inline void sort_corners(const int32_t *c, int32_t *sorted)
 
 /* Writes the numbers of edges by lower index to counts[1 + index], 0 there before.  Returns the first row with an index
  * outside the vertices, or -1. */
-static int64_t count_edges(const tl_scene *scene, int64_t *restrict counts)
+static int64_t count_edges(const tl_snapped *snapped, int64_t *restrict counts)
 {
-    const uint32_t n_vertices = (uint32_t)scene->mesh.n_vertices;
-    for (int64_t i = 0; i < scene->n_triangles; i++) {
-        const int32_t *c = scene->triangles + 3 * i;
+    const uint32_t n_vertices = (uint32_t)snapped->mesh.n_vertices;
+    for (int64_t i = 0; i < snapped->n_triangles; i++) {
+        const int32_t *c = snapped->triangles + 3 * i;
         int32_t sorted[3];
         if ((uint32_t)c[0] >= n_vertices || (uint32_t)c[1] >= n_vertices || (uint32_t)c[2] >= n_vertices)
             return i;
-        if (scene->cull != TL_CULL_NONE && !shows_side(scene, i))
+        if (snapped->cull != TL_CULL_NONE && !shows_side(snapped, i))
             continue;
         sort_corners(c, sorted);
         counts[1 + sorted[0]] += 2;
@@ -48,13 +47,13 @@ static int64_t count_edges(const tl_scene *scene, int64_t *restrict counts)
 }
 
 /* Writes the higher indices, grouped by lower index; starts[v] becomes the end of the group of v. */
-static void group_edges(const tl_scene *scene, int64_t *restrict starts, int32_t *restrict highs)
+static void group_edges(const tl_snapped *snapped, int64_t *restrict starts, int32_t *restrict highs)
 {
-    for (int64_t i = 0; i < scene->n_triangles; i++) {
+    for (int64_t i = 0; i < snapped->n_triangles; i++) {
         int32_t sorted[3];
-        if (scene->cull != TL_CULL_NONE && !shows_side(scene, i))
+        if (snapped->cull != TL_CULL_NONE && !shows_side(snapped, i))
             continue;
-        sort_corners(scene->triangles + 3 * i, sorted);
+        sort_corners(snapped->triangles + 3 * i, sorted);
         const int64_t at = starts[sorted[0]];
         highs[at] = sorted[1];
         highs[at + 1] = sorted[2];
@@ -63,20 +62,20 @@ static void group_edges(const tl_scene *scene, int64_t *restrict starts, int32_t
     }
 }
 
-static int64_t list_edges(const tl_scene *scene, const tl_edge_scratch *scratch, uint64_t *restrict edges,
+static int64_t list_edges(const tl_snapped *snapped, const tl_edge_scratch *scratch, uint64_t *restrict edges,
                           int64_t *n_edges)
 {
-    const int64_t n_vertices = scene->mesh.n_vertices;
+    const int64_t n_vertices = snapped->mesh.n_vertices;
     int64_t *restrict starts = scratch->starts, n = 0;
     int32_t *restrict highs = scratch->highs, *restrict last_low = scratch->last_low;
     memset(starts, 0, (size_t)(n_vertices + 1) * sizeof *starts);
     memset(last_low, 0xff, (size_t)n_vertices * sizeof *last_low);
-    const int64_t bad_row = count_edges(scene, starts);
+    const int64_t bad_row = count_edges(snapped, starts);
     if (bad_row >= 0)
         return bad_row;
     for (int64_t v = 0; v < n_vertices; v++)
         starts[v + 1] += starts[v];
-    group_edges(scene, starts, highs);
+    group_edges(snapped, starts, highs);
     for (int64_t low = 0, k = 0; low < n_vertices; low++)
         for (; k < starts[low]; k++) {
             const int32_t high = highs[k];

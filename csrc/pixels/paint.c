@@ -149,7 +149,7 @@ static void paint_run(resolve_state *s, const tl_window *window, int64_t row, in
     }
 }
 
-static void paint_gouraud(const tl_scene *scene, const tl_window *window, const int32_t *labels, const void *colors,
+static void paint_gouraud(const tl_snapped *snapped, const tl_window *window, const int32_t *labels, const void *colors,
                           int n_channels, int is_u8, void *pixels)
 {
     resolve_state s = {.id = -1};
@@ -161,14 +161,14 @@ static void paint_gouraud(const tl_scene *scene, const tl_window *window, const 
             for (n = 1; n < TL_CHUNK && col + n < window->width && label[col + n] == label[col];)
                 n++;
             const int64_t x_px = col + window->x_px, y_px = row + window->y_px;
-            if (label[col] < 0 || !find_triangle(&s, scene, label[col], x_px, y_px, bits))
+            if (label[col] < 0 || !find_triangle(&s, snapped, label[col], x_px, y_px, bits))
                 continue;
             if (!s.piece[0]) {
                 paint_run(&s, window, row, col, (int)n, colors, n_channels, is_u8, out + col * pixel_bytes);
                 continue;
             }
             n = 1; /* the next sample may belong to another piece */
-            paint_piece(&s, scene->triangles + 3 * (int64_t)label[col], x_px, y_px, bits, colors, n_channels, is_u8,
+            paint_piece(&s, snapped->triangles + 3 * (int64_t)label[col], x_px, y_px, bits, colors, n_channels, is_u8,
                         out + col * pixel_bytes);
         }
     }

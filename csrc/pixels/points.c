@@ -1,6 +1,6 @@
 /* Points: where in space the pixels of a visibility buffer lie, and what follows from that: distances, and ways in the
  * picture.
- * In: ids, the scene they were drawn from, positions of its vertices.  Out: float32, or float64, of each pixel.
+ * In: ids, the mesh they were drawn from, positions of its vertices.  Out: float32, or float64, of each pixel.
  *
  * A point has the weights of its pixel in its triangle, relative to the first corner: it lies on the triangle.  A
  * number that depends linearly on the point is computed at the corners, and interpolated.  All is float64, rounded once
@@ -119,11 +119,11 @@ TL_INLINE void write_points(point_span *r, const tl_points *points, int n_number
     }
 }
 
-static void fill_points(const tl_scene *scene, const tl_window *window, const tl_points *points, const int32_t *ids,
+static void fill_points(const tl_snapped *snapped, const tl_window *window, const tl_points *points, const int32_t *ids,
                         void *out)
 {
     point_span r;
-    start_weights(&r.weighed, scene, window);
+    start_weights(&r.weighed, snapped, window);
     memset(r.value, 0, sizeof r.value);
     for (int64_t row = 0; row < window->height; row++)
         for (int64_t column = 0; column < window->width; column += TL_SPAN) {

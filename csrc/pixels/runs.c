@@ -56,7 +56,7 @@ typedef struct {
 } special_run;
 
 typedef struct {
-    const tl_scene *scene;
+    const tl_snapped *snapped;
     const tl_window *window;
     const tl_shading *shading;
     const tl_view *view;
@@ -75,10 +75,10 @@ typedef struct {
     special_run special[TL_SPAN];
 } shade_runs;
 
-/* Lists the runs of n ids; run r stands in slot TL_LANES + r.  Ids outside the scene count as background. */
+/* Lists the runs of n ids; run r stands in slot TL_LANES + r.  Ids outside the mesh count as background. */
 TL_INLINE void find_runs(shade_runs *s, const int32_t *ids, int n)
 {
-    const vi none = vi_set1(-1), end = vi_set1((int32_t)s->scene->n_triangles);
+    const vi none = vi_set1(-1), end = vi_set1((int32_t)s->snapped->n_triangles);
     vi before = none;
     int slot = TL_LANES;
     for (int x = 0, i = 0; x < n; x += TL_LANES, i++) {
@@ -100,17 +100,17 @@ TL_INLINE void find_runs(shade_runs *s, const int32_t *ids, int n)
 TL_INLINE vm run_corners(const shade_runs *s, int slot, int32_t corners[3][TL_MAX_LANES])
 {
     const int32_t *ids = s->ints[RUN_ID] + slot;
-    const vi last = vi_set1((int32_t)s->scene->mesh.n_vertices - 1), zero = vi_set1(0);
+    const vi last = vi_set1((int32_t)s->snapped->mesh.n_vertices - 1), zero = vi_set1(0);
     vi c[4];
     vm is_there = vm_all();
     if (TL_LANES > 1 && !vm_any(vi_eq(vi_load(ids), zero))) {
         /* 16 bytes, from the number before the triangle on */
-        vi_load_records((const char *)s->scene->triangles - 4, 12, ids, c);
+        vi_load_records((const char *)s->snapped->triangles - 4, 12, ids, c);
     } else {
         int32_t own[3][TL_MAX_LANES];
         for (int lane = 0; lane < TL_LANES; lane++)
             for (int k = 0; k < 3; k++)
-                own[k][lane] = s->scene->triangles[3 * (int64_t)ids[lane] + k];
+                own[k][lane] = s->snapped->triangles[3 * (int64_t)ids[lane] + k];
         for (int k = 0; k < 3; k++)
             c[k + 1] = vi_load(own[k]);
     }
@@ -391,7 +391,7 @@ static void homogeneous_edges(special_run *e, const tl_view *view, const tl_vert
 /* Sets up one run by itself and puts it into its lane. */
 static void set_special(shade_runs *s, int slot, int lane, int64_t row, run_setup *r)
 {
-    const tl_vertex_set *set = &s->scene->mesh;
+    const tl_vertex_set *set = &s->snapped->mesh;
     const int32_t corners[3] = {r->corners[0][lane], r->corners[1][lane], r->corners[2][lane]};
     const int bits = s->window->subpixel_bits, is_cut = s->view && is_clipped(set, corners);
     const double y = center_fx(row + s->window->y_px, bits), unit = (double)(1 << bits);
@@ -431,7 +431,7 @@ static void set_special(shade_runs *s, int slot, int lane, int64_t row, run_setu
  * pixel. */
 TL_INLINE vm set_edges(shade_runs *s, int slot, int64_t row, run_setup *r)
 {
-    const tl_vertex_set *set = &s->scene->mesh;
+    const tl_vertex_set *set = &s->snapped->mesh;
     const int bits = s->window->subpixel_bits;
     const int32_t half = (1 << bits) >> 1;
     const vi px = vi_set1((int32_t)((uint32_t)s->window->x_px << bits) + half + set->sample_x_fx);

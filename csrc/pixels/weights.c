@@ -1,5 +1,5 @@
 /* Weights: those of the three corners at the pixels of a visibility buffer, in float64, a vector of pixels at a time.
- * In: ids, the scene they were drawn from.  Out: barycentric weights, or values of the vertices.
+ * In: ids, the mesh they were drawn from.  Out: barycentric weights, or values of the vertices.
  *
  * The bits are those of weights_of_pixel: edge functions are integers below 2^53, so float64 has them exactly, and
  * every operation after that is the same.  What does not fit is left to weights_of_pixel itself, pixel by pixel:
@@ -34,22 +34,22 @@ typedef struct {
     _Alignas(64) double w[3][TL_SPAN + TL_MAX_LANES]; /* the weights of the pixels of the span */
 } weighed_span;
 
-static void start_weights(weighed_span *r, const tl_scene *scene, const tl_window *window)
+static void start_weights(weighed_span *r, const tl_snapped *snapped, const tl_window *window)
 {
-    const tl_source *source = scene->mesh.source;
+    const tl_source *source = snapped->mesh.source;
     shade_runs *s = &r->runs;
-    s->scene = scene, s->window = window;
+    s->snapped = snapped, s->window = window;
     memset(s->ints, 0, sizeof s->ints);
     memset(r->q, 0, sizeof r->q);
     memset(r->corners, 0, sizeof r->corners);
     r->alone.id = -1;
-    r->has_w = scene->mesh.inv_w || (source && !(source->matrix && source->is_affine));
+    r->has_w = snapped->mesh.inv_w || (source && !(source->matrix && source->is_affine));
 }
 
 /* How a run that int32 does not hold is to be weighed. */
 static int32_t weigh_special(shade_runs *s, const int32_t *corners, int64_t row)
 {
-    const tl_vertex_set *set = &s->scene->mesh;
+    const tl_vertex_set *set = &s->snapped->mesh;
     double x_fx[3], y_fx[3], low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
     float row_step[3];
     for (int k = 0; k < 3; k++) {
@@ -90,7 +90,7 @@ TL_INLINE void load_run_corners(weighed_span *r)
         for (int k = 0; k < 3; k++) {
             vi_store(r->corners[k] + slot, vi_load(corners[k]));
             if (r->has_w)
-                load_inverse_w(&s->scene->mesh, corners[k], r->q[k] + slot);
+                load_inverse_w(&s->snapped->mesh, corners[k], r->q[k] + slot);
         }
     }
 }
@@ -156,7 +156,7 @@ static void set_lonely_weights(weighed_span *r, const shaded_lanes *p, vi specia
         const int lane = __builtin_ctz(rest);
         const int64_t x_px = column[lane] + window->x_px, y_px = row + window->y_px;
         double w[3];
-        if (!find_triangle(&r->alone, r->runs.scene, id[lane], x_px, y_px, window->subpixel_bits)) {
+        if (!find_triangle(&r->alone, r->runs.snapped, id[lane], x_px, y_px, window->subpixel_bits)) {
             r->runs.visible[i] &= ~(1u << lane);
             continue;
         }
@@ -223,11 +223,11 @@ TL_INLINE void store_channels(float *restrict out, int64_t step, int n, const vf
             out[lane * step + c] = lanes[c][lane];
 }
 
-static void barycentric(const tl_scene *scene, const tl_window *window, const int32_t *ids, float *restrict out)
+static void barycentric(const tl_snapped *snapped, const tl_window *window, const int32_t *ids, float *restrict out)
 {
     weighed_span r;
     const vf zero = vf_set1(0.0f);
-    start_weights(&r, scene, window);
+    start_weights(&r, snapped, window);
     for (int64_t row = 0; row < window->height; row++)
         for (int64_t column = 0; column < window->width; column += TL_SPAN) {
             const int64_t at = row * window->width + column;
@@ -306,12 +306,12 @@ TL_INLINE void interpolate_span(weighed_span *r, const vertex_values *values, in
     }
 }
 
-static void interpolate(const tl_scene *scene, const tl_window *window, const int32_t *ids, const float *values,
+static void interpolate(const tl_snapped *snapped, const tl_window *window, const int32_t *ids, const float *values,
                         int n_values, int per_corner, float background, float *restrict out)
 {
     const vertex_values read = {values, n_values, per_corner, background};
     weighed_span r;
-    start_weights(&r, scene, window);
+    start_weights(&r, snapped, window);
     for (int64_t row = 0; row < window->height; row++)
         for (int64_t column = 0; column < window->width; column += TL_SPAN) {
             const int64_t at = row * window->width + column;

@@ -57,29 +57,29 @@ static int load_resolved(resolve_state *s, const tl_vertex_set *set, const int32
     return 1;
 }
 
-/* Makes `s` describe the triangle or piece that shows at the pixel; 0 when the buffer does not belong to the scene. */
-static int find_triangle(resolve_state *s, const tl_scene *scene, int64_t id, int64_t x_px, int64_t y_px, int bits)
+/* Makes `s` describe the triangle or piece that shows at the pixel; 0 when the buffer does not belong to the mesh. */
+static int find_triangle(resolve_state *s, const tl_snapped *snapped, int64_t id, int64_t x_px, int64_t y_px, int bits)
 {
     if (id == s->id && !s->piece[0])
         return 1;
     s->id = -1;
-    if (id < 0 || id >= scene->n_triangles)
+    if (id < 0 || id >= snapped->n_triangles)
         return 0;
-    const int32_t *corners = scene->triangles + 3 * id;
+    const int32_t *corners = snapped->triangles + 3 * id;
     for (int k = 0; k < 3; k++)
-        if (corners[k] < 0 || corners[k] >= scene->mesh.n_vertices) /* the caller's array may have changed */
+        if (corners[k] < 0 || corners[k] >= snapped->mesh.n_vertices) /* the caller's array may have changed */
             return 0;
-    if (!is_clipped(&scene->mesh, corners)) {
+    if (!is_clipped(&snapped->mesh, corners)) {
         s->piece[0] = NULL;
-        if (!load_resolved(s, &scene->mesh, corners))
+        if (!load_resolved(s, &snapped->mesh, corners))
             return 0;
         s->id = id;
         return 1;
     }
-    if (!scene->pieces)
+    if (!snapped->pieces)
         return 0;
-    const tl_pieces *p = scene->pieces;
-    const tl_vertex_set cut = piece_set(p, &scene->mesh);
+    const tl_pieces *p = snapped->pieces;
+    const tl_vertex_set cut = piece_set(p, &snapped->mesh);
     for (int64_t i = first_piece(p, id); i < p->n_pieces && p->source[i] == id; i++) {
         if (!load_resolved(s, &cut, p->triangles + 3 * i) || !covers(&s->triangle, x_px, y_px, bits))
             continue;

@@ -89,45 +89,45 @@ TL_INLINE void walk_rows(const tl_triangle *t, const tl_window *window, const tl
 #define TL_EDGE_MAX_WIDTH 6
 
 /* What stands in the picture for triangles. */
-TL_INLINE vi names_of(const tl_scene *scene, vm m, vi id)
+TL_INLINE vi names_of(const tl_snapped *snapped, vm m, vi id)
 {
-    return vi_add(scene->names ? vi_gather(m, scene->names, id) : id, vi_set1(scene->first_id));
+    return vi_add(snapped->names ? vi_gather(m, snapped->names, id) : id, vi_set1(snapped->first_id));
 }
-TL_INLINE int32_t name_of(const tl_scene *scene, int32_t id)
+TL_INLINE int32_t name_of(const tl_snapped *snapped, int32_t id)
 {
-    return (scene->names ? scene->names[id] : id) + scene->first_id;
+    return (snapped->names ? snapped->names[id] : id) + snapped->first_id;
 }
 
 /* Whether a triangle that is set up is walked by float64 row ends; if not, sample by sample or by exact row ends. */
-TL_INLINE int takes_rows(const tl_triangle *t, const tl_scene *scene, const tl_window *window, tl_sink sink)
+TL_INLINE int takes_rows(const tl_triangle *t, const tl_snapped *snapped, const tl_window *window, tl_sink sink)
 {
-    return scene->method == TL_METHOD_AUTO && rows_fit(t, window, window->test != TL_TEST_SAMPLE) &&
+    return snapped->method == TL_METHOD_AUTO && rows_fit(t, window, window->test != TL_TEST_SAMPLE) &&
            (!sink_has_depth(sink) || t->has_plane);
 }
-TL_INLINE int takes_edge(const tl_triangle *t, const tl_scene *scene)
+TL_INLINE int takes_edge(const tl_triangle *t, const tl_snapped *snapped)
 {
-    return scene->method == TL_METHOD_EDGE ||
-           (scene->method == TL_METHOD_AUTO && t->col1 - t->col0 <= TL_EDGE_MAX_WIDTH);
+    return snapped->method == TL_METHOD_EDGE ||
+           (snapped->method == TL_METHOD_AUTO && t->col1 - t->col0 <= TL_EDGE_MAX_WIDTH);
 }
 
 /* Counts a triangle as draw_triangle would draw it. */
-TL_INLINE void count_drawn(tl_triangle *t, const tl_scene *scene, const tl_window *window, tl_census *census)
+TL_INLINE void count_drawn(tl_triangle *t, const tl_snapped *snapped, const tl_window *window, tl_census *census)
 {
     t->has_plane = 0;
     setup_sink(t, window, census->sink);
-    const tl_class narrow = takes_edge(t, scene) ? TL_CLASS_EDGE_64 : TL_CLASS_SPAN_64;
-    const tl_class wide = takes_edge(t, scene) ? TL_CLASS_EDGE_128 : TL_CLASS_SPAN_128;
-    const tl_class walker = takes_rows(t, scene, window, census->sink) ? TL_CLASS_LONG : t->is_narrow ? narrow : wide;
+    const tl_class narrow = takes_edge(t, snapped) ? TL_CLASS_EDGE_64 : TL_CLASS_SPAN_64;
+    const tl_class wide = takes_edge(t, snapped) ? TL_CLASS_EDGE_128 : TL_CLASS_SPAN_128;
+    const tl_class walker = takes_rows(t, snapped, window, census->sink) ? TL_CLASS_LONG : t->is_narrow ? narrow : wide;
     count_one(census, walker, t, window->subpixel_bits);
 }
 
 /* One triangle by itself: any range, any method. */
-TL_INLINE void draw_triangle(const tl_vertex_set *set, const int32_t *corners, int32_t id, const tl_scene *scene,
+TL_INLINE void draw_triangle(const tl_vertex_set *set, const int32_t *corners, int32_t id, const tl_snapped *snapped,
                              const tl_window *window, const tl_target *target, tl_sink sink)
 {
     tl_triangle t;
     const int sign = load_triangle(set, corners, &t);
-    if (is_culled(sign, scene->cull)) {
+    if (is_culled(sign, snapped->cull)) {
         count_faceless_one(target, sink, sign);
         return;
     }
@@ -136,14 +136,14 @@ TL_INLINE void draw_triangle(const tl_vertex_set *set, const int32_t *corners, i
         return;
     }
     tl_count_work(window, (t.row1 - t.row0) * (t.col1 - t.col0));
-    t.id = name_of(scene, id);
+    t.id = name_of(snapped, id);
     if (sink == TL_SINK_CENSUS) {
-        count_drawn(&t, scene, window, target->census);
+        count_drawn(&t, snapped, window, target->census);
         return;
     }
     setup_sink(&t, window, sink);
-    const int by_edge = takes_edge(&t, scene);
-    if (takes_rows(&t, scene, window, sink))
+    const int by_edge = takes_edge(&t, snapped);
+    if (takes_rows(&t, snapped, window, sink))
         walk_rows(&t, window, target, sink);
     else if (t.is_narrow && by_edge)
         walk_edge_64(&t, window, target, sink);
@@ -185,7 +185,7 @@ static row_span square_span(const tl_triangle *t, const tl_window *window, int64
 
 /* Counts the squares that any of a triangle's pieces meets, or holds: a square may meet several, and counts once. */
 static __attribute__((noinline)) void count_squares(const tl_vertex_set *set, const int32_t *corners, int n_pieces,
-                                                    const tl_scene *scene, const tl_window *window,
+                                                    const tl_snapped *snapped, const tl_window *window,
                                                     const tl_target *target)
 {
     tl_triangle t[TL_MAX_PIECES];
@@ -193,7 +193,7 @@ static __attribute__((noinline)) void count_squares(const tl_vertex_set *set, co
     int n = 0;
     for (int i = 0; i < n_pieces && n < TL_MAX_PIECES; i++) {
         const int sign = load_triangle(set, corners + 3 * i, &t[n]);
-        if (is_culled(sign, scene->cull) || !clip_box(&t[n], window))
+        if (is_culled(sign, snapped->cull) || !clip_box(&t[n], window))
             continue;
         row0 = min64(row0, t[n].row0);
         row1 = max64(row1, t[n].row1);
@@ -216,19 +216,19 @@ static __attribute__((noinline)) void count_squares(const tl_vertex_set *set, co
 }
 
 /* Triangle i, or its pieces, by itself. */
-TL_INLINE void draw_alone(const tl_scene *scene, int64_t i, const tl_window *window, const tl_target *target,
+TL_INLINE void draw_alone(const tl_snapped *snapped, int64_t i, const tl_window *window, const tl_target *target,
                           tl_sink sink)
 {
-    const triangle_parts parts = parts_of(scene, i);
+    const triangle_parts parts = parts_of(snapped, i);
     if (sink == TL_SINK_COUNT && window->test != TL_TEST_SAMPLE && parts.n > 1) {
-        count_squares(&parts.set, parts.corners, parts.n, scene, window, target);
+        count_squares(&parts.set, parts.corners, parts.n, snapped, window, target);
         return;
     }
     for (int k = 0; k < parts.n; k++)
-        draw_triangle(&parts.set, parts.corners + 3 * k, (int32_t)i, scene, window, target, sink);
+        draw_triangle(&parts.set, parts.corners + 3 * k, (int32_t)i, snapped, window, target, sink);
 }
 
-TL_SINK_COPIES(draw_alone, (const tl_scene *scene, int64_t i, const tl_window *window, const tl_target *target), scene,
-               i, window, target)
+TL_SINK_COPIES(draw_alone, (const tl_snapped *snapped, int64_t i, const tl_window *window, const tl_target *target),
+               snapped, i, window, target)
 
 #endif

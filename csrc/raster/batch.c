@@ -36,7 +36,7 @@ typedef struct {
     int32_t id[TL_QUEUE + TL_MAX_LANES];
 } box_queue;
 
-/* What one pass needs to know of the window and the scene, in int32. */
+/* What one pass needs to know of the window and the mesh, in int32. */
 typedef struct {
     int32_t left, top, right, bottom;    /* picture pixels */
     int32_t picture_top, picture_bottom; /* rows of the picture that other passes draw */
@@ -47,9 +47,9 @@ typedef struct {
     int second, third; /* which corner comes second and third: culled faces then have negative area */
 } batch_limits;
 
-/* Everything that one pass over a scene needs; on the stack of draw. */
+/* Everything that one pass over a mesh needs; on the stack of draw. */
 typedef struct batch_state {
-    const tl_scene *scene;
+    const tl_snapped *snapped;
     const tl_window *window;
     const tl_target *target;
     tl_share *share;
@@ -92,13 +92,13 @@ typedef struct {
 
 TL_INLINE void load_corners(const batch_state *s, const int32_t *corners, lane_corners *c)
 {
-    const tl_vertex *vertices = s->scene->mesh.vertices;
+    const tl_vertex *vertices = s->snapped->mesh.vertices;
     load_vertices(vertices, corners, &c->x[0], &c->y[0], &c->z[0]);
     load_vertices(vertices, corners + s->limits.second, &c->x[1], &c->y[1], &c->z[1]);
     load_vertices(vertices, corners + s->limits.third, &c->x[2], &c->y[2], &c->z[2]);
     for (int k = 0; k < 3; k++) {
-        c->x[k] = vi_sub(c->x[k], vi_set1(s->scene->mesh.sample_x_fx));
-        c->y[k] = vi_sub(c->y[k], vi_set1(s->scene->mesh.sample_y_fx));
+        c->x[k] = vi_sub(c->x[k], vi_set1(s->snapped->mesh.sample_x_fx));
+        c->y[k] = vi_sub(c->y[k], vi_set1(s->snapped->mesh.sample_y_fx));
     }
 }
 
@@ -145,7 +145,7 @@ TL_INLINE int load_batch(batch_state *s, const int32_t *corners, vi id, vm live,
     const vm too_tall = vi_gt_unsigned(vi_sub(b->y_max, b->y_min), max_extent);
     b->alone = vm_and(live, vm_or(vm_or(too_wide, too_tall), vi_eq(b->x_min, vi_set1(limits->special_x))));
     b->area = area_lanes(c);
-    b->absolute = s->scene->cull == TL_CULL_NONE ? vi_max(b->area, vi_sub(zero, b->area)) : b->area;
+    b->absolute = s->snapped->cull == TL_CULL_NONE ? vi_max(b->area, vi_sub(zero, b->area)) : b->area;
     b->drawn = vm_and_not(vm_and(live, vi_gt(b->absolute, zero)), b->alone);
     return 1;
 }
@@ -191,7 +191,7 @@ TL_INLINE void setup_edges_lanes(lane_triangles *t, const tl_window *window, tl_
 TL_INLINE void place_triangles(const batch_state *s, tl_sink sink, const lane_corners *c, vi col, vi row,
                                lane_triangles *t, vd *z)
 {
-    const int bits = s->window->subpixel_bits, either_turn = s->scene->cull == TL_CULL_NONE;
+    const int bits = s->window->subpixel_bits, either_turn = s->snapped->cull == TL_CULL_NONE;
     const vi centre_x = vi_add(vi_shift_left(col, bits + 1), vi_set1(1 << bits));
     const vi centre_y = vi_add(vi_shift_left(row, bits + 1), vi_set1(1 << bits));
     vi x[3] = {c->x[0], c->x[1], c->x[2]}, y[3] = {c->y[0], c->y[1], c->y[2]};
@@ -336,7 +336,7 @@ TL_INLINE void pop(const batch_state *s, tl_sink sink, const box_queue *q, int i
     int32_t corners[3 * TL_LANES];
     lane_corners c;
     for (int k = 0; k < TL_LANES; k++) /* lanes behind the end repeat the last triangle */
-        memcpy(corners + 3 * k, s->scene->triangles + 3 * (int64_t)q->id[i + k < n ? i + k : n - 1],
+        memcpy(corners + 3 * k, s->snapped->triangles + 3 * (int64_t)q->id[i + k < n ? i + k : n - 1],
                3 * sizeof *corners);
     load_corners(s, corners, &c);
     place_triangles(s, sink, &c, vi_load(q->col + i), vi_load(q->row + i), t, z);
@@ -371,7 +371,7 @@ TL_INLINE void flush_small(batch_state *s, tl_sink sink)
         const vi sample = t.sample, size = vi_load(q->size + i);
         const vi n_cols = vi_and(size, vi_set1(0xffff)), n_rows = vi_shift_right(size, 16);
         const vm live = vm_first(n - i);
-        const vi id = names_of(s->scene, live, vi_load(q->id + i));
+        const vi id = names_of(s->snapped, live, vi_load(q->id + i));
         for (int row = 0; row < TL_SMALL_BOX; row++) {
             const vm in_row = vm_and(live, vi_gt(n_rows, vi_set1(row)));
             vi e0 = t.e[0], e1 = t.e[1], e2 = t.e[2];
@@ -402,14 +402,14 @@ TL_SINK_COPIES(flush_small, (batch_state *s), s)
 
 /* The corners of the triangles [i, i + TL_LANES) of a share, behind the end zeros; in `buffer` unless they lie there
  * already. */
-TL_INLINE const int32_t *share_corners(const tl_scene *scene, const tl_share *share, int64_t i, int32_t *buffer)
+TL_INLINE const int32_t *share_corners(const tl_snapped *snapped, const tl_share *share, int64_t i, int32_t *buffer)
 {
     if (!share->ids && i + TL_LANES <= share->end)
-        return scene->triangles + 3 * i;
+        return snapped->triangles + 3 * i;
     for (int k = 0; k < TL_LANES; k++) {
         const int64_t id = i + k >= share->end ? -1 : share->ids ? share->ids[i + k] : i + k;
         if (id >= 0)
-            memcpy(buffer + 3 * k, scene->triangles + 3 * id, 3 * sizeof *buffer);
+            memcpy(buffer + 3 * k, snapped->triangles + 3 * id, 3 * sizeof *buffer);
         else
             memset(buffer + 3 * k, 0, 3 * sizeof *buffer);
     }
@@ -418,11 +418,11 @@ TL_INLINE const int32_t *share_corners(const tl_scene *scene, const tl_share *sh
 
 /* For triangles that cover the centres of pixels; the window has fewer than 2^31 samples and lies within 2^30 pixels of
  * 0. */
-static void start_batch(batch_state *s, const tl_scene *scene, const tl_window *window, const tl_target *target)
+static void start_batch(batch_state *s, const tl_snapped *snapped, const tl_window *window, const tl_target *target)
 {
-    const int bits = window->subpixel_bits, is_back = scene->cull == TL_CULL_BACK;
+    const int bits = window->subpixel_bits, is_back = snapped->cull == TL_CULL_BACK;
     const int64_t farthest = (int64_t)1 << 30;
-    s->scene = scene, s->window = window, s->target = target, s->bad_row = -1;
+    s->snapped = snapped, s->window = window, s->target = target, s->bad_row = -1;
     s->small.n = s->middle.n = s->rows.n = s->fragments.n = 0;
     s->limits = (batch_limits){
         .left = (int32_t)window->x_px,
@@ -433,10 +433,10 @@ static void start_batch(batch_state *s, const tl_scene *scene, const tl_window *
         .picture_bottom = (int32_t)min64(window->y_px + window->height, farthest),
         .max_extent = TL_MAX_BOX_PX << (bits < 8 ? bits : 8),
         .round = round_extent(window),
-        .special_x = (int32_t)((uint32_t)TL_SPECIAL - (uint32_t)scene->mesh.sample_x_fx),
+        .special_x = (int32_t)((uint32_t)TL_SPECIAL - (uint32_t)snapped->mesh.sample_x_fx),
         .second = is_back ? 2 : 1,
         .third = is_back ? 1 : 2,
-        .last_vertex = vi_set1((int32_t)(scene->mesh.n_vertices - 1)),
+        .last_vertex = vi_set1((int32_t)(snapped->mesh.n_vertices - 1)),
     };
 }
 

@@ -1,4 +1,4 @@
-/* Bin: which triangles reach into which bands of rows, so that a scene is set up once for many samples and bands.
+/* Bin: which triangles reach into which bands of rows, so that a mesh is set up once for many samples and bands.
  * In: vertex records and triangles.  Out: the triangles that can be seen, and the first and last band of each.
  *
  * A triangle is listed when a point within reach_fx of its extent, in x and in y, is a centre in the window: more than
@@ -17,7 +17,7 @@
 #include "raster/setup.c"
 
 typedef struct {
-    const tl_scene *scene;
+    const tl_snapped *snapped;
     const tl_window *window;
     int32_t low_fx, high_fx; /* added to the ends of an extent before they become pixels */
     int band_bits;
@@ -32,7 +32,7 @@ static void widen_rows(const bin_limits *b, const tl_vertex_set *set, const int3
     const int bits = window->subpixel_bits;
     tl_triangle t;
     const int sign = load_triangle(set, corners, &t);
-    if (is_culled(sign, b->scene->cull))
+    if (is_culled(sign, b->snapped->cull))
         return;
     const int64_t y0 = min3(t.y_fx[0], t.y_fx[1], t.y_fx[2]), y1 = max3(t.y_fx[0], t.y_fx[1], t.y_fx[2]);
     const int64_t first = max64(((y0 + b->low_fx) >> bits) - window->y_px, 0);
@@ -44,7 +44,7 @@ static void widen_rows(const bin_limits *b, const tl_vertex_set *set, const int3
 /* Triangle i, or its pieces, by itself. */
 static __attribute__((noinline)) void bin_alone(const bin_limits *b, int64_t i, tl_bins *bins)
 {
-    const triangle_parts parts = parts_of(b->scene, i);
+    const triangle_parts parts = parts_of(b->snapped, i);
     int64_t row0 = b->window->height, row1 = 0;
     for (int k = 0; k < parts.n; k++)
         widen_rows(b, &parts.set, parts.corners + 3 * k, &row0, &row1);
@@ -59,13 +59,13 @@ static __attribute__((noinline)) void bin_alone(const bin_limits *b, int64_t i, 
 TL_INLINE int bin_batch(const bin_limits *b, int64_t i, const int32_t *corners, vm live, tl_bins *bins)
 {
     const int bits = b->window->subpixel_bits;
-    const tl_cull cull = b->scene->cull;
+    const tl_cull cull = b->snapped->cull;
     const vi zero = vi_set1(0), max_extent = vi_set1(b->max_extent);
-    if (has_bad_index(corners, vi_set1((int32_t)(b->scene->mesh.n_vertices - 1))))
+    if (has_bad_index(corners, vi_set1((int32_t)(b->snapped->mesh.n_vertices - 1))))
         return 0;
     lane_corners c;
     for (int k = 0; k < 3; k++)
-        load_vertices(b->scene->mesh.vertices, corners + k, &c.x[k], &c.y[k], &c.z[k]);
+        load_vertices(b->snapped->mesh.vertices, corners + k, &c.x[k], &c.y[k], &c.z[k]);
     const vi x_min = vi_min(vi_min(c.x[0], c.x[1]), c.x[2]), x_max = vi_max(vi_max(c.x[0], c.x[1]), c.x[2]);
     const vi y_min = vi_min(vi_min(c.y[0], c.y[1]), c.y[2]), y_max = vi_max(vi_max(c.y[0], c.y[1]), c.y[2]);
     vm alone =
@@ -89,13 +89,13 @@ TL_INLINE int bin_batch(const bin_limits *b, int64_t i, const int32_t *corners, 
     return 1;
 }
 
-static int64_t bin(const tl_scene *scene, const tl_window *window, int32_t reach_fx, int band_bits, tl_bins *bins)
+static int64_t bin(const tl_snapped *snapped, const tl_window *window, int32_t reach_fx, int band_bits, tl_bins *bins)
 {
     const int bits = window->subpixel_bits;
     const int64_t farthest = (int64_t)1 << 30;
     const extent_rounding round = round_extent(window);
     const bin_limits b = {
-        .scene = scene,
+        .snapped = snapped,
         .window = window,
         .low_fx = round.first - reach_fx,
         .high_fx = round.end + reach_fx,
@@ -106,11 +106,11 @@ static int64_t bin(const tl_scene *scene, const tl_window *window, int32_t reach
         .right = (int32_t)min64(window->x_px + window->width, farthest),
         .bottom = (int32_t)min64(window->y_px + window->height, farthest),
     };
-    const tl_share all = {.end = scene->n_triangles};
+    const tl_share all = {.end = snapped->n_triangles};
     int32_t tail[3 * TL_LANES];
     bins->n = 0;
-    for (int64_t i = 0; i < scene->n_triangles; i += TL_LANES)
-        if (!bin_batch(&b, i, share_corners(scene, &all, i, tail), vm_first(scene->n_triangles - i), bins))
+    for (int64_t i = 0; i < snapped->n_triangles; i += TL_LANES)
+        if (!bin_batch(&b, i, share_corners(snapped, &all, i, tail), vm_first(snapped->n_triangles - i), bins))
             return i;
     return -1;
 }

@@ -1,7 +1,7 @@
 /* Peel: the nearest layers of every pixel, in one pass.
  * In: covered samples with depth and id, in any order.  Out: planes of ids and depths, sorted by depth, then id.
  *
- * Depth peeling draws the scene once a layer, each time what lies behind the layer before.  Here a sample goes through
+ * Depth peeling draws the mesh once a layer, each time what lies behind the layer before.  Here a sample goes through
  * the planes from the first to the last: where it comes before what is there it takes the place, and what was there
  * goes on, until an empty place ends it.  Neighbours on a surface do so together, a vector of them.
  *

@@ -1,4 +1,4 @@
-/* Raster: every triangle of a scene, a vector of them at a time, through setup and cull to the code for its size.
+/* Raster: every triangle of a mesh, a vector of them at a time, through setup and cull to the code for its size.
  * In: vertex records and triangles.  Out: the target's buffers. */
 #ifndef TL_RASTER_C
 #define TL_RASTER_C
@@ -24,15 +24,15 @@
 #include "raster/setup.c"
 #include "raster/sink.c"
 
-TL_INLINE void draw_one(const tl_scene *scene, int64_t i, const tl_window *window, const tl_target *target,
+TL_INLINE void draw_one(const tl_snapped *snapped, int64_t i, const tl_window *window, const tl_target *target,
                         tl_sink sink)
 {
     if (sink == TL_SINK_CENSUS)
-        draw_alone(scene, i, window, target, sink);
+        draw_alone(snapped, i, window, target, sink);
     else if (sink == TL_SINK_SAMPLES)
-        draw_alone_each_sample(scene, i, window, target);
+        draw_alone_each_sample(snapped, i, window, target);
     else
-        TL_SINK_CALL(draw_alone, sink, scene, i, window, target)
+        TL_SINK_CALL(draw_alone, sink, snapped, i, window, target)
 }
 
 /* Lists the triangles that the passes which draw the rest of the picture are to draw, too. */
@@ -83,7 +83,7 @@ TL_INLINE void draw_each_alone(const batch_state *s, tl_sink sink, vm alone, vi 
     int32_t ids[TL_MAX_LANES];
     vi_store(ids, id);
     for (unsigned lanes = vm_bits(alone); lanes && !tl_is_given_up(s->window); lanes &= lanes - 1)
-        draw_one(s->scene, ids[__builtin_ctz(lanes)], s->window, s->target, sink);
+        draw_one(s->snapped, ids[__builtin_ctz(lanes)], s->window, s->target, sink);
 }
 
 /* The triangles that lanes draw, by the size of their boxes: in the order of tl_class, from TL_CLASS_TINY on. */
@@ -108,7 +108,7 @@ TL_INLINE void draw_boxes(batch_state *s, tl_sink sink, const lane_batch *b, con
         lane_triangles t;
         vd z[3];
         place_triangles(s, sink, &b->c, b->col, b->row, &t, z);
-        draw_tiny(s, sink, &t, z, boxes[BOX_TINY], b->n_cols, b->n_rows, names_of(s->scene, boxes[BOX_TINY], id));
+        draw_tiny(s, sink, &t, z, boxes[BOX_TINY], b->n_cols, b->n_rows, names_of(s->snapped, boxes[BOX_TINY], id));
     }
     if (vm_any(boxes[BOX_SMALL])) {
         push(&s->small, boxes[BOX_SMALL], b->col, b->row, b->n_cols, b->n_rows, id);
@@ -165,14 +165,14 @@ TL_INLINE void flush_queues(batch_state *s, tl_sink sink)
 }
 
 /* As start_batch, but for squares and several samples, and for the shares of a picture. */
-TL_INLINE void start_share(batch_state *s, const tl_scene *scene, const tl_window *window, const tl_target *target,
+TL_INLINE void start_share(batch_state *s, const tl_snapped *snapped, const tl_window *window, const tl_target *target,
                            tl_share *share, tl_sink sink)
 {
     const int bits = window->subpixel_bits, of_samples = sink_of(target, sink) == TL_SINK_SAMPLES;
     const int32_t reach = of_samples ? sample_reach(target) : 0;
     const extent_rounding round = round_extent(window);
     batch_limits *limits = &s->limits;
-    start_batch(s, scene, window, target);
+    start_batch(s, snapped, window, target);
     s->share = share;
     memset(s->fragments.sample, 0, sizeof s->fragments.sample); /* what is prefetched behind the end of the list */
     limits->round = (extent_rounding){round.first - reach, round.end + reach};
@@ -187,13 +187,13 @@ TL_INLINE void start_share(batch_state *s, const tl_scene *scene, const tl_windo
 }
 
 /* Every triangle of a share; the window has fewer than 2^31 samples and lies within 2^30 pixels of 0. */
-TL_INLINE void draw_batches(const tl_scene *scene, const tl_window *window, const tl_target *target, tl_share *share,
-                            int64_t *bad_row, tl_sink sink)
+TL_INLINE void draw_batches(const tl_snapped *snapped, const tl_window *window, const tl_target *target,
+                            tl_share *share, int64_t *bad_row, tl_sink sink)
 {
     batch_state s;
-    start_share(&s, scene, window, target, share, sink);
+    start_share(&s, snapped, window, target, share, sink);
     tl_cluster_pass *clusters = share->clusters;
-    cluster_scene cluster;
+    cluster_mesh cluster;
     tl_share part = *share;
     const int64_t n_parts = clusters ? list_clusters(clusters, window, target) : 1;
     int is_given_up = 0;
@@ -202,9 +202,9 @@ TL_INLINE void draw_batches(const tl_scene *scene, const tl_window *window, cons
             const tl_cluster *c = clusters->mesh->clusters + clusters->list[next];
             if (clusters->may_be_hidden && is_cluster_hidden(c, clusters->seen, window, target))
                 continue;
-            part.first = 0, part.end = load_cluster(c, clusters, scene, share, &cluster);
+            part.first = 0, part.end = load_cluster(c, clusters, snapped, share, &cluster);
             clusters->n_drawn++;
-            s.scene = &cluster.scene;
+            s.snapped = &cluster.snapped;
         }
         for (int64_t i = part.first; i < part.end && s.bad_row < 0 && !is_given_up; i += TL_LANES) {
             int32_t corners[3 * TL_LANES];
@@ -212,7 +212,7 @@ TL_INLINE void draw_batches(const tl_scene *scene, const tl_window *window, cons
             is_given_up = tl_is_given_up(window);
             const vm live = vm_first(part.end - i);
             const vi id = part.ids ? vi_load_masked(live, part.ids + i) : vi_add(vi_set1((int32_t)i), vi_iota());
-            draw_batch(&s, sink, share_corners(s.scene, &part, i, corners), id, live);
+            draw_batch(&s, sink, share_corners(s.snapped, &part, i, corners), id, live);
         }
         flush_queues(&s, sink);
     }
@@ -220,37 +220,38 @@ TL_INLINE void draw_batches(const tl_scene *scene, const tl_window *window, cons
     *bad_row = s.bad_row;
 }
 
-TL_INLINE void draw_scene(const tl_scene *scene, const tl_window *window, const tl_target *target, tl_share *share,
-                          int64_t *bad_row, tl_sink sink)
+TL_INLINE void draw_snapped(const tl_snapped *snapped, const tl_window *window, const tl_target *target,
+                            tl_share *share, int64_t *bad_row, tl_sink sink)
 {
     const int is_centre = window->test == TL_TEST_SAMPLE && sink_of(target, sink) != TL_SINK_SAMPLES;
     const int fits_lanes = is_centre || window->subpixel_bits <= 8;
-    if (scene->method == TL_METHOD_AUTO && is_near(window) && fits_lanes) {
-        draw_batches(scene, window, target, share, bad_row, sink);
+    if (snapped->method == TL_METHOD_AUTO && is_near(window) && fits_lanes) {
+        draw_batches(snapped, window, target, share, bad_row, sink);
         return;
     }
-    *bad_row = first_bad_row(scene->triangles, scene->n_triangles, scene->mesh.n_vertices);
+    *bad_row = first_bad_row(snapped->triangles, snapped->n_triangles, snapped->mesh.n_vertices);
     if (*bad_row >= 0)
         return;
-    for (int64_t i = 0; i < scene->n_triangles && !tl_is_given_up(window); i++) {
+    for (int64_t i = 0; i < snapped->n_triangles && !tl_is_given_up(window); i++) {
         tl_count_work(window, TL_SETUP_PX);
-        draw_one(scene, i, window, target, sink);
+        draw_one(snapped, i, window, target, sink);
     }
 }
 
-TL_SINK_COPIES(draw_scene,
-               (const tl_scene *scene, const tl_window *window, const tl_target *target, tl_share *share,
+TL_SINK_COPIES(draw_snapped,
+               (const tl_snapped *snapped, const tl_window *window, const tl_target *target, tl_share *share,
                 int64_t *bad_row),
-               scene, window, target, share, bad_row)
+               snapped, window, target, share, bad_row)
 
-/* Counts the triangles of a scene by what draw_scene does with them: in its own code. */
-static int64_t count_classes(const tl_scene *scene, const tl_window *window, const tl_target *target, tl_census *census)
+/* Counts the triangles of a mesh by what draw_snapped does with them: in its own code. */
+static int64_t count_classes(const tl_snapped *snapped, const tl_window *window, const tl_target *target,
+                             tl_census *census)
 {
     tl_target counted = *target;
-    tl_share share = {.end = scene->n_triangles};
+    tl_share share = {.end = snapped->n_triangles};
     int64_t bad_row = -1;
     counted.sink = TL_SINK_CENSUS, counted.census = census;
-    draw_scene(scene, window, &counted, &share, &bad_row, TL_SINK_CENSUS);
+    draw_snapped(snapped, window, &counted, &share, &bad_row, TL_SINK_CENSUS);
     return bad_row;
 }
 
@@ -285,7 +286,7 @@ static void clear(const tl_window *window, const tl_target *target)
     }
 }
 
-static int64_t draw(const tl_scene *scene, const tl_window *window, const tl_target *target, tl_share *share)
+static int64_t draw(const tl_snapped *snapped, const tl_window *window, const tl_target *target, tl_share *share)
 {
     const int64_t pixel_bytes = target->sink == TL_SINK_MASK ? 1 : 4;
     const int64_t rows_at_once = max64(1, (((int64_t)1 << 31) - 1) / target->stride_px);
@@ -303,7 +304,7 @@ static int64_t draw(const tl_scene *scene, const tl_window *window, const tl_tar
         if (share->is_first)
             clear(&band, &part);
         if (share->first < share->end || share->clusters)
-            TL_SINK_CALL(draw_scene, target->sink, scene, &band, &part, share, &bad_row)
+            TL_SINK_CALL(draw_snapped, target->sink, snapped, &band, &part, share, &bad_row)
         if (bad_row >= 0)
             return bad_row;
         if (target->sink == TL_SINK_MASK && share->is_last)

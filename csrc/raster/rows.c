@@ -158,7 +158,7 @@ TL_INLINE void draw_rows(batch_state *s, tl_sink sink, const row_edges *r, int i
             if (!drawn)
                 continue;
             const int begin = __builtin_ctz(drawn), n = 32 - __builtin_clz(drawn) - begin;
-            vd z_col;
+            vd z_col = vd_set1(0);
             if (sink_has_depth(sink))
                 z_col = vd_mul(vd_set1(r->slope_x[i]), vd_add(vd_set1(r->x[i] + col0 * unit2), steps));
             vi_store(bits, in_block);
@@ -242,11 +242,11 @@ TL_INLINE void flush_middle(batch_state *s, tl_sink sink)
         setup_middle(sink, &t, &p, vi_and(vi_load(q->size + i), vi_set1(0xffff)), max_rows, unit2, &m);
         for (int k = 0; k < end; k++) {
             const int32_t size = q->size[i + k];
-            vd z_cols;
+            vd z_cols = vd_set1(0);
             if (sink_has_depth(sink))
                 z_cols = vd_mul(vd_set1(slope_x[k]), vd_add(vd_set1(x[k]), ramp(unit2)));
             draw_block(&target, sink, &m.bits[0][k], &m.z[0][k], TL_MAX_LANES, (uint32_t)sample[k], size >> 16,
-                       (size & 0xffff) <= TL_HALF_LANES, z_cols, name_of(s->scene, q->id[i + k]));
+                       (size & 0xffff) <= TL_HALF_LANES, z_cols, name_of(s->snapped, q->id[i + k]));
         }
     }
 }
@@ -282,7 +282,7 @@ TL_INLINE void flush_rows(batch_state *s, tl_sink sink)
         }
         const int end = n - i < TL_LANES ? n - i : TL_LANES;
         for (int k = 0; k < end; k++)
-            draw_rows(s, sink, &r, k, sample[k], q->size[i + k], name_of(s->scene, q->id[i + k]));
+            draw_rows(s, sink, &r, k, sample[k], q->size[i + k], name_of(s->snapped, q->id[i + k]));
     }
 }
 

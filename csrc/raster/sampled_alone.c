@@ -67,11 +67,11 @@ typedef struct {
 } sampled_triangle;
 
 /* Returns whether the triangle's row ends fit float64. */
-static int setup_sampled_triangle(const tl_scene *scene, const int32_t *corners, const tl_window *window,
+static int setup_sampled_triangle(const tl_snapped *snapped, const int32_t *corners, const tl_window *window,
                                   const tl_target *target, sampled_triangle *s)
 {
     const int n_samples = 1 << target->sample_bits;
-    tl_vertex_set seen = scene->mesh;
+    tl_vertex_set seen = snapped->mesh;
     s->col0 = window->width, s->row0 = window->height, s->row1 = 0;
     for (int k = 0; k < n_samples; k++) {
         tl_triangle *t = &s->t[k];
@@ -79,7 +79,7 @@ static int setup_sampled_triangle(const tl_scene *scene, const int32_t *corners,
         const int sign = load_triangle(&seen, corners, t);
         if (!rows_fit(t, window, 1))
             return 0;
-        if (is_culled(sign, scene->cull))
+        if (is_culled(sign, snapped->cull))
             return 1;
         if (!clip_box(t, window)) {
             t->row0 = t->row1 = 0;
@@ -186,12 +186,13 @@ TL_INLINE void cover_rows(const tl_target *target, int64_t at, int n, const samp
 }
 
 /* Returns whether the triangle could be drawn so. */
-static int walk_samples(const tl_scene *scene, const int32_t *corners, const tl_window *window, const tl_target *shared)
+static int walk_samples(const tl_snapped *snapped, const int32_t *corners, const tl_window *window,
+                        const tl_target *shared)
 {
     const tl_target own = *shared, *target = &own; /* a copy that no store can change */
     sampled_triangle s;
     sampled_ends ends = {{{0}}, {{0}}}; /* compilers cannot tell that there is a sample */
-    if (!setup_sampled_triangle(scene, corners, window, target, &s))
+    if (!setup_sampled_triangle(snapped, corners, window, target, &s))
         return 0;
     tl_count_work(window, (s.row1 - s.row0) << (target->sample_bits + 4)); /* a row end of a sample: 16 pixels */
     for (int64_t row = s.row0; row < s.row1; row += TL_LANES) {
@@ -209,14 +210,14 @@ static int walk_samples(const tl_scene *scene, const int32_t *corners, const tl_
 }
 
 /* Triangle i by itself. */
-static __attribute__((noinline)) void draw_alone_each_sample(const tl_scene *scene, int64_t i, const tl_window *window,
-                                                             const tl_target *target)
+static __attribute__((noinline)) void draw_alone_each_sample(const tl_snapped *snapped, int64_t i,
+                                                             const tl_window *window, const tl_target *target)
 {
-    const int32_t *corners = scene->triangles + 3 * i;
-    tl_scene seen = *scene;
+    const int32_t *corners = snapped->triangles + 3 * i;
+    tl_snapped seen = *snapped;
     tl_target one = *target;
-    if (scene->method == TL_METHOD_AUTO && !is_clipped(&scene->mesh, corners) &&
-        walk_samples(scene, corners, window, target))
+    if (snapped->method == TL_METHOD_AUTO && !is_clipped(&snapped->mesh, corners) &&
+        walk_samples(snapped, corners, window, target))
         return;
     for (one.sample = 0; one.sample < 1 << target->sample_bits; one.sample++) {
         seen.mesh.sample_x_fx = target->samples_fx[2 * one.sample];

@@ -1,5 +1,7 @@
-/* Triangle setup: the three corners in a fixed turn, the box of samples they can cover, the weights of a sample.
- * In: a triangle of vertex records.  Out: tl_triangle, or nothing when it is culled, degenerate or outside.
+/* Triangle setup: the three corners in a fixed turn, the box of samples they can cover, the weights of a sample; and
+ * which side of a triangle shows.
+ * In: a triangle of vertex records.  Out: tl_triangle, or nothing when it is culled, degenerate or outside; triangles,
+ * those of which one side is not drawn collapsed where they show it.
  * Based on: J. Pineda, A Parallel Algorithm for Polygon Rasterization, 1988. */
 #ifndef TL_SETUP_C
 #define TL_SETUP_C
@@ -7,6 +9,7 @@
 #include <stdint.h>
 
 #include "topleft.h"
+#include "vertex/clip.c"
 #include "vertex/fixed.h"
 
 /* A triangle with positive area (y down) and its samples inside the window. */
@@ -178,6 +181,58 @@ static inline void weights_at(const tl_triangle *t, const tl_window *window, int
     for (int k = 0; k < n; k++) {
         w1[k] = (double)doubled_edge(t, 2, 0, col + k + window->x_px, row + window->y_px, window->subpixel_bits);
         w2[k] = (double)doubled_edge(t, 0, 1, col + k + window->x_px, row + window->y_px, window->subpixel_bits);
+    }
+}
+
+/* Whether a triangle shows the side that is drawn: as draw_triangle, of the pieces where a plane cuts it. */
+static int shows_side(const tl_snapped *snapped, int64_t i)
+{
+    const int32_t *corners = snapped->triangles + 3 * i;
+    const int wanted = snapped->cull == TL_CULL_BACK ? -1 : 1;
+    tl_triangle t;
+    if (!is_clipped(&snapped->mesh, corners))
+        return load_triangle(&snapped->mesh, corners, &t) == wanted;
+    const tl_pieces *p = snapped->pieces;
+    if (!p)
+        return 0;
+    const tl_vertex_set cut = piece_set(p, &snapped->mesh);
+    for (int64_t k = first_piece(p, i); k < p->n_pieces && p->source[k] == i; k++)
+        if (load_triangle(&cut, p->triangles + 3 * k, &t) == wanted)
+            return 1;
+    return 0;
+}
+
+/* Collapses the pieces of a triangle that a plane cuts which do not show the side that is drawn. */
+static void drop_pieces(const tl_snapped *snapped, int64_t i)
+{
+    const tl_pieces *p = snapped->pieces;
+    const int wanted = snapped->cull == TL_CULL_BACK ? -1 : 1;
+    tl_triangle t;
+    if (!p)
+        return;
+    const tl_vertex_set cut = piece_set(p, &snapped->mesh);
+    for (int64_t k = first_piece(p, i); k < p->n_pieces && p->source[k] == i; k++) {
+        int32_t *corners = p->triangles + 3 * k;
+        if (load_triangle(&cut, corners, &t) != wanted)
+            corners[1] = corners[2] = corners[0];
+    }
+}
+
+/* Copies triangles [first, end), those collapsed to a point that are single-sided and do not show the side that the
+ * cull of the mesh leaves; of what a plane cuts the pieces instead, in place. */
+static void drop_sides(const tl_snapped *snapped, const uint8_t *is_single, int64_t first, int64_t end,
+                       int32_t *triangles)
+{
+    for (int64_t i = first; i < end; i++) {
+        const int32_t *corners = snapped->triangles + 3 * i;
+        int32_t *own = triangles + 3 * i;
+        const int is_cut = is_clipped(&snapped->mesh, corners),
+                  is_left = !is_single[i] || is_cut || shows_side(snapped, i);
+        own[0] = corners[0];
+        own[1] = is_left ? corners[1] : corners[0];
+        own[2] = is_left ? corners[2] : corners[0];
+        if (is_single[i] && is_cut)
+            drop_pieces(snapped, i);
     }
 }
 

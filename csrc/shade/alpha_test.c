@@ -52,7 +52,7 @@ TL_INLINE vf opacity_of(shaded_lanes *p, const tl_material *m)
 /* Where triangles with holes go. */
 typedef struct {
     const tl_target *target; /* NEAREST or PEEL */
-    tl_scene scene;          /* as the buffer's, but its first id is 0 */
+    tl_snapped snapped;      /* as the buffer's, but its first id is 0 */
     int32_t first_id;        /* that of the buffer */
     cutout_tile tile;
 } cutout;
@@ -109,11 +109,11 @@ TL_INLINE void keep_opaque(cutout *c, shade_runs *s, const tl_material *m, int64
 static void cut_triangle(cutout *c, shade_runs *s, const tl_window *window, int32_t id)
 {
     const tl_shading *shading = s->shading;
-    const int32_t *corners = c->scene.triangles + 3 * (int64_t)id;
+    const int32_t *corners = c->snapped.triangles + 3 * (int64_t)id;
     const int32_t material = shading->material_of ? shading->material_of[id] : 0;
     tl_triangle t = {.col0 = 0, .col1 = window->width, .row0 = 0, .row1 = window->height};
-    if (!is_clipped(&c->scene.mesh, corners) &&
-        (load_triangle(&c->scene.mesh, corners, &t) == 0 || !clip_box(&t, window)))
+    if (!is_clipped(&c->snapped.mesh, corners) &&
+        (load_triangle(&c->snapped.mesh, corners, &t) == 0 || !clip_box(&t, window)))
         return;
     for (int64_t top = t.row0; top < t.row1; top += TL_CUTOUT_TILE)
         for (int64_t left = t.col0; left < t.col1; left += TL_CUTOUT_TILE) {
@@ -123,7 +123,7 @@ static void cut_triangle(cutout *c, shade_runs *s, const tl_window *window, int3
             const tl_target target = {
                 .sink = TL_SINK_PAINT, .pixels = c->tile.ids, .depth = c->tile.depth, .stride_px = TL_CUTOUT_TILE};
             tl_share share = {.ids = &id, .end = 1, .is_first = 1, .is_last = 1};
-            draw(&c->scene, &part, &target, &share);
+            draw(&c->snapped, &part, &target, &share);
             for (int64_t row = 0; row < part.height; row++)
                 keep_opaque(c, s, &shading->materials[material], top + row, left, (int)part.width, row * TL_CUTOUT_TILE,
                             (top + row) * c->target->stride_px + left);
@@ -131,14 +131,14 @@ static void cut_triangle(cutout *c, shade_runs *s, const tl_window *window, int3
 }
 
 /* Draws n triangles over what a target holds: a visibility buffer, or the layers of pixels. */
-static void cut_out(const tl_scene *scene, const tl_window *window, const tl_view *view, const tl_shading *shading,
+static void cut_out(const tl_snapped *snapped, const tl_window *window, const tl_view *view, const tl_shading *shading,
                     const int32_t *triangles, int64_t n, const tl_target *target)
 {
     shade_runs s;
     cutout c;
-    c.target = target, c.scene = *scene, c.first_id = scene->first_id;
-    c.scene.first_id = 0;
-    start_runs(&s, &c.scene, window, view, shading);
+    c.target = target, c.snapped = *snapped, c.first_id = snapped->first_id;
+    c.snapped.first_id = 0;
+    start_runs(&s, &c.snapped, window, view, shading);
     s.needs_normal = s.needs_colors = s.needs_point = 0;
     s.needs_tangents[0] = s.needs_tangents[1] = 0;
     s.needs_alpha = shading->colors && shading->has_alpha;

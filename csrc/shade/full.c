@@ -60,6 +60,16 @@ TL_INLINE void look_up(const shaded_lanes *p, const tl_texture *t, vf *rgba, int
 static void look_up_rgb(const shaded_lanes *p, const tl_texture *t, vf *rgb) { look_up(p, t, rgb, 3); }
 static void look_up_rgba(const shaded_lanes *p, const tl_texture *t, vf *rgba) { look_up(p, t, rgba, 4); }
 
+/* The colour of the back, where that is seen and has one of its own. */
+TL_INLINE void color_back(const shaded_lanes *p, const tl_material *m, vf *rgb)
+{
+    if (m->back_side == 0.0f)
+        return;
+    const vm is_back = vf_lt(vf_set1(0.0f), vf_mul(p->area, vf_set1(m->back_side)));
+    for (int c = 0; c < 3; c++)
+        rgb[c] = vf_select(is_back, vf_set1(m->back_color[c]), rgb[c]);
+}
+
 /* The colour that light meets, and the opacity of the surface. */
 static void find_base(shaded_lanes *p, const tl_material *m, vf *rgb)
 {
@@ -81,11 +91,7 @@ static void find_base(shaded_lanes *p, const tl_material *m, vf *rgb)
         for (int c = 0; c < 3; c++)
             rgb[c] = vf_mul(rgb[c], texel[c]);
     }
-    if (m->back_side != 0.0f) {
-        const vm is_back = vf_lt(vf_set1(0.0f), vf_mul(p->area, vf_set1(m->back_side)));
-        for (int c = 0; c < 3; c++)
-            rgb[c] = vf_select(is_back, vf_set1(m->back_color[c]), rgb[c]);
-    }
+    color_back(p, m, rgb);
     p->opacity = vf_min(vf_max(opacity, vf_set1(0.0f)), vf_set1(1.0f));
 }
 

@@ -1,5 +1,5 @@
 /* Shades a visibility buffer: a picture in light, from light to sRGB; or the normals that shading has, as numbers.
- * In: ids, the scene they were drawn from, materials and lights.  Out: red, green, blue and opacity, uint8; or unit
+ * In: ids, the mesh they were drawn from, materials and lights.  Out: red, green, blue and opacity, uint8; or unit
  * vectors, float32, on the side that is seen, 0 where nothing is. */
 #ifndef TL_SHADE_C
 #define TL_SHADE_C
@@ -32,12 +32,12 @@ static void note_full(shade_runs *s, const tl_material *m)
         s->needs_tangents[m->normal_map->uv_set] = 1;
 }
 
-static void start_runs(shade_runs *s, const tl_scene *scene, const tl_window *window, const tl_view *view,
+static void start_runs(shade_runs *s, const tl_snapped *snapped, const tl_window *window, const tl_view *view,
                        const tl_shading *shading)
 {
     int shines = 0, has_texture = 0, is_lit = 0, has_points = 0;
     const int shows_light = shading->show == TL_SHOW_LIGHT;
-    s->scene = scene, s->window = window, s->shading = shading, s->view = view;
+    s->snapped = snapped, s->window = window, s->shading = shading, s->view = view;
     s->needs_uv = s->needs_uv1 = s->needs_tangents[0] = s->needs_tangents[1] = 0;
     for (int k = 0; k < shading->n_materials; k++) {
         const tl_material *m = &shading->materials[k];
@@ -83,13 +83,13 @@ TL_INLINE vi shaded_word(shaded_lanes *p, int64_t row, const float *depth)
 }
 
 /* The picture of a visibility buffer; rows of window->width. */
-static void shade(const tl_scene *scene, const tl_window *window, const tl_view *view, const tl_shading *shading,
+static void shade(const tl_snapped *snapped, const tl_window *window, const tl_view *view, const tl_shading *shading,
                   const int32_t *ids, const float *depth, uint8_t *pixels)
 {
     shade_runs s;
     int32_t background;
     memcpy(&background, shading->background_bytes, 4);
-    start_runs(&s, scene, window, view, shading);
+    start_runs(&s, snapped, window, view, shading);
     for (int64_t row = 0; row < window->height; row++)
         for (int64_t column = 0; column < window->width; column += TL_SPAN) {
             const int64_t at = row * window->width + column;
@@ -129,12 +129,12 @@ static void set_inverse_w(const tl_source *source, const float *rows, int64_t fi
     }
 }
 
-static void shade_normals(const tl_scene *scene, const tl_window *window, const tl_view *view,
+static void shade_normals(const tl_snapped *snapped, const tl_window *window, const tl_view *view,
                           const tl_shading *shading, const int32_t *ids, float *restrict out)
 {
     shade_runs s;
     const vf zero = vf_set1(0.0f);
-    start_runs(&s, scene, window, view, shading);
+    start_runs(&s, snapped, window, view, shading);
     for (int64_t row = 0; row < window->height; row++)
         for (int64_t column = 0; column < window->width; column += TL_SPAN) {
             const int64_t at = row * window->width + column;

@@ -44,7 +44,7 @@ static void face_normal(const shade_runs *s, int32_t id, double *n)
     double p[3][3], squared = 0.0;
     for (int k = 0; k < 3; k++)
         for (int axis = 0; axis < 3; axis++) {
-            const int64_t at = 3 * (int64_t)s->scene->triangles[3 * (int64_t)id + k] + axis;
+            const int64_t at = 3 * (int64_t)s->snapped->triangles[3 * (int64_t)id + k] + axis;
             p[k][axis] = shading->is_f64 ? ((const double *)shading->positions)[at]
                                          : (double)((const float *)shading->positions)[at];
         }
@@ -113,7 +113,7 @@ TL_INLINE void set_points(shaded_lanes *p, int64_t row, const float *depth)
 {
     const tl_shading *shading = p->s->shading;
     const tl_window *window = p->s->window;
-    const tl_vertex_set *set = &p->s->scene->mesh;
+    const tl_vertex_set *set = &p->s->snapped->mesh;
     const float unit = (float)(1 << window->subpixel_bits);
     const vf x = vf_add(vf_from_vi(vi_add(p->column, vi_set1((int32_t)window->x_px))),
                         vf_set1(0.5f + (float)set->sample_x_fx / unit));
@@ -148,11 +148,7 @@ TL_INLINE void shade_material(shaded_lanes *p, const tl_material *m, vf *rgb)
         for (int c = 0; c < 3; c++)
             rgb[c] = vf_mul(rgb[c], texel[c]);
     }
-    if (m->back_side != 0.0f) {
-        const vm is_back = vf_lt(vf_set1(0.0f), vf_mul(p->area, vf_set1(m->back_side)));
-        for (int c = 0; c < 3; c++)
-            rgb[c] = vf_select(is_back, vf_set1(m->back_color[c]), rgb[c]);
-    }
+    color_back(p, m, rgb);
     if (m->is_unlit)
         return;
     lit_surface surface;

@@ -1,7 +1,7 @@
 /* Shaded samples: a visibility buffer with several samples a pixel to a picture.  A triangle is shaded once in each
  * pixel that it shows in, at the first of the samples that see it; what the pixel shows is the mean of the light at its
  * samples.
- * In: planes of ids, the scene.  Out: red, green, blue and opacity, uint8. */
+ * In: planes of ids, the mesh.  Out: red, green, blue and opacity, uint8. */
 #ifndef TL_SHADE_SAMPLES_C
 #define TL_SHADE_SAMPLES_C
 
@@ -92,13 +92,13 @@ TL_INLINE vi finish_lanes(const sample_sums *sums, const tl_shading *shading, in
 
 /* The picture of planes of ids (and depth), `stride` pixels apart, for 2^sample_bits samples at (x, y) sub-pixels from
  * the centre. */
-static void shade_samples(const tl_scene *scene, const tl_window *window, const tl_view *view,
+static void shade_samples(const tl_snapped *snapped, const tl_window *window, const tl_view *view,
                           const tl_shading *shading, const int32_t *samples_fx, int sample_bits, int64_t stride,
                           const int32_t *ids, const float *depth, uint8_t *pixels)
 {
     shade_runs s;
     sample_sums sums;
-    tl_scene seen = *scene;
+    tl_snapped seen = *snapped;
     start_runs(&s, &seen, window, view, shading);
     for (int64_t row = 0; row < window->height; row++)
         for (int64_t column = 0; column < window->width; column += TL_SPAN) {

@@ -235,10 +235,10 @@ typedef struct {
     int n, is_cut;
 } triangle_parts;
 
-static inline triangle_parts parts_of(const tl_scene *scene, int64_t i)
+static inline triangle_parts parts_of(const tl_snapped *snapped, int64_t i)
 {
-    const tl_pieces *pieces = scene->pieces;
-    triangle_parts parts = {scene->mesh, scene->triangles + 3 * i, 1, 0};
+    const tl_pieces *pieces = snapped->pieces;
+    triangle_parts parts = {snapped->mesh, snapped->triangles + 3 * i, 1, 0};
     if (!is_clipped(&parts.set, parts.corners))
         return parts;
     parts.is_cut = 1, parts.n = 0;
@@ -247,7 +247,7 @@ static inline triangle_parts parts_of(const tl_scene *scene, int64_t i)
     const int64_t first = first_piece(pieces, i);
     while (first + parts.n < pieces->n_pieces && pieces->source[first + parts.n] == i)
         parts.n++;
-    parts.set = piece_set(pieces, &scene->mesh);
+    parts.set = piece_set(pieces, &snapped->mesh);
     parts.corners = pieces->triangles + 3 * first;
     return parts;
 }

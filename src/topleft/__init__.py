@@ -20,13 +20,11 @@ from topleft._io.load import load
 from topleft._lod.detail import Detail, choose_detail
 from topleft._lod.levels import Level, Levels
 from topleft._lod.simplify import simplify
-from topleft._model.adapt import as_mesh
 from topleft._model.environment import Environment
 from topleft._model.light import Fog, Light
 from topleft._model.material import Material
 from topleft._model.mesh import Mesh
 from topleft._model.points import Points
-from topleft._model.scene import Instance, Scene
 from topleft._model.texture import Texture
 from topleft._plan.plan import Plan, plan
 from topleft._points.points import PointFragments, points
@@ -34,13 +32,16 @@ from topleft._polygons.overlap import Overlap, overlap
 from topleft._polygons.polygons import polygons
 from topleft._raster.classic import bresenham_line
 from topleft._raster.composite import composite
-from topleft._raster.fragments import Fragments, FragmentsBatch
+from topleft._raster.fragments import Fragments
 from topleft._raster.peel import DepthLayers, peel
+from topleft._raster.poses import FragmentsBatch
 from topleft._raster.verbs import Rasterizer, coverage, fill, overdraw, rasterize, wireframe
 from topleft._render.fragments import SceneDepthLayers, SceneFragments
 from topleft._render.render import rasterize_mesh, render
 from topleft._render.scene_shade import shade
 from topleft._render.silhouette import silhouette
+from topleft._scene.adapt import as_mesh
+from topleft._scene.scene import Instance, Scene
 from topleft.errors import ImageError, MeshError, MeshWarning, MissingPackageError, TopleftError
 
 if TYPE_CHECKING:

@@ -19,10 +19,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from topleft._base.arrays import as_checked_triangles, as_pair
+from topleft._base.memory import empty
 from topleft._base.threads import parse_threads
 from topleft._raster.peel import DepthLayers, peel
 from topleft._raster.verbs import rasterize as draw
 from topleft.errors import MissingPackageError
+from topleft.typing import BoundaryOption, FilterModeOption
 
 try:
     import torch
@@ -149,7 +151,7 @@ def rasterize(
     """
     meshes = as_meshes(glctx, pos, tri, ranges)
     height, width = as_pair("resolution", resolution)
-    ids = np.empty((len(meshes.slices), height, width), np.int32)
+    ids = empty((len(meshes.slices), height, width), np.int32)
     for picture, vertices, first, triangles in meshes.each():
         shown = draw(vertices, triangles, (width, height), threads=glctx.threads).triangle[::-1]
         np.add(shown, np.where(shown < 0, 0, first), out=ids[picture])
@@ -206,7 +208,7 @@ class DepthPeeler:
         if k >= (len(self._layers[0]) if self._layers else 0):
             options: Any = {"layers": max(FIRST_LAYERS, 2 * k), "threads": self._context.threads}
             self._layers = [peel(v, t, (width, height), **options) for _, v, _, t in self._meshes.each()]
-        ids = np.empty((len(self._meshes.slices), height, width), np.int32)
+        ids = empty((len(self._meshes.slices), height, width), np.int32)
         for (picture, _, first, _), layers in zip(self._meshes.each(), self._layers, strict=True):
             shown = layers.triangle[::-1, :, k]
             np.add(shown, np.where(shown < 0, 0, first), out=ids[picture])
@@ -298,8 +300,8 @@ def texture(
     uv_da: Tensor | None = None,
     mip_level_bias: Tensor | None = None,
     mip: Sequence[Tensor] | None = None,
-    filter_mode: str = "auto",
-    boundary_mode: str = "wrap",
+    filter_mode: FilterModeOption = "auto",
+    boundary_mode: BoundaryOption = "wrap",
     max_mip_level: int | None = None,
 ) -> Tensor:
     """Return what a texture is at each pixel.

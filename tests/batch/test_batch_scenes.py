@@ -19,8 +19,8 @@ from topleft._batch import jobs
 from topleft._batch import workers as crews
 from topleft._io import load as files
 from topleft._lod.levels import kept_levels
-from topleft._model import adapt
 from topleft._render.layers import LAYERS
+from topleft._scene import adapt
 
 
 @pytest.fixture(scope="module")

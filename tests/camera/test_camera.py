@@ -7,7 +7,7 @@ import pytest
 
 from topleft import scenes
 from topleft._camera.camera import Camera
-from topleft._camera.matrices import bounding_sphere, orbit_view, view_matrix
+from topleft._camera.matrices import bounding_sphere, orbit_view
 from topleft._model.mesh import Mesh
 
 SIZE = (640, 480)
@@ -136,7 +136,7 @@ def test_framing_looks_only_at_vertices_in_use():
 
 
 def test_framing_takes_the_corners_of_a_box():
-    assert bounding_sphere([(-1, -1, -1), (1, 1, 1)])[1] == pytest.approx(3**0.5)
+    assert bounding_sphere(np.array([(-1.0, -1, -1), (1, 1, 1)]))[1] == pytest.approx(3**0.5)
 
 
 def test_framing_a_single_point_has_a_picture():
@@ -208,7 +208,7 @@ def test_camera_impossible_is_refused(make, message):
 
 
 def test_view_matrix_is_a_rotation_and_a_shift():
-    view = view_matrix((3, -2, 7), (1, 1, 1), (0, 0, 1))
+    view = Camera.look_at((3, -2, 7), (1, 1, 1), up=(0, 0, 1)).view
     assert view[:3, :3] @ view[:3, :3].T == pytest.approx(np.eye(3))
     assert np.linalg.det(view) == pytest.approx(1)
     assert view @ [3, -2, 7, 1] == pytest.approx([0, 0, 0, 1])
@@ -284,7 +284,7 @@ def test_framing_box_of_a_point_has_a_picture():
 
 @pytest.mark.parametrize("ortho", [False, True])
 def test_off_center_symmetric_is_the_camera_of_the_same_view(ortho):
-    view = view_matrix((1, 2, 3), (0, 0, 0))
+    view = Camera.look_at((1, 2, 3)).view
     side = 0.5 * np.tan(np.radians(25))
     camera = Camera.off_center(
         view, left=-side * 4 / 3, right=side * 4 / 3, bottom=-side, top=side, near=0.5, far=9, ortho=ortho

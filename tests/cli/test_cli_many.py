@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
+import pathlib
 import signal
 import stat
 import subprocess
@@ -408,3 +410,82 @@ def test_render_interrupted_leaves_whole_files_and_goes_on_with_resume(run, fold
     wanted = {f"p/{mesh}-{i:03}.png" for mesh in meshes for i in range(40)}
     assert set(names(folder)) == wanted | set(left)
     assert (folder / left[0]).read_text() == "kept"
+
+
+def children_of(pid):
+    found = subprocess.run(["ps", "-o", "pid=", "--ppid", str(pid)], capture_output=True, text=True, check=False)
+    return [int(line) for line in found.stdout.split()]
+
+
+def is_running(pid):
+    try:
+        return pathlib.Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+@pytest.fixture
+def many_pictures(folder):
+    """A run with two processes, once it has begun to write."""
+    command = [
+        sys.executable,
+        "-m",
+        "topleft",
+        "render",
+        "octahedron",
+        "tetrahedron",
+        "--jobs",
+        "2",
+        "-o",
+        "p/",
+        *SMALL,
+    ]
+    command += ["--views", "20000"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True) as process:
+        for _ in range(20_000):
+            if len(names(folder)) >= 3 or process.poll() is not None:
+                break
+            time.sleep(0.002)
+        yield process
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+
+
+@pytest.mark.skipif(not pathlib.Path("/proc/self/stat").exists(), reason="needs /proc")
+@pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGKILL])
+def test_render_killed_takes_its_workers_along(many_pictures, how):
+    workers = children_of(many_pictures.pid)
+    assert len(workers) >= 2
+    many_pictures.send_signal(how)
+    words = many_pictures.stderr.read()  # ends when nobody has it open
+    for _ in range(500):
+        if not any(map(is_running, workers)):
+            break
+        time.sleep(0.01)
+    assert not any(map(is_running, workers))
+    if how == signal.SIGTERM:
+        assert (many_pictures.wait(), words) == (143, "topleft: terminated\n")
+
+
+@pytest.mark.skipif(not pathlib.Path("/proc/self/stat").exists(), reason="needs /proc")
+def test_render_whose_worker_is_killed_says_so_in_one_line(many_pictures):
+    os.kill(children_of(many_pictures.pid)[0], signal.SIGKILL)
+    assert many_pictures.stderr.read() == (
+        "topleft: a process that draws was killed, maybe for want of memory: try fewer --jobs, then --resume\n"
+    )
+    assert many_pictures.wait() == 1
+
+
+def test_render_removes_what_killed_runs_have_left_of_its_files(run, folder):
+    (folder / "p").mkdir()
+    old, young, other = (folder / "p" / f".{name}.part" for name in ("cube.png.0123abcd", "cube.png.ffff0000", "x.y"))
+    for file in (old, young, other):
+        file.write_bytes(b"half")
+    for file in (old, other):
+        os.utime(file, (0, 0))
+    assert run("render", "cube", "-o", "p/", *SMALL) == (0, [])
+    assert sorted(path.name for path in (folder / "p").iterdir()) == [
+        ".cube.png.ffff0000.part",
+        ".x.y.part",
+        "cube.png",
+    ]

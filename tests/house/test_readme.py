@@ -1,4 +1,4 @@
-"""The programs of the README run as they stand there."""
+"""The programs of the README, and of the pages that it leads to first, run as they stand there."""
 
 import re
 from pathlib import Path
@@ -9,8 +9,15 @@ from PIL import Image
 
 from topleft import scenes
 
-README = Path(__file__).parents[2].joinpath("README.md").read_text(encoding="utf-8")
-SECTIONS = re.findall(r"^## ([^\n]*)\n(.*?)(?=^## |\Z)", README, flags=re.DOTALL | re.MULTILINE)
+ROOT = Path(__file__).parents[2]
+PAGES = [ROOT / "README.md", *(ROOT / f"docs/guide/{name}.md" for name in ("layers", "pictures", "grids"))]
+SECTIONS = [
+    found
+    for page in PAGES
+    for found in re.findall(
+        r"^## ([^\n]*)\n(.*?)(?=^## |\Z)", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE
+    )
+]
 #: The program of each section that has one, by its heading.
 PROGRAMS = {
     title: code for title, text in SECTIONS for code in re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
@@ -30,12 +37,24 @@ def test_readme_mask_is_a_star(folder):
         assert (np.asarray(image)[128, [0, 128, 255]] != 0).tolist() == [False, True, False]
 
 
+def test_readme_mesh_is_drawn(folder):
+    found = {}
+    exec(PROGRAMS["A mesh as depth, ids and a picture"], found)
+    assert found["frags"].triangle.max() >= 0
+    with Image.open(folder / "knot.png") as image:
+        assert image.size == (640, 480)
+
+
+def test_readme_fits_on_two_screens():
+    assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 120
+
+
 def test_readme_layers_agree(folder):
     pytest.importorskip("trimesh")
     vertices, triangles = scenes.shape("icosahedron")
     lines = [f"v {x} {y} {z}" for x, y, z in vertices] + [f"f {a} {b} {c}" for a, b, c in triangles + 1]
     folder.joinpath("bunny.obj").write_text("\n".join(lines) + "\n")
-    exec(PROGRAMS["Depth, ids, normals: layers for vision"], {})
+    exec(PROGRAMS["Layers of a view"], {})
     with np.load("view.npz") as view:
         assert view["triangle"].shape == (480, 640)
         assert view["triangle"].max() < len(triangles)
@@ -84,11 +103,12 @@ def test_readme_polygons_have_a_hole_of_another_label(folder):
 def test_readme_programs_are_all_run():
     source = Path(__file__).read_text(encoding="utf-8")
     assert [title for title in PROGRAMS if f'PROGRAMS["{title}"]' not in source] == []
-    assert len(PROGRAMS) == README.count("```python")
+    assert len(PROGRAMS) == sum(page.read_text(encoding="utf-8").count("```python") for page in PAGES)
 
 
 def test_readme_has_the_two_commands():
-    commands = re.findall(r"```sh\n(.*?)\n```", README, flags=re.DOTALL)
+    readme = PAGES[0].read_text(encoding="utf-8")
+    commands = re.findall(r"```sh\n(.*?)\n```", readme, flags=re.DOTALL)
     assert commands == [
         "pip install '.[render]' && topleft render torus-knot -o knot.png",
         "pip install '.[test]' && python -m pytest",

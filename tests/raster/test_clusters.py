@@ -367,7 +367,8 @@ def test_attributes_have_the_same_bits_with_all_vertices_snapped(cut, monkeypatc
 def test_only_used_blocks_of_vertices_are_marked():
     corners = np.array([[0, 1, 2], [16, 3, 40], [33, 34, 35]], np.int32)
     is_used = np.zeros(4, np.uint8)
-    _engine.mark_vertices(np.array([-1, 0, 0, -1, 2], np.int32), corners, is_used)
+    _engine.mark_vertices(np.array([-1, 0, 0, -1, 2], np.int32), corners, 64, is_used)
     assert is_used.tolist() == [1, 0, 1, 0]
-    _engine.mark_vertices(np.array([1], np.int32), corners, is_used)
+    _engine.mark_vertices(np.array([1], np.int32), corners, 64, is_used)
     assert is_used.tolist() == [1, 1, 1, 0]
+    assert _engine.mark_vertices(np.array([0, 1], np.int32), corners, 40, is_used) == 1

@@ -12,6 +12,7 @@ from topleft._base.memory import SCRATCH
 from topleft._raster.peel import peel_meshes
 from topleft._render.blended import is_blended
 from topleft._render.instances import draw_nearest, place
+from topleft._shade.shade import ShadingOptions
 
 SIZE = (120, 90)
 CAMERA = tl.Camera.look_at((0.3, 0.2, 4))
@@ -85,7 +86,7 @@ def test_a_scene_is_its_mesh_and_instances_hide_each_other():
 
 def test_what_is_opaque_is_drawn_as_ever():
     opaque = replace(MESH, materials=[SOLID] * 4)
-    assert not is_blended(opaque, None)
+    assert not is_blended(opaque, ShadingOptions.parse())
     alone = replace(MESH, triangles=MESH.triangles[MESH.material_of_triangle == 2], materials=[SOLID],
                     material_of_triangle=None)  # fmt: skip
     clear = [replace(one, opacity=0) if one.alpha_mode == "blend" else one for one in MATERIALS]
@@ -94,10 +95,10 @@ def test_what_is_opaque_is_drawn_as_ever():
 
 def test_full_opacity_is_opaque():
     full = [replace(one, opacity=1) for one in MATERIALS]
-    assert not is_blended(replace(MESH, materials=full), None)
+    assert not is_blended(replace(MESH, materials=full), ShadingOptions.parse())
     nearly = replace(MESH, materials=[replace(one, texture=tl.Texture([[[255, 255, 255, 254]]])) for one in full],
                      uv=np.zeros((len(MESH.vertices), 2)))  # fmt: skip
-    assert is_blended(nearly, None)
+    assert is_blended(nearly, ShadingOptions.parse())
     got, expected = (tl.render(mesh, CAMERA, SIZE).astype(int) for mesh in (nearly, replace(MESH, materials=full)))
     assert np.abs(got - expected).max() <= 12.92 * 255 / 255 + 1  # a 255th of white behind what is black
 

@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from comparing import assert_same
-from layer_views import CAMERAS, CUBE, SIZE, SNAP_PX, SPHERE, look, pixels, scene
-from lens_cases import FRONT, LENSES, pierced
+from layer_views import CAMERAS, CUBE, FRONT, LENSES, SIZE, SNAP_PX, SPHERE, look, pierced, pixels, scene
 
 import topleft as tl
 from topleft._render.fragments import camera_of

@@ -1,17 +1,14 @@
 """Full materials against float64 NumPy: metallic-rough light, normal maps, environments; the same bits everywhere."""
 
-import os
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import shading_reference as reference
 from comparing import assert_same
+from engine_cases import hashes_on_each_isa
 
 import topleft as tl
-from topleft import _engine
 
 SIZE = (150, 110)
 RNG = np.random.default_rng(8)
@@ -250,21 +247,5 @@ def test_full_materials_windows_are_crops(sampling):
         assert_same(part, picture[21:85, 37:120])
 
 
-PRINT_HASH = """
-import hashlib, test_materials
-digest = hashlib.sha256()
-for sampling in ("center", "msaa4"):
-    for picture in test_materials.everything(sampling=sampling):
-        digest.update(picture.tobytes())
-print(digest.hexdigest())
-"""
-
-
 def test_full_materials_each_isa_gives_the_same_bits():
-    digests = set()
-    for name in _engine.isa_available():
-        path = os.pathsep.join([os.path.dirname(__file__), *sys.path])
-        environment = {**os.environ, "TOPLEFT_ISA": name, "PYTHONPATH": path}
-        command = [sys.executable, "-c", PRINT_HASH]
-        digests.add(subprocess.run(command, env=environment, capture_output=True, check=True).stdout)
-    assert len(digests) == 1
+    assert len(hashes_on_each_isa(__file__, "center", "msaa4")) == 1

@@ -1,9 +1,6 @@
 """The shading kernels against float64 NumPy, and the same bits on every instruction set, thread count and window."""
 
 import gc
-import os
-import subprocess
-import sys
 import weakref
 from dataclasses import replace
 
@@ -11,9 +8,9 @@ import numpy as np
 import pytest
 import shading_reference as reference
 from comparing import assert_same
+from engine_cases import hashes_on_each_isa
 
 import topleft as tl
-from topleft import _engine
 from topleft._base.color import srgb_tables
 from topleft._render.scene_shade import shade
 
@@ -215,26 +212,8 @@ def test_shade_windows_are_crops(sampling):
         assert_same(part, picture[21:85, 37:120])
 
 
-PRINT_HASH = """
-import hashlib, test_shade
-digest = hashlib.sha256()
-for sampling in ("center", "msaa8"):
-    for picture in test_shade.everything(sampling=sampling):
-        digest.update(picture.tobytes())
-print(digest.hexdigest())
-"""
-
-
 def test_shade_each_isa_gives_the_same_bits():
-    names = _engine.isa_available()
-    here = os.path.dirname(__file__)
-    digests = set()
-    for name in names:
-        path = os.pathsep.join([here, *sys.path])
-        environment = {**os.environ, "TOPLEFT_ISA": name, "PYTHONPATH": path}
-        command = [sys.executable, "-c", PRINT_HASH]
-        digests.add(subprocess.run(command, env=environment, capture_output=True, check=True).stdout)
-    assert len(digests) == 1
+    assert len(hashes_on_each_isa(__file__, "center", "msaa8")) == 1
 
 
 def test_shade_several_samples_of_one_triangle_are_as_one():

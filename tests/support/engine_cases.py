@@ -1,9 +1,12 @@
 """What the engine must draw, and whether it does: on one instruction set and another, with any number of threads."""
 
+import os
+import subprocess
 import sys
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
+from pathlib import Path
 
 import int64_loop
 import numpy as np
@@ -30,6 +33,28 @@ def on(isa):
         yield
     finally:
         _engine.use_isa(before)
+
+
+PRINT_HASH = """
+import hashlib, importlib, sys
+module, *samplings = sys.argv[1:]
+digest = hashlib.sha256()
+for sampling in samplings:
+    for picture in importlib.import_module(module).everything(sampling=sampling):
+        digest.update(picture.tobytes())
+print(digest.hexdigest())
+"""
+
+
+def hashes_on_each_isa(path, *samplings):
+    """The hashes of what `everything` of a file of tests draws, in a process for each instruction set."""
+    found = set()
+    for isa in tl.build_info()["isa_available"]:
+        places = os.pathsep.join([str(Path(path).parent), *sys.path])
+        environment = {**os.environ, "TOPLEFT_ISA": isa, "PYTHONPATH": places}
+        command = [sys.executable, "-c", PRINT_HASH, Path(path).stem, *samplings]
+        found.add(subprocess.run(command, env=environment, capture_output=True, check=True).stdout)
+    return found
 
 
 @dataclass(frozen=True)

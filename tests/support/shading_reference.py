@@ -7,9 +7,22 @@ import numpy as np
 
 from topleft._model.environment import DEFAULT_ENVIRONMENT
 from topleft._model.normals import face_normals, unit_or_zero
-from topleft._model.texture import halved, light_of_image
+from topleft._model.texture import LIGHT_OF_BYTE, Encoding, halved_along
 
 TO_HEADLIGHT = np.array([-0.35, 0.45, 1.0]) / np.linalg.norm([-0.35, 0.45, 1.0])
+
+
+def light_of_image(rgba, encoding="srgb"):
+    """Linear light and opacity (H, W, 4) float64, 0 to 1, of a picture."""
+    light = np.empty(rgba.shape)
+    light[..., :3] = LIGHT_OF_BYTE[Encoding(encoding)][rgba[..., :3]]
+    light[..., 3] = rgba[..., 3] / 255
+    return light
+
+
+def halved(level):
+    """The next halving (max(1, H // 2), max(1, W // 2), 4): each texel the mean over its area."""
+    return halved_along(halved_along(level, 0), 1)
 
 
 def decode(srgb):

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
+    "apart_from",
     "as_background",
     "as_checked_triangles",
     "as_colors",
@@ -56,6 +57,16 @@ def as_array(name: str, values: ArrayLike) -> NDArray[Any]:
     except ValueError as error:
         raise ValueError(f"{name} must be array_like, got rows of different lengths ({error})") from None
     return array if array.flags.aligned else array.copy()
+
+
+def apart_from(out: object, name: str, values: ArrayLike) -> ArrayLike:
+    """Return `values`, copied where `out`, an array or several, may share memory with them."""
+    if out is None or isinstance(values, (list, tuple)):
+        return values
+    outs = out if isinstance(out, (list, tuple)) else (out,)
+    array = as_array(name, values)
+    overlaps = any(isinstance(one, np.ndarray) and np.may_share_memory(array, one) for one in outs)
+    return array.copy() if overlaps else values
 
 
 def array_of_tensor(name: str, tensor: Any) -> NDArray[Any]:

@@ -9,9 +9,19 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-__all__ = ["FreshMemory", "KeptMemory", "Memory", "ScratchMemory", "release_memory"]
+from topleft import _engine
+
+__all__ = ["FreshMemory", "KeptMemory", "Memory", "ScratchMemory", "empty", "release_memory"]
 
 HUGE_PAGE = 2 << 20
+CACHE_LINE = 64
+
+#: Arrays below it are NumPy's own: what the system keeps for them costs no page faults.
+MIN_BLOCK_BYTES = 4 << 10
+
+#: Most bytes of arrays that have died which the process keeps for arrays to come: ids and depth of four samples a pixel
+#: in a picture of 4096x4096.
+MAX_WAITING_BYTES = 512 << 20
 
 #: Most bytes that one name of a thread's scratch keeps between module-level calls; `SCRATCH_NAMES` are all.
 MAX_SCRATCH_BYTES = 64 << 20
@@ -52,11 +62,11 @@ class FreshMemory:
 
     def empty(self, name: str, shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:  # noqa: ARG002
         """Return an uninitialised array."""
-        return _typed(allocate(_size(shape, dtype)), shape, dtype)
+        return empty(shape, dtype)
 
     def constant(self, name: str, n: int, value: int) -> NDArray[np.int32]:  # noqa: ARG002
         """Return n int32 that are all `value`."""
-        array: NDArray[np.int32] = _typed(allocate(4 * n), (n,), np.int32)
+        array: NDArray[np.int32] = empty((n,), np.int32)
         array.fill(value)
         return array
 
@@ -117,28 +127,45 @@ FRESH = FreshMemory()
 SCRATCH = ScratchMemory()
 
 
-def release_memory() -> None:
-    """Give back the scratch memory that `coverage`, `overdraw`, `fill` and `wireframe` keep for the calling thread.
+_engine.keep_blocks(MAX_WAITING_BYTES)
 
-    It holds snapped vertices, converted indices, labels, cells and edges: at most 64 MiB each, nothing once the
-    thread has ended. `Rasterizer` objects keep their own memory for as long as they live.
+
+def empty(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
+    """Return an uninitialised array, in memory of one that has died where there is some of about that size.
+
+    Fresh memory costs a page fault every 4 KiB, which takes longer than drawing them. The memory is nobody else's until
+    the array and all its views have died; then it waits for another array, `MAX_WAITING_BYTES` at most.
+    """
+    n_bytes = _size(shape, dtype)
+    if n_bytes < MIN_BLOCK_BYTES:
+        return np.empty(shape, dtype)
+    return np.ndarray(shape, dtype, _engine.lease_block(n_bytes, allocate))
+
+
+def release_memory() -> None:
+    """Give back the memory that calls keep for calls to come.
+
+    These are results that have died, 512 MiB of the process at most, and the scratch of `coverage`, `overdraw`, `fill`
+    and `wireframe` for the calling thread: snapped vertices, converted indices, labels, cells and edges, at most 64 MiB
+    each, nothing once the thread has ended. `Rasterizer` objects keep their own memory for as long as they live.
     """
     SCRATCH.release()
+    _engine.keep_blocks(0)
+    _engine.keep_blocks(MAX_WAITING_BYTES)
 
 
 def allocate(n_bytes: int) -> NDArray[np.uint8]:
-    """Return uninitialised memory that whole huge pages can back, where it is large.
+    """Return uninitialised memory that begins at a cache line, and that whole huge pages can back where it is large.
 
     NumPy asks the system for huge pages from 4 MiB on, but the system uses them only for what is aligned to them.
     """
-    if n_bytes < 2 * HUGE_PAGE:
-        return np.empty(n_bytes, np.uint8)
-    n_whole = -(-n_bytes // HUGE_PAGE) * HUGE_PAGE
+    step = CACHE_LINE if n_bytes < 2 * HUGE_PAGE else HUGE_PAGE
+    n_whole = -(-n_bytes // step) * step
     try:
-        block = np.empty(n_whole + HUGE_PAGE, np.uint8)
+        block = np.empty(n_whole + step, np.uint8)
     except (MemoryError, ValueError):  # ValueError: beyond what addresses can tell
         raise MemoryError(f"no memory for an array of {n_bytes:,} bytes, which this size or scene needs") from None
-    skip = -block.ctypes.data % HUGE_PAGE
+    skip = -block.ctypes.data % step
     return block[skip : skip + n_whole]
 
 

@@ -1,6 +1,6 @@
-"""Looks up arrays at points: between their texels, and in halvings where texels are smaller than a pixel.
+"""Looks up arrays at pixels: between their texels, and in halvings where texels are smaller than a pixel.
 
-In: an array of values, points (u, v) and how they change from pixel to pixel. Out: values, float32.
+In: an array of values, (u, v) of pixels and how they change from one to the next. Out: values, float32.
 
 Based on: Williams, L., "Pyramidal Parametrics", SIGGRAPH 1983; Heckbert, P. S., "Fundamentals of Texture Mapping and
 Image Warping", 1989 (the footprint of a pixel from derivatives).
@@ -8,32 +8,66 @@ Image Warping", 1989 (the footprint of a pixel from derivatives).
 
 from __future__ import annotations
 
-from typing import Any
+from itertools import pairwise
+from typing import Any, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
+from topleft import _engine
 from topleft._base.arrays import as_array
-from topleft._base.color import decode_srgb
+from topleft._base.color import LIGHT_OF_SRGB, decode_srgb
 from topleft._base.options import check_choice
+from topleft.typing import EncodingOption, FilterOption, WrapOption
 
-__all__ = ["as_texels", "look_up"]
+__all__ = ["MOST_KEPT_BYTES", "ValueLevels", "as_levels", "as_light", "halve", "levels_of"]
 
 F32 = NDArray[np.float32]
-F64 = NDArray[np.float64]
-Wraps = tuple[str, str]
 
-POINTS_AT_ONCE = 1 << 16
-"""Points that are looked up together: with four texels of four channels each they take 8 MB of float64."""
+MOST_KEPT_BYTES = 1 << 27
+"""What the levels of a texture may take and be kept with it; those of 2048 x 2048 texels of four channels take 2/3."""
+
+FILTER_CODES = {"nearest": 0, "bilinear": 1, "trilinear": 2}  # tl_filter in csrc/shading.h
+WRAP_CODES = {"repeat": 0, "clamp": 1, "mirror": 2}  # tl_wrap
 
 
-def as_texels(texture: object, filter: str, wrap: str | Wraps, encoding: str | None) -> tuple[F32, str, Wraps, bool]:  # noqa: A002
-    """The values (H, W, C) of a texture, its filter and wraps, and whether it had no channels (H, W).
+class ValueLevels(NamedTuple):
+    """Values and their halvings, and how they are looked up."""
+
+    texels: F32  # (N, C): of all levels, behind each other; row 0 is the top, where v = 1
+    rows: NDArray[np.int64]  # (L, 3): where each begins, width and height
+    codes: tuple[int, int, int]  # of the filter, and of the wraps of u and v
+    is_flat: bool = False  # (H, W) without channels
+
+    @property
+    def n_channels(self) -> int:
+        """Numbers of a texel."""
+        return self.texels.shape[1]
+
+    def look_up(self, ids: NDArray[np.int32], uv: F32, slopes: F32 | None, background: float) -> F32:
+        """Return the values (P, C) of pixels.
+
+        Parameters
+        ----------
+        ids : (P,) int32
+            -1 where the value is the background.
+        uv : (P, 2) float32
+        slopes : (P, 2, 2) float32, or None
+            What u and v, the first axis, change by from pixel to pixel along x and y; None unless there are halvings.
+        background : float
+        """
+        out = np.empty((len(ids), self.n_channels), np.float32)
+        _engine.fill_texels(self.texels, self.rows, self.codes, ids, uv, slopes, background, out)
+        return out
+
+
+def as_levels(texture: object, filter: str, wrap: object, encoding: str | None) -> ValueLevels:  # noqa: A002
+    """Return what is looked up.
 
     Parameters
     ----------
     texture : Texture, or (H, W) or (H, W, C) array_like of real numbers
-        A `Texture` tells filter, wrap and encoding itself.
+        A `Texture` tells filter, wrap and encoding itself, and keeps its levels.
     filter : {"trilinear", "bilinear", "nearest"}
     wrap : {"repeat", "clamp", "mirror"}, or a pair of them
     encoding : {"linear", "srgb"}, optional
@@ -46,109 +80,62 @@ def as_texels(texture: object, filter: str, wrap: str | Wraps, encoding: str | N
     ValueError
         If it has another shape or no texels, or an option is unknown.
     """
-    if hasattr(texture, "image") and hasattr(texture, "filter") and hasattr(texture, "wrap"):
-        filter, wrap = str(texture.filter), texture.wrap  # noqa: A001
-        encoding, texture = str(getattr(texture, "encoding", "srgb")), texture.image
+    if hasattr(texture, "value_levels"):
+        found: ValueLevels = texture.value_levels()
+        return found
     encoding = "linear" if encoding is None else encoding
-    check_choice("filter", filter, ("trilinear", "bilinear", "nearest"))
-    check_choice("encoding", encoding, ("linear", "srgb"))
+    check_choice("filter", filter, get_args(FilterOption))
+    check_choice("encoding", encoding, get_args(EncodingOption))
     wraps = (wrap, wrap) if isinstance(wrap, str) else wrap
     if not isinstance(wraps, tuple | list) or len(wraps) != 2:
         raise ValueError(f"wrap must be one word, or two for u and v, got {wrap!r}")
     for one in wraps:
-        check_choice("wrap", str(one), ("repeat", "clamp", "mirror"))
+        check_choice("wrap", one, get_args(WrapOption))
     array = as_array("texture", texture)  # type: ignore[arg-type]
     if array.dtype.kind not in "fiub":
         raise TypeError(f"texture must be a Texture or real numbers, got dtype {array.dtype}")
     if array.ndim not in (2, 3) or not array.size:
         raise ValueError(f"texture must have shape (H, W) or (H, W, C), got {array.shape}")
-    is_flat = array.ndim == 2
-    values = array.reshape(*array.shape[:2], -1).astype(np.float32)
-    if array.dtype == np.uint8:
-        values /= 255
+    values = as_light(array.reshape(*array.shape[:2], -1), encoding)
+    return levels_of(values, filter, (str(wraps[0]), str(wraps[1])))._replace(is_flat=array.ndim == 2)
+
+
+def as_light(array: NDArray[Any], encoding: str) -> F32:
+    """Return values (H, W, C) as float32, bytes as 0 to 1, the first three channels decoded where they are sRGB."""
+    if array.dtype != np.uint8:
+        values = np.ascontiguousarray(array, np.float32)
+        if encoding == "srgb":
+            values = values.copy()
+            values[..., :3] = decode_srgb(values[..., :3].astype(np.float64))
+        return values
+    values = np.empty(array.shape, np.float32)
+    np.divide(array, np.float32(255), out=values, dtype=np.float32)
     if encoding == "srgb":
-        values[..., :3] = decode_srgb(values[..., :3].astype(np.float64))
-    return values, filter, (str(wraps[0]), str(wraps[1])), is_flat
+        values[..., :3] = LIGHT_OF_SRGB[array[..., :3]]
+    return values
 
 
-def look_up(texels: F32, uv: F64, footprint: F64 | None, filter: str, wrap: Wraps) -> F32:  # noqa: A002
-    """The values (P, C) float32 of texels (H, W, C) at points.
-
-    Parameters
-    ----------
-    texels : (H, W, C) float32
-        Row 0 is the top, where v = 1.
-    uv : (P, 2) float64
-    footprint : (P, 2, 2) float64, optional
-        What u and v, the first axis, change by from pixel to pixel along x and y. None: texels are never smaller than
-        a pixel.
-    filter, wrap
-        As `as_texels` returns them.
-    """
-    levels = [texels]
-    while filter == "trilinear" and footprint is not None and max(levels[-1].shape[:2]) > 1:
-        levels.append(halve(levels[-1]))
-    height, width, n_channels = texels.shape
-    out = np.empty((len(uv), n_channels), np.float32)
-    for first in range(0, len(uv), POINTS_AT_ONCE):
-        part = slice(first, first + POINTS_AT_ONCE)
-        if len(levels) == 1:
-            out[part] = between(texels, uv[part], wrap, is_nearest=filter == "nearest")
-            continue
-        sides = np.square(footprint[part] * np.array([[width], [height]])).sum(axis=1)  # type: ignore[index]
-        with np.errstate(divide="ignore"):
-            lod = np.clip(0.5 * np.log2(sides.max(axis=1)), 0, len(levels) - 1)
-        fine = np.floor(lod).astype(np.intp)
-        share = (lod - fine)[:, None]
-        own = np.zeros((len(lod), n_channels))
-        for k, level in enumerate(levels):
-            weight = np.where(fine == k, 1 - share[:, 0], np.where(fine == k - 1, share[:, 0], 0.0))
-            used = np.flatnonzero(weight)
-            if used.size:
-                own[used] += weight[used, None] * between(level, uv[part][used], wrap, is_nearest=False)
-        out[part] = own
-    return out
-
-
-def between(texels: F32, uv: F64, wrap: Wraps, *, is_nearest: bool) -> F64:
-    """The values (P, C) of one level: of the texel that a point lies in, or between the four next to it."""
-    height, width = texels.shape[:2]
-    x, y = uv[:, 0] * width, (1 - uv[:, 1]) * height
-    if is_nearest:
-        return texels[wrapped(np.floor(y), height, wrap[1]), wrapped(np.floor(x), width, wrap[0])].astype(np.float64)
-    left, top = np.floor(x - 0.5), np.floor(y - 0.5)
-    share_x, share_y = (x - 0.5 - left)[:, None], (y - 0.5 - top)[:, None]
-    columns = [wrapped(left + k, width, wrap[0]) for k in range(2)]
-    rows = [wrapped(top + k, height, wrap[1]) for k in range(2)]
-    upper, lower = (texels[row, columns[0]] * (1 - share_x) + texels[row, columns[1]] * share_x for row in rows)
-    mixed: F64 = upper * (1 - share_y) + lower * share_y
-    return mixed
-
-
-def wrapped(index: F64, n: int, wrap: str) -> NDArray[np.intp]:
-    """Which texel of n an index beyond them means; that of a point that is nowhere is 0."""
-    finite = np.where(np.isfinite(index), index, 0.0)
-    if wrap == "clamp":
-        return np.clip(finite, 0, n - 1).astype(np.intp)
-    if wrap == "repeat":
-        return np.mod(finite, n).astype(np.intp)
-    turned = np.mod(finite, 2 * n)
-    return np.minimum(turned, 2 * n - 1 - turned).astype(np.intp)
+def levels_of(values: F32, filter: str, wraps: tuple[str, str]) -> ValueLevels:  # noqa: A002
+    """Return contiguous values (H, W, C) with their halvings, where the filter looks at those."""
+    height, width, n_channels = values.shape
+    rows = [(0, width, height)]
+    while filter == "trilinear" and max(width, height) > 1:
+        offset, width, height = rows[-1]
+        offset, width, height = offset + height * width, max(1, width // 2), max(1, height // 2)
+        rows.append((offset, width, height))
+    codes = FILTER_CODES[filter], *(WRAP_CODES[one] for one in wraps)
+    texels = values.reshape(-1, n_channels)
+    if len(rows) > 1:
+        texels = np.empty((rows[-1][0] + 1, n_channels), np.float32)
+        texels[: rows[1][0]] = values.reshape(-1, n_channels)
+        for (first, width, height), (offset, *half) in pairwise(rows):
+            end = offset + half[0] * half[1]
+            _engine.halve_rows(texels[first:offset], width, height, 0, half[1], texels[offset:end])
+    return ValueLevels(texels, np.array(rows, np.int64), codes)  # type: ignore[arg-type]
 
 
 def halve(level: F32) -> F32:
-    """The next halving (max(1, H // 2), max(1, W // 2), C): each texel the mean over its area."""
-    values: NDArray[Any] = level.astype(np.float64)
-    for axis in range(2):
-        n = values.shape[axis]
-        if n % 2 == 0:
-            values = (values.take(range(0, n, 2), axis) + values.take(range(1, n, 2), axis)) / 2
-        elif n > 1:
-            m = n // 2
-            sums = np.cumsum(np.insert(values, 0, 0, axis=axis), axis=axis)  # the area up to each border
-            border = np.arange(m + 1) * n / m
-            below = np.minimum(border.astype(int), n - 1)
-            share = np.expand_dims(border - below, tuple(k for k in range(3) if k != axis))
-            area = sums.take(below, axis) + share * values.take(below, axis)
-            values = np.diff(area, axis=axis) * (m / n)
-    return values.astype(np.float32)
+    """Return the next halving (max(1, H // 2), max(1, W // 2), C): each texel the mean over its area."""
+    found = levels_of(np.ascontiguousarray(level), "trilinear", ("clamp", "clamp"))
+    offset, width, height = found.rows[1].tolist()
+    return found.texels[offset : offset + width * height].reshape(height, width, -1)

@@ -17,12 +17,15 @@ from topleft._base.memory import SCRATCH
 if TYPE_CHECKING:
     from concurrent.futures import Future, ThreadPoolExecutor
 
-__all__ = ["available_threads", "count_threads", "parse_threads", "run_parts", "threads_for"]
+__all__ = ["available_threads", "count_threads", "parse_threads", "run_parts", "threads_for", "threads_of_rows"]
 
 Part = TypeVar("Part")
 
 #: Triangles of a scene of instances, of lines or of arrays that are worth a thread; draws: `choices.threads_to_draw`.
 MIN_TRIANGLES_PER_THREAD = 2000
+
+#: Triangles or vertices that are worth one for less: a millisecond, where the first use of the pool takes four.
+MIN_ROWS_PER_THREAD = 50_000
 
 _pool: ThreadPoolExecutor | None = None
 
@@ -78,6 +81,11 @@ def count_threads(threads: int | None, n_triangles: int) -> int:
 def threads_for(threads: object, n_triangles: int) -> int:
     """Return how many threads a scene is worth, of the number that a caller gave."""
     return count_threads(parse_threads(threads), n_triangles)
+
+
+def threads_of_rows(n: int, threads: int | None = None) -> int:
+    """Return how many threads some triangles or vertices are worth that are measured or moved, not drawn."""
+    return max(1, min(count_threads(None, n), n // MIN_ROWS_PER_THREAD)) if threads is None else threads
 
 
 def run_parts(work: Callable[[int, int], Part], n: int, n_parts: int) -> list[Part]:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from pathlib import Path
 from typing import IO
 
-__all__ = ["write_whole"]
+__all__ = ["remove_stale_parts", "write_whole"]
+
+#: A file that nobody has written to for so long was left by a process that was killed.
+STALE_S = 3600
 
 
 def write_whole(path: Path, write: Callable[[IO[bytes]], object]) -> None:
@@ -28,6 +32,20 @@ def write_whole(path: Path, write: Callable[[IO[bytes]], object]) -> None:
     except BaseException:
         _remove(temporary)
         raise
+
+
+def remove_stale_parts(paths: Iterable[Path]) -> None:
+    """Remove what processes that were killed have left of these files an hour ago or earlier."""
+    names: dict[Path, set[str]] = {}
+    for path in paths:
+        names.setdefault(path.parent, set()).add(path.name[:100])
+    for folder, own in names.items():
+        with suppress(OSError):  # it is not there yet, or not ours
+            for left in folder.glob(".*.part"):
+                stem = left.name.removesuffix(".part")
+                is_ours = stem[1:-9] in own and stem[-9:-8] == "."
+                if is_ours and time.time() - left.stat().st_mtime > STALE_S:
+                    left.unlink()
 
 
 def _remove(temporary: Path) -> None:

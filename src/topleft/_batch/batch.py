@@ -9,7 +9,7 @@ import os
 import warnings
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Sized
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -24,6 +24,7 @@ from topleft._base.options import parse
 from topleft._batch.jobs import Job, JobRunner, Outcome, as_job
 from topleft._batch.workers import Workers, workers_of
 from topleft.errors import MeshWarning, MissingPackageError
+from topleft.typing import OnErrorOption, OrderOption
 
 __all__ = ["Batch", "Job", "Result", "Summary", "render_batch"]
 
@@ -114,8 +115,8 @@ def render_batch(
     *,
     executor: Executor | int | None = None,
     progress: Progress | bool | None = None,
-    on_error: str = "raise",
-    order: str = "jobs",
+    on_error: OnErrorOption = "raise",
+    order: OrderOption = "jobs",
     resume: bool = False,
     chunk: int = 1,
     window: int | None = None,
@@ -341,8 +342,17 @@ class _InFlight:
             if found is None:
                 break
             jobs, is_done = found
-            self._tasks.append(_Task(jobs, None if is_done else self._workers.submit(jobs)))
+            self._tasks.append(_Task(jobs, None if is_done else self._submit(jobs)))
         return bool(self._tasks)
+
+    def _submit(self, jobs: list[tuple[int, Job]]) -> Future[list[Outcome]]:
+        """Submit jobs; to workers of which one was killed they are submitted as ones that have failed for that."""
+        try:
+            return self._workers.submit(jobs)
+        except BrokenExecutor as error:
+            failed: Future[list[Outcome]] = Future()
+            failed.set_exception(error)
+            return failed
 
     def _next_done(self) -> _Task:
         """Take out a task that is done, the earliest of them."""
@@ -358,12 +368,12 @@ class _InFlight:
 
 
 def _is_done(job: Job) -> bool:
-    """Tell whether all files of a job are there; what is wrong with a job is found when it is drawn."""
+    """Tell whether all files of a job are there, and not empty; what is wrong with a job is found when it is drawn."""
     try:
         files: Sequence[Path] = job.files
     except ValueError:
         return False
-    return bool(files) and all(file.is_file() for file in files)
+    return bool(files) and all(file.is_file() and file.stat().st_size for file in files)
 
 
 class _Bar:

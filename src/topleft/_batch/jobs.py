@@ -21,15 +21,16 @@ from topleft._io.images import save_image
 from topleft._io.layer_files import layer_paths, save_layers
 from topleft._io.load import load
 from topleft._io.notes import listening, tell
-from topleft._model.adapt import MeshLike, as_mesh
 from topleft._model.mesh import Mesh
 from topleft._model.points import Points
-from topleft._model.scene import Scene
 from topleft._raster.verbs import Rasterizer
 from topleft._render.layers import check_layers, draw_layers
 from topleft._render.render import DEFAULT_SIZE, render
 from topleft._render.transparent import render_transparent
 from topleft._render.view_layers import gbuffer_of
+from topleft._scene.adapt import MeshLike, as_mesh
+from topleft._scene.scene import Scene
+from topleft.typing import LayerOption
 
 __all__ = ["Job", "JobRunner", "MeshFile", "Outcome", "as_job"]
 
@@ -62,10 +63,10 @@ class Job:
 
     scene: Any
     camera: Camera | CameraMaker | None = None
-    size: tuple[int, int] = DEFAULT_SIZE
+    size: int | tuple[int, int] = DEFAULT_SIZE
     options: Mapping[str, Any] = field(default_factory=dict)
     destination: str | os.PathLike[str] | None = None
-    layers: Sequence[str] = ()
+    layers: Sequence[LayerOption | str] = ()
 
     def __post_init__(self) -> None:
         if not isinstance(self.options, Mapping) or not all(isinstance(name, str) for name in self.options):

@@ -17,7 +17,7 @@ from topleft._batch.jobs import Job, JobRunner, Outcome
 from topleft._lod.levels import Level, Levels, keep_levels
 from topleft._lod.simplify import levels_of
 from topleft._model.mesh import Mesh
-from topleft._model.scene import Scene
+from topleft._scene.scene import Scene
 from topleft.errors import MissingPackageError
 
 __all__ = ["Workers", "workers_of"]

@@ -7,7 +7,7 @@ Matrices act on columns: `clip = projection @ view @ [x, y, z, 1]`. A lens bends
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -20,6 +20,7 @@ from topleft._camera.matrices import (
     FRAMING_MARGIN,
     SILHOUETTE_MARGIN,
     THREE_QUARTER_DEG,
+    as_framed,
     bounding_sphere,
     box_corners,
     box_matrix,
@@ -27,6 +28,7 @@ from topleft._camera.matrices import (
     check_planes,
     check_positive,
     distance_to_fit,
+    ends_to_frame,
     frustum_matrix,
     orbit_view,
     orthographic_matrix,
@@ -36,9 +38,13 @@ from topleft._camera.matrices import (
     split_matrix,
     view_matrix,
 )
-from topleft._model.adapt import MeshLike
+from topleft._model.mesh import Mesh
+from topleft._model.points import Points
+from topleft._scene.adapt import MeshLike
+from topleft._scene.scene import Scene
+from topleft.typing import FitOption, UpOption
 
-__all__ = ["DEFAULT_FOV_Y_DEG", "Camera", "CameraLike", "as_camera"]
+__all__ = ["DEFAULT_FOV_Y_DEG", "Camera", "CameraLike", "as_camera", "camera_for"]
 
 DEFAULT_FOV_Y_DEG = 40.0
 
@@ -221,7 +227,7 @@ class Camera:
         Parameters
         ----------
         view : (4, 4) array_like
-            Eye from world; `view_matrix` makes one.
+            Eye from world; the `view` of another camera, say.
         near, far : float
             Distances of the planes in front of the eye, world units, 0 < near < far.
         fov_y_deg : float
@@ -232,7 +238,7 @@ class Camera:
         ValueError
             If the field of view or the planes are outside their range.
         """
-        return cls(as_square("view", view, 4), perspective_matrix(fov_y_deg, near, far), aspect=1.0)
+        return cls(view, perspective_matrix(fov_y_deg, near, far), aspect=1.0)
 
     @classmethod
     def orthographic(cls, view: npt.ArrayLike, *, near: float, far: float, height: float) -> Camera:
@@ -241,7 +247,7 @@ class Camera:
         Parameters
         ----------
         view : (4, 4) array_like
-            Eye from world; `view_matrix` makes one.
+            Eye from world; the `view` of another camera, say.
         near, far : float
             Distances of the planes in front of the eye, world units, near < far; negative ones lie behind it.
         height : float
@@ -252,7 +258,7 @@ class Camera:
         ValueError
             If the height or the planes are outside their range.
         """
-        return cls(as_square("view", view, 4), orthographic_matrix(height, near, far), aspect=1.0)
+        return cls(view, orthographic_matrix(height, near, far), aspect=1.0)
 
     @classmethod
     def off_center(
@@ -272,7 +278,7 @@ class Camera:
         Parameters
         ----------
         view : (4, 4) array_like
-            Eye from world; `view_matrix` makes one.
+            Eye from world; the `view` of another camera, say.
         left, right, bottom, top : float
             Sides of the picture in the plane at `near`, world units from the axis, as for glFrustum and glOrtho. A
             picture of another shape is stretched.
@@ -287,7 +293,7 @@ class Camera:
             If the sides or the planes are out of order.
         """
         matrix = (box_matrix if ortho else frustum_matrix)(left, right, bottom, top, near, far)
-        return cls(as_square("view", view, 4), matrix)
+        return cls(view, matrix)
 
     @classmethod
     def look_at(
@@ -321,8 +327,9 @@ class Camera:
         ValueError
             If eye and target coincide, `up` is parallel to the view, or another number is outside its range.
         """
+        eye, target, up = as_vector("eye", eye), as_vector("target", target), as_vector("up", up)
         view = view_matrix(eye, target, up)
-        distance = float(np.linalg.norm(as_vector("target", target) - as_vector("eye", eye)))
+        distance = float(np.linalg.norm(target - eye))
         near = 0.01 * distance if near is None else near
         far = 100 * distance if far is None else far
         if ortho_height is not None:
@@ -399,10 +406,10 @@ class Camera:
         azimuth_deg: float = THREE_QUARTER_DEG[0],
         elevation_deg: float = THREE_QUARTER_DEG[1],
         fov_y_deg: float = DEFAULT_FOV_Y_DEG,
-        up: Literal["y", "z"] = "y",
+        up: UpOption = "y",
         ortho: bool = False,
         aspect: float = 1.0,
-        fit: Literal["sphere", "box", "points", "silhouette"] = "sphere",
+        fit: FitOption = "sphere",
     ) -> Camera:
         """A camera that has the whole subject just inside its frame; three-quarter view by default.
 
@@ -433,10 +440,12 @@ class Camera:
         ValueError
             If there is nothing to frame or a number is outside its range.
         """
-        center, radius = bounding_sphere(subject)
+        framed = as_framed(subject)
+        ends = ends_to_frame(framed)
+        center, radius = bounding_sphere(ends)
         check_fov(fov_y_deg)
         check_positive("aspect", aspect)
-        check_choice("fit", fit, ("sphere", "box", "points", "silhouette"))
+        check_choice("fit", fit, get_args(FitOption))
         tan_y = np.tan(np.radians(fov_y_deg) / 2)
         # The sphere touches the pyramid of view at sin, not tan, of the half angle.
         distance = radius * FRAMING_MARGIN / np.sin(np.arctan(tan_y * min(1.0, aspect)))
@@ -444,7 +453,7 @@ class Camera:
         right, above = 0.0, 0.0
         if fit != "sphere":
             turn = orbit_view((0, 0, 0), 1.0, azimuth_deg, elevation_deg, up=up)[:3, :3]
-            points = box_corners(subject) if fit == "box" else points_to_frame(subject)
+            points = box_corners(ends) if fit == "box" else points_to_frame(framed)
             points = (points - center) @ turn.T
             if fit == "silhouette":
                 share = 1 - 2 * SILHOUETTE_MARGIN
@@ -493,3 +502,21 @@ def as_camera(camera: object, name: str = "camera") -> Camera:
             return Camera.from_matrix(matrix)
         hint = "; Camera.from_intrinsics takes those of OpenCV" * (matrix.shape in ((3, 3), (3, 4)))
     raise TypeError(f"{wish}, got {shown(camera)}{hint}")
+
+
+def camera_for(subject: Mesh | Scene | Points, camera: CameraLike | None, size: tuple[int, int]) -> Camera:
+    """The camera, or the three-quarter view of the subject in a picture of this size.
+
+    Raises
+    ------
+    TypeError
+        If the camera is none.
+    ValueError
+        If there is none, and nothing to frame.
+    """
+    if camera is not None:
+        return as_camera(camera)
+    if isinstance(subject, Mesh) and not len(subject.triangles):
+        raise ValueError("there is nothing to frame: the mesh has no triangles")
+    width, height = size
+    return Camera.framing(subject.extreme_points(), aspect=width / height if width > 0 and height > 0 else 1.0)

@@ -8,18 +8,21 @@ Based on: Segal, M., and K. Akeley, "The OpenGL Graphics System", 1992 (the matr
 from __future__ import annotations
 
 import math
-from typing import Literal
+from typing import TypeAlias, get_args
 
 import numpy as np
 import numpy.typing as npt
 
 from topleft._base.arrays import as_number, as_real, as_vector, check_regular
 from topleft._base.options import check_choice
-from topleft._model.adapt import MeshLike, as_mesh, is_mesh_like
-from topleft._model.mesh import extreme_points, used_vertices
+from topleft._model.mesh import Mesh, extreme_points, used_vertices
 from topleft._model.points import Points
+from topleft._scene.adapt import MeshLike, is_mesh_like
+from topleft._scene.subject import as_subject
+from topleft.typing import UpOption
 
 F64 = npt.NDArray[np.float64]
+Framed: TypeAlias = Mesh | Points | F64
 
 THREE_QUARTER_DEG = (35.0, 20.0)
 """Azimuth and elevation of the three-quarter view: front, right side and top all show."""
@@ -31,7 +34,14 @@ SILHOUETTE_MARGIN = 0.05
 """The share of the frame that `fit="silhouette"` leaves free at each end of the side that is filled."""
 
 
-def points_to_frame(subject: MeshLike | npt.ArrayLike) -> F64:
+def as_framed(subject: MeshLike | npt.ArrayLike) -> Framed:
+    """What is to be framed: a mesh, or points, by themselves or in a cloud."""
+    if isinstance(subject, Points) or is_mesh_like(subject):
+        return as_subject(subject)  # type: ignore[return-value]  # a scene is not mesh-like
+    return as_real("subject", subject)
+
+
+def points_to_frame(subject: Framed) -> F64:
     """The points (N, 3) float64 of a subject that count: vertices that triangles use, each once, or all points.
 
     Raises
@@ -41,10 +51,8 @@ def points_to_frame(subject: MeshLike | npt.ArrayLike) -> F64:
     """
     if isinstance(subject, Points):
         points = np.asarray(subject.positions, np.float64)
-    elif is_mesh_like(subject):
-        points = np.asarray(used_vertices(as_mesh(subject)), np.float64)
     else:
-        points = as_real("subject", subject)
+        points = np.asarray(used_vertices(subject), np.float64) if isinstance(subject, Mesh) else subject
     if points.ndim != 2 or points.shape[1] != 3:
         raise ValueError(f"points to frame must have shape (N, 3), got {points.shape}")
     if not len(points):
@@ -54,34 +62,22 @@ def points_to_frame(subject: MeshLike | npt.ArrayLike) -> F64:
     return points
 
 
-def ends_to_frame(subject: MeshLike | npt.ArrayLike) -> F64:
+def ends_to_frame(subject: Framed) -> F64:
     """A few of those points, which have the box and the bounding sphere of all."""
-    if isinstance(subject, Points) and len(subject):
+    if isinstance(subject, Mesh | Points) and len(subject.triangles if isinstance(subject, Mesh) else subject):
         return subject.extreme_points()
-    if is_mesh_like(subject):
-        mesh = as_mesh(subject)
-        if len(mesh.triangles):
-            return mesh.extreme_points()
     return extreme_points(points_to_frame(subject))
 
 
-def bounding_sphere(subject: MeshLike | npt.ArrayLike) -> tuple[F64, float]:
-    """Centre (3,) of the box round the subject, and the distance of its farthest point (1 if they are all one).
-
-    Raises
-    ------
-    ValueError
-        If there is no point, or one is not finite.
-    """
-    ends = ends_to_frame(subject)
+def bounding_sphere(ends: F64) -> tuple[F64, float]:
+    """Centre (3,) of the box round points, and the distance of the farthest of them (1 if they are all one)."""
     center = ends.min(axis=0) / 2 + ends.max(axis=0) / 2
     radius = math.sqrt(float(((ends - center) ** 2).sum(axis=1).max()))
     return center, radius if radius > 0 else 1.0
 
 
-def box_corners(subject: MeshLike | npt.ArrayLike) -> F64:
-    """The corners (8, 3) float64 of the box round the subject; raises as `bounding_sphere` does."""
-    ends = ends_to_frame(subject)
+def box_corners(ends: F64) -> F64:
+    """The corners (8, 3) float64 of the box round points."""
     low, high = ends.min(axis=0), ends.max(axis=0)
     return np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
 
@@ -193,7 +189,7 @@ def _middle(axis: F64, z: F64, tan: float, distance: float) -> float:
     return place
 
 
-def view_matrix(eye: npt.ArrayLike, target: npt.ArrayLike, up: npt.ArrayLike = (0.0, 1.0, 0.0)) -> F64:
+def view_matrix(eye: F64, target: F64, up: F64) -> F64:
     """Eye from world (4, 4) float64, for a camera at `eye` that looks at `target`.
 
     Raises
@@ -201,7 +197,6 @@ def view_matrix(eye: npt.ArrayLike, target: npt.ArrayLike, up: npt.ArrayLike = (
     ValueError
         If eye and target coincide, or if `up` is zero or parallel to the view.
     """
-    eye, target, up = as_vector("eye", eye), as_vector("target", target), as_vector("up", up)
     forward = target - eye
     distance = np.linalg.norm(forward)
     if distance == 0:
@@ -224,7 +219,7 @@ def orbit_view(
     azimuth_deg: float = THREE_QUARTER_DEG[0],
     elevation_deg: float = THREE_QUARTER_DEG[1],
     *,
-    up: Literal["y", "z"] = "y",
+    up: UpOption = "y",
 ) -> F64:
     """Eye from world (4, 4) float64, for a camera on a sphere round the target; the angles of `Camera.framing`.
 
@@ -233,7 +228,7 @@ def orbit_view(
     ValueError
         If the elevation is outside -90 to 90 degrees or `up` is neither "y" nor "z".
     """
-    check_choice("up", up, ("y", "z"))
+    check_choice("up", up, get_args(UpOption))
     if not math.isfinite(as_number("azimuth_deg", azimuth_deg)):
         raise ValueError(f"azimuth_deg must be finite, got {azimuth_deg}")
     if not -90 <= as_number("elevation_deg", elevation_deg) <= 90:

@@ -8,17 +8,28 @@ Geosciences 42, 2010.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TypedDict, Unpack
 
 import numpy as np
 import numpy.typing as npt
 
 from topleft._base.arrays import as_count
 from topleft._camera.camera import Camera
-from topleft._camera.matrices import THREE_QUARTER_DEG, bounding_sphere
-from topleft._model.adapt import MeshLike
+from topleft._camera.matrices import THREE_QUARTER_DEG, Framed, as_framed, bounding_sphere, ends_to_frame
+from topleft._scene.adapt import MeshLike
+from topleft.typing import FitOption, UpOption
 
 GOLDEN_ANGLE_DEG = 180 * (3 - 5**0.5)
+
+
+class FramingOptions(TypedDict, total=False):
+    """The options of `Camera.framing` that `turntable` and `viewpoints` pass on."""
+
+    fov_y_deg: float
+    up: UpOption
+    ortho: bool
+    aspect: float
+    fit: FitOption
 
 
 def turntable(
@@ -27,7 +38,7 @@ def turntable(
     *,
     azimuth_deg: float = THREE_QUARTER_DEG[0],
     elevation_deg: float = THREE_QUARTER_DEG[1],
-    **framing: Any,
+    **framing: Unpack[FramingOptions],
 ) -> list[Camera]:
     """Cameras that go once round the subject at one height, in equal steps.
 
@@ -59,14 +70,14 @@ def turntable(
     12
     """
     n = as_count("n", n)
-    sphere = _corners_of_sphere(subject) if framing.get("fit", "sphere") == "sphere" else subject
+    sphere = _looked_at(subject, framing.get("fit", "sphere"))
     return [
         Camera.framing(sphere, azimuth_deg=azimuth_deg + 360 * i / n, elevation_deg=elevation_deg, **framing)
         for i in range(n)
     ]
 
 
-def viewpoints(subject: MeshLike | npt.ArrayLike, n: int, **framing: Any) -> list[Camera]:
+def viewpoints(subject: MeshLike | npt.ArrayLike, n: int, **framing: Unpack[FramingOptions]) -> list[Camera]:
     """Cameras spread evenly over the sphere round the subject, from the top to the bottom.
 
     Parameters
@@ -101,7 +112,7 @@ def viewpoints(subject: MeshLike | npt.ArrayLike, n: int, **framing: Any) -> lis
     True
     """
     n = as_count("n", n)
-    sphere = _corners_of_sphere(subject) if framing.get("fit", "sphere") == "sphere" else subject
+    sphere = _looked_at(subject, framing.get("fit", "sphere"))
     height = 1 - (2 * np.arange(n) + 1) / n
     return [
         Camera.framing(sphere, azimuth_deg=i * GOLDEN_ANGLE_DEG % 360, elevation_deg=elevation_deg, **framing)
@@ -109,7 +120,10 @@ def viewpoints(subject: MeshLike | npt.ArrayLike, n: int, **framing: Any) -> lis
     ]
 
 
-def _corners_of_sphere(subject: MeshLike | npt.ArrayLike) -> npt.NDArray[np.float64]:
-    """Two points with the sphere of the subject: the mesh is looked at once, not for every camera."""
-    center, radius = bounding_sphere(subject)
+def _looked_at(subject: MeshLike | npt.ArrayLike, fit: str) -> Framed:
+    """What all cameras look at: the subject, converted once; for its sphere two points that have the same."""
+    framed = as_framed(subject)
+    if fit != "sphere":
+        return framed
+    center, radius = bounding_sphere(ends_to_frame(framed))
     return np.stack([center - [radius, 0, 0], center + [radius, 0, 0]])

@@ -19,6 +19,7 @@ from topleft._base.options import Sampling, parse
 from topleft._base.whole_file import write_whole
 from topleft._raster.sampling import sample_positions
 from topleft.errors import ImageError
+from topleft.typing import SamplingOption
 
 __all__ = ["pixel_grid"]
 
@@ -51,8 +52,8 @@ def pixel_grid(
     vertices: ArrayLike | None = None,
     triangles: ArrayLike | None = None,
     *,
-    size: tuple[int, int] | None = None,
-    sampling: str | None = None,
+    size: int | tuple[int, int] | None = None,
+    sampling: SamplingOption | None = None,
     numbers: bool = True,
     cell: int = 32,
     edge_color: ColorLike = "#d1495b",

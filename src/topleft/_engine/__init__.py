@@ -1,5 +1,6 @@
 """The compiled unit, and the choice of its instruction set. It allocates scratch, calls csrc and returns its status.
 
+blocks.pxi     keeps the memory of arrays that have died for arrays to come
 buffers.pxi    describes what a pass reads and writes: viewport, vertices, buffers, indices, clipped pieces
 clusters.pxi   sorts a mesh into clusters and draws those that a view needs
 contract.pxi   declares the structs and kernels of csrc

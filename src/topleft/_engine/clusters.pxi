@@ -7,16 +7,24 @@ CLUSTER_BYTES = sizeof(tl_cluster)
 BLOCK = VERTEX_BLOCK
 
 
-def mark_vertices(const int32_t[::1] ids, const int32_t[:, ::1] corners, uint8_t[::1] is_used):
-    """Mark the blocks of VERTEX_BLOCK vertices that some triangles use; an id of -1 is of none."""
-    cdef int64_t i, k, n = ids.shape[0]
-    cdef int32_t last = -1
+def mark_vertices(const int32_t[::1] ids, const int32_t[:, ::1] corners, int64_t n_vertices, uint8_t[::1] is_used):
+    """Mark the blocks of VERTEX_BLOCK vertices that some triangles use; an id of -1 is of none.
+
+    Returns -1, or a triangle with an index outside [0, n_vertices).
+    """
+    cdef int64_t i, k, n = ids.shape[0], bad = -1
+    cdef int32_t last = -1, corner
     with nogil:
         for i in range(n):
             if ids[i] != last and ids[i] >= 0:
                 for k in range(3):
-                    is_used[corners[ids[i], k] // VERTEX_BLOCK] = 1
+                    corner = corners[ids[i], k]
+                    if 0 <= corner < n_vertices:
+                        is_used[corner // VERTEX_BLOCK] = 1
+                    else:
+                        bad = ids[i]
             last = ids[i]
+    return bad
 
 
 def list_cut(const int32_t[::1] ids, const int32_t[:, ::1] corners, const uint8_t[::1] records, int32_t[::1] cut):

@@ -99,7 +99,7 @@ cdef extern from "topleft.h" nogil:
         int32_t *packed
         int32_t *cells
     int64_t tl_blend_cells(int64_t width)
-    ctypedef struct tl_scene:
+    ctypedef struct tl_snapped:
         tl_vertex_set mesh
         const int32_t *triangles
         int64_t n_triangles
@@ -156,6 +156,12 @@ cdef extern from "topleft.h" nogil:
         int64_t n_points
         double sample_x_px, sample_y_px
         double band
+    ctypedef struct tl_sloped:
+        const int32_t *slot
+        const double *steps
+        const int32_t *rows
+        const float *values
+        int64_t n_values
     ctypedef struct tl_composite:
         const int32_t *ids
         int64_t n_triangles, plane_px
@@ -219,6 +225,12 @@ cdef extern from "topleft.h" nogil:
         float[2][3] transform
         float *tangent
         float hand
+    ctypedef struct tl_levels:
+        const float *texels
+        const int64_t *rows
+        int n_levels, n_channels
+        tl_filter filter
+        tl_wrap wrap_u, wrap_v
     ctypedef struct tl_material:
         float *color
         float *back_color
@@ -375,12 +387,12 @@ cdef extern from "topleft.h" nogil:
     int64_t tl_polygon_stride(int64_t width)
     int64_t tl_share_cells(int64_t width, int64_t height)
     ctypedef struct tl_kernels:
-        void (*shade_normals)(const tl_scene *, const tl_window *, const tl_view *, const tl_shading *, const int32_t *, float *) noexcept nogil
-        void (*fill_points)(const tl_scene *, const tl_window *, const tl_points *, const int32_t *, void *) noexcept nogil
+        void (*shade_normals)(const tl_snapped *, const tl_window *, const tl_view *, const tl_shading *, const int32_t *, float *) noexcept nogil
+        void (*fill_points)(const tl_snapped *, const tl_window *, const tl_points *, const int32_t *, void *) noexcept nogil
         void (*set_inverse_w)(const tl_source *, const float *, int64_t, int64_t, float *) noexcept nogil
-        void (*cut_out)(const tl_scene *, const tl_window *, const tl_view *, const tl_shading *, const int32_t *, int64_t, const tl_target *) noexcept nogil
-        void (*shade_samples)(const tl_scene *, const tl_window *, const tl_view *, const tl_shading *, const int32_t *, int, int64_t, const int32_t *, const float *, uint8_t *) noexcept nogil
-        void (*shade)(const tl_scene *, const tl_window *, const tl_view *, const tl_shading *, const int32_t *, const float *, uint8_t *) noexcept nogil
+        void (*cut_out)(const tl_snapped *, const tl_window *, const tl_view *, const tl_shading *, const int32_t *, int64_t, const tl_target *) noexcept nogil
+        void (*shade_samples)(const tl_snapped *, const tl_window *, const tl_view *, const tl_shading *, const int32_t *, int, int64_t, const int32_t *, const float *, uint8_t *) noexcept nogil
+        void (*shade)(const tl_snapped *, const tl_window *, const tl_view *, const tl_shading *, const int32_t *, const float *, uint8_t *) noexcept nogil
         tl_vertex_counts (*snap)(const tl_source *, int64_t, int64_t, int, int, tl_vertex *, tl_wide *) noexcept nogil
         tl_vertex_counts (*project)(const tl_source *, int64_t, int64_t, const tl_view *, tl_vertex *, tl_wide *) noexcept nogil
         void (*clip)(const tl_source *, const tl_vertex *, const int32_t *, const int32_t *, int64_t, const tl_view *, tl_pieces *) noexcept nogil
@@ -392,24 +404,27 @@ cdef extern from "topleft.h" nogil:
         int64_t (*first_bad)(const tl_vertex *, const int32_t *, int64_t) noexcept nogil
         int64_t (*first_bad_row)(const int32_t *, int64_t, int64_t) noexcept nogil
         int64_t (*narrow_triangles)(const int64_t *, int64_t, int64_t, int32_t *) noexcept nogil
-        int64_t (*draw)(const tl_scene *, const tl_window *, const tl_target *, tl_share *) noexcept nogil
+        int64_t (*draw)(const tl_snapped *, const tl_window *, const tl_target *, tl_share *) noexcept nogil
         int64_t (*take_points)(const tl_source *, int64_t, int64_t, double *) noexcept nogil
-        int64_t (*draw_exact)(const tl_scene *, const tl_exact_points *, const tl_window *, const tl_target *,
+        int64_t (*draw_exact)(const tl_snapped *, const tl_exact_points *, const tl_window *, const tl_target *,
                               const tl_share *, tl_exact_counts *) noexcept nogil
-        int64_t (*count_classes)(const tl_scene *, const tl_window *, const tl_target *, tl_census *) noexcept nogil
+        int64_t (*count_classes)(const tl_snapped *, const tl_window *, const tl_target *, tl_census *) noexcept nogil
         void (*set_flat_depth)(int32_t *, int64_t, int32_t, float, float, float *) noexcept nogil
-        int64_t (*bin)(const tl_scene *, const tl_window *, int32_t, int, tl_bins *) noexcept nogil
+        int64_t (*bin)(const tl_snapped *, const tl_window *, int32_t, int, tl_bins *) noexcept nogil
         void (*list_bins)(const tl_bins *, int64_t, int64_t *, int32_t *) noexcept nogil
-        int64_t (*draw_area)(const tl_scene *, const tl_window *, const tl_area *) noexcept nogil
-        int64_t (*blend)(const tl_scene *, const tl_window *, const tl_canvas *) noexcept nogil
+        int64_t (*draw_area)(const tl_snapped *, const tl_window *, const tl_area *) noexcept nogil
+        int64_t (*blend)(const tl_snapped *, const tl_window *, const tl_canvas *) noexcept nogil
         void (*inverse_w)(const tl_source *, int64_t, int64_t, double *) noexcept nogil
-        void (*barycentric)(const tl_scene *, const tl_window *, const int32_t *, float *) noexcept nogil
-        void (*interpolate)(const tl_scene *, const tl_window *, const int32_t *, const float *, int, int, float, float *) noexcept nogil
+        void (*barycentric)(const tl_snapped *, const tl_window *, const int32_t *, float *) noexcept nogil
+        void (*interpolate)(const tl_snapped *, const tl_window *, const int32_t *, const float *, int, int, float, float *) noexcept nogil
         void (*paint_flat)(const int32_t *, int64_t, const uint8_t *, int, uint8_t *) noexcept nogil
-        void (*paint_gouraud)(const tl_scene *, const tl_window *, const int32_t *, const void *, int, int, void *) noexcept nogil
+        void (*paint_gouraud)(const tl_snapped *, const tl_window *, const int32_t *, const void *, int, int, void *) noexcept nogil
+        void (*fill_slopes)(const tl_sloped *, const int32_t *, const float *, int64_t, float *) noexcept nogil
+        void (*fill_texels)(const tl_levels *, const int32_t *, const float *, const float *, float, int64_t, float *) noexcept nogil
+        void (*halve_rows)(const float *, int64_t, int64_t, int, int64_t, int64_t, float *) noexcept nogil
         void (*composite)(const tl_composite *, int64_t, void *) noexcept nogil
-        void (*drop_sides)(const tl_scene *, const uint8_t *, int64_t, int64_t, int32_t *) noexcept nogil
-        int64_t (*list_edges)(const tl_scene *, const tl_edge_scratch *, uint64_t *, int64_t *) noexcept nogil
+        void (*drop_sides)(const tl_snapped *, const uint8_t *, int64_t, int64_t, int32_t *) noexcept nogil
+        int64_t (*list_edges)(const tl_snapped *, const tl_edge_scratch *, uint64_t *, int64_t *) noexcept nogil
         void (*draw_cloud)(const tl_cloud *, const tl_window *, const tl_target *) noexcept nogil
         void (*draw_lines)(const tl_edges *, const tl_window *, const tl_line_target *) noexcept nogil
         void (*list_planes)(const tl_valued *, int64_t, int64_t) noexcept nogil

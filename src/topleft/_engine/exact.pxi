@@ -4,7 +4,7 @@
 cdef class ExactMesh:
     """Vertices in pixels as they are, and triangles: what `SnappedMesh` does that needs no snap."""
 
-    cdef tl_scene scene
+    cdef tl_snapped scene
     cdef tl_exact_points points
     cdef int64_t x_px, y_px
     cdef object arrays

@@ -1,10 +1,19 @@
 """The types of the compiled module. What each does stands in kernels.pyx and the .pxi files."""
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
+
+Array: TypeAlias = NDArray[Any]
+F32: TypeAlias = NDArray[np.float32]
+F64: TypeAlias = NDArray[np.float64]
+I32: TypeAlias = NDArray[np.int32]
+I64: TypeAlias = NDArray[np.int64]
+U8: TypeAlias = NDArray[np.uint8]
+U32: TypeAlias = NDArray[np.uint32]
+U64: TypeAlias = NDArray[np.uint64]
 
 VERTEX_BYTES: int
 CELL_CLEAR: int
@@ -25,35 +34,37 @@ def isa_available() -> list[str]: ...
 def compiler_info() -> dict[str, object]: ...
 def hear_signals_in(thread: int, threads: object) -> None: ...
 
+class Block: ...
+class Lease: ...
+
+# A `Lease`, which NumPy takes where it takes a memoryview.
+def lease_block(n_bytes: int, allocate: Callable[[int], U8]) -> memoryview: ...
+def keep_blocks(n_bytes: int) -> None: ...
+def waiting_memory() -> int: ...
+
 class Stop:
     def set(self) -> None: ...
     def run(self, work: Callable[[], object]) -> None: ...
 
 def area_stride(width: int) -> int: ...
 def blend_cells(width: int) -> int: ...
-def as_bytes(array: NDArray[Any]) -> NDArray[np.uint8]: ...
-def first_bad_row(triangles: NDArray[np.int32], n_vertices: int) -> int: ...
-def narrow_triangles(triangles: NDArray[np.int64], n_vertices: int, out: NDArray[np.int32]) -> int: ...
+def as_bytes(array: Array) -> U8: ...
+def first_bad_row(triangles: I32, n_vertices: int) -> int: ...
+def narrow_triangles(triangles: I64, n_vertices: int, out: I32) -> int: ...
 def set_flat_depth(
-    ids: NDArray[np.int32],
-    out: NDArray[np.float32],
-    first_row: int,
-    n_rows: int,
-    earlier_wins: bool,
-    depth: float,
-    background: float,
+    ids: I32, out: F32, first_row: int, n_rows: int, earlier_wins: bool, depth: float, background: float
 ) -> None: ...
-def first_bad(records: NDArray[np.uint8], triangles: NDArray[np.int32]) -> int: ...
+def first_bad(records: U8, triangles: I32) -> int: ...
 
 class Target:
     sink: int
     def __init__(
         self,
         sink: int,
-        pixels: NDArray[Any],
-        depth: NDArray[np.float32] | None,
-        covered: NDArray[np.uint64] | None,
-        samples: NDArray[np.int32] | None = None,
+        pixels: Array,
+        depth: F32 | None,
+        covered: U64 | None,
+        samples: I32 | None = None,
         earlier_wins: bool = False,
     ) -> None: ...
     @staticmethod
@@ -75,33 +86,20 @@ class Viewport:
 class Source:
     is_clip_space: bool
     is_affine: bool
-    def __init__(self, vertices: NDArray[Any], matrix: NDArray[Any] | None = None, is_affine: bool = False) -> None: ...
+    def __init__(self, vertices: Array, matrix: Array | None = None, is_affine: bool = False) -> None: ...
     def snap(
-        self,
-        first: int,
-        end: int,
-        subpixel_bits: int,
-        with_depth: bool,
-        records: NDArray[np.uint8],
-        wide: NDArray[np.int64] | None,
+        self, first: int, end: int, subpixel_bits: int, with_depth: bool, records: U8, wide: I64 | None
     ) -> tuple[int, int, int]: ...
-    def project_blocks(
-        self, is_used: NDArray[np.uint8], viewport: Viewport, records: NDArray[np.uint8]
-    ) -> tuple[int, int, int]: ...
+    def project_blocks(self, is_used: U8, viewport: Viewport, records: U8) -> tuple[int, int, int]: ...
     def project(
-        self, first: int, end: int, viewport: Viewport, records: NDArray[np.uint8], wide: NDArray[np.int64] | None
+        self, first: int, end: int, viewport: Viewport, records: U8, wide: I64 | None
     ) -> tuple[int, int, int]: ...
     def take(self, first: int, end: int, points: NDArray[np.float64] | None) -> int: ...
 
 class Pieces:
     arrays: tuple[Any, ...] | None
     def __init__(
-        self,
-        source: Source,
-        records: NDArray[np.uint8],
-        triangles: NDArray[np.int32],
-        viewport: Viewport,
-        ids: NDArray[np.int32] | None = None,
+        self, source: Source, records: U8, triangles: I32, viewport: Viewport, ids: I32 | None = None
     ) -> None: ...
     def __len__(self) -> int: ...
 
@@ -111,44 +109,34 @@ class SnappedMesh:
     def __init__(
         self,
         source: Source,
-        records: NDArray[np.uint8],
-        wide: NDArray[np.int64] | None,
-        triangles: NDArray[np.int32],
+        records: U8,
+        wide: I64 | None,
+        triangles: I32,
         pieces: Pieces | None,
         how: tuple[int, int, int, int, int, int],
         viewport: Viewport | None,
-        is_used: NDArray[np.uint8] | None = None,
+        is_used: U8 | None = None,
     ) -> None: ...
     def seen_from(self, x_fx: int, y_fx: int) -> SnappedMesh: ...
     def guess_seen(self, width: int, height: int) -> tuple[float, float, float]: ...
     def count_classes(
-        self, sink: int, width: int, height: int, samples: NDArray[np.int32] | None = None
+        self, sink: int, width: int, height: int, samples: I32 | None = None
     ) -> tuple[int, list[tuple[int, float, float]]]: ...
-    def with_inverse_w(self, n_pixels: int) -> SnappedMesh: ...
+    def with_inverse_w(self, n_pixels: int, empty: Callable[..., Array] = ...) -> SnappedMesh: ...
     def numbered_from(self, first_id: int) -> SnappedMesh: ...
     def moved(self, x_px: int, y_px: int) -> SnappedMesh: ...
-    def drop_sides(self, is_single: NDArray[np.uint8], first: int, end: int, triangles: NDArray[np.int32]) -> None: ...
+    def drop_sides(self, is_single: U8, first: int, end: int, triangles: I32) -> None: ...
     def draw(self, target: Target, first_row: int, n_rows: int, is_first: bool = True, is_last: bool = True) -> int: ...
-    def draw_share(
-        self, target: Target, first_row: int, n_rows: int, first: int, others: NDArray[np.int32]
-    ) -> tuple[int, int]: ...
-    def draw_listed(
-        self, target: Target, first_row: int, n_rows: int, ids: NDArray[np.int32], is_last: bool
-    ) -> None: ...
+    def draw_share(self, target: Target, first_row: int, n_rows: int, first: int, others: I32) -> tuple[int, int]: ...
+    def draw_listed(self, target: Target, first_row: int, n_rows: int, ids: I32, is_last: bool) -> None: ...
     def draw_area(
-        self,
-        pixels: NDArray[np.float32],
-        cells: NDArray[np.uint8],
-        first_row: int,
-        n_rows: int,
-        is_wide: bool,
-        is_clamped: bool,
+        self, pixels: F32, cells: U8, first_row: int, n_rows: int, is_wide: bool, is_clamped: bool
     ) -> int: ...
     def paint(
         self,
-        labels: NDArray[np.int32],
-        colors: NDArray[np.uint8],
-        pixels: NDArray[np.uint8],
+        labels: I32,
+        colors: U8,
+        pixels: U8,
         first_row: int,
         n_rows: int,
         is_flat: bool,
@@ -157,35 +145,28 @@ class SnappedMesh:
     ) -> None: ...
     def blend(
         self,
-        pixels: NDArray[np.uint8],
+        pixels: U8,
         width: int,
         first_row: int,
         n_rows: int,
-        colors: NDArray[np.uint8],
+        colors: U8,
         n_channels: int,
         is_u8: bool,
         is_flat: bool,
         blend: int,
         is_premultiplied: bool,
-        ground: NDArray[np.uint8] | None,
-        packed: NDArray[np.int32] | None,
-        cells: NDArray[np.int32] | None,
+        ground: U8 | None,
+        packed: I32 | None,
+        cells: I32 | None,
     ) -> int: ...
-    def barycentric(self, ids: NDArray[np.int32], out: NDArray[np.float32]) -> None: ...
-    def interpolate(
-        self,
-        ids: NDArray[np.int32],
-        values: NDArray[np.float32],
-        per_corner: bool,
-        background: float,
-        out: NDArray[np.float32],
-    ) -> None: ...
+    def barycentric(self, ids: I32, out: F32) -> None: ...
+    def interpolate(self, ids: I32, values: F32, per_corner: bool, background: float, out: F32) -> None: ...
 
 class ExactMesh(SnappedMesh):  # has draw, seen_from, guess_seen and paint; what asks for more is refused before
     def __init__(
         self,
-        points: NDArray[np.float64],
-        triangles: NDArray[np.int32],
+        points: F64,
+        triangles: I32,
         how: tuple[int, int, int, int, int, int],
         band: float = 1.0,
     ) -> None: ...
@@ -193,18 +174,12 @@ class ExactMesh(SnappedMesh):  # has draw, seen_from, guess_seen and paint; what
         self, target: Target, first_row: int, n_rows: int, is_first: bool = True, is_last: bool = True
     ) -> tuple[int, tuple[int, ...]]: ...
 
-def list_edges(
-    mesh: SnappedMesh,
-    starts: NDArray[np.int64],
-    last_low: NDArray[np.int32],
-    highs: NDArray[np.int32],
-    edges: NDArray[np.uint64],
-) -> int: ...
+def list_edges(mesh: SnappedMesh, starts: I64, last_low: I32, highs: I32, edges: U64) -> int: ...
 def draw_lines(
     mesh: SnappedMesh,
-    edges: NDArray[np.uint64],
-    pixels: NDArray[np.uint8],
-    depth: NDArray[np.float32] | None,
+    edges: U64,
+    pixels: U8,
+    depth: F32 | None,
     depth_bias: float,
     is_farthest: bool,
     is_smooth: bool,
@@ -214,31 +189,21 @@ def draw_lines(
 ) -> None: ...
 
 class Valued:
-    def __init__(
-        self,
-        points_px: NDArray[np.float64],
-        triangles: NDArray[np.int32],
-        values: NDArray[np.float64],
-        planes: NDArray[np.float64] | None = None,
-    ) -> None: ...
+    def __init__(self, points_px: F64, triangles: I32, values: F64, planes: F64 | None = None) -> None: ...
     def list_planes(self, first: int, end: int) -> None: ...
-    def fill_planes(
-        self, ids: NDArray[np.int32], out: NDArray[Any], first_row: int, n_rows: int, x_px: int, y_px: int
-    ) -> None: ...
+    def fill_planes(self, ids: I32, out: Array, first_row: int, n_rows: int, x_px: int, y_px: int) -> None: ...
 
 class PixelPoints:
     def __init__(
         self,
-        positions: NDArray[Any],
+        positions: Array,
         kind: int,
-        rows: NDArray[np.float64],
+        rows: F64,
         half_size: tuple[float, float],
         background: float,
         is_f64_out: bool,
     ) -> None: ...
-    def fill(
-        self, mesh: SnappedMesh, ids: NDArray[np.int32], out: NDArray[Any], first_row: int, n_rows: int
-    ) -> None: ...
+    def fill(self, mesh: SnappedMesh, ids: I32, out: Array, first_row: int, n_rows: int) -> None: ...
 
 class Bins:
     bad_row: int
@@ -246,9 +211,9 @@ class Bins:
     n_listed: int
     band_bits: int
     def __init__(
-        self, mesh: SnappedMesh, height: int, width: int, reach_fx: int, band_bits: int, room: NDArray[np.int32]
+        self, mesh: SnappedMesh, height: int, width: int, reach_fx: int, band_bits: int, room: I32
     ) -> None: ...
-    def fill(self, listed: NDArray[np.int32]) -> None: ...
+    def fill(self, listed: I32) -> None: ...
 
 def draw_bands(
     meshes: Sequence[SnappedMesh], targets: Sequence[Target], bins: Bins, first_band: int, end_band: int
@@ -256,53 +221,73 @@ def draw_bands(
 def peel(
     meshes: Sequence[SnappedMesh],
     bins: Sequence[Bins | None],
-    ids: NDArray[np.int32],
-    depth: NDArray[np.float32],
+    ids: I32,
+    depth: F32,
     is_farthest: bool,
     band_bits: int,
     first_band: int,
     end_band: int,
 ) -> int: ...
 def composite(
-    ids: NDArray[np.int32],
+    ids: I32,
     n_triangles: int,
     first_row: int,
     n_rows: int,
-    colors: NDArray[np.uint8],
+    colors: U8,
     is_flat: bool,
     is_u8: bool,
     n_channels: int,
-    background: NDArray[np.float32] | None,
-    pixels: NDArray[np.uint8],
+    background: F32 | None,
+    pixels: U8,
+) -> None: ...
+def fill_slopes(
+    ids: NDArray[np.int32],
+    weights: NDArray[np.float32],
+    slot: NDArray[np.int32],
+    steps: NDArray[np.float64],
+    rows: NDArray[np.int32],
+    values: NDArray[np.float32],
+    out: NDArray[np.float32],
+) -> None: ...
+def fill_texels(
+    texels: NDArray[np.float32],
+    rows: NDArray[np.int64],
+    codes: tuple[int, int, int],
+    ids: NDArray[np.int32],
+    uv: NDArray[np.float32],
+    slopes: NDArray[np.float32] | None,
+    background: float,
+    out: NDArray[np.float32],
+) -> None: ...
+def halve_rows(
+    level: NDArray[np.float32], width: int, height: int, first: int, end: int, out: NDArray[np.float32]
 ) -> None: ...
 
 class Transfer:
-    def __init__(
-        self, tables: tuple[NDArray[np.int32], NDArray[np.uint8]] | None, n_channels: int, is_straight: bool
-    ) -> None: ...
+    def __init__(self, tables: tuple[I32, U8] | None, n_channels: int, is_straight: bool) -> None: ...
 
 class Palette:
-    def __init__(self, colors: NDArray[Any], transfer: Transfer | None) -> None: ...
-    def mean_flat(self, labels: NDArray[np.int32], pixels: NDArray[Any], first_row: int, n_rows: int) -> None: ...
+    def __init__(self, colors: Array, transfer: Transfer | None) -> None: ...
+    def mean_flat(self, labels: I32, pixels: Array, first_row: int, n_rows: int) -> None: ...
 
 def fill_bands(
     meshes: Sequence[SnappedMesh],
-    labels: NDArray[np.int32],
+    labels: I32,
     palette: Palette,
-    pixels: NDArray[Any],
+    pixels: Array,
     bins: Bins,
     first_band: int,
     end_band: int,
 ) -> None: ...
 def mean_colors(
-    painted: NDArray[Any], pixels: NDArray[Any], first_row: int, n_rows: int, n_channels: int, transfer: Transfer | None
+    painted: Array, pixels: Array, first_row: int, n_rows: int, n_channels: int, transfer: Transfer | None
 ) -> None: ...
 
 class Mipmap:
     def __init__(
         self,
         texels: NDArray[np.uint16],
-        levels: NDArray[np.int32],
+        levels: I32,
         filter_code: int,
         wrap_u: int,
         wrap_v: int,
@@ -315,8 +300,8 @@ class Mipmap:
 class Surroundings:
     def __init__(
         self,
-        texels: NDArray[np.float32] | None,
-        levels: NDArray[np.int32] | None,
+        texels: F32 | None,
+        levels: I32 | None,
         sky: Sequence[float],
         ground: Sequence[float],
         diffuse: float,
@@ -326,18 +311,18 @@ class Surroundings:
 class ShadingTable:
     def __init__(
         self,
-        normals: NDArray[np.float32],
-        normal_of_corner: NDArray[np.int32] | None,
-        face_normals: NDArray[np.float32] | None,
-        positions: NDArray[Any],
-        is_turned: NDArray[np.uint8] | None,
-        uv: NDArray[np.float32] | None,
-        uv1: NDArray[np.float32] | None,
-        colors: NDArray[np.float32] | None,
+        normals: F32,
+        normal_of_corner: I32 | None,
+        face_normals: F32 | None,
+        positions: Array,
+        is_turned: U8 | None,
+        uv: F32 | None,
+        uv1: F32 | None,
+        colors: F32 | None,
         has_alpha: bool,
         front_side: float,
-        material_of: NDArray[np.int32] | None,
-        decode: NDArray[np.float32],
+        material_of: I32 | None,
+        decode: F32,
     ) -> None: ...
     def set_materials(self, materials: Sequence[tuple[Any, ...]]) -> None: ...
     def set_lights(self, lights: Sequence[tuple[Any, ...]], ambient: Sequence[float]) -> None: ...
@@ -358,42 +343,29 @@ class ShadingTable:
         self, color: Sequence[float], near: float, scale: float, distance_start: float, distance_scale: float
     ) -> None: ...
 
-def set_inverse_w(
-    mesh: SnappedMesh, rows: NDArray[np.float32], vertex_of_row: NDArray[np.int32] | None, out: NDArray[np.float32]
-) -> None: ...
+def set_inverse_w(mesh: SnappedMesh, rows: F32, vertex_of_row: I32 | None, out: F32) -> None: ...
 def shade(
-    mesh: SnappedMesh,
-    shading: ShadingTable,
-    ids: NDArray[np.int32],
-    depth: NDArray[np.float32],
-    pixels: NDArray[np.uint8],
-    first_row: int,
-    n_rows: int,
+    mesh: SnappedMesh, shading: ShadingTable, ids: I32, depth: F32, pixels: U8, first_row: int, n_rows: int
 ) -> None: ...
 def shade_samples(
     mesh: SnappedMesh,
     shading: ShadingTable,
-    positions: NDArray[np.int32],
-    ids: NDArray[np.int32],
-    depth: NDArray[np.float32],
-    pixels: NDArray[np.uint8],
+    positions: I32,
+    ids: I32,
+    depth: F32,
+    pixels: U8,
     first_row: int,
     n_rows: int,
 ) -> None: ...
 def shade_normals(
-    mesh: SnappedMesh,
-    shading: ShadingTable,
-    ids: NDArray[np.int32],
-    out: NDArray[np.float32],
-    first_row: int,
-    n_rows: int,
+    mesh: SnappedMesh, shading: ShadingTable, ids: I32, out: F32, first_row: int, n_rows: int
 ) -> None: ...
 def cut_out_over(
     mesh: SnappedMesh,
     shading: ShadingTable,
-    triangles: NDArray[np.int32],
-    ids: NDArray[np.int32],
-    depth: NDArray[np.float32],
+    triangles: I32,
+    ids: I32,
+    depth: F32,
     is_peeled: bool,
     first_row: int,
     n_rows: int,
@@ -401,46 +373,25 @@ def cut_out_over(
 def cut_out(
     mesh: SnappedMesh,
     shading: ShadingTable,
-    opaque: NDArray[np.int32],
-    triangles: NDArray[np.int32],
-    ids: NDArray[np.int32],
-    depth: NDArray[np.float32],
+    opaque: I32,
+    triangles: I32,
+    ids: I32,
+    depth: F32,
     first_row: int,
     n_rows: int,
 ) -> None: ...
-def mark_vertices(ids: NDArray[np.int32], corners: NDArray[np.int32], is_used: NDArray[np.uint8]) -> None: ...
-def list_cut(
-    ids: NDArray[np.int32], corners: NDArray[np.int32], records: NDArray[np.uint8], cut: NDArray[np.int32]
-) -> int: ...
-def order_triangles(
-    source: Source,
-    triangles: NDArray[np.int32],
-    box: NDArray[np.float64],
-    keys: NDArray[np.uint32],
-    room: NDArray[np.uint64],
-    order: NDArray[np.int32],
-) -> None: ...
+def mark_vertices(ids: I32, corners: I32, n_vertices: int, is_used: U8) -> int: ...
+def list_cut(ids: I32, corners: I32, records: U8, cut: I32) -> int: ...
+def order_triangles(source: Source, triangles: I32, box: F64, keys: U32, room: U64, order: I32) -> None: ...
 def cut_clusters(
-    triangles: NDArray[np.int32],
-    order: NDArray[np.int32],
-    seen: NDArray[np.int32],
-    clusters: NDArray[np.uint8],
-    vertices: NDArray[np.int32],
-    corners: NDArray[np.uint8],
+    triangles: I32, order: I32, seen: I32, clusters: U8, vertices: I32, corners: U8
 ) -> tuple[int, int]: ...
-def measure_clusters(
-    source: Source,
-    corners: NDArray[np.uint8],
-    clusters: NDArray[np.uint8],
-    group_boxes: NDArray[np.float64],
-    first: int,
-    end: int,
-) -> None: ...
+def measure_clusters(source: Source, corners: U8, clusters: U8, group_boxes: F64, first: int, end: int) -> None: ...
 
 class ClusterView:
     def __init__(
         self,
-        matrix: NDArray[np.float64],
+        matrix: F64,
         mesh: SnappedMesh,
         first_row: int,
         n_rows: int,
@@ -452,15 +403,9 @@ class ClusterView:
 
 class Clustered:
     n_triangles: int
-    def __init__(
-        self,
-        clusters: NDArray[np.uint8],
-        group_boxes: NDArray[np.float64],
-        corners: NDArray[np.uint8],
-        names: NDArray[np.int32],
-    ) -> None: ...
+    def __init__(self, clusters: U8, group_boxes: F64, corners: U8, names: I32) -> None: ...
     def __len__(self) -> int: ...
-    def survey(self, view: ClusterView, step: int, n_of: NDArray[np.int64]) -> None: ...
+    def survey(self, view: ClusterView, step: int, n_of: I64) -> None: ...
     def draw(
         self,
         mesh: SnappedMesh,
@@ -470,46 +415,26 @@ class Clustered:
         target: Target,
         first_row: int,
         n_rows: int,
-        room: NDArray[np.int32],
-        others: NDArray[np.int32],
+        room: I32,
+        others: I32,
         is_first: bool,
         is_last: bool,
     ) -> tuple[int, int, int]: ...
 
 class Tree:
-    def __init__(self, points: NDArray[np.float64], triangles: NDArray[np.int32], slack: float) -> None: ...
-    def find_nearest(
-        self,
-        points: NDArray[np.float64],
-        first: int,
-        end: int,
-        triangle: NDArray[np.int32],
-        at: NDArray[np.float64] | None = None,
-    ) -> float: ...
+    def __init__(self, points: F64, triangles: I32, slack: float) -> None: ...
+    def find_nearest(self, points: F64, first: int, end: int, triangle: I32, at: F64 | None = None) -> float: ...
     def find_reach(
-        self,
-        points: NDArray[np.float64],
-        triangles: NDArray[np.int32],
-        first: int,
-        end: int,
-        known: float,
-        share: float,
-        least: float,
+        self, points: F64, triangles: I32, first: int, end: int, known: float, share: float, least: float
     ) -> tuple[float, float, int]: ...
 
 def set_feet(
-    points: NDArray[np.float64],
-    triangles: NDArray[np.int32],
-    from_points: NDArray[np.float64],
-    triangle: NDArray[np.int32],
-    point: NDArray[np.int32],
-    at: NDArray[np.float64],
-    squared: NDArray[np.float64],
+    points: F64, triangles: I32, from_points: F64, triangle: I32, point: I32, at: F64, squared: F64
 ) -> None: ...
 def draw_cloud(
-    records: NDArray[np.uint8],
+    records: U8,
     size_fx: int,
-    sizes_fx: NDArray[np.int32] | None,
+    sizes_fx: I32 | None,
     is_disc: bool,
     x_fx: int,
     y_fx: int,
@@ -519,74 +444,36 @@ def draw_cloud(
     first_row: int,
     n_rows: int,
 ) -> None: ...
-def vertex_normals(
-    source: Source, triangles: NDArray[np.int32], first: int, end: int, out: NDArray[np.float64]
-) -> int: ...
-def face_normals(
-    source: Source,
-    triangles: NDArray[np.int32],
-    first: int,
-    end: int,
-    out: NDArray[np.float64] | None,
-    rows: NDArray[np.float32] | None,
-) -> int: ...
+def vertex_normals(source: Source, triangles: I32, first: int, end: int, out: F64) -> int: ...
+def face_normals(source: Source, triangles: I32, first: int, end: int, out: F64 | None, rows: F32 | None) -> int: ...
 def find_turned(
-    source: Source,
-    triangles: NDArray[np.int32],
-    first: int,
-    end: int,
-    normals: NDArray[np.float32],
-    row_of_corner: NDArray[np.int32],
-    is_turned: NDArray[np.uint8],
+    source: Source, triangles: I32, first: int, end: int, normals: F32, row_of_corner: I32, is_turned: U8
 ) -> int: ...
-def face_angles(
-    source: Source,
-    triangles: NDArray[np.int32],
-    first: int,
-    end: int,
-    normals: NDArray[np.float64],
-    angles: NDArray[np.float64],
-) -> int: ...
+def face_angles(source: Source, triangles: I32, first: int, end: int, normals: F64, angles: F64) -> int: ...
 
 class Fans:
     most_corners: int
-    def __init__(
-        self,
-        triangles: NDArray[np.int32],
-        n_vertices: int,
-        normals: NDArray[np.float64],
-        angles: NDArray[np.float64],
-        least_cosine: float,
-    ) -> None: ...
-    def find_creases(self, first: int, end: int, groups: NDArray[np.int32], n_groups: NDArray[np.int32]) -> None: ...
+    def __init__(self, triangles: I32, n_vertices: int, normals: F64, angles: F64, least_cosine: float) -> None: ...
+    def find_creases(self, first: int, end: int, groups: I32, n_groups: I32) -> None: ...
     def sum_creases(
         self,
         first: int,
         end: int,
-        starts: NDArray[np.int32],
-        groups: NDArray[np.int32],
-        own_triangles: NDArray[np.int32],
+        starts: I32,
+        groups: I32,
+        own_triangles: I32,
         first_row: int,
-        of_vertices: NDArray[np.float64],
-        of_groups: NDArray[np.float64],
-        row_of_corner: NDArray[np.int32] | None,
+        of_vertices: F64,
+        of_groups: F64,
+        row_of_corner: I32 | None,
     ) -> None: ...
 
-def box_of_faces(
-    source: Source, triangles: NDArray[np.int32], first: int, end: int, box: NDArray[np.float64]
-) -> int: ...
+def box_of_faces(source: Source, triangles: I32, first: int, end: int, box: F64) -> int: ...
 def unit_vectors(
-    vectors: Source,
-    turn: NDArray[np.float64] | None,
-    first: int,
-    end: int,
-    out: NDArray[np.float64] | None,
-    rows: NDArray[np.float32] | None,
+    vectors: Source, turn: F64 | None, first: int, end: int, out: F64 | None, rows: F32 | None
 ) -> None: ...
-def move_points(
-    points: Source, matrix: NDArray[np.float64], first: int, end: int, out: NDArray[np.float64]
-) -> None: ...
-def color_rows(colors: NDArray[np.uint8], first: int, end: int, rows: NDArray[np.float32]) -> None: ...
+def move_points(points: Source, matrix: F64, first: int, end: int, out: F64) -> None: ...
+def color_rows(colors: U8, first: int, end: int, rows: F32) -> None: ...
 
 CELL_ROWS: int
 CERTIFY_WORDS: int
@@ -606,9 +493,9 @@ def snap_points(
     grid_bits: int,
     x_px: int,
     y_px: int,
-    x_fx: NDArray[np.int32],
-    y_fx: NDArray[np.int32],
-    wide_fx: NDArray[np.int64] | None,
+    x_fx: I32,
+    y_fx: I32,
+    wide_fx: I64 | None,
 ) -> tuple[int, int]: ...
 
 class PieceScratch:
@@ -621,77 +508,58 @@ class SnappedPolygons:
     height: int
     def __init__(
         self,
-        x_fx: NDArray[np.int32],
-        y_fx: NDArray[np.int32],
-        wide_fx: NDArray[np.int64] | None,
-        rings: NDArray[np.int64],
-        polygons: NDArray[np.int64],
+        x_fx: I32,
+        y_fx: I32,
+        wide_fx: I64 | None,
+        rings: I64,
+        polygons: I64,
         width: int,
         height: int,
         bits: int,
         is_nonzero: bool,
     ) -> None: ...
     @property
-    def boxes_px(self) -> NDArray[np.int32]: ...
+    def boxes_px(self) -> I32: ...
     def bound(self, first: int, end: int) -> int: ...
     def make_weights(self) -> None: ...
-    def certify(self, first: int, end: int, room: NDArray[np.int64] | None) -> None: ...
+    def certify(self, first: int, end: int, room: I64 | None) -> None: ...
     def which_are_simple(self) -> NDArray[np.bool_]: ...
     def seen_from(self, sample_x_fx: int, sample_y_fx: int) -> None: ...
-    def sort(
-        self, band_rows: int, n_bands: int, starts: NDArray[np.int64], listed: NDArray[np.int32] | None
-    ) -> None: ...
-    def mask_even_odd(
-        self, polygon: int, out: NDArray[np.uint8], top: int, bottom: int, bits: NDArray[np.int32]
-    ) -> None: ...
+    def sort(self, band_rows: int, n_bands: int, starts: I64, listed: I32 | None) -> None: ...
+    def mask_even_odd(self, polygon: int, out: U8, top: int, bottom: int, bits: I32) -> None: ...
     def mask_nonzero(
-        self,
-        polygon: int,
-        out: NDArray[np.uint8],
-        top: int,
-        bottom: int,
-        at: NDArray[np.uint32],
-        room: NDArray[np.int32],
-        cells: NDArray[np.int32],
-        bits: NDArray[np.uint64],
+        self, polygon: int, out: U8, top: int, bottom: int, at: U32, room: I32, cells: I32, bits: U64
     ) -> None: ...
     def label(
         self,
-        pixels: NDArray[np.uint8],
+        pixels: U8,
         n_bytes: int,
-        values: NDArray[np.int32] | None,
+        values: I32 | None,
         background: int,
         test: int,
         waits: bool,
         band_rows: int,
-        starts: NDArray[np.int64] | None,
-        listed: NDArray[np.int32] | None,
+        starts: I64 | None,
+        listed: I32 | None,
         first_band: int,
         end_band: int,
-        cells: NDArray[np.int32],
-        scratch: NDArray[np.uint8],
+        cells: I32,
+        scratch: U8,
         pieces: PieceScratch | None,
     ) -> None: ...
     def add_shares(
         self,
-        pixels: NDArray[np.float32],
-        colors: NDArray[np.float32] | None,
+        pixels: F32,
+        colors: F32 | None,
         band_rows: int,
-        starts: NDArray[np.int64],
-        listed: NDArray[np.int32],
+        starts: I64,
+        listed: I32,
         first_band: int,
         end_band: int,
-        cells: NDArray[np.int32],
+        cells: I32,
         pieces: PieceScratch | None,
         is_alone: bool,
     ) -> None: ...
     def list_shares(
-        self,
-        first: int,
-        end: int,
-        starts: NDArray[np.int64],
-        indices: NDArray[Any],
-        areas: NDArray[np.float32],
-        cells: NDArray[np.int32],
-        pieces: PieceScratch | None,
+        self, first: int, end: int, starts: I64, indices: Array, areas: F32, cells: I32, pieces: PieceScratch | None
     ) -> int: ...

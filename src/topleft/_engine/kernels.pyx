@@ -89,6 +89,7 @@ def as_bytes(array):
 
 
 include "pause.pxi"
+include "blocks.pxi"
 include "buffers.pxi"
 include "triangles.pxi"
 include "exact.pxi"

@@ -53,7 +53,7 @@ def fill_bands(meshes, int32_t[:, ::1] labels, Palette palette, pixels, Bins bin
 
     `labels`: memory for those of a band, (S, rows * W).
     """
-    cdef tl_scene seen[16]
+    cdef tl_snapped seen[16]
     cdef SnappedMesh mesh
     cdef tl_target target
     cdef tl_window window
@@ -112,6 +112,53 @@ def composite(const int32_t[:, :, ::1] ids, int64_t n_triangles, int64_t first_r
     layers.background = &background[0] if background is not None else NULL
     with nogil:
         K.composite(&layers, n, &pixels[first_row * width * pixel_bytes])
+
+
+def fill_slopes(const int32_t[::1] ids, const float[:, ::1] weights, const int32_t[::1] slot, const double[:, :, ::1] steps,
+                const int32_t[:, ::1] rows, const float[:, ::1] values, float[:, :, ::1] out):
+    """Write what values change by along x and y at pixels (N,), (N, K, 2).
+
+    `slot`: of each triangle its place among those that show, whose corners have `steps` (M, 3, 3) and `rows` (M, 3).
+    """
+    cdef tl_sloped sloped
+    cdef int64_t n = ids.shape[0]
+    if n == 0 or values.shape[1] == 0:
+        return
+    if steps.shape[0] == 0:
+        out[:, :, :] = 0
+        return
+    sloped.slot, sloped.steps, sloped.rows = &slot[0], &steps[0, 0, 0], &rows[0, 0]
+    sloped.values, sloped.n_values = &values[0, 0], values.shape[1]
+    with nogil:
+        K.fill_slopes(&sloped, &ids[0], &weights[0, 0], n, &out[0, 0, 0])
+
+
+def fill_texels(const float[:, ::1] texels, const int64_t[:, ::1] rows, tuple codes, const int32_t[::1] ids, const float[:, ::1] uv,
+            slopes, float background, float[:, ::1] out):
+    """Write the values (N, C) of texels (., C) and their halvings, `rows` of (offset, width, height), at pixels (N,).
+
+    `codes`: of the filter and of both wraps, as in ``csrc/shading.h``; `slopes` (N, 2, 2), or None without halvings.
+    """
+    cdef tl_levels levels
+    cdef const float[:, :, ::1] own = slopes
+    cdef int64_t n = ids.shape[0]
+    if n == 0 or texels.shape[1] == 0:
+        return
+    levels.texels, levels.rows, levels.n_channels = &texels[0, 0], &rows[0, 0], <int>texels.shape[1]
+    levels.n_levels = 1 if own is None else <int>rows.shape[0]
+    levels.filter, levels.wrap_u, levels.wrap_v = <tl_filter><int>codes[0], <tl_wrap><int>codes[1], <tl_wrap><int>codes[2]
+    cdef const float *first = NULL
+    if own is not None:
+        first = &own[0, 0, 0]
+    with nogil:
+        K.fill_texels(&levels, &ids[0], &uv[0, 0], first, background, n, &out[0, 0])
+
+
+def halve_rows(const float[:, ::1] level, int64_t width, int64_t height, int64_t first, int64_t end, float[:, ::1] out):
+    """Write rows [first, end) of the halving of a level (height * width, C)."""
+    if first < end and level.shape[1]:
+        with nogil:
+            K.halve_rows(&level[0, 0], width, height, <int>level.shape[1], first, end, &out[0, 0])
 
 
 cdef class PixelPoints:

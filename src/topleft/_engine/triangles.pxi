@@ -11,7 +11,7 @@ cdef inline tl_share no_share() noexcept nogil:
 cdef class SnappedMesh:
     """Snapped vertices and triangles, ready to be drawn or resolved; keeps what it points to alive."""
 
-    cdef tl_scene snapped
+    cdef tl_snapped snapped
     cdef int64_t x_px, y_px
     cdef readonly int subpixel_bits
     cdef tl_test test
@@ -39,6 +39,10 @@ cdef class SnappedMesh:
         self.x_px, self.y_px, self.subpixel_bits, self.snapped.cull, self.snapped.method, test = how
         self.test = <tl_test>test
 
+    def __reduce__(self):
+        raise TypeError("what has been drawn refers to memory of this process and is not pickled or copied deeply: take "
+                        "its arrays, such as .triangle and .depth")
+
     def seen_from(self, int32_t x_fx, int32_t y_fx):
         """Return the same mesh with its samples off the centres of the pixels, in sub-pixels."""
         cdef SnappedMesh seen = self.copy()
@@ -58,14 +62,17 @@ cdef class SnappedMesh:
         part.y_px += y_px
         return part
 
-    def with_inverse_w(self, int64_t n_pixels):
-        """Return the same mesh with 1/w of all vertices at hand, if so many pixels ask for enough of them."""
+    def with_inverse_w(self, int64_t n_pixels, empty=np.empty):
+        """Return the same mesh with 1/w of all vertices at hand, if so many pixels ask for enough of them.
+
+        `empty(shape, dtype)` gives memory for them.
+        """
         cdef const tl_source *source = self.snapped.mesh.source
         cdef double[::1] inv_w
         cdef SnappedMesh other
         if source == NULL or source.is_affine or self.snapped.mesh.inv_w != NULL or self.snapped.mesh.n_vertices > 2 * n_pixels:
             return self
-        inv_w = np.empty(max(1, self.snapped.mesh.n_vertices))
+        inv_w = empty((max(1, self.snapped.mesh.n_vertices),), np.float64)
         with nogil:
             K.inverse_w(source, 0, self.snapped.mesh.n_vertices, &inv_w[0])
         other = self.copy()

@@ -8,7 +8,7 @@ Structures and an Interpolant over Each Irregular Triangular Domain", SIGGRAPH 1
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -18,12 +18,14 @@ from topleft._base.arrays import as_array, as_checked_triangles, as_number, as_p
 from topleft._base.memory import SCRATCH
 from topleft._base.options import Per, Sink, check_choice, parse
 from topleft._base.threads import count_threads, run_parts
-from topleft._field.grid import Extent, Grid, grid_around
-from topleft._model.adapt import MeshLike, Polygons, as_polygons
+from topleft._field.grid import ExtentLike, Grid, grid_around
 from topleft._raster.choices import drawing
 from topleft._raster.rasterize import canvas_of, draw
 from topleft._raster.snap import snap_mesh
 from topleft._raster.view import View
+from topleft._scene.adapt import MeshLike, as_polygons
+from topleft._scene.cells import Polygons
+from topleft.typing import PerOption, SurfaceOption, YOption
 
 F64 = npt.NDArray[np.float64]
 I32 = npt.NDArray[np.int32]
@@ -44,10 +46,10 @@ def field(
     origin: tuple[int, int] = (0, 0),
     window: int | tuple[int, int] | None = None,
     nodata: float | None = None,
-    extent: Extent | None = None,
+    extent: ExtentLike | None = None,
     pixel_size: float | tuple[float, float] | None = None,
-    y: str = "up",
-    per: str = "auto",
+    y: YOption = "up",
+    per: PerOption = "auto",
     subpixel_bits: int = 8,
     threads: int | None = None,
     out: npt.NDArray[Any] | None = None,
@@ -144,9 +146,9 @@ def height_map(
     mesh: MeshLike,
     spacing: float | tuple[float, float] | Grid,
     *,
-    surface: str = "upper",
-    extent: Extent | None = None,
-    y: str = "up",
+    surface: SurfaceOption = "upper",
+    extent: ExtentLike | None = None,
+    y: YOption = "up",
     subpixel_bits: int = 8,
     threads: int | None = None,
     out: F64 | None = None,
@@ -195,7 +197,7 @@ def height_map(
     array([[nan, nan],
            [1.5, nan]])
     """
-    check_choice("surface", surface, ("upper", "lower"))
+    check_choice("surface", surface, get_args(SurfaceOption))
     polygons = as_polygons(mesh)
     points = _plane_points(polygons)
     if points.shape[1] != 3:
@@ -242,7 +244,7 @@ def _plane_points(polygons: Polygons) -> npt.NDArray[Any]:
     return points
 
 
-def _grid_of(polygons: Polygons, size: Any, pixel_size: Any, extent: Extent | None, y: str) -> Grid:
+def _grid_of(polygons: Polygons, size: Any, pixel_size: Any, extent: ExtentLike | None, y: YOption) -> Grid:
     if isinstance(size, Grid):
         if extent is not None or pixel_size is not None or y != "up":
             raise ValueError("a Grid says extent, pixel_size and y itself: give none of them beside it")

@@ -5,18 +5,22 @@ Input: an extent and a size, or what the grid is to be laid round. Output: `Grid
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeAlias, get_args
 
 import numpy as np
 import numpy.typing as npt
 
 from topleft._base.arrays import as_real, as_size, shown
 from topleft._base.options import check_choice
-from topleft._model.adapt import MeshLike, Polygons, as_polygons
+from topleft._scene.adapt import MeshLike, as_polygons
+from topleft._scene.cells import Polygons
+from topleft.typing import YOption
 
 F64 = npt.NDArray[np.float64]
 Extent = tuple[float, float, float, float]
+ExtentLike: TypeAlias = Sequence[float] | npt.NDArray[Any]
 
 
 @dataclass(frozen=True)
@@ -50,6 +54,10 @@ class Grid:
     extent: Extent
     y: str = "up"
 
+    if TYPE_CHECKING:  # what is given may be any four numbers; what is kept is as above
+
+        def __init__(self, size: int | tuple[int, int], extent: ExtentLike, y: YOption = "up") -> None: ...
+
     def __post_init__(self) -> None:
         object.__setattr__(self, "size", as_size(self.size))
         try:
@@ -61,17 +69,17 @@ class Grid:
                 f"extent must be finite with x_min < x_max and y_min < y_max, got {x_min}, {x_max}, {y_min}, {y_max}"
             )
         object.__setattr__(self, "extent", (x_min, x_max, y_min, y_max))
-        check_choice("y", self.y, ("up", "down"))
+        check_choice("y", self.y, get_args(YOption))
 
     @classmethod
     def around(
         cls,
         subject: MeshLike,
         *,
-        size: tuple[int, int] | None = None,
+        size: int | tuple[int, int] | None = None,
         pixel_size: float | tuple[float, float] | None = None,
-        extent: Extent | None = None,
-        y: str = "up",
+        extent: ExtentLike | None = None,
+        y: YOption = "up",
     ) -> Grid:
         """The grid round a mesh, of so many pixels or of pixels so large.
 
@@ -179,10 +187,10 @@ class Grid:
 
 def grid_around(
     polygons: Polygons,
-    size: tuple[int, int] | None,
+    size: int | tuple[int, int] | None,
     pixel_size: float | tuple[float, float] | None,
-    extent: Extent | None,
-    y: str,
+    extent: ExtentLike | None,
+    y: YOption,
 ) -> Grid:
     """`Grid.around`, of points and triangles."""
     if (size is None) == (pixel_size is None):

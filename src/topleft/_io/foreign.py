@@ -16,7 +16,7 @@ from urllib.parse import unquote
 import numpy as np
 
 from topleft._io.references import Cloud, InputFile
-from topleft._model.adapt import placed
+from topleft._model.from_trimesh import placed
 from topleft._model.mesh import Mesh
 from topleft.errors import MeshError, MissingPackageError
 

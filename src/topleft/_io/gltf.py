@@ -22,6 +22,7 @@ from topleft._base.color import encode_srgb
 from topleft._io.gltf_accessors import Accessors, Tree, entry, normalized
 from topleft._io.gltf_materials import Materials
 from topleft._io.references import Cloud, InputFile
+from topleft._model.joined import placed_arrays
 from topleft._model.mesh import Mesh
 from topleft.errors import MeshError, MissingPackageError
 
@@ -516,19 +517,12 @@ def _flat(shape: _Shape) -> _Shape:
 
 def _placed(shape: _Shape, matrix: F64, materials: tuple[Any, ...]) -> Mesh:
     """A primitive in the world."""
-    positions, triangles, normals = shape.positions, shape.triangles, shape.normals
-    if not np.array_equal(matrix, np.eye(4)):
-        linear = matrix[:3, :3]
-        positions = positions @ linear.T + matrix[:3, 3]
-        if np.linalg.det(linear) < 0:  # a mirror turns the triangles over
-            triangles = triangles[:, ::-1]
-        if normals is not None:
-            normals = normals @ np.linalg.pinv(linear)
+    own = placed_arrays(shape.positions, shape.triangles, shape.normals, matrix)
     colors = None if shape.colors is None else _srgb_bytes(shape.colors)
     uv, uv1 = (
         None if rows is None else np.column_stack([rows[:, 0], 1 - rows[:, 1]]) for rows in (shape.uv, shape.uv1)
     )
-    return Mesh(positions, triangles, normals, colors, uv, materials, None, uv1)
+    return Mesh(*own, colors, uv, materials, None, uv1)
 
 
 def _srgb_bytes(colors: Array) -> npt.NDArray[np.uint8]:

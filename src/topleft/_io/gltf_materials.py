@@ -19,13 +19,14 @@ from topleft._base.color import LIGHT_OF_SRGB, Color, encode_srgb
 from topleft._io.gltf_accessors import Accessors, Tree, entry, uri_content, whole
 from topleft._io.references import InputFile
 from topleft._model.material import AlphaMode, Material
-from topleft._model.texture import Encoding, Filter, Texture, Wrap
+from topleft._model.texture import Texture
 from topleft.errors import MeshError
+from topleft.typing import EncodingOption, FilterOption, WrapOption
 
 F64 = npt.NDArray[np.float64]
 
 NEAREST, LINEAR = 9728, 9729
-WRAPS = {10497: Wrap.REPEAT, 33071: Wrap.CLAMP, 33648: Wrap.MIRROR}
+WRAPS: dict[int, WrapOption] = {10497: "repeat", 33071: "clamp", 33648: "mirror"}
 DIELECTRIC = 0.04
 """The share of light that a surface without metal reflects when seen along its normal."""
 
@@ -82,10 +83,10 @@ class Materials:
             own |= {
                 "color": srgb_of_light(factor[:3]),
                 "opacity": _share(factor[3]),
-                "texture": self._texture(rough.get("baseColorTexture"), Encoding.SRGB),
+                "texture": self._texture(rough.get("baseColorTexture"), "srgb"),
                 "metallic": _share(_number(rough, "metallicFactor", 1)),
                 "roughness": _share(_number(rough, "roughnessFactor", 1)),
-                "metallic_roughness_texture": self._texture(rough.get("metallicRoughnessTexture"), Encoding.LINEAR),
+                "metallic_roughness_texture": self._texture(rough.get("metallicRoughnessTexture"), "linear"),
             }
         mode = row.get("alphaMode", "OPAQUE")
         own["alpha_mode"] = {"MASK": AlphaMode.MASK, "BLEND": AlphaMode.BLEND}.get(mode, AlphaMode.OPAQUE)
@@ -97,13 +98,13 @@ class Materials:
             return Material(unlit=True, **own)
         strength = _number(extensions.get("KHR_materials_emissive_strength", {}), "emissiveStrength", 1)
         emission = tuple(max(0.0, strength * value) for value in _numbers(row, "emissiveFactor", (0, 0, 0)))
-        own |= {"emission": emission, "emission_texture": self._texture(row.get("emissiveTexture"), Encoding.SRGB)}
+        own |= {"emission": emission, "emission_texture": self._texture(row.get("emissiveTexture"), "srgb")}
         occlusion, normal = row.get("occlusionTexture"), row.get("normalTexture")
         if occlusion is not None:
-            own["occlusion_texture"] = self._texture(occlusion, Encoding.LINEAR)
+            own["occlusion_texture"] = self._texture(occlusion, "linear")
             own["occlusion_strength"] = _share(_number(occlusion, "strength", 1))
         if normal is not None:
-            own["normal_texture"] = self._texture(normal, Encoding.LINEAR)
+            own["normal_texture"] = self._texture(normal, "linear")
             own["normal_scale"] = max(0.0, _number(normal, "scale", 1))
         return Material(**own)
 
@@ -113,8 +114,8 @@ class Materials:
         diffuse_factor = np.array(_numbers(row, "diffuseFactor", (1, 1, 1, 1)))
         specular_factor = np.array(_numbers(row, "specularFactor", (1, 1, 1)))
         gloss = _share(_number(row, "glossinessFactor", 1))
-        diffuse = self._texture(row.get("diffuseTexture"), Encoding.SRGB)
-        specular = self._texture(row.get("specularGlossinessTexture"), Encoding.SRGB)
+        diffuse = self._texture(row.get("diffuseTexture"), "srgb")
+        specular = self._texture(row.get("specularGlossinessTexture"), "srgb")
         own: dict[str, Any] = {"opacity": _share(diffuse_factor[3])}
         there = [each for each in (diffuse, specular) if each is not None]
         if not there:
@@ -132,7 +133,7 @@ class Materials:
             bases[rows, :, :3] = np.rint(255 * encode_srgb(base))
             roughs[rows, :, 1] = np.rint(255 - gloss * strengths[rows, :, 3])
             roughs[rows, :, 2] = np.rint(255 * metallic)
-        rough = replace(there[-1], image=roughs, encoding=Encoding.LINEAR)
+        rough = replace(there[-1], image=roughs, encoding="linear")
         return {
             **own,
             "color": (255, 255, 255),
@@ -142,7 +143,7 @@ class Materials:
             "metallic_roughness_texture": rough,
         }
 
-    def _texture(self, info: Any, encoding: Encoding) -> Texture | None:
+    def _texture(self, info: Any, encoding: EncodingOption) -> Texture | None:
         """The texture that a material names, laid on as it says."""
         if info is None:
             return None
@@ -222,15 +223,16 @@ def _resized(picture: npt.NDArray[np.uint8] | None, size: tuple[int, ...]) -> np
     return np.asarray(Image.fromarray(picture).resize((size[1], size[0]), Image.Resampling.BILINEAR))
 
 
-def _filter_of(sampler: Tree) -> Filter:
+def _filter_of(sampler: Tree) -> FilterOption:
     """What comes nearest to the filters of OpenGL; trilinear unless the file says otherwise."""
     if sampler.get("magFilter") == NEAREST:
-        return Filter.NEAREST
-    return Filter.BILINEAR if sampler.get("minFilter") in (NEAREST, LINEAR) else Filter.TRILINEAR
+        return "nearest"
+    return "bilinear" if sampler.get("minFilter") in (NEAREST, LINEAR) else "trilinear"
 
 
-def _wrap_of(sampler: Tree) -> tuple[str, str]:
-    return tuple(WRAPS.get(sampler.get(name, 10497), Wrap.REPEAT) for name in ("wrapS", "wrapT"))  # type: ignore[return-value]
+def _wrap_of(sampler: Tree) -> tuple[WrapOption, WrapOption]:
+    first, second = (WRAPS.get(sampler.get(name, 10497), "repeat") for name in ("wrapS", "wrapT"))
+    return first, second
 
 
 def transform_of(row: Tree) -> npt.NDArray[np.float64]:

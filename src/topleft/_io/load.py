@@ -16,8 +16,8 @@ import numpy as np
 from topleft._base.arrays import as_path
 from topleft._io.notes import tell
 from topleft._io.references import MAX_TEXTURE_PIXELS, MAX_VERTICES, InputFile
-from topleft._model.adapt import DEFAULT_CREASE, FILE_READERS, joined
-from topleft._model.mesh import Mesh, as_crease
+from topleft._model.joined import joined
+from topleft._model.mesh import DEFAULT_CREASE, Mesh, as_crease
 from topleft._model.points import Points
 from topleft.errors import MeshError, MissingPackageError
 
@@ -81,9 +81,6 @@ def load(
     mesh = reading(source, lambda: _mesh(source, crease))
     tell(source.notes.lines, stacklevel=2)
     return mesh
-
-
-FILE_READERS.append(load)
 
 
 def _mesh(source: InputFile, crease: float) -> Mesh | Points:

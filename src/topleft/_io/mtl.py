@@ -20,8 +20,9 @@ import numpy.typing as npt
 from topleft._base.color import Color, decode_srgb
 from topleft._io.references import InputFile
 from topleft._model.material import AlphaMode, Material
-from topleft._model.texture import Encoding, Texture, Wrap
+from topleft._model.texture import Texture, Wrap
 from topleft.errors import MeshError
+from topleft.typing import EncodingOption
 
 U8 = npt.NDArray[np.uint8]
 
@@ -194,7 +195,7 @@ class _Makers:
         if "color" in maps:
             picture = self._picture(maps["color"])
             if picture is not None:
-                return {"texture": self._texture(maps["color"], picture, Encoding.SRGB)}
+                return {"texture": self._texture(maps["color"], picture, "srgb")}
         return {"color": _rgb(numbers["Kd"]) if numbers.get("Kd") else None}
 
     def _highlights(self, numbers: dict[str, list[float]]) -> dict[str, Any]:
@@ -242,7 +243,7 @@ class _Makers:
         picture = self._picture(maps["emission"]) if "emission" in maps else None
         if picture is None:
             return {"emission": light}
-        texture = self._texture(maps["emission"], picture, Encoding.SRGB)
+        texture = self._texture(maps["emission"], picture, "srgb")
         return {"emission": light if any(light) else (1.0, 1.0, 1.0), "emission_texture": texture}
 
     def _relief(self, maps: dict[str, _Map]) -> dict[str, Any]:
@@ -254,8 +255,8 @@ class _Makers:
         is_grey = bool((np.ptp(picture[..., :3], axis=-1) <= 2).all())
         if is_grey and "normal" not in maps:
             normals = normals_of_heights(_scalar_of(picture, laid.channel, "l"), laid.bump)
-            return {"normal_texture": Texture(normals, encoding=Encoding.LINEAR, **laid.placement)}
-        texture = self._texture(laid, picture, Encoding.LINEAR)
+            return {"normal_texture": Texture(normals, encoding="linear", **laid.placement)}
+        texture = self._texture(laid, picture, "linear")
         return {"normal_texture": texture, "normal_scale": max(laid.bump, 0.0)}
 
     def _metallic_rough(self, numbers: dict[str, list[float]], maps: dict[str, _Map]) -> dict[str, Any]:
@@ -276,13 +277,13 @@ class _Makers:
                     packed[..., channel] = alpha
                     if kind not in numbers and not numbers.get({"roughness": "Pr", "metallic": "Pm"}[kind]):
                         own[kind] = 1.0
-            own["metallic_roughness_texture"] = Texture(packed, encoding=Encoding.LINEAR, **maps[first].placement)
+            own["metallic_roughness_texture"] = Texture(packed, encoding="linear", **maps[first].placement)
         return own
 
     def _picture(self, laid: _Map) -> U8 | None:
         return self._source.picture(laid.name, self._folder) if laid.name else None
 
-    def _texture(self, laid: _Map, picture: U8, encoding: Encoding) -> Texture:
+    def _texture(self, laid: _Map, picture: U8, encoding: EncodingOption) -> Texture:
         """The texture; materials that use the same share it. The alpha of a picture is not opacity: map_d is."""
         key = (laid.name, laid.scale, laid.offset, laid.is_clamped, encoding)
         if key not in self._textures:

@@ -22,14 +22,15 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from topleft._base.arrays import as_number, as_size
+from topleft._base.arrays import as_number, as_size, shown
 from topleft._camera.camera import Camera, CameraLike, as_camera
 from topleft._lod.levels import Level
 from topleft._lod.simplify import levels_of
-from topleft._model.adapt import MeshLike, as_mesh
 from topleft._model.material import Material
 from topleft._model.mesh import Mesh, has_holes
-from topleft._model.scene import Instance, Scene
+from topleft._scene.adapt import MeshLike, as_mesh
+from topleft._scene.scene import Scene
+from topleft.typing import CullOption
 
 __all__ = ["Detail", "check_tolerance", "choose_detail", "detailed", "pixels_of_bound"]
 
@@ -74,7 +75,7 @@ def choose_detail(
     size: int | tuple[int, int],
     *,
     tolerance: float,
-    cull: str = "none",
+    cull: CullOption = "none",
     material: Material | None = None,
     transform: npt.ArrayLike | None = None,
     viewport: tuple[int, int] | None = None,
@@ -125,6 +126,25 @@ def choose_detail(
     mesh, camera, size = as_mesh(mesh), as_camera(camera), as_size(size)
     viewport = None if viewport is None else as_size(viewport, "viewport", smallest=1)
     tolerance = check_tolerance(tolerance)
+    return detail_of(
+        mesh, camera, size, tolerance, cull=cull, material=material, viewport=viewport, origin=origin,
+        transform=transform,
+    )  # fmt: skip
+
+
+def detail_of(
+    mesh: Mesh,
+    camera: Camera,
+    size: tuple[int, int],
+    tolerance: float,
+    *,
+    cull: str = "none",
+    material: Material | None = None,
+    viewport: tuple[int, int] | None = None,
+    origin: tuple[int, int] = (0, 0),
+    transform: npt.ArrayLike | None = None,
+) -> Detail:
+    """The level that a view needs, of checked arguments."""
     n = len(mesh.triangles)
 
     def whole(why: str, rejected: tuple[str, ...] = ()) -> Detail:
@@ -240,17 +260,11 @@ def detailed(
     mesh: Mesh | Scene, camera: Camera, size: tuple[int, int], tolerance: float, **options: Any
 ) -> Mesh | Scene:
     """The mesh or scene as it is drawn within a tolerance; options as for `choose_detail`."""
+    if not isinstance(options.get("material"), Material | None):
+        raise TypeError(f"material must be a Material, got {shown(options['material'])}")
     if check_tolerance(tolerance) == 0:
         return mesh
     if isinstance(mesh, Mesh):
-        return choose_detail(mesh, camera, size, tolerance=tolerance, **options).mesh
-    return Scene([detailed_instance(one, camera, size, tolerance, options) for one in mesh])
-
-
-def detailed_instance(
-    instance: Instance, camera: Camera, size: tuple[int, int], tolerance: float, options: dict[str, Any]
-) -> Instance:
-    """An instance with the level of its mesh."""
-    transform = instance.transform
-    found = choose_detail(instance.mesh, camera, size, tolerance=tolerance, transform=transform, **options)
-    return instance if found.level == 0 else replace(instance, mesh=found.mesh)
+        return detail_of(mesh, camera, size, tolerance, **options).mesh
+    own = [detail_of(one.mesh, camera, size, tolerance, transform=one.transform, **options).mesh for one in mesh]
+    return Scene([replace(one, mesh=level) for one, level in zip(mesh, own, strict=True)])

@@ -50,7 +50,7 @@ class Level:
     @cached_property
     def extent(self) -> tuple[F64, F64, float]:
         """Box (2, 3), and the centre (3,) and the radius of the sphere round it all."""
-        return self.mesh.bounds, *bounding_sphere(self.mesh)
+        return self.mesh.bounds, *bounding_sphere(self.mesh.extreme_points())
 
 
 class Levels(Sequence[Level]):

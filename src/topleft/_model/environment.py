@@ -17,15 +17,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from topleft._base.arrays import as_array, as_number, as_vector
-from topleft._base.color import LIGHT_OF_SRGB, Color, as_color, light_of
+from topleft._base.color import LIGHT_OF_SRGB, Color, ColorLike, as_color, light_of
 from topleft._base.options import parse
 from topleft._model.light import TO_HEADLIGHT, LightSpace, as_not_negative
+from topleft.typing import SpaceOption
 
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
@@ -91,6 +92,19 @@ class Environment:
     up: tuple[float, float, float] = (0.0, 1.0, 0.0)
     turn: float = 0.0
     space: str = "world"
+
+    if TYPE_CHECKING:  # what is given may be anything that NumPy reads; what is kept is as above
+
+        def __init__(
+            self,
+            sky: ColorLike = (255, 255, 255),
+            ground: ColorLike | None = None,
+            image: npt.ArrayLike | None = None,
+            intensity: float = 1.0,
+            up: npt.ArrayLike = (0.0, 1.0, 0.0),
+            turn: float = 0.0,
+            space: SpaceOption = "world",
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         keep = object.__setattr__  # the dataclass is frozen, and its values are coerced

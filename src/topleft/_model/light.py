@@ -17,6 +17,7 @@ import numpy.typing as npt
 from topleft._base.arrays import as_number, as_vector
 from topleft._base.color import Color, ColorLike, as_color
 from topleft._base.options import parse
+from topleft.typing import LightKindOption, SpaceOption
 
 F64 = npt.NDArray[np.float64]
 
@@ -89,11 +90,11 @@ class Light:
         def __init__(
             self,
             at: npt.ArrayLike,
-            kind: str = "directional",
+            kind: LightKindOption = "directional",
             color: ColorLike = (255, 255, 255),
             intensity: float = 1.0,
             falloff: float = 0.0,
-            space: str = "world",
+            space: SpaceOption = "world",
         ) -> None: ...
 
     def __post_init__(self) -> None:

@@ -11,6 +11,7 @@ from topleft._base.color import Color, ColorLike, as_color
 from topleft._base.options import parse
 from topleft._model.light import as_not_negative
 from topleft._model.texture import Texture
+from topleft.typing import AlphaModeOption
 
 TEXTURES = ("texture", "emission_texture", "metallic_roughness_texture", "occlusion_texture", "normal_texture")
 
@@ -109,7 +110,7 @@ class Material:
             unlit: bool = False,
             alpha_cutoff: float | None = None,
             opacity: float = 1.0,
-            alpha_mode: str | None = None,
+            alpha_mode: AlphaModeOption | None = None,
             double_sided: bool = True,
             emission: tuple[float, float, float] = (0.0, 0.0, 0.0),
             emission_texture: Texture | None = None,

@@ -29,6 +29,10 @@ U8 = npt.NDArray[np.uint8]
 NO_CREASE = 180.0
 """The crease angle at which no edge is sharp, degrees."""
 
+DEFAULT_CREASE = 30.0
+"""Degrees by which triangles of a mesh without normals bend at an edge before it is sharp: round things of 12 sides and
+more stay round."""
+
 POINTS_AT_ONCE = 1 << 14
 """Points whose distances are computed together: they stay in the second-level cache."""
 
@@ -73,7 +77,8 @@ class Mesh:
 
     Notes
     -----
-    The arrays are read-only views: of the caller's memory where the dtype allows.
+    The arrays are read-only views: of the caller's memory where the dtype allows. Do not change that memory while the
+    mesh lives: what has been computed of it is kept, and another thread that writes to it during a call may crash it.
 
     Examples
     --------
@@ -258,6 +263,11 @@ class Mesh:
     def __getstate__(self) -> dict[str, Any]:
         """What another process needs: what is computed from it is computed there."""
         return {field.name: self.__dict__[field.name] for field in fields(self)}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Take it, the arrays read-only as they were."""
+        for name, value in state.items():
+            self.__dict__[name] = read_only(value) if isinstance(value, np.ndarray) else value
 
 
 def keep_corner_normals(mesh: Mesh, normals: CornerNormals) -> None:

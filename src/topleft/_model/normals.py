@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from topleft import _engine
 from topleft._base.arrays import bad_triangle
-from topleft._base.threads import count_threads, run_parts
+from topleft._base.threads import run_parts, threads_of_rows
 
 __all__ = [
     "CornerNormals", "angle_weighted_normals", "box_of_triangles", "color_rows", "creased_normals", "face_normal_rows",
@@ -29,9 +29,6 @@ F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
 I32 = npt.NDArray[np.int32]
 U8 = npt.NDArray[np.uint8]
-
-MIN_PER_THREAD = 50_000
-"""Triangles or vertices that are worth a thread: a millisecond, where the first use of the pool takes four."""
 
 MAX_THREADS_OF_VERTICES = 8
 """Each thread that sums the normals of vertices goes through all triangles."""
@@ -109,7 +106,7 @@ def creased_normals(
     first, group = (None, None) if places is None else places
     points = _contiguous(vertices if first is None else vertices[first])
     corners = own if group is None else group.astype(np.int32)[own]
-    source, n_threads = _engine.Source(points), _threads(n_triangles, threads)
+    source, n_threads = _engine.Source(points), threads_of_rows(n_triangles, threads)
     normals, angles = np.empty((n_triangles, 3)), np.empty((n_triangles, 3))
     run_parts(lambda a, b: _engine.face_angles(source, corners, a, b, normals, angles), n_triangles, n_threads)
     least_cosine = math.cos(math.radians(min(crease_deg + EQUAL_ANGLE_DEG, 180.0)))
@@ -172,7 +169,7 @@ def angle_weighted_normals(vertices: FloatArray, triangles: I32, *, threads: int
     def add_up(first: int, end: int) -> int:
         return _engine.vertex_normals(source, corners, first, end, out)
 
-    n_threads = min(_threads(len(corners), None), MAX_THREADS_OF_VERTICES) if threads is None else threads
+    n_threads = min(threads_of_rows(len(corners)), MAX_THREADS_OF_VERTICES) if threads is None else threads
     _check(run_parts(add_up, len(points), n_threads), corners, len(points))
     return out
 
@@ -261,28 +258,23 @@ def moved(points: FloatArray, matrix: F64) -> F64:
 def color_rows(colors: U8) -> F32:
     """Rows (N, 4) float32 of colours (N, 3) or (N, 4): red, green, blue, and 1."""
     rows = np.empty((len(colors), 4), np.float32)
-    n_threads = _threads(len(colors), None)
+    n_threads = threads_of_rows(len(colors))
     run_parts(lambda first, end: _engine.color_rows(colors, first, end, rows), len(colors), n_threads)
     return rows
 
 
 def _over_rows(rows: FloatArray, work: Callable[[_engine.Source, int, int], None]) -> None:
     source = _engine.Source(_contiguous(rows))
-    run_parts(lambda first, end: work(source, first, end), len(rows), _threads(len(rows), None))
+    run_parts(lambda first, end: work(source, first, end), len(rows), threads_of_rows(len(rows)))
 
 
 def _over_faces(
     vertices: FloatArray, triangles: I32, threads: int | None, work: Callable[[_engine.Source, I32, int, int], int]
 ) -> None:
     points, corners = _contiguous(vertices), np.ascontiguousarray(triangles, np.int32)
-    source, n_threads = _engine.Source(points), _threads(len(corners), threads)
+    source, n_threads = _engine.Source(points), threads_of_rows(len(corners), threads)
     rows = run_parts(lambda first, end: work(source, corners, first, end), len(corners), n_threads)
     _check(rows, corners, len(points))
-
-
-def _threads(n: int, threads: int | None) -> int:
-    """How many threads some triangles or vertices are worth."""
-    return max(1, min(count_threads(None, n), n // MIN_PER_THREAD)) if threads is None else threads
 
 
 def _contiguous(rows: FloatArray) -> FloatArray:

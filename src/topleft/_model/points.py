@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +16,7 @@ import numpy.typing as npt
 from topleft._base.arrays import INT32_MAX, as_point_size
 from topleft._base.options import PointShape, parse
 from topleft._model.mesh import FloatArray, as_color_array, as_real_array, extreme_points, read_only
+from topleft.typing import PointShapeOption, PointUnitOption
 
 __all__ = ["DEFAULT_POINT_SIZE", "PointUnit", "Points"]
 
@@ -79,6 +80,18 @@ class Points:
     size: float | F64 = DEFAULT_POINT_SIZE
     unit: str = "px"
     shape: str = "disc"
+
+    if TYPE_CHECKING:  # what is given may be anything that NumPy reads; what is kept is as above
+
+        def __init__(
+            self,
+            positions: npt.ArrayLike,
+            colors: npt.ArrayLike | None = None,
+            normals: npt.ArrayLike | None = None,
+            size: npt.ArrayLike = DEFAULT_POINT_SIZE,
+            unit: PointUnitOption = "px",
+            shape: PointShapeOption = "disc",
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         keep = object.__setattr__  # the dataclass is frozen, and its arrays are coerced

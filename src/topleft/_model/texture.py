@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from enum import StrEnum
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +19,8 @@ from topleft import _engine
 from topleft._base.arrays import as_array
 from topleft._base.color import LIGHT_OF_SRGB
 from topleft._base.options import parse
+from topleft._base.texels import MOST_KEPT_BYTES, ValueLevels, as_light, levels_of
+from topleft.typing import EncodingOption, FilterOption, WrapOption
 
 U8 = npt.NDArray[np.uint8]
 U16 = npt.NDArray[np.uint16]
@@ -110,9 +112,9 @@ class Texture:
         def __init__(
             self,
             image: npt.ArrayLike,
-            filter: Literal["trilinear", "bilinear", "nearest"] | str = "trilinear",  # noqa: A002
-            wrap: str | tuple[str, str] = "repeat",
-            encoding: Literal["srgb", "linear"] | str = "srgb",
+            filter: FilterOption = "trilinear",  # noqa: A002
+            wrap: WrapOption | tuple[WrapOption, WrapOption] = "repeat",
+            encoding: EncodingOption = "srgb",
             uv_set: int = 0,
             transform: npt.ArrayLike | None = None,
         ) -> None: ...
@@ -158,6 +160,16 @@ class Texture:
             texels, table, filter_code, wrap_u, wrap_v, self.uv_set, rows_of_transform, (d * hand, -c * hand), hand
         )
 
+    def value_levels(self) -> ValueLevels:
+        """Light and opacity as float32, and their halvings; made when they are first needed, and kept unless large."""
+        found: ValueLevels | None = self.__dict__.get("_value_levels")
+        if found is None:
+            wrap_u, wrap_v = map(str, self.wrap)
+            found = levels_of(as_light(self.image, str(self.encoding)), str(self.filter), (wrap_u, wrap_v))
+            if found.texels.nbytes <= MOST_KEPT_BYTES:
+                self.__dict__["_value_levels"] = found
+        return found
+
     @cached_property
     def has_alpha(self) -> bool:
         """Whether some of it is not opaque."""
@@ -166,6 +178,13 @@ class Texture:
     def __getstate__(self) -> dict[str, Any]:
         """What another process needs: the texels are made there."""
         return {field.name: self.__dict__[field.name] for field in fields(self)}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Take it, the arrays read-only as they were."""
+        for name, value in state.items():
+            self.__dict__[name] = value
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False
 
 
 def as_image(name: str, pixels: npt.ArrayLike) -> U8:
@@ -287,21 +306,8 @@ class RowAreas:
         return np.diff(area, axis=0) * (self.m / self.n)
 
 
-def light_of_image(rgba: U8, encoding: str = "srgb") -> F64:
-    """Linear light and opacity (H, W, 4) float64, 0 to 1, of a picture."""
-    light = np.empty(rgba.shape)
-    light[..., :3] = LIGHT_OF_BYTE[Encoding(encoding)][rgba[..., :3]]
-    light[..., 3] = rgba[..., 3] / 255
-    return light
-
-
-def halved(level: F64) -> F64:
-    """The next halving (max(1, H // 2), max(1, W // 2), 4): each texel the mean over its area."""
-    return halved_along(halved_along(level, 0), 1)
-
-
 def halved_along(level: F64, axis: int) -> F64:
-    """One axis of it."""
+    """One axis of the next halving (max(1, H // 2), max(1, W // 2), 4): each texel the mean over its area."""
     n = level.shape[axis]
     if n % 2 == 0:
         even, odd = (level[::2], level[1::2]) if axis == 0 else (level[:, ::2], level[:, 1::2])

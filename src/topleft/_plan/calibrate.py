@@ -29,6 +29,7 @@ from topleft._raster.snap import Snapped, snap_mesh
 from topleft._raster.verbs import Rasterizer
 from topleft._raster.view import View, ViewOptions
 from topleft.scenes import blob, random_triangles
+from topleft.typing import SamplingOption
 
 __all__ = ["calibrate"]
 
@@ -123,7 +124,8 @@ def scenes(kinds: tuple[tuple[int, int], ...], *, with_blob: bool = False, seed:
 def measure_draw(scene: Any, view: View, group: str, sink: Sink, n_rounds: int) -> Sample:
     """Draw a scene and count what it is made of."""
     memory = KeptMemory()
-    options: ViewOptions = {"threads": 1, "sampling": {"samples": "msaa4", "area": "area"}.get(group, "center")}
+    samplings: dict[str, SamplingOption] = {"samples": "msaa4", "area": "area"}
+    options: ViewOptions = {"threads": 1, "sampling": samplings.get(group, "center")}
     chosen = View.parse(view.size, options) if group in ("samples", "area") else view
     vertices, triangles = scene
     snapped = snap_mesh(memory, vertices, triangles, chosen, with_depth=group == "depth", out=None)

@@ -6,7 +6,7 @@ In: the arguments of a verb. Out: a `Plan`, which explains itself, and which ver
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any, Unpack
@@ -19,7 +19,6 @@ from topleft._base.memory import KeptMemory
 from topleft._base.options import DepthTest, Sampling, parse
 from topleft._camera.camera import Camera
 from topleft._lod.detail import check_tolerance, choose_detail
-from topleft._model.adapt import MeshLike
 from topleft._model.mesh import Mesh
 from topleft._plan.costs import load_costs
 from topleft._plan.facts import CLASSES, find_cluster_facts, find_facts, memory_of
@@ -30,7 +29,9 @@ from topleft._raster.clusters import Clusters
 from topleft._raster.fill import Style, draw_fill
 from topleft._raster.rasterize import draw_coverage, draw_fragments, draw_overdraw
 from topleft._raster.view import CULL_CODES, View, ViewOptions
+from topleft._scene.adapt import MeshLike
 from topleft.methods import METHODS
+from topleft.typing import DepthTestOption, OutputOption
 
 __all__ = ["OUTPUTS", "Plan", "plan"]
 
@@ -264,10 +265,10 @@ class Plan:
 def plan(
     vertices: ArrayLike | MeshLike,
     triangles: ArrayLike | Camera,
-    size: tuple[int, int],
+    size: int | tuple[int, int],
     *,
-    outputs: tuple[str, ...] | list[str] | str = ("triangle", "depth"),
-    depth_test: str | None = "less",
+    outputs: OutputOption | str | Sequence[OutputOption | str] = ("triangle", "depth"),
+    depth_test: DepthTestOption | None = "less",
     tolerance: float = 0.0,
     **view: Unpack[ViewOptions],
 ) -> Plan:

@@ -15,9 +15,9 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._base.color import DEFAULT_COLOR, LINEAR_ONE, light_of, srgb_tables
-from topleft._base.memory import FreshMemory
+from topleft._base.memory import FreshMemory, empty
 from topleft._base.options import PointShape
-from topleft._camera.camera import Camera, CameraLike, as_camera
+from topleft._camera.camera import Camera
 from topleft._model.light import TO_HEADLIGHT, Light, LightKind, LightSpace
 from topleft._model.normals import moved, unit_or_zero
 from topleft._model.points import Points, PointUnit
@@ -28,7 +28,7 @@ from topleft._raster.view import View, ViewOptions
 from topleft._shade.look import determinant, turn_of_normals
 from topleft._shade.shade import Shading, ShadingOptions, eye_distance, shade_numbers, shade_samples
 
-__all__ = ["CLOUD_LAYERS", "CloudBuffer", "draw_cloud", "framing_of", "shade_cloud"]
+__all__ = ["CLOUD_LAYERS", "CloudBuffer", "draw_cloud", "shade_cloud"]
 
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
@@ -38,14 +38,6 @@ FRESH = FreshMemory()
 
 NOWHERE_PX = 1e12
 """Where points stand that a lens does not see: no window shows it."""
-
-
-def framing_of(cloud: Points, camera: CameraLike | None, size: tuple[int, int]) -> Camera:
-    """The camera, or the three-quarter view of the cloud."""
-    width, height = size
-    if camera is not None:
-        return as_camera(camera)
-    return Camera.framing(cloud, aspect=width / height if width > 0 and height > 0 else 1.0)
 
 
 def draw_cloud(
@@ -119,7 +111,7 @@ def shade_cloud(frags: PointFragments, cloud: Points, camera: Camera, options: S
         return shade_numbers(frags, camera, options)
 
     def shade_one(sample: Any) -> U8:
-        picture = np.empty((*sample.id.shape, 4), np.uint8)
+        picture = empty((*sample.id.shape, 4), np.uint8)
         picture[...] = options.background
         seen = sample.mask
         picture[seen, :3] = colors_of(sample.id[seen], sample.depth[seen], cloud, camera, options)

@@ -22,6 +22,7 @@ from topleft._raster.rasterize import refuse_many
 from topleft._raster.sampling import sample_positions
 from topleft._raster.snap import refine, snap, transform
 from topleft._raster.view import View, ViewOptions
+from topleft.typing import DepthTestOption, PointShapeOption
 
 __all__ = ["MOST_POINT_PX", "PointFragments", "draw_points", "points"]
 
@@ -107,11 +108,11 @@ class PointFragments(Fragments):
 
 def points(
     positions: ArrayLike,
-    size: tuple[int, int],
+    size: int | tuple[int, int],
     *,
     point_size: ArrayLike = 1.0,
-    shape: str = "square",
-    depth_test: str = "less",
+    shape: PointShapeOption = "square",
+    depth_test: DepthTestOption = "less",
     **view: Unpack[ViewOptions],
 ) -> PointFragments:
     """The visibility buffer of points: which of them shows in each pixel, and how deep.

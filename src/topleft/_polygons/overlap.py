@@ -21,6 +21,7 @@ from topleft._polygons.draw import cells_for
 from topleft._polygons.polygons import Rule, frame_of
 from topleft._polygons.prepared import Prepared, prepare
 from topleft._polygons.rings import as_points, as_rings, rings_of_triangles
+from topleft.typing import RuleOption
 
 __all__ = ["Overlap", "overlap"]
 
@@ -130,10 +131,10 @@ class Overlap:
 
 def overlap(
     rings: Any,
-    size: tuple[int, int] | Grid,
+    size: int | tuple[int, int] | Grid,
     *,
     triangles: npt.ArrayLike | None = None,
-    rule: str = "evenodd",
+    rule: RuleOption = "evenodd",
     origin: tuple[int, int] = (0, 0),
     subpixel_bits: int = 8,
     assume_valid: bool = False,

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from topleft._base.arrays import as_array, as_size, as_subpixel_bits, as_window
-from topleft._base.memory import SCRATCH, FreshMemory
+from topleft._base.memory import SCRATCH, FreshMemory, empty
 from topleft._base.options import Sampling, parse
 from topleft._base.threads import parse_threads, run_parts
 from topleft._field.grid import Grid
@@ -22,6 +22,7 @@ from topleft._polygons.prepared import Frame, Prepared, prepare
 from topleft._polygons.rings import RingSet, as_rings
 from topleft._raster.rasterize import canvas_of
 from topleft._raster.sampling import SAMPLE_GRID_BITS, sample_positions
+from topleft.typing import RuleOption, SamplingOption
 
 __all__ = ["Rule", "frame_of", "polygons"]
 
@@ -45,12 +46,12 @@ class Paint:
 
 def polygons(
     rings: Any,
-    size: tuple[int, int] | Grid,
+    size: int | tuple[int, int] | Grid,
     *,
-    rule: str = "evenodd",
-    values: npt.ArrayLike | str | None = None,
+    rule: RuleOption = "evenodd",
+    values: npt.ArrayLike | Literal["index"] | None = None,
     background: npt.ArrayLike | None = None,
-    sampling: str = "center",
+    sampling: SamplingOption = "center",
     origin: tuple[int, int] = (0, 0),
     subpixel_bits: int = 8,
     assume_valid: bool = False,
@@ -167,7 +168,12 @@ def polygons(
 
 
 def frame_of(
-    rings: RingSet, size: tuple[int, int] | Grid, origin: object, subpixel_bits: object, threads: object, n_samples: int
+    rings: RingSet,
+    size: int | tuple[int, int] | Grid,
+    origin: object,
+    subpixel_bits: object,
+    threads: object,
+    n_samples: int,
 ) -> tuple[RingSet, Frame]:
     """Return the rings in pixels, and the window that they are drawn in."""
     if isinstance(size, Grid):
@@ -196,8 +202,8 @@ def mean_of_samples(
     """Write the mean of what the samples of each pixel see: 0 or 1, or colours."""
     height, width = out.shape[:2]
     positions = sample_positions(how.n_samples, prepared.frame.grid_bits).tolist()
-    mask = np.empty((height, width), np.uint8) if paint is None else None
-    labels = None if paint is None else np.empty((height, width), np.int32)
+    mask = empty((height, width), np.uint8) if paint is None else None
+    labels = None if paint is None else empty((height, width), np.int32)
     table = None if paint is None else np.concatenate([paint.table, paint.background[None]]).astype(np.float32)
     out.fill(0)
     for at in positions:
@@ -249,7 +255,7 @@ def paint_values(
     if how in (Sampling.OUTER, Sampling.INNER, Sampling.AREA):
         prepared.certify(assume_valid=assume_valid)
     if how is Sampling.AREA or how.n_samples > 1:
-        picture = out if out.dtype == np.float32 else np.empty(out.shape, np.float32)
+        picture = out if out.dtype == np.float32 else empty(out.shape, np.float32)
         if how is Sampling.AREA:
             picture[...] = paint.background
             colors = np.ascontiguousarray(paint.table.reshape(len(paint.table), -1), np.float32)

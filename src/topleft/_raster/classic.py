@@ -13,11 +13,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from topleft._base.arrays import as_background, as_checked_triangles, as_out, as_triangles, as_vertices
-from topleft._base.memory import Memory
+from topleft._base.arrays import apart_from, as_background, as_checked_triangles, as_out, as_triangles, as_vertices
+from topleft._base.memory import Memory, empty
 from topleft._base.options import Per, Sampling, Sink, parse
 from topleft._raster.view import View
 from topleft.methods import Method, load_kernel
+from topleft.typing import PerOption
 
 __all__ = ["bresenham_line", "draw_classic", "fill_classic", "refuse_classic"]
 
@@ -87,10 +88,11 @@ def draw_classic(
         If a triangle names a vertex that does not exist.
     """
     check_options(method, view)
+    vertices, triangles = apart_from(out, "vertices", vertices), apart_from(out, "triangles", triangles)
     points, corners = as_scene(method, vertices, triangles, view)
     shape, dtype = view.size[::-1], np.dtype(np.bool_ if sink is Sink.MASK else np.int32)
     result = memory.empty(NAMES[sink], shape, dtype) if out is None else as_out("out", out, shape, dtype.type)
-    canvas = result if result.flags.c_contiguous else np.empty(shape, dtype)
+    canvas = result if result.flags.c_contiguous else empty(shape, dtype)
     canvas.fill(-1 if sink is Sink.LABEL else 0)
     draw, variant = load_kernel(method)
     pixels = canvas.reshape(-1).view(np.uint8)
@@ -107,7 +109,7 @@ def fill_classic(
     triangles: ArrayLike,
     colors: NDArray[Any],
     view: View,
-    per: str,
+    per: PerOption,
     background: ArrayLike | None,
     out: object,
 ) -> NDArray[Any]:

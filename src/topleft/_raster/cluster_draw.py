@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from topleft import _engine
-from topleft._base.arrays import as_matrix
+from topleft._base.arrays import as_matrix, bad_triangle
 from topleft._base.memory import FRESH, Memory
 from topleft._base.options import Sink
 from topleft._base.threads import run_parts
 from topleft._raster import choices
-from topleft._raster.clusters import Clusters, Survey
+from topleft._raster.clusters import Clusters, Survey, check_rows
 from topleft._raster.snap import snap_mesh
 from topleft._raster.view import View
 
@@ -117,7 +117,11 @@ class ClusteredMesh:
         is_used: NDArray[np.uint8] = np.full(len(points) // _engine.BLOCK + 1, triangles is None, np.uint8)
         ids = [np.ascontiguousarray(array, np.int32).ravel() for array in triangles or ()]
         for array in ids:
-            _engine.mark_vertices(array, own, is_used)
+            bad_row = _engine.mark_vertices(array, own, len(points), is_used)
+            if bad_row >= 0:  # the caller has written into the triangles of the mesh
+                raise bad_triangle(own, bad_row, len(points))
+        if triangles is None:
+            check_rows(own, len(points))
         records: NDArray[np.uint8] = memory.empty("records", (len(points) * _engine.VERTEX_BYTES,), np.uint8)
         bad, wide, clipped = source.project_blocks(is_used, self._viewport, records)
         if bad or wide or (clipped and triangles is None):

@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from topleft import _engine
+from topleft._base.arrays import bad_triangle
 from topleft._base.threads import count_threads, run_parts
 
-__all__ = ["Backoff", "Clusters", "Survey"]
+__all__ = ["Backoff", "Clusters", "Survey", "check_rows"]
 
 #: A bound of the error of the vertex stage as a share of the terms that it adds up: four roundings, and the same again
 #: for how the bounds themselves are computed, in float64; twice that.
@@ -70,6 +71,7 @@ class Clusters:
 
     def __init__(self, points: NDArray[Any], triangles: NDArray[np.int32], threads: int | None = None) -> None:
         """Sort and measure (V, 3) contiguous points and (T, 3) checked triangles."""
+        check_rows(triangles, len(points))
         self.points, self.triangles, self.backoff = points, triangles, Backoff()
         n_triangles = len(triangles)
         order: NDArray[np.int32] = np.empty(n_triangles, np.int32)
@@ -129,6 +131,13 @@ class Clusters:
         self.engine.survey(seen, max(1, round(len(self) / n_most)), n_of)
         n = max(1, int(n_of.sum()))
         return Survey(*(count / n for count in n_of.tolist()))
+
+
+def check_rows(triangles: NDArray[np.int32], n_vertices: int) -> None:
+    """Raise an error for triangles that have changed since they were checked: a mesh may share the caller's memory."""
+    bad_row = _engine.first_bad_row(triangles, n_vertices)
+    if bad_row >= 0:
+        raise bad_triangle(triangles, bad_row, n_vertices)
 
 
 def box_of(points: NDArray[Any]) -> NDArray[np.float64]:

@@ -11,10 +11,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine
-from topleft._base.arrays import as_array, as_background, as_number, as_out
+from topleft._base.arrays import apart_from, as_array, as_background, as_number, as_out
+from topleft._base.memory import empty
 from topleft._base.options import Per, parse
 from topleft._base.threads import available_threads, parse_threads, run_parts
 from topleft._raster.peel import DepthLayers
+from topleft.typing import PerOption
 
 __all__ = ["composite"]
 
@@ -30,7 +32,7 @@ def composite(
     colors: ArrayLike,
     *,
     opacity: float | None = None,
-    per: str = "auto",
+    per: PerOption = "auto",
     background: ArrayLike | None = None,
     out: NDArray[Any] | None = None,
     threads: int | None = None,
@@ -90,15 +92,15 @@ def composite(
     if not isinstance(layers, DepthLayers):
         raise TypeError(f"layers must be what peel returns, got {type(layers).__name__}")
     n_layers, height, width = layers.planes[0].shape
-    palette = as_palette(colors, opacity)
+    palette = as_palette(apart_from(out, "colors", colors), opacity)
     wish = find_owner(palette, per, layers)
     n_channels, is_u8 = palette.shape[-1], palette.dtype == np.uint8
     ground = as_background(background, palette.reshape(-1, n_channels))
     if ground is not None:
         ground = np.ascontiguousarray(np.broadcast_to(ground, (n_channels,)), np.float32)
     shape = (height, width, n_channels)
-    result = np.empty(shape, palette.dtype) if out is None else as_out("out", out, shape, palette.dtype.type)
-    canvas = result if result.flags.carray else np.empty(shape, palette.dtype)
+    result = empty(shape, palette.dtype) if out is None else as_out("out", out, shape, palette.dtype.type)
+    canvas = result if result.flags.carray else empty(shape, palette.dtype)
     rows_at_once = max(1, BAND_BYTES // max(1, 4 * n_layers * width * n_channels))
 
     def draw_rows(first: int, end: int) -> None:

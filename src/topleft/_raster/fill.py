@@ -1,4 +1,8 @@
-"""Fills a picture with the colours of triangles: of the one that shows in a pixel, or blended one after the other."""
+"""Fills a picture with the colours of triangles: of the one that shows in a pixel, or blended one after the other.
+
+Several samples are resolved: what they see is averaged, values or the light that these stand for. With straight alpha
+colours count as much as they are opaque: the mean of premultiplied colours, made straight again.
+"""
 
 from __future__ import annotations
 
@@ -9,17 +13,18 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from topleft import _engine
-from topleft._base.arrays import as_array, as_background, as_colors, shown
+from topleft._base.arrays import apart_from, as_array, as_background, as_colors, shown
+from topleft._base.color import srgb_tables
 from topleft._base.memory import Memory
-from topleft._base.options import Alpha, Blend, Per, Sampling, Sink, parse
+from topleft._base.options import Alpha, Blend, Per, Resolve, Sampling, Sink, parse
 from topleft._base.threads import run_parts
 from topleft._raster import choices
 from topleft._raster.classic import fill_classic, refuse_classic
 from topleft._raster.rasterize import canvas_of, draw, draw_all_samples
-from topleft._raster.resolve import parse_resolve, resolve_colors, resolve_flat, resolve_gouraud
 from topleft._raster.sampling import draw_means, sample_positions
 from topleft._raster.snap import Snapped, snap_mesh
 from topleft._raster.view import View
+from topleft.typing import AlphaOption, BlendOption, PerOption, ResolveOption
 
 __all__ = ["Style", "draw_fill"]
 
@@ -30,11 +35,11 @@ BLEND_CODES = {mode: code for code, mode in enumerate(Blend)}  # tl_blend in csr
 class Style:
     """The options of `fill` besides those that all verbs share, not yet checked."""
 
-    per: str
+    per: PerOption
     background: ArrayLike | None
-    blend: str
-    alpha: str
-    resolve: str
+    blend: BlendOption
+    alpha: AlphaOption
+    resolve: ResolveOption
     dtype: DTypeLike | None = None
 
 
@@ -86,6 +91,7 @@ def draw_fill(
         raise ValueError(
             f"sampling {str(view.sampling)!r} gives no order: fill takes 'center', 'msaa2' to 'msaa16' and 'area'"
         )
+    colors = apart_from(out, "colors", colors)
     if style.dtype is not None:
         return draw_labels(memory, vertices, triangles, colors, view, style, out)
     palette = as_colors(colors)
@@ -308,3 +314,74 @@ def blend_colors(
         )  # fmt: skip
 
     return max(run_parts(blend_part, n_parts, n_parts)) >= 0
+
+
+def parse_resolve(resolve: object, colors: NDArray[Any], view: View, *, is_straight: bool) -> _engine.Transfer | None:
+    """Return what is averaged; None when it is the values as they are.
+
+    Raises
+    ------
+    ValueError
+        If the option is unknown, or light is asked for and the colours are no uint8.
+    """
+    is_linear = parse(Resolve, "resolve", resolve) is Resolve.LINEAR
+    if is_linear and colors.dtype != np.uint8:
+        raise ValueError(
+            f"resolve 'linear' takes sRGB colours of uint8, got {colors.dtype}: float32 is averaged as it is"
+        )
+    n_channels = 1 if colors.ndim == 1 else colors.shape[1]
+    if view.sampling.n_samples == 1 or not (is_linear or is_straight):
+        return None
+    return _engine.Transfer(srgb_tables() if is_linear else None, n_channels - (n_channels in (2, 4)), is_straight)
+
+
+def resolve_flat(
+    labels: NDArray[np.int32],
+    colors: NDArray[Any],
+    pixels: NDArray[Any],
+    transfer: _engine.Transfer | None,
+    n_threads: int,
+) -> None:
+    """Write the mean colour of the triangles that the samples see, labels (S, H, W), over (H, W[, C]) pixels."""
+    palette = _engine.Palette(colors, transfer)
+
+    def resolve_rows(first: int, end: int) -> None:
+        palette.mean_flat(labels, pixels, first, end - first)
+
+    run_parts(resolve_rows, labels.shape[1], n_threads)
+
+
+def resolve_gouraud(
+    memory: Memory,
+    meshes: list[_engine.SnappedMesh],
+    labels: NDArray[np.int32],
+    colors: NDArray[Any],
+    pixels: NDArray[Any],
+    transfer: _engine.Transfer | None,
+    n_threads: int,
+) -> None:
+    """Write the mean of the colours at the samples, interpolated at each of them, over (H, W[, C]) pixels."""
+    n_channels = 1 if colors.ndim == 1 else colors.shape[1]
+    painted = memory.empty("sample colors", (len(labels), *pixels.shape), colors.dtype)
+    palette = _engine.as_bytes(colors)
+
+    def resolve_rows(first: int, end: int) -> None:
+        painted[:, first:end] = pixels[first:end]
+        for mesh, own, picture in zip(meshes, labels, painted, strict=True):
+            flat = _engine.as_bytes(picture)
+            mesh.paint(own, palette, flat, first, end - first, False, colors.dtype == np.uint8, n_channels)
+        _engine.mean_colors(painted, pixels, first, end - first, n_channels, transfer)
+
+    run_parts(resolve_rows, labels.shape[1], n_threads)
+
+
+def resolve_colors(
+    painted: NDArray[Any], pixels: NDArray[Any], transfer: _engine.Transfer | None, n_threads: int
+) -> None:
+    """Write the mean of what the samples hold, (S, H, W[, C]), over (H, W[, C]) pixels."""
+    n_channels = 1 if pixels.ndim == 2 else pixels.shape[2]
+
+    def resolve_rows(first: int, end: int) -> None:
+        _engine.mean_colors(painted, pixels, first, end - first, n_channels, transfer)
+
+    run_parts(resolve_rows, len(pixels), n_threads)

@@ -11,9 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine
 from topleft._base.arrays import as_array, as_number, as_values, shown
-from topleft._base.texels import as_texels, look_up
+from topleft._base.memory import empty
+from topleft._base.texels import as_levels
+from topleft.typing import EncodingOption, FilterOption, WrapOption
 
-__all__ = ["Fragments", "FragmentsBatch", "GivenCorners", "as_sample", "view_of"]
+__all__ = ["Fragments", "GivenCorners", "as_sample", "view_of"]
 
 #: Makes the snapped mesh that attributes of some triangles need: these are snapped, no others.
 PartOfMesh = Callable[..., _engine.SnappedMesh]
@@ -47,20 +49,19 @@ class GivenCorners(NamedTuple):
         (width, height), (x, y, _, w) = self.viewport, np.moveaxis(points, -1, 0)
         return np.stack([(w + x) * (width / 2), (w - y) * (height / 2), w], axis=-1)
 
-    def slopes(self, ids: NDArray[np.int32], weights: NDArray[np.float64]) -> NDArray[np.float64]:
-        """What the weights (P, 3) of pixels in their triangles (P,) change by along x and y, (P, 3, 2) float64.
+    def steps(self, ids: NDArray[np.int32]) -> NDArray[np.float64]:
+        """What l of each corner changes by along x and y, and its w: (N, 3, 3) float64.
 
-        The weights are l / (l0 + l1 + l2), and l = M^-1 (x, y, 1), where the columns of M are the corners.
+        The weights of a pixel are l / (l0 + l1 + l2), and l = M^-1 (x, y, 1), where the columns of M are the corners.
         """
-        unique, of_unique = np.unique(ids, return_inverse=True)
-        corners = self.homogeneous(unique)
+        corners = self.homogeneous(ids)
         crossed = np.cross(np.roll(corners, -1, axis=1), np.roll(corners, -2, axis=1))
         area = np.einsum("nk,nk->n", corners[:, 0], crossed[:, 0])
-        with np.errstate(divide="ignore", invalid="ignore"):
-            steps = (crossed[..., :2] / area[:, None, None])[of_unique]
-            w = np.einsum("pk,pk->p", weights, corners[of_unique][..., 2])
-            slopes = w[:, None, None] * (steps - weights[..., None] * steps.sum(axis=1)[:, None, :])
-        return np.nan_to_num(slopes, nan=0.0, posinf=0.0, neginf=0.0)  # of triangles without area before the snap
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            steps = crossed / area[:, None, None]
+        steps[..., 2] = corners[..., 2]
+        steps[~np.isfinite(steps).all(axis=(1, 2))] = 0  # of triangles without area before the snap
+        return steps
 
 
 class Fragments:
@@ -177,9 +178,9 @@ class Fragments:
         texture: object,
         uv: Any,
         *,
-        filter: str = "trilinear",
-        wrap: str | tuple[str, str] = "repeat",
-        encoding: str | None = None,
+        filter: FilterOption = "trilinear",
+        wrap: WrapOption | tuple[WrapOption, WrapOption] = "repeat",
+        encoding: EncodingOption | None = None,
         background: float = 0.0,
     ) -> NDArray[np.float32]: ...
     def sample(
@@ -187,9 +188,9 @@ class Fragments:
         texture: Any,
         uv: Any = None,
         *,
-        filter: str = "trilinear",  # noqa: A002
-        wrap: str | tuple[str, str] = "repeat",
-        encoding: str | None = None,
+        filter: FilterOption = "trilinear",  # noqa: A002
+        wrap: WrapOption | tuple[WrapOption, WrapOption] = "repeat",
+        encoding: EncodingOption | None = None,
         background: float = 0.0,
     ) -> Any:
         """Return a texture at each visible pixel; or, of a number alone, the fragments at that sample of each pixel.
@@ -238,18 +239,17 @@ class Fragments:
         """
         if uv is None:
             return self._at_sample(texture)
-        texels, filter, wraps, is_flat = as_texels(texture, filter, wrap, encoding)  # noqa: A001
-        mask = self.mask
-        if filter == "trilinear":
+        levels = as_levels(texture, filter, wrap, encoding)
+        ground = as_number("background", background)
+        if len(levels.rows) > 1:
             found, slopes = self.interpolate(uv, derivatives=True)
         else:
             found, slopes = self.interpolate(uv), None
         if found.shape[2:] != (2,):
             raise ValueError(f"uv must have two columns, (V, 2) or (T, 3, 2), got {found.shape[2:] or 'one'}")
-        out = np.full((*mask.shape, texels.shape[2]), as_number("background", background), np.float32)
-        footprint = None if slopes is None else slopes[mask].astype(np.float64)
-        out[mask] = look_up(texels, found[mask].astype(np.float64), footprint, filter, wraps)
-        return out[..., 0] if is_flat else out
+        of_pixels = None if slopes is None else slopes.reshape(-1, 2, 2)
+        out = levels.look_up(self._ids().reshape(-1), found.reshape(-1, 2), of_pixels, ground)
+        return out.reshape(self.id.shape if levels.is_flat else (*self.id.shape, levels.n_channels))
 
     def _at_sample(self, i: int) -> Fragments:
         """Return ids, depth and attributes at one sample of each pixel."""
@@ -322,8 +322,8 @@ class Fragments:
         >>> frags.barycentric()[0, 0]
         array([0.5 , 0.25, 0.25], dtype=float32)
         """
-        out = np.empty((*self.triangle.shape, 3), np.float32)
-        self._snapped.with_inverse_w(self.id.size).barycentric(self._ids(), out)
+        out = empty((*self.triangle.shape, 3), np.float32)
+        self._snapped.with_inverse_w(self.id.size, empty).barycentric(self._ids(), out)
         return out
 
     @overload
@@ -370,16 +370,20 @@ class Fragments:
         array([[0.5, 1.5, 2.5, 0. ],
                [0.5, 1.5, 0. , 0. ]], dtype=float32)
         """
-        array = as_values(values, self._n_vertices, self._n_triangles)
-        found = self._interpolated(array, as_number("background", background))
-        return (found, self._derivatives(array)) if derivatives else found
+        checked = self._checked(values)
+        found = self._interpolated(checked, as_number("background", background))
+        return (found, self._derivatives(checked)) if derivatives else found
+
+    def _checked(self, values: Any) -> Any:
+        """What the two following methods take of an attribute."""
+        return as_values(values, self._n_vertices, self._n_triangles)
 
     def _interpolated(self, array: NDArray[np.float32], background: float) -> NDArray[np.float32]:
         """The attribute of checked values."""
         channels = array.shape[-1] if array.ndim > 1 else 1
-        out: NDArray[Any] = np.empty((*self.triangle.shape, channels), np.float32)
+        out: NDArray[Any] = empty((*self.triangle.shape, channels), np.float32)
         rows = array.reshape(-1, channels) if array.size else np.empty((0, channels), np.float32)
-        snapped = self._snapped.with_inverse_w(self.id.size)
+        snapped = self._snapped.with_inverse_w(self.id.size, empty)
         snapped.interpolate(self._ids(), rows, array.ndim == 3, background, out)
         return out if array.ndim > 1 else out[..., 0]
 
@@ -387,18 +391,23 @@ class Fragments:
         """The derivatives of checked values along x and y, (H, W, K, 2) or (H, W, 2) float32."""
         if self.corners is None:
             raise ValueError("derivatives are those of rasterize and rasterize_mesh, not of layers")
-        mask = self.mask
-        ids = self.triangle[mask]
         channels = array.shape[-1] if array.ndim > 1 else 1
-        out = np.zeros((*mask.shape, channels, 2), np.float32)
-        if ids.size:
-            slopes = self.corners.slopes(ids, self.barycentric()[mask].astype(np.float64))
-            if array.ndim == 3:
-                corners = array[ids]
-            else:
-                rows = np.asarray(as_array("triangles", self.corners.triangles))[ids].astype(np.intp)
-                corners = array.reshape(len(array), -1)[rows]
-            out[mask] = np.einsum("pck,pcd->pkd", corners.astype(np.float64), slopes)
+        out = np.empty((*self.triangle.shape, channels, 2), np.float32)
+        ids = self._ids().reshape(-1)
+        is_seen = np.zeros(self._n_triangles + 1, np.bool_)
+        is_seen[ids] = True  # the last, too, by -1
+        seen = np.flatnonzero(is_seen[:-1]).astype(np.int32)
+        slot = np.empty(self._n_triangles, np.int32)
+        slot[seen] = np.arange(len(seen), dtype=np.int32)
+        if array.ndim == 3:
+            rows = (3 * seen[:, None] + np.arange(3)).astype(np.int32)
+        else:
+            rows = np.asarray(as_array("triangles", self.corners.triangles))[seen].astype(np.int32)
+        _engine.fill_slopes(
+            ids, self.barycentric().reshape(-1, 3), slot, self.corners.steps(seen), rows,
+            array.reshape(-1, channels) if array.size else np.empty((0, channels), np.float32),
+            out.reshape(-1, channels, 2),
+        )  # fmt: skip
         return out if array.ndim > 1 else out[..., 0, :]
 
     @cached_property
@@ -414,74 +423,6 @@ class Fragments:
 
     def _ids(self) -> NDArray[np.int32]:
         return np.require(self.triangle, np.int32, ["C", "A"])
-
-
-class FragmentsBatch(Sequence[Fragments]):
-    """What `rasterize` returns of a batch: a visibility buffer for each of B poses, behind each other.
-
-    Attributes
-    ----------
-    triangle : ndarray of int32, shape (B, H, W)
-        Index of the triangle that shows in the pixel, -1 where there is none.
-    depth : ndarray of float32, shape (B, H, W)
-        Its depth.
-    """
-
-    def __init__(self, triangle: NDArray[np.int32], depth: NDArray[np.float32], frags: Sequence[Fragments]) -> None:
-        self.triangle, self.depth = triangle, depth
-        self._frags = tuple(frags)
-
-    def __repr__(self) -> str:
-        n, height, width = self.triangle.shape
-        return f"FragmentsBatch({n} of {width}x{height})"
-
-    def __len__(self) -> int:
-        return len(self._frags)
-
-    @overload
-    def __getitem__(self, i: int) -> Fragments: ...
-    @overload
-    def __getitem__(self, i: slice) -> Sequence[Fragments]: ...
-    def __getitem__(self, i: int | slice) -> Fragments | Sequence[Fragments]:
-        """Return one of them, whose arrays are views."""
-        return self._frags[i]
-
-    @property
-    def mask(self) -> NDArray[np.bool_]:
-        """Where there is a triangle, bool (B, H, W)."""
-        return self.triangle >= 0
-
-    def barycentric(self) -> NDArray[np.float32]:
-        """Return the weights of the triangles' vertices, (B, H, W, 3) float32; see `Fragments.barycentric`."""
-        return self._stacked([frags.barycentric() for frags in self], (3,))
-
-    def interpolate(self, values: ArrayLike, *, background: float = 0.0) -> NDArray[np.float32]:
-        """Return an attribute of the vertices at each visible pixel, (B, H, W, K) or (B, H, W) float32.
-
-        Parameters
-        ----------
-        values : array_like of real numbers
-            Those of all, as `Fragments.interpolate` takes them, (V, K), say; or with a leading axis of B, (B, V, K).
-        background : float
-            Value where there is no triangle.
-
-        Raises
-        ------
-        ValueError
-            If there are neither one nor B arrays of values, or they do not fit.
-        """
-        array = as_array("values", values)
-        has_own = array.ndim == 4 or (array.ndim == 3 and array.shape[1] == (self[0]._n_vertices if self else 0))
-        if has_own and len(array) != len(self):
-            raise ValueError(f"values must be those of all, or {len(self)} of them, got {len(array)}")
-        own = array if has_own else [array] * len(self)
-        channels = array.shape[(2 if array.ndim == 3 and has_own else array.ndim - 1) :] if array.ndim > 1 else ()
-        found = [frags.interpolate(one, background=background) for frags, one in zip(self, own, strict=True)]
-        return self._stacked(found, channels)
-
-    def _stacked(self, found: list[NDArray[np.float32]], channels: tuple[int, ...]) -> NDArray[np.float32]:
-        shape = *self.triangle.shape, *channels
-        return np.stack(found) if found else np.empty(shape, np.float32)
 
 
 def as_sample(i: object, n: int) -> int:

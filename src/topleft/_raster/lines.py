@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine
-from topleft._base.arrays import as_array, as_number
+from topleft._base.arrays import apart_from, as_array, as_number
 from topleft._base.memory import Memory
 from topleft._base.options import DepthTest, parse
 from topleft._base.threads import count_threads, run_parts
@@ -20,6 +20,7 @@ from topleft._raster.fragments import Fragments
 from topleft._raster.rasterize import canvas_of
 from topleft._raster.snap import Snapped, snap_mesh
 from topleft._raster.view import View
+from topleft.typing import DepthTestOption
 
 __all__ = ["draw_wireframe"]
 
@@ -55,7 +56,7 @@ def draw_wireframe(
     triangles: ArrayLike,
     view: View,
     depth: object,
-    depth_test: str,
+    depth_test: DepthTestOption,
     depth_bias: float,
     antialias: bool,
     out: object,
@@ -63,6 +64,7 @@ def draw_wireframe(
     """`wireframe`, on the memory given."""
     width, height = view.size
     hides = as_depth(depth, (height, width))
+    hides = None if hides is None else np.asarray(apart_from(out, "depth", hides))
     is_farthest = parse(DepthTest, "depth_test", depth_test) is DepthTest.GREATER
     bias = as_number("depth_bias", depth_bias)
     if not math.isfinite(bias):

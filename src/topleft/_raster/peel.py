@@ -22,6 +22,7 @@ from topleft._raster.classic import refuse_classic
 from topleft._raster.fragments import Fragments
 from topleft._raster.snap import Snapped, snap_mesh
 from topleft._raster.view import View, ViewOptions
+from topleft.typing import DepthTestOption
 
 __all__ = ["DepthLayers", "check_peel", "peel", "peel_meshes"]
 
@@ -93,10 +94,10 @@ class DepthLayers:
 def peel(
     vertices: ArrayLike,
     triangles: ArrayLike,
-    size: tuple[int, int],
+    size: int | tuple[int, int],
     *,
     layers: int = 4,
-    depth_test: str = "less",
+    depth_test: DepthTestOption = "less",
     **view: Unpack[ViewOptions],
 ) -> DepthLayers:
     """Return the nearest layers of every pixel: ids and depths, sorted, as depth peeling gives them.

@@ -5,7 +5,7 @@ Each verb checks what it is asked for, snaps the mesh (transform, index, snap, c
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any, NamedTuple, cast
@@ -14,18 +14,19 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine
-from topleft._base.arrays import as_array, as_number, as_out
-from topleft._base.memory import FRESH, Memory
+from topleft._base.arrays import as_number, as_out
+from topleft._base.memory import FRESH, Memory, empty
 from topleft._base.options import DepthTest, Sampling, Sink, parse
-from topleft._base.threads import available_threads, count_threads, run_parts
+from topleft._base.threads import count_threads, run_parts
 from topleft._raster import choices
 from topleft._raster.choices import Drawing, Route
 from topleft._raster.classic import draw_classic, refuse_classic
 from topleft._raster.cluster_draw import ClusteredMesh, draw_clustered
-from topleft._raster.fragments import Fragments, FragmentsBatch, GivenCorners
+from topleft._raster.fragments import Fragments, GivenCorners
 from topleft._raster.sampling import draw_planes, sample_positions, sum_areas
 from topleft._raster.snap import Snapped, snap_mesh
-from topleft._raster.view import View, ViewOptions
+from topleft._raster.view import View
+from topleft.typing import DepthTestOption
 
 __all__ = ["canvas_of", "draw", "draw_all_samples", "draw_coverage", "draw_fragments", "draw_overdraw"]
 
@@ -108,7 +109,7 @@ def open_canvas(
 ) -> tuple[NDArray[Any], NDArray[Any]]:
     """Return the array to return, and a contiguous aligned one: the same wherever that one is."""
     result = memory.empty(name, shape, dtype) if out is None else as_out("out", out, shape, dtype)
-    return result, result if result.flags.carray else np.empty(shape, dtype)
+    return result, result if result.flags.carray else empty(shape, dtype)
 
 
 def draw_area(
@@ -238,7 +239,7 @@ def draw_fragments(
     vertices: ArrayLike,
     triangles: ArrayLike,
     view: View,
-    depth_test: str | None,
+    depth_test: DepthTestOption | None,
     background_depth: float | None,
     out: object,
 ) -> Fragments:
@@ -253,70 +254,6 @@ def draw_fragments(
     snapped = snap_mesh(memory, vertices, triangles, view, with_depth=True, out=out)
     route, drawing = choices.route(view, snapped, asked.test, wants_depth=asked.depth_out is not None)
     return ROUTES[route](memory, snapped, view, asked, drawing).drawn_from(corners)
-
-
-def n_poses(vertices: object, transform: object) -> int | None:
-    """How many poses vertices (B, V, C) or transforms (B, 4, 4) have; None where they have no leading axis."""
-    counts = {}
-    for name, array in (("vertices", vertices), ("transform", transform)):
-        shape = getattr(array, "shape", ())
-        if len(shape) == 3 or depth_of_lists(array) == 3:
-            counts[name] = len(cast("Sequence[Any]", array))
-    if len(set(counts.values())) > 1:
-        raise ValueError(f"vertices and transform must have one number of poses, got {counts}")
-    return next(iter(counts.values()), None)
-
-
-def depth_of_lists(values: object) -> int:
-    """How many axes nested lists have, told by their first items."""
-    if isinstance(values, list | tuple):
-        return 1 + (depth_of_lists(values[0]) if values else 0)
-    return 0
-
-
-def draw_batch(
-    n: int,
-    vertices: ArrayLike,
-    triangles: ArrayLike,
-    size: object,
-    options: ViewOptions,
-    depth_test: str | None,
-    background_depth: float | None,
-    out: object,
-) -> FragmentsBatch:
-    """`rasterize` of n poses: each is drawn by one thread, so many side by side as there are.
-
-    Raises
-    ------
-    ValueError
-        If several samples a pixel, or a plan, are asked for; else as `rasterize`.
-    """
-    view = View.parse(size, options, takes_exact=True)
-    asked = Asked.parse(depth_test, background_depth, out)
-    if view.sampling is not Sampling.CENTER:
-        raise ValueError(f"sampling must be 'center' for a batch, got {str(view.sampling)!r}")
-    if view.plan is not None:
-        raise ValueError("plan is for one pose: a batch takes none")
-    shape = (n, *view.size[::-1])
-    ids = np.empty(shape, np.int32) if asked.ids_out is None else as_out("out triangle", asked.ids_out, shape, np.int32)
-    planes = asked.depth_out
-    depth = np.empty(shape, np.float32) if planes is None else as_out("out depth", planes, shape, np.float32)
-    points = as_array("vertices", vertices)
-    matrices = None if view.transform is None else as_array("transform", view.transform)
-    n_threads = min(n, available_threads() if view.threads is None else view.threads)
-    one = replace(view, threads=1) if n_threads > 1 else view
-
-    def draw_some(first: int, end: int) -> list[Fragments]:
-        found = []
-        for i in range(first, end):
-            own = points[i] if points.ndim == 3 else points
-            transform = matrices[i] if matrices is not None and matrices.ndim == 3 else matrices
-            pose, arrays = replace(one, transform=transform), (ids[i], depth[i])
-            found.append(draw_fragments(FRESH, own, triangles, pose, depth_test, background_depth, arrays))
-        return found
-
-    drawn = [frags for part in run_parts(draw_some, n, n_threads) for frags in part] if n else []
-    return FragmentsBatch(ids, depth, drawn)
 
 
 def draw_labels(memory: Memory, snapped: Snapped, view: View, asked: Asked, drawing: Drawing) -> Fragments:

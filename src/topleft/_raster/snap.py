@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine
-from topleft._base.arrays import as_matrix, as_triangles, as_vertices, bad_triangle
-from topleft._base.memory import Memory
+from topleft._base.arrays import apart_from, as_matrix, as_triangles, as_vertices, bad_triangle
+from topleft._base.memory import Memory, empty
 from topleft._base.threads import run_parts
 from topleft._raster import choices
 from topleft._raster.view import View
@@ -94,7 +94,8 @@ def snap_mesh(
     """
     if view.is_exact:
         return take_mesh(memory, vertices, triangles, view, with_depth=with_depth, out=out)
-    points, source = transform(vertices, view)
+    points, source = transform(vertices, view, out)
+    triangles = apart_from(out, "triangles", triangles)
     indices, bad_row = index(memory, triangles, len(points), view)
     view.mark("input")
     n = len(points) if len(indices) and 0 not in view.size else 0
@@ -131,7 +132,8 @@ def take_mesh(
 
     Indices and positions are checked while drawing, or here where an error may not leave a trace in the caller's `out`.
     """
-    points, source = transform(vertices, view)
+    points, source = transform(vertices, view, out)
+    triangles = apart_from(out, "triangles", triangles)
     if source.is_clip_space:
         raise ValueError("vertices must be pixels, (V, 2) or (V, 3) without transform, for subpixel_bits 'exact'")
     indices, bad_row = index(memory, triangles, len(points), view)
@@ -172,9 +174,9 @@ def take_points(
     return taken, sum(run_parts(take_part, n, choices.threads_to_snap(view.threads, n, n_triangles)))
 
 
-def transform(vertices: ArrayLike, view: View) -> tuple[NDArray[Any], _engine.Source]:
+def transform(vertices: ArrayLike, view: View, out: object = None) -> tuple[NDArray[Any], _engine.Source]:
     """Return vertices as a contiguous array, and the same with the matrix that the snap applies to each of them."""
-    points = as_vertices(vertices, has_transform=view.transform is not None)
+    points = as_vertices(apart_from(out, "vertices", vertices), has_transform=view.transform is not None)
     if view.transform is None:
         return points, _engine.Source(points)
     matrix = as_matrix(view.transform, points.dtype)
@@ -224,7 +226,7 @@ def snap(
     counts = run_parts(snap_part, n, choices.threads_to_snap(view.threads, n, n_triangles))
     n_bad, n_wide, n_clipped = map(sum, zip(*counts, strict=True))
     if n_wide:
-        wide = np.empty((n, 2), np.int64)
+        wide = empty((n, 2), np.int64)
         snap_part(0, n)
     return Vertices(records, wide, n_bad, n_clipped)
 
@@ -233,7 +235,7 @@ def without_sides(
     mesh: _engine.SnappedMesh, triangles: NDArray[np.int32], is_single: NDArray[np.uint8], threads: int | None
 ) -> NDArray[np.int32]:
     """Return triangles, those collapsed that are single-sided and turned the way that the mesh culls."""
-    left = np.empty_like(triangles)
+    left: NDArray[np.int32] = empty(triangles.shape, np.int32)
     n_parts = choices.threads_to_convert(threads, len(triangles))
     run_parts(lambda first, end: mesh.drop_sides(is_single, first, end, left), len(triangles), n_parts)
     return left

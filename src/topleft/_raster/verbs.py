@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+from threading import Lock
 from typing import Any, Unpack, cast
 
 import numpy as np
@@ -13,8 +15,10 @@ from topleft._base.threads import parse_threads
 from topleft._raster.fill import Style, draw_fill
 from topleft._raster.fragments import Fragments
 from topleft._raster.lines import draw_wireframe
-from topleft._raster.rasterize import draw_batch, draw_coverage, draw_fragments, draw_overdraw, n_poses
+from topleft._raster.poses import draw_batch, n_poses
+from topleft._raster.rasterize import draw_coverage, draw_fragments, draw_overdraw
 from topleft._raster.view import View, ViewOptions
+from topleft.typing import AlphaOption, BlendOption, DepthTestOption, PerOption, ResolveOption
 
 __all__ = ["Rasterizer", "coverage", "fill", "overdraw", "rasterize", "wireframe"]
 
@@ -139,11 +143,11 @@ def fill(
     colors: ArrayLike,
     size: int | tuple[int, int],
     *,
-    per: str = "auto",
+    per: PerOption = "auto",
     background: ArrayLike | None = None,
-    blend: str = "replace",
-    alpha: str = "straight",
-    resolve: str = "values",
+    blend: BlendOption = "replace",
+    alpha: AlphaOption = "straight",
+    resolve: ResolveOption = "values",
     dtype: DTypeLike | None = None,
     out: NDArray[Any] | None = None,
     **view: Unpack[ViewOptions],
@@ -218,7 +222,7 @@ def rasterize(
     triangles: ArrayLike,
     size: int | tuple[int, int],
     *,
-    depth_test: str | None = "less",
+    depth_test: DepthTestOption | None = "less",
     background_depth: float | None = None,
     out: tuple[NDArray[np.int32] | None, NDArray[np.float32] | None] | None = None,
     **view: Unpack[ViewOptions],
@@ -291,7 +295,7 @@ def wireframe(
     size: int | tuple[int, int],
     *,
     depth: Fragments | NDArray[np.float32] | None = None,
-    depth_test: str = "less",
+    depth_test: DepthTestOption = "less",
     depth_bias: float = 2.0**-10,
     antialias: bool = False,
     out: NDArray[Any] | None = None,
@@ -354,11 +358,25 @@ def wireframe(
     return draw_wireframe(SCRATCH, vertices, triangles, checked, depth, depth_test, depth_bias, antialias, out)
 
 
+class Turn:
+    """One call at a time: what comes meanwhile is refused."""
+
+    def __init__(self) -> None:
+        self._lock = Lock()
+
+    def __enter__(self) -> None:
+        if not self._lock.acquire(blocking=False):
+            raise RuntimeError("a Rasterizer draws one picture at a time, and this one draws: give each thread its own")
+
+    def __exit__(self, *_: object) -> None:
+        self._lock.release()
+
+
 class Rasterizer:
     """The five verbs for one size, on memory that is kept from call to call.
 
     What a verb returns is overwritten by the next call of the same verb; copy what must last. Not for use from several
-    threads at once: give each its own.
+    threads at once: give each its own. A copy, and one that has been pickled, has memory of its own.
 
     Parameters
     ----------
@@ -379,6 +397,10 @@ class Rasterizer:
         self.size = as_size(size)
         self.threads = parse_threads(threads)
         self._memory = KeptMemory()
+        self._turn = Turn()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return partial(type(self), threads=self.threads), (self.size,)
 
     def __repr__(self) -> str:
         return f"Rasterizer(size={self.size}, threads={self.threads})"
@@ -391,13 +413,15 @@ class Rasterizer:
         self, vertices: ArrayLike, triangles: ArrayLike, *, out: NDArray[Any] | None = None, **view: Unpack[ViewOptions]
     ) -> NDArray[Any]:
         """Return the mask of the pixels that a triangle covers, as `topleft.coverage` does."""
-        return draw_coverage(self._memory, vertices, triangles, self._view(view), out)
+        with self._turn:
+            return draw_coverage(self._memory, vertices, triangles, self._view(view), out)
 
     def overdraw(
         self, vertices: ArrayLike, triangles: ArrayLike, *, out: NDArray[Any] | None = None, **view: Unpack[ViewOptions]
     ) -> NDArray[Any]:
         """Return how many triangles cover each pixel, as `topleft.overdraw` does."""
-        return draw_overdraw(self._memory, vertices, triangles, self._view(view), out)
+        with self._turn:
+            return draw_overdraw(self._memory, vertices, triangles, self._view(view), out)
 
     def fill(
         self,
@@ -405,31 +429,35 @@ class Rasterizer:
         triangles: ArrayLike,
         colors: ArrayLike,
         *,
-        per: str = "auto",
+        per: PerOption = "auto",
         background: ArrayLike | None = None,
-        blend: str = "replace",
-        alpha: str = "straight",
-        resolve: str = "values",
+        blend: BlendOption = "replace",
+        alpha: AlphaOption = "straight",
+        resolve: ResolveOption = "values",
         dtype: DTypeLike | None = None,
         out: NDArray[Any] | None = None,
         **view: Unpack[ViewOptions],
     ) -> NDArray[Any]:
         """Return a picture of coloured triangles in painter's order, as `topleft.fill` does."""
         style = Style(per, background, blend, alpha, resolve, dtype)
-        return draw_fill(self._memory, vertices, triangles, colors, self._view(view), style, out)
+        with self._turn:
+            return draw_fill(self._memory, vertices, triangles, colors, self._view(view), style, out)
 
     def rasterize(
         self,
         vertices: ArrayLike,
         triangles: ArrayLike,
         *,
-        depth_test: str | None = "less",
+        depth_test: DepthTestOption | None = "less",
         background_depth: float | None = None,
         out: tuple[NDArray[np.int32] | None, NDArray[np.float32] | None] | None = None,
         **view: Unpack[ViewOptions],
     ) -> Fragments:
         """Return the visibility buffer, as `topleft.rasterize` does; its attributes also end with the next call."""
-        return draw_fragments(self._memory, vertices, triangles, self._view(view), depth_test, background_depth, out)
+        with self._turn:
+            return draw_fragments(
+                self._memory, vertices, triangles, self._view(view), depth_test, background_depth, out
+            )
 
     def wireframe(
         self,
@@ -437,7 +465,7 @@ class Rasterizer:
         triangles: ArrayLike,
         *,
         depth: Fragments | NDArray[np.float32] | None = None,
-        depth_test: str = "less",
+        depth_test: DepthTestOption = "less",
         depth_bias: float = 2.0**-10,
         antialias: bool = False,
         out: NDArray[Any] | None = None,
@@ -445,4 +473,7 @@ class Rasterizer:
     ) -> NDArray[Any]:
         """Return the edges of the triangles as lines, as `topleft.wireframe` does."""
         checked = self._view(view, takes_exact=False)
-        return draw_wireframe(self._memory, vertices, triangles, checked, depth, depth_test, depth_bias, antialias, out)
+        with self._turn:
+            return draw_wireframe(
+                self._memory, vertices, triangles, checked, depth, depth_test, depth_bias, antialias, out
+            )

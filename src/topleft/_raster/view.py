@@ -14,6 +14,7 @@ from topleft._base.options import ClipDepth, Cull, Sampling, parse
 from topleft._base.threads import parse_threads
 from topleft._raster.sampling import SAMPLE_GRID_BITS
 from topleft.methods import Method, find_method
+from topleft.typing import ClipDepthOption, CullOption, MethodOption, SamplingOption
 
 if TYPE_CHECKING:
     from topleft._raster.clusters import Clusters
@@ -38,25 +39,31 @@ class Planned(Protocol):
     def find_clusters(self, vertices: ArrayLike) -> Clusters | None:
         """Return vertices and triangles in clusters, if the plan is for a mesh that does not change and has these."""
 
-    def mark(self, stage: str) -> None:
-        """Note that a stage has ended."""
+    def mark(self, stage: str) -> None:  # noqa: ARG002
+        """Note that a stage has ended: nothing, unless a plan measures."""
+        return
 
 
-class ViewOptions(TypedDict, total=False):
-    """The options that all verbs share; `docs/design/rules.md` tells what each does."""
+class WindowOptions(TypedDict, total=False):
+    """Options of a view of a mesh that no verb names itself."""
 
-    transform: ArrayLike | None
     origin: tuple[int, int]
     viewport: tuple[int, int] | None
     subpixel_bits: int | Literal["exact"]
-    sampling: str
-    method: str
-    cull: str
-    clip_depth: str
+    method: MethodOption
+    clip_depth: ClipDepthOption
     near_clip: bool
     far_clip: bool
-    threads: int | None
     plan: Any
+
+
+class ViewOptions(WindowOptions, total=False):
+    """The options that all verbs share; `docs/design/rules.md` tells what each does."""
+
+    transform: ArrayLike | None
+    sampling: SamplingOption
+    cull: CullOption
+    threads: int | None
 
 
 OPTIONS = frozenset(ViewOptions.__annotations__)

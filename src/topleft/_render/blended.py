@@ -25,14 +25,15 @@ from topleft._base.memory import SCRATCH
 from topleft._camera.camera import Camera
 from topleft._model.material import AlphaMode, Material
 from topleft._model.mesh import Mesh, has_opacity, is_laid
-from topleft._model.scene import Instance, Scene
 from topleft._raster.peel import peel_meshes
 from topleft._raster.rasterize import refuse_many
 from topleft._raster.view import View
-from topleft._render.fragments import SceneFragments, meshes_of, parts_of, scene_of
+from topleft._render.fragments import SceneFragments, parts_of
 from topleft._render.holes import without_holes
 from topleft._render.instances import PlacedScene, draw_nearest, place
 from topleft._render.scene_shade import shade_by, shade_part
+from topleft._scene.scene import Instance, Scene
+from topleft._scene.subject import meshes_of, scene_of
 from topleft._shade.shade import Shading, ShadingOptions
 
 __all__ = ["draw_blended", "is_blended"]
@@ -49,7 +50,7 @@ LAYERS, MOST_LAYERS = 4, 16
 
 CLEAR = (0, 0, 0, 0)
 
-COLORED = Material(alpha_mode=AlphaMode.BLEND)
+COLORED = Material(alpha_mode="blend")
 """Of a mesh with nothing but colours, which means their alpha."""
 
 
@@ -73,12 +74,10 @@ def has_opaque_rest(material: Material, mesh: Mesh) -> bool:
     return material.opacity == 1 and not (texture is not None and texture.has_alpha)
 
 
-def is_blended(subject: Mesh | Scene, material: Material | None, shading: str = "smooth") -> bool:
+def is_blended(subject: Mesh | Scene, options: ShadingOptions) -> bool:
     """Whether a picture of the subject has to be drawn by `draw_blended`."""
-    return (
-        isinstance(shading, str)
-        and shading in BLENDING
-        and any(blended_triangles(mesh, material) is not None for mesh in meshes_of(subject))
+    return options.mode in BLENDING and any(
+        blended_triangles(mesh, options.material) is not None for mesh in meshes_of(subject)
     )
 
 

@@ -9,26 +9,28 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal, TypeVar, cast, overload
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
 import numpy.typing as npt
 from numpy.typing import NDArray
 
 from topleft._base.arrays import as_array, shown
+from topleft._base.memory import empty
 from topleft._camera.camera import Camera
 from topleft._model.mesh import Mesh
-from topleft._model.scene import Instance, Scene
 from topleft._raster.fragments import Fragments, Viewer, as_sample, view_of
 from topleft._raster.peel import DepthLayers
 from topleft._render.bend import BentMesh
+from topleft._scene.scene import Instance, Scene
+from topleft._scene.subject import meshes_of
 
 if TYPE_CHECKING:
     from topleft._render.instances import PlacedScene
 
 __all__ = [
     "BentFragments", "Part", "SceneDepthLayers", "SceneFragments", "VisiblePart", "camera_of", "drawn_of", "join",
-    "meshes_of", "parts_of", "scene_of",
+    "parts_of",
 ]  # fmt: skip
 
 WHOLE = slice(None), slice(None)
@@ -89,7 +91,7 @@ def join(
     """A picture made part by part; what is made of a part that is all of it is returned, not copied."""
     if len(parts) == 1 and parts[0].box == WHOLE:
         return make(parts[0])
-    picture = np.empty(shape, dtype)
+    picture = empty(shape, dtype)
     picture[...] = background
     for part in parts:
         picture[part.box][part.seen] = make(part)[part.seen]
@@ -101,22 +103,29 @@ def drawn_of(frags: Fragments, mesh: Mesh) -> tuple[Fragments, Mesh]:
     return (frags.drawn, frags.bent.mesh_of(mesh)) if isinstance(frags, BentFragments) else (frags, mesh)
 
 
-def meshes_of(subject: Mesh | Scene) -> list[Mesh]:
-    """The mesh of each instance."""
-    return [subject] if isinstance(subject, Mesh) else [instance.mesh for instance in subject]
-
-
-def scene_of(subject: Mesh | Scene) -> Scene:
-    """The scene, or that of a mesh alone."""
-    return subject if isinstance(subject, Scene) else Scene([subject])
-
-
 def camera_of(camera: Camera, instance: Instance) -> Camera:
     """The camera as it stands in the object space of an instance."""
     return replace(camera, view=camera.view @ instance.transform)
 
 
-class SceneFragments(Fragments):
+class InstanceIds:
+    """What ids of triangles of all instances tell, of a buffer or of layers."""
+
+    id: NDArray[np.int32]
+    placed: Any
+
+    @cached_property
+    def instance(self) -> NDArray[np.int32]:
+        """Index of the instance that shows, int32, -1 where there is none."""
+        return instance_of_ids(self.id, self.placed.whole_first_ids)
+
+    @cached_property
+    def triangle(self) -> NDArray[np.int32]:
+        """Index of the triangle in its mesh, int32, -1 where there is none."""
+        return local_ids(self.id, self.instance, self.placed.whole_first_ids)
+
+
+class SceneFragments(InstanceIds, Fragments):
     """What `rasterize_mesh` returns of a `Scene`.
 
     An instance is snapped again when an attribute of it is asked for.
@@ -130,7 +139,7 @@ class SceneFragments(Fragments):
     id : ndarray of int32, shape (H, W)
         The triangles of all instances counted in their order: the number that decides ties.
     depth, mask
-        As in `Fragments`.
+        As in `Fragments`. `interpolate` takes a sequence of arrays, one of each instance, all with as many channels.
     samples_instance, samples_triangle, samples_id, samples_depth : ndarray, shape (H, W, S)
         The same for each sample, with several a pixel.
     """
@@ -160,16 +169,6 @@ class SceneFragments(Fragments):
     def whole(self) -> Scene:
         """The scene that ids count the triangles of."""
         return self.placed.whole
-
-    @cached_property
-    def instance(self) -> NDArray[np.int32]:
-        """Index of the instance that shows in each pixel, int32 (H, W), -1 where there is none."""
-        return instance_of_ids(self.id, self.placed.whole_first_ids)
-
-    @cached_property
-    def triangle(self) -> NDArray[np.int32]:
-        """Index of the triangle in its mesh, int32 (H, W), -1 where there is none."""
-        return local_ids(self.id, self.instance, self.placed.whole_first_ids)
 
     @cached_property
     def samples_instance(self) -> NDArray[np.int32]:
@@ -232,37 +231,7 @@ class SceneFragments(Fragments):
         values = [-(mesh.vertices @ row[:3] + row[3]) for mesh, row in zip(meshes, rows, strict=True)]
         return self.interpolate(values, background=np.inf)
 
-    @overload
-    def interpolate(
-        self, values: Any, *, background: float = 0.0, derivatives: Literal[False] = False
-    ) -> NDArray[np.float32]: ...
-    @overload
-    def interpolate(
-        self, values: Any, *, background: float = 0.0, derivatives: Literal[True]
-    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]: ...
-    def interpolate(
-        self, values: Any, *, background: float = 0.0, derivatives: bool = False
-    ) -> NDArray[np.float32] | tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Return an attribute of the vertices at each visible pixel, and what it changes by from pixel to pixel.
-
-        Parameters
-        ----------
-        values : sequence of array_like
-            One of each instance, as `Fragments.interpolate` takes it; all with as many channels.
-        background : float
-            Value where there is no triangle.
-        derivatives : bool
-            Whether to return the derivatives, too; as `Fragments.interpolate` does.
-
-        Returns
-        -------
-        ndarray of float32, shape (H, W, K), or (H, W) for values of shape (V,)
-
-        Raises
-        ------
-        ValueError
-            If the number of arrays is not that of the instances, or they fit neither these nor each other.
-        """
+    def _checked(self, values: Any) -> list[NDArray[Any]]:
         n = len(self.whole)
         if not isinstance(values, Iterable):
             raise TypeError(f"values must be one array for each of {n} instances, got {shown(values)}")
@@ -272,18 +241,22 @@ class SceneFragments(Fragments):
         shapes = {() if array.ndim < 2 else array.shape[-1:] for array in arrays}
         if len(shapes) > 1:
             raise ValueError(f"values must have as many channels for each instance, got {sorted(shapes)}")
-        shape = *self.id.shape, *shapes.pop()
-        found = join(
+        return arrays
+
+    def _interpolated(self, arrays: list[NDArray[Any]], background: float) -> NDArray[np.float32]:  # type: ignore[override]
+        """The attribute, part by part."""
+        shape = *self.id.shape, *arrays[0].shape[1:][-1:]
+        return join(
             self.parts, shape, background, lambda part: part.frags.interpolate(arrays[part.i], background=background)
         )
-        if not derivatives:
-            return found
-        return found, join(
-            self.parts, (*shape, 2), 0.0, lambda part: part.frags.interpolate(arrays[part.i], derivatives=True)[1]
-        )
+
+    def _derivatives(self, arrays: list[NDArray[Any]]) -> NDArray[np.float32]:  # type: ignore[override]
+        """The derivatives, part by part."""
+        shape = *self.id.shape, *arrays[0].shape[1:][-1:], 2
+        return join(self.parts, shape, 0.0, lambda part: part.frags.interpolate(arrays[part.i], derivatives=True)[1])
 
 
-class SceneDepthLayers(DepthLayers):
+class SceneDepthLayers(InstanceIds, DepthLayers):
     """The nearest layers of every pixel of a `Scene`.
 
     Attributes
@@ -310,19 +283,9 @@ class SceneDepthLayers(DepthLayers):
         return
 
     @property
-    def id(self) -> NDArray[np.int32]:
+    def id(self) -> NDArray[np.int32]:  # type: ignore[override]  # none assigns it
         """The triangles of all instances counted in their order, int32 (H, W, K)."""
         return np.moveaxis(self.planes[0], 0, -1)
-
-    @cached_property
-    def instance(self) -> NDArray[np.int32]:
-        """Index of the instance of each layer, int32 (H, W, K)."""
-        return instance_of_ids(self.id, self.placed.whole_first_ids)
-
-    @cached_property
-    def triangle(self) -> NDArray[np.int32]:
-        """Index of the triangle in its mesh, int32 (H, W, K)."""
-        return local_ids(self.id, self.instance, self.placed.whole_first_ids)
 
     def layer(self, k: int) -> SceneFragments:
         """Return layer k, 0 the nearest, as a visibility buffer of its own: attributes are computed there."""

@@ -15,15 +15,16 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft import _engine
+from topleft._base.memory import empty
 from topleft._base.threads import run_parts, threads_for
 from topleft._camera.camera import Camera
 from topleft._model.mesh import Mesh
-from topleft._model.scene import Scene
 from topleft._raster.fragments import Fragments
 from topleft._raster.verbs import Rasterizer
 from topleft._render.fragments import VisiblePart, join, parts_of
 from topleft._render.holes import has_cuts, without_holes
 from topleft._render.render import rasterize_subject
+from topleft._scene.scene import Scene
 
 __all__ = ["GBuffer", "PointKind", "evaluate", "points_of", "project"]
 
@@ -59,12 +60,12 @@ def evaluate(
     frags, mesh = part.drawn
     ids = np.require(frags.triangle, np.int32, ["C", "A"])
     n = N_NUMBERS.get(what, len(rows))
-    out: npt.NDArray[Any] = np.empty((*ids.shape, n)[: 2 if n == 1 else 3], dtype)
+    out: npt.NDArray[Any] = empty((*ids.shape, n)[: 2 if n == 1 else 3], dtype)
     half_size = size[0] / 2, size[1] / 2
     points = _engine.PixelPoints(
         mesh.vertices, what, np.ascontiguousarray(rows), half_size, background, dtype is np.float64
     )
-    scene = frags._snapped.with_inverse_w(ids.size)
+    scene = frags._snapped.with_inverse_w(ids.size, empty)
     n_threads = threads_for(threads, len(mesh.triangles))
     run_parts(lambda first, end: points.fill(scene, ids, out, first, end - first), len(ids), n_threads)
     return out

@@ -18,11 +18,12 @@ from topleft._base.threads import threads_for
 from topleft._camera.camera import Camera
 from topleft._model.material import Material
 from topleft._model.mesh import Mesh
-from topleft._model.scene import Instance, Scene
 from topleft._raster.fragments import Fragments
 from topleft._render.bend import BentMesh
-from topleft._render.fragments import BentFragments, SceneFragments, camera_of, drawn_of, meshes_of, scene_of
+from topleft._render.fragments import BentFragments, SceneFragments, camera_of, drawn_of
 from topleft._render.instances import PlacedScene
+from topleft._scene.scene import Instance, Scene
+from topleft._scene.subject import meshes_of, scene_of
 from topleft._shade.alpha_test import Cut, cut_of, cut_out, draw_cut
 
 __all__ = ["Holed", "cut_scene", "draw_holed", "has_cuts", "holed_instances", "solid_scene", "without_holes"]

@@ -15,12 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from topleft import _engine
-from topleft._base.memory import FRESH, SCRATCH, KeptMemory
+from topleft._base.memory import FRESH, SCRATCH, KeptMemory, empty
 from topleft._base.options import DepthTest, Sampling, Sink, parse
 from topleft._base.threads import count_threads, run_parts
 from topleft._camera.camera import Camera
 from topleft._model.material import Material
-from topleft._model.scene import Scene
 from topleft._raster import choices
 from topleft._raster.classic import refuse_classic
 from topleft._raster.cluster_draw import ClusteredMesh, draw_clustered
@@ -33,6 +32,8 @@ from topleft._raster.snap import Snapped, snap_mesh
 from topleft._raster.view import View, ViewOptions
 from topleft._render.fragments import SceneDepthLayers, SceneFragments
 from topleft._render.through_lens import DrawnScene, scene_through
+from topleft._scene.scene import Scene
+from topleft.typing import DepthTestOption
 
 __all__ = ["PlacedScene", "draw_nearest", "draw_scene", "draw_scene_coverage", "peel_scene", "place"]
 
@@ -273,7 +274,7 @@ def draw_scene(
     camera: Camera,
     size: tuple[int, int],
     *,
-    depth_test: str | None = "less",
+    depth_test: DepthTestOption | None = "less",
     background_depth: float | None = None,
     material: Material | None = None,
     **options: Any,
@@ -308,7 +309,7 @@ def peel_scene(
     size: tuple[int, int],
     *,
     layers: int = 4,
-    depth_test: str = "less",
+    depth_test: DepthTestOption = "less",
     material: Material | None = None,
     **options: Any,
 ) -> SceneDepthLayers:
@@ -350,7 +351,7 @@ def draw_scene_coverage(
 def add_areas(placed: PlacedScene, view: View, canvas: NDArray[np.float32]) -> None:
     """Write the sum of the areas that the instances cover, at most 1."""
     canvas[...] = 0
-    own = np.empty_like(canvas)
+    own = empty(canvas.shape, np.float32)
     for chunk in placed.chunks():
         for snapped in chunk:
             n_threads = count_threads(view.threads, snapped.n_triangles)

@@ -15,12 +15,14 @@ import numpy.typing as npt
 from topleft._base.arrays import as_names
 from topleft._points.cloud import CLOUD_LAYERS, CloudBuffer
 from topleft._render.blended import is_blended
-from topleft._render.fragments import VisiblePart, meshes_of
+from topleft._render.fragments import VisiblePart
 from topleft._render.gbuffer import GBuffer, PointKind, points_of, project
-from topleft._render.render import picture_of, render
+from topleft._render.render import draw_all_edges, render
+from topleft._render.scene_shade import shade_by
 from topleft._render.silhouette import silhouette as draw_silhouette
 from topleft._render.transparent import render_transparent
-from topleft._shade.shade import shade_normals
+from topleft._scene.subject import meshes_of
+from topleft._shade.shade import ShadingOptions, shade_normals
 
 __all__ = ["LAYERS", "check_layers", "draw_layers"]
 
@@ -30,15 +32,17 @@ F64 = npt.NDArray[np.float64]
 
 def color(gbuffer: GBuffer) -> Array:
     """The picture (H, W, 4) uint8 of `render`, or of `render_transparent` if the look has an `opacity`."""
-    options = {**gbuffer.options, **gbuffer.look}
+    subject, camera, options = gbuffer.subject, gbuffer.camera, {**gbuffer.options, **gbuffer.look}
     if "opacity" in options:
-        return render_transparent(gbuffer.subject, gbuffer.camera, gbuffer.size, **options)
-    sampling = options.pop("sampling", "center")
-    is_glass = is_blended(gbuffer.subject, options.get("material"), options.get("shading", "smooth"))
-    if sampling == "center" and not is_glass:
-        return picture_of(gbuffer.frags, gbuffer.subject, gbuffer.camera, **options)
-    options |= {"sampling": sampling, "rasterizer": gbuffer.rasterizer}
-    return render(gbuffer.subject, gbuffer.camera, gbuffer.size, **options)
+        return render_transparent(subject, camera, gbuffer.size, **options)
+    look = {name: value for name, value in options.items() if name not in ("cull", "edges", "sampling")}
+    checked = ShadingOptions.parse(**look)
+    if options.get("sampling", "center") != "center" or is_blended(subject, checked):
+        return render(subject, camera, gbuffer.size, rasterizer=gbuffer.rasterizer, **options)
+    picture = shade_by(gbuffer.frags, subject, camera, checked)
+    if options.get("edges"):
+        draw_all_edges(picture, gbuffer.frags, subject, camera, checked, cull=options["cull"])
+    return picture
 
 
 def cloud_color(buffer: CloudBuffer) -> Array:

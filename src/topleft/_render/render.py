@@ -6,6 +6,7 @@ Input: `Mesh` or `Scene`, `Camera`. Output: the picture (H, W, 4) uint8 of `rend
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, Unpack
 
@@ -14,31 +15,42 @@ import numpy.typing as npt
 from numpy.typing import ArrayLike, NDArray
 
 from topleft._base.arrays import as_size, shown
-from topleft._base.color import DEFAULT_COLOR, ColorLike
-from topleft._camera.camera import Camera, CameraLike, as_camera
+from topleft._base.color import DEFAULT_COLOR, WHITE, ColorLike
+from topleft._camera.camera import Camera, CameraLike, camera_for
 from topleft._lod.detail import detailed
-from topleft._model.adapt import MeshLike, as_mesh
 from topleft._model.material import Material
 from topleft._model.mesh import Mesh
 from topleft._model.points import Points
-from topleft._model.scene import Instance, Scene
-from topleft._points.cloud import draw_cloud, framing_of
+from topleft._points.cloud import draw_cloud, shade_cloud
 from topleft._raster import choices
 from topleft._raster.clusters import Clusters
 from topleft._raster.fragments import Fragments
 from topleft._raster.verbs import Rasterizer, rasterize, wireframe
-from topleft._raster.view import View
+from topleft._raster.view import Planned, View, WindowOptions
 from topleft._render.blended import draw_blended, is_blended
-from topleft._render.fragments import BentFragments, camera_of, scene_of
+from topleft._render.fragments import BentFragments, camera_of
 from topleft._render.holes import without_holes
 from topleft._render.instances import draw_scene
-from topleft._render.scene_shade import shade
+from topleft._render.scene_shade import shade_by
 from topleft._render.through_lens import seen_through
+from topleft._scene.adapt import MeshLike
+from topleft._scene.scene import Instance, Scene
+from topleft._scene.subject import as_subject, scene_of
 from topleft._shade.shade import LookOptions, ShadingOptions
+from topleft.typing import CullOption, DepthTestOption, SamplesOption, SamplingOption, ShadingOption
 
 DEFAULT_SIZE = (640, 480)
-WHITE = (255, 255, 255, 255)
 EDGE_COLOR = (24, 28, 40)
+TURNED: Mapping[str, CullOption] = {"back": "front", "front": "back"}
+
+
+class RasterizeOptions(WindowOptions, total=False):
+    """The options of `rasterize` that `rasterize_mesh` passes on."""
+
+    sampling: SamplingOption
+    depth_test: DepthTestOption | None
+    background_depth: float | None
+    out: tuple[NDArray[np.int32] | None, NDArray[np.float32] | None] | None
 
 
 def render(
@@ -46,12 +58,12 @@ def render(
     camera: CameraLike | None = None,
     size: int | tuple[int, int] = DEFAULT_SIZE,
     *,
-    shading: str = "smooth",
+    shading: ShadingOption = "smooth",
     color: ColorLike = DEFAULT_COLOR,
     background: ColorLike = WHITE,
-    cull: str = "none",
+    cull: CullOption = "none",
     edges: bool = False,
-    sampling: str = "center",
+    sampling: SamplesOption = "center",
     tolerance: float = 0.0,
     threads: int | None = None,
     rasterizer: Rasterizer | None = None,
@@ -113,64 +125,28 @@ def render(
     >>> tl.render(mesh, size=(64, 48), background=(0, 0, 0, 0))[24, 32].tolist()[3]
     255
     """
+    for option in look.keys() - LookOptions.__annotations__:
+        raise TypeError(f"render() got an unexpected keyword argument {option!r}")
     size = as_size(size)
-    if isinstance(mesh, Points):
+    subject = as_subject(mesh)
+    camera = camera_for(subject, camera, size)
+    options = ShadingOptions.parse(shading, color, background, threads=threads, **look)
+    if isinstance(subject, Points):
         if edges:
             raise ValueError("points have no edges")
-        camera = framing_of(mesh, camera, size)
-        cloud = draw_cloud(mesh, camera, size, cull=cull, threads=threads, sampling=sampling)
-        return shade(cloud, mesh, camera, shading=shading, color=color, background=background, threads=threads, **look)
-    material = look.get("material")
-    subject, camera = subject_of(mesh, camera, size, tolerance, cull=cull, material=material)
-    view: dict[str, Any] = {"cull": cull, "sampling": sampling}
-    if is_blended(subject, material, shading):
-        options = ShadingOptions.parse(shading=shading, color=color, background=background, threads=threads, **look)
-        picture, opaque = draw_blended(subject, camera, size, options=options, **view)
-        if edges:
-            draw_all_edges(picture, opaque, subject, camera, material, cull=cull, threads=threads)
-        return picture
-    frags = rasterize_subject(subject, camera, size, rasterizer, material, threads=threads, **view)
-    return picture_of(
-        frags, subject, camera, shading=shading, color=color, background=background, cull=cull, edges=edges,
-        threads=threads, **look,
-    )  # fmt: skip
-
-
-def subject_of(
-    mesh: MeshLike | Scene, camera: CameraLike | None, size: tuple[int, int], tolerance: float = 0.0, **options: Any
-) -> tuple[Mesh | Scene, Camera]:
-    """The mesh or scene as it is drawn within a tolerance, and who looks; options as for `choose_detail`."""
-    subject = mesh if isinstance(mesh, Scene) else as_mesh(mesh)
-    width, height = size
-    if not isinstance(options.get("material"), Material | None):
-        raise TypeError(f"material must be a Material, got {shown(options['material'])}")
-    if camera is not None:
-        camera = as_camera(camera)
+        cloud = draw_cloud(subject, camera, size, cull=cull, threads=threads, sampling=sampling)
+        return shade_cloud(cloud, subject, camera, options)
+    subject = detailed(subject, camera, size, tolerance, cull=cull, material=options.material)
+    if is_blended(subject, options):
+        picture, opaque = draw_blended(subject, camera, size, sampling=sampling, cull=cull, options=options)
+        frags: Fragments = opaque
     else:
-        framed = subject.extreme_points() if isinstance(subject, Scene) else subject
-        camera = Camera.framing(framed, aspect=width / height if width > 0 and height > 0 else 1.0)
-    return detailed(subject, camera, size, tolerance, **options), camera
-
-
-def picture_of(
-    frags: Fragments,
-    subject: Mesh | Scene,
-    camera: Camera,
-    *,
-    cull: str = "none",
-    edges: bool = False,
-    threads: int | None = None,
-    background: ColorLike = WHITE,
-    **look: Any,
-) -> npt.NDArray[np.uint8]:
-    """The picture of the visibility buffer that `rasterize_mesh` returned; options as for `render`.
-
-    What materials cut out is taken out of the buffer.
-    """
-    frags = without_holes(frags, subject, camera, look.get("material"), threads=threads)
-    picture = shade(frags, subject, camera, background=background, threads=threads, **look)
+        view = {"cull": cull, "sampling": sampling, "threads": threads}
+        frags = rasterize_subject(subject, camera, size, rasterizer, options.material, **view)
+        frags = without_holes(frags, subject, camera, options.material, threads=threads)
+        picture = shade_by(frags, subject, camera, options)
     if edges:
-        draw_all_edges(picture, frags, subject, camera, look.get("material"), cull=cull, threads=threads)
+        draw_all_edges(picture, frags, subject, camera, options, cull=cull)
     return picture
 
 
@@ -179,11 +155,11 @@ def rasterize_mesh(
     camera: CameraLike | None = None,
     size: int | tuple[int, int] = DEFAULT_SIZE,
     *,
-    cull: str = "none",
+    cull: CullOption = "none",
     tolerance: float = 0.0,
     threads: int | None = None,
     rasterizer: Rasterizer | None = None,
-    **view: Any,
+    **view: Unpack[RasterizeOptions],
 ) -> Fragments:
     """The visibility buffer of the mesh or scene: ids and depth per pixel, and attributes interpolated on demand.
 
@@ -213,10 +189,12 @@ def rasterize_mesh(
     size = as_size(size)
     if view.get("viewport") is not None:
         view["viewport"] = as_size(view["viewport"], "viewport", smallest=1)
-    if isinstance(mesh, Points):
-        return draw_cloud(mesh, framing_of(mesh, camera, size), size, cull=cull, threads=threads, **view)
+    subject = as_subject(mesh)
+    camera = camera_for(subject, camera, size)
+    if isinstance(subject, Points):
+        return draw_cloud(subject, camera, size, cull=cull, threads=threads, **view)
     window = {"viewport": view.get("viewport"), "origin": view.get("origin", (0, 0))}
-    subject, camera = subject_of(mesh, camera, size, tolerance, cull=cull, **window)
+    subject = detailed(subject, camera, size, tolerance, cull=cull, **window)
     return rasterize_subject(subject, camera, size, rasterizer, cull=cull, threads=threads, **view)
 
 
@@ -228,7 +206,7 @@ def rasterize_subject(
     material: Material | None = None,
     **view: Any,
 ) -> Fragments:
-    """The visibility buffer of what `subject_of` returned; options as for `rasterize_mesh`.
+    """The visibility buffer of what `detailed` returned; options as for `rasterize_mesh`.
 
     `material`: whose backs are culled, instead of those that the meshes have.
     """
@@ -255,22 +233,21 @@ def draw_all_edges(
     frags: Fragments,
     subject: Mesh | Scene,
     camera: Camera,
-    material: Material | None,
+    options: ShadingOptions,
     *,
-    cull: str,
-    threads: int | None,
+    cull: CullOption,
 ) -> None:
     """Draw the edges of every instance that the visibility buffer does not hide."""
     for instance in scene_of(subject):
         own_camera, own_cull, back = camera_of(camera, instance), cull_of(cull, instance), cull_of("back", instance)
-        is_single = instance.mesh.single_sided(material)
+        is_single = instance.mesh.single_sided(options.material)
         kinds = [(instance.mesh, own_cull)]
         if is_single is not None and own_cull != back:
             kinds = [(some_of(instance.mesh, is_single == 0), own_cull)]
             if own_cull == "none":  # of the others the edges of what shows its front
                 kinds.append((some_of(instance.mesh, is_single == 1), back))
         for mesh, side in kinds:
-            draw_edges(picture, frags, mesh, own_camera, cull=side, threads=threads)
+            draw_edges(picture, frags, mesh, own_camera, cull=side, threads=options.threads)
 
 
 def some_of(mesh: Mesh, is_some: npt.NDArray[np.bool_]) -> Mesh:
@@ -278,9 +255,9 @@ def some_of(mesh: Mesh, is_some: npt.NDArray[np.bool_]) -> Mesh:
     return Mesh(mesh.vertices, mesh.triangles[is_some])
 
 
-def cull_of(cull: str, instance: Instance) -> str:
+def cull_of(cull: CullOption, instance: Instance) -> CullOption:
     """What `cull` leaves out of an instance, whose winding is turned over where it is mirrored."""
-    return {"back": "front", "front": "back"}.get(cull, cull) if instance.is_mirrored else cull
+    return TURNED.get(cull, cull) if instance.is_mirrored else cull
 
 
 def draw_edges(
@@ -289,7 +266,7 @@ def draw_edges(
     mesh: Mesh,
     camera: Camera,
     *,
-    cull: str = "none",
+    cull: CullOption = "none",
     threads: int | None = None,
 ) -> None:
     """Draw the edges of the mesh over its picture (H, W, 4), those that the visibility buffer does not hide."""
@@ -325,7 +302,7 @@ def depth_behind(depth: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
     return behind
 
 
-class StaticPlan:
+class StaticPlan(Planned):
     """The plan of a mesh that does not change: from its second picture on it is drawn in clusters, where that pays."""
 
     def __init__(self, mesh: Mesh) -> None:
@@ -343,6 +320,3 @@ class StaticPlan:
         """Return the clusters of the mesh if it is drawn often enough; this is one time more."""
         mesh = self._mesh
         return mesh.clusters if choices.pays_to_cluster(len(mesh.triangles), mesh.note_drawn()) else None
-
-    def mark(self, stage: str) -> None:
-        """Nothing is measured."""

@@ -12,21 +12,23 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from topleft._base.color import DEFAULT_COLOR, ColorLike
+from topleft._base.color import DEFAULT_COLOR, WHITE, ColorLike
 from topleft._camera.camera import Camera, CameraLike, as_camera
 from topleft._model.environment import Environment
 from topleft._model.light import Fog, Light, LightKind, LightSpace
 from topleft._model.material import Material
 from topleft._model.mesh import Mesh
 from topleft._model.points import Points
-from topleft._model.scene import Instance, Scene
 from topleft._model.texture import Texture
 from topleft._points.cloud import shade_cloud
 from topleft._points.points import PointFragments
 from topleft._raster.fragments import Fragments
-from topleft._render.fragments import SceneFragments, VisiblePart, join, meshes_of, parts_of
+from topleft._render.fragments import SceneFragments, VisiblePart, join, parts_of
+from topleft._scene.scene import Instance, Scene
+from topleft._scene.subject import meshes_of
 from topleft._shade.look import is_similarity
 from topleft._shade.shade import Shading, ShadingOptions, shade_mesh, shade_numbers, shade_samples
+from topleft.typing import ShadingOption
 
 __all__ = ["shade", "shade_by", "shade_part"]
 
@@ -58,9 +60,9 @@ def shade(
     mesh: Mesh | Scene | Points,
     camera: CameraLike,
     *,
-    shading: str = "smooth",
+    shading: ShadingOption = "smooth",
     color: ColorLike = DEFAULT_COLOR,
-    background: ColorLike = (255, 255, 255, 255),
+    background: ColorLike = WHITE,
     depth_range: tuple[float, float] | None = None,
     lights: Light | Sequence[Light] | None = None,
     ambient: float | None = None,

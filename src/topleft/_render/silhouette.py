@@ -5,21 +5,25 @@ Input: `Mesh` or `Scene`, `Camera`. Output: a mask (H, W), bool or float32.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 import numpy.typing as npt
 
 from topleft._base.arrays import as_out, as_size
-from topleft._camera.camera import CameraLike
-from topleft._model.adapt import MeshLike
+from topleft._camera.camera import CameraLike, camera_for
+from topleft._lod.detail import detailed
 from topleft._model.points import Points
-from topleft._model.scene import Scene
-from topleft._points.cloud import draw_cloud, framing_of
+from topleft._points.cloud import draw_cloud
 from topleft._raster.verbs import coverage
+from topleft._raster.view import WindowOptions
 from topleft._render.instances import draw_scene_coverage
-from topleft._render.render import DEFAULT_SIZE, subject_of
+from topleft._render.render import DEFAULT_SIZE
 from topleft._render.through_lens import seen_through
+from topleft._scene.adapt import MeshLike
+from topleft._scene.scene import Scene
+from topleft._scene.subject import as_subject
+from topleft.typing import CullOption, SamplingOption
 
 __all__ = ["silhouette"]
 
@@ -29,12 +33,12 @@ def silhouette(
     camera: CameraLike | None = None,
     size: int | tuple[int, int] = DEFAULT_SIZE,
     *,
-    sampling: str = "center",
-    cull: str = "none",
+    sampling: SamplingOption = "center",
+    cull: CullOption = "none",
     tolerance: float = 0.0,
     threads: int | None = None,
     out: npt.NDArray[Any] | None = None,
-    **view: Any,
+    **view: Unpack[WindowOptions],
 ) -> npt.NDArray[Any]:
     """Return the mask of the mesh or scene: where it is seen, or how much of each pixel it covers.
 
@@ -86,11 +90,10 @@ def silhouette(
     >>> round(float(tl.silhouette(mesh, size=(8, 6), sampling="area", cull="back").sum()), 2)
     16.2
     """
-    size = as_size(size)
-    if isinstance(mesh, Points):
-        frags = draw_cloud(
-            mesh, framing_of(mesh, camera, size), size, sampling=sampling, cull=cull, threads=threads, **view
-        )
+    size, subject = as_size(size), as_subject(mesh)
+    camera = camera_for(subject, camera, size)
+    if isinstance(subject, Points):
+        frags = draw_cloud(subject, camera, size, sampling=sampling, cull=cull, threads=threads, **view)
         is_seen = frags.samples_triangle >= 0
         found = frags.mask if is_seen.shape[-1] == 1 else is_seen.mean(axis=-1, dtype=np.float32)
         if out is None:
@@ -99,7 +102,7 @@ def silhouette(
         result[...] = found
         return result
     window = {"viewport": view.get("viewport"), "origin": view.get("origin", (0, 0))}
-    subject, camera = subject_of(mesh, camera, size, tolerance, cull=cull, **window)
+    subject = detailed(subject, camera, size, tolerance, cull=cull, **window)
     options: Any = {"sampling": sampling, "cull": cull, "threads": threads} | view
     if isinstance(subject, Scene):
         return draw_scene_coverage(subject, camera, size, out, **options)

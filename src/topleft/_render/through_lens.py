@@ -12,10 +12,10 @@ import numpy.typing as npt
 
 from topleft._camera.camera import Camera
 from topleft._model.mesh import Mesh
-from topleft._model.scene import Instance, Scene
 from topleft._raster.view import Planned, View
 from topleft._render.bend import BentMesh, bend
 from topleft._render.fragments import camera_of
+from topleft._scene.scene import Instance, Scene
 
 __all__ = ["DrawnMesh", "DrawnScene", "scene_through", "seen_through"]
 

@@ -5,29 +5,51 @@ Input: a mesh or `Scene`, `Camera`. Output: a picture (H, W, 4) uint8, sRGB with
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 import numpy.typing as npt
 
 from topleft._base.arrays import as_count, as_size
-from topleft._base.color import ColorLike, as_color
-from topleft._camera.camera import Camera, CameraLike
-from topleft._model.adapt import MeshLike
+from topleft._base.color import WHITE, ColorLike, as_color
+from topleft._camera.camera import Camera, CameraLike, camera_for
+from topleft._lod.detail import detailed
 from topleft._model.material import Material
-from topleft._model.scene import Scene
 from topleft._raster.composite import composite
 from topleft._raster.peel import DepthLayers, peel
-from topleft._render.fragments import SceneDepthLayers, scene_of
+from topleft._raster.view import WindowOptions
+from topleft._render.fragments import SceneDepthLayers
 from topleft._render.holes import draw_holed, has_cuts, holed_instances, solid_scene
 from topleft._render.instances import peel_scene
-from topleft._render.render import DEFAULT_SIZE, WHITE, subject_of
+from topleft._render.render import DEFAULT_SIZE
 from topleft._render.scene_shade import shade
 from topleft._render.through_lens import seen_through
+from topleft._scene.adapt import MeshLike
+from topleft._scene.scene import Scene
+from topleft._scene.subject import as_meshes, scene_of
+from topleft._shade.shade import LookOptions
+from topleft.typing import CullOption, DepthTestOption, SamplesOption, ShadingOption
 
 __all__ = ["render_transparent", "visible_layers"]
 
 CLEAR = (0, 0, 0, 0)
+
+
+class GlassOptions(LookOptions, total=False):
+    """The options of `shade` that `render_transparent` passes on."""
+
+    color: ColorLike
+    depth_range: tuple[float, float] | None
+
+
+class PeelOptions(WindowOptions, total=False):
+    """The options of `peel` that `visible_layers` passes on."""
+
+    layers: int
+    depth_test: DepthTestOption
+    sampling: SamplesOption
+    cull: CullOption
+    threads: int | None
 
 
 def render_transparent(
@@ -37,12 +59,12 @@ def render_transparent(
     *,
     opacity: float = 0.5,
     layers: int = 8,
-    shading: str = "smooth",
+    shading: ShadingOption = "smooth",
     background: ColorLike = WHITE,
-    cull: str = "none",
+    cull: CullOption = "none",
     tolerance: float = 0.0,
     threads: int | None = None,
-    **look: Any,
+    **look: Unpack[GlassOptions],
 ) -> npt.NDArray[np.uint8]:
     """A picture of the mesh or scene as if it were of coloured glass.
 
@@ -77,7 +99,9 @@ def render_transparent(
     192
     """
     size, layers, material = as_size(size), as_count("layers", layers), look.get("material")
-    subject, camera = subject_of(mesh, camera, size, tolerance, cull=cull, material=material)
+    subject = as_meshes(mesh)
+    camera = camera_for(subject, camera, size)
+    subject = detailed(subject, camera, size, tolerance, cull=cull, material=material)
     ground = as_color("background", background, 4)
     options: dict[str, Any] = {"layers": layers, "cull": cull, "threads": threads}
     if has_cuts(subject, material):
@@ -123,7 +147,10 @@ def check_straight(camera: Camera) -> None:
 
 
 def visible_layers(
-    mesh: MeshLike | Scene, camera: CameraLike | None = None, size: int | tuple[int, int] = DEFAULT_SIZE, **options: Any
+    mesh: MeshLike | Scene,
+    camera: CameraLike | None = None,
+    size: int | tuple[int, int] = DEFAULT_SIZE,
+    **options: Unpack[PeelOptions],
 ) -> DepthLayers:
     """The nearest layers of every pixel of a mesh or scene, whatever its materials cut out; options as for `peel`.
 
@@ -145,10 +172,11 @@ def visible_layers(
         If the mesh has no triangles and no camera is given, an option is out of range, or the camera has a lens.
     """
     size = as_size(size)
-    subject, camera = subject_of(mesh, camera, size)
+    subject = as_meshes(mesh)
+    camera = camera_for(subject, camera, size)
     check_straight(camera)
     if isinstance(subject, Scene):
         return peel_scene(subject, camera, size, **options)
     drawn = seen_through(subject, camera, options.get("viewport") or size)
-    options |= {"transform": drawn.transform, "plan": drawn.sided(options.get("plan"), subject.single_sided())}
-    return peel(subject.vertices, subject.triangles, size, **options)
+    options["plan"] = drawn.sided(options.get("plan"), subject.single_sided())
+    return peel(subject.vertices, subject.triangles, size, transform=drawn.transform, **options)

@@ -8,24 +8,27 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 import numpy.typing as npt
 
 from topleft._base.arrays import as_real, as_size, shown
-from topleft._camera.camera import CameraLike, as_camera
+from topleft._base.color import ColorLike
+from topleft._camera.camera import CameraLike, as_camera, camera_for
 from topleft._io.layer_files import save_layers
-from topleft._model.adapt import MeshLike
+from topleft._lod.detail import detailed
 from topleft._model.points import Points
-from topleft._model.scene import Scene
-from topleft._points.cloud import CloudBuffer, framing_of
+from topleft._points.cloud import CloudBuffer
 from topleft._raster.verbs import Rasterizer
-from topleft._render.fragments import meshes_of
 from topleft._render.gbuffer import GBuffer
 from topleft._render.layers import LAYERS, check_layers, draw_layers
-from topleft._render.render import DEFAULT_SIZE, subject_of
+from topleft._render.render import DEFAULT_SIZE
+from topleft._scene.adapt import MeshLike
+from topleft._scene.scene import Scene
+from topleft._scene.subject import as_subject, meshes_of
 from topleft._shade.shade import LookOptions
+from topleft.typing import CullOption, LayerOption, SamplesOption, ShadingOption
 
 __all__ = ["ViewLayers", "gbuffer_of", "render_layers"]
 
@@ -70,20 +73,31 @@ class ViewLayers(Mapping[str, Array]):
         return save_layers(path, self if layer is None else {layer: self[layer]}, scale=scale)
 
 
+class LayerLookOptions(LookOptions, total=False):
+    """The options of `render` and `render_transparent` that `render_layers` passes on."""
+
+    shading: ShadingOption
+    color: ColorLike
+    background: ColorLike
+    edges: bool
+    sampling: SamplesOption
+    opacity: float
+
+
 def render_layers(
     mesh: MeshLike | Scene | Points,
     camera: CameraLike | None = None,
     size: int | tuple[int, int] = DEFAULT_SIZE,
     *,
-    layers: str | Iterable[str] = ("color", "depth"),
+    layers: LayerOption | str | Iterable[LayerOption | str] = ("color", "depth"),
     attributes: Mapping[str, Any] | None = None,
     camera_to: CameraLike | None = None,
     transforms_to: npt.ArrayLike | None = None,
-    cull: str = "none",
+    cull: CullOption = "none",
     tolerance: float = 0.0,
     threads: int | None = None,
     rasterizer: Rasterizer | None = None,
-    **look: Any,
+    **look: Unpack[LayerLookOptions],
 ) -> ViewLayers:
     """Layers of one view by name: depth, normals, positions, ids and flow beside the colours.
 
@@ -195,7 +209,7 @@ def gbuffer_of(
     *,
     camera_to: CameraLike | None = None,
     transforms_to: npt.ArrayLike | None = None,
-    cull: str = "none",
+    cull: CullOption = "none",
     tolerance: float = 0.0,
     threads: int | None = None,
     rasterizer: Rasterizer | None = None,
@@ -212,18 +226,19 @@ def gbuffer_of(
     """
     for option in sorted(look.keys() - (GLASS_LOOKS if "opacity" in look else LOOKS)):
         raise TypeError(f"there is no option {option!r} of a picture")
-    size = as_size(size)
-    if isinstance(mesh, Points):
+    size, subject = as_size(size), as_subject(mesh)
+    camera = camera_for(subject, camera, size)
+    if isinstance(subject, Points):
         return CloudBuffer(
-            mesh,
-            framing_of(mesh, camera, size),
+            subject,
+            camera,
             size,
             {"cull": cull, "threads": threads},
             look,
             None if camera_to is None else as_camera(camera_to, "camera_to"),
             None if transforms_to is None else as_transforms(transforms_to, 1),
         )
-    subject, camera = subject_of(mesh, camera, size, tolerance, cull=cull, material=look.get("material"))
+    subject = detailed(subject, camera, size, tolerance, cull=cull, material=look.get("material"))
     return GBuffer(
         subject=subject,
         camera=camera,

@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from topleft import _engine
 from topleft._base.color import DEFAULT_COLOR, LIGHT_OF_SRGB, Color, light_of
+from topleft._base.memory import empty
 from topleft._camera.camera import Camera
 from topleft._model.environment import DEFAULT_ENVIRONMENT, Environment
 from topleft._model.light import TO_HEADLIGHT, Fog, Light, LightKind, LightSpace
@@ -227,7 +228,7 @@ class ShadingInputs:
         self.is_in_eye_space = in_eye_space
         normals = self.mesh.normals
         if scene.viewport is not None and self.rays.has_perspective:
-            normals = np.empty_like(normals)
+            normals = empty(normals.shape, np.float32)
             _engine.set_inverse_w(scene, self.mesh.normals, self.mesh.vertex_of_row, normals)
         self.shading = _engine.ShadingTable(
             normals,

@@ -23,7 +23,8 @@ import numpy.typing as npt
 
 from topleft import _engine
 from topleft._base.arrays import shown
-from topleft._base.color import LINEAR_ONE, Color, ColorLike, as_color, id_colors, srgb_tables
+from topleft._base.color import DEFAULT_COLOR, LINEAR_ONE, WHITE, Color, ColorLike, as_color, id_colors, srgb_tables
+from topleft._base.memory import empty
 from topleft._base.options import parse
 from topleft._base.threads import count_threads, parse_threads, run_parts, threads_for
 from topleft._camera.camera import Camera
@@ -35,6 +36,7 @@ from topleft._model.texture import Texture
 from topleft._raster.fragments import Fragments
 from topleft._raster.sampling import sample_positions
 from topleft._shade.look import ShadingInputs
+from topleft.typing import ShadingOption
 
 __all__ = ["LookOptions", "Shading", "ShadingOptions", "picture_of_numbers", "shade_mesh", "shade_numbers"]
 
@@ -94,9 +96,9 @@ class ShadingOptions:
     @classmethod
     def parse(
         cls,
-        shading: str,
-        color: ColorLike,
-        background: ColorLike,
+        shading: ShadingOption = "smooth",
+        color: ColorLike = DEFAULT_COLOR,
+        background: ColorLike = WHITE,
         depth_range: tuple[float, float] | None = None,
         lights: Light | Sequence[Light] | None = None,
         ambient: float | None = None,
@@ -142,7 +144,7 @@ def shade_mesh(frags: Fragments, mesh: Mesh, camera: Camera, options: ShadingOpt
 
     The kernel reads the mesh triangle by triangle, so it has to be the one that was drawn: of a lens its parts.
     """
-    picture = np.empty((*frags.triangle.shape, 4), dtype=np.uint8)
+    picture = empty((*frags.triangle.shape, 4), np.uint8)
     if not len(mesh.triangles) or 0 in frags.triangle.shape:
         picture[...] = options.background
         return picture
@@ -190,7 +192,7 @@ def picture_of_numbers(
     frags: Fragments, camera: Camera, depth_range: tuple[float, float] | None, background: Color
 ) -> U8:
     """The picture (H, W, 4) of ids, or of distances when they have a range."""
-    picture = np.empty((*frags.triangle.shape, 4), dtype=np.uint8)
+    picture = empty((*frags.triangle.shape, 4), np.uint8)
     picture[...] = background
     seen = frags.mask
     if not seen.any():
@@ -283,7 +285,7 @@ def shade_normals(frags: Fragments, mesh: Mesh, camera: Camera, turn: F64, *, th
     ids = np.require(frags.triangle, np.int32, ["C", "A"])
     if not len(mesh.triangles) or 0 in ids.shape:
         return np.zeros((*ids.shape, 3), np.float32)
-    out = np.empty((*ids.shape, 3), np.float32)
+    out = empty((*ids.shape, 3), np.float32)
     scene = frags._snapped
     look = ShadingInputs(scene, mesh, camera, ids.shape[::-1], None, is_flat=False)
     look.set_turn(SHOW_CODES[Shading.NORMALS], turn)

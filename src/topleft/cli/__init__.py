@@ -1,11 +1,11 @@
-"""The command line: `topleft render MESH [MESH ...] -o OUT`, `topleft explain MESH`, `mask`, `calibrate` and `info`.
+"""The command line: `topleft render`, `mask`, `explain`, `calibrate`, `doctor` and `info`.
 
 Exit status: 0, all pictures were written; 1, some of several inputs failed and the rest were written, or, with
---strict, a mesh lacks something of its file; 2, nothing could
-be done with what was asked, told in one line on stderr.
+--strict, a mesh lacks something of its file; 2, nothing could be done with what was asked, told in one line on stderr.
 
 animation.py  writes the views of a mesh one after the other, by Pillow or ffmpeg
 arguments.py  defines what `topleft render` takes
+doctor.py     runs `topleft doctor`
 explain.py    runs `topleft explain` and `topleft calibrate`
 job_file.py   reads jobs from TOML or JSON
 mask.py       runs `topleft mask`
@@ -17,12 +17,18 @@ targets.py    finds which picture goes to which file, before anything is drawn
 from __future__ import annotations
 
 import argparse
+import signal
 import sys
-from collections.abc import Mapping, Sequence
+import threading
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import NoReturn
 
 from topleft._engine.isa import build_info
 from topleft._io.notes import listening
 from topleft.cli.arguments import REFUSED, Parser, UsageError, add_render_arguments
+from topleft.cli.doctor import add_doctor_command
 from topleft.cli.explain import add_plan_commands
 from topleft.cli.mask import add_mask_command
 from topleft.cli.render import FAILED, complain, complain_of_lacks, one_line, run_render
@@ -39,7 +45,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.print_help()
         return 0
     try:
-        with listening() as lacks:
+        with warnings.catch_warnings(), listening() as lacks, hearing_sigterm():
+            warnings.simplefilter("ignore", RuntimeWarning)  # of NumPy, for numbers that overflow: lines of its own
             status: int = options.run(options)
         complain_of_lacks(lacks)
     except (TopleftError, OSError, ValueError, MemoryError) as error:
@@ -48,7 +55,36 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         complain("interrupted")
         return 130
+    except Terminated:
+        complain("terminated")
+        return 143
+    except RuntimeError as error:
+        if type(error).__name__ != "BrokenProcessPool":  # whose module is not imported for one mesh
+            raise
+        complain("a process that draws was killed, maybe for want of memory: try fewer --jobs, then --resume")
+        return FAILED
     return status
+
+
+class Terminated(BaseException):
+    """SIGTERM: like Ctrl-C it ends what goes on, and processes and temporary files with it."""
+
+
+@contextmanager
+def hearing_sigterm() -> Iterator[None]:
+    """Raise `Terminated` on SIGTERM meanwhile, in the main thread, which alone may say so."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def end(*_: object) -> NoReturn:
+        raise Terminated
+
+    before = signal.signal(signal.SIGTERM, end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def run_info(_: argparse.Namespace) -> int:
@@ -73,4 +109,5 @@ def _parser() -> Parser:
     render.set_defaults(run=run_render)
     add_plan_commands(commands)
     add_mask_command(commands)
+    add_doctor_command(commands)
     return parser

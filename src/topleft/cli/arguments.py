@@ -12,8 +12,7 @@ from topleft._base.options import Cull, Sampling
 from topleft._camera.camera import DEFAULT_FOV_Y_DEG
 from topleft._camera.matrices import THREE_QUARTER_DEG
 from topleft._io.images import PICTURE_SUFFIXES, SUFFIXES
-from topleft._model.adapt import DEFAULT_CREASE
-from topleft._model.mesh import as_crease
+from topleft._model.mesh import DEFAULT_CREASE, as_crease
 from topleft._model.points import DEFAULT_POINT_SIZE
 from topleft._render.layers import LAYERS, check_layers
 from topleft._render.render import DEFAULT_SIZE

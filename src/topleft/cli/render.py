@@ -10,6 +10,7 @@ import os
 import signal
 import sys
 import tempfile
+import threading
 import warnings
 from collections.abc import Sequence
 from concurrent.futures import Executor
@@ -127,14 +128,27 @@ def _executor(groups: Sequence[MeshJobs], n: int, stack: ExitStack) -> Executor 
         return n if n > 1 else None
     from concurrent.futures import ProcessPoolExecutor
 
-    pool = ProcessPoolExecutor(min(n, len(groups)), initializer=_ignore_interrupt)
+    pool = ProcessPoolExecutor(min(n, len(groups)), initializer=_depend_on_parent)
     stack.callback(pool.shutdown, cancel_futures=True)
     return pool
 
 
-def _ignore_interrupt() -> None:
-    """Leave Ctrl-C to the parent, which lets the pictures on the way be finished."""
+def _depend_on_parent() -> None:
+    """Leave Ctrl-C to the parent, which lets the pictures on the way be finished, and end when it has ended."""
+    warnings.simplefilter("ignore", RuntimeWarning)  # as in `main`
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    import multiprocessing
+    from multiprocessing.connection import wait
+
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        wait([parent.sentinel])
+        os._exit(1)
 
 
 def _animations(groups: Sequence[MeshJobs], options: argparse.Namespace) -> list[tuple[Path, MeshJobs]]:

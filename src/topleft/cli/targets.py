@@ -17,16 +17,16 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._base.options import Sampling
+from topleft._base.whole_file import remove_stale_parts
 from topleft._batch.jobs import Job
 from topleft._camera.camera import Camera
 from topleft._camera.file_cameras import load_cameras
 from topleft._io.images import SUFFIXES
 from topleft._io.load import load
 from topleft._io.references import decoded
-from topleft._model.adapt import DEFAULT_CREASE
 from topleft._model.environment import Environment
 from topleft._model.material import Material
-from topleft._model.mesh import Mesh
+from topleft._model.mesh import DEFAULT_CREASE, Mesh
 from topleft._model.points import DEFAULT_POINT_SIZE, Points
 from topleft._model.texture import Texture
 from topleft._shade.shade import Shading
@@ -316,6 +316,7 @@ def check_targets(groups: Sequence[MeshJobs], others: Iterable[Path] = ()) -> No
             raise UsageError(f"OUT would overwrite the mesh {str(target)!r}")
     for folder in dict.fromkeys(target.parent for target, _ in targets):
         _check_writable(folder)
+    remove_stale_parts(target for target, _ in targets)
 
 
 def _check_writable(folder: Path) -> None:

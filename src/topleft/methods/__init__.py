@@ -16,6 +16,8 @@ from typing import Protocol, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from topleft.typing import WindingOption
+
 __all__ = ["CLASSICS", "METHODS", "Claims", "Kernel", "Method", "find_method", "load_kernel"]
 
 
@@ -64,7 +66,7 @@ class Claims:
     sub_pixel: bool = False
     integer_vertices: bool = False
     overdraws_shared_edges: bool = False
-    winding: str = "either"
+    winding: WindingOption = "either"
 
 
 @dataclass(frozen=True, slots=True)

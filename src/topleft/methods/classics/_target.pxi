@@ -4,6 +4,7 @@
 # In: pixel-space vertices, finite and within the method's limit; indices inside them. Out: a window of the picture.
 # `plot` and `fill_span` clamp to the window; `put` is for loops that are clamped already. Nothing else writes.
 
+from cpython.buffer cimport PyBUF_C_CONTIGUOUS, PyBUF_WRITABLE, PyBuffer_Release, PyObject_GetBuffer
 from libc.math cimport floor
 from libc.stdint cimport int32_t, int64_t, uint8_t
 
@@ -64,29 +65,45 @@ cdef inline int64_t pixel_floor(double value, int64_t smallest, int64_t largest)
     return largest if value >= <double>largest else <int64_t>floor(value)
 
 
-def draw(
-    const double[:, ::1] vertices,
-    const int32_t[:, ::1] triangles,
-    uint8_t[::1] pixels,
-    tuple window,
-    int sink,
-    str variant="",
-    int subpixel_bits=8,
-):
+cdef void *lend(object array, Py_buffer *view, Py_ssize_t item_size, int n_columns, int flags) except? NULL:
+    """Return the memory of a contiguous array of rows of at least `n_columns` items (0: one dimension).
+
+    Typed memoryviews would do the same, and be nine tenths of the module.
+    """
+    PyObject_GetBuffer(array, view, PyBUF_C_CONTIGUOUS | flags)
+    if view.itemsize != item_size or view.ndim != (2 if n_columns else 1) or (n_columns and view.shape[1] < n_columns):
+        PyBuffer_Release(view)
+        raise ValueError(f"a buffer must have items of {item_size} bytes in rows of {n_columns or "one"}")
+    return view.buf
+
+
+def draw(vertices, triangles, pixels, tuple window, int sink, str variant="", int subpixel_bits=8):
     """Draw triangles in order over a cleared window (x, y, width, height) of the picture."""
     cdef int form = FORMS.index(variant)
-    cdef int64_t i
+    cdef Py_ssize_t i, n, step
+    cdef Py_buffer points, corners, bytes_drawn
+    cdef const double *xy
+    cdef const int32_t *corner
     cdef target t
     t.x0, t.y0 = window[:2]
     t.x1, t.y1 = t.x0 + window[2], t.y0 + window[3]
     t.sink = sink
-    if pixels.shape[0] == 0:
-        return
-    t.pixels = &pixels[0]
-    with nogil:
-        for i in range(triangles.shape[0]):
-            t.label = <int32_t>i
-            fill_triangle(
-                &t, &vertices[triangles[i, 0], 0], &vertices[triangles[i, 1], 0], &vertices[triangles[i, 2], 0],
-                form, subpixel_bits,
-            )
+    xy = <const double *>lend(vertices, &points, sizeof(double), 2, 0)
+    try:
+        corner = <const int32_t *>lend(triangles, &corners, sizeof(int32_t), 3, 0)
+        try:
+            t.pixels = lend(pixels, &bytes_drawn, 1, 0, PyBUF_WRITABLE)
+            n = corners.shape[0] if bytes_drawn.len else 0
+            step = points.shape[1]
+            with nogil:
+                for i in range(n):
+                    t.label = <int32_t>i
+                    fill_triangle(
+                        &t, xy + step * corner[0], xy + step * corner[1], xy + step * corner[2], form, subpixel_bits
+                    )
+                    corner += corners.shape[1]
+            PyBuffer_Release(&bytes_drawn)
+        finally:
+            PyBuffer_Release(&corners)
+    finally:
+        PyBuffer_Release(&points)

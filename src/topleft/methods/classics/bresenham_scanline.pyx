@@ -137,13 +137,15 @@ def line_pixels(int64_t x0, int64_t y0, int64_t x1, int64_t y1):
     """Return the (N, 2) pixels of a line, from its upper end down."""
     cdef line l
     cdef point a, b
-    cdef int64_t i
-    cdef int64_t[:, ::1] pixels
+    cdef Py_ssize_t i
+    cdef Py_buffer view
+    cdef int64_t *pixels
     a.x, a.y, b.x, b.y = x0, y0, x1, y1
     start_line(&l, a, b)
     made = np.empty((l.n_left, 2), np.int64)
-    pixels = made
-    for i in range(pixels.shape[0]):
-        pixels[i, 0], pixels[i, 1] = l.x, l.y
+    pixels = <int64_t *>lend(made, &view, sizeof(int64_t), 2, PyBUF_WRITABLE)
+    for i in range(view.shape[0]):
+        pixels[2 * i], pixels[2 * i + 1] = l.x, l.y
         step_line(&l)
+    PyBuffer_Release(&view)
     return made

@@ -16,9 +16,9 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._base.arrays import INT32_MAX, as_square, check_regular, shown
-from topleft._model.adapt import MeshLike, as_mesh, is_mesh_like
 from topleft._model.mesh import Mesh, extreme_points, used_vertices
 from topleft._raster.clusters import Backoff
+from topleft._scene.adapt import MeshLike, as_mesh, is_mesh_like
 
 __all__ = ["Instance", "Scene"]
 

@@ -1,0 +1,126 @@
+"""The words that options take, as types: editors complete them, and type checkers find those that are misspelt.
+
+A function of yours that passes an option on says so: ``def draw(mesh, cull: topleft.typing.CullOption = "back")``.
+"""
+
+from __future__ import annotations
+
+from typing import Literal, TypeAlias
+
+__all__ = [
+    "AlphaModeOption",
+    "AlphaOption",
+    "BlendOption",
+    "BoundaryOption",
+    "ClipDepthOption",
+    "CullOption",
+    "DepthTestOption",
+    "EncodingOption",
+    "FilterModeOption",
+    "FilterOption",
+    "FitOption",
+    "LayerOption",
+    "LightKindOption",
+    "MethodOption",
+    "OnErrorOption",
+    "OrderOption",
+    "OutputOption",
+    "PerOption",
+    "PointShapeOption",
+    "PointUnitOption",
+    "ResolveOption",
+    "RuleOption",
+    "SamplesOption",
+    "SamplingOption",
+    "ShadingOption",
+    "SpaceOption",
+    "SurfaceOption",
+    "UpOption",
+    "WindingOption",
+    "WrapOption",
+    "YOption",
+]
+
+# Options of the verbs on arrays
+
+AlphaOption: TypeAlias = Literal["straight", "premultiplied"]
+BlendOption: TypeAlias = Literal["replace", "over", "add", "multiply", "max", "min"]
+ClipDepthOption: TypeAlias = Literal["minus_one_to_one", "zero_to_one"]
+CullOption: TypeAlias = Literal["none", "back", "front"]
+DepthTestOption: TypeAlias = Literal["less", "greater"]
+MethodOption: TypeAlias = Literal[
+    "auto",
+    "edge",
+    "scanline",
+    "point_in_triangle",
+    "point_in_triangle/top-left",
+    "edge_increment",
+    "edge_increment/integer",
+    "edge_increment/bottom-right",
+    "zigzag",
+    "bresenham_scanline",
+    "bresenham_scanline/top-left",
+    "bresenham_scanline/wireframe",
+    "lerp_scanline",
+    "lerp_scanline/plus-one",
+    "row_crossing",
+    "row_crossing/zero-area-test",
+    "row_crossing/cull-back",
+    "row_crossing/cull-front",
+    "float_barycentric",
+    "float_barycentric/float64",
+]
+OutputOption: TypeAlias = Literal[
+    "coverage", "overdraw", "color", "triangle", "depth", "mask", "barycentric", "interpolate"
+]
+PerOption: TypeAlias = Literal["auto", "triangle", "vertex"]
+PointShapeOption: TypeAlias = Literal["disc", "square"]
+ResolveOption: TypeAlias = Literal["values", "linear"]
+RuleOption: TypeAlias = Literal["evenodd", "nonzero"]
+SamplesOption: TypeAlias = Literal["center", "msaa2", "msaa4", "msaa8", "msaa16"]
+SamplingOption: TypeAlias = Literal["center", "msaa2", "msaa4", "msaa8", "msaa16", "area", "outer", "inner"]
+WindingOption: TypeAlias = Literal["either", "clockwise", "counter-clockwise"]
+
+# Grids and cameras
+
+FitOption: TypeAlias = Literal["sphere", "box", "points", "silhouette"]
+SurfaceOption: TypeAlias = Literal["upper", "lower"]
+UpOption: TypeAlias = Literal["y", "z"]
+YOption: TypeAlias = Literal["up", "down"]
+
+# Meshes, materials, textures, light
+
+AlphaModeOption: TypeAlias = Literal["opaque", "mask", "blend"]
+EncodingOption: TypeAlias = Literal["srgb", "linear"]
+FilterOption: TypeAlias = Literal["trilinear", "bilinear", "nearest"]
+LightKindOption: TypeAlias = Literal["directional", "point"]
+PointUnitOption: TypeAlias = Literal["px", "world"]
+ShadingOption: TypeAlias = Literal["smooth", "flat", "unlit", "matcap", "ids", "depth", "normals"]
+SpaceOption: TypeAlias = Literal["world", "eye"]
+WrapOption: TypeAlias = Literal["repeat", "clamp", "mirror"]
+
+# Layers and batches
+
+LayerOption: TypeAlias = Literal[
+    "color",
+    "alpha",
+    "silhouette",
+    "depth",
+    "distance",
+    "ray_distance",
+    "triangle",
+    "instance",
+    "barycentric",
+    "world_position",
+    "world_normal",
+    "camera_normal",
+    "uv",
+    "flow",
+]
+OnErrorOption: TypeAlias = Literal["raise", "collect"]
+OrderOption: TypeAlias = Literal["jobs", "completed"]
+
+# `topleft.torch`, in the words of nvdiffrast
+
+BoundaryOption: TypeAlias = Literal["wrap", "clamp", "zero"]
+FilterModeOption: TypeAlias = Literal["auto", "nearest", "linear", "linear-mipmap-nearest", "linear-mipmap-linear"]

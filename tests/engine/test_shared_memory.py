@@ -1,0 +1,147 @@
+"""Memory that is given twice, or that changes: `out` over inputs, meshes whose arrays their owner changes, threads."""
+
+import copy
+import pickle
+import threading
+
+import numpy as np
+import pytest
+from comparing import assert_same
+
+import topleft as tl
+from topleft import scenes
+
+SIZE = (128, 128)
+VERTICES = np.array([[-10.0, -10], [300, -10], [-10, 300]])
+
+
+def test_fill_into_memory_of_triangles_is_that_of_separate_memory():
+    out = np.zeros((128, 128, 4), np.uint8)
+    triangles = out.reshape(-1)[:192].view(np.int32).reshape(16, 3)
+    triangles[...] = [0, 1, 2]
+    colors = np.full((16, 4), 0x70, np.uint8)
+    before = out.copy()
+    expected = tl.fill(VERTICES, triangles.copy(), colors, SIZE, per="triangle", blend="over", out=before)
+    assert_same(tl.fill(VERTICES, triangles, colors, SIZE, per="triangle", blend="over", out=out), expected)
+
+
+def test_fill_into_memory_of_colors_is_that_of_separate_memory():
+    out = np.zeros((128, 128, 4), np.uint8)
+    colors = out.reshape(-1, 4)[:2]
+    colors[...] = [[200, 10, 20, 255], [1, 2, 3, 255]]
+    expected = tl.fill(VERTICES, [[0, 1, 2]] * 2, colors.copy(), SIZE, per="triangle", out=out.copy())
+    assert_same(tl.fill(VERTICES, [[0, 1, 2]] * 2, colors, SIZE, per="triangle", out=out), expected)
+
+
+@pytest.mark.parametrize("method", ["auto", "edge", "float_barycentric"])
+def test_overdraw_into_memory_of_triangles_is_that_of_separate_memory(method):
+    out = np.zeros((128, 128), np.int32)
+    triangles = out.reshape(-1)[: 3 * 1000].reshape(1000, 3)
+    triangles[...] = [0, 1, 2]
+    expected = tl.overdraw(VERTICES, triangles.copy(), SIZE, method=method)
+    assert_same(tl.overdraw(VERTICES, triangles, SIZE, method=method, out=out), expected)
+
+
+def test_overdraw_into_memory_of_vertices_is_that_of_separate_memory():
+    out = np.zeros((128, 128), np.int32)
+    vertices = out.reshape(-1)[:12].view(np.float64).reshape(3, 2)
+    vertices[...] = VERTICES
+    assert_same(tl.overdraw(vertices, [[0, 1, 2]], SIZE, out=out), tl.overdraw(VERTICES, [[0, 1, 2]], SIZE))
+
+
+def test_wireframe_into_memory_of_its_depth_is_that_of_separate_memory():
+    depth = np.full((128, 128), np.inf, np.float32)
+    scene = np.column_stack([VERTICES / 3, [0, 0, 0]]), [[0, 1, 2]]
+    expected = tl.wireframe(*scene, SIZE, depth=depth.copy(), antialias=True)
+    assert_same(tl.wireframe(*scene, SIZE, depth=depth, antialias=True, out=depth), expected)
+
+
+def test_wireframe_of_a_depth_at_an_odd_address_is_that_of_an_aligned_one():
+    odd = np.zeros(4 * 128 * 128 + 1, np.uint8)[1:].view(np.float32).reshape(128, 128)
+    scene = np.column_stack([VERTICES / 3, [1, 1, 1]]), [[0, 1, 2]]
+    assert_same(tl.wireframe(*scene, SIZE, depth=odd), tl.wireframe(*scene, SIZE, depth=odd.copy()))
+
+
+def shared_mesh():
+    vertices, triangles = scenes.blob(20_000)
+    triangles = triangles.astype(np.int32)
+    return tl.Mesh(vertices, triangles), triangles
+
+
+@pytest.mark.parametrize("n_before", [0, 1, 2, 3])
+def test_a_mesh_whose_triangles_their_owner_changes_is_refused(n_before):
+    mesh, triangles = shared_mesh()
+    camera = tl.Camera.framing(mesh)
+
+    def draw(n_times):
+        for _ in range(n_times):
+            tl.rasterize_mesh(mesh, camera, (64, 48)).barycentric()
+
+    draw(n_before)
+    triangles[:] = 10**8
+    with pytest.raises(IndexError, match=r"triangles must hold indices in \[0, \d+\)"):
+        draw(3)
+
+
+def test_clusters_of_a_mesh_whose_triangles_their_owner_changed_are_refused():
+    mesh, triangles = shared_mesh()
+    triangles[7] = -1
+    with pytest.raises(IndexError, match=r"row 7 is \[-1, -1, -1\]"):
+        _ = mesh.clusters
+
+
+@pytest.mark.parametrize("through", [copy.deepcopy, lambda mesh: pickle.loads(pickle.dumps(mesh))])
+def test_a_copy_of_a_mesh_is_read_only_as_the_mesh(through):
+    mesh = tl.Mesh(*scenes.shape("cube"))
+    again = through(mesh)
+    assert_same(again.vertices, mesh.vertices)
+    assert not (again.vertices.flags.writeable)
+    assert not (again.triangles.flags.writeable)
+
+
+@pytest.mark.parametrize("through", [copy.deepcopy, lambda texture: pickle.loads(pickle.dumps(texture))])
+def test_a_copy_of_a_texture_is_read_only_as_the_texture(through):
+    assert not through(tl.Texture(np.zeros((2, 2, 4), np.uint8))).image.flags.writeable
+
+
+def test_rasterizer_in_two_threads_is_refused():
+    rasterizer, refused = tl.Rasterizer(SIZE, threads=1), []
+    few, many = [[0, 1, 2]], np.tile(np.array([[0, 1, 2]], np.int32), (20_000, 1))
+
+    def draw():
+        try:
+            rasterizer.overdraw(VERTICES, many)
+        except RuntimeError as error:
+            refused.append(str(error))
+
+    others = [threading.Thread(target=draw) for _ in range(2)]
+    for thread in others:
+        thread.start()
+    for thread in others:
+        thread.join()
+    assert refused == ["a Rasterizer draws one picture at a time, and this one draws: give each thread its own"]
+    assert rasterizer.overdraw(VERTICES, few).max() == 1
+
+
+def test_rasterizer_after_an_error_draws_on():
+    rasterizer = tl.Rasterizer(SIZE)
+    with pytest.raises(IndexError):
+        rasterizer.coverage(VERTICES, [[0, 1, 3]])
+    assert rasterizer.coverage(VERTICES, [[0, 1, 2]]).any()
+
+
+@pytest.mark.parametrize("through", [copy.copy, copy.deepcopy, lambda one: pickle.loads(pickle.dumps(one))])
+def test_a_copy_of_a_rasterizer_has_memory_of_its_own(through):
+    one = tl.Rasterizer(SIZE, threads=1)
+    picture = one.coverage(VERTICES, [[0, 1, 2]])
+    other = through(one)
+    assert (other.size, other.threads) == (SIZE, 1)
+    other.coverage(VERTICES, np.empty((0, 3), np.int32))
+    assert picture.any()
+
+
+@pytest.mark.parametrize("draw", [tl.rasterize, tl.peel])
+def test_what_was_drawn_is_not_pickled_and_says_what_to_take(draw):
+    drawn = draw(np.column_stack([VERTICES, [1, 1, 1]]), [[0, 1, 2]], SIZE)
+    with pytest.raises(TypeError, match=r"refers to memory of this process .* take its arrays, such as .triangle"):
+        pickle.dumps(drawn)

@@ -1,0 +1,136 @@
+"""The words of `topleft.typing` are those that the code takes, and every public option that takes a word has them."""
+
+import inspect
+import re
+import typing
+from typing import get_args
+
+import pytest
+
+import topleft as tl
+import topleft.typing as words
+from topleft._base import options
+from topleft._batch.batch import OnError, Order
+from topleft._model.light import LightKind, LightSpace
+from topleft._model.material import AlphaMode
+from topleft._model.points import PointUnit
+from topleft._model.texture import Encoding, Filter, Wrap
+from topleft._plan.plan import OUTPUTS
+from topleft._polygons.polygons import Rule
+from topleft._raster.view import ViewOptions
+from topleft._render.layers import LAYERS
+from topleft._shade.shade import Shading
+from topleft.methods import CLASSICS, METHODS
+
+#: What the code takes; the others are read by the code itself, see `test_words_of_the_rest_are_read_from_the_types`.
+TAKEN = {
+    "AlphaModeOption": AlphaMode,
+    "AlphaOption": options.Alpha,
+    "BlendOption": options.Blend,
+    "ClipDepthOption": options.ClipDepth,
+    "CullOption": options.Cull,
+    "DepthTestOption": options.DepthTest,
+    "EncodingOption": Encoding,
+    "FilterOption": Filter,
+    "LayerOption": LAYERS,
+    "LightKindOption": LightKind,
+    "MethodOption": [*METHODS, *CLASSICS],
+    "OnErrorOption": OnError,
+    "OrderOption": Order,
+    "OutputOption": OUTPUTS,
+    "PerOption": options.Per,
+    "PointShapeOption": options.PointShape,
+    "PointUnitOption": PointUnit,
+    "ResolveOption": options.Resolve,
+    "RuleOption": Rule,
+    "SamplesOption": [one for one in options.Sampling if one == "center" or one.n_samples > 1],
+    "SamplingOption": options.Sampling,
+    "ShadingOption": Shading,
+    "SpaceOption": LightSpace,
+    "WindingOption": sorted({"either"} | {one.claims.winding for one in CLASSICS.values()}),
+    "WrapOption": Wrap,
+}  # fmt: skip
+
+CUBE = tl.Mesh(*tl.scenes.shape("cube"))
+FLAT = [[0.0, 0.0], [4.0, 0.0], [0.0, 4.0]], [[0, 1, 2]]
+
+#: Options whose check reads the type: a call of each.
+READ = {
+    "FitOption": lambda word: tl.Camera.framing(CUBE, fit=word),
+    "SurfaceOption": lambda word: tl.height_map(([[0, 0, 0], [4, 0, 0], [0, 4, 0]], [[0, 1, 2]]), 1.0, surface=word),
+    "UpOption": lambda word: tl.Camera.framing(CUBE, up=word),
+    "YOption": lambda word: tl.Grid((2, 2), (0, 1, 0, 1), y=word),
+}
+
+
+@pytest.mark.parametrize("name", TAKEN)
+def test_words_are_those_that_the_code_takes(name):
+    taken = [str(one) for one in TAKEN[name]]
+    assert sorted(get_args(getattr(words, name))) == sorted(taken)
+
+
+@pytest.mark.parametrize("name", READ)
+def test_words_of_the_rest_are_taken_and_no_others(name):
+    for word in get_args(getattr(words, name)):
+        READ[name](word)
+    with pytest.raises(ValueError, match="must be"):
+        READ[name]("wrong")
+
+
+def test_words_of_topleft_torch_are_taken_and_no_others():
+    torch = pytest.importorskip("torch")
+    dr = pytest.importorskip("topleft.torch")
+    uv, level = torch.zeros(1, 1, 1, 2), torch.zeros(1, 1, 1)
+    for filter_mode in get_args(words.FilterModeOption):
+        dr.texture(torch.zeros(1, 2, 2, 1), uv, mip_level_bias=level, filter_mode=filter_mode)
+    for boundary in get_args(words.BoundaryOption):
+        cube = boundary == "cube"
+        shape = (1, 6, 2, 2, 1) if cube else (1, 2, 2, 1)
+        points = torch.ones(1, 1, 1, 3) if cube else uv
+        dr.texture(torch.zeros(shape), points, boundary_mode=boundary, filter_mode="linear")
+    for wrong in ({"filter_mode": "wrong"}, {"boundary_mode": "wrong"}):
+        with pytest.raises(ValueError, match="must be"):
+            dr.texture(torch.zeros(1, 2, 2, 1), uv, **wrong)
+
+
+def test_every_type_is_tested():
+    assert set(words.__all__) == {*TAKEN, *READ, "BoundaryOption", "FilterModeOption"}
+
+
+def public_callables():
+    """Public functions, constructors and methods, by name."""
+    for name in tl.__all__:
+        value = getattr(tl, name)
+        if inspect.isclass(value):
+            if value.__init__ is not object.__init__ and not issubclass(value, BaseException | Warning):
+                yield name, value
+            for method, member in inspect.getmembers(
+                value, lambda one: inspect.isfunction(one) or inspect.ismethod(one)
+            ):
+                if not method.startswith("_"):
+                    yield f"{name}.{method}", member
+        elif callable(value):
+            yield name, value
+
+
+#: Options that take other strings: colours, files, names of instances, and layers and outputs, also by a list of str.
+FREE = {"color", "background", "edge_color", "path", "name", "names", "layers", "outputs", "destination"}
+
+
+def test_every_public_option_that_takes_a_word_lists_its_words():
+    plain = []
+    for name, function in public_callables():
+        init = function.__init__ if inspect.isclass(function) else function
+        for option, parameter in inspect.signature(init).parameters.items():
+            if (
+                isinstance(parameter.default, str)
+                and option not in FREE
+                and re.search(r"\bstr\b", str(parameter.annotation))
+            ):
+                plain.append(f"{name}({option})")
+    values = {"Light", "Material", "Texture", "Environment", "Points", "Grid"}  # kept as words, see their __init__
+    assert [one for one in plain if one.partition("(")[0] not in values] == []
+
+
+def test_options_of_views_list_their_words():
+    assert [name for name, kind in typing.get_type_hints(ViewOptions).items() if kind is str] == []
