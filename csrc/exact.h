@@ -23,4 +23,14 @@ typedef struct {
     double band;                     /* 1; less shows that the bands of doubt are needed: pictures are then wrong */
 } tl_exact_points;
 
+/* What clip planes leave of triangles: fans over points of their own, in order of their source triangle. */
+typedef struct {
+    double *points;     /* (n_points, 3) */
+    double *inv_w;      /* (n_points,) */
+    double *weights;    /* (n_points, 3): barycentrics in the source triangle */
+    int32_t *triangles; /* (n_pieces, 3) into `points` */
+    int32_t *source;    /* (n_pieces,) index of the input triangle, ascending */
+    int64_t n_points, n_pieces;
+} tl_exact_pieces;
+
 #endif

@@ -14,6 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullLocator
 
 from benchmarks.accuracy import speed_charts
+from benchmarks.accuracy.tables import with_no_snap
 from benchmarks.report.charts import LOOKS, Look, draw_grid, duration, write_chart
 from benchmarks.scenes.families import NO_SNAP
 
@@ -42,7 +43,8 @@ def chart_coverage(record: dict[str, Any]) -> Figure:
         def place(row: dict[str, Any], n_edge_px: int = n_edge_px, none_wrong: float = none_wrong) -> Point:
             return row["ns_triangle"], 1e6 * row["wrong_px"] / n_edge_px or none_wrong
 
-        rows, twins, peers = (rows_of(record, name, family) for name in ("coverage", "pure", "peers"))
+        twins, peers = (rows_of(record, name, family) for name in ("pure", "peers"))
+        rows = [row for row in with_no_snap(record) if row["family"] == family["name"]]
         points = [place(row) for row in rows]
         draw_front(axis, points + [place(row) for row in twins + peers])
         for row, point in zip(rows, points, strict=True):

@@ -103,7 +103,6 @@ def entries(methods: Sequence[str] = ()) -> list[Entry]:
         method = find_method(name)
         has_bits = method.code is not None or method.has_subpixel_bits
         found += [Entry(name, bits) for bits in BITS] if has_bits else [Entry(name)]
-        found += [Entry(name, NO_SNAP)] if name == "auto" else []
     return found
 
 

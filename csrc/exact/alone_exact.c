@@ -119,10 +119,36 @@ static int setup_on_grid(lone_triangle *t)
     return 1;
 }
 
+/* The columns [*first, *end) of a row; returns whether it is in doubt.  0x1.8p52 makes the nearest integer: floor() is a
+ * call where there are no lanes. */
+TL_INLINE unsigned find_lone_end(const lone_triangle *t, int64_t row, int32_t *first, int32_t *end)
+{
+    const asked_triangle *e = &t->edges;
+    const double far = e->n_cols + 2.0, magic = 0x1.8p52;
+    double begin = 0.0, stop = e->n_cols;
+    int is_doubted = t->asks_all;
+    for (int k = 0; k < 3; k++) {
+        if (e->dy[k] == 0.0)
+            continue;
+        const double any_q = (e->v[k] + e->dx[k] * (double)row) * t->inverse[k], low_q = any_q < far ? any_q : far;
+        const double q = low_q > -far ? low_q : -far, nearest = (q + magic) - magic, off = q - nearest;
+        const double quotient = off < 0.0 ? nearest - 1.0 : nearest;
+        is_doubted |= (fabs(off) <= e->band[k]) & (q == any_q); /* beyond the box nothing is in doubt */
+        if (e->dy[k] < 0.0)
+            begin = -quotient > begin ? -quotient : begin;
+        else
+            stop = quotient + 1.0 < stop ? quotient + 1.0 : stop;
+    }
+    *first = (int32_t)begin, *end = (int32_t)(stop > 0.0 ? stop : 0.0);
+    return (unsigned)is_doubted;
+}
+
 /* The columns [first, end) of TL_LANES rows; returns the rows in doubt. */
 TL_INLINE unsigned find_lone_ends(const lone_triangle *t, int64_t row0, int32_t *first, int32_t *end)
 {
     const asked_triangle *e = &t->edges;
+    if (TL_LANES == 1)
+        return find_lone_end(t, row0, first, end);
     const vd rows = vd_add(vd_set1((double)row0), vd_from_vi(vi_iota())), low = vd_set1(0.0);
     const vd high = vd_set1((double)e->n_cols);
     vd begins = low, ends = high;
@@ -167,7 +193,7 @@ TL_INLINE void put_lone_depths(const tl_target *target, tl_sink sink, const lone
 /* Sets up triangle i; returns whether there is anything to draw.  A vertex that is not finite ends the pass. */
 static int setup_lone(exact_state *s, int32_t i, lone_triangle *t, int with_depth)
 {
-    const int32_t *corners = s->scene->triangles + 3 * (int64_t)i;
+    const int32_t *corners = s->mesh->triangles + 3 * (int64_t)i;
     asked_triangle *e = &t->edges;
     exact_point *p = e->corners;
     load_turned(s, i, 0, p);
@@ -184,11 +210,11 @@ static int setup_lone(exact_state *s, int32_t i, lone_triangle *t, int with_dept
     if (e->n_cols <= 0 || t->n_rows <= 0)
         return 0;
     const int sign = edge_sign(p[0], p[1], p[2], s->counts), second = sign < 0 ? 2 : 1;
-    if (is_culled(sign, s->scene->cull))
+    if (is_culled(sign, s->mesh->cull))
         return 0;
     load_turned(s, i, sign < 0, p);
     e->sample_x = (double)t->col + s->centre_x, e->sample_y = (double)t->row + s->centre_y;
-    t->id = name_of(s->scene, i);
+    t->id = name_of(s->mesh, i);
     if (!setup_on_grid(t))
         setup_lone_edges(s, t, x1 - x0, y1 - y0);
     t->asks_all = e->band[0] == INFINITY || e->band[1] == INFINITY || e->band[2] == INFINITY;

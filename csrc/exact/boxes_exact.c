@@ -110,7 +110,7 @@ TL_INLINE void flush_boxes(exact_state *s, exact_queue *queue, int size, tl_sink
         const vi box = vi_load(q->size + i);
         const vi n_cols = vi_and(box, vi_set1(0xffff)), n_rows = vi_shift_right(box, 16);
         pop_exact(s, queue, i, &t);
-        const vi id = names_of(s->scene, vm_first(q->n - i), vi_load(q->id + i)), sample = t.sample;
+        const vi id = names_of(s->mesh, vm_first(q->n - i), vi_load(q->id + i)), sample = t.sample;
         vd z_col[TL_SMALL_BOX];
         if (sink_has_depth(sink)) {
             p = plane_of_lanes(s, queue, i, &t);

@@ -1,4 +1,4 @@
-/* Draw: every triangle of a scene whose vertices are not snapped, to the code for its size.
+/* Draw: every triangle of a mesh whose vertices are not snapped, to the code for its size.
  * In: points in pixels and triangles.  Out: the target's buffers.
  *
  * A sample belongs to a triangle by the sign of the exact edge functions of the float64 numbers that stand in the array,
@@ -77,12 +77,12 @@ TL_INLINE void take_out_exact(const exact_state *s, tl_sink sink, exact_batch *b
         b->alone = vm_or(b->alone, over_small);
         b->drawn = vm_and_not(b->drawn, over_small);
     }
-    if (!sink_has_depth(sink) && s->scene->cull == TL_CULL_NONE)
+    if (!sink_has_depth(sink) && s->mesh->cull == TL_CULL_NONE)
         return;
     const vd area = area_of_points(b->x, b->y), box = vd_mul(b->width, b->height);
     const vd bound = vd_add(vd_mul(box, vd_set1(0x1p-50)), vd_set1(1e-280)), zero = vd_set1(0.0);
-    if (s->scene->cull != TL_CULL_NONE)
-        b->drawn = vm_and_not(b->drawn, vd_ge(s->scene->cull == TL_CULL_BACK ? area : vd_sub(zero, area), bound));
+    if (s->mesh->cull != TL_CULL_NONE)
+        b->drawn = vm_and_not(b->drawn, vd_ge(s->mesh->cull == TL_CULL_BACK ? area : vd_sub(zero, area), bound));
     if (sink_has_depth(sink)) { /* as plane_of_points; the extents of lanes are in its range */
         const vd scaled = vd_mul(vd_abs(area), vd_set1((double)(1 << TL_SLIVER_BITS)));
         const vm has_plane = vm_and(vd_ge(scaled, box), vd_ge(box, vd_set1(TL_LEAST_BOX)));
@@ -163,10 +163,10 @@ TL_INLINE void draw_far_batch(exact_state *s, tl_sink sink, const int32_t *corne
 }
 
 /* The window has fewer than 2^31 samples and lies within 2^48 pixels of 0, where centres and samples are float64. */
-static void start_exact(exact_state *s, const tl_snapped *scene, const tl_exact_points *points, const tl_window *window,
+static void start_exact(exact_state *s, const tl_snapped *mesh, const tl_exact_points *points, const tl_window *window,
                         const tl_target *target, tl_exact_counts *counts)
 {
-    s->scene = scene, s->points = points, s->window = window, s->target = target, s->counts = counts;
+    s->mesh = mesh, s->points = points, s->window = window, s->target = target, s->counts = counts;
     s->left = window->x_px, s->right = window->x_px + window->width;
     s->top = window->y_px, s->bottom = window->y_px + window->height;
     s->centre_x = 0.5 + points->sample_x_px, s->centre_y = 0.5 + points->sample_y_px;
@@ -176,7 +176,7 @@ static void start_exact(exact_state *s, const tl_snapped *scene, const tl_exact_
     memset(s->fragments.sample, 0, sizeof s->fragments.sample); /* what is prefetched behind the end of the list */
 }
 
-TL_INLINE void draw_exact_scene(const tl_snapped *scene, const tl_exact_points *points, const tl_window *window,
+TL_INLINE void draw_exact_scene(const tl_snapped *mesh, const tl_exact_points *points, const tl_window *window,
                                 const tl_target *target, const tl_share *share, tl_exact_counts *counts,
                                 int64_t *bad_row, tl_sink sink)
 {
@@ -185,14 +185,14 @@ TL_INLINE void draw_exact_scene(const tl_snapped *scene, const tl_exact_points *
         is_near(window) && window->x_px + window->width < farthest && window->y_px + window->height < farthest;
     exact_state s;
     int is_given_up = 0;
-    start_exact(&s, scene, points, window, target, counts);
+    start_exact(&s, mesh, points, window, target, counts);
     for (int64_t i = share->first; i < share->end && s.bad_row < 0 && !is_given_up; i += TL_LANES) {
         int32_t corners[3 * TL_LANES];
         tl_count_work(window, TL_SETUP_PX * TL_LANES);
         is_given_up = tl_is_given_up(window);
         const vm live = vm_first(share->end - i);
         const vi id = share->ids ? vi_load_masked(live, share->ids + i) : vi_add(vi_set1((int32_t)i), vi_iota());
-        const int32_t *batch = share_corners(scene, share, i, corners);
+        const int32_t *batch = share_corners(mesh, share, i, corners);
         if (is_near_0)
             draw_exact_batch(&s, sink, batch, id, live);
         else
@@ -207,11 +207,11 @@ TL_INLINE void draw_exact_scene(const tl_snapped *scene, const tl_exact_points *
 }
 
 TL_SINK_COPIES(draw_exact_scene,
-               (const tl_snapped *scene, const tl_exact_points *points, const tl_window *window, const tl_target *target,
+               (const tl_snapped *mesh, const tl_exact_points *points, const tl_window *window, const tl_target *target,
                 const tl_share *share, tl_exact_counts *counts, int64_t *bad_row),
-               scene, points, window, target, share, counts, bad_row)
+               mesh, points, window, target, share, counts, bad_row)
 
-static int64_t draw_exact(const tl_snapped *scene, const tl_exact_points *points, const tl_window *window,
+static int64_t draw_exact(const tl_snapped *mesh, const tl_exact_points *points, const tl_window *window,
                           const tl_target *target, const tl_share *share, tl_exact_counts *counts)
 {
     const int64_t pixel_bytes = target->sink == TL_SINK_MASK ? 1 : 4;
@@ -228,7 +228,7 @@ static int64_t draw_exact(const tl_snapped *scene, const tl_exact_points *points
         if (share->is_first)
             clear(&band, &part);
         if (share->first < share->end)
-            TL_SINK_CALL(draw_exact_scene, target->sink, scene, points, &band, &part, share, counts, &bad_row)
+            TL_SINK_CALL(draw_exact_scene, target->sink, mesh, points, &band, &part, share, counts, &bad_row)
         if (bad_row >= 0)
             return bad_row;
         if (target->sink == TL_SINK_MASK && share->is_last)

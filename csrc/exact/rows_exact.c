@@ -270,7 +270,7 @@ TL_INLINE void flush_middle_exact(exact_state *s, tl_sink sink)
                 z_cols = vd_mul(vd_set1(slope_x[k]), vd_sub(x, vd_set1(x0[k])));
             }
             draw_block(&target, sink, &m.bits[0][k], &m.z[0][k], TL_MAX_LANES, (uint32_t)sample[k], size >> 16,
-                       (size & 0xffff) <= TL_HALF_LANES, z_cols, name_of(s->scene, q->id[i + k]));
+                       (size & 0xffff) <= TL_HALF_LANES, z_cols, name_of(s->mesh, q->id[i + k]));
         }
     }
     q->n = 0;
@@ -366,7 +366,7 @@ TL_INLINE void draw_rows_exact(exact_state *s, tl_sink sink, const exact_rows *r
     const tl_target own = *s->target, *target = &own; /* a copy that no store can change */
     const box_queue *q = &s->rows.boxes;
     const int n_cols = q->size[i + k] & 0xffff, n_rows = q->size[i + k] >> 16;
-    const int32_t id = name_of(s->scene, q->id[i + k]);
+    const int32_t id = name_of(s->mesh, q->id[i + k]);
     const double sample_x = q->col[i + k] + s->centre_x, sample_y = q->row[i + k] + s->centre_y;
     const vi zero = vi_set1(0);
     const vd steps = ramp(1.0);

@@ -44,9 +44,9 @@ typedef struct {
     float xy[TL_QUEUE + TL_MAX_LANES];
 } exact_queue;
 
-/* Everything that one pass over a scene needs; on the stack of draw_exact. */
+/* Everything that one pass over a mesh needs; on the stack of draw_exact. */
 typedef struct {
-    const tl_snapped *scene;
+    const tl_snapped *mesh;
     const tl_exact_points *points;
     const tl_window *window;
     const tl_target *target;
@@ -86,7 +86,7 @@ TL_INLINE exact_point point_of(const tl_exact_points *points, int32_t i)
 /* The corners of a triangle that is turned, or not. */
 TL_INLINE void load_turned(const exact_state *s, int32_t id, int is_turned, exact_point *p)
 {
-    const int32_t *corners = s->scene->triangles + 3 * (int64_t)id;
+    const int32_t *corners = s->mesh->triangles + 3 * (int64_t)id;
     p[0] = point_of(s->points, corners[0]);
     p[1] = point_of(s->points, corners[is_turned ? 2 : 1]);
     p[2] = point_of(s->points, corners[is_turned ? 1 : 2]);
@@ -133,9 +133,9 @@ TL_INLINE void turn_lanes(const exact_state *s, const int32_t *ids, lane_exact *
         t->turned = vm_from_bits(turned);
         t->live = vm_and_not(t->live, vm_from_bits(flat));
     }
-    if (s->scene->cull == TL_CULL_BACK)
+    if (s->mesh->cull == TL_CULL_BACK)
         t->live = vm_and(t->live, t->turned);
-    else if (s->scene->cull == TL_CULL_FRONT)
+    else if (s->mesh->cull == TL_CULL_FRONT)
         t->live = vm_and_not(t->live, t->turned);
     const vd x = t->x[1], y = t->y[1];
     t->x[1] = vd_select(t->turned, t->x[2], x), t->y[1] = vd_select(t->turned, t->y[2], y);
@@ -229,7 +229,7 @@ TL_INLINE void pop_exact(exact_state *s, const exact_queue *queue, int i, lane_e
     const int n = q->n;
     int32_t corners[3 * TL_LANES];
     for (int k = 0; k < TL_LANES; k++) /* lanes behind the end repeat the last triangle */
-        memcpy(corners + 3 * k, s->scene->triangles + 3 * (int64_t)q->id[i + k < n ? i + k : n - 1],
+        memcpy(corners + 3 * k, s->mesh->triangles + 3 * (int64_t)q->id[i + k < n ? i + k : n - 1],
                3 * sizeof *corners);
     for (int k = 0; k < 3; k++)
         vd_load_pairs(s->points->points, s->points->stride, corners + k, &t->x[k], &t->y[k]);
@@ -265,7 +265,7 @@ TL_INLINE exact_planes plane_of_lanes(const exact_state *s, const exact_queue *q
     int32_t corners[3 * TL_LANES];
     vd z[3];
     for (int k = 0; k < TL_LANES; k++)
-        memcpy(corners + 3 * k, s->scene->triangles + 3 * (int64_t)q->id[i + k < n ? i + k : n - 1],
+        memcpy(corners + 3 * k, s->mesh->triangles + 3 * (int64_t)q->id[i + k < n ? i + k : n - 1],
                3 * sizeof *corners);
     for (int k = 0; k < 3; k++)
         z[k] = vd_load_singles(s->points->points + 2, s->points->stride, corners + k);

@@ -63,22 +63,22 @@ static int64_t first_exact_piece(const tl_exact_pieces *p, int64_t id)
     return low;
 }
 
-/* Makes `t` describe the triangle or piece that shows at the sample; 0 when the buffer does not belong to the scene. */
-static int find_weighed(weighed_exact *t, const tl_snapped *scene, const tl_exact_points *points,
+/* Makes `t` describe the triangle or piece that shows at the sample; 0 when the buffer does not belong to the mesh. */
+static int find_weighed(weighed_exact *t, const tl_snapped *mesh, const tl_exact_points *points,
                         const tl_exact_pieces *pieces, int64_t id, exact_point sample)
 {
-    if (id == t->id && !t->piece[0])
+    if (id >= 0 && id == t->id && !t->piece[0])
         return 1;
     t->id = -1, t->piece[0] = NULL;
-    if (id < 0 || id >= scene->n_triangles)
+    if (id < 0 || id >= mesh->n_triangles)
         return 0;
-    const int32_t *corners = scene->triangles + 3 * id;
+    const int32_t *corners = mesh->triangles + 3 * id;
     int is_cut = 0;
     for (int k = 0; k < 3; k++) {
         if (corners[k] < 0 || corners[k] >= points->n_points) /* the caller's array may have changed */
             return 0;
         t->corners[k] = point_of(points, corners[k]);
-        t->inv_w[k] = inverse_w(&scene->mesh, corners[k]);
+        t->inv_w[k] = inverse_w(&mesh->mesh, corners[k]);
         is_cut |= isnan(t->corners[k].x);
     }
     if (!is_cut) {
@@ -121,7 +121,7 @@ static void weights_of_sample(const weighed_exact *t, exact_point s, double *wei
             weights[j] += part[k] / sum * t->piece[k][j];
 }
 
-static void weigh_exact(const tl_snapped *scene, const tl_exact_points *points, const tl_exact_pieces *pieces,
+static void weigh_exact(const tl_snapped *mesh, const tl_exact_points *points, const tl_exact_pieces *pieces,
                         const tl_window *window, const int32_t *ids, const float *values, int n_values, int per_corner,
                         float background, float *restrict out)
 {
@@ -131,7 +131,7 @@ static void weigh_exact(const tl_snapped *scene, const tl_exact_points *points, 
             const exact_point sample = {(double)(col + window->x_px) + 0.5 + points->sample_x_px,
                                         (double)(row + window->y_px) + 0.5 + points->sample_y_px};
             double w[3];
-            if (!find_weighed(&t, scene, points, pieces, *ids, sample)) {
+            if (!find_weighed(&t, mesh, points, pieces, *ids, sample)) {
                 for (int c = 0; c < n_values; c++)
                     out[c] = values ? background : 0.0f;
                 continue;
@@ -140,7 +140,7 @@ static void weigh_exact(const tl_snapped *scene, const tl_exact_points *points, 
             for (int c = 0; c < n_values; c++) {
                 double total = 0.0;
                 for (int k = 0; values && k < 3; k++) {
-                    const int64_t at = per_corner ? 3 * (int64_t)*ids + k : scene->triangles[3 * (int64_t)*ids + k];
+                    const int64_t at = per_corner ? 3 * (int64_t)*ids + k : mesh->triangles[3 * (int64_t)*ids + k];
                     total += w[k] * (double)values[at * n_values + c];
                 }
                 out[c] = (float)(values ? total : w[c]);

@@ -7,7 +7,7 @@ from engine_cases import ON_EACH_ISA, on
 from exact_cases import BITING_EDGES, KETTNER_A1, SIZE, exact_scenes, kettner_grid, lattice, tilted_grid
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from strategies import soup, with_depth
+from strategies import CLIP_SCENES, clip_scenes, soup, with_depth
 
 import topleft as tl
 from topleft import _engine
@@ -81,6 +81,57 @@ def test_numbers_of_each_type_are_kept(dtype):
     vertices = (np.random.default_rng(3).uniform(-2, 26, (60, 2))).astype(dtype)
     scene = soup(vertices, SIZE)
     assert (overdraw(scene) == reference.overdraw(*scene.arrays, **EXACT)).all()
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize("make", CLIP_SCENES.values(), ids=CLIP_SCENES)
+def test_clip_space_is_that_of_the_reference(isa, make):
+    for seed in range(2):
+        scene = make(np.random.default_rng(seed))
+        view = scene.view | EXACT
+        with on(isa):
+            assert (tl.overdraw(*scene.arrays, **view) == reference.overdraw(*scene.arrays, **view)).all()
+
+
+@settings(max_examples=40)
+@given(scene=clip_scenes())
+def test_ids_of_clip_space_are_those_of_the_reference(scene):
+    view = scene.view | EXACT
+    frags = tl.rasterize(*scene.arrays, depth_test=None, **view)
+    assert (frags.triangle == reference.ids(*scene.arrays, depth_test=None, **view)).all()
+
+
+def largest_error(found, exact):
+    """The largest distance of float32 numbers from fractions."""
+    return max(abs(f - float(e)) for f, e in zip(found.ravel().tolist(), exact.ravel().tolist(), strict=True))
+
+
+@pytest.mark.parametrize("make", CLIP_SCENES.values(), ids=CLIP_SCENES)
+def test_weights_of_clip_space_are_those_of_the_reference(make):
+    scene = make(np.random.default_rng(1))
+    view = scene.view | EXACT
+    weights = tl.rasterize(*scene.arrays, depth_test=None, **view).barycentric()
+    exact = reference.barycentric(*scene.arrays, depth_test=None, **view)
+    assert largest_error(weights, exact) <= 2.0**-23  # half a unit of float32 below 2, and what float64 errs by
+
+
+@settings(max_examples=30)
+@given(scene=exact_scenes(3), seed=st.integers(0, 99))
+def test_weights_and_values_of_hostile_floats_are_those_of_the_reference(scene, seed):
+    values = np.random.default_rng(seed).uniform(0, 1, (len(scene.vertices), 2)).astype(np.float32)
+    frags = tl.rasterize(*scene.arrays, **scene.view)
+    assert largest_error(frags.barycentric(), reference.barycentric(*scene.arrays, **scene.view)) <= 2.0**-24
+    exact = reference.interpolate(*scene.arrays[:2], values, scene.size, **scene.view)
+    assert largest_error(frags.interpolate(values), exact) <= 2.0**-24
+
+
+def test_mesh_with_a_camera_is_drawn_without_a_snap():
+    vertices, triangles, *_ = tl.scenes.icosphere(3)
+    mesh = tl.Mesh(vertices, triangles)
+    frags = tl.rasterize_mesh(mesh, None, (64, 48), **EXACT)
+    snapped = tl.rasterize_mesh(mesh, None, (64, 48))
+    assert (frags.triangle != snapped.triangle).mean() < 0.02
+    assert frags.mask.any()
 
 
 # ---- named scenes ---------------------------------------------------------------------------------------------------
@@ -278,7 +329,7 @@ def test_what_is_not_there_says_so(verb, options, message):
         ),
         ([[0, 0], [4, -np.inf], [0, 4]], r"vertices must be finite where a triangle uses them, got \[4.0, -inf\]"),
         ([[0, 0], [2**53 + 2, 0], [0, 4]], r"vertices must lie within 2\*\*53 as integers for 'exact'"),
-        ([[0, 0, 1, 1]] * 3, r"vertices must be pixels, \(V, 2\) or \(V, 3\) without transform"),
+        ([[0, 0, 0, 1], [1, 0, np.inf, 1], [0, 1, 0, 1]], r"vertices must be finite where .*, inf, 1.0\] in row 1"),
     ],
 )
 def test_vertices_that_cannot_be_drawn_are_named(vertices, message):
@@ -291,6 +342,13 @@ def test_error_leaves_no_trace_in_out():
     with pytest.raises(ValueError, match="finite"):
         tl.overdraw([[0, 0], [np.inf, 0], [0, 4]], [[0, 1, 2]], (4, 4), out=out, **EXACT)
     assert (out == 7).all()
+
+
+def test_plan_is_refused():
+    with pytest.raises(ValueError, match=r"0\.\.16 with a plan, got 'exact'"):
+        tl.coverage(*TRIANGLE, plan=tl.plan(*TRIANGLE), **EXACT)
+    with pytest.raises(ValueError, match=r"0\.\.16 here, got 'exact'"):
+        tl.plan(*TRIANGLE, **EXACT)
 
 
 def test_depth_that_float32_cannot_hold_is_named():

@@ -94,7 +94,8 @@ class Source:
     def project(
         self, first: int, end: int, viewport: Viewport, records: U8, wide: I64 | None
     ) -> tuple[int, int, int]: ...
-    def take(self, first: int, end: int, points: NDArray[np.float64] | None) -> int: ...
+    def project_points(self, first: int, end: int, viewport: Viewport, points: F64) -> tuple[int, int]: ...
+    def take(self, first: int, end: int, points: F64 | None, bits: int = -1) -> int: ...
 
 class Pieces:
     arrays: tuple[Any, ...] | None
@@ -162,13 +163,19 @@ class SnappedMesh:
     def barycentric(self, ids: I32, out: F32) -> None: ...
     def interpolate(self, ids: I32, values: F32, per_corner: bool, background: float, out: F32) -> None: ...
 
-class ExactMesh(SnappedMesh):  # has draw, seen_from, guess_seen and paint; what asks for more is refused before
+class ExactPieces:
+    def __init__(self, source: Source, points: F64, triangles: I32, viewport: Viewport) -> None: ...
+    def __len__(self) -> int: ...
+
+class ExactMesh(SnappedMesh):  # has what draws, paints and weighs one mesh; what asks for more is refused before
     def __init__(
         self,
         points: F64,
         triangles: I32,
         how: tuple[int, int, int, int, int, int],
         band: float = 1.0,
+        source: Source | None = None,
+        pieces: ExactPieces | None = None,
     ) -> None: ...
     def draw_counted(
         self, target: Target, first_row: int, n_rows: int, is_first: bool = True, is_last: bool = True

@@ -134,11 +134,13 @@ def take_mesh(
     """
     points, source = transform(vertices, view, out)
     triangles = apart_from(out, "triangles", triangles)
-    if source.is_clip_space:
-        raise ValueError("vertices must be pixels, (V, 2) or (V, 3) without transform, for subpixel_bits 'exact'")
+    if view.single_sided is not None:
+        raise ValueError("subpixel_bits must be in 0..16 where some triangles are single-sided, got 'exact'")
     indices, bad_row = index(memory, triangles, len(points), view)
     view.mark("input")
     n = len(points) if len(indices) and 0 not in view.size else 0
+    if source.is_clip_space and n:
+        return project_mesh(memory, triangles, view, points, source, indices, bad_row, must_check=out is not None)
     has_depth = with_depth and points.shape[1] == 3
     taken, n_bad = take_points(memory, source, points, n, len(indices), view, must_check=out is not None or has_depth)
     view.mark("vertices")
@@ -149,6 +151,41 @@ def take_mesh(
     if n_bad:
         check_finite(points, indices, with_depth=has_depth)
     mesh = _engine.ExactMesh(taken, indices if n else indices[:0], view.how)
+    return Unsnapped(mesh, indices, triangles, points, source, np.empty(0, np.uint8), None)
+
+
+def project_mesh(
+    memory: Memory,
+    triangles: ArrayLike,
+    view: View,
+    points: NDArray[Any],
+    source: _engine.Source,
+    indices: NDArray[np.int32],
+    bad_row: int,
+    *,
+    must_check: bool,
+) -> Unsnapped:
+    """Take clip space to pixels, and cut triangles, without a snap."""
+    n, viewport = len(points), view.engine_viewport()
+    projected = memory.empty("points", (n, 3), np.float64)
+
+    def project_part(first: int, end: int) -> tuple[int, int]:
+        return source.project_points(first, end, viewport, projected)
+
+    counts = run_parts(project_part, n, choices.threads_to_snap(view.threads, n, len(indices)))
+    n_bad, n_clipped = map(sum, zip(*counts, strict=True))
+    view.mark("vertices")
+    if bad_row == UNCHECKED and (must_check or n_bad or n_clipped):
+        bad_row = _engine.first_bad_row(indices, n)
+    if bad_row >= 0:
+        raise bad_triangle(triangles, bad_row, n)
+    if n_bad:
+        check_projected(points, projected, indices)
+    pieces = None
+    if choices.must_cut(n_clipped):
+        pieces = _engine.ExactPieces(source, projected, indices, viewport)
+    view.mark("clip")
+    mesh = _engine.ExactMesh(projected, indices, view.how, source=source, pieces=pieces)
     return Unsnapped(mesh, indices, triangles, points, source, np.empty(0, np.uint8), None)
 
 
@@ -288,6 +325,19 @@ def check_used_vertices(
         f"vertices must lie within 2**{62 - view.grid_bits} pixels of 0 with {view.grid_bits} sub-pixel bits, "
         f"got {row.tolist()} in row {i}"
     )
+
+
+def check_projected(points: NDArray[Any], projected: NDArray[np.float64], triangles: NDArray[np.int32]) -> None:
+    """Raise an error for the first vertex that is not finite behind its transform, if a triangle uses it."""
+    is_bad = np.isnan(projected[:, 0]) & (projected[:, 1] == BAD)
+    used = triangles[is_bad[triangles]]
+    if not used.size:
+        return
+    i = used.min()
+    row = points[i]
+    if not np.isfinite(row).all():
+        raise ValueError(f"vertices must be finite where a triangle uses them, got {row.tolist()} in row {i}")
+    raise ValueError(f"vertices must stay finite under transform, got {row.tolist()} in row {i}")
 
 
 def check_finite(points: NDArray[Any], triangles: NDArray[np.int32], *, with_depth: bool) -> None:

@@ -49,7 +49,7 @@ def coverage(
         viewport : (int, int). Width and height of the whole picture for clip space; default `size`.
         subpixel_bits : int, 0 to 16, or "exact". Vertices snap to ``2**-subpixel_bits`` pixels; default 8. "exact":
             they stay where they are, the float64 numbers of the array, and these decide every sample (`coverage`,
-            `overdraw`, `fill` and `rasterize` of vertices in pixels, at centres and samples).
+            `overdraw`, `rasterize`, and `fill` with a colour a triangle; at centres and samples).
         sampling : "center"; "msaa2", "msaa4", "msaa8" or "msaa16": so many samples a pixel, at the standard positions
             of Direct3D; "area": the exact area of the pixel (`coverage`, `overdraw` and `fill`). For `coverage` and
             `overdraw` also "outer": every pixel square that a triangle meets in positive area; "inner": every square

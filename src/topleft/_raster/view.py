@@ -168,11 +168,11 @@ class View:
             is_exact=is_exact,
         )
         if is_exact:
-            check_exact(view, takes_exact=takes_exact, has_plan=plan is not None)
+            check_exact(view, takes_exact=takes_exact)
         return view if plan is None else plan.fitted(view)
 
 
-def check_exact(view: View, *, takes_exact: bool, has_plan: bool) -> None:
+def check_exact(view: View, *, takes_exact: bool) -> None:
     """Raise an error where vertices that are not snapped cannot be drawn yet."""
     wish = "subpixel_bits must be in 0..16"
     if not takes_exact:
@@ -184,8 +184,6 @@ def check_exact(view: View, *, takes_exact: bool, has_plan: bool) -> None:
         )
     if view.classic:
         raise ValueError(f"{wish} for method {view.classic.name!r}, got 'exact': it has lanes of its own")
-    if has_plan:
-        raise ValueError(f"{wish} with a plan, got 'exact': a plan chooses for snapped vertices")
     (x, y), (width, height) = view.origin, view.size
     if max(abs(x), abs(y), abs(x + width), abs(y + height)) > MAX_EXACT_PX:
         raise ValueError(f"origin and size must lie within {MAX_EXACT_PX} pixels of 0 for 'exact', got {(x, y)}")

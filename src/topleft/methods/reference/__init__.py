@@ -196,7 +196,8 @@ class Projection(NamedTuple):
         z_px = max(z_px, 0.0 if self.near_clip else -FLOAT32_MAX)
         z_px = min(z_px, 1.0 if self.far_clip else FLOAT32_MAX)
         x_px, y_px = (x / w + 1.0) * self.half_px[0], (1.0 - y / w) * self.half_px[1]
-        if not max(abs(x_px), abs(y_px)) < 2.0 ** (62 - grid_bits(self.subpixel_bits)):
+        farthest = inf if self.subpixel_bits == "exact" else 2.0 ** (62 - grid_bits(self.subpixel_bits))
+        if not max(abs(x_px), abs(y_px)) < farthest:
             return None
         return Vertex(snap([(x_px, y_px)], self.subpixel_bits)[0], z_px, w, p[4:])
 
