@@ -8,6 +8,7 @@ Environment:
 
 TOPLEFT_BUILD_ISA   comma list of the instruction sets to build, scalar always among them; an error when it cannot be
 TOPLEFT_WERROR      "1" turns warnings into errors
+TOPLEFT_SANITIZE    sanitizers of the compiler, as of -fsanitize=; `.ci/sanitize` builds with them and runs the tests
 """
 
 import hashlib
@@ -43,6 +44,8 @@ FLAGS_CYTHON = [
 ]  # fmt: skip
 # The classics do their arithmetic in Cython.
 FLAGS_CLASSIC = [*FLAGS_CYTHON, "-O3", "-ffp-contract=off", "-fno-fast-math", "-fno-math-errno"]
+# For findings of a sanitizer: where they are, and integers whose overflow the language does not define.
+FLAGS_SANITIZED = ["-O1", "-g1", "-fno-omit-frame-pointer", "-fno-wrapv"]
 FLAGS_AVX2 = ["-mavx2", "-mfma", "-mbmi", "-mbmi2", "-mlzcnt", "-mpopcnt"]
 FLAGS_AVX512 = [
     *FLAGS_AVX2,
@@ -146,9 +149,14 @@ class BuildTopleft(build_ext):
         self.identity = (compiler, version, self.include_dirs)
 
         warnings = [*WARNINGS, *(["-Werror"] if os.environ.get("TOPLEFT_WERROR") == "1" else [])]
+        sanitizers = os.environ.get("TOPLEFT_SANITIZE")
+        last = [f"-fsanitize={sanitizers}", *FLAGS_SANITIZED] if sanitizers else []
         units = self.engine_units(ext) if ext.name == ENGINE else [(self.cython(ext), FLAGS_CLASSIC, [])]
         with ThreadPoolExecutor(self.parallel or os.cpu_count()) as pool:
-            jobs = [pool.submit(self.compile_unit, source, [*warnings, *own], define) for source, own, define in units]
+            jobs = [
+                pool.submit(self.compile_unit, source, [*warnings, *own, *last], define)
+                for source, own, define in units
+            ]
             objects = [str(job.result()) for job in jobs]
         self.compiler.link_shared_object(
             objects,
@@ -157,6 +165,7 @@ class BuildTopleft(build_ext):
             library_dirs=ext.library_dirs,
             runtime_library_dirs=ext.runtime_library_dirs,
             export_symbols=self.get_export_symbols(ext),
+            extra_postargs=last,
             debug=self.debug,
             build_temp=str(self.temp),
             target_lang="c",

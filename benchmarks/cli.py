@@ -27,6 +27,7 @@ from benchmarks.small.batch import STUDY as BATCH
 from benchmarks.small.field import STUDY as FIELD
 from benchmarks.small.fresh import STUDY as FRESH
 from benchmarks.small.gate import STUDY as GATE
+from benchmarks.small.growth import STUDY as GROWTH
 from benchmarks.small.layers import STUDY as LAYERS
 from benchmarks.small.memset import STUDY as MEMSET
 from benchmarks.small.samplings import STUDY as SAMPLINGS
@@ -36,7 +37,7 @@ STUDIES = {
     study.kind: study
     for study in (
         RUN, ACCURACY, BATCH, ATLAS, CHOICES, STATIC, PICTURES, LEVELS, LAYERS, FIELD, SAMPLINGS, PLANNER, MEMSET,
-        POLYGONS, FRESH, GATE,
+        GROWTH, POLYGONS, FRESH, GATE,
     )
 }  # fmt: skip
 

@@ -14,8 +14,23 @@ settings.register_profile(
 settings.load_profile("fixed")
 
 
+#: Pixels that the processes of pytest-xdist have compared.
+compared_elsewhere: list[int] = []
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_testnodedown(node):
+    compared_elsewhere.append(getattr(node, "workeroutput", {}).get("n_pixels_compared", 0))
+
+
+def pytest_sessionfinish(session):
+    if hasattr(session.config, "workeroutput"):
+        session.config.workeroutput["n_pixels_compared"] = comparing.n_pixels_compared
+
+
 def pytest_terminal_summary(terminalreporter):
-    terminalreporter.write_line(f"{comparing.n_pixels_compared:,} pixels compared with the exact reference")
+    n_pixels = comparing.n_pixels_compared + sum(compared_elsewhere)
+    terminalreporter.write_line(f"{n_pixels:,} pixels compared with the exact reference")
 
 
 @pytest.fixture

@@ -6,5 +6,6 @@ gate.py       two commits: instructions, and time in turns
 layers.py     each layer of a view beside its picture
 field.py      a field beside matplotlib, datashader and SciPy
 samplings.py  one scene in every sampling, as a picture
+growth.py     memory after thousands of calls
 memset.py     a yardstick: memset of the 4K pictures
 """

@@ -19,16 +19,16 @@ static int snap_exactly(const tl_source *source, int64_t i, int bits, int grid_b
         const int64_t v = ((const int64_t *)source->data)[i];
         if (v <= -TL_POLYGON_LIMIT || v >= TL_POLYGON_LIMIT)
             return 0;
-        value = (tl_int128)v << grid_bits;
+        value = v * ((tl_int128)1 << grid_bits);
     } else {
         const double v =
             source->scalar == TL_F32 ? (double)((const float *)source->data)[i] : ((const double *)source->data)[i];
         const double fx = rint(v * (double)((int64_t)1 << bits));
         if (!(fabs(fx) < 0x1p61))
             return 0;
-        value = (tl_int128)(int64_t)fx << (grid_bits - bits);
+        value = (int64_t)fx * ((tl_int128)1 << (grid_bits - bits));
     }
-    value -= (tl_int128)corner_px << grid_bits;
+    value -= corner_px * ((tl_int128)1 << grid_bits);
     *out = (int64_t)value;
     return value > -TL_POLYGON_LIMIT && value < TL_POLYGON_LIMIT;
 }

@@ -145,3 +145,44 @@ def test_what_was_drawn_is_not_pickled_and_says_what_to_take(draw):
     drawn = draw(np.column_stack([VERTICES, [1, 1, 1]]), [[0, 1, 2]], SIZE)
     with pytest.raises(TypeError, match=r"refers to memory of this process .* take its arrays, such as .triangle"):
         pickle.dumps(drawn)
+
+
+def test_polygons_into_memory_of_their_points_are_those_of_separate_memory():
+    out = np.zeros((64, 64), np.float32)
+    points = out.reshape(-1)[:8].reshape(4, 2)
+    points[...] = [[3, 3], [60, 5], [50, 60], [7, 40]]
+    expected = tl.polygons(points.copy(), (64, 64), sampling="area")
+    assert_same(tl.polygons(points, (64, 64), sampling="area", out=out), expected)
+
+
+def test_polygons_into_memory_of_their_offsets_are_those_of_separate_memory():
+    out = np.zeros((64, 64), np.int32)
+    offsets = out.reshape(-1)[:4].view(np.int64)
+    offsets[...] = [0, 4]
+    points = np.array([[3.0, 3], [60, 5], [50, 60], [7, 40]])
+    expected = tl.polygons((points, offsets.copy()), (64, 64), values="index")
+    assert_same(tl.polygons((points, offsets), (64, 64), values="index", out=out), expected)
+
+
+def test_polygons_of_offsets_at_an_odd_address_are_those_of_aligned_ones():
+    odd = np.zeros(17, np.uint8)[1:].view(np.int64)
+    odd[...] = [0, 4]
+    points = np.array([[3.0, 3], [60, 5], [50, 60], [7, 40]])
+    assert_same(tl.polygons((points, odd), (64, 64)), tl.polygons(points, (64, 64)))
+
+
+@pytest.mark.parametrize("name", ["triangles", "values"])
+def test_field_into_memory_of_its_inputs_is_that_of_separate_memory(name):
+    out = np.zeros((64, 64))
+    triangles = out.reshape(-1)[:6].view(np.int32)[:12].reshape(4, 3)
+    values = out.reshape(-1)[64:70]
+    points = np.random.default_rng(0).uniform(0, 64, (6, 2))
+    triangles[...], values[...] = [[0, 1, 2], [1, 2, 3], [2, 3, 4], [3, 4, 5]], range(6)
+    given = {"triangles": triangles.copy(), "values": values.copy()}
+    expected = tl.field((points, given["triangles"]), given["values"], (64, 64))
+    given[name] = triangles if name == "triangles" else values
+    assert_same_or_nan(tl.field((points, given["triangles"]), given["values"], (64, 64), out=out), expected)
+
+
+def assert_same_or_nan(got, expected):
+    assert np.array_equal(got, expected, equal_nan=True)

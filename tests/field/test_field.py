@@ -300,3 +300,15 @@ def test_field_of_words_is_refused():
 def test_field_with_an_index_outside_is_refused():
     with pytest.raises(IndexError, match=r"triangles must hold indices in \[0, 4\)"):
         tl.field((SQUARE, [[0, 1, 4]]), [1] * 4, (4, 3), extent=(0, 1, 0, 1))
+
+
+def test_field_of_float32_values_of_the_other_byte_order_is_float32():
+    scene, values = ([[0, 0], [4, 0], [0, 4]], [[0, 1, 2]]), np.array([0, 4, 8], np.float32)
+    got = tl.field(scene, values.astype(values.dtype.newbyteorder()), (4, 4))
+    assert got.dtype == np.float32
+    assert np.array_equal(got, tl.field(scene, values, (4, 4)), equal_nan=True)
+
+
+def test_height_map_of_more_pixels_than_numbers_count_is_refused():
+    with pytest.raises(ValueError, match="pixel_size must give a grid of countable pixels"):
+        tl.height_map(([[0, 0, 0], [4e10, 0, 0], [0, 4, 0]], [[0, 1, 2]]), 1e-300)

@@ -111,5 +111,5 @@ def test_readme_has_the_two_commands():
     commands = re.findall(r"```sh\n(.*?)\n```", readme, flags=re.DOTALL)
     assert commands == [
         "pip install '.[render]' && topleft render torus-knot -o knot.png",
-        "pip install '.[test]' && python -m pytest",
+        "pip install '.[test]' && python -m pytest -n auto",
     ]

@@ -1,7 +1,4 @@
-"""Files that nobody meant: mutated, truncated, pointing elsewhere. Each ends in a mesh or in one line of MeshError.
-
-`TOPLEFT_MUTATIONS` is the number of mutated files of each format; 150 unless set.
-"""
+"""Files that nobody meant: mutated, truncated, pointing elsewhere. Each ends in a mesh or in one line of MeshError."""
 
 from __future__ import annotations
 
@@ -16,36 +13,13 @@ import warnings
 import numpy as np
 import pytest
 from gltf_files import QUAD, GltfFile, glb_of
+from mutations import N_MUTATIONS, mutated_bytes, mutated_tree
 from PIL import Image
 
 import topleft as tl
 from topleft.errors import MeshError, MeshWarning, MissingPackageError
 
-N_MUTATIONS = int(os.environ.get("TOPLEFT_MUTATIONS", "150"))
 MOST_SECONDS = 10
-
-WORDS = [b"0", b"-1", b"1e999", b"nan", b"inf", b"4294967295", b"99999999999999999999", b"1.5", b"", b"/", b"//", b"\0"]
-JSON_VALUES = [
-    None,
-    True,
-    -1,
-    0,
-    1,
-    1.5,
-    1e308,
-    2**31,
-    2**53,
-    2**70,
-    "",
-    "x",
-    [],
-    {},
-    [0],
-    {"a": 0},
-    [[]],
-    "data:,",
-    "../a",
-]
 
 
 def rich_gltf():
@@ -76,55 +50,6 @@ def rich_gltf():
     file.node(mesh=file.mesh(strip, weights=[0.5]), extensions={"EXT_mesh_gpu_instancing": instances})
     file.node(camera=file.add("cameras", {"type": "perspective", "perspective": {"yfov": 1, "znear": 0.1}}))
     return file
-
-
-def places_of(tree, path=()):
-    """Where values stand in a JSON document."""
-    rows = tree.items() if isinstance(tree, dict) else enumerate(tree)
-    for key, value in rows:
-        yield (*path, key)
-        if isinstance(value, dict | list):
-            yield from places_of(value, (*path, key))
-
-
-def mutated_tree(rng, tree):
-    tree = json.loads(json.dumps(tree))
-    for _ in range(int(rng.integers(1, 3))):
-        places = list(places_of(tree))
-        *path, key = places[int(rng.integers(len(places)))]
-        holder = tree
-        for step in path:
-            holder = holder[step]
-        if rng.random() < 0.25:
-            del holder[key]
-        else:
-            holder[key] = JSON_VALUES[int(rng.integers(len(JSON_VALUES)))]
-    return tree
-
-
-def mutated_bytes(rng, content):
-    """Cut off, or with bytes changed, words replaced, parts doubled or taken out."""
-    content = bytearray(content)
-    for _ in range(int(rng.integers(1, 4))):
-        if not content:
-            break
-        at = int(rng.integers(len(content)))
-        match int(rng.integers(6)):
-            case 0:
-                del content[at:]
-            case 1:
-                content[at] = int(rng.integers(256))
-            case 2:
-                content[at : at + 4] = int(rng.integers(2**32)).to_bytes(4, "little")
-            case 3:
-                content[at:at] = content[at : at + int(rng.integers(60))]
-            case 4:
-                del content[at : at + int(rng.integers(1, 30))]
-            case _:
-                words = bytes(content).split(b" ")
-                words[int(rng.integers(len(words)))] = WORDS[int(rng.integers(len(WORDS)))]
-                content = bytearray(b" ".join(words))
-    return bytes(content)
 
 
 def glb_variant(rng):

@@ -158,3 +158,12 @@ def test_save_image_on_a_full_disk_is_an_error_and_leaves_nothing(tmp_path, suff
     assert done.returncode == 1
     assert "OSError" in done.stderr or "cannot write" in done.stderr
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(("suffix", "most"), [(".jpg", 65_500), (".jpeg", 65_500), (".webp", 16_383)])
+@pytest.mark.parametrize("turned", [False, True])
+def test_save_image_of_sides_that_the_format_has_not_is_refused(tmp_path, suffix, most, turned):
+    image = np.zeros((1, most + 1), np.uint8)
+    with pytest.raises(ImageError, match=f"{suffix} holds sides of at most {most} pixels"):
+        images.save_image(tmp_path / f"a{suffix}", image.T if turned else image)
+    images.save_image(tmp_path / f"a{suffix}", image[:, :most])

@@ -61,7 +61,7 @@ def as_array(name: str, values: ArrayLike) -> NDArray[Any]:
 
 def apart_from(out: object, name: str, values: ArrayLike) -> ArrayLike:
     """Return `values`, copied where `out`, an array or several, may share memory with them."""
-    if out is None or isinstance(values, (list, tuple)):
+    if out is None or isinstance(values, list | tuple | str | int | float):
         return values
     outs = out if isinstance(out, (list, tuple)) else (out,)
     array = as_array(name, values)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 import threading
 from typing import Any, Protocol
 
@@ -139,6 +140,8 @@ def empty(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
     n_bytes = _size(shape, dtype)
     if n_bytes < MIN_BLOCK_BYTES:
         return np.empty(shape, dtype)
+    if n_bytes > sys.maxsize:
+        allocate(n_bytes)  # whose error says how much it is
     return np.ndarray(shape, dtype, _engine.lease_block(n_bytes, allocate))
 
 

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft import _engine
-from topleft._base.arrays import as_array, as_checked_triangles, as_number, as_pair
+from topleft._base.arrays import apart_from, as_array, as_checked_triangles, as_number, as_pair
 from topleft._base.memory import SCRATCH
 from topleft._base.options import Per, Sink, check_choice, parse
 from topleft._base.threads import count_threads, run_parts
@@ -118,15 +118,16 @@ def field(
     """
     polygons = as_polygons(mesh)
     points = _plane_points(polygons)
-    array = as_array("values", values)
+    array = as_array("values", apart_from(out, "values", values))
     if array.dtype.kind not in "fiub":
         raise TypeError(f"values must be real numbers, got dtype {array.dtype}")
     is_per_face = _is_per_face(array, len(points), polygons.n_faces, parse(Per, "per", per))
     grid = _grid_of(polygons, size, pixel_size, extent, y)
-    points_px, triangles = grid.to_pixels(points), as_checked_triangles(polygons.triangles, len(points))
+    triangles = as_checked_triangles(apart_from(out, "triangles", polygons.triangles), len(points))
+    points_px = grid.to_pixels(points)
     size = _window_of(grid, origin) if window is None else window
     view = View.parse(size, {"subpixel_bits": subpixel_bits, "threads": threads, "origin": origin})
-    dtype: type[Any] = np.float32 if array.dtype == np.float32 else np.float64
+    dtype: type[Any] = np.float32 if array.dtype.newbyteorder("=") == np.float32 else np.float64
     if is_per_face and nodata is not None and array.dtype.kind in "iub":
         dtype = array.dtype.type
     empty = _nodata_of(nodata, dtype)
@@ -204,8 +205,8 @@ def height_map(
         raise ValueError(f"a height map needs points of shape (V, 3), got {points.shape}")
     is_grid = isinstance(spacing, Grid)
     grid = _grid_of(polygons, spacing, None, extent, y) if is_grid else _grid_of(polygons, None, spacing, extent, y)
-    triangles = as_checked_triangles(polygons.triangles, len(points))
-    points_px, heights = grid.to_pixels(points), np.ascontiguousarray(points[:, 2], np.float64)
+    triangles = as_checked_triangles(apart_from(out, "triangles", polygons.triangles), len(points))
+    points_px, heights = grid.to_pixels(points), points[:, 2].astype(np.float64)
     view = View.parse(grid.size, {"subpixel_bits": subpixel_bits, "threads": threads})
     sink = Sink.FARTHEST if surface == "upper" else Sink.NEAREST
     with canvas_of(SCRATCH, "field", out, view.size[::-1], np.float64) as (result, canvas):

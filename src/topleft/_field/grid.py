@@ -207,7 +207,10 @@ def grid_around(
     if not (np.isfinite(step).all() and (step > 0).all()):
         raise ValueError(f"pixel_size must be positive, got {pixel_size}")
     # A box of 3.0000000000000004 pixels, after the roundings of its sides, has three.
-    counts = np.maximum(np.ceil(np.array([x_max - x_min, y_max - y_min]) / step - 1e-9), 1)
+    with np.errstate(over="ignore"):
+        counts = np.maximum(np.ceil(np.array([x_max - x_min, y_max - y_min]) / step - 1e-9), 1)
+    if not np.isfinite(counts).all():
+        raise ValueError(f"pixel_size must give a grid of countable pixels, got {pixel_size} for {extent}")
     width, height = as_size((int(counts[0]), int(counts[1])))
     return Grid((width, height), (x_min, x_min + width * step[0], y_min, y_min + height * step[1]), y)
 

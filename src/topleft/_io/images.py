@@ -44,6 +44,9 @@ PILLOW_OPTIONS: Mapping[str, tuple[str, dict[str, Any]]] = {
     ".tiff": ("TIFF", {"compression": "tiff_adobe_deflate"}),
 }
 
+#: Pixels a side that libjpeg and WebP encode.
+MOST_SIDE = {".jpg": 65_500, ".jpeg": 65_500, ".webp": 16_383}
+
 
 def save_image(
     path: str | os.PathLike[str],
@@ -129,6 +132,11 @@ def _check_holds(path: Path, image: npt.NDArray[Any]) -> None:
         raise ImageError(
             f"cannot write {str(path)!r}: {path.suffix} holds {', '.join(kinds)}; got {image.dtype} {image.shape}"
             + "; .tif and .npy hold ids and floats" * (image.dtype.kind in "if")
+        )
+    most = MOST_SIDE.get(path.suffix.lower())
+    if most is not None and max(image.shape[:2]) > most:
+        raise ImageError(
+            f"cannot write {str(path)!r}: {path.suffix} holds sides of at most {most} pixels, got {image.shape[:2]}"
         )
     if image.size == 0:
         raise ImageError(f"cannot write {str(path)!r}: a picture of shape {image.shape} has no pixels")

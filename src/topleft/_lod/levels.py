@@ -151,10 +151,12 @@ class Levels(Sequence[Level]):
             ]
         except FileNotFoundError:
             raise FileNotFoundError(f"there is no file {str(path)!r}") from None
-        except (MeshError, OSError):
+        except MeshError:
             raise
-        except (ArithmeticError, AttributeError, EOFError, LookupError, MemoryError, RuntimeError, TypeError,
+        except (ArithmeticError, AttributeError, EOFError, LookupError, MemoryError, OSError, RuntimeError, TypeError,
                 ValueError, zipfile.BadZipFile, zlib.error) as error:  # fmt: skip
+            if isinstance(error, OSError) and error.filename is not None:  # it is the file, not what it says
+                raise
             raise MeshError(f"cannot read {str(path)!r}: broken, or not levels of detail ({error})") from error
         return keep_levels(mesh, cls(mesh, coarser))
 

@@ -12,7 +12,7 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from topleft._base.arrays import as_array, as_size, as_subpixel_bits, as_window
+from topleft._base.arrays import apart_from, as_array, as_size, as_subpixel_bits, as_window
 from topleft._base.memory import SCRATCH, FreshMemory, empty
 from topleft._base.options import Sampling, parse
 from topleft._base.threads import parse_threads, run_parts
@@ -139,7 +139,7 @@ def polygons(
     """
     how = parse(Sampling, "sampling", sampling)
     is_nonzero = parse(Rule, "rule", rule) is Rule.NONZERO
-    found, frame = frame_of(as_rings(rings), size, origin, subpixel_bits, threads, how.n_samples)
+    found, frame = frame_of(as_rings(rings).apart_from(out), size, origin, subpixel_bits, threads, how.n_samples)
     shape = frame.size[::-1]
     if values is None:
         if background is not None:
@@ -159,7 +159,7 @@ def polygons(
             else:
                 mean_of_samples(prepared, canvas, None, how, is_nonzero=is_nonzero)
         return result
-    paint = as_paint(values, background, len(found), how)
+    paint = as_paint(apart_from(out, "values", values), background, len(found), how)
     prepared = prepare(SCRATCH, found, frame, is_nonzero=is_nonzero)
     with canvas_of(FRESH, "values", out, (*shape, *paint.table.shape[1:]), paint.table.dtype.type) as (result, canvas):
         if canvas.size:

@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from topleft._base.arrays import apart_from, as_array
+
 __all__ = ["RingSet", "as_rings", "rings_of_triangles"]
 
 I64 = npt.NDArray[np.int64]
@@ -28,6 +30,13 @@ class RingSet:
 
     def __len__(self) -> int:
         return len(self.polygons) - 1
+
+    def apart_from(self, out: object) -> RingSet:
+        """Return it with copies of what `out` may share memory with."""
+        points, rings, polygons = (
+            np.asarray(apart_from(out, "rings", each)) for each in (self.points, self.rings, self.polygons)
+        )
+        return RingSet(points, rings, polygons)
 
 
 def as_rings(values: Any) -> RingSet:
@@ -94,7 +103,7 @@ def _from_offsets(values: Any) -> RingSet | None:
 
 
 def _as_offsets(values: Any, name: str, n: int, of: str) -> I64:
-    offsets = np.asarray(values)
+    offsets = as_array(name, values)
     if offsets.dtype.kind not in "iu":
         raise TypeError(f"{name} must be integers, got dtype {offsets.dtype}")
     if offsets.ndim != 1 or len(offsets) < 1:

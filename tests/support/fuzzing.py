@@ -1,0 +1,565 @@
+"""Calls of the public surface that nobody would write, drawn number by number, and what must hold of each of them.
+
+A case is drawn from a `Source`: hypothesis (`tests/trust/test_fuzz.py`), a random generator, or the bytes of a fuzzer
+that coverage guides (both in `fuzz.py`). It calls one verb with arrays of odd dtypes, strides, addresses and contents,
+with indices at every border, sizes up to beyond what memory holds, and `out=` that may overlap the inputs. Then either
+the call is refused in one line of a documented type, before `out` has changed; or it has written nowhere else, its
+inputs are what they were, and plain copies of the same arrays, drawn by another number of threads, give the same bits.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import numpy as np
+
+import topleft as tl
+
+REFUSALS = (ValueError, TypeError, IndexError, MemoryError, tl.TopleftError)
+TINY = [0.0, -0.0, 5e-324, 1e-310, 1e-45, 0.5, -0.5, 1 / 512, 2.0**22, -(2.0**24)]
+SPECIAL = [2.0**31, 2.0**53, 2.0**61, -(2.0**62), 1e30, -1e30, 1e300, 3.4e38, 1e39, float("inf"), float("-inf"),
+           float("nan")]  # fmt: skip
+INDICES = [-1, -2, 2**15, 2**16 - 1, 2**31 - 1, -(2**31), 2**31, 2**32, 2**63 - 1, -(2**63)]
+SIZES = [(0, 0), (0, 5), (5, 0), (2**31 - 1, 0), (0, 2**31 - 1), (2**31 - 1, 2**31 - 1), (2**31, 1), (1, -1),
+         (2**63, 2), (-(2**63), 1), (2**64, 2**64)]  # fmt: skip
+DTYPES = ["f8", "f4", "f2", ">f4", ">f8", "i4", "i8", "i2", "u1", "u8", ">i4", "g"]
+ODD_DTYPES = ["?", "c8", "O", "U3", "M8[s]"]
+INDEX_DTYPES = ["i4", "i8", "u4", "u8", "i2", "u1", ">i4", ">u8"]
+SAMPLINGS = ["center", "msaa2", "msaa4", "msaa8", "msaa16"]
+GUARD = 64
+
+
+class Source(Protocol):
+    """Where decisions come from."""
+
+    def integer(self, low: int, high: int) -> int:
+        """Return a number in [low, high]."""
+
+
+class FromRandom:
+    """Decisions of a seed."""
+
+    def __init__(self, seed: int) -> None:
+        self._rng = np.random.default_rng(seed)
+
+    def integer(self, low: int, high: int) -> int:
+        return int(self._rng.integers(low, high, endpoint=True))
+
+
+class FromBytes:
+    """Decisions of a file: up to four bytes each, zeros after its end."""
+
+    def __init__(self, content: bytes) -> None:
+        self._content, self._at = content, 0
+
+    def integer(self, low: int, high: int) -> int:
+        n = 1 if high - low < 256 else 2 if high - low < 65536 else 4
+        part = self._content[self._at : self._at + n]
+        self._at += n
+        return low + int.from_bytes(part, "little") % (high - low + 1)
+
+
+@dataclass
+class Draw:
+    """Decisions of a case, by what they are for."""
+
+    source: Source
+
+    def of(self, choices: Sequence[Any]) -> Any:
+        """One of some; the first is the plainest."""
+        return choices[self.source.integer(0, len(choices) - 1)]
+
+    def chance(self, one_in: int) -> bool:
+        """True once in so many times."""
+        return self.source.integer(0, one_in - 1) == one_in - 1
+
+    def mostly(self, usual: Sequence[Any], odd: Sequence[Any]) -> Any:
+        """One of the usual ones, now and then an odd one."""
+        return self.of(odd if self.chance(16) else usual)
+
+    def rng(self) -> np.random.Generator:
+        """A generator for the bulk of an array."""
+        return np.random.default_rng(self.source.integer(0, 65535))
+
+    def numbers(self, shape: tuple[int, ...], low: float, high: float) -> np.ndarray:
+        """Numbers of a range, of a lattice, or with some special ones among them."""
+        rng, kind = self.rng(), self.source.integer(0, 6)
+        values = np.asarray(rng.uniform(low, high, shape))
+        if kind == 1:
+            values = np.asarray(np.round(values * 2) / 2)
+        elif kind == 2:
+            values = np.asarray(values * 10.0 ** rng.integers(-3, 9))
+        if kind >= 4 and values.size:
+            for _ in range(self.source.integer(1, 3)):
+                values.reshape(-1)[self.source.integer(0, values.size - 1)] = self.mostly(TINY, SPECIAL)
+        return values
+
+    def as_dtype(self, values: np.ndarray, dtypes: Sequence[str]) -> np.ndarray:
+        """The numbers as another dtype."""
+        dtype = np.dtype(self.mostly(dtypes, ODD_DTYPES))
+        with np.errstate(all="ignore"), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            made = values.astype("i8").astype(dtype) if dtype.kind == "M" else values.astype(dtype)
+        if dtype.kind == "f" and dtype.itemsize in (4, 8) and made.size and self.chance(16):  # NaN with contents
+            words = made.view(f"{dtype.byteorder}u{dtype.itemsize}").reshape(-1)
+            words[self.source.integer(0, words.size - 1)] = (0x7FF << 52) + 0xABC if dtype.itemsize == 8 else 0xFFC12345
+        return made
+
+    def laid_out(self, array: np.ndarray) -> Any:
+        """The same numbers at an odd address, with other strides, read-only, or as a list."""
+        array, kind = np.asarray(array), self.source.integer(0, 9)
+        if kind == 1:
+            return np.asfortranarray(array)
+        if kind == 2 and array.ndim:
+            return array[::-1].copy()[::-1]
+        if kind == 3 and array.ndim:
+            wide = np.zeros((*array.shape[:-1], 2 * array.shape[-1]), array.dtype)
+            wide[..., ::2] = array
+            return wide[..., ::2]
+        if kind == 4 and not array.dtype.hasobject:
+            memory = np.zeros(array.nbytes + 1, np.uint8)
+            odd = memory[1:].view(array.dtype).reshape(array.shape)
+            odd[...] = array
+            return odd
+        if kind == 5:
+            array.flags.writeable = False
+        if kind == 6 and array.ndim and array.shape[0]:
+            return np.broadcast_to(array[:1], array.shape)
+        if kind == 7 and array.size < 64:
+            return array.tolist()
+        if kind == 8 and array.ndim > 1:
+            return array[:, ::-1].copy()[:, ::-1]
+        return array
+
+    def vertices(self, n: int, n_columns: Sequence[int], size: tuple[int, int]) -> Any:
+        """Rows of coordinates round a picture."""
+        side = min(max(*size, 4), 80)
+        columns = self.of(n_columns)
+        values = self.numbers((n, columns), -0.4 * side, 1.4 * side)
+        if columns == 4 and n:
+            values[:, 3] = np.where(np.isfinite(values[:, 3]), values[:, 3] / side + 0.5, values[:, 3])
+        return self.laid_out(self.as_dtype(values, DTYPES))
+
+    def triangles(self, n: int, n_vertices: int) -> Any:
+        """Rows of indices, now and then one at a border or beyond."""
+        values = self.rng().integers(0, max(n_vertices, 1), (n, 3))
+        dtype = self.mostly(INDEX_DTYPES, ["f8", "?", "O"])
+        with np.errstate(all="ignore"):
+            array = values.astype(dtype)
+        if n and self.chance(12):
+            wrong = self.of([n_vertices, n_vertices - 1, *INDICES])
+            info = np.iinfo(dtype) if array.dtype.kind in "iu" else None
+            if info and info.min <= wrong <= info.max:
+                array.reshape(-1)[self.source.integer(0, array.size - 1)] = wrong
+        return self.laid_out(array)
+
+    def shape(self, *wanted: int) -> tuple[int, ...]:
+        """A shape, now and then another one."""
+        if not self.chance(30):
+            return wanted
+        return self.of([(), (0,), (1, 1), wanted[:-1], (*wanted, 1), (wanted[0] + 1, *wanted[1:])])
+
+    def size(self) -> Any:
+        """A picture of a few thousand pixels, or of a size that no memory holds."""
+        if self.chance(30):
+            return self.of(SIZES)
+        return self.source.integer(1, 70), self.source.integer(1, 50)
+
+    def colors(self, n: int) -> Any:
+        """A row of colours for each."""
+        values = self.numbers(self.shape(n, self.of([4, 3, 1, 2])), 0, 255)
+        if not self.chance(12):
+            values = np.clip(np.nan_to_num(values), 0, 255)
+        return self.laid_out(self.as_dtype(values, ["u1", "f4", "f8", "i8", "f2"]))
+
+
+@dataclass
+class Case:
+    """A call: what is called with what, and which arguments the verbs would write to."""
+
+    name: str
+    call: Callable[..., Any]
+    arguments: tuple[Any, ...]
+    options: dict[str, Any] = field(default_factory=dict)
+
+    def run(self) -> list[np.ndarray]:
+        """Call it; the arrays that come back."""
+        return arrays_of(self.call(*self.arguments, **self.options))
+
+    def __repr__(self) -> str:
+        with np.printoptions(threshold=40):
+            return f"{self.name}(*{self.arguments!r}, **{self.options!r})"
+
+
+def arrays_of(result: Any) -> list[np.ndarray]:
+    """The arrays of a result, all attributes of fragments among them."""
+    if isinstance(result, np.ndarray):
+        return [result]
+    if isinstance(result, tuple | list):
+        return [array for one in result for array in arrays_of(one)]
+    if isinstance(result, tl.DepthLayers):
+        return [result.triangle, result.depth]
+    if isinstance(result, tl.Fragments):
+        return [result.triangle, result.depth, *map(np.asarray, result.planes if hasattr(result, "planes") else ())]
+    return []
+
+
+def view_of(draw: Draw, samplings: Sequence[str]) -> dict[str, Any]:
+    """Options that all verbs share."""
+    options: dict[str, Any] = {}
+    if draw.chance(2):
+        options["sampling"] = draw.of(samplings)
+    if draw.chance(3):
+        options["subpixel_bits"] = draw.mostly([8, 0, 4, 16, 1], [-1, 17])
+    if draw.chance(3):
+        options["origin"] = draw.mostly(
+            [(0, 0), (3, 2), (-7, 9)], [(2**31, -(2**31)), (2**44, 2**44), (2**62, 0), (2**63, 0)]
+        )
+    if draw.chance(4):
+        options["viewport"] = draw.mostly([(64, 48), (1, 1), (2**31 - 1, 2**31 - 1)], [(0, 0), (2**31, 4)])
+    if draw.chance(4):
+        options["cull"] = draw.of(["none", "back", "front"])
+    if draw.chance(5):
+        options["method"] = draw.mostly(["auto", "edge", "scanline"], ["float_barycentric", "zigzag"])
+    if draw.chance(4):
+        options["near_clip"] = options["far_clip"] = draw.of([True, False])
+    if draw.chance(6):
+        matrix = np.eye(4) + draw.numbers((4, 4), -0.2, 0.2)
+        options["transform"] = draw.laid_out(draw.as_dtype(matrix, ["f8", "f4", ">f8"]))
+    options["threads"] = draw.of([1, None, 2, 3])
+    return options
+
+
+def mesh_arrays(draw: Draw, size: Any, n_columns: Sequence[int] = (2, 3, 4)) -> tuple[Any, Any, int, int]:
+    """Vertices, triangles, and how many there are of each."""
+    n_vertices, n_triangles = draw.of([6, 3, 40, 1, 0, 200]), draw.of([2, 1, 0, 30, 300])
+    vertices = draw.vertices(n_vertices, n_columns, size if max(size) < 1000 else (60, 40))
+    return vertices, draw.triangles(n_triangles, n_vertices), n_vertices, n_triangles
+
+
+def out_of(draw: Draw, shape: tuple[int, ...], dtypes: Sequence[str], inputs: Sequence[Any]) -> Any:
+    """An array to draw into: plain, unsuitable, or over an input; nothing for a picture that no memory holds."""
+    kind = draw.source.integer(0, 9)
+    if kind < 5 or max(shape, default=0) > 1000 or min(shape, default=1) < 0:
+        return None
+    dtype = np.dtype(draw.of(dtypes))
+    memory = np.full(int(np.prod(shape)) * dtype.itemsize + 2 * GUARD + 1, 0x5A, np.uint8)
+    out = memory[GUARD : len(memory) - GUARD - 1].view(dtype).reshape(shape)
+    if dtype.kind == "b" or draw.chance(2):
+        out[...] = 0
+    if kind == 6:
+        own = [each for each in inputs if isinstance(each, np.ndarray) and each.flags.c_contiguous and each.size]
+        shared = draw.of(own) if own else None
+        if shared is not None and shared.nbytes <= out.nbytes and not shared.dtype.hasobject:
+            over = out.reshape(-1).view(np.uint8)[: shared.nbytes].view(shared.dtype).reshape(shared.shape)
+            over[...] = shared
+            for i, each in enumerate(inputs):
+                if each is shared:
+                    inputs[i] = over  # type: ignore[index]
+    if kind == 7:
+        return memory[GUARD + 1 : len(memory) - GUARD].view(dtype).reshape(shape)  # at an odd address
+    if kind == 8 and out.ndim > 1:
+        return draw.of([out[::-1], out[:, ::-1], np.asfortranarray(out), out[::2], out.swapaxes(0, 1)])
+    if kind == 9:
+        out.flags.writeable = False
+    return out
+
+
+def verb_case(draw: Draw) -> Case:
+    """`coverage`, `overdraw`, `fill`, `rasterize` or `wireframe`."""
+    size, name = draw.size(), draw.of(["coverage", "overdraw", "fill", "rasterize", "wireframe"])
+    more = {"coverage": ["area", "outer", "inner"], "overdraw": ["area", "outer", "inner"], "fill": ["area"]}
+    view = view_of(draw, ["center"] if name == "wireframe" else [*SAMPLINGS, *more.get(name, [])])
+    columns = (3,) if "transform" in view else (2, 2, 3, 4)
+    vertices, triangles, n_vertices, n_triangles = mesh_arrays(draw, size, columns)
+    inputs = [vertices, triangles]
+    shape = size[::-1]
+    rasterizer = tl.Rasterizer if draw.chance(8) else None
+    if name == "fill":
+        view["per"] = draw.of(["auto", "triangle", "vertex"])
+        colors = draw.colors(n_vertices if view["per"] == "vertex" else n_triangles)
+        view["blend"] = draw.of(["replace", "over", "add", "multiply", "max", "min"])
+        view["alpha"] = draw.of(["straight", "premultiplied"])
+        view["background"] = draw.of([None, 0, 255, 7.5, float("nan"), -1])
+        inputs.append(colors)
+        channels = np.shape(colors)[1:]
+        dtype = getattr(colors, "dtype", np.dtype("u1"))
+        view["out"] = out_of(draw, (*shape, *channels), ["u1" if dtype == np.uint8 else "f4", "f4", "u1"], inputs)
+    elif name == "rasterize":
+        view["depth_test"] = draw.of(["less", "greater", None])
+        view["background_depth"] = draw.of([None, 0.0, float("inf"), float("nan"), 1e300])
+        if draw.chance(3):
+            view["out"] = out_of(draw, shape, ["i4"], inputs), out_of(draw, shape, ["f4"], inputs)
+    else:
+        dtypes = {"coverage": ["?", "f4"], "overdraw": ["i4", "f4"], "wireframe": ["?", "f4", "u1"]}[name]
+        if name == "wireframe":
+            view["antialias"] = draw.of([False, True])
+            if draw.chance(3):
+                view["depth"] = draw.laid_out(draw.numbers(draw.shape(*shape), -1, 1).astype("f4")) if max(
+                    size) < 1000 and min(size) >= 0 else None  # fmt: skip
+        view["out"] = out_of(draw, shape, dtypes, inputs)
+
+    def call(*arrays: Any, **options: Any) -> Any:
+        if rasterizer is not None and name != "wireframe":
+            return getattr(rasterizer(size), name)(*arrays, **options)
+        return getattr(tl, name)(*arrays, size, **options)
+
+    return Case(f"{name} {size}", call, tuple(inputs), view)
+
+
+def fragments_case(draw: Draw) -> Case:
+    """Attributes of a visibility buffer whose ids its owner may have changed."""
+    size, n_vertices, n_triangles = (draw.source.integer(1, 40), draw.source.integer(1, 30)), 30, 40
+    rng = draw.rng()
+    scene = rng.uniform(-5, 45, (n_vertices, 3)), rng.integers(0, n_vertices, (n_triangles, 3))
+    frags = tl.rasterize(*scene, size, sampling=draw.of(["center", "msaa4"]), threads=1)
+    if draw.chance(3):
+        ids = frags.triangle
+        ids[draw.source.integer(0, size[1] - 1), draw.source.integer(0, size[0] - 1)] = draw.of(
+            [n_triangles, -2, 10**8]
+        )
+    kind = draw.of(["interpolate", "barycentric", "sample"])
+    values = draw.laid_out(draw.as_dtype(draw.numbers(draw.shape(n_vertices, 2), -2, 3), DTYPES))
+    image = draw.laid_out(draw.as_dtype(draw.numbers(draw.shape(draw.of([4, 1, 9]), 5, 3), 0, 255), DTYPES))
+
+    def call(values: Any, image: Any, **options: Any) -> Any:
+        if kind == "barycentric":
+            return frags.barycentric()
+        if kind == "sample":
+            return frags.sample(image, values, **options)
+        return frags.interpolate(values)
+
+    options = {"filter": draw.of(["nearest", "linear", "trilinear"]), "wrap": draw.of(["repeat", "clamp"])}
+    return Case(f"Fragments.{kind}", call, (values, image), options if kind == "sample" else {})
+
+
+def peel_case(draw: Draw) -> Case:
+    """`peel`, and `composite` of layers whose ids their owner may have changed."""
+    size, view = draw.size(), view_of(draw, ["center"])
+    view["layers"] = draw.mostly([2, 1, 4], [0, 300, 2**31, 2**63])
+    columns = (3,) if "transform" in view else (3, 4)
+    vertices, triangles, _, n_triangles = mesh_arrays(draw, size, columns)
+    colors = draw.colors(n_triangles)
+    is_composed, is_changed, opacity = (
+        draw.chance(2),
+        draw.chance(3),
+        draw.mostly([None, 0.5], [2.0, -1.0, float("nan")]),
+    )
+
+    def call(vertices: Any, triangles: Any, colors: Any, **options: Any) -> Any:
+        layers = tl.peel(vertices, triangles, size, **options)
+        if not is_composed:
+            return layers
+        if is_changed and layers.planes[0].size:
+            layers.planes[0].reshape(-1)[0] = 10**8
+        return tl.composite(layers, colors, per="triangle", opacity=opacity)
+
+    return Case(f"peel {size}", call, (vertices, triangles, colors), view)
+
+
+def field_case(draw: Draw) -> Case:
+    """`field` or `height_map`."""
+    size = draw.size()
+    is_map = draw.chance(3)
+    vertices, triangles, n_vertices, n_triangles = mesh_arrays(draw, size, (3,) if is_map else (2, 3))
+    if is_map:
+        spacing = draw.mostly([4.0, 1.0, 0.7], [0.0, -1.0, float("nan"), 1e-300, 1e300, 1e-12])
+        options = {
+            "spacing": spacing,
+            "extent": draw.mostly([(0, 60, 0, 40), (-5, 9.5, 2, 11)], [None]),
+            "surface": draw.of(["upper", "lower"]),
+            "threads": draw.of([1, None, 2]),
+        }
+        return Case("height_map", lambda *arrays, **options: tl.height_map(arrays, **options), (vertices, triangles),
+                    options)  # fmt: skip
+    values = draw.laid_out(draw.as_dtype(draw.numbers(draw.shape(draw.of([n_vertices, n_triangles])), -5, 5), DTYPES))
+    inputs = [vertices, triangles, values]
+    options = {
+        "threads": draw.of([1, None, 2]),
+        "subpixel_bits": draw.of([8, 0, 16]),
+        "origin": draw.of([(0, 0), (5, 3)]),
+    }
+    if draw.chance(2):
+        odd = [(0, 0, 0, 0), (5, -5, 0, 1), (0, 1e300, 0, 1), (0, float("nan"), 0, 1), (-1e308, 1e308, 0, 1)]
+        options["extent"] = draw.mostly([(0, 60, 0, 40)], odd)
+    out = out_of(draw, size[::-1], ["f8", "f4"], inputs)
+
+    def call(vertices: Any, triangles: Any, values: Any, **options: Any) -> Any:
+        return tl.field((vertices, triangles), values, size, **options)
+
+    return Case(f"field {size}", call, tuple(inputs), {**options, "out": out})
+
+
+def points_case(draw: Draw) -> Case:
+    """`points`."""
+    size, view = draw.size(), view_of(draw, SAMPLINGS)
+    view = {name: value for name, value in view.items() if name not in ("cull", "method")}
+    n = draw.of([5, 1, 0, 300])
+    positions = draw.vertices(n, (3,) if "transform" in view else (3, 2, 4), size if max(size) < 1000 else (60, 40))
+    widths = draw.laid_out(draw.as_dtype(np.abs(draw.numbers(draw.shape(n), 1, 9)), DTYPES))
+    view["shape"] = draw.of(["square", "disc"])
+    view["depth_test"] = draw.of(["less", "greater"])
+
+    def call(positions: Any, widths: Any, **options: Any) -> Any:
+        return tl.points(positions, size, point_size=widths, **options)
+
+    return Case(f"points {size}", call, (positions, widths), view)
+
+
+def polygons_case(draw: Draw) -> Case:
+    """`polygons`, in the forms that it takes."""
+    size = draw.size()
+    n = draw.mostly([8, 3, 40, 300], [2, 0])
+    coordinates = draw.vertices(n, (2,), size if max(size) < 1000 else (60, 40))
+    n_rings = min(draw.of([2, 1, 3]), max(n // 3, 1))
+    offsets = np.linspace(0, n, n_rings + 1).astype(int)
+    offsets[0], offsets[-1] = 0, n
+    offsets = offsets.astype(draw.mostly(["i8", "i4", "u8", ">i4"], ["f8"]))
+    if draw.chance(12):
+        offsets[draw.source.integer(0, n_rings)] = draw.of([n + 1, 2**31 - 1, 0])
+    parts = np.arange(n_rings + 1) if draw.chance(2) else np.array([0, n_rings])
+    options: dict[str, Any] = {
+        "rule": draw.of(["evenodd", "nonzero"]),
+        "sampling": draw.of(["center", "area", "outer", "inner", "msaa4"]),
+        "values": draw.of(
+            [None, "index", 7, 1e300, [1.5] * (len(parts) - 1), np.ones((len(parts) - 1, 3), "u1"), -0.5]
+        ),
+        "threads": draw.of([1, None, 2]),
+        "subpixel_bits": draw.of([8, 0, 16]),
+        "origin": draw.mostly([(0, 0), (5, -3)], [(2**40, 0), (2**59, 0)]),
+    }
+    inputs = [coordinates, draw.laid_out(offsets), draw.laid_out(parts)]
+    options["out"] = out_of(draw, size[::-1], ["?", "i4", "f4"], inputs)
+
+    def call(*arrays: Any, **options: Any) -> Any:
+        return tl.polygons(arrays, size, **options)
+
+    return Case(f"polygons {size}", call, tuple(inputs), options)
+
+
+def mesh_case(draw: Draw) -> Case:
+    """Pictures of a `Mesh`: shaded, as layers, as a silhouette, through a lens, simplified."""
+    size = draw.size()
+    vertices, triangles, n_vertices, n_triangles = mesh_arrays(draw, (6, 5), (3,))
+    uv = (
+        draw.laid_out(draw.as_dtype(draw.numbers(draw.shape(n_vertices, 2), -1, 2), DTYPES)) if draw.chance(2) else None
+    )
+    colors = draw.colors(n_vertices) if draw.chance(3) else None
+    name = draw.of(["render", "silhouette", "render_layers", "rasterize_mesh", "transparent", "simplify", "clusters"])
+    eye = draw.mostly([(4.0, 3.0, 9.0), (2.0, 2.0, 2.0)], [(0, 0, 0), (1e-300, 0, 1e-300), (1e30, 0, 0)])
+    look = {"sampling": draw.of(["center", "msaa4"])} if name in ("render", "silhouette") else {}
+    if name == "render":
+        look["shading"] = draw.of(["smooth", "flat", "unlit"])
+    lens = tl.OpenCVLens(k1=draw.of([-0.2, 0.1])) if draw.chance(6) and n_triangles <= 30 else None
+    threads = draw.of([1, None, 2])
+
+    def call(vertices: Any, triangles: Any, uv: Any, colors: Any) -> Any:
+        image = np.arange(48, dtype=np.uint8).reshape(4, 4, 3)
+        materials = (tl.Material(texture=tl.Texture(image)),) if uv is not None else ()
+        mesh = tl.Mesh(vertices, triangles, uv=uv, colors=colors, materials=materials)
+        camera = tl.Camera.look_at(eye, (2, 2, 0.5), fov_y_deg=50)
+        if lens is not None:
+            camera = tl.Camera(camera.view, camera.projection, lens=lens)
+        if name == "simplify":
+            levels = tl.simplify(mesh, smallest=8)
+            return [np.asarray(level.mesh.vertices) for level in levels]
+        if name == "clusters":
+            return [np.asarray(mesh.bounds), mesh.vertex_normals(), mesh.clusters.triangles]
+        if name == "transparent":
+            return tl.render_transparent(mesh, camera, size, threads=threads)
+        if name == "render_layers":
+            layers = tl.render_layers(
+                mesh, camera, size, layers=["depth", "world_normal", "triangle", "color"], threads=threads
+            )
+            return [layers[each] for each in layers]
+        return getattr(tl, name)(mesh, camera, size, threads=threads, **look)
+
+    return Case(f"{name} {size}", call, (vertices, triangles, uv, colors))
+
+
+KINDS: dict[str, Callable[[Draw], Case]] = {
+    "verb": verb_case,
+    "fragments": fragments_case,
+    "peel": peel_case,
+    "field": field_case,
+    "points": points_case,
+    "polygons": polygons_case,
+    "mesh": mesh_case,
+}
+
+
+def plain(value: Any) -> Any:
+    """Copies of arrays, contiguous, aligned, of the machine's byte order."""
+    if isinstance(value, np.ndarray):
+        return np.array(value, value.dtype.newbyteorder("="), order="C")
+    if isinstance(value, tuple):
+        return tuple(plain(each) for each in value)
+    return value
+
+
+def owner_of(array: np.ndarray) -> np.ndarray:
+    """The array whose memory it is."""
+    while isinstance(array.base, np.ndarray):
+        array = array.base
+    return array
+
+
+def memory_of(array: np.ndarray) -> bytes:
+    """All bytes of the memory that an array lies in."""
+    return b"" if array.dtype.hasobject else owner_of(array).tobytes()
+
+
+def guards_of(outs: Sequence[np.ndarray]) -> list[bytes]:
+    """What lies before and behind the memory to draw into."""
+    return [memory_of(out)[:GUARD] + memory_of(out)[-GUARD:] for out in outs if owner_of(out).ndim == 1]
+
+
+def must(holds: bool, case: Case, words: str) -> None:
+    """Raise an AssertionError about a case."""
+    if not holds:
+        raise AssertionError(f"{words}: {case}")
+
+
+def check(case: Case) -> str:
+    """Run a case; returns "drawn" or the name of the error that refused it. What must not be is an AssertionError."""
+    out = case.options.get("out")
+    outs = [each for each in (out if isinstance(out, tuple) else (out,)) if isinstance(each, np.ndarray)]
+    apart = [each for each in case.arguments
+             if isinstance(each, np.ndarray) and not any(np.may_share_memory(each, one) for one in outs)]  # fmt: skip
+    again = Case(case.name, case.call, plain(case.arguments), {**case.options, "out": plain(out)})
+    if "out" not in case.options:
+        del again.options["out"]
+    before, drawn_over, guards = (
+        [memory_of(each) for each in apart],
+        [memory_of(each) for each in outs],
+        guards_of(outs),
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of NumPy, for numbers that overflow when they become float32
+        try:
+            results = [result.copy() for result in case.run()]
+        except REFUSALS as error:
+            words = str(error)
+            must("\n" not in words and 0 < len(words) < 900, case, f"{type(error).__name__} says {words!r}")
+            must("bytes" in words or not isinstance(error, MemoryError), case, words)
+            must([memory_of(each) for each in outs] == drawn_over, case, f"out has changed, and then: {words}")
+            return type(error).__name__
+        must([memory_of(each) for each in apart] == before, case, "an input has changed")
+        must(guards_of(outs) == guards, case, "a write beside out")
+        if "threads" in again.options:
+            again.options["threads"] = 3 if again.options["threads"] == 1 else 1
+        for got, expected in zip(results, again.run(), strict=True):
+            must(got.dtype == expected.dtype, case, f"plain copies give {expected.dtype}, not {got.dtype}")
+            differ = (got != expected) & ~((got != got) & (expected != expected))
+            must(not differ.any(), case, f"plain copies give {expected[differ][:3]}, not {got[differ][:3]}")
+    return "drawn"
+
+
+def check_one(source: Source, kind: str | None = None) -> str:
+    """Draw a case and check it."""
+    draw = Draw(source)
+    case = KINDS[kind or draw.of(list(KINDS))](draw)
+    return f"{case.name.partition(' ')[0]} {check(case)}"

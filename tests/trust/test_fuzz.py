@@ -1,0 +1,38 @@
+"""Calls that nobody would write: each is drawn as plain copies of its arrays are, or refused in one line."""
+
+import pytest
+from fuzzing import KINDS, REFUSALS, FromBytes, FromRandom, check_one
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+N_CASES = {"verb": 250, "mesh": 60}
+
+
+class FromHypothesis:
+    """Decisions that hypothesis shrinks."""
+
+    def __init__(self, data):
+        self._data = data
+
+    def integer(self, low, high):
+        return self._data.draw(st.integers(low, high))
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")  # of NumPy, for numbers that overflow when they become float32
+@pytest.mark.parametrize("kind", KINDS)
+def test_calls_that_nobody_would_write_are_drawn_alike_or_refused(kind):
+    seen = set()
+
+    @settings(max_examples=N_CASES.get(kind, 100))
+    @given(st.data())
+    def check_each(data):
+        seen.add(check_one(FromHypothesis(data), kind).split()[1])
+
+    check_each()
+    assert "drawn" in seen
+    assert seen - {"drawn"} <= {error.__name__ for error in REFUSALS}
+
+
+def test_a_file_of_the_guided_fuzzer_is_a_case():
+    assert check_one(FromBytes(b"")).endswith(" drawn")
+    assert len({check_one(FromRandom(seed)) for seed in range(20)}) > 5
