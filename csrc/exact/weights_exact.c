@@ -1,8 +1,9 @@
 /* Weights: those of the three corners at the pixels of a visibility buffer, from vertices that are not snapped.
  * In: ids, the points they were drawn from.  Out: barycentric weights, or values of the vertices.
  *
- * A weight is an edge function over the area.  In float64 both err by 2^-50 of the box, so a weight by 2^-38 where the
- * box holds up to 2^12 areas; slivers, and what leaves the range of float64, take edge functions that are rounded once. */
+ * Weights are in proportion to edge functions over w.  A float64 edge function is taken where its error bound is below
+ * 2^-32 of it; elsewhere, near an edge and of slivers, one that is exact to 2^-50.  So each weight is within 2^-30 of
+ * its own size, however far apart the w are. */
 #ifndef TL_WEIGHTS_EXACT_C
 #define TL_WEIGHTS_EXACT_C
 
@@ -10,7 +11,6 @@
 #include <stdint.h>
 
 #include "topleft.h"
-#include "exact/alone_exact.c"
 #include "exact/project_exact.c"
 #include "exact/setup_exact.c"
 #include "exact/sign.c"
@@ -22,23 +22,7 @@ typedef struct {
     exact_point corners[3];
     const double *piece[3]; /* weights of a piece's corners in the source triangle, or NULL */
     double inv_w[3];
-    int has_plane;
-    double area;
-    scaled_number scaled_area;
 } weighed_exact;
-
-static void set_weighed(weighed_exact *t)
-{
-    const exact_point *p = t->corners;
-    const double x1 = p[1].x - p[0].x, y1 = p[1].y - p[0].y, x2 = p[2].x - p[0].x, y2 = p[2].y - p[0].y;
-    const double width = most_of(p[0].x, p[1].x, p[2].x) - least_of(p[0].x, p[1].x, p[2].x);
-    const double height = most_of(p[0].y, p[1].y, p[2].y) - least_of(p[0].y, p[1].y, p[2].y), box = width * height;
-    t->area = x1 * y2 - y1 * x2;
-    t->has_plane = width <= TL_MOST_EXTENT && height <= TL_MOST_EXTENT && box >= TL_LEAST_BOX &&
-                   fabs(t->area) * (double)(1 << TL_SLIVER_BITS) >= box;
-    if (!t->has_plane)
-        t->scaled_area = edge_value(p[0], p[1], p[2]);
-}
 
 /* Whether a sample lies in a triangle of either turn. */
 static int holds(const exact_point *p, exact_point sample)
@@ -82,7 +66,6 @@ static int find_weighed(weighed_exact *t, const tl_snapped *mesh, const tl_exact
         is_cut |= isnan(t->corners[k].x);
     }
     if (!is_cut) {
-        set_weighed(t);
         t->id = id;
         return 1;
     }
@@ -95,23 +78,40 @@ static int find_weighed(weighed_exact *t, const tl_snapped *mesh, const tl_exact
             t->piece[k] = pieces->weights + 3 * (int64_t)pieces->triangles[3 * i + k];
             t->inv_w[k] = pieces->inv_w[pieces->triangles[3 * i + k]];
         }
-        set_weighed(t);
         t->id = id;
         return 1;
     }
     return 0;
 }
 
+/* The edge functions opposite the corners, all by one power of two, which makes them numbers near 1. */
+static void scaled_edges(const exact_point *corners, exact_point s, double *e)
+{
+    scaled_number found[3];
+    int exponents[3], most = INT32_MIN;
+    for (int k = 0; k < 3; k++) {
+        const int next = k == 2 ? 0 : k + 1;
+        const exact_point a = corners[next], b = corners[3 - k - next];
+        double bound;
+        found[k] = (scaled_number){rounded_edge(a, b, s, &bound), 0};
+        if (!(fabs(found[k].mantissa) * 0x1p-32 > bound))
+            found[k] = edge_value(a, b, s);
+        int exponent;
+        found[k].mantissa = frexp(found[k].mantissa, &exponent);
+        exponents[k] = found[k].exponent + exponent;
+        most = found[k].mantissa != 0.0 && exponents[k] > most ? exponents[k] : most;
+    }
+    for (int k = 0; k < 3; k++)
+        e[k] = found[k].mantissa == 0.0 ? 0.0 : ldexp(found[k].mantissa, exponents[k] - most);
+}
+
 /* Perspective-correct weights of the input triangle's corners at a sample. */
 static void weights_of_sample(const weighed_exact *t, exact_point s, double *weights)
 {
     double part[3], sum = 0.0;
+    scaled_edges(t->corners, s, part);
     for (int k = 0; k < 3; k++) {
-        const int next = k == 2 ? 0 : k + 1;
-        const exact_point a = t->corners[next], b = t->corners[3 - k - next];
-        const double e = t->has_plane ? ((b.x - a.x) * (s.y - a.y) - (b.y - a.y) * (s.x - a.x)) / t->area
-                                      : scaled_quotient(edge_value(a, b, s), t->scaled_area);
-        part[k] = e * t->inv_w[k];
+        part[k] *= t->inv_w[k];
         sum += part[k];
     }
     for (int k = 0; k < 3; k++)

@@ -18,7 +18,7 @@ from topleft._base.threads import run_parts
 from topleft._raster import choices
 from topleft._raster.view import View
 
-__all__ = ["Snapped", "snap_mesh"]
+__all__ = ["Snapped", "snap_mesh", "snap_to_cover"]
 
 SPECIAL, BAD, WIDE = np.iinfo(np.int32).min, 0, 1  # x_fx and y_fx of vertices that are not narrow: csrc/topleft.h
 UNCHECKED = -2  # instead of the row of a bad triangle; -1: there is none
@@ -47,6 +47,11 @@ class Snapped:
         return len(self.triangles)
 
     @property
+    def can_share(self) -> bool:
+        """Whether threads can each take some of the triangles."""
+        return True
+
+    @property
     def has_depth(self) -> bool:
         """Whether vertices have a depth of their own; otherwise all of them lie at 0."""
         return self.source.is_clip_space or self.points.shape[1] == 3
@@ -61,6 +66,11 @@ class Snapped:
 @dataclass(frozen=True, slots=True)
 class Unsnapped(Snapped):
     """A mesh whose vertices stay where they are: `mesh` is an `_engine.ExactMesh`."""
+
+    @property
+    def can_share(self) -> bool:
+        """Whether threads can each take some of the triangles."""
+        return False
 
     def check_indices(self) -> None:
         """Raise an error for the first triangle with an index or a vertex that cannot be drawn."""
@@ -123,6 +133,40 @@ def snap_mesh(
         drawn = without_sides(seen, drawn, is_single, view.threads)
     mesh = _engine.SnappedMesh(source, records, wide, drawn, pieces, view.how, viewport)
     return Snapped(mesh, indices, triangles, points, source, records, pieces)
+
+
+def snap_to_cover(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, view: View, *, out: object) -> Snapped:
+    """Take arrays as `snap_mesh` does, for a picture that asks nothing but which samples are covered.
+
+    On a fine grid float lanes draw the snapped vertices as they do vertices that are not snapped: the same picture.
+    """
+    found = snap_for_floats(memory, vertices, triangles, view, out) if choices.pays_float_lanes(view) else None
+    return found or snap_mesh(memory, vertices, triangles, view, with_depth=False, out=out)
+
+
+def snap_for_floats(
+    memory: Memory, vertices: ArrayLike, triangles: ArrayLike, view: View, out: object
+) -> Unsnapped | None:
+    """Return pixels rounded to the grid as float64; None for clip space, and where a vertex leaves the range."""
+    points, source = transform(vertices, view, out)
+    triangles = apart_from(out, "triangles", triangles)
+    n = len(points)
+    if source.is_clip_space or not n or 0 in view.size:
+        return None
+    indices, bad_row = index(memory, triangles, n, view)
+    taken = memory.empty("points", points.shape, np.float64)
+
+    def take_part(first: int, end: int) -> int:
+        return source.take(first, end, taken, view.subpixel_bits)
+
+    if sum(run_parts(take_part, n, choices.threads_to_snap(view.threads, n, len(indices)))):
+        return None
+    if bad_row == UNCHECKED and out is not None:
+        bad_row = _engine.first_bad_row(indices, n)
+    if bad_row >= 0:
+        raise bad_triangle(triangles, bad_row, n)
+    mesh = _engine.ExactMesh(taken, indices, view.how)
+    return Unsnapped(mesh, indices, triangles, points, source, np.empty(0, np.uint8), None)
 
 
 def take_mesh(
