@@ -31,13 +31,14 @@ from benchmarks.small.growth import STUDY as GROWTH
 from benchmarks.small.layers import STUDY as LAYERS
 from benchmarks.small.memset import STUDY as MEMSET
 from benchmarks.small.samplings import STUDY as SAMPLINGS
+from benchmarks.small.tiles import STUDY as TILES
 from benchmarks.static.study import STUDY as STATIC
 
 STUDIES = {
     study.kind: study
     for study in (
         RUN, ACCURACY, BATCH, ATLAS, CHOICES, STATIC, PICTURES, LEVELS, LAYERS, FIELD, SAMPLINGS, PLANNER, MEMSET,
-        GROWTH, POLYGONS, FRESH, GATE,
+        GROWTH, POLYGONS, FRESH, GATE, TILES,
     )
 }  # fmt: skip
 

@@ -41,6 +41,8 @@
 #include "polygons/mask.c"
 #include "polygons/labels.c"
 #include "polygons/shares.c"
+#include "tiles/spans.c"
+#include "tiles/merge.c"
 
 #ifndef TL_KERNELS /* read by itself, as an editor does */
 #define TL_ISA_NAME "none"
@@ -119,4 +121,7 @@ const tl_kernels TL_KERNELS = {
     .mask_nonzero = mask_nonzero,
     .label_polygons = label_polygons,
     .share_polygons = share_polygons,
+    .list_spans = list_spans,
+    .merge_fragments = merge_fragments,
+    .name_triangles = name_triangles,
 };

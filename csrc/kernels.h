@@ -297,6 +297,18 @@ typedef struct tl_kernels {
     /* Exact shares of pixels.  Returns how many polygons of the job are finished: fewer than all when the table is
      * full. */
     int64_t (*share_polygons)(const tl_polygons *polygons, const tl_share_job *job);
+
+    /* The windows that n triangles may touch, whose corners (n, 3, 2) are in pixels.  With out = NULL adds to
+     * starts[row + 1] how many spans a row of windows has, and returns the first triangle that cannot be snapped, or
+     * -1.  Otherwise writes the spans of each row from starts[row] on, which is then where they end. */
+    int64_t (*list_spans)(const tl_tiling *tiling, const double *corners_px, int64_t n, int64_t first_triangle,
+                          int64_t *starts, tl_window_span *out);
+
+    /* Pixels [first, end) of two visibility buffers into the first. */
+    void (*merge_fragments)(const tl_merge *merge, int64_t first, int64_t end);
+
+    /* Ids [first, end) become names[1 + id]. */
+    void (*name_triangles)(int32_t *ids, int64_t first, int64_t end, const int32_t *names);
 } tl_kernels;
 
 #endif

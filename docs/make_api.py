@@ -37,6 +37,7 @@ SUBJECTS: Mapping[str, tuple[str, ...]] = {
     "Many pictures": ("render_batch", "Job"),
     "Levels of detail": ("simplify", "Levels", "Level", "choose_detail", "Detail"),
     "Fields and heights on a grid": ("field", "height_map", "Grid"),
+    "Huge rasters, many machines": ("tiles", "Tiles", "Window", "merge"),
     "What a draw needs, and why": ("plan", "Plan"),
     "Scenes to try things on": ("scenes",),
     "The library itself": ("release_memory", "build_info", "bresenham_line", "__version__"),
@@ -45,7 +46,7 @@ SUBJECTS: Mapping[str, tuple[str, ...]] = {
 
 RETURNED = frozenset({
     "DepthLayers", "Detail", "Fragments", "FragmentsBatch", "Overlap", "Plan", "SceneDepthLayers", "SceneFragments",
-    "ViewLayers",
+    "Tiles", "ViewLayers", "Window",
 })  # fmt: skip
 """Classes that functions return: nobody calls them."""
 
@@ -73,6 +74,11 @@ MEMBERS: Mapping[str, tuple[str, ...]] = {
     "SceneDepthLayers": ("instance", "triangle"),
     "Job": ("files",),
     "Levels": ("save", "load"),
+    "Tiles": (
+        "windows", "read", "grid", "dtype", "shape", "n_windows", "explain", "to_dask", "to_xarray", "to_zarr",
+        "to_geotiff", "to_deepzoom",
+    ),
+    "Window": ("slices",),
     "Grid": ("around", "pixel_size", "x_centers", "y_centers", "to_pixels"),
     "Plan": ("explain", "to_dict", "measure", "estimated_ms", "measured_ms"),
     "scenes": (

@@ -7,5 +7,6 @@ layers.py     each layer of a view beside its picture
 field.py      a field beside matplotlib, datashader and SciPy
 samplings.py  one scene in every sampling, as a picture
 growth.py     memory after thousands of calls
+tiles.py      huge rasters by windows, beside rasterio and datashader
 memset.py     a yardstick: memset of the 4K pictures
 """

@@ -19,6 +19,8 @@
 #include "area/ramp.c"
 
 #define TL_SUM_MARGIN (1 << 20) /* rounding may leave a few units less than nothing */
+/* Pixels of a run that is looked at as a whole: inside of a shape it is filled. */
+#define TL_RUN_LANES (4 * TL_LANES)
 #define TL_SUM_UNIT (1.0f / (1 << TL_AREA_BITS))
 
 /* Sums are unsigned, but for those just below 0. */
@@ -69,6 +71,22 @@ TL_INLINE void store_areas(float *out, int64_t n, vf areas)
         vf_store_masked(out, vm_first(n), areas);
 }
 
+/* Whether no edge meets the cells of a run in two rows. */
+TL_INLINE int is_clear(const int32_t *a, const int32_t *b)
+{
+    const vi bias = vi_set1(TL_CELL_ZERO);
+    vi met = vi_set1(0);
+    for (int k = 0; k < TL_RUN_LANES; k += TL_LANES)
+        met = vi_or(met, vi_or(vi_xor(vi_load(a + k), bias), vi_xor(vi_load(b + k), bias)));
+    return !vm_any(vi_gt_unsigned(met, vi_set1(0)));
+}
+
+TL_INLINE void fill_areas(float *out, vf areas)
+{
+    for (int k = 0; k < TL_RUN_LANES; k += TL_LANES)
+        vf_store(out + k, areas);
+}
+
 /* Two rows at a time hide how long a carry takes. */
 TL_INLINE int accumulate_narrow(const area_plane *plane, const tl_area *target, int is_clamped)
 {
@@ -79,14 +97,23 @@ TL_INLINE int accumulate_narrow(const area_plane *plane, const tl_area *target, 
         int32_t *a = plane->cells + row * stride + TL_CELL_PAD, *b = plane->cells + below * stride + TL_CELL_PAD;
         float *out_a = target->pixels + row * target->stride_px, *out_b = target->pixels + below * target->stride_px;
         vi carry_a = left_sum(a - TL_CELL_PAD, &seen), carry_b = left_sum(b - TL_CELL_PAD, &seen);
-        for (int64_t col = 0; col < n_cols; col += TL_LANES) {
-            const vi sums_a = accumulate_lanes(a + col, &carry_a, &seen);
-            const vf area_a = area_of_sums(sums_a, is_clamped);
-            if (below != row) {
-                const vi sums_b = accumulate_lanes(b + col, &carry_b, &seen);
-                store_areas(out_b + col, n_cols - col, area_of_sums(sums_b, is_clamped));
+        const int looks = plane->is_sparse && below != row;
+        for (int64_t col = 0, end; col < n_cols; col = end) {
+            end = min64(col + TL_RUN_LANES, n_cols);
+            if (looks && end - col == TL_RUN_LANES && is_clear(a + col, b + col)) {
+                fill_areas(out_a + col, area_of_sums(carry_a, is_clamped));
+                fill_areas(out_b + col, area_of_sums(carry_b, is_clamped));
+                continue;
             }
-            store_areas(out_a + col, n_cols - col, area_a);
+            for (int64_t k = col; k < end; k += TL_LANES) {
+                const vi sums_a = accumulate_lanes(a + k, &carry_a, &seen);
+                const vf area_a = area_of_sums(sums_a, is_clamped);
+                if (below != row) {
+                    const vi sums_b = accumulate_lanes(b + k, &carry_b, &seen);
+                    store_areas(out_b + k, n_cols - k, area_of_sums(sums_b, is_clamped));
+                }
+                store_areas(out_a + k, n_cols - k, area_a);
+            }
         }
         for (int64_t col = n_cols / TL_LANES * TL_LANES; col < stride - TL_CELL_PAD; col += TL_LANES) {
             vi_store(a + col, vi_set1(TL_CELL_ZERO));

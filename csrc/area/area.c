@@ -21,6 +21,7 @@
 
 #define TL_MAX_EDGE_BITS 14 /* pixels of an edge in lanes: see the error bound of ramp.c */
 #define TL_SHORT_ROWS 8
+#define TL_SPARSE_PX 4096 /* for each triangle: then most runs of pixels meet no edge */
 #define TL_EDGE_QUEUE 112
 
 /* Edges wait until a vector is full of their kind: of 1 to 8 rows, or more; that pass up to 2 columns a row, or up to
@@ -225,6 +226,7 @@ static void place_plane(const tl_window *window, const tl_area *area, area_plane
     p->left_fx = clamp32(window->x_px * ((int64_t)1 << bits), -far, far);
     p->right_fx = clamp32((window->x_px + window->width) * ((int64_t)1 << bits), -far, far);
     p->bits = bits;
+    p->is_sparse = 0;
     p->n_waiting = 0;
     p->seen = v4_zero();
 }
@@ -234,6 +236,7 @@ static int64_t draw_area(const tl_snapped *snapped, const tl_window *window, con
     area_state s;
     const int bits = window->subpixel_bits;
     place_plane(window, target, &s.plane);
+    s.plane.is_sparse = snapped->n_triangles < window->width * window->height / TL_SPARSE_PX;
     s.snapped = snapped, s.window = window, s.bad_row = -1, s.is_wide = target->is_wide;
     s.max_extent = 1 << (bits + TL_MAX_EDGE_BITS < 25 ? bits + TL_MAX_EDGE_BITS : 25);
     memset(s.n, 0, sizeof s.n);

@@ -44,6 +44,7 @@ typedef struct {
     int32_t left_px, top_px;                      /* the same, as near as lanes need it */
     int32_t top_fx, bottom_fx, left_fx, right_fx; /* the window's border, likewise */
     int bits;
+    int is_sparse; /* most cells are met by no edge; read by accumulate alone */
     int n_waiting; /* cells [at, at + 4) and what will be added to them, in the order of vi_store_quads */
     int32_t at[TL_WAITING_QUADS], quads[4 * TL_WAITING_QUADS];
     v4 seen; /* every value that a cell ever had, or-ed */

@@ -143,13 +143,15 @@ TL_INLINE vi mean_bytes(const mean_source *s, const int32_t *labels, vm live, vi
     const vi alpha = vi_set1(transfer && transfer->is_straight ? (int32_t)(0xffu << 8 * transfer->n_channels) : 0);
     const vi minus_one = vi_set1(-1), bytes = vi_set1(0x00ff00ff), first = vi_load_masked(live, labels);
     const int32_t *palette = (const int32_t *)(const void *)s->colors;
-    const vm is_drawn = vm_and(live, vi_gt(first, minus_one));
-    const vi color = vi_select(is_drawn, vi_gather(is_drawn, palette, first), own);
-    vi even = vi_and(color, bytes), odd = vi_and(vi_shift_right(color, 8), bytes);
     vm is_mixed = vm_and_not(live, vm_all());
     *rest = is_mixed;
     for (int k = 1; k < 1 << s->sample_bits; k++)
         is_mixed = vm_or(is_mixed, vm_and_not(live, vi_eq(vi_load_masked(live, labels + k * s->stride), first)));
+    if (!vm_any(vm_or(is_mixed, vm_and_not(vm_all(), vi_eq(first, vi_set1(labels[0])))))) /* inside of one triangle */
+        return labels[0] < 0 ? own : vi_set1(palette[labels[0]]);
+    const vm is_drawn = vm_and(live, vi_gt(first, minus_one));
+    const vi color = vi_select(is_drawn, vi_gather(is_drawn, palette, first), own);
+    vi even = vi_and(color, bytes), odd = vi_and(vi_shift_right(color, 8), bytes);
     if (!vm_any(is_mixed))
         return color;
     for (int k = 1; k < 1 << s->sample_bits; k++) {

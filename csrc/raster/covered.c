@@ -15,6 +15,7 @@
 #include "lanes/lanes.h"
 
 #define TL_MAX_SAMPLES 16
+_Static_assert(4 * 64 / TL_MAX_SAMPLES >= TL_LANES, "the pixels of four words are whole vectors");
 #define TL_EVEN_WORDS 8 /* that are worth a call */
 
 /* Marks samples from `at` on, one a bit. */
@@ -129,17 +130,28 @@ TL_INLINE uint64_t count_bits(uint64_t v, int sample_bits)
     return v;
 }
 
-/* The pixels [at, at + n), at a multiple of 32. */
+/* The pixels [at, at + n), at a multiple of 32.  Long runs that are covered whole, or not at all, are filled: eight words
+ * of four samples are 128 pixels. */
 TL_INLINE void share_span(const tl_target *target, int64_t at, int64_t n, int sample_bits)
 {
     const int per_word = 64 >> sample_bits, width = 1 << sample_bits;
     const float share = 1.0f / (float)width;
     const uint64_t *word = target->covered + (at >> (6 - sample_bits));
     float *pixels = (float *)target->pixels + at;
-    for (; n >= per_word; n -= per_word, pixels += per_word) {
+    while (n >= per_word) {
+        const int64_t n_even = even_words(word, n >> (6 - sample_bits)) & ~(int64_t)3; /* whole vectors of pixels */
+        const int64_t n_px = n_even << (6 - sample_bits);
+        if (n_even >= TL_EVEN_WORDS) {
+            const vf even = vf_set1(*word ? 1.0f : 0.0f);
+            for (int64_t k = 0; k < n_px; k += TL_LANES)
+                vf_store(pixels + k, even);
+            word += n_even, pixels += n_px, n -= n_px;
+            continue;
+        }
         const uint64_t counts = count_bits(*word++, sample_bits);
         for (int k = 0; k < per_word; k++)
             pixels[k] = (float)(int32_t)(counts >> (k * width) & (2 * (unsigned)width - 1)) * share;
+        pixels += per_word, n -= per_word;
     }
     const uint64_t counts = n ? count_bits(*word, sample_bits) : 0;
     for (int k = 0; k < n; k++)

@@ -50,15 +50,21 @@ if TYPE_CHECKING:
     from topleft._diagram.pixel_grid import pixel_grid
     from topleft._render.transparent import render_transparent, visible_layers
     from topleft._render.view_layers import ViewLayers, render_layers
+    from topleft._tiles.merge import merge
+    from topleft._tiles.tiles import Tiles, Window, tiles
 
 # What most programs do without is imported when it is asked for: a third of the time that the package takes.
 _LATE = {
     "Job": "topleft._batch.jobs",
+    "Tiles": "topleft._tiles.tiles",
     "ViewLayers": "topleft._render.view_layers",
+    "Window": "topleft._tiles.tiles",
+    "merge": "topleft._tiles.merge",
     "pixel_grid": "topleft._diagram.pixel_grid",
     "render_batch": "topleft._batch.batch",
     "render_layers": "topleft._render.view_layers",
     "render_transparent": "topleft._render.transparent",
+    "tiles": "topleft._tiles.tiles",
     "visible_layers": "topleft._render.transparent",
 }
 
@@ -95,8 +101,10 @@ __all__ = [
     "SceneDepthLayers",
     "SceneFragments",
     "Texture",
+    "Tiles",
     "TopleftError",
     "ViewLayers",
+    "Window",
     "__version__",
     "as_mesh",
     "bresenham_line",
@@ -109,6 +117,7 @@ __all__ = [
     "height_map",
     "load",
     "load_cameras",
+    "merge",
     "overdraw",
     "overlap",
     "peel",
@@ -128,6 +137,7 @@ __all__ = [
     "shade",
     "silhouette",
     "simplify",
+    "tiles",
     "turntable",
     "viewpoints",
     "visible_layers",

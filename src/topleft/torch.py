@@ -14,7 +14,7 @@ High-Performance Differentiable Rendering", ACM Transactions on Graphics, 2020.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, get_args
 
 import numpy as np
 
@@ -308,27 +308,28 @@ def texture(
 
     Parameters
     ----------
-    tex : tensor of float32 or float64, shape (B, Ht, Wt, C) or (1, Ht, Wt, C)
-        Row 0 is at v = 0. The centre of texel (i, j) is at u = (j + 0.5) / Wt, v = (i + 0.5) / Ht.
-    uv : tensor, shape (B, H, W, 2)
-        Where to look.
-    uv_da : tensor, shape (B, H, W, 4), optional
-        du/dX, du/dY, dv/dX, dv/dY, of `interpolate`.
+    tex : tensor of float32 or float64, shape (B, Ht, Wt, C) or (1, Ht, Wt, C); of a cube map (B or 1, 6, N, N, C)
+        Row 0 is at v = 0. The centre of texel (i, j) is at u = (j + 0.5) / Wt, v = (i + 0.5) / Ht. The faces of a cube
+        are those of +x, -x, +y, -y, +z and -z, laid out as OpenGL has them.
+    uv : tensor, shape (B, H, W, 2); of a cube map (B, H, W, 3)
+        Where to look; in a cube map along a direction of any length.
+    uv_da : tensor, shape (B, H, W, 4), or (B, H, W, 6), optional
+        du/dX, du/dY, dv/dX, dv/dY, of `interpolate`; of a cube map those of x, y and z.
     mip_level_bias : tensor, shape (B, H, W), optional
         Is added to the level; without `uv_da` it is the level.
     mip : sequence of tensors, optional
         The levels after `tex`, each half as high and wide: of `texture_construct_mip`, or your own.
     filter_mode : "auto", "nearest", "linear", "linear-mipmap-nearest" or "linear-mipmap-linear"
         "auto" is "linear-mipmap-linear" where `uv_da` or `mip_level_bias` is given, else "linear".
-    boundary_mode : "wrap", "clamp" or "zero"
-        What lies beyond 0 and 1.
+    boundary_mode : "wrap", "clamp", "zero" or "cube"
+        What lies beyond 0 and 1. "cube": `tex` is a cube map, and colours run on across its edges.
     max_mip_level : int, optional
         The last level that is made and used.
 
     Returns
     -------
     tensor, shape (B, H, W, C)
-        The level of a pixel is log2 of the longer axis of its footprint in texels.
+        The level of a pixel is log2 of the longer axis of its footprint in texels. 0 where a direction has no length.
 
     Raises
     ------
@@ -337,8 +338,11 @@ def texture(
     ValueError
         For a wrong shape, an unknown mode, a mipmap filter without `uv_da` or `mip_level_bias`, or a side of a level
         that is odd and not 1.
-    NotImplementedError
-        For ``boundary_mode="cube"``.
+
+    Notes
+    -----
+    Beyond an edge of a cube lies the next face; beyond a corner nothing does, and the mean of the other three texels
+    stands for the fourth. The table of faces is that of the OpenGL 4.6 specification, 8.13.
 
     Examples
     --------
@@ -356,19 +360,23 @@ def texture(
             "filter_mode must be 'auto', 'nearest', 'linear', 'linear-mipmap-nearest' or 'linear-mipmap-linear', "
             f"got {filter_mode!r}"
         )
-    shape = (*uv.shape[:3], tex.shape[3])
+    shape = (*uv.shape[:3], tex.shape[-1])
     picture = torch.arange(n_pictures).repeat_interleave(uv.shape[1] * uv.shape[2])
     picture = torch.zeros_like(picture) if len(tex) == 1 else picture
-    points = uv.reshape(-1, 2)
+    points, footprint = uv.reshape(-1, uv.shape[3]), uv_da
+    if boundary_mode == "cube":
+        picture, points, footprint = face_points(picture, points, uv_da)
     if filter_mode in ("nearest", "linear"):
         return look_up(tex, picture, points, boundary_mode, nearest=filter_mode == "nearest").reshape(shape)
     if not has_level:
         raise ValueError(f"filter_mode={filter_mode!r} needs uv_da or mip_level_bias")
-    levels = [tex, *(texture_construct_mip(tex, max_mip_level) if mip is None else as_mip(tex, mip, max_mip_level))]
-    level = mip_level(tex, uv_da, mip_level_bias).clamp(0, len(levels) - 1)
+    is_cube = boundary_mode == "cube"
+    made = texture_construct_mip(tex, max_mip_level, is_cube) if mip is None else as_mip(tex, mip, max_mip_level)
+    levels = [tex, *made]
+    level = mip_level(tex, footprint, mip_level_bias).clamp(0, len(levels) - 1)
     if filter_mode == "linear-mipmap-nearest":
         level = level.round()
-    out = torch.zeros((len(points), tex.shape[3]), dtype=torch.result_type(tex, uv))
+    out = torch.zeros((len(points), tex.shape[-1]), dtype=torch.result_type(tex, uv))
     for k, texels in enumerate(levels):
         share = 1 - (level - k).abs()
         near = (share > 0).nonzero().squeeze(1)
@@ -382,16 +390,16 @@ def texture_construct_mip(tex: Tensor, max_mip_level: int | None = None, cube_mo
 
     Parameters
     ----------
-    tex : tensor of float32 or float64, shape (B, Ht, Wt, C)
+    tex : tensor of float32 or float64, shape (B, Ht, Wt, C), or (B, 6, N, N, C) with `cube_mode`
         Level 0.
     max_mip_level : int, optional
         The last level; without it the last is 1 x 1.
     cube_mode : bool
-        False.
+        Whether it is a cube map, whose faces are halved each by itself.
 
     Returns
     -------
-    list of tensors, shapes (B, Ht/2, Wt/2, C), (B, Ht/4, Wt/4, C) and so on
+    list of tensors, shapes (B, Ht/2, Wt/2, C), (B, Ht/4, Wt/4, C) and so on; (B, 6, N/2, N/2, C) and so on
         Each texel is the mean of those that it covers.
 
     Raises
@@ -400,8 +408,6 @@ def texture_construct_mip(tex: Tensor, max_mip_level: int | None = None, cube_mo
         For what is no tensor, is not on the CPU, or has a wrong dtype.
     ValueError
         For a wrong shape, a side of a level that is odd and not 1, or a level below 0.
-    NotImplementedError
-        For cube maps.
 
     Examples
     --------
@@ -409,18 +415,19 @@ def texture_construct_mip(tex: Tensor, max_mip_level: int | None = None, cube_mo
     [(1, 1, 4, 3), (1, 1, 2, 3), (1, 1, 1, 3)]
     """
     if cube_mode:
-        raise NotImplementedError("topleft.torch has no cube maps: cube_mode must be False")
-    check("tex", tex, "(B, Ht, Wt, C)", is_tensor(tex) and tex.ndim == 4 and 0 not in tex.shape[1:])
+        check("tex", tex, "(B, 6, N, N, C)", is_cube_map(tex))
+    else:
+        check("tex", tex, "(B, Ht, Wt, C)", is_tensor(tex) and tex.ndim == 4 and 0 not in tex.shape[1:])
     if max_mip_level is not None and max_mip_level < 0:
         raise ValueError(f"max_mip_level must be at least 0, got {max_mip_level}")
     levels: list[Tensor] = []
     last = tex
-    while max(last.shape[1:3]) > 1 and (max_mip_level is None or len(levels) < max_mip_level):
-        for axis in (1, 2):
+    while max(last.shape[-3:-1]) > 1 and (max_mip_level is None or len(levels) < max_mip_level):
+        for axis in (tex.ndim - 3, tex.ndim - 2):
             n = last.shape[axis]
             if n > 1 and n % 2:
                 raise ValueError(
-                    f"tex must have sides that halve down to level {len(levels) + 1}, got {tuple(tex.shape[1:3])}; "
+                    f"tex must have sides that halve down to level {len(levels) + 1}, got {tuple(tex.shape[-3:-1])}; "
                     f"max_mip_level={len(levels)} stops before"
                 )
             last = last.unflatten(axis, (n // 2, 2)).mean(axis + 1) if n > 1 else last
@@ -651,7 +658,7 @@ def mip_level(tex: Tensor, uv_da: Tensor | None, bias: Tensor | None) -> Tensor:
     """Return the level of each pixel, flat and not clamped: log2 of the longer axis of its footprint in texels."""
     if uv_da is None:
         return bias.reshape(-1)  # type: ignore[union-attr]
-    height, width = tex.shape[1:3]
+    height, width = tex.shape[-3:-1]
     s_x, s_y, t_x, t_y = (uv_da.reshape(-1, 4) * torch.tensor([width, width, height, height])).unbind(1)
     a, b, c = s_x**2 + t_x**2, s_y**2 + t_y**2, s_x * s_y + t_x * t_y
     major_squared = (a + b) / 2 + (((a - b) / 2) ** 2 + c**2).clamp(min=1e-30).sqrt()
@@ -660,7 +667,9 @@ def mip_level(tex: Tensor, uv_da: Tensor | None, bias: Tensor | None) -> Tensor:
 
 
 def look_up(tex: Tensor, picture: Tensor, uv: Tensor, boundary: str, *, nearest: bool) -> Tensor:
-    """Return (N, C): a level (B, H, W, C) at points (N, 2) of the pictures (N,)."""
+    """Return (N, C): a level (B, H, W, C) at points (N, 2) of the pictures (N,); of a cube map of its faces."""
+    if boundary == "cube":
+        return look_up_cube(tex, picture, uv, nearest=nearest)
     size = torch.tensor([tex.shape[2], tex.shape[1]])
     uv = torch.nan_to_num(uv, 0.0, 0.0, 0.0)
     if boundary == "wrap":
@@ -688,6 +697,79 @@ def look_up(tex: Tensor, picture: Tensor, uv: Tensor, boundary: str, *, nearest:
     return torch.lerp(*same_dtype(below, above, up))
 
 
+#: The axes of each face of a cube, as rows: of u (its columns), of v (its rows), and from the middle to the face.
+CUBE_FRAMES = (
+    ((0, 0, -1), (0, -1, 0), (1, 0, 0)),
+    ((0, 0, 1), (0, -1, 0), (-1, 0, 0)),
+    ((1, 0, 0), (0, 0, 1), (0, 1, 0)),
+    ((1, 0, 0), (0, 0, -1), (0, -1, 0)),
+    ((1, 0, 0), (0, -1, 0), (0, 0, 1)),
+    ((-1, 0, 0), (0, -1, 0), (0, 0, -1)),
+)
+
+
+def face_of(directions: Tensor) -> Tensor:
+    """Return the face (N,) of a cube that each direction (N, 3) meets."""
+    x, y, z = directions.detach().abs().unbind(1)
+    axis = torch.where(z > torch.maximum(x, y), 2, torch.where(y > x, 1, 0))
+    return 2 * axis + (directions.detach().gather(1, axis[:, None])[:, 0] < 0)
+
+
+def face_points(picture: Tensor, directions: Tensor, xyz_da: Tensor | None) -> tuple[Tensor, Tensor, Tensor | None]:
+    """Return of directions the faces (N,), counted through the pictures, u and v on them (N, 2), and their `uv_da`.
+
+    What meets no face gets -1.
+    """
+    face = face_of(directions)
+    frames = torch.tensor(CUBE_FRAMES, dtype=directions.dtype)[face]
+    along = (frames * directions[:, None]).sum(2)  # (N, 3): along u, along v, towards the face
+    is_met = torch.isfinite(along).all(1) & (along[:, 2] > 0)
+    along = torch.where(is_met[:, None], along, torch.ones_like(along))
+    depth = along[:, 2:]
+    uv = (along[:, :2] / depth / 2 + 0.5).clamp(0, 1)
+    number = torch.where(is_met, 6 * picture + face, torch.full_like(face, -1))
+    if xyz_da is None:
+        return number, uv, None
+    by = (frames[..., None] * xyz_da.reshape(-1, 1, 3, 2)).sum(2)  # (N, 3, 2): what `along` changes by
+    slopes = (by[:, :2] - (along[:, :2] / depth)[..., None] * by[:, 2:]) / depth[..., None] / 2
+    return number, uv, torch.where(is_met[:, None, None], slopes, torch.zeros_like(slopes)).reshape(-1, 4)
+
+
+def look_up_cube(tex: Tensor, number: Tensor, uv: Tensor, *, nearest: bool) -> Tensor:
+    """Return (N, C): a level (B, 6, N, N, C) at points (N, 2) of its faces (N,), 0 for face -1."""
+    n, texels = tex.shape[2], tex.reshape(-1, tex.shape[4])
+    is_met = (number >= 0)[:, None]
+    number = number.clamp(min=0)
+    at = uv * n if nearest else uv * n - 0.5
+    low = at.detach().floor()
+    first = low.long()
+
+    def texel(dx: int, dy: int) -> tuple[Tensor, Tensor]:
+        x_y, own = first + torch.tensor([dx, dy]), number
+        is_beyond = (x_y < 0) | (x_y >= n)
+        (beyond,) = (is_beyond.any(1) & ~is_beyond.all(1)).nonzero(as_tuple=True)
+        if len(beyond):  # where the plane of the face runs on, seen from the middle of the cube, lies the next one
+            middle = 2 * (x_y[beyond].double() + 0.5) / n - 1
+            frames = torch.tensor(CUBE_FRAMES, dtype=torch.float64)[own[beyond] % 6]
+            directions = (torch.cat([middle, torch.ones_like(middle[:, :1])], 1)[..., None] * frames).sum(1)
+            next_face, next_uv, _ = face_points(own[beyond] // 6, directions, None)
+            own = own.index_copy(0, beyond, next_face)
+            x_y[beyond] = (next_uv * n).long().clamp(max=n - 1)
+        x_y = x_y.clamp(0, n - 1)
+        return texels[(own * n + x_y[:, 1]) * n + x_y[:, 0]], is_beyond.all(1, keepdim=True)
+
+    if nearest:
+        x_y = first.clamp(0, n - 1)
+        return texels[(number * n + x_y[:, 1]) * n + x_y[:, 0]] * is_met
+    quad, corners = (torch.stack(one) for one in zip(*(texel(k % 2, k // 2) for k in range(4)), strict=True))
+    quad = torch.where(corners, torch.zeros_like(quad), quad)
+    quad = torch.where(corners, quad.sum(0) / 3, quad)
+    right, down = (at - low).split(1, 1)
+    upper = torch.lerp(*same_dtype(quad[0], quad[1], right))
+    lower = torch.lerp(*same_dtype(quad[2], quad[3], right))
+    return torch.lerp(*same_dtype(upper, lower, down)) * is_met
+
+
 def same_dtype(*tensors: Tensor) -> list[Tensor]:
     """Return tensors in the widest of their dtypes."""
     dtype = torch.float64 if any(one.dtype == torch.float64 for one in tensors) else torch.float32
@@ -696,26 +778,32 @@ def same_dtype(*tensors: Tensor) -> list[Tensor]:
 
 def check_texture(tex: Tensor, uv: Tensor, uv_da: Tensor | None, bias: Tensor | None, boundary_mode: str) -> int:
     """Check what `texture` is given; returns the number of pictures."""
-    if boundary_mode == "cube":
-        raise NotImplementedError("topleft.torch has no cube maps: boundary_mode must be 'wrap', 'clamp' or 'zero'")
-    if boundary_mode not in ("wrap", "clamp", "zero"):
-        raise ValueError(f"boundary_mode must be 'wrap', 'clamp' or 'zero', got {boundary_mode!r}")
-    check("uv", uv, "(B, H, W, 2)", is_tensor(uv) and uv.ndim == 4 and uv.shape[3] == 2)
+    if boundary_mode not in get_args(BoundaryOption):
+        raise ValueError(f"boundary_mode must be 'wrap', 'clamp', 'zero' or 'cube', got {boundary_mode!r}")
+    is_cube = boundary_mode == "cube"
+    n_axes = 3 if is_cube else 2
+    check("uv", uv, f"(B, H, W, {n_axes})", is_tensor(uv) and uv.ndim == 4 and uv.shape[3] == n_axes)
     n_pictures = len(uv)
-    fits = is_tensor(tex) and tex.ndim == 4 and len(tex) in (1, n_pictures) and 0 not in tex.shape[1:]
-    check("tex", tex, f"(1, Ht, Wt, C) or ({n_pictures}, Ht, Wt, C)", fits)
-    for name, given, wish in (("uv_da", uv_da, (*uv.shape[:3], 4)), ("mip_level_bias", bias, tuple(uv.shape[:3]))):
+    if is_cube:
+        wish = f"(1, 6, N, N, C) or ({n_pictures}, 6, N, N, C) with boundary_mode 'cube'"
+        fits = is_cube_map(tex) and len(tex) in (1, n_pictures)
+    else:
+        wish = f"(1, Ht, Wt, C) or ({n_pictures}, Ht, Wt, C)"
+        fits = is_tensor(tex) and tex.ndim == 4 and len(tex) in (1, n_pictures) and 0 not in tex.shape[1:]
+    check("tex", tex, wish, fits)
+    of_uv_da = (*uv.shape[:3], 2 * n_axes)
+    for name, given, shape in (("uv_da", uv_da, of_uv_da), ("mip_level_bias", bias, tuple(uv.shape[:3]))):
         if given is not None:
-            check(name, given, str(tuple(wish)), is_tensor(given) and tuple(given.shape) == tuple(wish))
+            check(name, given, str(tuple(shape)), is_tensor(given) and tuple(given.shape) == tuple(shape))
     return n_pictures
 
 
 def as_mip(tex: Tensor, mip: Sequence[Tensor], max_mip_level: int | None) -> Sequence[Tensor]:
     """Check the levels after a texture."""
-    height, width = tex.shape[1:3]
+    height, width = tex.shape[-3:-1]
     for k, level in enumerate(mip):
         height, width = max(1, height // 2), max(1, width // 2)
-        wish = (len(tex), height, width, tex.shape[3])
+        wish = (*tex.shape[:-3], height, width, tex.shape[-1])
         check(f"mip[{k}]", level, str(wish), is_tensor(level) and tuple(level.shape) == wish)
     return mip[:max_mip_level]
 
@@ -788,6 +876,11 @@ def blend_shares(
 def is_tensor(value: object) -> bool:
     """Tell whether this is a tensor of PyTorch."""
     return isinstance(value, Tensor)
+
+
+def is_cube_map(tex: object) -> bool:
+    """Tell whether this is a tensor (B, 6, N, N, C)."""
+    return isinstance(tex, Tensor) and tex.ndim == 5 and tex.shape[1] == 6 and tex.shape[2] == tex.shape[3] > 0
 
 
 def len_of(tensor: Tensor) -> int:

@@ -28,6 +28,7 @@ __all__ = [
     "PerOption",
     "PointShapeOption",
     "PointUnitOption",
+    "RasterKindOption",
     "ResolveOption",
     "RuleOption",
     "SamplesOption",
@@ -35,10 +36,12 @@ __all__ = [
     "ShadingOption",
     "SpaceOption",
     "SurfaceOption",
+    "TiffCompressionOption",
     "UpOption",
     "WindingOption",
     "WrapOption",
     "YOption",
+    "ZarrCompressionOption",
 ]
 
 # Options of the verbs on arrays
@@ -120,7 +123,13 @@ LayerOption: TypeAlias = Literal[
 OnErrorOption: TypeAlias = Literal["raise", "collect"]
 OrderOption: TypeAlias = Literal["jobs", "completed"]
 
+# Huge rasters
+
+RasterKindOption: TypeAlias = Literal["labels", "depth", "coverage", "overdraw", "fill", "field", "height_map"]
+TiffCompressionOption: TypeAlias = Literal["deflate", "none"]
+ZarrCompressionOption: TypeAlias = Literal["gzip", "zstd", "none"]
+
 # `topleft.torch`, in the words of nvdiffrast
 
-BoundaryOption: TypeAlias = Literal["wrap", "clamp", "zero"]
+BoundaryOption: TypeAlias = Literal["wrap", "clamp", "zero", "cube"]
 FilterModeOption: TypeAlias = Literal["auto", "nearest", "linear", "linear-mipmap-nearest", "linear-mipmap-linear"]

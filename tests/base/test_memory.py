@@ -3,7 +3,10 @@
 import gc
 import os
 import pickle
+import subprocess
+import sys
 import threading
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -107,6 +110,30 @@ def test_release_memory_leaves_nothing_waiting_and_results_alone():
     tl.release_memory()
     assert _engine.waiting_memory() == 0
     assert (frags.triangle[0] == 0).all()
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="limits of address space are those of Linux")
+def test_memory_that_waits_is_given_back_before_an_array_has_none():
+    program = """
+import resource
+from topleft import _engine
+from topleft._base import memory
+large = memory.empty((400 << 20,), "u1")
+del large
+used = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
+resource.setrlimit(resource.RLIMIT_AS, (used + (100 << 20), resource.RLIM_INFINITY))
+assert _engine.waiting_memory() >= 400 << 20
+assert memory.empty((300 << 20,), "u1").size == 300 << 20
+assert _engine.waiting_memory() < 400 << 20
+try:
+    memory.empty((2 << 30,), "u1")
+except MemoryError as error:
+    assert "2,147,483,648 bytes" in str(error)
+else:
+    raise AssertionError("no error")
+"""
+    where = str(Path(tl.__file__).parents[1])
+    subprocess.run([sys.executable, "-c", program], check=True, env=os.environ | {"PYTHONPATH": where})
 
 
 VERBS = {

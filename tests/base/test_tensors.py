@@ -97,3 +97,35 @@ def test_tensors_of_torch_are_refused_with_what_to_do():
 def test_arrays_of_the_array_api_are_taken(module):
     xp = pytest.importorskip(module)
     assert tl.coverage(xp.asarray(SQUARE), xp.asarray(HALVES), (4, 4)).all()
+
+
+@pytest.mark.parametrize("kind", [Tensor, Legacy])
+def test_rings_may_be_tensors(kind):
+    hole = SQUARE / 2 + 1
+    for given, expected in (
+        (kind(SQUARE), SQUARE),
+        ([kind(SQUARE), kind(hole)], [SQUARE, hole]),
+        ([[kind(SQUARE)], [kind(hole)]], [[SQUARE], [hole]]),
+        ((kind(np.concatenate([SQUARE, hole])), kind(np.array([0, 4, 8]))), [SQUARE, hole]),
+    ):
+        assert np.array_equal(tl.polygons(given, (4, 4)), tl.polygons(expected, (4, 4)))
+    table = tl.overlap([kind(SQUARE)], (4, 4))
+    assert table.sums(kind(np.ones((4, 4)))).tolist() == [16]
+    assert table.spread(kind(np.array([2.0]))).sum() == 32
+    values, background = kind(np.array([7], np.uint8)), kind(np.array(3))
+    assert tl.polygons([kind(hole)], (4, 4), values=values, background=background)[0].tolist() == [3] * 4
+
+
+@pytest.mark.parametrize("wrap", [lambda one: one, lambda one: [one], lambda one: [[one]]], ids=["it", "list", "lists"])
+def test_rings_elsewhere_are_refused_by_device(wrap):
+    with pytest.raises(TypeError, match=r"rings must lie in the memory of the CPU, got a \S*Tensor on CUDA device 0"):
+        tl.polygons(wrap(Tensor(SQUARE, 2)), (4, 4))
+
+
+def test_list_of_tensors_elsewhere_is_refused_by_device():
+    class Cupy(Tensor):
+        def __array__(self, dtype=None, copy=None):
+            raise TypeError("Implicit conversion to a NumPy array is not allowed")
+
+    with pytest.raises(TypeError, match=r"vertices must lie in the memory of the CPU, got a \S*Cupy on CUDA device 0"):
+        tl.coverage([Cupy(SQUARE, 2)], HALVES, (4, 4))

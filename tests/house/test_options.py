@@ -20,6 +20,8 @@ from topleft._polygons.polygons import Rule
 from topleft._raster.view import ViewOptions
 from topleft._render.layers import LAYERS
 from topleft._shade.shade import Shading
+from topleft._tiles import geotiff, zarr_files
+from topleft._tiles.drawing import KINDS
 from topleft.methods import CLASSICS, METHODS
 
 #: What the code takes; the others are read by the code itself, see `test_words_of_the_rest_are_read_from_the_types`.
@@ -41,14 +43,17 @@ TAKEN = {
     "PerOption": options.Per,
     "PointShapeOption": options.PointShape,
     "PointUnitOption": PointUnit,
+    "RasterKindOption": KINDS,
     "ResolveOption": options.Resolve,
     "RuleOption": Rule,
     "SamplesOption": [one for one in options.Sampling if one == "center" or one.n_samples > 1],
     "SamplingOption": options.Sampling,
     "ShadingOption": Shading,
     "SpaceOption": LightSpace,
+    "TiffCompressionOption": geotiff.COMPRESSIONS,
     "WindingOption": sorted({"either"} | {one.claims.winding for one in CLASSICS.values()}),
     "WrapOption": Wrap,
+    "ZarrCompressionOption": zarr_files.COMPRESSIONS,
 }  # fmt: skip
 
 CUBE = tl.Mesh(*tl.scenes.shape("cube"))

@@ -48,7 +48,7 @@ def test_metadata_runtime_dependencies_state_a_floor():
 
 def test_metadata_extras_are_the_documented_ones():
     found = set(metadata.metadata("topleft").get_all("Provides-Extra"))
-    assert found == {"formats", "render", "simplify", "torch", "test", "bench", "docs", "dev", "all"}
+    assert found == {"dask", "formats", "render", "simplify", "tiles", "torch", "test", "bench", "docs", "dev", "all"}
 
 
 def test_metadata_render_extra_is_isal_trimesh_and_tqdm():
@@ -89,7 +89,12 @@ def test_package_is_typed(name):
 
 def public_names(body: list[ast.stmt]) -> dict[str, ast.stmt]:
     named = {getattr(node, "name", None) or getattr(getattr(node, "target", None), "id", "_"): node for node in body}
-    return {name: node for name, node in named.items() if not name.startswith("_")}
+    return {name: node for name, node in named.items() if not name.startswith("_") and not is_alias(node)}
+
+
+def is_alias(node: ast.stmt) -> bool:
+    """Tell whether a statement of a stub names a type for the others."""
+    return isinstance(node, ast.AnnAssign) and ast.unparse(node.annotation) == "TypeAlias"
 
 
 @pytest.mark.parametrize("unit", STUBS)

@@ -128,8 +128,42 @@ CALLS = {
                                                 "wrap": "clamp", "encoding": "linear", "background": 0.0}),
     "Fragments.distance": (FRAGS.distance, {"camera": CAMERA}),
     "Fragments.interpolate": (FRAGS.interpolate, {"values": CUBE.vertices, "background": 0.0}),
+    "merge": (tl.merge, {"buffers": [tl.rasterize(FLAT, ONE, SIZE)], "triangles": [0], "depth_test": "less",
+                         "threads": None}),
+    "tiles": (tl.tiles, {"mesh": (FLAT, ONE), "size": SIZE, "kind": "labels", "values": None, "window": 32,
+                         "extent": None, "pixel_size": None, "y": "up", "threads": None, "memory": 1 << 20,
+                         "folder": None}),
     "Fragments.sample": (FRAGS.sample, {"texture": 0}),
 }  # fmt: skip
+
+
+class OnDevice:
+    """What cupy's arrays are: of DLPack on a device, and no array of NumPy by itself."""
+
+    shape = (3, 3)
+
+    def __dlpack__(self, **options):
+        raise BufferError("on a device")
+
+    def __dlpack_device__(self):
+        return 2, 0
+
+    def __array__(self, dtype=None, copy=None):
+        raise TypeError("Implicit conversion to a NumPy array is not allowed")
+
+
+class OnCpu:
+    """What arrays of other libraries are at the least: DLPack alone."""
+
+    def __init__(self, array):
+        self.array = array
+
+    def __dlpack__(self, **options):
+        return self.array.__dlpack__(**options)
+
+    def __dlpack_device__(self):
+        return 1, 0
+
 
 WRONG = {
     "None": None,
@@ -164,6 +198,9 @@ WRONG = {
     "Scene": SCENE,
     "Path": Path("nothing.obj"),
     "pair": (FLAT, ONE),
+    "on a device": OnDevice(),
+    "list on a device": [OnDevice(), OnDevice()],
+    "of DLPack": OnCpu(np.ones((3, 3))),
 }
 
 
@@ -216,6 +253,6 @@ def test_every_public_callable_is_tried():
     others = {"simplify", "release_memory", "build_info"}  # the first takes seconds, the others nothing
     made = {"DepthLayers", "Detail", "Fragments", "FragmentsBatch", "Level", "Levels", "Plan", "SceneDepthLayers",
             "SceneFragments", "ViewLayers", "ImageError", "MeshError", "MissingPackageError", "TopleftError",
-            "MeshWarning", "Overlap", "PointFragments"}  # fmt: skip
+            "MeshWarning", "Overlap", "PointFragments", "Tiles", "Window"}  # fmt: skip
     public = {name for name in tl.__all__ if callable(getattr(tl, name)) and not inspect.ismodule(getattr(tl, name))}
     assert public <= set(CALLS) | others | made

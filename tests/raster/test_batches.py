@@ -65,7 +65,7 @@ def test_batch_goes_where_it_is_told():
 @pytest.mark.parametrize(
     ("arguments", "options", "message"),
     [
-        ((CLIP, MESH.triangles, SIZE), {"sampling": "msaa4"}, "sampling must be 'center' for a batch, got 'msaa4'"),
+        ((CLIP, MESH.triangles, SIZE), {"sampling": "area"}, "sampling"),
         ((CLIP[:2, :, :3], MESH.triangles, SIZE), {"transform": POSES}, "vertices and transform must have one number"),
         ((CLIP[..., :1], MESH.triangles, SIZE), {}, "vertices must have shape"),
         ((CLIP, MESH.triangles, SIZE), {"out": (np.empty((18, 24), np.int32), None)}, "out triangle must have shape"),
@@ -74,3 +74,47 @@ def test_batch_goes_where_it_is_told():
 def test_batch_that_does_not_fit_is_refused(arguments, options, message):
     with pytest.raises(ValueError, match=message):
         tl.rasterize(*arguments, **options)
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_batch_of_samples_is_each_of_them(threads):
+    options = {"sampling": "msaa4", "background_depth": 5}
+    found = tl.rasterize(CLIP, MESH.triangles, SIZE, threads=threads, **options)
+    alone = [tl.rasterize(clip, MESH.triangles, SIZE, **options) for clip in CLIP]
+    assert_same(found, alone)
+    assert np.array_equal(found.samples_triangle, np.stack([one.samples_triangle for one in alone]))
+    assert np.array_equal(found.samples_depth, np.stack([one.samples_depth for one in alone]))
+    assert_same(found.sample(2), [one.sample(2) for one in alone])
+    out = np.empty((5, 18, 24, 4), np.int32), None
+    tl.rasterize(CLIP, MESH.triangles, SIZE, out=out, **options)
+    assert np.array_equal(out[0], found.samples_triangle)
+    assert tl.rasterize(CLIP[:0], MESH.triangles, SIZE, **options).samples_triangle.shape == (0, 18, 24, 1)
+
+
+@pytest.mark.parametrize("sampling", ["center", "msaa2"])
+def test_batch_with_a_plan_is_that_without(sampling):
+    plan = tl.plan(CLIP[0], MESH.triangles, SIZE, sampling=sampling)
+    found = tl.rasterize(CLIP, MESH.triangles, SIZE, sampling=sampling, plan=plan)
+    assert_same(found, [tl.rasterize(clip, MESH.triangles, SIZE, sampling=sampling) for clip in CLIP])
+    with pytest.raises(ValueError, match="plan is for other triangles"):
+        tl.rasterize(CLIP, MESH.triangles[::-1], SIZE, sampling=sampling, plan=plan)
+
+
+def test_batch_has_derivatives_and_textures():
+    found = tl.rasterize(CLIP, MESH.triangles, SIZE)
+    alone = [tl.rasterize(clip, MESH.triangles, SIZE) for clip in CLIP]
+    uv = np.random.default_rng(1).normal(size=(len(MESH.vertices), 2))
+    values, slopes = found.interpolate(uv, derivatives=True)
+    assert np.array_equal(values, np.stack([one.interpolate(uv) for one in alone]))
+    assert np.array_equal(slopes, np.stack([one.interpolate(uv, derivatives=True)[1] for one in alone]))
+    texture = np.random.default_rng(2).normal(size=(8, 8, 3))
+    assert np.array_equal(found.sample(texture, uv), np.stack([one.sample(texture, uv) for one in alone]))
+    own = np.stack([uv * k for k in range(5)])
+    expected = np.stack([one.sample(texture[..., 0], of_one) for one, of_one in zip(alone, own, strict=True)])
+    assert np.array_equal(found.sample(texture[..., 0], own), expected)
+
+
+@pytest.mark.parametrize("dtype", [np.int32, np.int64, np.uint16])
+def test_batch_names_the_row_of_a_bad_index(dtype):
+    with pytest.raises(IndexError, match=r"row 1 is \[0, 2, 9\]"):
+        tl.rasterize(np.zeros((2, 3, 2)), np.array([[0, 1, 2], [0, 2, 9]], dtype), 4)

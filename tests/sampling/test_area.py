@@ -12,6 +12,7 @@ from strategies import Scene, needles, perspective, soup
 import topleft as tl
 from topleft import _engine, scenes
 from topleft._base.memory import KeptMemory
+from topleft._raster import sampling
 from topleft._raster.snap import snap_mesh
 from topleft._raster.view import View
 from topleft.methods.reference import area as ref
@@ -315,3 +316,45 @@ def test_triangles_beside_the_window_add_nothing(far):
     both = np.concatenate([vertices[:, :2], beside]), np.concatenate([triangles, triangles + len(vertices)])
     alone = tl.overdraw(vertices[:, :2], triangles, (60, 40), sampling="area")
     assert (tl.overdraw(*both, (60, 40), sampling="area") == alone).all()
+
+
+# ---- large shapes ---------------------------------------------------------------------------------------------------
+
+LARGE = np.array(
+    [[3.3, 2.1], [380.7, 30.2], [150.4, 91.9], [20, 70], [399, 1], [420, 97], [200.5, 40], [200.6, 41], [230, 40]]
+)
+LARGE_TRIANGLES = np.arange(9).reshape(3, 3)
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize("threads", [1, 3])
+@pytest.mark.parametrize("verb", [tl.coverage, tl.overdraw])
+def test_large_shapes_have_the_same_areas_in_bands_of_any_height(isa, threads, verb, monkeypatch):
+    def draw_in(n_bytes):
+        monkeypatch.setattr(sampling, "AREA_BAND_BYTES", n_bytes)
+        return verb(LARGE, LARGE_TRIANGLES, (411, 97), sampling="area", threads=threads)
+
+    with on(isa):
+        expected = sum(ref.area(LARGE, [row], (411, 97)) for row in LARGE_TRIANGLES.tolist())
+        whole = draw_in(1 << 30)
+        for n_bytes in (1, 6000, 20_000):
+            assert_same(draw_in(n_bytes), whole)
+    expected = np.array(expected, float)
+    error = np.abs((np.minimum(expected, 1) if verb is tl.coverage else expected) - whole).max()
+    assert error < 2**-24 * (0.501 * 9 + 3)  # three edges of each triangle, and the sum
+
+
+def test_many_triangles_are_summed_in_one_band():
+    height, width = 2160, 3840
+    assert sampling.area_band(1, height, width, 1) < 40
+    assert sampling.area_band(100_000, height, width, 1) == height
+    assert sampling.area_band(100_000, height, width, 2) == height // 2
+    assert sampling.area_cells(100_000, height, width, 2) == height * _engine.area_stride(width)
+
+
+def test_a_picture_beyond_the_bound_of_cells_is_summed_in_several_bands(monkeypatch):
+    monkeypatch.setattr(sampling, "MAX_CELLS", 7 * _engine.area_stride(40))
+    vertices, triangles, _ = scenes.random_triangles(300, 20, 40, 30)
+    whole = tl.overdraw(vertices[:, :2], triangles, (40, 30), sampling="area", threads=1)
+    monkeypatch.undo()
+    assert_same(tl.overdraw(vertices[:, :2], triangles, (40, 30), sampling="area", threads=2), whole)

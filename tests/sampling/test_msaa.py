@@ -196,3 +196,39 @@ def test_index_outside_the_vertices_is_an_error():
     for verb in (tl.coverage, tl.overdraw, tl.rasterize):
         with pytest.raises(IndexError, match="row 1"):
             verb([[0, 0], [1, 0], [0, 1]], [[0, 1, 2], [0, 1, 3]], (4, 4), sampling="msaa4")
+
+
+# ---- large shapes ---------------------------------------------------------------------------------------------------
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize("n", COUNTS)
+@pytest.mark.parametrize("width", [611, 640])
+def test_large_shapes_are_the_share_of_samples_and_stay_in_their_rows(isa, n, width):
+    size = (width, 24)
+    corners = np.array(
+        [[1.5, 1, 0.5], [width + 9, 3, 0.5], [width - 20, 40, 0.5], [40, 9, 0.1], [90, 20, 0.1], [30, 22, 0.1]]
+    )
+    triangles = np.array([[0, 1, 2], [3, 4, 5]])
+    room = np.full(width * 24 + 64, 7, np.float32)
+    out = room[32:-32].reshape(24, width)
+    with on(isa):
+        tl.coverage(corners[:, :2], triangles, size, sampling=f"msaa{n}", out=out)
+        seen = tl.rasterize(corners, triangles, size, sampling=f"msaa{n}").samples_triangle
+    assert_same(out, shares(seen >= 0))
+    assert (room[:32] == 7).all()
+    assert (room[-32:] == 7).all()
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize("channels", [1, 3, 4])
+def test_colors_inside_of_large_shapes_are_those_of_each_sample(isa, channels):
+    corners = np.array([[1.5, 1], [150, 3], [70, 40], [40, 9], [90, 20], [30, 22]])
+    colors = np.array([[40, 80, 120, 255], [200, 100, 50, 255]], np.uint8)[:, :channels]
+    ground = np.array([9, 9, 9, 255])[:channels]
+    with on(isa):
+        seen = tl.rasterize(corners, [[0, 1, 2], [3, 4, 5]], (140, 30), sampling="msaa4", depth_test=None)
+        picture = tl.fill(corners, [[0, 1, 2], [3, 4, 5]], colors, (140, 30), sampling="msaa4", background=ground)
+    of_samples = np.where((ids := seen.samples_triangle)[..., None] < 0, ground, colors[ids].astype(int))
+    mean = of_samples.sum(2) / 4
+    assert_same(picture.reshape(30, 140, channels), np.rint(mean).astype(np.uint8))

@@ -240,6 +240,122 @@ def test_texture_at_no_place_is_that_at_the_origin():
         assert torch.isfinite(dr.texture(random(1, 4, 4, 1), uv, boundary_mode=boundary)).all()
 
 
+# cube maps
+
+
+#: OpenGL 4.6, table 8.19: of each face the direction to its middle, of its columns and of its rows.
+FACES = (("+x", "-z", "-y"), ("-x", "+z", "-y"), ("+y", "+x", "+z"), ("-y", "+x", "-z"), ("+z", "+x", "-y"),
+         ("-z", "-x", "-y"))  # fmt: skip
+
+
+def axis(name):
+    return np.eye(3)["xyz".index(name[1])] * (1 if name[0] == "+" else -1)
+
+
+def on_cube(face, u, v):
+    """The point of a cube of half side 1 at (u, v) of a face, which may lie beyond it."""
+    middle, along_u, along_v = map(axis, FACES[face])
+    return middle + (2 * u - 1) * along_u + (2 * v - 1) * along_v
+
+
+def to_cube(direction):
+    """The face that a direction meets, and u and v there."""
+    largest = int(np.argmax(np.abs(direction)))
+    face = 2 * largest + int(direction[largest] < 0)
+    point = direction / np.abs(direction[largest])
+    return face, *((point @ axis(name) + 1) / 2 for name in FACES[face][1:])
+
+
+def texel_of_cube(tex, face, i, j):
+    """A texel, or the nearest one of another face beyond an edge; None beyond a corner."""
+    n = tex.shape[1]
+    if 0 <= i < n and 0 <= j < n:
+        return tex[face, i, j]
+    if not (0 <= i < n or 0 <= j < n):
+        return None
+    wanted = on_cube(face, (j + 0.5) / n, (i + 0.5) / n)
+    others = [place for place in np.ndindex(6, n, n) if place[0] != face]
+    distances = [np.linalg.norm(on_cube(f, (b + 0.5) / n, (a + 0.5) / n) - wanted) for f, a, b in others]
+    return tex[others[int(np.argmin(distances))]]
+
+
+def linear_on_cube(tex, face, u, v):
+    x, y = u * tex.shape[1] - 0.5, v * tex.shape[1] - 0.5
+    j, i = math.floor(x), math.floor(y)
+    quad = [texel_of_cube(tex, face, i + di, j + dj) for di in (0, 1) for dj in (0, 1)]
+    rest = np.mean([one for one in quad if one is not None], axis=0)
+    a, b, c, d = (rest if one is None else one for one in quad)
+    return (1 - y + i) * ((1 - x + j) * a + (x - j) * b) + (y - i) * ((1 - x + j) * c + (x - j) * d)
+
+
+def directions(n=200, seed=5):
+    """Some to all sides, some next to edges and to corners."""
+    found = np.random.default_rng(seed).normal(size=(n, 3))
+    found[::4] = np.sign(found[::4]) * [1, 1, 0.3] + 0.02 * found[::4]
+    found[1::4] = np.sign(found[1::4]) + 0.05 * found[1::4]
+    return found
+
+
+@pytest.mark.parametrize("n", [1, 2, 5])
+@pytest.mark.parametrize("mode", ["nearest", "linear"])
+def test_cube_map_is_the_loop(mode, n):
+    tex, given = random(2, 6, n, n, 3), directions()
+    uv = torch.tensor(given.reshape(2, 10, 10, 3))
+    out = dr.texture(tex, uv, filter_mode=mode, boundary_mode="cube").reshape(-1, 3)
+    for k, direction in enumerate(given):
+        face, u, v = to_cube(direction)
+        own = tex[k // 100].numpy()
+        near = own[face, min(int(v * n), n - 1), min(int(u * n), n - 1)]
+        expected = near if mode == "nearest" else linear_on_cube(own, face, u, v)
+        np.testing.assert_allclose(out[k].numpy(), expected, atol=1e-12)
+
+
+def test_cube_map_with_halvings_is_the_loop():
+    tex, given = random(1, 6, 4, 4, 2), directions(60, seed=6)
+    by = random(60, 3, 2, seed=7).numpy() - 0.5
+    out = dr.texture(tex, torch.tensor(given.reshape(1, 6, 10, 3)), torch.tensor(by.reshape(1, 6, 10, 6)),
+                     boundary_mode="cube", max_mip_level=1).reshape(-1, 2)  # fmt: skip
+    levels = [tex[0].numpy(), tex[0].numpy().reshape(6, 2, 2, 2, 2, 2).mean(axis=(2, 4))]
+    for k, direction in enumerate(given):
+        face, u, v = to_cube(direction)
+        h = 1e-7
+        steps = []
+        for axis_of_picture in (0, 1):
+            ends = [direction + sign * h * by[k, :, axis_of_picture] for sign in (1, -1)]
+            middle, *rest = map(axis, FACES[face])
+            (u1, v1), (u0, v0) = ([(one @ side / abs(one @ middle) + 1) / 2 for side in rest] for one in ends)
+            steps.append([4 * (u1 - u0) / (2 * h), 4 * (v1 - v0) / (2 * h)])
+        longer = np.linalg.svd(np.array(steps), compute_uv=False)[0]
+        level = min(max(math.log2(longer), 0), 1)
+        one, other = (linear_on_cube(own, face, u, v) for own in levels)
+        np.testing.assert_allclose(out[k].numpy(), (1 - level) * one + level * other, atol=1e-6)
+
+
+def test_cube_map_runs_on_across_edges():
+    tex = random(1, 6, 4, 4, 1)
+    edge = np.array([[1.0, t, 1.0] for t in np.linspace(-0.99, 0.99, 20)])
+    sides = [torch.tensor((edge + [0, 0, shift])[None, None]) for shift in (1e-9, -1e-9)]
+    one, other = (dr.texture(tex, side, boundary_mode="cube") for side in sides)
+    torch.testing.assert_close(one, other, atol=1e-7, rtol=0)
+
+
+def test_cube_map_along_no_direction_is_0():
+    uv = torch.tensor([[[[0.0, 0, 0], [math.nan, 1, 0], [math.inf, 1, 0]]]], requires_grad=True)
+    out = dr.texture(torch.ones(1, 6, 2, 2, 1), uv, boundary_mode="cube")
+    assert out.flatten().tolist() == [0, 0, 0]
+    out.sum().backward()
+    assert not uv.grad.any()
+
+
+def test_gradients_of_cube_maps():
+    tex, uv = (
+        random(1, 6, 2, 2, 2).requires_grad_(),
+        torch.tensor(directions(6).reshape(1, 2, 3, 3), requires_grad=True),
+    )
+    uv_da = (random(1, 2, 3, 6, seed=8) - 0.5).requires_grad_()
+    assert torch.autograd.gradcheck(lambda *given: dr.texture(*given, boundary_mode="cube"), (tex, uv, uv_da))
+
+
 # antialias
 
 
@@ -427,8 +543,9 @@ UV = torch.zeros((1, 4, 4, 2))
         (lambda: dr.interpolate(POS, RAST, TRI, diff_attrs="all"), ValueError, "rast_db must have shape (1, 4, 4, 4)"),
         (lambda: dr.interpolate(POS, RAST, TRI, RAST, [4]), IndexError, "diff_attrs must lie in [0, 4)"),
         (lambda: dr.interpolate(POS, RAST, TRI, RAST, "some"), ValueError, "diff_attrs must be 'all', integers or"),
-        (lambda: dr.texture(COLOR, UV, boundary_mode="cube"), NotImplementedError, "topleft.torch has no cube maps"),
-        (lambda: dr.texture(COLOR, UV, boundary_mode="mirror"), ValueError, "boundary_mode must be 'wrap', 'clamp'"),
+        (lambda: dr.texture(COLOR, UV, boundary_mode="cube"), ValueError, "uv must have shape (B, H, W, 3)"),
+        (lambda: dr.texture(COLOR, COLOR, boundary_mode="cube"), ValueError, "tex must have shape (1, 6, N, N, C)"),
+        (lambda: dr.texture(COLOR, UV, boundary_mode="mirror"), ValueError, "'wrap', 'clamp', 'zero' or 'cube', got"),
         (lambda: dr.texture(COLOR, UV, filter_mode="cubic"), ValueError, "filter_mode must be 'auto', 'nearest'"),
         (lambda: dr.texture(COLOR, UV, filter_mode="linear-mipmap-linear"), ValueError, "needs uv_da or mip_level"),
         (lambda: dr.texture(COLOR[0], UV), ValueError, "tex must have shape (1, Ht, Wt, C) or (1, Ht, Wt, C), got"),
@@ -441,7 +558,7 @@ UV = torch.zeros((1, 4, 4, 2))
             "tex must have sides that halve down to level 2, got (6, 8); max_mip_level=1 stops before",
         ),
         (lambda: dr.texture_construct_mip(COLOR, -1), ValueError, "max_mip_level must be at least 0, got -1"),
-        (lambda: dr.texture_construct_mip(COLOR, cube_mode=True), NotImplementedError, "cube_mode must be False"),
+        (lambda: dr.texture_construct_mip(COLOR, cube_mode=True), ValueError, "tex must have shape (B, 6, N, N, C)"),
         (lambda: dr.antialias(COLOR, RAST[:, :3], POS, TRI), ValueError, "rast must have shape (1, 4, 4, 4), got"),
         (lambda: dr.antialias(COLOR, RAST, POS, TRI, TRI[1:]), ValueError, "topology_hash must have shape (12, 3)"),
     ],

@@ -56,6 +56,13 @@ def as_array(name: str, values: ArrayLike) -> NDArray[Any]:
         array = np.asarray(values)
     except ValueError as error:
         raise ValueError(f"{name} must be array_like, got rows of different lengths ({error})") from None
+    except Exception as error:  # of arrays of other libraries in a list
+        first: Any = values
+        while isinstance(first, (list, tuple)) and len(first):
+            first = first[0]
+        if hasattr(first, "__dlpack_device__"):
+            array_of_tensor(name, first)
+        raise TypeError(f"{name} must be array_like, got {shown(values)} ({error})") from None
     return array if array.flags.aligned else array.copy()
 
 

@@ -165,11 +165,21 @@ def allocate(n_bytes: int) -> NDArray[np.uint8]:
     step = CACHE_LINE if n_bytes < 2 * HUGE_PAGE else HUGE_PAGE
     n_whole = -(-n_bytes // step) * step
     try:
-        block = np.empty(n_whole + step, np.uint8)
+        block = _fresh_bytes(n_whole + step)
     except (MemoryError, ValueError):  # ValueError: beyond what addresses can tell
         raise MemoryError(f"no memory for an array of {n_bytes:,} bytes, which this size or scene needs") from None
     skip = -block.ctypes.data % step
     return block[skip : skip + n_whole]
+
+
+def _fresh_bytes(n_bytes: int) -> NDArray[np.uint8]:
+    """Return fresh memory; where there is none, what waits for an array goes back to the system first."""
+    try:
+        return np.empty(n_bytes, np.uint8)
+    except MemoryError:
+        _engine.keep_blocks(0)
+        _engine.keep_blocks(MAX_WAITING_BYTES)
+        return np.empty(n_bytes, np.uint8)
 
 
 def _size(shape: tuple[int, ...], dtype: DTypeLike) -> int:

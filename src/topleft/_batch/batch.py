@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from topleft._base.arrays import as_count, shown
+from topleft._base.arrays import as_count, as_number, shown
 from topleft._base.options import parse
 from topleft._batch.jobs import Job, JobRunner, Outcome, as_job
 from topleft._batch.workers import Workers, workers_of
@@ -113,13 +113,14 @@ class Summary:
 def render_batch(
     jobs: Iterable[Job | tuple[Any, ...]],
     *,
-    executor: Executor | int | None = None,
+    executor: Executor | int | Any = None,  # Any: a Client of Dask, which is not imported for its name
     progress: Progress | bool | None = None,
     on_error: OnErrorOption = "raise",
     order: OrderOption = "jobs",
     resume: bool = False,
-    chunk: int = 1,
+    chunk: int | None = None,
     window: int | None = None,
+    time_limit: float | None = None,
 ) -> Batch:
     """Return the results of many jobs, to be iterated over: a picture is drawn when its turn comes, not before.
 
@@ -127,10 +128,11 @@ def render_batch(
     ----------
     jobs : iterable of Job, or of tuples (scene, camera, size, options, destination, layers), shorter ones too
         May be a generator without an end: no more than `window` times `chunk` pictures are on the way at any time.
-    executor : None, int or concurrent.futures.Executor
+    executor : None, int, concurrent.futures.Executor or dask.distributed.Client
         None: the calling thread. A number: so many threads, which end with the batch. An executor is left running; what
         a `ProcessPoolExecutor` draws is pickled, except that a mesh is handed to its processes through a file, once
-        for all jobs that share it. Other executors get whole jobs. Never changes a bit.
+        for all jobs that share it. Other executors get whole jobs. The client of a Dask cluster sends a mesh once, and
+        a worker that dies loses nothing; files go to a folder that all workers see. Never changes a bit.
     progress : function of a Result, or True, optional
         Called after each job. True shows a bar with rate and remaining time (tqdm).
     on_error : {"raise", "collect"}
@@ -139,10 +141,14 @@ def render_batch(
         Whether results come in the order of the jobs, or as soon as they are there.
     resume : bool
         Leave out jobs whose files are all there. A file is whole or not there, also after an interrupt.
-    chunk : int
-        How many neighbouring jobs of one scene are handed to a worker together: less to send for each picture.
+    chunk : int, optional
+        How many neighbouring jobs of one scene are handed to a worker together: less to send for each picture. Unless
+        given 1, and on a cluster as many as should take 0.2 s, by the plan of the first job of each scene.
     window : int, optional
         How many chunks are on the way at a time; unless given, 2 a worker and 2 more.
+    time_limit : float, seconds, optional
+        For a cluster: a job that takes longer fails with a `TimeoutError`; a worker that does not come back from it is
+        ended.
 
     Returns
     -------
@@ -173,21 +179,45 @@ def render_batch(
     >>> [result.picture.shape for result in tl.render_batch(jobs, executor=2)]
     [(48, 64, 4), (48, 64, 4), (48, 64, 4), (48, 64, 4)]
     """
-    n_chunk, n_window = as_count("chunk", chunk), None if window is None else as_count("window", window)
+    n_chunk = None if chunk is None else as_count("chunk", chunk)
+    n_window = None if window is None else as_count("window", window)
     if not isinstance(jobs, Iterable) or isinstance(jobs, str | bytes | Mapping | np.ndarray):
         raise TypeError(f"jobs must be an iterable of Job, got {shown(jobs)}")
     if not (progress is None or isinstance(progress, bool) or callable(progress)):
         raise TypeError(f"progress must be a function of a Result, True or None, got {shown(progress)}")
     wish = parse(Order, "order", order)
     collects = parse(OnError, "on_error", on_error) is OnError.COLLECT
-    workers = workers_of(executor)
+    workers = workers_on(executor, time_limit)
     n_jobs = len(jobs) if isinstance(jobs, Sized) else None
     if workers is None:
         results = _one_by_one(iter(jobs), resume)
     else:
         in_flight = _InFlight(workers, n_window or 2 * workers.n_workers + 2, wish is Order.COMPLETED)
-        results = in_flight.results(_chunks(iter(jobs), n_chunk, resume))
+        results = in_flight.results(
+            _chunks(iter(jobs), workers.together if n_chunk is None else lambda _: n_chunk, resume)
+        )
     return Batch(results, _bar(n_jobs) if progress is True else progress or None, collects=collects)
+
+
+def workers_on(executor: object, time_limit: float | None) -> Workers | None:
+    """Return the workers that draw: of a Dask cluster, or those of `workers_of`.
+
+    Raises
+    ------
+    ValueError
+        If a time limit is no positive number, or not for a cluster.
+    """
+    limit = None if time_limit is None else as_number("time_limit", time_limit)
+    if limit is not None and not limit > 0:
+        raise ValueError(f"time_limit must be positive, got {time_limit}")
+    if any(kind.__module__.partition(".")[0] == "distributed" for kind in type(executor).__mro__):
+        from topleft._batch.cluster import ClusterWorkers, is_client
+
+        if is_client(executor):
+            return ClusterWorkers(executor, limit)
+    if limit is not None:
+        raise ValueError("time_limit is for a dask.distributed.Client: other executors cannot end what hangs")
+    return workers_of(executor)
 
 
 class Batch(Iterator[Result]):
@@ -280,9 +310,12 @@ class _Task:
         ]
 
 
-def _chunks(jobs: Iterator[object], n: int, resume: bool) -> Iterator[tuple[list[tuple[int, Job]], bool]]:
-    """Yield neighbouring jobs of one scene, at most n together, and whether their files are there already."""
+def _chunks(
+    jobs: Iterator[object], most: Callable[[Job], int], resume: bool
+) -> Iterator[tuple[list[tuple[int, Job]], bool]]:
+    """Yield neighbouring jobs of one scene, so many together as the first allows, and whether their files are there."""
     together: list[tuple[int, Job]] = []
+    n = 1
     for index, item in enumerate(jobs):
         job = as_job(item, index)
         if resume and _is_done(job):
@@ -291,11 +324,13 @@ def _chunks(jobs: Iterator[object], n: int, resume: bool) -> Iterator[tuple[list
                 together = []
             yield [(index, job)], True
             continue
-        if together and (len(together) == n or not _is_same(together[-1][1].scene, job.scene)):
+        if together and not _is_same(together[-1][1].scene, job.scene):
             yield together, False
             together = []
+        if not together:
+            n = most(job)
         together.append((index, job))
-        if n == 1:  # at once: the next job may be long in coming
+        if len(together) >= n:  # at once: the next job may be long in coming
             yield together, False
             together = []
     if together:

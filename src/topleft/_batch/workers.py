@@ -67,6 +67,10 @@ class Workers:
         """Submit jobs together."""
         raise NotImplementedError
 
+    def together(self, job: Job) -> int:  # noqa: ARG002
+        """How many jobs of a scene are handed over together unless the caller says."""
+        return 1
+
     def release(self, jobs: Jobs) -> None:
         """Free what jobs needed that are done."""
 
@@ -135,13 +139,13 @@ class LocalProcesses(Workers):
 
     def submit(self, jobs: Jobs) -> Future[list[Outcome]]:
         """Submit jobs together, their meshes replaced by where to find them."""
-        light = [(index, replace(job, scene=self._spool.hold(job.scene, _needs_levels(job)))) for index, job in jobs]
+        light = [(index, replace(job, scene=self._spool.hold(job.scene, needs_levels(job)))) for index, job in jobs]
         return self._executor.submit(draw_in_process, self._spool.token, light)
 
     def release(self, jobs: Jobs) -> None:
         """Free their meshes."""
         for _, job in jobs:
-            self._spool.release(job.scene, _needs_levels(job))
+            self._spool.release(job.scene, needs_levels(job))
 
     def stop(self, futures: Sequence[Future[Any]]) -> None:
         """Wait until what has begun is finished, then remove the files."""
@@ -242,7 +246,7 @@ def coarser_levels_of(scene: Any) -> list[tuple[Mesh, tuple[Level, ...]]]:
         return []
 
 
-def _needs_levels(job: Job) -> bool:
+def needs_levels(job: Job) -> bool:
     """Tell whether a job may be drawn with levels of detail."""
     return bool(job.options.get("tolerance", 0))
 

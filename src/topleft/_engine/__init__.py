@@ -12,6 +12,7 @@ pause.pxi      ends a draw: Ctrl-C, and threads whose part is given up
 pixels.pxi     writes pixels that are not found by drawing triangles: means of samples, layers, points, planes, lines
 polygons.pxi   draws snapped polygons: masks, labels, shares
 shade.pxi      shades pixels and tests their alpha
+tiles.pxi      lists the windows that triangles touch, and merges visibility buffers
 triangles.pxi  draws snapped triangles: whole, by bands of rows, in layers
 
 kernels.pyi has the types of what kernels.pyx gives.

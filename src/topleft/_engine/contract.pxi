@@ -393,6 +393,20 @@ cdef extern from "topleft.h" nogil:
         int64_t n_room
     int64_t tl_polygon_stride(int64_t width)
     int64_t tl_share_cells(int64_t width, int64_t height)
+    ctypedef struct tl_tiling:
+        int64_t width_px, height_px, window_width_px, window_height_px
+        int subpixel_bits
+    ctypedef struct tl_window_span:
+        int32_t triangle, first, end
+    ctypedef enum tl_merge_rule:
+        pass
+    ctypedef struct tl_merge:
+        int32_t *ids
+        float *depth
+        const int32_t *other_ids
+        const float *other_depth
+        int32_t first_id
+        tl_merge_rule rule
     ctypedef struct tl_kernels:
         void (*shade_normals)(const tl_snapped *, const tl_window *, const tl_view *, const tl_shading *, const int32_t *, float *) noexcept nogil
         void (*fill_points)(const tl_snapped *, const tl_window *, const tl_points *, const int32_t *, void *) noexcept nogil
@@ -466,3 +480,6 @@ cdef extern from "topleft.h" nogil:
         void (*mask_nonzero)(const tl_polygons *, int64_t, int64_t, int64_t, int64_t, uint32_t *, int32_t *, int64_t, int32_t *, uint64_t *, uint8_t *) noexcept nogil
         void (*label_polygons)(const tl_polygons *, const tl_label_job *) noexcept nogil
         int64_t (*share_polygons)(const tl_polygons *, const tl_share_job *) noexcept nogil
+        int64_t (*list_spans)(const tl_tiling *, const double *, int64_t, int64_t, int64_t *, tl_window_span *) noexcept nogil
+        void (*merge_fragments)(const tl_merge *, int64_t, int64_t) noexcept nogil
+        void (*name_triangles)(int32_t *, int64_t, int64_t, const int32_t *) noexcept nogil

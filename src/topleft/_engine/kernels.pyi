@@ -570,3 +570,24 @@ class SnappedPolygons:
     def list_shares(
         self, first: int, end: int, starts: I64, indices: Array, areas: F32, cells: I32, pieces: PieceScratch | None
     ) -> int: ...
+
+# Windows of huge rasters
+
+def list_spans(
+    tiling: tuple[int, int, int, int, int],
+    corners_px: NDArray[np.float64],
+    first_triangle: int,
+    starts: NDArray[np.int64],
+    spans: NDArray[np.int32] | None,
+) -> int: ...
+def merge_fragments(
+    ids: NDArray[np.int32],
+    depth: NDArray[np.float32],
+    other_ids: NDArray[np.int32],
+    other_depth: NDArray[np.float32],
+    first_id: int,
+    rule: int,
+    first: int,
+    end: int,
+) -> None: ...
+def name_triangles(ids: NDArray[np.int32], first: int, end: int, names: NDArray[np.int32]) -> None: ...

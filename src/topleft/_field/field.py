@@ -121,23 +121,21 @@ def field(
     array = as_array("values", apart_from(out, "values", values))
     if array.dtype.kind not in "fiub":
         raise TypeError(f"values must be real numbers, got dtype {array.dtype}")
-    is_per_face = _is_per_face(array, len(points), polygons.n_faces, parse(Per, "per", per))
+    is_of_faces = is_per_face(array, len(points), polygons.n_faces, parse(Per, "per", per))
     grid = _grid_of(polygons, size, pixel_size, extent, y)
     triangles = as_checked_triangles(apart_from(out, "triangles", polygons.triangles), len(points))
     points_px = grid.to_pixels(points)
     size = _window_of(grid, origin) if window is None else window
     view = View.parse(size, {"subpixel_bits": subpixel_bits, "threads": threads, "origin": origin})
-    dtype: type[Any] = np.float32 if array.dtype.newbyteorder("=") == np.float32 else np.float64
-    if is_per_face and nodata is not None and array.dtype.kind in "iub":
-        dtype = array.dtype.type
-    empty = _nodata_of(nodata, dtype)
+    dtype = dtype_of_field(array.dtype, is_of_faces=is_of_faces, has_nodata=nodata is not None)
+    empty = nodata_of(nodata, dtype)
     with canvas_of(SCRATCH, "field", out, view.size[::-1], dtype) as (result, canvas):
-        ids = _visible(points_px, triangles, view, Sink.LABEL)
-        if is_per_face:
+        ids = visible(points_px, triangles, view, Sink.LABEL)
+        if is_of_faces:
             own = array if polygons.faces is None else array[polygons.faces]
             np.take(np.append(own.astype(dtype), empty), ids, out=canvas, mode="wrap")  # id -1 is the last
         else:
-            _fill_planes(ids, points_px, triangles, array.astype(np.float64, copy=False), view, canvas)
+            fill_planes(ids, points_px, triangles, array.astype(np.float64, copy=False), view, canvas)
             if nodata is not None:
                 canvas[ids < 0] = empty
     return result
@@ -210,8 +208,9 @@ def height_map(
     view = View.parse(grid.size, {"subpixel_bits": subpixel_bits, "threads": threads})
     sink = Sink.FARTHEST if surface == "upper" else Sink.NEAREST
     with canvas_of(SCRATCH, "field", out, view.size[::-1], np.float64) as (result, canvas):
-        ids = _visible(np.column_stack([points_px, _depth_of(heights, triangles)]), triangles, view, sink)
-        _fill_planes(ids, points_px, triangles, heights, view, canvas)
+        depth = depth_of(heights, *range_of(heights, triangles))
+        ids = visible(np.column_stack([points_px, depth]), triangles, view, sink)
+        fill_planes(ids, points_px, triangles, heights, view, canvas)
     return result
 
 
@@ -223,7 +222,14 @@ def _window_of(grid: Grid, origin: tuple[int, int]) -> tuple[int, int]:
     return width - x, height - y
 
 
-def _nodata_of(nodata: object, dtype: type[Any]) -> npt.NDArray[Any]:
+def dtype_of_field(values: np.dtype[Any], *, is_of_faces: bool, has_nodata: bool) -> type[Any]:
+    """The dtype of a field of values of a dtype."""
+    if is_of_faces and has_nodata and values.kind in "iub":
+        return values.type
+    return np.float32 if values.newbyteorder("=") == np.float32 else np.float64
+
+
+def nodata_of(nodata: object, dtype: type[Any]) -> npt.NDArray[Any]:
     """What stands where the mesh is not, as an array of one number of the dtype."""
     if nodata is None:
         return np.array([np.nan], dtype)
@@ -253,7 +259,8 @@ def _grid_of(polygons: Polygons, size: Any, pixel_size: Any, extent: ExtentLike 
     return grid_around(polygons, size, pixel_size, extent, y)
 
 
-def _is_per_face(values: npt.NDArray[Any], n_vertices: int, n_faces: int, per: Per) -> bool:
+def is_per_face(values: npt.NDArray[Any], n_vertices: int, n_faces: int, per: Per) -> bool:
+    """Whether values are of faces; of vertices otherwise."""
     fits_vertices, fits_faces = values.shape == (n_vertices,), values.shape == (n_faces,)
     if per is Per.AUTO and fits_vertices and fits_faces:
         raise ValueError(
@@ -268,17 +275,22 @@ def _is_per_face(values: npt.NDArray[Any], n_vertices: int, n_faces: int, per: P
     raise ValueError(f"values must have shape {wish}, got {values.shape}")
 
 
-def _depth_of(heights: F64, triangles: I32) -> F64:
-    """The heights that count as -1 to 1: what float32 tells apart best."""
+def range_of(heights: F64, triangles: I32) -> tuple[float, float]:
+    """The lowest and the highest height that triangles use."""
     used: F64 = heights[triangles]
+    with np.errstate(invalid="ignore"):
+        return (float(used.min()), float(used.max())) if used.size else (0.0, 0.0)
+
+
+def depth_of(heights: F64, low: float, high: float) -> F64:
+    """The heights that count as -1 to 1, from low to high: what float32 tells apart best."""
     with np.errstate(invalid="ignore", over="ignore"):
-        low, high = (used.min(), used.max()) if used.size else (0.0, 0.0)
-        middle, half = float(low / 2 + high / 2), float(high / 2 - low / 2)
+        middle, half = low / 2 + high / 2, high / 2 - low / 2
         depth: F64 = np.divide(np.subtract(heights, middle), half or 1.0)
     return depth
 
 
-def _visible(points: F64, triangles: I32, view: View, sink: Sink) -> I32:
+def visible(points: F64, triangles: I32, view: View, sink: Sink) -> I32:
     """Ids (H, W) of the triangles that show, in memory that the thread's next call overwrites."""
     snapped = snap_mesh(SCRATCH, points, triangles, view, with_depth=sink is not Sink.LABEL, out=None)
     ids: I32 = SCRATCH.empty("labels", view.size[::-1], np.int32)
@@ -287,7 +299,8 @@ def _visible(points: F64, triangles: I32, view: View, sink: Sink) -> I32:
     return ids
 
 
-def _fill_planes(ids: I32, points_px: F64, triangles: I32, values: F64, view: View, canvas: npt.NDArray[Any]) -> None:
+def fill_planes(ids: I32, points_px: F64, triangles: I32, values: F64, view: View, canvas: npt.NDArray[Any]) -> None:
+    """Write the values of the planes that show in a canvas (H, W)."""
     n, n_threads = len(triangles), count_threads(view.threads, len(triangles))
     planes: F64 | None = None
     if ids.size < MAX_PIXELS_TO_LIST * n and n < MAX_LISTED_PLANES:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import io
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -98,6 +99,57 @@ def read_ply(source: InputFile) -> list[Mesh]:
         return []
     mesh = _mesh(vertex, corners, n_corners, faces, textures, source)
     return [] if mesh is None else [mesh]
+
+
+def mapped_elements(path: Path) -> tuple[dict[str, Array], Array, dict[str, Array]] | None:
+    """Numbers of the vertices by name (V,), the triangles (T, 3) and numbers of these (T,) of a binary file, mapped.
+
+    None where faces are no triangles, or something else stands before them.
+
+    Raises
+    ------
+    MeshError
+        If the file is broken.
+    """
+    with open(path, "rb") as file:
+        order, elements, _, at = _header(file.read(MAX_HEADER_BYTES))
+    n_bytes, found = path.stat().st_size, {}
+    byte_order: Literal["<", ">"] = "<" if order == "<" else ">"
+    for element in elements if order else []:
+        fields: list[Any] = []
+        for i, own in enumerate(element.properties):
+            if own.count_dtype is not None:
+                fields.append((f"n{i}", own.count_dtype.newbyteorder(byte_order)))
+            k = 1 if own.count_dtype is None else 3
+            fields.append((f"{i}", own.dtype.newbyteorder(byte_order), *((k,) if k > 1 else ())))
+        if element.has_lists and element.name != "face":
+            return None
+        dtype = np.dtype(fields)
+        if at + dtype.itemsize * element.n > n_bytes:
+            if element.has_lists:
+                return None
+            raise MeshError(f"it ends within its {element.n} rows of {element.name}")
+        rows = np.memmap(path, dtype, "r", at, (element.n,)) if element.n and fields else np.empty(0, dtype)
+        at += dtype.itemsize * element.n
+        found[element.name] = {own.name: (rows, i) for i, own in enumerate(element.properties)}
+        if element.name == "face":
+            break
+    names = [name for name in ("vertex_indices", "vertex_index") if name in found.get("face", {})]
+    vertex = found.get("vertex", {})
+    if not names or not {"x", "y", "z"} <= vertex.keys():
+        return None
+    rows, i = found["face"][names[0]]
+    if rows.dtype.names is None or any(
+        (rows[first : first + (1 << 20)][name] != 3).any()
+        for name in rows.dtype.names
+        if name.startswith("n")
+        for first in range(0, len(rows), 1 << 20)
+    ):
+        return None
+    if not len(rows):
+        return None
+    of_vertices = {name: block[f"{k}"] for name, (block, k) in vertex.items()}
+    return of_vertices, rows[f"{i}"], {name: rows[f"{k}"] for name, (_, k) in found["face"].items() if k != i}
 
 
 def _header(content: bytes) -> tuple[str, list[_Element], list[str], int]:

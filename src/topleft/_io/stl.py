@@ -8,6 +8,7 @@ Based on: 3D Systems, "StereoLithography Interface Specification", 1988.
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import numpy as np
 
@@ -40,6 +41,29 @@ def read_stl(source: InputFile) -> list[Mesh]:
         corners = rows["corners"].reshape(-1, 3)
     source.check_n_vertices(len(corners))
     return [Mesh(corners, np.arange(len(corners), dtype=np.int32).reshape(-1, 3))] if len(corners) else []
+
+
+def mapped_corners(path: Path) -> np.ndarray[tuple[int, int], np.dtype[np.float32]] | None:
+    """The nine numbers of each triangle (T, 9) of a binary file, mapped; None of a text.
+
+    Raises
+    ------
+    MeshError
+        If the file is broken.
+    """
+    n_file = path.stat().st_size
+    with open(path, "rb") as file:
+        header = file.read(N_HEADER_BYTES)
+    n = int.from_bytes(header[80:84], "little") if len(header) == N_HEADER_BYTES else 0
+    n_bytes = N_HEADER_BYTES + N_TRIANGLE_BYTES * n
+    if header.lstrip()[:5].lower() == b"solid" and n_file != n_bytes:
+        return None
+    if len(header) < N_HEADER_BYTES or n_bytes > n_file:
+        raise MeshError(f"it has {max(0, n_file - N_HEADER_BYTES) // N_TRIANGLE_BYTES} of {n} triangles")
+    if not n:
+        raise MeshError("it has no triangles")
+    rows = np.memmap(path, np.dtype([("", "V12"), ("corners", "<f4", 9), ("", "V2")]), "r", N_HEADER_BYTES, (n,))
+    return rows["corners"]
 
 
 def _corners_of_text(content: bytes) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:

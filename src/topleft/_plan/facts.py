@@ -19,7 +19,7 @@ from topleft._raster import choices
 from topleft._raster.choices import Drawing, Route
 from topleft._raster.cluster_draw import ClusteredMesh
 from topleft._raster.clusters import Clusters
-from topleft._raster.sampling import sample_positions
+from topleft._raster.sampling import area_cells, sample_positions
 from topleft._raster.snap import snap_mesh
 from topleft._raster.view import View
 
@@ -220,7 +220,8 @@ def memory_of(facts: Facts) -> tuple[dict[str, int], dict[str, int]]:
         scratch["covered"] = 8 * height * _engine.Target.covered_shape(height, width, n_samples)[1]
     if view.sampling is Sampling.AREA:
         strips = facts.drawing.n_threads * _engine.blend_cells(width)
-        scratch["cells"] = 4 * (strips if facts.verb == "fill" else height * _engine.area_stride(width))
+        of_sums = area_cells(n, height, width, facts.drawing.n_threads) if n_pixels else 0
+        scratch["cells"] = 4 * (strips if facts.verb == "fill" else of_sums)
     elif facts.verb == "fill" and n_samples == 1 and n and not facts.is_direct:
         scratch["labels"] = 4 * n_pixels
     elif facts.draws_planes and not is_empty and n and choices.can_share(view):

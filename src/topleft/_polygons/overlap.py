@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft import _engine
-from topleft._base.arrays import as_checked_triangles
+from topleft._base.arrays import as_array, as_checked_triangles
 from topleft._base.memory import SCRATCH, FreshMemory
 from topleft._base.options import parse
 from topleft._base.threads import run_parts
@@ -107,7 +107,7 @@ class Overlap:
 
         Amounts a pixel's area are conserved: the sum of the raster is that of values times areas.
         """
-        own = np.asarray(values, np.float64)
+        own = as_array("values", values)
         if own.shape != (len(self),):
             raise ValueError(f"values must have shape ({len(self)},), a number for each polygon, got {own.shape}")
         weights = np.repeat(own, np.diff(self.starts)) * self.areas
@@ -115,7 +115,7 @@ class Overlap:
         return picture.reshape(self.size[::-1])
 
     def _values_of(self, raster: npt.ArrayLike) -> npt.NDArray[np.float64]:
-        values = np.asarray(raster)
+        values = as_array("raster", raster)
         if values.shape != self.size[::-1]:
             raise ValueError(f"raster must have shape {self.size[::-1]}, got {values.shape}")
         return values.reshape(-1)[self.pixels].astype(np.float64)

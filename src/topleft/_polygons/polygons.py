@@ -236,7 +236,7 @@ def as_paint(values: Any, background: Any, n: int, how: Sampling) -> Paint:
     if is_mixed and (isinstance(values, str) or not (table.dtype == np.uint8 or table.dtype.kind == "f")):
         kind = "numbers of polygons" if isinstance(values, str) else str(table.dtype)
         raise ValueError(f"sampling {str(how)!r} mixes colours, which must be uint8 or floats, got {kind}")
-    ground = np.asarray(0 if background is None else background)
+    ground = as_array("background", 0 if background is None else background)
     if ground.shape not in ((), table.shape[1:]):
         raise ValueError(f"background must be one number or have shape {table.shape[1:]}, got {ground.shape}")
     if ground.dtype.kind not in "biuf":

@@ -51,6 +51,7 @@ def as_rings(values: Any) -> RingSet:
     """
     if isinstance(values, RingSet):
         return values
+    values = _without_tensors(values)
     found = _from_offsets(values)
     if found is None:
         found = _from_shapely(values)
@@ -69,10 +70,7 @@ def rings_of_triangles(points: npt.NDArray[Any], triangles: npt.NDArray[np.int32
 
 def as_points(values: Any, name: str) -> npt.NDArray[Any]:
     """Return (N, 2) points as a contiguous float32, float64 or int64 array."""
-    try:
-        array = np.asarray(values)
-    except ValueError as error:
-        raise ValueError(f"{name} must be array_like, got rows of different lengths ({error})") from None
+    array = as_array(name, values)
     if array.size == 0:
         return np.empty((0, 2))
     if array.dtype.kind not in "fiu":
@@ -85,6 +83,27 @@ def as_points(values: Any, name: str) -> npt.NDArray[Any]:
     dtype = np.int64 if array.dtype.kind in "iu" else np.float32 if single else np.float64
     array = np.ascontiguousarray(array, dtype)
     return array if array.flags.aligned else array.copy()
+
+
+def _without_tensors(values: Any) -> Any:
+    """Return arrays of other libraries as NumPy's, by themselves or in lists, as the first elements tell."""
+    if _is_tensor(values):
+        return as_array("rings", values)
+    if isinstance(values, (list, tuple)) and _has_tensors(values):
+        return [*map(_without_tensors, values)] if isinstance(values, list) else (*map(_without_tensors, values),)
+    return values
+
+
+def _is_tensor(value: Any) -> bool:
+    if isinstance(value, (np.ndarray, np.generic)) or hasattr(value, "to_numpy") or hasattr(value, "__geo_interface__"):
+        return False
+    return hasattr(value, "__dlpack__") or hasattr(value, "__array__")
+
+
+def _has_tensors(values: Any) -> bool:
+    if isinstance(values, (list, tuple)):
+        return bool(len(values)) and _has_tensors(values[0])
+    return _is_tensor(values)
 
 
 def _from_offsets(values: Any) -> RingSet | None:

@@ -28,7 +28,16 @@ from topleft._raster.snap import Snapped, snap_mesh, snap_to_cover
 from topleft._raster.view import View
 from topleft.typing import DepthTestOption
 
-__all__ = ["canvas_of", "draw", "draw_all_samples", "draw_coverage", "draw_fragments", "draw_overdraw"]
+__all__ = [
+    "Asked",
+    "canvas_of",
+    "draw",
+    "draw_all_samples",
+    "draw_coverage",
+    "draw_fragments",
+    "draw_overdraw",
+    "refuse_many",
+]
 
 
 def draw(
@@ -118,7 +127,7 @@ def draw_area(
     """Return the area that triangles cover of each pixel, or at most 1 of it."""
     with canvas_of(memory, f"{name} area", out, view.size[::-1], np.float32) as (result, canvas):
         n_threads = choices.threads_to_draw(view, snapped, Sink.COUNT)
-        if sum_areas(memory, snapped.mesh, canvas, n_threads, is_clamped=is_clamped):
+        if sum_areas(memory, snapped.mesh, snapped.n_triangles, canvas, n_threads, is_clamped=is_clamped):
             snapped.check_indices()
     view.mark("draw")
     return result

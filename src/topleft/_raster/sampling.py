@@ -37,6 +37,12 @@ LABEL_BAND_BYTES = 512 << 10
 #: Cells that are held at a time; a larger picture is drawn in several passes over the triangles.
 MAX_CELLS = 1 << 28
 
+#: Cells of a band of rows that stays in the second-level cache: one triangle over 3840x2160 takes 2.3 ms, not 3.2.
+AREA_BAND_BYTES = 512 << 10
+
+#: Pixels that are summed 0.2 ns faster in the nearer cache for each time that a triangle is looked at, 10 ns.
+PIXELS_PER_TRIANGLE = 50
+
 
 def sample_positions(n_samples: int, grid_bits: int) -> NDArray[np.int32]:
     """Return where the samples lie from the pixel's centre, int32 (S, 2), in units of ``2**-grid_bits`` pixels."""
@@ -128,7 +134,13 @@ def sort_bands(
 
 
 def sum_areas(
-    memory: Memory, mesh: _engine.SnappedMesh, pixels: NDArray[np.float32], n_threads: int, *, is_clamped: bool
+    memory: Memory,
+    mesh: _engine.SnappedMesh,
+    n_triangles: int,
+    pixels: NDArray[np.float32],
+    n_threads: int,
+    *,
+    is_clamped: bool,
 ) -> bool:
     """Write the area that triangles cover of each pixel; returns whether a triangle has an index outside the vertices.
 
@@ -139,19 +151,39 @@ def sum_areas(
     if not pixels.size:
         return False
     stride = _engine.area_stride(width)
-    rows_at_once = min(height, max(1, MAX_CELLS // stride))
-    cells = memory.constant("cells", rows_at_once * stride, _engine.CELL_CLEAR)
+    n_parts = max(1, min(n_threads, height))
+    rows_at_once = area_band(n_triangles, height, width, n_parts)
+    cells = memory.constant("cells", area_cells(n_triangles, height, width, n_threads), _engine.CELL_CLEAR)
+    unused = list(cells.reshape(n_parts, -1))
 
-    def draw_rows(first: int, end: int) -> int:
-        own = _engine.as_bytes(cells[(first - top) * stride : (end - top) * stride])
+    def draw_band(own: NDArray[np.uint8], first: int, end: int) -> int:
         status = mesh.draw_area(pixels, own, first, end - first, False, is_clamped)
         if status != _engine.AREA_OVERFLOW:
             return status
         wide = _engine.as_bytes(np.zeros((end - first) * stride, np.int64))
         return mesh.draw_area(pixels, wide, first, end - first, True, is_clamped)
 
-    bad_rows = []
-    for top in range(0, height, rows_at_once):
-        n_rows = min(rows_at_once, height - top)
-        bad_rows += run_parts(lambda first, end: draw_rows(top + first, top + end), n_rows, n_threads)  # noqa: B023
-    return max(bad_rows) >= 0
+    def draw_rows(first: int, end: int) -> int:
+        own = _engine.as_bytes(unused.pop())
+        tops = range(first, end, rows_at_once)
+        return max(draw_band(own, top, min(top + rows_at_once, end)) for top in tops)
+
+    return max(run_parts(draw_rows, height, n_parts)) >= 0
+
+
+def area_band(n_triangles: int, height: int, width: int, n_parts: int) -> int:
+    """Return in how many rows at once each part sums areas: as many as cells are held of, or as stay in the cache.
+
+    Every band goes through all triangles, which pays for few of them: cells that leave the cache are read and written
+    for each pixel.
+    """
+    stride, largest = _engine.area_stride(width), -(-height // n_parts)
+    near = max(1, AREA_BAND_BYTES // (4 * stride))
+    is_near = n_triangles * -(-height // near) * PIXELS_PER_TRIANGLE < height * width
+    return min(largest, near if is_near else max(1, MAX_CELLS // (n_parts * stride)))
+
+
+def area_cells(n_triangles: int, height: int, width: int, n_threads: int) -> int:
+    """Return how many cells `sum_areas` needs."""
+    n_parts = max(1, min(n_threads, height))
+    return n_parts * area_band(n_triangles, height, width, n_parts) * _engine.area_stride(width)

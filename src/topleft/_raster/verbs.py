@@ -240,9 +240,9 @@ def rasterize(
         the triangle with the lower index.
     background_depth : float, optional
         Depth where nothing is; +inf, or -inf with "greater", unless given.
-    out : (ndarray of int32, ndarray of float32), each of shape (H, W), (H, W, S) for S samples or (B, H, W), optional
-        Where ids and depth go; either may be None. Without an array for it, the depth of vertices (V, 2) is made when
-        it is asked for: ids alone take half the time.
+    out : (ndarray of int32, ndarray of float32), each of shape (H, W), (H, W, S), (B, H, W) or (B, H, W, S), optional
+        Where ids and depth go, of S samples and B poses; either may be None. Without an array for it, the depth of
+        vertices (V, 2) is made when it is asked for: ids alone take half the time.
 
     Returns
     -------
@@ -251,7 +251,8 @@ def rasterize(
         ``.barycentric()``, ``.interpolate(values)``. With several samples a pixel also ``.samples_triangle`` and
         ``.samples_depth`` (H, W, S); all else is then of the first sample, which is nearest to the centre, and
         ``.sample(i)`` gives the same of another. Of a batch `FragmentsBatch`: ``.triangle`` and ``.depth`` (B, H, W),
-        ``[i]`` is the `Fragments` of a pose, and each is what it is when it is drawn alone.
+        ``[i]`` is the `Fragments` of a pose, and each is what it is when it is drawn alone. A `plan` of one pose
+        saves the others the check of the triangles.
 
     Raises
     ------

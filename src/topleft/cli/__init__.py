@@ -1,4 +1,4 @@
-"""The command line: `topleft render`, `mask`, `explain`, `calibrate`, `doctor` and `info`.
+"""The command line: `topleft render`, `mask`, `raster`, `explain`, `calibrate`, `doctor` and `info`.
 
 Exit status: 0, all pictures were written; 1, some of several inputs failed and the rest were written, or, with
 --strict, a mesh lacks something of its file; 2, nothing could be done with what was asked, told in one line on stderr.
@@ -9,6 +9,7 @@ doctor.py     runs `topleft doctor`
 explain.py    runs `topleft explain` and `topleft calibrate`
 job_file.py   reads jobs from TOML or JSON
 mask.py       runs `topleft mask`
+raster.py     runs `topleft raster`
 render.py     runs `topleft render`: from arguments to files
 sheet.py      puts many pictures, reduced, on one
 targets.py    finds which picture goes to which file, before anything is drawn
@@ -31,6 +32,7 @@ from topleft.cli.arguments import REFUSED, Parser, UsageError, add_render_argume
 from topleft.cli.doctor import add_doctor_command
 from topleft.cli.explain import add_plan_commands
 from topleft.cli.mask import add_mask_command
+from topleft.cli.raster import add_raster_command
 from topleft.cli.render import FAILED, complain, complain_of_lacks, one_line, run_render
 from topleft.errors import TopleftError
 
@@ -109,5 +111,6 @@ def _parser() -> Parser:
     render.set_defaults(run=run_render)
     add_plan_commands(commands)
     add_mask_command(commands)
+    add_raster_command(commands)
     add_doctor_command(commands)
     return parser

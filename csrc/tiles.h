@@ -1,0 +1,33 @@
+/* The contract of windows of huge rasters: which triangles each of them needs, and visibility buffers put together. */
+#ifndef TOPLEFT_TILES_H
+#define TOPLEFT_TILES_H
+
+#include <stdint.h>
+
+/* A raster cut into windows, all of one size but the last of a row or a column. */
+typedef struct {
+    int64_t width_px, height_px;               /* of the raster, below 2^31 */
+    int64_t window_width_px, window_height_px; /* at least 1 */
+    int subpixel_bits;
+} tl_tiling;
+
+/* Windows [first, end) of a row of windows that a triangle may touch. */
+typedef struct {
+    int32_t triangle, first, end;
+} tl_window_span;
+
+/* Which of two triangles shows: the one of smaller or of larger depth, at equal depth the lower index; or the larger
+ * index. */
+typedef enum { TL_MERGE_LESS = 0, TL_MERGE_GREATER = 1, TL_MERGE_LATER = 2 } tl_merge_rule;
+
+/* Two visibility buffers of one picture; the first gets what shows in either. */
+typedef struct {
+    int32_t *ids; /* -1 for nothing */
+    float *depth;
+    const int32_t *other_ids;
+    const float *other_depth;
+    int32_t first_id; /* is added to the other ids */
+    tl_merge_rule rule;
+} tl_merge;
+
+#endif

@@ -1,0 +1,155 @@
+"""`topleft raster`: meshes to GeoTIFF, Zarr and Deep Zoom."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import topleft as tl
+from topleft.cli import main
+
+SRC = str(Path(__file__).resolve().parents[2] / "src")
+RNG = np.random.default_rng(3)
+POINTS = RNG.uniform([1000, 2000, 0], [1064, 2048, 9], (60, 3))
+TRIANGLES = RNG.integers(0, 60, (40, 3)).astype(np.int32)
+
+
+@pytest.fixture
+def pair(tmp_path):
+    """Names of two .npy files."""
+    np.save(tmp_path / "v.npy", POINTS)
+    np.save(tmp_path / "t.npy", TRIANGLES)
+    return f"{tmp_path / 'v.npy'},{tmp_path / 't.npy'}"
+
+
+def ply_with_values(path):
+    values = np.arange(60, dtype="<f4")
+    vertices = np.zeros(60, [("x", "<f8"), ("y", "<f8"), ("z", "<f8"), ("speed", "<f4")])
+    vertices["x"], vertices["y"], vertices["z"] = POINTS.T
+    vertices["speed"] = values
+    faces = np.zeros(40, [("n", "u1"), ("v", "<i4", 3), ("zone", "<i4")])
+    faces["n"], faces["v"], faces["zone"] = 3, TRIANGLES, np.arange(40)
+    header = (
+        "ply\nformat binary_little_endian 1.0\nelement vertex 60\nproperty double x\nproperty double y\n"
+        "property double z\nproperty float speed\nelement face 40\nproperty list uchar int vertex_indices\n"
+        "property int zone\nend_header\n"
+    )
+    path.write_bytes(header.encode() + vertices.tobytes() + faces.tobytes())
+    return values
+
+
+def chunk_of(path, dtype, shape):
+    return np.frombuffer(path.read_bytes(), dtype).reshape(shape)
+
+
+def test_heights_go_to_a_geotiff(tmp_path, pair, capsys):
+    rasterio = pytest.importorskip("rasterio", reason="rasterio is not installed")
+    pytest.importorskip("pyproj", reason="the tiles extra is not installed")
+    out = tmp_path / "heights.tif"
+    assert main(["raster", pair, "-o", str(out), "--pixel-size", "1", "--crs", "EPSG:25832"]) == 0
+    assert "float64, 1 windows drawn, 0 kept, 0 blank" in capsys.readouterr().out
+    with rasterio.open(out) as found:
+        grid = tl.Grid.around((POINTS, TRIANGLES), pixel_size=1.0)
+        assert np.array_equal(found.read(1), tl.height_map((POINTS, TRIANGLES), grid), equal_nan=True)
+        assert (found.crs.to_epsg(), np.isnan(found.nodata)) == (25832, True)
+
+
+def test_labels_go_to_a_zarr_with_levels(tmp_path, pair):
+    out = tmp_path / "labels.zarr"
+    arguments = ["--labels", "--size", "64x48", "--levels", "2", "--window", "32", "--uncompressed", "--quiet"]
+    assert main(["raster", pair, "-o", str(out), *arguments]) == 0
+    said = json.loads((out / "0/zarr.json").read_text())
+    assert (said["shape"], said["data_type"]) == ([48, 64], "int32")
+    grid = tl.Grid.around((POINTS, TRIANGLES), size=(64, 48))
+    points = np.column_stack([grid.to_pixels(POINTS), POINTS[:, 2]])
+    whole = tl.rasterize(points, TRIANGLES, (64, 48)).triangle
+    assert np.array_equal(chunk_of(out / "0/c/0/1", "<i4", (32, 32)), whole[:32, 32:])
+    assert np.array_equal(chunk_of(out / "1/c/0/0", "<i4", (32, 32))[:24], whole[::2, ::2])
+
+
+def test_values_come_from_a_file_or_by_name(tmp_path):
+    values = ply_with_values(tmp_path / "mesh.ply")
+    np.save(tmp_path / "values.npy", values)
+    grid = tl.Grid.around((POINTS, TRIANGLES), pixel_size=2.0)
+    (w, h), mesh = grid.size, str(tmp_path / "mesh.ply")
+    wished = tl.field((POINTS, TRIANGLES), values, grid, nodata=-1)
+    zones = tl.field((POINTS, TRIANGLES), np.arange(40, dtype=np.int32), grid, nodata=-1)
+    for i, (name, whole) in enumerate((("speed", wished), (str(tmp_path / "values.npy"), wished), ("zone", zones))):
+        out = tmp_path / f"{i}.zarr"
+        arguments = ["--pixel-size", "2", "--values", name, "--nodata", "-1", "--uncompressed", "--quiet"]
+        assert main(["raster", mesh, "-o", str(out), *arguments]) == 0
+        assert np.array_equal(chunk_of(out / "c/0/0", whole.dtype, (h, w)), whole)
+
+
+def test_masks_go_to_deep_zoom(tmp_path, pair):
+    out = tmp_path / "mask.dzi"
+    assert main(["raster", pair, "-o", str(out), "--size", "64x48", "--kind", "coverage", "--quiet"]) == 0
+    grid = tl.Grid.around((POINTS, TRIANGLES), size=(64, 48))
+    mask = tl.coverage(grid.to_pixels(POINTS), TRIANGLES, (64, 48))
+    assert np.array_equal(np.asarray(Image.open(tmp_path / "mask_files/6/0_0.png")), mask * np.uint8(255))
+
+
+def test_interrupted_command_resumes(tmp_path, pair, capsys):
+    out, arguments = tmp_path / "a.zarr", ["--size", "64x48", "--window", "16", "--labels"]
+    assert main(["raster", pair, "-o", str(out), *arguments]) == 0
+    capsys.readouterr()
+    (out / "c/1/2").unlink()
+    assert main(["raster", pair, "-o", str(out), *arguments, "--resume", "--threads", "1"]) == 0
+    assert " 1 windows drawn, " in capsys.readouterr().out
+    assert main(["raster", pair, "-o", str(out), *arguments]) == 2
+    assert "exists: resume=True" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["-o", "a.png", "--size", "9x9"], "the name must end in one of .tif .tiff .zarr .dzi"),
+        (["-o", "a.zarr"], "either --pixel-size or --size must say how large the raster is"),
+        (["-o", "a.zarr", "--size", "9x9", "--pixel-size", "1"], "either --pixel-size or --size"),
+        (["-o", "a.zarr", "--size", "9x9", "--crs", "EPSG:25832"], "--crs is for .tif"),
+        (["-o", "a.tif", "--size", "9x9", "--levels", "2"], "--levels is for .zarr"),
+        (["-o", "a.zarr", "--size", "9x9", "--labels", "--kind", "depth"], "give one of them"),
+        (["-o", "a.zarr", "--size", "9x9", "--values", "speed"], "--values speed: a .npy file, or what"),
+        (["-o", "a.zarr", "--pixel-size", "0"], "pixel_size must be positive"),
+        (["-o", "a.zarr", "--size", "9x9", "--window", "0"], "--window"),
+        (["-o", "none/a.tif", "--size", "9x9"], "its folder is not there"),
+    ],
+)
+def test_wrong_arguments_are_told_in_one_line(tmp_path, pair, monkeypatch, capsys, arguments, message):
+    monkeypatch.chdir(tmp_path)
+    try:
+        status = main(["raster", pair, *arguments])
+    except SystemExit as error:
+        status = error.code
+    said = capsys.readouterr().err.strip()
+    assert status == 2
+    assert message in said
+    assert "\n" not in said
+
+
+def test_broken_meshes_are_told_in_one_line(tmp_path, pair, capsys):
+    triangles = TRIANGLES.copy()
+    triangles[17, 1] = 60
+    np.save(tmp_path / "t.npy", triangles)
+    assert main(["raster", pair, "-o", str(tmp_path / "a.zarr"), "--size", "9x9", "--labels"]) == 2
+    assert "row 17 is" in capsys.readouterr().err
+    assert main(["raster", str(tmp_path / "none.stl"), "-o", str(tmp_path / "a.zarr"), "--size", "9x9"]) == 2
+    assert "none.stl" in capsys.readouterr().err
+
+
+def test_command_leaves_optional_packages_alone(tmp_path, pair):
+    code = (
+        "import sys; from topleft.cli import main\n"
+        f"main(['raster', {pair!r}, '-o', 'a.tif', '--size', '64x48'])\n"
+        "print([name for name in ('zarr', 'dask', 'pyproj', 'fsspec', 'rasterio', 'tifffile') if name in sys.modules])"
+    )
+    env = {**os.environ, "PYTHONPATH": SRC}
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path, env=env, check=True
+    )
+    assert done.stdout.splitlines()[-1] == "[]"

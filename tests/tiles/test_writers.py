@@ -1,0 +1,437 @@
+"""Rasters in files: Zarr, GeoTIFF, Deep Zoom; what was killed goes on and ends up the same."""
+
+import io
+import itertools
+import json
+import os
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import topleft as tl
+from topleft._tiles.geotiff import differences, sums
+from topleft._tiles.levels import halved
+
+SRC = str(Path(__file__).resolve().parents[2] / "src")
+RNG = np.random.default_rng(6)
+POINTS = RNG.uniform([500000, 5000000, 0], [500300, 5000200, 9], (200, 3))
+POINTS[:, 0] -= np.where(POINTS[:, 0] > 500150, 0, 20)
+TRIANGLES = RNG.integers(0, 200, (60, 3)).astype(np.int32)
+GRID = tl.Grid((300, 200), (500000.0, 500300.0, 5000000.0, 5000200.0))
+CORNER = (POINTS, TRIANGLES[:6])
+
+KINDS = {
+    "labels": {},
+    "depth": {"kind": "depth"},
+    "coverage": {"kind": "coverage"},
+    "shares": {"kind": "coverage", "sampling": "area"},
+    "overdraw": {"kind": "overdraw"},
+    "colors": {"kind": "fill", "values": RNG.integers(0, 256, (60, 3)).astype(np.uint8)},
+    "alpha": {"kind": "fill", "values": RNG.integers(0, 256, (60, 4)).astype(np.uint8)},
+    "field": {"kind": "field", "values": RNG.normal(size=200).astype(np.float32), "nodata": -9999.0},
+    "height_map": {"kind": "height_map"},
+    "int16": {"kind": "field", "values": np.arange(60, dtype=np.int16), "nodata": -1},
+}
+
+
+def raster_of(kind, window=64, mesh=(POINTS, TRIANGLES)):
+    return tl.tiles(mesh, GRID, window=window, **KINDS[kind])
+
+
+def equal(found, wished):
+    return np.array_equal(found, wished, equal_nan=np.asarray(wished).dtype.kind == "f")
+
+
+def files_of(folder):
+    """All files below a folder, with what they hold."""
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+# Zarr
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("chunk", [None, (32, 16)])
+def test_zarr_is_the_raster(tmp_path, kind, chunk):
+    zarr = pytest.importorskip("zarr", reason="the tiles extra is not installed")
+    raster = raster_of(kind)
+    raster.to_zarr(tmp_path / "a.zarr", chunk=chunk)
+    found = zarr.open_array(tmp_path / "a.zarr", mode="r")
+    assert (found.shape, found.dtype) == (raster.shape, raster.dtype)
+    assert equal(found[:], raster[:])
+
+
+@pytest.mark.parametrize("compression", ["gzip", "zstd", "none"])
+def test_zarr_is_compressed_as_asked(tmp_path, compression):
+    zarr = pytest.importorskip("zarr", reason="the tiles extra is not installed")
+    raster = raster_of("labels")
+    raster.to_zarr(tmp_path / "a.zarr", compression=compression)
+    assert equal(zarr.open_array(tmp_path / "a.zarr", mode="r")[:], raster[:])
+
+
+def test_zarr_chunks_can_be_read_without_a_package(tmp_path):
+    raster = raster_of("labels")
+    written = raster.to_zarr(tmp_path / "a.zarr", compression="none")
+    assert (written.n_drawn, written.n_kept, written.n_blank) == (19, 0, 1)
+    said = json.loads((tmp_path / "a.zarr/zarr.json").read_text())
+    assert (said["shape"], said["fill_value"], said["dimension_names"]) == ([200, 300], -1, ["y", "x"])
+    chunk = np.frombuffer((tmp_path / "a.zarr/c/1/2").read_bytes(), "<i4").reshape(64, 64)
+    assert equal(chunk, raster[64:128, 128:192])
+
+
+def test_zarr_levels_are_halves(tmp_path):
+    zarr = pytest.importorskip("zarr", reason="the tiles extra is not installed")
+    for kind in ("labels", "field", "colors"):
+        raster = raster_of(kind)
+        raster.to_zarr(tmp_path / kind, levels=3)
+        group = zarr.open_group(tmp_path / kind, mode="r")
+        assert group.attrs["ome"]["multiscales"][0]["datasets"][2]["path"] == "2"
+        level = raster[:]
+        for i in range(3):
+            assert equal(group[str(i)][:], level), (kind, i)
+            level = halved(level, raster.painter.nodata, is_mean=raster.has_means)
+
+
+@pytest.mark.parametrize("window", [(100, 50), 64, 300])
+def test_levels_do_not_depend_on_the_windows(tmp_path, window):
+    tifffile = pytest.importorskip("tifffile", reason="tifffile is not installed")
+    raster_of("field", 32).to_geotiff(tmp_path / "a.tif", tile=16, compression="none")
+    raster = raster_of("field", (96, 64) if window == (100, 50) else window)
+    raster.to_geotiff(tmp_path / "b.tif", tile=16, compression="none")
+    with tifffile.TiffFile(tmp_path / "a.tif") as one, tifffile.TiffFile(tmp_path / "b.tif") as other:
+        assert len(one.pages) == len(other.pages) == 6
+        for a, b in zip(one.pages, other.pages, strict=True):
+            assert equal(a.asarray(), b.asarray())
+
+
+def test_means_leave_out_what_has_no_data():
+    pixels = np.array([[1.0, 3, -9], [5, -9, -9], [2, -9, 4]], np.float32)
+    assert halved(pixels, -9.0, is_mean=True).tolist() == [[3.0, -9.0], [2.0, 4.0]]
+    assert halved(np.array([[1, 2], [np.nan, np.nan]]), np.nan, is_mean=True).tolist() == [[1.5]]
+    assert halved(np.array([[255, 254], [255, 255]], np.uint8), None, is_mean=True).tolist() == [[255]]
+    assert halved(np.array([[7, 2, 3]]), None, is_mean=False).tolist() == [[7, 3]]
+
+
+def test_zarr_goes_to_what_fsspec_reaches():
+    fsspec = pytest.importorskip("fsspec", reason="the tiles extra is not installed")
+    raster = raster_of("labels")
+    assert raster.to_zarr("memory://bucket/a.zarr", compression="none").n_drawn == 19
+    stored = fsspec.filesystem("memory").cat_file("/bucket/a.zarr/c/0/1")
+    assert equal(np.frombuffer(stored, "<i4").reshape(64, 64), raster[:64, 64:128])
+    assert raster.to_zarr("memory://bucket/a.zarr", compression="none", resume=True).n_kept == 19
+
+
+# GeoTIFF
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("compression", ["deflate", "none"])
+def test_geotiff_is_the_raster(tmp_path, kind, compression):
+    rasterio = pytest.importorskip("rasterio", reason="rasterio is not installed")
+    pytest.importorskip("pyproj", reason="the tiles extra is not installed")
+    raster = raster_of(kind)
+    raster.to_geotiff(tmp_path / "a.tif", crs="EPSG:25832", tile=32, compression=compression)
+    with rasterio.open(tmp_path / "a.tif") as found:
+        pixels = np.moveaxis(found.read(), 0, -1)
+        wished = raster[:].view(np.uint8) if raster.dtype == bool else raster[:]
+        assert equal(pixels, wished.reshape(pixels.shape))
+        assert found.crs.to_epsg() == 25832
+        assert tl.Grid.from_transform(found.transform, (found.width, found.height)) == GRID
+        assert found.overviews(1) == [2, 4, 8, 16]
+        nodata = raster.painter.nodata
+        assert (found.nodata is None) == (nodata is None)
+        assert nodata is None or equal(np.float64(found.nodata), np.float64(nodata))
+        quarter = found.read(1, out_shape=(100, 150))
+    half = halved(wished, nodata, is_mean=raster.has_means)
+    assert equal(quarter, half if half.ndim == 2 else half[..., 0])
+    assert not (tmp_path / "a.tif.parts").exists()
+
+
+@pytest.mark.parametrize("kind", ["labels", "height_map", "colors"])
+def test_geotiff_is_cloud_optimised(tmp_path, kind):
+    """What GDAL's validator asks for: directories first, in order; tiles of smaller levels before larger ones."""
+    tifffile = pytest.importorskip("tifffile", reason="tifffile is not installed")
+    raster_of(kind).to_geotiff(tmp_path / "a.tif", tile=16)
+    with tifffile.TiffFile(tmp_path / "a.tif") as file:
+        pages = list(file.pages)
+        assert pages[0].offset == 8
+        assert all(page.is_tiled for page in pages)
+        assert [page.is_reduced for page in pages] == [False] + [True] * (len(pages) - 1)
+        offsets = [page.offset for page in pages]
+        assert offsets == sorted(offsets)
+        firsts = [min(page.dataoffsets) for page in pages]
+        assert firsts == sorted(firsts, reverse=True)
+        assert max(offsets) < min(firsts)
+        assert all(a.shape[0] > b.shape[0] for a, b in itertools.pairwise(pages))
+
+
+def test_geotiff_beyond_4_gb_is_bigtiff(tmp_path, monkeypatch):
+    tifffile = pytest.importorskip("tifffile", reason="tifffile is not installed")
+    monkeypatch.setattr("topleft._tiles.geotiff.LIMIT_CLASSIC", 1000)
+    raster = raster_of("height_map")
+    raster.to_geotiff(tmp_path / "a.tif", tile=32, compression="none")
+    with tifffile.TiffFile(tmp_path / "a.tif") as file:
+        assert file.is_bigtiff
+        assert equal(file.pages[0].asarray(), raster[:])
+        assert equal(file.pages[1].asarray(), halved(raster[:], np.nan, is_mean=True))
+
+
+def test_geotiff_in_pixels_and_with_y_down(tmp_path):
+    tifffile = pytest.importorskip("tifffile", reason="tifffile is not installed")
+    pixels = tl.tiles(([[0.0, 0], [40, 0], [0, 40]], [[0, 1, 2]]), 40, window=16)
+    pixels.to_geotiff(tmp_path / "a.tif", tile=16, overviews=False, nodata=7)
+    down = tl.tiles((POINTS, TRIANGLES), tl.Grid((300, 200), GRID.extent, "down"), window=64)
+    down.to_geotiff(tmp_path / "b.tif", tile=64, overviews=False)
+    with tifffile.TiffFile(tmp_path / "a.tif") as file:
+        assert (33550 in file.pages[0].tags, file.pages[0].tags[42113].value) == (False, "7")
+        assert equal(file.asarray(), pixels[:])
+    with tifffile.TiffFile(tmp_path / "b.tif") as file:
+        assert file.pages[0].tags[34264].value[5] == 1.0
+        assert equal(file.asarray(), down[:])
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.int32, np.float32, np.float64, np.uint16, np.int64])
+@pytest.mark.parametrize("channels", [(), (3,)])
+def test_predictors_are_undone(dtype, channels):
+    pixels = (RNG.normal(size=(16, 32, *channels)) * 1e4).astype(dtype)
+    assert equal(sums(np.frombuffer(differences(pixels), np.uint8), pixels.shape, np.dtype(dtype)), pixels)
+
+
+# Deep Zoom
+
+
+@pytest.mark.parametrize("kind", ["labels", "coverage", "shares", "colors"])
+def test_deepzoom_is_the_raster(tmp_path, kind):
+    raster = raster_of(kind)
+    raster.to_deepzoom(tmp_path / "a.dzi", tile=32)
+    text = (tmp_path / "a.dzi").read_text()
+    assert 'TileSize="32"' in text
+    assert 'Width="300" Height="200"' in text
+    levels = sorted(int(path.name) for path in (tmp_path / "a_files").iterdir() if path.is_dir())
+    assert levels == list(range(10))
+    tile = np.asarray(Image.open(tmp_path / "a_files/9/3_2.png"))
+    part = raster[64:96, 96:128]
+    if kind == "labels":
+        assert ((tile[..., 3] == 255) == (part >= 0)).all()
+        assert len(np.unique(tile[part >= 0], axis=0)) == len(np.unique(part[part >= 0]))
+    else:
+        scale = {"coverage": 255, "shares": np.float32(255), "colors": 1}[kind]
+        assert equal(tile, np.rint(part * scale).astype(np.uint8))
+    for level in levels:  # viewers ask for every tile
+        side = (-(-300 // 2 ** (9 - level)), -(-200 // 2 ** (9 - level)))
+        names = {f"{c}_{r}.png" for c in range(-(-side[0] // 32)) for r in range(-(-side[1] // 32))}
+        assert {path.name for path in (tmp_path / f"a_files/{level}").iterdir()} == names
+
+
+def test_deepzoom_takes_colors_of_a_function(tmp_path):
+    raster = raster_of("height_map")
+    with pytest.raises(ValueError, match="colors must say how float64 of kind 'height_map' becomes uint8"):
+        raster.to_deepzoom(tmp_path / "a.dzi", tile=32)
+    with pytest.raises(ValueError, match="colors must give uint8"):
+        raster.to_deepzoom(tmp_path / "a.dzi", tile=32, colors=np.isnan)
+    raster.to_deepzoom(tmp_path / "a.dzi", tile=32, colors=lambda z: np.where(np.isnan(z), 0, 20 * z).astype(np.uint8))
+    tile = np.asarray(Image.open(tmp_path / "a_files/9/0_0.png"))
+    assert equal(tile, np.nan_to_num(20 * raster[:32, :32]).astype(np.uint8))
+
+
+# What goes wrong
+
+
+WRITERS = {
+    "a.zarr": lambda raster, path, **options: raster.to_zarr(path, levels=2, **options),
+    "a.tif": lambda raster, path, **options: raster.to_geotiff(path, tile=16, **options),
+    "a.dzi": lambda raster, path, **options: raster.to_deepzoom(path, tile=16, **options),
+}
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_what_does_not_fit_the_disk_is_told_before_a_byte_is_written(tmp_path, name, monkeypatch):
+    usage = shutil.disk_usage(tmp_path)
+    monkeypatch.setattr("shutil.disk_usage", lambda path: usage._replace(free=1000))
+    with pytest.raises(OSError, match=r"takes up to [\d,]+ bytes, and .* has 1,000 free: nothing was written"):
+        WRITERS[name](raster_of("labels"), tmp_path / name)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", ["a.zarr", "a.dzi"])
+def test_what_is_there_is_not_written_over(tmp_path, name):
+    WRITERS[name](raster_of("labels"), tmp_path / name)
+    with pytest.raises(FileExistsError, match="exists: resume=True goes on with it"):
+        WRITERS[name](raster_of("labels"), tmp_path / name)
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_what_is_of_another_run_is_refused(tmp_path, name):
+    def interrupt(step):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        WRITERS[name](raster_of("labels"), tmp_path / name, progress=interrupt)
+    others = [raster_of("coverage"), raster_of("labels", 32), raster_of("labels", mesh=(POINTS + 1, TRIANGLES))]
+    for other in others:
+        with pytest.raises(
+            ValueError, match="is not of this raster: the mesh, an option or the size of windows differs"
+        ):
+            WRITERS[name](other, tmp_path / name, resume=True)
+    WRITERS[name](raster_of("labels"), tmp_path / name, resume=True)
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_interrupted_run_goes_on(tmp_path, name):
+    """After any number of windows; the files are those of a run that was not interrupted."""
+    (tmp_path / "whole").mkdir()
+    WRITERS[name](raster_of("labels", mesh=CORNER), tmp_path / "whole" / name)
+    for n in (1, 4):
+        folder = tmp_path / str(n)
+        folder.mkdir()
+        steps = []
+
+        def stop(step, steps=steps, n=n):
+            steps.append(step)
+            if len(steps) == n:
+                raise KeyboardInterrupt
+
+        with pytest.raises(KeyboardInterrupt):
+            WRITERS[name](raster_of("labels", mesh=CORNER), folder / name, progress=stop)
+        seen = []
+        written = WRITERS[name](raster_of("labels", mesh=CORNER), folder / name, progress=seen.append, resume=True)
+        assert written.n_kept >= n
+        assert not {(s.level, s.row, s.column) for s in steps} & {(s.level, s.row, s.column) for s in seen}
+        assert files_of(folder) == files_of(tmp_path / "whole")
+
+
+KILLED = """
+import os, sys, time
+import numpy as np, topleft as tl
+rng = np.random.default_rng(1)
+points = rng.uniform(0, 512, (300, 2))
+raster = tl.tiles((points, rng.integers(0, 300, (100, 3))), 512, window=32, threads=2)
+drawn = os.open(sys.argv[2] + ".log", os.O_WRONLY | os.O_APPEND | os.O_CREAT)
+own = raster.draw_window
+def draw_window(row, column, **options):
+    os.write(drawn, f"{row} {column}\\n".encode())
+    return own(row, column, **options)
+raster.draw_window = draw_window
+print("begins", flush=True)
+if sys.argv[1] == "zarr":
+    raster.to_zarr(sys.argv[2], levels=2, resume=True)
+else:
+    raster.to_geotiff(sys.argv[2], tile=16, resume=True)
+"""
+
+
+@pytest.mark.parametrize("kind", ["zarr", "tif"])
+def test_killed_run_goes_on_and_draws_no_whole_window_twice(tmp_path, kind):
+    env = {**os.environ, "PYTHONPATH": SRC}
+
+    def run(path):
+        command = [sys.executable, "-c", KILLED, kind, str(path)]
+        return subprocess.Popen(command, env=env, stdout=subprocess.PIPE, text=True)
+
+    def whole_windows(path):
+        folder = path / "0/c" if kind == "zarr" else path.with_name(path.name + ".parts") / "0"
+        names = [p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file() and p.name[0] != "."]
+        return {tuple(map(int, name.replace("_", "/").split("/"))) for name in names}
+
+    (tmp_path / "whole").mkdir()
+    (tmp_path / "cut").mkdir()
+    whole, cut = tmp_path / "whole" / f"a.{kind}", tmp_path / "cut" / f"a.{kind}"
+    assert run(whole).wait() == 0
+    log, rng, n_kills = Path(f"{cut}.log"), np.random.default_rng(3), 0
+    for _ in range(40):
+        there = whole_windows(cut)
+        log.write_text("")
+        process = run(cut)
+        process.stdout.readline()
+        if n_kills < 6:
+            time.sleep(rng.uniform(0, 0.03))
+            process.kill()
+        status = process.wait()
+        again = {tuple(map(int, line.split())) for line in log.read_text().splitlines()}
+        assert not again & there
+        n_kills += status != 0
+        if status == 0:
+            break
+    assert n_kills >= 1
+    log.unlink()
+    Path(f"{whole}.log").unlink()
+    assert files_of(tmp_path / "cut") == files_of(tmp_path / "whole")
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "error", "message"),
+    [
+        ("to_zarr", {"chunk": 48}, ValueError, "chunk must divide the windows of 64 x 64 pixels"),
+        ("to_zarr", {"compression": "rar"}, ValueError, "compression must be"),
+        ("to_zarr", {"levels": 0}, ValueError, "levels must be at least 1"),
+        ("to_geotiff", {"tile": 40}, ValueError, "tile must be a multiple of 16, got 40"),
+        ("to_geotiff", {"tile": 48}, ValueError, "tile must divide the windows of 64 x 64 pixels, got 48"),
+        ("to_geotiff", {"tile": 64}, ValueError, "window must have sides of whole pairs of tiles, of 128 pixels"),
+        ("to_geotiff", {"tile": 32, "crs": "EPSG:1"}, ValueError, "crs must be one that pyproj knows"),
+        ("to_geotiff", {"tile": 32, "crs": "Narnia"}, ValueError, "crs must be one that pyproj knows"),
+        ("to_geotiff", {"tile": 32, "crs": "EPSG:5773"}, ValueError, "crs must be projected or geographic"),
+        ("to_deepzoom", {"tile": 24}, ValueError, "tile must be a power of 2, got 24"),
+        ("to_deepzoom", {"tile": 64}, ValueError, "window must have sides of whole pairs of tiles"),
+    ],
+)
+def test_wrong_options_are_told(tmp_path, name, options, error, message):
+    if "crs" in options:
+        pytest.importorskip("pyproj", reason="the tiles extra is not installed")
+    with pytest.raises(error, match=message):
+        getattr(raster_of("labels"), name)(tmp_path / "a.dzi", **options)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_crs_needs_a_grid(tmp_path):
+    with pytest.raises(ValueError, match="crs is for a raster on a Grid"):
+        tl.tiles((POINTS, TRIANGLES), 64).to_geotiff(tmp_path / "a.tif", crs="EPSG:25832")
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write everywhere")
+def test_folder_without_permission_is_told(tmp_path):
+    tmp_path.chmod(0o500)
+    with pytest.raises(PermissionError, match="cannot write"):
+        raster_of("labels").to_zarr(tmp_path / "a.zarr")
+
+
+def test_missing_folder_is_told(tmp_path):
+    with pytest.raises(FileNotFoundError, match=r"cannot write .*: its folder is not there"):
+        raster_of("labels").to_geotiff(tmp_path / "none" / "a.tif", tile=32)
+
+
+@pytest.mark.parametrize(
+    ("package", "call"),
+    [
+        ("pyproj", "to_geotiff('a.tif', tile=32, crs='EPSG:25832')"),
+        ("numcodecs", "to_zarr('a.zarr', compression='zstd')"),
+        ("fsspec", "to_zarr('memory://a.zarr')"),
+        ("dask", "to_dask()"),
+        ("dask", "to_xarray()"),
+    ],
+)
+def test_absent_package_is_told_with_what_to_install(tmp_path, package, call):
+    code = (
+        f"import sys; sys.modules[{package!r}] = None; sys.modules['{package}.zstd'] = None\n"
+        "import topleft as tl\n"
+        "raster = tl.tiles(([[0, 0], [9, 0], [0, 9]], [[0, 1, 2]]), tl.Grid((64, 64), (0, 9, 0, 9)))\n"
+        f"try:\n    raster.{call}\nexcept tl.MissingPackageError as error: print(error)"
+    )
+    env = {**os.environ, "PYTHONPATH": SRC}
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path, env=env, check=True
+    )
+    assert "pip install" in done.stdout
+
+
+def test_progress_shows_a_bar(tmp_path, monkeypatch):
+    pytest.importorskip("tqdm", reason="tqdm is not installed")
+    shown = io.StringIO()
+    monkeypatch.setattr(sys, "stderr", shown)
+    raster_of("labels").to_zarr(tmp_path / "a.zarr", progress=True)
+    assert "19/19" in shown.getvalue()
