@@ -412,6 +412,7 @@ typedef struct {
 } tl_sloped;
 
 #include "clusters.h"
+#include "exact.h"
 #include "polygons.h"
 #include "kernels.h"
 

@@ -32,7 +32,20 @@ MAX_SCRATCH_BYTES = 64 << 20
 
 #: What no result refers to once `coverage`, `overdraw`, `fill` or `wireframe` has returned.
 SCRATCH_NAMES = frozenset(
-    {"bands", "bins", "covered", "labels", "others", "packed", "records", "sample colors", "sample labels", "triangles"}
+    {
+        "bands",
+        "bins",
+        "covered",
+        "labels",
+        "others",
+        "packed",
+        "points",
+        "records",
+        "sample colors",
+        "sample labels",
+        "sample mask",
+        "triangles",
+    }
     | {"edge highs", "edge last_low", "edge starts", "edges"}
     | {"chains", "depth of heights", "planes", "polygon points"}
 )
