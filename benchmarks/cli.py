@@ -19,6 +19,7 @@ from benchmarks.levels.study import STUDY as LEVELS
 from benchmarks.peers import PEERS
 from benchmarks.pictures.study import STUDY as PICTURES
 from benchmarks.polygons.study import STUDY as POLYGONS
+from benchmarks.real_files.study import STUDY as REAL_FILES
 from benchmarks.report.pages import with_parts
 from benchmarks.report.study import Study
 from benchmarks.run.study import STUDY as RUN
@@ -38,7 +39,7 @@ STUDIES = {
     study.kind: study
     for study in (
         RUN, ACCURACY, BATCH, ATLAS, CHOICES, STATIC, PICTURES, LEVELS, LAYERS, FIELD, SAMPLINGS, PLANNER, MEMSET,
-        GROWTH, POLYGONS, FRESH, GATE, TILES,
+        GROWTH, POLYGONS, REAL_FILES, FRESH, GATE, TILES,
     )
 }  # fmt: skip
 

@@ -33,6 +33,7 @@
 #include "shade/shade_samples.c"
 #include "shade/alpha_test.c"
 #include "mesh/creases.c"
+#include "mesh/equal.c"
 #include "mesh/normals.c"
 #include "mesh/nearest.c"
 #include "mesh/reach.c"
@@ -108,6 +109,7 @@ const tl_kernels TL_KERNELS = {
     .unit_vectors = unit_vectors,
     .move_points = move_points,
     .color_rows = color_rows,
+    .group_rows = group_rows,
     .build_tree = build_tree,
     .find_nearest = nearest_of_points,
     .find_reach = find_reach,

@@ -244,6 +244,12 @@ typedef struct tl_kernels {
     /* The first three of n_channels of colours [first, end) as float32 (n, 4) and 1. */
     void (*color_rows)(const uint8_t *colors, int n_channels, int64_t first, int64_t end, float *rows);
 
+    /* Groups of n equal rows of n_words words, in the order of their first rows: the first row of each, and the group
+     * of every row.  `table`: 2^table_bits numbers of -1, more than n.  Returns how many groups there are, or -1 where
+     * many hashes meet. */
+    int64_t (*group_rows)(const uint32_t *rows, int n_words, int64_t n, int table_bits, int32_t *table, int32_t *first,
+                          int32_t *group);
+
     /* The boxes of a surface, all but whose nodes are there. */
     void (*build_tree)(tl_surface *surface);
 
@@ -278,7 +284,7 @@ typedef struct tl_kernels {
     void (*sort_polygons)(const tl_polygon_box *boxes, int64_t n, int64_t band_rows, int64_t n_bands, int64_t *starts,
                           int32_t *listed);
 
-    /* Sets weights and is_simple of polygons [first, end); room as TL_CERTIFY_WORDS tells.  `trust_polygons`: of
+    /* Sets weights and is_simple of polygons [first, end); room as tl_certify_words tells.  `trust_polygons`: of
      * polygons that are known to be valid, the first ring of each its border and the others holes. */
     void (*certify_polygons)(const tl_polygons *polygons, int64_t first, int64_t end, int8_t *weights,
                              uint8_t *is_simple, int64_t *room);

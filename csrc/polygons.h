@@ -23,6 +23,7 @@ typedef struct {
     int bits;
     int is_nonzero;                   /* the rule: winding other than 0 instead of odd */
     int32_t sample_x_fx, sample_y_fx; /* the sample from the pixel's centre */
+    struct tl_pause *pause;           /* of this call, or NULL: what has begun is drawn to its end */
 } tl_polygons;
 
 /* The pixels [left, right) x [top, bottom) that a polygon reaches into, cut off at the window. */
@@ -111,11 +112,14 @@ typedef struct {
 } tl_share_job;
 
 /* Cells that there are at least: small polygons are drawn some at a time. */
-#define TL_LEAST_SHARE_CELLS 32768
+#define TL_LEAST_SHARE_CELLS 49152
 
 static inline int64_t tl_share_cells(int64_t width, int64_t height) { return (width + 63) / 16 * 16 * height + 64; }
 
-/* int64 for each edge of the largest polygon that `certify_polygons` needs. */
-#define TL_CERTIFY_WORDS 11
+/* int64 that `certify_polygons` needs for a polygon: two keys for each ring, and the nodes of a tree. */
+static inline int64_t tl_certify_words(int64_t n_points, int64_t n_rings)
+{
+    return 4 * n_rings + 18 * (n_points / 16 + n_rings);
+}
 
 #endif

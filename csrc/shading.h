@@ -86,9 +86,10 @@ typedef struct {
 typedef enum { TL_SHOW_LIGHT = 0, TL_SHOW_NORMALS = 1, TL_SHOW_MATCAP = 2 } tl_show;
 
 typedef struct {
-    const float *normals; /* rows of four: the unit normal, or 0, and 1/w; of the vertices, then of creases */
-    /* (n_triangles, 3): the row that each corner has; NULL: that of its vertex */
+    const float *normals; /* rows of four: the unit normal, or 0, and 1/w; of the vertices */
+    /* (n_triangles, 3): the row of `corner_normals` that each corner has; NULL: the normals are those of its vertex */
     const int32_t *normal_of_corner;
+    const float *corner_normals; /* rows of four: the unit normal, or 0, and what is not read */
     /* (n_triangles, 4): unit, on the side that is counter-clockwise; NULL: interpolated ones */
     const float *face_normals;
     const void *positions; /* (n_vertices, 3) float32 or float64: the face normal where interpolated ones cancel */

@@ -85,6 +85,7 @@ CASES = {
         _case("cells", "labels", (4000, 4000), "labels of 20,000 cells that tile", lambda s: cells(s, 20_000)),
         _case("strewn", "labels", (2000, 2000), "labels of 3,000 polygons", lambda s: strewn(s, 3000)),
         _case("parcels", "labels", (4096, 4096), "labels of 200,000 cells, random order", lambda s: cells(s, 200_000)),
+        _case("star-area", "area", (4096, 4096), "areas of a ring of 1,000,000 corners", lambda s: star(s, 1_000_000)),
         _case("hole-area", "area", (512, 512), "areas of a 400-gon with a hole", lambda s: gon(s, 400, with_hole=True)),
         _case("table", "table", (4000, 4000), "shares of 2,000 of 20,000 cells", lambda s: cells(s, 20_000)[:2000]),
         _case("full-table", "table", (4000, 4000), "shares of 2,000 cells that tile", lambda s: cells(s, 2000)),

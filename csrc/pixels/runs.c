@@ -199,12 +199,27 @@ TL_INLINE void load_normal_rows(const shade_runs *s, int slot, int32_t rows[3][T
             rows[k][lane] = of_corner[3 * (int64_t)ids[lane] + k];
 }
 
-/* Normals and q of the corners in these rows. */
-TL_INLINE void load_normals(const shade_runs *s, int32_t rows[3][TL_MAX_LANES], run_setup *r)
+/* Normals and q of the corners. */
+TL_INLINE void load_normals(const shade_runs *s, int slot, run_setup *r)
 {
+    const tl_shading *shading = s->shading;
+    _Alignas(64) int32_t rows[3][TL_MAX_LANES];
+    if (shading->normal_of_corner)
+        load_normal_rows(s, slot, rows);
     for (int k = 0; k < 3; k++) {
         vi c[4];
-        vi_load_records(s->shading->normals, 16, rows[k], c);
+        if (shading->normal_of_corner) {
+            const vi at = vi_add(vi_shift_left(vi_load(r->corners[k]), 2), vi_set1(3));
+            if (s->snapped->mesh.n_vertices >> 29) /* places of numbers need more than 31 bits */
+                vi_load_records(shading->normals, 16, r->corners[k], c);
+            else
+                c[3] = vi_gather(vm_all(), (const int32_t *)shading->normals, at);
+            const vi inv_w = c[3];
+            vi_load_records(shading->corner_normals, 16, rows[k], c);
+            c[3] = inv_w;
+        } else {
+            vi_load_records(shading->normals, 16, r->corners[k], c);
+        }
         for (int axis = 0; axis < 3; axis++)
             r->normal[k][axis] = vf_of_bits(c[axis]);
         r->q[k] = vf_of_bits(c[3]);
@@ -238,21 +253,51 @@ TL_INLINE void load_positions(const void *positions, int is_f64, const int32_t *
         p[axis] = vd_load(lanes[axis]);
 }
 
-/* The edges of the triangles of TL_LANES runs from their first corners on, over the longest coordinate of each. */
+/* The same of float32, as they are. */
+TL_INLINE void load_positions_f32(const float *positions, const int32_t *vertices, vf *p)
+{
+    if (TL_LANES > 1 && !vm_any(vi_eq(vi_load(vertices), vi_set1(0)))) {
+        vi bits[4];
+        vi_load_records((const char *)positions - 4, 12, vertices, bits);
+        for (int axis = 0; axis < 3; axis++)
+            p[axis] = vf_of_bits(bits[axis + 1]);
+        return;
+    }
+    float lanes[3][TL_MAX_LANES];
+    for (int lane = 0; lane < TL_LANES; lane++)
+        for (int axis = 0; axis < 3; axis++)
+            lanes[axis][lane] = positions[3 * (int64_t)vertices[lane] + axis];
+    for (int axis = 0; axis < 3; axis++)
+        p[axis] = vf_load(lanes[axis]);
+}
+
+/* The edges of the triangles of TL_LANES runs from their first corners on, over the longest coordinate of each.
+ * A difference of float32 is rounded alike in float32 and, by way of float64, in two steps: 53 bits are 2 * 24 + 2. */
 TL_INLINE void load_edges(const shade_runs *s, const run_setup *r, vf edge[2][3])
 {
     const tl_shading *shading = s->shading;
     const vf zero = vf_set1(0.0f);
     vf longest = vf_set1(0x1p-120f);
-    vd first[3], other[3];
-    load_positions(shading->positions, shading->is_f64, r->corners[0], first);
-    for (int k = 0; k < 2; k++) {
-        load_positions(shading->positions, shading->is_f64, r->corners[k + 1], other);
-        for (int axis = 0; axis < 3; axis++) {
-            edge[k][axis] = vf_from_vd(vd_sub(other[axis], first[axis]));
-            longest = vf_max(longest, vf_max(edge[k][axis], vf_sub(zero, edge[k][axis])));
+    if (shading->is_f64) {
+        vd first[3], other[3];
+        load_positions(shading->positions, 1, r->corners[0], first);
+        for (int k = 0; k < 2; k++) {
+            load_positions(shading->positions, 1, r->corners[k + 1], other);
+            for (int axis = 0; axis < 3; axis++)
+                edge[k][axis] = vf_from_vd(vd_sub(other[axis], first[axis]));
+        }
+    } else {
+        vf first[3], other[3];
+        load_positions_f32(shading->positions, r->corners[0], first);
+        for (int k = 0; k < 2; k++) {
+            load_positions_f32(shading->positions, r->corners[k + 1], other);
+            for (int axis = 0; axis < 3; axis++)
+                edge[k][axis] = vf_sub(other[axis], first[axis]);
         }
     }
+    for (int k = 0; k < 2; k++)
+        for (int axis = 0; axis < 3; axis++)
+            longest = vf_max(longest, vf_max(edge[k][axis], vf_sub(zero, edge[k][axis])));
     const vf scale = vf_div(vf_set1(1.0f), longest);
     for (int k = 0; k < 2; k++)
         for (int axis = 0; axis < 3; axis++)
@@ -477,13 +522,7 @@ TL_INLINE void set_runs(shade_runs *s, int64_t row)
         run_corners(s, slot, r.corners);
         vi_store(s->ints[RUN_SPECIAL] + slot, vi_set1(0));
         const vm is_special = vm_and(set_edges(s, slot, row, &r), vm_first(TL_LANES + s->n_runs - slot));
-        if (shading->normal_of_corner) {
-            _Alignas(64) int32_t rows[3][TL_MAX_LANES];
-            load_normal_rows(s, slot, rows);
-            load_normals(s, rows, &r);
-        } else {
-            load_normals(s, r.corners, &r);
-        }
+        load_normals(s, slot, &r);
         for (unsigned rest = vm_bits(is_special); rest; rest &= rest - 1)
             set_special(s, slot, __builtin_ctz(rest), row, &r);
         set_attributes(s, slot, &r);

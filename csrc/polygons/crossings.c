@@ -22,6 +22,8 @@
 #define TL_FEW_ROWS \
     6 /* edges of so many rows are walked a vector at a time; longer ones by a vector of rows: 4 and 8 are slower */
 
+#define TL_EDGES_TO_PAUSE 4096 /* after which it is asked whether to go on; a multiple of TL_LANES */
+
 /* Rows [top, bottom) of a picture of some width, and where pixels are sampled. */
 typedef struct {
     int32_t top, bottom, width, center_x, center_y;
@@ -198,6 +200,9 @@ TL_INLINE void walk_polygon(const tl_polygons *p, int64_t polygon, const row_fra
         for (int64_t i = first; i < end; i += TL_LANES) {
             vi ax, ay, bx, by;
             crossing_lanes e;
+            if ((i - first) % TL_EDGES_TO_PAUSE == 0 &&
+                is_polygon_given_up(p, 64 * (end - i < TL_EDGES_TO_PAUSE ? end - i : TL_EDGES_TO_PAUSE)))
+                return;
             vm live = load_ring_edges(p, first, end, i, &ax, &ay, &bx, &by);
             if (kind == TO_COUNTS) {
                 count_lanes(f, s, ay, by, live);

@@ -206,7 +206,7 @@ TL_INLINE void label_polygon(const tl_polygons *p, int64_t polygon, const tl_lab
     const int64_t top = box->top > job->top ? box->top : job->top,
                   bottom = box->bottom < job->bottom ? box->bottom : job->bottom;
     const int32_t value = job->values ? job->values[polygon] : (int32_t)polygon;
-    if (top >= bottom || box->left >= box->right)
+    if (top >= bottom || box->left >= box->right || is_polygon_given_up(p, (bottom - top) * (16 + n_points)))
         return;
     const int is_small = !p->is_wide[polygon] && n_points <= TL_LABEL_EDGES && job->test == TL_POLYGON_CENTER;
     if (is_small && bottom - top <= TL_LABEL_ROWS) {
@@ -225,7 +225,7 @@ TL_INLINE void label_polygon(const tl_polygons *p, int64_t polygon, const tl_lab
         }
     }
     write_all_waiting(job, n_bytes); /* what follows does not wait */
-    for (int64_t row = top; row < bottom; row += TL_CELL_ROWS)
+    for (int64_t row = top; row < bottom && !is_polygon_given_up(p, TL_CELL_ROWS * job->width); row += TL_CELL_ROWS)
         label_by_bits(p, polygon, job, row, row + TL_CELL_ROWS < bottom ? row + TL_CELL_ROWS : bottom, value);
 }
 

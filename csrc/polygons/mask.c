@@ -101,6 +101,8 @@ static void mask_nonzero(const tl_polygons *p, int64_t polygon, int64_t width, i
     crossing_sink s = {.at = at, .list = list};
     memset(at, 0, sizeof *at * (size_t)(bottom - top + 1));
     walk_polygon(p, polygon, &f, &s, TO_COUNTS);
+    if (is_polygon_given_up(p, 1)) /* lists would not be as long as the numbers say */
+        return;
     for (int64_t k = 1; k < bottom - top; k++) /* counts from their differences */
         at[k] += at[k - 1];
     for (int64_t first = top, end = top; first < bottom; first = end) {
@@ -114,6 +116,8 @@ static void mask_nonzero(const tl_polygons *p, int64_t polygon, int64_t width, i
         f = place_rows(p, first, end, width);
         s.at = starts;
         walk_polygon(p, polygon, &f, &s, TO_LISTS);
+        if (is_polygon_given_up(p, 1))
+            return;
         int64_t begin = 0;
         for (int64_t row = first; row < end; row++) {
             const int m = (int)(starts[row - first] - begin);

@@ -270,6 +270,8 @@ static void resolve_polygon(const tl_polygons *p, int64_t polygon, const tl_poly
         int64_t begin = 0;
         for (int64_t row = first; row < end; row++) {
             const int64_t row_end = starts[row - top];
+            if (is_polygon_given_up(p, 256 * (row_end - begin) + box->right - box->left))
+                return;
             resolve_row(p, scratch->pieces + begin, row_end - begin, box->left, box->right, scratch, scratch->shares);
             take(to, row, box->left, box->right, scratch->shares);
             begin = row_end;

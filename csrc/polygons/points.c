@@ -93,6 +93,16 @@ static tl_vertex_counts snap_points(const tl_source *source, int64_t first, int6
     return n;
 }
 
+/* Whether to give up the call, after work that takes as long as so many pixels of a large triangle. */
+TL_INLINE int is_polygon_given_up(const tl_polygons *s, int64_t n_px)
+{
+    tl_pause *pause = s->pause;
+    if (!pause)
+        return 0;
+    pause->left_px -= n_px;
+    return pause->left_px < 0 && pause->ask(pause);
+}
+
 static inline int64_t polygon_x(const tl_polygons *s, int is_wide, int64_t i)
 {
     return is_wide ? s->wide_fx[2 * i] : s->x_fx[i];

@@ -22,11 +22,13 @@
 
 #define TL_WHOLE (1 << TL_AREA_BITS)
 
-/* Small polygons are drawn some at a time, one below the other: vectors of edges are then fuller, which takes a sixth
+/* Small polygons are drawn some at a time, one below the other: vectors of edges are then fuller, which takes a third
  * off 20,000 cells of 28 px.  What an edge adds does not depend on where it is drawn. */
 #define TL_STACK_COLUMNS 64
-#define TL_STACK_ROWS 256
-#define TL_STACK_MAX 8 /* 4 is slower by 7 percent, 16 and 32 by 1 */
+#define TL_STACK_HEIGHT 128
+#define TL_STACK_ROWS 512
+#define TL_STACK_BEYOND 8 /* an edge that passes up to 6 columns a row writes 8 */
+#define TL_STACK_MAX 8    /* 4 is slower by 10 percent, 16 by 5 */
 
 typedef struct {
     const tl_share_job *job;
@@ -96,13 +98,34 @@ static void push_polygon(area_state *s, const tl_polygons *p, int64_t polygon, i
     }
 }
 
+/* Fills the last vector of edges of many rows with some of fewer: those rows have no height, and add nothing. */
+static void fill_vectors(area_state *s, int first_kind)
+{
+    for (int kind = first_kind + TL_SHORT_ROWS - 1, from = kind - 1; kind > first_kind; kind--) {
+        from = from < kind ? from : kind - 1;
+        int n_more = -s->n[kind] & (TL_LANES - 1);
+        while (n_more > 0 && from >= first_kind) {
+            if (s->n[from] == 0) {
+                from--;
+                continue;
+            }
+            s->edges[kind][s->n[kind]++] = s->edges[from][--s->n[from]];
+            n_more--;
+        }
+    }
+}
+
 static void finish_cells(area_state *s)
 {
+    fill_vectors(s, 0);
+    fill_vectors(s, TL_EDGES_FLAT);
     for (int kind = 0; kind < TL_EDGES_NONE; kind++)
         if (s->n[kind])
             flush_edges(s, kind, 1);
     flush_quads(&s->plane, 0);
 }
+
+TL_INLINE vi whole_at_most(vi sums) { return vi_min(vi_max(sums, vi_set1(0)), vi_set1(TL_WHOLE)); }
 
 /* The sums of TL_LANES cells, in [0, TL_WHOLE]; clears them.  Most hold nothing. */
 TL_INLINE vi take_cells(int32_t *cells, vi *carry)
@@ -114,7 +137,7 @@ TL_INLINE vi take_cells(int32_t *cells, vi *carry)
         vi_store(cells, bias);
         *carry = vi_last(sums);
     }
-    return vi_min(vi_max(sums, vi_set1(0)), vi_set1(TL_WHOLE));
+    return whole_at_most(sums);
 }
 
 TL_INLINE vi begin_cells(int32_t *row)
@@ -125,22 +148,32 @@ TL_INLINE vi begin_cells(int32_t *row)
     return vi_set1((int32_t)sum);
 }
 
-/* Appends the entries of a vector that are not 0 to the table; lanes beyond the box are none. */
-TL_INLINE int64_t pack_entries(const tl_share_job *job, int64_t n, int64_t index, vi sums, vm inside)
+/* Appends the cells of a row that are not 0 to a table of n entries, and clears them; returns how many there are then.
+ * Boxes of polygons are small: to ask which cells hold something costs more than to add them. */
+TL_INLINE int64_t pack_row(int is_long, int32_t *cells, vi carry, int64_t width, int64_t index, void *indices,
+                           float *areas, int64_t n)
 {
-    const vm on = vm_and(vi_gt(sums, vi_set1(0)), inside);
-    const vi areas = vi_bits_of_vf(vf_mul(vf_from_vi(sums), vf_set1(1.0f / TL_WHOLE)));
-    const int count = __builtin_popcount(vm_bits(on));
-    vi_compress((int32_t *)job->areas + n, on, areas);
-    if (job->is_long) {
-        int32_t columns[TL_LANES];
-        vi_compress(columns, on, vi_iota());
-        for (int k = 0; k < count; k++)
-            ((int64_t *)job->indices)[n + k] = index + columns[k];
-    } else {
-        vi_compress((int32_t *)job->indices + n, on, vi_add(vi_set1((int32_t)index), vi_iota()));
+    const vi bias = vi_set1(TL_CELL_ZERO), zero = vi_set1(0);
+    vi at = vi_add(vi_set1((int32_t)index), vi_iota());
+    for (int64_t c = 0; c < width; c += TL_LANES) {
+        const vi all = vi_add(vi_prefix_sum(vi_sub(vi_load(cells + c), bias)), carry), sums = whole_at_most(all);
+        const vm on = vm_and(vi_gt(sums, zero), vm_first(width - c));
+        const int count = __builtin_popcount(vm_bits(on));
+        carry = vi_last(all);
+        vi_store(cells + c, bias);
+        vi_compress((int32_t *)areas + n, on, vi_bits_of_vf(vf_mul(vf_from_vi(sums), vf_set1(1.0f / TL_WHOLE))));
+        if (is_long) {
+            int32_t columns[TL_LANES];
+            vi_compress(columns, on, vi_iota());
+            for (int k = 0; k < count; k++)
+                ((int64_t *)indices)[n + k] = index + c + columns[k];
+        } else {
+            vi_compress((int32_t *)indices + n, on, at);
+            at = vi_add(at, vi_set1(TL_LANES));
+        }
+        n += count;
     }
-    return n + count;
+    return n;
 }
 
 static void mix_pixel(const tl_share_job *job, int64_t polygon, int64_t at, float share)
@@ -151,16 +184,18 @@ static void mix_pixel(const tl_share_job *job, int64_t polygon, int64_t at, floa
         pixel[k] += (color[k] - pixel[k]) * share;
 }
 
-/* A row of cells to where shares go. */
-TL_INLINE void put_cells(share_output *out, int32_t *cells, int64_t row, int64_t left, int64_t right)
+/* A row of cells to where shares go; `n_beyond` cells right of the columns may hold something, and those left of them
+ * unless the polygon lies wholly inside. */
+TL_INLINE void put_cells(share_output *out, int32_t *cells, int64_t row, int64_t left, int64_t right, int is_inside,
+                         int64_t n_beyond)
 {
     const tl_share_job *job = out->job;
     const int64_t index = row * job->width + left, width = right - left;
-    vi carry = begin_cells(cells);
+    vi carry = is_inside ? vi_set1(0) : begin_cells(cells);
     cells += TL_CELL_PAD;
     if (job->starts) {
-        for (int64_t c = 0; c < width; c += TL_LANES)
-            out->n = pack_entries(job, out->n, index + c, take_cells(cells + c, &carry), vm_first(width - c));
+        out->n = job->is_long ? pack_row(1, cells, carry, width, index, job->indices, job->areas, out->n)
+                              : pack_row(0, cells, carry, width, index, job->indices, job->areas, out->n);
     } else if (job->colors) {
         int32_t sums[TL_LANES];
         for (int64_t c = 0; c < width; c += TL_LANES) {
@@ -187,7 +222,7 @@ TL_INLINE void put_cells(share_output *out, int32_t *cells, int64_t row, int64_t
             vf_store_some(to, inside, vf_select(vf_lt(one, sum), one, sum), width - c >= TL_LANES);
         }
     }
-    for (int64_t c = width / TL_LANES * TL_LANES; c < tl_area_stride(width) - TL_CELL_PAD; c += TL_LANES)
+    for (int64_t c = (width + TL_LANES - 1) / TL_LANES * TL_LANES; c < width + n_beyond; c += TL_LANES)
         vi_store(cells + c, vi_set1(TL_CELL_ZERO));
 }
 
@@ -242,7 +277,8 @@ static void share_simply(area_state *s, const tl_polygons *p, share_output *out,
         push_polygon(s, p, out->polygon, 0, 0);
         finish_cells(s);
         for (int64_t row = first; row < end; row++)
-            put_cells(out, job->cells + (row - first) * stride, row, box->left, box->right);
+            put_cells(out, job->cells + (row - first) * stride, row, box->left, box->right, 0,
+                      stride - TL_CELL_PAD - width);
     }
 }
 
@@ -252,37 +288,51 @@ static inline int fits_stack(const tl_polygons *p, const tl_share_job *job, int6
     const tl_polygon_box *box = job->boxes + polygon;
     return p->is_simple[polygon] && !p->is_wide[polygon] && box->left > 0 && box->right < job->width &&
            box->top > job->top && box->bottom < job->bottom && box->right - box->left <= TL_STACK_COLUMNS &&
-           box->bottom - box->top <= TL_STACK_ROWS / 4;
+           box->bottom - box->top <= TL_STACK_HEIGHT;
+}
+
+/* How many polygons from the i-th of the job on are drawn one below the other, and the widest of them. */
+static int64_t plan_stack(const tl_polygons *p, const share_output *out, int64_t i, int64_t *width)
+{
+    const tl_share_job *job = out->job;
+    int64_t n = 0, n_rows = 0, n_entries = 0;
+    *width = 0;
+    for (; n < TL_STACK_MAX && i + n < job->end; n++) {
+        const int64_t polygon = job->listed ? job->listed[i + n] : i + n;
+        const tl_polygon_box *box = job->boxes + polygon;
+        const int32_t height = box->bottom - box->top, columns = box->right - box->left;
+        n_rows += height, n_entries += (int64_t)height * columns;
+        if (!fits_stack(p, job, polygon) || n_rows > TL_STACK_ROWS || (job->starts && out->n + n_entries > job->n_room))
+            break;
+        *width = columns > *width ? columns : *width;
+    }
+    return n;
 }
 
 /* Draws polygons from the i-th of the job on, as many as fit one below the other.  Returns how many. */
 static int64_t share_stack(area_state *s, const tl_polygons *p, share_output *out, int64_t i)
 {
     const tl_share_job *job = out->job;
-    const tl_window window = {.width = TL_STACK_COLUMNS, .height = TL_STACK_ROWS, .subpixel_bits = p->bits};
+    int64_t width, n_rows = 0;
+    const int64_t n = plan_stack(p, out, i, &width);
+    const tl_window window = {.width = width, .height = TL_STACK_ROWS, .subpixel_bits = p->bits};
     const tl_area target = {.cells = job->cells};
-    const int64_t stride = tl_area_stride(TL_STACK_COLUMNS);
-    int64_t n = 0, n_rows = 0, n_entries = 0;
     place_plane(&window, &target, &s->plane);
-    for (; n < TL_STACK_MAX && i + n < job->end; n++) {
-        const int64_t polygon = job->listed ? job->listed[i + n] : i + n;
+    /* nothing is left of a polygon: rows that follow closely stay in the first-level cache */
+    s->plane.stride = (int32_t)(width + TL_STACK_BEYOND + 15) / 16 * 16;
+    for (int64_t k = 0; k < n; k++) {
+        const int64_t polygon = job->listed ? job->listed[i + k] : i + k;
         const tl_polygon_box *box = job->boxes + polygon;
-        const int32_t height = box->bottom - box->top;
-        if (!fits_stack(p, job, polygon) || n_rows + height > TL_STACK_ROWS)
-            break;
-        n_entries += (int64_t)height * (box->right - box->left);
-        if (job->starts && out->n + n_entries > job->n_room)
-            break;
         push_polygon(s, p, polygon, -box->left * (1 << p->bits), ((int32_t)n_rows - box->top) * (1 << p->bits));
-        n_rows += height;
+        n_rows += box->bottom - box->top;
     }
     finish_cells(s);
     int32_t *cells = job->cells;
     for (int64_t k = 0; k < n; k++) {
         out->polygon = job->listed ? job->listed[i + k] : i + k;
         const tl_polygon_box *box = job->boxes + out->polygon;
-        for (int64_t row = box->top; row < box->bottom; row++, cells += stride)
-            put_cells(out, cells, row, box->left, box->right);
+        for (int64_t row = box->top; row < box->bottom; row++, cells += s->plane.stride)
+            put_cells(out, cells, row, box->left, box->right, 1, TL_STACK_BEYOND);
         if (job->starts)
             job->starts[i + k + 1] = out->n;
     }
@@ -317,6 +367,8 @@ static int64_t share_polygons(const tl_polygons *p, const tl_share_job *job)
         const int64_t top = box->top > job->top ? box->top : job->top,
                       bottom = box->bottom < job->bottom ? box->bottom : job->bottom;
         out.polygon = polygon;
+        if (is_polygon_given_up(p, (int64_t)(box->bottom - box->top) * (box->right - box->left)))
+            return i - job->first;
         if (!job->is_alone && fits_stack(p, job, polygon)) {
             const int64_t n = share_stack(&s, p, &out, i);
             if (n == 0)

@@ -43,7 +43,9 @@ TL_INLINE vf opacity_of(shaded_lanes *p, const tl_material *m)
     if (m->texture) {
         if (p->s->needs_uv)
             set_uv_lanes(p);
-        look_up(p, m->texture, texel, 4);
+        laid_texture laid;
+        laid.as = (const tl_texture *)0;
+        look_up(p, m->texture, &laid, texel, 4);
         opacity = vf_mul(texel[3], opacity);
     }
     return p->s->needs_alpha ? vf_mul(p->alpha, opacity) : opacity;

@@ -43,7 +43,7 @@ static void set_more(shaded_lanes *p)
 }
 
 /* A texture where its set of uv and its transform lay it. */
-TL_INLINE void look_up(const shaded_lanes *p, const tl_texture *t, vf *rgba, int n_channels)
+TL_INLINE void look_up(const shaded_lanes *p, const tl_texture *t, laid_texture *laid, vf *rgba, int n_channels)
 {
     const vf *uv = t->uv_set ? p->uv1 : p->uv, *du = t->uv_set ? p->du1 : p->du, *dv = t->uv_set ? p->dv1 : p->dv;
     vf at[2] = {uv[0], uv[1]}, change[2][2] = {{du[0], du[1]}, {dv[0], dv[1]}};
@@ -54,11 +54,18 @@ TL_INLINE void look_up(const shaded_lanes *p, const tl_texture *t, vf *rgba, int
             for (int axis = 0; axis < 2; axis++)
                 change[k][axis] = vf_fma(a, du[axis], vf_mul(b, dv[axis]));
         }
-    sample_texture(t, at[0], at[1], change[0], change[1], rgba, n_channels);
+    sample_laid(t, at[0], at[1], change[0], change[1], laid, rgba, n_channels);
 }
 
-static void look_up_rgb(const shaded_lanes *p, const tl_texture *t, vf *rgb) { look_up(p, t, rgb, 3); }
-static void look_up_rgba(const shaded_lanes *p, const tl_texture *t, vf *rgba) { look_up(p, t, rgba, 4); }
+static void look_up_rgb(const shaded_lanes *p, const tl_texture *t, laid_texture *laid, vf *rgb)
+{
+    look_up(p, t, laid, rgb, 3);
+}
+
+static void look_up_rgba(const shaded_lanes *p, const tl_texture *t, laid_texture *laid, vf *rgba)
+{
+    look_up(p, t, laid, rgba, 4);
+}
 
 /* The colour of the back, where that is seen and has one of its own. */
 TL_INLINE void color_back(const shaded_lanes *p, const tl_material *m, vf *rgb)
@@ -71,7 +78,7 @@ TL_INLINE void color_back(const shaded_lanes *p, const tl_material *m, vf *rgb)
 }
 
 /* The colour that light meets, and the opacity of the surface. */
-static void find_base(shaded_lanes *p, const tl_material *m, vf *rgb)
+static void find_base(shaded_lanes *p, const tl_material *m, laid_texture *laid, vf *rgb)
 {
     vf texel[4], opacity = vf_set1(m->color[3]);
     for (int c = 0; c < 3; c++)
@@ -83,10 +90,10 @@ static void find_base(shaded_lanes *p, const tl_material *m, vf *rgb)
         opacity = vf_mul(opacity, p->alpha);
     if (m->texture) {
         if (p->s->shading->wants_opacity) {
-            look_up_rgba(p, m->texture, texel);
+            look_up_rgba(p, m->texture, laid, texel);
             opacity = vf_mul(opacity, texel[3]);
         } else {
-            look_up_rgb(p, m->texture, texel);
+            look_up_rgb(p, m->texture, laid, texel);
         }
         for (int c = 0; c < 3; c++)
             rgb[c] = vf_mul(rgb[c], texel[c]);
@@ -96,14 +103,14 @@ static void find_base(shaded_lanes *p, const tl_material *m, vf *rgb)
 }
 
 /* The unit normal `n` as the normal map bends it. */
-TL_INLINE void bend_normal(const shaded_lanes *p, const tl_material *m, vf *n)
+TL_INLINE void bend_normal(const shaded_lanes *p, const tl_material *m, laid_texture *laid, vf *n)
 {
     const tl_texture *t = m->normal_map;
     const int first = RUN_TANGENT + N_TANGENT_FLOATS * t->uv_set;
     const vf zero = vf_set1(0.0f), one = vf_set1(1.0f), two = vf_set1(2.0f), tiny = vf_set1(0x1p-40f),
              scale = vf_set1(m->normal_scale);
     vf texel[4], along[3], tangent[3], bent[3];
-    look_up_rgb(p, t, texel);
+    look_up_rgb(p, t, laid, texel);
     const vf x = vf_mul(vf_fma(two, texel[0], vf_set1(-1.0f)), scale),
              y = vf_mul(vf_fma(two, texel[1], vf_set1(-1.0f)), scale);
     const vf z = vf_fma(two, texel[2], vf_set1(-1.0f));
@@ -130,7 +137,7 @@ TL_INLINE void bend_normal(const shaded_lanes *p, const tl_material *m, vf *n)
 }
 
 /* Where the surface lies, how it is turned, and from where it is seen. */
-TL_INLINE void find_surface(const shaded_lanes *p, const tl_material *m, lit_surface *s)
+TL_INLINE void find_surface(const shaded_lanes *p, const tl_material *m, laid_texture *laid, lit_surface *s)
 {
     const tl_shading *shading = p->s->shading;
     for (int axis = 0; axis < 3; axis++) {
@@ -141,16 +148,16 @@ TL_INLINE void find_surface(const shaded_lanes *p, const tl_material *m, lit_sur
     if (shading->has_perspective && p->s->needs_point)
         normalize3(s->to_eye);
     if (m->normal_map)
-        bend_normal(p, m, s->normal);
+        bend_normal(p, m, laid, s->normal);
 }
 
 /* Colours, lights with Blinn's highlight, ambient light and surroundings. */
-static void light_plain(const shaded_lanes *p, const tl_material *m, vf occlusion, vf *rgb)
+static void light_plain(const shaded_lanes *p, const tl_material *m, laid_texture *laid, vf occlusion, vf *rgb)
 {
     const tl_shading *shading = p->s->shading;
     lit_surface s;
     vf diffuse[3], specular[3];
-    find_surface(p, m, &s);
+    find_surface(p, m, laid, &s);
     for (int c = 0; c < 3; c++)
         diffuse[c] = vf_set1(shading->ambient[c]), specular[c] = vf_set1(0.0f);
     if (shading->surroundings && shading->surroundings->diffuse != 0.0f) {
@@ -170,12 +177,13 @@ static void light_plain(const shaded_lanes *p, const tl_material *m, vf occlusio
             rgb[c] = vf_fma(vf_set1(m->specular[c]), specular[c], rgb[c]);
 }
 
-static void light_rough(const shaded_lanes *p, const tl_material *m, const vf *found, vf occlusion, vf *rgb)
+static void light_rough(const shaded_lanes *p, const tl_material *m, const vf *found, laid_texture *laid, vf occlusion,
+                        vf *rgb)
 {
     const tl_shading *shading = p->s->shading;
     vf metallic = vf_set1(m->metallic), roughness = vf_set1(m->roughness), base[3];
     rough_surface s;
-    find_surface(p, m, &s.lit);
+    find_surface(p, m, laid, &s.lit);
     if (m->metallic_roughness)
         roughness = vf_mul(roughness, found[1]), metallic = vf_mul(metallic, found[2]);
     for (int c = 0; c < 3; c++)
@@ -190,28 +198,30 @@ static void light_rough(const shaded_lanes *p, const tl_material *m, const vf *f
 static void shade_full(shaded_lanes *p, const tl_material *m, vf *rgb)
 {
     vf found[4], occlusion = vf_set1(1.0f);
+    laid_texture laid;
+    laid.as = (const tl_texture *)0;
     if (p->s->needs_more)
         set_more(p);
-    find_base(p, m, rgb);
+    find_base(p, m, &laid, rgb);
     if (m->is_unlit)
         return;
     if (m->metallic_roughness)
-        look_up_rgb(p, m->metallic_roughness, found);
+        look_up_rgb(p, m->metallic_roughness, &laid, found);
     if (m->occlusion_map) {
         vf texel[4];
         if (m->occlusion_map == m->metallic_roughness)
             texel[0] = found[0];
         else
-            look_up_rgb(p, m->occlusion_map, texel);
+            look_up_rgb(p, m->occlusion_map, &laid, texel);
         occlusion = vf_fma(vf_set1(m->occlusion), vf_sub(texel[0], vf_set1(1.0f)), vf_set1(1.0f));
     }
     if (m->is_metallic)
-        light_rough(p, m, found, occlusion, rgb);
+        light_rough(p, m, found, &laid, occlusion, rgb);
     else
-        light_plain(p, m, occlusion, rgb);
+        light_plain(p, m, &laid, occlusion, rgb);
     if (m->emission_map) {
         vf texel[4];
-        look_up_rgb(p, m->emission_map, texel);
+        look_up_rgb(p, m->emission_map, &laid, texel);
         for (int c = 0; c < 3; c++)
             rgb[c] = vf_fma(vf_set1(m->emission[c]), texel[c], rgb[c]);
     } else {

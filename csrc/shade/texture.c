@@ -135,34 +135,72 @@ TL_INLINE vf level_of_detail(const tl_texture *t, const vf *du, const vf *dv)
     return vf_mul(vf_set1(0.5f), vf_log2(vf_max(squared[0], squared[1])));
 }
 
-/* The texture at (u, v); du, dv: how much they grow from one column and from one row to the next. */
-TL_INLINE void sample_texture(const tl_texture *t, vf u, vf v, const vf *du, const vf *dv, vf *rgba, int n_channels)
+/* Where a texture is read in each lane: textures of one size that are laid alike share it. */
+typedef struct {
+    const tl_texture *as; /* NULL: nothing is found yet */
+    texel_quad fine, coarse;
+    vf share; /* of the coarser level */
+    int has_coarse;
+} laid_texture;
+
+/* Whether one is read where the other is: both by the same uv, as they are. */
+TL_INLINE int is_laid_alike(const tl_texture *a, const tl_texture *b)
 {
-    const vf zero = vf_set1(0.0f), scale = vf_set1(1.0f / 65535.0f);
-    u = folded(u, t->wrap_u), v = folded(v, t->wrap_v);
+    return a == b || (a->width[0] == b->width[0] && a->height[0] == b->height[0] && a->n_levels == b->n_levels &&
+                      a->filter == b->filter && a->wrap_u == b->wrap_u && a->wrap_v == b->wrap_v &&
+                      a->uv_set == b->uv_set && !a->has_transform && !b->has_transform);
+}
+
+/* u and v are folded; not of textures with the filter "nearest" */
+TL_INLINE void find_texels(const tl_texture *t, vf u, vf v, const vf *du, const vf *dv, laid_texture *laid)
+{
+    laid->as = t, laid->has_coarse = 0;
+    if (t->filter == TL_FILTER_BILINEAR) {
+        find_quad(t, vi_set1(0), u, v, &laid->fine);
+        return;
+    }
+    const vf zero = vf_set1(0.0f), last = vf_set1((float)(t->n_levels - 1));
+    const vf lod = vf_min(vf_max(level_of_detail(t, du, dv), zero), last);
+    const vi level = vi_floor(lod);
+    laid->share = vf_sub(lod, vf_from_vi(level));
+    laid->has_coarse = vm_any(vf_lt(zero, laid->share));
+    find_quad(t, level, u, v, &laid->fine);
+    if (laid->has_coarse)
+        find_quad(t, vi_min(vi_add(level, vi_set1(1)), vi_set1(t->n_levels - 1)), u, v, &laid->coarse);
+}
+
+TL_INLINE void filter_texels(const tl_texture *t, const laid_texture *laid, vf *rgba, int n_channels)
+{
+    filter_quad(t, &laid->fine, rgba, n_channels);
+    if (laid->has_coarse) {
+        vf coarser[4];
+        filter_quad(t, &laid->coarse, coarser, n_channels);
+        for (int c = 0; c < n_channels; c++)
+            rgba[c] = vf_fma(laid->share, vf_sub(coarser[c], rgba[c]), rgba[c]);
+    }
+}
+
+/* The texture at (u, v); du, dv: how much they grow from one column and from one row to the next. */
+TL_INLINE void sample_laid(const tl_texture *t, vf u, vf v, const vf *du, const vf *dv, laid_texture *laid, vf *rgba,
+                           int n_channels)
+{
     if (t->filter == TL_FILTER_NEAREST) {
-        sample_nearest(t, u, v, rgba);
-    } else if (t->filter == TL_FILTER_BILINEAR) {
-        texel_quad quad;
-        find_quad(t, vi_set1(0), u, v, &quad);
-        filter_quad(t, &quad, rgba, n_channels);
+        sample_nearest(t, folded(u, t->wrap_u), folded(v, t->wrap_v), rgba);
     } else {
-        const vf last = vf_set1((float)(t->n_levels - 1)), lod = vf_min(vf_max(level_of_detail(t, du, dv), zero), last);
-        const vi level = vi_floor(lod);
-        const vf share = vf_sub(lod, vf_from_vi(level));
-        texel_quad fine, coarse;
-        find_quad(t, level, u, v, &fine);
-        find_quad(t, vi_min(vi_add(level, vi_set1(1)), vi_set1(t->n_levels - 1)), u, v, &coarse);
-        filter_quad(t, &fine, rgba, n_channels);
-        if (vm_any(vf_lt(zero, share))) {
-            vf coarser[4];
-            filter_quad(t, &coarse, coarser, n_channels);
-            for (int c = 0; c < n_channels; c++)
-                rgba[c] = vf_fma(share, vf_sub(coarser[c], rgba[c]), rgba[c]);
-        }
+        if (!laid->as || !is_laid_alike(t, laid->as))
+            find_texels(t, folded(u, t->wrap_u), folded(v, t->wrap_v), du, dv, laid);
+        filter_texels(t, laid, rgba, n_channels);
     }
     for (int c = 0; c < n_channels; c++)
-        rgba[c] = vf_mul(rgba[c], scale);
+        rgba[c] = vf_mul(rgba[c], vf_set1(1.0f / 65535.0f));
+}
+
+/* The same of one texture alone. */
+TL_INLINE void sample_texture(const tl_texture *t, vf u, vf v, const vf *du, const vf *dv, vf *rgba, int n_channels)
+{
+    laid_texture laid;
+    laid.as = (const tl_texture *)0;
+    sample_laid(t, u, v, du, dv, &laid, rgba, n_channels);
 }
 
 #endif

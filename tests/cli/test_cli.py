@@ -323,9 +323,9 @@ def test_render_many_goes_on_after_a_failure(run, folder):
 
 def test_render_without_trimesh_gives_the_hint(run, folder, monkeypatch):
     monkeypatch.setitem(sys.modules, "trimesh", None)
-    (folder / "a.off").write_text("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")
+    (folder / "a.3mf").write_text("PK")
     expected = "topleft: reading a mesh needs trimesh: pip install 'topleft[render]'"
-    assert run("render", "a.off", "cube", "-o", "out/", *SMALL) == (2, [expected])
+    assert run("render", "a.3mf", "cube", "-o", "out/", *SMALL) == (2, [expected])
 
 
 def test_render_shape_needs_no_optional_package(run, monkeypatch):

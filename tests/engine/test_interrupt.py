@@ -22,9 +22,27 @@ def random_triangles(n, extent_px):
     return vertices, np.arange(3 * n, dtype=np.int32).reshape(-1, 3)
 
 
+def chords(n):
+    """A ring from side to side of the picture."""
+    return np.random.default_rng(3).random((n, 2)) * SIZE
+
+
+def crossing_star(n):
+    """A ring whose corners are out of order: its pixels are resolved one by one."""
+    rng = np.random.default_rng(4)
+    angles = np.linspace(0, 2 * np.pi, n) + rng.normal(0, 5e-4, n)
+    radius = 800 + rng.normal(0, 20, n)
+    return 1000 + radius[:, None] * np.stack([np.cos(angles), np.sin(angles)], 1)
+
+
 LARGE, SMALL = random_triangles(100_000, 2000), random_triangles(1_000_000, 30)
 FLAT = LARGE[0][:, :2], LARGE[1]
 COLORS = np.random.default_rng(2).integers(0, 256, (100_000, 4), dtype=np.uint8)
+POLYGONS = FLAT[0], np.arange(0, 300_001, 3), np.arange(100_001)
+BALL = tl.Mesh(*tl.scenes.shape("icosphere"))
+VIEWER = tl.Camera.look_at((0, 0, 1.2), (0, 0, 0))
+BALL_FRAGS = tl.rasterize_mesh(BALL, VIEWER, (3000, 3000))
+LIGHTS = [tl.Light((x, 1, 3), kind="point", space="eye") for x in range(60)]
 
 DRAWS = {
     "coverage by edges": lambda n: tl.coverage(*FLAT, SIZE, method="edge", threads=n),
@@ -40,6 +58,17 @@ DRAWS = {
     ),
     "peel": lambda n: tl.peel(*LARGE, SIZE, threads=n),
     "smooth wireframe": lambda n: tl.wireframe(*FLAT, SIZE, antialias=True, threads=n),
+    "mask of a polygon": lambda n: tl.polygons(chords(8_000_000), SIZE, threads=n),
+    "mask of a nonzero polygon": lambda n: tl.polygons(chords(4_000_000), SIZE, rule="nonzero", threads=n),
+    "labels of polygons": lambda n: tl.polygons(
+        (chords(1_000_000), np.arange(0, 1_000_001, 100), np.arange(10_001)), SIZE, values="index", threads=n
+    ),
+    "area of a polygon": lambda n: tl.polygons(crossing_star(100_000), SIZE, sampling="area", threads=n),
+    "table of a polygon": lambda n: tl.overlap([[crossing_star(100_000)]] * 2, SIZE, threads=n),
+    "polygons": lambda n: tl.polygons(POLYGONS, SIZE, values="index", threads=n),
+    "polygons by area": lambda n: tl.polygons(POLYGONS, SIZE, sampling="area", threads=n),
+    "points": lambda n: tl.points(SMALL[0], SIZE, point_size=400.0, shape="disc", threads=n),
+    "shade": lambda n: tl.shade(BALL_FRAGS, BALL, VIEWER, lights=LIGHTS, threads=n),
     "height_map": lambda n: tl.height_map(LARGE, tl.Grid(SIZE, (0, 2000, 0, 2000)), threads=n),
 }
 

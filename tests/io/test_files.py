@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -239,7 +240,7 @@ def test_load_folder_is_refused(tmp_path):
 def test_load_without_trimesh_says_how_to_get_it(write, monkeypatch):
     monkeypatch.setitem(sys.modules, "trimesh", None)
     with pytest.raises(MissingPackageError, match=r"needs trimesh: pip install 'topleft\[render\]'"):
-        files.load(write("a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"))
+        files.load(write("a.3mf", "PK"))
 
 
 @pytest.mark.parametrize(
@@ -275,6 +276,7 @@ def test_as_mesh_of_trimesh_takes_no_highlights_that_nobody_gave():
     ("name", "content", "message"),
     [
         ("a.dxf", b"AutoCAD Binary DXF\r\n\x1a\0", "it is a binary DXF: save it as text"),
+        ("a.dxf", "0\nSECTION\n", "cannot draw .*a.dxf': it is a drawing, of which only curves could be read"),
         ("a.svg", "<svg/>", "cannot draw .*a.svg': it holds curves in a plane"),
         ("a.binvox", "#binvox 1", "it holds voxels: make a mesh of them"),
     ],
@@ -282,6 +284,17 @@ def test_as_mesh_of_trimesh_takes_no_highlights_that_nobody_gave():
 def test_load_of_what_is_no_mesh_is_refused_in_true_words(write, name, content, message):
     with pytest.raises(MeshError, match=message):
         files.load(write(name, content))
+
+
+def test_load_of_3mf_with_objects_in_further_files_is_refused_in_true_words(tmp_path):
+    for package in ("lxml", "networkx"):
+        pytest.importorskip(package, reason="3MF needs it, of the extra formats")
+    model = '<model xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02"><resources/><build/></model>'
+    with zipfile.ZipFile(tmp_path / "a.3mf", "w") as archive:
+        archive.writestr("3D/3dmodel.model", model)
+        archive.writestr("3D/Objects/a.model", model)
+    with pytest.raises(MeshError, match=r"a.3mf': its objects are in further files of the archive"):
+        files.load(tmp_path / "a.3mf")
 
 
 def test_load_by_meshio_prints_nothing(write, capfd):

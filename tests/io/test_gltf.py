@@ -140,6 +140,76 @@ def test_gltf_sparse_accessor_sets_rows(load):
     assert corners(load(file)) == [[[0, 0, 0], [7, 8, 9], [0, 1, 0]], [[0, 0, 0], [7, 8, 9], [0, 0, 0]]]
 
 
+@pytest.mark.parametrize(("of_color", "of_emission"), [(2, 0), (0, 3), (2, 3), (3, 1), (2, 2)])
+def test_gltf_any_two_sets_of_texture_coordinates_are_read(load, of_color, of_emission):
+    file = GltfFile()
+    file.texture([[[9, 9, 9]]])
+    color, emission = ({"index": 0, "texCoord": number} for number in (of_color, of_emission))
+    row = {
+        "pbrMetallicRoughness": {"baseColorTexture": color},
+        "emissiveTexture": emission,
+        "emissiveFactor": [1, 1, 1],
+    }
+    file.add("materials", row)
+    uv = {f"TEXCOORD_{k}": np.full((3, 2), k / 8, np.float32) for k in range(4)}
+    mesh = load(file.shown(material=0, **uv))
+    sets, own = (mesh.uv, mesh.uv1), mesh.materials[0]
+    assert sets[own.texture.uv_set][0, 0] == of_color / 8
+    assert sets[own.emission_texture.uv_set][0, 0] == of_emission / 8
+
+
+def test_gltf_third_set_of_texture_coordinates_of_a_material_is_told(tmp_path):
+    file = GltfFile()
+    file.texture([[[9, 9, 9]]])
+    normal, emission, color = ({"index": 0, "texCoord": number} for number in (1, 3, 2))
+    file.add("materials", {
+        "pbrMetallicRoughness": {"baseColorTexture": color}, "emissiveTexture": emission, "normalTexture": normal,
+    })  # fmt: skip
+    uv = {f"TEXCOORD_{k}": np.full((3, 2), k / 8, np.float32) for k in range(4)}
+    (tmp_path / "a.glb").write_bytes(file.shown(material=0, **uv).glb())
+    with pytest.warns(MeshWarning, match="textures on a third set of texture coordinates of one material not read"):
+        mesh = tl.load(tmp_path / "a.glb")
+    assert (mesh.uv[0, 0], mesh.uv1[0, 0]) == (1 / 8, 2 / 8)
+    assert mesh.materials[0].emission_texture is None
+
+
+@pytest.mark.parametrize("is_there", [True, False])
+def test_gltf_buffers_compressed_by_meshopt_are_read_where_the_file_has_them_plainly(tmp_path, is_there):
+    file = GltfFile(extensionsUsed=["EXT_meshopt_compression"]).shown()
+    tree = json.loads(file.gltf())
+    for view in tree["bufferViews"]:
+        view["extensions"] = {"EXT_meshopt_compression": {"buffer": 0}}
+    if not is_there:
+        del tree["buffers"][0]["uri"]
+        tree["buffers"][0]["extensions"] = {"EXT_meshopt_compression": {"fallback": True}}
+    (tmp_path / "a.gltf").write_text(json.dumps(tree))
+    if is_there:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            assert len(tl.load(tmp_path / "a.gltf").triangles) == 1
+    else:
+        with pytest.raises(MeshError, match="its buffers are compressed by meshopt, which is not read"):
+            tl.load(tmp_path / "a.gltf")
+
+
+def test_gltf_with_textures_of_basis_universal_is_drawn_without_them_and_told(tmp_path):
+    file = GltfFile(extensionsUsed=["KHR_texture_basisu"], extensionsRequired=["KHR_texture_basisu"])
+    file.add("textures", {"extensions": {"KHR_texture_basisu": {"source": 0}}})
+    file.add("materials", {"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}})
+    (tmp_path / "a.glb").write_bytes(file.shown(material=0).glb())
+    with pytest.warns(MeshWarning) as told:
+        assert tl.load(tmp_path / "a.glb").materials[0].texture is None
+    assert [str(one.message).partition("': ")[2] for one in told] == [
+        "extensions not read: 'KHR_texture_basisu'", "textures of KHR_texture_basisu not read",
+    ]  # fmt: skip
+
+
+def test_gltf_texture_coordinates_that_are_whole_numbers_do_not_wrap(load):
+    file = GltfFile(extensionsRequired=["KHR_mesh_quantization"])
+    uv = np.array([[0, 0], [4095, 0], [0, 65535]], np.uint16)
+    assert load(file.shown(TEXCOORD_0=uv)).uv.tolist() == [[0, 1], [4095, 1], [0, -65534]]
+
+
 def test_gltf_interleaved_and_quantized_attributes_are_read(load):
     rows = np.zeros(3, [("position", "<i2", 3), ("pad", "<i2"), ("normal", "i1", 3), ("pad1", "i1")])
     rows["position"], rows["normal"] = 32767 * TRIANGLE, [0, 0, 127]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import resource
 import socket
 import threading
@@ -108,6 +109,29 @@ def off(rng):
     return mutated_bytes(rng, b"OFF\n4 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n4 0 1 2 3\n")
 
 
+COLLADA = (
+    b"<COLLADA xmlns='http://www.collada.org/2005/11/COLLADASchema' version='1.4.1'><asset/><library_geometries>"
+    b"<geometry id='g'><mesh><source id='s'><float_array id='a' count='12'>0 0 0 1 0 0 1 1 0 0 1 0</float_array>"
+    b"<technique_common><accessor source='#a' count='4' stride='3'><param name='X' type='float'/>"
+    b"<param name='Y' type='float'/><param name='Z' type='float'/></accessor></technique_common></source>"
+    b"<vertices id='v'><input semantic='POSITION' source='#s'/></vertices>"
+    b"<polylist count='1'><input semantic='VERTEX' source='#v' offset='0'/><vcount>4</vcount>"
+    b"<p>0 1 2 3</p></polylist>"
+    b"</mesh></geometry></library_geometries><library_visual_scenes><visual_scene id='w'><node id='n'>"
+    b"<instance_geometry url='#g'/></node></visual_scene></library_visual_scenes>"
+    b"<scene><instance_visual_scene url='#w'/></scene></COLLADA>"
+)
+
+
+def collada(rng):
+    """Broken as XML, or only in its numbers."""
+    if rng.integers(2):
+        return mutated_bytes(rng, COLLADA)
+    numbers = [found.span() for found in re.finditer(rb"(?<=[> '])\d+(?=[< '])", COLLADA)]
+    start, end = numbers[int(rng.integers(len(numbers)))]
+    return COLLADA[:start] + str(int(rng.integers(-3, 8)) ** int(rng.integers(1, 13))).encode() + COLLADA[end:]
+
+
 FORMATS = {
     "glb": ("a.glb", glb_variant),
     "gltf": ("a.gltf", gltf_variant),
@@ -118,6 +142,7 @@ FORMATS = {
     "stl_text": ("a.stl", stl_text),
     "stl_binary": ("a.stl", stl_binary),
     "off": ("a.off", off),
+    "collada": ("a.dae", collada),
     "png": ("a.png", None),
 }
 
@@ -132,8 +157,8 @@ def folder(tmp_path):
 
 @pytest.mark.parametrize("kind", FORMATS)
 def test_load_of_mutated_files_ends_in_a_mesh_or_one_line(folder, kind):
-    if kind == "off":
-        pytest.importorskip("trimesh")
+    if kind == "collada":
+        pytest.importorskip("collada", reason="needs pycollada, of the extra formats")
     name, variant = FORMATS[kind]
     picture = (folder / "a.png").read_bytes()
     path = folder / ("a.obj" if kind in ("mtl", "png") else name)

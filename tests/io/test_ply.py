@@ -38,6 +38,18 @@ def test_ply_text_faces_of_mixed_sizes_are_read(load):
     assert mesh.triangles.tolist() == [[0, 1, 2], [0, 2, 3], [0, 1, 2]]
 
 
+def test_ply_text_rows_with_more_numbers_than_the_header_says_are_read_and_told(load):
+    header = "element vertex 4\n" + XYZ + FACES.format(2) + "property uchar red\n"
+    with pytest.warns(MeshWarning, match="rows with more numbers than the header says"):
+        mesh = load(header, SQUARE + "4 0 1 2 3 5 9 9\n3 0 1 2 5 9 9\n")
+    assert mesh.triangles.tolist() == [[0, 1, 2], [0, 2, 3], [0, 1, 2]]
+
+
+def test_ply_text_rows_with_fewer_numbers_than_the_header_says_are_refused(load):
+    with pytest.raises(MeshError, match="a row of face has 4 of 5 numbers"):
+        load("element vertex 4\n" + XYZ + FACES.format(2), SQUARE + "4 0 1 2\n3 0 1 2\n")
+
+
 def test_ply_strips_turn_one_way_and_end_at_minus_one(load):
     strips = "element tristrips 1\nproperty list int int vertex_indices\n"
     mesh = load("element vertex 4\n" + XYZ + strips, SQUARE + "9 0 1 3 2 -1 1 2 0 -1\n")

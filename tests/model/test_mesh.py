@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from engine_cases import ON_EACH_ISA, on
 
-from topleft import scenes
+from topleft import _engine, scenes
 from topleft._model import mesh as mesh_module
 from topleft._model.mesh import Mesh, coincident
 from topleft._model.normals import angle_weighted_normals, face_normals
@@ -123,19 +124,40 @@ def test_coincident_compares_all_attributes():
     assert first.tolist() == [0, 1]
 
 
-def test_coincident_where_hashes_collide_compares_values(monkeypatch):
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("others", [[], [np.uint8, 4], [np.uint8, 3], [np.float32, 2]])
+def test_coincident_by_hash_and_by_value_is_the_same(monkeypatch, dtype, others):
     rng = np.random.default_rng(5)
-    rows = rng.integers(0, 4, (300, 3)).astype(np.float32)
-    by_hash = coincident(rows)
-    monkeypatch.setattr(mesh_module, "_runs_by_hash", lambda _: None)
-    by_value = coincident(rows)
-    assert len(by_value[0]) == len(np.unique(rows, axis=0))
+    rows = [rng.integers(-2, 3, (900, 3)).astype(dtype) * dtype(0.1)]
+    if others:
+        rows.append(rng.integers(0, 2, (900, others[1])).astype(others[0]))
+    by_hash = coincident(*rows)
+    monkeypatch.setattr(mesh_module, "_groups_by_hash", lambda _: None)
+    by_value = coincident(*rows)
+    assert len(by_value[0]) == len(np.unique(np.concatenate(rows, axis=1), axis=0))
     assert all(np.array_equal(one, other) for one, other in zip(by_hash, by_value, strict=True))
 
 
-def test_runs_by_hash_that_is_not_one_of_values_is_none():
-    nan = np.full(2, np.nan)  # equal bits, and not equal
-    assert mesh_module._runs_by_hash([nan]) is None
+def test_coincident_rows_that_are_no_numbers_are_each_a_group():
+    rows = np.array([[np.nan, 0], [1, 2], [np.nan, 0], [1, 2]])
+    first, group = coincident(rows)
+    assert first.tolist() == [0, 1, 2]
+    assert group.tolist() == [0, 1, 2, 1]
+
+
+@ON_EACH_ISA
+def test_group_rows_gives_up_where_too_many_hashes_meet(isa):
+    with on(isa):
+        n = 40_000
+        rows = np.arange(n, dtype=np.uint32)[:, None]
+        first, group = np.empty((2, n), np.int32)
+        table = np.full(1 << 17, -1, np.int32)
+        assert _engine.group_rows(rows, 17, table, first, group) == n
+        assert group.tolist() == list(range(n))
+        table = np.full(1 << 17, -1, np.int32)
+        table[:] = 0  # as if all places were taken by row 0
+        table[-1] = -1
+        assert _engine.group_rows(rows, 17, table, first, group) == -1
 
 
 def test_coincident_of_nothing_is_empty():

@@ -7,6 +7,8 @@ from hypothesis import given
 from polygon_cases import SIZE, cells, square, star, wild_polygon, wild_seeds
 
 import topleft as tl
+from topleft._polygons import overlap
+from topleft._polygons.prepared import Prepared
 from topleft.methods.reference import polygons as ref
 
 UNIT = 2.0**-24
@@ -87,6 +89,37 @@ def test_table_is_the_same_on_each_thread_and_instruction_set(isa):
             table = tl.overlap(drawn, (50, 40), threads=threads)
             for name in ("starts", "pixels", "areas"):
                 assert (getattr(table, name) == getattr(expected, name)).all()
+
+
+def test_table_in_many_blocks_is_the_same_on_each_thread(monkeypatch):
+    rng = np.random.default_rng(9)
+    drawn = [wild_polygon(rng, (50, 40)) for _ in range(60)]
+    expected = tl.overlap(drawn, (50, 40), threads=1)
+    monkeypatch.setattr(overlap, "MAX_BLOCK_ENTRIES", 300)
+    for at_once in (5000, 1 << 28):
+        monkeypatch.setattr(overlap, "MAX_ENTRIES_AT_ONCE", at_once)
+        for threads in (1, 2, 3, 8):
+            table = tl.overlap(drawn, (50, 40), threads=threads)
+            for name in ("starts", "pixels", "areas"):
+                assert (getattr(table, name) == getattr(expected, name)).all()
+
+
+def test_table_that_a_thread_cannot_finish_raises(monkeypatch):
+    """Those that wait for its block end."""
+    calls = []
+
+    def fail_late(prepared):
+        calls.append(1)
+        if len(calls) == 2:
+            raise MemoryError("no more")
+        return prepared_piece_scratch(prepared)
+
+    prepared_piece_scratch = Prepared.piece_scratch
+    monkeypatch.setattr(overlap, "MAX_BLOCK_ENTRIES", 300)
+    monkeypatch.setattr(Prepared, "piece_scratch", fail_late)
+    drawn = [square(i, 0, i + 20, 20) for i in range(40)]
+    with pytest.raises(MemoryError, match="no more"):
+        tl.overlap([[ring] for ring in drawn], (60, 20), threads=3)
 
 
 def test_table_of_a_window_is_that_of_the_picture_there():

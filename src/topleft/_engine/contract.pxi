@@ -271,6 +271,7 @@ cdef extern from "topleft.h" nogil:
     ctypedef struct tl_shading:
         const float *normals
         const int32_t *normal_of_corner
+        const float *corner_normals
         const float *face_normals
         const void *positions
         int is_f64
@@ -335,7 +336,7 @@ cdef extern from "topleft.h" nogil:
         double half_width_px, half_height_px, background
         int is_f64_out
     enum:
-        TL_POLYGON_PAD, TL_CERTIFY_WORDS, TL_PIECE_WORDS, TL_CELL_ROWS, TL_LEAST_SHARE_CELLS
+        TL_POLYGON_PAD, TL_PIECE_WORDS, TL_CELL_ROWS, TL_LEAST_SHARE_CELLS
     ctypedef struct tl_polygons:
         const int32_t *x_fx
         const int32_t *y_fx
@@ -348,6 +349,7 @@ cdef extern from "topleft.h" nogil:
         int64_t n_polygons
         int bits, is_nonzero
         int32_t sample_x_fx, sample_y_fx
+        tl_pause *pause
     ctypedef struct tl_polygon_box:
         int32_t left, top, right, bottom
     ctypedef int tl_polygon_test
@@ -392,6 +394,7 @@ cdef extern from "topleft.h" nogil:
         int is_long
         int64_t n_room
     int64_t tl_polygon_stride(int64_t width)
+    int64_t tl_certify_words(int64_t n_points, int64_t n_rings)
     int64_t tl_share_cells(int64_t width, int64_t height)
     ctypedef struct tl_tiling:
         int64_t width_px, height_px, window_width_px, window_height_px
@@ -467,6 +470,7 @@ cdef extern from "topleft.h" nogil:
         void (*unit_vectors)(const tl_source *, const double *, int64_t, int64_t, double *, float *) noexcept nogil
         void (*move_points)(const tl_source *, const double *, int64_t, int64_t, double *) noexcept nogil
         void (*color_rows)(const uint8_t *, int, int64_t, int64_t, float *) noexcept nogil
+        int64_t (*group_rows)(const uint32_t *, int, int64_t, int, int32_t *, int32_t *, int32_t *) noexcept nogil
         void (*build_tree)(tl_surface *) noexcept nogil
         double (*find_nearest)(const tl_surface *, const double *, int64_t, int64_t, int32_t *, double *) noexcept nogil
         void (*find_reach)(const tl_surface *, const double *, const int32_t *, int64_t, int64_t, double, double, tl_reach *) noexcept nogil

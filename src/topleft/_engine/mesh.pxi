@@ -119,6 +119,16 @@ def color_rows(const uint8_t[:, ::1] colors, int64_t first, int64_t end, float[:
             K.color_rows(&colors[0, 0], colors.shape[1], first, end, &rows[0, 0])
 
 
+def group_rows(const uint32_t[:, ::1] rows, int table_bits, int32_t[::1] table, int32_t[::1] first, int32_t[::1] group):
+    """Write the first row of each group of equal rows, and the group of each row, of at least one; return how many groups
+    there are, or -1 if many hashes meet. `table`: 2**table_bits numbers of -1, more than there are rows.
+    """
+    cdef int64_t n_groups
+    with nogil:
+        n_groups = K.group_rows(&rows[0, 0], rows.shape[1], rows.shape[0], table_bits, &table[0], &first[0], &group[0])
+    return n_groups
+
+
 cdef class Tree:
     """Triangles in a tree of boxes, to find the nearest of."""
 

@@ -99,6 +99,8 @@ cdef int ask(tl_pause *pause) noexcept nogil:
         if now - own.asked_ns >= HEAR_AFTER_NS:
             own.asked_ns = now
             own.is_given_up = hear()
+    if own.is_given_up:
+        pause.left_px = 0  # whoever asks again is told at once
     return own.is_given_up
 
 

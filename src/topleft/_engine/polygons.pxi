@@ -1,7 +1,6 @@
 # Polygons of rings: masks, labels and shares of pixels. Included by kernels.pyx, which declares the kernels.
 
 POLYGON_PAD = TL_POLYGON_PAD
-CERTIFY_WORDS = TL_CERTIFY_WORDS
 PIECE_WORDS = TL_PIECE_WORDS
 PIECE_BYTES = sizeof(tl_edge_piece)
 LABEL_SCRATCH_BYTES = sizeof(tl_label_scratch)
@@ -76,6 +75,12 @@ cdef class SnappedPolygons:
         """The pixels that each polygon reaches into: left, top, right, bottom (P, 4), cut off at the window."""
         return np.asarray(self.boxes)[: self.n_polygons]
 
+    cdef tl_polygons asking(self) noexcept:
+        """What kernels read, with the pause of this thread."""
+        cdef tl_polygons set = self.set
+        set.pause = pause_of_thread()
+        return set
+
     def bound(self, int64_t first, int64_t end):
         """Find the boxes of polygons [first, end); returns the largest number of edges of one."""
         cdef tl_polygon_box *boxes = self.box()
@@ -89,18 +94,32 @@ cdef class SnappedPolygons:
         self.weights, self.is_simple = np.zeros(self.n_rings + 1, np.int8), np.zeros(self.n_polygons + 1, np.uint8)
         self.set.weights, self.set.is_simple = &self.weights[0], &self.is_simple[0]
 
+    def certify_words(self):
+        """Return how many int64 of room `certify` needs."""
+        cdef int64_t most = 1, i, first, end
+        for i in range(self.n_polygons):
+            first, end = self.set.polygons[i], self.set.polygons[i + 1]
+            most = max(most, tl_certify_words(self.set.rings[end] - self.set.rings[first], end - first))
+        return most
+
     def certify(self, int64_t first, int64_t end, int64_t[::1] room):
         """Find out of polygons [first, end) whether their rings meet; without `room` they are trusted not to."""
+        cdef tl_polygons set = self.asking()
         cdef int64_t *words = &room[0] if room is not None else NULL
         with nogil:
             if words == NULL:
-                K.trust_polygons(&self.set, first, end, &self.weights[0], &self.is_simple[0])
+                K.trust_polygons(&set, first, end, &self.weights[0], &self.is_simple[0])
             else:
-                K.certify_polygons(&self.set, first, end, &self.weights[0], &self.is_simple[0], words)
+                K.certify_polygons(&set, first, end, &self.weights[0], &self.is_simple[0], words)
+        raise_if_given_up()
 
     def which_are_simple(self):
         """Return of which polygons the rings do not meet, (P,) bool."""
         return np.asarray(self.is_simple)[: self.n_polygons].view(np.bool_)
+
+    def weights_of_rings(self):
+        """Return what the signed area of each ring counts, (R,) int8; it means something where rings do not meet."""
+        return np.asarray(self.weights)[: self.n_rings]
 
     def seen_from(self, int32_t sample_x_fx, int32_t sample_y_fx):
         """Sample pixels at so many sub-pixels from their centre from now on."""
@@ -115,20 +134,25 @@ cdef class SnappedPolygons:
 
     def mask_even_odd(self, int64_t polygon, uint8_t[:, ::1] out, int64_t top, int64_t bottom, int32_t[::1] bits):
         """Write rows [top, bottom) of the mask of one polygon; `bits`: those of the rows, 0."""
+        cdef tl_polygons set = self.asking()
         with nogil:
-            K.mask_even_odd(&self.set, polygon, self.width, top, bottom, <uint64_t *>&bits[0], &out[0, 0])
+            K.mask_even_odd(&set, polygon, self.width, top, bottom, <uint64_t *>&bits[0], &out[0, 0])
+        raise_if_given_up()
 
     def mask_nonzero(self, int64_t polygon, uint8_t[:, ::1] out, int64_t top, int64_t bottom, uint32_t[::1] at,
                      int32_t[::1] room, int32_t[::1] cells, uint64_t[::1] bits):
         """The same by the nonzero rule; `cells`: a row, 0."""
+        cdef tl_polygons set = self.asking()
         with nogil:
-            K.mask_nonzero(&self.set, polygon, self.width, top, bottom, &at[0], &room[0], room.shape[0], &cells[0],
+            K.mask_nonzero(&set, polygon, self.width, top, bottom, &at[0], &room[0], room.shape[0], &cells[0],
                            &bits[0], &out[0, 0])
+        raise_if_given_up()
 
     def label(self, uint8_t[::1] pixels, int n_bytes, const int32_t[::1] values, int32_t background, int test,
               bint waits, int64_t band_rows, const int64_t[::1] starts, const int32_t[::1] listed, int64_t first_band,
               int64_t end_band, int32_t[::1] cells, uint8_t[::1] scratch, PieceScratch pieces):
         """Paint bands of rows: the background, then their polygons; without `listed` all of them."""
+        cdef tl_polygons set = self.asking()
         cdef tl_label_job job
         cdef int64_t band
         job.listed = &listed[0] if listed is not None else NULL
@@ -142,7 +166,8 @@ cdef class SnappedPolygons:
                 job.top, job.bottom = band * band_rows, min((band + 1) * band_rows, self.height)
                 job.first = 0 if job.listed == NULL else starts[band]
                 job.end = self.n_polygons if job.listed == NULL else starts[band + 1]
-                K.label_polygons(&self.set, &job)
+                K.label_polygons(&set, &job)
+        raise_if_given_up()
 
     def add_shares(self, float[::1] pixels, const float[:, ::1] colors, int64_t band_rows, const int64_t[::1] starts,
                    const int32_t[::1] listed, int64_t first_band, int64_t end_band, int32_t[::1] cells,
@@ -151,6 +176,7 @@ cdef class SnappedPolygons:
 
         `is_alone`: the only polygon is drawn over what there is.
         """
+        cdef tl_polygons set = self.asking()
         cdef tl_share_job job
         cdef int64_t band
         memset(&job, 0, sizeof(job))
@@ -165,7 +191,8 @@ cdef class SnappedPolygons:
                 job.first, job.end = starts[band], starts[band + 1]
                 if is_alone:  # also where it is not
                     job.listed, job.first, job.end = NULL, 0, 1
-                K.share_polygons(&self.set, &job)
+                K.share_polygons(&set, &job)
+        raise_if_given_up()
 
     def list_shares(self, int64_t first, int64_t end, int64_t[::1] starts, indices, float[::1] areas,
                     int32_t[::1] cells, PieceScratch pieces):
@@ -173,6 +200,7 @@ cdef class SnappedPolygons:
 
         Returns how many are finished; `areas` has 16 numbers more than it has room for.
         """
+        cdef tl_polygons set = self.asking()
         cdef tl_share_job job
         cdef uint8_t[::1] raw = as_bytes(indices)
         cdef int64_t n
@@ -183,5 +211,6 @@ cdef class SnappedPolygons:
         job.starts, job.indices, job.areas = &starts[0], &raw[0], &areas[0]
         job.is_long, job.n_room = indices.itemsize == 8, areas.shape[0] - 16
         with nogil:
-            n = K.share_polygons(&self.set, &job)
+            n = K.share_polygons(&set, &job)
+        raise_if_given_up()
         return n

@@ -64,16 +64,16 @@ cdef class ShadingTable:
     cdef uint8_t[::1] lights
 
     def __init__(self, const float[:, ::1] normals, const int32_t[:, ::1] normal_of_corner,
-                 const float[:, ::1] face_normals, positions, const uint8_t[::1] is_turned,
+                 const float[:, ::1] corner_normals, const float[:, ::1] face_normals, positions, const uint8_t[::1] is_turned,
                  const float[:, ::1] uv, const float[:, ::1] uv1, const float[:, ::1] colors, bint has_alpha, float front_side,
                  const int32_t[::1] material_of, const float[::1] decode):
         cdef const uint8_t[::1] raw = as_bytes(positions)
         cdef tl_shading *s = &self.shading
-        self.arrays = (normals, normal_of_corner, face_normals, raw, is_turned, uv, uv1, colors, material_of, decode)
+        self.arrays = (normals, normal_of_corner, corner_normals, face_normals, raw, is_turned, uv, uv1, colors, material_of, decode)
         s.normals = &normals[0, 0] if normals.shape[0] else NULL
         s.normal_of_corner = NULL
         if normal_of_corner is not None and normal_of_corner.shape[0]:
-            s.normal_of_corner = &normal_of_corner[0, 0]
+            s.normal_of_corner, s.corner_normals = &normal_of_corner[0, 0], &corner_normals[0, 0]
         s.face_normals = &face_normals[0, 0] if face_normals is not None and face_normals.shape[0] else NULL
         s.positions, s.is_f64 = data(raw), positions.dtype == np.float64
         s.is_turned = <const uint8_t *>data(is_turned)
@@ -154,33 +154,24 @@ cdef class ShadingTable:
         s.fog_near, s.fog_scale, s.distance_start, s.distance_scale = near, scale, distance_start, distance_scale
 
 
-def set_inverse_w(SnappedMesh mesh, const float[:, ::1] rows, const int32_t[::1] vertex_of_row, float[:, ::1] out):
-    """Copy rows of four numbers, and write 1/w over the fourth; of vertices that have been snapped.
-
-    The first rows are those of the vertices, one each; `vertex_of_row`, or None, has the vertices of the rows behind.
-    """
-    cdef int64_t i = 0, k, end, n_more = 0 if vertex_of_row is None else vertex_of_row.shape[0]
-    cdef int64_t n = rows.shape[0] - n_more, n_blocks
+def set_inverse_w(SnappedMesh mesh, const float[:, ::1] rows, float[:, ::1] out):
+    """Copy rows of four numbers, one a vertex, and write 1/w over the fourth; of vertices that have been snapped."""
+    cdef int64_t i = 0, end, n = rows.shape[0], n_blocks
     if n == 0:
         return
     if mesh.is_used is None:
         with nogil:
             K.set_inverse_w(mesh.snapped.mesh.source, &rows[0, 0], 0, n, &out[0, 0])
-    else:
-        n_blocks = mesh.is_used.shape[0]
-        with nogil:
-            while i < n_blocks:
-                end = i
-                while end < n_blocks and mesh.is_used[end]:
-                    end += 1
-                if end > i:
-                    K.set_inverse_w(mesh.snapped.mesh.source, &rows[0, 0], i * VERTEX_BLOCK, min(end * VERTEX_BLOCK, n), &out[0, 0])
-                i = end + 1
+        return
+    n_blocks = mesh.is_used.shape[0]
     with nogil:
-        for i in range(n_more):
-            for k in range(3):
-                out[n + i, k] = rows[n + i, k]
-            out[n + i, 3] = out[vertex_of_row[i], 3]
+        while i < n_blocks:
+            end = i
+            while end < n_blocks and mesh.is_used[end]:
+                end += 1
+            if end > i:
+                K.set_inverse_w(mesh.snapped.mesh.source, &rows[0, 0], i * VERTEX_BLOCK, min(end * VERTEX_BLOCK, n), &out[0, 0])
+            i = end + 1
 
 
 def shade(SnappedMesh mesh, ShadingTable shading, const int32_t[:, ::1] ids, const float[:, ::1] depth, uint8_t[:, :, ::1] pixels,
@@ -190,6 +181,7 @@ def shade(SnappedMesh mesh, ShadingTable shading, const int32_t[:, ::1] ids, con
     if n_rows and ids.shape[1]:
         with nogil:
             K.shade(&mesh.snapped, &window, mesh.clip_view(), &shading.shading, &ids[first_row, 0], &depth[first_row, 0], &pixels[first_row, 0, 0])
+        raise_if_given_up()
 
 
 def shade_samples(SnappedMesh mesh, ShadingTable shading, const int32_t[:, ::1] positions, const int32_t[:, :, ::1] ids,
@@ -202,6 +194,7 @@ def shade_samples(SnappedMesh mesh, ShadingTable shading, const int32_t[:, ::1] 
         with nogil:
             K.shade_samples(&mesh.snapped, &window, mesh.clip_view(), &shading.shading, &positions[0, 0], sample_bits, stride, &ids[0, first_row, 0],
                             &depth[0, first_row, 0], &pixels[first_row, 0, 0])
+        raise_if_given_up()
 
 
 def shade_normals(SnappedMesh mesh, ShadingTable shading, const int32_t[:, ::1] ids, float[:, :, ::1] out, int64_t first_row,
@@ -211,6 +204,7 @@ def shade_normals(SnappedMesh mesh, ShadingTable shading, const int32_t[:, ::1] 
     if n_rows and ids.shape[1]:
         with nogil:
             K.shade_normals(&mesh.snapped, &window, mesh.clip_view(), &shading.shading, &ids[first_row, 0], &out[first_row, 0, 0])
+        raise_if_given_up()
 
 
 def cut_out(SnappedMesh mesh, ShadingTable shading, const int32_t[::1] opaque, const int32_t[::1] triangles, int32_t[:, ::1] ids,

@@ -14,5 +14,5 @@ ply.py             reads PLY
 polygon_files.py   reads polygons from GeoJSON and COCO annotations
 png.py             encodes PNG, with one filter and the fastest compressor there is
 references.py      reads the files that a mesh file names, from its folder and nowhere else
-stl.py             reads STL
+stl_off.py         reads STL and OFF
 """

@@ -38,8 +38,11 @@ READ_EXTENSIONS = frozenset({
     "KHR_materials_pbrSpecularGlossiness", "KHR_materials_unlit", "KHR_mesh_quantization", "KHR_texture_transform",
 })  # fmt: skip
 
-WITHOUT_LOOK = ("KHR_xmp", "FB_ngon_", "EXT_structural_", "EXT_mesh_features", "EXT_instance_features", "KHR_physics_")
-"""Beginnings of the names of extensions that say nothing of the look."""
+WITHOUT_LOOK = (
+    "KHR_xmp", "FB_ngon_", "EXT_structural_", "EXT_mesh_features", "EXT_instance_features", "KHR_physics_",
+    "OMI_physics_", "KHR_materials_variants", "EXT_meshopt_compression", "KHR_meshopt_compression",
+)  # fmt: skip
+"""Beginnings of the names of extensions that say nothing of the look: what a file is without them is what it shows."""
 
 MAY_BE_LEFT_OUT = (
     *WITHOUT_LOOK,
@@ -50,6 +53,7 @@ MAY_BE_LEFT_OUT = (
     "KHR_node_",
     "KHR_audio",
     "EXT_lights_",
+    "KHR_texture_basisu",
 )
 """Beginnings of the names of extensions whose lack changes the look of a file, but not its shapes."""
 
@@ -359,7 +363,8 @@ class _Reader:
             return None
         if "POSITION" not in attributes:
             return None
-        values, corners = self._arrays(primitive, attributes)
+        uv_sets = (0, 1) if primitive.get("material") is None else self._materials.uv_sets(primitive["material"])
+        values, corners = self._arrays(primitive, attributes, uv_sets)
         n = len(values["POSITION"])
         for name, rows in values.items():
             if len(rows) != n:
@@ -368,7 +373,7 @@ class _Reader:
             values |= self._morphed(values, primitive["targets"], weights)
         if skin is not None:
             values |= self._skinned(values, attributes, skin)
-        shape = _shape_of(values, triangles_of(corners, mode))
+        shape = _shape_of(values, triangles_of(corners, mode), uv_sets)
         if is_shared:
             self._shapes[key] = shape
         return shape
@@ -388,12 +393,13 @@ class _Reader:
                     sum_[:, : delta.shape[1]] += float(weight) * delta
         return moved
 
-    def _arrays(self, primitive: Tree, attributes: Tree) -> tuple[dict[str, Array], Array]:
+    def _arrays(self, primitive: Tree, attributes: Tree, uv_sets: tuple[int, int]) -> tuple[dict[str, Array], Array]:
         """The attributes of a primitive, and its corners as a list, a strip or a fan."""
         draco = primitive.get("extensions", {}).get("KHR_draco_mesh_compression")
         if draco is not None and "bufferView" not in entry(self._tree, "accessors", attributes["POSITION"]):
             return self._unpacked(draco, attributes)
-        values = {name: self._accessors.array(index) for name, index in attributes.items() if name in USED_ATTRIBUTES}
+        used = {*USED_ATTRIBUTES, *(f"TEXCOORD_{number}" for number in uv_sets)}
+        values = {name: self._accessors.array(index) for name, index in attributes.items() if name in used}
         if "indices" not in primitive:
             return values, np.arange(len(values["POSITION"]))
         return values, self._accessors.array(primitive["indices"])[:, 0]
@@ -455,7 +461,7 @@ class _Reader:
         return moved
 
 
-USED_ATTRIBUTES = ("POSITION", "NORMAL", "COLOR_0", "TEXCOORD_0", "TEXCOORD_1")
+USED_ATTRIBUTES = ("POSITION", "NORMAL", "COLOR_0")
 
 
 def _checked(tree: Tree, index: Any) -> int:
@@ -477,18 +483,17 @@ def triangles_of(corners: Array, mode: int) -> Array:
     return triangles[(a != b) & (b != c) & (a != c)]  # those that turn a strip round have no area
 
 
-def _shape_of(values: dict[str, Array], triangles: Array) -> _Shape | None:
+def _shape_of(values: dict[str, Array], triangles: Array, uv_sets: tuple[int, int]) -> _Shape | None:
     if not len(triangles):
         return None
     positions, colors = values["POSITION"], values.get("COLOR_0")
-    for name, n_columns in (("POSITION", (3,)), ("NORMAL", (3,)), ("COLOR_0", (3, 4)), ("TEXCOORD_0", (2,))):
+    uv, uv1 = (f"TEXCOORD_{number}" for number in uv_sets)
+    for name, n_columns in (("POSITION", (3,)), ("NORMAL", (3,)), ("COLOR_0", (3, 4)), (uv, (2,)), (uv1, (2,))):
         if name in values and values[name].shape[1] not in n_columns:
             raise MeshError(f"{name} has {values[name].shape[1]} numbers a vertex")
     if colors is not None:
         colors = _light_of_colors(colors)
-    shape = _Shape(
-        positions, triangles, values.get("NORMAL"), colors, values.get("TEXCOORD_0"), values.get("TEXCOORD_1")
-    )
+    shape = _Shape(positions, triangles, values.get("NORMAL"), colors, values.get(uv), values.get(uv1))
     return shape if shape.normals is not None else _flat(shape)
 
 
@@ -519,10 +524,14 @@ def _placed(shape: _Shape, matrix: F64, materials: tuple[Any, ...]) -> Mesh:
     """A primitive in the world."""
     own = placed_arrays(shape.positions, shape.triangles, shape.normals, matrix)
     colors = None if shape.colors is None else _srgb_bytes(shape.colors)
-    uv, uv1 = (
-        None if rows is None else np.column_stack([rows[:, 0], 1 - rows[:, 1]]) for rows in (shape.uv, shape.uv1)
-    )
+    uv, uv1 = (None if rows is None else _upwards(rows) for rows in (shape.uv, shape.uv1))
     return Mesh(*own, colors, uv, materials, None, uv1)
+
+
+def _upwards(uv: Array) -> Array:
+    """Texture coordinates with v from the bottom; also of whole numbers, as quantized files have them."""
+    rows = uv if uv.dtype.kind == "f" else uv.astype(np.float32)  # 16 bits are exact in it
+    return np.column_stack([rows[:, 0], 1 - rows[:, 1]])
 
 
 def _srgb_bytes(colors: Array) -> npt.NDArray[np.uint8]:

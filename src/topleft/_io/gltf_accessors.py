@@ -102,8 +102,6 @@ class Accessors:
             If it lies beyond its buffer.
         """
         row = entry(self._tree, "bufferViews", index)
-        if "EXT_meshopt_compression" in row.get("extensions", {}):
-            self._source.notes.add("compressed buffers (EXT_meshopt_compression) not read")
         buffer = self._buffer(row.get("buffer"))
         start, size = whole(row, "byteOffset", 0), whole(row, "byteLength")
         if start + size > len(buffer):
@@ -151,6 +149,10 @@ class Accessors:
         row = entry(self._tree, "buffers", index)
         if index not in self._buffers:
             content = self._blob if "uri" not in row else uri_content(row["uri"], self._source, "buffers")
+            if content is None and "uri" not in row and any("meshopt" in name for name in row.get("extensions", {})):
+                raise MeshError(
+                    f"cannot read {str(self._source.path)!r}: its buffers are compressed by meshopt, which is not read"
+                )
             if content is None:
                 name = str(row.get("uri", "in the file"))[:80]
                 raise MeshError(f"cannot read {str(self._source.path)!r}: its buffer {name!r} is not there")

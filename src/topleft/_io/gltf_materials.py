@@ -55,6 +55,8 @@ class Materials:
         self._accessors = accessors
         self._source = source
         self._materials: dict[int, Material] = {}
+        self._uv_sets: dict[int, tuple[int, int]] = {}
+        self._sets = (0, 1)  # of the material that is being made
         self._textures: dict[tuple[Any, ...], Texture | None] = {}
         self._pictures: dict[int, npt.NDArray[np.uint8] | None] = {}
 
@@ -68,8 +70,14 @@ class Materials:
         """
         row = entry(self._tree, "materials", index)
         if index not in self._materials:
+            self._uv_sets[index] = self._sets = uv_sets_of(row)
             self._materials[index] = self._made(row)
         return self._materials[index]
+
+    def uv_sets(self, index: Any) -> tuple[int, int]:
+        """The sets of texture coordinates of the file that the textures of a material have as their sets 0 and 1."""
+        self.material(index)
+        return self._uv_sets[index]
 
     def _made(self, row: Tree) -> Material:
         extensions = row.get("extensions", {})
@@ -149,10 +157,11 @@ class Materials:
             return None
         row = entry(self._tree, "textures", info.get("index"))
         transform = info.get("extensions", {}).get("KHR_texture_transform", {})
-        uv_set = whole(transform, "texCoord", whole(info, "texCoord", 0))
-        if uv_set > 1:
-            self._source.notes.add("textures on a third set of texture coordinates not read")
+        set_of_file = whole(transform, "texCoord", whole(info, "texCoord", 0))
+        if set_of_file not in self._sets:
+            self._source.notes.add("textures on a third set of texture coordinates of one material not read")
             return None
+        uv_set = self._sets.index(set_of_file)
         matrix = None if not transform else transform_of(transform)
         sampler = {} if "sampler" not in row else entry(self._tree, "samplers", row["sampler"])
         key = (info["index"], encoding, uv_set, None if matrix is None else matrix.tobytes())
@@ -191,6 +200,23 @@ class Materials:
             name = name if str(uri).startswith("data:") else str(uri)
             content = uri_content(uri, self._source, "textures")
         return None if content is None else self._source.decode(bytes(content), name)
+
+
+def uv_sets_of(row: Tree) -> tuple[int, int]:
+    """The two sets of texture coordinates that a material is drawn with: 0 and 1, unless it names others."""
+    named: set[int] = set()
+    rows: list[Any] = [row]
+    while rows:
+        own = rows.pop()
+        if isinstance(own, dict):
+            if "index" in own:
+                transform = own.get("extensions", {}).get("KHR_texture_transform", {})
+                named.add(whole(transform, "texCoord", whole(own, "texCoord", 0)))
+            rows += [value for name, value in own.items() if name not in ("extras", "KHR_texture_transform")]
+    if named <= {0, 1}:
+        return 0, 1
+    first, second = [*sorted(named), *({0, 1} - named)][:2]
+    return first, second
 
 
 def metallic_of_specular(diffuse: F64, specular: F64) -> tuple[F64, F64]:

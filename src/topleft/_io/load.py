@@ -33,7 +33,7 @@ def load(
     max_vertices: int = MAX_VERTICES,
     max_texture_pixels: int = MAX_TEXTURE_PIXELS,
 ) -> Mesh | Points:
-    """A mesh read from a file: OBJ, PLY, STL, glTF and GLB; by trimesh OFF, 3MF and what else it has readers for.
+    """A mesh read from a file: OBJ, PLY, STL, OFF, glTF and GLB; by trimesh 3MF and what else it has readers for.
 
     Parameters
     ----------
@@ -99,9 +99,13 @@ def _mesh(source: InputFile, crease: float) -> Mesh | Points:
 
             parts = read_ply(source)
         case ".stl" | ".stl_ascii":
-            from topleft._io.stl import read_stl
+            from topleft._io.stl_off import read_stl
 
             parts = read_stl(source)
+        case ".off":
+            from topleft._io.stl_off import read_off
+
+            parts = read_off(source)
         case _:
             from topleft._io.foreign import read_by_trimesh
 

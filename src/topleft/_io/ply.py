@@ -77,17 +77,12 @@ def read_ply(source: InputFile) -> list[Mesh]:
     """
     content = source.path.read_bytes()
     order, elements, textures, start = _header(content)
-    body: _Numbers | _Bytes
-    body = _Numbers(content[start:]) if order == "" else _Bytes(content, start, "<" if order == "<" else ">")
-    found: dict[str, Rows] = {}
     for element in elements:
         if element.name == "vertex":
             source.check_n_vertices(element.n)
-        rows = body.rows(element)
-        if element.name in ("vertex", "face", "tristrips"):
-            found[element.name] = rows
-        elif element.n and element.name not in ("edge", "camera", "obj_info"):
+        elif element.n and element.name not in ("face", "tristrips", "edge", "camera", "obj_info"):
             source.notes.add("elements not read", element.name)
+    found = _found(content, order, elements, start, source)
     vertex = found.get("vertex")
     if vertex is None:
         raise MeshError("it has no vertices")
@@ -99,6 +94,44 @@ def read_ply(source: InputFile) -> list[Mesh]:
         return []
     mesh = _mesh(vertex, corners, n_corners, faces, textures, source)
     return [] if mesh is None else [mesh]
+
+
+def _found(content: bytes, order: str, elements: list[_Element], start: int, source: InputFile) -> dict[str, Rows]:
+    """The elements by name."""
+    if order:
+        body = _Bytes(content, start, "<" if order == "<" else ">")
+        return {element.name: body.rows(element) for element in elements}
+    numbers = _Numbers(content[start:])
+    error: MeshError | None = None
+    found: dict[str, Rows] = {}
+    try:
+        found = {element.name: numbers.rows(element) for element in elements}
+    except MeshError as raised:
+        error = raised
+    if error is None and not numbers.n_left:
+        return found
+    lines = [line for line in content[start:].splitlines() if line.strip()]
+    if len(lines) == sum(element.n for element in elements):  # a row a line: the header says too little of each
+        ends = np.cumsum([element.n for element in elements]).tolist()
+        for element, end in zip(elements, ends, strict=True):
+            rows = [_row(line, element) for line in lines[end - element.n : end]]
+            found[element.name] = _Numbers(b" ".join(rows)).rows(element)
+        source.notes.add("rows with more numbers than the header says, which are not read")
+    elif error is not None:
+        raise error
+    return found
+
+
+def _row(line: bytes, element: _Element) -> bytes:
+    """The numbers of a line that the header tells of."""
+    words, n = line.split(), 0
+    for own in element.properties:
+        if own.count_dtype is not None and n < len(words):
+            n += _length(float(words[n]))
+        n += 1
+    if n > len(words):
+        raise MeshError(f"a row of {element.name} has {len(words)} of {n} numbers")
+    return b" ".join(words[:n])
 
 
 def mapped_elements(path: Path) -> tuple[dict[str, Array], Array, dict[str, Array]] | None:
@@ -190,6 +223,11 @@ class _Numbers:
     def __init__(self, content: bytes) -> None:
         self._values = numbers_of_text(content)
         self._at = 0
+
+    @property
+    def n_left(self) -> int:
+        """How many numbers nobody has read."""
+        return len(self._values) - self._at
 
     def rows(self, element: _Element) -> Rows:
         """The next element."""

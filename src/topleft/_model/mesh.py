@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from topleft._base.arrays import as_array, as_checked_triangles, shown
+from topleft import _engine
+from topleft._base.arrays import as_array, as_checked_triangles, set_read_only, shown
 from topleft._model.material import Material
 from topleft._model.normals import CornerNormals, angle_weighted_normals, box_of_triangles, creased_normals
 from topleft._model.texture import Texture
@@ -264,10 +265,7 @@ class Mesh:
         """What another process needs: what is computed from it is computed there."""
         return {field.name: self.__dict__[field.name] for field in fields(self)}
 
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        """Take it, the arrays read-only as they were."""
-        for name, value in state.items():
-            self.__dict__[name] = read_only(value) if isinstance(value, np.ndarray) else value
+    __setstate__ = set_read_only
 
 
 def keep_corner_normals(mesh: Mesh, normals: CornerNormals) -> None:
@@ -353,8 +351,11 @@ def coincident(*attributes: npt.NDArray[Any]) -> tuple[npt.NDArray[np.intp], npt
     group : (V,) int
         The group that each row belongs to: `attribute[first][group]` equals `attribute`.
     """
+    groups = _groups_by_hash(attributes)
+    if groups is not None:
+        return groups
     columns = [column for rows in attributes for column in rows.T]
-    order, starts = _runs_by_hash(columns) or _runs_by_value(columns)
+    order, starts = _runs_by_value(columns)
     lowest = np.minimum.reduceat(order, np.flatnonzero(starts)) if len(order) else order
     first_of_row = np.empty(len(order), dtype=np.intp)
     first_of_row[order] = lowest[np.cumsum(starts) - 1]
@@ -362,23 +363,35 @@ def coincident(*attributes: npt.NDArray[Any]) -> tuple[npt.NDArray[np.intp], npt
     return np.flatnonzero(is_first), (np.cumsum(is_first) - 1)[first_of_row]
 
 
-def _runs_by_hash(columns: list[npt.NDArray[Any]]) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.bool_]] | None:
-    """Rows in an order in which equal ones follow each other, and where runs of them begin.
+def _groups_by_hash(
+    attributes: tuple[npt.NDArray[Any], ...],
+) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]] | None:
+    """The same of rows that are equal where their bits are, in a sixth of the time; None if some are not numbers."""
+    n = len(attributes[0])
+    if not 0 < n < 1 << 30 or any(rows.dtype.kind == "f" and np.isnan(rows).any() for rows in attributes):
+        return None
+    words = [_words(rows) for rows in attributes]
+    rows = words[0] if len(words) == 1 else np.concatenate(words, axis=1)
+    table_bits = max(4, (2 * n - 1).bit_length())
+    table = np.full(1 << table_bits, -1, np.int32)
+    first, group = np.empty(n, np.int32), np.empty(n, np.int32)
+    n_groups = _engine.group_rows(rows, table_bits, table, first, group)
+    return None if n_groups < 0 else (first[:n_groups].astype(np.intp), group.astype(np.intp))
 
-    Takes a third of the time of `_runs_by_value`. None in the rare case that rows share a hash and differ.
-    """
-    key = np.zeros(len(columns[0]), np.uint64)
-    for column in columns:
-        numbers = column.astype(np.float64) + 0.0  # -0.0 equals 0.0; all dtypes of meshes fit
-        key = (key ^ numbers.view(np.uint64)) * np.uint64(0x9E3779B97F4A7C15)
-        key ^= key >> np.uint64(32)
-    order = np.argsort(key)
-    starts = _differ([key], order)
-    return (order, starts) if np.array_equal(starts, _differ(columns, order)) else None
+
+def _words(rows: npt.NDArray[Any]) -> npt.NDArray[np.uint32]:
+    """The rows (V, K) as words (V, W) that are equal where the rows are."""
+    if rows.dtype.kind == "f":
+        wide = rows.astype(np.float64 if rows.itemsize > 4 else np.float32, order="C", copy=False) + 0  # -0.0 is 0.0
+    elif rows.dtype == np.uint8 and rows.shape[1] == 4:
+        wide = np.ascontiguousarray(rows)
+    else:
+        wide = rows.astype(np.int64, order="C")
+    return wide.view(np.uint32)
 
 
 def _runs_by_value(columns: list[npt.NDArray[Any]]) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.bool_]]:
-    """The same by comparing the rows."""
+    """Rows in an order in which equal ones follow each other, and where runs of them begin."""
     order = np.lexsort(columns[::-1])
     return order, _differ(columns, order)
 

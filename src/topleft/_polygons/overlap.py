@@ -5,7 +5,10 @@ Input: rings and a size. Output: `Overlap`.
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass, field
+from itertools import pairwise
+from threading import Condition, Lock
 from typing import Any
 
 import numpy as np
@@ -27,6 +30,9 @@ __all__ = ["Overlap", "overlap"]
 
 #: Entries that memory is asked for at a time, beyond those of the largest polygon; what is not written costs nothing.
 MAX_ENTRIES_AT_ONCE = 1 << 28
+
+#: Entries that a thread lists before it copies them to the table: they stay in the second-level cache.
+MAX_BLOCK_ENTRIES = 1 << 16
 
 #: What the kernel writes beyond the last entry: a whole vector.
 TAIL = 16
@@ -193,57 +199,111 @@ def overlap(
     return list_areas(prepared, [] if out is None else out._room)
 
 
-def list_areas(prepared: Prepared, used: list[tuple[npt.NDArray[Any], npt.NDArray[np.float32]]]) -> Overlap:
+Chunk = tuple[npt.NDArray[Any], npt.NDArray[np.float32]]
+
+
+def list_areas(prepared: Prepared, used: list[Chunk]) -> Overlap:
     """Return the table of snapped polygons; `used` is memory to take, if it fits."""
     size, n = prepared.frame.size, len(prepared)
     boxes = prepared.engine.boxes_px.astype(np.int64)
     widths, heights = boxes[:, 2] - boxes[:, 0], boxes[:, 3] - boxes[:, 1]
-    room = np.concatenate([[0], np.cumsum(widths * heights)])  # entries that there can be before each polygon
+    before = np.concatenate([[0], np.cumsum(widths * heights)])  # entries that there can be before each polygon
     dtype = np.int32 if size[0] * size[1] <= INT32_MAX else np.int64
     starts = np.zeros(n + 1, np.int64)
-    n_threads = max(1, min(prepared.n_threads, n))
-    at_once = max(1, MAX_ENTRIES_AT_ONCE // n_threads)
-    n_cells = cells_for(prepared, size[1])
-    cells = SCRATCH.constant("cells", n_cells * n_threads, _engine.CELL_CLEAR)
-    slots = list(range(n_threads))
-
-    def list_part(first: int, end: int) -> list[tuple[npt.NDArray[Any], npt.NDArray[np.float32]]]:
-        """Return the entries of polygons [first, end) in chunks; `starts` gets how many each has."""
-        slot, pieces = slots.pop(), prepared.piece_scratch()
-        own_cells = cells[slot * n_cells : (slot + 1) * n_cells]
-        own = np.zeros(n + 1, np.int64) if n_threads > 1 else starts
-        chunks = []
-        while first < end:
-            last = int(np.searchsorted(room, room[first] + at_once, "right")) - 1
-            last = min(end, max(last, first + 1))
-            n_room = int(room[last] - room[first]) + TAIL
-            pixels, areas = take_room(n_room + TAIL)
-            before, own[first] = int(own[first]), 0
-            done = prepared.engine.list_shares(first, last, own, pixels, areas, own_cells, pieces)
-            n_entries = int(own[first + done])
-            own[first : first + done + 1] += before
-            chunks.append((pixels[:n_entries], areas[:n_entries]))
-            rooms.append((pixels, areas))
-            first += done
-        counts.append((own, first))
-        return chunks
-
-    def take_room(n_entries: int) -> tuple[npt.NDArray[Any], npt.NDArray[np.float32]]:
-        for i, (pixels, areas) in enumerate(used):
-            if len(pixels) >= n_entries and pixels.dtype == dtype:
-                del used[i]
-                return pixels, areas
-        return FRESH.empty("pixels", (n_entries,), dtype), FRESH.empty("areas", (n_entries,), np.float32)
-
-    rooms: list[tuple[npt.NDArray[Any], npt.NDArray[np.float32]]] = []
-    counts: list[tuple[npt.NDArray[np.int64], int]] = []
     if not n or 0 in size:
         return Overlap(starts, np.empty(0, dtype), np.empty(0, np.float32), size)
-    parts = run_parts(list_part, n, n_threads)
-    if n_threads > 1:
-        lengths = sum(np.diff(own, prepend=0).clip(min=0) for own, _ in counts)
-        starts[:] = np.cumsum(lengths)
-    chunks = [chunk for part in parts for chunk in part]
-    if len(chunks) == 1:
-        return Overlap(starts, *chunks[0], size, rooms)
-    return Overlap(starts, np.concatenate([c[0] for c in chunks]), np.concatenate([c[1] for c in chunks]), size)
+    n_threads = max(1, min(prepared.n_threads, n))
+    n_cells = cells_for(prepared, size[1])
+    cells = SCRATCH.constant("cells", n_cells * n_threads, _engine.CELL_CLEAR).reshape(n_threads, n_cells)
+
+    def take_room(n_entries: int) -> Chunk:
+        for i, (pixels, areas) in enumerate(used):
+            if len(pixels) >= n_entries + TAIL and pixels.dtype == dtype:
+                del used[i]
+                return pixels, areas
+        return FRESH.empty("pixels", (n_entries + TAIL,), dtype), FRESH.empty("areas", (n_entries + TAIL,), np.float32)
+
+    rooms: list[Chunk] = []
+    done, entries = 0, []
+    while done < n:  # as many polygons as there is room for, all of them but for huge tables
+        end = end_of_room(before, done, MAX_ENTRIES_AT_ONCE)
+        room = take_room(int(before[end] - before[done]))
+        list_range(prepared, before, (done, end), starts, room, cells)
+        n_entries = int(starts[end] - starts[done])
+        entries.append((room[0][:n_entries], room[1][:n_entries]))
+        rooms.append(room)
+        done = end
+    if len(entries) == 1:
+        return Overlap(starts, *entries[0], size, rooms)
+    return Overlap(starts, np.concatenate([c[0] for c in entries]), np.concatenate([c[1] for c in entries]), size)
+
+
+def end_of_room(before: npt.NDArray[np.int64], first: int, n_entries: int) -> int:
+    """Return up to which polygon from `first` on so many entries have room; at least one."""
+    end = int(np.searchsorted(before, before[first] + n_entries, "right")) - 1
+    return min(len(before) - 1, max(end, first + 1))
+
+
+def list_range(
+    prepared: Prepared,
+    before: npt.NDArray[np.int64],
+    polygons: tuple[int, int],
+    starts: npt.NDArray[np.int64],
+    room: Chunk,
+    cells: npt.NDArray[np.int32],
+) -> None:
+    """Write the entries of a range of polygons to the begin of `room`, and where each ends to `starts`.
+
+    One thread, with a row of `cells` each, writes them there. Several take blocks of polygons in turn; those whose
+    block is the next one write it there, the others copy theirs to where the blocks before it have ended.
+    """
+    begin, last = polygons
+    pixels, areas = room
+    if len(cells) == 1:
+        before_all, starts[begin] = int(starts[begin]), 0
+        prepared.engine.list_shares(begin, last, starts, pixels, areas, cells[0], prepared.piece_scratch())
+        starts[begin : last + 1] += before_all
+        return
+    bounds = [begin]
+    while bounds[-1] < last:
+        bounds.append(min(last, end_of_room(before, bounds[-1], MAX_BLOCK_ENTRIES)))
+    most = int(np.diff(before[bounds]).max()) + TAIL
+    waiting, free = deque(pairwise(bounds)), deque(cells)
+    taking, turn = Lock(), Condition()
+    done = begin
+    is_lost = False
+
+    def list_blocks(*_: int) -> None:
+        nonlocal done, is_lost
+        scratch, own_cells = prepared.piece_scratch(), free.popleft()
+        own_starts = np.empty(len(starts), np.int64)
+        own = np.empty(most, pixels.dtype), np.empty(most, np.float32)
+        try:
+            while True:
+                with taking:
+                    if not waiting:
+                        return
+                    first, end = waiting.popleft()
+                own_starts[first] = 0
+                is_next = done == first  # all before it have ended: no copy
+                at = int(starts[first] - starts[begin])
+                to = (pixels[at:], areas[at:]) if is_next else own
+                prepared.engine.list_shares(first, end, own_starts, *to, own_cells, scratch)
+                with turn:
+                    while not is_lost and done != first:
+                        turn.wait()
+                    if is_lost:
+                        return
+                    at, n_entries = int(starts[first] - starts[begin]), int(own_starts[end])
+                    starts[first + 1 : end + 1] = own_starts[first + 1 : end + 1] + starts[first]
+                    done = end
+                    turn.notify_all()
+                if not is_next:
+                    pixels[at : at + n_entries], areas[at : at + n_entries] = own[0][:n_entries], own[1][:n_entries]
+        except BaseException:
+            with turn:  # who waits for this block waits no longer
+                is_lost = True
+                turn.notify_all()
+            raise
+
+    run_parts(list_blocks, len(cells), len(cells))

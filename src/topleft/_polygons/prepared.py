@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft import _engine
-from topleft._base.memory import Memory
+from topleft._base.memory import SCRATCH, Memory
 from topleft._base.threads import available_threads, run_parts
 from topleft._polygons.rings import RingSet
 
@@ -51,10 +51,10 @@ class Prepared:
         """Find out of which polygons the rings do not meet, and what the area of each ring counts."""
         engine, n = self.engine, len(self)
         engine.make_weights()
+        n_words = 0 if assume_valid else engine.certify_words()
 
         def certify_part(first: int, end: int) -> None:
-            room = None if assume_valid else np.empty(_engine.CERTIFY_WORDS * max(1, self.most_edges), np.int64)
-            engine.certify(first, end, room)
+            engine.certify(first, end, None if assume_valid else SCRATCH.empty("chains", (n_words,), np.int64))
 
         run_parts(certify_part, n, min(self.n_threads, n))
 
@@ -84,8 +84,8 @@ def prepare(memory: Memory, rings: RingSet, frame: Frame, *, is_nonzero: bool) -
     """
     points, n = rings.points, len(rings.points)
     source = _engine.Source(points)
-    x: npt.NDArray[np.int32] = memory.empty("polygon x", (n + _engine.POLYGON_PAD,), np.int32)
-    y: npt.NDArray[np.int32] = memory.empty("polygon y", (n + _engine.POLYGON_PAD,), np.int32)
+    columns: npt.NDArray[np.int32] = memory.empty("polygon points", (2, n + _engine.POLYGON_PAD), np.int32)
+    x, y = columns[0], columns[1]
     wide: npt.NDArray[np.int64] | None = None
     how = frame.subpixel_bits, frame.grid_bits, *frame.origin
 
@@ -94,7 +94,8 @@ def prepare(memory: Memory, rings: RingSet, frame: Frame, *, is_nonzero: bool) -
 
     n_threads = threads_for(frame, n)
     if n:
-        bad, n_wide = (sum(counts) for counts in zip(*run_parts(snap, n, n_threads), strict=True))
+        counts = run_parts(snap, n, n_threads)
+        bad, n_wide = counts[0] if len(counts) == 1 else (sum(column) for column in zip(*counts, strict=True))
         if bad:
             raise bad_point(rings, x[:n], frame)
         if n_wide:

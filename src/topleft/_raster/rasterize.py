@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine
 from topleft._base.arrays import as_number, as_out
-from topleft._base.memory import FRESH, Memory, empty
+from topleft._base.memory import FRESH, Memory, check_fits, empty
 from topleft._base.options import DepthTest, Sampling, Sink, parse
 from topleft._base.threads import count_threads, run_parts
 from topleft._raster import choices
@@ -300,6 +300,7 @@ def draw_samples(memory: Memory, snapped: Snapped, view: View, asked: Asked, dra
     """Draw ids and depth of every sample: a plane a sample in memory."""
     (width, height), n = view.size, view.sampling.n_samples
     positions = sample_positions(n, view.grid_bits)
+    check_fits((n, height, width), np.int32, np.float32)
     ids: NDArray[np.int32] = memory.empty("sample ids", (n, height, width), np.int32)
     depth: NDArray[np.float32] = memory.empty("sample depth", (n, height, width), np.float32)
     draw_all_samples(memory, snapped, view, positions, drawing, ids, depth)
@@ -349,6 +350,8 @@ Buffers = tuple[NDArray[np.int32], NDArray[np.float32]]
 def buffers_of(memory: Memory, view: View, asked: Asked) -> Iterator[tuple[Buffers, Buffers]]:
     """Give ids and depth to return, and contiguous ones to draw into, as `canvas_of` does."""
     shape = view.size[::-1]
+    if asked.ids_out is None and asked.depth_out is None:
+        check_fits(shape, np.int32, np.float32)
     ids, ids_canvas = open_canvas(memory, "triangle", asked.ids_out, shape, np.int32)
     depth, depth_canvas = open_canvas(memory, "depth", asked.depth_out, shape, np.float32)
     yield (ids, depth), (ids_canvas, depth_canvas)

@@ -145,7 +145,6 @@ class ShadingMesh:
         corners = None if mesh.is_faceted else mesh.corner_normals()
         self._triangles = mesh.triangles
         self.normal_of_corner = None if corners is None else corners.of_corner
-        self.vertex_of_row = None if corners is None else corners.vertex_of_row
         self.positions = mesh.vertices if view is None else moved(mesh.vertices, view)
         low, high = box_of_triangles(self.positions, self._triangles).astype(self.positions.dtype)
         self.center: F64 = np.asarray(low / 2 + high / 2, np.float64)
@@ -228,11 +227,13 @@ class ShadingInputs:
         self.is_in_eye_space = in_eye_space
         normals = self.mesh.normals
         if scene.viewport is not None and self.rays.has_perspective:
-            normals = empty(normals.shape, np.float32)
-            _engine.set_inverse_w(scene, self.mesh.normals, self.mesh.vertex_of_row, normals)
+            own = normals[: len(mesh.vertices)]
+            normals = empty(own.shape, np.float32)
+            _engine.set_inverse_w(scene, own, normals)
         self.shading = _engine.ShadingTable(
             normals,
             self.mesh.normal_of_corner,
+            self.mesh.normals,
             self.mesh.face_normals if is_flat else None,
             self.mesh.positions,
             None if is_flat else self.mesh.is_turned,

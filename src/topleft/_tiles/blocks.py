@@ -25,7 +25,7 @@ import numpy.typing as npt
 from topleft._base.arrays import INT32_MAX, as_array, shown
 from topleft._io.load import load
 from topleft._io.ply import mapped_elements
-from topleft._io.stl import mapped_corners
+from topleft._io.stl_off import mapped_corners
 from topleft._scene.adapt import as_polygons
 from topleft.errors import MeshError
 

@@ -23,7 +23,7 @@ DEFAULT_SIDE = 1024
 
 MASK_HELP = """\
 FILE is GeoJSON (Polygon, MultiPolygon, features and collections of them; y is up) or annotations in the format of COCO
-(a picture for each image, of its size).
+(a picture for each image, of its size): polygons and run lengths, as lists and as text.
 
 OUT is a file, or for several images a pattern: masks/{name}.png. A mask is 255 inside and 0 outside, with --sampling
 area and msaa2 to msaa16 the share of the pixel in between. --labels writes numbers: index, of the objects in their
@@ -34,7 +34,7 @@ numbers up to 65535; .npy and TIFF hold all.
 
 def run_mask(options: argparse.Namespace) -> int:
     """Write masks or labels of the polygons in a file."""
-    pictures = load_polygons(options.file)
+    pictures = load_polygons(options.file, has_crowds=not options.no_crowds)
     if options.image is not None:
         pictures = [picture for picture in pictures if picture.name == options.image]
         if not pictures:
@@ -128,5 +128,6 @@ def add_mask_command(commands: Any) -> None:
     mask.add_argument(
         "--extent", type=float, nargs=4, metavar=("X_MIN", "X_MAX", "Y_MIN", "Y_MAX"), help="what is shown (all)"
     )
+    mask.add_argument("--no-crowds", action="store_true", help="leave out annotations of COCO that are crowds")
     mask.add_argument("--image", metavar="NAME", help="the one of several images, its file name without the end")
     mask.add_argument("--threads", type=positive, metavar="N", help="how many at most")

@@ -1,0 +1,102 @@
+"""Draws files, one after the other, as `topleft render` draws them: the other end of the study's pipe.
+
+In: paths. Out: what came of each: an outcome, the line that was printed, seconds, and a small picture.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import time
+import warnings
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any
+
+SIZE = 384
+"""Width and height of the picture, pixels."""
+
+THUMBNAIL = 192
+"""Of the picture on a contact sheet."""
+
+
+def serve(pipe: Connection, picture: Path, up: str) -> None:
+    """Draw the files that the pipe names until it says None."""
+    warnings.simplefilter("ignore")  # what is wrong is read from the command's own line
+    pipe.send({"ready": True})
+    while (path := pipe.recv()) is not None:
+        pipe.send(draw(path, picture, up))
+
+
+def draw(path: Path, picture: Path, up: str = "y") -> dict[str, Any]:
+    """What comes of a file.
+
+    Returns
+    -------
+    dict
+        `outcome`: "drawn", "refused" or "crashed"; `line`: what the command printed, without the name of the file;
+        of what is drawn `n_triangles`, `n_points`, `load_s` (`tl.load`), `command_s` (all of `topleft render`), and
+        `covered`: the share of the pixels that are not background.
+    """
+    from topleft.cli import main
+
+    said = io.StringIO()
+    picture.unlink(missing_ok=True)
+    start = time.perf_counter()
+    arguments = [
+        "render",
+        str(path),
+        "-o",
+        str(picture),
+        "--size",
+        f"{SIZE}x{SIZE}",
+        "--up",
+        up,
+        "--background",
+        "none",
+    ]
+    try:
+        with contextlib.redirect_stderr(said), contextlib.redirect_stdout(said):
+            status = main(arguments)
+    except SystemExit as error:
+        status = int(error.code or 0)
+    except Exception as error:
+        return {"outcome": "crashed", "line": f"{type(error).__name__}: {error}"}
+    seconds = time.perf_counter() - start
+    line = shortened(said.getvalue(), path)
+    if status or not picture.is_file():
+        return {"outcome": "refused" if line else "crashed", "line": line, "command_s": round(seconds, 4)}
+    return {"outcome": "drawn", "line": line, "command_s": round(seconds, 4), **facts(path), **look(picture)}
+
+
+def shortened(text: str, path: Path) -> str:
+    """A line of the command without what all lines begin with, and without the folder of the file."""
+    line = " ".join(text.split()).removeprefix("topleft: ")
+    if not line.startswith("cannot"):  # what a mesh lacks begins with its file
+        line = line.replace(f"{str(path)!r}: ", "")
+    return line.replace(str(path), path.name).replace(str(path.parent), "")
+
+
+def facts(path: Path) -> dict[str, Any]:
+    """What is in a file, and how long `tl.load` takes."""
+    import topleft as tl
+
+    start = time.perf_counter()
+    mesh = tl.load(path)
+    load_s = round(time.perf_counter() - start, 4)
+    is_mesh = isinstance(mesh, tl.Mesh)
+    return {"n_triangles": len(mesh.triangles) if is_mesh else 0,
+            "n_points": 0 if is_mesh else len(mesh.positions), "load_s": load_s}  # fmt: skip
+
+
+def look(picture: Path) -> dict[str, Any]:
+    """The share of a picture that is covered, and the picture itself, reduced, as the bytes of a PNG."""
+    from PIL import Image
+
+    with Image.open(picture) as image:
+        pixels = image.convert("RGBA")
+    covered = 1 - pixels.getchannel("A").histogram()[0] / (pixels.width * pixels.height)
+    pixels.thumbnail((THUMBNAIL, THUMBNAIL), Image.Resampling.BOX)
+    content = io.BytesIO()
+    pixels.save(content, "PNG")
+    return {"covered": round(covered, 4), "picture": content.getvalue()}

@@ -1,0 +1,169 @@
+"""Draws all files of folders, and writes a page: what is drawn, refused or warned of, how long it takes, and sheets.
+
+In: folders of files, of which none is part of the project. Out: a record, and a folder with a page and contact sheets.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from collections.abc import Iterator
+from contextlib import AbstractContextManager
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+from benchmarks.harness.arguments import add_out, positive
+from benchmarks.harness.machine import describe
+from benchmarks.harness.records import Record, Save, tell, write_text
+from benchmarks.real_files import drawing, sheets, tables
+from benchmarks.report.study import Study
+
+SUFFIXES = (
+    ".gltf", ".glb", ".vrm", ".obj", ".ply", ".stl", ".stl_ascii", ".off", ".3mf", ".dae", ".zae", ".amf", ".xyz",
+    ".svg", ".dxf", ".binvox",
+)  # fmt: skip
+"""Of what is drawn unless `--suffix` says otherwise."""
+
+START_SECONDS = 60
+
+
+class Painter(AbstractContextManager["Painter"]):
+    """A process that draws files; one that falls, or takes too long, is replaced.
+
+    Parameters
+    ----------
+    seconds : float
+        How long a file may take.
+    up : str
+        The axis that points up.
+    """
+
+    def __init__(self, seconds: float, up: str = "y") -> None:
+        self._seconds = seconds
+        self._up = up
+        self._folder = tempfile.TemporaryDirectory(prefix="topleft-")
+        self._start()
+
+    def _start(self) -> None:
+        context = get_context("spawn")
+        self._pipe, other = context.Pipe()
+        picture = Path(self._folder.name, "picture.png")
+        self._process = context.Process(target=drawing.serve, args=(other, picture, self._up), daemon=True)
+        self._process.start()
+        other.close()
+        if not self._pipe.poll(START_SECONDS) or not self._pipe.recv().get("ready"):
+            raise ValueError("the process that draws did not start")
+
+    def draw(self, path: Path) -> dict[str, Any]:
+        """What comes of a file; see `drawing.draw`."""
+        self._pipe.send(path)
+        try:
+            if self._pipe.poll(self._seconds):
+                return self._pipe.recv()
+            row = {"outcome": "crashed", "line": f"not done after {self._seconds:g} seconds"}
+        except (EOFError, OSError):
+            self._process.join(1)
+            row = {"outcome": "crashed", "line": f"the process ended with status {self._process.exitcode}"}
+        self._stop()
+        self._start()
+        return row
+
+    def _stop(self) -> None:
+        self._pipe.close()
+        self._process.kill()
+        self._process.join()
+
+    def __exit__(self, *_: object) -> None:
+        self._stop()
+        self._folder.cleanup()
+
+
+def files_of(folder: Path, suffixes: tuple[str, ...] = SUFFIXES) -> list[Path]:
+    """The files of a folder and of those in it that end in one of these, in the order of their names."""
+    return sorted(path for path in folder.rglob("*") if path.suffix.lower() in suffixes and path.is_file())
+
+
+def draw_folder(label: str, folder: Path, painter: Painter, suffixes: tuple[str, ...]) -> Iterator[dict[str, Any]]:
+    """A row for each file of a folder, with its picture."""
+    paths = files_of(folder, suffixes)
+    for i, path in enumerate(paths):
+        row = painter.draw(path)
+        if i % 20 == 19 or row["outcome"] == "crashed":
+            tell(f"{label}: {i + 1} of {len(paths)}: {path.name}: {row['outcome']}")
+        yield {"file": path.relative_to(folder).as_posix(), **row}
+
+
+def run_real_files(
+    folders: dict[str, Path], out: Path, *, seconds: float = 60, suffixes: tuple[str, ...] = SUFFIXES, up: str = "y"
+) -> Record:
+    """Draw all files of folders; write a page and contact sheets into a folder.
+
+    Parameters
+    ----------
+    folders : dict
+        By what they are called: a repository and its commit, say.
+    out : path
+    seconds : float
+        How long a file may take.
+    suffixes : tuple of str
+        Of the files that are drawn.
+    up : str
+        The axis that points up.
+    """
+    for label, folder in folders.items():
+        if not files_of(folder, suffixes):
+            raise ValueError(f"{label!r} must be a folder with files that end in one of {' '.join(suffixes)}")
+    record: Record = {"kind": "real-files", **describe("pillow", "trimesh"), "size": drawing.SIZE, "files": []}
+    with Painter(seconds, up) as painter:
+        for number, (label, folder) in enumerate(folders.items()):
+            rows = list(draw_folder(label, folder, painter, suffixes))
+            pictures = [row.pop("picture", None) for row in rows]
+            captions = [Path(row["file"]).name for row in rows]
+            marks = [mark_of(row) for row in rows]
+            names = sheets.write_sheets(out, f"sheet-{number}", pictures, captions, marks)
+            for row, name in zip(rows, names, strict=True):
+                record["files"].append({"folder": label, **row, "sheet": name})
+            write_text(out / "index.md", tables.page(record))
+    return record
+
+
+def mark_of(row: dict[str, Any]) -> str:
+    """One letter for a contact sheet: R refused, C crashed, W warned of, B nothing to be seen, or none."""
+    if row["outcome"] != "drawn":
+        return row["outcome"][0].upper()
+    return "B" if not row["covered"] else "W" if row["line"] else ""
+
+
+def folder_of(text: str) -> tuple[str, Path]:
+    """`FOLDER` or `LABEL=FOLDER`."""
+    label, mark, folder = text.rpartition("=")
+    path = Path(folder)
+    if not path.is_dir():
+        raise argparse.ArgumentTypeError(f"there is no folder {folder!r}")
+    return (label if mark else path.name, path)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "folders", nargs="+", type=folder_of, metavar="[LABEL=]FOLDER", help="files, in folders within it too"
+    )
+    parser.add_argument("--page", type=Path, default=Path("real-files"), metavar="FOLDER",
+                        help="where index.md and the contact sheets go (%(default)s)")  # fmt: skip
+    parser.add_argument("--seconds", type=positive, default=60, metavar="S", help="a file may take (%(default)s)")
+    parser.add_argument("--suffix", nargs="+", default=SUFFIXES, metavar=".SUFFIX", help="files that are drawn")
+    parser.add_argument("--up", choices=["y", "z"], default="y", help="the axis that points up (%(default)s)")
+    add_out(parser)
+
+
+def run(arguments: argparse.Namespace, _: Save) -> Record:
+    """Draw."""
+    suffixes = tuple(suffix.lower() for suffix in arguments.suffix)
+    return run_real_files(
+        dict(arguments.folders), arguments.page, seconds=arguments.seconds, suffixes=suffixes, up=arguments.up
+    )
+
+
+STUDY = Study(
+    "real-files", "draw all files of folders, with contact sheets", add_arguments, run, tables.lines, tables.PARTS
+)

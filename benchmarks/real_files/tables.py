@@ -1,0 +1,125 @@
+"""The page of a run, and the tables of the documentation."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+from benchmarks.harness.records import Record
+from benchmarks.report.tables import facts_text, left_table, number, table_text
+
+N_EXAMPLES = 2
+"""Files that a row of a table of lines names."""
+
+Row = dict[str, Any]
+
+
+def folders(record: Record) -> dict[str, list[Row]]:
+    """The rows of each folder."""
+    found: dict[str, list[Row]] = {}
+    for row in record["files"]:
+        found.setdefault(row["folder"], []).append(row)
+    return found
+
+
+def summary(record: Record) -> str:
+    """A row a folder: files, what came of them, and seconds."""
+    rows = []
+    every = folders(record)
+    for label, of_folder in [*every.items(), *([("all", record["files"])] if len(every) > 1 else [])]:
+        drawn = [row for row in of_folder if row["outcome"] == "drawn"]
+        seconds = sorted(row["command_s"] for row in drawn)
+        rows.append([
+            label, f"{len(of_folder):,}", f"{len(drawn):,}", f"{sum(bool(row['line']) for row in drawn):,}",
+            *(f"{sum(row['outcome'] == kind for row in of_folder):,}" for kind in ("refused", "crashed")),
+            f"{sum(not row['covered'] for row in drawn):,}",
+            *([number(median(seconds)), number(seconds[-1])] if seconds else ["", ""]),
+        ])  # fmt: skip
+    return table_text(
+        ["folder", "files", "drawn", "with a warning", "refused", "crashed", "blank", "median s", "longest s"], rows
+    )
+
+
+def lines_of(record: Record, outcome: str) -> str:
+    """A row for each kind of line that a command printed, with how many files and the first of them."""
+    kinds: dict[str, list[str]] = {}
+    for row in record["files"]:
+        if row["outcome"] == outcome:
+            for kind in dict.fromkeys(kinds_of(row["line"], row["file"], outcome)):
+                kinds.setdefault(kind, []).append(Path(row["file"]).name)
+    rows = [
+        [f"`{kind}`", str(len(files)), ", ".join(list(dict.fromkeys(files))[:N_EXAMPLES])]
+        for kind, files in sorted(kinds.items(), key=lambda entry: (-len(entry[1]), entry[0]))
+    ]
+    return left_table(["line", "files", "such as"], rows) if rows else "None."
+
+
+def kinds_of(line: str, file: str, outcome: str) -> Iterator[str]:
+    """The parts of a line, without what differs from file to file."""
+    for part in filter(None, line.split("; ")) if outcome == "drawn" else [line]:
+        text = part.replace(repr(Path(file).name), "FILE").replace("`", "'").replace("|", "/")
+        if outcome == "drawn":
+            yield text.partition(": ")[0] if "extensions not read" not in text else text
+        elif text:
+            yield re.sub(r"\b\d+\b", "N", re.sub(r"^cannot (read|draw) FILE: ", "", text))[:160]
+
+
+def page(record: Record) -> str:
+    """The page of a run: summary, lines, sheets, and every file."""
+    parts = ["# Files, drawn", facts_text(record), summary(record)]
+    for outcome, head in (("crashed", "Crashed"), ("refused", "Refused"), ("drawn", "Warnings")):
+        parts += [f"## {head}", lines_of(record, outcome)]
+    parts.append("R: refused, C: crashed, W: with a warning, B: nothing to be seen.")
+    for label, rows in folders(record).items():
+        parts.append(f"## {label}")
+        parts += [f"![{name}]({name})" for name in dict.fromkeys(row["sheet"] for row in rows)]
+        parts.append(
+            left_table(["file", "outcome", "triangles", "load s", "command s", "line"], [cells(row) for row in rows])
+        )
+    return "\n\n".join(parts) + "\n"
+
+
+def cells(row: Row) -> list[str]:
+    """The cells of a file."""
+    n = row.get("n_triangles", 0)
+    many = f"{n:,}" if n else f"{row['n_points']:,} points" if row.get("n_points") else ""
+    times = [number(row[key]) if key in row else "" for key in ("load_s", "command_s")]
+    return [
+        row["file"].replace("|", "/"),
+        row["outcome"],
+        many,
+        *times,
+        row["line"].replace("|", "/").replace("`", "'"),
+    ]
+
+
+def suffixes(record: Record) -> str:
+    """A row a suffix."""
+    rows = []
+    for suffix, n in Counter(Path(row["file"]).suffix.lower() for row in record["files"]).most_common():
+        of_suffix = [row for row in record["files"] if Path(row["file"]).suffix.lower() == suffix]
+        drawn = [row for row in of_suffix if row["outcome"] == "drawn"]
+        rows.append(
+            [suffix, str(n), str(len(drawn)), str(sum(bool(row["line"]) for row in drawn)), str(n - len(drawn))]
+        )
+    return table_text(["suffix", "files", "drawn", "with a warning", "not drawn"], rows)
+
+
+def lines(record: Record) -> Iterator[str]:
+    """What is printed."""
+    yield summary(record)
+    yield ""
+    yield lines_of(record, "crashed")
+
+
+PARTS = {
+    "folders": summary,
+    "suffixes": suffixes,
+    "refused": lambda record: lines_of(record, "refused"),
+    "warned": lambda record: lines_of(record, "drawn"),
+    "facts": facts_text,
+}
