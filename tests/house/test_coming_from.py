@@ -1,5 +1,6 @@
-"""docs/guide/coming_from.md and tensors.md: every line of topleft runs, and what they say of others is so."""
+"""docs/guide/coming_from.md, tensors.md and words.md: every line of topleft runs, what they say of others is so."""
 
+import functools
 import re
 from pathlib import Path
 
@@ -119,3 +120,38 @@ def test_window_depth_is_half_of_z_over_w_and_a_half(names):
     z_w = frags.interpolate(names["clip"][:, 2:])
     z, w = z_w[frags.mask].T
     np.testing.assert_allclose((2 * frags.depth - 1)[frags.mask], z / w, atol=1e-5)
+
+
+# words.md
+
+
+WORDS = GUIDE / "words.md"
+WORDS_TEXT = WORDS.read_text(encoding="utf-8")
+ROWS = re.findall(r"^\| (.+?) \| (.+?) \| \[[^\]]*\]\((.+?)\) \|$", WORDS_TEXT, re.MULTILINE)
+CALLS = re.compile(r"`(tl|frags|topleft)[.]([\w.]+)")
+OPTIONS = re.compile(r"`(\w+)=")
+
+
+def test_page_of_words_has_its_rows():
+    assert len(ROWS) == len([line for line in WORDS_TEXT.splitlines() if line.startswith("| ")]) - WORDS_TEXT.count(
+        "| your word |"
+    )
+    assert len(ROWS) > 40
+
+
+def test_each_word_stands_in_one_row():
+    words = [word.strip("` ").lower() for row in ROWS for word in row[0].split(", ")]
+    assert sorted(words) == sorted(set(words))
+
+
+@pytest.mark.parametrize("row", ROWS, ids=lambda row: row[0].split(",")[0].strip("`"))
+def test_call_exists_and_its_page_names_it(row):
+    _, here, page = row
+    text = (WORDS.parent / page).read_text(encoding="utf-8")
+    names = []
+    for owner, path in CALLS.findall(here):
+        names.append(path.rpartition(".")[2])
+        if owner != "topleft":
+            functools.reduce(getattr, path.split("."), tl if owner == "tl" else tl.Fragments)
+    names += [f"{option}=" for option in OPTIONS.findall(here)]
+    assert not names or any(name in text for name in names), f"{page} names none of {', '.join(names)}"

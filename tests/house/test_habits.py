@@ -24,6 +24,16 @@ def test_size_in_the_place_of_the_camera_is_told():
             draw(CUBE, (640, 480))
 
 
+def test_camera_in_the_place_of_the_size_is_told():
+    with raises(TypeError, "got Camera; the camera comes before the size"):
+        tl.render(CUBE, SIZE, CAMERA)
+
+
+def test_direction_in_the_place_of_a_light_is_told():
+    with raises(TypeError, "lights must be of Light, got tuple: a direction is Light((0, 1, 0))"):
+        tl.render(CUBE, CAMERA, SIZE, lights=[(0, 1, 0)])
+
+
 def test_size_of_one_number_is_a_square():
     assert tl.render(CUBE, size=8).shape == (8, 8, 4)
     assert tl.coverage([[0, 0], [4, 0], [0, 4]], [[0, 1, 2]], 5).shape == (5, 5)

@@ -103,8 +103,19 @@ def programs():
         if page.stem == "coming_from":
             found |= programs_of_tables(text)
         else:
-            found |= {f"{page.stem.lower()}_{i}": block for i, block in enumerate(BLOCK.findall(text))}
+            found |= {f"{page.stem.lower()}_{i}": one for i, one in enumerate(programs_of_blocks(BLOCK.findall(text)))}
     return found
+
+
+def programs_of_blocks(blocks):
+    """Blocks that import topleft, each with those behind it that go on with its names."""
+    whole = []
+    for block in blocks:
+        if "import topleft" in block or not whole:
+            whole.append(block)
+        else:
+            whole[-1] += block
+    return whole
 
 
 def programs_of_tables(text):

@@ -31,6 +31,12 @@ from topleft.errors import MissingPackageError, TopleftError
 
 __all__ = ["ClusterWorkers", "is_client"]
 
+MESH_KEY = "topleft-mesh"
+"""How the keys of tasks begin that hold a mesh."""
+
+GONE = ("cancelled", "lost", "error")
+"""What has become of the future of a mesh that is no longer there."""
+
 TASK_MS = 200.0
 """What a task should take: about a hundred times what handing it over costs."""
 
@@ -222,7 +228,7 @@ class ClusterWorkers(Workers):
                 held = HeldScene(scene, coarser_levels_of(scene) if with_levels else [])
                 with quiet():
                     future = self._client.submit(
-                        hold_scene, held, key=f"topleft-mesh-{self._token}-{key[0]}-{os.urandom(4).hex()}"
+                        hold_scene, held, key=f"{MESH_KEY}-{self._token}-{key[0]}-{os.urandom(4).hex()}"
                     )
                 kept = self._kept[key] = _Kept(scene, future)
                 idle = [one for one, entry in self._kept.items() if not entry.n_users and one != key]
@@ -235,7 +241,7 @@ class ClusterWorkers(Workers):
     def _forget_cancelled(self) -> None:
         """Forget the meshes that went with the cluster; they are sent again."""
         with self._lock:
-            for key in [key for key, kept in self._kept.items() if kept.future.status in ("cancelled", "lost")]:
+            for key in [key for key, kept in self._kept.items() if kept.future.status in GONE]:
                 del self._kept[key]
 
     def release(self, jobs: Jobs) -> None:
@@ -261,7 +267,10 @@ def came_of(task: Any) -> tuple[list[Outcome] | None, BaseException | None]:
         if task.status == "finished":
             return task.result(), None
         if task.status == "error":
-            return None, told(task.exception())
+            error = task.exception()
+            # workers died while a mesh was made again there, for whatever jobs
+            is_of_mesh = type(error).__name__ == "KilledWorker" and str(error.task).startswith(MESH_KEY)
+            return None, None if is_of_mesh else told(error)
     except BaseException as error:
         if "Cancelled" not in type(error).__name__:
             return None, error

@@ -20,7 +20,7 @@ from topleft._field.grid import Grid
 from topleft._polygons.draw import add_shares, draw_labels, draw_mask
 from topleft._polygons.prepared import Frame, Prepared, prepare
 from topleft._polygons.rings import RingSet, as_rings
-from topleft._raster.rasterize import canvas_of
+from topleft._raster.rasterize import canvas_of, open_canvas
 from topleft._raster.sampling import SAMPLE_GRID_BITS, sample_positions
 from topleft.typing import RuleOption, SamplingOption
 
@@ -146,9 +146,11 @@ def polygons(
             raise ValueError("background needs values: a mask is False where no polygon is")
         prepared = prepare(SCRATCH, found, frame, is_nonzero=is_nonzero)
         if how in (Sampling.CENTER, Sampling.OUTER, Sampling.INNER):
-            with canvas_of(FRESH, "mask", out, shape, np.bool_) as (result, canvas):
-                if canvas.size:
-                    draw_binary(prepared, canvas.view(np.uint8), how, is_nonzero=is_nonzero, assume_valid=assume_valid)
+            result, canvas = open_canvas(FRESH, "mask", out, shape, np.bool_)  # without a context: that is 2 us of 40
+            if canvas.size:
+                draw_binary(prepared, canvas.view(np.uint8), how, is_nonzero=is_nonzero, assume_valid=assume_valid)
+            if canvas is not result:
+                result[...] = canvas
             return result
         with canvas_of(FRESH, "share", out, shape, np.float32) as (result, canvas):
             if not canvas.size:

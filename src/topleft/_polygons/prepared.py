@@ -94,7 +94,8 @@ def prepare(memory: Memory, rings: RingSet, frame: Frame, *, is_nonzero: bool) -
 
     n_threads = threads_for(frame, n)
     if n:
-        bad, n_wide = (sum(counts) for counts in zip(*run_parts(snap, n, n_threads), strict=True))
+        counts = run_parts(snap, n, n_threads)
+        bad, n_wide = counts[0] if len(counts) == 1 else (sum(column) for column in zip(*counts, strict=True))
         if bad:
             raise bad_point(rings, x[:n], frame)
         if n_wide:

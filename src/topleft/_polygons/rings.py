@@ -33,6 +33,12 @@ class RingSet:
 
     def apart_from(self, out: object) -> RingSet:
         """Return it with copies of what `out` may share memory with."""
+        overlap = np.may_share_memory
+        if out is None or (
+            isinstance(out, np.ndarray)
+            and not (overlap(self.points, out) or overlap(self.rings, out) or overlap(self.polygons, out))
+        ):
+            return self
         points, rings, polygons = (
             np.asarray(apart_from(out, "rings", each)) for each in (self.points, self.rings, self.polygons)
         )
@@ -53,8 +59,9 @@ def as_rings(values: Any) -> RingSet:
         return values
     values = _without_tensors(values)
     found = _from_offsets(values)
-    if found is None:
-        found = _from_shapely(values)
+    if found is not None:
+        return _bounded(found)
+    found = _from_shapely(values)
     if found is None:
         listed = [_rings_of_geometry(g) for g in _geometries(values)] if _is_geometry(values) else _nested(values)
         found = _join(listed)
@@ -112,7 +119,7 @@ def _from_offsets(values: Any) -> RingSet | None:
         return None
     if len(values) == 3 and isinstance(values[2], tuple) and not isinstance(values[0], (list, np.ndarray)):
         return _from_ragged(np.asarray(values[1]), values[2])
-    if np.ndim(values[0]) != 2 or any(np.ndim(offsets) != 1 for offsets in values[1:]):
+    if np.ndim(values[0]) != 2 or np.ndim(values[1]) != 1 or np.ndim(values[-1]) != 1:
         return None
     points = as_points(values[0], "coordinates")
     rings = _as_offsets(values[1], "ring_offsets", len(points), "coordinates")
@@ -128,8 +135,12 @@ def _as_offsets(values: Any, name: str, n: int, of: str) -> I64:
     if offsets.ndim != 1 or len(offsets) < 1:
         raise ValueError(f"{name} must have shape (n + 1,), got {offsets.shape}")
     offsets = np.ascontiguousarray(offsets, np.int64)
-    if offsets[0] != 0 or offsets[-1] != n or np.minimum.reduce(offsets[1:] - offsets[:-1], initial=0) < 0:
+    steps = offsets[1:] - offsets[:-1]
+    least = np.minimum.reduce(steps, initial=3)
+    if offsets[0] != 0 or offsets[-1] != n or least < 0:
         raise ValueError(f"{name} must rise from 0 to the number of {of}, {n}; got {_short(offsets)}")
+    if least < 3 and name == "ring_offsets":
+        raise _too_few(steps)
     return offsets
 
 
@@ -278,8 +289,17 @@ def _checked(found: RingSet) -> RingSet:
     """Return rings of at least three points each."""
     lengths = found.rings[1:] - found.rings[:-1]
     if np.minimum.reduce(lengths, initial=3) < 3:
-        k = int(np.argmax(lengths < 3))
-        raise ValueError(f"rings must have at least 3 points, ring {k} has {lengths[k]}")
+        raise _too_few(lengths)
+    return _bounded(found)
+
+
+def _too_few(lengths: I64) -> ValueError:
+    k = int(np.argmax(lengths < 3))
+    return ValueError(f"rings must have at least 3 points, ring {k} has {lengths[k]}")
+
+
+def _bounded(found: RingSet) -> RingSet:
+    """Return as many points and rings as kernels can number."""
     if max(len(found.points), len(found.rings)) > 2**31 - 1:
         raise ValueError(f"rings must have at most {2**31 - 1} points, got {len(found.points)}")
     return found

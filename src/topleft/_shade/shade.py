@@ -301,7 +301,7 @@ def shade_normals(frags: Fragments, mesh: Mesh, camera: Camera, turn: F64, *, th
 def _check_types(lights: Sequence[Light], material: object, matcap: object, fog: object, environment: object) -> None:
     for light in lights:
         if not isinstance(light, Light):
-            raise TypeError(f"lights must be of Light, got {type(light).__name__}")
+            raise TypeError(f"lights must be of Light, got {type(light).__name__}: a direction is Light((0, 1, 0))")
     kinds = (
         ("material", material, Material), ("matcap", matcap, Texture), ("fog", fog, Fog),
         ("environment", environment, Environment),

@@ -103,7 +103,7 @@ def dask_array_of(raster: Tiles) -> Any:
     chunks = (rows or (0,), columns or (0,), *((n,) for n in raster.painter.channels))
     if not graph:
         return da.zeros(raster.shape, dtype=raster.dtype)
-    return da.Array(graph, name, chunks, meta=np.empty((0,) * len(raster.shape), raster.dtype))  # type: ignore[no-untyped-call]
+    return da.Array(graph, name, chunks, meta=np.empty((0,) * len(raster.shape), raster.dtype))
 
 
 def data_array_of(raster: Tiles) -> Any:

@@ -84,7 +84,7 @@ class _SortedRow:
         crossing = self.long[(self.long[:, 1] < column) & (column < self.long[:, 2]), 0]
         if not len(crossing):
             return own
-        return np.sort(np.concatenate([own, crossing])) if len(own) else crossing
+        return np.insert(own, np.searchsorted(own, crossing), crossing)  # both ascend
 
 
 class WindowIndex:

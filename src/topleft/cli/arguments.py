@@ -111,6 +111,7 @@ def add_render_arguments(parser: Parser) -> None:
     many = parser.add_argument_group("many pictures")
     add = many.add_argument
     add("--jobs", type=positive, default=1, metavar="N", help="pictures that are drawn side by side (default 1)")
+    add("--dask", metavar="local|ADDRESS", help="draw on a Dask cluster: tcp://HOST:PORT, or --jobs processes here")
     add("--jobs-file", metavar="FILE", help="what to render, as TOML or JSON; see below")
     add("--resume", action="store_true", help="leave out pictures whose files are there")
     add("--strict", action="store_true", help="exit with 1 if a mesh lacks something of its file: a texture, say")

@@ -15,10 +15,12 @@ import warnings
 from collections.abc import Sequence
 from concurrent.futures import Executor
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from topleft._batch.batch import Result, render_batch
+from topleft._batch.jobs import Job
 from topleft._io.images import PICTURE_SUFFIXES, save_image
 from topleft.cli.animation import check_animation, save_animation
 from topleft.cli.arguments import UsageError
@@ -35,6 +37,9 @@ FAILED = 1
 MOST_VIEWS_TOGETHER = 16
 """Views of a mesh that a process draws before it gives word: it reads the mesh once for them."""
 
+
+CONNECT_S = 20
+"""How long a scheduler has to answer."""
 
 MOST_LACKS = 8
 """What meshes lack that one line tells."""
@@ -95,6 +100,8 @@ def _plan(options: argparse.Namespace, stack: ExitStack) -> list[MeshJobs]:
 def _render(groups: Sequence[MeshJobs], options: argparse.Namespace) -> tuple[list[tuple[str, str]], list[str]]:
     """Render all; the sources of what failed, each with the reason, once, and what meshes lack of their files."""
     jobs = [job for group in groups for job in group.jobs]
+    if options.dask is not None:
+        jobs = [_elsewhere(job) for job in jobs]
     source_of = [group.source for group in groups for _ in group.jobs]
     failed: dict[tuple[str, str], None] = {}
     lacks: dict[str, None] = {}
@@ -102,12 +109,12 @@ def _render(groups: Sequence[MeshJobs], options: argparse.Namespace) -> tuple[li
         stack.enter_context(warnings.catch_warnings())
         warnings.simplefilter("ignore", MeshWarning)  # results have them
         bar = stack.enter_context(_Progress(len(jobs)))
-        executor = _executor(groups, options.jobs, stack)
+        executor = _executor(groups, options.jobs, stack) if options.dask is None else _client(options, stack)
         chunk = min(MOST_VIEWS_TOGETHER, max(len(group.jobs) for group in groups))
         results = stack.enter_context(
             render_batch(
                 jobs, executor=executor, progress=bar.step, on_error="collect", order="completed",
-                resume=options.resume, chunk=1 if isinstance(executor, int) else chunk,
+                resume=options.resume, chunk=None if options.dask else 1 if isinstance(executor, int) else chunk,
             )
         )  # fmt: skip
         for result in results:
@@ -131,6 +138,36 @@ def _executor(groups: Sequence[MeshJobs], n: int, stack: ExitStack) -> Executor 
     pool = ProcessPoolExecutor(min(n, len(groups)), initializer=_depend_on_parent)
     stack.callback(pool.shutdown, cancel_futures=True)
     return pool
+
+
+def _elsewhere(job: Job) -> Job:
+    """A job with the whole names of its files: workers may run in other folders."""
+    scene, path = job.scene, job.destination
+    if isinstance(scene, str | os.PathLike):
+        scene = Path(scene).absolute()
+    return replace(job, scene=scene, destination=None if path is None else Path(path).absolute())
+
+
+def _client(options: argparse.Namespace, stack: ExitStack) -> Any:
+    """A client of the Dask cluster that is asked for, or of one of this machine that ends with the command."""
+    try:
+        import dask
+        from distributed import Client, LocalCluster
+    except ImportError:
+        raise MissingPackageError("--dask needs the package distributed: pip install 'topleft[dask]'") from None
+    if options.dask == "local":
+        stack.enter_context(dask.config.set({"distributed.comm.timeouts.connect": "30s"}))
+        cluster = LocalCluster(
+            n_workers=options.jobs, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=40
+        )  # fmt: skip
+        stack.enter_context(cluster)
+        return stack.enter_context(Client(cluster, set_as_default=False))
+    if "://" not in options.dask:
+        raise UsageError(f"--dask {options.dask}: must be local, or the address of a scheduler, tcp://HOST:PORT")
+    try:
+        return stack.enter_context(Client(options.dask, timeout=CONNECT_S, set_as_default=False))
+    except OSError as error:
+        raise UsageError(f"--dask {options.dask}: no scheduler answers there ({one_line(error)})") from None
 
 
 def _depend_on_parent() -> None:

@@ -1,0 +1,289 @@
+"""Batches and rasters on a Dask cluster of processes: the same pictures, whatever dies."""
+
+import functools
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from batch_jobs import BOX, SIZE, orbit, pictures, views
+from PIL import Image
+
+import topleft as tl
+from topleft.cli import main
+
+distributed = pytest.importorskip("distributed", reason="the dask extra is not installed")
+
+from cluster_jobs import hang, kill_always, kill_once, wait_a_little  # noqa: E402
+
+SRC = str(Path(__file__).resolve().parents[2] / "src")
+SUPPORT = str(Path(__file__).resolve().parents[1] / "support")
+
+
+@pytest.fixture(scope="module")
+def cluster():
+    """Two processes of one thread each, which find the package and the functions of these tests."""
+    before = os.environ.get("PYTHONPATH")
+    os.environ["PYTHONPATH"] = os.pathsep.join([SRC, SUPPORT, *([before] if before else [])])
+    settings = {
+        "distributed.scheduler.allowed-failures": 1,
+        "distributed.comm.timeouts.connect": "20s",
+        "distributed.admin.log-format": "",
+    }
+    import dask
+
+    with dask.config.set(settings):
+        made = distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
+        )  # fmt: skip
+        yield made
+        made.close()
+    os.environ.pop("PYTHONPATH") if before is None else os.environ.update(PYTHONPATH=before)
+
+
+@pytest.fixture
+def client(cluster):
+    with distributed.Client(cluster, set_as_default=False) as made:
+        try:
+            made.wait_for_workers(2, timeout=10)
+        except TimeoutError:  # a nanny that did not start again what an earlier test has killed
+            made.restart(timeout=40)
+        yield made
+
+
+@pytest.fixture(autouse=True)
+def in_time():
+    """A cluster whose workers do not come back fails a test and does not hold the rest up."""
+
+    def end(signum, frame):
+        raise TimeoutError("the cluster took longer than 60 s")
+
+    before = signal.signal(signal.SIGALRM, end)
+    signal.alarm(60)
+    yield
+    signal.alarm(0)
+    signal.signal(signal.SIGALRM, before)
+
+
+def pids(client):
+    return client.run(os.getpid)
+
+
+def test_pictures_are_those_of_one_thread(client):
+    found = [result.picture for result in tl.render_batch(views(7), executor=client)]
+    assert all(map(np.array_equal, found, pictures(7)))
+
+
+def test_layers_and_files_are_those_of_one_thread(client, tmp_path):
+    jobs = [tl.Job(BOX, camera, SIZE, destination=tmp_path / f"{i}.npz", layers=("depth", "triangle"))
+            for i, camera in enumerate(orbit(BOX, 3))]  # fmt: skip
+    assert tl.render_batch(jobs, executor=client).finish().n_made == 3
+    for i, camera in enumerate(orbit(BOX, 3)):
+        wished = tl.render_layers(BOX, camera, SIZE, layers=("depth", "triangle"))
+        with np.load(tmp_path / f"{i}.npz") as found:
+            assert np.array_equal(found["depth"], wished["depth"], equal_nan=True)
+            assert np.array_equal(found["triangle"], wished["triangle"])
+    again = tl.render_batch(jobs, executor=client, resume=True).finish()
+    assert (again.n_made, again.n_skipped) == (0, 3)
+
+
+def test_wrong_jobs_are_told_and_the_rest_goes_on(client):
+    jobs = [*views(2), tl.Job(BOX, None, (0, -1)), *views(2)]
+    summary = tl.render_batch(jobs, executor=client, on_error="collect", chunk=5).finish()
+    assert (summary.n_made, [result.index for result in summary.failed]) == (4, [2])
+    with pytest.raises(ValueError, match="size must be"):
+        tl.render_batch(jobs, executor=client).finish()
+
+
+def test_worker_that_dies_loses_nothing(client, tmp_path):
+    flag = tmp_path / "flag"
+    camera = functools.partial(kill_once, str(flag))
+    jobs = [tl.Job(BOX, camera if i == 3 else orbit(BOX, 8)[i], SIZE) for i in range(8)]
+    results = list(tl.render_batch(jobs, executor=client, chunk=2, on_error="collect"))
+    assert [result.error for result in results] == [None] * 8
+    assert flag.exists()
+    for i in (0, 1, 2, 4, 5, 6, 7):
+        assert np.array_equal(results[i].picture, tl.render(BOX, orbit(BOX, 8)[i], SIZE))
+
+
+def test_job_that_kills_workers_is_told_alone(client):
+    jobs = [tl.Job(BOX, kill_always if i == 2 else camera, SIZE) for i, camera in enumerate(orbit(BOX, 6))]
+    results = list(tl.render_batch(jobs, executor=client, chunk=3, on_error="collect"))
+    assert [type(result.error).__name__ for result in results] == ["NoneType"] * 2 + ["KilledWorker"] + ["NoneType"] * 3
+
+
+def test_job_that_hangs_is_given_up(client):
+    jobs = [tl.Job(BOX, hang if i == 1 else camera, SIZE) for i, camera in enumerate(orbit(BOX, 4))]
+    results = list(tl.render_batch(jobs, executor=client, on_error="collect", time_limit=1.0, chunk=2))
+    assert [type(result.error).__name__ for result in results] == ["NoneType", "TimeoutError", "NoneType", "NoneType"]
+    assert str(results[1].error) == "job 1 took longer than its time limit of 1 s"
+
+
+def test_restart_of_the_cluster_loses_nothing(client):
+    jobs = [tl.Job(BOX, wait_a_little, SIZE, {"shading": "ids"}) for _ in range(40)]
+    batch = tl.render_batch(jobs, executor=client, chunk=1)
+    found = [next(batch).picture]
+    threading.Thread(target=client.restart, kwargs={"timeout": 60}).start()
+    found += [result.picture for result in batch]
+    wished = tl.render(BOX, None, SIZE, shading="ids")
+    assert len(found) == 40
+    assert all(np.array_equal(one, wished) for one in found)
+
+
+def test_batch_that_is_left_early_goes_on_with_resume(client, tmp_path):
+    jobs = [tl.Job(BOX, wait_a_little, SIZE, destination=tmp_path / f"{i}.png") for i in range(12)]
+    with tl.render_batch(jobs, executor=client, chunk=1) as batch:
+        for _ in range(4):
+            next(batch)
+    there = len(list(tmp_path.glob("*.png")))
+    assert 4 <= there < 12
+    summary = tl.render_batch(jobs, executor=client, resume=True).finish()
+    assert summary.n_skipped >= there  # what a worker had begun it has finished
+    assert summary.n_skipped + summary.n_made == 12
+
+
+def test_no_more_is_on_the_way_than_the_window(client):
+    begun = []
+
+    def jobs():
+        for i, camera in enumerate(orbit(BOX, 60)):
+            begun.append(i)
+            yield tl.Job(BOX, camera, SIZE)
+
+    most = 0
+    for result in tl.render_batch(jobs(), executor=client, chunk=2, window=3):
+        most = max(most, len(begun) - result.index)
+    assert most <= 2 * 3 + 2
+
+
+def test_mesh_is_sent_once_a_worker(client, tmp_path):
+    vertices, triangles = tl.scenes.shape("icosphere", subdivisions=4)
+    mesh = tl.Mesh(vertices, triangles)
+    before = client.run(n_bytes_received)
+    assert tl.render_batch(views(30, mesh), executor=client, chunk=1).finish().n_made == 30
+    assert set(before) == set(client.run(n_bytes_received))
+    held = client.run(lambda dask_worker: [key for key in dask_worker.data if "topleft-mesh" in str(key)])
+    assert sum(map(len, held.values())) <= 2
+
+
+def n_bytes_received(dask_worker):
+    return dask_worker.digests is not None
+
+
+def test_raster_is_that_of_one_process(client):
+    rng = np.random.default_rng(1)
+    mesh = rng.uniform(0, 200, (80, 3)), rng.integers(0, 80, (90, 3))
+    raster = tl.tiles(mesh, 200, window=64)
+    array = raster.to_dask()
+    assert array.chunks == ((64, 64, 64, 8), (64, 64, 64, 8))
+    assert np.array_equal(client.compute(array, sync=True), raster[:])
+    assert np.array_equal(client.compute(array[70:130, 5:9], sync=True), raster[70:130, 5:9])
+
+
+def test_raster_with_a_worker_killed_is_right(client):
+    rng = np.random.default_rng(2)
+    mesh = rng.uniform(0, 4000, (300, 3)), rng.integers(0, 300, (300, 3))
+    raster = tl.tiles(mesh, 4000, window=500, kind="overdraw", sampling="area")
+    future = client.compute(raster.to_dask())
+    time.sleep(0.1)
+    os.kill(next(iter(pids(client).values())), signal.SIGKILL)
+    assert np.array_equal(future.result(timeout=120), raster[:])
+
+
+def test_raster_in_files_sends_names_alone(client, tmp_path):
+    rng = np.random.default_rng(3)
+    points, triangles = rng.uniform(0, 300, (1000, 3)), rng.integers(0, 1000, (2000, 3))
+    np.save(tmp_path / "v.npy", points)
+    np.save(tmp_path / "t.npy", triangles)
+    raster = tl.tiles((tmp_path / "v.npy", tmp_path / "t.npy"), 300, window=100)
+    assert raster.is_mapped
+    assert np.array_equal(client.compute(raster.to_dask(), sync=True), raster[:])
+
+
+def test_shares_of_a_mesh_are_merged_in_a_tree(client):
+    vertices, triangles, _ = tl.scenes.random_triangles(2000, 60, 320, 240)
+    parts = [client.submit(draw_share, vertices, triangles, first, pure=False) for first in range(0, 2000, 500)]
+    while len(parts) > 1:
+        parts = [client.submit(tl.merge, parts[i : i + 2], pure=False) for i in range(0, len(parts), 2)]
+    ids, depth = parts[0].result()
+    whole = tl.rasterize(vertices, triangles, (320, 240))
+    assert np.array_equal(ids, whole.triangle)
+    assert np.array_equal(depth, whole.depth)
+
+
+def draw_share(vertices, triangles, first):
+    frags = tl.rasterize(vertices, triangles[first : first + 500], (320, 240))
+    return np.where(frags.triangle < 0, -1, frags.triangle + first).astype(np.int32), frags.depth
+
+
+def test_worker_without_the_package_is_told_in_one_line(tmp_path):
+    """A cluster of a Python that finds Dask and not topleft."""
+    script = tmp_path / "cluster.py"
+    script.write_text(
+        "import os, sys\n"
+        f"sys.path.insert(0, {SRC!r})\n"
+        "def main():\n"
+        "    import topleft as tl\n"
+        "    from distributed import Client, LocalCluster\n"
+        "    os.environ.pop('PYTHONPATH', None)\n"
+        "    with LocalCluster(n_workers=1, threads_per_worker=1, processes=True, dashboard_address=None,\n"
+        "                      silence_logs=50, preload=[os.path.abspath(sys.argv[1])]) as a, Client(a) as client:\n"
+        "        try:\n"
+        "            tl.render_batch([(tl.Mesh(*tl.scenes.shape('cube')),)],\n"
+        "                            executor=client).finish()\n"
+        "        except tl.MissingPackageError as error:\n"
+        "            print('said:', error)\n"
+        "if __name__ == '__main__':\n"
+        "    main()\n"
+    )
+    (tmp_path / ("hide" + ".py")).write_text(
+        "import sys\n"
+        "class Without:\n"
+        "    def __init__(self, finder):\n"
+        "        self.finder = finder\n"
+        "    def find_spec(self, name, *rest):\n"
+        "        return None if name.partition('.')[0] == 'topleft' else self.finder.find_spec(name, *rest)\n"
+        "sys.modules.pop('topleft', None)\n"
+        "sys.meta_path[:] = [Without(finder) for finder in sys.meta_path]\n"
+    )
+    done = subprocess.run(
+        [sys.executable, str(script), "hide" + ".py"],
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+        timeout=120,
+        check=False,
+    )
+    lines = [line for line in done.stdout.splitlines() if line.startswith("said:")]
+    assert len(lines) == 1, done.stderr
+    assert "has no topleft: install it there" in lines[0]
+
+
+@pytest.mark.parametrize("limit", [0, -1.0, float("nan")])
+def test_wrong_time_limits_are_told(client, limit):
+    with pytest.raises(ValueError, match="time_limit must be positive"):
+        tl.render_batch([], executor=client, time_limit=limit)
+    with pytest.raises(ValueError, match=r"time_limit is for a dask\.distributed\.Client"):
+        tl.render_batch([], executor=2, time_limit=1.0)
+
+
+def test_command_draws_on_a_cluster(tmp_path, cluster, capsys):
+    save = tmp_path / "box.obj"
+    rows = [f"v {x} {y} {z}" for x, y, z in BOX.vertices.tolist()]
+    save.write_text("\n".join([*rows, *(f"f {a} {b} {c}" for a, b, c in (BOX.triangles + 1).tolist())]))
+    how = ["--size", "40x30", "--views", "5"]
+    assert main(["render", str(save), "-o", str(tmp_path / "one/{index}-{view}.png"), *how]) == 0
+    address = cluster.scheduler_address
+    assert main(["render", str(save), "-o", str(tmp_path / "many/{index}-{view}.png"), *how, "--dask", address]) == 0
+    names = sorted(path.name for path in (tmp_path / "one").iterdir())
+    assert len(names) == 5
+    for name in names:
+        one, many = (np.asarray(Image.open(tmp_path / folder / name)) for folder in ("one", "many"))
+        assert np.array_equal(one, many)
+    assert main(["render", str(save), "-o", str(tmp_path / "a.png"), "--dask", "here"]) == 2
+    assert "--dask here: must be local, or the address of a scheduler" in capsys.readouterr().err
