@@ -65,8 +65,8 @@ typedef struct tl_kernels {
      * rounded to 2^-bits px, and what leaves 2^62 of these cannot be drawn. */
     int64_t (*take_points)(const tl_source *source, int64_t first, int64_t end, int bits, double *points);
 
-    /* The clip space, or object space by the matrix, of vertices [first, end) to points (x, y, z) in pixels, not snapped.
-     * One that cannot be drawn has x NaN, and y says why: a tl_special. */
+    /* The clip space, or object space by the matrix, of vertices [first, end) to points (x, y, z) in pixels, not
+     * snapped.  One that cannot be drawn has x NaN, and y says why: a tl_special. */
     tl_vertex_counts (*project_points)(const tl_source *source, int64_t first, int64_t end, const tl_view *view,
                                        double *points);
 
@@ -80,8 +80,8 @@ typedef struct tl_kernels {
                         const tl_window *window, const int32_t *ids, const float *values, int n_values, int per_corner,
                         float background, float *out);
 
-    /* As `draw`, with vertices that are not snapped: of the mesh only triangles, cull and names are read.  Sinks MASK to
-     * FARTHEST, method AUTO.  A bad row may also be that of a vertex that is not finite. */
+    /* As `draw`, with vertices that are not snapped: of the mesh only triangles, cull and names are read.  Sinks MASK
+     * to FARTHEST, method AUTO.  A bad row may also be that of a vertex that is not finite. */
     int64_t (*draw_exact)(const tl_snapped *snapped, const tl_exact_points *points, const tl_window *window,
                           const tl_target *target, const tl_share *share, tl_exact_counts *counts);
 

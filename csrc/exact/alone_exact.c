@@ -2,8 +2,8 @@
  * In: points in pixels.  Out: spans of samples to the sink.
  *
  * As rows_exact.c, with u = 2^-53: setup and rows err by at most 9 u XY, so M = 12 u XY, and a quotient by 2.01 u of
- * itself, 3 u for each column of the box.  What is not finite, or may have lost bits below 1e-250, is asked.  Extents of
- * any size may come: a box is the samples of the window, and the first of them lies in the extent. */
+ * itself, 3 u for each column of the box.  What is not finite is asked.  Extents of any size may come: a box is the
+ * samples of the window, and the first of them lies in the extent. */
 #ifndef TL_ALONE_EXACT_C
 #define TL_ALONE_EXACT_C
 
@@ -119,8 +119,8 @@ static int setup_on_grid(lone_triangle *t)
     return 1;
 }
 
-/* The columns [*first, *end) of a row; returns whether it is in doubt.  0x1.8p52 makes the nearest integer: floor() is a
- * call where there are no lanes. */
+/* The columns [*first, *end) of a row; returns whether it is in doubt.  0x1.8p52 makes the nearest integer: floor() is
+ * a call where there are no lanes. */
 TL_INLINE unsigned find_lone_end(const lone_triangle *t, int64_t row, int32_t *first, int32_t *end)
 {
     const asked_triangle *e = &t->edges;

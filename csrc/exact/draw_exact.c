@@ -1,9 +1,9 @@
 /* Draw: every triangle of a mesh whose vertices are not snapped, to the code for its size.
  * In: points in pixels and triangles.  Out: the target's buffers.
  *
- * A sample belongs to a triangle by the sign of the exact edge functions of the float64 numbers that stand in the array,
- * with the top-left rule where one is 0.  Boxes are exact: the samples in the extent, of which centre - x is exact from
- * column 0 on; left of it a rounded one may be one too low, and is compared. */
+ * A sample belongs to a triangle by the sign of the exact edge functions of the float64 numbers that stand in the
+ * array, with the top-left rule where one is 0.  Boxes are exact: the samples in the extent, of which centre - x is
+ * exact from column 0 on; left of it a rounded one may be one too low, and is compared. */
 #ifndef TL_DRAW_EXACT_C
 #define TL_DRAW_EXACT_C
 

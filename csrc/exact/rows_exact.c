@@ -1,9 +1,9 @@
 /* Rows: triangles with boxes of 5 to 62 samples a side, by the ends of rows in float32.
  * In: queues of setup_exact.c.  Out: rows of samples to the sink.
  *
- * An edge ends a row at floor(q), q = v / |dy|, v the edge function at the row's first sample: samples up to floor(q) lie
- * inside a right edge, samples from -floor(q) on inside a left one.  Where q is nearer to an integer than the band says
- * (setup_exact.c), that one column is in doubt, and the exact sign decides. */
+ * An edge ends a row at floor(q), q = v / |dy|, v the edge function at the row's first sample: samples up to floor(q)
+ * lie inside a right edge, samples from -floor(q) on inside a left one.  Where q is nearer to an integer than the band
+ * says (setup_exact.c), that one column is in doubt, and the exact sign decides. */
 #ifndef TL_ROWS_EXACT_C
 #define TL_ROWS_EXACT_C
 

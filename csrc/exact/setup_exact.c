@@ -17,8 +17,8 @@
  *    Farther out both ends of the comparison are clamped to the box.
  * 4. A band above 1/2, of a nearly level edge, asks every row: |q - nearest integer| <= 1/2.  A level edge is never
  *    asked: the box, which is exact, says what it says.  A difference that only float32 takes for 0 is set to 1e-30.
- * 5. Vertices on 2^-8 px: the same numbers as integers of 2^-8 px, as batch.c and rows.c have them, which are exact: the
- *    band is 0.  Ties are systematic on grids, so lanes that ask are looked at.
+ * 5. Vertices on 2^-8 px: the same numbers as integers of 2^-8 px, as batch.c and rows.c have them, which are exact:
+ *    the band is 0.  Ties are systematic on grids, so lanes that ask are looked at.
  *
  * tests/raster/test_exact.py draws with bands four times narrower, which give wrong pictures. */
 #ifndef TL_SETUP_EXACT_C
@@ -206,8 +206,8 @@ static __attribute__((noinline)) vm try_grid(exact_state *s, lane_exact *t)
     return good;
 }
 
-/* Whether points lie inside edge k of TL_LANES triangles, or outside, beyond the error of float64 (Shewchuk's bound A); in
- * neither where the exact sign is to be asked. */
+/* Whether points lie inside edge k of TL_LANES triangles, or outside, beyond the error of float64 (Shewchuk's bound A);
+ * in neither where the exact sign is to be asked. */
 typedef struct {
     vm inside, outside;
 } lane_sides_of_edge;

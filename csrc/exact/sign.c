@@ -27,7 +27,8 @@ typedef struct {
     int exponent;
 } scaled_number;
 
-/* a + b = sum + error, exactly (D. E. Knuth); a * b = product + error, exactly while neither overflows or underflows. */
+/* a + b = sum + error, exactly (D. E. Knuth); a * b = product + error, exactly while neither overflows or
+ * underflows. */
 TL_INLINE void two_sum(double a, double b, double *sum, double *error)
 {
     *sum = a + b;
@@ -261,8 +262,8 @@ TL_INLINE int edge_sign(exact_point a, exact_point b, exact_point p, tl_exact_co
 }
 
 /* Whether a point lies on the inner side of an edge of a triangle with positive area, or on the edge where it is a top
- * or a left one.  Two triangles that share the edge ask the same number with opposite signs, and one of them owns a tie:
- * nothing is left open and nothing is covered twice. */
+ * or a left one.  Two triangles that share the edge ask the same number with opposite signs, and one of them owns a
+ * tie: nothing is left open and nothing is covered twice. */
 TL_INLINE int is_inside_edge(exact_point a, exact_point b, exact_point p, tl_exact_counts *counts)
 {
     const int sign = edge_sign(a, b, p, counts);
