@@ -26,6 +26,10 @@
 #include "lines/lines.c"
 #include "blend/blend.c"
 #include "shade/shade.c"
+#include "exact/take_points.c"
+#include "exact/project_exact.c"
+#include "exact/draw_exact.c"
+#include "exact/weights_exact.c"
 #include "shade/shade_samples.c"
 #include "shade/alpha_test.c"
 #include "mesh/creases.c"
@@ -55,6 +59,11 @@ const tl_kernels TL_KERNELS = {
     .first_bad_row = first_bad_row,
     .narrow_triangles = narrow_triangles,
     .draw = draw,
+    .draw_exact = draw_exact,
+    .project_points = project_points,
+    .clip_points = clip_points,
+    .weigh_exact = weigh_exact,
+    .take_points = take_points,
     .count_classes = count_classes,
     .set_flat_depth = set_flat_depth,
     .bin = bin,

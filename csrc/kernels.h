@@ -60,6 +60,31 @@ typedef struct tl_kernels {
      * 0. */
     int64_t (*draw)(const tl_snapped *snapped, const tl_window *window, const tl_target *target, tl_share *share);
 
+    /* The numbers of vertices [first, end) as float64 in `points`, or NULL: they stay where they are.  Returns how many
+     * cannot be drawn: what is not finite, integers beyond 2^53, a depth outside float32.  With bits >= 0 they are
+     * rounded to 2^-bits px, and what leaves 2^62 of these cannot be drawn. */
+    int64_t (*take_points)(const tl_source *source, int64_t first, int64_t end, int bits, double *points);
+
+    /* The clip space, or object space by the matrix, of vertices [first, end) to points (x, y, z) in pixels, not
+     * snapped.  One that cannot be drawn has x NaN, and y says why: a tl_special. */
+    tl_vertex_counts (*project_points)(const tl_source *source, int64_t first, int64_t end, const tl_view *view,
+                                       double *points);
+
+    /* Cuts the triangles that have such a vertex; with pieces->points NULL only counts. */
+    void (*clip_points)(const tl_source *source, const double *points, const int32_t *triangles, int64_t n_triangles,
+                        const tl_view *view, tl_exact_pieces *pieces);
+
+    /* `barycentric` and `interpolate` of what draw_exact has drawn: weights where values are NULL.  Of the scene
+     * triangles and 1/w are read; pieces may be NULL. */
+    void (*weigh_exact)(const tl_snapped *mesh, const tl_exact_points *points, const tl_exact_pieces *pieces,
+                        const tl_window *window, const int32_t *ids, const float *values, int n_values, int per_corner,
+                        float background, float *out);
+
+    /* As `draw`, with vertices that are not snapped: of the mesh only triangles, cull and names are read.  Sinks MASK
+     * to FARTHEST, method AUTO.  A bad row may also be that of a vertex that is not finite. */
+    int64_t (*draw_exact)(const tl_snapped *snapped, const tl_exact_points *points, const tl_window *window,
+                          const tl_target *target, const tl_share *share, tl_exact_counts *counts);
+
     /* Counts the triangles of a mesh by the code that `draw` has for them, with the sink of the census; the target's
      * samples are read when that is SAMPLES.  Returns as `draw` does. */
     int64_t (*count_classes)(const tl_snapped *snapped, const tl_window *window, const tl_target *target,

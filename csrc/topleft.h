@@ -118,8 +118,9 @@ static inline int tl_is_given_up(const tl_window *window)
     return window->pause && window->pause->left_px < 0 && window->pause->ask(window->pause);
 }
 
-/* What setup and cull of a triangle take. */
+/* What setup and cull of a triangle take, and to shade a pixel. */
 #define TL_SETUP_PX 32
+#define TL_SHADE_PX 32
 
 typedef enum { TL_CULL_NONE = 0, TL_CULL_BACK = 1, TL_CULL_FRONT = 2 } tl_cull;
 typedef enum { TL_METHOD_AUTO = 0, TL_METHOD_EDGE = 1, TL_METHOD_SCANLINE = 2 } tl_method;
@@ -411,6 +412,7 @@ typedef struct {
 } tl_sloped;
 
 #include "clusters.h"
+#include "exact.h"
 #include "polygons.h"
 #include "kernels.h"
 

@@ -9,6 +9,7 @@ sizes.py         time by area, and what memory takes
 scaling.py       time by number of triangles and of threads
 tutorial.py      pictures a second of the tutorials' triangles
 pure.py          the pure twins
+long_run.py      10^8 edge pixels of vertices that are not snapped
 tables.py        time, error, mesh, anti-aliasing
 speed_tables.py  depth and cost
 charts.py        time against error, and the list of charts

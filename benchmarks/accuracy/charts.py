@@ -14,7 +14,9 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullLocator
 
 from benchmarks.accuracy import speed_charts
+from benchmarks.accuracy.tables import with_no_snap
 from benchmarks.report.charts import LOOKS, Look, draw_grid, duration, write_chart
+from benchmarks.scenes.families import NO_SNAP
 
 FAR_AWAY = 1e12
 """Beyond every axis: where the ends of a front go."""
@@ -41,7 +43,8 @@ def chart_coverage(record: dict[str, Any]) -> Figure:
         def place(row: dict[str, Any], n_edge_px: int = n_edge_px, none_wrong: float = none_wrong) -> Point:
             return row["ns_triangle"], 1e6 * row["wrong_px"] / n_edge_px or none_wrong
 
-        rows, twins, peers = (rows_of(record, name, family) for name in ("coverage", "pure", "peers"))
+        twins, peers = (rows_of(record, name, family) for name in ("pure", "peers"))
+        rows = [row for row in with_no_snap(record) if row["family"] == family["name"]]
         points = [place(row) for row in rows]
         draw_front(axis, points + [place(row) for row in twins + peers])
         for row, point in zip(rows, points, strict=True):
@@ -56,7 +59,8 @@ def chart_coverage(record: dict[str, Any]) -> Figure:
             draw_peer(axis, row["peer"], place(row))
         for row, (_, y) in zip(rows, points, strict=True):
             if row["method"] == "auto":
-                axis.text(0.015, y, f"{row['precision']} bits", transform=axis.get_yaxis_transform(), va="center",
+                bits = "exact" if row["precision"] == NO_SNAP else f"{row['precision']} bits"
+                axis.text(0.015, y, bits, transform=axis.get_yaxis_transform(), va="center",
                           fontsize=8, color="0.25")  # fmt: skip
         axis.set(xscale="log", yscale="log", ylim=(none_wrong / 3, 3e6))
         axis.axhspan(none_wrong / 3, none_wrong * 1.8, color="0.93", zorder=0)

@@ -22,7 +22,7 @@ from benchmarks.exact.pictures import coverage
 from benchmarks.exact.unsnapped import draw_unsnapped
 from benchmarks.harness.peer_turns import MASK_TASKS, SMOOTH_TASKS, Peers, smooth_coverage
 from benchmarks.harness.turns import spread, take_turns, turn_of
-from benchmarks.scenes.families import Entry, Family, Triangles, entries, in_cells, strewn
+from benchmarks.scenes.families import FAMILIES, NO_SNAP, Entry, Family, Triangles, entries, in_cells, strewn
 
 Rows = dict[str, list[dict[str, Any]]]
 
@@ -36,6 +36,26 @@ def measure_family(family: Family, options: Options) -> Rows:
         rows = measure_masks(family, timed, facts, options, Path(folder))
         rows["antialiasing"] = measure_antialiasing(family, timed, facts, options, Path(folder))
     return {"families": [facts], **rows}
+
+
+def measure_no_snap(options: Options) -> Rows:
+    """Return `no_snap`: the errors of vertices that are not snapped, family by family, and the time beside 8 bits.
+
+    The ratio of calls that take turns does not depend on what else the machine does, so rows of another time than
+    those of `coverage` stand beside them.
+    """
+    rows = []
+    for family in FAMILIES.values():
+        facts: dict[str, Any] = {}
+        timed = strewn(family, max(1, int(family.n_timed * options.scale)), options.frame_px)
+        pair = [Entry("auto", NO_SNAP), Entry("auto", 8)]
+        with tempfile.TemporaryDirectory() as folder:
+            (wrong, _), _ = count_errors(family, pair, Peers(Path(folder)), facts, options)
+        turns = [turn_of(call) for call in mask_calls(pair, timed, options)]
+        exact, snapped = take_turns(turns, options.rounds, options.seconds)
+        row = {"family": family.name, "method": "auto", "precision": NO_SNAP, "wrong_px": wrong}
+        rows.append(row | {"n_edge_px": facts["n_edge_px"]} | spread(exact / snapped, 1.0, "times_8_bits"))
+    return {"no_snap": rows}
 
 
 def measure_masks(family: Family, timed: Triangles, facts: dict[str, Any], options: Options, folder: Path) -> Rows:

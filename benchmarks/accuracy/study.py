@@ -12,7 +12,7 @@ from typing import Any
 
 from benchmarks.accuracy import speed_tables, tables
 from benchmarks.accuracy.depth import measure_depth
-from benchmarks.accuracy.filling import measure_family
+from benchmarks.accuracy.filling import measure_family, measure_no_snap
 from benchmarks.accuracy.options import Options
 from benchmarks.accuracy.scaling import measure_scaling
 from benchmarks.accuracy.sizes import measure_sizes
@@ -39,6 +39,7 @@ SCHEMA = 2
 
 MEASURES: Mapping[str, Callable[[Options], Record]] = {
     **{name: partial(measure_family, family) for name, family in FAMILIES.items()},
+    "no-snap": measure_no_snap,
     "mesh": lambda options: measure_stability(entries(options.methods), options.frame_px, options.scale),
     "depth": measure_depth,
     "sizes": measure_sizes,
@@ -125,6 +126,7 @@ PARTS: Mapping[str, Callable[[Record], str]] = {
     "facts": tables.facts_text,
     "coverage": text_of(tables.coverage_rows, tables.is_default),
     "bits": text_of(tables.bits_rows),
+    "no-snap": text_of(tables.no_snap_rows),
     "others": text_of(tables.others_rows),
     "skipped": tables.skipped_text,
     "changes": tables.changes_text,

@@ -7,7 +7,9 @@ from typing import Any
 
 from benchmarks.accuracy.stability import CHANGES, EXACT, FAR_PX
 from benchmarks.harness.records import Record
+from benchmarks.harness.turns import digits
 from benchmarks.report.tables import commit_text, number
+from benchmarks.scenes.families import NO_SNAP
 
 DEFAULT_BITS = "8"
 
@@ -63,7 +65,7 @@ def family_rows(record: Record, head: list[str], rows: Iterable[tuple[str, str, 
 def coverage_rows(record: Record, keep: Callable[[Row], bool]) -> Table:
     """A row for each method and precision, time and error of every family."""
     rows = ((f"`{row['method']}`", row["precision"], row, wrong_text(record, row))
-            for row in record["coverage"] if keep(row))  # fmt: skip
+            for row in with_no_snap(record) if keep(row))  # fmt: skip
     return family_rows(record, ["method", "precision"], rows, "wrong")
 
 
@@ -94,6 +96,26 @@ def wrong_text(record: Record, row: Row) -> str:
     return per_million(row["wrong_px"], next(f["n_edge_px"] for f in record["families"] if f["name"] == row["family"]))
 
 
+def with_no_snap(record: Record) -> list[Row]:
+    """Return the rows of methods, and those of vertices that are not snapped: their time from that at 8 bits."""
+    snapped = {row["family"]: row for row in record["coverage"] if (row["method"], row["precision"]) == ("auto", "8")}
+    rows = []
+    for row in record.get("no_snap", ()):
+        times = {key: digits(row["times_8_bits"] * snapped[row["family"]][key]) for key in ("ns_triangle", "ns_px")}
+        rows.append(row | times)
+    return record["coverage"] + rows
+
+
+def no_snap_rows(record: Record) -> Table:
+    """A row for each family: wrong pixels of vertices that are not snapped, and time beside the snapped call."""
+    rows = [
+        [row["family"], f"{row['n_edge_px']:,}", f"{row['wrong_px']:,}"]
+        + [f"{row[key]:.2f}" for key in ("times_8_bits", "q1", "q3")]
+        for row in record.get("no_snap", ())
+    ]
+    return ["family", "edge pixels", "wrong", "time beside 8 bits", "quartile", "quartile"], rows
+
+
 def bits_rows(record: Record) -> tuple[list[str], list[list[str]]]:
     """Wrong pixels of the engine by sub-pixel bits, beside whole pixels and floats."""
     head = ["vertices", "as drawn by", *(family["name"] for family in record["families"])]
@@ -101,9 +123,9 @@ def bits_rows(record: Record) -> tuple[list[str], list[list[str]]]:
     shown = {"auto": "{} bits", "point_in_triangle/top-left": "{}", "float_barycentric": "{}",
              "float_barycentric/float64": "{}"}  # fmt: skip
     cells: dict[str, list[str]] = {}
-    for row in record["coverage"]:
+    for row in with_no_snap(record):
         if row["method"] in shown:
-            name = shown[row["method"]].format(row["precision"])
+            name = shown[row["method"]].format(row["precision"]) if row["precision"] != NO_SNAP else "not snapped"
             own = cells.setdefault(name, [name, f"`{row['method']}`"])
             own.append(per_million(row["wrong_px"], n_edge_px[row["family"]]))
     return head, list(cells.values())

@@ -22,6 +22,7 @@ from benchmarks.exact.integers import Points, draw_points, signed_area, snapped_
 from benchmarks.exact.unsnapped import ExactPicture
 from benchmarks.harness.arguments import refuse_unknown
 from benchmarks.harness.records import Record, tell
+from benchmarks.scenes.families import NO_SNAP
 
 SCHEMA = 1
 NO_FILL = "not applicable, it draws outlines and fills nothing"
@@ -34,7 +35,7 @@ class Entry:
 
     name: str
     method: str
-    bits: int = 8
+    bits: int | str = 8
     sampling: str = "center"
 
     @property
@@ -43,6 +44,8 @@ class Entry:
         from topleft.methods import find_method
 
         method = find_method(self.method)
+        if self.bits == NO_SNAP:
+            return "true"
         if method.code is not None or method.has_subpixel_bits:
             return str(self.bits)
         if method.claims.integer_vertices:
@@ -57,7 +60,7 @@ class Entry:
     def options(self) -> dict[str, Any]:
         """Arguments of the verbs."""
         options: dict[str, Any] = {"method": self.method}
-        if self.snap.isdigit():
+        if self.snap.isdigit() or self.bits == NO_SNAP:
             options["subpixel_bits"] = self.bits
         return options | ({} if self.sampling == "center" else {"sampling": self.sampling})
 
@@ -75,10 +78,10 @@ class Entry:
 
 
 def entries() -> list[Entry]:
-    """Every way to fill: the engine at three precisions and by both walkers, every classic."""
+    """Every way to fill: the engine at three precisions, by both walkers and without a snap, every classic."""
     from topleft.methods import CLASSICS
 
-    production = [Entry(name, *what) for name, what in PRODUCTION.items()]
+    production = [Entry(name, *what) for name, what in PRODUCTION.items()] + [Entry("auto, exact", "auto", NO_SNAP)]
     return production + [Entry(name, name) for name in CLASSICS if not name.endswith("/wireframe")]
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 Triangles = tuple[NDArray[np.float64], NDArray[np.int32]]
 
 BITS = (0, 4, 8, 12, 16)
+NO_SNAP = "exact"
 FRAME_PX = 2048
 CELL_MARGIN_PX = 6
 """Between triangles in cells: what any method draws beyond an edge stays clear of the neighbours."""
@@ -63,12 +64,12 @@ class Entry:
     """A method of the registry at one precision."""
 
     method: str
-    bits: int | None = None
-    """Sub-pixel bits, None where the method has a precision of its own."""
+    bits: int | str | None = None
+    """Sub-pixel bits, NO_SNAP, None where the method has a precision of its own."""
 
     @property
     def precision(self) -> str:
-        """What its vertices are when it draws: sub-pixel bits, whole pixels, or floats."""
+        """What its vertices are when it draws: sub-pixel bits, "exact" where they stay, whole pixels, or floats."""
         from topleft.methods import find_method
 
         if self.bits is not None:

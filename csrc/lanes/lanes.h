@@ -25,6 +25,10 @@
  *   vi_spill(p, a)          a store of lanes that are then read one by one
  *   vd_power(a, sum, mask)  the number whose bits are `sum` less the bits of a in `mask`
  *   vd_load_records(base, stride, i, c)    four doubles at base + 8 * stride * i[k], as columns
+ *   vd_load_pairs(base, stride, first, x, y)    two doubles at base + 8 * stride * first[3 * k], as columns
+ *   vd_load_singles(base, stride, first)    one there
+ *   vi_ceil(vd)             the next integer that is not less
+ *   vf_off_integer, vd_off_integer    a number less the nearest integer
  *   vf_store_pairs, vf_store_triples    pixels of two or three numbers, one after the other
  * vi_load_records(base, scale, i, c), vf_load_pairs 16 bytes at base + scale * i[k], 8 at base + 8 * i[k], as columns
  *   hm_, hf_, hi_, hd_      the few that short rows need, in half vectors of TL_HALF_LANES (0: there are none)

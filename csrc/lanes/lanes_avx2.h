@@ -467,4 +467,42 @@ TL_INLINE void vd_load_records(const double *base, int stride, const int32_t *i,
         c[k] = (vd){half[0][k], half[1][k]};
 }
 
+/* Pairs, and single numbers, at base + 8 * stride * first[3 * lane]. */
+TL_INLINE __m256d load_two_pairs(const double *base, int stride, const int32_t *first)
+{
+    return _mm256_insertf128_pd(_mm256_castpd128_pd256(_mm_loadu_pd(base + (int64_t)first[0] * stride)),
+                                _mm_loadu_pd(base + (int64_t)first[6] * stride), 1);
+}
+TL_INLINE void vd_load_pairs(const double *base, int stride, const int32_t *first, vd *x, vd *y)
+{
+    const __m256d even = load_two_pairs(base, stride, first), odd = load_two_pairs(base, stride, first + 3);
+    const __m256d even2 = load_two_pairs(base, stride, first + 12), odd2 = load_two_pairs(base, stride, first + 15);
+    *x = (vd){_mm256_unpacklo_pd(even, odd), _mm256_unpacklo_pd(even2, odd2)};
+    *y = (vd){_mm256_unpackhi_pd(even, odd), _mm256_unpackhi_pd(even2, odd2)};
+}
+TL_INLINE __m128d load_two_singles(const double *base, int stride, const int32_t *first)
+{
+    return _mm_loadh_pd(_mm_load_sd(base + (int64_t)first[0] * stride), base + (int64_t)first[3] * stride);
+}
+TL_INLINE __m256d load_four_singles(const double *base, int stride, const int32_t *first)
+{
+    return _mm256_insertf128_pd(_mm256_castpd128_pd256(load_two_singles(base, stride, first)),
+                                load_two_singles(base, stride, first + 6), 1);
+}
+TL_INLINE vd vd_load_singles(const double *base, int stride, const int32_t *first)
+{
+    return (vd){load_four_singles(base, stride, first), load_four_singles(base, stride, first + 12)};
+}
+TL_INLINE vi vi_ceil(vd a) { return vi_round((vd){_mm256_ceil_pd(a.lo), _mm256_ceil_pd(a.hi)}); }
+/* a less the nearest integer */
+TL_INLINE vf vf_off_integer(vf a)
+{
+    return _mm256_sub_ps(a, _mm256_round_ps(a, _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC));
+}
+TL_INLINE vd vd_off_integer(vd a)
+{
+    const int nearest = _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC;
+    return vd_sub(a, (vd){_mm256_round_pd(a.lo, nearest), _mm256_round_pd(a.hi, nearest)});
+}
+
 #endif

@@ -481,4 +481,53 @@ TL_INLINE void vd_load_records(const double *base, int stride, const int32_t *i,
         c[k] = (vd){half[0][k], half[1][k]};
 }
 
+/* Pairs, and single numbers, at base + 8 * stride * first[3 * lane]. */
+TL_INLINE __m256d load_two_pairs(const double *base, int stride, const int32_t *first)
+{
+    return _mm256_insertf128_pd(_mm256_castpd128_pd256(_mm_loadu_pd(base + (int64_t)first[0] * stride)),
+                                _mm_loadu_pd(base + (int64_t)first[6] * stride), 1);
+}
+TL_INLINE __m512d load_every_other_pair(const double *base, int stride, const int32_t *first)
+{
+    return _mm512_insertf64x4(_mm512_castpd256_pd512(load_two_pairs(base, stride, first)),
+                              load_two_pairs(base, stride, first + 12), 1);
+}
+TL_INLINE void vd_load_pairs(const double *base, int stride, const int32_t *first, vd *x, vd *y)
+{
+    const __m512d even = load_every_other_pair(base, stride, first);
+    const __m512d odd = load_every_other_pair(base, stride, first + 3);
+    const __m512d even2 = load_every_other_pair(base, stride, first + 24);
+    const __m512d odd2 = load_every_other_pair(base, stride, first + 27);
+    *x = (vd){_mm512_unpacklo_pd(even, odd), _mm512_unpacklo_pd(even2, odd2)};
+    *y = (vd){_mm512_unpackhi_pd(even, odd), _mm512_unpackhi_pd(even2, odd2)};
+}
+TL_INLINE __m128d load_two_singles(const double *base, int stride, const int32_t *first)
+{
+    return _mm_loadh_pd(_mm_load_sd(base + (int64_t)first[0] * stride), base + (int64_t)first[3] * stride);
+}
+TL_INLINE __m512d load_eight_singles(const double *base, int stride, const int32_t *first)
+{
+    const __m256d low = _mm256_insertf128_pd(_mm256_castpd128_pd256(load_two_singles(base, stride, first)),
+                                             load_two_singles(base, stride, first + 6), 1);
+    const __m256d high = _mm256_insertf128_pd(_mm256_castpd128_pd256(load_two_singles(base, stride, first + 12)),
+                                              load_two_singles(base, stride, first + 18), 1);
+    return _mm512_insertf64x4(_mm512_castpd256_pd512(low), high, 1);
+}
+TL_INLINE vd vd_load_singles(const double *base, int stride, const int32_t *first)
+{
+    return (vd){load_eight_singles(base, stride, first), load_eight_singles(base, stride, first + 24)};
+}
+TL_INLINE __m256i ceil_eight(__m512d a)
+{
+    return _mm512_cvt_roundpd_epi32(a, _MM_FROUND_TO_POS_INF | _MM_FROUND_NO_EXC);
+}
+TL_INLINE vi vi_ceil(vd a) { return _mm512_inserti64x4(_mm512_castsi256_si512(ceil_eight(a.lo)), ceil_eight(a.hi), 1); }
+/* a less the nearest integer */
+TL_INLINE vf vf_off_integer(vf a) { return _mm512_reduce_ps(a, _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC); }
+TL_INLINE vd vd_off_integer(vd a)
+{
+    const int nearest = _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC;
+    return (vd){_mm512_reduce_pd(a.lo, nearest), _mm512_reduce_pd(a.hi, nearest)};
+}
+
 #endif

@@ -318,4 +318,19 @@ TL_INLINE void vd_load_records(const double *base, int stride, const int32_t *i,
     memcpy(c, base + (int64_t)*i * stride, 32);
 }
 
+/* Pairs, and single numbers, at base + 8 * stride * first[3 * lane]. */
+TL_INLINE void vd_load_pairs(const double *base, int stride, const int32_t *first, vd *x, vd *y)
+{
+    *x = base[(int64_t)*first * stride];
+    *y = base[(int64_t)*first * stride + 1];
+}
+TL_INLINE vd vd_load_singles(const double *base, int stride, const int32_t *first)
+{
+    return base[(int64_t)*first * stride];
+}
+TL_INLINE vi vi_ceil(vd a) { return fabs(a) < 0x1p30 ? (vi)ceil(a) : INT32_MIN; }
+/* a less the nearest integer */
+TL_INLINE vf vf_off_integer(vf a) { return a - rintf(a); }
+TL_INLINE vd vd_off_integer(vd a) { return fabs(a) < 0x1p51 ? a - ((a + 0x1.8p52) - 0x1.8p52) : 0.0; }
+
 #endif

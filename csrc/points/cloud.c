@@ -77,6 +77,7 @@ static void draw_point(const tl_cloud *cloud, const tl_window *window, const tl_
         if (low <= high && left <= right)
             keep_span(target, row * target->stride_px + left, right - left + 1, (float)v.z, (int32_t)i);
     }
+    tl_count_work(window, TL_SETUP_PX / 4 + 4 * max64(bottom - top + 1, 0) * (4 + (size >> window->subpixel_bits)));
 }
 
 static void draw_cloud(const tl_cloud *cloud, const tl_window *window, const tl_target *target)
@@ -87,7 +88,7 @@ static void draw_cloud(const tl_cloud *cloud, const tl_window *window, const tl_
             target->depth[row * target->stride_px + x] = background;
             ((int32_t *)target->pixels)[row * target->stride_px + x] = -1;
         }
-    for (int64_t i = 0; i < cloud->n; i++)
+    for (int64_t i = 0; i < cloud->n && !tl_is_given_up(window); i++)
         if (cloud->vertices[i].x_fx != TL_SPECIAL)
             draw_point(cloud, window, target, i);
 }

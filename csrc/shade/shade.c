@@ -90,7 +90,8 @@ static void shade(const tl_snapped *snapped, const tl_window *window, const tl_v
     int32_t background;
     memcpy(&background, shading->background_bytes, 4);
     start_runs(&s, snapped, window, view, shading);
-    for (int64_t row = 0; row < window->height; row++)
+    for (int64_t row = 0; row < window->height && !tl_is_given_up(window); row++) {
+        tl_count_work(window, TL_SHADE_PX * window->width);
         for (int64_t column = 0; column < window->width; column += TL_SPAN) {
             const int64_t at = row * window->width + column;
             const int n = start_span(&s, ids, row, column);
@@ -107,6 +108,7 @@ static void shade(const tl_snapped *snapped, const tl_window *window, const tl_v
                     vi_store_masked((int32_t *)pixels + at + x, vm_first(n - x), word);
             }
         }
+    }
 }
 
 /* Copies rows [first, end) of four numbers, the last of them replaced by 1/w of the vertex. */
@@ -135,7 +137,8 @@ static void shade_normals(const tl_snapped *snapped, const tl_window *window, co
     shade_runs s;
     const vf zero = vf_set1(0.0f);
     start_runs(&s, snapped, window, view, shading);
-    for (int64_t row = 0; row < window->height; row++)
+    for (int64_t row = 0; row < window->height && !tl_is_given_up(window); row++) {
+        tl_count_work(window, TL_SHADE_PX * window->width);
         for (int64_t column = 0; column < window->width; column += TL_SPAN) {
             const int64_t at = row * window->width + column;
             const int n = start_span(&s, ids, row, column);
@@ -155,6 +158,7 @@ static void shade_normals(const tl_snapped *snapped, const tl_window *window, co
                 store_channels(out + 3 * (at + x), 3, (int)min64(n - x, TL_LANES), normal, 3);
             }
         }
+    }
 }
 
 #endif

@@ -100,7 +100,8 @@ static void shade_samples(const tl_snapped *snapped, const tl_window *window, co
     sample_sums sums;
     tl_snapped seen = *snapped;
     start_runs(&s, &seen, window, view, shading);
-    for (int64_t row = 0; row < window->height; row++)
+    for (int64_t row = 0; row < window->height && !tl_is_given_up(window); row++) {
+        tl_count_work(window, TL_SHADE_PX * window->width);
         for (int64_t column = 0; column < window->width; column += TL_SPAN) {
             const int64_t at = row * window->width + column;
             const int n = (int)min64(TL_SPAN, window->width - column);
@@ -115,6 +116,7 @@ static void shade_samples(const tl_snapped *snapped, const tl_window *window, co
                 vi_store_masked((int32_t *)pixels + at + x, vm_first(n - x),
                                 finish_lanes(&sums, shading, sample_bits, x));
         }
+    }
 }
 
 #endif

@@ -49,8 +49,25 @@ def cluster():
 @pytest.fixture
 def client(cluster):
     with distributed.Client(cluster, set_as_default=False) as made:
-        made.wait_for_workers(2, timeout=60)
+        try:
+            made.wait_for_workers(2, timeout=10)
+        except TimeoutError:  # a nanny that did not start again what an earlier test has killed
+            made.restart(timeout=40)
         yield made
+
+
+@pytest.fixture(autouse=True)
+def in_time():
+    """A cluster whose workers do not come back fails a test and does not hold the rest up."""
+
+    def end(signum, frame):
+        raise TimeoutError("the cluster took longer than 60 s")
+
+    before = signal.signal(signal.SIGALRM, end)
+    signal.alarm(60)
+    yield
+    signal.alarm(0)
+    signal.signal(signal.SIGALRM, before)
 
 
 def pids(client):

@@ -38,6 +38,11 @@ def crossing_star(n):
 LARGE, SMALL = random_triangles(100_000, 2000), random_triangles(1_000_000, 30)
 FLAT = LARGE[0][:, :2], LARGE[1]
 COLORS = np.random.default_rng(2).integers(0, 256, (100_000, 4), dtype=np.uint8)
+POLYGONS = FLAT[0], np.arange(0, 300_001, 3), np.arange(100_001)
+BALL = tl.Mesh(*tl.scenes.shape("icosphere"))
+VIEWER = tl.Camera.look_at((0, 0, 1.2), (0, 0, 0))
+BALL_FRAGS = tl.rasterize_mesh(BALL, VIEWER, (3000, 3000))
+LIGHTS = [tl.Light((x, 1, 3), kind="point", space="eye") for x in range(60)]
 
 DRAWS = {
     "coverage by edges": lambda n: tl.coverage(*FLAT, SIZE, method="edge", threads=n),
@@ -60,6 +65,10 @@ DRAWS = {
     ),
     "area of a polygon": lambda n: tl.polygons(crossing_star(100_000), SIZE, sampling="area", threads=n),
     "table of a polygon": lambda n: tl.overlap([[crossing_star(100_000)]] * 2, SIZE, threads=n),
+    "polygons": lambda n: tl.polygons(POLYGONS, SIZE, values="index", threads=n),
+    "polygons by area": lambda n: tl.polygons(POLYGONS, SIZE, sampling="area", threads=n),
+    "points": lambda n: tl.points(SMALL[0], SIZE, point_size=400.0, shape="disc", threads=n),
+    "shade": lambda n: tl.shade(BALL_FRAGS, BALL, VIEWER, lights=LIGHTS, threads=n),
     "height_map": lambda n: tl.height_map(LARGE, tl.Grid(SIZE, (0, 2000, 0, 2000)), threads=n),
 }
 

@@ -99,9 +99,32 @@ def test_a_copy_of_a_mesh_is_read_only_as_the_mesh(through):
     assert not (again.triangles.flags.writeable)
 
 
-@pytest.mark.parametrize("through", [copy.deepcopy, lambda texture: pickle.loads(pickle.dumps(texture))])
-def test_a_copy_of_a_texture_is_read_only_as_the_texture(through):
-    assert not through(tl.Texture(np.zeros((2, 2, 4), np.uint8))).image.flags.writeable
+HOLDERS = {
+    "texture": tl.Texture(np.zeros((2, 2, 4), np.uint8)),
+    "camera": tl.Camera.framing(tl.Mesh(*scenes.shape("cube"))),
+    "instance": tl.Instance(tl.Mesh(*scenes.shape("cube")), np.eye(4)),
+    "points": tl.Points([[0.0, 0, 0]], colors=np.uint8([[1, 2, 3]]), size=[2.0]),
+    "environment": tl.Environment(image=np.zeros((4, 8, 3), np.uint8)),
+}
+
+
+@pytest.mark.parametrize("through", [copy.copy, copy.deepcopy, lambda holder: pickle.loads(pickle.dumps(holder))])
+@pytest.mark.parametrize("name", HOLDERS)
+def test_a_copy_of_what_holds_arrays_is_read_only_as_it_was(name, through):
+    arrays = [value for value in vars(through(HOLDERS[name])).values() if isinstance(value, np.ndarray)]
+    assert arrays
+    assert not any(array.flags.writeable for array in arrays)
+
+
+@pytest.mark.parametrize("through", [copy.deepcopy, lambda frags: pickle.loads(pickle.dumps(frags))])
+def test_a_copy_of_scene_fragments_whose_parts_were_asked_for_shows_the_same(through):
+    mesh = tl.Mesh(*scenes.shape("cube"))
+    scene = tl.Scene([mesh, tl.Instance(mesh, np.diag([0.5, 2, 0.5, 1]))])
+    frags = tl.rasterize_mesh(scene, tl.Camera.framing(mesh), SIZE)
+    weights = frags.barycentric()
+    again = through(frags)
+    assert_same(again.triangle, frags.triangle)
+    assert_same(again.barycentric(), weights)
 
 
 def test_rasterizer_in_two_threads_is_refused():
@@ -186,3 +209,11 @@ def test_field_into_memory_of_its_inputs_is_that_of_separate_memory(name):
 
 def assert_same_or_nan(got, expected):
     assert np.array_equal(got, expected, equal_nan=True)
+
+
+@pytest.mark.parametrize("wrong", [1, 10**8])
+def test_slopes_of_ids_that_their_owner_has_changed_are_refused(wrong):
+    frags = tl.rasterize([[0.0, 0, 0], [8, 0, 1], [0, 8, 0]], [[0, 1, 2]], (8, 8))
+    frags.triangle[2, 2] = wrong
+    with pytest.raises(IndexError, match=f"triangle must hold ids below 1, got {wrong}"):
+        frags.interpolate(np.zeros((3, 2)), derivatives=True)

@@ -369,7 +369,7 @@ def field_case(draw: Draw) -> Case:
         spacing = draw.mostly([4.0, 1.0, 0.7], [0.0, -1.0, float("nan"), 1e-300, 1e300, 1e-12])
         options = {
             "spacing": spacing,
-            "extent": draw.mostly([(0, 60, 0, 40), (-5, 9.5, 2, 11)], [None]),
+            "extent": draw.mostly([(0, 60, 0, 40), (-5, 9.5, 2, 11)], [(0, 1e300, 0, 1)]),
             "surface": draw.of(["upper", "lower"]),
             "threads": draw.of([1, None, 2]),
         }

@@ -34,6 +34,7 @@ __all__ = [
     "as_window",
     "bad_triangle",
     "check_regular",
+    "set_read_only",
     "shown",
 ]
 
@@ -93,6 +94,14 @@ def array_of_tensor(name: str, tensor: Any) -> NDArray[Any]:
         return np.asarray(tensor) if hasattr(tensor, "__array__") else np.from_dlpack(tensor)
     except Exception as error:  # theirs: a dtype or a layout that NumPy has not
         raise TypeError(f"{name} must be an array that NumPy can read, got a {kind} ({error})") from None
+
+
+def set_read_only(instance: object, state: dict[str, Any]) -> None:
+    """Give an object that is unpickled or copied what it consists of, its arrays read-only as they were."""
+    for value in state.values():
+        if isinstance(value, np.ndarray):
+            value.flags.writeable = False
+    vars(instance).update(state)
 
 
 def as_vertices(values: ArrayLike, *, has_transform: bool) -> NDArray[Any]:

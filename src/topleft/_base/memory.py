@@ -12,13 +12,16 @@ from numpy.typing import DTypeLike, NDArray
 
 from topleft import _engine
 
-__all__ = ["FreshMemory", "KeptMemory", "Memory", "ScratchMemory", "empty", "release_memory"]
+__all__ = ["FreshMemory", "KeptMemory", "Memory", "ScratchMemory", "check_fits", "empty", "release_memory"]
 
 HUGE_PAGE = 2 << 20
 CACHE_LINE = 64
 
 #: Arrays below it are NumPy's own: what the system keeps for them costs no page faults.
 MIN_BLOCK_BYTES = 4 << 10
+
+#: Several arrays of so many bytes together are asked for at once before the first of them is touched.
+MIN_CHECKED_BYTES = 1 << 30
 
 #: Most bytes of arrays that have died which the process keeps for arrays to come: ids and depth of four samples a pixel
 #: in a picture of 4096x4096.
@@ -29,7 +32,20 @@ MAX_SCRATCH_BYTES = 64 << 20
 
 #: What no result refers to once `coverage`, `overdraw`, `fill` or `wireframe` has returned.
 SCRATCH_NAMES = frozenset(
-    {"bands", "bins", "covered", "labels", "others", "packed", "records", "sample colors", "sample labels", "triangles"}
+    {
+        "bands",
+        "bins",
+        "covered",
+        "labels",
+        "others",
+        "packed",
+        "points",
+        "records",
+        "sample colors",
+        "sample labels",
+        "sample mask",
+        "triangles",
+    }
     | {"edge highs", "edge last_low", "edge starts", "edges"}
     | {"chains", "depth of heights", "planes", "polygon points"}
 )
@@ -130,6 +146,21 @@ def empty(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
     if n_bytes > sys.maxsize:
         allocate(n_bytes)  # whose error says how much it is
     return np.ndarray(shape, dtype, _engine.lease_block(n_bytes, allocate))
+
+
+def check_fits(shape: tuple[int, ...], *dtypes: DTypeLike) -> None:
+    """Raise a MemoryError unless the system has memory for arrays of a shape together.
+
+    One by one it may promise what it has not: Linux refuses a single array larger than all memory, but gives two of
+    half that size and ends the process when they are written.
+    """
+    n_bytes = sum(_size(shape, dtype) for dtype in dtypes)
+    if n_bytes >= MIN_CHECKED_BYTES:
+        try:
+            np.empty(n_bytes, np.uint8)
+        except (MemoryError, ValueError):
+            words = f"no memory for {len(dtypes)} arrays of {n_bytes:,} bytes together, which this size or scene needs"
+            raise MemoryError(words) from None
 
 
 def release_memory() -> None:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias, get_args
 import numpy as np
 import numpy.typing as npt
 
-from topleft._base.arrays import as_array, as_real, as_size, as_square, as_vector, check_regular, shown
+from topleft._base.arrays import as_array, as_real, as_size, as_square, as_vector, check_regular, set_read_only, shown
 from topleft._base.options import check_choice
 from topleft._camera.lens import Lens, lens_of_opencv
 from topleft._camera.matrices import (
@@ -90,6 +90,8 @@ class Camera:
         def __init__(
             self, view: npt.ArrayLike, projection: npt.ArrayLike, aspect: float | None = None, lens: Lens | None = None
         ) -> None: ...
+
+    __setstate__ = set_read_only
 
     def __post_init__(self) -> None:
         for name in ("view", "projection"):

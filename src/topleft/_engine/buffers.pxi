@@ -47,6 +47,16 @@ cdef class Source:
             counts = K.snap(&self.source, first, end, subpixel_bits, with_depth, <tl_vertex *>&records[0], table)
         return counts.n_bad, counts.n_wide, counts.n_clipped
 
+    def take(self, int64_t first, int64_t end, double[:, ::1] points, int bits=-1):
+        """Widen the numbers of vertices [first, end) into points, or only look at them; returns how many cannot be drawn.
+
+        `bits` from 0 on: they are rounded to 2**-bits px.
+        """
+        cdef int64_t n_bad
+        with nogil:
+            n_bad = K.take_points(&self.source, first, end, bits, &points[0, 0] if points is not None else NULL)
+        return n_bad
+
     def project(self, int64_t first, int64_t end, Viewport viewport, uint8_t[::1] records, int64_t[:, ::1] wide):
         """Project and snap vertices [first, end) into records; returns the numbers of bad, wide and clipped vertices."""
         cdef tl_wide *table = <tl_wide *>&wide[0, 0] if wide is not None else NULL
@@ -54,6 +64,13 @@ cdef class Source:
         with nogil:
             counts = K.project(&self.source, first, end, &viewport.view, <tl_vertex *>&records[0], table)
         return counts.n_bad, counts.n_wide, counts.n_clipped
+
+    def project_points(self, int64_t first, int64_t end, Viewport viewport, double[:, ::1] points):
+        """Project vertices [first, end) to points (V, 3); returns the numbers of bad and of clipped ones, x NaN."""
+        cdef tl_vertex_counts counts
+        with nogil:
+            counts = K.project_points(&self.source, first, end, &viewport.view, &points[0, 0])
+        return counts.n_bad, counts.n_clipped
 
     def project_blocks(self, const uint8_t[::1] is_used, Viewport viewport, uint8_t[::1] records):
         """Project and snap the blocks of VERTEX_BLOCK vertices that are used; returns as `project` does."""

@@ -277,7 +277,7 @@ def draw_cloud(const uint8_t[::1] records, int64_t size_fx, const int32_t[::1] s
     window.x_px, window.y_px = origin
     window.y_px += first_row
     window.width, window.height = target.width, n_rows
-    window.subpixel_bits = subpixel_bits
+    window.subpixel_bits, window.pause = subpixel_bits, pause_of_thread()
     cloud.vertices, cloud.n = <const tl_vertex *>data(records), records.shape[0] // <int64_t>sizeof(tl_vertex)
     cloud.size_fx, cloud.sizes_fx = size_fx, &sizes_fx[0] if sizes_fx is not None and sizes_fx.shape[0] else NULL
     cloud.is_disc, cloud.sample_x_fx, cloud.sample_y_fx = is_disc, x_fx, y_fx

@@ -181,6 +181,7 @@ def shade(SnappedMesh mesh, ShadingTable shading, const int32_t[:, ::1] ids, con
     if n_rows and ids.shape[1]:
         with nogil:
             K.shade(&mesh.snapped, &window, mesh.clip_view(), &shading.shading, &ids[first_row, 0], &depth[first_row, 0], &pixels[first_row, 0, 0])
+        raise_if_given_up()
 
 
 def shade_samples(SnappedMesh mesh, ShadingTable shading, const int32_t[:, ::1] positions, const int32_t[:, :, ::1] ids,
@@ -193,6 +194,7 @@ def shade_samples(SnappedMesh mesh, ShadingTable shading, const int32_t[:, ::1] 
         with nogil:
             K.shade_samples(&mesh.snapped, &window, mesh.clip_view(), &shading.shading, &positions[0, 0], sample_bits, stride, &ids[0, first_row, 0],
                             &depth[0, first_row, 0], &pixels[first_row, 0, 0])
+        raise_if_given_up()
 
 
 def shade_normals(SnappedMesh mesh, ShadingTable shading, const int32_t[:, ::1] ids, float[:, :, ::1] out, int64_t first_row,
@@ -202,6 +204,7 @@ def shade_normals(SnappedMesh mesh, ShadingTable shading, const int32_t[:, ::1] 
     if n_rows and ids.shape[1]:
         with nogil:
             K.shade_normals(&mesh.snapped, &window, mesh.clip_view(), &shading.shading, &ids[first_row, 0], &out[first_row, 0, 0])
+        raise_if_given_up()
 
 
 def cut_out(SnappedMesh mesh, ShadingTable shading, const int32_t[::1] opaque, const int32_t[::1] triangles, int32_t[:, ::1] ids,

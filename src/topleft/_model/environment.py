@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from topleft._base.arrays import as_array, as_number, as_vector
+from topleft._base.arrays import as_array, as_number, as_vector, set_read_only
 from topleft._base.color import LIGHT_OF_SRGB, Color, ColorLike, as_color, light_of
 from topleft._base.options import parse
 from topleft._model.light import TO_HEADLIGHT, LightSpace, as_not_negative
@@ -162,6 +162,8 @@ class Environment:
     def __getstate__(self) -> dict[str, Any]:
         """What another process needs: the levels are made there."""
         return {field.name: self.__dict__[field.name] for field in fields(self)}
+
+    __setstate__ = set_read_only
 
 
 DEFAULT_ENVIRONMENT = Environment((255, 255, 255), ground=(90, 90, 90), up=tuple(TO_HEADLIGHT.tolist()), space="eye")

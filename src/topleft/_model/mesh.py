@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft import _engine
-from topleft._base.arrays import as_array, as_checked_triangles, shown
+from topleft._base.arrays import as_array, as_checked_triangles, set_read_only, shown
 from topleft._model.material import Material
 from topleft._model.normals import CornerNormals, angle_weighted_normals, box_of_triangles, creased_normals
 from topleft._model.texture import Texture
@@ -265,10 +265,7 @@ class Mesh:
         """What another process needs: what is computed from it is computed there."""
         return {field.name: self.__dict__[field.name] for field in fields(self)}
 
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        """Take it, the arrays read-only as they were."""
-        for name, value in state.items():
-            self.__dict__[name] = read_only(value) if isinstance(value, np.ndarray) else value
+    __setstate__ = set_read_only
 
 
 def keep_corner_normals(mesh: Mesh, normals: CornerNormals) -> None:

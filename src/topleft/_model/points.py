@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from topleft._base.arrays import INT32_MAX, as_point_size
+from topleft._base.arrays import INT32_MAX, as_point_size, set_read_only
 from topleft._base.options import PointShape, parse
 from topleft._model.mesh import FloatArray, as_color_array, as_real_array, extreme_points, read_only
 from topleft.typing import PointShapeOption, PointUnitOption
@@ -154,3 +154,5 @@ class Points:
         """What another process needs: what is computed from it is computed there."""
         names = ("positions", "colors", "normals", "size", "unit", "shape")
         return {name: self.__dict__[name] for name in names}
+
+    __setstate__ = set_read_only

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft import _engine
-from topleft._base.arrays import as_array
+from topleft._base.arrays import as_array, set_read_only
 from topleft._base.color import LIGHT_OF_SRGB
 from topleft._base.options import parse
 from topleft._base.texels import MOST_KEPT_BYTES, ValueLevels, as_light, levels_of
@@ -179,12 +179,7 @@ class Texture:
         """What another process needs: the texels are made there."""
         return {field.name: self.__dict__[field.name] for field in fields(self)}
 
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        """Take it, the arrays read-only as they were."""
-        for name, value in state.items():
-            self.__dict__[name] = value
-            if isinstance(value, np.ndarray):
-                value.flags.writeable = False
+    __setstate__ = set_read_only
 
 
 def as_image(name: str, pixels: npt.ArrayLike) -> U8:

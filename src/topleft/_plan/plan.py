@@ -213,6 +213,10 @@ class Plan:
             If the call asks for another size, sampling, method, side to cull or number of sub-pixel bits.
         """
         refuse_classic(view, "plan")
+        if view.is_exact:
+            raise ValueError(
+                "subpixel_bits must be in 0..16 with a plan, got 'exact': a plan chooses for snapped vertices"
+            )
         for name in FIXED:
             wish, fact = getattr(self._view, name), getattr(view, name)
             if wish != fact:

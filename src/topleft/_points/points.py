@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine
 from topleft._base.arrays import as_array, as_point_size
-from topleft._base.memory import FreshMemory, Memory
+from topleft._base.memory import FreshMemory, Memory, check_fits
 from topleft._base.options import DepthTest, PointShape, Sink, parse
 from topleft._base.threads import count_threads, run_parts
 from topleft._raster.classic import refuse_classic
@@ -187,6 +187,7 @@ def draw_points(
 ) -> PointFragments:
     """`points`, of checked options, on the memory given; larger sizes than there can be are the largest."""
     (width, height), n_samples = view.size, view.sampling.n_samples
+    check_fits((n_samples, height, width), np.int32, np.float32)
     ids: NDArray[np.int32] = memory.empty("sample ids", (n_samples, height, width), np.int32)
     depth: NDArray[np.float32] = memory.empty("sample depth", (n_samples, height, width), np.float32)
     array, source = transform(positions, view)

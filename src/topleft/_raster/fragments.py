@@ -395,6 +395,8 @@ class Fragments:
         out = np.empty((*self.triangle.shape, channels, 2), np.float32)
         ids = self._ids().reshape(-1)
         is_seen = np.zeros(self._n_triangles + 1, np.bool_)
+        if ids.size and ids.max() >= self._n_triangles:  # the caller has written into them
+            raise IndexError(f"triangle must hold ids below {self._n_triangles}, got {ids.max()}")
         is_seen[ids] = True  # the last, too, by -1
         seen = np.flatnonzero(is_seen[:-1]).astype(np.int32)
         slot = np.empty(self._n_triangles, np.int32)
@@ -417,7 +419,7 @@ class Fragments:
 
     def _snapped_with(self, *triangles: NDArray[np.int32]) -> _engine.SnappedMesh:
         """Return the triangles that show and these, snapped; maybe the others too."""
-        if isinstance(self._snapped_or_maker, _engine.SnappedMesh):
+        if isinstance(self._snapped_or_maker, (_engine.SnappedMesh, _engine.ExactMesh)):
             return self._snapped_or_maker
         return self._snapped_or_maker(self.id, *triangles)
 

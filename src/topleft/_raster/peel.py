@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine
-from topleft._base.memory import FRESH, SCRATCH, Memory
+from topleft._base.memory import FRESH, SCRATCH, Memory, check_fits
 from topleft._base.options import DepthTest, Sampling, parse
 from topleft._base.threads import count_threads, run_parts
 from topleft._raster.choices import can_share
@@ -186,6 +186,7 @@ def peel_meshes(
     meshes = [replace(snapped, mesh=snapped.mesh.seen_from(*at_fx)) for snapped in meshes] if any(at_fx) else meshes
     reach_fx = max(map(abs, at_fx))
     width, height = view.size
+    check_fits((n_layers, height, width), np.int32, np.float32)
     ids: NDArray[np.int32] = FRESH.empty("layer ids", (n_layers, height, width), np.int32)
     depth: NDArray[np.float32] = FRESH.empty("layer depth", (n_layers, height, width), np.float32)
     if 0 in view.size:

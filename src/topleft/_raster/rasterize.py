@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine
 from topleft._base.arrays import as_number, as_out
-from topleft._base.memory import FRESH, Memory, empty
+from topleft._base.memory import FRESH, Memory, check_fits, empty
 from topleft._base.options import DepthTest, Sampling, Sink, parse
 from topleft._base.threads import count_threads, run_parts
 from topleft._raster import choices
@@ -24,7 +24,7 @@ from topleft._raster.classic import draw_classic, refuse_classic
 from topleft._raster.cluster_draw import ClusteredMesh, draw_clustered
 from topleft._raster.fragments import Fragments, GivenCorners
 from topleft._raster.sampling import draw_planes, sample_positions, sum_areas
-from topleft._raster.snap import Snapped, snap_mesh
+from topleft._raster.snap import Snapped, snap_mesh, snap_to_cover
 from topleft._raster.view import View
 from topleft.typing import DepthTestOption
 
@@ -66,7 +66,7 @@ def draw(
     def draw_rows(first: int, end: int) -> int:
         return snapped.mesh.draw(target, first, end - first)
 
-    if is_shared:
+    if is_shared and snapped.can_share:
         bad_rows = draw_shared(memory, snapped, target, height, n_parts)
     else:
         bad_rows = run_parts(draw_rows, height, n_parts)
@@ -143,15 +143,30 @@ def draw_coverage(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, vie
     """`coverage`, on the memory given."""
     if view.classic:
         return draw_classic(view.classic, memory, vertices, triangles, view, Sink.MASK, out)
-    snapped = snap_mesh(memory, vertices, triangles, view, with_depth=False, out=out)
+    snapped = snap_to_cover(memory, vertices, triangles, view, out=out)
     if view.sampling is Sampling.AREA:
         return draw_area(memory, "coverage", snapped, view, out, is_clamped=True)
+    if view.sampling.n_samples > 1 and view.is_exact:
+        return draw_share_of_masks(memory, snapped, view, out)
     if view.sampling.n_samples > 1:
         with canvas_of(memory, "coverage share", out, view.size[::-1], np.float32) as (result, canvas):
             draw(memory, snapped, view, choices.drawing(view, snapped, Sink.SAMPLES), canvas)
         return result
     with canvas_of(memory, "coverage", out, view.size[::-1], np.bool_) as (result, canvas):
         draw(memory, snapped, view, choices.drawing(view, snapped, Sink.MASK), canvas)
+    return result
+
+
+def draw_share_of_masks(memory: Memory, snapped: Snapped, view: View, out: object) -> NDArray[np.float32]:
+    """Return the share of samples that triangles cover, from a mask of each sample."""
+    n, shape = view.sampling.n_samples, view.size[::-1]
+    mask: NDArray[np.bool_] = memory.empty("sample mask", shape, np.bool_)
+    with canvas_of(memory, "coverage share", out, shape, np.float32) as (result, canvas):
+        canvas[...] = 0.0
+        for at in sample_positions(n, view.grid_bits).tolist() if canvas.size else ():
+            seen = replace(snapped, mesh=snapped.mesh.seen_from(*at))
+            draw(memory, seen, view, choices.drawing(view, seen, Sink.MASK), mask)
+            np.add(canvas, 1.0 / n, out=canvas, where=mask)  # exact: n is a power of two
     return result
 
 
@@ -174,7 +189,7 @@ def draw_overdraw(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, vie
     """`overdraw`, on the memory given."""
     if view.classic:
         return draw_classic(view.classic, memory, vertices, triangles, view, Sink.COUNT, out)
-    snapped = snap_mesh(memory, vertices, triangles, view, with_depth=False, out=out)
+    snapped = snap_to_cover(memory, vertices, triangles, view, out=out)
     if view.sampling is Sampling.AREA:
         return draw_area(memory, "overdraw", snapped, view, out, is_clamped=False)
     if view.sampling.n_samples > 1:
@@ -285,6 +300,7 @@ def draw_samples(memory: Memory, snapped: Snapped, view: View, asked: Asked, dra
     """Draw ids and depth of every sample: a plane a sample in memory."""
     (width, height), n = view.size, view.sampling.n_samples
     positions = sample_positions(n, view.grid_bits)
+    check_fits((n, height, width), np.int32, np.float32)
     ids: NDArray[np.int32] = memory.empty("sample ids", (n, height, width), np.int32)
     depth: NDArray[np.float32] = memory.empty("sample depth", (n, height, width), np.float32)
     draw_all_samples(memory, snapped, view, positions, drawing, ids, depth)
@@ -334,6 +350,8 @@ Buffers = tuple[NDArray[np.int32], NDArray[np.float32]]
 def buffers_of(memory: Memory, view: View, asked: Asked) -> Iterator[tuple[Buffers, Buffers]]:
     """Give ids and depth to return, and contiguous ones to draw into, as `canvas_of` does."""
     shape = view.size[::-1]
+    if asked.ids_out is None and asked.depth_out is None:
+        check_fits(shape, np.int32, np.float32)
     ids, ids_canvas = open_canvas(memory, "triangle", asked.ids_out, shape, np.int32)
     depth, depth_canvas = open_canvas(memory, "depth", asked.depth_out, shape, np.float32)
     yield (ids, depth), (ids_canvas, depth_canvas)

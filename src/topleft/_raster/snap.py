@@ -1,4 +1,7 @@
-"""Snaps a mesh: vertices go through transform, snap and clip; indices are made int32 and checked."""
+"""Snaps a mesh: vertices go through transform, snap and clip; indices are made int32 and checked.
+
+Or takes it as it is: vertices in pixels as float64, which no grid moves.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +18,7 @@ from topleft._base.threads import run_parts
 from topleft._raster import choices
 from topleft._raster.view import View
 
-__all__ = ["Snapped", "snap_mesh"]
+__all__ = ["Snapped", "snap_mesh", "snap_to_cover"]
 
 SPECIAL, BAD, WIDE = np.iinfo(np.int32).min, 0, 1  # x_fx and y_fx of vertices that are not narrow: csrc/topleft.h
 UNCHECKED = -2  # instead of the row of a bad triangle; -1: there is none
@@ -44,6 +47,11 @@ class Snapped:
         return len(self.triangles)
 
     @property
+    def can_share(self) -> bool:
+        """Whether threads can each take some of the triangles."""
+        return True
+
+    @property
     def has_depth(self) -> bool:
         """Whether vertices have a depth of their own; otherwise all of them lie at 0."""
         return self.source.is_clip_space or self.points.shape[1] == 3
@@ -53,6 +61,21 @@ class Snapped:
         row = _engine.first_bad_row(self.triangles, self.n_vertices)
         if row >= 0:
             raise bad_triangle(self.triangles_given, row, self.n_vertices)
+
+
+@dataclass(frozen=True, slots=True)
+class Unsnapped(Snapped):
+    """A mesh whose vertices stay where they are: `mesh` is an `_engine.ExactMesh`."""
+
+    @property
+    def can_share(self) -> bool:
+        """Whether threads can each take some of the triangles."""
+        return False
+
+    def check_indices(self) -> None:
+        """Raise an error for the first triangle with an index or a vertex that cannot be drawn."""
+        Snapped.check_indices(self)
+        check_finite(self.points, self.triangles, with_depth=False)
 
 
 class Vertices(NamedTuple):
@@ -79,6 +102,8 @@ def snap_mesh(
     IndexError
         If a triangle names a vertex that does not exist, and indices are checked here.
     """
+    if view.is_exact:
+        return take_mesh(memory, vertices, triangles, view, with_depth=with_depth, out=out)
     points, source = transform(vertices, view, out)
     triangles = apart_from(out, "triangles", triangles)
     indices, bad_row = index(memory, triangles, len(points), view)
@@ -108,6 +133,126 @@ def snap_mesh(
         drawn = without_sides(seen, drawn, is_single, view.threads)
     mesh = _engine.SnappedMesh(source, records, wide, drawn, pieces, view.how, viewport)
     return Snapped(mesh, indices, triangles, points, source, records, pieces)
+
+
+def snap_to_cover(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, view: View, *, out: object) -> Snapped:
+    """Take arrays as `snap_mesh` does, for a picture that asks nothing but which samples are covered.
+
+    On a fine grid float lanes draw the snapped vertices as they do vertices that are not snapped: the same picture.
+    """
+    found = snap_for_floats(memory, vertices, triangles, view, out) if choices.pays_float_lanes(view) else None
+    return found or snap_mesh(memory, vertices, triangles, view, with_depth=False, out=out)
+
+
+def snap_for_floats(
+    memory: Memory, vertices: ArrayLike, triangles: ArrayLike, view: View, out: object
+) -> Unsnapped | None:
+    """Return pixels rounded to the grid as float64; None for clip space, and where a vertex leaves the range."""
+    points, source = transform(vertices, view, out)
+    triangles = apart_from(out, "triangles", triangles)
+    n = len(points)
+    if source.is_clip_space or not n or 0 in view.size:
+        return None
+    indices, bad_row = index(memory, triangles, n, view)
+    taken = memory.empty("points", points.shape, np.float64)
+
+    def take_part(first: int, end: int) -> int:
+        return source.take(first, end, taken, view.subpixel_bits)
+
+    if sum(run_parts(take_part, n, choices.threads_to_snap(view.threads, n, len(indices)))):
+        return None
+    if bad_row == UNCHECKED and out is not None:
+        bad_row = _engine.first_bad_row(indices, n)
+    if bad_row >= 0:
+        raise bad_triangle(triangles, bad_row, n)
+    mesh = _engine.ExactMesh(taken, indices, view.how)
+    return Unsnapped(mesh, indices, triangles, points, source, np.empty(0, np.uint8), None)
+
+
+def take_mesh(
+    memory: Memory, vertices: ArrayLike, triangles: ArrayLike, view: View, *, with_depth: bool, out: object
+) -> Unsnapped:
+    """Take arrays as they are: for ``subpixel_bits="exact"``.
+
+    Indices and positions are checked while drawing, or here where an error may not leave a trace in the caller's `out`.
+    """
+    points, source = transform(vertices, view, out)
+    triangles = apart_from(out, "triangles", triangles)
+    if view.single_sided is not None:
+        raise ValueError("subpixel_bits must be in 0..16 where some triangles are single-sided, got 'exact'")
+    indices, bad_row = index(memory, triangles, len(points), view)
+    view.mark("input")
+    n = len(points) if len(indices) and 0 not in view.size else 0
+    if source.is_clip_space and n:
+        return project_mesh(memory, triangles, view, points, source, indices, bad_row, must_check=out is not None)
+    has_depth = with_depth and points.shape[1] == 3
+    taken, n_bad = take_points(memory, source, points, n, len(indices), view, must_check=out is not None or has_depth)
+    view.mark("vertices")
+    if bad_row == UNCHECKED and (out is not None or n == 0 or n_bad):
+        bad_row = _engine.first_bad_row(indices, len(points))
+    if bad_row >= 0:
+        raise bad_triangle(triangles, bad_row, len(points))
+    if n_bad:
+        check_finite(points, indices, with_depth=has_depth)
+    mesh = _engine.ExactMesh(taken, indices if n else indices[:0], view.how)
+    return Unsnapped(mesh, indices, triangles, points, source, np.empty(0, np.uint8), None)
+
+
+def project_mesh(
+    memory: Memory,
+    triangles: ArrayLike,
+    view: View,
+    points: NDArray[Any],
+    source: _engine.Source,
+    indices: NDArray[np.int32],
+    bad_row: int,
+    *,
+    must_check: bool,
+) -> Unsnapped:
+    """Take clip space to pixels, and cut triangles, without a snap."""
+    n, viewport = len(points), view.engine_viewport()
+    projected = memory.empty("points", (n, 3), np.float64)
+
+    def project_part(first: int, end: int) -> tuple[int, int]:
+        return source.project_points(first, end, viewport, projected)
+
+    counts = run_parts(project_part, n, choices.threads_to_snap(view.threads, n, len(indices)))
+    n_bad, n_clipped = map(sum, zip(*counts, strict=True))
+    view.mark("vertices")
+    if bad_row == UNCHECKED and (must_check or n_bad or n_clipped):
+        bad_row = _engine.first_bad_row(indices, n)
+    if bad_row >= 0:
+        raise bad_triangle(triangles, bad_row, n)
+    if n_bad:
+        check_projected(points, projected, indices)
+    pieces = None
+    if choices.must_cut(n_clipped):
+        pieces = _engine.ExactPieces(source, projected, indices, viewport)
+    view.mark("clip")
+    mesh = _engine.ExactMesh(projected, indices, view.how, source=source, pieces=pieces)
+    return Unsnapped(mesh, indices, triangles, points, source, np.empty(0, np.uint8), None)
+
+
+def take_points(
+    memory: Memory,
+    source: _engine.Source,
+    points: NDArray[Any],
+    n: int,
+    n_triangles: int,
+    view: View,
+    *,
+    must_check: bool,
+) -> tuple[NDArray[np.float64], int]:
+    """Return the first `n` points as float64, and how many of their numbers cannot be drawn, if that was looked at."""
+    is_same = points.dtype == np.float64
+    if not n or (is_same and not must_check):
+        return points[:n].astype(np.float64, copy=False), 0
+    taken = points if is_same else memory.empty("points", (n, points.shape[1]), np.float64)
+
+    def take_part(first: int, end: int) -> int:
+        return source.take(first, end, None if is_same else taken)
+
+    return taken, sum(run_parts(take_part, n, choices.threads_to_snap(view.threads, n, n_triangles)))
 
 
 def transform(vertices: ArrayLike, view: View, out: object = None) -> tuple[NDArray[Any], _engine.Source]:
@@ -224,3 +369,34 @@ def check_used_vertices(
         f"vertices must lie within 2**{62 - view.grid_bits} pixels of 0 with {view.grid_bits} sub-pixel bits, "
         f"got {row.tolist()} in row {i}"
     )
+
+
+def check_projected(points: NDArray[Any], projected: NDArray[np.float64], triangles: NDArray[np.int32]) -> None:
+    """Raise an error for the first vertex that is not finite behind its transform, if a triangle uses it."""
+    is_bad = np.isnan(projected[:, 0]) & (projected[:, 1] == BAD)
+    used = triangles[is_bad[triangles]]
+    if not used.size:
+        return
+    i = used.min()
+    row = points[i]
+    if not np.isfinite(row).all():
+        raise ValueError(f"vertices must be finite where a triangle uses them, got {row.tolist()} in row {i}")
+    raise ValueError(f"vertices must stay finite under transform, got {row.tolist()} in row {i}")
+
+
+def check_finite(points: NDArray[Any], triangles: NDArray[np.int32], *, with_depth: bool) -> None:
+    """Raise an error for the first vertex whose numbers cannot be drawn as they are, if a triangle uses it."""
+    is_bad = ~(abs(points[:, :2].astype(float)) <= (2.0**53 if points.dtype.kind == "i" else np.inf)).all(axis=1)
+    is_bad |= ~np.isfinite(points).all(axis=1)
+    if with_depth:
+        is_bad |= ~(abs(points[:, 2].astype(float)) <= np.finfo(np.float32).max)
+    used = triangles[is_bad[triangles]]
+    if not used.size:
+        return
+    i = used.min()
+    row = points[i]
+    if not np.isfinite(row).all():
+        raise ValueError(f"vertices must be finite where a triangle uses them, got {row.tolist()} in row {i}")
+    if points.dtype.kind == "i" and abs(row[:2].astype(float)).max() > 2.0**53:
+        raise ValueError(f"vertices must lie within 2**53 as integers for 'exact', got {row.tolist()} in row {i}")
+    raise ValueError(f"vertices must have a depth that float32 can hold, got {row.tolist()} in row {i}")

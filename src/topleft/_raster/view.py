@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypedDict
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol, TypedDict
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 __all__ = ["Planned", "View", "ViewOptions"]
 
 TEST_CODES = {Sampling.OUTER: 1, Sampling.INNER: 2}  # tl_test in csrc/topleft.h
+EXACT_BITS = 8  # of the grid that all samples lie on: TL_GRID_BITS in csrc/exact
+MAX_EXACT_PX = 2**48
 CULL_CODES = {Cull.NONE: 0, Cull.BACK: 1, Cull.FRONT: 2}  # tl_cull in csrc/topleft.h
 
 
@@ -47,7 +49,7 @@ class WindowOptions(TypedDict, total=False):
 
     origin: tuple[int, int]
     viewport: tuple[int, int] | None
-    subpixel_bits: int
+    subpixel_bits: int | Literal["exact"]
     method: MethodOption
     clip_depth: ClipDepthOption
     near_clip: bool
@@ -86,7 +88,7 @@ class View:
     origin: tuple[int, int]
     viewport: tuple[int, int]
     transform: ArrayLike | None
-    subpixel_bits: int
+    subpixel_bits: int  # EXACT_BITS when vertices are not snapped
     grid_bits: int  # of the grid that holds the snapped vertices and all samples
     sampling: Sampling
     method: int
@@ -99,6 +101,8 @@ class View:
     plan: Planned | None = None
     single_sided: tuple[NDArray[np.uint8], int] | None = None
     """1 for each triangle of which one side is not drawn, and the `tl_cull` that names that side."""
+    is_exact: bool = False
+    """Whether vertices stay where they are: ``subpixel_bits="exact"``."""
 
     @property
     def how(self) -> How:
@@ -130,13 +134,14 @@ class View:
         return TEST_CODES.get(self.sampling, 0)
 
     @classmethod
-    def parse(cls, size: object, options: ViewOptions) -> View:
-        """Check the options of a call."""
+    def parse(cls, size: object, options: ViewOptions, *, takes_exact: bool = False) -> View:
+        """Check the options of a call; `takes_exact`: the caller can draw vertices that are not snapped."""
         if not options.keys() <= OPTIONS:
             unknown = min(options.keys() - OPTIONS)
             raise TypeError(f"unknown option {unknown!r}; the options are {', '.join(ViewOptions.__annotations__)}")
         checked_size = as_size(size)
-        bits = as_subpixel_bits(options.get("subpixel_bits", 8))
+        is_exact = options.get("subpixel_bits") == "exact"
+        bits = EXACT_BITS if is_exact else as_subpixel_bits(options.get("subpixel_bits", 8))
         sampling = parse(Sampling, "sampling", options.get("sampling", "center"))
         grid_bits = bits if sampling.n_samples == 1 else max(SAMPLE_GRID_BITS, bits)
         viewport = options.get("viewport")
@@ -160,5 +165,25 @@ class View:
             far_clip=bool(options.get("far_clip", True)),
             threads=parse_threads(options.get("threads")),
             classic=method if method.code is None else None,
+            is_exact=is_exact,
         )
+        if is_exact:
+            check_exact(view, takes_exact=takes_exact)
         return view if plan is None else plan.fitted(view)
+
+
+def check_exact(view: View, *, takes_exact: bool) -> None:
+    """Raise an error where vertices that are not snapped cannot be drawn yet."""
+    wish = "subpixel_bits must be in 0..16"
+    if not takes_exact:
+        raise ValueError(f"{wish} here, got 'exact': it is there for coverage, overdraw, fill and rasterize")
+    if view.sampling in (Sampling.AREA, Sampling.OUTER, Sampling.INNER):
+        raise ValueError(
+            f"{wish} for sampling {str(view.sampling)!r}, got 'exact': that decides samples, 'center' and 'msaa2' to "
+            "'msaa16'"
+        )
+    if view.classic:
+        raise ValueError(f"{wish} for method {view.classic.name!r}, got 'exact': it has lanes of its own")
+    (x, y), (width, height) = view.origin, view.size
+    if max(abs(x), abs(y), abs(x + width), abs(y + height)) > MAX_EXACT_PX:
+        raise ValueError(f"origin and size must lie within {MAX_EXACT_PX} pixels of 0 for 'exact', got {(x, y)}")

@@ -165,6 +165,10 @@ class SceneFragments(InstanceIds, Fragments):
         height, width = self.id.shape
         return f"SceneFragments({width}x{height}, {len(self.whole)} instances, {self.whole.n_triangles} triangles)"
 
+    def __getstate__(self) -> dict[str, Any]:
+        """What another process needs: the parts refer to memory of this one, and are made there."""
+        return {name: value for name, value in vars(self).items() if name != "parts"}
+
     @property
     def whole(self) -> Scene:
         """The scene that ids count the triangles of."""

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from topleft import _engine
-from topleft._base.memory import FRESH, SCRATCH, KeptMemory, empty
+from topleft._base.memory import FRESH, SCRATCH, KeptMemory, check_fits, empty
 from topleft._base.options import DepthTest, Sampling, Sink, parse
 from topleft._base.threads import count_threads, run_parts
 from topleft._camera.camera import Camera
@@ -295,6 +295,7 @@ def draw_nearest(placed: PlacedScene, view: View, test: DepthTest | None = Depth
     sink = {None: Sink.PAINT, DepthTest.LESS: Sink.NEAREST, DepthTest.GREATER: Sink.FARTHEST}[test]
     (width, height), n = view.size, view.sampling.n_samples
     positions = [(0, 0)] if n == 1 else [(x, y) for x, y in sample_positions(n, view.grid_bits).tolist()]
+    check_fits((n, height, width), np.int32, np.float32)
     ids: NDArray[np.int32] = FRESH.empty("ids", (n, height, width), np.int32)
     depth: NDArray[np.float32] = FRESH.empty("depth", (n, height, width), np.float32)
     if width and height:

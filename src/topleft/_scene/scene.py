@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from topleft._base.arrays import INT32_MAX, as_square, check_regular, shown
+from topleft._base.arrays import INT32_MAX, as_square, check_regular, set_read_only, shown
 from topleft._model.mesh import Mesh, extreme_points, used_vertices
 from topleft._raster.clusters import Backoff
 from topleft._scene.adapt import MeshLike, as_mesh, is_mesh_like
@@ -52,6 +52,8 @@ class Instance:
     if TYPE_CHECKING:  # what is given may be anything that NumPy reads; what is kept is as above
 
         def __init__(self, mesh: Mesh, transform: npt.ArrayLike = ..., name: str | None = None) -> None: ...
+
+    __setstate__ = set_read_only
 
     def __post_init__(self) -> None:
         if not isinstance(self.mesh, Mesh):

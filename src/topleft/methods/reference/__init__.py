@@ -2,7 +2,8 @@
 
 In: vertices, triangles and options, as in the public calls, taken to be valid.  Out: what each pixel must hold.
 Each pixel centre in the bounding box of each triangle is tested on its own: three edge functions in integers, then
-the fill rule.  After the snap nothing is rounded: depths, weights and attributes are fractions.  Before it, clip space
+the fill rule.  After the snap nothing is rounded: depths, weights and attributes are fractions.  Vertices that are not
+snapped (``subpixel_bits="exact"``) are the fractions that their float64 numbers stand for.  Before it, clip space
 is float64 arithmetic in the order that the rules state; Python's floats are IEEE doubles, so this too is exact.
 
 Based on: J. Pineda, A Parallel Algorithm for Polygon Rasterization, 1988 (edge functions);
@@ -34,13 +35,14 @@ GUARD_FX = 2.0**60  # sub-pixels from the middle of the picture: inside, every p
 FLOAT32_MAX = 2.0**128 - 2.0**104
 
 Point = tuple[int, int]
+Coordinate = Any  # int, or Fraction where nothing is snapped
 Position = tuple[float, ...]  # in clip space: x, y, z, w and the weights b0, b1, b2 in the input triangle
 
 
 class Vertex(NamedTuple):
-    """A snapped vertex: fixed point, depth, w, and its weights in the input triangle."""
+    """A snapped vertex: fixed point (pixels where nothing is snapped), depth, w, its weights in the input triangle."""
 
-    xy_fx: Point
+    xy_fx: tuple[Coordinate, Coordinate]
     z: float
     w: float
     weights: Position
@@ -82,15 +84,19 @@ class Fragment(NamedTuple):
 # ---- vertices -------------------------------------------------------------------------------------------------------
 
 
-def snap(vertices: Any, subpixel_bits: int = 8) -> list[Point]:
+def snap(vertices: Any, subpixel_bits: int | str = 8) -> list[tuple[Coordinate, Coordinate]]:
     """Return ``(x_fx, y_fx)`` of pixel-space vertices ``(V, 2)`` or ``(V, 3)``, rounded to nearest, ties to even.
+
+    Pixels as they are, as fractions, with "exact".
 
     Examples
     --------
     >>> snap([[0.5, 1.5], [-0.5, 2.25]], subpixel_bits=0)
     [(0, 2), (0, 2)]
     """
-    scale = 2**subpixel_bits
+    if subpixel_bits == "exact":
+        return [(Fraction(p[0]), Fraction(p[1])) for p in np.asarray(vertices).tolist()]
+    scale = 2 ** int(subpixel_bits)
     return [(round(Fraction(p[0]) * scale), round(Fraction(p[1]) * scale)) for p in np.asarray(vertices).tolist()]
 
 
@@ -138,7 +144,7 @@ class Projection(NamedTuple):
     """From clip space to snapped vertices."""
 
     half_px: tuple[float, float]  # half the size of the whole picture
-    subpixel_bits: int
+    subpixel_bits: int | str
     zero_to_one: bool
     near_clip: bool
     far_clip: bool
@@ -146,7 +152,7 @@ class Projection(NamedTuple):
     def distances(self, p: Position) -> list[float]:
         """Return signed distances from the planes w, near, far, -x, +x, -y, +y; inside is >= 0."""
         x, y, z, w = p[:4]
-        x_guard, y_guard = (GUARD_FX / 2.0**self.subpixel_bits / half for half in self.half_px)
+        x_guard, y_guard = (GUARD_FX / 2.0 ** grid_bits(self.subpixel_bits) / half for half in self.half_px)
         near = z if self.zero_to_one else z + w
         return [
             w - W_MIN, near if self.near_clip else 0.0, w - z if self.far_clip else 0.0,
@@ -174,7 +180,7 @@ class Projection(NamedTuple):
     def put_on_plane(self, p: Position, k: int) -> Position:
         """Return a cut with the coordinate that plane k fixes set to its value, which rounding may have missed."""
         x, y, z, w = p[:4]
-        x_guard, y_guard = (GUARD_FX / 2.0**self.subpixel_bits / half for half in self.half_px)
+        x_guard, y_guard = (GUARD_FX / 2.0 ** grid_bits(self.subpixel_bits) / half for half in self.half_px)
         fixed = (
             (x, y, z, W_MIN), (x, y, 0.0 if self.zero_to_one else -w, w), (x, y, w, w),
             (-(x_guard * w), y, z, w), (x_guard * w, y, z, w), (x, -(y_guard * w), z, w), (x, y_guard * w, z, w),
@@ -190,9 +196,15 @@ class Projection(NamedTuple):
         z_px = max(z_px, 0.0 if self.near_clip else -FLOAT32_MAX)
         z_px = min(z_px, 1.0 if self.far_clip else FLOAT32_MAX)
         x_px, y_px = (x / w + 1.0) * self.half_px[0], (1.0 - y / w) * self.half_px[1]
-        if not max(abs(x_px), abs(y_px)) < 2.0 ** (62 - self.subpixel_bits):
+        farthest = inf if self.subpixel_bits == "exact" else 2.0 ** (62 - grid_bits(self.subpixel_bits))
+        if not max(abs(x_px), abs(y_px)) < farthest:
             return None
         return Vertex(snap([(x_px, y_px)], self.subpixel_bits)[0], z_px, w, p[4:])
+
+
+def grid_bits(subpixel_bits: int | str) -> int:
+    """Return the sub-pixel bits that say how far a vertex may lie: those of the default for "exact"."""
+    return 8 if subpixel_bits == "exact" else int(subpixel_bits)
 
 
 def cut(a: Position, b: Position, da: float, db: float) -> Position:
@@ -231,7 +243,7 @@ def _fan(polygon: list[Vertex], source_turn: int = 0) -> list[tuple[Vertex, Vert
 
 def pieces(
     vertices: Any, triangles: Any, size: Point, *, transform: Any = None, viewport: Point | None = None,
-    subpixel_bits: int = 8, cull: str = "none", clip_depth: str = "minus_one_to_one", near_clip: bool = True,
+    subpixel_bits: int | str = 8, cull: str = "none", clip_depth: str = "minus_one_to_one", near_clip: bool = True,
     far_clip: bool = True,
 ) -> list[Piece]:  # fmt: skip
     """Return the snapped triangles that are drawn, in drawing order, without the degenerate and the culled ones.
@@ -269,21 +281,22 @@ def pieces(
     return drawn
 
 
-def edge_function(a: Point, b: Point, p: Point) -> int:
+def edge_function(a: Any, b: Any, p: Any) -> Any:
     """Return twice the signed area of a, b, p: positive where p lies inside the edge of a triangle of positive area."""
     return (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0])
 
 
-def is_top_left(a: Point, b: Point) -> bool:
+def is_top_left(a: Any, b: Any) -> bool:
     """Tell whether an edge from a to b, of a triangle with positive signed area, is top or left."""
     is_top = b[1] == a[1] and b[0] > a[0]  # the edge function grows with y: the interior is below
     is_left = b[1] < a[1]  # the edge function grows with x: the interior is to the right
     return is_top or is_left
 
 
-def _signed_area(corners: tuple[Vertex, Vertex, Vertex]) -> int:
+def _signed_area(corners: tuple[Vertex, Vertex, Vertex]) -> Coordinate:
     a, b, c = (v.xy_fx for v in corners)
-    return edge_function(a, b, c)  # twice the area
+    area: Coordinate = edge_function(a, b, c)  # twice the area
+    return area
 
 
 def fragments(
@@ -293,18 +306,22 @@ def fragments(
 
     The frame is the window of the whole picture at ``origin``.  Each pixel is sampled at its centre, or ``sample``
     sixteenths of a pixel from it, -8 to 7.  Coordinates are sixteenths of a sub-pixel, so that samples are integers
-    even with 0 sub-pixel bits.
+    even with 0 sub-pixel bits; of vertices that are not snapped, sixteenths of what all corners of a piece are
+    multiples of.
     """
     bits, (x_origin, y_origin) = view.get("subpixel_bits", 8), origin
+    is_exact = bits == "exact"
     for piece in pieces(vertices, triangles, size, **view):
-        a, b, c = ((16 * v.xy_fx[0], 16 * v.xy_fx[1]) for v in piece.vertices)
+        unit = max(v.denominator for p in piece.vertices for v in p.xy_fx) if is_exact else 1 << bits
+        scale = 16 * unit if is_exact else 16
+        a, b, c = ((int(scale * v.xy_fx[0]), int(scale * v.xy_fx[1])) for v in piece.vertices)
         if edge_function(a, b, c) > 0:
             edges = [(b, c), (c, a), (a, b)]  # opposite the first, second and third vertex
         else:
             edges = [(c, b), (a, c), (b, a)]
         owned = [is_top_left(*edge) for edge in edges]
-        for row, column in touched_pixels(piece, size, origin, bits):
-            at = ((16 * (column + x_origin) + 8 + sample[0]) << bits, (16 * (row + y_origin) + 8 + sample[1]) << bits)
+        for row, column in touched_pixels(piece, size, origin, 0 if is_exact else bits):
+            at = ((16 * (column + x_origin) + 8 + sample[0]) * unit, (16 * (row + y_origin) + 8 + sample[1]) * unit)
             e0, e1, e2 = (edge_function(*edge, at) for edge in edges)
             if all(e > 0 or (e == 0 and is_owned) for e, is_owned in zip((e0, e1, e2), owned, strict=True)):
                 yield Fragment(row, column, piece, (e0, e1, e2))
@@ -312,7 +329,7 @@ def fragments(
 
 def touched_pixels(piece: Piece, size: Point, origin: Point, bits: int) -> Iterator[Point]:
     """Yield ``(row, column)`` of the pixels of the window that the bounding box of a piece touches."""
-    x_px, y_px = ([v.xy_fx[k] >> bits for v in piece.vertices] for k in range(2))
+    x_px, y_px = ([v.xy_fx[k] // 2**bits for v in piece.vertices] for k in range(2))
     for row in range(max(0, min(y_px) - origin[1]), min(size[1], max(y_px) + 1 - origin[1])):
         for column in range(max(0, min(x_px) - origin[0]), min(size[0], max(x_px) + 1 - origin[0])):
             yield row, column

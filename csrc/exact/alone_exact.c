@@ -1,0 +1,273 @@
+/* Alone: one triangle of any finite float64 vertices by itself, by the ends of rows in float64.
+ * In: points in pixels.  Out: spans of samples to the sink.
+ *
+ * As rows_exact.c, with u = 2^-53: setup and rows err by at most 9 u XY, so M = 12 u XY, and a quotient by 2.01 u of
+ * itself, 3 u for each column of the box.  What is not finite is asked.  Extents of any size may come: a box is the
+ * samples of the window, and the first of them lies in the extent. */
+#ifndef TL_ALONE_EXACT_C
+#define TL_ALONE_EXACT_C
+
+#include <float.h>
+#include <math.h>
+#include <stdint.h>
+
+#include "topleft.h"
+#include "lanes/lanes.h"
+#include "exact/rows_exact.c"
+#include "exact/setup_exact.c"
+#include "exact/sign.c"
+#include "raster/alone.c"
+#include "raster/setup.c"
+#include "raster/sink.c"
+
+/* A triangle by itself, with positive area. */
+typedef struct {
+    asked_triangle edges;
+    double inverse[3];        /* 1 / |dy| */
+    int asks_all;             /* some band is wider than half a column */
+    int64_t col, row, n_rows; /* the box in the window */
+    double z[3];
+    int has_plane;
+    double slope_x, slope_y;
+    scaled_number area; /* twice the area, unless has_plane */
+    int32_t id;
+} lone_triangle;
+
+/* The first pixel of [low, high) whose sample, so far from its upper left corner, is not left of x; `high` if none is.
+ * Exact: x - centre can only round to an integer that is too low. */
+static int64_t first_pixel(double x, double centre, int64_t low, int64_t high)
+{
+    if (low >= high || x <= (double)low + centre)
+        return low;
+    if (x > (double)(high - 1) + centre)
+        return high;
+    const int64_t n = (int64_t)ceil(x - centre);
+    return (double)n + centre < x ? n + 1 : n;
+}
+
+TL_INLINE double least_of(double a, double b, double c) { return fmin(fmin(a, b), c); }
+TL_INLINE double most_of(double a, double b, double c) { return fmax(fmax(a, b), c); }
+
+/* Whether a plane gives depth: not to slivers, nor where products leave the range of float64.  As draw_exact.c. */
+#define TL_LEAST_BOX 1e-250
+#define TL_MOST_EXTENT 1e120
+
+/* The same operations as plane_of_lanes in setup_exact.c. */
+static void plane_of_points(lone_triangle *t, double width, double height)
+{
+    const exact_point *p = t->edges.corners;
+    const double x1 = p[1].x - p[0].x, y1 = p[1].y - p[0].y, x2 = p[2].x - p[0].x, y2 = p[2].y - p[0].y;
+    const double area = x1 * y2 - y1 * x2, box = width * height, d1 = t->z[1] - t->z[0], d2 = t->z[2] - t->z[0];
+    t->has_plane = width <= TL_MOST_EXTENT && height <= TL_MOST_EXTENT && box >= TL_LEAST_BOX &&
+                   area * (double)(1 << TL_SLIVER_BITS) >= box;
+    if (!t->has_plane) {
+        t->area = edge_value(p[0], p[1], p[2]);
+        return;
+    }
+    const double inverse = 1.0 / area;
+    t->slope_x = (d1 * y2 - d2 * y1) * inverse;
+    t->slope_y = (d2 * x1 - d1 * x2) * inverse;
+}
+
+/* The depth of a sample by weights: parts of the area, each within 2^-49 of its size. */
+static float weighted_depth(const lone_triangle *t, exact_point sample)
+{
+    const exact_point *p = t->edges.corners;
+    const double w1 = scaled_quotient(edge_value(p[2], p[0], sample), t->area);
+    const double w2 = scaled_quotient(edge_value(p[0], p[1], sample), t->area);
+    return (float)(t->z[0] + (w1 * (t->z[1] - t->z[0]) + w2 * (t->z[2] - t->z[0]))) + 0.0f;
+}
+
+/* The edge functions at the first sample of the box, with their bands. */
+static void setup_lone_edges(const exact_state *s, lone_triangle *t, double width, double height)
+{
+    asked_triangle *e = &t->edges;
+    const double margin = 12.0 * 0x1p-53 * fmax(width, 1.0) * fmax(height, 1.0) * s->points->band;
+    for (int k = 0; k < 3; k++) {
+        const exact_point a = e->corners[k], b = e->corners[k == 2 ? 0 : k + 1];
+        const double dx = b.x - a.x, dy = b.y - a.y;
+        const double v = dy * (a.x - e->sample_x) - dx * (a.y - e->sample_y), inverse = 1.0 / fabs(dy);
+        const double band = margin * inverse + 3.0 * 0x1p-53 * (e->n_cols + 2) * s->points->band;
+        e->v[k] = v, e->dx[k] = dx, e->dy[k] = dy;
+        e->band[k] = margin < INFINITY && isfinite(v) && isfinite(dx) && band < 0.49 ? band
+                     : dy == 0.0                                                     ? 0.0
+                                                                                     : INFINITY;
+        t->inverse[k] = inverse < 1e290 ? inverse : 1e290;
+    }
+}
+
+/* The same from vertices that lie on 2^-8 px, near enough that 2E < 2^51: without a band.  Returns whether they do. */
+static int setup_on_grid(lone_triangle *t)
+{
+    asked_triangle *e = &t->edges;
+    const double unit = (double)(1 << TL_GRID_BITS);
+    int64_t x[3], y[3]; /* doubled, from the first sample */
+    for (int k = 0; k < 3; k++) {
+        const double x_fx = e->corners[k].x * unit, y_fx = e->corners[k].y * unit;
+        if (!(fabs(x_fx) < 0x1p23 && fabs(y_fx) < 0x1p23 && x_fx == floor(x_fx) && y_fx == floor(y_fx)))
+            return 0;
+        x[k] = (int64_t)(2.0 * (x_fx - e->sample_x * unit)), y[k] = (int64_t)(2.0 * (y_fx - e->sample_y * unit));
+    }
+    for (int k = 0; k < 3; k++) {
+        const int next = k == 2 ? 0 : k + 1;
+        const int64_t dx = (x[next] - x[k]) / 2, dy = (y[next] - y[k]) / 2;
+        const int top_left = dy < 0 || (dy == 0 && dx > 0);
+        e->v[k] = (double)((dy * x[k] - dx * y[k] - !top_left) >> (TL_GRID_BITS + 1)) + 0.5;
+        e->dx[k] = (double)dx, e->dy[k] = (double)dy, e->band[k] = -1.0;
+        t->inverse[k] = dy ? 1.0 / fabs((double)dy) : 1.0;
+    }
+    return 1;
+}
+
+/* The columns [*first, *end) of a row; returns whether it is in doubt.  0x1.8p52 makes the nearest integer: floor() is
+ * a call where there are no lanes. */
+TL_INLINE unsigned find_lone_end(const lone_triangle *t, int64_t row, int32_t *first, int32_t *end)
+{
+    const asked_triangle *e = &t->edges;
+    const double far = e->n_cols + 2.0, magic = 0x1.8p52;
+    double begin = 0.0, stop = e->n_cols;
+    int is_doubted = t->asks_all;
+    for (int k = 0; k < 3; k++) {
+        if (e->dy[k] == 0.0)
+            continue;
+        const double any_q = (e->v[k] + e->dx[k] * (double)row) * t->inverse[k], low_q = any_q < far ? any_q : far;
+        const double q = low_q > -far ? low_q : -far, nearest = (q + magic) - magic, off = q - nearest;
+        const double quotient = off < 0.0 ? nearest - 1.0 : nearest;
+        is_doubted |= (fabs(off) <= e->band[k]) & (q == any_q); /* beyond the box nothing is in doubt */
+        if (e->dy[k] < 0.0)
+            begin = -quotient > begin ? -quotient : begin;
+        else
+            stop = quotient + 1.0 < stop ? quotient + 1.0 : stop;
+    }
+    *first = (int32_t)begin, *end = (int32_t)(stop > 0.0 ? stop : 0.0);
+    return (unsigned)is_doubted;
+}
+
+/* The columns [first, end) of TL_LANES rows; returns the rows in doubt. */
+TL_INLINE unsigned find_lone_ends(const lone_triangle *t, int64_t row0, int32_t *first, int32_t *end)
+{
+    const asked_triangle *e = &t->edges;
+    if (TL_LANES == 1)
+        return find_lone_end(t, row0, first, end);
+    const vd rows = vd_add(vd_set1((double)row0), vd_from_vi(vi_iota())), low = vd_set1(0.0);
+    const vd high = vd_set1((double)e->n_cols);
+    vd begins = low, ends = high;
+    vm doubted = vm_first(t->asks_all ? TL_LANES : 0);
+    for (int k = 0; k < 3; k++) {
+        if (e->dy[k] == 0.0)
+            continue;
+        const vd v = vd_add(vd_set1(e->v[k]), vd_mul(vd_set1(e->dx[k]), rows));
+        const vd q = vd_mul(v, vd_set1(t->inverse[k])), quotient = vd_floor(q);
+        doubted = vm_or(doubted, vd_ge(vd_set1(e->band[k]), vd_abs(vd_off_integer(q))));
+        if (e->dy[k] < 0.0)
+            begins = vd_max(begins, vd_sub(low, quotient));
+        else
+            ends = vd_min(ends, vd_add(quotient, vd_set1(1.0)));
+    }
+    vi_store(first, vi_round(vd_min(begins, high)));
+    vi_store(end, vi_round(vd_max(ends, low)));
+    return vm_bits(doubted);
+}
+
+/* The samples [first, end) of a row of the box, with depth; `at` is the first sample of the row. */
+TL_INLINE void put_lone_depths(const tl_target *target, tl_sink sink, const lone_triangle *t, int64_t row, int64_t at,
+                               int32_t first, int32_t end)
+{
+    const exact_point *p = t->edges.corners;
+    const double y = t->edges.sample_y + (double)row;
+    if (!t->has_plane) {
+        for (int32_t col = first; col < end; col++) {
+            const float z = weighted_depth(t, (exact_point){t->edges.sample_x + (double)col, y});
+            put_depths(target, sink, at + col, vm_first(1), vf_set1(z), t->id);
+        }
+        return;
+    }
+    const vd z_row = vd_set1(t->z[0] + t->slope_y * (y - p[0].y)), slope_x = vd_set1(t->slope_x), steps = ramp(1.0);
+    const vd x0 = vd_set1(p[0].x);
+    for (int32_t col = first; col < end; col += TL_LANES) {
+        const vd x = vd_sub(vd_add(vd_set1(t->edges.sample_x + (double)col), steps), x0);
+        put_depths(target, sink, at + col, vm_first(end - col), sum_depth(z_row, vd_mul(slope_x, x)), t->id);
+    }
+}
+
+/* Sets up triangle i; returns whether there is anything to draw.  A vertex that is not finite ends the pass. */
+static int setup_lone(exact_state *s, int32_t i, lone_triangle *t, int with_depth)
+{
+    const int32_t *corners = s->mesh->triangles + 3 * (int64_t)i;
+    asked_triangle *e = &t->edges;
+    exact_point *p = e->corners;
+    load_turned(s, i, 0, p);
+    const double x0 = least_of(p[0].x, p[1].x, p[2].x), x1 = most_of(p[0].x, p[1].x, p[2].x);
+    const double y0 = least_of(p[0].y, p[1].y, p[2].y), y1 = most_of(p[0].y, p[1].y, p[2].y);
+    for (int k = 0; k < 3; k++)
+        if (!isfinite(p[k].x) || !isfinite(p[k].y)) {
+            s->bad_row = i;
+            return 0;
+        }
+    t->col = first_pixel(x0, s->centre_x, s->left, s->right), t->row = first_pixel(y0, s->centre_y, s->top, s->bottom);
+    e->n_cols = (int)(first_pixel(x1, s->centre_x, s->left, s->right) - t->col);
+    t->n_rows = first_pixel(y1, s->centre_y, s->top, s->bottom) - t->row;
+    if (e->n_cols <= 0 || t->n_rows <= 0)
+        return 0;
+    const int sign = edge_sign(p[0], p[1], p[2], s->counts), second = sign < 0 ? 2 : 1;
+    if (is_culled(sign, s->mesh->cull))
+        return 0;
+    load_turned(s, i, sign < 0, p);
+    e->sample_x = (double)t->col + s->centre_x, e->sample_y = (double)t->row + s->centre_y;
+    t->id = name_of(s->mesh, i);
+    if (!setup_on_grid(t))
+        setup_lone_edges(s, t, x1 - x0, y1 - y0);
+    t->asks_all = e->band[0] == INFINITY || e->band[1] == INFINITY || e->band[2] == INFINITY;
+    if (with_depth) {
+        const int32_t ordered[3] = {corners[0], corners[second], corners[3 - second]};
+        for (int k = 0; k < 3; k++)
+            t->z[k] = s->points->stride < 3 ? 0.0 : s->points->points[(int64_t)ordered[k] * 3 + 2];
+        plane_of_points(t, x1 - x0, y1 - y0);
+    }
+    s->counts->n_triangles++;
+    return 1;
+}
+
+/* The ends of the rows in doubt, by the exact sign. */
+static __attribute__((noinline)) void ask_lone_ends(const asked_triangle *a, int64_t row0, unsigned doubted,
+                                                    int32_t *first, int32_t *end, tl_exact_counts *counts)
+{
+    counts->n_asked += __builtin_popcount(doubted);
+    for (; doubted; doubted &= doubted - 1) {
+        const int k = __builtin_ctz(doubted);
+        int64_t from, to;
+        decide_row(a, row0 + k, &from, &to, counts);
+        first[k] = (int32_t)from, end[k] = (int32_t)to;
+    }
+}
+
+TL_INLINE void draw_lone(exact_state *s, int32_t i, tl_sink sink)
+{
+    const tl_target target = *s->target; /* copies that no store can change */
+    lone_triangle found;
+    int32_t first[TL_MAX_LANES], end[TL_MAX_LANES];
+    if (!setup_lone(s, i, &found, sink_has_depth(sink)))
+        return;
+    const lone_triangle t = found;
+    const int64_t stride = target.stride_px, corner = (t.row - s->top) * stride + t.col - s->left;
+    tl_count_work(s->window, t.n_rows * t.edges.n_cols);
+    for (int64_t row0 = 0; row0 < t.n_rows; row0 += TL_LANES) {
+        const int n = t.n_rows - row0 < TL_LANES ? (int)(t.n_rows - row0) : TL_LANES;
+        const unsigned doubted = find_lone_ends(&t, row0, first, end) & ((1u << n) - 1);
+        if (__builtin_expect(doubted != 0, 0))
+            ask_lone_ends(&found.edges, row0, doubted, first, end, s->counts);
+        for (int k = 0; k < n; k++) {
+            const int64_t at = corner + (row0 + k) * stride;
+            if (first[k] >= end[k])
+                continue;
+            if (sink_has_depth(sink))
+                put_lone_depths(&target, sink, &t, row0 + k, at, first[k], end[k]);
+            else
+                put_plain(&target, sink, at + first[k], end[k] - first[k], t.id);
+        }
+    }
+}
+
+TL_SINK_COPIES(draw_lone, (exact_state * s, int32_t i), s, i)
+
+#endif

@@ -1,0 +1,148 @@
+/* Boxes: triangles with boxes of up to 4x4 samples, at every sample of TL_LANES boxes.
+ * In: queues of setup_exact.c.  Out: lists of samples.
+ *
+ * A sample at which the least of three edge functions lies beyond the band of doubt is decided by it; the others are
+ * asked. */
+#ifndef TL_BOXES_EXACT_C
+#define TL_BOXES_EXACT_C
+
+#include <stdint.h>
+
+#include "topleft.h"
+#include "lanes/lanes.h"
+#include "exact/setup_exact.c"
+#include "exact/sign.c"
+#include "raster/alone.c"
+#include "raster/batch.c"
+#include "raster/fragments.h"
+#include "raster/sink.c"
+
+typedef vm box_masks[TL_SMALL_BOX][TL_SMALL_BOX];
+
+/* The lanes whose boxes have a sample at a place. */
+TL_INLINE vm in_box(vm live, vi n_cols, vi n_rows, int row, int col)
+{
+    return vm_and(live, vm_and(vi_gt(n_rows, vi_set1(row)), vi_gt(n_cols, vi_set1(col))));
+}
+
+/* Sets `in` to what lanes decide; returns the lanes that are in doubt at some sample. */
+TL_INLINE vm test_boxes(const lane_exact *t, vi n_cols, vi n_rows, int size, box_masks in)
+{
+    const vf band = vf_select(t->on_grid, vf_set1(0.0f), vf_mul(t->xy, vf_set1(TL_BOX_BAND)));
+    const vf below = vf_sub(vf_set1(0.0f), band);
+    vm doubted = vm_first(0);
+    vf row_e[3] = {t->e[0], t->e[1], t->e[2]};
+    for (int row = 0; row < size; row++) {
+        vf e[3] = {row_e[0], row_e[1], row_e[2]};
+        for (int col = 0; col < size; col++) {
+            const vm box = in_box(t->live, n_cols, n_rows, row, col);
+            const vf least = vf_min(vf_min(e[0], e[1]), e[2]);
+            in[row][col] = vm_and(box, vf_lt(band, least));
+            doubted = vm_or(doubted, vm_and_not(vm_and(box, vf_ge(least, below)), in[row][col]));
+            for (int k = 0; k < 3; k++)
+                e[k] = vf_sub(e[k], t->dy[k]);
+        }
+        for (int k = 0; k < 3; k++)
+            row_e[k] = vf_add(row_e[k], t->dx[k]);
+    }
+    return vm_and_not(doubted, t->on_grid);
+}
+
+/* Decides the samples in doubt that float64 lanes can; returns the others. */
+TL_INLINE vm decide_samples(const lane_exact *t, int row, int col, vm doubted, vm *inside)
+{
+    const vd px = vd_add(t->sample_x, vd_set1(col)), py = vd_add(t->sample_y, vd_set1(row));
+    vm in = doubted, out = vm_first(0);
+    for (int k = 0; k < 3; k++) {
+        const lane_sides_of_edge sides = sides_of_edge(t->x, t->y, k, px, py);
+        in = vm_and(in, sides.inside), out = vm_or(out, sides.outside);
+    }
+    *inside = vm_or(*inside, in);
+    return vm_and_not(vm_and_not(doubted, in), out);
+}
+
+/* Decides the samples in doubt: on the grid by lanes, then by float64, then by the exact sign. */
+static __attribute__((noinline)) void ask_boxes(exact_state *s, const exact_queue *queue, int i, lane_exact *t,
+                                                vi n_cols, vi n_rows, int size, box_masks in)
+{
+    const box_queue *q = &queue->boxes;
+    const unsigned turned = vm_bits(t->turned);
+    try_grid(s, t);
+    const vf band = vf_select(t->on_grid, vf_set1(0.0f), vf_mul(t->xy, vf_set1(TL_BOX_BAND)));
+    const vf below = vf_sub(vf_set1(0.0f), band);
+    for (int row = 0; row < size; row++) {
+        vf e[3] = {t->e[0], t->e[1], t->e[2]};
+        for (int col = 0; col < size; col++) {
+            const vm box = in_box(t->live, n_cols, n_rows, row, col);
+            const vf least = vf_min(vf_min(e[0], e[1]), e[2]);
+            vm inside = vm_and(box, vf_lt(band, least));
+            const vm near = vm_and_not(vm_and_not(vm_and(box, vf_ge(least, below)), inside), t->on_grid);
+            if (vm_any(near)) {
+                unsigned left = vm_bits(decide_samples(t, row, col, near, &inside)), found = 0;
+                s->counts->n_asked += __builtin_popcount(vm_bits(near));
+                for (; left; left &= left - 1) {
+                    const int k = __builtin_ctz(left);
+                    exact_point p[3];
+                    load_turned(s, q->id[i + k], turned >> k & 1, p);
+                    const exact_point sample = {q->col[i + k] + col + s->centre_x, q->row[i + k] + row + s->centre_y};
+                    found |= (unsigned)is_inside(p, sample, s->counts) << k;
+                }
+                inside = vm_or(inside, vm_from_bits(found));
+            }
+            in[row][col] = inside;
+            for (int k = 0; k < 3; k++)
+                e[k] = vf_sub(e[k], t->dy[k]);
+        }
+        for (int k = 0; k < 3; k++)
+            t->e[k] = vf_add(t->e[k], t->dx[k]);
+    }
+}
+
+TL_INLINE void flush_boxes(exact_state *s, exact_queue *queue, int size, tl_sink sink)
+{
+    const box_queue *q = &queue->boxes;
+    const int32_t stride = (int32_t)s->target->stride_px;
+    int n_fragments = s->fragments.n;
+    for (int i = 0; i < q->n; i += TL_LANES) {
+        lane_exact t;
+        exact_planes p;
+        box_masks in;
+        const vi box = vi_load(q->size + i);
+        const vi n_cols = vi_and(box, vi_set1(0xffff)), n_rows = vi_shift_right(box, 16);
+        pop_exact(s, queue, i, &t);
+        const vi id = names_of(s->mesh, vm_first(q->n - i), vi_load(q->id + i)), sample = t.sample;
+        vd z_col[TL_SMALL_BOX];
+        if (sink_has_depth(sink)) {
+            p = plane_of_lanes(s, queue, i, &t);
+            for (int col = 0; col < size; col++)
+                z_col[col] = col_depth(&p, &t, col);
+        }
+        if (__builtin_expect(vm_any(test_boxes(&t, n_cols, n_rows, size, in)), 0))
+            ask_boxes(s, queue, i, &t, n_cols, n_rows, size, in);
+        for (int row = 0; row < size; row++) {
+            vd z_row;
+            if (sink_has_depth(sink))
+                z_row = row_depth(&p, &t, row);
+            for (int col = 0; col < size; col++)
+                if (TL_LANES > 1 || vm_any(in[row][col]))
+                    n_fragments = emit(&s->fragments, n_fragments, sink, in[row][col],
+                                       vi_add(sample, vi_set1(row * stride + col)), id,
+                                       sink_has_depth(sink) ? sum_depth(z_row, z_col[col]) : vf_set1(0.0f));
+            if ((row & 1) == 1 && n_fragments > TL_FRAGMENTS) {
+                flush_fragments(s->target, sink, &s->fragments, n_fragments);
+                n_fragments = 0;
+            }
+        }
+    }
+    queue->boxes.n = 0;
+    s->fragments.n = n_fragments;
+}
+
+/* Boxes of up to 2x2 and of up to 4x4 samples. */
+TL_INLINE void flush_tiny_exact(exact_state *s, tl_sink sink) { flush_boxes(s, &s->tiny, 2, sink); }
+TL_INLINE void flush_small_exact(exact_state *s, tl_sink sink) { flush_boxes(s, &s->small, TL_SMALL_BOX, sink); }
+
+TL_SINK_COPIES(flush_tiny_exact, (exact_state * s), s)
+TL_SINK_COPIES(flush_small_exact, (exact_state * s), s)
+
+#endif

@@ -1,0 +1,294 @@
+/* Setup: a vector of triangles whose vertices are not snapped, as edge functions in float32 with a band of doubt.
+ * In: points in pixels, a queue of boxes.  Out: lane_exact; which lanes lie on a grid; planes of depth.
+ *
+ * The edge functions are set up in float64 from the points as they are, relative to the first sample of the box, and
+ * rounded once to float32.  Extents are at most TL_MAX_BOX_PX.  u = 2^-24; X = max(width, 1), Y = max(height, 1) of the
+ * extent.  The first sample lies in the extent, so every |x - cx| <= X, and any E in the box is at most XY.
+ *
+ * 1. float64: differences, two products, their difference: at most 8 * 2^-53 XY = 2^-26 u XY, in the slack of what
+ *    follows.  Rounding to float32 errs by |e0| u, |dx| u, |dy| u.
+ * 2. E at row i <= height and column k <= width is e0 + i dx - k dy: those errors add up to 3 u XY.
+ *    Boxes of up to 4x4 samples step by six additions of values up to XY: 6 u XY.  Hence what lies within 10 u XY of 0
+ *    is asked (TL_BOX_BAND).
+ * 3. Rows: v = e0 + i dx, rounded once or twice, errs by 5 u XY at most from E at column 0, the errors of k dy for any
+ *    column k included: |v - k d - E| <= 5 u XY < M = 6 u XY, d = |dy|.  q = v * (1 / d) errs by 2.01 u |q|.
+ *    Where |q - k| > M / d + 2.01 u |q| the sign of v - k d is that of E.  So a row end is asked where
+ *    |q - nearest integer| <= M / d + 36 u in boxes of up to 17 columns, 130 u in those of up to 62.
+ *    Farther out both ends of the comparison are clamped to the box.
+ * 4. A band above 1/2, of a nearly level edge, asks every row: |q - nearest integer| <= 1/2.  A level edge is never
+ *    asked: the box, which is exact, says what it says.  A difference that only float32 takes for 0 is set to 1e-30.
+ * 5. Vertices on 2^-8 px: the same numbers as integers of 2^-8 px, as batch.c and rows.c have them, which are exact:
+ *    the band is 0.  Ties are systematic on grids, so lanes that ask are looked at.
+ *
+ * tests/raster/test_exact.py draws with bands four times narrower, which give wrong pictures. */
+#ifndef TL_SETUP_EXACT_C
+#define TL_SETUP_EXACT_C
+
+#include <stdint.h>
+#include <string.h>
+
+#include "topleft.h"
+#include "lanes/lanes.h"
+#include "exact/sign.c"
+#include "raster/batch.c"
+#include "raster/setup.c"
+#include "raster/sink.c"
+
+#define TL_BOX_BAND 0x1.4p-21f /* 10 u */
+#define TL_ROW_BAND 0x1.8p-22f /* 6 u */
+#define TL_GRID_BITS 8
+
+/* A queue of boxes, and X * Y of each extent. */
+typedef struct {
+    box_queue boxes;
+    float xy[TL_QUEUE + TL_MAX_LANES];
+} exact_queue;
+
+/* Everything that one pass over a mesh needs; on the stack of draw_exact. */
+typedef struct {
+    const tl_snapped *mesh;
+    const tl_exact_points *points;
+    const tl_window *window;
+    const tl_target *target;
+    tl_exact_counts *counts;
+    int64_t left, top, right, bottom; /* picture pixels */
+    double centre_x, centre_y;        /* of a pixel's sample, from its upper left corner */
+    vi last_vertex;
+    int64_t bad_row;    /* of triangles, -1: none so far */
+    int may_be_on_grid; /* the triangles that asked last were */
+    exact_queue tiny, small, middle, rows;
+    fragment_list fragments;
+} exact_state;
+
+/* TL_LANES triangles, turned so that their areas are positive. */
+typedef struct {
+    vd x[3], y[3];
+    vd sample_x, sample_y; /* the first sample of the box, in the picture */
+    vf e[3], dx[3], dy[3]; /* edge functions there, and what a row adds and a column subtracts */
+    vf xy;                 /* X * Y */
+    vi sample;             /* the first sample: row * stride_px + column */
+    vm live;               /* of those that are there, the ones with an area, and that are not culled */
+    vm turned;             /* corners 1 and 2 have changed places */
+    vm on_grid;            /* e, dx and dy are exact, in units of their own */
+} lane_exact;
+
+/* z = (z0 + slope_y * (y - y0)) + slope_x * (x - x0), in pixels from corner 0. */
+typedef struct {
+    vd z0, slope_x, slope_y;
+} exact_planes;
+
+TL_INLINE exact_point point_of(const tl_exact_points *points, int32_t i)
+{
+    const double *p = points->points + (int64_t)i * points->stride;
+    return (exact_point){p[0], p[1]};
+}
+
+/* The corners of a triangle that is turned, or not. */
+TL_INLINE void load_turned(const exact_state *s, int32_t id, int is_turned, exact_point *p)
+{
+    const int32_t *corners = s->mesh->triangles + 3 * (int64_t)id;
+    p[0] = point_of(s->points, corners[0]);
+    p[1] = point_of(s->points, corners[is_turned ? 2 : 1]);
+    p[2] = point_of(s->points, corners[is_turned ? 1 : 2]);
+}
+
+/* Twice the area; deterministic up to the sign when corners change places. */
+TL_INLINE vd area_of_points(const vd *x, const vd *y)
+{
+    const vd x1 = vd_sub(x[1], x[0]), y1 = vd_sub(y[1], y[0]), x2 = vd_sub(x[2], x[0]), y2 = vd_sub(y[2], y[0]);
+    return vd_sub(vd_mul(x1, y2), vd_mul(y1, x2));
+}
+
+/* Asks for the sign of the area of each lane in `doubted`. */
+static __attribute__((noinline)) void ask_turns(const exact_state *s, const int32_t *ids, unsigned doubted,
+                                                unsigned *negative, unsigned *flat)
+{
+    for (; doubted; doubted &= doubted - 1) {
+        const int k = __builtin_ctz(doubted);
+        exact_point p[3];
+        load_turned(s, ids[k], 0, p);
+        const int sign = edge_sign(p[0], p[1], p[2], s->counts);
+        *negative = (*negative & ~(1u << k)) | (unsigned)(sign < 0) << k;
+        *flat |= (unsigned)(sign == 0) << k;
+        s->counts->n_turns++;
+    }
+}
+
+/* Turns the triangles and marks those that are drawn: of a float64 area the sign holds beyond 2^-51 of its terms (J. R.
+ * Shewchuk), and is asked for otherwise. */
+TL_INLINE void turn_lanes(const exact_state *s, const int32_t *ids, lane_exact *t)
+{
+    const vd x1 = vd_sub(t->x[1], t->x[0]), y1 = vd_sub(t->y[1], t->y[0]);
+    const vd x2 = vd_sub(t->x[2], t->x[0]), y2 = vd_sub(t->y[2], t->y[0]);
+    const vd left = vd_mul(x1, y2), right = vd_mul(y1, x2), zero = vd_set1(0.0);
+    const vd size = vd_add(vd_abs(left), vd_abs(right));
+    const vd bound = vd_max(vd_mul(size, vd_set1(0x1p-51)), vd_set1(1e-280));
+    const vd area = vd_sub(left, right);
+    const vm positive = vd_ge(area, bound), negative = vd_ge(vd_sub(zero, area), bound);
+    const unsigned doubted = vm_bits(vm_and_not(t->live, vm_or(positive, negative)));
+    t->turned = negative;
+    if (__builtin_expect(doubted != 0, 0)) {
+        unsigned turned = vm_bits(negative), flat = 0;
+        ask_turns(s, ids, doubted, &turned, &flat);
+        t->turned = vm_from_bits(turned);
+        t->live = vm_and_not(t->live, vm_from_bits(flat));
+    }
+    if (s->mesh->cull == TL_CULL_BACK)
+        t->live = vm_and(t->live, t->turned);
+    else if (s->mesh->cull == TL_CULL_FRONT)
+        t->live = vm_and_not(t->live, t->turned);
+    const vd x = t->x[1], y = t->y[1];
+    t->x[1] = vd_select(t->turned, t->x[2], x), t->y[1] = vd_select(t->turned, t->y[2], y);
+    t->x[2] = vd_select(t->turned, x, t->x[2]), t->y[2] = vd_select(t->turned, y, t->y[2]);
+}
+
+/* Edge functions in float32, as the head of this file tells. */
+TL_INLINE void set_float_edges(lane_exact *t)
+{
+    const vd zero = vd_set1(0.0), least = vd_set1(0x1p-1074);
+    const vf least_f = vf_set1(1e-30f);
+    for (int k = 0; k < 3; k++) {
+        const int next = k == 2 ? 0 : k + 1;
+        const vd dx = vd_sub(t->x[next], t->x[k]), dy = vd_sub(t->y[next], t->y[k]);
+        const vd x = vd_sub(t->x[k], t->sample_x), y = vd_sub(t->y[k], t->sample_y);
+        t->e[k] = vf_from_vd(vd_sub(vd_mul(dy, x), vd_mul(dx, y)));
+        t->dx[k] = vf_from_vd(dx), t->dy[k] = vf_from_vd(dy);
+        const vm level = vm_and(vf_lt(t->dy[k], least_f), vf_lt(vf_set1(-1e-30f), t->dy[k]));
+        if (__builtin_expect(vm_any(level), 0)) {
+            const vm down = vm_and(level, vd_ge(dy, least)), up = vm_and(level, vd_ge(vd_sub(zero, dy), least));
+            t->dy[k] =
+                vf_select(down, least_f, vf_select(up, vf_set1(-1e-30f), vf_select(level, vf_set1(0.0f), t->dy[k])));
+        }
+    }
+}
+
+/* The triangles of which all vertices lie on 2^-8 px. */
+static __attribute__((noinline)) vm find_on_grid(const lane_exact *t)
+{
+    vm good = vm_all();
+    for (int k = 0; k < 3; k++) {
+        const vd unit = vd_set1((double)(1 << TL_GRID_BITS)), x = vd_mul(t->x[k], unit), y = vd_mul(t->y[k], unit);
+        good = vm_and(good, vm_and(vd_ge(vd_floor(x), x), vd_ge(vd_floor(y), y)));
+    }
+    return good;
+}
+
+/* Sets the edge functions of the lanes in m to those of batch.c, half a unit inwards: none is ever 0 at a sample. */
+static __attribute__((noinline)) void set_grid_edges(lane_exact *t, vm m)
+{
+    vi x[3], y[3]; /* doubled, from the first sample */
+    const vd unit2 = vd_set1((double)(2 << TL_GRID_BITS));
+    for (int k = 0; k < 3; k++) {
+        x[k] = vi_round(vd_mul(vd_sub(t->x[k], t->sample_x), unit2));
+        y[k] = vi_round(vd_mul(vd_sub(t->y[k], t->sample_y), unit2));
+    }
+    for (int k = 0; k < 3; k++) {
+        const int next = k == 2 ? 0 : k + 1;
+        const vi dx = vi_shift_right(vi_sub(x[next], x[k]), 1), dy = vi_shift_right(vi_sub(y[next], y[k]), 1);
+        const vi doubled = vi_sub(vi_mul(dy, x[k]), vi_mul(dx, y[k]));
+        const vm top_left = vi_gt(vi_set1(0), vi_sub(vi_shift_left(dy, 16), dx));
+        const vi e = vi_shift_right(vi_select(top_left, doubled, vi_sub(doubled, vi_set1(1))), TL_GRID_BITS + 1);
+        t->e[k] = vf_select(m, vf_add(vf_from_vi(e), vf_set1(0.5f)), t->e[k]);
+        t->dx[k] = vf_select(m, vf_from_vi(dx), t->dx[k]);
+        t->dy[k] = vf_select(m, vf_from_vi(dy), t->dy[k]);
+    }
+    t->on_grid = m;
+}
+
+/* Looks whether triangles that ask lie on the grid, and if so takes their edges from it; returns which. */
+static __attribute__((noinline)) vm try_grid(exact_state *s, lane_exact *t)
+{
+    const vm good = vm_and_not(find_on_grid(t), t->on_grid);
+    if (vm_any(vm_and(good, t->live))) {
+        set_grid_edges(t, vm_or(good, t->on_grid));
+        s->may_be_on_grid = 1;
+    }
+    return good;
+}
+
+/* Whether points lie inside edge k of TL_LANES triangles, or outside, beyond the error of float64 (Shewchuk's bound A);
+ * in neither where the exact sign is to be asked. */
+typedef struct {
+    vm inside, outside;
+} lane_sides_of_edge;
+
+TL_INLINE lane_sides_of_edge sides_of_edge(const vd *x, const vd *y, int k, vd px, vd py)
+{
+    const int next = k == 2 ? 0 : k + 1;
+    const vd left = vd_mul(vd_sub(x[next], x[k]), vd_sub(py, y[k]));
+    const vd right = vd_mul(vd_sub(y[next], y[k]), vd_sub(px, x[k]));
+    const vd size = vd_add(vd_abs(left), vd_abs(right)), e = vd_sub(left, right);
+    const vd bound = vd_add(vd_mul(size, vd_set1(0x1p-51)), vd_set1(1e-280));
+    return (lane_sides_of_edge){vd_ge(e, bound), vd_ge(vd_sub(vd_set1(0.0), e), bound)};
+}
+
+/* The triangles [i, i + TL_LANES) of a queue, turned and with edge functions. */
+TL_INLINE void pop_exact(exact_state *s, const exact_queue *queue, int i, lane_exact *t)
+{
+    const box_queue *q = &queue->boxes;
+    const int n = q->n;
+    int32_t corners[3 * TL_LANES];
+    for (int k = 0; k < TL_LANES; k++) /* lanes behind the end repeat the last triangle */
+        memcpy(corners + 3 * k, s->mesh->triangles + 3 * (int64_t)q->id[i + k < n ? i + k : n - 1],
+               3 * sizeof *corners);
+    for (int k = 0; k < 3; k++)
+        vd_load_pairs(s->points->points, s->points->stride, corners + k, &t->x[k], &t->y[k]);
+    const vi col = vi_load(q->col + i), row = vi_load(q->row + i);
+    t->sample_x = vd_add(vd_from_vi(col), vd_set1(s->centre_x));
+    t->sample_y = vd_add(vd_from_vi(row), vd_set1(s->centre_y));
+    t->sample = vi_add(vi_mul(vi_sub(row, vi_set1((int32_t)s->top)), vi_set1((int32_t)s->target->stride_px)),
+                       vi_sub(col, vi_set1((int32_t)s->left)));
+    t->live = vm_first(n - i);
+    t->xy = vf_mul(vf_load(queue->xy + i), vf_set1((float)s->points->band));
+    t->on_grid = vm_first(0);
+    turn_lanes(s, q->id + i, t);
+    const vm good = s->may_be_on_grid ? find_on_grid(t) : vm_first(0);
+    if (!s->may_be_on_grid || vm_any(vm_and_not(vm_all(), good)))
+        set_float_edges(t);
+    if (__builtin_expect(s->may_be_on_grid, 0)) {
+        if (vm_any(good))
+            set_grid_edges(t, good);
+        s->may_be_on_grid = vm_any(good);
+    }
+    s->counts->n_triangles += n - i < TL_LANES ? n - i : TL_LANES;
+    s->counts->n_on_grid += __builtin_popcount(vm_bits(vm_and(t->on_grid, t->live)));
+}
+
+/* The depth planes.  The same operations as plane_of_points in alone_exact.c. */
+TL_INLINE exact_planes plane_of_lanes(const exact_state *s, const exact_queue *queue, int i, const lane_exact *t)
+{
+    exact_planes p = {vd_set1(0.0), vd_set1(0.0), vd_set1(0.0)};
+    if (s->points->stride < 3)
+        return p;
+    const box_queue *q = &queue->boxes;
+    const int n = q->n;
+    int32_t corners[3 * TL_LANES];
+    vd z[3];
+    for (int k = 0; k < TL_LANES; k++)
+        memcpy(corners + 3 * k, s->mesh->triangles + 3 * (int64_t)q->id[i + k < n ? i + k : n - 1],
+               3 * sizeof *corners);
+    for (int k = 0; k < 3; k++)
+        z[k] = vd_load_singles(s->points->points + 2, s->points->stride, corners + k);
+    const vd z1 = vd_select(t->turned, z[2], z[1]), z2 = vd_select(t->turned, z[1], z[2]);
+    const vd x1 = vd_sub(t->x[1], t->x[0]), y1 = vd_sub(t->y[1], t->y[0]);
+    const vd x2 = vd_sub(t->x[2], t->x[0]), y2 = vd_sub(t->y[2], t->y[0]);
+    const vd d1 = vd_sub(z1, z[0]), d2 = vd_sub(z2, z[0]);
+    const vd inverse = vd_div(vd_set1(1.0), vd_sub(vd_mul(x1, y2), vd_mul(y1, x2)));
+    p.z0 = z[0];
+    p.slope_x = vd_mul(vd_sub(vd_mul(d1, y2), vd_mul(d2, y1)), inverse);
+    p.slope_y = vd_mul(vd_sub(vd_mul(d2, x1), vd_mul(d1, x2)), inverse);
+    return p;
+}
+
+/* z0 + slope_y * (y - y0), and slope_x * (x - x0), of the samples so many rows or columns behind the first. */
+TL_INLINE vd row_depth(const exact_planes *p, const lane_exact *t, double row)
+{
+    const vd y = vd_sub(vd_add(t->sample_y, vd_set1(row)), t->y[0]);
+    return vd_add(p->z0, vd_mul(p->slope_y, y));
+}
+TL_INLINE vd col_depth(const exact_planes *p, const lane_exact *t, double col)
+{
+    return vd_mul(p->slope_x, vd_sub(vd_add(t->sample_x, vd_set1(col)), t->x[0]));
+}
+
+#endif
