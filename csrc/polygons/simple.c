@@ -400,7 +400,7 @@ static int is_parted(simple_search *s, const chain_node *a, const chain_node *b,
     const double ay = ((double)b->y0 - y) * dy, by = ((double)b->y1 - y) * dy;
     if ((ax < bx ? ax : bx) + (ay < by ? ay : by) > after || (ax > bx ? ax : bx) + (ay > by ? ay : by) < before)
         return 1;
-    if (b->n > TL_LINE_POINTS)
+    if (b->n > TL_LINE_POINTS || b->ring < 0) /* or of several rings */
         return 0;
     s->n_left -= b->n / TL_CHAIN_EDGES;
     const int64_t first = s->base + b->first, last = edge_end(s, b->ring, first + b->n - 1);
@@ -453,9 +453,9 @@ static int are_apart(simple_search *s, const chain_node *a, const chain_node *b)
     direction low, high;
     if (is_next != is_before && join_directions(a, b, &low, &high))
         return 1;
-    if (a->is_monotone && is_parted(s, a, b, is_next, is_before))
+    if (a->is_monotone && a->ring >= 0 && is_parted(s, a, b, is_next, is_before))
         return 1;
-    if (b->is_monotone && is_parted(s, b, a, is_before, is_next))
+    if (b->is_monotone && b->ring >= 0 && is_parted(s, b, a, is_before, is_next))
         return 1;
     if (a->left < 0 && b->left < 0)
         return are_leaves_apart(s, a, b);
