@@ -130,8 +130,8 @@ TL_INLINE uint64_t count_bits(uint64_t v, int sample_bits)
     return v;
 }
 
-/* The pixels [at, at + n), at a multiple of 32.  Long runs that are covered whole, or not at all, are filled: eight words
- * of four samples are 128 pixels. */
+/* The pixels [at, at + n), at a multiple of 32.  Long runs that are covered whole, or not at all, are filled: eight
+ * words of four samples are 128 pixels. */
 TL_INLINE void share_span(const tl_target *target, int64_t at, int64_t n, int sample_bits)
 {
     const int per_word = 64 >> sample_bits, width = 1 << sample_bits;

@@ -140,8 +140,9 @@ class View:
             unknown = min(options.keys() - OPTIONS)
             raise TypeError(f"unknown option {unknown!r}; the options are {', '.join(ViewOptions.__annotations__)}")
         checked_size = as_size(size)
-        is_exact = options.get("subpixel_bits") == "exact"
-        bits = EXACT_BITS if is_exact else as_subpixel_bits(options.get("subpixel_bits", 8))
+        given_bits = options.get("subpixel_bits", 8)
+        is_exact = isinstance(given_bits, str) and given_bits == "exact"
+        bits = EXACT_BITS if is_exact else as_subpixel_bits(given_bits)
         sampling = parse(Sampling, "sampling", options.get("sampling", "center"))
         grid_bits = bits if sampling.n_samples == 1 else max(SAMPLE_GRID_BITS, bits)
         viewport = options.get("viewport")
