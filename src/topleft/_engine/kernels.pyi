@@ -180,6 +180,9 @@ class ExactMesh(SnappedMesh):  # has what draws, paints and weighs one mesh; wha
         source: Source | None = None,
         pieces: ExactPieces | None = None,
     ) -> None: ...
+    def weigh(
+        self, ids: I32, values: F32 | None, n_values: int, per_corner: bool, background: float, out: F32
+    ) -> None: ...
     def draw_counted(
         self, target: Target, first_row: int, n_rows: int, is_first: bool = True, is_last: bool = True
     ) -> tuple[int, tuple[int, ...]]: ...
