@@ -14,6 +14,15 @@ settings.register_profile(
 settings.load_profile("fixed")
 
 
+SLOW = frozenset(Path(__file__).with_name("support").joinpath("slow.txt").read_text(encoding="utf-8").split("\n")[1:])
+
+
+def pytest_collection_modifyitems(items):
+    for item in items:
+        if item.path.relative_to(Path(__file__).parents[1]).as_posix() not in SLOW:
+            item.add_marker(pytest.mark.quick)
+
+
 #: Pixels that the processes of pytest-xdist have compared.
 compared_elsewhere: list[int] = []
 

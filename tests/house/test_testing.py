@@ -1,5 +1,7 @@
 """`topleft.testing.assert_same_picture`: what it lets pass, and what it says of what it does not."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from PIL import Image
@@ -66,3 +68,10 @@ def test_difference_is_drawn(tmp_path):
     assert drawn[1, 1] == 255
     assert drawn[2, 3] == 155
     assert np.count_nonzero(drawn) == 3
+
+
+def test_files_of_slow_tests_are_there():
+    root = Path(__file__).parents[2]
+    listed = root.joinpath("tests/support/slow.txt").read_text(encoding="utf-8").split("\n")[1:-1]
+    assert [name for name in listed if not root.joinpath(name).is_file()] == []
+    assert listed == sorted(listed)
