@@ -21,7 +21,7 @@ distributed = pytest.importorskip("distributed", reason="the dask extra is not i
 
 from cluster_jobs import hang, kill_always, kill_once, wait_a_little  # noqa: E402
 
-SRC = str(Path(__file__).resolve().parents[2] / "src")
+SRC = str(Path(tl.__file__).parents[1])
 SUPPORT = str(Path(__file__).resolve().parents[1] / "support")
 
 

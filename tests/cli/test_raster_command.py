@@ -13,7 +13,7 @@ from PIL import Image
 import topleft as tl
 from topleft.cli import main
 
-SRC = str(Path(__file__).resolve().parents[2] / "src")
+SRC = str(Path(tl.__file__).parents[1])
 RNG = np.random.default_rng(3)
 POINTS = RNG.uniform([1000, 2000, 0], [1064, 2048, 9], (60, 3))
 TRIANGLES = RNG.integers(0, 60, (40, 3)).astype(np.int32)

@@ -18,7 +18,7 @@ import topleft as tl
 from topleft._tiles.geotiff import differences, sums
 from topleft._tiles.levels import halved
 
-SRC = str(Path(__file__).resolve().parents[2] / "src")
+SRC = str(Path(tl.__file__).parents[1])
 RNG = np.random.default_rng(6)
 POINTS = RNG.uniform([500000, 5000000, 0], [500300, 5000200, 9], (200, 3))
 POINTS[:, 0] -= np.where(POINTS[:, 0] > 500150, 0, 20)
