@@ -14,7 +14,7 @@ settings.register_profile(
 settings.load_profile("fixed")
 
 
-SLOW = frozenset(Path(__file__).with_name("support").joinpath("slow.txt").read_text(encoding="utf-8").split("\n")[1:])
+SLOW = frozenset(Path(__file__).with_name("slow.txt").read_text(encoding="utf-8").split("\n")[1:])
 
 
 def pytest_collection_modifyitems(items):

@@ -31,7 +31,8 @@ CYTHON = sorted([*SRC.rglob("*.pyx"), *SRC.rglob("*.pxi")])
 C = sorted([*(ROOT / "csrc").rglob("*.c"), *(ROOT / "csrc").rglob("*.h")])
 
 #: Where modules are found: those of the package, of the benchmarks, of tests/support and of the examples.
-PLACES = [ROOT / "src", ROOT, ROOT / "tests" / "support", ROOT / "examples"]
+SUPPORT = ROOT / "tests" / "support"
+PLACES = [ROOT / "src", ROOT, SUPPORT, SUPPORT / "hostile", SUPPORT / "references", ROOT / "examples"]
 
 
 @cache

@@ -72,6 +72,6 @@ def test_difference_is_drawn(tmp_path):
 
 def test_files_of_slow_tests_are_there():
     root = Path(__file__).parents[2]
-    listed = root.joinpath("tests/support/slow.txt").read_text(encoding="utf-8").split("\n")[1:-1]
+    listed = root.joinpath("tests/slow.txt").read_text(encoding="utf-8").split("\n")[1:-1]
     assert [name for name in listed if not root.joinpath(name).is_file()] == []
     assert listed == sorted(listed)

@@ -1,4 +1,6 @@
-"""Fuzz the public surface for some time: `python tests/support/fuzz.py --seconds 60`, best as `.ci/sanitize` does.
+"""Fuzz the public surface for some time: `python tests/support/hostile/fuzz.py --seconds 60`.
+
+It is best run as `.ci/sanitize` does.
 
 Prints how many cases of each verb were drawn and refused, and ends with the first case that must not be, its seed, and
 status 1; `--seed N --cases 1` draws that one again. With `--guided` coverage of the kernels guides it: `.ci/sanitize

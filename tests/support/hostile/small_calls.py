@@ -1,6 +1,7 @@
 """Many small calls from several threads, against the same calls one after another.
 
-`python tests/support/small_calls.py --calls 1000000 --threads 8` is the long run; the tests do the same with fewer.
+`python tests/support/hostile/small_calls.py --calls 1000000 --threads 8` is the long run; the tests do
+the same with fewer.
 """
 
 from __future__ import annotations
