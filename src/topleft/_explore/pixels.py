@@ -19,7 +19,7 @@ from topleft._raster.verbs import coverage, fill, overdraw, rasterize, wireframe
 from topleft.methods import CLASSICS, METHODS
 from topleft.methods.reference import area, sampling
 
-__all__ = ["EXACT", "HANDLERS", "Drawing", "draw", "methods", "triangle_colors"]
+__all__ = ["EXACT", "HANDLERS", "MethodPicture", "draw", "methods", "triangle_colors"]
 
 EXACT = "exact"
 """The name of the exact picture where others are those of methods."""
@@ -59,7 +59,7 @@ REPEATED_SECONDS = 0.01
 
 
 @dataclass(frozen=True)
-class Drawing:
+class MethodPicture:
     """What one method draws of a state.
 
     Attributes
@@ -83,7 +83,7 @@ class Drawing:
     notes: list[str] = field(default_factory=list)
 
 
-def draw(state: PixelState, method: str) -> Drawing:
+def draw(state: PixelState, method: str) -> MethodPicture:
     """Return what a method draws, `EXACT` for the exact picture."""
     if method == EXACT:
         return draw_reference(state)
@@ -95,9 +95,9 @@ def draw(state: PixelState, method: str) -> Drawing:
     notes = state.lacks(method)
     if state.look == "wireframe" or sampled in ("area", "outer", "inner"):
         owners = np.where(shown > 0, 0, -1).astype(np.int32)[..., None]
-        return Drawing(owners, counts[..., None], shown.astype(np.float32), seconds, notes)
+        return MethodPicture(owners, counts[..., None], shown.astype(np.float32), seconds, notes)
     owners = shown.reshape(*shown.shape[:2], -1).astype(np.int32)
-    return Drawing(owners, counts.reshape(owners.shape), share_of(owners), seconds, notes)
+    return MethodPicture(owners, counts.reshape(owners.shape), share_of(owners), seconds, notes)
 
 
 def call(state: PixelState, method: str, options: dict[str, Any]) -> NDArray[Any]:
@@ -126,7 +126,7 @@ def timed(work: Callable[[], NDArray[Any]]) -> tuple[NDArray[Any], float]:
     return result, time.perf_counter() - start
 
 
-def draw_reference(state: PixelState) -> Drawing:
+def draw_reference(state: PixelState) -> MethodPicture:
     """Return the exact picture: of vertices as they are, or, of areas and squares, of the snapped ones."""
     height, width = state.size[::-1]
     start = time.perf_counter()
@@ -140,13 +140,13 @@ def draw_reference(state: PixelState) -> Drawing:
         seconds = time.perf_counter() - start
         shares = np.minimum(shares, np.float32(1))
         owners = np.where(shares > 0, 0, -1).astype(np.int32)[..., None]
-        return Drawing(owners, (shares > 0).astype(np.int32)[..., None], shares, seconds)
+        return MethodPicture(owners, (shares > 0).astype(np.int32)[..., None], shares, seconds)
     n = int(state.sampling.removeprefix("msaa")) if state.sampling != "center" else 1
     owners, counts = draw_exact(
         state.vertices, state.triangles, state.size, state.origin, sampling.SAMPLE_POSITIONS[n], cull=state.cull,
         depth_test=state.depth_test,
     )  # fmt: skip
-    return Drawing(owners, counts, share_of(owners), time.perf_counter() - start)
+    return MethodPicture(owners, counts, share_of(owners), time.perf_counter() - start)
 
 
 def share_of(owners: NDArray[np.int32]) -> NDArray[np.float32]:
@@ -166,7 +166,7 @@ def triangle_colors(n: int) -> NDArray[np.uint8]:
     return np.where(turn == 0, colors, np.where(turn == 1, paler, darker)).astype(np.uint8)
 
 
-def picture(state: PixelState, drawing: Drawing) -> NDArray[np.uint8]:
+def picture(state: PixelState, drawing: MethodPicture) -> NDArray[np.uint8]:
     """Return a picture (H, W, 4): owners in colours, or how often pixels are drawn; nothing is transparent."""
     if state.look == "overdraw":
         most = drawing.counts.max(axis=2)
@@ -186,7 +186,7 @@ def picture(state: PixelState, drawing: Drawing) -> NDArray[np.uint8]:
     return shown
 
 
-def difference(one: Drawing, two: Drawing) -> NDArray[np.uint8]:
+def difference(one: MethodPicture, two: MethodPicture) -> NDArray[np.uint8]:
     """Return where two drawings differ: (H, W) of the rows of `DIFFERENCES`."""
     n = max(one.owners.shape[2], two.owners.shape[2])
     owners, others = (np.broadcast_to(d.owners, (*d.owners.shape[:2], n)) for d in (one, two))
@@ -209,7 +209,7 @@ def draw_all(session: Session, request: Request) -> Reply:
         names |= ({"b": state.other} if state.other else {}) | ({"exact": EXACT} if state.exact else {})
     arrays: dict[str, NDArray[Any] | bytes] = {}
     panels: dict[str, dict[str, Any]] = {}
-    drawings: dict[str, Drawing] = {}
+    drawings: dict[str, MethodPicture] = {}
     for key, method in names.items():
         panels[key] = {"key": key, "title": "wireframe" if state.look == "wireframe" else method}
         try:
@@ -234,7 +234,7 @@ def draw_all(session: Session, request: Request) -> Reply:
     return Reply({"panels": list(panels.values()), "samples": samples_of(state)}, arrays)
 
 
-def described(drawing: Drawing) -> dict[str, Any]:
+def described(drawing: MethodPicture) -> dict[str, Any]:
     """Return what is written over a picture."""
     return {
         "ms": round(1e3 * drawing.seconds, 4),
