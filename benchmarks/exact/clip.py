@@ -14,8 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.exact.integers import Points, draw_points
-from benchmarks.exact.unsnapped import ExactPicture
+from topleft.methods.reference.integers import ExactPicture, Points, draw_points
 
 Row = tuple[int, int, int]
 

@@ -9,17 +9,28 @@ Based on: J. Pineda, A Parallel Algorithm for Polygon Rasterization, 1988.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.exact.unsnapped import ExactPicture
-
 Point = tuple[int, int]
 
 INT64_SAFE = 2**61
+
+
+@dataclass(frozen=True)
+class ExactPicture:
+    """What the frame must hold."""
+
+    triangle: NDArray[np.int32]
+    """(H, W): the last triangle that covers the centre, -1 for none."""
+    count: NDArray[np.int32]
+    """(H, W): how many triangles cover the centre."""
+    is_edge: NDArray[np.bool_]
+    """(H, W): whether an edge of a triangle meets the pixel's square, its border included."""
 
 
 class Points(NamedTuple):
