@@ -10,13 +10,15 @@ import pytest
 
 from topleft._explore import race
 from topleft._explore.race import HANDLERS, OVERDRAWN, entries, value_at
+from topleft._explore.session import Content, Session
 from topleft.scene_families import FAMILIES, Axis
 
 RECORD = Path(__file__).parents[2] / "benchmarks" / "records" / "atlas.json"
 
 
 def ask(what="race", **request):
-    return HANDLERS[what](None, request)
+    """The header and the arrays of an answer."""
+    return HANDLERS[what](Session(Content()), request)
 
 
 def test_page_is_told_every_family_and_method():
@@ -29,20 +31,19 @@ def test_page_is_told_every_family_and_method():
 
 
 def test_production_methods_are_right_where_bresenham_is_not():
-    header, parts = ask(family="edge", positions=[3.0])
+    header, arrays = ask(family="edge", positions=[3.0])
     rows = {row["name"]: row for row in header["methods"]}
     assert rows["auto"]["bad"] == rows["edge"]["bad"] == rows["scanline"]["bad"] == 0
     assert rows["bresenham_scanline"]["bad"] > 0
     assert header["values"] == ("2^-6",)
-    assert len(parts) == 1 + len(rows)
+    assert arrays["faults"].shape == (len(rows), 64, 64)
 
 
 def test_pictures_hold_what_is_counted():
-    header, (labels, *pictures) = ask(family="sliver", positions=[2.0], seed=1)
+    header, arrays = ask(family="sliver", positions=[2.0], seed=1)
     width, height = header["size"]
-    assert len(labels) == 4 * width * height
-    for row, picture in zip(header["methods"], pictures, strict=True):
-        kinds = np.frombuffer(picture, np.uint8).reshape(height, width)
+    assert arrays["triangle"].shape == (height, width)
+    for row, kinds in zip(header["methods"], arrays["faults"], strict=True):
         assert np.count_nonzero(kinds) == row["bad"]
         assert np.count_nonzero(kinds == race.GAP) == row["gaps"]
         assert np.count_nonzero(kinds == OVERDRAWN) == row["overdrawn"]
@@ -73,10 +74,10 @@ def test_column_is_the_same_as_the_pictures():
 
 
 def test_method_that_refuses_says_why():
-    header, parts = ask(family="far", positions=[12.0])
+    header, arrays = ask(family="far", positions=[12.0])
     rows = {row["name"]: row for row in header["methods"]}
     assert rows["zigzag"]["refused"].startswith("origin must lie within")
-    assert not any(parts[-1])
+    assert not arrays["faults"][-1].any()
 
 
 def test_slider_goes_between_values_by_their_ratio():

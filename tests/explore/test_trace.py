@@ -9,6 +9,7 @@ import pytest
 
 import topleft as tl
 from topleft._explore import trace as traces
+from topleft._explore.session import Content, Session
 from topleft._explore.trace import TRACED, trace
 from topleft.methods import CLASSICS, METHODS, find_method, reference
 from topleft.methods.walks_pure import overdraw as walk
@@ -99,10 +100,10 @@ def test_bresenham_tells_the_error_of_its_lines():
 def test_big_numbers_travel_as_text():
     large = [[4096.0, 0.0], [0.0, 4096.0], [0.0, 0.0]]
     request = {"vertices": large, "triangles": [[0, 1, 2]], "size": [4, 4], "method": "edge_increment"}
-    header, parts = traces.HANDLERS["trace"](None, request | {"subpixel_bits": 16})
+    header, arrays = traces.HANDLERS["trace"](Session(Content()), request | {"subpixel_bits": 16})
     values = json.loads(json.dumps(header))["steps"][1][6]
     assert values["E2"] == str(2**56 - 2**44 - 1)
-    assert np.frombuffer(parts[0], np.int32).tolist() == [1] * 16
+    assert arrays["counts"].tolist() == [[1] * 4] * 4
 
 
 @pytest.mark.parametrize(

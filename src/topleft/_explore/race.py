@@ -7,7 +7,6 @@ of the chart of the atlas at a time. `benchmarks/atlas` draws its record with th
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -15,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from topleft._explore.session import Reply, Request, Session
 from topleft._raster.verbs import fill, overdraw
 from topleft.methods import CLASSICS, find_method
 from topleft.methods.reference.integers import ExactPicture, Points, draw_points, signed_area, snapped_points
@@ -206,15 +206,15 @@ def counted(faults: FaultyPixels | str) -> dict[str, Any]:
     return {**counts, "bad": int((faults.wrong | faults.gaps | faults.overdrawn).sum())}
 
 
-def picture_of(faults: FaultyPixels | str, size: tuple[int, int]) -> bytes:
+def picture_of(faults: FaultyPixels | str, size: tuple[int, int]) -> NDArray[np.uint8]:
     """Return a byte for each pixel, from `RIGHT` to `OVERDRAWN`."""
     if isinstance(faults, str):
-        return bytes(size[0] * size[1])
+        return np.zeros(size[::-1], np.uint8)
     kinds = np.where(faults.gaps, GAP, np.where(faults.overdrawn, OVERDRAWN, np.where(faults.wrong, WRONG, RIGHT)))
-    return kinds.astype(np.uint8).tobytes()
+    return kinds.astype(np.uint8)
 
 
-def as_request(request: Mapping[str, Any]) -> tuple[str, tuple[float, ...], int]:
+def as_request(request: Request) -> tuple[str, tuple[float, ...], int]:
     """Return family, positions and seed.
 
     Raises
@@ -229,7 +229,7 @@ def as_request(request: Mapping[str, Any]) -> tuple[str, tuple[float, ...], int]
     return str(request["family"]), positions, seed
 
 
-def answer_families(_: Any, __: Mapping[str, Any]) -> tuple[dict[str, Any], list[Any]]:
+def answer_families(_: Session, __: Request) -> Reply:
     """Answer the page: the families, their parameters, and the methods."""
     families = {
         name: {
@@ -241,11 +241,11 @@ def answer_families(_: Any, __: Mapping[str, Any]) -> tuple[dict[str, Any], list
         }
         for name, family in FAMILIES.items()
     }
-    return {"families": families, "methods": [entry.name for entry in entries()]}, []
+    return Reply({"families": families, "methods": [entry.name for entry in entries()]})
 
 
-def answer(_: Any, request: Mapping[str, Any]) -> tuple[dict[str, Any], list[Any]]:
-    """Answer the page: the exact picture, as ids int32, and the faults of each method, a byte a pixel."""
+def answer(_: Session, request: Request) -> Reply:
+    """Answer the page: the exact picture as ids (H, W), and the faults of the methods (N, H, W), a byte a pixel."""
     exact, written = scene_at(*as_request(request))
     size, found = exact.scene.size, [(entry, faults_of(entry, exact)) for entry in entries()]
     header = {
@@ -255,8 +255,8 @@ def answer(_: Any, request: Mapping[str, Any]) -> tuple[dict[str, Any], list[Any
         "n_edge_px": int(exact.picture().is_edge.sum()),
         "methods": [{"name": entry.name, **counted(faults)} for entry, faults in found],
     }
-    parts = [picture_of(faults, size) for _, faults in found]
-    return header, [exact.labels().astype(np.int32).tobytes(), *parts]
+    pictures = np.stack([picture_of(faults, size) for _, faults in found])
+    return Reply(header, {"triangle": exact.labels().astype(np.int32), "faults": pictures})
 
 
 @lru_cache(maxsize=1024)
@@ -267,10 +267,10 @@ def column_of(family: str, positions: tuple[float, ...], seed: int) -> tuple[int
     return int(exact.picture().is_edge.sum()), tuple((row.get("bad"), bool(row.get("gaps"))) for row in rows)
 
 
-def answer_column(_: Any, request: Mapping[str, Any]) -> tuple[dict[str, Any], list[Any]]:
+def answer_column(_: Session, request: Request) -> Reply:
     """Answer the page: a column of the chart, one value of the last parameter; the other sliders stay."""
     n_edge_px, rows = column_of(*as_request(request))
-    return {"n_edge_px": n_edge_px, "rows": rows}, []
+    return Reply({"n_edge_px": n_edge_px, "rows": rows})
 
 
 HANDLERS = {"race": answer, "race.column": answer_column, "race.families": answer_families}

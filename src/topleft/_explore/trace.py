@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from topleft._base.arrays import as_size
+from topleft._explore.session import Reply, Request, Session
 from topleft._raster.verbs import overdraw
 from topleft.methods import CLASSICS, METHODS, find_method
 
@@ -174,8 +175,10 @@ def trace(
     size, draw = as_size(size), find_twin(method, subpixel_bits)
     xy = np.asarray(vertices, np.float64)[:, :2]
     found = find_method(method)
-    options = {"subpixel_bits": subpixel_bits} if found.code is not None or found.has_subpixel_bits else {}
-    overdraw(xy, triangles, size, method=method, **options)  # type: ignore[call-overload]  # checks it all
+    options: dict[str, Any] = {"method": method}
+    if found.code is not None or found.has_subpixel_bits:
+        options["subpixel_bits"] = subpixel_bits
+    overdraw(xy, triangles, size, **options)  # checks it all
     recorder, counts = Recorder(), np.zeros((size[1], size[0]), np.int32)
     for i, row in enumerate(np.asarray(triangles).reshape(-1, 3).tolist()):
         recorder.triangle = i
@@ -183,7 +186,7 @@ def trace(
     return Trace(method, size, tuple(recorder.steps), counts)
 
 
-def answer(_: Any, request: Mapping[str, Any]) -> tuple[dict[str, Any], list[Any]]:
+def answer(_: Session, request: Request) -> Reply:
     """Answer the page: the steps of a method, each as a list [kind, triangle, x, y, last, is drawn, values]."""
     made = trace(
         request["vertices"],
@@ -201,7 +204,7 @@ def answer(_: Any, request: Mapping[str, Any]) -> tuple[dict[str, Any], list[Any
         "methods": TRACED,
         "steps": [(*step[:6], step.values) for step in made.steps],
     }
-    return header, [made.counts.tobytes()]
+    return Reply(header, {"counts": made.counts})
 
 
 HANDLERS = {"trace": answer}

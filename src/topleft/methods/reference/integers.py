@@ -44,7 +44,7 @@ def true_points(vertices: NDArray[np.float64]) -> Points:
     """Return float64 vertices in pixels as they are."""
     ratios = [[x.as_integer_ratio() for x in row] for row in np.asarray(vertices, np.float64)[:, :2].tolist()]
     bits = max([1, *(denominator.bit_length() - 1 for row in ratios for _, denominator in row)])
-    return Points([(*(n * (2**bits // d) for n, d in row),) for row in ratios], bits)  # type: ignore[misc]
+    return Points([(*(n * (2**bits // d) for n, d in row),) for row in ratios], bits)
 
 
 def snapped_points(vertices: NDArray[np.float64], snap: str) -> Points:
