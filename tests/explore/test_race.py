@@ -16,7 +16,7 @@ from topleft.scene_families import FAMILIES, Axis
 RECORD = Path(__file__).parents[2] / "benchmarks" / "records" / "atlas.json"
 
 
-def ask(what="race", **request):
+def ask(what="race.draw", **request):
     """The header and the arrays of an answer."""
     return HANDLERS[what](Session(Content()), request)
 

@@ -100,7 +100,7 @@ def test_bresenham_tells_the_error_of_its_lines():
 def test_big_numbers_travel_as_text():
     large = [[4096.0, 0.0], [0.0, 4096.0], [0.0, 0.0]]
     request = {"vertices": large, "triangles": [[0, 1, 2]], "size": [4, 4], "method": "edge_increment"}
-    header, arrays = traces.HANDLERS["trace"](Session(Content()), request | {"subpixel_bits": 16})
+    header, arrays = traces.HANDLERS["steps.trace"](Session(Content()), request | {"subpixel_bits": 16})
     values = json.loads(json.dumps(header))["steps"][1][6]
     assert values["E2"] == str(2**56 - 2**44 - 1)
     assert arrays["counts"].tolist() == [[1] * 4] * 4

@@ -273,4 +273,4 @@ def answer_column(_: Session, request: Request) -> Reply:
     return Reply({"n_edge_px": n_edge_px, "rows": rows})
 
 
-HANDLERS = {"race": answer, "race.column": answer_column, "race.families": answer_families}
+HANDLERS = {"race.draw": answer, "race.column": answer_column, "race.families": answer_families}

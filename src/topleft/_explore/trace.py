@@ -207,4 +207,4 @@ def answer(_: Session, request: Request) -> Reply:
     return Reply(header, {"counts": made.counts})
 
 
-HANDLERS = {"trace": answer}
+HANDLERS = {"steps.trace": answer}
