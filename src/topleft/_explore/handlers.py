@@ -9,6 +9,7 @@ import sys
 import traceback
 from typing import Any
 
+from topleft._explore import mesh_view, race, trace
 from topleft._explore.session import Handler, Reply, Request, Session
 from topleft.errors import TopleftError
 
@@ -21,7 +22,7 @@ def hello(session: Session, _: Request) -> Reply:
     return Reply({"tab": content.tab, "name": content.name, "fragment": content.fragment, "pixels": content.pixels})
 
 
-HANDLERS: dict[str, Handler] = {"hello": hello}
+HANDLERS: dict[str, Handler] = {"hello": hello, **mesh_view.HANDLERS, **race.HANDLERS, **trace.HANDLERS}
 """By what a page says in "do"."""
 
 

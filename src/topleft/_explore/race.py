@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from topleft._explore.session import Reply, Request, Session
 from topleft._raster.verbs import fill, overdraw
 from topleft.methods import CLASSICS, find_method
-from topleft.methods.reference.integers import ExactPicture, Points, draw_points, signed_area, snapped_points
+from topleft.methods.reference.integers import ExactPicture, ExactPoints, draw_points, signed_area, snapped_points
 from topleft.scene_families import FAMILIES, Axis, PixelScene
 
 __all__ = [
@@ -128,7 +128,7 @@ class Exact:
     def picture(self, snap: str = "true", rule: str = "top-left") -> ExactPicture:
         """Return the picture of one copy after a snap."""
         if (snap, rule) not in self.pictures:
-            points: Points = snapped_points(self.scene.vertices, snap)
+            points: ExactPoints = snapped_points(self.scene.vertices, snap)
             scene = self.scene
             self.pictures[snap, rule] = draw_points(points, scene.triangles, scene.size, scene.origin, rule)
         return self.pictures[snap, rule]

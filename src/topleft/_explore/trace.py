@@ -19,7 +19,7 @@ from topleft._explore.session import Reply, Request, Session
 from topleft._raster.verbs import overdraw
 from topleft.methods import CLASSICS, METHODS, find_method
 
-__all__ = ["HANDLERS", "TRACED", "Step", "Trace", "trace"]
+__all__ = ["HANDLERS", "TRACED", "Trace", "TraceStep", "trace"]
 
 #: The methods that have a pure twin with steps.
 TRACED = (*(name for name in METHODS if name != "auto"), *CLASSICS)
@@ -31,7 +31,7 @@ MAX_EXACT = 2**53
 """Integers beyond it would be rounded by JavaScript, and are sent as text."""
 
 
-class Step(NamedTuple):
+class TraceStep(NamedTuple):
     """One thing that a twin did.
 
     Attributes
@@ -65,14 +65,14 @@ class Trace:
     ----------
     method : str
     size : (int, int)
-    steps : tuple of Step
+    steps : tuple of TraceStep
     counts : ndarray of int32, shape (H, W)
         The picture of the twin: how often each pixel is drawn.
     """
 
     method: str
     size: tuple[int, int]
-    steps: tuple[Step, ...]
+    steps: tuple[TraceStep, ...]
     counts: NDArray[np.int32]
 
     def picture(self, n_steps: int | None = None) -> NDArray[np.int32]:
@@ -88,7 +88,7 @@ class Recorder:
     """What a pure twin tells its steps to, of one triangle after the other."""
 
     def __init__(self) -> None:
-        self.steps: list[Step] = []
+        self.steps: list[TraceStep] = []
         self.triangle = 0
 
     def __call__(self, kind: str, x: int, y: int, **values: Any) -> None:
@@ -98,16 +98,18 @@ class Recorder:
             return
         last = values.pop("last", x)
         is_drawn = bool(values.pop("is_drawn", kind == "span"))
-        self._take(Step(kind, self.triangle, x, y, last, is_drawn, {n: plain(value) for n, value in values.items()}))
+        self._take(
+            TraceStep(kind, self.triangle, x, y, last, is_drawn, {n: plain(value) for n, value in values.items()})
+        )
 
     def _take_box(self, x: int, y: int, is_drawn: NDArray[np.bool_], **values: NDArray[Any]) -> None:
         self._check(is_drawn.size)
         for (row, column), here in np.ndenumerate(is_drawn):
             numbers = {name: plain(array[row, column]) for name, array in values.items()}
             at = x + column
-            self._take(Step("test", self.triangle, at, y + row, at, bool(here), numbers))
+            self._take(TraceStep("test", self.triangle, at, y + row, at, bool(here), numbers))
 
-    def _take(self, step: Step) -> None:
+    def _take(self, step: TraceStep) -> None:
         self._check(1)
         self.steps.append(step)
 
