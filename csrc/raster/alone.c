@@ -183,6 +183,23 @@ static row_span square_span(const tl_triangle *t, const tl_window *window, int64
     return span;
 }
 
+/* Counts the squares of a row that lie in any of some spans, once each. */
+static void count_spans(const row_span *spans, int n, const tl_window *window, const tl_target *target, int64_t row)
+{
+    for (int64_t done = 0, n_left = n; n_left > 0; n_left--) { /* the spans in the order of their beginnings */
+        int64_t first = window->width, end = 0;
+        for (int i = 0; i < n; i++) {
+            const int64_t begin = max64(spans[i].first, done);
+            if (begin < spans[i].end && (begin < first || (begin == first && spans[i].end > end)))
+                first = begin, end = spans[i].end;
+        }
+        if (first >= end)
+            break;
+        put_plain(target, TL_SINK_COUNT, row * target->stride_px + first, end - first, 0);
+        done = end;
+    }
+}
+
 /* Counts the squares that any of a triangle's pieces meets, or holds: a square may meet several, and counts once. */
 static __attribute__((noinline)) void count_squares(const tl_vertex_set *set, const int32_t *corners, int n_pieces,
                                                     const tl_snapped *snapped, const tl_window *window,
@@ -199,20 +216,12 @@ static __attribute__((noinline)) void count_squares(const tl_vertex_set *set, co
         row1 = max64(row1, t[n].row1);
         n++;
     }
-    for (int64_t row = row0; row < row1; row++)
-        for (int64_t done = 0, n_left = n; n_left > 0; n_left--) { /* the spans in the order of their beginnings */
-            int64_t first = window->width, end = 0;
-            for (int i = 0; i < n; i++) {
-                const row_span span = square_span(&t[i], window, row);
-                const int64_t begin = max64(span.first, done);
-                if (begin < span.end && (begin < first || (begin == first && span.end > end)))
-                    first = begin, end = span.end;
-            }
-            if (first >= end)
-                break;
-            put_plain(target, TL_SINK_COUNT, row * target->stride_px + first, end - first, 0);
-            done = end;
-        }
+    for (int64_t row = row0; row < row1; row++) {
+        row_span spans[TL_MAX_PIECES];
+        for (int i = 0; i < n; i++)
+            spans[i] = square_span(&t[i], window, row);
+        count_spans(spans, n, window, target, row);
+    }
 }
 
 /* Triangle i, or its pieces, by itself. */
