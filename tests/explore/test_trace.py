@@ -42,6 +42,15 @@ def test_picture_of_the_steps_is_that_of_the_twin_and_of_the_kernel(method):
         assert np.array_equal(made.counts, tl.overdraw(*scene, SIZE, method=method))
 
 
+@EVERY_METHOD
+def test_window_of_a_picture_has_its_own_steps(method):
+    vertices, triangles = soup(5, low=0, high=40)
+    made = trace(vertices, triangles, (15, 12), method=method, origin=(9, 14))
+    assert np.array_equal(made.picture(), made.counts)
+    assert np.array_equal(made.counts, tl.overdraw(vertices, triangles, (15, 12), method=method, origin=(9, 14)))
+    assert all(0 <= step.y < 12 for step in made.steps if step.kind != "triangle")
+
+
 @pytest.mark.parametrize("bits", [0, 1, 4, 16])
 @pytest.mark.parametrize("method", [name for name in TRACED if options_of(name)])
 def test_picture_of_the_steps_is_that_of_the_kernel_at_other_precisions(method, bits):
@@ -112,6 +121,7 @@ def test_big_numbers_travel_as_text():
         ({"method": "auto"}, "method must be one of 'edge', 'scanline', .* to be traced, got 'auto'"),
         ({"method": "best"}, "method must be one of 'auto', 'edge'"),
         ({"method": "edge", "size": (2000, 2000)}, "a trace must have 100000 steps at most"),
+        ({"method": "edge", "origin": (-1, 0)}, "origin must lie in 0 to 1024 to be traced"),
         ({"method": "point_in_triangle", "size": (2000, 2000)}, "a trace must have 100000 steps at most"),
     ],
 )

@@ -27,6 +27,8 @@ TRACED = (*(name for name in METHODS if name != "auto"), *CLASSICS)
 MAX_STEPS = 100_000
 """Of a trace: 20 MB in a browser."""
 
+MAX_ORIGIN_PX = 1024
+
 MAX_EXACT = 2**53
 """Integers beyond it would be rounded by JavaScript, and are sent as text."""
 
@@ -87,25 +89,36 @@ class Trace:
 class Recorder:
     """What a pure twin tells its steps to, of one triangle after the other."""
 
-    def __init__(self) -> None:
+    def __init__(self, size: tuple[int, int], origin: tuple[int, int] = (0, 0)) -> None:
+        """Take steps in that window of the picture."""
         self.steps: list[TraceStep] = []
         self.triangle = 0
+        self._size, self._origin = size, origin
 
     def __call__(self, kind: str, x: int, y: int, **values: Any) -> None:
         """Take a step, or all those of a box."""
         if kind == "box":
             self._take_box(x, y, **values)
             return
-        last = values.pop("last", x)
+        (width, height), (x0, y0) = self._size, self._origin
+        first, last, row = max(x - x0, 0), min(values.pop("last", x) - x0, width - 1), y - y0
+        if kind == "row" or kind == "triangle":
+            first = last = x - x0
+        elif first > last or not 0 <= row < height:
+            return
+        if kind == "row" and not 0 <= row < height:
+            return
         is_drawn = bool(values.pop("is_drawn", kind == "span"))
-        self._take(
-            TraceStep(kind, self.triangle, x, y, last, is_drawn, {n: plain(value) for n, value in values.items()})
-        )
+        numbers = {name: plain(value) for name, value in values.items()}
+        self._take(TraceStep(kind, self.triangle, first, row, last, is_drawn, numbers))
 
     def _take_box(self, x: int, y: int, is_drawn: NDArray[np.bool_], **values: NDArray[Any]) -> None:
+        skipped = tuple(max(0, o - at) for o, at in zip(self._origin[::-1], (y, x), strict=True))
+        part = np.s_[skipped[0] :, skipped[1] :]
+        x, y, is_drawn = x + skipped[1] - self._origin[0], y + skipped[0] - self._origin[1], is_drawn[part]
         self._check(is_drawn.size)
         for (row, column), here in np.ndenumerate(is_drawn):
-            numbers = {name: plain(array[row, column]) for name, array in values.items()}
+            numbers = {name: plain(array[part][row, column]) for name, array in values.items()}
             at = x + column
             self._take(TraceStep("test", self.triangle, at, y + row, at, bool(here), numbers))
 
@@ -154,7 +167,13 @@ def find_twin(name: str, subpixel_bits: int) -> Callable[..., NDArray[np.int32]]
 
 
 def trace(
-    vertices: ArrayLike, triangles: ArrayLike, size: tuple[int, int], *, method: str, subpixel_bits: int = 8
+    vertices: ArrayLike,
+    triangles: ArrayLike,
+    size: tuple[int, int],
+    *,
+    method: str,
+    subpixel_bits: int = 8,
+    origin: tuple[int, int] = (0, 0),
 ) -> Trace:
     """Return how a method draws triangles, step by step.
 
@@ -168,6 +187,8 @@ def trace(
         One of `TRACED`.
     subpixel_bits : int
         Of a method that has any.
+    origin : (x, y), pixels
+        Where the window lies in the picture, 0 to 1024: a twin draws from the corner of the picture on.
 
     Raises
     ------
@@ -175,16 +196,19 @@ def trace(
         As `topleft.overdraw`; for a method without a twin; and where there would be more than 100,000 steps.
     """
     size, draw = as_size(size), find_twin(method, subpixel_bits)
+    x, y = (int(at) for at in origin)
+    if not 0 <= min(x, y) <= max(x, y) <= MAX_ORIGIN_PX:
+        raise ValueError(f"origin must lie in 0 to {MAX_ORIGIN_PX} to be traced, got {(x, y)}")
     xy = np.asarray(vertices, np.float64)[:, :2]
     found = find_method(method)
-    options: dict[str, Any] = {"method": method}
+    options: dict[str, Any] = {"method": method, "origin": (x, y)}
     if found.code is not None or found.has_subpixel_bits:
         options["subpixel_bits"] = subpixel_bits
     overdraw(xy, triangles, size, **options)  # checks it all
-    recorder, counts = Recorder(), np.zeros((size[1], size[0]), np.int32)
+    recorder, counts = Recorder(size, (x, y)), np.zeros((size[1], size[0]), np.int32)
     for i, row in enumerate(np.asarray(triangles).reshape(-1, 3).tolist()):
         recorder.triangle = i
-        counts += draw(xy, [row], size, recorder)
+        counts += draw(xy, [row], (x + size[0], y + size[1]), recorder)[y:, x:]
     return Trace(method, size, tuple(recorder.steps), counts)
 
 
@@ -196,6 +220,7 @@ def answer(_: Session, request: Request) -> Reply:
         tuple(request["size"]),
         method=request["method"],
         subpixel_bits=int(request.get("subpixel_bits", 8)),
+        origin=tuple(request.get("origin", (0, 0))),
     )
     summary = find_method(made.method)
     header = {

@@ -122,7 +122,7 @@ function make(what, properties = {}, ...children) {
   return element;
 }
 
-// The same of SVG, with attributes alone.
+// The same for SVG, whose properties are attributes.
 function svg(name, attributes = {}, ...children) {
   const element = document.createElementNS("http://www.w3.org/2000/svg", name);
   for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
@@ -130,14 +130,21 @@ function svg(name, attributes = {}, ...children) {
   return element;
 }
 
-// A labelled choice of words, [value, text] pairs or texts.
-function choose(label, options, value, onchange) {
-  const select = make("select", {onchange: () => onchange(select.value)}, options.map((option) => {
-    const [own, text] = Array.isArray(option) ? option : [option, option];
-    return make("option", {value: own}, text);
-  }));
-  select.value = value;
-  return Object.assign(make("label.row", {}, make("span", {}, label), select), {select});
+const group = (title, ...children) => make("section.group", {}, make("h2", {}, title), ...children);
+const row = (label, control) => make("label.row", {}, make("span", {}, label), control);
+const button = (text, onclick, title = "") => make("button", {type: "button", title, onclick}, text);
+
+// A row with a choice of [value, text], or of words.
+function choose(label, options, value, write) {
+  const box = make("select", {onchange: () => write(box.value)}, options.map(([own, text = own]) => make("option", {value: own}, `${text}`)));
+  box.value = value;
+  return row(label, box);
+}
+
+function download(name, content, type = "") {
+  const href = URL.createObjectURL(new Blob([content], {type}));
+  make("a", {href, download: name}).click();
+  setTimeout(() => URL.revokeObjectURL(href), 10000);
 }
 
 // A picture (H, W, 4) uint8 of Python's as it is, a canvas pixel for each of its pixels.
@@ -147,102 +154,515 @@ function paint(canvas, pixels) {
   canvas.getContext("2d").putImageData(new ImageData(pixels, width, height), 0, 0);
 }
 
-// What the page begins with in a part of it: `enter` is called when its tab is shown, `state` goes into the link.
+// The parts of the page. `enter` is called when its tab is shown, `state` is what goes into the link of the page, and
+// `restore` takes it back.
 const PARTS = {pixels: pixelsPart, steps: stepsPart, mesh: meshPart, race: racePart};
 
 // ---- Pixels ----------------------------------------------------------------------------------------------------
 
+// Colours of triangles, and of what is drawn again: Okabe and Ito's, which all eyes tell apart.
+const OWNERS = [[0, 114, 178], [230, 159, 0], [0, 158, 115], [204, 121, 167]], TWICE = [213, 94, 0];
+
+const PIXEL_DEFAULTS = {
+  origin: [0, 0], method: "auto", other: "", exact: false, subpixel_bits: 8, sampling: "center", cull: "none",
+  depth_test: "less", winding: "as given", look: "owners",
+};
+const COLORS = ["#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", "#f0e442"];
+const DIFFERENCES = [
+  [1, "#80808046", () => "same"], [2, "#0072b2", (a) => `${a} alone`], [3, "#e69f00", (a, b) => `${b} alone`],
+  [4, "#cc79a7", () => "another owner"], [5, "#d55e00", () => "drawn more often"],
+];
+const MOVES = {
+  ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1],
+  a: [-1, 0], d: [1, 0], w: [0, -1], s: [0, 1],
+};
+const KEYS = [
+  ["1 2 3", "take a corner"], ["0", "take none"], ["arrows, WASD", "move it by a sub-pixel, or look at the next pixel"],
+  ["Shift", "by a pixel"], ["[ ]", "the next triangle"], ["Tab", "the next scene"], ["F", "wireframe"], ["Z", "undo"],
+  ["N P R Del", "add, split, flip, remove"], ["Esc", "leave the picture"],
+];
+
 function pixelsPart(app, panel) {
-  return {enter() {}};
+  const part = {state: () => state, scene: () => state, drawn: 0, enter, restore, views: new Map()};
+  const {methods, scenes} = app.hello;
+  const bases = [...new Set(methods.map(({name}) => name.split("/")[0]))];
+  let state = {}, sceneName = app.hello.pixels.scene ?? "", chosen = 0, corner = null, snap = "sub-pixel";
+  let pixel = null, probed = "a", samples = [], past = [];
+
+  // -- what is asked --
+
+  const redraw = newest(async () => {
+    const asked = state;
+    try {
+      show(await app.line.ask("pixels.draw", {state: asked}));
+      app.say("");
+    } catch (error) {
+      app.say(error.message, true);
+    }
+    part.drawn++;
+  });
+  const explain = newest(async () => {
+    if (plan.open) plan.lastChild.textContent = (await app.line.ask("pixels.plan", {state})).text;
+  });
+  const look = newest(async () => {
+    if (!pixel) return;
+    const method = {b: state.other, exact: "exact"}[probed] || state.method;
+    try {
+      tell(await app.line.ask("pixels.probe", {state, pixel, method}));
+    } catch (error) {
+      why.replaceChildren(make("p", {}, error.message));
+    }
+  });
+
+  // Every change goes through here: `remember` lets Z take it back.
+  function change(next, remember = true) {
+    if (remember) past = [...past.slice(-199), state];
+    state = {...state, ...next};
+    if (pixel && (pixel[0] >= state.size[0] || pixel[1] >= state.size[1])) pixel = null;
+    chosen = Math.max(0, Math.min(chosen, state.triangles.length - 1));
+    overlay();
+    controls();
+    redraw(), look(), explain(), app.keep();
+  }
+  function restore(given) {
+    past = [];
+    [corner, pixel, chosen] = [null, null, 0];
+    change({...PIXEL_DEFAULTS, ...given}, false);
+  }
+  async function takeScene(name) {
+    sceneName = name;
+    const before = state;
+    try {
+      const {state: scene} = await app.line.ask("pixels.scene", {name});
+      [corner, pixel, chosen] = [null, null, 0];
+      change({...PIXEL_DEFAULTS, ...("method" in scene || "other" in scene ? {} : kept(before)), ...scene}, false);
+      past = [...past, before];
+      app.say(name);
+    } catch (error) {
+      app.say(error.message, true);
+    }
+  }
+  const kept = ({method, other, exact, look}) => ({method, other, exact, look});
+  const nextScene = (step) => takeScene(scenes.at((Math.max(0, scenes.indexOf(sceneName)) + step) % scenes.length));
+
+  // -- triangles --
+
+  const step = () => 2 ** -(state.subpixel_bits === "exact" ? 8 : state.subpixel_bits);
+  const snapped = (x) => {
+    if (snap === "pixel centre") return Math.floor(x) + 0.5;
+    const grid = snap === "free" ? 2 ** -20 : step();
+    return Math.round(x / grid) * grid;
+  };
+  function move(i, [x, y], remember) {
+    change({vertices: state.vertices.map((row, k) => k === i ? [x, y, ...row.slice(2)] : row)}, remember);
+  }
+  const edits = {
+    add() {
+      const [x, y] = [0, 1].map((k) => state.origin[k] + Math.floor(state.size[k] / 2));
+      const r = Math.max(2, Math.floor(Math.min(...state.size) / 4)), n = state.vertices.length;
+      const z = (state.vertices[0] ?? []).slice(2);
+      const added = [[x - r, y + r, ...z], [x, y - r, ...z], [x + r, y + r, ...z]];
+      chosen = state.triangles.length;
+      change({vertices: [...state.vertices, ...added], triangles: [...state.triangles, [n, n + 1, n + 2]]});
+    },
+    split() {
+      const [a, b, c] = state.triangles[chosen], n = state.vertices.length;
+      const middle = state.vertices[a].map((_, k) => [a, b, c].reduce((sum, i) => sum + state.vertices[i][k], 0) / 3);
+      const [x, y, ...z] = middle, parts = [[a, b, n], [b, c, n], [c, a, n]];
+      change({
+        vertices: [...state.vertices, [snapped(x), snapped(y), ...z]], triangles: state.triangles.toSpliced(chosen, 1, ...parts),
+      });
+    },
+    flip() {
+      const [a, b, c] = state.triangles[chosen];
+      change({triangles: state.triangles.with(chosen, [a, c, b])});
+    },
+    remove() {
+      const triangles = state.triangles.toSpliced(chosen, 1), used = [...new Set(triangles.flat())].sort((i, j) => i - j);
+      corner = null;
+      change({
+        vertices: used.map((i) => state.vertices[i]), triangles: triangles.map((row) => row.map((i) => used.indexOf(i))),
+      });
+    },
+    undo() {
+      if (past.length) state = past.pop(), change({}, false);
+    },
+  };
+
+  // -- the picture --
+
+  const panels = make("div.panels");
+  const why = make("div.why", {"aria-live": "polite"}, make("p", {}, "Point at a pixel, or move over the picture with the arrows."));
+  const stage = make("div.stage", {
+    tabIndex: 0, role: "application", onkeydown: press,
+    "aria-label": "Magnified pixels. Arrows look at pixels, 1 2 3 take a corner, Tab takes the next scene, Escape leaves.",
+  }, panels);
+
+  function show({panels: shown, arrays, samples: at}) {
+    samples = at;
+    for (const key of part.views.keys()) {
+      if (!shown.some((one) => one.key === key)) part.views.get(key).figure.remove(), part.views.delete(key);
+    }
+    for (const one of shown) {
+      if (!part.views.has(one.key)) part.views.set(one.key, view(one.key));
+      const {figure, canvas, box, caption, legend} = part.views.get(one.key);
+      Object.assign(part.views.get(one.key), {owners: arrays[`${one.key}_owners`], counts: arrays[`${one.key}_counts`]});
+      panels.append(figure);
+      caption.replaceChildren(...facts(one));
+      legend.replaceChildren(...(one.refused ? [make("div.refused", {}, one.refused)] : keys(one)));
+      box.hidden = Boolean(one.refused);
+      if (arrays[one.key]) paint(canvas, arrays[one.key]);
+    }
+    fit();
+  }
+  function facts({key, title, ms, n, n_wrong, n_twice, notes, kinds}) {
+    if (key === "difference") {
+      const n = kinds.slice(2).reduce((sum, k) => sum + k, 0);
+      return [make("b", {}, "difference"), make("div", {}, make(`span${n ? ".bad" : ".good"}`, {}, n === 1 ? "1 pixel" : `${n.toLocaleString("en")} pixels`))];
+    }
+    if (n === undefined) return [make("b", {}, title)];
+    const facts = [make("span", {}, `${n.toLocaleString("en")} px`), make("span", {}, time(ms))];
+    if (n_twice) facts.push(make("span", {}, `${n_twice.toLocaleString("en")} twice`));
+    if (n_wrong !== undefined) facts.push(make(n_wrong ? "span.bad" : "span.good", {}, n_wrong ? `${n_wrong} wrong` : "all exact"));
+    return [make("b", {}, title), make("span", {}, notes.join(", ")), make("div", {}, ...facts)];
+  }
+  const time = (ms) => ms < 1 ? `${(1000 * ms).toFixed(0)} µs` : `${ms.toFixed(1)} ms`;
+  function keys({key, kinds, of}) {
+    if (key === "difference") {
+      return DIFFERENCES.filter(([k]) => kinds[k]).map(([k, color, word]) =>
+        make("span", {}, make("i", {style: `background:${color}`}), `${kinds[k].toLocaleString("en")} ${word(...of)}`));
+    }
+    if (state.look !== "overdraw") return [];
+    return ["#9ecae1", "#e69f00", "#d55e00", "#7a1f5c"].map((color, i) =>
+      make("span", {}, make("i", {style: `background:${color}`}), ["once", "twice", "3 times", "4 or more"][i]));
+  }
+
+  function view(key) {
+    const canvas = make("canvas"), sheet = svg("svg", {"aria-hidden": "true"});
+    const box = make("div.view", {}, canvas, sheet), caption = make("figcaption"), legend = make("div.legend");
+    const figure = make("figure.panel", {"data-key": key}, caption, box, legend);
+    let dragged = null;
+    const place = ({clientX, clientY}) => {
+      const {left, top} = sheet.getBoundingClientRect(), cell = part.cell;
+      return [(clientX - left) / cell - 1 + state.origin[0], (clientY - top) / cell - 1 + state.origin[1]];
+    };
+    const nearest = (event) => {
+      const [x, y] = place(event), reach = (event.pointerType === "touch" ? 26 : 13) / part.cell;
+      const far = state.vertices.map((v) => Math.hypot(v[0] - x, v[1] - y));
+      const taken = corner === null ? -1 : state.triangles[chosen]?.[corner] ?? -1;
+      if (taken >= 0 && far[taken] <= reach) return taken;
+      const i = far.indexOf(Math.min(...far));
+      return far[i] <= reach ? i : null;
+    };
+    const at = (event) => place(event).map((value, k) => Math.floor(value - state.origin[k]));
+    const isInside = ([x, y]) => x >= 0 && y >= 0 && x < state.size[0] && y < state.size[1];
+    sheet.onpointerdown = (event) => {
+      if (event.button) return;
+      stage.focus({preventScroll: true});
+      const i = nearest(event);
+      if (i === null) {
+        const [x, y] = at(event), {owners} = part.views.get(key);
+        if (isInside([x, y])) {
+          const owner = owners?.[y * state.size[0] + x] ?? -1;
+          if (owner >= 0) chosen = owner;
+          inspect([x, y], key);
+          overlay(), controls();
+        }
+        return;
+      }
+      dragged = i;
+      if (!state.triangles[chosen]?.includes(i)) chosen = Math.max(0, state.triangles.findIndex((row) => row.includes(i)));
+      corner = Math.max(0, state.triangles[chosen]?.indexOf(i) ?? 0);
+      past = [...past.slice(-199), state];
+      sheet.setPointerCapture(event.pointerId);
+      overlay(), controls();
+    };
+    sheet.onpointermove = (event) => {
+      if (dragged !== null) move(dragged, place(event).map(snapped), false);
+      else if (event.pointerType === "mouse" && isInside(at(event))) inspect(at(event), key);
+    };
+    sheet.onpointerup = sheet.onpointercancel = () => { dragged = null; };
+    return {figure, canvas, sheet, box, caption, legend};
+  }
+  function inspect(at, key = probed) {
+    if (pixel && pixel[0] === at[0] && pixel[1] === at[1] && probed === key) return;
+    pixel = at;
+    probed = key;
+    look();
+    for (const {sheet} of part.views.values()) ring(sheet.querySelector(".ring"));
+  }
+  const ring = (rect) => {
+    if (rect) for (const [name, value] of Object.entries(pixel ? {x: pixel[0], y: pixel[1], width: 1, height: 1} : {width: 0})) rect.setAttribute(name, value);
+  };
+
+  // The largest whole number of screen pixels a pixel that lets all pictures fit, in the columns that allow most.
+  function fit() {
+    const n = part.views.size, [width, height] = state.size, isNarrow = stage.clientWidth < 480;
+    const room = isNarrow ? Infinity : Math.max(420, innerHeight - 120);
+    let best = [0, 1];
+    for (let columns = 1; columns <= n; columns++) {
+      const wide = ((stage.clientWidth + 24) / columns - 24) / (width + 2);
+      const high = (room / Math.ceil(n / columns) - 84) / (height + 2);
+      const cell = Math.max(1, Math.floor(Math.min(wide, high, 44)));
+      if (cell > best[0]) best = [cell, columns];
+    }
+    const [cell, columns] = isNarrow ? [Math.max(1, Math.floor(Math.min(stage.clientWidth / (width + 2), 44))), 1] : best;
+    part.cell = cell;
+    panels.style.gridTemplateColumns = `repeat(${columns}, ${Math.max(cell * (width + 2), 200)}px)`;
+    for (const {canvas, box} of part.views.values()) {
+      Object.assign(box.style, {width: `${cell * (width + 2)}px`, height: `${cell * (height + 2)}px`});
+      Object.assign(canvas.style, {left: `${cell}px`, top: `${cell}px`, width: `${cell * width}px`, height: `${cell * height}px`});
+    }
+    overlay();
+  }
+
+  // Lines, dots and handles over the pixels: no pixel is decided here.
+  function overlay() {
+    const [width, height] = state.size, [ox, oy] = state.origin, cell = part.cell || 1;
+    const points = state.vertices.map(([x, y]) => [x - ox, y - oy]);
+    const near = ([x, y]) => Math.abs(x) < 1e5 && Math.abs(y) < 1e5;
+    const outline = (rows) => rows.filter((row) => row.every((i) => near(points[i])))
+      .map((row) => `M${row.map((i) => points[i].join(" ")).join("L")}Z`).join("");
+    const bars = (n, from, line) => Array.from({length: n + 1}, (_, i) => line(i)).join("");
+    const grid = cell < 5 ? "" : bars(width, 0, (x) => `M${x} 0V${height}`) + bars(height, 0, (y) => `M0 ${y}H${width}`);
+    const taken = state.triangles[chosen] ?? [];
+    for (const {sheet, counts} of part.views.values()) {
+      sheet.setAttribute("viewBox", `-1 -1 ${width + 2} ${height + 2}`);
+      const dots = cell < 9 ? [] : samples.map(([x, y]) => svg("circle", {cx: x, cy: y, r: (samples.length > 4 ? 1 : 1.5) / cell}));
+      const id = `dots-${cell}-${samples.length}`;
+      const numbers = cell < 14 || !counts || state.look !== "overdraw" ? [] : [...counts].flatMap((n, i) =>
+        n > 1 ? [Object.assign(svg("text", {x: i % width + 0.5, y: Math.floor(i / width) + 0.5}), {textContent: n})] : []);
+      sheet.replaceChildren(
+        svg("defs", {}, svg("pattern", {id, width: 1, height: 1, patternUnits: "userSpaceOnUse"}, ...dots.map((dot) => (dot.setAttribute("class", "dots"), dot)))),
+        svg("path", {class: "lines", d: grid}),
+        svg("rect", {width, height, fill: dots.length ? `url(#${id})` : "none"}),
+        svg("g", {class: "counts"}, ...numbers),
+        svg("path", {class: "halo", d: outline(state.triangles)}), svg("path", {class: "edges", d: outline(state.triangles)}),
+        svg("path", {class: "taken", d: outline(state.triangles.length > 1 && taken.length ? [taken] : [])}),
+        svg("rect", {class: "ring", fill: "none"}),
+        ...points.flatMap((point, i) => near(point) ? [grip(point, taken.indexOf(i), cell)] : []),
+      );
+      ring(sheet.querySelector(".ring"));
+    }
+  }
+  function grip([x, y], k, cell) {
+    const isTaken = corner !== null && k === corner;
+    const parts = [svg("circle", {class: "reach", cx: x, cy: y, r: 22 / cell}), svg("circle", {class: "knob", cx: x, cy: y, r: (k < 0 ? 4 : 8) / cell})];
+    if (k >= 0) parts.push(Object.assign(svg("text", {x, y, "font-size": 11 / cell}), {textContent: k + 1}));
+    return svg("g", {class: isTaken ? "grip taken" : "grip"}, ...parts);
+  }
+
+  // -- why a pixel is whose --
+
+  function tell({sentences, rows, n_more}) {
+    const edge = ({ends: [a, b], kind, value, exact}) => make("tr", {}, make("th", {scope: "row"}, `${Math.min(a, b)}–${Math.max(a, b)}`),
+      make("td", {}, kind), make("td", {title: `exactly ${exact} square pixels, twice the area to this edge`},
+        make(value === "0" ? "b.zero" : "span", {}, value)));
+    const card = ({triangle, verdict, edges, weights, depth}) => make("section.card", {},
+      make("h3", {}, make("i", {style: `background:${COLORS[triangle % 7]}`}), `triangle ${triangle}`, make("small", {}, verdict)),
+      make("table", {}, ...edges.map(edge)),
+      make("p", {}, `weights ${weights.join(", ")}`, ...(depth === null ? [] : [make("br"), `depth ${depth}`])));
+    why.replaceChildren(...sentences.map((text) => make("p", {}, text)), make("div.cards", {}, ...rows.map(card)));
+    if (n_more) why.append(make("p.hint", {}, `${n_more} more triangles are farther away.`));
+  }
+
+  // -- keys --
+
+  function press(event) {
+    const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    const move_ = MOVES[key];
+    if (move_) {
+      const i = corner === null ? undefined : state.triangles[chosen]?.[corner];
+      const far = event.shiftKey ? 1 : step();
+      if (i !== undefined) move(i, state.vertices[i].slice(0, 2).map((v, k) => v + far * move_[k]));
+      else inspect([0, 1].map((k) => Math.max(0, Math.min(state.size[k] - 1, (pixel ?? [0, 0])[k] + (event.shiftKey ? 8 : 1) * move_[k]))));
+    } else if ("123".includes(key)) corner = Number(key) - 1;
+    else if (key === "0") corner = null;
+    else if (key === "[" || key === "]") chosen = (chosen + (key === "]" ? 1 : -1) + state.triangles.length) % Math.max(1, state.triangles.length);
+    else if (key === "Tab") nextScene(event.shiftKey ? -1 : 1);
+    else if (key === "f") change({look: state.look === "wireframe" ? "owners" : "wireframe"});
+    else if (key === "z") edits.undo();
+    else if (key === "n") edits.add();
+    else if (key === "Escape") side.querySelector("select").focus();
+    else if (state.triangles.length && {p: "split", r: "flip", Delete: "remove"}[key]) edits[{p: "split", r: "flip", Delete: "remove"}[key]]();
+    else return;
+    event.preventDefault();
+    overlay(), controls();
+  }
+
+  // -- the column of choices --
+
+  const sync = [];
+  const controls = () => sync.forEach((update) => update());
+  const select = (label, options, read, write) => {
+    const box = make("select", {"aria-label": label, onchange: () => write(box.value)});
+    sync.push(() => {
+      const wanted = typeof options === "function" ? options() : options;
+      if (box.dataset.options !== JSON.stringify(wanted)) {
+        box.dataset.options = JSON.stringify(wanted);
+        box.replaceChildren(...wanted.map(([value, text, title = ""]) => make("option", {value, title}, text)));
+      }
+      box.value = read();
+    });
+    return box;
+  };
+  const plain = (...words) => words.map((word) => [word, word]);
+  const choice = (label, name, options) => row(label, select(label, options, () => `${state[name]}`, (value) =>
+    change({[name]: name === "subpixel_bits" && value !== "exact" ? Number(value) : value})));
+  const segments = (label, words, read, write) => {
+    const buttons = words.map((word) => make("button", {type: "button", onclick: () => (write(word), controls())}, word));
+    sync.push(() => buttons.forEach((button, i) => button.setAttribute("aria-pressed", words[i] === read())));
+    return make("div.segments", {role: "group", "aria-label": label}, ...buttons);
+  };
+  const method = (label, name, more = []) => {
+    const variants = () => methods.filter((one) => one.name.split("/")[0] === state[name].split("/")[0])
+      .map((one) => [one.name, one.name.split("/")[1] ?? "as published", one.summary]);
+    const variant = row("variant", select(`${label}, variant`, variants, () => state[name], (value) => change({[name]: value})));
+    sync.push(() => { variant.hidden = variants().length < 2; });
+    const names = [...more, ...bases.map((base) => [base, base, methods.find((one) => one.name === base).summary])];
+    return [row(label, select(label, names, () => state[name].split("/")[0], (value) => change({[name]: value}))), variant];
+  };
+  const check = (label, name) => {
+    const box = make("input", {type: "checkbox", onchange: () => change({[name]: box.checked})});
+    sync.push(() => { box.checked = state[name]; });
+    return make("label.check", {}, box, label);
+  };
+  const number = (read, write, more = {}) => {
+    const box = make("input", {type: "number", step: "any", ...more, onchange: () => Number.isFinite(box.valueAsNumber) && write(box.valueAsNumber)});
+    sync.push(() => { if (box !== box.getRootNode().activeElement) box.value = read() ?? ""; });
+    return box;
+  };
+  const coordinates = [0, 1, 2].flatMap((k) => [make("span", {}, `${k + 1}`), ...[0, 1].map((axis) => {
+    const i = () => state.triangles[chosen]?.[k];
+    return number(() => state.vertices[i()]?.[axis], (value) => i() !== undefined && move(i(), state.vertices[i()].with(axis, value)),
+      {"aria-label": `corner ${k + 1}, ${"xy"[axis]}`});
+  })]);
+  const title = make("h2");
+  sync.push(() => { title.textContent = state.triangles.length ? `Triangle ${chosen} of ${state.triangles.length}` : "No triangle"; });
+  const edit = Object.entries({add: "N", split: "P", flip: "R", remove: "Del", undo: "Z"}).map(([name, key]) => {
+    const made = button(name, () => edits[name](), key);
+    sync.push(() => { made.disabled = name === "undo" ? !past.length : name !== "add" && !state.triangles.length; });
+    return made;
+  });
+  const plan = make("details", {ontoggle: explain}, make("summary", {}, "The plan, and why"), make("pre", {tabIndex: 0}));
+  const size = [0, 1].map((axis) => number(() => state.size[axis], (value) => change({size: state.size.with(axis, Math.round(value))}),
+    {min: 1, max: 256, step: 1, "aria-label": ["width", "height"][axis]}));
+  const depth = choice("depth test", "depth_test", plain("less", "greater"));
+  sync.push(() => { depth.hidden = (state.vertices[0]?.length ?? 2) < 3; });
+  const save = async (kind) => {
+    try {
+      const {name, type, arrays} = await app.line.ask("pixels.export", {state, kind});
+      download(name, arrays.content, type);
+      app.say(`${name} is saved`);
+    } catch (error) {
+      app.say(error.message, true);
+    }
+  };
+  const side = make("div.side", {},
+    group("Scene", make("div.stepper", {},
+      select("Scene", () => [...(scenes.includes(sceneName) ? [] : [["", app.hello.name || "from a link"]]), ...plain(...scenes)], () => scenes.includes(sceneName) ? sceneName : "", (name) => name && takeScene(name)),
+      make("button", {type: "button", "aria-label": "previous scene", onclick: () => nextScene(-1)}, "‹"),
+      make("button", {type: "button", "aria-label": "next scene", onclick: () => nextScene(1)}, "›"))),
+    group("Methods", ...method("draws", "method"), ...method("beside it", "other", [["", "none"]]), check("the exact picture", "exact")),
+    group("Rules",
+      choice("sub-pixel bits", "subpixel_bits", plain(...[..."012345678", "10", "12", "14", "16", "exact"])),
+      choice("sampling", "sampling", plain("center", "msaa2", "msaa4", "msaa8", "msaa16", "area", "outer", "inner")),
+      choice("cull", "cull", plain("none", "back", "front")),
+      choice("winding", "winding", plain("as given", "clockwise", "counter-clockwise")), depth),
+    group("Shown", segments("Shown", ["owners", "overdraw", "wireframe"], () => state.look, (look) => change({look})),
+      row("pixels", make("span.pair", {}, ...size))),
+    make("section.group", {}, title, make("div.coordinates", {}, ...coordinates), make("div.buttons", {}, ...edit),
+      row("drag to", select("Vertices are dragged to", plain("free", "sub-pixel", "pixel centre"), () => snap, (value) => { snap = value; }))),
+    group("Keep", make("div.buttons", {}, ...["png", "svg", "code", "test"].map((kind) => button({png: "PNG", svg: "SVG", code: "Python", test: "Test case"}[kind], () => save(kind))),
+      button("Copy link", () => app.copyLink()))),
+  );
+  const hint = make("p.hint", {}, ...KEYS.flatMap(([key, text], i) => [i ? " · " : "", make("kbd", {}, key), ` ${text}`]));
+  panel.append(make("div.layout.three", {}, stage, why, side, make("div.below", {}, plan, hint)));
+  new ResizeObserver(() => panel.hidden || !part.views.size || fit()).observe(stage);
+
+  function enter() {
+    if (!state.size) restore(app.hello.pixels);
+  }
+  return part;
 }
 
 // ---- Steps -----------------------------------------------------------------------------------------------------
 
-const OKABE_ITO = [[0, 114, 178], [230, 159, 0], [0, 158, 115], [204, 121, 167]];
-const VERMILION = [213, 94, 0];
-
-const TEACHERS_SCENES = {
-  "two triangles": {vertices: [[2, 2], [14, 3], [4, 13], [14.5, 12.5]], triangles: [[0, 1, 2], [1, 3, 2]], size: [17, 16]},
-  "edges through centres": {vertices: [[1.5, 1.5], [9.5, 1.5], [1.5, 9.5], [9.5, 9.5]], triangles: [[0, 1, 2], [1, 3, 2]], size: [11, 11]},
-  "a sliver": {vertices: [[1, 2], [22, 8.4], [12, 4.6]], triangles: [[0, 1, 2]], size: [24, 11]},
-};
-
 function stepsPart(app, panel) {
-  const view = {scene: "two triangles", method: "edge", subpixel_bits: 8, step: 0};
-  let trace = null, scene = TEACHERS_SCENES[view.scene], timer = null, methods = null;
-  const canvas = make("canvas.pixels"), lines = svg("svg", {class: "lines"});
-  const slider = make("input", {type: "range", min: 0, max: 0, value: 0, "aria-label": "Step", oninput: () => go(+slider.value)});
-  const told = make("p.told", {role: "status"}), values = make("dl.values"), about = make("p.muted");
-  const play = make("button", {onclick: toggle, title: "Space"}, "Play");
+  const part = {state: () => view, enter, restore}, view = {scene: "", method: "edge", subpixel_bits: 8, step: 0};
+  let trace = null, scene = null, timer = null;
+  const canvas = make("canvas"), over = svg("svg", {"aria-hidden": "true"}), values = make("dl.values"), about = make("p.hint");
+  const told = make("p", {role: "status"}), play = button("Play", toggle, "Space");
+  const slider = make("input", {type: "range", min: 0, "aria-label": "Step", oninput: () => go(slider.valueAsNumber)});
   const speed = make("input", {type: "range", min: 0, max: 3, step: 0.25, value: 1});
-  const buttons = [["First", () => go(0), "Home"], ["Row back", () => leap(-1), "Shift and left"], ["Back", () => go(view.step - 1), "Left"],
-    ["Step", () => go(view.step + 1), "Right"], ["Row", () => leap(1), "Shift and right"], ["Last", () => go(Infinity), "End"]]
-    .map(([text, onclick, title]) => make("button", {onclick, title}, text));
-  buttons.splice(3, 0, play);
 
   function toggle() {
-    const isOn = timer === null;
-    clearTimeout(timer), timer = null;
+    const isOn = timer === null && trace;
+    clearTimeout(timer);
+    timer = null;
     play.textContent = isOn ? "Pause" : "Play";
-    if (isOn && view.step >= trace.steps.length) go(0);
+    if (!isOn) return;
+    if (view.step >= trace.steps.length) go(0);
     const tick = () => {
       if (view.step >= trace.steps.length || panel.hidden) return toggle();
-      timer = setTimeout(() => (go(view.step + 1), timer !== null && tick()), 1000 / 10 ** speed.value);
+      go(view.step + 1);
+      timer = setTimeout(tick, 1000 / 10 ** speed.value);
     };
-    if (isOn) timer = 0, tick();
+    timer = setTimeout(tick);
   }
-  // To the next or the last step in another row.
+  const back = () => go(view.step - 1), next = () => go(view.step + 1), first = () => go(0), last = () => go(Infinity);
   function leap(way) {
+    const at = (k) => trace.steps[k - 1]?.slice(1, 4).filter((_, i) => i !== 1).join();
     let k = view.step + way;
-    const row = trace.steps[view.step - 1]?.[3];
-    while (k > 0 && k < trace.steps.length && trace.steps[k - 1][3] === row) k += way;
+    while (k > 0 && k < trace.steps.length && at(k) === at(view.step)) k += way;
     go(k);
   }
   function go(step) {
+    if (!trace) return;
     view.step = Math.max(0, Math.min(trace.steps.length, step));
-    const [width, height] = trace.size, pixels = new Uint8ClampedArray(4 * width * height), counts = new Int32Array(width * height);
-    const color = (i, rgb, alpha) => pixels.set([...rgb, alpha], 4 * i);
-    for (const [kind, triangle, x, y, last, isDrawn] of trace.steps.slice(0, view.step)) {
-      if (y < 0 || y >= height || kind === "row" || kind === "triangle") continue;
-      for (let at = Math.max(0, x); at <= Math.min(last, width - 1); at++) {
-        const i = y * width + at;
-        if (isDrawn) color(i, counts[i]++ ? VERMILION : OKABE_ITO[triangle % 4], 255);
-        else if (!counts[i]) color(i, [128, 128, 128], 90);
+    const [width, height] = trace.size, pixels = new Uint8ClampedArray(4 * width * height), counts = new Uint32Array(width * height);
+    for (const [kind, triangle, x, y, end, isDrawn] of trace.steps.slice(0, view.step)) {
+      if (kind === "triangle" || kind === "row") continue;
+      for (let i = y * width + x; i <= y * width + end; i++) {
+        if (isDrawn) pixels.set(counts[i]++ ? [...TWICE, 255] : [...OWNERS[triangle % OWNERS.length], 255], 4 * i);
+        else if (!counts[i]) pixels.set([128, 128, 128, 80], 4 * i);
       }
     }
     paint(canvas, Object.assign(pixels, {shape: [height, width, 4]}));
-    const now = trace.steps[view.step - 1], outlines = scene.triangles.map((corners) =>
-      svg("polygon", {points: corners.map((i) => scene.vertices[i].slice(0, 2).join(",")).join(" ")}));
-    const origin = scene.origin ?? [0, 0];
-    lines.setAttribute("viewBox", `${origin[0]} ${origin[1]} ${width} ${height}`);
-    if (now) outlines.push(svg("rect", {class: "now", x: now[2] + origin[0], y: now[3] + origin[1], width: now[4] - now[2] + 1, height: 1}));
-    lines.replaceChildren(...outlines);
-    Object.assign(slider, {max: trace.steps.length, value: view.step});
+    const now = trace.steps[view.step - 1], [ox, oy] = scene.origin ?? [0, 0];
+    over.setAttribute("viewBox", `0 0 ${width} ${height}`);
+    over.replaceChildren(...scene.triangles.map((row) =>
+      svg("polygon", {class: "edges", points: row.map((i) => `${scene.vertices[i][0] - ox},${scene.vertices[i][1] - oy}`).join(" ")})),
+    ...(now ? [svg("rect", {class: "now", x: now[2], y: now[3], width: now[4] - now[2] + 1, height: 1})] : []));
+    slider.max = trace.steps.length;
+    slider.value = view.step;
     tell(now);
+    app.keep();
   }
   function tell(now) {
     values.replaceChildren();
     if (!now) return void (told.textContent = `${trace.steps.length} steps. Nothing is drawn yet.`);
-    const [kind, triangle, x, y, last, isDrawn, numbers] = now;
-    const isIn = isDrawn || numbers.is_inside;
-    told.textContent = `${view.step} of ${trace.steps.length}: ` + {
-      triangle: `triangle ${triangle} is set up.`, row: `row ${y} of triangle ${triangle}.`,
-      line: `the ${numbers.side} line passes pixel ${x}, ${y}.`, span: `pixels ${x} to ${last} of row ${y} are drawn.`,
-      test: `pixel ${x}, ${y} of triangle ${triangle} is asked: ${isIn ? (isDrawn ? "drawn" : "inside") : "outside"}.`,
+    const [kind, triangle, x, y, end, isDrawn, numbers] = now;
+    told.textContent = `${view.step} of ${trace.steps.length}. ` + {
+      triangle: `Triangle ${triangle} is set up.`, row: `Row ${y} of triangle ${triangle}.`,
+      line: `The ${numbers.side} line passes pixel ${x}, ${y}.`, span: `Pixels ${x} to ${end} of row ${y} are drawn.`,
+      test: `Pixel ${x}, ${y} of triangle ${triangle}: ${isDrawn ? "drawn" : numbers.is_inside ? "inside" : "outside"}.`,
     }[kind];
     const before = trace.steps.slice(0, view.step - 1).findLast((one) => one[0] === kind && one[1] === triangle)?.[6] ?? {};
     for (const [name, value] of Object.entries(numbers)) {
-      const change = typeof value === "number" && typeof before[name] === "number" ? value - before[name] : null;
-      values.append(make("dt", {}, name), make(value < 0 ? "dd.negative" : "dd", {}, `${JSON.stringify(value).replaceAll('"', "")}`),
-        make("dd.change", {}, change === null ? "" : `${change < 0 ? "−" : "+"}${+Math.abs(change).toPrecision(6)}`));
+      const change = typeof value === "number" ? value - before[name] : NaN;
+      values.append(make("dt", {}, name), make(value < 0 ? "dd.bad" : "dd", {}, JSON.stringify(value).replaceAll('"', "")),
+        make("dd.change", {}, Number.isNaN(change) ? "" : `${change < 0 ? "−" : "+"}${+Math.abs(change).toPrecision(6)}`));
     }
   }
   const record = newest(async () => {
     try {
-      const {vertices, triangles, size, origin} = scene;
-      trace = await app.line.ask("steps.trace", {vertices, triangles, size, origin, method: view.method, subpixel_bits: view.subpixel_bits});
-      if (!methods) methods = choices.method.select.replaceChildren(...trace.methods.map((name) => make("option", {value: name}, name))) ?? trace.methods;
-      choices.method.select.value = view.method;
+      scene = view.scene ? (await app.line.ask("pixels.scene", {name: view.scene})).state : pixelsScene();
+      const {vertices, triangles, size, origin} = scene, {method, subpixel_bits} = view;
+      trace = await app.line.ask("steps.trace", {vertices, triangles, size, origin, method, subpixel_bits});
+      methods.replaceChildren(...trace.methods.map((name) => make("option", {value: name}, name)));
+      methods.value = method;
       about.textContent = `${trace.summary}. ${trace.source}.`;
       app.say("");
       go(view.step);
@@ -250,78 +670,58 @@ function stepsPart(app, panel) {
       app.say(error.message, true);
     }
   });
-  function take(name) {
-    view.scene = name, view.step = 0;
-    scene = TEACHERS_SCENES[name] ?? app.parts.pixels?.scene?.() ?? scene;
+  const pixelsScene = () => (app.parts.pixels.scene().size ? app.parts.pixels.scene() : app.hello.pixels);
+  const set = (name, read = String) => (value) => (Object.assign(view, {[name]: read(value), step: 0}), record());
+  const scenes = choose("scene", [["", "that of Pixels"], ...app.hello.scenes.map((name) => [name, name])], "", set("scene"));
+  const chosen = choose("method", [["edge", "edge"]], "edge", set("method")), methods = chosen.lastChild;
+  const bits = choose("sub-pixel bits", [0, 1, 2, 4, 8, 12, 16].map((n) => [n, n]), 8, set("subpixel_bits", Number));
+  const keys = {" ": toggle, ArrowRight: next, ArrowLeft: back, Home: first, End: last};
+  panel.append(make("div.layout", {tabIndex: -1, onkeydown(event) {
+    const isBusy = /SELECT|INPUT/.test(event.target.tagName) || (event.key === " " && event.target.tagName === "BUTTON");
+    const act = event.shiftKey && event.key.startsWith("Arrow") ? () => leap(event.key === "ArrowRight" ? 1 : -1) : keys[event.key];
+    if (act && trace && !isBusy) event.preventDefault(), act();
+  }}, make("div.stage", {}, make("div.magnified", {}, canvas, over)), make("div.side", {},
+    group("Steps", make("div.buttons", {}, play, button("Back", back, "Left"), button("Step", next, "Right"), button("Row back", () => leap(-1), "Shift and left"),
+      button("Row", () => leap(1), "Shift and right"), button("First", first, "Home"), button("Last", last, "End")), slider, row("speed", speed)),
+    group("Now", told, values), group("Drawn", scenes, chosen, bits, about))));
+  function enter() {
+    if (!view.scene || !trace) record();
+  }
+  function restore(given) {
+    Object.assign(view, given);
+    [scenes.lastChild.value, bits.lastChild.value] = [view.scene, view.subpixel_bits];
     record();
   }
-  const choices = {
-    scene: choose("Scene", [...Object.keys(TEACHERS_SCENES), ["pixels", "that of Pixels"]], view.scene, take),
-    method: choose("Method", [view.method], view.method, (name) => (view.method = name, view.step = 0, record())),
-    bits: choose("Sub-pixel bits", ["0", "1", "2", "4", "8", "12", "16"], "8", (bits) => (view.subpixel_bits = +bits, view.step = 0, record())),
-  };
-  function build() {
-    panel.append(make("div.layout", {}, make("div.stage", {}, make("div.magnified", {}, canvas, lines)), make("div.side", {},
-      make("div.group", {}, make("h2", {}, "Steps"), make("div.buttons", {}, buttons), slider, make("label.row", {}, make("span", {}, "Speed"), speed), told, values),
-      make("div.group", {}, make("h2", {}, "What is drawn"), Object.values(choices), about))));
-    panel.addEventListener("keydown", (event) => {
-      const isField = /SELECT|INPUT/.test(event.target.tagName);
-      const act = {" ": toggle, ArrowRight: () => (event.shiftKey ? leap(1) : go(view.step + 1)), ArrowLeft: () => (event.shiftKey ? leap(-1) : go(view.step - 1)),
-        Home: () => go(0), End: () => go(Infinity)}[event.key];
-      if (!act || !trace || isField || (event.key === " " && event.target.tagName === "BUTTON")) return;
-      event.preventDefault();
-      act();
-    });
-    panel.tabIndex = -1;
-    panel.onclick = (event) => event.target.closest("button, select, input") || panel.focus();
-  }
-  return {
-    enter() {
-      if (!panel.firstChild) build();
-      if (view.scene === "pixels" || !trace) take(view.scene);
-    },
-    state: () => view,
-    restore(kept) {
-      Object.assign(view, kept);
-      choices.scene.select.value = view.scene, choices.bits.select.value = view.subpixel_bits, trace = null;
-      scene = TEACHERS_SCENES[view.scene] ?? scene;
-    },
-  };
+  return part;
 }
 
 // ---- Mesh ------------------------------------------------------------------------------------------------------
 
-const FIRST_VIEW = {azimuth: 35, elevation: 20, zoom: 1, pan: [0, 0]};
-
 function meshPart(app, panel) {
-  const view = {...FIRST_VIEW, fov: 40, up: "y", layer: "smooth", lights: "headlight", edges: false, sampling: "center", tolerance: 0, cull: "none"};
-  const canvas = make("canvas.view", {tabIndex: 0, role: "application", "aria-label": "The mesh. Arrows turn it, with Shift they move it, plus and minus zoom."});
-  const mark = svg("svg", {class: "lines"}), stage = make("div.stage.mesh", {}, canvas, mark), side = make("div.side");
-  const facts = make("p.facts"), rate = make("p.rate", {role: "status"}), found = make("dl.values"), legend = make("ul.legend");
-  const planText = make("pre.plan"), planBox = make("details", {ontoggle: () => planBox.open && plan()}, make("summary", {}, "Plan of this view"), planText);
+  const home = () => ({azimuth: 35, elevation: 20, zoom: 1, pan: [0, 0]});
+  const view = {...home(), fov: 40, up: "y", layer: "smooth", lights: "headlight", edges: false, sampling: "center", tolerance: 0, cull: "none"};
   const frames = {painted: 0, asked: 0, newest: 0, times: [], last: null, waiting: null, rest: 0};
-  let mesh = null, spin = 0;
+  const part = {state: () => view, enter, restore, view, frames, change, spin: 0};
+  const canvas = make("canvas", {tabIndex: 0, role: "img", "aria-label": "The mesh: arrows turn it, with Shift they move it, plus and minus zoom"});
+  const over = svg("svg", {"aria-hidden": "true"}), stage = make("div.stage.mesh", {}, canvas, over), side = make("div.side");
+  const facts = make("p", {}, "No mesh yet."), rate = make("p.hint"), found = make("dl.values"), legend = make("div.legend");
+  const planText = make("pre", {tabIndex: 0}), planBox = make("details", {ontoggle: () => plan()}, make("summary", {}, "The plan, and why"), planText);
+  const file = make("input", {type: "file", "aria-label": "A mesh file", onchange: () => open(file.files[0])});
+  let mesh = null;
 
-  const size = () => {
-    const scale = Math.min(devicePixelRatio, 2), {clientWidth, clientHeight} = stage;
-    return [Math.max(1, Math.round(clientWidth * scale)), Math.max(1, Math.round(clientHeight * scale))];
-  };
+  const size = () => [stage.clientWidth, stage.clientHeight].map((n) => Math.max(1, Math.round(n * Math.min(devicePixelRatio, 2))));
+  const ask = (name, more) => app.line.ask(`mesh.${name}`, {...view, size: size(), ...more}).catch((error) => void app.say(error.message, true));
+  const paper = () => getComputedStyle(app.root).backgroundColor.match(/\d+/g).slice(0, 3).map(Number);
   // A view that changes comes as a JPEG, with the colour of the page behind it, and once more as it is when it rests. The
   // next frame is asked for before this one is on the screen: Python draws while the browser decodes and paints.
   const draw = newest(async (isAtRest = false) => {
     clearTimeout(frames.rest);
-    const start = performance.now(), number = ++frames.asked, background = isAtRest ? undefined : paper();
-    try {
-      const frame = await app.line.ask("mesh.draw", {...view, size: size(), background});
-      frame.took = performance.now() - start;
-      decode(frame, number, isAtRest);
-    } catch (error) {
-      app.say(error.message, true);
-    }
-    if (spin) view.azimuth = (view.azimuth + spin) % 360, draw();
-    else if (!isAtRest) frames.rest = setTimeout(() => draw(true), 200);
+    const start = performance.now(), number = ++frames.asked;
+    const frame = await ask("draw", isAtRest ? {} : {background: paper()});
+    if (frame) frame.took = performance.now() - start, decode(frame, number, isAtRest);
+    if (part.spin && !panel.hidden) view.azimuth = (view.azimuth + part.spin) % 360, draw();
+    else if (frame && !isAtRest) frames.rest = setTimeout(() => draw(true), 200);
   });
-  const paper = () => getComputedStyle(app.root).backgroundColor.match(/\d+/g)?.slice(0, 3).map(Number) ?? [255, 255, 255];
   async function decode(frame, number, isAtRest) {
     const [, , width, height] = frame.box, {pixels} = frame.arrays, start = performance.now();
     if (pixels.length) frame.image = isAtRest ? new ImageData(pixels, width, height) : await createImageBitmap(new Blob([pixels]));
@@ -332,234 +732,219 @@ function meshPart(app, panel) {
     frames.waiting = frame;
   }
   function show() {
-    const frame = frames.waiting, [x, y] = frame.box, start = performance.now();
+    const frame = frames.waiting, [x, y] = frame.box, start = performance.now(), context = canvas.getContext("2d");
     frames.waiting = null;
-    if (canvas.width !== frame.size[0] || canvas.height !== frame.size[1]) [canvas.width, canvas.height] = frame.size;
-    const context = canvas.getContext("2d");
-    context.clearRect(0, 0, canvas.width, canvas.height);
+    [canvas.width, canvas.height] = frame.size;
     if (frame.image instanceof ImageData) context.putImageData(frame.image, x, y);
     else if (frame.image) context.drawImage(frame.image, x, y);
     frames.painted++, frames.last = frame, frame.paint = performance.now() - start;
     frames.times = [...frames.times.filter((time) => start - time < 1000), start];
-    const level = frame.level === undefined ? "" : `, level ${frame.level} of ${frame.level_triangles.toLocaleString()} triangles`;
-    const perSecond = frames.times.length > 2 ? `${frames.times.length} frames a second; ` : "";
-    rate.textContent = `${perSecond}drawn in ${frame.draw_ms.toFixed(1)} ms, here after ${frame.took.toFixed(1)} ms${level}`;
+    const level = frame.level === undefined ? "" : `; level ${frame.level}, ${frame.level_triangles.toLocaleString("en")} triangles`;
+    rate.textContent = `${frames.times.length} frames in a second; drawn in ${frame.draw_ms.toFixed(1)} ms, here after ${frame.took.toFixed(1)} ms${level}`;
   }
   function change(values) {
     Object.assign(view, values);
     view.elevation = Math.max(-90, Math.min(90, view.elevation));
     view.zoom = Math.max(0.05, Math.min(1000, view.zoom));
-    mark.replaceChildren();
-    draw();
-    if (planBox.open) plan();
+    over.replaceChildren();
+    legend.replaceChildren(...(view.layer === "overdraw" ? mesh?.heat ?? [] : []).map(([rgb, text]) => make("span", {}, make("i", {style: `background:rgb(${rgb})`}), text)));
+    if (mesh) draw(), plan();
+    app.keep();
   }
-  const plan = newest(async () => (planText.textContent = (await app.line.ask("mesh.plan", {...view, size: size()}).catch((error) => ({text: error.message}))).text));
+  const plan = newest(async () => {
+    if (planBox.open) planText.textContent = (await ask("plan"))?.text ?? "";
+  });
 
-  async function pick(event) {
-    const box = canvas.getBoundingClientRect(), scale = canvas.width / box.width;
-    const [x, y] = [event.clientX - box.left, event.clientY - box.top].map((at) => Math.floor(at * scale));
-    const hit = await app.line.ask("mesh.pick", {...view, size: [canvas.width, canvas.height], x, y}).catch((error) => void app.say(error.message, true));
+  async function pick({clientX, clientY}) {
+    const {left, top, width} = canvas.getBoundingClientRect(), scale = canvas.width / width, size = [canvas.width, canvas.height];
+    const [x, y] = [clientX - left, clientY - top].map((at) => Math.floor(at * scale)), hit = await ask("pick", {size, x, y});
     if (!hit) return;
-    found.replaceChildren();
-    mark.replaceChildren();
-    if (hit.triangle < 0) return void found.append(make("dt", {}, "pixel"), make("dd", {}, `${x}, ${y}: nothing`));
-    mark.setAttribute("viewBox", `0 0 ${canvas.width} ${canvas.height}`);
-    mark.append(svg("polygon", {points: hit.corners_px.map((at) => at.join(",")).join(" ")}));
     const short = (numbers) => numbers.map((number) => +number.toPrecision(5)).join(", ");
-    const rows = [["pixel", `${x}, ${y}`], [hit.is_level ? "triangle of the level" : "triangle", hit.triangle], ["vertices", hit.vertices.join(", ")],
-      ...hit.positions.map((at, k) => [`corner ${k}`, short(at)]), ["barycentric", short(hit.barycentric)], ["depth", short([hit.depth])],
+    const rows = hit.triangle < 0 ? [["shows", "nothing"]] : [
+      [hit.is_level ? "triangle of the level" : "triangle", hit.triangle], ["vertices", hit.vertices.join(", ")],
+      ...hit.positions.map((at, k) => [`at ${k}`, short(at)]), ["weights", short(hit.barycentric)], ["depth", short([hit.depth])],
       ...(hit.uv ? [["uv", short(hit.uv)]] : []), ...(hit.material ? [["material", hit.material]] : [])];
-    for (const [name, value] of rows) found.append(make("dt", {}, name), make("dd", {}, `${value}`));
+    found.replaceChildren(...[["pixel", `${x}, ${y}`], ...rows].flatMap(([name, value]) => [make("dt", {}, name), make("dd", {}, `${value}`)]));
+    over.setAttribute("viewBox", `0 0 ${size.join(" ")}`);
+    over.replaceChildren(...(hit.corners_px ? ["halo", "taken"].map((name) => svg("polygon", {class: name, points: hit.corners_px.join(" ")})) : []));
   }
-  async function open(file) {
+  async function open(given) {
+    if (given) app.say(`Reading ${given.name}`);
     try {
-      if (file) app.say(`Reading ${file.name}`);
-      const parts = file ? [new Uint8Array(await file.arrayBuffer())] : [];
-      mesh = await app.line.ask("mesh.open", {name: file?.name}, parts);
-      facts.textContent = `${mesh.name}: ${mesh.n_triangles.toLocaleString()} triangles, ${mesh.n_vertices.toLocaleString()} vertices`;
-      app.say(mesh.lacks.join("; "));
-      controls();
-      change(file ? {...FIRST_VIEW, pan: [0, 0]} : {});
+      mesh = await app.line.ask("mesh.open", {name: given?.name}, given ? [new Uint8Array(await given.arrayBuffer())] : []);
     } catch (error) {
-      app.say(error.message, true);
+      return void app.say(error.message, true);
     }
+    facts.textContent = `${mesh.name}: ${mesh.n_triangles.toLocaleString("en")} triangles, ${mesh.n_vertices.toLocaleString("en")} vertices`;
+    app.say(mesh.lacks.join("; "));
+    if (!mesh.layers.includes(view.layer)) view.layer = "smooth";
+    controls();
+    change(given ? home() : {});
   }
   async function save(what) {
-    const {name, arrays} = await app.line.ask("mesh.save", {...view, size: size(), what}).catch((error) => (app.say(error.message, true), {}));
-    if (!name) return;
-    const link = make("a", {href: URL.createObjectURL(new Blob([arrays.file])), download: name});
-    link.click();
-    setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+    const {name, arrays} = (await ask("save", {what})) ?? {};
+    if (name) download(name, arrays.file);
   }
+
+  // One finger or button turns, the other button, Shift or two fingers move, two fingers and the wheel zoom.
   const pointers = new Map();
-  function move(event) {
-    if (!pointers.has(event.pointerId)) return;
-    const before = [...pointers.values()], old = pointers.get(event.pointerId), {clientHeight} = canvas;
-    const [dx, dy] = [event.clientX - old.x, event.clientY - old.y];
+  canvas.onpointerdown = (event) => {
+    canvas.setPointerCapture(event.pointerId);
+    pointers.set(event.pointerId, {x: event.clientX, y: event.clientY, moved: 0, button: event.button});
+  };
+  canvas.onpointermove = (event) => {
+    const old = pointers.get(event.pointerId), before = [...pointers.values()], reach = ([a, b]) => Math.hypot(a.x - b.x, a.y - b.y) || 1;
+    if (!old) return;
+    const dx = event.clientX - old.x, dy = event.clientY - old.y, share = (pointers.size > 1 ? 1 : 2) / canvas.clientHeight;
     pointers.set(event.pointerId, {...old, x: event.clientX, y: event.clientY, moved: old.moved + Math.abs(dx) + Math.abs(dy)});
-    const shift = (dx, dy) => [view.pan[0] + 2 * dx / clientHeight, view.pan[1] - 2 * dy / clientHeight];
-    if (pointers.size === 2) {
-      const reach = ([a, b]) => Math.hypot(a.x - b.x, a.y - b.y) || 1;
-      change({pan: shift(dx / 2, dy / 2), zoom: view.zoom * reach([...pointers.values()]) / reach(before)});
-    } else if (old.button || event.shiftKey) change({pan: shift(dx, dy)});
+    const pan = [view.pan[0] + share * dx, view.pan[1] - share * dy];
+    if (pointers.size === 2) change({pan, zoom: view.zoom * reach([...pointers.values()]) / reach(before)});
+    else if (old.button || event.shiftKey) change({pan});
     else change({azimuth: view.azimuth - 0.4 * dx, elevation: view.elevation + 0.4 * dy});
-  }
-  function release(event) {
+  };
+  canvas.onpointerup = canvas.onpointercancel = (event) => {
     const old = pointers.get(event.pointerId);
     pointers.delete(event.pointerId);
-    if (event.type === "pointerup" && old && old.moved < 4 && !old.button) pick(event);
-  }
-  function press(event) {
-    const way = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1]}[event.key];
-    if (way && event.shiftKey) change({pan: [view.pan[0] + 0.05 * way[0], view.pan[1] + 0.05 * way[1]]});
-    else if (way) change({azimuth: view.azimuth + 5 * way[0], elevation: view.elevation + 5 * way[1]});
-    else if ("+=-0".includes(event.key)) change({"+": {zoom: view.zoom * 1.1}, "=": {zoom: view.zoom * 1.1}, "-": {zoom: view.zoom / 1.1}, 0: {...FIRST_VIEW, pan: [0, 0]}}[event.key]);
+    if (event.type === "pointerup" && old?.moved < 4 && !old.button) pick(event);
+  };
+  canvas.oncontextmenu = (event) => event.preventDefault();
+  canvas.addEventListener("wheel", (event) => (event.preventDefault(), change({zoom: view.zoom * 1.0015 ** -event.deltaY})), {passive: false});
+  canvas.onkeydown = (event) => {
+    const [x, y] = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1]}[event.key] ?? [0, 0];
+    const zoom = {"+": 1.1, "=": 1.1, "-": 1 / 1.1}[event.key];
+    if (x || y) change(event.shiftKey ? {pan: [view.pan[0] + 0.05 * x, view.pan[1] + 0.05 * y]} : {azimuth: view.azimuth + 5 * x, elevation: view.elevation + 5 * y});
+    else if (zoom || event.key === "0") change(zoom ? {zoom: view.zoom * zoom} : home());
     else return;
     event.preventDefault();
-  }
+  };
+  panel.ondragover = (event) => event.preventDefault();
+  panel.ondrop = (event) => (event.preventDefault(), event.dataTransfer.files[0] && open(event.dataTransfer.files[0]));
+
   function controls() {
-    const set = (name, read = (text) => text) => (text) => (change({[name]: read(text)}), showLegend());
-    const edges = make("input", {type: "checkbox", checked: view.edges, onchange: () => change({edges: edges.checked})});
-    const turn = make("input", {type: "checkbox", checked: !!spin, onchange: () => (spin = turn.checked ? 1.5 : 0, draw())});
-    const file = make("input", {type: "file", onchange: () => file.files[0] && open(file.files[0])});
-    const check = (label, box) => make("label.row", {}, make("span", {}, label), box);
-    side.replaceChildren(
-      make("div.group", {}, make("h2", {}, "Mesh"), facts, rate, check("Open a file, or drop one", file)),
-      make("div.group", {}, make("h2", {}, "Look"), choose("Layer", mesh.layers, view.layer, set("layer")), legend, choose("Light", mesh.lights, view.lights, set("lights")),
-        check("Wireframe", edges), choose("Sampling", ["center", "msaa2", "msaa4", "msaa8", "msaa16"], view.sampling, set("sampling")),
-        choose("Tolerance, px", ["0", "0.25", "0.5", "1", "2", "4"], `${view.tolerance}`, set("tolerance", Number)),
-        choose("Cull", ["none", "back", "front"], view.cull, set("cull"))),
-      make("div.group", {}, make("h2", {}, "Camera"), choose("Field of view", [["40", "40°"], ["20", "20°"], ["70", "70°"], ["0", "no perspective"]], `${view.fov}`, set("fov", Number)),
-        choose("Up", ["y", "z"], view.up, set("up")), check("Turn", turn),
-        make("div.buttons", {}, make("button", {onclick: () => change({...FIRST_VIEW, pan: [0, 0]})}, "Reset"))),
-      make("div.group", {}, make("h2", {}, "Picked"), make("p.muted", {}, "A click tells what shows there."), found),
-      make("div.group", {}, make("h2", {}, "Save"), make("div.buttons", {}, [["PNG", "png"], ["Python", "code"], ["Job file", "job"]].map(([text, what]) =>
-        make("button", {onclick: () => save(what)}, text))), planBox));
-    showLegend();
-  }
-  function showLegend() {
-    legend.replaceChildren(...(view.layer === "overdraw" ? mesh.heat : []).map(([rgb, text]) => make("li", {}, make("i", {style: `background:rgb(${rgb})`}), text)));
-  }
-  function build() {
-    panel.append(make("div.layout", {}, stage, side));
-    canvas.onpointerdown = (event) => {
-      canvas.setPointerCapture(event.pointerId);
-      pointers.set(event.pointerId, {x: event.clientX, y: event.clientY, moved: 0, button: event.button});
+    const choice = (label, name, options) => choose(label, options.map((one) => [one].flat()), view[name], (text) =>
+      change({[name]: typeof view[name] === "number" ? Number(text) : text}));
+    const check = (label, isOn, act) => {
+      const box = make("input", {type: "checkbox", checked: isOn, onchange: () => act(box.checked)});
+      return make("label.check", {}, box, label);
     };
-    Object.assign(canvas, {onpointermove: move, onpointerup: release, onpointercancel: release, onkeydown: press, oncontextmenu: (event) => event.preventDefault()});
-    canvas.addEventListener("wheel", (event) => (event.preventDefault(), change({zoom: view.zoom * 1.0015 ** -event.deltaY})), {passive: false});
-    panel.ondragover = (event) => event.preventDefault();
-    panel.ondrop = (event) => (event.preventDefault(), event.dataTransfer.files[0] && open(event.dataTransfer.files[0]));
-    new ResizeObserver(() => mesh && !panel.hidden && draw()).observe(stage);
-    side.append(make("div.group", {}, make("h2", {}, "Mesh"), facts, make("p.muted", {}, "Drop a file here: OBJ, PLY, STL, OFF, glTF, GLB."),
-      make("input", {type: "file", "aria-label": "Mesh file", onchange: (event) => open(event.target.files[0])})));
-    open();
+    side.replaceChildren(group("Mesh", facts, file, rate), ...(mesh ? [
+      group("Look", choice("layer", "layer", mesh.layers), legend, choice("light", "lights", mesh.lights), choice("sampling", "sampling", ["center", "msaa2", "msaa4", "msaa8", "msaa16"]),
+        choice("tolerance", "tolerance", [[0, "none: the mesh itself"], ...[0.25, 0.5, 1, 2, 4].map((n) => [n, `${n} px: a coarser level`])]),
+        choice("cull", "cull", ["none", "back", "front"]), check("wireframe", view.edges, (edges) => change({edges}))),
+      group("Camera", choice("view angle", "fov", [[40, "40°"], [20, "20°"], [70, "70°"], [0, "no perspective"]]), choice("up", "up", ["y", "z"]),
+        check("turn by itself", part.spin, (isOn) => (part.spin = isOn ? 1.5 : 0, draw())), make("div.buttons", {}, button("Reset", () => change(home()), "0"))),
+      group("Picked", make("p.hint", {}, "A click tells which triangle shows."), found),
+      group("Keep", make("div.buttons", {}, ...[["PNG", "png"], ["Python", "code"], ["Job file", "job"]].map(([text, what]) => button(text, () => save(what))),
+        button("Copy link", () => app.copyLink())), planBox)] : [make("p.hint", {}, "Drop a file here: OBJ, PLY, STL, OFF, glTF or GLB.")]));
   }
-  return {enter: () => (panel.firstChild ? mesh && draw() : build()), state: () => view, restore: (kept) => Object.assign(view, kept), view, frames, change};
+  controls();
+  panel.append(make("div.layout", {}, stage, side));
+  new ResizeObserver(() => mesh && !panel.hidden && draw()).observe(stage);
+  function enter() {
+    if (mesh) draw();
+    else open();
+  }
+  function restore(given) {
+    for (const name of Object.keys(view)) if (name in given) view[name] = given[name];
+    controls();
+    change({});
+  }
+  return part;
 }
 
 // ---- Race ------------------------------------------------------------------------------------------------------
 
-const SHARES = ["#ffffcc", "#c7e9b4", "#7fcdbb", "#41b6c4", "#2c7fb8", "#253494"];
-
 function racePart(app, panel) {
-  const view = {family: "edge", positions: [0], seed: 0};
-  const FAULTS = [null, OKABE_ITO[3], VERMILION, OKABE_ITO[0]];
-  const stage = make("div.stage.race"), sliders = make("div"), what = make("p.muted"), chart = make("table.chart"), cards = [];
-  let known = null, columns = [];
+  const view = {family: "edge", positions: [0], seed: 0}, part = {state: () => view, enter, restore, drawn: 0};
+  const faultColors = [null, OWNERS[3], TWICE, OWNERS[0]], shareColors = ["#ffffcc", "#c7e9b4", "#7fcdbb", "#41b6c4", "#2c7fb8", "#253494"];
+  const stage = make("div.stage.race"), sliders = make("div"), what = make("p"), chart = make("table.chart"), side = make("div.side");
+  let known = null, racers = [], mapped = "";
 
   const draw = newest(async () => {
-    try {
-      const told = await app.line.ask("race.draw", view), [width, height] = told.size, n = width * height;
-      [...sliders.querySelectorAll("output")].forEach((output, i) => (output.textContent = told.values[i]));
-      const {triangle, faults} = told.arrays;
-      told.methods.forEach(({name, bad, gaps, overdrawn, refused}, k) => {
-        const pixels = new Uint8ClampedArray(4 * n);
-        for (let i = 0; i < n; i++) {
-          const fault = FAULTS[faults[k * n + i]];
-          pixels.set(fault ? [...fault, 255] : [128, 128, 128, refused || triangle[i] < 0 ? 0 : 40 + 25 * (triangle[i] % 3)], 4 * i);
-        }
-        paint(cards[k].canvas, Object.assign(pixels, {shape: [height, width, 4]}));
-        cards[k].count.textContent = refused ? "refuses" : bad ? `${bad} wrong` : "right";
-        cards[k].title = refused ?? `${bad} of ${n} pixels: ${gaps} gaps, ${overdrawn} drawn twice`;
-        cards[k].classList.toggle("is-right", bad === 0);
-      });
-      app.say("");
-      here();
-    } catch (error) {
-      app.say(error.message, true);
-    }
+    const told = await app.line.ask("race.draw", view).catch((error) => void app.say(error.message, true));
+    if (!told) return;
+    const [width, height] = told.size, n = width * height, {triangle, faults} = told.arrays;
+    sliders.querySelectorAll("output").forEach((output, i) => (output.textContent = told.values[i]));
+    told.methods.forEach(({bad, gaps, overdrawn, refused}, k) => {
+      const pixels = new Uint8ClampedArray(4 * n);
+      for (let i = 0; i < n; i++) {
+        const fault = faultColors[faults[k * n + i]];
+        pixels.set(fault ? [...fault, 255] : [128, 128, 128, refused || triangle[i] < 0 ? 0 : 40 + 30 * (triangle[i] % 3)], 4 * i);
+      }
+      paint(racers[k].canvas, Object.assign(pixels, {shape: [height, width, 4]}));
+      Object.assign(racers[k].count, {textContent: refused ? "refuses" : bad ? `${bad} wrong` : "right", className: bad ? "bad" : "good"});
+      racers[k].title = refused ?? `${bad} of ${n} pixels: ${gaps} gaps, ${overdrawn} drawn more than once`;
+    });
+    app.say("");
+    part.drawn++;
+    for (const line of chart.rows) [...line.cells].forEach((cell, i) => cell.classList.toggle("here", i === Math.round(view.positions.at(-1)) + 1));
   });
-  // Columns of the chart come one by one; another family ends the walk.
+  // The chart is filled column by column; another family, seed or first parameter begins another.
   async function map() {
-    const family = view.family, last = known.families[family].axes.length - 1, asked = JSON.stringify([family, view.seed, view.positions.slice(0, last)]);
-    if (asked === map.asked) return;
-    map.asked = asked, columns = [];
-    grid();
-    for (let i = 0; i < known.families[family].axes[last].steps.length && map.asked === asked; i++) {
-      const column = await app.line.ask("race.column", {...view, positions: [...view.positions.slice(0, last), i]}).catch(() => null);
-      if (map.asked !== asked || !column) return;
-      columns[i] = column;
+    const {axes} = known.families[view.family], axis = axes.at(-1), others = view.positions.slice(0, -1);
+    const wanted = JSON.stringify([view.family, view.seed, others]);
+    if (mapped === wanted) return;
+    mapped = wanted;
+    chart.replaceChildren(make("caption", {}, `Wrong pixels, in % of those that an edge meets, by ${axis.what}. A dot: with gaps.`),
+      make("thead", {}, make("tr", {}, make("th"), ...axis.steps.map((step, i) => make("th", {scope: "col"}, button(step, () => set(axes.length - 1, i)))))),
+      make("tbody", {}, ...known.methods.map((name) => make("tr", {}, make("th", {scope: "row"}, name), ...axis.steps.map(() => make("td"))))));
+    for (let i = 0; i < axis.steps.length; i++) {
+      const column = await app.line.ask("race.column", {...view, positions: [...others, i]}).catch(() => null);
+      if (mapped !== wanted || !column) return;
       column.rows.forEach(([bad, hasGaps], k) => {
         const cell = chart.tBodies[0].rows[k].cells[i + 1], share = bad / Math.max(1, column.n_edge_px);
-        const level = Math.max(0, Math.min(5, Math.floor(Math.log10(share) * 1.5 + 6)));
-        if (bad === null) return void Object.assign(cell, {className: "refused", title: "refuses to draw"});
-        cell.textContent = bad ? (100 * share < 1 ? (100 * share).toFixed(1) : Math.round(100 * share)) : "";
-        Object.assign(cell, {className: (level > 3 ? "dark" : "") + (hasGaps ? " gaps" : ""), title: `${bad} wrong pixels${hasGaps ? ", with gaps" : ""}`});
-        cell.style.background = bad ? SHARES[level] : "";
+        const level = Math.max(0, Math.min(5, Math.floor(1.5 * Math.log10(share) + 6)));
+        cell.title = bad === null ? "refuses to draw" : `${bad} wrong pixels${hasGaps ? ", with gaps" : ""}`;
+        cell.classList.add(bad === null ? "refused" : level > 3 ? "dark" : "light", ...(hasGaps ? ["gaps"] : []));
+        if (bad) cell.textContent = share < 0.01 ? (100 * share).toFixed(1) : Math.round(100 * share), cell.style.background = shareColors[level];
       });
     }
-  }
-  function grid() {
-    const {axes} = known.families[view.family], axis = axes.at(-1);
-    chart.replaceChildren(make("caption", {}, `Wrong pixels, % of those that an edge meets, by ${axis.what}. A dot: with gaps.`),
-      make("thead", {}, make("tr", {}, make("th"), axis.steps.map((step, i) => make("th", {scope: "col"}, make("button", {onclick: () => set(axes.length - 1, i)}, step))))),
-      make("tbody", {}, known.methods.map((name) => make("tr", {}, make("th", {scope: "row"}, name), axis.steps.map(() => make("td"))))));
-    here();
-  }
-  function here() {
-    const at = Math.round(view.positions.at(-1));
-    for (const line of chart.rows) [...line.cells].forEach((cell, i) => cell.classList.toggle("here", i === at + 1));
   }
   function set(i, position) {
     view.positions[i] = position;
     sliders.querySelectorAll("input")[i].value = position;
-    draw();
-    map();
+    draw(), map(), app.keep();
   }
-  function enterFamily(name) {
-    const {axes, what: text} = known.families[name];
-    if (name !== view.family || view.positions.length !== axes.length) view.positions = axes.map(() => 0);
-    view.family = name, what.textContent = `${text[0].toUpperCase()}${text.slice(1)}. Each pixel has to be drawn once.`;
-    sliders.replaceChildren(...axes.map((axis, i) => make("label.slider", {}, make("span", {}, axis.what, " ", make("output")),
-      make("input", {type: "range", min: 0, max: axis.steps.length - 1, step: axis.is_continuous ? 0.05 : 1, value: view.positions[i], oninput: ({target}) => set(i, +target.value)}))));
-    draw();
-    map();
+  function take(family) {
+    const {axes, what: text} = known.families[family];
+    if (family !== view.family || view.positions.length !== axes.length) view.positions = axes.map(() => 0);
+    view.family = family;
+    what.textContent = `${text[0].toUpperCase()}${text.slice(1)}. Each pixel has to be drawn once.`;
+    sliders.replaceChildren(...axes.map((axis, i) => make("label.slider", {}, make("span", {}, `${axis.what}: `, make("output")), make("input", {
+      type: "range", min: 0, max: axis.steps.length - 1, step: axis.is_continuous ? 0.05 : 1, value: view.positions[i], oninput: ({target}) => set(i, target.valueAsNumber),
+    }))));
+    draw(), map(), app.keep();
   }
-  async function build() {
-    panel.append(make("div.layout.wide"));
-    known = await app.line.ask("race.families").catch((error) => void app.say(error.message, true));
-    if (!known) return;
-    const names = Object.keys(known.families), seed = make("input", {type: "number", min: 0, max: 99, value: view.seed, onchange: () => (view.seed = Math.max(0, +seed.value | 0), draw(), map())});
-    cards.push(...known.methods.map((name) => {
-      const canvas = make("canvas.pixels"), count = make("span.count");
-      return Object.assign(make("figure.card", {}, canvas, make("figcaption", {}, make("b", {}, name), count)), {canvas, count});
-    }));
-    const key = [["another triangle shows", 1], ["a gap", 2], ["drawn more than once", 3]];
-    stage.append(...cards);
-    panel.firstChild.append(stage, make("div.side", {}, make("div.group", {}, make("h2", {}, "Race"), choose("Family", names, view.family, enterFamily), what, sliders,
-      make("label.row", {}, make("span", {}, "Seed"), seed), make("ul.legend", {}, key.map(([text, i]) => make("li", {}, make("i", {style: `background:rgb(${FAULTS[i]})`}), text)))),
-      make("div.group", {}, make("h2", {}, "Chart"), make("div.scroll", {}, chart))));
-    enterFamily(view.family);
+  async function enter() {
+    if (panel.firstChild) return;
+    panel.append(make("div.layout.wide", {}, stage, side));
+    known = await app.line.ask("race.families");
+    racers = known.methods.map((name) => {
+      const canvas = make("canvas"), count = make("span");
+      return Object.assign(make("figure", {}, canvas, make("figcaption", {}, name, count)), {canvas, count});
+    });
+    stage.append(...racers);
+    build();
   }
-  return {enter: () => panel.firstChild || build(), state: () => view, restore: (kept) => Object.assign(view, kept)};
+  function build() {
+    const seed = make("input", {type: "number", min: 0, max: 99, value: view.seed, onchange: () => (view.seed = Math.max(0, seed.valueAsNumber | 0), draw(), map(), app.keep())});
+    const key = ["another triangle shows", "a gap", "drawn more than once"].map((text, i) => make("span", {}, make("i", {style: `background:rgb(${faultColors[i + 1]})`}), text));
+    side.replaceChildren(group("Race", choose("family", Object.keys(known.families).map((name) => [name, name]), view.family, take), what, sliders, row("seed", seed),
+      make("div.legend", {}, ...key)), group("Chart", make("div.scroll", {tabIndex: 0}, chart)));
+    take(view.family);
+  }
+  function restore(given) {
+    Object.assign(view, given);
+    if (racers.length) build();
+  }
+  return part;
 }
 
 // ---- the page --------------------------------------------------------------------------------------------------
 
 // Fills an .explorer element with its parts. `app` is what they share: app.line.ask, app.say (a line of status),
-// app.hello (what Python begins with), app.root, app.show(tab), app.parts.
-export async function start(root, connect) {
+// app.hello (what Python begins with), app.root, app.show(tab), app.parts, app.keep (notes the state in the address).
+export async function start(root, connect, hasAddress = true) {
   const app = {root, parts: {}, tab: null};
   const tabs = [...root.querySelectorAll("[data-tab]")];
   app.say = (text, isBad = false) => {
@@ -576,7 +961,40 @@ export async function start(root, connect) {
       root.querySelector(`[data-panel=${tab.dataset.tab}]`).hidden = !isShown;
     }
     app.parts[name].enter();
+    app.keep();
   };
+
+  // The address holds what is shown: #pixels={...}.
+  let noted = "", timer = 0;
+  app.keep = () => {
+    clearTimeout(timer);
+    timer = setTimeout(() => {
+      const text = JSON.stringify(app.parts[app.tab].state?.() ?? {});
+      noted = `#${app.tab}=${encodeURIComponent(text)}`;
+      if (hasAddress && noted.length < 60000) history.replaceState(null, "", noted);
+    }, 200);
+  };
+  app.copyLink = async () => {
+    const link = hasAddress ? location.href : noted;
+    try {
+      await navigator.clipboard.writeText(link);
+      app.say("The link is copied.");
+    } catch {
+      app.say(link);
+    }
+  };
+  app.restore = (fragment) => {
+    const [tab, text = ""] = fragment.replace(/^#/, "").split("=");
+    if (!(tab in PARTS) || !text) return false;
+    app.show(tab);
+    try {
+      app.parts[tab].restore?.(JSON.parse(decodeURIComponent(text)));
+    } catch (error) {
+      app.say(`This link cannot be read: ${error.message}`, true);
+    }
+    return true;
+  };
+
   try {
     app.line = await connect(() => app.say("The explorer has ended. Start it again to go on.", true));
     app.hello = await app.line.ask("hello");
@@ -589,19 +1007,20 @@ export async function start(root, connect) {
   for (const [i, tab] of tabs.entries()) {
     tab.onclick = () => app.show(tab.dataset.tab);
     tab.onkeydown = ({key}) => {
-      const step = {ArrowRight: 1, ArrowLeft: -1}[key];
-      if (step) tabs.at((i + step) % tabs.length).focus(), app.show(tabs.at((i + step) % tabs.length).dataset.tab);
+      const next = tabs.at((i + ({ArrowRight: 1, ArrowLeft: -1}[key] ?? tabs.length)) % tabs.length);
+      if (next !== tab) next.focus(), app.show(next.dataset.tab);
     };
   }
-  app.show(app.hello.tab);
   root.app = app;
+  if (hasAddress) addEventListener("hashchange", () => location.hash !== noted && app.restore(location.hash));
+  if (!app.restore(hasAddress && location.hash ? location.hash : app.hello.fragment)) app.show(app.hello.tab);
   return app;
 }
 
 // In a notebook: anywidget calls this for each cell.
 async function render({model, el}) {
   el.innerHTML = model.get("markup");
-  await start(el.querySelector(".explorer"), () => notebookLine(model));
+  await start(el.querySelector(".explorer"), () => notebookLine(model), false);
 }
 export default {render};
 
