@@ -632,8 +632,9 @@ function stepsPart(app, panel) {
     paint(canvas, Object.assign(pixels, {shape: [height, width, 4]}));
     const now = trace.steps[view.step - 1], [ox, oy] = scene.origin ?? [0, 0];
     over.setAttribute("viewBox", `0 0 ${width} ${height}`);
-    over.replaceChildren(...scene.triangles.map((row) =>
-      svg("polygon", {class: "edges", points: row.map((i) => `${scene.vertices[i][0] - ox},${scene.vertices[i][1] - oy}`).join(" ")})),
+    over.parentNode.style.setProperty("--ratio", width / height);
+    const corners = scene.triangles.map((row) => row.map((i) => `${scene.vertices[i][0] - ox},${scene.vertices[i][1] - oy}`).join(" "));
+    over.replaceChildren(...["halo", "edges"].flatMap((name) => corners.map((points) => svg("polygon", {class: name, points}))),
     ...(now ? [svg("rect", {class: "now", x: now[2], y: now[3], width: now[4] - now[2] + 1, height: 1})] : []));
     slider.max = trace.steps.length;
     slider.value = view.step;
@@ -855,9 +856,9 @@ function meshPart(app, panel) {
 // ---- Race ------------------------------------------------------------------------------------------------------
 
 function racePart(app, panel) {
-  const view = {family: "edge", positions: [0], seed: 0}, part = {state: () => view, enter, restore, drawn: 0};
-  const faultColors = [null, OWNERS[3], TWICE, OWNERS[0]], shareColors = ["#ffffcc", "#c7e9b4", "#7fcdbb", "#41b6c4", "#2c7fb8", "#253494"];
-  const stage = make("div.stage.race"), sliders = make("div"), what = make("p"), chart = make("table.chart"), side = make("div.side");
+  const view = {family: "fan", positions: [3], seed: 0}, part = {state: () => view, enter, restore, drawn: 0};
+  const faultColors = [null, OWNERS[3], TWICE, [20, 130, 210]], shareColors = ["#ffffcc", "#c7e9b4", "#7fcdbb", "#41b6c4", "#2c7fb8", "#253494"];
+  const stage = make("div.stage.race"), sliders = make("div"), what = make("p"), chart = make("table.chart"), by = make("p.hint"), side = make("div.side");
   let known = null, racers = [], mapped = "";
 
   const draw = newest(async () => {
@@ -885,8 +886,8 @@ function racePart(app, panel) {
     const wanted = JSON.stringify([view.family, view.seed, others]);
     if (mapped === wanted) return;
     mapped = wanted;
-    chart.replaceChildren(make("caption", {}, `Wrong pixels, in % of those that an edge meets, by ${axis.what}. A dot: with gaps.`),
-      make("thead", {}, make("tr", {}, make("th"), ...axis.steps.map((step, i) => make("th", {scope: "col"}, button(step, () => set(axes.length - 1, i)))))),
+    by.textContent = `Wrong pixels, in % of those that an edge meets, by ${axis.what}. A dot: with gaps.`;
+    chart.replaceChildren(make("thead", {}, make("tr", {}, make("th"), ...axis.steps.map((step, i) => make("th", {scope: "col"}, button(step, () => set(axes.length - 1, i)))))),
       make("tbody", {}, ...known.methods.map((name) => make("tr", {}, make("th", {scope: "row"}, name), ...axis.steps.map(() => make("td"))))));
     for (let i = 0; i < axis.steps.length; i++) {
       const column = await app.line.ask("race.column", {...view, positions: [...others, i]}).catch(() => null);
@@ -917,11 +918,11 @@ function racePart(app, panel) {
   }
   async function enter() {
     if (panel.firstChild) return;
-    panel.append(make("div.layout.wide", {}, stage, side));
+    panel.append(make("div.layout.wide", {}, stage, side, group("Chart", by, make("div.scroll", {tabIndex: 0}, chart))));
     known = await app.line.ask("race.families");
     racers = known.methods.map((name) => {
       const canvas = make("canvas"), count = make("span");
-      return Object.assign(make("figure", {}, canvas, make("figcaption", {}, name, count)), {canvas, count});
+      return Object.assign(make("figure", {}, canvas, make("figcaption", {}, name.replace(/[_/]/g, "$&\u200b"), count)), {canvas, count});
     });
     stage.append(...racers);
     build();
@@ -930,7 +931,7 @@ function racePart(app, panel) {
     const seed = make("input", {type: "number", min: 0, max: 99, value: view.seed, onchange: () => (view.seed = Math.max(0, seed.valueAsNumber | 0), draw(), map(), app.keep())});
     const key = ["another triangle shows", "a gap", "drawn more than once"].map((text, i) => make("span", {}, make("i", {style: `background:rgb(${faultColors[i + 1]})`}), text));
     side.replaceChildren(group("Race", choose("family", Object.keys(known.families).map((name) => [name, name]), view.family, take), what, sliders, row("seed", seed),
-      make("div.legend", {}, ...key)), group("Chart", make("div.scroll", {tabIndex: 0}, chart)));
+      make("div.legend", {}, ...key)));
     take(view.family);
   }
   function restore(given) {
