@@ -120,6 +120,7 @@ class OpenCVLens:
 
     def distort(self, points: F64) -> F64:
         """Places (N, 2) in the image plane of points (N, 3) with Z > 0."""
+        points = _as_points(points)
         x, y = points[:, 0] / points[:, 2], points[:, 1] / points[:, 2]
         r2 = x * x + y * y
         numerator = 1 + r2 * (self.k1 + r2 * (self.k2 + r2 * self.k3))
@@ -194,6 +195,7 @@ class FisheyeLens:
 
     def distort(self, points: F64) -> F64:
         """Places (N, 2) in the image plane of points (N, 3)."""
+        points = _as_points(points)
         off_axis = np.hypot(points[:, 0], points[:, 1])
         angle = np.arctan2(off_axis, points[:, 2])
         t2 = angle * angle
@@ -209,6 +211,13 @@ class FisheyeLens:
     def bend(self, points_eye: F64) -> F64:
         """Where points (N, 3) in eye space must be for a camera without the lens to see the same."""
         return _bend(self, points_eye)
+
+
+def _as_points(points: npt.ArrayLike) -> F64:
+    found = as_real("points", points)
+    if found.ndim != 2 or found.shape[1] != 3:
+        raise ValueError(f"points must have shape (N, 3), got {found.shape}")
+    return found
 
 
 def lens_of_opencv(distortion: npt.ArrayLike | None, fisheye: npt.ArrayLike | None) -> Lens | None:

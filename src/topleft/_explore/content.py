@@ -21,8 +21,14 @@ __all__ = ["MAX_SIDE_PX", "MAX_TRIANGLES", "SCENES", "content_of", "content_of_n
 MAX_SIDE_PX, MAX_TRIANGLES, MAX_VERTICES = 256, 1000, 3000
 """Of what is drawn magnified."""
 
-SCENES: tuple[str, ...] = (*scenes.TUTORIAL_SCENES, *failure_scenes.FAILURE_SCENES)
+SCENES: tuple[str, ...] = ("shared-edge", *scenes.TUTORIAL_SCENES, *failure_scenes.FAILURE_SCENES)
 """Names of what is drawn magnified, in the order of the page."""
+
+SHARED_EDGE = {
+    "vertices": [[2.5, 2.5], [13.5, 1.5], [3.5, 11.5], [12.5, 10.5]], "triangles": [[0, 1, 2], [1, 3, 2]],
+    "size": [16, 13], "origin": [0, 0], "other": "bresenham_scanline", "exact": True,
+}  # fmt: skip
+"""What the page begins with: an edge through pixel centres, and what one classic makes of it."""
 
 REDUCTION, THIN_PX = 10, 10
 PRESET_SIZE = (scenes.TUTORIAL_SIZE[0] // REDUCTION, scenes.TUTORIAL_SIZE[1] // REDUCTION)
@@ -131,12 +137,18 @@ def scene(name: str) -> dict[str, Any]:
     ValueError
         If there is none of that name.
     """
+    if name == SCENES[0]:
+        return dict(SHARED_EDGE)
     if name in failure_scenes.FAILURE_SCENES:
         found = failure_scenes.FAILURE_SCENES[name]
+        origin, size = window_of(found.shape()[0])
+        if max(size) > PRESET_SIZE[0]:
+            origin, size = found.origin, found.size
+        wrong = [one for one in found.got if one.subpixel_bits == found.subpixel_bits] or list(found.got)
         return {
             "vertices": [list(point) for point in found.points], "triangles": [list(row) for row in found.triangles],
-            "size": list(found.size), "origin": list(found.origin), "subpixel_bits": found.subpixel_bits,
-            "method": found.got[0].method if found.got else "auto", "other": "auto",
+            "size": list(size), "origin": list(origin), "method": wrong[0].method,
+            "subpixel_bits": wrong[0].subpixel_bits, "exact": True,
         }  # fmt: skip
     if name not in scenes.TUTORIAL_SCENES:
         raise ValueError(f"scene must be one of {', '.join(SCENES)}, got {name[:40]!r}")

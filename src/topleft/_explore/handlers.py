@@ -9,6 +9,8 @@ import sys
 import traceback
 from typing import Any
 
+from topleft._explore import export, mesh_view, pixels, probe, race, trace
+from topleft._explore.content import SCENES, scene
 from topleft._explore.session import Handler, Reply, Request, Session
 from topleft.errors import TopleftError
 
@@ -18,10 +20,28 @@ __all__ = ["HANDLERS", "answer"]
 def hello(session: Session, _: Request) -> Reply:
     """What the page starts with."""
     content = session.content
-    return Reply({"tab": content.tab, "name": content.name, "fragment": content.fragment, "pixels": content.pixels})
+    given = content.pixels or {"scene": SCENES[0]}
+    return Reply(
+        {
+            "tab": content.tab,
+            "name": content.name,
+            "fragment": content.fragment,
+            "pixels": {**scene(given["scene"]), **given} if "scene" in given else given,
+            "scenes": SCENES,
+            "methods": pixels.methods(),
+        }
+    )
 
 
-HANDLERS: dict[str, Handler] = {"hello": hello}
+HANDLERS: dict[str, Handler] = {
+    "hello": hello,
+    **pixels.HANDLERS,
+    **probe.HANDLERS,
+    **export.HANDLERS,
+    **trace.HANDLERS,
+    **mesh_view.HANDLERS,
+    **race.HANDLERS,
+}
 """By what a page says in "do"."""
 
 
@@ -36,6 +56,8 @@ def answer(session: Session, request: Request) -> Reply:
         reply = HANDLERS[name](session, request)
     except (TopleftError, ValueError, TypeError, IndexError, OSError, MemoryError) as error:
         return Reply({**header, "error": sentence(error)})
+    except KeyError as error:
+        return Reply({**header, "error": f"the question must hold {error}"})
     except Exception as error:  # a fault of ours: the page says so, the terminal where
         traceback.print_exc(file=sys.stderr)
         return Reply({**header, "error": f"a fault of the explorer, see the terminal: {sentence(error)}"})

@@ -118,7 +118,7 @@ class Server:
         """The page, its files and its socket."""
         return Starlette(
             routes=[
-                WebSocketRoute("/{token}/socket", self._talk),
+                WebSocketRoute("/{path:path}", self._talk),
                 Route("/{path:path}", self._serve_file, methods=["GET"]),
             ]
         )
@@ -169,7 +169,10 @@ class Server:
         return Response(content, headers={**HEADERS, "Content-Type": FILES[name]})
 
     async def _talk(self, page: WebSocket) -> None:
-        why = self.refusal(page.headers, page.path_params["token"], is_socket=True)
+        token, _, name = page.path_params["path"].partition("/")
+        why = self.refusal(page.headers, token, is_socket=True)
+        if not why and name != "socket":
+            why = "There is no such socket here."
         if not why and self._pages >= MAX_PAGES:
             why = f"At most {MAX_PAGES} pages may be open at a time."
         if why:

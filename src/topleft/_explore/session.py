@@ -55,6 +55,10 @@ class Content:
     fragment: str = ""
     moved: NDArray[np.float64] | None = None
 
+    def __post_init__(self) -> None:
+        if "vertices" in self.pixels:
+            self.moved = np.array(self.pixels["vertices"], np.float64)
+
 
 @dataclass
 class Session:

@@ -17,6 +17,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 import numpy.typing as npt
 
+from topleft._base.arrays import as_path, shown
 from topleft._base.whole_file import write_whole
 from topleft._camera.matrices import bounding_sphere
 from topleft._model.mesh import Mesh
@@ -145,6 +146,8 @@ class Levels(Sequence[Level]):
         import zipfile
         import zlib
 
+        if not isinstance(mesh, Mesh):
+            raise TypeError(f"mesh must be a Mesh, got {shown(mesh)}")
         path = _checked_path(path)
         try:
             with np.load(path, allow_pickle=False) as file:
@@ -209,7 +212,7 @@ def kept_levels(mesh: Mesh) -> Levels | None:
 
 
 def _checked_path(path: str | os.PathLike[str]) -> Path:
-    checked = Path(path)
+    checked = as_path("path", path)
     if checked.suffix != ".npz":
         raise ValueError(f"levels are kept in a file that ends in .npz, got {str(checked)!r}")
     return checked

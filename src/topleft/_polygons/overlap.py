@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft import _engine
-from topleft._base.arrays import as_array, as_checked_triangles
+from topleft._base.arrays import as_array, as_checked_triangles, as_real
 from topleft._base.memory import SCRATCH, FreshMemory
 from topleft._base.options import parse
 from topleft._base.threads import run_parts
@@ -122,7 +122,7 @@ class Overlap:
 
         Amounts a pixel's area are conserved: the sum of the raster is that of values times areas.
         """
-        own = as_array("values", values)
+        own = as_real("values", values)
         if own.shape != (len(self),):
             raise ValueError(f"values must have shape ({len(self)},), a number for each polygon, got {own.shape}")
         weights = np.repeat(own, np.diff(self.starts)) * self.areas

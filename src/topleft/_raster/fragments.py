@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine
-from topleft._base.arrays import as_array, as_number, as_values, shown
+from topleft._base.arrays import as_array, as_number, as_places, as_values, shown
 from topleft._base.memory import empty
 from topleft._base.texels import as_levels
 from topleft.typing import EncodingOption, FilterOption, WrapOption
@@ -302,6 +302,7 @@ class Fragments:
 
     def only(self, rows: NDArray[np.intp], cols: NDArray[np.intp]) -> Fragments:
         """Return what is left when no other pixels than these show a triangle."""
+        rows, cols = as_places(rows, cols, self.triangle.shape)
         triangle = np.full_like(self.triangle, -1)
         triangle[rows, cols] = self.triangle[rows, cols]
         found = Fragments(triangle, self.depth, self._snapped_or_maker, self._n_vertices, self._n_triangles)

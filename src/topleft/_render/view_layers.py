@@ -77,7 +77,7 @@ class ViewLayers(Mapping[str, Array]):
         ValueError
             If there is no such layer; and as `save_layers` does.
         """
-        if layer is not None and layer not in self:
+        if layer is not None and not (isinstance(layer, str) and layer in self):
             raise ValueError(f"layer must be one of {', '.join(self)}, got {layer!r}")
         return save_layers(path, self if layer is None else {layer: self[layer]}, scale=scale)
 

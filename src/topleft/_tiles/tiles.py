@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from topleft._base.arrays import as_count, as_path, as_size
+from topleft._base.arrays import as_count, as_pair, as_path, as_size
 from topleft._base.options import check_choice
 from topleft._base.threads import parse_threads
 from topleft._field.grid import Extent, ExtentLike, Grid, grid_around
@@ -327,6 +327,12 @@ class Tiles:
 
     def read(self, x: int, y: int, width: int, height: int) -> Array:
         """Return a part of the raster, drawn at once, whatever windows it lies in."""
+        (x, y), (width, height) = as_pair("x and y", (x, y)), as_size((width, height))
+        if not (0 <= x <= self.size[0] - width and 0 <= y <= self.size[1] - height):
+            raise ValueError(
+                f"the part must lie in the raster of {self.size[0]} x {self.size[1]} pixels, got {width} x {height} "
+                f"from ({x}, {y}) on"
+            )
         which = self._triangles_in(x, y, width, height)
         payload = self.painter.gather(self.triangles, which)
         return self.painter.window(payload, (x, y), (width, height), self.threads, None)

@@ -32,7 +32,7 @@ def run_explore(options: argparse.Namespace) -> int:
         raise UsageError(f"--port must be from 0 to 65535, got {options.port}")
     if not options.idle > 0:
         raise UsageError(f"--idle must be more than 0 seconds, got {options.idle}")
-    content = content_of_name(options.what or "two-triangles", options.size)
+    content = content_of_name(options.what or "shared-edge", options.size)
     explorer = open_page(
         content, host=options.host, port=options.port, idle=options.idle, browser=not options.no_browser
     )
