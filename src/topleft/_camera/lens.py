@@ -83,6 +83,13 @@ class OpenCVLens:
     With x = X/Z, y = Y/Z, r2 = x*x + y*y and q = (1 + k1 r2 + k2 r2^2 + k3 r2^3) / (1 + k4 r2 + k5 r2^2 + k6 r2^3) the
     point is seen at x q + 2 p1 x y + p2 (r2 + 2 x x) + s1 r2 + s2 r2^2, y q + p1 (r2 + 2 y y) + 2 p2 x y + s3 r2 +
     s4 r2^2, and from there on the plane that the tilt turns about its axes x, then y. Depth stays that of Z.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import topleft as tl
+    >>> tl.OpenCVLens(k1=-0.25).distort(np.array([[1.0, 0.0, 2.0]])).tolist()  # 0.5 (1 - 0.25 * 0.5^2)
+    [[0.46875, 0.0]]
     """
 
     k1: float = 0.0
@@ -165,6 +172,13 @@ class FisheyeLens:
     -----
     A point at the angle t from the axis is seen at the distance t (1 + k1 t^2 + k2 t^4 + k3 t^6 + k4 t^8) from the
     centre. Depth is that of the distance from the lens, not of Z, which is nothing at 90 degrees.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import topleft as tl
+    >>> round(float(tl.FisheyeLens(k1=0.0).distort(np.array([[1.0, 0.0, 1.0]]))[0, 0]), 4)  # 45 degrees from the axis
+    0.7854
     """
 
     k1: float = 0.0

@@ -42,6 +42,13 @@ class Level:
         No point of either surface is farther than that from the other one, in units of object space.
     known : float
         About how far some point is, as measured: so `bound` is at most `bound / known` times too large. 0: not known.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> ball = tl.Mesh(*tl.scenes.icosphere(1))
+    >>> tl.Level(ball, 0.0).bound
+    0.0
     """
 
     mesh: Mesh
@@ -64,6 +71,14 @@ class Levels(Sequence[Level]):
     mesh : Mesh
     coarser : sequence of Level
         Each with fewer triangles than the one before.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> fine, coarse = tl.Mesh(*tl.scenes.icosphere(2)), tl.Mesh(*tl.scenes.icosphere(1))
+    >>> levels = tl.Levels(fine, [tl.Level(coarse, 0.2)])
+    >>> [len(level.mesh.triangles) for level in levels]
+    [320, 80]
     """
 
     def __init__(self, mesh: Mesh, coarser: Sequence[Level] = ()) -> None:

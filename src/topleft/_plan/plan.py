@@ -99,6 +99,13 @@ class Plan:
         How many draw.
     costs : str
         Where the estimates come from, and how far off they are.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> plan = tl.plan([(0, 0), (4, 0), (0, 4)], [(0, 1, 2)], (4, 4))
+    >>> plan.verb, plan.n_triangles, plan.threads
+    ('rasterize', 1, 1)
     """
 
     verb: str

@@ -44,6 +44,13 @@ class PointFragments(Fragments):
         Index of the point that shows in the pixel, -1 where there is none; the same as `triangle` and `id`.
     depth, mask, instance, samples_triangle, samples_depth
         As in `Fragments`, of points. The depth of a point is that of its centre.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> frags = tl.points([(1, 1, 0.5), (3, 1, 0.25)], (4, 2), point_size=2, shape="square")
+    >>> frags.point.tolist()
+    [[0, 0, 1, 1], [0, 0, 1, 1]]
     """
 
     def __init__(self, ids: NDArray[np.int32], depth: NDArray[np.float32], n_points: int) -> None:

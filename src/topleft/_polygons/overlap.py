@@ -56,6 +56,15 @@ class Overlap:
         The area of the pixel that lies in the polygon, in pixels, above 0 and at most 1: `data`.
     size : (int, int)
         Width and height of the picture.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> found = tl.overlap([[[(0.5, 0), (2, 0), (2, 1), (0.5, 1)]]], (3, 1))
+    >>> found.pixels.tolist(), found.areas.tolist()
+    ([0, 1], [0.5, 1.0])
+    >>> found.means([[2.0, 8.0, 9.0]]).tolist()
+    [6.0]
     """
 
     starts: npt.NDArray[np.int64]

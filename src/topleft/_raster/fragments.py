@@ -83,6 +83,17 @@ class Fragments:
     samples_triangle, samples_depth : ndarray of int32 and of float32, shape (H, W, S)
         The same for each sample, with several a pixel. `triangle`, `depth`, `mask` and the attributes are then those of
         the first sample, which is nearest to the centre; `sample` gives those of another.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> frags = tl.rasterize([(0, 0, 0.0), (4, 0, 1.0), (0, 4, 0.0)], [(0, 1, 2)], (4, 2))
+    >>> frags.triangle.tolist()
+    [[0, 0, 0, -1], [0, 0, -1, -1]]
+    >>> frags.depth[0, :3].tolist()
+    [0.125, 0.375, 0.625]
+    >>> frags.interpolate([10.0, 20.0, 30.0])[0, 0].tolist()
+    13.75
     """
 
     #: Fragments of each sample when there are several.

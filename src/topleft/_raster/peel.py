@@ -42,6 +42,14 @@ class DepthLayers:
         Its depth; +inf where there are fewer, -inf with ``depth_test="greater"``.
     planes : (ndarray of int32, ndarray of float32), each of shape (K, H, W)
         The same numbers as they lie in memory.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> far, near = [(0, 0, 0.9), (4, 0, 0.9), (0, 4, 0.9)], [(0, 0, 0.1), (4, 0, 0.1), (0, 4, 0.1)]
+    >>> layers = tl.peel([*far, *near], [(0, 1, 2), (3, 4, 5)], (2, 1))
+    >>> layers.triangle[0, 0].tolist(), layers.count.tolist()
+    ([1, 0, -1, -1], [[2, 2]])
     """
 
     def __init__(self, ids: NDArray[np.int32], depth: NDArray[np.float32], snapped: Snapped) -> None:

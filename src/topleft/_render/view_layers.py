@@ -41,7 +41,16 @@ GLASS_LOOKS = frozenset({"shading", "color", "background", "opacity", "layers", 
 
 
 class ViewLayers(Mapping[str, Array]):
-    """Named arrays of one view, in the order asked for: what `render_layers` returns."""
+    """Named arrays of one view, in the order asked for: what `render_layers` returns.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> ball = tl.Mesh(*tl.scenes.icosphere(2))
+    >>> views = tl.render_layers(ball, tl.Camera.framing(ball), (32, 24), layers=["depth", "world_normal"])
+    >>> {name: array.shape for name, array in views.items()}
+    {'depth': (24, 32), 'world_normal': (24, 32, 3)}
+    """
 
     def __init__(self, arrays: Mapping[str, Array]) -> None:
         self._arrays = dict(arrays)

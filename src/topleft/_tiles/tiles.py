@@ -53,6 +53,13 @@ class Window:
         What it shows.
     n_triangles : int
         How many triangles may touch it; 0: it is blank.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> raster = tl.tiles(([[0, 0], [6, 0], [0, 6]], [[0, 1, 2]]), (6, 6), window=4)
+    >>> [(window.x, window.y, window.pixels.shape) for window in raster]
+    [(0, 0, (4, 4)), (4, 0, (4, 2)), (0, 4, (2, 4)), (4, 4, (2, 2))]
     """
 
     row: int
@@ -186,6 +193,13 @@ class Tiles:
         Where it lies in the plane of the data.
     window_size : (width, height), pixels
     n_windows : int
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> raster = tl.tiles(([[0, 0], [6, 0], [0, 6]], [[0, 1, 2]]), (6, 6), window=4)
+    >>> raster.shape, raster.n_windows
+    ((6, 6), 4)
     """
 
     def __init__(
