@@ -9,7 +9,7 @@ from __future__ import annotations
 from fractions import Fraction
 from typing import Any, NamedTuple
 
-from topleft._explore.pixels import EXACT
+from topleft._explore.pixels import EXACT, css, triangle_colors
 from topleft._explore.session import Reply, Request, Session
 from topleft._explore.state import PixelState, pair, parse_state
 from topleft._raster.verbs import overdraw
@@ -177,10 +177,10 @@ def sentences(
 def edge_story(one: Verdict) -> str:
     """What the edges through a sample are for a triangle."""
     through = [edge for edge in one.edges if edge.value == 0]
-    ends = " and ".join(f"{min(edge.ends)}\N{EN DASH}{max(edge.ends)}" for edge in through)
+    ends = " and ".join(map(named, through))
     kinds = " and a ".join(edge.kind for edge in through)
-    named = f"Edge {ends} is a {kinds} edge" if len(through) == 1 else f"Edges {ends} are a {kinds} edge"
-    return f"{named} of triangle {one.triangle}, so the pixel is {'' if one.is_covered else 'not '}its own."
+    story = f"Edge {ends} is a {kinds} edge" if len(through) == 1 else f"Edges {ends} are a {kinds} edge"
+    return f"{story} of triangle {one.triangle}, so the pixel is {'' if one.is_covered else 'not '}its own."
 
 
 def classic_story(method: str, times: dict[int, int], owner: Verdict | None) -> str:
@@ -208,14 +208,20 @@ def as_row(one: Verdict, state: PixelState, owner: Verdict | None) -> dict[str, 
     )
     return {
         "triangle": one.triangle,
+        "color": css(triangle_colors(one.triangle + 1)[-1]),
         "verdict": "owner" if one is owner else verdict,
         "edges": [
-            {"ends": edge.ends, "kind": edge.kind, "value": number(edge.value), "exact": str(edge.value)}
+            {"ends": named(edge), "kind": edge.kind, "value": number(edge.value), "exact": str(edge.value)}
             for edge in one.edges
         ],
         "depth": number(one.fragment.depth()) if state.has_depth else None,
-        "weights": [number(weight) for weight in one.fragment.weights()],
+        "weights": ", ".join(number(weight) for weight in one.fragment.weights()),
     }
+
+
+def named(edge: Edge) -> str:
+    """An edge by its vertices."""
+    return f"{min(edge.ends)}\N{EN DASH}{max(edge.ends)}"
 
 
 def number(value: Fraction) -> str:
