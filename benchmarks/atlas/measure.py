@@ -81,7 +81,7 @@ def entries() -> list[Entry]:
     """Every way to fill: the engine at three precisions, by both walkers and without a snap, every classic."""
     from topleft.methods import CLASSICS
 
-    production = [Entry(name, *what) for name, what in PRODUCTION.items()] + [Entry("auto, exact", "auto", NO_SNAP)]
+    production = [Entry(name, *what) for name, what in PRODUCTION.items()]
     return production + [Entry(name, name) for name in CLASSICS if not name.endswith("/wireframe")]
 
 

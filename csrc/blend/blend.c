@@ -16,6 +16,9 @@
 #include "vertex/clip.c"
 #include "vertex/fixed.h"
 #include "vertex/snap.c"
+#include "exact/alone_exact.c"
+#include "exact/draw_exact.c"
+#include "exact/setup_exact.c"
 #include "raster/alone.c"
 #include "raster/batch.c"
 #include "raster/rows.c"
@@ -141,6 +144,37 @@ static int64_t blend_batches(blend_pass *p)
     return s->bad_row;
 }
 
+/* A triangle of the list that is drawn, with the name of one of the mesh. */
+static void blend_exact_one(exact_state *s, blend_state *b, int64_t drawn, int64_t name)
+{
+    const int64_t n_whole = b->snapped->n_triangles;
+    if (!b->is_flat)
+        begin_exact_gouraud(b, name, drawn < n_whole ? -1 : drawn - n_whole);
+    draw_lone(s, (int32_t)drawn, TL_SINK_BLEND);
+}
+
+/* Every triangle by itself, of vertices that are not snapped; where clip planes cut one, its pieces. */
+static __attribute__((noinline)) int64_t blend_exact(blend_state *b)
+{
+    const tl_snapped *snapped = b->snapped, drawn = drawn_mesh(snapped);
+    const tl_exact_pieces *pieces = snapped->mesh.exact->pieces;
+    const int64_t n_pieces = pieces ? pieces->n_pieces : 0;
+    tl_exact_counts counts = {0, 0, 0, 0, 0, 0};
+    exact_state s;
+    start_exact(&s, &drawn, b->window, &b->target, &counts);
+    s.bad_row = first_bad_row(snapped->triangles, snapped->n_triangles, snapped->mesh.n_vertices);
+    for (int64_t i = 0, k = 0; i < snapped->n_triangles && s.bad_row < 0 && !tl_is_given_up(b->window); i++) {
+        tl_count_work(b->window, TL_SETUP_PX);
+        const int is_drawn = !b->is_flat || begin_flat(b, i);
+        if (is_drawn)
+            blend_exact_one(&s, b, i, i);
+        for (; k < n_pieces && pieces->source[k] == i; k++)
+            if (is_drawn)
+                blend_exact_one(&s, b, snapped->n_triangles + k, i);
+    }
+    return s.bad_row;
+}
+
 static tl_mix mix_of(const tl_canvas *canvas)
 {
     const int has_alpha = canvas->n_channels == 2 || canvas->n_channels == 4;
@@ -175,7 +209,9 @@ static int64_t blend_window(const tl_snapped *snapped, const tl_window *window, 
         pack_u8((const uint8_t *)canvas->pixels + row * canvas->stride_px * n_channels, window->width,
                 canvas->n_channels, canvas->packed + row * b->stride);
     int64_t bad_row = -1;
-    if (canvas->is_area) {
+    if (snapped->mesh.exact) {
+        bad_row = blend_exact(b);
+    } else if (canvas->is_area) {
         bad_row = blend_areas(b);
     } else if (snapped->method == TL_METHOD_AUTO && is_near(window)) {
         start_batch(&p.batch, snapped, window, &b->target);

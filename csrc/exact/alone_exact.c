@@ -63,11 +63,7 @@ static int64_t find_lone_box(double x0, double x1, tl_test test, double centre, 
 TL_INLINE double least_of(double a, double b, double c) { return fmin(fmin(a, b), c); }
 TL_INLINE double most_of(double a, double b, double c) { return fmax(fmax(a, b), c); }
 
-/* Whether a plane gives depth: not to slivers, nor where products leave the range of float64.  As draw_exact.c. */
-#define TL_LEAST_BOX 1e-250
-#define TL_MOST_EXTENT 1e120
-
-/* The same operations as plane_of_lanes in setup_exact.c. */
+/* The same operations as plane_of_lanes and take_out_slivers in setup_exact.c. */
 static void plane_of_points(lone_triangle *t, double width, double height)
 {
     const exact_point *p = t->edges.corners;
