@@ -264,7 +264,7 @@ TL_INLINE void flush_middle_exact(exact_state *s, tl_sink sink)
         const unsigned live = vm_bits(t.live);
         for (int k = 0; k < end; k++) {
             const int32_t size = q->size[i + k];
-            vd z_cols;
+            vd z_cols = vd_set1(0.0);
             if (!(live >> k & 1))
                 continue;
             if (sink_has_depth(sink)) {
@@ -397,7 +397,7 @@ TL_INLINE void draw_rows_exact(exact_state *s, tl_sink sink, const exact_rows *r
             if (!drawn)
                 continue;
             const int begin = __builtin_ctz(drawn), n = 32 - __builtin_clz(drawn) - begin;
-            vd z_col;
+            vd z_col = vd_set1(0.0);
             if (sink_has_depth(sink)) {
                 const vd x = vd_sub(vd_add(vd_set1(sample_x + col0), steps), vd_set1(r->x0[k]));
                 z_col = vd_mul(vd_set1(r->slope_x[k]), x);

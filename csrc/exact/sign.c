@@ -73,9 +73,10 @@ static void set_big(double value, big_number *out)
         mantissa >>= -shift;
         shift = 0;
     }
-    const unsigned __int128 moved = (unsigned __int128)mantissa << (shift & 31);
-    for (int k = 0; k < 3; k++)
-        out->words[(shift >> 5) + k] = (uint32_t)(moved >> 32 * k);
+    const int places = shift & 31, word = shift >> 5;
+    out->words[word] = (uint32_t)(mantissa << places);
+    out->words[word + 1] = (uint32_t)(mantissa << places >> 32);
+    out->words[word + 2] = places ? (uint32_t)(mantissa >> (64 - places)) : 0;
 }
 
 static int compare_words(const uint32_t *a, const uint32_t *b, int n)

@@ -15,12 +15,12 @@
 #include "raster/sink.c"
 
 #define TL_INT int64_t
-#define TL_UINT uint64_t
+#define TL_OP(name) i64_##name
 #define TL_WALK(name) name##_64
 #include "raster/walk.h"
 
 #define TL_INT tl_int128
-#define TL_UINT tl_uint128
+#define TL_OP(name) i128_##name
 #define TL_WALK(name) name##_128
 #include "raster/walk.h"
 
@@ -166,20 +166,21 @@ static row_span square_span(const tl_triangle *t, const tl_window *window, int64
     if (row < t->row0 || row >= t->row1)
         return span;
     const edges_128 e = setup_edges_128(t, window);
-    tl_int128 first = 0, end = t->col1 - t->col0;
+    tl_int128 first = i128_from(0), end = i128_from(t->col1 - t->col0);
     for (int k = 0; k < 3; k++) {
         tl_int128 quotient, remainder;
-        if (e.dy[k] == 0)
+        const int is_left = i128_is_negative(e.dy[k]);
+        if (i128_is_zero(e.dy[k]))
             continue;
-        floor_divide_128(e.value[k] + e.dx[k] * (row - t->row0), e.dy[k] < 0 ? -e.dy[k] : e.dy[k], &quotient,
-                         &remainder);
-        if (e.dy[k] < 0)
-            first = -quotient > first ? -quotient : first;
+        i128_floor_divide(i128_add(e.value[k], i128_times(e.dx[k], row - t->row0)),
+                          is_left ? i128_neg(e.dy[k]) : e.dy[k], &quotient, &remainder);
+        if (is_left)
+            first = i128_max(first, i128_neg(quotient));
         else
-            end = quotient + 1 < end ? quotient + 1 : end;
+            end = i128_min(end, i128_add(quotient, i128_from(1)));
     }
-    if (first < end)
-        span = (row_span){t->col0 + (int64_t)first, t->col0 + (int64_t)end};
+    if (i128_less(first, end))
+        span = (row_span){t->col0 + i128_low(first), t->col0 + i128_low(end)};
     return span;
 }
 
