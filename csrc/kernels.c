@@ -13,7 +13,7 @@
 #include "raster/setup.c"
 #include "area/area.c"
 #include "exact/take_points.c"
-#include "exact/project_exact.c"
+#include "exact/pieces_exact.c"
 #include "exact/draw_exact.c"
 #include "exact/sides_exact.c"
 #include "pixels/weights_exact.c"

@@ -13,7 +13,7 @@
 #include "lanes/lanes.h"
 #include "vertex/clip.c"
 #include "vertex/fixed.h"
-#include "exact/project_exact.c"
+#include "exact/pieces_exact.c"
 #include "exact/sign.c"
 #include "raster/setup.c"
 #include "raster/sink.c"

@@ -7,7 +7,7 @@
 
 #include "topleft.h"
 #include "vertex/clip.c"
-#include "exact/project_exact.c"
+#include "exact/pieces_exact.c"
 #include "exact/sign.c"
 #include "raster/setup.c"
 

@@ -10,7 +10,7 @@
 #include <stdint.h>
 
 #include "topleft.h"
-#include "exact/project_exact.c"
+#include "exact/pieces_exact.c"
 #include "exact/sign.c"
 
 /* Where a pixel is looked at. */
