@@ -16,13 +16,11 @@
 #include "vertex/clip.c"
 #include "vertex/fixed.h"
 #include "vertex/snap.c"
-#include "exact/alone_exact.c"
-#include "exact/draw_exact.c"
-#include "exact/setup_exact.c"
 #include "raster/alone.c"
 #include "raster/batch.c"
 #include "raster/rows.c"
 #include "blend/blend_area.c"
+#include "blend/blend_exact.c"
 #include "blend/mix.c"
 #include "blend/mix.h"
 #include "blend/mix_u8.c"
@@ -31,11 +29,6 @@ typedef struct {
     batch_state batch; /* its queue `rows` holds what waits */
     blend_state mix;
 } blend_pass;
-
-/* Rows of TL_LANES triangles: the first sample and the number of them. */
-typedef struct {
-    int32_t first[TL_MAX_BOX_PX][TL_MAX_LANES], n[TL_MAX_BOX_PX][TL_MAX_LANES];
-} blend_rows;
 
 /* Triangle i, or its pieces, by itself. */
 static __attribute__((noinline)) void blend_alone(blend_state *b, int64_t i)
@@ -142,37 +135,6 @@ static int64_t blend_batches(blend_pass *p)
     }
     flush_blend(p);
     return s->bad_row;
-}
-
-/* A triangle of the list that is drawn, with the name of one of the mesh. */
-static void blend_exact_one(exact_state *s, blend_state *b, int64_t drawn, int64_t name)
-{
-    const int64_t n_whole = b->snapped->n_triangles;
-    if (!b->is_flat)
-        begin_exact_gouraud(b, name, drawn < n_whole ? -1 : drawn - n_whole);
-    draw_lone(s, (int32_t)drawn, TL_SINK_BLEND);
-}
-
-/* Every triangle by itself, of vertices that are not snapped; where clip planes cut one, its pieces. */
-static __attribute__((noinline)) int64_t blend_exact(blend_state *b)
-{
-    const tl_snapped *snapped = b->snapped, drawn = drawn_mesh(snapped);
-    const tl_exact_pieces *pieces = snapped->mesh.exact->pieces;
-    const int64_t n_pieces = pieces ? pieces->n_pieces : 0;
-    tl_exact_counts counts = {0, 0, 0, 0, 0, 0};
-    exact_state s;
-    start_exact(&s, &drawn, b->window, &b->target, &counts);
-    s.bad_row = first_bad_row(snapped->triangles, snapped->n_triangles, snapped->mesh.n_vertices);
-    for (int64_t i = 0, k = 0; i < snapped->n_triangles && s.bad_row < 0 && !tl_is_given_up(b->window); i++) {
-        tl_count_work(b->window, TL_SETUP_PX);
-        const int is_drawn = !b->is_flat || begin_flat(b, i);
-        if (is_drawn)
-            blend_exact_one(&s, b, i, i);
-        for (; k < n_pieces && pieces->source[k] == i; k++)
-            if (is_drawn)
-                blend_exact_one(&s, b, snapped->n_triangles + k, i);
-    }
-    return s.bad_row;
 }
 
 static tl_mix mix_of(const tl_canvas *canvas)

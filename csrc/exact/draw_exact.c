@@ -133,6 +133,14 @@ static __attribute__((noinline)) void draw_slivers(exact_state *s, tl_sink sink)
     s->n_slivers = 0;
 }
 
+/* X * Y of extents, as the head of setup_exact.c has them. */
+TL_INLINE vf box_sizes(const exact_batch *b, tl_test test)
+{
+    const vf one = vf_set1(1.0f), border = vf_set1((float)border_of(test));
+    const vf width = vf_add(vf_from_vd(b->width), border), height = vf_add(vf_from_vd(b->height), border);
+    return vf_mul(vf_max(width, one), vf_max(height, one));
+}
+
 TL_INLINE void push_exact(exact_queue *queue, vm m, const exact_batch *b, vi id, vf xy)
 {
     vi_compress((int32_t *)(queue->xy + queue->boxes.n), m, vi_bits_of_vf(xy));
@@ -159,9 +167,7 @@ TL_INLINE void draw_exact_batch(exact_state *s, tl_sink sink, const int32_t *cor
     }
     if (!vm_any(b.drawn))
         return;
-    const vf one = vf_set1(1.0f), border = vf_set1((float)border_of(test_of(s, sink)));
-    const vf width = vf_add(vf_from_vd(b.width), border), height = vf_add(vf_from_vd(b.height), border);
-    const vf xy = vf_mul(vf_max(width, one), vf_max(height, one));
+    const vf xy = box_sizes(&b, test_of(s, sink));
     const vi longer = vi_max(b.n_cols, b.n_rows);
     const vm over_tiny = vi_gt(longer, vi_set1(2)), over_small = vi_gt(longer, vi_set1(TL_SMALL_BOX));
     const vm over = vm_and(b.drawn, over_small), tiny = vm_and_not(b.drawn, over_tiny);
@@ -201,6 +207,13 @@ TL_INLINE void draw_far_batch(exact_state *s, tl_sink sink, const int32_t *corne
         draw_each_lone(s, sink, vm_bits(live), ids);
 }
 
+/* Whether int32 counts the pixels of a window. */
+TL_INLINE int is_near_0(const tl_window *window)
+{
+    const int64_t farthest = (int64_t)1 << 30;
+    return is_near(window) && window->x_px + window->width < farthest && window->y_px + window->height < farthest;
+}
+
 /* The window has fewer than 2^31 samples and lies within 2^48 pixels of 0, where centres and samples are float64. */
 static void start_exact(exact_state *s, const tl_snapped *mesh, const tl_window *window, const tl_target *target,
                         tl_exact_counts *counts)
@@ -224,9 +237,7 @@ TL_INLINE void draw_exact_scene(const tl_snapped *mesh, int64_t n_whole, const t
                                 const tl_target *target, tl_share *share, tl_exact_counts *counts, int64_t *bad_row,
                                 tl_sink sink)
 {
-    const int64_t farthest = (int64_t)1 << 30;
-    const int is_near_0 =
-        is_near(window) && window->x_px + window->width < farthest && window->y_px + window->height < farthest;
+    const int takes_lanes = is_near_0(window);
     exact_state s;
     int is_given_up = 0;
     start_exact(&s, mesh, window, target, counts);
@@ -240,7 +251,7 @@ TL_INLINE void draw_exact_scene(const tl_snapped *mesh, int64_t n_whole, const t
         const vm live = vm_first(end - i);
         const vi id = share->ids ? vi_load_masked(live, share->ids + i) : vi_add(vi_set1((int32_t)i), vi_iota());
         const int32_t *batch = share_corners(mesh, share, i, corners);
-        if (is_near_0)
+        if (takes_lanes)
             draw_exact_batch(&s, sink, batch, id, live);
         else
             draw_far_batch(&s, sink, batch, id, live);

@@ -105,6 +105,24 @@ def test_samples_of_colors_are_the_mean_of_pictures(per, mode):
     assert abs(found - np.mean(each, axis=0)).max() < 1e-6
 
 
+@ON_EACH_ISA
+@pytest.mark.parametrize("on_grid", [False, True])
+@pytest.mark.parametrize("side", [0.75, 3, 11, 40, 61, 130])
+def test_ones_that_add_up_count_the_triangles(isa, side, on_grid):
+    """Queues of triangles of all sizes, those that lanes cannot take between them, in windows and on threads."""
+    rng = np.random.default_rng(int(side * 4))
+    corners = rng.uniform(-9, 130, (400, 1, 2)) + rng.uniform(-0.5, 0.5, (400, 3, 2)) * side
+    corners[::50] *= 2
+    corners[::3] = np.round(corners[::3] * 2) / 2 if on_grid else np.nextafter(np.round(corners[::3]), np.inf)
+    vertices, triangles = corners.reshape(-1, 2), np.arange(1200).reshape(-1, 3)
+    ones = np.ones((400, 1), np.float32)
+    with on(isa):
+        for threads, origin in ((1, (0, 0)), (3, (-7, 11))):
+            view = EXACT | {"threads": threads, "origin": origin}
+            added = tl.fill(vertices, triangles, ones, (120, 90), blend="add", **view)[..., 0]
+            assert (added == tl.overdraw(vertices, triangles, (120, 90), **view)).all()
+
+
 # ---- layers ---------------------------------------------------------------------------------------------------------
 
 
