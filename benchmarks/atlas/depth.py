@@ -14,7 +14,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.atlas.families import (
+from benchmarks.atlas.maps import tabulate
+from benchmarks.exact.clip import draw_clip, pieces_picture
+from benchmarks.scenes.families import NO_SNAP
+from topleft._explore.race import PRODUCTION
+from topleft.methods.reference.integers import box_side, edge_values, signed_area, snapped_points
+from topleft.scene_families import (
     MIDDLE_PX,
     Axis,
     Family,
@@ -22,21 +27,11 @@ from benchmarks.atlas.families import (
     power_of_ten,
     power_of_two,
     square_rim,
-    tabulate,
     walk,
 )  # fmt: skip
-from benchmarks.exact.clip import draw_clip, pieces_picture
-from benchmarks.exact.integers import box_side, edge_values, signed_area, snapped_points
-from benchmarks.scenes.families import NO_SNAP
 
 F64 = NDArray[np.float64]
 I32 = NDArray[np.int32]
-
-PRODUCTION: dict[str, tuple[str, int | str]] = {
-    "auto": ("auto", 8), "edge": ("edge", 8), "scanline": ("scanline", 8),
-    "auto, 0 bits": ("auto", 0), "auto, 16 bits": ("auto", 16), "auto, exact": ("auto", NO_SNAP),
-}  # fmt: skip
-"""The engine's rows: method and sub-pixel bits, or NO_SNAP."""
 
 SIZE = (32, 32)
 PLANE_ERROR = Fraction(1, 2**35)
