@@ -188,15 +188,23 @@ def test_all_controls_are_reached_by_keyboard_alone(page):
     assert {"Scene", "draws", "beside it", "sub-pixel bits", "sampling", "corner 1, x", "split", "Copy link"} <= reached
 
 
+def edit(page, name):
+    page.evaluate(f"window.before = {STATE}")
+    pixels_of(page).get_by_role("button", name=name, exact=True).click()
+    page.wait_for_function(f"() => window.before !== {STATE}")
+
+
 def test_triangles_are_added_split_flipped_and_removed(page):
-    for button, n in (("add", 3), ("split", 5), ("flip", 5), ("remove", 4)):
-        pixels_of(page).get_by_role("button", name=button, exact=True).click()
+    for name, n in (("add", 3), ("split", 5), ("flip", 5), ("remove", 4)):
+        edit(page, name)
         check_pictures(page)
         assert len(state_of(page)["triangles"]) == n
     for _ in range(4):
-        pixels_of(page).get_by_role("button", name="remove", exact=True).click()
+        edit(page, "remove")
     check_pictures(page)
     assert state_of(page)["vertices"] == []
+    edit(page, "undo")
+    assert len(state_of(page)["triangles"]) == 1
 
 
 def test_methods_and_rules_are_switched(page):
@@ -217,7 +225,10 @@ def test_hovered_pixel_says_whose_it_is(page):
     page.wait_for_function("() => document.querySelector('.why').textContent.includes('draws it')")
     told = page.locator(".why").inner_text()
     assert "left edge of triangle 1, so the pixel is its own" in told
-    assert "bresenham_scanline draws it 2 times, for triangle 0 and triangle 1, which is triangle 1's." in told
+    assert (
+        "bresenham_scanline draws it 2 times, for triangle 0 and triangle 1; by the exact rule it is triangle 1's."
+        in told
+    )
 
 
 def test_touch_drags_a_vertex(chromium, explorer):

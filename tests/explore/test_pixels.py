@@ -139,7 +139,7 @@ def test_probe_of_a_shared_edge_names_both_sides_and_the_owner():
         "its own. Edge 1\N{EN DASH}2 is a right edge of triangle 0, so the pixel is not its own."
     )
     assert told["sentences"][1] == (
-        "bresenham_scanline draws it 2 times, for triangle 0 and triangle 1, which is triangle 1's."
+        "bresenham_scanline draws it 2 times, for triangle 0 and triangle 1; by the exact rule it is triangle 1's."
     )
     assert [row["verdict"] for row in told["rows"]] == ["owner", "on its edge"]
 
@@ -165,7 +165,10 @@ def test_probe_tells_of_gaps():
     missed = draw(state | {"other": "bresenham_scanline/top-left"}).arrays
     y, x = np.argwhere((missed["a_owners"] >= 0) & (missed["b_owners"] < 0))[0].tolist()
     told = ask("pixels.probe", state=state | {"method": "bresenham_scanline/top-left"}, pixel=[x, y]).header
-    assert told["sentences"][-1] == "bresenham_scanline/top-left leaves it out, which is triangle 0's: a gap."
+    assert (
+        told["sentences"][-1]
+        == "bresenham_scanline/top-left leaves it out; by the exact rule it is triangle 0's: a gap."
+    )
 
 
 # Edits

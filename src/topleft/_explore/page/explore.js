@@ -462,7 +462,7 @@ function pixelsPart(app, panel) {
       box.append(make("optgroup", {label: kind}, ...own.map(({name, summary}) => option(name, name, summary))));
     }
   }
-  boxes[0].append(option(app.hello.name || "from a link", ""), ...scenes.map((name) => option(name)));
+  boxes[0].append(option(scenes.includes(app.hello.name) ? "from a link" : app.hello.name, ""), ...scenes.map((name) => option(name)));
   for (let k = 0; k < 6; k++) {
     const corner = k >> 1, axis = k & 1;
     const box = make("input", {type: "number", step: "any", "aria-label": `corner ${corner + 1}, ${"xy"[axis]}`});
