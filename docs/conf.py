@@ -1,4 +1,4 @@
-"""The pages as a site: `sphinx-build docs site`. Words and pictures stand in the Markdown alone, the order in index.rst."""
+"""The pages as a site: `sphinx-build docs site`. Words stand in the Markdown alone, their order in index.rst."""
 
 import sys
 from pathlib import Path
