@@ -14,7 +14,7 @@ from typing import Any, Unpack
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from topleft._base.arrays import as_names, as_size, as_triangles
+from topleft._base.arrays import as_count, as_names, as_size, as_triangles
 from topleft._base.memory import KeptMemory
 from topleft._base.options import DepthTest, Sampling, parse
 from topleft._camera.camera import Camera
@@ -99,6 +99,13 @@ class Plan:
         How many draw.
     costs : str
         Where the estimates come from, and how far off they are.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> plan = tl.plan([(0, 0), (4, 0), (0, 4)], [(0, 1, 2)], (4, 4))
+    >>> plan.verb, plan.n_triangles, plan.threads
+    ('rasterize', 1, 1)
     """
 
     verb: str
@@ -179,6 +186,7 @@ class Plan:
 
         `fill` is drawn with made-up colours of four channels, one a triangle.
         """
+        n_rounds = as_count("n_rounds", n_rounds)
         memory = KeptMemory()
         best: dict[str, int] = {}
         for _ in range(n_rounds + 1):  # the first one touches the memory

@@ -185,6 +185,15 @@ def rasterize_mesh(
     ------
     ValueError
         If the mesh has no triangles and no camera is given, an option is unknown, or `rasterizer` has another size.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> cube = tl.Mesh(*tl.scenes.cube())
+    >>> camera = tl.Camera.look_at((0, 0, 5), (0, 0, 0), up=(0, 1, 0))
+    >>> frags = tl.rasterize_mesh(cube, camera, (9, 9))
+    >>> round(float(frags.distance(camera)[4, 4]), 3)
+    4.0
     """
     size = as_size(size)
     if view.get("viewport") is not None:

@@ -183,11 +183,11 @@ const KEYS = [
 ];
 
 function pixelsPart(app, panel) {
-  const part = {state: () => state, scene: () => state, drawn: 0, enter, restore, views: new Map()};
+  const part = {state: () => state, scene: () => state, drawn: null, enter, restore, views: new Map()};
   const {methods, scenes} = app.hello;
   const bases = [...new Set(methods.map(({name}) => name.split("/")[0]))];
   let state = {}, sceneName = app.hello.pixels.scene ?? "", chosen = 0, corner = null, snap = "sub-pixel";
-  let pixel = null, probed = "a", samples = [], past = [];
+  let pixel = null, probed = "a", samples = [], past = [], isRefused = false;
 
   // -- what is asked --
 
@@ -195,11 +195,14 @@ function pixelsPart(app, panel) {
     const asked = state;
     try {
       show(await app.line.ask("pixels.draw", {state: asked}));
-      app.say("");
+      if (isRefused) app.say("");
+      isRefused = false;
     } catch (error) {
+      isRefused = true;
       app.say(error.message, true);
     }
-    part.drawn++;
+    part.drawn = asked;
+    part.onDrawn?.();
   });
   const explain = newest(async () => {
     if (plan.open) plan.lastChild.textContent = (await app.line.ask("pixels.plan", {state})).text;
@@ -298,7 +301,9 @@ function pixelsPart(app, panel) {
     "aria-label": "Magnified pixels. Arrows look at pixels, 1 2 3 take a corner, Tab takes the next scene, Escape leaves.",
   }, panels);
 
+  let fitted = "";
   function show({panels: shown, arrays, samples: at}) {
+    const isNew = samples.length !== at.length;
     samples = at;
     for (const key of part.views.keys()) {
       if (!shown.some((one) => one.key === key)) part.views.get(key).figure.remove(), part.views.delete(key);
@@ -313,7 +318,9 @@ function pixelsPart(app, panel) {
       box.hidden = Boolean(one.refused);
       if (arrays[one.key]) paint(canvas, arrays[one.key]);
     }
-    fit();
+    const wanted = JSON.stringify([shown.map(({key}) => key), state.size]);
+    if (wanted !== fitted) fitted = wanted, fit();
+    else if (state.look === "overdraw" || isNew) overlay();
   }
   function facts({key, title, ms, n, n_wrong, n_twice, notes, kinds}) {
     if (key === "difference") {
@@ -419,31 +426,36 @@ function pixelsPart(app, panel) {
   // Lines, dots and handles over the pixels: no pixel is decided here.
   function overlay() {
     const [width, height] = state.size, [ox, oy] = state.origin, cell = part.cell || 1;
-    const points = state.vertices.map(([x, y]) => [x - ox, y - oy]);
+    const points = state.vertices.map(([x, y]) => [x - ox, y - oy]), taken = state.triangles[chosen] ?? [];
     const near = ([x, y]) => Math.abs(x) < 1e5 && Math.abs(y) < 1e5;
     const outline = (rows) => rows.filter((row) => row.every((i) => near(points[i])))
       .map((row) => `M${row.map((i) => points[i].join(" ")).join("L")}Z`).join("");
-    const bars = (n, from, line) => Array.from({length: n + 1}, (_, i) => line(i)).join("");
-    const grid = cell < 5 ? "" : bars(width, 0, (x) => `M${x} 0V${height}`) + bars(height, 0, (y) => `M0 ${y}H${width}`);
-    const taken = state.triangles[chosen] ?? [];
+    const all = outline(state.triangles), one = outline(state.triangles.length > 1 && taken.length ? [taken] : []);
+    const kind = [cell, width, height, samples.length].join("-");
     for (const {sheet, counts} of part.views.values()) {
-      sheet.setAttribute("viewBox", `-1 -1 ${width + 2} ${height + 2}`);
-      const dots = cell < 9 ? [] : samples.map(([x, y]) => svg("circle", {cx: x, cy: y, r: (samples.length > 4 ? 1 : 1.5) / cell}));
-      const id = `dots-${cell}-${samples.length}`;
+      if (sheet.dataset.kind !== kind) {
+        sheet.dataset.kind = kind;
+        sheet.setAttribute("viewBox", `-1 -1 ${width + 2} ${height + 2}`);
+        sheet.replaceChildren(...ruled(width, height, cell, kind), svg("g"));
+      }
       const numbers = cell < 14 || !counts || state.look !== "overdraw" ? [] : [...counts].flatMap((n, i) =>
         n > 1 ? [Object.assign(svg("text", {x: i % width + 0.5, y: Math.floor(i / width) + 0.5}), {textContent: n})] : []);
-      sheet.replaceChildren(
-        svg("defs", {}, svg("pattern", {id, width: 1, height: 1, patternUnits: "userSpaceOnUse"}, ...dots.map((dot) => (dot.setAttribute("class", "dots"), dot)))),
-        svg("path", {class: "lines", d: grid}),
-        svg("rect", {width, height, fill: dots.length ? `url(#${id})` : "none"}),
-        svg("g", {class: "counts"}, ...numbers),
-        svg("path", {class: "halo", d: outline(state.triangles)}), svg("path", {class: "edges", d: outline(state.triangles)}),
-        svg("path", {class: "taken", d: outline(state.triangles.length > 1 && taken.length ? [taken] : [])}),
-        svg("rect", {class: "ring", fill: "none"}),
+      sheet.lastChild.replaceChildren(
+        svg("g", {class: "counts"}, ...numbers), svg("path", {class: "halo", d: all}), svg("path", {class: "edges", d: all}),
+        svg("path", {class: "taken", d: one}), svg("rect", {class: "ring", fill: "none"}),
         ...points.flatMap((point, i) => near(point) ? [grip(point, taken.indexOf(i), cell)] : []),
       );
       ring(sheet.querySelector(".ring"));
     }
+  }
+  // Lines between pixels and dots at samples, where there is room for them.
+  function ruled(width, height, cell, kind) {
+    const bars = (n, line) => Array.from({length: n + 1}, (_, i) => line(i)).join("");
+    const lines = cell < 5 ? "" : bars(width, (x) => `M${x} 0V${height}`) + bars(height, (y) => `M0 ${y}H${width}`);
+    if (cell < 9 || !samples.length) return [svg("path", {class: "lines", d: lines})];
+    const dots = samples.map(([cx, cy]) => svg("circle", {class: "dots", cx, cy, r: (samples.length > 4 ? 1 : 1.5) / cell}));
+    const pattern = svg("pattern", {id: `dots-${kind}`, width: 1, height: 1, patternUnits: "userSpaceOnUse"}, ...dots);
+    return [svg("defs", {}, pattern), svg("path", {class: "lines", d: lines}), svg("rect", {width, height, fill: `url(#dots-${kind})`})];
   }
   function grip([x, y], k, cell) {
     const isTaken = corner !== null && k === corner;
@@ -497,12 +509,10 @@ function pixelsPart(app, panel) {
   const controls = () => sync.forEach((update) => update());
   const select = (label, options, read, write) => {
     const box = make("select", {"aria-label": label, onchange: () => write(box.value)});
+    const list = (wanted) => box.replaceChildren(...wanted.map(([value, text, title = ""]) => make("option", {value, title}, text)));
+    if (typeof options !== "function") list(options);
     sync.push(() => {
-      const wanted = typeof options === "function" ? options() : options;
-      if (box.dataset.options !== JSON.stringify(wanted)) {
-        box.dataset.options = JSON.stringify(wanted);
-        box.replaceChildren(...wanted.map(([value, text, title = ""]) => make("option", {value, title}, text)));
-      }
+      if (typeof options === "function") list(options());
       box.value = read();
     });
     return box;
