@@ -11,7 +11,10 @@ playwright = pytest.importorskip("playwright.sync_api", reason="no Playwright: p
 pytest.importorskip("uvicorn", reason="the explorer needs its extra: pip install 'topleft[explore]'")
 
 import topleft as tl  # noqa: E402
+from topleft._explore.content import content_of  # noqa: E402
 from topleft._explore.handlers import answer  # noqa: E402
+from topleft._explore.messages import split  # noqa: E402
+from topleft._explore.notebook import markup  # noqa: E402
 from topleft._explore.session import Content, Session  # noqa: E402
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
@@ -310,3 +313,39 @@ def test_drag_to_new_pixels_is_timed(chromium, explorer, capsys):
         check_pictures(page)
     with capsys.disabled():
         print(f"\ndrag to new pixels, 64x64, two methods and the exact picture: median {np.median(times):.1f} ms")
+
+
+def test_page_works_in_the_cell_of_a_notebook(page):
+    """A model as anywidget's: messages with buffers, which need not begin at multiples of eight bytes."""
+    content = content_of([[1, 1], [12, 3], [2, 9]], [[0, 1, 2]], (14, 11))
+    session = Session(content)
+
+    def ask(question):
+        header, parts = split(answer(session, {**question, "parts": []}))
+        return [header, [list(part) for part in parts]]
+
+    page.expose_function("askPython", ask)
+    page.evaluate(
+        """async (markup) => {
+          document.querySelector(".explorer").remove();
+          const el = document.body.appendChild(document.createElement("div"));
+          const module = await import(new URL("explore.js", document.baseURI).href);
+          let hear;
+          const odd = (part) => new DataView(Uint8Array.from([0, ...part]).buffer, 1);
+          const model = {
+            get: () => markup,
+            on: (_, heard) => { hear = heard; },
+            send: async (header) => {
+              const [answer, parts] = await window.askPython(header);
+              hear(answer, parts.map(odd));
+            },
+          };
+          await module.default.render({model, el});
+        }""",
+        markup(),
+    )
+    before = page.evaluate("location.hash")
+    drag(page, 1, (-35, 35))
+    check_pictures(page)
+    assert content.moved.tolist() == state_of(page)["vertices"] != [[1, 1], [12, 3], [2, 9]]
+    assert page.evaluate("location.hash") == before

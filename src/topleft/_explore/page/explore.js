@@ -11,7 +11,8 @@ const ARRAYS = {
 // Typed arrays, with their shape, in place of their descriptions in a header.
 function withArrays(header, parts) {
   for (const [name, {dtype, shape, part}] of Object.entries(header.arrays ?? {})) {
-    const {buffer, byteOffset, byteLength} = parts[part];
+    let {buffer, byteOffset, byteLength} = parts[part];
+    if (byteOffset % 8) [buffer, byteOffset] = [buffer.slice(byteOffset, byteOffset + byteLength), 0];  // of a notebook
     const kind = ARRAYS[dtype];
     const array = new kind(buffer, byteOffset, byteLength / kind.BYTES_PER_ELEMENT);
     header.arrays[name] = Object.assign(array, {shape});
@@ -186,7 +187,7 @@ function pixelsPart(app, panel) {
   const part = {state: () => state, scene: () => state, drawn: null, enter, restore, views: new Map()};
   const {methods, scenes} = app.hello;
   const bases = [...new Set(methods.map(({name}) => name.split("/")[0]))];
-  let state = {}, sceneName = app.hello.pixels.scene ?? "", chosen = 0, corner = null, snap = "sub-pixel";
+  let state = {}, chosen = 0, corner = null, snap = "sub-pixel";
   let pixel = null, probed = "a", samples = [], past = [], isRefused = false;
 
   // -- what is asked --
@@ -233,12 +234,11 @@ function pixelsPart(app, panel) {
     change({...PIXEL_DEFAULTS, ...given}, false);
   }
   async function takeScene(name) {
-    sceneName = name;
     const before = state;
     try {
       const {state: scene} = await app.line.ask("pixels.scene", {name});
       [corner, pixel, chosen] = [null, null, 0];
-      change({...PIXEL_DEFAULTS, ...("method" in scene || "other" in scene ? {} : kept(before)), ...scene}, false);
+      change({...PIXEL_DEFAULTS, ...("method" in scene || "other" in scene ? {} : kept(before)), ...scene, scene: name}, false);
       past = [...past, before];
       app.say(name);
     } catch (error) {
@@ -246,7 +246,7 @@ function pixelsPart(app, panel) {
     }
   }
   const kept = ({method, other, exact, look}) => ({method, other, exact, look});
-  const nextScene = (step) => takeScene(scenes.at((Math.max(0, scenes.indexOf(sceneName)) + step) % scenes.length));
+  const nextScene = (step) => takeScene(scenes.at((Math.max(0, scenes.indexOf(state.scene)) + step) % scenes.length));
 
   // -- triangles --
 
@@ -441,7 +441,7 @@ function pixelsPart(app, panel) {
       const numbers = cell < 14 || !counts || state.look !== "overdraw" ? [] : [...counts].flatMap((n, i) =>
         n > 1 ? [Object.assign(svg("text", {x: i % width + 0.5, y: Math.floor(i / width) + 0.5}), {textContent: n})] : []);
       sheet.lastChild.replaceChildren(
-        svg("g", {class: "counts"}, ...numbers), svg("path", {class: "halo", d: all}), svg("path", {class: "edges", d: all}),
+        svg("g", {class: "counts"}, ...numbers), svg("path", {class: "halo", d: cell < 9 ? "" : all}), svg("path", {class: "edges", d: all}),
         svg("path", {class: "taken", d: one}), svg("rect", {class: "ring", fill: "none"}),
         ...points.flatMap((point, i) => near(point) ? [grip(point, taken.indexOf(i), cell)] : []),
       );
@@ -571,7 +571,7 @@ function pixelsPart(app, panel) {
   };
   const side = make("div.side", {},
     group("Scene", make("div.stepper", {},
-      select("Scene", () => [...(scenes.includes(sceneName) ? [] : [["", app.hello.name || "from a link"]]), ...plain(...scenes)], () => scenes.includes(sceneName) ? sceneName : "", (name) => name && takeScene(name)),
+      select("Scene", () => [...(scenes.includes(state.scene) ? [] : [["", app.hello.name || "from a link"]]), ...plain(...scenes)], () => scenes.includes(state.scene) ? state.scene : "", (name) => name && takeScene(name)),
       make("button", {type: "button", "aria-label": "previous scene", onclick: () => nextScene(-1)}, "‹"),
       make("button", {type: "button", "aria-label": "next scene", onclick: () => nextScene(1)}, "›"))),
     group("Methods", ...method("draws", "method"), ...method("beside it", "other", [["", "none"]]), check("the exact picture", "exact")),
