@@ -19,6 +19,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 import numpy as np
 
@@ -131,8 +132,39 @@ def measure_mesh(browser: Any, path: Path, seconds: float) -> dict[str, Any]:
     }  # fmt: skip
 
 
+PICTURES = {
+    "pixels": ("light", (1280, 800), "", ""),
+    "steps": ("light", (1280, 720), "#steps=", '{"scene":"two-triangles","method":"bresenham_scanline","step":136}'),
+    "mesh": ("dark", (1280, 720), "#mesh=", '{"layer":"smooth","edges":true,"zoom":1.1}'),
+    "race": ("light", (1280, 900), "#race=", '{"family":"fan","positions":[4],"seed":0}'),
+    "phone": ("dark", (390, 844), "#mesh=", '{"layer":"overdraw"}'),
+}
+"""Pages of the guide: colour scheme, size, part, its state."""
+
+
+def take_pictures(browser: Any, folder: Path) -> None:
+    """Write the pictures of the guide, in few colours."""
+    import io
+
+    from PIL import Image
+
+    import topleft as tl
+
+    with tl.explore("shared-edge", wait=False, browser=False) as explorer:
+        for name, (scheme, (width, height), part, state) in PICTURES.items():
+            viewport = {"width": width, "height": height}
+            context = browser.new_context(bypass_csp=True, viewport=viewport, color_scheme=scheme)
+            page = context.new_page()
+            page.goto(explorer.url.split("#")[0] + part + quote(state))
+            page.wait_for_timeout(6000)
+            picture = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
+            picture.quantize(128).save(folder / f"explore-{name}.png", optimize=True)
+            context.close()
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--triangles", type=positive, nargs="+", default=list(N_TRIANGLES), metavar="N")
+    parser.add_argument("--triangles", type=positive, nargs="*", default=list(N_TRIANGLES), metavar="N")
+    parser.add_argument("--pictures", type=Path, metavar="FOLDER", help="write the pictures of the guide, too")
     parser.add_argument("--seconds", type=positive, default=5, metavar="N", help="of turning (%(default)s)")
     add_out(parser)
 
@@ -161,6 +193,8 @@ def run(arguments: argparse.Namespace, _: Save) -> Record:
             rows.append({"triangles": n_triangles, **measure_mesh(browser, path, arguments.seconds)})
             tell(json.dumps(rows[-1]))
             path.unlink()
+        if arguments.pictures:
+            take_pictures(browser, arguments.pictures)
         version = browser.version
         browser.close()
     return {"kind": "explorer", "browser": version} | describe() | {"rows": rows}

@@ -233,8 +233,9 @@ def test_page_without_a_mesh_begins_with_a_shape():
 @pytest.mark.parametrize(
     ("request_", "message"),
     [
-        ({"size": [0, 5]}, "size must be two numbers of 1 to 4096"),
-        ({"size": [5000, 5]}, "size must be two numbers of 1 to 4096"),
+        ({"size": [0, 5]}, "size must be two numbers of 1 to 8192"),
+        ({"size": [9000, 5]}, "size must be two numbers of 1 to 8192"),
+        ({"size": [4096, 4096]}, "8388608 pixels, got"),
         ({"layer": "x"}, "layer must be one of 'smooth', .* got 'x'"),
         ({"lights": "x"}, "lights must be one of 'headlight', .* got 'x'"),
         ({"zoom": 0}, "zoom must lie in 0.001 to 10000, got 0"),

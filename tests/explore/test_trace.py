@@ -135,9 +135,10 @@ def test_every_kind_of_step_has_its_sentence():
     [
         ({"method": "auto"}, "method must be one of 'edge', 'scanline', .* to be traced, got 'auto'"),
         ({"method": "best"}, "method must be one of 'auto', 'edge'"),
-        ({"method": "edge", "size": (2000, 2000)}, "a trace must have 40000 steps at most"),
+        ({"method": "edge", "size": (2000, 20)}, "1024 pixels a side and 1000 triangles at most, got .2000, 20. and 1"),
+        ({"method": "edge", "size": (1000, 1000)}, "a trace must have 40000 steps at most"),
         ({"method": "edge", "origin": (-1, 0)}, "origin must lie in 0 to 1024 to be traced"),
-        ({"method": "point_in_triangle", "size": (2000, 2000)}, "a trace must have 40000 steps at most"),
+        ({"method": "point_in_triangle", "size": (1000, 1000)}, "a trace must have 40000 steps at most"),
     ],
 )
 def test_what_cannot_be_traced_is_refused(options, message):

@@ -42,7 +42,9 @@ __all__ = ["HANDLERS", "LAYERS", "MeshView", "draw", "load_bytes"]
 
 U8 = NDArray[np.uint8]
 
-MAX_SIDE_PX = 4096
+MAX_SIDE_PX, MAX_PIXELS = 8192, 2**23
+"""Of a frame: 4K; with 16 samples a pixel, a gigabyte of memory."""
+
 MAX_VERTICES = 20_000_000
 """Of a file that is dropped on the page: a gigabyte of memory."""
 
@@ -123,8 +125,8 @@ class MeshView:
             if name in given and not math.isfinite(as_number(name, given[name])):
                 raise ValueError(f"{name} must be finite, got {given[name]}")
         size = tuple(int(n) for n in given["size"])
-        if len(size) != 2 or not 1 <= min(size) <= max(size) <= MAX_SIDE_PX:
-            raise ValueError(f"size must be two numbers of 1 to {MAX_SIDE_PX}, got {size}")
+        if len(size) != 2 or not 1 <= min(size) <= max(size) <= MAX_SIDE_PX or size[0] * size[1] > MAX_PIXELS:
+            raise ValueError(f"size must be two numbers of 1 to {MAX_SIDE_PX}, {MAX_PIXELS} pixels, got {size}")
         pan = tuple(float(x) for x in given.get("pan", (0.0, 0.0)))
         if len(pan) != 2 or not all(abs(x) < 1e6 for x in pan):
             raise ValueError(f"pan must be two numbers, got {pan}")

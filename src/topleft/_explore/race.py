@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from topleft._explore.session import Reply, Request, Session
 from topleft._raster.verbs import fill, overdraw
 from topleft.methods import CLASSICS, find_method
-from topleft.methods.reference.integers import ExactPicture, ExactPoints, draw_points, signed_area, snapped_points
+from topleft.methods.reference.integers import ExactPicture, WidePoints, draw_points, signed_area, snapped_points
 from topleft.scene_families import FAMILIES, Axis, PixelScene
 
 __all__ = [
@@ -128,7 +128,7 @@ class Exact:
     def picture(self, snap: str = "true", rule: str = "top-left") -> ExactPicture:
         """Return the picture of one copy after a snap."""
         if (snap, rule) not in self.pictures:
-            points: ExactPoints = snapped_points(self.scene.vertices, snap)
+            points: WidePoints = snapped_points(self.scene.vertices, snap)
             scene = self.scene
             self.pictures[snap, rule] = draw_points(points, scene.triangles, scene.size, scene.origin, rule)
         return self.pictures[snap, rule]
@@ -151,7 +151,7 @@ def find_faults(exact: Exact, counts: NDArray[Any], labels: NDArray[np.int32]) -
 COLORS = {"another triangle shows": (204, 121, 167), "a gap": (213, 94, 0), "drawn more than once": (20, 130, 210)}
 """Of faults, in the order of `FaultyPixels`; shades of grey tell the triangles of what is right."""
 
-SHARES = ("#ffffcc", "#c7e9b4", "#7fcdbb", "#41b6c4", "#2c7fb8", "#253494")
+SHARES = ("#ffffcc", "#c7e9b4", "#7fcdbb", "#41b6c4", "#225ea8", "#0c2c84")
 """Colours of shares of wrong pixels by their logarithm: ColorBrewer's YlGnBu, which all eyes see."""
 
 

@@ -27,7 +27,7 @@ TRACED = (*(name for name in METHODS if name != "auto"), *CLASSICS)
 MAX_STEPS = 40_000
 """Of a trace: 10 MB on the way to the page."""
 
-MAX_ORIGIN_PX = 1024
+MAX_ORIGIN_PX, MAX_SIDE_PX, MAX_TRIANGLES = 1024, 1024, 1000
 
 
 class TraceStep(NamedTuple):
@@ -193,6 +193,11 @@ def trace(
     x, y = (int(at) for at in origin)
     if not 0 <= min(x, y) <= max(x, y) <= MAX_ORIGIN_PX:
         raise ValueError(f"origin must lie in 0 to {MAX_ORIGIN_PX} to be traced, got {(x, y)}")
+    if max(size) > MAX_SIDE_PX or len(np.asarray(triangles)) > MAX_TRIANGLES:
+        raise ValueError(
+            f"a trace must have {MAX_SIDE_PX} pixels a side and {MAX_TRIANGLES} triangles at most, got {size} and "
+            f"{len(np.asarray(triangles))}"
+        )
     xy = np.asarray(vertices, np.float64)[:, :2]
     found = find_method(method)
     options: dict[str, Any] = {"method": method, "origin": (x, y)}
