@@ -142,6 +142,9 @@ function choose(label, options, value, write) {
   return row(label, box);
 }
 
+// A key of colours: [text, [r, g, b]] each.
+const keyOf = (rows) => rows.map(([text, rgb]) => make("span", {}, make("i", {style: `background:rgb(${rgb})`}), text));
+
 function download(name, content, type = "") {
   const href = URL.createObjectURL(new Blob([content], {type}));
   make("a", {href, download: name}).click();
@@ -498,18 +501,25 @@ function pixelsPart(app, panel) {
 // ---- Steps -----------------------------------------------------------------------------------------------------
 
 function stepsPart(app, panel) {
-  const part = {state: () => view, enter, restore}, view = {scene: "", method: "edge", subpixel_bits: 8, step: 0};
-  let trace = null, scene = null, timer = null;
-  const canvas = make("canvas"), over = svg("svg", {"aria-hidden": "true"}), values = make("dl.values"), about = make("p.hint");
-  const told = make("p", {role: "status"}), play = button("Play", toggle, "Space");
+  const part = {state: () => view, enter, restore}, view = {scene: "", method: "edge", subpixel_bits: 8, step: null};
+  let trace = null, timer = null;
+  const canvas = make("canvas"), over = svg("svg", {"aria-hidden": "true"}), now = svg("rect", {class: "now", height: 1});
+  const told = make("p", {role: "status"}), values = make("dl.values"), about = make("p.hint");
   const slider = make("input", {type: "range", min: 0, "aria-label": "Step", oninput: () => go(slider.valueAsNumber)});
   const speed = make("input", {type: "range", min: 0, max: 3, step: 0.25, value: 1});
+  const actions = {
+    First: ["⇤", "Home", () => go(0)], "Row back": ["«", "Shift+ArrowLeft", () => leap(-1)], Back: ["‹", "ArrowLeft", () => go(view.step - 1)],
+    Play: ["▶", " ", toggle],
+    Step: ["›", "ArrowRight", () => go(view.step + 1)], Row: ["»", "Shift+ArrowRight", () => leap(1)], Last: ["⇥", "End", () => go(Infinity)],
+  };
+  const buttons = Object.entries(actions).map(([name, [sign, key, onclick]]) =>
+    make("button", {type: "button", title: `${name}: ${key === " " ? "Space" : key}`, "aria-label": name, onclick}, sign));
 
   function toggle() {
-    const isOn = timer === null && trace;
+    const isOn = timer === null && trace !== null;
     clearTimeout(timer);
     timer = null;
-    play.textContent = isOn ? "Pause" : "Play";
+    buttons[3].textContent = isOn ? "❚❚" : "▶";
     if (!isOn) return;
     if (view.step >= trace.steps.length) go(0);
     const tick = () => {
@@ -519,81 +529,68 @@ function stepsPart(app, panel) {
     };
     timer = setTimeout(tick);
   }
-  const back = () => go(view.step - 1), next = () => go(view.step + 1), first = () => go(0), last = () => go(Infinity);
+  // To the first step of another row, or of another triangle.
   function leap(way) {
-    const at = (k) => trace.steps[k - 1]?.slice(1, 4).filter((_, i) => i !== 1).join();
+    const place = (k) => trace.steps[k - 1]?.slice(1, 5).filter((_, i) => i % 3 === 0).join();
     let k = view.step + way;
-    while (k > 0 && k < trace.steps.length && at(k) === at(view.step)) k += way;
+    while (k > 0 && k < trace.steps.length && place(k) === place(view.step)) k += way;
     go(k);
   }
   function go(step) {
-    if (!trace) return;
     view.step = Math.max(0, Math.min(trace.steps.length, step));
-    const [width, height] = trace.size, pixels = new Uint8ClampedArray(4 * width * height), counts = new Uint32Array(width * height);
-    for (const [kind, triangle, x, y, end, isDrawn] of trace.steps.slice(0, view.step)) {
+    const [width, height] = trace.size, counts = new Uint32Array(width * height), pixels = new Uint8ClampedArray(4 * width * height);
+    for (const [x, y, last, isDrawn, triangle, kind] of trace.steps.slice(0, view.step)) {
       if (kind === "triangle" || kind === "row") continue;
-      for (let i = y * width + x; i <= y * width + end; i++) {
+      for (let i = y * width + x; i <= y * width + last; i++) {
         if (isDrawn) pixels.set(counts[i]++ ? [...TWICE, 255] : [...OWNERS[triangle % OWNERS.length], 255], 4 * i);
         else if (!counts[i]) pixels.set([128, 128, 128, 80], 4 * i);
       }
     }
     paint(canvas, Object.assign(pixels, {shape: [height, width, 4]}));
-    const now = trace.steps[view.step - 1], [ox, oy] = scene.origin ?? [0, 0];
-    over.setAttribute("viewBox", `0 0 ${width} ${height}`);
-    over.parentNode.style.setProperty("--ratio", width / height);
-    const corners = scene.triangles.map((row) => row.map((i) => `${scene.vertices[i][0] - ox},${scene.vertices[i][1] - oy}`).join(" "));
-    over.replaceChildren(...["halo", "edges"].flatMap((name) => corners.map((points) => svg("polygon", {class: name, points}))),
-    ...(now ? [svg("rect", {class: "now", x: now[2], y: now[3], width: now[4] - now[2] + 1, height: 1})] : []));
-    slider.max = trace.steps.length;
-    slider.value = view.step;
-    tell(now);
+    const [x, y, last, , , , sentence, numbers] = trace.steps[view.step - 1] ?? [0, 0, -1, 0, 0, 0, "Nothing is drawn yet.", []];
+    for (const [name, value] of Object.entries({x, y, width: last - x + 1})) now.setAttribute(name, value);
+    told.textContent = `${view.step} of ${trace.steps.length}. ${sentence}`;
+    values.replaceChildren(...numbers.flatMap(([name, text, change]) =>
+      [make("dt", {}, name), make(text.startsWith("-") ? "dd.bad" : "dd", {}, text), make("dd.change", {}, change)]));
+    Object.assign(slider, {max: trace.steps.length}, {value: view.step});
     app.keep();
-  }
-  function tell(now) {
-    values.replaceChildren();
-    if (!now) return void (told.textContent = `${trace.steps.length} steps. Nothing is drawn yet.`);
-    const [kind, triangle, x, y, end, isDrawn, numbers] = now;
-    told.textContent = `${view.step} of ${trace.steps.length}. ` + {
-      triangle: `Triangle ${triangle} is set up.`, row: `Row ${y} of triangle ${triangle}.`,
-      line: `The ${numbers.side} line passes pixel ${x}, ${y}.`, span: `Pixels ${x} to ${end} of row ${y} are drawn.`,
-      test: `Pixel ${x}, ${y} of triangle ${triangle}: ${isDrawn ? "drawn" : numbers.is_inside ? "inside" : "outside"}.`,
-    }[kind];
-    const before = trace.steps.slice(0, view.step - 1).findLast((one) => one[0] === kind && one[1] === triangle)?.[6] ?? {};
-    for (const [name, value] of Object.entries(numbers)) {
-      const change = typeof value === "number" ? value - before[name] : NaN;
-      values.append(make("dt", {}, name), make(value < 0 ? "dd.bad" : "dd", {}, JSON.stringify(value).replaceAll('"', "")),
-        make("dd.change", {}, Number.isNaN(change) ? "" : `${change < 0 ? "−" : "+"}${+Math.abs(change).toPrecision(6)}`));
-    }
   }
   const record = newest(async () => {
     try {
-      scene = view.scene ? (await app.line.ask("pixels.scene", {name: view.scene})).state : pixelsScene();
-      const {vertices, triangles, size, origin} = scene, {method, subpixel_bits} = view;
+      const drawn = app.parts.pixels.scene().size ? app.parts.pixels.scene() : app.hello.pixels;
+      const scene = view.scene ? (await app.line.ask("pixels.scene", {name: view.scene})).state : drawn;
+      const {vertices, triangles, size, origin} = scene, {method, subpixel_bits} = view, [width, height] = size;
       trace = await app.line.ask("steps.trace", {vertices, triangles, size, origin, method, subpixel_bits});
       methods.replaceChildren(...trace.methods.map((name) => make("option", {value: name}, name)));
       methods.value = method;
-      about.textContent = `${trace.summary}. ${trace.source}.`;
+      about.textContent = trace.about;
+      const bars = (n, line) => Array.from({length: n + 1}, (_, i) => line(i)).join("");
+      const grid = bars(width, (x) => `M${x} 0V${height}`) + bars(height, (y) => `M0 ${y}H${width}`);
+      const centers = bars(height - 1, (y) => bars(width - 1, (x) => `M${x + 0.5} ${y + 0.5}h0`));
+      over.setAttribute("viewBox", `0 0 ${width} ${height}`);
+      over.replaceChildren(svg("path", {class: "lines", d: grid}), svg("path", {class: "centers", d: centers}),
+        ...["halo", "edges"].flatMap((name) => trace.outlines.map((points) => svg("polygon", {class: name, points}))), now);
+      over.parentNode.style.setProperty("--ratio", width / height);
       app.say("");
-      go(view.step);
+      go(view.step ?? trace.steps.findIndex(([, , , isDrawn]) => isDrawn) + 1);
     } catch (error) {
       app.say(error.message, true);
     }
   });
-  const pixelsScene = () => (app.parts.pixels.scene().size ? app.parts.pixels.scene() : app.hello.pixels);
-  const set = (name, read = String) => (value) => (Object.assign(view, {[name]: read(value), step: 0}), record());
-  const scenes = choose("scene", [["", "that of Pixels"], ...app.hello.scenes.map((name) => [name, name])], "", set("scene"));
-  const chosen = choose("method", [["edge", "edge"]], "edge", set("method")), methods = chosen.lastChild;
-  const bits = choose("sub-pixel bits", [0, 1, 2, 4, 8, 12, 16].map((n) => [n, n]), 8, set("subpixel_bits", Number));
-  const keys = {" ": toggle, ArrowRight: next, ArrowLeft: back, Home: first, End: last};
-  panel.append(make("div.layout", {tabIndex: -1, onkeydown(event) {
-    const isBusy = /SELECT|INPUT/.test(event.target.tagName) || (event.key === " " && event.target.tagName === "BUTTON");
-    const act = event.shiftKey && event.key.startsWith("Arrow") ? () => leap(event.key === "ArrowRight" ? 1 : -1) : keys[event.key];
-    if (act && trace && !isBusy) event.preventDefault(), act();
-  }}, make("div.stage", {}, make("div.magnified", {}, canvas, over)), make("div.side", {},
-    group("Steps", make("div.buttons", {}, play, button("Back", back, "Left"), button("Step", next, "Right"), button("Row back", () => leap(-1), "Shift and left"),
-      button("Row", () => leap(1), "Shift and right"), button("First", first, "Home"), button("Last", last, "End")), slider, row("speed", speed)),
-    group("Now", told, values), group("Drawn", scenes, chosen, bits, about))));
+  const set = (name, read = String) => (value) => (Object.assign(view, {[name]: read(value), step: null}), record());
+  const scenes = choose("scene", [["", "that of Pixels"], ...app.hello.scenes.map((name) => [name])], "", set("scene"));
+  const chosen = choose("method", [["edge"]], "edge", set("method")), methods = chosen.lastChild;
+  const bits = choose("sub-pixel bits", [[0], [1], [2], [4], [8], [12], [16]], 8, set("subpixel_bits", Number));
+  const press = (event) => {
+    const act = Object.values(actions).find(([, key]) => key === (event.shiftKey ? "Shift+" : "") + event.key)?.[2];
+    if (!act || !trace || /SELECT|INPUT/.test(event.target.tagName) || (event.key === " " && event.target.tagName === "BUTTON")) return;
+    event.preventDefault();
+    act();
+  };
+  const layout = make("div.layout", {tabIndex: -1, onkeydown: press}, make("div.stage", {}, make("div.magnified", {}, canvas, over)), make("div.side", {},
+    group("Steps", make("div.segments", {role: "group"}, ...buttons), slider, row("speed", speed)), group("Now", told, values), group("Drawn", scenes, chosen, bits, about)));
   function enter() {
+    panel.append(layout);
     if (!view.scene || !trace) record();
   }
   function restore(given) {
@@ -606,37 +603,41 @@ function stepsPart(app, panel) {
 
 // ---- Mesh ------------------------------------------------------------------------------------------------------
 
+const AT_REST = "msaa4 at rest";
+
 function meshPart(app, panel) {
   const home = () => ({azimuth: 35, elevation: 20, zoom: 1, pan: [0, 0]});
-  const view = {...home(), fov: 40, up: "y", layer: "smooth", lights: "headlight", edges: false, sampling: "center", tolerance: 0, cull: "none"};
+  const view = {...home(), fov: 40, up: "y", layer: "smooth", lights: "headlight", edges: false, sampling: AT_REST, tolerance: 0, cull: "none"};
   const frames = {painted: 0, asked: 0, newest: 0, times: [], last: null, waiting: null, rest: 0};
   const part = {state: () => view, enter, restore, view, frames, change, spin: 0};
   const canvas = make("canvas", {tabIndex: 0, role: "img", "aria-label": "The mesh: arrows turn it, with Shift they move it, plus and minus zoom"});
   const over = svg("svg", {"aria-hidden": "true"}), stage = make("div.stage.mesh", {}, canvas, over), side = make("div.side");
-  const facts = make("p", {}, "No mesh yet."), rate = make("p.hint"), found = make("dl.values"), legend = make("div.legend");
-  const planText = make("pre", {tabIndex: 0}), planBox = make("details", {ontoggle: () => plan()}, make("summary", {}, "The plan, and why"), planText);
-  const file = make("input", {type: "file", "aria-label": "A mesh file", onchange: () => open(file.files[0])});
+  const facts = make("p"), rate = make("p.hint"), found = make("dl.values"), legend = make("div.legend"), planText = make("pre", {tabIndex: 0});
+  const planBox = make("details", {ontoggle: () => plan()}, make("summary", {}, "The plan, and why"), planText);
+  const file = make("input", {type: "file", onchange: () => open(file.files[0])});
   let mesh = null;
 
   const size = () => [stage.clientWidth, stage.clientHeight].map((n) => Math.max(1, Math.round(n * Math.min(devicePixelRatio, 2))));
-  const ask = (name, more) => app.line.ask(`mesh.${name}`, {...view, size: size(), ...more}).catch((error) => void app.say(error.message, true));
+  const ask = (name, more, isAtRest = true) => {
+    const sampling = view.sampling !== AT_REST ? view.sampling : isAtRest ? "msaa4" : "center";
+    return app.line.ask(`mesh.${name}`, {...view, sampling, size: size(), ...more}).catch((error) => void app.say(error.message, true));
+  };
   const paper = () => getComputedStyle(app.root).backgroundColor.match(/\d+/g).slice(0, 3).map(Number);
   // A view that changes comes as a JPEG, with the colour of the page behind it, and once more as it is when it rests. The
   // next frame is asked for before this one is on the screen: Python draws while the browser decodes and paints.
   const draw = newest(async (isAtRest = false) => {
     clearTimeout(frames.rest);
-    const start = performance.now(), number = ++frames.asked;
-    const frame = await ask("draw", isAtRest ? {} : {background: paper()});
-    if (frame) frame.took = performance.now() - start, decode(frame, number, isAtRest);
+    const start = performance.now(), number = ++frames.asked, frame = await ask("draw", isAtRest ? {} : {background: paper()}, isAtRest);
+    if (frame) decode(Object.assign(frame, {took: performance.now() - start, number, isAtRest}));
     if (part.spin && !panel.hidden) view.azimuth = (view.azimuth + part.spin) % 360, draw();
-    else if (frame && !isAtRest) frames.rest = setTimeout(() => draw(true), 200);
+    else if (frame && !isAtRest) frames.rest = setTimeout(() => draw(true), 300);
   });
-  async function decode(frame, number, isAtRest) {
+  async function decode(frame) {
     const [, , width, height] = frame.box, {pixels} = frame.arrays, start = performance.now();
-    if (pixels.length) frame.image = isAtRest ? new ImageData(pixels, width, height) : await createImageBitmap(new Blob([pixels]));
+    if (pixels.length) frame.image = frame.isAtRest ? new ImageData(pixels, width, height) : await createImageBitmap(new Blob([pixels]));
     frame.decode = performance.now() - start;
-    if (number < frames.newest) return;
-    frames.newest = number;
+    if (frame.number < frames.newest) return;
+    frames.newest = frame.number;
     if (!frames.waiting) requestAnimationFrame(show);
     frames.waiting = frame;
   }
@@ -648,15 +649,15 @@ function meshPart(app, panel) {
     else if (frame.image) context.drawImage(frame.image, x, y);
     frames.painted++, frames.last = frame, frame.paint = performance.now() - start;
     frames.times = [...frames.times.filter((time) => start - time < 1000), start];
-    const level = frame.level === undefined ? "" : `; level ${frame.level}, ${frame.level_triangles.toLocaleString("en")} triangles`;
-    rate.textContent = `${frames.times.length} frames in a second; drawn in ${frame.draw_ms.toFixed(1)} ms, here after ${frame.took.toFixed(1)} ms${level}`;
+    rate.textContent = `${frame.isAtRest ? "" : `${frames.times.length} frames in a second, `}drawn in ${frame.draw_ms.toFixed(1)} ms, `
+      + `here after ${frame.took.toFixed(1)} ms${frame.level === undefined ? "" : `; level ${frame.level}, ${frame.level_triangles.toLocaleString("en")} triangles`}`;
   }
   function change(values) {
     Object.assign(view, values);
     view.elevation = Math.max(-90, Math.min(90, view.elevation));
     view.zoom = Math.max(0.05, Math.min(1000, view.zoom));
     over.replaceChildren();
-    legend.replaceChildren(...(view.layer === "overdraw" ? mesh?.heat ?? [] : []).map(([rgb, text]) => make("span", {}, make("i", {style: `background:rgb(${rgb})`}), text)));
+    legend.replaceChildren(...keyOf(view.layer === "overdraw" ? mesh?.heat : []));
     if (mesh) draw(), plan();
     app.keep();
   }
@@ -667,18 +668,11 @@ function meshPart(app, panel) {
   async function pick({clientX, clientY}) {
     const {left, top, width} = canvas.getBoundingClientRect(), scale = canvas.width / width, size = [canvas.width, canvas.height];
     const [x, y] = [clientX - left, clientY - top].map((at) => Math.floor(at * scale)), hit = await ask("pick", {size, x, y});
-    if (!hit) return;
-    const short = (numbers) => numbers.map((number) => +number.toPrecision(5)).join(", ");
-    const rows = hit.triangle < 0 ? [["shows", "nothing"]] : [
-      [hit.is_level ? "triangle of the level" : "triangle", hit.triangle], ["vertices", hit.vertices.join(", ")],
-      ...hit.positions.map((at, k) => [`at ${k}`, short(at)]), ["weights", short(hit.barycentric)], ["depth", short([hit.depth])],
-      ...(hit.uv ? [["uv", short(hit.uv)]] : []), ...(hit.material ? [["material", hit.material]] : [])];
-    found.replaceChildren(...[["pixel", `${x}, ${y}`], ...rows].flatMap(([name, value]) => [make("dt", {}, name), make("dd", {}, `${value}`)]));
+    found.replaceChildren(...[["pixel", `${x}, ${y}`], ...hit?.rows ?? []].flatMap(([name, text]) => [make("dt", {}, name), make("dd", {}, text)]));
     over.setAttribute("viewBox", `0 0 ${size.join(" ")}`);
-    over.replaceChildren(...(hit.corners_px ? ["halo", "taken"].map((name) => svg("polygon", {class: name, points: hit.corners_px.join(" ")})) : []));
+    over.replaceChildren(...["halo", "taken"].map((name) => svg("polygon", {class: name, points: (hit?.corners_px ?? []).join(" ")})));
   }
   async function open(given) {
-    if (given) app.say(`Reading ${given.name}`);
     try {
       mesh = await app.line.ask("mesh.open", {name: given?.name}, given ? [new Uint8Array(await given.arrayBuffer())] : []);
     } catch (error) {
@@ -691,11 +685,11 @@ function meshPart(app, panel) {
     change(given ? home() : {});
   }
   async function save(what) {
-    const {name, arrays} = (await ask("save", {what})) ?? {};
-    if (name) download(name, arrays.file);
+    const saved = await ask("save", {what});
+    if (saved) download(saved.name, saved.arrays.file);
   }
 
-  // One finger or button turns, the other button, Shift or two fingers move, two fingers and the wheel zoom.
+  // One finger or button turns; the other button, Shift or two fingers move; two fingers and the wheel zoom.
   const pointers = new Map();
   canvas.onpointerdown = (event) => {
     canvas.setPointerCapture(event.pointerId);
@@ -716,18 +710,18 @@ function meshPart(app, panel) {
     pointers.delete(event.pointerId);
     if (event.type === "pointerup" && old?.moved < 4 && !old.button) pick(event);
   };
-  canvas.oncontextmenu = (event) => event.preventDefault();
+  canvas.oncontextmenu = panel.ondragover = (event) => event.preventDefault();
+  panel.ondrop = (event) => (event.preventDefault(), event.dataTransfer.files[0] && open(event.dataTransfer.files[0]));
   canvas.addEventListener("wheel", (event) => (event.preventDefault(), change({zoom: view.zoom * 1.0015 ** -event.deltaY})), {passive: false});
   canvas.onkeydown = (event) => {
     const [x, y] = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1]}[event.key] ?? [0, 0];
     const zoom = {"+": 1.1, "=": 1.1, "-": 1 / 1.1}[event.key];
-    if (x || y) change(event.shiftKey ? {pan: [view.pan[0] + 0.05 * x, view.pan[1] + 0.05 * y]} : {azimuth: view.azimuth + 5 * x, elevation: view.elevation + 5 * y});
+    if ((x || y) && event.shiftKey) change({pan: [view.pan[0] + 0.05 * x, view.pan[1] + 0.05 * y]});
+    else if (x || y) change({azimuth: view.azimuth + 5 * x, elevation: view.elevation + 5 * y});
     else if (zoom || event.key === "0") change(zoom ? {zoom: view.zoom * zoom} : home());
     else return;
     event.preventDefault();
   };
-  panel.ondragover = (event) => event.preventDefault();
-  panel.ondrop = (event) => (event.preventDefault(), event.dataTransfer.files[0] && open(event.dataTransfer.files[0]));
 
   function controls() {
     const choice = (label, name, options) => choose(label, options.map((one) => [one].flat()), view[name], (text) =>
@@ -736,17 +730,18 @@ function meshPart(app, panel) {
       const box = make("input", {type: "checkbox", checked: isOn, onchange: () => act(box.checked)});
       return make("label.check", {}, box, label);
     };
-    side.replaceChildren(group("Mesh", facts, file, rate), ...(mesh ? [
-      group("Look", choice("layer", "layer", mesh.layers), legend, choice("light", "lights", mesh.lights), choice("sampling", "sampling", ["center", "msaa2", "msaa4", "msaa8", "msaa16"]),
-        choice("tolerance", "tolerance", [[0, "none: the mesh itself"], ...[0.25, 0.5, 1, 2, 4].map((n) => [n, `${n} px: a coarser level`])]),
+    const tolerances = [[0, "none: the mesh itself"], ...[0.25, 0.5, 1, 2, 4].map((n) => [n, `${n} px: a coarser level`])];
+    side.replaceChildren(
+      group("Mesh", facts, make("label.file", {}, file, "Open a file, or drop one"), rate),
+      group("Look", choice("layer", "layer", mesh.layers), legend, choice("light", "lights", mesh.lights),
+        choice("sampling", "sampling", [AT_REST, "center", "msaa2", "msaa4", "msaa8", "msaa16"]), choice("tolerance", "tolerance", tolerances),
         choice("cull", "cull", ["none", "back", "front"]), check("wireframe", view.edges, (edges) => change({edges}))),
       group("Camera", choice("view angle", "fov", [[40, "40°"], [20, "20°"], [70, "70°"], [0, "no perspective"]]), choice("up", "up", ["y", "z"]),
         check("turn by itself", part.spin, (isOn) => (part.spin = isOn ? 1.5 : 0, draw())), make("div.buttons", {}, button("Reset", () => change(home()), "0"))),
       group("Picked", make("p.hint", {}, "A click tells which triangle shows."), found),
       group("Keep", make("div.buttons", {}, ...[["PNG", "png"], ["Python", "code"], ["Job file", "job"]].map(([text, what]) => button(text, () => save(what))),
-        button("Copy link", () => app.copyLink())), planBox)] : [make("p.hint", {}, "Drop a file here: OBJ, PLY, STL, OFF, glTF or GLB.")]));
+        button("Copy link", () => app.copyLink())), planBox));
   }
-  controls();
   panel.append(make("div.layout", {}, stage, side));
   new ResizeObserver(() => mesh && !panel.hidden && draw()).observe(stage);
   function enter() {
@@ -755,8 +750,7 @@ function meshPart(app, panel) {
   }
   function restore(given) {
     for (const name of Object.keys(view)) if (name in given) view[name] = given[name];
-    controls();
-    change({});
+    if (mesh) controls(), change({});
   }
   return part;
 }
@@ -765,28 +759,24 @@ function meshPart(app, panel) {
 
 function racePart(app, panel) {
   const view = {family: "fan", positions: [3], seed: 0}, part = {state: () => view, enter, restore, drawn: 0};
-  const faultColors = [null, OWNERS[3], TWICE, [20, 130, 210]], shareColors = ["#ffffcc", "#c7e9b4", "#7fcdbb", "#41b6c4", "#2c7fb8", "#253494"];
   const stage = make("div.stage.race"), sliders = make("div"), what = make("p"), chart = make("table.chart"), by = make("p.hint"), side = make("div.side");
   let known = null, racers = [], mapped = "";
 
   const draw = newest(async () => {
     const told = await app.line.ask("race.draw", view).catch((error) => void app.say(error.message, true));
     if (!told) return;
-    const [width, height] = told.size, n = width * height, {triangle, faults} = told.arrays;
-    sliders.querySelectorAll("output").forEach((output, i) => (output.textContent = told.values[i]));
-    told.methods.forEach(({bad, gaps, overdrawn, refused}, k) => {
-      const pixels = new Uint8ClampedArray(4 * n);
-      for (let i = 0; i < n; i++) {
-        const fault = faultColors[faults[k * n + i]];
-        pixels.set(fault ? [...fault, 255] : [128, 128, 128, refused || triangle[i] < 0 ? 0 : 40 + 30 * (triangle[i] % 3)], 4 * i);
-      }
-      paint(racers[k].canvas, Object.assign(pixels, {shape: [height, width, 4]}));
-      Object.assign(racers[k].count, {textContent: refused ? "refuses" : bad ? `${bad} wrong` : "right", className: bad ? "bad" : "good"});
-      racers[k].title = refused ?? `${bad} of ${n} pixels: ${gaps} gaps, ${overdrawn} drawn more than once`;
+    const {pictures} = told.arrays, shape = pictures.shape.slice(1), n = pictures.length / racers.length;
+    racers.forEach(({canvas, count, figure}, k) => {
+      const {text, title, bad} = told.rows[k];
+      paint(canvas, Object.assign(pictures.slice(k * n, (k + 1) * n), {shape}));
+      Object.assign(count, {textContent: text, className: bad === 0 ? "good" : "bad"});
+      figure.title = title;
     });
-    app.say("");
+    sliders.querySelectorAll("output").forEach((output, i) => (output.textContent = told.values[i]));
+    const here = Math.round(view.positions.at(-1)) + 1;
+    for (const line of chart.rows) [...line.cells].forEach((cell, i) => cell.classList.toggle("here", i === here));
     part.drawn++;
-    for (const line of chart.rows) [...line.cells].forEach((cell, i) => cell.classList.toggle("here", i === Math.round(view.positions.at(-1)) + 1));
+    app.say("");
   });
   // The chart is filled column by column; another family, seed or first parameter begins another.
   async function map() {
@@ -795,34 +785,42 @@ function racePart(app, panel) {
     if (mapped === wanted) return;
     mapped = wanted;
     by.textContent = `Wrong pixels, in % of those that an edge meets, by ${axis.what}. A dot: with gaps.`;
-    chart.replaceChildren(make("thead", {}, make("tr", {}, make("th"), ...axis.steps.map((step, i) => make("th", {scope: "col"}, button(step, () => set(axes.length - 1, i)))))),
-      make("tbody", {}, ...known.methods.map((name) => make("tr", {}, make("th", {scope: "row"}, name), ...axis.steps.map(() => make("td"))))));
+    const head = axis.steps.map((step, i) => make("th", {scope: "col"}, button(step, () => set(axes.length - 1, i))));
+    chart.replaceChildren(make("thead", {}, make("tr", {}, make("th"), ...head)), make("tbody", {}, ...known.methods.map((name) =>
+      make("tr", {}, make("th", {scope: "row"}, name), ...head.map(() => make("td"))))));
     for (let i = 0; i < axis.steps.length; i++) {
       const column = await app.line.ask("race.column", {...view, positions: [...others, i]}).catch(() => null);
       if (mapped !== wanted || !column) return;
-      column.rows.forEach(([bad, hasGaps], k) => {
-        const cell = chart.tBodies[0].rows[k].cells[i + 1], share = bad / Math.max(1, column.n_edge_px);
-        const level = Math.max(0, Math.min(5, Math.floor(1.5 * Math.log10(share) + 6)));
-        cell.title = bad === null ? "refuses to draw" : `${bad} wrong pixels${hasGaps ? ", with gaps" : ""}`;
-        cell.classList.add(bad === null ? "refused" : level > 3 ? "dark" : "light", ...(hasGaps ? ["gaps"] : []));
-        if (bad) cell.textContent = share < 0.01 ? (100 * share).toFixed(1) : Math.round(100 * share), cell.style.background = shareColors[level];
+      column.cells.forEach(({text, color, kind, title}, k) => {
+        const cell = Object.assign(chart.tBodies[0].rows[k].cells[i + 1], {textContent: text, title});
+        cell.classList.add(...kind.split(" "));
+        cell.style.background = color;
       });
     }
+  }
+  function redraw() {
+    draw(), map(), app.keep();
   }
   function set(i, position) {
     view.positions[i] = position;
     sliders.querySelectorAll("input")[i].value = position;
-    draw(), map(), app.keep();
+    redraw();
   }
   function take(family) {
     const {axes, what: text} = known.families[family];
     if (family !== view.family || view.positions.length !== axes.length) view.positions = axes.map(() => 0);
     view.family = family;
-    what.textContent = `${text[0].toUpperCase()}${text.slice(1)}. Each pixel has to be drawn once.`;
-    sliders.replaceChildren(...axes.map((axis, i) => make("label.slider", {}, make("span", {}, `${axis.what}: `, make("output")), make("input", {
-      type: "range", min: 0, max: axis.steps.length - 1, step: axis.is_continuous ? 0.05 : 1, value: view.positions[i], oninput: ({target}) => set(i, target.valueAsNumber),
+    what.textContent = `${text[0].toUpperCase()}${text.slice(1)}. Each pixel has to be drawn once, and as the vertices say before any snap.`;
+    sliders.replaceChildren(...axes.map(({what, steps, is_continuous}, i) => make("label.slider", {}, make("span", {}, `${what}: `, make("output")), make("input", {
+      type: "range", min: 0, max: steps.length - 1, step: is_continuous ? 0.05 : 1, value: view.positions[i], oninput: ({target}) => set(i, target.valueAsNumber),
     }))));
-    draw(), map(), app.keep();
+    redraw();
+  }
+  function build() {
+    const seed = make("input", {type: "number", min: 0, max: 99, value: view.seed, onchange: () => (view.seed = Math.max(0, seed.valueAsNumber | 0), redraw())});
+    const families = Object.keys(known.families).map((name) => [name]);
+    side.replaceChildren(group("Race", choose("family", families, view.family, take), what, sliders, row("seed", seed), make("div.legend", {}, ...keyOf(known.key))));
+    take(view.family);
   }
   async function enter() {
     if (panel.firstChild) return;
@@ -830,17 +828,10 @@ function racePart(app, panel) {
     known = await app.line.ask("race.families");
     racers = known.methods.map((name) => {
       const canvas = make("canvas"), count = make("span");
-      return Object.assign(make("figure", {}, canvas, make("figcaption", {}, name.replace(/[_/]/g, "$&\u200b"), count)), {canvas, count});
+      return {canvas, count, figure: make("figure", {}, canvas, make("figcaption", {}, name.replace(/[_/]/g, "$&\u200b"), count))};
     });
-    stage.append(...racers);
+    stage.append(...racers.map(({figure}) => figure));
     build();
-  }
-  function build() {
-    const seed = make("input", {type: "number", min: 0, max: 99, value: view.seed, onchange: () => (view.seed = Math.max(0, seed.valueAsNumber | 0), draw(), map(), app.keep())});
-    const key = ["another triangle shows", "a gap", "drawn more than once"].map((text, i) => make("span", {}, make("i", {style: `background:rgb(${faultColors[i + 1]})`}), text));
-    side.replaceChildren(group("Race", choose("family", Object.keys(known.families).map((name) => [name, name]), view.family, take), what, sliders, row("seed", seed),
-      make("div.legend", {}, ...key)));
-    take(view.family);
   }
   function restore(given) {
     Object.assign(view, given);
