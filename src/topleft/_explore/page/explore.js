@@ -171,30 +171,24 @@ const PIXEL_DEFAULTS = {
   origin: [0, 0], method: "auto", other: "", exact: false, subpixel_bits: 8, sampling: "center", cull: "none",
   depth_test: "less", winding: "as given", look: "owners",
 };
-const COLORS = ["#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", "#f0e442"];
-const DIFFERENCES = [
-  [1, "#80808046", () => "same"], [2, "#0072b2", (a) => `${a} alone`], [3, "#e69f00", (a, b) => `${b} alone`],
-  [4, "#cc79a7", () => "another owner"], [5, "#d55e00", () => "drawn more often"],
-];
 const MOVES = {
   ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1],
   a: [-1, 0], d: [1, 0], w: [0, -1], s: [0, 1],
 };
-const KEYS = [
-  ["1 2 3", "take a corner"], ["0", "take none"], ["arrows, WASD", "move it by a sub-pixel, or look at the next pixel"],
-  ["Shift", "by a pixel"], ["[ ]", "the next triangle"], ["Tab", "the next scene"], ["F", "wireframe"], ["Z", "undo"],
-  ["N P R Del", "add, split, flip, remove"], ["Esc", "leave the picture"],
-];
+const EDIT_KEYS = {n: "add", p: "split", r: "flip", Delete: "remove", z: "undo", "]": "forward", "[": "back"};
 
+// A state is what Python draws: vertices, triangles, a window, methods and rules (PixelState in state.py).
 function pixelsPart(app, panel) {
   const part = {state: () => state, scene: () => state, drawn: null, enter, restore, views: new Map()};
-  const {methods, scenes} = app.hello;
-  const bases = [...new Set(methods.map(({name}) => name.split("/")[0]))];
-  let state = {}, chosen = 0, corner = null, snap = "sub-pixel";
-  let pixel = null, probed = "a", samples = [], past = [], isRefused = false;
+  const find = (what) => panel.querySelector(what), findAll = (what) => [...panel.querySelectorAll(what)];
+  const stage = find(".stage"), panels = find(".panels"), why = find(".why"), plan = find(".plan");
+  const boxes = findAll("[data-name]"), {methods, scenes} = app.hello;
+  let state = {}, chosen = 0, corner = null;  // the triangle that is edited, and its corner that the keys move
+  let pixel = null, probed = "a", samples = [], past = [], fitted = "", isRefused = false;
 
   // -- what is asked --
 
+  const told = (error) => app.say(error.message, true);
   const redraw = newest(async () => {
     const asked = state;
     try {
@@ -203,188 +197,122 @@ function pixelsPart(app, panel) {
       isRefused = false;
     } catch (error) {
       isRefused = true;
-      app.say(error.message, true);
+      told(error);
     }
     part.drawn = asked;
     part.onDrawn?.();
   });
   const explain = newest(async () => {
-    if (plan.open) plan.lastChild.textContent = (await app.line.ask("pixels.plan", {state})).text;
+    if (plan.open) plan.lastChild.textContent = (await app.line.ask("pixels.plan", {state}).catch(told))?.text ?? "";
   });
   const look = newest(async () => {
-    if (!pixel) return;
     const method = {b: state.other, exact: "exact"}[probed] || state.method;
-    try {
-      tell(await app.line.ask("pixels.probe", {state, pixel, method}));
-    } catch (error) {
-      why.replaceChildren(make("p", {}, error.message));
-    }
+    if (pixel) tell(await app.line.ask("pixels.probe", {state, pixel, method}).catch(({message}) => ({sentences: [message]})));
   });
 
   // Every change goes through here: `remember` lets Z take it back.
   function change(next, remember = true) {
     if (remember) past = [...past.slice(-199), state];
     state = {...state, ...next};
-    if (pixel && (pixel[0] >= state.size[0] || pixel[1] >= state.size[1])) pixel = null;
+    if (pixel?.some((at, k) => at >= state.size[k])) pixel = null;
     chosen = Math.max(0, Math.min(chosen, state.triangles.length - 1));
-    overlay();
-    controls();
-    redraw(), look(), explain(), app.keep();
+    overlay(), controls(), redraw(), look(), explain(), app.keep();
   }
   function restore(given) {
-    past = [];
-    [corner, pixel, chosen] = [null, null, 0];
+    [past, corner, chosen] = [[], null, 0];
+    [pixel, probed] = [given.size.map((n) => n >> 1), given.other ? "b" : "a"];
     change({...PIXEL_DEFAULTS, ...given}, false);
   }
   async function takeScene(name) {
-    const before = state;
-    try {
-      const {state: scene} = await app.line.ask("pixels.scene", {name});
-      [corner, pixel, chosen] = [null, null, 0];
-      change({...PIXEL_DEFAULTS, ...("method" in scene || "other" in scene ? {} : kept(before)), ...scene, scene: name}, false);
-      past = [...past, before];
-      app.say(name);
-    } catch (error) {
-      app.say(error.message, true);
-    }
+    const before = state, {state: scene} = await app.line.ask("pixels.scene", {name});
+    const {method, other, exact, look} = before, kept = "exact" in scene ? {} : {method, other, exact, look};
+    restore({...kept, ...scene, scene: name});
+    past = [before];
+    app.say(name);
   }
-  const kept = ({method, other, exact, look}) => ({method, other, exact, look});
   const nextScene = (step) => takeScene(scenes.at((Math.max(0, scenes.indexOf(state.scene)) + step) % scenes.length));
 
   // -- triangles --
 
   const step = () => 2 ** -(state.subpixel_bits === "exact" ? 8 : state.subpixel_bits);
-  const snapped = (x) => {
-    if (snap === "pixel centre") return Math.floor(x) + 0.5;
-    const grid = snap === "free" ? 2 ** -20 : step();
-    return Math.round(x / grid) * grid;
-  };
-  function move(i, [x, y], remember) {
-    change({vertices: state.vertices.map((row, k) => k === i ? [x, y, ...row.slice(2)] : row)}, remember);
+  function snapped(x) {
+    const kind = find(".snap").value, grid = kind === "free" ? 2 ** -20 : step();
+    return kind === "pixel centre" ? Math.floor(x) + 0.5 : Math.round(x / grid) * grid;
   }
-  const edits = {
-    add() {
-      const [x, y] = [0, 1].map((k) => state.origin[k] + Math.floor(state.size[k] / 2));
-      const r = Math.max(2, Math.floor(Math.min(...state.size) / 4)), n = state.vertices.length;
-      const z = (state.vertices[0] ?? []).slice(2);
-      const added = [[x - r, y + r, ...z], [x, y - r, ...z], [x + r, y + r, ...z]];
-      chosen = state.triangles.length;
-      change({vertices: [...state.vertices, ...added], triangles: [...state.triangles, [n, n + 1, n + 2]]});
-    },
-    split() {
-      const [a, b, c] = state.triangles[chosen], n = state.vertices.length;
-      const middle = state.vertices[a].map((_, k) => [a, b, c].reduce((sum, i) => sum + state.vertices[i][k], 0) / 3);
-      const [x, y, ...z] = middle, parts = [[a, b, n], [b, c, n], [c, a, n]];
-      change({
-        vertices: [...state.vertices, [snapped(x), snapped(y), ...z]], triangles: state.triangles.toSpliced(chosen, 1, ...parts),
-      });
-    },
-    flip() {
-      const [a, b, c] = state.triangles[chosen];
-      change({triangles: state.triangles.with(chosen, [a, c, b])});
-    },
-    remove() {
-      const triangles = state.triangles.toSpliced(chosen, 1), used = [...new Set(triangles.flat())].sort((i, j) => i - j);
-      corner = null;
-      change({
-        vertices: used.map((i) => state.vertices[i]), triangles: triangles.map((row) => row.map((i) => used.indexOf(i))),
-      });
-    },
-    undo() {
+  const taken = () => state.triangles[chosen] ?? [];
+  const move = (i, [x, y], remember) =>
+    change({vertices: state.vertices.map((row, k) => k === i ? [x, y, ...row.slice(2)] : row)}, remember);
+  async function edit(what) {
+    const n = state.triangles.length;
+    if (what === "undo") {
       if (past.length) state = past.pop(), change({}, false);
-    },
-  };
+    } else if (what === "next" || what === "previous") await nextScene(what === "next" ? 1 : -1);
+    else if (what === "forward" || what === "back") chosen = (chosen + (what === "forward" ? 1 : n - 1)) % Math.max(1, n);
+    else {
+      const made = await app.line.ask("pixels.edit", {state, triangle: chosen, what});
+      [corner, chosen] = [null, made.triangle];
+      change(made.state);
+    }
+    overlay(), controls();
+  }
 
-  // -- the picture --
+  // -- the pictures --
 
-  const panels = make("div.panels");
-  const why = make("div.why", {"aria-live": "polite"}, make("p", {}, "Point at a pixel, or move over the picture with the arrows."));
-  const stage = make("div.stage", {
-    tabIndex: 0, role: "application", onkeydown: press,
-    "aria-label": "Magnified pixels. Arrows look at pixels, 1 2 3 take a corner, Tab takes the next scene, Escape leaves.",
-  }, panels);
-
-  let fitted = "";
   function show({panels: shown, arrays, samples: at}) {
     const isNew = samples.length !== at.length;
     samples = at;
-    for (const key of part.views.keys()) {
-      if (!shown.some((one) => one.key === key)) part.views.get(key).figure.remove(), part.views.delete(key);
+    for (const [key, {figure}] of part.views) {
+      if (!shown.some((one) => one.key === key)) figure.remove(), part.views.delete(key);
     }
-    for (const one of shown) {
-      if (!part.views.has(one.key)) part.views.set(one.key, view(one.key));
-      const {figure, canvas, box, caption, legend} = part.views.get(one.key);
-      Object.assign(part.views.get(one.key), {owners: arrays[`${one.key}_owners`], counts: arrays[`${one.key}_counts`]});
-      panels.append(figure);
-      caption.replaceChildren(...facts(one));
-      legend.replaceChildren(...(one.refused ? [make("div.refused", {}, one.refused)] : keys(one)));
-      box.hidden = Boolean(one.refused);
-      if (arrays[one.key]) paint(canvas, arrays[one.key]);
+    for (const {key, title, notes, facts, legend, refused} of shown) {
+      if (!part.views.has(key)) part.views.set(key, view(key));
+      const one = part.views.get(key), text = facts.map(([words, kind]) => make(`span.${kind}`, {}, words));
+      Object.assign(one, {owners: arrays[`${key}_owners`], counts: arrays[`${key}_counts`]});
+      one.caption.replaceChildren(make("b", {}, title), make("span", {}, notes), make("div", {}, text));
+      one.legend.replaceChildren(...legend.map(([color, words]) =>
+        make("span", {}, make("i", {style: `background:${color}`}), words)), make("span.bad", {}, refused));
+      one.box.hidden = !arrays[key];
+      if (arrays[key]) paint(one.canvas, arrays[key]);
+      panels.append(one.figure);
     }
     const wanted = JSON.stringify([shown.map(({key}) => key), state.size]);
     if (wanted !== fitted) fitted = wanted, fit();
     else if (state.look === "overdraw" || isNew) overlay();
   }
-  function facts({key, title, ms, n, n_wrong, n_twice, notes, kinds}) {
-    if (key === "difference") {
-      const n = kinds.slice(2).reduce((sum, k) => sum + k, 0);
-      return [make("b", {}, "difference"), make("div", {}, make(`span${n ? ".bad" : ".good"}`, {}, n === 1 ? "1 pixel" : `${n.toLocaleString("en")} pixels`))];
-    }
-    if (n === undefined) return [make("b", {}, title)];
-    const facts = [make("span", {}, `${n.toLocaleString("en")} px`), make("span", {}, time(ms))];
-    if (n_twice) facts.push(make("span", {}, `${n_twice.toLocaleString("en")} twice`));
-    if (n_wrong !== undefined) facts.push(make(n_wrong ? "span.bad" : "span.good", {}, n_wrong ? `${n_wrong} wrong` : "all exact"));
-    return [make("b", {}, title), make("span", {}, notes.join(", ")), make("div", {}, ...facts)];
-  }
-  const time = (ms) => ms < 1 ? `${(1000 * ms).toFixed(0)} µs` : `${ms.toFixed(1)} ms`;
-  function keys({key, kinds, of}) {
-    if (key === "difference") {
-      return DIFFERENCES.filter(([k]) => kinds[k]).map(([k, color, word]) =>
-        make("span", {}, make("i", {style: `background:${color}`}), `${kinds[k].toLocaleString("en")} ${word(...of)}`));
-    }
-    if (state.look !== "overdraw") return [];
-    return ["#9ecae1", "#e69f00", "#d55e00", "#7a1f5c"].map((color, i) =>
-      make("span", {}, make("i", {style: `background:${color}`}), ["once", "twice", "3 times", "4 or more"][i]));
-  }
 
+  // A picture with its caption, the lines over it, and what a pointer does there.
   function view(key) {
     const canvas = make("canvas"), sheet = svg("svg", {"aria-hidden": "true"});
     const box = make("div.view", {}, canvas, sheet), caption = make("figcaption"), legend = make("div.legend");
     const figure = make("figure.panel", {"data-key": key}, caption, box, legend);
     let dragged = null;
     const place = ({clientX, clientY}) => {
-      const {left, top} = sheet.getBoundingClientRect(), cell = part.cell;
-      return [(clientX - left) / cell - 1 + state.origin[0], (clientY - top) / cell - 1 + state.origin[1]];
+      const {left, top} = sheet.getBoundingClientRect();
+      return [clientX - left, clientY - top].map((value, k) => value / part.cell - 1 + state.origin[k]);
     };
     const nearest = (event) => {
       const [x, y] = place(event), reach = (event.pointerType === "touch" ? 26 : 13) / part.cell;
-      const far = state.vertices.map((v) => Math.hypot(v[0] - x, v[1] - y));
-      const taken = corner === null ? -1 : state.triangles[chosen]?.[corner] ?? -1;
-      if (taken >= 0 && far[taken] <= reach) return taken;
-      const i = far.indexOf(Math.min(...far));
+      const far = state.vertices.map((v) => Math.hypot(v[0] - x, v[1] - y)), own = taken()[corner];
+      const i = far[own] <= reach ? own : far.indexOf(Math.min(...far));
       return far[i] <= reach ? i : null;
     };
     const at = (event) => place(event).map((value, k) => Math.floor(value - state.origin[k]));
-    const isInside = ([x, y]) => x >= 0 && y >= 0 && x < state.size[0] && y < state.size[1];
+    const isInside = (at) => at.every((value, k) => value >= 0 && value < state.size[k]);
     sheet.onpointerdown = (event) => {
       if (event.button) return;
       stage.focus({preventScroll: true});
-      const i = nearest(event);
-      if (i === null) {
-        const [x, y] = at(event), {owners} = part.views.get(key);
-        if (isInside([x, y])) {
-          const owner = owners?.[y * state.size[0] + x] ?? -1;
-          if (owner >= 0) chosen = owner;
-          inspect([x, y], key);
-          overlay(), controls();
-        }
-        return;
+      dragged = nearest(event);
+      const [x, y] = at(event);
+      if (dragged !== null) {
+        if (!taken().includes(dragged)) chosen = Math.max(0, state.triangles.findIndex((row) => row.includes(dragged)));
+        corner = taken().indexOf(dragged);
+        past = [...past.slice(-199), state];
+        sheet.setPointerCapture(event.pointerId);
+      } else if (isInside([x, y])) {
+        const owner = part.views.get(key).owners?.[y * state.size[0] + x] ?? -1;
+        if (owner >= 0) chosen = owner;
+        inspect([x, y], key);
       }
-      dragged = i;
-      if (!state.triangles[chosen]?.includes(i)) chosen = Math.max(0, state.triangles.findIndex((row) => row.includes(i)));
-      corner = Math.max(0, state.triangles[chosen]?.indexOf(i) ?? 0);
-      past = [...past.slice(-199), state];
-      sheet.setPointerCapture(event.pointerId);
       overlay(), controls();
     };
     sheet.onpointermove = (event) => {
@@ -395,45 +323,45 @@ function pixelsPart(app, panel) {
     return {figure, canvas, sheet, box, caption, legend};
   }
   function inspect(at, key = probed) {
-    if (pixel && pixel[0] === at[0] && pixel[1] === at[1] && probed === key) return;
-    pixel = at;
-    probed = key;
+    if (`${pixel}` === `${at}` && probed === key) return;
+    [pixel, probed] = [at, key];
     look();
     for (const {sheet} of part.views.values()) ring(sheet.querySelector(".ring"));
   }
-  const ring = (rect) => {
-    if (rect) for (const [name, value] of Object.entries(pixel ? {x: pixel[0], y: pixel[1], width: 1, height: 1} : {width: 0})) rect.setAttribute(name, value);
-  };
+  function ring(rect) {
+    const [x, y] = pixel ?? [0, 0], width = pixel ? 1 : 0;
+    for (const [name, value] of Object.entries({x, y, width, height: 1})) rect?.setAttribute(name, value);
+  }
 
   // The largest whole number of screen pixels a pixel that lets all pictures fit, in the columns that allow most.
   function fit() {
     const n = part.views.size, [width, height] = state.size, isNarrow = stage.clientWidth < 480;
     const room = isNarrow ? Infinity : Math.max(420, innerHeight - 120);
     let best = [0, 1];
-    for (let columns = 1; columns <= n; columns++) {
+    for (let columns = 1; columns <= (isNarrow ? 1 : n); columns++) {
       const wide = ((stage.clientWidth + 24) / columns - 24) / (width + 2);
       const high = (room / Math.ceil(n / columns) - 84) / (height + 2);
       const cell = Math.max(1, Math.floor(Math.min(wide, high, 44)));
       if (cell > best[0]) best = [cell, columns];
     }
-    const [cell, columns] = isNarrow ? [Math.max(1, Math.floor(Math.min(stage.clientWidth / (width + 2), 44))), 1] : best;
+    const [cell, columns] = best, px = (n) => `${cell * n}px`;
     part.cell = cell;
     panels.style.gridTemplateColumns = `repeat(${columns}, ${Math.max(cell * (width + 2), 200)}px)`;
     for (const {canvas, box} of part.views.values()) {
-      Object.assign(box.style, {width: `${cell * (width + 2)}px`, height: `${cell * (height + 2)}px`});
-      Object.assign(canvas.style, {left: `${cell}px`, top: `${cell}px`, width: `${cell * width}px`, height: `${cell * height}px`});
+      Object.assign(box.style, {width: px(width + 2), height: px(height + 2)});
+      Object.assign(canvas.style, {left: px(1), top: px(1), width: px(width), height: px(height)});
     }
     overlay();
   }
 
   // Lines, dots and handles over the pixels: no pixel is decided here.
   function overlay() {
-    const [width, height] = state.size, [ox, oy] = state.origin, cell = part.cell || 1;
-    const points = state.vertices.map(([x, y]) => [x - ox, y - oy]), taken = state.triangles[chosen] ?? [];
-    const near = ([x, y]) => Math.abs(x) < 1e5 && Math.abs(y) < 1e5;
-    const outline = (rows) => rows.filter((row) => row.every((i) => near(points[i])))
+    const [width, height] = state.size, cell = part.cell || 1;
+    const points = state.vertices.map(([x, y]) => [x - state.origin[0], y - state.origin[1]]);
+    const isNear = (point) => Math.max(...point.map(Math.abs)) < 1e5;
+    const outline = (rows) => rows.filter((row) => row.every((i) => isNear(points[i])))
       .map((row) => `M${row.map((i) => points[i].join(" ")).join("L")}Z`).join("");
-    const all = outline(state.triangles), one = outline(state.triangles.length > 1 && taken.length ? [taken] : []);
+    const all = outline(state.triangles), own = outline(state.triangles.length > 1 ? [taken()] : []);
     const kind = [cell, width, height, samples.length].join("-");
     for (const {sheet, counts} of part.views.values()) {
       if (sheet.dataset.kind !== kind) {
@@ -441,12 +369,14 @@ function pixelsPart(app, panel) {
         sheet.setAttribute("viewBox", `-1 -1 ${width + 2} ${height + 2}`);
         sheet.replaceChildren(...ruled(width, height, cell, kind), svg("g"));
       }
-      const numbers = cell < 14 || !counts || state.look !== "overdraw" ? [] : [...counts].flatMap((n, i) =>
-        n > 1 ? [Object.assign(svg("text", {x: i % width + 0.5, y: Math.floor(i / width) + 0.5}), {textContent: n})] : []);
+      const isCounted = cell >= 14 && counts && state.look === "overdraw";
+      const numbers = [...(isCounted ? counts : [])].flatMap((n, i) => n > 1
+        ? [svg("text", {x: i % width + 0.5, y: Math.floor(i / width) + 0.5}, n)] : []);
       sheet.lastChild.replaceChildren(
-        svg("g", {class: "counts"}, ...numbers), svg("path", {class: "halo", d: cell < 9 ? "" : all}), svg("path", {class: "edges", d: all}),
-        svg("path", {class: "taken", d: one}), svg("rect", {class: "ring", fill: "none"}),
-        ...points.flatMap((point, i) => near(point) ? [grip(point, taken.indexOf(i), cell)] : []),
+        svg("g", {class: "counts"}, ...numbers), svg("path", {class: "halo", d: cell < 9 ? "" : all}),
+        svg("path", {class: "edges", d: all}), svg("path", {class: "taken", d: own}),
+        svg("rect", {class: "ring", fill: "none"}),
+        ...points.flatMap((point, i) => isNear(point) ? [grip(point, taken().indexOf(i), cell)] : []),
       );
       ring(sheet.querySelector(".ring"));
     }
@@ -455,143 +385,111 @@ function pixelsPart(app, panel) {
   function ruled(width, height, cell, kind) {
     const bars = (n, line) => Array.from({length: n + 1}, (_, i) => line(i)).join("");
     const lines = cell < 5 ? "" : bars(width, (x) => `M${x} 0V${height}`) + bars(height, (y) => `M0 ${y}H${width}`);
-    if (cell < 9 || !samples.length) return [svg("path", {class: "lines", d: lines})];
-    const dots = samples.map(([cx, cy]) => svg("circle", {class: "dots", cx, cy, r: (samples.length > 4 ? 1 : 1.5) / cell}));
-    const pattern = svg("pattern", {id: `dots-${kind}`, width: 1, height: 1, patternUnits: "userSpaceOnUse"}, ...dots);
-    return [svg("defs", {}, pattern), svg("path", {class: "lines", d: lines}), svg("rect", {width, height, fill: `url(#dots-${kind})`})];
+    const ruling = svg("path", {class: "lines", d: lines});
+    if (cell < 9 || !samples.length) return [ruling];
+    const r = (samples.length > 4 ? 1 : 1.5) / cell, id = `dots-${kind}`;
+    const dots = samples.map(([cx, cy]) => svg("circle", {class: "dots", cx, cy, r}));
+    const pattern = svg("pattern", {id, width: 1, height: 1, patternUnits: "userSpaceOnUse"}, ...dots);
+    return [svg("defs", {}, pattern), ruling, svg("rect", {width, height, fill: `url(#${id})`})];
   }
   function grip([x, y], k, cell) {
-    const isTaken = corner !== null && k === corner;
-    const parts = [svg("circle", {class: "reach", cx: x, cy: y, r: 22 / cell}), svg("circle", {class: "knob", cx: x, cy: y, r: (k < 0 ? 4 : 8) / cell})];
-    if (k >= 0) parts.push(Object.assign(svg("text", {x, y, "font-size": 11 / cell}), {textContent: k + 1}));
-    return svg("g", {class: isTaken ? "grip taken" : "grip"}, ...parts);
+    return svg("g", {class: corner !== null && k === corner ? "grip taken" : "grip"},
+      svg("circle", {class: "reach", cx: x, cy: y, r: 22 / cell}),
+      svg("circle", {class: "knob", cx: x, cy: y, r: (k < 0 ? 4 : 8) / cell}),
+      ...(k < 0 ? [] : [svg("text", {x, y, "font-size": 11 / cell}, k + 1)]));
   }
 
   // -- why a pixel is whose --
 
-  function tell({sentences, rows, n_more}) {
-    const edge = ({ends: [a, b], kind, value, exact}) => make("tr", {}, make("th", {scope: "row"}, `${Math.min(a, b)}–${Math.max(a, b)}`),
-      make("td", {}, kind), make("td", {title: `exactly ${exact} square pixels, twice the area to this edge`},
-        make(value === "0" ? "b.zero" : "span", {}, value)));
-    const card = ({triangle, verdict, edges, weights, depth}) => make("section.card", {},
-      make("h3", {}, make("i", {style: `background:${COLORS[triangle % 7]}`}), `triangle ${triangle}`, make("small", {}, verdict)),
+  function tell({sentences, rows = [], n_more = 0}) {
+    const edge = ({ends, kind, value, exact}) => make("tr", {title: `exactly ${exact}: twice the area to this edge`},
+      make("th", {scope: "row"}, ends), make("td", {}, kind), make("td", {}, make(value === "0" ? "b.zero" : "span", {}, value)));
+    const card = ({triangle, color, verdict, edges, weights, depth}) => make("section.card", {},
+      make("h3", {}, make("i", {style: `background:${color}`}), `triangle ${triangle}`, make("small", {}, verdict)),
       make("table", {}, ...edges.map(edge)),
-      make("p", {}, `weights ${weights.join(", ")}`, ...(depth === null ? [] : [make("br"), `depth ${depth}`])));
+      make("p", {}, `weights ${weights}`, depth === null ? "" : `, depth ${depth}`));
     why.replaceChildren(...sentences.map((text) => make("p", {}, text)), make("div.cards", {}, ...rows.map(card)));
     if (n_more) why.append(make("p.hint", {}, `${n_more} more triangles are farther away.`));
   }
 
-  // -- keys --
+  // -- keys, and the column of choices: the data-name of an element says which value of the state it shows --
 
-  function press(event) {
-    const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
+  stage.onkeydown = (event) => {
+    const key = event.key.length === 1 ? event.key.toLowerCase() : event.key, by = MOVES[key];
     if (event.ctrlKey || event.metaKey || event.altKey) return;
-    const move_ = MOVES[key];
-    if (move_) {
-      const i = corner === null ? undefined : state.triangles[chosen]?.[corner];
-      const far = event.shiftKey ? 1 : step();
-      if (i !== undefined) move(i, state.vertices[i].slice(0, 2).map((v, k) => v + far * move_[k]));
-      else inspect([0, 1].map((k) => Math.max(0, Math.min(state.size[k] - 1, (pixel ?? [0, 0])[k] + (event.shiftKey ? 8 : 1) * move_[k]))));
-    } else if ("123".includes(key)) corner = Number(key) - 1;
-    else if (key === "0") corner = null;
-    else if (key === "[" || key === "]") chosen = (chosen + (key === "]" ? 1 : -1) + state.triangles.length) % Math.max(1, state.triangles.length);
-    else if (key === "Tab") nextScene(event.shiftKey ? -1 : 1);
+    if (by && corner !== null) {
+      const far = event.shiftKey ? 1 : step(), i = taken()[corner];
+      move(i, state.vertices[i].slice(0, 2).map((value, k) => value + far * by[k]));
+    } else if (by) {
+      const far = event.shiftKey ? 8 : 1;
+      inspect(state.size.map((n, k) => Math.max(0, Math.min(n - 1, (pixel ?? [0, 0])[k] + far * by[k]))));
+    } else if ("0123".includes(key)) {
+      corner = key === "0" || !taken().length ? null : Number(key) - 1;
+      overlay();
+    } else if (key === "Tab") nextScene(event.shiftKey ? -1 : 1).catch(told);
     else if (key === "f") change({look: state.look === "wireframe" ? "owners" : "wireframe"});
-    else if (key === "z") edits.undo();
-    else if (key === "n") edits.add();
-    else if (key === "Escape") side.querySelector("select").focus();
-    else if (state.triangles.length && {p: "split", r: "flip", Delete: "remove"}[key]) edits[{p: "split", r: "flip", Delete: "remove"}[key]]();
+    else if (key === "Escape") boxes[0].focus();
+    else if (key in EDIT_KEYS) edit(EDIT_KEYS[key]).catch(told);
     else return;
     event.preventDefault();
-    overlay(), controls();
-  }
-
-  // -- the column of choices --
-
-  const sync = [];
-  const controls = () => sync.forEach((update) => update());
-  const select = (label, options, read, write) => {
-    const box = make("select", {"aria-label": label, onchange: () => write(box.value)});
-    const list = (wanted) => box.replaceChildren(...wanted.map(([value, text, title = ""]) => make("option", {value, title}, text)));
-    if (typeof options !== "function") list(options);
-    sync.push(() => {
-      if (typeof options === "function") list(options());
-      box.value = read();
-    });
-    return box;
   };
-  const plain = (...words) => words.map((word) => [word, word]);
-  const choice = (label, name, options) => row(label, select(label, options, () => `${state[name]}`, (value) =>
-    change({[name]: name === "subpixel_bits" && value !== "exact" ? Number(value) : value})));
-  const segments = (label, words, read, write) => {
-    const buttons = words.map((word) => make("button", {type: "button", onclick: () => (write(word), controls())}, word));
-    sync.push(() => buttons.forEach((button, i) => button.setAttribute("aria-pressed", words[i] === read())));
-    return make("div.segments", {role: "group", "aria-label": label}, ...buttons);
-  };
-  const method = (label, name, more = []) => {
-    const variants = () => methods.filter((one) => one.name.split("/")[0] === state[name].split("/")[0])
-      .map((one) => [one.name, one.name.split("/")[1] ?? "as published", one.summary]);
-    const variant = row("variant", select(`${label}, variant`, variants, () => state[name], (value) => change({[name]: value})));
-    sync.push(() => { variant.hidden = variants().length < 2; });
-    const names = [...more, ...bases.map((base) => [base, base, methods.find((one) => one.name === base).summary])];
-    return [row(label, select(label, names, () => state[name].split("/")[0], (value) => change({[name]: value}))), variant];
-  };
-  const check = (label, name) => {
-    const box = make("input", {type: "checkbox", onchange: () => change({[name]: box.checked})});
-    sync.push(() => { box.checked = state[name]; });
-    return make("label.check", {}, box, label);
-  };
-  const number = (read, write, more = {}) => {
-    const box = make("input", {type: "number", step: "any", ...more, onchange: () => Number.isFinite(box.valueAsNumber) && write(box.valueAsNumber)});
-    sync.push(() => { if (box !== box.getRootNode().activeElement) box.value = read() ?? ""; });
-    return box;
-  };
-  const coordinates = [0, 1, 2].flatMap((k) => [make("span", {}, `${k + 1}`), ...[0, 1].map((axis) => {
-    const i = () => state.triangles[chosen]?.[k];
-    return number(() => state.vertices[i()]?.[axis], (value) => i() !== undefined && move(i(), state.vertices[i()].with(axis, value)),
-      {"aria-label": `corner ${k + 1}, ${"xy"[axis]}`});
-  })]);
-  const title = make("h2");
-  sync.push(() => { title.textContent = state.triangles.length ? `Triangle ${chosen} of ${state.triangles.length}` : "No triangle"; });
-  const edit = Object.entries({add: "N", split: "P", flip: "R", remove: "Del", undo: "Z"}).map(([name, key]) => {
-    const made = button(name, () => edits[name](), key);
-    sync.push(() => { made.disabled = name === "undo" ? !past.length : name !== "add" && !state.triangles.length; });
-    return made;
-  });
-  const plan = make("details", {ontoggle: explain}, make("summary", {}, "The plan, and why"), make("pre", {tabIndex: 0}));
-  const size = [0, 1].map((axis) => number(() => state.size[axis], (value) => change({size: state.size.with(axis, Math.round(value))}),
-    {min: 1, max: 256, step: 1, "aria-label": ["width", "height"][axis]}));
-  const depth = choice("depth test", "depth_test", plain("less", "greater"));
-  sync.push(() => { depth.hidden = (state.vertices[0]?.length ?? 2) < 3; });
-  const save = async (kind) => {
-    try {
-      const {name, type, arrays} = await app.line.ask("pixels.export", {state, kind});
-      download(name, arrays.content, type);
-      app.say(`${name} is saved`);
-    } catch (error) {
-      app.say(error.message, true);
+  function controls() {
+    for (const box of boxes) {
+      const value = state[box.dataset.name];
+      if (box.type === "checkbox") box.checked = value;
+      else if (box !== box.getRootNode().activeElement || box.tagName === "SELECT") box.value = value?.[box.dataset.axis] ?? value ?? "";
     }
-  };
-  const side = make("div.side", {},
-    group("Scene", make("div.stepper", {},
-      select("Scene", () => [...(scenes.includes(state.scene) ? [] : [["", app.hello.name || "from a link"]]), ...plain(...scenes)], () => scenes.includes(state.scene) ? state.scene : "", (name) => name && takeScene(name)),
-      make("button", {type: "button", "aria-label": "previous scene", onclick: () => nextScene(-1)}, "‹"),
-      make("button", {type: "button", "aria-label": "next scene", onclick: () => nextScene(1)}, "›"))),
-    group("Methods", ...method("draws", "method"), ...method("beside it", "other", [["", "none"]]), check("the exact picture", "exact")),
-    group("Rules",
-      choice("sub-pixel bits", "subpixel_bits", plain(...[..."012345678", "10", "12", "14", "16", "exact"])),
-      choice("sampling", "sampling", plain("center", "msaa2", "msaa4", "msaa8", "msaa16", "area", "outer", "inner")),
-      choice("cull", "cull", plain("none", "back", "front")),
-      choice("winding", "winding", plain("as given", "clockwise", "counter-clockwise")), depth),
-    group("Shown", segments("Shown", ["owners", "overdraw", "wireframe"], () => state.look, (look) => change({look})),
-      row("pixels", make("span.pair", {}, ...size))),
-    make("section.group", {}, title, make("div.coordinates", {}, ...coordinates), make("div.buttons", {}, ...edit),
-      row("drag to", select("Vertices are dragged to", plain("free", "sub-pixel", "pixel centre"), () => snap, (value) => { snap = value; }))),
-    group("Keep", make("div.buttons", {}, ...["png", "svg", "code", "test"].map((kind) => button({png: "PNG", svg: "SVG", code: "Python", test: "Test case"}[kind], () => save(kind))),
-      button("Copy link", () => app.copyLink()))),
-  );
-  const hint = make("p.hint", {}, ...KEYS.flatMap(([key, text], i) => [i ? " · " : "", make("kbd", {}, key), ` ${text}`]));
-  panel.append(make("div.layout.three", {}, stage, why, side, make("div.below", {}, plan, hint)));
+    for (const button of findAll("[data-look]")) button.setAttribute("aria-pressed", button.dataset.look === state.look);
+    for (const box of findAll(".coordinates input")) {
+      const row = state.vertices[taken()[box.dataset.corner]];
+      if (box !== box.getRootNode().activeElement) box.value = row?.[box.dataset.axis] ?? "";
+    }
+    const n = state.triangles.length;
+    find(".which").textContent = n ? `Triangle ${chosen} of ${n}` : "No triangle";
+    for (const what of ["split", "flip", "remove"]) find(`[data-edit=${what}]`).disabled = !n;
+    find("[data-edit=undo]").disabled = !past.length;
+    find(".deep").hidden = (state.vertices[0]?.length ?? 2) < 3;
+  }
+  for (const box of boxes) {
+    const {name, axis} = box.dataset;
+    box.onchange = () => {
+      if (name === "scene") return void (box.value && takeScene(box.value).catch(told));
+      const value = box.type === "checkbox" ? box.checked : Number(box.value) >= 0 && box.value ? Number(box.value) : box.value;
+      change({[name]: axis ? state[name].with(axis, value) : value});
+    };
+  }
+  const option = (text, value = text, title = "") => make("option", {value, title}, text);
+  for (const box of [find("[data-name=method]"), find("[data-name=other]")]) {
+    for (const kind of ["production", "of the literature"]) {
+      const own = methods.filter((one) => one.is_classic === (kind !== "production"));
+      box.append(make("optgroup", {label: kind}, ...own.map(({name, summary}) => option(name, name, summary))));
+    }
+  }
+  boxes[0].append(option(scenes.includes(app.hello.name) ? "from a link" : app.hello.name, ""), ...scenes.map((name) => option(name)));
+  for (let k = 0; k < 6; k++) {
+    const corner = k >> 1, axis = k & 1;
+    const box = make("input", {type: "number", step: "any", "aria-label": `corner ${corner + 1}, ${"xy"[axis]}`});
+    Object.assign(box.dataset, {corner, axis});
+    box.onchange = () => {
+      const i = taken()[corner];
+      if (i !== undefined && box.value) move(i, state.vertices[i].with(axis, Number(box.value)));
+    };
+    find(".coordinates").append(...(axis ? [] : [make("span", {}, `${corner + 1}`)]), box);
+  }
+  for (const one of findAll("[data-look]")) one.onclick = () => change({look: one.dataset.look});
+  for (const one of findAll("[data-edit]")) one.onclick = () => edit(one.dataset.edit).catch(told);
+  for (const one of findAll("[data-save]")) {
+    one.onclick = async () => {
+      try {
+        const {name, type, arrays} = await app.line.ask("pixels.export", {state, kind: one.dataset.save});
+        download(name, arrays.content, type);
+      } catch (error) {
+        told(error);
+      }
+    };
+  }
+  find(".link").onclick = app.copyLink;
+  plan.ontoggle = explain;
   new ResizeObserver(() => panel.hidden || !part.views.size || fit()).observe(stage);
 
   function enter() {
