@@ -52,7 +52,7 @@ TURN = """async (seconds) => {
 }"""
 ASK = """async ([size, background]) => {
   const {app} = document.querySelector(".explorer"), {view} = app.parts.mesh, start = performance.now();
-  const frame = await app.line.ask("mesh.draw", {...view, size, ...(background ? {background} : {})});
+  const frame = await app.line.ask("mesh.draw", {...view, sampling: "center", size, ...(background ? {background} : {})});
   return [performance.now() - start - frame.draw_ms - frame.encode_ms, frame.encode_ms, frame.arrays.pixels.length];
 }"""
 
@@ -133,11 +133,10 @@ def measure_mesh(browser: Any, path: Path, seconds: float) -> dict[str, Any]:
 
 
 PICTURES = {
-    "pixels": ("light", (1280, 800), "", ""),
-    "steps": ("light", (1280, 720), "#steps=", '{"scene":"two-triangles","method":"bresenham_scanline","step":136}'),
-    "mesh": ("dark", (1280, 720), "#mesh=", '{"layer":"smooth","edges":true,"zoom":1.1}'),
+    "steps": ("light", (1280, 720), "#steps=", '{"scene":"","method":"bresenham_scanline","step":70}'),
+    "mesh": ("dark", (1280, 720), "#mesh=", '{"layer":"smooth","lights":"three"}'),
     "race": ("light", (1280, 900), "#race=", '{"family":"fan","positions":[4],"seed":0}'),
-    "phone": ("dark", (390, 844), "#mesh=", '{"layer":"overdraw"}'),
+    "mesh-phone": ("dark", (390, 844), "#mesh=", '{"layer":"overdraw"}'),
 }
 """Pages of the guide: colour scheme, size, part, its state."""
 
