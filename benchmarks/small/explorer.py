@@ -52,7 +52,8 @@ TURN = """async (seconds) => {
 }"""
 ASK = """async ([size, background]) => {
   const {app} = document.querySelector(".explorer"), {view} = app.parts.mesh, start = performance.now();
-  const frame = await app.line.ask("mesh.draw", {...view, sampling: "center", size, ...(background ? {background} : {})});
+  const asked = {...view, sampling: "center", size, ...(background ? {background} : {})};
+  const frame = await app.line.ask("mesh.draw", asked);
   return [performance.now() - start - frame.draw_ms - frame.encode_ms, frame.encode_ms, frame.arrays.pixels.length];
 }"""
 
