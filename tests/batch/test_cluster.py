@@ -3,6 +3,7 @@
 import functools
 import os
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -147,6 +148,36 @@ def test_batch_that_is_left_early_goes_on_with_resume(client, tmp_path):
     assert summary.n_skipped + summary.n_made == 12
 
 
+def test_client_that_is_killed_goes_on_with_resume(cluster, client, tmp_path):
+    """A process that draws a batch is killed; another one draws what is not there."""
+    script = (
+        "import sys; from pathlib import Path; from distributed import Client; import topleft as tl\n"
+        "from batch_jobs import BOX, SIZE; from cluster_jobs import wait_a_little\n"
+        "jobs = [tl.Job(BOX, wait_a_little, SIZE, destination=Path(sys.argv[2], f'{i}.png')) for i in range(30)]\n"
+        "if __name__ == '__main__':\n"
+        "    with Client(sys.argv[1], set_as_default=False) as client:\n"
+        "        print(tl.render_batch(jobs, executor=client, chunk=1, resume=True).finish())\n"
+    )
+    out = tmp_path / "out"
+    (tmp_path / "draw.py").write_text(script)
+    command = [sys.executable, str(tmp_path / "draw.py"), cluster.scheduler_address, str(out)]
+    env = {**os.environ, "PYTHONPATH": os.pathsep.join([SRC, SUPPORT])}
+    with subprocess.Popen(command, env=env, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as killed:
+        while len(list(out.glob("[0-9]*.png"))) < 3:
+            assert killed.poll() is None
+            time.sleep(0.01)
+        killed.kill()
+    there = {path.name: path.stat().st_mtime_ns for path in out.glob("[0-9]*.png")}
+    assert 3 <= len(there) < 30
+    jobs = [tl.Job(BOX, wait_a_little, SIZE, destination=out / f"{i}.png") for i in range(30)]
+    summary = tl.render_batch(jobs, executor=client, resume=True).finish()
+    assert summary.n_skipped >= len(there)  # what a worker had begun it has finished
+    assert summary.n_skipped + summary.n_made == 30
+    assert all((out / name).stat().st_mtime_ns == time_ns for name, time_ns in there.items())
+    wished = tl.render(BOX, tl.Camera.framing(BOX, aspect=4 / 3), SIZE)
+    assert all(np.array_equal(np.asarray(Image.open(out / f"{i}.png")), wished) for i in range(30))
+
+
 def test_no_more_is_on_the_way_than_the_window(client):
     begun = []
 
@@ -262,6 +293,62 @@ def test_worker_without_the_package_is_told_in_one_line(tmp_path):
     lines = [line for line in done.stdout.splitlines() if line.startswith("said:")]
     assert len(lines) == 1, done.stderr
     assert "has no topleft: install it there" in lines[0]
+
+
+class Processes:
+    """A scheduler and a worker in processes that a test kills and starts again."""
+
+    def __init__(self):
+        with socket.socket() as probe:
+            probe.bind(("127.0.0.1", 0))
+            self.port = probe.getsockname()[1]
+        self.address = f"tcp://127.0.0.1:{self.port}"
+        self.scheduler, self.worker = self.started("scheduler"), self.started("worker")
+
+    def started(self, what):
+        env = {**os.environ, "PYTHONPATH": os.pathsep.join([SRC, SUPPORT])}
+        command = [sys.executable, f"{SUPPORT}/dask_processes.py", what, str(self.port)]
+        made = subprocess.Popen(command, env=env, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+        if what == "scheduler":
+            assert made.stdout.readline() == b"ready\n"
+        return made
+
+    def restart_scheduler(self):
+        """Kill it, and start another one where it was."""
+        self.scheduler.kill()
+        self.scheduler.wait()
+        self.scheduler.stdout.close()
+        self.scheduler = self.started("scheduler")
+
+    def close(self):
+        for one in (self.worker, self.scheduler):
+            one.kill()
+            one.wait()
+            one.stdout.close()
+
+
+@pytest.fixture(scope="module")
+def processes():
+    made = Processes()
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def own_client(processes):
+    with distributed.Client(processes.address, timeout=30, set_as_default=False) as made:
+        made.wait_for_workers(1, timeout=30)
+        yield made
+
+
+def test_batch_goes_on_with_another_scheduler(processes, own_client, tmp_path):
+    jobs = [tl.Job(BOX, wait_a_little, SIZE, destination=tmp_path / f"{i}.png") for i in range(24)]
+    batch = tl.render_batch(jobs, executor=own_client, chunk=1)
+    assert [next(batch).index for _ in range(3)] == [0, 1, 2]
+    processes.restart_scheduler()
+    assert [result.index for result in batch] == list(range(3, 24))
+    wished = tl.render(BOX, tl.Camera.framing(BOX, aspect=4 / 3), SIZE)
+    assert all(np.array_equal(np.asarray(Image.open(tmp_path / f"{i}.png")), wished) for i in range(24))
 
 
 @pytest.mark.parametrize("limit", [0, -1.0, float("nan")])

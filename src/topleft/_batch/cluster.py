@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import os
 import threading
+import time
 import warnings
 from collections import OrderedDict, deque
 from collections.abc import Iterator, Sequence
@@ -49,6 +50,9 @@ MOST_TRIALS = 2
 
 MOST_RESTARTS = 5
 """How often a task is sent again that was cancelled or lost with the scheduler."""
+
+WAIT_S = 0.05
+"""How often a client that has lost its scheduler is looked at."""
 
 GRACE_S = 5.0
 """How long a job may take to end once its time is over, before its process is ended."""
@@ -172,14 +176,30 @@ class ClusterWorkers(Workers):
         if outcomes is not None:
             promise.set_result(outcomes)
         elif error is None and not self._ends and n_restarts < MOST_RESTARTS:
-            self._forget_cancelled()
-            self._send(jobs, promise, n_restarts + 1, n_trials)
             self._is_trying = self._is_trying or n_trials > 0
+            again = partial(self._send_again, jobs, promise, n_restarts + 1, n_trials)
+            threading.Thread(target=again, daemon=True).start()
         elif type(error).__name__ == "KilledWorker" and n_trials < MOST_TRIALS and not self._ends:
             self._suspect(jobs, promise, n_trials + 1)
         else:
             promise.set_exception(error or TopleftError(f"the cluster has lost the job {1 + n_restarts} times"))
         self._try_next()
+
+    def _send_again(
+        self, jobs: list[tuple[int, Job]], promise: Future[list[Outcome]], n_restarts: int, n_trials: int
+    ) -> None:
+        """Send jobs once more as soon as there is a scheduler; until then a client forgets what it is given."""
+        try:
+            while self._client.status == "connecting" and not self._ends:
+                time.sleep(WAIT_S)
+            if self._ends or promise.done():
+                promise.cancel()
+                return
+            self._forget_cancelled()
+            self._send(jobs, promise, n_restarts, n_trials)
+        except BaseException as error:
+            if not promise.done():
+                promise.set_exception(error)
 
     def _suspect(self, jobs: list[tuple[int, Job]], promise: Future[list[Outcome]], n_trials: int) -> None:
         """Let each job be tried by itself, and no two at a time: workers died over them, but maybe for another job."""

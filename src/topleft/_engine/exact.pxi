@@ -89,6 +89,13 @@ cdef class ExactMesh:
         other.x_px, other.y_px, other.subpixel_bits = self.x_px, self.y_px, self.subpixel_bits
         return other
 
+    def named(self, const int32_t[::1] names):
+        """Return the same mesh with other ids in the buffers that `draw` fills: triangle i is called names[i]."""
+        cdef ExactMesh named = self.copy()
+        named.drawn.names = &names[0] if names.shape[0] else NULL
+        named.arrays = (self.arrays, names)
+        return named
+
     def seen_from(self, int32_t x_fx, int32_t y_fx):
         """Return the same mesh with its samples off the centres of the pixels, in units of 2**-subpixel_bits px."""
         cdef ExactMesh seen = self.copy()

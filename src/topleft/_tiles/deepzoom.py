@@ -17,8 +17,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from topleft._base.arrays import as_count, as_path
+from topleft._base.arrays import as_count
 from topleft._base.color import id_colors
+from topleft._base.remote import as_place
 from topleft._io.png import encode
 from topleft._tiles.folders import DiskFolder, check_space
 from topleft._tiles.levels import Progress, Written, halved, level_size, n_levels_to, write_levels
@@ -93,7 +94,9 @@ def write_deepzoom(
     progress: Progress | bool | None,
 ) -> Written:
     """`Tiles.to_deepzoom`."""
-    file = as_path("path", path)
+    file = as_place("path", path)
+    if not isinstance(file, Path):
+        raise ValueError(f"path must be on this machine, got {path!r}: to_zarr writes to URLs")
     if file.suffix != ".dzi":
         raise ValueError(f"path must end in .dzi, got {file.name!r}")
     side, window = as_count("tile", tile), raster.window_size

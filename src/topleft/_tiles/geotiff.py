@@ -26,8 +26,9 @@ from typing import IO, TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from topleft._base.arrays import as_count, as_number, as_path
+from topleft._base.arrays import as_count, as_number
 from topleft._base.options import check_choice
+from topleft._base.remote import as_place
 from topleft._base.whole_file import write_whole
 from topleft._field.grid import Grid
 from topleft._tiles.folders import DiskFolder, check_space
@@ -177,7 +178,9 @@ def write_geotiff(
     progress: Progress | bool | None,
 ) -> Written:
     """`Tiles.to_geotiff`."""
-    file = as_path("path", path)
+    file = as_place("path", path)
+    if not isinstance(file, Path):
+        raise ValueError(f"path must be on this machine, got {path!r}: to_zarr writes to URLs")
     check_choice("compression", compression, COMPRESSIONS)
     side, window = as_count("tile", tile), raster.window_size
     if side % 16:

@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from topleft._base.threads import available_threads
 from topleft.errors import MissingPackageError
 
 if TYPE_CHECKING:
@@ -184,7 +183,7 @@ def write_levels(
                     pixels[y : y + shape[0], x : x + shape[1]] = layout.read(level, r, c, shape)
         return pixels
 
-    n_threads = available_threads() if raster.threads is None else raster.threads
+    n_threads = raster.n_threads
     try:
         with ThreadPoolExecutor(n_threads, thread_name_prefix="topleft-tiles") as pool:
             for level, blocks in enumerate(there):

@@ -17,8 +17,9 @@ import numpy.typing as npt
 
 from topleft._base.arrays import as_count, as_path, as_size
 from topleft._base.options import check_choice
-from topleft._base.threads import parse_threads
+from topleft._base.threads import available_threads, parse_threads
 from topleft._field.grid import Extent, ExtentLike, Grid, grid_around
+from topleft._tiles.ahead import in_order, kept_memory
 from topleft._tiles.blocks import BLOCK, Triangles, fingerprint_of, triangles_of
 from topleft._tiles.drawing import KINDS, ON_GRIDS, Painter, painter_of
 from topleft._tiles.spans import SPAN_BYTES, Tiling, WindowIndex
@@ -115,9 +116,10 @@ def tiles(
     folder : path, optional
         Where temporary files go; that of the system unless given.
     **options
-        Of the verb: ``subpixel_bits`` and ``cull``; "coverage", "overdraw" and "fill": ``sampling``; "labels" and
-        "depth": ``depth_test``, ``background_depth``; "fill": ``per``, ``background``, ``blend``, ``alpha``,
-        ``resolve``, ``dtype``; "field": ``per``, ``nodata``; "height_map": ``surface``.
+        Of the verb: ``subpixel_bits``, which is no "exact" for fields and heights, and ``cull``; "coverage", "overdraw"
+        and "fill": ``sampling``; "labels" and "depth": ``depth_test``, ``background_depth``; "fill": ``per``,
+        ``background``, ``blend``, ``alpha``, ``resolve``, ``dtype``; "field": ``per``, ``nodata``; "height_map":
+        ``surface``.
 
     Returns
     -------
@@ -202,7 +204,7 @@ class Tiles:
         self.triangles, self.painter, self.kind = triangles, painter, kind
         self.size, self.threads = size, threads
         self.window_size = min(window_size[0], max(size[0], 1)), min(window_size[1], max(size[1], 1))
-        self.tiling = Tiling(*size, *self.window_size, painter.view.get("subpixel_bits", 8))
+        self.tiling = Tiling(*size, *self.window_size, 0 if painter.is_exact else painter.view.get("subpixel_bits", 8))
         self._memory, self._folder = memory, folder
         self._index: WindowIndex | None = None
         self._fingerprint: str | None = None
@@ -251,8 +253,14 @@ class Tiles:
                 self.painter.check,
                 memory=self._memory,
                 folder=self._folder,
+                n_threads=self.n_threads,
             )
         return self._index
+
+    @property
+    def n_threads(self) -> int:
+        """How many threads draw, a window each."""
+        return available_threads() if self.threads is None else self.threads
 
     @property
     def is_mapped(self) -> bool:
@@ -285,7 +293,7 @@ class Tiles:
     def draw_window(self, row: int, column: int, *, threads: int | None = None, out: Array | None = None) -> Array:
         """Return the pixels of a window, in a fresh array or in `out`."""
         origin, size = self.place(row, column)
-        payload = self.painter.gather(self.triangles, self.index.of_window(row, column))
+        payload = self.painter.gather(self.triangles, self.index.of_window(row, column), kept_memory())
         return self.painter.window(payload, origin, size, self.threads if threads is None else threads, out)
 
     def __iter__(self) -> Iterator[Window]:
@@ -293,28 +301,39 @@ class Tiles:
         return self.windows()
 
     def windows(self, *, reuse: bool = False) -> Iterator[Window]:
-        """Yield all windows, row by row.
+        """Yield all windows, row by row; each thread draws one, a few ahead of the one that is asked for.
 
         Parameters
         ----------
         reuse : bool
             Whether the next window may overwrite the pixels of this one: a fresh array costs its first touch.
         """
-        kept: Array | None = None
-        for row, column in itertools.product(range(self.tiling.n_rows), range(self.tiling.n_columns)):
-            (x, y), (w, h) = self.place(row, column)
-            out = None
-            if reuse:
-                if kept is None:
-                    kept = np.empty((w * h, *self.painter.channels), self.dtype)
-                out = kept[: w * h].reshape(h, w, *self.painter.channels)
-            pixels = self.draw_window(row, column, out=out)
-            yield Window(row, column, x, y, pixels, self.n_triangles_of(row, column))
+        n_threads = max(1, min(self.n_threads, self.n_windows))
+        n_ahead = 2 * n_threads if n_threads > 1 else 1
+        own_threads = 1 if n_threads > 1 else None
+        w, h = self.window_size
+        shape = (w * h, *self.painter.channels)
+        spare = [np.empty(shape, self.dtype) for _ in range(n_ahead)] if reuse and self.n_windows else []
+
+        def draw(place: tuple[int, int]) -> tuple[Window, Array | None]:
+            row, column = place
+            (x, y), (width, height) = self.place(row, column)
+            memory = spare.pop() if reuse else None
+            out = None if memory is None else memory[: width * height].reshape(height, width, *shape[1:])
+            pixels = self.draw_window(row, column, threads=own_threads, out=out)
+            return Window(row, column, x, y, pixels, self.n_triangles_of(row, column)), memory
+
+        self.index  # noqa: B018  (made once, here, on all threads)
+        places = itertools.product(range(self.tiling.n_rows), range(self.tiling.n_columns))
+        for window, memory in in_order(draw, places, n_threads, n_ahead):
+            yield window
+            if memory is not None:
+                spare.append(memory)
 
     def read(self, x: int, y: int, width: int, height: int) -> Array:
         """Return a part of the raster, drawn at once, whatever windows it lies in."""
         which = self._triangles_in(x, y, width, height)
-        payload = self.painter.gather(self.triangles, which)
+        payload = self.painter.gather(self.triangles, which, kept_memory())
         return self.painter.window(payload, (x, y), (width, height), self.threads, None)
 
     def _triangles_in(self, x: int, y: int, width: int, height: int) -> npt.NDArray[np.int32]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from topleft._base.remote import Place, RemotePath, place_of
 from topleft._tiles.blocks import Triangles, mapped_npy, triangles_of
 from topleft._tiles.drawing import KINDS
 from topleft._tiles.tiles import WINDOW, Tiles, extent_of, tiles
@@ -23,9 +24,9 @@ RASTER_HELP = """\
 MESH is a mesh file, or two .npy files with a comma between them: vertices.npy,triangles.npy. Binary STL, binary PLY of
 triangles and .npy are mapped and need not fit memory. x and y are the plane, z is the height.
 
-OUT ends in .tif (cloud-optimised GeoTIFF), .zarr (a folder) or .dzi (Deep Zoom). Heights of the upper surface are
-written unless --labels, --values or --kind asks for something else. --resume goes on with what an interrupted run has
-left of the same raster, and draws no window again that is whole.
+OUT ends in .tif (cloud-optimised GeoTIFF), .zarr (a folder, or a URL that fsspec reaches) or .dzi (Deep Zoom). Heights
+of the upper surface are written unless --labels, --values or --kind asks for something else. --resume goes on with what
+an interrupted run has left of the same raster, and draws no window again that is whole.
 
 examples:
   topleft raster terrain.ply -o heights.tif --pixel-size 1 --crs EPSG:25832
@@ -38,10 +39,12 @@ SUFFIXES = (".tif", ".tiff", ".zarr", ".dzi")
 
 def run_raster(options: argparse.Namespace) -> int:
     """Write a raster of a mesh, of any size."""
-    path = Path(options.out)
+    path = place_of(options.out)
     if path.suffix.lower() not in SUFFIXES:
         raise UsageError(f"-o {options.out}: the name must end in one of {' '.join(SUFFIXES)}")
     is_tiff, is_zarr = path.suffix.lower() in (".tif", ".tiff"), path.suffix.lower() == ".zarr"
+    if isinstance(path, RemotePath) and not is_zarr:
+        raise UsageError(f"-o {options.out}: {path.suffix} goes to a path of this machine, .zarr to a URL as well")
     if options.crs is not None and not is_tiff:
         raise UsageError(f"--crs is for .tif, got {path.name}")
     if options.levels is not None and not is_zarr:
@@ -60,13 +63,14 @@ def run_raster(options: argparse.Namespace) -> int:
     return 0
 
 
-def write(raster: Tiles, path: Path, options: argparse.Namespace) -> Written:
+def write(raster: Tiles, path: Place, options: argparse.Namespace) -> Written:
     """Write the raster in the format that the name asks for."""
     progress = True if not options.quiet and sys.stderr.isatty() else None
     how: dict[str, Any] = {"resume": options.resume, "progress": progress}
     suffix = path.suffix.lower()
     if suffix == ".zarr":
-        return raster.to_zarr(path, levels=options.levels or 1, compression=compression(options, "gzip"), **how)
+        return raster.to_zarr(options.out, levels=options.levels or 1, compression=compression(options, "gzip"), **how)
+    assert isinstance(path, Path)
     if suffix == ".dzi":
         return raster.to_deepzoom(path, **how)
     how |= {"nodata": options.nodata, "compression": compression(options, "deflate")}

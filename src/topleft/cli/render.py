@@ -19,6 +19,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from topleft._base.remote import is_url
 from topleft._batch.batch import Result, render_batch
 from topleft._batch.jobs import Job
 from topleft._io.images import PICTURE_SUFFIXES, save_image
@@ -145,7 +146,9 @@ def _elsewhere(job: Job) -> Job:
     scene, path = job.scene, job.destination
     if isinstance(scene, str | os.PathLike):
         scene = Path(scene).absolute()
-    return replace(job, scene=scene, destination=None if path is None else Path(path).absolute())
+    if path is not None and not is_url(path):
+        path = Path(path).absolute()
+    return replace(job, scene=scene, destination=path)
 
 
 def _client(options: argparse.Namespace, stack: ExitStack) -> Any:
@@ -204,7 +207,11 @@ def _check_pictures(groups: Sequence[MeshJobs], options: argparse.Namespace) -> 
     """Raise an error if there are no pictures for a sheet or an animation."""
     if options.sheet and Path(options.sheet).suffix.lower() not in PICTURE_SUFFIXES:
         raise UsageError(f"--sheet must end in one of {' '.join(PICTURE_SUFFIXES)}, got {options.sheet!r}")
+    if is_url(options.sheet) or is_url(options.animation):
+        raise UsageError("--sheet and --animation are written to this machine: give a path, not a URL")
     for job in (job for group in groups for job in group.jobs):
+        if is_url(job.destination):
+            raise UsageError("--sheet and --animation need pictures on this machine: OUT must be a path, not a URL")
         if job.layers and "color" not in job.layers:
             raise UsageError(f"--sheet and --animation show the layer color, got --layers {','.join(job.layers)}")
         if Path(os.fspath(job.destination or "")).suffix.lower() not in PICTURE_SUFFIXES:
