@@ -20,6 +20,7 @@ typedef struct {
     int stride;           /* 2 or 3 */
     int64_t n_points;
     double sample_x_px, sample_y_px; /* of the sample, from the pixel's centre: sixteenths of a pixel, at most 1/2 */
+    int64_t n_whole;                 /* triangles before the first one that clip planes leave of another */
     double band;                     /* 1; less shows that the bands of doubt are needed: pictures are then wrong */
 } tl_exact_points;
 

@@ -105,11 +105,13 @@ static void find_piece(blend_state *b, int64_t x_px, int64_t y_px)
         if (load_triangle(&set, p->triangles + 3 * i, &b->resolve.triangle) == 0)
             continue;
         const tl_triangle *t = &b->resolve.triangle;
-        const double sum = (double)weight_sum(t);
+        const double sum = i128_to_f64(weight_sum(t));
         double least = INFINITY;
-        for (int k = 0; k < 3; k++)
-            least =
-                fmin(least, (double)doubled_edge(t, k, k == 2 ? 0 : k + 1, x_px, y_px, b->window->subpixel_bits) / sum);
+        for (int k = 0; k < 3; k++) {
+            const int next = k == 2 ? 0 : k + 1;
+            const tl_int128 edge = doubled_edge(t, k, next, x_px, y_px, b->window->subpixel_bits);
+            least = fmin(least, i128_to_f64(edge) / sum);
+        }
         if (least <= best_weight)
             continue;
         best_weight = least;

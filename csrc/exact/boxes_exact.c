@@ -54,7 +54,7 @@ TL_INLINE vm decide_samples(const lane_exact *t, int row, int col, vm doubted, v
     const vd px = vd_add(t->sample_x, vd_set1(col)), py = vd_add(t->sample_y, vd_set1(row));
     vm in = doubted, out = vm_first(0);
     for (int k = 0; k < 3; k++) {
-        const lane_sides_of_edge sides = sides_of_edge(t->x, t->y, k, px, py);
+        const lane_sides_of_edge sides = sides_of_edge(t->x, t->y, k, px, py, t->test);
         in = vm_and(in, sides.inside), out = vm_or(out, sides.outside);
     }
     *inside = vm_or(*inside, in);
@@ -85,7 +85,7 @@ static __attribute__((noinline)) void ask_boxes(exact_state *s, const exact_queu
                     exact_point p[3];
                     load_turned(s, q->id[i + k], turned >> k & 1, p);
                     const exact_point sample = {q->col[i + k] + col + s->centre_x, q->row[i + k] + row + s->centre_y};
-                    found |= (unsigned)is_inside(p, sample, s->counts) << k;
+                    found |= (unsigned)is_inside(p, sample, t->test, s->counts) << k;
                 }
                 inside = vm_or(inside, vm_from_bits(found));
             }
@@ -109,7 +109,7 @@ TL_INLINE void flush_boxes(exact_state *s, exact_queue *queue, int size, tl_sink
         box_masks in;
         const vi box = vi_load(q->size + i);
         const vi n_cols = vi_and(box, vi_set1(0xffff)), n_rows = vi_shift_right(box, 16);
-        pop_exact(s, queue, i, &t);
+        pop_exact(s, sink, queue, i, &t);
         const vi id = names_of(s->mesh, vm_first(q->n - i), vi_load(q->id + i)), sample = t.sample;
         vd z_col[TL_SMALL_BOX];
         if (sink_has_depth(sink)) {

@@ -40,8 +40,20 @@ TL_INLINE vi first_pixels(vd x, vd centre, int is_left_of_0)
     return vi_add(n, vi_select(is_low, vi_set1(1), vi_set1(0)));
 }
 
+/* The boxes of squares that extents meet in more than a line, or hold. */
+TL_INLINE void find_squares(vd low, vd high, tl_test test, int64_t least, int64_t most, vi *first, vi *n)
+{
+    const vi begin = test == TL_TEST_OUTER ? vi_round(vd_floor(low)) : vi_ceil(low);
+    const vi end = test == TL_TEST_OUTER ? vi_ceil(high) : vi_round(vd_floor(high));
+    *first = vi_max(begin, vi_set1((int32_t)least));
+    *n = vi_sub(vi_min(end, vi_set1((int32_t)most)), *first);
+}
+
+/* The pixels around the extent of a triangle in which edges are tested. */
+TL_INLINE double border_of(tl_test test) { return test == TL_TEST_SAMPLE ? 0.0 : 2.0; }
+
 /* Loads TL_LANES triangles; returns 0, with the row in `bad_row`, when an index lies outside the vertices. */
-TL_INLINE int load_exact_batch(exact_state *s, const int32_t *corners, vi id, vm live, exact_batch *b)
+TL_INLINE int load_exact_batch(exact_state *s, tl_sink sink, const int32_t *corners, vi id, vm live, exact_batch *b)
 {
     if (has_bad_index(corners, s->last_vertex)) {
         int32_t ids[TL_MAX_LANES];
@@ -57,8 +69,16 @@ TL_INLINE int load_exact_batch(exact_state *s, const int32_t *corners, vi id, vm
     const vd x_min = vd_min(vd_min(b->x[0], b->x[1]), b->x[2]), x_max = vd_max(vd_max(b->x[0], b->x[1]), b->x[2]);
     const vd y_min = vd_min(vd_min(b->y[0], b->y[1]), b->y[2]), y_max = vd_max(vd_max(b->y[0], b->y[1]), b->y[2]);
     b->width = vd_sub(x_max, x_min), b->height = vd_sub(y_max, y_min);
-    const vm fits = vm_and(vd_ge(vd_set1(0x1p30), far), vd_ge(vd_set1(TL_MAX_BOX_PX), vd_max(b->width, b->height)));
+    const tl_test test = test_of(s, sink);
+    const vd widest = vd_set1(TL_MAX_BOX_PX - border_of(test));
+    const vm fits = vm_and(vd_ge(vd_set1(0x1p30), far), vd_ge(widest, vd_max(b->width, b->height)));
     b->alone = vm_and_not(live, fits);
+    if (test != TL_TEST_SAMPLE) {
+        find_squares(x_min, x_max, test, s->left, s->right, &b->col, &b->n_cols);
+        find_squares(y_min, y_max, test, s->top, s->bottom, &b->row, &b->n_rows);
+        b->drawn = vm_and(vm_and(live, fits), vi_gt(vi_min(b->n_cols, b->n_rows), vi_set1(0)));
+        return 1;
+    }
     const vd centre_x = vd_set1(s->centre_x), centre_y = vd_set1(s->centre_y);
     const int is_left_of_0 = s->left < 0 || s->top < 0;
     b->col = vi_max(first_pixels(x_min, centre_x, is_left_of_0), vi_set1((int32_t)s->left));
@@ -109,7 +129,7 @@ TL_INLINE void draw_exact_batch(exact_state *s, tl_sink sink, const int32_t *cor
     exact_batch b;
     for (int k = 0; k < 3 * TL_LANES; k += 16)
         __builtin_prefetch(corners + 12 * 48 + k);
-    if (!load_exact_batch(s, corners, id, live, &b))
+    if (!load_exact_batch(s, sink, corners, id, live, &b))
         return;
     if (!vm_any(vm_or(b.drawn, b.alone)))
         return;
@@ -121,8 +141,9 @@ TL_INLINE void draw_exact_batch(exact_state *s, tl_sink sink, const int32_t *cor
     }
     if (!vm_any(b.drawn))
         return;
-    const vf one = vf_set1(1.0f);
-    const vf xy = vf_mul(vf_max(vf_from_vd(b.width), one), vf_max(vf_from_vd(b.height), one));
+    const vf one = vf_set1(1.0f), border = vf_set1((float)border_of(test_of(s, sink)));
+    const vf width = vf_add(vf_from_vd(b.width), border), height = vf_add(vf_from_vd(b.height), border);
+    const vf xy = vf_mul(vf_max(width, one), vf_max(height, one));
     const vi longer = vi_max(b.n_cols, b.n_rows);
     const vm over_tiny = vi_gt(longer, vi_set1(2)), over_small = vi_gt(longer, vi_set1(TL_SMALL_BOX));
     const vm over = vm_and(b.drawn, over_small), tiny = vm_and_not(b.drawn, over_tiny);
@@ -169,7 +190,9 @@ static void start_exact(exact_state *s, const tl_snapped *mesh, const tl_exact_p
     s->mesh = mesh, s->points = points, s->window = window, s->target = target, s->counts = counts;
     s->left = window->x_px, s->right = window->x_px + window->width;
     s->top = window->y_px, s->bottom = window->y_px + window->height;
-    s->centre_x = 0.5 + points->sample_x_px, s->centre_y = 0.5 + points->sample_y_px;
+    const int of_squares = window->test != TL_TEST_SAMPLE;
+    s->centre_x = of_squares ? 0.0 : 0.5 + points->sample_x_px,
+    s->centre_y = of_squares ? 0.0 : 0.5 + points->sample_y_px;
     s->last_vertex = vi_set1((int32_t)(points->n_points - 1));
     s->bad_row = -1, s->may_be_on_grid = 0;
     s->tiny.boxes.n = s->small.boxes.n = s->middle.boxes.n = s->rows.boxes.n = s->fragments.n = 0;
@@ -186,11 +209,13 @@ TL_INLINE void draw_exact_scene(const tl_snapped *mesh, const tl_exact_points *p
     exact_state s;
     int is_given_up = 0;
     start_exact(&s, mesh, points, window, target, counts);
-    for (int64_t i = share->first; i < share->end && s.bad_row < 0 && !is_given_up; i += TL_LANES) {
+    const int counts_pieces = sink == TL_SINK_COUNT && window->test != TL_TEST_SAMPLE;
+    const int64_t end = counts_pieces ? min64(share->end, points->n_whole) : share->end;
+    for (int64_t i = share->first; i < end && s.bad_row < 0 && !is_given_up; i += TL_LANES) {
         int32_t corners[3 * TL_LANES];
         tl_count_work(window, TL_SETUP_PX * TL_LANES);
         is_given_up = tl_is_given_up(window);
-        const vm live = vm_first(share->end - i);
+        const vm live = vm_first(end - i);
         const vi id = share->ids ? vi_load_masked(live, share->ids + i) : vi_add(vi_set1((int32_t)i), vi_iota());
         const int32_t *batch = share_corners(mesh, share, i, corners);
         if (is_near_0)
@@ -203,6 +228,8 @@ TL_INLINE void draw_exact_scene(const tl_snapped *mesh, const tl_exact_points *p
     TL_SINK_CALL(flush_middle_exact, sink, &s)
     TL_SINK_CALL(flush_rows_exact, sink, &s)
     flush_fragments(target, sink, &s.fragments, s.fragments.n);
+    if (counts_pieces && s.bad_row < 0)
+        count_pieces(&s, max64(share->first, points->n_whole), share->end);
     *bad_row = s.bad_row;
 }
 

@@ -67,9 +67,10 @@ static void set_big(double value, big_number *out)
         mantissa >>= -shift;
         shift = 0;
     }
-    const unsigned __int128 moved = (unsigned __int128)mantissa << (shift & 31);
-    for (int k = 0; k < 3; k++)
-        out->words[(shift >> 5) + k] = (uint32_t)(moved >> 32 * k);
+    const int places = shift & 31, word = shift >> 5;
+    out->words[word] = (uint32_t)(mantissa << places);
+    out->words[word + 1] = (uint32_t)(mantissa << places >> 32);
+    out->words[word + 2] = places ? (uint32_t)(mantissa >> (64 - places)) : 0;
 }
 
 static int compare_words(const uint32_t *a, const uint32_t *b, int n)
@@ -261,19 +262,32 @@ TL_INLINE int edge_sign(exact_point a, exact_point b, exact_point p, tl_exact_co
     return slow_sign(a, b, p, counts);
 }
 
-/* Whether a point lies on the inner side of an edge of a triangle with positive area, or on the edge where it is a top
- * or a left one.  Two triangles that share the edge ask the same number with opposite signs, and one of them owns a
- * tie: nothing is left open and nothing is covered twice. */
-TL_INLINE int is_inside_edge(exact_point a, exact_point b, exact_point p, tl_exact_counts *counts)
+/* The point at which an edge is tested: the sample; of the square that has its upper left corner there, the corner that
+ * lies farthest inside (OUTER) or outside (INNER), as walk.h tells. */
+TL_INLINE exact_point tested_point(exact_point a, exact_point b, exact_point p, tl_test test)
 {
-    const int sign = edge_sign(a, b, p, counts);
-    return sign ? sign > 0 : b.y < a.y || (b.y == a.y && b.x > a.x);
+    const int is_outer = test == TL_TEST_OUTER;
+    if (test == TL_TEST_SAMPLE)
+        return p;
+    return (exact_point){p.x + (is_outer == (b.y < a.y)), p.y + (is_outer == (b.x > a.x))};
 }
 
-static int is_inside(const exact_point *corners, exact_point p, tl_exact_counts *counts)
+/* Whether a point lies on the inner side of an edge of a triangle with positive area, or on the edge where it is a top
+ * or a left one.  Two triangles that share the edge ask the same number with opposite signs, and one of them owns a
+ * tie: nothing is left open and nothing is covered twice.  Of squares a tie is within for INNER alone. */
+TL_INLINE int is_inside_edge(exact_point a, exact_point b, exact_point p, tl_test test, tl_exact_counts *counts)
 {
-    return is_inside_edge(corners[0], corners[1], p, counts) && is_inside_edge(corners[1], corners[2], p, counts) &&
-           is_inside_edge(corners[2], corners[0], p, counts);
+    const int sign = edge_sign(a, b, tested_point(a, b, p, test), counts);
+    if (sign || test != TL_TEST_SAMPLE)
+        return sign > 0 || (sign == 0 && test == TL_TEST_INNER);
+    return b.y < a.y || (b.y == a.y && b.x > a.x);
+}
+
+static int is_inside(const exact_point *corners, exact_point p, tl_test test, tl_exact_counts *counts)
+{
+    return is_inside_edge(corners[0], corners[1], p, test, counts) &&
+           is_inside_edge(corners[1], corners[2], p, test, counts) &&
+           is_inside_edge(corners[2], corners[0], p, test, counts);
 }
 
 /* E to within 2^-50 of its size. */

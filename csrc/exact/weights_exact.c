@@ -30,7 +30,7 @@ static int holds(const exact_point *p, exact_point sample)
     tl_exact_counts counts = {0, 0, 0, 0, 0, 0};
     const int sign = edge_sign(p[0], p[1], p[2], &counts);
     const exact_point turned[3] = {p[0], p[sign < 0 ? 2 : 1], p[sign < 0 ? 1 : 2]};
-    return sign && is_inside(turned, sample, &counts);
+    return sign && is_inside(turned, sample, TL_TEST_SAMPLE, &counts);
 }
 
 /* First piece of a triangle, by bisection in the ascending sources. */

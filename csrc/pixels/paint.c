@@ -60,14 +60,13 @@ static int compare_exactly(const tl_triangle *t, int64_t x_px, int64_t y_px, int
     const tl_int128 terms[3] = {doubled_edge(t, 2, 0, x_px, y_px, bits), doubled_edge(t, 0, 1, x_px, y_px, bits),
                                 weight_sum(t)};
     const int factors[3] = {2 * d1, 2 * d2, -halves};
-    tl_int128 high = 0, low = 0; /* the terms reach 2^127: two limbs */
+    tl_int128 high = i128_from(0), low = high; /* high 2^64 + low: the terms reach 2^127 */
     for (int k = 0; k < 3; k++) {
-        high += (terms[k] >> 64) * factors[k];
-        low += (tl_int128)(uint64_t)terms[k] * factors[k];
+        high = i128_add(high, i128_times(i128_shift_right(terms[k], 64), factors[k]));
+        low = i128_add(low, i128_times(i128_from_u64((uint64_t)i128_low(terms[k])), factors[k]));
     }
-    high += low >> 64;
-    low = (tl_int128)(uint64_t)low;
-    return high < 0 ? -1 : high > 0 || low > 0;
+    high = i128_add(high, i128_shift_right(low, 64));
+    return i128_is_zero(high) ? i128_low(low) != 0 : i128_sign(high);
 }
 
 /* The exact value of a channel rounded to nearest, ties to even; `value` decides unless it is next to a tie. */
@@ -107,7 +106,7 @@ static void paint_piece(const resolve_state *s, const int32_t *corners, int64_t 
     for (int k = 0; k < 3; k++) {
         const int a = k == 2 ? 0 : k + 1, b = 3 - k - a;
         const tl_int128 edge = doubled_edge(&s->triangle, a, b, x_px, y_px, bits);
-        part[k] = edge > 0 ? (double)edge : 0.0; /* below 0 only where a piece covers a pixel but not its centre */
+        part[k] = fmax(i128_to_f64(edge), 0.0); /* below 0 only where a piece covers a pixel but not its centre */
         sum += part[k];
     }
     for (int c = 0; c < n_channels; c++) {

@@ -25,9 +25,9 @@ static inline int covers(const tl_triangle *t, int64_t x_px, int64_t y_px, int b
 {
     for (int k = 0; k < 3; k++) {
         const int next = k == 2 ? 0 : k + 1;
-        const tl_int128 dy = (tl_int128)t->y_fx[next] - t->y_fx[k], dx = (tl_int128)t->x_fx[next] - t->x_fx[k];
+        const int64_t dy = t->y_fx[next] - t->y_fx[k], dx = t->x_fx[next] - t->x_fx[k];
         const int top_left = dy < 0 || (dy == 0 && dx > 0);
-        if (doubled_edge(t, k, next, x_px, y_px, bits) - !top_left < 0)
+        if (i128_less(doubled_edge(t, k, next, x_px, y_px, bits), i128_from(!top_left)))
             return 0;
     }
     return 1;
@@ -98,7 +98,7 @@ static void weights_of_pixel(const resolve_state *s, int64_t x_px, int64_t y_px,
     double part[3], sum = 0.0;
     for (int k = 0; k < 3; k++) {
         const int a = k == 2 ? 0 : k + 1, b = 3 - k - a;
-        part[k] = (double)doubled_edge(&s->triangle, a, b, x_px, y_px, bits) * s->inv_w[k];
+        part[k] = i128_to_f64(doubled_edge(&s->triangle, a, b, x_px, y_px, bits)) * s->inv_w[k];
         sum += part[k];
     }
     weights[0] = weights[1] = weights[2] = 0.0;

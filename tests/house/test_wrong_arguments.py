@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import topleft as tl
+from topleft._explore.content import content_of
 
 ROOT = Path(tl.__file__).parent
 CUBE = tl.Mesh(*tl.scenes.shape("cube"))
@@ -69,6 +70,7 @@ CALLS = {
     "composite": (tl.composite, {"layers": LAYERS, "colors": np.zeros((12, 3), np.uint8), "opacity": 0.5,
                                  "background": None, "threads": None}),
     "coverage": (tl.coverage, {"vertices": FLAT, "triangles": ONE, "size": SIZE, "out": None, **VIEW}),
+    "explore": (content_of, {"vertices": FLAT, "triangles": ONE, "size": SIZE}),  # what it does before it is seen
     "field": (tl.field, {"mesh": (FLAT, ONE), "values": [1.0, 2.0, 3.0], "size": SIZE, "extent": None,
                          "pixel_size": None, "y": "up", "per": "vertex", "subpixel_bits": 8, "threads": None,
                          "out": None, "origin": (0, 0), "window": None, "nodata": None}),
@@ -253,6 +255,6 @@ def test_every_public_callable_is_tried():
     others = {"simplify", "release_memory", "build_info"}  # the first takes seconds, the others nothing
     made = {"DepthLayers", "Detail", "Fragments", "FragmentsBatch", "Level", "Levels", "Plan", "SceneDepthLayers",
             "SceneFragments", "ViewLayers", "ImageError", "MeshError", "MissingPackageError", "TopleftError",
-            "MeshWarning", "Overlap", "PointFragments", "Tiles", "Window"}  # fmt: skip
+            "MeshWarning", "Explorer", "Overlap", "PointFragments", "Tiles", "Window"}  # fmt: skip
     public = {name for name in tl.__all__ if callable(getattr(tl, name)) and not inspect.ismodule(getattr(tl, name))}
     assert public <= set(CALLS) | others | made

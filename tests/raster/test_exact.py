@@ -15,6 +15,7 @@ from topleft.methods import reference
 from topleft.methods.reference import sampling
 
 EXACT = {"subpixel_bits": "exact"}
+SQUARES = "outer", "inner"
 
 
 def overdraw(scene, **options):
@@ -231,7 +232,8 @@ def test_every_instruction_set_and_thread_count_draws_the_same_bits():
         with on(isa):
             for threads in (1, 2, 3, 8):
                 frags = tl.rasterize(*scene.arrays, **EXACT, threads=threads)
-                pictures.append((frags.triangle, frags.depth, overdraw(scene, threads=threads)))
+                squares = [overdraw(scene, threads=threads, sampling=kind) for kind in SQUARES]
+                pictures.append((frags.triangle, frags.depth, overdraw(scene, threads=threads), *squares))
     for other in pictures[1:]:
         for mine, first in zip(other, pictures[0], strict=True):
             comparing.assert_same(mine, first)
@@ -249,9 +251,9 @@ def test_vertices_on_the_grid_give_the_snapped_picture(isa):
     scene = mixed_scene(np.random.default_rng(4))
     vertices = np.round(scene.vertices[:, :2] * 256) / 256
     with on(isa):
-        exact = tl.overdraw(vertices, scene.triangles, scene.size, **EXACT)
-        snapped = tl.overdraw(vertices, scene.triangles, scene.size)
-    assert (exact == snapped).all()
+        for kind in ("center", *SQUARES):
+            exact = tl.overdraw(vertices, scene.triangles, scene.size, **EXACT, sampling=kind)
+            assert (exact == tl.overdraw(vertices, scene.triangles, scene.size, sampling=kind)).all()
 
 
 def count(vertices, size, band):
@@ -304,7 +306,6 @@ TRIANGLE = [[0, 0], [4, 0], [0, 4]], [[0, 1, 2]], (4, 4)
     ("verb", "options", "message"),
     [
         (tl.coverage, {"sampling": "area"}, r"subpixel_bits must be in 0\.\.16 for sampling 'area', got 'exact'"),
-        (tl.coverage, {"sampling": "outer"}, r"subpixel_bits must be in 0\.\.16 for sampling 'outer', got 'exact'"),
         (tl.coverage, {"method": "float_barycentric"}, r"0\.\.16 for method 'float_barycentric.*got 'exact'"),
         (
             tl.coverage,

@@ -162,6 +162,7 @@ cdef extern from "topleft.h" nogil:
         int stride
         int64_t n_points
         double sample_x_px, sample_y_px
+        int64_t n_whole
         double band
     ctypedef struct tl_sloped:
         const int32_t *slot

@@ -50,6 +50,7 @@ cdef class ExactMesh:
     cdef tl_exact_points points
     cdef ExactPieces pieces
     cdef int64_t x_px, y_px
+    cdef tl_test test
     cdef object arrays
     cdef readonly int subpixel_bits
 
@@ -59,7 +60,7 @@ cdef class ExactMesh:
 
         `source`: of clip space, where 1/w comes from; `pieces`: of the triangles that a clip plane cuts.
         """
-        cdef int cull
+        cdef int cull, test
         cdef const double[:, ::1] points = points_given
         cdef const int32_t[:, ::1] triangles = triangles_given
         cdef const int32_t[::1] names = None
@@ -75,18 +76,18 @@ cdef class ExactMesh:
         self.points.points = &points[0, 0] if points.shape[0] else NULL
         self.points.n_points, self.points.stride = points.shape[0], points.shape[1]
         self.points.sample_x_px = self.points.sample_y_px = 0.0
-        self.points.band = band
+        self.points.band, self.points.n_whole = band, triangles_given.shape[0]
         self.drawn.triangles = &triangles[0, 0] if triangles.shape[0] else NULL
         self.drawn.n_triangles, self.drawn.mesh.n_vertices = triangles.shape[0], points.shape[0]
         self.drawn.names = &names[0] if names is not None and names.shape[0] else NULL
-        self.x_px, self.y_px, self.subpixel_bits, cull, _, _ = how
-        self.drawn.cull = <tl_cull>cull
+        self.x_px, self.y_px, self.subpixel_bits, cull, _, test = how
+        self.drawn.cull, self.test = <tl_cull>cull, <tl_test>test
 
     cdef ExactMesh copy(self):
         cdef ExactMesh other = ExactMesh.__new__(ExactMesh)
         other.drawn, other.given, other.pieces = self.drawn, self.given, self.pieces
         other.points, other.arrays = self.points, self.arrays
-        other.x_px, other.y_px, other.subpixel_bits = self.x_px, self.y_px, self.subpixel_bits
+        other.x_px, other.y_px, other.subpixel_bits, other.test = self.x_px, self.y_px, self.subpixel_bits, self.test
         return other
 
     def named(self, const int32_t[::1] names):
@@ -106,7 +107,7 @@ cdef class ExactMesh:
         cdef tl_window w
         memset(&w, 0, sizeof(w))
         w.x_px, w.y_px, w.subpixel_bits = self.x_px, self.y_px + first_row, self.subpixel_bits
-        w.width, w.height, w.pause = width, n_rows, pause_of_thread()
+        w.width, w.height, w.test, w.pause = width, n_rows, self.test, pause_of_thread()
         return w
 
     def guess_seen(self, int64_t width, int64_t height):

@@ -178,10 +178,10 @@ def check_exact(view: View, *, takes_exact: bool) -> None:
     wish = "subpixel_bits must be in 0..16"
     if not takes_exact:
         raise ValueError(f"{wish} here, got 'exact': it is there for coverage, overdraw, fill and rasterize")
-    if view.sampling in (Sampling.AREA, Sampling.OUTER, Sampling.INNER):
+    if view.sampling is Sampling.AREA:
         raise ValueError(
-            f"{wish} for sampling {str(view.sampling)!r}, got 'exact': that decides samples, 'center' and 'msaa2' to "
-            "'msaa16'"
+            f"{wish} for sampling 'area', got 'exact': that decides whether a sample or a square is covered, not how "
+            "much of it"
         )
     if view.classic:
         raise ValueError(f"{wish} for method {view.classic.name!r}, got 'exact': it has lanes of its own")

@@ -54,6 +54,10 @@ class Piece(NamedTuple):
     triangle: int
     vertices: tuple[Vertex, Vertex, Vertex]
 
+    def denominator(self) -> int:
+        """Return what makes integers of all coordinates, powers of two, when they are multiplied by it."""
+        return max(v.denominator for vertex in self.vertices for v in vertex.xy_fx)
+
 
 class Fragment(NamedTuple):
     """A covered sample: pixel of the window, piece, and the edge functions opposite the vertices (their sum is > 0)."""
@@ -312,7 +316,7 @@ def fragments(
     bits, (x_origin, y_origin) = view.get("subpixel_bits", 8), origin
     is_exact = bits == "exact"
     for piece in pieces(vertices, triangles, size, **view):
-        unit = max(v.denominator for p in piece.vertices for v in p.xy_fx) if is_exact else 1 << bits
+        unit = piece.denominator() if is_exact else 1 << bits
         scale = 16 * unit if is_exact else 16
         a, b, c = ((int(scale * v.xy_fx[0]), int(scale * v.xy_fx[1])) for v in piece.vertices)
         if edge_function(a, b, c) > 0:
