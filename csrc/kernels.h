@@ -318,8 +318,8 @@ typedef struct tl_kernels {
 
     /* Adds spans [starts[i], starts[i + 1]) of n_rows rows of windows to what the numbers of triangles change by from
      * window to window: rows of n_columns + 1 numbers. */
-    void (*count_spans)(const tl_window_span *spans, const int64_t *starts, int64_t n_rows, int64_t n_columns,
-                        int32_t *steps);
+    void (*count_windows)(const tl_window_span *spans, const int64_t *starts, int64_t n_rows, int64_t n_columns,
+                          int32_t *steps);
 
     /* The corners of n triangles, those from `first` on unless `which` names them: their rows, one after the other.
      * Returns the first that names a vertex that does not exist, or -1. */

@@ -146,8 +146,8 @@ static int64_t sort_spans(const tl_window_span *spans, int64_t n, int64_t *start
 }
 
 /* Counts the triangles of windows, as what changes from one to the next. */
-static void count_spans(const tl_window_span *spans, const int64_t *starts, int64_t n_rows, int64_t n_columns,
-                        int32_t *steps)
+static void count_windows(const tl_window_span *spans, const int64_t *starts, int64_t n_rows, int64_t n_columns,
+                          int32_t *steps)
 {
     for (int64_t row = 0; row < n_rows; row++, steps += n_columns + 1) {
         for (int64_t i = starts[row]; i < starts[row + 1]; i++) {

@@ -236,6 +236,63 @@ def test_raster_in_files_sends_names_alone(client, tmp_path):
     assert np.array_equal(client.compute(raster.to_dask(), sync=True), raster[:])
 
 
+def raster_of_soup(side=1000, kind="labels", **options):
+    rng = np.random.default_rng(4)
+    mesh = rng.uniform(0, side, (300, 3)), rng.integers(0, 300, (300, 3))
+    return tl.tiles(mesh, side, window=128, kind=kind, **options)
+
+
+def files_of(folder):
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def test_workers_write_a_raster_and_one_of_them_is_killed(client, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    raster = raster_of_soup()
+    raster.to_zarr(tmp_path / "alone.zarr", levels=3, compression="none")
+    killed = []
+
+    def kill_a_worker(step):
+        if step.n_done == 20 and not killed:
+            killed.append(next(iter(pids(client).values())))
+            os.kill(killed[0], signal.SIGKILL)
+
+    written = raster.to_zarr("many.zarr", levels=3, compression="none", executor=client, progress=kill_a_worker)
+    assert (written.n_drawn, len(killed)) == (64, 1)
+    assert files_of(tmp_path / "many.zarr") == files_of(tmp_path / "alone.zarr")
+    (tmp_path / "many.zarr/0/c/3/3").unlink()
+    again = raster.to_zarr("many.zarr", levels=3, compression="none", executor=client, resume=True)
+    assert (again.n_drawn, again.n_kept) == (1, 63)
+
+
+@pytest.mark.parametrize("name", ["a.tif", "a.dzi"])
+def test_workers_write_files_of_one_raster(client, tmp_path, name):
+    kinds = {"a.tif": ("height_map", "to_geotiff", {"tile": 64}), "a.dzi": ("labels", "to_deepzoom", {"tile": 64})}
+    kind, write, how = kinds[name]
+    raster = raster_of_soup(300, kind)
+    for folder, executor in (("alone", None), ("many", client)):
+        (tmp_path / folder).mkdir()
+        getattr(raster, write)(tmp_path / folder / name, executor=executor, **how)
+    assert files_of(tmp_path / "many") == files_of(tmp_path / "alone")
+
+
+def test_wrong_executors_of_a_raster_are_told_before_a_byte_is_written(tmp_path):
+    with pytest.raises(TypeError, match=r"executor must be a dask\.distributed\.Client or None, got 2"):
+        raster_of_soup().to_zarr(tmp_path / "a.zarr", executor=2)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_command_writes_a_raster_on_a_cluster(tmp_path, cluster, capsys):
+    np.save(tmp_path / "v.npy", [[0.0, 0, 0], [300, 0, 0], [0, 300, 3]])
+    np.save(tmp_path / "t.npy", [[0, 1, 2]])
+    how = ["raster", f"{tmp_path / 'v.npy'},{tmp_path / 't.npy'}", "--pixel-size", "1", "--window", "64"]
+    assert main([*how, "-o", str(tmp_path / "alone.zarr")]) == 0
+    assert main([*how, "-o", str(tmp_path / "many.zarr"), "--dask", cluster.scheduler_address]) == 0
+    assert files_of(tmp_path / "many.zarr") == files_of(tmp_path / "alone.zarr")
+    assert main([*how, "-o", str(tmp_path / "b.zarr"), "--dask", "here"]) == 2
+    assert "--dask here: must be local, or the address" in capsys.readouterr().err
+
+
 def test_shares_of_a_mesh_are_merged_in_a_tree(client):
     vertices, triangles, _ = tl.scenes.random_triangles(2000, 60, 320, 240)
     parts = [client.submit(draw_share, vertices, triangles, first, pure=False) for first in range(0, 2000, 500)]
@@ -349,6 +406,21 @@ def test_batch_goes_on_with_another_scheduler(processes, own_client, tmp_path):
     assert [result.index for result in batch] == list(range(3, 24))
     wished = tl.render(BOX, tl.Camera.framing(BOX, aspect=4 / 3), SIZE)
     assert all(np.array_equal(np.asarray(Image.open(tmp_path / f"{i}.png")), wished) for i in range(24))
+
+
+def test_raster_goes_on_with_another_scheduler(processes, own_client, tmp_path):
+    raster = raster_of_soup(1500, "coverage", sampling="area")
+    raster.to_zarr(tmp_path / "alone.zarr", compression="none")
+    restarted = []
+
+    def restart(step):
+        if step.n_done >= 5 and not restarted:
+            restarted.append(step.n_done)
+            processes.restart_scheduler()
+
+    raster.to_zarr(tmp_path / "many.zarr", compression="none", executor=own_client, progress=restart)
+    assert restarted == [5]
+    assert files_of(tmp_path / "many.zarr") == files_of(tmp_path / "alone.zarr")
 
 
 @pytest.mark.parametrize("limit", [0, -1.0, float("nan")])

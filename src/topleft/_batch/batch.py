@@ -212,7 +212,8 @@ def workers_on(executor: object, time_limit: float | None) -> Workers | None:
     if limit is not None and not limit > 0:
         raise ValueError(f"time_limit must be positive, got {time_limit}")
     if any(kind.__module__.partition(".")[0] == "distributed" for kind in type(executor).__mro__):
-        from topleft._batch.cluster import ClusterWorkers, is_client
+        from topleft._base.cluster import is_client
+        from topleft._batch.cluster import ClusterWorkers
 
         if is_client(executor):
             return ClusterWorkers(executor, limit)

@@ -495,7 +495,7 @@ cdef extern from "topleft.h" nogil:
         int64_t (*share_polygons)(const tl_polygons *, const tl_share_job *) noexcept nogil
         int64_t (*list_spans)(const tl_tiling *, const double *, int64_t, int64_t, tl_window_box *, int64_t *, tl_window_span *) noexcept nogil
         int64_t (*sort_spans)(const tl_window_span *, int64_t, int64_t *, int32_t *) noexcept nogil
-        void (*count_spans)(const tl_window_span *, const int64_t *, int64_t, int64_t, int32_t *) noexcept nogil
+        void (*count_windows)(const tl_window_span *, const int64_t *, int64_t, int64_t, int32_t *) noexcept nogil
         int64_t (*take_corners)(const tl_corners *, const int32_t *, int64_t, int64_t, void *) noexcept nogil
         void (*merge_fragments)(const tl_merge *, int64_t, int64_t) noexcept nogil
         void (*name_triangles)(int32_t *, int64_t, int64_t, const int32_t *) noexcept nogil

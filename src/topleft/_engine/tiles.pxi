@@ -42,13 +42,13 @@ def sort_spans(const int32_t[:, ::1] spans, int64_t[::1] starts, int32_t[::1] ou
     return n_long
 
 
-def count_spans(const int32_t[:, ::1] spans, const int64_t[::1] starts, int32_t[:, ::1] steps):
+def count_windows(const int32_t[:, ::1] spans, const int64_t[::1] starts, int32_t[:, ::1] steps):
     """Add spans [starts[i], starts[i + 1]) of each row to the steps of the numbers of triangles, (rows, columns + 1)."""
     cdef const tl_window_span *first
     if spans.shape[0] and steps.shape[0]:
         first = <const tl_window_span *>&spans[0, 0]
         with nogil:
-            K.count_spans(first, &starts[0], steps.shape[0], steps.shape[1] - 1, &steps[0, 0])
+            K.count_windows(first, &starts[0], steps.shape[0], steps.shape[1] - 1, &steps[0, 0])
 
 
 cdef class StridedMesh:

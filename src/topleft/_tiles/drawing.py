@@ -38,6 +38,8 @@ Size = tuple[int, int]
 
 VIEW_OPTIONS = ("cull", "subpixel_bits")
 
+RANGE_ROWS = 1 << 20
+
 
 @dataclass(frozen=True)
 class Payload:
@@ -68,6 +70,9 @@ class Painter:
     nodata: float | None = field(default=None, init=False)
     """What a file calls the pixels without data, where it can tell."""
     channels: tuple[int, ...] = field(default=(), init=False)
+    low: float = field(default=np.inf, init=False)
+    high: float = field(default=-np.inf, init=False)
+    """The range of heights, depths or values, once the index is made."""
 
     @property
     def is_exact(self) -> bool:
@@ -88,6 +93,11 @@ class Painter:
                 if not np.isfinite(corners[row]).all():
                     raise ValueError(f"vertices must be finite where a triangle uses them, got {at} {where(row)}")
                 raise ValueError(f"vertices must have a depth that float32 can hold, got {at} {where(row)}")
+
+    def widen(self, low: float, high: float) -> None:
+        """Note the lowest and the highest value of a block."""
+        with _checking:  # blocks are looked at on several threads
+            self.low, self.high = min(self.low, low), max(self.high, high)
 
     def to_pixels(self, points: Array) -> F64:
         """Pixels (N, 2) of points (N, C)."""
@@ -227,6 +237,13 @@ class DepthPainter(FragmentsPainter):
         super().prepare(triangles, values)
         self.dtype = np.dtype(np.float32)
         self.empty = self.nodata = float(np.float32(self.asked.background))
+        self.low, self.high = (np.inf, -np.inf) if triangles.n_components == 3 else (0.0, 0.0)
+
+    def check(self, corners: Array, where: Callable[[int], str]) -> None:
+        """Look at a block of corners (N, 3, C) while the index is made."""
+        super().check(corners, where)
+        if len(corners) and corners.shape[2] == 3:
+            self.widen(float(corners[..., 2].min()), float(corners[..., 2].max()))
 
     def draw(self, payload: Payload, origin: Size, size: Size, threads: int | None, out: Array | None = None) -> Array:
         """Return the pixels of a window (H, W)."""
@@ -296,6 +313,14 @@ class FieldPainter(Painter):
         self.has_nodata, self.nodata = nodata is not None, float(self.empty)
         self.values = array
 
+    def find_range(self) -> None:
+        """Note the lowest and the highest value, block by block: values may be mapped."""
+        for first in range(0, len(self.values), RANGE_ROWS):
+            part = self.values[first : first + RANGE_ROWS]
+            part = part[np.isfinite(part)] if part.dtype.kind == "f" else part
+            if len(part):
+                self.widen(float(part.min()), float(part.max()))
+
     def gather(self, triangles: Triangles, which: I32, memory: Memory = FRESH) -> Payload:
         """Take out of the mesh what a window needs."""
         if self.is_of_faces:
@@ -336,7 +361,6 @@ class HeightPainter(Painter):
         if triangles.n_components != 3:
             raise ValueError(f"a height map needs points of shape (V, 3), got (V, {triangles.n_components})")
         self.dtype, self.empty, self.nodata = np.dtype(np.float64), np.nan, np.nan
-        self.low, self.high = np.inf, -np.inf
 
     def check(self, corners: Array, where: Callable[[int], str]) -> None:
         """Look at a block of corners (N, 3, C) while the index is made."""
@@ -349,9 +373,7 @@ class HeightPainter(Painter):
                 f"vertices must be finite where a triangle uses them, got {corners[row].tolist()} {where(row)}"
             )
         heights = corners[..., 2]
-        low, high = float(heights.min()), float(heights.max())
-        with _checking:  # blocks are looked at on several threads
-            self.low, self.high = min(self.low, low), max(self.high, high)
+        self.widen(float(heights.min()), float(heights.max()))
 
     def draw(self, payload: Payload, origin: Size, size: Size, threads: int | None, out: Array | None = None) -> Array:
         """Return the pixels of a window (H, W)."""

@@ -32,6 +32,9 @@ class Folder(Protocol):
     def exists(self) -> bool:
         """Whether anything is there."""
 
+    def absolute(self) -> Folder:
+        """The same folder for processes that run in other ones."""
+
 
 class DiskFolder:
     """A folder on a disk."""
@@ -62,6 +65,10 @@ class DiskFolder:
         if not self.path.is_dir():
             return self.path.exists()
         return any(not name.startswith(".") for name in os.listdir(self.path))
+
+    def absolute(self) -> DiskFolder:
+        """The same folder for processes that run in other ones."""
+        return DiskFolder(self.path.absolute())
 
     def sweep(self) -> None:
         """Remove what a killed process had not renamed yet."""
@@ -94,6 +101,10 @@ class RemoteFolder:
     def exists(self) -> bool:
         """Whether anything is there."""
         return self._path.exists()
+
+    def absolute(self) -> RemoteFolder:
+        """The same folder for processes that run in other ones."""
+        return self
 
 
 def folder_of(path: str | os.PathLike[str], storage: dict[str, Any] | None = None) -> DiskFolder | RemoteFolder:

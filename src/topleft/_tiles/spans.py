@@ -12,6 +12,7 @@ Based on: the binning of tiled renderers: H. Fuchs et al., Pixel-Planes 5, 1989.
 
 from __future__ import annotations
 
+import os
 import tempfile
 import threading
 from collections import OrderedDict
@@ -112,7 +113,7 @@ class WindowIndex:
         self._runs: list[_Run] = []
         self._memory, self._folder = memory, folder
         self._file: IO[bytes] | None = None
-        self._lock = threading.Lock()
+        self._pid, self._lock = os.getpid(), threading.Lock()
         self._kept: OrderedDict[int, _SortedRow] = OrderedDict()
         block = max(BLOCK, 4 * tiling.n_rows)  # so that the starts of all rows take less than the spans
         n_blocks = -(-triangles.n // block)
@@ -134,6 +135,8 @@ class WindowIndex:
             if run is not None:
                 self._add(run, steps)
         np.cumsum(steps[:, :-1], axis=1, dtype=np.int32, out=self.counts)
+        if self._file is not None:
+            self._file.flush()
 
     @property
     def is_on_disk(self) -> bool:
@@ -170,7 +173,7 @@ class WindowIndex:
     def _add(self, run: _Run, steps: I32) -> None:
         spans = run.spans
         assert spans is not None
-        _engine.count_spans(spans, run.starts, steps[run.first_row : run.first_row + len(run.starts) - 1])
+        _engine.count_windows(spans, run.starts, steps[run.first_row : run.first_row + len(run.starts) - 1])
         run = replace(run, offset=SPAN_BYTES * self.n_spans)
         self.n_spans += len(spans)
         if self._file is None and SPAN_BYTES * self.n_spans > self._memory:
@@ -188,6 +191,8 @@ class WindowIndex:
         """The triangles that may touch a window, ascending."""
         if not self.counts[row, column]:
             return np.empty(0, np.int32)
+        if self._pid != os.getpid():  # a forked child: the lock may be held by a thread that is not there
+            self._pid, self._lock, self._kept = os.getpid(), threading.Lock(), OrderedDict()
         with self._lock:
             found = self._kept.get(row)
             if found is None:
@@ -207,8 +212,7 @@ class WindowIndex:
                 parts.append(run.spans[first:end])
             else:
                 assert self._file is not None
-                self._file.seek(run.offset + SPAN_BYTES * first)
-                content = self._file.read(SPAN_BYTES * (end - first))
+                content = read_at(self._file, run.offset + SPAN_BYTES * first, SPAN_BYTES * (end - first))
                 parts.append(np.frombuffer(content, np.int32).reshape(-1, 3))
         starts = np.zeros(self.tiling.n_columns + 1, np.int64)
         n_long = sum(_engine.sort_spans(part, starts, None) for part in parts)
@@ -219,3 +223,15 @@ class WindowIndex:
             _engine.sort_spans(part, at, names)
         long = [part[part[:, 2] - part[:, 1] > _engine.SHORT_SPAN] for part in parts] if n_long else []
         return _SortedRow(starts, names, np.concatenate(long) if long else np.empty((0, 3), np.int32))
+
+
+def read_at(file: IO[bytes], offset: int, n: int) -> bytes:
+    """Return a part of a file; where the system can, without the place in it that forked processes share."""
+    if not hasattr(os, "pread"):
+        file.seek(offset)
+        return file.read(n)
+    parts = []
+    while n > 0 and (part := os.pread(file.fileno(), n, offset)):  # 2 GB at most at a time
+        parts.append(part)
+        n, offset = n - len(part), offset + len(part)
+    return b"".join(parts)

@@ -238,6 +238,14 @@ class Tiles:
         return self.dtype.kind == "f" or (self.kind == "fill" and self.painter.options.get("dtype") is None)
 
     @property
+    def range_of_values(self) -> tuple[float, float]:
+        """The lowest and the highest depth, height or value of the mesh; makes the index."""
+        self.index  # noqa: B018  (which looks at depths and heights)
+        if hasattr(self.painter, "find_range"):
+            self.painter.find_range()
+        return self.painter.low, self.painter.high
+
+    @property
     def n_windows(self) -> int:
         """How many windows there are."""
         return self.tiling.n_rows * self.tiling.n_columns
@@ -424,6 +432,7 @@ class Tiles:
         levels: int = 1,
         resume: bool = False,
         progress: Progress | bool | None = None,
+        executor: Any = None,
         storage: dict[str, Any] | None = None,
     ) -> Written:
         """Write the raster as a Zarr array (version 3), or as a group of levels; return what was done.
@@ -443,6 +452,9 @@ class Tiles:
             Go on with what an interrupted run has left, and draw no window again that is whole.
         progress : function of a `Step`, or True, optional
             Called after each window; True shows a bar (tqdm).
+        executor : dask.distributed.Client, optional
+            Whose workers draw and write the windows; all of them see the folder, or reach the URL. A worker or a
+            scheduler that dies loses nothing.
         storage : dict, optional
             What fsspec needs for a URL.
 
@@ -457,7 +469,7 @@ class Tiles:
         """
         from topleft._tiles.zarr_files import write_zarr
 
-        return write_zarr(self, path, chunk, compression, levels, resume, progress, storage)
+        return write_zarr(self, path, chunk, compression, levels, resume, progress, executor, storage)
 
     def to_geotiff(
         self,
@@ -470,6 +482,7 @@ class Tiles:
         overviews: bool = True,
         resume: bool = False,
         progress: Progress | bool | None = None,
+        executor: Any = None,
     ) -> Written:
         """Write the raster as a cloud-optimised GeoTIFF, BigTIFF where it is large; return what was done.
 
@@ -488,7 +501,7 @@ class Tiles:
             Pixels a side of a tile, a multiple of 16 that divides the sides of windows.
         overviews : bool
             Whether levels of half the size follow, down to one tile: means of numbers, every second label.
-        resume, progress
+        resume, progress, executor
             As in `to_zarr`.
 
         Raises
@@ -500,7 +513,7 @@ class Tiles:
         """
         from topleft._tiles.geotiff import write_geotiff
 
-        return write_geotiff(self, path, crs, nodata, compression, tile, overviews, resume, progress)
+        return write_geotiff(self, path, crs, nodata, compression, tile, overviews, resume, progress, executor)
 
     def to_deepzoom(
         self,
@@ -510,6 +523,7 @@ class Tiles:
         colors: Callable[[Array], npt.NDArray[np.uint8]] | None = None,
         resume: bool = False,
         progress: Progress | bool | None = None,
+        executor: Any = None,
     ) -> Written:
         """Write the raster as a pyramid of Deep Zoom, for viewers such as OpenSeadragon; return what was done.
 
@@ -521,8 +535,9 @@ class Tiles:
             Pixels a side of a tile; a power of 2 that divides the sides of windows.
         colors : function of an array (H, W), optional
             Returns uint8 (H, W), (H, W, 3) or (H, W, 4). Unless given, labels get a colour each, masks become black and
-            white, and uint8 colours stay what they are; other kinds need it.
-        resume, progress
+            white, counts greys up to 255, depths, heights and values greys from the lowest to the highest, and uint8
+            colours stay what they are; other colours need it.
+        resume, progress, executor
             As in `to_zarr`.
 
         Raises
@@ -532,7 +547,7 @@ class Tiles:
         """
         from topleft._tiles.deepzoom import write_deepzoom
 
-        return write_deepzoom(self, path, tile, colors, resume, progress)
+        return write_deepzoom(self, path, tile, colors, resume, progress, executor)
 
 
 def extent_of(triangles: Triangles) -> Extent:

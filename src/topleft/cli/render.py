@@ -30,7 +30,7 @@ from topleft.cli.sheet import make_sheet
 from topleft.cli.targets import MeshJobs, check_targets, check_words, plan_jobs
 from topleft.errors import MeshWarning, MissingPackageError, TopleftError
 
-__all__ = ["FAILED", "complain", "complain_of_lacks", "one_line", "run_render"]
+__all__ = ["FAILED", "client_of", "complain", "complain_of_lacks", "one_line", "run_render"]
 
 FAILED = 1
 """Exit status: a part of the work failed."""
@@ -110,7 +110,11 @@ def _render(groups: Sequence[MeshJobs], options: argparse.Namespace) -> tuple[li
         stack.enter_context(warnings.catch_warnings())
         warnings.simplefilter("ignore", MeshWarning)  # results have them
         bar = stack.enter_context(_Progress(len(jobs)))
-        executor = _executor(groups, options.jobs, stack) if options.dask is None else _client(options, stack)
+        executor = (
+            _executor(groups, options.jobs, stack)
+            if options.dask is None
+            else client_of(options.dask, options.jobs, stack)
+        )
         chunk = min(MOST_VIEWS_TOGETHER, max(len(group.jobs) for group in groups))
         results = stack.enter_context(
             render_batch(
@@ -151,26 +155,26 @@ def _elsewhere(job: Job) -> Job:
     return replace(job, scene=scene, destination=path)
 
 
-def _client(options: argparse.Namespace, stack: ExitStack) -> Any:
+def client_of(address: str, n_workers: int, stack: ExitStack) -> Any:
     """A client of the Dask cluster that is asked for, or of one of this machine that ends with the command."""
     try:
         import dask
         from distributed import Client, LocalCluster
     except ImportError:
         raise MissingPackageError("--dask needs the package distributed: pip install 'topleft[dask]'") from None
-    if options.dask == "local":
+    if address == "local":
         stack.enter_context(dask.config.set({"distributed.comm.timeouts.connect": "30s"}))
         cluster = LocalCluster(
-            n_workers=options.jobs, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=40
+            n_workers=n_workers, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=40
         )  # fmt: skip
         stack.enter_context(cluster)
         return stack.enter_context(Client(cluster, set_as_default=False))
-    if "://" not in options.dask:
-        raise UsageError(f"--dask {options.dask}: must be local, or the address of a scheduler, tcp://HOST:PORT")
+    if "://" not in address:
+        raise UsageError(f"--dask {address}: must be local, or the address of a scheduler, tcp://HOST:PORT")
     try:
-        return stack.enter_context(Client(options.dask, timeout=CONNECT_S, set_as_default=False))
+        return stack.enter_context(Client(address, timeout=CONNECT_S, set_as_default=False))
     except OSError as error:
-        raise UsageError(f"--dask {options.dask}: no scheduler answers there ({one_line(error)})") from None
+        raise UsageError(f"--dask {address}: no scheduler answers there ({one_line(error)})") from None
 
 
 def _depend_on_parent() -> None:
