@@ -115,6 +115,18 @@ KINDS = {
         {"kind": "overdraw", "subpixel_bits": "exact"},
         lambda **view: tl.overdraw(IN_PIXELS, TRIANGLES, SIZE, subpixel_bits="exact", **view),
     ),
+    "field exact": (
+        {"kind": "field", "values": OF_VERTICES, "subpixel_bits": "exact"},
+        lambda **view: tl.field((POINTS, TRIANGLES), OF_VERTICES, GRID, subpixel_bits="exact", **view),
+    ),
+    "height_map exact": (
+        {"kind": "height_map", "subpixel_bits": "exact"},
+        lambda **view: tl.height_map((POINTS, TRIANGLES), GRID, subpixel_bits="exact", **view),
+    ),
+    "coverage area exact": (
+        {"kind": "coverage", "sampling": "area", "subpixel_bits": "exact"},
+        lambda **view: tl.coverage(IN_PIXELS, TRIANGLES, SIZE, sampling="area", subpixel_bits="exact", **view),
+    ),
     "fill exact": (
         {"kind": "fill", "values": COLORS, "subpixel_bits": "exact"},
         lambda **view: tl.fill(IN_PIXELS, TRIANGLES, COLORS, SIZE, subpixel_bits="exact", **view),
@@ -312,13 +324,6 @@ def test_wrong_sizes_are_told():
 def test_grid_round_a_mesh_is_that_of_field():
     raster = tl.tiles((POINTS, TRIANGLES), pixel_size=0.5, window=32)
     assert raster.grid == tl.Grid.around((POINTS, TRIANGLES), pixel_size=0.5)
-
-
-@pytest.mark.parametrize("kind", ["field", "height_map"])
-def test_values_are_of_snapped_triangles(kind):
-    values = OF_VERTICES if kind == "field" else None
-    with pytest.raises(ValueError, match="got 'exact': it is there for coverage, overdraw, fill and rasterize"):
-        tl.tiles((POINTS, TRIANGLES), GRID, kind=kind, values=values, subpixel_bits="exact")
 
 
 @pytest.mark.parametrize("threads", [1, 2, 5])

@@ -9,7 +9,7 @@ import sys
 import traceback
 from typing import Any
 
-from topleft._explore import export, pixels, probe
+from topleft._explore import export, mesh_view, pixels, probe, race, trace
 from topleft._explore.content import SCENES, scene
 from topleft._explore.session import Handler, Reply, Request, Session
 from topleft.errors import TopleftError
@@ -33,7 +33,15 @@ def hello(session: Session, _: Request) -> Reply:
     )
 
 
-HANDLERS: dict[str, Handler] = {"hello": hello, **pixels.HANDLERS, **probe.HANDLERS, **export.HANDLERS}
+HANDLERS: dict[str, Handler] = {
+    "hello": hello,
+    **pixels.HANDLERS,
+    **probe.HANDLERS,
+    **export.HANDLERS,
+    **trace.HANDLERS,
+    **mesh_view.HANDLERS,
+    **race.HANDLERS,
+}
 """By what a page says in "do"."""
 
 

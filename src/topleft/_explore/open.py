@@ -29,6 +29,12 @@ class Explorer:
     ----------
     url : str
         The address of the page. Whoever has it may look, so it holds a token.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> with tl.explore("torus-knot", wait=False, browser=False) as explorer:  # doctest: +SKIP
+    ...     print(explorer.url)
     """
 
     def __init__(self, content: Content, server: Server) -> None:

@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from topleft._base.remote import Place, place_of
+from topleft._base.arrays import as_number
+from topleft._base.remote import Place, as_place, place_of
 from topleft._io.images import SUFFIXES, save_image
 from topleft.errors import ImageError
 
@@ -88,7 +89,11 @@ def save_layers(
     OSError
         If a file cannot be written.
     """
-    place = place_of(destination)
+    place = as_place("path", destination)
+    if scale is not None:
+        scale = as_number("scale", scale)
+        if not 0 < scale < np.inf:
+            raise ValueError(f"scale must be positive and finite, got {scale}")
     paths = layer_paths(place, list(layers))
     if place.suffix.lower() == ".npz" and "{layer}" not in str(place):
         save_image(place, layers if matrix is None else {**layers, "clip_from_world": matrix})

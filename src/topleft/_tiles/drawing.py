@@ -61,8 +61,6 @@ class Painter:
     own: ClassVar[tuple[str, ...]] = ()
     takes_values: ClassVar[bool] = False
     needs_depth: ClassVar[bool] = False
-    takes_exact: ClassVar[bool] = True
-    """Whether vertices need not be snapped."""
 
     dtype: Any = field(default=np.dtype(bool), init=False)
     empty: Any = field(default=False, init=False)
@@ -207,7 +205,7 @@ class FragmentsPainter(Painter):
 
     def draw_into(self, payload: Payload, origin: Size, size: Size, threads: int | None, out: Any) -> None:
         """Draw a window into ids or depth, the other one into memory that the thread's next window overwrites."""
-        view = View.parse(size, self.view_at(origin, threads), takes_exact=True)  # type: ignore[arg-type]
+        view = View.parse(size, self.view_at(origin, threads))  # type: ignore[arg-type]
         points, own, names = self.points(payload), rows(len(payload.triangles)), payload.triangles
         draw_fragments(kept_memory(), points, own, view, self.depth_test, self.asked.background, out, names)
 
@@ -294,7 +292,6 @@ class FieldPainter(Painter):
     """`field`: values of vertices or faces on a grid."""
 
     own = ("nodata", "per")
-    takes_exact = False
     takes_values = True
 
     def prepare(self, triangles: Triangles, values: Any) -> None:
@@ -352,7 +349,6 @@ class HeightPainter(Painter):
     """`height_map`: the upper or lower surface on a grid."""
 
     own = ("surface",)
-    takes_exact = False
 
     def prepare(self, triangles: Triangles, values: Any) -> None:  # noqa: ARG002
         """Check options and values against the mesh."""
@@ -420,7 +416,7 @@ def painter_of(kind: str, grid: Grid | None, triangles: Triangles, values: Any, 
     if values is not None and not made.takes_values:
         raise ValueError(f"values are for the kinds 'fill' and 'field', got {shown(values)} for {kind!r}")
     view = {name: options[name] for name in VIEW_OPTIONS if name in options}
-    View.parse(1, view, takes_exact=made.takes_exact)  # type: ignore[arg-type]
+    View.parse(1, view)  # type: ignore[arg-type]
     painter = made(grid, options, view, triangles.n_components)
     painter.prepare(triangles, values)
     return painter

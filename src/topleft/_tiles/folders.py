@@ -11,7 +11,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Protocol
 
-from topleft._base.remote import RemotePath, place_of
+from topleft._base.arrays import shown
+from topleft._base.remote import RemotePath, as_place
 from topleft._base.whole_file import write_whole
 
 __all__ = ["DiskFolder", "Folder", "check_space", "folder_of"]
@@ -109,7 +110,9 @@ class RemoteFolder:
 
 def folder_of(path: str | os.PathLike[str], storage: dict[str, Any] | None = None) -> DiskFolder | RemoteFolder:
     """Return where chunks of a path or URL are kept."""
-    place = place_of(path)
+    if not (storage is None or isinstance(storage, dict)):
+        raise TypeError(f"storage must be a dict or None, got {shown(storage)}")
+    place = as_place("path", path)
     if isinstance(place, RemotePath):
         return RemoteFolder(replace(place, storage=tuple((storage or {}).items())))
     return DiskFolder(place)

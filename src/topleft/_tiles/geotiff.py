@@ -26,7 +26,7 @@ from typing import IO, TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from topleft._base.arrays import as_count, as_number
+from topleft._base.arrays import as_count, as_number, check_progress, shown
 from topleft._base.options import check_choice
 from topleft._base.remote import as_place
 from topleft._base.whole_file import write_whole
@@ -188,6 +188,7 @@ def write_geotiff(
     if not isinstance(file, Path):
         raise ValueError(f"path must be on this machine, got {path!r}: to_zarr writes to URLs")
     check_choice("compression", compression, COMPRESSIONS)
+    check_progress(progress)
     side, window = as_count("tile", tile), raster.window_size
     if side % 16:
         raise ValueError(f"tile must be a multiple of 16, got {side}")
@@ -285,11 +286,11 @@ def epsg_of(crs: str | int) -> tuple[int, bool]:
         raise MissingPackageError("crs needs the package pyproj: pip install 'topleft[tiles]'") from None
     try:
         found = pyproj.CRS.from_user_input(crs)
-    except (pyproj.exceptions.CRSError, TypeError) as error:
-        raise ValueError(f"crs must be one that pyproj knows, 'EPSG:25832', say, got {crs!r} ({error})") from None
+    except (pyproj.exceptions.CRSError, TypeError, ValueError) as error:
+        raise ValueError(f"crs must be one that pyproj knows, 'EPSG:25832', say, got {shown(crs)} ({error})") from None
     code = found.to_epsg()
     if code is None or code > 65535 or not (found.is_projected or found.is_geographic):
-        raise ValueError(f"crs must be projected or geographic and have an EPSG code up to 65535, got {crs!r}")
+        raise ValueError(f"crs must be projected or geographic and have an EPSG code up to 65535, got {shown(crs)}")
     return int(code), bool(found.is_geographic)
 
 

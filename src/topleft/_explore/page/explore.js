@@ -130,6 +130,23 @@ function svg(name, attributes = {}, ...children) {
   return element;
 }
 
+const group = (title, ...children) => make("section.group", {}, make("h2", {}, title), ...children);
+const row = (label, control) => make("label.row", {}, make("span", {}, label), control);
+const button = (text, onclick, title = "") => make("button", {type: "button", title, onclick}, text);
+
+// A row with a choice of [value, text], or of words.
+function choose(label, options, value, write) {
+  const box = make("select", {onchange: () => write(box.value)}, options.map(([own, text = own]) => make("option", {value: own}, `${text}`)));
+  box.value = value;
+  return row(label, box);
+}
+
+function download(name, content, type = "") {
+  const href = URL.createObjectURL(new Blob([content], {type}));
+  make("a", {href, download: name}).click();
+  setTimeout(() => URL.revokeObjectURL(href), 10000);
+}
+
 // A picture (H, W, 4) uint8 of Python's as it is, a canvas pixel for each of its pixels.
 function paint(canvas, pixels) {
   const [height, width] = pixels.shape;
@@ -142,6 +159,9 @@ function paint(canvas, pixels) {
 const PARTS = {pixels: pixelsPart, steps: stepsPart, mesh: meshPart, race: racePart};
 
 // ---- Pixels ----------------------------------------------------------------------------------------------------
+
+// Colours of triangles, and of what is drawn again: Okabe and Ito's, which all eyes tell apart.
+const OWNERS = [[0, 114, 178], [230, 159, 0], [0, 158, 115], [204, 121, 167]], TWICE = [213, 94, 0];
 
 const PIXEL_DEFAULTS = {
   origin: [0, 0], method: "auto", other: "", exact: false, subpixel_bits: 8, sampling: "center", cull: "none",
@@ -163,11 +183,11 @@ const KEYS = [
 ];
 
 function pixelsPart(app, panel) {
-  const part = {state: () => state, scene: () => state, drawn: 0, enter, restore, views: new Map()};
+  const part = {state: () => state, scene: () => state, drawn: null, enter, restore, views: new Map()};
   const {methods, scenes} = app.hello;
   const bases = [...new Set(methods.map(({name}) => name.split("/")[0]))];
   let state = {}, sceneName = app.hello.pixels.scene ?? "", chosen = 0, corner = null, snap = "sub-pixel";
-  let pixel = null, probed = "a", samples = [], past = [];
+  let pixel = null, probed = "a", samples = [], past = [], isRefused = false;
 
   // -- what is asked --
 
@@ -175,11 +195,14 @@ function pixelsPart(app, panel) {
     const asked = state;
     try {
       show(await app.line.ask("pixels.draw", {state: asked}));
-      app.say("");
+      if (isRefused) app.say("");
+      isRefused = false;
     } catch (error) {
+      isRefused = true;
       app.say(error.message, true);
     }
-    part.drawn++;
+    part.drawn = asked;
+    part.onDrawn?.();
   });
   const explain = newest(async () => {
     if (plan.open) plan.lastChild.textContent = (await app.line.ask("pixels.plan", {state})).text;
@@ -278,7 +301,9 @@ function pixelsPart(app, panel) {
     "aria-label": "Magnified pixels. Arrows look at pixels, 1 2 3 take a corner, Tab takes the next scene, Escape leaves.",
   }, panels);
 
+  let fitted = "";
   function show({panels: shown, arrays, samples: at}) {
+    const isNew = samples.length !== at.length;
     samples = at;
     for (const key of part.views.keys()) {
       if (!shown.some((one) => one.key === key)) part.views.get(key).figure.remove(), part.views.delete(key);
@@ -293,7 +318,9 @@ function pixelsPart(app, panel) {
       box.hidden = Boolean(one.refused);
       if (arrays[one.key]) paint(canvas, arrays[one.key]);
     }
-    fit();
+    const wanted = JSON.stringify([shown.map(({key}) => key), state.size]);
+    if (wanted !== fitted) fitted = wanted, fit();
+    else if (state.look === "overdraw" || isNew) overlay();
   }
   function facts({key, title, ms, n, n_wrong, n_twice, notes, kinds}) {
     if (key === "difference") {
@@ -399,31 +426,36 @@ function pixelsPart(app, panel) {
   // Lines, dots and handles over the pixels: no pixel is decided here.
   function overlay() {
     const [width, height] = state.size, [ox, oy] = state.origin, cell = part.cell || 1;
-    const points = state.vertices.map(([x, y]) => [x - ox, y - oy]);
+    const points = state.vertices.map(([x, y]) => [x - ox, y - oy]), taken = state.triangles[chosen] ?? [];
     const near = ([x, y]) => Math.abs(x) < 1e5 && Math.abs(y) < 1e5;
     const outline = (rows) => rows.filter((row) => row.every((i) => near(points[i])))
       .map((row) => `M${row.map((i) => points[i].join(" ")).join("L")}Z`).join("");
-    const bars = (n, from, line) => Array.from({length: n + 1}, (_, i) => line(i)).join("");
-    const grid = cell < 5 ? "" : bars(width, 0, (x) => `M${x} 0V${height}`) + bars(height, 0, (y) => `M0 ${y}H${width}`);
-    const taken = state.triangles[chosen] ?? [];
+    const all = outline(state.triangles), one = outline(state.triangles.length > 1 && taken.length ? [taken] : []);
+    const kind = [cell, width, height, samples.length].join("-");
     for (const {sheet, counts} of part.views.values()) {
-      sheet.setAttribute("viewBox", `-1 -1 ${width + 2} ${height + 2}`);
-      const dots = cell < 9 ? [] : samples.map(([x, y]) => svg("circle", {cx: x, cy: y, r: (samples.length > 4 ? 1 : 1.5) / cell}));
-      const id = `dots-${cell}-${samples.length}`;
+      if (sheet.dataset.kind !== kind) {
+        sheet.dataset.kind = kind;
+        sheet.setAttribute("viewBox", `-1 -1 ${width + 2} ${height + 2}`);
+        sheet.replaceChildren(...ruled(width, height, cell, kind), svg("g"));
+      }
       const numbers = cell < 14 || !counts || state.look !== "overdraw" ? [] : [...counts].flatMap((n, i) =>
         n > 1 ? [Object.assign(svg("text", {x: i % width + 0.5, y: Math.floor(i / width) + 0.5}), {textContent: n})] : []);
-      sheet.replaceChildren(
-        svg("defs", {}, svg("pattern", {id, width: 1, height: 1, patternUnits: "userSpaceOnUse"}, ...dots.map((dot) => (dot.setAttribute("class", "dots"), dot)))),
-        svg("path", {class: "lines", d: grid}),
-        svg("rect", {width, height, fill: dots.length ? `url(#${id})` : "none"}),
-        svg("g", {class: "counts"}, ...numbers),
-        svg("path", {class: "halo", d: outline(state.triangles)}), svg("path", {class: "edges", d: outline(state.triangles)}),
-        svg("path", {class: "taken", d: outline(state.triangles.length > 1 && taken.length ? [taken] : [])}),
-        svg("rect", {class: "ring", fill: "none"}),
+      sheet.lastChild.replaceChildren(
+        svg("g", {class: "counts"}, ...numbers), svg("path", {class: "halo", d: all}), svg("path", {class: "edges", d: all}),
+        svg("path", {class: "taken", d: one}), svg("rect", {class: "ring", fill: "none"}),
         ...points.flatMap((point, i) => near(point) ? [grip(point, taken.indexOf(i), cell)] : []),
       );
       ring(sheet.querySelector(".ring"));
     }
+  }
+  // Lines between pixels and dots at samples, where there is room for them.
+  function ruled(width, height, cell, kind) {
+    const bars = (n, line) => Array.from({length: n + 1}, (_, i) => line(i)).join("");
+    const lines = cell < 5 ? "" : bars(width, (x) => `M${x} 0V${height}`) + bars(height, (y) => `M0 ${y}H${width}`);
+    if (cell < 9 || !samples.length) return [svg("path", {class: "lines", d: lines})];
+    const dots = samples.map(([cx, cy]) => svg("circle", {class: "dots", cx, cy, r: (samples.length > 4 ? 1 : 1.5) / cell}));
+    const pattern = svg("pattern", {id: `dots-${kind}`, width: 1, height: 1, patternUnits: "userSpaceOnUse"}, ...dots);
+    return [svg("defs", {}, pattern), svg("path", {class: "lines", d: lines}), svg("rect", {width, height, fill: `url(#dots-${kind})`})];
   }
   function grip([x, y], k, cell) {
     const isTaken = corner !== null && k === corner;
@@ -477,17 +509,14 @@ function pixelsPart(app, panel) {
   const controls = () => sync.forEach((update) => update());
   const select = (label, options, read, write) => {
     const box = make("select", {"aria-label": label, onchange: () => write(box.value)});
+    const list = (wanted) => box.replaceChildren(...wanted.map(([value, text, title = ""]) => make("option", {value, title}, text)));
+    if (typeof options !== "function") list(options);
     sync.push(() => {
-      const wanted = typeof options === "function" ? options() : options;
-      if (box.dataset.options !== JSON.stringify(wanted)) {
-        box.dataset.options = JSON.stringify(wanted);
-        box.replaceChildren(...wanted.map(([value, text, title = ""]) => make("option", {value, title}, text)));
-      }
+      if (typeof options === "function") list(options());
       box.value = read();
     });
     return box;
   };
-  const row = (label, control) => make("label.row", {}, make("span", {}, label), control);
   const plain = (...words) => words.map((word) => [word, word]);
   const choice = (label, name, options) => row(label, select(label, options, () => `${state[name]}`, (value) =>
     change({[name]: name === "subpixel_bits" && value !== "exact" ? Number(value) : value})));
@@ -509,8 +538,6 @@ function pixelsPart(app, panel) {
     sync.push(() => { box.checked = state[name]; });
     return make("label.check", {}, box, label);
   };
-  const group = (title, ...children) => make("section.group", {}, make("h2", {}, title), ...children);
-  const button = (text, onclick, title = "") => make("button", {type: "button", title, onclick}, text);
   const number = (read, write, more = {}) => {
     const box = make("input", {type: "number", step: "any", ...more, onchange: () => Number.isFinite(box.valueAsNumber) && write(box.valueAsNumber)});
     sync.push(() => { if (box !== box.getRootNode().activeElement) box.value = read() ?? ""; });
@@ -536,9 +563,7 @@ function pixelsPart(app, panel) {
   const save = async (kind) => {
     try {
       const {name, type, arrays} = await app.line.ask("pixels.export", {state, kind});
-      const url = URL.createObjectURL(new Blob([arrays.content], {type}));
-      make("a", {href: url, download: name}).click();
-      setTimeout(() => URL.revokeObjectURL(url), 10000);
+      download(name, arrays.content, type);
       app.say(`${name} is saved`);
     } catch (error) {
       app.say(error.message, true);
@@ -575,19 +600,355 @@ function pixelsPart(app, panel) {
 // ---- Steps -----------------------------------------------------------------------------------------------------
 
 function stepsPart(app, panel) {
-  return {enter() {}};
+  const part = {state: () => view, enter, restore}, view = {scene: "", method: "edge", subpixel_bits: 8, step: 0};
+  let trace = null, scene = null, timer = null;
+  const canvas = make("canvas"), over = svg("svg", {"aria-hidden": "true"}), values = make("dl.values"), about = make("p.hint");
+  const told = make("p", {role: "status"}), play = button("Play", toggle, "Space");
+  const slider = make("input", {type: "range", min: 0, "aria-label": "Step", oninput: () => go(slider.valueAsNumber)});
+  const speed = make("input", {type: "range", min: 0, max: 3, step: 0.25, value: 1});
+
+  function toggle() {
+    const isOn = timer === null && trace;
+    clearTimeout(timer);
+    timer = null;
+    play.textContent = isOn ? "Pause" : "Play";
+    if (!isOn) return;
+    if (view.step >= trace.steps.length) go(0);
+    const tick = () => {
+      if (view.step >= trace.steps.length || panel.hidden) return toggle();
+      go(view.step + 1);
+      timer = setTimeout(tick, 1000 / 10 ** speed.value);
+    };
+    timer = setTimeout(tick);
+  }
+  const back = () => go(view.step - 1), next = () => go(view.step + 1), first = () => go(0), last = () => go(Infinity);
+  function leap(way) {
+    const at = (k) => trace.steps[k - 1]?.slice(1, 4).filter((_, i) => i !== 1).join();
+    let k = view.step + way;
+    while (k > 0 && k < trace.steps.length && at(k) === at(view.step)) k += way;
+    go(k);
+  }
+  function go(step) {
+    if (!trace) return;
+    view.step = Math.max(0, Math.min(trace.steps.length, step));
+    const [width, height] = trace.size, pixels = new Uint8ClampedArray(4 * width * height), counts = new Uint32Array(width * height);
+    for (const [kind, triangle, x, y, end, isDrawn] of trace.steps.slice(0, view.step)) {
+      if (kind === "triangle" || kind === "row") continue;
+      for (let i = y * width + x; i <= y * width + end; i++) {
+        if (isDrawn) pixels.set(counts[i]++ ? [...TWICE, 255] : [...OWNERS[triangle % OWNERS.length], 255], 4 * i);
+        else if (!counts[i]) pixels.set([128, 128, 128, 80], 4 * i);
+      }
+    }
+    paint(canvas, Object.assign(pixels, {shape: [height, width, 4]}));
+    const now = trace.steps[view.step - 1], [ox, oy] = scene.origin ?? [0, 0];
+    over.setAttribute("viewBox", `0 0 ${width} ${height}`);
+    over.parentNode.style.setProperty("--ratio", width / height);
+    const corners = scene.triangles.map((row) => row.map((i) => `${scene.vertices[i][0] - ox},${scene.vertices[i][1] - oy}`).join(" "));
+    over.replaceChildren(...["halo", "edges"].flatMap((name) => corners.map((points) => svg("polygon", {class: name, points}))),
+    ...(now ? [svg("rect", {class: "now", x: now[2], y: now[3], width: now[4] - now[2] + 1, height: 1})] : []));
+    slider.max = trace.steps.length;
+    slider.value = view.step;
+    tell(now);
+    app.keep();
+  }
+  function tell(now) {
+    values.replaceChildren();
+    if (!now) return void (told.textContent = `${trace.steps.length} steps. Nothing is drawn yet.`);
+    const [kind, triangle, x, y, end, isDrawn, numbers] = now;
+    told.textContent = `${view.step} of ${trace.steps.length}. ` + {
+      triangle: `Triangle ${triangle} is set up.`, row: `Row ${y} of triangle ${triangle}.`,
+      line: `The ${numbers.side} line passes pixel ${x}, ${y}.`, span: `Pixels ${x} to ${end} of row ${y} are drawn.`,
+      test: `Pixel ${x}, ${y} of triangle ${triangle}: ${isDrawn ? "drawn" : numbers.is_inside ? "inside" : "outside"}.`,
+    }[kind];
+    const before = trace.steps.slice(0, view.step - 1).findLast((one) => one[0] === kind && one[1] === triangle)?.[6] ?? {};
+    for (const [name, value] of Object.entries(numbers)) {
+      const change = typeof value === "number" ? value - before[name] : NaN;
+      values.append(make("dt", {}, name), make(value < 0 ? "dd.bad" : "dd", {}, JSON.stringify(value).replaceAll('"', "")),
+        make("dd.change", {}, Number.isNaN(change) ? "" : `${change < 0 ? "−" : "+"}${+Math.abs(change).toPrecision(6)}`));
+    }
+  }
+  const record = newest(async () => {
+    try {
+      scene = view.scene ? (await app.line.ask("pixels.scene", {name: view.scene})).state : pixelsScene();
+      const {vertices, triangles, size, origin} = scene, {method, subpixel_bits} = view;
+      trace = await app.line.ask("steps.trace", {vertices, triangles, size, origin, method, subpixel_bits});
+      methods.replaceChildren(...trace.methods.map((name) => make("option", {value: name}, name)));
+      methods.value = method;
+      about.textContent = `${trace.summary}. ${trace.source}.`;
+      app.say("");
+      go(view.step);
+    } catch (error) {
+      app.say(error.message, true);
+    }
+  });
+  const pixelsScene = () => (app.parts.pixels.scene().size ? app.parts.pixels.scene() : app.hello.pixels);
+  const set = (name, read = String) => (value) => (Object.assign(view, {[name]: read(value), step: 0}), record());
+  const scenes = choose("scene", [["", "that of Pixels"], ...app.hello.scenes.map((name) => [name, name])], "", set("scene"));
+  const chosen = choose("method", [["edge", "edge"]], "edge", set("method")), methods = chosen.lastChild;
+  const bits = choose("sub-pixel bits", [0, 1, 2, 4, 8, 12, 16].map((n) => [n, n]), 8, set("subpixel_bits", Number));
+  const keys = {" ": toggle, ArrowRight: next, ArrowLeft: back, Home: first, End: last};
+  panel.append(make("div.layout", {tabIndex: -1, onkeydown(event) {
+    const isBusy = /SELECT|INPUT/.test(event.target.tagName) || (event.key === " " && event.target.tagName === "BUTTON");
+    const act = event.shiftKey && event.key.startsWith("Arrow") ? () => leap(event.key === "ArrowRight" ? 1 : -1) : keys[event.key];
+    if (act && trace && !isBusy) event.preventDefault(), act();
+  }}, make("div.stage", {}, make("div.magnified", {}, canvas, over)), make("div.side", {},
+    group("Steps", make("div.buttons", {}, play, button("Back", back, "Left"), button("Step", next, "Right"), button("Row back", () => leap(-1), "Shift and left"),
+      button("Row", () => leap(1), "Shift and right"), button("First", first, "Home"), button("Last", last, "End")), slider, row("speed", speed)),
+    group("Now", told, values), group("Drawn", scenes, chosen, bits, about))));
+  function enter() {
+    if (!view.scene || !trace) record();
+  }
+  function restore(given) {
+    Object.assign(view, given);
+    [scenes.lastChild.value, bits.lastChild.value] = [view.scene, view.subpixel_bits];
+    record();
+  }
+  return part;
 }
 
 // ---- Mesh ------------------------------------------------------------------------------------------------------
 
 function meshPart(app, panel) {
-  return {enter() {}};
+  const home = () => ({azimuth: 35, elevation: 20, zoom: 1, pan: [0, 0]});
+  const view = {...home(), fov: 40, up: "y", layer: "smooth", lights: "headlight", edges: false, sampling: "center", tolerance: 0, cull: "none"};
+  const frames = {painted: 0, asked: 0, newest: 0, times: [], last: null, waiting: null, rest: 0};
+  const part = {state: () => view, enter, restore, view, frames, change, spin: 0};
+  const canvas = make("canvas", {tabIndex: 0, role: "img", "aria-label": "The mesh: arrows turn it, with Shift they move it, plus and minus zoom"});
+  const over = svg("svg", {"aria-hidden": "true"}), stage = make("div.stage.mesh", {}, canvas, over), side = make("div.side");
+  const facts = make("p", {}, "No mesh yet."), rate = make("p.hint"), found = make("dl.values"), legend = make("div.legend");
+  const planText = make("pre", {tabIndex: 0}), planBox = make("details", {ontoggle: () => plan()}, make("summary", {}, "The plan, and why"), planText);
+  const file = make("input", {type: "file", "aria-label": "A mesh file", onchange: () => open(file.files[0])});
+  let mesh = null;
+
+  const size = () => [stage.clientWidth, stage.clientHeight].map((n) => Math.max(1, Math.round(n * Math.min(devicePixelRatio, 2))));
+  const ask = (name, more) => app.line.ask(`mesh.${name}`, {...view, size: size(), ...more}).catch((error) => void app.say(error.message, true));
+  const paper = () => getComputedStyle(app.root).backgroundColor.match(/\d+/g).slice(0, 3).map(Number);
+  // A view that changes comes as a JPEG, with the colour of the page behind it, and once more as it is when it rests. The
+  // next frame is asked for before this one is on the screen: Python draws while the browser decodes and paints.
+  const draw = newest(async (isAtRest = false) => {
+    clearTimeout(frames.rest);
+    const start = performance.now(), number = ++frames.asked;
+    const frame = await ask("draw", isAtRest ? {} : {background: paper()});
+    if (frame) frame.took = performance.now() - start, decode(frame, number, isAtRest);
+    if (part.spin && !panel.hidden) view.azimuth = (view.azimuth + part.spin) % 360, draw();
+    else if (frame && !isAtRest) frames.rest = setTimeout(() => draw(true), 200);
+  });
+  async function decode(frame, number, isAtRest) {
+    const [, , width, height] = frame.box, {pixels} = frame.arrays, start = performance.now();
+    if (pixels.length) frame.image = isAtRest ? new ImageData(pixels, width, height) : await createImageBitmap(new Blob([pixels]));
+    frame.decode = performance.now() - start;
+    if (number < frames.newest) return;
+    frames.newest = number;
+    if (!frames.waiting) requestAnimationFrame(show);
+    frames.waiting = frame;
+  }
+  function show() {
+    const frame = frames.waiting, [x, y] = frame.box, start = performance.now(), context = canvas.getContext("2d");
+    frames.waiting = null;
+    [canvas.width, canvas.height] = frame.size;
+    if (frame.image instanceof ImageData) context.putImageData(frame.image, x, y);
+    else if (frame.image) context.drawImage(frame.image, x, y);
+    frames.painted++, frames.last = frame, frame.paint = performance.now() - start;
+    frames.times = [...frames.times.filter((time) => start - time < 1000), start];
+    const level = frame.level === undefined ? "" : `; level ${frame.level}, ${frame.level_triangles.toLocaleString("en")} triangles`;
+    rate.textContent = `${frames.times.length} frames in a second; drawn in ${frame.draw_ms.toFixed(1)} ms, here after ${frame.took.toFixed(1)} ms${level}`;
+  }
+  function change(values) {
+    Object.assign(view, values);
+    view.elevation = Math.max(-90, Math.min(90, view.elevation));
+    view.zoom = Math.max(0.05, Math.min(1000, view.zoom));
+    over.replaceChildren();
+    legend.replaceChildren(...(view.layer === "overdraw" ? mesh?.heat ?? [] : []).map(([rgb, text]) => make("span", {}, make("i", {style: `background:rgb(${rgb})`}), text)));
+    if (mesh) draw(), plan();
+    app.keep();
+  }
+  const plan = newest(async () => {
+    if (planBox.open) planText.textContent = (await ask("plan"))?.text ?? "";
+  });
+
+  async function pick({clientX, clientY}) {
+    const {left, top, width} = canvas.getBoundingClientRect(), scale = canvas.width / width, size = [canvas.width, canvas.height];
+    const [x, y] = [clientX - left, clientY - top].map((at) => Math.floor(at * scale)), hit = await ask("pick", {size, x, y});
+    if (!hit) return;
+    const short = (numbers) => numbers.map((number) => +number.toPrecision(5)).join(", ");
+    const rows = hit.triangle < 0 ? [["shows", "nothing"]] : [
+      [hit.is_level ? "triangle of the level" : "triangle", hit.triangle], ["vertices", hit.vertices.join(", ")],
+      ...hit.positions.map((at, k) => [`at ${k}`, short(at)]), ["weights", short(hit.barycentric)], ["depth", short([hit.depth])],
+      ...(hit.uv ? [["uv", short(hit.uv)]] : []), ...(hit.material ? [["material", hit.material]] : [])];
+    found.replaceChildren(...[["pixel", `${x}, ${y}`], ...rows].flatMap(([name, value]) => [make("dt", {}, name), make("dd", {}, `${value}`)]));
+    over.setAttribute("viewBox", `0 0 ${size.join(" ")}`);
+    over.replaceChildren(...(hit.corners_px ? ["halo", "taken"].map((name) => svg("polygon", {class: name, points: hit.corners_px.join(" ")})) : []));
+  }
+  async function open(given) {
+    if (given) app.say(`Reading ${given.name}`);
+    try {
+      mesh = await app.line.ask("mesh.open", {name: given?.name}, given ? [new Uint8Array(await given.arrayBuffer())] : []);
+    } catch (error) {
+      return void app.say(error.message, true);
+    }
+    facts.textContent = `${mesh.name}: ${mesh.n_triangles.toLocaleString("en")} triangles, ${mesh.n_vertices.toLocaleString("en")} vertices`;
+    app.say(mesh.lacks.join("; "));
+    if (!mesh.layers.includes(view.layer)) view.layer = "smooth";
+    controls();
+    change(given ? home() : {});
+  }
+  async function save(what) {
+    const {name, arrays} = (await ask("save", {what})) ?? {};
+    if (name) download(name, arrays.file);
+  }
+
+  // One finger or button turns, the other button, Shift or two fingers move, two fingers and the wheel zoom.
+  const pointers = new Map();
+  canvas.onpointerdown = (event) => {
+    canvas.setPointerCapture(event.pointerId);
+    pointers.set(event.pointerId, {x: event.clientX, y: event.clientY, moved: 0, button: event.button});
+  };
+  canvas.onpointermove = (event) => {
+    const old = pointers.get(event.pointerId), before = [...pointers.values()], reach = ([a, b]) => Math.hypot(a.x - b.x, a.y - b.y) || 1;
+    if (!old) return;
+    const dx = event.clientX - old.x, dy = event.clientY - old.y, share = (pointers.size > 1 ? 1 : 2) / canvas.clientHeight;
+    pointers.set(event.pointerId, {...old, x: event.clientX, y: event.clientY, moved: old.moved + Math.abs(dx) + Math.abs(dy)});
+    const pan = [view.pan[0] + share * dx, view.pan[1] - share * dy];
+    if (pointers.size === 2) change({pan, zoom: view.zoom * reach([...pointers.values()]) / reach(before)});
+    else if (old.button || event.shiftKey) change({pan});
+    else change({azimuth: view.azimuth - 0.4 * dx, elevation: view.elevation + 0.4 * dy});
+  };
+  canvas.onpointerup = canvas.onpointercancel = (event) => {
+    const old = pointers.get(event.pointerId);
+    pointers.delete(event.pointerId);
+    if (event.type === "pointerup" && old?.moved < 4 && !old.button) pick(event);
+  };
+  canvas.oncontextmenu = (event) => event.preventDefault();
+  canvas.addEventListener("wheel", (event) => (event.preventDefault(), change({zoom: view.zoom * 1.0015 ** -event.deltaY})), {passive: false});
+  canvas.onkeydown = (event) => {
+    const [x, y] = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1]}[event.key] ?? [0, 0];
+    const zoom = {"+": 1.1, "=": 1.1, "-": 1 / 1.1}[event.key];
+    if (x || y) change(event.shiftKey ? {pan: [view.pan[0] + 0.05 * x, view.pan[1] + 0.05 * y]} : {azimuth: view.azimuth + 5 * x, elevation: view.elevation + 5 * y});
+    else if (zoom || event.key === "0") change(zoom ? {zoom: view.zoom * zoom} : home());
+    else return;
+    event.preventDefault();
+  };
+  panel.ondragover = (event) => event.preventDefault();
+  panel.ondrop = (event) => (event.preventDefault(), event.dataTransfer.files[0] && open(event.dataTransfer.files[0]));
+
+  function controls() {
+    const choice = (label, name, options) => choose(label, options.map((one) => [one].flat()), view[name], (text) =>
+      change({[name]: typeof view[name] === "number" ? Number(text) : text}));
+    const check = (label, isOn, act) => {
+      const box = make("input", {type: "checkbox", checked: isOn, onchange: () => act(box.checked)});
+      return make("label.check", {}, box, label);
+    };
+    side.replaceChildren(group("Mesh", facts, file, rate), ...(mesh ? [
+      group("Look", choice("layer", "layer", mesh.layers), legend, choice("light", "lights", mesh.lights), choice("sampling", "sampling", ["center", "msaa2", "msaa4", "msaa8", "msaa16"]),
+        choice("tolerance", "tolerance", [[0, "none: the mesh itself"], ...[0.25, 0.5, 1, 2, 4].map((n) => [n, `${n} px: a coarser level`])]),
+        choice("cull", "cull", ["none", "back", "front"]), check("wireframe", view.edges, (edges) => change({edges}))),
+      group("Camera", choice("view angle", "fov", [[40, "40°"], [20, "20°"], [70, "70°"], [0, "no perspective"]]), choice("up", "up", ["y", "z"]),
+        check("turn by itself", part.spin, (isOn) => (part.spin = isOn ? 1.5 : 0, draw())), make("div.buttons", {}, button("Reset", () => change(home()), "0"))),
+      group("Picked", make("p.hint", {}, "A click tells which triangle shows."), found),
+      group("Keep", make("div.buttons", {}, ...[["PNG", "png"], ["Python", "code"], ["Job file", "job"]].map(([text, what]) => button(text, () => save(what))),
+        button("Copy link", () => app.copyLink())), planBox)] : [make("p.hint", {}, "Drop a file here: OBJ, PLY, STL, OFF, glTF or GLB.")]));
+  }
+  controls();
+  panel.append(make("div.layout", {}, stage, side));
+  new ResizeObserver(() => mesh && !panel.hidden && draw()).observe(stage);
+  function enter() {
+    if (mesh) draw();
+    else open();
+  }
+  function restore(given) {
+    for (const name of Object.keys(view)) if (name in given) view[name] = given[name];
+    controls();
+    change({});
+  }
+  return part;
 }
 
 // ---- Race ------------------------------------------------------------------------------------------------------
 
 function racePart(app, panel) {
-  return {enter() {}};
+  const view = {family: "fan", positions: [3], seed: 0}, part = {state: () => view, enter, restore, drawn: 0};
+  const faultColors = [null, OWNERS[3], TWICE, [20, 130, 210]], shareColors = ["#ffffcc", "#c7e9b4", "#7fcdbb", "#41b6c4", "#2c7fb8", "#253494"];
+  const stage = make("div.stage.race"), sliders = make("div"), what = make("p"), chart = make("table.chart"), by = make("p.hint"), side = make("div.side");
+  let known = null, racers = [], mapped = "";
+
+  const draw = newest(async () => {
+    const told = await app.line.ask("race.draw", view).catch((error) => void app.say(error.message, true));
+    if (!told) return;
+    const [width, height] = told.size, n = width * height, {triangle, faults} = told.arrays;
+    sliders.querySelectorAll("output").forEach((output, i) => (output.textContent = told.values[i]));
+    told.methods.forEach(({bad, gaps, overdrawn, refused}, k) => {
+      const pixels = new Uint8ClampedArray(4 * n);
+      for (let i = 0; i < n; i++) {
+        const fault = faultColors[faults[k * n + i]];
+        pixels.set(fault ? [...fault, 255] : [128, 128, 128, refused || triangle[i] < 0 ? 0 : 40 + 30 * (triangle[i] % 3)], 4 * i);
+      }
+      paint(racers[k].canvas, Object.assign(pixels, {shape: [height, width, 4]}));
+      Object.assign(racers[k].count, {textContent: refused ? "refuses" : bad ? `${bad} wrong` : "right", className: bad ? "bad" : "good"});
+      racers[k].title = refused ?? `${bad} of ${n} pixels: ${gaps} gaps, ${overdrawn} drawn more than once`;
+    });
+    app.say("");
+    part.drawn++;
+    for (const line of chart.rows) [...line.cells].forEach((cell, i) => cell.classList.toggle("here", i === Math.round(view.positions.at(-1)) + 1));
+  });
+  // The chart is filled column by column; another family, seed or first parameter begins another.
+  async function map() {
+    const {axes} = known.families[view.family], axis = axes.at(-1), others = view.positions.slice(0, -1);
+    const wanted = JSON.stringify([view.family, view.seed, others]);
+    if (mapped === wanted) return;
+    mapped = wanted;
+    by.textContent = `Wrong pixels, in % of those that an edge meets, by ${axis.what}. A dot: with gaps.`;
+    chart.replaceChildren(make("thead", {}, make("tr", {}, make("th"), ...axis.steps.map((step, i) => make("th", {scope: "col"}, button(step, () => set(axes.length - 1, i)))))),
+      make("tbody", {}, ...known.methods.map((name) => make("tr", {}, make("th", {scope: "row"}, name), ...axis.steps.map(() => make("td"))))));
+    for (let i = 0; i < axis.steps.length; i++) {
+      const column = await app.line.ask("race.column", {...view, positions: [...others, i]}).catch(() => null);
+      if (mapped !== wanted || !column) return;
+      column.rows.forEach(([bad, hasGaps], k) => {
+        const cell = chart.tBodies[0].rows[k].cells[i + 1], share = bad / Math.max(1, column.n_edge_px);
+        const level = Math.max(0, Math.min(5, Math.floor(1.5 * Math.log10(share) + 6)));
+        cell.title = bad === null ? "refuses to draw" : `${bad} wrong pixels${hasGaps ? ", with gaps" : ""}`;
+        cell.classList.add(bad === null ? "refused" : level > 3 ? "dark" : "light", ...(hasGaps ? ["gaps"] : []));
+        if (bad) cell.textContent = share < 0.01 ? (100 * share).toFixed(1) : Math.round(100 * share), cell.style.background = shareColors[level];
+      });
+    }
+  }
+  function set(i, position) {
+    view.positions[i] = position;
+    sliders.querySelectorAll("input")[i].value = position;
+    draw(), map(), app.keep();
+  }
+  function take(family) {
+    const {axes, what: text} = known.families[family];
+    if (family !== view.family || view.positions.length !== axes.length) view.positions = axes.map(() => 0);
+    view.family = family;
+    what.textContent = `${text[0].toUpperCase()}${text.slice(1)}. Each pixel has to be drawn once.`;
+    sliders.replaceChildren(...axes.map((axis, i) => make("label.slider", {}, make("span", {}, `${axis.what}: `, make("output")), make("input", {
+      type: "range", min: 0, max: axis.steps.length - 1, step: axis.is_continuous ? 0.05 : 1, value: view.positions[i], oninput: ({target}) => set(i, target.valueAsNumber),
+    }))));
+    draw(), map(), app.keep();
+  }
+  async function enter() {
+    if (panel.firstChild) return;
+    panel.append(make("div.layout.wide", {}, stage, side, group("Chart", by, make("div.scroll", {tabIndex: 0}, chart))));
+    known = await app.line.ask("race.families");
+    racers = known.methods.map((name) => {
+      const canvas = make("canvas"), count = make("span");
+      return Object.assign(make("figure", {}, canvas, make("figcaption", {}, name.replace(/[_/]/g, "$&\u200b"), count)), {canvas, count});
+    });
+    stage.append(...racers);
+    build();
+  }
+  function build() {
+    const seed = make("input", {type: "number", min: 0, max: 99, value: view.seed, onchange: () => (view.seed = Math.max(0, seed.valueAsNumber | 0), draw(), map(), app.keep())});
+    const key = ["another triangle shows", "a gap", "drawn more than once"].map((text, i) => make("span", {}, make("i", {style: `background:rgb(${faultColors[i + 1]})`}), text));
+    side.replaceChildren(group("Race", choose("family", Object.keys(known.families).map((name) => [name, name]), view.family, take), what, sliders, row("seed", seed),
+      make("div.legend", {}, ...key)));
+    take(view.family);
+  }
+  function restore(given) {
+    Object.assign(view, given);
+    if (racers.length) build();
+  }
+  return part;
 }
 
 // ---- the page --------------------------------------------------------------------------------------------------

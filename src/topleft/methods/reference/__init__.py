@@ -14,6 +14,7 @@ P. S. Heckbert, H. P. Moreton, Interpolation for Polygon Texture Mapping and Sha
 
 area.py       cuts each triangle to each pixel square: exact areas
 blend.py      blends a colour into a pixel
+integers.py   draws vertices however far away, after any snap or none
 lines.py      draws the edges of a mesh as lines
 peel.py       sorts the layers of each pixel, and composites them
 points.py     draws points as discs or squares
