@@ -123,10 +123,6 @@ KINDS = {
         {"kind": "height_map", "subpixel_bits": "exact"},
         lambda **view: tl.height_map((POINTS, TRIANGLES), GRID, subpixel_bits="exact", **view),
     ),
-    "coverage area exact": (
-        {"kind": "coverage", "sampling": "area", "subpixel_bits": "exact"},
-        lambda **view: tl.coverage(IN_PIXELS, TRIANGLES, SIZE, sampling="area", subpixel_bits="exact", **view),
-    ),
     "fill exact": (
         {"kind": "fill", "values": COLORS, "subpixel_bits": "exact"},
         lambda **view: tl.fill(IN_PIXELS, TRIANGLES, COLORS, SIZE, subpixel_bits="exact", **view),
