@@ -4,6 +4,7 @@ batch.py      many pictures: views a second
 fresh.py      results of their own beside `Rasterizer`
 gate.py       two commits: instructions, and time in turns
 layers.py     each layer of a view beside its picture
+no_snap.py    vertices that are not snapped beside snapped ones, verb by verb
 field.py      a field beside matplotlib, datashader and SciPy
 samplings.py  one scene in every sampling, as a picture
 growth.py     memory after thousands of calls
