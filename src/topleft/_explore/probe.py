@@ -105,7 +105,7 @@ def probe(_: Session, request: Request) -> Reply:
     return Reply(
         {
             "pixel": place,
-            "sentences": [*sentences(state, found, owner, place), *(story for story in stories if story)],
+            "sentences": [*sentences(state, found, owner, place, k), *(story for story in stories if story)],
             "owner": -1 if owner is None else owner.triangle,
             "rows": [as_row(one, state, owner) for one in found[:MAX_ROWS]],
             "n_more": max(0, len(found) - MAX_ROWS),
@@ -157,9 +157,11 @@ def drawn_by(state: PixelState, pixel: tuple[int, int], method: str) -> dict[int
 # In words
 
 
-def sentences(state: PixelState, found: list[Verdict], owner: Verdict | None, pixel: tuple[int, int]) -> Iterator[str]:
+def sentences(
+    state: PixelState, found: list[Verdict], owner: Verdict | None, pixel: tuple[int, int], k: int
+) -> Iterator[str]:
     """Yield why the pixel is whose."""
-    what = f"The {'centre' if state.sampling == 'center' else 'sample'} of pixel ({pixel[0]}, {pixel[1]})"
+    what = f"The {f'sample {k}' if state.sampling.startswith('msaa') else 'centre'} of pixel ({pixel[0]}, {pixel[1]})"
     on_edge = [one for one in found if one.is_touched and any(edge.value == 0 for edge in one.edges)]
     covered = [one for one in found if one.is_covered]
     if on_edge:

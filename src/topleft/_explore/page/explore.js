@@ -184,7 +184,7 @@ function pixelsPart(app, panel) {
   const stage = find(".stage"), panels = find(".panels"), why = find(".why"), plan = find(".plan");
   const boxes = findAll("[data-name]"), {methods, scenes} = app.hello;
   let state = {}, chosen = 0, corner = null;  // the triangle that is edited, and its corner that the keys move
-  let pixel = null, probed = "a", samples = [], past = [], fitted = "", isRefused = false;
+  let pixel = null, sample = 0, probed = "a", samples = [], past = [], fitted = "", isRefused = false;
 
   // -- what is asked --
 
@@ -207,7 +207,7 @@ function pixelsPart(app, panel) {
   });
   const look = newest(async () => {
     const method = {b: state.other, exact: "exact"}[probed] || state.method;
-    if (pixel) tell(await app.line.ask("pixels.probe", {state, pixel, method}).catch(({message}) => ({sentences: [message]})));
+    if (pixel) tell(await app.line.ask("pixels.probe", {state, pixel, sample, method}).catch(({message}) => ({sentences: [message]})));
   });
 
   // Every change goes through here: `remember` lets Z take it back.
@@ -215,6 +215,7 @@ function pixelsPart(app, panel) {
     if (remember) past = [...past.slice(-199), state];
     state = {...state, ...next};
     if (pixel?.some((at, k) => at >= state.size[k])) pixel = null;
+    if ("sampling" in next) sample = 0;
     chosen = Math.max(0, Math.min(chosen, state.triangles.length - 1));
     overlay(), controls(), redraw(), look(), explain(), app.keep();
   }
@@ -297,6 +298,11 @@ function pixelsPart(app, panel) {
       return far[i] <= reach ? i : null;
     };
     const at = (event) => place(event).map((value, k) => Math.floor(value - state.origin[k]));
+    const nearestSample = (event) => {
+      const [x, y] = place(event).map((value) => value - Math.floor(value));
+      const far = samples.map((one) => Math.hypot(one[0] - x, one[1] - y));
+      return Math.max(0, far.indexOf(Math.min(...far)));
+    };
     const isInside = (at) => at.every((value, k) => value >= 0 && value < state.size[k]);
     sheet.onpointerdown = (event) => {
       if (event.button) return;
@@ -311,20 +317,20 @@ function pixelsPart(app, panel) {
       } else if (isInside([x, y])) {
         const owner = part.views.get(key).owners?.[y * state.size[0] + x] ?? -1;
         if (owner >= 0) chosen = owner;
-        inspect([x, y], key);
+        inspect([x, y], key, nearestSample(event));
       }
       overlay(), controls();
     };
     sheet.onpointermove = (event) => {
       if (dragged !== null) move(dragged, place(event).map(snapped), false);
-      else if (event.pointerType === "mouse" && isInside(at(event))) inspect(at(event), key);
+      else if (event.pointerType === "mouse" && isInside(at(event))) inspect(at(event), key, nearestSample(event));
     };
     sheet.onpointerup = sheet.onpointercancel = () => { dragged = null; };
     return {figure, canvas, sheet, box, caption, legend};
   }
-  function inspect(at, key = probed) {
-    if (`${pixel}` === `${at}` && probed === key) return;
-    [pixel, probed] = [at, key];
+  function inspect(at, key = probed, k = 0) {
+    if (`${pixel},${sample}` === `${at},${k}` && probed === key) return;
+    [pixel, probed, sample] = [at, key, k];
     look();
     for (const {sheet} of part.views.values()) ring(sheet.querySelector(".ring"));
   }
