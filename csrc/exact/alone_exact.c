@@ -41,14 +41,18 @@ static int64_t first_pixel(double x, double centre, int64_t low, int64_t high)
         return low;
     if (x > (double)(high - 1) + centre)
         return high;
-    const int64_t n = (int64_t)ceil(x - centre);
+    const double distance = x - centre;
+    const int64_t below = (int64_t)distance, n = below + ((double)below < distance); /* ceil() is a call */
     return (double)n + centre < x ? n + 1 : n;
 }
 
 /* The first square of [low, high) that reaches right of x; `high` if none does. */
 static int64_t first_square(double x, int64_t low, int64_t high)
 {
-    return x < (double)low ? low : x >= (double)high ? high : (int64_t)floor(x);
+    if (x < (double)low || x >= (double)high)
+        return x < (double)low ? low : high;
+    const int64_t n = (int64_t)x;
+    return n - ((double)n > x);
 }
 
 /* The pixels of [low, high) whose samples lie in an extent, or whose squares meet it in more than a line, or lie in
@@ -60,14 +64,12 @@ static int64_t find_lone_box(double x0, double x1, tl_test test, double centre, 
     return (test == TL_TEST_INNER ? first_square(x1, low, high) : first_pixel(x1, centre, low, high)) - *first;
 }
 
-TL_INLINE double least_of(double a, double b, double c) { return fmin(fmin(a, b), c); }
-TL_INLINE double most_of(double a, double b, double c) { return fmax(fmax(a, b), c); }
+TL_INLINE double lesser_of(double a, double b) { return b < a ? b : a; }
+TL_INLINE double larger_of(double a, double b) { return b > a ? b : a; }
+TL_INLINE double least_of(double a, double b, double c) { return lesser_of(lesser_of(a, b), c); }
+TL_INLINE double most_of(double a, double b, double c) { return larger_of(larger_of(a, b), c); }
 
-/* Whether a plane gives depth: not to slivers, nor where products leave the range of float64.  As draw_exact.c. */
-#define TL_LEAST_BOX 1e-250
-#define TL_MOST_EXTENT 1e120
-
-/* The same operations as plane_of_lanes in setup_exact.c. */
+/* The same operations as plane_of_lanes and take_out_slivers in setup_exact.c. */
 static void plane_of_points(lone_triangle *t, double width, double height)
 {
     const exact_point *p = t->edges.corners;
@@ -98,7 +100,8 @@ static void setup_lone_edges(const exact_state *s, lone_triangle *t, double widt
 {
     asked_triangle *e = &t->edges;
     const double border = e->test == TL_TEST_SAMPLE ? 0.0 : 2.0;
-    const double margin = 12.0 * 0x1p-53 * fmax(width + border, 1.0) * fmax(height + border, 1.0) * s->points->band;
+    const double margin =
+        12.0 * 0x1p-53 * larger_of(width + border, 1.0) * larger_of(height + border, 1.0) * s->points->band;
     for (int k = 0; k < 3; k++) {
         const exact_point a = e->corners[k], b = e->corners[k == 2 ? 0 : k + 1];
         const double dx = b.x - a.x, dy = b.y - a.y;
@@ -113,6 +116,9 @@ static void setup_lone_edges(const exact_state *s, lone_triangle *t, double widt
     }
 }
 
+/* The nearest integer of a number below 2^51. */
+TL_INLINE double nearest_of(double x) { return (x + 0x1.8p52) - 0x1.8p52; }
+
 /* The same from vertices that lie on 2^-8 px, near enough that 2E < 2^51: without a band.  Returns whether they do. */
 static int setup_on_grid(lone_triangle *t)
 {
@@ -121,7 +127,7 @@ static int setup_on_grid(lone_triangle *t)
     int64_t x[3], y[3]; /* doubled, from the first sample */
     for (int k = 0; k < 3; k++) {
         const double x_fx = e->corners[k].x * unit, y_fx = e->corners[k].y * unit;
-        if (!(fabs(x_fx) < 0x1p23 && fabs(y_fx) < 0x1p23 && x_fx == floor(x_fx) && y_fx == floor(y_fx)))
+        if (!(fabs(x_fx) < 0x1p23 && fabs(y_fx) < 0x1p23 && x_fx == nearest_of(x_fx) && y_fx == nearest_of(y_fx)))
             return 0;
         x[k] = (int64_t)(2.0 * (x_fx - e->sample_x * unit)), y[k] = (int64_t)(2.0 * (y_fx - e->sample_y * unit));
     }

@@ -251,7 +251,7 @@ TL_INLINE void flush_middle_exact(exact_state *s, tl_sink sink)
         for (int k = 0; k < end; k++)
             max_rows = q->size[i + k] >> 16 > max_rows ? q->size[i + k] >> 16 : max_rows;
         if (sink_has_depth(sink)) {
-            p = plane_of_lanes(s, &s->middle, i, &t);
+            p = plane_of_lanes(s, &t);
             vd_store(slope_x, p.slope_x), vd_store(x0, t.x[0]);
             for (int row = 0; row < max_rows; row++)
                 vd_store(m.z[row], row_depth(&p, &t, row));
@@ -422,7 +422,7 @@ TL_INLINE void flush_rows_exact(exact_state *s, tl_sink sink)
         store_exact_edges(&edges, &r);
         vi_store(sample, t.sample);
         if (sink_has_depth(sink)) {
-            const exact_planes p = plane_of_lanes(s, &s->rows, i, &t);
+            const exact_planes p = plane_of_lanes(s, &t);
             vd_store(r.z0, p.z0), vd_store(r.slope_x, p.slope_x), vd_store(r.slope_y, p.slope_y);
             vd_store(r.x0, t.x[0]), vd_store(r.y0, t.y[0]);
         }

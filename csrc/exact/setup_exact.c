@@ -47,43 +47,42 @@ typedef struct {
 
 /* Everything that one pass over a mesh needs; on the stack of draw_exact. */
 typedef struct {
-    const tl_snapped *mesh;
+    const tl_snapped *mesh; /* with the triangles that are drawn */
     const tl_exact_points *points;
     const tl_window *window;
     const tl_target *target;
     tl_exact_counts *counts;
+    tl_share *share;
     int64_t left, top, right, bottom; /* picture pixels */
     double centre_x, centre_y;        /* of a pixel's sample, from its upper left corner; of squares 0 */
     vi last_vertex;
     int64_t bad_row;    /* of triangles, -1: none so far */
     int may_be_on_grid; /* the triangles that asked last were */
     exact_queue tiny, small, middle, rows;
+    int n_slivers; /* triangles of the queues that have no depth plane, and wait to be drawn by themselves */
+    int32_t slivers[4 * (TL_QUEUE + TL_MAX_LANES)];
     fragment_list fragments;
 } exact_state;
 
 /* TL_LANES triangles, turned so that their areas are positive. */
 typedef struct {
     vd x[3], y[3];
-    tl_test test;          /* a constant where the sink is */
-    vd sample_x, sample_y; /* the first sample of the box, in the picture; of squares the upper left corner */
-    vf e[3], dx[3], dy[3]; /* edge functions there, and what a row adds and a column subtracts */
-    vf xy;                 /* X * Y */
-    vi sample;             /* the first sample: row * stride_px + column */
-    vm live;               /* of those that are there, the ones with an area, and that are not culled */
-    vm turned;             /* corners 1 and 2 have changed places */
-    vm on_grid;            /* e, dx and dy are exact, in units of their own */
+    tl_test test;                  /* a constant where the sink is */
+    vd sample_x, sample_y;         /* the first sample of the box, in the picture; of squares the upper left corner */
+    vf e[3], dx[3], dy[3];         /* edge functions there, and what a row adds and a column subtracts */
+    vf xy;                         /* X * Y */
+    vi sample;                     /* the first sample: row * stride_px + column */
+    vd area;                       /* twice the area, before the turn */
+    int32_t corners[3 * TL_LANES]; /* vertices, before the turn */
+    vm live;                       /* of those that are there, the ones with an area, and that are not culled */
+    vm turned;                     /* corners 1 and 2 have changed places */
+    vm on_grid;                    /* e, dx and dy are exact, in units of their own */
 } lane_exact;
 
 /* z = (z0 + slope_y * (y - y0)) + slope_x * (x - x0), in pixels from corner 0. */
 typedef struct {
     vd z0, slope_x, slope_y;
 } exact_planes;
-
-TL_INLINE exact_point point_of(const tl_exact_points *points, int32_t i)
-{
-    const double *p = points->points + (int64_t)i * points->stride;
-    return (exact_point){p[0], p[1]};
-}
 
 /* The corners of a triangle that is turned, or not. */
 TL_INLINE void load_turned(const exact_state *s, int32_t id, int is_turned, exact_point *p)
@@ -125,7 +124,7 @@ TL_INLINE void turn_lanes(const exact_state *s, const int32_t *ids, lane_exact *
     const vd left = vd_mul(x1, y2), right = vd_mul(y1, x2), zero = vd_set1(0.0);
     const vd size = vd_add(vd_abs(left), vd_abs(right));
     const vd bound = vd_max(vd_mul(size, vd_set1(0x1p-51)), vd_set1(1e-280));
-    const vd area = vd_sub(left, right);
+    const vd area = t->area = vd_sub(left, right);
     const vm positive = vd_ge(area, bound), negative = vd_ge(vd_sub(zero, area), bound);
     const unsigned doubted = vm_bits(vm_and_not(t->live, vm_or(positive, negative)));
     t->turned = negative;
@@ -253,17 +252,35 @@ TL_INLINE tl_test test_of(const exact_state *s, tl_sink sink)
     return sink == TL_SINK_MASK || sink == TL_SINK_COUNT ? s->window->test : TL_TEST_SAMPLE;
 }
 
+/* Whether a plane gives depth: not to slivers, nor where products leave the range of float64. */
+#define TL_LEAST_BOX 1e-250
+#define TL_MOST_EXTENT 1e120
+
+/* Puts by what lanes could draw but for the depth; as plane_of_points, of which the extents of lanes are in range. */
+TL_INLINE void take_out_slivers(exact_state *s, const exact_queue *queue, int i, lane_exact *t)
+{
+    const vd width = vd_sub(vd_max(vd_max(t->x[0], t->x[1]), t->x[2]), vd_min(vd_min(t->x[0], t->x[1]), t->x[2]));
+    const vd height = vd_sub(vd_max(vd_max(t->y[0], t->y[1]), t->y[2]), vd_min(vd_min(t->y[0], t->y[1]), t->y[2]));
+    const vd box = vd_mul(width, height), scaled = vd_mul(vd_abs(t->area), vd_set1((double)(1 << TL_SLIVER_BITS)));
+    const vm has_plane = vm_and(vd_ge(scaled, box), vd_ge(box, vd_set1(TL_LEAST_BOX)));
+    const vm slivers = vm_and_not(t->live, has_plane);
+    if (__builtin_expect(vm_any(slivers), 0)) {
+        vi_compress(s->slivers + s->n_slivers, slivers, vi_load(queue->boxes.id + i));
+        s->n_slivers += __builtin_popcount(vm_bits(slivers));
+        t->live = vm_and(t->live, has_plane);
+    }
+}
+
 /* The triangles [i, i + TL_LANES) of a queue, turned and with edge functions. */
 TL_INLINE void pop_exact(exact_state *s, tl_sink sink, const exact_queue *queue, int i, lane_exact *t)
 {
     const box_queue *q = &queue->boxes;
     const int n = q->n;
-    int32_t corners[3 * TL_LANES];
     for (int k = 0; k < TL_LANES; k++) /* lanes behind the end repeat the last triangle */
-        memcpy(corners + 3 * k, s->mesh->triangles + 3 * (int64_t)q->id[i + k < n ? i + k : n - 1],
-               3 * sizeof *corners);
+        memcpy(t->corners + 3 * k, s->mesh->triangles + 3 * (int64_t)q->id[i + k < n ? i + k : n - 1],
+               3 * sizeof *t->corners);
     for (int k = 0; k < 3; k++)
-        vd_load_pairs(s->points->points, s->points->stride, corners + k, &t->x[k], &t->y[k]);
+        vd_load_pairs(s->points->points, s->points->stride, t->corners + k, &t->x[k], &t->y[k]);
     const vi col = vi_load(q->col + i), row = vi_load(q->row + i);
     t->sample_x = vd_add(vd_from_vi(col), vd_set1(s->centre_x));
     t->sample_y = vd_add(vd_from_vi(row), vd_set1(s->centre_y));
@@ -274,6 +291,8 @@ TL_INLINE void pop_exact(exact_state *s, tl_sink sink, const exact_queue *queue,
     t->xy = vf_mul(vf_load(queue->xy + i), vf_set1((float)s->points->band));
     t->on_grid = vm_first(0);
     turn_lanes(s, q->id + i, t);
+    if (sink_has_depth(sink))
+        take_out_slivers(s, queue, i, t);
     const vm good = s->may_be_on_grid ? find_on_grid(t) : vm_first(0);
     if (!s->may_be_on_grid || vm_any(vm_and_not(vm_all(), good)))
         set_float_edges(t);
@@ -287,20 +306,14 @@ TL_INLINE void pop_exact(exact_state *s, tl_sink sink, const exact_queue *queue,
 }
 
 /* The depth planes.  The same operations as plane_of_points in alone_exact.c. */
-TL_INLINE exact_planes plane_of_lanes(const exact_state *s, const exact_queue *queue, int i, const lane_exact *t)
+TL_INLINE exact_planes plane_of_lanes(const exact_state *s, const lane_exact *t)
 {
     exact_planes p = {vd_set1(0.0), vd_set1(0.0), vd_set1(0.0)};
     if (s->points->stride < 3)
         return p;
-    const box_queue *q = &queue->boxes;
-    const int n = q->n;
-    int32_t corners[3 * TL_LANES];
     vd z[3];
-    for (int k = 0; k < TL_LANES; k++)
-        memcpy(corners + 3 * k, s->mesh->triangles + 3 * (int64_t)q->id[i + k < n ? i + k : n - 1],
-               3 * sizeof *corners);
     for (int k = 0; k < 3; k++)
-        z[k] = vd_load_singles(s->points->points + 2, s->points->stride, corners + k);
+        z[k] = vd_load_singles(s->points->points + 2, s->points->stride, t->corners + k);
     const vd z1 = vd_select(t->turned, z[2], z[1]), z2 = vd_select(t->turned, z[1], z[2]);
     const vd x1 = vd_sub(t->x[1], t->x[0]), y1 = vd_sub(t->y[1], t->y[0]);
     const vd x2 = vd_sub(t->x[2], t->x[0]), y2 = vd_sub(t->y[2], t->y[0]);

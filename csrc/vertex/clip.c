@@ -202,6 +202,11 @@ static void clip(const tl_source *source, const tl_vertex *vertices, const int32
 static inline int is_clipped(const tl_vertex_set *set, const int32_t *corners)
 {
     int clipped = 0;
+    if (set->exact) {
+        for (int k = 0; k < 3; k++)
+            clipped |= isnan(set->exact->points[(int64_t)corners[k] * set->exact->stride]);
+        return clipped;
+    }
     for (int k = 0; k < 3; k++)
         clipped |= set->vertices[corners[k]].x_fx == TL_SPECIAL && set->vertices[corners[k]].y_fx == TL_CLIPPED;
     return clipped;
@@ -210,7 +215,8 @@ static inline int is_clipped(const tl_vertex_set *set, const int32_t *corners)
 /* The vertices of the pieces, seen from the same sample. */
 static tl_vertex_set piece_set(const tl_pieces *p, const tl_vertex_set *mesh)
 {
-    return (tl_vertex_set){p->vertices, p->wide, p->inv_w, NULL, p->n_vertices, mesh->sample_x_fx, mesh->sample_y_fx};
+    return (tl_vertex_set){p->vertices,   p->wide,           p->inv_w,          NULL,
+                           p->n_vertices, mesh->sample_x_fx, mesh->sample_y_fx, NULL};
 }
 
 /* First piece of a triangle, by bisection in the ascending sources. */

@@ -34,11 +34,11 @@ __all__ = [
 
 NO_SNAP = "exact"
 
-PRODUCTION: dict[str, tuple[str, int]] = {
+PRODUCTION: dict[str, tuple[str, int | str]] = {
     "auto": ("auto", 8), "edge": ("edge", 8), "scanline": ("scanline", 8),
-    "auto, 0 bits": ("auto", 0), "auto, 16 bits": ("auto", 16),
+    "auto, 0 bits": ("auto", 0), "auto, 16 bits": ("auto", 16), "auto, exact": ("auto", NO_SNAP),
 }  # fmt: skip
-"""The engine's rows: method and sub-pixel bits."""
+"""The engine's rows: method and sub-pixel bits, or NO_SNAP."""
 
 
 class FaultyPixels(NamedTuple):
@@ -95,7 +95,7 @@ class Entry:
 
 def entries() -> list[Entry]:
     """Every way to fill: the engine at three precisions, by both walkers and without a snap, every classic."""
-    production = [Entry(name, *what) for name, what in PRODUCTION.items()] + [Entry("auto, exact", "auto", NO_SNAP)]
+    production = [Entry(name, *what) for name, what in PRODUCTION.items()]
     return production + [Entry(name, name) for name in CLASSICS if not name.endswith("/wireframe")]
 
 

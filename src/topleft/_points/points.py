@@ -169,7 +169,7 @@ def points(
            [ 0,  0,  0, -1,  1, -1],
            [ 0,  0,  0, -1, -1, -1]], dtype=int32)
     """
-    checked = View.parse(size, view)
+    checked = View.parse(size, view, why_snapped="the corners of points lie on the grid")
     refuse_many(checked, "points")
     refuse_classic(checked, "points")
     if checked.cull:

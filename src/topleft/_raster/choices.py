@@ -176,7 +176,8 @@ def is_shared(view: View, n_triangles: int, n_parts: int, sink: Sink) -> bool:
     """Tell whether each thread is to take a share of the triangles instead of setting up all of them."""
     pays = n_triangles * n_parts >= MIN_TRIANGLES_TO_SHARE
     fits_lanes = sink is not Sink.SAMPLES or view.grid_bits <= 8
-    return n_parts > 1 and pays and fits_lanes and can_share(view)
+    shares = takes_lanes(view) if view.is_exact else can_share(view)
+    return n_parts > 1 and pays and fits_lanes and shares
 
 
 def fragment_sink(test: DepthTest | None, *, has_depth: bool) -> Sink:

@@ -431,7 +431,7 @@ class Fragments:
 
     def _snapped_with(self, *triangles: NDArray[np.int32]) -> _engine.SnappedMesh:
         """Return the triangles that show and these, snapped; maybe the others too."""
-        if isinstance(self._snapped_or_maker, (_engine.SnappedMesh, _engine.ExactMesh)):
+        if isinstance(self._snapped_or_maker, _engine.SnappedMesh):
             return self._snapped_or_maker
         return self._snapped_or_maker(self.id, *triangles)
 

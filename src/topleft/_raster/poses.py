@@ -217,7 +217,7 @@ def draw_batch(
     ValueError, TypeError, IndexError
         As `rasterize`.
     """
-    view = View.parse(size, options, takes_exact=True)
+    view = View.parse(size, options)
     refuse_many(view, "rasterize")
     asked = Asked.parse(depth_test, background_depth, out)
     (width, height), n_samples = view.size, view.sampling.n_samples
