@@ -95,6 +95,18 @@ class ClusteredMesh:
         n_others, _, n_drawn = clusters.engine.draw(empty, self._own, seen, may_be_hidden, *place, is_first, is_last)
         return others[:n_others].copy(), n_drawn
 
+    def draw_meshlets(self, memory: Memory, target: _engine.Target, n_parts: int) -> bool:
+        """Clear a target and draw the mesh from meshlets, as `draw_clustered` does from clusters."""
+        (width, height), clusters = self._view.size, self.clusters
+        is_farthest = target.sink == Sink.FARTHEST
+        seen = clusters.seen_in(self._exact, self._empty, 0, height, width, is_farthest=is_farthest)
+        meshlets = clusters.meshlets
+        drawn = _engine.MeshletPass(meshlets.engine, self._empty, self._own, seen, target)
+        parts = meshlets.draw(memory, drawn, clusters.n_triangles, height, n_parts, is_first=True)
+        if not any(map(len, parts)):
+            return True
+        return draw_others([memory] * n_parts, self, np.unique(np.concatenate(parts)), target, height, (0, 0))
+
     def part(self, *triangles: NDArray[np.int32]) -> _engine.SnappedMesh:
         """Return the mesh with what some triangles use snapped, maybe more; -1 is no triangle."""
         points, own, view = self.clusters.points, self.clusters.triangles, self._view

@@ -5,6 +5,7 @@ In: the vertices and triangles of a mesh in object space, then a view of it. Out
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from topleft import _engine
 from topleft._base.arrays import bad_triangle
 from topleft._base.threads import count_threads, run_parts
+from topleft._raster.meshlets import Meshlets
 
 __all__ = ["Backoff", "Clusters", "Survey", "check_rows"]
 
@@ -95,8 +97,14 @@ class Clusters:
 
         run_parts(measure, len(group_boxes), count_threads(threads, n_triangles))
         self.engine = _engine.Clustered(records, group_boxes, own_corners, order)
+        self.order = order
         arrays = self.own_points, records, group_boxes, own_corners, order
         self._n_bytes = sum(array.nbytes for array in arrays)
+
+    @cached_property
+    def meshlets(self) -> Meshlets:
+        """The same triangles in meshlets, made when they are first asked for."""
+        return Meshlets(self)
 
     def __len__(self) -> int:
         return len(self.engine)

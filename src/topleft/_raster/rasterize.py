@@ -316,6 +316,8 @@ def draw_samples(memory: Memory, snapped: Snapped, view: View, asked: Asked, dra
 ROUTES = {Route.LABELS: draw_labels, Route.FLAT: draw_flat, Route.DEPTH: draw_depth, Route.SAMPLES: draw_samples}
 
 
+import os
+MESHLETS = int(os.environ.get("MESHLETS", "1"))
 def draw_clusters(memory: Memory, vertices: ArrayLike, view: View, asked: Asked) -> Fragments | None:
     """Draw a mesh that the plan has in clusters.
 
@@ -336,7 +338,10 @@ def draw_clusters(memory: Memory, vertices: ArrayLike, view: View, asked: Asked)
         n_threads = count_threads(view.threads, clusters.n_triangles)
         memories = [memory] if n_threads == 1 else [FRESH] * n_threads
         target = _engine.Target(sink, ids_canvas, depth_canvas, None)
-        if not draw_clustered(memories, [seen], target, view.size[1]):
+        if MESHLETS and _engine.has_meshlets() and view.cull:
+            if not seen.draw_meshlets(memory, target, n_threads):
+                return None
+        elif not draw_clustered(memories, [seen], target, view.size[1]):
             return None
         lay_background(ids_canvas, depth_canvas, sink, asked)
     view.mark("draw")
