@@ -30,7 +30,7 @@ static __attribute__((noinline)) void draw_with_care(meshlet_batch *s, const tl_
     source.data = points, source.n = TL_MESHLET_VERTICES + TAIL;
     pass->kernels->project(&source, 0, TL_MESHLET_VERTICES, pass->view, vertices, NULL);
     for (int i = 0; i < TL_MESHLET_ROOM; i++) {
-        if (!(which[i >> 6] >> (i & 63) & 1))
+        if (!(which[i >> 6] >> (i & 63) & 1) || m->corners[0][i] == m->corners[1][i]) /* or an empty one */
             continue;
         int is_special = 0;
         for (int k = 0; k < 3; k++) {

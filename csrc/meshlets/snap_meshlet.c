@@ -6,6 +6,7 @@
 
 #include <math.h>
 #include <stdint.h>
+#include <string.h>
 
 #include "lanes/halves.h"
 #include "lanes/lanes.h"
@@ -92,10 +93,11 @@ TL_INLINE vi snap_slot(meshlet_batch *s, meshlet_slot *slot, int is_wide)
         const int32_t x = (int32_t)x_exact, y = (int32_t)y_exact;
         const int32_t x_px = (int32_t)((uint32_t)x << s->fine_bits), y_px = (int32_t)((uint32_t)y << s->fine_bits);
         any = vi_or(any, vi_set1(x | y));
+        const uint32_t pair = (uint32_t)x_px | (uint32_t)y_px << 16;
         if (is_wide)
             s->wide_x[i] = x_px, s->wide_y[i] = y_px;
-        else
-            ((int32_t *)slot->pairs)[i] = (int32_t)((uint32_t)x_px | (uint32_t)y_px << 16);
+        else /* compilers take int32_t for no part of a vector */
+            memcpy((char *)slot->pairs + sizeof pair * (size_t)i, &pair, sizeof pair);
     }
     return any;
 }

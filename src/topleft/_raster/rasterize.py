@@ -316,8 +316,6 @@ def draw_samples(memory: Memory, snapped: Snapped, view: View, asked: Asked, dra
 ROUTES = {Route.LABELS: draw_labels, Route.FLAT: draw_flat, Route.DEPTH: draw_depth, Route.SAMPLES: draw_samples}
 
 
-import os
-MESHLETS = int(os.environ.get("MESHLETS", "1"))
 def draw_clusters(memory: Memory, vertices: ArrayLike, view: View, asked: Asked) -> Fragments | None:
     """Draw a mesh that the plan has in clusters.
 
@@ -330,7 +328,10 @@ def draw_clusters(memory: Memory, vertices: ArrayLike, view: View, asked: Asked)
     if clusters is None or not clusters.backoff.is_over():
         return None
     seen = ClusteredMesh(clusters, view)
-    pays = choices.pays_to_draw_clusters(view, clusters.n_triangles, seen.survey)
+    found = seen.survey()
+    has_meshlets = choices.can_draw_meshlets(view, sink, clusters.points.dtype)
+    has_meshlets = has_meshlets and choices.pays_to_draw_meshlets(clusters.n_triangles, found)
+    pays = has_meshlets or choices.pays_to_draw_clusters(view, clusters.n_triangles, lambda: found)
     clusters.backoff.note(pays=pays)
     if not pays:
         return None
@@ -338,10 +339,11 @@ def draw_clusters(memory: Memory, vertices: ArrayLike, view: View, asked: Asked)
         n_threads = count_threads(view.threads, clusters.n_triangles)
         memories = [memory] if n_threads == 1 else [FRESH] * n_threads
         target = _engine.Target(sink, ids_canvas, depth_canvas, None)
-        if MESHLETS and _engine.has_meshlets() and view.cull:
-            if not seen.draw_meshlets(memory, target, n_threads):
-                return None
-        elif not draw_clustered(memories, [seen], target, view.size[1]):
+        if not (
+            seen.draw_meshlets(memory, target, n_threads)
+            if has_meshlets
+            else draw_clustered(memories, [seen], target, view.size[1])
+        ):
             return None
         lay_background(ids_canvas, depth_canvas, sink, asked)
     view.mark("draw")
