@@ -79,10 +79,7 @@ static int cpu_has_avx512(void)
 #ifdef TL_HAVE_VBMI
 extern const tl_meshlet_kernels tl_meshlets_vbmi;
 
-static int cpu_has_vbmi(void)
-{
-    return __builtin_cpu_supports("avx512vbmi") && __builtin_cpu_supports("avx512vbmi2");
-}
+static int cpu_has_vbmi(void) { return __builtin_cpu_supports("avx512vbmi") && __builtin_cpu_supports("avx512vbmi2"); }
 #endif
 
 const tl_meshlet_kernels *tl_meshlets_beside(const tl_kernels *kernels)

@@ -1,5 +1,5 @@
-/* Meshlets: what a mesh of float32 vertices is grown into where bytes can be permuted, and what drawing them needs.  Part
- * of the contract of topleft.h, which includes it behind the types that it uses. */
+/* Meshlets: what a mesh of float32 vertices is grown into where bytes can be permuted, and what drawing them needs.
+ * Part of the contract of topleft.h, which includes it behind the types that it uses. */
 #include "topleft.h" /* before the guard: it includes this file behind its types */
 
 #ifndef TOPLEFT_MESHLETS_H
@@ -37,9 +37,9 @@ enum {
 #define TL_GROW_PIECE 65536
 #define TL_GROW_ROOM (TL_GROW_PIECE * 105 + 64)
 
-#define TL_SLOT_PX 128 /* a side of the window that vertices of a meshlet are measured from */
+#define TL_SLOT_PX 128        /* a side of the window that vertices of a meshlet are measured from */
 #define TL_MAX_DRAWN_PX 16384 /* a side of the window */
-#define TL_MESHLET_TAIL 16 /* bounds and counts that must be readable behind the last */
+#define TL_MESHLET_TAIL 16    /* bounds and counts that must be readable behind the last */
 
 typedef struct {
     const tl_meshlet *meshlets;
@@ -65,8 +65,8 @@ typedef struct {
     const tl_source *source; /* its matrix; no vertices */
     const tl_view *view;
     const tl_window *window;
-    const tl_target *target;     /* NEAREST, FARTHEST */
-    const tl_kernels *kernels;   /* what draws triangles that are large, or need care */
+    const tl_target *target;   /* NEAREST, FARTHEST */
+    const tl_kernels *kernels; /* what draws triangles that are large, or need care */
     int32_t first_id;
 } tl_meshlet_pass;
 
@@ -82,8 +82,8 @@ typedef struct {
     int64_t (*list)(const tl_meshlet_pass *pass, int64_t first, int64_t end, tl_seen_meshlet *seen, int32_t *odd,
                     int64_t *n_odd);
 
-    /* Draws what is listed of rows [row0, row1) of the window, cleared first if `is_first`.  `others`, a number for each
-     * triangle, gets those that clip planes may cut, or that 64 bits cannot hold; returns how many. */
+    /* Draws what is listed of rows [row0, row1) of the window, cleared first if `is_first`.  `others`, a number for
+     * each triangle, gets those that clip planes may cut, or that 64 bits cannot hold; returns how many. */
     int64_t (*draw)(const tl_meshlet_pass *pass, const tl_seen_meshlet *seen, int64_t n_seen, const int32_t *odd,
                     int64_t n_odd, int32_t row0, int32_t row1, int is_first, tl_seen_meshlet *sorted, int32_t *others);
 } tl_meshlet_kernels;

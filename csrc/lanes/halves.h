@@ -72,9 +72,8 @@ TL_INLINE vi vh_pick_of(vi a, vi i, vi b) { return _mm512_permutex2var_epi16(a, 
 /* the low and the high halves of 32 lanes */
 TL_INLINE void vh_part(vi a, vi b, vi *low, vi *high)
 {
-    const vi even =
-        _mm512_set_epi16(62, 60, 58, 56, 54, 52, 50, 48, 46, 44, 42, 40, 38, 36, 34, 32, 30, 28, 26, 24, 22, 20, 18, 16,
-                         14, 12, 10, 8, 6, 4, 2, 0);
+    const vi even = _mm512_set_epi16(62, 60, 58, 56, 54, 52, 50, 48, 46, 44, 42, 40, 38, 36, 34, 32, 30, 28, 26, 24, 22,
+                                     20, 18, 16, 14, 12, 10, 8, 6, 4, 2, 0);
     *low = _mm512_permutex2var_epi16(a, even, b);
     *high = _mm512_permutex2var_epi16(a, _mm512_add_epi16(even, _mm512_set1_epi16(1)), b);
 }

@@ -1,5 +1,5 @@
-/* Triangles of meshlets that lanes of 16 bits do not draw: large ones, slivers, and all of a meshlet that near or far may
- * cut, or that is very close to the eye.
+/* Triangles of meshlets that lanes of 16 bits do not draw: large ones, slivers, and all of a meshlet that near or far
+ * may cut, or that is very close to the eye.
  * In: a meshlet and a bit for each of its triangles.  Out: the target's buffers, by the kernels that draw any mesh; the
  * names of triangles with special corners. */
 #ifndef TL_CARE_C

@@ -1,8 +1,8 @@
 /* Draws meshlets: from the list of those that a view shows to ids and depths, band by band, a batch at a time.
  * In: meshlets, a view, the list.  Out: the target's buffers; the names of triangles that are still to be drawn.
  *
- * The window is cleared 64 rows at a time from the top, and a meshlet is drawn as soon as all of its rows are clear: its
- * part of the buffers is still in the second-level cache then.  The blocks of meshlets to come are prefetched. */
+ * The window is cleared 64 rows at a time from the top, and a meshlet is drawn as soon as all of its rows are clear:
+ * its part of the buffers is still in the second-level cache then.  The blocks of meshlets to come are prefetched. */
 #ifndef TL_DRAW_MESHLETS_C
 #define TL_DRAW_MESHLETS_C
 

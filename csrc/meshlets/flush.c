@@ -1,5 +1,7 @@
-/* Draws the queues of a meshlet: boxes up to 4x4 sample by sample, larger ones by rows, both triangles of a pair at once.
- * In: queues of triangles, their corners as pairs from the first sample.  Out: samples in the list, or in the buffers. */
+/* Draws the queues of a meshlet: boxes up to 4x4 sample by sample, larger ones by rows, both triangles of a pair at
+ * once.
+ * In: queues of triangles, their corners as pairs from the first sample.  Out: samples in the list, or in the
+ * buffers. */
 #ifndef TL_FLUSH_C
 #define TL_FLUSH_C
 
@@ -32,7 +34,8 @@ TL_INLINE vi less_side_bias(vi e, vi dx, vi dy)
 TL_INLINE queued_lanes load_queued(meshlet_slot *slot, const lane_queue *q, int i)
 {
     const vi v[3] = {vi_load(q->v0 + i), vi_load(q->v1 + i), vi_load(q->v2 + i)};
-    queued_lanes t = {.sample = vi_load(q->sample + i), .size = vi_load(q->size + i), .triangle = vi_load(q->triangle + i)};
+    queued_lanes t = {
+        .sample = vi_load(q->sample + i), .size = vi_load(q->size + i), .triangle = vi_load(q->triangle + i)};
     t.live = vm_and(vm_first(q->n - i), vi_any_bit(t.size, t.size));
     t.live = vm_and_not(t.live, leave_slivers(slot, v, t.live, t.triangle));
     for (int k = 0; k < 3; k++) {
@@ -54,7 +57,8 @@ static __attribute__((noinline)) void flush_small_boxes(meshlet_batch *s, meshle
     for (int i = 0; i < q->n; i += TL_LANES) {
         queued_lanes t = load_queued(slot, q, i);
         lane_plane *plane = &t.plane;
-        const vi n_cols = vi_low_half(t.size), n_rows = vi_high_half(t.size), name = vi_add(t.triangle, vi_set1(slot->name0));
+        const vi n_cols = vi_low_half(t.size), n_rows = vi_high_half(t.size),
+                 name = vi_add(t.triangle, vi_set1(slot->name0));
         vd z_col[TL_SMALL_PX];
         for (int col = 0; col < TL_SMALL_PX; col++) {
             z_col[col] = vd_mul(plane->slope_x, plane->x);
@@ -107,9 +111,9 @@ TL_INLINE row_sides find_sides(const queued_lanes *t)
         dx[k] = vf_from_vi(t->dx[k]);
         inverse[k] = vf_div(vf_set1(1.0f), vf_from_vi(vi_max(vi_abs(t->dy[k]), vi_set1(1))));
     }
-    const vm middle0 = (vm)~(left[0] | right[0]);
-    const vm middle1 = (vm)~((left[1] & ~left[0]) | (right[1] & ~right[0]) | middle0);
-    const vm middle2 = (vm)~(middle0 | middle1);
+    const vm middle0 = (vm) ~(left[0] | right[0]);
+    const vm middle1 = (vm) ~((left[1] & ~left[0]) | (right[1] & ~right[0]) | middle0);
+    const vm middle2 = (vm) ~(middle0 | middle1);
     const vm first[3] = {left[0], right[0], middle0}, second[3] = {left[1], right[1], middle1};
     row_sides r;
     for (int k = 0; k < 3; k++) {
@@ -211,8 +215,8 @@ TL_INLINE void find_long_rows(const long_rows *r, int k, int first, vi *begin, v
     const vf row = vf_add(vf_from_vi(vi_iota()), vf_set1((float)first));
     vi end[3];
     for (int j = 0; j < 3; j++)
-        end[j] = vi_floor(vf_mul(vf_add(vf_set1(r->start[j][k]), vf_mul(vf_set1(r->dx[j][k]), row)),
-                                 vf_set1(r->inverse[j][k])));
+        end[j] = vi_floor(
+            vf_mul(vf_add(vf_set1(r->start[j][k]), vf_mul(vf_set1(r->dx[j][k]), row)), vf_set1(r->inverse[j][k])));
     if (vm_bits(r->sides.middle_is_left) >> k & 1)
         end[0] = vi_min(end[0], end[2]);
     if (vm_bits(r->sides.middle_is_right) >> k & 1)
@@ -233,8 +237,8 @@ TL_INLINE vi columns_of(vi begin, vi stop, int first)
 }
 
 /* Rows [first, first + 16) of a pair. */
-TL_INLINE void put_long_rows(meshlet_batch *s, const long_rows *r, int k, int first, int n_cols, int64_t sample, vi ids0,
-                             vi ids1, int is_farthest)
+TL_INLINE void put_long_rows(meshlet_batch *s, const long_rows *r, int k, int first, int n_cols, int64_t sample,
+                             vi ids0, vi ids1, int is_farthest)
 {
     const vd steps = vd_mul(vd_from_vi(vi_iota()), vd_set1(TL_PX));
     vi begin[2], stop[2];

@@ -97,8 +97,8 @@ static void list_round(grow_piece *p)
 typedef struct {
     int32_t number; /* from 1 on, in its piece */
     int n_vertices, n_triangles;
-    int32_t vertices[TL_MESHLET_VERTICES];                           /* of the piece */
-    int n_whole, n_near;                                             /* triangles that lack no vertex, and one */
+    int32_t vertices[TL_MESHLET_VERTICES]; /* of the piece */
+    int n_whole, n_near;                   /* triangles that lack no vertex, and one */
     int32_t whole[TL_MAX_CANDIDATES], near_by[TL_MAX_CANDIDATES];
     float sum[3], area; /* of its vertices, of its triangles */
 } grown_meshlet;

@@ -1,6 +1,6 @@
 /* Which meshlets a view may show: sixteen at a time, in float32.
- * In: bounds of meshlets, a view.  Out: those that are not certain to lie outside or to be turned away, and where in the
- * picture they are; apart from them those for which that is not certain in float32, or that near or far may cut.
+ * In: bounds of meshlets, a view.  Out: those that are not certain to lie outside or to be turned away, and where in
+ * the picture they are; apart from them those for which that is not certain in float32, or that near or far may cut.
  *
  * As in cluster_view.c every test has the errors of the vertex stage, of the snap and of float32 on its far side.
  *
@@ -92,10 +92,10 @@ static lane_view place_view(const tl_meshlet_pass *pass)
 /* The bounds of sixteen meshlets under a view. */
 typedef struct {
     vf bound[TL_N_BOUNDS];
-    vf clip[4];           /* the middle */
-    vf w_min, w_max;      /* over the ball */
-    vf reach[2];          /* sub-pixels that the picture of a vector of length 1 spans at most */
-    vf moved;             /* sub-pixels that the vertex stage and the snap move a corner at most */
+    vf clip[4];      /* the middle */
+    vf w_min, w_max; /* over the ball */
+    vf reach[2];     /* sub-pixels that the picture of a vector of length 1 spans at most */
+    vf moved;        /* sub-pixels that the vertex stage and the snap move a corner at most */
 } lane_bounds;
 
 TL_INLINE vf set(float a) { return vf_set1(a); }
@@ -124,9 +124,9 @@ TL_INLINE void place_bounds(const tl_meshlets *mesh, const lane_view *l, int64_t
         b->bound[k] = vf_load(mesh->bounds + k * stride + i);
     for (int k = 0; k < 4; k++) {
         const float *row = l->row[k];
-        b->clip[k] = vf_fma(set(row[0]), b->bound[TL_BOUND_X],
-                            vf_fma(set(row[1]), b->bound[TL_BOUND_Y],
-                                   vf_fma(set(row[2]), b->bound[TL_BOUND_Z], set(row[3]))));
+        b->clip[k] =
+            vf_fma(set(row[0]), b->bound[TL_BOUND_X],
+                   vf_fma(set(row[1]), b->bound[TL_BOUND_Y], vf_fma(set(row[2]), b->bound[TL_BOUND_Z], set(row[3]))));
     }
     const vf reach_w = vf_mul(b->bound[TL_BOUND_RADIUS], set(l->length[2])), error = set(0x1p-20f * l->terms[3]);
     b->w_min = vf_sub(vf_sub(b->clip[3], reach_w), error);
@@ -137,12 +137,13 @@ TL_INLINE void place_reach(const lane_view *l, vf inverse_w, lane_bounds *b)
 {
     vf moved[2];
     for (int k = 0; k < 2; k++) {
-        const vf largest = vf_mul(
-            vf_add(vf_fma(b->bound[TL_BOUND_RADIUS], set(l->length[k]), vf_abs(b->clip[k])), set(0x1p-20f * l->terms[k])),
-            inverse_w);
-        b->reach[k] = vf_mul(vf_mul(set(1.001f * l->scale[k]), vf_fma(largest, set(l->length[2]), set(l->length[k]))),
-                             inverse_w);
-        moved[k] = vf_mul(set((float)TL_STAGE_ERROR * 1.01f * l->scale[k]), vf_fma(largest, set(l->terms[3]), set(l->terms[k])));
+        const vf largest = vf_mul(vf_add(vf_fma(b->bound[TL_BOUND_RADIUS], set(l->length[k]), vf_abs(b->clip[k])),
+                                         set(0x1p-20f * l->terms[k])),
+                                  inverse_w);
+        b->reach[k] =
+            vf_mul(vf_mul(set(1.001f * l->scale[k]), vf_fma(largest, set(l->length[2]), set(l->length[k]))), inverse_w);
+        moved[k] = vf_mul(set((float)TL_STAGE_ERROR * 1.01f * l->scale[k]),
+                          vf_fma(largest, set(l->terms[3]), set(l->terms[k])));
     }
     b->moved = vf_fma(vf_max(moved[0], moved[1]), inverse_w, set(0.501f));
 }
@@ -204,12 +205,14 @@ static int64_t list_seen(const tl_meshlet_pass *pass, int64_t first, int64_t end
         at[0] = vf_fma(vf_mul(b.clip[0], inverse), set(l.half_px[0]), set(l.origin_px[0]));
         at[1] = vf_fnma(vf_mul(b.clip[1], inverse), set(l.half_px[1]), set(l.origin_px[1]));
         for (int k = 0; k < 2; k++)
-            reach[k] = vf_fma(vf_fma(b.reach[k], b.bound[TL_BOUND_RADIUS], vf_add(b.moved, b.moved)), set(l.pixel), set(2.0f));
+            reach[k] =
+                vf_fma(vf_fma(b.reach[k], b.bound[TL_BOUND_RADIUS], vf_add(b.moved, b.moved)), set(l.pixel), set(2.0f));
         const vf farthest = vf_max(vf_max(vf_abs(at[0]), vf_abs(at[1])), vf_max(reach[0], reach[1]));
         /* NaN, too; a maximum with NaN is the other number, so each is compared */
         vm is_far = vf_not_lt(farthest, set(TL_MAX_PX));
         for (int k = 0; k < 2; k++)
-            is_far = vm_or(is_far, vm_or(vf_not_lt(vf_abs(at[k]), set(TL_MAX_PX)), vf_not_lt(reach[k], set(TL_MAX_PX))));
+            is_far =
+                vm_or(is_far, vm_or(vf_not_lt(vf_abs(at[k]), set(TL_MAX_PX)), vf_not_lt(reach[k], set(TL_MAX_PX))));
         const vm is_odd = vm_and(live, vm_or(vm_and_not(vm_all(), plain), is_far));
         for (unsigned rest = vm_bits(is_odd); rest; rest &= rest - 1)
             odd[(*n_odd)++] = (int32_t)(i + __builtin_ctz(rest));
@@ -220,7 +223,7 @@ static int64_t list_seen(const tl_meshlet_pass *pass, int64_t first, int64_t end
         vi_store(rows, vi_nearest(reach[1]));
         for (unsigned rest = vm_bits(vm_and_not(live, is_odd)); rest; rest &= rest - 1) {
             const int k = __builtin_ctz(rest);
-            seen[n++] = (tl_seen_meshlet){(int32_t)(i + k),  (int16_t)left[k], (int16_t)below[k],
+            seen[n++] = (tl_seen_meshlet){(int32_t)(i + k), (int16_t)left[k], (int16_t)below[k],
                                           (int16_t)cols[k], (int16_t)rows[k], mesh->n_triangles[i + k]};
         }
     }

@@ -15,7 +15,10 @@
 #define TL_INWARDS 0.999999
 #define TL_LEAST_BOUND 1e-30 /* below it float32 would round too coarsely */
 
-static inline void meshlet_point(const tl_meshlet *m, int i, double *p) { p[0] = m->x[i], p[1] = m->y[i], p[2] = m->z[i]; }
+static inline void meshlet_point(const tl_meshlet *m, int i, double *p)
+{
+    p[0] = m->x[i], p[1] = m->y[i], p[2] = m->z[i];
+}
 
 /* The normal of a triangle, as long as twice its area, and its longest side; 0 when two corners are one point: it is
  * never drawn. */

@@ -1,5 +1,5 @@
-/* Pairs the triangles of a meshlet: two that share an edge and lie on its two sides are drawn together, because no pixel
- * is in both.
+/* Pairs the triangles of a meshlet: two that share an edge and lie on its two sides are drawn together, because no
+ * pixel is in both.
  * In: a meshlet whose triangles stand in any order.  Out: triangles 2k and 2k + 1 are a pair. */
 #ifndef TL_PAIR_C
 #define TL_PAIR_C

@@ -10,9 +10,10 @@
 #include "lanes/halves.h"
 #include "lanes/lanes.h"
 #include "meshlets/batch.h"
-#include "raster/setup.c"
 
 #if TL_HAS_HALVES
+
+#define TL_MESHLET_SLIVER_BITS 12 /* TL_SLIVER_BITS of setup.c */
 
 typedef struct {
     vd z0, slope_x, slope_y;
@@ -32,24 +33,31 @@ TL_INLINE lane_plane make_plane(const meshlet_slot *slot, const vi *corner, cons
                         vd_from_vi(vi_sub(zero, vi_signed_low(v[0]))), vd_from_vi(vi_signed_high(v[0]))};
 }
 
+/* Notes the lanes of m for draw_with_care. */
+TL_INLINE void leave_lanes(meshlet_slot *slot, vm m, vi triangle)
+{
+    if (!__builtin_expect(vm_any(m), 0))
+        return;
+    int32_t numbers[TL_LANES];
+    vi_store(numbers, triangle);
+    for (unsigned rest = vm_bits(m); rest; rest &= rest - 1) {
+        const int i = numbers[__builtin_ctz(rest)] & (TL_MESHLET_ROOM - 1);
+        slot->alone[i >> 6] |= 1ull << (i & 63);
+    }
+}
+
 /* Slivers, as setup_plane tells them: their depth is interpolated with exact weights, so they are left for
  * draw_with_care.  Returns which lanes of `live` are. */
 TL_INLINE vm leave_slivers(meshlet_slot *slot, const vi *v, vm live, vi triangle)
 {
-    const vi least = vh_signed_min(vh_signed_min(v[0], v[1]), v[2]), most = vh_signed_max(vh_signed_max(v[0], v[1]), v[2]);
+    const vi least = vh_signed_min(vh_signed_min(v[0], v[1]), v[2]),
+             most = vh_signed_max(vh_signed_max(v[0], v[1]), v[2]);
     const vi extent = vi_sub_halves(most, least), one = vi_set1(1);
     const vi box = vi_mul(vi_low_half(extent), vi_high_half(extent));
     const vi area = edge_at(vi_sub_halves(v[1], v[0]), vi_sub_halves(v[2], v[0]));
     /* box > area * 2^12 */
-    const vm found = vm_and(live, vi_gt(vi_shift_right(vi_sub(box, one), TL_SLIVER_BITS), vi_sub(area, one)));
-    if (__builtin_expect(vm_any(found), 0)) {
-        int32_t numbers[TL_LANES];
-        vi_store(numbers, triangle);
-        for (unsigned rest = vm_bits(found); rest; rest &= rest - 1) {
-            const int i = numbers[__builtin_ctz(rest)] & (TL_MESHLET_ROOM - 1);
-            slot->alone[i >> 6] |= 1ull << (i & 63);
-        }
-    }
+    const vm found = vm_and(live, vi_gt(vi_shift_right(vi_sub(box, one), TL_MESHLET_SLIVER_BITS), vi_sub(area, one)));
+    leave_lanes(slot, found, triangle);
     return found;
 }
 

@@ -9,6 +9,7 @@
 #include "lanes/halves.h"
 #include "lanes/lanes.h"
 #include "meshlets/batch.h"
+#include "meshlets/plane.c"
 #include "meshlets/tiny.c"
 
 #if TL_HAS_HALVES
@@ -96,19 +97,6 @@ TL_INLINE void queue_boxes(meshlet_batch *s, vm m, const lane_boxes *b, int32_t 
     }
 }
 
-/* Notes the lanes of m for draw_with_care. */
-TL_INLINE void leave_lanes(meshlet_slot *slot, vm m, vi triangle)
-{
-    if (!__builtin_expect(vm_any(m), 0))
-        return;
-    int32_t numbers[TL_LANES];
-    vi_store(numbers, triangle);
-    for (unsigned rest = vm_bits(m); rest; rest &= rest - 1) {
-        const int i = numbers[__builtin_ctz(rest)] & (TL_MESHLET_ROOM - 1);
-        slot->alone[i >> 6] |= 1ull << (i & 63);
-    }
-}
-
 /* The larger triangles of a meshlet of 128 x 128 pixels. */
 TL_INLINE void queue_larger(meshlet_batch *s, meshlet_slot *slot)
 {
@@ -119,12 +107,16 @@ TL_INLINE void queue_larger(meshlet_batch *s, meshlet_slot *slot)
         pick_triangles(slot, triangle, v);
         const vi extent = vi_sub_halves(vh_max(vh_max(v[0], v[1]), v[2]), vh_min(vh_min(v[0], v[1]), v[2]));
         const vi first = first_sample(slot, v), last = last_sample(slot, v);
-        lane_boxes b = {.col0 = vi_low_half(first), .col1 = vi_low_half(last), .row0 = vi_high_half(first),
-                        .row1 = vi_high_half(last), .triangle = triangle};
+        lane_boxes b = {.col0 = vi_low_half(first),
+                        .col1 = vi_low_half(last),
+                        .row0 = vi_high_half(first),
+                        .row1 = vi_high_half(last),
+                        .triangle = triangle};
         const vi n_cols = vi_sub(b.col1, b.col0), n_rows = vi_sub(b.row1, b.row0);
         /* those with boxes up to 2x2 have been drawn */
         live = vm_and(live, vm_and(vi_gt(vi_min(n_cols, n_rows), zero), vi_gt(vi_max(n_cols, n_rows), vi_set1(2))));
-        const vm is_large = vm_and(live, vi_gt(vi_max(vi_low_half(extent), vi_high_half(extent)), vi_set1(TL_MAX_LANE_PX * TL_PX)));
+        const vm is_large =
+            vm_and(live, vi_gt(vi_max(vi_low_half(extent), vi_high_half(extent)), vi_set1(TL_MAX_LANE_PX * TL_PX)));
         leave_lanes(slot, is_large, triangle);
         const vi area = edge_at(vi_sub_halves(v[1], v[0]), vi_sub_halves(v[2], v[0]));
         live = vm_and(vm_and_not(live, is_large), vi_gt(area, zero));

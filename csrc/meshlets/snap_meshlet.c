@@ -54,7 +54,8 @@ TL_INLINE vi snap_slot(meshlet_batch *s, meshlet_slot *slot, int is_wide)
     for (int k = 0; k < 4; k++) {
         const vf x = vf_load(m->x + 16 * k), y = vf_load(m->y + 16 * k), z = vf_load(m->z + 16 * k);
         const vf w32 = clip_row(s->matrix + 12, x, y, z);
-        const vd clip_x = vd_from_vf(clip_row(s->matrix, x, y, z)), clip_y = vd_from_vf(clip_row(s->matrix + 4, x, y, z));
+        const vd clip_x = vd_from_vf(clip_row(s->matrix, x, y, z)),
+                 clip_y = vd_from_vf(clip_row(s->matrix + 4, x, y, z));
         const vd clip_z = vd_from_vf(clip_row(s->matrix + 8, x, y, z)), w = vd_from_vf(w32);
         vd inverse = vd_from_vf(vf_div(vf_set1(1.0f), w32));
         inverse = vd_fma(inverse, vd_fnma(w, inverse, one), inverse); /* 1/w to 2^-47 */
@@ -72,8 +73,8 @@ TL_INLINE vi snap_slot(meshlet_batch *s, meshlet_slot *slot, int is_wide)
         any = vi_or_three(any, x_fx, y_fx);
         if (is_wide) { /* within 2^19, shifted: there the words mean what they should, and areas fit */
             const vi reach = vi_set1(1 << 19 >> s->fine_bits), range = vi_set1((1 << 20 >> s->fine_bits) - 1);
-            s->is_too_far |= vm_any(vm_or(vi_gt_unsigned(vi_add(x_fx, reach), range),
-                                          vi_gt_unsigned(vi_add(y_fx, reach), range)));
+            s->is_too_far |=
+                vm_any(vm_or(vi_gt_unsigned(vi_add(x_fx, reach), range), vi_gt_unsigned(vi_add(y_fx, reach), range)));
         }
         x_fx = vi_shift_left(x_fx, s->fine_bits), y_fx = vi_shift_left(y_fx, s->fine_bits);
         if (is_wide)

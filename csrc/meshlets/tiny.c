@@ -1,5 +1,5 @@
-/* Tiny triangles of a batch of meshlets: which hold a sample, which samples they cover, their depths.  A stage runs over
- * all meshlets of the batch before the next one begins: what ends a loop has long been known then.
+/* Tiny triangles of a batch of meshlets: which hold a sample, which samples they cover, their depths.  A stage runs
+ * over all meshlets of the batch before the next one begins: what ends a loop has long been known then.
  * In: meshlets with snapped vertices.  Out: samples of triangles with boxes up to 2x2 in the list; the numbers of those
  * with larger ones.
  *
@@ -94,7 +94,7 @@ TL_INLINE void pick_triangles(const meshlet_slot *slot, vi triangle, vi *v)
         v[k] = pick_pairs(slot, corner[k]);
 }
 
-/* Edge functions at a sample, as pair; less one where a zero lies outside.  `from_sample`: corners as seen from there. */
+/* Edge functions at a sample, a pair; less one where a zero lies outside.  `from_sample`: corners seen from there. */
 TL_INLINE void edges_at(const vi *v, vi sample, vi *from_sample, vi *e)
 {
     const vi at = place_of_sample(sample);
@@ -152,8 +152,10 @@ static __attribute__((noinline)) void cover_tiny(meshlet_batch *s)
         }
         const vm has_right = vi_any_bit(size, vi_set1(2)), has_above = vi_any_bit(size, vi_set1(2 << 16));
         vi bits = vi_select(vi_none_negative(e[0], e[1], e[2]), vi_set1(1), zero);
-        bits = vi_select(vm_and(vi_none_negative(right[0], right[1], right[2]), has_right), vi_or(bits, vi_set1(2)), bits);
-        bits = vi_select(vm_and(vi_none_negative(above[0], above[1], above[2]), has_above), vi_or(bits, vi_set1(4)), bits);
+        bits =
+            vi_select(vm_and(vi_none_negative(right[0], right[1], right[2]), has_right), vi_or(bits, vi_set1(2)), bits);
+        bits =
+            vi_select(vm_and(vi_none_negative(above[0], above[1], above[2]), has_above), vi_or(bits, vi_set1(4)), bits);
         bits = vi_select(vm_and(vi_none_negative(both[0], both[1], both[2]), vm_and(has_right, has_above)),
                          vi_or(bits, vi_set1(8)), bits);
         const vm any = vm_and(live, vi_any_bit(bits, bits));
@@ -167,8 +169,7 @@ static __attribute__((noinline)) void cover_tiny(meshlet_batch *s)
 static __attribute__((noinline)) void list_covered(meshlet_batch *s)
 {
     /* the lowest bit that is set -> column | row << 16 */
-    static const int32_t offsets[16] = {0,       0, 1, 0, 0x10000, 0, 1, 0,
-                                        0x10001, 0, 1, 0, 0x10000, 0, 1, 0};
+    static const int32_t offsets[16] = {0, 0, 1, 0, 0x10000, 0, 1, 0, 0x10001, 0, 1, 0, 0x10000, 0, 1, 0};
     const vi step = vi_set1((int32_t)((uint32_t)-s->stride_px << 16 | 1)), one = vi_set1(1);
     vector_list list = {.n = 0};
     for (int j = 0; j < s->n_slots; j++)
@@ -190,8 +191,9 @@ static __attribute__((noinline)) void list_covered(meshlet_batch *s)
             const vi offset = vi_lookup(offsets, bits);
             const vd x = vd_add(plane.x, vd_from_vi(vi_shift_left(vi_and(offset, one), TL_PX_BITS)));
             const vd y = vd_sub(plane.y, vd_from_vi(vi_shift_left(vi_high_half(offset), TL_PX_BITS)));
-            const vf depth = vf_add(vf_from_vd(vd_add(vd_add(plane.z0, vd_mul(plane.slope_y, y)), vd_mul(plane.slope_x, x))),
-                                    vf_set1(0.0f));
+            const vf depth =
+                vf_add(vf_from_vd(vd_add(vd_add(plane.z0, vd_mul(plane.slope_y, y)), vd_mul(plane.slope_x, x))),
+                       vf_set1(0.0f));
             const vi place = vi_add(vi_dot_pairs(vi_add_halves(sample, offset), step), vi_set1(slot->base));
             add_fragments(s, live, place, name, depth);
             bits = vi_and(bits, vi_sub(bits, one));

@@ -13,21 +13,21 @@
 #if TL_HAS_HALVES
 
 /* A copy of a function for each sink. */
-#define TL_DEPTH_COPIES(f, declared, ...)                                                    \
-    static __attribute__((noinline)) void f##_nearest declared { f(__VA_ARGS__, 0); }  \
+#define TL_DEPTH_COPIES(f, declared, ...)                                             \
+    static __attribute__((noinline)) void f##_nearest declared { f(__VA_ARGS__, 0); } \
     static __attribute__((noinline)) void f##_farthest declared { f(__VA_ARGS__, 1); }
 
 /* A row of lanes, whole or half. */
-#define TL_PUT_ROW(NAME, M, F, I, P)                                                                        \
-    TL_INLINE void NAME(const meshlet_batch *s, int64_t at, M m, F depth, I id, int is_farthest)            \
-    {                                                                                                       \
-        const F old = P##f_load_masked(m, s->depth + at);                                                   \
-        const M equal = P##m_and(m, P##f_eq(depth, old));                                                   \
-        M wins = P##m_and(m, is_farthest ? P##f_lt(old, depth) : P##f_lt(depth, old));                      \
-        if (__builtin_expect(P##m_any(equal), 0))                                                           \
-            wins = P##m_or(wins, P##m_and(equal, P##i_gt(P##i_load_masked(equal, s->ids + at), id)));       \
-        P##f_store_masked(s->depth + at, wins, depth);                                                      \
-        P##i_store_masked(s->ids + at, wins, id);                                                           \
+#define TL_PUT_ROW(NAME, M, F, I, P)                                                                  \
+    TL_INLINE void NAME(const meshlet_batch *s, int64_t at, M m, F depth, I id, int is_farthest)      \
+    {                                                                                                 \
+        const F old = P##f_load_masked(m, s->depth + at);                                             \
+        const M equal = P##m_and(m, P##f_eq(depth, old));                                             \
+        M wins = P##m_and(m, is_farthest ? P##f_lt(old, depth) : P##f_lt(depth, old));                \
+        if (__builtin_expect(P##m_any(equal), 0))                                                     \
+            wins = P##m_or(wins, P##m_and(equal, P##i_gt(P##i_load_masked(equal, s->ids + at), id))); \
+        P##f_store_masked(s->depth + at, wins, depth);                                                \
+        P##i_store_masked(s->ids + at, wins, id);                                                     \
     }
 TL_PUT_ROW(put_row, vm, vf, vi, v)
 TL_PUT_ROW(put_short_row, hm, hf, hi, h)

@@ -455,6 +455,8 @@ cdef extern from "topleft.h" nogil:
         int64_t (*cut_clusters)(const int32_t *, const int32_t *, int64_t, int32_t *, tl_cluster *, int32_t *, uint8_t *, int64_t *) noexcept nogil
         void (*measure_clusters)(const tl_source *, const uint8_t *, int64_t, int64_t, tl_cluster *, double *) noexcept nogil
         void (*survey_clusters)(const tl_clustered *, const tl_cluster_view *, int64_t, int64_t *) noexcept nogil
+        int64_t (*count_hidden)(const tl_clustered *, const tl_cluster_view *, const tl_window *, const tl_target *, int64_t,
+                                int64_t *) noexcept nogil
         int64_t (*first_bad)(const tl_vertex *, const int32_t *, int64_t) noexcept nogil
         int64_t (*first_bad_row)(const int32_t *, int64_t, int64_t) noexcept nogil
         int64_t (*narrow_triangles)(const int64_t *, int64_t, int64_t, int32_t *) noexcept nogil

@@ -95,6 +95,14 @@ class ClusteredMesh:
         n_others, _, n_drawn = clusters.engine.draw(empty, self._own, seen, may_be_hidden, *place, is_first, is_last)
         return others[:n_others].copy(), n_drawn
 
+    def hidden_share(self, target: _engine.Target, n_most: int = SURVEYED) -> float:
+        """Return the share of the clusters that the picture may show which lie behind what a target holds, by some."""
+        (width, height), clusters = self._view.size, self.clusters
+        is_farthest = target.sink == Sink.FARTHEST
+        seen = clusters.seen_in(self._exact, self._empty, 0, height, width, is_farthest=is_farthest)
+        n, n_hidden = clusters.engine.count_hidden(self._empty, seen, target, max(1, round(len(clusters) / n_most)))
+        return n_hidden / max(1, n)
+
     def draw_meshlets(self, memory: Memory, target: _engine.Target, n_parts: int) -> bool:
         """Clear a target and draw the mesh from meshlets, as `draw_clustered` does from clusters."""
         (width, height), clusters = self._view.size, self.clusters

@@ -67,6 +67,10 @@ class Clusters:
         The vertices of the mesh.
     triangles : ndarray of int32, shape (T, 3)
         Its triangles, whose indices have been checked.
+    n_pictures : int
+        How many pictures of the mesh there have been that might have been drawn in clusters.
+    hidden : float
+        The share of the clusters in view that the last one hid.
     own_points : ndarray, shape (N, 3)
         The vertices cluster by cluster, those on borders several times, and some rows that may be read past the end.
     """
@@ -75,6 +79,7 @@ class Clusters:
         """Sort and measure (V, 3) contiguous points and (T, 3) checked triangles."""
         check_rows(triangles, len(points))
         self.points, self.triangles, self.backoff = points, triangles, Backoff()
+        self.n_pictures, self.hidden = 0, 0.0
         n_triangles = len(triangles)
         order: NDArray[np.int32] = np.empty(n_triangles, np.int32)
         keys: NDArray[np.uint32] = np.empty(n_triangles, np.uint32)

@@ -21,7 +21,19 @@ __all__ = ["Meshlets"]
 
 
 class Meshlets:
-    """A copy of a mesh in meshlets: up to 64 vertices and 96 triangles each."""
+    """A copy of a mesh in meshlets: up to 64 vertices and 96 triangles each.
+
+    Attributes
+    ----------
+    blocks : (N * MESHLET_BYTES,) uint8
+        `tl_meshlet` of ``csrc/meshlets.h``: vertices, corners, and which triangle of the mesh each is.
+    bounds : (MESHLET_BOUNDS, N + MESHLET_TAIL) float32
+        What is known of each.
+    counts : (N + MESHLET_TAIL,) uint8
+        Their triangles, with the empty ones.
+    n_bytes : int
+        How much memory the copy takes.
+    """
 
     def __init__(self, clusters: Clusters, threads: int | None = None) -> None:
         """Grow the triangles of clusters with float32 points, in the order that these have along a curve."""
@@ -52,7 +64,8 @@ class Meshlets:
         counts: NDArray[np.uint8] = np.zeros(n_meshlets + _engine.MESHLET_TAIL, np.uint8)
         np.concatenate([part[2] for part in parts], out=counts[:n_meshlets])
         middle, radius = np.abs(bounds[:3, :n_meshlets].astype(np.float64)), bounds[3, :n_meshlets].astype(np.float64)
-        self.engine = _engine.Meshlets(meshlets, bounds, counts, (middle + radius).max(axis=1).tolist())
+        self.engine = _engine.Meshlets(meshlets, bounds, counts, (middle + radius).max(axis=1, initial=0).tolist())
+        self.blocks, self.bounds, self.counts = meshlets, bounds, counts
         self.n_bytes = meshlets.nbytes + bounds.nbytes + counts.nbytes
 
     def __len__(self) -> int:
