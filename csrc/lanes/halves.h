@@ -68,6 +68,9 @@ TL_INLINE vi vh_signed_min(vi a, vi b) { return _mm512_min_epi16(a, b); }
 TL_INLINE vi vh_signed_max(vi a, vi b) { return _mm512_max_epi16(a, b); }
 TL_INLINE vi vh_shift_left(vi a, int n) { return _mm512_slli_epi16(a, (unsigned)n); }
 TL_INLINE vhm vh_signed_gt(vi a, vi b) { return _mm512_cmpgt_epi16_mask(a, b); }
+/* of the halves in m */
+TL_INLINE vhm vh_signed_gt_in(vhm m, vi a, vi b) { return _mm512_mask_cmpgt_epi16_mask(m, a, b); }
+TL_INLINE vhm vh_signed_le_in(vhm m, vi a, vi b) { return _mm512_mask_cmple_epi16_mask(m, a, b); }
 TL_INLINE vi vh_pick_of(vi a, vi i, vi b) { return _mm512_permutex2var_epi16(a, i, b); }
 /* the low and the high halves of 32 lanes */
 TL_INLINE void vh_part(vi a, vi b, vi *low, vi *high)

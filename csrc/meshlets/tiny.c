@@ -59,13 +59,15 @@ static __attribute__((noinline)) void find_tiny_boxes(meshlet_batch *s)
         const vi right = vh_min(vi_upper_bytes(vh_max(vh_max(x[0], x[1]), x[2])), vh_set1(slot->high));
         const vi below = vh_max(vi_upper_bytes(vh_min(vh_min(y[0], y[1]), y[2])), vh_set1(slot->low >> 16));
         const vi above = vh_min(vi_upper_bytes(vh_max(vh_max(y[0], y[1]), y[2])), vh_set1(slot->high >> 16));
-        const vhm has_box = vh_signed_gt(right, left) & vh_signed_gt(above, below);
+        const vhm has_box = vh_signed_gt_in(vh_signed_gt(right, left), above, below);
         const vi longer = vh_signed_max(vi_sub_halves(right, left), vi_sub_halves(above, below));
-        const vhm over_tiny = vh_signed_gt(longer, vh_set1(2)), over_one = vh_signed_gt(longer, vh_set1(1));
+        const vhm over_one = vh_signed_gt_in(has_box, longer, vh_set1(1));
+        const vhm one = vh_signed_le_in(has_box, longer, vh_set1(1)),
+                  tiny = vh_signed_le_in(over_one, longer, vh_set1(2));
         const vb number = vb_count_from(first);
-        slot->n_one += vb_compress(slot->one + slot->n_one, has_box & ~over_one, number);
-        slot->n_tiny += vb_compress(slot->tiny + slot->n_tiny, has_box & over_one & ~over_tiny, number);
-        vhm larger = has_box & over_tiny;
+        slot->n_one += vb_compress(slot->one + slot->n_one, one, number);
+        slot->n_tiny += vb_compress(slot->tiny + slot->n_tiny, tiny, number);
+        vhm larger = vh_signed_gt_in(over_one, longer, vh_set1(2));
         if (larger) { /* whole pairs */
             larger |= (larger & 0x55555555u) << 1 | (larger >> 1 & 0x55555555u);
             slot->n_larger += vb_compress(slot->larger + slot->n_larger, larger, number);

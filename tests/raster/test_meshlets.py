@@ -74,7 +74,7 @@ MESHES = {name: (v.astype(np.float32), t.astype(np.int32)) for name, (v, t) in m
 
 
 def cameras(rng, n):
-    """Cameras outside, near and inside of a unit sphere, some of them orthographic; windows; mirrors; sheared spaces."""
+    """Cameras outside, near and inside of a unit sphere, some orthographic; windows; mirrors; sheared spaces."""
     for _ in range(n):
         eye = rng.normal(size=3)
         eye *= rng.choice([0.05, 0.9, 1.1, 2.5, 2.5, 30.0]) / np.linalg.norm(eye)

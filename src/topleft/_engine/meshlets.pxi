@@ -56,7 +56,7 @@ cdef class Meshlets:
 
 
 cdef class MeshletPass:
-    """A picture of meshlets: lists what it may show, then draws rows of that, which several threads may do at a time."""
+    """A picture of meshlets: finds what it may show, then draws rows of that, which several threads may do at a time."""
 
     cdef Meshlets meshlets
     cdef SnappedMesh mesh
@@ -68,7 +68,7 @@ cdef class MeshletPass:
         """`mesh`: how it is seen, and what triangle 0 is called; its own triangles are not read. `source`: the matrix."""
         self.meshlets, self.mesh, self.source, self.seen, self.target = meshlets, mesh, source, seen, target
 
-    def list(self, int64_t first, int64_t end, int32_t[::1] found, int32_t[::1] odd):
+    def find(self, int64_t first, int64_t end, int32_t[::1] found, int32_t[::1] odd):
         """List those of meshlets [first, end) that the picture may show, and in `odd` those that need care.
 
         `found` has room for SEEN_BYTES of each, `odd` for a number. Returns how many there are of the first, and of the second.

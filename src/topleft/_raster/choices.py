@@ -100,10 +100,11 @@ MIN_INSTANCES_TO_CLUSTER = 16
 MAX_FRONT_TO_CLUSTER = 0.8
 MIN_OUTSIDE_TO_CLUSTER = ((60_000, 0.1, 0.6), (500_000, 0.0, 0.33), (math.inf, 0.0, 0.0))
 
-#: Meshlets take 0.4 to 0.95 of the time of clusters or of the whole mesh, whichever is less, of blobs of 30,000 triangles
-#: or more in every view. They take longer where all triangles show (hills, 1.15 times), where triangles share no vertices,
-#: of which a cluster then has 85 (soup, 1.4 times), and where much is hidden. Growing takes about three times as long as
-#: sorting clusters, which is paid back after some 100 pictures; a mesh that is drawn 16 times is likely to be drawn more.
+#: Meshlets take 0.4 to 0.95 of the time of clusters or of the whole mesh, whichever is less, of blobs of 30,000
+#: triangles or more in every view. They take longer where all triangles show (hills, 1.15 times), where triangles share
+#: no vertices, of which a cluster then has 85 (soup, 1.4 times), and where much is hidden. Growing takes about three
+#: times as long as sorting clusters, which some 100 pictures pay back; a mesh that is drawn 16 times is likely to be
+#: drawn more.
 MIN_PICTURES_TO_GROW = 16
 MIN_TRIANGLES_OF_CLUSTER = 150
 MAX_HIDDEN_OF_MESHLETS = 0.5
@@ -229,7 +230,7 @@ def pays_to_draw_clusters(view: View, n_triangles: int, survey: Callable[[], Sur
 def can_draw_meshlets(view: View, sink: Sink, dtype: np.dtype[Any]) -> bool:
     """Tell whether a view of a mesh in clusters may be drawn from meshlets, where there is code for these.
 
-    They hold float32 vertices, and draw one side of triangles, in 16 bits; what near and far cut is found by both planes.
+    They hold float32 vertices, and draw one side of triangles, in 16 bits, of what lies between near and far.
     """
     if not (_engine.has_meshlets() and sink in (Sink.NEAREST, Sink.FARTHEST) and dtype == np.float32):
         return False
@@ -240,7 +241,10 @@ def can_draw_meshlets(view: View, sink: Sink, dtype: np.dtype[Any]) -> bool:
 
 
 def pays_to_grow(n_pictures: int, n_triangles: int, n_clusters: int) -> bool:
-    """Tell whether a mesh in clusters has been drawn often enough to grow it into meshlets, and its triangles are joined."""
+    """Tell whether a mesh in clusters has been drawn often enough to grow it into meshlets.
+
+    Triangles that share no vertices, of which few are in a cluster, never are.
+    """
     return n_pictures >= MIN_PICTURES_TO_GROW and n_triangles >= MIN_TRIANGLES_OF_CLUSTER * n_clusters
 
 

@@ -108,7 +108,8 @@ class Clusters:
 
     @cached_property
     def meshlets(self) -> Meshlets:
-        """The same triangles in meshlets, made when they are first asked for."""
+        """The same triangles in meshlets, made when they are first asked for (`pays_to_grow` in `choices.py`)."""
+        check_rows(self.triangles, len(self.points))
         return Meshlets(self)
 
     def __len__(self) -> int:

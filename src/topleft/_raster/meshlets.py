@@ -72,14 +72,7 @@ class Meshlets:
         return len(self.engine)
 
     def draw(
-        self,
-        memory: Memory,
-        drawn: _engine.MeshletPass,
-        n_triangles: int,
-        height: int,
-        n_parts: int,
-        *,
-        is_first: bool,
+        self, memory: Memory, drawn: _engine.MeshletPass, n_triangles: int, height: int, n_parts: int, *, is_first: bool
     ) -> list[NDArray[np.int32]]:
         """Draw what a pass shows, in as many bands of rows; returns the triangles that are still to be drawn."""
         n = len(self)
@@ -89,7 +82,7 @@ class Meshlets:
 
         def list_part(first: int, end: int) -> tuple[int, int, int]:
             first, end = first * 16, min(end * 16, n)
-            return first, *drawn.list(first, end, found[words * first :], odd[first:])
+            return first, *drawn.find(first, end, found[words * first :], odd[first:])
 
         n_found = n_odd = 0
         for first, n_own, n_own_odd in run_parts(list_part, -(-n // 16), n_parts):
