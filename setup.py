@@ -7,6 +7,7 @@ flags, so `BuildTopleft` compiles each unit by itself and links the objects.
 Environment:
 
 TOPLEFT_BUILD_ISA   comma list of the instruction sets to build, scalar always among them; an error when it cannot be
+TOPLEFT_NO_INT128   "1" builds without the compiler's 128-bit integers, as it is done where there are none
 TOPLEFT_WERROR      "1" turns warnings into errors
 TOPLEFT_SANITIZE    sanitizers of the compiler, as of -fsanitize=; `.ci/sanitize` builds with them and runs the tests
 """
@@ -53,13 +54,13 @@ FLAGS_AVX512 = [
 ]
 FLAGS_VBMI = [*FLAGS_AVX512, "-mavx512vbmi", "-mavx512vbmi2"]
 
-# What a compiler has to accept before a unit is built. Scalar: 128-bit integers, no excess precision.
+# What a compiler has to accept before a unit is built. Scalar: C11, no excess precision.
 PROBE_SCALAR = """
 #include <float.h>
 #if FLT_EVAL_METHOD != 0
 #error "floating point has excess precision"
 #endif
-unsigned __int128 probe(unsigned long long a) { return (unsigned __int128)a * a; }
+_Static_assert(sizeof(double) == 8, "float64");
 """
 PROBE_AVX2 = """
 #include <immintrin.h>
@@ -144,7 +145,7 @@ class BuildTopleft(build_ext):
 
     def build_extension(self, ext: Extension) -> None:
         if self.compiler.compiler_type == "msvc":
-            raise PlatformError("topleft needs gcc or clang: it uses 128-bit integers, which MSVC does not have")
+            raise PlatformError("topleft needs gcc or clang: it uses their attributes, which MSVC does not have")
         self.temp = Path(self.build_temp).resolve() / "topleft"
         self.temp.mkdir(parents=True, exist_ok=True)
         compiler = self.compiler.compiler_so
@@ -180,7 +181,8 @@ class BuildTopleft(build_ext):
     def engine_units(self, ext: Extension) -> list[tuple[Path, list[str], list[tuple[str, str]]]]:
         """Return the units of the engine: source, flags, macros."""
         isas = self.isas_to_build()
-        flags = {isa.name: FLAGS_C + isa.flags for isa in isas}
+        own = ["-DTL_NO_INT128"] if os.environ.get("TOPLEFT_NO_INT128") == "1" else []
+        flags = {isa.name: FLAGS_C + isa.flags + own for isa in isas}
         macros = [("TL_VERSION", quoted(self.distribution.get_version()))]
         for name, unit_flags in flags.items():
             # Paths say where a machine keeps things, not how the code was compiled.
@@ -207,7 +209,7 @@ class BuildTopleft(build_ext):
             if self.accepts(FLAGS_C + isa.flags, isa.probe):
                 chosen.append(isa)
             elif isa.name == "scalar":
-                raise CompileError("topleft needs gcc or clang for a 64-bit machine: C11 with 128-bit integers")
+                raise CompileError("topleft needs gcc or clang with C11, and a machine without excess precision")
             elif wanted is not None:
                 raise CompileError(f"TOPLEFT_BUILD_ISA asks for {isa.name}, which this compiler cannot build")
             else:

@@ -5,7 +5,7 @@
 #include <stdint.h>
 
 /* What was decided how. */
-typedef struct {
+typedef struct tl_exact_counts {
     int64_t n_triangles;  /* that were drawn, of each pass */
     int64_t n_on_grid;    /* of which all vertices lie on 2^-8 px, where the others of their vector were asked */
     int64_t n_asked;      /* samples and row ends that lie too near an edge for float lanes */
@@ -14,17 +14,8 @@ typedef struct {
     int64_t n_integers;   /* signs that only integers of 2176 bits told */
 } tl_exact_counts;
 
-/* A mesh whose vertices are the float64 numbers that stand here. */
-typedef struct {
-    const double *points; /* (n_points, stride): x and y in pixels, and depth when stride = 3 */
-    int stride;           /* 2 or 3 */
-    int64_t n_points;
-    double sample_x_px, sample_y_px; /* of the sample, from the pixel's centre: sixteenths of a pixel, at most 1/2 */
-    double band;                     /* 1; less shows that the bands of doubt are needed: pictures are then wrong */
-} tl_exact_points;
-
 /* What clip planes leave of triangles: fans over points of their own, in order of their source triangle. */
-typedef struct {
+typedef struct tl_exact_pieces {
     double *points;     /* (n_points, 3) */
     double *inv_w;      /* (n_points,) */
     double *weights;    /* (n_points, 3): barycentrics in the source triangle */
@@ -32,5 +23,19 @@ typedef struct {
     int32_t *source;    /* (n_pieces,) index of the input triangle, ascending */
     int64_t n_points, n_pieces;
 } tl_exact_pieces;
+
+/* A mesh whose vertices are the float64 numbers that stand here.  A vertex that cannot be drawn has x NaN.  What is
+ * drawn are the triangles of the mesh, collapsed to a point where a clip plane cuts them, and then all pieces. */
+typedef struct tl_exact_points {
+    const double
+        *points; /* (n_points, stride): x and y in pixels, and depth when stride = 3; behind them those of pieces */
+    int stride;  /* 2 or 3 */
+    int64_t n_points;
+    const int32_t *triangles; /* (n_triangles, 3) */
+    int64_t n_triangles;
+    const int32_t *names;          /* (n_triangles,) which triangle of the mesh each is of; NULL: its index */
+    const tl_exact_pieces *pieces; /* or NULL */
+    double band;                   /* 1; less shows that the bands of doubt are needed: pictures are then wrong */
+} tl_exact_points;
 
 #endif

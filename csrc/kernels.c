@@ -12,6 +12,11 @@
 #include "raster/bin.c"
 #include "raster/setup.c"
 #include "area/area.c"
+#include "exact/take_points.c"
+#include "exact/pieces_exact.c"
+#include "exact/draw_exact.c"
+#include "exact/sides_exact.c"
+#include "pixels/weights_exact.c"
 #include "pixels/weights_one.c"
 #include "pixels/weights.c"
 #include "pixels/paint.c"
@@ -26,10 +31,6 @@
 #include "lines/lines.c"
 #include "blend/blend.c"
 #include "shade/shade.c"
-#include "exact/take_points.c"
-#include "exact/project_exact.c"
-#include "exact/draw_exact.c"
-#include "exact/weights_exact.c"
 #include "shade/shade_samples.c"
 #include "shade/alpha_test.c"
 #include "mesh/creases.c"
@@ -58,11 +59,9 @@ const tl_kernels TL_KERNELS = {
     .first_bad = first_bad,
     .first_bad_row = first_bad_row,
     .narrow_triangles = narrow_triangles,
-    .draw = draw,
-    .draw_exact = draw_exact,
+    .draw = draw_mesh,
     .project_points = project_points,
     .clip_points = clip_points,
-    .weigh_exact = weigh_exact,
     .take_points = take_points,
     .count_classes = count_classes,
     .set_flat_depth = set_flat_depth,
@@ -81,7 +80,7 @@ const tl_kernels TL_KERNELS = {
     .measure_clusters = measure_clusters,
     .survey_clusters = survey_clusters,
     .count_hidden = count_hidden,
-    .drop_sides = drop_sides,
+    .drop_sides = drop_sides_of_mesh,
     .list_edges = list_edges,
     .draw_lines = draw_lines,
     .draw_cloud = draw_cloud,

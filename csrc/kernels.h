@@ -62,7 +62,8 @@ typedef struct tl_kernels {
     /* Returns -1, or, when it has met an index outside [0, n_vertices), the number of a row at or before which there is
      * one; what was drawn is then worthless.  The window's pixels are cleared first: 0, id -1, and the depth that every
      * other beats.  A share of a part needs method AUTO, a picture of less than 2^31 samples within 2^30 pixels of
-     * 0. */
+     * 0.  A bad row of a mesh whose vertices are not snapped may also be that of one that is not finite; it is drawn
+     * without clusters and not to SAMPLES. */
     int64_t (*draw)(const tl_snapped *snapped, const tl_window *window, const tl_target *target, tl_share *share);
 
     /* The numbers of vertices [first, end) as float64 in `points`, or NULL: they stay where they are.  Returns how many
@@ -78,17 +79,6 @@ typedef struct tl_kernels {
     /* Cuts the triangles that have such a vertex; with pieces->points NULL only counts. */
     void (*clip_points)(const tl_source *source, const double *points, const int32_t *triangles, int64_t n_triangles,
                         const tl_view *view, tl_exact_pieces *pieces);
-
-    /* `barycentric` and `interpolate` of what draw_exact has drawn: weights where values are NULL.  Of the scene
-     * triangles and 1/w are read; pieces may be NULL. */
-    void (*weigh_exact)(const tl_snapped *mesh, const tl_exact_points *points, const tl_exact_pieces *pieces,
-                        const tl_window *window, const int32_t *ids, const float *values, int n_values, int per_corner,
-                        float background, float *out);
-
-    /* As `draw`, with vertices that are not snapped: of the mesh only triangles, cull and names are read.  Sinks MASK
-     * to FARTHEST, method AUTO.  A bad row may also be that of a vertex that is not finite. */
-    int64_t (*draw_exact)(const tl_snapped *snapped, const tl_exact_points *points, const tl_window *window,
-                          const tl_target *target, const tl_share *share, tl_exact_counts *counts);
 
     /* Counts the triangles of a mesh by the code that `draw` has for them, with the sink of the census; the target's
      * samples are read when that is SAMPLES.  Returns as `draw` does. */

@@ -54,6 +54,7 @@ typedef struct {
     int64_t n_vertices;
     /* the sample from the pixel's centre, which vertices are seen from: |.| <= half a pixel */
     int32_t sample_x_fx, sample_y_fx;
+    const struct tl_exact_points *exact; /* vertices that are not snapped, instead of `vertices` and `wide`; or NULL */
 } tl_vertex_set;
 
 /* How many vertices of each special kind a vertex stage has seen, used by a triangle or not. */
@@ -220,8 +221,9 @@ typedef struct {
     /* out, or NULL: those that reach into `picture` beyond the window; end - first + 16 numbers */
     int32_t *others;
     int64_t n_others;
-    const tl_window *picture; /* what all the passes draw; read when there are `others` */
-    int is_first, is_last;    /* of the passes over the window: the first clears it */
+    const tl_window *picture;       /* what all the passes draw; read when there are `others` */
+    int is_first, is_last;          /* of the passes over the window: the first clears it */
+    struct tl_exact_counts *counts; /* out: added up, of a mesh whose vertices are not snapped; or NULL */
 } tl_share;
 
 /* The triangles that reach into a window, and the first and last band of rows of each. */

@@ -39,14 +39,15 @@ SUBJECTS: Mapping[str, tuple[str, ...]] = {
     "Fields and heights on a grid": ("field", "height_map", "Grid"),
     "Huge rasters, many machines": ("tiles", "Tiles", "Window", "merge"),
     "What a draw needs, and why": ("plan", "Plan"),
+    "Moved and watched in the browser": ("explore", "Explorer"),
     "Scenes to try things on": ("scenes",),
     "The library itself": ("release_memory", "build_info", "bresenham_line", "__version__"),
 }  # fmt: skip
 """In reading order."""
 
 RETURNED = frozenset({
-    "DepthLayers", "Detail", "Fragments", "FragmentsBatch", "Overlap", "Plan", "SceneDepthLayers", "SceneFragments",
-    "Tiles", "ViewLayers", "Window",
+    "DepthLayers", "Detail", "Explorer", "Fragments", "FragmentsBatch", "Overlap", "Plan", "SceneDepthLayers",
+    "SceneFragments", "Tiles", "ViewLayers", "Window",
 })  # fmt: skip
 """Classes that functions return: nobody calls them."""
 
@@ -74,6 +75,7 @@ MEMBERS: Mapping[str, tuple[str, ...]] = {
     "SceneDepthLayers": ("instance", "triangle"),
     "Job": ("files",),
     "Levels": ("save", "load"),
+    "Explorer": ("vertices", "wait", "close"),
     "Tiles": (
         "windows", "read", "grid", "dtype", "shape", "n_windows", "explain", "to_dask", "to_xarray", "to_zarr",
         "to_geotiff", "to_deepzoom",

@@ -32,15 +32,21 @@ from benchmarks.harness.records import Record, Save, forget, read_record, tell
 from benchmarks.peers import PEERS
 from benchmarks.report.study import Study
 from benchmarks.report.tables import table, table_text
-from benchmarks.scenes.families import FAMILIES, entries
+from benchmarks.scenes.families import FAMILIES, NO_SNAP, Entry, entries
 
 SCHEMA = 2
+
+
+def mesh_entries(methods: Sequence[str]) -> list[Entry]:
+    """Return every way to fill a mesh, vertices that are not snapped behind the others."""
+    own = [Entry("auto", NO_SNAP)] if not methods or "auto" in methods else []
+    return [*entries(methods), *own]
 
 
 MEASURES: Mapping[str, Callable[[Options], Record]] = {
     **{name: partial(measure_family, family) for name, family in FAMILIES.items()},
     "no-snap": measure_no_snap,
-    "mesh": lambda options: measure_stability(entries(options.methods), options.frame_px, options.scale),
+    "mesh": lambda options: measure_stability(mesh_entries(options.methods), options.frame_px, options.scale),
     "depth": measure_depth,
     "sizes": measure_sizes,
     "scaling": measure_scaling,

@@ -14,7 +14,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.atlas.families import (
+from benchmarks.atlas.maps import tabulate
+from benchmarks.exact.clip import draw_clip, pieces_picture
+from benchmarks.scenes.families import NO_SNAP
+from topleft._explore.race import PRODUCTION
+from topleft.methods.reference.integers import box_side, edge_values, signed_area, snapped_points
+from topleft.scene_families import (
     MIDDLE_PX,
     Axis,
     Family,
@@ -22,20 +27,11 @@ from benchmarks.atlas.families import (
     power_of_ten,
     power_of_two,
     square_rim,
-    tabulate,
     walk,
 )  # fmt: skip
-from benchmarks.exact.clip import draw_clip, pieces_picture
-from benchmarks.exact.integers import box_side, edge_values, signed_area, snapped_points
 
 F64 = NDArray[np.float64]
 I32 = NDArray[np.int32]
-
-PRODUCTION: dict[str, tuple[str, int]] = {
-    "auto": ("auto", 8), "edge": ("edge", 8), "scanline": ("scanline", 8),
-    "auto, 0 bits": ("auto", 0), "auto, 16 bits": ("auto", 16),
-}  # fmt: skip
-"""The engine's rows: method and sub-pixel bits."""
 
 SIZE = (32, 32)
 PLANE_ERROR = Fraction(1, 2**35)
@@ -78,10 +74,10 @@ class Picture(NamedTuple):
 class DepthFamily(Family):
     """A family with depth: what judges a picture that was drawn with so many bits."""
 
-    judge: Callable[[DepthScene, Picture, int], DepthFaults] = field(kw_only=True)
+    judge: Callable[[DepthScene, Picture, int | str], DepthFaults] = field(kw_only=True)
 
 
-def draw(scene: DepthScene, method: str, bits: int) -> Picture:
+def draw(scene: DepthScene, method: str, bits: int | str) -> Picture:
     """Draw with a depth test."""
     import topleft as tl
 
@@ -129,15 +125,24 @@ def in_clip(points: F64, near: float, triangles: NDArray[Any]) -> DepthScene:
     return DepthScene(np.stack([x, y, w - 2 * near, w], -1), triangles.astype(np.int32))
 
 
-def judge_clip(scene: DepthScene, picture: Picture, bits: int) -> DepthFaults:
+def judge_clip(scene: DepthScene, picture: Picture, bits: int | str) -> DepthFaults:
     """Compare the triangles that show, and how many cover each pixel, with the exact picture of the clip space."""
     counts = picture.counts
     true_ids, true_count = draw_clip(scene.vertices, scene.triangles, scene.size)
-    snapped = pieces_picture(scene.vertices, scene.triangles, scene.size, bits)
+    own_count = count_pieces(scene, bits)
     return DepthFaults(
         int((picture.ids != true_ids).sum()), int((counts < true_count).sum()), int((counts > true_count).sum()),
-        int((counts != snapped.count).sum()),
+        int((counts != own_count).sum()),
     )  # fmt: skip
+
+
+def count_pieces(scene: DepthScene, bits: int | str) -> I32:
+    """Return how many pieces cover each pixel, of what the projection and the clip in float64 leave."""
+    from topleft.methods import reference
+
+    if bits == NO_SNAP:
+        return reference.overdraw(scene.vertices, scene.triangles, scene.size, subpixel_bits=NO_SNAP)
+    return pieces_picture(scene.vertices, scene.triangles, scene.size, int(bits)).count
 
 
 # Pixels with depth
@@ -189,7 +194,7 @@ def deep_layers(n: int, seed: int) -> DepthScene:
     return DepthScene(vertices, triangles.astype(np.int32), (6, 6), (13, 13))
 
 
-def judge_layers(scene: DepthScene, picture: Picture, _: int) -> DepthFaults:
+def judge_layers(scene: DepthScene, picture: Picture, _: int | str) -> DepthFaults:
     """Compare with the nearest layer, which is known, and its depth, which is that of its corners."""
     nearest = int(np.argmin(scene.vertices[::4, 2]))
     n = len(scene.triangles) // 2
@@ -227,14 +232,14 @@ def plane_values(scene: DepthScene, snap: str) -> tuple[NDArray[Any], NDArray[An
     return numerators, denominators, covered
 
 
-def judge_depth(scene: DepthScene, picture: Picture, bits: int) -> DepthFaults:
+def judge_depth(scene: DepthScene, picture: Picture, bits: int | str) -> DepthFaults:
     """Compare ids with the exact picture of the planes as they are, depths with the planes after the snap.
 
     A depth beyond its bound is inexact, and so is a triangle that lies behind another by more than both may err.
     """
     ids, counts = picture.ids, picture.counts
     true = plane_values(scene, "true")
-    numerators, denominators, covered = plane_values(scene, str(bits))
+    numerators, denominators, covered = plane_values(scene, "true" if bits == NO_SNAP else str(bits))
     true_count = true[2].sum(axis=0)
     is_inexact = counts != covered.sum(axis=0)
     largest_z = [max(abs(Fraction(z)) for z in scene.vertices[t, 2].tolist()) for t in scene.triangles]
@@ -302,7 +307,7 @@ def measure_depth(family: DepthFamily, names: Sequence[str]) -> tuple[dict[str, 
     for _, values in walk(family):
         scenes = [family.make(*values, seed) for seed in range(family.n_seeds)]
         n_px.append(sum(width * height for width, height in (scene.size for scene in scenes)))
-        judged: dict[tuple[int, int, bytes], DepthFaults] = {}
+        judged: dict[tuple[int, int | str, bytes], DepthFaults] = {}
         for name in names:
             method, bits = PRODUCTION[name]
             faults: list[DepthFaults | str] = []

@@ -17,10 +17,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.atlas.families import FAMILIES, Family, Scene
-from benchmarks.atlas.measure import Entry, Exact, draw_counts, draw_labels, entries
+from topleft._explore.race import Entry, Exact, draw_counts, draw_labels, entries
 from topleft.failure_scenes import FailureScene, Got
 from topleft.methods import find_method
+from topleft.scene_families import FAMILIES, Family, PixelScene
 
 WINDOW_PX = 7
 KINDS = {"gap": "gaps", "overdraw": "overdrawn", "wrong": "wrong"}
@@ -62,7 +62,7 @@ def first_step(counts: Sequence[int | None]) -> int | None:
     return next((step for step, count in enumerate(counts) if count), None)
 
 
-def fault_pixels(scene: Scene, entry: Entry, kind: str) -> NDArray[np.bool_]:
+def fault_pixels(scene: PixelScene, entry: Entry, kind: str) -> NDArray[np.bool_]:
     """Return where a method fails in that way; a pixel that is drawn too often must be one that has to be drawn."""
     exact = Exact(scene)
     if kind == "wrong":
@@ -71,7 +71,7 @@ def fault_pixels(scene: Scene, entry: Entry, kind: str) -> NDArray[np.bool_]:
     return counts < true if kind == "gap" else (counts > true) & (true == 1)
 
 
-def is_right(scene: Scene, bits: int) -> bool:
+def is_right(scene: PixelScene, bits: int) -> bool:
     """Tell whether the engine draws the exact picture of the vertices as they are."""
     engine, exact = Entry("auto", "auto", bits), Exact(scene)
     try:
@@ -81,7 +81,7 @@ def is_right(scene: Scene, bits: int) -> bool:
     return bool((counts == exact.picture().count).all() and (draw_labels(engine, scene) == exact.labels()).all())
 
 
-def keeps_family(scene: Scene, family: str, value: float) -> bool:
+def keeps_family(scene: PixelScene, family: str, value: float) -> bool:
     """Tell whether a scene is still one of its family at that value."""
     corners = scene.vertices[scene.triangles]
     if family == "far":
@@ -116,7 +116,7 @@ class Shrinker:
         self.is_middle = failure.entry.snap == "px" and failure.kind != "wrong" and not is_exact
         """Whether vertices stay in the middle of their pixels, so that the snap is not what fails."""
 
-    def faults(self, scene: Scene) -> NDArray[np.bool_]:
+    def faults(self, scene: PixelScene) -> NDArray[np.bool_]:
         """Return the pixels that count: inside the mesh, if the failure is to be one between triangles."""
         is_fault = fault_pixels(scene, self.failure.entry, self.failure.kind)
         if self.is_inside and self.failure.kind != "wrong":
@@ -125,7 +125,7 @@ class Shrinker:
             is_fault &= np.all([is_once[i : i + height, j : j + width] for i in range(3) for j in range(3)], axis=0)
         return is_fault
 
-    def fails(self, scene: Scene) -> bool:
+    def fails(self, scene: PixelScene) -> bool:
         """Tell whether the method still fails as it did, and nobody else does."""
         used = scene.vertices[np.unique(scene.triangles)]
         if not (self.is_everyday or keeps_family(scene, self.failure.family, self.value)):
@@ -139,7 +139,7 @@ class Shrinker:
         except ValueError:
             return False
 
-    def start(self, family: Family) -> Scene | None:
+    def start(self, family: Family) -> PixelScene | None:
         """Return a scene of the family on which the method fails, its vertices where its own snap moves none."""
         # A mesh of tiny triangles round a pixel is not small: there the pixel alone counts.
         for is_inside in (False,) if family.name == "dense" else (True, False):
@@ -166,7 +166,7 @@ class Shrinker:
             for bits in (8, 16, 0):
                 yield np.rint(own * 2.0**bits) / 2.0**bits, bits
 
-    def smaller(self, scene: Scene) -> Iterator[Scene]:
+    def smaller(self, scene: PixelScene) -> Iterator[PixelScene]:
         """Yield scenes that are simpler by one step, the boldest first."""
         n_cut = len(scene.triangles)
         while n_cut := n_cut // 2:
@@ -184,7 +184,7 @@ class Shrinker:
                     if vertices[i, k] != scene.vertices[i, k]:
                         yield scene._replace(vertices=vertices)
 
-    def shrink(self, scene: Scene) -> Scene:
+    def shrink(self, scene: PixelScene) -> PixelScene:
         """Return the smallest scene that single steps lead to."""
         is_smaller = True
         while is_smaller:
@@ -209,7 +209,7 @@ def simpler(value: float, least: int) -> Iterator[float]:
         last = nearest
 
 
-def windows(scene: Scene, is_fault: NDArray[np.bool_]) -> Iterator[Scene]:
+def windows(scene: PixelScene, is_fault: NDArray[np.bool_]) -> Iterator[PixelScene]:
     """Yield what lies in small windows round pixels that are at fault."""
     for row, column in np.argwhere(is_fault)[:20].tolist():
         at = (max(0, scene.origin[0] + column - WINDOW_PX // 2), max(0, scene.origin[1] + row - WINDOW_PX // 2))
@@ -223,19 +223,19 @@ def rows_of(values: NDArray[Any]) -> str:
     return "/".join("".join(SIGNS[v + 1] for v in row) for row in values.tolist())
 
 
-def compact(scene: Scene) -> Scene:
+def compact(scene: PixelScene) -> PixelScene:
     """Return the scene without the vertices that no triangle uses."""
     used, triangles = np.unique(scene.triangles, return_inverse=True)
     return scene._replace(vertices=scene.vertices[used], triangles=triangles.reshape(-1, 3).astype(np.int32))
 
 
-def got_of(scene: Scene, entry: Entry, kind: str) -> Got:
+def got_of(scene: PixelScene, entry: Entry, kind: str) -> Got:
     """Return what a method draws of it."""
     drawn = draw_labels(entry, scene) if kind == "wrong" else draw_counts(entry, scene)
     return Got(entry.method, entry.bits, rows_of(drawn))
 
 
-def keep_scene(failure: Failure, value_name: str, scene: Scene, bits: int) -> FailureScene:
+def keep_scene(failure: Failure, value_name: str, scene: PixelScene, bits: int) -> FailureScene:
     """Return what is kept of a shrunk scene; without a value it needs nothing but a mesh."""
     scene, exact = compact(scene), Exact(compact(scene))
     expected = exact.labels() if failure.kind == "wrong" else exact.picture().count
@@ -248,9 +248,9 @@ def keep_scene(failure: Failure, value_name: str, scene: Scene, bits: int) -> Fa
     )  # fmt: skip
 
 
-def as_scene(kept: FailureScene) -> Scene:
+def as_scene(kept: FailureScene) -> PixelScene:
     """Return it as the families make them."""
-    return Scene(*kept.shape(), kept.size, kept.origin)
+    return PixelScene(*kept.shape(), kept.size, kept.origin)
 
 
 def shrink_all(record: dict[str, Any]) -> list[FailureScene]:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from benchmarks.atlas.depth import DEPTH_FAMILIES, PRODUCTION
+from benchmarks.atlas.depth import DEPTH_FAMILIES
 from benchmarks.atlas.measure import SAMPLED
 from benchmarks.harness.records import Record
 from benchmarks.report.tables import left_table, table_text
+from topleft._explore.race import PRODUCTION
 from topleft.failure_scenes import FAILURE_SCENES
 
 Row = dict[str, Any]

@@ -2,7 +2,6 @@
 
 pictures.py   the picture of a case after the snap, and how far another is from it
 unsnapped.py  float64 vertices as they are: coverage and ids
-integers.py   the same far away and after any snap, in big integers
 clip.py       clip space, cut by the planes
 area.py       the covered area of each pixel
 """

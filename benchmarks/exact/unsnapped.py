@@ -11,11 +11,12 @@ J. Pineda, A Parallel Algorithm for Polygon Rasterization, 1988.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
 from numpy.typing import NDArray
+
+from topleft.methods.reference.integers import ExactPicture
 
 F64 = NDArray[np.float64]
 I64 = NDArray[np.int64]
@@ -27,18 +28,6 @@ CHUNK = 1 << 18
 HALF_ULP = 2.0**-53
 ERROR_BOUND = (3 + 16 * HALF_ULP) * HALF_ULP
 """Shewchuk's bound A: times the sum of the two products, what the float64 edge function is off by at most."""
-
-
-@dataclass(frozen=True)
-class ExactPicture:
-    """What the frame must hold."""
-
-    triangle: NDArray[np.int32]
-    """(H, W): the last triangle that covers the centre, -1 for none."""
-    count: NDArray[np.int32]
-    """(H, W): how many triangles cover the centre."""
-    is_edge: BOOL
-    """(H, W): whether an edge of a triangle meets the pixel's square, its border included."""
 
 
 def draw_unsnapped(vertices: F64, triangles: NDArray[np.int32], size: tuple[int, int]) -> ExactPicture:

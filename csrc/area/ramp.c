@@ -319,7 +319,8 @@ static void add_exact_edge(area_plane *plane, int64_t x0, int64_t y0, int64_t x1
 {
     const int bits = plane->bits;
     const int64_t unit = (int64_t)1 << bits;
-    const tl_int128 dx = (tl_int128)x1 - x0, dy = (tl_int128)y1 - y0, divisor = dy * unit;
+    const int64_t dx = x1 - x0, dy = y1 - y0;
+    const tl_int128 divisor = i128_product(dy, unit);
     const int64_t first = max64(y0 >> bits, plane->y_px);
     const int64_t end = min64(((y1 - 1) >> bits) + 1, plane->y_px + plane->n_rows);
     if (dy == 0)
@@ -327,14 +328,15 @@ static void add_exact_edge(area_plane *plane, int64_t x0, int64_t y0, int64_t x1
     const double height = sign * (double)(1 << TL_AREA_BITS) / (double)unit;
     const double steep = dx == 0 ? 0.0 : sign * 0.5 * (1 << TL_AREA_BITS) * (double)dy / fabs((double)dx);
     for (int64_t row = first; row < end; row++) {
-        const tl_int128 t = (tl_int128)row * unit - y0, ta = t > 0 ? t : 0, tb = t + unit < dy ? t + unit : dy;
-        const tl_int128 xa = (x0 & (unit - 1)) * dy + ta * dx, step = (tb - ta) * dx; /* below 2^126 */
+        const int64_t t = row * unit - y0, ta = max64(t, 0), tb = t < dy - unit ? t + unit : dy;
+        const tl_int128 xa = i128_add(i128_product(x0 & (unit - 1), dy), i128_product(ta, dx)); /* below 2^126 */
+        const tl_int128 step = i128_product(tb - ta, dx);
         tl_int128 quotient, rest;
-        floor_divide_128(step < 0 ? xa + step : xa, divisor, &quotient, &rest);
-        const int64_t whole = (x0 >> bits) + (int64_t)quotient;
-        const double low = (double)rest / (double)divisor, high = low + fabs((double)step) / (double)divisor;
-        add_exact_row(plane, row - plane->y_px, whole - plane->x_px, low, high, steep,
-                      (double)(int64_t)(tb - ta) * height);
+        i128_floor_divide(dx < 0 ? i128_add(xa, step) : xa, divisor, &quotient, &rest);
+        const int64_t whole = (x0 >> bits) + i128_low(quotient);
+        const double unit_rows = i128_to_f64(divisor), low = i128_to_f64(rest) / unit_rows;
+        const double high = low + fabs(i128_to_f64(step)) / unit_rows;
+        add_exact_row(plane, row - plane->y_px, whole - plane->x_px, low, high, steep, (double)(tb - ta) * height);
     }
 }
 

@@ -20,6 +20,7 @@
 #include "raster/batch.c"
 #include "raster/rows.c"
 #include "blend/blend_area.c"
+#include "blend/blend_exact.c"
 #include "blend/mix.c"
 #include "blend/mix.h"
 #include "blend/mix_u8.c"
@@ -28,11 +29,6 @@ typedef struct {
     batch_state batch; /* its queue `rows` holds what waits */
     blend_state mix;
 } blend_pass;
-
-/* Rows of TL_LANES triangles: the first sample and the number of them. */
-typedef struct {
-    int32_t first[TL_MAX_BOX_PX][TL_MAX_LANES], n[TL_MAX_BOX_PX][TL_MAX_LANES];
-} blend_rows;
 
 /* Triangle i, or its pieces, by itself. */
 static __attribute__((noinline)) void blend_alone(blend_state *b, int64_t i)
@@ -175,7 +171,9 @@ static int64_t blend_window(const tl_snapped *snapped, const tl_window *window, 
         pack_u8((const uint8_t *)canvas->pixels + row * canvas->stride_px * n_channels, window->width,
                 canvas->n_channels, canvas->packed + row * b->stride);
     int64_t bad_row = -1;
-    if (canvas->is_area) {
+    if (snapped->mesh.exact) {
+        bad_row = blend_exact(b);
+    } else if (canvas->is_area) {
         bad_row = blend_areas(b);
     } else if (snapped->method == TL_METHOD_AUTO && is_near(window)) {
         start_batch(&p.batch, snapped, window, &b->target);

@@ -13,6 +13,8 @@
 #include "lanes/lanes.h"
 #include "vertex/clip.c"
 #include "vertex/fixed.h"
+#include "exact/pieces_exact.c"
+#include "exact/sign.c"
 #include "raster/setup.c"
 #include "raster/sink.c"
 #include "pixels/paint.c"
@@ -47,10 +49,28 @@ static void begin_gouraud(blend_state *b, int64_t id, const tl_vertex_set *set, 
 {
     b->whole_mode = b->mode == TL_MIX_REPLACE_STRAIGHT ? TL_MIX_REPLACE : b->mode;
     b->id = id;
+    b->resolve.exact = NULL;
     load_triangle(set, corners, &b->resolve.triangle);
     for (int k = 0; k < 3; k++)
         b->resolve.piece[k] =
             is_piece ? b->snapped->pieces->weights + 3 * (int64_t)b->resolve.triangle.corner[k] : NULL;
+}
+
+/* The same of a triangle of the mesh, or of a piece of it, whose vertices are not snapped. */
+static void begin_exact_gouraud(blend_state *b, int64_t id, int64_t piece)
+{
+    const tl_exact_points *points = b->snapped->mesh.exact;
+    const int32_t *corners = b->snapped->triangles + 3 * id;
+    resolve_state *s = &b->resolve;
+    b->whole_mode = b->mode == TL_MIX_REPLACE_STRAIGHT ? TL_MIX_REPLACE : b->mode;
+    b->id = id;
+    s->exact = &b->snapped->mesh;
+    for (int k = 0; k < 3; k++) {
+        const int32_t at = piece < 0 ? -1 : points->pieces->triangles[3 * piece + k];
+        s->triangle.corner[k] = corners[k];
+        s->points[k] = piece < 0 ? point_of(points, corners[k]) : piece_point(points->pieces, at);
+        s->piece[k] = piece < 0 ? NULL : points->pieces->weights + 3 * (int64_t)at;
+    }
 }
 
 /* Colours at the centres of n pixels of a row, of which the triangle may cover any part: where the centre lies outside,
@@ -85,8 +105,9 @@ static void color_partly_covered(blend_state *b, int64_t row, int64_t col, int n
             if (!canvas->is_u8)
                 ((float *)out)[k * n_channels + c] = (float)value;
             else if (is_inside)
-                ((uint8_t *)out)[k * n_channels + c] = round_color(t, col + k + b->window->x_px, row + b->window->y_px,
-                                                                   bits, (int)v[0], (int)d1, (int)d2, value);
+                ((uint8_t *)out)[k * n_channels + c] =
+                    round_color(&b->resolve, col + k + b->window->x_px, row + b->window->y_px, bits, (int)v[0], (int)d1,
+                                (int)d2, value);
             else
                 ((uint8_t *)out)[k * n_channels + c] = (uint8_t)rint(value);
         }
@@ -105,11 +126,13 @@ static void find_piece(blend_state *b, int64_t x_px, int64_t y_px)
         if (load_triangle(&set, p->triangles + 3 * i, &b->resolve.triangle) == 0)
             continue;
         const tl_triangle *t = &b->resolve.triangle;
-        const double sum = (double)weight_sum(t);
+        const double sum = i128_to_f64(weight_sum(t));
         double least = INFINITY;
-        for (int k = 0; k < 3; k++)
-            least =
-                fmin(least, (double)doubled_edge(t, k, k == 2 ? 0 : k + 1, x_px, y_px, b->window->subpixel_bits) / sum);
+        for (int k = 0; k < 3; k++) {
+            const int next = k == 2 ? 0 : k + 1;
+            const tl_int128 edge = doubled_edge(t, k, next, x_px, y_px, b->window->subpixel_bits);
+            least = fmin(least, i128_to_f64(edge) / sum);
+        }
         if (least <= best_weight)
             continue;
         best_weight = least;

@@ -10,6 +10,7 @@
 
 #include "topleft.h"
 #include "lanes/lanes.h"
+#include "raster/batch.c"
 #include "raster/sink.c"
 #include "area/ramp.c"
 #include "pixels/weights_one.c"
@@ -52,6 +53,11 @@ typedef struct blend_state {
     int32_t source[TL_CHUNK + TL_MAX_LANES];
     float source_f32[4 * (TL_CHUNK + TL_MAX_LANES)];
 } blend_state;
+
+/* Rows of TL_LANES triangles: the first sample and the number of them. */
+typedef struct {
+    int32_t first[TL_MAX_BOX_PX][TL_MAX_LANES], n[TL_MAX_BOX_PX][TL_MAX_LANES];
+} blend_rows;
 
 /* f(..., mode) with the mode as a constant. */
 #define TL_MIX_CALL(f, mode, ...)                                                     \

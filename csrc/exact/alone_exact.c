@@ -41,18 +41,35 @@ static int64_t first_pixel(double x, double centre, int64_t low, int64_t high)
         return low;
     if (x > (double)(high - 1) + centre)
         return high;
-    const int64_t n = (int64_t)ceil(x - centre);
+    const double distance = x - centre;
+    const int64_t below = (int64_t)distance, n = below + ((double)below < distance); /* ceil() is a call */
     return (double)n + centre < x ? n + 1 : n;
 }
 
-TL_INLINE double least_of(double a, double b, double c) { return fmin(fmin(a, b), c); }
-TL_INLINE double most_of(double a, double b, double c) { return fmax(fmax(a, b), c); }
+/* The first square of [low, high) that reaches right of x; `high` if none does. */
+static int64_t first_square(double x, int64_t low, int64_t high)
+{
+    if (x < (double)low || x >= (double)high)
+        return x < (double)low ? low : high;
+    const int64_t n = (int64_t)x;
+    return n - ((double)n > x);
+}
 
-/* Whether a plane gives depth: not to slivers, nor where products leave the range of float64.  As draw_exact.c. */
-#define TL_LEAST_BOX 1e-250
-#define TL_MOST_EXTENT 1e120
+/* The pixels of [low, high) whose samples lie in an extent, or whose squares meet it in more than a line, or lie in
+ * it. */
+static int64_t find_lone_box(double x0, double x1, tl_test test, double centre, int64_t low, int64_t high,
+                             int64_t *first)
+{
+    *first = test == TL_TEST_OUTER ? first_square(x0, low, high) : first_pixel(x0, centre, low, high);
+    return (test == TL_TEST_INNER ? first_square(x1, low, high) : first_pixel(x1, centre, low, high)) - *first;
+}
 
-/* The same operations as plane_of_lanes in setup_exact.c. */
+TL_INLINE double lesser_of(double a, double b) { return b < a ? b : a; }
+TL_INLINE double larger_of(double a, double b) { return b > a ? b : a; }
+TL_INLINE double least_of(double a, double b, double c) { return lesser_of(lesser_of(a, b), c); }
+TL_INLINE double most_of(double a, double b, double c) { return larger_of(larger_of(a, b), c); }
+
+/* The same operations as plane_of_lanes and take_out_slivers in setup_exact.c. */
 static void plane_of_points(lone_triangle *t, double width, double height)
 {
     const exact_point *p = t->edges.corners;
@@ -82,11 +99,14 @@ static float weighted_depth(const lone_triangle *t, exact_point sample)
 static void setup_lone_edges(const exact_state *s, lone_triangle *t, double width, double height)
 {
     asked_triangle *e = &t->edges;
-    const double margin = 12.0 * 0x1p-53 * fmax(width, 1.0) * fmax(height, 1.0) * s->points->band;
+    const double border = e->test == TL_TEST_SAMPLE ? 0.0 : 2.0;
+    const double margin =
+        12.0 * 0x1p-53 * larger_of(width + border, 1.0) * larger_of(height + border, 1.0) * s->points->band;
     for (int k = 0; k < 3; k++) {
         const exact_point a = e->corners[k], b = e->corners[k == 2 ? 0 : k + 1];
         const double dx = b.x - a.x, dy = b.y - a.y;
-        const double v = dy * (a.x - e->sample_x) - dx * (a.y - e->sample_y), inverse = 1.0 / fabs(dy);
+        const exact_point p = tested_point(a, b, (exact_point){e->sample_x, e->sample_y}, e->test);
+        const double v = dy * (a.x - p.x) - dx * (a.y - p.y), inverse = 1.0 / fabs(dy);
         const double band = margin * inverse + 3.0 * 0x1p-53 * (e->n_cols + 2) * s->points->band;
         e->v[k] = v, e->dx[k] = dx, e->dy[k] = dy;
         e->band[k] = margin < INFINITY && isfinite(v) && isfinite(dx) && band < 0.49 ? band
@@ -96,6 +116,9 @@ static void setup_lone_edges(const exact_state *s, lone_triangle *t, double widt
     }
 }
 
+/* The nearest integer of a number below 2^51. */
+TL_INLINE double nearest_of(double x) { return (x + 0x1.8p52) - 0x1.8p52; }
+
 /* The same from vertices that lie on 2^-8 px, near enough that 2E < 2^51: without a band.  Returns whether they do. */
 static int setup_on_grid(lone_triangle *t)
 {
@@ -104,15 +127,18 @@ static int setup_on_grid(lone_triangle *t)
     int64_t x[3], y[3]; /* doubled, from the first sample */
     for (int k = 0; k < 3; k++) {
         const double x_fx = e->corners[k].x * unit, y_fx = e->corners[k].y * unit;
-        if (!(fabs(x_fx) < 0x1p23 && fabs(y_fx) < 0x1p23 && x_fx == floor(x_fx) && y_fx == floor(y_fx)))
+        if (!(fabs(x_fx) < 0x1p23 && fabs(y_fx) < 0x1p23 && x_fx == nearest_of(x_fx) && y_fx == nearest_of(y_fx)))
             return 0;
         x[k] = (int64_t)(2.0 * (x_fx - e->sample_x * unit)), y[k] = (int64_t)(2.0 * (y_fx - e->sample_y * unit));
     }
     for (int k = 0; k < 3; k++) {
         const int next = k == 2 ? 0 : k + 1;
         const int64_t dx = (x[next] - x[k]) / 2, dy = (y[next] - y[k]) / 2;
-        const int top_left = dy < 0 || (dy == 0 && dx > 0);
-        e->v[k] = (double)((dy * x[k] - dx * y[k] - !top_left) >> (TL_GRID_BITS + 1)) + 0.5;
+        const int top_left = dy < 0 || (dy == 0 && dx > 0), is_outer = e->test == TL_TEST_OUTER;
+        const int is_square = e->test != TL_TEST_SAMPLE, bias = is_square ? is_outer : !top_left;
+        const int64_t side = is_square ? 2 << TL_GRID_BITS : 0; /* as tested_point */
+        const int64_t px = is_outer == (dy < 0) ? side : 0, py = is_outer == (dx > 0) ? side : 0;
+        e->v[k] = (double)((dy * (x[k] - px) - dx * (y[k] - py) - bias) >> (TL_GRID_BITS + 1)) + 0.5;
         e->dx[k] = (double)dx, e->dy[k] = (double)dy, e->band[k] = -1.0;
         t->inverse[k] = dy ? 1.0 / fabs((double)dy) : 1.0;
     }
@@ -191,7 +217,7 @@ TL_INLINE void put_lone_depths(const tl_target *target, tl_sink sink, const lone
 }
 
 /* Sets up triangle i; returns whether there is anything to draw.  A vertex that is not finite ends the pass. */
-static int setup_lone(exact_state *s, int32_t i, lone_triangle *t, int with_depth)
+static int setup_lone(exact_state *s, int32_t i, lone_triangle *t, tl_test test, int with_depth)
 {
     const int32_t *corners = s->mesh->triangles + 3 * (int64_t)i;
     asked_triangle *e = &t->edges;
@@ -204,9 +230,9 @@ static int setup_lone(exact_state *s, int32_t i, lone_triangle *t, int with_dept
             s->bad_row = i;
             return 0;
         }
-    t->col = first_pixel(x0, s->centre_x, s->left, s->right), t->row = first_pixel(y0, s->centre_y, s->top, s->bottom);
-    e->n_cols = (int)(first_pixel(x1, s->centre_x, s->left, s->right) - t->col);
-    t->n_rows = first_pixel(y1, s->centre_y, s->top, s->bottom) - t->row;
+    e->test = test;
+    e->n_cols = (int)find_lone_box(x0, x1, test, s->centre_x, s->left, s->right, &t->col);
+    t->n_rows = find_lone_box(y0, y1, test, s->centre_y, s->top, s->bottom, &t->row);
     if (e->n_cols <= 0 || t->n_rows <= 0)
         return 0;
     const int sign = edge_sign(p[0], p[1], p[2], s->counts), second = sign < 0 ? 2 : 1;
@@ -246,7 +272,7 @@ TL_INLINE void draw_lone(exact_state *s, int32_t i, tl_sink sink)
     const tl_target target = *s->target; /* copies that no store can change */
     lone_triangle found;
     int32_t first[TL_MAX_LANES], end[TL_MAX_LANES];
-    if (!setup_lone(s, i, &found, sink_has_depth(sink)))
+    if (!setup_lone(s, i, &found, test_of(s, sink), sink_has_depth(sink)))
         return;
     const lone_triangle t = found;
     const int64_t stride = target.stride_px, corner = (t.row - s->top) * stride + t.col - s->left;
@@ -269,5 +295,44 @@ TL_INLINE void draw_lone(exact_state *s, int32_t i, tl_sink sink)
 }
 
 TL_SINK_COPIES(draw_lone, (exact_state * s, int32_t i), s, i)
+
+/* Counts the squares that any of the pieces [first, end) of one triangle meets, or holds, once each. */
+static void count_squares_of_pieces(exact_state *s, int64_t first, int64_t end)
+{
+    lone_triangle t[TL_MAX_PIECES];
+    int64_t row0 = s->bottom, row1 = s->top;
+    int n = 0;
+    for (int64_t i = first; i < end && n < TL_MAX_PIECES; i++) {
+        if (!setup_lone(s, (int32_t)i, &t[n], s->window->test, 0))
+            continue;
+        row0 = min64(row0, t[n].row);
+        row1 = max64(row1, t[n].row + t[n].n_rows);
+        n++;
+    }
+    for (int64_t row = row0; row < row1; row++) {
+        row_span spans[TL_MAX_PIECES];
+        int n_spans = 0;
+        for (int i = 0; i < n; i++) {
+            int32_t from, to;
+            if (row < t[i].row || row >= t[i].row + t[i].n_rows)
+                continue;
+            if (find_lone_end(&t[i], row - t[i].row, &from, &to))
+                ask_lone_ends(&t[i].edges, row - t[i].row, 1, &from, &to, s->counts);
+            const int64_t col = t[i].col - s->left;
+            spans[n_spans++] = (row_span){col + from, col + to};
+        }
+        count_spans(spans, n_spans, s->window, s->target, row - s->top);
+    }
+}
+
+/* The triangles [first, end), which are pieces: those of one triangle have one name. */
+static __attribute__((noinline)) void count_pieces(exact_state *s, int64_t first, int64_t end)
+{
+    for (int64_t i = first, next; i < end && s->bad_row < 0 && !tl_is_given_up(s->window); i = next) {
+        for (next = i + 1; next < end && s->mesh->names[next] == s->mesh->names[i];)
+            next++;
+        count_squares_of_pieces(s, i, next);
+    }
+}
 
 #endif

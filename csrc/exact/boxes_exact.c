@@ -54,7 +54,7 @@ TL_INLINE vm decide_samples(const lane_exact *t, int row, int col, vm doubted, v
     const vd px = vd_add(t->sample_x, vd_set1(col)), py = vd_add(t->sample_y, vd_set1(row));
     vm in = doubted, out = vm_first(0);
     for (int k = 0; k < 3; k++) {
-        const lane_sides_of_edge sides = sides_of_edge(t->x, t->y, k, px, py);
+        const lane_sides_of_edge sides = sides_of_edge(t->x, t->y, k, px, py, t->test);
         in = vm_and(in, sides.inside), out = vm_or(out, sides.outside);
     }
     *inside = vm_or(*inside, in);
@@ -85,7 +85,7 @@ static __attribute__((noinline)) void ask_boxes(exact_state *s, const exact_queu
                     exact_point p[3];
                     load_turned(s, q->id[i + k], turned >> k & 1, p);
                     const exact_point sample = {q->col[i + k] + col + s->centre_x, q->row[i + k] + row + s->centre_y};
-                    found |= (unsigned)is_inside(p, sample, s->counts) << k;
+                    found |= (unsigned)is_inside(p, sample, t->test, s->counts) << k;
                 }
                 inside = vm_or(inside, vm_from_bits(found));
             }
@@ -96,6 +96,31 @@ static __attribute__((noinline)) void ask_boxes(exact_state *s, const exact_queu
         for (int k = 0; k < 3; k++)
             t->e[k] = vf_add(t->e[k], t->dx[k]);
     }
+}
+
+/* The samples of boxes of up to 2x2: the first of each in one go, as draw_tiny in batch.c; most cover no other. */
+TL_INLINE int emit_tiny(exact_state *s, tl_sink sink, box_masks in, vi sample, vi id, const vd *z_row, const vd *z_col,
+                        int n)
+{
+    fragment_list *f = &s->fragments;
+    const vi stride = vi_set1((int32_t)s->target->stride_px), one = vi_set1(1);
+    const vm first01 = vm_and_not(in[0][1], in[0][0]), upper = vm_or(in[0][0], in[0][1]);
+    const vm first10 = vm_and_not(in[1][0], upper), first11 = vm_and_not(in[1][1], vm_or(upper, in[1][0]));
+    const vm on_right = vm_or(first01, first11), below = vm_or(first10, first11);
+    const vm more[3] = {vm_and_not(in[0][1], first01), vm_and_not(in[1][0], first10), vm_and_not(in[1][1], first11)};
+    const vi right = vi_select(on_right, vi_add(sample, one), sample);
+    vf depth = vf_set1(0.0f);
+    if (sink_has_depth(sink))
+        depth = sum_depth(vd_select(below, z_row[1], z_row[0]), vd_select(on_right, z_col[1], z_col[0]));
+    n = emit(f, n, sink, vm_or(upper, vm_or(in[1][0], in[1][1])), vi_select(below, vi_add(right, stride), right), id,
+             depth);
+    for (int k = 0; k < 3; k++) {
+        const int row = k > 0, col = k != 1;
+        if (vm_any(more[k]))
+            n = emit(f, n, sink, more[k], vi_add(sample, vi_set1(row * (int32_t)s->target->stride_px + col)), id,
+                     sink_has_depth(sink) ? sum_depth(z_row[row], z_col[col]) : depth);
+    }
+    return n;
 }
 
 TL_INLINE void flush_boxes(exact_state *s, exact_queue *queue, int size, tl_sink sink)
@@ -109,16 +134,26 @@ TL_INLINE void flush_boxes(exact_state *s, exact_queue *queue, int size, tl_sink
         box_masks in;
         const vi box = vi_load(q->size + i);
         const vi n_cols = vi_and(box, vi_set1(0xffff)), n_rows = vi_shift_right(box, 16);
-        pop_exact(s, queue, i, &t);
+        pop_exact(s, sink, queue, i, &t);
         const vi id = names_of(s->mesh, vm_first(q->n - i), vi_load(q->id + i)), sample = t.sample;
-        vd z_col[TL_SMALL_BOX];
+        vd z_col[TL_SMALL_BOX], z_tiny[2];
         if (sink_has_depth(sink)) {
-            p = plane_of_lanes(s, queue, i, &t);
+            p = plane_of_lanes(s, &t);
             for (int col = 0; col < size; col++)
                 z_col[col] = col_depth(&p, &t, col);
         }
         if (__builtin_expect(vm_any(test_boxes(&t, n_cols, n_rows, size, in)), 0))
             ask_boxes(s, queue, i, &t, n_cols, n_rows, size, in);
+        if (TL_LANES > 1 && size == 2) {
+            for (int row = 0; sink_has_depth(sink) && row < 2; row++)
+                z_tiny[row] = row_depth(&p, &t, row);
+            n_fragments = emit_tiny(s, sink, in, sample, id, z_tiny, z_col, n_fragments);
+            if (n_fragments > TL_FRAGMENTS) {
+                flush_fragments(s->target, sink, &s->fragments, n_fragments);
+                n_fragments = 0;
+            }
+            continue;
+        }
         for (int row = 0; row < size; row++) {
             vd z_row;
             if (sink_has_depth(sink))

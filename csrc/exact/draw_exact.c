@@ -26,8 +26,9 @@
 typedef struct {
     vd x[3], y[3];
     vd width, height;
+    vi top, bottom;              /* rows of the box in the picture */
     vi col, row, n_cols, n_rows; /* the box of samples in the window */
-    vm alone, drawn;
+    vm alone, fits, drawn;       /* fits: the others, drawn or not */
 } exact_batch;
 
 /* The first pixels whose samples are not left of x. */
@@ -40,8 +41,24 @@ TL_INLINE vi first_pixels(vd x, vd centre, int is_left_of_0)
     return vi_add(n, vi_select(is_low, vi_set1(1), vi_set1(0)));
 }
 
+/* The pixels from *first to *end whose samples lie in extents, or whose squares meet them in more than a line, or lie
+ * in them. */
+TL_INLINE void find_pixels_of(vd low, vd high, tl_test test, double centre, int is_left_of_0, vi *first, vi *end)
+{
+    const vd at = vd_set1(centre);
+    if (test == TL_TEST_SAMPLE) {
+        *first = first_pixels(low, at, is_left_of_0), *end = first_pixels(high, at, is_left_of_0);
+        return;
+    }
+    *first = test == TL_TEST_OUTER ? vi_round(vd_floor(low)) : vi_ceil(low);
+    *end = test == TL_TEST_OUTER ? vi_ceil(high) : vi_round(vd_floor(high));
+}
+
+/* The pixels around the extent of a triangle in which edges are tested. */
+TL_INLINE double border_of(tl_test test) { return test == TL_TEST_SAMPLE ? 0.0 : 2.0; }
+
 /* Loads TL_LANES triangles; returns 0, with the row in `bad_row`, when an index lies outside the vertices. */
-TL_INLINE int load_exact_batch(exact_state *s, const int32_t *corners, vi id, vm live, exact_batch *b)
+TL_INLINE int load_exact_batch(exact_state *s, tl_sink sink, const int32_t *corners, vi id, vm live, exact_batch *b)
 {
     if (has_bad_index(corners, s->last_vertex)) {
         int32_t ids[TL_MAX_LANES];
@@ -57,44 +74,71 @@ TL_INLINE int load_exact_batch(exact_state *s, const int32_t *corners, vi id, vm
     const vd x_min = vd_min(vd_min(b->x[0], b->x[1]), b->x[2]), x_max = vd_max(vd_max(b->x[0], b->x[1]), b->x[2]);
     const vd y_min = vd_min(vd_min(b->y[0], b->y[1]), b->y[2]), y_max = vd_max(vd_max(b->y[0], b->y[1]), b->y[2]);
     b->width = vd_sub(x_max, x_min), b->height = vd_sub(y_max, y_min);
-    const vm fits = vm_and(vd_ge(vd_set1(0x1p30), far), vd_ge(vd_set1(TL_MAX_BOX_PX), vd_max(b->width, b->height)));
-    b->alone = vm_and_not(live, fits);
-    const vd centre_x = vd_set1(s->centre_x), centre_y = vd_set1(s->centre_y);
+    const tl_test test = test_of(s, sink);
+    const vd widest = vd_set1(TL_MAX_BOX_PX - border_of(test));
+    const vm fits = vm_and(vd_ge(vd_set1(0x1p30), far), vd_ge(widest, vd_max(b->width, b->height)));
     const int is_left_of_0 = s->left < 0 || s->top < 0;
-    b->col = vi_max(first_pixels(x_min, centre_x, is_left_of_0), vi_set1((int32_t)s->left));
-    b->row = vi_max(first_pixels(y_min, centre_y, is_left_of_0), vi_set1((int32_t)s->top));
-    b->n_cols = vi_sub(vi_min(first_pixels(x_max, centre_x, is_left_of_0), vi_set1((int32_t)s->right)), b->col);
-    b->n_rows = vi_sub(vi_min(first_pixels(y_max, centre_y, is_left_of_0), vi_set1((int32_t)s->bottom)), b->row);
-    b->drawn = vm_and(vm_and(live, fits), vi_gt(vi_min(b->n_cols, b->n_rows), vi_set1(0)));
+    vi left, right;
+    b->alone = vm_and_not(live, fits), b->fits = vm_and(live, fits);
+    find_pixels_of(x_min, x_max, test, s->centre_x, is_left_of_0, &left, &right);
+    find_pixels_of(y_min, y_max, test, s->centre_y, is_left_of_0, &b->top, &b->bottom);
+    b->col = vi_max(left, vi_set1((int32_t)s->left));
+    b->row = vi_max(b->top, vi_set1((int32_t)s->top));
+    b->n_cols = vi_sub(vi_min(right, vi_set1((int32_t)s->right)), b->col);
+    b->n_rows = vi_sub(vi_min(b->bottom, vi_set1((int32_t)s->bottom)), b->row);
+    b->drawn = vm_and(b->fits, vi_gt(vi_min(b->n_cols, b->n_rows), vi_set1(0)));
     return 1;
 }
 
+/* As list_others in raster.c. */
+TL_INLINE void list_exact_others(const exact_state *s, const exact_batch *b, vi id)
+{
+    tl_share *share = s->share;
+    const tl_window *picture = share->picture;
+    const vi first = vi_max(b->top, vi_set1((int32_t)picture->y_px));
+    const vi end = vi_min(b->bottom, vi_set1((int32_t)(picture->y_px + picture->height)));
+    const vm is_seen = vm_and(b->fits, vm_and(vi_gt(b->n_cols, vi_set1(0)), vi_gt(end, first)));
+    const vm is_beyond = vm_or(vi_gt(b->row, first), vi_gt(end, vi_set1((int32_t)s->bottom)));
+    const vm m = vm_or(b->alone, vm_and(is_seen, is_beyond));
+    vi_compress(share->others + share->n_others, m, id);
+    share->n_others += __builtin_popcount(vm_bits(m));
+}
+
 /* Leaves to draw_lone what lanes could take but should not, and to nobody what is turned away for certain. */
-TL_INLINE void take_out_exact(const exact_state *s, tl_sink sink, exact_batch *b)
+TL_INLINE void take_out_exact(const exact_state *s, exact_batch *b)
 {
     if (TL_LANES == 1) { /* one lane gains nothing from the rows of rows_exact.c */
         const vm over_small = vm_and(b->drawn, vi_gt(vi_max(b->n_cols, b->n_rows), vi_set1(TL_SMALL_BOX)));
         b->alone = vm_or(b->alone, over_small);
         b->drawn = vm_and_not(b->drawn, over_small);
     }
-    if (!sink_has_depth(sink) && s->mesh->cull == TL_CULL_NONE)
+    if (s->mesh->cull == TL_CULL_NONE)
         return;
     const vd area = area_of_points(b->x, b->y), box = vd_mul(b->width, b->height);
     const vd bound = vd_add(vd_mul(box, vd_set1(0x1p-50)), vd_set1(1e-280)), zero = vd_set1(0.0);
-    if (s->mesh->cull != TL_CULL_NONE)
-        b->drawn = vm_and_not(b->drawn, vd_ge(s->mesh->cull == TL_CULL_BACK ? area : vd_sub(zero, area), bound));
-    if (sink_has_depth(sink)) { /* as plane_of_points; the extents of lanes are in its range */
-        const vd scaled = vd_mul(vd_abs(area), vd_set1((double)(1 << TL_SLIVER_BITS)));
-        const vm has_plane = vm_and(vd_ge(scaled, box), vd_ge(box, vd_set1(TL_LEAST_BOX)));
-        b->alone = vm_or(b->alone, vm_and_not(b->drawn, has_plane));
-        b->drawn = vm_and(b->drawn, has_plane);
-    }
+    b->drawn = vm_and_not(b->drawn, vd_ge(s->mesh->cull == TL_CULL_BACK ? area : vd_sub(zero, area), bound));
 }
 
 static __attribute__((noinline)) void draw_each_lone(exact_state *s, tl_sink sink, unsigned lanes, const int32_t *ids)
 {
     for (; lanes && s->bad_row < 0 && !tl_is_given_up(s->window); lanes &= lanes - 1)
         TL_SINK_CALL(draw_lone, sink, s, ids[__builtin_ctz(lanes)])
+}
+
+/* What the queues have put by. */
+static __attribute__((noinline)) void draw_slivers(exact_state *s, tl_sink sink)
+{
+    for (int k = 0; k < s->n_slivers && s->bad_row < 0 && !tl_is_given_up(s->window); k++)
+        TL_SINK_CALL(draw_lone, sink, s, s->slivers[k])
+    s->n_slivers = 0;
+}
+
+/* X * Y of extents, as the head of setup_exact.c has them. */
+TL_INLINE vf box_sizes(const exact_batch *b, tl_test test)
+{
+    const vf one = vf_set1(1.0f), border = vf_set1((float)border_of(test));
+    const vf width = vf_add(vf_from_vd(b->width), border), height = vf_add(vf_from_vd(b->height), border);
+    return vf_mul(vf_max(width, one), vf_max(height, one));
 }
 
 TL_INLINE void push_exact(exact_queue *queue, vm m, const exact_batch *b, vi id, vf xy)
@@ -109,11 +153,13 @@ TL_INLINE void draw_exact_batch(exact_state *s, tl_sink sink, const int32_t *cor
     exact_batch b;
     for (int k = 0; k < 3 * TL_LANES; k += 16)
         __builtin_prefetch(corners + 12 * 48 + k);
-    if (!load_exact_batch(s, corners, id, live, &b))
+    if (!load_exact_batch(s, sink, corners, id, live, &b))
         return;
+    if (s->share->others)
+        list_exact_others(s, &b, id);
     if (!vm_any(vm_or(b.drawn, b.alone)))
         return;
-    take_out_exact(s, sink, &b);
+    take_out_exact(s, &b);
     if (__builtin_expect(vm_any(b.alone), 0)) {
         int32_t ids[TL_MAX_LANES];
         vi_store(ids, id);
@@ -121,8 +167,7 @@ TL_INLINE void draw_exact_batch(exact_state *s, tl_sink sink, const int32_t *cor
     }
     if (!vm_any(b.drawn))
         return;
-    const vf one = vf_set1(1.0f);
-    const vf xy = vf_mul(vf_max(vf_from_vd(b.width), one), vf_max(vf_from_vd(b.height), one));
+    const vf xy = box_sizes(&b, test_of(s, sink));
     const vi longer = vi_max(b.n_cols, b.n_rows);
     const vm over_tiny = vi_gt(longer, vi_set1(2)), over_small = vi_gt(longer, vi_set1(TL_SMALL_BOX));
     const vm over = vm_and(b.drawn, over_small), tiny = vm_and_not(b.drawn, over_tiny);
@@ -162,79 +207,109 @@ TL_INLINE void draw_far_batch(exact_state *s, tl_sink sink, const int32_t *corne
         draw_each_lone(s, sink, vm_bits(live), ids);
 }
 
-/* The window has fewer than 2^31 samples and lies within 2^48 pixels of 0, where centres and samples are float64. */
-static void start_exact(exact_state *s, const tl_snapped *mesh, const tl_exact_points *points, const tl_window *window,
-                        const tl_target *target, tl_exact_counts *counts)
+/* Whether int32 counts the pixels of a window. */
+TL_INLINE int is_near_0(const tl_window *window)
 {
+    const int64_t farthest = (int64_t)1 << 30;
+    return is_near(window) && window->x_px + window->width < farthest && window->y_px + window->height < farthest;
+}
+
+/* The window has fewer than 2^31 samples and lies within 2^48 pixels of 0, where centres and samples are float64. */
+static void start_exact(exact_state *s, const tl_snapped *mesh, const tl_window *window, const tl_target *target,
+                        tl_exact_counts *counts)
+{
+    const tl_exact_points *points = mesh->mesh.exact;
+    const double unit = 1.0 / (double)(1 << window->subpixel_bits);
     s->mesh = mesh, s->points = points, s->window = window, s->target = target, s->counts = counts;
     s->left = window->x_px, s->right = window->x_px + window->width;
     s->top = window->y_px, s->bottom = window->y_px + window->height;
-    s->centre_x = 0.5 + points->sample_x_px, s->centre_y = 0.5 + points->sample_y_px;
+    const int of_squares = window->test != TL_TEST_SAMPLE;
+    s->centre_x = of_squares ? 0.0 : 0.5 + mesh->mesh.sample_x_fx * unit;
+    s->centre_y = of_squares ? 0.0 : 0.5 + mesh->mesh.sample_y_fx * unit;
     s->last_vertex = vi_set1((int32_t)(points->n_points - 1));
-    s->bad_row = -1, s->may_be_on_grid = 0;
+    s->bad_row = -1, s->may_be_on_grid = 0, s->n_slivers = 0;
     s->tiny.boxes.n = s->small.boxes.n = s->middle.boxes.n = s->rows.boxes.n = s->fragments.n = 0;
     memset(s->fragments.sample, 0, sizeof s->fragments.sample); /* what is prefetched behind the end of the list */
 }
 
-TL_INLINE void draw_exact_scene(const tl_snapped *mesh, const tl_exact_points *points, const tl_window *window,
-                                const tl_target *target, const tl_share *share, tl_exact_counts *counts,
-                                int64_t *bad_row, tl_sink sink)
+/* The triangles [n_whole, end) are pieces. */
+TL_INLINE void draw_exact_scene(const tl_snapped *mesh, int64_t n_whole, const tl_window *window,
+                                const tl_target *target, tl_share *share, tl_exact_counts *counts, int64_t *bad_row,
+                                tl_sink sink)
 {
-    const int64_t farthest = (int64_t)1 << 30;
-    const int is_near_0 =
-        is_near(window) && window->x_px + window->width < farthest && window->y_px + window->height < farthest;
+    const int takes_lanes = is_near_0(window);
     exact_state s;
     int is_given_up = 0;
-    start_exact(&s, mesh, points, window, target, counts);
-    for (int64_t i = share->first; i < share->end && s.bad_row < 0 && !is_given_up; i += TL_LANES) {
+    start_exact(&s, mesh, window, target, counts);
+    s.share = share;
+    const int counts_pieces = sink == TL_SINK_COUNT && window->test != TL_TEST_SAMPLE;
+    const int64_t end = counts_pieces ? min64(share->end, n_whole) : share->end;
+    for (int64_t i = share->first; i < end && s.bad_row < 0 && !is_given_up; i += TL_LANES) {
         int32_t corners[3 * TL_LANES];
         tl_count_work(window, TL_SETUP_PX * TL_LANES);
         is_given_up = tl_is_given_up(window);
-        const vm live = vm_first(share->end - i);
+        const vm live = vm_first(end - i);
         const vi id = share->ids ? vi_load_masked(live, share->ids + i) : vi_add(vi_set1((int32_t)i), vi_iota());
         const int32_t *batch = share_corners(mesh, share, i, corners);
-        if (is_near_0)
+        if (takes_lanes)
             draw_exact_batch(&s, sink, batch, id, live);
         else
             draw_far_batch(&s, sink, batch, id, live);
+        if (__builtin_expect(s.n_slivers > 0, 0))
+            draw_slivers(&s, sink);
     }
     TL_SINK_CALL(flush_tiny_exact, sink, &s)
     TL_SINK_CALL(flush_small_exact, sink, &s)
     TL_SINK_CALL(flush_middle_exact, sink, &s)
     TL_SINK_CALL(flush_rows_exact, sink, &s)
+    draw_slivers(&s, sink);
     flush_fragments(target, sink, &s.fragments, s.fragments.n);
+    if (counts_pieces && s.bad_row < 0)
+        count_pieces(&s, max64(share->first, n_whole), share->end);
     *bad_row = s.bad_row;
 }
 
 TL_SINK_COPIES(draw_exact_scene,
-               (const tl_snapped *mesh, const tl_exact_points *points, const tl_window *window, const tl_target *target,
-                const tl_share *share, tl_exact_counts *counts, int64_t *bad_row),
-               mesh, points, window, target, share, counts, bad_row)
+               (const tl_snapped *mesh, int64_t n_whole, const tl_window *window, const tl_target *target,
+                tl_share *share, tl_exact_counts *counts, int64_t *bad_row),
+               mesh, n_whole, window, target, share, counts, bad_row)
 
-static int64_t draw_exact(const tl_snapped *mesh, const tl_exact_points *points, const tl_window *window,
-                          const tl_target *target, const tl_share *share, tl_exact_counts *counts)
+/* The mesh with the triangles that are drawn: without those that planes cut, with the pieces behind the others. */
+static tl_snapped drawn_mesh(const tl_snapped *snapped)
 {
-    const int64_t pixel_bytes = target->sink == TL_SINK_MASK ? 1 : 4;
-    const int64_t rows_at_once = max64(1, (((int64_t)1 << 31) - 1) / target->stride_px);
-    for (int64_t row = 0; row < window->height; row += rows_at_once) {
-        tl_window band = *window;
-        tl_target part = *target;
-        band.y_px += row;
-        band.height = min64(rows_at_once, window->height - row);
-        part.pixels = target->pixels ? (char *)target->pixels + row * target->stride_px * pixel_bytes : NULL;
-        part.depth = target->depth ? target->depth + row * target->stride_px : NULL;
-        part.n_samples = part.stride_px * (band.height - 1) + band.width;
-        int64_t bad_row = -1;
-        if (share->is_first)
-            clear(&band, &part);
-        if (share->first < share->end)
-            TL_SINK_CALL(draw_exact_scene, target->sink, mesh, points, &band, &part, share, counts, &bad_row)
-        if (bad_row >= 0)
-            return bad_row;
-        if (target->sink == TL_SINK_MASK && share->is_last)
-            expand_covered(&band, &part);
+    const tl_exact_points *points = snapped->mesh.exact;
+    tl_snapped drawn = *snapped;
+    drawn.triangles = points->triangles, drawn.n_triangles = points->n_triangles, drawn.names = points->names;
+    return drawn;
+}
+
+/* A band of less than 2^31 pixels. */
+static int64_t draw_exact(const tl_snapped *snapped, const tl_window *band, const tl_target *part, tl_share *share)
+{
+    const tl_snapped drawn = drawn_mesh(snapped);
+    const int has_all = !share->ids && share->end == snapped->n_triangles;
+    tl_exact_counts counts = {0, 0, 0, 0, 0, 0};
+    tl_share own = *share;
+    int64_t bad_row = -1;
+    own.end = has_all ? drawn.n_triangles : share->end;
+    if (own.first < own.end)
+        TL_SINK_CALL(draw_exact_scene, part->sink, &drawn, snapped->n_triangles, band, part, &own, &counts, &bad_row)
+    share->n_others = own.n_others;
+    if (share->counts) {
+        share->counts->n_triangles += counts.n_triangles;
+        share->counts->n_on_grid += counts.n_on_grid;
+        share->counts->n_asked += counts.n_asked;
+        share->counts->n_turns += counts.n_turns;
+        share->counts->n_expansions += counts.n_expansions;
+        share->counts->n_integers += counts.n_integers;
     }
-    return -1;
+    return bad_row;
+}
+
+/* A mesh of either kind. */
+static int64_t draw_mesh(const tl_snapped *snapped, const tl_window *window, const tl_target *target, tl_share *share)
+{
+    return draw_bands_of(snapped, window, target, share, snapped->mesh.exact ? draw_exact : draw_part);
 }
 
 #endif

@@ -33,6 +33,7 @@ typedef struct {
     exact_point corners[3];
     double v[3], dx[3], dy[3], band[3]; /* of the edges in their order; at row 0 of the box */
     double sample_x, sample_y;          /* the first sample of the box */
+    tl_test test;
     int n_cols;
 } asked_triangle;
 
@@ -86,7 +87,7 @@ TL_INLINE vm is_near_integer(vf q, vf band)
 TL_INLINE int is_column_inside(const asked_triangle *a, int i, double y, int64_t k, tl_exact_counts *counts)
 {
     const exact_point sample = {a->sample_x + (double)k, y};
-    return is_inside_edge(a->corners[i], a->corners[i == 2 ? 0 : i + 1], sample, counts);
+    return is_inside_edge(a->corners[i], a->corners[i == 2 ? 0 : i + 1], sample, a->test, counts);
 }
 
 /* The columns of [*first, *end) inside edge i, by bisection. */
@@ -148,17 +149,18 @@ static __attribute__((noinline)) void set_asked(const exact_state *s, const box_
         vf_store(lane, band[edge]), a->band[edge] = lane[k];
     }
     a->sample_x = q->col[i + k] + s->centre_x, a->sample_y = q->row[i + k] + s->centre_y;
-    a->n_cols = q->size[i + k] & 0xffff;
+    a->n_cols = q->size[i + k] & 0xffff, a->test = t->test;
 }
 
 /* floor(q) of edge k in TL_LANES rows, of triangles or of one of them: where q is in its band, by the sign of E at that
  * column in float64.  Adds to *unsure the lanes where that does not tell. */
-TL_INLINE vi decide_floors(const vd *x, const vd *y, int k, vd sample_x, vd py, vm is_left, vf q, vf band, vm *unsure)
+TL_INLINE vi decide_floors(const vd *x, const vd *y, int k, tl_test test, vd sample_x, vd py, vm is_left, vf q, vf band,
+                           vm *unsure)
 {
     const vf off = vf_off_integer(q), size = vf_max(off, vf_sub(vf_set1(0.0f), off)), nearest = vf_sub(q, off);
     const vm near = vf_ge(band, size);
     const vf col = vf_select(is_left, vf_sub(vf_set1(0.0f), nearest), nearest);
-    const lane_sides_of_edge sides = sides_of_edge(x, y, k, vd_add(sample_x, vd_from_vf(col)), py);
+    const lane_sides_of_edge sides = sides_of_edge(x, y, k, vd_add(sample_x, vd_from_vf(col)), py, test);
     const vi end = vi_nearest(nearest), before = vi_sub(end, vi_set1(1));
     const vm told = vm_and_not(vm_or(sides.inside, sides.outside), vf_ge(band, vf_set1(0.49f)));
     *unsure = vm_or(*unsure, vm_and_not(near, told));
@@ -207,7 +209,7 @@ static __attribute__((noinline)) void ask_middle_rows(exact_state *s, const box_
         for (int k = 0; k < 3; k++) {
             const vm is_left = vf_lt(t->dy[k], vf_set1(0.0f)), is_right = vf_lt(vf_set1(0.0f), t->dy[k]);
             const vf row_f = vf_set1((float)row), q_k = vf_mul(vf_fma(t->dx[k], row_f, t->e[k]), inverse[k]);
-            const vi floors = decide_floors(t->x, t->y, k, t->sample_x, py, is_left, q_k, band[k], &unsure);
+            const vi floors = decide_floors(t->x, t->y, k, t->test, t->sample_x, py, is_left, q_k, band[k], &unsure);
             begin = vi_select(is_left, vi_max(begin, vi_sub(zero, floors)), begin);
             end = vi_select(is_right, vi_min(end, vi_add(floors, vi_set1(1))), end);
         }
@@ -244,12 +246,12 @@ TL_INLINE void flush_middle_exact(exact_state *s, tl_sink sink)
         double slope_x[TL_MAX_LANES], x0[TL_MAX_LANES];
         const int end = q->n - i < TL_LANES ? q->n - i : TL_LANES;
         int max_rows = 0;
-        pop_exact(s, &s->middle, i, &t);
+        pop_exact(s, sink, &s->middle, i, &t);
         vi_store(sample, t.sample);
         for (int k = 0; k < end; k++)
             max_rows = q->size[i + k] >> 16 > max_rows ? q->size[i + k] >> 16 : max_rows;
         if (sink_has_depth(sink)) {
-            p = plane_of_lanes(s, &s->middle, i, &t);
+            p = plane_of_lanes(s, &t);
             vd_store(slope_x, p.slope_x), vd_store(x0, t.x[0]);
             for (int row = 0; row < max_rows; row++)
                 vd_store(m.z[row], row_depth(&p, &t, row));
@@ -262,7 +264,7 @@ TL_INLINE void flush_middle_exact(exact_state *s, tl_sink sink)
         const unsigned live = vm_bits(t.live);
         for (int k = 0; k < end; k++) {
             const int32_t size = q->size[i + k];
-            vd z_cols;
+            vd z_cols = vd_set1(0.0);
             if (!(live >> k & 1))
                 continue;
             if (sink_has_depth(sink)) {
@@ -343,7 +345,8 @@ static __attribute__((noinline)) void ask_row_ends(const asked_triangle *a, int 
             continue;
         const vf v = vf_fma(vf_set1((float)a->dx[k]), rows, vf_set1((float)a->v[k])),
                  q = vf_mul(v, vf_set1(1.0f / size));
-        const vi floors = decide_floors(x, y, k, sample_x, py, is_left, q, vf_set1((float)a->band[k]), &unsure);
+        const vi floors =
+            decide_floors(x, y, k, a->test, sample_x, py, is_left, q, vf_set1((float)a->band[k]), &unsure);
         if (a->dy[k] < 0.0)
             begin = vi_max(begin, vi_sub(zero, floors));
         else
@@ -394,7 +397,7 @@ TL_INLINE void draw_rows_exact(exact_state *s, tl_sink sink, const exact_rows *r
             if (!drawn)
                 continue;
             const int begin = __builtin_ctz(drawn), n = 32 - __builtin_clz(drawn) - begin;
-            vd z_col;
+            vd z_col = vd_set1(0.0);
             if (sink_has_depth(sink)) {
                 const vd x = vd_sub(vd_add(vd_set1(sample_x + col0), steps), vd_set1(r->x0[k]));
                 z_col = vd_mul(vd_set1(r->slope_x[k]), x);
@@ -414,12 +417,12 @@ TL_INLINE void flush_rows_exact(exact_state *s, tl_sink sink)
         exact_edges edges;
         exact_rows r;
         int32_t sample[TL_MAX_LANES];
-        pop_exact(s, &s->rows, i, &t);
+        pop_exact(s, sink, &s->rows, i, &t);
         sort_exact_edges(s, &t, TL_FAR_BAND, &edges);
         store_exact_edges(&edges, &r);
         vi_store(sample, t.sample);
         if (sink_has_depth(sink)) {
-            const exact_planes p = plane_of_lanes(s, &s->rows, i, &t);
+            const exact_planes p = plane_of_lanes(s, &t);
             vd_store(r.z0, p.z0), vd_store(r.slope_x, p.slope_x), vd_store(r.slope_y, p.slope_y);
             vd_store(r.x0, t.x[0]), vd_store(r.y0, t.y[0]);
         }

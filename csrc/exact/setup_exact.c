@@ -17,6 +17,7 @@
  *    Farther out both ends of the comparison are clamped to the box.
  * 4. A band above 1/2, of a nearly level edge, asks every row: |q - nearest integer| <= 1/2.  A level edge is never
  *    asked: the box, which is exact, says what it says.  A difference that only float32 takes for 0 is set to 1e-30.
+ *    Squares are tested at corners up to a pixel outside the extent: X and Y are then two pixels more.
  * 5. Vertices on 2^-8 px: the same numbers as integers of 2^-8 px, as batch.c and rows.c have them, which are exact:
  *    the band is 0.  Ties are systematic on grids, so lanes that ask are looked at.
  *
@@ -46,42 +47,42 @@ typedef struct {
 
 /* Everything that one pass over a mesh needs; on the stack of draw_exact. */
 typedef struct {
-    const tl_snapped *mesh;
+    const tl_snapped *mesh; /* with the triangles that are drawn */
     const tl_exact_points *points;
     const tl_window *window;
     const tl_target *target;
     tl_exact_counts *counts;
+    tl_share *share;
     int64_t left, top, right, bottom; /* picture pixels */
-    double centre_x, centre_y;        /* of a pixel's sample, from its upper left corner */
+    double centre_x, centre_y;        /* of a pixel's sample, from its upper left corner; of squares 0 */
     vi last_vertex;
     int64_t bad_row;    /* of triangles, -1: none so far */
     int may_be_on_grid; /* the triangles that asked last were */
     exact_queue tiny, small, middle, rows;
+    int n_slivers; /* triangles of the queues that have no depth plane, and wait to be drawn by themselves */
+    int32_t slivers[4 * (TL_QUEUE + TL_MAX_LANES)];
     fragment_list fragments;
 } exact_state;
 
 /* TL_LANES triangles, turned so that their areas are positive. */
 typedef struct {
     vd x[3], y[3];
-    vd sample_x, sample_y; /* the first sample of the box, in the picture */
-    vf e[3], dx[3], dy[3]; /* edge functions there, and what a row adds and a column subtracts */
-    vf xy;                 /* X * Y */
-    vi sample;             /* the first sample: row * stride_px + column */
-    vm live;               /* of those that are there, the ones with an area, and that are not culled */
-    vm turned;             /* corners 1 and 2 have changed places */
-    vm on_grid;            /* e, dx and dy are exact, in units of their own */
+    tl_test test;                  /* a constant where the sink is */
+    vd sample_x, sample_y;         /* the first sample of the box, in the picture; of squares the upper left corner */
+    vf e[3], dx[3], dy[3];         /* edge functions there, and what a row adds and a column subtracts */
+    vf xy;                         /* X * Y */
+    vi sample;                     /* the first sample: row * stride_px + column */
+    vd area;                       /* twice the area, before the turn */
+    int32_t corners[3 * TL_LANES]; /* vertices, before the turn */
+    vm live;                       /* of those that are there, the ones with an area, and that are not culled */
+    vm turned;                     /* corners 1 and 2 have changed places */
+    vm on_grid;                    /* e, dx and dy are exact, in units of their own */
 } lane_exact;
 
 /* z = (z0 + slope_y * (y - y0)) + slope_x * (x - x0), in pixels from corner 0. */
 typedef struct {
     vd z0, slope_x, slope_y;
 } exact_planes;
-
-TL_INLINE exact_point point_of(const tl_exact_points *points, int32_t i)
-{
-    const double *p = points->points + (int64_t)i * points->stride;
-    return (exact_point){p[0], p[1]};
-}
 
 /* The corners of a triangle that is turned, or not. */
 TL_INLINE void load_turned(const exact_state *s, int32_t id, int is_turned, exact_point *p)
@@ -123,7 +124,7 @@ TL_INLINE void turn_lanes(const exact_state *s, const int32_t *ids, lane_exact *
     const vd left = vd_mul(x1, y2), right = vd_mul(y1, x2), zero = vd_set1(0.0);
     const vd size = vd_add(vd_abs(left), vd_abs(right));
     const vd bound = vd_max(vd_mul(size, vd_set1(0x1p-51)), vd_set1(1e-280));
-    const vd area = vd_sub(left, right);
+    const vd area = t->area = vd_sub(left, right);
     const vm positive = vd_ge(area, bound), negative = vd_ge(vd_sub(zero, area), bound);
     const unsigned doubted = vm_bits(vm_and_not(t->live, vm_or(positive, negative)));
     t->turned = negative;
@@ -142,6 +143,18 @@ TL_INLINE void turn_lanes(const exact_state *s, const int32_t *ids, lane_exact *
     t->x[2] = vd_select(t->turned, x, t->x[2]), t->y[2] = vd_select(t->turned, y, t->y[2]);
 }
 
+/* Where edge k of TL_LANES triangles is tested: as tested_point. */
+TL_INLINE void move_to_corners(const vd *x, const vd *y, int k, tl_test test, vd *px, vd *py)
+{
+    const int next = k == 2 ? 0 : k + 1;
+    const vd zero = vd_set1(0.0), one = vd_set1(1.0);
+    if (test == TL_TEST_SAMPLE)
+        return;
+    const vd inside = test == TL_TEST_OUTER ? one : zero, outside = test == TL_TEST_OUTER ? zero : one;
+    *px = vd_add(*px, vd_select(vd_ge(y[k], y[next]), inside, outside)); /* of equal ones either corner will do */
+    *py = vd_add(*py, vd_select(vd_ge(x[next], x[k]), inside, outside));
+}
+
 /* Edge functions in float32, as the head of this file tells. */
 TL_INLINE void set_float_edges(lane_exact *t)
 {
@@ -150,7 +163,9 @@ TL_INLINE void set_float_edges(lane_exact *t)
     for (int k = 0; k < 3; k++) {
         const int next = k == 2 ? 0 : k + 1;
         const vd dx = vd_sub(t->x[next], t->x[k]), dy = vd_sub(t->y[next], t->y[k]);
-        const vd x = vd_sub(t->x[k], t->sample_x), y = vd_sub(t->y[k], t->sample_y);
+        vd px = t->sample_x, py = t->sample_y;
+        move_to_corners(t->x, t->y, k, t->test, &px, &py);
+        const vd x = vd_sub(t->x[k], px), y = vd_sub(t->y[k], py);
         t->e[k] = vf_from_vd(vd_sub(vd_mul(dy, x), vd_mul(dx, y)));
         t->dx[k] = vf_from_vd(dx), t->dy[k] = vf_from_vd(dy);
         const vm level = vm_and(vf_lt(t->dy[k], least_f), vf_lt(vf_set1(-1e-30f), t->dy[k]));
@@ -185,9 +200,17 @@ static __attribute__((noinline)) void set_grid_edges(lane_exact *t, vm m)
     for (int k = 0; k < 3; k++) {
         const int next = k == 2 ? 0 : k + 1;
         const vi dx = vi_shift_right(vi_sub(x[next], x[k]), 1), dy = vi_shift_right(vi_sub(y[next], y[k]), 1);
-        const vi doubled = vi_sub(vi_mul(dy, x[k]), vi_mul(dx, y[k]));
-        const vm top_left = vi_gt(vi_set1(0), vi_sub(vi_shift_left(dy, 16), dx));
-        const vi e = vi_shift_right(vi_select(top_left, doubled, vi_sub(doubled, vi_set1(1))), TL_GRID_BITS + 1);
+        const vi doubled = vi_sub(vi_mul(dy, x[k]), vi_mul(dx, y[k])), zero = vi_set1(0), one = vi_set1(1);
+        const vm top_left = vi_gt(zero, vi_sub(vi_shift_left(dy, 16), dx));
+        vi biased = vi_select(top_left, doubled, vi_sub(doubled, one));
+        if (t->test != TL_TEST_SAMPLE) { /* as tested_point */
+            const vi inside = t->test == TL_TEST_OUTER ? one : zero, outside = vi_sub(one, inside);
+            const vi right = vi_select(vi_gt(zero, dy), inside, outside);
+            const vi down = vi_select(vi_gt(dx, zero), inside, outside);
+            const vi moved = vi_shift_left(vi_sub(vi_mul(dx, down), vi_mul(dy, right)), TL_GRID_BITS + 1);
+            biased = vi_sub(vi_add(doubled, moved), inside);
+        }
+        const vi e = vi_shift_right(biased, TL_GRID_BITS + 1);
         t->e[k] = vf_select(m, vf_add(vf_from_vi(e), vf_set1(0.5f)), t->e[k]);
         t->dx[k] = vf_select(m, vf_from_vi(dx), t->dx[k]);
         t->dy[k] = vf_select(m, vf_from_vi(dy), t->dy[k]);
@@ -212,9 +235,10 @@ typedef struct {
     vm inside, outside;
 } lane_sides_of_edge;
 
-TL_INLINE lane_sides_of_edge sides_of_edge(const vd *x, const vd *y, int k, vd px, vd py)
+TL_INLINE lane_sides_of_edge sides_of_edge(const vd *x, const vd *y, int k, vd px, vd py, tl_test test)
 {
     const int next = k == 2 ? 0 : k + 1;
+    move_to_corners(x, y, k, test, &px, &py);
     const vd left = vd_mul(vd_sub(x[next], x[k]), vd_sub(py, y[k]));
     const vd right = vd_mul(vd_sub(y[next], y[k]), vd_sub(px, x[k]));
     const vd size = vd_add(vd_abs(left), vd_abs(right)), e = vd_sub(left, right);
@@ -222,26 +246,53 @@ TL_INLINE lane_sides_of_edge sides_of_edge(const vd *x, const vd *y, int k, vd p
     return (lane_sides_of_edge){vd_ge(e, bound), vd_ge(vd_sub(vd_set1(0.0), e), bound)};
 }
 
+/* When a triangle covers a pixel, by what is drawn: squares have masks and counts alone. */
+TL_INLINE tl_test test_of(const exact_state *s, tl_sink sink)
+{
+    return sink == TL_SINK_MASK || sink == TL_SINK_COUNT ? s->window->test : TL_TEST_SAMPLE;
+}
+
+/* Whether a plane gives depth: not to slivers, nor where products leave the range of float64. */
+#define TL_LEAST_BOX 1e-250
+#define TL_MOST_EXTENT 1e120
+
+/* Puts by what lanes could draw but for the depth; as plane_of_points, of which the extents of lanes are in range. */
+TL_INLINE void take_out_slivers(exact_state *s, const exact_queue *queue, int i, lane_exact *t)
+{
+    const vd width = vd_sub(vd_max(vd_max(t->x[0], t->x[1]), t->x[2]), vd_min(vd_min(t->x[0], t->x[1]), t->x[2]));
+    const vd height = vd_sub(vd_max(vd_max(t->y[0], t->y[1]), t->y[2]), vd_min(vd_min(t->y[0], t->y[1]), t->y[2]));
+    const vd box = vd_mul(width, height), scaled = vd_mul(vd_abs(t->area), vd_set1((double)(1 << TL_SLIVER_BITS)));
+    const vm has_plane = vm_and(vd_ge(scaled, box), vd_ge(box, vd_set1(TL_LEAST_BOX)));
+    const vm slivers = vm_and_not(t->live, has_plane);
+    if (__builtin_expect(vm_any(slivers), 0)) {
+        vi_compress(s->slivers + s->n_slivers, slivers, vi_load(queue->boxes.id + i));
+        s->n_slivers += __builtin_popcount(vm_bits(slivers));
+        t->live = vm_and(t->live, has_plane);
+    }
+}
+
 /* The triangles [i, i + TL_LANES) of a queue, turned and with edge functions. */
-TL_INLINE void pop_exact(exact_state *s, const exact_queue *queue, int i, lane_exact *t)
+TL_INLINE void pop_exact(exact_state *s, tl_sink sink, const exact_queue *queue, int i, lane_exact *t)
 {
     const box_queue *q = &queue->boxes;
     const int n = q->n;
-    int32_t corners[3 * TL_LANES];
     for (int k = 0; k < TL_LANES; k++) /* lanes behind the end repeat the last triangle */
-        memcpy(corners + 3 * k, s->mesh->triangles + 3 * (int64_t)q->id[i + k < n ? i + k : n - 1],
-               3 * sizeof *corners);
+        memcpy(t->corners + 3 * k, s->mesh->triangles + 3 * (int64_t)q->id[i + k < n ? i + k : n - 1],
+               3 * sizeof *t->corners);
     for (int k = 0; k < 3; k++)
-        vd_load_pairs(s->points->points, s->points->stride, corners + k, &t->x[k], &t->y[k]);
+        vd_load_pairs(s->points->points, s->points->stride, t->corners + k, &t->x[k], &t->y[k]);
     const vi col = vi_load(q->col + i), row = vi_load(q->row + i);
     t->sample_x = vd_add(vd_from_vi(col), vd_set1(s->centre_x));
     t->sample_y = vd_add(vd_from_vi(row), vd_set1(s->centre_y));
     t->sample = vi_add(vi_mul(vi_sub(row, vi_set1((int32_t)s->top)), vi_set1((int32_t)s->target->stride_px)),
                        vi_sub(col, vi_set1((int32_t)s->left)));
+    t->test = test_of(s, sink);
     t->live = vm_first(n - i);
     t->xy = vf_mul(vf_load(queue->xy + i), vf_set1((float)s->points->band));
     t->on_grid = vm_first(0);
     turn_lanes(s, q->id + i, t);
+    if (sink_has_depth(sink))
+        take_out_slivers(s, queue, i, t);
     const vm good = s->may_be_on_grid ? find_on_grid(t) : vm_first(0);
     if (!s->may_be_on_grid || vm_any(vm_and_not(vm_all(), good)))
         set_float_edges(t);
@@ -255,20 +306,14 @@ TL_INLINE void pop_exact(exact_state *s, const exact_queue *queue, int i, lane_e
 }
 
 /* The depth planes.  The same operations as plane_of_points in alone_exact.c. */
-TL_INLINE exact_planes plane_of_lanes(const exact_state *s, const exact_queue *queue, int i, const lane_exact *t)
+TL_INLINE exact_planes plane_of_lanes(const exact_state *s, const lane_exact *t)
 {
     exact_planes p = {vd_set1(0.0), vd_set1(0.0), vd_set1(0.0)};
     if (s->points->stride < 3)
         return p;
-    const box_queue *q = &queue->boxes;
-    const int n = q->n;
-    int32_t corners[3 * TL_LANES];
     vd z[3];
-    for (int k = 0; k < TL_LANES; k++)
-        memcpy(corners + 3 * k, s->mesh->triangles + 3 * (int64_t)q->id[i + k < n ? i + k : n - 1],
-               3 * sizeof *corners);
     for (int k = 0; k < 3; k++)
-        z[k] = vd_load_singles(s->points->points + 2, s->points->stride, corners + k);
+        z[k] = vd_load_singles(s->points->points + 2, s->points->stride, t->corners + k);
     const vd z1 = vd_select(t->turned, z[2], z[1]), z2 = vd_select(t->turned, z[1], z[2]);
     const vd x1 = vd_sub(t->x[1], t->x[0]), y1 = vd_sub(t->y[1], t->y[0]);
     const vd x2 = vd_sub(t->x[2], t->x[0]), y2 = vd_sub(t->y[2], t->y[0]);

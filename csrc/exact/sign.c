@@ -27,6 +27,12 @@ typedef struct {
     int exponent;
 } scaled_number;
 
+TL_INLINE exact_point point_of(const tl_exact_points *points, int32_t i)
+{
+    const double *p = points->points + (int64_t)i * points->stride;
+    return (exact_point){p[0], p[1]};
+}
+
 /* a + b = sum + error, exactly (D. E. Knuth); a * b = product + error, exactly while neither overflows or
  * underflows. */
 TL_INLINE void two_sum(double a, double b, double *sum, double *error)
@@ -67,9 +73,10 @@ static void set_big(double value, big_number *out)
         mantissa >>= -shift;
         shift = 0;
     }
-    const unsigned __int128 moved = (unsigned __int128)mantissa << (shift & 31);
-    for (int k = 0; k < 3; k++)
-        out->words[(shift >> 5) + k] = (uint32_t)(moved >> 32 * k);
+    const int places = shift & 31, word = shift >> 5;
+    out->words[word] = (uint32_t)(mantissa << places);
+    out->words[word + 1] = (uint32_t)(mantissa << places >> 32);
+    out->words[word + 2] = places ? (uint32_t)(mantissa >> (64 - places)) : 0;
 }
 
 static int compare_words(const uint32_t *a, const uint32_t *b, int n)
@@ -168,6 +175,23 @@ static scaled_number big_edge_value(exact_point a, exact_point b, exact_point p)
 
 #define TL_EXPANSION 17
 
+/* Adds a number to a sum of n numbers of rising size that do not overlap; returns how many it has then.  Zeros are left
+ * out. */
+TL_INLINE int grow_sum(double *sum, int n, double term)
+{
+    int n_kept = 0;
+    for (int i = 0; i < n; i++) {
+        double total, error;
+        two_sum(term, sum[i], &total, &error);
+        term = total;
+        if (error != 0.0)
+            sum[n_kept++] = error;
+    }
+    if (term != 0.0)
+        sum[n_kept++] = term;
+    return n_kept;
+}
+
 /* E as a sum of up to 16 numbers of rising size that do not overlap, so that the last one has its sign; returns their
  * number.  Exact while no number but 0 is below 2^-440 or above 2^500: every product of parts is then a multiple of
  * 2^-1074 and below 2^1004. */
@@ -187,20 +211,8 @@ static int expand_edge(exact_point a, exact_point b, exact_point p, double *sum)
             two_product(right[0][i], right[1][k], &product, &error);
             terms[n_terms++] = -error, terms[n_terms++] = -product;
         }
-    for (int k = 0; k < n_terms; k++) { /* grow-expansion; zeros are left out */
-        double rest = terms[k];
-        int n_kept = 0;
-        for (int i = 0; i < n; i++) {
-            double total, error;
-            two_sum(rest, sum[i], &total, &error);
-            rest = total;
-            if (error != 0.0)
-                sum[n_kept++] = error;
-        }
-        if (rest != 0.0)
-            sum[n_kept++] = rest;
-        n = n_kept;
-    }
+    for (int k = 0; k < n_terms; k++)
+        n = grow_sum(sum, n, terms[k]);
     return n;
 }
 
@@ -261,19 +273,32 @@ TL_INLINE int edge_sign(exact_point a, exact_point b, exact_point p, tl_exact_co
     return slow_sign(a, b, p, counts);
 }
 
-/* Whether a point lies on the inner side of an edge of a triangle with positive area, or on the edge where it is a top
- * or a left one.  Two triangles that share the edge ask the same number with opposite signs, and one of them owns a
- * tie: nothing is left open and nothing is covered twice. */
-TL_INLINE int is_inside_edge(exact_point a, exact_point b, exact_point p, tl_exact_counts *counts)
+/* The point at which an edge is tested: the sample; of the square that has its upper left corner there, the corner that
+ * lies farthest inside (OUTER) or outside (INNER), as walk.h tells. */
+TL_INLINE exact_point tested_point(exact_point a, exact_point b, exact_point p, tl_test test)
 {
-    const int sign = edge_sign(a, b, p, counts);
-    return sign ? sign > 0 : b.y < a.y || (b.y == a.y && b.x > a.x);
+    const int is_outer = test == TL_TEST_OUTER;
+    if (test == TL_TEST_SAMPLE)
+        return p;
+    return (exact_point){p.x + (is_outer == (b.y < a.y)), p.y + (is_outer == (b.x > a.x))};
 }
 
-static int is_inside(const exact_point *corners, exact_point p, tl_exact_counts *counts)
+/* Whether a point lies on the inner side of an edge of a triangle with positive area, or on the edge where it is a top
+ * or a left one.  Two triangles that share the edge ask the same number with opposite signs, and one of them owns a
+ * tie: nothing is left open and nothing is covered twice.  Of squares a tie is within for INNER alone. */
+TL_INLINE int is_inside_edge(exact_point a, exact_point b, exact_point p, tl_test test, tl_exact_counts *counts)
 {
-    return is_inside_edge(corners[0], corners[1], p, counts) && is_inside_edge(corners[1], corners[2], p, counts) &&
-           is_inside_edge(corners[2], corners[0], p, counts);
+    const int sign = edge_sign(a, b, tested_point(a, b, p, test), counts);
+    if (sign || test != TL_TEST_SAMPLE)
+        return sign > 0 || (sign == 0 && test == TL_TEST_INNER);
+    return b.y < a.y || (b.y == a.y && b.x > a.x);
+}
+
+static int is_inside(const exact_point *corners, exact_point p, tl_test test, tl_exact_counts *counts)
+{
+    return is_inside_edge(corners[0], corners[1], p, test, counts) &&
+           is_inside_edge(corners[1], corners[2], p, test, counts) &&
+           is_inside_edge(corners[2], corners[0], p, test, counts);
 }
 
 /* E to within 2^-50 of its size. */
@@ -286,6 +311,54 @@ static scaled_number edge_value(exact_point a, exact_point b, exact_point p)
     for (int k = 0; k < n; k++)
         total += sum[k];
     return (scaled_number){total, 0};
+}
+
+/* An edge function at a point, times an integer of up to 10 bits. */
+typedef struct {
+    exact_point a, b, p;
+    int factor;
+} edge_term;
+
+/* The sign of a sum of n edge functions, in integers: what is positive, and what is negative. */
+static int big_terms_sign(const edge_term *terms, int n)
+{
+    const int n_words = 2 * TL_BIG_WORDS;
+    big_product sums[2], size;
+    memset(sums, 0, sizeof sums);
+    for (int k = 0; k < n; k++) {
+        const int sign = big_edge(terms[k].a, terms[k].b, terms[k].p, &size) * (terms[k].factor < 0 ? -1 : 1);
+        const uint64_t factor = (uint64_t)(terms[k].factor < 0 ? -terms[k].factor : terms[k].factor);
+        uint64_t carry = 0;
+        for (int i = 0; i < n_words; i++) { /* |E| is below 2^4200, the words have 4352 bits */
+            carry += factor * size.words[i];
+            size.words[i] = (uint32_t)carry;
+            carry >>= 32;
+        }
+        if (sign)
+            add_words(sums[sign < 0].words, size.words, n_words, sums[sign < 0].words);
+    }
+    return compare_words(sums[0].words, sums[1].words, n_words);
+}
+
+#define TL_MAX_TERMS 3
+
+/* The same by sums that do not overlap, where these are in range. */
+static int terms_sign(const edge_term *terms, int n)
+{
+    double sum[2 * 16 * TL_MAX_TERMS + 1];
+    int n_sum = 0;
+    for (int k = 0; k < n; k++) {
+        double edge[TL_EXPANSION], product, error;
+        if (!are_in_range(terms[k].a, terms[k].b, terms[k].p))
+            return big_terms_sign(terms, n);
+        const int n_edge = expand_edge(terms[k].a, terms[k].b, terms[k].p, edge);
+        for (int i = 0; i < n_edge; i++) {
+            two_product(edge[i], terms[k].factor, &product, &error);
+            n_sum = grow_sum(sum, n_sum, error);
+            n_sum = grow_sum(sum, n_sum, product);
+        }
+    }
+    return n_sum ? (sum[n_sum - 1] > 0.0) - (sum[n_sum - 1] < 0.0) : 0;
 }
 
 /* The quotient of two of them; both are within the range of a float64 after one shift. */

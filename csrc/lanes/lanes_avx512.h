@@ -526,7 +526,7 @@ TL_INLINE vi vi_ceil(vd a) { return _mm512_inserti64x4(_mm512_castsi256_si512(ce
 TL_INLINE vf vf_off_integer(vf a) { return _mm512_reduce_ps(a, _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC); }
 TL_INLINE vd vd_off_integer(vd a)
 {
-    const int nearest = _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC;
+    enum { nearest = _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC }; /* clang: a constant of the language */
     return (vd){_mm512_reduce_pd(a.lo, nearest), _mm512_reduce_pd(a.hi, nearest)};
 }
 

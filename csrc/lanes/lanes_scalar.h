@@ -328,7 +328,8 @@ TL_INLINE vd vd_load_singles(const double *base, int stride, const int32_t *firs
 {
     return base[(int64_t)*first * stride];
 }
-TL_INLINE vi vi_ceil(vd a) { return fabs(a) < 0x1p30 ? (vi)ceil(a) : INT32_MIN; }
+/* ceil() is a call where there are no lanes */
+TL_INLINE vi vi_ceil(vd a) { return fabs(a) < 0x1p30 ? (vi)a + ((double)(vi)a < a) : INT32_MIN; }
 /* a less the nearest integer */
 TL_INLINE vf vf_off_integer(vf a) { return a - rintf(a); }
 TL_INLINE vd vd_off_integer(vd a) { return fabs(a) < 0x1p51 ? a - ((a + 0x1.8p52) - 0x1.8p52) : 0.0; }

@@ -92,6 +92,14 @@ static inline step_range steps_along(int64_t u0, int direction, int64_t extent, 
     return (step_range){max64(0, u0 - (extent - 1)), min64(d, u0)};
 }
 
+/* floor((a b + c) / q) for q > 0. */
+static inline int64_t floor_of_share(int64_t a, int64_t b, int64_t c, int64_t q)
+{
+    tl_int128 quotient, rest;
+    i128_floor_divide(i128_add(i128_product(a, b), i128_from(c)), i128_from(q), &quotient, &rest);
+    return i128_low(quotient);
+}
+
 /* Of these the ones where the line is inside across: at step k it is at v0 + direction * floor((q k + d / 2) / d). */
 static inline step_range steps_across(step_range r, int64_t v0, int direction, int64_t extent, int64_t d, int64_t q)
 {
@@ -99,9 +107,9 @@ static inline step_range steps_across(step_range r, int64_t v0, int direction, i
     if (high < 0 || low > q)
         return (step_range){0, -1};
     if (low > 0) /* rounded up */
-        r.first = max64(r.first, (int64_t)(((tl_int128)low * d - d / 2 + (q - 1)) / q));
+        r.first = max64(r.first, floor_of_share(low, d, q - 1 - d / 2, q));
     if (high < q)
-        r.last = min64(r.last, (int64_t)((((tl_int128)high + 1) * d - d / 2 - 1) / q));
+        r.last = min64(r.last, floor_of_share(high + 1, d, -1 - d / 2, q));
     return r;
 }
 
@@ -124,9 +132,11 @@ static void draw_line(const line_state *s, const int32_t *edge)
     tl_count_work(w, TL_SETUP_PX + 4 * max64(0, r.last - r.first)); /* a pixel takes as long as four of a row */
     if (r.first > r.last)
         return;
-    const tl_int128 across = (tl_int128)q * r.first + d / 2;
-    const int64_t taken = d ? (int64_t)(across / d) : 0;
-    uint64_t rest = d ? (uint64_t)(across % d) : 0;
+    tl_int128 steps = i128_from(0), left = i128_from(0);
+    if (d)
+        i128_floor_divide(i128_add(i128_product(q, r.first), i128_from(d / 2)), i128_from(d), &steps, &left);
+    const int64_t taken = i128_low(steps);
+    uint64_t rest = (uint64_t)i128_low(left);
     const int64_t x = x0 + right * (is_steep ? taken : r.first), y = y0 + (is_steep ? r.first : taken);
     const int64_t along = is_steep ? stride : right, aside = is_steep ? right : stride;
     const double slope = d ? (ends[1].z - ends[0].z) / (double)d : 0.0;

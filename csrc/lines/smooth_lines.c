@@ -146,27 +146,32 @@ static void walk_far_line(const smooth_state *s, const smooth_line *l)
     const double du = (double)l->du, dv = (double)l->dv, len2 = du * du + dv * dv;
     const double per_pixel = 0.5 / (double)(1 << bits);
     for (int64_t column = l->first; column < l->end; column++) {
-        const tl_int128 u = ((tl_int128)(column + l->u_px) * 2 + 1) * ((tl_int128)1 << bits) - (tl_int128)l->u_fx * 2;
-        const tl_int128 half = u * l->dv, across_u = half / l->du - (half % l->du != 0 && (half < 0) != (l->du < 0));
-        const tl_int128 middle = ((across_u + (tl_int128)l->v_fx * 2) >> (bits + 1)) - l->v_px;
+        const tl_int128 u = center_from_128(column + l->u_px, bits, l->u_fx);
+        tl_int128 across_u, rest;
+        i128_floor_divide(i128_times(u, l->du < 0 ? -l->dv : l->dv), i128_from(l->du < 0 ? -l->du : l->du), &across_u,
+                          &rest);
+        const tl_int128 middle =
+            i128_sub(i128_shift_right(i128_add(across_u, i128_product(l->v_fx, 2)), bits + 1), i128_from(l->v_px));
         for (int64_t aside = -1; aside <= 1; aside++) {
-            const tl_int128 row = middle + aside;
-            if (row < 0 || row >= l->size_v)
+            const tl_int128 at = i128_add(middle, i128_from(aside));
+            if (i128_is_negative(at) || !i128_less(at, i128_from(l->size_v)))
                 continue;
-            const tl_int128 v = (2 * (row + l->v_px) + 1) * ((tl_int128)1 << bits) - (tl_int128)l->v_fx * 2;
-            const double across = (double)(tl_int128)((tl_uint128)u * (tl_uint128)(tl_int128)l->dv -
-                                                      (tl_uint128)v * (tl_uint128)(tl_int128)l->du);
-            const double along = (double)u * du + (double)v * dv, u1 = (double)(u - (tl_int128)l->du * 2);
-            const double v1 = (double)(v - (tl_int128)l->dv * 2);
+            const int64_t row = i128_low(at);
+            const tl_int128 v = center_from_128(row + l->v_px, bits, l->v_fx);
+            const double u0 = i128_to_f64(u), v0 = i128_to_f64(v);
+            const double across =
+                i128_to_f64(i128_wrapping_sub(i128_wrapping_times(u, l->dv), i128_wrapping_times(v, l->du)));
+            const double along = u0 * du + v0 * dv, u1 = i128_to_f64(i128_sub(u, i128_product(l->du, 2)));
+            const double v1 = i128_to_f64(i128_sub(v, i128_product(l->dv, 2)));
             double square = across * across / len2, share = along / (2.0 * len2);
             if (along <= 0.0)
-                square = (double)u * (double)u + (double)v * (double)v, share = 0.0;
+                square = u0 * u0 + v0 * v0, share = 0.0;
             else if (along >= 2.0 * len2)
                 square = u1 * u1 + v1 * v1, share = 1.0;
             const double value = 1.0 - sqrt(square) * per_pixel;
             if (value > 0.0)
-                put_smooth(s->target, l->is_steep ? column * stride + (int64_t)row : (int64_t)row * stride + column,
-                           (float)value, (float)(l->z + share * l->dz), s->target->depth != NULL);
+                put_smooth(s->target, l->is_steep ? column * stride + row : row * stride + column, (float)value,
+                           (float)(l->z + share * l->dz), s->target->depth != NULL);
         }
     }
 }

@@ -60,41 +60,52 @@ static int compare_exactly(const tl_triangle *t, int64_t x_px, int64_t y_px, int
     const tl_int128 terms[3] = {doubled_edge(t, 2, 0, x_px, y_px, bits), doubled_edge(t, 0, 1, x_px, y_px, bits),
                                 weight_sum(t)};
     const int factors[3] = {2 * d1, 2 * d2, -halves};
-    tl_int128 high = 0, low = 0; /* the terms reach 2^127: two limbs */
+    tl_int128 high = i128_from(0), low = high; /* high 2^64 + low: the terms reach 2^127 */
     for (int k = 0; k < 3; k++) {
-        high += (terms[k] >> 64) * factors[k];
-        low += (tl_int128)(uint64_t)terms[k] * factors[k];
+        high = i128_add(high, i128_times(i128_shift_right(terms[k], 64), factors[k]));
+        low = i128_add(low, i128_times(i128_from_u64((uint64_t)i128_low(terms[k])), factors[k]));
     }
-    high += low >> 64;
-    low = (tl_int128)(uint64_t)low;
-    return high < 0 ? -1 : high > 0 || low > 0;
+    high = i128_add(high, i128_shift_right(low, 64));
+    return i128_is_zero(high) ? i128_low(low) != 0 : i128_sign(high);
+}
+
+/* The same of vertices that are not snapped. */
+static int compare_points(const resolve_state *s, int64_t x_px, int64_t y_px, int bits, int d1, int d2, int halves)
+{
+    const exact_point *p = s->points, sample = sample_of(s->exact, x_px, y_px, bits);
+    const edge_term terms[3] = {
+        {p[2], p[0], sample, 2 * d1}, {p[0], p[1], sample, 2 * d2}, {p[0], p[1], p[2], -halves}};
+    tl_exact_counts counts = {0, 0, 0, 0, 0, 0};
+    return terms_sign(terms, 3) * edge_sign(p[0], p[1], p[2], &counts);
 }
 
 /* The exact value of a channel rounded to nearest, ties to even; `value` decides unless it is next to a tie. */
-static inline uint8_t round_color(const tl_triangle *t, int64_t x_px, int64_t y_px, int bits, int c0, int d1, int d2,
+static inline uint8_t round_color(const resolve_state *s, int64_t x_px, int64_t y_px, int bits, int c0, int d1, int d2,
                                   double value)
 {
-    const int below = (int)floor(value);
+    const int below = (int)floor(value), halves = 2 * (below - c0) + 1;
     if (fabs(value - below - 0.5) >= 0x1p-20)
         return (uint8_t)(int)rint(value);
-    const int side = compare_exactly(t, x_px, y_px, bits, d1, d2, 2 * (below - c0) + 1);
+    const int side = s->exact ? compare_points(s, x_px, y_px, bits, d1, d2, halves)
+                              : compare_exactly(&s->triangle, x_px, y_px, bits, d1, d2, halves);
     return (uint8_t)(below + (side > 0 || (side == 0 && (below & 1))));
 }
 
-/* One channel of n samples. */
-static inline void paint_run_u8(const tl_triangle *t, const uint8_t *c, int64_t x_px, int64_t y_px, int bits,
-                                const double *w1, const double *w2, int n, int n_channels, uint8_t *restrict out)
+/* One channel of n samples; w1 and w2 are parts of w_sum. */
+static inline void paint_run_u8(const resolve_state *s, const uint8_t *c, int64_t x_px, int64_t y_px, int bits,
+                                const double *w1, const double *w2, double w_sum, int n, int n_channels,
+                                uint8_t *restrict out)
 {
     const int c0 = c[0], d1 = c[1] - c0, d2 = c[2] - c0;
-    const double slope1 = d1 / t->w_sum, slope2 = d2 / t->w_sum;
+    const double slope1 = d1 / w_sum, slope2 = d2 / w_sum;
     for (int k = 0; k < n; k++)
-        out[k * n_channels] = round_color(t, x_px + k, y_px, bits, c0, d1, d2, c0 + (w1[k] * slope1 + w2[k] * slope2));
+        out[k * n_channels] = round_color(s, x_px + k, y_px, bits, c0, d1, d2, c0 + (w1[k] * slope1 + w2[k] * slope2));
 }
 
-static inline void paint_run_f32(const tl_triangle *t, const float *c, const double *w1, const double *w2, int n,
+static inline void paint_run_f32(const float *c, const double *w1, const double *w2, double w_sum, int n,
                                  int n_channels, float *restrict out)
 {
-    const double c0 = c[0], slope1 = (c[1] - c0) / t->w_sum, slope2 = (c[2] - c0) / t->w_sum;
+    const double c0 = c[0], slope1 = (c[1] - c0) / w_sum, slope2 = (c[2] - c0) / w_sum;
     for (int k = 0; k < n; k++)
         out[k * n_channels] = (float)(c0 + (w1[k] * slope1 + w2[k] * slope2));
 }
@@ -104,10 +115,10 @@ static void paint_piece(const resolve_state *s, const int32_t *corners, int64_t 
                         const void *colors, int n_channels, int is_u8, void *out)
 {
     double part[3], sum = 0.0;
+    edges_of_pixel(s, x_px, y_px, bits, part);
     for (int k = 0; k < 3; k++) {
-        const int a = k == 2 ? 0 : k + 1, b = 3 - k - a;
-        const tl_int128 edge = doubled_edge(&s->triangle, a, b, x_px, y_px, bits);
-        part[k] = edge > 0 ? (double)edge : 0.0; /* below 0 only where a piece covers a pixel but not its centre */
+        if (!s->exact) /* a piece may cover a pixel but not its centre */
+            part[k] = part[k] > 0.0 ? part[k] : 0.0;
         sum += part[k];
     }
     for (int c = 0; c < n_channels; c++) {
@@ -125,6 +136,18 @@ static void paint_piece(const resolve_state *s, const int32_t *corners, int64_t 
     }
 }
 
+/* The weights of corners 1 and 2 of n samples of a triangle that is not snapped, as parts of 1. */
+static void exact_weights_at(const resolve_state *s, int64_t x_px, int64_t y_px, int bits, int n, double *w1,
+                             double *w2)
+{
+    for (int k = 0; k < n; k++) {
+        double e[3];
+        edges_of_pixel(s, x_px + k, y_px, bits, e);
+        const double inverse = 1.0 / ((e[0] + e[1]) + e[2]);
+        w1[k] = e[1] * inverse, w2[k] = e[2] * inverse;
+    }
+}
+
 /* n samples of one triangle in a row. */
 static void paint_run(resolve_state *s, const tl_window *window, int64_t row, int64_t col, int n, const void *colors,
                       int n_channels, int is_u8, void *out)
@@ -133,18 +156,24 @@ static void paint_run(resolve_state *s, const tl_window *window, int64_t row, in
     tl_triangle *t = &s->triangle;
     const int bits = window->subpixel_bits;
     const int64_t x_px = col + window->x_px, y_px = row + window->y_px;
-    t->row0 = row, t->col0 = col;
-    setup_weights(t, window);
-    weights_at(t, window, row, col, n, w1, w2);
+    double w_sum = 1.0;
+    if (s->exact) {
+        exact_weights_at(s, x_px, y_px, bits, n, w1, w2);
+    } else {
+        t->row0 = row, t->col0 = col;
+        setup_weights(t, window);
+        weights_at(t, window, row, col, n, w1, w2);
+        w_sum = t->w_sum;
+    }
     for (int c = 0; c < n_channels; c++) {
         const int64_t at[3] = {(int64_t)t->corner[0] * n_channels + c, (int64_t)t->corner[1] * n_channels + c,
                                (int64_t)t->corner[2] * n_channels + c};
         if (is_u8) {
             const uint8_t *all = colors, own[3] = {all[at[0]], all[at[1]], all[at[2]]};
-            paint_run_u8(t, own, x_px, y_px, bits, w1, w2, n, n_channels, (uint8_t *)out + c);
+            paint_run_u8(s, own, x_px, y_px, bits, w1, w2, w_sum, n, n_channels, (uint8_t *)out + c);
         } else {
             const float *all = colors, own[3] = {all[at[0]], all[at[1]], all[at[2]]};
-            paint_run_f32(t, own, w1, w2, n, n_channels, (float *)out + c);
+            paint_run_f32(own, w1, w2, w_sum, n, n_channels, (float *)out + c);
         }
     }
 }

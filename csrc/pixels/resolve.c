@@ -166,10 +166,48 @@ TL_INLINE vi mean_bytes(const mean_source *s, const int32_t *labels, vm live, vi
                      vi_or(mean_pairs(even, s->sample_bits), vi_shift_left(mean_pairs(odd, s->sample_bits), 8)), color);
 }
 
+/* Pixels that are looked at as one: inside of a large triangle, and outside of all, every sample has one label. */
+#define MEAN_BLOCK 64
+
+TL_INLINE int block_has_one_label(const mean_source *s, const int32_t *labels)
+{
+    const int32_t *last = labels + (((int64_t)1 << s->sample_bits) - 1) * s->stride;
+    if (labels[0] != labels[MEAN_BLOCK - 1] || labels[0] != last[0] || labels[0] != last[MEAN_BLOCK - 1])
+        return 0; /* edges are seldom missed here */
+    const vi first = vi_set1(labels[0]);
+    vi differs = vi_set1(0);
+    for (; labels <= last; labels += s->stride)
+        for (int i = 0; i < MEAN_BLOCK; i += TL_LANES)
+            differs = vi_or(differs, vi_xor(vi_load(labels + i), first));
+    return !vm_any(vm_and_not(vm_all(), vi_eq(differs, vi_set1(0))));
+}
+
+/* MEAN_BLOCK pixels of one triangle, or none of any. */
+TL_INLINE void paint_block(const mean_source *s, int32_t label, int pixel_bytes, char *pixels)
+{
+    if (label < 0)
+        return;
+    const char *color = s->colors + (int64_t)label * s->row_bytes;
+    if (pixel_bytes == 4) {
+        int32_t whole;
+        memcpy(&whole, color, 4);
+        for (int i = 0; i < MEAN_BLOCK; i += TL_LANES)
+            vi_store((int32_t *)(void *)pixels + i, vi_set1(whole));
+        return;
+    }
+    memcpy(pixels, color, (size_t)pixel_bytes);
+    for (size_t done = (size_t)pixel_bytes; done < (size_t)pixel_bytes * MEAN_BLOCK; done *= 2)
+        memcpy(pixels + done, pixels, done);
+}
+
 /* n pixels of n_channels bytes. */
 TL_INLINE void mean_flat_bytes(const mean_source *s, const int32_t *labels, int64_t n, int n_channels, char *pixels)
 {
     for (int64_t i = 0; i < n; i += TL_LANES) {
+        while (i % MEAN_BLOCK == 0 && i + MEAN_BLOCK < n && block_has_one_label(s, labels + i)) {
+            paint_block(s, labels[i], n_channels, pixels + n_channels * i);
+            i += MEAN_BLOCK;
+        }
         const vm live = vm_first(n - i);
         const int end = n - i < TL_LANES ? (int)(n - i) : TL_LANES;
         char *const own = pixels + n_channels * i;
@@ -197,6 +235,10 @@ TL_INLINE void mean_flat_pixels(const mean_source *s, const int32_t *labels, int
 {
     const int pixel_bytes = s->n_channels * (s->is_u8 ? 1 : 4);
     for (int64_t i = 0; i < n; i++, labels++, pixel += pixel_bytes) {
+        while (i % MEAN_BLOCK == 0 && i + MEAN_BLOCK < n && block_has_one_label(s, labels)) {
+            paint_block(s, labels[0], pixel_bytes, pixel);
+            i += MEAN_BLOCK, labels += MEAN_BLOCK, pixel += (int64_t)MEAN_BLOCK * pixel_bytes;
+        }
         const int32_t first = labels[0];
         int32_t differs = 0;
         for (int k = 1; k < 1 << s->sample_bits; k++)

@@ -21,6 +21,7 @@
 #include "lanes/lanes.h"
 #include "vertex/clip.c"
 #include "vertex/project.c"
+#include "exact/sign.c"
 #include "raster/setup.c"
 
 #define TL_SPAN 512 /* pixels of a row that are shaded together */
@@ -433,6 +434,46 @@ static void homogeneous_edges(special_run *e, const tl_view *view, const tl_vert
     e->area = det < 0.0 ? -1.0f : 1.0f;
 }
 
+/* Edge functions over the area, of vertices that are not snapped, whose range no float32 has.  Of a sliver whose box
+ * holds 2^36 of its areas or more float64 has lost the weights: it takes the mean of its corners. */
+static void normalize_edges(special_run *e, const tl_vertex_set *set, const int32_t *corners, const double *x_fx,
+                            const double *y_fx, float *row_step)
+{
+    const double width = fmax(x_fx[0], fmax(x_fx[1], x_fx[2])) - fmin(x_fx[0], fmin(x_fx[1], x_fx[2]));
+    const double height = fmax(y_fx[0], fmax(y_fx[1], y_fx[2])) - fmin(y_fx[0], fmin(y_fx[1], y_fx[2]));
+    const double area = (x_fx[2] - x_fx[0]) * (y_fx[1] - y_fx[0]) - (x_fx[1] - x_fx[0]) * (y_fx[2] - y_fx[0]);
+    const double box = width * height, scale = 1.0 / fabs(area);
+    if (isfinite(box) && isfinite(scale) && box <= fabs(area) * 0x1p36) {
+        for (int k = 0; k < 3; k++) {
+            const int a = k == 2 ? 0 : k + 1, b = 3 - k - a;
+            e->at[k] *= scale, e->step[k] *= scale;
+            row_step[k] = (float)((x_fx[a] - x_fx[b]) * scale);
+        }
+        e->area = area < 0.0 ? -1.0f : 1.0f;
+        return;
+    }
+    tl_exact_counts counts = {0, 0, 0, 0, 0, 0};
+    const int sign = -edge_sign(point_of(set->exact, corners[0]), point_of(set->exact, corners[1]),
+                                point_of(set->exact, corners[2]), &counts);
+    for (int k = 0; k < 3; k++)
+        e->at[k] = sign / 3.0, e->step[k] = 0.0, row_step[k] = 0.0f;
+    e->area = (float)sign;
+}
+
+/* The corners in sub-pixels, seen from the sample. */
+static void place_special(const tl_vertex_set *set, const int32_t *corners, double unit, double *x_fx, double *y_fx)
+{
+    for (int k = 0; k < 3; k++) {
+        if (set->exact) {
+            const double *p = set->exact->points + (int64_t)corners[k] * set->exact->stride;
+            x_fx[k] = p[0] * unit - set->sample_x_fx, y_fx[k] = p[1] * unit - set->sample_y_fx;
+            continue;
+        }
+        const tl_wide v = vertex_fx(set, corners[k]);
+        x_fx[k] = (double)v.x_fx, y_fx[k] = (double)v.y_fx;
+    }
+}
+
 /* Sets up one run by itself and puts it into its lane. */
 static void set_special(shade_runs *s, int slot, int lane, int64_t row, run_setup *r)
 {
@@ -446,11 +487,10 @@ static void set_special(shade_runs *s, int slot, int lane, int64_t row, run_setu
         homogeneous_edges(e, s->view, set, corners, y, unit, row_step);
     } else {
         double x_fx[3], y_fx[3];
-        for (int k = 0; k < 3; k++) {
-            const tl_wide v = vertex_fx(set, corners[k]);
-            x_fx[k] = (double)v.x_fx, y_fx[k] = (double)v.y_fx;
-        }
+        place_special(set, corners, unit, x_fx, y_fx);
         special_edges(e, x_fx, y_fx, y, row_step);
+        if (set->exact)
+            normalize_edges(e, set, corners, x_fx, y_fx, row_step);
     }
     s->ints[RUN_SPECIAL][slot + lane] = ++s->n_special;
     vf *changed[10] = {&r->area,        &r->col_step[0], &r->col_step[1], &r->col_step[2], &r->row_step[0],
@@ -472,6 +512,18 @@ static void set_special(shade_runs *s, int slot, int lane, int64_t row, run_setu
     }
 }
 
+/* Where all runs are special. */
+static void set_no_edges(shade_runs *s, int slot, run_setup *r)
+{
+    const vi zero = vi_set1(0);
+    const int ints[5] = {RUN_E1, RUN_E2, RUN_STEP1, RUN_STEP2, RUN_SUM};
+    for (int k = 0; k < 5; k++)
+        vi_store(s->ints[ints[k]] + slot, zero);
+    for (int k = 0; k < 3; k++)
+        r->col_step[k] = r->row_step[k] = vf_set1(0.0f);
+    r->area = vf_set1(0.0f);
+}
+
 /* Edge functions of TL_LANES runs in a row, at column 0 of the row: what wraps on the way there comes back at the
  * pixel. */
 TL_INLINE vm set_edges(shade_runs *s, int slot, int64_t row, run_setup *r)
@@ -483,6 +535,10 @@ TL_INLINE vm set_edges(shade_runs *s, int slot, int64_t row, run_setup *r)
     const vi py = vi_set1((int32_t)((uint32_t)(row + s->window->y_px) << bits) + half + set->sample_y_fx);
     vi x[3], y[3];
     vm is_special = bits == 0 ? vm_all() : vm_first(0);
+    if (set->exact) {
+        set_no_edges(s, slot, r);
+        return vm_all();
+    }
     for (int k = 0; k < 3; k++) {
         vz z;
         load_vertices_by(1, set->vertices, r->corners[k], &x[k], &y[k], &z);

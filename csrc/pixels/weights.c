@@ -43,7 +43,7 @@ static void start_weights(weighed_span *r, const tl_snapped *snapped, const tl_w
     memset(r->q, 0, sizeof r->q);
     memset(r->corners, 0, sizeof r->corners);
     r->alone.id = -1;
-    r->has_w = snapped->mesh.inv_w || (source && !(source->matrix && source->is_affine));
+    r->has_w = !snapped->mesh.exact && (snapped->mesh.inv_w || (source && !(source->matrix && source->is_affine)));
 }
 
 /* How a run that int32 does not hold is to be weighed. */
@@ -52,6 +52,8 @@ static int32_t weigh_special(shade_runs *s, const int32_t *corners, int64_t row)
     const tl_vertex_set *set = &s->snapped->mesh;
     double x_fx[3], y_fx[3], low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
     float row_step[3];
+    if (set->exact)
+        return TL_ALONE;
     for (int k = 0; k < 3; k++) {
         if (set->vertices[corners[k]].x_fx == TL_SPECIAL)
             return TL_ALONE;

@@ -10,7 +10,9 @@
 #include "vertex/clip.c"
 #include "vertex/fixed.h"
 #include "vertex/project.c"
+#include "exact/sign.c"
 #include "raster/setup.c"
+#include "pixels/weights_exact.c"
 
 /* The triangle (or piece) under the last pixel: neighbours mostly share it. */
 typedef struct {
@@ -19,15 +21,18 @@ typedef struct {
     const double *piece[3]; /* weights of a piece's corners in the source triangle, or NULL */
     double inv_w[3];
     int slot[3]; /* which of the input triangle's corners each turned corner is */
+    /* instead of `triangle` where vertices are not snapped: the mesh's own, and the corners, which are not turned */
+    const tl_vertex_set *exact;
+    exact_point points[3];
 } resolve_state;
 
 static inline int covers(const tl_triangle *t, int64_t x_px, int64_t y_px, int bits)
 {
     for (int k = 0; k < 3; k++) {
         const int next = k == 2 ? 0 : k + 1;
-        const tl_int128 dy = (tl_int128)t->y_fx[next] - t->y_fx[k], dx = (tl_int128)t->x_fx[next] - t->x_fx[k];
+        const int64_t dy = t->y_fx[next] - t->y_fx[k], dx = t->x_fx[next] - t->x_fx[k];
         const int top_left = dy < 0 || (dy == 0 && dx > 0);
-        if (doubled_edge(t, k, next, x_px, y_px, bits) - !top_left < 0)
+        if (i128_less(doubled_edge(t, k, next, x_px, y_px, bits), i128_from(!top_left)))
             return 0;
     }
     return 1;
@@ -57,6 +62,32 @@ static int load_resolved(resolve_state *s, const tl_vertex_set *set, const int32
     return 1;
 }
 
+/* As find_triangle, of vertices that are not snapped. */
+static int find_exact(resolve_state *s, const tl_snapped *snapped, int64_t id, int64_t x_px, int64_t y_px, int bits)
+{
+    const tl_exact_points *points = snapped->mesh.exact;
+    const int32_t *corners = snapped->triangles + 3 * id;
+    for (int k = 0; k < 3; k++) {
+        s->slot[k] = k, s->piece[k] = NULL;
+        s->points[k] = point_of(points, corners[k]);
+        s->inv_w[k] = inverse_w(&snapped->mesh, corners[k]);
+        s->triangle.corner[k] = corners[k];
+    }
+    if (is_clipped(&snapped->mesh, corners)) {
+        const tl_exact_pieces *p = points->pieces;
+        const int64_t i = piece_at(p, id, sample_of(&snapped->mesh, x_px, y_px, bits), s->points);
+        if (i < 0)
+            return 0;
+        for (int k = 0; k < 3; k++) {
+            s->piece[k] = p->weights + 3 * (int64_t)p->triangles[3 * i + k];
+            s->inv_w[k] = p->inv_w[p->triangles[3 * i + k]];
+        }
+    }
+    s->exact = &snapped->mesh;
+    s->id = id;
+    return 1;
+}
+
 /* Makes `s` describe the triangle or piece that shows at the pixel; 0 when the buffer does not belong to the mesh. */
 static int find_triangle(resolve_state *s, const tl_snapped *snapped, int64_t id, int64_t x_px, int64_t y_px, int bits)
 {
@@ -69,6 +100,9 @@ static int find_triangle(resolve_state *s, const tl_snapped *snapped, int64_t id
     for (int k = 0; k < 3; k++)
         if (corners[k] < 0 || corners[k] >= snapped->mesh.n_vertices) /* the caller's array may have changed */
             return 0;
+    if (snapped->mesh.exact)
+        return find_exact(s, snapped, id, x_px, y_px, bits);
+    s->exact = NULL;
     if (!is_clipped(&snapped->mesh, corners)) {
         s->piece[0] = NULL;
         if (!load_resolved(s, &snapped->mesh, corners))
@@ -91,14 +125,27 @@ static int find_triangle(resolve_state *s, const tl_snapped *snapped, int64_t id
     return 0;
 }
 
+/* The edge functions opposite the corners of the triangle or piece, of either turn, in proportion. */
+static void edges_of_pixel(const resolve_state *s, int64_t x_px, int64_t y_px, int bits, double *e)
+{
+    if (s->exact) {
+        scaled_edges(s->points, sample_of(s->exact, x_px, y_px, bits), e);
+        return;
+    }
+    for (int k = 0; k < 3; k++) {
+        const int a = k == 2 ? 0 : k + 1, b = 3 - k - a;
+        e[k] = i128_to_f64(doubled_edge(&s->triangle, a, b, x_px, y_px, bits));
+    }
+}
+
 /* Perspective-correct weights of the input triangle's corners at a pixel: exact edge functions times 1/w,
  * normalised. */
 static void weights_of_pixel(const resolve_state *s, int64_t x_px, int64_t y_px, int bits, double *weights)
 {
     double part[3], sum = 0.0;
+    edges_of_pixel(s, x_px, y_px, bits, part);
     for (int k = 0; k < 3; k++) {
-        const int a = k == 2 ? 0 : k + 1, b = 3 - k - a;
-        part[k] = (double)doubled_edge(&s->triangle, a, b, x_px, y_px, bits) * s->inv_w[k];
+        part[k] *= s->inv_w[k];
         sum += part[k];
     }
     weights[0] = weights[1] = weights[2] = 0.0;

@@ -123,11 +123,14 @@ static inline void walk_wide_edge(const row_frame *f, const crossing_sink *s, cr
         s->at[row - f->top]++, s->at[end - f->top]--;
         return;
     }
-    const tl_int128 dx = (tl_int128)x1 - x0, dy = (tl_int128)y1 - y0, d = unit * dy, step = unit * dx;
-    tl_int128 num = (x0 - f->center_x) * dy + dx * (row * unit + f->center_y - y0) + d - 1;
-    for (; row < end; row++, num += step) {
-        const tl_int128 column = num < 0 ? 0 : num / d;
-        put_crossing(s, kind, row - f->top, (int32_t)(column > f->width ? f->width : column), up);
+    const int64_t dx = x1 - x0, dy = y1 - y0;
+    const tl_int128 d = i128_product(unit, dy), step = i128_product(unit, dx), width = i128_from(f->width);
+    tl_int128 num = i128_add(i128_product(x0 - f->center_x, dy), i128_product(dx, row * unit + f->center_y - y0));
+    num = i128_add(num, i128_sub(d, i128_from(1)));
+    for (; row < end; row++, num = i128_add(num, step)) {
+        tl_int128 column, rest;
+        i128_floor_divide(i128_max(num, i128_from(0)), d, &column, &rest);
+        put_crossing(s, kind, row - f->top, (int32_t)i128_low(i128_min(column, width)), up);
     }
 }
 

@@ -53,11 +53,11 @@ TL_INLINE void cut_edges(const tl_polygons *p, int is_wide, int64_t polygon, int
                 int64_t column;
                 double left, length;
                 if (is_wide) {
-                    const tl_int128 d = (tl_int128)dy * unit,
-                                    x = (x0 & (unit - 1)) * (tl_int128)dy + (tl_int128)ta * dx;
-                    const tl_int128 q = x / d - (x % d < 0);
-                    column = (int64_t)q, left = (double)(x - q * d) / (double)d;
-                    length = (double)((tl_int128)(tb - ta) * dx) / (double)d;
+                    const tl_int128 d = i128_product(dy, unit);
+                    tl_int128 q, rest;
+                    i128_floor_divide(i128_add(i128_product(x0 & (unit - 1), dy), i128_product(ta, dx)), d, &q, &rest);
+                    column = i128_low(q), left = i128_to_f64(rest) / i128_to_f64(d);
+                    length = i128_to_f64(i128_product(tb - ta, dx)) / i128_to_f64(d);
                 } else {
                     const int64_t d = dy * unit, x = (x0 & (unit - 1)) * dy + ta * dx, q = x / d - (x % d < 0);
                     column = q, left = (double)(x - q * d) / (double)d;

@@ -19,18 +19,18 @@ static int snap_exactly(const tl_source *source, int64_t i, int bits, int grid_b
         const int64_t v = ((const int64_t *)source->data)[i];
         if (v <= -TL_POLYGON_LIMIT || v >= TL_POLYGON_LIMIT)
             return 0;
-        value = v * ((tl_int128)1 << grid_bits);
+        value = i128_shift_left(i128_from(v), grid_bits);
     } else {
         const double v =
             source->scalar == TL_F32 ? (double)((const float *)source->data)[i] : ((const double *)source->data)[i];
         const double fx = rint(v * (double)((int64_t)1 << bits));
         if (!(fabs(fx) < 0x1p61))
             return 0;
-        value = (int64_t)fx * ((tl_int128)1 << (grid_bits - bits));
+        value = i128_shift_left(i128_from((int64_t)fx), grid_bits - bits);
     }
-    value -= corner_px * ((tl_int128)1 << grid_bits);
-    *out = (int64_t)value;
-    return value > -TL_POLYGON_LIMIT && value < TL_POLYGON_LIMIT;
+    value = i128_sub(value, i128_shift_left(i128_from(corner_px), grid_bits));
+    *out = i128_low(value);
+    return i128_less(i128_from(-TL_POLYGON_LIMIT), value) && i128_less(value, i128_from(TL_POLYGON_LIMIT));
 }
 
 static void snap_point(const tl_source *source, int64_t i, int bits, int grid_bits, const int64_t *corner_px,

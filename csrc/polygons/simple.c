@@ -34,8 +34,6 @@
 /* Comparisons for each edge, and some for all: polygons beyond are resolved pixel by pixel. */
 #define TL_COMPARED_NODES 128
 
-TL_INLINE int sign_of_128(tl_int128 a) { return (a > 0) - (a < 0); }
-
 /* On which side of the line from a to b the point c lies: the sign of the area of a, b, c. */
 TL_INLINE int side_of(const tl_polygons *p, int is_wide, int64_t a, int64_t b, int64_t c)
 {
@@ -43,7 +41,7 @@ TL_INLINE int side_of(const tl_polygons *p, int is_wide, int64_t a, int64_t b, i
     const int64_t bx = polygon_x(p, is_wide, b) - ax, by = polygon_y(p, is_wide, b) - ay;
     const int64_t cx = polygon_x(p, is_wide, c) - ax, cy = polygon_y(p, is_wide, c) - ay;
     if (is_wide)
-        return sign_of_128((tl_int128)bx * cy - (tl_int128)by * cx);
+        return i128_sign(i128_sub(i128_product(bx, cy), i128_product(by, cx)));
     const int64_t area = bx * cy - by * cx;
     return (area > 0) - (area < 0);
 }
@@ -91,21 +89,23 @@ TL_INLINE int convex_turn(const tl_polygons *p, int is_wide, int64_t first, int6
 /* The sign of the area that a ring encloses. */
 static int ring_turn(const tl_polygons *p, int is_wide, int64_t first, int64_t end)
 {
-    tl_int128 high = 0, low = 0; /* of wide products there may be more than 128 bits hold */
+    /* high 2^64 + low: of wide products there may be more than 128 bits hold */
+    tl_int128 high = i128_from(0), low = high;
     const int64_t x0 = polygon_x(p, is_wide, first), y0 = polygon_y(p, is_wide, first);
     for (int64_t i = first + 1; !is_wide && i + 1 < end;) {
         int64_t some = 0; /* products have 51 bits */
         for (const int64_t stop = i + 2048 < end - 1 ? i + 2048 : end - 1; i < stop; i++)
             some += (p->x_fx[i] - x0) * (p->y_fx[i + 1] - y0) - (p->y_fx[i] - y0) * (p->x_fx[i + 1] - x0);
-        low += some;
+        low = i128_add(low, i128_from(some));
     }
     for (int64_t i = first + 1; is_wide && i + 1 < end; i++) {
-        const tl_int128 a = (tl_int128)(polygon_x(p, 1, i) - x0) * (polygon_y(p, 1, i + 1) - y0);
-        const tl_int128 b = (tl_int128)(polygon_y(p, 1, i) - y0) * (polygon_x(p, 1, i + 1) - x0), area = a - b;
-        high += area >> 64, low += (tl_int128)(uint64_t)area;
+        const tl_int128 a = i128_product(polygon_x(p, 1, i) - x0, polygon_y(p, 1, i + 1) - y0);
+        const tl_int128 b = i128_product(polygon_y(p, 1, i) - y0, polygon_x(p, 1, i + 1) - x0), area = i128_sub(a, b);
+        high = i128_add(high, i128_shift_right(area, 64));
+        low = i128_add(low, i128_from_u64((uint64_t)i128_low(area)));
     }
-    high += low >> 64, low = (tl_int128)(uint64_t)low;
-    return high ? sign_of_128(high) : low > 0;
+    high = i128_add(high, i128_shift_right(low, 64));
+    return i128_is_zero(high) ? i128_low(low) != 0 : i128_sign(high);
 }
 
 typedef struct {

@@ -54,10 +54,13 @@ TL_INLINE void touch_edge(const tl_polygons *p, int is_wide, int64_t i, int64_t 
     row = row < s->top ? s->top : row, last = last >= bottom ? bottom - 1 : last;
     for (; row <= last; row++) {
         const int64_t t = row * unit - y0, ta = t > 0 ? t : 0, tb = t + unit < dy ? t + unit : dy;
-        const tl_int128 a = (tl_int128)x0 * dy + (tl_int128)ta * dx, b = (tl_int128)x0 * dy + (tl_int128)tb * dx,
-                        d = (tl_int128)dy * unit;
-        const tl_int128 low = a < b ? a : b, high = a < b ? b : a;
-        mark_squares(s, row, (int64_t)(low / d - (low % d < 0)), (int64_t)(high / d + (high % d > 0)));
+        const tl_int128 start = i128_product(x0, dy), d = i128_product(dy, unit);
+        const tl_int128 a = i128_add(start, i128_product(ta, dx)), b = i128_add(start, i128_product(tb, dx));
+        tl_int128 first, last_touched, rest;
+        i128_floor_divide(dx < 0 ? a : b, d, &last_touched, &rest);
+        const int64_t end = i128_low(last_touched) + !i128_is_zero(rest);
+        i128_floor_divide(dx < 0 ? b : a, d, &first, &rest);
+        mark_squares(s, row, i128_low(first), end);
     }
 }
 

@@ -15,12 +15,12 @@
 #include "raster/sink.c"
 
 #define TL_INT int64_t
-#define TL_UINT uint64_t
+#define TL_OP(name) i64_##name
 #define TL_WALK(name) name##_64
 #include "raster/walk.h"
 
 #define TL_INT tl_int128
-#define TL_UINT tl_uint128
+#define TL_OP(name) i128_##name
 #define TL_WALK(name) name##_128
 #include "raster/walk.h"
 
@@ -166,21 +166,39 @@ static row_span square_span(const tl_triangle *t, const tl_window *window, int64
     if (row < t->row0 || row >= t->row1)
         return span;
     const edges_128 e = setup_edges_128(t, window);
-    tl_int128 first = 0, end = t->col1 - t->col0;
+    tl_int128 first = i128_from(0), end = i128_from(t->col1 - t->col0);
     for (int k = 0; k < 3; k++) {
         tl_int128 quotient, remainder;
-        if (e.dy[k] == 0)
+        const int is_left = i128_is_negative(e.dy[k]);
+        if (i128_is_zero(e.dy[k]))
             continue;
-        floor_divide_128(e.value[k] + e.dx[k] * (row - t->row0), e.dy[k] < 0 ? -e.dy[k] : e.dy[k], &quotient,
-                         &remainder);
-        if (e.dy[k] < 0)
-            first = -quotient > first ? -quotient : first;
+        i128_floor_divide(i128_add(e.value[k], i128_times(e.dx[k], row - t->row0)),
+                          is_left ? i128_neg(e.dy[k]) : e.dy[k], &quotient, &remainder);
+        if (is_left)
+            first = i128_max(first, i128_neg(quotient));
         else
-            end = quotient + 1 < end ? quotient + 1 : end;
+            end = i128_min(end, i128_add(quotient, i128_from(1)));
     }
-    if (first < end)
-        span = (row_span){t->col0 + (int64_t)first, t->col0 + (int64_t)end};
+    if (i128_less(first, end))
+        span = (row_span){t->col0 + i128_low(first), t->col0 + i128_low(end)};
     return span;
+}
+
+/* Counts the squares of a row that lie in any of some spans, once each. */
+static void count_spans(const row_span *spans, int n, const tl_window *window, const tl_target *target, int64_t row)
+{
+    for (int64_t done = 0, n_left = n; n_left > 0; n_left--) { /* the spans in the order of their beginnings */
+        int64_t first = window->width, end = 0;
+        for (int i = 0; i < n; i++) {
+            const int64_t begin = max64(spans[i].first, done);
+            if (begin < spans[i].end && (begin < first || (begin == first && spans[i].end > end)))
+                first = begin, end = spans[i].end;
+        }
+        if (first >= end)
+            break;
+        put_plain(target, TL_SINK_COUNT, row * target->stride_px + first, end - first, 0);
+        done = end;
+    }
 }
 
 /* Counts the squares that any of a triangle's pieces meets, or holds: a square may meet several, and counts once. */
@@ -199,20 +217,12 @@ static __attribute__((noinline)) void count_squares(const tl_vertex_set *set, co
         row1 = max64(row1, t[n].row1);
         n++;
     }
-    for (int64_t row = row0; row < row1; row++)
-        for (int64_t done = 0, n_left = n; n_left > 0; n_left--) { /* the spans in the order of their beginnings */
-            int64_t first = window->width, end = 0;
-            for (int i = 0; i < n; i++) {
-                const row_span span = square_span(&t[i], window, row);
-                const int64_t begin = max64(span.first, done);
-                if (begin < span.end && (begin < first || (begin == first && span.end > end)))
-                    first = begin, end = span.end;
-            }
-            if (first >= end)
-                break;
-            put_plain(target, TL_SINK_COUNT, row * target->stride_px + first, end - first, 0);
-            done = end;
-        }
+    for (int64_t row = row0; row < row1; row++) {
+        row_span spans[TL_MAX_PIECES];
+        for (int i = 0; i < n; i++)
+            spans[i] = square_span(&t[i], window, row);
+        count_spans(spans, n, window, target, row);
+    }
 }
 
 /* Triangle i, or its pieces, by itself. */

@@ -83,7 +83,7 @@ TL_INLINE void count_unseen_one(const tl_target *target, tl_sink sink, const tl_
 
 static inline void count_one(tl_census *census, tl_class walker, const tl_triangle *t, int bits)
 {
-    const double area_px = (double)weight_sum(t) * 0.25 / (double)((int64_t)1 << 2 * bits);
+    const double area_px = i128_to_f64(weight_sum(t)) * 0.25 / (double)((int64_t)1 << 2 * bits);
     count_box(census, walker, (double)(t->col1 - t->col0) * (double)(t->row1 - t->row0), area_px);
 }
 

@@ -286,7 +286,18 @@ static void clear(const tl_window *window, const tl_target *target)
     }
 }
 
-static int64_t draw(const tl_snapped *snapped, const tl_window *window, const tl_target *target, tl_share *share)
+static int64_t draw_part(const tl_snapped *snapped, const tl_window *window, const tl_target *target, tl_share *share)
+{
+    int64_t bad_row = -1;
+    if (share->first < share->end || share->clusters)
+        TL_SINK_CALL(draw_snapped, target->sink, snapped, window, target, share, &bad_row)
+    return bad_row;
+}
+
+/* Clears bands of less than 2^31 pixels, has `draw_band` draw them, and finishes them. */
+typedef int64_t draw_of_band(const tl_snapped *snapped, const tl_window *band, const tl_target *part, tl_share *share);
+static int64_t draw_bands_of(const tl_snapped *snapped, const tl_window *window, const tl_target *target,
+                             tl_share *share, draw_of_band *draw_band)
 {
     const int64_t pixel_bytes = target->sink == TL_SINK_MASK ? 1 : 4;
     const int64_t rows_at_once = max64(1, (((int64_t)1 << 31) - 1) / target->stride_px);
@@ -300,11 +311,9 @@ static int64_t draw(const tl_snapped *snapped, const tl_window *window, const tl
         part.pixels = target->pixels ? (char *)target->pixels + row * target->stride_px * pixel_bytes : NULL;
         part.depth = target->depth ? target->depth + row * target->stride_px : NULL;
         part.n_samples = part.stride_px * (band.height - 1) + band.width;
-        int64_t bad_row = -1;
         if (share->is_first)
             clear(&band, &part);
-        if (share->first < share->end || share->clusters)
-            TL_SINK_CALL(draw_snapped, target->sink, snapped, &band, &part, share, &bad_row)
+        const int64_t bad_row = draw_band(snapped, &band, &part, share);
         if (bad_row >= 0)
             return bad_row;
         if (target->sink == TL_SINK_MASK && share->is_last)
@@ -313,6 +322,11 @@ static int64_t draw(const tl_snapped *snapped, const tl_window *window, const tl
             share_samples(&band, &part);
     }
     return -1;
+}
+
+static int64_t draw(const tl_snapped *snapped, const tl_window *window, const tl_target *target, tl_share *share)
+{
+    return draw_bands_of(snapped, window, target, share, draw_part);
 }
 
 #endif

@@ -54,18 +54,17 @@ static inline tl_wide vertex_fx(const tl_vertex_set *set, int32_t i)
 /* The doubled edge function from corner a to corner b at the centre of a picture pixel, unbiased. */
 static inline tl_int128 doubled_edge(const tl_triangle *t, int a, int b, int64_t x_px, int64_t y_px, int bits)
 {
-    const tl_int128 dx = (tl_int128)t->x_fx[b] - t->x_fx[a], dy = (tl_int128)t->y_fx[b] - t->y_fx[a];
-    const tl_int128 px = ((tl_int128)x_px * 2 + 1) * ((tl_int128)1 << bits) - (tl_int128)t->x_fx[a] * 2;
-    const tl_int128 py = ((tl_int128)y_px * 2 + 1) * ((tl_int128)1 << bits) - (tl_int128)t->y_fx[a] * 2;
-    return (tl_int128)((tl_uint128)dx * (tl_uint128)py - (tl_uint128)dy * (tl_uint128)px);
+    const int64_t dx = t->x_fx[b] - t->x_fx[a], dy = t->y_fx[b] - t->y_fx[a];
+    const tl_int128 px = center_from_128(x_px, bits, t->x_fx[a]), py = center_from_128(y_px, bits, t->y_fx[a]);
+    return i128_wrapping_sub(i128_wrapping_times(py, dx), i128_wrapping_times(px, dy));
 }
 
 /* The sum of the three doubled edge functions, at any point: four times the signed area. */
 static inline tl_int128 weight_sum(const tl_triangle *t)
 {
-    const tl_int128 x1 = (tl_int128)t->x_fx[1] - t->x_fx[0], y1 = (tl_int128)t->y_fx[1] - t->y_fx[0];
-    const tl_int128 x2 = (tl_int128)t->x_fx[2] - t->x_fx[0], y2 = (tl_int128)t->y_fx[2] - t->y_fx[0];
-    return (tl_int128)(2 * ((tl_uint128)x1 * (tl_uint128)y2 - (tl_uint128)y1 * (tl_uint128)x2));
+    const int64_t x1 = t->x_fx[1] - t->x_fx[0], y1 = t->y_fx[1] - t->y_fx[0];
+    const int64_t x2 = t->x_fx[2] - t->x_fx[0], y2 = t->y_fx[2] - t->y_fx[0];
+    return i128_wrapping_times(i128_wrapping_sub(i128_product(x1, y2), i128_product(y1, x2)), 2);
 }
 
 /* +1 or -1 by the turn of the corners, 0 when they lie on a line. */
@@ -76,8 +75,7 @@ static inline int area_sign(const tl_triangle *t)
                              (t->y_fx[1] - t->y_fx[0]) * (t->x_fx[2] - t->x_fx[0]); /* two products below 2^62 */
         return (area > 0) - (area < 0);
     }
-    const tl_int128 area = weight_sum(t);
-    return (area > 0) - (area < 0);
+    return i128_sign(weight_sum(t));
 }
 
 /* Reads the corners and turns them so that the area is positive; returns the sign it had, 0 if degenerate. */
@@ -155,9 +153,9 @@ static inline void setup_weights(tl_triangle *t, const tl_window *window)
     const double height =
         (double)max3(t->y_fx[0], t->y_fx[1], t->y_fx[2]) - (double)min3(t->y_fx[0], t->y_fx[1], t->y_fx[2]);
     t->weights_exact = 2.0 * width * height < 0x1p52; /* |2E| <= 2 * width * height */
-    t->w_sum = (double)weight_sum(t);
-    t->w1 = (double)doubled_edge(t, 2, 0, x_px, y_px, bits);
-    t->w2 = (double)doubled_edge(t, 0, 1, x_px, y_px, bits);
+    t->w_sum = i128_to_f64(weight_sum(t));
+    t->w1 = i128_to_f64(doubled_edge(t, 2, 0, x_px, y_px, bits));
+    t->w2 = i128_to_f64(doubled_edge(t, 0, 1, x_px, y_px, bits));
     t->w1_col = -step * ((double)t->y_fx[0] - (double)t->y_fx[2]),
     t->w1_row = step * ((double)t->x_fx[0] - (double)t->x_fx[2]);
     t->w2_col = -step * ((double)t->y_fx[1] - (double)t->y_fx[0]),
@@ -179,8 +177,8 @@ static inline void weights_at(const tl_triangle *t, const tl_window *window, int
         return;
     }
     for (int k = 0; k < n; k++) {
-        w1[k] = (double)doubled_edge(t, 2, 0, col + k + window->x_px, row + window->y_px, window->subpixel_bits);
-        w2[k] = (double)doubled_edge(t, 0, 1, col + k + window->x_px, row + window->y_px, window->subpixel_bits);
+        w1[k] = i128_to_f64(doubled_edge(t, 2, 0, col + k + window->x_px, row + window->y_px, window->subpixel_bits));
+        w2[k] = i128_to_f64(doubled_edge(t, 0, 1, col + k + window->x_px, row + window->y_px, window->subpixel_bits));
     }
 }
 

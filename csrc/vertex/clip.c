@@ -104,8 +104,7 @@ static inline tl_int128 fan_area(const tl_pieces *p, int64_t first, int n, int a
 {
     const tl_wide a = snapped_corner(p, first + apex), b = snapped_corner(p, first + (apex + i) % n),
                   c = snapped_corner(p, first + (apex + i + 1) % n);
-    return ((tl_int128)b.x_fx - a.x_fx) * ((tl_int128)c.y_fx - a.y_fx) -
-           ((tl_int128)b.y_fx - a.y_fx) * ((tl_int128)c.x_fx - a.x_fx);
+    return i128_sub(i128_product(b.x_fx - a.x_fx, c.y_fx - a.y_fx), i128_product(b.y_fx - a.y_fx, c.x_fx - a.x_fx));
 }
 
 /* The turn of a triangle as drawn (y down) from its clip-space corners: the sign of its homogeneous determinant. */
@@ -125,22 +124,24 @@ static inline int clip_turn(const tl_source *source, const int32_t *corners)
  * against the source triangle are left out.  Returns the apex, and in *turn the sign of the triangles to draw. */
 static int fan_apex(const tl_pieces *p, int64_t first, int n, int source_turn, int *turn)
 {
-    tl_int128 least = 0;
+    const tl_int128 none = i128_from(0);
+    tl_int128 least = none;
     int best = -1;
     for (int apex = 0; apex < n; apex++) {
-        tl_int128 positive = 0, negative = 0;
+        tl_int128 positive = none, negative = none;
         for (int i = 1; i < n - 1; i++) {
             const tl_int128 area = fan_area(p, first, n, apex, i);
-            *(area > 0 ? &positive : &negative) += area;
+            positive = i128_add(positive, i128_max(area, none));
+            negative = i128_add(negative, i128_min(area, none));
         }
-        if (positive == 0 || negative == 0) {
-            *turn = (positive > 0) - (negative < 0);
+        if (i128_is_zero(positive) || i128_is_zero(negative)) {
+            *turn = i128_sign(i128_add(positive, negative));
             return apex;
         }
         if (source_turn == 0)
-            source_turn = positive + negative >= 0 ? 1 : -1;
-        const tl_int128 wrong = source_turn > 0 ? -negative : positive;
-        if (best < 0 || wrong < least) {
+            source_turn = i128_is_negative(i128_add(positive, negative)) ? -1 : 1;
+        const tl_int128 wrong = source_turn > 0 ? i128_neg(negative) : positive;
+        if (best < 0 || i128_less(wrong, least)) {
             best = apex;
             least = wrong;
         }
@@ -165,8 +166,7 @@ static void append_pieces(tl_pieces *p, const clip_corner *polygon, int n, int32
     int turn;
     const int apex = fan_apex(p, first, n, source_turn, &turn);
     for (int i = 1; i < n - 1; i++) {
-        const tl_int128 area = fan_area(p, first, n, apex, i);
-        if ((area > 0) - (area < 0) != turn || turn == 0)
+        if (turn == 0 || i128_sign(fan_area(p, first, n, apex, i)) != turn)
             continue;
         int32_t *t = p->triangles + 3 * p->n_pieces;
         t[0] = (int32_t)(first + apex);
@@ -202,6 +202,11 @@ static void clip(const tl_source *source, const tl_vertex *vertices, const int32
 static inline int is_clipped(const tl_vertex_set *set, const int32_t *corners)
 {
     int clipped = 0;
+    if (set->exact) {
+        for (int k = 0; k < 3; k++)
+            clipped |= isnan(set->exact->points[(int64_t)corners[k] * set->exact->stride]);
+        return clipped;
+    }
     for (int k = 0; k < 3; k++)
         clipped |= set->vertices[corners[k]].x_fx == TL_SPECIAL && set->vertices[corners[k]].y_fx == TL_CLIPPED;
     return clipped;
@@ -210,7 +215,8 @@ static inline int is_clipped(const tl_vertex_set *set, const int32_t *corners)
 /* The vertices of the pieces, seen from the same sample. */
 static tl_vertex_set piece_set(const tl_pieces *p, const tl_vertex_set *mesh)
 {
-    return (tl_vertex_set){p->vertices, p->wide, p->inv_w, NULL, p->n_vertices, mesh->sample_x_fx, mesh->sample_y_fx};
+    return (tl_vertex_set){p->vertices,   p->wide,           p->inv_w,          NULL,
+                           p->n_vertices, mesh->sample_x_fx, mesh->sample_y_fx, NULL};
 }
 
 /* First piece of a triangle, by bisection in the ascending sources. */

@@ -16,36 +16,30 @@
 #include <math.h>
 #include <stdint.h>
 
+#include "base/integers.h"
 #include "topleft.h"
 
 #define TL_NARROW_LIMIT 0x1p30
 #define TL_WIDE_LIMIT 0x1p62
 
-typedef __int128 tl_int128;
-typedef unsigned __int128 tl_uint128;
-
 _Static_assert(sizeof(tl_vertex) == 16, "a vertex is one 16-byte load");
 _Static_assert(sizeof(tl_int128) == 16, "the wide path needs 128-bit integers");
-_Static_assert((-3 >> 1) == -2, "a right shift of a negative number must floor");
-_Static_assert((tl_int128)2 * ((1LL << 31) - 2) * ((1LL << 31) - 2) < (tl_int128)1 << 63, "2E must fit 64 bits");
+_Static_assert(2 * ((1ULL << 31) - 2) * ((1ULL << 31) - 2) < 1ULL << 63, "2E must fit 64 bits");
 
 static inline int64_t min64(int64_t a, int64_t b) { return a < b ? a : b; }
 static inline int64_t max64(int64_t a, int64_t b) { return a > b ? a : b; }
 static inline int64_t min3(int64_t a, int64_t b, int64_t c) { return min64(min64(a, b), c); }
 static inline int64_t max3(int64_t a, int64_t b, int64_t c) { return max64(max64(a, b), c); }
 
-/* Quotient and remainder for b > 0, rounded down. */
-static inline void floor_divide_64(int64_t a, int64_t b, int64_t *quotient, int64_t *remainder)
+/* The centre of a pixel, from a coordinate, in half sub-pixels. */
+static inline int64_t center_from_64(int64_t px, int bits, int64_t fx)
 {
-    const int64_t q = a / b, r = a % b;
-    *quotient = q - (r < 0);
-    *remainder = r < 0 ? r + b : r;
+    return (px * 2 + 1) * ((int64_t)1 << bits) - fx * 2;
 }
-static inline void floor_divide_128(tl_int128 a, tl_int128 b, tl_int128 *quotient, tl_int128 *remainder)
+static inline tl_int128 center_from_128(int64_t px, int bits, int64_t fx)
 {
-    const tl_int128 q = a / b, r = a % b;
-    *quotient = q - (r < 0);
-    *remainder = r < 0 ? r + b : r;
+    const tl_int128 center = i128_shift_left(i128_add(i128_product(px, 2), i128_from(1)), bits);
+    return i128_sub(center, i128_product(fx, 2));
 }
 
 /* Whether a window lies within 2^30 pixels of 0, so that 32-bit lanes hold its pixels. */

@@ -1,5 +1,5 @@
-/* Project: object space to clip space to snapped vertices, those outside a clip plane marked.
- * In: the caller's vertices, a matrix.  Out: vertex records. */
+/* Project: object space to clip space to vertices in pixels, snapped or not, those outside a clip plane marked.
+ * In: the caller's vertices, a matrix.  Out: vertex records, or points (x, y, z). */
 #ifndef TL_PROJECT_C
 #define TL_PROJECT_C
 
@@ -58,34 +58,60 @@ static inline unsigned outside_planes(const double *p, const tl_view *view)
 }
 
 /* Perspective divide and viewport.  x_px = (x/w + 1) * (width/2), each operation rounded once. */
-static inline void store_projected(const double *p, const tl_view *view, int64_t i, tl_vertex *out, tl_wide *wide,
-                                   int was_cut, tl_vertex_counts *counts)
+static inline void set_projected(const double *p, const tl_view *view, int was_cut, double *out)
 {
-    const double unit = (double)(1 << view->subpixel_bits);
-    const double x_px = (p[0] / p[3] + 1.0) * view->half_width_px, y_px = (1.0 - p[1] / p[3]) * view->half_height_px;
     double z = view->zero_to_one ? p[2] / p[3] : (p[2] / p[3] + 1.0) * 0.5;
     if (was_cut && view->near_clip)
         z = z < 0.0 ? 0.0 : z; /* a cut lies on its plane but for rounding */
     if (was_cut && view->far_clip)
         z = z > 1.0 ? 1.0 : z;
-    z = z > FLT_MAX ? FLT_MAX : z < -FLT_MAX ? -FLT_MAX : z; /* only without near and far planes */
-    store_vertex(rint(x_px * unit), rint(y_px * unit), z, i, out, wide, counts);
+    out[0] = (p[0] / p[3] + 1.0) * view->half_width_px;
+    out[1] = (1.0 - p[1] / p[3]) * view->half_height_px;
+    out[2] = z > FLT_MAX ? FLT_MAX : z < -FLT_MAX ? -FLT_MAX : z; /* only without near and far planes */
+}
+
+/* The same, snapped. */
+static inline void store_projected(const double *p, const tl_view *view, int64_t i, tl_vertex *out, tl_wide *wide,
+                                   int was_cut, tl_vertex_counts *counts)
+{
+    const double unit = (double)(1 << view->subpixel_bits);
+    double at[3];
+    set_projected(p, view, was_cut, at);
+    store_vertex(rint(at[0] * unit), rint(at[1] * unit), at[2], i, out, wide, counts);
+}
+
+/* Where vertices go: records, with a table of wide ones or NULL; or, not snapped, points (n, 3). */
+typedef struct {
+    tl_vertex *records;
+    tl_wide *wide;
+    double *points;
+} projected_vertices;
+
+/* A vertex that is not drawn where it lies. */
+static inline void store_special(const projected_vertices *out, int64_t i, tl_special what)
+{
+    if (out->points)
+        out->points[3 * i] = NAN, out->points[3 * i + 1] = what, out->points[3 * i + 2] = 0.0;
+    else
+        out->records[i] = (tl_vertex){TL_SPECIAL, what, 0.0};
 }
 
 /* One vertex, whatever it is. */
-static void project_one(const tl_source *source, int64_t i, const tl_view *view, tl_vertex *out, tl_wide *wide,
+static void project_one(const tl_source *source, int64_t i, const tl_view *view, const projected_vertices *out,
                         tl_vertex_counts *counts)
 {
     double p[4];
     clip_position(source, i, p);
     if (!(isfinite(p[0]) && isfinite(p[1]) && isfinite(p[2]) && isfinite(p[3]))) {
-        out[i] = (tl_vertex){TL_SPECIAL, TL_BAD, 0.0};
+        store_special(out, i, TL_BAD);
         counts->n_bad++;
     } else if (outside_planes(p, view)) {
-        out[i] = (tl_vertex){TL_SPECIAL, TL_CLIPPED, 0.0};
+        store_special(out, i, TL_CLIPPED);
         counts->n_clipped++;
+    } else if (out->points) {
+        set_projected(p, view, 0, out->points + 3 * i);
     } else {
-        store_projected(p, view, i, out, wide, 0, counts);
+        store_projected(p, view, i, out->records, out->wide, 0, counts);
     }
 }
 
@@ -142,12 +168,25 @@ TL_INLINE vm inside_lanes_f32(const vf *p, const tl_view *view)
     return inside;
 }
 
-/* `scalar`, `has_matrix` and `is_affine` are constants: a copy for each keeps the matrix in registers. */
-TL_INLINE int64_t project_lanes(const tl_source *source, int64_t first, int64_t end, const tl_view *view,
-                                tl_vertex *out, tl_wide *wide, tl_vertex_counts *counts, tl_scalar scalar,
-                                int has_matrix, int is_affine)
+#define TL_SURELY_INSIDE_PX 0x1p50 /* of the guard band, which begins 2^52 px from the middle of the picture */
+
+/* Stores TL_LANES points as they are; returns those that surely lie inside the guard band. */
+TL_INLINE vm store_points(double *out, vd x, vd y, vd z)
 {
-    const double unit = (double)(1 << view->subpixel_bits);
+    const vd farthest = vd_set1(TL_SURELY_INSIDE_PX);
+    double columns[3][TL_MAX_LANES];
+    vd_store(columns[0], x), vd_store(columns[1], y), vd_store(columns[2], z);
+    for (int k = 0; k < TL_LANES; k++, out += 3)
+        out[0] = columns[0][k], out[1] = columns[1][k], out[2] = columns[2][k];
+    return vm_and(vd_ge(farthest, vd_abs(x)), vd_ge(farthest, vd_abs(y)));
+}
+
+/* What begins with `scalar` are constants: a copy for each keeps the matrix in registers. */
+TL_INLINE int64_t project_lanes(const tl_source *source, int64_t first, int64_t end, const tl_view *view,
+                                const projected_vertices *out, tl_vertex_counts *counts, tl_scalar scalar,
+                                int has_matrix, int is_affine, int is_snapped)
+{
+    const double unit = is_snapped ? (double)(1 << view->subpixel_bits) : 1.0;
     const vd one = vd_set1(1.0), half = vd_set1(0.5), largest = vd_set1(FLT_MAX);
     const vd scale_x = vd_set1(view->half_width_px * unit), scale_y = vd_set1(view->half_height_px * unit);
     const int stride = has_matrix ? 3 : 4;
@@ -175,34 +214,51 @@ TL_INLINE int64_t project_lanes(const tl_source *source, int64_t first, int64_t 
             ndc[0] = p[0], ndc[1] = p[1], ndc[2] = p[2];
         else
             vd_quotients(p, p[3], ndc, scalar == TL_F32);
-        const vi x = vi_round(vd_mul(vd_add(ndc[0], one), scale_x)), y = vi_round(vd_mul(vd_sub(one, ndc[1]), scale_y));
+        const vd x = vd_mul(vd_add(ndc[0], one), scale_x), y = vd_mul(vd_sub(one, ndc[1]), scale_y);
         const vd z = view->zero_to_one ? ndc[2] : vd_mul(vd_add(ndc[2], one), half);
-        good = vm_and(good, vm_and(is_narrow_lanes(x), is_narrow_lanes(y)));
         if (!(view->near_clip && view->far_clip))
             good = vm_and(good, vd_ge(largest, vd_abs(z)));
-        store_vertices(out + i, x, y, z);
+        if (is_snapped) {
+            const vi x_fx = vi_round(x), y_fx = vi_round(y);
+            good = vm_and(good, vm_and(is_narrow_lanes(x_fx), is_narrow_lanes(y_fx)));
+            store_vertices(out->records + i, x_fx, y_fx, z);
+        } else {
+            good = vm_and(good, store_points(out->points + 3 * i, x, y, z));
+        }
         for (unsigned rest = vm_bits(vm_and_not(vm_all(), good)); rest; rest &= rest - 1)
-            project_one(source, i + __builtin_ctz(rest), view, out, wide, counts);
+            project_one(source, i + __builtin_ctz(rest), view, out, counts);
     }
     return i;
+}
+
+TL_INLINE tl_vertex_counts project_all(const tl_source *source, int64_t first, int64_t end, const tl_view *view,
+                                       const projected_vertices *out, int is_snapped)
+{
+    tl_vertex_counts counts = {0, 0, 0};
+    int64_t i = first;
+    if (TL_LANES > 1 && source->scalar == TL_F32)
+        i = source->is_affine ? project_lanes(source, first, end, view, out, &counts, TL_F32, 1, 1, is_snapped)
+            : source->matrix  ? project_lanes(source, first, end, view, out, &counts, TL_F32, 1, 0, is_snapped)
+                              : project_lanes(source, first, end, view, out, &counts, TL_F32, 0, 0, is_snapped);
+    else if (TL_LANES > 1)
+        i = source->is_affine ? project_lanes(source, first, end, view, out, &counts, TL_F64, 1, 1, is_snapped)
+            : source->matrix  ? project_lanes(source, first, end, view, out, &counts, TL_F64, 1, 0, is_snapped)
+                              : project_lanes(source, first, end, view, out, &counts, TL_F64, 0, 0, is_snapped);
+    for (; i < end; i++)
+        project_one(source, i, view, out, &counts);
+    return counts;
 }
 
 static tl_vertex_counts project(const tl_source *source, int64_t first, int64_t end, const tl_view *view,
                                 tl_vertex *out, tl_wide *wide)
 {
-    tl_vertex_counts counts = {0, 0, 0};
-    int64_t i = first;
-    if (TL_LANES > 1 && source->scalar == TL_F32)
-        i = source->is_affine ? project_lanes(source, first, end, view, out, wide, &counts, TL_F32, 1, 1)
-            : source->matrix  ? project_lanes(source, first, end, view, out, wide, &counts, TL_F32, 1, 0)
-                              : project_lanes(source, first, end, view, out, wide, &counts, TL_F32, 0, 0);
-    else if (TL_LANES > 1)
-        i = source->is_affine ? project_lanes(source, first, end, view, out, wide, &counts, TL_F64, 1, 1)
-            : source->matrix  ? project_lanes(source, first, end, view, out, wide, &counts, TL_F64, 1, 0)
-                              : project_lanes(source, first, end, view, out, wide, &counts, TL_F64, 0, 0);
-    for (; i < end; i++)
-        project_one(source, i, view, out, wide, &counts);
-    return counts;
+    return project_all(source, first, end, view, &(projected_vertices){out, wide, NULL}, 1);
+}
+
+static tl_vertex_counts project_points(const tl_source *source, int64_t first, int64_t end, const tl_view *view,
+                                       double *points)
+{
+    return project_all(source, first, end, view, &(projected_vertices){NULL, NULL, points}, 0);
 }
 
 #endif

@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from topleft._batch.batch import render_batch
     from topleft._batch.jobs import Job
     from topleft._diagram.pixel_grid import pixel_grid
+    from topleft._explore.open import Explorer, explore
     from topleft._render.transparent import render_transparent, visible_layers
     from topleft._render.view_layers import ViewLayers, render_layers
     from topleft._tiles.merge import merge
@@ -55,10 +56,12 @@ if TYPE_CHECKING:
 
 # What most programs do without is imported when it is asked for: a third of the time that the package takes.
 _LATE = {
+    "Explorer": "topleft._explore.open",
     "Job": "topleft._batch.jobs",
     "Tiles": "topleft._tiles.tiles",
     "ViewLayers": "topleft._render.view_layers",
     "Window": "topleft._tiles.tiles",
+    "explore": "topleft._explore.open",
     "merge": "topleft._tiles.merge",
     "pixel_grid": "topleft._diagram.pixel_grid",
     "render_batch": "topleft._batch.batch",
@@ -75,6 +78,7 @@ __all__ = [
     "DepthLayers",
     "Detail",
     "Environment",
+    "Explorer",
     "FisheyeLens",
     "Fog",
     "Fragments",
@@ -112,6 +116,7 @@ __all__ = [
     "choose_detail",
     "composite",
     "coverage",
+    "explore",
     "field",
     "fill",
     "height_map",

@@ -60,6 +60,7 @@ def random_triangles(
     triangles : (n, 3) int32
     colors : (n, 3) uint8
     """
+    _check_frame(width, height)
     rng = np.random.default_rng(seed)
     center_px = rng.uniform([0, 0], [width, height], (n, 1, 2))
     third_turns = np.array([0, 2, 4]) * np.pi / 3
@@ -85,11 +86,17 @@ def planar_mesh(n_points: int, width: int = 1920, height: int = 1080, seed: int 
     """
     from scipy.spatial import Delaunay
 
+    _check_frame(width, height)
     rng = np.random.default_rng(seed)
     corners = np.array([[-1.0, -1.0], [width + 1, -1], [-1, height + 1], [width + 1, height + 1]])
     inner = rng.uniform([-1, -1], [width + 1, height + 1], (n_points, 2))
     vertices = np.concatenate([corners, inner])
     return vertices, Delaunay(vertices).simplices.astype(np.int32)
+
+
+def _check_frame(width: float, height: float) -> None:
+    if not (math.isfinite(width) and math.isfinite(height)):
+        raise ValueError(f"width and height must be finite, got {width} and {height}")
 
 
 TUTORIAL_SIZE = (640, 400)
@@ -153,7 +160,7 @@ TUTORIAL_SCENES: Mapping[str, Callable[[], Shape]] = MappingProxyType(
 
 def to_clip(vertices: F64, matrix: F64) -> F64:
     """Clip-space vertices (V, 4) of object-space vertices (V, 3), by a (4, 4) clip-from-object matrix."""
-    return np.concatenate([vertices, np.ones((len(vertices), 1))], axis=-1) @ matrix.T
+    return np.concatenate([vertices, np.ones((len(vertices), 1))], axis=-1) @ np.asarray(matrix).T
 
 
 def to_pixels(clip: F64, width: int = 1920, height: int = 1080) -> F64:
@@ -357,6 +364,6 @@ def shape(name: str, **parameters: Any) -> Shape:
     >>> vertices.shape, triangles.shape
     ((24, 3), (12, 3))
     """
-    if name not in SHAPES:
+    if not (isinstance(name, str) and name in SHAPES):
         raise ValueError(f"no built-in shape {name!r}; there are {', '.join(SHAPES)}")
     return SHAPES[name](**parameters)

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from topleft._base.arrays import as_array, as_number, as_path, shown
 from topleft._engine import isa_available, isa_in_use, use_isa
 from topleft._io.images import save_image
 from topleft._raster.verbs import coverage, fill, overdraw, rasterize
@@ -98,7 +99,11 @@ def assert_same_picture(
       row 2, column 1: got 0.0, expected 1.0
     """
     __tracebackhide__ = True  # pytest shows the line of the caller
-    one, other = np.asarray(got), np.asarray(expected)
+    one, other, most = as_array("got", got), as_array("expected", expected), as_number("tolerance", tolerance)
+    where = None if path is None else as_path("path", path)
+    for name, array in (("got", one), ("expected", other)):
+        if array.dtype.kind not in "bfiu":
+            raise TypeError(f"{name} must be real numbers or truth values, got {shown(array)} of {array.dtype}")
     if one.shape != other.shape:
         raise AssertionError(f"the picture has shape {one.shape}, expected {other.shape}")
     if one.dtype != other.dtype:
@@ -107,7 +112,7 @@ def assert_same_picture(
         raise AssertionError(f"a picture has shape (H, W) or (H, W, C), got {one.shape}")
     off = _differences(one, other)
     by_pixel = off if off.ndim == 2 else off.max(2, initial=0.0)
-    wrong = by_pixel > tolerance
+    wrong = by_pixel > most
     if not wrong.any():
         return
     lines = [f"{wrong.sum()} of {wrong.size} pixels differ, by {by_pixel.max():g} at most"]
@@ -117,11 +122,11 @@ def assert_same_picture(
         rows, columns = np.nonzero(wrong)
         box = f"rows {rows.min()} to {rows.max()}, columns {columns.min()} to {columns.max()}"
         lines.append(f"  and {wrong.sum() - N_SHOWN} more, in {box}")
-    if path is not None:
+    if where is not None:
         finite = by_pixel[np.isfinite(by_pixel)].max(initial=0.0)
         share = np.where(np.isfinite(by_pixel), by_pixel / (finite or 1), 1)
-        save_image(path, np.where(wrong, np.ceil(55 + 200 * share), 0).astype(np.uint8))
-        lines.append(f"  the difference is drawn in {os.fspath(path)}")
+        save_image(where, np.where(wrong, np.ceil(55 + 200 * share), 0).astype(np.uint8))
+        lines.append(f"  the difference is drawn in {where}")
     raise AssertionError("\n".join(lines))
 
 
@@ -144,7 +149,7 @@ def hard_scenes(kind: str) -> Iterator[tuple[NDArray[Any], NDArray[np.int64]]]:
     ValueError
         If there is no such kind.
     """
-    if kind not in HARD_SCENES:
+    if not (isinstance(kind, str) and kind in HARD_SCENES):
         raise ValueError(f"kind must be one of {', '.join(HARD_SCENES)}, got {kind!r}")
     for seed in range(N_SEEDS):
         rng = np.random.default_rng([len(kind), ord(kind[0]), seed])
@@ -191,6 +196,9 @@ def check_instruction_sets() -> dict[str, str]:
 
 def words_of(buffer: NDArray[Any]) -> bytes:
     """Return dtype, shape and contents of an array to be hashed; all NaN as one, for their bits are the CPU's."""
+    buffer = as_array("buffer", buffer)
+    if buffer.dtype.hasobject:
+        raise TypeError(f"buffer must hold numbers, got {shown(buffer)} of {buffer.dtype}")
     if buffer.dtype.kind == "f":
         buffer = np.where(np.isnan(buffer), buffer.dtype.type(np.nan), buffer)
     return f"{buffer.dtype.str} {buffer.shape} ".encode() + np.ascontiguousarray(buffer).tobytes()

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from comparing import assert_same
 
 from topleft import scenes
 from topleft._camera.camera import Camera
 from topleft._camera.matrices import bounding_sphere, orbit_view
+from topleft._camera.viewpoints import turntable
 from topleft._model.mesh import Mesh
+from topleft._scene.scene import Scene
 
 SIZE = (640, 480)
 K = np.array([[500.0, 0.0, 320.0], [0.0, 510.0, 240.0], [0.0, 0.0, 1.0]])
@@ -137,6 +140,21 @@ def test_framing_looks_only_at_vertices_in_use():
 
 def test_framing_takes_the_corners_of_a_box():
     assert bounding_sphere(np.array([(-1.0, -1, -1), (1, 1, 1)]))[1] == pytest.approx(3**0.5)
+
+
+@pytest.mark.parametrize("fit", ["sphere", "box", "points", "silhouette"])
+def test_framing_a_scene_frames_its_points_in_the_world(fit):
+    mesh, move = Mesh([(0, 0, 0), (1, 0, 0), (0, 1, 0), (9, 9, 9)], [(0, 1, 2)]), np.eye(4)
+    move[:3, 3] = 4, 0, -2
+    scene = Scene([mesh, (mesh, move)])
+    points = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (4, 0, -2), (5, 0, -2), (4, 1, -2)]
+    assert_same(Camera.framing(scene, fit=fit).view, Camera.framing(points, fit=fit).view)
+    assert_same(turntable(scene, 3, fit=fit)[1].view, turntable(points, 3, fit=fit)[1].view)
+
+
+def test_framing_a_scene_without_triangles_is_refused():
+    with pytest.raises(ValueError, match="there is nothing to frame"):
+        Camera.framing(Scene([Mesh([(0, 0, 0)], np.empty((0, 3), int))]))
 
 
 def test_framing_a_single_point_has_a_picture():

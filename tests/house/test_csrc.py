@@ -15,8 +15,8 @@ FOLDERS = sorted({name.rpartition("/")[0] for name in FILES})
 
 #: From the lowest floor to the highest. A folder includes those of lower floors, its own files, and headers beside it.
 LADDER = (
-    ("lanes",), ("vertex",), ("clusters", "mesh"), ("raster",), ("area", "pixels", "points", "meshlets"),
-    ("blend", "exact", "lines", "polygons", "shade", "tiles"),
+    ("base",), ("lanes",), ("vertex",), ("clusters", "mesh"), ("raster",), ("area", "exact", "points", "meshlets"),
+    ("pixels",), ("blend", "lines", "polygons", "shade", "tiles"),
 )  # fmt: skip
 FLOORS = {folder: floor for floor, folders in enumerate(LADDER) for folder in folders}
 

@@ -1,6 +1,5 @@
 """The pages: links lead somewhere, every page and picture is shown by another, and api.md is that of the package."""
 
-import importlib.util
 import re
 from pathlib import Path
 
@@ -64,14 +63,6 @@ def test_source_files_that_a_page_names_exist(page):
     named = {name for code in CODE.findall(page.read_text(encoding="utf-8")) for name in NAMED.findall(code)}
     named -= {name for name in named if re.search(r"NAME|Python\.h|\.ci/", name)}  # to be filled in; not in an sdist
     assert sorted(name for name in named if not any(path.endswith(f"/{name}") for path in SOURCES)) == []
-
-
-@pytest.fixture(scope="module")
-def make_api():
-    spec = importlib.util.spec_from_file_location("make_api", DOCS / "make_api.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 def test_api_page_is_that_of_the_package(make_api):

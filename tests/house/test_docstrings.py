@@ -3,9 +3,12 @@
 import ast
 import doctest
 from importlib import import_module
+from inspect import ismodule
 from pathlib import Path
 
 import pytest
+
+import topleft as tl
 
 SRC = Path(__file__).parents[2] / "src"
 MODULES = {
@@ -39,3 +42,16 @@ def test_examples_print_what_stands_there(name):
     n_written = MODULES[name].read_text(encoding="utf-8").count(">>> ")
     assert sum(len(test.examples) for test in tests) == n_written
     assert runner.failures == 0
+
+
+def public_docstrings():
+    """Name and docstring of each function and class that the package promises; from its file, whatever it inherits."""
+    found = {name: getattr(tl, name) for name in tl.__all__ if not name.startswith("__")}
+    return {name: thing.__doc__ or "" for name, thing in found.items() if not ismodule(thing)}
+
+
+@pytest.mark.parametrize("name", sorted(public_docstrings()))
+def test_public_name_has_an_example_that_runs(name):
+    """The test above runs it."""
+    assert "\n    Examples\n    --------\n" in public_docstrings()[name]
+    assert ">>> " in public_docstrings()[name].partition("Examples\n")[2]

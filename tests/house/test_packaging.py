@@ -48,7 +48,20 @@ def test_metadata_runtime_dependencies_state_a_floor():
 
 def test_metadata_extras_are_the_documented_ones():
     found = set(metadata.metadata("topleft").get_all("Provides-Extra"))
-    assert found == {"dask", "formats", "render", "simplify", "tiles", "torch", "test", "bench", "docs", "dev", "all"}
+    assert found == {
+        "dask",
+        "explore",
+        "formats",
+        "render",
+        "simplify",
+        "tiles",
+        "torch",
+        "test",
+        "bench",
+        "docs",
+        "dev",
+        "all",
+    }
 
 
 def test_metadata_render_extra_is_isal_trimesh_and_tqdm():
@@ -57,6 +70,10 @@ def test_metadata_render_extra_is_isal_trimesh_and_tqdm():
 
 def test_metadata_torch_extra_is_torch():
     assert requirements_of("torch") == {"torch"}
+
+
+def test_metadata_explore_extra_is_a_server_and_a_widget():
+    assert requirements_of("explore") == {"anywidget", "starlette", "uvicorn", "websockets"}
 
 
 def test_metadata_simplify_extra_is_fast_simplification():

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 import topleft as tl
+from topleft import methods, testing
+from topleft._explore.content import content_of
 
 ROOT = Path(tl.__file__).parent
 CUBE = tl.Mesh(*tl.scenes.shape("cube"))
@@ -20,6 +22,14 @@ POINTS = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.5], [0.0, 4.0, 0.0]]
 ONE = [[0, 1, 2]]
 FRAGS = tl.rasterize_mesh(CUBE, CAMERA, SIZE)
 LAYERS = tl.peel(CUBE.vertices, CUBE.triangles, SIZE, transform=CAMERA.clip_from_world(SIZE), layers=2)
+POSES = tl.rasterize([POINTS, POINTS], ONE, SIZE)
+CLOUD = tl.points(POINTS, SIZE)
+TABLE = tl.overlap([FLAT], SIZE)
+PLAN = tl.plan(POINTS, ONE, SIZE)
+VIEWS = tl.render_layers(CUBE, CAMERA, SIZE, layers=["depth"])
+LEVELS = tl.simplify(CUBE, smallest=8)
+RASTER = tl.tiles((FLAT, ONE), SIZE, kind="coverage", extent=(0, 8, 0, 6))
+DRAW = tl.Rasterizer(SIZE)
 VIEW = {
     "transform": None, "origin": (0, 0), "viewport": None, "subpixel_bits": 8, "sampling": "center", "method": "auto",
     "cull": "none", "clip_depth": "minus_one_to_one", "threads": None, "plan": None,
@@ -69,6 +79,7 @@ CALLS = {
     "composite": (tl.composite, {"layers": LAYERS, "colors": np.zeros((12, 3), np.uint8), "opacity": 0.5,
                                  "background": None, "threads": None}),
     "coverage": (tl.coverage, {"vertices": FLAT, "triangles": ONE, "size": SIZE, "out": None, **VIEW}),
+    "explore": (content_of, {"vertices": FLAT, "triangles": ONE, "size": SIZE}),  # what it does before it is seen
     "field": (tl.field, {"mesh": (FLAT, ONE), "values": [1.0, 2.0, 3.0], "size": SIZE, "extent": None,
                          "pixel_size": None, "y": "up", "per": "vertex", "subpixel_bits": 8, "threads": None,
                          "out": None, "origin": (0, 0), "window": None, "nodata": None}),
@@ -134,7 +145,58 @@ CALLS = {
                          "extent": None, "pixel_size": None, "y": "up", "threads": None, "memory": 1 << 20,
                          "folder": None}),
     "Fragments.sample": (FRAGS.sample, {"texture": 0}),
+    "Fragments.only": (FRAGS.only, {"rows": np.array([0]), "cols": np.array([0])}),
+    "FragmentsBatch.interpolate": (POSES.interpolate, {"values": POINTS, "background": 0.0}),
+    "PointFragments.interpolate": (CLOUD.interpolate, {"values": [1.0, 2.0, 3.0], "background": 0.0}),
+    "PointFragments.sample": (CLOUD.sample, {"texture": np.eye(3), "uv": [[0.0, 0.0]] * 3, "filter": "nearest",
+                                             "wrap": "clamp"}),
+    "PointFragments.only": (CLOUD.only, {"rows": np.array([0]), "cols": np.array([0])}),
+    "DepthLayers.layer": (LAYERS.layer, {"k": 0}),
+    "Overlap.means": (TABLE.means, {"raster": np.ones((6, 8))}),
+    "Overlap.sums": (TABLE.sums, {"raster": np.ones((6, 8))}),
+    "Overlap.spread": (TABLE.spread, {"values": [1.0]}),
+    "Plan.measure": (PLAN.measure, {"n_rounds": 1}),
+    "Grid.to_pixels": (tl.Grid(SIZE, (0, 1, 0, 1)).to_pixels, {"points": FLAT}),
+    "Camera.clip_from_eye": (CAMERA.clip_from_eye, {"size": SIZE}),
+    "OpenCVLens.distort": (tl.OpenCVLens(k1=0.1).distort, {"points": POINTS}),
+    "FisheyeLens.distort": (tl.FisheyeLens(0.1).distort, {"points": POINTS}),
+    "ViewLayers.save": (VIEWS.save, {"path": "layers.npz", "layer": None, "scale": None}),
+    "Levels.save": (LEVELS.save, {"path": "levels.npz"}),
+    "Levels.load": (tl.Levels.load, {"path": "nothing.npz", "mesh": CUBE}),
+    "Tiles.read": (RASTER.read, {"x": 0, "y": 0, "width": 2, "height": 2}),
+    "Tiles.to_zarr": (RASTER.to_zarr, {"path": "a.zarr", "chunk": None, "compression": "none", "levels": 1,
+                                       "progress": None, "storage": None}),
+    "Tiles.to_geotiff": (RASTER.to_geotiff, {"path": "a.tif", "crs": None, "nodata": None, "compression": "none",
+                                             "tile": 512, "progress": None}),
+    "Tiles.to_deepzoom": (tl.tiles((FLAT, ONE), SIZE, kind="coverage").to_deepzoom,
+                          {"path": "a.dzi", "tile": 256, "colors": None, "progress": None}),
+    "Rasterizer.coverage": (DRAW.coverage, {"vertices": FLAT, "triangles": ONE, "out": None}),
+    "Rasterizer.overdraw": (DRAW.overdraw, {"vertices": FLAT, "triangles": ONE, "out": None}),
+    "Rasterizer.fill": (DRAW.fill, {"vertices": FLAT, "triangles": ONE, "colors": [[9, 9, 9]]}),
+    "Rasterizer.rasterize": (DRAW.rasterize, {"vertices": POINTS, "triangles": ONE, "background_depth": None}),
+    "Rasterizer.wireframe": (DRAW.wireframe, {"vertices": FLAT, "triangles": ONE, "depth": None}),
+    "scenes.shape": (tl.scenes.shape, {"name": "cube"}),
+    "scenes.icosphere": (tl.scenes.icosphere, {"subdivisions": 1}),
+    "scenes.torus": (tl.scenes.torus, {"radius": 1.0, "tube_radius": 0.5, "segments": 3, "sections": 3}),
+    "scenes.torus_knot": (tl.scenes.torus_knot, {"p": 2, "q": 3, "tube_radius": 0.3, "segments": 8, "sections": 3}),
+    "scenes.blob": (tl.scenes.blob, {"n_triangles": 20, "seed": 0}),
+    "scenes.large_triangle": (tl.scenes.large_triangle, {"width": 8, "height": 6}),
+    "scenes.random_triangles": (tl.scenes.random_triangles, {"n": 3, "size_px": 2.0, "width": 8, "height": 6,
+                                                             "seed": 0}),
+    "scenes.planar_mesh": (tl.scenes.planar_mesh, {"n_points": 9, "width": 8, "height": 6, "seed": 0}),
+    "scenes.tight_fan": (tl.scenes.tight_fan, {"n": 4}),
+    "scenes.to_clip": (tl.scenes.to_clip, {"vertices": np.array(POINTS), "matrix": np.eye(4)}),
+    "scenes.to_pixels": (tl.scenes.to_pixels, {"clip": np.ones((2, 4)), "width": 8, "height": 6}),
+    "testing.assert_same_picture": (testing.assert_same_picture, {"got": np.eye(3), "expected": np.eye(3),
+                                                                  "tolerance": 0.0, "path": None}),
+    "testing.hard_scenes": (lambda **given: list(testing.hard_scenes(**given)), {"kind": "dust"}),
+    "testing.words_of": (testing.words_of, {"buffer": np.eye(3)}),
+    "methods.find_method": (methods.find_method, {"name": "edge"}),
 }  # fmt: skip
+
+
+#: Functions of the caller that take other things than they are given.
+CALLBACKS = {("progress", "function"), ("progress", "type"), ("colors", "type"), ("colors", "function")}
 
 
 class OnDevice:
@@ -204,10 +266,16 @@ WRONG = {
 }
 
 
-def complaint_of(error: BaseException) -> str | None:
-    """None if a function of topleft raised the error by itself, in words; else where it came from."""
-    if not isinstance(error, (TypeError, ValueError, IndexError, OSError, tl.TopleftError)):
+def complaint_of(error: BaseException, *, is_formula: bool = False) -> str | None:
+    """None if a function of topleft raised the error by itself, in words; else where it came from.
+
+    The formulas of `topleft.scenes` may leave the words to NumPy and to Python.
+    """
+    documented = (TypeError, ValueError, IndexError, OSError, AssertionError, tl.TopleftError)  # assert_same_picture
+    if not isinstance(error, documented):
         return f"a {type(error).__name__}: {error}"
+    if is_formula:
+        return None if str(error) else f"an empty {type(error).__name__}"
     frames = traceback.extract_tb(error.__traceback__)
     frame = frames[-1]
     if len(frames) == 1 or ("argument" in str(error) and "() " in str(error)):
@@ -218,34 +286,37 @@ def complaint_of(error: BaseException) -> str | None:
     return None if str(error) else f"an empty {type(error).__name__}"
 
 
-def complaints(function, right, wrong_names, arguments):
+def complaints(function, right, wrong_names, arguments, *, is_formula=False):
     for argument in arguments:
         for name in wrong_names:
-            if (argument, name) == ("progress", "function"):
-                continue  # `len` of a `Result`: the caller's own function fails
+            if (argument, name) in CALLBACKS:
+                continue  # `len` of a `Result`, say: the caller's own function fails
             try:
                 function(**{**right, argument: WRONG[name]})
             except Exception as error:
-                found = complaint_of(error)
+                found = complaint_of(error, is_formula=is_formula)
                 if found:
                     yield f"{argument}={name}: {found}"
 
 
+@pytest.mark.usefixtures("folder")
 @pytest.mark.parametrize("name", CALLS)
 def test_arguments_that_suit_are_taken(name):
     function, right = CALLS[name]
-    if name in ("load", "load_cameras", "save_image"):
+    if name in ("load", "load_cameras", "save_image", "Levels.load"):
         with pytest.raises((OSError, tl.TopleftError)):
             function(**right)
     else:
         function(**right)
 
 
+@pytest.mark.usefixtures("folder")
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("name", CALLS)
 def test_wrong_arguments_work_or_are_named(name):
     function, right = CALLS[name]
-    found = list(complaints(function, right, WRONG, right))
+    is_formula = name.startswith("scenes.") and name != "scenes.shape"
+    found = list(complaints(function, right, WRONG, right, is_formula=is_formula))
     assert not found, f"{len(found)} of {len(right) * len(WRONG)}:\n" + "\n".join(found)
 
 
@@ -253,6 +324,24 @@ def test_every_public_callable_is_tried():
     others = {"simplify", "release_memory", "build_info"}  # the first takes seconds, the others nothing
     made = {"DepthLayers", "Detail", "Fragments", "FragmentsBatch", "Level", "Levels", "Plan", "SceneDepthLayers",
             "SceneFragments", "ViewLayers", "ImageError", "MeshError", "MissingPackageError", "TopleftError",
-            "MeshWarning", "Overlap", "PointFragments", "Tiles", "Window"}  # fmt: skip
+            "MeshWarning", "Explorer", "Overlap", "PointFragments", "Tiles", "Window"}  # fmt: skip
     public = {name for name in tl.__all__ if callable(getattr(tl, name)) and not inspect.ismodule(getattr(tl, name))}
     assert public <= set(CALLS) | others | made
+
+
+def takes_arguments(function):
+    """Whether it takes anything but truth values."""
+    parameters = inspect.signature(function).parameters.values()
+    return any(each.name != "self" and each.annotation not in (bool, "bool") for each in parameters)
+
+
+def test_every_promised_method_is_tried(make_api):
+    promised = [(owner, getattr(tl, owner), name) for owner, names in make_api.MEMBERS.items() for name in names]
+    promised += [("Rasterizer", tl.Rasterizer, name) for name in dir(tl.Rasterizer) if not name.startswith("_")]
+    promised += [("testing", testing, name) for name in testing.__all__]
+    methods_of = {
+        f"{owner}.{name}"
+        for owner, home, name in promised
+        if callable(found := getattr(home, name)) and takes_arguments(found)
+    }
+    assert methods_of <= set(CALLS)

@@ -3,7 +3,7 @@
 import comparing
 import numpy as np
 import pytest
-from engine_cases import ON_EACH_ISA, on
+from engine_cases import ON_EACH_ISA, on, sharing
 from exact_cases import BITING_EDGES, KETTNER_A1, SIZE, exact_scenes, kettner_grid, lattice, tilted_grid
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -15,6 +15,7 @@ from topleft.methods import reference
 from topleft.methods.reference import sampling
 
 EXACT = {"subpixel_bits": "exact"}
+SQUARES = "outer", "inner"
 
 
 def overdraw(scene, **options):
@@ -225,13 +226,17 @@ def mixed_scene(rng, n=3000, size=(200, 140)):
 
 
 def test_every_instruction_set_and_thread_count_draws_the_same_bits():
+    """With threads that set up all triangles, and with threads that each take a share of them."""
     scene = mixed_scene(np.random.default_rng(1))
     pictures = []
     for isa in tl.build_info()["isa_available"]:
         with on(isa):
-            for threads in (1, 2, 3, 8):
-                frags = tl.rasterize(*scene.arrays, **EXACT, threads=threads)
-                pictures.append((frags.triangle, frags.depth, overdraw(scene, threads=threads)))
+            for threads, is_shared in ((1, False), (2, False), (2, True), (3, True), (8, True)):
+                with sharing(is_shared):
+                    frags = tl.rasterize(*scene.arrays, **EXACT, threads=threads)
+                    squares = [overdraw(scene, threads=threads, sampling=kind) for kind in SQUARES]
+                    counts = overdraw(scene, threads=threads, origin=(7, 11))
+                    pictures.append((frags.triangle, frags.depth, overdraw(scene, threads=threads), counts, *squares))
     for other in pictures[1:]:
         for mine, first in zip(other, pictures[0], strict=True):
             comparing.assert_same(mine, first)
@@ -249,16 +254,19 @@ def test_vertices_on_the_grid_give_the_snapped_picture(isa):
     scene = mixed_scene(np.random.default_rng(4))
     vertices = np.round(scene.vertices[:, :2] * 256) / 256
     with on(isa):
-        exact = tl.overdraw(vertices, scene.triangles, scene.size, **EXACT)
-        snapped = tl.overdraw(vertices, scene.triangles, scene.size)
-    assert (exact == snapped).all()
+        for kind in ("center", *SQUARES):
+            exact = tl.overdraw(vertices, scene.triangles, scene.size, **EXACT, sampling=kind)
+            assert (exact == tl.overdraw(vertices, scene.triangles, scene.size, sampling=kind)).all()
 
 
 def count(vertices, size, band):
     """Draw counts with bands of a width other than the proved one."""
     triangles = np.arange(len(vertices), dtype=np.int32).reshape(-1, 3)
     out = np.empty(size[::-1], np.int32)
-    mesh = _engine.ExactMesh(vertices, triangles, (0, 0, 8, 0, 0, 0), band)
+    exact = _engine.ExactPoints(vertices, triangles, band=band)
+    how, records = (0, 0, 8, 0, 0, 0), np.empty(0, np.uint8)
+    source = _engine.Source(vertices)
+    mesh = _engine.SnappedMesh(source, records, None, triangles, None, how, None, exact=exact)
     mesh.draw(_engine.Target(1, out, None, None), 0, size[1])
     return out
 
@@ -304,14 +312,12 @@ TRIANGLE = [[0, 0], [4, 0], [0, 4]], [[0, 1, 2]], (4, 4)
     ("verb", "options", "message"),
     [
         (tl.coverage, {"sampling": "area"}, r"subpixel_bits must be in 0\.\.16 for sampling 'area', got 'exact'"),
-        (tl.coverage, {"sampling": "outer"}, r"subpixel_bits must be in 0\.\.16 for sampling 'outer', got 'exact'"),
         (tl.coverage, {"method": "float_barycentric"}, r"0\.\.16 for method 'float_barycentric.*got 'exact'"),
         (
             tl.coverage,
             {"origin": (2**48, 0)},
             "origin and size must lie within 281474976710656 pixels of 0 for 'exact'",
         ),
-        (tl.wireframe, {}, r"subpixel_bits must be in 0\.\.16 here, got 'exact'"),
         (tl.coverage, {"subpixel_bits": "exacter"}, "subpixel_bits must be an integer, got 'exacter'"),
     ],
 )
@@ -344,18 +350,24 @@ def test_error_leaves_no_trace_in_out():
     assert (out == 7).all()
 
 
-def test_plan_is_refused():
-    with pytest.raises(ValueError, match=r"0\.\.16 with a plan, got 'exact'"):
-        tl.coverage(*TRIANGLE, plan=tl.plan(*TRIANGLE), **EXACT)
-    with pytest.raises(ValueError, match=r"0\.\.16 here, got 'exact'"):
-        tl.plan(*TRIANGLE, **EXACT)
+def test_plan_is_for_one_precision():
+    with pytest.raises(ValueError, match="plan is for subpixel_bits=8, got 'exact'"):
+        tl.rasterize(*TRIANGLE, plan=tl.plan(*TRIANGLE), **EXACT)
+    with pytest.raises(ValueError, match="plan is for subpixel_bits='exact', got 8"):
+        tl.rasterize(*TRIANGLE, plan=tl.plan(*TRIANGLE, **EXACT))
+
+
+def test_plan_tells_what_was_in_doubt():
+    scene = mixed_scene(np.random.default_rng(3), 400)
+    plan = tl.plan(*scene.arrays, **EXACT)
+    (stage,) = (stage for stage in plan.stages if stage.name == "arithmetic")
+    assert "in doubt" in stage.choice
+    assert "on 2**-8 px, by integers" in stage.choice
+    frags = tl.rasterize(*scene.arrays, plan=plan, **EXACT)
+    comparing.assert_same(frags.triangle, tl.rasterize(*scene.arrays, **EXACT).triangle)
+    assert {"input", "vertices", "draw"} <= plan.measured_ms.keys()
 
 
 def test_depth_that_float32_cannot_hold_is_named():
     with pytest.raises(ValueError, match="vertices must have a depth that float32 can hold"):
         tl.rasterize([[0, 0, 0], [4, 0, 1e39], [0, 4, 0]], *TRIANGLE[1:], **EXACT)
-
-
-def test_colors_of_vertices_are_refused():
-    with pytest.raises(ValueError, match=r"0\.\.16 for interpolated colors, got 'exact'"):
-        tl.fill(*TRIANGLE[:2], np.zeros((3, 3), np.uint8), TRIANGLE[2], per="vertex", **EXACT)

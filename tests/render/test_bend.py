@@ -331,3 +331,12 @@ def test_bend_into_too_many_parts_is_refused_with_the_number(monkeypatch):
     monkeypatch.setattr(bend_file, "MAX_PARTS", 1000)
     with pytest.raises(ValueError, match=r"the lens splits 20 triangles into more than 1160 parts: give it a larger"):
         bend(*large_triangles(20), camera, camera.lens, SIZE)
+
+
+def test_bend_into_too_many_parts_is_refused_before_they_are_made(monkeypatch):
+    n_parts, join = [], bend_file._joined
+    monkeypatch.setattr(bend_file, "_joined", lambda many: n_parts.append(bend_file._count(many)) or join(many))
+    camera = camera_of(FISHEYE)
+    with pytest.raises(ValueError, match="the lens splits 3000 triangles into more than 4218304 parts: give it a lar"):
+        bend(*large_triangles(3000, 100), camera, camera.lens, SIZE)
+    assert max(n_parts) < 300_000

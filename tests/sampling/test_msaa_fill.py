@@ -51,6 +51,23 @@ def test_flat_float32_is_the_mean_rounded_once(n):
 
 
 @ON_EACH_ISA
+@pytest.mark.parametrize("dtype", [np.uint8, np.float32])
+def test_runs_of_pixels_inside_of_one_triangle_are_its_colour(isa, dtype):
+    vertices = [[-9.0, 2.3], [410.2, 5.1], [200.7, 39.9], [30.5, -20.0], [33.1, 60.0], [300.0, 20.2]]
+    triangles, size = [[0, 1, 2], [3, 4, 5]], (400, 37)
+    ids = tl.rasterize(vertices, triangles, size, depth_test=None, sampling="msaa4").samples_triangle
+    rng = np.random.default_rng(7)
+    for channels in (1, 2, 3, 4):
+        colors = rng.integers(0, 256, (2, channels)).astype(dtype)
+        seen = np.where((ids < 0)[..., None], dtype(9), colors[ids]).astype(np.float64)
+        mean = seen.mean(2)
+        options = {"per": "triangle", "background": 9, "sampling": "msaa4", "alpha": "premultiplied"}
+        with on(isa):
+            got = tl.fill(vertices, triangles, colors, size, **options)
+        assert_same(got, np.rint(mean).astype(dtype) if dtype is np.uint8 else mean.astype(dtype))
+
+
+@ON_EACH_ISA
 @pytest.mark.parametrize("make", [lambda rng: mixed(rng, 60, (60, 50)), lambda rng: floor(rng, 4, 24)])
 def test_gouraud_is_the_mean_of_the_samples(isa, make):
     rng = np.random.default_rng(5)

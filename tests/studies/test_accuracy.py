@@ -158,7 +158,8 @@ def test_accuracy_more_bits_are_less_wrong(tiny):
 def test_stability_engine_is_watertight_and_takes_any_order(tiny):
     rows = [row for row in tiny["stability"] if row["method"] in ("exact", "auto")]
     faults = ("missed", "overdrawn", "far_missed", "far_overdrawn", "pixel", "reorder")
-    assert [row[fault] for row in rows for fault in faults] == [0] * 36
+    assert [row[fault] for row in rows for fault in faults] == [0] * 42
+    assert [row["wrong"] for row in rows if row["precision"] == "exact"] == [0]
 
 
 def test_stability_inclusive_spans_overdraw(tiny):

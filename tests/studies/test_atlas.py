@@ -10,15 +10,16 @@ import pytest
 from benchmarks import cli
 from benchmarks.atlas import measure as atlas
 from benchmarks.atlas import shrink as atlas_shrink
-from benchmarks.atlas.depth import DEPTH_FAMILIES, PRODUCTION, DepthScene, Picture, draw, judge_depth
-from benchmarks.atlas.families import FAMILIES
+from benchmarks.atlas.depth import DEPTH_FAMILIES, DepthScene, Picture, draw, judge_depth
 from benchmarks.exact.clip import draw_clip, pieces_picture
-from benchmarks.exact.integers import draw_points, snapped_points, true_points
 from benchmarks.exact.unsnapped import draw_unsnapped
 from benchmarks.harness.machine import IMAGES, PAGES, RECORDS, ROOT
 
+from topleft._explore.race import PRODUCTION, Entry, entries
 from topleft.failure_scenes import FAILURE_SCENES, picture
 from topleft.methods import CLASSICS, reference
+from topleft.methods.reference.integers import draw_points, snapped_points, true_points
+from topleft.scene_families import FAMILIES
 
 SIZE = (12, 11)
 EVERY_FAMILY = pytest.mark.parametrize("name", [name for name in FAMILIES if name != "dense"])
@@ -122,10 +123,10 @@ def test_family_first_and_last_scene_cover_the_frame_once(name):
 
 
 def test_entries_every_method_that_fills():
-    assert {entry.method for entry in atlas.entries()} == {"auto", "edge", "scanline", *CLASSICS} - {
+    assert {entry.method for entry in entries()} == {"auto", "edge", "scanline", *CLASSICS} - {
         "bresenham_scanline/wireframe"
     }
-    assert {atlas.Entry(name, name).snap for name in ("lerp_scanline", "float_barycentric", "zigzag")} == {
+    assert {Entry(name, name).snap for name in ("lerp_scanline", "float_barycentric", "zigzag")} == {
         "px", "float32", "8"
     }  # fmt: skip
 
@@ -143,7 +144,7 @@ def test_atlas_of_a_family_is_that_of_the_record(record, family, methods):
 
 def test_atlas_record_has_a_map_of_every_entry_and_family(record):
     found = {(row["family"], row["entry"]) for row in record["maps"]}
-    names = [entry.name for entry in atlas.entries()]
+    names = [entry.name for entry in entries()]
     wished = {*itertools.product(FAMILIES, names), *itertools.product(DEPTH_FAMILIES, PRODUCTION)}
     assert found == wished | {("layers", entry.name) for entry in atlas.SAMPLED}
 
@@ -177,7 +178,7 @@ def test_simpler_values_have_fewer_bits():
 
 
 def test_shrink_float32_edge_through_centres_is_two_triangles_on_small_numbers():
-    entry = atlas.Entry("float_barycentric", "float_barycentric")
+    entry = Entry("float_barycentric", "float_barycentric")
     kept = atlas_shrink.Shrinker(atlas_shrink.Failure("edge", 13, "overdraw", entry), 0.0)
     small = kept.shrink(kept.start(FAMILIES["edge"]))
     assert len(small.triangles) == 2

@@ -102,6 +102,7 @@ IDS, DEPTH = np.zeros((2, 3), np.int32), np.zeros((2, 3), np.float32)
         ([(IDS, DEPTH)], {"triangles": []}, ValueError, "triangles must have an item for each buffer, got 0"),
         ([(IDS, DEPTH)], {"triangles": [0, 1]}, ValueError, "an item for each buffer, got 2 for 1"),
         ([(IDS, DEPTH)], {"triangles": [-1]}, ValueError, "triangles must be indices from 0 to"),
+        ([(IDS - 1, DEPTH)], {"triangles": [2**31]}, ValueError, "triangles must be indices from 0 to 2147483647"),
         ([(IDS, DEPTH)], {"triangles": [[]]}, ValueError, "triangles has 0 rows for buffer 0, in which"),
         ([(IDS, DEPTH)], {"triangles": [[5, 5]]}, ValueError, "triangles must ascend"),
         ([(IDS, DEPTH)], {"triangles": ["x"]}, TypeError, "triangles must be an index or a column of them"),

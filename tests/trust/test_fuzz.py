@@ -5,7 +5,7 @@ from fuzzing import KINDS, REFUSALS, FromBytes, FromRandom, check_one
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-N_CASES = {"verb": 250, "mesh": 60}
+N_CASES = {"verb": 250, "mesh": 60, "tiles": 60}
 
 
 class FromHypothesis:

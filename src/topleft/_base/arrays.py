@@ -21,7 +21,9 @@ __all__ = [
     "as_names",
     "as_number",
     "as_out",
+    "as_pair",
     "as_path",
+    "as_places",
     "as_point_size",
     "as_real",
     "as_size",
@@ -33,6 +35,7 @@ __all__ = [
     "as_vertices",
     "as_window",
     "bad_triangle",
+    "check_progress",
     "check_regular",
     "set_read_only",
     "shown",
@@ -220,6 +223,27 @@ def as_path(name: str, value: object) -> Path:
     if not isinstance(value, str | os.PathLike):
         raise TypeError(f"{name} must be a path, got {shown(value)}")
     return Path(value)
+
+
+def as_places(rows: ArrayLike, cols: ArrayLike, shape: tuple[int, ...]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return the rows and columns of pixels of a picture (H, W)."""
+    found = []
+    for name, values, n in (("rows", rows, shape[0]), ("cols", cols, shape[1])):
+        array = as_array(name, values)
+        if array.dtype.kind not in "iu" and array.size:
+            raise TypeError(f"{name} must be integers, got {shown(values)}")
+        if array.size and not (array.min() >= 0 and array.max() < n):
+            raise IndexError(f"{name} must lie in [0, {n}), got {array.min()} to {array.max()}")
+        found.append(array.astype(np.intp, copy=False))
+    if found[0].shape != found[1].shape:
+        raise ValueError(f"rows and cols must have one shape, got {found[0].shape} and {found[1].shape}")
+    return found[0], found[1]
+
+
+def check_progress(progress: object) -> None:
+    """Raise a `TypeError` unless it is a function, a truth value or None."""
+    if not (progress is None or isinstance(progress, bool) or callable(progress)):
+        raise TypeError(f"progress must be a function, True or None, got {shown(progress)}")
 
 
 def as_names(name: str, values: object) -> tuple[str, ...]:

@@ -169,6 +169,12 @@ def release_memory() -> None:
     These are results that have died, 512 MiB of the process at most, and the scratch of `coverage`, `overdraw`, `fill`
     and `wireframe` for the calling thread: snapped vertices, converted indices, labels, cells and edges, at most 64 MiB
     each, nothing once the thread has ended. `Rasterizer` objects keep their own memory for as long as they live.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> _ = tl.coverage([(0, 0), (400, 0), (0, 400)], [(0, 1, 2)], (400, 400))
+    >>> tl.release_memory()
     """
     SCRATCH.release()
     _engine.keep_blocks(0)

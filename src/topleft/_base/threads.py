@@ -28,12 +28,13 @@ MIN_TRIANGLES_PER_THREAD = 2000
 MIN_ROWS_PER_THREAD = 50_000
 
 _pool: ThreadPoolExecutor | None = None
+_pool_lock = threading.Lock()
 
 
 def _forget_pool() -> None:
     """Drop the pool in a forked child: its threads stayed with the parent."""
-    global _pool
-    _pool = None
+    global _pool, _pool_lock
+    _pool, _pool_lock = None, threading.Lock()
 
 
 os.register_at_fork(after_in_child=_forget_pool)
@@ -151,8 +152,9 @@ def _finish_whatever_comes(jobs: list[Future[None]]) -> None:
 
 def _shared_pool() -> ThreadPoolExecutor:
     global _pool
-    if _pool is None:
-        from concurrent.futures import ThreadPoolExecutor  # 4 ms that one thread does without
+    with _pool_lock:
+        if _pool is None:
+            from concurrent.futures import ThreadPoolExecutor  # 4 ms that one thread does without
 
-        _pool = ThreadPoolExecutor(max_workers=os.cpu_count() or 1, thread_name_prefix="topleft")
-    return _pool
+            _pool = ThreadPoolExecutor(max_workers=os.cpu_count() or 1, thread_name_prefix="topleft")
+        return _pool

@@ -59,6 +59,14 @@ class Job:
         picture is returned.
     layers : sequence of str
         What is wanted besides, or instead of, the picture: names that `render_layers` knows. None: the picture alone.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> ball = tl.Mesh(*tl.scenes.icosphere(2))
+    >>> job = tl.Job(ball, size=(32, 24), options={"color": "gold"})
+    >>> [result.picture.shape for result in tl.render_batch([job])]
+    [(24, 32, 4)]
     """
 
     scene: Any

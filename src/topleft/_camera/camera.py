@@ -403,7 +403,7 @@ class Camera:
     @classmethod
     def framing(
         cls,
-        subject: MeshLike | npt.ArrayLike,
+        subject: MeshLike | Scene | npt.ArrayLike,
         *,
         azimuth_deg: float = THREE_QUARTER_DEG[0],
         elevation_deg: float = THREE_QUARTER_DEG[1],
@@ -417,8 +417,9 @@ class Camera:
 
         Parameters
         ----------
-        subject : mesh, or (N, 3) array_like
-            Whatever `as_mesh` takes, of which the vertices in use count, or points: the two corners of a box, say.
+        subject : mesh, Scene, or (N, 3) array_like
+            Whatever `as_mesh` takes, or a scene, of which the vertices in use count; or points: the two corners of a
+            box, say.
         azimuth_deg : float
             0 looks at the front of the subject (+z with y up, -y with z up), 90 at its right (+x). Degrees.
         elevation_deg : float

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def load_cameras(path: str | os.PathLike[str]) -> list[Camera]:
-    """The cameras of a glTF or GLB file, in the order of the nodes that hold them; of other formats none.
+    r"""The cameras of a glTF or GLB file, in the order of the nodes that hold them; of other formats none.
 
     Parameters
     ----------
@@ -41,6 +41,17 @@ def load_cameras(path: str | os.PathLike[str]) -> list[Camera]:
         If there is no such file.
     MeshError
         If the file is broken, or a camera of it has numbers that none can have.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> import topleft as tl
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder, "one.obj")
+    ...     _ = path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    ...     tl.load_cameras(path)
+    []
     """
     source = InputFile(as_path("path", path))
 

@@ -83,6 +83,13 @@ class OpenCVLens:
     With x = X/Z, y = Y/Z, r2 = x*x + y*y and q = (1 + k1 r2 + k2 r2^2 + k3 r2^3) / (1 + k4 r2 + k5 r2^2 + k6 r2^3) the
     point is seen at x q + 2 p1 x y + p2 (r2 + 2 x x) + s1 r2 + s2 r2^2, y q + p1 (r2 + 2 y y) + 2 p2 x y + s3 r2 +
     s4 r2^2, and from there on the plane that the tilt turns about its axes x, then y. Depth stays that of Z.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import topleft as tl
+    >>> tl.OpenCVLens(k1=-0.25).distort(np.array([[1.0, 0.0, 2.0]])).tolist()  # 0.5 (1 - 0.25 * 0.5^2)
+    [[0.46875, 0.0]]
     """
 
     k1: float = 0.0
@@ -113,6 +120,7 @@ class OpenCVLens:
 
     def distort(self, points: F64) -> F64:
         """Places (N, 2) in the image plane of points (N, 3) with Z > 0."""
+        points = _as_points(points)
         x, y = points[:, 0] / points[:, 2], points[:, 1] / points[:, 2]
         r2 = x * x + y * y
         numerator = 1 + r2 * (self.k1 + r2 * (self.k2 + r2 * self.k3))
@@ -164,6 +172,13 @@ class FisheyeLens:
     -----
     A point at the angle t from the axis is seen at the distance t (1 + k1 t^2 + k2 t^4 + k3 t^6 + k4 t^8) from the
     centre. Depth is that of the distance from the lens, not of Z, which is nothing at 90 degrees.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import topleft as tl
+    >>> round(float(tl.FisheyeLens(k1=0.0).distort(np.array([[1.0, 0.0, 1.0]]))[0, 0]), 4)  # 45 degrees from the axis
+    0.7854
     """
 
     k1: float = 0.0
@@ -180,6 +195,7 @@ class FisheyeLens:
 
     def distort(self, points: F64) -> F64:
         """Places (N, 2) in the image plane of points (N, 3)."""
+        points = _as_points(points)
         off_axis = np.hypot(points[:, 0], points[:, 1])
         angle = np.arctan2(off_axis, points[:, 2])
         t2 = angle * angle
@@ -195,6 +211,13 @@ class FisheyeLens:
     def bend(self, points_eye: F64) -> F64:
         """Where points (N, 3) in eye space must be for a camera without the lens to see the same."""
         return _bend(self, points_eye)
+
+
+def _as_points(points: npt.ArrayLike) -> F64:
+    found = as_real("points", points)
+    if found.ndim != 2 or found.shape[1] != 3:
+        raise ValueError(f"points must have shape (N, 3), got {found.shape}")
+    return found
 
 
 def lens_of_opencv(distortion: npt.ArrayLike | None, fisheye: npt.ArrayLike | None) -> Lens | None:

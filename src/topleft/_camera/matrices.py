@@ -18,6 +18,7 @@ from topleft._base.options import check_choice
 from topleft._model.mesh import Mesh, extreme_points, used_vertices
 from topleft._model.points import Points
 from topleft._scene.adapt import MeshLike, is_mesh_like
+from topleft._scene.scene import Scene, world_corners
 from topleft._scene.subject import as_subject
 from topleft.typing import UpOption
 
@@ -34,10 +35,12 @@ SILHOUETTE_MARGIN = 0.05
 """The share of the frame that `fit="silhouette"` leaves free at each end of the side that is filled."""
 
 
-def as_framed(subject: MeshLike | npt.ArrayLike) -> Framed:
-    """What is to be framed: a mesh, or points, by themselves or in a cloud."""
+def as_framed(subject: MeshLike | Scene | npt.ArrayLike) -> Framed:
+    """What is to be framed: a mesh, or points, by themselves, in a cloud, or of a scene in the world."""
+    if isinstance(subject, Scene):
+        return np.concatenate([np.empty((0, 3)), *map(world_corners, subject)])
     if isinstance(subject, Points) or is_mesh_like(subject):
-        return as_subject(subject)  # type: ignore[return-value]  # a scene is not mesh-like
+        return as_subject(subject)  # type: ignore[return-value]  # a scene was told apart
     return as_real("subject", subject)
 
 

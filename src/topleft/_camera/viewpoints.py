@@ -17,6 +17,7 @@ from topleft._base.arrays import as_count
 from topleft._camera.camera import Camera
 from topleft._camera.matrices import THREE_QUARTER_DEG, Framed, as_framed, bounding_sphere, ends_to_frame
 from topleft._scene.adapt import MeshLike
+from topleft._scene.scene import Scene
 from topleft.typing import FitOption, UpOption
 
 GOLDEN_ANGLE_DEG = 180 * (3 - 5**0.5)
@@ -33,7 +34,7 @@ class FramingOptions(TypedDict, total=False):
 
 
 def turntable(
-    subject: MeshLike | npt.ArrayLike,
+    subject: MeshLike | Scene | npt.ArrayLike,
     n: int,
     *,
     azimuth_deg: float = THREE_QUARTER_DEG[0],
@@ -44,7 +45,7 @@ def turntable(
 
     Parameters
     ----------
-    subject : mesh, or (N, 3) array_like
+    subject : mesh, Scene, or (N, 3) array_like
         As for `Camera.framing`.
     n : int
         How many, at least 1.
@@ -77,12 +78,12 @@ def turntable(
     ]
 
 
-def viewpoints(subject: MeshLike | npt.ArrayLike, n: int, **framing: Unpack[FramingOptions]) -> list[Camera]:
+def viewpoints(subject: MeshLike | Scene | npt.ArrayLike, n: int, **framing: Unpack[FramingOptions]) -> list[Camera]:
     """Cameras spread evenly over the sphere round the subject, from the top to the bottom.
 
     Parameters
     ----------
-    subject : mesh, or (N, 3) array_like
+    subject : mesh, Scene, or (N, 3) array_like
         As for `Camera.framing`.
     n : int
         How many, at least 1.
@@ -120,7 +121,7 @@ def viewpoints(subject: MeshLike | npt.ArrayLike, n: int, **framing: Unpack[Fram
     ]
 
 
-def _looked_at(subject: MeshLike | npt.ArrayLike, fit: str) -> Framed:
+def _looked_at(subject: MeshLike | Scene | npt.ArrayLike, fit: str) -> Framed:
     """What all cameras look at: the subject, converted once; for its sphere two points that have the same."""
     framed = as_framed(subject)
     if fit != "sphere":

@@ -1,4 +1,5 @@
-# Keeps the memory of arrays that have died, for arrays to come.
+# Keeps the memory of arrays that have died, for arrays to come. Where Python has no GIL, the critical sections of the
+# list hold its numbers, too.
 
 from cpython.object cimport PyObject
 cimport cython
@@ -42,11 +43,17 @@ cdef class Lease:
 cdef void keep_block(Block block) noexcept:
     """Let a block wait; those that have waited longest go back to the system where there are too many."""
     global waiting_bytes
-    if block.n_bytes > most_waiting_bytes:
-        return
-    waiting_blocks.append(block)
-    waiting_bytes += block.n_bytes
-    while waiting_bytes > most_waiting_bytes or len(waiting_blocks) > MAX_BLOCKS:
+    with cython.critical_section(waiting_blocks):
+        if block.n_bytes <= most_waiting_bytes:
+            waiting_blocks.append(block)
+            waiting_bytes += block.n_bytes
+            drop_blocks(most_waiting_bytes)
+
+
+cdef void drop_blocks(int64_t n_bytes) noexcept:
+    """Give back what waits beyond so many bytes; the caller has the list for itself."""
+    global waiting_bytes
+    while waiting_bytes > n_bytes or len(waiting_blocks) > MAX_BLOCKS:
         waiting_bytes -= (<Block>waiting_blocks[0]).n_bytes
         del waiting_blocks[0]
 
@@ -56,17 +63,17 @@ cdef Block find_block(int64_t n_bytes):
     global waiting_bytes
     cdef int64_t i, best = -1, n_found = 0
     cdef int64_t most = n_bytes + n_bytes // 4 + (2 << 20 if n_bytes >= 4 << 20 else 0)
-    cdef Block block
-    for i in range(<int64_t>len(waiting_blocks) - 1, -1, -1):
-        n_found = (<Block>waiting_blocks[i]).n_bytes
-        if n_bytes <= n_found <= most:
-            best, most = i, n_found - 1
-            if n_found == n_bytes:
-                break
-    if best < 0:
-        return None
-    block = waiting_blocks.pop(best)
-    waiting_bytes -= block.n_bytes
+    cdef Block block = None
+    with cython.critical_section(waiting_blocks):
+        for i in range(<int64_t>len(waiting_blocks) - 1, -1, -1):
+            n_found = (<Block>waiting_blocks[i]).n_bytes
+            if n_bytes <= n_found <= most:
+                best, most = i, n_found - 1
+                if n_found == n_bytes:
+                    break
+        if best >= 0:
+            block = waiting_blocks.pop(best)
+            waiting_bytes -= block.n_bytes
     return block
 
 
@@ -86,11 +93,10 @@ def lease_block(int64_t n_bytes, allocate):
 
 def keep_blocks(int64_t n_bytes):
     """Keep at most so many bytes that no array has; what is beyond them goes back to the system now."""
-    global most_waiting_bytes, waiting_bytes
-    most_waiting_bytes = n_bytes
-    while waiting_bytes > n_bytes:
-        waiting_bytes -= (<Block>waiting_blocks[0]).n_bytes
-        del waiting_blocks[0]
+    global most_waiting_bytes
+    with cython.critical_section(waiting_blocks):
+        most_waiting_bytes = n_bytes
+        drop_blocks(n_bytes)
 
 
 def waiting_memory():

@@ -13,6 +13,24 @@ cdef extern from "topleft.h" nogil:
         int64_t n
         const void *matrix
         int is_affine
+    ctypedef struct tl_exact_counts:
+        int64_t n_triangles, n_on_grid, n_asked, n_turns, n_expansions, n_integers
+    ctypedef struct tl_exact_pieces:
+        double *points
+        double *inv_w
+        double *weights
+        int32_t *triangles
+        int32_t *source
+        int64_t n_points, n_pieces
+    ctypedef struct tl_exact_points:
+        const double *points
+        int stride
+        int64_t n_points
+        const int32_t *triangles
+        int64_t n_triangles
+        const int32_t *names
+        const tl_exact_pieces *pieces
+        double band
     ctypedef struct tl_vertex_set:
         const tl_vertex *vertices
         const tl_wide *wide
@@ -20,6 +38,7 @@ cdef extern from "topleft.h" nogil:
         const tl_source *source
         int64_t n_vertices
         int32_t sample_x_fx, sample_y_fx
+        const tl_exact_points *exact
     ctypedef struct tl_vertex_counts:
         int64_t n_bad, n_wide, n_clipped
     ctypedef struct tl_view:
@@ -178,21 +197,7 @@ cdef extern from "topleft.h" nogil:
         int64_t n_others
         const tl_window *picture
         int is_first, is_last
-    ctypedef struct tl_exact_counts:
-        int64_t n_triangles, n_on_grid, n_asked, n_turns, n_expansions, n_integers
-    ctypedef struct tl_exact_pieces:
-        double *points
-        double *inv_w
-        double *weights
-        int32_t *triangles
-        int32_t *source
-        int64_t n_points, n_pieces
-    ctypedef struct tl_exact_points:
-        const double *points
-        int stride
-        int64_t n_points
-        double sample_x_px, sample_y_px
-        double band
+        tl_exact_counts *counts
     ctypedef struct tl_sloped:
         const int32_t *slot
         const double *steps
@@ -463,11 +468,7 @@ cdef extern from "topleft.h" nogil:
         int64_t (*draw)(const tl_snapped *, const tl_window *, const tl_target *, tl_share *) noexcept nogil
         tl_vertex_counts (*project_points)(const tl_source *, int64_t, int64_t, const tl_view *, double *) noexcept nogil
         void (*clip_points)(const tl_source *, const double *, const int32_t *, int64_t, const tl_view *, tl_exact_pieces *) noexcept nogil
-        void (*weigh_exact)(const tl_snapped *, const tl_exact_points *, const tl_exact_pieces *, const tl_window *, const int32_t *,
-                            const float *, int, int, float, float *) noexcept nogil
         int64_t (*take_points)(const tl_source *, int64_t, int64_t, int, double *) noexcept nogil
-        int64_t (*draw_exact)(const tl_snapped *, const tl_exact_points *, const tl_window *, const tl_target *,
-                              const tl_share *, tl_exact_counts *) noexcept nogil
         int64_t (*count_classes)(const tl_snapped *, const tl_window *, const tl_target *, tl_census *) noexcept nogil
         void (*set_flat_depth)(int32_t *, int64_t, int32_t, float, float, float *) noexcept nogil
         int64_t (*bin)(const tl_snapped *, const tl_window *, int32_t, int, tl_bins *) noexcept nogil

@@ -1,4 +1,4 @@
-# Triangles whose vertices are not snapped, and the passes that draw them.
+# Vertices that are not snapped, and what clip planes leave of their triangles.
 
 
 cdef class ExactPieces:
@@ -43,82 +43,64 @@ cdef class ExactPieces:
         return all_points, np.concatenate([collapsed, own[3] + np.int32(n + 1)]), names
 
 
-cdef class ExactMesh:
-    """Vertices in pixels as they are, and triangles: what `SnappedMesh` does that needs no snap."""
+cdef class ExactPoints:
+    """Vertices in pixels as they are, the triangles that are drawn of them, and how many samples were decided how."""
 
-    cdef tl_snapped drawn, given  # what is drawn; the triangles as they were given, with 1/w
     cdef tl_exact_points points
-    cdef ExactPieces pieces
-    cdef int64_t x_px, y_px
+    cdef tl_exact_counts counted
+    cdef int64_t n_vertices
     cdef object arrays
-    cdef readonly int subpixel_bits
 
-    def __init__(self, points_given, const int32_t[:, ::1] triangles_given, how, double band=1.0, Source source=None,
-                 ExactPieces pieces=None):
-        """`points_given`: (V, 2) or (V, 3); `how`: that of a view; `band` less than 1 draws wrong pictures, to test bands.
-
-        `source`: of clip space, where 1/w comes from; `pieces`: of the triangles that a clip plane cuts.
-        """
-        cdef int cull
+    def __init__(self, points_given, const int32_t[:, ::1] triangles_given, ExactPieces pieces=None, double band=1.0):
+        """`points_given`: (V, 2) or (V, 3); `band` less than 1 draws wrong pictures, to test bands."""
         cdef const double[:, ::1] points = points_given
         cdef const int32_t[:, ::1] triangles = triangles_given
         cdef const int32_t[::1] names = None
-        memset(&self.given, 0, sizeof(self.given))
-        self.given.triangles = &triangles[0, 0] if triangles.shape[0] else NULL
-        self.given.n_triangles, self.given.mesh.n_vertices = triangles.shape[0], points.shape[0]
-        self.given.mesh.source = &source.source if source is not None and source.is_clip_space else NULL
-        self.pieces = pieces
+        memset(&self.counted, 0, sizeof(self.counted))
+        self.n_vertices = points.shape[0]
         if pieces is not None:
             points, triangles, names = pieces.join(points_given, np.asarray(triangles_given))
-        self.arrays = (points, triangles, names, triangles_given, source)
-        memset(&self.drawn, 0, sizeof(self.drawn))
+        self.arrays = (points, triangles, names, pieces)
         self.points.points = &points[0, 0] if points.shape[0] else NULL
         self.points.n_points, self.points.stride = points.shape[0], points.shape[1]
-        self.points.sample_x_px = self.points.sample_y_px = 0.0
+        self.points.triangles = &triangles[0, 0] if triangles.shape[0] else NULL
+        self.points.n_triangles = triangles.shape[0]
+        self.points.names = &names[0] if names is not None and names.shape[0] else NULL
+        self.points.pieces = &pieces.pieces if pieces is not None and len(pieces) else NULL
         self.points.band = band
-        self.drawn.triangles = &triangles[0, 0] if triangles.shape[0] else NULL
-        self.drawn.n_triangles, self.drawn.mesh.n_vertices = triangles.shape[0], points.shape[0]
-        self.drawn.names = &names[0] if names is not None and names.shape[0] else NULL
-        self.x_px, self.y_px, self.subpixel_bits, cull, _, _ = how
-        self.drawn.cull = <tl_cull>cull
 
-    cdef ExactMesh copy(self):
-        cdef ExactMesh other = ExactMesh.__new__(ExactMesh)
-        other.drawn, other.given, other.pieces = self.drawn, self.given, self.pieces
-        other.points, other.arrays = self.points, self.arrays
-        other.x_px, other.y_px, other.subpixel_bits = self.x_px, self.y_px, self.subpixel_bits
-        return other
+    @property
+    def counts(self):
+        """`tl_exact_counts` of all that has been drawn, in its order."""
+        cdef tl_exact_counts *c = &self.counted
+        return c.n_triangles, c.n_on_grid, c.n_asked, c.n_turns, c.n_expansions, c.n_integers
 
-    def seen_from(self, int32_t x_fx, int32_t y_fx):
-        """Return the same mesh with its samples off the centres of the pixels, in units of 2**-subpixel_bits px."""
-        cdef ExactMesh seen = self.copy()
-        seen.points.sample_x_px, seen.points.sample_y_px = x_fx / 2.0**self.subpixel_bits, y_fx / 2.0**self.subpixel_bits
-        return seen
+    cdef void add(self, const tl_exact_counts *counts):
+        cdef tl_exact_counts *c = &self.counted
+        c.n_triangles += counts.n_triangles
+        c.n_on_grid += counts.n_on_grid
+        c.n_asked += counts.n_asked
+        c.n_turns += counts.n_turns
+        c.n_expansions += counts.n_expansions
+        c.n_integers += counts.n_integers
 
-    cdef tl_window window(self, int64_t first_row, int64_t n_rows, int64_t width) noexcept nogil:
-        cdef tl_window w
-        memset(&w, 0, sizeof(w))
-        w.x_px, w.y_px, w.subpixel_bits = self.x_px, self.y_px + first_row, self.subpixel_bits
-        w.width, w.height, w.pause = width, n_rows, pause_of_thread()
-        return w
-
-    def guess_seen(self, int64_t width, int64_t height):
-        """Return what `SnappedMesh.guess_seen` does."""
-        cdef int64_t n = min(self.drawn.n_triangles, 128), i, n_seen = 0, last = self.points.n_points - 1
+    cdef guess_seen(self, int64_t x_px, int64_t y_px, int64_t width, int64_t height):
+        """What `SnappedMesh.guess_seen` returns."""
+        cdef int64_t n = min(self.points.n_triangles, 128), i, n_seen = 0, last = self.points.n_points - 1
         cdef const int32_t *t
         cdef const double *a
         cdef const double *b
         cdef const double *c
         cdef double area, total = 0, n_rows = 0, n_pixels = <double>width * height, cols, rows, each
         for i in range(n):
-            t = self.drawn.triangles + 3 * (i * self.drawn.n_triangles // n)
+            t = self.points.triangles + 3 * (i * self.points.n_triangles // n)
             if not (0 <= t[0] <= last and 0 <= t[1] <= last and 0 <= t[2] <= last):
                 return 0.0, 0.0, 0.0  # an error that draw finds
             a = self.points.points + <int64_t>t[0] * self.points.stride
             b = self.points.points + <int64_t>t[1] * self.points.stride
             c = self.points.points + <int64_t>t[2] * self.points.stride
-            cols = min(max(a[0], b[0], c[0]), <double>(self.x_px + width)) - max(min(a[0], b[0], c[0]), <double>self.x_px)
-            rows = min(max(a[1], b[1], c[1]), <double>(self.y_px + height)) - max(min(a[1], b[1], c[1]), <double>self.y_px)
+            cols = min(max(a[0], b[0], c[0]), <double>(x_px + width)) - max(min(a[0], b[0], c[0]), <double>x_px)
+            rows = min(max(a[1], b[1], c[1]), <double>(y_px + height)) - max(min(a[1], b[1], c[1]), <double>y_px)
             if not (cols > 0 and rows > 0):
                 continue
             n_seen += 1
@@ -127,59 +109,5 @@ cdef class ExactMesh:
             total += area if area < cols * rows else cols * rows
         if not n or not n_pixels:
             return 0.0, 0.0, 0.0
-        each = self.drawn.n_triangles / <double>n
+        each = self.points.n_triangles / <double>n
         return n_seen * each, total * each / n_pixels, n_rows * each
-
-    def draw(self, Target target, int64_t first_row, int64_t n_rows, bint is_first=True, bint is_last=True):
-        """Draw as `SnappedMesh.draw` does; a bad row may also be that of a vertex that is not finite."""
-        return self.draw_counted(target, first_row, n_rows, is_first, is_last)[0]
-
-    def draw_counted(self, Target target, int64_t first_row, int64_t n_rows, bint is_first=True, bint is_last=True):
-        """Return what `draw` does, and `tl_exact_counts`: what was decided how."""
-        cdef tl_target rows = target.rows(first_row)
-        cdef tl_window window = self.window(first_row, n_rows, target.width)
-        cdef tl_share share = no_share()
-        cdef tl_exact_counts counts
-        cdef int64_t bad_row
-        memset(&counts, 0, sizeof(counts))
-        share.first, share.end, share.is_first, share.is_last = 0, self.drawn.n_triangles, is_first, is_last
-        with nogil:
-            bad_row = K.draw_exact(&self.drawn, &self.points, &window, &rows, &share, &counts)
-        raise_if_given_up()
-        return bad_row, (counts.n_triangles, counts.n_on_grid, counts.n_asked, counts.n_turns, counts.n_expansions,
-                         counts.n_integers)
-
-    def with_inverse_w(self, int64_t n_pixels, empty=None):
-        """Return the same mesh: 1/w is computed a triangle at a time."""
-        return self
-
-    def weigh(self, const int32_t[:, ::1] ids, const float[:, ::1] values, int n_values, bint per_corner, float background,
-              float[:, :, ::1] out):
-        """Write weights, or values where they are given, at each pixel."""
-        cdef tl_window window = self.window(0, ids.shape[0], ids.shape[1])
-        cdef const tl_exact_pieces *pieces = &self.pieces.pieces if self.pieces is not None else NULL
-        if ids.shape[0] and ids.shape[1] and n_values:
-            with nogil:
-                K.weigh_exact(&self.given, &self.points, pieces, &window, &ids[0, 0],
-                              &values[0, 0] if values is not None and values.shape[0] else NULL, n_values, per_corner,
-                              background, &out[0, 0, 0])
-
-    def barycentric(self, const int32_t[:, ::1] ids, float[:, :, ::1] out):
-        """Write the weights of the three vertices of the triangle at each pixel."""
-        self.weigh(ids, None, 3, False, 0.0, out)
-
-    def interpolate(self, const int32_t[:, ::1] ids, const float[:, ::1] values, bint per_corner, float background,
-                    float[:, :, ::1] out):
-        """Write the interpolated values at each pixel, as `SnappedMesh.interpolate` does."""
-        self.weigh(ids, values, out.shape[2], per_corner, background, out)
-
-    def paint(self, const int32_t[:, ::1] labels, const uint8_t[::1] colors, uint8_t[::1] pixels, int64_t first_row, int64_t n_rows,
-              bint is_flat, bint is_u8, int n_channels):
-        """Colour the rows [first_row, first_row + n_rows) by their labels, a colour a triangle."""
-        cdef int64_t width = labels.shape[1]
-        cdef int pixel_bytes = n_channels if is_u8 else 4 * n_channels
-        if width == 0 or n_rows == 0 or self.drawn.n_triangles == 0:
-            return
-        with nogil:
-            K.paint_flat(&labels[first_row, 0], n_rows * width, <const uint8_t *>data(colors), pixel_bytes,
-                         &pixels[first_row * width * pixel_bytes])

@@ -45,6 +45,13 @@ def build_info() -> dict[str, Any]:
         ``version``; ``compiler``; ``flags``, the compiler flags of each kernel unit; ``isa_built``, the instruction
         sets in the binary; ``isa_available``, those of them that this machine can run; ``isa``, the one in use. Every
         instruction set gives the same bits.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> info = tl.build_info()
+    >>> "scalar" in info["isa_built"], info["isa"] in info["isa_available"]
+    (True, True)
     """
     return {
         **kernels.compiler_info(),

@@ -113,6 +113,7 @@ class Pieces:
 
 class SnappedMesh:
     viewport: Viewport | None
+    exact: ExactPoints | None
     subpixel_bits: int
     def __init__(
         self,
@@ -124,6 +125,7 @@ class SnappedMesh:
         how: tuple[int, int, int, int, int, int],
         viewport: Viewport | None,
         is_used: U8 | None = None,
+        exact: ExactPoints | None = None,
     ) -> None: ...
     def seen_from(self, x_fx: int, y_fx: int) -> SnappedMesh: ...
     def guess_seen(self, width: int, height: int) -> tuple[float, float, float]: ...
@@ -177,22 +179,12 @@ class ExactPieces:
     def __len__(self) -> int: ...
     def join(self, points: F64, triangles: I32) -> tuple[F64, I32, I32]: ...
 
-class ExactMesh(SnappedMesh):  # has what draws, paints and weighs one mesh; what asks for more is refused before
+class ExactPoints:
+    @property
+    def counts(self) -> tuple[int, int, int, int, int, int]: ...
     def __init__(
-        self,
-        points: F64,
-        triangles: I32,
-        how: tuple[int, int, int, int, int, int],
-        band: float = 1.0,
-        source: Source | None = None,
-        pieces: ExactPieces | None = None,
+        self, points_given: F64, triangles_given: I32, pieces: ExactPieces | None = None, band: float = 1.0
     ) -> None: ...
-    def weigh(
-        self, ids: I32, values: F32 | None, n_values: int, per_corner: bool, background: float, out: F32
-    ) -> None: ...
-    def draw_counted(
-        self, target: Target, first_row: int, n_rows: int, is_first: bool = True, is_last: bool = True
-    ) -> tuple[int, tuple[int, ...]]: ...
 
 def list_edges(mesh: SnappedMesh, starts: I64, last_low: I32, highs: I32, edges: U64) -> int: ...
 def draw_lines(

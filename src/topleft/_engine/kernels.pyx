@@ -1,4 +1,5 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, initializedcheck=False, embedsignature=False
+# cython: freethreading_compatible=True
 """Memoryviews in, one nogil kernel call, status out. The array layer has checked every shape, dtype and index."""
 
 from libc.stdint cimport int8_t, int16_t, int32_t, int64_t, uint8_t, uint16_t, uint32_t, uint64_t
@@ -92,8 +93,8 @@ def as_bytes(array):
 include "pause.pxi"
 include "blocks.pxi"
 include "buffers.pxi"
-include "triangles.pxi"
 include "exact.pxi"
+include "triangles.pxi"
 include "clusters.pxi"
 include "meshlets.pxi"
 include "pixels.pxi"

@@ -125,5 +125,7 @@ cdef int raise_if_given_up() except -1:
     if not own.is_given_up:
         return 0
     own.is_given_up, own.pause.left_px = 0, ASK_AFTER_PX
-    error, heard = (KeyboardInterrupt(), heard) if own.stop != NULL else (heard, None)
+    if own.stop != NULL:
+        raise KeyboardInterrupt
+    error, heard = heard, None  # the main thread alone hears
     raise error

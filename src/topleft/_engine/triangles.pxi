@@ -8,6 +8,13 @@ cdef inline tl_share no_share() noexcept nogil:
     return share
 
 
+cdef inline tl_exact_counts no_counts() noexcept nogil:
+    """Nothing that was decided."""
+    cdef tl_exact_counts counts
+    memset(&counts, 0, sizeof(counts))
+    return counts
+
+
 cdef class SnappedMesh:
     """Snapped vertices and triangles, ready to be drawn or resolved; keeps what it points to alive."""
 
@@ -17,21 +24,25 @@ cdef class SnappedMesh:
     cdef tl_test test
     cdef object arrays
     cdef readonly Viewport viewport
+    cdef readonly ExactPoints exact  # vertices that are not snapped; None: they are
     cdef const uint8_t[::1] is_used  # the blocks of vertices that have been snapped; None: all
 
     def __init__(
         self, Source source, const uint8_t[::1] records, const int64_t[:, ::1] wide, const int32_t[:, ::1] triangles,
-        Pieces pieces, how, Viewport viewport, const uint8_t[::1] is_used=None,
+        Pieces pieces, how, Viewport viewport, const uint8_t[::1] is_used=None, ExactPoints exact=None,
     ):
-        """`how`: that of a view, see `topleft._raster.view.How`."""
+        """`how`: that of a view, see `topleft._raster.view.How`; with `exact` there are no records."""
         cdef int test
-        self.viewport, self.is_used = viewport, is_used
+        self.viewport, self.is_used, self.exact = viewport, is_used, exact
         self.arrays = (source, records, wide, triangles, pieces)
         self.snapped.mesh.vertices = <const tl_vertex *>data(records)
         self.snapped.mesh.wide = <const tl_wide *>&wide[0, 0] if wide is not None and wide.shape[0] else NULL
         self.snapped.mesh.inv_w = NULL
         self.snapped.mesh.source = &source.source if source.is_clip_space else NULL
         self.snapped.mesh.n_vertices = records.shape[0] // <int64_t>sizeof(tl_vertex)
+        self.snapped.mesh.exact = NULL
+        if exact is not None:
+            self.snapped.mesh.exact, self.snapped.mesh.n_vertices = &exact.points, exact.n_vertices
         self.snapped.n_triangles = triangles.shape[0]
         self.snapped.triangles = &triangles[0, 0] if triangles.shape[0] else NULL
         self.snapped.pieces = &pieces.pieces if pieces is not None and len(pieces) else NULL
@@ -84,8 +95,12 @@ cdef class SnappedMesh:
         cdef SnappedMesh other = SnappedMesh.__new__(SnappedMesh)
         other.snapped, other.arrays = self.snapped, self.arrays
         other.x_px, other.y_px, other.subpixel_bits, other.test = self.x_px, self.y_px, self.subpixel_bits, self.test
-        other.viewport, other.is_used = self.viewport, self.is_used
+        other.viewport, other.is_used, other.exact = self.viewport, self.is_used, self.exact
         return other
+
+    cdef void note(self, const tl_exact_counts *counts):
+        if self.exact is not None:
+            self.exact.add(counts)
 
     cdef const tl_view *clip_view(self) noexcept nogil:
         """How clip space maps to pixels; NULL where vertices are in pixels."""
@@ -103,6 +118,8 @@ cdef class SnappedMesh:
         From the boxes and areas of up to 128 of them; one with a vertex that is wide or outside of a clip plane counts as
         if it covered the picture.
         """
+        if self.exact is not None:
+            return self.exact.guess_seen(self.x_px, self.y_px, width, height)
         cdef const tl_vertex *v = self.snapped.mesh.vertices
         cdef const tl_vertex *a
         cdef const tl_vertex *b
@@ -169,10 +186,13 @@ cdef class SnappedMesh:
         cdef tl_target rows = target.rows(first_row)
         cdef tl_window window = self.window(first_row, n_rows, target.width)
         cdef tl_share share = no_share()
+        cdef tl_exact_counts counts = no_counts()
         cdef int64_t bad_row
         share.first, share.end, share.is_first, share.is_last = 0, self.snapped.n_triangles, is_first, is_last
+        share.counts = &counts
         with nogil:
             bad_row = K.draw(&self.snapped, &window, &rows, &share)
+        self.note(&counts)
         raise_if_given_up()
         return bad_row
 
@@ -184,11 +204,13 @@ cdef class SnappedMesh:
         cdef tl_target rows = target.rows(first_row)
         cdef tl_window window = self.window(first_row, n_rows, target.width), picture = self.window(0, target.height, target.width)
         cdef tl_share share = no_share()
+        cdef tl_exact_counts counts = no_counts()
         cdef int64_t bad_row
-        share.others, share.picture = &others[0], &picture
+        share.others, share.picture, share.counts = &others[0], &picture, &counts
         share.first, share.end, share.is_first, share.is_last = first, first + others.shape[0] - 16, True, False
         with nogil:
             bad_row = K.draw(&self.snapped, &window, &rows, &share)
+        self.note(&counts)
         raise_if_given_up()
         return bad_row, share.n_others
 
@@ -197,10 +219,12 @@ cdef class SnappedMesh:
         cdef tl_target rows = target.rows(first_row)
         cdef tl_window window = self.window(first_row, n_rows, target.width)
         cdef tl_share share = no_share()
-        share.ids = &ids[0] if ids.shape[0] else NULL
+        cdef tl_exact_counts counts = no_counts()
+        share.ids, share.counts = &ids[0] if ids.shape[0] else NULL, &counts
         share.first, share.end, share.is_first, share.is_last = 0, ids.shape[0], False, is_last
         with nogil:
             K.draw(&self.snapped, &window, &rows, &share)
+        self.note(&counts)
         raise_if_given_up()
 
     def draw_area(self, float[:, ::1] pixels, uint8_t[::1] cells, int64_t first_row, int64_t n_rows, bint is_wide, bint is_clamped):

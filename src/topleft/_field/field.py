@@ -8,7 +8,7 @@ Structures and an Interpolant over Each Irregular Triangular Domain", SIGGRAPH 1
 
 from __future__ import annotations
 
-from typing import Any, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -50,7 +50,7 @@ def field(
     pixel_size: float | tuple[float, float] | None = None,
     y: YOption = "up",
     per: PerOption = "auto",
-    subpixel_bits: int = 8,
+    subpixel_bits: int | Literal["exact"] = 8,
     threads: int | None = None,
     out: npt.NDArray[Any] | None = None,
 ) -> npt.NDArray[Any]:
@@ -148,7 +148,7 @@ def height_map(
     surface: SurfaceOption = "upper",
     extent: ExtentLike | None = None,
     y: YOption = "up",
-    subpixel_bits: int = 8,
+    subpixel_bits: int | Literal["exact"] = 8,
     threads: int | None = None,
     out: F64 | None = None,
 ) -> F64:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias, get_args
 import numpy as np
 import numpy.typing as npt
 
-from topleft._base.arrays import as_real, as_size, shown
+from topleft._base.arrays import as_array, as_real, as_size, shown
 from topleft._base.options import check_choice
 from topleft._scene.adapt import MeshLike, as_polygons
 from topleft._scene.cells import Polygons
@@ -176,6 +176,11 @@ class Grid:
         The difference to the side of the extent is taken first and in float64, so coordinates may be large: the result
         has three roundings of 2**-53 each, relative to itself, besides the one of the data.
         """
+        points = as_array("points", points)
+        if points.dtype.kind not in "fiu":
+            raise TypeError(f"points must be real numbers, got {shown(points)}")
+        if points.ndim != 2 or points.shape[1] < 2:
+            raise ValueError(f"points must have shape (N, 2) or more columns, got {points.shape}")
         width, height = self.size
         x_min, x_max, y_min, y_max = self.extent
         pixels = np.empty((len(points), 2))

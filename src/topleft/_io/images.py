@@ -77,6 +77,17 @@ def save_image(
         If the format is unknown or cannot hold the array or the text.
     OSError
         If the file cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> import topleft as tl
+    >>> mask = tl.coverage([(0, 0), (4, 0), (0, 4)], [(0, 1, 2)], (4, 4))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     tl.save_image(Path(folder, "mask.png"), mask)
+    ...     Path(folder, "mask.png").exists()
+    True
     """
     path = as_path("path", path)
     suffix = path.suffix.lower()

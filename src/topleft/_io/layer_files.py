@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from topleft._base.arrays import as_number, as_path
 from topleft._io.images import SUFFIXES, save_image
 from topleft.errors import ImageError
 
@@ -88,7 +89,11 @@ def save_layers(
     OSError
         If a file cannot be written.
     """
-    destination = Path(destination)
+    destination = as_path("path", destination)
+    if scale is not None:
+        scale = as_number("scale", scale)
+        if not 0 < scale < np.inf:
+            raise ValueError(f"scale must be positive and finite, got {scale}")
     paths = layer_paths(destination, list(layers))
     if destination.suffix.lower() == ".npz" and "{layer}" not in str(destination):
         save_image(destination, layers if matrix is None else {**layers, "clip_from_world": matrix})

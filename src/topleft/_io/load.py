@@ -33,7 +33,7 @@ def load(
     max_vertices: int = MAX_VERTICES,
     max_texture_pixels: int = MAX_TEXTURE_PIXELS,
 ) -> Mesh | Points:
-    """A mesh read from a file: OBJ, PLY, STL, OFF, glTF and GLB; by trimesh 3MF and what else it has readers for.
+    r"""A mesh read from a file: OBJ, PLY, STL, OFF, glTF and GLB; by trimesh 3MF and what else it has readers for.
 
     Parameters
     ----------
@@ -75,6 +75,18 @@ def load(
     -----
     Files that a mesh names are read from its folder, and from the folders in it; nothing else is opened. What is read
     of each format is told in docs/guide/files.md.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> import topleft as tl
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder, "one.obj")
+    ...     _ = path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    ...     mesh = tl.load(path)
+    >>> mesh.triangles.tolist()
+    [[0, 1, 2]]
     """
     crease = as_crease(crease)
     source = InputFile(as_path("path", path), max_vertices=max_vertices, max_texture_pixels=max_texture_pixels)

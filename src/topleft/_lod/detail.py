@@ -57,6 +57,14 @@ class Detail:
         Triangles of the mesh itself.
     why : str
     rejected : tuple of str
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> ball = tl.Mesh(*tl.scenes.icosphere(3))
+    >>> detail = tl.choose_detail(ball, tl.Camera.framing(ball), (64, 64), tolerance=0.0)
+    >>> detail.level, detail.mesh is ball
+    (0, True)
     """
 
     level: int

@@ -17,6 +17,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 import numpy.typing as npt
 
+from topleft._base.arrays import as_path, shown
 from topleft._base.whole_file import write_whole
 from topleft._camera.matrices import bounding_sphere
 from topleft._model.mesh import Mesh
@@ -41,6 +42,13 @@ class Level:
         No point of either surface is farther than that from the other one, in units of object space.
     known : float
         About how far some point is, as measured: so `bound` is at most `bound / known` times too large. 0: not known.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> ball = tl.Mesh(*tl.scenes.icosphere(1))
+    >>> tl.Level(ball, 0.0).bound
+    0.0
     """
 
     mesh: Mesh
@@ -63,6 +71,14 @@ class Levels(Sequence[Level]):
     mesh : Mesh
     coarser : sequence of Level
         Each with fewer triangles than the one before.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> fine, coarse = tl.Mesh(*tl.scenes.icosphere(2)), tl.Mesh(*tl.scenes.icosphere(1))
+    >>> levels = tl.Levels(fine, [tl.Level(coarse, 0.2)])
+    >>> [len(level.mesh.triangles) for level in levels]
+    [320, 80]
     """
 
     def __init__(self, mesh: Mesh, coarser: Sequence[Level] = ()) -> None:
@@ -130,6 +146,8 @@ class Levels(Sequence[Level]):
         import zipfile
         import zlib
 
+        if not isinstance(mesh, Mesh):
+            raise TypeError(f"mesh must be a Mesh, got {shown(mesh)}")
         path = _checked_path(path)
         try:
             with np.load(path, allow_pickle=False) as file:
@@ -194,7 +212,7 @@ def kept_levels(mesh: Mesh) -> Levels | None:
 
 
 def _checked_path(path: str | os.PathLike[str]) -> Path:
-    checked = Path(path)
+    checked = as_path("path", path)
     if checked.suffix != ".npz":
         raise ValueError(f"levels are kept in a file that ends in .npz, got {str(checked)!r}")
     return checked

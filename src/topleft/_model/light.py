@@ -124,6 +124,14 @@ class Fog:
     ------
     ValueError
         If a number is outside its range.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> fog = tl.Fog(2.0, 6.0, color=(200, 210, 220))
+    >>> ball = tl.Mesh(*tl.scenes.icosphere(2))
+    >>> tl.render(ball, tl.Camera.framing(ball), (32, 32), fog=fog).shape
+    (32, 32, 4)
     """
 
     near: float

@@ -76,6 +76,15 @@ class Material:
     ------
     ValueError
         If a number is outside its range.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> vertices, triangles = tl.scenes.icosphere(2)
+    >>> ball = tl.Mesh(vertices, triangles, materials=[tl.Material(color=(200, 40, 30), specular=0.3)])
+    >>> picture = tl.render(ball, tl.Camera.framing(ball), (32, 32))
+    >>> bool(picture[16, 16, 0] > picture[16, 16, 2])
+    True
     """
 
     color: Color | None = None

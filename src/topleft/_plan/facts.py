@@ -5,7 +5,8 @@ In: the arrays of a call, or a mesh. Out: `Facts`, which `stages.py` turns into 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -54,6 +55,17 @@ class ClusterFacts:
     n_drawn: int = 0
 
 
+class Decided(NamedTuple):
+    """How samples of triangles whose vertices are not snapped were decided: `tl_exact_counts` in ``csrc/exact.h``."""
+
+    n_triangles: int
+    n_on_grid: int
+    n_asked: int
+    n_turns: int
+    n_expansions: int
+    n_integers: int
+
+
 @dataclass(frozen=True, slots=True)
 class Facts:
     """What decides how a scene is drawn."""
@@ -82,6 +94,7 @@ class Facts:
     is_direct: bool  # uint8 colours of triangles are stored without labels in between
     work_ms: float  # of one thread, as guessed before the draw
     census: tuple[tuple[int, float, float], ...]  # of each of CLASSES: triangles, samples in boxes, covered
+    decided: Decided | None = None  # with vertices that are not snapped
     clusters: ClusterFacts | None = None  # of a mesh
 
     def count(self, *names: str) -> int:
@@ -126,6 +139,8 @@ def find_facts(
     ValueError, TypeError, IndexError
         As the verb would.
     """
+    decided = count_decided(vertices, triangles, view) if view.is_exact else None
+    asked, view = view, replace(view, is_exact=False)  # the census is that of the snapped triangles
     snapped = snap_mesh(FRESH, vertices, triangles, view, with_depth=verb == "rasterize", out=None)
     snapped.check_indices()
     given, indices = as_array("vertices", vertices), as_array("triangles", triangles)
@@ -144,7 +159,7 @@ def find_facts(
     facts = Facts(
         verb=verb,
         outputs=outputs,
-        view=view,
+        view=asked,
         test=test,
         route=route,
         drawing=drawing,
@@ -166,10 +181,26 @@ def find_facts(
         is_direct=verb == "fill" and choices.is_direct(snapped, view, np.dtype(np.uint8), is_flat=True),
         work_ms=choices.work_ns(view, snapped, drawing.sink) / 1e6,
         census=tuple(census),
+        decided=decided,
     )
     checked = np.array(snapped.triangles, np.int32)
     checked.flags.writeable = False
     return facts, checked
+
+
+def count_decided(vertices: ArrayLike, triangles: ArrayLike, view: View) -> Decided:
+    """Draw a scene without a snap, and return how its samples were decided; of several samples the first."""
+    exact = snap_mesh(FRESH, vertices, triangles, view, with_depth=False, out=None)
+    mesh = exact.mesh
+    if view.sampling.n_samples > 1:
+        x, y = sample_positions(view.sampling.n_samples, view.grid_bits)[0].tolist()
+        mesh = mesh.seen_from(x, y)
+    width, height = view.size
+    covered = np.empty(_engine.Target.covered_shape(height, width, 1), np.uint64)
+    target = _engine.Target(Sink.MASK, np.empty((height, width), np.bool_), None, covered)
+    if width and height and mesh.draw(target, 0, height) >= 0:
+        exact.check_indices()
+    return Decided(*mesh.exact.counts)  # type: ignore[union-attr]
 
 
 def find_sink(verb: str, view: View) -> Sink:
@@ -189,6 +220,8 @@ def find_cluster_facts(mesh: Mesh, view: View, verb: str, test: DepthTest | None
     if view.sampling is not Sampling.CENTER:
         return ClusterFacts(None, "with several samples a pixel, bands of rows are drawn, a sample after the other")
     sink = choices.fragment_sink(test, has_depth=True)
+    if view.is_exact:
+        return ClusterFacts(None, "vertices that are not snapped are drawn from beginning to end")
     if not choices.can_cluster(view, sink):
         return ClusterFacts(None, "the order of the triangles matters, or the window lies too far off")
     if not choices.pays_to_cluster(n_triangles, 1):
@@ -213,6 +246,9 @@ def memory_of(facts: Facts) -> tuple[dict[str, int], dict[str, int]]:
     n_pixels, n_samples = width * height, view.sampling.n_samples
     is_empty = n_pixels == 0
     scratch = {"records": 0 if is_empty or not n else _engine.VERTEX_BYTES * facts.n_vertices}
+    if view.is_exact:  # float64 pixels stay where they are
+        taken = 24 if facts.is_clip_space else 8 * facts.n_components if facts.point_dtype != "float64" else 0
+        scratch = {"points": 0 if is_empty or not n else taken * facts.n_vertices}
     if facts.index_dtype not in ("int32", "uint32"):
         scratch["triangles"] = 12 * n
     results = result_bytes(facts)

@@ -14,7 +14,7 @@ from typing import Any, Unpack
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from topleft._base.arrays import as_names, as_size, as_triangles
+from topleft._base.arrays import as_count, as_names, as_size, as_triangles
 from topleft._base.memory import KeptMemory
 from topleft._base.options import DepthTest, Sampling, parse
 from topleft._camera.camera import Camera
@@ -99,6 +99,13 @@ class Plan:
         How many draw.
     costs : str
         Where the estimates come from, and how far off they are.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> plan = tl.plan([(0, 0), (4, 0), (0, 4)], [(0, 1, 2)], (4, 4))
+    >>> plan.verb, plan.n_triangles, plan.threads
+    ('rasterize', 1, 1)
     """
 
     verb: str
@@ -179,6 +186,7 @@ class Plan:
 
         `fill` is drawn with made-up colours of four channels, one a triangle.
         """
+        n_rounds = as_count("n_rounds", n_rounds)
         memory = KeptMemory()
         best: dict[str, int] = {}
         for _ in range(n_rounds + 1):  # the first one touches the memory
@@ -213,10 +221,9 @@ class Plan:
             If the call asks for another size, sampling, method, side to cull or number of sub-pixel bits.
         """
         refuse_classic(view, "plan")
-        if view.is_exact:
-            raise ValueError(
-                "subpixel_bits must be in 0..16 with a plan, got 'exact': a plan chooses for snapped vertices"
-            )
+        if view.is_exact != self._view.is_exact:
+            wishes = ("exact" if view.is_exact else view.subpixel_bits for view in (self._view, view))
+            raise ValueError("plan is for subpixel_bits={!r}, got {!r}: make another with topleft.plan".format(*wishes))
         for name in FIXED:
             wish, fact = getattr(self._view, name), getattr(view, name)
             if wish != fact:
@@ -279,7 +286,9 @@ def plan(
     """Return how a scene is drawn: what is chosen at each stage, why, what is left out, and what it should take.
 
     Vertices are transformed, cut and snapped as the verb does it, and triangles are counted in the code that draws
-    them: the plan says what happens, it does not guess. It costs about as much as a draw.
+    them: the plan says what happens, it does not guess. It costs about as much as a draw. With
+    ``subpixel_bits="exact"`` the scene is drawn once, so that the plan tells how many samples were in doubt and what
+    decided them; its classes are those of the same triangles on 2**-8 px.
 
     Parameters
     ----------

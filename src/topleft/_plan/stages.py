@@ -13,7 +13,7 @@ from topleft._base.options import Sampling, Sink
 from topleft._base.threads import available_threads
 from topleft._lod.detail import Detail
 from topleft._plan.costs import Costs, features, sink_group
-from topleft._plan.facts import ClusterFacts, Facts, memory_of
+from topleft._plan.facts import ClusterFacts, Decided, Facts, memory_of
 from topleft._raster import choices
 from topleft._raster.choices import MIN_THREAD_NS, Route
 from topleft.methods import METHODS
@@ -59,6 +59,9 @@ SINKS = {
 #: does: of balls of 10**6 and 10**7 triangles.
 CLUSTER_TEST_NS = 160
 LEFT_OUT_SHARE = 0.6
+
+#: What drawing takes of vertices that are not snapped, beside the snapped draw: of the scenes in docs/design/exact.md.
+EXACT_TIMES = 1.1
 
 
 def find_stages(facts: Facts, costs: Costs) -> tuple[Stage, ...]:
@@ -159,6 +162,13 @@ def plan_vertices(facts: Facts, costs: Costs) -> Iterator[Stage]:
     else:
         yield plan_transform(facts)
         yield plan_clip(facts, costs)
+    if view.is_exact:
+        is_taken = kind == "snap" and facts.point_dtype == "float64"
+        why = f"{vertices(facts.n_vertices)} stay where they are: no pixel is wrong against the numbers of the array"
+        choice = "none, float64 where it lies" if is_taken else f"none, float64, {plural(threads, 'thread')}"
+        grid = ("a grid: vertices would move by up to 1/512 px at 8 sub-pixel bits",)
+        yield Stage("snap", choice, why, grid, 0.0 if is_taken else ms, "vertices")
+        return
     bits = view.subpixel_bits
     why = f"{vertices(facts.n_vertices)}, each moved by at most 1/{2 << bits} px; all that follows is integers"
     rejected = ["float32 coordinates: edges that two triangles share would leave gaps"]
@@ -204,6 +214,8 @@ def plan_clip(facts: Facts, costs: Costs) -> Stage:
 
 def plan_arithmetic(facts: Facts) -> Stage:
     """Tell how many bits the edge functions need."""
+    if facts.decided is not None:
+        return plan_decisions(facts.decided)
     narrow, long = facts.count("tiny", "small", "middle", "rows"), facts.count("long", "edge 64", "span 64")
     wide = facts.count("edge 128", "span 128")
     parts = [f"{name}: {n:,}" for name, n in (("32-bit lanes", narrow), ("64-bit", long), ("128-bit", wide)) if n]
@@ -214,6 +226,21 @@ def plan_arithmetic(facts: Facts) -> Stage:
     return Stage("arithmetic", ", ".join(parts) or "none", why, rejected, timed_in="method")
 
 
+def plan_decisions(found: Decided) -> Stage:
+    """Tell how the samples of vertices that are not snapped were decided."""
+    parts = [f"{plural(found.n_asked, 'sample or row end')} in doubt"]
+    if found.n_on_grid:
+        parts.append(f"{plural(found.n_on_grid, 'triangle')} on 2**-8 px, by integers")
+    if found.n_turns:
+        parts.append(f"the turn of {plural(found.n_turns, 'triangle')}")
+    why = (
+        f"float32 and float64 lanes decide what lies beyond their error; of the rest {found.n_expansions:,} signs took "
+        f"sums of several float64, {found.n_integers:,} integers of 2,176 bits"
+    )
+    rejected = ("the exact sign for every sample: 10 to 1,000 times as long for the same picture",)
+    return Stage("arithmetic", ", ".join(parts), why, rejected, timed_in="method")
+
+
 def plan_cull(facts: Facts) -> Stage:
     """Tell which triangles draw nothing."""
     names = {"degenerate": "without area", "culled": "turned away", "outside": "outside of the picture",
@@ -221,6 +248,8 @@ def plan_cull(facts: Facts) -> Stage:
     parts = [f"{facts.count(name):,} {text}" for name, text in names.items() if facts.count(name)]
     if facts.n_beyond:
         parts.append(f"{facts.n_beyond:,} outside of a clip plane")
+    if facts.view.is_exact:
+        parts = [f"{part}, on 2**-8 px" if part.endswith("without area") else part for part in parts]
     n_hidden = facts.count(*names) + facts.n_beyond
     n_all = facts.n_triangles - facts.n_cut + facts.n_pieces
     why = f"{n_hidden:,} of {n_all:,} cannot cover a sample: " + ", ".join(parts)
@@ -249,6 +278,7 @@ def plan_method(facts: Facts, costs: Costs) -> Stage:
     group = sink_group(facts.drawing.sink, view.sampling)
     times = view.sampling.n_samples / 4 if group == "samples" else view.sampling.n_samples
     counts = features(facts.census, n_pixels)
+    times *= EXACT_TIMES if facts.decided is not None else 1.0
     ms = times * costs.draw_ms(group, counts, facts.drawing.n_threads, is_shared=facts.is_shared) if n_pixels else 0.0
     if view.sampling is Sampling.AREA:
         why = f"the picture is {n_pixels:,} pixels; an edge costs the rows that it passes, an interior nothing"

@@ -60,7 +60,7 @@ def draw_cloud(
         options["transform"] = camera.clip_from_world(frame)
     else:
         positions = through_lens(positions, camera, frame)
-    view = View.parse(size, cast(ViewOptions, options))
+    view = View.parse(size, cast(ViewOptions, options), why_snapped="the corners of points lie on the grid")
     refuse_many(view, "a cloud")
     refuse_classic(view, "points")
     return draw_points(FRESH, positions, sizes_px(cloud, camera, frame), PointShape(cloud.shape), view)

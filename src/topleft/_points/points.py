@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine
-from topleft._base.arrays import as_array, as_point_size
+from topleft._base.arrays import as_array, as_number, as_places, as_point_size, as_real
 from topleft._base.memory import FreshMemory, Memory, check_fits
 from topleft._base.options import DepthTest, PointShape, Sink, parse
 from topleft._base.threads import count_threads, run_parts
@@ -44,6 +44,13 @@ class PointFragments(Fragments):
         Index of the point that shows in the pixel, -1 where there is none; the same as `triangle` and `id`.
     depth, mask, instance, samples_triangle, samples_depth
         As in `Fragments`, of points. The depth of a point is that of its centre.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> frags = tl.points([(1, 1, 0.5), (3, 1, 0.25)], (4, 2), point_size=2, shape="square")
+    >>> frags.point.tolist()
+    [[0, 0, 1, 1], [0, 0, 1, 1]]
     """
 
     def __init__(self, ids: NDArray[np.int32], depth: NDArray[np.float32], n_points: int) -> None:
@@ -65,6 +72,7 @@ class PointFragments(Fragments):
 
     def only(self, rows: NDArray[np.intp], cols: NDArray[np.intp]) -> PointFragments:
         """Return what is left when no other pixels than these show a point."""
+        rows, cols = as_places(rows, cols, self.id.shape)
         ids = np.full((1, *self.id.shape), -1, np.int32)
         ids[0, rows, cols] = self.id[rows, cols]
         return PointFragments(ids, self.depth[None], self._n_vertices)
@@ -96,12 +104,12 @@ class PointFragments(Fragments):
         """
         if derivatives:
             raise ValueError("derivatives are those of triangles: a point has one value")
-        array = np.asarray(values, np.float32)
+        array = as_real("values", values).astype(np.float32)
         if array.ndim not in (1, 2) or len(array) != self._n_vertices:
             raise ValueError(
                 f"values must have shape ({self._n_vertices}, K) or ({self._n_vertices},), got {array.shape}"
             )
-        out = np.full((*self.id.shape, *array.shape[1:]), background, np.float32)
+        out = np.full((*self.id.shape, *array.shape[1:]), as_number("background", background), np.float32)
         out[self.mask] = array[self.id[self.mask]]
         return out
 
@@ -161,7 +169,7 @@ def points(
            [ 0,  0,  0, -1,  1, -1],
            [ 0,  0,  0, -1, -1, -1]], dtype=int32)
     """
-    checked = View.parse(size, view)
+    checked = View.parse(size, view, why_snapped="the corners of points lie on the grid")
     refuse_many(checked, "points")
     refuse_classic(checked, "points")
     if checked.cull:

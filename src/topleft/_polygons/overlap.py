@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft import _engine
-from topleft._base.arrays import as_array, as_checked_triangles
+from topleft._base.arrays import as_array, as_checked_triangles, as_real
 from topleft._base.memory import SCRATCH, FreshMemory
 from topleft._base.options import parse
 from topleft._base.threads import run_parts
@@ -56,6 +56,15 @@ class Overlap:
         The area of the pixel that lies in the polygon, in pixels, above 0 and at most 1: `data`.
     size : (int, int)
         Width and height of the picture.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> found = tl.overlap([[[(0.5, 0), (2, 0), (2, 1), (0.5, 1)]]], (3, 1))
+    >>> found.pixels.tolist(), found.areas.tolist()
+    ([0, 1], [0.5, 1.0])
+    >>> found.means([[2.0, 8.0, 9.0]]).tolist()
+    [6.0]
     """
 
     starts: npt.NDArray[np.int64]
@@ -113,7 +122,7 @@ class Overlap:
 
         Amounts a pixel's area are conserved: the sum of the raster is that of values times areas.
         """
-        own = as_array("values", values)
+        own = as_real("values", values)
         if own.shape != (len(self),):
             raise ValueError(f"values must have shape ({len(self)},), a number for each polygon, got {own.shape}")
         weights = np.repeat(own, np.diff(self.starts)) * self.areas

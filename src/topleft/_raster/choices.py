@@ -174,17 +174,23 @@ def work_ns(view: View, snapped: Snapped, sink: Sink) -> float:
 
 def can_share(view: View) -> bool:
     """Tell whether a pass over a scene can draw some of its triangles."""
+    fits_lanes = not view.test or view.subpixel_bits <= 8
+    return fits_lanes and takes_lanes(view) and not view.is_exact
+
+
+def takes_lanes(view: View) -> bool:
+    """Tell whether int32 can count the pixels of a picture, of which nobody has said how it is drawn."""
     width, height = view.size
     is_near = max(map(abs, view.origin)) < 2**29 and width * height < 2**31
-    fits_lanes = not view.test or view.subpixel_bits <= 8
-    return is_near and fits_lanes and view.method == METHODS["auto"].code and not view.is_exact
+    return is_near and view.method == METHODS["auto"].code
 
 
 def is_shared(view: View, n_triangles: int, n_parts: int, sink: Sink) -> bool:
     """Tell whether each thread is to take a share of the triangles instead of setting up all of them."""
     pays = n_triangles * n_parts >= MIN_TRIANGLES_TO_SHARE
     fits_lanes = sink is not Sink.SAMPLES or view.grid_bits <= 8
-    return n_parts > 1 and pays and fits_lanes and can_share(view)
+    shares = takes_lanes(view) if view.is_exact else can_share(view)
+    return n_parts > 1 and pays and fits_lanes and shares
 
 
 def fragment_sink(test: DepthTest | None, *, has_depth: bool) -> Sink:
@@ -200,7 +206,8 @@ def pays_float_lanes(view: View) -> bool:
     1,000,000 triangles of 1 px at 16 bits: 42 and 8 ms; 100,000 of 10 px at 12 bits: 12.7 and 4 ms.
     """
     has_way = view.plan is None and view.transform is None and view.single_sided is None and view.classic is None
-    return view.subpixel_bits > 8 and view.sampling is Sampling.CENTER and has_way and can_share(view)
+    is_one = view.sampling in (Sampling.CENTER, Sampling.OUTER, Sampling.INNER)
+    return view.subpixel_bits > 8 and is_one and has_way and takes_lanes(view) and not view.is_exact
 
 
 def can_cluster(view: View, sink: Sink) -> bool:

@@ -26,6 +26,11 @@ STAGE_ERROR = {np.dtype(np.float32): 2.0**-21, np.dtype(np.float64): 2.0**-49}
 MARGIN_PX = 1.0
 
 
+#: `tl_cluster` of csrc/clusters.h, as far as Python reads it.
+RECORD = np.dtype({"names": ["first_triangle", "n_triangles"], "formats": [np.int64, np.int32], "offsets": [96, 112],
+                   "itemsize": _engine.CLUSTER_BYTES})  # fmt: skip
+
+
 class Survey(NamedTuple):
     """Shares of the clusters of a mesh by what a view does with them, hidden or not."""
 
@@ -102,7 +107,7 @@ class Clusters:
 
         run_parts(measure, len(group_boxes), count_threads(threads, n_triangles))
         self.engine = _engine.Clustered(records, group_boxes, own_corners, order)
-        self.order = order
+        self._records, self.order = records, order
         arrays = self.own_points, records, group_boxes, own_corners, order
         self._n_bytes = sum(array.nbytes for array in arrays)
 
@@ -124,6 +129,13 @@ class Clusters:
     def n_triangles(self) -> int:
         """How many triangles the mesh has."""
         return len(self.triangles)
+
+    def of_triangles(self) -> NDArray[np.int32]:
+        """Return which cluster each triangle of the mesh is in, (T,) int32."""
+        found: NDArray[np.int32] = np.empty(self.n_triangles, np.int32)
+        sizes = self._records.view(RECORD)["n_triangles"]
+        found[self.order] = np.repeat(np.arange(len(sizes), dtype=np.int32), sizes)
+        return found
 
     def seen_in(
         self,

@@ -101,11 +101,6 @@ def draw_fill(
         return fill_classic(view.classic, memory, vertices, triangles, palette, view, style.per, style.background, out)
     snapped = snap_mesh(memory, vertices, triangles, view, with_depth=False, out=out)
     is_flat = colors_are_flat(len(palette), snapped, style.per)
-    if view.is_exact and (blending.is_needed or not is_flat):
-        what = "interpolated colors" if not is_flat else f"blend {str(blending.mode)!r}"
-        raise ValueError(
-            f"subpixel_bits must be in 0..16 for {what}, got 'exact': fill takes colors per triangle there"
-        )
     shape = (*view.size[::-1], *palette.shape[1:])
     ground = as_background(style.background, palette)
     with canvas_of(memory, "fill", out, shape, palette.dtype.type, keep=ground is None) as (result, canvas):

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine
-from topleft._base.arrays import as_array, as_number, as_values, shown
+from topleft._base.arrays import as_array, as_number, as_places, as_values, shown
 from topleft._base.memory import empty
 from topleft._base.texels import as_levels
 from topleft.typing import EncodingOption, FilterOption, WrapOption
@@ -83,6 +83,17 @@ class Fragments:
     samples_triangle, samples_depth : ndarray of int32 and of float32, shape (H, W, S)
         The same for each sample, with several a pixel. `triangle`, `depth`, `mask` and the attributes are then those of
         the first sample, which is nearest to the centre; `sample` gives those of another.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> frags = tl.rasterize([(0, 0, 0.0), (4, 0, 1.0), (0, 4, 0.0)], [(0, 1, 2)], (4, 2))
+    >>> frags.triangle.tolist()
+    [[0, 0, 0, -1], [0, 0, -1, -1]]
+    >>> frags.depth[0, :3].tolist()
+    [0.125, 0.375, 0.625]
+    >>> frags.interpolate([10.0, 20.0, 30.0])[0, 0].tolist()
+    13.75
     """
 
     #: Fragments of each sample when there are several.
@@ -291,6 +302,7 @@ class Fragments:
 
     def only(self, rows: NDArray[np.intp], cols: NDArray[np.intp]) -> Fragments:
         """Return what is left when no other pixels than these show a triangle."""
+        rows, cols = as_places(rows, cols, self.triangle.shape)
         triangle = np.full_like(self.triangle, -1)
         triangle[rows, cols] = self.triangle[rows, cols]
         found = Fragments(triangle, self.depth, self._snapped_or_maker, self._n_vertices, self._n_triangles)
@@ -419,7 +431,7 @@ class Fragments:
 
     def _snapped_with(self, *triangles: NDArray[np.int32]) -> _engine.SnappedMesh:
         """Return the triangles that show and these, snapped; maybe the others too."""
-        if isinstance(self._snapped_or_maker, (_engine.SnappedMesh, _engine.ExactMesh)):
+        if isinstance(self._snapped_or_maker, _engine.SnappedMesh):
             return self._snapped_or_maker
         return self._snapped_or_maker(self.id, *triangles)
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine
+from topleft._base.arrays import shown
 from topleft._base.memory import FRESH, SCRATCH, Memory, check_fits
 from topleft._base.options import DepthTest, Sampling, parse
 from topleft._base.threads import count_threads, run_parts
@@ -41,6 +42,14 @@ class DepthLayers:
         Its depth; +inf where there are fewer, -inf with ``depth_test="greater"``.
     planes : (ndarray of int32, ndarray of float32), each of shape (K, H, W)
         The same numbers as they lie in memory.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> far, near = [(0, 0, 0.9), (4, 0, 0.9), (0, 4, 0.9)], [(0, 0, 0.1), (4, 0, 0.1), (0, 4, 0.1)]
+    >>> layers = tl.peel([*far, *near], [(0, 1, 2), (3, 4, 5)], (2, 1))
+    >>> layers.triangle[0, 0].tolist(), layers.count.tolist()
+    ([1, 0, -1, -1], [[2, 2]])
     """
 
     def __init__(self, ids: NDArray[np.int32], depth: NDArray[np.float32], snapped: Snapped) -> None:
@@ -86,6 +95,11 @@ class DepthLayers:
 
     def rows(self, k: int, top: int, n_rows: int) -> Fragments:
         """Return rows [top, top + n_rows) of layer k in the same way."""
+        n = len(self.planes[0])
+        if not isinstance(k, int | np.integer):
+            raise TypeError(f"k must be an integer, got {shown(k)}")
+        if not -n <= k < n:
+            raise IndexError(f"k must be a layer in [0, {n}), got {k}")
         (ids, depth), box = self.planes, (k, slice(top, top + n_rows))
         snapped = self._snapped
         return Fragments(ids[box], depth[box], snapped.mesh.moved(0, top), snapped.n_vertices, snapped.n_triangles)

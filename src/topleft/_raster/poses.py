@@ -35,6 +35,16 @@ class FragmentsBatch(Sequence[Fragments]):
         Its depth.
     samples_triangle, samples_depth : ndarray of int32 and of float32, shape (B, H, W, S)
         The same for each sample, with several a pixel; all else is then of the first sample.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import topleft as tl
+    >>> poses = np.array([np.eye(4), np.diag([0.5, 0.5, 1, 1])])
+    >>> corners = [(-1, -1, 0), (1, -1, 0), (-1, 1, 0)]
+    >>> batch = tl.rasterize(corners, [(0, 1, 2)], (4, 4), transform=poses)
+    >>> batch.triangle.shape, batch.mask.sum(axis=(1, 2)).tolist()
+    ((2, 4, 4), [6, 1])
     """
 
     def __init__(self, triangle: NDArray[np.int32], depth: NDArray[np.float32], frags: Sequence[Fragments]) -> None:
@@ -207,7 +217,7 @@ def draw_batch(
     ValueError, TypeError, IndexError
         As `rasterize`.
     """
-    view = View.parse(size, options, takes_exact=True)
+    view = View.parse(size, options)
     refuse_many(view, "rasterize")
     asked = Asked.parse(depth_test, background_depth, out)
     (width, height), n_samples = view.size, view.sampling.n_samples

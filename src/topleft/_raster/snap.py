@@ -21,6 +21,7 @@ from topleft._raster.view import View
 __all__ = ["Snapped", "snap_mesh", "snap_to_cover"]
 
 SPECIAL, BAD, WIDE = np.iinfo(np.int32).min, 0, 1  # x_fx and y_fx of vertices that are not narrow: csrc/topleft.h
+NO_RECORDS = np.empty(0, np.uint8)
 UNCHECKED = -2  # instead of the row of a bad triangle; -1: there is none
 
 
@@ -65,12 +66,14 @@ class Snapped:
 
 @dataclass(frozen=True, slots=True)
 class Unsnapped(Snapped):
-    """A mesh whose vertices stay where they are: `mesh` is an `_engine.ExactMesh`."""
+    """A mesh whose vertices stay where they are: `mesh.exact` has them."""
+
+    has_pieces: bool = False  # of triangles that a clip plane cuts
 
     @property
     def can_share(self) -> bool:
         """Whether threads can each take some of the triangles."""
-        return False
+        return not self.has_pieces
 
     def check_indices(self) -> None:
         """Raise an error for the first triangle with an index or a vertex that cannot be drawn."""
@@ -165,8 +168,9 @@ def snap_for_floats(
         bad_row = _engine.first_bad_row(indices, n)
     if bad_row >= 0:
         raise bad_triangle(triangles, bad_row, n)
-    mesh = _engine.ExactMesh(taken, indices, view.how)
-    return Unsnapped(mesh, indices, triangles, points, source, np.empty(0, np.uint8), None)
+    exact = _engine.ExactPoints(taken, indices)
+    mesh = _engine.SnappedMesh(source, NO_RECORDS, None, indices, None, view.how, None, exact=exact)
+    return Unsnapped(mesh, indices, triangles, points, source, NO_RECORDS, None)
 
 
 def take_mesh(
@@ -178,8 +182,6 @@ def take_mesh(
     """
     points, source = transform(vertices, view, out)
     triangles = apart_from(out, "triangles", triangles)
-    if view.single_sided is not None:
-        raise ValueError("subpixel_bits must be in 0..16 where some triangles are single-sided, got 'exact'")
     indices, bad_row = index(memory, triangles, len(points), view)
     view.mark("input")
     n = len(points) if len(indices) and 0 not in view.size else 0
@@ -194,8 +196,27 @@ def take_mesh(
         raise bad_triangle(triangles, bad_row, len(points))
     if n_bad:
         check_finite(points, indices, with_depth=has_depth)
-    mesh = _engine.ExactMesh(taken, indices if n else indices[:0], view.how)
-    return Unsnapped(mesh, indices, triangles, points, source, np.empty(0, np.uint8), None)
+    mesh = exact_mesh(source, taken, indices if n else indices[:0], None, view, None)
+    return Unsnapped(mesh, indices, triangles, points, source, NO_RECORDS, None)
+
+
+def exact_mesh(
+    source: _engine.Source,
+    points: NDArray[np.float64],
+    triangles: NDArray[np.int32],
+    pieces: _engine.ExactPieces | None,
+    view: View,
+    viewport: _engine.Viewport | None,
+) -> _engine.SnappedMesh:
+    """Return a mesh of points in pixels, without the sides that are not drawn."""
+    exact = _engine.ExactPoints(points, triangles, pieces)
+    if view.single_sided is not None and len(points):
+        is_single, cull = view.single_sided
+        how = view.how._replace(cull=cull)
+        seen = _engine.SnappedMesh(source, NO_RECORDS, None, triangles, None, how, viewport, exact=exact)
+        triangles = without_sides(seen, triangles, is_single, view.threads)
+        exact = _engine.ExactPoints(points, triangles, pieces)
+    return _engine.SnappedMesh(source, NO_RECORDS, None, triangles, None, view.how, viewport, exact=exact)
 
 
 def project_mesh(
@@ -229,8 +250,8 @@ def project_mesh(
     if choices.must_cut(n_clipped):
         pieces = _engine.ExactPieces(source, projected, indices, viewport)
     view.mark("clip")
-    mesh = _engine.ExactMesh(projected, indices, view.how, source=source, pieces=pieces)
-    return Unsnapped(mesh, indices, triangles, points, source, np.empty(0, np.uint8), None)
+    mesh = exact_mesh(source, projected, indices, pieces, view, viewport)
+    return Unsnapped(mesh, indices, triangles, points, source, NO_RECORDS, None, has_pieces=pieces is not None)
 
 
 def take_points(

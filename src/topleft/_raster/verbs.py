@@ -22,6 +22,8 @@ from topleft.typing import AlphaOption, BlendOption, DepthTestOption, PerOption,
 
 __all__ = ["Rasterizer", "coverage", "fill", "overdraw", "rasterize", "wireframe"]
 
+WHY_LINES = "lines run between points of the grid"
+
 
 def coverage(
     vertices: ArrayLike,
@@ -48,8 +50,8 @@ def coverage(
         origin : (int, int). The pixel of the whole picture that is row 0, column 0 here.
         viewport : (int, int). Width and height of the whole picture for clip space; default `size`.
         subpixel_bits : int, 0 to 16, or "exact". Vertices snap to ``2**-subpixel_bits`` pixels; default 8. "exact":
-            they stay where they are, the float64 numbers of the array, and these decide every sample (`coverage`,
-            `overdraw`, `rasterize`, and `fill` with a colour a triangle; at centres and samples).
+            they stay where they are, the float64 numbers of the array, and these decide every sample, at every
+            `sampling` but "area". `wireframe` has lines between points of the grid, and takes 0 to 16.
         sampling : "center"; "msaa2", "msaa4", "msaa8" or "msaa16": so many samples a pixel, at the standard positions
             of Direct3D; "area": the exact area of the pixel (`coverage`, `overdraw` and `fill`). For `coverage` and
             `overdraw` also "outer": every pixel square that a triangle meets in positive area; "inner": every square
@@ -94,7 +96,7 @@ def coverage(
            [1. , 1. , 0.5, 0. ],
            [1. , 0.5, 0. , 0. ]], dtype=float32)
     """
-    return draw_coverage(SCRATCH, vertices, triangles, View.parse(size, view, takes_exact=True), out)
+    return draw_coverage(SCRATCH, vertices, triangles, View.parse(size, view), out)
 
 
 def overdraw(
@@ -134,7 +136,7 @@ def overdraw(
            [1, 1, 1],
            [1, 1, 1]], dtype=int32)
     """
-    return draw_overdraw(SCRATCH, vertices, triangles, View.parse(size, view, takes_exact=True), out)
+    return draw_overdraw(SCRATCH, vertices, triangles, View.parse(size, view), out)
 
 
 def fill(
@@ -212,7 +214,7 @@ def fill(
     array([[70000, 70000, 70000,    -1],
            [70000, 70000,    -1,    -1]], dtype=int32)
     """
-    checked = View.parse(size, view, takes_exact=True)
+    checked = View.parse(size, view)
     style = Style(per, background, blend, alpha, resolve, dtype)
     return draw_fill(SCRATCH, vertices, triangles, colors, checked, style, out)
 
@@ -286,7 +288,7 @@ def rasterize(
         batch = draw_batch(n, vertices, triangles, size, view, depth_test, background_depth, out)
         return cast("Fragments", batch)  # the rare case: whoever passes a batch knows what comes back
     # Fragments refer to what they were drawn from, so nothing of it can be reused.
-    checked = View.parse(size, view, takes_exact=True)
+    checked = View.parse(size, view)
     return draw_fragments(FRESH, vertices, triangles, checked, depth_test, background_depth, out)
 
 
@@ -355,7 +357,7 @@ def wireframe(
            [1, 1, 0, 0, 0],
            [1, 0, 0, 0, 0]])
     """
-    checked = View.parse(size, view)
+    checked = View.parse(size, view, why_snapped=WHY_LINES)
     return draw_wireframe(SCRATCH, vertices, triangles, checked, depth, depth_test, depth_bias, antialias, out)
 
 
@@ -406,9 +408,9 @@ class Rasterizer:
     def __repr__(self) -> str:
         return f"Rasterizer(size={self.size}, threads={self.threads})"
 
-    def _view(self, options: ViewOptions, *, takes_exact: bool = True) -> View:
+    def _view(self, options: ViewOptions, *, why_snapped: str | None = None) -> View:
         options.setdefault("threads", self.threads)
-        return View.parse(self.size, options, takes_exact=takes_exact)
+        return View.parse(self.size, options, why_snapped=why_snapped)
 
     def coverage(
         self, vertices: ArrayLike, triangles: ArrayLike, *, out: NDArray[Any] | None = None, **view: Unpack[ViewOptions]
@@ -473,7 +475,7 @@ class Rasterizer:
         **view: Unpack[ViewOptions],
     ) -> NDArray[Any]:
         """Return the edges of the triangles as lines, as `topleft.wireframe` does."""
-        checked = self._view(view, takes_exact=False)
+        checked = self._view(view, why_snapped=WHY_LINES)
         with self._turn:
             return draw_wireframe(
                 self._memory, vertices, triangles, checked, depth, depth_test, depth_bias, antialias, out

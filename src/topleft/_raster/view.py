@@ -134,8 +134,8 @@ class View:
         return TEST_CODES.get(self.sampling, 0)
 
     @classmethod
-    def parse(cls, size: object, options: ViewOptions, *, takes_exact: bool = False) -> View:
-        """Check the options of a call; `takes_exact`: the caller can draw vertices that are not snapped."""
+    def parse(cls, size: object, options: ViewOptions, *, why_snapped: str | None = None) -> View:
+        """Check the options of a call; `why_snapped`: why the caller draws snapped vertices alone, if so."""
         if not options.keys() <= OPTIONS:
             unknown = min(options.keys() - OPTIONS)
             raise TypeError(f"unknown option {unknown!r}; the options are {', '.join(ViewOptions.__annotations__)}")
@@ -169,19 +169,19 @@ class View:
             is_exact=is_exact,
         )
         if is_exact:
-            check_exact(view, takes_exact=takes_exact)
+            check_exact(view, why_snapped)
         return view if plan is None else plan.fitted(view)
 
 
-def check_exact(view: View, *, takes_exact: bool) -> None:
-    """Raise an error where vertices that are not snapped cannot be drawn yet."""
+def check_exact(view: View, why_snapped: str | None) -> None:
+    """Raise an error where vertices that are not snapped cannot be drawn."""
     wish = "subpixel_bits must be in 0..16"
-    if not takes_exact:
-        raise ValueError(f"{wish} here, got 'exact': it is there for coverage, overdraw, fill and rasterize")
-    if view.sampling in (Sampling.AREA, Sampling.OUTER, Sampling.INNER):
+    if why_snapped is not None:
+        raise ValueError(f"{wish} here, got 'exact': {why_snapped}")
+    if view.sampling is Sampling.AREA:
         raise ValueError(
-            f"{wish} for sampling {str(view.sampling)!r}, got 'exact': that decides samples, 'center' and 'msaa2' to "
-            "'msaa16'"
+            f"{wish} for sampling 'area', got 'exact': that decides whether a sample or a square is covered, not how "
+            "much of it"
         )
     if view.classic:
         raise ValueError(f"{wish} for method {view.classic.name!r}, got 'exact': it has lanes of its own")

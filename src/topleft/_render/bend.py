@@ -11,6 +11,7 @@ they split it alike, and no gap opens.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
@@ -50,6 +51,9 @@ SHORT_PX = 0.5
 
 MAX_PARTS, MAX_PARTS_OF_ONE = 1 << 22, 8
 """Most parts of a mesh, beside so many for each of its triangles: 1.5 GB while they are made."""
+
+N_TO_FORECAST, N_TRIED = 1 << 15, 1 << 10
+"""From so many parts on that may be split again, so many of them are split alone, to tell how many all will be."""
 
 N_ANGLES, N_AZIMUTHS = 513, 128
 """Rings of directions that are asked where they lie in the picture."""
@@ -195,7 +199,9 @@ class LensMap:
 
     def px(self, place: F64) -> F64:
         """Pixels (N, 2) from the middle of the picture, y up, of places in the image plane."""
-        return place @ self.px_from_plane[:, :2].T + self.px_from_plane[:, 2]
+        (xx, xy, x0), (yx, yy, y0) = self.px_from_plane.tolist()
+        x, y = place[:, 0], place[:, 1]
+        return np.stack([xx * x + xy * y + x0, yx * x + yy * y + y0], axis=1)  # BLAS takes six times as long
 
     def _extend(self, angles: F64, rings: F64, last: int) -> None:
         """From angles[last] on, go outwards as fast as before it, and at least as fast as on the whole way there."""
@@ -279,13 +285,46 @@ class _Subdivision:
 
     def run(self, triangles: I64) -> BentMesh:
         """Halve edges until all are straight enough; then put the triangles back in the order of the mesh."""
+        most = MAX_PARTS + MAX_PARTS_OF_ONE * len(triangles)
+        n_to_forecast = N_TO_FORECAST
+        done: list[Parts] = []
+        for done in self._rounds(triangles):
+            n_parts, n_live = _count(done), len(done[-1][0])
+            if n_live > n_to_forecast and n_parts <= most:
+                n_parts += self._forecast(done[-1][0], most) - n_live
+                n_to_forecast = 4 * n_live
+            if n_parts > most:
+                raise ValueError(
+                    f"the lens splits {len(triangles)} triangles into more than {most} parts: give it a larger "
+                    f"tolerance_px than {self.tolerance_px:g}, or leave out the triangles that are far larger than the "
+                    "picture shows"
+                )
+        triangles, source, weights, is_outline = _joined(done)
+        order = np.argsort(source, kind="stable")
+        bent = np.stack([self.place[:, 0] * self.reach, -self.place[:, 1] * self.reach, -self.reach], axis=1)
+        return BentMesh(bent, triangles[order], source[order], weights[order], is_outline[order])
+
+    def _forecast(self, triangles: I64, most: int) -> int:
+        """About how many parts there will be of these: as many as of some of them, tried alone."""
+        step = len(triangles) // N_TRIED
+        used, corners = np.unique(triangles[::step], return_inverse=True)
+        trial = _Subdivision(self.lens_map, self.points[used], self.tolerance_px, self.near)
+        n_parts = 0
+        for done in trial._rounds(corners.reshape(-1, 3)):
+            n_parts = step * _count(done)
+            if n_parts > most:
+                break
+        return n_parts
+
+    def _rounds(self, triangles: I64) -> Iterator[list[Parts]]:
+        """Halve edges until all are straight enough; yields the parts so far, the last of which may be split again."""
         parts: Parts = (
             triangles,
             np.arange(len(triangles)),
             np.broadcast_to(np.eye(3), (len(triangles), 3, 3)),
             np.ones((len(triangles), 3), bool),
         )
-        done = []
+        done: list[Parts] = []
         for _ in range(MAX_HALVINGS):
             parts = _rows(parts, self._may_show(parts[0]))
             sides = np.stack([parts[0], np.roll(parts[0], -1, axis=1)], axis=-1)
@@ -303,20 +342,8 @@ class _Subdivision:
             done.append(_rows(parts, masks == 0))
             pieces = [_split(_rows(parts, masks == mask), middles[masks == mask], mask) for mask in PIECES]
             parts = _joined(pieces)
-            self._check_number(sum(len(each[0]) for each in (*done, parts)), len(triangles))
-        done.append(_rows(parts, self._may_show(parts[0])))
-        triangles, source, weights, is_outline = _joined(done)
-        order = np.argsort(source, kind="stable")
-        bent = np.stack([self.place[:, 0] * self.reach, -self.place[:, 1] * self.reach, -self.reach], axis=1)
-        return BentMesh(bent, triangles[order], source[order], weights[order], is_outline[order])
-
-    def _check_number(self, n_parts: int, n_triangles: int) -> None:
-        most = MAX_PARTS + MAX_PARTS_OF_ONE * n_triangles
-        if n_parts > most:
-            raise ValueError(
-                f"the lens splits {n_triangles} triangles into more than {most} parts: give it a larger tolerance_px "
-                f"than {self.tolerance_px:g}, or leave out the triangles that are far larger than the picture shows"
-            )
+            yield [*done, parts]
+        yield [*done, _rows(parts, self._may_show(parts[0]))]
 
     def _add(self, points: F64) -> None:
         place, reach = self.lens_map(points)
@@ -353,19 +380,28 @@ class _Subdivision:
         px_a, px_b = self.lens_map.px(self.place[a]), self.lens_map.px(self.place[b])
         off = np.zeros(len(ask))
         middle = (px_a + px_b) / 2
-        spread_px = np.abs(px_a - middle).max(axis=1)
+        spread_px = _largest(px_a - middle)
         for share in (0.25, 0.5, 0.75):
             place, reach = self.lens_map((1 - share) * self.points[a] + share * self.points[b])
             weight_a, weight_b = (1 - share) * self.reach[a], share * self.reach[b]
             mean = weight_a + weight_b
             straight = (weight_a[:, None] * px_a + weight_b[:, None] * px_b) / mean[:, None]
             px = self.lens_map.px(place)
-            spread_px = np.maximum(spread_px, np.abs(px - middle).max(axis=1))
-            off = np.maximum(off, np.abs(px - straight).max(axis=1) / self.tolerance_px)
+            spread_px = np.maximum(spread_px, _largest(px - middle))
+            off = np.maximum(off, _largest(px - straight) / self.tolerance_px)
             if not self.lens_map.lens.has_planar_range:
                 off = np.maximum(off, np.abs(reach - mean) / (MAX_RANGE_ERROR * mean))
         is_bent[ask] = (off > 1) & (spread_px > SHORT_PX)
         return is_bent
+
+
+def _largest(steps: F64) -> F64:
+    """The larger of both sides (N,) of steps (N, 2)."""
+    return np.maximum(np.abs(steps[:, 0]), np.abs(steps[:, 1]))
+
+
+def _count(many: list[Parts]) -> int:
+    return sum(len(each[0]) for each in many)
 
 
 def _rows(parts: Parts, keep: Bools) -> Parts:

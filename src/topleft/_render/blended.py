@@ -82,11 +82,10 @@ def is_blended(subject: Mesh | Scene, options: ShadingOptions) -> bool:
 
 
 def draw_blended(
-    subject: Mesh | Scene, camera: Camera, size: tuple[int, int], *, sampling: str, cull: str, options: ShadingOptions
+    subject: Mesh | Scene, camera: Camera, size: tuple[int, int], *, options: ShadingOptions, **view_options: Any
 ) -> tuple[U8, SceneFragments]:
     """The picture, and what is opaque in it."""
     scene = scene_of(subject)
-    view_options: dict[str, Any] = {"sampling": sampling, "cull": cull, "threads": options.threads}
     placed, view = place(scene, camera, size, view_options, material=options.material)
     refuse_many(view, "rasterize")
     masks = masks_of(placed, options.material)

@@ -142,6 +142,15 @@ class SceneFragments(InstanceIds, Fragments):
         As in `Fragments`. `interpolate` takes a sequence of arrays, one of each instance, all with as many channels.
     samples_instance, samples_triangle, samples_id, samples_depth : ndarray, shape (H, W, S)
         The same for each sample, with several a pixel.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> cube = tl.Mesh(*tl.scenes.cube())
+    >>> scene = tl.Scene([tl.Instance(cube)])
+    >>> frags = tl.rasterize_mesh(scene, tl.Camera.framing(scene), (16, 16))
+    >>> int(frags.instance[8, 8]), int(frags.instance[0, 0])
+    (0, -1)
     """
 
     _planes: tuple[NDArray[np.int32], NDArray[np.float32]]
@@ -269,6 +278,15 @@ class SceneDepthLayers(InstanceIds, DepthLayers):
         As in `SceneFragments`, of each layer; -1 where there are fewer.
     depth : ndarray of float32, shape (H, W, K)
         As in `DepthLayers`.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> cube = tl.Mesh(*tl.scenes.cube())
+    >>> scene = tl.Scene([tl.Instance(cube)])
+    >>> layers = tl.visible_layers(scene, tl.Camera.framing(scene), (16, 16), layers=2)
+    >>> layers.instance[8, 8].tolist()
+    [0, 0]
     """
 
     def __init__(self, ids: NDArray[np.int32], depth: NDArray[np.float32], placed: PlacedScene) -> None:

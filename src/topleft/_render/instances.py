@@ -340,6 +340,8 @@ def draw_scene_coverage(
             pass
         elif view.sampling is Sampling.AREA:
             add_areas(placed, view, canvas)
+        elif n > 1 and view.is_exact:
+            add_masks(placed, view, canvas)
         else:
             samples = sample_positions(n, view.grid_bits) if n > 1 else None
             shape = _engine.Target.covered_shape(height, width, n)
@@ -347,6 +349,17 @@ def draw_scene_coverage(
             target = _engine.Target(sink, canvas, None, SCRATCH.empty("covered", shape, np.uint64), samples)
             placed.draw([target], [(0, 0)], height)
     return result
+
+
+def add_masks(placed: PlacedScene, view: View, canvas: NDArray[np.float32]) -> None:
+    """Write the share of samples that the instances cover, from a mask of each sample."""
+    n, (width, height) = view.sampling.n_samples, view.size
+    mask: NDArray[np.bool_] = SCRATCH.empty("sample mask", (height, width), np.bool_)
+    covered = SCRATCH.empty("covered", _engine.Target.covered_shape(height, width, 1), np.uint64)
+    canvas[...] = 0
+    for x, y in sample_positions(n, view.grid_bits).tolist():
+        placed.draw([_engine.Target(Sink.MASK, mask, None, covered)], [(x, y)], height)
+        np.add(canvas, 1.0 / n, out=canvas, where=mask)  # exact: n is a power of two
 
 
 def add_areas(placed: PlacedScene, view: View, canvas: NDArray[np.float32]) -> None:

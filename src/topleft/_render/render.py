@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any, Unpack
+from typing import Any, Literal, Unpack
 
 import numpy as np
 import numpy.typing as npt
@@ -64,6 +64,7 @@ def render(
     cull: CullOption = "none",
     edges: bool = False,
     sampling: SamplesOption = "center",
+    subpixel_bits: int | Literal["exact"] = 8,
     tolerance: float = 0.0,
     threads: int | None = None,
     rasterizer: Rasterizer | None = None,
@@ -95,6 +96,8 @@ def render(
     sampling : {"center", "msaa2", "msaa4", "msaa8", "msaa16"}
         Samples of a pixel. With several outlines are smooth: a triangle is shaded once in a pixel, where the first of
         its samples lies, and the light of the samples is averaged.
+    subpixel_bits : int, 0 to 16, or "exact"
+        As for `coverage`: which grid vertices snap to. "exact": they stay where they are.
     tolerance : float
         How far outlines may lie from where they belong, pixels: the mesh is drawn at the coarsest level of detail that
         a bound on its distance allows in this view, see `choose_detail`. 0: the mesh itself. Levels are made at the
@@ -131,17 +134,17 @@ def render(
     subject = as_subject(mesh)
     camera = camera_for(subject, camera, size)
     options = ShadingOptions.parse(shading, color, background, threads=threads, **look)
+    view: dict[str, Any] = {"cull": cull, "sampling": sampling, "subpixel_bits": subpixel_bits, "threads": threads}
     if isinstance(subject, Points):
         if edges:
             raise ValueError("points have no edges")
-        cloud = draw_cloud(subject, camera, size, cull=cull, threads=threads, sampling=sampling)
+        cloud = draw_cloud(subject, camera, size, **view)
         return shade_cloud(cloud, subject, camera, options)
     subject = detailed(subject, camera, size, tolerance, cull=cull, material=options.material)
     if is_blended(subject, options):
-        picture, opaque = draw_blended(subject, camera, size, sampling=sampling, cull=cull, options=options)
+        picture, opaque = draw_blended(subject, camera, size, options=options, **view)
         frags: Fragments = opaque
     else:
-        view = {"cull": cull, "sampling": sampling, "threads": threads}
         frags = rasterize_subject(subject, camera, size, rasterizer, options.material, **view)
         frags = without_holes(frags, subject, camera, options.material, threads=threads)
         picture = shade_by(frags, subject, camera, options)
@@ -185,6 +188,15 @@ def rasterize_mesh(
     ------
     ValueError
         If the mesh has no triangles and no camera is given, an option is unknown, or `rasterizer` has another size.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> cube = tl.Mesh(*tl.scenes.cube())
+    >>> camera = tl.Camera.look_at((0, 0, 5), (0, 0, 0), up=(0, 1, 0))
+    >>> frags = tl.rasterize_mesh(cube, camera, (9, 9))
+    >>> round(float(frags.distance(camera)[4, 4]), 3)
+    4.0
     """
     size = as_size(size)
     if view.get("viewport") is not None:

@@ -119,6 +119,15 @@ def shade(
         none, a number is outside its range, or "matcap" has no matcap.
     TypeError
         If `frags`, the mesh, a light, material, texture or environment is none.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> ball = tl.Mesh(*tl.scenes.icosphere(2))
+    >>> camera = tl.Camera.framing(ball)
+    >>> frags = tl.rasterize_mesh(ball, camera, (32, 32))
+    >>> tl.shade(frags, ball, camera, shading="normals").shape
+    (32, 32, 4)
     """
     camera = as_camera(camera)
     if not isinstance(mesh, Points):

@@ -170,6 +170,14 @@ def visible_layers(
     ------
     ValueError
         If the mesh has no triangles and no camera is given, an option is out of range, or the camera has a lens.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> cube = tl.Mesh(*tl.scenes.cube())
+    >>> layers = tl.visible_layers(cube, tl.Camera.framing(cube), (16, 16), layers=3)
+    >>> int(layers.count[8, 8])  # the front and the back
+    2
     """
     size = as_size(size)
     subject = as_meshes(mesh)

@@ -41,7 +41,16 @@ GLASS_LOOKS = frozenset({"shading", "color", "background", "opacity", "layers", 
 
 
 class ViewLayers(Mapping[str, Array]):
-    """Named arrays of one view, in the order asked for: what `render_layers` returns."""
+    """Named arrays of one view, in the order asked for: what `render_layers` returns.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> ball = tl.Mesh(*tl.scenes.icosphere(2))
+    >>> views = tl.render_layers(ball, tl.Camera.framing(ball), (32, 24), layers=["depth", "world_normal"])
+    >>> {name: array.shape for name, array in views.items()}
+    {'depth': (24, 32), 'world_normal': (24, 32, 3)}
+    """
 
     def __init__(self, arrays: Mapping[str, Array]) -> None:
         self._arrays = dict(arrays)
@@ -68,7 +77,7 @@ class ViewLayers(Mapping[str, Array]):
         ValueError
             If there is no such layer; and as `save_layers` does.
         """
-        if layer is not None and layer not in self:
+        if layer is not None and not (isinstance(layer, str) and layer in self):
             raise ValueError(f"layer must be one of {', '.join(self)}, got {layer!r}")
         return save_layers(path, self if layer is None else {layer: self[layer]}, scale=scale)
 

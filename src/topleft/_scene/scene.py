@@ -43,6 +43,17 @@ class Instance:
         If the matrix has another shape or last row, is singular, or holds a number that is not finite.
     TypeError
         If `mesh` is none.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import topleft as tl
+    >>> cube = tl.Mesh(*tl.scenes.cube())
+    >>> aside = np.eye(4)
+    >>> aside[0, 3] = 3.0
+    >>> scene = tl.Scene([tl.Instance(cube), tl.Instance(cube, aside, name="right")])
+    >>> scene.n_triangles
+    24
     """
 
     mesh: Mesh

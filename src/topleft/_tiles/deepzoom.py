@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from topleft._base.arrays import as_count, as_path
+from topleft._base.arrays import as_count, as_path, check_progress, shown
 from topleft._base.color import id_colors
 from topleft._io.png import encode
 from topleft._tiles.folders import DiskFolder, check_space
@@ -103,6 +103,9 @@ def write_deepzoom(
         raise ValueError(f"window must have sides of whole pairs of tiles, of {2 * side} pixels, got {window}")
     if not (raster.size[0] and raster.size[1]):
         raise ValueError(f"Deep Zoom has pixels, got a raster of {raster.size[0]} x {raster.size[1]}")
+    if not (colors is None or callable(colors)):
+        raise TypeError(f"colors must be a function of an array, got {shown(colors)}")
+    check_progress(progress)
     paint = painting(raster) if colors is None else colors
     ground = checked(paint(raster.painter.blank((1, 1))), (1, 1))
     n_levels = n_levels_to(raster.size, 1)

@@ -402,7 +402,7 @@ def painter_of(kind: str, grid: Grid | None, triangles: Triangles, values: Any, 
     if values is not None and not made.takes_values:
         raise ValueError(f"values are for the kinds 'fill' and 'field', got {shown(values)} for {kind!r}")
     view = {name: options[name] for name in VIEW_OPTIONS if name in options}
-    View.parse(1, view)  # type: ignore[arg-type]
+    View.parse(1, view, why_snapped="the windows of a triangle are found on the grid")  # type: ignore[arg-type]
     painter = made(grid, options, view, triangles.n_components)
     painter.prepare(triangles, values)
     return painter

@@ -10,6 +10,7 @@ import shutil
 from pathlib import Path
 from typing import Any, Protocol
 
+from topleft._base.arrays import shown
 from topleft._base.whole_file import write_whole
 from topleft.errors import MissingPackageError
 
@@ -104,6 +105,10 @@ class RemoteFolder:
 
 def folder_of(path: str | os.PathLike[str], storage: dict[str, Any] | None = None) -> DiskFolder | RemoteFolder:
     """Return where chunks of a path or URL are kept."""
+    if not isinstance(path, str | os.PathLike):
+        raise TypeError(f"path must be a path or a URL, got {shown(path)}")
+    if not (storage is None or isinstance(storage, dict)):
+        raise TypeError(f"storage must be a dict or None, got {shown(storage)}")
     text = os.fspath(path)
     return RemoteFolder(text, storage) if "://" in text else DiskFolder(Path(text))
 

@@ -26,7 +26,7 @@ from typing import IO, TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from topleft._base.arrays import as_count, as_number, as_path
+from topleft._base.arrays import as_count, as_number, as_path, check_progress, shown
 from topleft._base.options import check_choice
 from topleft._base.whole_file import write_whole
 from topleft._field.grid import Grid
@@ -179,6 +179,7 @@ def write_geotiff(
     """`Tiles.to_geotiff`."""
     file = as_path("path", path)
     check_choice("compression", compression, COMPRESSIONS)
+    check_progress(progress)
     side, window = as_count("tile", tile), raster.window_size
     if side % 16:
         raise ValueError(f"tile must be a multiple of 16, got {side}")
@@ -275,11 +276,11 @@ def epsg_of(crs: str | int) -> tuple[int, bool]:
         raise MissingPackageError("crs needs the package pyproj: pip install 'topleft[tiles]'") from None
     try:
         found = pyproj.CRS.from_user_input(crs)
-    except (pyproj.exceptions.CRSError, TypeError) as error:
-        raise ValueError(f"crs must be one that pyproj knows, 'EPSG:25832', say, got {crs!r} ({error})") from None
+    except (pyproj.exceptions.CRSError, TypeError, ValueError) as error:
+        raise ValueError(f"crs must be one that pyproj knows, 'EPSG:25832', say, got {shown(crs)} ({error})") from None
     code = found.to_epsg()
     if code is None or code > 65535 or not (found.is_projected or found.is_geographic):
-        raise ValueError(f"crs must be projected or geographic and have an EPSG code up to 65535, got {crs!r}")
+        raise ValueError(f"crs must be projected or geographic and have an EPSG code up to 65535, got {shown(crs)}")
     return int(code), bool(found.is_geographic)
 
 

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
+from topleft._base.arrays import check_progress
 from topleft._base.threads import available_threads
 from topleft.errors import MissingPackageError
 
@@ -152,6 +153,7 @@ def write_levels(
     n_blocks = int(sum(level.sum() for level in there))
     channels = () if prepare is None else prepare(raster.painter.blank((1, 1))).shape[2:]
     channels = channels or (raster.painter.channels if prepare is None else ())
+    check_progress(progress)
     bar = _bar(n_blocks) if progress is True else None
     tell = bar.tell if bar is not None else progress if callable(progress) else None
     n_done = n_drawn = n_kept = 0

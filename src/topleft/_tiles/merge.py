@@ -162,7 +162,7 @@ def _as_buffer(buffer: Any, i: int) -> tuple[I32, F32]:
 def _as_names(which: Any, ids: I32, i: int) -> int | I32:
     largest = int(ids.max(initial=-1))
     if isinstance(which, int | np.integer):
-        if not (which >= 0 and which + largest <= INT32_MAX):
+        if not (which >= 0 and which + max(largest, 0) <= INT32_MAX):
             raise ValueError(f"triangles must be indices from 0 to {INT32_MAX}, got {which} for buffer {i}")
         return int(which)
     array = as_array("triangles", which)

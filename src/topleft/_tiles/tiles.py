@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from topleft._base.arrays import as_count, as_path, as_size
+from topleft._base.arrays import as_count, as_pair, as_path, as_size
 from topleft._base.options import check_choice
 from topleft._base.threads import parse_threads
 from topleft._field.grid import Extent, ExtentLike, Grid, grid_around
@@ -53,6 +53,13 @@ class Window:
         What it shows.
     n_triangles : int
         How many triangles may touch it; 0: it is blank.
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> raster = tl.tiles(([[0, 0], [6, 0], [0, 6]], [[0, 1, 2]]), (6, 6), window=4)
+    >>> [(window.x, window.y, window.pixels.shape) for window in raster]
+    [(0, 0, (4, 4)), (4, 0, (4, 2)), (0, 4, (2, 4)), (4, 4, (2, 2))]
     """
 
     row: int
@@ -186,6 +193,13 @@ class Tiles:
         Where it lies in the plane of the data.
     window_size : (width, height), pixels
     n_windows : int
+
+    Examples
+    --------
+    >>> import topleft as tl
+    >>> raster = tl.tiles(([[0, 0], [6, 0], [0, 6]], [[0, 1, 2]]), (6, 6), window=4)
+    >>> raster.shape, raster.n_windows
+    ((6, 6), 4)
     """
 
     def __init__(
@@ -313,6 +327,12 @@ class Tiles:
 
     def read(self, x: int, y: int, width: int, height: int) -> Array:
         """Return a part of the raster, drawn at once, whatever windows it lies in."""
+        (x, y), (width, height) = as_pair("x and y", (x, y)), as_size((width, height))
+        if not (0 <= x <= self.size[0] - width and 0 <= y <= self.size[1] - height):
+            raise ValueError(
+                f"the part must lie in the raster of {self.size[0]} x {self.size[1]} pixels, got {width} x {height} "
+                f"from ({x}, {y}) on"
+            )
         which = self._triangles_in(x, y, width, height)
         payload = self.painter.gather(self.triangles, which)
         return self.painter.window(payload, (x, y), (width, height), self.threads, None)

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from topleft._base.arrays import as_count, as_size
+from topleft._base.arrays import as_count, as_size, check_progress
 from topleft._base.options import check_choice
 from topleft._tiles.folders import DiskFolder, Folder, check_space, folder_of
 from topleft._tiles.levels import Progress, Written, halved, level_size, write_levels
@@ -105,6 +105,7 @@ def write_zarr(
     storage: dict[str, Any] | None,
 ) -> Written:
     """`Tiles.to_zarr`."""
+    check_progress(progress)
     n_levels = as_count("levels", levels)
     window = raster.window_size
     size = window if chunk is None else as_size(chunk, "chunk", smallest=1)

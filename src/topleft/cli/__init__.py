@@ -1,4 +1,4 @@
-"""The command line: `topleft render`, `mask`, `raster`, `explain`, `calibrate`, `doctor` and `info`.
+"""The command line: `topleft render`, `mask`, `raster`, `explore`, `explain`, `calibrate`, `doctor` and `info`.
 
 Exit status: 0, all pictures were written; 1, some of several inputs failed and the rest were written, or, with
 --strict, a mesh lacks something of its file; 2, nothing could be done with what was asked, told in one line on stderr.
@@ -7,6 +7,7 @@ animation.py  writes the views of a mesh one after the other, by Pillow or ffmpe
 arguments.py  defines what `topleft render` takes
 doctor.py     runs `topleft doctor`
 explain.py    runs `topleft explain` and `topleft calibrate`
+explore.py    runs `topleft explore`
 job_file.py   reads jobs from TOML or JSON
 mask.py       runs `topleft mask`
 raster.py     runs `topleft raster`
@@ -31,6 +32,7 @@ from topleft._io.notes import listening
 from topleft.cli.arguments import REFUSED, Parser, UsageError, add_render_arguments
 from topleft.cli.doctor import add_doctor_command
 from topleft.cli.explain import add_plan_commands
+from topleft.cli.explore import add_explore_command
 from topleft.cli.mask import add_mask_command
 from topleft.cli.raster import add_raster_command
 from topleft.cli.render import FAILED, complain, complain_of_lacks, one_line, run_render
@@ -112,5 +114,6 @@ def _parser() -> Parser:
     add_plan_commands(commands)
     add_mask_command(commands)
     add_raster_command(commands)
+    add_explore_command(commands)
     add_doctor_command(commands)
     return parser

@@ -5,6 +5,7 @@ compared; a variant's name stands after a slash. Their kernels are imported when
 
 classics/    draws triangles as the literature does: a compiled kernel for each classic, and a twin in Python
 reference/   draws triangles exactly and slowly, in integers and fractions: what all others are held against
+walks_pure.py  the two production walkers in Python integers
 """
 
 from __future__ import annotations

@@ -12,6 +12,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any, Protocol
 
 import numpy as np
@@ -143,15 +144,17 @@ class Draw:
             values[:, 3] = np.where(np.isfinite(values[:, 3]), values[:, 3] / side + 0.5, values[:, 3])
         return self.laid_out(self.as_dtype(values, DTYPES))
 
+    def as_index(self, values: np.ndarray, dtypes: Sequence[str]) -> np.ndarray:
+        """Indices as another dtype, now and then one that holds no indices."""
+        with np.errstate(all="ignore"):
+            return values.astype(self.mostly(dtypes, ["f8", "?", "O"]))
+
     def triangles(self, n: int, n_vertices: int) -> Any:
         """Rows of indices, now and then one at a border or beyond."""
-        values = self.rng().integers(0, max(n_vertices, 1), (n, 3))
-        dtype = self.mostly(INDEX_DTYPES, ["f8", "?", "O"])
-        with np.errstate(all="ignore"):
-            array = values.astype(dtype)
+        array = self.as_index(self.rng().integers(0, max(n_vertices, 1), (n, 3)), INDEX_DTYPES)
         if n and self.chance(12):
             wrong = self.of([n_vertices, n_vertices - 1, *INDICES])
-            info = np.iinfo(dtype) if array.dtype.kind in "iu" else None
+            info = np.iinfo(array.dtype) if array.dtype.kind in "iu" else None
             if info and info.min <= wrong <= info.max:
                 array.reshape(-1)[self.source.integer(0, array.size - 1)] = wrong
         return self.laid_out(array)
@@ -202,6 +205,8 @@ def arrays_of(result: Any) -> list[np.ndarray]:
         return [array for one in result for array in arrays_of(one)]
     if isinstance(result, tl.DepthLayers):
         return [result.triangle, result.depth]
+    if isinstance(result, tl.Overlap):
+        return [result.starts, result.pixels, result.areas]
     if isinstance(result, tl.Fragments):
         return [result.triangle, result.depth, *map(np.asarray, result.planes if hasattr(result, "planes") else ())]
     return []
@@ -213,7 +218,7 @@ def view_of(draw: Draw, samplings: Sequence[str]) -> dict[str, Any]:
     if draw.chance(2):
         options["sampling"] = draw.of(samplings)
     if draw.chance(3):
-        options["subpixel_bits"] = draw.mostly([8, 0, 4, 16, 1], [-1, 17])
+        options["subpixel_bits"] = draw.mostly([8, 0, 4, 16, 1, "exact"], [-1, 17, "exactly"])
     if draw.chance(3):
         options["origin"] = draw.mostly(
             [(0, 0), (3, 2), (-7, 9)], [(2**31, -(2**31)), (2**44, 2**44), (2**62, 0), (2**63, 0)]
@@ -409,9 +414,8 @@ def points_case(draw: Draw) -> Case:
     return Case(f"points {size}", call, (positions, widths), view)
 
 
-def polygons_case(draw: Draw) -> Case:
-    """`polygons`, in the forms that it takes."""
-    size = draw.size()
+def rings_of(draw: Draw, size: Any) -> tuple[Any, ...]:
+    """Coordinates, offsets of rings, offsets of polygons."""
     n = draw.mostly([8, 3, 40, 300], [2, 0])
     coordinates = draw.vertices(n, (2,), size if max(size) < 1000 else (60, 40))
     n_rings = min(draw.of([2, 1, 3]), max(n // 3, 1))
@@ -421,23 +425,206 @@ def polygons_case(draw: Draw) -> Case:
     if draw.chance(12):
         offsets[draw.source.integer(0, n_rings)] = draw.of([n + 1, 2**31 - 1, 0])
     parts = np.arange(n_rings + 1) if draw.chance(2) else np.array([0, n_rings])
+    return coordinates, draw.laid_out(offsets), draw.laid_out(parts)
+
+
+def in_other_words(form: str, coordinates: Any, offsets: Any, parts: Any) -> Any:
+    """The same polygons as `polygons` takes them otherwise; what does not fit together, as it is."""
+    if form == "offsets":
+        return coordinates, offsets, parts
+    points, borders, groups = (np.asarray(each).tolist() for each in (coordinates, offsets, parts))
+    if not all(isinstance(each, int) and 0 <= each < 1000 for each in [*borders, *groups]):
+        return coordinates, offsets, parts
+    rings = [points[first:end] for first, end in pairwise(borders)]
+    nested = [rings[first:end] for first, end in pairwise(groups)]
+    if form == "flat":
+        return [[[number for point in ring for number in point] for ring in each] for each in nested]
+    if form == "geojson":
+        return {"type": "MultiPolygon", "coordinates": nested}
+    return nested
+
+
+def polygons_case(draw: Draw) -> Case:
+    """`polygons`, in the forms that it takes."""
+    size = draw.size()
+    inputs = [*rings_of(draw, size)]
+    n_polygons = len(inputs[2]) - 1
     options: dict[str, Any] = {
         "rule": draw.of(["evenodd", "nonzero"]),
         "sampling": draw.of(["center", "area", "outer", "inner", "msaa4"]),
-        "values": draw.of(
-            [None, "index", 7, 1e300, [1.5] * (len(parts) - 1), np.ones((len(parts) - 1, 3), "u1"), -0.5]
-        ),
+        "values": draw.of([None, "index", 7, 1e300, [1.5] * n_polygons, np.ones((n_polygons, 3), "u1"), -0.5]),
         "threads": draw.of([1, None, 2]),
-        "subpixel_bits": draw.of([8, 0, 16]),
+        "subpixel_bits": draw.mostly([8, 0, 16], ["exact"]),
         "origin": draw.mostly([(0, 0), (5, -3)], [(2**40, 0), (2**59, 0)]),
     }
-    inputs = [coordinates, draw.laid_out(offsets), draw.laid_out(parts)]
     options["out"] = out_of(draw, size[::-1], ["?", "i4", "f4"], inputs)
+    form = draw.of(["offsets", "nested", "flat", "geojson"])
+    options["background"] = draw.mostly([None, 0], [1e300, -1, float("nan"), [1, 2, 3]])
 
     def call(*arrays: Any, **options: Any) -> Any:
-        return tl.polygons(arrays, size, **options)
+        return tl.polygons(in_other_words(form, *arrays), size, **options)
 
     return Case(f"polygons {size}", call, tuple(inputs), options)
+
+
+def overlap_case(draw: Draw) -> Case:
+    """`overlap`, of polygons or of the triangles of a mesh, and what its table computes of a raster."""
+    size = draw.size()
+    options: dict[str, Any] = {
+        "rule": draw.of(["evenodd", "nonzero"]),
+        "threads": draw.of([1, None, 2]),
+        "subpixel_bits": draw.mostly([8, 0, 16], ["exact", -1]),
+        "origin": draw.mostly([(0, 0), (5, -3)], [(2**40, 0), (2**59, 0)]),
+        "out": tl.overlap([[(0, 0), (9, 0), (0, 9)]], (9, 9)) if draw.chance(3) else None,
+    }
+    of_mesh, is_used = draw.chance(3), draw.chance(3)
+    inputs = mesh_arrays(draw, size, (2,))[:2] if of_mesh else rings_of(draw, size)
+    raster = draw.laid_out(draw.as_dtype(draw.numbers(draw.shape(7, 9), -5, 5), DTYPES)) if is_used else None
+
+    def call(*arrays: Any, **options: Any) -> Any:
+        *arrays, raster = arrays
+        if of_mesh:
+            table = tl.overlap(arrays[0], size, triangles=arrays[1], **options)
+        else:
+            table = tl.overlap(tuple(arrays), size, **options)
+        if raster is None:
+            return table
+        whole = np.resize(np.asarray(raster), size[::-1]) if max(size) < 1000 else raster
+        return [*arrays_of(table), table.sums(whole), table.means(whole), table.spread(table.totals())]
+
+    return Case(f"overlap {size}", call, (*inputs, raster), options)
+
+
+def assumed_valid_case(draw: Draw) -> Case:
+    """`polygons` and `overlap` that are promised what is not so: any picture, and no write or read beside it."""
+    size = draw.source.integer(1, 70), draw.source.integer(1, 50)
+    inputs = [*rings_of(draw, size)]
+    name, sampling = draw.of(["polygons", "overlap"]), draw.of(["area", "outer", "inner"])
+    options: dict[str, Any] = {"origin": draw.of([(0, 0), (5, -3)]), "subpixel_bits": draw.of([8, 0, 16])}
+    if name == "polygons":
+        options |= {"sampling": sampling, "values": draw.of([None, "index"])}
+        options["out"] = out_of(draw, size[::-1], ["?", "i4", "f4"], inputs)
+
+    def call(*arrays: Any, **options: Any) -> Any:
+        return getattr(tl, name)(arrays, size, assume_valid=True, threads=1, **options)
+
+    return Case(f"assume_valid {size}", call, tuple(inputs), options)
+
+
+def plan_case(draw: Draw) -> Case:
+    """`plan`, and the draw that follows it: that of a call without a plan."""
+    size, output = draw.size(), draw.of(["coverage", "overdraw", "color", "triangle"])
+    more = {"coverage": ["area", "outer", "inner"], "overdraw": ["area", "outer", "inner"], "color": ["area"]}
+    view = view_of(draw, [*SAMPLINGS, *more.get(output, [])])
+    columns = (3,) if "transform" in view else (2, 3, 4)
+    vertices, triangles, _, n_triangles = mesh_arrays(draw, size, columns)
+    is_drawn, is_other = draw.chance(2), draw.chance(12)
+
+    def call(vertices: Any, triangles: Any, **options: Any) -> Any:
+        plan = tl.plan(vertices, triangles, size, outputs=output, **options)
+        if not isinstance(plan.to_dict(), dict) or not plan.explain() or not str(plan):
+            raise AssertionError("a plan without words")
+        if not is_drawn:
+            return []
+        own = (vertices, np.asarray(triangles)[::-1]) if is_other else (vertices, triangles)
+        if output == "color":
+            colors = np.arange(4 * n_triangles, dtype=np.uint8).reshape(-1, 4)
+            return tl.fill(*own, colors, size, per="triangle", plan=plan, **options)
+        return getattr(tl, "rasterize" if output == "triangle" else output)(*own, size, plan=plan, **options)
+
+    return Case(f"plan {size}", call, (vertices, triangles), view)
+
+
+def merge_case(draw: Draw) -> Case:
+    """`merge` of visibility buffers that are right but for a number here and there."""
+    shape = (draw.source.integer(1, 40), draw.source.integer(1, 50), *draw.of([(), (4,)]))
+    arrays: list[Any] = []
+    n = draw.source.integer(1, 3)
+    for _ in range(n):
+        ids = draw.rng().integers(-1, 20, draw.shape(*shape)).astype(draw.mostly(["i4"], ["i8", "f4", ">i4", "u4"]))
+        if ids.size and ids.dtype.kind == "i" and draw.chance(6):
+            ids.reshape(-1)[draw.source.integer(0, ids.size - 1)] = draw.of([20, -2, 10**8])
+        depth = draw.numbers(ids.shape if not draw.chance(30) else (3, 3), -1, 1)
+        arrays += [draw.laid_out(ids), draw.laid_out(draw.as_dtype(depth, ["f4"]))]
+    kind = draw.of(["none", "first", "names"])  # what `triangles` says
+    if kind == "first":
+        arrays += [draw.mostly([20 * i, 0], [-1, 2**31 - 1, 2**31, 2**63, 1.5]) for i in range(n)]
+    if kind == "names":
+        for _ in range(n):
+            ascending = draw.as_index(np.arange(20) * draw.of([1, 3, 10**8]), ["i4", "i8", ">i8", "u2"])
+            arrays.append(draw.triangles(10, 100) if draw.chance(12) else draw.laid_out(ascending))
+    options = {"depth_test": draw.of(["less", "greater", None]), "threads": draw.of([1, None, 3])}
+
+    def call(*arrays: Any, **options: Any) -> Any:
+        names = None if kind == "none" else arrays[2 * n :]
+        return tl.merge(zip(arrays[: 2 * n : 2], arrays[1 : 2 * n : 2], strict=True), triangles=names, **options)
+
+    return Case("merge", call, tuple(arrays), options)
+
+
+def tiles_case(draw: Draw) -> Case:
+    """`tiles`: windows, and slices across them, as they are drawn and as they are cut out of all windows."""
+    size = draw.size()
+    kind = draw.of(["labels", "depth", "coverage", "overdraw", "fill", "field", "height_map"])
+    columns = (3,) if kind in ("depth", "height_map") else (2, 3)
+    vertices, triangles, n_vertices, n_triangles = mesh_arrays(draw, size, columns)
+    options: dict[str, Any] = {"kind": kind, "threads": draw.of([1, None, 2])}
+    values = None
+    if kind == "fill":
+        values, options["per"] = draw.colors(n_triangles), "triangle"
+        options["blend"] = draw.of(["replace", "over", "add"])
+    if kind == "field":
+        values = draw.laid_out(draw.as_dtype(draw.numbers(draw.shape(draw.of([n_vertices, n_triangles])), -5, 5),
+                                             DTYPES))  # fmt: skip
+    if kind in ("field", "height_map") or draw.chance(4):
+        odd = [(0, 0, 0, 0), (5, -5, 0, 1), (0, 1e300, 0, 1), (0, float("nan"), 0, 1), (-1e308, 1e308, 0, 1)]
+        options["extent"] = draw.mostly([(0, 60, 0, 40), (-5, 9.5, 2, 11)], odd)
+    if draw.chance(3):
+        options["subpixel_bits"] = draw.mostly([8, 0, 4, 16], [-1, 17, "exact"])
+    if draw.chance(4):
+        options["cull"] = draw.of(["none", "back", "front"])
+    if kind in ("coverage", "overdraw", "fill") and draw.chance(2):
+        options["sampling"] = draw.of(["center", "msaa4", "area", "outer"])
+    if draw.chance(6):
+        options["memory"] = draw.mostly([0, 64], [-1, 2**70])
+    window = draw.mostly([16, (7, 50), 4, (100, 3)], [0, -1, 2**31, 2**63, (1, 2**31 - 1)])
+    first, end, step = draw.source.integer(-3, 60), draw.source.integer(-3, 60), draw.mostly([1, 3], [0, -1])
+
+    def call(vertices: Any, triangles: Any, values: Any, **options: Any) -> Any:
+        raster = tl.tiles((vertices, triangles), size, values=values, window=window, **options)
+        if raster.n_windows > 2000 or max(raster.shape) > 1000:
+            return raster[:3, :5] if max(raster.shape) < 2**31 - 1 else []
+        whole = np.empty(raster.shape, raster.dtype)
+        for each in raster:
+            whole[each.slices] = each.pixels
+        part = raster[first:end:step, end:]
+        cut = whole[first:end:step, end:]
+        if part.tobytes() != np.ascontiguousarray(cut).tobytes():
+            raise AssertionError("a slice that is not that of the windows")
+        return [whole, part]
+
+    return Case(f"tiles {size}", call, (vertices, triangles, values), options)
+
+
+def batch_case(draw: Draw) -> Case:
+    """`rasterize` of many poses of a mesh."""
+    size, view = (draw.source.integer(1, 50), draw.source.integer(1, 40)), view_of(draw, SAMPLINGS)
+    n, n_vertices, n_triangles = draw.of([3, 1, 0]), draw.of([6, 3, 40, 0]), draw.of([2, 1, 0, 30])
+    columns = 3 if "transform" in view else draw.of([3, 2, 4])
+    poses = draw.numbers(draw.shape(n, n_vertices, columns), -20, 70)
+    if "transform" in view and draw.chance(2):
+        view["transform"] = np.stack([np.asarray(view["transform"])] * draw.mostly([max(n, 1)], [n + 1]))
+        poses = poses[0] if poses.ndim and len(poses) else poses
+    inputs = draw.laid_out(draw.as_dtype(poses, DTYPES)), draw.triangles(n_triangles, n_vertices)
+    view["depth_test"] = draw.of(["less", "greater", None])
+
+    def call(*arrays: Any, **options: Any) -> Any:
+        found = tl.rasterize(*arrays, size, **options)
+        if isinstance(found, tl.FragmentsBatch):
+            return [found.triangle, found.depth, found.barycentric()]
+        return found
+
+    return Case(f"poses {size}", call, inputs, view)
 
 
 def mesh_case(draw: Draw) -> Case:
@@ -488,6 +675,12 @@ KINDS: dict[str, Callable[[Draw], Case]] = {
     "points": points_case,
     "polygons": polygons_case,
     "mesh": mesh_case,
+    "overlap": overlap_case,
+    "assume_valid": assumed_valid_case,
+    "plan": plan_case,
+    "merge": merge_case,
+    "tiles": tiles_case,
+    "batch": batch_case,
 }
 
 

@@ -1,7 +1,7 @@
 """The methods of the literature as published: compiled kernels, and the same in Python, written for reading.
 
-A kernel draws triangles over a picture; those of edge_increment and zigzag draw what the exact reference draws, and so
-have no other twin. One stub types the kernel that is imported by name.
+A kernel draws triangles over a picture; a twin does so in Python, and tells a recorder of its steps. One stub types the
+kernel that is imported by name.
 
 _edges.pxi                  sets up integer edge functions, for the kernels that step them
 _pure.py                    holds what the twins share: a picture of counts, and spans that are clamped to it
@@ -9,6 +9,7 @@ _target.pxi                 holds the buffer that kernels draw into
 bresenham_scanline.pyx      fills between two Bresenham lines, walked from the top down together
 bresenham_scanline_pure.py  does so with generators
 edge_increment.pyx          steps integer edge functions over the bounding box by additions
+edge_increment_pure.py      does so in whole numbers of any size
 float_barycentric.pyx       asks every pixel centre of the bounding box for its float weights
 float_barycentric_pure.py   does so for the whole box at once
 lerp_scanline.pyx           interpolates the two edges of each row in float32
@@ -18,4 +19,5 @@ point_in_triangle_pure.py   does so for the whole box at once
 row_crossing.pyx            asks the three edges of each row where they cross it, in float32
 row_crossing_pure.py        does so row by row
 zigzag.pyx                  steps edge functions and turns round at the sides of the triangle
+zigzag_pure.py              does so in whole numbers of any size
 """

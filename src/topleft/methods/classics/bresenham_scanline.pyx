@@ -1,4 +1,5 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, initializedcheck=False, cdivision=True, embedsignature=False
+# cython: freethreading_compatible=True
 """Bresenham scanline: two Bresenham lines, walked from the top down together, and the pixels between them.
 
 In: vertices, truncated to pixels.  They are sorted by y, then x, and turned clockwise; a triangle with a corner at mid

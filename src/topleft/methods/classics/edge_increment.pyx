@@ -1,4 +1,5 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, initializedcheck=False, cdivision=True, embedsignature=False
+# cython: freethreading_compatible=True
 """Edge increment: integer edge functions, set up once a triangle, then stepped by additions along rows and columns.
 
 In: vertices, snapped to sub-pixels ("integer": truncated to pixels, which are sampled at their corner).  Out: the pixels

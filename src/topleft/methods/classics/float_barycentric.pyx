@@ -1,4 +1,5 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, initializedcheck=False, cdivision=True, embedsignature=False
+# cython: freethreading_compatible=True
 """Float barycentric: every pixel centre of the bounding box, three weights in floating point, all of them >= 0.
 
 In: vertices as they are, nothing is snapped.  Out: the pixels whose centre has no negative weight; edges belong to both

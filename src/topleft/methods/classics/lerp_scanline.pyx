@@ -1,4 +1,5 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, initializedcheck=False, cdivision=True, embedsignature=False
+# cython: freethreading_compatible=True
 """Lerp scanline: sorted by height, two float interpolations a row, and the pixels between them.
 
 In: vertices, truncated to pixels.  The long edge runs from the top vertex to the bottom one, the short edges from the top

@@ -1,4 +1,5 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, initializedcheck=False, cdivision=True, embedsignature=False
+# cython: freethreading_compatible=True
 """Point in triangle: every pixel of the bounding box, three cross products each.
 
 In: vertices, truncated to pixels.  Out: the pixels whose three cross products have one sign, zero included, so either

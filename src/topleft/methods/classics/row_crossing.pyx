@@ -1,4 +1,5 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, initializedcheck=False, cdivision=True, embedsignature=False
+# cython: freethreading_compatible=True
 """Row crossing: each row asks the three edges where it crosses them, and fills from the least answer to the greatest.
 
 In: vertices, truncated to pixels.  An edge answers in float32, rounded to the nearest pixel, for the rows between its

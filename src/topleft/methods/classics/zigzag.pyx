@@ -1,4 +1,5 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, initializedcheck=False, cdivision=True, embedsignature=False
+# cython: freethreading_compatible=True
 """Zigzag: integer edge functions again, but the walk turns round at the triangle's sides instead of the box's.
 
 In: vertices, snapped to sub-pixels.  Out: the pixels that edge_increment finds, in another order: one row to the right,

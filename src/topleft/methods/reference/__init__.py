@@ -14,6 +14,7 @@ P. S. Heckbert, H. P. Moreton, Interpolation for Polygon Texture Mapping and Sha
 
 area.py       cuts each triangle to each pixel square: exact areas
 blend.py      blends a colour into a pixel
+integers.py   draws vertices however far away, after any snap or none
 lines.py      draws the edges of a mesh as lines
 peel.py       sorts the layers of each pixel, and composites them
 points.py     draws points as discs or squares
@@ -53,6 +54,10 @@ class Piece(NamedTuple):
 
     triangle: int
     vertices: tuple[Vertex, Vertex, Vertex]
+
+    def denominator(self) -> int:
+        """Return what makes integers of all coordinates, powers of two, when they are multiplied by it."""
+        return max(v.denominator for vertex in self.vertices for v in vertex.xy_fx)
 
 
 class Fragment(NamedTuple):
@@ -312,7 +317,7 @@ def fragments(
     bits, (x_origin, y_origin) = view.get("subpixel_bits", 8), origin
     is_exact = bits == "exact"
     for piece in pieces(vertices, triangles, size, **view):
-        unit = max(v.denominator for p in piece.vertices for v in p.xy_fx) if is_exact else 1 << bits
+        unit = piece.denominator() if is_exact else 1 << bits
         scale = 16 * unit if is_exact else 16
         a, b, c = ((int(scale * v.xy_fx[0]), int(scale * v.xy_fx[1])) for v in piece.vertices)
         if edge_function(a, b, c) > 0:

@@ -1,7 +1,8 @@
 """The exact reference of the other kinds of sampling: several samples a pixel, and conservative coverage.
 
-In: scenes, as in `reference`.  Out: what each sample, or each pixel square, must hold.  Integers only: samples and the
-corners of pixels are counted in sixteenths of a sub-pixel.
+In: scenes, as in `reference`.  Out: what each sample, or each pixel square, must hold.  Integers only: samples are
+counted in sixteenths of a sub-pixel, squares in sub-pixels, and with vertices that are not snapped in what all corners
+of a triangle are multiples of.
 
 Based on: Microsoft, Direct3D 11.3 Functional Specification, 2015 (standard sample patterns);
 S. Gottschalk, M. C. Lin, D. Manocha, OBBTree: A Hierarchical Structure for Rapid Interference Detection, 1996
@@ -97,12 +98,14 @@ def _conservative(
     origin: Point = (0, 0), **view: Any,
 ) -> np.ndarray:  # fmt: skip
     bits = view.get("subpixel_bits", 8)
+    is_exact = bits == "exact"
     picture = np.zeros((size[1], size[0]), bool)
     for piece in reference.pieces(vertices, triangles, size, **view):
-        corners = _turned(piece)
-        for row, column in reference.touched_pixels(piece, size, origin, bits):
-            x, y = (column + origin[0]) << bits, (row + origin[1]) << bits
-            far_x, far_y = x + (1 << bits), y + (1 << bits)
+        unit = piece.denominator() if is_exact else 1 << bits
+        corners = [(int(x * unit), int(y * unit)) if is_exact else (x, y) for x, y in _turned(piece)]
+        for row, column in reference.touched_pixels(piece, size, origin, 0 if is_exact else bits):
+            x, y = (column + origin[0]) * unit, (row + origin[1]) * unit
+            far_x, far_y = x + unit, y + unit
             picture[row, column] |= test(corners, [(x, y), (far_x, y), (far_x, far_y), (x, far_y)])
     return picture
 

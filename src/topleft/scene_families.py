@@ -22,7 +22,7 @@ MIDDLE_PX = 512.0
 """Of the frame, unless the family says where it lies: no coordinate is negative, where truncation turns round."""
 
 
-class Scene(NamedTuple):
+class PixelScene(NamedTuple):
     """Triangles in pixels and the window that is drawn; `copies` times the same, one over the other."""
 
     vertices: F64
@@ -55,38 +55,10 @@ class Family:
     n_seeds: int = 3
 
 
-class Faults(NamedTuple):
-    """Pixels of a picture."""
-
-    wrong: int
-    gaps: int
-    overdrawn: int
-    inexact: int
-
-
 def walk(family: Family) -> Iterator[tuple[list[str], list[Any]]]:
     """Yield names and values of the parameters, from mild to harsh, the last parameter first."""
     for steps in itertools.product(*(axis.values.items() for axis in family.axes)):
         yield [name for name, _ in steps], [value for _, value in steps]
-
-
-def tabulate(
-    family: Family, n_px: list[int], cells: dict[str, list[list[Any]]]
-) -> tuple[dict[str, Any], list[dict[str, Any]]]:
-    """Return facts, and rows with a list for each field: sums over scenes step by step, None where a method refuses."""
-    facts = {"name": family.name, "what": family.what, "axes": {axis.what: list(axis.values) for axis in family.axes},
-             "n_scenes": family.n_seeds, "n_px": n_px}  # fmt: skip
-    maps = []
-    for name, steps in cells.items():
-        row: dict[str, Any] = {"family": family.name, "entry": name}
-        refusals = [fault for faults in steps for fault in faults if isinstance(fault, str)]
-        drawn = [None if any(isinstance(fault, str) for fault in faults) else faults for faults in steps]
-        for field in Faults._fields:
-            row[field] = [None if faults is None else sum(getattr(f, field) for f in faults) for faults in drawn]
-        if getattr(steps[0][0], "ulp", None) is not None:
-            row["ulp"] = [max(fault.ulp for fault in faults) for faults in steps]
-        maps.append(row | ({"refused": refusals[0]} if refusals else {}))
-    return facts, maps
 
 
 def power_of_ten(*exponents: int) -> dict[str, float]:
@@ -108,7 +80,7 @@ def direction(rng: np.random.Generator) -> F64:
     return turned
 
 
-def far(distance_px: float, seed: int) -> Scene:
+def far(distance_px: float, seed: int) -> PixelScene:
     """Return a jittered grid whose middle lies that far from the origin, as fine as float64 allows there."""
     rng = np.random.default_rng(seed)
     spacing = float(np.spacing(distance_px))
@@ -122,10 +94,10 @@ def far(distance_px: float, seed: int) -> Scene:
     if spacing > 1:
         jitter[n, n] = 0  # a corner in the middle of the frame, where there are so few
     origin = int(middle) - FRAME_PX // 2
-    return Scene((middle + (xy + jitter)).reshape(-1, 2), grid_triangles(len(line)), origin=(origin, origin))
+    return PixelScene((middle + (xy + jitter)).reshape(-1, 2), grid_triangles(len(line)), origin=(origin, origin))
 
 
-def dense(cell_px: float, seed: int) -> Scene:
+def dense(cell_px: float, seed: int) -> PixelScene:
     """Return a jittered grid of cells of that size, in a frame of a quarter of the side."""
     rng = np.random.default_rng(seed)
     side_px = FRAME_PX // 4
@@ -133,7 +105,7 @@ def dense(cell_px: float, seed: int) -> Scene:
     xy = np.stack(np.meshgrid(line, line), -1)
     xy[1:-1, 1:-1] += rng.uniform(-0.45, 0.45, (len(line) - 2, len(line) - 2, 2)) * cell_px
     origin = int(MIDDLE_PX)
-    return Scene((MIDDLE_PX + xy).reshape(-1, 2), grid_triangles(len(line)), (side_px, side_px), (origin, origin))
+    return PixelScene((MIDDLE_PX + xy).reshape(-1, 2), grid_triangles(len(line)), (side_px, side_px), (origin, origin))
 
 
 def grid_triangles(n: int) -> I32:
@@ -160,16 +132,16 @@ def square_rim(n: int, half_px: float, phase: float) -> F64:
     return half_px * (start + along[:, None] * (end - start))
 
 
-def large(reach_px: float, seed: int) -> Scene:
+def large(reach_px: float, seed: int) -> PixelScene:
     """Return a fan of nine triangles from within the frame to corners that far away."""
     rng = np.random.default_rng(seed)
     middle = FRAME_PX / 2
     hub = middle + rng.uniform(-8, 8, 2)
     rim = middle + square_rim(9, reach_px, rng.uniform()) * rng.uniform(0.8, 1, (9, 1))
-    return Scene(*fan_of(hub, rim, closed=True), origin=(0, 0))
+    return PixelScene(*fan_of(hub, rim, closed=True), origin=(0, 0))
 
 
-def sliver(thickness_px: float, seed: int, offset_px: float = 0) -> Scene:
+def sliver(thickness_px: float, seed: int, offset_px: float = 0) -> PixelScene:
     """Return a band of that thickness across the frame, cut into six slivers, and fans on either side."""
     rng = np.random.default_rng(seed)
     middle = MIDDLE_PX + offset_px
@@ -184,7 +156,7 @@ def sliver(thickness_px: float, seed: int, offset_px: float = 0) -> Scene:
         for triangle in ((i, i + 1, 4 + i), (i + 1, 5 + i, 4 + i), (8, i + 1, i), (9, 4 + i, 5 + i))
     ]
     origin = int(middle) - FRAME_PX // 2
-    return Scene(vertices, np.array(triangles, np.int32), origin=(origin, origin))
+    return PixelScene(vertices, np.array(triangles, np.int32), origin=(origin, origin))
 
 
 HUBS: dict[str, tuple[float, float]] = {
@@ -195,7 +167,7 @@ HUBS: dict[str, tuple[float, float]] = {
 """Where the hub lies, from a pixel's corner in the middle of the frame; distances: left of it, outside."""
 
 
-def fan(n: int, hub: tuple[float, float], seed: int) -> Scene:
+def fan(n: int, hub: tuple[float, float], seed: int) -> PixelScene:
     """Return a fan of n triangles round its hub, or, from a hub to the left of the frame, side by side."""
     rng = np.random.default_rng(seed)
     start = MIDDLE_PX + 2.0**20 * (hub[0] < -512)  # no coordinate is negative
@@ -204,20 +176,22 @@ def fan(n: int, hub: tuple[float, float], seed: int) -> Scene:
     distance = -hub[0]
     if distance < FRAME_PX / 2:
         rim = middle + square_rim(n, 200.0, rng.uniform())
-        return Scene(*fan_of(middle + np.array(hub), rim, closed=True), origin=origin)
+        return PixelScene(*fan_of(middle + np.array(hub), rim, closed=True), origin=origin)
     half_px = 64 * (96 + distance) / (distance - 32)  # at the left side of the frame still 64 px
     rim = np.stack([np.full(n + 1, 96.0), np.linspace(-1, 1, n + 1) * half_px], -1)
     rim[1:-1, 1] += rng.uniform(-0.3, 0.3, n - 1) * (2 * half_px / n)
     vertices, triangles = fan_of(middle + np.array(hub) + [0, rng.uniform(-8, 8)], middle + rim, closed=False)
     vertices[:, 1] += max(0.0, np.ceil(half_px) - MIDDLE_PX)
-    return Scene(vertices, triangles, origin=(origin[0], origin[1] + max(0, int(np.ceil(half_px)) - int(MIDDLE_PX))))
+    return PixelScene(
+        vertices, triangles, origin=(origin[0], origin[1] + max(0, int(np.ceil(half_px)) - int(MIDDLE_PX)))
+    )
 
 
 STEPS = [(1, 0), (0, 1), (1, 1), (-1, 1), (3, 1), (2, 5), (-5, 2), (-7, 3), (1, 4)]
 """Directions of edges that pass through pixel centres again and again."""
 
 
-def edge(distance_px: float, seed: int) -> Scene:
+def edge(distance_px: float, seed: int) -> PixelScene:
     """Return two triangles whose common edge passes pixel centres at that distance."""
     rng = np.random.default_rng(seed)
     step = np.array(STEPS[seed % len(STEPS)], float)
@@ -228,14 +202,14 @@ def edge(distance_px: float, seed: int) -> Scene:
     ends = centre + across * distance_px + step * reach * np.array([[-1.0], [1.0]])
     sides = MIDDLE_PX + across * np.array([[-160.0], [160.0]])
     triangles = np.array([[0, 1, 2], [1, 0, 3]], np.int32)
-    return Scene(np.concatenate([ends, sides]), triangles)
+    return PixelScene(np.concatenate([ends, sides]), triangles)
 
 
-def layers(n: int, seed: int) -> Scene:
+def layers(n: int, seed: int) -> PixelScene:
     """Return a square of two triangles, n times."""
     rng = np.random.default_rng(seed)
     vertices = np.array([[4.0, 4], [28, 4], [4, 28], [28, 28]]) + rng.uniform(-2, 2, (4, 2))
-    return Scene(vertices, np.array([[0, 1, 2], [1, 3, 2]], np.int32), (6, 6), (13, 13), n)
+    return PixelScene(vertices, np.array([[0, 1, 2], [1, 3, 2]], np.int32), (6, 6), (13, 13), n)
 
 
 DISTANCES = Axis("distance from the origin, px", power_of_ten(0, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 18))

@@ -9,34 +9,45 @@ Based on: J. Pineda, A Parallel Algorithm for Polygon Rasterization, 1988.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.exact.unsnapped import ExactPicture
-
 Point = tuple[int, int]
 
 INT64_SAFE = 2**61
 
 
-class Points(NamedTuple):
+@dataclass(frozen=True)
+class ExactPicture:
+    """What the frame must hold."""
+
+    triangle: NDArray[np.int32]
+    """(H, W): the last triangle that covers the centre, -1 for none."""
+    count: NDArray[np.int32]
+    """(H, W): how many triangles cover the centre."""
+    is_edge: NDArray[np.bool_]
+    """(H, W): whether an edge of a triangle meets the pixel's square, its border included."""
+
+
+class ExactPoints(NamedTuple):
     """Vertices in units of 2**-bits pixels; bits >= 1, so that pixel centres are whole numbers of units."""
 
     xy: list[Point]
     bits: int
 
 
-def true_points(vertices: NDArray[np.float64]) -> Points:
+def true_points(vertices: NDArray[np.float64]) -> ExactPoints:
     """Return float64 vertices in pixels as they are."""
     ratios = [[x.as_integer_ratio() for x in row] for row in np.asarray(vertices, np.float64)[:, :2].tolist()]
     bits = max([1, *(denominator.bit_length() - 1 for row in ratios for _, denominator in row)])
-    return Points([(*(n * (2**bits // d) for n, d in row),) for row in ratios], bits)  # type: ignore[misc]
+    return ExactPoints([(*(n * (2**bits // d) for n, d in row),) for row in ratios], bits)
 
 
-def snapped_points(vertices: NDArray[np.float64], snap: str) -> Points:
+def snapped_points(vertices: NDArray[np.float64], snap: str) -> ExactPoints:
     """Return vertices in pixels after a snap: "px" to the middle of their pixel, "float32", or to a number of bits.
 
     Truncation is towards zero, the rounding to bits to nearest with ties to even.
@@ -47,19 +58,19 @@ def snapped_points(vertices: NDArray[np.float64], snap: str) -> Points:
         return true_points(np.asarray(vertices).astype(np.float32).astype(np.float64))
     rows = [[Fraction(x) for x in row] for row in np.asarray(vertices, np.float64)[:, :2].tolist()]
     if snap == "px":
-        return Points([(2 * int(x) + 1, 2 * int(y) + 1) for x, y in rows], 1)
+        return ExactPoints([(2 * int(x) + 1, 2 * int(y) + 1) for x, y in rows], 1)
     scale = 2 ** int(snap)
-    return Points([(2 * round(x * scale), 2 * round(y * scale)) for x, y in rows], int(snap) + 1)
+    return ExactPoints([(2 * round(x * scale), 2 * round(y * scale)) for x, y in rows], int(snap) + 1)
 
 
-def signed_area(points: Points, triangle: list[int]) -> int:
+def signed_area(points: ExactPoints, triangle: list[int]) -> int:
     """Return twice the area in square units, positive clockwise as seen (y down)."""
     (ax, ay), (bx, by), (cx, cy) = (points.xy[i] for i in triangle)
     return (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
 
 
 def draw_points(
-    points: Points, triangles: NDArray[np.int32], size: Point, origin: Point = (0, 0), rule: str = "top-left"
+    points: ExactPoints, triangles: NDArray[np.int32], size: Point, origin: Point = (0, 0), rule: str = "top-left"
 ) -> ExactPicture:
     """Return the exact picture of a window; `rule` says which edges own the centres on them: or "bottom-right"."""
     width, height = size

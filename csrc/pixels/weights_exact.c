@@ -1,0 +1,65 @@
+/* Exact weights: those of the three corners of one pixel, from vertices that are not snapped.
+ * In: a triangle's id and the points it was drawn from.  Out: edge functions in proportion, float64.
+ *
+ * A float64 edge function is taken where its error bound is below 2^-32 of it; elsewhere, near an edge and of slivers,
+ * one that is exact to 2^-50.  So each weight is within 2^-30 of its own size, however far apart the w are. */
+#ifndef TL_WEIGHTS_EXACT_C
+#define TL_WEIGHTS_EXACT_C
+
+#include <math.h>
+#include <stdint.h>
+
+#include "topleft.h"
+#include "exact/pieces_exact.c"
+#include "exact/sign.c"
+
+/* Where a pixel is looked at. */
+TL_INLINE exact_point sample_of(const tl_vertex_set *set, int64_t x_px, int64_t y_px, int bits)
+{
+    const double unit = 1.0 / (double)(1 << bits);
+    return (exact_point){(double)x_px + 0.5 + set->sample_x_fx * unit, (double)y_px + 0.5 + set->sample_y_fx * unit};
+}
+
+/* Whether a sample lies in a triangle of either turn. */
+static int holds(const exact_point *p, exact_point sample)
+{
+    tl_exact_counts counts = {0, 0, 0, 0, 0, 0};
+    const int sign = edge_sign(p[0], p[1], p[2], &counts);
+    const exact_point turned[3] = {p[0], p[sign < 0 ? 2 : 1], p[sign < 0 ? 1 : 2]};
+    return sign && is_inside(turned, sample, TL_TEST_SAMPLE, &counts);
+}
+
+/* The piece of a triangle that holds a sample, -1 if none does. */
+static int64_t piece_at(const tl_exact_pieces *pieces, int64_t id, exact_point sample, exact_point *corners)
+{
+    for (int64_t i = first_exact_piece(pieces, id); pieces && i < pieces->n_pieces && pieces->source[i] == id; i++) {
+        for (int k = 0; k < 3; k++)
+            corners[k] = piece_point(pieces, pieces->triangles[3 * i + k]);
+        if (holds(corners, sample))
+            return i;
+    }
+    return -1;
+}
+
+/* The edge functions opposite the corners, all by one power of two, which makes them numbers near 1. */
+static void scaled_edges(const exact_point *corners, exact_point s, double *e)
+{
+    scaled_number found[3];
+    int exponents[3], most = INT32_MIN;
+    for (int k = 0; k < 3; k++) {
+        const int next = k == 2 ? 0 : k + 1;
+        const exact_point a = corners[next], b = corners[3 - k - next];
+        double bound;
+        found[k] = (scaled_number){rounded_edge(a, b, s, &bound), 0};
+        if (!(fabs(found[k].mantissa) * 0x1p-32 > bound))
+            found[k] = edge_value(a, b, s);
+        int exponent;
+        found[k].mantissa = frexp(found[k].mantissa, &exponent);
+        exponents[k] = found[k].exponent + exponent;
+        most = found[k].mantissa != 0.0 && exponents[k] > most ? exponents[k] : most;
+    }
+    for (int k = 0; k < 3; k++)
+        e[k] = found[k].mantissa == 0.0 ? 0.0 : ldexp(found[k].mantissa, exponents[k] - most);
+}
+
+#endif

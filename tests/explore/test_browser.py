@@ -1,0 +1,312 @@
+"""The page of the explorer in a browser: what is seen is what the library draws, whatever is dragged or pressed."""
+
+import json
+import shutil
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+
+playwright = pytest.importorskip("playwright.sync_api", reason="no Playwright: pip install playwright")
+pytest.importorskip("uvicorn", reason="the explorer needs its extra: pip install 'topleft[explore]'")
+
+import topleft as tl  # noqa: E402
+from topleft._explore.handlers import answer  # noqa: E402
+from topleft._explore.session import Content, Session  # noqa: E402
+
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no browser: apt-get install chromium")
+
+DESKTOP, PHONE = {"width": 1280, "height": 860}, {"width": 390, "height": 844}
+STATE = "document.querySelector('.explorer').app.parts.pixels.state()"
+QUIET = """() => {
+  const part = document.querySelector(".explorer").app?.parts.pixels;
+  return part?.drawn && part.drawn === part.state();
+}"""
+PIXELS = """(key) => {
+  const canvas = document.querySelector(`[data-key="${key}"] canvas`);
+  const {data, width, height} = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+  return [height, width, [...data]];
+}"""
+
+
+@pytest.fixture(scope="module")
+def chromium():
+    with playwright.sync_playwright() as running:
+        browser = running.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def explorer():
+    with tl.explore("shared-edge", wait=False, browser=False) as found:
+        yield found
+
+
+@contextmanager
+def opened(chromium, explorer, fragment="", viewport=DESKTOP, **more):
+    """The page, once it has been drawn; it may fetch from its server alone, and complain of nothing."""
+    context = chromium.new_context(viewport=viewport, accept_downloads=True, **more)
+    page, complaints = context.new_page(), []
+    page.on("console", lambda message: complaints.append(message.text) if message.type == "error" else None)
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    ours = explorer.url.split("#")[0]
+    page.on(
+        "request", lambda sent: None if sent.url.startswith((ours, "data:", "blob:")) else complaints.append(sent.url)
+    )
+    page.goto(ours + fragment)
+    page.wait_for_function(QUIET)
+    yield page
+    context.close()
+    assert complaints == []
+
+
+@pytest.fixture
+def page(chromium, explorer):
+    with opened(chromium, explorer) as found:
+        yield found
+
+
+def state_of(page):
+    return page.evaluate(STATE)
+
+
+def check_pictures(page):
+    """Compare each picture, pixel by pixel, with what the library draws of the state; returns the owners."""
+    page.wait_for_function(QUIET)
+    state = state_of(page)
+    reply = answer(Session(Content()), {"id": 1, "do": "pixels.draw", "state": state})
+    shown = page.evaluate("[...document.querySelectorAll('[data-key]')].map((one) => one.dataset.key)")
+    assert shown == [panel["key"] for panel in reply.header["panels"]]
+    for key in shown:
+        height, width, data = page.evaluate(PIXELS, key)
+        pixels = np.array(data, np.uint8).reshape(height, width, 4)
+        wanted = reply.arrays[key]
+        is_seen = wanted[..., 3] > 0
+        assert (pixels[..., 3] == wanted[..., 3]).all()
+        assert (np.abs(pixels[is_seen].astype(int) - wanted[is_seen]) <= (wanted[is_seen][:, 3:] < 255) * 128).all()
+    assert "a" in shown
+    return reply.arrays["a_owners"]
+
+
+def grip(page, i, key="a"):
+    """Where a vertex is on the screen."""
+    page.wait_for_function(QUIET)
+    knob = f"""document.querySelectorAll('[data-key="{key}"] .grip .knob')[{i}].getBoundingClientRect()"""
+    return page.evaluate(f"(({{x, y, width, height}}) => [x + width / 2, y + height / 2])({knob})")
+
+
+def drag(page, i, by, key="a"):
+    x, y = grip(page, i, key)
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + by[0] / 2, y + by[1] / 2)
+    page.mouse.move(x + by[0], y + by[1])
+    page.mouse.up()
+
+
+def test_page_shows_what_the_library_draws(page):
+    state = state_of(page)
+    owners = check_pictures(page)
+    assert (owners == tl.rasterize(state["vertices"], state["triangles"], state["size"]).triangle).all()
+    assert page.locator("figcaption").count() == 4
+
+
+@pytest.mark.parametrize("snap", ["free", "sub-pixel", "pixel centre"])
+def test_dragged_vertex_moves_in_the_chosen_steps(page, snap):
+    page.get_by_label("Vertices are dragged to").select_option(snap)
+    page.get_by_label("sub-pixel bits").select_option("2")
+    before = state_of(page)["vertices"]
+    drag(page, 3, (-33, 21))
+    check_pictures(page)
+    after = state_of(page)["vertices"]
+    assert after[:3] == before[:3]
+    assert after[3] != before[3]
+    step = {"free": 2**-20, "sub-pixel": 0.25, "pixel centre": 1.0}[snap]
+    offset = 0.5 if snap == "pixel centre" else 0
+    assert all((value - offset) % step == 0 for value in after[3])
+
+
+def test_vertices_that_were_dragged_are_those_of_python(page, explorer):
+    drag(page, 0, (40, 40))
+    page.wait_for_function(QUIET)
+    assert explorer.vertices.tolist() == state_of(page)["vertices"]
+
+
+def test_keys_take_and_move_a_corner_and_undo(page):
+    stage = page.locator("[data-panel=pixels] .stage")
+    stage.focus()
+    before = state_of(page)["vertices"]
+    for keys, moved in ((["2", "ArrowRight"], [13.5 + 1 / 256, 1.5]), (["s"], [13.5 + 1 / 256, 1.5 + 1 / 256]),
+                        (["Shift+ArrowLeft"], [12.5 + 1 / 256, 1.5 + 1 / 256])):  # fmt: skip
+        for key in keys:
+            page.keyboard.press(key)
+        check_pictures(page)
+        assert state_of(page)["vertices"][1] == moved
+    for _ in range(3):
+        page.keyboard.press("z")
+    assert state_of(page)["vertices"] == before
+    page.keyboard.press("f")
+    assert state_of(page)["look"] == "wireframe"
+    check_pictures(page)
+
+
+def test_tab_goes_through_the_scenes_and_escape_leaves_the_picture(page):
+    page.locator("[data-panel=pixels] .stage").focus()
+    for name in ("wide", "tall"):
+        page.keyboard.press("Tab")
+        page.wait_for_function(f"() => document.querySelector('.status').textContent === '{name}'")
+        check_pictures(page)
+    page.keyboard.press("Shift+Tab")
+    page.wait_for_function("() => document.querySelector('.status').textContent === 'wide'")
+    page.keyboard.press("Escape")
+    assert page.evaluate("document.activeElement.getAttribute('aria-label')") == "Scene"
+
+
+def test_all_controls_are_reached_by_keyboard_alone(page):
+    page.locator("[data-tab=pixels]").focus()
+    page.keyboard.press("Tab")
+    assert page.evaluate("document.activeElement.className") == "stage"
+    page.keyboard.press("ArrowRight")
+    page.wait_for_function("() => document.querySelector('.why .card')")
+    page.keyboard.press("Escape")
+    reached = set()
+    for _ in range(60):
+        reached.add(
+            page.evaluate("document.activeElement.getAttribute('aria-label') ?? document.activeElement.textContent")
+        )
+        page.keyboard.press("Tab")
+    assert {"Scene", "draws", "beside it", "sub-pixel bits", "sampling", "corner 1, x", "split", "Copy link"} <= reached
+
+
+def test_triangles_are_added_split_flipped_and_removed(page):
+    for button, n in (("add", 3), ("split", 5), ("flip", 5), ("remove", 4)):
+        page.get_by_role("button", name=button, exact=True).click()
+        check_pictures(page)
+        assert len(state_of(page)["triangles"]) == n
+    for _ in range(4):
+        page.get_by_role("button", name="remove", exact=True).click()
+    check_pictures(page)
+    assert state_of(page)["vertices"] == []
+
+
+def test_methods_and_rules_are_switched(page):
+    for label, value in (("draws", "edge_increment"), ("draws, variant", "edge_increment/bottom-right"),
+                         ("beside it", ""), ("draws", "scanline"), ("sampling", "msaa4"), ("sub-pixel bits", "exact"),
+                         ("sampling", "outer"), ("sampling", "area"), ("cull", "back"), ("winding", "clockwise"),
+                         ("sampling", "center")):  # fmt: skip
+        page.get_by_label(label, exact=True).select_option(value)
+        check_pictures(page)
+    page.get_by_role("button", name="overdraw").click()
+    check_pictures(page)
+
+
+def test_hovered_pixel_says_whose_it_is(page):
+    box = page.locator('[data-key="b"] svg').bounding_box()
+    cell = box["width"] / 18
+    page.mouse.move(box["x"] + 9.5 * cell, box["y"] + 7.5 * cell)
+    page.wait_for_function("() => document.querySelector('.why').textContent.includes('draws it')")
+    told = page.locator(".why").inner_text()
+    assert "left edge of triangle 1, so the pixel is its own" in told
+    assert "bresenham_scanline draws it 2 times, for triangle 0 and triangle 1, which is triangle 1's." in told
+
+
+def test_touch_drags_a_vertex(chromium, explorer):
+    with opened(chromium, explorer, viewport=PHONE, has_touch=True, is_mobile=True) as page:
+        before = state_of(page)["vertices"]
+        x, y = grip(page, 3)
+        touch = page.context.new_cdp_session(page)
+        points = [(x, y), (x - 20, y - 10), (x - 44, y - 30)]
+        for kind, at in zip(("touchStart", "touchMove", "touchMove"), points, strict=True):
+            touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [{"x": at[0], "y": at[1]}]})
+        touch.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+        check_pictures(page)
+        after = state_of(page)["vertices"]
+        assert after[:3] == before[:3]
+        assert after[3][0] < before[3][0]
+        assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
+
+
+def test_exported_code_runs_and_draws_the_same(page, folder):
+    drag(page, 3, (-40, 13))
+    owners = check_pictures(page)
+    with page.expect_download() as download:
+        page.get_by_role("button", name="Python").click()
+    made = {}
+    exec(download.value.path().read_text(), made)
+    assert (made["owners"] == owners).all()
+
+
+@pytest.mark.parametrize(("button", "begins"), [("PNG", b"\x89PNG"), ("SVG", b"<svg"), ("Test case", b"import numpy")])
+def test_exported_file_is_saved(page, button, begins):
+    with page.expect_download() as download:
+        page.get_by_role("button", name=button).click()
+    assert download.value.path().read_bytes().startswith(begins)
+
+
+def test_link_restores_the_state_in_another_page(page, chromium, explorer):
+    drag(page, 2, (30, -20))
+    page.get_by_label("draws", exact=True).select_option("zigzag")
+    page.get_by_label("sub-pixel bits").select_option("4")
+    check_pictures(page)
+    page.wait_for_timeout(400)
+    fragment, state = page.evaluate("location.hash"), state_of(page)
+    with opened(chromium, explorer, fragment) as other:
+        check_pictures(other)
+        assert state_of(other) == state
+    with tl.explore(f"{explorer.url}{fragment}", wait=False, browser=False) as again:
+        context = chromium.new_context()
+        third = context.new_page()
+        third.goto(again.url)
+        third.wait_for_function(QUIET)
+        assert state_of(third) == state
+        context.close()
+
+
+def test_broken_link_is_told_of(chromium, explorer):
+    with opened(chromium, explorer, "#pixels=%7Bno") as page:
+        assert "This link cannot be read" in page.locator(".status").inner_text()
+
+
+def test_two_pages_are_moved_apart(page, chromium, explorer):
+    with opened(chromium, explorer) as other:
+        drag(page, 0, (25, 25))
+        drag(other, 1, (-25, 25))
+        check_pictures(page)
+        check_pictures(other)
+        assert state_of(page)["vertices"] != state_of(other)["vertices"]
+
+
+def test_page_says_that_its_server_has_ended(page, explorer):
+    explorer.close()
+    page.wait_for_function("() => document.querySelector('.status').textContent.includes('has ended')")
+
+
+def test_drag_to_new_pixels_is_timed(chromium, explorer, capsys):
+    square = {"vertices": [[2.3, 3.1], [61.2, 5.7], [4.9, 60.3], [60.1, 58.8]], "triangles": [[0, 1, 2], [1, 3, 2]]}
+    state = square | {"size": [64, 64], "other": "bresenham_scanline", "exact": True}
+    with opened(chromium, explorer, f"#pixels={json.dumps(state)}") as page:
+        x, y = grip(page, 3)
+        page.mouse.move(x, y)
+        page.mouse.down()
+        times = page.evaluate(
+            """async ([x, y]) => {
+              const part = document.querySelector(".explorer").app.parts.pixels, times = [];
+              const sheet = document.querySelector('[data-key="a"] svg');
+              for (let i = 0; i < 60; i++) {
+                const drawn = new Promise((resolve) => { part.onDrawn = resolve; }), start = performance.now();
+                const at = {clientX: x - 40 * Math.sin(i / 5), clientY: y - i / 2, pointerType: "mouse"};
+                sheet.dispatchEvent(new PointerEvent("pointermove", at));
+                await drawn;
+                times.push(performance.now() - start);
+                await new Promise(requestAnimationFrame);
+              }
+              return times;
+            }""",
+            [x, y],
+        )
+        page.mouse.up()
+        check_pictures(page)
+    with capsys.disabled():
+        print(f"\ndrag to new pixels, 64x64, two methods and the exact picture: median {np.median(times):.1f} ms")
