@@ -253,10 +253,18 @@ def test_scalar_kernels_have_no_meshlets():
 
 
 @pytest.mark.parametrize(
-    ("front", "hidden", "pays"), [(0.5, 0.0, True), (0.9, 0.0, False), (0.5, 0.7, False), (0.8, 0.5, True)]
+    ("n", "outside", "front", "hidden", "pays"),
+    [
+        (90_000, 0.0, 0.5, 0.0, True),
+        (90_000, 0.0, 0.9, 0.0, False),
+        (90_000, 0.0, 0.5, 0.7, False),
+        (90_000, 0.0, 0.8, 0.6, True),
+        (30_000, 0.0, 0.5, 0.0, False),
+        (30_000, 0.2, 0.5, 0.0, True),
+    ],
 )
-def test_meshlets_are_drawn_where_little_is_hidden(front, hidden, pays):
-    assert choices.pays_to_draw_meshlets(Survey(0.0, 0.0, 1 - front, front), hidden) == pays
+def test_meshlets_are_drawn_where_little_is_hidden(n, outside, front, hidden, pays):
+    assert choices.pays_to_draw_meshlets(n, Survey(outside, 0.0, 1 - outside - front, front), hidden) == pays
 
 
 @pytest.mark.parametrize(("n_pictures", "n_clusters", "pays"), [(15, 100, False), (16, 100, True), (99, 350, False)])

@@ -101,13 +101,14 @@ MAX_FRONT_TO_CLUSTER = 0.8
 MIN_OUTSIDE_TO_CLUSTER = ((60_000, 0.1, 0.6), (500_000, 0.0, 0.33), (math.inf, 0.0, 0.0))
 
 #: Meshlets take 0.4 to 0.95 of the time of clusters or of the whole mesh, whichever is less, of blobs of 30,000
-#: triangles or more in every view. They take longer where all triangles show (hills, 1.15 times), where triangles share
-#: no vertices, of which a cluster then has 85 (soup, 1.4 times), and where much is hidden. Growing takes about three
-#: times as long as sorting clusters, which some 100 pictures pay back; a mesh that is drawn 16 times is likely to be
-#: drawn more.
+#: triangles or more in every view, but for 30,000 seen whole (1.14 times). They take longer where all triangles show
+#: (hills, 1.15 times), where triangles share no vertices, of which a cluster then has 85 (soup, 1.4 times), and where
+#: much is hidden. Growing takes about three times as long as sorting clusters, which some 100 pictures pay back; a mesh
+#: that is drawn 16 times is likely to be drawn more.
 MIN_PICTURES_TO_GROW = 16
 MIN_TRIANGLES_OF_CLUSTER = 150
-MAX_HIDDEN_OF_MESHLETS = 0.5
+MAX_HIDDEN_OF_MESHLETS = 0.6
+MIN_TRIANGLES_OF_MESHLETS, MIN_OUTSIDE_OF_MESHLETS = 60_000, 0.1
 
 #: Scenes whose instances lie so many deep, on the mean, are drawn from clusters in any case: 200 in rows, 8.8 deep, are
 #: 4 to 5.5 times as fast. Others are where so large a share is outside, with one sample and with several, for each of
@@ -255,12 +256,13 @@ def pays_to_grow(n_pictures: int, n_triangles: int, n_clusters: int) -> bool:
     return n_pictures >= MIN_PICTURES_TO_GROW and n_triangles >= MIN_TRIANGLES_OF_CLUSTER * n_clusters
 
 
-def pays_to_draw_meshlets(survey: Survey, hidden: float) -> bool:
-    """Tell whether a view is drawn from meshlets; `survey`: what becomes of its clusters.
+def pays_to_draw_meshlets(n_triangles: int, survey: Survey, hidden: float) -> bool:
+    """Tell whether a view of a mesh is drawn from meshlets; `survey`: what becomes of its clusters.
 
     `hidden`: the share of those in view that the last picture hid. Meshlets are drawn from top to bottom, all of them.
     """
-    return survey.front <= MAX_FRONT_TO_CLUSTER and hidden <= MAX_HIDDEN_OF_MESHLETS
+    are_small = n_triangles >= MIN_TRIANGLES_OF_MESHLETS or survey.outside >= MIN_OUTSIDE_OF_MESHLETS
+    return are_small and survey.front <= MAX_FRONT_TO_CLUSTER and hidden <= MAX_HIDDEN_OF_MESHLETS
 
 
 def pays_to_draw_instances(

@@ -26,6 +26,9 @@ __all__ = ["ClusteredMesh", "draw_clustered"]
 #: Clusters that tell what a view shows of all: 5 microseconds.
 SURVEYED = 50
 
+#: Clusters that tell how much a picture hides: 40 microseconds. With 50 the share of a ball is off by 0.1.
+SURVEYED_BEHIND = 200
+
 NO_RECORDS: NDArray[np.uint8] = np.empty(0, np.uint8)
 
 
@@ -95,7 +98,7 @@ class ClusteredMesh:
         n_others, _, n_drawn = clusters.engine.draw(empty, self._own, seen, may_be_hidden, *place, is_first, is_last)
         return others[:n_others].copy(), n_drawn
 
-    def hidden_share(self, target: _engine.Target, n_most: int = SURVEYED) -> float:
+    def hidden_share(self, target: _engine.Target, n_most: int = SURVEYED_BEHIND) -> float:
         """Return the share of the clusters that the picture may show which lie behind what a target holds, by some."""
         (width, height), clusters = self._view.size, self.clusters
         is_farthest = target.sink == Sink.FARTHEST

@@ -335,7 +335,7 @@ def draw_clusters(memory: Memory, vertices: ArrayLike, view: View, asked: Asked)
     n = clusters.n_triangles
     can_grow = choices.can_draw_meshlets(view, sink, clusters.points.dtype)
     is_grown = can_grow and choices.pays_to_grow(clusters.n_pictures, n, len(clusters))
-    is_grown = is_grown and choices.pays_to_draw_meshlets(found, clusters.hidden)
+    is_grown = is_grown and choices.pays_to_draw_meshlets(n, found, clusters.hidden)
     pays = is_grown or choices.pays_to_draw_clusters(view, n, lambda: found)
     clusters.backoff.note(pays=pays)
     if not pays:
