@@ -1,13 +1,18 @@
-"""The pages as a site: `sphinx-build docs site`. Words and pictures stand in the Markdown alone."""
+"""The pages as a site: `sphinx-build docs site`. Words stand in the Markdown alone, their order in index.rst."""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent / "site"))
 
 project = "topleft"
 author = "the topleft authors"
-extensions = ["myst_parser"]
+extensions = ["myst_parser", "gallery", "links"]
 html_theme = "furo"
 html_title = "topleft"
+html_static_path = ["site/static"]
+html_css_files = ["site.css"]
 root_doc = "index"
-exclude_patterns = ["README.md"]  # index.rst includes it
+source_suffix = {".rst": "restructuredtext", ".md": "markdown", ".txt": "markdown"}  # .txt: site/links.py
+exclude_patterns = ["README.md", "guide/examples.md", "site"]  # other pages show them
 myst_heading_anchors = 4
-# Links that leave the folder (CONTRIBUTING.md, sources) are for readers of the repository; tests/house/test_docs.py
-# checks that all of them exist.
-suppress_warnings = ["myst.xref_missing"]

@@ -1,7 +1,9 @@
-"""The examples run as a user runs them, and the pictures of docs/guide/examples.md are theirs."""
+"""The examples run as a user runs them, and the pictures of docs/guide/examples.md are theirs; the notebooks run."""
 
 from __future__ import annotations
 
+import ast
+import json
 import re
 import subprocess
 import sys
@@ -13,6 +15,7 @@ from PIL import Image
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = sorted(path.stem for path in ROOT.joinpath("examples").glob("*.py") if path.stem != "picture")
+NOTEBOOKS = sorted(ROOT.joinpath("examples").glob("*.ipynb"))
 PAGE = ROOT.joinpath("docs", "guide", "examples.md").read_text(encoding="utf-8")
 
 
@@ -66,3 +69,34 @@ def test_segmentation_masks_have_boxes(tmp_path):
     lines = run("segmentation_mask", tmp_path / "out.png").splitlines()
     assert len(lines) == 4
     assert all(int(line.split()[-2]) > 1000 for line in lines)
+
+
+def code_cells(path):
+    cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
+    return [cell for cell in cells if cell["cell_type"] == "code"]
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_notebook_runs_and_what_it_claims_is_so(path):
+    """Cells are run as a notebook runs them; where the last line is a comparison, it is a claim."""
+    names = {}
+    n_claims = 0
+    for cell in code_cells(path):
+        body = ast.parse("".join(cell["source"])).body
+        last = body.pop() if isinstance(body[-1], ast.Expr) else None
+        exec(compile(ast.Module(body, []), path.name, "exec"), names)
+        if last is not None:
+            shown = eval(compile(ast.Expression(last.value), path.name, "eval"), names)
+            if isinstance(last.value, ast.Compare) or ast.unparse(last).startswith("np.allclose"):
+                assert shown, ast.unparse(last)
+                n_claims += 1
+    assert n_claims >= 1
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_notebook_keeps_no_output(path):
+    assert [cell for cell in code_cells(path) if cell["outputs"] or cell["execution_count"]] == []
+
+
+def test_notebooks_are_two():
+    assert len(NOTEBOOKS) == 2

@@ -18,6 +18,12 @@ SECTIONS = [
         r"^## ([^\n]*)\n(.*?)(?=^## |\Z)", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE
     )
 ]
+#: The programs of the pages for newcomers and for tasks, by page and place.
+STEPS = {
+    f"{path.stem} {i}": code
+    for path in [ROOT / "docs/start.md", *sorted(ROOT.glob("docs/tasks/*.md"))]
+    for i, code in enumerate(re.findall(r"```python\n(.*?)```", path.read_text(encoding="utf-8"), flags=re.DOTALL))
+}
 #: The program of each section that has one, by its heading.
 PROGRAMS = {
     title: code for title, text in SECTIONS for code in re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
@@ -113,3 +119,18 @@ def test_readme_has_the_two_commands():
         "pip install '.[render]' && topleft render torus-knot -o knot.png",
         "pip install '.[test]' && python -m pytest -n auto",
     ]
+
+
+@pytest.mark.parametrize("name", STEPS)
+def test_program_of_a_task_runs(name, folder):
+    names = {"__name__": "task"}
+    exec(STEPS[name], names)
+    for thing in list(names.values()):
+        if getattr(thing, "__name__", "").startswith("test_"):
+            thing()
+
+
+def test_first_mask_is_the_one_of_the_page(folder, capsys):
+    exec(STEPS["start 0"], {})
+    page = (ROOT / "docs/start.md").read_text(encoding="utf-8")
+    assert f"```text\n{capsys.readouterr().out}```" in page

@@ -98,7 +98,8 @@ def misspelt():
 def programs():
     """The programs of the pages by the name of their file."""
     found = {"habits": HABITS}
-    for page in [ROOT / "README.md", *sorted(ROOT.glob("docs/guide/*.md"))]:
+    guide = [path for name in ("start.md", "guide/*.md", "tasks/*.md") for path in sorted(ROOT.glob(f"docs/{name}"))]
+    for page in [ROOT / "README.md", *guide]:
         text = page.read_text(encoding="utf-8")
         if page.stem == "coming_from":
             found |= programs_of_tables(text)
