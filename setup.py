@@ -195,7 +195,7 @@ class BuildTopleft(build_ext):
         macros += [("TL_HAVE_VBMI", "1")] if has_vbmi else []
 
         units = [(ROOT / f"csrc/isa_{name}.c", unit_flags, []) for name, unit_flags in flags.items()]
-        units += [(ROOT / "csrc/meshlets.c", flags_vbmi, [])] if has_vbmi else []
+        units += [(ROOT / "csrc/meshlets/meshlets.c", flags_vbmi, [])] if has_vbmi else []
         units.append((ROOT / "csrc/dispatch.c", FLAGS_C, macros))
         return [*units, (self.cython(ext), FLAGS_CYTHON, [])]
 

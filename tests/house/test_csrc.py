@@ -50,7 +50,7 @@ def may_include(name: str, other: str) -> bool:
     if not other_folder:
         return not folder or other.endswith(".h")
     if not folder:
-        return name in ("kernels.c", "meshlets.c")
+        return name == "kernels.c"
     return folder == other_folder or FLOORS[other_folder] < FLOORS[folder]
 
 

@@ -35,7 +35,7 @@ def grow_meshlets(Source source, const int32_t[:, ::1] triangles, const int32_t[
     return n
 
 
-cdef class Meshlets:
+cdef class Grown:
     """A mesh of float32 vertices in object space, grown into meshlets; keeps what it points to alive."""
 
     cdef tl_meshlets mesh
@@ -58,13 +58,13 @@ cdef class Meshlets:
 cdef class MeshletPass:
     """A picture of meshlets: finds what it may show, then draws rows of that, which several threads may do at a time."""
 
-    cdef Meshlets meshlets
+    cdef Grown meshlets
     cdef SnappedMesh mesh
     cdef Source source
     cdef ClusterView seen
     cdef Target target
 
-    def __init__(self, Meshlets meshlets, SnappedMesh mesh, Source source, ClusterView seen, Target target):
+    def __init__(self, Grown meshlets, SnappedMesh mesh, Source source, ClusterView seen, Target target):
         """`mesh`: how it is seen, and what triangle 0 is called; its own triangles are not read. `source`: the matrix."""
         self.meshlets, self.mesh, self.source, self.seen, self.target = meshlets, mesh, source, seen, target
 

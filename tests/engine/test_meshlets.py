@@ -14,8 +14,7 @@ from topleft._base.memory import FreshMemory
 from topleft._base.options import Sink
 from topleft._raster import choices
 from topleft._raster.cluster_draw import ClusteredMesh
-from topleft._raster.clusters import Clusters, Survey
-from topleft._raster.meshlets import Meshlets
+from topleft._raster.clusters import Clusters, Meshlets, Survey
 from topleft._raster.rasterize import draw_fragments
 from topleft._raster.view import View
 
