@@ -33,7 +33,7 @@ def main(folder: Path) -> None:
         in_sdist = {member.name.partition("/")[2] for member in archive.getmembers() if member.isfile()}
 
     package = {name.removeprefix("src/") for name in files_below("src/topleft")}
-    modules = {name for name in package if name.endswith((".py", ".pyi", "py.typed", ".json"))}
+    modules = {name for name in package if name.endswith((".py", ".pyi", "py.typed", ".json", ".html", ".css", ".js"))}
     units = {name.removesuffix(".pyx") for name in package if name.endswith(".pyx")}
     extensions = {name for name in in_wheel if name.endswith((".so", ".pyd"))}
     metadata = {name for name in in_wheel if ".dist-info/" in name}

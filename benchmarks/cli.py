@@ -25,6 +25,8 @@ from benchmarks.report.study import Study
 from benchmarks.run.study import STUDY as RUN
 from benchmarks.scenes.cases import CASES
 from benchmarks.small.batch import STUDY as BATCH
+from benchmarks.small.cluster import STUDY as CLUSTER
+from benchmarks.small.explorer import STUDY as EXPLORER
 from benchmarks.small.field import STUDY as FIELD
 from benchmarks.small.fresh import STUDY as FRESH
 from benchmarks.small.gate import STUDY as GATE
@@ -39,7 +41,7 @@ STUDIES = {
     study.kind: study
     for study in (
         RUN, ACCURACY, BATCH, ATLAS, CHOICES, STATIC, PICTURES, LEVELS, LAYERS, FIELD, SAMPLINGS, PLANNER, MEMSET,
-        GROWTH, POLYGONS, REAL_FILES, FRESH, GATE, TILES,
+        GROWTH, POLYGONS, REAL_FILES, FRESH, GATE, TILES, EXPLORER, CLUSTER,
     )
 }  # fmt: skip
 

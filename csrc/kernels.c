@@ -44,6 +44,7 @@
 #include "polygons/labels.c"
 #include "polygons/shares.c"
 #include "tiles/spans.c"
+#include "tiles/corners.c"
 #include "tiles/merge.c"
 
 #ifndef TL_KERNELS /* read by itself, as an editor does */
@@ -124,6 +125,9 @@ const tl_kernels TL_KERNELS = {
     .label_polygons = label_polygons,
     .share_polygons = share_polygons,
     .list_spans = list_spans,
+    .sort_spans = sort_spans,
+    .count_windows = count_windows,
+    .take_corners = take_corners,
     .merge_fragments = merge_fragments,
     .name_triangles = name_triangles,
 };

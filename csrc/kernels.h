@@ -299,11 +299,26 @@ typedef struct tl_kernels {
      * full. */
     int64_t (*share_polygons)(const tl_polygons *polygons, const tl_share_job *job);
 
-    /* The windows that n triangles may touch, whose corners (n, 3, 2) are in pixels.  With out = NULL adds to
-     * starts[row + 1] how many spans a row of windows has, and returns the first triangle that cannot be snapped, or
-     * -1.  Otherwise writes the spans of each row from starts[row] on, which is then where they end. */
+    /* The windows that n triangles may touch, whose corners (n, 3, 2) are in pixels.  With out = NULL sets `boxes`,
+     * adds to starts[row + 1] how many spans a row of windows has, and returns the first triangle that cannot be
+     * snapped, or -1.  Otherwise writes the spans of each row from starts[row] on, which is then where they end, by the
+     * boxes. */
     int64_t (*list_spans)(const tl_tiling *tiling, const double *corners_px, int64_t n, int64_t first_triangle,
-                          int64_t *starts, tl_window_span *out);
+                          tl_window_box *boxes, int64_t *starts, tl_window_span *out);
+
+    /* The triangles of the windows of a row, of n spans of at most TL_SHORT_SPAN windows.  With out = NULL adds to
+     * starts[column + 1] how many a window has.  Otherwise writes them from starts[column] on, which is then where they
+     * end.  Returns how many spans are longer. */
+    int64_t (*sort_spans)(const tl_window_span *spans, int64_t n, int64_t *starts, int32_t *out);
+
+    /* Adds spans [starts[i], starts[i + 1]) of n_rows rows of windows to what the numbers of triangles change by from
+     * window to window: rows of n_columns + 1 numbers. */
+    void (*count_windows)(const tl_window_span *spans, const int64_t *starts, int64_t n_rows, int64_t n_columns,
+                          int32_t *steps);
+
+    /* The corners of n triangles, those from `first` on unless `which` names them: their rows, one after the other.
+     * Returns the first that names a vertex that does not exist, or -1. */
+    int64_t (*take_corners)(const tl_corners *mesh, const int32_t *which, int64_t first, int64_t n, void *out);
 
     /* Pixels [first, end) of two visibility buffers into the first. */
     void (*merge_fragments)(const tl_merge *merge, int64_t first, int64_t end);

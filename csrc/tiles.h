@@ -16,6 +16,25 @@ typedef struct {
     int32_t triangle, first, end;
 } tl_window_span;
 
+/* Windows that a box touches: columns [left, right) of rows [top, bottom). */
+typedef struct {
+    int32_t left, right, top, bottom;
+} tl_window_box;
+
+/* Windows of a span that its triangle is written to one by one. */
+#define TL_SHORT_SPAN 2
+
+/* Vertices and triangles where they lie: rows of numbers of any kind, of which a copy is made. */
+typedef struct {
+    const char *points;
+    int64_t point_stride; /* bytes from row to row */
+    int64_t point_bytes;  /* of a row */
+    int64_t n_points;
+    const char *triangles; /* rows of three int32, or int64 */
+    int64_t triangle_stride;
+    int is_wide;
+} tl_corners;
+
 /* Which of two triangles shows: the one of smaller or of larger depth, at equal depth the lower index; or the larger
  * index. */
 typedef enum { TL_MERGE_LESS = 0, TL_MERGE_GREATER = 1, TL_MERGE_LATER = 2 } tl_merge_rule;

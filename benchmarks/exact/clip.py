@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from topleft.methods.reference.integers import ExactPicture, ExactPoints, draw_points
+from topleft.methods.reference.integers import ExactPicture, WidePoints, draw_points
 
 Row = tuple[int, int, int]
 
@@ -69,6 +69,6 @@ def pieces_picture(
     pieces = reference.pieces(vertices, triangles, size, subpixel_bits=bits)
     xy = [(2 * v.xy_fx[0], 2 * v.xy_fx[1]) for piece in pieces for v in piece.vertices]
     corners = np.arange(len(xy), dtype=np.int32).reshape(-1, 3)
-    picture = draw_points(ExactPoints(xy, bits + 1), corners, size)
+    picture = draw_points(WidePoints(xy, bits + 1), corners, size)
     names = np.array([piece.triangle for piece in pieces] + [-1], np.int32)
     return ExactPicture(names[picture.triangle], picture.count, picture.is_edge)

@@ -1,12 +1,14 @@
 """Studies of one file each.
 
 batch.py      many pictures: views a second
+cluster.py    what a Dask cluster costs: a job, the client's memory
 fresh.py      results of their own beside `Rasterizer`
 gate.py       two commits: instructions, and time in turns
 layers.py     each layer of a view beside its picture
 field.py      a field beside matplotlib, datashader and SciPy
 samplings.py  one scene in every sampling, as a picture
+explorer.py   frames a second of the explorer in a headless browser
 growth.py     memory after thousands of calls
-tiles.py      huge rasters by windows, beside rasterio and datashader
+tiles.py      huge rasters by windows, beside rasterio, GDAL and datashader
 memset.py     a yardstick: memset of the 4K pictures
 """

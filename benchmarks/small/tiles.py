@@ -2,8 +2,8 @@
 
 `python -m benchmarks tiles` draws a planar mesh window by window and throws the windows away, writes it as uncompressed
 Zarr, and draws one window of 4096 x 4096 with `rasterize` in memory as a yardstick. `--peers` sets 2,000,000 triangles
-at 10,000 x 10,000 beside rasterio (GDAL) and datashader, each in a process of its own. Memory is the largest resident
-size of the process, mapped files included.
+at 10,000 x 10,000 beside rasterio, GDAL's own program and datashader with and without Dask, each in a process of its
+own. Memory is the largest resident size of the process, mapped files included.
 """
 
 from __future__ import annotations
@@ -27,8 +27,9 @@ from benchmarks.harness.records import Record, Save
 from benchmarks.report.study import Study
 
 WINDOW, ONE = 2048, 4096
+TURNS = 5
 WAYS = ("windows", "zarr", "one window")
-PEERS = ("topleft", "rasterio", "datashader")
+PEERS = ("topleft", "topleft, exact", "rasterio", "gdal_rasterize", "datashader", "datashader, Dask")
 
 
 def write_mesh(folder: Path, n_triangles: int, side: int) -> None:
@@ -80,8 +81,8 @@ def write_zarr(folder: Path, side: int) -> dict[str, float]:
     return {"seconds": seconds, "bytes": n_bytes}
 
 
-def draw_one(folder: Path, side: int) -> dict[str, float]:
-    """Draw the first window by `rasterize`, of the triangles in it alone; the fastest of five."""
+def one_window(folder: Path, side: int) -> Callable[[], None]:
+    """What draws a window of 4096 x 4096 in memory by `rasterize`: of the triangles in it alone, into one array."""
     import topleft as tl
 
     vertices, triangles = mesh_of(folder)
@@ -92,18 +93,43 @@ def draw_one(folder: Path, side: int) -> dict[str, float]:
     used, index = np.unique(rows, return_inverse=True)
     points, own = np.array(vertices[used]), index.reshape(-1, 3).astype(np.int32)
     ids = np.empty((edge, edge), np.int32)
-    best = np.inf
-    for _ in range(5):
-        begin = time.perf_counter()
-        tl.rasterize(points, own, edge, out=(ids, None))
-        best = min(best, time.perf_counter() - begin)
-    return {"seconds": best, "pixels": edge * edge}
+    return lambda: tl.rasterize(points, own, edge, out=(ids, None)) and None
+
+
+def draw_in_turns(folder: Path, side: int) -> dict[str, float]:
+    """Draw one window, all windows, one window, ...: seconds, CPU seconds, and the ratios of the rates of pixels."""
+    draw, n_pixels = one_window(folder, side), min(side, ONE) ** 2
+    draw()
+    turns = []
+    for _ in range(TURNS):
+        one = [timed(draw) for _ in range(8)]
+        every = timed(lambda: draw_windows(folder, side))
+        one = np.median([*one, *(timed(draw) for _ in range(8))], axis=0)
+        turns.append([*one, *every, *(one / n_pixels / (np.array(every) / side**2))])
+    seconds, cpu_s, run_s, run_cpu_s, ratio, cpu_ratio = np.median(turns, axis=0).tolist()
+    return {
+        "seconds": seconds, "pixels": n_pixels, "cpu_s": cpu_s, "run_s": run_s, "run_cpu_s": run_cpu_s,
+        "ratio": ratio, "cpu_ratio": cpu_ratio,
+    }  # fmt: skip
+
+
+def timed(work: Callable[[], object]) -> tuple[float, float]:
+    """Seconds, and CPU seconds of all threads."""
+    begin, begin_cpu = time.perf_counter(), time.process_time()
+    work()
+    return time.perf_counter() - begin, time.process_time() - begin_cpu
 
 
 def topleft_labels(vertices: np.ndarray, triangles: np.ndarray, side: int) -> np.ndarray:
     import topleft as tl
 
     return tl.tiles((vertices, triangles), (side, side), window=WINDOW, depth_test=None)[:]
+
+
+def exact_labels(vertices: np.ndarray, triangles: np.ndarray, side: int) -> np.ndarray:
+    import topleft as tl
+
+    return tl.tiles((vertices, triangles), (side, side), window=WINDOW, depth_test=None, subpixel_bits="exact")[:]
 
 
 def rasterio_labels(vertices: np.ndarray, triangles: np.ndarray, side: int) -> np.ndarray:
@@ -114,7 +140,35 @@ def rasterio_labels(vertices: np.ndarray, triangles: np.ndarray, side: int) -> n
     return rasterize(shapes, (side, side), fill=-1, dtype="int32")
 
 
-def datashader_labels(vertices: np.ndarray, triangles: np.ndarray, side: int) -> np.ndarray:
+def write_flatgeobuf(path: Path, vertices: np.ndarray, triangles: np.ndarray, side: int) -> None:
+    """Write triangles as polygons with their labels, y up as GDAL has it."""
+    from pyogrio.raw import write
+
+    ring = [("head", "u1"), ("kind", "<u4"), ("n_rings", "<u4"), ("n", "<u4"), ("points", "<f8", (4, 2))]
+    rows = np.zeros(len(triangles), ring)
+    rows["head"], rows["kind"], rows["n_rings"], rows["n"] = 1, 3, 1, 4
+    rows["points"] = vertices[triangles[:, [0, 1, 2, 0]]] * (1, -1) + (0, side)
+    content, step = rows.tobytes(), rows.dtype.itemsize
+    polygons = np.array([content[i : i + step] for i in range(0, len(content), step)], object)
+    labels = np.arange(len(triangles), dtype=np.int32)
+    write(str(path), polygons, [labels], ["label"], geometry_type="Polygon", driver="FlatGeobuf", SPATIAL_INDEX="NO")
+
+
+def gdal_labels(vertices: np.ndarray, triangles: np.ndarray, side: int) -> np.ndarray:
+    """Run gdal_rasterize, from a file of polygons to one of pixels: making the first is no part of its time."""
+    import tifffile
+
+    with tempfile.TemporaryDirectory() as name:
+        polygons, pixels = Path(name, "polygons.fgb"), Path(name, "labels.tif")
+        write_flatgeobuf(polygons, vertices, triangles, side)
+        how = ["-q", "-a", "label", "-init", "-1", "-ot", "Int32", "-te", "0", "0", str(side), str(side)]
+        begin = time.perf_counter()
+        subprocess.run(["gdal_rasterize", *how, "-ts", str(side), str(side), str(polygons), str(pixels)], check=True)
+        OWN_TIME["gdal_rasterize"] = time.perf_counter() - begin
+        return tifffile.imread(pixels)
+
+
+def datashader_labels(vertices: np.ndarray, triangles: np.ndarray, side: int, n_parts: int = 0) -> np.ndarray:
     import datashader
     import pandas as pd
 
@@ -122,42 +176,55 @@ def datashader_labels(vertices: np.ndarray, triangles: np.ndarray, side: int) ->
     simplices = pd.DataFrame(triangles, columns=["a", "b", "c"])
     simplices["label"] = np.arange(len(triangles), dtype=np.float64)
     canvas = datashader.Canvas(side, side, (0, side), (0, side))
-    found = canvas.trimesh(points, simplices, interpolate="nearest", agg=datashader.max("label"))
+    mesh = None
+    if n_parts:  # rows of corners in partitions of whole triangles
+        import dask.dataframe as dd
+
+        rows = points.to_numpy()[triangles.ravel()]
+        mesh = pd.DataFrame({"x": rows[:, 0], "y": rows[:, 1], "label": np.repeat(simplices["label"].to_numpy(), 3)})
+        mesh = dd.from_pandas(mesh, chunksize=3 * -(-len(triangles) // n_parts), sort=False)
+    found = canvas.trimesh(points, simplices, mesh=mesh, interpolate="nearest", agg=datashader.max("label"))
     return np.nan_to_num(found.values, nan=-1).astype(np.int32)
 
 
+def datashader_dask_labels(vertices: np.ndarray, triangles: np.ndarray, side: int) -> np.ndarray:
+    return datashader_labels(vertices, triangles, side, n_parts=4)
+
+
 DRAWN: dict[str, Callable[[np.ndarray, np.ndarray, int], np.ndarray]] = {
-    "topleft": topleft_labels, "rasterio": rasterio_labels, "datashader": datashader_labels,
+    "topleft": topleft_labels, "topleft, exact": exact_labels, "rasterio": rasterio_labels,
+    "gdal_rasterize": gdal_labels, "datashader": datashader_labels, "datashader, Dask": datashader_dask_labels,
 }  # fmt: skip
+
+#: What a program took by itself, where making its input is no part of its time.
+OWN_TIME: dict[str, float] = {}
 
 
 def draw_peer(name: str, folder: Path, side: int) -> dict[str, float]:
     """Draw with one program, and count the pixels that differ from the exact rule."""
     vertices, triangles = map(np.array, mesh_of(folder))
-    DRAWN[name](vertices, triangles[:1], 64)  # imports, and what compiles at its first call
+    DRAWN[name](vertices, triangles[:4], 64)  # imports, and what compiles at its first call
     begin = time.perf_counter()
     labels = DRAWN[name](vertices, triangles, side)
-    seconds = time.perf_counter() - begin
-    peak = peak_bytes()
-    wrong = 0
-    if name != "topleft":
-        for window in exact_windows(folder, side):
-            wrong += int((labels[window.slices] != window.pixels).sum())
+    seconds = OWN_TIME.get(name, time.perf_counter() - begin)
+    peak = peak_bytes(children=name in OWN_TIME)
+    wrong = sum(int((labels[window.slices] != window.pixels).sum()) for window in exact_windows(folder, side))
     return {"seconds": seconds, "wrong": wrong, "bytes_at_peak": peak}
 
 
 def exact_windows(folder: Path, side: int) -> Any:
+    """The windows of the mesh as it is: with vertices that are not snapped."""
     import topleft as tl
 
-    return tl.tiles(mesh_of(folder), (side, side), window=WINDOW, depth_test=None, subpixel_bits=16)
+    return tl.tiles(mesh_of(folder), (side, side), window=WINDOW, depth_test=None, subpixel_bits="exact")
 
 
-def peak_bytes() -> int:
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+def peak_bytes(*, children: bool = False) -> int:
+    return resource.getrusage(resource.RUSAGE_CHILDREN if children else resource.RUSAGE_SELF).ru_maxrss * 1024
 
 
 MEASURED: dict[str, Callable[[Path, int], dict[str, float]]] = {
-    "windows": draw_windows, "zarr": write_zarr, "one window": draw_one,
+    "windows": draw_windows, "zarr": write_zarr, "one window": draw_in_turns,
 }  # fmt: skip
 
 
@@ -220,9 +287,14 @@ def lines(record: Record) -> list[str]:
         peak = row.get("bytes_at_peak", 0) / 1e9
         more = [f"index {row['index_s']:.1f} s, {row['spans']:,} spans"] if "index_s" in row else []
         more += [f"{row['bytes'] / 1e9:.1f} GB written"] if "bytes" in row else []
+        if "ratio" in row:
+            more.append(
+                f"all windows in turns with it: {row['run_s']:.2f} s, {row['ratio']:.2f} of its pixels a second; "
+                f"in CPU time {row['run_cpu_s']:.2f} s, {row['cpu_ratio']:.2f}"
+            )
         if "index_ns" in row:
             more.append(f"{row['index_ns']:.0f} ns a triangle, {row['draw_ns']:.1f} ns a pixel")
-        more += [f"{row['wrong']:,} pixels differ"] if row.get("wrong") else []
+        more += [f"{row['wrong']:,} pixels differ"] if "wrong" in row else []
         made.append(f"| {way} | {row['seconds']:.2f} | {rate:.0f} | {peak:.2f} | {', '.join(more)} |")
     return made
 

@@ -279,7 +279,8 @@ static tl_snapped drawn_mesh(const tl_snapped *snapped)
 {
     const tl_exact_points *points = snapped->mesh.exact;
     tl_snapped drawn = *snapped;
-    drawn.triangles = points->triangles, drawn.n_triangles = points->n_triangles, drawn.names = points->names;
+    drawn.triangles = points->triangles, drawn.n_triangles = points->n_triangles;
+    drawn.names = points->names ? points->names : snapped->names; /* pieces are of clip space, where none are given */
     return drawn;
 }
 

@@ -18,20 +18,27 @@
 #define TL_SPAN_MARGIN_PX 2.0
 #define TL_SPAN_SLACK 0x1p-44
 
-/* Windows [*first, *end) of `n` with `side` pixels each that the pixels from low to high touch. */
-static inline void windows_between(double low, double high, int64_t length_px, int64_t side, int64_t *first,
-                                   int64_t *end)
+/* Windows [*first, *end) of `side` pixels each that the pixels from low to high touch.  The quotient is a product with
+ * the reciprocal: it is off by less than 2^-20 px, which the margin has room for, and a division takes longer. */
+static inline void windows_between(double low, double high, int64_t length_px, double per_px, int32_t *first,
+                                   int32_t *end)
 {
-    const double from = low - TL_SPAN_MARGIN_PX, to = high + TL_SPAN_MARGIN_PX;
+    const double last = (double)(length_px - 1);
+    double from = low - TL_SPAN_MARGIN_PX, to = high + TL_SPAN_MARGIN_PX;
     *first = *end = 0;
-    if (to < 0.0 || from >= (double)length_px)
+    if (to < 0.0 || from > last || length_px == 0)
         return;
-    *first = from <= 0.0 ? 0 : (int64_t)from / side;
-    *end = (to >= (double)(length_px - 1) ? length_px - 1 : (int64_t)to) / side + 1;
+    from = from < 0.0 ? 0.0 : from;
+    to = to > last ? last : to;
+    *first = (int32_t)(from * per_px);
+    *end = (int32_t)(to * per_px) + 1;
 }
 
-static inline double min3_f64(double a, double b, double c) { return fmin(a, fmin(b, c)); }
-static inline double max3_f64(double a, double b, double c) { return fmax(a, fmax(b, c)); }
+/* Of numbers: fmin and fmax, which know what to do with those that are none, are calls. */
+static inline double min_f64(double a, double b) { return a < b ? a : b; }
+static inline double max_f64(double a, double b) { return a > b ? a : b; }
+static inline double min3_f64(double a, double b, double c) { return min_f64(a, min_f64(b, c)); }
+static inline double max3_f64(double a, double b, double c) { return max_f64(a, max_f64(b, c)); }
 
 /* The x of a triangle between two rows of pixels: low and high, which are crossed where there is nothing. */
 static void reach_between(const double *p, double top, double bottom, double *low, double *high)
@@ -40,8 +47,8 @@ static void reach_between(const double *p, double top, double bottom, double *lo
     for (int k = 0; k < 3; k++) {
         const double *a = p + 2 * k, *b = p + 2 * ((k + 1) % 3);
         if (a[1] >= top && a[1] <= bottom) {
-            *low = fmin(*low, a[0]);
-            *high = fmax(*high, a[0]);
+            *low = min_f64(*low, a[0]);
+            *high = max_f64(*high, a[0]);
         }
         for (int side = 0; side < 2; side++) {
             const double y = side ? bottom : top;
@@ -49,14 +56,14 @@ static void reach_between(const double *p, double top, double bottom, double *lo
                 continue;
             const double x = a[0] + (b[0] - a[0]) * ((y - a[1]) / (b[1] - a[1]));
             const double slack = TL_SPAN_SLACK * (fabs(a[0]) + fabs(b[0]));
-            *low = fmin(*low, x - slack);
-            *high = fmax(*high, x + slack);
+            *low = min_f64(*low, x - slack);
+            *high = max_f64(*high, x + slack);
         }
     }
 }
 
 /* The windows of row `row` that a triangle may touch. */
-static void span_of_row(const tl_tiling *t, const double *p, int64_t row, int64_t *first, int64_t *end)
+static void span_of_row(const tl_tiling *t, const double *p, int64_t row, int32_t *first, int32_t *end)
 {
     double low, high;
     const double top = (double)(row * t->window_height_px) - TL_SPAN_MARGIN_PX;
@@ -64,46 +71,90 @@ static void span_of_row(const tl_tiling *t, const double *p, int64_t row, int64_
     reach_between(p, top, bottom, &low, &high);
     *first = *end = 0;
     if (low <= high)
-        windows_between(low, high, t->width_px, t->window_width_px, first, end);
+        windows_between(low, high, t->width_px, 1.0 / (double)t->window_width_px, first, end);
 }
 
 /* Whether three corners can be drawn: finite and within 2^62 sub-pixels. */
-static inline int can_snap(const tl_tiling *t, const double *p)
+static inline int can_snap(const double *p, double limit)
 {
-    const double limit = ldexp(1.0, 62 - t->subpixel_bits);
+    int is_good = 1;
     for (int k = 0; k < 6; k++)
-        if (!(fabs(p[k]) < limit))
-            return 0;
-    return 1;
+        is_good &= fabs(p[k]) < limit;
+    return is_good;
+}
+
+/* The windows that the box of a triangle touches. */
+static inline tl_window_box box_of(const tl_tiling *t, const double *p, double per_column, double per_row)
+{
+    tl_window_box box;
+    windows_between(min3_f64(p[0], p[2], p[4]), max3_f64(p[0], p[2], p[4]), t->width_px, per_column, &box.left,
+                    &box.right);
+    windows_between(min3_f64(p[1], p[3], p[5]), max3_f64(p[1], p[3], p[5]), t->height_px, per_row, &box.top,
+                    &box.bottom);
+    return box;
 }
 
 /* Counts the spans of each row into starts[row + 1], or with `out` writes them from starts[row] on, which moves. */
 static int64_t list_spans(const tl_tiling *t, const double *corners_px, int64_t n, int64_t first_triangle,
-                          int64_t *starts, tl_window_span *out)
+                          tl_window_box *boxes, int64_t *starts, tl_window_span *out)
 {
+    const double limit = ldexp(1.0, 62 - t->subpixel_bits);
+    const double per_column = 1.0 / (double)t->window_width_px, per_row = 1.0 / (double)t->window_height_px;
     for (int64_t i = 0; i < n; i++) {
         const double *p = corners_px + 6 * i;
-        if (!out && !can_snap(t, p))
-            return i;
-        int64_t first, end, top, bottom;
-        windows_between(min3_f64(p[0], p[2], p[4]), max3_f64(p[0], p[2], p[4]), t->width_px, t->window_width_px, &first,
-                        &end);
-        windows_between(min3_f64(p[1], p[3], p[5]), max3_f64(p[1], p[3], p[5]), t->height_px, t->window_height_px, &top,
-                        &bottom);
-        const int is_box = end - first == 1 || bottom - top == 1;
-        for (int64_t row = top; row < bottom && first < end; row++) {
-            int64_t from = first, to = end;
-            if (!is_box)
+        if (!out) {
+            if (!can_snap(p, limit))
+                return i;
+            boxes[i] = box_of(t, p, per_column, per_row);
+        }
+        const tl_window_box box = boxes[i];
+        const int is_whole = box.right - box.left == 1 || box.bottom - box.top == 1;
+        for (int32_t row = box.top; row < box.bottom && box.left < box.right; row++) {
+            int32_t from = box.left, to = box.right;
+            if (!is_whole)
                 span_of_row(t, p, row, &from, &to);
             if (from >= to)
                 continue;
             if (out)
-                out[starts[row]++] = (tl_window_span){(int32_t)(first_triangle + i), (int32_t)from, (int32_t)to};
+                out[starts[row]++] = (tl_window_span){(int32_t)(first_triangle + i), from, to};
             else
                 starts[row + 1]++;
         }
     }
     return -1;
+}
+
+/* Counts the spans of a row by their windows, or with `out` writes their triangles in that order.  Those of more than
+ * TL_SHORT_SPAN windows are left out: what is written is at most so many times as long as the spans. */
+static int64_t sort_spans(const tl_window_span *spans, int64_t n, int64_t *starts, int32_t *out)
+{
+    int64_t n_long = 0;
+    for (int64_t i = 0; i < n; i++) {
+        const tl_window_span s = spans[i];
+        if (s.end - s.first > TL_SHORT_SPAN) {
+            n_long++;
+            continue;
+        }
+        for (int32_t column = s.first; column < s.end; column++) {
+            if (out)
+                out[starts[column]++] = s.triangle;
+            else
+                starts[column + 1]++;
+        }
+    }
+    return n_long;
+}
+
+/* Counts the triangles of windows, as what changes from one to the next. */
+static void count_windows(const tl_window_span *spans, const int64_t *starts, int64_t n_rows, int64_t n_columns,
+                          int32_t *steps)
+{
+    for (int64_t row = 0; row < n_rows; row++, steps += n_columns + 1) {
+        for (int64_t i = starts[row]; i < starts[row + 1]; i++) {
+            steps[spans[i].first]++;
+            steps[spans[i].end]--;
+        }
+    }
 }
 
 #endif

@@ -3,6 +3,7 @@
 import functools
 import os
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -147,6 +148,36 @@ def test_batch_that_is_left_early_goes_on_with_resume(client, tmp_path):
     assert summary.n_skipped + summary.n_made == 12
 
 
+def test_client_that_is_killed_goes_on_with_resume(cluster, client, tmp_path):
+    """A process that draws a batch is killed; another one draws what is not there."""
+    script = (
+        "import sys; from pathlib import Path; from distributed import Client; import topleft as tl\n"
+        "from batch_jobs import BOX, SIZE; from cluster_jobs import wait_a_little\n"
+        "jobs = [tl.Job(BOX, wait_a_little, SIZE, destination=Path(sys.argv[2], f'{i}.png')) for i in range(30)]\n"
+        "if __name__ == '__main__':\n"
+        "    with Client(sys.argv[1], set_as_default=False) as client:\n"
+        "        print(tl.render_batch(jobs, executor=client, chunk=1, resume=True).finish())\n"
+    )
+    out = tmp_path / "out"
+    (tmp_path / "draw.py").write_text(script)
+    command = [sys.executable, str(tmp_path / "draw.py"), cluster.scheduler_address, str(out)]
+    env = {**os.environ, "PYTHONPATH": os.pathsep.join([SRC, SUPPORT])}
+    with subprocess.Popen(command, env=env, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as killed:
+        while len(list(out.glob("[0-9]*.png"))) < 3:
+            assert killed.poll() is None
+            time.sleep(0.01)
+        killed.kill()
+    there = {path.name: path.stat().st_mtime_ns for path in out.glob("[0-9]*.png")}
+    assert 3 <= len(there) < 30
+    jobs = [tl.Job(BOX, wait_a_little, SIZE, destination=out / f"{i}.png") for i in range(30)]
+    summary = tl.render_batch(jobs, executor=client, resume=True).finish()
+    assert summary.n_skipped >= len(there)  # what a worker had begun it has finished
+    assert summary.n_skipped + summary.n_made == 30
+    assert all((out / name).stat().st_mtime_ns == time_ns for name, time_ns in there.items())
+    wished = tl.render(BOX, tl.Camera.framing(BOX, aspect=4 / 3), SIZE)
+    assert all(np.array_equal(np.asarray(Image.open(out / f"{i}.png")), wished) for i in range(30))
+
+
 def test_no_more_is_on_the_way_than_the_window(client):
     begun = []
 
@@ -203,6 +234,63 @@ def test_raster_in_files_sends_names_alone(client, tmp_path):
     raster = tl.tiles((tmp_path / "v.npy", tmp_path / "t.npy"), 300, window=100)
     assert raster.is_mapped
     assert np.array_equal(client.compute(raster.to_dask(), sync=True), raster[:])
+
+
+def raster_of_soup(side=1000, kind="labels", **options):
+    rng = np.random.default_rng(4)
+    mesh = rng.uniform(0, side, (300, 3)), rng.integers(0, 300, (300, 3))
+    return tl.tiles(mesh, side, window=128, kind=kind, **options)
+
+
+def files_of(folder):
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def test_workers_write_a_raster_and_one_of_them_is_killed(client, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    raster = raster_of_soup()
+    raster.to_zarr(tmp_path / "alone.zarr", levels=3, compression="none")
+    killed = []
+
+    def kill_a_worker(step):
+        if step.n_done == 20 and not killed:
+            killed.append(next(iter(pids(client).values())))
+            os.kill(killed[0], signal.SIGKILL)
+
+    written = raster.to_zarr("many.zarr", levels=3, compression="none", executor=client, progress=kill_a_worker)
+    assert (written.n_drawn, len(killed)) == (64, 1)
+    assert files_of(tmp_path / "many.zarr") == files_of(tmp_path / "alone.zarr")
+    (tmp_path / "many.zarr/0/c/3/3").unlink()
+    again = raster.to_zarr("many.zarr", levels=3, compression="none", executor=client, resume=True)
+    assert (again.n_drawn, again.n_kept) == (1, 63)
+
+
+@pytest.mark.parametrize("name", ["a.tif", "a.dzi"])
+def test_workers_write_files_of_one_raster(client, tmp_path, name):
+    kinds = {"a.tif": ("height_map", "to_geotiff", {"tile": 64}), "a.dzi": ("labels", "to_deepzoom", {"tile": 64})}
+    kind, write, how = kinds[name]
+    raster = raster_of_soup(300, kind)
+    for folder, executor in (("alone", None), ("many", client)):
+        (tmp_path / folder).mkdir()
+        getattr(raster, write)(tmp_path / folder / name, executor=executor, **how)
+    assert files_of(tmp_path / "many") == files_of(tmp_path / "alone")
+
+
+def test_wrong_executors_of_a_raster_are_told_before_a_byte_is_written(tmp_path):
+    with pytest.raises(TypeError, match=r"executor must be a dask\.distributed\.Client or None, got 2"):
+        raster_of_soup().to_zarr(tmp_path / "a.zarr", executor=2)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_command_writes_a_raster_on_a_cluster(tmp_path, cluster, capsys):
+    np.save(tmp_path / "v.npy", [[0.0, 0, 0], [300, 0, 0], [0, 300, 3]])
+    np.save(tmp_path / "t.npy", [[0, 1, 2]])
+    how = ["raster", f"{tmp_path / 'v.npy'},{tmp_path / 't.npy'}", "--pixel-size", "1", "--window", "64"]
+    assert main([*how, "-o", str(tmp_path / "alone.zarr")]) == 0
+    assert main([*how, "-o", str(tmp_path / "many.zarr"), "--dask", cluster.scheduler_address]) == 0
+    assert files_of(tmp_path / "many.zarr") == files_of(tmp_path / "alone.zarr")
+    assert main([*how, "-o", str(tmp_path / "b.zarr"), "--dask", "here"]) == 2
+    assert "--dask here: must be local, or the address" in capsys.readouterr().err
 
 
 def test_shares_of_a_mesh_are_merged_in_a_tree(client):
@@ -262,6 +350,77 @@ def test_worker_without_the_package_is_told_in_one_line(tmp_path):
     lines = [line for line in done.stdout.splitlines() if line.startswith("said:")]
     assert len(lines) == 1, done.stderr
     assert "has no topleft: install it there" in lines[0]
+
+
+class Processes:
+    """A scheduler and a worker in processes that a test kills and starts again."""
+
+    def __init__(self):
+        with socket.socket() as probe:
+            probe.bind(("127.0.0.1", 0))
+            self.port = probe.getsockname()[1]
+        self.address = f"tcp://127.0.0.1:{self.port}"
+        self.scheduler, self.worker = self.started("scheduler"), self.started("worker")
+
+    def started(self, what):
+        env = {**os.environ, "PYTHONPATH": os.pathsep.join([SRC, SUPPORT])}
+        command = [sys.executable, f"{SUPPORT}/dask_processes.py", what, str(self.port)]
+        made = subprocess.Popen(command, env=env, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+        if what == "scheduler":
+            assert made.stdout.readline() == b"ready\n"
+        return made
+
+    def restart_scheduler(self):
+        """Kill it, and start another one where it was."""
+        self.scheduler.kill()
+        self.scheduler.wait()
+        self.scheduler.stdout.close()
+        self.scheduler = self.started("scheduler")
+
+    def close(self):
+        for one in (self.worker, self.scheduler):
+            one.kill()
+            one.wait()
+            one.stdout.close()
+
+
+@pytest.fixture(scope="module")
+def processes():
+    made = Processes()
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def own_client(processes):
+    with distributed.Client(processes.address, timeout=30, set_as_default=False) as made:
+        made.wait_for_workers(1, timeout=30)
+        yield made
+
+
+def test_batch_goes_on_with_another_scheduler(processes, own_client, tmp_path):
+    jobs = [tl.Job(BOX, wait_a_little, SIZE, destination=tmp_path / f"{i}.png") for i in range(24)]
+    batch = tl.render_batch(jobs, executor=own_client, chunk=1)
+    assert [next(batch).index for _ in range(3)] == [0, 1, 2]
+    processes.restart_scheduler()
+    assert [result.index for result in batch] == list(range(3, 24))
+    wished = tl.render(BOX, tl.Camera.framing(BOX, aspect=4 / 3), SIZE)
+    assert all(np.array_equal(np.asarray(Image.open(tmp_path / f"{i}.png")), wished) for i in range(24))
+
+
+def test_raster_goes_on_with_another_scheduler(processes, own_client, tmp_path):
+    raster = raster_of_soup(1500, "coverage", sampling="area")
+    raster.to_zarr(tmp_path / "alone.zarr", compression="none")
+    restarted = []
+
+    def restart(step):
+        if step.n_done >= 5 and not restarted:
+            restarted.append(step.n_done)
+            processes.restart_scheduler()
+
+    raster.to_zarr(tmp_path / "many.zarr", compression="none", executor=own_client, progress=restart)
+    assert restarted == [5]
+    assert files_of(tmp_path / "many.zarr") == files_of(tmp_path / "alone.zarr")
 
 
 @pytest.mark.parametrize("limit", [0, -1.0, float("nan")])

@@ -94,6 +94,22 @@ def test_masks_go_to_deep_zoom(tmp_path, pair):
     assert np.array_equal(np.asarray(Image.open(tmp_path / "mask_files/6/0_0.png")), mask * np.uint8(255))
 
 
+def test_heights_go_to_deep_zoom(tmp_path, pair):
+    out = tmp_path / "heights.dzi"
+    assert main(["raster", pair, "-o", str(out), "--size", "64x48", "--quiet"]) == 0
+    grid = tl.Grid.around((POINTS, TRIANGLES), size=(64, 48))
+    found = np.asarray(Image.open(tmp_path / "heights_files/6/0_0.png"))
+    assert np.array_equal(found[..., 1] > 0, np.isfinite(tl.height_map((POINTS, TRIANGLES), grid)))
+
+
+def test_raster_that_shows_nothing_is_told(tmp_path, pair, capsys):
+    out = tmp_path / "a.tif"
+    assert main(["raster", pair, "-o", str(out), "--pixel-size", "1", "--extent", "0", "9", "0", "9"]) == 0
+    said = capsys.readouterr()
+    assert "0 windows drawn, 0 kept, 1 blank" in said.out
+    assert said.err == f"topleft: no triangle of {pair} lies within {out}: all of it is blank\n"
+
+
 def test_interrupted_command_resumes(tmp_path, pair, capsys):
     out, arguments = tmp_path / "a.zarr", ["--size", "64x48", "--window", "16", "--labels"]
     assert main(["raster", pair, "-o", str(out), *arguments]) == 0
@@ -114,6 +130,9 @@ def test_interrupted_command_resumes(tmp_path, pair, capsys):
         (["-o", "a.zarr", "--size", "9x9", "--crs", "EPSG:25832"], "--crs is for .tif"),
         (["-o", "a.tif", "--size", "9x9", "--levels", "2"], "--levels is for .zarr"),
         (["-o", "a.zarr", "--size", "9x9", "--labels", "--kind", "depth"], "give one of them"),
+        (["-o", "a.zarr", "--size", "9x9", "--nodata", "5"], "--nodata is for --values and .tif"),
+        (["-o", "a.zarr", "--size", "9x9", "--labels", "--surface", "upper"], "--surface is for heights"),
+        (["-o", "a.dzi", "--size", "9x9", "--uncompressed"], "--uncompressed is for .tif and .zarr"),
         (["-o", "a.zarr", "--size", "9x9", "--values", "speed"], "--values speed: a .npy file, or what"),
         (["-o", "a.zarr", "--pixel-size", "0"], "pixel_size must be positive"),
         (["-o", "a.zarr", "--size", "9x9", "--window", "0"], "--window"),

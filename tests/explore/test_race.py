@@ -5,11 +5,10 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from topleft._explore import race
-from topleft._explore.race import HANDLERS, OVERDRAWN, entries, value_at
+from topleft._explore.race import COLORS, HANDLERS, entries, value_at
 from topleft._explore.session import Content, Session
 from topleft.scene_families import FAMILIES, Axis
 
@@ -32,52 +31,55 @@ def test_page_is_told_every_family_and_method():
 
 def test_production_methods_are_right_where_bresenham_is_not():
     header, arrays = ask(family="edge", positions=[3.0])
-    rows = {row["name"]: row for row in header["methods"]}
-    assert rows["auto"]["bad"] == rows["edge"]["bad"] == rows["scanline"]["bad"] == 0
-    assert rows["bresenham_scanline"]["bad"] > 0
+    rows = {row["name"]: row for row in header["rows"]}
+    assert {rows[name]["text"] for name in ("auto", "edge", "scanline")} == {"right"}
+    assert rows["bresenham_scanline"]["text"].endswith(" wrong")
     assert header["values"] == ("2^-6",)
-    assert arrays["faults"].shape == (len(rows), 64, 64)
+    assert arrays["pictures"].shape == (len(rows), 64, 64, 4)
 
 
 def test_pictures_hold_what_is_counted():
     header, arrays = ask(family="sliver", positions=[2.0], seed=1)
-    width, height = header["size"]
-    assert arrays["triangle"].shape == (height, width)
-    for row, kinds in zip(header["methods"], arrays["faults"], strict=True):
-        assert np.count_nonzero(kinds) == row["bad"]
-        assert np.count_nonzero(kinds == race.GAP) == row["gaps"]
-        assert np.count_nonzero(kinds == OVERDRAWN) == row["overdrawn"]
+    for row, picture in zip(header["rows"], arrays["pictures"], strict=True):
+        is_marked = {name: (picture == (*color, 255)).all(axis=-1) for name, color in COLORS.items()}
+        assert sum(marked.sum() for marked in is_marked.values()) == row["bad"]
+        n_gaps, n_twice = is_marked["a gap"].sum(), is_marked["drawn more than once"].sum()
+        assert row["title"] == f"{row['bad']} of 4096 pixels: {n_gaps} gaps, {n_twice} drawn more than once"
 
 
 @pytest.mark.skipif(not RECORD.exists(), reason="the records of the benchmarks are not here")
 @pytest.mark.parametrize(("family", "i"), [("edge", 4), ("large", 3), ("fan", 1)])
-def test_columns_add_up_to_the_record_of_the_atlas(family, i):
+def test_faults_add_up_to_the_record_of_the_atlas(family, i):
     record = json.loads(RECORD.read_text(encoding="utf-8"))
     rows = {row["entry"]: row for row in record["maps"] if row["family"] == family}
     facts = next(row for row in record["families"] if row["name"] == family)
-    sums = dict.fromkeys(rows, 0)
-    n_edge_px = 0
+    sums, n_edge_px = dict.fromkeys(rows, 0), 0
     for seed in range(facts["n_scenes"]):
-        header, _ = ask(family=family, positions=[float(i)], seed=seed)
-        n_edge_px += header["n_edge_px"]
-        for row in header["methods"]:
-            sums[row["name"]] += row["gaps"] + row["overdrawn"]
+        exact, _ = race.scene_at(family, (float(i),), seed)
+        n_edge_px += exact.picture().is_edge.sum()
+        for entry in entries():
+            faults = race.faults_of(entry, exact)
+            sums[entry.name] += faults.gaps.sum() + faults.overdrawn.sum()
     assert n_edge_px == facts["n_px"][i]
     assert sums == {name: row["gaps"][i] + row["overdrawn"][i] for name, row in rows.items()}
 
 
 def test_column_is_the_same_as_the_pictures():
-    header, _ = ask("race.column", family="hub", positions=[1.0])
-    full, _ = ask(family="hub", positions=[1.0])
-    assert [bad for bad, _ in header["rows"]] == [row["bad"] for row in full["methods"]]
-    assert [has_gaps for _, has_gaps in header["rows"]] == [row["gaps"] > 0 for row in full["methods"]]
+    cells = ask("race.column", family="hub", positions=[1.0])[0]["cells"]
+    rows = ask(family="hub", positions=[1.0])[0]["rows"]
+    for cell, row in zip(cells, rows, strict=True):
+        assert cell["title"].startswith(f"{row['bad']} wrong pixels")
+        assert (cell["color"] != "") == (row["bad"] > 0)
+        assert ("gaps" in cell["kind"]) == (": 0 gaps" not in row["title"])
 
 
 def test_method_that_refuses_says_why():
     header, arrays = ask(family="far", positions=[12.0])
-    rows = {row["name"]: row for row in header["methods"]}
-    assert rows["zigzag"]["refused"].startswith("origin must lie within")
-    assert not arrays["faults"][-1].any()
+    rows = {row["name"]: row for row in header["rows"]}
+    assert rows["zigzag"]["text"] == "refuses"
+    assert rows["zigzag"]["title"].startswith("origin must lie within")
+    assert not arrays["pictures"][-1].any()
+    assert ask("race.column", family="far", positions=[12.0])[0]["cells"][-1]["kind"] == "refused"
 
 
 def test_slider_goes_between_values_by_their_ratio():

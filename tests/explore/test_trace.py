@@ -106,13 +106,28 @@ def test_bresenham_tells_the_error_of_its_lines():
     ]  # fmt: skip
 
 
-def test_big_numbers_travel_as_text():
+def test_page_is_told_each_step_in_words():
     large = [[4096.0, 0.0], [0.0, 4096.0], [0.0, 0.0]]
     request = {"vertices": large, "triangles": [[0, 1, 2]], "size": [4, 4], "method": "edge_increment"}
-    header, arrays = traces.HANDLERS["steps.trace"](Session(Content()), request | {"subpixel_bits": 16})
-    values = json.loads(json.dumps(header))["steps"][1][6]
-    assert values["E2"] == str(2**56 - 2**44 - 1)
-    assert arrays["counts"].tolist() == [[1] * 4] * 4
+    reply = traces.HANDLERS["steps.trace"](Session(Content()), request | {"subpixel_bits": 16})
+    header = json.loads(json.dumps(reply.header))
+    x, y, last, is_drawn, triangle, kind, sentence, values = header["steps"][2]
+    assert (x, y, last, is_drawn, triangle, kind) == (1, 0, 1, True, 0, "test")
+    assert sentence == "Pixel 1, 0 of triangle 0: drawn."
+    e2 = next(row for row in header["steps"][1][7] if row[0] == "E2")
+    assert e2 == ["E2", str(2**56 - 2**44 - 1), ""]  # as it is: JavaScript has no such number
+    assert [row[2] for row in values] == ["+1.75922e+13", "+0", "-1.75922e+13"]
+    assert header["outlines"] == ["4096.0,0.0 0.0,4096.0 0.0,0.0"]
+    assert reply.arrays["counts"].tolist() == [[1] * 4] * 4
+
+
+def test_every_kind_of_step_has_its_sentence():
+    kinds = {}
+    for method in ("edge", "scanline", "bresenham_scanline"):
+        steps = trace(QUAD, HALVES, SIZE, method=method).steps
+        kinds |= {step.kind: words for step, (words, _) in zip(steps, traces.told(steps), strict=True)}
+    assert {*kinds} == {"triangle", "row", "line", "test", "span"}
+    assert "None" not in " ".join(kinds.values())
 
 
 @pytest.mark.parametrize(
@@ -120,9 +135,10 @@ def test_big_numbers_travel_as_text():
     [
         ({"method": "auto"}, "method must be one of 'edge', 'scanline', .* to be traced, got 'auto'"),
         ({"method": "best"}, "method must be one of 'auto', 'edge'"),
-        ({"method": "edge", "size": (2000, 2000)}, "a trace must have 100000 steps at most"),
+        ({"method": "edge", "size": (2000, 20)}, "1024 pixels a side and 1000 triangles at most, got .2000, 20. and 1"),
+        ({"method": "edge", "size": (1000, 1000)}, "a trace must have 40000 steps at most"),
         ({"method": "edge", "origin": (-1, 0)}, "origin must lie in 0 to 1024 to be traced"),
-        ({"method": "point_in_triangle", "size": (2000, 2000)}, "a trace must have 100000 steps at most"),
+        ({"method": "point_in_triangle", "size": (1000, 1000)}, "a trace must have 40000 steps at most"),
     ],
 )
 def test_what_cannot_be_traced_is_refused(options, message):

@@ -1,6 +1,8 @@
 """Windows of huge rasters: stitched together they are the whole, to the bit."""
 
 import itertools
+import os
+import threading
 
 import numpy as np
 import pytest
@@ -90,6 +92,40 @@ KINDS = {
         lambda **view: tl.fill(
             IN_PIXELS, TRIANGLES, np.arange(50) + 70000, SIZE, dtype=np.int32, background=-5, **view
         ),
+    ),
+    "labels exact": (
+        {"kind": "labels", "subpixel_bits": "exact"},
+        lambda **view: tl.rasterize(IN_PIXELS, TRIANGLES, SIZE, subpixel_bits="exact", **view).triangle,
+    ),
+    "labels later exact": (
+        {"kind": "labels", "depth_test": None, "subpixel_bits": "exact"},
+        lambda **view: (
+            tl.rasterize(IN_PIXELS, TRIANGLES, SIZE, depth_test=None, subpixel_bits="exact", **view).triangle
+        ),
+    ),
+    "depth exact": (
+        {"kind": "depth", "subpixel_bits": "exact"},
+        lambda **view: tl.rasterize(IN_PIXELS, TRIANGLES, SIZE, subpixel_bits="exact", **view).depth,
+    ),
+    "coverage exact": (
+        {"kind": "coverage", "subpixel_bits": "exact"},
+        lambda **view: tl.coverage(IN_PIXELS, TRIANGLES, SIZE, subpixel_bits="exact", **view),
+    ),
+    "overdraw exact": (
+        {"kind": "overdraw", "subpixel_bits": "exact"},
+        lambda **view: tl.overdraw(IN_PIXELS, TRIANGLES, SIZE, subpixel_bits="exact", **view),
+    ),
+    "field exact": (
+        {"kind": "field", "values": OF_VERTICES, "subpixel_bits": "exact"},
+        lambda **view: tl.field((POINTS, TRIANGLES), OF_VERTICES, GRID, subpixel_bits="exact", **view),
+    ),
+    "height_map exact": (
+        {"kind": "height_map", "subpixel_bits": "exact"},
+        lambda **view: tl.height_map((POINTS, TRIANGLES), GRID, subpixel_bits="exact", **view),
+    ),
+    "fill exact": (
+        {"kind": "fill", "values": COLORS, "subpixel_bits": "exact"},
+        lambda **view: tl.fill(IN_PIXELS, TRIANGLES, COLORS, SIZE, subpixel_bits="exact", **view),
     ),
     "field": (
         {"kind": "field", "values": OF_VERTICES},
@@ -284,3 +320,50 @@ def test_wrong_sizes_are_told():
 def test_grid_round_a_mesh_is_that_of_field():
     raster = tl.tiles((POINTS, TRIANGLES), pixel_size=0.5, window=32)
     assert raster.grid == tl.Grid.around((POINTS, TRIANGLES), pixel_size=0.5)
+
+
+@pytest.mark.parametrize("threads", [1, 2, 5])
+@pytest.mark.parametrize("reuse", [False, True])
+def test_windows_come_in_order_whatever_draws_them(threads, reuse):
+    raster = tl.tiles((POINTS, TRIANGLES), GRID, window=16, threads=threads)
+    whole = tl.rasterize(IN_PIXELS, TRIANGLES, SIZE).triangle
+    places = []
+    for window in raster.windows(reuse=reuse):
+        places.append((window.row, window.column))
+        assert np.array_equal(window.pixels, whole[window.slices])
+    assert places == list(itertools.product(range(4), range(6)))
+
+
+def test_windows_may_be_left_early():
+    raster = tl.tiles((POINTS, TRIANGLES), GRID, window=8, threads=3)
+    before = threading.active_count()
+    windows = raster.windows()
+    for _ in range(4):
+        next(windows)
+    windows.close()
+    assert threading.active_count() <= before
+    assert np.array_equal(stitched(raster), tl.rasterize(IN_PIXELS, TRIANGLES, SIZE).triangle)
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="only where processes fork")
+@pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
+def test_windows_go_on_in_a_forked_child():
+    raster = tl.tiles((POINTS, TRIANGLES), GRID, window=16, threads=2)
+    whole = tl.rasterize(IN_PIXELS, TRIANGLES, SIZE).triangle
+    windows = raster.windows()
+    next(windows)
+    child = os.fork()
+    if not child:
+        is_good = all(np.array_equal(window.pixels, whole[window.slices]) for window in windows)
+        os._exit(0 if is_good else 1)
+    assert os.waitpid(child, 0)[1] == 0
+
+
+def test_error_of_a_later_block_comes_in_its_turn(monkeypatch):
+    monkeypatch.setattr("topleft._tiles.spans.BLOCK", 8)
+    points = POINTS.copy()
+    points[TRIANGLES[41, 0]] = np.nan
+    points[TRIANGLES[20, 0]] = np.nan
+    first = int(np.argmax(np.isnan(points[TRIANGLES]).any(axis=(1, 2))))
+    with pytest.raises(ValueError, match=f"in triangle {first}, block {first // 16 + 1} of 4"):
+        next(iter(tl.tiles((points, TRIANGLES), GRID, window=16, threads=4)))

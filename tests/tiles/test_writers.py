@@ -15,6 +15,7 @@ import pytest
 from PIL import Image
 
 import topleft as tl
+from topleft._tiles.deepzoom import halved_colors
 from topleft._tiles.geotiff import differences, sums
 from topleft._tiles.levels import halved
 
@@ -230,14 +231,35 @@ def test_deepzoom_is_the_raster(tmp_path, kind):
 
 
 def test_deepzoom_takes_colors_of_a_function(tmp_path):
+    floats = tl.tiles((POINTS, TRIANGLES), GRID, window=64, kind="fill", values=np.ones((60, 3), np.float32))
+    with pytest.raises(ValueError, match="colors must say how float32 of kind 'fill' becomes uint8"):
+        floats.to_deepzoom(tmp_path / "a.dzi", tile=32)
     raster = raster_of("height_map")
-    with pytest.raises(ValueError, match="colors must say how float64 of kind 'height_map' becomes uint8"):
-        raster.to_deepzoom(tmp_path / "a.dzi", tile=32)
     with pytest.raises(ValueError, match="colors must give uint8"):
         raster.to_deepzoom(tmp_path / "a.dzi", tile=32, colors=np.isnan)
     raster.to_deepzoom(tmp_path / "a.dzi", tile=32, colors=lambda z: np.where(np.isnan(z), 0, 20 * z).astype(np.uint8))
     tile = np.asarray(Image.open(tmp_path / "a_files/9/0_0.png"))
     assert equal(tile, np.nan_to_num(20 * raster[:32, :32]).astype(np.uint8))
+
+
+@pytest.mark.parametrize("kind", ["height_map", "depth", "field", "int16"])
+def test_deepzoom_shows_numbers_as_greys(tmp_path, kind):
+    raster = raster_of(kind)
+    raster.to_deepzoom(tmp_path / "a.dzi", tile=32)
+    tile = np.asarray(Image.open(tmp_path / "a_files/9/1_2.png"))
+    numbers = raster[64:96, 32:64].astype(np.float64)
+    is_there = ~np.isnan(numbers) & (numbers != raster.painter.empty)
+    assert np.array_equal(tile[..., 1], is_there * 255)
+    low, high = raster.range_of_values
+    inside = numbers[is_there]
+    assert low <= inside.min() <= inside.max() <= high
+    assert np.array_equal(tile[is_there, 0], np.rint((inside - low) * (255 / (high - low))).astype(np.uint8))
+
+
+def test_halved_colors_leave_out_what_is_transparent():
+    pixels = np.zeros((3, 3, 4), np.uint8)
+    pixels[0, 0], pixels[1, 1], pixels[2, 2] = (200, 100, 50, 255), (100, 0, 50, 255), (9, 8, 7, 4)
+    assert halved_colors(pixels).tolist() == [[[150, 50, 50, 128], [0, 0, 0, 0]], [[0, 0, 0, 0], [9, 8, 7, 4]]]
 
 
 # What goes wrong
@@ -371,7 +393,7 @@ def test_killed_run_goes_on_and_draws_no_whole_window_twice(tmp_path, kind):
         ("to_zarr", {"compression": "rar"}, ValueError, "compression must be"),
         ("to_zarr", {"levels": 0}, ValueError, "levels must be at least 1"),
         ("to_geotiff", {"tile": 40}, ValueError, "tile must be a multiple of 16, got 40"),
-        ("to_geotiff", {"tile": 48}, ValueError, "tile must divide the windows of 64 x 64 pixels, got 48"),
+        ("to_geotiff", {"tile": 48}, ValueError, "window must have sides of whole tiles, of 48 pixels"),
         ("to_geotiff", {"tile": 64}, ValueError, "window must have sides of whole pairs of tiles, of 128 pixels"),
         ("to_geotiff", {"tile": 32, "crs": "EPSG:1"}, ValueError, "crs must be one that pyproj knows"),
         ("to_geotiff", {"tile": 32, "crs": "Narnia"}, ValueError, "crs must be one that pyproj knows"),

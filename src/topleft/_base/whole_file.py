@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import time
 from collections.abc import Callable, Iterable
@@ -9,14 +10,24 @@ from contextlib import suppress
 from pathlib import Path
 from typing import IO
 
-__all__ = ["remove_stale_parts", "write_whole"]
+from topleft._base.remote import Place, RemotePath
+
+__all__ = ["is_whole", "remove_stale_parts", "write_whole"]
 
 #: A file that nobody has written to for so long was left by a process that was killed.
 STALE_S = 3600
 
 
-def write_whole(path: Path, write: Callable[[IO[bytes]], object]) -> None:
-    """Write to a new name in the same folder, then rename: a reader or a crash never meets half a file."""
+def write_whole(path: Place, write: Callable[[IO[bytes]], object]) -> None:
+    """Write to a new name in the same folder, then rename: a reader or a crash never meets half a file.
+
+    What goes to a URL is sent in one piece.
+    """
+    if isinstance(path, RemotePath):
+        content = io.BytesIO()
+        write(content)
+        path.write_bytes(content.getvalue())
+        return
     if path.is_dir():
         raise IsADirectoryError(f"cannot write {str(path)!r}: it is a folder")
     temporary = path.with_name(f".{path.name[:100]}.{os.urandom(4).hex()}.part")
@@ -32,6 +43,13 @@ def write_whole(path: Path, write: Callable[[IO[bytes]], object]) -> None:
     except BaseException:
         _remove(temporary)
         raise
+
+
+def is_whole(path: Place) -> bool:
+    """Tell whether a file is there, and not empty."""
+    if isinstance(path, RemotePath):
+        return path.size() > 0
+    return path.is_file() and path.stat().st_size > 0
 
 
 def remove_stale_parts(paths: Iterable[Path]) -> None:

@@ -8,11 +8,10 @@ from __future__ import annotations
 import os
 import warnings
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Sized
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sized
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from dataclasses import dataclass
 from enum import StrEnum
-from pathlib import Path
 from types import TracebackType
 from typing import Any
 
@@ -21,6 +20,7 @@ import numpy.typing as npt
 
 from topleft._base.arrays import as_count, as_number, shown
 from topleft._base.options import parse
+from topleft._base.whole_file import is_whole
 from topleft._batch.jobs import Job, JobRunner, Outcome, as_job
 from topleft._batch.workers import Workers, workers_of
 from topleft.errors import MeshWarning, MissingPackageError
@@ -140,7 +140,8 @@ def render_batch(
     order : {"jobs", "completed"}
         Whether results come in the order of the jobs, or as soon as they are there.
     resume : bool
-        Leave out jobs whose files are all there. A file is whole or not there, also after an interrupt.
+        Leave out jobs whose files are all there. A file is whole or not there, also after an interrupt. Of files behind
+        URLs each is asked for.
     chunk : int, optional
         How many neighbouring jobs of one scene are handed to a worker together: less to send for each picture. Unless
         given 1, and on a cluster as many as should take 0.2 s, by the plan of the first job of each scene.
@@ -211,7 +212,8 @@ def workers_on(executor: object, time_limit: float | None) -> Workers | None:
     if limit is not None and not limit > 0:
         raise ValueError(f"time_limit must be positive, got {time_limit}")
     if any(kind.__module__.partition(".")[0] == "distributed" for kind in type(executor).__mro__):
-        from topleft._batch.cluster import ClusterWorkers, is_client
+        from topleft._base.cluster import is_client
+        from topleft._batch.cluster import ClusterWorkers
 
         if is_client(executor):
             return ClusterWorkers(executor, limit)
@@ -405,10 +407,10 @@ class _InFlight:
 def _is_done(job: Job) -> bool:
     """Tell whether all files of a job are there, and not empty; what is wrong with a job is found when it is drawn."""
     try:
-        files: Sequence[Path] = job.files
+        files = job.files
     except ValueError:
         return False
-    return bool(files) and all(file.is_file() and file.stat().st_size for file in files)
+    return bool(files) and all(map(is_whole, files))
 
 
 class _Bar:

@@ -12,24 +12,22 @@ from __future__ import annotations
 
 import os
 import threading
-import warnings
 from collections import OrderedDict, deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Future, wait
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
+from topleft._base.cluster import MOST_RESTARTS, check_workers, quiet, result_of, wait_for_scheduler
 from topleft._batch.jobs import Job, JobRunner, Outcome
 from topleft._batch.workers import N_SPOOLED, Jobs, Workers, coarser_levels_of, needs_levels
-from topleft._engine.isa import build_info
 from topleft._lod.levels import Level, Levels, keep_levels
 from topleft._model.mesh import Mesh
 from topleft._plan.plan import plan
 from topleft.errors import MissingPackageError, TopleftError
 
-__all__ = ["ClusterWorkers", "is_client"]
+__all__ = ["ClusterWorkers"]
 
 MESH_KEY = "topleft-mesh"
 """How the keys of tasks begin that hold a mesh."""
@@ -47,17 +45,8 @@ UNKNOWN_TOGETHER = 4
 MOST_TRIALS = 2
 """How often a job that workers died over is tried by itself."""
 
-MOST_RESTARTS = 5
-"""How often a task is sent again that was cancelled or lost with the scheduler."""
-
 GRACE_S = 5.0
 """How long a job may take to end once its time is over, before its process is ended."""
-
-
-def is_client(executor: object) -> bool:
-    """Whether it is a client of Dask, which is not imported for that."""
-    kinds = [(kind.__module__.partition(".")[0], kind.__name__) for kind in type(executor).__mro__]
-    return ("distributed", "Client") in kinds
 
 
 class HeldScene:
@@ -115,15 +104,7 @@ class ClusterWorkers(Workers):
         TopleftError
             If one has another version.
         """
-        from importlib.util import find_spec
-
-        for worker, spec in self._client.run(find_spec, "topleft").items():
-            if spec is None:
-                raise MissingPackageError(f"worker {worker} has no topleft: install it there")
-        own = build_info()["version"]
-        for worker, version in self._client.run(version_here).items():
-            if version != own:
-                raise TopleftError(f"worker {worker} has topleft {version}, and this is {own}: install one version")
+        check_workers(self._client)
 
     def submit(self, jobs: Jobs) -> Future[list[Outcome]]:
         """Submit jobs together, their mesh by itself."""
@@ -172,14 +153,29 @@ class ClusterWorkers(Workers):
         if outcomes is not None:
             promise.set_result(outcomes)
         elif error is None and not self._ends and n_restarts < MOST_RESTARTS:
-            self._forget_cancelled()
-            self._send(jobs, promise, n_restarts + 1, n_trials)
             self._is_trying = self._is_trying or n_trials > 0
+            again = partial(self._send_again, jobs, promise, n_restarts + 1, n_trials)
+            threading.Thread(target=again, daemon=True).start()
         elif type(error).__name__ == "KilledWorker" and n_trials < MOST_TRIALS and not self._ends:
             self._suspect(jobs, promise, n_trials + 1)
         else:
             promise.set_exception(error or TopleftError(f"the cluster has lost the job {1 + n_restarts} times"))
         self._try_next()
+
+    def _send_again(
+        self, jobs: list[tuple[int, Job]], promise: Future[list[Outcome]], n_restarts: int, n_trials: int
+    ) -> None:
+        """Send jobs once more as soon as there is a scheduler; until then a client forgets what it is given."""
+        try:
+            wait_for_scheduler(self._client, lambda: self._ends)
+            if self._ends or promise.done():
+                promise.cancel()
+                return
+            self._forget_cancelled()
+            self._send(jobs, promise, n_restarts, n_trials)
+        except BaseException as error:
+            if not promise.done():
+                promise.set_exception(error)
 
     def _suspect(self, jobs: list[tuple[int, Job]], promise: Future[list[Outcome]], n_trials: int) -> None:
         """Let each job be tried by itself, and no two at a time: workers died over them, but maybe for another job."""
@@ -263,32 +259,10 @@ class ClusterWorkers(Workers):
 
 def came_of(task: Any) -> tuple[list[Outcome] | None, BaseException | None]:
     """What a task has given, or its error; neither of them where it was cancelled or lost with the scheduler."""
-    try:
-        if task.status == "finished":
-            return task.result(), None
-        if task.status == "error":
-            error = task.exception()
-            # workers died while a mesh was made again there, for whatever jobs
-            is_of_mesh = type(error).__name__ == "KilledWorker" and str(error.task).startswith(MESH_KEY)
-            return None, None if is_of_mesh else told(error)
-    except BaseException as error:
-        if "Cancelled" not in type(error).__name__:
-            return None, error
-    return None, None
-
-
-def version_here() -> str:
-    """Return the version of this process's package."""
-    version: str = build_info()["version"]
-    return version
-
-
-@contextmanager
-def quiet() -> Iterator[None]:
-    """Keep Dask from warning that a mesh is large: it is sent once."""
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", message="Sending large graph", category=UserWarning)
-        yield
+    outcomes, error = result_of(task)
+    # workers died while a mesh was made again there, for whatever jobs
+    is_of_mesh = type(error).__name__ == "KilledWorker" and str(getattr(error, "task", "")).startswith(MESH_KEY)
+    return outcomes, None if error is None or is_of_mesh else told(error)
 
 
 def told(error: BaseException) -> BaseException:

@@ -15,7 +15,8 @@ from typing import Any
 
 import numpy.typing as npt
 
-from topleft._base.arrays import as_path, as_size, shown
+from topleft._base.arrays import as_size, shown
+from topleft._base.remote import Place, as_place, place_of
 from topleft._camera.camera import Camera
 from topleft._io.images import save_image
 from topleft._io.layer_files import layer_paths, save_layers
@@ -54,9 +55,9 @@ class Job:
     options : mapping
         Other options of `render`, by name; with "opacity" those of `render_transparent`; for "flow" among the layers
         also "camera_to" and "transforms_to" of `render_layers`.
-    destination : path, optional
-        The file to be written; its folder is made. `{layer}` in the name stands for the name of a layer. None: the
-        picture is returned.
+    destination : path or URL, optional
+        The file to be written; its folder is made. A URL is whatever fsspec can write to where the job is drawn.
+        `{layer}` in the name stands for the name of a layer. None: the picture is returned.
     layers : sequence of str
         What is wanted besides, or instead of, the picture: names that `render_layers` knows. None: the picture alone.
 
@@ -82,7 +83,7 @@ class Job:
         if isinstance(self.camera, type):
             raise TypeError(f"camera must be a Camera, a function of the mesh and the size or None, got {self.camera}")
         if self.destination is not None:
-            as_path("destination", self.destination)
+            as_place("destination", self.destination)
 
     def __repr__(self) -> str:
         """One line: what is drawn, how large, where to."""
@@ -94,7 +95,7 @@ class Job:
         return f"Job({', '.join(words)})"
 
     @property
-    def files(self) -> tuple[Path, ...]:
+    def files(self) -> tuple[Place, ...]:
         """The files that it writes.
 
         Raises
@@ -106,7 +107,7 @@ class Job:
         """
         if self.destination is None:
             return ()
-        path = Path(self.destination)
+        path = place_of(self.destination)
         return tuple(dict.fromkeys(layer_paths(path, check_layers(self.layers) or ("color",)).values()))
 
     @property
@@ -235,10 +236,10 @@ class JobRunner:
     def draw_one(self, job: Job) -> Array | dict[str, Array] | None:
         """Return the picture of a job, arrays by name if it asks for layers, or None when they are in their files."""
         layers = check_layers(job.layers)
-        path = None if job.destination is None else Path(job.destination)
+        path = None if job.destination is None else place_of(job.destination)
         files = job.files  # before any work: a format that is none
         for file in files:
-            if not file.parent.is_dir():
+            if isinstance(file, Path) and not file.parent.is_dir():
                 file.parent.mkdir(parents=True, exist_ok=True)
         scene = self._scene(job.scene)
         size = as_size(job.size)

@@ -227,7 +227,7 @@ cdef extern from "topleft.h" nogil:
         int is_farthest
         int64_t stride_px
     enum:
-        TL_N_CLASSES, TL_FLIP, TL_SPECIAL
+        TL_N_CLASSES, TL_FLIP, TL_SPECIAL, TL_SHORT_SPAN
     ctypedef struct tl_cloud:
         const tl_vertex *vertices
         int64_t n
@@ -436,6 +436,14 @@ cdef extern from "topleft.h" nogil:
         int subpixel_bits
     ctypedef struct tl_window_span:
         int32_t triangle, first, end
+    ctypedef struct tl_window_box:
+        int32_t left, right, top, bottom
+    ctypedef struct tl_corners:
+        const char *points
+        int64_t point_stride, point_bytes, n_points
+        const char *triangles
+        int64_t triangle_stride
+        int is_wide
     ctypedef enum tl_merge_rule:
         pass
     ctypedef struct tl_merge:
@@ -517,6 +525,9 @@ cdef extern from "topleft.h" nogil:
         void (*mask_nonzero)(const tl_polygons *, int64_t, int64_t, int64_t, int64_t, uint32_t *, int32_t *, int64_t, int32_t *, uint64_t *, uint8_t *) noexcept nogil
         void (*label_polygons)(const tl_polygons *, const tl_label_job *) noexcept nogil
         int64_t (*share_polygons)(const tl_polygons *, const tl_share_job *) noexcept nogil
-        int64_t (*list_spans)(const tl_tiling *, const double *, int64_t, int64_t, int64_t *, tl_window_span *) noexcept nogil
+        int64_t (*list_spans)(const tl_tiling *, const double *, int64_t, int64_t, tl_window_box *, int64_t *, tl_window_span *) noexcept nogil
+        int64_t (*sort_spans)(const tl_window_span *, int64_t, int64_t *, int32_t *) noexcept nogil
+        void (*count_windows)(const tl_window_span *, const int64_t *, int64_t, int64_t, int32_t *) noexcept nogil
+        int64_t (*take_corners)(const tl_corners *, const int32_t *, int64_t, int64_t, void *) noexcept nogil
         void (*merge_fragments)(const tl_merge *, int64_t, int64_t) noexcept nogil
         void (*name_triangles)(int32_t *, int64_t, int64_t, const int32_t *) noexcept nogil

@@ -2,8 +2,10 @@
 
 
 def list_spans(tuple tiling, const double[:, :, ::1] corners_px,
-               int64_t first_triangle, int64_t[::1] starts, int32_t[:, ::1] spans):
+               int64_t first_triangle, int32_t[:, ::1] boxes, int64_t[::1] starts, int32_t[:, ::1] spans):
     """Count the spans of each row of windows into starts[row + 1], or write them where spans is not None.
+
+    `boxes`, (N, 4): what the first call leaves for the second.
 
     `tiling`: width and height of the raster, those of a window, sub-pixel bits. Returns the first triangle that cannot
     be snapped, or -1.
@@ -18,8 +20,68 @@ def list_spans(tuple tiling, const double[:, :, ::1] corners_px,
         out = <tl_window_span *>&spans[0, 0]
     if corners_px.shape[0]:
         with nogil:
-            bad = K.list_spans(&t, &corners_px[0, 0, 0], corners_px.shape[0], first_triangle, &starts[0], out)
+            bad = K.list_spans(&t, &corners_px[0, 0, 0], corners_px.shape[0], first_triangle,
+                               <tl_window_box *>&boxes[0, 0], &starts[0], out)
     return bad
+
+
+SHORT_SPAN = TL_SHORT_SPAN
+
+
+def sort_spans(const int32_t[:, ::1] spans, int64_t[::1] starts, int32_t[::1] out):
+    """Count the triangles of the windows of a row into starts[column + 1], or write them, of spans that are short.
+
+    Returns how many spans are longer than `SHORT_SPAN` windows.
+    """
+    cdef int64_t n_long = 0
+    cdef const tl_window_span *first
+    if spans.shape[0]:
+        first = <const tl_window_span *>&spans[0, 0]
+        with nogil:
+            n_long = K.sort_spans(first, spans.shape[0], &starts[0], &out[0] if out is not None else NULL)
+    return n_long
+
+
+def count_windows(const int32_t[:, ::1] spans, const int64_t[::1] starts, int32_t[:, ::1] steps):
+    """Add spans [starts[i], starts[i + 1]) of each row to the steps of the numbers of triangles, (rows, columns + 1)."""
+    cdef const tl_window_span *first
+    if spans.shape[0] and steps.shape[0]:
+        first = <const tl_window_span *>&spans[0, 0]
+        with nogil:
+            K.count_windows(first, &starts[0], steps.shape[0], steps.shape[1] - 1, &steps[0, 0])
+
+
+cdef class StridedMesh:
+    """The vertices and the triangles of a mesh where they lie, in memory or in a mapped file."""
+
+    cdef tl_corners mesh
+    cdef Py_buffer points, triangles
+    cdef int64_t n_triangles
+
+    def __cinit__(self, points, triangles):
+        """`points`: (V, C), `triangles`: (T, 3) int32 or int64; the numbers of a row lie side by side."""
+        PyObject_GetBuffer(points, &self.points, PyBUF_STRIDED_RO)
+        PyObject_GetBuffer(triangles, &self.triangles, PyBUF_STRIDED_RO)
+        self.mesh.points, self.mesh.point_stride = <const char *>self.points.buf, self.points.strides[0]
+        self.mesh.n_points = self.points.shape[0]
+        self.mesh.point_bytes = self.points.shape[1] * self.points.itemsize
+        self.mesh.triangles, self.mesh.triangle_stride = <const char *>self.triangles.buf, self.triangles.strides[0]
+        self.mesh.is_wide, self.n_triangles = self.triangles.itemsize == 8, self.triangles.shape[0]
+
+    def __dealloc__(self):
+        PyBuffer_Release(&self.points)
+        PyBuffer_Release(&self.triangles)
+
+    def take(self, const int32_t[::1] which, int64_t first, uint8_t[::1] out):
+        """Copy the corners of some triangles, or of those from `first` on; `out` says how many.
+
+        Returns the first that names a vertex that does not exist, or -1.
+        """
+        cdef int64_t n = out.shape[0] // (3 * self.mesh.point_bytes), bad = -1
+        if n:
+            with nogil:
+                bad = K.take_corners(&self.mesh, &which[0] if which is not None else NULL, first, n, &out[0])
+        return bad
 
 
 def merge_fragments(int32_t[::1] ids, float[::1] depth, const int32_t[::1] other_ids, const float[::1] other_depth,

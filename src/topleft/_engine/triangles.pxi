@@ -66,6 +66,13 @@ cdef class SnappedMesh:
         named.snapped.first_id = first_id
         return named
 
+    def named(self, const int32_t[::1] names):
+        """Return the same mesh with other ids in the buffers that `draw` fills: triangle i is called names[i]."""
+        cdef SnappedMesh named = self.copy()
+        named.snapped.names = &names[0] if names.shape[0] else NULL
+        named.arrays = (self.arrays, names)
+        return named
+
     def moved(self, int64_t x_px, int64_t y_px):
         """Return the same mesh behind a window that begins x_px columns and y_px rows later."""
         cdef SnappedMesh part = self.copy()

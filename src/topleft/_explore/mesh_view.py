@@ -12,7 +12,7 @@ import tempfile
 import threading
 import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -36,15 +36,19 @@ from topleft._raster.verbs import Rasterizer
 from topleft._render.render import rasterize_mesh, render
 from topleft._render.view_layers import render_layers
 from topleft.errors import MeshError
-from topleft.scenes import SHAPES
+from topleft.scenes import SHAPES, shape
 
 __all__ = ["HANDLERS", "LAYERS", "MeshView", "draw", "load_bytes"]
 
 U8 = NDArray[np.uint8]
 
-MAX_SIDE_PX = 4096
+MAX_SIDE_PX, MAX_PIXELS = 8192, 2**23
+"""Of a frame: 4K; with 16 samples a pixel, a gigabyte of memory."""
+
 MAX_VERTICES = 20_000_000
 """Of a file that is dropped on the page: a gigabyte of memory."""
+
+FIRST_SHAPE = "torus-knot"
 
 SHADINGS = ("smooth", "flat", "unlit", "normals", "depth")
 LAYERS = (*SHADINGS, "triangle", "cluster", "overdraw", "uv")
@@ -121,8 +125,8 @@ class MeshView:
             if name in given and not math.isfinite(as_number(name, given[name])):
                 raise ValueError(f"{name} must be finite, got {given[name]}")
         size = tuple(int(n) for n in given["size"])
-        if len(size) != 2 or not 1 <= min(size) <= max(size) <= MAX_SIDE_PX:
-            raise ValueError(f"size must be two numbers of 1 to {MAX_SIDE_PX}, got {size}")
+        if len(size) != 2 or not 1 <= min(size) <= max(size) <= MAX_SIDE_PX or size[0] * size[1] > MAX_PIXELS:
+            raise ValueError(f"size must be two numbers of 1 to {MAX_SIDE_PX}, {MAX_PIXELS} pixels, got {size}")
         pan = tuple(float(x) for x in given.get("pan", (0.0, 0.0)))
         if len(pan) != 2 or not all(abs(x) < 1e6 for x in pan):
             raise ValueError(f"pan must be two numbers, got {pan}")
@@ -190,18 +194,13 @@ class Shown:
 
 
 def shown_in(session: Session) -> Shown:
-    """Return the mesh of a page.
-
-    Raises
-    ------
-    MeshError
-        If it has none.
-    """
+    """Return the mesh of a page: a shape of the library where it has none."""
     shown = session.kept.get("mesh")
     if shown is None:
-        if session.content.mesh is None:
-            raise MeshError("there is no mesh: drop a file on the page")
-        shown = session.kept["mesh"] = Shown(session.content.mesh, session.content.name)
+        mesh, name = session.content.mesh, session.content.name
+        if mesh is None:
+            mesh, name = Mesh(*shape(FIRST_SHAPE)), FIRST_SHAPE
+        shown = session.kept["mesh"] = Shown(mesh, name)
     return shown
 
 
@@ -324,8 +323,7 @@ def answer_open(session: Session, request: Request) -> Reply:
         "has_uv": mesh.uv is not None, "has_colors": mesh.colors is not None, "materials": len(mesh.materials),
         "bounds": mesh.bounds.tolist(),
         "lacks": lacks, "layers": [name for name in LAYERS if name != "uv" or mesh.uv is not None],
-        "lights": list(LIGHTS), "heat": [(tuple(color[:3]), label) for color, label in
-                                         zip(HEAT[1:].tolist(), HEAT_LABELS, strict=True)],
+        "lights": list(LIGHTS), "heat": list(zip(HEAT_LABELS, HEAT[1:, :3].tolist(), strict=True)),
     })  # fmt: skip
 
 
@@ -364,7 +362,7 @@ def answer_pick(session: Session, request: Request) -> Reply:
     frags = rasterize_mesh(mesh, camera, (1, 1), **options)
     i = int(frags.triangle[0, 0])
     if i < 0:
-        return Reply({"triangle": -1, "x": x, "y": y})
+        return Reply({"triangle": -1, "x": x, "y": y, "rows": [("shows", "nothing")], "corners_px": []})
     level = mesh
     if view.tolerance:
         level = choose_detail(mesh, camera, view.size, tolerance=view.tolerance, cull=view.cull).mesh  # type: ignore[arg-type]
@@ -374,12 +372,20 @@ def answer_pick(session: Session, request: Request) -> Reply:
         "positions": level.vertices[corners].tolist(), "barycentric": frags.barycentric()[0, 0].tolist(),
         "is_level": level is not mesh, "corners_px": camera.project(level.vertices[corners], view.size)[:, :2].tolist(),
     }  # fmt: skip
+    rows = [("triangle of the level" if level is not mesh else "triangle", str(i))]
+    rows += [(f"vertex {corner}", numbers(level.vertices[corner])) for corner in corners]
+    rows += [("weights", numbers(found["barycentric"])), ("depth", numbers([found["depth"]]))]
     if level.uv is not None:
-        found["uv"] = frags.interpolate(level.uv)[0, 0].tolist()
+        rows.append(("uv", numbers(frags.interpolate(level.uv)[0, 0])))
     if level.materials:
-        rows = level.material_of_triangle
-        found["material"] = material_text(level, 0 if rows is None else int(rows[i]))
-    return Reply(found)
+        of_triangle = level.material_of_triangle
+        rows.append(("material", material_text(level, 0 if of_triangle is None else int(of_triangle[i]))))
+    return Reply({**found, "rows": rows})
+
+
+def numbers(values: Iterable[float]) -> str:
+    """Return numbers to five digits."""
+    return ", ".join(f"{float(value):.5g}" for value in values)
 
 
 def material_text(mesh: Mesh, i: int) -> str:

@@ -6,10 +6,11 @@ All is computed in integers and fractions, by `topleft.methods.reference`; what 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from fractions import Fraction
 from typing import Any, NamedTuple
 
-from topleft._explore.pixels import EXACT
+from topleft._explore.pixels import EXACT, css, triangle_colors
 from topleft._explore.session import Reply, Request, Session
 from topleft._explore.state import PixelState, pair, parse_state
 from topleft._raster.verbs import overdraw
@@ -99,11 +100,12 @@ def probe(_: Session, request: Request) -> Reply:
     found = sorted(verdicts(state, (x, y), positions[k], bits), key=nearness)
     place = (x + state.origin[0], y + state.origin[1])
     owner = winner([one for one in found if one.is_covered], state)
-    times = drawn_by(state, (x, y), method) if method in CLASSICS else None
+    others = [name for name in dict.fromkeys((method, state.method, state.other)) if name in CLASSICS]
+    stories = [classic_story(name, drawn_by(state, (x, y), name), owner) for name in others]
     return Reply(
         {
             "pixel": place,
-            "sentences": list(sentences(state, found, owner, times, method, place)),
+            "sentences": [*sentences(state, found, owner, place, k), *(story for story in stories if story)],
             "owner": -1 if owner is None else owner.triangle,
             "rows": [as_row(one, state, owner) for one in found[:MAX_ROWS]],
             "n_more": max(0, len(found) - MAX_ROWS),
@@ -137,13 +139,16 @@ def winner(covered: list[Verdict], state: PixelState) -> Verdict | None:
 
 
 def drawn_by(state: PixelState, pixel: tuple[int, int], method: str) -> dict[int, int] | None:
-    """Return how often a classic draws a pixel for each triangle; None for too many triangles."""
+    """Return how often a classic draws a pixel for each triangle; None when that cannot be told."""
     if len(state.triangles) > MAX_DRAWN:
         return None
     options = {**state.options(method), "origin": (pixel[0] + state.origin[0], pixel[1] + state.origin[1])}
     found = {}
     for i in range(len(state.triangles)):
-        n = int(overdraw(state.vertices, state.triangles[i : i + 1], (1, 1), **options)[0, 0])
+        try:
+            n = int(overdraw(state.vertices, state.triangles[i : i + 1], (1, 1), **options)[0, 0])
+        except ValueError:  # a vertex beyond its range
+            return None
         if n:
             found[i] = n
     return found
@@ -153,11 +158,10 @@ def drawn_by(state: PixelState, pixel: tuple[int, int], method: str) -> dict[int
 
 
 def sentences(
-    state: PixelState, found: list[Verdict], owner: Verdict | None, times: dict[int, int] | None, method: str,
-    pixel: tuple[int, int],
-) -> Any:  # fmt: skip
-    """Yield why the pixel is whose, and what a classic makes of it."""
-    what = f"The {'centre' if state.sampling == 'center' else 'sample'} of pixel ({pixel[0]}, {pixel[1]})"
+    state: PixelState, found: list[Verdict], owner: Verdict | None, pixel: tuple[int, int], k: int
+) -> Iterator[str]:
+    """Yield why the pixel is whose."""
+    what = f"The {f'sample {k}' if state.sampling.startswith('msaa') else 'centre'} of pixel ({pixel[0]}, {pixel[1]})"
     on_edge = [one for one in found if one.is_touched and any(edge.value == 0 for edge in one.edges)]
     covered = [one for one in found if one.is_covered]
     if on_edge:
@@ -170,29 +174,29 @@ def sentences(
         others = listed([one.triangle for one in covered if one is not owner])
         why = "it is nearer" if state.has_depth else "it is drawn last"
         yield f"Triangle {owner.triangle} shows because {why}; {others} {'is' if len(covered) == 2 else 'are'} hidden."
-    if times is not None:
-        yield classic_story(method, times, owner)
 
 
 def edge_story(one: Verdict) -> str:
     """What the edges through a sample are for a triangle."""
     through = [edge for edge in one.edges if edge.value == 0]
-    ends = " and ".join(f"{min(edge.ends)}\N{EN DASH}{max(edge.ends)}" for edge in through)
+    ends = " and ".join(map(named, through))
     kinds = " and a ".join(edge.kind for edge in through)
-    named = f"Edge {ends} is a {kinds} edge" if len(through) == 1 else f"Edges {ends} are a {kinds} edge"
-    return f"{named} of triangle {one.triangle}, so the pixel is {'' if one.is_covered else 'not '}its own."
+    story = f"Edge {ends} is a {kinds} edge" if len(through) == 1 else f"Edges {ends} are a {kinds} edge"
+    return f"{story} of triangle {one.triangle}, so the pixel is {'' if one.is_covered else 'not '}its own."
 
 
-def classic_story(method: str, times: dict[int, int], owner: Verdict | None) -> str:
-    """What a classic makes of the pixel, beside the exact rule."""
+def classic_story(method: str, times: dict[int, int] | None, owner: Verdict | None) -> str:
+    """What a classic makes of the pixel, beside the exact rule; nothing where that is not known."""
+    if times is None:
+        return ""
     n = sum(times.values())
-    rule = "which no triangle should have" if owner is None else f"which is triangle {owner.triangle}'s"
+    rule = "no triangle should have it" if owner is None else f"by the exact rule it is triangle {owner.triangle}'s"
     if not n:
-        return f"{method} leaves it out" + (", as it should." if owner is None else f", {rule}: a gap.")
+        return f"{method} leaves it out" + (", as it should." if owner is None else f"; {rule}: a gap.")
     drawn = " and ".join(f"triangle {i}" + (f" ({k} times)" if k > 1 else "") for i, k in times.items())
     if owner is not None and times == {owner.triangle: 1}:
         return f"{method} draws it once, for triangle {owner.triangle}, as it should."
-    return f"{method} draws it {'once' if n == 1 else f'{n} times'}, for {drawn}, {rule}."
+    return f"{method} draws it {'once' if n == 1 else f'{n} times'}, for {drawn}; {rule}."
 
 
 def listed(numbers: list[int]) -> str:
@@ -208,14 +212,20 @@ def as_row(one: Verdict, state: PixelState, owner: Verdict | None) -> dict[str, 
     )
     return {
         "triangle": one.triangle,
+        "color": css(triangle_colors(one.triangle + 1)[-1]),
         "verdict": "owner" if one is owner else verdict,
         "edges": [
-            {"ends": edge.ends, "kind": edge.kind, "value": number(edge.value), "exact": str(edge.value)}
+            {"ends": named(edge), "kind": edge.kind, "value": number(edge.value), "exact": str(edge.value)}
             for edge in one.edges
         ],
         "depth": number(one.fragment.depth()) if state.has_depth else None,
-        "weights": [number(weight) for weight in one.fragment.weights()],
+        "weights": ", ".join(number(weight) for weight in one.fragment.weights()),
     }
+
+
+def named(edge: Edge) -> str:
+    """An edge by its vertices."""
+    return f"{min(edge.ends)}\N{EN DASH}{max(edge.ends)}"
 
 
 def number(value: Fraction) -> str:

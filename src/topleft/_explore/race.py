@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from topleft._explore.session import Reply, Request, Session
 from topleft._raster.verbs import fill, overdraw
 from topleft.methods import CLASSICS, find_method
-from topleft.methods.reference.integers import ExactPicture, ExactPoints, draw_points, signed_area, snapped_points
+from topleft.methods.reference.integers import ExactPicture, WidePoints, draw_points, signed_area, snapped_points
 from topleft.scene_families import FAMILIES, Axis, PixelScene
 
 __all__ = [
@@ -128,7 +128,7 @@ class Exact:
     def picture(self, snap: str = "true", rule: str = "top-left") -> ExactPicture:
         """Return the picture of one copy after a snap."""
         if (snap, rule) not in self.pictures:
-            points: ExactPoints = snapped_points(self.scene.vertices, snap)
+            points: WidePoints = snapped_points(self.scene.vertices, snap)
             scene = self.scene
             self.pictures[snap, rule] = draw_points(points, scene.triangles, scene.size, scene.origin, rule)
         return self.pictures[snap, rule]
@@ -148,8 +148,11 @@ def find_faults(exact: Exact, counts: NDArray[Any], labels: NDArray[np.int32]) -
 # The page
 
 
-RIGHT, WRONG, GAP, OVERDRAWN = range(4)
-"""What a byte of a method's picture says: where it is not drawn once, that, and else whether the triangle is right."""
+COLORS = {"another triangle shows": (204, 121, 167), "a gap": (213, 94, 0), "drawn more than once": (20, 130, 210)}
+"""Of faults, in the order of `FaultyPixels`; shades of grey tell the triangles of what is right."""
+
+SHARES = ("#ffffcc", "#c7e9b4", "#7fcdbb", "#41b6c4", "#225ea8", "#0c2c84")
+"""Colours of shares of wrong pixels by their logarithm: ColorBrewer's YlGnBu, which all eyes see."""
 
 
 def value_at(axis: Axis, position: float) -> tuple[str, Any]:
@@ -198,20 +201,44 @@ def faults_of(entry: Entry, exact: Exact) -> FaultyPixels | str:
         return str(error).partition(", got")[0]
 
 
-def counted(faults: FaultyPixels | str) -> dict[str, Any]:
-    """Return the counts of a method for the page: `bad` pixels are wrong or not drawn once."""
-    if isinstance(faults, str):
-        return {"refused": faults}
-    counts = {name: int(mask.sum()) for name, mask in faults._asdict().items()}
-    return {**counts, "bad": int((faults.wrong | faults.gaps | faults.overdrawn).sum())}
+def n_bad(faults: FaultyPixels) -> int:
+    """Return how many pixels are wrong, or not drawn once."""
+    return int((faults.wrong | faults.gaps | faults.overdrawn).sum())
 
 
-def picture_of(faults: FaultyPixels | str, size: tuple[int, int]) -> NDArray[np.uint8]:
-    """Return a byte for each pixel, from `RIGHT` to `OVERDRAWN`."""
+def row_of(name: str, faults: FaultyPixels | str) -> dict[str, Any]:
+    """Return what the page says of a method."""
     if isinstance(faults, str):
-        return np.zeros(size[::-1], np.uint8)
-    kinds = np.where(faults.gaps, GAP, np.where(faults.overdrawn, OVERDRAWN, np.where(faults.wrong, WRONG, RIGHT)))
-    return kinds.astype(np.uint8)
+        return {"name": name, "bad": None, "text": "refuses", "title": faults}
+    bad, gaps, overdrawn = n_bad(faults), int(faults.gaps.sum()), int(faults.overdrawn.sum())
+    title = f"{bad} of {faults.wrong.size} pixels: {gaps} gaps, {overdrawn} drawn more than once"
+    return {"name": name, "bad": bad, "text": f"{bad} wrong" if bad else "right", "title": title}
+
+
+def picture_of(faults: FaultyPixels | str, ids: NDArray[np.int32]) -> NDArray[np.uint8]:
+    """Return the picture (H, W, 4) of a method: faults in their colours, triangles in shades of grey."""
+    picture = np.full((*ids.shape, 4), 128, np.uint8)
+    picture[..., 3] = np.where(ids < 0, 0, 40 + 30 * (ids % 3))
+    if isinstance(faults, str):
+        return np.zeros_like(picture)
+    for kind, color in zip(("wrong", "overdrawn", "gaps"), (0, 2, 1), strict=True):
+        picture[getattr(faults, kind)] = (*list(COLORS.values())[color], 255)
+    return picture
+
+
+def cell_of(faults: FaultyPixels | str, n_edge_px: int) -> dict[str, str]:
+    """Return a cell of the chart: its text, colour, kind and title."""
+    if isinstance(faults, str):
+        return {"text": "", "color": "", "kind": "refused", "title": "refuses to draw"}
+    bad, has_gaps = n_bad(faults), bool(faults.gaps.any())
+    share = bad / max(1, n_edge_px)
+    level = min(5, max(0, math.floor(1.5 * math.log10(share) + 6))) if bad else 0
+    return {
+        "text": f"{100 * share:.{1 if share < 0.01 else 0}f}" if bad else "",
+        "color": SHARES[level] if bad else "",
+        "kind": ("dark" if level > 3 else "light") + (" gaps" if has_gaps else ""),
+        "title": f"{bad} wrong pixels{', with gaps' if has_gaps else ''}",
+    }
 
 
 def as_request(request: Request) -> tuple[str, tuple[float, ...], int]:
@@ -241,36 +268,29 @@ def answer_families(_: Session, __: Request) -> Reply:
         }
         for name, family in FAMILIES.items()
     }
-    return Reply({"families": families, "methods": [entry.name for entry in entries()]})
+    return Reply({"families": families, "methods": [entry.name for entry in entries()], "key": list(COLORS.items())})
 
 
 def answer(_: Session, request: Request) -> Reply:
-    """Answer the page: the exact picture as ids (H, W), and the faults of the methods (N, H, W), a byte a pixel."""
+    """Answer the page: where each method is wrong, as pictures (N, H, W, 4) and in words."""
     exact, written = scene_at(*as_request(request))
-    size, found = exact.scene.size, [(entry, faults_of(entry, exact)) for entry in entries()]
-    header = {
-        "values": written,
-        "size": size,
-        "n_triangles": len(exact.scene.triangles) * exact.scene.copies,
-        "n_edge_px": int(exact.picture().is_edge.sum()),
-        "methods": [{"name": entry.name, **counted(faults)} for entry, faults in found],
-    }
-    pictures = np.stack([picture_of(faults, size) for _, faults in found])
-    return Reply(header, {"triangle": exact.labels().astype(np.int32), "faults": pictures})
+    found = [(entry.name, faults_of(entry, exact)) for entry in entries()]
+    rows = [row_of(*one) for one in found]
+    ids = exact.labels()
+    return Reply({"values": written, "rows": rows}, {"pictures": np.stack([picture_of(one, ids) for _, one in found])})
 
 
 @lru_cache(maxsize=1024)
-def column_of(family: str, positions: tuple[float, ...], seed: int) -> tuple[int, tuple[tuple[int | None, bool], ...]]:
-    """Return the edge pixels of a scene, and of each method its bad pixels (None: refused), and whether it has gaps."""
+def column_of(family: str, positions: tuple[float, ...], seed: int) -> list[dict[str, str]]:
+    """Return the cells of all methods on a scene."""
     exact, _ = scene_at(family, positions, seed)
-    rows = [counted(faults_of(entry, exact)) for entry in entries()]
-    return int(exact.picture().is_edge.sum()), tuple((row.get("bad"), bool(row.get("gaps"))) for row in rows)
+    n_edge_px = int(exact.picture().is_edge.sum())
+    return [cell_of(faults_of(entry, exact), n_edge_px) for entry in entries()]
 
 
 def answer_column(_: Session, request: Request) -> Reply:
     """Answer the page: a column of the chart, one value of the last parameter; the other sliders stay."""
-    n_edge_px, rows = column_of(*as_request(request))
-    return Reply({"n_edge_px": n_edge_px, "rows": rows})
+    return Reply({"cells": column_of(*as_request(request))})
 
 
 HANDLERS = {"race.draw": answer, "race.column": answer_column, "race.families": answer_families}

@@ -15,6 +15,7 @@ import secrets
 import socket
 import threading
 from collections.abc import Mapping
+from contextlib import suppress
 from importlib.resources import files
 from typing import Any
 
@@ -31,6 +32,7 @@ try:
     from starlette.responses import PlainTextResponse, Response
     from starlette.routing import Route, WebSocketRoute
     from starlette.websockets import WebSocket, WebSocketDisconnect
+    from websockets.exceptions import InvalidState
 except ImportError as error:
     raise MissingPackageError(
         f"the explorer needs {error.name or 'starlette'}: pip install 'topleft[explore]'"
@@ -88,6 +90,7 @@ class Server:
         self._loop: asyncio.AbstractEventLoop | None = None
         self._closing: asyncio.TimerHandle | None = None
         self._is_ready = threading.Event()
+        self._error: Exception | None = None
         self._thread = threading.Thread(target=self._run, name="topleft-explore", daemon=True)
 
     @property
@@ -102,6 +105,8 @@ class Server:
         """Begin to serve, in a thread, and return when the page can be opened."""
         self._thread.start()
         self._is_ready.wait()
+        if self._error is not None:
+            raise self._error
 
     def wait(self) -> None:
         """Return when the server has ended."""
@@ -124,7 +129,12 @@ class Server:
         )
 
     def _run(self) -> None:
-        asyncio.run(self._serve())
+        try:
+            asyncio.run(self._serve())
+        except Exception as error:
+            self._error = error
+        finally:
+            self._is_ready.set()
 
     async def _serve(self) -> None:
         self._loop, self._end = asyncio.get_running_loop(), asyncio.Event()
@@ -137,7 +147,8 @@ class Server:
         serving = EventServer(config, self._end)
         self._close_in(600.0 if self.idle < float("inf") else self.idle)  # for a browser that never comes
         self._loop.call_soon(self._is_ready.set)
-        await serving.serve(sockets=[self._socket])
+        with suppress(InvalidState):  # raised by the end of a page that is being closed at this moment
+            await serving.serve(sockets=[self._socket])
 
     def _close_in(self, seconds: float) -> None:
         """End the server after so many seconds, unless a page comes."""

@@ -6,7 +6,7 @@ that decide each of them. Nothing is computed here: what is shown is what the tw
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from typing import Any, NamedTuple
@@ -24,13 +24,10 @@ __all__ = ["HANDLERS", "TRACED", "Trace", "TraceStep", "trace"]
 #: The methods that have a pure twin with steps.
 TRACED = (*(name for name in METHODS if name != "auto"), *CLASSICS)
 
-MAX_STEPS = 100_000
-"""Of a trace: 20 MB in a browser."""
+MAX_STEPS = 40_000
+"""Of a trace: 10 MB on the way to the page."""
 
-MAX_ORIGIN_PX = 1024
-
-MAX_EXACT = 2**53
-"""Integers beyond it would be rounded by JavaScript, and are sent as text."""
+MAX_ORIGIN_PX, MAX_SIDE_PX, MAX_TRIANGLES = 1024, 1024, 1000
 
 
 class TraceStep(NamedTuple):
@@ -132,13 +129,10 @@ class Recorder:
 
 
 def plain(value: Any) -> Any:
-    """Return a number, or numbers, as JSON and JavaScript hold them."""
+    """Return a number, or numbers, as Python has them."""
     if isinstance(value, np.ndarray | tuple | list):
         return [plain(one) for one in value]
-    number = value.item() if isinstance(value, np.generic) else value
-    if isinstance(number, float):
-        return number if np.isfinite(number) else str(number)
-    return str(number) if isinstance(number, int) and abs(number) > MAX_EXACT else number
+    return value.item() if isinstance(value, np.generic) else value
 
 
 def find_twin(name: str, subpixel_bits: int) -> Callable[..., NDArray[np.int32]]:
@@ -193,12 +187,17 @@ def trace(
     Raises
     ------
     ValueError
-        As `topleft.overdraw`; for a method without a twin; and where there would be more than 100,000 steps.
+        As `topleft.overdraw`; for a method without a twin; and where there would be more than 40,000 steps.
     """
     size, draw = as_size(size), find_twin(method, subpixel_bits)
     x, y = (int(at) for at in origin)
     if not 0 <= min(x, y) <= max(x, y) <= MAX_ORIGIN_PX:
         raise ValueError(f"origin must lie in 0 to {MAX_ORIGIN_PX} to be traced, got {(x, y)}")
+    if max(size) > MAX_SIDE_PX or len(np.asarray(triangles)) > MAX_TRIANGLES:
+        raise ValueError(
+            f"a trace must have {MAX_SIDE_PX} pixels a side and {MAX_TRIANGLES} triangles at most, got {size} and "
+            f"{len(np.asarray(triangles))}"
+        )
     xy = np.asarray(vertices, np.float64)[:, :2]
     found = find_method(method)
     options: dict[str, Any] = {"method": method, "origin": (x, y)}
@@ -212,24 +211,62 @@ def trace(
     return Trace(method, size, tuple(recorder.steps), counts)
 
 
+def told(steps: Sequence[TraceStep]) -> Iterator[tuple[str, list[tuple[str, str, str]]]]:
+    """Yield a sentence, and its values as name, text, and what it changed by since the last of its kind."""
+    before: dict[tuple[str, int], Mapping[str, Any]] = {}
+    for step in steps:
+        x, y, values = step.x, step.y, step.values
+        is_in = "drawn" if step.is_drawn else "inside" if values.get("is_inside") else "outside"
+        sentence = {
+            "triangle": f"Triangle {step.triangle} is set up.",
+            "row": f"Row {y} of triangle {step.triangle}.",
+            "line": f"The {values.get('side')} line passes pixel {x}, {y}.",
+            "test": f"Pixel {x}, {y} of triangle {step.triangle}: {is_in}.",
+            "span": f"Pixels {x} to {step.last} of row {y} are drawn.",
+        }[step.kind]
+        last = before.get((step.kind, step.triangle), {})
+        numbers = {name: value for name, value in values.items() if name not in ("is_inside", "side")}
+        yield sentence, [(name, text_of(value), change_of(last.get(name), value)) for name, value in numbers.items()]
+        before[step.kind, step.triangle] = values
+
+
+def text_of(value: Any) -> str:
+    """Return a value as it is read."""
+    if isinstance(value, list):
+        return ", ".join(map(text_of, value))
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def change_of(before: Any, value: Any) -> str:
+    """Return by what a number has changed, "" where there is none to compare with."""
+    if not (isinstance(before, int | float) and isinstance(value, int | float)):
+        return ""
+    return f"{value - before:+.6g}"
+
+
 def answer(_: Session, request: Request) -> Reply:
-    """Answer the page: the steps of a method, each as a list [kind, triangle, x, y, last, is drawn, values]."""
+    """Answer the page: steps as lists [x, y, last, is drawn, triangle, kind, sentence, values], and the outlines."""
+    origin = tuple(request.get("origin", (0, 0)))
     made = trace(
         request["vertices"],
         request["triangles"],
         tuple(request["size"]),
         method=request["method"],
         subpixel_bits=int(request.get("subpixel_bits", 8)),
-        origin=tuple(request.get("origin", (0, 0))),
+        origin=origin,
     )
-    summary = find_method(made.method)
+    method = find_method(made.method)
+    corners = np.asarray(request["vertices"], np.float64)[:, :2] - origin
+    steps = [
+        (step.x, step.y, step.last, step.is_drawn, step.triangle, step.kind, *words)
+        for step, words in zip(made.steps, told(made.steps), strict=True)
+    ]
     header = {
-        "method": made.method,
         "size": made.size,
-        "summary": summary.summary,
-        "source": summary.source,
+        "steps": steps,
+        "about": f"{method.summary[0].upper()}{method.summary[1:]}. {method.source}.",
         "methods": TRACED,
-        "steps": [(*step[:6], step.values) for step in made.steps],
+        "outlines": [" ".join(f"{x},{y}" for x, y in corners[row].tolist()) for row in request["triangles"]],
     }
     return Reply(header, {"counts": made.counts})
 

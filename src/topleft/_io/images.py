@@ -8,13 +8,13 @@ from __future__ import annotations
 import io
 import os
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from topleft._base.arrays import as_array, as_path
+from topleft._base.arrays import as_array
+from topleft._base.remote import Place, as_place
 from topleft._base.whole_file import write_whole
 from topleft._io import png
 from topleft.errors import ImageError
@@ -59,8 +59,9 @@ def save_image(
 
     Parameters
     ----------
-    path : path
-        PNG, JPEG, WebP (lossless), TIFF, .npy or .npz, by the end of the name. A file of that name is replaced.
+    path : path or URL
+        PNG, JPEG, WebP (lossless), TIFF, .npy or .npz, by the end of the name. A file of that name is replaced. A URL
+        is whatever fsspec can write to, "s3://bucket/name.png".
     image : (H, W), (H, W, 3) or (H, W, 4) uint8, or (H, W) bool
         The picture; a mask becomes 0 and 255. PNG also holds (H, W, 2) uint8, grey with alpha, and (H, W) uint16; TIFF
         also (H, W) of uint16, int32 or float32, and (H, W, K) float32, a page for each channel. For .npy any array, for
@@ -89,27 +90,27 @@ def save_image(
     ...     Path(folder, "mask.png").exists()
     True
     """
-    path = as_path("path", path)
-    suffix = path.suffix.lower()
+    place = as_place("path", path)
+    suffix = place.suffix.lower()
     if suffix not in SUFFIXES:
-        raise ImageError(f"cannot write {str(path)!r}: format {path.suffix!r} is none of {' '.join(SUFFIXES)}")
+        raise ImageError(f"cannot write {str(place)!r}: format {place.suffix!r} is none of {' '.join(SUFFIXES)}")
     if text and suffix != ".png":
-        raise ImageError(f"cannot write {str(path)!r}: text goes into .png only")
+        raise ImageError(f"cannot write {str(place)!r}: text goes into .png only")
     if suffix == ".npz":
         arrays: dict[str, Any] = dict(image) if isinstance(image, Mapping) else {"image": image}
-        write_whole(path, lambda file: np.savez_compressed(file, **arrays))
+        write_whole(place, lambda file: np.savez_compressed(file, **arrays))
         return
     if isinstance(image, Mapping):
-        raise ImageError(f"cannot write {str(path)!r}: several arrays by name need .npz")
+        raise ImageError(f"cannot write {str(place)!r}: several arrays by name need .npz")
     picture = as_array("image", image)
     if suffix == ".npy":
-        write_whole(path, lambda file: np.save(file, picture, allow_pickle=False))
+        write_whole(place, lambda file: np.save(file, picture, allow_pickle=False))
         return
     if picture.dtype == np.bool_:
         picture = np.where(picture, np.uint8(255), np.uint8(0))
-    _check_holds(path, picture)
+    _check_holds(place, picture)
     if suffix == ".png":
-        write_whole(path, lambda file: file.writelines(png.pieces(picture, text=text)))
+        write_whole(place, lambda file: file.writelines(png.pieces(picture, text=text)))
         return
     if suffix in (".jpg", ".jpeg") and picture.shape[2:] == (4,):
         picture = composite(picture, background)
@@ -124,7 +125,7 @@ def save_image(
     # In memory first: Pillow's JPEG encoder does not notice a disk that is full, its TIFF one reads back what it wrote.
     encoded = io.BytesIO()
     first.save(encoded, format=kind, **options)
-    write_whole(path, lambda file: file.write(encoded.getbuffer()))
+    write_whole(place, lambda file: file.write(encoded.getbuffer()))
 
 
 def composite(image: npt.NDArray[np.uint8], background: tuple[int, int, int]) -> npt.NDArray[np.uint8]:
@@ -134,7 +135,7 @@ def composite(image: npt.NDArray[np.uint8], background: tuple[int, int, int]) ->
     return ((mixed + 127) // 255).astype(np.uint8)
 
 
-def _check_holds(path: Path, image: npt.NDArray[Any]) -> None:
+def _check_holds(path: Place, image: npt.NDArray[Any]) -> None:
     """Raise an error for what the format cannot hold."""
     kinds = HOLDS[path.suffix.lower()]
     channels = "".join(f", {n}" for n in image.shape[2:])

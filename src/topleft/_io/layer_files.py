@@ -11,13 +11,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from topleft._base.arrays import as_number, as_path
+from topleft._base.arrays import as_number
+from topleft._base.remote import Place, as_place, place_of
 from topleft._io.images import SUFFIXES, save_image
 from topleft.errors import ImageError
 
@@ -35,7 +35,7 @@ MILLIMETRES = 1000.0
 LARGEST = 65535
 
 
-def layer_paths(destination: Path, names: Sequence[str]) -> dict[str, Path]:
+def layer_paths(destination: Place, names: Sequence[str]) -> dict[str, Place]:
     """Return the file of each layer: `{layer}` in the name stands for the layer; .npz holds all of them.
 
     Raises
@@ -49,7 +49,7 @@ def layer_paths(destination: Path, names: Sequence[str]) -> dict[str, Path]:
         raise ImageError(f"cannot write {text!r}: format {destination.suffix!r} is none of {known}")
     if destination.suffix.lower() != ".npz" and "{layer}" not in text and len(names) > 1:
         raise ImageError(f"{len(names)} layers need {{layer}} in the name, or .npz, got {text!r}")
-    return {name: Path(text.replace("{layer}", name)) for name in names}
+    return {name: place_of(text.replace("{layer}", name)) for name in names}
 
 
 def save_layers(
@@ -59,12 +59,12 @@ def save_layers(
     scale: float | None = None,
     matrix: npt.NDArray[np.float64] | None = None,
     background: tuple[int, int, int] = (255, 255, 255),
-) -> tuple[Path, ...]:
+) -> tuple[Place, ...]:
     """Write layers, each file whole or not at all; returns the files.
 
     Parameters
     ----------
-    destination : path
+    destination : path or URL
         `{layer}` in the name stands for the name of the layer. The end tells the format:
 
         * .npz, .npy: the arrays as they are.
@@ -89,15 +89,15 @@ def save_layers(
     OSError
         If a file cannot be written.
     """
-    destination = as_path("path", destination)
+    place = as_place("path", destination)
     if scale is not None:
         scale = as_number("scale", scale)
         if not 0 < scale < np.inf:
             raise ValueError(f"scale must be positive and finite, got {scale}")
-    paths = layer_paths(destination, list(layers))
-    if destination.suffix.lower() == ".npz" and "{layer}" not in str(destination):
-        save_image(destination, layers if matrix is None else {**layers, "clip_from_world": matrix})
-        return (destination,)
+    paths = layer_paths(place, list(layers))
+    if place.suffix.lower() == ".npz" and "{layer}" not in str(place):
+        save_image(place, layers if matrix is None else {**layers, "clip_from_world": matrix})
+        return (place,)
     # All are converted before the first is written: a layer that does not fit leaves no file.
     stored = {name: _stored(paths[name], name, array, scale) for name, array in layers.items()}
     for name, (array, text) in stored.items():
@@ -105,7 +105,7 @@ def save_layers(
     return tuple(paths.values())
 
 
-def _stored(path: Path, name: str, array: Array, scale: float | None) -> tuple[Array, dict[str, str] | None]:
+def _stored(path: Place, name: str, array: Array, scale: float | None) -> tuple[Array, dict[str, str] | None]:
     """What goes into the file, and the notes that tell what it means."""
     suffix = path.suffix.lower()
     if suffix in (".npy", ".npz") or array.dtype == np.uint8:
@@ -127,7 +127,7 @@ def _stored(path: Path, name: str, array: Array, scale: float | None) -> tuple[A
 
 
 def _numbers_of_16_bits(
-    path: Path, name: str, array: Array, scale: float | None
+    path: Place, name: str, array: Array, scale: float | None
 ) -> tuple[npt.NDArray[np.uint16], dict[str, str]]:
     """Numbers in equal steps; 0 where they are not finite, or ids that are -1."""
     if array.dtype == np.int32:
@@ -149,7 +149,7 @@ def _numbers_of_16_bits(
     return values, _notes(name, step, offset)
 
 
-def _check_steps(path: Path, name: str, step: float, steps: npt.NDArray[Any]) -> None:
+def _check_steps(path: Place, name: str, step: float, steps: npt.NDArray[Any]) -> None:
     """Raise an error for what 16 bits do not hold."""
     low, high = steps.min(initial=0), steps.max(initial=0)
     if not (low >= 0 and high <= LARGEST):

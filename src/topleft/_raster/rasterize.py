@@ -251,8 +251,9 @@ def draw_fragments(
     depth_test: DepthTestOption | None,
     background_depth: float | None,
     out: object,
+    names: NDArray[np.int32] | None = None,
 ) -> Fragments:
-    """`rasterize`, on the memory given."""
+    """`rasterize`, on the memory given; with `names` triangle i is called names[i], which ascend."""
     refuse_classic(view, "depth")
     refuse_many(view, "rasterize")
     asked = Asked.parse(depth_test, background_depth, out)
@@ -261,6 +262,8 @@ def draw_fragments(
     if frags is not None:
         return frags.drawn_from(corners)
     snapped = snap_mesh(memory, vertices, triangles, view, with_depth=True, out=out)
+    if names is not None:
+        snapped = replace(snapped, mesh=snapped.mesh.named(names))
     route, drawing = choices.route(view, snapped, asked.test, wants_depth=asked.depth_out is not None)
     return ROUTES[route](memory, snapped, view, asked, drawing).drawn_from(corners)
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator, Mapping
-from pathlib import Path
 from typing import Any, Unpack
 
 import numpy as np
@@ -15,6 +14,7 @@ import numpy.typing as npt
 
 from topleft._base.arrays import as_real, as_size, shown
 from topleft._base.color import ColorLike
+from topleft._base.remote import Place
 from topleft._camera.camera import CameraLike, as_camera, camera_for
 from topleft._io.layer_files import save_layers
 from topleft._lod.detail import detailed
@@ -69,7 +69,7 @@ class ViewLayers(Mapping[str, Array]):
 
     def save(
         self, path: str | os.PathLike[str], layer: str | None = None, *, scale: float | None = None
-    ) -> tuple[Path, ...]:
+    ) -> tuple[Place, ...]:
         """Write the layers, or one of them, and return the files; see `topleft._io.layer_files.save_layers`.
 
         Raises

@@ -1,6 +1,8 @@
 """Huge rasters: drawn window by window, handed on to Dask, written to Zarr, GeoTIFF and Deep Zoom.
 
+ahead.py      makes blocks and windows ahead of who takes them, on threads
 blocks.py     reads meshes of any size: arrays, arrays in files, binary PLY and STL, blocks of triangles
+cluster.py    writes windows on the workers of a Dask cluster
 dask_array.py hands a raster to Dask, a chunk a window
 deepzoom.py   writes pyramids of Deep Zoom
 drawing.py    draws what a window shows: masks, counts, labels, depth, colours, fields, heights

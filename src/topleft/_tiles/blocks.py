@@ -22,7 +22,9 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
+from topleft import _engine
 from topleft._base.arrays import INT32_MAX, as_array, shown
+from topleft._base.memory import FRESH, Memory
 from topleft._io.load import load
 from topleft._io.ply import mapped_elements
 from topleft._io.stl_off import mapped_corners
@@ -37,6 +39,9 @@ BLOCK = 1 << 17
 
 HASH_ROWS = 1 << 20
 
+INDICES = (np.int32, np.int64)
+"""Dtypes of indices that the engine reads."""
+
 
 class Triangles(Protocol):
     """Triangles that are asked for by their indices."""
@@ -47,8 +52,8 @@ class Triangles(Protocol):
     n_faces: int
     n_vertices: int
 
-    def corners(self, which: slice | I32) -> Array:
-        """The corners (N, 3, C) of triangles."""
+    def corners(self, which: slice | I32, memory: Memory = FRESH) -> Array:
+        """The corners (N, 3, C) of triangles, in memory that is given or in a fresh array."""
 
     def indices(self, which: slice | I32) -> Array:
         """The vertices (N, 3) of triangles."""
@@ -78,26 +83,37 @@ class IndexedTriangles:
         """The vertices (N, 3) of triangles."""
         return np.asarray(self.triangles[which])
 
-    def corners(self, which: slice | I32) -> Array:
-        """The corners (N, 3, C) of triangles.
+    def corners(self, which: slice | I32, memory: Memory = FRESH) -> Array:
+        """The corners (N, 3, C) of triangles, in memory that is given or in a fresh array.
 
         Raises
         ------
         IndexError
             If a triangle names a vertex that does not exist.
         """
+        points, triangles = self.columns[0], self.triangles
+        if len(self.columns) == 1 and is_copied(points) and is_copied(triangles) and triangles.dtype in INDICES:
+            first, end, _ = which.indices(self.n) if isinstance(which, slice) else (0, len(which), 1)
+            found: Array = memory.empty("corners", (end - first, 3, self.n_components), points.dtype)
+            mesh = _engine.StridedMesh(points, triangles)
+            bad = mesh.take(None if isinstance(which, slice) else which, first, found.reshape(-1).view(np.uint8))
+            if bad >= 0:
+                raise self._bad_index(which, bad)
+            return found
         rows = self.indices(which)
         if rows.size and not (rows.min() >= 0 and rows.max() < self.n_vertices):
-            bad = int(np.argmax(((rows < 0) | (rows >= self.n_vertices)).any(axis=1)))
-            number = (which.start or 0) + bad if isinstance(which, slice) else int(which[bad])
-            raise IndexError(
-                f"triangles must hold indices in [0, {self.n_vertices}), the number of vertices; "
-                f"row {number} is {rows[bad].tolist()}"
-            )
+            raise self._bad_index(which, int(np.argmax(((rows < 0) | (rows >= self.n_vertices)).any(axis=1))))
         flat = rows.ravel()
         if len(self.columns) == 1:
-            return self.columns[0].take(flat, axis=0).reshape(len(rows), 3, self.n_components)
+            return points[flat].reshape(len(rows), 3, self.n_components)
         return np.stack([column[flat] for column in self.columns], axis=-1).reshape(len(rows), 3, -1)
+
+    def _bad_index(self, which: slice | I32, bad: int) -> IndexError:
+        number = (which.start or 0) + bad if isinstance(which, slice) else int(which[bad])
+        return IndexError(
+            f"triangles must hold indices in [0, {self.n_vertices}), the number of vertices; "
+            f"row {number} is {self.triangles[number].tolist()}"
+        )
 
     def parts(self) -> Iterator[Array]:
         """All that the mesh consists of, in pieces."""
@@ -114,6 +130,11 @@ class IndexedTriangles:
         vars(self).update({**state, "columns": columns, "triangles": received(state["triangles"])})
 
 
+def is_copied(array: Array) -> bool:
+    """Whether the engine can copy rows of an array: native numbers that lie side by side, at any distance of rows."""
+    return array.dtype.isnative and array.ndim == 2 and array.strides[1] == array.itemsize
+
+
 class SeparateTriangles:
     """Triangles that share no vertices, in a mapped file: three corners after each other."""
 
@@ -128,7 +149,7 @@ class SeparateTriangles:
         numbers = np.arange(*which.indices(self.n)) if isinstance(which, slice) else which.astype(np.int64)
         return 3 * numbers[:, None] + np.arange(3)
 
-    def corners(self, which: slice | I32) -> Array:
+    def corners(self, which: slice | I32, memory: Memory = FRESH) -> Array:  # noqa: ARG002
         """The corners (N, 3, 3) of triangles."""
         return np.array(self._rows[which], np.float32).reshape(-1, 3, 3)
 
@@ -234,11 +255,22 @@ def triangles_of_file(path: Path) -> Triangles:
         if suffix == ".ply" and (found := mapped_elements(path)) is not None:
             of_vertices, triangles, of_faces = found
             columns = of_vertices["x"], of_vertices["y"], of_vertices["z"]
-            return IndexedTriangles(columns, triangles, named={**of_faces, **of_vertices})
+            return IndexedTriangles(side_by_side(columns), triangles, named={**of_faces, **of_vertices})
     except MeshError as error:
         raise MeshError(f"cannot read {path}: {error}") from None
     mesh: Any = load(path)
     return triangles_of(mesh, None)
+
+
+def side_by_side(columns: tuple[Array, ...]) -> tuple[Array, ...]:
+    """Return one array (V, 3) of three columns whose numbers lie side by side in a file; others as they are."""
+    x, dtype = columns[0], columns[0].dtype
+    places = [column.__array_interface__["data"][0] - x.__array_interface__["data"][0] for column in columns]
+    if any(column.dtype != dtype for column in columns) or places != [0, dtype.itemsize, 2 * dtype.itemsize]:
+        return columns
+    base: Any = x.base
+    offset = x.__array_interface__["data"][0] - base.__array_interface__["data"][0]
+    return (np.ndarray((len(x), 3), dtype, base, offset, (x.strides[0], dtype.itemsize)),)
 
 
 def triangles_of_blocks(blocks: Iterator[Any], folder: str | os.PathLike[str] | None) -> IndexedTriangles:

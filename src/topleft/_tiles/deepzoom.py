@@ -10,18 +10,19 @@ from __future__ import annotations
 import io
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from topleft._base.arrays import as_count, as_path, check_progress, shown
+from topleft._base.arrays import as_count, check_progress, shown
 from topleft._base.color import id_colors
+from topleft._base.remote import as_place
 from topleft._io.png import encode
 from topleft._tiles.folders import DiskFolder, check_space
-from topleft._tiles.levels import Progress, Written, halved, level_size, n_levels_to, write_levels
+from topleft._tiles.levels import Progress, Written, check_executor, halved, level_size, n_levels_to, write_levels
 
 if TYPE_CHECKING:
     from topleft._tiles.tiles import Tiles
@@ -57,6 +58,10 @@ class DeepZoomLayout:
         columns = range(column * k_columns, min((column + 1) * k_columns, -(-width // t)))
         return [(r, c) for r in rows for c in columns]
 
+    def seen_from_elsewhere(self) -> DeepZoomLayout:
+        """The same layout for processes that run in other folders."""
+        return replace(self, folder=self.folder.absolute())
+
     def is_there(self, level: int, row: int, column: int) -> bool:
         """Whether all tiles of a block are there."""
         return all(self.folder.has(self.name(level, r, c)) for r, c in self.tiles_of(level, row, column))
@@ -91,9 +96,13 @@ def write_deepzoom(
     colors: Callable[[Array], U8] | None,
     resume: bool,
     progress: Progress | bool | None,
+    executor: Any,
 ) -> Written:
     """`Tiles.to_deepzoom`."""
-    file = as_path("path", path)
+    check_executor(executor)
+    file = as_place("path", path)
+    if not isinstance(file, Path):
+        raise ValueError(f"path must be on this machine, got {path!r}: to_zarr writes to URLs")
     if file.suffix != ".dzi":
         raise ValueError(f"path must end in .dzi, got {file.name!r}")
     side, window = as_count("tile", tile), raster.window_size
@@ -111,15 +120,16 @@ def write_deepzoom(
     n_levels = n_levels_to(raster.size, 1)
     folder = DiskFolder(file.with_name(f"{file.stem}_files"))
     layout = DeepZoomLayout(folder, raster.size, window, side, ground.shape[2:], n_levels)
-    begin(raster, layout, f"{raster.fingerprint} deepzoom {side} {ground.tolist()}", file, resume)
+    begin(raster, layout, f"{raster.fingerprint} deepzoom 2 {side} {ground.tolist()}", file, resume)
     written = write_levels(
         raster,
         layout,
         dtype=np.uint8,
         blank=ground[0, 0],
-        halve=lambda pixels: halved(pixels, None, is_mean=True),
+        halve=halved_colors,
         prepare=lambda pixels: checked(paint(pixels), pixels.shape[:2]),
         progress=progress,
+        executor=executor,
     )
     fill_blanks(layout, ground)
     width, height = raster.size
@@ -184,9 +194,36 @@ def painting(raster: Tiles) -> Callable[[Array], U8]:
         return lambda mask: mask.view(np.uint8) * np.uint8(255)
     if raster.kind == "coverage":
         return lambda share: np.rint(share * np.float32(255)).astype(np.uint8)
+    if raster.kind == "overdraw":
+        return lambda counts: np.rint(np.minimum(counts, 255)).astype(np.uint8)
+    if raster.kind in ("depth", "field", "height_map"):
+        low, high = raster.range_of_values
+        return lambda values: greys(values, raster.painter.empty, low, high)
     if raster.dtype == np.uint8 and raster.shape[2:] in ((), (2,), (3,), (4,)):
         return lambda pixels: pixels
     raise ValueError(f"colors must say how {raster.dtype} of kind {raster.kind!r} becomes uint8")
+
+
+def greys(values: Array, empty: Any, low: float, high: float) -> U8:
+    """Greys (H, W, 2) from black at the lowest value to white at the highest, transparent where there is none."""
+    is_there = ~np.isnan(values) if values.dtype.kind == "f" and np.isnan(empty) else values != empty
+    numbers = np.where(is_there, values, low).astype(np.float64)
+    shade = (numbers - low) * (255 / (high - low)) if high > low else np.full(values.shape, 128.0)
+    return np.stack([np.rint(shade.clip(0, 255)) * is_there, is_there * 255], axis=-1).astype(np.uint8)
+
+
+def halved_colors(pixels: U8) -> U8:
+    """Return colours of half the size: the mean of four, as much of each as it is opaque."""
+    if pixels.shape[2:] not in ((2,), (4,)):
+        return halved(pixels, None, is_mean=True)
+    height, width = pixels.shape[:2]
+    even = np.pad(pixels, [(0, height % 2), (0, width % 2), (0, 0)], "edge").astype(np.uint32)
+    even[..., :-1] *= even[..., -1:]
+    total = even[::2, ::2] + even[::2, 1::2] + even[1::2, ::2] + even[1::2, 1::2]
+    alpha = np.maximum(total[..., -1:], 1)
+    return np.concatenate([(total[..., :-1] + alpha // 2) // alpha, (total[..., -1:] + 2) >> 2], axis=-1).astype(
+        np.uint8
+    )
 
 
 def label_colors(labels: Array) -> U8:

@@ -18,16 +18,15 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from topleft import _engine
 from topleft._base.arrays import as_array, as_colors, shown
-from topleft._base.memory import KeptMemory
+from topleft._base.memory import FRESH, Memory
 from topleft._base.options import Per, Sampling, Sink, check_choice, parse
-from topleft._base.threads import count_threads, run_parts
 from topleft._field.field import depth_of, dtype_of_field, fill_planes, is_per_face, nodata_of, visible
 from topleft._field.grid import Grid
 from topleft._raster.rasterize import Asked, draw_fragments
 from topleft._raster.verbs import coverage, fill, overdraw
 from topleft._raster.view import View
+from topleft._tiles.ahead import kept_memory
 from topleft._tiles.blocks import Triangles
 
 __all__ = ["KINDS", "Painter", "Payload", "painter_of"]
@@ -38,6 +37,8 @@ I32 = npt.NDArray[np.int32]
 Size = tuple[int, int]
 
 VIEW_OPTIONS = ("cull", "subpixel_bits")
+
+RANGE_ROWS = 1 << 20
 
 
 @dataclass(frozen=True)
@@ -67,6 +68,14 @@ class Painter:
     nodata: float | None = field(default=None, init=False)
     """What a file calls the pixels without data, where it can tell."""
     channels: tuple[int, ...] = field(default=(), init=False)
+    low: float = field(default=np.inf, init=False)
+    high: float = field(default=-np.inf, init=False)
+    """The range of heights, depths or values, once the index is made."""
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether vertices stay where they are, and are not snapped."""
+        return bool(self.view.get("subpixel_bits") == "exact")
 
     def prepare(self, triangles: Triangles, values: Any) -> None:
         """Check options and values against the mesh."""
@@ -83,6 +92,11 @@ class Painter:
                     raise ValueError(f"vertices must be finite where a triangle uses them, got {at} {where(row)}")
                 raise ValueError(f"vertices must have a depth that float32 can hold, got {at} {where(row)}")
 
+    def widen(self, low: float, high: float) -> None:
+        """Note the lowest and the highest value of a block."""
+        with _checking:  # blocks are looked at on several threads
+            self.low, self.high = min(self.low, low), max(self.high, high)
+
     def to_pixels(self, points: Array) -> F64:
         """Pixels (N, 2) of points (N, C)."""
         if self.grid is not None:
@@ -97,9 +111,9 @@ class Painter:
         pixels = self.grid.to_pixels(flat)
         return np.column_stack([pixels, flat[:, 2]]) if self.n_components == 3 and self.needs_depth else pixels
 
-    def gather(self, triangles: Triangles, which: I32) -> Payload:
+    def gather(self, triangles: Triangles, which: I32, memory: Memory = FRESH) -> Payload:
         """Take out of the mesh what a window needs."""
-        return Payload(which, triangles.corners(which))
+        return Payload(which, triangles.corners(which, memory))
 
     def draw(self, payload: Payload, origin: Size, size: Size, threads: int | None, out: Array | None = None) -> Array:
         """Return the pixels of a window (H, W)."""
@@ -136,15 +150,7 @@ def rows(n: int) -> I32:
     return known[:n]
 
 
-_kept = threading.local()
-
-
-def memory_of_thread() -> KeptMemory:
-    """Memory that a thread keeps from window to window."""
-    memory: KeptMemory | None = getattr(_kept, "memory", None)
-    if memory is None:
-        memory = _kept.memory = KeptMemory()
-    return memory
+_checking = threading.Lock()
 
 
 class CoveragePainter(Painter):
@@ -197,13 +203,11 @@ class FragmentsPainter(Painter):
         self.asked = asked
         self.depth_test = self.options.get("depth_test", "less")
 
-    def drawn(self, payload: Payload, origin: Size, size: Size, threads: int | None, out: Any) -> Any:
-        """The fragments of a window, in memory that the thread's next window overwrites."""
+    def draw_into(self, payload: Payload, origin: Size, size: Size, threads: int | None, out: Any) -> None:
+        """Draw a window into ids or depth, the other one into memory that the thread's next window overwrites."""
         view = View.parse(size, self.view_at(origin, threads))  # type: ignore[arg-type]
-        points, n = self.points(payload), len(payload.triangles)
-        return draw_fragments(
-            memory_of_thread(), points, rows(n), view, self.depth_test, self.asked.background, out
-        )  # fmt: skip
+        points, own, names = self.points(payload), rows(len(payload.triangles)), payload.triangles
+        draw_fragments(kept_memory(), points, own, view, self.depth_test, self.asked.background, out, names)
 
 
 class LabelsPainter(FragmentsPainter):
@@ -217,11 +221,7 @@ class LabelsPainter(FragmentsPainter):
     def draw(self, payload: Payload, origin: Size, size: Size, threads: int | None, out: Array | None = None) -> Array:
         """Return the pixels of a window (H, W)."""
         ids = out if out is not None and out.flags.carray else np.empty(size[::-1], np.int32)
-        self.drawn(payload, origin, size, threads, (ids, None))
-        names = np.empty(1 + len(payload.triangles), np.int32)
-        names[0], names[1:] = -1, payload.triangles
-        flat, n_parts = ids.reshape(-1), count_threads(threads, ids.size >> 6)
-        run_parts(lambda first, end: _engine.name_triangles(flat, first, end, names), flat.size, n_parts)
+        self.draw_into(payload, origin, size, threads, (ids, None))
         if out is not None and ids is not out:
             out[...] = ids
         return ids if out is None else out
@@ -235,11 +235,18 @@ class DepthPainter(FragmentsPainter):
         super().prepare(triangles, values)
         self.dtype = np.dtype(np.float32)
         self.empty = self.nodata = float(np.float32(self.asked.background))
+        self.low, self.high = (np.inf, -np.inf) if triangles.n_components == 3 else (0.0, 0.0)
+
+    def check(self, corners: Array, where: Callable[[int], str]) -> None:
+        """Look at a block of corners (N, 3, C) while the index is made."""
+        super().check(corners, where)
+        if len(corners) and corners.shape[2] == 3:
+            self.widen(float(corners[..., 2].min()), float(corners[..., 2].max()))
 
     def draw(self, payload: Payload, origin: Size, size: Size, threads: int | None, out: Array | None = None) -> Array:
         """Return the pixels of a window (H, W)."""
         depth = np.empty(size[::-1], np.float32) if out is None else out
-        self.drawn(payload, origin, size, threads, (None, depth))
+        self.draw_into(payload, origin, size, threads, (None, depth))
         return depth
 
 
@@ -267,10 +274,10 @@ class FillPainter(Painter):
         sample = self.draw(nothing, (0, 0), (1, 1), 1)
         self.dtype, self.empty = sample.dtype, sample[0, 0].copy()
 
-    def gather(self, triangles: Triangles, which: I32) -> Payload:
+    def gather(self, triangles: Triangles, which: I32, memory: Memory = FRESH) -> Payload:
         """Take out of the mesh what a window needs."""
         at = which if self.is_flat else triangles.indices(which).ravel()
-        return Payload(which, triangles.corners(which), np.ascontiguousarray(self.values[at]))
+        return Payload(which, triangles.corners(which, memory), np.ascontiguousarray(self.values[at]))
 
     def draw(self, payload: Payload, origin: Size, size: Size, threads: int | None, out: Array | None = None) -> Array:
         """Return the pixels of a window (H, W) or (H, W, C)."""
@@ -303,13 +310,21 @@ class FieldPainter(Painter):
         self.has_nodata, self.nodata = nodata is not None, float(self.empty)
         self.values = array
 
-    def gather(self, triangles: Triangles, which: I32) -> Payload:
+    def find_range(self) -> None:
+        """Note the lowest and the highest value, block by block: values may be mapped."""
+        for first in range(0, len(self.values), RANGE_ROWS):
+            part = self.values[first : first + RANGE_ROWS]
+            part = part[np.isfinite(part)] if part.dtype.kind == "f" else part
+            if len(part):
+                self.widen(float(part.min()), float(part.max()))
+
+    def gather(self, triangles: Triangles, which: I32, memory: Memory = FRESH) -> Payload:
         """Take out of the mesh what a window needs."""
         if self.is_of_faces:
             values = self.values[which if self.faces is None else self.faces[which]]
         else:
             values = self.values[triangles.indices(which).ravel()].astype(np.float64, copy=False)
-        return Payload(which, triangles.corners(which), values)
+        return Payload(which, triangles.corners(which, memory), values)
 
     def draw(self, payload: Payload, origin: Size, size: Size, threads: int | None, out: Array | None = None) -> Array:
         """Return the pixels of a window (H, W)."""
@@ -342,7 +357,6 @@ class HeightPainter(Painter):
         if triangles.n_components != 3:
             raise ValueError(f"a height map needs points of shape (V, 3), got (V, {triangles.n_components})")
         self.dtype, self.empty, self.nodata = np.dtype(np.float64), np.nan, np.nan
-        self.low, self.high = np.inf, -np.inf
 
     def check(self, corners: Array, where: Callable[[int], str]) -> None:
         """Look at a block of corners (N, 3, C) while the index is made."""
@@ -355,7 +369,7 @@ class HeightPainter(Painter):
                 f"vertices must be finite where a triangle uses them, got {corners[row].tolist()} {where(row)}"
             )
         heights = corners[..., 2]
-        self.low, self.high = min(self.low, float(heights.min())), max(self.high, float(heights.max()))
+        self.widen(float(heights.min()), float(heights.max()))
 
     def draw(self, payload: Payload, origin: Size, size: Size, threads: int | None, out: Array | None = None) -> Array:
         """Return the pixels of a window (H, W)."""
@@ -402,7 +416,7 @@ def painter_of(kind: str, grid: Grid | None, triangles: Triangles, values: Any, 
     if values is not None and not made.takes_values:
         raise ValueError(f"values are for the kinds 'fill' and 'field', got {shown(values)} for {kind!r}")
     view = {name: options[name] for name in VIEW_OPTIONS if name in options}
-    View.parse(1, view, why_snapped="the windows of a triangle are found on the grid")  # type: ignore[arg-type]
+    View.parse(1, view)  # type: ignore[arg-type]
     painter = made(grid, options, view, triangles.n_components)
     painter.prepare(triangles, values)
     return painter

@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import os
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Protocol
 
 from topleft._base.arrays import shown
+from topleft._base.remote import RemotePath, as_place
 from topleft._base.whole_file import write_whole
-from topleft.errors import MissingPackageError
 
 __all__ = ["DiskFolder", "Folder", "check_space", "folder_of"]
 
@@ -31,6 +32,9 @@ class Folder(Protocol):
 
     def exists(self) -> bool:
         """Whether anything is there."""
+
+    def absolute(self) -> Folder:
+        """The same folder for processes that run in other ones."""
 
 
 class DiskFolder:
@@ -63,6 +67,10 @@ class DiskFolder:
             return self.path.exists()
         return any(not name.startswith(".") for name in os.listdir(self.path))
 
+    def absolute(self) -> DiskFolder:
+        """The same folder for processes that run in other ones."""
+        return DiskFolder(self.path.absolute())
+
     def sweep(self) -> None:
         """Remove what a killed process had not renamed yet."""
         for left in self.path.rglob(".*.part"):
@@ -70,47 +78,44 @@ class DiskFolder:
 
 
 class RemoteFolder:
-    """What fsspec reaches; an object is there when it is whole."""
+    """What fsspec reaches."""
 
-    def __init__(self, url: str, storage: dict[str, Any] | None) -> None:
-        try:
-            from fsspec.core import url_to_fs
-        except ImportError:
-            raise MissingPackageError(
-                f"writing to {url} needs the package fsspec: pip install 'topleft[tiles]'"
-            ) from None
-        self._fs, self._root = url_to_fs(url, **(storage or {}))
+    def __init__(self, path: RemotePath) -> None:
+        self._path = path
+        path.exists()  # what is wrong with the URL is told before anything is drawn
 
     def put(self, name: str, content: bytes) -> None:
         """Write a chunk."""
-        path = f"{self._root}/{name}"
-        self._fs.makedirs(path.rpartition("/")[0], exist_ok=True)
-        self._fs.pipe_file(path, content)
+        (self._path / name).write_bytes(content)
 
     def get(self, name: str) -> bytes | None:
         """Read a chunk; None where there is none."""
         try:
-            return bytes(self._fs.cat_file(f"{self._root}/{name}"))
+            return (self._path / name).read_bytes()
         except FileNotFoundError:
             return None
 
     def has(self, name: str) -> bool:
         """Whether a chunk is there."""
-        return bool(self._fs.exists(f"{self._root}/{name}"))
+        return (self._path / name).exists()
 
     def exists(self) -> bool:
         """Whether anything is there."""
-        return bool(self._fs.exists(self._root))
+        return self._path.exists()
+
+    def absolute(self) -> RemoteFolder:
+        """The same folder for processes that run in other ones."""
+        return self
 
 
 def folder_of(path: str | os.PathLike[str], storage: dict[str, Any] | None = None) -> DiskFolder | RemoteFolder:
     """Return where chunks of a path or URL are kept."""
-    if not isinstance(path, str | os.PathLike):
-        raise TypeError(f"path must be a path or a URL, got {shown(path)}")
     if not (storage is None or isinstance(storage, dict)):
         raise TypeError(f"storage must be a dict or None, got {shown(storage)}")
-    text = os.fspath(path)
-    return RemoteFolder(text, storage) if "://" in text else DiskFolder(Path(text))
+    place = as_place("path", path)
+    if isinstance(place, RemotePath):
+        return RemoteFolder(replace(place, storage=tuple((storage or {}).items())))
+    return DiskFolder(place)
 
 
 def check_space(folder: Path, n_bytes: int, what: str) -> None:

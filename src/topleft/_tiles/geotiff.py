@@ -19,19 +19,20 @@ import os
 import shutil
 import struct
 import zlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from topleft._base.arrays import as_count, as_number, as_path, check_progress, shown
+from topleft._base.arrays import as_count, as_number, check_progress, shown
 from topleft._base.options import check_choice
+from topleft._base.remote import as_place
 from topleft._base.whole_file import write_whole
 from topleft._field.grid import Grid
 from topleft._tiles.folders import DiskFolder, check_space
-from topleft._tiles.levels import Progress, Written, halved, level_size, n_levels_to, write_levels
+from topleft._tiles.levels import Progress, Written, check_executor, halved, level_size, n_levels_to, write_levels
 from topleft.errors import MissingPackageError
 
 if TYPE_CHECKING:
@@ -78,6 +79,10 @@ class TiffLayout:
             range(row * k_rows, min((row + 1) * k_rows, rows)),
             range(column * k_columns, min((column + 1) * k_columns, columns)),
         )
+
+    def seen_from_elsewhere(self) -> TiffLayout:
+        """The same layout for processes that run in other folders."""
+        return replace(self, folder=self.folder.absolute())
 
     def is_there(self, level: int, row: int, column: int) -> bool:
         """Whether a block is there."""
@@ -175,16 +180,20 @@ def write_geotiff(
     overviews: bool,
     resume: bool,
     progress: Progress | bool | None,
+    executor: Any,
 ) -> Written:
     """`Tiles.to_geotiff`."""
-    file = as_path("path", path)
+    check_executor(executor)
+    file = as_place("path", path)
+    if not isinstance(file, Path):
+        raise ValueError(f"path must be on this machine, got {path!r}: to_zarr writes to URLs")
     check_choice("compression", compression, COMPRESSIONS)
     check_progress(progress)
     side, window = as_count("tile", tile), raster.window_size
     if side % 16:
         raise ValueError(f"tile must be a multiple of 16, got {side}")
     if any(w % side and w < length for w, length in zip(window, raster.size, strict=True)):
-        raise ValueError(f"tile must divide the windows of {window[0]} x {window[1]} pixels, got {side}")
+        raise ValueError(f"window must have sides of whole tiles, of {side} pixels, got {window[0]} x {window[1]}")
     if not (raster.size[0] and raster.size[1]):
         raise ValueError(f"a GeoTIFF has pixels, got a raster of {raster.size[0]} x {raster.size[1]}")
     if not file.absolute().parent.is_dir():
@@ -207,6 +216,7 @@ def write_geotiff(
         blank=raster.painter.empty,
         halve=lambda pixels: halved(pixels, raster.painter.nodata, is_mean=raster.has_means),
         progress=progress,
+        executor=executor,
     )
     write_whole(file, lambda out: assemble(layout, out, told, geo))
     shutil.rmtree(folder.path)

@@ -15,14 +15,14 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from topleft._base.arrays import check_progress
-from topleft._base.threads import available_threads
+from topleft._base.arrays import check_progress, shown
+from topleft._base.cluster import is_client
 from topleft.errors import MissingPackageError
 
 if TYPE_CHECKING:
     from topleft._tiles.tiles import Tiles
 
-__all__ = ["Layout", "Progress", "Step", "Written", "halved", "n_levels_to", "write_levels"]
+__all__ = ["Layout", "Progress", "Step", "Written", "check_executor", "halved", "n_levels_to", "write_levels"]
 
 Array = npt.NDArray[Any]
 
@@ -74,6 +74,9 @@ class Layout(Protocol):
     @property
     def n_levels(self) -> int:
         """How many resolutions there are."""
+
+    def seen_from_elsewhere(self) -> Layout:
+        """The same layout for processes that run in other folders."""
 
     def is_there(self, level: int, row: int, column: int) -> bool:
         """Whether all chunks of a block are there."""
@@ -132,6 +135,7 @@ def write_levels(
     halve: Callable[[Array], Array],
     prepare: Callable[[Array], Array] | None = None,
     progress: Progress | bool | None = None,
+    executor: Any = None,
 ) -> Written:
     """Write all blocks that are not there yet, level by level.
 
@@ -143,6 +147,8 @@ def write_levels(
         Makes the level above.
     prepare : function of an array, optional
         Makes what is written of the pixels of a window.
+    executor : dask.distributed.Client, optional
+        Whose workers draw and write the windows; levels are made of these here.
     """
     there: list[npt.NDArray[Any]] = [raster.index.counts > 0]  # which blocks hold more than background
     for _ in range(1, layout.n_levels):
@@ -186,7 +192,7 @@ def write_levels(
                     pixels[y : y + shape[0], x : x + shape[1]] = layout.read(level, r, c, shape)
         return pixels
 
-    n_threads = available_threads() if raster.threads is None else raster.threads
+    n_threads = raster.n_threads
     try:
         with ThreadPoolExecutor(n_threads, thread_name_prefix="topleft-tiles") as pool:
             for level, blocks in enumerate(there):
@@ -198,7 +204,11 @@ def write_levels(
                         waiting.append((level, row, column))
                 if bar is not None:
                     bar.begin(n_done)
-                for done in _in_turn(pool, make, iter(waiting), n_threads):
+                for done in (
+                    _in_turn(pool, make, iter(waiting), n_threads)
+                    if executor is None or level
+                    else _on_workers(executor, raster, layout, prepare, iter(waiting))
+                ):
                     n_drawn, n_done = n_drawn + (level == 0), n_done + 1
                     if tell is not None:
                         tell(Step(*done, n_done, n_blocks))
@@ -206,6 +216,32 @@ def write_levels(
         if bar is not None:
             bar.close()
     return Written(n_drawn, n_kept, int(there[0].size - there[0].sum()))
+
+
+def check_executor(executor: Any) -> None:
+    """Raise an error for what is no client of Dask."""
+    if not (executor is None or is_client(executor)):
+        raise TypeError(f"executor must be a dask.distributed.Client or None, got {shown(executor)}")
+
+
+def _on_workers(
+    client: Any,
+    raster: Tiles,
+    layout: Layout,
+    prepare: Callable[[Array], Array] | None,
+    blocks: Iterator[tuple[int, int, int]],
+) -> Iterator[tuple[int, int, int]]:
+    """Let workers of a cluster draw and write windows; yield each when it is there."""
+    from topleft._tiles.cluster import WriteJob, write_on_cluster
+    from topleft._tiles.dask_array import WindowJob
+
+    seen = layout.seen_from_elsewhere()
+
+    def make(block: tuple[int, int, int]) -> WriteJob:
+        _, row, column = block
+        return WriteJob(seen, WindowJob(raster, row, column), row, column, prepare)
+
+    return write_on_cluster(client, make, blocks)
 
 
 def _in_turn(

@@ -12,17 +12,20 @@ Based on: the binning of tiled renderers: H. Fuchs et al., Pixel-Planes 5, 1989.
 
 from __future__ import annotations
 
+import os
 import tempfile
 import threading
 from collections import OrderedDict
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import IO, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from topleft import _engine
+from topleft._base.memory import Memory
+from topleft._tiles.ahead import in_order, kept_memory
 from topleft._tiles.blocks import BLOCK, Triangles
 
 I32 = npt.NDArray[np.int32]
@@ -72,7 +75,7 @@ class _Run:
 
 @dataclass(frozen=True)
 class _SortedRow:
-    """Spans of a row of windows, sorted by their first window, and those that reach over several."""
+    """The triangles of each window of a row, and the spans that reach over more windows than are listed one by one."""
 
     starts: npt.NDArray[np.int64]
     triangles: I32
@@ -81,7 +84,9 @@ class _SortedRow:
     def of_column(self, column: int) -> I32:
         """The triangles of a window, ascending."""
         own = self.triangles[self.starts[column] : self.starts[column + 1]]
-        crossing = self.long[(self.long[:, 1] < column) & (column < self.long[:, 2]), 0]
+        if not len(self.long):
+            return own
+        crossing = self.long[(self.long[:, 1] <= column) & (column < self.long[:, 2]), 0]
         if not len(crossing):
             return own
         return np.insert(own, np.searchsorted(own, crossing), crossing)  # both ascend
@@ -99,6 +104,7 @@ class WindowIndex:
         *,
         memory: int,
         folder: str | None,
+        n_threads: int = 1,
     ) -> None:
         """`check`: looks at the corners of each block, and gets what tells where one of its triangles is."""
         self.tiling = tiling
@@ -107,60 +113,73 @@ class WindowIndex:
         self._runs: list[_Run] = []
         self._memory, self._folder = memory, folder
         self._file: IO[bytes] | None = None
-        self._lock = threading.Lock()
+        self._pid, self._lock = os.getpid(), threading.Lock()
         self._kept: OrderedDict[int, _SortedRow] = OrderedDict()
         block = max(BLOCK, 4 * tiling.n_rows)  # so that the starts of all rows take less than the spans
         n_blocks = -(-triangles.n // block)
-        for i in range(n_blocks):
+        steps = np.zeros((tiling.n_rows, tiling.n_columns + 1), np.int32)
+
+        def list_block(i: int) -> _Run | None:
             first = i * block
 
-            def where(row: int, first: int = first, i: int = i) -> str:
+            def where(row: int) -> str:
                 return f"in triangle {first + row}, block {i + 1} of {n_blocks}"
 
-            corners = triangles.corners(slice(first, min(first + block, triangles.n)))
+            memory = kept_memory()
+            corners = triangles.corners(slice(first, min(first + block, triangles.n)), memory)
             check(corners, where)
-            self._add(to_pixels(corners.reshape(-1, corners.shape[2])).reshape(-1, 3, 2), corners, first, where)
+            corners_px = to_pixels(corners.reshape(-1, corners.shape[2])).reshape(-1, 3, 2)
+            return self._listed(corners_px, corners, first, where, memory)
+
+        for run in in_order(list_block, range(n_blocks), n_threads):
+            if run is not None:
+                self._add(run, steps)
+        np.cumsum(steps[:, :-1], axis=1, dtype=np.int32, out=self.counts)
+        if self._file is not None:
+            self._file.flush()
 
     @property
     def is_on_disk(self) -> bool:
         """Whether spans went to a file."""
         return self._file is not None
 
-    def _add(self, corners_px: F64, corners: npt.NDArray[Any], first: int, where: Callable[[int], str]) -> None:
+    def _listed(
+        self, corners_px: F64, corners: npt.NDArray[Any], first: int, where: Callable[[int], str], memory: Memory
+    ) -> _Run | None:
+        """The spans of a block, by rows; None if it has none."""
         numbers, n_rows = self.tiling.numbers, self.tiling.n_rows
         starts = np.zeros(n_rows + 1, np.int64)
-        bad = _engine.list_spans(numbers, corners_px, first, starts, None)
+        boxes: I32 = memory.empty("boxes", (len(corners), 4), np.int32)
+        bad = _engine.list_spans(numbers, corners_px, first, boxes, starts, None)
         if bad >= 0:
             at = corners[bad].tolist()
             if not np.isfinite(corners[bad]).all():
                 raise ValueError(f"vertices must be finite where a triangle uses them, got {at} {where(bad)}")
             bits = self.tiling.subpixel_bits
             raise ValueError(
-                f"vertices must lie within 2**{62 - bits} pixels of 0 with {bits} sub-pixel bits, got {at} {where(bad)}"
+                f"vertices must lie within 2**{62 - bits} pixels of 0"
+                + (f" with {bits} sub-pixel bits" if bits else "")
+                + f", got {at} {where(bad)}"
             )
         np.cumsum(starts, out=starts)
         n = int(starts[-1])
         if not n:
-            return
+            return None
         spans = np.empty((n, 3), np.int32)
-        _engine.list_spans(numbers, corners_px, first, starts[:-1].copy(), spans)
-        rows = np.flatnonzero(np.diff(starts))
-        low, high = int(rows[0]), int(rows[-1])
-        self._count(spans, starts, rows)
-        run = _Run(low, starts[low : high + 2].copy(), spans, SPAN_BYTES * self.n_spans)
-        self.n_spans += n
+        _engine.list_spans(numbers, corners_px, first, boxes, starts[:-1].copy(), spans)
+        low, end = int(np.searchsorted(starts, 1)) - 1, int(np.searchsorted(starts, n))
+        return _Run(low, starts[low : end + 1].copy(), spans, 0)
+
+    def _add(self, run: _Run, steps: I32) -> None:
+        spans = run.spans
+        assert spans is not None
+        _engine.count_windows(spans, run.starts, steps[run.first_row : run.first_row + len(run.starts) - 1])
+        run = replace(run, offset=SPAN_BYTES * self.n_spans)
+        self.n_spans += len(spans)
         if self._file is None and SPAN_BYTES * self.n_spans > self._memory:
             self._file = tempfile.TemporaryFile(prefix="topleft-", dir=self._folder)  # noqa: SIM115
             self._runs = [self._to_file(earlier) for earlier in self._runs]
         self._runs.append(run if self._file is None else self._to_file(run))
-
-    def _count(self, spans: I32, starts: npt.NDArray[np.int64], rows: npt.NDArray[np.int64]) -> None:
-        """Add to the number of triangles of each window."""
-        n_columns = self.tiling.n_columns
-        for row in rows.tolist():
-            own = spans[starts[row] : starts[row + 1]]
-            steps = np.bincount(own[:, 1], minlength=n_columns + 1) - np.bincount(own[:, 2], minlength=n_columns + 1)
-            self.counts[row] += np.cumsum(steps)[:n_columns].astype(np.int32)
 
     def _to_file(self, run: _Run) -> _Run:
         assert self._file is not None
@@ -172,6 +191,8 @@ class WindowIndex:
         """The triangles that may touch a window, ascending."""
         if not self.counts[row, column]:
             return np.empty(0, np.int32)
+        if self._pid != os.getpid():  # a forked child: the lock may be held by a thread that is not there
+            self._pid, self._lock, self._kept = os.getpid(), threading.Lock(), OrderedDict()
         with self._lock:
             found = self._kept.get(row)
             if found is None:
@@ -191,14 +212,26 @@ class WindowIndex:
                 parts.append(run.spans[first:end])
             else:
                 assert self._file is not None
-                self._file.seek(run.offset + SPAN_BYTES * first)
-                content = self._file.read(SPAN_BYTES * (end - first))
+                content = read_at(self._file, run.offset + SPAN_BYTES * first, SPAN_BYTES * (end - first))
                 parts.append(np.frombuffer(content, np.int32).reshape(-1, 3))
-        spans = parts[0] if len(parts) == 1 else np.concatenate(parts)
-        columns = spans[:, 1]
-        # NumPy sorts 16 bits by counting.
-        key = columns.astype(np.uint16) if self.tiling.n_columns <= 1 << 16 else columns
-        order = np.argsort(key, kind="stable")
         starts = np.zeros(self.tiling.n_columns + 1, np.int64)
-        np.cumsum(np.bincount(columns, minlength=self.tiling.n_columns), out=starts[1:])
-        return _SortedRow(starts, spans[:, 0][order], spans[spans[:, 2] - columns > 1])
+        n_long = sum(_engine.sort_spans(part, starts, None) for part in parts)
+        np.cumsum(starts, out=starts)
+        names = np.empty(int(starts[-1]), np.int32)
+        at = starts[:-1].copy()
+        for part in parts:
+            _engine.sort_spans(part, at, names)
+        long = [part[part[:, 2] - part[:, 1] > _engine.SHORT_SPAN] for part in parts] if n_long else []
+        return _SortedRow(starts, names, np.concatenate(long) if long else np.empty((0, 3), np.int32))
+
+
+def read_at(file: IO[bytes], offset: int, n: int) -> bytes:
+    """Return a part of a file; where the system can, without the place in it that forked processes share."""
+    if not hasattr(os, "pread"):
+        file.seek(offset)
+        return file.read(n)
+    parts = []
+    while n > 0 and (part := os.pread(file.fileno(), n, offset)):  # 2 GB at most at a time
+        parts.append(part)
+        n, offset = n - len(part), offset + len(part)
+    return b"".join(parts)

@@ -17,8 +17,9 @@ import numpy.typing as npt
 
 from topleft._base.arrays import as_count, as_pair, as_path, as_size
 from topleft._base.options import check_choice
-from topleft._base.threads import parse_threads
+from topleft._base.threads import available_threads, parse_threads
 from topleft._field.grid import Extent, ExtentLike, Grid, grid_around
+from topleft._tiles.ahead import in_order, kept_memory
 from topleft._tiles.blocks import BLOCK, Triangles, fingerprint_of, triangles_of
 from topleft._tiles.drawing import KINDS, ON_GRIDS, Painter, painter_of
 from topleft._tiles.spans import SPAN_BYTES, Tiling, WindowIndex
@@ -216,7 +217,7 @@ class Tiles:
         self.triangles, self.painter, self.kind = triangles, painter, kind
         self.size, self.threads = size, threads
         self.window_size = min(window_size[0], max(size[0], 1)), min(window_size[1], max(size[1], 1))
-        self.tiling = Tiling(*size, *self.window_size, painter.view.get("subpixel_bits", 8))
+        self.tiling = Tiling(*size, *self.window_size, 0 if painter.is_exact else painter.view.get("subpixel_bits", 8))
         self._memory, self._folder = memory, folder
         self._index: WindowIndex | None = None
         self._fingerprint: str | None = None
@@ -250,6 +251,14 @@ class Tiles:
         return self.dtype.kind == "f" or (self.kind == "fill" and self.painter.options.get("dtype") is None)
 
     @property
+    def range_of_values(self) -> tuple[float, float]:
+        """The lowest and the highest depth, height or value of the mesh; makes the index."""
+        self.index  # noqa: B018  (which looks at depths and heights)
+        if hasattr(self.painter, "find_range"):
+            self.painter.find_range()
+        return self.painter.low, self.painter.high
+
+    @property
     def n_windows(self) -> int:
         """How many windows there are."""
         return self.tiling.n_rows * self.tiling.n_columns
@@ -265,8 +274,14 @@ class Tiles:
                 self.painter.check,
                 memory=self._memory,
                 folder=self._folder,
+                n_threads=self.n_threads,
             )
         return self._index
+
+    @property
+    def n_threads(self) -> int:
+        """How many threads draw, a window each."""
+        return available_threads() if self.threads is None else self.threads
 
     @property
     def is_mapped(self) -> bool:
@@ -299,7 +314,7 @@ class Tiles:
     def draw_window(self, row: int, column: int, *, threads: int | None = None, out: Array | None = None) -> Array:
         """Return the pixels of a window, in a fresh array or in `out`."""
         origin, size = self.place(row, column)
-        payload = self.painter.gather(self.triangles, self.index.of_window(row, column))
+        payload = self.painter.gather(self.triangles, self.index.of_window(row, column), kept_memory())
         return self.painter.window(payload, origin, size, self.threads if threads is None else threads, out)
 
     def __iter__(self) -> Iterator[Window]:
@@ -307,23 +322,34 @@ class Tiles:
         return self.windows()
 
     def windows(self, *, reuse: bool = False) -> Iterator[Window]:
-        """Yield all windows, row by row.
+        """Yield all windows, row by row; each thread draws one, a few ahead of the one that is asked for.
 
         Parameters
         ----------
         reuse : bool
             Whether the next window may overwrite the pixels of this one: a fresh array costs its first touch.
         """
-        kept: Array | None = None
-        for row, column in itertools.product(range(self.tiling.n_rows), range(self.tiling.n_columns)):
-            (x, y), (w, h) = self.place(row, column)
-            out = None
-            if reuse:
-                if kept is None:
-                    kept = np.empty((w * h, *self.painter.channels), self.dtype)
-                out = kept[: w * h].reshape(h, w, *self.painter.channels)
-            pixels = self.draw_window(row, column, out=out)
-            yield Window(row, column, x, y, pixels, self.n_triangles_of(row, column))
+        n_threads = max(1, min(self.n_threads, self.n_windows))
+        n_ahead = 2 * n_threads if n_threads > 1 else 1
+        own_threads = 1 if n_threads > 1 else None
+        w, h = self.window_size
+        shape = (w * h, *self.painter.channels)
+        spare = [np.empty(shape, self.dtype) for _ in range(n_ahead)] if reuse and self.n_windows else []
+
+        def draw(place: tuple[int, int]) -> tuple[Window, Array | None]:
+            row, column = place
+            (x, y), (width, height) = self.place(row, column)
+            memory = spare.pop() if reuse else None
+            out = None if memory is None else memory[: width * height].reshape(height, width, *shape[1:])
+            pixels = self.draw_window(row, column, threads=own_threads, out=out)
+            return Window(row, column, x, y, pixels, self.n_triangles_of(row, column)), memory
+
+        self.index  # noqa: B018  (made once, here, on all threads)
+        places = itertools.product(range(self.tiling.n_rows), range(self.tiling.n_columns))
+        for window, memory in in_order(draw, places, n_threads, n_ahead):
+            yield window
+            if memory is not None:
+                spare.append(memory)
 
     def read(self, x: int, y: int, width: int, height: int) -> Array:
         """Return a part of the raster, drawn at once, whatever windows it lies in."""
@@ -334,7 +360,7 @@ class Tiles:
                 f"from ({x}, {y}) on"
             )
         which = self._triangles_in(x, y, width, height)
-        payload = self.painter.gather(self.triangles, which)
+        payload = self.painter.gather(self.triangles, which, kept_memory())
         return self.painter.window(payload, (x, y), (width, height), self.threads, None)
 
     def _triangles_in(self, x: int, y: int, width: int, height: int) -> npt.NDArray[np.int32]:
@@ -425,6 +451,7 @@ class Tiles:
         levels: int = 1,
         resume: bool = False,
         progress: Progress | bool | None = None,
+        executor: Any = None,
         storage: dict[str, Any] | None = None,
     ) -> Written:
         """Write the raster as a Zarr array (version 3), or as a group of levels; return what was done.
@@ -444,6 +471,9 @@ class Tiles:
             Go on with what an interrupted run has left, and draw no window again that is whole.
         progress : function of a `Step`, or True, optional
             Called after each window; True shows a bar (tqdm).
+        executor : dask.distributed.Client, optional
+            Whose workers draw and write the windows; all of them see the folder, or reach the URL. A worker or a
+            scheduler that dies loses nothing.
         storage : dict, optional
             What fsspec needs for a URL.
 
@@ -458,7 +488,7 @@ class Tiles:
         """
         from topleft._tiles.zarr_files import write_zarr
 
-        return write_zarr(self, path, chunk, compression, levels, resume, progress, storage)
+        return write_zarr(self, path, chunk, compression, levels, resume, progress, executor, storage)
 
     def to_geotiff(
         self,
@@ -471,6 +501,7 @@ class Tiles:
         overviews: bool = True,
         resume: bool = False,
         progress: Progress | bool | None = None,
+        executor: Any = None,
     ) -> Written:
         """Write the raster as a cloud-optimised GeoTIFF, BigTIFF where it is large; return what was done.
 
@@ -489,7 +520,7 @@ class Tiles:
             Pixels a side of a tile, a multiple of 16 that divides the sides of windows.
         overviews : bool
             Whether levels of half the size follow, down to one tile: means of numbers, every second label.
-        resume, progress
+        resume, progress, executor
             As in `to_zarr`.
 
         Raises
@@ -501,7 +532,7 @@ class Tiles:
         """
         from topleft._tiles.geotiff import write_geotiff
 
-        return write_geotiff(self, path, crs, nodata, compression, tile, overviews, resume, progress)
+        return write_geotiff(self, path, crs, nodata, compression, tile, overviews, resume, progress, executor)
 
     def to_deepzoom(
         self,
@@ -511,6 +542,7 @@ class Tiles:
         colors: Callable[[Array], npt.NDArray[np.uint8]] | None = None,
         resume: bool = False,
         progress: Progress | bool | None = None,
+        executor: Any = None,
     ) -> Written:
         """Write the raster as a pyramid of Deep Zoom, for viewers such as OpenSeadragon; return what was done.
 
@@ -522,8 +554,9 @@ class Tiles:
             Pixels a side of a tile; a power of 2 that divides the sides of windows.
         colors : function of an array (H, W), optional
             Returns uint8 (H, W), (H, W, 3) or (H, W, 4). Unless given, labels get a colour each, masks become black and
-            white, and uint8 colours stay what they are; other kinds need it.
-        resume, progress
+            white, counts greys up to 255, depths, heights and values greys from the lowest to the highest, and uint8
+            colours stay what they are; other colours need it.
+        resume, progress, executor
             As in `to_zarr`.
 
         Raises
@@ -533,7 +566,7 @@ class Tiles:
         """
         from topleft._tiles.deepzoom import write_deepzoom
 
-        return write_deepzoom(self, path, tile, colors, resume, progress)
+        return write_deepzoom(self, path, tile, colors, resume, progress, executor)
 
 
 def extent_of(triangles: Triangles) -> Extent:

@@ -12,7 +12,7 @@ import json
 import os
 import zlib
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,7 +21,7 @@ import numpy.typing as npt
 from topleft._base.arrays import as_count, as_size, check_progress
 from topleft._base.options import check_choice
 from topleft._tiles.folders import DiskFolder, Folder, check_space, folder_of
-from topleft._tiles.levels import Progress, Written, halved, level_size, write_levels
+from topleft._tiles.levels import Progress, Written, check_executor, halved, level_size, write_levels
 from topleft.errors import MissingPackageError
 
 if TYPE_CHECKING:
@@ -60,6 +60,10 @@ class ZarrLayout:
         rows = range(row * (h // ch), min((row + 1) * (h // ch), -(-height // ch)))
         columns = range(column * (w // cw), min((column + 1) * (w // cw), -(-width // cw)))
         return [(r, c) for r in rows for c in columns]
+
+    def seen_from_elsewhere(self) -> ZarrLayout:
+        """The same layout for processes that run in other folders."""
+        return replace(self, folder=self.folder.absolute())
 
     def is_there(self, level: int, row: int, column: int) -> bool:
         """Whether all chunks of a block are there."""
@@ -102,10 +106,12 @@ def write_zarr(
     levels: int,
     resume: bool,
     progress: Progress | bool | None,
+    executor: Any,
     storage: dict[str, Any] | None,
 ) -> Written:
     """`Tiles.to_zarr`."""
     check_progress(progress)
+    check_executor(executor)
     n_levels = as_count("levels", levels)
     window = raster.window_size
     size = window if chunk is None else as_size(chunk, "chunk", smallest=1)
@@ -136,6 +142,7 @@ def write_zarr(
         blank=empty,
         halve=lambda pixels: halved(pixels, raster.painter.nodata, is_mean=raster.has_means),
         progress=progress,
+        executor=executor,
     )
 
 

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import argparse
 import sys
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from topleft._base.remote import Place, RemotePath, place_of
+from topleft._base.threads import available_threads
 from topleft._tiles.blocks import Triangles, mapped_npy, triangles_of
 from topleft._tiles.drawing import KINDS
 from topleft._tiles.tiles import WINDOW, Tiles, extent_of, tiles
 from topleft.cli.arguments import UsageError, positive, size
+from topleft.cli.render import client_of, complain
 
 if TYPE_CHECKING:
     from topleft._tiles.levels import Written
@@ -23,9 +27,9 @@ RASTER_HELP = """\
 MESH is a mesh file, or two .npy files with a comma between them: vertices.npy,triangles.npy. Binary STL, binary PLY of
 triangles and .npy are mapped and need not fit memory. x and y are the plane, z is the height.
 
-OUT ends in .tif (cloud-optimised GeoTIFF), .zarr (a folder) or .dzi (Deep Zoom). Heights of the upper surface are
-written unless --labels, --values or --kind asks for something else. --resume goes on with what an interrupted run has
-left of the same raster, and draws no window again that is whole.
+OUT ends in .tif (cloud-optimised GeoTIFF), .zarr (a folder, or a URL that fsspec reaches) or .dzi (Deep Zoom). Heights
+of the upper surface are written unless --labels, --values or --kind asks for something else. --resume goes on with what
+an interrupted run has left of the same raster, and draws no window again that is whole.
 
 examples:
   topleft raster terrain.ply -o heights.tif --pixel-size 1 --crs EPSG:25832
@@ -38,17 +42,26 @@ SUFFIXES = (".tif", ".tiff", ".zarr", ".dzi")
 
 def run_raster(options: argparse.Namespace) -> int:
     """Write a raster of a mesh, of any size."""
-    path = Path(options.out)
+    path = place_of(options.out)
     if path.suffix.lower() not in SUFFIXES:
         raise UsageError(f"-o {options.out}: the name must end in one of {' '.join(SUFFIXES)}")
     is_tiff, is_zarr = path.suffix.lower() in (".tif", ".tiff"), path.suffix.lower() == ".zarr"
+    if isinstance(path, RemotePath) and not is_zarr:
+        raise UsageError(f"-o {options.out}: {path.suffix} goes to a path of this machine, .zarr to a URL as well")
     if options.crs is not None and not is_tiff:
         raise UsageError(f"--crs is for .tif, got {path.name}")
     if options.levels is not None and not is_zarr:
         raise UsageError(f"--levels is for .zarr, got {path.name}")
+    if options.uncompressed and not (is_tiff or is_zarr):
+        raise UsageError(f"--uncompressed is for .tif and .zarr, got {path.name}")
+    if options.nodata is not None and not (is_tiff or options.values is not None):
+        raise UsageError("--nodata is for --values and .tif: other pixels without triangles are -1, NaN or 0")
     try:
-        raster = raster_of(options)
-        written = write(raster, path, options)
+        with ExitStack() as stack:
+            raster = raster_of(options)
+            n_workers = options.threads or available_threads()
+            client = None if options.dask is None else client_of(options.dask, n_workers, stack)
+            written = write(raster, path, options, client)
     except IndexError as error:  # a triangle that names no vertex
         raise ValueError(f"{options.mesh}: {error}") from None
     if not options.quiet:
@@ -57,16 +70,19 @@ def run_raster(options: argparse.Namespace) -> int:
             f"{options.out}: {width} x {height} {raster.dtype}, {written.n_drawn} windows drawn, "
             f"{written.n_kept} kept, {written.n_blank} blank"
         )
+    if not (written.n_drawn or written.n_kept):
+        complain(f"no triangle of {options.mesh} lies within {options.out}: all of it is blank")
     return 0
 
 
-def write(raster: Tiles, path: Path, options: argparse.Namespace) -> Written:
+def write(raster: Tiles, path: Place, options: argparse.Namespace, client: Any) -> Written:
     """Write the raster in the format that the name asks for."""
     progress = True if not options.quiet and sys.stderr.isatty() else None
-    how: dict[str, Any] = {"resume": options.resume, "progress": progress}
+    how: dict[str, Any] = {"resume": options.resume, "progress": progress, "executor": client}
     suffix = path.suffix.lower()
     if suffix == ".zarr":
-        return raster.to_zarr(path, levels=options.levels or 1, compression=compression(options, "gzip"), **how)
+        return raster.to_zarr(options.out, levels=options.levels or 1, compression=compression(options, "gzip"), **how)
+    assert isinstance(path, Path)
     if suffix == ".dzi":
         return raster.to_deepzoom(path, **how)
     how |= {"nodata": options.nodata, "compression": compression(options, "deflate")}
@@ -91,7 +107,9 @@ def raster_of(options: argparse.Namespace) -> Tiles:
     if sum((options.labels, options.values is not None, options.kind is not None)) > 1:
         raise UsageError("--labels, --values and --kind each say what is drawn: give one of them")
     if kind == "height_map":
-        more["surface"] = options.surface
+        more["surface"] = options.surface or "upper"
+    elif options.surface is not None:
+        raise UsageError(f"--surface is for heights, got the kind {kind}")
     if kind == "field" and options.nodata is not None:
         more["nodata"] = options.nodata
     if (options.pixel_size is None) == (options.size is None):
@@ -145,7 +163,7 @@ def add_raster_command(commands: Any) -> None:
     raster.add_argument("--labels", action="store_true", help="write which triangle shows, -1 for none")
     raster.add_argument("--values", metavar="FIELD", help="write values: a .npy file, or a name in a PLY file")
     raster.add_argument("--kind", choices=[one for one in KINDS if one not in ("field", "fill")], help="what is drawn")
-    raster.add_argument("--surface", choices=("upper", "lower"), default="upper", help="whose height counts (upper)")
+    raster.add_argument("--surface", choices=("upper", "lower"), help="whose height counts (upper)")
     raster.add_argument("--nodata", type=float, metavar="N", help="what stands where nothing is, in values and .tif")
     raster.add_argument("--levels", type=positive, metavar="N", help="resolutions of a .zarr, each half as wide (1)")
     raster.add_argument("--uncompressed", action="store_true", help="store pixels as they are")
@@ -153,4 +171,7 @@ def add_raster_command(commands: Any) -> None:
     raster.add_argument("--resume", action="store_true", help="go on with what an interrupted run has left")
     raster.add_argument("--folder", metavar="DIR", help="where temporary files go")
     raster.add_argument("--threads", type=positive, metavar="N", help="how many at most")
+    raster.add_argument(
+        "--dask", metavar="ADDRESS", help="let the workers of a Dask cluster draw: its scheduler, or local"
+    )
     raster.add_argument("--quiet", action="store_true", help="show no bar and print nothing")

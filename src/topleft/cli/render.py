@@ -19,6 +19,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from topleft._base.remote import is_url
 from topleft._batch.batch import Result, render_batch
 from topleft._batch.jobs import Job
 from topleft._io.images import PICTURE_SUFFIXES, save_image
@@ -29,7 +30,7 @@ from topleft.cli.sheet import make_sheet
 from topleft.cli.targets import MeshJobs, check_targets, check_words, plan_jobs
 from topleft.errors import MeshWarning, MissingPackageError, TopleftError
 
-__all__ = ["FAILED", "complain", "complain_of_lacks", "one_line", "run_render"]
+__all__ = ["FAILED", "client_of", "complain", "complain_of_lacks", "one_line", "run_render"]
 
 FAILED = 1
 """Exit status: a part of the work failed."""
@@ -109,7 +110,11 @@ def _render(groups: Sequence[MeshJobs], options: argparse.Namespace) -> tuple[li
         stack.enter_context(warnings.catch_warnings())
         warnings.simplefilter("ignore", MeshWarning)  # results have them
         bar = stack.enter_context(_Progress(len(jobs)))
-        executor = _executor(groups, options.jobs, stack) if options.dask is None else _client(options, stack)
+        executor = (
+            _executor(groups, options.jobs, stack)
+            if options.dask is None
+            else client_of(options.dask, options.jobs, stack)
+        )
         chunk = min(MOST_VIEWS_TOGETHER, max(len(group.jobs) for group in groups))
         results = stack.enter_context(
             render_batch(
@@ -145,29 +150,31 @@ def _elsewhere(job: Job) -> Job:
     scene, path = job.scene, job.destination
     if isinstance(scene, str | os.PathLike):
         scene = Path(scene).absolute()
-    return replace(job, scene=scene, destination=None if path is None else Path(path).absolute())
+    if path is not None and not is_url(path):
+        path = Path(path).absolute()
+    return replace(job, scene=scene, destination=path)
 
 
-def _client(options: argparse.Namespace, stack: ExitStack) -> Any:
+def client_of(address: str, n_workers: int, stack: ExitStack) -> Any:
     """A client of the Dask cluster that is asked for, or of one of this machine that ends with the command."""
     try:
         import dask
         from distributed import Client, LocalCluster
     except ImportError:
         raise MissingPackageError("--dask needs the package distributed: pip install 'topleft[dask]'") from None
-    if options.dask == "local":
+    if address == "local":
         stack.enter_context(dask.config.set({"distributed.comm.timeouts.connect": "30s"}))
         cluster = LocalCluster(
-            n_workers=options.jobs, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=40
+            n_workers=n_workers, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=40
         )  # fmt: skip
         stack.enter_context(cluster)
         return stack.enter_context(Client(cluster, set_as_default=False))
-    if "://" not in options.dask:
-        raise UsageError(f"--dask {options.dask}: must be local, or the address of a scheduler, tcp://HOST:PORT")
+    if "://" not in address:
+        raise UsageError(f"--dask {address}: must be local, or the address of a scheduler, tcp://HOST:PORT")
     try:
-        return stack.enter_context(Client(options.dask, timeout=CONNECT_S, set_as_default=False))
+        return stack.enter_context(Client(address, timeout=CONNECT_S, set_as_default=False))
     except OSError as error:
-        raise UsageError(f"--dask {options.dask}: no scheduler answers there ({one_line(error)})") from None
+        raise UsageError(f"--dask {address}: no scheduler answers there ({one_line(error)})") from None
 
 
 def _depend_on_parent() -> None:
@@ -204,7 +211,11 @@ def _check_pictures(groups: Sequence[MeshJobs], options: argparse.Namespace) -> 
     """Raise an error if there are no pictures for a sheet or an animation."""
     if options.sheet and Path(options.sheet).suffix.lower() not in PICTURE_SUFFIXES:
         raise UsageError(f"--sheet must end in one of {' '.join(PICTURE_SUFFIXES)}, got {options.sheet!r}")
+    if is_url(options.sheet) or is_url(options.animation):
+        raise UsageError("--sheet and --animation are written to this machine: give a path, not a URL")
     for job in (job for group in groups for job in group.jobs):
+        if is_url(job.destination):
+            raise UsageError("--sheet and --animation need pictures on this machine: OUT must be a path, not a URL")
         if job.layers and "color" not in job.layers:
             raise UsageError(f"--sheet and --animation show the layer color, got --layers {','.join(job.layers)}")
         if Path(os.fspath(job.destination or "")).suffix.lower() not in PICTURE_SUFFIXES:

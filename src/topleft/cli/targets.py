@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._base.options import Sampling
+from topleft._base.remote import Place, RemotePath, place_of
 from topleft._base.whole_file import remove_stale_parts
 from topleft._batch.jobs import Job
 from topleft._camera.camera import Camera
@@ -31,7 +32,7 @@ from topleft._model.points import DEFAULT_POINT_SIZE, Points
 from topleft._model.texture import Texture
 from topleft._shade.shade import Shading
 from topleft.cli.arguments import UsageError, meant
-from topleft.errors import ImageError, MeshError
+from topleft.errors import ImageError, MeshError, MissingPackageError
 from topleft.scenes import SHAPES, shape
 
 __all__ = ["MeshJobs", "MeshSource", "Orbit", "check_targets", "check_words", "plan_jobs"]
@@ -258,9 +259,9 @@ def _layers(path: str, options: argparse.Namespace) -> tuple[str, ...]:
 
 def _pattern(out: str, options: argparse.Namespace) -> str:
     """OUT as a file name with {name}, {view}, {index} and {layer} where several pictures need them."""
-    path = Path(out)
+    path = place_of(out)
     check_words("OUT", path, ("name", "view", "index", "layer"))
-    is_folder = out.endswith(("/", "\\")) or path.is_dir() or not path.suffix
+    is_folder = out.endswith(("/", "\\")) or not path.suffix or (isinstance(path, Path) and path.is_dir())
     if not out or (path.suffix.lower() not in SUFFIXES and not is_folder):
         raise UsageError(f"OUT must end in one of {' '.join(SUFFIXES)}, or in / for a folder, got {out!r}")
     several_layers = len(options.layers) > 1 and path.suffix.lower() != ".npz"
@@ -277,13 +278,13 @@ def _pattern(out: str, options: argparse.Namespace) -> str:
     return str(path.with_name(stem + path.suffix))
 
 
-def check_words(what: str, path: Path, known: Sequence[str]) -> None:
+def check_words(what: str, path: Place, known: Sequence[str]) -> None:
     """Raise a `UsageError` for a word in braces that stands for nothing, unless a folder is called so."""
     folder = Path()
-    for part in path.parts:
+    for part in path.parts if isinstance(path, Path) else (str(path),):
         folder /= part
         for word in re.findall(r"\{(\w*)\}", part):
-            if word not in known and not folder.exists():
+            if word not in known and (isinstance(path, RemotePath) or not folder.exists()):
                 words = ", ".join(f"{{{each}}}" for each in known)
                 raise UsageError(f"{what} may have {words}, got {{{word}}} in {str(path)!r}{meant(word, known)}")
 
@@ -299,10 +300,13 @@ def check_targets(groups: Sequence[MeshJobs], others: Iterable[Path] = ()) -> No
         If two pictures would have the same name, or a picture that of a mesh, or a folder cannot be written to.
     """
     owner_of: dict[str, str] = {}
-    targets = [(file, group.source) for group in groups for job in group.jobs for file in job.files]
+    targets: list[tuple[Place, str]] = [
+        (file, group.source) for group in groups for job in group.jobs for file in job.files
+    ]
     targets += [(path, str(path)) for path in others]
     for target, source in targets:
-        key = str(target.absolute()).casefold()  # on some disks Bunny.png is bunny.png
+        # on some disks Bunny.png is bunny.png
+        key = str(target.absolute()).casefold() if isinstance(target, Path) else str(target)
         if key in owner_of:
             raise UsageError(
                 f"{owner_of[key]!r} and {source!r} would both be written to {str(target)!r}; "
@@ -311,12 +315,15 @@ def check_targets(groups: Sequence[MeshJobs], others: Iterable[Path] = ()) -> No
         owner_of[key] = source
     files = (Path(group.source) for group in groups if group.source not in SHAPES)
     meshes = {(status.st_dev, status.st_ino) for status in (file.stat() for file in files if file.exists())}
-    for target, _ in targets:
+    paths = [target for target, _ in targets if isinstance(target, Path)]
+    for target in paths:
         if target.exists() and (target.stat().st_dev, target.stat().st_ino) in meshes:
             raise UsageError(f"OUT would overwrite the mesh {str(target)!r}")
-    for folder in dict.fromkeys(target.parent for target, _ in targets):
+    for folder in dict.fromkeys(path.parent for path in paths):
         _check_writable(folder)
-    remove_stale_parts(target for target, _ in targets)
+    for url in dict.fromkeys(target.parent for target, _ in targets if isinstance(target, RemotePath)):
+        _check_reached(url)
+    remove_stale_parts(paths)
 
 
 def _check_writable(folder: Path) -> None:
@@ -328,3 +335,13 @@ def _check_writable(folder: Path) -> None:
         raise UsageError(f"cannot write to the folder {str(folder)!r}: {str(existing)!r} is a file")
     if not os.access(existing, os.W_OK | os.X_OK):
         raise UsageError(f"cannot write to the folder {str(folder)!r}: permission denied")
+
+
+def _check_reached(folder: RemotePath) -> None:
+    """Find out before any work whether fsspec reaches what a URL names."""
+    try:
+        folder.exists()
+    except MissingPackageError:
+        raise
+    except Exception as error:  # of whatever package reaches it
+        raise UsageError(f"cannot write to {folder}: {' '.join(str(error).split()) or type(error).__name__}") from None

@@ -11,7 +11,8 @@ const ARRAYS = {
 // Typed arrays, with their shape, in place of their descriptions in a header.
 function withArrays(header, parts) {
   for (const [name, {dtype, shape, part}] of Object.entries(header.arrays ?? {})) {
-    const {buffer, byteOffset, byteLength} = parts[part];
+    let {buffer, byteOffset, byteLength} = parts[part];
+    if (byteOffset % 8) [buffer, byteOffset] = [buffer.slice(byteOffset, byteOffset + byteLength), 0];  // of a notebook
     const kind = ARRAYS[dtype];
     const array = new kind(buffer, byteOffset, byteLength / kind.BYTES_PER_ELEMENT);
     header.arrays[name] = Object.assign(array, {shape});
@@ -141,6 +142,9 @@ function choose(label, options, value, write) {
   return row(label, box);
 }
 
+// A key of colours: [text, [r, g, b]] each.
+const keyOf = (rows) => rows.map(([text, rgb]) => make("span", {}, make("i", {style: `background:rgb(${rgb})`}), text));
+
 function download(name, content, type = "") {
   const href = URL.createObjectURL(new Blob([content], {type}));
   make("a", {href, download: name}).click();
@@ -167,30 +171,24 @@ const PIXEL_DEFAULTS = {
   origin: [0, 0], method: "auto", other: "", exact: false, subpixel_bits: 8, sampling: "center", cull: "none",
   depth_test: "less", winding: "as given", look: "owners",
 };
-const COLORS = ["#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", "#f0e442"];
-const DIFFERENCES = [
-  [1, "#80808046", () => "same"], [2, "#0072b2", (a) => `${a} alone`], [3, "#e69f00", (a, b) => `${b} alone`],
-  [4, "#cc79a7", () => "another owner"], [5, "#d55e00", () => "drawn more often"],
-];
 const MOVES = {
   ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1],
   a: [-1, 0], d: [1, 0], w: [0, -1], s: [0, 1],
 };
-const KEYS = [
-  ["1 2 3", "take a corner"], ["0", "take none"], ["arrows, WASD", "move it by a sub-pixel, or look at the next pixel"],
-  ["Shift", "by a pixel"], ["[ ]", "the next triangle"], ["Tab", "the next scene"], ["F", "wireframe"], ["Z", "undo"],
-  ["N P R Del", "add, split, flip, remove"], ["Esc", "leave the picture"],
-];
+const EDIT_KEYS = {n: "add", p: "split", r: "flip", Delete: "remove", z: "undo", "]": "forward", "[": "back"};
 
+// A state is what Python draws: vertices, triangles, a window, methods and rules (PixelState in state.py).
 function pixelsPart(app, panel) {
   const part = {state: () => state, scene: () => state, drawn: null, enter, restore, views: new Map()};
-  const {methods, scenes} = app.hello;
-  const bases = [...new Set(methods.map(({name}) => name.split("/")[0]))];
-  let state = {}, sceneName = app.hello.pixels.scene ?? "", chosen = 0, corner = null, snap = "sub-pixel";
-  let pixel = null, probed = "a", samples = [], past = [], isRefused = false;
+  const find = (what) => panel.querySelector(what), findAll = (what) => [...panel.querySelectorAll(what)];
+  const stage = find(".stage"), panels = find(".panels"), why = find(".why"), plan = find(".plan");
+  const boxes = findAll("[data-name]"), {methods, scenes} = app.hello;
+  let state = {}, chosen = 0, corner = null;  // the triangle that is edited, and its corner that the keys move
+  let pixel = null, sample = 0, probed = "a", samples = [], past = [], fitted = "", isRefused = false;
 
   // -- what is asked --
 
+  const told = (error) => app.say(error.message, true);
   const redraw = newest(async () => {
     const asked = state;
     try {
@@ -199,238 +197,177 @@ function pixelsPart(app, panel) {
       isRefused = false;
     } catch (error) {
       isRefused = true;
-      app.say(error.message, true);
+      told(error);
     }
     part.drawn = asked;
     part.onDrawn?.();
   });
   const explain = newest(async () => {
-    if (plan.open) plan.lastChild.textContent = (await app.line.ask("pixels.plan", {state})).text;
+    if (plan.open) plan.lastChild.textContent = (await app.line.ask("pixels.plan", {state}).catch(told))?.text ?? "";
   });
   const look = newest(async () => {
-    if (!pixel) return;
     const method = {b: state.other, exact: "exact"}[probed] || state.method;
-    try {
-      tell(await app.line.ask("pixels.probe", {state, pixel, method}));
-    } catch (error) {
-      why.replaceChildren(make("p", {}, error.message));
-    }
+    if (pixel) tell(await app.line.ask("pixels.probe", {state, pixel, sample, method}).catch(({message}) => ({sentences: [message]})));
   });
 
   // Every change goes through here: `remember` lets Z take it back.
   function change(next, remember = true) {
     if (remember) past = [...past.slice(-199), state];
     state = {...state, ...next};
-    if (pixel && (pixel[0] >= state.size[0] || pixel[1] >= state.size[1])) pixel = null;
+    if (pixel?.some((at, k) => at >= state.size[k])) pixel = null;
+    if ("sampling" in next) sample = 0;
     chosen = Math.max(0, Math.min(chosen, state.triangles.length - 1));
-    overlay();
-    controls();
-    redraw(), look(), explain(), app.keep();
+    overlay(), controls(), redraw(), look(), explain(), app.keep();
   }
   function restore(given) {
-    past = [];
-    [corner, pixel, chosen] = [null, null, 0];
+    [past, corner, chosen] = [[], null, 0];
+    [pixel, probed] = [given.size.map((n) => n >> 1), given.other ? "b" : "a"];
     change({...PIXEL_DEFAULTS, ...given}, false);
   }
   async function takeScene(name) {
-    sceneName = name;
-    const before = state;
-    try {
-      const {state: scene} = await app.line.ask("pixels.scene", {name});
-      [corner, pixel, chosen] = [null, null, 0];
-      change({...PIXEL_DEFAULTS, ...("method" in scene || "other" in scene ? {} : kept(before)), ...scene}, false);
-      past = [...past, before];
-      app.say(name);
-    } catch (error) {
-      app.say(error.message, true);
-    }
+    const before = state, {state: scene} = await app.line.ask("pixels.scene", {name});
+    const {method, other, exact, look} = before, kept = "exact" in scene ? {} : {method, other, exact, look};
+    restore({...kept, ...scene, scene: name});
+    past = [before];
+    app.say(name);
   }
-  const kept = ({method, other, exact, look}) => ({method, other, exact, look});
-  const nextScene = (step) => takeScene(scenes.at((Math.max(0, scenes.indexOf(sceneName)) + step) % scenes.length));
+  const nextScene = (step) => takeScene(scenes.at((Math.max(0, scenes.indexOf(state.scene)) + step) % scenes.length));
 
   // -- triangles --
 
   const step = () => 2 ** -(state.subpixel_bits === "exact" ? 8 : state.subpixel_bits);
-  const snapped = (x) => {
-    if (snap === "pixel centre") return Math.floor(x) + 0.5;
-    const grid = snap === "free" ? 2 ** -20 : step();
-    return Math.round(x / grid) * grid;
-  };
-  function move(i, [x, y], remember) {
-    change({vertices: state.vertices.map((row, k) => k === i ? [x, y, ...row.slice(2)] : row)}, remember);
+  function snapped(x) {
+    const kind = find(".snap").value, grid = kind === "free" ? 2 ** -20 : step();
+    return kind === "pixel centre" ? Math.floor(x) + 0.5 : Math.round(x / grid) * grid;
   }
-  const edits = {
-    add() {
-      const [x, y] = [0, 1].map((k) => state.origin[k] + Math.floor(state.size[k] / 2));
-      const r = Math.max(2, Math.floor(Math.min(...state.size) / 4)), n = state.vertices.length;
-      const z = (state.vertices[0] ?? []).slice(2);
-      const added = [[x - r, y + r, ...z], [x, y - r, ...z], [x + r, y + r, ...z]];
-      chosen = state.triangles.length;
-      change({vertices: [...state.vertices, ...added], triangles: [...state.triangles, [n, n + 1, n + 2]]});
-    },
-    split() {
-      const [a, b, c] = state.triangles[chosen], n = state.vertices.length;
-      const middle = state.vertices[a].map((_, k) => [a, b, c].reduce((sum, i) => sum + state.vertices[i][k], 0) / 3);
-      const [x, y, ...z] = middle, parts = [[a, b, n], [b, c, n], [c, a, n]];
-      change({
-        vertices: [...state.vertices, [snapped(x), snapped(y), ...z]], triangles: state.triangles.toSpliced(chosen, 1, ...parts),
-      });
-    },
-    flip() {
-      const [a, b, c] = state.triangles[chosen];
-      change({triangles: state.triangles.with(chosen, [a, c, b])});
-    },
-    remove() {
-      const triangles = state.triangles.toSpliced(chosen, 1), used = [...new Set(triangles.flat())].sort((i, j) => i - j);
-      corner = null;
-      change({
-        vertices: used.map((i) => state.vertices[i]), triangles: triangles.map((row) => row.map((i) => used.indexOf(i))),
-      });
-    },
-    undo() {
+  const taken = () => state.triangles[chosen] ?? [];
+  const move = (i, [x, y], remember) =>
+    change({vertices: state.vertices.map((row, k) => k === i ? [x, y, ...row.slice(2)] : row)}, remember);
+  async function edit(what) {
+    const n = state.triangles.length;
+    if (what === "undo") {
       if (past.length) state = past.pop(), change({}, false);
-    },
-  };
+    } else if (what === "next" || what === "previous") await nextScene(what === "next" ? 1 : -1);
+    else if (what === "forward" || what === "back") chosen = (chosen + (what === "forward" ? 1 : n - 1)) % Math.max(1, n);
+    else {
+      const made = await app.line.ask("pixels.edit", {state, triangle: chosen, what});
+      [corner, chosen] = [null, made.triangle];
+      change(made.state);
+    }
+    overlay(), controls();
+  }
 
-  // -- the picture --
+  // -- the pictures --
 
-  const panels = make("div.panels");
-  const why = make("div.why", {"aria-live": "polite"}, make("p", {}, "Point at a pixel, or move over the picture with the arrows."));
-  const stage = make("div.stage", {
-    tabIndex: 0, role: "application", onkeydown: press,
-    "aria-label": "Magnified pixels. Arrows look at pixels, 1 2 3 take a corner, Tab takes the next scene, Escape leaves.",
-  }, panels);
-
-  let fitted = "";
   function show({panels: shown, arrays, samples: at}) {
     const isNew = samples.length !== at.length;
     samples = at;
-    for (const key of part.views.keys()) {
-      if (!shown.some((one) => one.key === key)) part.views.get(key).figure.remove(), part.views.delete(key);
+    for (const [key, {figure}] of part.views) {
+      if (!shown.some((one) => one.key === key)) figure.remove(), part.views.delete(key);
     }
-    for (const one of shown) {
-      if (!part.views.has(one.key)) part.views.set(one.key, view(one.key));
-      const {figure, canvas, box, caption, legend} = part.views.get(one.key);
-      Object.assign(part.views.get(one.key), {owners: arrays[`${one.key}_owners`], counts: arrays[`${one.key}_counts`]});
-      panels.append(figure);
-      caption.replaceChildren(...facts(one));
-      legend.replaceChildren(...(one.refused ? [make("div.refused", {}, one.refused)] : keys(one)));
-      box.hidden = Boolean(one.refused);
-      if (arrays[one.key]) paint(canvas, arrays[one.key]);
+    for (const {key, title, notes, facts, legend, refused} of shown) {
+      if (!part.views.has(key)) part.views.set(key, view(key));
+      const one = part.views.get(key), text = facts.map(([words, kind]) => make(`span.${kind}`, {}, words));
+      Object.assign(one, {owners: arrays[`${key}_owners`], counts: arrays[`${key}_counts`]});
+      one.caption.replaceChildren(make("b", {}, title), make("span", {}, notes), make("div", {}, text));
+      one.legend.replaceChildren(...legend.map(([color, words]) =>
+        make("span", {}, make("i", {style: `background:${color}`}), words)), make("span.bad", {}, refused));
+      one.box.hidden = !arrays[key];
+      if (arrays[key]) paint(one.canvas, arrays[key]);
+      panels.append(one.figure);
     }
     const wanted = JSON.stringify([shown.map(({key}) => key), state.size]);
     if (wanted !== fitted) fitted = wanted, fit();
     else if (state.look === "overdraw" || isNew) overlay();
   }
-  function facts({key, title, ms, n, n_wrong, n_twice, notes, kinds}) {
-    if (key === "difference") {
-      const n = kinds.slice(2).reduce((sum, k) => sum + k, 0);
-      return [make("b", {}, "difference"), make("div", {}, make(`span${n ? ".bad" : ".good"}`, {}, n === 1 ? "1 pixel" : `${n.toLocaleString("en")} pixels`))];
-    }
-    if (n === undefined) return [make("b", {}, title)];
-    const facts = [make("span", {}, `${n.toLocaleString("en")} px`), make("span", {}, time(ms))];
-    if (n_twice) facts.push(make("span", {}, `${n_twice.toLocaleString("en")} twice`));
-    if (n_wrong !== undefined) facts.push(make(n_wrong ? "span.bad" : "span.good", {}, n_wrong ? `${n_wrong} wrong` : "all exact"));
-    return [make("b", {}, title), make("span", {}, notes.join(", ")), make("div", {}, ...facts)];
-  }
-  const time = (ms) => ms < 1 ? `${(1000 * ms).toFixed(0)} µs` : `${ms.toFixed(1)} ms`;
-  function keys({key, kinds, of}) {
-    if (key === "difference") {
-      return DIFFERENCES.filter(([k]) => kinds[k]).map(([k, color, word]) =>
-        make("span", {}, make("i", {style: `background:${color}`}), `${kinds[k].toLocaleString("en")} ${word(...of)}`));
-    }
-    if (state.look !== "overdraw") return [];
-    return ["#9ecae1", "#e69f00", "#d55e00", "#7a1f5c"].map((color, i) =>
-      make("span", {}, make("i", {style: `background:${color}`}), ["once", "twice", "3 times", "4 or more"][i]));
-  }
 
+  // A picture with its caption, the lines over it, and what a pointer does there.
   function view(key) {
     const canvas = make("canvas"), sheet = svg("svg", {"aria-hidden": "true"});
     const box = make("div.view", {}, canvas, sheet), caption = make("figcaption"), legend = make("div.legend");
     const figure = make("figure.panel", {"data-key": key}, caption, box, legend);
     let dragged = null;
     const place = ({clientX, clientY}) => {
-      const {left, top} = sheet.getBoundingClientRect(), cell = part.cell;
-      return [(clientX - left) / cell - 1 + state.origin[0], (clientY - top) / cell - 1 + state.origin[1]];
+      const {left, top} = sheet.getBoundingClientRect();
+      return [clientX - left, clientY - top].map((value, k) => value / part.cell - 1 + state.origin[k]);
     };
     const nearest = (event) => {
       const [x, y] = place(event), reach = (event.pointerType === "touch" ? 26 : 13) / part.cell;
-      const far = state.vertices.map((v) => Math.hypot(v[0] - x, v[1] - y));
-      const taken = corner === null ? -1 : state.triangles[chosen]?.[corner] ?? -1;
-      if (taken >= 0 && far[taken] <= reach) return taken;
-      const i = far.indexOf(Math.min(...far));
+      const far = state.vertices.map((v) => Math.hypot(v[0] - x, v[1] - y)), own = taken()[corner];
+      const i = far[own] <= reach ? own : far.indexOf(Math.min(...far));
       return far[i] <= reach ? i : null;
     };
     const at = (event) => place(event).map((value, k) => Math.floor(value - state.origin[k]));
-    const isInside = ([x, y]) => x >= 0 && y >= 0 && x < state.size[0] && y < state.size[1];
+    const nearestSample = (event) => {
+      const [x, y] = place(event).map((value) => value - Math.floor(value));
+      const far = samples.map((one) => Math.hypot(one[0] - x, one[1] - y));
+      return Math.max(0, far.indexOf(Math.min(...far)));
+    };
+    const isInside = (at) => at.every((value, k) => value >= 0 && value < state.size[k]);
     sheet.onpointerdown = (event) => {
       if (event.button) return;
       stage.focus({preventScroll: true});
-      const i = nearest(event);
-      if (i === null) {
-        const [x, y] = at(event), {owners} = part.views.get(key);
-        if (isInside([x, y])) {
-          const owner = owners?.[y * state.size[0] + x] ?? -1;
-          if (owner >= 0) chosen = owner;
-          inspect([x, y], key);
-          overlay(), controls();
-        }
-        return;
+      dragged = nearest(event);
+      const [x, y] = at(event);
+      if (dragged !== null) {
+        if (!taken().includes(dragged)) chosen = Math.max(0, state.triangles.findIndex((row) => row.includes(dragged)));
+        corner = taken().indexOf(dragged);
+        past = [...past.slice(-199), state];
+        sheet.setPointerCapture(event.pointerId);
+      } else if (isInside([x, y])) {
+        const owner = part.views.get(key).owners?.[y * state.size[0] + x] ?? -1;
+        if (owner >= 0) chosen = owner;
+        inspect([x, y], key, nearestSample(event));
       }
-      dragged = i;
-      if (!state.triangles[chosen]?.includes(i)) chosen = Math.max(0, state.triangles.findIndex((row) => row.includes(i)));
-      corner = Math.max(0, state.triangles[chosen]?.indexOf(i) ?? 0);
-      past = [...past.slice(-199), state];
-      sheet.setPointerCapture(event.pointerId);
       overlay(), controls();
     };
     sheet.onpointermove = (event) => {
       if (dragged !== null) move(dragged, place(event).map(snapped), false);
-      else if (event.pointerType === "mouse" && isInside(at(event))) inspect(at(event), key);
+      else if (event.pointerType === "mouse" && isInside(at(event))) inspect(at(event), key, nearestSample(event));
     };
     sheet.onpointerup = sheet.onpointercancel = () => { dragged = null; };
     return {figure, canvas, sheet, box, caption, legend};
   }
-  function inspect(at, key = probed) {
-    if (pixel && pixel[0] === at[0] && pixel[1] === at[1] && probed === key) return;
-    pixel = at;
-    probed = key;
+  function inspect(at, key = probed, k = 0) {
+    if (`${pixel},${sample}` === `${at},${k}` && probed === key) return;
+    [pixel, probed, sample] = [at, key, k];
     look();
     for (const {sheet} of part.views.values()) ring(sheet.querySelector(".ring"));
   }
-  const ring = (rect) => {
-    if (rect) for (const [name, value] of Object.entries(pixel ? {x: pixel[0], y: pixel[1], width: 1, height: 1} : {width: 0})) rect.setAttribute(name, value);
-  };
+  function ring(rect) {
+    const [x, y] = pixel ?? [0, 0], width = pixel ? 1 : 0;
+    for (const [name, value] of Object.entries({x, y, width, height: 1})) rect?.setAttribute(name, value);
+  }
 
   // The largest whole number of screen pixels a pixel that lets all pictures fit, in the columns that allow most.
   function fit() {
     const n = part.views.size, [width, height] = state.size, isNarrow = stage.clientWidth < 480;
     const room = isNarrow ? Infinity : Math.max(420, innerHeight - 120);
     let best = [0, 1];
-    for (let columns = 1; columns <= n; columns++) {
+    for (let columns = 1; columns <= (isNarrow ? 1 : n); columns++) {
       const wide = ((stage.clientWidth + 24) / columns - 24) / (width + 2);
       const high = (room / Math.ceil(n / columns) - 84) / (height + 2);
       const cell = Math.max(1, Math.floor(Math.min(wide, high, 44)));
       if (cell > best[0]) best = [cell, columns];
     }
-    const [cell, columns] = isNarrow ? [Math.max(1, Math.floor(Math.min(stage.clientWidth / (width + 2), 44))), 1] : best;
+    const [cell, columns] = best, px = (n) => `${cell * n}px`;
     part.cell = cell;
     panels.style.gridTemplateColumns = `repeat(${columns}, ${Math.max(cell * (width + 2), 200)}px)`;
     for (const {canvas, box} of part.views.values()) {
-      Object.assign(box.style, {width: `${cell * (width + 2)}px`, height: `${cell * (height + 2)}px`});
-      Object.assign(canvas.style, {left: `${cell}px`, top: `${cell}px`, width: `${cell * width}px`, height: `${cell * height}px`});
+      Object.assign(box.style, {width: px(width + 2), height: px(height + 2)});
+      Object.assign(canvas.style, {left: px(1), top: px(1), width: px(width), height: px(height)});
     }
     overlay();
   }
 
   // Lines, dots and handles over the pixels: no pixel is decided here.
   function overlay() {
-    const [width, height] = state.size, [ox, oy] = state.origin, cell = part.cell || 1;
-    const points = state.vertices.map(([x, y]) => [x - ox, y - oy]), taken = state.triangles[chosen] ?? [];
-    const near = ([x, y]) => Math.abs(x) < 1e5 && Math.abs(y) < 1e5;
-    const outline = (rows) => rows.filter((row) => row.every((i) => near(points[i])))
+    const [width, height] = state.size, cell = part.cell || 1;
+    const points = state.vertices.map(([x, y]) => [x - state.origin[0], y - state.origin[1]]);
+    const isNear = (point) => Math.max(...point.map(Math.abs)) < 1e5;
+    const outline = (rows) => rows.filter((row) => row.every((i) => isNear(points[i])))
       .map((row) => `M${row.map((i) => points[i].join(" ")).join("L")}Z`).join("");
-    const all = outline(state.triangles), one = outline(state.triangles.length > 1 && taken.length ? [taken] : []);
+    const all = outline(state.triangles), own = outline(state.triangles.length > 1 ? [taken()] : []);
     const kind = [cell, width, height, samples.length].join("-");
     for (const {sheet, counts} of part.views.values()) {
       if (sheet.dataset.kind !== kind) {
@@ -438,12 +375,14 @@ function pixelsPart(app, panel) {
         sheet.setAttribute("viewBox", `-1 -1 ${width + 2} ${height + 2}`);
         sheet.replaceChildren(...ruled(width, height, cell, kind), svg("g"));
       }
-      const numbers = cell < 14 || !counts || state.look !== "overdraw" ? [] : [...counts].flatMap((n, i) =>
-        n > 1 ? [Object.assign(svg("text", {x: i % width + 0.5, y: Math.floor(i / width) + 0.5}), {textContent: n})] : []);
+      const isCounted = cell >= 14 && counts && state.look === "overdraw";
+      const numbers = [...(isCounted ? counts : [])].flatMap((n, i) => n > 1
+        ? [svg("text", {x: i % width + 0.5, y: Math.floor(i / width) + 0.5}, n)] : []);
       sheet.lastChild.replaceChildren(
-        svg("g", {class: "counts"}, ...numbers), svg("path", {class: "halo", d: all}), svg("path", {class: "edges", d: all}),
-        svg("path", {class: "taken", d: one}), svg("rect", {class: "ring", fill: "none"}),
-        ...points.flatMap((point, i) => near(point) ? [grip(point, taken.indexOf(i), cell)] : []),
+        svg("g", {class: "counts"}, ...numbers), svg("path", {class: "halo", d: cell < 9 ? "" : all}),
+        svg("path", {class: "edges", d: all}), svg("path", {class: "taken", d: own}),
+        svg("rect", {class: "ring", fill: "none"}),
+        ...points.flatMap((point, i) => isNear(point) ? [grip(point, taken().indexOf(i), cell)] : []),
       );
       ring(sheet.querySelector(".ring"));
     }
@@ -452,143 +391,111 @@ function pixelsPart(app, panel) {
   function ruled(width, height, cell, kind) {
     const bars = (n, line) => Array.from({length: n + 1}, (_, i) => line(i)).join("");
     const lines = cell < 5 ? "" : bars(width, (x) => `M${x} 0V${height}`) + bars(height, (y) => `M0 ${y}H${width}`);
-    if (cell < 9 || !samples.length) return [svg("path", {class: "lines", d: lines})];
-    const dots = samples.map(([cx, cy]) => svg("circle", {class: "dots", cx, cy, r: (samples.length > 4 ? 1 : 1.5) / cell}));
-    const pattern = svg("pattern", {id: `dots-${kind}`, width: 1, height: 1, patternUnits: "userSpaceOnUse"}, ...dots);
-    return [svg("defs", {}, pattern), svg("path", {class: "lines", d: lines}), svg("rect", {width, height, fill: `url(#dots-${kind})`})];
+    const ruling = svg("path", {class: "lines", d: lines});
+    if (cell < 9 || !samples.length) return [ruling];
+    const r = (samples.length > 4 ? 1 : 1.5) / cell, id = `dots-${kind}`;
+    const dots = samples.map(([cx, cy]) => svg("circle", {class: "dots", cx, cy, r}));
+    const pattern = svg("pattern", {id, width: 1, height: 1, patternUnits: "userSpaceOnUse"}, ...dots);
+    return [svg("defs", {}, pattern), ruling, svg("rect", {width, height, fill: `url(#${id})`})];
   }
   function grip([x, y], k, cell) {
-    const isTaken = corner !== null && k === corner;
-    const parts = [svg("circle", {class: "reach", cx: x, cy: y, r: 22 / cell}), svg("circle", {class: "knob", cx: x, cy: y, r: (k < 0 ? 4 : 8) / cell})];
-    if (k >= 0) parts.push(Object.assign(svg("text", {x, y, "font-size": 11 / cell}), {textContent: k + 1}));
-    return svg("g", {class: isTaken ? "grip taken" : "grip"}, ...parts);
+    return svg("g", {class: corner !== null && k === corner ? "grip taken" : "grip"},
+      svg("circle", {class: "reach", cx: x, cy: y, r: 22 / cell}),
+      svg("circle", {class: "knob", cx: x, cy: y, r: (k < 0 ? 4 : 8) / cell}),
+      ...(k < 0 ? [] : [svg("text", {x, y, "font-size": 11 / cell}, k + 1)]));
   }
 
   // -- why a pixel is whose --
 
-  function tell({sentences, rows, n_more}) {
-    const edge = ({ends: [a, b], kind, value, exact}) => make("tr", {}, make("th", {scope: "row"}, `${Math.min(a, b)}–${Math.max(a, b)}`),
-      make("td", {}, kind), make("td", {title: `exactly ${exact} square pixels, twice the area to this edge`},
-        make(value === "0" ? "b.zero" : "span", {}, value)));
-    const card = ({triangle, verdict, edges, weights, depth}) => make("section.card", {},
-      make("h3", {}, make("i", {style: `background:${COLORS[triangle % 7]}`}), `triangle ${triangle}`, make("small", {}, verdict)),
+  function tell({sentences, rows = [], n_more = 0}) {
+    const edge = ({ends, kind, value, exact}) => make("tr", {title: `exactly ${exact}: twice the area to this edge`},
+      make("th", {scope: "row"}, ends), make("td", {}, kind), make("td", {}, make(value === "0" ? "b.zero" : "span", {}, value)));
+    const card = ({triangle, color, verdict, edges, weights, depth}) => make("section.card", {},
+      make("h3", {}, make("i", {style: `background:${color}`}), `triangle ${triangle}`, make("small", {}, verdict)),
       make("table", {}, ...edges.map(edge)),
-      make("p", {}, `weights ${weights.join(", ")}`, ...(depth === null ? [] : [make("br"), `depth ${depth}`])));
+      make("p", {}, `weights ${weights}`, depth === null ? "" : `, depth ${depth}`));
     why.replaceChildren(...sentences.map((text) => make("p", {}, text)), make("div.cards", {}, ...rows.map(card)));
     if (n_more) why.append(make("p.hint", {}, `${n_more} more triangles are farther away.`));
   }
 
-  // -- keys --
+  // -- keys, and the column of choices: the data-name of an element says which value of the state it shows --
 
-  function press(event) {
-    const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
+  stage.onkeydown = (event) => {
+    const key = event.key.length === 1 ? event.key.toLowerCase() : event.key, by = MOVES[key];
     if (event.ctrlKey || event.metaKey || event.altKey) return;
-    const move_ = MOVES[key];
-    if (move_) {
-      const i = corner === null ? undefined : state.triangles[chosen]?.[corner];
-      const far = event.shiftKey ? 1 : step();
-      if (i !== undefined) move(i, state.vertices[i].slice(0, 2).map((v, k) => v + far * move_[k]));
-      else inspect([0, 1].map((k) => Math.max(0, Math.min(state.size[k] - 1, (pixel ?? [0, 0])[k] + (event.shiftKey ? 8 : 1) * move_[k]))));
-    } else if ("123".includes(key)) corner = Number(key) - 1;
-    else if (key === "0") corner = null;
-    else if (key === "[" || key === "]") chosen = (chosen + (key === "]" ? 1 : -1) + state.triangles.length) % Math.max(1, state.triangles.length);
-    else if (key === "Tab") nextScene(event.shiftKey ? -1 : 1);
+    if (by && corner !== null) {
+      const far = event.shiftKey ? 1 : step(), i = taken()[corner];
+      move(i, state.vertices[i].slice(0, 2).map((value, k) => value + far * by[k]));
+    } else if (by) {
+      const far = event.shiftKey ? 8 : 1;
+      inspect(state.size.map((n, k) => Math.max(0, Math.min(n - 1, (pixel ?? [0, 0])[k] + far * by[k]))));
+    } else if ("0123".includes(key)) {
+      corner = key === "0" || !taken().length ? null : Number(key) - 1;
+      overlay();
+    } else if (key === "Tab") nextScene(event.shiftKey ? -1 : 1).catch(told);
     else if (key === "f") change({look: state.look === "wireframe" ? "owners" : "wireframe"});
-    else if (key === "z") edits.undo();
-    else if (key === "n") edits.add();
-    else if (key === "Escape") side.querySelector("select").focus();
-    else if (state.triangles.length && {p: "split", r: "flip", Delete: "remove"}[key]) edits[{p: "split", r: "flip", Delete: "remove"}[key]]();
+    else if (key === "Escape") boxes[0].focus();
+    else if (key in EDIT_KEYS) edit(EDIT_KEYS[key]).catch(told);
     else return;
     event.preventDefault();
-    overlay(), controls();
-  }
-
-  // -- the column of choices --
-
-  const sync = [];
-  const controls = () => sync.forEach((update) => update());
-  const select = (label, options, read, write) => {
-    const box = make("select", {"aria-label": label, onchange: () => write(box.value)});
-    const list = (wanted) => box.replaceChildren(...wanted.map(([value, text, title = ""]) => make("option", {value, title}, text)));
-    if (typeof options !== "function") list(options);
-    sync.push(() => {
-      if (typeof options === "function") list(options());
-      box.value = read();
-    });
-    return box;
   };
-  const plain = (...words) => words.map((word) => [word, word]);
-  const choice = (label, name, options) => row(label, select(label, options, () => `${state[name]}`, (value) =>
-    change({[name]: name === "subpixel_bits" && value !== "exact" ? Number(value) : value})));
-  const segments = (label, words, read, write) => {
-    const buttons = words.map((word) => make("button", {type: "button", onclick: () => (write(word), controls())}, word));
-    sync.push(() => buttons.forEach((button, i) => button.setAttribute("aria-pressed", words[i] === read())));
-    return make("div.segments", {role: "group", "aria-label": label}, ...buttons);
-  };
-  const method = (label, name, more = []) => {
-    const variants = () => methods.filter((one) => one.name.split("/")[0] === state[name].split("/")[0])
-      .map((one) => [one.name, one.name.split("/")[1] ?? "as published", one.summary]);
-    const variant = row("variant", select(`${label}, variant`, variants, () => state[name], (value) => change({[name]: value})));
-    sync.push(() => { variant.hidden = variants().length < 2; });
-    const names = [...more, ...bases.map((base) => [base, base, methods.find((one) => one.name === base).summary])];
-    return [row(label, select(label, names, () => state[name].split("/")[0], (value) => change({[name]: value}))), variant];
-  };
-  const check = (label, name) => {
-    const box = make("input", {type: "checkbox", onchange: () => change({[name]: box.checked})});
-    sync.push(() => { box.checked = state[name]; });
-    return make("label.check", {}, box, label);
-  };
-  const number = (read, write, more = {}) => {
-    const box = make("input", {type: "number", step: "any", ...more, onchange: () => Number.isFinite(box.valueAsNumber) && write(box.valueAsNumber)});
-    sync.push(() => { if (box !== box.getRootNode().activeElement) box.value = read() ?? ""; });
-    return box;
-  };
-  const coordinates = [0, 1, 2].flatMap((k) => [make("span", {}, `${k + 1}`), ...[0, 1].map((axis) => {
-    const i = () => state.triangles[chosen]?.[k];
-    return number(() => state.vertices[i()]?.[axis], (value) => i() !== undefined && move(i(), state.vertices[i()].with(axis, value)),
-      {"aria-label": `corner ${k + 1}, ${"xy"[axis]}`});
-  })]);
-  const title = make("h2");
-  sync.push(() => { title.textContent = state.triangles.length ? `Triangle ${chosen} of ${state.triangles.length}` : "No triangle"; });
-  const edit = Object.entries({add: "N", split: "P", flip: "R", remove: "Del", undo: "Z"}).map(([name, key]) => {
-    const made = button(name, () => edits[name](), key);
-    sync.push(() => { made.disabled = name === "undo" ? !past.length : name !== "add" && !state.triangles.length; });
-    return made;
-  });
-  const plan = make("details", {ontoggle: explain}, make("summary", {}, "The plan, and why"), make("pre", {tabIndex: 0}));
-  const size = [0, 1].map((axis) => number(() => state.size[axis], (value) => change({size: state.size.with(axis, Math.round(value))}),
-    {min: 1, max: 256, step: 1, "aria-label": ["width", "height"][axis]}));
-  const depth = choice("depth test", "depth_test", plain("less", "greater"));
-  sync.push(() => { depth.hidden = (state.vertices[0]?.length ?? 2) < 3; });
-  const save = async (kind) => {
-    try {
-      const {name, type, arrays} = await app.line.ask("pixels.export", {state, kind});
-      download(name, arrays.content, type);
-      app.say(`${name} is saved`);
-    } catch (error) {
-      app.say(error.message, true);
+  function controls() {
+    for (const box of boxes) {
+      const value = state[box.dataset.name];
+      if (box.type === "checkbox") box.checked = value;
+      else if (box !== box.getRootNode().activeElement || box.tagName === "SELECT") box.value = value?.[box.dataset.axis] ?? value ?? "";
     }
-  };
-  const side = make("div.side", {},
-    group("Scene", make("div.stepper", {},
-      select("Scene", () => [...(scenes.includes(sceneName) ? [] : [["", app.hello.name || "from a link"]]), ...plain(...scenes)], () => scenes.includes(sceneName) ? sceneName : "", (name) => name && takeScene(name)),
-      make("button", {type: "button", "aria-label": "previous scene", onclick: () => nextScene(-1)}, "‹"),
-      make("button", {type: "button", "aria-label": "next scene", onclick: () => nextScene(1)}, "›"))),
-    group("Methods", ...method("draws", "method"), ...method("beside it", "other", [["", "none"]]), check("the exact picture", "exact")),
-    group("Rules",
-      choice("sub-pixel bits", "subpixel_bits", plain(...[..."012345678", "10", "12", "14", "16", "exact"])),
-      choice("sampling", "sampling", plain("center", "msaa2", "msaa4", "msaa8", "msaa16", "area", "outer", "inner")),
-      choice("cull", "cull", plain("none", "back", "front")),
-      choice("winding", "winding", plain("as given", "clockwise", "counter-clockwise")), depth),
-    group("Shown", segments("Shown", ["owners", "overdraw", "wireframe"], () => state.look, (look) => change({look})),
-      row("pixels", make("span.pair", {}, ...size))),
-    make("section.group", {}, title, make("div.coordinates", {}, ...coordinates), make("div.buttons", {}, ...edit),
-      row("drag to", select("Vertices are dragged to", plain("free", "sub-pixel", "pixel centre"), () => snap, (value) => { snap = value; }))),
-    group("Keep", make("div.buttons", {}, ...["png", "svg", "code", "test"].map((kind) => button({png: "PNG", svg: "SVG", code: "Python", test: "Test case"}[kind], () => save(kind))),
-      button("Copy link", () => app.copyLink()))),
-  );
-  const hint = make("p.hint", {}, ...KEYS.flatMap(([key, text], i) => [i ? " · " : "", make("kbd", {}, key), ` ${text}`]));
-  panel.append(make("div.layout.three", {}, stage, why, side, make("div.below", {}, plan, hint)));
+    for (const button of findAll("[data-look]")) button.setAttribute("aria-pressed", button.dataset.look === state.look);
+    for (const box of findAll(".coordinates input")) {
+      const row = state.vertices[taken()[box.dataset.corner]];
+      if (box !== box.getRootNode().activeElement) box.value = row?.[box.dataset.axis] ?? "";
+    }
+    const n = state.triangles.length;
+    find(".which").textContent = n ? `Triangle ${chosen} of ${n}` : "No triangle";
+    for (const what of ["split", "flip", "remove"]) find(`[data-edit=${what}]`).disabled = !n;
+    find("[data-edit=undo]").disabled = !past.length;
+    find(".deep").hidden = (state.vertices[0]?.length ?? 2) < 3;
+  }
+  for (const box of boxes) {
+    const {name, axis} = box.dataset;
+    box.onchange = () => {
+      if (name === "scene") return void (box.value && takeScene(box.value).catch(told));
+      const value = box.type === "checkbox" ? box.checked : Number(box.value) >= 0 && box.value ? Number(box.value) : box.value;
+      change({[name]: axis ? state[name].with(axis, value) : value});
+    };
+  }
+  const option = (text, value = text, title = "") => make("option", {value, title}, text);
+  for (const box of [find("[data-name=method]"), find("[data-name=other]")]) {
+    for (const kind of ["production", "of the literature"]) {
+      const own = methods.filter((one) => one.is_classic === (kind !== "production"));
+      box.append(make("optgroup", {label: kind}, ...own.map(({name, summary}) => option(name, name, summary))));
+    }
+  }
+  boxes[0].append(option(scenes.includes(app.hello.name) ? "from a link" : app.hello.name, ""), ...scenes.map((name) => option(name)));
+  for (let k = 0; k < 6; k++) {
+    const corner = k >> 1, axis = k & 1;
+    const box = make("input", {type: "number", step: "any", "aria-label": `corner ${corner + 1}, ${"xy"[axis]}`});
+    Object.assign(box.dataset, {corner, axis});
+    box.onchange = () => {
+      const i = taken()[corner];
+      if (i !== undefined && box.value) move(i, state.vertices[i].with(axis, Number(box.value)));
+    };
+    find(".coordinates").append(...(axis ? [] : [make("span", {}, `${corner + 1}`)]), box);
+  }
+  for (const one of findAll("[data-look]")) one.onclick = () => change({look: one.dataset.look});
+  for (const one of findAll("[data-edit]")) one.onclick = () => edit(one.dataset.edit).catch(told);
+  for (const one of findAll("[data-save]")) {
+    one.onclick = async () => {
+      try {
+        const {name, type, arrays} = await app.line.ask("pixels.export", {state, kind: one.dataset.save});
+        download(name, arrays.content, type);
+      } catch (error) {
+        told(error);
+      }
+    };
+  }
+  find(".link").onclick = app.copyLink;
+  plan.ontoggle = explain;
   new ResizeObserver(() => panel.hidden || !part.views.size || fit()).observe(stage);
 
   function enter() {
@@ -600,18 +507,25 @@ function pixelsPart(app, panel) {
 // ---- Steps -----------------------------------------------------------------------------------------------------
 
 function stepsPart(app, panel) {
-  const part = {state: () => view, enter, restore}, view = {scene: "", method: "edge", subpixel_bits: 8, step: 0};
-  let trace = null, scene = null, timer = null;
-  const canvas = make("canvas"), over = svg("svg", {"aria-hidden": "true"}), values = make("dl.values"), about = make("p.hint");
-  const told = make("p", {role: "status"}), play = button("Play", toggle, "Space");
+  const part = {state: () => view, enter, restore}, view = {scene: "", method: "edge", subpixel_bits: 8, step: null};
+  let trace = null, timer = null;
+  const canvas = make("canvas"), over = svg("svg", {"aria-hidden": "true"}), now = svg("rect", {class: "now", height: 1});
+  const told = make("p", {role: "status"}), values = make("dl.values"), about = make("p.hint");
   const slider = make("input", {type: "range", min: 0, "aria-label": "Step", oninput: () => go(slider.valueAsNumber)});
   const speed = make("input", {type: "range", min: 0, max: 3, step: 0.25, value: 1});
+  const actions = {
+    First: ["⇤", "Home", () => go(0)], "Row back": ["«", "Shift+ArrowLeft", () => leap(-1)], Back: ["‹", "ArrowLeft", () => go(view.step - 1)],
+    Play: ["▶", " ", toggle],
+    Step: ["›", "ArrowRight", () => go(view.step + 1)], Row: ["»", "Shift+ArrowRight", () => leap(1)], Last: ["⇥", "End", () => go(Infinity)],
+  };
+  const buttons = Object.entries(actions).map(([name, [sign, key, onclick]]) =>
+    make("button", {type: "button", title: `${name}: ${key === " " ? "Space" : key}`, "aria-label": name, onclick}, sign));
 
   function toggle() {
-    const isOn = timer === null && trace;
+    const isOn = timer === null && trace !== null;
     clearTimeout(timer);
     timer = null;
-    play.textContent = isOn ? "Pause" : "Play";
+    buttons[3].textContent = isOn ? "❚❚" : "▶";
     if (!isOn) return;
     if (view.step >= trace.steps.length) go(0);
     const tick = () => {
@@ -621,81 +535,68 @@ function stepsPart(app, panel) {
     };
     timer = setTimeout(tick);
   }
-  const back = () => go(view.step - 1), next = () => go(view.step + 1), first = () => go(0), last = () => go(Infinity);
+  // To the first step of another row, or of another triangle.
   function leap(way) {
-    const at = (k) => trace.steps[k - 1]?.slice(1, 4).filter((_, i) => i !== 1).join();
+    const place = (k) => trace.steps[k - 1]?.slice(1, 5).filter((_, i) => i % 3 === 0).join();
     let k = view.step + way;
-    while (k > 0 && k < trace.steps.length && at(k) === at(view.step)) k += way;
+    while (k > 0 && k < trace.steps.length && place(k) === place(view.step)) k += way;
     go(k);
   }
   function go(step) {
-    if (!trace) return;
     view.step = Math.max(0, Math.min(trace.steps.length, step));
-    const [width, height] = trace.size, pixels = new Uint8ClampedArray(4 * width * height), counts = new Uint32Array(width * height);
-    for (const [kind, triangle, x, y, end, isDrawn] of trace.steps.slice(0, view.step)) {
+    const [width, height] = trace.size, counts = new Uint32Array(width * height), pixels = new Uint8ClampedArray(4 * width * height);
+    for (const [x, y, last, isDrawn, triangle, kind] of trace.steps.slice(0, view.step)) {
       if (kind === "triangle" || kind === "row") continue;
-      for (let i = y * width + x; i <= y * width + end; i++) {
+      for (let i = y * width + x; i <= y * width + last; i++) {
         if (isDrawn) pixels.set(counts[i]++ ? [...TWICE, 255] : [...OWNERS[triangle % OWNERS.length], 255], 4 * i);
         else if (!counts[i]) pixels.set([128, 128, 128, 80], 4 * i);
       }
     }
     paint(canvas, Object.assign(pixels, {shape: [height, width, 4]}));
-    const now = trace.steps[view.step - 1], [ox, oy] = scene.origin ?? [0, 0];
-    over.setAttribute("viewBox", `0 0 ${width} ${height}`);
-    over.parentNode.style.setProperty("--ratio", width / height);
-    const corners = scene.triangles.map((row) => row.map((i) => `${scene.vertices[i][0] - ox},${scene.vertices[i][1] - oy}`).join(" "));
-    over.replaceChildren(...["halo", "edges"].flatMap((name) => corners.map((points) => svg("polygon", {class: name, points}))),
-    ...(now ? [svg("rect", {class: "now", x: now[2], y: now[3], width: now[4] - now[2] + 1, height: 1})] : []));
-    slider.max = trace.steps.length;
-    slider.value = view.step;
-    tell(now);
+    const [x, y, last, , , , sentence, numbers] = trace.steps[view.step - 1] ?? [0, 0, -1, 0, 0, 0, "Nothing is drawn yet.", []];
+    for (const [name, value] of Object.entries({x, y, width: last - x + 1})) now.setAttribute(name, value);
+    told.textContent = `${view.step} of ${trace.steps.length}. ${sentence}`;
+    values.replaceChildren(...numbers.flatMap(([name, text, change]) =>
+      [make("dt", {}, name), make(text.startsWith("-") ? "dd.bad" : "dd", {}, text), make("dd.change", {}, change)]));
+    Object.assign(slider, {max: trace.steps.length}, {value: view.step});
     app.keep();
-  }
-  function tell(now) {
-    values.replaceChildren();
-    if (!now) return void (told.textContent = `${trace.steps.length} steps. Nothing is drawn yet.`);
-    const [kind, triangle, x, y, end, isDrawn, numbers] = now;
-    told.textContent = `${view.step} of ${trace.steps.length}. ` + {
-      triangle: `Triangle ${triangle} is set up.`, row: `Row ${y} of triangle ${triangle}.`,
-      line: `The ${numbers.side} line passes pixel ${x}, ${y}.`, span: `Pixels ${x} to ${end} of row ${y} are drawn.`,
-      test: `Pixel ${x}, ${y} of triangle ${triangle}: ${isDrawn ? "drawn" : numbers.is_inside ? "inside" : "outside"}.`,
-    }[kind];
-    const before = trace.steps.slice(0, view.step - 1).findLast((one) => one[0] === kind && one[1] === triangle)?.[6] ?? {};
-    for (const [name, value] of Object.entries(numbers)) {
-      const change = typeof value === "number" ? value - before[name] : NaN;
-      values.append(make("dt", {}, name), make(value < 0 ? "dd.bad" : "dd", {}, JSON.stringify(value).replaceAll('"', "")),
-        make("dd.change", {}, Number.isNaN(change) ? "" : `${change < 0 ? "−" : "+"}${+Math.abs(change).toPrecision(6)}`));
-    }
   }
   const record = newest(async () => {
     try {
-      scene = view.scene ? (await app.line.ask("pixels.scene", {name: view.scene})).state : pixelsScene();
-      const {vertices, triangles, size, origin} = scene, {method, subpixel_bits} = view;
+      const drawn = app.parts.pixels.scene().size ? app.parts.pixels.scene() : app.hello.pixels;
+      const scene = view.scene ? (await app.line.ask("pixels.scene", {name: view.scene})).state : drawn;
+      const {vertices, triangles, size, origin} = scene, {method, subpixel_bits} = view, [width, height] = size;
       trace = await app.line.ask("steps.trace", {vertices, triangles, size, origin, method, subpixel_bits});
       methods.replaceChildren(...trace.methods.map((name) => make("option", {value: name}, name)));
       methods.value = method;
-      about.textContent = `${trace.summary}. ${trace.source}.`;
+      about.textContent = trace.about;
+      const bars = (n, line) => Array.from({length: n + 1}, (_, i) => line(i)).join("");
+      const grid = bars(width, (x) => `M${x} 0V${height}`) + bars(height, (y) => `M0 ${y}H${width}`);
+      const centers = bars(height - 1, (y) => bars(width - 1, (x) => `M${x + 0.5} ${y + 0.5}h0`));
+      over.setAttribute("viewBox", `0 0 ${width} ${height}`);
+      over.replaceChildren(svg("path", {class: "lines", d: grid}), svg("path", {class: "centers", d: centers}),
+        ...["halo", "edges"].flatMap((name) => trace.outlines.map((points) => svg("polygon", {class: name, points}))), now);
+      over.parentNode.style.setProperty("--ratio", width / height);
       app.say("");
-      go(view.step);
+      go(view.step ?? trace.steps.findIndex(([, , , isDrawn]) => isDrawn) + 1);
     } catch (error) {
       app.say(error.message, true);
     }
   });
-  const pixelsScene = () => (app.parts.pixels.scene().size ? app.parts.pixels.scene() : app.hello.pixels);
-  const set = (name, read = String) => (value) => (Object.assign(view, {[name]: read(value), step: 0}), record());
-  const scenes = choose("scene", [["", "that of Pixels"], ...app.hello.scenes.map((name) => [name, name])], "", set("scene"));
-  const chosen = choose("method", [["edge", "edge"]], "edge", set("method")), methods = chosen.lastChild;
-  const bits = choose("sub-pixel bits", [0, 1, 2, 4, 8, 12, 16].map((n) => [n, n]), 8, set("subpixel_bits", Number));
-  const keys = {" ": toggle, ArrowRight: next, ArrowLeft: back, Home: first, End: last};
-  panel.append(make("div.layout", {tabIndex: -1, onkeydown(event) {
-    const isBusy = /SELECT|INPUT/.test(event.target.tagName) || (event.key === " " && event.target.tagName === "BUTTON");
-    const act = event.shiftKey && event.key.startsWith("Arrow") ? () => leap(event.key === "ArrowRight" ? 1 : -1) : keys[event.key];
-    if (act && trace && !isBusy) event.preventDefault(), act();
-  }}, make("div.stage", {}, make("div.magnified", {}, canvas, over)), make("div.side", {},
-    group("Steps", make("div.buttons", {}, play, button("Back", back, "Left"), button("Step", next, "Right"), button("Row back", () => leap(-1), "Shift and left"),
-      button("Row", () => leap(1), "Shift and right"), button("First", first, "Home"), button("Last", last, "End")), slider, row("speed", speed)),
-    group("Now", told, values), group("Drawn", scenes, chosen, bits, about))));
+  const set = (name, read = String) => (value) => (Object.assign(view, {[name]: read(value), step: null}), record());
+  const scenes = choose("scene", [["", "that of Pixels"], ...app.hello.scenes.map((name) => [name])], "", set("scene"));
+  const chosen = choose("method", [["edge"]], "edge", set("method")), methods = chosen.lastChild;
+  const bits = choose("sub-pixel bits", [[0], [1], [2], [4], [8], [12], [16]], 8, set("subpixel_bits", Number));
+  const press = (event) => {
+    const act = Object.values(actions).find(([, key]) => key === (event.shiftKey ? "Shift+" : "") + event.key)?.[2];
+    if (!act || !trace || /SELECT|INPUT/.test(event.target.tagName) || (event.key === " " && event.target.tagName === "BUTTON")) return;
+    event.preventDefault();
+    act();
+  };
+  const layout = make("div.layout", {tabIndex: -1, onkeydown: press}, make("div.stage", {}, make("div.magnified", {}, canvas, over)), make("div.side", {},
+    group("Steps", make("div.segments", {role: "group"}, ...buttons), slider, row("speed", speed)), group("Now", told, values), group("Drawn", scenes, chosen, bits, about)));
   function enter() {
+    panel.append(layout);
     if (!view.scene || !trace) record();
   }
   function restore(given) {
@@ -708,37 +609,41 @@ function stepsPart(app, panel) {
 
 // ---- Mesh ------------------------------------------------------------------------------------------------------
 
+const AT_REST = "msaa4 at rest";
+
 function meshPart(app, panel) {
   const home = () => ({azimuth: 35, elevation: 20, zoom: 1, pan: [0, 0]});
-  const view = {...home(), fov: 40, up: "y", layer: "smooth", lights: "headlight", edges: false, sampling: "center", tolerance: 0, cull: "none"};
+  const view = {...home(), fov: 40, up: "y", layer: "smooth", lights: "headlight", edges: false, sampling: AT_REST, tolerance: 0, cull: "none"};
   const frames = {painted: 0, asked: 0, newest: 0, times: [], last: null, waiting: null, rest: 0};
   const part = {state: () => view, enter, restore, view, frames, change, spin: 0};
   const canvas = make("canvas", {tabIndex: 0, role: "img", "aria-label": "The mesh: arrows turn it, with Shift they move it, plus and minus zoom"});
   const over = svg("svg", {"aria-hidden": "true"}), stage = make("div.stage.mesh", {}, canvas, over), side = make("div.side");
-  const facts = make("p", {}, "No mesh yet."), rate = make("p.hint"), found = make("dl.values"), legend = make("div.legend");
-  const planText = make("pre", {tabIndex: 0}), planBox = make("details", {ontoggle: () => plan()}, make("summary", {}, "The plan, and why"), planText);
-  const file = make("input", {type: "file", "aria-label": "A mesh file", onchange: () => open(file.files[0])});
+  const facts = make("p"), rate = make("p.hint"), found = make("dl.values"), legend = make("div.legend"), planText = make("pre", {tabIndex: 0});
+  const planBox = make("details", {ontoggle: () => plan()}, make("summary", {}, "The plan, and why"), planText);
+  const file = make("input", {type: "file", onchange: () => open(file.files[0])});
   let mesh = null;
 
   const size = () => [stage.clientWidth, stage.clientHeight].map((n) => Math.max(1, Math.round(n * Math.min(devicePixelRatio, 2))));
-  const ask = (name, more) => app.line.ask(`mesh.${name}`, {...view, size: size(), ...more}).catch((error) => void app.say(error.message, true));
+  const ask = (name, more, isAtRest = true) => {
+    const sampling = view.sampling !== AT_REST ? view.sampling : isAtRest ? "msaa4" : "center";
+    return app.line.ask(`mesh.${name}`, {...view, sampling, size: size(), ...more}).catch((error) => void app.say(error.message, true));
+  };
   const paper = () => getComputedStyle(app.root).backgroundColor.match(/\d+/g).slice(0, 3).map(Number);
   // A view that changes comes as a JPEG, with the colour of the page behind it, and once more as it is when it rests. The
   // next frame is asked for before this one is on the screen: Python draws while the browser decodes and paints.
   const draw = newest(async (isAtRest = false) => {
     clearTimeout(frames.rest);
-    const start = performance.now(), number = ++frames.asked;
-    const frame = await ask("draw", isAtRest ? {} : {background: paper()});
-    if (frame) frame.took = performance.now() - start, decode(frame, number, isAtRest);
+    const start = performance.now(), number = ++frames.asked, frame = await ask("draw", isAtRest ? {} : {background: paper()}, isAtRest);
+    if (frame) decode(Object.assign(frame, {took: performance.now() - start, number, isAtRest}));
     if (part.spin && !panel.hidden) view.azimuth = (view.azimuth + part.spin) % 360, draw();
-    else if (frame && !isAtRest) frames.rest = setTimeout(() => draw(true), 200);
+    else if (frame && !isAtRest) frames.rest = setTimeout(() => draw(true), 300);
   });
-  async function decode(frame, number, isAtRest) {
+  async function decode(frame) {
     const [, , width, height] = frame.box, {pixels} = frame.arrays, start = performance.now();
-    if (pixels.length) frame.image = isAtRest ? new ImageData(pixels, width, height) : await createImageBitmap(new Blob([pixels]));
+    if (pixels.length) frame.image = frame.isAtRest ? new ImageData(pixels, width, height) : await createImageBitmap(new Blob([pixels]));
     frame.decode = performance.now() - start;
-    if (number < frames.newest) return;
-    frames.newest = number;
+    if (frame.number < frames.newest) return;
+    frames.newest = frame.number;
     if (!frames.waiting) requestAnimationFrame(show);
     frames.waiting = frame;
   }
@@ -750,15 +655,15 @@ function meshPart(app, panel) {
     else if (frame.image) context.drawImage(frame.image, x, y);
     frames.painted++, frames.last = frame, frame.paint = performance.now() - start;
     frames.times = [...frames.times.filter((time) => start - time < 1000), start];
-    const level = frame.level === undefined ? "" : `; level ${frame.level}, ${frame.level_triangles.toLocaleString("en")} triangles`;
-    rate.textContent = `${frames.times.length} frames in a second; drawn in ${frame.draw_ms.toFixed(1)} ms, here after ${frame.took.toFixed(1)} ms${level}`;
+    rate.textContent = `${frame.isAtRest ? "" : `${frames.times.length} frames in a second, `}drawn in ${frame.draw_ms.toFixed(1)} ms, `
+      + `here after ${frame.took.toFixed(1)} ms${frame.level === undefined ? "" : `; level ${frame.level}, ${frame.level_triangles.toLocaleString("en")} triangles`}`;
   }
   function change(values) {
     Object.assign(view, values);
     view.elevation = Math.max(-90, Math.min(90, view.elevation));
     view.zoom = Math.max(0.05, Math.min(1000, view.zoom));
     over.replaceChildren();
-    legend.replaceChildren(...(view.layer === "overdraw" ? mesh?.heat ?? [] : []).map(([rgb, text]) => make("span", {}, make("i", {style: `background:rgb(${rgb})`}), text)));
+    legend.replaceChildren(...keyOf(view.layer === "overdraw" ? mesh?.heat : []));
     if (mesh) draw(), plan();
     app.keep();
   }
@@ -769,18 +674,11 @@ function meshPart(app, panel) {
   async function pick({clientX, clientY}) {
     const {left, top, width} = canvas.getBoundingClientRect(), scale = canvas.width / width, size = [canvas.width, canvas.height];
     const [x, y] = [clientX - left, clientY - top].map((at) => Math.floor(at * scale)), hit = await ask("pick", {size, x, y});
-    if (!hit) return;
-    const short = (numbers) => numbers.map((number) => +number.toPrecision(5)).join(", ");
-    const rows = hit.triangle < 0 ? [["shows", "nothing"]] : [
-      [hit.is_level ? "triangle of the level" : "triangle", hit.triangle], ["vertices", hit.vertices.join(", ")],
-      ...hit.positions.map((at, k) => [`at ${k}`, short(at)]), ["weights", short(hit.barycentric)], ["depth", short([hit.depth])],
-      ...(hit.uv ? [["uv", short(hit.uv)]] : []), ...(hit.material ? [["material", hit.material]] : [])];
-    found.replaceChildren(...[["pixel", `${x}, ${y}`], ...rows].flatMap(([name, value]) => [make("dt", {}, name), make("dd", {}, `${value}`)]));
+    found.replaceChildren(...[["pixel", `${x}, ${y}`], ...hit?.rows ?? []].flatMap(([name, text]) => [make("dt", {}, name), make("dd", {}, text)]));
     over.setAttribute("viewBox", `0 0 ${size.join(" ")}`);
-    over.replaceChildren(...(hit.corners_px ? ["halo", "taken"].map((name) => svg("polygon", {class: name, points: hit.corners_px.join(" ")})) : []));
+    over.replaceChildren(...["halo", "taken"].map((name) => svg("polygon", {class: name, points: (hit?.corners_px ?? []).join(" ")})));
   }
   async function open(given) {
-    if (given) app.say(`Reading ${given.name}`);
     try {
       mesh = await app.line.ask("mesh.open", {name: given?.name}, given ? [new Uint8Array(await given.arrayBuffer())] : []);
     } catch (error) {
@@ -793,11 +691,11 @@ function meshPart(app, panel) {
     change(given ? home() : {});
   }
   async function save(what) {
-    const {name, arrays} = (await ask("save", {what})) ?? {};
-    if (name) download(name, arrays.file);
+    const saved = await ask("save", {what});
+    if (saved) download(saved.name, saved.arrays.file);
   }
 
-  // One finger or button turns, the other button, Shift or two fingers move, two fingers and the wheel zoom.
+  // One finger or button turns; the other button, Shift or two fingers move; two fingers and the wheel zoom.
   const pointers = new Map();
   canvas.onpointerdown = (event) => {
     canvas.setPointerCapture(event.pointerId);
@@ -818,18 +716,18 @@ function meshPart(app, panel) {
     pointers.delete(event.pointerId);
     if (event.type === "pointerup" && old?.moved < 4 && !old.button) pick(event);
   };
-  canvas.oncontextmenu = (event) => event.preventDefault();
+  canvas.oncontextmenu = panel.ondragover = (event) => event.preventDefault();
+  panel.ondrop = (event) => (event.preventDefault(), event.dataTransfer.files[0] && open(event.dataTransfer.files[0]));
   canvas.addEventListener("wheel", (event) => (event.preventDefault(), change({zoom: view.zoom * 1.0015 ** -event.deltaY})), {passive: false});
   canvas.onkeydown = (event) => {
     const [x, y] = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1]}[event.key] ?? [0, 0];
     const zoom = {"+": 1.1, "=": 1.1, "-": 1 / 1.1}[event.key];
-    if (x || y) change(event.shiftKey ? {pan: [view.pan[0] + 0.05 * x, view.pan[1] + 0.05 * y]} : {azimuth: view.azimuth + 5 * x, elevation: view.elevation + 5 * y});
+    if ((x || y) && event.shiftKey) change({pan: [view.pan[0] + 0.05 * x, view.pan[1] + 0.05 * y]});
+    else if (x || y) change({azimuth: view.azimuth + 5 * x, elevation: view.elevation + 5 * y});
     else if (zoom || event.key === "0") change(zoom ? {zoom: view.zoom * zoom} : home());
     else return;
     event.preventDefault();
   };
-  panel.ondragover = (event) => event.preventDefault();
-  panel.ondrop = (event) => (event.preventDefault(), event.dataTransfer.files[0] && open(event.dataTransfer.files[0]));
 
   function controls() {
     const choice = (label, name, options) => choose(label, options.map((one) => [one].flat()), view[name], (text) =>
@@ -838,17 +736,18 @@ function meshPart(app, panel) {
       const box = make("input", {type: "checkbox", checked: isOn, onchange: () => act(box.checked)});
       return make("label.check", {}, box, label);
     };
-    side.replaceChildren(group("Mesh", facts, file, rate), ...(mesh ? [
-      group("Look", choice("layer", "layer", mesh.layers), legend, choice("light", "lights", mesh.lights), choice("sampling", "sampling", ["center", "msaa2", "msaa4", "msaa8", "msaa16"]),
-        choice("tolerance", "tolerance", [[0, "none: the mesh itself"], ...[0.25, 0.5, 1, 2, 4].map((n) => [n, `${n} px: a coarser level`])]),
+    const tolerances = [[0, "none: the mesh itself"], ...[0.25, 0.5, 1, 2, 4].map((n) => [n, `${n} px: a coarser level`])];
+    side.replaceChildren(
+      group("Mesh", facts, make("label.file", {}, file, "Open a file, or drop one"), rate),
+      group("Look", choice("layer", "layer", mesh.layers), legend, choice("light", "lights", mesh.lights),
+        choice("sampling", "sampling", [AT_REST, "center", "msaa2", "msaa4", "msaa8", "msaa16"]), choice("tolerance", "tolerance", tolerances),
         choice("cull", "cull", ["none", "back", "front"]), check("wireframe", view.edges, (edges) => change({edges}))),
       group("Camera", choice("view angle", "fov", [[40, "40°"], [20, "20°"], [70, "70°"], [0, "no perspective"]]), choice("up", "up", ["y", "z"]),
         check("turn by itself", part.spin, (isOn) => (part.spin = isOn ? 1.5 : 0, draw())), make("div.buttons", {}, button("Reset", () => change(home()), "0"))),
       group("Picked", make("p.hint", {}, "A click tells which triangle shows."), found),
       group("Keep", make("div.buttons", {}, ...[["PNG", "png"], ["Python", "code"], ["Job file", "job"]].map(([text, what]) => button(text, () => save(what))),
-        button("Copy link", () => app.copyLink())), planBox)] : [make("p.hint", {}, "Drop a file here: OBJ, PLY, STL, OFF, glTF or GLB.")]));
+        button("Copy link", () => app.copyLink())), planBox));
   }
-  controls();
   panel.append(make("div.layout", {}, stage, side));
   new ResizeObserver(() => mesh && !panel.hidden && draw()).observe(stage);
   function enter() {
@@ -857,8 +756,7 @@ function meshPart(app, panel) {
   }
   function restore(given) {
     for (const name of Object.keys(view)) if (name in given) view[name] = given[name];
-    controls();
-    change({});
+    if (mesh) controls(), change({});
   }
   return part;
 }
@@ -867,28 +765,24 @@ function meshPart(app, panel) {
 
 function racePart(app, panel) {
   const view = {family: "fan", positions: [3], seed: 0}, part = {state: () => view, enter, restore, drawn: 0};
-  const faultColors = [null, OWNERS[3], TWICE, [20, 130, 210]], shareColors = ["#ffffcc", "#c7e9b4", "#7fcdbb", "#41b6c4", "#2c7fb8", "#253494"];
   const stage = make("div.stage.race"), sliders = make("div"), what = make("p"), chart = make("table.chart"), by = make("p.hint"), side = make("div.side");
   let known = null, racers = [], mapped = "";
 
   const draw = newest(async () => {
     const told = await app.line.ask("race.draw", view).catch((error) => void app.say(error.message, true));
     if (!told) return;
-    const [width, height] = told.size, n = width * height, {triangle, faults} = told.arrays;
-    sliders.querySelectorAll("output").forEach((output, i) => (output.textContent = told.values[i]));
-    told.methods.forEach(({bad, gaps, overdrawn, refused}, k) => {
-      const pixels = new Uint8ClampedArray(4 * n);
-      for (let i = 0; i < n; i++) {
-        const fault = faultColors[faults[k * n + i]];
-        pixels.set(fault ? [...fault, 255] : [128, 128, 128, refused || triangle[i] < 0 ? 0 : 40 + 30 * (triangle[i] % 3)], 4 * i);
-      }
-      paint(racers[k].canvas, Object.assign(pixels, {shape: [height, width, 4]}));
-      Object.assign(racers[k].count, {textContent: refused ? "refuses" : bad ? `${bad} wrong` : "right", className: bad ? "bad" : "good"});
-      racers[k].title = refused ?? `${bad} of ${n} pixels: ${gaps} gaps, ${overdrawn} drawn more than once`;
+    const {pictures} = told.arrays, shape = pictures.shape.slice(1), n = pictures.length / racers.length;
+    racers.forEach(({canvas, count, figure}, k) => {
+      const {text, title, bad} = told.rows[k];
+      paint(canvas, Object.assign(pictures.slice(k * n, (k + 1) * n), {shape}));
+      Object.assign(count, {textContent: text, className: bad === 0 ? "good" : "bad"});
+      figure.title = title;
     });
-    app.say("");
+    sliders.querySelectorAll("output").forEach((output, i) => (output.textContent = told.values[i]));
+    const here = Math.round(view.positions.at(-1)) + 1;
+    for (const line of chart.rows) [...line.cells].forEach((cell, i) => cell.classList.toggle("here", i === here));
     part.drawn++;
-    for (const line of chart.rows) [...line.cells].forEach((cell, i) => cell.classList.toggle("here", i === Math.round(view.positions.at(-1)) + 1));
+    app.say("");
   });
   // The chart is filled column by column; another family, seed or first parameter begins another.
   async function map() {
@@ -897,34 +791,42 @@ function racePart(app, panel) {
     if (mapped === wanted) return;
     mapped = wanted;
     by.textContent = `Wrong pixels, in % of those that an edge meets, by ${axis.what}. A dot: with gaps.`;
-    chart.replaceChildren(make("thead", {}, make("tr", {}, make("th"), ...axis.steps.map((step, i) => make("th", {scope: "col"}, button(step, () => set(axes.length - 1, i)))))),
-      make("tbody", {}, ...known.methods.map((name) => make("tr", {}, make("th", {scope: "row"}, name), ...axis.steps.map(() => make("td"))))));
+    const head = axis.steps.map((step, i) => make("th", {scope: "col"}, button(step, () => set(axes.length - 1, i))));
+    chart.replaceChildren(make("thead", {}, make("tr", {}, make("th"), ...head)), make("tbody", {}, ...known.methods.map((name) =>
+      make("tr", {}, make("th", {scope: "row"}, name), ...head.map(() => make("td"))))));
     for (let i = 0; i < axis.steps.length; i++) {
       const column = await app.line.ask("race.column", {...view, positions: [...others, i]}).catch(() => null);
       if (mapped !== wanted || !column) return;
-      column.rows.forEach(([bad, hasGaps], k) => {
-        const cell = chart.tBodies[0].rows[k].cells[i + 1], share = bad / Math.max(1, column.n_edge_px);
-        const level = Math.max(0, Math.min(5, Math.floor(1.5 * Math.log10(share) + 6)));
-        cell.title = bad === null ? "refuses to draw" : `${bad} wrong pixels${hasGaps ? ", with gaps" : ""}`;
-        cell.classList.add(bad === null ? "refused" : level > 3 ? "dark" : "light", ...(hasGaps ? ["gaps"] : []));
-        if (bad) cell.textContent = share < 0.01 ? (100 * share).toFixed(1) : Math.round(100 * share), cell.style.background = shareColors[level];
+      column.cells.forEach(({text, color, kind, title}, k) => {
+        const cell = Object.assign(chart.tBodies[0].rows[k].cells[i + 1], {textContent: text, title});
+        cell.classList.add(...kind.split(" "));
+        cell.style.background = color;
       });
     }
+  }
+  function redraw() {
+    draw(), map(), app.keep();
   }
   function set(i, position) {
     view.positions[i] = position;
     sliders.querySelectorAll("input")[i].value = position;
-    draw(), map(), app.keep();
+    redraw();
   }
   function take(family) {
     const {axes, what: text} = known.families[family];
     if (family !== view.family || view.positions.length !== axes.length) view.positions = axes.map(() => 0);
     view.family = family;
-    what.textContent = `${text[0].toUpperCase()}${text.slice(1)}. Each pixel has to be drawn once.`;
-    sliders.replaceChildren(...axes.map((axis, i) => make("label.slider", {}, make("span", {}, `${axis.what}: `, make("output")), make("input", {
-      type: "range", min: 0, max: axis.steps.length - 1, step: axis.is_continuous ? 0.05 : 1, value: view.positions[i], oninput: ({target}) => set(i, target.valueAsNumber),
+    what.textContent = `${text[0].toUpperCase()}${text.slice(1)}. Each pixel has to be drawn once, and as the vertices say before any snap.`;
+    sliders.replaceChildren(...axes.map(({what, steps, is_continuous}, i) => make("label.slider", {}, make("span", {}, `${what}: `, make("output")), make("input", {
+      type: "range", min: 0, max: steps.length - 1, step: is_continuous ? 0.05 : 1, value: view.positions[i], oninput: ({target}) => set(i, target.valueAsNumber),
     }))));
-    draw(), map(), app.keep();
+    redraw();
+  }
+  function build() {
+    const seed = make("input", {type: "number", min: 0, max: 99, value: view.seed, onchange: () => (view.seed = Math.max(0, seed.valueAsNumber | 0), redraw())});
+    const families = Object.keys(known.families).map((name) => [name]);
+    side.replaceChildren(group("Race", choose("family", families, view.family, take), what, sliders, row("seed", seed), make("div.legend", {}, ...keyOf(known.key))));
+    take(view.family);
   }
   async function enter() {
     if (panel.firstChild) return;
@@ -932,17 +834,10 @@ function racePart(app, panel) {
     known = await app.line.ask("race.families");
     racers = known.methods.map((name) => {
       const canvas = make("canvas"), count = make("span");
-      return Object.assign(make("figure", {}, canvas, make("figcaption", {}, name.replace(/[_/]/g, "$&\u200b"), count)), {canvas, count});
+      return {canvas, count, figure: make("figure", {}, canvas, make("figcaption", {}, name.replace(/[_/]/g, "$&\u200b"), count))};
     });
-    stage.append(...racers);
+    stage.append(...racers.map(({figure}) => figure));
     build();
-  }
-  function build() {
-    const seed = make("input", {type: "number", min: 0, max: 99, value: view.seed, onchange: () => (view.seed = Math.max(0, seed.valueAsNumber | 0), draw(), map(), app.keep())});
-    const key = ["another triangle shows", "a gap", "drawn more than once"].map((text, i) => make("span", {}, make("i", {style: `background:rgb(${faultColors[i + 1]})`}), text));
-    side.replaceChildren(group("Race", choose("family", Object.keys(known.families).map((name) => [name, name]), view.family, take), what, sliders, row("seed", seed),
-      make("div.legend", {}, ...key)));
-    take(view.family);
   }
   function restore(given) {
     Object.assign(view, given);

@@ -33,21 +33,21 @@ class ExactPicture:
     """(H, W): whether an edge of a triangle meets the pixel's square, its border included."""
 
 
-class ExactPoints(NamedTuple):
+class WidePoints(NamedTuple):
     """Vertices in units of 2**-bits pixels; bits >= 1, so that pixel centres are whole numbers of units."""
 
     xy: list[Point]
     bits: int
 
 
-def true_points(vertices: NDArray[np.float64]) -> ExactPoints:
+def true_points(vertices: NDArray[np.float64]) -> WidePoints:
     """Return float64 vertices in pixels as they are."""
     ratios = [[x.as_integer_ratio() for x in row] for row in np.asarray(vertices, np.float64)[:, :2].tolist()]
     bits = max([1, *(denominator.bit_length() - 1 for row in ratios for _, denominator in row)])
-    return ExactPoints([(*(n * (2**bits // d) for n, d in row),) for row in ratios], bits)
+    return WidePoints([(*(n * (2**bits // d) for n, d in row),) for row in ratios], bits)
 
 
-def snapped_points(vertices: NDArray[np.float64], snap: str) -> ExactPoints:
+def snapped_points(vertices: NDArray[np.float64], snap: str) -> WidePoints:
     """Return vertices in pixels after a snap: "px" to the middle of their pixel, "float32", or to a number of bits.
 
     Truncation is towards zero, the rounding to bits to nearest with ties to even.
@@ -58,19 +58,19 @@ def snapped_points(vertices: NDArray[np.float64], snap: str) -> ExactPoints:
         return true_points(np.asarray(vertices).astype(np.float32).astype(np.float64))
     rows = [[Fraction(x) for x in row] for row in np.asarray(vertices, np.float64)[:, :2].tolist()]
     if snap == "px":
-        return ExactPoints([(2 * int(x) + 1, 2 * int(y) + 1) for x, y in rows], 1)
+        return WidePoints([(2 * int(x) + 1, 2 * int(y) + 1) for x, y in rows], 1)
     scale = 2 ** int(snap)
-    return ExactPoints([(2 * round(x * scale), 2 * round(y * scale)) for x, y in rows], int(snap) + 1)
+    return WidePoints([(2 * round(x * scale), 2 * round(y * scale)) for x, y in rows], int(snap) + 1)
 
 
-def signed_area(points: ExactPoints, triangle: list[int]) -> int:
+def signed_area(points: WidePoints, triangle: list[int]) -> int:
     """Return twice the area in square units, positive clockwise as seen (y down)."""
     (ax, ay), (bx, by), (cx, cy) = (points.xy[i] for i in triangle)
     return (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
 
 
 def draw_points(
-    points: ExactPoints, triangles: NDArray[np.int32], size: Point, origin: Point = (0, 0), rule: str = "top-left"
+    points: WidePoints, triangles: NDArray[np.int32], size: Point, origin: Point = (0, 0), rule: str = "top-left"
 ) -> ExactPicture:
     """Return the exact picture of a window; `rule` says which edges own the centres on them: or "bottom-right"."""
     width, height = size
