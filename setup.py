@@ -14,7 +14,9 @@ TOPLEFT_SANITIZE    sanitizers of the compiler, as of -fsanitize=; `.ci/sanitize
 
 import hashlib
 import os
+import shutil
 import subprocess
+import sys
 import tempfile
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -22,6 +24,7 @@ from pathlib import Path
 from threading import Lock
 
 from setuptools import Extension, setup
+from setuptools.command.build import build
 from setuptools.command.build_ext import build_ext
 from setuptools.errors import CompileError, PlatformError
 
@@ -134,6 +137,14 @@ def make_once(target: Path, key: str, make) -> None:
     stamp.write_text(key)
 
 
+class BuildAnew(build):
+    """Begin with an empty folder: a module that is gone would stay in it, and come into the wheel."""
+
+    def run(self) -> None:
+        shutil.rmtree(self.build_lib, ignore_errors=True)
+        super().run()
+
+
 class BuildTopleft(build_ext):
     """Compile each unit with its own flags, rebuild what changed, link."""
 
@@ -146,7 +157,9 @@ class BuildTopleft(build_ext):
     def build_extension(self, ext: Extension) -> None:
         if self.compiler.compiler_type == "msvc":
             raise PlatformError("topleft needs gcc or clang: it uses their attributes, which MSVC does not have")
-        self.temp = Path(self.build_temp).resolve() / "topleft"
+        # pip gives an editable build a folder that it deletes: the next build in the checkout would begin anew.
+        kept = ROOT / "build" / f"temp.{self.plat_name}-{sys.implementation.cache_tag}"
+        self.temp = (kept if self.editable_mode else Path(self.build_temp).resolve()) / "topleft"
         self.temp.mkdir(parents=True, exist_ok=True)
         compiler = self.compiler.compiler_so
         try:
@@ -279,4 +292,4 @@ def extensions() -> list[Extension]:
     return [Extension(ENGINE, ["src/topleft/_engine/kernels.pyx"]), *classics]
 
 
-setup(ext_modules=extensions(), cmdclass={"build_ext": BuildTopleft})
+setup(ext_modules=extensions(), cmdclass={"build": BuildAnew, "build_ext": BuildTopleft})

@@ -39,15 +39,14 @@ AT_REST = "() => document.querySelector('.explorer').app.parts.mesh.frames.last.
 TURN = """async (seconds) => {
   const part = document.querySelector(".explorer").app.parts.mesh, {frames} = part, seen = [];
   const wait = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
-  part.spin = 1.5;
-  part.change({});
+  part.change({spin: true});
   await wait(2000);
   const start = performance.now(), before = frames.painted;
   for (let last = null; performance.now() - start < 1000 * seconds; await new Promise(requestAnimationFrame)) {
     if (frames.last !== last) seen.push(last = frames.last);
   }
   const rate = 1000 * (frames.painted - before) / (performance.now() - start);
-  part.spin = 0;
+  part.change({spin: false});
   return {rate, seen: seen.map((one) => [one.draw_ms, one.encode_ms, one.took, one.decode + one.paint])};
 }"""
 ASK = """async ([size, background]) => {

@@ -113,7 +113,7 @@ class Pieces:
 
 class SnappedMesh:
     viewport: Viewport | None
-    exact: ExactPoints | None
+    exact: UnsnappedPoints | None
     subpixel_bits: int
     def __init__(
         self,
@@ -125,7 +125,7 @@ class SnappedMesh:
         how: tuple[int, int, int, int, int, int],
         viewport: Viewport | None,
         is_used: U8 | None = None,
-        exact: ExactPoints | None = None,
+        exact: UnsnappedPoints | None = None,
     ) -> None: ...
     def seen_from(self, x_fx: int, y_fx: int) -> SnappedMesh: ...
     def guess_seen(self, width: int, height: int) -> tuple[float, float, float]: ...
@@ -180,7 +180,7 @@ class ExactPieces:
     def __len__(self) -> int: ...
     def join(self, points: F64, triangles: I32) -> tuple[F64, I32, I32]: ...
 
-class ExactPoints:
+class UnsnappedPoints:
     @property
     def counts(self) -> tuple[int, int, int, int, int, int]: ...
     def __init__(
