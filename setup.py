@@ -55,6 +55,7 @@ FLAGS_AVX512 = [
     *FLAGS_AVX2,
     *("-mavx512f", "-mavx512bw", "-mavx512dq", "-mavx512vl", "-mavx512cd", "-mprefer-vector-width=512"),
 ]
+FLAGS_VBMI = [*FLAGS_AVX512, "-mavx512vbmi", "-mavx512vbmi2"]
 
 # What a compiler has to accept before a unit is built. Scalar: C11, no excess precision.
 PROBE_SCALAR = """
@@ -77,6 +78,11 @@ PROBE_AVX512 = """
 #error "not x86-64"
 #endif
 __m512i probe(__m512i a, __mmask64 m) { return _mm512_mask_mullo_epi64(_mm512_lzcnt_epi32(a), (__mmask8)m, a, a); }
+"""
+
+PROBE_VBMI = """
+#include <immintrin.h>
+__m512i probe(__m512i a, __mmask64 m) { return _mm512_maskz_compress_epi8(m, _mm512_permutex2var_epi8(a, a, a)); }
 """
 
 
@@ -196,7 +202,13 @@ class BuildTopleft(build_ext):
             told = [flag for flag in [*self.compiler.compiler_so[1:], *unit_flags] if "/" not in flag]
             macros += [(f"TL_HAVE_{name.upper()}", "1"), (f"TL_FLAGS_{name.upper()}", quoted(" ".join(told)))]
 
+        # Beside AVX-512, and no instruction set of its own: a unit for what draws meshlets on newer CPUs.
+        flags_vbmi = FLAGS_C + FLAGS_VBMI
+        has_vbmi = "avx512" in flags and self.accepts(flags_vbmi, PROBE_VBMI)
+        macros += [("TL_HAVE_VBMI", "1")] if has_vbmi else []
+
         units = [(ROOT / f"csrc/isa_{name}.c", unit_flags, []) for name, unit_flags in flags.items()]
+        units += [(ROOT / "csrc/meshlets/meshlets.c", flags_vbmi, [])] if has_vbmi else []
         units.append((ROOT / "csrc/dispatch.c", FLAGS_C, macros))
         return [*units, (self.cython(ext), FLAGS_CYTHON, [])]
 
