@@ -14,7 +14,9 @@ TOPLEFT_SANITIZE    sanitizers of the compiler, as of -fsanitize=; `.ci/sanitize
 
 import hashlib
 import os
+import shutil
 import subprocess
+import sys
 import tempfile
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -22,6 +24,7 @@ from pathlib import Path
 from threading import Lock
 
 from setuptools import Extension, setup
+from setuptools.command.build import build
 from setuptools.command.build_ext import build_ext
 from setuptools.errors import CompileError, PlatformError
 
@@ -52,6 +55,7 @@ FLAGS_AVX512 = [
     *FLAGS_AVX2,
     *("-mavx512f", "-mavx512bw", "-mavx512dq", "-mavx512vl", "-mavx512cd", "-mprefer-vector-width=512"),
 ]
+FLAGS_VBMI = [*FLAGS_AVX512, "-mavx512vbmi", "-mavx512vbmi2"]
 
 # What a compiler has to accept before a unit is built. Scalar: C11, no excess precision.
 PROBE_SCALAR = """
@@ -74,6 +78,11 @@ PROBE_AVX512 = """
 #error "not x86-64"
 #endif
 __m512i probe(__m512i a, __mmask64 m) { return _mm512_mask_mullo_epi64(_mm512_lzcnt_epi32(a), (__mmask8)m, a, a); }
+"""
+
+PROBE_VBMI = """
+#include <immintrin.h>
+__m512i probe(__m512i a, __mmask64 m) { return _mm512_maskz_compress_epi8(m, _mm512_permutex2var_epi8(a, a, a)); }
 """
 
 
@@ -128,6 +137,14 @@ def make_once(target: Path, key: str, make) -> None:
     stamp.write_text(key)
 
 
+class BuildAnew(build):
+    """Begin with an empty folder: a module that is gone would stay in it, and come into the wheel."""
+
+    def run(self) -> None:
+        shutil.rmtree(self.build_lib, ignore_errors=True)
+        super().run()
+
+
 class BuildTopleft(build_ext):
     """Compile each unit with its own flags, rebuild what changed, link."""
 
@@ -140,7 +157,9 @@ class BuildTopleft(build_ext):
     def build_extension(self, ext: Extension) -> None:
         if self.compiler.compiler_type == "msvc":
             raise PlatformError("topleft needs gcc or clang: it uses their attributes, which MSVC does not have")
-        self.temp = Path(self.build_temp).resolve() / "topleft"
+        # pip gives an editable build a folder that it deletes: the next build in the checkout would begin anew.
+        kept = ROOT / "build" / f"temp.{self.plat_name}-{sys.implementation.cache_tag}"
+        self.temp = (kept if self.editable_mode else Path(self.build_temp).resolve()) / "topleft"
         self.temp.mkdir(parents=True, exist_ok=True)
         compiler = self.compiler.compiler_so
         try:
@@ -183,7 +202,13 @@ class BuildTopleft(build_ext):
             told = [flag for flag in [*self.compiler.compiler_so[1:], *unit_flags] if "/" not in flag]
             macros += [(f"TL_HAVE_{name.upper()}", "1"), (f"TL_FLAGS_{name.upper()}", quoted(" ".join(told)))]
 
+        # Beside AVX-512, and no instruction set of its own: a unit for what draws meshlets on newer CPUs.
+        flags_vbmi = FLAGS_C + FLAGS_VBMI
+        has_vbmi = "avx512" in flags and self.accepts(flags_vbmi, PROBE_VBMI)
+        macros += [("TL_HAVE_VBMI", "1")] if has_vbmi else []
+
         units = [(ROOT / f"csrc/isa_{name}.c", unit_flags, []) for name, unit_flags in flags.items()]
+        units += [(ROOT / "csrc/meshlets/meshlets.c", flags_vbmi, [])] if has_vbmi else []
         units.append((ROOT / "csrc/dispatch.c", FLAGS_C, macros))
         return [*units, (self.cython(ext), FLAGS_CYTHON, [])]
 
@@ -267,4 +292,4 @@ def extensions() -> list[Extension]:
     return [Extension(ENGINE, ["src/topleft/_engine/kernels.pyx"]), *classics]
 
 
-setup(ext_modules=extensions(), cmdclass={"build_ext": BuildTopleft})
+setup(ext_modules=extensions(), cmdclass={"build": BuildAnew, "build_ext": BuildTopleft})

@@ -33,6 +33,7 @@ from benchmarks.small.gate import STUDY as GATE
 from benchmarks.small.growth import STUDY as GROWTH
 from benchmarks.small.layers import STUDY as LAYERS
 from benchmarks.small.memset import STUDY as MEMSET
+from benchmarks.small.no_snap import STUDY as NO_SNAP
 from benchmarks.small.samplings import STUDY as SAMPLINGS
 from benchmarks.small.tiles import STUDY as TILES
 from benchmarks.static.study import STUDY as STATIC
@@ -41,7 +42,7 @@ STUDIES = {
     study.kind: study
     for study in (
         RUN, ACCURACY, BATCH, ATLAS, CHOICES, STATIC, PICTURES, LEVELS, LAYERS, FIELD, SAMPLINGS, PLANNER, MEMSET,
-        GROWTH, POLYGONS, REAL_FILES, FRESH, GATE, TILES, EXPLORER, CLUSTER,
+        GROWTH, POLYGONS, REAL_FILES, FRESH, GATE, TILES, EXPLORER, CLUSTER, NO_SNAP,
     )
 }  # fmt: skip
 

@@ -76,6 +76,22 @@ static int cpu_has_avx512(void)
 #endif
 }
 
+#ifdef TL_HAVE_VBMI
+extern const tl_meshlet_kernels tl_meshlets_vbmi;
+
+static int cpu_has_vbmi(void) { return __builtin_cpu_supports("avx512vbmi") && __builtin_cpu_supports("avx512vbmi2"); }
+#endif
+
+const tl_meshlet_kernels *tl_meshlets_beside(const tl_kernels *kernels)
+{
+#ifdef TL_HAVE_VBMI
+    if (kernels == UNITS[TL_ISA_AVX512].kernels && cpu_has_avx512() && cpu_has_vbmi())
+        return &tl_meshlets_vbmi;
+#endif
+    (void)kernels;
+    return NULL;
+}
+
 const char *tl_isa_name(int i_isa) { return i_isa >= 0 && i_isa < TL_N_ISA ? UNITS[i_isa].name : NULL; }
 
 const char *tl_isa_flags(int i_isa) { return i_isa >= 0 && i_isa < TL_N_ISA ? UNITS[i_isa].flags : ""; }

@@ -80,6 +80,7 @@ const tl_kernels TL_KERNELS = {
     .cut_clusters = cut_clusters,
     .measure_clusters = measure_clusters,
     .survey_clusters = survey_clusters,
+    .count_hidden = count_hidden,
     .drop_sides = drop_sides_of_mesh,
     .list_edges = list_edges,
     .draw_lines = draw_lines,

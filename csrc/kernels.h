@@ -45,6 +45,11 @@ typedef struct tl_kernels {
     void (*survey_clusters)(const tl_clustered *mesh, const tl_cluster_view *view, int64_t step,
                             int64_t n_of[TL_N_FATES]);
 
+    /* Counts of the same clusters those that the window may show, and in *n_hidden those of them that all lie behind
+     * what the target shows. */
+    int64_t (*count_hidden)(const tl_clustered *mesh, const tl_cluster_view *view, const tl_window *window,
+                            const tl_target *target, int64_t step, int64_t *n_hidden);
+
     /* Lowest index of a TL_BAD vertex that a triangle uses, -1 if there is none. */
     int64_t (*first_bad)(const tl_vertex *vertices, const int32_t *triangles, int64_t n_triangles);
 

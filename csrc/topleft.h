@@ -417,5 +417,6 @@ typedef struct {
 #include "exact.h"
 #include "polygons.h"
 #include "kernels.h"
+#include "meshlets.h"
 
 #endif

@@ -23,6 +23,20 @@ def pytest_collection_modifyitems(items):
             item.add_marker(pytest.mark.quick)
 
 
+#: Packages of the extra `test` that scenes and comparisons of tests need; the library itself never does.
+TEST_PACKAGES = frozenset({"matplotlib", "meshio", "scipy"})
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call(item):
+    try:
+        return (yield)
+    except ModuleNotFoundError as error:
+        if (error.name or "").partition(".")[0] in TEST_PACKAGES:
+            pytest.skip(f"needs {error.name}, of the extra `test`")
+        raise
+
+
 #: Pixels that the processes of pytest-xdist have compared.
 compared_elsewhere: list[int] = []
 

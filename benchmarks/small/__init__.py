@@ -5,6 +5,7 @@ cluster.py    what a Dask cluster costs: a job, the client's memory
 fresh.py      results of their own beside `Rasterizer`
 gate.py       two commits: instructions, and time in turns
 layers.py     each layer of a view beside its picture
+no_snap.py    vertices that are not snapped beside snapped ones, verb by verb
 field.py      a field beside matplotlib, datashader and SciPy
 samplings.py  one scene in every sampling, as a picture
 explorer.py   frames a second of the explorer in a headless browser

@@ -36,19 +36,21 @@ STYLE = """.explorer .stage.mesh {
 }"""
 PAINTED = "() => document.querySelector('.explorer').app?.parts.mesh.frames.painted > 0"
 AT_REST = "() => document.querySelector('.explorer').app.parts.mesh.frames.last.image instanceof ImageData"
+WARM_UP = """async () => {
+  const part = document.querySelector(".explorer").app.parts.mesh, {frames} = part, end = frames.painted + 8;
+  part.change({spin: true});
+  while (frames.painted < end) await new Promise(requestAnimationFrame);
+}"""
+"""Clusters are made at the second frame of a mesh."""
 TURN = """async (seconds) => {
   const part = document.querySelector(".explorer").app.parts.mesh, {frames} = part, seen = [];
-  const wait = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
-  part.spin = 1.5;
-  part.change({});
-  await wait(2000);
   const start = performance.now(), before = frames.painted;
   for (let last = null; performance.now() - start < 1000 * seconds; await new Promise(requestAnimationFrame)) {
     if (frames.last !== last) seen.push(last = frames.last);
   }
-  const rate = 1000 * (frames.painted - before) / (performance.now() - start);
-  part.spin = 0;
-  return {rate, seen: seen.map((one) => [one.draw_ms, one.encode_ms, one.took, one.decode + one.paint])};
+  const n = frames.painted - before, rate = 1000 * n / (performance.now() - start);
+  part.change({spin: false});
+  return {n, rate, seen: seen.map((one) => [one.draw_ms, one.encode_ms, one.took, one.decode + one.paint])};
 }"""
 ASK = """async ([size, background]) => {
   const {app} = document.querySelector(".explorer"), {view} = app.parts.mesh, start = performance.now();
@@ -107,7 +109,7 @@ def measure_mesh(browser: Any, path: Path, seconds: float) -> dict[str, Any]:
             first = time.perf_counter() - start
             page.add_style_tag(content=STYLE)
             others = [pid for pid in chromium if pid != server.pid]
-            page.wait_for_timeout(1000)
+            page.evaluate(WARM_UP)
             before = cpu_ms(server.pid), cpu_ms(*others)
             turned = page.evaluate(TURN, seconds)
             used = cpu_ms(server.pid) - before[0], cpu_ms(*others) - before[1]
@@ -123,7 +125,7 @@ def measure_mesh(browser: Any, path: Path, seconds: float) -> dict[str, Any]:
         finally:
             page.context.close()
             server.terminate()
-    n = max(1, round(turned["rate"] * (seconds + 2)))
+    n = max(1, turned["n"])
     draw, encode, took, shown = (statistics.median(column) for column in zip(*turned["seen"], strict=True))
     return {
         "first_s": first, "frames_a_second": turned["rate"], "draw_ms": draw, "encode_ms": encode,

@@ -3,8 +3,8 @@
 In: scenes of `scenes.py`. Out: a record with a row for each scene and one for each mesh.
 
 Both ways are the public call on memory that is kept, on one thread; each has a `Mesh` of its own, of the same arrays.
-The planner's has been drawn before: it is in clusters where `topleft._raster.choices` says that this pays. The other
-never is.
+The planner's has been drawn before: it is in clusters or in meshlets where `topleft._raster.choices` says that this
+pays. The other never is. A third one, where the first is in meshlets, never is in these.
 """
 
 from __future__ import annotations
@@ -39,7 +39,13 @@ WHOLE: Forced = ((choices, "pays_to_cluster", lambda *_: False),)
 ASKED = ("pays_to_cluster", "pays_to_draw_clusters", "pays_to_draw_instances")
 FORCED: Forced = tuple((choices, name, lambda *_: True) for name in ASKED)
 
+NEVER_GROWN: Forced = ((choices, "pays_to_grow", lambda *_: False),)
+
 Row = dict[str, Any]
+
+
+LONGEST_BACKOFF = 9
+"""Pictures after which a mesh that is drawn whole is asked again whether clusters pay."""
 
 
 @dataclass(frozen=True)
@@ -169,6 +175,11 @@ def measure_scene(scene: StaticScene, options: Options) -> Row:
         ways.append(Way("clusters", drawing(scene), FORCED))
         with Way("", ways[2].draw, (*FORCED, *counting(fates))).in_force():
             ways[2].draw()
+    is_grown = grow(planned)
+    if is_grown:
+        ways.append(Way("without meshlets", drawing(scene), NEVER_GROWN))
+        with ways[-1].in_force():
+            ways[-1].draw()  # the second picture sorts clusters
     check_same_bits(scene.label, ways)
     n_rounds = max(3, min(options.rounds, int(options.most_seconds * 1e3 / (4 * whole_first))))
     times = take_rounds(ways, n_rounds, options.seconds, time.thread_time, math.inf)
@@ -193,7 +204,24 @@ def measure_scene(scene: StaticScene, options: Options) -> Row:
     }
     if shares is None:
         row["clusters_faster"] = quartiles(times[1] / times[2])
+    if is_grown:
+        row["ungrown_ms"], row["grown_faster"] = quartiles(times[-1]), quartiles(times[-1] / times[0])
     return row
+
+
+def grow(planned: Way) -> bool:
+    """Draw as often as it takes before a mesh is grown into meshlets; returns whether it was."""
+    grown = []
+
+    def draw_meshlets(*arguments: Any) -> Any:
+        grown.append(1)
+        return draw(*arguments)
+
+    draw = ClusteredMesh.draw_meshlets
+    with Way("", planned.draw, ((ClusteredMesh, "draw_meshlets", draw_meshlets),)).in_force():
+        for _ in range(choices.MIN_PICTURES_TO_GROW + LONGEST_BACKOFF):
+            planned.draw()
+    return bool(grown)
 
 
 def measure_model(scene: StaticScene) -> Row:
@@ -253,6 +281,7 @@ def row_text(row: Row) -> str:
     width, height = row["size"]
     what = f"{row['model']}, {row['view']}, {row['cull']} {row['verb']} {row['sampling']} {width}x{height}"
     how = "in clusters" if row["is_clustered"] else f"whole (clusters x {row['clusters_faster'][1]:.2f})"
+    how = f"in meshlets, x {row['grown_faster'][1]:.2f} of without" if "grown_faster" in row else how
     return f"{what:72} {row['whole_ms'][1]:9.3f} -> {row['ms'][1]:9.3f} ms  x {row['faster'][1]:6.2f}  {how}"
 
 

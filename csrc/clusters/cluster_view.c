@@ -341,6 +341,26 @@ static void survey_clusters(const tl_clustered *mesh, const tl_cluster_view *v, 
     }
 }
 
+/* Counts of the same clusters those that the window may show, and in *n_hidden those of them that all lie behind what
+ * the window shows. */
+static int64_t count_hidden(const tl_clustered *mesh, const tl_cluster_view *v, const tl_window *window,
+                            const tl_target *target, int64_t step, int64_t *n_hidden)
+{
+    int64_t n = 0;
+    *n_hidden = 0;
+    for (int64_t i = 0; i < mesh->n_clusters; i += step) {
+        const tl_cluster *c = mesh->clusters + i;
+        const seen_box box = place_box(c->low, c->high, v->matrix);
+        unsigned within = 0;
+        if (is_outside(&box, v, &within) ||
+            (v->cull != TL_CULL_NONE && (within & TL_IN_DEPTH) == TL_IN_DEPTH && is_turned_away(c, v, &box)))
+            continue;
+        n++;
+        *n_hidden += is_cluster_hidden(c, v, window, target);
+    }
+    return n;
+}
+
 /* A cluster as a mesh of its own. */
 typedef struct {
     tl_snapped snapped;

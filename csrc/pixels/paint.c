@@ -13,6 +13,7 @@
 #include "vertex/fixed.h"
 #include "raster/setup.c"
 #include "raster/sink.c"
+#include "pixels/weights_exact.c"
 #include "pixels/weights_one.c"
 
 /* The first samples of paint_flat whose colours have four bytes, a vector at a time; returns how many. */
@@ -140,6 +141,19 @@ static void paint_piece(const resolve_state *s, const int32_t *corners, int64_t 
 static void exact_weights_at(const resolve_state *s, int64_t x_px, int64_t y_px, int bits, int n, double *w1,
                              double *w2)
 {
+    const exact_point *p = s->points, first = sample_of(s->exact, x_px, y_px, bits);
+    double area;
+    if (has_float_weights(p, &area)) {
+        const double inverse = 1.0 / area, dx1 = p[0].x - p[2].x, dy1 = p[0].y - p[2].y;
+        const double dx2 = p[1].x - p[0].x, dy2 = p[1].y - p[0].y;
+        const double row1 = dx1 * (first.y - p[2].y), row2 = dx2 * (first.y - p[0].y);
+        for (int k = 0; k < n; k++) {
+            const double x = first.x + (double)k;
+            w1[k] = (row1 - dy1 * (x - p[2].x)) * inverse;
+            w2[k] = (row2 - dy2 * (x - p[0].x)) * inverse;
+        }
+        return;
+    }
     for (int k = 0; k < n; k++) {
         double e[3];
         edges_of_pixel(s, x_px + k, y_px, bits, e);

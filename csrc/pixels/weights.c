@@ -18,6 +18,7 @@
 #include "vertex/project.c"
 #include "raster/setup.c"
 #include "pixels/runs.c"
+#include "pixels/weights_exact.c"
 #include "pixels/weights_one.c"
 
 #define TL_ALONE -1 /* RUN_SPECIAL of a run that is left to weights_of_pixel */
@@ -43,7 +44,7 @@ static void start_weights(weighed_span *r, const tl_snapped *snapped, const tl_w
     memset(r->q, 0, sizeof r->q);
     memset(r->corners, 0, sizeof r->corners);
     r->alone.id = -1;
-    r->has_w = !snapped->mesh.exact && (snapped->mesh.inv_w || (source && !(source->matrix && source->is_affine)));
+    r->has_w = snapped->mesh.inv_w || (source && !(source->matrix && source->is_affine));
 }
 
 /* How a run that int32 does not hold is to be weighed. */
@@ -52,8 +53,6 @@ static int32_t weigh_special(shade_runs *s, const int32_t *corners, int64_t row)
     const tl_vertex_set *set = &s->snapped->mesh;
     double x_fx[3], y_fx[3], low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
     float row_step[3];
-    if (set->exact)
-        return TL_ALONE;
     for (int k = 0; k < 3; k++) {
         if (set->vertices[corners[k]].x_fx == TL_SPECIAL)
             return TL_ALONE;
@@ -67,6 +66,32 @@ static int32_t weigh_special(shade_runs *s, const int32_t *corners, int64_t row)
     special_run *e = &s->special[s->n_special];
     special_edges(e, x_fx, y_fx, center_fx(row + s->window->y_px, s->window->subpixel_bits), row_step);
     return e->area == 0.0f ? TL_ALONE : s->n_special + 1;
+}
+
+/* The same of a run of vertices that are not snapped: float64 where each weight is then within 2^-30. */
+static int32_t weigh_exact_run(weighed_span *r, int slot, const int32_t *corners, int64_t row)
+{
+    shade_runs *s = &r->runs;
+    const tl_vertex_set *set = &s->snapped->mesh;
+    const double unit = (double)(1 << s->window->subpixel_bits);
+    double x_fx[3], y_fx[3], area;
+    float row_step[3];
+    exact_point p[3];
+    if (set->sample_x_fx || set->sample_y_fx) /* moves vertices by a rounded number */
+        return TL_ALONE;
+    for (int k = 0; k < 3; k++)
+        p[k] = point_of(set->exact, corners[k]);
+    if (!has_float_weights(p, &area))
+        return TL_ALONE;
+    if (r->has_w) {
+        const double q0 = r->q[0][slot], q1 = r->q[1][slot], q2 = r->q[2][slot];
+        if (!(fmax(q0, fmax(q1, q2)) <= 256.0 * fmin(q0, fmin(q1, q2))))
+            return TL_ALONE;
+    }
+    place_special(set, corners, unit, x_fx, y_fx);
+    special_edges(&s->special[s->n_special], x_fx, y_fx, center_fx(row + s->window->y_px, s->window->subpixel_bits),
+                  row_step);
+    return s->n_special + 1;
 }
 
 /* 1/w of TL_LANES vertices. */
@@ -122,7 +147,9 @@ TL_INLINE void set_weighed_runs(weighed_span *r, int64_t row)
         for (unsigned rest = vm_bits(is_special); rest; rest &= rest - 1) {
             const int lane = __builtin_ctz(rest);
             const int32_t corners[3] = {setup.corners[0][lane], setup.corners[1][lane], setup.corners[2][lane]};
-            const int32_t how = vm_bits(is_alone) >> lane & 1 ? TL_ALONE : weigh_special(s, corners, row);
+            const int32_t how = vm_bits(is_alone) >> lane & 1 ? TL_ALONE
+                                : s->snapped->mesh.exact      ? weigh_exact_run(r, slot + lane, corners, row)
+                                                              : weigh_special(s, corners, row);
             s->ints[RUN_SPECIAL][slot + lane] = how;
             s->n_special += how > 0;
             r->n_alone += how < 0;

@@ -2,7 +2,8 @@
  * In: a triangle's id and the points it was drawn from.  Out: edge functions in proportion, float64.
  *
  * A float64 edge function is taken where its error bound is below 2^-32 of it; elsewhere, near an edge and of slivers,
- * one that is exact to 2^-50.  So each weight is within 2^-30 of its own size, however far apart the w are. */
+ * one that is exact to 2^-50.  So each weight is within 2^-30 of its own size, however far apart the w are.  weights.c
+ * and paint.c do without where has_float_weights says that plain float64 gives weights within 2^-38 of 1. */
 #ifndef TL_WEIGHTS_EXACT_C
 #define TL_WEIGHTS_EXACT_C
 
@@ -18,6 +19,18 @@ TL_INLINE exact_point sample_of(const tl_vertex_set *set, int64_t x_px, int64_t 
 {
     const double unit = 1.0 / (double)(1 << bits);
     return (exact_point){(double)x_px + 0.5 + set->sample_x_fx * unit, (double)y_px + 0.5 + set->sample_y_fx * unit};
+}
+
+/* Whether float64 edge functions over the area are weights within 2^-38: not of slivers, nor where products leave the
+ * range.  *area is then twice the area, within 2^-38 of its size. */
+static int has_float_weights(const exact_point *p, double *area)
+{
+    const double x1 = p[1].x - p[0].x, y1 = p[1].y - p[0].y, x2 = p[2].x - p[0].x, y2 = p[2].y - p[0].y;
+    const double x3 = p[2].x - p[1].x, y3 = p[2].y - p[1].y;
+    const double width = fmax(fabs(x1), fmax(fabs(x2), fabs(x3))), height = fmax(fabs(y1), fmax(fabs(y2), fabs(y3)));
+    const double box = width * height;
+    *area = x1 * y2 - y1 * x2;
+    return box < 0x1p100 && box > 0x1p-100 && fabs(*area) * 0x1p12 >= box;
 }
 
 /* Whether a sample lies in a triangle of either turn. */

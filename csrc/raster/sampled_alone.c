@@ -194,7 +194,8 @@ static int walk_samples(const tl_snapped *snapped, const int32_t *corners, const
     sampled_ends ends = {{{0}}, {{0}}}; /* compilers cannot tell that there is a sample */
     if (!setup_sampled_triangle(snapped, corners, window, target, &s))
         return 0;
-    tl_count_work(window, (s.row1 - s.row0) << (target->sample_bits + 4)); /* a row end of a sample: 16 pixels */
+    tl_count_work(window, max64(s.row1 - s.row0, 0)
+                              << (target->sample_bits + 4)); /* a row end of a sample: 16 pixels */
     for (int64_t row = s.row0; row < s.row1; row += TL_LANES) {
         const int n = s.row1 - row < TL_LANES ? (int)(s.row1 - row) : TL_LANES;
         const int64_t at = row * target->stride_px + s.col0;

@@ -1,7 +1,5 @@
 """The engine at the ends of arrays: tails of vectors, pages that must not be touched, special vertices, threads."""
 
-import ctypes
-import mmap
 import os
 import subprocess
 import sys
@@ -13,6 +11,7 @@ import pytest
 from comparing import assert_same
 from engine_cases import ON_EACH_ISA, THREADS, Expected, cases, check, check_all, mixed, on, plain
 from int64_loop import DEPTH_TESTS
+from pages import before_a_page, behind_a_page
 from strategies import Scene, perspective, soup
 
 import topleft as tl
@@ -72,32 +71,6 @@ def test_engine_each_number_of_vertices_equals_loop(kind, isa):
 
 
 # ---- pages that must not be touched ---------------------------------------------------------------------------------
-
-
-def between_pages(array, start):
-    """A copy that starts at a place in whole pages of its own, with inaccessible pages on both sides."""
-    page, n_bytes = mmap.PAGESIZE, size_in_pages(array)
-    memory = mmap.mmap(-1, n_bytes + 2 * page)
-    address = ctypes.addressof(ctypes.c_char.from_buffer(memory))
-    for first in (address, address + page + n_bytes):
-        assert ctypes.CDLL(None).mprotect(ctypes.c_void_p(first), ctypes.c_size_t(page), 0) == 0
-    copy = np.frombuffer(memory, array.dtype, array.size, page + start).reshape(array.shape)
-    copy[...] = array
-    return copy
-
-
-def size_in_pages(array):
-    return -(-array.nbytes // mmap.PAGESIZE) * mmap.PAGESIZE
-
-
-def before_a_page(array):
-    """A copy that ends where an inaccessible page begins."""
-    return between_pages(array, size_in_pages(array) - array.nbytes)
-
-
-def behind_a_page(array):
-    """A copy that begins where an inaccessible page ends."""
-    return between_pages(array, 0)
 
 
 def draw_all(scene, guard):

@@ -92,7 +92,6 @@ def check_mesh(page):
     """Compare the canvas, when it rests, with what `render` draws of the view; returns the view."""
     page.wait_for_function(AT_REST)
     view = page.evaluate(f"({{...{PART}.mesh.view, size: {PART}.mesh.frames.last.size}})")
-    view["sampling"] = view["sampling"].removesuffix(" at rest")
     _, arrays = HANDLERS["mesh.save"](
         Session(Content(mesh=tl.Mesh(*tl.scenes.shape("torus-knot")))), {**view, "what": "png"}
     )

@@ -9,7 +9,6 @@ import pytest
 from PIL import Image
 
 import topleft as tl
-from topleft._explore import mesh_view
 from topleft._explore.mesh_view import HANDLERS, HEAT, LAYERS, MeshView, load_bytes
 from topleft._explore.session import Content, Session
 from topleft.errors import MeshError
@@ -118,6 +117,14 @@ def test_with_a_background_comes_a_jpeg_on_it(session):
     assert np.abs(picture.astype(int) - expected).mean() < 3  # of 255; JPEG at quality 92
     for layer in LAYERS[:-1]:
         ask(session, "draw", background=[250, 240, 230], layer=layer)
+
+
+def test_edges_are_smooth_at_rest_alone(session):
+    at_rest, moving = (
+        MeshView.parse({"size": SIZE, "sampling": "at rest"}),
+        {"sampling": "at rest", "background": "white"},
+    )
+    assert (at_rest.sampling, MeshView.parse({"size": SIZE, **moving}).sampling) == ("msaa4", "center")
 
 
 def test_nothing_in_view_is_an_empty_picture(session):
@@ -257,4 +264,12 @@ def test_every_answer_but_pixels_is_json(session):
 
     for what, more in (("open", {}), ("draw", {}), ("pick", {"x": 48, "y": 45}), ("plan", {})):
         json.dumps(ask(session, what, **more)[0])
-    assert set(mesh_view.LIGHTS) == set(ask(session, "open")[0]["lights"])
+
+
+def test_every_choice_of_the_page_is_drawn(session):
+    rows = [row for _, rows in ask(session, "open")[0]["controls"] for row in rows]
+    assert {name for _, name, _ in rows} - {"spin"} <= set(MeshView.__dataclass_fields__)
+    for _, name, options in rows:
+        for value, _ in options or []:
+            if not (name == "tolerance" and value):
+                ask(session, "draw", **{name: value})

@@ -222,6 +222,18 @@ def test_waiting_explorer_returns_when_it_is_closed():
     assert made[1].vertices is None
 
 
+@pytest.mark.parametrize(("display", "n"), [("", 0), (":0", 1)])
+def test_browser_is_opened_where_there_is_a_display(monkeypatch, display, n):
+    opened = []
+    monkeypatch.setattr("webbrowser.open", opened.append)
+    monkeypatch.setattr(sys, "platform", "linux")
+    monkeypatch.setenv("DISPLAY", display)
+    for name in ("WAYLAND_DISPLAY", "BROWSER"):
+        monkeypatch.delenv(name, raising=False)
+    with tl.explore("shared-edge", wait=False) as explorer:
+        assert opened == [explorer.url] * n
+
+
 def test_host_for_others_is_warned_of():
     with pytest.warns(UserWarning, match="whoever reaches 0.0.0.0 and knows the address sees the page"):
         explorer = open_page(Content(), host="0.0.0.0", browser=False)

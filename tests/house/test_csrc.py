@@ -15,8 +15,8 @@ FOLDERS = sorted({name.rpartition("/")[0] for name in FILES})
 
 #: From the lowest floor to the highest. A folder includes those of lower floors, its own files, and headers beside it.
 LADDER = (
-    ("base",), ("lanes",), ("vertex",), ("clusters", "mesh"), ("raster",), ("area", "exact", "points"), ("pixels",),
-    ("blend", "lines", "polygons", "shade", "tiles"),
+    ("base",), ("lanes",), ("vertex",), ("clusters", "mesh"), ("raster",), ("area", "exact", "points", "meshlets"),
+    ("pixels",), ("blend", "lines", "polygons", "shade", "tiles"),
 )  # fmt: skip
 FLOORS = {folder: floor for floor, folders in enumerate(LADDER) for folder in folders}
 
@@ -25,7 +25,8 @@ HOOKS = "raster/hooks.h"
 
 FLAGS_AVX2 = ("-mavx2", "-mfma", "-mbmi", "-mbmi2", "-mlzcnt", "-mpopcnt")
 FLAGS_AVX512 = (*FLAGS_AVX2, "-mavx512f", "-mavx512bw", "-mavx512dq", "-mavx512vl", "-mavx512cd")
-FLAGS = {"avx2": FLAGS_AVX2, "avx512": FLAGS_AVX512}
+FLAGS_VBMI = (*FLAGS_AVX512, "-mavx512vbmi", "-mavx512vbmi2")
+FLAGS = {"avx2": FLAGS_AVX2, "avx512": FLAGS_AVX512, "vbmi": FLAGS_VBMI}
 
 
 def text_of(name: str) -> str:
@@ -115,7 +116,7 @@ def has_instructions(isa: str) -> bool:
 def test_file_compiles_alone(name):
     if not compiler():
         pytest.skip("no C compiler: $CC, cc, gcc or clang")
-    isa = Path(name).stem.rpartition("_")[2]
+    isa = "vbmi" if "meshlet" in name or name == "lanes/halves.h" else Path(name).stem.rpartition("_")[2]
     if isa in FLAGS and not has_instructions(isa):
         pytest.skip(f"{compiler()[0]} does not know {isa}")
     result = check_syntax(CSRC / name, FLAGS.get(isa, ()))

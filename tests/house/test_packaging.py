@@ -2,8 +2,10 @@
 
 import ast
 import os
+import re
 import subprocess
 import sys
+import tomllib
 from importlib import import_module, metadata, resources
 from inspect import ismodule
 from pathlib import Path
@@ -15,6 +17,7 @@ from packaging.specifiers import SpecifierSet
 import topleft as tl
 from topleft.methods import CLASSICS
 
+ROOT = Path(__file__).parents[2]
 ISAS = ["scalar", "avx2", "avx512"]
 
 
@@ -215,3 +218,14 @@ def test_import_of_topleft_loads_no_optional_dependency():
     optional = {"trimesh", "tqdm", "scipy", "matplotlib", "fast_simplification"}
     done = run_python(f"import topleft, sys; print(*sorted({optional} & set(sys.modules)))")
     assert (done.returncode, done.stdout.split()) == (0, []), done.stderr
+
+
+def test_version_stands_in_pyproject_and_everything_else_agrees():
+    version = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
+    newest = re.search(r"^## \[(\d[^\]]*)\]", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), re.M)
+    assert newest is not None
+    assert newest[1] == version
+    assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    recipe = ROOT / "packaging/conda/meta.yaml"
+    if recipe.exists():  # not in an sdist
+        assert f'version = "{version}"' in recipe.read_text(encoding="utf-8")

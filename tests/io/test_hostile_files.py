@@ -20,7 +20,7 @@ from PIL import Image
 import topleft as tl
 from topleft.errors import MeshError, MeshWarning, MissingPackageError
 
-MOST_SECONDS = 10
+MOST_SECONDS = 10  # of the CPU
 
 
 def rich_gltf():
@@ -168,7 +168,7 @@ def test_load_of_mutated_files_ends_in_a_mesh_or_one_line(folder, kind):
     for seed in range(N_MUTATIONS):
         rng = np.random.default_rng(seed)
         (folder / name).write_bytes(mutated_bytes(rng, picture) if variant is None else variant(rng))
-        start = time.monotonic()
+        start = time.process_time()
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             warnings.simplefilter("ignore", MeshWarning)
@@ -180,7 +180,7 @@ def test_load_of_mutated_files_ends_in_a_mesh_or_one_line(folder, kind):
                     tl.load_cameras(path)
             except (MeshError, MissingPackageError) as error:
                 lines.add(str(error))
-        assert time.monotonic() - start < MOST_SECONDS, seed
+        assert time.process_time() - start < MOST_SECONDS, seed
     assert n_read > 0
     assert [line for line in lines if "\n" in line or len(line) > 600] == []
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 600_000  # KiB

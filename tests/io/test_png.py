@@ -66,7 +66,7 @@ def test_encode_bytes_come_back(compressor, channels, mode, size):
 def test_encode_grey_of_16_bits_comes_back(compressor):
     image = np.arange(0, 65533, 13, dtype=np.uint16).reshape(71, 71)
     array, mode = decoded(png.encode(image, compressor=compressor))
-    assert mode == "I;16"
+    assert mode in ("I;16", "I")  # "I" by Pillow 10
     assert np.array_equal(array, image)
 
 

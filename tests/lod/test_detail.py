@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy import ndimage
 
 import topleft as tl
 from topleft._camera.matrices import orbit_view
 from topleft.cli import main
+
+ndimage = pytest.importorskip("scipy.ndimage")
 
 SIZE = (96, 64)
 FINENESS = 8

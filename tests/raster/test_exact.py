@@ -263,7 +263,7 @@ def count(vertices, size, band):
     """Draw counts with bands of a width other than the proved one."""
     triangles = np.arange(len(vertices), dtype=np.int32).reshape(-1, 3)
     out = np.empty(size[::-1], np.int32)
-    exact = _engine.ExactPoints(vertices, triangles, band=band)
+    exact = _engine.UnsnappedPoints(vertices, triangles, band=band)
     how, records = (0, 0, 8, 0, 0, 0), np.empty(0, np.uint8)
     source = _engine.Source(vertices)
     mesh = _engine.SnappedMesh(source, records, None, triangles, None, how, None, exact=exact)

@@ -280,10 +280,6 @@ TRIANGLE = [[0, 0, 0], [4, 0, 0], [0, 4, 0]], [[0, 1, 2]]
         (lambda: tl.wireframe(*TRIANGLE, (4, 4), **EXACT), "here, got 'exact': lines run between points of the grid"),
         (lambda: tl.points(TRIANGLE[0], (4, 4), **EXACT), "here, got 'exact': the corners of points lie on the grid"),
         (lambda: tl.fill(*TRIANGLE, [9], (4, 4), sampling="area", **EXACT), "for sampling 'area', got 'exact'"),
-        (
-            lambda: tl.tiles(tl.Mesh(*TRIANGLE), (4, 4), **EXACT),
-            "here, got 'exact': the windows of a triangle are found on the grid",
-        ),
     ],
 )
 def test_what_needs_the_grid_says_so(call, message):

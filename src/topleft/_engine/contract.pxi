@@ -159,6 +159,36 @@ cdef extern from "topleft.h" nogil:
         void *room
         int may_be_hidden
         int64_t n_seen, n_drawn
+    ctypedef struct tl_kernels  # the table, below
+    int TL_MESHLET_TAIL, TL_N_BOUNDS, TL_GROW_ROOM, TL_GROW_PIECE, TL_MAX_DRAWN_PX, TL_SLOT_PX
+    ctypedef struct tl_meshlet:
+        pass
+    ctypedef struct tl_meshlets:
+        const tl_meshlet *meshlets
+        const float *bounds
+        const uint8_t *n_triangles
+        int64_t n_meshlets
+        double largest[3]
+    ctypedef struct tl_seen_meshlet:
+        int32_t meshlet
+        int16_t left_px, below_px, reach_x, reach_y
+        int32_t n_triangles
+    ctypedef struct tl_meshlet_pass:
+        const tl_meshlets *mesh
+        const tl_cluster_view *seen
+        const tl_source *source
+        const tl_view *view
+        const tl_window *window
+        const tl_target *target
+        const tl_kernels *kernels
+        int32_t first_id
+    ctypedef struct tl_meshlet_kernels:
+        int64_t (*grow)(const tl_source *, const int32_t *, const int32_t *, int64_t, int64_t, int32_t *, void *, tl_meshlet *,
+                        float *, uint8_t *) noexcept nogil
+        int64_t (*list)(const tl_meshlet_pass *, int64_t, int64_t, tl_seen_meshlet *, int32_t *, int64_t *) noexcept nogil
+        int64_t (*draw)(const tl_meshlet_pass *, const tl_seen_meshlet *, int64_t, const int32_t *, int64_t, int32_t, int32_t,
+                        int, tl_seen_meshlet *, int32_t *) noexcept nogil
+    int64_t tl_most_meshlets(int64_t)
     ctypedef struct tl_share:
         const int32_t *ids
         int64_t first, end
@@ -438,6 +468,8 @@ cdef extern from "topleft.h" nogil:
         int64_t (*cut_clusters)(const int32_t *, const int32_t *, int64_t, int32_t *, tl_cluster *, int32_t *, uint8_t *, int64_t *) noexcept nogil
         void (*measure_clusters)(const tl_source *, const uint8_t *, int64_t, int64_t, tl_cluster *, double *) noexcept nogil
         void (*survey_clusters)(const tl_clustered *, const tl_cluster_view *, int64_t, int64_t *) noexcept nogil
+        int64_t (*count_hidden)(const tl_clustered *, const tl_cluster_view *, const tl_window *, const tl_target *, int64_t,
+                                int64_t *) noexcept nogil
         int64_t (*first_bad)(const tl_vertex *, const int32_t *, int64_t) noexcept nogil
         int64_t (*first_bad_row)(const int32_t *, int64_t, int64_t) noexcept nogil
         int64_t (*narrow_triangles)(const int64_t *, int64_t, int64_t, int32_t *) noexcept nogil

@@ -43,7 +43,7 @@ cdef class ExactPieces:
         return all_points, np.concatenate([collapsed, own[3] + np.int32(n + 1)]), names
 
 
-cdef class ExactPoints:
+cdef class UnsnappedPoints:
     """Vertices in pixels as they are, the triangles that are drawn of them, and how many samples were decided how."""
 
     cdef tl_exact_points points

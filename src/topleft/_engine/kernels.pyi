@@ -24,6 +24,13 @@ CLUSTER: int
 CLUSTER_GROUP: int
 CLUSTER_TAIL: int
 CLUSTER_BYTES: int
+MESHLET_BYTES: int
+MESHLET_TAIL: int
+MESHLET_BOUNDS: int
+MESHLET_PIECE: int
+GROW_ROOM: int
+SEEN_BYTES: int
+MAX_DRAWN_PX: int
 BLOCK: int
 SCALARS: dict[np.dtype[Any], int]
 
@@ -106,7 +113,7 @@ class Pieces:
 
 class SnappedMesh:
     viewport: Viewport | None
-    exact: ExactPoints | None
+    exact: UnsnappedPoints | None
     subpixel_bits: int
     def __init__(
         self,
@@ -118,7 +125,7 @@ class SnappedMesh:
         how: tuple[int, int, int, int, int, int],
         viewport: Viewport | None,
         is_used: U8 | None = None,
-        exact: ExactPoints | None = None,
+        exact: UnsnappedPoints | None = None,
     ) -> None: ...
     def seen_from(self, x_fx: int, y_fx: int) -> SnappedMesh: ...
     def guess_seen(self, width: int, height: int) -> tuple[float, float, float]: ...
@@ -173,7 +180,7 @@ class ExactPieces:
     def __len__(self) -> int: ...
     def join(self, points: F64, triangles: I32) -> tuple[F64, I32, I32]: ...
 
-class ExactPoints:
+class UnsnappedPoints:
     @property
     def counts(self) -> tuple[int, int, int, int, int, int]: ...
     def __init__(
@@ -413,6 +420,7 @@ class Clustered:
     def __init__(self, clusters: U8, group_boxes: F64, corners: U8, names: I32) -> None: ...
     def __len__(self) -> int: ...
     def survey(self, view: ClusterView, step: int, n_of: I64) -> None: ...
+    def count_hidden(self, mesh: SnappedMesh, view: ClusterView, target: Target, step: int) -> tuple[int, int]: ...
     def draw(
         self,
         mesh: SnappedMesh,
@@ -427,6 +435,44 @@ class Clustered:
         is_first: bool,
         is_last: bool,
     ) -> tuple[int, int, int]: ...
+
+def has_meshlets() -> bool: ...
+def most_meshlets(n_triangles: int) -> int: ...
+def grow_meshlets(
+    source: Source,
+    triangles: I32,
+    order: I32,
+    first: int,
+    end: int,
+    numbers: I32,
+    room: U8,
+    meshlets: U8,
+    records: F32,
+    n_triangles: U8,
+) -> int: ...
+
+class Grown:
+    def __init__(self, meshlets: U8, bounds: F32, n_triangles: U8, largest: Sequence[float]) -> None: ...
+    def __len__(self) -> int: ...
+
+class MeshletPass:
+    def __init__(
+        self, meshlets: Grown, mesh: SnappedMesh, source: Source, seen: ClusterView, target: Target
+    ) -> None: ...
+    def find(self, first: int, end: int, found: I32, odd: I32) -> tuple[int, int]: ...
+    def split_rows(self, found: I32, n: int, n_parts: int) -> list[int]: ...
+    def draw(
+        self,
+        found: I32,
+        n: int,
+        odd: I32,
+        n_odd: int,
+        first_row: int,
+        end_row: int,
+        is_first: bool,
+        room: I32,
+        others: I32,
+    ) -> int: ...
 
 class Tree:
     def __init__(self, points: F64, triangles: I32, slack: float) -> None: ...

@@ -2,7 +2,7 @@
 # cython: freethreading_compatible=True
 """Memoryviews in, one nogil kernel call, status out. The array layer has checked every shape, dtype and index."""
 
-from libc.stdint cimport int8_t, int32_t, int64_t, uint8_t, uint16_t, uint32_t, uint64_t
+from libc.stdint cimport int8_t, int16_t, int32_t, int64_t, uint8_t, uint16_t, uint32_t, uint64_t
 from cpython.buffer cimport PyBUF_STRIDED_RO, PyBuffer_Release, PyObject_GetBuffer
 from libc.math cimport sqrt
 from libc.string cimport memset
@@ -19,6 +19,7 @@ cdef extern from "dispatch.h" nogil:
     bint tl_isa_available(int i_isa)
     const char *tl_isa_flags(int i_isa)
     const tl_kernels *tl_kernels_for(const char *name)
+    const tl_meshlet_kernels *tl_meshlets_beside(const tl_kernels *kernels)
     const char *tl_compiler()
     const char *tl_version()
 
@@ -96,6 +97,7 @@ include "buffers.pxi"
 include "exact.pxi"
 include "triangles.pxi"
 include "clusters.pxi"
+include "meshlets.pxi"
 include "pixels.pxi"
 include "shade.pxi"
 include "mesh.pxi"

@@ -24,12 +24,12 @@ cdef class SnappedMesh:
     cdef tl_test test
     cdef object arrays
     cdef readonly Viewport viewport
-    cdef readonly ExactPoints exact  # vertices that are not snapped; None: they are
+    cdef readonly UnsnappedPoints exact  # vertices that are not snapped; None: they are
     cdef const uint8_t[::1] is_used  # the blocks of vertices that have been snapped; None: all
 
     def __init__(
         self, Source source, const uint8_t[::1] records, const int64_t[:, ::1] wide, const int32_t[:, ::1] triangles,
-        Pieces pieces, how, Viewport viewport, const uint8_t[::1] is_used=None, ExactPoints exact=None,
+        Pieces pieces, how, Viewport viewport, const uint8_t[::1] is_used=None, UnsnappedPoints exact=None,
     ):
         """`how`: that of a view, see `topleft._raster.view.How`; with `exact` there are no records."""
         cdef int test

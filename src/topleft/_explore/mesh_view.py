@@ -64,6 +64,28 @@ LIGHTS: dict[str, tuple[Light, ...] | None] = {
     ),
 }
 
+AT_REST = "at rest"
+"""A sampling: several samples, but where a view moves."""
+
+CONTROLS: dict[str, list[tuple[str, str, list[tuple[Any, str]] | None]]] = {
+    "Look": [
+        ("layer", "layer", []),
+        ("light", "lights", [(name, name) for name in LIGHTS]),
+        ("sampling", "sampling", [(AT_REST, "msaa4 at rest")]
+         + [(name, name) for name in ("center", "msaa2", "msaa4", "msaa8", "msaa16")]),
+        ("tolerance", "tolerance", [(0, "none: the mesh itself")]
+         + [(px, f"{px:g} px: a coarser level") for px in (0.25, 0.5, 1, 2, 4)]),
+        ("cull", "cull", [(name, name) for name in ("none", "back", "front")]),
+        ("wireframe", "edges", None),
+    ],
+    "Camera": [
+        ("view angle", "fov", [(40, "40°"), (20, "20°"), (70, "70°"), (0, "no perspective")]),
+        ("up", "up", [("y", "y"), ("z", "z")]),
+        ("turn by itself", "spin", None),
+    ],
+}  # fmt: skip
+"""What a page lets choose: label, name in the view, values and their texts; None is yes or no."""
+
 HEAT = np.array([
     (0, 0, 0, 0), (255, 255, 204, 255), (199, 233, 180, 255), (127, 205, 187, 255), (65, 182, 196, 255),
     (29, 145, 192, 255), (34, 94, 168, 255), (37, 52, 148, 255), (8, 29, 88, 255),
@@ -121,6 +143,8 @@ class MeshView:
             If it makes no sense.
         """
         given = {name: request[name] for name in cls.__dataclass_fields__ if name in request}
+        if given.get("sampling") == AT_REST:
+            given["sampling"] = "center" if "background" in request else "msaa4"
         for name in ("azimuth", "elevation", "zoom", "fov", "tolerance"):
             if name in given and not math.isfinite(as_number(name, given[name])):
                 raise ValueError(f"{name} must be finite, got {given[name]}")
@@ -318,12 +342,13 @@ def answer_open(session: Session, request: Request) -> Reply:
         session.kept["mesh"] = Shown(mesh, Path(name).name)
     shown = shown_in(session)
     mesh = shown.mesh
+    layers = [name for name in LAYERS if name != "uv" or mesh.uv is not None]
+    named = {"layer": [(name, name) for name in layers]}
     return Reply({
-        "name": shown.name, "n_vertices": len(mesh.vertices), "n_triangles": len(mesh.triangles),
-        "has_uv": mesh.uv is not None, "has_colors": mesh.colors is not None, "materials": len(mesh.materials),
-        "bounds": mesh.bounds.tolist(),
-        "lacks": lacks, "layers": [name for name in LAYERS if name != "uv" or mesh.uv is not None],
-        "lights": list(LIGHTS), "heat": list(zip(HEAT_LABELS, HEAT[1:, :3].tolist(), strict=True)),
+        "name": shown.name, "n_vertices": len(mesh.vertices), "n_triangles": len(mesh.triangles), "lacks": lacks,
+        "layers": layers, "heat": list(zip(HEAT_LABELS, HEAT[1:, :3].tolist(), strict=True)),
+        "controls": [(title, [(label, name, named.get(name, options)) for label, name, options in rows])
+                     for title, rows in CONTROLS.items()],
     })  # fmt: skip
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import warnings
 import webbrowser
@@ -135,9 +136,14 @@ def open_page(
     server = Server(content, host or LOOPBACK, port, idle)
     server.start()
     print(f"topleft explore: {server.url}", flush=True)  # noqa: T201 -- where to look
-    if browser:
+    if browser and has_display():
         webbrowser.open(server.url)
     return Explorer(content, server)
+
+
+def has_display() -> bool:
+    """Whether a browser can show a window: without one, those of the terminal would take it over."""
+    return sys.platform != "linux" or any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")))
 
 
 def in_notebook() -> bool:

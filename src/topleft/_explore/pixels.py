@@ -50,6 +50,9 @@ DIFFERENCES = np.array(
 
 INK = (60, 72, 88, 255)
 
+MAX_EXACT_ROWS, MAX_EXACT_DEPTHS = 1_000_000, 50_000
+"""Rows of triangles, and samples with a depth, of the exact picture: about two seconds."""
+
 MAX_SLOW_TESTS = 6000
 """Pixels times triangles of what the reference alone can draw: areas and conservative coverage, about half a second."""
 
@@ -146,6 +149,10 @@ def draw_reference(state: PixelState) -> MethodPicture:
         return MethodPicture(owners, (shares > 0).astype(np.int32)[..., None], shares, seconds)
     n = int(state.sampling.removeprefix("msaa")) if state.sampling != "center" else 1
     positions = sampling.SAMPLE_POSITIONS[n]
+    n_samples = n * int(overdraw(state.vertices, state.triangles, state.size, origin=state.origin).sum())
+    n_rows = n * height * len(state.triangles)
+    if n_rows > MAX_EXACT_ROWS or (state.has_depth and n_samples > MAX_EXACT_DEPTHS):
+        raise ValueError("the exact picture takes too long here: make the window smaller, or take fewer triangles")
 
     def both() -> NDArray[np.int32]:
         given = (state.vertices, state.triangles, state.size, state.origin, positions)

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine
 from topleft._base.arrays import as_array
-from topleft._base.memory import FRESH
+from topleft._base.memory import FRESH, empty
 from topleft._base.options import DepthTest, Sampling, Sink
 from topleft._model.mesh import Mesh
 from topleft._raster import choices
@@ -196,10 +196,11 @@ def count_decided(vertices: ArrayLike, triangles: ArrayLike, view: View) -> Deci
         x, y = sample_positions(view.sampling.n_samples, view.grid_bits)[0].tolist()
         mesh = mesh.seen_from(x, y)
     width, height = view.size
-    covered = np.empty(_engine.Target.covered_shape(height, width, 1), np.uint64)
-    target = _engine.Target(Sink.MASK, np.empty((height, width), np.bool_), None, covered)
-    if width and height and mesh.draw(target, 0, height) >= 0:
-        exact.check_indices()
+    if width and height:
+        covered = empty(_engine.Target.covered_shape(height, width, 1), np.uint64)
+        target = _engine.Target(Sink.MASK, empty((height, width), np.bool_), None, covered)
+        if mesh.draw(target, 0, height) >= 0:
+            exact.check_indices()
     return Decided(*mesh.exact.counts)  # type: ignore[union-attr]
 
 

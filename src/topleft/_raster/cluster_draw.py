@@ -26,6 +26,9 @@ __all__ = ["ClusteredMesh", "draw_clustered"]
 #: Clusters that tell what a view shows of all: 5 microseconds.
 SURVEYED = 50
 
+#: Clusters that tell how much a picture hides: 40 microseconds. With 50 the share of a ball is off by 0.1.
+SURVEYED_BEHIND = 200
+
 NO_RECORDS: NDArray[np.uint8] = np.empty(0, np.uint8)
 
 
@@ -94,6 +97,26 @@ class ClusteredMesh:
         place = target, first, end - first, room, others
         n_others, _, n_drawn = clusters.engine.draw(empty, self._own, seen, may_be_hidden, *place, is_first, is_last)
         return others[:n_others].copy(), n_drawn
+
+    def hidden_share(self, target: _engine.Target, n_most: int = SURVEYED_BEHIND) -> float:
+        """Return the share of the clusters that the picture may show which lie behind what a target holds, by some."""
+        (width, height), clusters = self._view.size, self.clusters
+        is_farthest = target.sink == Sink.FARTHEST
+        seen = clusters.seen_in(self._exact, self._empty, 0, height, width, is_farthest=is_farthest)
+        n, n_hidden = clusters.engine.count_hidden(self._empty, seen, target, max(1, round(len(clusters) / n_most)))
+        return n_hidden / max(1, n)
+
+    def draw_meshlets(self, memory: Memory, target: _engine.Target, n_parts: int) -> bool:
+        """Clear a target and draw the mesh from meshlets, as `draw_clustered` does from clusters."""
+        (width, height), clusters = self._view.size, self.clusters
+        is_farthest = target.sink == Sink.FARTHEST
+        seen = clusters.seen_in(self._exact, self._empty, 0, height, width, is_farthest=is_farthest)
+        meshlets = clusters.meshlets
+        drawn = _engine.MeshletPass(meshlets.engine, self._empty, self._own, seen, target)
+        parts = meshlets.draw(memory, drawn, clusters.n_triangles, height, n_parts, is_first=True)
+        if not any(map(len, parts)):
+            return True
+        return draw_others([memory] * n_parts, self, np.unique(np.concatenate(parts)), target, height, (0, 0))
 
     def part(self, *triangles: NDArray[np.int32]) -> _engine.SnappedMesh:
         """Return the mesh with what some triangles use snapped, maybe more; -1 is no triangle."""

@@ -328,19 +328,33 @@ def draw_clusters(memory: Memory, vertices: ArrayLike, view: View, asked: Asked)
         return None
     sink = choices.fragment_sink(asked.test, has_depth=True)
     clusters = view.plan.find_clusters(vertices) if choices.can_cluster(view, sink) else None
-    if clusters is None or not clusters.backoff.is_over():
+    if clusters is None:
+        return None
+    clusters.n_pictures += 1
+    if not clusters.backoff.is_over():
         return None
     seen = ClusteredMesh(clusters, view)
-    pays = choices.pays_to_draw_clusters(view, clusters.n_triangles, seen.survey)
+    found = seen.survey()
+    n = clusters.n_triangles
+    can_grow = choices.can_draw_meshlets(view, sink, clusters.points.dtype)
+    is_grown = can_grow and choices.pays_to_grow(clusters.n_pictures, n, len(clusters))
+    is_grown = is_grown and choices.pays_to_draw_meshlets(n, found, clusters.hidden)
+    pays = is_grown or choices.pays_to_draw_clusters(view, n, lambda: found)
     clusters.backoff.note(pays=pays)
     if not pays:
         return None
     with buffers_of(memory, view, asked) as ((ids, depth), (ids_canvas, depth_canvas)):
-        n_threads = count_threads(view.threads, clusters.n_triangles)
-        memories = [memory] if n_threads == 1 else [FRESH] * n_threads
+        n_threads = count_threads(view.threads, n)
         target = _engine.Target(sink, ids_canvas, depth_canvas, None)
-        if not draw_clustered(memories, [seen], target, view.size[1]):
+        if is_grown:
+            is_drawn = seen.draw_meshlets(memory, target, min(n_threads, view.size[1]))
+        else:
+            memories = [memory] if n_threads == 1 else [FRESH] * n_threads
+            is_drawn = draw_clustered(memories, [seen], target, view.size[1])
+        if not is_drawn:
             return None
+        if can_grow:
+            clusters.hidden = seen.hidden_share(target)
         lay_background(ids_canvas, depth_canvas, sink, asked)
     view.mark("draw")
     return Fragments(ids, depth, seen.part, len(clusters.points), clusters.n_triangles)

@@ -168,7 +168,7 @@ def snap_for_floats(
         bad_row = _engine.first_bad_row(indices, n)
     if bad_row >= 0:
         raise bad_triangle(triangles, bad_row, n)
-    exact = _engine.ExactPoints(taken, indices)
+    exact = _engine.UnsnappedPoints(taken, indices)
     mesh = _engine.SnappedMesh(source, NO_RECORDS, None, indices, None, view.how, None, exact=exact)
     return Unsnapped(mesh, indices, triangles, points, source, NO_RECORDS, None)
 
@@ -209,13 +209,13 @@ def exact_mesh(
     viewport: _engine.Viewport | None,
 ) -> _engine.SnappedMesh:
     """Return a mesh of points in pixels, without the sides that are not drawn."""
-    exact = _engine.ExactPoints(points, triangles, pieces)
+    exact = _engine.UnsnappedPoints(points, triangles, pieces)
     if view.single_sided is not None and len(points):
         is_single, cull = view.single_sided
         how = view.how._replace(cull=cull)
         seen = _engine.SnappedMesh(source, NO_RECORDS, None, triangles, None, how, viewport, exact=exact)
         triangles = without_sides(seen, triangles, is_single, view.threads)
-        exact = _engine.ExactPoints(points, triangles, pieces)
+        exact = _engine.UnsnappedPoints(points, triangles, pieces)
     return _engine.SnappedMesh(source, NO_RECORDS, None, triangles, None, view.how, viewport, exact=exact)
 
 

@@ -19,13 +19,20 @@ def main() -> None:
         for sampling in ("center", "msaa4", "area"):
             tl.coverage(*flat, sampling=sampling, **one)
         tl.overdraw(*flat, **one)
-        tl.rasterize(vertices, triangles, SIZE, **one)
+        frags = tl.rasterize(vertices, triangles, SIZE, **one)
+        frags.barycentric(), frags.interpolate(vertices), frags.sample(colors[:16].reshape(4, 4, 4), flat[0] / 99)
+        tl.merge([frags, frags], **one)
+        for sampling in ("center", "msaa4"):
+            tl.rasterize(vertices, triangles, SIZE, subpixel_bits="exact", sampling=sampling, **one)
         for blend in ("replace", "over"):
             tl.fill(flat[0], triangles, colors, SIZE, per="triangle", blend=blend, **one)
         for antialias in (False, True):
             tl.wireframe(*flat, antialias=antialias, **one)
-        tl.peel(vertices, triangles, SIZE, **one)
+        tl.composite(tl.peel(vertices, triangles, SIZE, **one), colors, per="triangle", **one)
         tl.polygons((flat[0], np.arange(0, 3 * n + 1, 3), np.arange(n + 1)), SIZE, values="index", **one)
+        tl.overlap(flat[0], SIZE, triangles=triangles, **one)
+        tl.field(flat[:2], vertices[:, 2], SIZE, extent=(0, 640, 0, 480), **one)
+        tl.height_map((vertices, triangles), tl.Grid(SIZE, (0, 640, 0, 480)), **one)
         tl.points(vertices[:n], SIZE, point_size=extent / 2, **one)
     tl.render(tl.Mesh(*tl.scenes.shape("torus-knot")), size=SIZE, threads=1)
 

@@ -38,6 +38,8 @@ def main() -> int:
             break
         try:
             found[check_one(FromRandom(seed), options.kind)] += 1
+        except KeyboardInterrupt:
+            break
         except Exception:
             traceback.print_exc()
             print(f"seed {seed}")

@@ -384,7 +384,7 @@ def field_case(draw: Draw) -> Case:
     inputs = [vertices, triangles, values]
     options = {
         "threads": draw.of([1, None, 2]),
-        "subpixel_bits": draw.of([8, 0, 16]),
+        "subpixel_bits": draw.mostly([8, 0, 16, "exact"], [-1]),
         "origin": draw.of([(0, 0), (5, 3)]),
     }
     if draw.chance(2):
@@ -640,6 +640,7 @@ def mesh_case(draw: Draw) -> Case:
     look = {"sampling": draw.of(["center", "msaa4"])} if name in ("render", "silhouette") else {}
     if name == "render":
         look["shading"] = draw.of(["smooth", "flat", "unlit"])
+        look["subpixel_bits"] = draw.mostly([8, "exact"], [-1, "exactly"])
     lens = tl.OpenCVLens(k1=draw.of([-0.2, 0.1])) if draw.chance(6) and n_triangles <= 30 else None
     threads = draw.of([1, None, 2])
 

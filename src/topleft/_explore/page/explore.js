@@ -526,14 +526,13 @@ function stepsPart(app, panel) {
     clearTimeout(timer);
     timer = null;
     buttons[3].textContent = isOn ? "❚❚" : "▶";
-    if (!isOn) return;
-    if (view.step >= trace.steps.length) go(0);
-    const tick = () => {
-      if (view.step >= trace.steps.length || panel.hidden) return toggle();
-      go(view.step + 1);
-      timer = setTimeout(tick, 1000 / 10 ** speed.value);
-    };
-    timer = setTimeout(tick);
+    if (isOn && view.step >= trace.steps.length) go(0);
+    if (isOn) tick();
+  }
+  function tick() {
+    if (view.step >= trace.steps.length || panel.hidden) return toggle();
+    go(view.step + 1);
+    timer = setTimeout(tick, 1000 / 10 ** speed.value);
   }
   // To the first step of another row, or of another triangle.
   function leap(way) {
@@ -570,13 +569,9 @@ function stepsPart(app, panel) {
       methods.replaceChildren(...trace.methods.map((name) => make("option", {value: name}, name)));
       methods.value = method;
       about.textContent = trace.about;
-      const bars = (n, line) => Array.from({length: n + 1}, (_, i) => line(i)).join("");
-      const grid = bars(width, (x) => `M${x} 0V${height}`) + bars(height, (y) => `M0 ${y}H${width}`);
-      const centers = bars(height - 1, (y) => bars(width - 1, (x) => `M${x + 0.5} ${y + 0.5}h0`));
       over.setAttribute("viewBox", `0 0 ${width} ${height}`);
-      over.replaceChildren(svg("path", {class: "lines", d: grid}), svg("path", {class: "centers", d: centers}),
-        ...["halo", "edges"].flatMap((name) => trace.outlines.map((points) => svg("polygon", {class: name, points}))), now);
-      over.parentNode.style.setProperty("--ratio", width / height);
+      over.replaceChildren(...["halo", "edges"].flatMap((name) => trace.outlines.map((points) => svg("polygon", {class: name, points}))), now);
+      for (const [name, value] of Object.entries({width, height})) over.parentNode.style.setProperty(`--${name}`, value);
       app.say("");
       go(view.step ?? trace.steps.findIndex(([, , , isDrawn]) => isDrawn) + 1);
     } catch (error) {
@@ -609,13 +604,11 @@ function stepsPart(app, panel) {
 
 // ---- Mesh ------------------------------------------------------------------------------------------------------
 
-const AT_REST = "msaa4 at rest";
-
 function meshPart(app, panel) {
   const home = () => ({azimuth: 35, elevation: 20, zoom: 1, pan: [0, 0]});
-  const view = {...home(), fov: 40, up: "y", layer: "smooth", lights: "headlight", edges: false, sampling: AT_REST, tolerance: 0, cull: "none"};
+  const view = {...home(), fov: 40, up: "y", layer: "smooth", lights: "headlight", edges: false, sampling: "at rest", tolerance: 0, cull: "none", spin: false};
   const frames = {painted: 0, asked: 0, newest: 0, times: [], last: null, waiting: null, rest: 0};
-  const part = {state: () => view, enter, restore, view, frames, change, spin: 0};
+  const part = {state: () => view, enter, restore, view, frames, change};
   const canvas = make("canvas", {tabIndex: 0, role: "img", "aria-label": "The mesh: arrows turn it, with Shift they move it, plus and minus zoom"});
   const over = svg("svg", {"aria-hidden": "true"}), stage = make("div.stage.mesh", {}, canvas, over), side = make("div.side");
   const facts = make("p"), rate = make("p.hint"), found = make("dl.values"), legend = make("div.legend"), planText = make("pre", {tabIndex: 0});
@@ -624,18 +617,15 @@ function meshPart(app, panel) {
   let mesh = null;
 
   const size = () => [stage.clientWidth, stage.clientHeight].map((n) => Math.max(1, Math.round(n * Math.min(devicePixelRatio, 2))));
-  const ask = (name, more, isAtRest = true) => {
-    const sampling = view.sampling !== AT_REST ? view.sampling : isAtRest ? "msaa4" : "center";
-    return app.line.ask(`mesh.${name}`, {...view, sampling, size: size(), ...more}).catch((error) => void app.say(error.message, true));
-  };
+  const ask = (name, more) => app.line.ask(`mesh.${name}`, {...view, size: size(), ...more}).catch((error) => void app.say(error.message, true));
   const paper = () => getComputedStyle(app.root).backgroundColor.match(/\d+/g).slice(0, 3).map(Number);
   // A view that changes comes as a JPEG, with the colour of the page behind it, and once more as it is when it rests. The
   // next frame is asked for before this one is on the screen: Python draws while the browser decodes and paints.
   const draw = newest(async (isAtRest = false) => {
     clearTimeout(frames.rest);
-    const start = performance.now(), number = ++frames.asked, frame = await ask("draw", isAtRest ? {} : {background: paper()}, isAtRest);
+    const start = performance.now(), number = ++frames.asked, frame = await ask("draw", isAtRest ? {} : {background: paper()});
     if (frame) decode(Object.assign(frame, {took: performance.now() - start, number, isAtRest}));
-    if (part.spin && !panel.hidden) view.azimuth = (view.azimuth + part.spin) % 360, draw();
+    if (view.spin && !panel.hidden) view.azimuth = (view.azimuth + 1.5) % 360, draw();
     else if (frame && !isAtRest) frames.rest = setTimeout(() => draw(true), 300);
   });
   async function decode(frame) {
@@ -729,24 +719,20 @@ function meshPart(app, panel) {
     event.preventDefault();
   };
 
+  // Python lists what can be chosen: groups of [label, name in the view, options]; a check where there are none.
   function controls() {
-    const choice = (label, name, options) => choose(label, options.map((one) => [one].flat()), view[name], (text) =>
-      change({[name]: typeof view[name] === "number" ? Number(text) : text}));
-    const check = (label, isOn, act) => {
-      const box = make("input", {type: "checkbox", checked: isOn, onchange: () => act(box.checked)});
+    const control = ([label, name, options]) => {
+      if (options) return choose(label, options, view[name], (text) => change({[name]: typeof view[name] === "number" ? Number(text) : text}));
+      const box = make("input", {type: "checkbox", checked: view[name], onchange: () => change({[name]: box.checked})});
       return make("label.check", {}, box, label);
     };
-    const tolerances = [[0, "none: the mesh itself"], ...[0.25, 0.5, 1, 2, 4].map((n) => [n, `${n} px: a coarser level`])];
+    const saves = Object.entries({PNG: "png", Python: "code", "Job file": "job"}).map(([text, what]) => button(text, () => save(what)));
     side.replaceChildren(
       group("Mesh", facts, make("label.file", {}, file, "Open a file, or drop one"), rate),
-      group("Look", choice("layer", "layer", mesh.layers), legend, choice("light", "lights", mesh.lights),
-        choice("sampling", "sampling", [AT_REST, "center", "msaa2", "msaa4", "msaa8", "msaa16"]), choice("tolerance", "tolerance", tolerances),
-        choice("cull", "cull", ["none", "back", "front"]), check("wireframe", view.edges, (edges) => change({edges}))),
-      group("Camera", choice("view angle", "fov", [[40, "40°"], [20, "20°"], [70, "70°"], [0, "no perspective"]]), choice("up", "up", ["y", "z"]),
-        check("turn by itself", part.spin, (isOn) => (part.spin = isOn ? 1.5 : 0, draw())), make("div.buttons", {}, button("Reset", () => change(home()), "0"))),
+      ...mesh.controls.map(([title, rows]) => group(title, ...rows.map(control))), legend,
+      make("div.buttons", {}, button("Reset the camera", () => change(home()), "0")),
       group("Picked", make("p.hint", {}, "A click tells which triangle shows."), found),
-      group("Keep", make("div.buttons", {}, ...[["PNG", "png"], ["Python", "code"], ["Job file", "job"]].map(([text, what]) => button(text, () => save(what))),
-        button("Copy link", () => app.copyLink())), planBox));
+      group("Keep", make("div.buttons", {}, ...saves, button("Copy link", () => app.copyLink())), planBox));
   }
   panel.append(make("div.layout", {}, stage, side));
   new ResizeObserver(() => mesh && !panel.hidden && draw()).observe(stage);
