@@ -2,7 +2,8 @@
 
 `python -m benchmarks cluster` starts a scheduler and a worker of one thread, each a process, hands them so many tiny
 jobs from a generator, and notes the client's resident memory on the way: it must not grow with their number. Then one
-thread merges visibility buffers, and draws separate triangles.
+thread merges visibility buffers, draws separate triangles and lists them by windows: where workers that each draw a
+share of the triangles are done sooner than workers that each look for the triangles of their window.
 """
 
 from __future__ import annotations
@@ -54,8 +55,8 @@ def client_of_processes() -> Iterator[Any]:
         stack.enter_context(process_of_dask(*scheduler))
         worker = ("distributed.cli.dask_worker", f"tcp://{address}", "--nthreads", "1", "--no-nanny", "--no-dashboard")
         stack.enter_context(process_of_dask(*worker))
-        client = stack.enter_context(Client(f"tcp://{address}", timeout=60))
-        client.wait_for_workers(1, timeout=60)
+        client = stack.enter_context(Client(f"tcp://{address}", timeout=300))
+        client.wait_for_workers(1, timeout=300)
         yield client
 
 
@@ -91,12 +92,23 @@ def merge_ns() -> float:
     return fastest(lambda: tl.merge(pairs, triangles=shares, threads=1)) / (len(pairs) * 3840 * 2160) * 1e9
 
 
-def triangle_ns() -> float:
-    """Nanoseconds of each of 500,000 separate triangles of 6 px to ids and depth, one thread; the fastest of five."""
+def triangle_ns() -> tuple[float, float]:
+    """Nanoseconds a pixel and a triangle of 6 px, ids and depth at 3840 x 2160, one thread; the fastest of five."""
     import topleft as tl
 
-    vertices, triangles, _ = tl.scenes.random_triangles(500_000, 6, 3840, 2160)
-    return fastest(lambda: tl.rasterize(vertices, triangles, (3840, 2160), threads=1)) / 500_000 * 1e9
+    counts, seconds = (1, 2_000_000), []
+    for n in counts:
+        vertices, triangles, _ = tl.scenes.random_triangles(n, 6, 3840, 2160)
+        seconds.append(fastest(lambda v=vertices, t=triangles: tl.rasterize(v, t, (3840, 2160), threads=1)))
+    return seconds[0] / (3840 * 2160) * 1e9, (seconds[1] - seconds[0]) / counts[1] * 1e9
+
+
+def index_ns() -> float:
+    """Nanoseconds a triangle to find which windows it touches; the fastest of five."""
+    import topleft as tl
+
+    vertices, triangles, _ = tl.scenes.random_triangles(1_000_000, 6, 3840, 2160)
+    return fastest(lambda: tl.tiles((vertices, triangles), (3840, 2160), window=1024, threads=1).index) / 1e6 * 1e9
 
 
 def fastest(work: Any) -> float:
@@ -116,7 +128,8 @@ def run(arguments: argparse.Namespace, _: Save) -> Record:
         draw_jobs(client, 200, arguments.chunk)
         for n in arguments.jobs:
             rows += draw_jobs(client, n, arguments.chunk)
-    units = {"merge_ns": merge_ns(), "triangle_ns": triangle_ns()}
+    pixel, triangle = triangle_ns()
+    units = {"merge_ns": merge_ns(), "pixel_ns": pixel, "triangle_ns": triangle, "index_ns": index_ns()}
     return {"kind": "cluster", "chunk": arguments.chunk, "rows": rows, "units": units, **describe("distributed")}
 
 
@@ -129,9 +142,16 @@ def lines(record: Record) -> list[str]:
         each = 1e3 * row["seconds"] / row["jobs"]
         made.append(f"| {row['jobs']:,} | {row['seconds']:.1f} | {each:.2f} | {row['bytes'] / MIB:.1f} |")
     units = record["units"]
-    of_merge = f"`merge`: {units['merge_ns']:.2f} ns a pixel of each buffer"
-    of_triangles = f"`rasterize`: {units['triangle_ns']:.0f} ns for each of 500,000 triangles of 6 px at 3840 x 2160"
-    return [*made, "", f"{of_merge}; {of_triangles}; one thread, CPU time"]
+    made += ["", "| one thread, CPU time, 3840 x 2160 | ns |", "|---|---:|"]
+    made.append(f"| `rasterize`, a pixel that is cleared | {units['pixel_ns']:.2f} |")
+    made.append(f"| `rasterize`, a separate triangle of 6 px, of 2,000,000 | {units['triangle_ns']:.0f} |")
+    made.append(f"| `merge`, a pixel of each buffer | {units['merge_ns']:.2f} |")
+    made.append(f"| `tiles`, a triangle in the index | {units['index_ns']:.0f} |")
+    made += ["", "| workers | a tree of merges, ms | sort-last pays from so many triangles on |", "|---:|---:|---:|"]
+    for n in (2, 4, 16, 64):
+        merged_ns = np.log2(n) * 2 * units["merge_ns"] * 3840 * 2160
+        made.append(f"| {n} | {merged_ns / 1e6:.0f} | {merged_ns / units['index_ns'] / 1e6:.1f} million |")
+    return made
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
