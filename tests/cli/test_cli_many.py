@@ -395,7 +395,7 @@ def test_render_interrupted_leaves_whole_files_and_goes_on_with_resume(run, fold
     command = [sys.executable, "-m", "topleft", "render", *meshes, *options, "--views", "5000"]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True) as process:
         for _ in range(20_000):  # not by the clock: a machine may stand still
-            if len(names(folder)) >= 3 or process.poll() is not None:
+            if len(list(folder.glob("p/[!.]*.png"))) >= 3 or process.poll() is not None:
                 break
             time.sleep(0.002)
         os.killpg(process.pid, signal.SIGINT)
@@ -443,7 +443,7 @@ def many_pictures(folder):
     command += ["--views", "20000"]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True) as process:
         for _ in range(20_000):
-            if len(names(folder)) >= 3 or process.poll() is not None:
+            if len(list(folder.glob("p/[!.]*.png"))) >= 3 or process.poll() is not None:
                 break
             time.sleep(0.002)
         yield process
