@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from batch_jobs import BOX, SIZE, orbit, pictures, views
+from comparing import files_of
 from PIL import Image
 
 import topleft as tl
@@ -240,10 +241,6 @@ def raster_of_soup(side=1000, kind="labels", **options):
     rng = np.random.default_rng(4)
     mesh = rng.uniform(0, side, (300, 3)), rng.integers(0, 300, (300, 3))
     return tl.tiles(mesh, side, window=128, kind=kind, **options)
-
-
-def files_of(folder):
-    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
 def test_workers_write_a_raster_and_one_of_them_is_killed(client, tmp_path, monkeypatch):

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from comparing import files_of
 from PIL import Image
 
 import topleft as tl
@@ -47,11 +48,6 @@ def raster_of(kind, window=64, mesh=(POINTS, TRIANGLES)):
 
 def equal(found, wished):
     return np.array_equal(found, wished, equal_nan=np.asarray(wished).dtype.kind == "f")
-
-
-def files_of(folder):
-    """All files below a folder, with what they hold."""
-    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
 # Zarr

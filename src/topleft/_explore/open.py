@@ -135,9 +135,13 @@ def open_page(
         )
     server = Server(content, host or LOOPBACK, port, idle)
     server.start()
-    print(f"topleft explore: {server.url}", flush=True)  # noqa: T201 -- where to look
-    if browser and has_display():
-        webbrowser.open(server.url)
+    try:
+        print(f"topleft explore: {server.url}", flush=True)  # noqa: T201 -- where to look
+        if browser and has_display():
+            webbrowser.open(server.url)
+    except BaseException:  # Ctrl-C, say
+        server.close()
+        raise
     return Explorer(content, server)
 
 

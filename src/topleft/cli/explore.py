@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from contextlib import suppress
 from typing import Any
 
 from topleft.cli.arguments import Parser, UsageError, size
@@ -33,13 +34,9 @@ def run_explore(options: argparse.Namespace) -> int:
     if not options.idle > 0:
         raise UsageError(f"--idle must be more than 0 seconds, got {options.idle}")
     content = content_of_name(options.what or "shared-edge", options.size)
-    explorer = open_page(
-        content, host=options.host, port=options.port, idle=options.idle, browser=not options.no_browser
-    )
-    try:
+    host, port, idle, browser = options.host, options.port, options.idle, not options.no_browser
+    with suppress(KeyboardInterrupt), open_page(content, host=host, port=port, idle=idle, browser=browser) as explorer:
         explorer.wait()
-    except KeyboardInterrupt:
-        explorer.close()
     return 0
 
 
