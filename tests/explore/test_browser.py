@@ -360,6 +360,7 @@ def test_page_works_in_the_cell_of_a_notebook(page):
         }""",
         markup(),
     )
+    page.wait_for_timeout(300)  # the first page notes its state 0.2 s after the last change
     before = page.evaluate("location.hash")
     drag(page, 1, (-35, 35))
     check_pictures(page)
