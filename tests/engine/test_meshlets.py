@@ -1,11 +1,9 @@
 """Meshlets: they hold each triangle once, what a view leaves out draws nothing, and pictures have the same bits."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 from comparing import assert_same
-from engine_cases import THREADS, on
+from engine_cases import THREADS, Drawn, on
 from pages import before_a_page, behind_a_page
 
 import topleft as tl
@@ -92,25 +90,6 @@ def cameras(rng, n):
             "subpixel_bits": int(rng.choice([0, 1, 4, 7, 8, 8, 8])),
             "clip_depth": str(rng.choice(["minus_one_to_one", "zero_to_one"])),
         }
-
-
-class Drawn:
-    """A plan that says which clusters a mesh is drawn with."""
-
-    def __init__(self, clusters):
-        self._clusters = clusters
-
-    def fitted(self, view):
-        return dataclasses.replace(view, plan=self)
-
-    def triangles_of(self, triangles, n_vertices):
-        return self._clusters.triangles
-
-    def find_clusters(self, vertices):
-        return self._clusters
-
-    def mark(self, stage):
-        pass
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 from comparing import assert_same
-from engine_cases import ON_EACH_ISA, THREADS, on
+from engine_cases import ON_EACH_ISA, THREADS, Drawn, on
 
 import topleft as tl
 from topleft import _engine
@@ -65,25 +65,6 @@ def cameras(rng, n):
             "near_clip": bool(rng.uniform() < 0.8),
             "far_clip": bool(rng.uniform() < 0.8),
         }
-
-
-class Drawn:
-    """A plan that says which clusters a mesh is drawn with."""
-
-    def __init__(self, clusters):
-        self._clusters = clusters
-
-    def fitted(self, view):
-        return dataclasses.replace(view, plan=self)
-
-    def triangles_of(self, triangles, n_vertices):
-        return self._clusters.triangles
-
-    def find_clusters(self, vertices):
-        return self._clusters
-
-    def mark(self, stage):
-        pass
 
 
 def draw(mesh, clusters, depth_test="less", **view):

@@ -4,7 +4,7 @@ import os
 import subprocess
 import sys
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -135,3 +135,22 @@ def mixed(rng, n, size, *, bits=8, level=True, **view):
     xy = np.where((kind % 5 == 3)[:, None, None], snap_ties, xy) + np.array(view.get("origin", (0, 0)))
     z = np.repeat(rng.integers(-8, 56, (n, 1)) / 64, 3, 1) if level else rng.standard_normal((n, 3))
     return soup(np.dstack([xy, z]).reshape(-1, 3), size, subpixel_bits=bits, **view)
+
+
+class Drawn:
+    """A plan that says which clusters a mesh is drawn with."""
+
+    def __init__(self, clusters):
+        self._clusters = clusters
+
+    def fitted(self, view):
+        return replace(view, plan=self)
+
+    def triangles_of(self, triangles, n_vertices):
+        return self._clusters.triangles
+
+    def find_clusters(self, vertices):
+        return self._clusters
+
+    def mark(self, stage):
+        pass
