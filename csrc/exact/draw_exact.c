@@ -24,7 +24,7 @@
 
 /* TL_LANES triangles as loaded, and what becomes of them. */
 typedef struct {
-    vd x[3], y[3];
+    vd x[3], y[3], z[3];
     vd width, height;
     vi top, bottom;              /* rows of the box in the picture */
     vi col, row, n_cols, n_rows; /* the box of samples in the window */
@@ -66,17 +66,16 @@ TL_INLINE int load_exact_batch(exact_state *s, tl_sink sink, const int32_t *corn
         s->bad_row = ids[0];
         return 0;
     }
-    vd far = vd_set1(0.0); /* a sum, so that what is not finite shows */
-    for (int k = 0; k < 3; k++) {
-        vd_load_pairs(s->points->points, s->points->stride, corners + k, &b->x[k], &b->y[k]);
-        far = vd_add(far, vd_add(vd_abs(b->x[k]), vd_abs(b->y[k])));
-    }
+    load_points(s->points, sink, corners, b->x, b->y, b->z);
+    const vd sum = vd_add(vd_add(vd_add(b->x[0], b->x[1]), vd_add(b->y[0], b->y[1])), vd_add(b->x[2], b->y[2]));
     const vd x_min = vd_min(vd_min(b->x[0], b->x[1]), b->x[2]), x_max = vd_max(vd_max(b->x[0], b->x[1]), b->x[2]);
     const vd y_min = vd_min(vd_min(b->y[0], b->y[1]), b->y[2]), y_max = vd_max(vd_max(b->y[0], b->y[1]), b->y[2]);
     b->width = vd_sub(x_max, x_min), b->height = vd_sub(y_max, y_min);
     const tl_test test = test_of(s, sink);
     const vd widest = vd_set1(TL_MAX_BOX_PX - border_of(test));
-    const vm fits = vm_and(vd_ge(vd_set1(0x1p30), far), vd_ge(widest, vd_max(b->width, b->height)));
+    const vd farthest = vd_max(vd_max(x_max, y_max), vd_sub(vd_set1(0.0), vd_min(x_min, y_min)));
+    const vm in_range = vm_and(vd_ge(vd_set1(0x1p30), farthest), vd_ge(vd_set1(0x1p33), sum)); /* not where it is NaN */
+    const vm fits = vm_and(in_range, vd_ge(widest, vd_max(b->width, b->height)));
     const int is_left_of_0 = s->left < 0 || s->top < 0;
     vi left, right;
     b->alone = vm_and_not(live, fits), b->fits = vm_and(live, fits);
@@ -148,6 +147,22 @@ TL_INLINE void push_exact(exact_queue *queue, vm m, const exact_batch *b, vi id,
 }
 #define TL_IS_FULL(queue) ((queue).boxes.n > TL_QUEUE - TL_LANES)
 
+/* Fewer boxes of up to 2x2 samples wait with the small ones; others are tested where they are. */
+#define TL_FEW_TINY ((TL_LANES + 3) / 4)
+
+TL_INLINE void draw_tiny_exact(exact_state *s, tl_sink sink, const exact_batch *b, vi id, vm tiny, vf xy)
+{
+    lane_exact t;
+    for (int k = 0; k < 3; k++) {
+        t.x[k] = b->x[k], t.y[k] = b->y[k];
+        if (sink_has_depth(sink))
+            t.z[k] = b->z[k];
+    }
+    t.ids = id, t.live = tiny;
+    place_exact(s, sink, b->col, b->row, xy, &t);
+    s->fragments.n = draw_exact_boxes(s, sink, &t, b->n_cols, b->n_rows, 2, s->fragments.n);
+}
+
 TL_INLINE void draw_exact_batch(exact_state *s, tl_sink sink, const int32_t *corners, vi id, vm live)
 {
     exact_batch b;
@@ -169,15 +184,14 @@ TL_INLINE void draw_exact_batch(exact_state *s, tl_sink sink, const int32_t *cor
         return;
     const vf xy = box_sizes(&b, test_of(s, sink));
     const vi longer = vi_max(b.n_cols, b.n_rows);
-    const vm over_tiny = vi_gt(longer, vi_set1(2)), over_small = vi_gt(longer, vi_set1(TL_SMALL_BOX));
-    const vm over = vm_and(b.drawn, over_small), tiny = vm_and_not(b.drawn, over_tiny);
-    const vm small = vm_and(b.drawn, vm_and_not(over_tiny, over_small));
+    const vm over_small = vi_gt(longer, vi_set1(TL_SMALL_BOX)), over = vm_and(b.drawn, over_small);
+    const vm tiny = vm_and_not(b.drawn, vi_gt(longer, vi_set1(2)));
+    vm small = vm_and_not(b.drawn, over_small);
     const vm beyond = vm_or(vi_gt(b.n_cols, vi_set1(TL_LANES)), vi_gt(b.n_rows, vi_set1(TL_MIDDLE_BOX)));
     const vm middle = vm_and_not(over, beyond), rows = vm_and(over, beyond);
-    if (vm_any(tiny)) {
-        push_exact(&s->tiny, tiny, &b, id, xy);
-        if (TL_IS_FULL(s->tiny))
-            TL_SINK_CALL(flush_tiny_exact, sink, s)
+    if (__builtin_popcount(vm_bits(tiny)) >= TL_FEW_TINY) {
+        draw_tiny_exact(s, sink, &b, id, tiny, xy);
+        small = vm_and_not(small, tiny);
     }
     if (vm_any(small)) {
         push_exact(&s->small, small, &b, id, xy);
@@ -228,7 +242,7 @@ static void start_exact(exact_state *s, const tl_snapped *mesh, const tl_window 
     s->centre_y = of_squares ? 0.0 : 0.5 + mesh->mesh.sample_y_fx * unit;
     s->last_vertex = vi_set1((int32_t)(points->n_points - 1));
     s->bad_row = -1, s->may_be_on_grid = 0, s->n_slivers = 0;
-    s->tiny.boxes.n = s->small.boxes.n = s->middle.boxes.n = s->rows.boxes.n = s->fragments.n = 0;
+    s->small.boxes.n = s->middle.boxes.n = s->rows.boxes.n = s->fragments.n = 0;
     memset(s->fragments.sample, 0, sizeof s->fragments.sample); /* what is prefetched behind the end of the list */
 }
 
@@ -258,7 +272,6 @@ TL_INLINE void draw_exact_scene(const tl_snapped *mesh, int64_t n_whole, const t
         if (__builtin_expect(s.n_slivers > 0, 0))
             draw_slivers(&s, sink);
     }
-    TL_SINK_CALL(flush_tiny_exact, sink, &s)
     TL_SINK_CALL(flush_small_exact, sink, &s)
     TL_SINK_CALL(flush_middle_exact, sink, &s)
     TL_SINK_CALL(flush_rows_exact, sink, &s)
