@@ -10,9 +10,9 @@ import topleft as tl
 from topleft import _engine
 from topleft._base.memory import FreshMemory
 from topleft._base.options import Sink
-from topleft._raster import choices
-from topleft._raster.cluster_draw import ClusteredMesh
-from topleft._raster.clusters import Clusters, Meshlets, Survey
+from topleft._raster import choices, cluster_draw
+from topleft._raster.cluster_draw import ClusteredMesh, Survey
+from topleft._raster.clusters import Clusters
 from topleft._raster.rasterize import draw_fragments
 from topleft._raster.view import View
 
@@ -197,9 +197,9 @@ def test_mesh_without_area_is_drawn(drawn):
 @needs_meshlets
 def test_mesh_is_grown_when_it_has_been_drawn_often(monkeypatch):
     pictures, mesh = [], tl.Mesh(*MESHES["blob"])
-    draw = Meshlets.draw
+    draw = cluster_draw.draw_pass
     monkeypatch.setattr(ClusteredMesh, "survey", lambda *_: Survey(0.8, 0.0, 0.1, 0.1))
-    monkeypatch.setattr(Meshlets, "draw", lambda *a, **k: pictures.append(1) or draw(*a, **k))
+    monkeypatch.setattr(cluster_draw, "draw_pass", lambda *a, **k: pictures.append(1) or draw(*a, **k))
     expected = tl.rasterize_mesh(mesh, size=SIZE, cull="back")
     for i in range(1, 20):
         assert_same_fragments(tl.rasterize_mesh(mesh, size=SIZE, cull="back"), expected)

@@ -405,7 +405,7 @@ def measure_clusters(source: Source, corners: U8, clusters: U8, group_boxes: F64
 class ClusterView:
     def __init__(
         self,
-        matrix: F64,
+        matrix: Array,
         mesh: SnappedMesh,
         first_row: int,
         n_rows: int,

@@ -229,7 +229,7 @@ def find_cluster_facts(mesh: Mesh, view: View, verb: str, test: DepthTest | None
         return ClusterFacts(None, f"{n_triangles:,} triangles are done before sorting them would pay")
     clusters = mesh.clusters
     seen = ClusteredMesh(clusters, view)
-    if not choices.pays_to_draw_clusters(view, n_triangles, seen.survey):
+    if not choices.pays_to_draw_clusters(view, n_triangles, seen.survey()):
         return ClusterFacts(None, "most of the mesh shows, and drawing that cluster by cluster takes longer")
     n, found = len(clusters), seen.survey(len(clusters))
     n_outside, n_turned, n_drawn = round(found.outside * n), round(found.turned * n), seen.count_drawn(sink)

@@ -21,15 +21,18 @@ from topleft._raster.view import CULL_CODES, View
 from topleft.methods import METHODS
 
 if TYPE_CHECKING:
-    from topleft._raster.clusters import Survey
+    from topleft._raster.cluster_draw import Survey
+    from topleft._raster.clusters import Clusters
     from topleft._raster.snap import Snapped
 
 __all__ = [
+    "ClusterRoute",
     "Drawing",
     "Route",
     "can_cluster",
     "can_draw_meshlets",
     "can_share",
+    "cluster_route",
     "common_depth",
     "drawing",
     "earlier_wins",
@@ -227,12 +230,29 @@ def pays_to_cluster(n_triangles: int, n_drawn: int, n_instances: int = 1) -> boo
     return n_triangles >= MIN_TRIANGLES_TO_CLUSTER and (n_drawn > 0 or n_instances >= MIN_INSTANCES_TO_CLUSTER)
 
 
-def pays_to_draw_clusters(view: View, n_triangles: int, survey: Callable[[], Survey]) -> bool:
+class ClusterRoute(Enum):
+    """How `rasterize` draws a mesh that is sorted into clusters."""
+
+    WHOLE = "as a mesh without clusters"
+    CLUSTERS = "cluster by cluster"
+    MESHLETS = "from meshlets"
+
+
+def cluster_route(view: View, sink: Sink, clusters: Clusters, survey: Survey) -> ClusterRoute:
+    """Return how a view of a mesh in clusters is drawn; `survey`: what becomes of them in it."""
+    n = clusters.n_triangles
+    is_grown = can_draw_meshlets(view, sink, clusters.points.dtype)
+    is_grown = is_grown and pays_to_grow(clusters.n_pictures, n, len(clusters))
+    if is_grown and pays_to_draw_meshlets(n, survey, clusters.hidden):
+        return ClusterRoute.MESHLETS
+    return ClusterRoute.CLUSTERS if pays_to_draw_clusters(view, n, survey) else ClusterRoute.WHOLE
+
+
+def pays_to_draw_clusters(view: View, n_triangles: int, survey: Survey) -> bool:
     """Tell whether a view of a mesh in clusters is drawn from these; `survey`: what becomes of them in it."""
-    seen = survey()
     is_culled = view.cull != CULL_CODES[Cull.NONE]
     least = next(shares[is_culled] for below, *shares in MIN_OUTSIDE_TO_CLUSTER if n_triangles < below)
-    return seen.front <= MAX_FRONT_TO_CLUSTER and seen.outside >= least
+    return survey.front <= MAX_FRONT_TO_CLUSTER and survey.outside >= least
 
 
 def can_draw_meshlets(view: View, sink: Sink, dtype: np.dtype[Any]) -> bool:
@@ -265,16 +285,13 @@ def pays_to_draw_meshlets(n_triangles: int, survey: Survey, hidden: float) -> bo
     return are_small and survey.front <= MAX_FRONT_TO_CLUSTER and hidden <= MAX_HIDDEN_OF_MESHLETS
 
 
-def pays_to_draw_instances(
-    view: View, n_triangles: int, survey: Callable[[], Survey], count_layers: Callable[[], float]
-) -> bool:
+def pays_to_draw_instances(view: View, n_triangles: int, survey: Survey, count_layers: Callable[[], float]) -> bool:
     """Tell whether a scene in clusters is drawn from these; `n_triangles`: of an instance, on the mean.
 
     `survey`: as for one mesh; `count_layers`: how many instances lie one behind the other.
     """
-    seen = survey()
     least = MIN_OUTSIDE_OF_INSTANCES[view.sampling.n_samples > 1]
-    pays = seen.outside >= least and pays_to_draw_clusters(view, n_triangles, lambda: seen)
+    pays = survey.outside >= least and pays_to_draw_clusters(view, n_triangles, survey)
     return pays or count_layers() >= MIN_LAYERS_TO_CLUSTER
 
 
