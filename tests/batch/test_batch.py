@@ -135,6 +135,23 @@ def test_batch_layers_are_copies_by_name():
         assert np.array_equal(result.layers["triangle"], tl.rasterize_mesh(BOX, camera, SIZE).triangle)
 
 
+@pytest.mark.parametrize("bits", [0, "exact"])
+def test_batch_subpixel_bits_reach_pictures_layers_and_glass(bits):
+    (camera,) = orbit(BOX, 1)
+    glass = {"subpixel_bits": bits, "opacity": 0.25}
+    jobs = [
+        tl.Job(BOX, camera, SIZE, {"subpixel_bits": bits}),
+        tl.Job(BOX, camera, SIZE, glass),
+        tl.Job(BOX, camera, SIZE, {"subpixel_bits": bits}, layers=("triangle", "silhouette")),
+    ]
+    picture, through, layers = (result.made for result in tl.render_batch(jobs))
+    assert np.array_equal(picture, tl.render(BOX, camera, SIZE, subpixel_bits=bits))
+    assert np.array_equal(through, tl.render_transparent(BOX, camera, SIZE, **glass))
+    frags = tl.rasterize_mesh(BOX, camera, SIZE, subpixel_bits=bits)
+    assert np.array_equal(layers["triangle"], frags.triangle)
+    assert np.array_equal(layers["silhouette"], frags.mask)
+
+
 def test_batch_camera_may_be_made_of_mesh_and_size():
     (result,) = tl.render_batch([tl.Job(BOX, lambda mesh, size: tl.Camera.framing(mesh, aspect=4 / 3), SIZE)])
     assert np.array_equal(result.picture, tl.render(BOX, None, SIZE))

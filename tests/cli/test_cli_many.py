@@ -21,6 +21,7 @@ from topleft import scenes
 from topleft._camera.camera import Camera
 from topleft._model.mesh import Mesh
 from topleft._render.render import rasterize_mesh, render
+from topleft._render.transparent import render_transparent
 from topleft.cli import animation
 from topleft.cli.sheet import make_sheet
 from topleft.cli.targets import Orbit
@@ -101,6 +102,31 @@ def test_render_sampling_reaches_the_picture(run):
     for sampling in ("center", "msaa8"):
         assert run("render", "torus-knot", "-o", "a.png", "--sampling", sampling, *SMALL) == (0, [])
         assert np.array_equal(pixels("a.png"), first_picture("torus-knot", sampling=sampling))
+
+
+@pytest.mark.parametrize("bits", [0, 12, "exact"])
+def test_render_subpixel_bits_reach_pictures_layers_and_glass(run, bits):
+    words = ["--subpixel-bits", bits, *SMALL]
+    assert run("render", "torus-knot", "-o", "a.png", *words) == (0, [])
+    camera = camera_of(KNOT)
+    assert np.array_equal(pixels("a.png"), render(KNOT, camera, (64, 48), sampling="msaa4", subpixel_bits=bits))
+    assert run("render", "torus-knot", "-o", "a.npz", *words) == (0, [])
+    with np.load("a.npz") as found:
+        frags = rasterize_mesh(KNOT, camera, (64, 48), subpixel_bits=bits)
+        assert (frags.triangle != rasterize_mesh(KNOT, camera, (64, 48)).triangle).any()
+        assert np.array_equal(found["triangle"], frags.triangle)
+        assert np.array_equal(found["depth"], frags.depth)
+        assert np.array_equal(found["color"], render(KNOT, camera, (64, 48), subpixel_bits=bits))
+    assert run("render", "torus-knot", "-o", "a.png", "--opacity", "0.4", *words) == (0, [])
+    glass = render_transparent(KNOT, camera, (64, 48), opacity=0.4, subpixel_bits=bits)
+    assert np.array_equal(pixels("a.png"), glass)
+
+
+@pytest.mark.parametrize("bits", ["17", "-1", "1.5", "Exact", ""])
+def test_render_subpixel_bits_impossible_is_one_line(run, bits):
+    line = f"topleft: argument --subpixel-bits: must be a whole number from 0 to 16, or exact, got {bits!r}"
+    status, lines = run("render", "cube", "-o", "a.png", f"--subpixel-bits={bits}")
+    assert (status, lines) == (2, [f"{line} (try: topleft render --help)"])
 
 
 # Workers
@@ -186,6 +212,16 @@ def test_job_file_json_is_the_same_as_toml(run, folder):
     (folder / "jobs.json").write_text(json.dumps(document))
     assert run("render", "--jobs-file", "jobs.json") == (0, [])
     assert np.array_equal(pixels("a.png"), first_picture("cube"))
+
+
+@pytest.mark.parametrize("key", ["subpixel-bits", "subpixel_bits"])
+@pytest.mark.parametrize("bits", [0, "exact"])
+def test_job_file_subpixel_bits_reach_the_picture(run, folder, key, bits):
+    document = {"size": "64x48", "job": [{"mesh": "torus-knot", key: bits}]}
+    (folder / "jobs.json").write_text(json.dumps(document))
+    assert run("render", "--jobs-file", "jobs.json", "-o", "a.npy", "--shading", "ids") == (0, [])
+    expected = rasterize_mesh(KNOT, camera_of(KNOT), (64, 48), subpixel_bits=bits).triangle
+    assert np.array_equal(np.load("a.npy"), expected)
 
 
 def test_job_file_takes_from_the_command_line_what_it_does_not_say(run, folder):

@@ -72,6 +72,17 @@ def test_labels_go_to_a_zarr_with_levels(tmp_path, pair):
     assert np.array_equal(chunk_of(out / "1/c/0/0", "<i4", (32, 32))[:24], whole[::2, ::2])
 
 
+@pytest.mark.parametrize("bits", [0, "exact"])
+def test_subpixel_bits_reach_the_raster(tmp_path, pair, bits):
+    out = tmp_path / "labels.zarr"
+    arguments = ["--labels", "--size", "64x48", "--uncompressed", "--quiet", "--subpixel-bits", str(bits)]
+    assert main(["raster", pair, "-o", str(out), *arguments]) == 0
+    grid = tl.Grid.around((POINTS, TRIANGLES), size=(64, 48))
+    points = np.column_stack([grid.to_pixels(POINTS), POINTS[:, 2]])
+    whole = tl.rasterize(points, TRIANGLES, (64, 48), subpixel_bits=bits).triangle
+    assert np.array_equal(chunk_of(out / "c/0/0", "<i4", (48, 64)), whole)
+
+
 def test_values_come_from_a_file_or_by_name(tmp_path):
     values = ply_with_values(tmp_path / "mesh.ply")
     np.save(tmp_path / "values.npy", values)

@@ -380,6 +380,8 @@ def test_cli_explains(capsys):
     assert capsys.readouterr().out.startswith("rasterize -> triangle, depth: 64x48 pixels")
     assert cli.main(["explain", "cube", "--verb", "fill", "--json", "--ortho"]) == 0
     assert json.loads(capsys.readouterr().out)["verb"] == "fill"
+    assert cli.main(["explain", "cube", "--subpixel-bits", "exact"]) == 0
+    assert "vertices stay where they are" in capsys.readouterr().out
 
 
 def test_cli_calibrates(capsys, monkeypatch, tmp_path):

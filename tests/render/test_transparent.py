@@ -46,6 +46,16 @@ def test_layers_of_a_scene_are_composited_by_triangle_and_pixel():
     assert repr(got) == f"SceneDepthLayers(90x70, 4 layers, {scene.n_triangles} triangles)"
 
 
+@pytest.mark.parametrize("bits", [0, "exact"])
+def test_transparent_picture_has_the_grid_that_is_asked_for(bits):
+    layers = tl.visible_layers(CUBE, CAMERA, SIZE, layers=8, subpixel_bits=bits)
+    pictures = [tl.shade(layers.layer(k), CUBE, CAMERA, background=transparent.CLEAR)[..., :3] for k in range(8)]
+    expected = tl.composite(layers, np.stack(pictures, axis=2), opacity=0.5, background=(255, 255, 255, 255))
+    got = tl.render_transparent(CUBE, CAMERA, SIZE, subpixel_bits=bits)
+    assert_same(got, expected)
+    assert (got != tl.render_transparent(CUBE, CAMERA, SIZE)).any() or bits == "exact"
+
+
 def test_transparent_picture_is_over_of_shaded_layers():
     camera = tl.Camera.look_at((3, 2, 4))
     got = tl.render_transparent(CUBE, camera, SIZE, opacity=0.25, shading="flat", background=(10, 20, 30))

@@ -133,14 +133,14 @@ def timed(work: Callable[[], NDArray[Any]]) -> tuple[NDArray[Any], float]:
 
 
 def draw_reference(state: PixelState) -> MethodPicture:
-    """Return the exact picture: of vertices as they are, or, of areas and squares, of the snapped ones."""
+    """Return the exact picture: of vertices as they are; of areas and squares with the sub-pixel bits asked for."""
     height, width = state.size[::-1]
     start = time.perf_counter()
     if state.sampling in ("area", "outer", "inner"):
         if height * width * max(1, len(state.triangles)) > MAX_SLOW_TESTS:
             raise ValueError(f"the exact picture of {state.sampling!r} takes too long here: make the window smaller")
         verb = {"area": area.area, "outer": sampling.outer, "inner": sampling.inner}[state.sampling]
-        bits = 8 if state.subpixel_bits == "exact" else state.subpixel_bits
+        bits = 8 if (state.sampling, state.subpixel_bits) == ("area", "exact") else state.subpixel_bits
         given = (state.vertices, state.triangles, state.size)
         shares = verb(*given, origin=state.origin, subpixel_bits=bits, cull=state.cull).astype(np.float32)
         seconds = time.perf_counter() - start

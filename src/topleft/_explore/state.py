@@ -74,7 +74,7 @@ class PixelState:
         classic = CLASSICS.get(method)
         if classic is None:
             found: dict[str, Any] = {"subpixel_bits": self.subpixel_bits, "sampling": self.sampling, "cull": self.cull}
-            if self.sampling in ("area", "outer", "inner") and self.subpixel_bits == "exact":
+            if self.sampling == "area" and self.subpixel_bits == "exact":
                 found["subpixel_bits"] = 8
         else:
             has_bits = classic.has_subpixel_bits and self.subpixel_bits != "exact"

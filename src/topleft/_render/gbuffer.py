@@ -87,7 +87,7 @@ class GBuffer:
     camera : Camera
     size : (width, height), pixels
     options : dict
-        `cull` and `threads`, as `rasterize_mesh` takes them.
+        `cull`, `subpixel_bits` and `threads`, as `rasterize_mesh` takes them.
     look : dict
         Further options of `render`, for colours.
     camera_to : Camera, optional

@@ -26,6 +26,9 @@ from topleft._shade.shade import ShadingOptions, shade_normals
 
 __all__ = ["LAYERS", "check_layers", "draw_layers"]
 
+NOT_OF_LIGHT = ("cull", "edges", "sampling", "subpixel_bits")
+"""Options of `render` that say which triangle is seen where, not how it is lit."""
+
 Array = npt.NDArray[Any]
 F64 = npt.NDArray[np.float64]
 
@@ -35,7 +38,7 @@ def color(gbuffer: GBuffer) -> Array:
     subject, camera, options = gbuffer.subject, gbuffer.camera, {**gbuffer.options, **gbuffer.look}
     if "opacity" in options:
         return render_transparent(subject, camera, gbuffer.size, **options)
-    look = {name: value for name, value in options.items() if name not in ("cull", "edges", "sampling")}
+    look = {name: value for name, value in options.items() if name not in NOT_OF_LIGHT}
     checked = ShadingOptions.parse(**look)
     if options.get("sampling", "center") != "center" or is_blended(subject, checked):
         return render(subject, camera, gbuffer.size, rasterizer=gbuffer.rasterizer, **options)

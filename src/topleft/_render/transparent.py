@@ -5,7 +5,7 @@ Input: a mesh or `Scene`, `Camera`. Output: a picture (H, W, 4) uint8, sRGB with
 
 from __future__ import annotations
 
-from typing import Any, Unpack
+from typing import Any, Literal, Unpack
 
 import numpy as np
 import numpy.typing as npt
@@ -62,6 +62,7 @@ def render_transparent(
     shading: ShadingOption = "smooth",
     background: ColorLike = WHITE,
     cull: CullOption = "none",
+    subpixel_bits: int | Literal["exact"] = 8,
     tolerance: float = 0.0,
     threads: int | None = None,
     **look: Unpack[GlassOptions],
@@ -70,7 +71,7 @@ def render_transparent(
 
     Parameters
     ----------
-    mesh, camera, size, shading, background, cull, tolerance, threads, **look
+    mesh, camera, size, shading, background, cull, subpixel_bits, tolerance, threads, **look
         As for `render`, one sample a pixel, and as for `shade`.
     opacity : float, 0 to 1
         How much each layer hides of what lies behind it.
@@ -103,12 +104,12 @@ def render_transparent(
     camera = camera_for(subject, camera, size)
     subject = detailed(subject, camera, size, tolerance, cull=cull, material=material)
     ground = as_color("background", background, 4)
-    options: dict[str, Any] = {"layers": layers, "cull": cull, "threads": threads}
+    view: dict[str, Any] = {"cull": cull, "subpixel_bits": subpixel_bits, "threads": threads}
     if has_cuts(subject, material):
         subject = scene_of(subject)  # which is the same picture
-        found: DepthLayers = solid_layers(subject, camera, size, material, **options)
+        found: DepthLayers = solid_layers(subject, camera, size, material, layers=layers, **view)
     else:
-        found = visible_layers(subject, camera, size, **options)
+        found = visible_layers(subject, camera, size, layers=layers, **view)
     pictures = np.zeros((size[1], size[0], layers, 3), np.uint8)
     for k in range(layers):
         frags = found.layer(k)

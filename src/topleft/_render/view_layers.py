@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any, Unpack
+from typing import Any, Literal, Unpack
 
 import numpy as np
 import numpy.typing as npt
@@ -103,6 +103,7 @@ def render_layers(
     camera_to: CameraLike | None = None,
     transforms_to: npt.ArrayLike | None = None,
     cull: CullOption = "none",
+    subpixel_bits: int | Literal["exact"] = 8,
     tolerance: float = 0.0,
     threads: int | None = None,
     rasterizer: Rasterizer | None = None,
@@ -128,8 +129,9 @@ def render_layers(
     transforms_to : (N, 4, 4) array_like, optional
         For "flow": where the instances of the scene are when it ends, world from object; (4, 4) for a mesh. Unless
         given they stay.
-    cull, tolerance, threads
-        As for `render`. With a tolerance, "triangle" counts those of the level of detail, and there are no attributes.
+    cull, subpixel_bits, tolerance, threads
+        As for `render`, of every layer. With a tolerance, "triangle" counts those of the level of detail, and there are
+        no attributes.
     rasterizer : Rasterizer, optional
         Of this size: "depth" and "triangle" lie in its memory, until the next call.
     **look
@@ -172,9 +174,9 @@ def render_layers(
 
     Notes
     -----
-    The point of a pixel lies on its triangle and projects to within 2**-9 pixels of the centre in x and y, half a
-    sub-pixel, which is what the snap moves a vertex by; float32 then rounds it. Flow is the difference of its two
-    projections in float64, so what does not move has flow 0, to the bit.
+    The point of a pixel lies on its triangle and projects to within half a sub-pixel of the centre in x and y, 2**-9
+    pixels at 8 bits, which is what the snap moves a vertex by; float32 then rounds it. Flow is the difference of its
+    two projections in float64, so what does not move has flow 0, to the bit.
 
     All layers show the mesh or scene without what its materials cut out. Of `Points` "triangle" is the index of the
     point, and positions, distances and normals are those of its centre all over it; there are no "barycentric" and no
@@ -201,7 +203,7 @@ def render_layers(
         raise ValueError("attributes are those of the mesh's own vertices, which a tolerance may leave out")
     gbuffer = gbuffer_of(
         mesh, camera, size, camera_to=camera_to, transforms_to=transforms_to, cull=cull,
-        tolerance=tolerance, threads=threads, rasterizer=rasterizer, **look,
+        subpixel_bits=subpixel_bits, tolerance=tolerance, threads=threads, rasterizer=rasterizer, **look,
     )  # fmt: skip
     found = draw_layers(names, gbuffer)
     for name, values in (attributes or {}).items():
@@ -219,6 +221,7 @@ def gbuffer_of(
     camera_to: CameraLike | None = None,
     transforms_to: npt.ArrayLike | None = None,
     cull: CullOption = "none",
+    subpixel_bits: int | Literal["exact"] = 8,
     tolerance: float = 0.0,
     threads: int | None = None,
     rasterizer: Rasterizer | None = None,
@@ -237,12 +240,13 @@ def gbuffer_of(
         raise TypeError(f"there is no option {option!r} of a picture")
     size, subject = as_size(size), as_subject(mesh)
     camera = camera_for(subject, camera, size)
+    options: dict[str, Any] = {"cull": cull, "subpixel_bits": subpixel_bits, "threads": threads}
     if isinstance(subject, Points):
         return CloudBuffer(
             subject,
             camera,
             size,
-            {"cull": cull, "threads": threads},
+            options,
             look,
             None if camera_to is None else as_camera(camera_to, "camera_to"),
             None if transforms_to is None else as_transforms(transforms_to, 1),
@@ -252,7 +256,7 @@ def gbuffer_of(
         subject=subject,
         camera=camera,
         size=size,
-        options={"cull": cull, "threads": threads},
+        options=options,
         look=look,
         camera_to=None if camera_to is None else as_camera(camera_to, "camera_to"),
         transforms_to=None if transforms_to is None else as_transforms(transforms_to, len(meshes_of(subject))),

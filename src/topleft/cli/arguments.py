@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterable
-from typing import NoReturn
+from typing import Literal, NoReturn
 
 from topleft._base.arrays import as_point_size
 from topleft._base.color import DEFAULT_COLOR
@@ -22,14 +22,16 @@ from topleft.errors import TopleftError
 from topleft.scenes import SHAPES
 
 __all__ = [
-    "REFUSED", "Parser", "UsageError", "add_picture_arguments", "add_render_arguments", "meant", "positive", "size",
-    "tolerance",
+    "REFUSED", "SUBPIXEL_BITS_HELP", "Parser", "UsageError", "add_picture_arguments", "add_render_arguments", "meant",
+    "positive", "size", "subpixel_bits", "tolerance",
 ]  # fmt: skip
 
 REFUSED = 2
 """Exit status: nothing could be done."""
 
 UP_HELP = "the axis that points up: z for most CAD, print, scan and map files; never guessed (default y)"
+
+SUBPIXEL_BITS_HELP = "vertices snap to 2^-N pixels, 0 to 16, or stay where they are: exact (default 8)"
 
 LAYERS_OF_ONE_VIEW = tuple(name for name in LAYERS if name != "flow")
 """Flow needs a second camera, or a second place."""
@@ -196,6 +198,7 @@ def add_picture_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"samples of a pixel: {', '.join(samplings)} (default msaa4; center with --layers, .npz, --opacity and "
         "--shading ids or depth)",
     )
+    add("--subpixel-bits", type=subpixel_bits, default=8, metavar="N|exact", help=SUBPIXEL_BITS_HELP)
     add(
         "--point-size",
         type=_point_size,
@@ -225,6 +228,15 @@ def positive(text: str) -> int:
     """A positive whole number."""
     if not (text.isdecimal() and int(text)):
         raise argparse.ArgumentTypeError(f"must be a positive whole number, got {text!r}")
+    return int(text)
+
+
+def subpixel_bits(text: str) -> int | Literal["exact"]:
+    """The grid that vertices snap to."""
+    if text == "exact":
+        return "exact"
+    if not (text.isdecimal() and int(text) <= 16):
+        raise argparse.ArgumentTypeError(f"must be a whole number from 0 to 16, or exact, got {text!r}")
     return int(text)
 
 

@@ -12,7 +12,7 @@ from topleft._model.points import Points
 from topleft._plan.costs import save_costs
 from topleft._plan.plan import plan
 from topleft._render.render import DEFAULT_SIZE
-from topleft.cli.arguments import UP_HELP, UsageError, positive, size, tolerance
+from topleft.cli.arguments import SUBPIXEL_BITS_HELP, UP_HELP, UsageError, positive, size, subpixel_bits, tolerance
 from topleft.cli.targets import MeshSource, Orbit
 
 __all__ = ["add_plan_commands", "run_calibrate", "run_explain"]
@@ -34,6 +34,7 @@ def run_explain(options: argparse.Namespace) -> int:
         tolerance=options.tolerance,
         cull=options.cull,
         sampling=options.sampling,
+        subpixel_bits=options.subpixel_bits,
         threads=options.threads,
     )
     if options.measure:
@@ -74,6 +75,7 @@ def add_plan_commands(commands: Any) -> None:
     add("--up", choices=["y", "z"], default="y", help=UP_HELP)
     add("--cull", choices=[str(side) for side in Cull], default="none", help="leave out triangles (default none)")
     add("--sampling", choices=[str(mode) for mode in Sampling], default="center", help="of a pixel (default center)")
+    add("--subpixel-bits", type=subpixel_bits, default=8, metavar="N|exact", help=SUBPIXEL_BITS_HELP)
     add("--tolerance", type=tolerance, default=0.0, metavar="PX", help="by which outlines may be off (default 0)")
     add("--threads", type=positive, default=None, metavar="N", help="(default: as many as pay)")
     add("--measure", action="store_true", help="draw it, and show what the stages took")

@@ -76,7 +76,7 @@ def _arguments(
     for key, value in job.items():
         if key == "mesh":
             continue
-        action = keys.get(key)
+        action = keys.get(key.replace("-", "_"))
         if action is None:
             guess = meant(key, ["mesh", *keys])
             raise UsageError(f"there is no key {key!r}{guess or '; there are mesh, ' + ', '.join(keys)}")

@@ -15,7 +15,7 @@ from topleft._base.threads import available_threads
 from topleft._tiles.blocks import Triangles, mapped_npy, triangles_of
 from topleft._tiles.drawing import KINDS
 from topleft._tiles.tiles import WINDOW, Tiles, extent_of, tiles
-from topleft.cli.arguments import UsageError, positive, size
+from topleft.cli.arguments import SUBPIXEL_BITS_HELP, UsageError, positive, size, subpixel_bits
 from topleft.cli.render import client_of, complain
 
 if TYPE_CHECKING:
@@ -110,6 +110,8 @@ def raster_of(options: argparse.Namespace) -> Tiles:
         more["surface"] = options.surface or "upper"
     elif options.surface is not None:
         raise UsageError(f"--surface is for heights, got the kind {kind}")
+    if options.subpixel_bits != 8:
+        more["subpixel_bits"] = options.subpixel_bits
     if kind == "field" and options.nodata is not None:
         more["nodata"] = options.nodata
     if (options.pixel_size is None) == (options.size is None):
@@ -164,6 +166,7 @@ def add_raster_command(commands: Any) -> None:
     raster.add_argument("--values", metavar="FIELD", help="write values: a .npy file, or a name in a PLY file")
     raster.add_argument("--kind", choices=[one for one in KINDS if one not in ("field", "fill")], help="what is drawn")
     raster.add_argument("--surface", choices=("upper", "lower"), help="whose height counts (upper)")
+    raster.add_argument("--subpixel-bits", type=subpixel_bits, default=8, metavar="N|exact", help=SUBPIXEL_BITS_HELP)
     raster.add_argument("--nodata", type=float, metavar="N", help="what stands where nothing is, in values and .tif")
     raster.add_argument("--levels", type=positive, metavar="N", help="resolutions of a .zarr, each half as wide (1)")
     raster.add_argument("--uncompressed", action="store_true", help="store pixels as they are")

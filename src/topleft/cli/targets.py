@@ -234,6 +234,7 @@ def _render_options(options: argparse.Namespace) -> dict[str, Any]:
         "color": options.color,
         "background": options.background,
         "cull": options.cull,
+        "subpixel_bits": options.subpixel_bits,
         "tolerance": options.tolerance,
         "threads": options.threads,
     }
