@@ -72,7 +72,7 @@ def unaligned(array):
         (lambda a: arrays.as_vertices(a, has_transform=False), SQUARE),
         (arrays.as_triangles, HALVES),
         (arrays.as_triangles, HALVES.astype(np.int32)),
-        (lambda a: arrays.as_matrix(a, a.dtype), np.eye(4)),
+        (arrays.as_transform, np.eye(4)),
         (arrays.as_colors, SQUARE.astype(np.float32)),
         (lambda a: arrays.as_values(a, 4, 2), SQUARE.astype(np.float32)),
     ],

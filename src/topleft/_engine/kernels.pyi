@@ -93,6 +93,7 @@ class Viewport:
 class Source:
     is_clip_space: bool
     is_affine: bool
+    matrix: Array | None
     def __init__(self, vertices: Array, matrix: Array | None = None, is_affine: bool = False) -> None: ...
     def snap(
         self, first: int, end: int, subpixel_bits: int, with_depth: bool, records: U8, wide: I64 | None
@@ -405,7 +406,7 @@ def measure_clusters(source: Source, corners: U8, clusters: U8, group_boxes: F64
 class ClusterView:
     def __init__(
         self,
-        matrix: Array,
+        source: Source,
         mesh: SnappedMesh,
         first_row: int,
         n_rows: int,

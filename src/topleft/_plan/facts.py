@@ -144,7 +144,7 @@ def find_facts(
     snapped = snap_mesh(FRESH, vertices, triangles, view, with_depth=verb == "rasterize", out=None)
     snapped.check_indices()
     given, indices = as_array("vertices", vertices), as_array("triangles", triangles)
-    points, pieces, source = snapped.points, snapped.pieces, snapped.source
+    (points, source, indices_drawn, *_), pieces = snapped.given, snapped.pieces
     xy = snapped.records.view(np.int32).reshape(-1, 4)[:, :2]
     is_special = xy[:, 0] == np.iinfo(np.int32).min
     route, drawing = None, choices.drawing(view, snapped, find_sink(verb, view))
@@ -183,7 +183,7 @@ def find_facts(
         census=tuple(census),
         decided=decided,
     )
-    checked = np.array(snapped.triangles, np.int32)
+    checked = np.array(indices_drawn, np.int32)
     checked.flags.writeable = False
     return facts, checked
 

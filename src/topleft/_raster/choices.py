@@ -338,10 +338,10 @@ def pays_without_depth(snapped: Snapped, view: View) -> bool:
 
 def is_flat(snapped: Snapped, view: View) -> bool:
     """Tell whether all triangles lie at one depth, so that samples need not compare it, and leaving that out pays."""
-    is_clip_space = snapped.source.is_clip_space
+    is_clip_space = snapped.given.source.is_clip_space
     if is_clip_space or not pays_without_depth(snapped, view):
         return False
-    return common_depth(snapped.points, has_depth=snapped.has_depth, is_clip_space=is_clip_space) is not None
+    return common_depth(snapped.given.points, has_depth=snapped.has_depth, is_clip_space=is_clip_space) is not None
 
 
 class Drawing(NamedTuple):

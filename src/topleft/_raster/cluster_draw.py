@@ -6,20 +6,20 @@ In: `Clusters`, a view, a target. Out: the picture that the whole mesh gives, an
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from topleft import _engine
-from topleft._base.arrays import as_matrix, bad_triangle
+from topleft._base.arrays import bad_triangle, check_rows
 from topleft._base.memory import FRESH, Memory
 from topleft._base.options import Sink
 from topleft._base.threads import count_threads, run_parts
 from topleft._raster import choices
 from topleft._raster.choices import ClusterRoute
-from topleft._raster.clusters import Clusters, check_rows
-from topleft._raster.snap import snap_mesh
+from topleft._raster.clusters import Clusters
+from topleft._raster.snap import snap_mesh, source_of
 from topleft._raster.view import View
 
 __all__ = ["ClusteredMesh", "Survey", "draw_clustered"]
@@ -56,10 +56,8 @@ class ClusteredMesh:
 
     def __init__(self, clusters: Clusters, view: View, first_id: int = 0) -> None:
         self.clusters, self._view, self._first_id = clusters, view, first_id
-        self._matrix = as_matrix(view.transform, clusters.points.dtype)  # type: ignore[arg-type]
-        self._is_affine = choices.is_affine(self._matrix)
         self._viewport = view.engine_viewport()
-        self._own = self._source_of(clusters.own_points)
+        self._own = source_of(clusters.own_points, view)
         self._empty = self._snapped(self._own, NO_RECORDS, clusters.triangles[:0], None)
 
     def survey(self, n_most: int = SURVEYED) -> Survey:
@@ -153,7 +151,7 @@ class ClusteredMesh:
         Without triangles: with all vertices snapped, or None where a clip plane may cut a triangle, too.
         """
         points, own = self.clusters.points, self.clusters.triangles
-        source = self._source_of(points)
+        source = source_of(points, self._view)
         is_used: NDArray[np.uint8] = np.full(len(points) // _engine.BLOCK + 1, triangles is None, np.uint8)
         ids = [np.ascontiguousarray(array, np.int32).ravel() for array in triangles or ()]
         for array in ids:
@@ -182,11 +180,8 @@ class ClusteredMesh:
         width, height = self._view.size
         n_rows, how = (height if end is None else end) - first, (MARGIN_PX, STAGE_ERROR[self.clusters.points.dtype])
         return _engine.ClusterView(
-            self._matrix, empty or self._empty, first, n_rows, width, *how, sink == Sink.FARTHEST
+            self._own, empty or self._empty, first, n_rows, width, *how, sink == Sink.FARTHEST
         )  # fmt: skip
-
-    def _source_of(self, points: NDArray[Any]) -> _engine.Source:
-        return _engine.Source(points, self._matrix, self._is_affine)
 
     def _snapped(
         self,

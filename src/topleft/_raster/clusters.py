@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from topleft import _engine
-from topleft._base.arrays import bad_triangle
+from topleft._base.arrays import check_rows
 from topleft._base.memory import CACHE_LINE
 from topleft._base.threads import count_threads, run_parts
 
-__all__ = ["Backoff", "Clusters", "Meshlets", "check_rows"]
+__all__ = ["Backoff", "Clusters", "Meshlets"]
 
 #: `tl_cluster` of csrc/clusters.h, as far as Python reads it.
 RECORD = np.dtype({"names": ["first_triangle", "n_triangles"], "formats": [np.int64, np.int32], "offsets": [96, 112],
@@ -176,13 +176,6 @@ def aligned(n_bytes: int) -> NDArray[np.uint8]:
     block: NDArray[np.uint8] = np.empty(n_bytes + CACHE_LINE, np.uint8)
     first = -block.ctypes.data % CACHE_LINE
     return block[first : first + n_bytes]
-
-
-def check_rows(triangles: NDArray[np.int32], n_vertices: int) -> None:
-    """Raise an error for triangles that have changed since they were checked: a mesh may share the caller's memory."""
-    bad_row = _engine.first_bad_row(triangles, n_vertices)
-    if bad_row >= 0:
-        raise bad_triangle(triangles, bad_row, n_vertices)
 
 
 def box_of(points: NDArray[Any]) -> NDArray[np.float64]:

@@ -278,7 +278,7 @@ def draw_labels(memory: Memory, snapped: Snapped, view: View, asked: Asked, draw
 def draw_flat(memory: Memory, snapped: Snapped, view: View, asked: Asked, drawing: Drawing) -> Fragments:
     """Draw ids of triangles that all lie at one depth, and write it where they are."""
     earlier_wins = choices.earlier_wins(asked.test, has_depth=snapped.has_depth)
-    flat_depth = choices.first_depth(snapped.points, has_depth=snapped.has_depth)
+    flat_depth = choices.first_depth(snapped.given.points, has_depth=snapped.has_depth)
     with buffers_of(memory, view, asked) as ((ids, depth), (ids_canvas, depth_canvas)):
         draw(memory, snapped, view, drawing, ids_canvas, earlier_wins=earlier_wins)
 
