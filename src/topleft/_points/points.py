@@ -16,6 +16,7 @@ from topleft._base.arrays import as_array, as_number, as_places, as_point_size, 
 from topleft._base.memory import FreshMemory, Memory, check_fits
 from topleft._base.options import DepthTest, PointShape, Sink, parse
 from topleft._base.threads import count_threads, run_parts
+from topleft._raster.choices import threads_to_snap
 from topleft._raster.classic import refuse_classic
 from topleft._raster.fragments import Fragments
 from topleft._raster.rasterize import refuse_many
@@ -244,7 +245,7 @@ def snap_points(memory: Memory, array: NDArray[Any], source: _engine.Source, vie
     """
     n = len(array)
     viewport = view.engine_viewport() if source.is_clip_space and n else None
-    records, _, n_bad, _ = snap(memory, source, n, 0, view, viewport, with_depth=True)
+    records, _, n_bad, _ = snap(memory, source, n, threads_to_snap(view.threads, n, 0), view, viewport, with_depth=True)
     if n_bad:
         bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
         if len(bad):

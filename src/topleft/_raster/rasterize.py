@@ -1,6 +1,6 @@
 """Draws masks, counts and visibility buffers.
 
-Each verb checks what it is asked for, snaps the mesh (transform, index, snap, clip), chooses a route and draws.
+Each verb checks what it is asked for, snaps the mesh (read, transform, snap, clip), chooses a route and draws.
 """
 
 from __future__ import annotations

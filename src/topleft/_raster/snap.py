@@ -33,6 +33,7 @@ class Input(NamedTuple):
     triangles: NDArray[np.int32]
     triangles_given: ArrayLike
     is_checked: bool  # whether all triangles name vertices that there are
+    n_threads: int  # that vertices are worth
 
     def check_first(self, *, is_due: bool) -> None:
         """Check indices before they are drawn if that is due, unless they have been."""
@@ -152,7 +153,8 @@ def read(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, view: View, 
             n_threads = choices.threads_to_convert(view.threads, len(native))
             narrow_triangles(native, triangles, len(points), room, n_threads)
         indices = room if is_checked else cast("NDArray[np.int32]", native)
-    return Input(points, source_of(points, view), indices, triangles, is_checked)
+    n_threads = choices.threads_to_snap(view.threads, len(points), len(indices))
+    return Input(points, source_of(points, view), indices, triangles, is_checked, n_threads)
 
 
 def source_of(points: NDArray[Any], view: View) -> _engine.Source:
@@ -170,7 +172,7 @@ def snap_input(memory: Memory, given: Input, view: View, *, with_depth: bool, mu
     points, source, indices = given.points, given.source, given.triangles
     n = n_to_draw(given, view)
     viewport = view.engine_viewport() if source.is_clip_space and n else None
-    records, wide, n_bad, n_clipped = snap(memory, source, n, len(indices), view, viewport, with_depth=with_depth)
+    records, wide, n_bad, n_clipped = snap(memory, source, n, given.n_threads, view, viewport, with_depth=with_depth)
     view.mark("vertices")
     given.check_first(is_due=must_check or bool(n == 0 or n_bad or n_clipped))
     if n_bad:
@@ -200,8 +202,7 @@ def snap_for_floats(memory: Memory, given: Input, view: View, *, must_check: boo
     def take_part(first: int, end: int) -> int:
         return source.take(first, end, taken, view.subpixel_bits)
 
-    n = len(points)
-    if sum(run_parts(take_part, n, choices.threads_to_snap(view.threads, n, len(indices)))):
+    if sum(run_parts(take_part, len(points), given.n_threads)):
         return None
     given.check_first(is_due=must_check)
     return unsnapped(given, taken, indices, None, view, None)
@@ -217,7 +218,7 @@ def take_mesh(memory: Memory, given: Input, view: View, *, with_depth: bool, mus
     if source.is_clip_space and n:
         return project_mesh(memory, given, view, must_check=must_check)
     has_depth = with_depth and points.shape[1] == 3
-    taken, n_bad = take_points(memory, source, points, n, len(indices), view, must_check=must_check or has_depth)
+    taken, n_bad = take_points(memory, given, n, must_check=must_check or has_depth)
     view.mark("vertices")
     given.check_first(is_due=must_check or bool(n == 0 or n_bad))
     if n_bad:
@@ -234,7 +235,7 @@ def project_mesh(memory: Memory, given: Input, view: View, *, must_check: bool) 
     def project_part(first: int, end: int) -> tuple[int, int]:
         return source.project_points(first, end, viewport, projected)
 
-    counts = run_parts(project_part, n, choices.threads_to_snap(view.threads, n, len(indices)))
+    counts = run_parts(project_part, n, given.n_threads)
     n_bad, n_clipped = map(sum, zip(*counts, strict=True))
     view.mark("vertices")
     given.check_first(is_due=must_check or bool(n_bad or n_clipped))
@@ -265,17 +266,9 @@ def unsnapped(
     return Unsnapped(mesh, given, NO_RECORDS, None, has_pieces=pieces is not None)
 
 
-def take_points(
-    memory: Memory,
-    source: _engine.Source,
-    points: NDArray[Any],
-    n: int,
-    n_triangles: int,
-    view: View,
-    *,
-    must_check: bool,
-) -> tuple[NDArray[np.float64], int]:
+def take_points(memory: Memory, given: Input, n: int, *, must_check: bool) -> tuple[NDArray[np.float64], int]:
     """Return the first `n` points as float64, and how many of their numbers cannot be drawn, if that was looked at."""
+    points, source = given.points, given.source
     is_same = points.dtype == np.float64
     if not n or (is_same and not must_check):
         return points[:n].astype(np.float64, copy=False), 0
@@ -284,14 +277,14 @@ def take_points(
     def take_part(first: int, end: int) -> int:
         return source.take(first, end, None if is_same else taken)
 
-    return taken, sum(run_parts(take_part, n, choices.threads_to_snap(view.threads, n, n_triangles)))
+    return taken, sum(run_parts(take_part, n, given.n_threads))
 
 
 def snap(
     memory: Memory,
     source: _engine.Source,
     n: int,
-    n_triangles: int,
+    n_threads: int,
     view: View,
     viewport: _engine.Viewport | None,
     *,
@@ -308,7 +301,7 @@ def snap(
             return source.project(first, end, viewport, records, wide)
         return source.snap(first, end, view.subpixel_bits, with_depth, records, wide)
 
-    counts = run_parts(snap_part, n, choices.threads_to_snap(view.threads, n, n_triangles))
+    counts = run_parts(snap_part, n, n_threads)
     n_bad, n_wide, n_clipped = map(sum, zip(*counts, strict=True))
     if n_wide:
         wide = empty((n, 2), np.int64)
