@@ -238,8 +238,10 @@ static __attribute__((noinline)) void blend_area_alone(blend_state *b, int64_t i
         right = max64(right, max3(t[n].x_fx[0], t[n].x_fx[1], t[n].x_fx[2]) >> window->subpixel_bits);
         n++;
     }
+    if (!n)
+        return;
     const int64_t first_row = max64(top - window->y_px, 0);
-    const int64_t end_row = n ? min64(bottom + 1 - window->y_px, window->height) : 0;
+    const int64_t end_row = min64(bottom + 1 - window->y_px, window->height);
     if (first_row >= end_row || (b->is_flat && !begin_flat(b, i)))
         return;
     if (!b->is_flat)

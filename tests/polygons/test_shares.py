@@ -1,5 +1,7 @@
 """Areas of polygons and the table of overlaps: near fractions, and to the last bit where they must be."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from engine_cases import ON_EACH_ISA, on
@@ -182,3 +184,19 @@ def test_colors_are_mixed_by_area():
 def test_colors_are_the_mean_of_samples():
     picture = tl.polygons(square(0, 0, 1.5, 1), (2, 1), values=[8.0], sampling="msaa4", background=4)
     assert picture.tolist() == [[8, 6]]
+
+
+def test_memory_for_rings_that_meet_is_as_large_as_they_are():
+    """A bow tie in a huge picture: scratch for all its rows would be 16 GiB."""
+    bow_tie, side = [[2.5, 1], [9, 9.5], [9, 1], [2, 9]], 2**31 - 1
+    small = tl.overlap([bow_tie], (12, 12))
+    tracemalloc.start()
+    try:
+        table = tl.overlap([bow_tie], (side, side))
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < 4 << 20
+    assert (table.areas == small.areas).all()
+    rows, columns = np.divmod(small.pixels.astype(np.int64), 12)
+    assert (table.pixels == rows * side + columns).all()

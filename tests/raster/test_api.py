@@ -6,7 +6,9 @@ import pytest
 import topleft as tl
 from topleft._base import arrays, threads
 from topleft._base.memory import FreshMemory
+from topleft._raster import classic
 from topleft._raster.rasterize import canvas_of
+from topleft.methods import CLASSICS, load_kernel
 
 SQUARE = np.array([[0, 0], [4, 0], [4, 4], [0, 4]], float)
 HALVES = np.array([[0, 1, 2], [0, 2, 3]])
@@ -70,7 +72,7 @@ def unaligned(array):
         (lambda a: arrays.as_vertices(a, has_transform=False), SQUARE),
         (arrays.as_triangles, HALVES),
         (arrays.as_triangles, HALVES.astype(np.int32)),
-        (lambda a: arrays.as_matrix(a, a.dtype), np.eye(4)),
+        (arrays.as_transform, np.eye(4)),
         (arrays.as_colors, SQUARE.astype(np.float32)),
         (lambda a: arrays.as_values(a, 4, 2), SQUARE.astype(np.float32)),
     ],
@@ -90,6 +92,21 @@ def test_unaligned_out_is_filled_through_an_aligned_canvas():
     np.testing.assert_array_equal(ids, np.where(LEFT_MASK, 0, -1))
     np.testing.assert_array_equal(depth, np.where(LEFT_MASK, 0, np.inf))
     np.testing.assert_array_equal(frags.barycentric().sum(-1), LEFT_MASK)
+
+
+def test_unaligned_out_of_a_classic_is_filled_through_an_aligned_canvas(monkeypatch):
+    draw, variant = load_kernel(CLASSICS["zigzag"])
+    addresses = []
+
+    def draw_there(points, corners, pixels, *how):
+        addresses.append(pixels.ctypes.data)
+        draw(points, corners, pixels, *how)
+
+    monkeypatch.setattr(classic, "load_kernel", lambda _: (draw_there, variant))
+    counts = unaligned(np.full((4, 4), 9, np.int32))
+    assert tl.overdraw(SQUARE, LEFT, SIZE, method="zigzag", out=counts) is counts
+    assert [address % 4 for address in addresses] == [0]
+    np.testing.assert_array_equal(counts, tl.overdraw(SQUARE, LEFT, SIZE, method="zigzag"))
 
 
 def test_overdraw_out_is_cleared_first():

@@ -168,7 +168,7 @@ def count_drawn(mesh, **view):
     clusters = Clusters(*mesh)
     scene = ClusteredMesh(clusters, View.parse(SIZE, view))
     target = _engine.Target(Sink.NEAREST, np.empty(SIZE[::-1], np.int32), np.empty(SIZE[::-1], np.float32), None)
-    seen = clusters.seen_in(scene._exact, scene._empty, 0, SIZE[1], SIZE[0], is_farthest=False)
+    seen = scene._seen(Sink.NEAREST)
     room, others = np.empty(3 * len(clusters) + 1, np.int32), np.empty(len(mesh[1]) + 1, np.int32)
     how = target, 0, SIZE[1], room, others, True, True
     return [clusters.engine.draw(scene._empty, scene._own, seen, hides, *how)[2] for hides in (True, False)]

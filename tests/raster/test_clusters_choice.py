@@ -6,8 +6,8 @@ import pytest
 import topleft as tl
 from topleft._base.options import Sink
 from topleft._raster import choices, cluster_draw
-from topleft._raster.cluster_draw import ClusteredMesh
-from topleft._raster.clusters import Backoff, Clusters, Survey
+from topleft._raster.cluster_draw import ClusteredMesh, Survey
+from topleft._raster.clusters import Backoff, Clusters
 from topleft._raster.view import View
 from topleft._render import instances
 from topleft._render.instances import PlacedScene, count_layers, survey_instances
@@ -40,7 +40,7 @@ FINE = as_floats(*tl.scenes.blob(300_000))
 )
 def test_clusters_are_drawn_where_enough_is_left_out(n, cull, outside, front, pays):
     view = View.parse(SIZE, {"cull": cull})
-    assert choices.pays_to_draw_clusters(view, n, lambda: Survey(outside, 0.0, 1 - outside - front, front)) == pays
+    assert choices.pays_to_draw_clusters(view, n, Survey(outside, 0.0, 1 - outside - front, front)) == pays
 
 
 @pytest.mark.parametrize("cull", ["none", "back", "front"])
@@ -119,7 +119,7 @@ def test_survey_of_instances_weighs_them_by_their_triangles():
 )
 def test_instances_are_drawn_from_clusters_where_enough_is_left_out(view, outside, layers, pays):
     seen = Survey(outside, 0.0, 0.6 - outside, 0.4)
-    assert choices.pays_to_draw_instances(View.parse(SIZE, view), 70_000, lambda: seen, lambda: layers) == pays
+    assert choices.pays_to_draw_instances(View.parse(SIZE, view), 70_000, seen, lambda: layers) == pays
 
 
 def test_scene_asks_before_it_draws_clusters(monkeypatch):

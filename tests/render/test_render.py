@@ -12,7 +12,8 @@ from topleft._base.color import id_colors
 from topleft._camera.camera import Camera
 from topleft._io import load as files
 from topleft._model.mesh import Mesh
-from topleft._render.render import EDGE_COLOR, depth_behind, rasterize_mesh, render
+from topleft._render.edges import EDGE_COLOR, depth_behind
+from topleft._render.render import rasterize_mesh, render
 from topleft._render.scene_shade import shade
 from topleft._shade.shade import GREY_OF_FARTHEST, GREY_OF_NEAREST, eye_distance
 

@@ -8,7 +8,6 @@ from comparing import assert_same
 from layer_views import CAMERAS, CUBE, FRONT, LENSES, SIZE, SNAP_PX, SPHERE, look, pierced, pixels, scene
 
 import topleft as tl
-from topleft._render.fragments import camera_of
 from topleft._render.layers import LAYERS
 
 ON_EACH_LENS = pytest.mark.parametrize("lens", LENSES.values(), ids=LENSES)
@@ -19,7 +18,7 @@ STRAIGHT = CAMERAS["off-centre"]
 @pytest.mark.parametrize("sampling", ["center", "msaa4"])
 def test_scene_shows_the_nearest_of_its_instances(lens, sampling):
     subject, camera = scene(), replace(STRAIGHT, lens=lens)
-    alone = [tl.rasterize_mesh(i.mesh, camera_of(camera, i), SIZE, sampling=sampling) for i in subject]
+    alone = [tl.rasterize_mesh(i.mesh, camera.placed(i.transform), SIZE, sampling=sampling) for i in subject]
     depth = np.array([frags.samples_depth for frags in alone])
     nearest = depth.argmin(0)
     seen = np.isfinite(depth.min(0))

@@ -11,13 +11,15 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from topleft import _engine
+from topleft._base.threads import run_parts
+
 __all__ = [
     "apart_from",
     "as_background",
     "as_checked_triangles",
     "as_colors",
     "as_count",
-    "as_matrix",
     "as_names",
     "as_number",
     "as_out",
@@ -29,6 +31,7 @@ __all__ = [
     "as_size",
     "as_square",
     "as_subpixel_bits",
+    "as_transform",
     "as_triangles",
     "as_values",
     "as_vector",
@@ -37,6 +40,8 @@ __all__ = [
     "bad_triangle",
     "check_progress",
     "check_regular",
+    "check_rows",
+    "narrow_triangles",
     "set_read_only",
     "shown",
 ]
@@ -149,8 +154,8 @@ def as_triangles(values: ArrayLike) -> NDArray[np.signedinteger[Any]]:
         raise TypeError(f"triangles must be integers, got dtype {array.dtype}")
     if array.dtype.itemsize < 4:
         return np.ascontiguousarray(array, np.int32)
-    native = np.ascontiguousarray(array, array.dtype.newbyteorder("="))
-    return native.view(f"i{native.dtype.itemsize}")
+    native = np.ascontiguousarray(array if array.dtype.isnative else array.astype(array.dtype.newbyteorder("=")))
+    return native.view() if array.dtype.kind == "i" else native.view(f"i{native.dtype.itemsize}")
 
 
 def as_checked_triangles(values: ArrayLike, n_vertices: int) -> NDArray[np.int32]:
@@ -170,20 +175,40 @@ def bad_triangle(values: ArrayLike, row: int, n_vertices: int) -> IndexError:
     )
 
 
-def as_matrix(values: ArrayLike, dtype: np.dtype[Any]) -> NDArray[Any]:
-    """Return a finite (4, 4) transform of the vertices' dtype."""
+def check_rows(triangles: NDArray[np.int32], n_vertices: int, given: ArrayLike | None = None) -> None:
+    """Raise an error for the first of contiguous triangles that names a vertex that does not exist.
+
+    `given`: the same as the caller has them, for the message.
+    """
+    row = _engine.first_bad_row(triangles, n_vertices)
+    if row >= 0:
+        raise bad_triangle(triangles if given is None else given, row, n_vertices)
+
+
+def narrow_triangles(
+    triangles: NDArray[Any], given: ArrayLike, n_vertices: int, out: NDArray[np.int32], n_threads: int
+) -> None:
+    """Write contiguous int64 triangles as int32, and raise an error as `check_rows` does."""
+
+    def narrow(first: int, end: int) -> int:
+        row = _engine.narrow_triangles(triangles[first:end], n_vertices, out[first:end])
+        return first + row if row >= 0 else -1
+
+    for row in run_parts(narrow, len(triangles), n_threads):
+        if row >= 0:
+            raise bad_triangle(given, row, n_vertices)
+
+
+def as_transform(values: ArrayLike, *, has_poses: bool = False) -> NDArray[Any]:
+    """Return a finite (4, 4) transform, or with `has_poses` maybe several, (B, 4, 4)."""
     array = as_array("transform", values)
-    if array.shape != (4, 4):
+    if array.shape[-2:] != (4, 4) or array.ndim > 2 + has_poses:
         raise ValueError(f"transform must have shape (4, 4), got {array.shape}")
     if array.dtype.kind not in "fiu":
         raise TypeError(f"transform must be real numbers, got dtype {array.dtype}")
     if not np.isfinite(array).all():
         raise ValueError("transform must be finite, got NaN or infinity")
-    with np.errstate(over="ignore"):
-        matrix = np.ascontiguousarray(array, dtype=dtype)
-    if not np.isfinite(matrix).all():
-        raise ValueError("transform must fit float32, because the vertices are float32; pass float64 vertices")
-    return matrix
+    return array
 
 
 def as_real(name: str, values: ArrayLike) -> NDArray[np.float64]:

@@ -154,6 +154,10 @@ class Camera:
         """The same camera without its lens."""
         return self if self.lens is None else replace(self, lens=None)
 
+    def placed(self, transform: F64) -> Camera:
+        """The same camera in the object space of what stands at `transform` (4, 4), world from object."""
+        return replace(self, view=self.view @ transform)
+
     def project(self, points: npt.ArrayLike, size: int | tuple[int, int]) -> F64:
         """Where world points lie in a picture.
 
@@ -445,20 +449,38 @@ class Camera:
         """
         framed = as_framed(subject)
         ends = ends_to_frame(framed)
+        check_choice("fit", fit, get_args(FitOption))
+        points = None if fit == "sphere" else box_corners(ends) if fit == "box" else points_to_frame(framed)
+        angles = azimuth_deg, elevation_deg, fov_y_deg
+        return cls._around(ends, points, *angles, up=up, ortho=ortho, aspect=aspect, fills=fit == "silhouette")
+
+    @classmethod
+    def _around(
+        cls,
+        ends: F64,
+        points: F64 | None = None,
+        azimuth_deg: float = THREE_QUARTER_DEG[0],
+        elevation_deg: float = THREE_QUARTER_DEG[1],
+        fov_y_deg: float = DEFAULT_FOV_Y_DEG,
+        *,
+        up: UpOption = "y",
+        ortho: bool = False,
+        aspect: float = 1.0,
+        fills: bool = False,
+    ) -> Camera:
+        """A camera that has the sphere round these ends just inside its frame, or the points, or fills it with them."""
         center, radius = bounding_sphere(ends)
         check_fov(fov_y_deg)
         check_positive("aspect", aspect)
-        check_choice("fit", fit, get_args(FitOption))
         tan_y = np.tan(np.radians(fov_y_deg) / 2)
         # The sphere touches the pyramid of view at sin, not tan, of the half angle.
         distance = radius * FRAMING_MARGIN / np.sin(np.arctan(tan_y * min(1.0, aspect)))
         height = 2 * radius * FRAMING_MARGIN / min(1.0, aspect)
         right, above = 0.0, 0.0
-        if fit != "sphere":
+        if points is not None:
             turn = orbit_view((0, 0, 0), 1.0, azimuth_deg, elevation_deg, up=up)[:3, :3]
-            points = box_corners(ends) if fit == "box" else points_to_frame(framed)
             points = (points - center) @ turn.T
-            if fit == "silhouette":
+            if fills:
                 share = 1 - 2 * SILHOUETTE_MARGIN
                 right, above, distance = place_to_fill(points, share * tan_y * aspect, share * tan_y)
                 if ortho:
@@ -522,4 +544,4 @@ def camera_for(subject: Mesh | Scene | Points, camera: CameraLike | None, size: 
     if isinstance(subject, Mesh) and not len(subject.triangles):
         raise ValueError("there is nothing to frame: the mesh has no triangles")
     width, height = size
-    return Camera.framing(subject.extreme_points(), aspect=width / height if width > 0 and height > 0 else 1.0)
+    return Camera._around(subject.extreme_points(), aspect=width / height if width > 0 and height > 0 else 1.0)

@@ -18,8 +18,7 @@ from topleft._base.options import check_choice
 from topleft._model.mesh import Mesh, extreme_points, used_vertices
 from topleft._model.points import Points
 from topleft._scene.adapt import MeshLike, is_mesh_like
-from topleft._scene.scene import Scene, world_corners
-from topleft._scene.subject import as_subject
+from topleft._scene.scene import Scene, as_subject, world_corners
 from topleft.typing import UpOption
 
 F64 = npt.NDArray[np.float64]

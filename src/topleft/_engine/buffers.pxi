@@ -21,17 +21,35 @@ cdef class Viewport:
         return int(2 * self.view.half_width_px), int(2 * self.view.half_height_px)
 
 
+cdef object as_float32(const double[:, ::1] matrix):
+    """A (4, 4) matrix in float32."""
+    cdef float[:, ::1] rounded = np.empty((4, 4), np.float32)
+    cdef int i, j
+    for i in range(4):
+        for j in range(4):
+            rounded[i, j] = <float>matrix[i, j]
+            if isinf(rounded[i, j]):
+                raise ValueError("transform must fit float32, because the vertices are float32; pass float64 vertices")
+    return rounded.base
+
+
 cdef class Source:
     """The caller's (V, C) vertices, contiguous float32, float64 or int64, and the matrix that takes them to clip space."""
 
     cdef tl_source source
     cdef object arrays
     cdef readonly bint is_clip_space, is_affine
+    cdef readonly object matrix
 
     def __init__(self, vertices, matrix=None, bint is_affine=False):
+        """`matrix`: finite, (4, 4); it is rounded to the dtype of the vertices."""
         cdef const uint8_t[::1] raw = as_bytes(vertices)
+        if matrix is not None:
+            matrix = np.ascontiguousarray(matrix, np.float64)
+            if vertices.dtype == np.float32:
+                matrix = as_float32(matrix)
         cdef const uint8_t[::1] raw_matrix = None if matrix is None else as_bytes(matrix)
-        self.arrays = (raw, raw_matrix)
+        self.arrays, self.matrix = (raw, raw_matrix), matrix
         self.source.data = data(raw)
         self.source.matrix = data(raw_matrix)
         self.source.is_affine = self.is_affine = matrix is not None and is_affine

@@ -88,8 +88,8 @@ cdef class ClusterView:
 
     cdef tl_cluster_view view
 
-    def __init__(self, matrix, SnappedMesh mesh, int64_t first_row, int64_t n_rows, int64_t width, double margin_px, double error, bint is_farthest):
-        """`matrix`: clip from object; `mesh`: how it is seen; beyond `margin_px` around the window nothing shows.
+    def __init__(self, Source source, SnappedMesh mesh, int64_t first_row, int64_t n_rows, int64_t width, double margin_px, double error, bint is_farthest):
+        """`source`: whose matrix is clip from object; `mesh`: how it is seen; beyond `margin_px` around the window nothing shows.
 
         `error`: of the vertex stage, as a share of the terms that it adds up.
         """
@@ -102,7 +102,7 @@ cdef class ClusterView:
         cdef double unit = 2.0**window.subpixel_bits
         cdef int i
         for i in range(16):
-            v.matrix[i] = matrix.flat[i]
+            v.matrix[i] = source.matrix.flat[i]
         v.half_width_px, v.half_height_px = how.half_width_px, how.half_height_px
         v.scale_x, v.scale_y = how.half_width_px * unit, how.half_height_px * unit
         v.side[0][0], v.side[0][1] = how.half_width_px, how.half_width_px - (window.x_px - margin_px)

@@ -25,6 +25,7 @@ CLUSTER_GROUP: int
 CLUSTER_TAIL: int
 CLUSTER_BYTES: int
 MESHLET_BYTES: int
+MESHLET_TRIANGLES: int
 MESHLET_TAIL: int
 MESHLET_BOUNDS: int
 MESHLET_PIECE: int
@@ -93,6 +94,7 @@ class Viewport:
 class Source:
     is_clip_space: bool
     is_affine: bool
+    matrix: Array | None
     def __init__(self, vertices: Array, matrix: Array | None = None, is_affine: bool = False) -> None: ...
     def snap(
         self, first: int, end: int, subpixel_bits: int, with_depth: bool, records: U8, wide: I64 | None
@@ -405,7 +407,7 @@ def measure_clusters(source: Source, corners: U8, clusters: U8, group_boxes: F64
 class ClusterView:
     def __init__(
         self,
-        matrix: F64,
+        source: Source,
         mesh: SnappedMesh,
         first_row: int,
         n_rows: int,

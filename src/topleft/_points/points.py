@@ -12,15 +12,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine
-from topleft._base.arrays import as_array, as_number, as_places, as_point_size, as_real
+from topleft._base.arrays import as_array, as_number, as_places, as_point_size, as_real, as_vertices
 from topleft._base.memory import FreshMemory, Memory, check_fits
 from topleft._base.options import DepthTest, PointShape, Sink, parse
 from topleft._base.threads import count_threads, run_parts
+from topleft._raster.choices import threads_to_snap
 from topleft._raster.classic import refuse_classic
 from topleft._raster.fragments import Fragments
 from topleft._raster.rasterize import refuse_many
 from topleft._raster.sampling import sample_positions
-from topleft._raster.snap import refine, snap, transform
+from topleft._raster.snap import refine, snap, source_of
 from topleft._raster.view import View, ViewOptions
 from topleft.typing import DepthTestOption, PointShapeOption
 
@@ -198,8 +199,8 @@ def draw_points(
     check_fits((n_samples, height, width), np.int32, np.float32)
     ids: NDArray[np.int32] = memory.empty("sample ids", (n_samples, height, width), np.int32)
     depth: NDArray[np.float32] = memory.empty("sample depth", (n_samples, height, width), np.float32)
-    array, source = transform(positions, view)
-    n_points = len(array)
+    array = as_vertices(positions, has_transform=view.transform is not None)
+    source, n_points = source_of(array, view), len(array)
     is_near = all(abs(at) << view.grid_bits < FARTHEST_WINDOW_FX for at in view.origin)
     frags = PointFragments(ids, depth, n_points)
     if 0 in view.size:
@@ -244,7 +245,7 @@ def snap_points(memory: Memory, array: NDArray[Any], source: _engine.Source, vie
     """
     n = len(array)
     viewport = view.engine_viewport() if source.is_clip_space and n else None
-    records, _, n_bad, _ = snap(memory, source, n, 0, view, viewport, with_depth=True)
+    records, _, n_bad, _ = snap(memory, source, n, threads_to_snap(view.threads, n, 0), view, viewport, with_depth=True)
     if n_bad:
         bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
         if len(bad):

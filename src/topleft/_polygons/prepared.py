@@ -60,9 +60,11 @@ class Prepared:
 
     def piece_scratch(self) -> _engine.PieceScratch | None:
         """Return memory for polygons whose rings meet, None when there are none."""
-        if self.engine.which_are_simple().all():
+        is_simple = self.engine.which_are_simple()
+        if is_simple.all():
             return None
-        width, height = self.frame.size
+        boxes = self.engine.boxes_px[~is_simple]
+        width, height = (boxes[:, 2:].astype(np.int64) - boxes[:, :2]).max(axis=0)
         return _engine.PieceScratch(max(4096, self.most_edges), height, width)
 
 

@@ -12,7 +12,7 @@ peel.py          peels depth: keeps the nearest layers of every pixel, sorted
 poses.py         draws many poses of one mesh: a visibility buffer for each
 rasterize.py     draws masks, counts and visibility buffers: the stages of a verb, and a function for each route
 sampling.py      draws several samples a pixel, or the exact area of it
-snap.py          snaps a mesh: transform, index, snap, clip
+snap.py          snaps a mesh: read, transform, snap, clip
 verbs.py         offers the five verbs, and `Rasterizer`, which keeps its memory from call to call
 view.py          checks the options that all verbs share, once a call
 """

@@ -92,7 +92,7 @@ def draw_classic(
     points, corners = as_scene(method, vertices, triangles, view)
     shape, dtype = view.size[::-1], np.dtype(np.bool_ if sink is Sink.MASK else np.int32)
     result = memory.empty(NAMES[sink], shape, dtype) if out is None else as_out("out", out, shape, dtype.type)
-    canvas = result if result.flags.c_contiguous else empty(shape, dtype)
+    canvas = result if result.flags.carray else empty(shape, dtype)
     canvas.fill(-1 if sink is Sink.LABEL else 0)
     draw, variant = load_kernel(method)
     pixels = canvas.reshape(-1).view(np.uint8)

@@ -6,22 +6,30 @@ In: `Clusters`, a view, a target. Out: the picture that the whole mesh gives, an
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from topleft import _engine
-from topleft._base.arrays import as_matrix, bad_triangle
+from topleft._base.arrays import bad_triangle, check_rows
 from topleft._base.memory import FRESH, Memory
 from topleft._base.options import Sink
-from topleft._base.threads import run_parts
+from topleft._base.threads import count_threads, run_parts
 from topleft._raster import choices
-from topleft._raster.clusters import Clusters, Survey, check_rows
-from topleft._raster.snap import snap_mesh
+from topleft._raster.choices import ClusterRoute
+from topleft._raster.clusters import Clusters
+from topleft._raster.snap import snap_mesh, source_of
 from topleft._raster.view import View
 
-__all__ = ["ClusteredMesh", "draw_clustered"]
+__all__ = ["ClusteredMesh", "Survey", "draw_clustered"]
+
+#: A bound of the error of the vertex stage as a share of the terms that it adds up: four roundings, and the same again
+#: for how the bounds themselves are computed, in float64; twice that.
+STAGE_ERROR = {np.dtype(np.float32): 2.0**-21, np.dtype(np.float64): 2.0**-49}
+
+#: Pixels around the window that count as inside: more than the snap and the vertex stage move a corner.
+MARGIN_PX = 1.0
 
 #: Clusters that tell what a view shows of all: 5 microseconds.
 SURVEYED = 50
@@ -32,23 +40,51 @@ SURVEYED_BEHIND = 200
 NO_RECORDS: NDArray[np.uint8] = np.empty(0, np.uint8)
 
 
+class Survey(NamedTuple):
+    """Shares of the clusters of a mesh by what a view does with them, hidden or not."""
+
+    outside: float
+    turned: float
+    """Certain to be culled."""
+    back: float
+    """Showing their backs: what is closed and not culled hides them."""
+    front: float
+
+
 class ClusteredMesh:
     """A mesh in clusters behind a view with a `transform`; triangle 0 is called `first_id` where it is drawn."""
 
     def __init__(self, clusters: Clusters, view: View, first_id: int = 0) -> None:
         self.clusters, self._view, self._first_id = clusters, view, first_id
-        self._matrix = as_matrix(view.transform, clusters.points.dtype)  # type: ignore[arg-type]
-        self._exact = self._matrix.astype(np.float64)
-        self._is_affine = choices.is_affine(self._matrix)
         self._viewport = view.engine_viewport()
-        self._own = self._source_of(clusters.own_points)
+        self._own = source_of(clusters.own_points, view)
         self._empty = self._snapped(self._own, NO_RECORDS, clusters.triangles[:0], None)
 
     def survey(self, n_most: int = SURVEYED) -> Survey:
-        """Return what becomes of the clusters, by some of them: outside, turned away, and so on."""
-        (width, height), clusters = self._view.size, self.clusters
-        seen = clusters.seen_in(self._exact, self._empty, 0, height, width, is_farthest=False)
-        return clusters.survey(seen, n_most)
+        """Return what becomes of the clusters, by about `n_most` of them, evenly spread over the mesh."""
+        n_of: NDArray[np.int64] = np.zeros(4, np.int64)
+        self.clusters.engine.survey(self._seen(Sink.NEAREST), max(1, round(len(self.clusters) / n_most)), n_of)
+        n = max(1, int(n_of.sum()))
+        return Survey(*(count / n for count in n_of.tolist()))
+
+    def route(self, sink: Sink) -> ClusterRoute:
+        """Return how a picture of the mesh is drawn, which counts as one."""
+        clusters = self.clusters
+        found = choices.cluster_route(self._view, sink, clusters, self.survey())
+        clusters.backoff.note(pays=found is not ClusterRoute.WHOLE)
+        return found
+
+    def draw(self, memory: Memory, target: _engine.Target, route: ClusterRoute) -> bool:
+        """Clear a target and draw the mesh by the route found; returns as `draw_clustered` does."""
+        clusters, height = self.clusters, self._view.size[1]
+        n_threads = count_threads(self._view.threads, clusters.n_triangles)
+        if route is ClusterRoute.MESHLETS:
+            is_drawn = self.draw_meshlets(memory, target, min(n_threads, height))
+        else:
+            is_drawn = draw_clustered([memory] if n_threads == 1 else [FRESH] * n_threads, [self], target, height)
+        if is_drawn and choices.can_draw_meshlets(self._view, Sink(target.sink), clusters.points.dtype):
+            clusters.hidden = self.hidden_share(target)
+        return is_drawn
 
     def draw_rows(
         self,
@@ -60,60 +96,39 @@ class ClusteredMesh:
         sample: tuple[int, int] = (0, 0),
         is_first: bool = True,
         is_last: bool = True,
-    ) -> NDArray[np.int32]:
+    ) -> tuple[NDArray[np.int32], int]:
         """Draw rows [first, end) of a target that the first of several meshes clears and the last one finishes.
 
-        Returns the triangles that are still to be drawn: the planes of clip space may cut them, or they do not fit.
+        Returns the triangles that are still to be drawn, which the planes of clip space may cut or which do not fit,
+        and how many clusters have been.
         """
-        others, _ = self._draw_rows(memory, target, first, end, sample, is_first=is_first, is_last=is_last)
-        return others
+        clusters, sink = self.clusters, target.sink
+        empty = self._empty if sample == (0, 0) else self._empty.seen_from(*sample)
+        room: NDArray[np.int32] = memory.empty("clusters", (3 * len(clusters) + 1,), np.int32)
+        others: NDArray[np.int32] = memory.empty("others", (clusters.n_triangles + 1,), np.int32)
+        may_be_hidden = sink in (Sink.NEAREST, Sink.FARTHEST)
+        seen, place = self._seen(sink, first, end, empty), (target, first, end - first, room, others)
+        n_others, _, n_drawn = clusters.engine.draw(empty, self._own, seen, may_be_hidden, *place, is_first, is_last)
+        return others[:n_others].copy(), n_drawn
 
     def count_drawn(self, sink: Sink) -> int:
         """Return how many clusters the picture draws, by one thread: those that are not left out, nor hidden."""
         width, height = self._view.size
         ids: NDArray[np.int32] = np.empty((height, width), np.int32)
         target = _engine.Target(sink, ids, np.empty((height, width), np.float32), None)
-        return self._draw_rows(FRESH, target, 0, height, (0, 0), is_first=True, is_last=True)[1]
-
-    def _draw_rows(
-        self,
-        memory: Memory,
-        target: _engine.Target,
-        first: int,
-        end: int,
-        sample: tuple[int, int],
-        *,
-        is_first: bool,
-        is_last: bool,
-    ) -> tuple[NDArray[np.int32], int]:
-        """Return what is still to be drawn, and how many clusters were."""
-        clusters = self.clusters
-        empty = self._empty if sample == (0, 0) else self._empty.seen_from(*sample)
-        is_farthest = target.sink == Sink.FARTHEST
-        seen = clusters.seen_in(self._exact, empty, first, end, self._view.size[0], is_farthest=is_farthest)
-        room: NDArray[np.int32] = memory.empty("clusters", (3 * len(clusters) + 1,), np.int32)
-        others: NDArray[np.int32] = memory.empty("others", (clusters.n_triangles + 1,), np.int32)
-        may_be_hidden = is_farthest or target.sink == Sink.NEAREST
-        place = target, first, end - first, room, others
-        n_others, _, n_drawn = clusters.engine.draw(empty, self._own, seen, may_be_hidden, *place, is_first, is_last)
-        return others[:n_others].copy(), n_drawn
+        return self.draw_rows(FRESH, target, 0, height)[1]
 
     def hidden_share(self, target: _engine.Target, n_most: int = SURVEYED_BEHIND) -> float:
         """Return the share of the clusters that the picture may show which lie behind what a target holds, by some."""
-        (width, height), clusters = self._view.size, self.clusters
-        is_farthest = target.sink == Sink.FARTHEST
-        seen = clusters.seen_in(self._exact, self._empty, 0, height, width, is_farthest=is_farthest)
-        n, n_hidden = clusters.engine.count_hidden(self._empty, seen, target, max(1, round(len(clusters) / n_most)))
+        seen, step = self._seen(target.sink), max(1, round(len(self.clusters) / n_most))
+        n, n_hidden = self.clusters.engine.count_hidden(self._empty, seen, target, step)
         return n_hidden / max(1, n)
 
     def draw_meshlets(self, memory: Memory, target: _engine.Target, n_parts: int) -> bool:
         """Clear a target and draw the mesh from meshlets, as `draw_clustered` does from clusters."""
-        (width, height), clusters = self._view.size, self.clusters
-        is_farthest = target.sink == Sink.FARTHEST
-        seen = clusters.seen_in(self._exact, self._empty, 0, height, width, is_farthest=is_farthest)
-        meshlets = clusters.meshlets
-        drawn = _engine.MeshletPass(meshlets.engine, self._empty, self._own, seen, target)
-        parts = meshlets.draw(memory, drawn, clusters.n_triangles, height, n_parts, is_first=True)
+        height, meshlets = self._view.size[1], self.clusters.meshlets
+        drawn = _engine.MeshletPass(meshlets.engine, self._empty, self._own, self._seen(target.sink), target)
+        parts = draw_pass(memory, drawn, len(meshlets), self.clusters.n_triangles, height, n_parts)
         if not any(map(len, parts)):
             return True
         return draw_others([memory] * n_parts, self, np.unique(np.concatenate(parts)), target, height, (0, 0))
@@ -136,7 +151,7 @@ class ClusteredMesh:
         Without triangles: with all vertices snapped, or None where a clip plane may cut a triangle, too.
         """
         points, own = self.clusters.points, self.clusters.triangles
-        source = self._source_of(points)
+        source = source_of(points, self._view)
         is_used: NDArray[np.uint8] = np.full(len(points) // _engine.BLOCK + 1, triangles is None, np.uint8)
         ids = [np.ascontiguousarray(array, np.int32).ravel() for array in triangles or ()]
         for array in ids:
@@ -158,8 +173,15 @@ class ClusteredMesh:
             pieces = _engine.Pieces(source, records, own, self._viewport, np.unique(cut[:n_cut]))
         return self._snapped(source, records, own, pieces, is_used)
 
-    def _source_of(self, points: NDArray[Any]) -> _engine.Source:
-        return _engine.Source(points, self._matrix, self._is_affine)
+    def _seen(
+        self, sink: int, first: int = 0, end: int | None = None, empty: _engine.SnappedMesh | None = None
+    ) -> _engine.ClusterView:
+        """Return what clusters need to know of rows [first, end) of the picture, or of all; `empty`: of a sample."""
+        width, height = self._view.size
+        n_rows, how = (height if end is None else end) - first, (MARGIN_PX, STAGE_ERROR[self.clusters.points.dtype])
+        return _engine.ClusterView(
+            self._own, empty or self._empty, first, n_rows, width, *how, sink == Sink.FARTHEST
+        )  # fmt: skip
 
     def _snapped(
         self,
@@ -172,6 +194,36 @@ class ClusteredMesh:
         how, viewport = self._view.how, self._viewport
         mesh = _engine.SnappedMesh(source, records, None, triangles, pieces, how, viewport, is_used)
         return mesh.numbered_from(self._first_id)
+
+
+def draw_pass(
+    memory: Memory, drawn: _engine.MeshletPass, n: int, n_triangles: int, height: int, n_parts: int
+) -> list[NDArray[np.int32]]:
+    """Draw what a pass over n meshlets shows, in as many bands of rows; returns what is still to be drawn."""
+    words = _engine.SEEN_BYTES // 4
+    found: NDArray[np.int32] = memory.empty("meshlets found", (words * (n + 16),), np.int32)
+    odd: NDArray[np.int32] = memory.empty("meshlets odd", (n + 16,), np.int32)
+
+    def list_part(first: int, end: int) -> tuple[int, int, int]:
+        first, end = first * 16, min(end * 16, n)
+        return first, *drawn.find(first, end, found[words * first :], odd[first:])
+
+    n_found = n_odd = 0
+    for first, n_own, n_own_odd in run_parts(list_part, -(-n // 16), n_parts):
+        if first:
+            found[words * n_found : words * (n_found + n_own)] = found[words * first : words * (first + n_own)]
+            odd[n_odd : n_odd + n_own_odd] = odd[first : first + n_own_odd]
+        n_found += n_own
+        n_odd += n_own_odd
+    rows = [0, height] if n_parts == 1 else drawn.split_rows(found, n_found, n_parts)
+    room: NDArray[np.int32] = memory.empty("meshlets sorted", (n_parts, words * (n_found + 1)), np.int32)
+    others: NDArray[np.int32] = memory.empty("meshlets others", (n_parts, n_triangles + 1), np.int32)
+
+    def draw_rows(i: int, _: int) -> NDArray[np.int32]:
+        place = rows[i], rows[i + 1], True, room[i], others[i]
+        return others[i, : drawn.draw(found, n_found, odd, n_odd, *place)].copy()
+
+    return run_parts(draw_rows, n_parts, n_parts)
 
 
 def draw_clustered(
@@ -191,7 +243,7 @@ def draw_clustered(
     def draw_rows(i: int, _: int) -> list[NDArray[np.int32]]:
         rows = height * i // n_parts, height * (i + 1) // n_parts
         return [
-            mesh.draw_rows(memories[i], target, *rows, sample=sample, is_first=k == 0, is_last=k == last)
+            mesh.draw_rows(memories[i], target, *rows, sample=sample, is_first=k == 0, is_last=k == last)[0]
             for k, mesh in enumerate(meshes)
         ]
 

@@ -1,45 +1,26 @@
 """Clusters: a mesh sorted once, so that a view leaves out what cannot show in it.
 
-In: the vertices and triangles of a mesh in object space, then a view of it. Out: what of them may draw a pixel.
+In: the vertices and triangles of a mesh in object space. Out: copies of them in clusters and in meshlets.
 """
 
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from topleft import _engine
-from topleft._base.arrays import bad_triangle
-from topleft._base.memory import CACHE_LINE, Memory
+from topleft._base.arrays import check_rows
+from topleft._base.memory import CACHE_LINE
 from topleft._base.threads import count_threads, run_parts
 
-__all__ = ["Backoff", "Clusters", "Meshlets", "Survey", "check_rows"]
-
-#: A bound of the error of the vertex stage as a share of the terms that it adds up: four roundings, and the same again
-#: for how the bounds themselves are computed, in float64; twice that.
-STAGE_ERROR = {np.dtype(np.float32): 2.0**-21, np.dtype(np.float64): 2.0**-49}
-
-#: Pixels around the window that count as inside: more than the snap and the vertex stage move a corner.
-MARGIN_PX = 1.0
-
+__all__ = ["Backoff", "Clusters", "Meshlets"]
 
 #: `tl_cluster` of csrc/clusters.h, as far as Python reads it.
 RECORD = np.dtype({"names": ["first_triangle", "n_triangles"], "formats": [np.int64, np.int32], "offsets": [96, 112],
                    "itemsize": _engine.CLUSTER_BYTES})  # fmt: skip
-
-
-class Survey(NamedTuple):
-    """Shares of the clusters of a mesh by what a view does with them, hidden or not."""
-
-    outside: float
-    turned: float
-    """Certain to be culled."""
-    back: float
-    """Showing their backs: what is closed and not culled hides them."""
-    front: float
 
 
 class Backoff:
@@ -117,6 +98,11 @@ class Clusters:
         check_rows(self.triangles, len(self.points))
         return Meshlets(self)
 
+    @property
+    def has_meshlets(self) -> bool:
+        """Whether they have been made."""
+        return "meshlets" in self.__dict__
+
     def __len__(self) -> int:
         return len(self.engine)
 
@@ -136,27 +122,6 @@ class Clusters:
         sizes = self._records.view(RECORD)["n_triangles"]
         found[self.order] = np.repeat(np.arange(len(sizes), dtype=np.int32), sizes)
         return found
-
-    def seen_in(
-        self,
-        matrix: NDArray[np.float64],
-        mesh: _engine.SnappedMesh,
-        first: int,
-        end: int,
-        width: int,
-        *,
-        is_farthest: bool,
-    ) -> _engine.ClusterView:
-        """Return what clusters need to know of rows [first, end) of a picture; `matrix`: clip from object."""
-        error = STAGE_ERROR[self.points.dtype]
-        return _engine.ClusterView(matrix, mesh, first, end - first, width, MARGIN_PX, error, is_farthest)
-
-    def survey(self, seen: _engine.ClusterView, n_most: int) -> Survey:
-        """Return what becomes of some clusters, about `n_most`, evenly spread over the mesh."""
-        n_of: NDArray[np.int64] = np.zeros(4, np.int64)
-        self.engine.survey(seen, max(1, round(len(self) / n_most)), n_of)
-        n = max(1, int(n_of.sum()))
-        return Survey(*(count / n for count in n_of.tolist()))
 
 
 class Meshlets:
@@ -210,49 +175,12 @@ class Meshlets:
     def __len__(self) -> int:
         return len(self.engine)
 
-    def draw(
-        self, memory: Memory, drawn: _engine.MeshletPass, n_triangles: int, height: int, n_parts: int, *, is_first: bool
-    ) -> list[NDArray[np.int32]]:
-        """Draw what a pass shows, in as many bands of rows; returns the triangles that are still to be drawn."""
-        n = len(self)
-        words = _engine.SEEN_BYTES // 4
-        found: NDArray[np.int32] = memory.empty("meshlets found", (words * (n + 16),), np.int32)
-        odd: NDArray[np.int32] = memory.empty("meshlets odd", (n + 16,), np.int32)
-
-        def list_part(first: int, end: int) -> tuple[int, int, int]:
-            first, end = first * 16, min(end * 16, n)
-            return first, *drawn.find(first, end, found[words * first :], odd[first:])
-
-        n_found = n_odd = 0
-        for first, n_own, n_own_odd in run_parts(list_part, -(-n // 16), n_parts):
-            if first:
-                found[words * n_found : words * (n_found + n_own)] = found[words * first : words * (first + n_own)]
-                odd[n_odd : n_odd + n_own_odd] = odd[first : first + n_own_odd]
-            n_found += n_own
-            n_odd += n_own_odd
-        rows = [0, height] if n_parts == 1 else drawn.split_rows(found, n_found, n_parts)
-        room: NDArray[np.int32] = memory.empty("meshlets sorted", (n_parts, words * (n_found + 1)), np.int32)
-        others: NDArray[np.int32] = memory.empty("meshlets others", (n_parts, n_triangles + 1), np.int32)
-
-        def draw_rows(i: int, _: int) -> NDArray[np.int32]:
-            place = rows[i], rows[i + 1], is_first, room[i], others[i]
-            return others[i, : drawn.draw(found, n_found, odd, n_odd, *place)].copy()
-
-        return run_parts(draw_rows, n_parts, n_parts)
-
 
 def aligned(n_bytes: int) -> NDArray[np.uint8]:
     """Return bytes that begin with a line of the cache."""
     block: NDArray[np.uint8] = np.empty(n_bytes + CACHE_LINE, np.uint8)
     first = -block.ctypes.data % CACHE_LINE
     return block[first : first + n_bytes]
-
-
-def check_rows(triangles: NDArray[np.int32], n_vertices: int) -> None:
-    """Raise an error for triangles that have changed since they were checked: a mesh may share the caller's memory."""
-    bad_row = _engine.first_bad_row(triangles, n_vertices)
-    if bad_row >= 0:
-        raise bad_triangle(triangles, bad_row, n_vertices)
 
 
 def box_of(points: NDArray[Any]) -> NDArray[np.float64]:

@@ -217,7 +217,7 @@ def draw_batch(
     ValueError, TypeError, IndexError
         As `rasterize`.
     """
-    view = View.parse(size, options)
+    view = View.parse(size, options, has_poses=True)
     refuse_many(view, "rasterize")
     asked = Asked.parse(depth_test, background_depth, out)
     (width, height), n_samples = view.size, view.sampling.n_samples
@@ -232,7 +232,7 @@ def draw_batch(
     corners = triangles if view.plan is not None else as_triangles(triangles)
     if isinstance(corners, np.ndarray) and corners.dtype == np.int64 and view.plan is None:  # once, not for each pose
         corners = as_checked_triangles(corners, points.shape[-2] if points.ndim > 1 else 0)
-    matrices = None if view.transform is None else as_array("transform", view.transform)
+    matrices = view.transform
     n_threads = min(n, available_threads() if view.threads is None else view.threads)
     one = replace(view, threads=1) if n_threads > 1 else view
     if view.plan is not None:

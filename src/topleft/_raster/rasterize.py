@@ -1,6 +1,6 @@
 """Draws masks, counts and visibility buffers.
 
-Each verb checks what it is asked for, snaps the mesh (transform, index, snap, clip), chooses a route and draws.
+Each verb checks what it is asked for, snaps the mesh (read, transform, snap, clip), chooses a route and draws.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine
 from topleft._base.arrays import as_number, as_out
-from topleft._base.memory import FRESH, Memory, check_fits, empty
+from topleft._base.memory import Memory, check_fits, empty
 from topleft._base.options import DepthTest, Sampling, Sink, parse
-from topleft._base.threads import count_threads, run_parts
+from topleft._base.threads import run_parts
 from topleft._raster import choices
 from topleft._raster.choices import Drawing, Route
 from topleft._raster.classic import draw_classic, refuse_classic
-from topleft._raster.cluster_draw import ClusteredMesh, draw_clustered
+from topleft._raster.cluster_draw import ClusteredMesh
 from topleft._raster.fragments import Fragments, GivenCorners
 from topleft._raster.sampling import draw_planes, sample_positions, sum_areas
 from topleft._raster.snap import Snapped, snap_mesh, snap_to_cover
@@ -278,7 +278,7 @@ def draw_labels(memory: Memory, snapped: Snapped, view: View, asked: Asked, draw
 def draw_flat(memory: Memory, snapped: Snapped, view: View, asked: Asked, drawing: Drawing) -> Fragments:
     """Draw ids of triangles that all lie at one depth, and write it where they are."""
     earlier_wins = choices.earlier_wins(asked.test, has_depth=snapped.has_depth)
-    flat_depth = choices.first_depth(snapped.points, has_depth=snapped.has_depth)
+    flat_depth = choices.first_depth(snapped.given.points, has_depth=snapped.has_depth)
     with buffers_of(memory, view, asked) as ((ids, depth), (ids_canvas, depth_canvas)):
         draw(memory, snapped, view, drawing, ids_canvas, earlier_wins=earlier_wins)
 
@@ -333,31 +333,16 @@ def draw_clusters(memory: Memory, vertices: ArrayLike, view: View, asked: Asked)
     clusters.n_pictures += 1
     if not clusters.backoff.is_over():
         return None
-    seen = ClusteredMesh(clusters, view)
-    found = seen.survey()
-    n = clusters.n_triangles
-    can_grow = choices.can_draw_meshlets(view, sink, clusters.points.dtype)
-    is_grown = can_grow and choices.pays_to_grow(clusters.n_pictures, n, len(clusters))
-    is_grown = is_grown and choices.pays_to_draw_meshlets(n, found, clusters.hidden)
-    pays = is_grown or choices.pays_to_draw_clusters(view, n, lambda: found)
-    clusters.backoff.note(pays=pays)
-    if not pays:
+    mesh = ClusteredMesh(clusters, view)
+    route = mesh.route(sink)
+    if route is choices.ClusterRoute.WHOLE:
         return None
     with buffers_of(memory, view, asked) as ((ids, depth), (ids_canvas, depth_canvas)):
-        n_threads = count_threads(view.threads, n)
-        target = _engine.Target(sink, ids_canvas, depth_canvas, None)
-        if is_grown:
-            is_drawn = seen.draw_meshlets(memory, target, min(n_threads, view.size[1]))
-        else:
-            memories = [memory] if n_threads == 1 else [FRESH] * n_threads
-            is_drawn = draw_clustered(memories, [seen], target, view.size[1])
-        if not is_drawn:
+        if not mesh.draw(memory, _engine.Target(sink, ids_canvas, depth_canvas, None), route):
             return None
-        if can_grow:
-            clusters.hidden = seen.hidden_share(target)
         lay_background(ids_canvas, depth_canvas, sink, asked)
     view.mark("draw")
-    return Fragments(ids, depth, seen.part, len(clusters.points), clusters.n_triangles)
+    return Fragments(ids, depth, mesh.part, len(clusters.points), clusters.n_triangles)
 
 
 Buffers = tuple[NDArray[np.int32], NDArray[np.float32]]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine
-from topleft._base.arrays import as_size, as_subpixel_bits, as_window
+from topleft._base.arrays import as_size, as_subpixel_bits, as_transform, as_window
 from topleft._base.options import ClipDepth, Cull, Sampling, parse
 from topleft._base.threads import parse_threads
 from topleft._raster.sampling import SAMPLE_GRID_BITS
@@ -87,7 +87,7 @@ class View:
     size: tuple[int, int]
     origin: tuple[int, int]
     viewport: tuple[int, int]
-    transform: ArrayLike | None
+    transform: NDArray[Any] | None
     subpixel_bits: int  # EXACT_BITS when vertices are not snapped
     grid_bits: int  # of the grid that holds the snapped vertices and all samples
     sampling: Sampling
@@ -134,8 +134,13 @@ class View:
         return TEST_CODES.get(self.sampling, 0)
 
     @classmethod
-    def parse(cls, size: object, options: ViewOptions, *, why_snapped: str | None = None) -> View:
-        """Check the options of a call; `why_snapped`: why the caller draws snapped vertices alone, if so."""
+    def parse(
+        cls, size: object, options: ViewOptions, *, why_snapped: str | None = None, has_poses: bool = False
+    ) -> View:
+        """Check the options of a call.
+
+        `why_snapped`: why the caller draws snapped vertices alone, if so; `has_poses`: there may be several transforms.
+        """
         if not options.keys() <= OPTIONS:
             unknown = min(options.keys() - OPTIONS)
             raise TypeError(f"unknown option {unknown!r}; the options are {', '.join(ViewOptions.__annotations__)}")
@@ -146,6 +151,7 @@ class View:
         sampling = parse(Sampling, "sampling", options.get("sampling", "center"))
         grid_bits = bits if sampling.n_samples == 1 else max(SAMPLE_GRID_BITS, bits)
         viewport = options.get("viewport")
+        transform = options.get("transform")
         method = find_method(options.get("method", "auto"))
         plan = options.get("plan")
         if not (plan is None or hasattr(plan, "fitted")):
@@ -154,7 +160,7 @@ class View:
             size=checked_size,
             origin=as_window(options.get("origin", (0, 0)), grid_bits),
             viewport=checked_size if viewport is None else as_size(viewport, "viewport", smallest=1),
-            transform=options.get("transform"),
+            transform=None if transform is None else as_transform(transform, has_poses=has_poses),
             subpixel_bits=bits,
             grid_bits=grid_bits,
             sampling=sampling,

@@ -2,6 +2,7 @@
 
 bend.py          bends edges: splits triangles until their sides are straight in the picture of a lens
 blended.py       draws materials that what is behind shows through, over what is opaque
+edges.py         draws the edges of triangles over a picture, those that show
 fragments.py     holds what each instance shows: visibility buffers of scenes and through a lens, and their parts
 gbuffer.py       evaluates where in space each visible pixel lies, when a layer asks for it
 holes.py         takes out what materials cut out, so that what lies behind a hole shows, of any instance

@@ -1,7 +1,6 @@
 """Draws pictures with materials that what is behind shows through: `alpha_mode="blend"`, and colours with alpha.
 
-Input: `Mesh` or `Scene`, `Camera`. Output: a picture (H, W, 4) uint8, sRGB with alpha, and the visibility buffer of
-what is opaque.
+Input: `Mesh` or `Scene`, `Camera`. Output: the visibility buffer of what is opaque; the rest, laid over its picture.
 
 What is opaque is drawn as ever. The other triangles are peeled, layers that it hides are left out, the rest is shaded,
 each with its own opacity, and laid over it front to back, in linear light: their order in the mesh does not matter.
@@ -15,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -27,16 +27,15 @@ from topleft._model.material import AlphaMode, Material
 from topleft._model.mesh import Mesh, has_opacity, is_laid
 from topleft._raster.peel import peel_meshes
 from topleft._raster.rasterize import refuse_many
+from topleft._raster.snap import Snapped
 from topleft._raster.view import View
 from topleft._render.fragments import SceneFragments, parts_of
-from topleft._render.holes import without_holes
 from topleft._render.instances import PlacedScene, draw_nearest, place
 from topleft._render.scene_shade import shade_by, shade_part
-from topleft._scene.scene import Instance, Scene
-from topleft._scene.subject import meshes_of, scene_of
+from topleft._scene.scene import Instance, Scene, meshes_of, scene_of
 from topleft._shade.shade import Shading, ShadingOptions
 
-__all__ = ["draw_blended", "is_blended"]
+__all__ = ["Glass", "blended_masks", "glass_of"]
 
 F32 = npt.NDArray[np.float32]
 U8 = npt.NDArray[np.uint8]
@@ -74,37 +73,26 @@ def has_opaque_rest(material: Material, mesh: Mesh) -> bool:
     return material.opacity == 1 and not (texture is not None and texture.has_alpha)
 
 
-def is_blended(subject: Mesh | Scene, options: ShadingOptions) -> bool:
-    """Whether a picture of the subject has to be drawn by `draw_blended`."""
-    return options.mode in BLENDING and any(
-        blended_triangles(mesh, options.material) is not None for mesh in meshes_of(subject)
-    )
+def blended_masks(subject: Mesh | Scene, options: ShadingOptions) -> list[Mask | None] | None:
+    """The blended triangles of each instance; None where there are none, or a picture does not tell them apart."""
+    if options.mode not in BLENDING:
+        return None
+    masks = [blended_triangles(mesh, options.material) for mesh in meshes_of(subject)]
+    return None if all(mask is None for mask in masks) else masks
 
 
-def draw_blended(
-    subject: Mesh | Scene, camera: Camera, size: tuple[int, int], *, options: ShadingOptions, **view_options: Any
-) -> tuple[U8, SceneFragments]:
-    """The picture, and what is opaque in it."""
-    scene = scene_of(subject)
-    placed, view = place(scene, camera, size, view_options, material=options.material)
+def glass_of(
+    subject: Mesh | Scene, camera: Camera, size: tuple[int, int], options: ShadingOptions, view_options: dict[str, Any]
+) -> Glass | None:
+    """What a picture of the subject composites; None where all of it is opaque."""
+    masks = blended_masks(subject, options)
+    if masks is None:
+        return None
+    placed, view = place(scene_of(subject), camera, size, view_options, material=options.material)
     refuse_many(view, "rasterize")
-    masks = masks_of(placed, options.material)
-    frags = draw_nearest(placed.of(collapsed(placed.scene, masks)), view)
-    without_holes(frags, scene, camera, options.material, threads=options.threads)
-    frags = SceneFragments(*frags.drawn_planes, frags.placed, frags.positions)  # what is known of it anew
-    picture = shade_by(frags, scene, camera, options)
-    inverse = [None if mask is None else ~mask for mask in masks]
-    glass = Glass(placed.of(collapsed(placed.scene, inverse, keeps_others=False)), view, masks, scene, camera, options)
-    glass.lay_over(picture, frags)
-    return picture, frags
-
-
-def masks_of(placed: PlacedScene, material: Material | None) -> list[Mask | None]:
-    """The blended triangles of each instance as it is drawn: through a lens its parts."""
-    masks = [blended_triangles(instance.mesh, material) for instance in placed.whole]
-    if placed.bent is None:
-        return masks
-    return [mask if mask is None else mask[bent.source] for mask, bent in zip(masks, placed.bent, strict=True)]
+    if placed.bent is not None:  # the parts that a lens makes of the triangles
+        masks = [mask if mask is None else mask[bent.source] for mask, bent in zip(masks, placed.bent, strict=True)]
+    return Glass(placed, view, masks, camera, options)
 
 
 def collapsed(scene: Scene, masks: Sequence[Mask | None], *, keeps_others: bool = True) -> Scene:
@@ -126,24 +114,37 @@ def collapsed(scene: Scene, masks: Sequence[Mask | None], *, keeps_others: bool 
 
 
 class Glass:
-    """The blended triangles of a scene, ready to be peeled."""
+    """A scene some of whose triangles are blended: what is opaque is drawn first, then these are laid over it."""
 
     def __init__(
-        self,
-        placed: PlacedScene,
-        view: View,
-        masks: Sequence[Mask | None],
-        scene: Scene,
-        camera: Camera,
-        options: ShadingOptions,
+        self, placed: PlacedScene, view: View, masks: Sequence[Mask | None], camera: Camera, options: ShadingOptions
     ) -> None:
-        self.placed, self.view, self.scene, self.camera = placed, view, scene, camera
+        self.whole, self.view, self.masks, self.camera = placed, view, masks, camera
         self.under = options
         self.options = replace(options, background=CLEAR, shows_opacity=True)
-        self.snapped = [placed.snap(i) for i, mask in enumerate(masks) if mask is not None]
+
+    @property
+    def scene(self) -> Scene:
+        """What ids count the triangles of."""
+        return self.whole.whole
+
+    def draw_opaque(self) -> SceneFragments:
+        """The visibility buffer of what is opaque."""
+        return draw_nearest(self.whole.of(collapsed(self.whole.scene, self.masks)), self.view)
+
+    @cached_property
+    def blended(self) -> PlacedScene:
+        """The blended triangles alone."""
+        inverse = [None if mask is None else ~mask for mask in self.masks]
+        return self.whole.of(collapsed(self.whole.scene, inverse, keeps_others=False))
+
+    @cached_property
+    def snapped(self) -> list[Snapped]:
+        """The same, ready to be peeled."""
+        return [self.blended.snap(i) for i, mask in enumerate(self.masks) if mask is not None]
 
     def lay_over(self, picture: U8, frags: SceneFragments) -> None:
-        """Lay what is visible of it over the picture of what is opaque."""
+        """Lay what is visible of the blended triangles over the picture of what is opaque."""
         if 0 in self.view.size:
             return
         positions = frags.positions
@@ -194,7 +195,7 @@ class Glass:
         for k in range(len(ids)):
             if not (ids[k] >= 0).any():
                 break
-            layer = SceneFragments(ids[k : k + 1], depth[k : k + 1], self.placed, [at_sample])
+            layer = SceneFragments(ids[k : k + 1], depth[k : k + 1], self.blended, [at_sample])
             for part in parts_of(layer, self.scene):
                 own, pixels = shade_part(part, self.camera, self.options)[part.seen], numbers[part.box][part.seen]
                 share = through[pixels] * (own[:, 3] / np.float32(255))

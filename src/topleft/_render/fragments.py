@@ -7,7 +7,7 @@ Input: ids that count the triangles of all instances, and what they were drawn f
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
@@ -22,14 +22,13 @@ from topleft._model.mesh import Mesh
 from topleft._raster.fragments import Fragments, Viewer, as_sample, view_of
 from topleft._raster.peel import DepthLayers
 from topleft._render.bend import BentMesh
-from topleft._scene.scene import Instance, Scene
-from topleft._scene.subject import meshes_of
+from topleft._scene.scene import Instance, Scene, meshes_of
 
 if TYPE_CHECKING:
     from topleft._render.instances import PlacedScene
 
 __all__ = [
-    "BentFragments", "Part", "SceneDepthLayers", "SceneFragments", "VisiblePart", "camera_of", "drawn_of", "join",
+    "BentFragments", "Part", "SceneDepthLayers", "SceneFragments", "VisiblePart", "drawn_of", "join",
     "parts_of",
 ]  # fmt: skip
 
@@ -70,7 +69,7 @@ class VisiblePart(Part):
 
     def camera(self, camera: Camera) -> Camera:
         """The camera as it stands in the object space of the instance, without its lens."""
-        return (camera if self.instance is None else camera_of(camera, self.instance)).straightened()
+        return camera.straightened() if self.instance is None else camera.straightened().placed(self.instance.transform)
 
 
 PartT = TypeVar("PartT", bound=Part)
@@ -101,11 +100,6 @@ def join(
 def drawn_of(frags: Fragments, mesh: Mesh) -> tuple[Fragments, Mesh]:
     """The fragments and the mesh as they were drawn: through a lens those of its parts."""
     return (frags.drawn, frags.bent.mesh_of(mesh)) if isinstance(frags, BentFragments) else (frags, mesh)
-
-
-def camera_of(camera: Camera, instance: Instance) -> Camera:
-    """The camera as it stands in the object space of an instance."""
-    return replace(camera, view=camera.view @ instance.transform)
 
 
 class InstanceIds:

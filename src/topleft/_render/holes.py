@@ -20,10 +20,9 @@ from topleft._model.material import Material
 from topleft._model.mesh import Mesh
 from topleft._raster.fragments import Fragments
 from topleft._render.bend import BentMesh
-from topleft._render.fragments import BentFragments, SceneFragments, camera_of, drawn_of
+from topleft._render.fragments import BentFragments, SceneFragments, drawn_of
 from topleft._render.instances import PlacedScene
-from topleft._scene.scene import Instance, Scene
-from topleft._scene.subject import meshes_of, scene_of
+from topleft._scene.scene import Instance, Scene, meshes_of, scene_of
 from topleft._shade.alpha_test import Cut, cut_of, cut_out, draw_cut
 
 __all__ = ["Holed", "cut_scene", "draw_holed", "has_cuts", "holed_instances", "solid_scene", "without_holes"]
@@ -66,7 +65,7 @@ def holed_instances(
         if cut is not None:
             if bent is not None:
                 cut, mesh = cut.of_parts(bent[i].source), bent[i].mesh_of(mesh)
-            found.append(Holed(i, mesh, camera_of(camera, instance).straightened(), cut))
+            found.append(Holed(i, mesh, camera.straightened().placed(instance.transform), cut))
     return found
 
 

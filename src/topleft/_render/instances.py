@@ -22,8 +22,8 @@ from topleft._camera.camera import Camera
 from topleft._model.material import Material
 from topleft._raster import choices
 from topleft._raster.classic import refuse_classic
-from topleft._raster.cluster_draw import ClusteredMesh, draw_clustered
-from topleft._raster.clusters import Clusters, Survey
+from topleft._raster.cluster_draw import ClusteredMesh, Survey, draw_clustered
+from topleft._raster.clusters import Clusters
 from topleft._raster.fragments import GivenCorners
 from topleft._raster.peel import check_peel, peel_meshes
 from topleft._raster.rasterize import canvas_of, refuse_many
@@ -195,7 +195,7 @@ def pays_to_draw(placed: PlacedScene, clip_from_world: NDArray[np.float64], view
         return False
     n_triangles = scene.n_triangles // len(scene)
     pays = choices.pays_to_draw_instances(
-        view, n_triangles, lambda: survey_instances(placed), lambda: count_layers(scene, clip_from_world)
+        view, n_triangles, survey_instances(placed), lambda: count_layers(scene, clip_from_world)
     )
     scene.backoff.note(pays=pays)
     return pays

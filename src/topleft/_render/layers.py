@@ -14,14 +14,15 @@ import numpy.typing as npt
 
 from topleft._base.arrays import as_names
 from topleft._points.cloud import CLOUD_LAYERS, CloudBuffer
-from topleft._render.blended import is_blended
+from topleft._render.blended import blended_masks
+from topleft._render.edges import draw_all_edges
 from topleft._render.fragments import VisiblePart
 from topleft._render.gbuffer import GBuffer, PointKind, points_of, project
-from topleft._render.render import draw_all_edges, render
+from topleft._render.render import render
 from topleft._render.scene_shade import shade_by
 from topleft._render.silhouette import silhouette as draw_silhouette
 from topleft._render.transparent import render_transparent
-from topleft._scene.subject import meshes_of
+from topleft._scene.scene import meshes_of
 from topleft._shade.shade import ShadingOptions, shade_normals
 
 __all__ = ["LAYERS", "check_layers", "draw_layers"]
@@ -40,7 +41,7 @@ def color(gbuffer: GBuffer) -> Array:
         return render_transparent(subject, camera, gbuffer.size, **options)
     look = {name: value for name, value in options.items() if name not in NOT_OF_LIGHT}
     checked = ShadingOptions.parse(**look)
-    if options.get("sampling", "center") != "center" or is_blended(subject, checked):
+    if options.get("sampling", "center") != "center" or blended_masks(subject, checked) is not None:
         return render(subject, camera, gbuffer.size, rasterizer=gbuffer.rasterizer, **options)
     picture = shade_by(gbuffer.frags, subject, camera, checked)
     if options.get("edges"):

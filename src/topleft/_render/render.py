@@ -6,13 +6,11 @@ Input: `Mesh` or `Scene`, `Camera`. Output: the picture (H, W, 4) uint8 of `rend
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
-from typing import Any, Literal, Unpack
+from typing import Any, Literal, Unpack, cast
 
 import numpy as np
 import numpy.typing as npt
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from topleft._base.arrays import as_size, shown
 from topleft._base.color import DEFAULT_COLOR, WHITE, ColorLike
@@ -22,26 +20,22 @@ from topleft._model.material import Material
 from topleft._model.mesh import Mesh
 from topleft._model.points import Points
 from topleft._points.cloud import draw_cloud, shade_cloud
-from topleft._raster import choices
-from topleft._raster.clusters import Clusters
 from topleft._raster.fragments import Fragments
-from topleft._raster.verbs import Rasterizer, rasterize, wireframe
-from topleft._raster.view import Planned, View, WindowOptions
-from topleft._render.blended import draw_blended, is_blended
-from topleft._render.fragments import BentFragments, camera_of
+from topleft._raster.verbs import Rasterizer, rasterize
+from topleft._raster.view import WindowOptions
+from topleft._render.blended import glass_of
+from topleft._render.edges import draw_all_edges
+from topleft._render.fragments import BentFragments, SceneFragments
 from topleft._render.holes import without_holes
 from topleft._render.instances import draw_scene
 from topleft._render.scene_shade import shade_by
-from topleft._render.through_lens import seen_through
+from topleft._render.through_lens import StaticPlan, seen_through
 from topleft._scene.adapt import MeshLike
-from topleft._scene.scene import Instance, Scene
-from topleft._scene.subject import as_subject, scene_of
+from topleft._scene.scene import Scene, as_subject
 from topleft._shade.shade import LookOptions, ShadingOptions
 from topleft.typing import CullOption, DepthTestOption, SamplesOption, SamplingOption, ShadingOption
 
 DEFAULT_SIZE = (640, 480)
-EDGE_COLOR = (24, 28, 40)
-TURNED: Mapping[str, CullOption] = {"back": "front", "front": "back"}
 
 
 class RasterizeOptions(WindowOptions, total=False):
@@ -141,13 +135,15 @@ def render(
         cloud = draw_cloud(subject, camera, size, **view)
         return shade_cloud(cloud, subject, camera, options)
     subject = detailed(subject, camera, size, tolerance, cull=cull, material=options.material)
-    if is_blended(subject, options):
-        picture, opaque = draw_blended(subject, camera, size, options=options, **view)
-        frags: Fragments = opaque
-    else:
+    glass = glass_of(subject, camera, size, options, view)
+    if glass is None:
         frags = rasterize_subject(subject, camera, size, rasterizer, options.material, **view)
-        frags = without_holes(frags, subject, camera, options.material, threads=threads)
-        picture = shade_by(frags, subject, camera, options)
+    else:
+        subject, frags = glass.scene, glass.draw_opaque()
+    frags = without_holes(frags, subject, camera, options.material, threads=threads)
+    picture = shade_by(frags, subject, camera, options)
+    if glass is not None:
+        glass.lay_over(picture, cast(SceneFragments, frags))
     if edges:
         draw_all_edges(picture, frags, subject, camera, options, cull=cull)
     return picture
@@ -238,97 +234,3 @@ def rasterize_subject(
     else:
         frags = rasterizer.rasterize(drawn.vertices, drawn.triangles, **view)
     return frags if drawn.bent is None else BentFragments(frags, drawn.bent, subject)
-
-
-def draw_all_edges(
-    picture: npt.NDArray[np.uint8],
-    frags: Fragments,
-    subject: Mesh | Scene,
-    camera: Camera,
-    options: ShadingOptions,
-    *,
-    cull: CullOption,
-) -> None:
-    """Draw the edges of every instance that the visibility buffer does not hide."""
-    for instance in scene_of(subject):
-        own_camera, own_cull, back = camera_of(camera, instance), cull_of(cull, instance), cull_of("back", instance)
-        is_single = instance.mesh.single_sided(options.material)
-        kinds = [(instance.mesh, own_cull)]
-        if is_single is not None and own_cull != back:
-            kinds = [(some_of(instance.mesh, is_single == 0), own_cull)]
-            if own_cull == "none":  # of the others the edges of what shows its front
-                kinds.append((some_of(instance.mesh, is_single == 1), back))
-        for mesh, side in kinds:
-            draw_edges(picture, frags, mesh, own_camera, cull=side, threads=options.threads)
-
-
-def some_of(mesh: Mesh, is_some: npt.NDArray[np.bool_]) -> Mesh:
-    """A mesh of some of its triangles, for edges."""
-    return Mesh(mesh.vertices, mesh.triangles[is_some])
-
-
-def cull_of(cull: CullOption, instance: Instance) -> CullOption:
-    """What `cull` leaves out of an instance, whose winding is turned over where it is mirrored."""
-    return TURNED.get(cull, cull) if instance.is_mirrored else cull
-
-
-def draw_edges(
-    picture: npt.NDArray[np.uint8],
-    frags: Fragments,
-    mesh: Mesh,
-    camera: Camera,
-    *,
-    cull: CullOption = "none",
-    threads: int | None = None,
-) -> None:
-    """Draw the edges of the mesh over its picture (H, W, 4), those that the visibility buffer does not hide."""
-    height, width = frags.depth.shape
-    size = width, height
-    vertices, triangles, transform, bent = seen_through(mesh, camera, size)
-    if bent is not None:
-        triangles, cull = bent.outline(transform, cull), "none"
-    lines = wireframe(
-        vertices, triangles, size, transform=transform, depth=depth_behind(frags.depth), antialias=True, cull=cull,
-        threads=threads,
-    )  # fmt: skip
-    on = lines > 0
-    share = lines[on][:, None]
-    under = picture[on].astype(np.float32)
-    alpha = share + (1 - share) * (under[:, 3:] / 255)  # "over", T. Porter, T. Duff, Compositing Digital Images, 1984
-    rgb = share * np.array(EDGE_COLOR, np.float32) + (1 - share) * (under[:, 3:] / 255) * under[:, :3]
-    picture[on] = np.rint(np.hstack([rgb / alpha, 255 * alpha])).astype(np.uint8)
-
-
-def depth_behind(depth: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
-    """The depth that edges may have and still show: farther by what the surface falls away within a pixel.
-
-    The slope along each axis is the smaller of those to the two neighbours: the other one may jump to another surface.
-    """
-    behind = depth.copy()
-    for axis in range(2):
-        with np.errstate(invalid="ignore"):
-            step = np.abs(np.diff(depth, axis=axis, prepend=np.inf, append=np.inf))
-        before, after = np.delete(step, -1, axis), np.delete(step, 0, axis)
-        slope = np.fmin(before, after)  # NaN: nothing on either side
-        behind += np.where(np.isfinite(slope), slope, 0)
-    return behind
-
-
-class StaticPlan(Planned):
-    """The plan of a mesh that does not change: from its second picture on it is drawn in clusters, where that pays."""
-
-    def __init__(self, mesh: Mesh) -> None:
-        self._mesh = mesh
-
-    def fitted(self, view: View) -> View:
-        """Return the view with this plan."""
-        return replace(view, plan=self)
-
-    def triangles_of(self, triangles: ArrayLike, n_vertices: int) -> NDArray[np.int32]:  # noqa: ARG002
-        """Return the triangles of the mesh, which has checked them."""
-        return self._mesh.triangles
-
-    def find_clusters(self, vertices: ArrayLike) -> Clusters | None:  # noqa: ARG002
-        """Return the clusters of the mesh if it is drawn often enough; this is one time more."""
-        mesh = self._mesh
-        return mesh.clusters if choices.pays_to_cluster(len(mesh.triangles), mesh.note_drawn()) else None

@@ -24,8 +24,7 @@ from topleft._points.cloud import shade_cloud
 from topleft._points.points import PointFragments
 from topleft._raster.fragments import Fragments
 from topleft._render.fragments import SceneFragments, VisiblePart, join, parts_of
-from topleft._scene.scene import Instance, Scene
-from topleft._scene.subject import meshes_of
+from topleft._scene.scene import Instance, Scene, meshes_of
 from topleft._shade.look import is_similarity
 from topleft._shade.shade import Shading, ShadingOptions, shade_mesh, shade_numbers, shade_samples
 from topleft.typing import ShadingOption

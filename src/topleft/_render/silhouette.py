@@ -21,8 +21,7 @@ from topleft._render.instances import draw_scene_coverage
 from topleft._render.render import DEFAULT_SIZE
 from topleft._render.through_lens import seen_through
 from topleft._scene.adapt import MeshLike
-from topleft._scene.scene import Scene
-from topleft._scene.subject import as_subject
+from topleft._scene.scene import Scene, as_subject
 from topleft.typing import CullOption, SamplingOption
 
 __all__ = ["silhouette"]

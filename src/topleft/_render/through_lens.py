@@ -5,19 +5,22 @@ Input: `Mesh` or `Scene`, a camera with or without lens. Output: `DrawnMesh` or 
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from numpy.typing import ArrayLike, NDArray
 
 from topleft._camera.camera import Camera
 from topleft._model.mesh import Mesh
+from topleft._raster import choices
+from topleft._raster.clusters import Clusters
 from topleft._raster.view import Planned, View
 from topleft._render.bend import BentMesh, bend
-from topleft._render.fragments import camera_of
 from topleft._scene.scene import Instance, Scene
 
-__all__ = ["DrawnMesh", "DrawnScene", "scene_through", "seen_through"]
+__all__ = ["DrawnMesh", "DrawnScene", "StaticPlan", "scene_through", "seen_through"]
 
 MIRROR = np.diag([-1.0, 1.0, 1.0, 1.0])
 
@@ -57,6 +60,26 @@ def seen_through(mesh: Mesh, camera: Camera, frame: tuple[int, int], *, near_cli
     return DrawnMesh(bent.points_eye, bent.triangles, camera.clip_from_eye(frame), bent)
 
 
+class StaticPlan(Planned):
+    """The plan of a mesh that does not change: from its second picture on it is drawn in clusters, where that pays."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        self._mesh = mesh
+
+    def fitted(self, view: View) -> View:
+        """Return the view with this plan."""
+        return replace(view, plan=self)
+
+    def triangles_of(self, triangles: ArrayLike, n_vertices: int) -> NDArray[np.int32]:  # noqa: ARG002
+        """Return the triangles of the mesh, which has checked them."""
+        return self._mesh.triangles
+
+    def find_clusters(self, vertices: ArrayLike) -> Clusters | None:  # noqa: ARG002
+        """Return the clusters of the mesh if it is drawn often enough; this is one time more."""
+        mesh = self._mesh
+        return mesh.clusters if choices.pays_to_cluster(len(mesh.triangles), mesh.note_drawn()) else None
+
+
 class DrawnScene(NamedTuple):
     """What is drawn of a scene, and the scene itself, which ids count the triangles of."""
 
@@ -76,7 +99,8 @@ def scene_through(scene: Scene, camera: Camera, frame: tuple[int, int], *, near_
     many, instances = [], []
     for instance in scene:
         mesh = instance.mesh
-        bent = bend(mesh.vertices, mesh.triangles, camera_of(camera, instance), camera.lens, frame, near_clip=near_clip)
+        own = camera.placed(instance.transform)
+        bent = bend(mesh.vertices, mesh.triangles, own, camera.lens, frame, near_clip=near_clip)
         place = MIRROR if instance.is_mirrored else np.eye(4)
         many.append(bent)
         instances.append(Instance(Mesh(bent.points_eye * np.diag(place)[:3], bent.triangles.astype(np.int32)), place))

@@ -25,8 +25,7 @@ from topleft._render.render import DEFAULT_SIZE
 from topleft._render.scene_shade import shade
 from topleft._render.through_lens import seen_through
 from topleft._scene.adapt import MeshLike
-from topleft._scene.scene import Scene
-from topleft._scene.subject import as_meshes, scene_of
+from topleft._scene.scene import Scene, as_meshes, scene_of
 from topleft._shade.shade import LookOptions
 from topleft.typing import CullOption, DepthTestOption, SamplesOption, ShadingOption
 

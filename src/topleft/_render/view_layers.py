@@ -25,8 +25,7 @@ from topleft._render.gbuffer import GBuffer
 from topleft._render.layers import LAYERS, check_layers, draw_layers
 from topleft._render.render import DEFAULT_SIZE
 from topleft._scene.adapt import MeshLike
-from topleft._scene.scene import Scene
-from topleft._scene.subject import as_subject, meshes_of
+from topleft._scene.scene import Scene, as_subject, meshes_of
 from topleft._shade.shade import LookOptions
 from topleft.typing import CullOption, LayerOption, SamplesOption, ShadingOption
 

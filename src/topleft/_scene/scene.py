@@ -1,11 +1,12 @@
 """Scenes: meshes that stand in one world, each placed by a matrix, as often as wanted.
 
-Input: meshes and matrices. Output: a `Scene`, which `render`, `visibility`, `silhouette` and `render_layers`
-take like a mesh. (Ready-made test scenes are in `topleft.scenes`.)
+Input: meshes and matrices; or whatever a caller gives to be drawn, a path, say. Output: a `Scene`, or the `Mesh`,
+`Scene` or `Points` that is drawn. (Ready-made test scenes are in `topleft.scenes`.)
 """
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -16,11 +17,13 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._base.arrays import INT32_MAX, as_square, check_regular, set_read_only, shown
+from topleft._io.load import load
 from topleft._model.mesh import Mesh, extreme_points, used_vertices
+from topleft._model.points import Points
 from topleft._raster.clusters import Backoff
 from topleft._scene.adapt import MeshLike, as_mesh, is_mesh_like
 
-__all__ = ["Instance", "Scene"]
+__all__ = ["Instance", "Scene", "as_meshes", "as_subject", "meshes_of", "scene_of"]
 
 F64 = npt.NDArray[np.float64]
 
@@ -234,3 +237,25 @@ def world_corners(instance: Instance) -> F64:
     """The vertices that triangles of an instance use, in the world: (N, 3) float64."""
     linear, offset = instance.transform[:3, :3], instance.transform[:3, 3]
     return used_vertices(instance.mesh).astype(np.float64) @ linear.T + offset
+
+
+def as_subject(given: MeshLike | Scene | Points) -> Mesh | Scene | Points:
+    """What is drawn of what is given; of a path what `load` reads, of other things what `as_mesh` makes of them."""
+    if isinstance(given, Mesh | Scene | Points):
+        return given
+    return load(given) if isinstance(given, str | os.PathLike) else as_mesh(given)
+
+
+def as_meshes(given: MeshLike | Scene) -> Mesh | Scene:
+    """The same for what needs triangles: points are refused."""
+    return given if isinstance(given, Scene) else as_mesh(given)
+
+
+def meshes_of(subject: Mesh | Scene) -> list[Mesh]:
+    """The mesh of each instance."""
+    return [subject] if isinstance(subject, Mesh) else [instance.mesh for instance in subject]
+
+
+def scene_of(subject: Mesh | Scene) -> Scene:
+    """The scene, or that of a mesh alone."""
+    return subject if isinstance(subject, Scene) else Scene([subject])
