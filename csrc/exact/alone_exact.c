@@ -180,9 +180,9 @@ typedef struct {
     int64_t twice[3];       /* twice of it, or -1: nothing is */
 } row_steps;
 
-/* Returns 0 where steps of 64 bits do not reach.  Beside the errors that the band allows for, q at the first row and each
- * step err by 2^-52 of the most that |q| gets, and by one unit when they become integers.  On the grid, where nothing is
- * asked, q is at least 0.5 / |dy| away from integers. */
+/* Returns 0 where steps of 64 bits do not reach.  Beside the errors that the band allows for, q at the first row and
+ * each step err by 2^-52 of the most that |q| gets, and by one unit when they become integers.  On the grid, where
+ * nothing is asked, q is at least 0.5 / |dy| away from integers. */
 static int setup_steps(const lone_triangle *t, row_steps *r)
 {
     const asked_triangle *e = &t->edges;

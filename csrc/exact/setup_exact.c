@@ -2,8 +2,8 @@
  * In: points in pixels, a queue of boxes.  Out: lane_exact; which lanes lie on a grid; planes of depth.
  *
  * Points are measured in float64 from the first sample of the box.  Extents are at most TL_MAX_BOX_PX.  u = 2^-24;
- * X = max(width, 1), Y = max(height, 1) of the extent.  The first sample lies in the extent, so every |x - cx| <= X, and
- * any E in the box is at most XY.
+ * X = max(width, 1), Y = max(height, 1) of the extent.  The first sample lies in the extent, so every |x - cx| <= X,
+ * and any E in the box is at most XY.
  *
  * 1. Rows: edge functions are set up in float64 and rounded once to float32.  float64: differences, two products, their
  *    difference: at most 8 * 2^-53 XY = 2^-26 u XY, in the slack of what follows.  Rounding errs by |e0| u, |dx| u,
@@ -137,8 +137,8 @@ static __attribute__((noinline)) void ask_turns(const exact_state *s, vi all_ids
     }
 }
 
-/* Finds the triangles that are to be turned, and those without an area: of a float64 area the sign holds beyond 2^-51 of
- * its terms (J. R. Shewchuk), and is asked for otherwise.  Of vertices on 2^-8 px it is exact. */
+/* Finds the triangles that are to be turned, and those without an area: of a float64 area the sign holds beyond 2^-51
+ * of its terms (J. R. Shewchuk), and is asked for otherwise.  Of vertices on 2^-8 px it is exact. */
 TL_INLINE void find_turns(const exact_state *s, lane_exact *t, vm on_grid)
 {
     const vd x1 = vd_sub(t->x[1], t->x[0]), y1 = vd_sub(t->y[1], t->y[0]);
