@@ -49,12 +49,16 @@ typedef struct {
     double largest[3]; /* absolute coordinate of each axis */
 } tl_meshlets;
 
+/* Which side of a meshlet shows: its back, in the middle at least; both, or that is not certain. */
+enum { TL_SIDE_BACK = 1, TL_SIDE_BOTH = 2 };
+
 /* A meshlet that a view may show: the left column and the row below the window of 128 pixels that its vertices are
  * measured from, in the window that is drawn, and how many columns and rows it reaches from the middle of that. */
 typedef struct {
     int32_t meshlet;
     int16_t left_px, below_px, reach_x, reach_y;
-    int32_t n_triangles;
+    int16_t n_triangles, side;
+    float depth; /* no sample of it is drawn nearer, or, where the farthest stays, farther */
 } tl_seen_meshlet;
 
 /* How meshlets are seen and drawn.  Of pixels, rows [0, height) of the window; the picture lies within 2^14 pixels of

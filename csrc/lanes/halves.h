@@ -38,6 +38,7 @@ TL_INLINE vi vi_pick_bytes(const uint8_t *table, vi i)
 {
     return _mm512_permutex2var_epi8(_mm512_loadu_si512(table), i, _mm512_loadu_si512(table + 64));
 }
+TL_INLINE vi vi_select_bytes(uint64_t m, vi a, vi b) { return _mm512_mask_blend_epi8(m, b, a); }
 TL_INLINE vi vi_from_halves(vi low, vi high) { return _mm512_mask_blend_epi16(0xaaaaaaaau, low, high); }
 TL_INLINE vi vi_signed_low(vi a) { return _mm512_srai_epi32(_mm512_slli_epi32(a, 16), 16); }
 TL_INLINE vi vi_signed_high(vi a) { return _mm512_srai_epi32(a, 16); }

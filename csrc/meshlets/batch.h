@@ -35,6 +35,8 @@ typedef struct {
         z_high[TL_MESHLET_VERTICES] __attribute__((aligned(64)));
     const tl_meshlet *meshlet;
     const uint8_t *corners[3]; /* in the order in which the drawn side is counter-clockwise */
+    uint8_t turned[2][TL_MESHLET_ROOM]
+        __attribute__((aligned(64))); /* the last two of them, where triangles show one side or the other */
     tl_seen_meshlet at;
     int32_t name0;     /* place of its names among all words of the mesh */
     int32_t base;      /* sample of the left end of the lowest row of its window */
@@ -63,7 +65,6 @@ typedef struct {
     int32_t first_id;
     int is_farthest, fine_bits; /* bits that the grid is finer than the picture's sub-pixels */
     float matrix[16];
-    int turn[3];                         /* which corner comes where: the drawn side is counter-clockwise */
     double scale_x, scale_y, x_fx, y_fx; /* of the picture's middle, in the window */
     int is_zero_to_one;
     int32_t *others;

@@ -2,7 +2,10 @@
  * In: meshlets, a view, the list.  Out: the target's buffers; the names of triangles that are still to be drawn.
  *
  * The window is cleared 64 rows at a time from the top, and a meshlet is drawn as soon as all of its rows are clear:
- * its part of the buffers is still in the second-level cache then.  The blocks of meshlets to come are prefetched. */
+ * its part of the buffers is still in the second-level cache then.  The blocks of meshlets to come are prefetched.
+ *
+ * Where both sides are drawn, the meshlets that all show the one which lies farther off, as the backs of a closed mesh
+ * do, wait for the next band, and are left out if they are hidden then. */
 #ifndef TL_DRAW_MESHLETS_C
 #define TL_DRAW_MESHLETS_C
 
@@ -23,10 +26,13 @@
 #include "meshlets/queues.c"
 #include "meshlets/snap_meshlet.c"
 #include "meshlets/tiny.c"
+#include "meshlets/turn.c"
 #include "meshlets/write.c"
 
 #if TL_HAS_HALVES
 
+#define TL_ORDER_SLABS 8 /* of depth, in a band */
+#define TL_ORDERED (2 * TL_ORDER_SLABS)
 #define TL_BAND_BITS 6 /* rows that are cleared at a time */
 #define TL_AHEAD 6     /* meshlets that are prefetched: 10,000,000 triangles take 24 ms without, 10.5 with */
 
@@ -73,38 +79,46 @@ static void draw_batch_of_meshlets(meshlet_batch *s)
 
 static inline int32_t in_slot(int32_t px) { return px < 0 ? 0 : px > 255 ? 255 : px; }
 
+static __attribute__((noinline)) void draw_on_32_bits(meshlet_batch *s, meshlet_slot *slot)
+{
+    s->is_too_far = 0;
+    snap_slot(s, slot, 1);
+    if (s->is_too_far) {
+        const uint64_t all[2] = {UINT64_MAX, UINT64_MAX};
+        draw_with_care(s, slot->meshlet, all);
+        return;
+    }
+    if (slot->at.side & TL_SIDE_BOTH)
+        turn_wide(s, slot);
+    draw_wide(s, slot);
+}
+
 /* Adds a meshlet to the batch, which is drawn when it is full. */
 TL_INLINE void draw_meshlet(meshlet_batch *s, tl_seen_meshlet at)
 {
     meshlet_slot *slot = s->slots + s->n_slots;
     const tl_meshlet *m = s->meshlets + at.meshlet;
     slot->meshlet = m, slot->at = at, slot->n_triangles = at.n_triangles;
-    for (int k = 0; k < 3; k++)
-        slot->corners[k] = m->corners[s->turn[k]];
+    turn_slot(slot, at.side == TL_SIDE_BACK);
     slot->n_one = slot->n_tiny = slot->n_larger = slot->n_covered = 0;
     slot->alone[0] = slot->alone[1] = 0;
     slot->name0 = (int32_t)(m->names - (const int32_t *)s->meshlets);
     slot->base = (at.below_px - 1) * s->stride_px + at.left_px;
     const vi any = snap_slot(s, slot, 0);
-    if (__builtin_expect(!vm_any(vi_any_bit(any, vi_set1(~(INT16_MAX >> s->fine_bits)))), 1)) {
-        const vi round = vi_set1(TL_ROUND_PAIR);
-        for (int k = 0; k < 2; k++)
-            vh_part(vi_add_halves(slot->pairs[2 * k], round), vi_add_halves(slot->pairs[2 * k + 1], round), slot->x + k,
-                    slot->y + k);
-        slot->low = in_slot(at.below_px - s->row1) << 16 | in_slot(-at.left_px);
-        slot->high = in_slot(at.below_px - s->row0) << 16 | in_slot(s->width - at.left_px);
-        if (++s->n_slots == TL_BATCH)
-            draw_batch_of_meshlets(s);
+    if (__builtin_expect(vm_any(vi_any_bit(any, vi_set1(~(INT16_MAX >> s->fine_bits)))), 0)) {
+        draw_on_32_bits(s, slot);
         return;
     }
-    s->is_too_far = 0;
-    snap_slot(s, slot, 1);
-    if (s->is_too_far) {
-        const uint64_t all[2] = {UINT64_MAX, UINT64_MAX};
-        draw_with_care(s, m, all);
-    } else {
-        draw_wide(s, slot);
-    }
+    if (at.side & TL_SIDE_BOTH)
+        turn_pairs(slot);
+    const vi round = vi_set1(TL_ROUND_PAIR);
+    for (int k = 0; k < 2; k++)
+        vh_part(vi_add_halves(slot->pairs[2 * k], round), vi_add_halves(slot->pairs[2 * k + 1], round), slot->x + k,
+                slot->y + k);
+    slot->low = in_slot(at.below_px - s->row1) << 16 | in_slot(-at.left_px);
+    slot->high = in_slot(at.below_px - s->row0) << 16 | in_slot(s->width - at.left_px);
+    if (++s->n_slots == TL_BATCH)
+        draw_batch_of_meshlets(s);
 }
 
 TL_INLINE void prefetch_meshlet(const tl_meshlet *m, int n_triangles)
@@ -146,32 +160,134 @@ static void start_meshlets(meshlet_batch *s, const tl_meshlet_pass *pass, int32_
     s->scale_x = pass->seen->scale_x, s->scale_y = pass->seen->scale_y;
     s->x_fx = s->scale_x - unit * (double)window->x_px, s->y_fx = s->scale_y - unit * (double)window->y_px;
     s->is_zero_to_one = pass->view->zero_to_one;
-    s->turn[0] = 0, s->turn[1] = pass->seen->cull == TL_CULL_FRONT ? 2 : 1, s->turn[2] = 3 - s->turn[1];
     s->n_slots = s->n_fragments = s->small.n = s->middle.n = s->rows.n = 0;
     memset(s->sample, 0, sizeof s->sample); /* what is prefetched behind the end of the list */
 }
 
-/* Sorts what reaches into rows [row0, row1) by the band that its last row lies in; `bands` gets where each begins. */
-static int64_t sort_bands(const tl_seen_meshlet *seen, int64_t n, int32_t row0, int32_t row1, int64_t *bands,
-                          tl_seen_meshlet *sorted)
+/* ---- what lies behind what has been drawn: depths only come nearer, so what is hidden now stays so ------------- */
+
+/* Whether the depth of a sample, if that is drawn here, does not beat this one. */
+TL_INLINE int shows_at(const meshlet_batch *s, int32_t col, int32_t row, float depth)
+{
+    if (col < 0 || col >= s->width || row < s->row0 || row >= s->row1)
+        return 0;
+    const float there = s->depth[(int64_t)row * s->stride_px + col];
+    return !(s->is_farthest ? there > depth : there < depth);
+}
+
+/* Whether a meshlet is certain to change no sample. */
+static int is_meshlet_hidden(const meshlet_batch *s, const tl_seen_meshlet *at)
+{
+    const int32_t col = at->left_px + TL_SLOT_PX / 2, row = at->below_px - TL_SLOT_PX / 2;
+    const int32_t col0 = col - at->reach_x > 0 ? col - at->reach_x : 0;
+    const int32_t col1 = col + at->reach_x < s->width ? col + at->reach_x + 1 : s->width;
+    const int32_t first = row - at->reach_y > s->row0 ? row - at->reach_y : s->row0;
+    const int32_t end = row + at->reach_y < s->row1 ? row + at->reach_y + 1 : s->row1;
+    const int32_t x = at->reach_x >> 1, y = at->reach_y >> 1;
+    const vf depth = vf_set1(at->depth);
+    if (shows_at(s, col, row, at->depth) || shows_at(s, col - x, row - y, at->depth) ||
+        shows_at(s, col + x, row - y, at->depth) || shows_at(s, col - x, row + y, at->depth) ||
+        shows_at(s, col + x, row + y, at->depth))
+        return 0; /* settles most that show */
+    for (int64_t i = first; i < end; i++)
+        for (int64_t k = col0; k < col1; k += TL_LANES) {
+            const vm live = vm_first(col1 - k);
+            const vf there = vf_load_masked(live, s->depth + i * s->stride_px + k);
+            if (vm_any(vm_and_not(live, s->is_farthest ? vf_lt(depth, there) : vf_lt(there, depth))))
+                return 0;
+        }
+    return 1;
+}
+
+/* ---- the order in which they are drawn ------------------------------------------------------------------------- */
+
+/* The order in which meshlets of a band are drawn: those of one side first, in slabs by depth. */
+typedef struct {
+    int late; /* the side that lies farther off on the mean, if both are drawn, as that of a meshlet; -1: none does */
+    int n_bands_later;
+    float nearest, slabs_a_unit;
+} draw_order;
+
+static draw_order find_order(const tl_seen_meshlet *seen, int64_t n, int has_sides, int is_farthest)
+{
+    double sum[2] = {0.0, 0.0};
+    int64_t n_of[2] = {0, 0}, reach = 0;
+    float low = INFINITY, high = -INFINITY;
+    for (int64_t i = 0; i < n; i++) {
+        const int side = seen[i].side & TL_SIDE_BACK;
+        sum[side] += seen[i].depth;
+        n_of[side]++;
+        reach += seen[i].reach_y;
+        low = seen[i].depth < low ? seen[i].depth : low;
+        high = seen[i].depth > high ? seen[i].depth : high;
+    }
+    const double front = sum[0] / (double)n_of[0], back = sum[1] / (double)n_of[1];
+    const float a_unit = high > low ? (float)TL_ORDER_SLABS / (high - low) : 0.0f;
+    return (draw_order){
+        .late = has_sides && n_of[0] && n_of[1] ? (back > front) != is_farthest : -1,
+        .n_bands_later = 1 + (int)((3 * reach / (n > 0 ? n : 1)) >> TL_BAND_BITS),
+        .nearest = is_farthest ? high : low,
+        .slabs_a_unit = is_farthest ? -a_unit : a_unit,
+    };
+}
+
+static inline int slab_in_order(const draw_order *order, const tl_seen_meshlet *at)
+{
+    const float slab = (at->depth - order->nearest) * order->slabs_a_unit;
+    const int in_slab = slab > 0.0f ? slab < (float)(TL_ORDER_SLABS - 1) ? (int)slab : TL_ORDER_SLABS - 1 : 0;
+    return ((at->side & TL_SIDE_BACK) == order->late ? TL_ORDER_SLABS : 0) + in_slab;
+}
+
+/* Sorts what reaches into rows [row0, row1) by the band that its last row lies in, and there into the order in which it
+ * is drawn; starts[TL_ORDERED * band] is where a band begins, TL_ORDER_SLABS on where those of it that are late do. */
+static int sort_bands(const tl_seen_meshlet *seen, int64_t n, int32_t row0, int32_t row1, const draw_order *order,
+                      int64_t *starts, tl_seen_meshlet *sorted)
 {
     const int n_bands = (row1 - row0 + (1 << TL_BAND_BITS) - 1) >> TL_BAND_BITS;
-    memset(bands, 0, (size_t)(n_bands + 2) * sizeof *bands);
+    memset(starts, 0, (size_t)(TL_ORDERED * n_bands + 2) * sizeof *starts);
     for (int pass = 0; pass < 2; pass++) {
         for (int64_t i = 0; i < n; i++) {
             const int32_t middle = seen[i].below_px - TL_SLOT_PX / 2, last = middle + seen[i].reach_y;
             if (last < row0 || middle - seen[i].reach_y >= row1)
                 continue;
             const int32_t band = (last >= row1 ? row1 - 1 - row0 : last - row0) >> TL_BAND_BITS;
+            const int32_t at = TL_ORDERED * band + slab_in_order(order, seen + i);
             if (pass)
-                sorted[bands[band + 1]++] = seen[i];
+                sorted[starts[at + 1]++] = seen[i];
             else
-                bands[band + 2]++;
+                starts[at + 2]++;
         }
-        for (int k = 0; !pass && k < n_bands; k++)
-            bands[k + 2] += bands[k + 1];
+        for (int k = 0; !pass && k < TL_ORDERED * n_bands; k++)
+            starts[k + 2] += starts[k + 1];
     }
     return n_bands;
+}
+
+/* Draws list[first] to list[end - 1] without those that are hidden; what follows up to `limit` is drawn soon. */
+static int draw_listed_meshlets(meshlet_batch *s, const tl_seen_meshlet *list, int64_t first, int64_t end,
+                                int64_t limit)
+{
+    int is_given_up = 0;
+    for (int64_t i = first; i < end && !is_given_up; i++) {
+        const tl_seen_meshlet *next = list + (i + TL_AHEAD < limit ? i + TL_AHEAD : limit - 1);
+        prefetch_meshlet(s->meshlets + next->meshlet, next->n_triangles);
+        if (is_meshlet_hidden(s, list + i))
+            continue;
+        draw_meshlet(s, list[i]);
+        tl_count_work(s->pass->window, (int64_t)TL_SETUP_PX * TL_MESHLET_GROWN);
+        is_given_up = tl_is_given_up(s->pass->window);
+    }
+    return is_given_up;
+}
+
+/* The same where most are hidden, so that those alone are prefetched which are not. */
+static int draw_late_meshlets(meshlet_batch *s, tl_seen_meshlet *list, int64_t first, int64_t end)
+{
+    int64_t n = first;
+    for (int64_t i = first; i < end; i++)
+        if (!is_meshlet_hidden(s, list + i))
+            list[n++] = list[i];
+    return draw_listed_meshlets(s, list, first, n, n);
 }
 
 /* Draws what `seen` and `odd` list of rows [row0, row1) of the window, cleared first if `is_first`.  `others` gets the
@@ -181,23 +297,22 @@ static int64_t draw_meshlets(const tl_meshlet_pass *pass, const tl_seen_meshlet 
                              tl_seen_meshlet *sorted, int32_t *others)
 {
     meshlet_batch s;
-    int64_t bands[(TL_MAX_DRAWN_PX >> TL_BAND_BITS) + 3];
+    int64_t starts[TL_ORDERED * (TL_MAX_DRAWN_PX >> TL_BAND_BITS) + 2];
     start_meshlets(&s, pass, row0, row1);
     s.others = others, s.n_others = 0;
-    const int64_t n_bands = sort_bands(seen, n_seen, row0, row1, bands, sorted), n = bands[n_bands];
-    int64_t i = 0;
+    const draw_order order = find_order(seen, n_seen, pass->seen->cull == TL_CULL_NONE, s.is_farthest);
+    const int n_bands = sort_bands(seen, n_seen, row0, row1, &order, starts, sorted);
     int is_given_up = 0;
-    for (int64_t band = 0; band < n_bands && !is_given_up; band++) {
-        const int32_t first = row0 + (int32_t)(band << TL_BAND_BITS);
-        if (is_first)
+    const int n_later = order.late < 0 ? 0 : order.n_bands_later;
+    for (int band = 0; band < n_bands + n_later && !is_given_up; band++) {
+        const int64_t *at = starts + TL_ORDERED * band, *before = at - (int64_t)TL_ORDERED * n_later;
+        const int32_t first = row0 + (band << TL_BAND_BITS);
+        if (is_first && first < row1)
             clear_rows(&s, first, first + (1 << TL_BAND_BITS) < row1 ? first + (1 << TL_BAND_BITS) : row1);
-        for (; i < bands[band + 1] && !is_given_up; i++) {
-            const tl_seen_meshlet *next = sorted + (i + TL_AHEAD < n ? i + TL_AHEAD : n - 1);
-            prefetch_meshlet(s.meshlets + next->meshlet, next->n_triangles);
-            draw_meshlet(&s, sorted[i]);
-            tl_count_work(pass->window, (int64_t)TL_SETUP_PX * TL_MESHLET_GROWN);
-            is_given_up = tl_is_given_up(pass->window);
-        }
+        if (band < n_bands)
+            is_given_up = draw_listed_meshlets(&s, sorted, at[0], at[TL_ORDER_SLABS], at[TL_ORDER_SLABS]);
+        if (n_later && band >= n_later && !is_given_up)
+            is_given_up = draw_late_meshlets(&s, sorted, before[TL_ORDER_SLABS], before[TL_ORDERED]);
     }
     draw_batch_of_meshlets(&s);
     make_fragment_room(&s, TL_FRAGMENTS_KEPT);

@@ -37,6 +37,7 @@ typedef struct {
     float eye[3], eye_w, eye_factor, eye_error;
     float length[3], terms[4];
     float scale[2], half_px[2], origin_px[2], pixel;
+    int is_zero_to_one, is_farthest;
 } lane_view;
 
 static double row_length(const double *row) { return sqrt((row[0] * row[0] + row[1] * row[1]) + row[2] * row[2]); }
@@ -86,6 +87,7 @@ static lane_view place_view(const tl_meshlet_pass *pass)
     l.origin_px[0] = (float)(v->half_width_px - (double)pass->window->x_px);
     l.origin_px[1] = (float)(v->half_height_px - (double)pass->window->y_px);
     l.pixel = (float)(v->half_width_px / v->scale_x); /* a sub-pixel */
+    l.is_zero_to_one = v->zero_to_one, l.is_farthest = v->is_farthest;
     return l;
 }
 
@@ -148,30 +150,58 @@ TL_INLINE void place_reach(const lane_view *l, vf inverse_w, lane_bounds *b)
     b->moved = vf_fma(vf_max(moved[0], moved[1]), inverse_w, set(0.501f));
 }
 
-/* The meshlets whose triangles are all certain to be turned the way that is culled after the snap.
+/* The eye as the middle of a meshlet sees it: along the axis of its cone, and across. */
+typedef struct {
+    vf along, across, length;
+} lane_eye;
+
+TL_INLINE lane_eye place_eye(const lane_view *l, const lane_bounds *b)
+{
+    const vf zero = set(0.0f);
+    vf squares = zero, along = zero;
+    for (int k = 0; k < 3; k++) {
+        const vf g = vf_fnma(set(l->eye_w), b->bound[TL_BOUND_X + k], set(l->eye[k]));
+        squares = vf_fma(g, g, squares);
+        along = vf_fma(g, b->bound[TL_BOUND_AXIS_X + k], along);
+    }
+    const vf across = vf_sqrt(vf_max(vf_fma(set(1e-5f), squares, vf_fnma(along, along, squares)), zero));
+    return (lane_eye){along, across, vf_sqrt(squares)};
+}
+
+/* The meshlets whose triangles are all certain to be turned one way after the snap: with `along` as it is the one that
+ * is culled (of a view that culls nothing: the front shows), with `along` negated the other one.
  *
  * Twice the area of a triangle in the picture is n . g(a) times a factor, as is_turned_away in cluster_view.c has it.
  * Corners that move by d change it by less than 2 d (|x| + |y|) for each of two sides (x, y), and 8 d^2. */
-TL_INLINE vm turned_away(const lane_view *l, const lane_bounds *b)
+TL_INLINE vm all_turned(const lane_view *l, const lane_bounds *b, const lane_eye *eye, vf along)
 {
-    const vf zero = set(0.0f);
-    vf g[3], squares = zero, along = zero;
-    for (int k = 0; k < 3; k++) {
-        g[k] = vf_fnma(set(l->eye_w), b->bound[TL_BOUND_X + k], set(l->eye[k]));
-        squares = vf_fma(g[k], g[k], squares);
-        along = vf_fma(g[k], b->bound[TL_BOUND_AXIS_X + k], along);
-    }
-    const vf length = vf_sqrt(squares), slack = set(1e-5f);
-    const vf across = vf_sqrt(vf_max(vf_fma(slack, squares, vf_fnma(along, along, squares)), zero));
     const vf radius = vf_mul(b->bound[TL_BOUND_RADIUS], set(l->eye_w == 0.0f ? 0.0f : 1.0001f));
-    vf least = vf_sub(vf_fms(along, b->bound[TL_BOUND_COS], vf_mul(across, b->bound[TL_BOUND_SIN])), radius);
-    least = vf_sub(vf_fnma(slack, length, least), set(2.0f * l->eye_error));
+    vf least = vf_sub(vf_fms(along, b->bound[TL_BOUND_COS], vf_mul(eye->across, b->bound[TL_BOUND_SIN])), radius);
+    least = vf_sub(vf_fnma(set(1e-5f), eye->length, least), set(2.0f * l->eye_error));
     const vf w_cubed = vf_mul(b->w_max, vf_mul(b->w_max, b->w_max));
     const vf factor = vf_mul(vf_mul(least, set(l->eye_factor)), vf_div(set(l->scale[0] * l->scale[1]), w_cubed));
     const vf sides = vf_mul(set(4.0f), vf_add(b->reach[0], b->reach[1]));
     const vf corners = vf_div(vf_mul(set(8.0f), b->moved), b->bound[TL_BOUND_SIDE]);
     const vf changed = vf_mul(vf_mul(set(1.002f), b->moved), vf_add(sides, corners));
     return vf_gt(vf_mul(b->bound[TL_BOUND_HEIGHT], factor), changed);
+}
+
+/* The depth that no sample of a meshlet is nearer than, or farther than: z/w of the middle is q, and elsewhere differs
+ * from it by (z - q w) / w, a form that is small in the middle.  Any q will do. */
+TL_INLINE vf depth_bound(const lane_view *l, const lane_bounds *b, vf q, vf inverse_least)
+{
+    vf squares = set(0.0f);
+    for (int k = 0; k < 3; k++) {
+        const vf slope = vf_fnma(q, set(l->row[3][k]), set(l->row[2][k]));
+        squares = vf_fma(slope, slope, squares);
+    }
+    const vf error = vf_mul(set(2.0f * (float)TL_FORM_ERROR), vf_fma(vf_abs(q), set(l->terms[3]), set(l->terms[2])));
+    const vf middle = vf_add(vf_abs(vf_fnma(q, b->clip[3], b->clip[2])), error);
+    const vf reach = vf_mul(vf_fma(vf_mul(b->bound[TL_BOUND_RADIUS], set(1.0001f)), vf_sqrt(squares), middle),
+                            vf_mul(inverse_least, set(1.0001f)));
+    const vf ndc = l->is_farthest ? vf_add(q, reach) : vf_sub(q, reach);
+    const vf depth = l->is_zero_to_one ? ndc : vf_fma(ndc, set(0.5f), set(0.5f));
+    return vf_add(depth, set(l->is_farthest ? 0x1p-21f : -0x1p-21f)); /* what is drawn lies in [0, 1] */
 }
 
 /* Lists meshlets [first, end) that the window may show in `seen`, and in `odd` those that draw_odd is for; returns how
@@ -181,7 +211,7 @@ static int64_t list_seen(const tl_meshlet_pass *pass, int64_t first, int64_t end
 {
     const lane_view l = place_view(pass);
     const tl_meshlets *mesh = pass->mesh;
-    const int is_culled = pass->seen->cull != TL_CULL_NONE;
+    const tl_cull cull = pass->seen->cull;
     int64_t n = 0;
     *n_odd = 0;
     for (int64_t i = first; i < end; i += TL_LANES) {
@@ -197,8 +227,16 @@ static int64_t list_seen(const tl_meshlet_pass *pass, int64_t first, int64_t end
         plain = vm_and(plain, vf_lt(b.w_max, set((float)TL_LARGEST_W)));
         const vf inverse = vf_div(set(1.0f), b.clip[3]), inverse_least = vf_div(set(1.0f), b.w_min);
         place_reach(&l, inverse_least, &b);
-        if (is_culled)
-            live = vm_and_not(live, vm_and(turned_away(&l, &b), plain));
+        const lane_eye eye = place_eye(&l, &b);
+        const vm turned = vm_and(all_turned(&l, &b, &eye, eye.along), plain);
+        unsigned is_back = cull == TL_CULL_FRONT ? ~0u : 0, is_both = 0;
+        if (cull != TL_CULL_NONE) {
+            live = vm_and_not(live, turned);
+        } else {
+            const vf other_way = vf_sub(set(0.0f), eye.along);
+            is_back = vm_bits(vf_gt(other_way, set(0.0f)));
+            is_both = ~vm_bits(vm_or(all_turned(&l, &b, &eye, other_way), turned));
+        }
         if (!vm_any(live))
             continue;
         vf at[2], reach[2];
@@ -217,14 +255,24 @@ static int64_t list_seen(const tl_meshlet_pass *pass, int64_t first, int64_t end
         for (unsigned rest = vm_bits(is_odd); rest; rest &= rest - 1)
             odd[(*n_odd)++] = (int32_t)(i + __builtin_ctz(rest));
         int32_t left[TL_LANES], below[TL_LANES], cols[TL_LANES], rows[TL_LANES];
+        float depth[TL_LANES];
         vi_store(left, vi_sub(vi_nearest(at[0]), vi_set1(TL_SLOT_PX / 2)));
         vi_store(below, vi_add(vi_nearest(at[1]), vi_set1(TL_SLOT_PX / 2)));
         vi_store(cols, vi_nearest(reach[0]));
         vi_store(rows, vi_nearest(reach[1]));
+        vf_store(depth, depth_bound(&l, &b, vf_mul(b.clip[2], inverse), inverse_least));
         for (unsigned rest = vm_bits(vm_and_not(live, is_odd)); rest; rest &= rest - 1) {
             const int k = __builtin_ctz(rest);
-            seen[n++] = (tl_seen_meshlet){(int32_t)(i + k), (int16_t)left[k], (int16_t)below[k],
-                                          (int16_t)cols[k], (int16_t)rows[k], mesh->n_triangles[i + k]};
+            seen[n++] = (tl_seen_meshlet){
+                .meshlet = (int32_t)(i + k),
+                .left_px = (int16_t)left[k],
+                .below_px = (int16_t)below[k],
+                .reach_x = (int16_t)cols[k],
+                .reach_y = (int16_t)rows[k],
+                .n_triangles = mesh->n_triangles[i + k],
+                .side = (int16_t)((is_back >> k & 1 ? TL_SIDE_BACK : 0) | (is_both >> k & 1 ? TL_SIDE_BOTH : 0)),
+                .depth = depth[k],
+            };
         }
     }
     return n;

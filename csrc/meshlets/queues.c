@@ -11,6 +11,7 @@
 #include "meshlets/batch.h"
 #include "meshlets/plane.c"
 #include "meshlets/tiny.c"
+#include "meshlets/turn.c"
 
 #if TL_HAS_HALVES
 
@@ -45,8 +46,9 @@ TL_INLINE void from_sample(const lane_boxes *b, vi col, vi row, vi *v)
         v[k] = vi_from_halves(vi_sub(b->x[k], x), vi_shift_left(vi_sub(b->y[k], y), 16));
 }
 
-/* The lanes of m and their partners. */
-TL_INLINE vm with_partners(vm m) { return (vm)(m | (m << 1 & 0xaaaa) | (m >> 1 & 0x5555)); }
+/* The partners of the lanes of m; these as well. */
+TL_INLINE vm partners(vm m) { return (vm)((m << 1 & 0xaaaa) | (m >> 1 & 0x5555)); }
+TL_INLINE vm with_partners(vm m) { return vm_or(m, partners(m)); }
 
 /* Columns, rows, and which rows [from, to) of these are the triangle's own: horizontal edges end nothing else. */
 TL_INLINE vi box_size(vi n_cols, vi n_rows, vi from, vi to)
@@ -55,8 +57,9 @@ TL_INLINE vi box_size(vi n_cols, vi n_rows, vi from, vi to)
 }
 
 /* Puts the triangles in m into queues: small ones alone, others with their partner, measured from the first sample of
- * the box of both, partners that draw nothing with size 0. */
-TL_INLINE void queue_boxes(meshlet_batch *s, vm m, const lane_boxes *b, int32_t base)
+ * the box of both, partners that draw nothing with size 0.  `folded`: the
+ * two may cover the same samples. */
+TL_INLINE void queue_boxes(meshlet_batch *s, vm m, vm folded, const lane_boxes *b, int32_t base)
 {
     const vi outside = vi_set1(1 << 20), none = vi_set1(-(1 << 20)), stride = vi_set1(s->stride_px);
     const vi left = vi_select(m, b->col0, outside), right = vi_select(m, b->col1, none);
@@ -69,10 +72,11 @@ TL_INLINE void queue_boxes(meshlet_batch *s, vm m, const lane_boxes *b, int32_t 
     vm small = vm_and_not(m, vi_gt(vi_max(own_cols, own_rows), vi_set1(TL_SMALL_PX)));
     const vm small_or_none = vm_or(small, (vm)~m); /* both small, or the only one */
     small &= (vm)((small_or_none << 1 | 0x5555) & (small_or_none >> 1 | 0xaaaa));
-    const vm fits = vm_and_not(any, vi_gt(longer, vi_set1(TL_MAX_LANE_PX)));
-    const vm apart = vm_and_not(any, fits); /* together too large: one by one */
-    const vm of_small = with_partners(small);
-    const vm middle = vm_and_not(vm_and_not(any, vi_gt(longer, vi_set1(TL_MIDDLE_PX))), of_small);
+    const vm of_small = with_partners(small), over = vm_and(folded, vm_and(m, partners(m)));
+    const vm fits = vm_and_not(vm_and_not(any, vi_gt(longer, vi_set1(TL_MAX_LANE_PX))), over);
+    /* together too large, or one over the other: one by one */
+    const vm apart = vm_and_not(vm_and_not(any, fits), of_small);
+    const vm middle = vm_and_not(vm_and_not(fits, vi_gt(longer, vi_set1(TL_MIDDLE_PX))), of_small);
     const vm rows = vm_and_not(vm_and_not(fits, of_small), middle);
     vi v[3];
     if (vm_any(small)) {
@@ -115,16 +119,17 @@ TL_INLINE void queue_larger(meshlet_batch *s, meshlet_slot *slot)
         const vi n_cols = vi_sub(b.col1, b.col0), n_rows = vi_sub(b.row1, b.row0);
         /* those with boxes up to 2x2 have been drawn */
         live = vm_and(live, vm_and(vi_gt(vi_min(n_cols, n_rows), zero), vi_gt(vi_max(n_cols, n_rows), vi_set1(2))));
+        const vi area = edge_at(vi_sub_halves(v[1], v[0]), vi_sub_halves(v[2], v[0]));
+        live = vm_and(live, vi_gt(area, zero));
         const vm is_large =
             vm_and(live, vi_gt(vi_max(vi_low_half(extent), vi_high_half(extent)), vi_set1(TL_MAX_LANE_PX * TL_PX)));
         leave_lanes(slot, is_large, triangle);
-        const vi area = edge_at(vi_sub_halves(v[1], v[0]), vi_sub_halves(v[2], v[0]));
-        live = vm_and(vm_and_not(live, is_large), vi_gt(area, zero));
+        live = vm_and_not(live, is_large);
         if (!vm_any(live))
             continue;
         for (int k = 0; k < 3; k++)
             b.x[k] = vi_low_half(v[k]), b.y[k] = vi_high_half(v[k]);
-        queue_boxes(s, live, &b, slot->base);
+        queue_boxes(s, live, is_folded(slot, b.triangle), &b, slot->base);
     }
 }
 
@@ -156,7 +161,7 @@ TL_INLINE void queue_wide(meshlet_batch *s, meshlet_slot *slot)
         live = vm_and(live, vi_gt(vi_mul(vi_sub(b.x[1], b.x[0]), vi_sub(b.y[2], b.y[0])),
                                   vi_mul(vi_sub(b.y[1], b.y[0]), vi_sub(b.x[2], b.x[0]))));
         if (vm_any(live))
-            queue_boxes(s, live, &b, slot->base);
+            queue_boxes(s, live, is_folded(slot, b.triangle), &b, slot->base);
     }
 }
 

@@ -53,6 +53,16 @@ def layered_sheet(rng):
     return np.stack([x, y, 0 * x], -1).reshape(-1, 3), np.stack([first, *(first + steps) % (side * side)], axis=1)
 
 
+def crumpled_sheet(rng):
+    """A sheet with folds at many edges: partners of a pair that show both sides, one over the other."""
+    side = 60
+    x, y = np.meshgrid(*[np.linspace(-1, 1, side)] * 2)
+    points = np.stack([x, y, np.zeros_like(x)], -1).reshape(-1, 3) + rng.normal(size=(side * side, 3)) * 0.03
+    corner = np.arange(side * side).reshape(side, side)
+    a, b, c, d = corner[:-1, :-1], corner[:-1, 1:], corner[1:, :-1], corner[1:, 1:]
+    return points, np.stack([a, c, b, b, c, d], axis=-1).reshape(-1, 3)
+
+
 def meshes():
     """Closed shapes, coarse and fine, and what no modeller would make."""
     rng = np.random.default_rng(3)
@@ -64,6 +74,7 @@ def meshes():
         "soup": shuffled_soup(rng),
         "triples": near_triples(rng),
         "sheet": layered_sheet(rng),
+        "crumpled": crumpled_sheet(rng),
     }
 
 
@@ -86,7 +97,7 @@ def cameras(rng, n):
             "transform": camera.clip_from_world(viewport) @ object_space,
             "viewport": viewport,
             "origin": tuple(int(rng.integers(-20, side - 100)) for side in viewport),
-            "cull": str(rng.choice(["back", "front"])),
+            "cull": str(rng.choice(["back", "front", "none", "none"])),
             "subpixel_bits": int(rng.choice([0, 1, 4, 7, 8, 8, 8])),
             "clip_depth": str(rng.choice(["minus_one_to_one", "zero_to_one"])),
         }
@@ -187,6 +198,23 @@ def test_balls_hold_their_vertices(name):
 
 
 @needs_meshlets
+@pytest.mark.parametrize("cull", ["back", "none"])
+@pytest.mark.parametrize("mirror", [1.0, -1.0])
+@pytest.mark.parametrize("test", ["less", "greater"])
+def test_shells_that_hide_each_other_have_the_same_bits(cull, mirror, test, drawn):
+    points, triangles = MESHES["fine"]
+    shells = [points, 0.9 * points, 1.02 * points]
+    mesh = np.concatenate(shells), np.concatenate([triangles + i * len(points) for i in range(3)]).astype(np.int32)
+    clusters = Clusters(mesh[0].astype(np.float32), mesh[1])
+    for distance in (1.3, 2.0, 3.0, 40.0):
+        camera = tl.Camera.look_at((0.3, 0.2, distance), near=0.05, far=100.0)
+        view = {"transform": camera.clip_from_world(SIZE) @ np.diag([mirror, 1.0, 1.0, 1.0]), "cull": cull}
+        expected = draw((clusters.points, mesh[1]), None, test, threads=1, **view)
+        assert_same_fragments(draw((clusters.points, mesh[1]), clusters, test, threads=2, **view), expected)
+    assert len(drawn) == 4
+
+
+@needs_meshlets
 def test_mesh_without_area_is_drawn(drawn):
     mesh = np.zeros((3, 3), np.float32), np.zeros((40, 3), np.int32)
     got = draw(mesh, Clusters(*mesh), transform=np.eye(4), cull="back")
@@ -210,7 +238,6 @@ def test_mesh_is_grown_when_it_has_been_drawn_often(monkeypatch):
 @pytest.mark.parametrize(
     ("options", "dtype"),
     [
-        ({"cull": "none"}, np.float32),
         ({"cull": "back"}, np.float64),
         ({"cull": "back", "near_clip": False}, np.float32),
         ({"cull": "back", "subpixel_bits": 9}, np.float32),
@@ -231,18 +258,24 @@ def test_scalar_kernels_have_no_meshlets():
 
 
 @pytest.mark.parametrize(
-    ("n", "outside", "front", "hidden", "pays"),
+    ("cull", "n", "outside", "front", "hidden", "pays"),
     [
-        (90_000, 0.0, 0.5, 0.0, True),
-        (90_000, 0.0, 0.9, 0.0, False),
-        (90_000, 0.0, 0.5, 0.7, False),
-        (90_000, 0.0, 0.8, 0.6, True),
-        (30_000, 0.0, 0.5, 0.0, False),
-        (30_000, 0.2, 0.5, 0.0, True),
+        ("back", 90_000, 0.0, 0.5, 0.0, True),
+        ("back", 90_000, 0.0, 0.9, 0.0, False),
+        ("back", 90_000, 0.0, 0.5, 0.7, False),
+        ("back", 90_000, 0.0, 0.8, 0.6, True),
+        ("back", 30_000, 0.0, 0.5, 0.0, False),
+        ("back", 30_000, 0.2, 0.5, 0.0, True),
+        ("none", 90_000, 0.0, 0.5, 0.5, True),
+        ("none", 90_000, 0.0, 0.5, 0.8, False),
+        ("none", 90_000, 0.0, 0.9, 0.1, False),
+        ("none", 30_000, 0.2, 0.5, 0.0, False),
+        ("none", 30_000, 0.8, 0.1, 0.0, True),
     ],
 )
-def test_meshlets_are_drawn_where_little_is_hidden(n, outside, front, hidden, pays):
-    assert choices.pays_to_draw_meshlets(n, Survey(outside, 0.0, 1 - outside - front, front), hidden) == pays
+def test_meshlets_are_drawn_where_little_is_hidden(cull, n, outside, front, hidden, pays):
+    view = View.parse(SIZE, {"cull": cull})
+    assert choices.pays_to_draw_meshlets(view, n, Survey(outside, 0.0, 1 - outside - front, front), hidden) == pays
 
 
 @pytest.mark.parametrize(("n_pictures", "n_clusters", "pays"), [(15, 100, False), (16, 100, True), (99, 350, False)])

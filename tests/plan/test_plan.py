@@ -291,6 +291,21 @@ def test_plan_of_a_mesh_counts_its_clusters():
     assert plan.scratch_bytes["clusters"] > mesh.clusters.n_bytes > 0
 
 
+@pytest.mark.skipif(not _engine.has_meshlets(), reason="no AVX-512 with VBMI, or other kernels in use")
+@pytest.mark.parametrize(("cull", "is_whole"), [("none", False), ("back", True)])
+def test_plan_of_a_mesh_tells_of_its_meshlets_and_counts_their_bytes(cull, is_whole):
+    vertices, triangles = tl.scenes.blob(100_000)
+    mesh = tl.Mesh(vertices.astype(np.float32), triangles)
+    camera = tl.Camera.look_at((0, 0, 3), near=0.01, far=100.0)
+    plan = tl.plan(mesh, camera, (1280, 720), threads=1, cull=cull)
+    row = stage(plan, "meshlets")
+    assert row.choice.startswith("from picture 16 on")
+    assert (stage(plan, "clusters").choice == "none") == is_whole
+    guess = plan.scratch_bytes["meshlets"]
+    assert guess == pytest.approx(mesh.clusters.meshlets.n_bytes, rel=0.1)
+    assert tl.plan(mesh, camera, (1280, 720), cull=cull).scratch_bytes["meshlets"] == mesh.clusters.meshlets.n_bytes
+
+
 @pytest.mark.parametrize(
     ("n_triangles", "options", "why"),
     [

@@ -160,7 +160,7 @@ cdef extern from "topleft.h" nogil:
         int may_be_hidden
         int64_t n_seen, n_drawn
     ctypedef struct tl_kernels  # the table, below
-    int TL_MESHLET_TAIL, TL_N_BOUNDS, TL_GROW_ROOM, TL_GROW_PIECE, TL_MAX_DRAWN_PX, TL_SLOT_PX
+    int TL_MESHLET_GROWN, TL_MESHLET_TAIL, TL_N_BOUNDS, TL_GROW_ROOM, TL_GROW_PIECE, TL_MAX_DRAWN_PX, TL_SLOT_PX
     ctypedef struct tl_meshlet:
         pass
     ctypedef struct tl_meshlets:
@@ -172,7 +172,8 @@ cdef extern from "topleft.h" nogil:
     ctypedef struct tl_seen_meshlet:
         int32_t meshlet
         int16_t left_px, below_px, reach_x, reach_y
-        int32_t n_triangles
+        int16_t n_triangles, side
+        float depth
     ctypedef struct tl_meshlet_pass:
         const tl_meshlets *mesh
         const tl_cluster_view *seen

@@ -1,6 +1,7 @@
 # Meshes that are grown into meshlets, and passes that draw what a view may show of them.
 
 MESHLET_BYTES = sizeof(tl_meshlet)
+MESHLET_TRIANGLES = TL_MESHLET_GROWN
 MESHLET_TAIL = TL_MESHLET_TAIL
 MESHLET_BOUNDS = TL_N_BOUNDS
 MESHLET_PIECE = TL_GROW_PIECE

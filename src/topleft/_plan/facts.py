@@ -33,6 +33,12 @@ CLASSES = (
 )  # fmt: skip
 
 
+MOST_SHOWS = "most of the mesh shows, and drawing that cluster by cluster takes longer"
+
+#: Of closed meshes: 89 triangles a meshlet.
+TRIANGLE_BYTES_OF_MESHLETS = 19.2
+
+
 @dataclass(frozen=True, slots=True)
 class ClusterFacts:
     """How the clusters of a mesh fare in a view.
@@ -45,6 +51,8 @@ class ClusterFacts:
         Why it is.
     n_outside, n_turned, n_hidden, n_drawn : int
         Clusters outside of the picture, turned away, hidden, and drawn.
+    meshlet_bytes : int
+        What meshlets take of memory, about, where pictures come to be drawn from them; else 0.
     """
 
     clusters: Clusters | None
@@ -53,6 +61,7 @@ class ClusterFacts:
     n_turned: int = 0
     n_hidden: int = 0
     n_drawn: int = 0
+    meshlet_bytes: int = 0
 
 
 class Decided(NamedTuple):
@@ -229,11 +238,27 @@ def find_cluster_facts(mesh: Mesh, view: View, verb: str, test: DepthTest | None
         return ClusterFacts(None, f"{n_triangles:,} triangles are done before sorting them would pay")
     clusters = mesh.clusters
     seen = ClusteredMesh(clusters, view)
-    if not choices.pays_to_draw_clusters(view, n_triangles, seen.survey()):
-        return ClusterFacts(None, "most of the mesh shows, and drawing that cluster by cluster takes longer")
-    n, found = len(clusters), seen.survey(len(clusters))
+    pays, n = choices.pays_to_draw_clusters(view, n_triangles, seen.survey()), len(clusters)
+    can_grow = choices.can_draw_meshlets(view, sink, clusters.points.dtype)
+    can_grow = can_grow and choices.pays_to_grow(choices.MIN_PICTURES_TO_GROW, n_triangles, n)
+    if not (pays or can_grow):
+        return ClusterFacts(None, MOST_SHOWS)
+    found = seen.survey(n)
     n_outside, n_turned, n_drawn = round(found.outside * n), round(found.turned * n), seen.count_drawn(sink)
-    return ClusterFacts(clusters, "", n_outside, n_turned, n - n_outside - n_turned - n_drawn, n_drawn)
+    n_hidden = n - n_outside - n_turned - n_drawn
+    hidden = n_hidden / max(1, n_hidden + n_drawn)
+    is_grown = can_grow and choices.pays_to_draw_meshlets(view, n_triangles, found, hidden)
+    meshlet_bytes = bytes_of_meshlets(clusters) if is_grown else 0
+    if not pays:
+        return ClusterFacts(None, MOST_SHOWS, meshlet_bytes=meshlet_bytes)
+    return ClusterFacts(clusters, "", n_outside, n_turned, n_hidden, n_drawn, meshlet_bytes)
+
+
+def bytes_of_meshlets(clusters: Clusters) -> int:
+    """Return what the meshlets of a mesh take of memory: exactly once they are grown, about before."""
+    if clusters.has_meshlets:
+        return clusters.meshlets.n_bytes
+    return round(TRIANGLE_BYTES_OF_MESHLETS * clusters.n_triangles)
 
 
 def memory_of(facts: Facts) -> tuple[dict[str, int], dict[str, int]]:
@@ -270,6 +295,8 @@ def memory_of(facts: Facts) -> tuple[dict[str, int], dict[str, int]]:
         scratch["clusters"] = 12 * len(found.clusters) + 4 * facts.drawing.n_threads * n + found.clusters.n_bytes
     elif facts.is_shared:
         scratch["others"] = 4 * (n + 16 * facts.drawing.n_threads)
+    if found is not None and found.meshlet_bytes:
+        scratch["meshlets"] = found.meshlet_bytes
     return scratch, results
 
 

@@ -75,7 +75,7 @@ def find_stages(facts: Facts, costs: Costs) -> tuple[Stage, ...]:
 def with_clusters(stages: list[Stage], found: ClusterFacts) -> list[Stage]:
     """Return the stages of a mesh that is drawn again, with one that tells what its clusters save."""
     if found.clusters is None:
-        stages.insert(1, Stage("clusters", "none", found.why_not, timed_in="method"))
+        stages[1:1] = [Stage("clusters", "none", found.why_not, timed_in="method"), *plan_meshlets(found)]
         return stages
     n, n_triangles = len(found.clusters), found.clusters.n_triangles
     names = {"outside of the picture": found.n_outside, "turned away": found.n_turned, "hidden": found.n_hidden}
@@ -102,8 +102,18 @@ def with_clusters(stages: list[Stage], found: ClusterFacts) -> list[Stage]:
             scaled.append(replace(stage, estimated_ms=total))
         else:
             scaled.append(stage)
-    scaled.insert(1, row)
+    scaled[1:1] = [row, *plan_meshlets(found)]
     return scaled
+
+
+def plan_meshlets(found: ClusterFacts) -> list[Stage]:
+    """Return the stage of a mesh that is drawn from meshlets once it has been drawn often, if it is."""
+    if not found.meshlet_bytes:
+        return []
+    choice = f"from picture {choices.MIN_PICTURES_TO_GROW} on, at most {_engine.MESHLET_TRIANGLES} triangles each"
+    why = "what is drawn so often is worth growing, once; estimates are of the pictures before"
+    rejected = ("from the first picture on: growing takes as long as a hundred of them save",)
+    return [Stage("meshlets", choice, why, rejected, timed_in="method")]
 
 
 def plural(n: int, thing: str) -> str:

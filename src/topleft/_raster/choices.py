@@ -104,14 +104,25 @@ MAX_FRONT_TO_CLUSTER = 0.8
 MIN_OUTSIDE_TO_CLUSTER = ((60_000, 0.1, 0.6), (500_000, 0.0, 0.33), (math.inf, 0.0, 0.0))
 
 #: Meshlets take 0.4 to 0.95 of the time of clusters or of the whole mesh, whichever is less, of blobs of 30,000
-#: triangles or more in every view, but for 30,000 seen whole (1.14 times). They take longer where all triangles show
-#: (hills, 1.15 times), where triangles share no vertices, of which a cluster then has 85 (soup, 1.4 times), and where
-#: much is hidden. Growing takes about three times as long as sorting clusters, which some 100 pictures pay back; a mesh
-#: that is drawn 16 times is likely to be drawn more.
+#: triangles or more in every view with culled faces, but for 30,000 seen whole (1.14 times). They take longer where all
+#: triangles show (hills, 1.15 times), where triangles share no vertices, of which a cluster then has 85 (soup, 1.4
+#: times), and where much is hidden. Of views that cull nothing they take 0.7 to 1 of it from 100,000 triangles on, of
+#: 30,000 1.1 to 1.2 but for views from inside (0.8), and where more is hidden than is said here nothing is gained.
+#: Growing takes about three times as long as sorting clusters, which some 100 pictures pay back; a mesh that is drawn
+#: 16 times is likely to be drawn more.
 MIN_PICTURES_TO_GROW = 16
 MIN_TRIANGLES_OF_CLUSTER = 150
-MAX_HIDDEN_OF_MESHLETS = 0.6
-MIN_TRIANGLES_OF_MESHLETS, MIN_OUTSIDE_OF_MESHLETS = 60_000, 0.1
+
+
+class MeshletLimits(NamedTuple):
+    """So many triangles at least, or so large a share outside; and no more hidden."""
+
+    triangles: int
+    outside: float
+    hidden: float
+
+
+CULLED_MESHLETS, MESHLETS_OF_BOTH_SIDES = MeshletLimits(60_000, 0.1, 0.6), MeshletLimits(90_000, 0.5, 0.7)
 
 #: Scenes whose instances lie so many deep, on the mean, are drawn from clusters in any case: 200 in rows, 8.8 deep, are
 #: 4 to 5.5 times as fast. Others are where so large a share is outside, with one sample and with several, for each of
@@ -243,7 +254,7 @@ def cluster_route(view: View, sink: Sink, clusters: Clusters, survey: Survey) ->
     n = clusters.n_triangles
     is_grown = can_draw_meshlets(view, sink, clusters.points.dtype)
     is_grown = is_grown and pays_to_grow(clusters.n_pictures, n, len(clusters))
-    if is_grown and pays_to_draw_meshlets(n, survey, clusters.hidden):
+    if is_grown and pays_to_draw_meshlets(view, n, survey, clusters.hidden):
         return ClusterRoute.MESHLETS
     return ClusterRoute.CLUSTERS if pays_to_draw_clusters(view, n, survey) else ClusterRoute.WHOLE
 
@@ -258,14 +269,13 @@ def pays_to_draw_clusters(view: View, n_triangles: int, survey: Survey) -> bool:
 def can_draw_meshlets(view: View, sink: Sink, dtype: np.dtype[Any]) -> bool:
     """Tell whether a view of a mesh in clusters may be drawn from meshlets, where there is code for these.
 
-    They hold float32 vertices, and draw one side of triangles, in 16 bits, of what lies between near and far.
+    They hold float32 vertices, and draw triangles in 16 bits, of what lies between near and far.
     """
     if not (_engine.has_meshlets() and sink in (Sink.NEAREST, Sink.FARTHEST) and dtype == np.float32):
         return False
     is_near = max(*view.size, *view.viewport, *map(abs, view.origin)) <= _engine.MAX_DRAWN_PX
     is_clipped = view.near_clip and view.far_clip
-    is_culled = view.cull != CULL_CODES[Cull.NONE]
-    return is_near and is_clipped and is_culled and view.subpixel_bits <= 8 and view.sampling is Sampling.CENTER
+    return is_near and is_clipped and view.subpixel_bits <= 8 and view.sampling is Sampling.CENTER
 
 
 def pays_to_grow(n_pictures: int, n_triangles: int, n_clusters: int) -> bool:
@@ -276,13 +286,14 @@ def pays_to_grow(n_pictures: int, n_triangles: int, n_clusters: int) -> bool:
     return n_pictures >= MIN_PICTURES_TO_GROW and n_triangles >= MIN_TRIANGLES_OF_CLUSTER * n_clusters
 
 
-def pays_to_draw_meshlets(n_triangles: int, survey: Survey, hidden: float) -> bool:
+def pays_to_draw_meshlets(view: View, n_triangles: int, survey: Survey, hidden: float) -> bool:
     """Tell whether a view of a mesh is drawn from meshlets; `survey`: what becomes of its clusters.
 
-    `hidden`: the share of those in view that the last picture hid. Meshlets are drawn from top to bottom, all of them.
+    `hidden`: the share of those in view that the last picture hid. Meshlets are drawn from top to bottom.
     """
-    are_small = n_triangles >= MIN_TRIANGLES_OF_MESHLETS or survey.outside >= MIN_OUTSIDE_OF_MESHLETS
-    return are_small and survey.front <= MAX_FRONT_TO_CLUSTER and hidden <= MAX_HIDDEN_OF_MESHLETS
+    limits = MESHLETS_OF_BOTH_SIDES if view.cull == CULL_CODES[Cull.NONE] else CULLED_MESHLETS
+    are_small = n_triangles >= limits.triangles or survey.outside >= limits.outside
+    return are_small and survey.front <= MAX_FRONT_TO_CLUSTER and hidden <= limits.hidden
 
 
 def pays_to_draw_instances(view: View, n_triangles: int, survey: Survey, count_layers: Callable[[], float]) -> bool:

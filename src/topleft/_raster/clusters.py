@@ -100,6 +100,11 @@ class Clusters:
         check_rows(self.triangles, len(self.points))
         return Meshlets(self)
 
+    @property
+    def has_meshlets(self) -> bool:
+        """Whether they have been made."""
+        return "meshlets" in self.__dict__
+
     def __len__(self) -> int:
         return len(self.engine)
 
