@@ -34,121 +34,61 @@ def same(found, wished):
     return found.dtype == wished.dtype and found.shape == wished.shape and found.tobytes() == wished.tobytes()
 
 
-#: What tiles are asked for, and the verb that draws the whole.
-KINDS = {
-    "labels": ({"kind": "labels"}, lambda **view: tl.rasterize(IN_PIXELS, TRIANGLES, SIZE, **view).triangle),
-    "labels farthest": (
-        {"kind": "labels", "depth_test": "greater"},
-        lambda **view: tl.rasterize(IN_PIXELS, TRIANGLES, SIZE, depth_test="greater", **view).triangle,
-    ),
-    "labels later": (
-        {"kind": "labels", "depth_test": None},
-        lambda **view: tl.rasterize(IN_PIXELS, TRIANGLES, SIZE, depth_test=None, **view).triangle,
-    ),
-    "depth": (
-        {"kind": "depth", "background_depth": 7.5},
-        lambda **view: tl.rasterize(IN_PIXELS, TRIANGLES, SIZE, background_depth=7.5, **view).depth,
-    ),
-    "coverage": ({"kind": "coverage"}, lambda **view: tl.coverage(IN_PIXELS, TRIANGLES, SIZE, **view)),
-    "coverage area": (
-        {"kind": "coverage", "sampling": "area"},
-        lambda **view: tl.coverage(IN_PIXELS, TRIANGLES, SIZE, sampling="area", **view),
-    ),
-    "coverage msaa4": (
-        {"kind": "coverage", "sampling": "msaa4"},
-        lambda **view: tl.coverage(IN_PIXELS, TRIANGLES, SIZE, sampling="msaa4", **view),
-    ),
-    "coverage outer": (
-        {"kind": "coverage", "sampling": "outer"},
-        lambda **view: tl.coverage(IN_PIXELS, TRIANGLES, SIZE, sampling="outer", **view),
-    ),
-    "coverage inner": (
-        {"kind": "coverage", "sampling": "inner"},
-        lambda **view: tl.coverage(IN_PIXELS, TRIANGLES, SIZE, sampling="inner", **view),
-    ),
-    "overdraw": ({"kind": "overdraw"}, lambda **view: tl.overdraw(IN_PIXELS, TRIANGLES, SIZE, **view)),
-    "overdraw area": (
-        {"kind": "overdraw", "sampling": "area"},
-        lambda **view: tl.overdraw(IN_PIXELS, TRIANGLES, SIZE, sampling="area", **view),
-    ),
-    "fill": (
-        {"kind": "fill", "values": COLORS, "background": (1, 2, 3, 4)},
-        lambda **view: tl.fill(IN_PIXELS, TRIANGLES, COLORS, SIZE, background=(1, 2, 3, 4), **view),
-    ),
-    "fill over": (
-        {"kind": "fill", "values": COLORS, "blend": "over"},
-        lambda **view: tl.fill(IN_PIXELS, TRIANGLES, COLORS, SIZE, blend="over", **view),
-    ),
-    "fill area": (
-        {"kind": "fill", "values": COLORS, "sampling": "area"},
-        lambda **view: tl.fill(IN_PIXELS, TRIANGLES, COLORS, SIZE, sampling="area", **view),
-    ),
-    "fill vertices": (
-        {"kind": "fill", "values": OF_VERTICES},
-        lambda **view: tl.fill(IN_PIXELS, TRIANGLES, OF_VERTICES, SIZE, **view),
-    ),
-    "fill labels": (
-        {"kind": "fill", "values": np.arange(50) + 70000, "dtype": np.int32, "background": -5},
-        lambda **view: tl.fill(
-            IN_PIXELS, TRIANGLES, np.arange(50) + 70000, SIZE, dtype=np.int32, background=-5, **view
-        ),
-    ),
-    "labels exact": (
-        {"kind": "labels", "subpixel_bits": "exact"},
-        lambda **view: tl.rasterize(IN_PIXELS, TRIANGLES, SIZE, subpixel_bits="exact", **view).triangle,
-    ),
-    "labels later exact": (
-        {"kind": "labels", "depth_test": None, "subpixel_bits": "exact"},
-        lambda **view: (
-            tl.rasterize(IN_PIXELS, TRIANGLES, SIZE, depth_test=None, subpixel_bits="exact", **view).triangle
-        ),
-    ),
-    "depth exact": (
-        {"kind": "depth", "subpixel_bits": "exact"},
-        lambda **view: tl.rasterize(IN_PIXELS, TRIANGLES, SIZE, subpixel_bits="exact", **view).depth,
-    ),
-    "coverage exact": (
-        {"kind": "coverage", "subpixel_bits": "exact"},
-        lambda **view: tl.coverage(IN_PIXELS, TRIANGLES, SIZE, subpixel_bits="exact", **view),
-    ),
-    "overdraw exact": (
-        {"kind": "overdraw", "subpixel_bits": "exact"},
-        lambda **view: tl.overdraw(IN_PIXELS, TRIANGLES, SIZE, subpixel_bits="exact", **view),
-    ),
-    "field exact": (
-        {"kind": "field", "values": OF_VERTICES, "subpixel_bits": "exact"},
-        lambda **view: tl.field((POINTS, TRIANGLES), OF_VERTICES, GRID, subpixel_bits="exact", **view),
-    ),
-    "height_map exact": (
-        {"kind": "height_map", "subpixel_bits": "exact"},
-        lambda **view: tl.height_map((POINTS, TRIANGLES), GRID, subpixel_bits="exact", **view),
-    ),
-    "fill exact": (
-        {"kind": "fill", "values": COLORS, "subpixel_bits": "exact"},
-        lambda **view: tl.fill(IN_PIXELS, TRIANGLES, COLORS, SIZE, subpixel_bits="exact", **view),
-    ),
-    "field": (
-        {"kind": "field", "values": OF_VERTICES},
-        lambda **view: tl.field((POINTS, TRIANGLES), OF_VERTICES, GRID, **view),
-    ),
-    "field of faces": (
-        {"kind": "field", "values": np.arange(50, dtype=np.int16), "nodata": -1},
-        lambda **view: tl.field((POINTS, TRIANGLES), np.arange(50, dtype=np.int16), GRID, nodata=-1, **view),
-    ),
-    "height_map": ({"kind": "height_map"}, lambda **view: tl.height_map((POINTS, TRIANGLES), GRID, **view)),
-    "height_map lower": (
-        {"kind": "height_map", "surface": "lower"},
-        lambda **view: tl.height_map((POINTS, TRIANGLES), GRID, surface="lower", **view),
-    ),
+#: The verb that draws the whole, by what tiles are asked for.
+VERBS = {
+    "labels": lambda **how: tl.rasterize(IN_PIXELS, TRIANGLES, SIZE, **how).triangle,
+    "depth": lambda **how: tl.rasterize(IN_PIXELS, TRIANGLES, SIZE, **how).depth,
+    "coverage": lambda **how: tl.coverage(IN_PIXELS, TRIANGLES, SIZE, **how),
+    "overdraw": lambda **how: tl.overdraw(IN_PIXELS, TRIANGLES, SIZE, **how),
+    "fill": lambda values, **how: tl.fill(IN_PIXELS, TRIANGLES, values, SIZE, **how),
+    "field": lambda values, **how: tl.field((POINTS, TRIANGLES), values, GRID, **how),
+    "height_map": lambda **how: tl.height_map((POINTS, TRIANGLES), GRID, **how),
 }
+
+#: Options of each, by a name that begins with the verb's.
+KINDS = {
+    "labels": {},
+    "labels farthest": {"depth_test": "greater"},
+    "labels later": {"depth_test": None},
+    "depth": {"background_depth": 7.5},
+    "coverage": {},
+    "coverage area": {"sampling": "area"},
+    "coverage msaa4": {"sampling": "msaa4"},
+    "coverage outer": {"sampling": "outer"},
+    "coverage inner": {"sampling": "inner"},
+    "overdraw": {},
+    "overdraw area": {"sampling": "area"},
+    "fill": {"values": COLORS, "background": (1, 2, 3, 4)},
+    "fill over": {"values": COLORS, "blend": "over"},
+    "fill area": {"values": COLORS, "sampling": "area"},
+    "fill vertices": {"values": OF_VERTICES},
+    "fill labels": {"values": np.arange(50) + 70000, "dtype": np.int32, "background": -5},
+    "labels exact": {"subpixel_bits": "exact"},
+    "labels later exact": {"depth_test": None, "subpixel_bits": "exact"},
+    "depth exact": {"subpixel_bits": "exact"},
+    "coverage exact": {"subpixel_bits": "exact"},
+    "overdraw exact": {"subpixel_bits": "exact"},
+    "field exact": {"values": OF_VERTICES, "subpixel_bits": "exact"},
+    "height_map exact": {"subpixel_bits": "exact"},
+    "fill exact": {"values": COLORS, "subpixel_bits": "exact"},
+    "field": {"values": OF_VERTICES},
+    "field of faces": {"values": np.arange(50, dtype=np.int16), "nodata": -1},
+    "height_map": {},
+    "height_map lower": {"surface": "lower"},
+}
+
+
+def asked(name, **view):
+    """What tiles are asked for, and the whole that the verb draws."""
+    kind, options = name.split()[0], KINDS[name] | view
+    return {"kind": kind, **options}, VERBS[kind](**options)
 
 
 @pytest.mark.parametrize("name", KINDS)
 @pytest.mark.parametrize("window", [7, (32, 16), 100])
 def test_stitched_windows_are_the_whole(name, window):
-    options, whole = KINDS[name]
+    options, wished = asked(name)
     raster = tl.tiles((POINTS, TRIANGLES), GRID, window=window, **options)
-    wished = whole()
     assert (raster.shape, raster.dtype) == (wished.shape, wished.dtype)
     assert same(stitched(raster), wished)
 
@@ -156,8 +96,8 @@ def test_stitched_windows_are_the_whole(name, window):
 @pytest.mark.parametrize("name", ["labels", "coverage", "overdraw area", "fill"])
 @pytest.mark.parametrize("view", [{"subpixel_bits": 0}, {"subpixel_bits": 16}, {"cull": "back"}])
 def test_options_of_verbs_are_kept(name, view):
-    options, whole = KINDS[name]
-    assert same(stitched(tl.tiles((POINTS, TRIANGLES), GRID, window=16, **options, **view)), whole(**view))
+    options, wished = asked(name, **view)
+    assert same(stitched(tl.tiles((POINTS, TRIANGLES), GRID, window=16, **options)), wished)
 
 
 @given(

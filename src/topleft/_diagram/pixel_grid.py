@@ -210,7 +210,7 @@ def draw_samples(sampling: Sampling, width: int, height: int, scale: int) -> Ite
     if sampling in (Sampling.AREA, Sampling.OUTER, Sampling.INNER):
         raise ValueError(f"sampling {str(sampling)!r} has no samples to mark")
     n = sampling.n_samples
-    offsets = [(0.5, 0.5)] if n == 1 else (0.5 + sample_positions(n, 8) / 256).tolist()
+    offsets = (0.5 + sample_positions(n, 8) / 256).tolist()
     radius = max(0.75, scale / (16 if n <= 4 else 24))
     for row, column in np.ndindex(height, width):
         for x, y in offsets:

@@ -66,6 +66,13 @@ def draw_cloud(
     return draw_points(FRESH, positions, sizes_px(cloud, camera, frame), PointShape(cloud.shape), view)
 
 
+def draw_share(cloud: Points, camera: Camera, size: tuple[int, int], **options: Any) -> npt.NDArray[Any]:
+    """Where points are, (H, W): bool, or of several samples a pixel the share, float32; options as for `draw_cloud`."""
+    frags = draw_cloud(cloud, camera, size, **options)
+    is_seen = frags.samples_triangle >= 0
+    return frags.mask if is_seen.shape[-1] == 1 else is_seen.mean(axis=-1, dtype=np.float32)
+
+
 def through_lens(positions: npt.NDArray[Any], camera: Camera, frame: tuple[int, int]) -> F64:
     """Where the points lie in the picture of a lens: pixels and depth (N, 3)."""
     eye = moved(positions, camera.view)
@@ -230,8 +237,7 @@ def silhouette(buffer: CloudBuffer) -> npt.NDArray[Any]:
     sampling = buffer.look.get("sampling", "center")
     if sampling == "center":
         return buffer.frags.mask
-    frags = draw_cloud(buffer.subject, buffer.camera, buffer.size, sampling=sampling, **buffer.options)
-    return (frags.samples_triangle >= 0).mean(axis=-1, dtype=np.float32)
+    return draw_share(buffer.subject, buffer.camera, buffer.size, sampling=sampling, **buffer.options)
 
 
 def alpha(buffer: CloudBuffer) -> U8:

@@ -5,7 +5,7 @@ Input: positions in pixels or clip space, sizes. Output: `PointFragments`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any, Unpack
 
 import numpy as np
@@ -207,9 +207,7 @@ def draw_points(
         return frags
     records = snap_points(memory, array, source, view) if is_near else np.empty(0, np.uint8)
     sizes = sizes_in_fx(sizes_px, view.grid_bits)
-    samples: Sequence[tuple[int, int]] = [(0, 0)]
-    if n_samples > 1:
-        samples = [(x, y) for x, y in sample_positions(n_samples, view.grid_bits).tolist()]
+    samples: list[tuple[int, int]] = sample_positions(n_samples, view.grid_bits).tolist()
     sink = Sink.FARTHEST if is_farthest else Sink.NEAREST
     for at, own_ids, own_depth in zip(samples, ids, depth, strict=True):
         target = _engine.Target(sink, own_ids, own_depth, None)

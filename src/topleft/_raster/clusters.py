@@ -59,6 +59,8 @@ class Clusters:
         The share of the clusters in view that the last one hid.
     own_points : ndarray, shape (N, 3)
         The vertices cluster by cluster, those on borders several times, and some rows that may be read past the end.
+    n_bytes : int
+        How much memory the copy takes.
     """
 
     def __init__(self, points: NDArray[Any], triangles: NDArray[np.int32], threads: int | None = None) -> None:
@@ -90,7 +92,7 @@ class Clusters:
         self.engine = _engine.Clustered(records, group_boxes, own_corners, order)
         self._records, self.order = records, order
         arrays = self.own_points, records, group_boxes, own_corners, order
-        self._n_bytes = sum(array.nbytes for array in arrays)
+        self.n_bytes = sum(array.nbytes for array in arrays)
 
     @cached_property
     def meshlets(self) -> Meshlets:
@@ -105,11 +107,6 @@ class Clusters:
 
     def __len__(self) -> int:
         return len(self.engine)
-
-    @property
-    def n_bytes(self) -> int:
-        """How much memory the copy takes."""
-        return self._n_bytes
 
     @property
     def n_triangles(self) -> int:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, Literal, NamedTuple, cast, overload
+from typing import Any, Literal, cast, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike, NDArray
 from topleft._base.arrays import as_array, as_checked_triangles, as_out, as_triangles
 from topleft._base.memory import FRESH, empty
 from topleft._base.threads import available_threads, run_parts
-from topleft._raster.clusters import Clusters
 from topleft._raster.fragments import Fragments
 from topleft._raster.rasterize import Asked, draw_fragments, refuse_many
 from topleft._raster.view import Planned, View, ViewOptions
@@ -254,21 +253,12 @@ def draw_batch(
     return FragmentsBatch.stacked(drawn, view.size)
 
 
-class PlanOfPoses(NamedTuple):
+class PlanOfPoses(Planned):
     """A plan whose triangles many poses use at once: it notes no times, and draws no clusters."""
 
-    plan: Planned
-
-    def fitted(self, view: View) -> View:
-        """Return the view: it has been fitted."""
-        return view
+    def __init__(self, plan: Planned) -> None:
+        self._plan = plan
 
     def triangles_of(self, triangles: ArrayLike, n_vertices: int) -> NDArray[np.int32]:
         """Return the plan's own triangles, as `Planned` does."""
-        return self.plan.triangles_of(triangles, n_vertices)
-
-    def find_clusters(self, vertices: ArrayLike) -> Clusters | None:
-        """Return None."""
-
-    def mark(self, stage: str) -> None:
-        """Note nothing: stages of several poses overlap."""
+        return self._plan.triangles_of(triangles, n_vertices)

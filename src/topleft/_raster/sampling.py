@@ -16,6 +16,7 @@ __all__ = ["SAMPLE_GRID_BITS", "draw_means", "draw_planes", "sample_positions", 
 
 #: From the centre of the pixel, x right and y down, in sixteenths of a pixel: the standard patterns of Direct3D 11.
 POSITIONS: dict[int, tuple[tuple[int, int], ...]] = {
+    1: ((0, 0),),
     2: ((4, 4), (-4, -4)),
     4: ((-2, -6), (6, -2), (-6, 2), (2, 6)),
     8: ((1, -3), (-1, 3), (5, 1), (-3, -5), (-5, 5), (-7, -1), (3, 7), (7, -7)),

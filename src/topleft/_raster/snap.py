@@ -47,12 +47,13 @@ class Input(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Snapped:
-    """A mesh after the snap: ready to be drawn into any buffer of the view's size."""
+    """A mesh after the snap, or without one in `mesh.exact`: ready to be drawn into any buffer of the view's size."""
 
     mesh: _engine.SnappedMesh
     given: Input
     records: NDArray[np.uint8]  # `tl_vertex` in csrc
     pieces: _engine.Pieces | None
+    can_share: bool = True  # whether threads can each take some of the triangles
 
     @property
     def n_vertices(self) -> int:
@@ -65,35 +66,15 @@ class Snapped:
         return len(self.given.triangles)
 
     @property
-    def can_share(self) -> bool:
-        """Whether threads can each take some of the triangles."""
-        return True
-
-    @property
     def has_depth(self) -> bool:
         """Whether vertices have a depth of their own; otherwise all of them lie at 0."""
         return self.given.source.is_clip_space or self.given.points.shape[1] == 3
 
     def check_indices(self) -> None:
-        """Raise an error for the first triangle that names a vertex that does not exist."""
+        """Raise an error for the first triangle with an index or a vertex that cannot be drawn, if one was not."""
         self.given.check_indices()
-
-
-@dataclass(frozen=True, slots=True)
-class Unsnapped(Snapped):
-    """A mesh whose vertices stay where they are: `mesh.exact` has them."""
-
-    has_pieces: bool = False  # of triangles that a clip plane cuts
-
-    @property
-    def can_share(self) -> bool:
-        """Whether threads can each take some of the triangles."""
-        return not self.has_pieces
-
-    def check_indices(self) -> None:
-        """Raise an error for the first triangle with an index or a vertex that cannot be drawn."""
-        self.given.check_indices()
-        check_finite(self.given.points, self.given.triangles, with_depth=False)
+        if self.mesh.exact is not None:  # whose vertices were not looked at before
+            check_finite(self.given.points, self.given.triangles, with_depth=False)
 
 
 class Vertices(NamedTuple):
@@ -192,7 +173,7 @@ def snap_input(memory: Memory, given: Input, view: View, *, with_depth: bool, mu
     return Snapped(without_sides(made, indices if n else indices[:0], view), given, records, pieces)
 
 
-def snap_for_floats(memory: Memory, given: Input, view: View, *, must_check: bool) -> Unsnapped | None:
+def snap_for_floats(memory: Memory, given: Input, view: View, *, must_check: bool) -> Snapped | None:
     """Return pixels rounded to the grid as float64; None for clip space, and where a vertex leaves the range."""
     points, source, indices = given.points, given.source, given.triangles
     if source.is_clip_space or not len(points) or 0 in view.size:
@@ -208,7 +189,7 @@ def snap_for_floats(memory: Memory, given: Input, view: View, *, must_check: boo
     return unsnapped(given, taken, indices, None, view, None)
 
 
-def take_mesh(memory: Memory, given: Input, view: View, *, with_depth: bool, must_check: bool) -> Unsnapped:
+def take_mesh(memory: Memory, given: Input, view: View, *, with_depth: bool, must_check: bool) -> Snapped:
     """Take arrays as they are: for ``subpixel_bits="exact"``.
 
     Indices and positions are checked while drawing, or here where an error may not leave a trace in the caller's `out`.
@@ -226,7 +207,7 @@ def take_mesh(memory: Memory, given: Input, view: View, *, with_depth: bool, mus
     return unsnapped(given, taken, indices if n else indices[:0], None, view, None)
 
 
-def project_mesh(memory: Memory, given: Input, view: View, *, must_check: bool) -> Unsnapped:
+def project_mesh(memory: Memory, given: Input, view: View, *, must_check: bool) -> Snapped:
     """Take clip space to pixels, and cut triangles, without a snap."""
     points, source, indices = given.points, given.source, given.triangles
     n, viewport = len(points), view.engine_viewport()
@@ -255,7 +236,7 @@ def unsnapped(
     pieces: _engine.ExactPieces | None,
     view: View,
     viewport: _engine.Viewport | None,
-) -> Unsnapped:
+) -> Snapped:
     """Return a mesh of points in pixels, without the sides that are not drawn."""
 
     def made(triangles: NDArray[np.int32], how: How) -> _engine.SnappedMesh:
@@ -263,7 +244,7 @@ def unsnapped(
         return _engine.SnappedMesh(given.source, NO_RECORDS, None, triangles, None, how, viewport, exact=exact)
 
     mesh = without_sides(made, triangles, view)
-    return Unsnapped(mesh, given, NO_RECORDS, None, has_pieces=pieces is not None)
+    return Snapped(mesh, given, NO_RECORDS, None, can_share=pieces is None)
 
 
 def take_points(memory: Memory, given: Input, n: int, *, must_check: bool) -> tuple[NDArray[np.float64], int]:

@@ -32,12 +32,14 @@ class Planned(Protocol):
 
     def fitted(self, view: View) -> View:
         """Return the view with what was chosen for it, or raise an error where the plan is for another one."""
+        return replace(view, plan=self)
 
     def triangles_of(self, triangles: ArrayLike, n_vertices: int) -> NDArray[np.int32]:
         """Return the checked int32 triangles, or raise an error where the plan is for others."""
 
-    def find_clusters(self, vertices: ArrayLike) -> Clusters | None:
+    def find_clusters(self, vertices: ArrayLike) -> Clusters | None:  # noqa: ARG002
         """Return vertices and triangles in clusters, if the plan is for a mesh that does not change and has these."""
+        return None
 
     def mark(self, stage: str) -> None:  # noqa: ARG002
         """Note that a stage has ended: nothing, unless a plan measures."""

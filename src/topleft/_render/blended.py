@@ -32,7 +32,7 @@ from topleft._raster.view import View
 from topleft._render.fragments import SceneFragments, parts_of
 from topleft._render.instances import PlacedScene, draw_nearest, place
 from topleft._render.scene_shade import shade_by, shade_part
-from topleft._scene.scene import Instance, Scene, meshes_of, scene_of
+from topleft._scene.scene import Scene, collapsed, meshes_of, scene_of
 from topleft._shade.shade import Shading, ShadingOptions
 
 __all__ = ["Glass", "blended_masks", "glass_of"]
@@ -93,24 +93,6 @@ def glass_of(
     if placed.bent is not None:  # the parts that a lens makes of the triangles
         masks = [mask if mask is None else mask[bent.source] for mask, bent in zip(masks, placed.bent, strict=True)]
     return Glass(placed, view, masks, camera, options)
-
-
-def collapsed(scene: Scene, masks: Sequence[Mask | None], *, keeps_others: bool = True) -> Scene:
-    """The scene with these triangles collapsed to points, so ids stay; other instances whole, or all of them."""
-    made: dict[int, Mesh] = {}
-    instances = []
-    for instance, mask in zip(scene, masks, strict=True):
-        mesh = instance.mesh
-        if mask is None and keeps_others:
-            instances.append(instance)
-            continue
-        if id(mesh) not in made:
-            if mask is None:
-                made[id(mesh)] = Mesh(mesh.vertices[mesh.triangles[:1, 0]], np.zeros_like(mesh.triangles))
-            else:
-                made[id(mesh)] = Mesh(mesh.vertices, np.where(mask[:, None], mesh.triangles[:, :1], mesh.triangles))
-        instances.append(Instance(made[id(mesh)], instance.transform))
-    return Scene(instances)
 
 
 class Glass:

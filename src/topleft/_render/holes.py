@@ -22,7 +22,7 @@ from topleft._raster.fragments import Fragments
 from topleft._render.bend import BentMesh
 from topleft._render.fragments import BentFragments, SceneFragments, drawn_of
 from topleft._render.instances import PlacedScene
-from topleft._scene.scene import Instance, Scene, meshes_of, scene_of
+from topleft._scene.scene import Scene, collapsed, meshes_of, scene_of
 from topleft._shade.alpha_test import Cut, cut_of, cut_out, draw_cut
 
 __all__ = ["Holed", "cut_scene", "draw_holed", "has_cuts", "holed_instances", "solid_scene", "without_holes"]
@@ -71,10 +71,8 @@ def holed_instances(
 
 def solid_scene(scene: Scene, holed: Sequence[Holed]) -> Scene:
     """The scene without the triangles that have holes; ids stay."""
-    instances = list(scene)
-    for i, _, _, cut in holed:
-        instances[i] = Instance(cut.solid(instances[i].mesh), instances[i].transform)
-    return Scene(instances)
+    cuts = {one.i: one.cut.is_cut for one in holed}
+    return collapsed(scene, [cuts.get(i) for i in range(len(scene))])
 
 
 def cut_scene(frags: SceneFragments, holed: Sequence[Holed], threads: int | None) -> SceneFragments:

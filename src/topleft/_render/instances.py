@@ -294,7 +294,7 @@ def draw_nearest(placed: PlacedScene, view: View, test: DepthTest | None = Depth
     """Return the visibility buffer of what `place` returned."""
     sink = {None: Sink.PAINT, DepthTest.LESS: Sink.NEAREST, DepthTest.GREATER: Sink.FARTHEST}[test]
     (width, height), n = view.size, view.sampling.n_samples
-    positions = [(0, 0)] if n == 1 else [(x, y) for x, y in sample_positions(n, view.grid_bits).tolist()]
+    positions: list[tuple[int, int]] = list(map(tuple, sample_positions(n, view.grid_bits).tolist()))
     check_fits((n, height, width), np.int32, np.float32)
     ids: NDArray[np.int32] = FRESH.empty("ids", (n, height, width), np.int32)
     depth: NDArray[np.float32] = FRESH.empty("depth", (n, height, width), np.float32)

@@ -7,14 +7,13 @@ from __future__ import annotations
 
 from typing import Any, Unpack
 
-import numpy as np
 import numpy.typing as npt
 
 from topleft._base.arrays import as_out, as_size
 from topleft._camera.camera import CameraLike, camera_for
 from topleft._lod.detail import detailed
 from topleft._model.points import Points
-from topleft._points.cloud import draw_cloud
+from topleft._points.cloud import draw_share
 from topleft._raster.verbs import coverage
 from topleft._raster.view import WindowOptions
 from topleft._render.instances import draw_scene_coverage
@@ -92,9 +91,7 @@ def silhouette(
     size, subject = as_size(size), as_subject(mesh)
     camera = camera_for(subject, camera, size)
     if isinstance(subject, Points):
-        frags = draw_cloud(subject, camera, size, sampling=sampling, cull=cull, threads=threads, **view)
-        is_seen = frags.samples_triangle >= 0
-        found = frags.mask if is_seen.shape[-1] == 1 else is_seen.mean(axis=-1, dtype=np.float32)
+        found = draw_share(subject, camera, size, sampling=sampling, cull=cull, threads=threads, **view)
         if out is None:
             return found
         result = as_out("out", out, found.shape, found.dtype.type)

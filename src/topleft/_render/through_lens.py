@@ -5,7 +5,6 @@ Input: `Mesh` or `Scene`, a camera with or without lens. Output: `DrawnMesh` or 
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -65,10 +64,6 @@ class StaticPlan(Planned):
 
     def __init__(self, mesh: Mesh) -> None:
         self._mesh = mesh
-
-    def fitted(self, view: View) -> View:
-        """Return the view with this plan."""
-        return replace(view, plan=self)
 
     def triangles_of(self, triangles: ArrayLike, n_vertices: int) -> NDArray[np.int32]:  # noqa: ARG002
         """Return the triangles of the mesh, which has checked them."""

@@ -7,7 +7,7 @@ Input: meshes and matrices; or whatever a caller gives to be drawn, a path, say.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from html import escape
@@ -23,7 +23,7 @@ from topleft._model.points import Points
 from topleft._raster.clusters import Backoff
 from topleft._scene.adapt import MeshLike, as_mesh, is_mesh_like
 
-__all__ = ["Instance", "Scene", "as_meshes", "as_subject", "meshes_of", "scene_of"]
+__all__ = ["Instance", "Scene", "as_meshes", "as_subject", "collapsed", "meshes_of", "scene_of"]
 
 F64 = npt.NDArray[np.float64]
 
@@ -259,3 +259,21 @@ def meshes_of(subject: Mesh | Scene) -> list[Mesh]:
 def scene_of(subject: Mesh | Scene) -> Scene:
     """The scene, or that of a mesh alone."""
     return subject if isinstance(subject, Scene) else Scene([subject])
+
+
+def collapsed(scene: Scene, masks: Sequence[npt.NDArray[np.bool_] | None], *, keeps_others: bool = True) -> Scene:
+    """The scene with these triangles collapsed to points, so ids stay; other instances whole, or all of them."""
+    made: dict[int, Mesh] = {}
+    instances = []
+    for instance, mask in zip(scene, masks, strict=True):
+        mesh = instance.mesh
+        if mask is None and keeps_others:
+            instances.append(instance)
+            continue
+        if id(mesh) not in made:
+            if mask is None:
+                made[id(mesh)] = Mesh(mesh.vertices[mesh.triangles[:1, 0]], np.zeros_like(mesh.triangles))
+            else:
+                made[id(mesh)] = Mesh(mesh.vertices, np.where(mask[:, None], mesh.triangles[:, :1], mesh.triangles))
+        instances.append(Instance(made[id(mesh)], instance.transform))
+    return Scene(instances)

@@ -44,10 +44,6 @@ class Cut:
         """The same of parts of triangles."""
         return Cut(self.materials, None if self.rows is None else self.rows[source], self.is_cut[source])
 
-    def solid(self, mesh: Mesh) -> Mesh:
-        """The mesh with triangles of no area in the place of those with holes: ids stay."""
-        return Mesh(mesh.vertices, np.where(self.is_cut[:, None], mesh.triangles[:, :1], mesh.triangles))
-
 
 def cut_of(mesh: Mesh, material: Material | None = None) -> Cut | None:
     """What the materials of a mesh, or this one, cut out of it; None if nothing."""
