@@ -149,7 +149,7 @@ TL_INLINE void flush_boxes(exact_state *s, exact_queue *queue, int size, tl_sink
                 z_tiny[row] = row_depth(&p, &t, row);
             n_fragments = emit_tiny(s, sink, in, sample, id, z_tiny, z_col, n_fragments);
             if (n_fragments > TL_FRAGMENTS) {
-                flush_fragments(s->target, sink, &s->fragments, n_fragments);
+                flush_fragments(s->target, &s->fragments, n_fragments);
                 n_fragments = 0;
             }
             continue;
@@ -164,7 +164,7 @@ TL_INLINE void flush_boxes(exact_state *s, exact_queue *queue, int size, tl_sink
                                        vi_add(sample, vi_set1(row * stride + col)), id,
                                        sink_has_depth(sink) ? sum_depth(z_row, z_col[col]) : vf_set1(0.0f));
             if ((row & 1) == 1 && n_fragments > TL_FRAGMENTS) {
-                flush_fragments(s->target, sink, &s->fragments, n_fragments);
+                flush_fragments(s->target, &s->fragments, n_fragments);
                 n_fragments = 0;
             }
         }
@@ -177,7 +177,7 @@ TL_INLINE void flush_boxes(exact_state *s, exact_queue *queue, int size, tl_sink
 TL_INLINE void flush_tiny_exact(exact_state *s, tl_sink sink) { flush_boxes(s, &s->tiny, 2, sink); }
 TL_INLINE void flush_small_exact(exact_state *s, tl_sink sink) { flush_boxes(s, &s->small, TL_SMALL_BOX, sink); }
 
-TL_SINK_COPIES(flush_tiny_exact, (exact_state * s), s)
-TL_SINK_COPIES(flush_small_exact, (exact_state * s), s)
+TL_LIST_COPIES(flush_tiny_exact, (exact_state * s), s)
+TL_LIST_COPIES(flush_small_exact, (exact_state * s), s)
 
 #endif
