@@ -102,11 +102,11 @@ static __attribute__((noinline)) void ask_boxes(exact_state *s, lane_exact *t, v
 }
 
 /* Writes a full list out; returns its length. */
-TL_INLINE int make_exact_room(exact_state *s, tl_sink sink, int n)
+TL_INLINE int make_exact_room(exact_state *s, int n)
 {
     if (n <= TL_FRAGMENTS)
         return n;
-    flush_fragments(s->target, sink, &s->fragments, n);
+    flush_fragments(s->target, &s->fragments, n);
     return 0;
 }
 
@@ -169,7 +169,7 @@ TL_INLINE int draw_exact_boxes(exact_state *s, tl_sink sink, lane_exact *t, vi n
         for (int row = 0; sink_has_depth(sink) && row < 2; row++)
             z_tiny[row] = row_depth(&p, t, row);
         n = emit_tiny(s, sink, in, sample, id, z_tiny, z_col, n);
-        return make_exact_room(s, sink, n);
+        return make_exact_room(s, n);
     }
     for (int row = 0; row < size; row++) {
         vd z_row;
@@ -180,7 +180,7 @@ TL_INLINE int draw_exact_boxes(exact_state *s, tl_sink sink, lane_exact *t, vi n
                 n = emit(&s->fragments, n, sink, in[row][col], vi_add(sample, vi_set1(row * stride + col)), id,
                          sink_has_depth(sink) ? sum_depth(z_row, z_col[col]) : vf_set1(0.0f));
         if ((row & 1) == 1)
-            n = make_exact_room(s, sink, n);
+            n = make_exact_room(s, n);
     }
     return n;
 }
@@ -201,6 +201,6 @@ TL_INLINE void flush_small_exact(exact_state *s, tl_sink sink)
     s->fragments.n = n_fragments;
 }
 
-TL_SINK_COPIES(flush_small_exact, (exact_state * s), s)
+TL_LIST_COPIES(flush_small_exact, (exact_state * s), s)
 
 #endif

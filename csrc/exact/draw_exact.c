@@ -150,7 +150,7 @@ TL_INLINE void push_exact(exact_queue *queue, vm m, const exact_batch *b, vi id,
 /* Fewer boxes of up to 2x2 samples wait with the small ones; others are tested where they are. */
 #define TL_FEW_TINY ((TL_LANES + 3) / 4)
 
-TL_INLINE void draw_tiny_exact(exact_state *s, tl_sink sink, const exact_batch *b, vi id, vm tiny, vf xy)
+TL_INLINE void draw_tiny_exact(exact_state *s, const exact_batch *b, vi id, vm tiny, vf xy, tl_sink sink)
 {
     lane_exact t;
     for (int k = 0; k < 3; k++) {
@@ -162,6 +162,8 @@ TL_INLINE void draw_tiny_exact(exact_state *s, tl_sink sink, const exact_batch *
     place_exact(s, sink, b->col, b->row, xy, &t);
     s->fragments.n = draw_exact_boxes(s, sink, &t, b->n_cols, b->n_rows, 2, s->fragments.n);
 }
+
+TL_LIST_COPIES(draw_tiny_exact, (exact_state * s, const exact_batch *b, vi id, vm tiny, vf xy), s, b, id, tiny, xy)
 
 TL_INLINE void draw_exact_batch(exact_state *s, tl_sink sink, const int32_t *corners, vi id, vm live)
 {
@@ -190,23 +192,23 @@ TL_INLINE void draw_exact_batch(exact_state *s, tl_sink sink, const int32_t *cor
     const vm beyond = vm_or(vi_gt(b.n_cols, vi_set1(TL_LANES)), vi_gt(b.n_rows, vi_set1(TL_MIDDLE_BOX)));
     const vm middle = vm_and_not(over, beyond), rows = vm_and(over, beyond);
     if (__builtin_popcount(vm_bits(tiny)) >= TL_FEW_TINY) {
-        draw_tiny_exact(s, sink, &b, id, tiny, xy);
+        TL_LIST_CALL(draw_tiny_exact, sink, s, &b, id, tiny, xy)
         small = vm_and_not(small, tiny);
     }
     if (vm_any(small)) {
         push_exact(&s->small, small, &b, id, xy);
         if (TL_IS_FULL(s->small))
-            TL_SINK_CALL(flush_small_exact, sink, s)
+            TL_LIST_CALL(flush_small_exact, sink, s)
     }
     if (vm_any(middle)) {
         push_exact(&s->middle, middle, &b, id, xy);
         if (TL_IS_FULL(s->middle))
-            TL_SINK_CALL(flush_middle_exact, sink, s)
+            TL_LIST_CALL(flush_middle_exact, sink, s)
     }
     if (vm_any(rows)) {
         push_exact(&s->rows, rows, &b, id, xy);
         if (TL_IS_FULL(s->rows))
-            TL_SINK_CALL(flush_rows_exact, sink, s)
+            TL_LIST_CALL(flush_rows_exact, sink, s)
     }
 }
 
@@ -247,10 +249,10 @@ static void start_exact(exact_state *s, const tl_snapped *mesh, const tl_window 
 }
 
 /* The triangles [n_whole, end) are pieces. */
-TL_INLINE void draw_exact_scene(const tl_snapped *mesh, int64_t n_whole, const tl_window *window,
-                                const tl_target *target, tl_share *share, tl_exact_counts *counts, int64_t *bad_row,
-                                tl_sink sink)
+TL_ONCE void draw_exact_scene(const tl_snapped *mesh, int64_t n_whole, const tl_window *window, const tl_target *target,
+                              tl_share *share, tl_exact_counts *counts, int64_t *bad_row)
 {
+    const tl_sink sink = target->sink;
     const int takes_lanes = is_near_0(window);
     exact_state s;
     int is_given_up = 0;
@@ -272,20 +274,15 @@ TL_INLINE void draw_exact_scene(const tl_snapped *mesh, int64_t n_whole, const t
         if (__builtin_expect(s.n_slivers > 0, 0))
             draw_slivers(&s, sink);
     }
-    TL_SINK_CALL(flush_small_exact, sink, &s)
-    TL_SINK_CALL(flush_middle_exact, sink, &s)
-    TL_SINK_CALL(flush_rows_exact, sink, &s)
+    TL_LIST_CALL(flush_small_exact, sink, &s)
+    TL_LIST_CALL(flush_middle_exact, sink, &s)
+    TL_LIST_CALL(flush_rows_exact, sink, &s)
     draw_slivers(&s, sink);
-    flush_fragments(target, sink, &s.fragments, s.fragments.n);
+    flush_fragments(target, &s.fragments, s.fragments.n);
     if (counts_pieces && s.bad_row < 0)
         count_pieces(&s, max64(share->first, n_whole), share->end);
     *bad_row = s.bad_row;
 }
-
-TL_SINK_COPIES(draw_exact_scene,
-               (const tl_snapped *mesh, int64_t n_whole, const tl_window *window, const tl_target *target,
-                tl_share *share, tl_exact_counts *counts, int64_t *bad_row),
-               mesh, n_whole, window, target, share, counts, bad_row)
 
 /* The mesh with the triangles that are drawn: without those that planes cut, with the pieces behind the others. */
 static tl_snapped drawn_mesh(const tl_snapped *snapped)
@@ -307,7 +304,7 @@ static int64_t draw_exact(const tl_snapped *snapped, const tl_window *band, cons
     int64_t bad_row = -1;
     own.end = has_all ? drawn.n_triangles : share->end;
     if (own.first < own.end)
-        TL_SINK_CALL(draw_exact_scene, part->sink, &drawn, snapped->n_triangles, band, part, &own, &counts, &bad_row)
+        draw_exact_scene(&drawn, snapped->n_triangles, band, part, &own, &counts, &bad_row);
     share->n_others = own.n_others;
     if (share->counts) {
         share->counts->n_triangles += counts.n_triangles;

@@ -235,25 +235,23 @@ static __attribute__((noinline)) void ask_middle_rows(exact_state *s, const box_
 
 TL_INLINE void flush_middle_exact(exact_state *s, tl_sink sink)
 {
-    const tl_target target = *s->target; /* a copy that no store can change */
     box_queue *q = &s->middle.boxes;
     for (int i = 0; i < q->n; i += TL_LANES) {
         lane_exact t;
         exact_edges e;
         exact_planes p;
         middle_rows m;
-        int32_t sample[TL_MAX_LANES];
-        double slope_x[TL_MAX_LANES], x0[TL_MAX_LANES];
         const int end = q->n - i < TL_LANES ? q->n - i : TL_LANES;
         int max_rows = 0;
         pop_exact(s, sink, &s->middle, i, &t);
         setup_exact(s, sink, &t, 0);
-        vi_store(sample, t.sample);
+        vi_store(m.sample, t.sample);
         for (int k = 0; k < end; k++)
             max_rows = q->size[i + k] >> 16 > max_rows ? q->size[i + k] >> 16 : max_rows;
         if (sink_has_depth(sink)) {
             p = plane_of_lanes(s, &t);
-            vd_store(slope_x, p.slope_x), vd_store(x0, t.x[0]);
+            vd_store(m.slope_x, p.slope_x), vd_store(m.x, t.sample_x), vd_store(m.x0, t.x[0]);
+            m.step = 1.0;
             for (int row = 0; row < max_rows; row++)
                 vd_store(m.z[row], row_depth(&p, &t, row));
         }
@@ -262,24 +260,12 @@ TL_INLINE void flush_middle_exact(exact_state *s, tl_sink sink)
         const vm doubted = find_middle_rows(&t, &e, n_cols, max_rows, m.bits);
         if (__builtin_expect(vm_any(doubted), 0))
             ask_middle_rows(s, q, i, &t, doubted, max_rows, m.bits);
-        const unsigned live = vm_bits(t.live);
-        for (int k = 0; k < end; k++) {
-            const int32_t size = q->size[i + k];
-            vd z_cols = vd_set1(0.0);
-            if (!(live >> k & 1))
-                continue;
-            if (sink_has_depth(sink)) {
-                const vd x = vd_add(vd_set1(q->col[i + k] + s->centre_x), ramp(1.0));
-                z_cols = vd_mul(vd_set1(slope_x[k]), vd_sub(x, vd_set1(x0[k])));
-            }
-            draw_block(&target, sink, &m.bits[0][k], &m.z[0][k], TL_MAX_LANES, (uint32_t)sample[k], size >> 16,
-                       (size & 0xffff) <= TL_HALF_LANES, z_cols, name_of(s->mesh, q->id[i + k]));
-        }
+        TL_SINK_CALL(draw_middle, s->target->sink, s->mesh, s->target, q, i, vm_bits(t.live), &m)
     }
     q->n = 0;
 }
 
-TL_SINK_COPIES(flush_middle_exact, (exact_state * s), s)
+TL_LIST_COPIES(flush_middle_exact, (exact_state * s), s)
 
 /* ---- boxes of up to 62 x 62 samples --------------------------------------------------------------------- */
 
@@ -364,10 +350,9 @@ static __attribute__((noinline)) void ask_row_ends(const asked_triangle *a, int 
 }
 
 /* One triangle of the queue, in blocks of TL_LANES x TL_LANES samples. */
-TL_INLINE void draw_rows_exact(exact_state *s, tl_sink sink, const exact_rows *r, int i, int k, const lane_exact *t,
-                               int32_t sample)
+TL_INLINE void draw_rows_exact(exact_state *s, const tl_target *target, tl_sink sink, const exact_rows *r, int i, int k,
+                               const lane_exact *t, int32_t sample)
 {
-    const tl_target own = *s->target, *target = &own; /* a copy that no store can change */
     const box_queue *q = &s->rows.boxes;
     const int n_cols = q->size[i + k] & 0xffff, n_rows = q->size[i + k] >> 16;
     const int32_t id = name_of(s->mesh, q->id[i + k]);
@@ -410,6 +395,21 @@ TL_INLINE void draw_rows_exact(exact_state *s, tl_sink sink, const exact_rows *r
     }
 }
 
+/* Draws the triangles in `live` of those at i in the queue. */
+TL_INLINE void draw_all_rows_exact(exact_state *s, const exact_rows *r, int i, unsigned live, const lane_exact *t,
+                                   const int32_t *sample, tl_sink sink)
+{
+    const tl_target target = *s->target; /* a copy that no store can change */
+    for (; live; live &= live - 1) {
+        const int k = __builtin_ctz(live);
+        draw_rows_exact(s, &target, sink, r, i, k, t, sample[k]);
+    }
+}
+
+TL_SINK_COPIES(draw_all_rows_exact,
+               (exact_state * s, const exact_rows *r, int i, unsigned live, const lane_exact *t, const int32_t *sample),
+               s, r, i, live, t, sample)
+
 TL_INLINE void flush_rows_exact(exact_state *s, tl_sink sink)
 {
     box_queue *q = &s->rows.boxes;
@@ -428,18 +428,14 @@ TL_INLINE void flush_rows_exact(exact_state *s, tl_sink sink)
             vd_store(r.z0, p.z0), vd_store(r.slope_x, p.slope_x), vd_store(r.slope_y, p.slope_y);
             vd_store(r.x0, t.x[0]), vd_store(r.y0, t.y[0]);
         }
-        const unsigned live = vm_bits(t.live);
-        const int end = q->n - i < TL_LANES ? q->n - i : TL_LANES;
         const int64_t n_asked = s->counts->n_asked;
-        for (int k = 0; k < end; k++)
-            if (live >> k & 1)
-                draw_rows_exact(s, sink, &r, i, k, &t, sample[k]);
+        TL_SINK_CALL(draw_all_rows_exact, s->target->sink, s, &r, i, vm_bits(t.live), &t, sample)
         if (s->counts->n_asked != n_asked)
             try_grid(s, &t);
     }
     q->n = 0;
 }
 
-TL_SINK_COPIES(flush_rows_exact, (exact_state * s), s)
+TL_LIST_COPIES(flush_rows_exact, (exact_state * s), s)
 
 #endif

@@ -234,13 +234,12 @@ TL_INLINE void draw_all_lines(line_state *s, int has_depth)
     int64_t i = 0;
     for (; !is_near(s->window) && i < n && !tl_is_given_up(s->window); i++)
         draw_line(s, s->lines->edges + 2 * i);
-    for (; i + TL_LANES <= n && !tl_is_given_up(s->window); i += TL_LANES)
-        draw_lanes(s, s->lines->edges + 2 * i, vm_all(), has_depth);
-    if (i < n) {
+    for (; i < n && !tl_is_given_up(s->window); i += TL_LANES) {
+        const int32_t *edges = s->lines->edges + 2 * i;
         int32_t last[2 * TL_MAX_LANES];
-        for (int k = 0; k < 2 * TL_LANES; k++)
+        for (int k = 0; i + TL_LANES > n && k < 2 * TL_LANES; k++)
             last[k] = s->lines->edges[2 * min64(i + k / 2, n - 1) + k % 2];
-        draw_lanes(s, last, vm_first(n - i), has_depth);
+        draw_lanes(s, i + TL_LANES > n ? last : edges, vm_first(n - i), has_depth);
     }
     flush_pixels(s);
 }

@@ -125,7 +125,7 @@ typedef struct {
     const tl_transfer *transfer;
 } mean_source;
 
-TL_INLINE void mean_labels(const mean_source *s, const int32_t *labels, char *pixel)
+TL_ONCE void mean_labels(const mean_source *s, const int32_t *labels, char *pixel)
 {
     const void *own[TL_MAX_SAMPLES];
     for (int k = 0; k < 1 << s->sample_bits; k++) {

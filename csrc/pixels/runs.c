@@ -77,7 +77,7 @@ typedef struct {
 } shade_runs;
 
 /* Lists the runs of n ids; run r stands in slot TL_LANES + r.  Ids outside the mesh count as background. */
-TL_INLINE void find_runs(shade_runs *s, const int32_t *ids, int n)
+TL_ONCE void find_runs(shade_runs *s, const int32_t *ids, int n)
 {
     const vi none = vi_set1(-1), end = vi_set1((int32_t)s->snapped->n_triangles);
     vi before = none;
@@ -567,7 +567,7 @@ TL_INLINE vm set_edges(shade_runs *s, int slot, int64_t row, run_setup *r)
 }
 
 /* Prepares the runs of a row, a vector of them at a time. */
-TL_INLINE void set_runs(shade_runs *s, int64_t row)
+TL_ONCE void set_runs(shade_runs *s, int64_t row)
 {
     const tl_shading *shading = s->shading;
     s->n_special = 0;

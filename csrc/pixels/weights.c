@@ -223,7 +223,7 @@ TL_INLINE void weigh_lanes(weighed_span *r, int i, int64_t column, int64_t row)
 }
 
 /* The runs of n ids of a row, and the weights of the pixels that they show. */
-TL_INLINE void weigh_span(weighed_span *r, const int32_t *ids, int n, int64_t row, int64_t column)
+TL_ONCE void weigh_span(weighed_span *r, const int32_t *ids, int n, int64_t row, int64_t column)
 {
     find_runs(&r->runs, ids, n);
     set_weighed_runs(r, row);

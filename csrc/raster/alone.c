@@ -110,15 +110,39 @@ TL_INLINE int takes_edge(const tl_triangle *t, const tl_snapped *snapped)
            (snapped->method == TL_METHOD_AUTO && t->col1 - t->col0 <= TL_EDGE_MAX_WIDTH);
 }
 
-/* Counts a triangle as draw_triangle would draw it. */
-TL_INLINE void count_drawn(tl_triangle *t, const tl_snapped *snapped, const tl_window *window, tl_census *census)
+/* Sets a triangle up; returns how it is drawn, or TL_CLASS_CULLED when there is nothing to draw. */
+TL_ONCE tl_class setup_alone(const tl_vertex_set *set, const int32_t *corners, int32_t id, const tl_snapped *snapped,
+                             const tl_window *window, const tl_target *target, tl_sink sink, tl_triangle *t)
 {
+    const tl_sink drawn = sink_of(target, sink);
+    const int sign = load_triangle(set, corners, t);
+    if (is_culled(sign, snapped->cull)) {
+        count_faceless_one(target, sink, sign);
+        return TL_CLASS_CULLED;
+    }
+    if (!clip_box(t, window)) {
+        count_unseen_one(target, sink, t, window);
+        return TL_CLASS_CULLED;
+    }
+    tl_count_work(window, (t->row1 - t->row0) * (t->col1 - t->col0));
+    t->id = name_of(snapped, id);
     t->has_plane = 0;
-    setup_sink(t, window, census->sink);
-    const tl_class narrow = takes_edge(t, snapped) ? TL_CLASS_EDGE_64 : TL_CLASS_SPAN_64;
-    const tl_class wide = takes_edge(t, snapped) ? TL_CLASS_EDGE_128 : TL_CLASS_SPAN_128;
-    const tl_class walker = takes_rows(t, snapped, window, census->sink) ? TL_CLASS_LONG : t->is_narrow ? narrow : wide;
-    count_one(census, walker, t, window->subpixel_bits);
+    setup_sink(t, window, drawn);
+    if (takes_rows(t, snapped, window, drawn))
+        return TL_CLASS_LONG;
+    if (takes_edge(t, snapped))
+        return t->is_narrow ? TL_CLASS_EDGE_64 : TL_CLASS_EDGE_128;
+    return t->is_narrow ? TL_CLASS_SPAN_64 : TL_CLASS_SPAN_128;
+}
+
+/* Draws a triangle that needs integers of 128 bits. */
+TL_ONCE void walk_wide(const tl_triangle *t, const tl_window *window, const tl_target *target, tl_sink sink,
+                       int by_edge)
+{
+    if (by_edge)
+        walk_edge_128(t, window, target, sink);
+    else
+        walk_scanline_128(t, window, target, sink);
 }
 
 /* One triangle by itself: any range, any method. */
@@ -126,33 +150,19 @@ TL_INLINE void draw_triangle(const tl_vertex_set *set, const int32_t *corners, i
                              const tl_window *window, const tl_target *target, tl_sink sink)
 {
     tl_triangle t;
-    const int sign = load_triangle(set, corners, &t);
-    if (is_culled(sign, snapped->cull)) {
-        count_faceless_one(target, sink, sign);
+    const tl_class walker = setup_alone(set, corners, id, snapped, window, target, sink, &t);
+    if (walker == TL_CLASS_CULLED)
         return;
-    }
-    if (!clip_box(&t, window)) {
-        count_unseen_one(target, sink, &t, window);
-        return;
-    }
-    tl_count_work(window, (t.row1 - t.row0) * (t.col1 - t.col0));
-    t.id = name_of(snapped, id);
-    if (sink == TL_SINK_CENSUS) {
-        count_drawn(&t, snapped, window, target->census);
-        return;
-    }
-    setup_sink(&t, window, sink);
-    const int by_edge = takes_edge(&t, snapped);
-    if (takes_rows(&t, snapped, window, sink))
+    if (sink == TL_SINK_CENSUS)
+        count_one(target->census, walker, &t, window->subpixel_bits);
+    else if (walker == TL_CLASS_LONG)
         walk_rows(&t, window, target, sink);
-    else if (t.is_narrow && by_edge)
+    else if (walker == TL_CLASS_EDGE_64)
         walk_edge_64(&t, window, target, sink);
-    else if (t.is_narrow)
+    else if (walker == TL_CLASS_SPAN_64)
         walk_scanline_64(&t, window, target, sink);
-    else if (by_edge)
-        walk_edge_128(&t, window, target, sink);
     else
-        walk_scanline_128(&t, window, target, sink);
+        walk_wide(&t, window, target, sink, walker == TL_CLASS_EDGE_128);
 }
 
 /* The squares [first, end) of a row that a triangle meets, or holds. */
@@ -238,6 +248,9 @@ TL_INLINE void draw_alone(const tl_snapped *snapped, int64_t i, const tl_window 
         draw_triangle(&parts.set, parts.corners + 3 * k, (int32_t)i, snapped, window, target, sink);
 }
 
+TL_SINK_COPY(draw_alone, samples, TL_SINK_SAMPLES,
+             (const tl_snapped *snapped, int64_t i, const tl_window *window, const tl_target *target), snapped, i,
+             window, target)
 TL_SINK_COPIES(draw_alone, (const tl_snapped *snapped, int64_t i, const tl_window *window, const tl_target *target),
                snapped, i, window, target)
 

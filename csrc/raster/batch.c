@@ -254,11 +254,11 @@ TL_INLINE int emit(fragment_list *f, int n, tl_sink sink, vm m, vi sample, vi id
 }
 
 /* Writes a full list out; returns its length. */
-TL_INLINE int make_room(batch_state *s, int n, tl_sink sink)
+TL_INLINE int make_room(batch_state *s, int n)
 {
     if (n <= TL_FRAGMENTS)
         return n;
-    flush_fragments(s->target, sink, &s->fragments, n);
+    flush_fragments(s->target, &s->fragments, n);
     return 0;
 }
 
@@ -318,7 +318,7 @@ TL_INLINE void draw_tiny(batch_state *s, tl_sink sink, const lane_triangles *t, 
     if (vm_any(more11))
         n = emit(f, n, sink, more11, vi_add(vi_add(sample, stride), one), id,
                  sink_has_depth(sink) ? plane_depth(&p, x_right, y_down) : depth);
-    f->n = make_room(s, n, sink);
+    f->n = make_room(s, n);
 }
 
 TL_INLINE void push(box_queue *q, vm m, vi col, vi row, vi n_cols, vi n_rows, vi id)
@@ -345,10 +345,6 @@ TL_INLINE void pop(const batch_state *s, tl_sink sink, const box_queue *q, int i
 /* Boxes of up to 4x4 samples: every sample of TL_LANES boxes. */
 TL_INLINE void flush_small(batch_state *s, tl_sink sink)
 {
-    if (sink == TL_SINK_SAMPLES) {
-        flush_small_of_samples(s);
-        return;
-    }
     box_queue *q = &s->small;
     const int bits = s->window->subpixel_bits, n = q->n;
     const int32_t stride = (int32_t)s->target->stride_px;
@@ -392,13 +388,13 @@ TL_INLINE void flush_small(batch_state *s, tl_sink sink)
             for (int k = 0; k < 3; k++)
                 t.e[k] = vi_add(t.e[k], t.dx[k]);
             if ((row & 1) == 1)
-                n_fragments = make_room(s, n_fragments, sink);
+                n_fragments = make_room(s, n_fragments);
         }
     }
     s->fragments.n = n_fragments;
 }
 
-TL_SINK_COPIES(flush_small, (batch_state *s), s)
+TL_LIST_COPIES(flush_small, (batch_state *s), s)
 
 /* The corners of the triangles [i, i + TL_LANES) of a share, behind the end zeros; in `buffer` unless they lie there
  * already. */

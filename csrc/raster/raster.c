@@ -32,7 +32,7 @@ TL_INLINE void draw_one(const tl_snapped *snapped, int64_t i, const tl_window *w
     else if (sink == TL_SINK_SAMPLES)
         draw_alone_each_sample(snapped, i, window, target);
     else
-        TL_SINK_CALL(draw_alone, sink, snapped, i, window, target)
+        TL_SINK_CALL(draw_alone, target->sink, snapped, i, window, target)
 }
 
 /* Lists the triangles that the passes which draw the rest of the picture are to draw, too. */
@@ -86,6 +86,28 @@ TL_INLINE void draw_each_alone(const batch_state *s, tl_sink sink, vm alone, vi 
         draw_one(s->snapped, ids[__builtin_ctz(lanes)], s->window, s->target, sink);
 }
 
+TL_INLINE void flush_queue_small(batch_state *s, tl_sink sink)
+{
+    if (sink == TL_SINK_SAMPLES)
+        flush_small_of_samples(s);
+    else
+        TL_LIST_CALL(flush_small, sink, s)
+}
+TL_INLINE void flush_queue_middle(batch_state *s, tl_sink sink)
+{
+    if (sink == TL_SINK_SAMPLES)
+        flush_middle_of_samples(s);
+    else
+        TL_LIST_CALL(flush_middle, sink, s)
+}
+TL_INLINE void flush_queue_rows(batch_state *s, tl_sink sink)
+{
+    if (sink == TL_SINK_SAMPLES)
+        flush_rows_of_samples(s);
+    else
+        TL_LIST_CALL(flush_rows, sink, s)
+}
+
 /* The triangles that lanes draw, by the size of their boxes: in the order of tl_class, from TL_CLASS_TINY on. */
 enum { BOX_TINY, BOX_SMALL, BOX_MIDDLE, BOX_ROWS, N_BOXES };
 
@@ -113,17 +135,17 @@ TL_INLINE void draw_boxes(batch_state *s, tl_sink sink, const lane_batch *b, con
     if (vm_any(boxes[BOX_SMALL])) {
         push(&s->small, boxes[BOX_SMALL], b->col, b->row, b->n_cols, b->n_rows, id);
         if (s->small.n > TL_QUEUE - TL_LANES)
-            TL_SINK_CALL(flush_small, sink, s)
+            flush_queue_small(s, sink);
     }
     if (vm_any(boxes[BOX_MIDDLE])) {
         push(&s->middle, boxes[BOX_MIDDLE], b->col, b->row, b->n_cols, b->n_rows, id);
         if (s->middle.n > TL_QUEUE - TL_LANES)
-            TL_SINK_CALL(flush_middle, sink, s)
+            flush_queue_middle(s, sink);
     }
     if (vm_any(boxes[BOX_ROWS])) {
         push(&s->rows, boxes[BOX_ROWS], b->col, b->row, b->n_cols, b->n_rows, id);
         if (s->rows.n > TL_QUEUE - TL_LANES)
-            TL_SINK_CALL(flush_rows, sink, s)
+            flush_queue_rows(s, sink);
     }
 }
 
@@ -159,9 +181,9 @@ TL_INLINE void flush_queues(batch_state *s, tl_sink sink)
 {
     if (sink == TL_SINK_CENSUS)
         return; /* nothing waits */
-    TL_SINK_CALL(flush_small, sink, s)
-    TL_SINK_CALL(flush_middle, sink, s)
-    TL_SINK_CALL(flush_rows, sink, s)
+    flush_queue_small(s, sink);
+    flush_queue_middle(s, sink);
+    flush_queue_rows(s, sink);
 }
 
 /* As start_batch, but for squares and several samples, and for the shares of a picture. */
@@ -216,7 +238,8 @@ TL_INLINE void draw_batches(const tl_snapped *snapped, const tl_window *window, 
         }
         flush_queues(&s, sink);
     }
-    flush_fragments(target, sink, &s.fragments, s.fragments.n);
+    if (sink != TL_SINK_CENSUS)
+        flush_fragments(target, &s.fragments, s.fragments.n);
     *bad_row = s.bad_row;
 }
 
@@ -238,7 +261,11 @@ TL_INLINE void draw_snapped(const tl_snapped *snapped, const tl_window *window, 
     }
 }
 
-TL_SINK_COPIES(draw_snapped,
+TL_SINK_COPY(draw_snapped, samples, TL_SINK_SAMPLES,
+             (const tl_snapped *snapped, const tl_window *window, const tl_target *target, tl_share *share,
+              int64_t *bad_row),
+             snapped, window, target, share, bad_row)
+TL_LIST_COPIES(draw_snapped,
                (const tl_snapped *snapped, const tl_window *window, const tl_target *target, tl_share *share,
                 int64_t *bad_row),
                snapped, window, target, share, bad_row)
@@ -289,8 +316,12 @@ static void clear(const tl_window *window, const tl_target *target)
 static int64_t draw_part(const tl_snapped *snapped, const tl_window *window, const tl_target *target, tl_share *share)
 {
     int64_t bad_row = -1;
-    if (share->first < share->end || share->clusters)
-        TL_SINK_CALL(draw_snapped, target->sink, snapped, window, target, share, &bad_row)
+    if (share->first >= share->end && !share->clusters)
+        return bad_row;
+    if (target->sink == TL_SINK_SAMPLES)
+        draw_snapped_samples(snapped, window, target, share, &bad_row);
+    else
+        TL_LIST_CALL(draw_snapped, target->sink, snapped, window, target, share, &bad_row)
     return bad_row;
 }
 

@@ -125,10 +125,9 @@ TL_INLINE void draw_block(const tl_target *target, tl_sink sink, const int32_t *
 }
 
 /* One triangle of the queue, in blocks of TL_LANES x TL_LANES samples. */
-TL_INLINE void draw_rows(batch_state *s, tl_sink sink, const row_edges *r, int i, int32_t sample, int32_t size,
-                         int32_t id)
+TL_INLINE void draw_rows(const batch_state *s, const tl_target *target, tl_sink sink, const row_edges *r, int i,
+                         int32_t sample, int32_t size, int32_t id)
 {
-    const tl_target own = *s->target, *target = &own; /* a copy that no store can change */
     const double unit2 = (double)(2 << s->window->subpixel_bits);
     const int n_cols = size & 0xffff, n_rows = size >> 16;
     const vi zero = vi_set1(0);
@@ -183,10 +182,13 @@ TL_INLINE void next_row(lane_edges *e, vi n_cols, vi *begin, vi *end)
     *begin = vi_max(vi_sub(zero, left), zero), *end = vi_min(vi_add(right, one), n_cols);
 }
 
-/* The rows of TL_LANES triangles: of each its covered samples, a bit each, and its depth at column 0. */
+/* The rows of TL_LANES triangles: of each its covered samples, a bit each, and its depth at column 0.  Column k adds
+ * slope_x * ((x + k * step) - x0). */
 typedef struct {
     int32_t bits[TL_MIDDLE_BOX][TL_MAX_LANES];
     double z[TL_MIDDLE_BOX][TL_MAX_LANES];
+    int32_t sample[TL_MAX_LANES];
+    double slope_x[TL_MAX_LANES], x[TL_MAX_LANES], x0[TL_MAX_LANES], step;
 } middle_rows;
 
 TL_INLINE void setup_middle(tl_sink sink, const lane_triangles *t, const lane_planes *p, vi n_cols, int n_rows,
@@ -210,13 +212,31 @@ TL_INLINE void setup_middle(tl_sink sink, const lane_triangles *t, const lane_pl
     }
 }
 
+/* Draws the triangles in `live` of those at i in a queue. */
+TL_INLINE void draw_middle(const tl_snapped *snapped, const tl_target *shared, const box_queue *q, int i, unsigned live,
+                           const middle_rows *m, tl_sink sink)
+{
+    const tl_target target = *shared; /* a copy that no store can change */
+    for (; live; live &= live - 1) {
+        const int k = __builtin_ctz(live);
+        const int32_t size = q->size[i + k];
+        vd z_cols = vd_set1(0);
+        if (sink_has_depth(sink)) {
+            const vd x = vd_sub(vd_add(vd_set1(m->x[k]), ramp(m->step)), vd_set1(m->x0[k]));
+            z_cols = vd_mul(vd_set1(m->slope_x[k]), x);
+        }
+        draw_block(&target, sink, &m->bits[0][k], &m->z[0][k], TL_MAX_LANES, (uint32_t)m->sample[k], size >> 16,
+                   (size & 0xffff) <= TL_HALF_LANES, z_cols, name_of(snapped, q->id[i + k]));
+    }
+}
+
+TL_SINK_COPIES(draw_middle,
+               (const tl_snapped *snapped, const tl_target *shared, const box_queue *q, int i, unsigned live,
+                const middle_rows *m),
+               snapped, shared, q, i, live, m)
+
 TL_INLINE void flush_middle(batch_state *s, tl_sink sink)
 {
-    if (sink == TL_SINK_SAMPLES) {
-        flush_middle_of_samples(s);
-        return;
-    }
-    const tl_target target = *s->target; /* a copy that no store can change */
     const double unit2 = (double)(2 << s->window->subpixel_bits);
     box_queue *q = &s->middle;
     const int n = q->n;
@@ -226,39 +246,39 @@ TL_INLINE void flush_middle(batch_state *s, tl_sink sink)
         lane_planes p;
         middle_rows m;
         vd z[3];
-        int32_t sample[TL_MAX_LANES];
-        double slope_x[TL_MAX_LANES], x[TL_MAX_LANES];
         const int end = n - i < TL_LANES ? n - i : TL_LANES;
         int max_rows = 0;
         pop(s, sink, q, i, n, &t, z);
-        vi_store(sample, t.sample);
+        vi_store(m.sample, t.sample);
         if (sink_has_depth(sink)) {
             p = plane_lanes(&t, z);
-            vd_store(slope_x, p.slope_x);
-            vd_store(x, p.x);
+            vd_store(m.slope_x, p.slope_x), vd_store(m.x, p.x), vd_store(m.x0, vd_set1(0.0));
+            m.step = unit2;
         }
         for (int k = 0; k < end; k++)
             max_rows = q->size[i + k] >> 16 > max_rows ? q->size[i + k] >> 16 : max_rows;
         setup_middle(sink, &t, &p, vi_and(vi_load(q->size + i), vi_set1(0xffff)), max_rows, unit2, &m);
-        for (int k = 0; k < end; k++) {
-            const int32_t size = q->size[i + k];
-            vd z_cols = vd_set1(0);
-            if (sink_has_depth(sink))
-                z_cols = vd_mul(vd_set1(slope_x[k]), vd_add(vd_set1(x[k]), ramp(unit2)));
-            draw_block(&target, sink, &m.bits[0][k], &m.z[0][k], TL_MAX_LANES, (uint32_t)sample[k], size >> 16,
-                       (size & 0xffff) <= TL_HALF_LANES, z_cols, name_of(s->snapped, q->id[i + k]));
-        }
+        TL_SINK_CALL(draw_middle, s->target->sink, s->snapped, s->target, q, i, (1u << end) - 1, &m)
     }
 }
 
-TL_SINK_COPIES(flush_middle, (batch_state *s), s)
+TL_LIST_COPIES(flush_middle, (batch_state *s), s)
+
+/* Draws n triangles at i in a queue. */
+TL_INLINE void draw_all_rows(const batch_state *s, const row_edges *r, const int32_t *sample, int i, int n,
+                             tl_sink sink)
+{
+    const tl_target target = *s->target; /* a copy that no store can change */
+    const box_queue *q = &s->rows;
+    for (int k = 0; k < n; k++)
+        draw_rows(s, &target, sink, r, k, sample[k], q->size[i + k], name_of(s->snapped, q->id[i + k]));
+}
+
+TL_SINK_COPIES(draw_all_rows, (const batch_state *s, const row_edges *r, const int32_t *sample, int i, int n), s, r,
+               sample, i, n)
 
 TL_INLINE void flush_rows(batch_state *s, tl_sink sink)
 {
-    if (sink == TL_SINK_SAMPLES) {
-        flush_rows_of_samples(s);
-        return;
-    }
     box_queue *q = &s->rows;
     const int n = q->n;
     q->n = 0;
@@ -281,11 +301,10 @@ TL_INLINE void flush_rows(batch_state *s, tl_sink sink)
             vd_store(r.y, p.y);
         }
         const int end = n - i < TL_LANES ? n - i : TL_LANES;
-        for (int k = 0; k < end; k++)
-            draw_rows(s, sink, &r, k, sample[k], q->size[i + k], name_of(s->snapped, q->id[i + k]));
+        TL_SINK_CALL(draw_all_rows, s->target->sink, s, &r, sample, i, end)
     }
 }
 
-TL_SINK_COPIES(flush_rows, (batch_state *s), s)
+TL_LIST_COPIES(flush_rows, (batch_state *s), s)
 
 #endif

@@ -54,7 +54,7 @@ TL_INLINE void draw_box_of_samples(batch_state *s, const lane_triangles *t, vm l
             if (vm_any(in))
                 n = emit(&s->fragments, n, TL_SINK_SAMPLES, in, vi_add(t->sample, vi_set1(row * stride + col)), samples,
                          vf_set1(0.0f));
-            n = make_room(s, n, TL_SINK_SAMPLES);
+            n = make_room(s, n);
         }
     s->fragments.n = n;
 }

@@ -19,9 +19,9 @@
 /* Samples interpolated by weights at a time. */
 #define TL_CHUNK 64
 
-/* A copy of a function for each sink, so that inner loops know what they draw, and a call of the right one.
- * Such a function takes the sink last: TL_SINK_COPIES(f, (declared parameters), parameters ...), TL_SINK_CALL(f, sink,
- * ...). */
+/* A copy of a function for each sink of whole samples, so that inner loops know what they draw, and a call of the right
+ * one.  Such a function takes the sink last: TL_SINK_COPIES(f, (declared parameters), parameters ...),
+ * TL_SINK_CALL(f, sink, ...).  TL_SINK_SAMPLES, TL_SINK_BLEND and TL_SINK_CENSUS have code of their own. */
 #define TL_SINK_COPY(f, name, sink, declared, ...) \
     static __attribute__((noinline)) void f##_##name declared { f(__VA_ARGS__, sink); }
 #define TL_SINK_COPIES(f, declared, ...)                               \
@@ -31,7 +31,6 @@
     TL_SINK_COPY(f, paint, TL_SINK_PAINT, declared, __VA_ARGS__)       \
     TL_SINK_COPY(f, nearest, TL_SINK_NEAREST, declared, __VA_ARGS__)   \
     TL_SINK_COPY(f, farthest, TL_SINK_FARTHEST, declared, __VA_ARGS__) \
-    TL_SINK_COPY(f, samples, TL_SINK_SAMPLES, declared, __VA_ARGS__)   \
     TL_SINK_COPY(f, peel, TL_SINK_PEEL, declared, __VA_ARGS__)
 #define TL_SINK_CALL(f, sink, ...)                                            \
     switch (sink) { /* no default: compilers name a sink that is forgotten */ \
@@ -41,10 +40,30 @@
     case TL_SINK_PAINT: f##_paint(__VA_ARGS__); break;                        \
     case TL_SINK_NEAREST: f##_nearest(__VA_ARGS__); break;                    \
     case TL_SINK_FARTHEST: f##_farthest(__VA_ARGS__); break;                  \
-    case TL_SINK_SAMPLES: f##_samples(__VA_ARGS__); break;                    \
     case TL_SINK_PEEL: f##_peel(__VA_ARGS__); break;                          \
-    case TL_SINK_BLEND: /* these two have no copies */                        \
+    case TL_SINK_SAMPLES:                                                     \
+    case TL_SINK_BLEND:                                                       \
     case TL_SINK_CENSUS: __builtin_trap();                                    \
+    }
+
+/* Code that only lists samples needs fewer copies: what a list holds is places, places and ids, or depths, too.  A copy
+ * has one sink of its kind for all. */
+#define TL_LIST_COPIES(f, declared, ...)                         \
+    TL_SINK_COPY(f, mask, TL_SINK_MASK, declared, __VA_ARGS__)   \
+    TL_SINK_COPY(f, label, TL_SINK_LABEL, declared, __VA_ARGS__) \
+    TL_SINK_COPY(f, nearest, TL_SINK_NEAREST, declared, __VA_ARGS__)
+#define TL_LIST_CALL(f, sink, ...)                      \
+    switch (sink) {                                     \
+    case TL_SINK_MASK:                                  \
+    case TL_SINK_COUNT: f##_mask(__VA_ARGS__); break;   \
+    case TL_SINK_LABEL: f##_label(__VA_ARGS__); break;  \
+    case TL_SINK_PAINT:                                 \
+    case TL_SINK_NEAREST:                               \
+    case TL_SINK_FARTHEST:                              \
+    case TL_SINK_PEEL: f##_nearest(__VA_ARGS__); break; \
+    case TL_SINK_SAMPLES:                               \
+    case TL_SINK_BLEND:                                 \
+    case TL_SINK_CENSUS: __builtin_trap();              \
     }
 
 TL_INLINE int sink_has_depth(tl_sink sink)
@@ -156,8 +175,8 @@ TL_INLINE void put_plane(const tl_triangle *t, const tl_window *window, const tl
 }
 
 /* A span with depth from the exact weights. */
-static void put_weighted(const tl_triangle *t, const tl_window *window, const tl_target *target, tl_sink sink,
-                         int64_t row, int64_t first, int64_t end)
+TL_ONCE void put_weighted(const tl_triangle *t, const tl_window *window, const tl_target *target, tl_sink sink,
+                          int64_t row, int64_t first, int64_t end)
 {
     double w1[TL_CHUNK], w2[TL_CHUNK];
     float z[TL_CHUNK];
@@ -196,8 +215,8 @@ TL_INLINE void put_span(const tl_triangle *t, const tl_window *window, const tl_
         put_weighted(t, window, target, sink, row, first, end);
 }
 
-/* Writes the list out, one sample after the other: without branches, whatever wins. */
-TL_INLINE void flush_fragments(const tl_target *target, tl_sink sink, const fragment_list *f, int n)
+/* Writes a list of n out, one sample after the other: without branches, whatever wins. */
+TL_INLINE void write_list(const tl_target *target, const fragment_list *f, int n, tl_sink sink)
 {
     if (sink == TL_SINK_PEEL) {
         peel_fragments(target->peeled, f, n);
@@ -234,6 +253,19 @@ TL_INLINE void flush_fragments(const tl_target *target, tl_sink sink, const frag
             depths[at] = key_depth(least, turn);
         }
     }
+}
+
+TL_SINK_COPY(write_list, samples, TL_SINK_SAMPLES, (const tl_target *target, const fragment_list *f, int n), target, f,
+             n)
+TL_SINK_COPIES(write_list, (const tl_target *target, const fragment_list *f, int n), target, f, n)
+
+/* Writes a list of n out. */
+static void flush_fragments(const tl_target *target, const fragment_list *f, int n)
+{
+    if (target->sink == TL_SINK_SAMPLES)
+        write_list_samples(target, f, n);
+    else if (n > 0)
+        TL_SINK_CALL(write_list, target->sink, target, f, n)
 }
 
 #endif

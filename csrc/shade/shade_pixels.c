@@ -215,6 +215,7 @@ TL_INLINE void shade_pixels(shaded_lanes *p, int64_t row, const float *depth, vf
     const shade_runs *s = p->s;
     const tl_shading *shading = s->shading;
     const vf zero = vf_set1(0.0f), half = vf_set1(0.5f);
+    p->opacity = vf_set1(1.0f);
     if (s->needs_normal)
         set_normals(p);
     if (s->needs_q) {
