@@ -118,17 +118,17 @@ TL_INLINE void take_out_exact(const exact_state *s, exact_batch *b)
     b->drawn = vm_and_not(b->drawn, vd_ge(s->mesh->cull == TL_CULL_BACK ? area : vd_sub(zero, area), bound));
 }
 
-static __attribute__((noinline)) void draw_each_lone(exact_state *s, tl_sink sink, unsigned lanes, const int32_t *ids)
+static __attribute__((noinline)) void draw_each_lone(exact_state *s, unsigned lanes, const int32_t *ids)
 {
     for (; lanes && s->bad_row < 0 && !tl_is_given_up(s->window); lanes &= lanes - 1)
-        TL_SINK_CALL(draw_lone, sink, s, ids[__builtin_ctz(lanes)])
+        TL_SINK_CALL(draw_lone, s->target->sink, s, ids[__builtin_ctz(lanes)])
 }
 
 /* What the queues have put by. */
-static __attribute__((noinline)) void draw_slivers(exact_state *s, tl_sink sink)
+static __attribute__((noinline)) void draw_slivers(exact_state *s)
 {
     for (int k = 0; k < s->n_slivers && s->bad_row < 0 && !tl_is_given_up(s->window); k++)
-        TL_SINK_CALL(draw_lone, sink, s, s->slivers[k])
+        TL_SINK_CALL(draw_lone, s->target->sink, s, s->slivers[k])
     s->n_slivers = 0;
 }
 
@@ -150,7 +150,7 @@ TL_INLINE void push_exact(exact_queue *queue, vm m, const exact_batch *b, vi id,
 /* Fewer boxes of up to 2x2 samples wait with the small ones; others are tested where they are. */
 #define TL_FEW_TINY ((TL_LANES + 3) / 4)
 
-TL_INLINE void draw_tiny_exact(exact_state *s, const exact_batch *b, vi id, vm tiny, vf xy, tl_sink sink)
+TL_INLINE void draw_tiny_exact(exact_state *s, tl_sink sink, const exact_batch *b, vi id, vm tiny, vf xy)
 {
     lane_exact t;
     for (int k = 0; k < 3; k++) {
@@ -162,8 +162,6 @@ TL_INLINE void draw_tiny_exact(exact_state *s, const exact_batch *b, vi id, vm t
     place_exact(s, sink, b->col, b->row, xy, &t);
     s->fragments.n = draw_exact_boxes(s, sink, &t, b->n_cols, b->n_rows, 2, s->fragments.n);
 }
-
-TL_LIST_COPIES(draw_tiny_exact, (exact_state * s, const exact_batch *b, vi id, vm tiny, vf xy), s, b, id, tiny, xy)
 
 TL_INLINE void draw_exact_batch(exact_state *s, tl_sink sink, const int32_t *corners, vi id, vm live)
 {
@@ -180,7 +178,7 @@ TL_INLINE void draw_exact_batch(exact_state *s, tl_sink sink, const int32_t *cor
     if (__builtin_expect(vm_any(b.alone), 0)) {
         int32_t ids[TL_MAX_LANES];
         vi_store(ids, id);
-        draw_each_lone(s, sink, vm_bits(b.alone), ids);
+        draw_each_lone(s, vm_bits(b.alone), ids);
     }
     if (!vm_any(b.drawn))
         return;
@@ -192,7 +190,7 @@ TL_INLINE void draw_exact_batch(exact_state *s, tl_sink sink, const int32_t *cor
     const vm beyond = vm_or(vi_gt(b.n_cols, vi_set1(TL_LANES)), vi_gt(b.n_rows, vi_set1(TL_MIDDLE_BOX)));
     const vm middle = vm_and_not(over, beyond), rows = vm_and(over, beyond);
     if (__builtin_popcount(vm_bits(tiny)) >= TL_FEW_TINY) {
-        TL_LIST_CALL(draw_tiny_exact, sink, s, &b, id, tiny, xy)
+        draw_tiny_exact(s, sink, &b, id, tiny, xy);
         small = vm_and_not(small, tiny);
     }
     if (vm_any(small)) {
@@ -213,14 +211,14 @@ TL_INLINE void draw_exact_batch(exact_state *s, tl_sink sink, const int32_t *cor
 }
 
 /* The same where int32 cannot count pixels: all by themselves. */
-TL_INLINE void draw_far_batch(exact_state *s, tl_sink sink, const int32_t *corners, vi id, vm live)
+TL_INLINE void draw_far_batch(exact_state *s, const int32_t *corners, vi id, vm live)
 {
     int32_t ids[TL_MAX_LANES];
     vi_store(ids, id);
     if (has_bad_index(corners, s->last_vertex))
         s->bad_row = ids[0];
     else
-        draw_each_lone(s, sink, vm_bits(live), ids);
+        draw_each_lone(s, vm_bits(live), ids);
 }
 
 /* Whether int32 counts the pixels of a window. */
@@ -249,16 +247,16 @@ static void start_exact(exact_state *s, const tl_snapped *mesh, const tl_window 
 }
 
 /* The triangles [n_whole, end) are pieces. */
-TL_ONCE void draw_exact_scene(const tl_snapped *mesh, int64_t n_whole, const tl_window *window, const tl_target *target,
-                              tl_share *share, tl_exact_counts *counts, int64_t *bad_row)
+TL_INLINE void draw_exact_scene(const tl_snapped *mesh, int64_t n_whole, const tl_window *window,
+                                const tl_target *target, tl_share *share, tl_exact_counts *counts, int64_t *bad_row,
+                                tl_sink sink)
 {
-    const tl_sink sink = target->sink;
     const int takes_lanes = is_near_0(window);
     exact_state s;
     int is_given_up = 0;
     start_exact(&s, mesh, window, target, counts);
     s.share = share;
-    const int counts_pieces = sink == TL_SINK_COUNT && window->test != TL_TEST_SAMPLE;
+    const int counts_pieces = target->sink == TL_SINK_COUNT && window->test != TL_TEST_SAMPLE;
     const int64_t end = counts_pieces ? min64(share->end, n_whole) : share->end;
     for (int64_t i = share->first; i < end && s.bad_row < 0 && !is_given_up; i += TL_LANES) {
         int32_t corners[3 * TL_LANES];
@@ -270,19 +268,24 @@ TL_ONCE void draw_exact_scene(const tl_snapped *mesh, int64_t n_whole, const tl_
         if (takes_lanes)
             draw_exact_batch(&s, sink, batch, id, live);
         else
-            draw_far_batch(&s, sink, batch, id, live);
+            draw_far_batch(&s, batch, id, live);
         if (__builtin_expect(s.n_slivers > 0, 0))
-            draw_slivers(&s, sink);
+            draw_slivers(&s);
     }
     TL_LIST_CALL(flush_small_exact, sink, &s)
     TL_LIST_CALL(flush_middle_exact, sink, &s)
     TL_LIST_CALL(flush_rows_exact, sink, &s)
-    draw_slivers(&s, sink);
+    draw_slivers(&s);
     flush_fragments(target, &s.fragments, s.fragments.n);
     if (counts_pieces && s.bad_row < 0)
         count_pieces(&s, max64(share->first, n_whole), share->end);
     *bad_row = s.bad_row;
 }
+
+TL_LIST_COPIES(draw_exact_scene,
+               (const tl_snapped *mesh, int64_t n_whole, const tl_window *window, const tl_target *target,
+                tl_share *share, tl_exact_counts *counts, int64_t *bad_row),
+               mesh, n_whole, window, target, share, counts, bad_row)
 
 /* The mesh with the triangles that are drawn: without those that planes cut, with the pieces behind the others. */
 static tl_snapped drawn_mesh(const tl_snapped *snapped)
@@ -304,7 +307,7 @@ static int64_t draw_exact(const tl_snapped *snapped, const tl_window *band, cons
     int64_t bad_row = -1;
     own.end = has_all ? drawn.n_triangles : share->end;
     if (own.first < own.end)
-        draw_exact_scene(&drawn, snapped->n_triangles, band, part, &own, &counts, &bad_row);
+        TL_LIST_CALL(draw_exact_scene, part->sink, &drawn, snapped->n_triangles, band, part, &own, &counts, &bad_row)
     share->n_others = own.n_others;
     if (share->counts) {
         share->counts->n_triangles += counts.n_triangles;
