@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from strategies import CLIP_SCENES, soup, with_depth
 
 import topleft as tl
-from topleft._shade.alpha_test import cut_out
+from topleft._shade.alpha_test import cut_of, cut_out
 from topleft.methods import reference
 from topleft.methods.reference import blend as ref_blend
 from topleft.methods.reference import peel as ref_peel
@@ -293,4 +293,4 @@ def test_holes_of_textures_are_refused():
     mesh = tl.Mesh(*TRIANGLE, uv=[[0, 0], [1, 0], [0, 1]], materials=[material])
     frags = tl.rasterize_mesh(mesh, tl.Camera.from_matrix(FLAT), (8, 8), **EXACT)
     with pytest.raises(ValueError, match=r"0\.\.16 where textures cut holes, got 'exact'"):
-        cut_out(frags, mesh, tl.Camera.from_matrix(FLAT))
+        cut_out(frags, mesh, tl.Camera.from_matrix(FLAT), cut_of(mesh))

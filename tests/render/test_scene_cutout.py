@@ -9,6 +9,7 @@ from layer_views import look
 from leaf_cases import CAMERA, LEAF, N_LAYERS, SIZE, cut, layers
 
 import topleft as tl
+from topleft._render.holes import cuts_of
 from topleft._render.transparent import solid_layers
 
 ORDER = (2, 0, 3, 1)
@@ -109,7 +110,7 @@ def expected_layers(n):
 @pytest.mark.parametrize("n", [1, 3, 5])
 @pytest.mark.parametrize("threads", [1, 3])
 def test_layers_of_glass_are_those_that_are_left(n, threads):
-    found = solid_layers(SCENE, CAMERA, SIZE, None, layers=n, threads=threads)
+    found = solid_layers(SCENE, CAMERA, SIZE, cuts_of(SCENE, None), layers=n, threads=threads)
     ids, depth = expected_layers(n)
     assert_same(found.planes[0], ids.astype(np.int32))
     assert_same(found.planes[1], depth.astype(np.float32))

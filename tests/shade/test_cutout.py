@@ -11,7 +11,7 @@ from leaf_cases import CAMERA, HOLES, LEAF, N_LAYERS, SIZE, cut, layers
 import topleft as tl
 from topleft import _engine
 from topleft._engine.isa import build_info
-from topleft._shade.alpha_test import cut_out
+from topleft._shade.alpha_test import cut_of, cut_out
 
 
 def expected_ids(mesh):
@@ -79,7 +79,7 @@ def test_cutout_of_a_triangle_that_the_near_plane_cuts():
     camera = tl.Camera.look_at((0, 1, 5), (0, 0.2, 0), near=0.1, far=1000)
     frags = tl.rasterize_mesh(mesh, camera, SIZE)
     before = frags.mask
-    cut_out(frags, mesh, camera)
+    cut_out(frags, mesh, camera, cut_of(mesh))
     assert not (frags.mask & ~before).any()
     assert 0.3 < frags.mask.sum() / before.sum() < 0.8  # 7 of 15 diagonals, and the far end is the mean of all
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 import topleft as tl
-from topleft._shade.alpha_test import cut_out
+from topleft._shade.alpha_test import cut_of, cut_out
 
 SIZE = (90, 70)
 CAMERA = tl.Camera.look_at((0.4, 0.3, 3), near=0.5, far=9)
@@ -29,5 +29,6 @@ def layers(order):
 
 def cut(mesh, size=SIZE, **options):
     frags = tl.rasterize_mesh(mesh, CAMERA, size, **options)
-    cut_out(frags, mesh, CAMERA, threads=options.get("threads"))
+    if found := cut_of(mesh):
+        cut_out(frags, mesh, CAMERA, found, threads=options.get("threads"))
     return frags

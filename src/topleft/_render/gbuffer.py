@@ -22,7 +22,7 @@ from topleft._model.mesh import Mesh
 from topleft._raster.fragments import Fragments
 from topleft._raster.verbs import Rasterizer
 from topleft._render.fragments import VisiblePart, join, parts_of
-from topleft._render.holes import has_cuts, without_holes
+from topleft._render.holes import cuts_of, without_holes
 from topleft._render.render import rasterize_subject
 from topleft._scene.scene import Scene
 
@@ -120,7 +120,7 @@ class GBuffer:
     @cached_property
     def has_holes(self) -> bool:
         """Whether materials cut something out."""
-        return has_cuts(self.subject, self.look.get("material"))
+        return any(cuts_of(self.subject, self.look.get("material")))
 
     @property
     def _view(self) -> tuple[Mesh | Scene, Camera, tuple[int, int]]:

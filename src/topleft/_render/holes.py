@@ -20,12 +20,12 @@ from topleft._model.material import Material
 from topleft._model.mesh import Mesh
 from topleft._raster.fragments import Fragments
 from topleft._render.bend import BentMesh
-from topleft._render.fragments import BentFragments, SceneFragments, drawn_of
+from topleft._render.fragments import BentFragments, SceneFragments
 from topleft._render.instances import PlacedScene
 from topleft._scene.scene import Scene, collapsed, meshes_of, scene_of
 from topleft._shade.alpha_test import Cut, cut_of, cut_out, draw_cut
 
-__all__ = ["Holed", "cut_scene", "draw_holed", "has_cuts", "holed_instances", "solid_scene", "without_holes"]
+__all__ = ["Holed", "cut_scene", "cuts_of", "draw_holed", "holed_instances", "solid_scene", "without_holes"]
 
 
 class Holed(NamedTuple):
@@ -37,31 +37,33 @@ class Holed(NamedTuple):
     cut: Cut
 
 
-def has_cuts(subject: Mesh | Scene, material: Material | None) -> bool:
-    """Whether materials, or this one, cut something out."""
-    return any(cut_of(mesh, material) is not None for mesh in meshes_of(subject))
+def cuts_of(subject: Mesh | Scene, material: Material | None) -> list[Cut | None]:
+    """What materials, or this one, cut out of the mesh of each instance."""
+    return [cut_of(mesh, material) for mesh in meshes_of(subject)]
 
 
 def without_holes(
     frags: Fragments, subject: Mesh | Scene, camera: Camera, material: Material | None, *, threads: int | None = None
 ) -> Fragments:
     """The visibility buffer without what materials (or this one) cut out; `frags` is changed."""
-    if 0 in frags.id.shape or not has_cuts(subject, material):
+    cuts = cuts_of(subject, material)
+    if 0 in frags.id.shape or not any(cuts):
         return frags
     if isinstance(frags, SceneFragments):
-        return cut_scene(frags, holed_instances(scene_of(subject), camera, material, frags.placed.bent), threads)
-    (mesh,) = meshes_of(subject)
-    cut_out(*drawn_of(frags, mesh), camera.straightened(), material, threads=threads)
+        return cut_scene(frags, holed_instances(scene_of(subject), cuts, camera, frags.placed.bent), threads)
+    drawn, bent = (frags.drawn, [frags.bent]) if isinstance(frags, BentFragments) else (frags, None)
+    (holed,) = holed_instances(scene_of(subject), cuts, camera, bent)
+    cut_out(drawn, holed.mesh, holed.camera, holed.cut, threads=threads)
     return frags.again() if isinstance(frags, BentFragments) else frags
 
 
 def holed_instances(
-    scene: Scene, camera: Camera, material: Material | None, bent: Sequence[BentMesh] | None = None
+    scene: Scene, cuts: Sequence[Cut | None], camera: Camera, bent: Sequence[BentMesh] | None = None
 ) -> list[Holed]:
-    """The instances that materials, or this one, cut something out of."""
+    """The instances that something is cut out of, and how they are drawn."""
     found = []
-    for i, instance in enumerate(scene):
-        cut, mesh = cut_of(instance.mesh, material), instance.mesh
+    for i, (instance, cut) in enumerate(zip(scene, cuts, strict=True)):
+        mesh = instance.mesh
         if cut is not None:
             if bent is not None:
                 cut, mesh = cut.of_parts(bent[i].source), bent[i].mesh_of(mesh)

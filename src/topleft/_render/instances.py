@@ -112,8 +112,7 @@ class PlacedScene:
 
     def snap_part(self, i: int, triangles: NDArray[np.int32]) -> _engine.SnappedMesh:
         """Return what some triangles of an instance need, snapped: all of it, unless its mesh is drawn in clusters."""
-        can_cluster = self._may_cluster and choices.can_cluster(self._view, Sink.NEAREST) and not self.has_sides
-        if can_cluster and self.scene[i].mesh.has_clusters:
+        if self._can_cluster(Sink.NEAREST) and self.scene[i].mesh.has_clusters:
             return ClusteredMesh(*self.clustered(i)).part(triangles)
         return self.snap(i).mesh
 
@@ -127,9 +126,12 @@ class PlacedScene:
         is_single = is_single if self.bent is None else is_single[self.bent[i].source]
         return own.without_backs(is_single, is_mirrored=instance.is_mirrored)
 
+    def _can_cluster(self, sink: Sink) -> bool:
+        """Whether clusters may be drawn, which do not know that some triangles are single-sided and others are not."""
+        return self._may_cluster and choices.can_cluster(self._view, sink) and not self._has_sides
+
     @cached_property
-    def has_sides(self) -> bool:
-        """Whether some triangles of a mesh are single-sided and others are not, which clusters do not know."""
+    def _has_sides(self) -> bool:
         masks = (instance.mesh.single_sided(self._material) for instance in self.whole)
         return any(mask is not None and not mask.all() for mask in masks)
 
@@ -152,10 +154,8 @@ class PlacedScene:
         """Clear targets of that many rows, one a sample, and draw what each sees; (0, 0) is the pixel's centre."""
         n_parts = count_threads(self._view.threads, self.scene.n_triangles)
         n_parts = min(height, max(n_parts, height * self._view.size[0] // MOST_PIXELS_OF_PART))
-        can_cluster = self._may_cluster and choices.can_cluster(self._view, Sink(targets[0].sink))
-        can_cluster = can_cluster and not self.has_sides
         seen = self._clip_from_world, self._view
-        if can_cluster and wants_clusters(self.scene) and pays_to_draw(self, *seen):
+        if self._can_cluster(Sink(targets[0].sink)) and pays_in_clusters(self, *seen):
             order = front_to_back(self.scene, self._clip_from_world)
             if draw_placed(self, order, targets, positions, height, n_parts):
                 return
@@ -169,13 +169,19 @@ class PlacedScene:
             is_first = False
 
 
-def wants_clusters(scene: Scene) -> bool:
-    """Tell whether all meshes of a scene are to be drawn in clusters, and note that it is drawn."""
+def pays_in_clusters(placed: PlacedScene, clip_from_world: NDArray[np.float64], view: View) -> bool:
+    """Tell whether a scene whose meshes may be drawn in clusters is, and note that they are drawn."""
+    scene = placed.scene
     n_instances = Counter(id(instance.mesh) for instance in scene)
     meshes = {id(instance.mesh): instance.mesh for instance in scene}
-    n_triangles = scene.n_triangles
-    pays = [choices.pays_to_cluster(n_triangles, mesh.note_drawn(), n_instances[key]) for key, mesh in meshes.items()]
-    return all(pays)
+    n = scene.n_triangles
+    wanted = [choices.pays_to_cluster(n, mesh.note_drawn(), n_instances[key]) for key, mesh in meshes.items()]
+    if not all(wanted) or not scene.backoff.is_over():
+        return False
+    survey = survey_instances(placed)
+    pays = choices.pays_to_draw_instances(view, n // len(scene), survey, lambda: count_layers(scene, clip_from_world))
+    scene.backoff.note(pays=pays)
+    return pays
 
 
 def front_to_back(scene: Scene, clip_from_world: NDArray[np.float64]) -> NDArray[np.intp]:
@@ -186,19 +192,6 @@ def front_to_back(scene: Scene, clip_from_world: NDArray[np.float64]) -> NDArray
     ])  # fmt: skip
     row = clip_from_world[3] if clip_from_world[3, :3].any() else clip_from_world[2]
     return np.argsort(middles @ row[:3], kind="stable")
-
-
-def pays_to_draw(placed: PlacedScene, clip_from_world: NDArray[np.float64], view: View) -> bool:
-    """Tell whether a scene whose meshes are in clusters is drawn from these."""
-    scene = placed.scene
-    if not scene.backoff.is_over():
-        return False
-    n_triangles = scene.n_triangles // len(scene)
-    pays = choices.pays_to_draw_instances(
-        view, n_triangles, survey_instances(placed), lambda: count_layers(scene, clip_from_world)
-    )
-    scene.backoff.note(pays=pays)
-    return pays
 
 
 def survey_instances(placed: PlacedScene) -> Survey:

@@ -5,6 +5,7 @@ Input: a mesh or `Scene`, `Camera`. Output: a picture (H, W, 4) uint8, sRGB with
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, Literal, Unpack
 
 import numpy as np
@@ -14,18 +15,18 @@ from topleft._base.arrays import as_count, as_size
 from topleft._base.color import WHITE, ColorLike, as_color
 from topleft._camera.camera import Camera, CameraLike, camera_for
 from topleft._lod.detail import detailed
-from topleft._model.material import Material
 from topleft._raster.composite import composite
 from topleft._raster.peel import DepthLayers, peel
 from topleft._raster.view import WindowOptions
 from topleft._render.fragments import SceneDepthLayers
-from topleft._render.holes import draw_holed, has_cuts, holed_instances, solid_scene
+from topleft._render.holes import cuts_of, draw_holed, holed_instances, solid_scene
 from topleft._render.instances import peel_scene
 from topleft._render.render import DEFAULT_SIZE
 from topleft._render.scene_shade import shade
 from topleft._render.through_lens import seen_through
 from topleft._scene.adapt import MeshLike
 from topleft._scene.scene import Scene, as_meshes, scene_of
+from topleft._shade.alpha_test import Cut
 from topleft._shade.shade import LookOptions
 from topleft.typing import CullOption, DepthTestOption, SamplesOption, ShadingOption
 
@@ -104,9 +105,10 @@ def render_transparent(
     subject = detailed(subject, camera, size, tolerance, cull=cull, material=material)
     ground = as_color("background", background, 4)
     view: dict[str, Any] = {"cull": cull, "subpixel_bits": subpixel_bits, "threads": threads}
-    if has_cuts(subject, material):
+    cuts = cuts_of(subject, material)
+    if any(cuts):
         subject = scene_of(subject)  # which is the same picture
-        found: DepthLayers = solid_layers(subject, camera, size, material, layers=layers, **view)
+        found: DepthLayers = solid_layers(subject, camera, size, cuts, layers=layers, **view)
     else:
         found = visible_layers(subject, camera, size, layers=layers, **view)
     pictures = np.zeros((size[1], size[0], layers, 3), np.uint8)
@@ -124,14 +126,14 @@ def solid_layers(
     scene: Scene,
     camera: Camera,
     size: tuple[int, int],
-    material: Material | None,
+    cuts: Sequence[Cut | None],
     *,
     threads: int | None,
     **options: Any,
 ) -> SceneDepthLayers:
-    """The nearest layers of a scene without what its materials, or this one, cut out."""
+    """The nearest layers of a scene without what is cut out of its meshes."""
     check_straight(camera)
-    holed = holed_instances(scene, camera, material)
+    holed = holed_instances(scene, cuts, camera)
     found = peel_scene(solid_scene(scene, holed), camera, size, threads=threads, **options)
     if 0 in size:
         return found

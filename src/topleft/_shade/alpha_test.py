@@ -56,23 +56,20 @@ def cut_of(mesh: Mesh, material: Material | None = None) -> Cut | None:
     return Cut(materials, rows, np.full(len(mesh.triangles), True) if rows is None else with_holes[rows])
 
 
-def cut_out(
-    frags: Fragments, mesh: Mesh, camera: Camera, material: Material | None = None, *, threads: int | None = None
-) -> None:
+def cut_out(frags: Fragments, mesh: Mesh, camera: Camera, cut: Cut, *, threads: int | None = None) -> None:
     """Take out of the buffers of `rasterize` what materials cut out; changes `frags` in place.
 
     Parameters
     ----------
     frags : Fragments
         What `rasterize` returned for the mesh with `depth_test="less"`.
-    mesh, camera, material
+    mesh, camera
         As in `topleft.shade`.
+    cut : Cut
+        Of the mesh.
     threads : int, optional
         Never changes a bit.
     """
-    cut = cut_of(mesh, material)
-    if cut is None or 0 in frags.triangle.shape:
-        return
     n_threads = threads_for(threads, len(mesh.triangles))
     for k in range(frags.samples_triangle.shape[-1]):
         cut_sample(frags.sample(k), mesh, camera, cut, n_threads)
