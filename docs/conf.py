@@ -9,6 +9,7 @@ project = "topleft"
 author = "the topleft authors"
 extensions = ["myst_parser", "gallery", "links"]
 html_theme = "furo"
+html_show_copyright = False
 html_title = "topleft"
 html_static_path = ["site/static"]
 html_css_files = ["site.css"]

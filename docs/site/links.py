@@ -46,6 +46,7 @@ def relinked(text: str, path: Path, page: Path) -> str:
             target = DOCS / "gallery" / found[1] if path.name == "examples.md" else target
         elif DOCS not in target.parents:
             return words
+        words = "" if words == Path(name).name else words  # the title of the page stands for the name of its file
         return f"{mark}[{words}]({os.path.relpath(target, page.parent)}{'#' + part if part else ''})"
 
     parts, last = [], 0

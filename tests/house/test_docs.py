@@ -48,6 +48,12 @@ def test_page_has_a_title_and_a_first_sentence(page):
     assert re.match(r"[\[`*\w]", first)
 
 
+@pytest.mark.parametrize("page", CHECKED, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_powers_outside_code_are_not_read_as_bold(page):
+    text = CODE.sub("", page.read_text(encoding="utf-8"))
+    assert re.findall(r"(?m)^(?!    ).*\d\*\*-?\d.*$", text) == []  # 2**62 to 2**30 shows as a bold "62 to 2"
+
+
 def test_index_lists_every_page_once():
     listed = [path for path, _ in links(DOCS / "README.md") if DOCS in path.parents]
     assert sorted(listed) == [page for page in PAGES if page != DOCS / "README.md"]

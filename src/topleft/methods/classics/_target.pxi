@@ -73,7 +73,7 @@ cdef void *lend(object array, Py_buffer *view, Py_ssize_t item_size, int n_colum
     PyObject_GetBuffer(array, view, PyBUF_C_CONTIGUOUS | flags)
     if view.itemsize != item_size or view.ndim != (2 if n_columns else 1) or (n_columns and view.shape[1] < n_columns):
         PyBuffer_Release(view)
-        raise ValueError(f"a buffer must have items of {item_size} bytes in rows of {n_columns or "one"}")
+        raise ValueError(f"a buffer must have items of {item_size} bytes in rows of {n_columns or 'one'}")
     return view.buf
 
 
