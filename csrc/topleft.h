@@ -191,7 +191,13 @@ typedef struct {
     int32_t flip;              /* LABEL: what ids are xored with, 0, or TL_FLIP: the earlier triangle wins */
     tl_census *census;         /* CENSUS */
     const tl_peeled *peeled;   /* PEEL; the window has less than 2^31 pixels */
+    /* NEAREST, FARTHEST: what no depth of a segment of a row lies behind, tl_segments(stride_px) numbers a row, set by
+     * draw, so that large triangles leave out segments that they lie behind; or NULL */
+    float *bounds;
 } tl_target;
+
+#define TL_SEGMENT_BITS 6 /* columns of a segment */
+static inline int64_t tl_segments(int64_t width) { return (width + (1 << TL_SEGMENT_BITS) - 1) >> TL_SEGMENT_BITS; }
 
 #define TL_FLIP INT32_MAX
 

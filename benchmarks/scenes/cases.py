@@ -132,6 +132,16 @@ def large_scene(task: str = "mask", size: tuple[int, int] = UHD) -> Scene:
     return Scene(task, size, *scenes.large_triangle(*size), colors=colors)
 
 
+def frames_scene(n: int, *, is_near_first: bool, size: tuple[int, int] = HD) -> Scene:
+    """Triangles that each cover the whole frame, one behind the other, a little inclined: float32 pixels."""
+    width, height = size
+    order = np.arange(n) if is_near_first else np.arange(n)[::-1]
+    depth = (order[:, None] + np.array([0.1, 0.6, 0.4])) / n
+    corners = np.tile([[-10.0, -10.0], [2 * width + 20, -10], [-10, 2 * height + 20]], (n, 1, 1))
+    vertices = np.concatenate([corners, depth[:, :, None]], axis=2).reshape(-1, 3).astype(np.float32)
+    return Scene("depth-2d", size, vertices, np.arange(3 * n, dtype=np.int32).reshape(-1, 3))
+
+
 def planar_scene(task: str = "labels", n_points: int = 100_000, *, is_white: bool = False) -> Scene:
     """A mesh that tiles the frame."""
     from topleft import scenes
@@ -190,6 +200,9 @@ def _register() -> None:
     for n, px in ((1000, 400), (10_000, 100), (100_000, 10), (1_000_000, 4)):
         make = lambda n=n, px=px: random_scene("depth-2d", n, px)  # noqa: E731
         add(Case(f"random-{n}x{px}", "depth-2d", make, aliases=(f"rand{n}_{px}",)))
+    for name, is_near_first in (("near", True), ("far", False)):
+        make = lambda near=is_near_first: frames_scene(40, is_near_first=near)  # noqa: E731
+        add(Case(f"frames-{name}-first", "depth-2d", make))
     add(Case("large-4k", "mask", large_scene, aliases=("large",)))
     for n, px in ((1000, 300), (20_000, 40), (200_000, 8)):
         make = lambda n=n, px=px: random_scene("fill", n, px)  # noqa: E731

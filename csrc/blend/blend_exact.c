@@ -100,6 +100,7 @@ static __attribute__((noinline)) void flush_exact_blend(exact_blend *p)
         for (int k = 0; k < end; k++)
             max_rows = q->size[i + k] >> 16 > max_rows ? q->size[i + k] >> 16 : max_rows;
         pop_exact(s, TL_SINK_BLEND, &s->rows, i, &t);
+        setup_exact(s, TL_SINK_BLEND, &t, 0);
         sort_exact_edges(s, &t, TL_FAR_BAND, &e);
         const vm doubted = find_blend_rows(&t, &e, n_cols, max_rows, stride, &rows);
         if (__builtin_expect(vm_any(doubted), 0))

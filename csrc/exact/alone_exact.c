@@ -169,6 +169,62 @@ TL_INLINE unsigned find_lone_end(const lone_triangle *t, int64_t row, int32_t *f
     return (unsigned)is_doubted;
 }
 
+/* Row ends where there are no lanes, in steps of 2^-TL_STEP_BITS columns from row to row: as walk_scanline, but that
+ * quotients are rounded, once and in each step. */
+#define TL_STEP_BITS 40
+typedef struct {
+    int n;
+    int is_left[3];
+    int64_t at[3], step[3]; /* q, and what a row adds */
+    int64_t band[3];        /* what lies so near to an integer is asked */
+    int64_t twice[3];       /* twice of it, or -1: nothing is */
+} row_steps;
+
+/* Returns 0 where steps of 64 bits do not reach.  Beside the errors that the band allows for, q at the first row and
+ * each step err by 2^-52 of the most that |q| gets, and by one unit when they become integers.  On the grid, where
+ * nothing is asked, q is at least 0.5 / |dy| away from integers. */
+static int setup_steps(const lone_triangle *t, row_steps *r)
+{
+    const asked_triangle *e = &t->edges;
+    const double unit = (double)((int64_t)1 << TL_STEP_BITS), n_rows = (double)t->n_rows;
+    if (t->asks_all || t->n_rows > 1 << 12 || e->n_cols > 1 << 20)
+        return 0;
+    r->n = 0;
+    for (int k = 0; k < 3; k++) {
+        const double q = e->v[k] * t->inverse[k], step = e->dx[k] * t->inverse[k], most = fabs(q) + fabs(step) * n_rows;
+        const int is_asked = e->band[k] >= 0.0, i = r->n;
+        const double band = (is_asked ? e->band[k] * unit : 0.0) + n_rows * (1.0 + 0x1p-12 * most) + 4.0;
+        if (e->dy[k] == 0.0)
+            continue;
+        if (!(most < 0x1p20) || !(band < 0.49 * unit * (is_asked ? 1.0 : t->inverse[k])))
+            return 0;
+        r->is_left[i] = e->dy[k] < 0.0;
+        r->at[i] = (int64_t)(q * unit), r->step[i] = (int64_t)(step * unit);
+        r->band[i] = is_asked ? (int64_t)band : 0, r->twice[i] = is_asked ? 2 * (int64_t)band : -1;
+        r->n++;
+    }
+    return 1;
+}
+
+/* The columns [*first, *end) of the row that the steps are at; returns whether it is in doubt.  Goes on to the next. */
+TL_INLINE unsigned take_step(row_steps *r, int32_t n_cols, int32_t *first, int32_t *end)
+{
+    const int64_t below_1 = ((int64_t)1 << TL_STEP_BITS) - 1;
+    int64_t begin = 0, stop = n_cols;
+    int is_doubted = 0;
+    for (int k = 0; k < r->n; k++) {
+        const int64_t at = r->at[k], quotient = at >> TL_STEP_BITS;
+        is_doubted |= ((at + r->band[k]) & below_1) <= r->twice[k];
+        if (r->is_left[k])
+            begin = -quotient > begin ? -quotient : begin;
+        else
+            stop = quotient + 1 < stop ? quotient + 1 : stop;
+        r->at[k] = at + r->step[k];
+    }
+    *first = (int32_t)begin, *end = (int32_t)stop;
+    return (unsigned)is_doubted;
+}
+
 /* The columns [first, end) of TL_LANES rows; returns the rows in doubt. */
 TL_INLINE unsigned find_lone_ends(const lone_triangle *t, int64_t row0, int32_t *first, int32_t *end)
 {
@@ -277,9 +333,12 @@ TL_INLINE void draw_lone(exact_state *s, int32_t i, tl_sink sink)
     const lone_triangle t = found;
     const int64_t stride = target.stride_px, corner = (t.row - s->top) * stride + t.col - s->left;
     tl_count_work(s->window, t.n_rows * t.edges.n_cols);
+    row_steps steps;
+    const int takes_steps = TL_LANES == 1 && setup_steps(&t, &steps);
     for (int64_t row0 = 0; row0 < t.n_rows; row0 += TL_LANES) {
         const int n = t.n_rows - row0 < TL_LANES ? (int)(t.n_rows - row0) : TL_LANES;
-        const unsigned doubted = find_lone_ends(&t, row0, first, end) & ((1u << n) - 1);
+        const unsigned doubted = takes_steps ? take_step(&steps, t.edges.n_cols, first, end)
+                                             : find_lone_ends(&t, row0, first, end) & ((1u << n) - 1);
         if (__builtin_expect(doubted != 0, 0))
             ask_lone_ends(&found.edges, row0, doubted, first, end, s->counts);
         for (int k = 0; k < n; k++) {

@@ -1,5 +1,5 @@
 /* Boxes: triangles with boxes of up to 4x4 samples, at every sample of TL_LANES boxes.
- * In: queues of setup_exact.c.  Out: lists of samples.
+ * In: triangles that have been loaded, or a queue.  Out: lists of samples.
  *
  * A sample at which the least of three edge functions lies beyond the band of doubt is decided by it; the others are
  * asked. */
@@ -62,11 +62,14 @@ TL_INLINE vm decide_samples(const lane_exact *t, int row, int col, vm doubted, v
 }
 
 /* Decides the samples in doubt: on the grid by lanes, then by float64, then by the exact sign. */
-static __attribute__((noinline)) void ask_boxes(exact_state *s, const exact_queue *queue, int i, lane_exact *t,
-                                                vi n_cols, vi n_rows, int size, box_masks in)
+static __attribute__((noinline)) void ask_boxes(exact_state *s, lane_exact *t, vi n_cols, vi n_rows, int size,
+                                                box_masks in)
 {
-    const box_queue *q = &queue->boxes;
     const unsigned turned = vm_bits(t->turned);
+    int32_t ids[TL_MAX_LANES];
+    double sample_x[TL_MAX_LANES], sample_y[TL_MAX_LANES];
+    vi_store(ids, t->ids), vd_store(sample_x, t->sample_x), vd_store(sample_y, t->sample_y);
+    turn_points(t);
     try_grid(s, t);
     const vf band = vf_select(t->on_grid, vf_set1(0.0f), vf_mul(t->xy, vf_set1(TL_BOX_BAND)));
     const vf below = vf_sub(vf_set1(0.0f), band);
@@ -82,9 +85,9 @@ static __attribute__((noinline)) void ask_boxes(exact_state *s, const exact_queu
                 s->counts->n_asked += __builtin_popcount(vm_bits(near));
                 for (; left; left &= left - 1) {
                     const int k = __builtin_ctz(left);
+                    const exact_point sample = {sample_x[k] + col, sample_y[k] + row};
                     exact_point p[3];
-                    load_turned(s, q->id[i + k], turned >> k & 1, p);
-                    const exact_point sample = {q->col[i + k] + col + s->centre_x, q->row[i + k] + row + s->centre_y};
+                    load_turned(s, ids[k], turned >> k & 1, p);
                     found |= (unsigned)is_inside(p, sample, t->test, s->counts) << k;
                 }
                 inside = vm_or(inside, vm_from_bits(found));
@@ -96,6 +99,15 @@ static __attribute__((noinline)) void ask_boxes(exact_state *s, const exact_queu
         for (int k = 0; k < 3; k++)
             t->e[k] = vf_add(t->e[k], t->dx[k]);
     }
+}
+
+/* Writes a full list out; returns its length. */
+TL_INLINE int make_exact_room(exact_state *s, int n)
+{
+    if (n <= TL_FRAGMENTS)
+        return n;
+    flush_fragments(s->target, &s->fragments, n);
+    return 0;
 }
 
 /* The samples of boxes of up to 2x2: the first of each in one go, as draw_tiny in batch.c; most cover no other. */
@@ -123,61 +135,72 @@ TL_INLINE int emit_tiny(exact_state *s, tl_sink sink, box_masks in, vi sample, v
     return n;
 }
 
-TL_INLINE void flush_boxes(exact_state *s, exact_queue *queue, int size, tl_sink sink)
+/* Leaves out the samples of triangles that have no depth plane, which are put by. */
+TL_INLINE void take_out_sliver_samples(exact_state *s, lane_exact *t, int size, box_masks in)
 {
-    const box_queue *q = &queue->boxes;
+    const int n = s->n_slivers;
+    take_out_slivers(s, t);
+    if (__builtin_expect(s->n_slivers > n, 0))
+        for (int row = 0; row < size; row++)
+            for (int col = 0; col < size; col++)
+                in[row][col] = vm_and(in[row][col], t->live);
+}
+
+/* The samples of TL_LANES boxes that have been loaded and placed, to a list of n; returns its new length. */
+TL_INLINE int draw_exact_boxes(exact_state *s, tl_sink sink, lane_exact *t, vi n_cols, vi n_rows, int size, int n)
+{
     const int32_t stride = (int32_t)s->target->stride_px;
+    exact_planes p;
+    box_masks in;
+    vd z_col[TL_SMALL_BOX], z_tiny[2];
+    setup_exact(s, sink, t, 1);
+    if (__builtin_expect(vm_any(test_boxes(t, n_cols, n_rows, size, in)), 0)) {
+        lane_exact own = *t;
+        ask_boxes(s, &own, n_cols, n_rows, size, in);
+    }
+    const vi id = names_of(s->mesh, t->live, t->ids), sample = t->sample;
+    if (sink_has_depth(sink)) {
+        take_out_sliver_samples(s, t, size, in);
+        p = plane_of_lanes(s, t);
+        for (int col = 0; col < size; col++)
+            z_col[col] = col_depth(&p, t, col);
+    }
+    if (TL_LANES > 1 && size == 2) {
+        for (int row = 0; sink_has_depth(sink) && row < 2; row++)
+            z_tiny[row] = row_depth(&p, t, row);
+        n = emit_tiny(s, sink, in, sample, id, z_tiny, z_col, n);
+        return make_exact_room(s, n);
+    }
+    for (int row = 0; row < size; row++) {
+        vd z_row;
+        if (sink_has_depth(sink))
+            z_row = row_depth(&p, t, row);
+        for (int col = 0; col < size; col++)
+            if (TL_LANES > 1 || vm_any(in[row][col]))
+                n = emit(&s->fragments, n, sink, in[row][col], vi_add(sample, vi_set1(row * stride + col)), id,
+                         sink_has_depth(sink) ? sum_depth(z_row, z_col[col]) : vf_set1(0.0f));
+        if ((row & 1) == 1)
+            n = make_exact_room(s, n);
+    }
+    return n;
+}
+
+/* Boxes of up to 4x4 samples. */
+TL_INLINE void flush_small_exact(exact_state *s, tl_sink sink)
+{
+    const box_queue *q = &s->small.boxes;
     int n_fragments = s->fragments.n;
     for (int i = 0; i < q->n; i += TL_LANES) {
         lane_exact t;
-        exact_planes p;
-        box_masks in;
         const vi box = vi_load(q->size + i);
-        const vi n_cols = vi_and(box, vi_set1(0xffff)), n_rows = vi_shift_right(box, 16);
-        pop_exact(s, sink, queue, i, &t);
-        const vi id = names_of(s->mesh, vm_first(q->n - i), vi_load(q->id + i)), sample = t.sample;
-        vd z_col[TL_SMALL_BOX], z_tiny[2];
-        if (sink_has_depth(sink)) {
-            p = plane_of_lanes(s, &t);
-            for (int col = 0; col < size; col++)
-                z_col[col] = col_depth(&p, &t, col);
-        }
-        if (__builtin_expect(vm_any(test_boxes(&t, n_cols, n_rows, size, in)), 0))
-            ask_boxes(s, queue, i, &t, n_cols, n_rows, size, in);
-        if (TL_LANES > 1 && size == 2) {
-            for (int row = 0; sink_has_depth(sink) && row < 2; row++)
-                z_tiny[row] = row_depth(&p, &t, row);
-            n_fragments = emit_tiny(s, sink, in, sample, id, z_tiny, z_col, n_fragments);
-            if (n_fragments > TL_FRAGMENTS) {
-                flush_fragments(s->target, &s->fragments, n_fragments);
-                n_fragments = 0;
-            }
-            continue;
-        }
-        for (int row = 0; row < size; row++) {
-            vd z_row;
-            if (sink_has_depth(sink))
-                z_row = row_depth(&p, &t, row);
-            for (int col = 0; col < size; col++)
-                if (TL_LANES > 1 || vm_any(in[row][col]))
-                    n_fragments = emit(&s->fragments, n_fragments, sink, in[row][col],
-                                       vi_add(sample, vi_set1(row * stride + col)), id,
-                                       sink_has_depth(sink) ? sum_depth(z_row, z_col[col]) : vf_set1(0.0f));
-            if ((row & 1) == 1 && n_fragments > TL_FRAGMENTS) {
-                flush_fragments(s->target, &s->fragments, n_fragments);
-                n_fragments = 0;
-            }
-        }
+        pop_exact(s, sink, &s->small, i, &t);
+        n_fragments = draw_exact_boxes(s, sink, &t, vi_and(box, vi_set1(0xffff)), vi_shift_right(box, 16), TL_SMALL_BOX,
+                                       n_fragments);
     }
-    queue->boxes.n = 0;
+    s->small.boxes.n = 0;
     s->fragments.n = n_fragments;
 }
 
-/* Boxes of up to 2x2 and of up to 4x4 samples. */
-TL_INLINE void flush_tiny_exact(exact_state *s, tl_sink sink) { flush_boxes(s, &s->tiny, 2, sink); }
-TL_INLINE void flush_small_exact(exact_state *s, tl_sink sink) { flush_boxes(s, &s->small, TL_SMALL_BOX, sink); }
-
-TL_LIST_COPIES(flush_tiny_exact, (exact_state * s), s)
 TL_LIST_COPIES(flush_small_exact, (exact_state * s), s)
 
 #endif

@@ -24,7 +24,7 @@
 
 /* TL_LANES triangles as loaded, and what becomes of them. */
 typedef struct {
-    vd x[3], y[3];
+    vd x[3], y[3], z[3];
     vd width, height;
     vi top, bottom;              /* rows of the box in the picture */
     vi col, row, n_cols, n_rows; /* the box of samples in the window */
@@ -66,17 +66,16 @@ TL_INLINE int load_exact_batch(exact_state *s, tl_sink sink, const int32_t *corn
         s->bad_row = ids[0];
         return 0;
     }
-    vd far = vd_set1(0.0); /* a sum, so that what is not finite shows */
-    for (int k = 0; k < 3; k++) {
-        vd_load_pairs(s->points->points, s->points->stride, corners + k, &b->x[k], &b->y[k]);
-        far = vd_add(far, vd_add(vd_abs(b->x[k]), vd_abs(b->y[k])));
-    }
+    load_points(s->points, sink, corners, b->x, b->y, b->z);
+    const vd sum = vd_add(vd_add(vd_add(b->x[0], b->x[1]), vd_add(b->y[0], b->y[1])), vd_add(b->x[2], b->y[2]));
     const vd x_min = vd_min(vd_min(b->x[0], b->x[1]), b->x[2]), x_max = vd_max(vd_max(b->x[0], b->x[1]), b->x[2]);
     const vd y_min = vd_min(vd_min(b->y[0], b->y[1]), b->y[2]), y_max = vd_max(vd_max(b->y[0], b->y[1]), b->y[2]);
     b->width = vd_sub(x_max, x_min), b->height = vd_sub(y_max, y_min);
     const tl_test test = test_of(s, sink);
     const vd widest = vd_set1(TL_MAX_BOX_PX - border_of(test));
-    const vm fits = vm_and(vd_ge(vd_set1(0x1p30), far), vd_ge(widest, vd_max(b->width, b->height)));
+    const vd farthest = vd_max(vd_max(x_max, y_max), vd_sub(vd_set1(0.0), vd_min(x_min, y_min)));
+    const vm in_range = vm_and(vd_ge(vd_set1(0x1p30), farthest), vd_ge(vd_set1(0x1p33), sum)); /* not where it is NaN */
+    const vm fits = vm_and(in_range, vd_ge(widest, vd_max(b->width, b->height)));
     const int is_left_of_0 = s->left < 0 || s->top < 0;
     vi left, right;
     b->alone = vm_and_not(live, fits), b->fits = vm_and(live, fits);
@@ -119,17 +118,17 @@ TL_INLINE void take_out_exact(const exact_state *s, exact_batch *b)
     b->drawn = vm_and_not(b->drawn, vd_ge(s->mesh->cull == TL_CULL_BACK ? area : vd_sub(zero, area), bound));
 }
 
-static __attribute__((noinline)) void draw_each_lone(exact_state *s, tl_sink sink, unsigned lanes, const int32_t *ids)
+static __attribute__((noinline)) void draw_each_lone(exact_state *s, unsigned lanes, const int32_t *ids)
 {
     for (; lanes && s->bad_row < 0 && !tl_is_given_up(s->window); lanes &= lanes - 1)
-        TL_SINK_CALL(draw_lone, sink, s, ids[__builtin_ctz(lanes)])
+        TL_SINK_CALL(draw_lone, s->target->sink, s, ids[__builtin_ctz(lanes)])
 }
 
 /* What the queues have put by. */
-static __attribute__((noinline)) void draw_slivers(exact_state *s, tl_sink sink)
+static __attribute__((noinline)) void draw_slivers(exact_state *s)
 {
     for (int k = 0; k < s->n_slivers && s->bad_row < 0 && !tl_is_given_up(s->window); k++)
-        TL_SINK_CALL(draw_lone, sink, s, s->slivers[k])
+        TL_SINK_CALL(draw_lone, s->target->sink, s, s->slivers[k])
     s->n_slivers = 0;
 }
 
@@ -148,6 +147,22 @@ TL_INLINE void push_exact(exact_queue *queue, vm m, const exact_batch *b, vi id,
 }
 #define TL_IS_FULL(queue) ((queue).boxes.n > TL_QUEUE - TL_LANES)
 
+/* Fewer boxes of up to 2x2 samples wait with the small ones; others are tested where they are. */
+#define TL_FEW_TINY ((TL_LANES + 3) / 4)
+
+TL_INLINE void draw_tiny_exact(exact_state *s, tl_sink sink, const exact_batch *b, vi id, vm tiny, vf xy)
+{
+    lane_exact t;
+    for (int k = 0; k < 3; k++) {
+        t.x[k] = b->x[k], t.y[k] = b->y[k];
+        if (sink_has_depth(sink))
+            t.z[k] = b->z[k];
+    }
+    t.ids = id, t.live = tiny;
+    place_exact(s, sink, b->col, b->row, xy, &t);
+    s->fragments.n = draw_exact_boxes(s, sink, &t, b->n_cols, b->n_rows, 2, s->fragments.n);
+}
+
 TL_INLINE void draw_exact_batch(exact_state *s, tl_sink sink, const int32_t *corners, vi id, vm live)
 {
     exact_batch b;
@@ -163,21 +178,20 @@ TL_INLINE void draw_exact_batch(exact_state *s, tl_sink sink, const int32_t *cor
     if (__builtin_expect(vm_any(b.alone), 0)) {
         int32_t ids[TL_MAX_LANES];
         vi_store(ids, id);
-        draw_each_lone(s, sink, vm_bits(b.alone), ids);
+        draw_each_lone(s, vm_bits(b.alone), ids);
     }
     if (!vm_any(b.drawn))
         return;
     const vf xy = box_sizes(&b, test_of(s, sink));
     const vi longer = vi_max(b.n_cols, b.n_rows);
-    const vm over_tiny = vi_gt(longer, vi_set1(2)), over_small = vi_gt(longer, vi_set1(TL_SMALL_BOX));
-    const vm over = vm_and(b.drawn, over_small), tiny = vm_and_not(b.drawn, over_tiny);
-    const vm small = vm_and(b.drawn, vm_and_not(over_tiny, over_small));
+    const vm over_small = vi_gt(longer, vi_set1(TL_SMALL_BOX)), over = vm_and(b.drawn, over_small);
+    const vm tiny = vm_and_not(b.drawn, vi_gt(longer, vi_set1(2)));
+    vm small = vm_and_not(b.drawn, over_small);
     const vm beyond = vm_or(vi_gt(b.n_cols, vi_set1(TL_LANES)), vi_gt(b.n_rows, vi_set1(TL_MIDDLE_BOX)));
     const vm middle = vm_and_not(over, beyond), rows = vm_and(over, beyond);
-    if (vm_any(tiny)) {
-        push_exact(&s->tiny, tiny, &b, id, xy);
-        if (TL_IS_FULL(s->tiny))
-            TL_LIST_CALL(flush_tiny_exact, sink, s)
+    if (__builtin_popcount(vm_bits(tiny)) >= TL_FEW_TINY) {
+        draw_tiny_exact(s, sink, &b, id, tiny, xy);
+        small = vm_and_not(small, tiny);
     }
     if (vm_any(small)) {
         push_exact(&s->small, small, &b, id, xy);
@@ -197,14 +211,14 @@ TL_INLINE void draw_exact_batch(exact_state *s, tl_sink sink, const int32_t *cor
 }
 
 /* The same where int32 cannot count pixels: all by themselves. */
-TL_INLINE void draw_far_batch(exact_state *s, tl_sink sink, const int32_t *corners, vi id, vm live)
+TL_INLINE void draw_far_batch(exact_state *s, const int32_t *corners, vi id, vm live)
 {
     int32_t ids[TL_MAX_LANES];
     vi_store(ids, id);
     if (has_bad_index(corners, s->last_vertex))
         s->bad_row = ids[0];
     else
-        draw_each_lone(s, sink, vm_bits(live), ids);
+        draw_each_lone(s, vm_bits(live), ids);
 }
 
 /* Whether int32 counts the pixels of a window. */
@@ -228,21 +242,21 @@ static void start_exact(exact_state *s, const tl_snapped *mesh, const tl_window 
     s->centre_y = of_squares ? 0.0 : 0.5 + mesh->mesh.sample_y_fx * unit;
     s->last_vertex = vi_set1((int32_t)(points->n_points - 1));
     s->bad_row = -1, s->may_be_on_grid = 0, s->n_slivers = 0;
-    s->tiny.boxes.n = s->small.boxes.n = s->middle.boxes.n = s->rows.boxes.n = s->fragments.n = 0;
+    s->small.boxes.n = s->middle.boxes.n = s->rows.boxes.n = s->fragments.n = 0;
     memset(s->fragments.sample, 0, sizeof s->fragments.sample); /* what is prefetched behind the end of the list */
 }
 
 /* The triangles [n_whole, end) are pieces. */
-TL_ONCE void draw_exact_scene(const tl_snapped *mesh, int64_t n_whole, const tl_window *window, const tl_target *target,
-                              tl_share *share, tl_exact_counts *counts, int64_t *bad_row)
+TL_INLINE void draw_exact_scene(const tl_snapped *mesh, int64_t n_whole, const tl_window *window,
+                                const tl_target *target, tl_share *share, tl_exact_counts *counts, int64_t *bad_row,
+                                tl_sink sink)
 {
-    const tl_sink sink = target->sink;
     const int takes_lanes = is_near_0(window);
     exact_state s;
     int is_given_up = 0;
     start_exact(&s, mesh, window, target, counts);
     s.share = share;
-    const int counts_pieces = sink == TL_SINK_COUNT && window->test != TL_TEST_SAMPLE;
+    const int counts_pieces = target->sink == TL_SINK_COUNT && window->test != TL_TEST_SAMPLE;
     const int64_t end = counts_pieces ? min64(share->end, n_whole) : share->end;
     for (int64_t i = share->first; i < end && s.bad_row < 0 && !is_given_up; i += TL_LANES) {
         int32_t corners[3 * TL_LANES];
@@ -254,20 +268,24 @@ TL_ONCE void draw_exact_scene(const tl_snapped *mesh, int64_t n_whole, const tl_
         if (takes_lanes)
             draw_exact_batch(&s, sink, batch, id, live);
         else
-            draw_far_batch(&s, sink, batch, id, live);
+            draw_far_batch(&s, batch, id, live);
         if (__builtin_expect(s.n_slivers > 0, 0))
-            draw_slivers(&s, sink);
+            draw_slivers(&s);
     }
-    TL_LIST_CALL(flush_tiny_exact, sink, &s)
     TL_LIST_CALL(flush_small_exact, sink, &s)
     TL_LIST_CALL(flush_middle_exact, sink, &s)
     TL_LIST_CALL(flush_rows_exact, sink, &s)
-    draw_slivers(&s, sink);
+    draw_slivers(&s);
     flush_fragments(target, &s.fragments, s.fragments.n);
     if (counts_pieces && s.bad_row < 0)
         count_pieces(&s, max64(share->first, n_whole), share->end);
     *bad_row = s.bad_row;
 }
+
+TL_LIST_COPIES(draw_exact_scene,
+               (const tl_snapped *mesh, int64_t n_whole, const tl_window *window, const tl_target *target,
+                tl_share *share, tl_exact_counts *counts, int64_t *bad_row),
+               mesh, n_whole, window, target, share, counts, bad_row)
 
 /* The mesh with the triangles that are drawn: without those that planes cut, with the pieces behind the others. */
 static tl_snapped drawn_mesh(const tl_snapped *snapped)
@@ -289,7 +307,7 @@ static int64_t draw_exact(const tl_snapped *snapped, const tl_window *band, cons
     int64_t bad_row = -1;
     own.end = has_all ? drawn.n_triangles : share->end;
     if (own.first < own.end)
-        draw_exact_scene(&drawn, snapped->n_triangles, band, part, &own, &counts, &bad_row);
+        TL_LIST_CALL(draw_exact_scene, part->sink, &drawn, snapped->n_triangles, band, part, &own, &counts, &bad_row)
     share->n_others = own.n_others;
     if (share->counts) {
         share->counts->n_triangles += counts.n_triangles;

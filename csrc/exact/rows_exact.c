@@ -244,6 +244,7 @@ TL_INLINE void flush_middle_exact(exact_state *s, tl_sink sink)
         const int end = q->n - i < TL_LANES ? q->n - i : TL_LANES;
         int max_rows = 0;
         pop_exact(s, sink, &s->middle, i, &t);
+        setup_exact(s, sink, &t, 0);
         vi_store(m.sample, t.sample);
         for (int k = 0; k < end; k++)
             max_rows = q->size[i + k] >> 16 > max_rows ? q->size[i + k] >> 16 : max_rows;
@@ -418,6 +419,7 @@ TL_INLINE void flush_rows_exact(exact_state *s, tl_sink sink)
         exact_rows r;
         int32_t sample[TL_MAX_LANES];
         pop_exact(s, sink, &s->rows, i, &t);
+        setup_exact(s, sink, &t, 0);
         sort_exact_edges(s, &t, TL_FAR_BAND, &edges);
         store_exact_edges(&edges, &r);
         vi_store(sample, t.sample);

@@ -1,15 +1,19 @@
 /* Setup: a vector of triangles whose vertices are not snapped, as edge functions in float32 with a band of doubt.
  * In: points in pixels, a queue of boxes.  Out: lane_exact; which lanes lie on a grid; planes of depth.
  *
- * The edge functions are set up in float64 from the points as they are, relative to the first sample of the box, and
- * rounded once to float32.  Extents are at most TL_MAX_BOX_PX.  u = 2^-24; X = max(width, 1), Y = max(height, 1) of the
- * extent.  The first sample lies in the extent, so every |x - cx| <= X, and any E in the box is at most XY.
+ * Points are measured in float64 from the first sample of the box.  Extents are at most TL_MAX_BOX_PX.  u = 2^-24;
+ * X = max(width, 1), Y = max(height, 1) of the extent.  The first sample lies in the extent, so every |x - cx| <= X,
+ * and any E in the box is at most XY.
  *
- * 1. float64: differences, two products, their difference: at most 8 * 2^-53 XY = 2^-26 u XY, in the slack of what
- *    follows.  Rounding to float32 errs by |e0| u, |dx| u, |dy| u.
- * 2. E at row i <= height and column k <= width is e0 + i dx - k dy: those errors add up to 3 u XY.
- *    Boxes of up to 4x4 samples step by six additions of values up to XY: 6 u XY.  Hence what lies within 10 u XY of 0
- *    is asked (TL_BOX_BAND).
+ * 1. Rows: edge functions are set up in float64 and rounded once to float32.  float64: differences, two products, their
+ *    difference: at most 8 * 2^-53 XY = 2^-26 u XY, in the slack of what follows.  Rounding errs by |e0| u, |dx| u,
+ *    |dy| u; at row i <= height and column k <= width, E = e0 + i dx - k dy, that adds up to 3 u XY.
+ * 2. Boxes of up to 4x4 samples: the distances of the points are rounded to float32, and the rest is float32.  Points
+ *    moved by u X and u Y move E = (A - S) x (B - S) by 4 u XY.  The setup rounds dx, dy, two products and their
+ *    difference: 5 u XY; i dx and k dy err by 2 u XY; six additions of values up to XY by 6 u XY.  Squares subtract
+ *    their corner: 2 u XY; of an edge that float32 takes for level or upright they may take the wrong one, where E
+ *    differs by 4 u XY at most.  That is 23 u XY: what lies within 24 u XY of 0 is asked (TL_BOX_BAND).  Twice the area
+ *    errs by 13 u XY: three points moved, 6; four differences, two products and theirs, 7.
  * 3. Rows: v = e0 + i dx, rounded once or twice, errs by 5 u XY at most from E at column 0, the errors of k dy for any
  *    column k included: |v - k d - E| <= 5 u XY < M = 6 u XY, d = |dy|.  q = v * (1 / d) errs by 2.01 u |q|.
  *    Where |q - k| > M / d + 2.01 u |q| the sign of v - k d is that of E.  So a row end is asked where
@@ -35,7 +39,7 @@
 #include "raster/setup.c"
 #include "raster/sink.c"
 
-#define TL_BOX_BAND 0x1.4p-21f /* 10 u */
+#define TL_BOX_BAND 0x1.8p-20f /* 24 u */
 #define TL_ROW_BAND 0x1.8p-22f /* 6 u */
 #define TL_GRID_BITS 8
 
@@ -58,7 +62,7 @@ typedef struct {
     vi last_vertex;
     int64_t bad_row;    /* of triangles, -1: none so far */
     int may_be_on_grid; /* the triangles that asked last were */
-    exact_queue tiny, small, middle, rows;
+    exact_queue small, middle, rows;
     int n_slivers; /* triangles of the queues that have no depth plane, and wait to be drawn by themselves */
     int32_t slivers[4 * (TL_QUEUE + TL_MAX_LANES)];
     fragment_list fragments;
@@ -66,17 +70,17 @@ typedef struct {
 
 /* TL_LANES triangles, turned so that their areas are positive. */
 typedef struct {
-    vd x[3], y[3];
-    tl_test test;                  /* a constant where the sink is */
-    vd sample_x, sample_y;         /* the first sample of the box, in the picture; of squares the upper left corner */
-    vf e[3], dx[3], dy[3];         /* edge functions there, and what a row adds and a column subtracts */
-    vf xy;                         /* X * Y */
-    vi sample;                     /* the first sample: row * stride_px + column */
-    vd area;                       /* twice the area, before the turn */
-    int32_t corners[3 * TL_LANES]; /* vertices, before the turn */
-    vm live;                       /* of those that are there, the ones with an area, and that are not culled */
-    vm turned;                     /* corners 1 and 2 have changed places */
-    vm on_grid;                    /* e, dx and dy are exact, in units of their own */
+    vi ids;
+    vd x[3], y[3], z[3];   /* z: where there is depth */
+    tl_test test;          /* a constant where the sink is */
+    vd sample_x, sample_y; /* the first sample of the box, in the picture; of squares the upper left corner */
+    vf e[3], dx[3], dy[3]; /* edge functions there, and what a row adds and a column subtracts */
+    vf xy;                 /* X * Y */
+    vi sample;             /* the first sample: row * stride_px + column */
+    vm live;               /* of those that are there, the ones with an area, and that are not culled */
+    vm turned;             /* corners 1 and 2 have changed places in e, dx and dy */
+    vm to_turn;            /* and are still to do so in x and y */
+    vm on_grid;            /* e, dx and dy are exact, in units of their own */
 } lane_exact;
 
 /* z = (z0 + slope_y * (y - y0)) + slope_x * (x - x0), in pixels from corner 0. */
@@ -93,6 +97,22 @@ TL_INLINE void load_turned(const exact_state *s, int32_t id, int is_turned, exac
     p[2] = point_of(s->points, corners[is_turned ? 1 : 2]);
 }
 
+/* The corners of TL_LANES triangles. */
+TL_INLINE void load_points(const tl_exact_points *points, tl_sink sink, const int32_t *corners, vd *x, vd *y, vd *z)
+{
+    for (int k = 0; k < 3; k++) {
+        if (points->stride == 2) { /* constants: an address without a product */
+            vd_load_pairs(points->points, 2, corners + k, &x[k], &y[k]);
+            if (sink_has_depth(sink))
+                z[k] = vd_set1(0.0);
+        } else if (sink_has_depth(sink)) {
+            vd_load_triples(points->points, corners + k, &x[k], &y[k], &z[k]);
+        } else {
+            vd_load_pairs(points->points, 3, corners + k, &x[k], &y[k]);
+        }
+    }
+}
+
 /* Twice the area; deterministic up to the sign when corners change places. */
 TL_INLINE vd area_of_points(const vd *x, const vd *y)
 {
@@ -101,9 +121,11 @@ TL_INLINE vd area_of_points(const vd *x, const vd *y)
 }
 
 /* Asks for the sign of the area of each lane in `doubted`. */
-static __attribute__((noinline)) void ask_turns(const exact_state *s, const int32_t *ids, unsigned doubted,
-                                                unsigned *negative, unsigned *flat)
+static __attribute__((noinline)) void ask_turns(const exact_state *s, vi all_ids, unsigned doubted, unsigned *negative,
+                                                unsigned *flat)
 {
+    int32_t ids[TL_MAX_LANES];
+    vi_store(ids, all_ids);
     for (; doubted; doubted &= doubted - 1) {
         const int k = __builtin_ctz(doubted);
         exact_point p[3];
@@ -115,32 +137,46 @@ static __attribute__((noinline)) void ask_turns(const exact_state *s, const int3
     }
 }
 
-/* Turns the triangles and marks those that are drawn: of a float64 area the sign holds beyond 2^-51 of its terms (J. R.
- * Shewchuk), and is asked for otherwise. */
-TL_INLINE void turn_lanes(const exact_state *s, const int32_t *ids, lane_exact *t)
+/* Finds the triangles that are to be turned, and those without an area: of a float64 area the sign holds beyond 2^-51
+ * of its terms (J. R. Shewchuk), and is asked for otherwise.  Of vertices on 2^-8 px it is exact. */
+TL_INLINE void find_turns(const exact_state *s, lane_exact *t, vm on_grid)
 {
     const vd x1 = vd_sub(t->x[1], t->x[0]), y1 = vd_sub(t->y[1], t->y[0]);
     const vd x2 = vd_sub(t->x[2], t->x[0]), y2 = vd_sub(t->y[2], t->y[0]);
     const vd left = vd_mul(x1, y2), right = vd_mul(y1, x2), zero = vd_set1(0.0);
     const vd size = vd_add(vd_abs(left), vd_abs(right));
     const vd bound = vd_max(vd_mul(size, vd_set1(0x1p-51)), vd_set1(1e-280));
-    const vd area = t->area = vd_sub(left, right);
+    const vd area = vd_sub(left, right);
     const vm positive = vd_ge(area, bound), negative = vd_ge(vd_sub(zero, area), bound);
-    const unsigned doubted = vm_bits(vm_and_not(t->live, vm_or(positive, negative)));
+    const vm not_told = vm_and_not(t->live, vm_or(positive, negative));
+    t->live = vm_and_not(t->live, vm_and(not_told, on_grid));
+    const unsigned doubted = vm_bits(vm_and_not(not_told, on_grid));
     t->turned = negative;
     if (__builtin_expect(doubted != 0, 0)) {
         unsigned turned = vm_bits(negative), flat = 0;
-        ask_turns(s, ids, doubted, &turned, &flat);
+        ask_turns(s, t->ids, doubted, &turned, &flat);
         t->turned = vm_from_bits(turned);
         t->live = vm_and_not(t->live, vm_from_bits(flat));
     }
+    t->to_turn = t->turned;
+}
+
+/* Lets corners change places. */
+TL_INLINE void turn_points(lane_exact *t)
+{
+    const vd x = t->x[1], y = t->y[1];
+    t->x[1] = vd_select(t->to_turn, t->x[2], x), t->y[1] = vd_select(t->to_turn, t->y[2], y);
+    t->x[2] = vd_select(t->to_turn, x, t->x[2]), t->y[2] = vd_select(t->to_turn, y, t->y[2]);
+    t->to_turn = vm_first(0);
+}
+
+/* Leaves out the side that is culled. */
+TL_INLINE void cull_turned(const exact_state *s, lane_exact *t)
+{
     if (s->mesh->cull == TL_CULL_BACK)
         t->live = vm_and(t->live, t->turned);
     else if (s->mesh->cull == TL_CULL_FRONT)
         t->live = vm_and_not(t->live, t->turned);
-    const vd x = t->x[1], y = t->y[1];
-    t->x[1] = vd_select(t->turned, t->x[2], x), t->y[1] = vd_select(t->turned, t->y[2], y);
-    t->x[2] = vd_select(t->turned, x, t->x[2]), t->y[2] = vd_select(t->turned, y, t->y[2]);
 }
 
 /* Where edge k of TL_LANES triangles is tested: as tested_point. */
@@ -177,6 +213,38 @@ TL_INLINE void set_float_edges(lane_exact *t)
     }
 }
 
+/* The same for boxes of up to 4x4 samples, from points in float32; finds the turns, too. */
+TL_INLINE void set_box_edges(const exact_state *s, lane_exact *t)
+{
+    const vf zero = vf_set1(0.0f), one = vf_set1(1.0f), band = vf_mul(t->xy, vf_set1(TL_BOX_BAND));
+    const vf inside = t->test == TL_TEST_OUTER ? one : zero, outside = t->test == TL_TEST_OUTER ? zero : one;
+    vf x[3], y[3];
+    for (int k = 0; k < 3; k++) {
+        x[k] = vf_from_vd(vd_sub(t->x[k], t->sample_x));
+        y[k] = vf_from_vd(vd_sub(t->y[k], t->sample_y));
+    }
+    const vf x1 = vf_sub(x[1], x[0]), y1 = vf_sub(y[1], y[0]), x2 = vf_sub(x[2], x[0]), y2 = vf_sub(y[2], y[0]);
+    const vf area = vf_sub(vf_mul(x1, y2), vf_mul(y1, x2));
+    t->turned = t->to_turn = vf_lt(area, vf_sub(zero, band));
+    if (__builtin_expect(vm_any(vm_and_not(t->live, vm_or(vf_lt(band, area), t->turned))), 0))
+        find_turns(s, t, vm_first(0));
+    const vf old_x = x[1], old_y = y[1];
+    x[1] = vf_select(t->turned, x[2], old_x), y[1] = vf_select(t->turned, y[2], old_y);
+    x[2] = vf_select(t->turned, old_x, x[2]), y[2] = vf_select(t->turned, old_y, y[2]);
+    for (int k = 0; k < 3; k++) {
+        const int next = k == 2 ? 0 : k + 1;
+        t->dx[k] = vf_sub(x[next], x[k]), t->dy[k] = vf_sub(y[next], y[k]);
+    }
+    for (int k = 0; k < 3; k++) {
+        vf px = x[k], py = y[k];
+        if (t->test != TL_TEST_SAMPLE) { /* as move_to_corners */
+            px = vf_sub(px, vf_select(vf_lt(zero, t->dy[k]), outside, inside));
+            py = vf_sub(py, vf_select(vf_lt(t->dx[k], zero), outside, inside));
+        }
+        t->e[k] = vf_sub(vf_mul(t->dy[k], px), vf_mul(t->dx[k], py));
+    }
+}
+
 /* The triangles of which all vertices lie on 2^-8 px. */
 static __attribute__((noinline)) vm find_on_grid(const lane_exact *t)
 {
@@ -197,6 +265,9 @@ static __attribute__((noinline)) void set_grid_edges(lane_exact *t, vm m)
         x[k] = vi_round(vd_mul(vd_sub(t->x[k], t->sample_x), unit2));
         y[k] = vi_round(vd_mul(vd_sub(t->y[k], t->sample_y), unit2));
     }
+    const vi x1 = x[1], y1 = y[1];
+    x[1] = vi_select(t->to_turn, x[2], x1), y[1] = vi_select(t->to_turn, y[2], y1);
+    x[2] = vi_select(t->to_turn, x1, x[2]), y[2] = vi_select(t->to_turn, y1, y[2]);
     for (int k = 0; k < 3; k++) {
         const int next = k == 2 ? 0 : k + 1;
         const vi dx = vi_shift_right(vi_sub(x[next], x[k]), 1), dy = vi_shift_right(vi_sub(y[next], y[k]), 1);
@@ -252,57 +323,80 @@ TL_INLINE tl_test test_of(const exact_state *s, tl_sink sink)
     return sink == TL_SINK_MASK || sink == TL_SINK_COUNT ? s->window->test : TL_TEST_SAMPLE;
 }
 
-/* Whether a plane gives depth: not to slivers, nor where products leave the range of float64. */
-#define TL_LEAST_BOX 1e-250
-#define TL_MOST_EXTENT 1e120
-
-/* Puts by what lanes could draw but for the depth; as plane_of_points, of which the extents of lanes are in range. */
-TL_INLINE void take_out_slivers(exact_state *s, const exact_queue *queue, int i, lane_exact *t)
+/* The first samples of boxes. */
+TL_INLINE void place_exact(const exact_state *s, tl_sink sink, vi col, vi row, vf xy, lane_exact *t)
 {
-    const vd width = vd_sub(vd_max(vd_max(t->x[0], t->x[1]), t->x[2]), vd_min(vd_min(t->x[0], t->x[1]), t->x[2]));
-    const vd height = vd_sub(vd_max(vd_max(t->y[0], t->y[1]), t->y[2]), vd_min(vd_min(t->y[0], t->y[1]), t->y[2]));
-    const vd box = vd_mul(width, height), scaled = vd_mul(vd_abs(t->area), vd_set1((double)(1 << TL_SLIVER_BITS)));
-    const vm has_plane = vm_and(vd_ge(scaled, box), vd_ge(box, vd_set1(TL_LEAST_BOX)));
-    const vm slivers = vm_and_not(t->live, has_plane);
-    if (__builtin_expect(vm_any(slivers), 0)) {
-        vi_compress(s->slivers + s->n_slivers, slivers, vi_load(queue->boxes.id + i));
-        s->n_slivers += __builtin_popcount(vm_bits(slivers));
-        t->live = vm_and(t->live, has_plane);
-    }
-}
-
-/* The triangles [i, i + TL_LANES) of a queue, turned and with edge functions. */
-TL_INLINE void pop_exact(exact_state *s, tl_sink sink, const exact_queue *queue, int i, lane_exact *t)
-{
-    const box_queue *q = &queue->boxes;
-    const int n = q->n;
-    for (int k = 0; k < TL_LANES; k++) /* lanes behind the end repeat the last triangle */
-        memcpy(t->corners + 3 * k, s->mesh->triangles + 3 * (int64_t)q->id[i + k < n ? i + k : n - 1],
-               3 * sizeof *t->corners);
-    for (int k = 0; k < 3; k++)
-        vd_load_pairs(s->points->points, s->points->stride, t->corners + k, &t->x[k], &t->y[k]);
-    const vi col = vi_load(q->col + i), row = vi_load(q->row + i);
     t->sample_x = vd_add(vd_from_vi(col), vd_set1(s->centre_x));
     t->sample_y = vd_add(vd_from_vi(row), vd_set1(s->centre_y));
     t->sample = vi_add(vi_mul(vi_sub(row, vi_set1((int32_t)s->top)), vi_set1((int32_t)s->target->stride_px)),
                        vi_sub(col, vi_set1((int32_t)s->left)));
     t->test = test_of(s, sink);
-    t->live = vm_first(n - i);
-    t->xy = vf_mul(vf_load(queue->xy + i), vf_set1((float)s->points->band));
+    t->xy = vf_mul(xy, vf_set1((float)s->points->band));
     t->on_grid = vm_first(0);
-    turn_lanes(s, q->id + i, t);
-    if (sink_has_depth(sink))
-        take_out_slivers(s, queue, i, t);
+}
+
+/* Whether a plane gives depth: not to slivers, nor where products leave the range of float64. */
+#define TL_LEAST_BOX 1e-250
+#define TL_MOST_EXTENT 1e120
+
+/* Puts by what lanes could draw but for the depth; as plane_of_points, of which the extents of lanes are in range. */
+TL_INLINE void take_out_slivers(exact_state *s, lane_exact *t)
+{
+    const vd width = vd_sub(vd_max(vd_max(t->x[0], t->x[1]), t->x[2]), vd_min(vd_min(t->x[0], t->x[1]), t->x[2]));
+    const vd height = vd_sub(vd_max(vd_max(t->y[0], t->y[1]), t->y[2]), vd_min(vd_min(t->y[0], t->y[1]), t->y[2]));
+    const vd box = vd_mul(width, height),
+             scaled = vd_mul(vd_abs(area_of_points(t->x, t->y)), vd_set1((double)(1 << TL_SLIVER_BITS)));
+    const vm has_plane = vm_and(vd_ge(scaled, box), vd_ge(box, vd_set1(TL_LEAST_BOX)));
+    const vm slivers = vm_and_not(t->live, has_plane);
+    if (__builtin_expect(vm_any(slivers), 0)) {
+        vi_compress(s->slivers + s->n_slivers, slivers, t->ids);
+        s->n_slivers += __builtin_popcount(vm_bits(slivers));
+        t->live = vm_and(t->live, has_plane);
+    }
+}
+
+/* Loads the triangles [i, i + TL_LANES) of a queue. */
+TL_INLINE void pop_exact(const exact_state *s, tl_sink sink, const exact_queue *queue, int i, lane_exact *t)
+{
+    int32_t corners[3 * TL_LANES];
+    const box_queue *q = &queue->boxes;
+    const int n = q->n;
+    for (int k = 0; k < TL_LANES; k++) /* lanes behind the end repeat the last triangle */
+        memcpy(corners + 3 * k, s->mesh->triangles + 3 * (int64_t)q->id[i + k < n ? i + k : n - 1],
+               3 * sizeof *corners);
+    load_points(s->points, sink, corners, t->x, t->y, t->z);
+    t->ids = vi_load(q->id + i);
+    t->live = vm_first(n - i);
+    place_exact(s, sink, vi_load(q->col + i), vi_load(q->row + i), vf_load(queue->xy + i), t);
+}
+
+/* Edge functions of triangles that have been loaded.  of_boxes, a constant: of up to 4x4 samples. */
+TL_INLINE void setup_exact(exact_state *s, tl_sink sink, lane_exact *t, int of_boxes)
+{
     const vm good = s->may_be_on_grid ? find_on_grid(t) : vm_first(0);
-    if (!s->may_be_on_grid || vm_any(vm_and_not(vm_all(), good)))
+    const int needs_floats = !s->may_be_on_grid || vm_any(vm_and_not(t->live, good));
+    s->counts->n_triangles += __builtin_popcount(vm_bits(t->live));
+    if (!of_boxes || !needs_floats)
+        find_turns(s, t, good);
+    if (!of_boxes) {
+        turn_points(t);
+        if (sink_has_depth(sink))
+            take_out_slivers(s, t);
+    }
+    if (!needs_floats)
+        for (int k = 0; k < 3; k++)
+            t->e[k] = t->dx[k] = t->dy[k] = vf_set1(0.0f);
+    else if (of_boxes)
+        set_box_edges(s, t);
+    else
         set_float_edges(t);
+    cull_turned(s, t);
     if (__builtin_expect(s->may_be_on_grid, 0)) {
         if (vm_any(good))
             set_grid_edges(t, good);
         s->may_be_on_grid = vm_any(good);
+        s->counts->n_on_grid += __builtin_popcount(vm_bits(vm_and(t->on_grid, t->live)));
     }
-    s->counts->n_triangles += n - i < TL_LANES ? n - i : TL_LANES;
-    s->counts->n_on_grid += __builtin_popcount(vm_bits(vm_and(t->on_grid, t->live)));
 }
 
 /* The depth planes.  The same operations as plane_of_points in alone_exact.c. */
@@ -311,10 +405,10 @@ TL_INLINE exact_planes plane_of_lanes(const exact_state *s, const lane_exact *t)
     exact_planes p = {vd_set1(0.0), vd_set1(0.0), vd_set1(0.0)};
     if (s->points->stride < 3)
         return p;
-    vd z[3];
-    for (int k = 0; k < 3; k++)
-        z[k] = vd_load_singles(s->points->points + 2, s->points->stride, t->corners + k);
-    const vd z1 = vd_select(t->turned, z[2], z[1]), z2 = vd_select(t->turned, z[1], z[2]);
+    const vd *z = t->z;
+    /* which corner comes second changes the sign of both products and of the area, and no bit else */
+    const vm is_turned = vm_and_not(t->turned, t->to_turn);
+    const vd z1 = vd_select(is_turned, z[2], z[1]), z2 = vd_select(is_turned, z[1], z[2]);
     const vd x1 = vd_sub(t->x[1], t->x[0]), y1 = vd_sub(t->y[1], t->y[0]);
     const vd x2 = vd_sub(t->x[2], t->x[0]), y2 = vd_sub(t->y[2], t->y[0]);
     const vd d1 = vd_sub(z1, z[0]), d2 = vd_sub(z2, z[0]);

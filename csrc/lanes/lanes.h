@@ -26,7 +26,7 @@
  *   vd_power(a, sum, mask)  the number whose bits are `sum` less the bits of a in `mask`
  *   vd_load_records(base, stride, i, c)    four doubles at base + 8 * stride * i[k], as columns
  *   vd_load_pairs(base, stride, first, x, y)    two doubles at base + 8 * stride * first[3 * k], as columns
- *   vd_load_singles(base, stride, first)    one there
+ *   vd_load_triples(base, first, x, y, z)    three doubles at base + 24 * first[3 * k], as columns
  *   vi_ceil(vd)             the next integer that is not less
  *   vf_off_integer, vd_off_integer    a number less the nearest integer
  *   vf_store_pairs, vf_store_triples    pixels of two or three numbers, one after the other

@@ -467,7 +467,7 @@ TL_INLINE void vd_load_records(const double *base, int stride, const int32_t *i,
         c[k] = (vd){half[0][k], half[1][k]};
 }
 
-/* Pairs, and single numbers, at base + 8 * stride * first[3 * lane]. */
+/* Pairs, and rows of three, at base + 8 * stride * first[3 * lane]. */
 TL_INLINE __m256d load_two_pairs(const double *base, int stride, const int32_t *first)
 {
     return _mm256_insertf128_pd(_mm256_castpd128_pd256(_mm_loadu_pd(base + (int64_t)first[0] * stride)),
@@ -480,18 +480,20 @@ TL_INLINE void vd_load_pairs(const double *base, int stride, const int32_t *firs
     *x = (vd){_mm256_unpacklo_pd(even, odd), _mm256_unpacklo_pd(even2, odd2)};
     *y = (vd){_mm256_unpackhi_pd(even, odd), _mm256_unpackhi_pd(even2, odd2)};
 }
-TL_INLINE __m128d load_two_singles(const double *base, int stride, const int32_t *first)
+TL_INLINE __m128d load_two_thirds(const double *base, const int32_t *first)
 {
-    return _mm_loadh_pd(_mm_load_sd(base + (int64_t)first[0] * stride), base + (int64_t)first[3] * stride);
+    return _mm_loadh_pd(_mm_load_sd(base + (int64_t)first[0] * 3 + 2), base + (int64_t)first[3] * 3 + 2);
 }
-TL_INLINE __m256d load_four_singles(const double *base, int stride, const int32_t *first)
+TL_INLINE __m256d load_four_thirds(const double *base, const int32_t *first)
 {
-    return _mm256_insertf128_pd(_mm256_castpd128_pd256(load_two_singles(base, stride, first)),
-                                load_two_singles(base, stride, first + 6), 1);
+    return _mm256_insertf128_pd(_mm256_castpd128_pd256(load_two_thirds(base, first)), load_two_thirds(base, first + 6),
+                                1);
 }
-TL_INLINE vd vd_load_singles(const double *base, int stride, const int32_t *first)
+/* Two loads a row: a masked one of 32 bytes takes longer. */
+TL_INLINE void vd_load_triples(const double *base, const int32_t *first, vd *x, vd *y, vd *z)
 {
-    return (vd){load_four_singles(base, stride, first), load_four_singles(base, stride, first + 12)};
+    vd_load_pairs(base, 3, first, x, y);
+    *z = (vd){load_four_thirds(base, first), load_four_thirds(base, first + 12)};
 }
 TL_INLINE vi vi_ceil(vd a) { return vi_round((vd){_mm256_ceil_pd(a.lo), _mm256_ceil_pd(a.hi)}); }
 /* a less the nearest integer */

@@ -481,7 +481,31 @@ TL_INLINE void vd_load_records(const double *base, int stride, const int32_t *i,
         c[k] = (vd){half[0][k], half[1][k]};
 }
 
-/* Pairs, and single numbers, at base + 8 * stride * first[3 * lane]. */
+/* Eight rows of three doubles at base + 24 * first[3 * lane], as columns. */
+TL_INLINE void load_eight_triples(const double *base, const int32_t *first, __m512d *c)
+{
+    __m512d row[4];
+    for (int k = 0; k < 4; k++) { /* lanes k and k + 4 */
+        const double *a = base + (int64_t)first[3 * k] * 3, *b = base + (int64_t)first[3 * k + 12] * 3;
+        row[k] =
+            _mm512_insertf64x4(_mm512_castpd256_pd512(_mm256_maskz_loadu_pd(7, a)), _mm256_maskz_loadu_pd(7, b), 1);
+    }
+    const __m512d even = _mm512_unpacklo_pd(row[0], row[1]), odd = _mm512_unpacklo_pd(row[2], row[3]);
+    const __m512i low = _mm512_setr_epi64(0, 1, 8, 9, 4, 5, 12, 13),
+                  high = _mm512_setr_epi64(2, 3, 10, 11, 6, 7, 14, 15);
+    c[0] = _mm512_permutex2var_pd(even, low, odd);
+    c[1] = _mm512_permutex2var_pd(_mm512_unpackhi_pd(row[0], row[1]), low, _mm512_unpackhi_pd(row[2], row[3]));
+    c[2] = _mm512_permutex2var_pd(even, high, odd);
+}
+TL_INLINE void vd_load_triples(const double *base, const int32_t *first, vd *x, vd *y, vd *z)
+{
+    __m512d front[3], back[3];
+    load_eight_triples(base, first, front);
+    load_eight_triples(base, first + 24, back);
+    *x = (vd){front[0], back[0]}, *y = (vd){front[1], back[1]}, *z = (vd){front[2], back[2]};
+}
+
+/* Pairs at base + 8 * stride * first[3 * lane]. */
 TL_INLINE __m256d load_two_pairs(const double *base, int stride, const int32_t *first)
 {
     return _mm256_insertf128_pd(_mm256_castpd128_pd256(_mm_loadu_pd(base + (int64_t)first[0] * stride)),
@@ -500,22 +524,6 @@ TL_INLINE void vd_load_pairs(const double *base, int stride, const int32_t *firs
     const __m512d odd2 = load_every_other_pair(base, stride, first + 27);
     *x = (vd){_mm512_unpacklo_pd(even, odd), _mm512_unpacklo_pd(even2, odd2)};
     *y = (vd){_mm512_unpackhi_pd(even, odd), _mm512_unpackhi_pd(even2, odd2)};
-}
-TL_INLINE __m128d load_two_singles(const double *base, int stride, const int32_t *first)
-{
-    return _mm_loadh_pd(_mm_load_sd(base + (int64_t)first[0] * stride), base + (int64_t)first[3] * stride);
-}
-TL_INLINE __m512d load_eight_singles(const double *base, int stride, const int32_t *first)
-{
-    const __m256d low = _mm256_insertf128_pd(_mm256_castpd128_pd256(load_two_singles(base, stride, first)),
-                                             load_two_singles(base, stride, first + 6), 1);
-    const __m256d high = _mm256_insertf128_pd(_mm256_castpd128_pd256(load_two_singles(base, stride, first + 12)),
-                                              load_two_singles(base, stride, first + 18), 1);
-    return _mm512_insertf64x4(_mm512_castpd256_pd512(low), high, 1);
-}
-TL_INLINE vd vd_load_singles(const double *base, int stride, const int32_t *first)
-{
-    return (vd){load_eight_singles(base, stride, first), load_eight_singles(base, stride, first + 24)};
 }
 TL_INLINE __m256i ceil_eight(__m512d a)
 {

@@ -318,15 +318,16 @@ TL_INLINE void vd_load_records(const double *base, int stride, const int32_t *i,
     memcpy(c, base + (int64_t)*i * stride, 32);
 }
 
-/* Pairs, and single numbers, at base + 8 * stride * first[3 * lane]. */
+/* Pairs, and rows of three, at base + 8 * stride * first[3 * lane]. */
 TL_INLINE void vd_load_pairs(const double *base, int stride, const int32_t *first, vd *x, vd *y)
 {
     *x = base[(int64_t)*first * stride];
     *y = base[(int64_t)*first * stride + 1];
 }
-TL_INLINE vd vd_load_singles(const double *base, int stride, const int32_t *first)
+TL_INLINE void vd_load_triples(const double *base, const int32_t *first, vd *x, vd *y, vd *z)
 {
-    return base[(int64_t)*first * stride];
+    const double *row = base + (int64_t)*first * 3;
+    *x = row[0], *y = row[1], *z = row[2];
 }
 /* ceil() is a call where there are no lanes */
 TL_INLINE vi vi_ceil(vd a) { return fabs(a) < 0x1p30 ? (vi)a + ((double)(vi)a < a) : INT32_MIN; }

@@ -59,6 +59,9 @@ TL_INLINE void walk_rows(const tl_triangle *t, const tl_window *window, const tl
     const vd lanes = vd_from_vi(vi_iota());
     const double step = (double)((int64_t)2 << window->subpixel_bits), x0 = sample_x(t, window, t->col0);
     const vd xs = vd_add(vd_set1(x0), ramp(step)), slope_x = vd_set1(t->slope_x);
+    const int is_wide = sink_keeps_order(sink) && t->col1 - t->col0 >= TL_LEAST_WIDE;
+    const double x_left = sample_x(t, window, 0);
+    int n_left = 0;
     int32_t first[TL_MAX_LANES], end[TL_MAX_LANES];
     double z_row[TL_MAX_LANES];
     for (int64_t row0 = t->row0; row0 < t->row1; row0 += TL_LANES) {
@@ -76,6 +79,12 @@ TL_INLINE void walk_rows(const tl_triangle *t, const tl_window *window, const tl
                     put_plain(target, sink, at + first[k], end[k] - first[k], t->id);
                 continue;
             }
+            if (is_wide && first[k] < end[k] && looks_wide(target, end[k] - first[k], n_left)) {
+                const plane_row row = {z_row[k], t->slope_x, x_left, step, t->id};
+                n_left = put_wide(&row, target, sink, row0 + k, t->col0 + first[k], t->col0 + end[k]);
+                continue;
+            }
+            n_left -= n_left > 0;
             const vd z = vd_set1(z_row[k]);
             for (int32_t col = first[k]; col < end[k]; col += TL_LANES) {
                 const vd x = vd_add(xs, vd_set1(col * step));

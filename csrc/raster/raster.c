@@ -311,6 +311,8 @@ static void clear(const tl_window *window, const tl_target *target)
         if (sink_has_depth(target->sink))
             clear_depth(target->depth + at, window->width, farthest);
     }
+    if (target->bounds)
+        clear_depth(target->bounds, tl_segments(target->stride_px) * window->height, farthest);
 }
 
 static int64_t draw_part(const tl_snapped *snapped, const tl_window *window, const tl_target *target, tl_share *share)
@@ -342,6 +344,7 @@ static int64_t draw_bands_of(const tl_snapped *snapped, const tl_window *window,
         part.pixels = target->pixels ? (char *)target->pixels + row * target->stride_px * pixel_bytes : NULL;
         part.depth = target->depth ? target->depth + row * target->stride_px : NULL;
         part.n_samples = part.stride_px * (band.height - 1) + band.width;
+        part.bounds = target->bounds ? target->bounds + row * tl_segments(target->stride_px) : NULL;
         if (share->is_first)
             clear(&band, &part);
         const int64_t bad_row = draw_band(snapped, &band, &part, share);

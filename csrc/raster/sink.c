@@ -160,12 +160,172 @@ TL_INLINE double sample_y(const tl_triangle *t, const tl_window *window, int64_t
     return half_units(row + window->y_px, t->y_fx[0], window->subpixel_bits);
 }
 
+/* A row of a triangle's plane of depth: z + slope_x * x, x at column 0 of the window and from column to column. */
+typedef struct {
+    double z, slope_x, x, step;
+    int32_t id;
+} plane_row;
+
+/* Depths at columns first, first + apart, ... */
+TL_INLINE vf row_depths(const plane_row *r, int64_t first, int64_t apart)
+{
+    const vd x = vd_add(vd_set1(r->x + (double)first * r->step), ramp((double)apart * r->step));
+    return sum_depth(vd_set1(r->z), vd_mul(vd_set1(r->slope_x), x));
+}
+
+#define TL_QUAD (4 * TL_LANES)
+
+/* As put_depths of TL_QUAD columns that are covered whole: equal depths are looked for once. */
+TL_INLINE int put_quad(const tl_target *target, tl_sink sink, int64_t at, const vf *depth, vi id)
+{
+    float *depths = target->depth + at;
+    int32_t *ids = (int32_t *)target->pixels + at;
+    vm wins[4], equal[4];
+    for (int k = 0; k < 4; k++) {
+        const vf old = vf_load(depths + k * TL_LANES);
+        equal[k] = vf_eq(depth[k], old);
+        wins[k] = sink == TL_SINK_NEAREST ? vf_lt(depth[k], old) : vf_lt(old, depth[k]);
+    }
+    if (__builtin_expect(vm_any(vm_or(vm_or(equal[0], equal[1]), vm_or(equal[2], equal[3]))), 0))
+        return 0;
+    for (int k = 0; k < 4; k++) {
+        vf_store_some(depths + k * TL_LANES, wins[k], depth[k], 1);
+        vi_store_some(ids + k * TL_LANES, wins[k], id, 1);
+    }
+    return 1;
+}
+
+TL_INLINE void put_some_columns(const plane_row *r, const tl_target *target, tl_sink sink, int64_t at, int64_t from,
+                                int64_t first, int64_t end)
+{
+    for (int64_t col = from; col < end; col += TL_LANES) {
+        const vm m = vm_and_not(vm_first(end - col), vm_first(first - col));
+        put_depths(target, sink, at + col, m, row_depths(r, col, 1), r->id);
+    }
+}
+
+/* Columns [first, end) of the row that begins at `at`, in vectors that begin at multiples of TL_LANES columns. */
+TL_INLINE void put_columns(const plane_row *r, const tl_target *target, tl_sink sink, int64_t at, int64_t first,
+                           int64_t end)
+{
+    const int64_t whole0 = (first + TL_LANES - 1) & -(int64_t)TL_LANES;
+    const int64_t n_quads = end > whole0 ? (end - whole0) / TL_QUAD : 0, whole1 = whole0 + n_quads * TL_QUAD;
+    if (!n_quads) {
+        put_some_columns(r, target, sink, at, first & -(int64_t)TL_LANES, first, end);
+        return;
+    }
+    if (whole0 > first)
+        put_some_columns(r, target, sink, at, whole0 - TL_LANES, first, whole0);
+    const vd z = vd_set1(r->z), slope_x = vd_set1(r->slope_x), step = vd_set1(r->step * TL_LANES);
+    const vi id = vi_set1(r->id);
+    vd x = vd_add(vd_set1(r->x + (double)whole0 * r->step), ramp(r->step));
+    for (int64_t col = whole0; col < whole1; col += TL_QUAD) {
+        vf depth[4];
+        for (int k = 0; k < 4; k++) {
+            depth[k] = sum_depth(z, vd_mul(slope_x, x));
+            x = vd_add(x, step); /* whole numbers: exact */
+        }
+        if (__builtin_expect(!put_quad(target, sink, at + col, depth, id), 0))
+            put_some_columns(r, target, sink, at, col, col, col + TL_QUAD);
+    }
+    put_some_columns(r, target, sink, at, whole1, whole1, end);
+}
+
+/* As calls: walkers have many copies, and the loops above need all registers. */
+static __attribute__((noinline)) void put_columns_nearest(const plane_row *r, const tl_target *target, int64_t at,
+                                                          int64_t first, int64_t end)
+{
+    put_columns(r, target, TL_SINK_NEAREST, at, first, end);
+}
+static __attribute__((noinline)) void put_columns_farthest(const plane_row *r, const tl_target *target, int64_t at,
+                                                           int64_t first, int64_t end)
+{
+    put_columns(r, target, TL_SINK_FARTHEST, at, first, end);
+}
+
+/* The same without segments in which all that is drawn lies before the triangle.  Along a row depths as they are
+ * rounded never turn back, so those at the ends of a segment bound the others, to the bit.  What a triangle covers
+ * whole is a bound from then on: other depths only come before it.  Returns whether anything was left out. */
+TL_INLINE int put_bounded(const plane_row *r, const tl_target *target, tl_sink sink, int64_t at, float *bounds,
+                          int64_t first, int64_t end)
+{
+    const int64_t size = 1 << TL_SEGMENT_BITS, n_segments = ((end - 1) >> TL_SEGMENT_BITS) + 1;
+    const int64_t whole0 = (first + size - 1) >> TL_SEGMENT_BITS, whole1 = end >> TL_SEGMENT_BITS;
+    int is_any_behind = 0;
+    for (int64_t i = first >> TL_SEGMENT_BITS; i < n_segments; i += TL_LANES) {
+        const vm live = vm_first(n_segments - i);
+        const vf left = row_depths(r, i * size, size), right = row_depths(r, i * size + size - 1, size);
+        const vf low = vf_min(left, right), high = vf_max(left, right), bound = vf_load_masked(live, bounds + i);
+        const vm is_behind = sink == TL_SINK_NEAREST ? vf_lt(bound, low) : vf_lt(high, bound);
+        const vm whole = vm_and_not(vm_first(whole1 - i), vm_first(whole0 - i));
+        unsigned shown = vm_bits(vm_and_not(live, is_behind));
+        is_any_behind |= vm_any(vm_and(live, is_behind));
+        if (!shown)
+            continue;
+        vf_store_masked(bounds + i, vm_and(live, whole),
+                        sink == TL_SINK_NEAREST ? vf_min(high, bound) : vf_max(low, bound));
+        while (shown) { /* a run of segments at a time */
+            const int from = __builtin_ctz(shown), n = __builtin_ctz(~(shown >> from));
+            const int64_t col0 = max64((i + from) * size, first), col1 = min64((i + from + n) * size, end);
+            if (sink == TL_SINK_NEAREST)
+                put_columns_nearest(r, target, at, col0, col1);
+            else
+                put_columns_farthest(r, target, at, col0, col1);
+            shown &= ~(((1u << n) - 1) << from);
+        }
+    }
+    return is_any_behind;
+}
+
+/* The sinks that keep what comes first by depth, whatever comes when. */
+TL_INLINE int sink_keeps_order(tl_sink sink) { return sink == TL_SINK_NEAREST || sink == TL_SINK_FARTHEST; }
+
+/* Columns of a triangle from which on its rows may look at bounds, and of a row from which on it does, or is drawn by
+ * whole vectors.  To look takes as long as to draw 40 columns; so a shorter row looks only if none of the last
+ * TL_UNLOOKED rows did without leaving anything out. */
+#define TL_LEAST_WIDE 128
+#define TL_LONG_ROW 192
+#define TL_UNLOOKED 3
+TL_INLINE int looks_wide(const tl_target *target, int64_t n, int n_left)
+{
+    return n >= TL_LONG_ROW || (target->bounds && n_left == 0);
+}
+
+/* Such a row, [first, end).  Returns how many shorter ones then do not look. */
+#define TL_PUT_WIDE(NAME, SINK, PUT_COLUMNS)                                                                           \
+    static __attribute__((noinline)) int NAME(const plane_row *r, const tl_target *target, int64_t row, int64_t first, \
+                                              int64_t end)                                                             \
+    {                                                                                                                  \
+        const int64_t at = row * target->stride_px;                                                                    \
+        if (!target->bounds) {                                                                                         \
+            PUT_COLUMNS(r, target, at, first, end);                                                                    \
+            return 0;                                                                                                  \
+        }                                                                                                              \
+        float *bounds = target->bounds + row * tl_segments(target->stride_px);                                         \
+        return put_bounded(r, target, SINK, at, bounds, first, end) ? 0 : TL_UNLOOKED;                                 \
+    }
+TL_PUT_WIDE(put_wide_nearest, TL_SINK_NEAREST, put_columns_nearest)
+TL_PUT_WIDE(put_wide_farthest, TL_SINK_FARTHEST, put_columns_farthest)
+
+TL_INLINE int put_wide(const plane_row *r, const tl_target *target, tl_sink sink, int64_t row, int64_t first,
+                       int64_t end)
+{
+    return sink == TL_SINK_NEAREST ? put_wide_nearest(r, target, row, first, end)
+                                   : put_wide_farthest(r, target, row, first, end);
+}
+
 /* A span with depth from the plane: (z0 + slope_y * y) + slope_x * x. */
 TL_INLINE void put_plane(const tl_triangle *t, const tl_window *window, const tl_target *target, tl_sink sink,
                          int64_t row, int64_t first, int64_t end)
 {
     const double step = (double)((int64_t)2 << window->subpixel_bits), x = sample_x(t, window, first);
-    const vd z_row = vd_set1(t->z[0] + t->slope_y * sample_y(t, window, row)), slope_x = vd_set1(t->slope_x);
+    const double z = t->z[0] + t->slope_y * sample_y(t, window, row);
+    if (sink_keeps_order(sink) && end - first >= TL_LEAST_WIDE && looks_wide(target, end - first, 0)) {
+        const plane_row wide = {z, t->slope_x, sample_x(t, window, 0), step, t->id};
+        put_wide(&wide, target, sink, row, first, end);
+        return;
+    }
+    const vd z_row = vd_set1(z), slope_x = vd_set1(t->slope_x);
     const vd steps = ramp(step);
     const int64_t at = row * target->stride_px;
     for (int64_t col = first; col < end; col += TL_LANES) {

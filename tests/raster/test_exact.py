@@ -282,6 +282,22 @@ def test_bands_a_quarter_as_wide_draw_wrong_pixels(isa, edge):
         assert (count(vertices, (64, 56), 0.25) != expected).any()
 
 
+@ON_EACH_ISA
+def test_bands_of_small_boxes_draw_wrong_pixels_when_they_are_a_twentieth_as_wide(isa):
+    """Edges that pass samples within 2**-22 px: float32 errs by less than the proof allows, but by more than that."""
+    rng, n, size = np.random.default_rng(0), 100_000, (1024, 1024)
+    place = np.arange(n)[:, None] // [1, 126] % 126 * 8 + 8.5 + rng.integers(0, 3, (n, 2))
+    along = rng.uniform(-2, 2, (n, 2))
+    across = along[:, ::-1] * [-1, 1] / np.linalg.norm(along, axis=1, keepdims=True)
+    share, near = rng.uniform(0.05, 0.95, (n, 1)), place + across * rng.uniform(-(2.0**-22), 2.0**-22, (n, 1))
+    third = place + across * rng.choice([-1, 1], (n, 1)) + along * rng.uniform(-0.5, 0.5, (n, 1))
+    vertices = np.stack([near - share * along, near + (1 - share) * along, third], axis=1).reshape(-1, 2)
+    with on(isa):
+        proved = count(vertices, size, 1.0)
+        assert (count(vertices, size, 0.05) != proved).any()
+        assert (count(vertices, size, 2.0) == proved).all()
+
+
 # ---- other verbs, and what is refused -------------------------------------------------------------------------------
 
 

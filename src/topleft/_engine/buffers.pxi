@@ -120,9 +120,11 @@ cdef class Target:
     cdef int sample_bits
     cdef const int32_t[:, ::1] samples
     cdef int32_t flip
+    cdef float[:, ::1] bounds
 
-    def __init__(self, int sink, pixels, depth, covered, samples=None, bint earlier_wins=False):
-        self.sink, self.flip = sink, TL_FLIP if earlier_wins else 0
+    def __init__(self, int sink, pixels, depth, covered, samples=None, bint earlier_wins=False, bounds=None):
+        """`bounds`: `bounds_shape` float32, with which large triangles leave out what lies behind."""
+        self.sink, self.flip, self.bounds = sink, TL_FLIP if earlier_wins else 0, bounds
         self.height, self.width = pixels.shape
         self.pixel_bytes = pixels.itemsize
         self.pixels, self.depth, self.covered = as_bytes(pixels), depth, covered
@@ -132,6 +134,11 @@ cdef class Target:
     def covered_shape(int64_t height, int64_t width, int64_t n_samples=1):
         """Return the shape of the uint64 scratch that a mask needs: any rows of it are enough for as many of the mask."""
         return height, tl_covered_words(width * n_samples)
+
+    @staticmethod
+    def bounds_shape(int64_t height, int64_t width):
+        """Return the shape of the float32 scratch that bounds of depth take."""
+        return height, tl_segments(width)
 
     cdef tl_target rows(self, int64_t first_row) noexcept:
         """The buffers from a row on."""
@@ -143,6 +150,7 @@ cdef class Target:
         t.covered = &self.covered[first_row, 0] if self.covered is not None else NULL
         t.stride_px = self.width
         t.flip = self.flip
+        t.bounds = &self.bounds[first_row, 0] if self.bounds is not None else NULL
         t.sample_bits = self.sample_bits
         t.samples_fx = &self.samples[0, 0] if self.samples is not None else NULL
         return t

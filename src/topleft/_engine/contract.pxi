@@ -86,8 +86,10 @@ cdef extern from "topleft.h" nogil:
         const int32_t *samples_fx
         int sample
         int32_t flip
+        float *bounds
         const tl_peeled *peeled
     int64_t tl_covered_words(int64_t)
+    int64_t tl_segments(int64_t)
     ctypedef struct tl_bins:
         int64_t n
         int32_t *ids

@@ -74,7 +74,10 @@ class Target:
         covered: U64 | None,
         samples: I32 | None = None,
         earlier_wins: bool = False,
+        bounds: F32 | None = None,
     ) -> None: ...
+    @staticmethod
+    def bounds_shape(height: int, width: int) -> tuple[int, int]: ...
     @staticmethod
     def covered_shape(height: int, width: int, n_samples: int = 1) -> tuple[int, int]: ...
 

@@ -290,6 +290,10 @@ def memory_of(facts: Facts) -> tuple[dict[str, int], dict[str, int]]:
         scratch["bins"] = 12 * (n + 16)
         scratch["bands"] = 4 * (n + 1)
     found = facts.clusters
+    is_whole = found is None or found.clusters is None
+    if facts.route is Route.DEPTH and facts.drawing.is_bounded and is_whole:
+        rows, segments = _engine.Target.bounds_shape(height, width)
+        scratch["bounds"] = 4 * rows * segments
     if found is not None and found.clusters is not None:  # the records are not needed, unless a plane cuts
         scratch["records"] = 0 if not facts.n_clipped else scratch["records"]
         scratch["clusters"] = 12 * len(found.clusters) + 4 * facts.drawing.n_threads * n + found.clusters.n_bytes

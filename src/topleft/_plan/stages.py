@@ -357,6 +357,9 @@ def plan_depth(facts: Facts, costs: Costs) -> Stage:
     if facts.common_depth is not None:
         why = f"every vertex lies at depth {facts.common_depth:g}, but little of the picture is covered"
         rejected = ("ids alone, and a pass over all pixels for depth: longer than the comparisons",)
+    if facts.drawing.is_bounded:
+        what += "; large triangles leave out what lies behind"
+        why += "; rows of triangles are long, so a bound of depth is kept for each 64 columns of a row"
     return Stage("depth", what, why, rejected, timed_in="method")
 
 

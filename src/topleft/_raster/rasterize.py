@@ -51,7 +51,7 @@ def draw(
     earlier_wins: bool = False,
 ) -> None:
     """Clear contiguous buffers and draw a mesh into them, in bands of rows."""
-    (width, height), (sink, n_parts, is_shared) = view.size, drawing
+    (width, height), (sink, n_parts, is_shared, is_bounded) = view.size, drawing
     if 0 in view.size:
         return
     covered: NDArray[np.uint64] | None = None
@@ -61,7 +61,8 @@ def draw(
     if sink in (Sink.MASK, Sink.SAMPLES):
         n_samples = 1 if samples is None else len(samples)
         covered = memory.empty("covered", _engine.Target.covered_shape(height, width, n_samples), np.uint64)
-    target = _engine.Target(sink, pixels, depth, covered, samples, earlier_wins)
+    bounds = memory.empty("bounds", _engine.Target.bounds_shape(height, width), np.float32) if is_bounded else None
+    target = _engine.Target(sink, pixels, depth, covered, samples, earlier_wins, bounds)
 
     def draw_rows(first: int, end: int) -> int:
         return snapped.mesh.draw(target, first, end - first)
@@ -212,7 +213,7 @@ def draw_all_samples(
     width, height = view.size
     if not (width and height):
         return
-    sink, n_threads, _ = drawing
+    sink, n_threads, *_ = drawing
     is_near = snapped.n_triangles > 0 and choices.can_share(view)
     if draw_planes(
         memory, snapped.mesh, snapped.n_triangles, positions, sink, pixels, depth, n_threads, is_near=is_near
