@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,9 +13,10 @@ from benchmarks.accuracy import study as accuracy
 from benchmarks.accuracy.filling import samplings
 from benchmarks.accuracy.options import Options
 from benchmarks.accuracy.stability import CHANGES, count_flips, touch
+from benchmarks.accuracy.tables import with_no_snap
 from benchmarks.exact.area import draw_area
 from benchmarks.exact.unsnapped import draw_unsnapped, edge_sign, meets_pixel
-from benchmarks.scenes.families import FAMILIES, Entry, entries, in_cells
+from benchmarks.scenes.families import FAMILIES, NO_SNAP, Entry, entries, in_cells
 
 import topleft as tl
 from topleft import scenes
@@ -166,6 +168,17 @@ def test_stability_inclusive_spans_overdraw(tiny):
     (row,) = (row for row in tiny["stability"] if row["method"].startswith("row_crossing"))
     assert row["overdrawn"] > 0
     assert row["reorder"] > 0
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_chart_no_snap_is_the_first_mark_of_those_without_a_wrong_pixel(family):
+    """Of the record that the page's chart is drawn from: the engine, and next to nobody near it."""
+    record = json.loads((Path(accuracy.__file__).parents[1] / "records/accuracy.json").read_text())
+    rows = [*with_no_snap(record), *record["pure"], *record["peers"]]
+    right = sorted((row["ns_triangle"], row.get("precision")) for row in rows
+                   if row["family"] == family and row["wrong_px"] == 0)  # fmt: skip
+    assert right[0][1] == NO_SNAP
+    assert right[1][0] > 5 * right[0][0]
 
 
 def test_accuracy_command_writes_what_report_prints(tmp_path, capsys):
