@@ -81,6 +81,17 @@ def test_the_least_block_with_room_is_given():
     assert address(memory.empty((70_000,), np.uint8)) == at
 
 
+def test_sizes_near_2_63_fit_no_block_that_waits():
+    def refuse(n_bytes):
+        raise MemoryError(f"no {n_bytes:,} bytes")
+
+    memory.empty(SIZE, np.int32)
+    for n_asked in (2**63 - 1, 2**63 - 2**40):
+        with pytest.raises(MemoryError, match=f"no {n_asked:,} bytes"):
+            _engine.lease_block(n_asked, refuse)
+    assert _engine.waiting_memory() == N_BYTES
+
+
 def test_no_more_waits_than_the_bound_and_what_waited_longest_goes_first():
     _engine.keep_blocks(2 * N_BYTES)
     arrays = [memory.empty(SIZE, np.int32) for _ in range(3)]

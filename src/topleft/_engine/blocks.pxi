@@ -61,15 +61,15 @@ cdef void drop_blocks(int64_t n_bytes) noexcept:
 cdef Block find_block(int64_t n_bytes):
     """The smallest block that waits and has room for so much, unless much of it would be left; None if there is none."""
     global waiting_bytes
-    cdef int64_t i, best = -1, n_found = 0
-    cdef int64_t most = n_bytes + n_bytes // 4 + (2 << 20 if n_bytes >= 4 << 20 else 0)
+    cdef int64_t i, best = -1, n_left = 0
+    cdef int64_t most_left = n_bytes // 4 + (2 << 20 if n_bytes >= 4 << 20 else 0)
     cdef Block block = None
     with cython.critical_section(waiting_blocks):
         for i in range(<int64_t>len(waiting_blocks) - 1, -1, -1):
-            n_found = (<Block>waiting_blocks[i]).n_bytes
-            if n_bytes <= n_found <= most:
-                best, most = i, n_found - 1
-                if n_found == n_bytes:
+            n_left = (<Block>waiting_blocks[i]).n_bytes - n_bytes
+            if 0 <= n_left <= most_left:
+                best, most_left = i, n_left - 1
+                if n_left == 0:
                     break
         if best >= 0:
             block = waiting_blocks.pop(best)
