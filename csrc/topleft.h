@@ -105,10 +105,11 @@ typedef struct {
     tl_pause *pause; /* or NULL: what has begun is drawn to its end */
 } tl_window;
 
-/* Counts work that takes as long as so many pixels of a large triangle. */
+/* Counts work that takes as long as so many pixels of a large triangle, up to 2^62; not below the next question, where
+ * the sum could overflow. */
 static inline void tl_count_work(const tl_window *window, int64_t n_px)
 {
-    if (window->pause)
+    if (window->pause && window->pause->left_px >= 0)
         window->pause->left_px -= n_px;
 }
 

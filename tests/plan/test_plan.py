@@ -420,3 +420,10 @@ def test_page_has_a_plan_of_each_scene():
         words = " ".join(section.split())
         for name in ("transform", "clip", "snap", "depth"):
             assert " ".join(stage(found, name).why.split()) in words
+
+
+def test_plan_of_large_triangles_in_the_largest_picture():
+    """Pixels of all together are more than 2^63, which counters of work are not to hold."""
+    corners = np.array([[-1.0, -1], [2.0**33, -1], [-1, 2.0**33]])
+    plan = tl.plan(corners, np.zeros((16, 3), int) + [0, 1, 2], (2**31 - 1, 2**31 - 1))
+    assert "16 triangles" in plan.explain()
