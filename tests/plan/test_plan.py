@@ -423,7 +423,9 @@ def test_page_has_a_plan_of_each_scene():
 
 
 def test_plan_of_large_triangles_in_the_largest_picture():
-    """Pixels of all together are more than 2^63, which counters of work are not to hold."""
-    corners = np.array([[-1.0, -1], [2.0**33, -1], [-1, 2.0**33]])
-    plan = tl.plan(corners, np.zeros((16, 3), int) + [0, 1, 2], (2**31 - 1, 2**31 - 1))
-    assert "16 triangles" in plan.explain()
+    """All together they have more than 2^63 pixels, which overflowed a count: UBSan says so (.ci/sanitize)."""
+    rng = np.random.default_rng(0)
+    corners = np.hstack([rng.uniform(-2, 2, (48, 3)), rng.uniform(0.001, 1, (48, 1))])
+    size, origin = (2**31 - 1, 2**31 - 1), (-(2**31), -(2**31))
+    plan = tl.plan(corners, rng.integers(0, 48, (64, 3)), size, outputs="coverage", subpixel_bits=0, origin=origin)
+    assert "64 triangles" in plan.explain()
