@@ -452,16 +452,14 @@ class Camera:
         check_choice("fit", fit, get_args(FitOption))
         points = None if fit == "sphere" else box_corners(ends) if fit == "box" else points_to_frame(framed)
         angles = azimuth_deg, elevation_deg, fov_y_deg
-        return cls._around(ends, points, *angles, up=up, ortho=ortho, aspect=aspect, fills=fit == "silhouette")
+        return cls._around(ends, points, angles, up=up, ortho=ortho, aspect=aspect, fills=fit == "silhouette")
 
     @classmethod
     def _around(
         cls,
         ends: F64,
         points: F64 | None = None,
-        azimuth_deg: float = THREE_QUARTER_DEG[0],
-        elevation_deg: float = THREE_QUARTER_DEG[1],
-        fov_y_deg: float = DEFAULT_FOV_Y_DEG,
+        angles: tuple[float, float, float] = (*THREE_QUARTER_DEG, DEFAULT_FOV_Y_DEG),
         *,
         up: UpOption = "y",
         ortho: bool = False,
@@ -469,6 +467,7 @@ class Camera:
         fills: bool = False,
     ) -> Camera:
         """A camera that has the sphere round these ends just inside its frame, or the points, or fills it with them."""
+        azimuth_deg, elevation_deg, fov_y_deg = angles
         center, radius = bounding_sphere(ends)
         check_fov(fov_y_deg)
         check_positive("aspect", aspect)

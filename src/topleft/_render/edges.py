@@ -36,11 +36,8 @@ def draw_all_edges(
 ) -> None:
     """Draw the edges of every instance that the visibility buffer does not hide."""
     for instance in scene_of(subject):
-        own_camera, own_cull, back = (
-            camera.placed(instance.transform),
-            cull_of(cull, instance),
-            cull_of("back", instance),
-        )
+        own_camera, own_cull = camera.placed(instance.transform), cull_of(cull, instance)
+        back = cull_of("back", instance)
         is_single = instance.mesh.single_sided(options.material)
         kinds = [(instance.mesh, own_cull)]
         if is_single is not None and own_cull != back:
@@ -48,7 +45,6 @@ def draw_all_edges(
             if own_cull == "none":  # of the others the edges of what shows its front
                 kinds.append((some_of(instance.mesh, is_single == 1), back))
         for mesh, side in kinds:
-            own_camera = camera.placed(instance.transform)
             draw_edges(picture, frags, mesh, own_camera, cull=side, threads=options.threads)
 
 
