@@ -9,6 +9,7 @@ from hypothesis import given
 from polygon_cases import SIZE, cells, square, star, wild_polygon, wild_seeds
 
 import topleft as tl
+from topleft._base import memory
 from topleft._polygons import overlap
 from topleft._polygons.prepared import Prepared
 from topleft.methods.reference import polygons as ref
@@ -127,7 +128,7 @@ def test_table_that_a_thread_cannot_finish_raises(monkeypatch):
 @pytest.mark.parametrize(("most", "squares_listed"), [(1300, 3), (2100, 5), (9000, 12)])
 def test_table_that_grows_beyond_memory_is_refused(monkeypatch, most, squares_listed):
     """Linux gives each part of it, and ends the process when they are written."""
-    real, listed = overlap.check_fits, []
+    real, listed = memory.check_fits, []
 
     def check_fits(shape, *dtypes):
         if shape[0] > most:
