@@ -65,7 +65,7 @@ static __attribute__((noinline)) void ask_blend_rows(exact_state *s, int i, lane
 {
     const box_queue *q = &s->rows.boxes;
     int32_t sample[TL_MAX_LANES];
-    if (vm_any(vm_and(try_grid(s, t), doubted))) {
+    if (vm_any(vm_and(try_grid(s, t, 0), doubted))) {
         sort_exact_edges(s, t, TL_FAR_BAND, e);
         doubted = find_blend_rows(t, e, n_cols, n_rows, stride, rows);
     }

@@ -6,6 +6,7 @@
 #ifndef TL_BOXES_EXACT_C
 #define TL_BOXES_EXACT_C
 
+#include <math.h>
 #include <stdint.h>
 
 #include "topleft.h"
@@ -25,27 +26,25 @@ TL_INLINE vm in_box(vm live, vi n_cols, vi n_rows, int row, int col)
     return vm_and(live, vm_and(vi_gt(n_rows, vi_set1(row)), vi_gt(n_cols, vi_set1(col))));
 }
 
-/* Sets `in` to what lanes decide; returns the lanes that are in doubt at some sample. */
+/* Sets `in` to what lanes decide; returns the lanes that are in doubt at some sample, in the box or beside it. */
 TL_INLINE vm test_boxes(const lane_exact *t, vi n_cols, vi n_rows, int size, box_masks in)
 {
     const vf band = vf_select(t->on_grid, vf_set1(0.0f), vf_mul(t->xy, vf_set1(TL_BOX_BAND)));
-    const vf below = vf_sub(vf_set1(0.0f), band);
-    vm doubted = vm_first(0);
+    vf closest = vf_set1(INFINITY);
     vf row_e[3] = {t->e[0], t->e[1], t->e[2]};
     for (int row = 0; row < size; row++) {
         vf e[3] = {row_e[0], row_e[1], row_e[2]};
         for (int col = 0; col < size; col++) {
-            const vm box = in_box(t->live, n_cols, n_rows, row, col);
             const vf least = vf_min(vf_min(e[0], e[1]), e[2]);
-            in[row][col] = vm_and(box, vf_lt(band, least));
-            doubted = vm_or(doubted, vm_and_not(vm_and(box, vf_ge(least, below)), in[row][col]));
+            in[row][col] = vm_and(in_box(t->live, n_cols, n_rows, row, col), vf_lt(band, least));
+            closest = vf_min_size(closest, least);
             for (int k = 0; k < 3; k++)
                 e[k] = vf_sub(e[k], t->dy[k]);
         }
         for (int k = 0; k < 3; k++)
             row_e[k] = vf_add(row_e[k], t->dx[k]);
     }
-    return vm_and_not(doubted, t->on_grid);
+    return vm_and_not(vm_and(t->live, vf_ge(band, closest)), t->on_grid);
 }
 
 /* Decides the samples in doubt that float64 lanes can; returns the others. */
@@ -70,7 +69,7 @@ static __attribute__((noinline)) void ask_boxes(exact_state *s, lane_exact *t, v
     double sample_x[TL_MAX_LANES], sample_y[TL_MAX_LANES];
     vi_store(ids, t->ids), vd_store(sample_x, t->sample_x), vd_store(sample_y, t->sample_y);
     turn_points(t);
-    try_grid(s, t);
+    try_grid(s, t, 1);
     const vf band = vf_select(t->on_grid, vf_set1(0.0f), vf_mul(t->xy, vf_set1(TL_BOX_BAND)));
     const vf below = vf_sub(vf_set1(0.0f), band);
     for (int row = 0; row < size; row++) {

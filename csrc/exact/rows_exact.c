@@ -200,7 +200,7 @@ static __attribute__((noinline)) void ask_middle_rows(exact_state *s, const box_
     const vi zero = vi_set1(0), n_cols = vi_and(vi_load(q->size + i), vi_set1(0xffff));
     vf inverse[3], band[3];
     unsigned unsure_rows[TL_MIDDLE_BOX], any = 0;
-    try_grid(s, t);
+    try_grid(s, t, 0);
     set_bands(s, t, TL_NEAR_BAND, inverse, band);
     for (int row = 0; row < n_rows; row++) {
         const vd py = vd_add(t->sample_y, vd_set1(row));
@@ -431,7 +431,7 @@ TL_INLINE void flush_rows_exact(exact_state *s, tl_sink sink)
         const int64_t n_asked = s->counts->n_asked;
         TL_SINK_CALL(draw_all_rows_exact, s->target->sink, s, &r, i, vm_bits(t.live), &t, sample)
         if (s->counts->n_asked != n_asked)
-            try_grid(s, &t);
+            try_grid(s, &t, 0);
     }
     q->n = 0;
 }

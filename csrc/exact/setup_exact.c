@@ -22,8 +22,10 @@
  * 4. A band above 1/2, of a nearly level edge, asks every row: |q - nearest integer| <= 1/2.  A level edge is never
  *    asked: the box, which is exact, says what it says.  A difference that only float32 takes for 0 is set to 1e-30.
  *    Squares are tested at corners up to a pixel outside the extent: X and Y are then two pixels more.
- * 5. Vertices on 2^-8 px: the same numbers as integers of 2^-8 px, as batch.c and rows.c have them, which are exact:
- *    the band is 0.  Ties are systematic on grids, so lanes that ask are looked at.
+ * 5. Vertices on 2^-8 px: ties are systematic, so lanes that ask are looked at, and the band of those on the grid is 0.
+ *    Boxes of up to 4x4 samples: points are measured without an error, edge functions are multiples of 2^-16, and while
+ *    XY <= 64 nothing is rounded in 2., as all its numbers are below 2^7; they are moved by half a unit where a tie is
+ *    not within, and otherwise the other way.  Larger boxes: integers of 2^-8 px, as batch.c and rows.c have them.
  *
  * tests/raster/test_exact.py draws with bands four times narrower, which give wrong pictures. */
 #ifndef TL_SETUP_EXACT_C
@@ -42,6 +44,9 @@
 #define TL_BOX_BAND 0x1.8p-20f /* 24 u */
 #define TL_ROW_BAND 0x1.8p-22f /* 6 u */
 #define TL_GRID_BITS 8
+#define TL_GRID_VECTORS 64    /* on fine grids few vectors have a tie */
+#define TL_EXACT_BOX 64.0f    /* pixels */
+#define TL_HALF_UNIT 0x1p-17f /* half of what edge functions on the grid are multiples of */
 
 /* A queue of boxes, and X * Y of each extent. */
 typedef struct {
@@ -61,7 +66,7 @@ typedef struct {
     double centre_x, centre_y;        /* of a pixel's sample, from its upper left corner; of squares 0 */
     vi last_vertex;
     int64_t bad_row;    /* of triangles, -1: none so far */
-    int may_be_on_grid; /* the triangles that asked last were */
+    int may_be_on_grid; /* the triangles that asked last were: of so many vectors, that is looked at first */
     exact_queue small, middle, rows;
     int n_slivers; /* triangles of the queues that have no depth plane, and wait to be drawn by themselves */
     int32_t slivers[4 * (TL_QUEUE + TL_MAX_LANES)];
@@ -214,9 +219,10 @@ TL_INLINE void set_float_edges(lane_exact *t)
 }
 
 /* The same for boxes of up to 4x4 samples, from points in float32; finds the turns, too. */
-TL_INLINE void set_box_edges(const exact_state *s, lane_exact *t)
+TL_INLINE void set_box_edges(const exact_state *s, lane_exact *t, vm on_grid)
 {
-    const vf zero = vf_set1(0.0f), one = vf_set1(1.0f), band = vf_mul(t->xy, vf_set1(TL_BOX_BAND));
+    const vf zero = vf_set1(0.0f), one = vf_set1(1.0f);
+    const vf band = vf_select(on_grid, zero, vf_mul(t->xy, vf_set1(TL_BOX_BAND)));
     const vf inside = t->test == TL_TEST_OUTER ? one : zero, outside = t->test == TL_TEST_OUTER ? zero : one;
     vf x[3], y[3];
     for (int k = 0; k < 3; k++) {
@@ -226,8 +232,10 @@ TL_INLINE void set_box_edges(const exact_state *s, lane_exact *t)
     const vf x1 = vf_sub(x[1], x[0]), y1 = vf_sub(y[1], y[0]), x2 = vf_sub(x[2], x[0]), y2 = vf_sub(y[2], y[0]);
     const vf area = vf_sub(vf_mul(x1, y2), vf_mul(y1, x2));
     t->turned = t->to_turn = vf_lt(area, vf_sub(zero, band));
-    if (__builtin_expect(vm_any(vm_and_not(t->live, vm_or(vf_lt(band, area), t->turned))), 0))
-        find_turns(s, t, vm_first(0));
+    const vm not_told = vm_and_not(t->live, vm_or(vf_lt(band, area), t->turned));
+    t->live = vm_and_not(t->live, vm_and(not_told, on_grid));
+    if (__builtin_expect(vm_any(vm_and_not(not_told, on_grid)), 0))
+        find_turns(s, t, on_grid);
     const vf old_x = x[1], old_y = y[1];
     x[1] = vf_select(t->turned, x[2], old_x), y[1] = vf_select(t->turned, y[2], old_y);
     x[2] = vf_select(t->turned, old_x, x[2]), y[2] = vf_select(t->turned, old_y, y[2]);
@@ -245,15 +253,29 @@ TL_INLINE void set_box_edges(const exact_state *s, lane_exact *t)
     }
 }
 
-/* The triangles of which all vertices lie on 2^-8 px. */
-static __attribute__((noinline)) vm find_on_grid(const lane_exact *t)
+/* The triangles of which all vertices lie on 2^-8 px; of_boxes: and that are so small that set_box_edges is exact. */
+TL_INLINE vm find_on_grid(const exact_state *s, const lane_exact *t, int of_boxes)
 {
-    vm good = vm_all();
+    vd off = vd_set1(0.0);
+    for (int k = 0; k < 3; k++)
+        off = vd_or(off, vd_or(vd_off_256th(t->x[k]), vd_off_256th(t->y[k])));
+    const vm good = vd_ge(vd_set1(0.0), vd_abs(off));
+    return of_boxes ? vm_and(good, vf_ge(vf_set1(TL_EXACT_BOX * (float)s->points->band), t->xy)) : good;
+}
+
+/* Moves what set_box_edges made of the lanes in m by half a unit, outwards where an edge owns its ties and else inwards:
+ * none is ever 0 at a sample then. */
+TL_INLINE void set_ties(lane_exact *t, vm m)
+{
+    const vf zero = vf_set1(0.0f), half = vf_set1(TL_HALF_UNIT), wide = vf_set1(0x1p15f);
+    const vf other = t->test == TL_TEST_OUTER ? vf_sub(zero, half) : half;
     for (int k = 0; k < 3; k++) {
-        const vd unit = vd_set1((double)(1 << TL_GRID_BITS)), x = vd_mul(t->x[k], unit), y = vd_mul(t->y[k], unit);
-        good = vm_and(good, vm_and(vd_ge(vd_floor(x), x), vd_ge(vd_floor(y), y)));
+        /* left: dy < 0, top: dy = 0 and dx > 0; as one number, |dx| <= 64 and dy a multiple of 2^-8 */
+        const vm top_left = vf_lt(vf_fma(t->dy[k], wide, vf_sub(zero, t->dx[k])), zero);
+        const vf moved = t->test != TL_TEST_SAMPLE ? other : vf_select(top_left, half, vf_sub(zero, half));
+        t->e[k] = vf_select(m, vf_add(t->e[k], moved), t->e[k]);
     }
-    return good;
+    t->on_grid = vm_or(t->on_grid, m);
 }
 
 /* Sets the edge functions of the lanes in m to those of batch.c, half a unit inwards: none is ever 0 at a sample. */
@@ -290,12 +312,15 @@ static __attribute__((noinline)) void set_grid_edges(lane_exact *t, vm m)
 }
 
 /* Looks whether triangles that ask lie on the grid, and if so takes their edges from it; returns which. */
-static __attribute__((noinline)) vm try_grid(exact_state *s, lane_exact *t)
+static __attribute__((noinline)) vm try_grid(exact_state *s, lane_exact *t, int of_boxes)
 {
-    const vm good = vm_and_not(find_on_grid(t), t->on_grid);
+    const vm good = vm_and_not(find_on_grid(s, t, of_boxes), t->on_grid);
     if (vm_any(vm_and(good, t->live))) {
-        set_grid_edges(t, vm_or(good, t->on_grid));
-        s->may_be_on_grid = 1;
+        s->may_be_on_grid = TL_GRID_VECTORS;
+        if (of_boxes)
+            set_ties(t, good);
+        else
+            set_grid_edges(t, vm_or(good, t->on_grid));
     }
     return good;
 }
@@ -373,28 +398,28 @@ TL_INLINE void pop_exact(const exact_state *s, tl_sink sink, const exact_queue *
 /* Edge functions of triangles that have been loaded.  of_boxes, a constant: of up to 4x4 samples. */
 TL_INLINE void setup_exact(exact_state *s, tl_sink sink, lane_exact *t, int of_boxes)
 {
-    const vm good = s->may_be_on_grid ? find_on_grid(t) : vm_first(0);
-    const int needs_floats = !s->may_be_on_grid || vm_any(vm_and_not(t->live, good));
+    const vm good = s->may_be_on_grid ? find_on_grid(s, t, of_boxes) : vm_first(0);
     s->counts->n_triangles += __builtin_popcount(vm_bits(t->live));
-    if (!of_boxes || !needs_floats)
+    if (of_boxes) {
+        set_box_edges(s, t, good);
+    } else {
         find_turns(s, t, good);
-    if (!of_boxes) {
         turn_points(t);
         if (sink_has_depth(sink))
             take_out_slivers(s, t);
+        if (!s->may_be_on_grid || vm_any(vm_and_not(t->live, good)))
+            set_float_edges(t);
+        else
+            for (int k = 0; k < 3; k++)
+                t->e[k] = t->dx[k] = t->dy[k] = vf_set1(0.0f);
     }
-    if (!needs_floats)
-        for (int k = 0; k < 3; k++)
-            t->e[k] = t->dx[k] = t->dy[k] = vf_set1(0.0f);
-    else if (of_boxes)
-        set_box_edges(s, t);
-    else
-        set_float_edges(t);
     cull_turned(s, t);
     if (__builtin_expect(s->may_be_on_grid, 0)) {
-        if (vm_any(good))
+        if (of_boxes)
+            set_ties(t, good);
+        else if (vm_any(good))
             set_grid_edges(t, good);
-        s->may_be_on_grid = vm_any(good);
+        s->may_be_on_grid = vm_any(good) ? s->may_be_on_grid - 1 : 0;
         s->counts->n_on_grid += __builtin_popcount(vm_bits(vm_and(t->on_grid, t->live)));
     }
 }

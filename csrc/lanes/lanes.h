@@ -19,6 +19,7 @@
  *   vi_shift_in(a, before)  a one lane up, the last lane of `before` in lane 0
  *   vf_fma(a, b, c)         a * b + c, rounded once
  *   vf_min, vf_max          the second number when one is NaN
+ *   vf_min_size(a, b)       the lesser of a >= 0 and |b|
  *   v?_lookup(table, i)     table[i & 15] of sixteen numbers
  *   v?_pick(p, i)           p[i] of TL_LANES numbers that lie together
  *   vi_prefix_count(bits)   how many of the bits [0, k] are set
@@ -29,6 +30,8 @@
  *   vd_load_triples(base, first, x, y, z)    three doubles at base + 24 * first[3 * k], as columns
  *   vi_ceil(vd)             the next integer that is not less
  *   vf_off_integer, vd_off_integer    a number less the nearest integer
+ *   vd_off_256th(a)         a number below 2^42 less the nearest multiple of 2^-8
+ *   vd_or(a, b)             the bits of both: 0 where both are
  *   vf_store_pairs, vf_store_triples    pixels of two or three numbers, one after the other
  * vi_load_records(base, scale, i, c), vf_load_pairs 16 bytes at base + scale * i[k], 8 at base + 8 * i[k], as columns
  *   hm_, hf_, hi_, hd_      the few that short rows need, in half vectors of TL_HALF_LANES (0: there are none)

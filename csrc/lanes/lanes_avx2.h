@@ -352,6 +352,7 @@ TL_INLINE vf vf_load(const float *p) { return _mm256_loadu_ps(p); }
 TL_INLINE vf vf_fma(vf a, vf b, vf c) { return _mm256_fmadd_ps(a, b, c); }
 TL_INLINE vf vf_min(vf a, vf b) { return _mm256_min_ps(a, b); }
 TL_INLINE vf vf_max(vf a, vf b) { return _mm256_max_ps(a, b); }
+TL_INLINE vf vf_min_size(vf a, vf b) { return _mm256_min_ps(a, _mm256_andnot_ps(_mm256_set1_ps(-0.0f), b)); }
 TL_INLINE vi vi_rint(vf a) { return _mm256_cvtps_epi32(a); }
 TL_INLINE vf vf_of_bits(vi a) { return _mm256_castsi256_ps(a); }
 TL_INLINE vi vi_low_half(vi a) { return _mm256_blend_epi16(a, _mm256_setzero_si256(), 0xaa); }
@@ -506,5 +507,11 @@ TL_INLINE vd vd_off_integer(vd a)
     enum { nearest = _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC }; /* clang: a constant of the language */
     return vd_sub(a, (vd){_mm256_round_pd(a.lo, nearest), _mm256_round_pd(a.hi, nearest)});
 }
+TL_INLINE vd vd_off_256th(vd a)
+{
+    const vd shift = vd_set1(0x1.8p44); /* next to it are the multiples of 2^-8 */
+    return vd_sub(a, vd_sub(vd_add(a, shift), shift));
+}
+TL_INLINE vd vd_or(vd a, vd b) { return (vd){_mm256_or_pd(a.lo, b.lo), _mm256_or_pd(a.hi, b.hi)}; }
 
 #endif

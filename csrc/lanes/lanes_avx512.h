@@ -363,6 +363,7 @@ TL_INLINE vf vf_fma(vf a, vf b, vf c) { return _mm512_fmadd_ps(a, b, c); }
 TL_INLINE vf vf_min(vf a, vf b) { return _mm512_min_ps(a, b); }
 TL_INLINE vf vf_max(vf a, vf b) { return _mm512_max_ps(a, b); }
 TL_INLINE vi vi_rint(vf a) { return _mm512_cvtps_epi32(a); }
+TL_INLINE vf vf_min_size(vf a, vf b) { return _mm512_range_ps(a, b, 10); } /* the lesser, without its sign */
 TL_INLINE vf vf_of_bits(vi a) { return _mm512_castsi512_ps(a); }
 TL_INLINE vi vi_low_half(vi a) { return _mm512_and_si512(a, _mm512_set1_epi32(0xffff)); }
 TL_INLINE vi vi_high_half(vi a) { return _mm512_srli_epi32(a, 16); }
@@ -537,5 +538,11 @@ TL_INLINE vd vd_off_integer(vd a)
     enum { nearest = _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC }; /* clang: a constant of the language */
     return (vd){_mm512_reduce_pd(a.lo, nearest), _mm512_reduce_pd(a.hi, nearest)};
 }
+TL_INLINE vd vd_off_256th(vd a)
+{
+    enum { nearest = 8 << 4 | _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC };
+    return (vd){_mm512_reduce_pd(a.lo, nearest), _mm512_reduce_pd(a.hi, nearest)};
+}
+TL_INLINE vd vd_or(vd a, vd b) { return (vd){_mm512_or_pd(a.lo, b.lo), _mm512_or_pd(a.hi, b.hi)}; }
 
 #endif

@@ -257,6 +257,7 @@ TL_INLINE vf vf_load(const float *p) { return *p; }
 TL_INLINE vf vf_fma(vf a, vf b, vf c) { return fmaf(a, b, c); }
 TL_INLINE vf vf_min(vf a, vf b) { return a < b ? a : b; } /* b when one is NaN */
 TL_INLINE vf vf_max(vf a, vf b) { return a > b ? a : b; }
+TL_INLINE vf vf_min_size(vf a, vf b) { return vf_min(a, fabsf(b)); }
 TL_INLINE vi vi_rint(vf a) { return fabsf(a) < 0x1p31f ? (vi)lrintf(a) : INT32_MIN; }
 TL_INLINE vf vf_of_bits(vi a)
 {
@@ -333,6 +334,15 @@ TL_INLINE void vd_load_triples(const double *base, const int32_t *first, vd *x, 
 TL_INLINE vi vi_ceil(vd a) { return fabs(a) < 0x1p30 ? (vi)a + ((double)(vi)a < a) : INT32_MIN; }
 /* a less the nearest integer */
 TL_INLINE vf vf_off_integer(vf a) { return a - rintf(a); }
+TL_INLINE vd vd_off_256th(vd a) { return a - ((a + 0x1.8p44) - 0x1.8p44); }
+TL_INLINE vd vd_or(vd a, vd b)
+{
+    uint64_t bits_a, bits_b;
+    memcpy(&bits_a, &a, sizeof a), memcpy(&bits_b, &b, sizeof b);
+    bits_a |= bits_b;
+    memcpy(&a, &bits_a, sizeof a);
+    return a;
+}
 TL_INLINE vd vd_off_integer(vd a) { return fabs(a) < 0x1p51 ? a - ((a + 0x1.8p52) - 0x1.8p52) : 0.0; }
 
 #endif

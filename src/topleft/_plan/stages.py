@@ -240,7 +240,7 @@ def plan_decisions(found: Decided) -> Stage:
     """Tell how the samples of vertices that are not snapped were decided."""
     parts = [f"{plural(found.n_asked, 'sample or row end')} in doubt"]
     if found.n_on_grid:
-        parts.append(f"{plural(found.n_on_grid, 'triangle')} on 2**-8 px, by integers")
+        parts.append(f"{plural(found.n_on_grid, 'triangle')} on 2**-8 px, without rounding")
     if found.n_turns:
         parts.append(f"the turn of {plural(found.n_turns, 'triangle')}")
     why = (
