@@ -1,5 +1,5 @@
 """Build `topleft._engine.kernels`: one Cython unit, one dispatcher and one kernel unit per instruction set; and the
-classics in `topleft.methods.classics`: one Cython unit each, for the compiler's default instruction set.
+classics, `topleft.methods.classics.classic_kernels`: one Cython unit, for the compiler's default instruction set.
 
 Everything that is not about compiling stands in `pyproject.toml`. setuptools gives all sources of an extension the same
 flags, so `BuildTopleft` compiles each unit by itself and links the objects.
@@ -30,6 +30,7 @@ from setuptools.errors import CompileError, PlatformError
 
 ROOT = Path(__file__).resolve().parent
 ENGINE = "topleft._engine.kernels"
+CLASSICS = "topleft.methods.classics.classic_kernels"
 
 WARNINGS = ["-Wall", "-Wextra"]
 # -ffp-contract=off and -fno-fast-math stand after whatever CFLAGS holds: the same bits on every machine depend on them.
@@ -291,11 +292,7 @@ def quoted(text: str) -> str:
     return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
 
 
-def extensions() -> list[Extension]:
-    """Return the engine, and an extension for each kernel of the classics."""
-    kernels = [path.relative_to(ROOT).as_posix() for path in files_in("src/topleft/methods/classics", ".pyx")]
-    classics = [Extension(path.removeprefix("src/").removesuffix(".pyx").replace("/", "."), [path]) for path in kernels]
-    return [Extension(ENGINE, ["src/topleft/_engine/kernels.pyx"]), *classics]
-
-
-setup(ext_modules=extensions(), cmdclass={"build": BuildAnew, "build_ext": BuildTopleft})
+setup(
+    ext_modules=[Extension(name, [f"src/{name.replace('.', '/')}.pyx"]) for name in (ENGINE, CLASSICS)],
+    cmdclass={"build": BuildAnew, "build_ext": BuildTopleft},
+)

@@ -36,13 +36,14 @@ from benchmarks.small.memset import STUDY as MEMSET
 from benchmarks.small.no_snap import STUDY as NO_SNAP
 from benchmarks.small.samplings import STUDY as SAMPLINGS
 from benchmarks.small.tiles import STUDY as TILES
+from benchmarks.small.tolerance import STUDY as TOLERANCE
 from benchmarks.static.study import STUDY as STATIC
 
 STUDIES = {
     study.kind: study
     for study in (
         RUN, ACCURACY, BATCH, ATLAS, CHOICES, STATIC, PICTURES, LEVELS, LAYERS, FIELD, SAMPLINGS, PLANNER, MEMSET,
-        GROWTH, POLYGONS, REAL_FILES, FRESH, GATE, TILES, EXPLORER, CLUSTER, NO_SNAP,
+        GROWTH, POLYGONS, REAL_FILES, FRESH, GATE, TILES, EXPLORER, CLUSTER, NO_SNAP, TOLERANCE,
     )
 }  # fmt: skip
 

@@ -10,6 +10,7 @@ field.py      a field beside matplotlib, datashader and SciPy
 samplings.py  one scene in every sampling, as a picture
 explorer.py   frames a second of the explorer in a headless browser
 growth.py     memory after thousands of calls
+tolerance.py  `tolerance=` beside the same without it
 tiles.py      huge rasters by windows, beside rasterio, GDAL and datashader
 memset.py     a yardstick: memset of the 4K pictures
 """

@@ -53,12 +53,15 @@ TL_INLINE vi left_sum(int32_t *row, vi *seen)
     return vi_set1((int32_t)(uint32_t)sum);
 }
 
-TL_INLINE vi accumulate_lanes(int32_t *cells, vi *carry, vi *seen)
+/* The sums of the next TL_LANES cells, the first n of which are pixels: what lies right of the window may be anything,
+ * as the same edges are moved there by different widths. */
+TL_INLINE vi accumulate_lanes(int32_t *cells, int64_t n, vi *carry, vi *seen)
 {
     const vi bias = vi_set1(TL_CELL_ZERO), sums = vi_add(vi_prefix_sum(vi_sub(vi_load(cells), bias)), *carry);
+    const vi alarm = sum_alarm(sums);
     vi_store(cells, bias);
     *carry = vi_last(sums);
-    *seen = vi_or(*seen, sum_alarm(sums));
+    *seen = vi_or(*seen, n >= TL_LANES ? alarm : vi_select(vm_first(n), alarm, vi_set1(0)));
     return sums;
 }
 
@@ -106,10 +109,10 @@ TL_INLINE int accumulate_narrow(const area_plane *plane, const tl_area *target, 
                 continue;
             }
             for (int64_t k = col; k < end; k += TL_LANES) {
-                const vi sums_a = accumulate_lanes(a + k, &carry_a, &seen);
+                const vi sums_a = accumulate_lanes(a + k, n_cols - k, &carry_a, &seen);
                 const vf area_a = area_of_sums(sums_a, is_clamped);
                 if (below != row) {
-                    const vi sums_b = accumulate_lanes(b + k, &carry_b, &seen);
+                    const vi sums_b = accumulate_lanes(b + k, n_cols - k, &carry_b, &seen);
                     store_areas(out_b + k, n_cols - k, area_of_sums(sums_b, is_clamped));
                 }
                 store_areas(out_a + k, n_cols - k, area_a);

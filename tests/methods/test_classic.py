@@ -7,6 +7,7 @@ import pytest
 
 import topleft as tl
 from topleft.methods import CLASSICS, load_kernel
+from topleft.methods.classics.classic_kernels import FORMS, draw
 
 EVERY_CLASSIC = pytest.mark.parametrize("name", CLASSICS)
 SUBPIXEL = [name for name, method in CLASSICS.items() if method.has_subpixel_bits]
@@ -36,10 +37,14 @@ def test_kernel_equals_its_pure_twin(name):
 
 @EVERY_CLASSIC
 def test_kernel_knows_the_variants_of_the_registry(name):
-    module, _, variant = name.partition("/")
-    forms = import_module(f"topleft.methods.classics.{module}").FORMS
+    first, _, variant = name.partition("/")
     assert load_kernel(CLASSICS[name])[1] == variant
-    assert set(forms) == {other.partition("/")[2] for other in CLASSICS if other.partition("/")[0] == module}
+    assert set(FORMS[first]) == {other.partition("/")[2] for other in CLASSICS if other.partition("/")[0] == first}
+
+
+def test_kernel_of_another_name_is_refused():
+    with pytest.raises(ValueError, match="method must be one of 'bresenham_scanline', 'edge_increment'"):
+        draw("zag", np.zeros((3, 2)), np.zeros((1, 3), np.int32), np.zeros(4, np.uint8), (0, 0, 2, 2), 0)
 
 
 # ---- verbs ----------------------------------------------------------------------------------------------------------

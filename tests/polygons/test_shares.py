@@ -9,6 +9,7 @@ from hypothesis import given
 from polygon_cases import SIZE, cells, square, star, wild_polygon, wild_seeds
 
 import topleft as tl
+from topleft._base import memory
 from topleft._polygons import overlap
 from topleft._polygons.prepared import Prepared
 from topleft.methods.reference import polygons as ref
@@ -122,6 +123,30 @@ def test_table_that_a_thread_cannot_finish_raises(monkeypatch):
     drawn = [square(i, 0, i + 20, 20) for i in range(40)]
     with pytest.raises(MemoryError, match="no more"):
         tl.overlap([[ring] for ring in drawn], (60, 20), threads=3)
+
+
+@pytest.mark.parametrize(("most", "squares_listed"), [(1300, 3), (2100, 5), (9000, 12)])
+def test_table_that_grows_beyond_memory_is_refused(monkeypatch, most, squares_listed):
+    """Linux gives each part of it, and ends the process when they are written."""
+    real, listed = memory.check_fits, []
+
+    def check_fits(shape, *dtypes):
+        if shape[0] > most:
+            raise MemoryError(f"no memory for {shape[0]}")
+        real(shape, *dtypes)
+
+    def list_range(*arguments):
+        listed.append(arguments[2])
+        real_list(*arguments)
+
+    real_list = overlap.list_range
+    monkeypatch.setattr(overlap, "MAX_ENTRIES_AT_ONCE", 400)
+    monkeypatch.setattr(overlap, "check_fits", check_fits)
+    monkeypatch.setattr(overlap, "list_range", list_range)
+    drawn = [[square(0, 0, 20, 20)]] * 12  # 400 entries each
+    with pytest.raises(MemoryError, match="no memory for"):
+        tl.overlap(drawn, (60, 20))
+    assert len(listed) == squares_listed
 
 
 def test_table_of_a_window_is_that_of_the_picture_there():

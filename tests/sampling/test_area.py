@@ -309,6 +309,18 @@ def test_shallow_edge_across_the_left_border_needs_no_wide_cells():
     assert narrow[:, 0].any()
 
 
+@ON_EACH_ISA
+def test_edges_across_the_right_border_need_no_wide_cells(isa):
+    vertices, triangles, _ = scenes.random_triangles(100, 8, 40, 30)
+    for width in range(1, 40):  # with vectors that end beside the window, and with none
+        view = View.parse((width, 30), {"sampling": "area"})
+        with on(isa):
+            snapped = snap_mesh(KeptMemory(), vertices[:, :2], triangles, view, with_depth=False, out=None)
+            cells = KeptMemory().constant("cells", 30 * _engine.area_stride(width), _engine.CELL_CLEAR)
+            pixels = np.empty((30, width), np.float32)
+            assert snapped.mesh.draw_area(pixels, _engine.as_bytes(cells), 0, 30, False, True) == -1
+
+
 @pytest.mark.parametrize("far", [0, 1])
 def test_triangles_beside_the_window_add_nothing(far):
     vertices, triangles, _ = scenes.random_triangles(300, 20, 60, 40)

@@ -1,5 +1,5 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, initializedcheck=False, embedsignature=False
-# cython: freethreading_compatible=True
+# cython: freethreading_compatible=True, auto_pickle=False, emit_code_comments=False
 """Memoryviews in, one nogil kernel call, status out. The array layer has checked every shape, dtype and index."""
 
 from libc.stdint cimport int8_t, int16_t, int32_t, int64_t, uint8_t, uint16_t, uint32_t, uint64_t
@@ -69,6 +69,7 @@ VERTEX_BYTES = sizeof(tl_vertex)
 PLACED = TL_PLACED  # numbers of a vertex behind a transform that is not snapped
 CELL_CLEAR = TL_CELL_CLEAR
 AREA_OVERFLOW = TL_AREA_OVERFLOW
+FEW_OF_BITS, FEW_STORED, FEW_LABELLED = <int>TL_FEW_OF_BITS, <int>TL_FEW_STORED, <int>TL_FEW_LABELLED
 MAX_LAYERS = TL_MAX_LAYERS
 SCALARS = {np.dtype(np.float32): 0, np.dtype(np.float64): 1, np.dtype(np.int64): 2}  # tl_scalar
 

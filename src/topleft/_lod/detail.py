@@ -15,16 +15,17 @@ pixels, shear, the edge of the frame and instances that are scaled are in the ma
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from topleft._base.arrays import as_number, as_size, shown
 from topleft._camera.camera import Camera, CameraLike, as_camera
-from topleft._lod.levels import Level
+from topleft._lod.levels import Extent, Level, Levels
 from topleft._lod.simplify import levels_of
 from topleft._model.material import Material
 from topleft._model.mesh import Mesh, has_holes
@@ -35,6 +36,8 @@ from topleft.typing import CullOption
 __all__ = ["Detail", "check_tolerance", "choose_detail", "detailed", "pixels_of_bound"]
 
 F64 = npt.NDArray[np.float64]
+Rows = Sequence[Sequence[float]]
+Ends = tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -155,30 +158,58 @@ def detail_of(
     """The level that a view needs, of checked arguments."""
     n = len(mesh.triangles)
 
-    def whole(why: str, rejected: tuple[str, ...] = ()) -> Detail:
-        return Detail(0, mesh, 0.0, 0.0, tolerance, n, why, rejected)
+    def whole(why: str, others: tuple[str, ...] = ()) -> Detail:
+        return Detail(0, mesh, 0.0, 0.0, tolerance, n, why, others)
 
     if reason := why_whole(mesh, camera, tolerance, cull, material):
         return whole(reason)
+    levels = levels_of(mesh)
+    if len(levels) == 1:
+        return whole("it has no coarser level")
+    scale_of = scales(camera, size, viewport, origin, transform)
+
+    def rejected(i: int) -> str:
+        scale = scale_of(levels[0], levels[i])
+        off = "reach the near or the far plane, or the eye"
+        if scale is not None:
+            off = f"be off by {levels[i].bound * scale:.3g} px"
+        return f"level {i}, {len(levels[i].mesh.triangles):,} triangles: may {off}"
+
+    i, bound_px = coarsest(levels, scale_of, tolerance)
+    if i == 0:
+        return whole(f"no coarser level is sure to be within {tolerance:g} px", (rejected(1),))
+    why = f"no point that shows is off by more than {bound_px:.3g} px, and {tolerance:g} px are allowed"
+    others = [rejected(i + 1)] if i + 1 < len(levels) else []
+    others.append(f"the mesh itself, {n:,} triangles: finer than the picture has to be")
+    return Detail(i, levels[i].mesh, levels[i].bound, bound_px, tolerance, n, why, tuple(others))
+
+
+def scales(
+    camera: Camera,
+    size: tuple[int, int],
+    viewport: tuple[int, int] | None,
+    origin: tuple[int, int],
+    transform: npt.ArrayLike | None,
+) -> Callable[..., float | None]:
+    """What tells how many pixels a unit is at most on some levels, as `pixels_per_unit`, in a view."""
     matrix = camera.clip_from_world(viewport or size)
     if transform is not None:
         matrix = matrix @ np.asarray(transform, np.float64)
-    window = window_of(size, viewport, origin)
-    rejected: list[str] = []
-    original, *coarser = levels_of(mesh)
-    for i, level in reversed(list(enumerate(coarser, 1))):
-        bound_px = pixels_of_bound(matrix, viewport or size, window, original, level)
-        count = len(level.mesh.triangles)
-        if bound_px is None:
-            rejected.append(f"level {i}, {count:,} triangles: may reach the near or the far plane, or the eye")
-        elif bound_px <= tolerance:
-            why = f"no point that shows is off by more than {bound_px:.3g} px, and {tolerance:g} px are allowed"
-            rejected.append(f"the mesh itself, {n:,} triangles: finer than the picture has to be")
-            return Detail(i, level.mesh, level.bound, bound_px, tolerance, n, why, tuple(rejected[-2:]))
-        else:
-            rejected.append(f"level {i}, {count:,} triangles: may be off by {bound_px:.3g} px")
-    why = f"no coarser level is sure to be within {tolerance:g} px" if coarser else "it has no coarser level"
-    return whole(why, tuple(rejected[-1:]))
+    rows, window = matrix.tolist(), window_of(size, viewport, origin)
+    return lambda *levels: pixels_per_unit(rows, viewport or size, window, [level.extent for level in levels])
+
+
+def coarsest(levels: Levels, scale_of: Callable[..., float | None], tolerance: float) -> tuple[int, float]:
+    """The last level that is sure to be within a tolerance, and its bound in pixels; 0 for none but the first."""
+    least_scale = scale_of(levels[0])
+    if least_scale is None:
+        return 0, 0.0
+    for i in reversed(range(1, len(levels))):
+        if levels[i].bound * least_scale <= tolerance:  # it is no less where the level reaches beyond the mesh
+            scale = scale_of(levels[0], levels[i])
+            if scale is not None and levels[i].bound * scale <= tolerance:
+                return i, levels[i].bound * scale
+    return 0, 0.0
 
 
 def check_tolerance(tolerance: float) -> float:
@@ -203,21 +234,21 @@ def why_whole(mesh: Mesh, camera: Camera, tolerance: float, cull: str, material:
     return None
 
 
-def window_of(size: tuple[int, int], viewport: tuple[int, int] | None, origin: tuple[int, int]) -> F64:
-    """Where in normalised device coordinates pixels are looked at, (2, 2): lower and upper x, and y.
+def window_of(size: tuple[int, int], viewport: tuple[int, int] | None, origin: tuple[int, int]) -> list[Ends]:
+    """Where in normalised device coordinates pixels are looked at: lower and upper x, and y.
 
     All of the viewport, so that a window of a picture has the level of the whole; more where the window has more.
     """
-    whole = viewport or size
-    ends = np.empty((2, 2))
-    for axis in range(2):
-        low, high = min(0, origin[axis]), max(whole[axis], origin[axis] + size[axis])
-        ends[axis] = 2 * (low - 1) / max(whole[axis], 1) - 1, 2 * (high + 1) / max(whole[axis], 1) - 1
-    ends[1] = -ends[1, ::-1]
-    return ends
+    ends = []
+    for first, n, whole in zip(origin, size, viewport or size, strict=True):
+        low, high = min(0, first), max(whole, first + n)
+        ends.append((2 * (low - 1) / max(whole, 1) - 1, 2 * (high + 1) / max(whole, 1) - 1))
+    return [ends[0], (-ends[1][1], -ends[1][0])]
 
 
-def pixels_of_bound(matrix: F64, viewport: tuple[int, int], window: F64, original: Level, level: Level) -> float | None:
+def pixels_of_bound(
+    matrix: F64, viewport: tuple[int, int], window: Sequence[Ends], original: Level, level: Level
+) -> float | None:
     """How far a point that shows may be off, pixels; None where nothing is known of that.
 
     Parameters
@@ -225,43 +256,75 @@ def pixels_of_bound(matrix: F64, viewport: tuple[int, int], window: F64, origina
     matrix : (4, 4) float64
         Clip from object.
     viewport : (width, height), pixels
-    window : (2, 2) float64
+    window : two pairs of float
         What `window_of` gives.
     original, level : Level
     """
-    lows, highs = zip(original.extent[0], level.extent[0], strict=True)
-    ends = np.array([np.min(lows, axis=0), np.max(highs, axis=0)])
-    corners = np.array([[ends[k, axis] for axis, k in enumerate(pick)] for pick in product((0, 1), repeat=3)])
-    clip = corners @ matrix[:, :3].T + matrix[:, 3]
-    nearest = least(matrix[3], clip[:, 3], original, level)
-    beyond = [least(matrix[3] + sign * matrix[2], clip[:, 3] + sign * clip[:, 2], original, level) for sign in (1, -1)]
-    if not nearest > 0 or not min(beyond) >= 0:
+    scale = pixels_per_unit(matrix.tolist(), viewport, window, [original.extent, level.extent])
+    return None if scale is None else level.bound * scale
+
+
+def pixels_per_unit(
+    matrix: Rows, viewport: tuple[int, int], window: Sequence[Ends], extents: Sequence[Extent]
+) -> float | None:
+    """How many pixels a point that shows moves at most where it moves by one unit, on surfaces of these extents.
+
+    Never less for more surfaces. In numbers of Python, of which all take as long as a few calls of NumPy.
+    """
+    of_x, of_y, of_z, of_w = matrix
+    box = Box([min(lows) for lows in zip(*(one.low for one in extents), strict=True)],
+              [max(highs) for highs in zip(*(one.high for one in extents), strict=True)])  # fmt: skip
+    nearest = least(of_w, box, extents)
+    ends = [[w + sign * z for w, z in zip(of_w, of_z, strict=True)] for sign in (1.0, -1.0)]
+    if not nearest > 0 or not all(least(row, box, extents) >= 0 for row in ends):
         return None
-    in_x, in_y = window
-    if clip[:, 3].min() > 0:  # then the box shows nowhere but between its corners
-        places = clip[:, :2] / clip[:, 3:]
-        in_x, in_y = (
-            np.array([max(end[0], column.min()), min(end[1], column.max())])
-            for end, column in zip(window, places.T, strict=True)
-        )
-        if in_x[0] > in_x[1] or in_y[0] > in_y[1]:
+    if box.least(of_w) > 0:  # then the box shows nowhere but between its corners
+        shown = box.places(of_x, of_y, of_w)
+        window = [(max(end[0], min(at)), min(end[1], max(at))) for end, at in zip(window, shown, strict=True)]
+        if any(low > high for low, high in window):
             return 0.0
-    half = np.array(viewport, np.float64)[:, None] / 2
-    stretch = max(
-        np.linalg.norm(half * (matrix[:2, :3] - np.array([[u], [v]]) * matrix[3, :3]), 2)
-        for u, v in product(in_x, in_y)
-    )
+    moves = [
+        [[n / 2 * (a - u * w) for a, w in zip(row[:3], of_w[:3], strict=True)] for u in at]
+        for row, n, at in zip((of_x, of_y), viewport, window, strict=True)
+    ]
     # A billionth more for what float64 rounds here.
-    return float(level.bound * stretch / nearest * (1 + 1e-9))
+    return max(stretch(right, down) for right, down in product(*moves)) / nearest * (1 + 1e-9)
 
 
-def least(row: F64, at_corners: F64, original: Level, level: Level) -> float:
-    """A bound from below on an affine function on both surfaces: by their boxes, or by their spheres."""
-    by_sphere = min(
-        float(row[:3] @ center + row[3] - np.linalg.norm(row[:3]) * radius)
-        for _, center, radius in (original.extent, level.extent)
-    )
-    return max(float(at_corners.min()), by_sphere)
+class Box(NamedTuple):
+    """The least and the largest coordinates of some surfaces."""
+
+    low: list[float]
+    high: list[float]
+
+    def least(self, row: Sequence[float]) -> float:
+        """The least value of an affine function in it."""
+        (x, y, z, constant), low, high = row, self.low, self.high
+        return constant + min(x * low[0], x * high[0]) + min(y * low[1], y * high[1]) + min(z * low[2], z * high[2])
+
+    def places(self, of_x: Sequence[float], of_y: Sequence[float], of_w: Sequence[float]) -> tuple[list[float], ...]:
+        """The picture of its corners: all x / w, all y / w."""
+        corners = [(corner, dot(of_w, corner) + of_w[3]) for corner in product(*zip(self.low, self.high, strict=True))]
+        return [(dot(of_x, at) + of_x[3]) / w for at, w in corners], [
+            (dot(of_y, at) + of_y[3]) / w for at, w in corners
+        ]
+
+
+def least(row: Sequence[float], box: Box, extents: Sequence[Extent]) -> float:
+    """A bound from below on an affine function on all surfaces: by their box, or by their spheres."""
+    length = math.sqrt(dot(row, row))
+    return max(box.least(row), row[3] + min(dot(row, one.center) - length * one.radius for one in extents))
+
+
+def stretch(a: Sequence[float], b: Sequence[float]) -> float:
+    """The largest singular value of a matrix of two rows."""
+    aa, ab, bb = dot(a, a), dot(a, b), dot(b, b)
+    return math.sqrt((aa + bb) / 2 + math.hypot((aa - bb) / 2, ab))
+
+
+def dot(a: Sequence[float], b: Sequence[float]) -> float:
+    """The product of the first three numbers of each."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def detailed(
@@ -273,6 +336,25 @@ def detailed(
     if check_tolerance(tolerance) == 0:
         return mesh
     if isinstance(mesh, Mesh):
-        return detail_of(mesh, camera, size, tolerance, **options).mesh
-    own = [detail_of(one.mesh, camera, size, tolerance, transform=one.transform, **options).mesh for one in mesh]
+        return level_of(mesh, camera, size, tolerance, **options)
+    own = [level_of(one.mesh, camera, size, tolerance, transform=one.transform, **options) for one in mesh]
     return Scene([replace(one, mesh=level) for one, level in zip(mesh, own, strict=True)])
+
+
+def level_of(
+    mesh: Mesh,
+    camera: Camera,
+    size: tuple[int, int],
+    tolerance: float,
+    *,
+    cull: str = "none",
+    material: Material | None = None,
+    viewport: tuple[int, int] | None = None,
+    origin: tuple[int, int] = (0, 0),
+    transform: npt.ArrayLike | None = None,
+) -> Mesh:
+    """The mesh of `detail_of`, without its words."""
+    if why_whole(mesh, camera, tolerance, cull, material):
+        return mesh
+    levels = levels_of(mesh)
+    return levels[coarsest(levels, scales(camera, size, viewport, origin, transform), tolerance)[0]].mesh

@@ -6,12 +6,13 @@ In: a mesh. Out: `Levels`, which are kept with the mesh, and in a file where tha
 from __future__ import annotations
 
 import hashlib
+import math
 import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -29,6 +30,15 @@ F64 = npt.NDArray[np.float64]
 
 #: The arrays of a mesh, by the names that they have in files.
 ARRAYS = ("vertices", "triangles", "normals", "colors", "uv", "uv1", "material_of_triangle")
+
+
+class Extent(NamedTuple):
+    """Where a surface lies, in numbers of Python: a view asks for a few of them, not for arrays."""
+
+    low: list[float]
+    high: list[float]
+    center: list[float]
+    radius: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,9 +66,14 @@ class Level:
     known: float = 0.0
 
     @cached_property
-    def extent(self) -> tuple[F64, F64, float]:
-        """Box (2, 3), and the centre (3,) and the radius of the sphere round it all."""
-        return self.mesh.bounds, *bounding_sphere(self.mesh.extreme_points())
+    def extent(self) -> Extent:
+        """The box and the sphere round it all."""
+        box = self.mesh.bounds
+        center, radius = bounding_sphere(self.mesh.extreme_points())
+        if not (np.isfinite(box).all() and np.isfinite(radius)):
+            return Extent([-math.inf] * 3, [math.inf] * 3, [0.0] * 3, math.inf)
+        low, high = box.tolist()
+        return Extent(low, high, center.tolist(), float(radius))
 
 
 class Levels(Sequence[Level]):

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from topleft import _engine
 from topleft._base.arrays import as_array, as_checked_triangles, as_real
-from topleft._base.memory import SCRATCH, FreshMemory
+from topleft._base.memory import SCRATCH, FreshMemory, check_fits
 from topleft._base.options import parse
 from topleft._base.threads import run_parts
 from topleft._field.grid import Grid
@@ -29,7 +29,7 @@ from topleft.typing import RuleOption
 __all__ = ["Overlap", "overlap"]
 
 #: Entries that memory is asked for at a time, beyond those of the largest polygon; what is not written costs nothing.
-MAX_ENTRIES_AT_ONCE = 1 << 28
+MAX_ENTRIES_AT_ONCE = 1 << 27
 
 #: Entries that a thread lists before it copies them to the table: they stay in the second-level cache.
 MAX_BLOCK_ENTRIES = 1 << 16
@@ -233,17 +233,20 @@ def list_areas(prepared: Prepared, used: list[Chunk]) -> Overlap:
         return FRESH.empty("pixels", (n_entries + TAIL,), dtype), FRESH.empty("areas", (n_entries + TAIL,), np.float32)
 
     rooms: list[Chunk] = []
-    done, entries = 0, []
+    done, n_listed, entries = 0, 0, []
     while done < n:  # as many polygons as there is room for, all of them but for huge tables
         end = end_of_room(before, done, MAX_ENTRIES_AT_ONCE)
-        room = take_room(int(before[end] - before[done]))
+        n_room = int(before[end] - before[done])
+        check_fits((n_listed + n_room,), dtype, np.float32)
+        room = take_room(n_room)
         list_range(prepared, before, (done, end), starts, room, cells)
         n_entries = int(starts[end] - starts[done])
         entries.append((room[0][:n_entries], room[1][:n_entries]))
         rooms.append(room)
-        done = end
+        done, n_listed = end, n_listed + n_entries
     if len(entries) == 1:
         return Overlap(starts, *entries[0], size, rooms)
+    check_fits((2 * n_listed,), dtype, np.float32)
     return Overlap(starts, np.concatenate([c[0] for c in entries]), np.concatenate([c[1] for c in entries]), size)
 
 

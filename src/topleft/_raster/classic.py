@@ -58,7 +58,7 @@ def bresenham_line(x0: int, y0: int, x1: int, y1: int) -> NDArray[np.int64]:
     >>> bresenham_line(3, 2, 0, 0).tolist()
     [[0, 0], [1, 1], [2, 1], [3, 2]]
     """
-    from topleft.methods.classics import bresenham_scanline
+    from topleft.methods.classics import classic_kernels
 
     try:
         ends = [operator.index(value) for value in (x0, y0, x1, y1)]
@@ -66,7 +66,7 @@ def bresenham_line(x0: int, y0: int, x1: int, y1: int) -> NDArray[np.int64]:
         raise TypeError(f"x0, y0, x1 and y1 must be integers, got {(x0, y0, x1, y1)}") from None
     if max(map(abs, ends)) > 2**31:
         raise ValueError(f"x0, y0, x1 and y1 must lie within 2**31 pixels of 0, got {tuple(ends)}")
-    return bresenham_scanline.line_pixels(*ends)
+    return classic_kernels.line_pixels(*ends)
 
 
 def draw_classic(

@@ -1,7 +1,7 @@
 """The registry: the only list of the ways to fill that the library has, and what each of them claims.
 
 `METHODS` are the production ones: exact, identical buffers. `CLASSICS` are those of the literature, as published, to be
-compared; a variant's name stands after a slash. Their kernels are imported when they are first asked for.
+compared; a variant's name stands after a slash. Their kernels are imported when one is first asked for.
 
 classics/    draws triangles as the literature does: a compiled kernel for each classic, and a twin in Python
 reference/   draws triangles exactly and slowly, in integers and fractions: what all others are held against
@@ -11,8 +11,8 @@ walks_pure.py  the two production walkers in Python integers
 from __future__ import annotations
 
 from dataclasses import dataclass
-from importlib import import_module
-from typing import Protocol, cast
+from functools import partial
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,7 +77,7 @@ class Method:
     Attributes
     ----------
     name : str
-        What ``method=`` calls it; of a classic, the kernel's module and, after a slash, the variant.
+        What ``method=`` calls it; of a classic, the file of its kernel and, after a slash, the variant.
     summary : str
         How it finds the covered samples.
     source : str
@@ -282,5 +282,7 @@ def find_method(name: object) -> Method:
 
 def load_kernel(method: Method) -> tuple[Kernel, str]:
     """Return the kernel of a classic and the name of its variant ("" for the first form)."""
-    module, _, variant = method.name.partition("/")
-    return cast(Kernel, import_module(f"{__name__}.classics.{module}").draw), variant
+    from topleft.methods.classics import classic_kernels
+
+    name, _, variant = method.name.partition("/")
+    return partial(classic_kernels.draw, name), variant

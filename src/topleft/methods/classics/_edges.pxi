@@ -1,4 +1,4 @@
-# Integer edge functions of a triangle, to be stepped. Included after _target.pxi by the kernels that step them.
+# Integer edge functions of a triangle, to be stepped. Included after _target.pxi, for the kernels that step them.
 
 from libc.math cimport rint
 

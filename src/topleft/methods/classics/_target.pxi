@@ -1,5 +1,4 @@
-# What the classics share: one way in, one way out. Included by each kernel, which defines FORMS and
-# fill_triangle(target, a, b, c, form, subpixel_bits).
+# What the classics share: memory in, pixels out. Included before them by classic_kernels.pyx.
 #
 # In: pixel-space vertices, finite and within the method's limit; indices inside them. Out: a window of the picture.
 # `plot` and `fill_span` clamp to the window; `put` is for loops that are clamped already. Nothing else writes.
@@ -68,42 +67,10 @@ cdef inline int64_t pixel_floor(double value, int64_t smallest, int64_t largest)
 cdef void *lend(object array, Py_buffer *view, Py_ssize_t item_size, int n_columns, int flags) except? NULL:
     """Return the memory of a contiguous array of rows of at least `n_columns` items (0: one dimension).
 
-    Typed memoryviews would do the same, and be nine tenths of the module.
+    Typed memoryviews would do the same, and be most of the module.
     """
     PyObject_GetBuffer(array, view, PyBUF_C_CONTIGUOUS | flags)
     if view.itemsize != item_size or view.ndim != (2 if n_columns else 1) or (n_columns and view.shape[1] < n_columns):
         PyBuffer_Release(view)
         raise ValueError(f"a buffer must have items of {item_size} bytes in rows of {n_columns or 'one'}")
     return view.buf
-
-
-def draw(vertices, triangles, pixels, tuple window, int sink, str variant="", int subpixel_bits=8):
-    """Draw triangles in order over a cleared window (x, y, width, height) of the picture."""
-    cdef int form = FORMS.index(variant)
-    cdef Py_ssize_t i, n, step
-    cdef Py_buffer points, corners, bytes_drawn
-    cdef const double *xy
-    cdef const int32_t *corner
-    cdef target t
-    t.x0, t.y0 = window[:2]
-    t.x1, t.y1 = t.x0 + window[2], t.y0 + window[3]
-    t.sink = sink
-    xy = <const double *>lend(vertices, &points, sizeof(double), 2, 0)
-    try:
-        corner = <const int32_t *>lend(triangles, &corners, sizeof(int32_t), 3, 0)
-        try:
-            t.pixels = lend(pixels, &bytes_drawn, 1, 0, PyBUF_WRITABLE)
-            n = corners.shape[0] if bytes_drawn.len else 0
-            step = points.shape[1]
-            with nogil:
-                for i in range(n):
-                    t.label = <int32_t>i
-                    fill_triangle(
-                        &t, xy + step * corner[0], xy + step * corner[1], xy + step * corner[2], form, subpixel_bits
-                    )
-                    corner += corners.shape[1]
-            PyBuffer_Release(&bytes_drawn)
-        finally:
-            PyBuffer_Release(&corners)
-    finally:
-        PyBuffer_Release(&points)

@@ -1,6 +1,6 @@
 """Bresenham scanline in Python, where the generator of the line really is one.
 
-In: vertices, truncated to pixels.  Out: counts.  Source: see bresenham_scanline.pyx.
+In: vertices, truncated to pixels.  Out: counts.  Source: see bresenham_scanline.pxi.
 """
 
 from __future__ import annotations

@@ -1,24 +1,17 @@
-# cython: language_level=3, boundscheck=False, wraparound=False, initializedcheck=False, cdivision=True, embedsignature=False
-# cython: freethreading_compatible=True
-"""Bresenham scanline: two Bresenham lines, walked from the top down together, and the pixels between them.
+# Bresenham scanline: two Bresenham lines, walked from the top down together, and the pixels between them.
+#
+# In: vertices, truncated to pixels.  They are sorted by y, then x, and turned clockwise; a triangle with a corner at mid
+# height is split there, by linear interpolation, into one with a flat bottom and one with a flat top.  Out: each row from
+# the left line's outermost pixel to the right one's, both included.  "top-left" takes the first pixel of either line's run
+# in a row and leaves the right one and the last row out.  "wireframe" draws the lines and the flat sides alone.
+#
+# Based on: xterminal86, Software 3D renderer tutorial, part 2: Triangle, 2023;
+# J. E. Bresenham, Algorithm for computer control of a digital plotter, 1965.
 
-In: vertices, truncated to pixels.  They are sorted by y, then x, and turned clockwise; a triangle with a corner at mid
-height is split there, by linear interpolation, into one with a flat bottom and one with a flat top.  Out: each row from
-the left line's outermost pixel to the right one's, both included.  "top-left" takes the first pixel of either line's run
-in a row and leaves the right one and the last row out.  "wireframe" draws the lines and the flat sides alone.
-
-Based on: xterminal86, Software 3D renderer tutorial, part 2: Triangle, 2023;
-J. E. Bresenham, Algorithm for computer control of a digital plotter, 1965.
-"""
-
-include "_target.pxi"
-
-import numpy as np
-
-FORMS = ("", "top-left", "wireframe")
+FORMS["bresenham_scanline"] = ("", "top-left", "wireframe")
 cdef enum:
     OVERDRAW = 0
-    TOP_LEFT = 1
+    WITHOUT_ENDS = 1
     WIREFRAME = 2
 
 cdef struct point:
@@ -83,10 +76,10 @@ cdef void fill_basic(target *t, point a, point b, point c, bint is_flat_top, int
     start_line(&right, b if is_flat_top else a, c if is_flat_top else b)
     left_first = left_last = left.x
     right_first = right_last = right.x
-    for y in range(a.y, min(t.y1, y_end if form == TOP_LEFT else y_end + 1)):
+    for y in range(a.y, min(t.y1, y_end if form == WITHOUT_ENDS else y_end + 1)):
         take_run(&left, y, &left_first, &left_last)
         take_run(&right, y, &right_first, &right_last)
-        if form == TOP_LEFT:
+        if form == WITHOUT_ENDS:
             fill_span(t, y, left_first, right_first - 1)
         else:
             # Which end of a run lies outside depends on the side and on the way that the line goes.
@@ -98,11 +91,11 @@ cdef inline bint comes_first(point a, point b) noexcept nogil:
     return a.y < b.y or (a.y == b.y and a.x <= b.x)
 
 
-cdef void fill_triangle(
+cdef void fill_bresenham_scanline(
     target *t, const double *va, const double *vb, const double *vc, int form, int subpixel_bits
 ) noexcept nogil:
     cdef point a, b, c, split
-    cdef int64_t y, short_by = 1 if form == TOP_LEFT else 0
+    cdef int64_t y, short_by = 1 if form == WITHOUT_ENDS else 0
     a.x, a.y, b.x, b.y, c.x, c.y = <int64_t>va[0], <int64_t>va[1], <int64_t>vb[0], <int64_t>vb[1], <int64_t>vc[0], <int64_t>vc[1]
     if not comes_first(a, b):
         a, b = b, a

@@ -1,19 +1,13 @@
-# cython: language_level=3, boundscheck=False, wraparound=False, initializedcheck=False, cdivision=True, embedsignature=False
-# cython: freethreading_compatible=True
-"""Zigzag: integer edge functions again, but the walk turns round at the triangle's sides instead of the box's.
+# Zigzag: integer edge functions again, but the walk turns round at the triangle's sides instead of the box's.
+#
+# In: vertices, snapped to sub-pixels.  Out: the pixels that edge_increment finds, in another order: one row to the right,
+# the next to the left.  A row is left when an edge function is negative, and will stay so, both there and in the row below;
+# then whatever the next row covers lies the other way.
+#
+# Based on: J. Pineda, A Parallel Algorithm for Polygon Rasterization, 1988 (smarter traversal, figure 5);
+# T. Akenine-Moeller, J. Stroem, Graphics for the Masses, 2003 (the zigzag by name).
 
-In: vertices, snapped to sub-pixels.  Out: the pixels that edge_increment finds, in another order: one row to the right,
-the next to the left.  A row is left when an edge function is negative, and will stay so, both there and in the row below;
-then whatever the next row covers lies the other way.
-
-Based on: J. Pineda, A Parallel Algorithm for Polygon Rasterization, 1988 (smarter traversal, figure 5);
-T. Akenine-Moeller, J. Stroem, Graphics for the Masses, 2003 (the zigzag by name).
-"""
-
-include "_target.pxi"
-include "_edges.pxi"
-
-FORMS = ("",)
+FORMS["zigzag"] = ("",)
 
 
 cdef inline bint is_behind(const int64_t *w, const int64_t *step_x, const int64_t *step_y, int64_t way) noexcept nogil:
@@ -27,7 +21,7 @@ cdef inline bint is_behind(const int64_t *w, const int64_t *step_x, const int64_
     return here and below
 
 
-cdef void fill_triangle(
+cdef void fill_zigzag(
     target *t, const double *a, const double *b, const double *c, int form, int subpixel_bits
 ) noexcept nogil:
     cdef edges e

@@ -1,27 +1,21 @@
-# cython: language_level=3, boundscheck=False, wraparound=False, initializedcheck=False, cdivision=True, embedsignature=False
-# cython: freethreading_compatible=True
-"""Edge increment: integer edge functions, set up once a triangle, then stepped by additions along rows and columns.
+# Edge increment: integer edge functions, set up once a triangle, then stepped by additions along rows and columns.
+#
+# In: vertices, snapped to sub-pixels ("integer": truncated to pixels, which are sampled at their corner).  Out: the pixels
+# whose three edge functions are >= 0 after one unit was taken off the edges that own nothing.  "bottom-right" takes it off
+# the top and left edges: as watertight, but other pixels.
+#
+# Based on: J. Pineda, A Parallel Algorithm for Polygon Rasterization, 1988;
+# F. Giesen, Optimizing the basic rasterizer, 2013 (the steps and the bias);
+# K. Dyrkorn, A fast and precise triangle rasterizer, 2022 (the variant that leaves top and left edges out).
 
-In: vertices, snapped to sub-pixels ("integer": truncated to pixels, which are sampled at their corner).  Out: the pixels
-whose three edge functions are >= 0 after one unit was taken off the edges that own nothing.  "bottom-right" takes it off
-the top and left edges: as watertight, but other pixels.
-
-Based on: J. Pineda, A Parallel Algorithm for Polygon Rasterization, 1988;
-F. Giesen, Optimizing the basic rasterizer, 2013 (the steps and the bias);
-K. Dyrkorn, A fast and precise triangle rasterizer, 2022 (the variant that leaves top and left edges out).
-"""
-
-include "_target.pxi"
-include "_edges.pxi"
-
-FORMS = ("", "integer", "bottom-right")
+FORMS["edge_increment"] = ("", "integer", "bottom-right")
 cdef enum:
     SUBPIXEL = 0
     INTEGER = 1
     BOTTOM_RIGHT = 2
 
 
-cdef void fill_triangle(
+cdef void fill_edge_increment(
     target *t, const double *a, const double *b, const double *c, int form, int subpixel_bits
 ) noexcept nogil:
     cdef edges e

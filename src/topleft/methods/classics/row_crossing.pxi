@@ -1,20 +1,16 @@
-# cython: language_level=3, boundscheck=False, wraparound=False, initializedcheck=False, cdivision=True, embedsignature=False
-# cython: freethreading_compatible=True
-"""Row crossing: each row asks the three edges where it crosses them, and fills from the least answer to the greatest.
+# Row crossing: each row asks the three edges where it crosses them, and fills from the least answer to the greatest.
+#
+# In: vertices, truncated to pixels.  An edge answers in float32, rounded to the nearest pixel, for the rows between its
+# ends, both included; a horizontal one does not answer, so a horizontal line vanishes and a vertical one stays.  Out: spans
+# that include both ends.  "zero-area-test" drops triangles without area first; "cull-back" and "cull-front" drop those, too,
+# and one winding (the front is counter-clockwise as seen).
+#
+# Based on: C. Wylie, G. Romney, D. Evans, A. Erdahl, Half-tone perspective drawings by computer, 1967;
+# D. R. Finley, Efficient Polygon Fill Algorithm, 2007 (each row asks each edge).
 
-In: vertices, truncated to pixels.  An edge answers in float32, rounded to the nearest pixel, for the rows between its
-ends, both included; a horizontal one does not answer, so a horizontal line vanishes and a vertical one stays.  Out: spans
-that include both ends.  "zero-area-test" drops triangles without area first; "cull-back" and "cull-front" drop those, too,
-and one winding (the front is counter-clockwise as seen).
-
-Based on: C. Wylie, G. Romney, D. Evans, A. Erdahl, Half-tone perspective drawings by computer, 1967;
-D. R. Finley, Efficient Polygon Fill Algorithm, 2007 (each row asks each edge).
-"""
-
-include "_target.pxi"
 from libc.math cimport floorf
 
-FORMS = ("", "zero-area-test", "cull-back", "cull-front")
+FORMS["row_crossing"] = ("", "zero-area-test", "cull-back", "cull-front")
 cdef enum:
     ALL = 0
     WITH_AREA = 1
@@ -35,7 +31,7 @@ cdef inline void ask(
     s.first, s.last = min(s.first, x), max(s.last, x)
 
 
-cdef void fill_triangle(
+cdef void fill_row_crossing(
     target *t, const double *a, const double *b, const double *c, int form, int subpixel_bits
 ) noexcept nogil:
     cdef int64_t ax = <int64_t>a[0], ay = <int64_t>a[1], bx = <int64_t>b[0], by = <int64_t>b[1]

@@ -1,18 +1,13 @@
-# cython: language_level=3, boundscheck=False, wraparound=False, initializedcheck=False, cdivision=True, embedsignature=False
-# cython: freethreading_compatible=True
-"""Lerp scanline: sorted by height, two float interpolations a row, and the pixels between them.
+# Lerp scanline: sorted by height, two float interpolations a row, and the pixels between them.
+#
+# In: vertices, truncated to pixels.  The long edge runs from the top vertex to the bottom one, the short edges from the top
+# to the middle and from the middle to the bottom; either is asked for its x by a float32 fraction of the height, truncated.
+# Out: spans that include both ends, without the last row.  "plus-one" is the form that the same lesson starts from: one
+# more in the heights of the short edges, against division by zero, and two loops that both draw the middle row.
+#
+# Based on: D. Sokolov, tinyrenderer, lesson 2: Triangle rasterization and back face culling, 2015.
 
-In: vertices, truncated to pixels.  The long edge runs from the top vertex to the bottom one, the short edges from the top
-to the middle and from the middle to the bottom; either is asked for its x by a float32 fraction of the height, truncated.
-Out: spans that include both ends, without the last row.  "plus-one" is the form that the same lesson starts from: one
-more in the heights of the short edges, against division by zero, and two loops that both draw the middle row.
-
-Based on: D. Sokolov, tinyrenderer, lesson 2: Triangle rasterization and back face culling, 2015.
-"""
-
-include "_target.pxi"
-
-FORMS = ("", "plus-one")
+FORMS["lerp_scanline"] = ("", "plus-one")
 cdef enum:
     PLUS_ONE = 1
 
@@ -25,7 +20,7 @@ cdef inline void fill_between(target *t, int64_t y, int64_t x, int64_t other) no
     fill_span(t, y, min(x, other), max(x, other))
 
 
-cdef void fill_triangle(
+cdef void fill_lerp_scanline(
     target *t, const double *a, const double *b, const double *c, int form, int subpixel_bits
 ) noexcept nogil:
     cdef int64_t x0 = <int64_t>a[0], y0 = <int64_t>a[1], x1 = <int64_t>b[0], y1 = <int64_t>b[1]
