@@ -53,8 +53,8 @@ typedef struct {
     int32_t codes[(TL_SMALL_BOX * TL_SMALL_BOX + 1) * TL_MAX_LANES];
 } doubted_samples;
 
-/* Decides samples in doubt, TL_LANES at a time by float64, then by the exact sign; sets the lanes of those inside in the
- * bits of their places. */
+/* Decides samples in doubt, TL_LANES at a time by float64, then by the exact sign; sets the lanes of those inside in
+ * the bits of their places. */
 TL_INLINE void decide_samples(const lane_exact *t, const doubted_samples *d, unsigned *found, tl_exact_counts *counts)
 {
     picked_points m;

@@ -198,8 +198,8 @@ typedef struct {
     int32_t codes[(TL_MIDDLE_BOX + 1) * TL_MAX_LANES];
 } doubted_columns;
 
-/* Decides the columns in doubt of edge k, TL_LANES at a time by float64, then by the exact sign; takes those outside out
- * of the bits of their rows. */
+/* Decides the columns in doubt of edge k, TL_LANES at a time by float64, then by the exact sign; takes those outside
+ * out of the bits of their rows. */
 TL_INLINE void decide_columns(const picked_points *m, int k, tl_test test, doubted_columns *d,
                               int32_t (*bits)[TL_MAX_LANES], tl_exact_counts *counts)
 {
@@ -260,8 +260,8 @@ TL_INLINE vm list_columns(const lane_exact *t, const vf *inverse, const vf *band
     return wide;
 }
 
-/* Decides all rows of the lanes in doubt: by their grid, by float64 at each column in doubt, by the exact sign; and rows
- * whose bands are wide by themselves. */
+/* Decides all rows of the lanes in doubt: by their grid, by float64 at each column in doubt, by the exact sign; and
+ * rows whose bands are wide by themselves. */
 static __attribute__((noinline)) void ask_middle_rows(exact_state *s, const box_queue *q, int i, lane_exact *t,
                                                       vm doubted, int n_rows, int32_t (*bits)[TL_MAX_LANES])
 {
