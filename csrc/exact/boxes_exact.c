@@ -47,27 +47,48 @@ TL_INLINE vm test_boxes(const lane_exact *t, vi n_cols, vi n_rows, int size, box
     return vm_and_not(vm_and(t->live, vf_ge(band, closest)), t->on_grid);
 }
 
-/* Decides the samples in doubt that float64 lanes can; returns the others. */
-TL_INLINE vm decide_samples(const lane_exact *t, int row, int col, vm doubted, vm *inside)
+/* Samples of a vector of boxes that are in doubt: lane | place << 8, place = row * TL_SMALL_BOX + col. */
+typedef struct {
+    int n;
+    int32_t codes[(TL_SMALL_BOX * TL_SMALL_BOX + 1) * TL_MAX_LANES];
+} doubted_samples;
+
+/* Decides samples in doubt, TL_LANES at a time by float64, then by the exact sign; sets the lanes of those inside in
+ * the bits of their places. */
+TL_INLINE void decide_samples(const lane_exact *t, const doubted_samples *d, unsigned *found, tl_exact_counts *counts)
 {
-    const vd px = vd_add(t->sample_x, vd_set1(col)), py = vd_add(t->sample_y, vd_set1(row));
-    vm in = doubted, out = vm_first(0);
-    for (int k = 0; k < 3; k++) {
-        const lane_sides_of_edge sides = sides_of_edge(t->x, t->y, k, px, py, t->test);
-        in = vm_and(in, sides.inside), out = vm_or(out, sides.outside);
+    picked_points m;
+    store_points_to_pick(t, &m);
+    for (int i = 0; i < d->n; i += TL_LANES) {
+        const vi code = vi_load(d->codes + i), lane = vi_and(code, vi_set1(0xff)), place = vi_shift_right(code, 8);
+        const vd px = vd_add(vd_pick(m.sample_x, lane), vd_from_vi(vi_and(place, vi_set1(TL_SMALL_BOX - 1))));
+        const vd py = vd_add(vd_pick(m.sample_y, lane), vd_from_vi(vi_shift_right(place, 2)));
+        vd x[3], y[3];
+        vm in = vm_first(d->n - i), out = vm_first(0);
+        for (int k = 0; k < 3; k++)
+            x[k] = vd_pick(m.x[k], lane), y[k] = vd_pick(m.y[k], lane);
+        for (int k = 0; k < 3; k++) {
+            const lane_sides_of_edge sides = sides_of_edge(x, y, k, px, py, t->test);
+            in = vm_and(in, sides.inside), out = vm_or(out, sides.outside);
+        }
+        const unsigned inside = vm_bits(in);
+        for (unsigned left = vm_bits(vm_and_not(vm_first(d->n - i), out)); left; left &= left - 1) {
+            const int j = __builtin_ctz(left), k = d->codes[i + j] & 0xff, at = d->codes[i + j] >> 8;
+            const exact_point p[3] = {{m.x[0][k], m.y[0][k]}, {m.x[1][k], m.y[1][k]}, {m.x[2][k], m.y[2][k]}};
+            const exact_point sample = {m.sample_x[k] + (at & (TL_SMALL_BOX - 1)), m.sample_y[k] + (at >> 2)};
+            if (inside >> j & 1 || is_inside(p, sample, t->test, counts))
+                found[at] |= 1u << k;
+        }
     }
-    *inside = vm_or(*inside, in);
-    return vm_and_not(vm_and_not(doubted, in), out);
 }
 
 /* Decides the samples in doubt: on the grid by lanes, then by float64, then by the exact sign. */
 static __attribute__((noinline)) void ask_boxes(exact_state *s, lane_exact *t, vi n_cols, vi n_rows, int size,
                                                 box_masks in)
 {
-    const unsigned turned = vm_bits(t->turned);
-    int32_t ids[TL_MAX_LANES];
-    double sample_x[TL_MAX_LANES], sample_y[TL_MAX_LANES];
-    vi_store(ids, t->ids), vd_store(sample_x, t->sample_x), vd_store(sample_y, t->sample_y);
+    unsigned found[TL_SMALL_BOX * TL_SMALL_BOX] = {0};
+    doubted_samples d;
+    d.n = 0;
     turn_points(t);
     try_grid(s, t, 1);
     const vf band = vf_select(t->on_grid, vf_set1(0.0f), t->band);
@@ -77,27 +98,24 @@ static __attribute__((noinline)) void ask_boxes(exact_state *s, lane_exact *t, v
         for (int col = 0; col < size; col++) {
             const vm box = in_box(t->live, n_cols, n_rows, row, col);
             const vf least = vf_min(vf_min(e[0], e[1]), e[2]);
-            vm inside = vm_and(box, vf_lt(band, least));
-            const vm near = vm_and_not(vm_and_not(vm_and(box, vf_ge(least, below)), inside), t->on_grid);
-            if (vm_any(near)) {
-                unsigned left = vm_bits(decide_samples(t, row, col, near, &inside)), found = 0;
-                s->counts->n_asked += __builtin_popcount(vm_bits(near));
-                for (; left; left &= left - 1) {
-                    const int k = __builtin_ctz(left);
-                    const exact_point sample = {sample_x[k] + col, sample_y[k] + row};
-                    exact_point p[3];
-                    load_turned(s, ids[k], turned >> k & 1, p);
-                    found |= (unsigned)is_inside(p, sample, t->test, s->counts) << k;
-                }
-                inside = vm_or(inside, vm_from_bits(found));
-            }
-            in[row][col] = inside;
+            in[row][col] = vm_and(box, vf_lt(band, least));
+            const vm near = vm_and_not(vm_and_not(vm_and(box, vf_ge(least, below)), in[row][col]), t->on_grid);
+            vi_compress(d.codes + d.n, near, vi_add(vi_iota(), vi_set1((row * TL_SMALL_BOX + col) << 8)));
+            d.n += __builtin_popcount(vm_bits(near));
             for (int k = 0; k < 3; k++)
                 e[k] = vf_sub(e[k], t->dy[k]);
         }
         for (int k = 0; k < 3; k++)
             t->e[k] = vf_add(t->e[k], t->dx[k]);
     }
+    s->counts->n_asked += d.n;
+    if (!d.n)
+        return;
+    vi_store(d.codes + d.n, vi_set1(0));
+    decide_samples(t, &d, found, s->counts);
+    for (int row = 0; row < size; row++)
+        for (int col = 0; col < size; col++)
+            in[row][col] = vm_or(in[row][col], vm_from_bits(found[row * TL_SMALL_BOX + col]));
 }
 
 /* Writes a full list out; returns its length. */

@@ -192,43 +192,108 @@ TL_INLINE vm find_middle_rows(const lane_exact *t, const exact_edges *e, vi n_co
     return vm_and(doubted, t->live);
 }
 
-/* Decides all rows of the lanes in doubt: by their grid, by float64, and, of each row where that does not tell, by the
- * exact sign. */
+/* Columns of one edge that are in doubt, in a vector of triangles: lane | row << 8 | col << 16. */
+typedef struct {
+    int n;
+    int32_t codes[(TL_MIDDLE_BOX + 1) * TL_MAX_LANES];
+} doubted_columns;
+
+/* Decides the columns in doubt of edge k, TL_LANES at a time by float64, then by the exact sign; takes those outside
+ * out of the bits of their rows. */
+TL_INLINE void decide_columns(const picked_points *m, int k, tl_test test, doubted_columns *d,
+                              int32_t (*bits)[TL_MAX_LANES], tl_exact_counts *counts)
+{
+    const int next = k == 2 ? 0 : k + 1;
+    vi_store(d->codes + d->n, vi_set1(0));
+    for (int i = 0; i < d->n; i += TL_LANES) {
+        const vi code = vi_load(d->codes + i), lane = vi_and(code, vi_set1(0xff));
+        const vi row = vi_and(vi_shift_right(code, 8), vi_set1(0xff)), col = vi_shift_right(code, 16);
+        const vd px = vd_add(vd_pick(m->sample_x, lane), vd_from_vi(col));
+        const vd py = vd_add(vd_pick(m->sample_y, lane), vd_from_vi(row));
+        const vd x[2] = {vd_pick(m->x[k], lane), vd_pick(m->x[next], lane)};
+        const vd y[2] = {vd_pick(m->y[k], lane), vd_pick(m->y[next], lane)};
+        const lane_sides_of_edge sides = sides_of_edge(x, y, 0, px, py, test);
+        const unsigned outside = vm_bits(sides.outside);
+        for (unsigned left = vm_bits(vm_and_not(vm_first(d->n - i), sides.inside)); left; left &= left - 1) {
+            const int j = __builtin_ctz(left), code_j = d->codes[i + j];
+            const int lane_j = code_j & 0xff, row_j = code_j >> 8 & 0xff, col_j = code_j >> 16;
+            const exact_point a = {m->x[k][lane_j], m->y[k][lane_j]}, b = {m->x[next][lane_j], m->y[next][lane_j]};
+            const exact_point sample = {m->sample_x[lane_j] + col_j, m->sample_y[lane_j] + row_j};
+            if (outside >> j & 1 || !is_inside_edge(a, b, sample, test, counts))
+                bits[row_j][lane_j] &= ~(1 << col_j);
+        }
+    }
+}
+
+/* Sets the bits of a row of the lanes in doubt as if columns in doubt were inside, and lists these; returns the lanes
+ * whose bands are as wide as columns. */
+TL_INLINE vm list_columns(const lane_exact *t, const vf *inverse, const vf *band, vm doubted, vi n_cols, int row,
+                          int32_t *bits, doubted_columns *d)
+{
+    const vi zero = vi_set1(0), one = vi_set1(1);
+    const vf far = vf_set1(2.0f * TL_MIDDLE_BOX);
+    vi begin = zero, end = n_cols, col[3];
+    vm near[3], wide = vm_first(0);
+    for (int k = 0; k < 3; k++) {
+        const vm is_left = vf_lt(t->dy[k], vf_set1(0.0f)), is_right = vf_lt(vf_set1(0.0f), t->dy[k]);
+        const vf unclamped = vf_mul(vf_fma(t->dx[k], vf_set1((float)row), t->e[k]), inverse[k]);
+        const vf q = vf_max(vf_min(unclamped, far), vf_sub(vf_set1(0.0f), far)), off = vf_off_integer(q);
+        const vf reach = vf_fma(vf_set1(2.0f), band[k], vf_from_vi(n_cols)); /* beyond it, none or all are inside */
+        const vm may_end = vf_ge(reach, vf_max(unclamped, vf_sub(vf_set1(0.0f), unclamped)));
+        near[k] = vm_and(vm_and(doubted, may_end), vf_ge(band[k], vf_max(off, vf_sub(vf_set1(0.0f), off))));
+        wide = vm_or(wide, vm_and(near[k], vf_ge(band[k], vf_set1(0.49f))));
+        const vi nearest = vi_nearest(vf_sub(q, off)), floors = vi_select(near[k], nearest, vi_floor(q));
+        begin = vi_select(is_left, vi_max(begin, vi_sub(zero, floors)), begin);
+        end = vi_select(is_right, vi_min(end, vi_add(floors, one)), end);
+        col[k] = vi_select(is_left, vi_sub(zero, nearest), nearest);
+    }
+    const vi found = vi_bit_ranges(vi_min(begin, n_cols), vi_max(end, zero));
+    vi_store(bits, vi_select(doubted, found, vi_load(bits)));
+    for (int k = 0; k < 3; k++) {
+        const vm is_asked = vm_and(near[k], vm_and(vi_gt(end, col[k]), vi_gt(col[k], vi_sub(begin, one))));
+        if (!vm_any(is_asked))
+            continue;
+        vi_compress(d[k].codes + d[k].n, is_asked,
+                    vi_add(vi_iota(), vi_shift_left(vi_add(vi_set1(row), vi_shift_left(col[k], 8)), 8)));
+        d[k].n += __builtin_popcount(vm_bits(is_asked));
+    }
+    return wide;
+}
+
+/* Decides all rows of the lanes in doubt: by their grid, by float64 at each column in doubt, by the exact sign; and
+ * rows whose bands are wide by themselves. */
 static __attribute__((noinline)) void ask_middle_rows(exact_state *s, const box_queue *q, int i, lane_exact *t,
                                                       vm doubted, int n_rows, int32_t (*bits)[TL_MAX_LANES])
 {
-    const vi zero = vi_set1(0), n_cols = vi_and(vi_load(q->size + i), vi_set1(0xffff));
+    const vi size = vi_load(q->size + i), n_cols = vi_and(size, vi_set1(0xffff));
+    picked_points m;
+    doubted_columns d[3];
     vf inverse[3], band[3];
-    unsigned unsure_rows[TL_MIDDLE_BOX], any = 0;
+    unsigned wide_rows[TL_MIDDLE_BOX], any = 0;
+    d[0].n = d[1].n = d[2].n = 0;
     try_grid(s, t, 0);
     set_bands(s, t, TL_NEAR_BAND, inverse, band);
     for (int row = 0; row < n_rows; row++) {
-        const vd py = vd_add(t->sample_y, vd_set1(row));
-        vi begin = zero, end = n_cols;
-        vm unsure = vm_first(0);
-        for (int k = 0; k < 3; k++) {
-            const vm is_left = vf_lt(t->dy[k], vf_set1(0.0f)), is_right = vf_lt(vf_set1(0.0f), t->dy[k]);
-            const vf row_f = vf_set1((float)row), q_k = vf_mul(vf_fma(t->dx[k], row_f, t->e[k]), inverse[k]);
-            const vi floors = decide_floors(t->x, t->y, k, t->test, t->sample_x, py, is_left, q_k, band[k], &unsure);
-            begin = vi_select(is_left, vi_max(begin, vi_sub(zero, floors)), begin);
-            end = vi_select(is_right, vi_min(end, vi_add(floors, vi_set1(1))), end);
-        }
-        const vi found = vi_bit_ranges(vi_min(begin, n_cols), vi_max(end, zero));
-        vi_store(bits[row], vi_select(doubted, found, vi_load(bits[row])));
-        unsure_rows[row] = vm_bits(vm_and(unsure, doubted));
-        any |= unsure_rows[row];
+        const vm in_box = vm_and(doubted, vi_gt(vi_shift_right(size, 16), vi_set1(row)));
+        wide_rows[row] = vm_bits(list_columns(t, inverse, band, in_box, n_cols, row, bits[row], d));
+        any |= wide_rows[row];
     }
-    s->counts->n_asked += __builtin_popcount(vm_bits(vm_and_not(doubted, t->on_grid)));
+    store_points_to_pick(t, &m);
+    for (int k = 0; k < 3; k++) {
+        s->counts->n_asked += d[k].n;
+        decide_columns(&m, k, t->test, &d[k], bits, s->counts);
+    }
     for (; any; any &= any - 1) {
         const int k = __builtin_ctz(any), n = q->size[i + k] >> 16;
         asked_triangle a;
         set_asked(s, q, i, k, t, TL_NEAR_BAND, &a);
         for (int row = 0; row < n; row++) {
             int64_t first, end;
-            if (!(unsure_rows[row] >> k & 1))
+            if (!(wide_rows[row] >> k & 1))
                 continue;
             decide_row(&a, row, &first, &end, s->counts);
             bits[row][k] = first < end ? (int32_t)((1u << end) - (1u << first)) : 0;
+            s->counts->n_asked++;
         }
     }
 }

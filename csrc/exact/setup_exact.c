@@ -373,6 +373,18 @@ TL_INLINE lane_sides_of_edge sides_of_edge(const vd *x, const vd *y, int k, vd p
     return (lane_sides_of_edge){vd_ge(e, bound), vd_ge(vd_sub(vd_set1(0.0), e), bound)};
 }
 
+/* Points and first samples of TL_LANES triangles, to be picked from. */
+typedef struct {
+    double x[3][TL_MAX_LANES], y[3][TL_MAX_LANES], sample_x[TL_MAX_LANES], sample_y[TL_MAX_LANES];
+} picked_points;
+
+TL_INLINE void store_points_to_pick(const lane_exact *t, picked_points *m)
+{
+    for (int k = 0; k < 3; k++)
+        vd_store(m->x[k], t->x[k]), vd_store(m->y[k], t->y[k]);
+    vd_store(m->sample_x, t->sample_x), vd_store(m->sample_y, t->sample_y);
+}
+
 /* When a triangle covers a pixel, by what is drawn: squares have masks and counts alone. */
 TL_INLINE tl_test test_of(const exact_state *s, tl_sink sink)
 {
