@@ -241,7 +241,8 @@ static int64_t draw_area(const tl_snapped *snapped, const tl_window *window, con
     place_plane(window, target, &s.plane);
     s.plane.is_sparse = snapped->n_triangles < window->width * window->height / TL_SPARSE_PX;
     const int64_t n_met = (int64_t)s.plane.stride * s.plane.n_rows / TL_MET_CELLS;
-    if (s.plane.is_sparse && !target->is_wide && n_met <= TL_MOST_MET) {
+    const int is_met_seldom = snapped->n_triangles < window->width * window->height / (2 * TL_SPARSE_PX);
+    if (is_met_seldom && !target->is_wide && n_met <= TL_MOST_MET) {
         memset(met, 0, (size_t)(n_met + 63) / 64 * sizeof *met);
         s.plane.met = met;
     }
