@@ -4,6 +4,7 @@ batch.py      many pictures: views a second
 cluster.py    what a Dask cluster costs: a job, the client's memory
 fresh.py      results of their own beside `Rasterizer`
 gate.py       two commits: instructions, and time in turns
+large.py      one large triangle beside a fill of the same memory
 layers.py     each layer of a view beside its picture
 no_snap.py    vertices that are not snapped beside snapped ones, verb by verb
 field.py      a field beside matplotlib, datashader and SciPy

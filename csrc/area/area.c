@@ -21,7 +21,8 @@
 
 #define TL_MAX_EDGE_BITS 14 /* pixels of an edge in lanes: see the error bound of ramp.c */
 #define TL_SHORT_ROWS 8
-#define TL_SPARSE_PX 4096 /* for each triangle: then most runs of pixels meet no edge */
+#define TL_SPARSE_PX 4096     /* for each triangle: then most runs of pixels meet no edge */
+#define TL_MOST_MET (1 << 16) /* bits of cells that edges meet: 2^20 cells */
 #define TL_EDGE_QUEUE 112
 
 /* Edges wait until a vector is full of their kind: of 1 to 8 rows, or more; that pass up to 2 columns a row, or up to
@@ -227,6 +228,7 @@ static void place_plane(const tl_window *window, const tl_area *area, area_plane
     p->right_fx = clamp32((window->x_px + window->width) * ((int64_t)1 << bits), -far, far);
     p->bits = bits;
     p->is_sparse = 0;
+    p->met = NULL;
     p->n_waiting = 0;
     p->seen = v4_zero();
 }
@@ -234,9 +236,16 @@ static void place_plane(const tl_window *window, const tl_area *area, area_plane
 static int64_t draw_area(const tl_snapped *snapped, const tl_window *window, const tl_area *target)
 {
     area_state s;
+    uint64_t met[TL_MOST_MET / 64];
     const int bits = window->subpixel_bits;
     place_plane(window, target, &s.plane);
     s.plane.is_sparse = snapped->n_triangles < window->width * window->height / TL_SPARSE_PX;
+    const int64_t n_met = (int64_t)s.plane.stride * s.plane.n_rows / TL_MET_CELLS;
+    const int is_met_seldom = snapped->n_triangles < window->width * window->height / (2 * TL_SPARSE_PX);
+    if (is_met_seldom && !target->is_wide && n_met <= TL_MOST_MET) {
+        memset(met, 0, (size_t)(n_met + 63) / 64 * sizeof *met);
+        s.plane.met = met;
+    }
     s.snapped = snapped, s.window = window, s.bad_row = -1, s.is_wide = target->is_wide;
     s.max_extent = 1 << (bits + TL_MAX_EDGE_BITS < 25 ? bits + TL_MAX_EDGE_BITS : 25);
     memset(s.n, 0, sizeof s.n);

@@ -88,7 +88,7 @@ static void fill_rows_of_few(few_colors *f, const tl_snapped *snapped, const tl_
 {
     const int64_t stride = f->canvas->stride_px;
     span_table t;
-    open_run run = {.pixels = f->canvas->pixels, .n_px = stride * (window->height - 1) + window->width};
+    open_run run = start_pixels(f->canvas->pixels, window->width, window->height, stride);
     start_span_table(&t, snapped, 1 << f->sample_bits, window->width);
     for (int64_t row = 0; row < window->height && !tl_is_given_up(window); row += t.n_rows) {
         tl_window band = *window;

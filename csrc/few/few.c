@@ -72,7 +72,7 @@ TL_INLINE void draw_few_of(const tl_snapped *snapped, const tl_window *window, c
 {
     const int n_samples = sink == TL_SINK_SAMPLES ? 1 << target->sample_bits : 1;
     span_table t;
-    open_run run = {.pixels = target->pixels, .n_px = target->stride_px * (window->height - 1) + window->width};
+    open_run run = start_pixels(target->pixels, window->width, window->height, target->stride_px);
     start_span_table(&t, snapped, n_samples, window->width);
     for (int64_t row = 0; row < window->height && !tl_is_given_up(window); row += t.n_rows) {
         tl_window band = *window;

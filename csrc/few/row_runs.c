@@ -132,10 +132,17 @@ static void put_pixels(char *pixels, int64_t n, const char *value, size_t pixel_
 typedef struct {
     char *pixels;
     int64_t first, end;
-    int64_t n_px; /* of all rows of the pass: what lies behind them is another's */
+    int64_t n_px; /* of all rows of the pass, whatever lies behind; 0 where rows do not follow one another */
     char value[16];
 } open_run;
 
+/* For n_rows of `width` pixels, `stride` apart. */
+TL_INLINE open_run start_pixels(void *pixels, int64_t width, int64_t n_rows, int64_t stride)
+{
+    return (open_run){.pixels = pixels, .n_px = width == stride ? width * n_rows : 0};
+}
+
+/* Writes what is known, and may write a few pixels more, which are written later. */
 TL_INLINE void close_run(const open_run *run, int pixel_bytes)
 {
     char *const pixels = run->pixels + run->first * pixel_bytes;

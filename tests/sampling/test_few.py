@@ -49,6 +49,35 @@ def test_coverage_and_counts(shape, sampling):
     assert (tl.overdraw(*few, SIZE, sampling=sampling) == tl.overdraw(*many, SIZE, sampling=sampling)).all()
 
 
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("size", [SIZE, (800, 333), (61, 3000)])
+def test_areas(shape, size):
+    few, many = meshes(np.concatenate([SHAPES[shape], SHAPES["level"]]))
+    for verb in (tl.coverage, tl.overdraw):
+        assert (verb(*few, size, sampling="area") == verb(*many, size, sampling="area")).all()
+
+
+@pytest.mark.parametrize("blend", ["replace", "over", "add", "multiply"])
+@pytest.mark.parametrize("shape", SHAPES)
+def test_colours_by_area(shape, blend):
+    """The same over a background as over a picture, and whole as by windows that are too narrow for runs."""
+    vertices, triangles = meshes(np.concatenate([SHAPES[shape], SHAPES["level"]]))[0]
+    for dtype, alpha in ((np.uint8, 255), (np.uint8, 100), (np.float32, 1)):
+        colors = palette(2, 4, dtype)[:2]
+        colors[:, 3] = alpha
+        options = {"per": "triangle", "sampling": "area", "blend": blend}
+        ground = [20, 40, 60, 255] if dtype is np.uint8 else [0.2, 0.4, 0.6, 1.0]
+        picture = tl.fill(vertices, triangles, colors, SIZE, background=ground, **options)
+        out = np.full((*SIZE[::-1], 4), ground, dtype)
+        tl.fill(vertices, triangles, colors, SIZE, out=out, **options)
+        assert (picture == out).all()
+        for x in (0, 333, 700):
+            size, part = (min(100, SIZE[0] - x), SIZE[1]), picture[:, x : x + 100]
+            options["viewport"] = SIZE
+            own = tl.fill(vertices, triangles, colors, size, background=ground, origin=(x, 0), **options)
+            assert (own == part).all()
+
+
 @pytest.mark.parametrize("options", [
     {}, {"threads": 3}, {"method": "edge"}, {"method": "scanline"}, {"cull": "back"}, {"cull": "front"},
     {"subpixel_bits": 0}, {"subpixel_bits": 16}, {"origin": (50, -70), "viewport": (900, 800)},
