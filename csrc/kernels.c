@@ -30,6 +30,7 @@
 #include "lines/edges.c"
 #include "lines/lines.c"
 #include "blend/blend.c"
+#include "blend/fill_few.c"
 #include "shade/shade.c"
 #include "shade/shade_samples.c"
 #include "shade/alpha_test.c"
@@ -70,6 +71,7 @@ const tl_kernels TL_KERNELS = {
     .list_bins = list_bins,
     .draw_area = draw_area,
     .blend = blend,
+    .fill_few = fill_few,
     .inverse_w = inverse_ws,
     .barycentric = barycentric,
     .interpolate = interpolate,

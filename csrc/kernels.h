@@ -104,6 +104,11 @@ typedef struct tl_kernels {
     /* Blends the colours of triangles into the canvas in their order.  Returns as `draw` does. */
     int64_t (*blend)(const tl_snapped *snapped, const tl_window *window, const tl_canvas *canvas);
 
+    /* Fills the canvas, whose ground is no NULL, with the flat colours of a few triangles: tl_are_few.  2^sample_bits
+     * samples a pixel lie at samples_fx, or one where the mesh says; of several the mean.  Returns as `draw` does. */
+    int64_t (*fill_few)(const tl_snapped *snapped, const tl_window *window, const tl_canvas *canvas,
+                        const int32_t *samples_fx, int sample_bits, const tl_transfer *transfer);
+
     /* 1/w of vertices [first, end) of clip space, for tl_vertex_set; nothing of it is checked. */
     void (*inverse_w)(const tl_source *source, int64_t first, int64_t end, double *out);
 

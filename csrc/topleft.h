@@ -138,6 +138,7 @@ typedef enum {
     TL_SINK_SAMPLES = 6,  /* float: the share of samples that are covered; bits in `covered` until the last pass */
     TL_SINK_BLEND = 7,    /* the colour of the triangle that `blend` draws; not for draw */
     TL_SINK_PEEL = 8,     /* ids and depths of the nearest layers, sorted: `peeled` */
+    TL_SINK_SPANS = 9,    /* nothing is drawn: spans are listed; not for draw */
     TL_SINK_CENSUS = 16,  /* nothing is drawn: triangles are counted by how they would be; not for draw */
 } tl_sink;
 
@@ -201,6 +202,24 @@ typedef struct {
 static inline int64_t tl_segments(int64_t width) { return (width + (1 << TL_SEGMENT_BITS) - 1) >> TL_SEGMENT_BITS; }
 
 #define TL_FLIP INT32_MAX
+
+/* Where a picture of a few large triangles is written row by row: the most spans of a row, of each triangle one for
+ * each sample, and of a band of rows. */
+#define TL_FEW_SLOTS 128
+#define TL_FEW_SPANS 4096
+
+/* How many are few, by what is done otherwise: bits are drawn; every triangle is stored over a background; labels are
+ * drawn first, or samples averaged. */
+typedef enum { TL_FEW_OF_BITS = 2, TL_FEW_STORED = 4, TL_FEW_LABELLED = 64 } tl_few;
+static inline int tl_are_few(int64_t n, int n_samples, int64_t width, int64_t height, tl_few most)
+{
+    const int64_t px_each = most < TL_FEW_LABELLED ? (int64_t)1 << 18 : 4096 * (n_samples > 4 ? n_samples : 4);
+    const int fits = n * n_samples <= TL_FEW_SLOTS && width >= 64 && width < INT32_MAX;
+    return n <= (int64_t)most && fits && n * px_each <= width * height;
+}
+
+/* Bits of a label where those of a pixel's samples stand in one word.  No label has all of them set. */
+static inline int tl_few_label_bits(int sample_bits) { return sample_bits ? 64 >> sample_bits : 63; }
 
 /* A bit a sample, and a word behind the end. */
 static inline int64_t tl_covered_words(int64_t n_samples) { return n_samples / 64 + 2; }

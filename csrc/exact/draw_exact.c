@@ -13,6 +13,7 @@
 #include "topleft.h"
 #include "lanes/lanes.h"
 #include "vertex/fixed.h"
+#include "few/few.c"
 #include "exact/alone_exact.c"
 #include "exact/boxes_exact.c"
 #include "exact/rows_exact.c"
@@ -323,6 +324,8 @@ static int64_t draw_exact(const tl_snapped *snapped, const tl_window *band, cons
 /* A mesh of either kind. */
 static int64_t draw_mesh(const tl_snapped *snapped, const tl_window *window, const tl_target *target, tl_share *share)
 {
+    if (draws_few(snapped, window, target, share))
+        return draw_few(snapped, window, target);
     return draw_bands_of(snapped, window, target, share, snapped->mesh.exact ? draw_exact : draw_part);
 }
 

@@ -21,7 +21,8 @@
 
 /* A copy of a function for each sink of whole samples, so that inner loops know what they draw, and a call of the right
  * one.  Such a function takes the sink last: TL_SINK_COPIES(f, (declared parameters), parameters ...),
- * TL_SINK_CALL(f, sink, ...).  TL_SINK_SAMPLES, TL_SINK_BLEND and TL_SINK_CENSUS have code of their own. */
+ * TL_SINK_CALL(f, sink, ...).  TL_SINK_SAMPLES, TL_SINK_BLEND, TL_SINK_SPANS and TL_SINK_CENSUS have code of their
+ * own. */
 #define TL_SINK_COPY(f, name, sink, declared, ...) \
     static __attribute__((noinline)) void f##_##name declared { f(__VA_ARGS__, sink); }
 #define TL_SINK_COPIES(f, declared, ...)                               \
@@ -43,6 +44,7 @@
     case TL_SINK_PEEL: f##_peel(__VA_ARGS__); break;                          \
     case TL_SINK_SAMPLES:                                                     \
     case TL_SINK_BLEND:                                                       \
+    case TL_SINK_SPANS:                                                       \
     case TL_SINK_CENSUS: __builtin_trap();                                    \
     }
 
@@ -63,6 +65,7 @@
     case TL_SINK_PEEL: f##_nearest(__VA_ARGS__); break; \
     case TL_SINK_SAMPLES:                               \
     case TL_SINK_BLEND:                                 \
+    case TL_SINK_SPANS:                                 \
     case TL_SINK_CENSUS: __builtin_trap();              \
     }
 
@@ -123,6 +126,10 @@ TL_INLINE void put_plain(const tl_target *target, tl_sink sink, int64_t at, int6
     }
     if (sink == TL_SINK_BLEND) {
         mix_run(target->pixels, at, n);
+        return;
+    }
+    if (sink == TL_SINK_SPANS) {
+        note_span(target->pixels, at, n);
         return;
     }
     if (sink == TL_SINK_SAMPLES) {

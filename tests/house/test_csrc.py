@@ -15,7 +15,8 @@ FOLDERS = sorted({name.rpartition("/")[0] for name in FILES})
 
 #: From the lowest floor to the highest. A folder includes those of lower floors, its own files, and headers beside it.
 LADDER = (
-    ("base",), ("lanes",), ("vertex",), ("clusters", "mesh"), ("raster",), ("area", "exact", "points", "meshlets"),
+    ("base",), ("lanes",), ("vertex",), ("clusters", "mesh"), ("raster",), ("few",),
+    ("area", "exact", "points", "meshlets"),
     ("pixels",), ("blend", "lines", "polygons", "shade", "tiles"),
 )  # fmt: skip
 FLOORS = {folder: floor for floor, folders in enumerate(LADDER) for folder in folders}

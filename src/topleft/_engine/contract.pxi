@@ -120,6 +120,11 @@ cdef extern from "topleft.h" nogil:
         int32_t *packed
         int32_t *cells
     int64_t tl_blend_cells(int64_t width)
+    ctypedef enum tl_few:
+        TL_FEW_OF_BITS
+        TL_FEW_STORED
+        TL_FEW_LABELLED
+    bint tl_are_few(int64_t n, int n_samples, int64_t width, int64_t height, tl_few most)
     ctypedef struct tl_snapped:
         tl_vertex_set mesh
         const int32_t *triangles
@@ -486,6 +491,7 @@ cdef extern from "topleft.h" nogil:
         void (*list_bins)(const tl_bins *, int64_t, int64_t *, int32_t *) noexcept nogil
         int64_t (*draw_area)(const tl_snapped *, const tl_window *, const tl_area *) noexcept nogil
         int64_t (*blend)(const tl_snapped *, const tl_window *, const tl_canvas *) noexcept nogil
+        int64_t (*fill_few)(const tl_snapped *, const tl_window *, const tl_canvas *, const int32_t *, int, const tl_transfer *) noexcept nogil
         void (*inverse_w)(const tl_source *, int64_t, int64_t, double *) noexcept nogil
         void (*barycentric)(const tl_snapped *, const tl_window *, const int32_t *, float *) noexcept nogil
         void (*interpolate)(const tl_snapped *, const tl_window *, const int32_t *, const float *, int, int, float, float *) noexcept nogil

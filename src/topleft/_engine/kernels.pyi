@@ -19,6 +19,9 @@ VERTEX_BYTES: int
 CELL_CLEAR: int
 PLANE_DOUBLES: int
 AREA_OVERFLOW: int
+FEW_OF_BITS: int
+FEW_STORED: int
+FEW_LABELLED: int
 MAX_LAYERS: int
 CLUSTER: int
 CLUSTER_GROUP: int
@@ -174,6 +177,17 @@ class SnappedMesh:
         ground: U8 | None,
         packed: I32 | None,
         cells: I32 | None,
+    ) -> int: ...
+    def is_few(self, width: int, height: int, n_samples: int, most: int) -> bool: ...
+    def fill_few(
+        self,
+        pixels: Array,
+        first_row: int,
+        n_rows: int,
+        colors: Array,
+        transfer: Transfer | None,
+        ground: U8,
+        samples_fx: I32,
     ) -> int: ...
     def barycentric(self, ids: I32, out: F32) -> None: ...
     def interpolate(self, ids: I32, values: F32, per_corner: bool, background: float, out: F32) -> None: ...

@@ -290,6 +290,36 @@ cdef class SnappedMesh:
         raise_if_given_up()
         return bad_row
 
+    def is_few(self, int64_t width, int64_t height, int n_samples, int most):
+        """Tell whether a picture of the mesh is to be written row by row: large triangles, which are snapped.
+
+        `most`: FEW_OF_BITS, FEW_STORED or FEW_LABELLED, by what is done otherwise.
+        """
+        cdef int64_t n = self.snapped.n_triangles + (self.snapped.pieces.n_pieces if self.snapped.pieces != NULL else 0)
+        return self.snapped.mesh.exact == NULL and tl_are_few(n, n_samples, width, height, <tl_few>most)
+
+    def fill_few(self, pixels, int64_t first_row, int64_t n_rows, colors, Transfer transfer, const uint8_t[::1] ground,
+                 const int32_t[:, ::1] samples_fx):
+        """Fill rows of (H, W[, C]) pixels with `ground` and the flat colours of triangles; of samples their mean.
+
+        Returns as `draw` does.
+        """
+        cdef tl_canvas canvas
+        cdef int64_t bad_row, width = pixels.shape[1]
+        cdef tl_window window = self.window(first_row, n_rows, width)
+        cdef uint8_t[::1] flat = as_bytes(pixels)
+        cdef const uint8_t[::1] palette = as_bytes(colors)
+        cdef const tl_transfer *own = NULL if transfer is None else &transfer.transfer
+        cdef int sample_bits = int(samples_fx.shape[0]).bit_length() - 1
+        memset(&canvas, 0, sizeof(canvas))
+        canvas.n_channels, canvas.is_u8 = 1 if pixels.ndim == 2 else pixels.shape[2], pixels.dtype == np.uint8
+        canvas.pixels = &flat[first_row * width * canvas.n_channels * (1 if canvas.is_u8 else 4)]
+        canvas.stride_px, canvas.colors, canvas.ground, canvas.is_flat = width, data(palette), &ground[0], True
+        with nogil:
+            bad_row = K.fill_few(&self.snapped, &window, &canvas, &samples_fx[0, 0], sample_bits, own)
+        raise_if_given_up()
+        return bad_row
+
     def barycentric(self, const int32_t[:, ::1] ids, float[:, :, ::1] out):
         """Write the weights of the three vertices of the triangle at each pixel."""
         cdef tl_window window = self.window(0, ids.shape[0], ids.shape[1])

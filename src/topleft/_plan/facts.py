@@ -21,7 +21,7 @@ from topleft._raster.choices import Drawing, Route
 from topleft._raster.cluster_draw import ClusteredMesh
 from topleft._raster.clusters import Clusters
 from topleft._raster.sampling import area_cells, sample_positions
-from topleft._raster.snap import snap_mesh
+from topleft._raster.snap import Snapped, snap_mesh
 from topleft._raster.view import View
 
 __all__ = ["CLASSES", "ClusterFacts", "Facts", "find_cluster_facts", "find_facts", "memory_of"]
@@ -101,6 +101,7 @@ class Facts:
     n_pieces: int
     common_depth: float | None  # of all vertices, whatever is made of it
     is_direct: bool  # uint8 colours of triangles are stored without labels in between
+    is_few: bool  # large triangles, whose picture is written row by row
     work_ms: float  # of one thread, as guessed before the draw
     census: tuple[tuple[int, float, float], ...]  # of each of CLASSES: triangles, samples in boxes, covered
     decided: Decided | None = None  # with vertices that are not snapped
@@ -188,6 +189,7 @@ def find_facts(
         n_pieces=len(pieces) if pieces else 0,
         common_depth=common,
         is_direct=verb == "fill" and choices.is_direct(snapped, view, np.dtype(np.uint8), is_flat=True),
+        is_few=writes_rows(snapped, view, verb, drawing),
         work_ms=choices.work_ns(view, snapped, drawing.sink) / 1e6,
         census=tuple(census),
         decided=decided,
@@ -195,6 +197,14 @@ def find_facts(
     checked = np.array(indices_drawn, np.int32)
     checked.flags.writeable = False
     return facts, checked
+
+
+def writes_rows(snapped: Snapped, view: View, verb: str, drawing: Drawing) -> bool:
+    """Tell whether a picture is written row by row; colours are taken for RGBA, one a triangle."""
+    if verb == "fill":
+        return choices.fills_few(snapped, view, np.zeros((snapped.n_triangles, 4), np.uint8), is_flat=True)
+    is_one = view.sampling.n_samples == 1 or drawing.sink is Sink.SAMPLES
+    return is_one and choices.draws_few(snapped, view, drawing.sink, drawing.n_threads)
 
 
 def count_decided(vertices: ArrayLike, triangles: ArrayLike, view: View) -> Decided:
@@ -284,9 +294,9 @@ def memory_of(facts: Facts) -> tuple[dict[str, int], dict[str, int]]:
         strips = facts.drawing.n_threads * _engine.blend_cells(width)
         of_sums = area_cells(n, height, width, facts.drawing.n_threads) if n_pixels else 0
         scratch["cells"] = 4 * (strips if facts.verb == "fill" else of_sums)
-    elif facts.verb == "fill" and n_samples == 1 and n and not facts.is_direct:
+    elif facts.verb == "fill" and n_samples == 1 and n and not (facts.is_direct or facts.is_few):
         scratch["labels"] = 4 * n_pixels
-    elif facts.draws_planes and not is_empty and n and choices.can_share(view):
+    elif facts.draws_planes and not is_empty and n and choices.can_share(view) and not facts.is_few:
         scratch["bins"] = 12 * (n + 16)
         scratch["bands"] = 4 * (n + 1)
     found = facts.clusters

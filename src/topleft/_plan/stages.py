@@ -301,7 +301,10 @@ def plan_method(facts: Facts, costs: Costs) -> Stage:
     rejected = ("one method for all: boxes waste tests on large triangles, rows waste setup on small ones",)
     if view.method != METHODS["auto"].code:
         rejected = ("method='auto': another one was asked for; the picture is the same",)
-    if facts.is_direct and facts.n_drawn:
+    if facts.is_few and facts.n_drawn:
+        parts = [f"{plural(facts.n_drawn, 'triangle')} at once, row by row: every pixel is written once"]
+        rejected = ("one after the other: what they cover would be cleared first, and written again",)
+    elif facts.is_direct and facts.n_drawn:
         parts = [f"{plural(facts.n_drawn, 'triangle')} one after the other, in painter's order"]
         rejected = ("vectors and queues of triangles: they change the order, and colours have no ids to tell it",)
     return Stage("method", "; ".join(parts) or "nothing to draw", covered, rejected, ms, "draw")
@@ -317,8 +320,8 @@ def plan_sink(facts: Facts, costs: Costs) -> Iterator[Stage]:
     rejected = () if n == 1 else ("a full draw for each sample: setup, culling and boxes are shared",)
     choice, why = names.get(view.sampling, f"{n} samples a pixel"), f"sampling={str(view.sampling)!r} was asked for"
     yield Stage("sampling", choice, why, rejected, timed_in="method")
-    if facts.is_direct:
-        why = "triangles are few for the picture: uint8 colours of triangles go straight to it"
+    if facts.is_direct or (facts.is_few and facts.verb == "fill"):
+        why = "triangles are few for the picture: their colours go straight to it"
         rejected = ("labels and colours from them: two passes over the picture, which pay for small triangles",)
         yield Stage("shade", "none", why, rejected, timed_in="method")
     elif facts.verb == "fill":

@@ -35,7 +35,9 @@ __all__ = [
     "cluster_route",
     "common_depth",
     "drawing",
+    "draws_few",
     "earlier_wins",
+    "fills_few",
     "first_depth",
     "fragment_sink",
     "is_affine",
@@ -150,6 +152,12 @@ MIN_PIXELS_A_VERTEX = 4
 
 #: What it does not matter to in which order triangles are drawn.
 ORDER_FREE = frozenset({Sink.MASK, Sink.COUNT, Sink.NEAREST, Sink.FARTHEST, Sink.SAMPLES})
+
+#: What is drawn row by row where triangles are few, and how few those are.
+FEW_OF = {
+    Sink.MASK: _engine.FEW_OF_BITS, Sink.SAMPLES: _engine.FEW_OF_BITS, Sink.COUNT: _engine.FEW_STORED,
+    Sink.LABEL: _engine.FEW_STORED,
+}  # fmt: skip
 
 #: With fewer pixels in the picture for each triangle that is seen, labels take less time than colours stored triangle
 #: by triangle: 200,000 triangles of 8 px in 1920x1080 take 6.4 and 8 ms, 20,000 of 40 px 3.8 and 2.3 ms, 200,000 of
@@ -420,6 +428,22 @@ def route(view: View, snapped: Snapped, test: DepthTest | None, *, wants_depth: 
 def earlier_wins(test: DepthTest | None, *, has_depth: bool) -> bool:
     """Tell whether the triangle with the lower index shows where depths are equal; otherwise the later one does."""
     return test is not None and has_depth
+
+
+def draws_few(snapped: Snapped, view: View, sink: Sink, n_threads: int) -> bool:
+    """Tell whether `draw` writes a picture row by row: so few triangles for the size of a thread's rows."""
+    is_known = sink in FEW_OF and view.sampling is not Sampling.AREA and not view.test
+    n_samples = view.sampling.n_samples if sink is Sink.SAMPLES else 1
+    width, height = view.size
+    return is_known and snapped.mesh.is_few(width, height // max(1, n_threads), n_samples, FEW_OF[sink])
+
+
+def fills_few(snapped: Snapped, view: View, colors: NDArray[Any], *, is_flat: bool) -> bool:
+    """Tell whether flat colours over a background are written row by row."""
+    n_samples = view.sampling.n_samples
+    is_stored = n_samples == 1 and colors.dtype == np.uint8 and colors.shape[1:] == (4,)
+    most = _engine.FEW_STORED if is_stored else _engine.FEW_LABELLED
+    return is_flat and view.sampling is not Sampling.AREA and snapped.mesh.is_few(*view.size, n_samples, most)
 
 
 def is_direct(snapped: Snapped, view: View, dtype: np.dtype[Any], *, is_flat: bool) -> bool:

@@ -21,7 +21,7 @@ from topleft._base.threads import run_parts
 from topleft._raster import choices
 from topleft._raster.classic import fill_classic, refuse_classic
 from topleft._raster.rasterize import canvas_of, draw, draw_all_samples
-from topleft._raster.sampling import draw_means, sample_positions
+from topleft._raster.sampling import SAMPLE_GRID_BITS, draw_means, sample_positions
 from topleft._raster.snap import Snapped, snap_mesh
 from topleft._raster.view import View
 from topleft.typing import AlphaOption, BlendOption, PerOption, ResolveOption
@@ -109,11 +109,14 @@ def draw_fill(
         is_drawn = bool(canvas.size and snapped.n_triangles)
         is_blended = blending.is_needed or choices.is_direct(snapped, view, palette.dtype, is_flat=is_flat)
         can_lay = is_drawn and is_blended and palette.dtype == np.uint8 and view.sampling.n_samples == 1
-        if ground is not None and not can_lay:
+        is_few = is_drawn and not blending.is_needed and choices.fills_few(snapped, view, palette, is_flat=is_flat)
+        if ground is not None and not (can_lay or is_few):
             lay_ground(canvas, ground)
             ground = None
         if not is_drawn:
             pass
+        elif is_few and ground is not None:
+            fill_few(snapped, view, palette, canvas, ground, transfer)
         elif is_blended:
             blend(memory, snapped, view, palette, canvas, blending, transfer, is_flat=is_flat, ground=ground)
         elif view.sampling.n_samples > 1:
@@ -194,6 +197,27 @@ def lay_ground(pixels: NDArray[Any], ground: NDArray[Any]) -> None:
     """Give all pixels one colour: the first row, and the others row by row, which NumPy copies fast."""
     pixels[:1] = ground
     pixels[1:] = pixels[:1]
+
+
+def fill_few(
+    snapped: Snapped,
+    view: View,
+    colors: NDArray[Any],
+    pixels: NDArray[Any],
+    ground: NDArray[Any],
+    transfer: _engine.Transfer | None,
+) -> None:
+    """Write every pixel once, row by row: few triangles, of which a row meets fewer."""
+    n_samples = view.sampling.n_samples
+    positions = sample_positions(n_samples, view.grid_bits) if n_samples > 1 else sample_positions(1, SAMPLE_GRID_BITS)
+    under = _engine.as_bytes(np.full(pixels.shape[2:] or 1, ground))
+
+    def fill_rows(first: int, end: int) -> int:
+        return snapped.mesh.fill_few(pixels, first, end - first, colors, transfer, under, positions)
+
+    if max(run_parts(fill_rows, view.size[1], choices.threads_to_draw(view, snapped, Sink.LABEL))) >= 0:
+        snapped.check_indices()
+    view.mark("draw")
 
 
 def paint(

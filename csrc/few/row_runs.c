@@ -1,0 +1,167 @@
+/* Runs: a row of a picture as runs of pixels that hold the same, and how they get into memory.
+ * In: spans of triangles.  Out: pixels, each written once.
+ *
+ * A run has a key: a mask's bit, a count, a label, or what each sample of its pixels sees, side by side. */
+#ifndef TL_ROW_RUNS_C
+#define TL_ROW_RUNS_C
+
+#include <stdint.h>
+#include <string.h>
+
+#include "topleft.h"
+#include "lanes/lanes.h"
+#include "vertex/fixed.h"
+
+/* Run k is [col[k], col[k + 1]). */
+typedef struct {
+    int n;
+    int32_t col[2 * TL_FEW_SLOTS + 2];
+    uint64_t key[2 * TL_FEW_SLOTS + 2];
+} row_runs;
+
+/* What a triangle does to the key of what it covers. */
+typedef enum {
+    KEY_REPLACE, /* the bits of its sample become its own */
+    KEY_COUNT,   /* one more */
+    KEY_LATER,   /* the larger label stays */
+} key_change;
+
+TL_INLINE void start_row(row_runs *r, int64_t width, uint64_t key)
+{
+    r->n = 1, r->col[0] = 0, r->col[1] = (int32_t)width, r->key[0] = key;
+}
+
+/* Cuts run k in two at a column inside of it. */
+TL_INLINE void cut_run(row_runs *r, int k, int32_t col)
+{
+    uint64_t key = r->key[k];
+    r->n++;
+    for (int i = k + 1; i <= r->n; i++) { /* no memmove: few, and just written */
+        const int32_t next_col = r->col[i];
+        const uint64_t next_key = r->key[i];
+        r->col[i] = col, r->key[i] = key;
+        col = next_col, key = next_key;
+    }
+}
+
+TL_INLINE uint64_t changed_key(uint64_t key, key_change change, uint64_t bits, uint64_t own)
+{
+    if (change == KEY_REPLACE)
+        return (key & ~bits) | own;
+    if (change == KEY_COUNT)
+        return key + 1;
+    return (int64_t)own > (int64_t)key ? own : key;
+}
+
+/* A span of a triangle: `own` where `bits` are set. */
+TL_INLINE void lay_span(row_runs *r, int32_t first, int32_t end, key_change change, uint64_t bits, uint64_t own)
+{
+    int k = 0;
+    if (r->n == 1) { /* the first one of the row */
+        const uint64_t key = r->key[0];
+        const int32_t width = r->col[1];
+        k = first > 0;
+        r->col[k] = first, r->key[k] = changed_key(key, change, bits, own);
+        r->col[k + 1] = end, r->key[k + 1] = key;
+        r->n = k + 1 + (end < width);
+        r->col[r->n] = width;
+        return;
+    }
+    while (r->col[k + 1] <= first)
+        k++;
+    if (r->col[k] < first)
+        cut_run(r, k++, first);
+    for (; k < r->n && r->col[k] < end; k++) {
+        if (r->col[k + 1] > end)
+            cut_run(r, k, end);
+        r->key[k] = changed_key(r->key[k], change, bits, own);
+    }
+}
+
+/* ---- pixels ------------------------------------------------------------------------------------------------------ */
+
+/* n > 0 pixels of one value.  Vectors begin at multiples of their size, for a store across two cache lines takes twice
+ * as long; where `may_pass`, the last one may write up to a vector further than n, which is written later. */
+TL_INLINE void put_words(int32_t *pixels, int64_t n, int32_t value, int may_pass)
+{
+    const vi values = vi_set1(value);
+    int32_t *const end = pixels + n;
+    int32_t *p = pixels + TL_LANES - ((uintptr_t)pixels >> 2) % TL_LANES;
+    if (!may_pass && n < TL_LANES) {
+        vi_store_masked(pixels, vm_first(n), values);
+        return;
+    }
+    vi_store(pixels, values);
+    for (; end - p >= 4 * TL_LANES; p += 4 * TL_LANES)
+        for (int k = 0; k < 4; k++)
+            vi_store(p + k * TL_LANES, values);
+    for (; end - p >= (may_pass ? 1 : TL_LANES); p += TL_LANES)
+        vi_store(p, values);
+    if (!may_pass)
+        vi_store(end - TL_LANES, values);
+}
+
+/* The same of bytes. */
+TL_INLINE void put_bytes(uint8_t *pixels, int64_t n, uint8_t value, int may_pass)
+{
+    const int64_t size = 4 * TL_LANES;
+    if (!may_pass || TL_LANES == 1) {
+        memset(pixels, value, (size_t)n);
+        return;
+    }
+    uint8_t *const aligned = pixels + size - (uintptr_t)pixels % (uintptr_t)size;
+    vi_store((int32_t *)(void *)pixels, vi_set1((int32_t)(value * 0x01010101u)));
+    if (pixels + n > aligned)
+        put_words((int32_t *)(void *)aligned, (pixels + n - aligned + 3) >> 2, (int32_t)(value * 0x01010101u), 1);
+}
+
+/* The same of any size. */
+static void put_pixels(char *pixels, int64_t n, const char *value, size_t pixel_bytes)
+{
+    const size_t all = (size_t)n * pixel_bytes, most = 1024 / pixel_bytes * pixel_bytes;
+    memcpy(pixels, value, pixel_bytes);
+    for (size_t done = pixel_bytes; done < all;) { /* twice as many each time, up to what stays near */
+        const size_t part = done < most ? done : most, size = all - done < part ? all - done : part;
+        memcpy(pixels + done, pixels, size);
+        done += size;
+    }
+}
+
+/* A run that is known as far as `end`, and may go on: in a picture whose rows follow one another in the next row, too.
+ * Pixels are counted from the first one of the rows that this pass writes. */
+typedef struct {
+    char *pixels;
+    int64_t first, end;
+    int64_t n_px; /* of all rows of the pass: what lies behind them is another's */
+    char value[16];
+} open_run;
+
+TL_INLINE void close_run(const open_run *run, int pixel_bytes)
+{
+    char *const pixels = run->pixels + run->first * pixel_bytes;
+    const int64_t n = run->end - run->first;
+    const int may_pass = run->n_px - run->end >= 4 * TL_LANES;
+    int32_t word;
+    if (n <= 0)
+        return;
+    memcpy(&word, run->value, 4);
+    if (pixel_bytes == 1)
+        put_bytes((uint8_t *)pixels, n, (uint8_t)run->value[0], may_pass);
+    else if (pixel_bytes == 4)
+        put_words((int32_t *)(void *)pixels, n, word, may_pass);
+    else
+        put_pixels(pixels, n, run->value, (size_t)pixel_bytes);
+}
+
+/* The pixels [first, end) hold `value`. */
+TL_INLINE void add_pixels(open_run *run, int64_t first, int64_t end, const char *value, int pixel_bytes)
+{
+    if (first != run->end || memcmp(run->value, value, (size_t)pixel_bytes) != 0) {
+        close_run(run, pixel_bytes);
+        run->first = first;
+        memcpy(run->value, value, (size_t)pixel_bytes);
+    }
+    run->end = end;
+}
+
+#endif

@@ -1,0 +1,136 @@
+"""Pictures of a few large triangles, which are written row by row: the same as with so many that they are not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import topleft as tl
+
+SIZE = (769, 701)
+N_OTHERS = 80
+"""Triangles without area: no picture changes by them, but a mesh of so many is drawn triangle by triangle."""
+
+SHAPES = {
+    "one": [[30.3, 20.7], [700.1, 333.3], [120.9, 690.2]],
+    "beyond": [[-4000.5, 200.25], [9000.0, -100.0], [300.0, 9e5]],
+    "far": [[-1e12, 2e11], [3e12, -1e12], [1e11, 5e12]],
+    "whole": [[-10, -10], [2000, -10], [-10, 2000]],
+    "level": [[0, 100], [769, 100], [0, 600]],
+    "sliver": [[1, 1], [768, 699.5], [768, 700]],
+    "none": [[5, 5], [700, 5], [300, 5]],
+    "outside": [[5, -5], [700, -5], [300, -50]],
+}
+
+
+def two_triangles() -> np.ndarray:
+    """Return two that overlap."""
+    return np.concatenate([SHAPES["one"], [[760.0, 3], [740.5, 660], [10, 400]]])
+
+
+def meshes(vertices: object) -> tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
+    """Return triangles of their own vertices, and the same with others that show nowhere."""
+    points = np.asarray(vertices, np.float64)
+    triangles = np.arange(len(points)).reshape(-1, 3)
+    return (points, triangles), (points, np.concatenate([triangles, np.zeros((N_OTHERS, 3), int)]))
+
+
+def palette(n: int, channels: int, dtype: type) -> np.ndarray:
+    """Return colours of n triangles and of those that show nowhere."""
+    colors = np.random.default_rng(n).integers(0, 256, (n + N_OTHERS, channels))
+    return colors.astype(dtype) if dtype is np.uint8 else (colors / 255).astype(dtype)
+
+
+@pytest.mark.parametrize("sampling", ["center", "msaa2", "msaa4", "msaa8", "msaa16"])
+@pytest.mark.parametrize("shape", SHAPES)
+def test_coverage_and_counts(shape, sampling):
+    few, many = meshes(SHAPES[shape])
+    assert (tl.coverage(*few, SIZE, sampling=sampling) == tl.coverage(*many, SIZE, sampling=sampling)).all()
+    assert (tl.overdraw(*few, SIZE, sampling=sampling) == tl.overdraw(*many, SIZE, sampling=sampling)).all()
+
+
+@pytest.mark.parametrize("options", [
+    {}, {"threads": 3}, {"method": "edge"}, {"method": "scanline"}, {"cull": "back"}, {"cull": "front"},
+    {"subpixel_bits": 0}, {"subpixel_bits": 16}, {"origin": (50, -70), "viewport": (900, 800)},
+])  # fmt: skip
+def test_each_verb_with_options(options):
+    few, many = meshes(two_triangles())
+    colors = palette(2, 4, np.uint8)
+    assert (tl.coverage(*few, SIZE, **options) == tl.coverage(*many, SIZE, **options)).all()
+    assert (tl.overdraw(*few, SIZE, **options) == tl.overdraw(*many, SIZE, **options)).all()
+    for sampling in ("center", "msaa4"):
+        own = {"per": "triangle", "background": (1, 2, 3, 4), "sampling": sampling, **options}
+        assert (tl.fill(*few, colors[:2], SIZE, **own) == tl.fill(*many, colors, SIZE, **own)).all()
+    for test in ("less", "greater", None):
+        ids, expected = (tl.rasterize(*mesh, SIZE, depth_test=test, **options).triangle for mesh in (few, many))
+        assert (ids == expected).all()
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.float32])
+@pytest.mark.parametrize("channels", [1, 2, 3, 4])
+@pytest.mark.parametrize("sampling", ["center", "msaa2", "msaa4", "msaa16"])
+def test_fill_has_the_colours_of_labels(sampling, channels, dtype):
+    few, many = meshes(two_triangles())
+    colors = palette(2, channels, dtype)
+    for alpha in ("straight", "premultiplied"):
+        options = {"per": "triangle", "background": np.full(channels, 0.25 if dtype is np.float32 else 9),
+                   "sampling": sampling, "alpha": alpha}  # fmt: skip
+        assert (tl.fill(*few, colors[:2], SIZE, **options) == tl.fill(*many, colors, SIZE, **options)).all()
+
+
+@pytest.mark.parametrize("sampling", ["msaa4", "msaa8"])
+def test_fill_averages_light(sampling):
+    few, many = meshes(two_triangles())
+    colors, options = palette(2, 4, np.uint8), {"per": "triangle", "resolve": "linear", "sampling": sampling}
+    assert (tl.fill(*few, colors[:2], SIZE, **options) == tl.fill(*many, colors, SIZE, **options)).all()
+
+
+def test_fill_of_a_fan_of_many_colours():
+    angles = np.linspace(0, 2 * np.pi, 15)
+    rim = np.stack([380 + 300 * np.cos(angles), 350 + 330 * np.sin(angles)], 1)
+    corners = np.stack([np.broadcast_to([380.2, 351.3], (14, 2)), rim[:-1], rim[1:]], 1)
+    few, many = meshes(corners.reshape(-1, 2))
+    for channels, dtype in ((3, np.uint8), (4, np.float32)):
+        colors = palette(14, channels, dtype)
+        for sampling in ("center", "msaa4", "msaa8"):
+            options = {"per": "triangle", "sampling": sampling}
+            assert (tl.fill(*few, colors[:14], SIZE, **options) == tl.fill(*many, colors, SIZE, **options)).all()
+
+
+def test_pieces_of_a_triangle_that_planes_cut():
+    vertices = np.array([[-3.0, -2, 0.1, 0.5], [4, -1, 0.3, 2], [0.5, 6, 0.2, -1.5]])
+    triangles = np.array([[0, 1, 2]])
+    many = np.concatenate([triangles, np.zeros((N_OTHERS, 3), int)])
+    colors = palette(1, 4, np.uint8)
+    assert tl.coverage(vertices, triangles, SIZE).any()
+    for sampling in ("center", "msaa4"):
+        options = {"sampling": sampling}
+        assert (tl.coverage(vertices, triangles, SIZE, **options) == tl.coverage(vertices, many, SIZE, **options)).all()
+        options["per"] = "triangle"
+        picture = tl.fill(vertices, triangles, colors[:1], SIZE, **options)
+        assert (picture == tl.fill(vertices, many, colors, SIZE, **options)).all()
+
+
+def test_arrays_of_the_caller():
+    few, many = meshes(SHAPES["one"])
+    colors = palette(1, 4, np.uint8)
+    mask, picture = np.ones((701, 1538), bool), np.full((701, 769, 8), 77, np.uint8)
+    tl.coverage(*few, SIZE, out=mask[:, ::2])
+    assert (mask[:, ::2] == tl.coverage(*many, SIZE)).all()
+    assert mask[:, 1::2].all()
+    tl.fill(*few, colors[:1], SIZE, per="triangle", background=5, out=picture[..., 4:])
+    assert (picture[..., 4:] == tl.fill(*many, colors, SIZE, per="triangle", background=5)).all()
+    assert (picture[..., :4] == 77).all()
+    kept = np.full((701, 769, 4), 77, np.uint8)
+    tl.fill(*few, colors[:1], SIZE, per="triangle", sampling="msaa4", out=kept)
+    expected = np.full((701, 769, 4), 77, np.uint8)
+    tl.fill(*many, colors, SIZE, per="triangle", sampling="msaa4", out=expected)
+    assert (kept == expected).all()
+
+
+@pytest.mark.parametrize("verb", ["coverage", "overdraw", "fill"])
+def test_an_index_outside_the_vertices_is_refused(verb):
+    vertices, colors = np.array(SHAPES["one"]), [np.zeros((1, 3), np.uint8)] if verb == "fill" else []
+    for bad in (3, -1):
+        with pytest.raises(IndexError, match="triangles"):
+            getattr(tl, verb)(vertices, [[0, 1, bad]], *colors, SIZE)
