@@ -263,8 +263,8 @@ TL_INLINE vm find_on_grid(const exact_state *s, const lane_exact *t, int of_boxe
     return of_boxes ? vm_and(good, vf_ge(vf_set1(TL_EXACT_BOX * (float)s->points->band), t->xy)) : good;
 }
 
-/* Moves what set_box_edges made of the lanes in m by half a unit, outwards where an edge owns its ties and else inwards:
- * none is ever 0 at a sample then. */
+/* Moves what set_box_edges made of the lanes in m by half a unit, outwards where an edge owns its ties and else
+ * inwards: none is ever 0 at a sample then. */
 TL_INLINE void set_ties(lane_exact *t, vm m)
 {
     const vf zero = vf_set1(0.0f), half = vf_set1(TL_HALF_UNIT), wide = vf_set1(0x1p15f);
