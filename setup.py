@@ -34,9 +34,9 @@ CLASSICS = "topleft.methods.classics.classic_kernels"
 
 WARNINGS = ["-Wall", "-Wextra"]
 # -ffp-contract=off and -fno-fast-math stand after whatever CFLAGS holds: the same bits on every machine depend on them.
-# -O2 -fno-tree-vectorize takes three quarters of the time to compile, and the kernels then take 1.15 times as long (mean
-# of 75 calls with AVX2; up to 2.8); -fno-tree-vectorize alone takes 0.94, and half of the calls 1.02 to 1.6 times as
-# long.
+# -O2 -fno-tree-vectorize takes three quarters of the time to compile, and the kernels then take 1.15 times as long
+# (mean of 75 calls with AVX2; up to 2.8). -fno-tree-vectorize alone takes 0.94, and half of the calls 1.02 to 1.6 times
+# as long.
 # Link-time optimisation could move code between units of different instruction sets. Debug information, which Python
 # asks for, would be nine tenths of the library and a third of the time: only `build_ext --debug` makes it.
 FLAGS_C = [
