@@ -4,6 +4,11 @@
 
 #include <stdint.h>
 
+/* What a transform makes of a vertex: x, y, depth, and two int32, x and y rounded to 2^-18 px and clamped to 2^12 px. */
+#define TL_PLACED 4
+#define TL_PLACE_BITS 18
+#define TL_PLACE_LIMIT_PX 4096
+
 /* What was decided how. */
 typedef struct tl_exact_counts {
     int64_t n_triangles;  /* that were drawn, of each pass */
@@ -28,8 +33,8 @@ typedef struct tl_exact_pieces {
  * drawn are the triangles of the mesh, collapsed to a point where a clip plane cuts them, and then all pieces. */
 typedef struct tl_exact_points {
     const double
-        *points; /* (n_points, stride): x and y in pixels, and depth when stride = 3; behind them those of pieces */
-    int stride;  /* 2 or 3 */
+        *points; /* (n_points, stride): x and y in pixels, and depth when stride > 2; behind them those of pieces */
+    int stride;  /* 2, 3 or TL_PLACED */
     int64_t n_points;
     const int32_t *triangles; /* (n_triangles, 3) */
     int64_t n_triangles;

@@ -71,8 +71,8 @@ typedef struct tl_kernels {
      * rounded to 2^-bits px, and what leaves 2^62 of these cannot be drawn. */
     int64_t (*take_points)(const tl_source *source, int64_t first, int64_t end, int bits, double *points);
 
-    /* The clip space, or object space by the matrix, of vertices [first, end) to points (x, y, z) in pixels, not
-     * snapped.  One that cannot be drawn has x NaN, and y says why: a tl_special. */
+    /* The clip space, or object space by the matrix, of vertices [first, end) to points in pixels, not snapped,
+     * TL_PLACED numbers each.  One that cannot be drawn has x NaN, and y says why: a tl_special. */
     tl_vertex_counts (*project_points)(const tl_source *source, int64_t first, int64_t end, const tl_view *view,
                                        double *points);
 

@@ -130,14 +130,13 @@ TL_INLINE void blend_exact_batch(exact_blend *p, const int32_t *corners, vi id, 
         alone = vm_or(alone, drawn);
         drawn = vm_and_not(drawn, alone);
     }
-    const vf xy = box_sizes(&b, TL_TEST_SAMPLE);
     if (__builtin_expect(vm_any(alone), 0)) {
         int32_t ids[TL_MAX_LANES];
         vi_store(ids, id);
         for (unsigned lanes = vm_bits(alone); lanes && s->bad_row < 0; lanes &= lanes - 1) {
             const int lane = __builtin_ctz(lanes);
             const vm before = vm_first(lane);
-            push_exact(&s->rows, vm_and(drawn, before), &b, id, xy);
+            push_exact(&s->rows, vm_and(drawn, before), &b, id);
             drawn = vm_and_not(drawn, before);
             flush_exact_blend(p);
             if (tl_is_given_up(s->window))
@@ -146,7 +145,7 @@ TL_INLINE void blend_exact_batch(exact_blend *p, const int32_t *corners, vi id, 
         }
     }
     if (vm_any(drawn)) {
-        push_exact(&s->rows, drawn, &b, id, xy);
+        push_exact(&s->rows, drawn, &b, id);
         if (TL_IS_FULL(s->rows))
             flush_exact_blend(p);
     }

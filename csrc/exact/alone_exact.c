@@ -303,7 +303,7 @@ static int setup_lone(exact_state *s, int32_t i, lone_triangle *t, tl_test test,
     if (with_depth) {
         const int32_t ordered[3] = {corners[0], corners[second], corners[3 - second]};
         for (int k = 0; k < 3; k++)
-            t->z[k] = s->points->stride < 3 ? 0.0 : s->points->points[(int64_t)ordered[k] * 3 + 2];
+            t->z[k] = s->points->stride < 3 ? 0.0 : s->points->points[(int64_t)ordered[k] * s->points->stride + 2];
         plane_of_points(t, x1 - x0, y1 - y0);
     }
     s->counts->n_triangles++;

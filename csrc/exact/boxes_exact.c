@@ -29,7 +29,7 @@ TL_INLINE vm in_box(vm live, vi n_cols, vi n_rows, int row, int col)
 /* Sets `in` to what lanes decide; returns the lanes that are in doubt at some sample, in the box or beside it. */
 TL_INLINE vm test_boxes(const lane_exact *t, vi n_cols, vi n_rows, int size, box_masks in)
 {
-    const vf band = vf_select(t->on_grid, vf_set1(0.0f), vf_mul(t->xy, vf_set1(TL_BOX_BAND)));
+    const vf band = vf_select(t->on_grid, vf_set1(0.0f), t->band);
     vf closest = vf_set1(INFINITY);
     vf row_e[3] = {t->e[0], t->e[1], t->e[2]};
     for (int row = 0; row < size; row++) {
@@ -70,7 +70,7 @@ static __attribute__((noinline)) void ask_boxes(exact_state *s, lane_exact *t, v
     vi_store(ids, t->ids), vd_store(sample_x, t->sample_x), vd_store(sample_y, t->sample_y);
     turn_points(t);
     try_grid(s, t, 1);
-    const vf band = vf_select(t->on_grid, vf_set1(0.0f), vf_mul(t->xy, vf_set1(TL_BOX_BAND)));
+    const vf band = vf_select(t->on_grid, vf_set1(0.0f), t->band);
     const vf below = vf_sub(vf_set1(0.0f), band);
     for (int row = 0; row < size; row++) {
         vf e[3] = {t->e[0], t->e[1], t->e[2]};
@@ -193,6 +193,7 @@ TL_INLINE void flush_small_exact(exact_state *s, tl_sink sink)
         lane_exact t;
         const vi box = vi_load(q->size + i);
         pop_exact(s, sink, &s->small, i, &t);
+        measure_points(&t);
         n_fragments = draw_exact_boxes(s, sink, &t, vi_and(box, vi_set1(0xffff)), vi_shift_right(box, 16), TL_SMALL_BOX,
                                        n_fragments);
     }

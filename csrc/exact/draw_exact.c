@@ -25,10 +25,12 @@
 
 /* TL_LANES triangles as loaded, and what becomes of them. */
 typedef struct {
-    vd x[3], y[3], z[3];
-    vd width, height;
+    lane_exact t;
+    vi x_fx[3], y_fx[3];         /* places, where vertices have them */
+    int is_placed;               /* boxes are those of the places: none has more than 4x4 samples */
     vi top, bottom;              /* rows of the box in the picture */
     vi col, row, n_cols, n_rows; /* the box of samples in the window */
+    vf xy;                       /* as the head of setup_exact.c has it */
     vm alone, fits, drawn;       /* fits: the others, drawn or not */
 } exact_batch;
 
@@ -58,6 +60,67 @@ TL_INLINE void find_pixels_of(vd low, vd high, tl_test test, double centre, int 
 /* The pixels around the extent of a triangle in which edges are tested. */
 TL_INLINE double border_of(tl_test test) { return test == TL_TEST_SAMPLE ? 0.0 : 2.0; }
 
+/* Cuts boxes to the window, and finds which have a sample. */
+TL_INLINE void cut_boxes(const exact_state *s, vi left, vi right, exact_batch *b)
+{
+    b->col = vi_max(left, vi_set1((int32_t)s->left));
+    b->row = vi_max(b->top, vi_set1((int32_t)s->top));
+    b->n_cols = vi_sub(vi_min(right, vi_set1((int32_t)s->right)), b->col);
+    b->n_rows = vi_sub(vi_min(b->bottom, vi_set1((int32_t)s->bottom)), b->row);
+    b->drawn = vm_and(b->fits, vi_gt(vi_min(b->n_cols, b->n_rows), vi_set1(0)));
+}
+
+/* The boxes of the points. */
+TL_INLINE void find_boxes_of_points(const exact_state *s, tl_sink sink, vm live, exact_batch *b)
+{
+    const vd *x = b->t.x, *y = b->t.y;
+    const vd sum = vd_add(vd_add(vd_add(x[0], x[1]), vd_add(y[0], y[1])), vd_add(x[2], y[2]));
+    const vd x_min = vd_min(vd_min(x[0], x[1]), x[2]), x_max = vd_max(vd_max(x[0], x[1]), x[2]);
+    const vd y_min = vd_min(vd_min(y[0], y[1]), y[2]), y_max = vd_max(vd_max(y[0], y[1]), y[2]);
+    const vd width = vd_sub(x_max, x_min), height = vd_sub(y_max, y_min);
+    const tl_test test = test_of(s, sink);
+    const vf one = vf_set1(1.0f), border = vf_set1((float)border_of(test));
+    const vd widest = vd_set1(TL_MAX_BOX_PX - border_of(test));
+    const vd farthest = vd_max(vd_max(x_max, y_max), vd_sub(vd_set1(0.0), vd_min(x_min, y_min)));
+    const vm in_range = vm_and(vd_ge(vd_set1(0x1p30), farthest), vd_ge(vd_set1(0x1p33), sum)); /* not where it is NaN */
+    const vm fits = vm_and(in_range, vd_ge(widest, vd_max(width, height)));
+    const int is_left_of_0 = s->left < 0 || s->top < 0;
+    vi left, right;
+    b->alone = vm_and_not(live, fits), b->fits = vm_and(live, fits);
+    find_pixels_of(x_min, x_max, test, s->centre_x, is_left_of_0, &left, &right);
+    find_pixels_of(y_min, y_max, test, s->centre_y, is_left_of_0, &b->top, &b->bottom);
+    cut_boxes(s, left, right, b);
+    b->xy = vf_mul(vf_max(vf_add(vf_from_vd(width), border), one), vf_max(vf_add(vf_from_vd(height), border), one));
+}
+
+/* The pixels whose samples lie between places, or up to a unit beside them. */
+TL_INLINE void find_pixels_of_places(vi low, vi high, double centre, vi *first, vi *end)
+{
+    const int32_t at = place_of(centre), unit = 1 << TL_PLACE_BITS;
+    *first = vi_shift_right(vi_add(low, vi_set1(unit - 2 - at)), TL_PLACE_BITS);
+    *end = vi_shift_right(vi_add(high, vi_set1(unit + 1 - at)), TL_PLACE_BITS);
+}
+
+/* The boxes of the places; returns 0 where one has more than 4x4 samples and has to be exact. */
+TL_INLINE int find_boxes_of_places(const exact_state *s, vm live, exact_batch *b)
+{
+    const vi *x = b->x_fx, *y = b->y_fx;
+    const vi x_min = vi_min(vi_min(x[0], x[1]), x[2]), x_max = vi_max(vi_max(x[0], x[1]), x[2]);
+    const vi y_min = vi_min(vi_min(y[0], y[1]), y[2]), y_max = vi_max(vi_max(y[0], y[1]), y[2]);
+    const vi width = vi_sub(x_max, x_min), height = vi_sub(y_max, y_min);
+    const vi widest = vi_set1(TL_MAX_BOX_PX << TL_PLACE_BITS);
+    const vf one = vf_set1(1.0f), unit = vf_set1(TL_PLACE_UNIT);
+    /* a special vertex has TL_SPECIAL for x: its triangle is too wide, or special throughout */
+    const vm too_large = vm_or(vi_gt_unsigned(width, widest), vi_gt_unsigned(height, widest));
+    vi left, right;
+    b->alone = vm_and(live, vm_or(too_large, vi_eq(x_min, vi_set1(TL_SPECIAL)))), b->fits = vm_and_not(live, b->alone);
+    find_pixels_of_places(x_min, x_max, s->centre_x, &left, &right);
+    find_pixels_of_places(y_min, y_max, s->centre_y, &b->top, &b->bottom);
+    cut_boxes(s, left, right, b);
+    b->xy = vf_mul(vf_max(vf_mul(vf_from_vi(width), unit), one), vf_max(vf_mul(vf_from_vi(height), unit), one));
+    return !vm_any(vm_and(b->drawn, vi_gt(vi_max(b->n_cols, b->n_rows), vi_set1(TL_SMALL_BOX))));
+}
+
 /* Loads TL_LANES triangles; returns 0, with the row in `bad_row`, when an index lies outside the vertices. */
 TL_INLINE int load_exact_batch(exact_state *s, tl_sink sink, const int32_t *corners, vi id, vm live, exact_batch *b)
 {
@@ -67,26 +130,17 @@ TL_INLINE int load_exact_batch(exact_state *s, tl_sink sink, const int32_t *corn
         s->bad_row = ids[0];
         return 0;
     }
-    load_points(s->points, sink, corners, b->x, b->y, b->z);
-    const vd sum = vd_add(vd_add(vd_add(b->x[0], b->x[1]), vd_add(b->y[0], b->y[1])), vd_add(b->x[2], b->y[2]));
-    const vd x_min = vd_min(vd_min(b->x[0], b->x[1]), b->x[2]), x_max = vd_max(vd_max(b->x[0], b->x[1]), b->x[2]);
-    const vd y_min = vd_min(vd_min(b->y[0], b->y[1]), b->y[2]), y_max = vd_max(vd_max(b->y[0], b->y[1]), b->y[2]);
-    b->width = vd_sub(x_max, x_min), b->height = vd_sub(y_max, y_min);
-    const tl_test test = test_of(s, sink);
-    const vd widest = vd_set1(TL_MAX_BOX_PX - border_of(test));
-    const vd farthest = vd_max(vd_max(x_max, y_max), vd_sub(vd_set1(0.0), vd_min(x_min, y_min)));
-    const vm in_range = vm_and(vd_ge(vd_set1(0x1p30), farthest), vd_ge(vd_set1(0x1p33), sum)); /* not where it is NaN */
-    const vm fits = vm_and(in_range, vd_ge(widest, vd_max(b->width, b->height)));
-    const int is_left_of_0 = s->left < 0 || s->top < 0;
-    vi left, right;
-    b->alone = vm_and_not(live, fits), b->fits = vm_and(live, fits);
-    find_pixels_of(x_min, x_max, test, s->centre_x, is_left_of_0, &left, &right);
-    find_pixels_of(y_min, y_max, test, s->centre_y, is_left_of_0, &b->top, &b->bottom);
-    b->col = vi_max(left, vi_set1((int32_t)s->left));
-    b->row = vi_max(b->top, vi_set1((int32_t)s->top));
-    b->n_cols = vi_sub(vi_min(right, vi_set1((int32_t)s->right)), b->col);
-    b->n_rows = vi_sub(vi_min(b->bottom, vi_set1((int32_t)s->bottom)), b->row);
-    b->drawn = vm_and(b->fits, vi_gt(vi_min(b->n_cols, b->n_rows), vi_set1(0)));
+    b->is_placed = 0;
+    if (sink_has_depth(sink) && s->has_places) {
+        for (int k = 0; k < 3; k++)
+            vd_load_places(s->points->points, corners + k, &b->t.x[k], &b->t.y[k], &b->t.z[k], &b->x_fx[k],
+                           &b->y_fx[k]);
+        b->is_placed = find_boxes_of_places(s, live, b);
+    } else {
+        load_points(s->points, sink, corners, b->t.x, b->t.y, b->t.z);
+    }
+    if (!b->is_placed)
+        find_boxes_of_points(s, sink, live, b);
     return 1;
 }
 
@@ -114,7 +168,10 @@ TL_INLINE void take_out_exact(const exact_state *s, exact_batch *b)
     }
     if (s->mesh->cull == TL_CULL_NONE)
         return;
-    const vd area = area_of_points(b->x, b->y), box = vd_mul(b->width, b->height);
+    const vd *x = b->t.x, *y = b->t.y;
+    const vd width = vd_sub(vd_max(vd_max(x[0], x[1]), x[2]), vd_min(vd_min(x[0], x[1]), x[2]));
+    const vd height = vd_sub(vd_max(vd_max(y[0], y[1]), y[2]), vd_min(vd_min(y[0], y[1]), y[2]));
+    const vd area = area_of_points(x, y), box = vd_mul(width, height);
     const vd bound = vd_add(vd_mul(box, vd_set1(0x1p-50)), vd_set1(1e-280)), zero = vd_set1(0.0);
     b->drawn = vm_and_not(b->drawn, vd_ge(s->mesh->cull == TL_CULL_BACK ? area : vd_sub(zero, area), bound));
 }
@@ -133,17 +190,9 @@ static __attribute__((noinline)) void draw_slivers(exact_state *s)
     s->n_slivers = 0;
 }
 
-/* X * Y of extents, as the head of setup_exact.c has them. */
-TL_INLINE vf box_sizes(const exact_batch *b, tl_test test)
+TL_INLINE void push_exact(exact_queue *queue, vm m, const exact_batch *b, vi id)
 {
-    const vf one = vf_set1(1.0f), border = vf_set1((float)border_of(test));
-    const vf width = vf_add(vf_from_vd(b->width), border), height = vf_add(vf_from_vd(b->height), border);
-    return vf_mul(vf_max(width, one), vf_max(height, one));
-}
-
-TL_INLINE void push_exact(exact_queue *queue, vm m, const exact_batch *b, vi id, vf xy)
-{
-    vi_compress((int32_t *)(queue->xy + queue->boxes.n), m, vi_bits_of_vf(xy));
+    vi_compress((int32_t *)(queue->xy + queue->boxes.n), m, vi_bits_of_vf(b->xy));
     push(&queue->boxes, m, b->col, b->row, b->n_cols, b->n_rows, id);
 }
 #define TL_IS_FULL(queue) ((queue).boxes.n > TL_QUEUE - TL_LANES)
@@ -151,17 +200,24 @@ TL_INLINE void push_exact(exact_queue *queue, vm m, const exact_batch *b, vi id,
 /* Fewer boxes of up to 2x2 samples wait with the small ones; others are tested where they are. */
 #define TL_FEW_TINY ((TL_LANES + 3) / 4)
 
-TL_INLINE void draw_tiny_exact(exact_state *s, tl_sink sink, const exact_batch *b, vi id, vm tiny, vf xy)
+TL_INLINE void draw_tiny_exact(exact_state *s, tl_sink sink, exact_batch *b, vi id, vm tiny)
 {
-    lane_exact t;
-    for (int k = 0; k < 3; k++) {
-        t.x[k] = b->x[k], t.y[k] = b->y[k];
-        if (sink_has_depth(sink))
-            t.z[k] = b->z[k];
-    }
-    t.ids = id, t.live = tiny;
-    place_exact(s, sink, b->col, b->row, xy, &t);
-    s->fragments.n = draw_exact_boxes(s, sink, &t, b->n_cols, b->n_rows, 2, s->fragments.n);
+    lane_exact *t = &b->t;
+    t->ids = id, t->live = tiny;
+    place_exact(s, sink, b->col, b->row, b->xy, t);
+    if (sink_has_depth(sink) && b->is_placed)
+        measure_places(s, b->x_fx, b->y_fx, b->col, b->row, t);
+    else
+        measure_points(t);
+    s->fragments.n = draw_exact_boxes(s, sink, t, b->n_cols, b->n_rows, 2, s->fragments.n);
+}
+
+/* The vertices of triangles that come later. */
+TL_INLINE void fetch_points(const exact_state *s, const int32_t *corners)
+{
+    const uintptr_t points = (uintptr_t)s->points->points, n_bytes = (uintptr_t)s->points->stride * sizeof(double);
+    for (int k = 2; k < 3 * TL_LANES; k += 6) /* indices that were not checked: addresses, and no pointers */
+        __builtin_prefetch((const void *)(points + (uint32_t)corners[k] * n_bytes));
 }
 
 TL_INLINE void draw_exact_batch(exact_state *s, tl_sink sink, const int32_t *corners, vi id, vm live)
@@ -183,7 +239,6 @@ TL_INLINE void draw_exact_batch(exact_state *s, tl_sink sink, const int32_t *cor
     }
     if (!vm_any(b.drawn))
         return;
-    const vf xy = box_sizes(&b, test_of(s, sink));
     const vi longer = vi_max(b.n_cols, b.n_rows);
     const vm over_small = vi_gt(longer, vi_set1(TL_SMALL_BOX)), over = vm_and(b.drawn, over_small);
     const vm tiny = vm_and_not(b.drawn, vi_gt(longer, vi_set1(2)));
@@ -191,21 +246,21 @@ TL_INLINE void draw_exact_batch(exact_state *s, tl_sink sink, const int32_t *cor
     const vm beyond = vm_or(vi_gt(b.n_cols, vi_set1(TL_LANES)), vi_gt(b.n_rows, vi_set1(TL_MIDDLE_BOX)));
     const vm middle = vm_and_not(over, beyond), rows = vm_and(over, beyond);
     if (__builtin_popcount(vm_bits(tiny)) >= TL_FEW_TINY) {
-        draw_tiny_exact(s, sink, &b, id, tiny, xy);
+        draw_tiny_exact(s, sink, &b, id, tiny);
         small = vm_and_not(small, tiny);
     }
     if (vm_any(small)) {
-        push_exact(&s->small, small, &b, id, xy);
+        push_exact(&s->small, small, &b, id);
         if (TL_IS_FULL(s->small))
             TL_LIST_CALL(flush_small_exact, sink, s)
     }
     if (vm_any(middle)) {
-        push_exact(&s->middle, middle, &b, id, xy);
+        push_exact(&s->middle, middle, &b, id);
         if (TL_IS_FULL(s->middle))
             TL_LIST_CALL(flush_middle_exact, sink, s)
     }
     if (vm_any(rows)) {
-        push_exact(&s->rows, rows, &b, id, xy);
+        push_exact(&s->rows, rows, &b, id);
         if (TL_IS_FULL(s->rows))
             TL_LIST_CALL(flush_rows_exact, sink, s)
     }
@@ -242,6 +297,8 @@ static void start_exact(exact_state *s, const tl_snapped *mesh, const tl_window 
     s->centre_x = of_squares ? 0.0 : 0.5 + mesh->mesh.sample_x_fx * unit;
     s->centre_y = of_squares ? 0.0 : 0.5 + mesh->mesh.sample_y_fx * unit;
     s->last_vertex = vi_set1((int32_t)(points->n_points - 1));
+    s->has_places = points->stride == TL_PLACED && max64(-s->left, s->right) <= TL_PLACE_LIMIT_PX - TL_MAX_BOX_PX - 2 &&
+                    max64(-s->top, s->bottom) <= TL_PLACE_LIMIT_PX - TL_MAX_BOX_PX - 2;
     s->bad_row = -1, s->may_be_on_grid = 0, s->n_slivers = 0;
     s->small.boxes.n = s->middle.boxes.n = s->rows.boxes.n = s->fragments.n = 0;
     memset(s->fragments.sample, 0, sizeof s->fragments.sample); /* what is prefetched behind the end of the list */
@@ -266,6 +323,8 @@ TL_INLINE void draw_exact_scene(const tl_snapped *mesh, int64_t n_whole, const t
         const vm live = vm_first(end - i);
         const vi id = share->ids ? vi_load_masked(live, share->ids + i) : vi_add(vi_set1((int32_t)i), vi_iota());
         const int32_t *batch = share_corners(mesh, share, i, corners);
+        if (!share->ids && i + 5 * TL_LANES <= end)
+            fetch_points(&s, batch + 3 * 4 * TL_LANES);
         if (takes_lanes)
             draw_exact_batch(&s, sink, batch, id, live);
         else

@@ -109,7 +109,7 @@ static void clip_points(const tl_source *source, const double *points, const int
         const int32_t *corners = triangles + 3 * i;
         int is_cut = 0;
         for (int k = 0; k < 3; k++)
-            is_cut |= isnan(points[3 * (int64_t)corners[k]]);
+            is_cut |= isnan(points[TL_PLACED * (int64_t)corners[k]]);
         const int n = is_cut ? clip_triangle(source, corners, view, polygon) : 0;
         if (n && pieces->points) {
             append_exact_pieces(pieces, polygon, n, (int32_t)i, clip_turn(source, corners), view);

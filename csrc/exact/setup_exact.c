@@ -14,6 +14,10 @@
  *    their corner: 2 u XY; of an edge that float32 takes for level or upright they may take the wrong one, where E
  *    differs by 4 u XY at most.  That is 23 u XY: what lies within 24 u XY of 0 is asked (TL_BOX_BAND).  Twice the area
  *    errs by 13 u XY: three points moved, 6; four differences, two products and theirs, 7.
+ *    Places (exact.h) stand up to 2^-19 px beside points, and are measured without an error: that moves E by
+ *    2^-18 (X + Y) <= 128 u XY instead of 4 u XY.  Together 147 u XY: what lies within 156 u XY is asked
+ *    (TL_PLACE_BAND), and twice the area errs by less than twice that.  Boxes are those of the places and a unit around
+ *    them; a sample beside the extent lies outside of some edge as any other does.
  * 3. Rows: v = e0 + i dx, rounded once or twice, errs by 5 u XY at most from E at column 0, the errors of k dy for any
  *    column k included: |v - k d - E| <= 5 u XY < M = 6 u XY, d = |dy|.  q = v * (1 / d) errs by 2.01 u |q|.
  *    Where |q - k| > M / d + 2.01 u |q| the sign of v - k d is that of E.  So a row end is asked where
@@ -36,6 +40,7 @@
 
 #include "topleft.h"
 #include "lanes/lanes.h"
+#include "vertex/project.c"
 #include "exact/sign.c"
 #include "raster/batch.c"
 #include "raster/setup.c"
@@ -43,6 +48,8 @@
 
 #define TL_BOX_BAND 0x1.8p-20f /* 24 u */
 #define TL_ROW_BAND 0x1.8p-22f /* 6 u */
+#define TL_PLACE_UNIT 0x1p-18f
+#define TL_PLACE_BAND 0x1.38p-17f /* 156 u */
 #define TL_GRID_BITS 8
 #define TL_GRID_VECTORS 64    /* on fine grids few vectors have a tie */
 #define TL_EXACT_BOX 64.0f    /* pixels */
@@ -66,6 +73,7 @@ typedef struct {
     double centre_x, centre_y;        /* of a pixel's sample, from its upper left corner; of squares 0 */
     vi last_vertex;
     int64_t bad_row;    /* of triangles, -1: none so far */
+    int has_places;     /* of vertices, and all of the window lies within their limit */
     int may_be_on_grid; /* the triangles that asked last were: of so many vectors, that is looked at first */
     exact_queue small, middle, rows;
     int n_slivers; /* triangles of the queues that have no depth plane, and wait to be drawn by themselves */
@@ -76,16 +84,17 @@ typedef struct {
 /* TL_LANES triangles, turned so that their areas are positive. */
 typedef struct {
     vi ids;
-    vd x[3], y[3], z[3];   /* z: where there is depth */
-    tl_test test;          /* a constant where the sink is */
-    vd sample_x, sample_y; /* the first sample of the box, in the picture; of squares the upper left corner */
-    vf e[3], dx[3], dy[3]; /* edge functions there, and what a row adds and a column subtracts */
-    vf xy;                 /* X * Y */
-    vi sample;             /* the first sample: row * stride_px + column */
-    vm live;               /* of those that are there, the ones with an area, and that are not culled */
-    vm turned;             /* corners 1 and 2 have changed places in e, dx and dy */
-    vm to_turn;            /* and are still to do so in x and y */
-    vm on_grid;            /* e, dx and dy are exact, in units of their own */
+    vd x[3], y[3], z[3];           /* z: where there is depth */
+    tl_test test;                  /* a constant where the sink is */
+    vd sample_x, sample_y;         /* the first sample of the box, in the picture; of squares the upper left corner */
+    vf e[3], dx[3], dy[3];         /* edge functions there, and what a row adds and a column subtracts */
+    vf xy;                         /* X * Y */
+    vf from_x[3], from_y[3], band; /* of boxes of up to 4x4: points from the first sample, and the band of samples */
+    vi sample;                     /* the first sample: row * stride_px + column */
+    vm live;                       /* of those that are there, the ones with an area, and that are not culled */
+    vm turned;                     /* corners 1 and 2 have changed places in e, dx and dy */
+    vm to_turn;                    /* and are still to do so in x and y */
+    vm on_grid;                    /* e, dx and dy are exact, in units of their own */
 } lane_exact;
 
 /* z = (z0 + slope_y * (y - y0)) + slope_x * (x - x0), in pixels from corner 0. */
@@ -110,10 +119,13 @@ TL_INLINE void load_points(const tl_exact_points *points, tl_sink sink, const in
             vd_load_pairs(points->points, 2, corners + k, &x[k], &y[k]);
             if (sink_has_depth(sink))
                 z[k] = vd_set1(0.0);
-        } else if (sink_has_depth(sink)) {
-            vd_load_triples(points->points, corners + k, &x[k], &y[k], &z[k]);
+        } else if (!sink_has_depth(sink)) {
+            vd_load_pairs(points->points, points->stride, corners + k, &x[k], &y[k]);
+        } else if (points->stride == TL_PLACED) {
+            vi x_fx, y_fx;
+            vd_load_places(points->points, corners + k, &x[k], &y[k], &z[k], &x_fx, &y_fx);
         } else {
-            vd_load_pairs(points->points, 3, corners + k, &x[k], &y[k]);
+            vd_load_triples(points->points, corners + k, &x[k], &y[k], &z[k]);
         }
     }
 }
@@ -218,17 +230,36 @@ TL_INLINE void set_float_edges(lane_exact *t)
     }
 }
 
+/* What set_box_edges begins with. */
+TL_INLINE void measure_points(lane_exact *t)
+{
+    for (int k = 0; k < 3; k++) {
+        t->from_x[k] = vf_from_vd(vd_sub(t->x[k], t->sample_x));
+        t->from_y[k] = vf_from_vd(vd_sub(t->y[k], t->sample_y));
+    }
+    t->band = vf_mul(t->xy, vf_set1(TL_BOX_BAND));
+}
+
+/* The same of points that are rounded to places. */
+TL_INLINE void measure_places(const exact_state *s, const vi *x_fx, const vi *y_fx, vi col, vi row, lane_exact *t)
+{
+    const vf unit = vf_set1(TL_PLACE_UNIT);
+    const vi x = vi_add(vi_shift_left(col, TL_PLACE_BITS), vi_set1(place_of(s->centre_x)));
+    const vi y = vi_add(vi_shift_left(row, TL_PLACE_BITS), vi_set1(place_of(s->centre_y)));
+    for (int k = 0; k < 3; k++) {
+        t->from_x[k] = vf_mul(vf_from_vi(vi_sub(x_fx[k], x)), unit);
+        t->from_y[k] = vf_mul(vf_from_vi(vi_sub(y_fx[k], y)), unit);
+    }
+    t->band = vf_mul(t->xy, vf_set1(TL_PLACE_BAND));
+}
+
 /* The same for boxes of up to 4x4 samples, from points in float32; finds the turns, too. */
 TL_INLINE void set_box_edges(const exact_state *s, lane_exact *t, vm on_grid)
 {
     const vf zero = vf_set1(0.0f), one = vf_set1(1.0f);
-    const vf band = vf_select(on_grid, zero, vf_mul(t->xy, vf_set1(TL_BOX_BAND)));
+    const vf band = vf_select(on_grid, zero, vf_add(t->band, t->band));
     const vf inside = t->test == TL_TEST_OUTER ? one : zero, outside = t->test == TL_TEST_OUTER ? zero : one;
-    vf x[3], y[3];
-    for (int k = 0; k < 3; k++) {
-        x[k] = vf_from_vd(vd_sub(t->x[k], t->sample_x));
-        y[k] = vf_from_vd(vd_sub(t->y[k], t->sample_y));
-    }
+    vf x[3] = {t->from_x[0], t->from_x[1], t->from_x[2]}, y[3] = {t->from_y[0], t->from_y[1], t->from_y[2]};
     const vf x1 = vf_sub(x[1], x[0]), y1 = vf_sub(y[1], y[0]), x2 = vf_sub(x[2], x[0]), y2 = vf_sub(y[2], y[0]);
     const vf area = vf_sub(vf_mul(x1, y2), vf_mul(y1, x2));
     t->turned = t->to_turn = vf_lt(area, vf_sub(zero, band));

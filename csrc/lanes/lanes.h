@@ -28,6 +28,8 @@
  *   vd_load_records(base, stride, i, c)    four doubles at base + 8 * stride * i[k], as columns
  *   vd_load_pairs(base, stride, first, x, y)    two doubles at base + 8 * stride * first[3 * k], as columns
  *   vd_load_triples(base, first, x, y, z)    three doubles at base + 24 * first[3 * k], as columns
+ *   vd_load_places(base, first, x, y, z, a, b)    three doubles and two int32 at base + 32 * first[3 * k], as columns
+ *   vd_store_places(base, x, y, z, a, b)          the same, TL_LANES of them one after the other
  *   vi_ceil(vd)             the next integer that is not less
  *   vf_off_integer, vd_off_integer    a number less the nearest integer
  *   vd_off_256th(a)         a number below 2^42 less the nearest multiple of 2^-8

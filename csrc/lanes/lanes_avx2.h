@@ -496,6 +496,44 @@ TL_INLINE void vd_load_triples(const double *base, const int32_t *first, vd *x, 
     vd_load_pairs(base, 3, first, x, y);
     *z = (vd){load_four_thirds(base, first), load_four_thirds(base, first + 12)};
 }
+/* Turns four rows of four into columns, or back. */
+TL_INLINE void transpose_four(const __m256d *row, __m256d *c)
+{
+    const __m256d even[2] = {_mm256_unpacklo_pd(row[0], row[1]), _mm256_unpackhi_pd(row[0], row[1])};
+    const __m256d odd[2] = {_mm256_unpacklo_pd(row[2], row[3]), _mm256_unpackhi_pd(row[2], row[3])};
+    for (int k = 0; k < 2; k++) {
+        c[k] = _mm256_permute2f128_pd(even[k], odd[k], 0x20);
+        c[k + 2] = _mm256_permute2f128_pd(even[k], odd[k], 0x31);
+    }
+}
+TL_INLINE void vd_load_places(const double *base, const int32_t *first, vd *x, vd *y, vd *z, vi *a, vi *b)
+{
+    __m256d half[2][4];
+    for (int part = 0; part < 2; part++) {
+        __m256d row[4];
+        for (int k = 0; k < 4; k++)
+            row[k] = _mm256_loadu_pd(base + (int64_t)first[12 * part + 3 * k] * 4);
+        transpose_four(row, half[part]);
+    }
+    *x = (vd){half[0][0], half[1][0]}, *y = (vd){half[0][1], half[1][1]}, *z = (vd){half[0][2], half[1][2]};
+    const __m256 low = _mm256_castpd_ps(half[0][3]), high = _mm256_castpd_ps(half[1][3]);
+    *a = _mm256_permute4x64_epi64(_mm256_castps_si256(_mm256_shuffle_ps(low, high, 0x88)), 0xd8);
+    *b = _mm256_permute4x64_epi64(_mm256_castps_si256(_mm256_shuffle_ps(low, high, 0xdd)), 0xd8);
+}
+TL_INLINE void store_four_places(double *p, __m256d x, __m256d y, __m256d z, __m128i a, __m128i b)
+{
+    const __m256i ab = _mm256_or_si256(_mm256_cvtepu32_epi64(a), _mm256_slli_epi64(_mm256_cvtepu32_epi64(b), 32));
+    const __m256d c[4] = {x, y, z, _mm256_castsi256_pd(ab)};
+    __m256d row[4];
+    transpose_four(c, row);
+    for (int k = 0; k < 4; k++)
+        _mm256_storeu_pd(p + 4 * k, row[k]);
+}
+TL_INLINE void vd_store_places(double *p, vd x, vd y, vd z, vi a, vi b)
+{
+    store_four_places(p, x.lo, y.lo, z.lo, _mm256_castsi256_si128(a), _mm256_castsi256_si128(b));
+    store_four_places(p + 16, x.hi, y.hi, z.hi, _mm256_extracti128_si256(a, 1), _mm256_extracti128_si256(b, 1));
+}
 TL_INLINE vi vi_ceil(vd a) { return vi_round((vd){_mm256_ceil_pd(a.lo), _mm256_ceil_pd(a.hi)}); }
 /* a less the nearest integer */
 TL_INLINE vf vf_off_integer(vf a)

@@ -506,6 +506,58 @@ TL_INLINE void vd_load_triples(const double *base, const int32_t *first, vd *x, 
     *x = (vd){front[0], back[0]}, *y = (vd){front[1], back[1]}, *z = (vd){front[2], back[2]};
 }
 
+/* Eight rows of 32 bytes, as columns. */
+TL_INLINE void load_eight_places(const double *base, const int32_t *first, __m512d *c)
+{
+    __m512d row[4];
+    for (int k = 0; k < 4; k++) { /* lanes k and k + 4 */
+        const double *a = base + (int64_t)first[3 * k] * 4, *b = base + (int64_t)first[3 * k + 12] * 4;
+        row[k] = _mm512_insertf64x4(_mm512_castpd256_pd512(_mm256_loadu_pd(a)), _mm256_loadu_pd(b), 1);
+    }
+    const __m512d even[2] = {_mm512_unpacklo_pd(row[0], row[1]), _mm512_unpackhi_pd(row[0], row[1])};
+    const __m512d odd[2] = {_mm512_unpacklo_pd(row[2], row[3]), _mm512_unpackhi_pd(row[2], row[3])};
+    const __m512i low = _mm512_setr_epi64(0, 1, 8, 9, 4, 5, 12, 13);
+    const __m512i high = _mm512_setr_epi64(2, 3, 10, 11, 6, 7, 14, 15);
+    for (int k = 0; k < 2; k++) {
+        c[k] = _mm512_permutex2var_pd(even[k], low, odd[k]);
+        c[k + 2] = _mm512_permutex2var_pd(even[k], high, odd[k]);
+    }
+}
+TL_INLINE void vd_load_places(const double *base, const int32_t *first, vd *x, vd *y, vd *z, vi *a, vi *b)
+{
+    const vi even = _mm512_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
+    __m512d front[4], back[4];
+    load_eight_places(base, first, front);
+    load_eight_places(base, first + 24, back);
+    *x = (vd){front[0], back[0]}, *y = (vd){front[1], back[1]}, *z = (vd){front[2], back[2]};
+    const __m512i low = _mm512_castpd_si512(front[3]), high = _mm512_castpd_si512(back[3]);
+    *a = _mm512_permutex2var_epi32(low, even, high);
+    *b = _mm512_permutex2var_epi32(low, _mm512_add_epi32(even, _mm512_set1_epi32(1)), high);
+}
+TL_INLINE void store_eight_places(double *p, __m512d x, __m512d y, __m512d z, __m512i ab)
+{
+    const __m512d w = _mm512_castsi512_pd(ab);
+    const __m512i low = _mm512_setr_epi64(0, 1, 8, 9, 2, 3, 10, 11);
+    const __m512i high = _mm512_setr_epi64(4, 5, 12, 13, 6, 7, 14, 15);
+    const __m512d xy[2] = {_mm512_unpacklo_pd(x, y), _mm512_unpackhi_pd(x, y)}; /* rows 0 2 4 6, and 1 3 5 7 */
+    const __m512d zw[2] = {_mm512_unpacklo_pd(z, w), _mm512_unpackhi_pd(z, w)};
+    for (int k = 0; k < 2; k++) {
+        const __m512d front = _mm512_permutex2var_pd(xy[k], low, zw[k]);
+        const __m512d back = _mm512_permutex2var_pd(xy[k], high, zw[k]);
+        _mm256_storeu_pd(p + 4 * k, _mm512_castpd512_pd256(front));
+        _mm256_storeu_pd(p + 4 * k + 8, _mm512_extractf64x4_pd(front, 1));
+        _mm256_storeu_pd(p + 4 * k + 16, _mm512_castpd512_pd256(back));
+        _mm256_storeu_pd(p + 4 * k + 24, _mm512_extractf64x4_pd(back, 1));
+    }
+}
+TL_INLINE void vd_store_places(double *p, vd x, vd y, vd z, vi a, vi b)
+{
+    const __m512i low = _mm512_setr_epi32(0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23);
+    const __m512i high = _mm512_setr_epi32(8, 24, 9, 25, 10, 26, 11, 27, 12, 28, 13, 29, 14, 30, 15, 31);
+    store_eight_places(p, x.lo, y.lo, z.lo, _mm512_permutex2var_epi32(a, low, b));
+    store_eight_places(p + 32, x.hi, y.hi, z.hi, _mm512_permutex2var_epi32(a, high, b));
+}
+
 /* Pairs at base + 8 * stride * first[3 * lane]. */
 TL_INLINE __m256d load_two_pairs(const double *base, int stride, const int32_t *first)
 {

@@ -330,6 +330,17 @@ TL_INLINE void vd_load_triples(const double *base, const int32_t *first, vd *x, 
     const double *row = base + (int64_t)*first * 3;
     *x = row[0], *y = row[1], *z = row[2];
 }
+TL_INLINE void vd_load_places(const double *base, const int32_t *first, vd *x, vd *y, vd *z, vi *a, vi *b)
+{
+    const double *row = base + (int64_t)*first * 4;
+    *x = row[0], *y = row[1], *z = row[2];
+    memcpy(a, row + 3, sizeof *a), memcpy(b, (const char *)(row + 3) + sizeof *a, sizeof *b);
+}
+TL_INLINE void vd_store_places(double *row, vd x, vd y, vd z, vi a, vi b)
+{
+    row[0] = x, row[1] = y, row[2] = z;
+    memcpy(row + 3, &a, sizeof a), memcpy((char *)(row + 3) + sizeof a, &b, sizeof b);
+}
 /* ceil() is a call where there are no lanes */
 TL_INLINE vi vi_ceil(vd a) { return fabs(a) < 0x1p30 ? (vi)a + ((double)(vi)a < a) : INT32_MIN; }
 /* a less the nearest integer */

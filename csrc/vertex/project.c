@@ -80,20 +80,35 @@ static inline void store_projected(const double *p, const tl_view *view, int64_t
     store_vertex(rint(at[0] * unit), rint(at[1] * unit), at[2], i, out, wide, counts);
 }
 
-/* Where vertices go: records, with a table of wide ones or NULL; or, not snapped, points (n, 3). */
+/* Where vertices go: records, with a table of wide ones or NULL; or, not snapped, points (n, TL_PLACED). */
 typedef struct {
     tl_vertex *records;
     tl_wide *wide;
     double *points;
 } projected_vertices;
 
+static inline void set_placed(double *point, double x, double y, double z, int32_t x_fx, int32_t y_fx)
+{
+    const int32_t place[2] = {x_fx, y_fx};
+    point[0] = x, point[1] = y, point[2] = z;
+    memcpy(point + 3, place, sizeof place);
+}
+
+/* The nearest multiple of 2^-TL_PLACE_BITS, within the limit. */
+static inline int32_t place_of(double v)
+{
+    const double most = TL_PLACE_LIMIT_PX;
+    return (int32_t)rint((v > most ? most : v < -most ? -most : v) * (double)(1 << TL_PLACE_BITS));
+}
+
 /* A vertex that is not drawn where it lies. */
 static inline void store_special(const projected_vertices *out, int64_t i, tl_special what)
 {
-    if (out->points)
-        out->points[3 * i] = NAN, out->points[3 * i + 1] = what, out->points[3 * i + 2] = 0.0;
-    else
+    double *point = out->points + TL_PLACED * i;
+    if (!out->points)
         out->records[i] = (tl_vertex){TL_SPECIAL, what, 0.0};
+    else
+        set_placed(point, NAN, what, 0.0, TL_SPECIAL, 0);
 }
 
 /* One vertex, whatever it is. */
@@ -109,7 +124,9 @@ static void project_one(const tl_source *source, int64_t i, const tl_view *view,
         store_special(out, i, TL_CLIPPED);
         counts->n_clipped++;
     } else if (out->points) {
-        set_projected(p, view, 0, out->points + 3 * i);
+        double at[3];
+        set_projected(p, view, 0, at);
+        set_placed(out->points + TL_PLACED * i, at[0], at[1], at[2], place_of(at[0]), place_of(at[1]));
     } else {
         store_projected(p, view, i, out->records, out->wide, 0, counts);
     }
@@ -173,11 +190,10 @@ TL_INLINE vm inside_lanes_f32(const vf *p, const tl_view *view)
 /* Stores TL_LANES points as they are; returns those that surely lie inside the guard band. */
 TL_INLINE vm store_points(double *out, vd x, vd y, vd z)
 {
-    const vd farthest = vd_set1(TL_SURELY_INSIDE_PX);
-    double columns[3][TL_MAX_LANES];
-    vd_store(columns[0], x), vd_store(columns[1], y), vd_store(columns[2], z);
-    for (int k = 0; k < TL_LANES; k++, out += 3)
-        out[0] = columns[0][k], out[1] = columns[1][k], out[2] = columns[2][k];
+    const vd farthest = vd_set1(TL_SURELY_INSIDE_PX), scale = vd_set1((double)(1 << TL_PLACE_BITS));
+    const vd most = vd_set1(TL_PLACE_LIMIT_PX), least = vd_set1(-TL_PLACE_LIMIT_PX);
+    vd_store_places(out, x, y, z, vi_round(vd_mul(vd_max(vd_min(x, most), least), scale)),
+                    vi_round(vd_mul(vd_max(vd_min(y, most), least), scale)));
     return vm_and(vd_ge(farthest, vd_abs(x)), vd_ge(farthest, vd_abs(y)));
 }
 
@@ -223,7 +239,7 @@ TL_INLINE int64_t project_lanes(const tl_source *source, int64_t first, int64_t 
             good = vm_and(good, vm_and(is_narrow_lanes(x_fx), is_narrow_lanes(y_fx)));
             store_vertices(out->records + i, x_fx, y_fx, z);
         } else {
-            good = vm_and(good, store_points(out->points + 3 * i, x, y, z));
+            good = vm_and(good, store_points(out->points + TL_PLACED * i, x, y, z));
         }
         for (unsigned rest = vm_bits(vm_and_not(vm_all(), good)); rest; rest &= rest - 1)
             project_one(source, i + __builtin_ctz(rest), view, out, counts);

@@ -282,16 +282,21 @@ def test_bands_a_quarter_as_wide_draw_wrong_pixels(isa, edge):
         assert (count(vertices, (64, 56), 0.25) != expected).any()
 
 
+def beside_samples(rng, n, reach, side=2.0):
+    """Corners (n, 3, 2) of triangles of up to 2 `side`, 8 px apart, of which an edge passes a sample within `reach`."""
+    place = np.arange(n)[:, None] // [1, 126] % 126 * 8 + 8.5 + rng.integers(0, 3, (n, 2))
+    along = rng.uniform(-side, side, (n, 2))
+    across = along[:, ::-1] * [-1, 1] / np.linalg.norm(along, axis=1, keepdims=True)
+    share, near = rng.uniform(0.05, 0.95, (n, 1)), place + across * rng.uniform(-reach, reach, (n, 1))
+    third = place + across * rng.choice([-1, 1], (n, 1)) + along * rng.uniform(-0.5, 0.5, (n, 1))
+    return np.stack([near - share * along, near + (1 - share) * along, third], axis=1)
+
+
 @ON_EACH_ISA
 def test_bands_of_small_boxes_draw_wrong_pixels_when_they_are_a_twentieth_as_wide(isa):
     """Edges that pass samples within 2**-22 px: float32 errs by less than the proof allows, but by more than that."""
-    rng, n, size = np.random.default_rng(0), 100_000, (1024, 1024)
-    place = np.arange(n)[:, None] // [1, 126] % 126 * 8 + 8.5 + rng.integers(0, 3, (n, 2))
-    along = rng.uniform(-2, 2, (n, 2))
-    across = along[:, ::-1] * [-1, 1] / np.linalg.norm(along, axis=1, keepdims=True)
-    share, near = rng.uniform(0.05, 0.95, (n, 1)), place + across * rng.uniform(-(2.0**-22), 2.0**-22, (n, 1))
-    third = place + across * rng.choice([-1, 1], (n, 1)) + along * rng.uniform(-0.5, 0.5, (n, 1))
-    vertices = np.stack([near - share * along, near + (1 - share) * along, third], axis=1).reshape(-1, 2)
+    size = 1024, 1024
+    vertices = beside_samples(np.random.default_rng(0), 100_000, 2.0**-22).reshape(-1, 2)
     with on(isa):
         proved = count(vertices, size, 1.0)
         assert (count(vertices, size, 0.05) != proved).any()
@@ -299,6 +304,27 @@ def test_bands_of_small_boxes_draw_wrong_pixels_when_they_are_a_twentieth_as_wid
 
 
 # ---- other verbs, and what is refused -------------------------------------------------------------------------------
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize("size", [(1024, 1024), (8192, 64)])
+def test_transform_that_rounds_nothing_changes_no_bit(isa, size):
+    """Behind a transform tiny boxes are tested at vertices rounded to 2**-18 px first, in windows of up to 4096 px."""
+    rng, n, half = np.random.default_rng(5), 15_000, np.array(size) / 2
+    corners = beside_samples(rng, n, 2.0**-18, 0.8)
+    corners[:2_000] = np.round(corners[:2_000] * 2) / 2
+    reach = rng.choice([1, 20, 1e4, 1e6], (2_000, 1, 1))
+    corners[-2_000:] += rng.uniform(-1, 1, (2_000, 3, 2)) * reach
+    corners = np.round(corners * 2.0**30) / 2.0**30
+    depth = rng.integers(0, 2**16, (n, 3, 1)) / 2.0**17 + 0.25
+    pixels = np.concatenate([corners, depth], axis=2).reshape(-1, 3)
+    clip = np.concatenate([(pixels[:, :2] - half) / half * [1, -1], 2 * pixels[:, 2:] - 1], axis=1)
+    triangles = np.arange(3 * n, dtype=np.int32).reshape(-1, 3)
+    with on(isa):
+        expected = tl.rasterize(pixels, triangles, size, **EXACT)
+        found = tl.rasterize(clip, triangles, size, transform=np.eye(4), **EXACT)
+    assert (found.triangle == expected.triangle).all()
+    assert (found.depth == expected.depth).all()
 
 
 def test_fill_colours_the_triangle_on_top():

@@ -84,7 +84,7 @@ cdef class Source:
         return counts.n_bad, counts.n_wide, counts.n_clipped
 
     def project_points(self, int64_t first, int64_t end, Viewport viewport, double[:, ::1] points):
-        """Project vertices [first, end) to points (V, 3); returns the numbers of bad and of clipped ones, x NaN."""
+        """Project vertices [first, end) to points (V, PLACED); returns the numbers of bad and of clipped ones, x NaN."""
         cdef tl_vertex_counts counts
         with nogil:
             counts = K.project_points(&self.source, first, end, &viewport.view, &points[0, 0])

@@ -235,7 +235,7 @@ cdef extern from "topleft.h" nogil:
         int is_farthest
         int64_t stride_px
     enum:
-        TL_N_CLASSES, TL_FLIP, TL_SPECIAL, TL_SHORT_SPAN
+        TL_N_CLASSES, TL_FLIP, TL_SPECIAL, TL_SHORT_SPAN, TL_PLACED, TL_PLACE_BITS, TL_PLACE_LIMIT_PX
     ctypedef struct tl_cloud:
         const tl_vertex *vertices
         int64_t n

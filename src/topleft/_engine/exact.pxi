@@ -36,7 +36,9 @@ cdef class ExactPieces:
         if len(self):
             own[0], own[3], own[4] = own[0][: self.pieces.n_points], own[3][: len(self)], own[4][: len(self)]
         collapsed = np.where(is_cut[:, None], np.int32(n), triangles)
-        all_points = np.concatenate([points, np.zeros((1, 3)), own[0]])
+        places = np.rint(np.clip(own[0][:, :2], -TL_PLACE_LIMIT_PX, TL_PLACE_LIMIT_PX) * (1 << TL_PLACE_BITS))
+        placed = np.ascontiguousarray(places.astype(np.int32)).view(np.float64)
+        all_points = np.concatenate([points, np.zeros((1, TL_PLACED)), np.hstack([own[0], placed])])
         if not len(self):
             return all_points, collapsed, np.arange(len(triangles), dtype=np.int32)
         names = np.concatenate([np.arange(len(triangles), dtype=np.int32), own[4]])
@@ -52,7 +54,7 @@ cdef class UnsnappedPoints:
     cdef object arrays
 
     def __init__(self, points_given, const int32_t[:, ::1] triangles_given, ExactPieces pieces=None, double band=1.0):
-        """`points_given`: (V, 2) or (V, 3); `band` less than 1 draws wrong pictures, to test bands."""
+        """`points_given`: (V, 2), (V, 3) or (V, PLACED); `band` less than 1 draws wrong pictures, to test bands."""
         cdef const double[:, ::1] points = points_given
         cdef const int32_t[:, ::1] triangles = triangles_given
         cdef const int32_t[::1] names = None

@@ -16,6 +16,7 @@ U32: TypeAlias = NDArray[np.uint32]
 U64: TypeAlias = NDArray[np.uint64]
 
 VERTEX_BYTES: int
+PLACED: int
 CELL_CLEAR: int
 PLANE_DOUBLES: int
 AREA_OVERFLOW: int

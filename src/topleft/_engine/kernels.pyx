@@ -67,6 +67,7 @@ cdef enum:
     LABEL = 2  # TL_SINK_LABEL
 
 VERTEX_BYTES = sizeof(tl_vertex)
+PLACED = TL_PLACED  # numbers of a vertex behind a transform that is not snapped
 CELL_CLEAR = TL_CELL_CLEAR
 AREA_OVERFLOW = TL_AREA_OVERFLOW
 FEW_OF_BITS, FEW_STORED, FEW_LABELLED = <int>TL_FEW_OF_BITS, <int>TL_FEW_STORED, <int>TL_FEW_LABELLED

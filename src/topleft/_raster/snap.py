@@ -211,7 +211,7 @@ def project_mesh(memory: Memory, given: Input, view: View, *, must_check: bool) 
     """Take clip space to pixels, and cut triangles, without a snap."""
     points, source, indices = given.points, given.source, given.triangles
     n, viewport = len(points), view.engine_viewport()
-    projected = memory.empty("points", (n, 3), np.float64)
+    projected = memory.empty("points", (n, _engine.PLACED), np.float64)
 
     def project_part(first: int, end: int) -> tuple[int, int]:
         return source.project_points(first, end, viewport, projected)
