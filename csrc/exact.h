@@ -4,7 +4,7 @@
 
 #include <stdint.h>
 
-/* What a transform makes of a vertex: x, y, depth, and two int32, x and y rounded to 2^-18 px and clamped to 2^12 px. */
+/* What a transform makes of a vertex: x, y, depth, and two int32: x and y rounded to 2^-18 px, clamped to 2^12 px. */
 #define TL_PLACED 4
 #define TL_PLACE_BITS 18
 #define TL_PLACE_LIMIT_PX 4096
