@@ -34,9 +34,11 @@ CLASSICS = "topleft.methods.classics.classic_kernels"
 
 WARNINGS = ["-Wall", "-Wextra"]
 # -ffp-contract=off and -fno-fast-math stand after whatever CFLAGS holds: the same bits on every machine depend on them.
-# -O2 makes the kernels 5 to 25 % slower. Link-time optimisation could move code between units of different instruction
-# sets. Debug information, which Python asks for, would be nine tenths of the library and a third of the time: only
-# `build_ext --debug` makes it.
+# -O2 -fno-tree-vectorize takes three quarters of the time to compile, and the kernels then take 1.15 times as long
+# (mean of 75 calls with AVX2; up to 2.8). -fno-tree-vectorize alone takes 0.94, and half of the calls 1.02 to 1.6 times
+# as long.
+# Link-time optimisation could move code between units of different instruction sets. Debug information, which Python
+# asks for, would be nine tenths of the library and a third of the time: only `build_ext --debug` makes it.
 FLAGS_C = [
     "-std=c11", "-O3", "-g0", "-ffp-contract=off", "-fno-fast-math", "-fno-math-errno", "-fvisibility=hidden",
     "-fno-lto",
@@ -156,7 +158,8 @@ class BuildTopleft(build_ext):
         super().finalize_options()
         self.parallel = self.parallel or os.cpu_count()
 
-    def build_extension(self, ext: Extension) -> None:
+    def build_extensions(self) -> None:
+        """Compile the units of all extensions in one pool, and link each extension as soon as its units are there."""
         if self.compiler.compiler_type == "msvc":
             raise PlatformError("topleft needs gcc or clang: it uses their attributes, which MSVC does not have")
         # pip gives an editable build a folder that it deletes: the next build in the checkout would begin anew.
@@ -173,13 +176,20 @@ class BuildTopleft(build_ext):
         warnings = [*WARNINGS, *(["-Werror"] if os.environ.get("TOPLEFT_WERROR") == "1" else [])]
         sanitizers = os.environ.get("TOPLEFT_SANITIZE")
         last = [f"-fsanitize={sanitizers}", *FLAGS_SANITIZED] if sanitizers else []
-        units = self.engine_units(ext) if ext.name == ENGINE else [(ext, FLAGS_CLASSIC, [])]
-        with ThreadPoolExecutor(self.parallel or os.cpu_count()) as pool:
-            jobs = [
-                pool.submit(self.compile_unit, source, [*warnings, *own, *last], define)
-                for source, own, define in units
-            ]
-            objects = [str(job.result()) for job in jobs]
+        with ThreadPoolExecutor(self.parallel) as pool:
+            waiting = []
+            for ext in self.extensions:  # the engine first
+                units = self.engine_units(ext, pool) if ext.name == ENGINE else [(ext, FLAGS_CLASSIC, [])]
+                jobs = [
+                    pool.submit(self.compile_unit, source, [*warnings, *own, *last], define)
+                    for source, own, define in units
+                ]
+                waiting.append((ext, jobs))
+            for ext, jobs in waiting:
+                self.link(ext, [str(job.result()) for job in jobs], last)
+
+    def link(self, ext: Extension, objects: list[str], flags: list[str]) -> None:
+        """Link the objects of an extension."""
         self.compiler.link_shared_object(
             objects,
             self.get_ext_fullpath(ext.name),
@@ -187,18 +197,22 @@ class BuildTopleft(build_ext):
             library_dirs=ext.library_dirs,
             runtime_library_dirs=ext.runtime_library_dirs,
             export_symbols=self.get_export_symbols(ext),
-            extra_postargs=last,
+            extra_postargs=flags,
             debug=self.debug,
             build_temp=str(self.temp),
             target_lang="c",
         )
 
-    def engine_units(self, ext: Extension) -> list[tuple[Path | Extension, list[str], list[tuple[str, str]]]]:
+    def engine_units(
+        self, ext: Extension, pool: ThreadPoolExecutor
+    ) -> list[tuple[Path | Extension, list[str], list[tuple[str, str]]]]:
         """Return the units of the engine: source, or extension that Cython translates; flags; macros.
 
         What takes longest stands first, so that no core waits for it at the end.
         """
-        isas = self.isas_to_build()
+        flags_vbmi = FLAGS_C + FLAGS_VBMI
+        vbmi_accepted = pool.submit(self.accepts, flags_vbmi, PROBE_VBMI)
+        isas = self.isas_to_build(pool)
         own = ["-DTL_NO_INT128"] if os.environ.get("TOPLEFT_NO_INT128") == "1" else []
         flags = {isa.name: FLAGS_C + isa.flags + own for isa in isas}
         macros = [("TL_VERSION", quoted(self.distribution.get_version()))]
@@ -208,8 +222,7 @@ class BuildTopleft(build_ext):
             macros += [(f"TL_HAVE_{name.upper()}", "1"), (f"TL_FLAGS_{name.upper()}", quoted(" ".join(told)))]
 
         # Beside AVX-512, and no instruction set of its own: a unit for what draws meshlets on newer CPUs.
-        flags_vbmi = FLAGS_C + FLAGS_VBMI
-        has_vbmi = "avx512" in flags and self.accepts(flags_vbmi, PROBE_VBMI)
+        has_vbmi = "avx512" in flags and vbmi_accepted.result()
         macros += [("TL_HAVE_VBMI", "1")] if has_vbmi else []
 
         units = [(ROOT / f"csrc/isa_{name}.c", unit_flags, []) for name, unit_flags in reversed(flags.items())]
@@ -217,14 +230,15 @@ class BuildTopleft(build_ext):
         units += [(ROOT / "csrc/meshlets/meshlets.c", flags_vbmi, [])] if has_vbmi else []
         return [*units, (ROOT / "csrc/dispatch.c", FLAGS_C, macros)]
 
-    def isas_to_build(self) -> list[Isa]:
+    def isas_to_build(self, pool: ThreadPoolExecutor) -> list[Isa]:
         """Return the kernel units to build: those asked for, or all that the compiler can build."""
         wanted = wanted_isas()
+        accepted = pool.map(lambda isa: self.accepts(FLAGS_C + isa.flags, isa.probe), ISAS)
         chosen = []
-        for isa in ISAS:
+        for isa, is_accepted in zip(ISAS, accepted, strict=True):
             if wanted is not None and isa.name not in wanted:
                 continue
-            if self.accepts(FLAGS_C + isa.flags, isa.probe):
+            if is_accepted:
                 chosen.append(isa)
             elif isa.name == "scalar":
                 raise CompileError("topleft needs gcc or clang with C11, and a machine without excess precision")

@@ -41,28 +41,23 @@ typedef struct {
     const tl_window *window;
     int64_t bad_row;
     int32_t max_extent;
-    int is_wide;
     int32_t n[TL_EDGE_KINDS];
     edge_record edges[TL_EDGE_KINDS][TL_EDGE_QUEUE];
 } area_state;
 
-TL_INLINE void flush_kind(area_state *s, int is_wide, int kind, int n)
+TL_ONCE void flush_kind(area_plane *plane, const edge_record *edges, int kind, int n)
 {
-    const edge_record *edges = s->edges[kind];
     if (kind == TL_EDGES_SHALLOW)
-        add_shallow_edges(&s->plane, is_wide, edges, n);
+        add_shallow_edges(plane, edges, n);
     else if (kind < TL_EDGES_LONG)
-        add_short_edges(&s->plane, is_wide, 1, edges, n, kind + 1);
+        add_short_edges(plane, 1, edges, n, kind + 1);
     else if (kind == TL_EDGES_LONG)
-        add_long_edges(&s->plane, is_wide, 1, edges, n);
+        add_steep_edges(plane, edges, n);
     else if (kind < TL_EDGES_FLAT + TL_EDGES_LONG)
-        add_short_edges(&s->plane, is_wide, 2, edges, n, kind - TL_EDGES_FLAT + 1);
+        add_short_edges(plane, 2, edges, n, kind - TL_EDGES_FLAT + 1);
     else
-        add_long_edges(&s->plane, is_wide, 2, edges, n);
+        add_flat_edges(plane, edges, n);
 }
-
-static __attribute__((noinline)) void flush_narrow(area_state *s, int kind, int n) { flush_kind(s, 0, kind, n); }
-static __attribute__((noinline)) void flush_wide(area_state *s, int kind, int n) { flush_kind(s, 1, kind, n); }
 
 /* Draws the whole vectors of a kind and keeps the rest; at the end of the mesh the rest as well. */
 static void flush_edges(area_state *s, int kind, int is_end)
@@ -74,10 +69,8 @@ static void flush_edges(area_state *s, int kind, int is_end)
         s->edges[kind][k] = (edge_record){0, s->plane.bottom_fx, 0, 1};
     if (n > 0 && (kind == TL_EDGES_LONG || kind >= TL_EDGES_FLAT + TL_EDGES_LONG))
         tl_count_work(s->window, 8 * n * s->window->height); /* at most: as long as eight pixels each row */
-    if (n > 0 && s->is_wide)
-        flush_wide(s, kind, n);
-    else if (n > 0)
-        flush_narrow(s, kind, n);
+    if (n > 0)
+        flush_kind(&s->plane, s->edges[kind], kind, n);
     memmove(s->edges[kind], s->edges[kind] + n, sizeof(edge_record) * (size_t)n_rest);
     s->n[kind] = n_rest;
 }
@@ -246,7 +239,7 @@ static int64_t draw_area(const tl_snapped *snapped, const tl_window *window, con
         memset(met, 0, (size_t)(n_met + 63) / 64 * sizeof *met);
         s.plane.met = met;
     }
-    s.snapped = snapped, s.window = window, s.bad_row = -1, s.is_wide = target->is_wide;
+    s.snapped = snapped, s.window = window, s.bad_row = -1;
     s.max_extent = 1 << (bits + TL_MAX_EDGE_BITS < 25 ? bits + TL_MAX_EDGE_BITS : 25);
     memset(s.n, 0, sizeof s.n);
     const tl_share all = {.end = snapped->n_triangles};
@@ -257,10 +250,7 @@ static int64_t draw_area(const tl_snapped *snapped, const tl_window *window, con
     }
     for (int kind = 0; kind < TL_EDGES_NONE; kind++)
         flush_edges(&s, kind, 1);
-    if (s.is_wide)
-        flush_quads(&s.plane, 1);
-    else
-        flush_quads(&s.plane, 0);
+    flush_quads(&s.plane);
     const int fits = accumulate(&s.plane, target);
     return s.bad_row >= 0 ? s.bad_row : fits ? -1 : TL_AREA_OVERFLOW;
 }

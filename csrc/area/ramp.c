@@ -134,21 +134,20 @@ static __attribute__((noinline)) void note_quads(const area_plane *plane, int n)
 
 /* Adds what waits to the cells.  They are all over the memory, and beyond the second-level cache: to compute first,
  * fetch meanwhile and add later takes a third off 200,000 triangles of 8 px. */
-TL_INLINE void flush_quads(area_plane *plane, int is_wide)
+TL_ONCE void flush_quads(area_plane *plane)
 {
     const int n = plane->n_waiting;
     v4 seen = plane->seen;
     plane->n_waiting = 0;
     if (plane->met)
         note_quads(plane, n);
-    for (int i = 0; i < n; i += TL_LANES)
+    for (int i = 0; plane->wide_cells && i < n; i++)
+        for (int k = 0; k < 4; k++)
+            plane->wide_cells[plane->at[i] + k] +=
+                plane->quads[4 * (i - i % TL_LANES + vi_quad_slot(i % TL_LANES)) + k];
+    for (int i = 0; plane->cells && i < n; i += TL_LANES)
         for (int lane = 0; lane < TL_LANES; lane++) {
             const int32_t *quad = plane->quads + 4 * (i + vi_quad_slot(lane));
-            if (is_wide) {
-                for (int k = 0; k < 4; k++)
-                    plane->wide_cells[plane->at[i + lane] + k] += quad[k];
-                continue;
-            }
             int32_t *p = plane->cells + plane->at[i + lane];
             const v4 sum = v4_add(v4_load(p), v4_load(quad));
             v4_store(p, sum);
@@ -158,20 +157,20 @@ TL_INLINE void flush_quads(area_plane *plane, int is_wide)
 }
 
 /* Adds four numbers a lane to the cells [at, at + 4) of that lane. */
-TL_INLINE void add_quads(area_plane *plane, int is_wide, vi at, const vi *columns)
+TL_INLINE void add_quads(area_plane *plane, vi at, const vi *columns)
 {
     const int n = plane->n_waiting;
     vi_store(plane->at + n, at);
     vi_store_quads(plane->quads + 4 * n, columns);
-    for (int lane = 0; !is_wide && lane < TL_LANES; lane++)
+    for (int lane = 0; plane->cells && lane < TL_LANES; lane++)
         __builtin_prefetch(plane->cells + plane->at[n + lane], 1);
     plane->n_waiting = n + TL_LANES;
     if (n + TL_LANES == TL_WAITING_QUADS)
-        flush_quads(plane, is_wide);
+        flush_quads(plane);
 }
 
 /* A row of TL_LANES edges that pass from xa to xb, less than 4 * n_quads - 2 px. */
-TL_INLINE void add_row(area_plane *plane, int is_wide, int n_quads, vd xa, vd xb, vd steep, vd height, vi col, vi row)
+TL_INLINE void add_row(area_plane *plane, int n_quads, vd xa, vd xb, vd steep, vd height, vi col, vi row)
 {
     const vd low = vd_min(xa, xb), high = vd_max(xa, xb), first = vd_floor(low), zero = vd_set1(0.0);
     const vd lo = vd_sub(low, first), hi = vd_sub(high, first);
@@ -197,13 +196,12 @@ TL_INLINE void add_row(area_plane *plane, int is_wide, int n_quads, vd xa, vd xb
     /* cells beside the frame: all that is left of it counts as one, the rest as none */
     for (int k = 0; k < n; k += 4) {
         const vi at = vi_clamp(vi_add(c, vi_set1(k)), vi_set1(-4), vi_set1(plane->n_cols));
-        add_quads(plane, is_wide, vi_add(start, at), cells + k);
+        add_quads(plane, vi_add(start, at), cells + k);
     }
 }
 
 /* TL_LANES edges at a time, all of n_rows rows. */
-TL_INLINE void add_short_edges(area_plane *plane, int is_wide, int n_quads, const edge_record *records, int n,
-                               int n_rows)
+TL_INLINE void add_short_edges(area_plane *plane, int n_quads, const edge_record *records, int n, int n_rows)
 {
     const vi last_row = vi_set1(plane->n_rows - 1), zero = vi_set1(0);
     for (int i = 0; i < n; i += TL_LANES) {
@@ -215,7 +213,7 @@ TL_INLINE void add_short_edges(area_plane *plane, int is_wide, int n_quads, cons
             const vd xb = vd_add(e.x, vd_mul(vd_from_vi(tb), e.slope));
             const vd height = vd_mul(vd_from_vi(vi_sub(tb, ta)), e.height);
             const vi row = vi_clamp(vi_add(e.row, vi_set1(j)), zero, last_row); /* rows outside have no height */
-            add_row(plane, is_wide, n_quads, xa, xb, e.steep, height, e.col, row);
+            add_row(plane, n_quads, xa, xb, e.steep, height, e.col, row);
             ta = tb;
             xa = xb;
         }
@@ -223,7 +221,7 @@ TL_INLINE void add_short_edges(area_plane *plane, int is_wide, int n_quads, cons
 }
 
 /* Edges of many rows, TL_LANES rows of one edge at a time. */
-TL_INLINE void add_long_edges(area_plane *plane, int is_wide, int n_quads, const edge_record *records, int n)
+TL_INLINE void add_long_edges(area_plane *plane, int n_quads, const edge_record *records, int n)
 {
     const vi last_row = vi_set1(plane->n_rows - 1), zero = vi_set1(0), rows = vi_iota();
     for (int i = 0; i < n; i++) {
@@ -237,14 +235,14 @@ TL_INLINE void add_long_edges(area_plane *plane, int is_wide, int n_quads, const
             const vd xb = vd_add(vd_set1(e.x), vd_mul(vd_from_vi(tb), vd_set1(e.slope)));
             const vd height = vd_mul(vd_from_vi(vi_sub(tb, ta)), vd_set1(e.height));
             const vi row = vi_clamp(vi_add(vi_set1(e.row + j), rows), zero, last_row);
-            add_row(plane, is_wide, n_quads, xa, xb, vd_set1(e.steep), height, vi_set1(e.col), row);
+            add_row(plane, n_quads, xa, xb, vd_set1(e.steep), height, vi_set1(e.col), row);
         }
     }
 }
 
 /* One row of one edge that passes many pixels, from low to high px right of column col; TL_LANES pixels at a time. */
-TL_INLINE void add_wide_row(area_plane *plane, int is_wide, int64_t row, int64_t col, double low, double high,
-                            double steep, double height)
+TL_INLINE void add_wide_row(area_plane *plane, int64_t row, int64_t col, double low, double high, double steep,
+                            double height)
 {
     if (col >= plane->n_cols)
         return;
@@ -267,7 +265,7 @@ TL_INLINE void add_wide_row(area_plane *plane, int is_wide, int64_t row, int64_t
         const vi area = vi_round(vd_add(vd_mul(mean, vd_sub(b, a)), right));
         const vi cells = vi_sub(area, vi_shift_in(area, before));
         before = area;
-        if (is_wide) {
+        if (plane->wide_cells) {
             int32_t values[TL_LANES];
             vi_store(values, cells);
             for (int i = 0; i < TL_LANES; i++)
@@ -282,7 +280,18 @@ TL_INLINE void add_wide_row(area_plane *plane, int is_wide, int64_t row, int64_t
         plane->seen = v4_or(plane->seen, v4_load((const int32_t[4]){INT32_MIN, 0, 0, 0}));
 }
 
-TL_INLINE void add_shallow_edges(area_plane *plane, int is_wide, const edge_record *records, int n)
+/* Edges of many rows that pass up to 2 columns a row, or up to 6. */
+TL_ONCE void add_steep_edges(area_plane *plane, const edge_record *records, int n)
+{
+    add_long_edges(plane, 1, records, n);
+}
+TL_ONCE void add_flat_edges(area_plane *plane, const edge_record *records, int n)
+{
+    add_long_edges(plane, 2, records, n);
+}
+
+/* Edges that pass any number. */
+TL_ONCE void add_shallow_edges(area_plane *plane, const edge_record *records, int n)
 {
     for (int i = 0; i < n; i++) {
         const edge_one e = setup_edge(plane, records + i);
@@ -292,7 +301,7 @@ TL_INLINE void add_shallow_edges(area_plane *plane, int is_wide, const edge_reco
             const int32_t tb = clamp32((int64_t)t + (1 << bits), e.t_first, e.t_end);
             const double xa = e.x + (double)ta * e.slope, xb = e.x + (double)tb * e.slope;
             const double low = xa < xb ? xa : xb, high = xa < xb ? xb : xa, first = floor(low);
-            add_wide_row(plane, is_wide, e.row + j, e.col + (int64_t)first, low - first, high - first, e.steep,
+            add_wide_row(plane, e.row + j, e.col + (int64_t)first, low - first, high - first, e.steep,
                          (tb - ta) * e.height);
         }
     }

@@ -44,7 +44,7 @@ static __attribute__((noinline)) void flush_atlas(area_pass *p)
     for (int kind = 0; kind < TL_EDGES_NONE; kind++)
         if (p->area.n[kind])
             flush_edges(&p->area, kind, 1);
-    flush_quads(&p->area.plane, 0);
+    flush_quads(&p->area.plane);
     for (int k = 0; k < p->n; k++) {
         const int64_t id = p->id[k];
         const int32_t row = p->row[k], col = p->col[k], next = k + 2 < p->n ? k + 2 : k;
@@ -171,7 +171,7 @@ static int64_t blend_areas(blend_state *b)
     p.mix = b, p.n = p.n_atlas_rows = 0;
     place_plane(&atlas, &(tl_area){.cells = b->canvas->cells}, &p.area.plane);
     p.area.plane.stride = TL_ATLAS_COLS; /* what an edge adds right of a row is 0 */
-    p.area.snapped = snapped, p.area.window = &atlas, p.area.bad_row = -1, p.area.is_wide = 0;
+    p.area.snapped = snapped, p.area.window = &atlas, p.area.bad_row = -1;
     memset(p.area.n, 0, sizeof p.area.n);
     const tl_share all = {.first = 0, .end = snapped->n_triangles};
     for (int64_t i = 0; i < all.end && p.area.bad_row < 0 && !tl_is_given_up(window); i += TL_LANES) {

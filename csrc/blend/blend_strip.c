@@ -201,11 +201,11 @@ static void add_edge(area_plane *plane, int64_t x0, int64_t y0, int64_t x1, int6
     const int32_t dx = (int32_t)(x1 - x0), dy = (int32_t)(y1 - y0), width = dx < 0 ? -dx : dx;
     const edge_record record = {(int32_t)x0, (int32_t)y0, dx, sign * dy};
     if (width > 6 * dy)
-        add_shallow_edges(plane, 0, &record, 1);
+        add_shallow_edges(plane, &record, 1);
     else if (width > 2 * dy)
-        add_long_edges(plane, 0, 2, &record, 1);
+        add_flat_edges(plane, &record, 1);
     else
-        add_long_edges(plane, 0, 1, &record, 1);
+        add_steep_edges(plane, &record, 1);
 }
 
 /* fmin and fmax are calls unless NaN is ruled out. */
@@ -278,7 +278,7 @@ static void blend_strip(blend_state *b, const tl_triangle *pieces, int64_t n, in
             const int next = k == 2 ? 0 : k + 1;
             add_edge(&plane, pieces[i].x_fx[k], pieces[i].y_fx[k], pieces[i].x_fx[next], pieces[i].y_fx[next]);
         }
-    flush_quads(&plane, 0);
+    flush_quads(&plane);
     blend_block(b, &(cell_block){
                        .cells = plane.cells + TL_CELL_PAD,
                        .at = row * b->stride + col,

@@ -122,7 +122,7 @@ static void finish_cells(area_state *s)
     for (int kind = 0; kind < TL_EDGES_NONE; kind++)
         if (s->n[kind])
             flush_edges(s, kind, 1);
-    flush_quads(&s->plane, 0);
+    flush_quads(&s->plane);
 }
 
 TL_INLINE vi whole_at_most(vi sums) { return vi_min(vi_max(sums, vi_set1(0)), vi_set1(TL_WHOLE)); }
@@ -356,7 +356,7 @@ static int64_t share_polygons(const tl_polygons *p, const tl_share_job *job)
 {
     area_state s;
     share_output out = {.job = job, .n = job->starts ? job->starts[job->first] : 0};
-    s.snapped = NULL, s.bad_row = -1, s.is_wide = 0;
+    s.snapped = NULL, s.bad_row = -1;
     s.max_extent = 1 << (p->bits + TL_MAX_EDGE_BITS < 25 ? p->bits + TL_MAX_EDGE_BITS : 25);
     const tl_window whole = {.width = job->width, .height = job->bottom - job->top};
     s.window = &whole; /* its size alone is read, to count work */

@@ -1,5 +1,6 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, initializedcheck=False, embedsignature=False
-# cython: freethreading_compatible=True, auto_pickle=False, emit_code_comments=False
+# cython: freethreading_compatible=True
+# cython: auto_pickle=False, emit_code_comments=False
 """Memoryviews in, one nogil kernel call, status out. The array layer has checked every shape, dtype and index."""
 
 from libc.stdint cimport int8_t, int16_t, int32_t, int64_t, uint8_t, uint16_t, uint32_t, uint64_t

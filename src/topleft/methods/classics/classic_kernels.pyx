@@ -1,5 +1,6 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, initializedcheck=False, cdivision=True, embedsignature=False
-# cython: freethreading_compatible=True, auto_pickle=False, emit_code_comments=False
+# cython: freethreading_compatible=True
+# cython: auto_pickle=False, emit_code_comments=False
 """The classics as one compiled module: arrays in, a loop over triangles, and the fill of the method that is named.
 
 A method is a file beside this one.  It has its variants in FORMS, in the order of its own constants, and a function
