@@ -1,5 +1,6 @@
 """One fixed hypothesis profile, the command line as a fixture, the count of pixels compared with the reference."""
 
+import signal
 from pathlib import Path
 
 import comparing
@@ -12,6 +13,9 @@ settings.register_profile(
     "fixed", derandomize=True, deadline=None, database=None, max_examples=300, suppress_health_check=list(HealthCheck)
 )
 settings.load_profile("fixed")
+
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # begun by a shell with `&`: tests of Ctrl-C need the usual
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 SLOW = frozenset(Path(__file__).with_name("slow.txt").read_text(encoding="utf-8").split("\n")[1:])

@@ -300,6 +300,7 @@ static __attribute__((noinline)) void blend_area_alone(blend_state *b, int64_t i
     const tl_window *window = b->window;
     const triangle_parts parts = parts_of(b->snapped, i);
     int64_t n = 0, top = INT64_MAX, bottom = INT64_MIN, left = INT64_MAX, right = INT64_MIN;
+    int is_narrow = 1;
     tl_triangle t[TL_MAX_PIECES];
     for (int k = 0; k < parts.n && n < TL_MAX_PIECES; k++) {
         if (is_culled(load_triangle(&parts.set, parts.corners + 3 * k, t + n), b->snapped->cull))
@@ -308,6 +309,7 @@ static __attribute__((noinline)) void blend_area_alone(blend_state *b, int64_t i
         bottom = max64(bottom, max3(t[n].y_fx[0], t[n].y_fx[1], t[n].y_fx[2]) >> window->subpixel_bits);
         left = min64(left, min3(t[n].x_fx[0], t[n].x_fx[1], t[n].x_fx[2]) >> window->subpixel_bits);
         right = max64(right, max3(t[n].x_fx[0], t[n].x_fx[1], t[n].x_fx[2]) >> window->subpixel_bits);
+        is_narrow &= t[n].is_narrow;
         n++;
     }
     if (!n)
@@ -318,7 +320,8 @@ static __attribute__((noinline)) void blend_area_alone(blend_state *b, int64_t i
         return;
     if (!b->is_flat)
         begin_gouraud(b, i, &parts.set, parts.corners, parts.is_cut);
-    const int n_rows = strip_rows(min64(window->width, right - left + 4));
+    /* strips of what is not narrow are as wide as the window */
+    const int n_rows = strip_rows(is_narrow ? min64(window->width, right - left + 4) : window->width);
     tl_count_work(window, 4 * (end_row - first_row) * (16 + min64(window->width, right - left)));
     for (int64_t row = first_row; row < end_row; row += n_rows)
         blend_strip(b, t, n, row, (int)min64(n_rows, end_row - row));

@@ -463,3 +463,27 @@ def test_blend_by_area_of_a_whole_pixel_is_the_blend_without_area(blend, color, 
         by_area = tl.fill(vertices, triangles, [[color]], (32, 1), **view, sampling="area", out=under.copy())
         plain = tl.fill(vertices, triangles, [[color]], (32, 1), **view, out=under.copy())
     assert by_area[0, 1:].tobytes() == plain[0, 1:].tobytes()
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize("dtype", [np.uint8, np.float32])
+def test_areas_far_away_stay_in_their_own_cells(dtype, isa):
+    """Strips of triangles beyond 2**30 sub-pixels are as wide as the window, however narrow the triangles are."""
+    v = np.array([[95, 440], [95, -250], [96, -370], [119, -120], [119, 206], [317, 145]], np.float64)
+    t, colors = [[0, 1, 2], [3, 4, 5]], np.array([[9, 99, 200, 80], [255, 3, 90, 160]]).astype(dtype)
+    options = {"per": "triangle", "blend": "over", "sampling": "area", "background": 7}
+    far = np.array([2**31 - 866, -(2**32) - 7])
+    with on(isa):
+        near = tl.fill(v, t, colors, (1500, 300), **options)
+        for threads in (1, 2, 3):
+            got = tl.fill(v + far, t, colors, (1500, 300), origin=tuple(far.tolist()), threads=threads, **options)
+            assert (got == near).all()
+
+
+@ON_EACH_ISA
+def test_a_narrow_triangle_far_beside_a_wide_window_draws_nothing(isa):
+    far = [[5e6, 10], [5e6 + 30, 12], [5e6, 290]]
+    with on(isa):
+        for bits in (8, 16):
+            got = tl.fill(far, [[0, 1, 2]], [[255]], (4000, 300), blend="add", sampling="area", subpixel_bits=bits)
+            assert not got.any()
