@@ -1,11 +1,14 @@
 """One fixed hypothesis profile, the command line as a fixture, the count of pixels compared with the reference."""
 
 import signal
+from importlib.util import find_spec
 from pathlib import Path
 
 import comparing
 import pytest
 from hypothesis import HealthCheck, settings
+
+import topleft as tl
 
 collect_ignore = [] if Path(__file__).parents[1].joinpath("benchmarks").is_dir() else ["studies"]
 
@@ -31,14 +34,27 @@ def pytest_collection_modifyitems(items):
 TEST_PACKAGES = frozenset({"matplotlib", "meshio", "scipy"})
 
 
-@pytest.hookimpl(wrapper=True)
-def pytest_runtest_call(item):
+def skipped_without_packages():
     try:
         return (yield)
     except ModuleNotFoundError as error:
         if (error.name or "").partition(".")[0] in TEST_PACKAGES:
             pytest.skip(f"needs {error.name}, of the extra `test`")
         raise
+    except tl.MissingPackageError as error:
+        if find_spec("fast_simplification") is None and "fast-simplification" in str(error):
+            pytest.skip(str(error))
+        raise
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_setup(item):
+    return (yield from skipped_without_packages())
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call(item):
+    return (yield from skipped_without_packages())
 
 
 #: Pixels that the processes of pytest-xdist have compared.

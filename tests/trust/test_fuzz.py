@@ -1,5 +1,7 @@
 """Calls that nobody would write: each is drawn as plain copies of its arrays are, or refused in one line."""
 
+from importlib.util import find_spec
+
 import pytest
 from fuzzing import KINDS, REFUSALS, FromBytes, FromRandom, check_one
 from hypothesis import given, settings
@@ -30,7 +32,8 @@ def test_calls_that_nobody_would_write_are_drawn_alike_or_refused(kind):
 
     check_each()
     assert "drawn" in seen
-    assert seen - {"drawn"} <= {error.__name__ for error in REFUSALS}
+    unmade = set() if find_spec("fast_simplification") else {"MissingPackageError"}  # levels of a mesh
+    assert seen - {"drawn"} - unmade <= {error.__name__ for error in REFUSALS}
 
 
 def test_a_file_of_the_guided_fuzzer_is_a_case():
