@@ -86,6 +86,9 @@ static void plane_of_points(lone_triangle *t, double width, double height)
     t->slope_y = (d2 * x1 - d1 * x2) * inverse;
 }
 
+/* What that takes, in pixels of a plane. */
+#define TL_WEIGHTED_PX 256
+
 /* The depth of a sample by weights: parts of the area, each within 2^-49 of its size. */
 static float weighted_depth(const lone_triangle *t, exact_point sample)
 {
@@ -332,11 +335,15 @@ TL_INLINE void draw_lone(exact_state *s, int32_t i, tl_sink sink)
         return;
     const lone_triangle t = found;
     const int64_t stride = target.stride_px, corner = (t.row - s->top) * stride + t.col - s->left;
-    tl_count_work(s->window, t.n_rows * t.edges.n_cols);
+    const int is_slow = sink_has_depth(sink) && !t.has_plane;
+    if (!is_slow)
+        tl_count_work(s->window, t.n_rows * t.edges.n_cols);
     row_steps steps;
     const int takes_steps = TL_LANES == 1 && setup_steps(&t, &steps);
-    for (int64_t row0 = 0; row0 < t.n_rows; row0 += TL_LANES) {
+    for (int64_t row0 = 0; row0 < t.n_rows && !(is_slow && tl_is_given_up(s->window)); row0 += TL_LANES) {
         const int n = t.n_rows - row0 < TL_LANES ? (int)(t.n_rows - row0) : TL_LANES;
+        if (is_slow)
+            tl_count_work(s->window, (int64_t)TL_WEIGHTED_PX * n * t.edges.n_cols);
         const unsigned doubted = takes_steps ? take_step(&steps, t.edges.n_cols, first, end)
                                              : find_lone_ends(&t, row0, first, end) & ((1u << n) - 1);
         if (__builtin_expect(doubted != 0, 0))

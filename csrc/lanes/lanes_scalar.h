@@ -18,8 +18,14 @@ typedef double vd;
 typedef unsigned vm; /* 0 or 1 */
 
 TL_INLINE vi vi_set1(int32_t a) { return a; }
-TL_INLINE vi vi_load(const int32_t *p) { return *p; }
-TL_INLINE void vi_store(int32_t *p, vi a) { *p = a; }
+/* Pixels of four bytes may lie at any address. */
+TL_INLINE vi vi_load(const int32_t *p)
+{
+    vi a;
+    memcpy(&a, p, sizeof a);
+    return a;
+}
+TL_INLINE void vi_store(int32_t *p, vi a) { memcpy(p, &a, sizeof a); }
 TL_INLINE vi vi_iota(void) { return 0; }
 TL_INLINE vi vi_add(vi a, vi b) { return (vi)((uint32_t)a + (uint32_t)b); }
 TL_INLINE vi vi_sub(vi a, vi b) { return (vi)((uint32_t)a - (uint32_t)b); }
@@ -81,11 +87,11 @@ TL_INLINE void vi_compress(int32_t *p, vm m, vi a)
     (void)m;
     *p = a;
 }
-TL_INLINE vi vi_load_masked(vm m, const int32_t *p) { return m ? *p : 0; }
+TL_INLINE vi vi_load_masked(vm m, const int32_t *p) { return m ? vi_load(p) : 0; }
 TL_INLINE void vi_store_masked(int32_t *p, vm m, vi a)
 {
     if (m)
-        *p = a;
+        vi_store(p, a);
 }
 TL_INLINE void vi_store_some(int32_t *p, vm m, vi a, int has_room)
 {

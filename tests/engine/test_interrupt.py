@@ -37,6 +37,7 @@ def crossing_star(n):
 
 LARGE, SMALL = random_triangles(100_000, 2000), random_triangles(1_000_000, 30)
 FLAT = LARGE[0][:, :2], LARGE[1]
+THIN = np.array([[-1e12, -1e12 - 9e3, 0.0], [1e12, 1e12 - 9e3, 0.5], [0.0, 9e3, 1.0]])
 COLORS = np.random.default_rng(2).integers(0, 256, (100_000, 4), dtype=np.uint8)
 POLYGONS = FLAT[0], np.arange(0, 300_001, 3), np.arange(100_001)
 BALL = tl.Mesh(*tl.scenes.shape("icosphere"))
@@ -73,6 +74,9 @@ DRAWS = {
     "coverage exact": lambda n: tl.coverage(*FLAT, SIZE, subpixel_bits="exact", threads=n),
     "overdraw exact far away": lambda n: tl.overdraw(
         FLAT[0] * 1e6 - 1e9, FLAT[1], SIZE, subpixel_bits="exact", threads=n
+    ),
+    "rasterize one exact triangle without a plane": lambda n: tl.rasterize(
+        THIN, [[0, 1, 2]], (6000, 5000), subpixel_bits="exact", threads=n
     ),
     "rasterize exact msaa16": lambda n: tl.rasterize(*SMALL, SIZE, sampling="msaa16", subpixel_bits="exact", threads=n),
     "table of triangles": lambda n: tl.overlap(FLAT[0], SIZE, triangles=FLAT[1], threads=n),

@@ -481,6 +481,19 @@ def test_areas_far_away_stay_in_their_own_cells(dtype, isa):
 
 
 @ON_EACH_ISA
+@pytest.mark.parametrize("sampling", ["center", "msaa4", "area"])
+@pytest.mark.parametrize("blend", ["replace", "over"])
+def test_pixels_of_four_bytes_may_lie_at_any_address(blend, sampling, isa):
+    """UndefinedBehaviorSanitizer watches in `.ci/sanitize core`."""
+    options = {"per": "triangle", "blend": blend, "sampling": sampling}
+    mesh = [[-5, -5], [300, 10], [40, 90.5], [70, -20]], [[0, 1, 2], [1, 3, 2]], np.array([[9, 9, 9, 255]] * 2, "u1")
+    odd = np.zeros(40 * 200 * 4 + 1, np.uint8)[1:].reshape(40, 200, 4)
+    with on(isa):
+        tl.fill(*mesh, (200, 40), out=odd, **options)
+        assert (odd == tl.fill(*mesh, (200, 40), **options)).all()
+
+
+@ON_EACH_ISA
 def test_a_narrow_triangle_far_beside_a_wide_window_draws_nothing(isa):
     far = [[5e6, 10], [5e6 + 30, 12], [5e6, 290]]
     with on(isa):

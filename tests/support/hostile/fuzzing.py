@@ -31,6 +31,8 @@ ODD_DTYPES = ["?", "c8", "O", "U3", "M8[s]"]
 INDEX_DTYPES = ["i4", "i8", "u4", "u8", "i2", "u1", ">i4", ">u8"]
 SAMPLINGS = ["center", "msaa2", "msaa4", "msaa8", "msaa16"]
 GUARD = 64
+LARGEST = 5000  # the longest side of a picture that is drawn; what is larger is to be refused
+FAR = [2.0**20, -(2.0**22), 2.0**23, -(2.0**27), 2.0**31]
 
 
 class Source(Protocol):
@@ -135,11 +137,20 @@ class Draw:
             return array[:, ::-1].copy()[:, ::-1]
         return array
 
-    def vertices(self, n: int, n_columns: Sequence[int], size: tuple[int, int]) -> Any:
-        """Rows of coordinates round a picture."""
+    def vertices(
+        self, n: int, n_columns: Sequence[int], size: tuple[int, int], origin: tuple[int, int] = (0, 0)
+    ) -> Any:
+        """Rows of coordinates round a picture, now and then stretched along an axis, or far away."""
         side = min(max(*size, 4), 80)
         columns = self.of(n_columns)
         values = self.numbers((n, columns), -0.4 * side, 1.4 * side)
+        with np.errstate(all="ignore"):
+            for axis in (0, 1):
+                if max(*size) > 80:
+                    values[:, axis] *= size[axis] / side
+                if self.chance(8):
+                    values[:, axis] *= 2.0 ** self.source.integer(-4, 24)
+                values[:, axis] += self.of(FAR) if self.chance(8) else origin[axis]
         if columns == 4 and n:
             values[:, 3] = np.where(np.isfinite(values[:, 3]), values[:, 3] / side + 0.5, values[:, 3])
         return self.laid_out(self.as_dtype(values, DTYPES))
@@ -166,9 +177,12 @@ class Draw:
         return self.of([(), (0,), (1, 1), wanted[:-1], (*wanted, 1), (wanted[0] + 1, *wanted[1:])])
 
     def size(self) -> Any:
-        """A picture of a few thousand pixels, or of a size that no memory holds."""
+        """A picture of a few thousand pixels, a wide, tall or larger one, or of a size that no memory holds."""
         if self.chance(30):
             return self.of(SIZES)
+        if self.chance(6):
+            wide = self.source.integer(1, 4000), self.source.integer(1, 12)
+            return self.of([wide, wide[::-1], (self.source.integer(70, 1600), self.source.integer(50, 320))])
         return self.source.integer(1, 70), self.source.integer(1, 50)
 
     def colors(self, n: int) -> Any:
@@ -221,7 +235,8 @@ def view_of(draw: Draw, samplings: Sequence[str]) -> dict[str, Any]:
         options["subpixel_bits"] = draw.mostly([8, 0, 4, 16, 1, "exact"], [-1, 17, "exactly"])
     if draw.chance(3):
         options["origin"] = draw.mostly(
-            [(0, 0), (3, 2), (-7, 9)], [(2**31, -(2**31)), (2**44, 2**44), (2**62, 0), (2**63, 0)]
+            [(0, 0), (3, 2), (-7, 9), (2**23, -(2**22)), (2**31 - 866, -(2**32) - 7)],
+            [(2**44, 2**44), (2**62, 0), (2**63, 0)],
         )
     if draw.chance(4):
         options["viewport"] = draw.mostly([(64, 48), (1, 1), (2**31 - 1, 2**31 - 1)], [(0, 0), (2**31, 4)])
@@ -238,17 +253,19 @@ def view_of(draw: Draw, samplings: Sequence[str]) -> dict[str, Any]:
     return options
 
 
-def mesh_arrays(draw: Draw, size: Any, n_columns: Sequence[int] = (2, 3, 4)) -> tuple[Any, Any, int, int]:
+def mesh_arrays(
+    draw: Draw, size: Any, n_columns: Sequence[int] = (2, 3, 4), origin: tuple[int, int] = (0, 0)
+) -> tuple[Any, Any, int, int]:
     """Vertices, triangles, and how many there are of each."""
     n_vertices, n_triangles = draw.of([6, 3, 40, 1, 0, 200]), draw.of([2, 1, 0, 30, 300])
-    vertices = draw.vertices(n_vertices, n_columns, size if max(size) < 1000 else (60, 40))
+    vertices = draw.vertices(n_vertices, n_columns, size if max(size) <= LARGEST else (60, 40), origin)
     return vertices, draw.triangles(n_triangles, n_vertices), n_vertices, n_triangles
 
 
 def out_of(draw: Draw, shape: tuple[int, ...], dtypes: Sequence[str], inputs: Sequence[Any]) -> Any:
     """An array to draw into: plain, unsuitable, or over an input; nothing for a picture that no memory holds."""
     kind = draw.source.integer(0, 9)
-    if kind < 5 or max(shape, default=0) > 1000 or min(shape, default=1) < 0:
+    if kind < 5 or max(shape, default=0) > LARGEST or min(shape, default=1) < 0:
         return None
     dtype = np.dtype(draw.of(dtypes))
     memory = np.full(int(np.prod(shape)) * dtype.itemsize + 2 * GUARD + 1, 0x5A, np.uint8)
@@ -276,10 +293,11 @@ def out_of(draw: Draw, shape: tuple[int, ...], dtypes: Sequence[str], inputs: Se
 def verb_case(draw: Draw) -> Case:
     """`coverage`, `overdraw`, `fill`, `rasterize` or `wireframe`."""
     size, name = draw.size(), draw.of(["coverage", "overdraw", "fill", "rasterize", "wireframe"])
-    more = {"coverage": ["area", "outer", "inner"], "overdraw": ["area", "outer", "inner"], "fill": ["area"]}
+    more = {"coverage": ["area", "outer", "inner"], "overdraw": ["area", "outer", "inner"], "fill": ["area"] * 4}
     view = view_of(draw, ["center"] if name == "wireframe" else [*SAMPLINGS, *more.get(name, [])])
     columns = (3,) if "transform" in view else (2, 2, 3, 4)
-    vertices, triangles, n_vertices, n_triangles = mesh_arrays(draw, size, columns)
+    origin = view.get("origin", (0, 0)) if columns != (3,) and draw.chance(2) else (0, 0)
+    vertices, triangles, n_vertices, n_triangles = mesh_arrays(draw, size, columns, origin)
     inputs = [vertices, triangles]
     shape = size[::-1]
     rasterizer = tl.Rasterizer if draw.chance(8) else None
@@ -304,7 +322,7 @@ def verb_case(draw: Draw) -> Case:
             view["antialias"] = draw.of([False, True])
             if draw.chance(3):
                 view["depth"] = draw.laid_out(draw.numbers(draw.shape(*shape), -1, 1).astype("f4")) if max(
-                    size) < 1000 and min(size) >= 0 else None  # fmt: skip
+                    size) <= LARGEST and min(size) >= 0 else None  # fmt: skip
         view["out"] = out_of(draw, shape, dtypes, inputs)
 
     def call(*arrays: Any, **options: Any) -> Any:
@@ -403,7 +421,7 @@ def points_case(draw: Draw) -> Case:
     size, view = draw.size(), view_of(draw, SAMPLINGS)
     view = {name: value for name, value in view.items() if name not in ("cull", "method")}
     n = draw.of([5, 1, 0, 300])
-    positions = draw.vertices(n, (3,) if "transform" in view else (3, 2, 4), size if max(size) < 1000 else (60, 40))
+    positions = draw.vertices(n, (3,) if "transform" in view else (3, 2, 4), size if max(size) <= LARGEST else (60, 40))
     widths = draw.laid_out(draw.as_dtype(np.abs(draw.numbers(draw.shape(n), 1, 9)), DTYPES))
     view["shape"] = draw.of(["square", "disc"])
     view["depth_test"] = draw.of(["less", "greater"])
@@ -417,7 +435,7 @@ def points_case(draw: Draw) -> Case:
 def rings_of(draw: Draw, size: Any) -> tuple[Any, ...]:
     """Coordinates, offsets of rings, offsets of polygons."""
     n = draw.mostly([8, 3, 40, 300], [2, 0])
-    coordinates = draw.vertices(n, (2,), size if max(size) < 1000 else (60, 40))
+    coordinates = draw.vertices(n, (2,), size if max(size) <= LARGEST else (60, 40))
     n_rings = min(draw.of([2, 1, 3]), max(n // 3, 1))
     offsets = np.linspace(0, n, n_rings + 1).astype(int)
     offsets[0], offsets[-1] = 0, n
@@ -489,7 +507,7 @@ def overlap_case(draw: Draw) -> Case:
             table = tl.overlap(tuple(arrays), size, **options)
         if raster is None:
             return table
-        whole = np.resize(np.asarray(raster), size[::-1]) if max(size) < 1000 else raster
+        whole = np.resize(np.asarray(raster), size[::-1]) if max(size) <= LARGEST else raster
         return [*arrays_of(table), table.sums(whole), table.means(whole), table.spread(table.totals())]
 
     return Case(f"overlap {size}", call, (*inputs, raster), options)
@@ -592,7 +610,7 @@ def tiles_case(draw: Draw) -> Case:
 
     def call(vertices: Any, triangles: Any, values: Any, **options: Any) -> Any:
         raster = tl.tiles((vertices, triangles), size, values=values, window=window, **options)
-        if raster.n_windows > 2000 or max(raster.shape) > 1000:
+        if raster.n_windows > 2000 or max(raster.shape) > LARGEST:
             return raster[:3, :5] if max(raster.shape) < 2**31 - 1 else []
         whole = np.empty(raster.shape, raster.dtype)
         for each in raster:
@@ -755,5 +773,5 @@ def check(case: Case) -> str:
 def check_one(source: Source, kind: str | None = None) -> str:
     """Draw a case and check it."""
     draw = Draw(source)
-    case = KINDS[kind or draw.of(list(KINDS))](draw)
+    case = KINDS[kind or draw.of([*KINDS, "verb", "verb", "verb"])](draw)
     return f"{case.name.partition(' ')[0]} {check(case)}"
