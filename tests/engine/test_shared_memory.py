@@ -217,3 +217,48 @@ def test_slopes_of_ids_that_their_owner_has_changed_are_refused(wrong):
     frags.triangle[2, 2] = wrong
     with pytest.raises(IndexError, match=f"triangle must hold ids below 1, got {wrong}"):
         frags.interpolate(np.zeros((3, 2)), derivatives=True)
+
+
+def moved(value):
+    """What another process makes of an object when the bytes of its arrays arrive at odd addresses, as Dask's do."""
+    sent = []
+    words = pickle.dumps(value, protocol=5, buffer_callback=sent.append)
+    parts = []
+    for part in sent:
+        at = np.zeros(part.raw().nbytes + 1, np.uint8)[1:]
+        at[:] = np.frombuffer(part.raw(), np.uint8)
+        parts.append(pickle.PickleBuffer(at))
+    assert parts
+    return pickle.loads(words, buffers=parts)
+
+
+def arrays_of(value):
+    """The arrays that an object holds, also in tuples."""
+    held = [vars(value)]
+    for each in held:
+        held += each.values() if isinstance(each, dict) else each if isinstance(each, tuple) else ()
+    return [each for each in held if isinstance(each, np.ndarray)]
+
+
+KNOT = tl.Mesh(*scenes.shape("torus-knot"))
+SEEN = tl.Camera.framing(KNOT)
+SENT = {
+    "Mesh": KNOT,
+    "Camera": SEEN,
+    "Texture": tl.Texture(np.arange(48, dtype=np.uint8).reshape(4, 4, 3)),
+    "Environment": tl.Environment(image=np.arange(48.0).reshape(4, 4, 3) / 48),
+    "Points": tl.Points(VERTICES.repeat(2, 1)[:, :3]),
+    "Instance": tl.Instance(KNOT, np.eye(4)),
+    "SceneFragments": tl.rasterize_mesh(tl.Scene([KNOT, KNOT]), SEEN, (40, 30)),
+}
+
+
+@pytest.mark.parametrize("name", SENT)
+def test_what_is_received_at_odd_addresses_is_aligned(name):
+    arrays = arrays_of(moved(SENT[name]))
+    assert arrays
+    assert all(array.flags.aligned for array in arrays)
+
+
+def test_a_mesh_that_is_received_at_odd_addresses_is_drawn_alike():
+    assert_same(tl.render(moved(KNOT), SEEN, (80, 60)), tl.render(KNOT, SEEN, (80, 60)))

@@ -10,7 +10,7 @@ from polygon_cases import SIZE, cells, square, star, wild_polygon, wild_seeds
 
 import topleft as tl
 from topleft._base import memory
-from topleft._polygons import overlap
+from topleft._polygons import overlap, prepared
 from topleft._polygons.prepared import Prepared
 from topleft.methods.reference import polygons as ref
 
@@ -123,6 +123,26 @@ def test_table_that_a_thread_cannot_finish_raises(monkeypatch):
     drawn = [square(i, 0, i + 20, 20) for i in range(40)]
     with pytest.raises(MemoryError, match="no more"):
         tl.overlap([[ring] for ring in drawn], (60, 20), threads=3)
+
+
+def test_memory_for_rings_that_meet_is_asked_for_with_its_bytes(monkeypatch):
+    """Each thread has eight bytes for a row of the tallest of them."""
+    asked = []
+
+    def check_fits(shape, *dtypes):
+        asked.append((shape, *dtypes))
+        raise MemoryError("no memory")
+
+    monkeypatch.setattr(prepared, "check_fits", check_fits)
+    height = 2**23 - 10
+    tall = [(0, 0), (5, height), (0, height), (5, 0)]
+    with pytest.raises(MemoryError, match="no memory"):
+        tl.overlap([[tall]], (9, 2**23), threads=4)
+    ((n_threads, n_words), dtype), *others = asked
+    assert not others
+    assert n_threads == 4
+    assert n_words > height
+    assert dtype is np.int64
 
 
 @pytest.mark.parametrize(("most", "squares_listed"), [(1300, 3), (2100, 5), (9000, 12)])

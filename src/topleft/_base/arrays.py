@@ -42,6 +42,7 @@ __all__ = [
     "check_regular",
     "check_rows",
     "narrow_triangles",
+    "set_aligned",
     "set_read_only",
     "shown",
 ]
@@ -104,12 +105,26 @@ def array_of_tensor(name: str, tensor: Any) -> NDArray[Any]:
         raise TypeError(f"{name} must be an array that NumPy can read, got a {kind} ({error})") from None
 
 
+def set_aligned(instance: object, state: dict[str, Any]) -> None:
+    """Give an object that is unpickled or copied what it consists of, its arrays aligned for the kernels.
+
+    Arrays that are pickled out of band lie wherever their bytes were received.
+    """
+    vars(instance).update({name: _aligned(value) for name, value in state.items()})
+
+
 def set_read_only(instance: object, state: dict[str, Any]) -> None:
-    """Give an object that is unpickled or copied what it consists of, its arrays read-only as they were."""
-    for value in state.values():
+    """Do the same, with arrays read-only as they were."""
+    set_aligned(instance, state)
+    for value in vars(instance).values():
         if isinstance(value, np.ndarray):
             value.flags.writeable = False
-    vars(instance).update(state)
+
+
+def _aligned(value: Any) -> Any:
+    if isinstance(value, tuple):
+        return tuple(map(_aligned, value))
+    return value.copy() if isinstance(value, np.ndarray) and not value.flags.aligned else value
 
 
 def as_vertices(values: ArrayLike, *, has_transform: bool) -> NDArray[Any]:

@@ -159,7 +159,8 @@ def check_fits(shape: tuple[int, ...], *dtypes: DTypeLike) -> None:
         try:
             np.empty(n_bytes, np.uint8)
         except (MemoryError, ValueError):
-            words = f"no memory for {len(dtypes)} arrays of {n_bytes:,} bytes together, which this size or scene needs"
+            what = f"{len(dtypes)} arrays of {n_bytes:,} bytes together" if len(dtypes) > 1 else f"{n_bytes:,} bytes"
+            words = f"no memory for {what}, which this size or scene needs"
             raise MemoryError(words) from None
 
 

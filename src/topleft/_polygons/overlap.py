@@ -280,6 +280,7 @@ def list_range(
     while bounds[-1] < last:
         bounds.append(min(last, end_of_room(before, bounds[-1], MAX_BLOCK_ENTRIES)))
     most = int(np.diff(before[bounds]).max()) + TAIL
+    check_fits((len(cells) * most,), pixels.dtype, np.float32)
     waiting, free = deque(pairwise(bounds)), deque(cells)
     taking, turn = Lock(), Condition()
     done = begin

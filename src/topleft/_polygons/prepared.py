@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft import _engine
-from topleft._base.memory import SCRATCH, Memory
+from topleft._base.memory import SCRATCH, Memory, check_fits
 from topleft._base.threads import available_threads, run_parts
 from topleft._polygons.rings import RingSet
 
@@ -65,7 +65,10 @@ class Prepared:
             return None
         boxes = self.engine.boxes_px[~is_simple]
         width, height = (boxes[:, 2:].astype(np.int64) - boxes[:, :2]).max(axis=0)
-        return _engine.PieceScratch(max(4096, self.most_edges), height, width)
+        n_pieces = max(4096, self.most_edges)
+        n_words = n_pieces * (_engine.PIECE_BYTES // 8 + _engine.PIECE_WORDS) + int(height) + int(width)
+        check_fits((self.n_threads, n_words), np.int64)
+        return _engine.PieceScratch(n_pieces, height, width)
 
 
 def threads_for(frame: Frame, n_points: int) -> int:

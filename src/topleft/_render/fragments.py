@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from numpy.typing import NDArray
 
-from topleft._base.arrays import as_array, shown
+from topleft._base.arrays import as_array, set_aligned, shown
 from topleft._base.memory import empty
 from topleft._camera.camera import Camera
 from topleft._model.mesh import Mesh
@@ -171,6 +171,8 @@ class SceneFragments(InstanceIds, Fragments):
     def __getstate__(self) -> dict[str, Any]:
         """What another process needs: the parts refer to memory of this one, and are made there."""
         return {name: value for name, value in vars(self).items() if name != "parts"}
+
+    __setstate__ = set_aligned
 
     @property
     def whole(self) -> Scene:

@@ -190,7 +190,7 @@ def sent(array: Array) -> Array | MappedArray:
 def received(array: Array | MappedArray) -> Array:
     """Return the array that was sent."""
     if not isinstance(array, MappedArray):
-        return array
+        return array if array.flags.aligned else array.copy()
     n_bytes = sum((n - 1) * step for n, step in zip(array.shape, array.strides, strict=True)) + array.dtype.itemsize
     if 0 in array.shape:
         return np.empty(array.shape, array.dtype)
