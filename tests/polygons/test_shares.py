@@ -10,7 +10,7 @@ from polygon_cases import SIZE, cells, square, star, wild_polygon, wild_seeds
 
 import topleft as tl
 from topleft._base import memory
-from topleft._polygons import overlap, prepared
+from topleft._polygons import overlap
 from topleft._polygons.prepared import Prepared
 from topleft.methods.reference import polygons as ref
 
@@ -125,24 +125,30 @@ def test_table_that_a_thread_cannot_finish_raises(monkeypatch):
         tl.overlap([[ring] for ring in drawn], (60, 20), threads=3)
 
 
+CROSSING = [(0, 0), (5, 2**23 - 10), (0, 2**23 - 10), (5, 0)]  # eight bytes for each of its rows, in each thread
+
+
 def test_memory_for_rings_that_meet_is_asked_for_with_its_bytes(monkeypatch):
-    """Each thread has eight bytes for a row of the tallest of them."""
-    asked = []
+    monkeypatch.setattr(memory, "MIN_CHECKED_BYTES", 0)
+    monkeypatch.setattr(memory, "fits", lambda shape, *_: shape[0] < 2**20)
+    with pytest.raises(MemoryError, match=r"no memory for [67]\d,\d{3},\d{3} bytes, which this size or scene needs"):
+        tl.overlap([[CROSSING]], (9, 2**23))
 
-    def check_fits(shape, *dtypes):
-        asked.append((shape, *dtypes))
-        raise MemoryError("no memory")
 
-    monkeypatch.setattr(prepared, "check_fits", check_fits)
-    height = 2**23 - 10
-    tall = [(0, 0), (5, height), (0, height), (5, 0)]
-    with pytest.raises(MemoryError, match="no memory"):
-        tl.overlap([[tall]], (9, 2**23), threads=4)
-    ((n_threads, n_words), dtype), *others = asked
-    assert not others
-    assert n_threads == 4
-    assert n_words > height
-    assert dtype is np.int64
+def test_fewer_threads_draw_where_memory_is_scarce(monkeypatch):
+    expected = tl.overlap([[CROSSING], [CROSSING]], (9, 2**23), threads=1)
+    made, real = [], Prepared.piece_scratch
+    monkeypatch.setattr(memory, "fits", lambda shape, *_: shape[0] < 3)
+    for module in (memory, overlap):
+        monkeypatch.setattr(module, "check_fits", lambda *_: None)
+    monkeypatch.setattr(Prepared, "piece_scratch", lambda self: made.append(1) or real(self))
+    table = tl.overlap([[CROSSING]] * 2, (9, 2**23), threads=8)
+    assert (table.areas == expected.areas).all()
+    assert len(made) == 2
+    monkeypatch.setattr(overlap, "fits", lambda *_: False)  # for rows of its own
+    table = tl.overlap([[CROSSING]] * 2, (9, 2**23), threads=8)
+    assert (table.areas == expected.areas).all()
+    assert len(made) == 3
 
 
 @pytest.mark.parametrize(("most", "squares_listed"), [(1300, 3), (2100, 5), (9000, 12)])

@@ -12,7 +12,8 @@ from numpy.typing import DTypeLike, NDArray
 
 from topleft import _engine
 
-__all__ = ["FreshMemory", "KeptMemory", "Memory", "ScratchMemory", "check_fits", "empty", "release_memory"]
+__all__ = ["FreshMemory", "KeptMemory", "Memory", "ScratchMemory", "check_fits", "empty", "fits", "release_memory",
+           "times_that_fit"]  # fmt: skip
 
 HUGE_PAGE = 2 << 20
 CACHE_LINE = 64
@@ -148,20 +149,31 @@ def empty(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
     return np.ndarray(shape, dtype, _engine.lease_block(n_bytes, allocate))
 
 
-def check_fits(shape: tuple[int, ...], *dtypes: DTypeLike) -> None:
-    """Raise a MemoryError unless the system has memory for arrays of a shape together.
+def fits(shape: tuple[int, ...], *dtypes: DTypeLike) -> bool:
+    """Whether the system has memory for arrays of a shape together.
 
     One by one it may promise what it has not: Linux refuses a single array larger than all memory, but gives two of
     half that size and ends the process when they are written.
     """
     n_bytes = sum(_size(shape, dtype) for dtype in dtypes)
-    if n_bytes >= MIN_CHECKED_BYTES:
-        try:
-            np.empty(n_bytes, np.uint8)
-        except (MemoryError, ValueError):
-            what = f"{len(dtypes)} arrays of {n_bytes:,} bytes together" if len(dtypes) > 1 else f"{n_bytes:,} bytes"
-            words = f"no memory for {what}, which this size or scene needs"
-            raise MemoryError(words) from None
+    try:
+        return n_bytes < MIN_CHECKED_BYTES or np.empty(n_bytes, np.uint8).nbytes == n_bytes
+    except (MemoryError, ValueError):
+        return False
+
+
+def check_fits(shape: tuple[int, ...], *dtypes: DTypeLike) -> None:
+    """Raise a MemoryError unless the system has memory for arrays of a shape together."""
+    if not fits(shape, *dtypes):
+        n_bytes = sum(_size(shape, dtype) for dtype in dtypes)
+        what = f"{len(dtypes)} arrays of {n_bytes:,} bytes together" if len(dtypes) > 1 else f"{n_bytes:,} bytes"
+        raise MemoryError(f"no memory for {what}, which this size or scene needs")
+
+
+def times_that_fit(most: int, shape: tuple[int, ...], *dtypes: DTypeLike) -> int:
+    """Return how many times there is memory for arrays of a shape, `most` at most; a MemoryError where not once."""
+    check_fits(shape, *dtypes)
+    return next(n for n in range(most, 0, -1) if n == 1 or fits((n, *shape), *dtypes))
 
 
 def release_memory() -> None:

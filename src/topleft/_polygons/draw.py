@@ -79,7 +79,8 @@ def draw_labels(
 ) -> None:
     """Write the values of polygons, or their numbers, over contiguous (H, W) pixels of 1 or 4 bytes."""
     engine, (width, height) = prepared.engine, prepared.frame.size
-    n_bytes, n_threads = pixels.itemsize, prepared.n_threads
+    n_bytes = pixels.itemsize
+    n_threads = prepared.n_threads if sampling == "center" else prepared.threads_with_pieces()
     flat = _engine.as_bytes(pixels)
     boxes = engine.boxes_px
     sides = boxes[:, 2:].astype(np.int64) - boxes[:, :2]
@@ -108,7 +109,7 @@ def add_shares(prepared: Prepared, pixels: npt.NDArray[np.float32], colors: npt.
     is_alone = colors is None and len(prepared) == 1
     if colors is None and not is_alone:
         pixels.fill(0)
-    height, n_threads = prepared.frame.size[1], prepared.n_threads
+    height, n_threads = prepared.frame.size[1], prepared.threads_with_pieces()
     n_bands = min(height, n_threads if len(prepared) < 64 else 4 * n_threads)
     band_rows = -(-height // n_bands)
     starts, listed = sort_bands(prepared, band_rows)

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from topleft import _engine
 from topleft._base.arrays import as_array, as_checked_triangles, as_real
-from topleft._base.memory import SCRATCH, FreshMemory, check_fits
+from topleft._base.memory import SCRATCH, FreshMemory, check_fits, fits
 from topleft._base.options import parse
 from topleft._base.threads import run_parts
 from topleft._field.grid import Grid
@@ -221,7 +221,7 @@ def list_areas(prepared: Prepared, used: list[Chunk]) -> Overlap:
     starts = np.zeros(n + 1, np.int64)
     if not n or 0 in size:
         return Overlap(starts, np.empty(0, dtype), np.empty(0, np.float32), size)
-    n_threads = max(1, min(prepared.n_threads, n))
+    n_threads = max(1, min(prepared.threads_with_pieces(), n))
     n_cells = cells_for(prepared, size[1])
     cells = SCRATCH.constant("cells", n_cells * n_threads, _engine.CELL_CLEAR).reshape(n_threads, n_cells)
 
@@ -271,16 +271,17 @@ def list_range(
     """
     begin, last = polygons
     pixels, areas = room
+    bounds = [begin]
+    while bounds[-1] < last:
+        bounds.append(min(last, end_of_room(before, bounds[-1], MAX_BLOCK_ENTRIES)))
+    most = int(np.diff(before[bounds]).max()) + TAIL
+    if len(cells) > 1 and not fits((len(cells), most), pixels.dtype, np.float32):
+        cells = cells[:1]
     if len(cells) == 1:
         before_all, starts[begin] = int(starts[begin]), 0
         prepared.engine.list_shares(begin, last, starts, pixels, areas, cells[0], prepared.piece_scratch())
         starts[begin : last + 1] += before_all
         return
-    bounds = [begin]
-    while bounds[-1] < last:
-        bounds.append(min(last, end_of_room(before, bounds[-1], MAX_BLOCK_ENTRIES)))
-    most = int(np.diff(before[bounds]).max()) + TAIL
-    check_fits((len(cells) * most,), pixels.dtype, np.float32)
     waiting, free = deque(pairwise(bounds)), deque(cells)
     taking, turn = Lock(), Condition()
     done = begin

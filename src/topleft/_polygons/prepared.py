@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft import _engine
-from topleft._base.memory import SCRATCH, Memory, check_fits
+from topleft._base.memory import SCRATCH, Memory, times_that_fit
 from topleft._base.threads import available_threads, run_parts
 from topleft._polygons.rings import RingSet
 
@@ -58,17 +58,27 @@ class Prepared:
 
         run_parts(certify_part, n, min(self.n_threads, n))
 
-    def piece_scratch(self) -> _engine.PieceScratch | None:
-        """Return memory for polygons whose rings meet, None when there are none."""
+    def pieces_shape(self) -> tuple[int, int, int] | None:
+        """Return how many parts of edges of polygons whose rings meet there can be, and the sides of their boxes."""
         is_simple = self.engine.which_are_simple()
         if is_simple.all():
             return None
         boxes = self.engine.boxes_px[~is_simple]
-        width, height = (boxes[:, 2:].astype(np.int64) - boxes[:, :2]).max(axis=0)
-        n_pieces = max(4096, self.most_edges)
-        n_words = n_pieces * (_engine.PIECE_BYTES // 8 + _engine.PIECE_WORDS) + int(height) + int(width)
-        check_fits((self.n_threads, n_words), np.int64)
-        return _engine.PieceScratch(n_pieces, height, width)
+        width, height = (boxes[:, 2:].astype(np.int64) - boxes[:, :2]).max(axis=0).tolist()
+        return max(4096, self.most_edges), height, width
+
+    def threads_with_pieces(self) -> int:
+        """Return how many threads have memory for such polygons: fewer than drawing is worth where it is scarce."""
+        shape = self.pieces_shape()
+        if shape is None:
+            return self.n_threads
+        n_words = shape[0] * (_engine.PIECE_BYTES // 8 + _engine.PIECE_WORDS) + shape[1] + shape[2]
+        return times_that_fit(self.n_threads, (n_words,), np.int64)
+
+    def piece_scratch(self) -> _engine.PieceScratch | None:
+        """Return memory for polygons whose rings meet, None when there are none."""
+        shape = self.pieces_shape()
+        return None if shape is None else _engine.PieceScratch(*shape)
 
 
 def threads_for(frame: Frame, n_points: int) -> int:
