@@ -449,7 +449,8 @@ def test_render_interrupted_leaves_whole_files_and_goes_on_with_resume(run, fold
 
 
 def children_of(pid):
-    found = subprocess.run(["ps", "-o", "pid=", "--ppid", str(pid)], capture_output=True, text=True, check=False)
+    command, plain = ["ps", "-o", "pid=", "--ppid", str(pid)], {"PATH": os.environ["PATH"]}  # no sanitizer preloaded
+    found = subprocess.run(command, capture_output=True, text=True, check=False, env=plain)
     return [int(line) for line in found.stdout.split()]
 
 
