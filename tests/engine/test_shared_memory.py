@@ -10,6 +10,7 @@ from comparing import assert_same
 
 import topleft as tl
 from topleft import scenes
+from topleft._tiles.dask_array import WindowJob
 
 SIZE = (128, 128)
 VERTICES = np.array([[-10.0, -10], [300, -10], [-10, 300]])
@@ -233,10 +234,18 @@ def moved(value):
 
 
 def arrays_of(value):
-    """The arrays that an object holds, also in tuples."""
-    held = [vars(value)]
+    """The arrays that an object holds, also in what it consists of."""
+    held, seen = [value], set()
     for each in held:
-        held += each.values() if isinstance(each, dict) else each if isinstance(each, tuple) else ()
+        if id(each) in seen:
+            continue
+        seen.add(id(each))
+        if isinstance(each, dict):
+            held += each.values()
+        elif isinstance(each, tuple | list):
+            held += each
+        elif type(each).__module__.startswith("topleft") and hasattr(each, "__dict__"):
+            held += vars(each).values()
     return [each for each in held if isinstance(each, np.ndarray)]
 
 
@@ -248,7 +257,7 @@ SENT = {
     "Texture": tl.Texture(np.arange(48, dtype=np.uint8).reshape(4, 4, 3)),
     "Environment": tl.Environment(image=np.arange(48.0).reshape(4, 4, 3) / 48),
     "Points": tl.Points(VERTICES.repeat(2, 1)[:, :3]),
-    "Instance": tl.Instance(KNOT, np.eye(4)),
+    "Scene": tl.Scene([KNOT, (KNOT, np.eye(4))]),
     "SceneFragments": tl.rasterize_mesh(tl.Scene([KNOT, KNOT]), SEEN, (40, 30)),
 }
 
@@ -262,3 +271,23 @@ def test_what_is_received_at_odd_addresses_is_aligned(name):
 
 def test_a_mesh_that_is_received_at_odd_addresses_is_drawn_alike():
     assert_same(tl.render(moved(KNOT), SEEN, (80, 60)), tl.render(KNOT, SEEN, (80, 60)))
+
+
+FLAT = np.random.default_rng(5).random((60, 2)) * 50, np.random.default_rng(6).integers(0, 60, (90, 3))
+
+
+@pytest.mark.parametrize("is_mapped", [False, True])
+@pytest.mark.parametrize("kind", ["coverage", "overdraw", "field", "fill"])
+def test_a_window_that_is_received_at_odd_addresses_is_drawn_alike(kind, is_mapped, tmp_path):
+    values = {"field": np.arange(60.0), "fill": np.arange(360, dtype=np.uint8).reshape(90, 4)}.get(kind)
+    mesh = FLAT
+    if is_mapped:
+        for name, array in zip(("v.npy", "t.npy"), FLAT, strict=True):
+            np.save(tmp_path / name, array)
+        mesh = tmp_path / "v.npy", tmp_path / "t.npy"
+    options = {"per": "triangle"} if kind == "fill" else {"extent": (0, 50, 0, 50)} if kind == "field" else {}
+    raster = tl.tiles(mesh, (50, 50), values=values, kind=kind, window=32, **options)
+    job = moved(WindowJob(raster, 1, 0))
+    assert_same(np.nan_to_num(job(), nan=-1), np.nan_to_num(raster[32:, :32], nan=-1))
+    held = arrays_of(job.payload if hasattr(job, "payload") else job.triangles)
+    assert all(array.flags.aligned for array in held)

@@ -123,7 +123,7 @@ def set_read_only(instance: object, state: dict[str, Any]) -> None:
 
 def _aligned(value: Any) -> Any:
     if isinstance(value, tuple):
-        return tuple(map(_aligned, value))
+        return getattr(value, "_make", tuple)(map(_aligned, value))
     return value.copy() if isinstance(value, np.ndarray) and not value.flags.aligned else value
 
 

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from topleft._base.arrays import set_aligned
 from topleft._base.options import Cull, parse
 from topleft._camera.camera import Camera
 from topleft._camera.lens import FLIP, Lens
@@ -105,6 +106,8 @@ class BentMesh:
     source: I64
     weights: F64
     is_outline: Bools
+
+    __setstate__ = set_aligned
 
     @property
     def wholes(self) -> npt.NDArray[np.int32]:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from topleft import _engine
+from topleft._base.arrays import set_aligned
 from topleft._base.memory import FRESH, SCRATCH, KeptMemory, check_fits, empty
 from topleft._base.options import DepthTest, Sampling, Sink, parse
 from topleft._base.threads import count_threads, run_parts
@@ -84,6 +85,8 @@ class PlacedScene:
         self._material = material  # instead of those of the meshes
         self._with_depth = with_depth
         self._may_cluster = may_cluster
+
+    __setstate__ = set_aligned
 
     def of(self, scene: Scene) -> PlacedScene:
         """Return another scene to draw, made for this picture alone, seen in the same way."""

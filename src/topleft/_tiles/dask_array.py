@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from topleft._base.arrays import as_array
 from topleft._tiles.ahead import kept_memory
 from topleft._tiles.blocks import Triangles
 from topleft._tiles.drawing import Painter, Payload, without_values
@@ -75,7 +76,8 @@ class MappedJob:
 
     def __call__(self) -> Array:
         """Draw it."""
-        payload = self.painter.gather(self.triangles, self.which, kept_memory())
+        which = as_array("which", self.which)  # bytes that were received lie anywhere
+        payload = self.painter.gather(self.triangles, which, kept_memory())
         return self.painter.window(payload, self.origin, self.size, 1, None)
 
 

@@ -18,7 +18,7 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from topleft._base.arrays import as_array, as_colors, shown
+from topleft._base.arrays import as_array, as_colors, set_aligned, shown
 from topleft._base.memory import FRESH, Memory
 from topleft._base.options import Per, Sampling, Sink, check_choice, parse
 from topleft._field.field import depth_of, dtype_of_field, fill_planes, is_per_face, nodata_of, visible
@@ -49,6 +49,8 @@ class Payload:
     corners: Array
     values: Array | None = None
 
+    __setstate__ = set_aligned
+
 
 @dataclass
 class Painter:
@@ -61,6 +63,8 @@ class Painter:
     own: ClassVar[tuple[str, ...]] = ()
     takes_values: ClassVar[bool] = False
     needs_depth: ClassVar[bool] = False
+
+    __setstate__ = set_aligned
 
     dtype: Any = field(default=np.dtype(bool), init=False)
     empty: Any = field(default=False, init=False)
