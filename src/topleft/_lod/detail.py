@@ -137,25 +137,6 @@ def choose_detail(
     mesh, camera, size = as_mesh(mesh), as_camera(camera), as_size(size)
     viewport = None if viewport is None else as_size(viewport, "viewport", smallest=1)
     tolerance = check_tolerance(tolerance)
-    return detail_of(
-        mesh, camera, size, tolerance, cull=cull, material=material, viewport=viewport, origin=origin,
-        transform=transform,
-    )  # fmt: skip
-
-
-def detail_of(
-    mesh: Mesh,
-    camera: Camera,
-    size: tuple[int, int],
-    tolerance: float,
-    *,
-    cull: str = "none",
-    material: Material | None = None,
-    viewport: tuple[int, int] | None = None,
-    origin: tuple[int, int] = (0, 0),
-    transform: npt.ArrayLike | None = None,
-) -> Detail:
-    """The level that a view needs, of checked arguments."""
     n = len(mesh.triangles)
 
     def whole(why: str, others: tuple[str, ...] = ()) -> Detail:
@@ -353,7 +334,7 @@ def level_of(
     origin: tuple[int, int] = (0, 0),
     transform: npt.ArrayLike | None = None,
 ) -> Mesh:
-    """The mesh of `detail_of`, without its words."""
+    """The mesh of `choose_detail`, of checked arguments, without its words."""
     if why_whole(mesh, camera, tolerance, cull, material):
         return mesh
     levels = levels_of(mesh)
