@@ -125,28 +125,28 @@ def test_table_that_a_thread_cannot_finish_raises(monkeypatch):
         tl.overlap([[ring] for ring in drawn], (60, 20), threads=3)
 
 
-CROSSING = [(0, 0), (5, 2**23 - 10), (0, 2**23 - 10), (5, 0)]  # eight bytes for each of its rows, in each thread
+CROSSING = [(0, 0), (5, 2**17 - 10), (0, 2**17 - 10), (5, 0)]  # eight bytes for each of its rows, in each thread
 
 
 def test_memory_for_rings_that_meet_is_asked_for_with_its_bytes(monkeypatch):
     monkeypatch.setattr(memory, "MIN_CHECKED_BYTES", 0)
-    monkeypatch.setattr(memory, "fits", lambda shape, *_: shape[0] < 2**20)
-    with pytest.raises(MemoryError, match=r"no memory for [67]\d,\d{3},\d{3} bytes, which this size or scene needs"):
-        tl.overlap([[CROSSING]], (9, 2**23))
+    monkeypatch.setattr(memory, "fits", lambda shape, *_: shape[0] < 2**16)
+    with pytest.raises(MemoryError, match=r"no memory for [12],\d{3},\d{3} bytes, which this size or scene needs"):
+        tl.overlap([[CROSSING]], (9, 2**17))
 
 
 def test_fewer_threads_draw_where_memory_is_scarce(monkeypatch):
-    expected = tl.overlap([[CROSSING], [CROSSING]], (9, 2**23), threads=1)
+    expected = tl.overlap([[CROSSING], [CROSSING]], (9, 2**17), threads=1)
     made, real = [], Prepared.piece_scratch
     monkeypatch.setattr(memory, "fits", lambda shape, *_: shape[0] < 3)
     for module in (memory, overlap):
         monkeypatch.setattr(module, "check_fits", lambda *_: None)
     monkeypatch.setattr(Prepared, "piece_scratch", lambda self: made.append(1) or real(self))
-    table = tl.overlap([[CROSSING]] * 2, (9, 2**23), threads=8)
+    table = tl.overlap([[CROSSING]] * 2, (9, 2**17), threads=8)
     assert (table.areas == expected.areas).all()
     assert len(made) == 2
     monkeypatch.setattr(overlap, "fits", lambda *_: False)  # for rows of its own
-    table = tl.overlap([[CROSSING]] * 2, (9, 2**23), threads=8)
+    table = tl.overlap([[CROSSING]] * 2, (9, 2**17), threads=8)
     assert (table.areas == expected.areas).all()
     assert len(made) == 3
 

@@ -1,7 +1,7 @@
 """Exact areas: within the bound that docs/design/area.md proves, and to the last bit where they must be."""
 
 from fractions import Fraction
-from functools import lru_cache
+from functools import cache, lru_cache
 
 import numpy as np
 import pytest
@@ -338,6 +338,11 @@ LARGE = np.array(
 LARGE_TRIANGLES = np.arange(9).reshape(3, 3)
 
 
+@cache
+def areas_of_large_shapes():
+    return np.array(sum(ref.area(LARGE, [row], (411, 97)) for row in LARGE_TRIANGLES.tolist()), float)
+
+
 @ON_EACH_ISA
 @pytest.mark.parametrize("threads", [1, 3])
 @pytest.mark.parametrize("verb", [tl.coverage, tl.overdraw])
@@ -347,11 +352,10 @@ def test_large_shapes_have_the_same_areas_in_bands_of_any_height(isa, threads, v
         return verb(LARGE, LARGE_TRIANGLES, (411, 97), sampling="area", threads=threads)
 
     with on(isa):
-        expected = sum(ref.area(LARGE, [row], (411, 97)) for row in LARGE_TRIANGLES.tolist())
         whole = draw_in(1 << 30)
         for n_bytes in (1, 6000, 20_000):
             assert_same(draw_in(n_bytes), whole)
-    expected = np.array(expected, float)
+    expected = areas_of_large_shapes()
     error = np.abs((np.minimum(expected, 1) if verb is tl.coverage else expected) - whole).max()
     assert error < 2**-24 * (0.501 * 9 + 3)  # three edges of each triangle, and the sum
 

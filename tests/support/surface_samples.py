@@ -3,8 +3,8 @@
 import numpy as np
 
 
-def nearest_squared(point, corners):
-    """Squared distance of a point from triangles (T, 3, 3), the smallest: inside, or on the three sides, in float64."""
+def squared(points, corners):
+    """Squared distances (N,) of points (N, 3) from a triangle each (N, 3, 3), inside or on the sides, in float64."""
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     across = np.cross(b - a, c - a)
     area = (across**2).sum(axis=1)
@@ -12,12 +12,12 @@ def nearest_squared(point, corners):
     for p, q in ((a, b), (b, c), (c, a)):
         side = q - p
         length = (side**2).sum(axis=1)
-        t = np.divide(((point - p) * side).sum(axis=1), length, out=np.zeros(len(p)), where=length > 0).clip(0, 1)
-        best = np.minimum(best, ((point - p - t[:, None] * side) ** 2).sum(axis=1))
-    parts = [(np.cross(q - p, point - p) * across).sum(axis=1) for p, q in ((a, b), (b, c), (c, a))]
+        t = np.divide(((points - p) * side).sum(axis=1), length, out=np.zeros(len(p)), where=length > 0).clip(0, 1)
+        best = np.minimum(best, ((points - p - t[:, None] * side) ** 2).sum(axis=1))
+    parts = [(np.cross(q - p, points - p) * across).sum(axis=1) for p, q in ((a, b), (b, c), (c, a))]
     is_above = (area > 0) & (np.min(parts, axis=0) >= 0)
-    height = np.divide(((point - a) * across).sum(axis=1), area, out=np.zeros(len(a)), where=area > 0)
-    return np.where(is_above, np.minimum(best, height**2 * area), best).min()
+    height = np.divide(((points - a) * across).sum(axis=1), area, out=np.zeros(len(a)), where=area > 0)
+    return np.where(is_above, np.minimum(best, height**2 * area), best)
 
 
 def points_on(corners, n):
@@ -28,8 +28,22 @@ def points_on(corners, n):
 
 def sampled_distance(one, other, n=6):
     """The largest distance of sample points of one surface from the other, both ways; both (T, 3, 3)."""
-    ways = ((one, other), (other, one))
-    return max(np.sqrt(nearest_squared(point, target)) for source, target in ways for point in points_on(source, n))
+    ways = (one, other), (other, one)
+    return max(np.sqrt(largest_squared(points_on(source, n), target)) for source, target in ways)
+
+
+def largest_squared(points, corners):
+    """The largest of the squared distances of points from triangles; of each point from those that may be nearest."""
+    centers = corners.mean(axis=1)
+    radii = np.linalg.norm(corners - centers[:, None], axis=2).max(axis=1)
+    largest = 0.0
+    for some in np.array_split(points, len(points) * len(corners) // 500_000 + 1):
+        to_centers = np.linalg.norm(centers - some[:, None], axis=2)
+        near = to_centers - radii <= to_centers.min(axis=1, keepdims=True) * (1 + 1e-9)  # a center is on its triangle
+        which, triangle = np.nonzero(near)
+        starts = np.searchsorted(which, np.arange(len(some)))
+        largest = max(largest, np.minimum.reduceat(squared(some[which], corners[triangle]), starts).max())
+    return largest
 
 
 def corners_of(mesh):
