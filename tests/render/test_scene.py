@@ -8,6 +8,7 @@ from scene_cases import CAMERA, CUBE, SIZE, SPHERE, joined, many, told_apart
 
 import topleft as tl
 from topleft._camera.camera import Camera
+from topleft._raster.snap import Snapped
 from topleft._render import instances
 from topleft._render.fragments import SceneFragments
 from topleft._render.render import rasterize_mesh
@@ -241,3 +242,13 @@ def test_scene_unknown_option_is_refused():
         rasterize_mesh(many(), CAMERA, SIZE, sampling="area")
     with pytest.raises(ValueError, match="method 'bresenham_scanline' has no depth"):
         rasterize_mesh(many(), CAMERA, SIZE, method="bresenham_scanline")
+
+
+def test_small_instances_are_counted_once(monkeypatch):
+    """Not again for each instance that follows in a chunk."""
+    counted = []
+    kept = Snapped.n_vertices.fget
+    monkeypatch.setattr(Snapped, "n_vertices", property(lambda self: counted.append(1) or kept(self)))
+    scene = tl.Scene([CUBE] * 300)
+    tl.rasterize_mesh(scene, CAMERA, SIZE)
+    assert len(counted) < 10 * len(scene)

@@ -23,10 +23,10 @@ CUBE = "v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\nv -1 -1 1\nv 1 -1 1\nv 1 1 1
 
 @pytest.fixture(scope="module")
 def record(tmp_path_factory):
-    """Every scene and a cube, at a fiftieth of the size."""
+    """Every scene and a cube, at a hundredth of the size."""
     path = tmp_path_factory.mktemp("static") / "cube.obj"
     path.write_text(CUBE)
-    options = static.Options(files=[path], rounds=1, seconds=0.0, most_seconds=0.0, scale=SCALE)
+    options = static.Options(files=[path], rounds=1, seconds=0.0, most_seconds=0.0, scale=SCALE / 2)
     return static.run_static(options)
 
 

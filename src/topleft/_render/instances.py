@@ -145,11 +145,13 @@ class PlacedScene:
     def chunks(self) -> Iterator[list[Snapped]]:
         """Yield the instances in their order, as many at a time as `VERTICES_AT_ONCE` allows."""
         chunk: list[Snapped] = []
+        n_vertices = 0
         for i in range(len(self.scene)):
             chunk.append(self.snap(i))
-            if sum(snapped.n_vertices for snapped in chunk) >= VERTICES_AT_ONCE:
+            n_vertices += chunk[-1].n_vertices
+            if n_vertices >= VERTICES_AT_ONCE:
                 yield chunk
-                chunk = []
+                chunk, n_vertices = [], 0
         if chunk:
             yield chunk
 
