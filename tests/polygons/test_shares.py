@@ -129,7 +129,6 @@ CROSSING = [(0, 0), (5, 2**17 - 10), (0, 2**17 - 10), (5, 0)]  # eight bytes for
 
 
 def test_memory_for_rings_that_meet_is_asked_for_with_its_bytes(monkeypatch):
-    monkeypatch.setattr(memory, "MIN_CHECKED_BYTES", 0)
     monkeypatch.setattr(memory, "fits", lambda shape, *_: shape[0] < 2**16)
     with pytest.raises(MemoryError, match=r"no memory for [12],\d{3},\d{3} bytes, which this size or scene needs"):
         tl.overlap([[CROSSING]], (9, 2**17))

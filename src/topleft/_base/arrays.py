@@ -16,6 +16,7 @@ from topleft._base.threads import run_parts
 
 __all__ = [
     "apart_from",
+    "as_aligned",
     "as_background",
     "as_checked_triangles",
     "as_colors",
@@ -73,6 +74,11 @@ def as_array(name: str, values: ArrayLike) -> NDArray[Any]:
         if hasattr(first, "__dlpack_device__"):
             array_of_tensor(name, first)
         raise TypeError(f"{name} must be array_like, got {shown(values)} ({error})") from None
+    return as_aligned(array)
+
+
+def as_aligned(array: NDArray[Any]) -> NDArray[Any]:
+    """Return an array, copied unless it is aligned for the kernels."""
     return array if array.flags.aligned else array.copy()
 
 
@@ -124,7 +130,7 @@ def set_read_only(instance: object, state: dict[str, Any]) -> None:
 def _aligned(value: Any) -> Any:
     if isinstance(value, tuple):
         return getattr(value, "_make", tuple)(map(_aligned, value))
-    return value.copy() if isinstance(value, np.ndarray) and not value.flags.aligned else value
+    return as_aligned(value) if isinstance(value, np.ndarray) else value
 
 
 def as_vertices(values: ArrayLike, *, has_transform: bool) -> NDArray[Any]:

@@ -156,10 +156,12 @@ def fits(shape: tuple[int, ...], *dtypes: DTypeLike) -> bool:
     half that size and ends the process when they are written.
     """
     n_bytes = sum(_size(shape, dtype) for dtype in dtypes)
-    try:
-        return n_bytes < MIN_CHECKED_BYTES or np.empty(n_bytes, np.uint8).nbytes == n_bytes
-    except (MemoryError, ValueError):
-        return False
+    if n_bytes >= MIN_CHECKED_BYTES:
+        try:
+            np.empty(n_bytes, np.uint8)
+        except (MemoryError, ValueError):
+            return False
+    return True
 
 
 def check_fits(shape: tuple[int, ...], *dtypes: DTypeLike) -> None:

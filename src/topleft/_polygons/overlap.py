@@ -222,6 +222,9 @@ def list_areas(prepared: Prepared, used: list[Chunk]) -> Overlap:
     if not n or 0 in size:
         return Overlap(starts, np.empty(0, dtype), np.empty(0, np.float32), size)
     n_threads = max(1, min(prepared.threads_with_pieces(), n))
+    most = max(MAX_BLOCK_ENTRIES, int((widths * heights).max())) + TAIL  # that a thread keeps for itself
+    if n_threads > 1 and not fits((n_threads, most), dtype, np.float32):
+        n_threads = 1
     n_cells = cells_for(prepared, size[1])
     cells = SCRATCH.constant("cells", n_cells * n_threads, _engine.CELL_CLEAR).reshape(n_threads, n_cells)
 
@@ -271,17 +274,15 @@ def list_range(
     """
     begin, last = polygons
     pixels, areas = room
-    bounds = [begin]
-    while bounds[-1] < last:
-        bounds.append(min(last, end_of_room(before, bounds[-1], MAX_BLOCK_ENTRIES)))
-    most = int(np.diff(before[bounds]).max()) + TAIL
-    if len(cells) > 1 and not fits((len(cells), most), pixels.dtype, np.float32):
-        cells = cells[:1]
     if len(cells) == 1:
         before_all, starts[begin] = int(starts[begin]), 0
         prepared.engine.list_shares(begin, last, starts, pixels, areas, cells[0], prepared.piece_scratch())
         starts[begin : last + 1] += before_all
         return
+    bounds = [begin]
+    while bounds[-1] < last:
+        bounds.append(min(last, end_of_room(before, bounds[-1], MAX_BLOCK_ENTRIES)))
+    most = int(np.diff(before[bounds]).max()) + TAIL
     waiting, free = deque(pairwise(bounds)), deque(cells)
     taking, turn = Lock(), Condition()
     done = begin

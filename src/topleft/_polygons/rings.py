@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from topleft._base.arrays import apart_from, as_array
+from topleft._base.arrays import apart_from, as_aligned, as_array
 
 __all__ = ["RingSet", "as_rings", "rings_of_triangles"]
 
@@ -89,7 +89,7 @@ def as_points(values: Any, name: str) -> npt.NDArray[Any]:
     single = array.dtype.kind == "f" and array.dtype.itemsize <= 4
     dtype = np.int64 if array.dtype.kind in "iu" else np.float32 if single else np.float64
     array = np.ascontiguousarray(array, dtype)
-    return array if array.flags.aligned else array.copy()
+    return as_aligned(array)
 
 
 def _without_tensors(values: Any) -> Any:

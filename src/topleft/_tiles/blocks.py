@@ -23,7 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft import _engine
-from topleft._base.arrays import INT32_MAX, as_array, shown
+from topleft._base.arrays import INT32_MAX, as_aligned, as_array, shown
 from topleft._base.memory import FRESH, Memory
 from topleft._io.load import load
 from topleft._io.ply import mapped_elements
@@ -190,7 +190,7 @@ def sent(array: Array) -> Array | MappedArray:
 def received(array: Array | MappedArray) -> Array:
     """Return the array that was sent."""
     if not isinstance(array, MappedArray):
-        return array if array.flags.aligned else array.copy()
+        return as_aligned(array)
     n_bytes = sum((n - 1) * step for n, step in zip(array.shape, array.strides, strict=True)) + array.dtype.itemsize
     if 0 in array.shape:
         return np.empty(array.shape, array.dtype)

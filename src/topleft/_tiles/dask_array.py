@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from topleft._base.arrays import as_array
+from topleft._base.arrays import as_aligned
 from topleft._tiles.ahead import kept_memory
 from topleft._tiles.blocks import Triangles
 from topleft._tiles.drawing import Painter, Payload, without_values
@@ -76,7 +76,7 @@ class MappedJob:
 
     def __call__(self) -> Array:
         """Draw it."""
-        which = as_array("which", self.which)  # bytes that were received lie anywhere
+        which = as_aligned(self.which)  # bytes that were received lie anywhere
         payload = self.painter.gather(self.triangles, which, kept_memory())
         return self.painter.window(payload, self.origin, self.size, 1, None)
 
