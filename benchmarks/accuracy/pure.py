@@ -33,7 +33,7 @@ class Twin:
 
             return reference.overdraw(*scene, size, subpixel_bits=self.entry.bits)
         module, _, variant = self.entry.method.partition("/")
-        draw: Callable[..., np.ndarray] = import_module(f"topleft.methods.classics.{module}_pure").overdraw
+        draw: Callable[..., np.ndarray] = import_module(f"topleft.methods.twins.{module}").overdraw
         return draw(*scene, size, variant)
 
 

@@ -12,7 +12,7 @@ from topleft._explore import trace as traces
 from topleft._explore.session import Content, Session
 from topleft._explore.trace import TRACED, trace
 from topleft.methods import CLASSICS, METHODS, find_method, reference
-from topleft.methods.walks_pure import overdraw as walk
+from topleft.methods.twins.walks import overdraw as walk
 
 SIZE = (21, 19)
 QUAD = [[2.0, 2.0], [18.5, 3.25], [4.0, 16.75], [17.0, 15.0]]

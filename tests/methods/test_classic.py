@@ -26,7 +26,7 @@ def soup(seed, n=8, low=-12, high=36, *, whole=False):
 @pytest.mark.parametrize("name", TWINS)
 def test_kernel_equals_its_pure_twin(name):
     module, _, variant = name.partition("/")
-    twin = import_module(f"topleft.methods.classics.{module}_pure").overdraw
+    twin = import_module(f"topleft.methods.twins.{module}").overdraw
     size = (25, 23)
     for seed in range(12):
         small = soup(seed, low=0, high=4, whole=True)  # mostly without area

@@ -148,9 +148,9 @@ def find_twin(name: str, subpixel_bits: int) -> Callable[..., NDArray[np.int32]]
         raise ValueError(f"method must be one of {', '.join(map(repr, TRACED))} to be traced, got {name!r}")
     module, _, variant = name.partition("/")
     if method.code is not None:
-        module, variant = "topleft.methods.walks_pure", name
+        module, variant = "topleft.methods.twins.walks", name
     else:
-        module = f"topleft.methods.classics.{module}_pure"
+        module = f"topleft.methods.twins.{module}"
     draw = import_module(module).overdraw
     options = {"subpixel_bits": subpixel_bits} if method.code is not None or method.has_subpixel_bits else {}
 

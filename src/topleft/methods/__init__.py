@@ -3,9 +3,9 @@
 `METHODS` are the production ones: exact, identical buffers. `CLASSICS` are those of the literature, as published, to be
 compared; a variant's name stands after a slash. Their kernels are imported when one is first asked for.
 
-classics/    draws triangles as the literature does: a compiled kernel for each classic, and a twin in Python
+classics/    draws triangles as the literature does: a compiled kernel for each classic
 reference/   draws triangles exactly and slowly, in integers and fractions: what all others are held against
-walks_pure.py  the two production walkers in Python integers
+twins/       draws as the classics and the production walkers do, in Python, step by step
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from topleft.methods.classics._pure import Pixel, Record, corners_of, new_picture, to_pixels
+from topleft.methods.twins._picture import Pixel, Record, corners_of, new_picture, to_pixels
 
 
 def lerp(a: int, b: int, i: int, height: int) -> int:

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from topleft.methods.classics._pure import Pixel, Record, Span, corners_of, new_picture
+from topleft.methods.twins._picture import Pixel, Record, Span, corners_of, new_picture
 
 
 class Walk(NamedTuple):

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from topleft.methods.classics._pure import Pixel, Record, corners_of, new_picture
-from topleft.methods.classics.edge_increment_pure import Edges, Triple, add, note_set_up, set_up
+from topleft.methods.twins._picture import Pixel, Record, corners_of, new_picture
+from topleft.methods.twins.edge_increment import Edges, Triple, add, note_set_up, set_up
 
 
 def is_behind(w: Triple, step_x: Triple, step_y: Triple | None, way: int) -> bool:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from topleft.methods.classics._pure import Pixel, Record, Span, corners_of, new_picture, to_pixels
+from topleft.methods.twins._picture import Pixel, Record, Span, corners_of, new_picture, to_pixels
 
 
 def line(a: Pixel, b: Pixel, record: Record | None = None) -> Iterator[Pixel]:
