@@ -1,0 +1,57 @@
+"""Arrays that another process writes to during a call: any picture or error will do, a crash will not."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from changing_arrays import Changing, between_closed_pages
+from fuzzing import Draw, FromRandom
+
+FUZZER = Path(__file__).parents[1] / "support/hostile/changing.py"
+
+pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="fork and mprotect are POSIX")
+
+
+def test_calls_whose_arrays_change_do_not_crash():
+    ended = subprocess.run([sys.executable, FUZZER, "--cases", "300"], capture_output=True, text=True)
+    assert ended.returncode == 0, f"{ended.stdout[-1500:]}\n{ended.stderr[:3000]}"
+    assert "300 cases, none that must not be" in ended.stdout
+
+
+def test_arrays_change_while_a_call_may_read_them_and_stay_within_their_memory():
+    changing = Changing(Draw(FromRandom(0)))
+    shared = [changing.numbers(str(i), (50, 3), 0, 1) for i in range(8)]
+    seen = [set() for _ in shared]
+    with changing.changed():
+        for _ in range(2000):
+            for contents, array in zip(seen, shared, strict=True):
+                contents.add(array.tobytes())
+    assert sum(len(contents) > 1 for contents in seen) >= 4
+
+
+@pytest.mark.parametrize("is_at_end", [False, True])
+def test_a_step_beside_a_shared_array_ends_the_program(is_at_end):
+    code = f"""
+import sys; sys.path.insert(0, {str(FUZZER.parent)!r})
+import ctypes, numpy as np
+from changing_arrays import between_closed_pages
+own, _ = between_closed_pages(np.arange(5.0), is_at_end={is_at_end})
+print(ctypes.c_double.from_address(own.ctypes.data + {8 * 4 if is_at_end else 0}).value, flush=True)
+ctypes.c_double.from_address(own.ctypes.data + {8 * 5 if is_at_end else -8}).value
+"""
+    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert ended.stdout == ("4.0\n" if is_at_end else "0.0\n")
+    assert ended.returncode != 0
+
+
+def test_what_is_written_beside_a_shared_array_is_found():
+    changing = Changing(Draw(FromRandom(0)))
+    own = changing.share("numbers", np.arange(5.0))
+    _, beside = between_closed_pages(own, is_at_end=True)
+    assert len(beside) % 8 == 0
+    assert not beside.any()
+    with pytest.raises(AssertionError, match="beside"), changing.changed():
+        changing._beside[0][0] = 1
