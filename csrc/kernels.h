@@ -51,7 +51,7 @@ typedef struct tl_kernels {
                             const tl_target *target, int64_t step, int64_t *n_hidden);
 
     /* Lowest index of a TL_BAD vertex that a triangle uses, -1 if there is none. */
-    int64_t (*first_bad)(const tl_vertex *vertices, const int32_t *triangles, int64_t n_triangles);
+    int64_t (*first_bad)(const tl_vertex *vertices, int64_t n_vertices, const int32_t *triangles, int64_t n_triangles);
 
     /* Lowest row with an index outside [0, n_vertices), -1 if there is none. */
     int64_t (*first_bad_row)(const int32_t *triangles, int64_t n_triangles, int64_t n_vertices);

@@ -125,7 +125,8 @@ static void push_triangle(area_state *s, const tl_vertex_set *set, const int32_t
 /* Triangle i, or its pieces, by itself. */
 static __attribute__((noinline)) void push_alone(area_state *s, int64_t i)
 {
-    const triangle_parts parts = parts_of(s->snapped, i);
+    int32_t own[3];
+    const triangle_parts parts = parts_of(s->snapped, i, own);
     for (int k = 0; k < parts.n; k++)
         push_triangle(s, &parts.set, parts.corners + 3 * k);
 }
@@ -243,10 +244,10 @@ static int64_t draw_area(const tl_snapped *snapped, const tl_window *window, con
     s.max_extent = 1 << (bits + TL_MAX_EDGE_BITS < 25 ? bits + TL_MAX_EDGE_BITS : 25);
     memset(s.n, 0, sizeof s.n);
     const tl_share all = {.end = snapped->n_triangles};
-    int32_t tail[3 * TL_LANES];
+    int32_t corners[3 * TL_LANES];
     for (int64_t i = 0; i < snapped->n_triangles && s.bad_row < 0 && !tl_is_given_up(window); i += TL_LANES) {
         tl_count_work(window, TL_SETUP_PX * TL_LANES);
-        push_batch(&s, i, share_corners(snapped, &all, i, tail), vm_first(snapped->n_triangles - i));
+        push_batch(&s, i, share_corners(snapped, &all, i, corners), vm_first(snapped->n_triangles - i));
     }
     for (int kind = 0; kind < TL_EDGES_NONE; kind++)
         flush_edges(&s, kind, 1);

@@ -33,7 +33,8 @@ typedef struct {
 /* Triangle i, or its pieces, by itself. */
 static __attribute__((noinline)) void blend_alone(blend_state *b, int64_t i)
 {
-    const triangle_parts parts = parts_of(b->snapped, i);
+    int32_t own[3];
+    const triangle_parts parts = parts_of(b->snapped, i, own);
     if (!parts.n || (b->is_flat && !begin_flat(b, i)))
         return;
     for (int k = 0; k < parts.n; k++) {
@@ -53,6 +54,7 @@ TL_INLINE void setup_blend_rows(const lane_triangles *t, vi n_cols, int n_rows, 
     for (int row = 0; row < n_rows; row++) {
         vi begin, end;
         next_row(&e, n_cols, &begin, &end);
+        begin = vi_min(begin, n_cols), end = vi_max(end, vi_set1(0)); /* corners may not be those of the box any more */
         vi_store(rows->first[row], vi_add(sample, begin));
         vi_store(rows->n[row], vi_sub(end, begin));
         sample = vi_add(sample, stride);
@@ -79,7 +81,7 @@ static __attribute__((noinline)) void flush_blend(blend_pass *p)
         for (int k = 0; k < end; k++) {
             const int64_t id = q->id[i + k];
             if (!b->is_flat)
-                begin_gouraud(b, id, &b->snapped->mesh, b->snapped->triangles + 3 * id, 0);
+                begin_gouraud_of_mesh(b, id);
             else if (!begin_flat(b, id))
                 continue;
             mix_runs(b, &rows.first[0][k], &rows.n[0][k], TL_MAX_LANES, q->size[i + k] >> 16);
@@ -127,8 +129,8 @@ static int64_t blend_batches(blend_pass *p)
     batch_state *s = &p->batch;
     const tl_snapped *snapped = s->snapped;
     const tl_share all = {.first = 0, .end = snapped->n_triangles};
+    int32_t corners[3 * TL_LANES];
     for (int64_t i = 0; i < all.end && s->bad_row < 0 && !tl_is_given_up(p->mix.window); i += TL_LANES) {
-        int32_t corners[3 * TL_LANES];
         tl_count_work(p->mix.window, TL_SETUP_PX * TL_LANES);
         blend_batch(p, share_corners(snapped, &all, i, corners), vi_add(vi_set1((int32_t)i), vi_iota()),
                     vm_first(all.end - i));

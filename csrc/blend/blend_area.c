@@ -53,7 +53,7 @@ static __attribute__((noinline)) void flush_atlas(area_pass *p)
         if (b->is_flat && !begin_flat(b, id))
             continue;
         if (!b->is_flat)
-            begin_gouraud(b, id, &b->snapped->mesh, b->snapped->triangles + 3 * id, 0);
+            begin_gouraud_of_mesh(b, id);
         blend_block(b, &(cell_block){
                            .cells = cells + (int64_t)(p->top[k] + first_row) * TL_ATLAS_COLS,
                            .at = (row + first_row) * b->stride + col,
@@ -174,8 +174,8 @@ static int64_t blend_areas(blend_state *b)
     p.area.snapped = snapped, p.area.window = &atlas, p.area.bad_row = -1;
     memset(p.area.n, 0, sizeof p.area.n);
     const tl_share all = {.first = 0, .end = snapped->n_triangles};
+    int32_t corners[3 * TL_LANES];
     for (int64_t i = 0; i < all.end && p.area.bad_row < 0 && !tl_is_given_up(window); i += TL_LANES) {
-        int32_t corners[3 * TL_LANES];
         tl_count_work(window, TL_SETUP_PX * TL_LANES);
         blend_area_batch(&p, i, share_corners(snapped, &all, i, corners), vm_first(all.end - i));
     }

@@ -175,6 +175,7 @@ static __attribute__((noinline)) int64_t blend_exact(const blend_state *ready)
     p->mix = *ready, p->mix.target.pixels = &p->mix;
     const tl_snapped *snapped = ready->snapped, drawn = drawn_mesh(snapped);
     const tl_share all = {.first = 0, .end = snapped->n_triangles};
+    int32_t corners[3 * TL_LANES];
     tl_exact_counts counts = {0, 0, 0, 0, 0, 0};
     start_exact(s, &drawn, p->mix.window, &p->mix.target, &counts);
     if (snapped->mesh.exact->pieces || !is_near_0(s->window)) {
@@ -182,7 +183,6 @@ static __attribute__((noinline)) int64_t blend_exact(const blend_state *ready)
         return s->bad_row;
     }
     for (int64_t i = 0; i < all.end && s->bad_row < 0 && !tl_is_given_up(s->window); i += TL_LANES) {
-        int32_t corners[3 * TL_LANES];
         tl_count_work(s->window, TL_SETUP_PX * TL_LANES);
         blend_exact_batch(p, share_corners(snapped, &all, i, corners), vi_add(vi_set1((int32_t)i), vi_iota()),
                           vm_first(all.end - i));

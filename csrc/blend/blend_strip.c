@@ -298,7 +298,8 @@ static void blend_strip(blend_state *b, const tl_triangle *pieces, int64_t n, in
 static __attribute__((noinline)) void blend_area_alone(blend_state *b, int64_t i)
 {
     const tl_window *window = b->window;
-    const triangle_parts parts = parts_of(b->snapped, i);
+    int32_t own[3];
+    const triangle_parts parts = parts_of(b->snapped, i, own);
     int64_t n = 0, top = INT64_MAX, bottom = INT64_MIN, left = INT64_MAX, right = INT64_MIN;
     int is_narrow = 1;
     tl_triangle t[TL_MAX_PIECES];

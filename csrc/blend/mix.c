@@ -56,12 +56,21 @@ static void begin_gouraud(blend_state *b, int64_t id, const tl_vertex_set *set, 
             is_piece ? b->snapped->pieces->weights + 3 * (int64_t)b->resolve.triangle.corner[k] : NULL;
 }
 
+/* The same of a triangle of the mesh that no plane cuts. */
+static void begin_gouraud_of_mesh(blend_state *b, int64_t id)
+{
+    int32_t corners[3];
+    read_corners(b->snapped, id, corners);
+    begin_gouraud(b, id, &b->snapped->mesh, corners, 0);
+}
+
 /* The same of a triangle of the mesh, or of a piece of it, whose vertices are not snapped. */
 static void begin_exact_gouraud(blend_state *b, int64_t id, int64_t piece)
 {
     const tl_exact_points *points = b->snapped->mesh.exact;
-    const int32_t *corners = b->snapped->triangles + 3 * id;
     resolve_state *s = &b->resolve;
+    int32_t corners[3];
+    read_corners(b->snapped, id, corners);
     b->whole_mode = b->mode == TL_MIX_REPLACE_STRAIGHT ? TL_MIX_REPLACE : b->mode;
     b->id = id;
     s->exact = &b->snapped->mesh;
@@ -152,12 +161,14 @@ static __attribute__((noinline)) void color_run(blend_state *b, int64_t at, int 
     void *out = canvas->is_u8 ? (void *)bytes : (void *)b->source_f32;
     const int pixel_bytes = b->n_channels * (canvas->is_u8 ? 1 : 4);
     if (b->resolve.piece[0]) {
+        int32_t corners[3];
+        read_corners(b->snapped, b->id, corners);
         for (int k = 0; k < n; k++) {
             const int64_t x_px = col + k + b->window->x_px, y_px = row + b->window->y_px;
             if (canvas->is_area)
                 find_piece(b, x_px, y_px);
-            paint_piece(&b->resolve, b->snapped->triangles + 3 * b->id, x_px, y_px, b->window->subpixel_bits,
-                        canvas->colors, b->n_channels, canvas->is_u8, (char *)out + k * pixel_bytes);
+            paint_piece(&b->resolve, corners, x_px, y_px, b->window->subpixel_bits, canvas->colors, b->n_channels,
+                        canvas->is_u8, (char *)out + k * pixel_bytes);
         }
     } else if (canvas->is_area) {
         color_partly_covered(b, row, col, n, out);

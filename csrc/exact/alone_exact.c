@@ -13,6 +13,7 @@
 
 #include "topleft.h"
 #include "lanes/lanes.h"
+#include "vertex/corners.h"
 #include "exact/rows_exact.c"
 #include "exact/setup_exact.c"
 #include "exact/sign.c"
@@ -278,10 +279,12 @@ TL_INLINE void put_lone_depths(const tl_target *target, tl_sink sink, const lone
 /* Sets up triangle i; returns whether there is anything to draw.  A vertex that is not finite ends the pass. */
 static int setup_lone(exact_state *s, int32_t i, lone_triangle *t, tl_test test, int with_depth)
 {
-    const int32_t *corners = s->mesh->triangles + 3 * (int64_t)i;
     asked_triangle *e = &t->edges;
     exact_point *p = e->corners;
-    load_turned(s, i, 0, p);
+    int32_t corners[3];
+    read_corners(s->mesh, i, corners);
+    for (int k = 0; k < 3; k++)
+        p[k] = point_of(s->points, corners[k]);
     const double x0 = least_of(p[0].x, p[1].x, p[2].x), x1 = most_of(p[0].x, p[1].x, p[2].x);
     const double y0 = least_of(p[0].y, p[1].y, p[2].y), y1 = most_of(p[0].y, p[1].y, p[2].y);
     for (int k = 0; k < 3; k++)
@@ -297,7 +300,10 @@ static int setup_lone(exact_state *s, int32_t i, lone_triangle *t, tl_test test,
     const int sign = edge_sign(p[0], p[1], p[2], s->counts), second = sign < 0 ? 2 : 1;
     if (is_culled(sign, s->mesh->cull))
         return 0;
-    load_turned(s, i, sign < 0, p);
+    if (sign < 0) {
+        const exact_point first = p[1];
+        p[1] = p[2], p[2] = first;
+    }
     e->sample_x = (double)t->col + s->centre_x, e->sample_y = (double)t->row + s->centre_y;
     t->id = name_of(s->mesh, i);
     if (!setup_on_grid(t))

@@ -212,19 +212,9 @@ TL_INLINE void draw_tiny_exact(exact_state *s, tl_sink sink, exact_batch *b, vi 
     s->fragments.n = draw_exact_boxes(s, sink, t, b->n_cols, b->n_rows, 2, s->fragments.n);
 }
 
-/* The vertices of triangles that come later. */
-TL_INLINE void fetch_points(const exact_state *s, const int32_t *corners)
-{
-    const uintptr_t points = (uintptr_t)s->points->points, n_bytes = (uintptr_t)s->points->stride * sizeof(double);
-    for (int k = 2; k < 3 * TL_LANES; k += 6) /* indices that were not checked: addresses, and no pointers */
-        __builtin_prefetch((const void *)(points + (uint32_t)corners[k] * n_bytes));
-}
-
 TL_INLINE void draw_exact_batch(exact_state *s, tl_sink sink, const int32_t *corners, vi id, vm live)
 {
     exact_batch b;
-    for (int k = 0; k < 3 * TL_LANES; k += 16)
-        __builtin_prefetch(corners + 12 * 48 + k);
     if (!load_exact_batch(s, sink, corners, id, live, &b))
         return;
     if (s->share->others)
@@ -311,24 +301,24 @@ TL_INLINE void draw_exact_scene(const tl_snapped *mesh, int64_t n_whole, const t
 {
     const int takes_lanes = is_near_0(window);
     exact_state s;
+    int32_t own[3 * TL_LANES];
     int is_given_up = 0;
     start_exact(&s, mesh, window, target, counts);
     s.share = share;
     const int counts_pieces = target->sink == TL_SINK_COUNT && window->test != TL_TEST_SAMPLE;
     const int64_t end = counts_pieces ? min64(share->end, n_whole) : share->end;
     for (int64_t i = share->first; i < end && s.bad_row < 0 && !is_given_up; i += TL_LANES) {
-        int32_t corners[3 * TL_LANES];
         tl_count_work(window, TL_SETUP_PX * TL_LANES);
         is_given_up = tl_is_given_up(window);
         const vm live = vm_first(end - i);
         const vi id = share->ids ? vi_load_masked(live, share->ids + i) : vi_add(vi_set1((int32_t)i), vi_iota());
-        const int32_t *batch = share_corners(mesh, share, i, corners);
+        const int32_t *corners = share_corners(mesh, share, i, own);
         if (!share->ids && i + 5 * TL_LANES <= end)
-            fetch_points(&s, batch + 3 * 4 * TL_LANES);
+            fetch_rows(s.points->points, s.points->stride * sizeof(double), mesh->triangles + 3 * (i + 4 * TL_LANES));
         if (takes_lanes)
-            draw_exact_batch(&s, sink, batch, id, live);
+            draw_exact_batch(&s, sink, corners, id, live);
         else
-            draw_far_batch(&s, batch, id, live);
+            draw_far_batch(&s, corners, id, live);
         if (__builtin_expect(s.n_slivers > 0, 0))
             draw_slivers(&s);
     }
@@ -353,6 +343,7 @@ static tl_snapped drawn_mesh(const tl_snapped *snapped)
     const tl_exact_points *points = snapped->mesh.exact;
     tl_snapped drawn = *snapped;
     drawn.triangles = points->triangles, drawn.n_triangles = points->n_triangles;
+    drawn.mesh.n_vertices = points->n_points;
     drawn.names = points->names ? points->names : snapped->names; /* pieces are of clip space, where none are given */
     return drawn;
 }

@@ -12,6 +12,7 @@
 #include "topleft.h"
 #include "lanes/lanes.h"
 #include "vertex/clip.c"
+#include "vertex/corners.h"
 #include "vertex/project.c"
 #include "exact/sign.c"
 
@@ -104,14 +105,19 @@ static void clip_points(const tl_source *source, const double *points, const int
                         const tl_view *view, tl_exact_pieces *pieces)
 {
     clip_corner polygon[TL_MAX_CORNERS];
+    const int64_t point_room = pieces->n_points, room = pieces->n_pieces;
     pieces->n_points = pieces->n_pieces = 0;
     for (int64_t i = 0; i < n_triangles; i++) {
-        const int32_t *corners = triangles + 3 * i;
+        int32_t corners[3];
         int is_cut = 0;
-        for (int k = 0; k < 3; k++)
+        for (int k = 0; k < 3; k++) {
+            corners[k] = corner_within(triangles[3 * i + k], source->n);
             is_cut |= isnan(points[TL_PLACED * (int64_t)corners[k]]);
+        }
         const int n = is_cut ? clip_triangle(source, corners, view, polygon) : 0;
         if (n && pieces->points) {
+            if (pieces->n_points + n > point_room || pieces->n_pieces + n - 2 > room)
+                return; /* as clip */
             append_exact_pieces(pieces, polygon, n, (int32_t)i, clip_turn(source, corners), view);
         } else if (n) {
             pieces->n_points += n;

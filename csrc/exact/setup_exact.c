@@ -40,6 +40,7 @@
 
 #include "topleft.h"
 #include "lanes/lanes.h"
+#include "vertex/corners.h"
 #include "vertex/project.c"
 #include "exact/sign.c"
 #include "raster/batch.c"
@@ -105,7 +106,8 @@ typedef struct {
 /* The corners of a triangle that is turned, or not. */
 TL_INLINE void load_turned(const exact_state *s, int32_t id, int is_turned, exact_point *p)
 {
-    const int32_t *corners = s->mesh->triangles + 3 * (int64_t)id;
+    int32_t corners[3];
+    read_corners(s->mesh, id, corners);
     p[0] = point_of(s->points, corners[0]);
     p[1] = point_of(s->points, corners[is_turned ? 2 : 1]);
     p[2] = point_of(s->points, corners[is_turned ? 1 : 2]);
@@ -429,9 +431,7 @@ TL_INLINE void pop_exact(const exact_state *s, tl_sink sink, const exact_queue *
     int32_t corners[3 * TL_LANES];
     const box_queue *q = &queue->boxes;
     const int n = q->n;
-    for (int k = 0; k < TL_LANES; k++) /* lanes behind the end repeat the last triangle */
-        memcpy(corners + 3 * k, s->mesh->triangles + 3 * (int64_t)q->id[i + k < n ? i + k : n - 1],
-               3 * sizeof *corners);
+    pop_corners(s->mesh, s->last_vertex, q, i, n, corners);
     load_points(s->points, sink, corners, t->x, t->y, t->z);
     t->ids = vi_load(q->id + i);
     t->live = vm_first(n - i);

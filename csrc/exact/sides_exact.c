@@ -7,6 +7,7 @@
 
 #include "topleft.h"
 #include "vertex/clip.c"
+#include "vertex/corners.h"
 #include "exact/pieces_exact.c"
 #include "exact/sign.c"
 #include "raster/setup.c"
@@ -37,8 +38,8 @@ static void drop_exact_sides(const tl_snapped *snapped, const uint8_t *is_single
     const tl_exact_points *points = snapped->mesh.exact;
     const int wanted = snapped->cull == TL_CULL_BACK ? -1 : 1;
     for (int64_t i = first; i < end; i++) {
-        const int32_t *corners = snapped->triangles + 3 * i;
-        int32_t *own = triangles + 3 * i;
+        int32_t corners[3], *own = triangles + 3 * i;
+        read_corners(snapped, i, corners);
         const int is_cut = is_clipped(&snapped->mesh, corners);
         const int is_left = !is_single[i] || is_cut || exact_turn(points->points, points->stride, corners) == wanted;
         own[0] = corners[0];

@@ -64,7 +64,7 @@ typedef struct {
 static void set_big(double value, big_number *out)
 {
     memset(out, 0, sizeof *out);
-    if (value == 0.0)
+    if (value == 0.0 || !isfinite(value)) /* not finite: a vertex that has changed since it was looked at */
         return;
     int exponent;
     uint64_t mantissa = (uint64_t)ldexp(frexp(fabs(value), &exponent), 53);

@@ -47,16 +47,15 @@ static __attribute__((noinline)) int64_t list_triangle(const tl_snapped *snapped
                                                        int n_samples, span_table *t)
 {
     tl_target target = {.sink = TL_SINK_SPANS, .pixels = t, .stride_px = window->width};
-    tl_snapped seen = *snapped;
-    const triangle_parts whole = parts_of(snapped, i);
-    for (int part = 0; part < whole.n; part++)
+    int32_t own[3];
+    triangle_parts parts = parts_of(snapped, i, own);
+    for (int part = 0; part < parts.n; part++)
         for (int s = 0; s < n_samples; s++, slot++) {
             if (samples_fx)
-                seen.mesh.sample_x_fx = samples_fx[2 * s], seen.mesh.sample_y_fx = samples_fx[2 * s + 1];
-            const triangle_parts parts = parts_of(&seen, i);
+                parts.set.sample_x_fx = samples_fx[2 * s], parts.set.sample_y_fx = samples_fx[2 * s + 1];
             t->next = t->spans + slot, t->row_at = 0;
             t->triangles[slot] = (uint16_t)i;
-            draw_triangle(&parts.set, parts.corners + 3 * part, (int32_t)i, &seen, window, &target, TL_SINK_SPANS);
+            draw_triangle(&parts.set, parts.corners + 3 * part, (int32_t)i, snapped, window, &target, TL_SINK_SPANS);
         }
     return slot;
 }

@@ -27,13 +27,16 @@ static inline void sort_corners(const int32_t *c, int32_t *sorted)
     sorted[2] = middle < high ? high : middle;
 }
 
-/* Writes the numbers of edges by lower index to counts[1 + index], 0 there before.  Returns the first row with an index
- * outside the vertices, or -1. */
-static int64_t count_edges(const tl_snapped *snapped, int64_t *restrict counts)
+/* Writes the numbers of edges by lower index to counts[1 + index], 0 there before, and the sorted corners of the
+ * triangles that are not culled: low | middle << 32 and high, of *n_listed triangles.  Returns the first row with an
+ * index outside the vertices, or -1. */
+static int64_t count_edges(const tl_snapped *snapped, int64_t *restrict counts, uint64_t *restrict listed,
+                           int64_t *n_listed)
 {
     const uint32_t n_vertices = (uint32_t)snapped->mesh.n_vertices;
+    int64_t n = 0;
     for (int64_t i = 0; i < snapped->n_triangles; i++) {
-        const int32_t *c = snapped->triangles + 3 * i;
+        const int32_t *given = snapped->triangles + 3 * i, c[3] = {given[0], given[1], given[2]};
         int32_t sorted[3];
         if ((uint32_t)c[0] >= n_vertices || (uint32_t)c[1] >= n_vertices || (uint32_t)c[2] >= n_vertices)
             return i;
@@ -42,23 +45,25 @@ static int64_t count_edges(const tl_snapped *snapped, int64_t *restrict counts)
         sort_corners(c, sorted);
         counts[1 + sorted[0]] += 2;
         counts[1 + sorted[1]]++;
+        listed[2 * n] = (uint64_t)sorted[1] << 32 | (uint64_t)sorted[0];
+        listed[2 * n + 1] = (uint64_t)sorted[2];
+        n++;
     }
+    *n_listed = n;
     return -1;
 }
 
 /* Writes the higher indices, grouped by lower index; starts[v] becomes the end of the group of v. */
-static void group_edges(const tl_snapped *snapped, int64_t *restrict starts, int32_t *restrict highs)
+static void group_edges(const uint64_t *restrict listed, int64_t n, int64_t *restrict starts, int32_t *restrict highs)
 {
-    for (int64_t i = 0; i < snapped->n_triangles; i++) {
-        int32_t sorted[3];
-        if (snapped->cull != TL_CULL_NONE && !shows_side(snapped, i))
-            continue;
-        sort_corners(snapped->triangles + 3 * i, sorted);
-        const int64_t at = starts[sorted[0]];
-        highs[at] = sorted[1];
-        highs[at + 1] = sorted[2];
-        starts[sorted[0]] = at + 2;
-        highs[starts[sorted[1]]++] = sorted[2];
+    for (int64_t i = 0; i < n; i++) {
+        const int32_t low = (int32_t)listed[2 * i], middle = (int32_t)(listed[2 * i] >> 32);
+        const int32_t high = (int32_t)listed[2 * i + 1];
+        const int64_t at = starts[low];
+        highs[at] = middle;
+        highs[at + 1] = high;
+        starts[low] = at + 2;
+        highs[starts[middle]++] = high;
     }
 }
 
@@ -66,16 +71,17 @@ static int64_t list_edges(const tl_snapped *snapped, const tl_edge_scratch *scra
                           int64_t *n_edges)
 {
     const int64_t n_vertices = snapped->mesh.n_vertices;
-    int64_t *restrict starts = scratch->starts, n = 0;
+    int64_t *restrict starts = scratch->starts, n = 0, n_listed;
     int32_t *restrict highs = scratch->highs, *restrict last_low = scratch->last_low;
     memset(starts, 0, (size_t)(n_vertices + 1) * sizeof *starts);
     memset(last_low, 0xff, (size_t)n_vertices * sizeof *last_low);
-    const int64_t bad_row = count_edges(snapped, starts);
+    /* three numbers a triangle, of which two are what the edges, written later, are found by */
+    const int64_t bad_row = count_edges(snapped, starts, edges, &n_listed);
     if (bad_row >= 0)
         return bad_row;
     for (int64_t v = 0; v < n_vertices; v++)
         starts[v + 1] += starts[v];
-    group_edges(snapped, starts, highs);
+    group_edges(edges, n_listed, starts, highs);
     for (int64_t low = 0, k = 0; low < n_vertices; low++)
         for (; k < starts[low]; k++) {
             const int32_t high = highs[k];

@@ -203,16 +203,17 @@ static void paint_gouraud(const tl_snapped *snapped, const tl_window *window, co
         for (int64_t col = 0, n; col < window->width; col += n) {
             for (n = 1; n < TL_CHUNK && col + n < window->width && label[col + n] == label[col];)
                 n++;
-            const int64_t x_px = col + window->x_px, y_px = row + window->y_px;
-            if (label[col] < 0 || !find_triangle(&s, snapped, label[col], x_px, y_px, bits))
+            const int64_t id = label[col], x_px = col + window->x_px, y_px = row + window->y_px;
+            int32_t corners[3];
+            if (id < 0 || !find_triangle(&s, snapped, id, x_px, y_px, bits))
                 continue;
             if (!s.piece[0]) {
                 paint_run(&s, window, row, col, (int)n, colors, n_channels, is_u8, out + col * pixel_bytes);
                 continue;
             }
             n = 1; /* the next sample may belong to another piece */
-            paint_piece(&s, snapped->triangles + 3 * (int64_t)label[col], x_px, y_px, bits, colors, n_channels, is_u8,
-                        out + col * pixel_bytes);
+            read_corners(snapped, id, corners);
+            paint_piece(&s, corners, x_px, y_px, bits, colors, n_channels, is_u8, out + col * pixel_bytes);
         }
     }
 }

@@ -28,18 +28,18 @@ static inline double upper(double a, double b) { return b > a ? b : a; }
 
 static void load_plane(value_plane *p, const tl_valued *mesh, int64_t id)
 {
-    const int32_t *corner = mesh->triangles + 3 * id;
     double x[3], y[3], v[3];
     p->id = id;
     for (int k = 0; k < 3; k++) {
-        if (corner[k] < 0 || corner[k] >= mesh->n_points) { /* the caller's array may have changed */
+        const int64_t corner = mesh->triangles[3 * id + k];
+        if (corner < 0 || corner >= mesh->n_points) { /* the caller's array may have changed */
             p->x = p->y = p->slope_x = p->slope_y = 0.0;
             p->value = p->low = p->high = NAN;
             return;
         }
-        x[k] = mesh->points_px[2 * (int64_t)corner[k]];
-        y[k] = mesh->points_px[2 * (int64_t)corner[k] + 1];
-        v[k] = mesh->values[corner[k]];
+        x[k] = mesh->points_px[2 * corner];
+        y[k] = mesh->points_px[2 * corner + 1];
+        v[k] = mesh->values[corner];
     }
     const double ax = x[1] - x[0], ay = y[1] - y[0], bx = x[2] - x[0], by = y[2] - y[0];
     const double av = v[1] - v[0], bv = v[2] - v[0], twice_area = ax * by - ay * bx;

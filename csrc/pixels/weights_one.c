@@ -63,10 +63,10 @@ static int load_resolved(resolve_state *s, const tl_vertex_set *set, const int32
 }
 
 /* As find_triangle, of vertices that are not snapped. */
-static int find_exact(resolve_state *s, const tl_snapped *snapped, int64_t id, int64_t x_px, int64_t y_px, int bits)
+static int find_exact(resolve_state *s, const tl_snapped *snapped, int64_t id, const int32_t *corners, int64_t x_px,
+                      int64_t y_px, int bits)
 {
     const tl_exact_points *points = snapped->mesh.exact;
-    const int32_t *corners = snapped->triangles + 3 * id;
     for (int k = 0; k < 3; k++) {
         s->slot[k] = k, s->piece[k] = NULL;
         s->points[k] = point_of(points, corners[k]);
@@ -96,12 +96,14 @@ static int find_triangle(resolve_state *s, const tl_snapped *snapped, int64_t id
     s->id = -1;
     if (id < 0 || id >= snapped->n_triangles)
         return 0;
-    const int32_t *corners = snapped->triangles + 3 * id;
-    for (int k = 0; k < 3; k++)
+    int32_t corners[3];
+    for (int k = 0; k < 3; k++) {
+        corners[k] = snapped->triangles[3 * id + k];
         if (corners[k] < 0 || corners[k] >= snapped->mesh.n_vertices) /* the caller's array may have changed */
             return 0;
+    }
     if (snapped->mesh.exact)
-        return find_exact(s, snapped, id, x_px, y_px, bits);
+        return find_exact(s, snapped, id, corners, x_px, y_px, bits);
     s->exact = NULL;
     if (!is_clipped(&snapped->mesh, corners)) {
         s->piece[0] = NULL;

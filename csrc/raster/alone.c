@@ -248,7 +248,8 @@ static __attribute__((noinline)) void count_squares(const tl_vertex_set *set, co
 TL_INLINE void draw_alone(const tl_snapped *snapped, int64_t i, const tl_window *window, const tl_target *target,
                           tl_sink sink)
 {
-    const triangle_parts parts = parts_of(snapped, i);
+    int32_t own[3];
+    const triangle_parts parts = parts_of(snapped, i, own);
     if (sink == TL_SINK_COUNT && window->test != TL_TEST_SAMPLE && parts.n > 1) {
         count_squares(&parts.set, parts.corners, parts.n, snapped, window, target);
         return;

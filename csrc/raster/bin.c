@@ -44,7 +44,8 @@ static void widen_rows(const bin_limits *b, const tl_vertex_set *set, const int3
 /* Triangle i, or its pieces, by itself. */
 static __attribute__((noinline)) void bin_alone(const bin_limits *b, int64_t i, tl_bins *bins)
 {
-    const triangle_parts parts = parts_of(b->snapped, i);
+    int32_t own[3];
+    const triangle_parts parts = parts_of(b->snapped, i, own);
     int64_t row0 = b->window->height, row1 = 0;
     for (int k = 0; k < parts.n; k++)
         widen_rows(b, &parts.set, parts.corners + 3 * k, &row0, &row1);
@@ -107,10 +108,10 @@ static int64_t bin(const tl_snapped *snapped, const tl_window *window, int32_t r
         .bottom = (int32_t)min64(window->y_px + window->height, farthest),
     };
     const tl_share all = {.end = snapped->n_triangles};
-    int32_t tail[3 * TL_LANES];
+    int32_t corners[3 * TL_LANES];
     bins->n = 0;
     for (int64_t i = 0; i < snapped->n_triangles; i += TL_LANES)
-        if (!bin_batch(&b, i, share_corners(snapped, &all, i, tail), vm_first(snapped->n_triangles - i), bins))
+        if (!bin_batch(&b, i, share_corners(snapped, &all, i, corners), vm_first(snapped->n_triangles - i), bins))
             return i;
     return -1;
 }

@@ -154,8 +154,6 @@ TL_INLINE void draw_batch(batch_state *s, tl_sink sink, const int32_t *corners, 
 {
     lane_batch b;
     vm boxes[N_BOXES];
-    for (int k = 0; k < 3 * TL_LANES; k += 16) /* 5 % of a million-triangle mesh */
-        __builtin_prefetch(corners + 12 * 48 + k);
     if (!load_batch(s, corners, id, live, &b))
         return;
     count_faceless(s->target, sink, vm_and_not(vm_and_not(live, b.alone), b.drawn), b.area);
@@ -217,6 +215,7 @@ TL_INLINE void draw_batches(const tl_snapped *snapped, const tl_window *window, 
     tl_cluster_pass *clusters = share->clusters;
     cluster_mesh cluster;
     tl_share part = *share;
+    int32_t corners[3 * TL_LANES];
     const int64_t n_parts = clusters ? list_clusters(clusters, window, target) : 1;
     int is_given_up = 0;
     for (int64_t next = 0; next < n_parts && !is_given_up; next++) {
@@ -229,11 +228,12 @@ TL_INLINE void draw_batches(const tl_snapped *snapped, const tl_window *window, 
             s.snapped = &cluster.snapped;
         }
         for (int64_t i = part.first; i < part.end && s.bad_row < 0 && !is_given_up; i += TL_LANES) {
-            int32_t corners[3 * TL_LANES];
             tl_count_work(window, TL_SETUP_PX * TL_LANES);
             is_given_up = tl_is_given_up(window);
             const vm live = vm_first(part.end - i);
             const vi id = part.ids ? vi_load_masked(live, part.ids + i) : vi_add(vi_set1((int32_t)i), vi_iota());
+            if (TL_LANES > 1 && !part.ids && !clusters && i + 5 * TL_LANES <= part.end)
+                fetch_rows(snapped->mesh.vertices, sizeof(tl_vertex), snapped->triangles + 3 * (i + 4 * TL_LANES));
             draw_batch(&s, sink, share_corners(s.snapped, &part, i, corners), id, live);
         }
         flush_queues(&s, sink);

@@ -12,6 +12,7 @@
 #include "topleft.h"
 #include "lanes/lanes.h"
 #include "vertex/clip.c"
+#include "vertex/corners.h"
 #include "vertex/fixed.h"
 #include "raster/alone.c"
 #include "raster/covered.c"
@@ -214,9 +215,10 @@ static int walk_samples(const tl_snapped *snapped, const int32_t *corners, const
 static __attribute__((noinline)) void draw_alone_each_sample(const tl_snapped *snapped, int64_t i,
                                                              const tl_window *window, const tl_target *target)
 {
-    const int32_t *corners = snapped->triangles + 3 * i;
     tl_snapped seen = *snapped;
     tl_target one = *target;
+    int32_t corners[3];
+    read_corners(snapped, i, corners);
     if (snapped->method == TL_METHOD_AUTO && !is_clipped(&snapped->mesh, corners) &&
         walk_samples(snapped, corners, window, target))
         return;

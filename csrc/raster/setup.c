@@ -10,6 +10,7 @@
 
 #include "topleft.h"
 #include "vertex/clip.c"
+#include "vertex/corners.h"
 #include "vertex/fixed.h"
 
 /* A triangle with positive area (y down) and its samples inside the window. */
@@ -47,7 +48,8 @@ static inline extent_rounding round_extent(const tl_window *window)
 static inline tl_wide vertex_fx(const tl_vertex_set *set, int32_t i)
 {
     const tl_vertex v = set->vertices[i];
-    const tl_wide p = v.x_fx == TL_SPECIAL ? set->wide[i] : (tl_wide){v.x_fx, v.y_fx};
+    /* without a table: a mesh that has changed since it was looked at */
+    const tl_wide p = v.x_fx == TL_SPECIAL && set->wide ? set->wide[i] : (tl_wide){v.x_fx, v.y_fx};
     return (tl_wide){p.x_fx - set->sample_x_fx, p.y_fx - set->sample_y_fx};
 }
 
@@ -185,9 +187,10 @@ static inline void weights_at(const tl_triangle *t, const tl_window *window, int
 /* Whether a triangle shows the side that is drawn: as draw_triangle, of the pieces where a plane cuts it. */
 static int shows_side(const tl_snapped *snapped, int64_t i)
 {
-    const int32_t *corners = snapped->triangles + 3 * i;
     const int wanted = snapped->cull == TL_CULL_BACK ? -1 : 1;
+    int32_t corners[3];
     tl_triangle t;
+    read_corners(snapped, i, corners);
     if (!is_clipped(&snapped->mesh, corners))
         return load_triangle(&snapped->mesh, corners, &t) == wanted;
     const tl_pieces *p = snapped->pieces;
@@ -222,8 +225,8 @@ static void drop_sides(const tl_snapped *snapped, const uint8_t *is_single, int6
                        int32_t *triangles)
 {
     for (int64_t i = first; i < end; i++) {
-        const int32_t *corners = snapped->triangles + 3 * i;
-        int32_t *own = triangles + 3 * i;
+        int32_t corners[3], *own = triangles + 3 * i;
+        read_corners(snapped, i, corners);
         const int is_cut = is_clipped(&snapped->mesh, corners),
                   is_left = !is_single[i] || is_cut || shows_side(snapped, i);
         own[0] = corners[0];

@@ -111,9 +111,10 @@ TL_INLINE void keep_opaque(cutout *c, shade_runs *s, const tl_material *m, int64
 static void cut_triangle(cutout *c, shade_runs *s, const tl_window *window, int32_t id)
 {
     const tl_shading *shading = s->shading;
-    const int32_t *corners = c->snapped.triangles + 3 * (int64_t)id;
     const int32_t material = shading->material_of ? shading->material_of[id] : 0;
     tl_triangle t = {.col0 = 0, .col1 = window->width, .row0 = 0, .row1 = window->height};
+    int32_t corners[3];
+    read_corners(&c->snapped, id, corners);
     if (!is_clipped(&c->snapped.mesh, corners) &&
         (load_triangle(&c->snapped.mesh, corners, &t) == 0 || !clip_box(&t, window)))
         return;

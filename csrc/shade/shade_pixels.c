@@ -9,6 +9,7 @@
 #include "shading.h"
 #include "topleft.h"
 #include "lanes/lanes.h"
+#include "vertex/corners.h"
 #include "pixels/runs.c"
 #include "shade/full.c"
 #include "shade/light.c"
@@ -42,9 +43,11 @@ static void face_normal(const shade_runs *s, int32_t id, double *n)
 {
     const tl_shading *shading = s->shading;
     double p[3][3], squared = 0.0;
+    int32_t corners[3];
+    read_corners(s->snapped, id, corners);
     for (int k = 0; k < 3; k++)
         for (int axis = 0; axis < 3; axis++) {
-            const int64_t at = 3 * (int64_t)s->snapped->triangles[3 * (int64_t)id + k] + axis;
+            const int64_t at = 3 * (int64_t)corners[k] + axis;
             p[k][axis] = shading->is_f64 ? ((const double *)shading->positions)[at]
                                          : (double)((const float *)shading->positions)[at];
         }

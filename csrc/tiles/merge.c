@@ -23,7 +23,7 @@ static void merge_fragments(const tl_merge *m, int64_t first, int64_t end)
     const int32_t first_id = m->first_id;
     if (m->rule == TL_MERGE_LATER) {
         for (int64_t i = first; i < end; i++) {
-            const int32_t id = other_ids[i] < 0 ? -1 : other_ids[i] + first_id;
+            const int32_t id = other_ids[i] < 0 ? -1 : (int32_t)((uint32_t)other_ids[i] + (uint32_t)first_id);
             const int takes = id > ids[i];
             ids[i] = takes ? id : ids[i];
             depth[i] = takes ? other_depth[i] : depth[i];
@@ -32,7 +32,7 @@ static void merge_fragments(const tl_merge *m, int64_t first, int64_t end)
     }
     const float sign = m->rule == TL_MERGE_GREATER ? -1.0f : 1.0f; /* exact, and turns the order round */
     for (int64_t i = first; i < end; i++) {
-        const int32_t id = other_ids[i] < 0 ? -1 : other_ids[i] + first_id;
+        const int32_t id = other_ids[i] < 0 ? -1 : (int32_t)((uint32_t)other_ids[i] + (uint32_t)first_id);
         const float mine = sign * depth[i], other = sign * other_depth[i];
         const int is_nearer = (other < mine) | ((other == mine) & (id < ids[i]));
         const int takes = (id >= 0) & ((ids[i] < 0) | is_nearer);

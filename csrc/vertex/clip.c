@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "topleft.h"
+#include "vertex/corners.h"
 #include "vertex/fixed.h"
 #include "vertex/project.c"
 
@@ -181,15 +182,20 @@ static void clip(const tl_source *source, const tl_vertex *vertices, const int32
                  int64_t n_listed, const tl_view *view, tl_pieces *pieces)
 {
     clip_corner polygon[TL_MAX_CORNERS];
+    const int64_t vertex_room = pieces->n_vertices, room = pieces->n_pieces;
     pieces->n_vertices = pieces->n_pieces = 0;
     for (int64_t i = 0; i < n_listed; i++) {
         const int64_t t = ids ? ids[i] : i;
-        const int32_t *corners = triangles + 3 * t;
+        int32_t corners[3];
         int cut = 0;
-        for (int k = 0; k < 3; k++)
+        for (int k = 0; k < 3; k++) {
+            corners[k] = corner_within(triangles[3 * t + k], source->n);
             cut |= vertices[corners[k]].x_fx == TL_SPECIAL && vertices[corners[k]].y_fx == TL_CLIPPED;
+        }
         const int n = cut ? clip_triangle(source, corners, view, polygon) : 0;
         if (n && pieces->vertices) {
+            if (pieces->n_vertices + n > vertex_room || pieces->n_pieces + n - 2 > room)
+                return; /* the mesh has changed since they were counted */
             append_pieces(pieces, polygon, n, (int32_t)t, clip_turn(source, corners), view);
         } else if (n) {
             pieces->n_vertices += n;
@@ -241,10 +247,12 @@ typedef struct {
     int n, is_cut;
 } triangle_parts;
 
-static inline triangle_parts parts_of(const tl_snapped *snapped, int64_t i)
+/* The corners of what no plane cuts are put into `own`. */
+static inline triangle_parts parts_of(const tl_snapped *snapped, int64_t i, int32_t *own)
 {
     const tl_pieces *pieces = snapped->pieces;
-    triangle_parts parts = {snapped->mesh, snapped->triangles + 3 * i, 1, 0};
+    triangle_parts parts = {snapped->mesh, own, 1, 0};
+    read_corners(snapped, i, own);
     if (!is_clipped(&parts.set, parts.corners))
         return parts;
     parts.is_cut = 1, parts.n = 0;

@@ -8,6 +8,7 @@
 
 #include "topleft.h"
 #include "lanes/lanes.h"
+#include "vertex/corners.h"
 #include "vertex/fixed.h"
 
 /* float32 widens to float64 without loss, and a power of two scales without loss: rint is the only rounding. */
@@ -122,13 +123,14 @@ static int64_t narrow_triangles(const int64_t *restrict triangles, int64_t n_tri
     return -1;
 }
 
-static int64_t first_bad(const tl_vertex *vertices, const int32_t *triangles, int64_t n_triangles)
+static int64_t first_bad(const tl_vertex *vertices, int64_t n_vertices, const int32_t *triangles, int64_t n_triangles)
 {
     int64_t first = -1;
     for (int64_t i = 0; i < 3 * n_triangles; i++) {
-        const tl_vertex v = vertices[triangles[i]];
-        if (v.x_fx == TL_SPECIAL && v.y_fx == TL_BAD && (first < 0 || triangles[i] < first))
-            first = triangles[i];
+        const int32_t corner = corner_within(triangles[i], n_vertices);
+        const tl_vertex v = vertices[corner];
+        if (v.x_fx == TL_SPECIAL && v.y_fx == TL_BAD && (first < 0 || corner < first))
+            first = corner;
     }
     return first;
 }

@@ -154,6 +154,12 @@ def test_simplify_wrong_option_is_refused(options, message):
         tl.simplify(torus(), **options)
 
 
+@pytest.mark.parametrize("other", [tl.Scene([torus()]), tl.Points([[0.0, 0, 0]]), None])
+def test_simplify_of_what_is_no_mesh_is_refused(other):
+    with pytest.raises(TypeError, match=r"mesh must be a Mesh, got"):
+        tl.simplify(other)
+
+
 def test_simplify_without_the_package_says_how_to_get_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "fast_simplification", None)
     with pytest.raises(ImportError, match=r"pip install 'topleft\[simplify\]'"):

@@ -21,6 +21,7 @@ __all__ = [
     "as_checked_triangles",
     "as_colors",
     "as_count",
+    "as_frozen",
     "as_names",
     "as_number",
     "as_out",
@@ -42,6 +43,7 @@ __all__ = [
     "check_progress",
     "check_regular",
     "check_rows",
+    "is_frozen",
     "narrow_triangles",
     "set_aligned",
     "set_read_only",
@@ -181,12 +183,34 @@ def as_triangles(values: ArrayLike) -> NDArray[np.signedinteger[Any]]:
 
 
 def as_checked_triangles(values: ArrayLike, n_vertices: int) -> NDArray[np.int32]:
-    """Return (T, 3) triangles as a contiguous int32 array, every index inside ``[0, n_vertices)``."""
+    """Return (T, 3) triangles as a contiguous int32 array that nobody writes to, every index in ``[0, n_vertices)``."""
     array = as_triangles(values)
-    if array.size and not (array.min() >= 0 and array.max() < n_vertices):
-        row = int(np.argmax(((array < 0) | (array >= n_vertices)).any(axis=1)))
-        raise bad_triangle(values, row, n_vertices)
-    return np.ascontiguousarray(array, np.int32)
+    if array.dtype == np.int32:
+        own = as_frozen(array)
+        check_rows(own, n_vertices, values)
+        return own
+    own = np.empty(array.shape, np.int32)
+    narrow_triangles(array, values, n_vertices, own, 1)
+    return as_frozen(own, is_own=True)
+
+
+def as_frozen(array: NDArray[Any], *, is_own: bool = False) -> NDArray[Any]:
+    """Return a read-only array that nobody can write to: a copy, unless it is one, or nobody else has it."""
+    if is_frozen(array):
+        return array
+    own = array if is_own else array.copy()
+    own.flags.writeable = False
+    return own
+
+
+def is_frozen(array: NDArray[Any]) -> bool:
+    """Tell whether an array, and all that its memory is borrowed from, is read-only."""
+    owner: Any = array
+    while isinstance(owner, np.ndarray):
+        if owner.flags.writeable:
+            return False
+        owner = owner.base
+    return owner is None or isinstance(owner, bytes)
 
 
 def bad_triangle(values: ArrayLike, row: int, n_vertices: int) -> IndexError:

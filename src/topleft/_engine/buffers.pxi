@@ -185,10 +185,10 @@ def set_flat_depth(int32_t[:, ::1] ids, float[:, ::1] out, int64_t first_row, in
 
 def first_bad(const uint8_t[::1] records, const int32_t[:, ::1] triangles):
     """Return the lowest index of a vertex in use that has no fixed-point position, -1 if there is none."""
-    cdef int64_t n = triangles.shape[0], found = -1
-    if n:
+    cdef int64_t n = triangles.shape[0], n_vertices = records.shape[0] // <int64_t>sizeof(tl_vertex), found = -1
+    if n and n_vertices:
         with nogil:
-            found = K.first_bad(<const tl_vertex *>&records[0], &triangles[0, 0], n)
+            found = K.first_bad(<const tl_vertex *>&records[0], n_vertices, &triangles[0, 0], n)
     return found
 
 

@@ -478,7 +478,7 @@ cdef extern from "topleft.h" nogil:
         void (*survey_clusters)(const tl_clustered *, const tl_cluster_view *, int64_t, int64_t *) noexcept nogil
         int64_t (*count_hidden)(const tl_clustered *, const tl_cluster_view *, const tl_window *, const tl_target *, int64_t,
                                 int64_t *) noexcept nogil
-        int64_t (*first_bad)(const tl_vertex *, const int32_t *, int64_t) noexcept nogil
+        int64_t (*first_bad)(const tl_vertex *, int64_t, const int32_t *, int64_t) noexcept nogil
         int64_t (*first_bad_row)(const int32_t *, int64_t, int64_t) noexcept nogil
         int64_t (*narrow_triangles)(const int64_t *, int64_t, int64_t, int32_t *) noexcept nogil
         int64_t (*draw)(const tl_snapped *, const tl_window *, const tl_target *, tl_share *) noexcept nogil

@@ -89,13 +89,15 @@ cdef class UnsnappedPoints:
     cdef guess_seen(self, int64_t x_px, int64_t y_px, int64_t width, int64_t height):
         """What `SnappedMesh.guess_seen` returns."""
         cdef int64_t n = min(self.points.n_triangles, 128), i, n_seen = 0, last = self.points.n_points - 1
-        cdef const int32_t *t
+        cdef const int32_t *given
+        cdef int32_t t[3]
         cdef const double *a
         cdef const double *b
         cdef const double *c
         cdef double area, total = 0, n_rows = 0, n_pixels = <double>width * height, cols, rows, each
         for i in range(n):
-            t = self.points.triangles + 3 * (i * self.points.n_triangles // n)
+            given = self.points.triangles + 3 * (i * self.points.n_triangles // n)
+            t[0], t[1], t[2] = given[0], given[1], given[2]
             if not (0 <= t[0] <= last and 0 <= t[1] <= last and 0 <= t[2] <= last):
                 return 0.0, 0.0, 0.0  # an error that draw finds
             a = self.points.points + <int64_t>t[0] * self.points.stride

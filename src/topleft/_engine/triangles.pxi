@@ -132,12 +132,14 @@ cdef class SnappedMesh:
         cdef const tl_vertex *b
         cdef const tl_vertex *c
         cdef int64_t n = min(self.snapped.n_triangles, 128), i, n_seen = 0, last = self.snapped.mesh.n_vertices - 1
-        cdef const int32_t *t
+        cdef const int32_t *given
+        cdef int32_t t[3]
         cdef double unit = 2.0**self.subpixel_bits, area, total = 0, n_rows = 0, n_pixels = <double>width * height
         cdef double left = self.x_px * unit, top = self.y_px * unit, cols, rows, each
         cdef double right = (self.x_px + width) * unit, bottom = (self.y_px + height) * unit
         for i in range(n):
-            t = self.snapped.triangles + 3 * (i * self.snapped.n_triangles // n)
+            given = self.snapped.triangles + 3 * (i * self.snapped.n_triangles // n)
+            t[0], t[1], t[2] = given[0], given[1], given[2]
             if not (0 <= t[0] <= last and 0 <= t[1] <= last and 0 <= t[2] <= last):
                 return 0.0, 0.0, 0.0  # an error that draw finds
             a, b, c = &v[t[0]], &v[t[1]], &v[t[2]]

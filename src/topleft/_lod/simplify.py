@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft import _engine
+from topleft._base.arrays import shown
 from topleft._lod.collapse import MOST_TO_COLLAPSE, STUCK, Collapsed, border_points, collapse, collapser
 from topleft._lod.distance import TriangleTree, measure, welded
 from topleft._lod.levels import Level, Levels, keep_levels, kept_levels
@@ -82,6 +83,8 @@ def simplify(mesh: Mesh, *, ratio: float = 0.25, smallest: int = 200) -> Levels:
 
     Raises
     ------
+    TypeError
+        If it is no mesh.
     ValueError
         If an option is out of range.
     MissingPackageError
@@ -107,6 +110,8 @@ def simplify(mesh: Mesh, *, ratio: float = 0.25, smallest: int = 200) -> Levels:
     >>> [len(level.mesh.triangles) for level in levels]  # doctest: +SKIP
     [16384, 4096, 1024, 256]
     """
+    if not isinstance(mesh, Mesh):
+        raise TypeError(f"mesh must be a Mesh, got {shown(mesh)}; of a Scene simplify its meshes")
     if not 0.05 <= ratio <= 0.75:
         raise ValueError(f"ratio must lie in 0.05 to 0.75, got {ratio!r}")
     if smallest < 4:

@@ -78,8 +78,9 @@ class Mesh:
 
     Notes
     -----
-    The arrays are read-only views: of the caller's memory where the dtype allows. Do not change that memory while the
-    mesh lives: what has been computed of it is kept, and another thread that writes to it during a call may crash it.
+    Vertices, normals, colours and uv are read-only views of the caller's memory where the dtype allows. Do not change
+    it while the mesh lives: what has been computed of it is kept. Triangles are copied, unless the array and what it
+    borrows its memory from are read-only.
 
     Examples
     --------
@@ -452,11 +453,12 @@ def _material_rows(values: npt.ArrayLike, n_triangles: int, n_materials: int) ->
         raise TypeError(f"material_of_triangle must hold integers, got {array.dtype}")
     if array.shape != (n_triangles,):
         raise ValueError(f"material_of_triangle must have shape ({n_triangles},), got {array.shape}")
+    array = array.copy()  # what has been checked is what is used
     outside = (array < 0) | (array >= n_materials)
     if outside.any():
         row = int(outside.argmax())
         raise IndexError(f"material_of_triangle[{row}] = {array[row]} must name one of {n_materials} materials")
-    return np.ascontiguousarray(array, np.int32)
+    return array.astype(np.int32)
 
 
 def _check_finite(vertices: FloatArray, triangles: I32) -> None:

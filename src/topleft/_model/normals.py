@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft import _engine
-from topleft._base.arrays import bad_triangle
+from topleft._base.arrays import as_frozen, bad_triangle
 from topleft._base.threads import run_parts, threads_of_rows
 
 __all__ = [
@@ -163,7 +163,7 @@ def angle_weighted_normals(vertices: FloatArray, triangles: I32, *, threads: int
     G. Thurmer and C. A. Wuthrich, "Computing Vertex Normals from Polygonal Facets", Journal of Graphics Tools 3(1),
     1998.
     """
-    points, corners = _contiguous(vertices), np.ascontiguousarray(triangles, np.int32)
+    points, corners = _contiguous(vertices), as_frozen(np.ascontiguousarray(triangles, np.int32))
     source, out = _engine.Source(points), np.empty((len(points), 3))
 
     def add_up(first: int, end: int) -> int:
@@ -271,7 +271,7 @@ def _over_rows(rows: FloatArray, work: Callable[[_engine.Source, int, int], None
 def _over_faces(
     vertices: FloatArray, triangles: I32, threads: int | None, work: Callable[[_engine.Source, I32, int, int], int]
 ) -> None:
-    points, corners = _contiguous(vertices), np.ascontiguousarray(triangles, np.int32)
+    points, corners = _contiguous(vertices), as_frozen(np.ascontiguousarray(triangles, np.int32))
     source, n_threads = _engine.Source(points), threads_of_rows(len(corners), threads)
     rows = run_parts(lambda first, end: work(source, corners, first, end), len(corners), n_threads)
     _check(rows, corners, len(points))

@@ -152,7 +152,7 @@ def find_facts(
     decided = count_decided(vertices, triangles, view) if view.is_exact else None
     asked, view = view, replace(view, is_exact=False)  # the census is that of the snapped triangles
     snapped = snap_mesh(FRESH, vertices, triangles, view, with_depth=verb == "rasterize", out=None)
-    snapped.check_indices()
+    snapped.given.check_indices()
     given, indices = as_array("vertices", vertices), as_array("triangles", triangles)
     (points, source, indices_drawn, *_), pieces = snapped.given, snapped.pieces
     xy = snapped.records.view(np.int32).reshape(-1, 4)[:, :2]
@@ -219,7 +219,7 @@ def count_decided(vertices: ArrayLike, triangles: ArrayLike, view: View) -> Deci
         covered = empty(_engine.Target.covered_shape(height, width, 1), np.uint64)
         target = _engine.Target(Sink.MASK, empty((height, width), np.bool_), None, covered)
         if mesh.draw(target, 0, height) >= 0:
-            exact.check_indices()
+            exact.refuse()
     return Decided(*mesh.exact.counts)  # type: ignore[union-attr]
 
 

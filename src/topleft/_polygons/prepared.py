@@ -114,7 +114,7 @@ def prepare(memory: Memory, rings: RingSet, frame: Frame, *, is_nonzero: bool) -
         if bad:
             raise bad_point(rings, x[:n], frame)
         if n_wide:
-            wide = np.empty((n, 2), np.int64)
+            wide = np.zeros((n, 2), np.int64)
             snap(0, n)
     sides = rings.rings, rings.polygons, *frame.size
     engine = _engine.SnappedPolygons(x, y, wide, *sides, frame.grid_bits, is_nonzero)

@@ -134,7 +134,7 @@ def _as_offsets(values: Any, name: str, n: int, of: str) -> I64:
         raise TypeError(f"{name} must be integers, got dtype {offsets.dtype}")
     if offsets.ndim != 1 or len(offsets) < 1:
         raise ValueError(f"{name} must have shape (n + 1,), got {offsets.shape}")
-    offsets = np.ascontiguousarray(offsets, np.int64)
+    offsets = np.array(offsets, np.int64)  # a copy: what has been checked is what is used
     steps = offsets[1:] - offsets[:-1]
     least = np.minimum.reduce(steps, initial=3)
     if offsets[0] != 0 or offsets[-1] != n or least < 0:

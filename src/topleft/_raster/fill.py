@@ -216,7 +216,7 @@ def fill_few(
         return snapped.mesh.fill_few(pixels, first, end - first, colors, transfer, under, positions)
 
     if max(run_parts(fill_rows, view.size[1], choices.threads_to_draw(view, snapped, Sink.LABEL))) >= 0:
-        snapped.check_indices()
+        snapped.refuse()
     view.mark("draw")
 
 
@@ -255,7 +255,7 @@ def paint_samples(
     if is_flat and choices.can_share(view):
         palette = _engine.Palette(colors, transfer)
         if draw_means(memory, snapped.mesh, snapped.n_triangles, positions, palette, pixels, n_threads):
-            snapped.check_indices()
+            snapped.refuse()
         view.mark("draw")
         return
     labels: NDArray[np.int32] = memory.empty("sample labels", (len(positions), height, width), np.int32)
@@ -293,7 +293,7 @@ def blend(
         pictures[...] = pixels
     for mesh, picture in zip(meshes, pictures, strict=True):
         if blend_colors(memory, mesh, colors, picture, blending, n_threads, is_flat=is_flat, ground=ground):
-            snapped.check_indices()
+            snapped.refuse()
     view.mark("draw")
     if view.sampling.n_samples > 1:
         resolve_colors(pictures, pixels, transfer, n_threads)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine
-from topleft._base.arrays import as_array, as_number, as_places, as_values, shown
+from topleft._base.arrays import as_array, as_checked_triangles, as_number, as_places, as_values, shown
 from topleft._base.memory import empty
 from topleft._base.texels import as_levels
 from topleft.typing import EncodingOption, FilterOption, WrapOption
@@ -405,7 +405,7 @@ class Fragments:
             raise ValueError("derivatives are those of rasterize and rasterize_mesh, not of layers")
         channels = array.shape[-1] if array.ndim > 1 else 1
         out = np.empty((*self.triangle.shape, channels, 2), np.float32)
-        ids = self._ids().reshape(-1)
+        ids = np.maximum(self._ids().reshape(-1), -1)  # a copy: what has been checked is what is used
         is_seen = np.zeros(self._n_triangles + 1, np.bool_)
         if ids.size and ids.max() >= self._n_triangles:  # the caller has written into them
             raise IndexError(f"triangle must hold ids below {self._n_triangles}, got {ids.max()}")
@@ -416,7 +416,7 @@ class Fragments:
         if array.ndim == 3:
             rows = (3 * seen[:, None] + np.arange(3)).astype(np.int32)
         else:
-            rows = np.asarray(as_array("triangles", self.corners.triangles))[seen].astype(np.int32)
+            rows = as_checked_triangles(as_array("triangles", self.corners.triangles)[seen], len(array))
         _engine.fill_slopes(
             ids, self.barycentric().reshape(-1, 3), slot, self.corners.steps(seen), rows,
             array.reshape(-1, channels) if array.size else np.empty((0, channels), np.float32),

@@ -34,7 +34,7 @@ def list_edges(memory: Memory, snapped: Snapped) -> NDArray[np.uint64]:
     highs = memory.empty("edge highs", (n_edges,), np.int32)
     n = _engine.list_edges(snapped.mesh, starts, last_low, highs, edges)
     if n < 0:
-        snapped.check_indices()
+        snapped.refuse()
     return edges[:n]
 
 

@@ -220,7 +220,8 @@ def peel_meshes(
 
     if max(run_parts(peel_bands, n_bands, n_threads)) >= 0:
         for snapped in meshes:
-            snapped.check_indices()
+            snapped.given.check_indices()
+        meshes[0].refuse()
     return ids, depth
 
 
@@ -233,6 +234,6 @@ def bins_of(memory: Memory, snapped: Snapped, view: View, band_bits: int, reach_
         snapped.mesh, height, width, reach_fx, band_bits, memory.empty("bins", (3, snapped.n_triangles + 16), np.int32)
     )
     if bins.bad_row >= 0:
-        snapped.check_indices()
+        snapped.refuse()
     bins.fill(np.empty(bins.n_listed + 1, np.int32))
     return bins

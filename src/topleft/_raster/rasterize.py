@@ -72,7 +72,7 @@ def draw(
     else:
         bad_rows = run_parts(draw_rows, height, n_parts)
     if max(bad_rows) >= 0:
-        snapped.check_indices()
+        snapped.refuse()
     view.mark("draw")
 
 
@@ -129,7 +129,7 @@ def draw_area(
     with canvas_of(memory, f"{name} area", out, view.size[::-1], np.float32) as (result, canvas):
         n_threads = choices.threads_to_draw(view, snapped, Sink.COUNT)
         if sum_areas(memory, snapped.mesh, snapped.n_triangles, canvas, n_threads, is_clamped=is_clamped):
-            snapped.check_indices()
+            snapped.refuse()
     view.mark("draw")
     return result
 
@@ -218,7 +218,7 @@ def draw_all_samples(
     if draw_planes(
         memory, snapped.mesh, snapped.n_triangles, positions, sink, pixels, depth, n_threads, is_near=is_near
     ):
-        snapped.check_indices()
+        snapped.refuse()
     view.mark("draw")
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple, NoReturn, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -70,11 +70,15 @@ class Snapped:
         """Whether vertices have a depth of their own; otherwise all of them lie at 0."""
         return self.given.source.is_clip_space or self.given.points.shape[1] == 3
 
-    def check_indices(self) -> None:
-        """Raise an error for the first triangle with an index or a vertex that cannot be drawn, if one was not."""
+    def refuse(self) -> NoReturn:
+        """Raise an error for the first triangle with an index or a vertex that cannot be drawn, as one was not."""
         self.given.check_indices()
         if self.mesh.exact is not None:  # whose vertices were not looked at before
             check_finite(self.given.points, self.given.triangles, with_depth=False)
+        raise IndexError(
+            "triangles must hold indices of vertices while they are drawn, got some that did not, and now do: nobody "
+            "may write to them during a call"
+        )
 
 
 class Vertices(NamedTuple):
@@ -286,6 +290,7 @@ def snap(
     n_bad, n_wide, n_clipped = map(sum, zip(*counts, strict=True))
     if n_wide:
         wide = empty((n, 2), np.int64)
+        wide.fill(0)
         snap_part(0, n)
     return Vertices(records, wide, n_bad, n_clipped)
 
@@ -350,7 +355,7 @@ def check_used_vertices(
 
 def check_projected(points: NDArray[Any], projected: NDArray[np.float64], triangles: NDArray[np.int32]) -> None:
     """Raise an error for the first vertex that is not finite behind its transform, if a triangle uses it."""
-    used = triangles[(np.isnan(projected[:, 0]) & (projected[:, 1] == BAD))[triangles]]
+    used = corners_of(triangles, np.isnan(projected[:, 0]) & (projected[:, 1] == BAD))
     if used.size:
         raise bad_vertex(points, used.min(), "stay finite under transform")
 
@@ -362,11 +367,17 @@ def check_finite(points: NDArray[Any], triangles: NDArray[np.int32], *, with_dep
     is_bad = is_far | ~np.isfinite(points).all(axis=1)
     if with_depth:
         is_bad |= ~(abs(points[:, 2].astype(float)) <= np.finfo(np.float32).max)
-    used = triangles[is_bad[triangles]]
+    used = corners_of(triangles, is_bad)
     if used.size:
         i = used.min()
         wish = "lie within 2**53 as integers for 'exact'" if is_far[i] else "have a depth that float32 can hold"
         raise bad_vertex(points, i, wish)
+
+
+def corners_of(triangles: NDArray[np.int32], is_meant: NDArray[np.bool_]) -> NDArray[np.int32]:
+    """Return the corners, one after the other, that are vertices of some kind; others may write to the triangles."""
+    own = np.clip(triangles, 0, len(is_meant) - 1)
+    return own[is_meant[own]]
 
 
 def bad_vertex(points: NDArray[Any], i: int, wish: str) -> ValueError:

@@ -97,14 +97,13 @@ def merge(
         if shares is not None:
             if i >= len(shares):
                 raise ValueError(f"triangles must have an item for each buffer, got {len(shares)}")
+            own_ids = own_ids.copy()  # what has been checked is what is named
             names = _as_names(shares[i], own_ids, i)
         if ids is None or depth is None:
             ids = np.full(own_ids.shape, -1, np.int32)
             depth = own_depth.copy()  # the background's, as the first one has it
         if own_ids.shape != ids.shape:
             raise ValueError(f"buffers must have one shape, got {own_ids.shape} as buffer {i} after {ids.shape}")
-        if isinstance(names, np.ndarray):
-            own_ids = own_ids.copy()
         _merge_into(ids, depth, own_ids, own_depth, names, test, n_threads)
         n = i + 1
     if ids is None or depth is None:
