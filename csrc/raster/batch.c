@@ -406,8 +406,8 @@ TL_INLINE void flush_small(batch_state *s, tl_sink sink)
 
 TL_LIST_COPIES(flush_small, (batch_state *s), s)
 
-/* Copies the corners of the triangles [i, i + TL_LANES) of a share, unchecked; behind the end zeros.  What another thread
- * then writes to the indices is not seen any more. */
+/* Copies the corners of the triangles [i, i + TL_LANES) of a share, unchecked; behind the end zeros.  What another
+ * thread then writes to the indices is not seen any more. */
 TL_INLINE const int32_t *share_corners(const tl_snapped *snapped, const tl_share *share, int64_t i, int32_t *own)
 {
     if (!share->ids && i + TL_LANES <= share->end) {

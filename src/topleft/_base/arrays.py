@@ -303,9 +303,12 @@ def as_places(rows: ArrayLike, cols: ArrayLike, shape: tuple[int, ...]) -> tuple
         array = as_array(name, values)
         if array.dtype.kind not in "iu" and array.size:
             raise TypeError(f"{name} must be integers, got {shown(values)}")
+        if array.dtype.kind == "u":
+            array = np.minimum(array, np.iinfo(np.intp).max)
+        array = array.astype(np.intp)  # a copy: what has been checked is what is used
         if array.size and not (array.min() >= 0 and array.max() < n):
             raise IndexError(f"{name} must lie in [0, {n}), got {array.min()} to {array.max()}")
-        found.append(array.astype(np.intp, copy=False))
+        found.append(array)
     if found[0].shape != found[1].shape:
         raise ValueError(f"rows and cols must have one shape, got {found[0].shape} and {found[1].shape}")
     return found[0], found[1]

@@ -68,22 +68,30 @@ class Changing:
     @contextmanager
     def changed(self) -> Iterator[None]:
         """Let another process write to the arrays meanwhile; an AssertionError if something was written beside them."""
-        has_begun, seed, parent = mmap.mmap(-1, 1), self.draw.source.integer(0, 65535), os.getpid()
-        child = os.fork()
-        if child == 0:
-            try:
-                self._write_while(parent, random.Random(seed), has_begun)
-            finally:
-                os._exit(0)
+        child = self._begin_to_write(self.draw.source.integer(0, 65535))
         try:
-            while self._arrays and not has_begun[0]:
-                time.sleep(1e-4)
             yield
         finally:
-            os.kill(child, signal.SIGKILL)
-            os.waitpid(child, 0)
+            end_process(child)
         if any(beside.any() for beside in self._beside):
             raise AssertionError("a write beside an array")
+
+    def _begin_to_write(self, seed: int) -> int:
+        """Fork the process that writes; again, where a lock that a thread had when it was forked lets it not begin."""
+        has_begun, parent = mmap.mmap(-1, 1), os.getpid()
+        while True:
+            child = os.fork()
+            if child == 0:
+                try:
+                    self._write_while(parent, random.Random(seed), has_begun)
+                finally:
+                    os._exit(0)
+            latest = time.monotonic() + 2
+            while time.monotonic() < latest:
+                if has_begun[0] or not self._arrays:
+                    return child
+                time.sleep(1e-4)
+            end_process(child)
 
     def _write_while(self, parent: int, rng: random.Random, has_begun: mmap.mmap) -> None:
         while self._arrays and os.getppid() == parent:
@@ -98,6 +106,12 @@ class Changing:
                 time.sleep(rng.random() * 1e-3)
                 own[first:end] = contents[0][first:end]
                 time.sleep(rng.random() * 2e-3)
+
+
+def end_process(child: int) -> None:
+    """Kill a process that this one has forked, and wait for its end."""
+    os.kill(child, signal.SIGKILL)
+    os.waitpid(child, 0)
 
 
 def between_closed_pages(array: np.ndarray, *, is_at_end: bool) -> tuple[np.ndarray, np.ndarray]:
