@@ -227,7 +227,9 @@ static inline int64_t tl_covered_words(int64_t n_samples) { return n_samples / 6
 /* A mesh after the snap: what kernels draw. */
 typedef struct {
     tl_vertex_set mesh;
-    const int32_t *triangles; /* (n_triangles, 3); draw checks the indices, everything else trusts them */
+    /* (n_triangles, 3), maybe the caller's memory: draw checks the indices; what reads them again has them from
+     * vertex/corners.h, in case they have changed */
+    const int32_t *triangles;
     int64_t n_triangles;
     const tl_pieces *pieces; /* of triangles with TL_CLIPPED vertices, or NULL */
     tl_cull cull;

@@ -75,7 +75,7 @@ static int64_t list_edges(const tl_snapped *snapped, const tl_edge_scratch *scra
     int32_t *restrict highs = scratch->highs, *restrict last_low = scratch->last_low;
     memset(starts, 0, (size_t)(n_vertices + 1) * sizeof *starts);
     memset(last_low, 0xff, (size_t)n_vertices * sizeof *last_low);
-    /* three numbers a triangle, of which two are what the edges, written later, are found by */
+    /* corners wait in the memory of the edges, two numbers of the three that each triangle has there */
     const int64_t bad_row = count_edges(snapped, starts, edges, &n_listed);
     if (bad_row >= 0)
         return bad_row;

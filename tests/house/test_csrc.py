@@ -136,3 +136,16 @@ def test_map_of_a_folder_lists_its_files(folder):
 def test_lines_have_at_most_120_columns(path):
     lines = path.read_text(encoding="utf-8").splitlines()
     assert [f"{i}: {line}" for i, line in enumerate(lines, 1) if len(line) > 120] == []
+
+
+#: What reads the indices of triangles, which may be the caller's memory and change: each once, and looks at them then.
+READERS_OF_INDICES = {
+    "vertex/corners.h", "raster/batch.c", "lines/edges.c", "mesh/creases.c", "mesh/nearest.c", "pixels/planes.c",
+    "pixels/runs.c", "pixels/weights_one.c", "tiles/corners.c",
+}  # fmt: skip
+
+
+def test_indices_are_read_in_few_places():
+    first_looks = r"(first_bad_row|fetch_rows)\([^;]*;"  # checks of all, and addresses that are only fetched
+    named = r"(snapped|mesh|fans|\bs|\bc)(->|\.)triangles\b(?!\s*=)"
+    assert {name for name in FILES if re.search(named, re.sub(first_looks, "", code_of(name)))} == READERS_OF_INDICES

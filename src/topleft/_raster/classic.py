@@ -163,7 +163,7 @@ def as_scene(
     points = as_vertices(vertices, has_transform=False)
     if points.shape[1] == 4:
         raise ValueError(f"method {method.name!r} takes vertices in pixels, (V, 2) or (V, 3), got shape {points.shape}")
-    points = np.ascontiguousarray(points, np.float64)
+    points = np.array(points, np.float64, order="C")  # a copy: what has been checked is what is used
     corners = as_checked_triangles(triangles, len(points))
     # Without sub-pixel bits a kernel takes one, so that a pixel centre is an integer.
     limit = method.limit / 2 ** max(1, view.subpixel_bits) if method.has_subpixel_bits else method.limit
