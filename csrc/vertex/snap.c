@@ -96,10 +96,16 @@ static tl_vertex_counts snap(const tl_source *source, int64_t first, int64_t end
 static int64_t first_bad_row(const int32_t *triangles, int64_t n_triangles, int64_t n_vertices)
 {
     const uint32_t n = (uint32_t)n_vertices;
-    for (int64_t i = 0; i < n_triangles; i++)
-        if ((uint32_t)triangles[3 * i] >= n || (uint32_t)triangles[3 * i + 1] >= n ||
-            (uint32_t)triangles[3 * i + 2] >= n)
-            return i;
+    const int64_t chunk = 3 * 1024;
+    for (int64_t first = 0; first < 3 * n_triangles; first += chunk) {
+        const int64_t end = first + chunk < 3 * n_triangles ? first + chunk : 3 * n_triangles;
+        uint32_t bad = 0; /* no branch inside: the compiler makes vectors of it */
+        for (int64_t i = first; i < end; i++)
+            bad |= (uint32_t)((uint32_t)triangles[i] >= n);
+        for (int64_t i = first; bad && i < end; i++)
+            if ((uint32_t)triangles[i] >= n)
+                return i / 3;
+    }
     return -1;
 }
 
