@@ -84,9 +84,10 @@ static int compare_points(const resolve_state *s, int64_t x_px, int64_t y_px, in
 static inline uint8_t round_color(const resolve_state *s, int64_t x_px, int64_t y_px, int bits, int c0, int d1, int d2,
                                   double value)
 {
-    const int below = (int)floor(value), halves = 2 * (below - c0) + 1;
-    if (fabs(value - below - 0.5) >= 0x1p-20)
+    const int below = (int)floor(value);
+    if (!(fabs(value - below - 0.5) < 0x1p-20)) /* or it is no number, of a triangle that has changed */
         return (uint8_t)(int)rint(value);
+    const int halves = 2 * (below - c0) + 1;
     const int side = s->exact ? compare_points(s, x_px, y_px, bits, d1, d2, halves)
                               : compare_exactly(&s->triangle, x_px, y_px, bits, d1, d2, halves);
     return (uint8_t)(below + (side > 0 || (side == 0 && (below & 1))));
