@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft import _engine
-from topleft._base.arrays import as_frozen, bad_triangle
+from topleft._base.arrays import as_checked_triangles, as_frozen, bad_triangle
 from topleft._base.threads import run_parts, threads_of_rows
 
 __all__ = [
@@ -99,8 +99,7 @@ def creased_normals(
     n_vertices, n_triangles = len(vertices), len(triangles)
     if n_triangles >= 1 << 28:
         raise ValueError(f"a mesh with a crease angle must have fewer than 2**28 triangles, got {n_triangles}")
-    own = np.array(triangles, np.int32)  # a copy: what has been checked is what is used
-    _check([_engine.first_bad_row(own, n_vertices)], own, n_vertices)
+    own = as_checked_triangles(triangles, n_vertices)
     if not n_triangles:
         return np.zeros((n_vertices, 3)), None
     first, group = (None, None) if places is None else places

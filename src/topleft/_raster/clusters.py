@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from topleft import _engine
-from topleft._base.arrays import check_rows
 from topleft._base.memory import CACHE_LINE
 from topleft._base.threads import count_threads, run_parts
 
@@ -64,8 +63,7 @@ class Clusters:
     """
 
     def __init__(self, points: NDArray[Any], triangles: NDArray[np.int32], threads: int | None = None) -> None:
-        """Sort and measure (V, 3) contiguous points and (T, 3) checked triangles."""
-        check_rows(triangles, len(points))
+        """Sort and measure (V, 3) contiguous points and (T, 3) checked triangles that nobody writes to."""
         self.points, self.triangles, self.backoff = points, triangles, Backoff()
         self.n_pictures, self.hidden = 0, 0.0
         n_triangles = len(triangles)
@@ -97,7 +95,6 @@ class Clusters:
     @cached_property
     def meshlets(self) -> Meshlets:
         """The same triangles in meshlets, made when they are first asked for (`pays_to_grow` in `choices.py`)."""
-        check_rows(self.triangles, len(self.points))
         return Meshlets(self)
 
     @property
