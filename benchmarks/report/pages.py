@@ -10,8 +10,8 @@ from benchmarks.harness.records import Record
 MARKED = re.compile(r"(<!-- table: ([\w-]+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
 
 
-def with_parts(text: str, record: Record, parts: Mapping[str, Callable[[Record], str]]) -> str:
-    """Return a page with what stands between its markers made anew, by `parts`.
+def with_parts(text: str, record: Record, parts: Mapping[str, Callable[[Record], str | None]]) -> str:
+    """Return a page with what stands between its markers made anew, by `parts`; what they give None for stays.
 
     Raises
     ------
@@ -24,9 +24,10 @@ def with_parts(text: str, record: Record, parts: Mapping[str, Callable[[Record],
         if name not in parts:
             raise ValueError(f"a marker must be one of {', '.join(parts)}, got {name!r}")
         try:
-            return f"{head}{parts[name](record)}\n{end}"
+            part = parts[name](record)
         except KeyError as key:
             raise ValueError(f"the record must hold {key} for {name!r}: measure that part") from None
+        return found[0] if part is None else f"{head}{part}\n{end}"
 
     page, n = MARKED.subn(made, text)
     if not n:

@@ -27,8 +27,8 @@ class Study:
     """
     lines: Callable[[Record], Iterable[str]]
     """What is printed of a record."""
-    parts: Mapping[str, Callable[[Record], str]] = field(default_factory=dict)
-    """What the markers `<!-- table: NAME -->` of its pages stand for."""
+    parts: Mapping[str, Callable[[Record], str | None]] = field(default_factory=dict)
+    """What the markers `<!-- table: NAME -->` of its pages stand for; None: of another record than this one."""
     charts: str | None = None
     """The module that draws its charts; it needs matplotlib."""
 

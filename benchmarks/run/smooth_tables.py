@@ -99,10 +99,15 @@ def errors_text(record: Record) -> str:
     return table_text(["contestant", "gives", "RMS error", "largest", "seam pixels (darkest)"], rows)
 
 
-PARTS: dict[str, Callable[[Record], str]] = {
-    "smooth-facts": facts_text,
-    "smooth-times": times_text,
-    "smooth-ratios": ratios_text,
-    "smooth-errors": errors_text,
+def if_measured(text: Callable[[Record], str]) -> Callable[[Record], str | None]:
+    """The same; None for a record without these scenes."""
+    return lambda record: text(record) if timed_scenes(record) else None
+
+
+PARTS: dict[str, Callable[[Record], str | None]] = {
+    "smooth-facts": if_measured(facts_text),
+    "smooth-times": if_measured(times_text),
+    "smooth-ratios": if_measured(ratios_text),
+    "smooth-errors": if_measured(errors_text),
 }
 """What the markers `<!-- table: NAME -->` of the page stand for."""

@@ -23,7 +23,7 @@ from benchmarks.harness.rounds import Options, run_cases
 from benchmarks.harness.yardstick import DEFAULT_PATTERN, Yardstick
 from benchmarks.peers import PEERS
 from benchmarks.report.study import Study
-from benchmarks.run import smooth_tables, tables
+from benchmarks.run import scene_tables, smooth_tables, tables
 from benchmarks.scenes.cases import CASES, TRIALS
 
 
@@ -74,4 +74,4 @@ def find_scenes(names: Sequence[str]) -> list[str]:
     return found
 
 
-STUDY = Study("run", "measure", add_arguments, run, tables.lines, smooth_tables.PARTS)
+STUDY = Study("run", "measure", add_arguments, run, tables.lines, {**scene_tables.PARTS, **smooth_tables.PARTS})

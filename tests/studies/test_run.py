@@ -13,7 +13,8 @@ from benchmarks.exact.pictures import compare, draw_exact
 from benchmarks.harness.rounds import Options, run_cases
 from benchmarks.harness.yardstick import DEFAULT_PATTERN, Yardstick, YardstickError
 from benchmarks.peers import PEERS, load_peer, why_not
-from benchmarks.run import tables
+from benchmarks.report.tables import number
+from benchmarks.run import scene_tables, smooth_tables, tables
 from benchmarks.scenes.cases import CASES, TASKS, Scene, orbit_camera
 
 import topleft as tl
@@ -60,6 +61,17 @@ def test_run_yardstick_is_read(record):
     (yardstick,) = record["scenes"][0]["yardsticks"]
     assert yardstick["turns_ms"] == [0.25, 0.25]
     assert list(yardstick["ratios_of_minima"]) == [f"topleft {ISA}"]
+
+
+def test_scene_tables_show_a_mesh_and_leave_out_what_was_not_measured():
+    record = run_cases(Options(["blob-10k", "large-4k"], [], [ISA], repeats=1, seconds=0))
+    mesh, fills = scene_tables.meshes_text(record), scene_tables.PARTS["fills"](record)
+    median = record["scenes"][0]["runs"][0]["median_ms"]
+    assert f"| 10,000    | {number(median)}" in mesh.replace("!", "")
+    assert fills.splitlines()[2].startswith("| large-4k | 1 ")
+    assert "not those of the exact picture: 0." in scene_tables.facts_text(record)
+    assert scene_tables.PARTS["strewn"](record) is None
+    assert smooth_tables.PARTS["smooth-times"](record) is None
 
 
 def test_report_names_contestants_and_errors(record):

@@ -1,0 +1,131 @@
+"""Tables of a record of meshes, strewn triangles and fills, for docs/measured/performance.md, between markers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from benchmarks.harness.records import Record
+from benchmarks.peers import OURS
+from benchmarks.report.tables import commit_text, number, table_text
+from benchmarks.run.tables import is_crowded, ratio
+
+Scene = dict[str, Any]
+Run = dict[str, Any]
+
+MESHES = ["blob-10k", "blob-100k", "blob-1m", "blob-10m"]
+STREWN = ["random-1000x400", "random-10000x100", "random-100000x10", "random-1000000x4", "frames-near-first",
+          "frames-far-first"]  # fmt: skip
+FILLS = ["large-4k", "fill-4k", "fill-1000x300", "fill-20000x40", "fill-200000x8", "labels-planar"]
+
+
+def scenes_of(record: Record, names: list[str]) -> list[Scene]:
+    """The scenes of these names that the record has, in their order."""
+    found = {scene["scene"]: scene for scene in record["scenes"]}
+    return [found[name] for name in names if name in found]
+
+
+def own_run(scene: Scene, isa: str, n_threads: int = 1) -> Run | None:
+    """What topleft took for the scene itself, not for the one beside it."""
+    return next(
+        (
+            run
+            for run in scene["runs"]
+            if run["peer"] == OURS and run["scene"] == scene["scene"]
+            and run["isa"] == isa and run["threads"] == n_threads
+        ),
+        None,
+    )  # fmt: skip
+
+
+def isas_of(record: Record) -> list[str]:
+    """Instruction sets that took part, the widest first."""
+    return list(dict.fromkeys(run["isa"] for scene in record["scenes"] for run in scene["runs"] if run["peer"] == OURS))
+
+
+def time_text(run: Run | None) -> str:
+    """The median, marked where others used the CPU."""
+    return number(run["median_ms"]) + "!" * is_crowded(run) if run else "-"
+
+
+def ratio_text(run: Run | None, other: Run | None) -> str:
+    """How many times as long as the other a run takes, pair by pair."""
+    return f"{ratio(run, other):.2f}x" if run and other else "-"
+
+
+def own_cells(scene: Scene, isas: list[str]) -> list[str]:
+    """A time for each instruction set, and what the first one gains by a second thread."""
+    alone = [own_run(scene, isa) for isa in isas]
+    return [*map(time_text, alone), ratio_text(alone[0], own_run(scene, isas[0], 2))]
+
+
+def own_head(isas: list[str]) -> list[str]:
+    """The heads of these cells."""
+    return [*isas, f"two threads ({isas[0]})"]
+
+
+def facts_text(record: Record) -> str | None:
+    """What the figures belong to."""
+    if not scenes_of(record, [*MESHES, *STREWN, *FILLS]):
+        return None
+    machine, options = record["machine"], record["options"]
+    peers = {run["peer"]: run for scene in record["scenes"] for run in scene["runs"] if run["peer"] != OURS}
+    versions = "".join(f", {name} {run['version']}" for name, run in peers.items())
+    wrong = sum((run["error"] or {}).get("wrong_px") or 0
+                for scene in record["scenes"] for run in scene["runs"] if run["peer"] == OURS)  # fmt: skip
+    return (
+        f"{machine['cpu']}, {machine['cpus']} CPUs, {machine['system']}, Python {machine['python']}, at "
+        f"{commit_text(record)}, {record['date'][:10]}{versions}; medians of {options['repeats']} rounds of "
+        f"{options['seconds']:g} s a turn. Pixels of ours that are not those of the exact picture: {wrong:,}. "
+        "!: others used the CPU, too."
+    )
+
+
+def meshes_text(record: Record) -> str | None:
+    """A row for each mesh: instruction sets, threads, wide arrays, no cull, the peer."""
+    scenes, isas = scenes_of(record, MESHES), isas_of(record)
+    if not scenes:
+        return None
+    rows = []
+    for scene in scenes:
+        first = own_run(scene, isas[0])
+        wide, both = (
+            next(iter(scenes_of(record, [scene["scene"] + end])), None) for end in ("-f64", "-nocull")
+        )  # fmt: skip
+        beside = next((run for run in wide["runs"] if run["peer"] == OURS and run["scene"] == scene["scene"]
+                       and run["isa"] == isas[0] and run["threads"] == 1), None) if wide else None  # fmt: skip
+        peer = next((run for run in scene["runs"] if run["peer"] != OURS and run["threads"] == 1), None)
+        peak = first.get("peak_mb") if first else None
+        rows.append([
+            f"{scene['n_triangles']:,}",
+            *own_cells(scene, isas),
+            ratio_text(own_run(wide, isas[0]) if wide else None, beside),
+            time_text(own_run(both, isas[0]) if both else None),
+            time_text(peer),
+            ratio_text(peer, first),
+            "-" if peak is None else f"{peak:.0f}",
+        ])  # fmt: skip
+    head = ["float64 and int64", "nothing culled", "llvmpipe, read back", "over ours", "peak MB"]
+    return table_text(["triangles", *own_head(isas), *head], rows)
+
+
+def rows_text(names: list[str]) -> Callable[[Record], str | None]:
+    """A table with a row for each of these scenes."""
+
+    def text(record: Record) -> str | None:
+        scenes, isas = scenes_of(record, names), isas_of(record)
+        if not scenes:
+            return None
+        rows = [[scene["scene"], f"{scene['n_triangles']:,}", *own_cells(scene, isas)] for scene in scenes]
+        return table_text(["scene", "triangles", *own_head(isas)], rows)
+
+    return text
+
+
+PARTS: dict[str, Callable[[Record], str | None]] = {
+    "scene-facts": facts_text,
+    "meshes": meshes_text,
+    "strewn": rows_text(STREWN),
+    "fills": rows_text(FILLS),
+}
+"""What the markers `<!-- table: NAME -->` of the page stand for."""
