@@ -165,6 +165,7 @@ def to_clip(vertices: F64, matrix: F64) -> F64:
 
 def to_pixels(clip: F64, width: int = 1920, height: int = 1080) -> F64:
     """Pixel-space vertices (V, 3) of clip-space vertices (V, 4) with w > 0: x px, y px (down), z in [0, 1]."""
+    clip = np.asarray(clip, np.float64)
     ndc = clip[:, :3] / clip[:, 3:]
     return np.stack([(ndc[:, 0] + 1) * width / 2, (1 - ndc[:, 1]) * height / 2, (ndc[:, 2] + 1) / 2], axis=-1)
 

@@ -96,6 +96,31 @@ def test_batch_left_early_drops_what_has_not_begun():
     assert len(begun) <= 1
 
 
+def test_batch_left_early_does_not_wait_for_jobs_that_a_broken_pool_forgets():
+    """A process pool that breaks leaves cancelled futures as they are: `wait` would wait for them for ever."""
+
+    class Forgetful(Executor):
+        def submit(self, draw, *arguments):
+            future = Future()
+            if not submitted:
+                future.set_result(draw(*arguments))
+            submitted.append(future)
+            return future
+
+    def leave_early():
+        results = tl.render_batch(views(9), executor=Forgetful())
+        next(results)
+        results.close()
+
+    submitted = []
+    thread = threading.Thread(target=leave_early, daemon=True)
+    thread.start()
+    thread.join(60)
+    assert not thread.is_alive()
+    assert len(submitted) > 1
+    assert all(future.cancelled() for future in submitted[1:])
+
+
 @pytest.mark.parametrize("executor", EXECUTORS)
 def test_batch_takes_tuples_and_different_sizes(executor):
     shapes = [result.picture.shape for result in tl.render_batch([(BOX,), (BOX, None, (8, 9))], executor=executor)]

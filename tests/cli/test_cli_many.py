@@ -11,6 +11,7 @@ import stat
 import subprocess
 import sys
 import time
+from multiprocessing import get_all_start_methods
 
 import numpy as np
 import pytest
@@ -423,12 +424,20 @@ def test_palette_of_an_animation_is_one_for_all_frames():
 # Interrupts
 
 
+def topleft_with(method):
+    """What of Python's command line is topleft, its processes started by a method: the default changed with 3.14."""
+    if method is None:
+        return ["-m", "topleft"]
+    start = f"import multiprocessing, sys; multiprocessing.set_start_method({method!r})"
+    return ["-c", f"{start}; from topleft.cli import main; sys.exit(main())"]
+
+
 @pytest.mark.skipif(not hasattr(os, "killpg"), reason="needs process groups")
 @pytest.mark.parametrize("meshes", [["octahedron"], ["octahedron", "tetrahedron"]])
-@pytest.mark.parametrize("jobs", [1, 2])
-def test_render_interrupted_leaves_whole_files_and_goes_on_with_resume(run, folder, meshes, jobs):
+@pytest.mark.parametrize(("jobs", "method"), [(1, None), *((2, method) for method in get_all_start_methods())])
+def test_render_interrupted_leaves_whole_files_and_goes_on_with_resume(run, folder, meshes, jobs, method):
     options = ["--jobs", str(jobs), "-o", "p/", "--shading", "ids", *SMALL]
-    command = [sys.executable, "-m", "topleft", "render", *meshes, *options, "--views", "5000"]
+    command = [sys.executable, *topleft_with(method), "render", *meshes, *options, "--views", "5000"]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True) as process:
         for _ in range(20_000):  # not by the clock: a machine may stand still
             if len(list(folder.glob("p/[!.]*.png"))) >= 3 or process.poll() is not None:
@@ -454,6 +463,19 @@ def children_of(pid):
     return [int(line) for line in found.stdout.split()]
 
 
+def workers_of(pid):
+    """The processes that draw: not what multiprocessing has beside them, nor a server that they are forked from."""
+    children = [child for child in children_of(pid) if "resource_tracker" not in words_of(child)]
+    return [worker for child in children for worker in workers_of(child) or [child]]
+
+
+def words_of(pid):
+    try:
+        return pathlib.Path(f"/proc/{pid}/cmdline").read_text()
+    except OSError:
+        return ""
+
+
 def is_running(pid):
     try:
         return pathlib.Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
@@ -461,23 +483,11 @@ def is_running(pid):
         return False
 
 
-@pytest.fixture
-def many_pictures(folder):
+@pytest.fixture(params=get_all_start_methods())
+def many_pictures(request, folder):
     """A run with two processes, once it has begun to write."""
-    command = [
-        sys.executable,
-        "-m",
-        "topleft",
-        "render",
-        "octahedron",
-        "tetrahedron",
-        "--jobs",
-        "2",
-        "-o",
-        "p/",
-        *SMALL,
-    ]
-    command += ["--views", "20000"]
+    options = ["octahedron", "tetrahedron", "--jobs", "2", "-o", "p/", *SMALL, "--views", "20000"]
+    command = [sys.executable, *topleft_with(request.param), "render", *options]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True) as process:
         for _ in range(20_000):
             if len(list(folder.glob("p/[!.]*.png"))) >= 3 or process.poll() is not None:
@@ -491,7 +501,7 @@ def many_pictures(folder):
 @pytest.mark.skipif(not pathlib.Path("/proc/self/stat").exists(), reason="needs /proc")
 @pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGKILL])
 def test_render_killed_takes_its_workers_along(many_pictures, how):
-    workers = children_of(many_pictures.pid)
+    workers = workers_of(many_pictures.pid)
     assert len(workers) >= 2
     many_pictures.send_signal(how)
     words = many_pictures.stderr.read()  # ends when nobody has it open
@@ -506,7 +516,7 @@ def test_render_killed_takes_its_workers_along(many_pictures, how):
 
 @pytest.mark.skipif(not pathlib.Path("/proc/self/stat").exists(), reason="needs /proc")
 def test_render_whose_worker_is_killed_says_so_in_one_line(many_pictures):
-    os.kill(children_of(many_pictures.pid)[0], signal.SIGKILL)
+    os.kill(workers_of(many_pictures.pid)[0], signal.SIGKILL)
     assert many_pictures.stderr.read() == (
         "topleft: a process that draws was killed, maybe for want of memory: try fewer --jobs, then --resume\n"
     )

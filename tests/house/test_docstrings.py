@@ -3,7 +3,7 @@
 import ast
 import doctest
 from importlib import import_module
-from inspect import ismodule
+from inspect import cleandoc, ismodule
 from pathlib import Path
 
 import pytest
@@ -47,11 +47,11 @@ def test_examples_print_what_stands_there(name):
 def public_docstrings():
     """Name and docstring of each function and class that the package promises; from its file, whatever it inherits."""
     found = {name: getattr(tl, name) for name in tl.__all__ if not name.startswith("__")}
-    return {name: thing.__doc__ or "" for name, thing in found.items() if not ismodule(thing)}
+    return {name: cleandoc(thing.__doc__ or "") for name, thing in found.items() if not ismodule(thing)}
 
 
 @pytest.mark.parametrize("name", sorted(public_docstrings()))
 def test_public_name_has_an_example_that_runs(name):
     """The test above runs it."""
-    assert "\n    Examples\n    --------\n" in public_docstrings()[name]
+    assert "\nExamples\n--------\n" in public_docstrings()[name]
     assert ">>> " in public_docstrings()[name].partition("Examples\n")[2]

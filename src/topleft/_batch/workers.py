@@ -79,8 +79,8 @@ class Workers:
         return False
 
     def stop(self, futures: Sequence[Future[Any]]) -> None:
-        """Wait until what has begun is finished."""
-        wait(futures)
+        """Wait until what has begun is finished; not for what was cancelled: broken pools forget it."""
+        wait([future for future in futures if not future.cancelled()])
 
 
 class BorrowedThreads(Workers):

@@ -12,9 +12,9 @@ import sys
 import tempfile
 import threading
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -140,7 +140,14 @@ def _executor(groups: Sequence[MeshJobs], n: int, stack: ExitStack) -> Executor 
         return n if n > 1 else None
     from concurrent.futures import ProcessPoolExecutor
 
-    pool = ProcessPoolExecutor(min(n, len(groups)), initializer=_depend_on_parent)
+    class Processes(ProcessPoolExecutor):
+        """Processes that Ctrl-C does not reach, also while `submit` starts them, or the server that they fork from."""
+
+        def submit(self, *arguments: Any, **options: Any) -> Any:
+            with _interrupts_blocked():
+                return super().submit(*arguments, **options)
+
+    pool = Processes(min(n, len(groups)), initializer=_depend_on_parent)
     stack.callback(pool.shutdown, cancel_futures=True)
     return pool
 
@@ -175,6 +182,19 @@ def client_of(address: str, n_workers: int, stack: ExitStack) -> Any:
         return stack.enter_context(Client(address, timeout=CONNECT_S, set_as_default=False))
     except OSError as error:
         raise UsageError(f"--dask {address}: no scheduler answers there ({one_line(error)})") from None
+
+
+@contextmanager
+def _interrupts_blocked() -> Iterator[None]:
+    """Let Ctrl-C wait; processes that are started meanwhile never see it."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _depend_on_parent() -> None:
