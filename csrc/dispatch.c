@@ -50,36 +50,56 @@ static const tl_isa_unit UNITS[TL_N_ISA] = {
     [TL_ISA_AVX512] = {"avx512", TL_FLAGS_AVX512, TL_TABLE_AVX512},
 };
 
-/* Each probe asks for all that its unit is compiled with in setup.py. __builtin_cpu_supports knows whether the
- * operating system saves the registers; not every clang knows "lzcnt", so that bit is read by hand. */
+#if defined(__x86_64__)
+/* What the CPU and the operating system tell, by hand: __builtin_cpu_supports needs a library that clang
+ * for Windows does not link. */
+typedef struct {
+    unsigned ecx_1, ebx_7, ecx_7, ecx_extended; /* registers of cpuid */
+    unsigned saved;                             /* which vectors a thread keeps while others run, of xgetbv */
+} cpu_words;
+
+#ifdef __APPLE__ /* whose system tells of longer ones once they are used, and saves them from then on */
+enum { SAVES_AVX2 = 0x06, SAVES_AVX512 = 0x06 };
+#else /* 128 and 256 bits; masks, 512 bits, 32 vectors */
+enum { SAVES_AVX2 = 0x06, SAVES_AVX512 = 0xe6 };
+#endif
+
+static cpu_words ask_cpu(void)
+{
+    cpu_words cpu = {0};
+    unsigned a, b, d;
+    if (__get_cpuid(1, &a, &b, &cpu.ecx_1, &d) && (cpu.ecx_1 & bit_OSXSAVE))
+        __asm__ volatile("xgetbv" : "=a"(cpu.saved), "=d"(d) : "c"(0));
+    __get_cpuid_count(7, 0, &a, &cpu.ebx_7, &cpu.ecx_7, &d);
+    __get_cpuid(0x80000001u, &a, &b, &cpu.ecx_extended, &d);
+    return cpu;
+}
+
+static int has(unsigned word, unsigned bits) { return (word & bits) == bits; }
+
+/* Each probe asks for all that its unit is compiled with in setup.py. */
 static int cpu_has_avx2(void)
 {
-#if defined(__x86_64__)
-    unsigned a, b, c, d;
-    __builtin_cpu_init();
-    return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("bmi") &&
-           __builtin_cpu_supports("bmi2") && __builtin_cpu_supports("popcnt") &&
-           __get_cpuid(0x80000001u, &a, &b, &c, &d) && (c & bit_LZCNT);
-#else
-    return 0;
-#endif
+    const cpu_words cpu = ask_cpu();
+    return has(cpu.saved, SAVES_AVX2) && has(cpu.ecx_1, bit_AVX | bit_FMA | bit_POPCNT) &&
+           has(cpu.ebx_7, bit_AVX2 | bit_BMI | bit_BMI2) && has(cpu.ecx_extended, bit_LZCNT);
 }
 
 static int cpu_has_avx512(void)
 {
-#if defined(__x86_64__)
-    return cpu_has_avx2() && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
-           __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl") &&
-           __builtin_cpu_supports("avx512cd");
-#else
-    return 0;
-#endif
+    const cpu_words cpu = ask_cpu();
+    return cpu_has_avx2() && has(cpu.saved, SAVES_AVX512) &&
+           has(cpu.ebx_7, bit_AVX512F | bit_AVX512BW | bit_AVX512DQ | bit_AVX512VL | bit_AVX512CD);
 }
 
 #ifdef TL_HAVE_VBMI
 extern const tl_meshlet_kernels tl_meshlets_vbmi;
 
-static int cpu_has_vbmi(void) { return __builtin_cpu_supports("avx512vbmi") && __builtin_cpu_supports("avx512vbmi2"); }
+static int cpu_has_vbmi(void) { return has(ask_cpu().ecx_7, bit_AVX512VBMI | bit_AVX512VBMI2); }
+#endif
+#else
+static int cpu_has_avx2(void) { return 0; }
+static int cpu_has_avx512(void) { return 0; }
 #endif
 
 const tl_meshlet_kernels *tl_meshlets_beside(const tl_kernels *kernels)

@@ -13,6 +13,9 @@
 #include "shading.h"
 #include "tiles.h"
 
+/* Where there is no number. The sign is clear; that of Microsoft's NAN depends on the compiler. */
+#define TL_NAN __builtin_nan("")
+
 /* ---- vertices ------------------------------------------------------------------------------------------ */
 
 /* A snapped vertex, 16 bytes: one vector load.  x_fx = TL_SPECIAL marks a vertex that the 64-bit path cannot

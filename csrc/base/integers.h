@@ -1,8 +1,9 @@
 /* Integers of 128 bits: the compiler's where it has them, otherwise a struct of two words; both give the same bits.
  * And of 64 bits under the same names, for code that is written once for both.
  *
- * No function but those named `wrapping` may overflow.  TL_NO_INT128 forces the struct, for compilers for 32-bit
- * machines and Microsoft's; tests/engine/test_integers.py holds both to Python's integers. */
+ * No function but those named `wrapping` may overflow.  The struct serves 32-bit machines, and Windows, whose
+ * libraries cannot divide 128 bits; TL_NO_INT128 forces it.  tests/engine/test_integers.py holds both to Python's
+ * integers. */
 #ifndef TL_INTEGERS_H
 #define TL_INTEGERS_H
 
@@ -11,7 +12,7 @@
 
 _Static_assert((-3 >> 1) == -2, "a right shift of a negative number must floor");
 
-#if defined(__SIZEOF_INT128__) && !defined(TL_NO_INT128)
+#if defined(__SIZEOF_INT128__) && !defined(TL_NO_INT128) && !defined(_WIN32)
 
 typedef __int128 tl_int128;
 typedef unsigned __int128 tl_uint128;

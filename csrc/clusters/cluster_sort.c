@@ -193,12 +193,12 @@ static void measure_clusters(const tl_source *source, const uint8_t *corners, in
         if (is_finite)
             measure_cone(points, corners + 3 * c->first_triangle, c);
         else /* no comparison with NaN holds: always drawn */
-            c->low[0] = c->high[0] = NAN;
+            c->low[0] = c->high[0] = TL_NAN;
         if (is_finite && box[0] == box[0]) {
             widen_box(box, box + 3, c->low);
             widen_box(box, box + 3, c->high);
         } else {
-            box[0] = NAN;
+            box[0] = TL_NAN;
         }
     }
 }

@@ -34,7 +34,7 @@ static void load_plane(value_plane *p, const tl_valued *mesh, int64_t id)
         const int64_t corner = mesh->triangles[3 * id + k];
         if (corner < 0 || corner >= mesh->n_points) { /* the caller's array may have changed */
             p->x = p->y = p->slope_x = p->slope_y = 0.0;
-            p->value = p->low = p->high = NAN;
+            p->value = p->low = p->high = TL_NAN;
             return;
         }
         x[k] = mesh->points_px[2 * corner];
@@ -52,7 +52,7 @@ static void load_plane(value_plane *p, const tl_valued *mesh, int64_t id)
     }
 }
 
-static const value_plane NO_PLANE = {.id = -1, .value = NAN, .low = NAN, .high = NAN};
+static const value_plane NO_PLANE = {.id = -1, .value = TL_NAN, .low = TL_NAN, .high = TL_NAN};
 
 static void list_planes(const tl_valued *mesh, int64_t first, int64_t end)
 {

@@ -47,7 +47,7 @@ TL_INLINE void set_values(point_span *r, const tl_points *points)
 /* Where x, y and w lie in the picture. */
 TL_INLINE void to_pixels(const tl_points *points, const vd *p, vd *xy)
 {
-    const vd one = vd_set1(1.0), none = vd_set1(NAN), inverse = vd_div(one, p[2]);
+    const vd one = vd_set1(1.0), none = vd_set1(TL_NAN), inverse = vd_div(one, p[2]);
     const vd x = vd_mul(p[0], inverse), y = vd_mul(p[1], inverse);
     const vm is_behind = vd_ge(vd_set1(0.0), p[2]);
     xy[0] = vd_select(is_behind, none, vd_mul(vd_add(x, one), vd_set1(points->half_width_px)));

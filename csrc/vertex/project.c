@@ -108,7 +108,7 @@ static inline void store_special(const projected_vertices *out, int64_t i, tl_sp
     if (!out->points)
         out->records[i] = (tl_vertex){TL_SPECIAL, what, 0.0};
     else
-        set_placed(point, NAN, what, 0.0, TL_SPECIAL, 0);
+        set_placed(point, TL_NAN, what, 0.0, TL_SPECIAL, 0);
 }
 
 /* One vertex, whatever it is. */

@@ -24,19 +24,21 @@ cdef extern from "dispatch.h" nogil:
     const char *tl_compiler()
     const char *tl_version()
 
-# The kernels in use. Scalar until `isa.py` has chosen: never NULL.
+# The kernels in use. Scalar until `isa.py` has chosen: never NULL. What draws meshlets beside them may be NULL; to ask
+# the CPU again takes up to 0.1 ms on a virtual machine.
 cdef const tl_kernels *K = tl_kernels_for(b"scalar")
+cdef const tl_meshlet_kernels *BESIDE = NULL
 cdef str isa_name = "scalar"
 
 
 def use_isa(name: str) -> None:
     """Let all further calls run on the kernels of one available instruction set."""
-    global K, isa_name
+    global K, BESIDE, isa_name
     cdef bytes key = name.encode()
     cdef const tl_kernels *kernels = tl_kernels_for(key)
     if kernels == NULL:
         raise ValueError(f"instruction set must be one of {', '.join(isa_available())}, got {name!r}")
-    K = kernels
+    K, BESIDE = kernels, tl_meshlets_beside(kernels)
     isa_name = name
 
 

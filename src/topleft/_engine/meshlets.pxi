@@ -12,7 +12,7 @@ MAX_DRAWN_PX = TL_MAX_DRAWN_PX
 
 def has_meshlets():
     """Tell whether there is code for meshlets beside the kernels in use, and a CPU for it."""
-    return tl_meshlets_beside(K) != NULL
+    return BESIDE != NULL
 
 
 def most_meshlets(int64_t n_triangles):
@@ -26,7 +26,7 @@ def grow_meshlets(Source source, const int32_t[:, ::1] triangles, const int32_t[
 
     `numbers`: -1 for each vertex; `room`: GROW_ROOM bytes. The rest has room for `most_meshlets`.
     """
-    cdef const tl_meshlet_kernels *kernels = tl_meshlets_beside(K)
+    cdef const tl_meshlet_kernels *kernels = BESIDE
     cdef int64_t n
     if kernels == NULL or end <= first:
         return 0
@@ -74,7 +74,7 @@ cdef class MeshletPass:
 
         `found` has room for SEEN_BYTES of each, `odd` for a number. Returns how many there are of the first, and of the second.
         """
-        cdef const tl_meshlet_kernels *kernels = tl_meshlets_beside(K)
+        cdef const tl_meshlet_kernels *kernels = BESIDE
         cdef tl_window window = self.mesh.window(0, self.target.height, self.target.width)
         cdef tl_target target = self.target.rows(0)
         cdef tl_meshlet_pass drawn = self.with_window(&window, &target)
@@ -111,7 +111,7 @@ cdef class MeshletPass:
         `others`, a number for each triangle, gets those that a clip plane may cut, or that 64 bits cannot hold; returns how
         many.
         """
-        cdef const tl_meshlet_kernels *kernels = tl_meshlets_beside(K)
+        cdef const tl_meshlet_kernels *kernels = BESIDE
         cdef tl_window window = self.mesh.window(0, self.target.height, self.target.width)
         cdef tl_target target = self.target.rows(0)
         cdef tl_meshlet_pass drawn = self.with_window(&window, &target)

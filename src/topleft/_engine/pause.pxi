@@ -2,7 +2,6 @@
 
 cdef extern from *:
     """
-    #include <time.h>
     #include "topleft.h"
 
     /* What a thread asks while it draws. */
@@ -22,12 +21,18 @@ cdef extern from *:
     static int is_said(const int32_t *stop) { return __atomic_load_n(stop, __ATOMIC_RELAXED); }
     static void say(int32_t *stop) { __atomic_store_n(stop, 1, __ATOMIC_RELAXED); }
 
+    #ifdef _WIN32
+    __declspec(dllimport) unsigned long long __stdcall GetTickCount64(void);
+    static int64_t clock_ns(void) { return (int64_t)GetTickCount64() * 1000000; }
+    #else
+    #include <time.h>
     static int64_t clock_ns(void)
     {
         struct timespec now;
         clock_gettime(CLOCK_MONOTONIC, &now);
         return (int64_t)now.tv_sec * 1000000000 + now.tv_nsec;
     }
+    #endif
     """
     ctypedef struct tl_thread_pause:
         tl_pause pause
