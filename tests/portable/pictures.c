@@ -9,6 +9,12 @@
 
 #include "topleft.h"
 
+#ifdef _WIN32 /* where C11's names are not */
+#include <malloc.h>
+#define aligned_alloc(alignment, n) _aligned_malloc(n, alignment)
+#define free _aligned_free
+#endif
+
 #ifndef TL_KERNELS
 #define TL_KERNELS tl_kernels_scalar
 #endif
