@@ -499,8 +499,9 @@ def many_pictures(request, folder):
 
 
 @pytest.mark.skipif(not pathlib.Path("/proc/self/stat").exists(), reason="needs /proc")
-@pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGKILL])
-def test_render_killed_takes_its_workers_along(many_pictures, how):
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGKILL"])
+def test_render_killed_takes_its_workers_along(many_pictures, name):
+    how = signal.Signals[name]
     workers = workers_of(many_pictures.pid)
     assert len(workers) >= 2
     many_pictures.send_signal(how)

@@ -27,6 +27,14 @@ def test_import_leaves_what_is_big_and_seldom_used_for_later(module):
     assert done.stdout.strip() == "False"
 
 
+def test_import_and_calls_ask_for_nothing_that_windows_lacks():
+    posix = ["fork", "geteuid", "pread", "register_at_fork", "sched_getaffinity", "sysconf"]
+    code = f"import os, numpy; [vars(os).pop(name, None) for name in {posix}]; import topleft as tl; "
+    code += "print(tl.coverage([(0, 0), (4, 0), (0, 4)], [(0, 1, 2)], (4, 4), threads=2).sum())"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "6"
+
+
 def test_every_public_name_is_there():
     for name in tl.__all__:
         assert getattr(tl, name) is not None

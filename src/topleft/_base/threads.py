@@ -37,16 +37,15 @@ def _forget_pool() -> None:
     _pool, _pool_lock = None, threading.Lock()
 
 
-os.register_at_fork(after_in_child=_forget_pool)
-
-
 def _hear_signals() -> None:
     """Let kernels answer Ctrl-C in the main thread, which is the one that forked in a child."""
     _engine.hear_signals_in(threading.main_thread().ident or 0, SCRATCH.threads)
 
 
 _hear_signals()
-os.register_at_fork(after_in_child=_hear_signals)
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_forget_pool)
+    os.register_at_fork(after_in_child=_hear_signals)
 
 
 def available_threads() -> int:
