@@ -10,6 +10,8 @@ TOPLEFT_BUILD_ISA   comma list of the instruction sets to build, scalar always a
 TOPLEFT_NO_INT128   "1" builds without the compiler's 128-bit integers, as it is done where there are none
 TOPLEFT_WERROR      "1" turns warnings into errors
 TOPLEFT_SANITIZE    sanitizers of the compiler, as of -fsanitize=; `.ci/sanitize` builds with them and runs the tests
+TOPLEFT_URL         the address of the repository, for the links in the metadata; the release workflow knows it
+CC                  on Windows, which clang to take
 """
 
 import hashlib
@@ -60,6 +62,8 @@ FLAGS_AVX512 = [
     *("-mavx512f", "-mavx512bw", "-mavx512dq", "-mavx512vl", "-mavx512cd", "-mprefer-vector-width=512"),
 ]
 FLAGS_VBMI = [*FLAGS_AVX512, "-mavx512vbmi", "-mavx512vbmi2"]
+
+CPUS_OF_WINDOWS = {"win-amd64": "x86_64", "win-arm64": "aarch64", "win32": "i686"}
 
 # What a compiler has to accept before a unit is built. Scalar: C11, no excess precision.
 PROBE_SCALAR = """
@@ -160,12 +164,12 @@ class BuildTopleft(build_ext):
 
     def build_extensions(self) -> None:
         """Compile the units of all extensions in one pool, and link each extension as soon as its units are there."""
-        if self.compiler.compiler_type == "msvc":
-            raise PlatformError("topleft needs gcc or clang: it uses their attributes, which MSVC does not have")
         # pip gives an editable build a folder that it deletes: the next build in the checkout would begin anew.
         kept = ROOT / "build" / f"temp.{self.plat_name}-{sys.implementation.cache_tag}"
         self.temp = (kept if self.editable_mode else Path(self.build_temp).resolve()) / "topleft"
         self.temp.mkdir(parents=True, exist_ok=True)
+        if os.name == "nt":
+            self.compiler = self.clang_for_windows()
         compiler = self.compiler.compiler_so
         try:
             version = subprocess.run([compiler[0], "--version"], capture_output=True, check=False).stdout
@@ -188,12 +192,32 @@ class BuildTopleft(build_ext):
             for ext, jobs in waiting:
                 self.link(ext, [str(job.result()) for job in jobs], last)
 
+    def clang_for_windows(self):
+        """Return clang, with Microsoft's headers and libraries, in place of the compiler that Python has chosen.
+
+        Microsoft's has neither the attributes nor the built-in functions that the kernels use. gcc for Windows has, but
+        aligns vectors of 32 and 64 bytes on the stack to 16 (GCC bug 54412), which ends the process.
+        """
+        from distutils.ccompiler import new_compiler  # that of setuptools
+
+        clang = shutil.which(os.environ.get("CC", "clang"))
+        if clang is None:
+            raise PlatformError("topleft needs clang on Windows: install LLVM, or let CC name its clang")
+        command = [clang, f"--target={CPUS_OF_WINDOWS[self.plat_name]}-pc-windows-msvc", "-DNDEBUG"]
+        compiler = new_compiler(compiler="unix")
+        # The linker makes an import library, which is not for the wheel.
+        shared = ["-shared", "-fuse-ld=lld", "-Xlinker", f"-implib:{self.temp / 'import.lib'}"]
+        compiler.set_executables(compiler_so=command, linker_so=[*command, *shared])
+        compiler.macros = self.compiler.macros  # Py_GIL_DISABLED, where it is
+        compiler.set_library_dirs(self.library_dirs)
+        return compiler
+
     def link(self, ext: Extension, objects: list[str], flags: list[str]) -> None:
-        """Link the objects of an extension."""
+        """Link the objects of an extension; on Windows headers name the libraries, Python's, too."""
         self.compiler.link_shared_object(
             objects,
             self.get_ext_fullpath(ext.name),
-            libraries=[*self.get_libraries(ext), "m"],
+            libraries=[] if os.name == "nt" else [*self.get_libraries(ext), "m"],
             library_dirs=ext.library_dirs,
             runtime_library_dirs=ext.runtime_library_dirs,
             export_symbols=self.get_export_symbols(ext),
@@ -306,7 +330,14 @@ def quoted(text: str) -> str:
     return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
 
 
+PAGES = {
+    "Homepage": "", "Source": "", "Documentation": "/tree/HEAD/docs", "Issues": "/issues",
+    "Changelog": "/blob/HEAD/CHANGELOG.md",
+}  # fmt: skip
+
+url = os.environ.get("TOPLEFT_URL")
 setup(
     ext_modules=[Extension(name, [f"src/{name.replace('.', '/')}.pyx"]) for name in (ENGINE, CLASSICS)],
     cmdclass={"build": BuildAnew, "build_ext": BuildTopleft},
+    project_urls={name: url + path for name, path in PAGES.items()} if url else {},
 )
