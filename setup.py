@@ -36,9 +36,9 @@ CLASSICS = "topleft.methods.classics.classic_kernels"
 
 WARNINGS = ["-Wall", "-Wextra"]
 # -ffp-contract=off and -fno-fast-math stand after whatever CFLAGS holds: the same bits on every machine depend on them.
-# -O2 -fno-tree-vectorize takes three quarters of the time to compile, and the kernels then take 1.15 times as long
-# (mean of 75 calls with AVX2; up to 2.8). -fno-tree-vectorize alone takes 0.94, and half of the calls 1.02 to 1.6 times
-# as long.
+# What compiles sooner draws later, in pairs of 43 calls with AVX-512 (mean, most): -O2 -fvect-cost-model=dynamic takes
+# 0.78 of the time, calls 1.12, up to 1.44; with -fpeel-loops, too, 0.85, 1.05, up to 1.16; -O3 -fno-gcse
+# -fno-schedule-insns2 0.95, 1.01, up to 1.08; -O2 -fno-tree-vectorize (75 calls with AVX2) 0.75, 1.15, up to 2.8.
 # Link-time optimisation could move code between units of different instruction sets. Debug information, which Python
 # asks for, would be nine tenths of the library and a third of the time: only `build_ext --debug` makes it.
 FLAGS_C = [
