@@ -4,6 +4,7 @@ import copy
 import dataclasses
 import pickle
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -143,12 +144,14 @@ def test_a_copy_of_scene_fragments_whose_parts_were_asked_for_shows_the_same(thr
 def test_rasterizer_in_two_threads_is_refused():
     rasterizer, refused = tl.Rasterizer(SIZE, threads=1), []
     few, many = [[0, 1, 2]], np.tile(np.array([[0, 1, 2]], np.int32), (20_000, 1))
+    latest = time.monotonic() + 60
 
     def draw():
-        try:
-            rasterizer.overdraw(VERTICES, many)
-        except RuntimeError as error:
-            refused.append(str(error))
+        while not refused and time.monotonic() < latest:  # until both draw at a time
+            try:
+                rasterizer.overdraw(VERTICES, many)
+            except RuntimeError as error:
+                refused.append(str(error))
 
     others = [threading.Thread(target=draw) for _ in range(2)]
     for thread in others:
