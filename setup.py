@@ -10,12 +10,13 @@ TOPLEFT_BUILD_ISA   comma list of the instruction sets to build, scalar always a
 TOPLEFT_NO_INT128   "1" builds without the compiler's 128-bit integers, as it is done where there are none
 TOPLEFT_WERROR      "1" turns warnings into errors
 TOPLEFT_SANITIZE    sanitizers of the compiler, as of -fsanitize=; `.ci/sanitize` builds with them and runs the tests
-TOPLEFT_URL         the address of the repository, for the links in the metadata; the release workflow knows it
+TOPLEFT_URL         the address of the repository, for links and pictures in the metadata; the release workflow knows it
 CC                  on Windows, which clang to take
 """
 
 import hashlib
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -335,8 +336,21 @@ PAGES = {
     "Changelog": "/blob/HEAD/CHANGELOG.md",
 }  # fmt: skip
 
+
+def readme(url: str | None) -> str:
+    """Return README.md; its files, which are beside it in the repository alone, by their addresses there."""
+    text = Path(ROOT, "README.md").read_text(encoding="utf-8")
+    if not url:
+        return text
+    elsewhere = r"(?!https?:|#)"
+    text = re.sub(rf"(!\[[^]]*\]\(){elsewhere}", rf"\g<1>{url}/raw/HEAD/", text)
+    return re.sub(rf"(\[[^]]*\]\(){elsewhere}", rf"\g<1>{url}/blob/HEAD/", text)
+
+
 url = os.environ.get("TOPLEFT_URL")
 setup(
+    long_description=readme(url),
+    long_description_content_type="text/markdown",
     ext_modules=[Extension(name, [f"src/{name.replace('.', '/')}.pyx"]) for name in (ENGINE, CLASSICS)],
     cmdclass={"build": BuildAnew, "build_ext": BuildTopleft},
     project_urls={name: url + path for name, path in PAGES.items()} if url else {},

@@ -86,6 +86,20 @@ def test_metadata_version_is_that_of_the_binary():
     assert tl.build_info()["version"] == metadata.version("topleft")
 
 
+def test_metadata_of_a_release_names_what_the_readme_shows_by_its_address(tmp_path):
+    pytest.importorskip("setuptools", minversion="77")
+    command = [sys.executable, "setup.py", "-q", "egg_info", "-e", str(tmp_path)]
+    address = "https://example.org/team/topleft"
+    subprocess.run(command, cwd=ROOT, env=os.environ | {"TOPLEFT_URL": address}, check=True, capture_output=True)
+    (folder,) = tmp_path.iterdir()
+    text = (folder / "PKG-INFO").read_text(encoding="utf-8")
+    assert f"Project-URL: Issues, {address}/issues\n" in text
+    assert f"![A torus knot, drawn by topleft]({address}/raw/HEAD/docs/images/torus-knot.png)" in text
+    targets = re.findall(r"\]\(([^)]*)\)", text)
+    assert f"{address}/blob/HEAD/docs/guide/install.md" in targets
+    assert all(target.startswith(address) for target in targets)
+
+
 def test_metadata_license_is_mit():
     assert metadata.metadata("topleft")["License-Expression"] == "MIT"
 
