@@ -37,9 +37,9 @@ CLASSICS = "topleft.methods.classics.classic_kernels"
 
 WARNINGS = ["-Wall", "-Wextra"]
 # -ffp-contract=off and -fno-fast-math stand after whatever CFLAGS holds: the same bits on every machine depend on them.
-# What compiles sooner draws later, in pairs of 43 calls with AVX-512 (mean, most): -O2 -fvect-cost-model=dynamic takes
-# 0.78 of the time, calls 1.12, up to 1.44; with -fpeel-loops, too, 0.85, 1.05, up to 1.16; -O3 -fno-gcse
-# -fno-schedule-insns2 0.95, 1.01, up to 1.08; -O2 -fno-tree-vectorize (75 calls with AVX2) 0.75, 1.15, up to 2.8.
+# What compiles sooner draws later. -O2 -fvect-cost-model=dynamic takes 0.78 of the time to build, and calls take 1.12
+# (mean of 43 with AVX-512; up to 1.44); with -fpeel-loops, too, 0.85 and 1.05 (of 14; up to 1.16); -O3 -fno-gcse
+# -fno-schedule-insns2 0.95 and 1.01 (of 14; up to 1.08); -O2 -fno-tree-vectorize 0.75 and 1.15 (of 75 with AVX2; 2.8).
 # Link-time optimisation could move code between units of different instruction sets. Debug information, which Python
 # asks for, would be nine tenths of the library and a third of the time: only `build_ext --debug` makes it.
 FLAGS_C = [

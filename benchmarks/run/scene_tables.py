@@ -25,17 +25,10 @@ def scenes_of(record: Record, names: list[str]) -> list[Scene]:
     return [found[name] for name in names if name in found]
 
 
-def own_run(scene: Scene, isa: str, n_threads: int = 1) -> Run | None:
-    """What topleft took for the scene itself, not for the one beside it."""
-    return next(
-        (
-            run
-            for run in scene["runs"]
-            if run["peer"] == OURS and run["scene"] == scene["scene"]
-            and run["isa"] == isa and run["threads"] == n_threads
-        ),
-        None,
-    )  # fmt: skip
+def own_run(scene: Scene, isa: str, n_threads: int = 1, name: str | None = None) -> Run | None:
+    """What topleft took for the scene itself; `name`: for the one beside it."""
+    wanted = {"peer": OURS, "scene": name or scene["scene"], "isa": isa, "threads": n_threads}
+    return next((run for run in scene["runs"] if run.items() >= wanted.items()), None)
 
 
 def isas_of(record: Record) -> list[str]:
@@ -92,8 +85,7 @@ def meshes_text(record: Record) -> str | None:
         wide, both = (
             next(iter(scenes_of(record, [scene["scene"] + end])), None) for end in ("-f64", "-nocull")
         )  # fmt: skip
-        beside = next((run for run in wide["runs"] if run["peer"] == OURS and run["scene"] == scene["scene"]
-                       and run["isa"] == isas[0] and run["threads"] == 1), None) if wide else None  # fmt: skip
+        beside = own_run(wide, isas[0], name=scene["scene"]) if wide else None
         peer = next((run for run in scene["runs"] if run["peer"] != OURS and run["threads"] == 1), None)
         peak = first.get("peak_mb") if first else None
         rows.append([

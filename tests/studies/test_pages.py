@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import pytest
 from benchmarks import cli
@@ -68,3 +69,18 @@ def test_commands_refuse_what_does_not_fit(tmp_path, capsys):
     assert "the page must hold" in capsys.readouterr().err
     assert cli.main(["charts", str(RECORDS / "smooth.json"), "-o", str(tmp_path)]) == 2
     assert "there are no charts of a record of run" in capsys.readouterr().err
+
+
+def test_readme_says_what_the_record_says_of_a_mesh():
+    """Its milliseconds, to two digits: with AVX-512, with AVX2, without either, by the fastest other renderer."""
+    scene = next(scene for scene in record_of("scenes")["scenes"] if scene["scene"] == "blob-100k")
+    runs = [run for run in scene["runs"] if run["scene"] == "blob-100k" and run["threads"] == 1]
+    ours = {run["isa"]: run["median_ms"] for run in runs if run["peer"] == "topleft"}
+    (other,) = [run["median_ms"] for run in runs if run["peer"] != "topleft"]
+    found = re.search(
+        r"takes ([\d.]+) ms .* with AVX-512, ([\d.]+) ms with AVX2, ([\d.]+) ms\s+without .* took ([\d.]+) ms",
+        (ROOT / "README.md").read_text(encoding="utf-8"),
+    )
+    assert found is not None
+    for text, median in zip(found.groups(), [ours["avx512"], ours["avx2"], ours["scalar"], other], strict=True):
+        assert abs(float(text) - median) <= 0.5 * 0.1 ** len(text.partition(".")[2]) + 1e-9
