@@ -271,11 +271,28 @@ def test_scalar_kernels_have_no_meshlets():
         ("none", 90_000, 0.0, 0.9, 0.1, False),
         ("none", 30_000, 0.2, 0.5, 0.0, False),
         ("none", 30_000, 0.8, 0.1, 0.0, True),
+        ("back", 60_000, 0.5, 0.5, 0.0, True),
+        ("none", 90_000, 0.0, 0.5, 0.6, True),
     ],
 )
 def test_meshlets_are_drawn_where_little_is_hidden(cull, n, outside, front, hidden, pays):
     view = View.parse(SIZE, {"cull": cull})
     assert choices.pays_to_draw_meshlets(view, n, Survey(outside, 0.0, 1 - outside - front, front), hidden) == pays
+
+
+@pytest.mark.parametrize(
+    ("cull", "n", "outside", "hidden", "pays"),
+    [
+        ("back", 60_000, 0.5, 0.0, False),
+        ("back", 60_000, 0.7, 0.0, True),
+        ("none", 90_000, 0.0, 0.5, True),
+        ("none", 90_000, 0.0, 0.6, False),
+        ("none", 900_000, 0.0, 0.6, True),
+    ],
+)
+def test_large_triangles_are_left_to_clusters_where_much_is_in_view_or_hidden(cull, n, outside, hidden, pays):
+    view = View.parse((1920, 1080), {"cull": cull})
+    assert choices.pays_to_draw_meshlets(view, n, Survey(outside, 0.0, 0.8 - outside, 0.2), hidden) == pays
 
 
 @pytest.mark.parametrize(("n_pictures", "n_clusters", "pays"), [(15, 100, False), (16, 100, True), (99, 350, False)])

@@ -67,9 +67,9 @@ def cameras(rng, n):
         }
 
 
-def draw(mesh, clusters, depth_test="less", **view):
+def draw(mesh, clusters, depth_test="less", size=SIZE, **view):
     plan = None if clusters is None else Drawn(clusters)
-    view = View.parse(SIZE, {**view, "plan": plan})
+    view = View.parse(size, {**view, "plan": plan})
     return draw_fragments(FreshMemory(), *mesh, view, depth_test, None, None)
 
 
@@ -106,6 +106,53 @@ def test_picture_has_the_same_bits(name, dtype):
             assert_same(got.barycentric(), expected.barycentric())
             assert_same(got.interpolate(mesh[0]), expected.interpolate(mesh[0]))
     assert n_drawn > 30
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize("name", ["blob", "soup", "shell"])
+def test_bounds_of_depth_leave_the_bits_of_wide_pictures(isa, name):
+    """Clusters that are wider than 96 columns are found hidden by bounds of segments of 64."""
+    rng = np.random.default_rng(5)
+    mesh = as_shells(*as_arrays("sphere")) if name == "shell" else as_arrays(name)
+    clusters = Clusters(*mesh)
+    with on(isa):
+        for i, view in enumerate(cameras(rng, 30)):
+            size, test = ((700, 90), (450, 200), (129, 300))[i % 3], ("less", "greater")[i % 2]
+            expected = draw(mesh, None, test, size, threads=1, **view)
+            got = draw(mesh, clusters, test, size, threads=THREADS[i % len(THREADS)], **view)
+            assert_same_fragments(got, expected)
+
+
+def as_shells(vertices, triangles):
+    """A sphere in a sphere, in another: most is hidden."""
+    scaled = [vertices * np.float32(scale) for scale in (1.0, 0.9, 0.8)]
+    corners = [triangles + np.int32(i * len(vertices)) for i in range(3)]
+    return np.concatenate(scaled), np.concatenate(corners)
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize("sink", [Sink.NEAREST, Sink.FARTHEST])
+def test_bounds_hide_the_same_clusters(isa, sink):
+    mesh, size, rng = as_shells(*as_arrays("blob")), (450, 200), np.random.default_rng(8)
+    clusters = Clusters(*mesh)
+    n_hidden = n_bounds = 0
+    for _ in range(8):
+        eye = rng.normal(size=3)
+        camera = tl.Camera.look_at(1.6 * eye / np.linalg.norm(eye), near=0.01, far=100.0)
+        seen = ClusteredMesh(clusters, View.parse(size, {"transform": camera.clip_from_world(size)}))
+        drawn = []
+        for is_bounded in (False, True):
+            target = _engine.Target(sink, np.empty(size[::-1], np.int32), np.empty(size[::-1], np.float32), None)
+            bounds = np.full(_engine.Target.bounds_shape(*size[::-1]), np.nan, np.float32)
+            if is_bounded:
+                target.keep_bounds(bounds)
+            with on(isa):
+                drawn.append(seen.draw_rows(FreshMemory(), target, 0, size[1])[1])
+        assert drawn[0] == drawn[1]
+        n_hidden += len(clusters) - drawn[0]
+        n_bounds += np.isfinite(bounds).sum()
+    assert n_hidden > 500
+    assert n_bounds > 1000
 
 
 @ON_EACH_ISA

@@ -123,7 +123,7 @@ cdef class Target:
     cdef float[:, ::1] bounds
 
     def __init__(self, int sink, pixels, depth, covered, samples=None, bint earlier_wins=False, bounds=None):
-        """`bounds`: `bounds_shape` float32, with which large triangles leave out what lies behind."""
+        """`bounds`: `bounds_shape` float32, with which large triangles and clusters that lie behind are left out."""
         self.sink, self.flip, self.bounds = sink, TL_FLIP if earlier_wins else 0, bounds
         self.height, self.width = pixels.shape
         self.pixel_bytes = pixels.itemsize
@@ -139,6 +139,10 @@ cdef class Target:
     def bounds_shape(int64_t height, int64_t width):
         """Return the shape of the float32 scratch that bounds of depth take."""
         return height, tl_segments(width)
+
+    def keep_bounds(self, float[:, ::1] bounds):
+        """Have it keep bounds of depth, `bounds_shape` float32, from when it is next cleared."""
+        self.bounds = bounds
 
     cdef tl_target rows(self, int64_t first_row) noexcept:
         """The buffers from a row on."""
