@@ -19,6 +19,7 @@
 #include "clusters.h"
 #include "topleft.h"
 #include "lanes/lanes.h"
+#include "clusters/behind.h"
 #include "vertex/fixed.h"
 #include "vertex/project.c"
 
@@ -140,63 +141,6 @@ static int shows_back(const tl_cluster *c, const tl_cluster_view *v, const seen_
 
 /* ---- occlusion ------------------------------------------------------------------------------------------- */
 
-/* The lanes in which a depth does not beat this one. */
-TL_INLINE vm not_beating(vm live, vf there, vf depth, int is_farthest)
-{
-    return vm_and_not(live, is_farthest ? vf_lt(depth, there) : vf_lt(there, depth));
-}
-
-/* Whether all depths of some columns of a row beat this one. */
-TL_INLINE int row_beats(const float *row, int64_t col0, int64_t col1, vf depth, int is_farthest)
-{
-    for (int64_t col = col0; col < col1; col += TL_LANES) {
-        const vm live = vm_first(col1 - col);
-        if (vm_any(not_beating(live, vf_load_masked(live, row + col), depth, is_farthest)))
-            return 0;
-    }
-    return 1;
-}
-
-/* The same of a row with bounds, which take what is found out of whole segments: depths only come before it. */
-TL_INLINE int bounded_row_beats(const float *row, float *bounds, int64_t width, int64_t col0, int64_t col1, float depth,
-                                int is_farthest)
-{
-    const vf depths = vf_set1(depth);
-    const int64_t n_segments = ((col1 - 1) >> TL_SEGMENT_BITS) + 1;
-    for (int64_t i = col0 >> TL_SEGMENT_BITS; i < n_segments; i += TL_LANES) {
-        const vm live = vm_first(n_segments - i);
-        unsigned open = vm_bits(not_beating(live, vf_load_masked(live, bounds + i), depths, is_farthest));
-        for (; open; open &= open - 1) {
-            const int64_t k = i + __builtin_ctz(open), first = k << TL_SEGMENT_BITS;
-            const int64_t end = min64(first + (1 << TL_SEGMENT_BITS), width);
-            if (row_beats(row, first, end, depths, is_farthest))
-                bounds[k] = depth;
-            else if (!row_beats(row, max64(first, col0), min64(end, col1), depths, is_farthest))
-                return 0;
-        }
-    }
-    return 1;
-}
-
-/* Columns of a rectangle from which on bounds pay. */
-#define TL_LEAST_BOUNDED 96
-
-/* Whether every depth of a rectangle of the window beats this one. */
-TL_INLINE int all_beat(const tl_target *target, int64_t row0, int64_t row1, int64_t col0, int64_t col1, float depth,
-                       int is_farthest)
-{
-    const int64_t width = target->stride_px;
-    const int has_bounds = target->bounds && col1 - col0 >= TL_LEAST_BOUNDED;
-    for (int64_t row = row0; row < row1 && col0 < col1; row++) {
-        const float *p = target->depth + row * width;
-        if (has_bounds ? !bounded_row_beats(p, target->bounds + row * tl_segments(width), width, col0, col1, depth,
-                                            is_farthest)
-                       : !row_beats(p, col0, col1, vf_set1(depth), is_farthest))
-            return 0;
-    }
-    return 1;
-}
-
 /* The depth of the vertex stage for z / w. */
 static inline double depth_of_ndc(const tl_cluster_view *v, double z) { return v->zero_to_one ? z : (z + 1.0) * 0.5; }
 
@@ -265,7 +209,8 @@ static int is_hidden(const seen_box *box, const tl_cluster_view *v, const tl_win
     const double error = 0x1p-33 * (largest[2] + 1.0), z = depth_of_ndc(v, is_farthest ? high[2] : low[2]);
     if (!(fabs(z) < 0x1p126)) /* the vertex stage has depths end at the largest float32 */
         return 0;
-    return all_beat(target, row0, row1, col0, col1, (float)(is_farthest ? z + error : z - error), is_farthest);
+    return all_beat(target->depth, target->stride_px, target->bounds, row0, row1, col0, col1,
+                    (float)(is_farthest ? z + error : z - error), is_farthest);
 }
 
 #define TL_MAX_PX_OF_CULLED 1024 /* triangles that are culled one by one take no longer */

@@ -18,6 +18,7 @@
 #include "topleft.h"
 #include "lanes/halves.h"
 #include "lanes/lanes.h"
+#include "clusters/behind.h"
 #include "vertex/fixed.h"
 #include "meshlets/batch.h"
 #include "meshlets/care.c"
@@ -144,6 +145,10 @@ static void clear_rows(const meshlet_batch *s, int32_t first, int32_t end)
             vf_store(s->depth + at + k, farthest);
         vf_store_masked(s->depth + at + k, vm_first(s->width - k), farthest);
     }
+    float *bounds = s->pass->target->bounds;
+    const int64_t n_segments = tl_segments(s->stride_px);
+    for (int64_t k = first * n_segments; bounds && k < end * n_segments; k++)
+        bounds[k] = s->is_farthest ? -INFINITY : INFINITY;
 }
 
 static void start_meshlets(meshlet_batch *s, const tl_meshlet_pass *pass, int32_t row0, int32_t row1)
@@ -184,19 +189,11 @@ static int is_meshlet_hidden(const meshlet_batch *s, const tl_seen_meshlet *at)
     const int32_t first = row - at->reach_y > s->row0 ? row - at->reach_y : s->row0;
     const int32_t end = row + at->reach_y < s->row1 ? row + at->reach_y + 1 : s->row1;
     const int32_t x = at->reach_x >> 1, y = at->reach_y >> 1;
-    const vf depth = vf_set1(at->depth);
     if (shows_at(s, col, row, at->depth) || shows_at(s, col - x, row - y, at->depth) ||
         shows_at(s, col + x, row - y, at->depth) || shows_at(s, col - x, row + y, at->depth) ||
         shows_at(s, col + x, row + y, at->depth))
         return 0; /* settles most that show */
-    for (int64_t i = first; i < end; i++)
-        for (int64_t k = col0; k < col1; k += TL_LANES) {
-            const vm live = vm_first(col1 - k);
-            const vf there = vf_load_masked(live, s->depth + i * s->stride_px + k);
-            if (vm_any(vm_and_not(live, s->is_farthest ? vf_lt(depth, there) : vf_lt(there, depth))))
-                return 0;
-        }
-    return 1;
+    return all_beat(s->depth, s->stride_px, s->pass->target->bounds, first, end, col0, col1, at->depth, s->is_farthest);
 }
 
 /* ---- the order in which they are drawn ------------------------------------------------------------------------- */

@@ -121,9 +121,9 @@ MIN_OUTSIDE_TO_CLUSTER = ((60_000, 0.1, 0.6), (500_000, 0.0, 0.33), (math.inf, 0
 #: triangles show (hills, 1.15 times), where triangles share no vertices, of which a cluster then has 85 (soup, 1.4
 #: times), and where much is hidden. Of views that cull nothing they take 0.7 to 1.03 of it from 100,000 triangles on,
 #: but 1.2 where 5 % of a million show; of 30,000 1.1 to 1.2 but for views from inside (0.8), and where more is hidden
-#: than is said here nothing is gained. Where triangles in view are few beside the pixels (fitted on a Sapphire Rapids,
-#: in 1920x1080) they take 1.0 to 1.3 times as long if more than 0.55 is hidden and both sides are drawn, and 1.05 to
-#: 1.3 times if faces are culled and less than 0.6 is outside.
+#: than is said here nothing is gained. Of large triangles less may be hidden, for meshlets are drawn from top to bottom:
+#: on a Sapphire Rapids, in 1920x1080, views of a scan of 100,000 triangles beyond these limits take 1.15 to 1.5 times as
+#: long, and of blobs of which both sides are drawn 1.1 to 1.3 times.
 #: Growing takes about three times as long as sorting clusters, which some 100 pictures pay back; a mesh that is drawn
 #: 16 times is likely to be drawn more.
 MIN_PICTURES_TO_GROW = 16
@@ -136,14 +136,13 @@ class MeshletLimits(NamedTuple):
     triangles: int
     outside: float
     hidden: float
-    few: float
-    """Triangles in view, of each pixel, below which the shares that follow hold as well."""
-    outside_of_few: float
-    hidden_of_few: float
+    hidden_of_large: float
+    """Of large triangles, and so much more with each triangle in view a pixel."""
+    hidden_growth: float
 
 
-CULLED_MESHLETS = MeshletLimits(60_000, 0.1, 0.6, few=0.02, outside_of_few=0.6, hidden_of_few=0.6)
-MESHLETS_OF_BOTH_SIDES = MeshletLimits(90_000, 0.5, 0.7, few=0.2, outside_of_few=0.0, hidden_of_few=0.55)
+CULLED_MESHLETS = MeshletLimits(60_000, 0.1, 0.6, hidden_of_large=0.17, hidden_growth=0.4)
+MESHLETS_OF_BOTH_SIDES = MeshletLimits(90_000, 0.5, 0.7, hidden_of_large=0.35, hidden_growth=1.0)
 
 #: Scenes whose instances lie so many deep, on the mean, are drawn from clusters in any case: 200 in rows, 8.8 deep, are
 #: 4 to 5.5 times as fast. Others are where so large a share is outside, with one sample and with several, for each of
@@ -319,11 +318,10 @@ def pays_to_draw_meshlets(view: View, n_triangles: int, survey: Survey, hidden: 
     `hidden`: the share of those in view that the last picture hid. Meshlets are drawn from top to bottom.
     """
     limits = MESHLETS_OF_BOTH_SIDES if view.cull == CULL_CODES[Cull.NONE] else CULLED_MESHLETS
-    n_in_view, n_pixels = n_triangles * (1.0 - survey.outside - survey.turned), view.size[0] * view.size[1]
-    if n_in_view < limits.few * n_pixels and (survey.outside < limits.outside_of_few or hidden > limits.hidden_of_few):
-        return False
+    density = n_triangles * (1.0 - survey.outside) / (view.size[0] * view.size[1])
     are_many = n_triangles >= limits.triangles or survey.outside >= limits.outside
-    return are_many and survey.front <= MAX_FRONT_TO_CLUSTER and hidden <= limits.hidden
+    most_hidden = min(limits.hidden, limits.hidden_of_large + limits.hidden_growth * density)
+    return are_many and survey.front <= MAX_FRONT_TO_CLUSTER and hidden <= most_hidden
 
 
 def pays_to_draw_instances(view: View, n_triangles: int, survey: Survey, count_layers: Callable[[], float]) -> bool:

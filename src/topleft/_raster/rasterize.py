@@ -339,10 +339,8 @@ def draw_clusters(memory: Memory, vertices: ArrayLike, view: View, asked: Asked)
     if route is choices.ClusterRoute.WHOLE:
         return None
     with buffers_of(memory, view, asked) as ((ids, depth), (ids_canvas, depth_canvas)):
-        target = _engine.Target(sink, ids_canvas, depth_canvas, None)
-        if route is choices.ClusterRoute.CLUSTERS:
-            target.keep_bounds(memory.empty("bounds", _engine.Target.bounds_shape(*ids_canvas.shape), np.float32))
-        if not mesh.draw(memory, target, route):
+        bounds = memory.empty("bounds", _engine.Target.bounds_shape(*ids_canvas.shape), np.float32)
+        if not mesh.draw(memory, _engine.Target(sink, ids_canvas, depth_canvas, None, bounds=bounds), route):
             return None
         lay_background(ids_canvas, depth_canvas, sink, asked)
     view.mark("draw")
