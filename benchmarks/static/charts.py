@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from benchmarks.report.charts import write_chart
-from benchmarks.static.tables import faster, label_of
+from benchmarks.static.tables import faster, is_whole, label_of
 
 LOOKS = (("#000000", "o"), ("#0072B2", "s"), ("#009E73", "D"), ("#D55E00", "^"), ("#CC79A7", "v"))
 """Of the views of a mesh, in their order."""
@@ -59,10 +59,10 @@ def draw_blobs(axis: Axes, record: dict[str, Any], cull: str) -> None:
     ]
     for i, view in enumerate(dict.fromkeys(row["view"] for row in own)):
         color, marker = LOOKS[i % len(LOOKS)]
-        points = sorted((row["n_triangles"], faster(row), row["is_clustered"]) for row in own if row["view"] == view)
+        points = sorted((row["n_triangles"], faster(row), is_whole(row)) for row in own if row["view"] == view)
         axis.plot([n for n, _, _ in points], [y for _, y, _ in points], color=color, lw=1.2, zorder=2)
-        for n, y, is_clustered in points:
-            axis.plot(n, y, marker, color=color, mfc=color if is_clustered else "white", ms=5, zorder=3)
+        for n, y, is_hollow in points:
+            axis.plot(n, y, marker, color=color, mfc="white" if is_hollow else color, ms=5, zorder=3)
         axis.plot([], [], color=color, marker=marker, ms=5, lw=1.2, label=view)
     axis.axhline(1, color="0.4", lw=1, zorder=1)
     axis.set(xscale="log", yscale="log", xlabel="triangles of the blob, 1920x1080")
@@ -81,7 +81,7 @@ def draw_others(axis: Axes, rows: list[dict[str, Any]]) -> None:
         color, label = KIND_COLORS[kind], KIND_NAMES[kind] if kind not in named else None
         named.add(kind)
         axis.plot([low, high], [i, i], color=color, lw=1.5, zorder=2)
-        inside = color if row["is_clustered"] else "white"
+        inside = "white" if is_whole(row) else color
         axis.plot(middle, i, "o", color=color, mfc=inside, ms=5, label=label, zorder=3)
     axis.axvline(1, color="0.4", lw=1, zorder=1)
     axis.set(xscale="log", ylim=(len(rows) - 0.4, -0.6), xlabel="times as fast as whole")

@@ -61,6 +61,11 @@ def yes(is_so: bool) -> str:
     return "yes" if is_so else "no"
 
 
+def is_whole(row: Row) -> bool:
+    """Tell whether the mesh was drawn whole, neither in clusters nor in meshlets."""
+    return not (row["is_clustered"] or "grown_faster" in row)
+
+
 def faster(row: Row) -> float:
     """Return how many times as fast as whole, the median over the rounds."""
     return float(row["faster"][1])
@@ -100,7 +105,7 @@ def cell_of(row: Row | None) -> str:
     """Return times faster, in parentheses where the mesh was drawn whole."""
     if row is None:
         return "-"
-    return f"{faster(row):.2f}" if row["is_clustered"] else f"({faster(row):.2f})"
+    return f"({faster(row):.2f})" if is_whole(row) else f"{faster(row):.2f}"
 
 
 def details_text(record: Record, wanted: Callable[[Row], bool]) -> str:
@@ -172,7 +177,7 @@ def kept_whole_text(record: Record) -> str:
     rows = [
         [label_of(row), f"{row['whole_ms'][1]:.3g}", f"{faster(row):.2f}", f"{row['clusters_faster'][1]:.2f}"]
         for row in record["rows"]
-        if not row["is_clustered"]
+        if is_whole(row)
     ]
     if not rows:
         return "There are none."

@@ -121,9 +121,9 @@ MIN_OUTSIDE_TO_CLUSTER = ((60_000, 0.1, 0.6), (500_000, 0.0, 0.33), (math.inf, 0
 #: triangles show (hills, 1.15 times), where triangles share no vertices, of which a cluster then has 85 (soup, 1.4
 #: times), and where much is hidden. Of views that cull nothing they take 0.7 to 1.03 of it from 100,000 triangles on,
 #: but 1.2 where 5 % of a million show; of 30,000 1.1 to 1.2 but for views from inside (0.8), and where more is hidden
-#: than is said here nothing is gained. Of large triangles less may be hidden, for meshlets are drawn from top to bottom:
-#: on a Sapphire Rapids, in 1920x1080, views of a scan of 100,000 triangles beyond these limits take 1.15 to 1.5 times as
-#: long, and of blobs of which both sides are drawn 1.1 to 1.3 times.
+#: than is said here nothing is gained. Of large triangles less may be hidden, for meshlets are drawn from top to
+#: bottom: on a Sapphire Rapids, in 1920x1080, views of a scan of 100,000 triangles beyond these limits take 1.15 to 1.5
+#: times as long, and of blobs of which both sides are drawn 1.1 to 1.3 times.
 #: Growing takes about three times as long as sorting clusters, which some 100 pictures pay back; a mesh that is drawn
 #: 16 times is likely to be drawn more.
 MIN_PICTURES_TO_GROW = 16
