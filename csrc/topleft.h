@@ -197,7 +197,7 @@ typedef struct {
     tl_census *census;         /* CENSUS */
     const tl_peeled *peeled;   /* PEEL; the window has less than 2^31 pixels */
     /* NEAREST, FARTHEST: what no depth of a segment of a row lies behind, tl_segments(stride_px) numbers a row, set by
-     * draw, so that large triangles leave out segments that they lie behind; or NULL */
+     * draw, so that large triangles and clusters that lie behind are left out; or NULL */
     float *bounds;
 } tl_target;
 

@@ -163,8 +163,8 @@ class PlacedScene:
         if self._can_cluster(Sink(targets[0].sink)) and pays_in_clusters(self, *seen):
             order = front_to_back(self.scene, self._clip_from_world)
             if Sink(targets[0].sink) in (Sink.NEAREST, Sink.FARTHEST):
+                shape = _engine.Target.bounds_shape(height, self._view.size[0])
                 for target in targets:
-                    shape = _engine.Target.bounds_shape(height, self._view.size[0])
                     target.keep_bounds(FRESH.empty("bounds", shape, np.float32))
             if draw_placed(self, order, targets, positions, height, n_parts):
                 return
