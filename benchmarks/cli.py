@@ -35,6 +35,7 @@ from benchmarks.small.large import STUDY as LARGE
 from benchmarks.small.layers import STUDY as LAYERS
 from benchmarks.small.memset import STUDY as MEMSET
 from benchmarks.small.no_snap import STUDY as NO_SNAP
+from benchmarks.small.samples import STUDY as SAMPLES
 from benchmarks.small.samplings import STUDY as SAMPLINGS
 from benchmarks.small.tiles import STUDY as TILES
 from benchmarks.small.tolerance import STUDY as TOLERANCE
@@ -44,7 +45,7 @@ STUDIES = {
     study.kind: study
     for study in (
         RUN, ACCURACY, BATCH, ATLAS, CHOICES, STATIC, PICTURES, LEVELS, LAYERS, FIELD, SAMPLINGS, PLANNER, MEMSET,
-        GROWTH, POLYGONS, REAL_FILES, FRESH, LARGE, GATE, TILES, EXPLORER, CLUSTER, NO_SNAP, TOLERANCE,
+        GROWTH, POLYGONS, REAL_FILES, FRESH, LARGE, GATE, TILES, EXPLORER, CLUSTER, NO_SNAP, TOLERANCE, SAMPLES,
     )
 }  # fmt: skip
 

@@ -21,6 +21,7 @@
 #include "pixels/weights.c"
 #include "pixels/paint.c"
 #include "pixels/resolve.c"
+#include "pixels/split.c"
 #include "pixels/points.c"
 #include "pixels/planes.c"
 #include "pixels/slopes.c"
@@ -69,6 +70,9 @@ const tl_kernels TL_KERNELS = {
     .set_flat_depth = set_flat_depth,
     .bin = bin,
     .list_bins = list_bins,
+    .find_columns = find_columns,
+    .split_pixels = split_pixels,
+    .spread_ids = spread_ids,
     .draw_area = draw_area,
     .blend = blend,
     .fill_few = fill_few,

@@ -97,6 +97,18 @@ typedef struct tl_kernels {
      * + 2 numbers.  A first call with listed = NULL sets starts[n_bands + 1] to the length of `listed`. */
     void (*list_bins)(const tl_bins *bins, int64_t n_bands, int64_t *starts, int32_t *listed);
 
+    /* The columns [columns[2 k], columns[2 k + 1]) that the triangles of band k may reach. */
+    void (*find_columns)(const tl_bins *bins, int64_t n_bands, int32_t *columns);
+
+    /* Lists pixels whose samples see several triangles, from place `at` on, where there is room for 16 more than there
+     * are; returns where they end. */
+    int64_t (*split_pixels)(const tl_seen_samples *seen, const tl_split *split, int64_t at);
+
+    /* Writes rows of `width` ids that sample k, not the first, sees, from those of the first and `split`, whose rows
+     * begin with these. */
+    void (*spread_ids)(const tl_split *split, int k, int64_t n_rows, int64_t width, const int32_t *first_ids,
+                       int32_t *ids);
+
     /* The exact area that triangles cover of each pixel, their sum; the window has fewer than 2^31 cells.  Returns as
      * `draw` does, or TL_AREA_OVERFLOW; either way the pixels are then worthless. */
     int64_t (*draw_area)(const tl_snapped *snapped, const tl_window *window, const tl_area *target);
@@ -156,11 +168,11 @@ typedef struct tl_kernels {
     void (*shade)(const tl_snapped *snapped, const tl_window *window, const tl_view *view, const tl_shading *shading,
                   const int32_t *ids, const float *depth, uint8_t *pixels);
 
-    /* The same from planes of ids and depth that lie `stride` pixels apart, one a sample; samples_fx as in
-     * tl_target. */
+    /* The same from planes of ids and depth that lie `stride` pixels apart, one a sample; samples_fx as in tl_target.
+     * With `split`, whose rows begin with the window's, there is the plane of the first sample alone. */
     void (*shade_samples)(const tl_snapped *snapped, const tl_window *window, const tl_view *view,
                           const tl_shading *shading, const int32_t *samples_fx, int sample_bits, int64_t stride,
-                          const int32_t *ids, const float *depth, uint8_t *pixels);
+                          const int32_t *ids, const float *depth, const tl_split *split, uint8_t *pixels);
 
     /* Unit normals on the side that is seen, float32 (x, y, z), 0 where nothing is: turned by shading->eye_from; show
      * is NORMALS. */

@@ -261,7 +261,28 @@ typedef struct {
 typedef struct {
     int64_t n;
     int32_t *ids, *first_band, *last_band; /* n_triangles + 16 numbers each */
+    int32_t *first_col, *end_col;          /* the same, the columns that each may reach; or NULL */
 } tl_bins;
+
+#define TL_MAX_SAMPLES 16 /* of a pixel */
+
+/* Pixels whose samples see several triangles, row by row from left to right: those of row y are [rows[2 y], rows[2 y +
+ * 1]) of the columns, and of the ids and depths of each sample but the first, which lie `room` numbers apart. */
+typedef struct {
+    int64_t *rows;
+    int32_t *columns, *ids;
+    float *depth;
+    int64_t room;
+} tl_split;
+
+/* What 2^sample_bits samples see in the rows [row0, row0 + n_rows) of a picture: the first sample in all columns, and
+ * the others, `plane` pixels apart, in the columns [col0, col0 + n_cols), outside of which none sees anything. */
+typedef struct {
+    const int32_t *first_ids, *ids;
+    const float *depth;
+    int64_t first_stride, stride, plane, row0, n_rows, col0, n_cols;
+    int sample_bits;
+} tl_seen_samples;
 
 /* What is averaged of the samples' colours: uint8 values become light and back in 65537 steps; alpha, behind the first
  * n_channels, does not.  With straight alpha colours count as much as they are opaque. */

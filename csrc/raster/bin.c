@@ -24,9 +24,13 @@ typedef struct {
     int32_t max_extent, left, top, right, bottom;
 } bin_limits;
 
-/* Widens the rows [*row0, *row1) of the window by those that a triangle may reach. */
-static void widen_rows(const bin_limits *b, const tl_vertex_set *set, const int32_t *corners, int64_t *row0,
-                       int64_t *row1)
+/* Pixels of the window; empty unless col0 < col1 and row0 < row1. */
+typedef struct {
+    int64_t col0, col1, row0, row1;
+} bin_box;
+
+/* Widens a box by the pixels that a triangle may reach. */
+static void widen_bin(const bin_limits *b, const tl_vertex_set *set, const int32_t *corners, bin_box *box)
 {
     const tl_window *window = b->window;
     const int bits = window->subpixel_bits;
@@ -34,11 +38,16 @@ static void widen_rows(const bin_limits *b, const tl_vertex_set *set, const int3
     const int sign = load_triangle(set, corners, &t);
     if (is_culled(sign, b->snapped->cull))
         return;
+    const int64_t x0 = min3(t.x_fx[0], t.x_fx[1], t.x_fx[2]), x1 = max3(t.x_fx[0], t.x_fx[1], t.x_fx[2]);
     const int64_t y0 = min3(t.y_fx[0], t.y_fx[1], t.y_fx[2]), y1 = max3(t.y_fx[0], t.y_fx[1], t.y_fx[2]);
-    const int64_t first = max64(((y0 + b->low_fx) >> bits) - window->y_px, 0);
-    const int64_t end = min64(((y1 + b->high_fx) >> bits) - window->y_px, window->height);
-    if (first < end)
-        *row0 = min64(*row0, first), *row1 = max64(*row1, end);
+    const int64_t col0 = max64(((x0 + b->low_fx) >> bits) - window->x_px, 0);
+    const int64_t col1 = min64(((x1 + b->high_fx) >> bits) - window->x_px, window->width);
+    const int64_t row0 = max64(((y0 + b->low_fx) >> bits) - window->y_px, 0);
+    const int64_t row1 = min64(((y1 + b->high_fx) >> bits) - window->y_px, window->height);
+    if (col0 >= col1 || row0 >= row1)
+        return;
+    box->col0 = min64(box->col0, col0), box->col1 = max64(box->col1, col1);
+    box->row0 = min64(box->row0, row0), box->row1 = max64(box->row1, row1);
 }
 
 /* Triangle i, or its pieces, by itself. */
@@ -46,14 +55,16 @@ static __attribute__((noinline)) void bin_alone(const bin_limits *b, int64_t i, 
 {
     int32_t own[3];
     const triangle_parts parts = parts_of(b->snapped, i, own);
-    int64_t row0 = b->window->height, row1 = 0;
+    bin_box box = {b->window->width, 0, b->window->height, 0};
     for (int k = 0; k < parts.n; k++)
-        widen_rows(b, &parts.set, parts.corners + 3 * k, &row0, &row1);
-    if (row0 >= row1)
+        widen_bin(b, &parts.set, parts.corners + 3 * k, &box);
+    if (box.row0 >= box.row1)
         return;
     bins->ids[bins->n] = (int32_t)i;
-    bins->first_band[bins->n] = (int32_t)(row0 >> b->band_bits);
-    bins->last_band[bins->n] = (int32_t)((row1 - 1) >> b->band_bits);
+    bins->first_band[bins->n] = (int32_t)(box.row0 >> b->band_bits);
+    bins->last_band[bins->n] = (int32_t)((box.row1 - 1) >> b->band_bits);
+    if (bins->first_col)
+        bins->first_col[bins->n] = (int32_t)box.col0, bins->end_col[bins->n] = (int32_t)box.col1;
     bins->n++;
 }
 
@@ -86,6 +97,10 @@ TL_INLINE int bin_batch(const bin_limits *b, int64_t i, const int32_t *corners, 
     vi_compress(bins->ids + bins->n, seen, vi_add(vi_set1((int32_t)i), vi_iota()));
     vi_compress(bins->first_band + bins->n, seen, vi_shift_right(first, b->band_bits));
     vi_compress(bins->last_band + bins->n, seen, vi_shift_right(last, b->band_bits));
+    if (bins->first_col) {
+        vi_compress(bins->first_col + bins->n, seen, vi_sub(col0, vi_set1(b->left)));
+        vi_compress(bins->end_col + bins->n, seen, vi_sub(col1, vi_set1(b->left)));
+    }
     bins->n += __builtin_popcount(vm_bits(seen));
     return 1;
 }
@@ -132,6 +147,21 @@ static void list_bins(const tl_bins *bins, int64_t n_bands, int64_t *starts, int
     for (int64_t i = 0; i < bins->n; i++) /* starts[k + 1] is where band k goes on, and ends where band k + 1 begins */
         for (int32_t k = bins->first_band[i]; k <= bins->last_band[i]; k++)
             listed[starts[k + 1]++] = bins->ids[i];
+}
+
+/* The columns [columns[2 k], columns[2 k + 1]) that the triangles of band k may reach, none where there are no
+ * triangles. */
+static void find_columns(const tl_bins *bins, int64_t n_bands, int32_t *columns)
+{
+    for (int64_t k = 0; k < n_bands; k++)
+        columns[2 * k] = INT32_MAX, columns[2 * k + 1] = 0;
+    for (int64_t i = 0; i < bins->n; i++)
+        for (int32_t *at = columns + 2 * bins->first_band[i]; at <= columns + 2 * bins->last_band[i]; at += 2) {
+            at[0] = bins->first_col[i] < at[0] ? bins->first_col[i] : at[0];
+            at[1] = bins->end_col[i] > at[1] ? bins->end_col[i] : at[1];
+        }
+    for (int64_t k = 0; k < n_bands; k++)
+        columns[2 * k] = columns[2 * k] < columns[2 * k + 1] ? columns[2 * k] : columns[2 * k + 1];
 }
 
 #endif

@@ -14,7 +14,6 @@
 #include "topleft.h"
 #include "lanes/lanes.h"
 
-#define TL_MAX_SAMPLES 16
 _Static_assert(4 * 64 / TL_MAX_SAMPLES >= TL_LANES, "the pixels of four words are whole vectors");
 #define TL_EVEN_WORDS 8 /* that are worth a call */
 

@@ -1,7 +1,8 @@
 /* Shaded samples: a visibility buffer with several samples a pixel to a picture.  A triangle is shaded once in each
  * pixel that it shows in, at the first of the samples that see it; what the pixel shows is the mean of the light at its
  * samples.
- * In: planes of ids, the mesh.  Out: red, green, blue and opacity, uint8. */
+ * In: planes of ids, or one plane and the pixels that show several triangles; the mesh.  Out: red, green, blue and
+ * opacity, uint8. */
 #ifndef TL_SHADE_SAMPLES_C
 #define TL_SHADE_SAMPLES_C
 
@@ -90,27 +91,78 @@ TL_INLINE vi finish_lanes(const sample_sums *sums, const tl_shading *shading, in
     return vi_select(vf_lt(vf_set1(0.0f), share), word, vi_set1(background));
 }
 
+/* What the samples of a span of pixels see, a plane a sample. */
+typedef struct {
+    int32_t ids[TL_MAX_SAMPLES][TL_SPAN_ROOM];
+    float depth[TL_MAX_SAMPLES][TL_SPAN_ROOM];
+} span_samples;
+
+/* Writes what the samples of n pixels see, of which split pixels [at, end) are the first that may lie there; `ids` and
+ * `depth` are those of the first sample.  Returns where the split pixels of the next span begin. */
+static int64_t unpack_span(const tl_split *split, int64_t at, int64_t end, int64_t column, int n, int sample_bits,
+                           const int32_t *ids, const float *depth, span_samples *span)
+{
+    for (int k = 0; k < 1 << sample_bits; k++)
+        memcpy(span->ids[k], ids, (size_t)n * sizeof *ids);
+    memcpy(span->depth[0], depth, (size_t)n * sizeof *depth); /* others are read where a pixel is split */
+    for (; at < end && split->columns[at] < column + n; at++) {
+        const int64_t x = split->columns[at] - column;
+        for (int k = 1; k < 1 << sample_bits; k++) {
+            span->ids[k][x] = split->ids[(k - 1) * split->room + at];
+            span->depth[k][x] = split->depth[(k - 1) * split->room + at];
+        }
+    }
+    return at;
+}
+
+/* All samples of n pixels see what the first does. */
+TL_INLINE int find_whole(sample_sums *sums, const int32_t *ids, int sample_bits, int n)
+{
+    const vi none = vi_set1(-1);
+    vm any = vm_first(0);
+    for (int x = 0; x < n; x += TL_LANES) {
+        const vm inside = vm_first(n - x);
+        const vi own = vi_select(inside, vi_load_masked(inside, ids + x), none);
+        any = vm_or(any, vi_gt(own, none));
+        vi_store(sums->ids + x, vi_max(own, none));
+        vf_store(sums->n_seen + x, vf_set1((float)(1 << sample_bits)));
+    }
+    return vm_any(any);
+}
+
 /* The picture of planes of ids (and depth), `stride` pixels apart, for 2^sample_bits samples at (x, y) sub-pixels from
- * the centre. */
+ * the centre; with `split` of one plane. */
 static void shade_samples(const tl_snapped *snapped, const tl_window *window, const tl_view *view,
                           const tl_shading *shading, const int32_t *samples_fx, int sample_bits, int64_t stride,
-                          const int32_t *ids, const float *depth, uint8_t *pixels)
+                          const int32_t *ids, const float *depth, const tl_split *split, uint8_t *pixels)
 {
     shade_runs s;
     sample_sums sums;
+    span_samples span;
     tl_snapped seen = *snapped;
     start_runs(&s, &seen, window, view, shading);
     for (int64_t row = 0; row < window->height && !tl_is_given_up(window); row++) {
+        const int64_t end = split ? split->rows[2 * row + 1] : 0;
+        int64_t next = split ? split->rows[2 * row] : 0;
         tl_count_work(window, TL_SHADE_PX * window->width);
         for (int64_t column = 0; column < window->width; column += TL_SPAN) {
             const int64_t at = row * window->width + column;
             const int n = (int)min64(TL_SPAN, window->width - column);
+            const int is_whole = split && (next == end || split->columns[next] >= column + n);
+            const int32_t *own = ids + at;
+            const float *own_depth = depth + at;
+            int64_t own_stride = stride;
             memset(&sums, 0, offsetof(sample_sums, n_seen));
-            for (int k = 0; k < 1 << sample_bits; k++) {
-                if (!find_first_seen(&sums, ids + at, stride, sample_bits, k, n))
+            if (split && !is_whole) {
+                next = unpack_span(split, next, end, column, n, sample_bits, own, own_depth, &span);
+                own = span.ids[0], own_depth = span.depth[0], own_stride = TL_SPAN_ROOM;
+            }
+            for (int k = 0; k < (is_whole ? 1 : 1 << sample_bits); k++) {
+                if (!(is_whole ? find_whole(&sums, own, sample_bits, n)
+                               : find_first_seen(&sums, own, own_stride, sample_bits, k, n)))
                     continue;
                 seen.mesh.sample_x_fx = samples_fx[2 * k], seen.mesh.sample_y_fx = samples_fx[2 * k + 1];
-                add_shaded(&sums, &s, row, column, n, depth + k * stride + at);
+                add_shaded(&sums, &s, row, column, n, own_depth + k * own_stride);
             }
             for (int x = 0; x < n; x += TL_LANES)
                 vi_store_masked((int32_t *)pixels + at + x, vm_first(n - x),

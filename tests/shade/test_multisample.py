@@ -7,10 +7,11 @@ import sys
 import numpy as np
 import pytest
 from comparing import assert_same
+from engine_cases import ON_EACH_ISA, on
 
 import topleft as tl
 from topleft._base.color import id_colors, srgb_tables
-from topleft._shade.shade import GREY_OF_FARTHEST, GREY_OF_NEAREST, picture_of_numbers
+from topleft._shade.shade import GREY_OF_FARTHEST, GREY_OF_NEAREST, colors_of_numbers
 from topleft.methods.reference.sampling import mean
 
 SIZE = (48, 36)
@@ -23,6 +24,24 @@ def test_alpha_is_the_share_of_samples_with_a_triangle(n):
     got = tl.render(KNOT, size=SIZE, sampling=f"msaa{n}", background=CLEAR)
     frags = tl.rasterize_mesh(KNOT, size=SIZE, sampling=f"msaa{n}")
     assert_same(got[..., 3], np.rint(255 * (frags.samples_triangle >= 0).mean(-1)).astype(np.uint8))
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize("shading", ["smooth", "flat", "normals"])
+@pytest.mark.parametrize("size", [SIZE, (1100, 40)])
+def test_picture_is_the_same_from_planes_of_samples(isa, shading, size):
+    square = tl.Camera.orthographic(tl.Camera.framing(KNOT).view, near=0.1, far=30, height=3)
+    look = {"shading": shading, "fog": tl.Fog(2.0, 9.0), "background": (10, 200, 30, 100)}
+    lights = [tl.Light((1, 2, 3), kind="point")]
+    with on(isa):
+        for camera, n in ((None, 4), (square, 2), (square, 16)):
+            camera = camera or tl.Camera.framing(KNOT)
+            frags = tl.rasterize_mesh(KNOT, camera, size, sampling=f"msaa{n}", threads=3)
+            from_lists = tl.shade(frags, KNOT, camera, lights=lights, **look)
+            assert frags._split is not None
+            assert frags.samples_depth.shape[-1] == n
+            assert frags._split is None
+            assert_same(tl.shade(frags, KNOT, camera, lights=lights, **look), from_lists)
 
 
 @pytest.mark.parametrize("background", [CLEAR, (255, 255, 255, 255), (10, 200, 30, 100)])
@@ -49,11 +68,11 @@ def test_outline_over_nothing_has_the_colour_of_the_surface():
 def test_a_triangle_is_shaded_once_in_a_pixel(monkeypatch):
     shaded = []
 
-    def count(frags, *arguments):
-        shaded.append(int(frags.mask.sum()))
-        return picture_of_numbers(frags, *arguments)
+    def count(ids, *arguments):
+        shaded.append(len(ids))
+        return colors_of_numbers(ids, *arguments)
 
-    monkeypatch.setattr(sys.modules["topleft._shade.shade"], "picture_of_numbers", count)
+    monkeypatch.setattr(sys.modules["topleft._shade.shade"], "colors_of_numbers", count)
     tl.render(KNOT, size=SIZE, sampling="msaa8", shading="ids")
     ids = tl.rasterize_mesh(KNOT, size=SIZE, sampling="msaa8").samples_triangle
     pairs = sum(len(set(pixel) - {-1}) for row in ids.tolist() for pixel in row)

@@ -12,8 +12,8 @@ from numpy.typing import DTypeLike, NDArray
 
 from topleft import _engine
 
-__all__ = ["FreshMemory", "KeptMemory", "Memory", "ScratchMemory", "check_fits", "empty", "fits", "release_memory",
-           "times_that_fit"]  # fmt: skip
+__all__ = ["FreshMemory", "KeptMemory", "Memory", "MemoryOf", "ScratchMemory", "check_fits", "empty", "fits",
+           "release_memory", "times_that_fit"]  # fmt: skip
 
 HUGE_PAGE = 2 << 20
 CACHE_LINE = 64
@@ -126,6 +126,21 @@ class ScratchMemory(FreshMemory):
     def release(self) -> None:
         """Give the calling thread's scratch back."""
         self.threads.kept = None
+
+
+class MemoryOf:
+    """Another memory, under names of its own: what it holds outlives what others ask that one for."""
+
+    def __init__(self, memory: Memory, owner: str) -> None:
+        self.memory, self.owner = memory, owner
+
+    def empty(self, name: str, shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
+        """Return an uninitialised array."""
+        return self.memory.empty(f"{name} of {self.owner}", shape, dtype)
+
+    def constant(self, name: str, n: int, value: int) -> NDArray[np.int32]:
+        """Return n int32 that are all `value`."""
+        return self.memory.constant(f"{name} of {self.owner}", n, value)
 
 
 FRESH = FreshMemory()

@@ -95,6 +95,26 @@ cdef extern from "topleft.h" nogil:
         int32_t *ids
         int32_t *first_band
         int32_t *last_band
+        int32_t *first_col
+        int32_t *end_col
+    ctypedef struct tl_split:
+        int64_t *rows
+        int32_t *columns
+        int32_t *ids
+        float *depth
+        int64_t room
+    ctypedef struct tl_seen_samples:
+        const int32_t *first_ids
+        const int32_t *ids
+        const float *depth
+        int64_t first_stride
+        int64_t stride
+        int64_t plane
+        int64_t row0
+        int64_t n_rows
+        int64_t col0
+        int64_t n_cols
+        int sample_bits
     ctypedef struct tl_transfer:
         const int32_t *decode
         const uint8_t *encode
@@ -466,7 +486,7 @@ cdef extern from "topleft.h" nogil:
         void (*fill_points)(const tl_snapped *, const tl_window *, const tl_points *, const int32_t *, void *) noexcept nogil
         void (*set_inverse_w)(const tl_source *, const float *, int64_t, int64_t, float *) noexcept nogil
         void (*cut_out)(const tl_snapped *, const tl_window *, const tl_view *, const tl_shading *, const int32_t *, int64_t, const tl_target *) noexcept nogil
-        void (*shade_samples)(const tl_snapped *, const tl_window *, const tl_view *, const tl_shading *, const int32_t *, int, int64_t, const int32_t *, const float *, uint8_t *) noexcept nogil
+        void (*shade_samples)(const tl_snapped *, const tl_window *, const tl_view *, const tl_shading *, const int32_t *, int, int64_t, const int32_t *, const float *, const tl_split *, uint8_t *) noexcept nogil
         void (*shade)(const tl_snapped *, const tl_window *, const tl_view *, const tl_shading *, const int32_t *, const float *, uint8_t *) noexcept nogil
         tl_vertex_counts (*snap)(const tl_source *, int64_t, int64_t, int, int, tl_vertex *, tl_wide *) noexcept nogil
         tl_vertex_counts (*project)(const tl_source *, int64_t, int64_t, const tl_view *, tl_vertex *, tl_wide *) noexcept nogil
@@ -489,6 +509,9 @@ cdef extern from "topleft.h" nogil:
         void (*set_flat_depth)(int32_t *, int64_t, int32_t, float, float, float *) noexcept nogil
         int64_t (*bin)(const tl_snapped *, const tl_window *, int32_t, int, tl_bins *) noexcept nogil
         void (*list_bins)(const tl_bins *, int64_t, int64_t *, int32_t *) noexcept nogil
+        void (*find_columns)(const tl_bins *, int64_t, int32_t *) noexcept nogil
+        int64_t (*split_pixels)(const tl_seen_samples *, const tl_split *, int64_t) noexcept nogil
+        void (*spread_ids)(const tl_split *, int, int64_t, int64_t, const int32_t *, int32_t *) noexcept nogil
         int64_t (*draw_area)(const tl_snapped *, const tl_window *, const tl_area *) noexcept nogil
         int64_t (*blend)(const tl_snapped *, const tl_window *, const tl_canvas *) noexcept nogil
         int64_t (*fill_few)(const tl_snapped *, const tl_window *, const tl_canvas *, const int32_t *, int, const tl_transfer *) noexcept nogil

@@ -144,6 +144,8 @@ class SnappedMesh:
     ) -> tuple[int, list[tuple[int, float, float]]]: ...
     def with_inverse_w(self, n_pixels: int, empty: Callable[..., Array] = ...) -> SnappedMesh: ...
     def numbered_from(self, first_id: int) -> SnappedMesh: ...
+    @property
+    def is_named(self) -> bool: ...
     def named(self, names: I32) -> SnappedMesh: ...
     def moved(self, x_px: int, y_px: int) -> SnappedMesh: ...
     def drop_sides(self, is_single: U8, first: int, end: int, triangles: I32) -> None: ...
@@ -251,6 +253,29 @@ class Bins:
 
 def draw_bands(
     meshes: Sequence[SnappedMesh], targets: Sequence[Target], bins: Bins, first_band: int, end_band: int
+) -> None: ...
+
+class Split:
+    rows: NDArray[np.int64]
+    columns: NDArray[np.int32]
+    ids: NDArray[np.int32]
+    depth: NDArray[np.float32]
+    def __init__(
+        self, rows: NDArray[np.int64], columns: NDArray[np.int32], ids: NDArray[np.int32], depth: NDArray[np.float32]
+    ) -> None: ...
+    def spread_ids(self, first_ids: I32, ids: I32, first_row: int, n_rows: int) -> None: ...
+    @staticmethod
+    def room_of(height: int, width: int, n_bands: int) -> int: ...
+
+def draw_split_bands(
+    meshes: Sequence[SnappedMesh],
+    first: Target,
+    ids: I32,
+    depth: F32,
+    split: Split,
+    bins: Bins,
+    first_band: int,
+    end_band: int,
 ) -> None: ...
 def peel(
     meshes: Sequence[SnappedMesh],
@@ -388,6 +413,7 @@ def shade_samples(
     positions: I32,
     ids: I32,
     depth: F32,
+    split: Split | None,
     pixels: U8,
     first_row: int,
     n_rows: int,

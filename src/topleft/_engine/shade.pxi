@@ -185,15 +185,21 @@ def shade(SnappedMesh mesh, ShadingTable shading, const int32_t[:, ::1] ids, con
 
 
 def shade_samples(SnappedMesh mesh, ShadingTable shading, const int32_t[:, ::1] positions, const int32_t[:, :, ::1] ids,
-                  const float[:, :, ::1] depth, uint8_t[:, :, ::1] pixels, int64_t first_row, int64_t n_rows):
-    """Write rows of the picture (H, W, 4) of a visibility buffer with several samples a pixel, ids and depth (S, H, W)."""
+                  const float[:, :, ::1] depth, Split split, uint8_t[:, :, ::1] pixels, int64_t first_row, int64_t n_rows):
+    """Write rows of the picture (H, W, 4) of a visibility buffer with several samples a pixel.
+
+    `ids` and `depth`: (S, H, W), or with `split` (1, H, W), what the first sample sees.
+    """
     cdef tl_window window = mesh.window(first_row, n_rows, ids.shape[2])
-    cdef int sample_bits = int(ids.shape[0]).bit_length() - 1
+    cdef int sample_bits = int(positions.shape[0]).bit_length() - 1
     cdef int64_t stride = ids.shape[1] * ids.shape[2]
+    cdef tl_split rows
+    if split is not None:
+        rows = split.from_row(first_row)
     if n_rows and ids.shape[2]:
         with nogil:
             K.shade_samples(&mesh.snapped, &window, mesh.clip_view(), &shading.shading, &positions[0, 0], sample_bits, stride, &ids[0, first_row, 0],
-                            &depth[0, first_row, 0], &pixels[first_row, 0, 0])
+                            &depth[0, first_row, 0], &rows if split is not None else NULL, &pixels[first_row, 0, 0])
         raise_if_given_up()
 
 

@@ -73,6 +73,11 @@ cdef class SnappedMesh:
         named.arrays = (self.arrays, names)
         return named
 
+    @property
+    def is_named(self):
+        """Whether buffers hold other ids than the indices of triangles."""
+        return self.snapped.names != NULL or self.snapped.first_id != 0
+
     def moved(self, int64_t x_px, int64_t y_px):
         """Return the same mesh behind a window that begins x_px columns and y_px rows later."""
         cdef SnappedMesh part = self.copy()
@@ -346,22 +351,32 @@ cdef class Bins:
     cdef tl_bins bins
     cdef int64_t[::1] starts
     cdef int32_t[::1] listed
+    cdef int32_t[:, ::1] columns
     cdef object room
     cdef readonly int band_bits
     cdef readonly int64_t bad_row, n_bands, n_listed
 
     def __init__(self, SnappedMesh mesh, int64_t height, int64_t width, int32_t reach_fx, int band_bits, int32_t[:, ::1] room):
-        """`room`: (3, n_triangles + 16). `bad_row` is -1, or a triangle has an index outside the vertices."""
+        """`room`: (3, n_triangles + 16), or 5 rows of them, to know the columns of each band, too.
+
+        `bad_row` is -1, or a triangle has an index outside the vertices.
+        """
         cdef tl_window window = mesh.window(0, height, width)
         self.room, self.band_bits, self.n_bands = room, band_bits, (height + (1 << band_bits) - 1) >> band_bits
         self.starts = np.empty(self.n_bands + 2, np.int64)
         self.bins.n = self.n_listed = 0
         self.bins.ids, self.bins.first_band, self.bins.last_band = &room[0, 0], &room[1, 0], &room[2, 0]
+        self.bins.first_col = self.bins.end_col = NULL
+        if room.shape[0] == 5:
+            self.bins.first_col, self.bins.end_col = &room[3, 0], &room[4, 0]
+            self.columns = np.empty((self.n_bands, 2), np.int32)
         with nogil:
             self.bad_row = K.bin(&mesh.snapped, &window, reach_fx, band_bits, &self.bins)
             if self.bad_row < 0:
                 K.list_bins(&self.bins, self.n_bands, &self.starts[0], NULL)
                 self.n_listed = self.starts[self.n_bands + 1]
+                if self.bins.first_col != NULL and self.n_bands:
+                    K.find_columns(&self.bins, self.n_bands, &self.columns[0, 0])
 
     def fill(self, int32_t[::1] listed):
         """Sort the triangles into `listed`, which has room for `n_listed` and one more."""
@@ -390,6 +405,80 @@ def draw_bands(meshes, targets, Bins bins, int64_t first_band, int64_t end_band)
             with nogil:
                 K.draw(&mesh.snapped, &window, &rows, &share)
             raise_if_given_up()
+
+
+cdef class Split:
+    """Pixels whose samples see several triangles, row by row: their columns, and what their samples but the first see."""
+
+    cdef readonly object rows, columns, ids, depth
+    cdef tl_split split
+
+    def __init__(self, int64_t[:, ::1] rows, int32_t[::1] columns, int32_t[:, ::1] ids, float[:, ::1] depth):
+        """Take room (H, 2) for where pixels of a row begin and end, and for `room_of` pixels and S - 1 samples of each."""
+        self.rows, self.columns, self.ids, self.depth = rows.base, columns.base, ids.base, depth.base
+        self.split.rows, self.split.columns, self.split.ids = &rows[0, 0], &columns[0], &ids[0, 0]
+        self.split.depth, self.split.room = &depth[0, 0], columns.shape[0]
+
+    @staticmethod
+    def room_of(int64_t height, int64_t width, int64_t n_bands):
+        """Return for how many pixels there must be room where a picture is drawn in bands."""
+        return height * width + 16 * n_bands
+
+    def spread_ids(self, const int32_t[:, ::1] first_ids, int32_t[:, :, ::1] ids, int64_t first_row, int64_t n_rows):
+        """Write rows of the ids that the samples see, planes (S, H, W), from those that the first sees."""
+        cdef tl_split rows = self.from_row(first_row)
+        cdef int64_t width = first_ids.shape[1]
+        cdef int k
+        with nogil:
+            for k in range(1, ids.shape[0] if n_rows and width else 0):
+                K.spread_ids(&rows, k, n_rows, width, &first_ids[first_row, 0], &ids[k, first_row, 0])
+
+    cdef tl_split from_row(self, int64_t row) noexcept:
+        cdef tl_split split = self.split
+        split.rows += 2 * row
+        return split
+
+
+def draw_split_bands(meshes, Target first, int32_t[:, ::1] ids, float[:, ::1] depth, Split split, Bins bins, int64_t first_band,
+                     int64_t end_band):
+    """Clear and draw bands of the picture that the first sample sees, and list the pixels of which others see more.
+
+    `meshes`: as each sample sees it; `ids` and `depth`: memory for what the others see in a band, (S - 1, rows * (W + 16)).
+    """
+    cdef tl_snapped seen[16]
+    cdef SnappedMesh mesh
+    cdef tl_target rows, other
+    cdef tl_window window
+    cdef tl_seen_samples found
+    cdef tl_share share = no_share()
+    cdef int k, n_samples = len(meshes)
+    cdef int64_t band, first_row, at = (first_band << bins.band_bits) * first.width + 16 * first_band
+    for k in range(n_samples):
+        mesh = meshes[k]
+        seen[k] = mesh.snapped
+    memset(&found, 0, sizeof(found))
+    found.sample_bits, found.ids, found.depth, found.plane = n_samples.bit_length() - 1, &ids[0, 0], &depth[0, 0], ids.shape[1]
+    found.first_stride = first.width
+    share.is_first = share.is_last = True
+    for band in range(first_band, end_band):
+        first_row = band << bins.band_bits
+        rows = other = first.rows(first_row)
+        window = mesh.window(first_row, min(<int64_t>1 << bins.band_bits, first.height - first_row), first.width)
+        share.ids = &bins.listed[0] + bins.starts[band]
+        share.end = bins.starts[band + 1] - bins.starts[band]
+        found.first_ids = <int32_t *>rows.pixels
+        found.row0, found.n_rows = first_row, window.height
+        found.col0, found.n_cols = bins.columns[band, 0], bins.columns[band, 1] - bins.columns[band, 0]
+        found.stride = other.stride_px = (found.n_cols + 15) & ~<int64_t>15
+        with nogil:
+            K.draw(&seen[0], &window, &rows, &share)
+            window.x_px += found.col0
+            window.width = found.n_cols
+            for k in range(1, n_samples if found.n_cols else 0):
+                other.pixels, other.depth = &ids[k - 1, 0], &depth[k - 1, 0]
+                K.draw(&seen[k], &window, &other, &share)
+            at = K.split_pixels(&found, &split.split, at)
+        raise_if_given_up()
 
 
 def peel(meshes, bins, int32_t[:, :, ::1] ids, float[:, :, ::1] depth, bint is_farthest, int band_bits,

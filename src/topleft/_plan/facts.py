@@ -20,7 +20,7 @@ from topleft._raster import choices
 from topleft._raster.choices import Drawing, Route
 from topleft._raster.cluster_draw import ClusteredMesh
 from topleft._raster.clusters import Clusters
-from topleft._raster.sampling import area_cells, sample_positions
+from topleft._raster.sampling import area_cells, sample_positions, split_bytes
 from topleft._raster.snap import Snapped, snap_mesh
 from topleft._raster.view import View
 
@@ -120,6 +120,11 @@ class Facts:
     def draws_planes(self) -> bool:
         """Whether each sample is a picture of its own."""
         return self.view.sampling.n_samples > 1 and self.verb in ("rasterize", "fill")
+
+    @property
+    def is_split(self) -> bool:
+        """Whether the samples of pixels that show one triangle are kept once."""
+        return self.verb == "rasterize" and choices.can_split(self.view, self.n_triangles)
 
     @property
     def is_shared(self) -> bool:
@@ -296,6 +301,8 @@ def memory_of(facts: Facts) -> tuple[dict[str, int], dict[str, int]]:
         scratch["cells"] = 4 * (strips if facts.verb == "fill" else of_sums)
     elif facts.verb == "fill" and n_samples == 1 and n and not (facts.is_direct or facts.is_few):
         scratch["labels"] = 4 * n_pixels
+    elif facts.is_split:
+        scratch |= split_bytes(n, (height, width), n_samples, facts.drawing.n_threads)[0]
     elif facts.draws_planes and not is_empty and n and choices.can_share(view) and not facts.is_few:
         scratch["bins"] = 12 * (n + 16)
         scratch["bands"] = 4 * (n + 1)
@@ -319,6 +326,8 @@ def result_bytes(facts: Facts) -> dict[str, int]:
     width, height = facts.view.size
     n_pixels, n_samples = width * height, facts.view.sampling.n_samples
     many = facts.view.sampling is Sampling.AREA or n_samples > 1
+    if facts.is_split:
+        return split_bytes(facts.n_triangles, (height, width), n_samples, facts.drawing.n_threads)[1]
     if facts.verb == "rasterize":
         return {"triangle": 4 * n_pixels * n_samples, "depth": 4 * n_pixels * n_samples}
     if facts.verb == "fill":

@@ -32,6 +32,7 @@ __all__ = [
     "can_cluster",
     "can_draw_meshlets",
     "can_share",
+    "can_split",
     "cluster_route",
     "common_depth",
     "drawing",
@@ -431,6 +432,11 @@ def route(view: View, snapped: Snapped, test: DepthTest | None, *, wants_depth: 
     else:
         found = Route.DEPTH
     return found, drawing(view, snapped, sink)
+
+
+def can_split(view: View, n_triangles: int) -> bool:
+    """Tell whether what samples see may be kept once for the pixels that show one triangle."""
+    return view.sampling.n_samples > 1 and 0 not in view.size and n_triangles > 0 and can_share(view)
 
 
 def earlier_wins(test: DepthTest | None, *, has_depth: bool) -> bool:

@@ -13,6 +13,7 @@ from topleft import _engine
 from topleft._base.arrays import as_array, as_checked_triangles, as_number, as_places, as_values, shown
 from topleft._base.memory import empty
 from topleft._base.texels import as_levels
+from topleft._raster.sampling import SplitSamples
 from topleft.typing import EncodingOption, FilterOption, WrapOption
 
 __all__ = ["Fragments", "GivenCorners", "as_sample", "view_of"]
@@ -67,8 +68,8 @@ class GivenCorners(NamedTuple):
 class Fragments:
     """What `rasterize` returns.
 
-    Attributes are computed when they are asked for, from the `triangles` that were passed in, and for clip space from
-    the `vertices` too: do not change those arrays before.
+    Attributes, and samples but the first, are computed when they are asked for, from the `triangles` that were passed
+    in, and for clip space from the `vertices` too: do not change those arrays before.
 
     Attributes
     ----------
@@ -98,6 +99,8 @@ class Fragments:
 
     #: Fragments of each sample when there are several.
     _samples: tuple[Fragments, ...] = ()
+    #: What these see, until somebody asks for their planes.
+    _split: SplitSamples | None = None
     #: What it was drawn from; None where that is not kept.
     corners: GivenCorners | None = None
     #: Ids and depth of these, (S, H, W).
@@ -123,6 +126,24 @@ class Fragments:
         for sample in self._samples:
             sample.corners = corners
         return self
+
+    def _sampled(self) -> tuple[tuple[Fragments, ...], tuple[NDArray[np.int32], NDArray[np.float32]] | None]:
+        """Return the fragments of each of several samples, and their planes (S, H, W), drawn now if they were not."""
+        if self._split is not None:
+            self._set_planes(*self._split.planes(), self._split.meshes)
+            self._split = None
+        return self._samples, self._planes
+
+    def _set_planes(
+        self, ids: NDArray[np.int32], depth: NDArray[np.float32], meshes: Sequence[_engine.SnappedMesh]
+    ) -> None:
+        """Take ids and depth of several samples, (S, H, W), and the mesh as each sample sees it."""
+        numbers = self._n_vertices, self._n_triangles
+        self._samples = tuple(Fragments(*planes, *numbers) for planes in zip(ids, depth, meshes, strict=True))
+        self._planes = ids, depth
+        self.id, self._depth = ids[0], depth[0]
+        if self.corners is not None:
+            self.drawn_from(self.corners)
 
     def __repr__(self) -> str:
         height, width = self.triangle.shape
@@ -153,12 +174,16 @@ class Fragments:
     @property
     def samples_triangle(self) -> NDArray[np.int32]:
         """Indices of triangles by sample, int32 (H, W, S)."""
-        return self.id[..., None] if self._planes is None else np.moveaxis(self._planes[0], 0, -1)
+        if self._split is not None:
+            return np.moveaxis(self._split.sample_ids, 0, -1)
+        _, planes = self._sampled()
+        return self.id[..., None] if planes is None else np.moveaxis(planes[0], 0, -1)
 
     @property
     def samples_depth(self) -> NDArray[np.float32]:
         """Depth by sample, float32 (H, W, S)."""
-        return self.depth[..., None] if self._planes is None else np.moveaxis(self._planes[1], 0, -1)
+        _, planes = self._sampled()
+        return self.depth[..., None] if planes is None else np.moveaxis(planes[1], 0, -1)
 
     @property
     def mask(self) -> NDArray[np.bool_]:
@@ -175,10 +200,15 @@ class Fragments:
         n_triangles: int,
     ) -> Fragments:
         """Return the fragments of several samples: planes (S, H, W), and the mesh as each sample sees it."""
-        samples = tuple(cls(*planes, n_vertices, n_triangles) for planes in zip(triangle, depth, meshes, strict=True))
         frags = cls(triangle[0], depth[0], meshes[0], n_vertices, n_triangles)
-        frags._samples = samples
-        frags._planes = triangle, depth
+        frags._set_planes(triangle, depth, meshes)
+        return frags
+
+    @classmethod
+    def of_split(cls, split: SplitSamples, n_vertices: int, n_triangles: int) -> Fragments:
+        """Return the fragments of several samples whose planes are drawn when they are asked for."""
+        frags = cls(split.ids, split.depth, split.meshes[0], n_vertices, n_triangles)
+        frags._split = split
         return frags
 
     @overload
@@ -264,7 +294,7 @@ class Fragments:
 
     def _at_sample(self, i: int) -> Fragments:
         """Return ids, depth and attributes at one sample of each pixel."""
-        samples = self._samples or (self,)
+        samples = self._sampled()[0] or (self,)
         return samples[as_sample(i, len(samples))]
 
     def distance(self, camera: Viewer) -> NDArray[np.float32]:

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine
 from topleft._base.arrays import as_number, as_out
-from topleft._base.memory import Memory, check_fits, empty
+from topleft._base.memory import Memory, MemoryOf, check_fits, empty
 from topleft._base.options import DepthTest, Sampling, Sink, parse
 from topleft._base.threads import run_parts
 from topleft._raster import choices
@@ -23,7 +23,7 @@ from topleft._raster.choices import Drawing, Route
 from topleft._raster.classic import draw_classic, refuse_classic
 from topleft._raster.cluster_draw import ClusteredMesh
 from topleft._raster.fragments import Fragments, GivenCorners
-from topleft._raster.sampling import draw_planes, sample_positions, sum_areas
+from topleft._raster.sampling import draw_planes, draw_split, lay_background, sample_positions, sum_areas
 from topleft._raster.snap import Snapped, snap_mesh, snap_to_cover
 from topleft._raster.view import View
 from topleft.typing import DepthTestOption
@@ -262,6 +262,8 @@ def draw_fragments(
     frags = draw_clusters(memory, vertices, view, asked)
     if frags is not None:
         return frags.drawn_from(corners)
+    if view.sampling.n_samples > 1:  # which are drawn from the snapped mesh when they are asked for
+        memory = MemoryOf(memory, "samples")
     snapped = snap_mesh(memory, vertices, triangles, view, with_depth=True, out=out)
     if names is not None:
         snapped = replace(snapped, mesh=snapped.mesh.named(names))
@@ -296,19 +298,28 @@ def draw_depth(memory: Memory, snapped: Snapped, view: View, asked: Asked, drawi
     """Draw ids and depth, compared at each sample."""
     with buffers_of(memory, view, asked) as ((ids, depth), (ids_canvas, depth_canvas)):
         draw(memory, snapped, view, drawing, ids_canvas, depth=depth_canvas)
-        lay_background(ids_canvas, depth_canvas, drawing.sink, asked)
+        lay_background(ids_canvas, depth_canvas, drawing.sink, asked.background)
     return Fragments(ids, depth, snapped.mesh, snapped.n_vertices, snapped.n_triangles)
 
 
 def draw_samples(memory: Memory, snapped: Snapped, view: View, asked: Asked, drawing: Drawing) -> Fragments:
-    """Draw ids and depth of every sample: a plane a sample in memory."""
+    """Draw ids and depth of every sample: those of the first, and of pixels that show several; or a plane a sample."""
     (width, height), n = view.size, view.sampling.n_samples
     positions = sample_positions(n, view.grid_bits)
     check_fits((n, height, width), np.int32, np.float32)
+    can_split = choices.can_split(view, snapped.n_triangles) and not snapped.mesh.is_named
+    if can_split and asked.ids_out is None and asked.depth_out is None:
+        shape, n_threads = (height, width), drawing.n_threads
+        given = snapped.mesh, snapped.n_triangles, positions, drawing.sink, shape, asked.background
+        split = draw_split(memory, *given, n_threads)
+        if split is None:
+            snapped.refuse()
+        view.mark("draw")
+        return Fragments.of_split(split, snapped.n_vertices, snapped.n_triangles)
     ids: NDArray[np.int32] = memory.empty("sample ids", (n, height, width), np.int32)
     depth: NDArray[np.float32] = memory.empty("sample depth", (n, height, width), np.float32)
     draw_all_samples(memory, snapped, view, positions, drawing, ids, depth)
-    lay_background(ids, depth, drawing.sink, asked)
+    lay_background(ids, depth, drawing.sink, asked.background)
     for name, out, planes in (("triangle", asked.ids_out, ids), ("depth", asked.depth_out, depth)):
         if out is not None:
             result = as_out(f"out {name}", out, (height, width, n), planes.dtype.type)
@@ -342,7 +353,7 @@ def draw_clusters(memory: Memory, vertices: ArrayLike, view: View, asked: Asked)
         bounds = memory.empty("bounds", _engine.Target.bounds_shape(*ids_canvas.shape), np.float32)
         if not mesh.draw(memory, _engine.Target(sink, ids_canvas, depth_canvas, None, bounds=bounds), route):
             return None
-        lay_background(ids_canvas, depth_canvas, sink, asked)
+        lay_background(ids_canvas, depth_canvas, sink, asked.background)
     view.mark("draw")
     return Fragments(ids, depth, mesh.part, len(clusters.points), clusters.n_triangles)
 
@@ -362,9 +373,3 @@ def buffers_of(memory: Memory, view: View, asked: Asked) -> Iterator[tuple[Buffe
     for result, canvas in ((ids, ids_canvas), (depth, depth_canvas)):
         if canvas is not result:
             result[...] = canvas
-
-
-def lay_background(ids: NDArray[np.int32], depth: NDArray[np.float32], sink: Sink, asked: Asked) -> None:
-    """Write the depth of the background where nothing is, unless the engine has cleared the buffer to it."""
-    if asked.background != (-np.inf if sink is Sink.FARTHEST else np.inf):
-        depth[ids < 0] = asked.background

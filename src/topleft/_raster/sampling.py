@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from topleft import _engine
-from topleft._base.memory import Memory
+from topleft._base.memory import FRESH, Memory, check_fits, empty
 from topleft._base.options import Sink
 from topleft._base.threads import run_parts
 
-__all__ = ["SAMPLE_GRID_BITS", "draw_means", "draw_planes", "sample_positions", "sum_areas"]
+__all__ = [
+    "SAMPLE_GRID_BITS", "SplitSamples", "draw_means", "draw_planes", "draw_split", "sample_positions", "split_bytes",
+    "sum_areas",
+]  # fmt: skip
 
 #: From the centre of the pixel, x right and y down, in sixteenths of a pixel: the standard patterns of Direct3D 11.
 POSITIONS: dict[int, tuple[tuple[int, int], ...]] = {
@@ -31,6 +36,9 @@ SAMPLE_GRID_BITS = 4
 
 #: Ids and depth of one sample in a band of rows: they stay in the second-level cache while the band is drawn.
 BAND_BYTES = 512 << 10
+
+#: The same where a band is drawn for all samples before the next: so that these stay there together, of four.
+SPLIT_BAND_BYTES = 256 << 10
 
 #: Labels of all samples in a band of rows that is resolved at once.
 LABEL_BAND_BYTES = 512 << 10
@@ -84,6 +92,134 @@ def draw_planes(
     return False
 
 
+@dataclass(frozen=True, eq=False)
+class SplitSamples:
+    """What several samples a pixel see: the first in each pixel, the others in those that show several triangles."""
+
+    ids: NDArray[np.int32]
+    depth: NDArray[np.float32]
+    split: _engine.Split
+    positions: NDArray[np.int32]
+    mesh: _engine.SnappedMesh
+    n_triangles: int
+    sink: Sink
+    background: float
+    n_threads: int
+
+    @property
+    def meshes(self) -> list[_engine.SnappedMesh]:
+        """The mesh as each sample sees it."""
+        return [self.mesh.seen_from(x, y) for x, y in self.positions.tolist()]
+
+    @cached_property
+    def sample_ids(self) -> NDArray[np.int32]:
+        """The ids of all samples, (S, H, W)."""
+        ids: NDArray[np.int32] = empty((len(self.positions), *self.ids.shape), np.int32)
+
+        def spread_rows(first: int, end: int) -> None:
+            ids[0, first:end] = self.ids[first:end]
+            self.split.spread_ids(self.ids, ids, first, end - first)
+
+        run_parts(spread_rows, len(self.ids), self.n_threads)
+        return ids
+
+    def planes(self) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+        """Return the ids and depths of all samples, (S, H, W): a depth is that of the triangle at the sample.
+
+        Raises
+        ------
+        IndexError
+            If the triangles have been changed since they were drawn.
+        """
+        shape = len(self.positions), *self.ids.shape
+        check_fits(shape, np.int32, np.float32)
+        ids, depth = empty(shape, np.int32), empty(shape, np.float32)
+        drawn = self.mesh, self.n_triangles, self.positions, self.sink, ids, depth, self.n_threads
+        if draw_planes(FRESH, *drawn, is_near=True):
+            raise IndexError("triangles must stay what they were drawn from until samples are asked for")
+        lay_background(ids, depth, self.sink, self.background)
+        return ids, depth
+
+
+def draw_split(
+    memory: Memory,
+    mesh: _engine.SnappedMesh,
+    n_triangles: int,
+    positions: NDArray[np.int32],
+    sink: Sink,
+    shape: tuple[int, int],
+    background: float,
+    n_threads: int,
+) -> SplitSamples | None:
+    """Draw what the first sample sees, and list the pixels of which others see more; None as `draw_planes` tells.
+
+    The mesh is near, neither side of the picture is 0. Planes of the other samples live no longer than a band of rows,
+    and only in the columns that its triangles may reach.
+    """
+    (height, width), n_others = shape, len(positions) - 1
+    bins = sort_bands(memory, mesh, n_triangles, positions, shape, SPLIT_BAND_BYTES // 8, n_threads, with_columns=True)
+    if bins.bad_row >= 0:
+        return None
+    ids: NDArray[np.int32] = memory.empty("triangle", shape, np.int32)
+    depth: NDArray[np.float32] = memory.empty("depth", shape, np.float32)
+    room = _engine.Split.room_of(height, width, bins.n_bands)
+    split = _engine.Split(
+        memory.empty("split rows", (height, 2), np.int64),
+        memory.empty("split columns", (room,), np.int32),
+        memory.empty("split ids", (n_others, room), np.int32),
+        memory.empty("split depth", (n_others, room), np.float32),
+    )
+    n_parts = max(1, min(n_threads, bins.n_bands))
+    own = n_parts, n_others, (width + 16) << bins.band_bits
+    others = memory.empty("band ids", own, np.int32), memory.empty("band depth", own, np.float32)
+    unused = list(zip(*others, strict=True))
+    meshes = [mesh.seen_from(x, y) for x, y in positions.tolist()]
+    target = _engine.Target(sink, ids, depth, None)
+    run_parts(
+        lambda first, end: _engine.draw_split_bands(meshes, target, *unused.pop(), split, bins, first, end),
+        bins.n_bands,
+        n_parts,
+    )
+    lay_background(ids, depth, sink, background)
+    for at in split_ranges(split.rows):
+        lay_background(split.ids[:, at], split.depth[:, at], sink, background)
+    return SplitSamples(ids, depth, split, positions, mesh, n_triangles, sink, background, n_threads)
+
+
+def lay_background(ids: NDArray[np.int32], depth: NDArray[np.float32], sink: Sink, background: float) -> None:
+    """Write the depth of the background where nothing is, unless the engine has cleared the buffer to it."""
+    if background != (-np.inf if sink is Sink.FARTHEST else np.inf):
+        depth[ids < 0] = background
+
+
+def split_ranges(rows: NDArray[np.int64]) -> list[slice]:
+    """Return where the pixels of all rows lie: one range for each part of a picture that a thread drew."""
+    breaks = np.flatnonzero(rows[1:, 0] != rows[:-1, 1])
+    starts, ends = np.append(rows[0, 0], rows[breaks + 1, 0]), np.append(rows[breaks, 1], rows[-1, 1])
+    return [slice(first, end) for first, end in zip(starts.tolist(), ends.tolist(), strict=True)]
+
+
+def split_bytes(
+    n_triangles: int, shape: tuple[int, int], n_samples: int, n_threads: int
+) -> tuple[dict[str, int], dict[str, int]]:
+    """Return the most bytes that `draw_split` needs: of scratch and of what it returns, by name."""
+    (height, width), n_others = shape, n_samples - 1
+    band_bits = bits_of_bands(shape, SPLIT_BAND_BYTES // 8, n_threads)
+    n_bands = -(-height >> band_bits)
+    n_rows = min(n_threads, n_bands) << band_bits
+    scratch = {
+        "bins": 20 * (n_triangles + 16),
+        "bands": 4 * (n_triangles + 1),
+        "samples of bands": 8 * n_others * n_rows * (width + 16),
+    }
+    room = _engine.Split.room_of(height, width, n_bands)
+    return scratch, {
+        "triangle": 4 * height * width,
+        "depth": 4 * height * width,
+        "pixels of several triangles": 16 * height + (4 + 8 * n_others) * room,
+    }
+
+
 def draw_means(
     memory: Memory,
     mesh: _engine.SnappedMesh,
@@ -121,17 +257,26 @@ def sort_bands(
     shape: tuple[int, int],
     n_pixels: int,
     n_threads: int,
+    *,
+    with_columns: bool = False,
 ) -> _engine.Bins:
     """Return the triangles of each band of up to `n_pixels`; none when an index lies outside the vertices."""
     height, width = shape
-    band_bits = max(0, (n_pixels // width).bit_length() - 1)
-    while band_bits and height >> band_bits < 2 * n_threads:
-        band_bits -= 1
-    room = memory.empty("bins", (3, n_triangles + 16), np.int32)
+    band_bits = bits_of_bands(shape, n_pixels, n_threads)
+    room = memory.empty("bins", (5 if with_columns else 3, n_triangles + 16), np.int32)
     bins = _engine.Bins(mesh, height, width, int(np.abs(positions).max()), band_bits, room)
     if bins.bad_row < 0:
         bins.fill(memory.empty("bands", (bins.n_listed + 1,), np.int32))
     return bins
+
+
+def bits_of_bands(shape: tuple[int, int], n_pixels: int, n_threads: int) -> int:
+    """Return the binary logarithm of the rows of a band of up to `n_pixels`, two bands a thread at least."""
+    height, width = shape
+    band_bits = max(0, (n_pixels // width).bit_length() - 1)
+    while band_bits and height >> band_bits < 2 * n_threads:
+        band_bits -= 1
+    return band_bits
 
 
 def sum_areas(

@@ -335,10 +335,16 @@ class BentFragments(Fragments):
     def __init__(self, drawn: Fragments, bent: BentMesh, mesh: Mesh) -> None:
         wholes = bent.wholes
         super().__init__(wholes[drawn.triangle], drawn.depth, drawn._snapped, len(mesh.vertices), len(mesh.triangles))
-        self._samples = tuple(BentFragments(sample, bent, mesh) for sample in drawn._samples)
-        self._planes = drawn._planes and (wholes[drawn._planes[0]], drawn._planes[1])
         self.drawn, self.bent = drawn, bent
         self._mesh = mesh
+
+    def _sampled(self) -> tuple[tuple[Fragments, ...], tuple[NDArray[np.int32], NDArray[np.float32]] | None]:
+        """Return the fragments of each of several samples, and their planes (S, H, W), of whole triangles."""
+        if self._planes is None:
+            samples, planes = self.drawn._sampled()
+            self._samples = tuple(BentFragments(sample, self.bent, self._mesh) for sample in samples)
+            self._planes = planes and (self.bent.wholes[planes[0]], planes[1])
+        return self._samples, self._planes
 
     def again(self) -> BentFragments:
         """Return the same made anew from the parts, whose buffers have changed."""

@@ -38,11 +38,13 @@ from topleft._raster.sampling import sample_positions
 from topleft._shade.look import ShadingInputs
 from topleft.typing import ShadingOption
 
-__all__ = ["LookOptions", "Shading", "ShadingOptions", "picture_of_numbers", "shade_mesh", "shade_numbers"]
+__all__ = ["LookOptions", "Shading", "ShadingOptions", "shade_mesh", "shade_numbers"]
 
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
 U8 = npt.NDArray[np.uint8]
+I32 = npt.NDArray[np.int32]
+Places = tuple[npt.NDArray[np.intp], ...]
 
 
 class Shading(StrEnum):
@@ -149,7 +151,11 @@ def shade_mesh(frags: Fragments, mesh: Mesh, camera: Camera, options: ShadingOpt
         picture[...] = options.background
         return picture
     scene = frags._snapped
-    planes = frags.samples_triangle.transpose(2, 0, 1), frags.samples_depth.transpose(2, 0, 1)
+    split = frags._split
+    if split is None:
+        planes = frags.samples_triangle.transpose(2, 0, 1), frags.samples_depth.transpose(2, 0, 1)
+    else:
+        planes = split.ids[None], split.depth[None]
     kinds = np.int32, np.float32
     ids, depth = (np.require(array, kind, ["C", "A"]) for array, kind in zip(planes, kinds, strict=True))
     own = (options.material,) if options.material is not None else mesh.materials
@@ -165,14 +171,16 @@ def shade_mesh(frags: Fragments, mesh: Mesh, camera: Camera, options: ShadingOpt
         look.set_opacity()
     look.set_view(SHOW_CODES.get(options.mode, 0), options.matcap, options.background)
     look.set_fog(options.fog)
-    positions = None if len(ids) == 1 else sample_positions(len(ids), scene.subpixel_bits)
+    n_samples = len(ids) if split is None else len(split.positions)
+    positions = None if n_samples == 1 else sample_positions(n_samples, scene.subpixel_bits)
 
     def shade_rows(first: int, end: int) -> None:
         part = picture, first, end - first
         if positions is None:
             _engine.shade(scene, look.shading, ids[0], depth[0], *part)
         else:
-            _engine.shade_samples(scene, look.shading, positions, ids, depth, *part)
+            listed = None if split is None else split.split
+            _engine.shade_samples(scene, look.shading, positions, ids, depth, listed, *part)
 
     run_parts(shade_rows, len(picture), count_threads(options.threads, len(mesh.triangles)))
     return picture
@@ -183,30 +191,30 @@ def shade_numbers(frags: Fragments, camera: Camera, options: ShadingOptions) -> 
     ends = options.depth_range or distances(frags, camera) if options.mode is Shading.DEPTH else None
 
     def picture_one(sample: Fragments) -> U8:
-        return picture_of_numbers(sample, camera, ends, options.background)
-
-    return shade_samples(frags, picture_one, options.background)
-
-
-def picture_of_numbers(
-    frags: Fragments, camera: Camera, depth_range: tuple[float, float] | None, background: Color
-) -> U8:
-    """The picture (H, W, 4) of ids, or of distances when they have a range."""
-    picture = empty((*frags.triangle.shape, 4), np.uint8)
-    picture[...] = background
-    seen = frags.mask
-    if not seen.any():
+        picture = empty((*sample.id.shape, 4), np.uint8)
+        picture[...] = options.background
+        at = np.nonzero(sample.mask)
+        picture[at] = color_at(sample, at)
         return picture
+
+    def color_at(sample: Fragments, at: Places) -> U8:
+        return colors_of_numbers(sample.id[at], sample.depth[at], camera, ends)
+
+    return shade_samples(frags, picture_one, options.background, color_at)
+
+
+def colors_of_numbers(ids: I32, depth: F32, camera: Camera, depth_range: tuple[float, float] | None) -> U8:
+    """The colours (P, 4) of ids, or of distances when they have a range."""
+    colors = np.full((len(ids), 4), 255, np.uint8)
     if depth_range is None:
-        picture[seen, :3] = id_colors(frags.id[seen])
-    else:
+        colors[:, :3] = id_colors(ids)
+    elif len(depth):
         nearest, farthest = depth_range
-        distance = eye_distance(frags.depth[seen], camera)
+        distance = eye_distance(depth, camera)
         share = np.clip((distance - nearest) / max(farthest - nearest, np.finfo(np.float64).tiny), 0, 1)
         grey = GREY_OF_NEAREST + (GREY_OF_FARTHEST - GREY_OF_NEAREST) * share
-        picture[seen, :3] = np.rint(grey).astype(np.uint8)[:, None]
-    picture[seen, 3] = 255
-    return picture
+        colors[:, :3] = np.rint(grey).astype(np.uint8)[:, None]
+    return colors
 
 
 def eye_distance(depth: F32, camera: Camera) -> F64:
@@ -225,10 +233,16 @@ def distances(frags: Fragments, camera: Camera) -> tuple[float, float] | None:
     return float(ends[0]), float(ends[1])
 
 
-def shade_samples(frags: Fragments, shade_one: Callable[[Fragments], U8], background: tuple[int, ...]) -> U8:
+def shade_samples(
+    frags: Fragments,
+    shade_one: Callable[[Fragments], U8],
+    background: tuple[int, ...],
+    color_at: Callable[[Fragments, Places], U8] | None = None,
+) -> U8:
     """Return the mean colour of the samples, (H, W, 4) uint8: light is averaged, alpha as it is.
 
     `shade_one` gives the picture of one sample; pixels whose triangle an earlier sample has shown are left out of it.
+    `color_at` gives the colours (P, 4) of pixels alone, where there is a quicker way to them.
     """
     if frags.samples_depth.shape[-1] == 1:
         return shade_one(frags)
@@ -255,7 +269,10 @@ def shade_samples(frags: Fragments, shade_one: Callable[[Fragments], U8], backgr
         if k == 0:
             add(picture[at], share)
         elif is_new.any():
-            add(shade_one(frags.sample(k).only(at[0][is_new], at[1][is_new]))[at], share)
+            where, sample = (at[0][is_new], at[1][is_new]), frags.sample(k)
+            colors = np.zeros((split.shape[1], 4), np.uint8)
+            colors[is_new] = color_at(sample, where) if color_at else shade_one(sample.only(*where))[where]
+            add(colors, share)
     steps = (2 * light + alpha[:, None]) // np.maximum(2 * alpha, 1)[:, None]  # to nearest, of at most LINEAR_ONE
     mean = np.empty((split.shape[1], 4), np.uint8)
     mean[:, :3] = encode[np.minimum(steps, LINEAR_ONE)]
