@@ -22,6 +22,7 @@
 #include "pixels/paint.c"
 #include "pixels/resolve.c"
 #include "pixels/split.c"
+#include "pixels/instances.c"
 #include "pixels/points.c"
 #include "pixels/planes.c"
 #include "pixels/slopes.c"
@@ -73,6 +74,7 @@ const tl_kernels TL_KERNELS = {
     .find_columns = find_columns,
     .split_pixels = split_pixels,
     .spread_ids = spread_ids,
+    .find_instances = find_instances,
     .draw_area = draw_area,
     .blend = blend,
     .fill_few = fill_few,

@@ -109,6 +109,11 @@ typedef struct tl_kernels {
     void (*spread_ids)(const tl_split *split, int k, int64_t n_rows, int64_t width, const int32_t *first_ids,
                        int32_t *ids);
 
+    /* Writes which of n instances each id belongs to, -1 below 0; instance i has the ids from first_ids[i] on to
+     * first_ids[i + 1].  Boxes may be NULL: (n, 4) left, top, right, bottom, which are widened. */
+    void (*find_instances)(const int32_t *ids, int64_t n_rows, int64_t width, const int64_t *first_ids, int64_t n,
+                           int32_t *out, int32_t *boxes);
+
     /* The exact area that triangles cover of each pixel, their sum; the window has fewer than 2^31 cells.  Returns as
      * `draw` does, or TL_AREA_OVERFLOW; either way the pixels are then worthless. */
     int64_t (*draw_area)(const tl_snapped *snapped, const tl_window *window, const tl_area *target);

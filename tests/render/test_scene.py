@@ -7,11 +7,14 @@ from engine_cases import ON_EACH_ISA, THREADS, on
 from scene_cases import CAMERA, CUBE, SIZE, SPHERE, joined, many, told_apart
 
 import topleft as tl
+from topleft import _engine
+from topleft._base.color import srgb_tables
 from topleft._camera.camera import Camera
 from topleft._raster.snap import Snapped
 from topleft._render import instances
 from topleft._render.fragments import SceneFragments
 from topleft._render.render import rasterize_mesh
+from topleft.methods.reference.sampling import mean
 
 
 def assert_same_as_joined(got, expected, scene):
@@ -124,6 +127,44 @@ def test_scene_picture_shows_each_instance_as_if_alone():
         assert own.sum() > 100
         difference = picture[own].astype(int) - tl.render(mesh, camera, SIZE)[own]
         assert np.abs(difference).max() <= 1  # the matrix of the instance is multiplied in another order
+
+
+@pytest.mark.parametrize("shading", ["smooth", "ids"])
+def test_scene_picture_of_samples_is_their_mean_each_triangle_shaded_once(shading):
+    scene, background = many(), (10, 200, 30, 255)
+    look = {"shading": shading, "background": background}
+    got = tl.render(scene, CAMERA, SIZE, sampling="msaa4", **look)
+    frags = rasterize_mesh(scene, CAMERA, SIZE, sampling="msaa4")
+    ids = np.stack([frags.sample(k).id for k in range(4)])
+    first = (ids[:, None] == ids[None]).argmax(1)  # the first sample that sees the same
+    pictures = np.stack([tl.shade(frags.sample(k), scene, CAMERA, **look) for k in range(4)])
+    samples = np.take_along_axis(pictures, first[..., None], 0)
+    rows = np.moveaxis(samples, 0, 2)
+    expected = [[mean(pixel, is_straight=True, tables=srgb_tables()) for pixel in row] for row in rows]
+    assert (first > 0).any()
+    assert_same(got, np.array(expected, np.uint8))
+
+
+@ON_EACH_ISA
+def test_instances_of_ids_are_those_of_a_search(isa):
+    rng = np.random.default_rng(5)
+    for n in (1, 2, 7, 300):
+        sizes = rng.integers(0, 5, n)
+        first_ids = np.append(0, np.cumsum(sizes))
+        ids = rng.integers(-2, first_ids[-1] + 2, (9, 40)).astype(np.int32)
+        ids = np.repeat(ids, 3, 1)
+        found = np.empty_like(ids)
+        boxes = np.tile(np.array([120, 9, 0, 0], np.int32), (n, 1))
+        with on(isa):
+            _engine.find_instances(ids, first_ids, found, boxes)
+        expected = np.where(ids < 0, -1, np.searchsorted(first_ids, ids, side="right") - 1)
+        assert_same(found, expected.astype(np.int32))
+        for i, box in enumerate(boxes.tolist()):
+            rows, columns = np.nonzero(expected == i)
+            if rows.size:
+                assert box == [columns.min(), rows.min(), columns.max() + 1, rows.max() + 1]
+            else:
+                assert box == [120, 9, 0, 0]
 
 
 def test_scene_shares_the_arrays_of_its_mesh():

@@ -512,6 +512,7 @@ cdef extern from "topleft.h" nogil:
         void (*find_columns)(const tl_bins *, int64_t, int32_t *) noexcept nogil
         int64_t (*split_pixels)(const tl_seen_samples *, const tl_split *, int64_t) noexcept nogil
         void (*spread_ids)(const tl_split *, int, int64_t, int64_t, const int32_t *, int32_t *) noexcept nogil
+        void (*find_instances)(const int32_t *, int64_t, int64_t, const int64_t *, int64_t, int32_t *, int32_t *) noexcept nogil
         int64_t (*draw_area)(const tl_snapped *, const tl_window *, const tl_area *) noexcept nogil
         int64_t (*blend)(const tl_snapped *, const tl_window *, const tl_canvas *) noexcept nogil
         int64_t (*fill_few)(const tl_snapped *, const tl_window *, const tl_canvas *, const int32_t *, int, const tl_transfer *) noexcept nogil

@@ -81,6 +81,18 @@ def fill_bands(meshes, int32_t[:, ::1] labels, Palette palette, pixels, Bins bin
     raise_if_given_up()
 
 
+def find_instances(const int32_t[:, ::1] ids, const int64_t[::1] first_ids, int32_t[:, ::1] out, int32_t[:, ::1] boxes):
+    """Write which instance each id belongs to, and widen the boxes (N, 4) of those that show, unless these are None.
+
+    `first_ids`: (N + 1,), where the ids of each instance begin, and the last of all end.
+    """
+    cdef int64_t n = first_ids.shape[0] - 1
+    if ids.shape[0] and ids.shape[1]:
+        with nogil:
+            K.find_instances(&ids[0, 0], ids.shape[0], ids.shape[1], &first_ids[0], n, &out[0, 0],
+                             &boxes[0, 0] if boxes is not None and n else NULL)
+
+
 def mean_colors(painted, pixels, int64_t first_row, int64_t n_rows, int n_channels, Transfer transfer):
     """Write the mean of planes of colours (S, H, W[, C]) over rows of pixels."""
     cdef const uint8_t[::1] planes = as_bytes(painted)

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from numpy.typing import NDArray
 
+from topleft import _engine
 from topleft._base.arrays import as_array, set_aligned, shown
 from topleft._base.memory import empty
 from topleft._camera.camera import Camera
@@ -93,7 +94,10 @@ def join(
     picture = empty(shape, dtype)
     picture[...] = background
     for part in parts:
-        picture[part.box][part.seen] = make(part)[part.seen]
+        to, made = picture[part.box], make(part)
+        if to.ndim > 2 and to.shape[2:] == (4,) and to.dtype == made.dtype == np.uint8 and made.flags.c_contiguous:
+            to, made = to.view(np.uint32), made.view(np.uint32)  # a pixel at once
+        np.copyto(to, made, where=part.seen.reshape(part.seen.shape + (1,) * (to.ndim - 2)))
     return picture
 
 
@@ -180,6 +184,20 @@ class SceneFragments(InstanceIds, Fragments):
         return self.placed.whole
 
     @cached_property
+    def _found(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+        """Which instance shows (H, W), and the boxes of pixels round each (N, 4): left, top, right, bottom."""
+        ids = np.require(self.id, np.int32, ["C", "A"])
+        instance = empty(ids.shape, np.int32)
+        boxes = np.tile(np.array([*ids.shape[::-1], 0, 0], np.int32), (len(self.placed.whole_first_ids) - 1, 1))
+        _engine.find_instances(ids, self.placed.whole_first_ids, instance, boxes)
+        return instance, boxes
+
+    @cached_property
+    def instance(self) -> NDArray[np.int32]:
+        """Index of the instance that shows, int32, -1 where there is none."""
+        return self._found[0]
+
+    @cached_property
     def samples_instance(self) -> NDArray[np.int32]:
         """Index of the instance that each sample sees, int32 (H, W, S)."""
         return instance_of_ids(self.samples_id, self.placed.whole_first_ids)
@@ -207,21 +225,14 @@ class SceneFragments(InstanceIds, Fragments):
         return tuple(self._make_parts())
 
     def _make_parts(self) -> Iterator[Part]:
-        flat = np.flatnonzero(self.id >= 0)
-        if not flat.size:
-            return
-        instance = self.instance.ravel()[flat]
-        order = np.argsort(instance, kind="stable")
-        found, starts = np.unique(instance[order], return_index=True)
-        rows, columns = np.divmod(flat[order], self.id.shape[1])
-        lows = [np.minimum.reduceat(axis, starts) for axis in (rows, columns)]
-        ends = [np.maximum.reduceat(axis, starts) + 1 for axis in (rows, columns)]
-        for i, top, left, bottom, right in zip(found.tolist(), *lows, *ends, strict=True):
-            box = slice(int(top), int(bottom)), slice(int(left), int(right))
-            first, end = self.placed.first_ids[i : i + 2]
-            ids = self.drawn_planes[0][0][box]
-            own = np.where((ids >= first) & (ids < end), ids - np.int32(first), np.int32(-1))
-            scene = self.placed.snap_part(i, own).seen_from(*self.positions[0]).moved(int(left), int(top))
+        _, boxes = self._found
+        for i in np.flatnonzero(boxes[:, 2] > 0).tolist():  # those that show
+            left, top, right, bottom = boxes[i].tolist()
+            box = slice(top, bottom), slice(left, right)
+            first, end = self.placed.first_ids[i : i + 2].tolist()
+            own = self.drawn_planes[0][0][box] - np.int32(first)
+            own[own.view(np.uint32) >= end - first] = -1
+            scene = self.placed.snap_part(i, own).seen_from(*self.positions[0]).moved(left, top)
             mesh = self.placed.scene[i].mesh
             frags = Fragments(own, self.depth[box], scene, len(mesh.vertices), len(mesh.triangles))
             frags.corners = self.placed.corners(i)
@@ -316,7 +327,10 @@ def instance_of_ids(ids: NDArray[np.int32], first_ids: NDArray[np.int64]) -> NDA
     """Return the instance that each id belongs to, -1 for -1."""
     if len(first_ids) == 2:
         return ids >> 31
-    return (np.searchsorted(first_ids, ids.ravel(), side="right") - 1).astype(np.int32).reshape(ids.shape)
+    flat = np.ascontiguousarray(ids).reshape(1, -1)
+    found = empty(flat.shape, np.int32)
+    _engine.find_instances(flat, first_ids, found, None)
+    return found.reshape(ids.shape)
 
 
 def local_ids(ids: NDArray[np.int32], instance: NDArray[np.int32], first_ids: NDArray[np.int64]) -> NDArray[np.int32]:

@@ -26,7 +26,7 @@ from topleft._raster.fragments import Fragments
 from topleft._render.fragments import SceneFragments, VisiblePart, join, parts_of
 from topleft._scene.scene import Instance, Scene, meshes_of
 from topleft._shade.look import is_similarity
-from topleft._shade.shade import Shading, ShadingOptions, shade_mesh, shade_numbers, shade_samples
+from topleft._shade.shade import Places, Shading, ShadingOptions, shade_mesh, shade_numbers, shade_samples
 from topleft.typing import ShadingOption
 
 __all__ = ["shade", "shade_by", "shade_part"]
@@ -152,8 +152,17 @@ def shade_by(frags: Fragments, mesh: Mesh | Scene, camera: Camera, options: Shad
     def shade_one(sample: Fragments) -> U8:
         return join(parts_of(sample, mesh), (*sample.id.shape, 4), options.background, shade_own, np.uint8)
 
+    def color_at(sample: Fragments, at: Places) -> U8:
+        left = sample.only(*at)
+        colors, instance = np.empty((len(at[0]), 4), np.uint8), left.instance[at]
+        for part in parts_of(left, mesh):
+            own = instance == part.i
+            rows, columns = (places[own] - side.start for places, side in zip(at, part.box, strict=True))
+            colors[own] = shade_own(part)[rows, columns]
+        return colors
+
     # The kernel resolves the samples of one mesh; those of several are resolved here.
-    return shade_one(frags) if isinstance(mesh, Mesh) else shade_samples(frags, shade_one, options.background)
+    return shade_one(frags) if isinstance(mesh, Mesh) else shade_samples(frags, shade_one, options.background, color_at)
 
 
 def shade_part(part: VisiblePart, camera: Camera, options: ShadingOptions) -> U8:
