@@ -85,6 +85,11 @@ class PlacedScene:
         self._material = material  # instead of those of the meshes
         self._with_depth = with_depth
         self._may_cluster = may_cluster
+        self._last: tuple[int, View] | None = None  # the instance that was last asked for: often thrice in turn
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What another process needs: views of instances are made there."""
+        return vars(self) | {"_last": None}
 
     __setstate__ = set_aligned
 
@@ -120,6 +125,12 @@ class PlacedScene:
         return self.snap(i).mesh
 
     def _view_of(self, i: int) -> View:
+        last = self._last
+        if last is None or last[0] != i:
+            self._last = last = i, self._make_view(i)
+        return last[1]
+
+    def _make_view(self, i: int) -> View:
         instance, view = self.scene[i], self._view
         cull = MIRRORED[view.cull] if instance.is_mirrored else view.cull
         own = replace(view, transform=self._clip_from_world @ instance.transform, cull=cull)

@@ -87,7 +87,7 @@ class Instance:
         name = "" if self.name is None else f", name={self.name!r}"
         return f"Instance({self.mesh!r}, at=({place}){name})"
 
-    @property
+    @cached_property
     def is_mirrored(self) -> bool:
         """Whether the matrix turns the winding of triangles over."""
         return bool(np.linalg.det(self.transform[:3, :3]) < 0)
