@@ -206,8 +206,7 @@ def test_index_outside_the_vertices_is_an_error():
 
 def kept(frags):
     """Pixels that are listed, (H, W), and ids and depths of samples (H, W, S) from the lists; other depths are NaN."""
-    kept = frags._split
-    n, split = len(kept.positions), kept.split
+    n, split = len(frags._split.positions), frags._split.split
     is_listed = np.zeros(frags.id.shape, bool)
     ids, depth = np.repeat(frags.id[..., None], n, -1), np.full((*frags.id.shape, n), np.nan, np.float32)
     depth[..., 0] = frags.depth
@@ -223,11 +222,15 @@ def check_kept(frags):
     """The pixels listed are those whose samples differ, and all samples are those of the planes."""
     before = frags.id, frags.depth
     is_listed, ids, depth = kept(frags)
-    planes = frags.samples_triangle, frags.samples_depth
-    assert_same(is_listed, (planes[0] != planes[0][..., :1]).any(-1))
-    assert_same(ids, planes[0])
+    spread = frags.samples_triangle  # from the lists: planes are drawn when depths are asked for
+    assert frags._split is not None
+    planes = frags.samples_depth, frags.samples_triangle
+    assert frags._split is None
+    assert_same(is_listed, (planes[1] != planes[1][..., :1]).any(-1))
+    assert_same(ids, planes[1])
+    assert_same(spread, planes[1])
     is_known = ~np.isnan(depth)
-    assert_same(depth[is_known].view(np.int32), planes[1][is_known].view(np.int32))
+    assert_same(depth[is_known].view(np.int32), planes[0][is_known].view(np.int32))
     assert is_known[is_listed].all()
     assert_same(before[0], frags.id)
     assert_same(before[1].view(np.int32), frags.depth.view(np.int32))

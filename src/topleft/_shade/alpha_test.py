@@ -71,8 +71,9 @@ def cut_out(frags: Fragments, mesh: Mesh, camera: Camera, cut: Cut, *, threads: 
         Never changes a bit.
     """
     n_threads = threads_for(threads, len(mesh.triangles))
-    for k in range(frags.samples_triangle.shape[-1]):
-        cut_sample(frags.sample(k), mesh, camera, cut, n_threads)
+    samples, _ = frags._sampled()
+    for sample in samples or (frags,):
+        cut_sample(sample, mesh, camera, cut, n_threads)
 
 
 def cut_sample(sample: Fragments, mesh: Mesh, camera: Camera, cut: Cut, n_threads: int) -> None:
