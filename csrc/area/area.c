@@ -25,6 +25,20 @@
 #define TL_MOST_MET (1 << 16) /* bits of cells that edges meet: 2^20 cells */
 #define TL_EDGE_QUEUE 112
 
+/* The largest extent of an edge in lanes, in units. */
+static inline int32_t max_edge_extent(int bits)
+{
+    return 1 << (bits + TL_MAX_EDGE_BITS < 25 ? bits + TL_MAX_EDGE_BITS : 25);
+}
+
+/* Whether lanes can take an edge. */
+static inline int is_lane_edge(int64_t x0, int64_t y0, int64_t x1, int64_t y1, int32_t max_extent)
+{
+    const int64_t limit = (int64_t)1 << 30;
+    return x0 > -limit && x0 < limit && x1 > -limit && x1 < limit && min64(y0, y1) > -limit && max64(y0, y1) < limit &&
+           max64(x1 - x0, x0 - x1) <= max_extent && max64(y1 - y0, y0 - y1) <= max_extent;
+}
+
 /* Edges wait until a vector is full of their kind: of 1 to 8 rows, or more; that pass up to 2 columns a row, or up to
  * 6; or any number.  The last kind are no edges at all: horizontal, or without an effect here. */
 enum {
@@ -93,9 +107,7 @@ static void push_edge(area_state *s, int64_t x0, int64_t y0, int64_t x1, int64_t
         const int64_t x = x0, y = y0;
         x0 = x1, y0 = y1, x1 = x, y1 = y;
     }
-    const int64_t limit = (int64_t)1 << 30;
-    const int is_narrow = x0 > -limit && x0 < limit && x1 > -limit && x1 < limit && y0 > -limit && y1 < limit;
-    if (!is_narrow || max64(x1 - x0, x0 - x1) > s->max_extent || y1 - y0 > s->max_extent) {
+    if (!is_lane_edge(x0, y0, x1, y1, s->max_extent)) {
         tl_count_work(s->window, 16 * s->window->height);
         add_exact_edge(&s->plane, x0, y0, x1, y1, sign);
         return;
@@ -231,7 +243,6 @@ static int64_t draw_area(const tl_snapped *snapped, const tl_window *window, con
 {
     area_state s;
     uint64_t met[TL_MOST_MET / 64];
-    const int bits = window->subpixel_bits;
     place_plane(window, target, &s.plane);
     s.plane.is_sparse = snapped->n_triangles < window->width * window->height / TL_SPARSE_PX;
     const int64_t n_met = (int64_t)s.plane.stride * s.plane.n_rows / TL_MET_CELLS;
@@ -241,7 +252,7 @@ static int64_t draw_area(const tl_snapped *snapped, const tl_window *window, con
         s.plane.met = met;
     }
     s.snapped = snapped, s.window = window, s.bad_row = -1;
-    s.max_extent = 1 << (bits + TL_MAX_EDGE_BITS < 25 ? bits + TL_MAX_EDGE_BITS : 25);
+    s.max_extent = max_edge_extent(window->subpixel_bits);
     memset(s.n, 0, sizeof s.n);
     const tl_share all = {.end = snapped->n_triangles};
     int32_t corners[3 * TL_LANES];

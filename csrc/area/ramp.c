@@ -169,13 +169,13 @@ TL_INLINE void add_quads(area_plane *plane, vi at, const vi *columns)
         flush_quads(plane);
 }
 
-/* A row of TL_LANES edges that pass from xa to xb, less than 4 * n_quads - 2 px. */
-TL_INLINE void add_row(area_plane *plane, int n_quads, vd xa, vd xb, vd steep, vd height, vi col, vi row)
+/* A row of TL_LANES edges that pass from xa to xb, less than 4 * n_quads - 2 px: the area right of them in 4 * n_quads
+ * pixels from the column that is returned on.  In the last of these all of the ramp lies left. */
+TL_INLINE vi ramp_areas(int n_quads, vd xa, vd xb, vd steep, vd height, vi *areas)
 {
     const vd low = vd_min(xa, xb), high = vd_max(xa, xb), first = vd_floor(low), zero = vd_set1(0.0);
     const vd lo = vd_sub(low, first), hi = vd_sub(high, first);
     const int n = 4 * n_quads;
-    vi cells[8], area = vi_set1(0);
     vd before = zero;
     for (int k = 1; k < n; k++) {
         vd q;
@@ -185,14 +185,23 @@ TL_INLINE void add_row(area_plane *plane, int n_quads, vd xa, vd xb, vd steep, v
         } else { /* all of the ramp lies left of here */
             q = vd_mul(height, vd_sub(vd_set1(k), vd_mul(vd_set1(0.5), vd_add(lo, hi))));
         }
-        const vi next = vi_round(vd_sub(q, before));
-        cells[k - 1] = vi_sub(next, area);
-        area = next;
+        areas[k - 1] = vi_round(vd_sub(q, before));
         before = q;
     }
-    cells[n - 1] = vi_sub(vi_round(height), area);
+    areas[n - 1] = vi_round(height);
+    return vi_round(first);
+}
+
+/* The same as differences, into the cells. */
+TL_INLINE void add_row(area_plane *plane, int n_quads, vd xa, vd xb, vd steep, vd height, vi col, vi row)
+{
+    const int n = 4 * n_quads;
+    vi areas[8], cells[8];
+    const vi first = ramp_areas(n_quads, xa, xb, steep, height, areas);
+    for (int k = 0; k < n; k++)
+        cells[k] = k ? vi_sub(areas[k], areas[k - 1]) : areas[k];
     const vi start = vi_add(vi_mul(row, vi_set1(plane->stride)), vi_set1(TL_CELL_PAD));
-    const vi c = vi_add(col, vi_round(first));
+    const vi c = vi_add(col, first);
     /* cells beside the frame: all that is left of it counts as one, the rest as none */
     for (int k = 0; k < n; k += 4) {
         const vi at = vi_clamp(vi_add(c, vi_set1(k)), vi_set1(-4), vi_set1(plane->n_cols));

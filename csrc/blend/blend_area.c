@@ -17,6 +17,7 @@
 #include "raster/batch.c"
 #include "area/area.c"
 #include "area/ramp.c"
+#include "blend/blend_rows.c"
 #include "blend/blend_strip.c"
 #include "blend/mix.c"
 #include "blend/mix.h"

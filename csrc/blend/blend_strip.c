@@ -185,14 +185,11 @@ static void blend_block(blend_state *b, const cell_block *c)
 static void add_edge(area_plane *plane, int64_t x0, int64_t y0, int64_t x1, int64_t y1)
 {
     const int sign = y0 < y1 ? -1 : 1, bits = plane->bits;
-    const int64_t limit = (int64_t)1 << 30;
-    const int64_t max_extent = (int64_t)1 << (bits + TL_MAX_EDGE_BITS < 25 ? bits + TL_MAX_EDGE_BITS : 25);
     if (sign > 0) {
         const int64_t x = x0, y = y0;
         x0 = x1, y0 = y1, x1 = x, y1 = y;
     }
-    const int is_narrow = x0 > -limit && x0 < limit && x1 > -limit && x1 < limit && y0 > -limit && y1 < limit;
-    if (!is_narrow || max64(x1 - x0, x0 - x1) > max_extent || y1 - y0 > max_extent) {
+    if (!is_lane_edge(x0, y0, x1, y1, max_edge_extent(bits))) {
         add_exact_edge(plane, x0, y0, x1, y1, sign);
         return;
     }
@@ -292,40 +289,6 @@ static void blend_strip(blend_state *b, const tl_triangle *pieces, int64_t n, in
     for (int64_t k = 0; k < n_rows; k++) /* what lies right of the window, for nobody */
         for (int64_t i = plane.n_cols / TL_LANES * TL_LANES; i < plane.stride - TL_CELL_PAD; i += TL_LANES)
             vi_store(plane.cells + k * plane.stride + TL_CELL_PAD + i, vi_set1(TL_CELL_ZERO));
-}
-
-/* Triangle i, all of its pieces as one. */
-static __attribute__((noinline)) void blend_area_alone(blend_state *b, int64_t i)
-{
-    const tl_window *window = b->window;
-    int32_t own[3];
-    const triangle_parts parts = parts_of(b->snapped, i, own);
-    int64_t n = 0, top = INT64_MAX, bottom = INT64_MIN, left = INT64_MAX, right = INT64_MIN;
-    int is_narrow = 1;
-    tl_triangle t[TL_MAX_PIECES];
-    for (int k = 0; k < parts.n && n < TL_MAX_PIECES; k++) {
-        if (is_culled(load_triangle(&parts.set, parts.corners + 3 * k, t + n), b->snapped->cull))
-            continue;
-        top = min64(top, min3(t[n].y_fx[0], t[n].y_fx[1], t[n].y_fx[2]) >> window->subpixel_bits);
-        bottom = max64(bottom, max3(t[n].y_fx[0], t[n].y_fx[1], t[n].y_fx[2]) >> window->subpixel_bits);
-        left = min64(left, min3(t[n].x_fx[0], t[n].x_fx[1], t[n].x_fx[2]) >> window->subpixel_bits);
-        right = max64(right, max3(t[n].x_fx[0], t[n].x_fx[1], t[n].x_fx[2]) >> window->subpixel_bits);
-        is_narrow &= t[n].is_narrow;
-        n++;
-    }
-    if (!n)
-        return;
-    const int64_t first_row = max64(top - window->y_px, 0);
-    const int64_t end_row = min64(bottom + 1 - window->y_px, window->height);
-    if (first_row >= end_row || (b->is_flat && !begin_flat(b, i)))
-        return;
-    if (!b->is_flat)
-        begin_gouraud(b, i, &parts.set, parts.corners, parts.is_cut);
-    /* strips of what is not narrow are as wide as the window */
-    const int n_rows = strip_rows(is_narrow ? min64(window->width, right - left + 4) : window->width);
-    tl_count_work(window, 4 * (end_row - first_row) * (16 + min64(window->width, right - left)));
-    for (int64_t row = first_row; row < end_row; row += n_rows)
-        blend_strip(b, t, n, row, (int)min64(n_rows, end_row - row));
 }
 
 #endif

@@ -357,7 +357,7 @@ static int64_t share_polygons(const tl_polygons *p, const tl_share_job *job)
     area_state s;
     share_output out = {.job = job, .n = job->starts ? job->starts[job->first] : 0};
     s.snapped = NULL, s.bad_row = -1;
-    s.max_extent = 1 << (p->bits + TL_MAX_EDGE_BITS < 25 ? p->bits + TL_MAX_EDGE_BITS : 25);
+    s.max_extent = max_edge_extent(p->bits);
     const tl_window whole = {.width = job->width, .height = job->bottom - job->top};
     s.window = &whole; /* its size alone is read, to count work */
     memset(s.n, 0, sizeof s.n);
