@@ -329,6 +329,7 @@ typedef struct {
     int is_premultiplied;  /* colours hold alpha already; otherwise the last of 2 or 4 channels is alpha */
     const uint8_t *ground; /* uint8: the colour that all pixels get first, or NULL: they stay as they are */
     int is_area;           /* the share of the pixel that the triangle covers counts, not its centre */
+    int64_t band_rows;     /* drawn at once, > 0: with fewer all triangles are set up more often */
     int32_t *packed;       /* uint8 with other than 4 channels: room for the window, a row after the other */
     int32_t *cells;        /* is_area: tl_blend_cells(width), all TL_CELL_CLEAR, and left so */
 } tl_canvas;

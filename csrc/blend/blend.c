@@ -193,18 +193,11 @@ static int64_t blend_window(const tl_snapped *snapped, const tl_window *window, 
     return bad_row;
 }
 
-/* Fewer triangles than these are set up for each band anew, so that a band is still in the cache when it is drawn over:
- * half of a frame of 33 MB in one triangle takes 1.1 ms instead of 1.7. */
-#define TL_FEW_TRIANGLES 64
-#define TL_BAND_BYTES (1 << 18)
-
 static int64_t blend(const tl_snapped *snapped, const tl_window *window, const tl_canvas *canvas)
 {
     const int64_t pixel_bytes = canvas->n_channels * (canvas->is_u8 ? 1 : 4);
     const int64_t fitting = max64(1, (((int64_t)1 << 31) - 1) / canvas->stride_px);
-    const int64_t hot = max64(1, TL_BAND_BYTES / (canvas->stride_px * pixel_bytes));
-    const int64_t rows_at_once =
-        canvas->ground && snapped->n_triangles < TL_FEW_TRIANGLES ? min64(fitting, hot) : fitting;
+    const int64_t rows_at_once = min64(fitting, canvas->band_rows);
     for (int64_t row = 0; row < window->height; row += rows_at_once) {
         tl_window band = *window;
         tl_canvas part = *canvas;

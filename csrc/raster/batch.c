@@ -437,6 +437,17 @@ TL_INLINE void fetch_rows(const void *rows, size_t n_bytes, const int32_t *corne
         __builtin_prefetch((const void *)((uintptr_t)rows + (uint32_t)corners[k] * n_bytes));
 }
 
+/* The same of triangles in a list, and the rows of indices of those that come after them. */
+TL_INLINE void fetch_listed(const void *rows, size_t n_bytes, const int32_t *triangles, const int32_t *ids)
+{
+    for (int k = 0; k < TL_LANES; k++) {
+        const int32_t *corners = triangles + 3 * (int64_t)ids[4 * TL_LANES + k];
+        __builtin_prefetch(triangles + 3 * (int64_t)ids[8 * TL_LANES + k]);
+        __builtin_prefetch((const void *)((uintptr_t)rows + (uint32_t)corners[0] * n_bytes));
+        __builtin_prefetch((const void *)((uintptr_t)rows + (uint32_t)corners[2] * n_bytes));
+    }
+}
+
 /* For triangles that cover the centres of pixels; the window has fewer than 2^31 samples and lies within 2^30 pixels of
  * 0. */
 static void start_batch(batch_state *s, const tl_snapped *snapped, const tl_window *window, const tl_target *target)

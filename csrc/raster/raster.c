@@ -234,6 +234,8 @@ TL_INLINE void draw_batches(const tl_snapped *snapped, const tl_window *window, 
             const vi id = part.ids ? vi_load_masked(live, part.ids + i) : vi_add(vi_set1((int32_t)i), vi_iota());
             if (TL_LANES > 1 && !part.ids && !clusters && i + 5 * TL_LANES <= part.end)
                 fetch_rows(snapped->mesh.vertices, sizeof(tl_vertex), snapped->triangles + 3 * (i + 4 * TL_LANES));
+            if (TL_LANES > 1 && part.ids && i + 9 * TL_LANES <= part.end)
+                fetch_listed(snapped->mesh.vertices, sizeof(tl_vertex), snapped->triangles, part.ids + i);
             draw_batch(&s, sink, share_corners(s.snapped, &part, i, corners), id, live);
         }
         flush_queues(&s, sink);

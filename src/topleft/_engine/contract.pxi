@@ -137,6 +137,7 @@ cdef extern from "topleft.h" nogil:
         int is_premultiplied
         const uint8_t *ground
         int is_area
+        int64_t band_rows
         int32_t *packed
         int32_t *cells
     int64_t tl_blend_cells(int64_t width)

@@ -167,6 +167,26 @@ cdef class SnappedMesh:
         each = self.snapped.n_triangles / <double>n
         return n_seen * each, total * each / n_pixels, n_rows * each
 
+    def guess_scatter(self, int64_t n_rows):
+        """Return the share of triangles that are taller than `n_rows` or lie farther from the next, from up to 64 of them.
+
+        0 where vertices are not snapped.
+        """
+        if self.exact is not None:
+            return 0.0
+        cdef const tl_vertex *v = self.snapped.mesh.vertices
+        cdef const int32_t *t
+        cdef int64_t n = min(self.snapped.n_triangles - 1, 64), i, k, last = self.snapped.mesh.n_vertices - 1, n_far = 0
+        cdef double far = n_rows * 2.0**self.subpixel_bits, low, high
+        for i in range(n):
+            t = self.snapped.triangles + 3 * (i * (self.snapped.n_triangles - 1) // n)
+            low, high = 2.0**62, -2.0**62
+            for k in range(4):  # its corners, and one of the next
+                if 0 <= t[k] <= last:
+                    low, high = min(low, <double>v[t[k]].y_fx), max(high, <double>v[t[k]].y_fx)
+            n_far += high - low > far
+        return n_far / <double>max(1, n)
+
     def count_classes(self, int sink, int64_t width, int64_t height, const int32_t[:, ::1] samples=None):
         """Count the triangles by the code that draws them into a sink: `tl_census` in ``csrc/topleft.h``.
 
@@ -275,10 +295,10 @@ cdef class SnappedMesh:
                                 &pixels[first_row * width * pixel_bytes])
 
     def blend(self, uint8_t[::1] pixels, int64_t width, int64_t first_row, int64_t n_rows, const uint8_t[::1] colors, int n_channels,
-              bint is_u8, bint is_flat, int blend, bint is_premultiplied, const uint8_t[::1] ground, int32_t[::1] packed, int32_t[::1] cells):
+              bint is_u8, bint is_flat, int blend, bint is_premultiplied, int64_t band_rows, const uint8_t[::1] ground, int32_t[::1] packed, int32_t[::1] cells):
         """Blend the colours of triangles into rows [first_row, first_row + n_rows) of a picture, one after the other.
 
-        `ground`: one colour, which the rows get first, or None. `packed`: room for the picture, for uint8 with other than 4 channels; `cells`: clear, for areas. Returns as `draw` does.
+        `band_rows`: so many rows are finished before the next. `ground`: one colour, which the rows get first, or None. `packed`: room for the picture, for uint8 with other than 4 channels; `cells`: clear, for areas. Returns as `draw` does.
         """
         cdef tl_canvas canvas
         cdef tl_window window = self.window(first_row, n_rows, width)
@@ -289,6 +309,7 @@ cdef class SnappedMesh:
         canvas.pixels, canvas.stride_px = &pixels[first_row * width * pixel_bytes], width
         canvas.colors, canvas.n_channels, canvas.is_u8, canvas.is_flat = data(colors), n_channels, is_u8, is_flat
         canvas.blend, canvas.is_premultiplied, canvas.is_area = <tl_blend>blend, is_premultiplied, cells is not None
+        canvas.band_rows = band_rows
         canvas.ground = &ground[0] if ground is not None else NULL
         canvas.packed = &packed[first_row * width] if packed is not None else NULL
         canvas.cells = &cells[0] if cells is not None else NULL

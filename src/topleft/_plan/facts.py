@@ -134,6 +134,11 @@ class Facts:
         return self.drawing.is_shared
 
     @property
+    def in_bands(self) -> bool:
+        """Whether triangles are sorted into bands of rows, and band after band is drawn."""
+        return self.drawing.in_bands and not (self.is_direct or self.is_few or 0 in self.view.size)
+
+    @property
     def n_drawn(self) -> int:
         """Triangles and pieces that may cover a sample."""
         return self.count(*CLASSES[4:])
@@ -280,7 +285,7 @@ def memory_of(facts: Facts) -> tuple[dict[str, int], dict[str, int]]:
     """Return the bytes of scratch, which is kept from call to call, and of results, by name.
 
     What only the data can tell comes on top: a table of vertices beyond 2**30 sub-pixels, 16 bytes a vertex; the pieces
-    of cut triangles, about 100 bytes each; with several samples a pixel, triangles in several bands of rows.
+    of cut triangles, about 100 bytes each; triangles in several bands of rows.
     """
     view, n = facts.view, facts.n_triangles
     width, height = view.size
@@ -314,6 +319,8 @@ def memory_of(facts: Facts) -> tuple[dict[str, int], dict[str, int]]:
     if found is not None and found.clusters is not None:  # the records are not needed, unless a plane cuts
         scratch["records"] = 0 if not facts.n_clipped else scratch["records"]
         scratch["clusters"] = 12 * len(found.clusters) + 4 * facts.drawing.n_threads * n + found.clusters.n_bytes
+    elif facts.in_bands:
+        scratch |= {"bins": 12 * (n + 16), "bands": 4 * (n + 1)}
     elif facts.is_shared:
         scratch["others"] = 4 * (n + 16 * facts.drawing.n_threads)
     if found is not None and found.meshlet_bytes:

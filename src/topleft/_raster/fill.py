@@ -291,8 +291,12 @@ def blend(
         meshes = [snapped.mesh.seen_from(x, y) for x, y in positions]
         pictures = memory.empty("sample colors", (len(meshes), *pixels.shape), colors.dtype)
         pictures[...] = pixels
+    n_channels = 1 if colors.ndim == 1 else colors.shape[1]
+    pixel_bytes = 4 if colors.dtype == np.uint8 else 4 * n_channels
+    row_bytes = pixel_bytes * view.size[0]
+    band_rows = choices.rows_to_blend(view, snapped, row_bytes, lays_ground=ground is not None)
     for mesh, picture in zip(meshes, pictures, strict=True):
-        if blend_colors(memory, mesh, colors, picture, blending, n_threads, is_flat=is_flat, ground=ground):
+        if blend_colors(memory, mesh, colors, picture, blending, n_threads, band_rows, is_flat=is_flat, ground=ground):
             snapped.refuse()
     view.mark("draw")
     if view.sampling.n_samples > 1:
@@ -306,13 +310,14 @@ def blend_colors(
     pixels: NDArray[Any],
     blending: Blending,
     n_threads: int,
+    band_rows: int,
     *,
     is_flat: bool,
     ground: NDArray[Any] | None = None,
 ) -> bool:
     """Blend a mesh into contiguous pixels; returns whether a triangle has an index outside the vertices.
 
-    `ground`, for uint8: the colour that all pixels get before.
+    `band_rows`: so many are finished before the next. `ground`, for uint8: the colour that all pixels get before.
     """
     height, width = pixels.shape[:2]
     n_parts = min(height, n_threads)
@@ -329,7 +334,7 @@ def blend_colors(
         own = None if cells is None else cells[n_cells * i : n_cells * (i + 1)]
         return mesh.blend(
             flat, width, first, end - first, palette, n_channels, is_u8, is_flat,
-            code, is_premultiplied, under, packed, own,
+            code, is_premultiplied, band_rows, under, packed, own,
         )  # fmt: skip
 
     return max(run_parts(blend_part, n_parts, n_parts)) >= 0

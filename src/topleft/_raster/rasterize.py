@@ -23,7 +23,7 @@ from topleft._raster.choices import Drawing, Route
 from topleft._raster.classic import draw_classic, refuse_classic
 from topleft._raster.cluster_draw import ClusteredMesh
 from topleft._raster.fragments import Fragments, GivenCorners
-from topleft._raster.sampling import draw_planes, draw_split, lay_background, sample_positions, sum_areas
+from topleft._raster.sampling import draw_planes, draw_sorted, draw_split, lay_background, sample_positions, sum_areas
 from topleft._raster.snap import Snapped, snap_mesh, snap_to_cover
 from topleft._raster.view import View
 from topleft.typing import DepthTestOption
@@ -51,7 +51,7 @@ def draw(
     earlier_wins: bool = False,
 ) -> None:
     """Clear contiguous buffers and draw a mesh into them, in bands of rows."""
-    (width, height), (sink, n_parts, is_shared, is_bounded) = view.size, drawing
+    (width, height), (sink, n_parts, is_shared, is_bounded, in_bands) = view.size, drawing
     if 0 in view.size:
         return
     covered: NDArray[np.uint64] | None = None
@@ -67,11 +67,14 @@ def draw(
     def draw_rows(first: int, end: int) -> int:
         return snapped.mesh.draw(target, first, end - first)
 
-    if is_shared and snapped.can_share:
-        bad_rows = draw_shared(memory, snapped, target, height, n_parts)
+    if in_bands:
+        mesh, n, shape = snapped.mesh, snapped.n_triangles, (height, width)
+        is_bad = draw_sorted(memory, mesh, n, sample_positions(1, view.grid_bits), [target], shape, n_parts)
+    elif is_shared and snapped.can_share:
+        is_bad = max(draw_shared(memory, snapped, target, height, n_parts)) >= 0
     else:
-        bad_rows = run_parts(draw_rows, height, n_parts)
-    if max(bad_rows) >= 0:
+        is_bad = max(run_parts(draw_rows, height, n_parts)) >= 0
+    if is_bad:
         snapped.refuse()
     view.mark("draw")
 

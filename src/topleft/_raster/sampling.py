@@ -15,8 +15,8 @@ from topleft._base.options import Sink
 from topleft._base.threads import run_parts
 
 __all__ = [
-    "SAMPLE_GRID_BITS", "SplitSamples", "draw_means", "draw_planes", "draw_split", "sample_positions", "split_bytes",
-    "sum_areas",
+    "SAMPLE_GRID_BITS", "SplitSamples", "draw_means", "draw_planes", "draw_sorted", "draw_split", "sample_positions",
+    "split_bytes", "sum_areas",
 ]  # fmt: skip
 
 #: From the centre of the pixel, x right and y down, in sixteenths of a pixel: the standard patterns of Direct3D 11.
@@ -76,18 +76,32 @@ def draw_planes(
     the other. A mesh that is not near (see `tl_kernels.draw`) is drawn as a whole for each sample.
     """
     n_samples, height, width = pixels.shape
-    meshes = [mesh.seen_from(x, y) for x, y in positions.tolist()]
     depths = [None] * n_samples if depth is None else list(depth)
     targets = [_engine.Target(sink, plane, z, None) for plane, z in zip(pixels, depths, strict=True)]
     if not is_near:
+        meshes = [mesh.seen_from(x, y) for x, y in positions.tolist()]
         bad_rows = [
             max(run_parts(lambda first, end, s=s, t=t: s.draw(t, first, end - first), height, n_threads))  # type: ignore[misc]
             for s, t in zip(meshes, targets, strict=True)
         ]
         return max(bad_rows) >= 0
-    bins = sort_bands(memory, mesh, n_triangles, positions, (height, width), BAND_BYTES // 8, n_threads)
+    return draw_sorted(memory, mesh, n_triangles, positions, targets, (height, width), n_threads)
+
+
+def draw_sorted(
+    memory: Memory,
+    mesh: _engine.SnappedMesh,
+    n_triangles: int,
+    positions: NDArray[np.int32],
+    targets: list[_engine.Target],
+    shape: tuple[int, int],
+    n_threads: int,
+) -> bool:
+    """Draw each sample into its target, band after band of rows; returns as `draw_planes` does. The mesh is near."""
+    bins = sort_bands(memory, mesh, n_triangles, positions, shape, BAND_BYTES // 8, n_threads)
     if bins.bad_row >= 0:
         return True
+    meshes = [mesh.seen_from(x, y) for x, y in positions.tolist()]
     run_parts(lambda first, end: _engine.draw_bands(meshes, targets, bins, first, end), bins.n_bands, n_threads)
     return False
 

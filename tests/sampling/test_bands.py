@@ -1,0 +1,195 @@
+"""Pictures that are drawn in bands of rows: the same as drawn at once, from triangles as they come."""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+from engine_cases import ON_EACH_ISA, on
+
+import topleft as tl
+from topleft._raster import choices, sampling
+
+SIZE = (333, 301)
+TESTS = [None, "less", "greater"]
+
+
+@contextmanager
+def bands(monkeypatch, *, are_drawn):
+    """Draw in bands of few rows wherever that is possible, or nowhere."""
+    with monkeypatch.context() as m:
+        m.setattr(choices, "NEAR_PIXELS", 0 if are_drawn else 1 << 40)
+        m.setattr(choices, "CLEARED_PIXEL_NS", 1e6)
+        m.setattr(sampling, "BAND_BYTES", 8 * 333 * 20)
+        m.setattr(choices, "BLEND_BAND_BYTES", 4 * 333 * 20)
+        m.setattr(choices, "rows_to_blend", lambda view, *_, **__: 13 if are_drawn else view.size[1])
+        yield
+
+
+def strewn(seed, n=300, size_px=60.0):
+    """Triangles that reach beyond the picture, with depths of which many are equal, slivers among them."""
+    rng = np.random.default_rng(seed)
+    corners = rng.uniform(-20, 350, (n, 1, 3)) + rng.normal(scale=size_px, size=(n, 3, 3))
+    corners[: n // 4] = np.round(corners[: n // 4])
+    corners[n // 4 : n // 3, 2] = corners[n // 4 : n // 3, 1] + 0.2
+    corners[..., 2] = rng.integers(0, 4, (n, 3)) / 3
+    return corners.reshape(-1, 3), np.arange(3 * n, dtype=np.int32).reshape(n, 3)
+
+
+def as_drawn(monkeypatch, draw):
+    """What is drawn at once, and in bands."""
+    with bands(monkeypatch, are_drawn=False):
+        whole = draw()
+    with bands(monkeypatch, are_drawn=True):
+        return whole, draw()
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize("threads", [1, 3])
+@pytest.mark.parametrize("test", TESTS)
+def test_ids_and_depth(monkeypatch, isa, test, threads):
+    vertices, triangles = strewn(1)
+    for cull in ("none", "back", "front"):
+
+        def draw(cull=cull):
+            found = tl.rasterize(vertices, triangles, SIZE, depth_test=test, threads=threads, cull=cull)
+            return found.triangle, found.depth
+
+        with on(isa):
+            (ids, depth), (banded_ids, banded_depth) = as_drawn(monkeypatch, draw)
+        assert (ids >= 0).any()
+        assert (banded_ids == ids).all()
+        assert banded_depth.tobytes() == depth.tobytes()
+
+
+@ON_EACH_ISA
+def test_counts_and_labels(monkeypatch, isa):
+    vertices, triangles = strewn(2)
+    colors = np.random.default_rng(0).random((len(triangles), 2), np.float32)
+    monkeypatch.setattr(choices, "MIN_ROWS_TO_SORT", 0.0)
+    monkeypatch.setattr(choices, "SAVED_STORE_NS", 1e6)
+    with on(isa):
+        for draw in (
+            lambda: tl.overdraw(vertices, triangles, SIZE),
+            lambda: tl.fill(vertices, triangles, colors, SIZE, per="triangle"),
+            lambda: tl.fill(vertices[:, :2], triangles, np.repeat(colors, 3, 0), SIZE, per="vertex"),
+        ):
+            whole, banded = as_drawn(monkeypatch, draw)
+            assert (whole == banded).all()
+
+
+@pytest.mark.parametrize("options", [
+    {"subpixel_bits": 0}, {"subpixel_bits": 16}, {"subpixel_bits": "exact"}, {"method": "scanline"},
+    {"origin": (40, -30)}, {"sampling": "msaa4"}, {"viewport": (500, 400)},
+])  # fmt: skip
+def test_options(monkeypatch, options):
+    vertices, triangles = strewn(3, 120)
+
+    def draw():
+        found = tl.rasterize(vertices, triangles, SIZE, **options)
+        return found.triangle, found.depth
+
+    (ids, depth), (banded_ids, banded_depth) = as_drawn(monkeypatch, draw)
+    assert (ids >= 0).any()
+    assert (banded_ids == ids).all()
+    assert (banded_depth == depth).all()
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_triangles_that_planes_cut(monkeypatch, threads):
+    rng = np.random.default_rng(4)
+    vertices = rng.normal(size=(300, 3)) * [3, 3, 6]
+    triangles = np.arange(300).reshape(-1, 3)
+    camera = np.array([[1.0, 0, 0, 0], [0, 1, 0, 0], [0, 0, -1.02, -0.2], [0, 0, -1, 0]])
+
+    def draw():
+        found = tl.rasterize(vertices, triangles, SIZE, transform=camera, threads=threads)
+        return found.triangle, found.depth
+
+    (ids, depth), (banded_ids, banded_depth) = as_drawn(monkeypatch, draw)
+    assert (ids >= 0).any()
+    assert (banded_ids == ids).all()
+    assert (banded_depth == depth).all()
+
+
+def test_which_are_drawn_so():
+    """Strewn triangles, and few of a mesh; not many of a mesh, nor tiny ones, nor small pictures."""
+
+    def in_bands(vertices, triangles, size):
+        return "one band after the other" in tl.plan(vertices, triangles, size).explain()
+
+    wide, tall = 1920, 1080
+    rng = np.random.default_rng(0)
+    at = rng.random((20_000, 1, 3)) * [wide, tall, 1]
+    triangles = np.arange(60_000).reshape(-1, 3)
+    for px, is_so in ((40, True), (2, False)):
+        vertices = (at + rng.uniform(-px, px, (20_000, 3, 3)) * [0.7, 0.7, 0]).reshape(-1, 3)
+        assert in_bands(vertices, triangles, (wide, tall)) is is_so
+        assert not in_bands(vertices * [0.1, 0.1, 1], triangles, (wide // 10, tall // 10))
+    for n, is_so in ((100, True), (400, False)):
+        x, y = np.meshgrid(np.linspace(0, wide, n + 1), np.linspace(0, tall, n + 1))
+        grid = np.stack([x, y, x + y], -1).reshape(-1, 3)
+        k = (np.arange(n)[:, None] * (n + 1) + np.arange(n)).reshape(-1, 1)
+        cells = np.concatenate([k + [0, 1, n + 2], k + [0, n + 2, n + 1]], 1).reshape(-1, 3)
+        assert in_bands(grid, cells, (wide, tall)) is is_so
+
+
+def test_bad_indices(monkeypatch):
+    vertices, triangles = strewn(5)
+    triangles[17, 1] = len(vertices)
+    with bands(monkeypatch, are_drawn=True), pytest.raises(IndexError, match="17"):
+        tl.rasterize(vertices, triangles, SIZE)
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize("sampling_", ["area", "center"])
+@pytest.mark.parametrize(("channels", "blend"), [(4, "over"), (4, "replace"), (3, "replace"), (2, "over"), (1, "add")])
+def test_colours(monkeypatch, isa, sampling_, channels, blend):
+    vertices, triangles = strewn(6)
+    colors = np.random.default_rng(1).integers(0, 256, (len(triangles), channels)).astype(np.uint8)
+    colors[::2, -1] = 255
+    for background, values in ((None, colors), (7, colors), (0.5, colors.astype(np.float32))):
+        with on(isa):
+            whole, banded = as_drawn(
+                monkeypatch,
+                lambda values=values, background=background: tl.fill(
+                    vertices[:, :2], triangles, values, SIZE, per="triangle", sampling=sampling_, blend=blend,
+                    background=None if background is None else np.full(channels, background, values.dtype),
+                ),
+            )  # fmt: skip
+        assert (whole == banded).all()
+
+
+SHAPES = {
+    "steep": [[40.3, 10.7], [290.1, 150.3], [90.9, 290.2]],
+    "flat": [[5.5, 20.25], [320.75, 80.5], [30.0, 110.125]],
+    "level": [[20, 40], [300.5, 40], [120.25, 280]],
+    "upright": [[60, 10], [60, 280.5], [300, 140]],
+    "beyond": [[-200.5, -100.25], [900.0, 100.0], [100.0, 800]],
+    "left": [[-120.5, 20.25], [150.0, 150.0], [-20.0, 290]],
+    "thin": [[30, 5], [33.5, 295.5], [31.25, 150]],
+    "far": [[-3e6, -2e6], [4e6, 1e5], [1e5, 5e6]],
+    "centres": [[16.5, 16.5], [272.5, 144.5], [16.5, 272.5]],
+}
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("blend", ["over", "replace", "multiply", "max"])
+def test_large_triangles_by_area(isa, shape, blend):
+    """A flat triangle has the bits of one whose vertices have that colour, which takes another way."""
+    rng = np.random.default_rng(2)
+    points = np.array(SHAPES[shape])
+    for corners in (points, points[::-1], points[[1, 2, 0]]):
+        for alpha in (255, 90):
+            color = np.array([[200, 30, 99, alpha]], np.uint8)
+            ground = rng.integers(0, 256, (SIZE[1], SIZE[0], 4)).astype(np.uint8)
+            ground[::2, :, 3] = 255
+            flat, smooth = ground.copy(), ground.copy()
+            with on(isa):
+                options = {"sampling": "area", "blend": blend}
+                tl.fill(corners, [[0, 1, 2]], color, SIZE, per="triangle", out=flat, **options)
+                tl.fill(corners, [[0, 1, 2]], np.repeat(color, 3, 0), SIZE, per="vertex", out=smooth, **options)
+            assert (flat == smooth).all()
+            assert (flat != ground).any()
