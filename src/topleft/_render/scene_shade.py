@@ -18,6 +18,7 @@ from topleft._model.environment import Environment
 from topleft._model.light import Fog, Light, LightKind, LightSpace
 from topleft._model.material import Material
 from topleft._model.mesh import Mesh
+from topleft._model.normals import is_similarity
 from topleft._model.points import Points
 from topleft._model.texture import Texture
 from topleft._points.cloud import shade_cloud
@@ -25,7 +26,6 @@ from topleft._points.points import PointFragments
 from topleft._raster.fragments import Fragments
 from topleft._render.fragments import SceneFragments, VisiblePart, join, parts_of
 from topleft._scene.scene import Instance, Scene, meshes_of
-from topleft._shade.look import is_similarity
 from topleft._shade.shade import Places, Shading, ShadingOptions, shade_mesh, shade_numbers, shade_samples
 from topleft.typing import ShadingOption
 
@@ -167,7 +167,8 @@ def shade_by(frags: Fragments, mesh: Mesh | Scene, camera: Camera, options: Shad
 
 def shade_part(part: VisiblePart, camera: Camera, options: ShadingOptions) -> U8:
     """The picture of the rectangle of a part."""
-    return shade_mesh(*part.drawn, part.camera(camera), in_space_of(part.instance, options, camera))
+    own = in_space_of(part.instance, options, camera)
+    return shade_mesh(*part.drawn, part.camera(camera), own)
 
 
 def check_drawn(frags: Fragments, mesh: Mesh | Scene) -> None:
