@@ -11,7 +11,7 @@ from leaf_cases import CAMERA, HOLES, LEAF, N_LAYERS, SIZE, cut, layers
 import topleft as tl
 from topleft import _engine
 from topleft._engine.isa import build_info
-from topleft._shade.alpha_test import cut_of, cut_out
+from topleft._render.holes import cut_of, cut_out
 
 
 def expected_ids(mesh):
