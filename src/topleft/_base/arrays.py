@@ -190,15 +190,16 @@ def as_checked_triangles(values: ArrayLike, n_vertices: int) -> NDArray[np.int32
         check_rows(own, n_vertices, values)
         return own
     own = np.empty_like(array, np.int32)
-    narrow_triangles(array, values, n_vertices, own, 1)
-    return as_frozen(own, is_own=True)
+    refuse_rows([_engine.narrow_triangles(array, n_vertices, own)], values, n_vertices)
+    own.flags.writeable = False
+    return own
 
 
-def as_frozen(array: NDArray[Any], *, is_own: bool = False) -> NDArray[Any]:
-    """Return a read-only array that nobody can write to: a copy, unless it is one, or nobody else has it."""
+def as_frozen(array: NDArray[Any]) -> NDArray[Any]:
+    """Return a read-only array that nobody can write to: a copy, unless it is one."""
     if is_frozen(array):
         return array
-    own = array if is_own else array.copy()
+    own = array.copy()
     own.flags.writeable = False
     return own
 
