@@ -114,7 +114,8 @@ def simplify(mesh: Mesh, *, ratio: float = 0.25, smallest: int = 200) -> Levels:
         raise ValueError(f"smallest must be at least 4, got {smallest!r}")
     collapser()
     with _lock:
-        return keep_levels(mesh, Levels(mesh, coarser_levels(mesh, ratio, smallest)))
+        coarser = coarser_levels(mesh, ratio, smallest)
+        return keep_levels(mesh, Levels(mesh, coarser))
 
 
 def levels_of(mesh: Mesh) -> Levels:

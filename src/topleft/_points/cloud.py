@@ -54,7 +54,8 @@ def draw_cloud(
     if options.get("cull", "none") != "none":
         raise ValueError("points have no side to cull")
     frame = options.get("viewport") or size
-    sizes, positions = sizes_px(cloud, camera, frame), cloud.positions
+    sizes = sizes_px(cloud, camera, frame)
+    positions: npt.NDArray[Any] = cloud.positions
     if camera.lens is None:
         options["transform"] = camera.clip_from_world(frame)
     else:
@@ -89,13 +90,13 @@ def sizes_px(cloud: Points, camera: Camera, frame: tuple[int, int]) -> float | F
     if cloud.unit == PointUnit.PX:
         return cloud.size
     eye = moved(cloud.positions, camera.view)
+    unit_of_eye = abs(determinant(camera.view[:3, :3].tolist())) ** (1 / 3)
     if camera.lens is not None:
         eye = camera.lens.bend(eye)
     projection = camera.clip_from_eye(frame)
     x, y, z = eye.T
     a, b, c, d = projection[3].tolist()
     w = ((a * x + b * y) + c * z) + d
-    unit_of_eye = abs(determinant(camera.view[:3, :3].tolist())) ** (1 / 3)
     scale = unit_of_eye * abs(float(projection[1, 1])) * frame[1] / 2
     sizes: F64 = np.asarray(cloud.size) * scale / np.where(w > 0, w, 1)
     return sizes
@@ -185,12 +186,12 @@ def lambert(light: Light, eye: F64, normals: F64, view: F64) -> F64:
     if light.space == LightSpace.WORLD:
         matrix = view if is_point else np.vstack([np.c_[view[:3, :3], np.zeros(3)], [0, 0, 0, 1]])
         at = moved(at, matrix)
+    way = at - eye if is_point else at
+    cosine = light.intensity * np.maximum(dot(normals, unit_or_zero(way)), 0)
     if not is_point:
-        return light.intensity * np.maximum(dot(normals, unit_or_zero(at)[0]), 0)
-    way = at - eye
+        return cosine
     unit_of_eye = abs(determinant(view[:3, :3].tolist())) ** (1 / 3)
-    falloff = 1 + light.falloff * dot(way, way) / unit_of_eye**2
-    return light.intensity * np.maximum(dot(normals, unit_or_zero(way)), 0) / falloff
+    return cosine / (1 + light.falloff * dot(way, way) / unit_of_eye**2)
 
 
 def dot(a: F64, b: F64) -> F64:
