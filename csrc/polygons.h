@@ -94,7 +94,7 @@ typedef struct {
     int64_t first, end;
     const tl_polygon_box *boxes;
     int64_t width, top, bottom;
-    int32_t *cells;  /* (tl_share_cells(box), TL_CELL_CLEAR, and left so) of the largest box within the rows */
+    int32_t *cells;  /* (n_cells,), all TL_CELL_CLEAR, and left so */
     int64_t n_cells; /* at least TL_LEAST_SHARE_CELLS */
     tl_piece_scratch *pieces;
     /* pixels: the sum of the shares, at most 1; or, with colours, the mix of what is there and the polygon's by its
@@ -113,8 +113,6 @@ typedef struct {
 
 /* Cells that there are at least: small polygons are drawn some at a time. */
 #define TL_LEAST_SHARE_CELLS 49152
-
-static inline int64_t tl_share_cells(int64_t width, int64_t height) { return (width + 63) / 16 * 16 * height + 64; }
 
 /* int64 that `certify_polygons` needs for a polygon: two keys for each ring, and the nodes of a tree. */
 static inline int64_t tl_certify_words(int64_t n_points, int64_t n_rings)

@@ -182,7 +182,7 @@ def samples(
         a, b, c = corners[rows].swapaxes(0, 1)
         turned = (area[rows] < 0)[:, None]
         b, c = np.where(turned, c, b), np.where(turned, b, c)
-        weights = [edge_value(p[of], q[of], sample) for p, q in ((b, c), (c, a), (a, b))]
+        weights = [cross(p[of], q[of], sample) for p, q in ((b, c), (c, a), (a, b))]
         accept = [owns_border(q - p)[of] for p, q in ((b, c), (c, a), (a, b))]
         inside = np.logical_and.reduce([(w > 0) | ((w == 0) & own) for w, own in zip(weights, accept, strict=True)])
         z_sample = None
@@ -200,11 +200,6 @@ def samples(
 def cross(a: NDArray[np.int64], b: NDArray[np.int64], c: NDArray[np.int64]) -> NDArray[np.int64]:
     """Twice the signed area, positive clockwise on the screen (y down)."""
     return (b[..., 0] - a[..., 0]) * (c[..., 1] - a[..., 1]) - (b[..., 1] - a[..., 1]) * (c[..., 0] - a[..., 0])
-
-
-def edge_value(p: NDArray[np.int64], q: NDArray[np.int64], sample: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The edge function of p to q at the sample."""
-    return cross(p, q, sample)
 
 
 def owns_border(edge: NDArray[np.int64]) -> NDArray[np.bool_]:

@@ -16,8 +16,6 @@ TASK = "smooth-fill"
 SINGLES, SEAMS = "smooth-singles", "smooth-seams"
 """Scenes whose pictures are compared with exact areas."""
 
-SUMMED, ONE_BY_ONE = "area, summed", "area, one by one"
-
 
 def timed_scenes(record: Record) -> list[dict[str, Any]]:
     """Scenes that are there for their times."""

@@ -10,9 +10,9 @@ from surface_samples import corners_of, sampled_distance
 
 import topleft as tl
 from topleft._lod import collapse as collapsing
-from topleft._lod.collapse import border_points, collapse, flatness, gather
+from topleft._lod.collapse import border_points, collapse, flatness, gather, wanted_of
 from topleft._lod.levels import kept_levels
-from topleft._lod.simplify import levels_of, wanted_of
+from topleft._lod.simplify import levels_of
 
 
 def torus(**attributes):

@@ -11,7 +11,8 @@ from engine_cases import ON_EACH_ISA, THREADS, on
 import topleft as tl
 from topleft._model import normals as faces
 from topleft._model.mesh import Mesh
-from topleft._shade.look import ShadingMesh, turn_of_normals
+from topleft._model.normals import turn_of_normals
+from topleft._shade.look import ShadingMesh
 
 PI = Decimal("3.14159265358979323846264338327950288419716939937510582097494")
 

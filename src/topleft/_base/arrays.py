@@ -39,12 +39,12 @@ __all__ = [
     "as_vector",
     "as_vertices",
     "as_window",
-    "bad_triangle",
     "check_progress",
     "check_regular",
     "check_rows",
     "is_frozen",
     "narrow_triangles",
+    "refuse_rows",
     "set_aligned",
     "set_read_only",
     "shown",
@@ -189,16 +189,17 @@ def as_checked_triangles(values: ArrayLike, n_vertices: int) -> NDArray[np.int32
         own = as_frozen(array)
         check_rows(own, n_vertices, values)
         return own
-    own = np.empty(array.shape, np.int32)
-    narrow_triangles(array, values, n_vertices, own, 1)
-    return as_frozen(own, is_own=True)
+    own = np.empty_like(array, np.int32)
+    refuse_rows([_engine.narrow_triangles(array, n_vertices, own)], values, n_vertices)
+    own.flags.writeable = False
+    return own
 
 
-def as_frozen(array: NDArray[Any], *, is_own: bool = False) -> NDArray[Any]:
-    """Return a read-only array that nobody can write to: a copy, unless it is one, or nobody else has it."""
+def as_frozen(array: NDArray[Any]) -> NDArray[Any]:
+    """Return a read-only array that nobody can write to: a copy, unless it is one."""
     if is_frozen(array):
         return array
-    own = array if is_own else array.copy()
+    own = array.copy()
     own.flags.writeable = False
     return own
 
@@ -213,22 +214,23 @@ def is_frozen(array: NDArray[Any]) -> bool:
     return owner is None or isinstance(owner, bytes)
 
 
-def bad_triangle(values: ArrayLike, row: int, n_vertices: int) -> IndexError:
-    """Return the error for a row of `triangles` that names a vertex that does not exist."""
-    return IndexError(
-        f"triangles must hold indices in [0, {n_vertices}), the number of vertices; "
-        f"row {row} is {as_array('triangles', values)[row].tolist()}"
-    )
-
-
 def check_rows(triangles: NDArray[np.int32], n_vertices: int, given: ArrayLike | None = None) -> None:
     """Raise an error for the first of contiguous triangles that names a vertex that does not exist.
 
     `given`: the same as the caller has them, for the message.
     """
-    row = _engine.first_bad_row(triangles, n_vertices)
-    if row >= 0:
-        raise bad_triangle(triangles if given is None else given, row, n_vertices)
+    refuse_rows([_engine.first_bad_row(triangles, n_vertices)], triangles if given is None else given, n_vertices)
+
+
+def refuse_rows(found: list[int], triangles: ArrayLike, n_vertices: int) -> None:
+    """Raise an error for the first row found to name a vertex that does not exist; -1 is none."""
+    bad_rows = [row for row in found if row >= 0]
+    if bad_rows:
+        row = min(bad_rows)
+        raise IndexError(
+            f"triangles must hold indices in [0, {n_vertices}), the number of vertices; "
+            f"row {row} is {as_array('triangles', triangles)[row].tolist()}"
+        )
 
 
 def narrow_triangles(
@@ -240,9 +242,7 @@ def narrow_triangles(
         row = _engine.narrow_triangles(triangles[first:end], n_vertices, out[first:end])
         return first + row if row >= 0 else -1
 
-    for row in run_parts(narrow, len(triangles), n_threads):
-        if row >= 0:
-            raise bad_triangle(given, row, n_vertices)
+    refuse_rows(run_parts(narrow, len(triangles), n_threads), given, n_vertices)
 
 
 def as_transform(values: ArrayLike, *, has_poses: bool = False) -> NDArray[Any]:

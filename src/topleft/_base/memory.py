@@ -89,7 +89,7 @@ class KeptMemory:
         block = self._blocks.get(name)
         if block is None or block.size < n_bytes:
             block = self._blocks[name] = allocate(n_bytes)
-        return _typed(block, shape, dtype)
+        return block[:n_bytes].view(dtype).reshape(shape)
 
     def constant(self, name: str, n: int, value: int) -> NDArray[np.int32]:
         """Return n int32 that are all `value`: filled once, put back by whoever changed them."""
@@ -238,7 +238,3 @@ def _fresh_bytes(n_bytes: int) -> NDArray[np.uint8]:
 
 def _size(shape: tuple[int, ...], dtype: DTypeLike) -> int:
     return math.prod(shape) * np.dtype(dtype).itemsize
-
-
-def _typed(block: NDArray[np.uint8], shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
-    return block[: _size(shape, dtype)].view(dtype).reshape(shape)

@@ -17,23 +17,17 @@ from topleft._base.options import check_choice
 from topleft._camera.lens import Lens, lens_of_opencv
 from topleft._camera.matrices import (
     F64,
-    FRAMING_MARGIN,
-    SILHOUETTE_MARGIN,
     THREE_QUARTER_DEG,
     as_framed,
-    bounding_sphere,
     box_corners,
     box_matrix,
-    check_fov,
     check_planes,
     check_positive,
-    distance_to_fit,
     ends_to_frame,
+    framing_matrices,
     frustum_matrix,
-    orbit_view,
     orthographic_matrix,
     perspective_matrix,
-    place_to_fill,
     points_to_frame,
     split_matrix,
     view_matrix,
@@ -452,49 +446,9 @@ class Camera:
         check_choice("fit", fit, get_args(FitOption))
         points = None if fit == "sphere" else box_corners(ends) if fit == "box" else points_to_frame(framed)
         angles = azimuth_deg, elevation_deg, fov_y_deg
-        return cls._around(ends, points, angles, up=up, ortho=ortho, aspect=aspect, fills=fit == "silhouette")
-
-    @classmethod
-    def _around(
-        cls,
-        ends: F64,
-        points: F64 | None = None,
-        angles: tuple[float, float, float] = (*THREE_QUARTER_DEG, DEFAULT_FOV_Y_DEG),
-        *,
-        up: UpOption = "y",
-        ortho: bool = False,
-        aspect: float = 1.0,
-        fills: bool = False,
-    ) -> Camera:
-        """A camera that has the sphere round these ends just inside its frame, or the points, or fills it with them."""
-        azimuth_deg, elevation_deg, fov_y_deg = angles
-        center, radius = bounding_sphere(ends)
-        check_fov(fov_y_deg)
-        check_positive("aspect", aspect)
-        tan_y = np.tan(np.radians(fov_y_deg) / 2)
-        # The sphere touches the pyramid of view at sin, not tan, of the half angle.
-        distance = radius * FRAMING_MARGIN / np.sin(np.arctan(tan_y * min(1.0, aspect)))
-        height = 2 * radius * FRAMING_MARGIN / min(1.0, aspect)
-        right, above = 0.0, 0.0
-        if points is not None:
-            turn = orbit_view((0, 0, 0), 1.0, azimuth_deg, elevation_deg, up=up)[:3, :3]
-            points = (points - center) @ turn.T
-            if fills:
-                share = 1 - 2 * SILHOUETTE_MARGIN
-                right, above, distance = place_to_fill(points, share * tan_y * aspect, share * tan_y)
-                if ortho:
-                    right, above, half = place_to_fill(points, aspect, 1.0, ortho=True)
-                    distance, height = radius / np.sin(np.arctan(tan_y)), 2 * half / share
-            else:
-                distance = distance_to_fit(points, tan_y * aspect, tan_y)
-                height = 2 * FRAMING_MARGIN * max(np.abs(points[:, 1]).max(), np.abs(points[:, 0]).max() / aspect)
-            height = height or 2 * FRAMING_MARGIN
-        view = orbit_view(center, distance, azimuth_deg, elevation_deg, up=up)
-        view[:2, 3] -= right, above
-        near, far = max(distance - 1.01 * radius, 1e-3 * radius), distance + 1.01 * radius
-        if ortho:
-            return cls.orthographic(view, near=near, far=far, height=height)
-        return cls.perspective(view, near=near, far=far, fov_y_deg=fov_y_deg)
+        fills = fit == "silhouette"
+        matrices = framing_matrices(ends, points, angles, up=up, ortho=ortho, aspect=aspect, fills=fills)
+        return cls(*matrices, aspect=1.0)
 
 
 CameraLike: TypeAlias = Camera | npt.NDArray[Any]
@@ -543,4 +497,6 @@ def camera_for(subject: Mesh | Scene | Points, camera: CameraLike | None, size: 
     if isinstance(subject, Mesh) and not len(subject.triangles):
         raise ValueError("there is nothing to frame: the mesh has no triangles")
     width, height = size
-    return Camera._around(subject.extreme_points(), aspect=width / height if width > 0 and height > 0 else 1.0)
+    aspect = width / height if width > 0 and height > 0 else 1.0
+    angles = *THREE_QUARTER_DEG, DEFAULT_FOV_Y_DEG
+    return Camera(*framing_matrices(subject.extreme_points(), None, angles, aspect=aspect), aspect=1.0)

@@ -13,7 +13,7 @@ from typing import TypeAlias, get_args
 import numpy as np
 import numpy.typing as npt
 
-from topleft._base.arrays import as_number, as_real, as_vector, check_regular
+from topleft._base.arrays import as_number, as_real, check_regular
 from topleft._base.options import check_choice
 from topleft._model.mesh import Mesh, extreme_points, used_vertices
 from topleft._model.points import Points
@@ -242,8 +242,8 @@ def orbit_view(
         axis = np.array([-np.sin(azimuth), 0, -np.cos(azimuth)]) * np.sign(elevation)
     if up == "z":
         outward, axis = outward[[0, 2, 1]] * [1, -1, 1], axis[[0, 2, 1]] * [1, -1, 1]
-    target = as_vector("target", target)
-    return view_matrix(target + distance * outward, target, axis)
+    at = np.asarray(target, np.float64)
+    return view_matrix(at + distance * outward, at, axis)
 
 
 def perspective_matrix(fov_y_deg: float, near: float, far: float) -> F64:
@@ -284,6 +284,50 @@ def box_matrix(left: float, right: float, bottom: float, top: float, near: float
     matrix[0, 0], matrix[0, 3] = 2 / (right - left), -(right + left) / (right - left)
     matrix[1, 1], matrix[1, 3] = 2 / (top - bottom), -(top + bottom) / (top - bottom)
     return matrix
+
+
+def framing_matrices(
+    ends: F64,
+    points: F64 | None,
+    angles: tuple[float, float, float],
+    *,
+    up: UpOption = "y",
+    ortho: bool = False,
+    aspect: float = 1.0,
+    fills: bool = False,
+) -> tuple[F64, F64]:
+    """View and projection (4, 4) that have the sphere round these ends, or the points, just inside a frame.
+
+    `angles`: azimuth, elevation and field of view, degrees. `fills`: the points fill the frame; see `Camera.framing`.
+    """
+    azimuth_deg, elevation_deg, fov_y_deg = angles
+    center, radius = bounding_sphere(ends)
+    check_fov(fov_y_deg)
+    check_positive("aspect", aspect)
+    tan_y = np.tan(np.radians(fov_y_deg) / 2)
+    # The sphere touches the pyramid of view at sin, not tan, of the half angle.
+    distance = radius * FRAMING_MARGIN / np.sin(np.arctan(tan_y * min(1.0, aspect)))
+    height = 2 * radius * FRAMING_MARGIN / min(1.0, aspect)
+    right, above = 0.0, 0.0
+    if points is not None:
+        turn = orbit_view((0, 0, 0), 1.0, azimuth_deg, elevation_deg, up=up)[:3, :3]
+        points = (points - center) @ turn.T
+        if fills:
+            share = 1 - 2 * SILHOUETTE_MARGIN
+            right, above, distance = place_to_fill(points, share * tan_y * aspect, share * tan_y)
+            if ortho:
+                right, above, half = place_to_fill(points, aspect, 1.0, ortho=True)
+                distance, height = radius / np.sin(np.arctan(tan_y)), 2 * half / share
+        else:
+            distance = distance_to_fit(points, tan_y * aspect, tan_y)
+            height = 2 * FRAMING_MARGIN * max(np.abs(points[:, 1]).max(), np.abs(points[:, 0]).max() / aspect)
+        height = height or 2 * FRAMING_MARGIN
+    view = orbit_view(center, distance, azimuth_deg, elevation_deg, up=up)
+    view[:2, 3] -= right, above
+    near, far = max(distance - 1.01 * radius, 1e-3 * radius), distance + 1.01 * radius
+    if ortho:
+        return view, orthographic_matrix(height, near, far)
+    return view, perspective_matrix(fov_y_deg, near, far)
 
 
 def check_positive(name: str, value: float) -> None:

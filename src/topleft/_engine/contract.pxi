@@ -459,7 +459,6 @@ cdef extern from "topleft.h" nogil:
         int64_t n_room
     int64_t tl_polygon_stride(int64_t width)
     int64_t tl_certify_words(int64_t n_points, int64_t n_rings)
-    int64_t tl_share_cells(int64_t width, int64_t height)
     ctypedef struct tl_tiling:
         int64_t width_px, height_px, window_width_px, window_height_px
         int subpixel_bits

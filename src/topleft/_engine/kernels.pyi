@@ -587,7 +587,6 @@ PIECE_WORDS: int
 POLYGON_PAD: int
 
 def polygon_stride(width: int) -> int: ...
-def share_cells(width: int, height: int) -> int: ...
 def snap_points(
     source: Source,
     first: int,

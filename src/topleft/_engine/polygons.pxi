@@ -13,11 +13,6 @@ def polygon_stride(int64_t width):
     return tl_polygon_stride(width)
 
 
-def share_cells(int64_t width, int64_t height):
-    """Return how many cells the shares of a box need."""
-    return tl_share_cells(width, height)
-
-
 def snap_points(Source source, int64_t first, int64_t end, int bits, int grid_bits, int64_t x_px, int64_t y_px,
                 int32_t[::1] x_fx, int32_t[::1] y_fx, int64_t[:, ::1] wide_fx):
     """Snap points [first, end) to columns of coordinates from the corner; returns the numbers of bad and wide points."""

@@ -16,7 +16,7 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from topleft._io.references import Cloud, InputFile, numbers_of_text
+from topleft._io.references import Cloud, InputFile, numbers_of_text, whole_numbers
 from topleft._model.material import Material
 from topleft._model.mesh import Mesh
 from topleft._model.polygons import triangulate
@@ -399,18 +399,13 @@ def _corners(found: dict[str, Rows]) -> tuple[I64, I64, Rows]:
     for name in ("vertex_indices", "vertex_index"):
         if isinstance(faces.get(name), _List):
             rows = faces[name]
-            return _whole(rows.values), rows.lengths, faces
+            return whole_numbers(rows.values), rows.lengths, faces
     strips = found.get("tristrips", {})
     for name in ("vertex_indices", "vertex_index"):
         if isinstance(strips.get(name), _List):
-            triangles = triangles_of_strips(_whole(strips[name].values), strips[name].lengths)
+            triangles = triangles_of_strips(whole_numbers(strips[name].values), strips[name].lengths)
             return triangles.ravel(), np.full(len(triangles), 3), {}
     return np.zeros(0, np.int64), np.zeros(0, np.int64), {}
-
-
-def _whole(values: Array) -> I64:
-    with np.errstate(invalid="ignore"):
-        return values.astype(np.int64)
 
 
 def triangles_of_strips(values: I64, lengths: I64) -> I64:

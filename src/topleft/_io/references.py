@@ -149,6 +149,12 @@ def numbers_of_text(content: bytes, dtype: Any = np.float64) -> npt.NDArray[Any]
         raise MeshError("a number in it is none") from None
 
 
+def whole_numbers(values: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
+    """The values as int64; those that have none there come out as any."""
+    with np.errstate(invalid="ignore"):
+        return values.astype(np.int64)
+
+
 def decoded(content: bytes, max_pixels: int = MAX_TEXTURE_PIXELS) -> U8:
     """The picture (H, W, 4), uint8, of an encoded one.
 

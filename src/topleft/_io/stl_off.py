@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from topleft._io.references import Cloud, InputFile, numbers_of_text
+from topleft._io.references import Cloud, InputFile, numbers_of_text, whole_numbers
 from topleft._model.mesh import Mesh
 from topleft._model.polygons import triangulate
 from topleft.errors import MeshError
@@ -146,13 +146,13 @@ def _faces_of_one_size(values: Array, n_faces: int) -> Faces | None:
     if n_colors not in (0, 3, 4) or not (rows[:, 0] == rows[0, 0]).all():
         return None
     k = int(rows[0, 0])
-    return _whole(rows[:, 1 : k + 1].ravel()), np.full(n_faces, k), rows[:, k + 1 :] if n_colors else None
+    return whole_numbers(rows[:, 1 : k + 1].ravel()), np.full(n_faces, k), rows[:, k + 1 :] if n_colors else None
 
 
 def _faces_of_lines(lines: list[bytes]) -> Faces:
     """Faces of which each has a line of its own."""
     rows = [line.split() for line in lines]
-    counts = _whole(numbers_of_text(b" ".join(row[0] for row in rows)))
+    counts = whole_numbers(numbers_of_text(b" ".join(row[0] for row in rows)))
     if not all(0 <= n < len(row) for n, row in zip(counts.tolist(), rows, strict=True)):
         raise MeshError("a face has fewer corners than it says")
     corners = [word for n, row in zip(counts.tolist(), rows, strict=True) for word in row[1 : n + 1]]
@@ -160,7 +160,7 @@ def _faces_of_lines(lines: list[bytes]) -> Faces:
     table: Array | None = None
     if colors and len(colors[0]) in (3, 4) and all(len(color) == len(colors[0]) for color in colors):
         table = numbers_of_text(b" ".join(word for color in colors for word in color)).reshape(len(colors), -1)
-    return _whole(numbers_of_text(b" ".join(corners))), counts, table
+    return whole_numbers(numbers_of_text(b" ".join(corners))), counts, table
 
 
 def _faces_of_numbers(values: list[float], n_faces: int) -> Faces:
@@ -176,12 +176,7 @@ def _faces_of_numbers(values: list[float], n_faces: int) -> Faces:
         counts.append(int(values[at]))
         corners += values[at + 1 : at + 1 + counts[-1]]
         at += counts[-1] + 1
-    return _whole(np.array(corners, np.float64)), np.array(counts, np.int64), None
-
-
-def _whole(values: Array) -> I64:
-    with np.errstate(invalid="ignore"):
-        return values.astype(np.int64)
+    return whole_numbers(np.array(corners, np.float64)), np.array(counts, np.int64), None
 
 
 def _bytes(values: Array) -> npt.NDArray[np.uint8]:

@@ -42,6 +42,10 @@ TOO_MANY = 1.25
 #: A result with more than this share of the triangles is a failure: nearly nothing can be collapsed.
 STUCK = 0.8
 
+#: The finest level has about so many triangles at most. A blob of 300,000 is within half a pixel where it fills a frame
+#: of 7,000 pixels; finer levels would take most of the time and of the memory.
+MOST_OF_LEVEL = 1_000_000
+
 #: The package keeps its mesh in a global variable.
 _lock = threading.Lock()
 
@@ -72,6 +76,18 @@ def collapser() -> Any:
             "levels of detail need fast-simplification: pip install 'topleft[simplify]'"
         ) from None
     return fast_simplification
+
+
+def wanted_of(triangles: I32, ratio: float, smallest: int) -> int:
+    """How many triangles the next level is to have; 0: there is to be none.
+
+    Borders stay, and one of n sides needs about n triangles: the ratio is that of all others. Else a level would have
+    nothing but its borders. (Very large meshes are looked at when they have become smaller.)
+    """
+    n_fixed = len(border_points(triangles)) if len(triangles) <= MOST_TO_COLLAPSE else 0
+    n_free = int((len(triangles) - n_fixed) * ratio)
+    n_wanted = min(n_fixed + n_free, max(MOST_OF_LEVEL, n_fixed))
+    return n_wanted if smallest <= n_free and n_wanted <= STUCK * len(triangles) else 0
 
 
 def collapse(points: F64, triangles: I32, n_wanted: int, *, with_pairs: bool = True) -> Collapsed:

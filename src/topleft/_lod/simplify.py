@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from topleft import _engine
 from topleft._base.arrays import shown
-from topleft._lod.collapse import MOST_TO_COLLAPSE, STUCK, Collapsed, border_points, collapse, collapser
+from topleft._lod.collapse import STUCK, Collapsed, collapse, collapser, wanted_of
 from topleft._lod.distance import TriangleTree, measure, welded
 from topleft._lod.levels import Level, Levels, keep_levels, kept_levels
 from topleft._model.mesh import FloatArray, Mesh, coincident
@@ -28,10 +28,6 @@ __all__ = ["levels_of", "simplify"]
 #: Levels are measured against the mesh itself, or against its finest level with at most so many triangles, whose bound
 #: is added: it is small beside those of coarser levels, and the time that comparisons take goes with the triangles.
 MOST_TO_COMPARE = 300_000
-
-#: The finest level has about so many triangles at most. A blob of 300,000 is within half a pixel where it fills a frame
-#: of 7,000 pixels; finer levels would take most of the time and of the memory.
-MOST_OF_LEVEL = 1_000_000
 
 #: A level ends the levels, and is none of them, if it has 1/n of the triangles of the one before and more than n to
 #: this power times its bound: something is lost. Bounds go with the area of triangles on smooth surfaces, with n.
@@ -118,7 +114,8 @@ def simplify(mesh: Mesh, *, ratio: float = 0.25, smallest: int = 200) -> Levels:
         raise ValueError(f"smallest must be at least 4, got {smallest!r}")
     collapser()
     with _lock:
-        return keep_levels(mesh, Levels(mesh, coarser_levels(mesh, ratio, smallest)))
+        coarser = coarser_levels(mesh, ratio, smallest)
+        return keep_levels(mesh, Levels(mesh, coarser))
 
 
 def levels_of(mesh: Mesh) -> Levels:
@@ -136,16 +133,16 @@ def coarser_levels(mesh: Mesh, ratio: float, smallest: int) -> list[Level]:
     anchor: TriangleTree | None = None
     bound_of_anchor = 0.0
     while n_wanted := wanted_of(corners.triangles, ratio, smallest):
+        n_before = len(corners.triangles)
+        collapsed = collapse(corners.points, corners.triangles, n_wanted, with_pairs=has_more)
+        if not 0 < len(collapsed.triangles) <= STUCK * n_before:
+            break
         if anchor is None:  # without attributes the corners are welded already
             anchor = (
                 TriangleTree.of_mesh(mesh.vertices, mesh.triangles, center)
                 if has_more
                 else TriangleTree(corners.points - center, corners.triangles)
             )
-        n_before = len(corners.triangles)
-        collapsed = collapse(corners.points, corners.triangles, n_wanted, with_pairs=has_more)
-        if not 0 < len(collapsed.triangles) <= STUCK * n_before:
-            break
         corners = stored(next_corners(corners, collapsed), mesh)
         level = level_mesh(corners, mesh)
         surface = TriangleTree.of_mesh(level.vertices, level.triangles, center)
@@ -157,18 +154,6 @@ def coarser_levels(mesh: Mesh, ratio: float, smallest: int) -> list[Level]:
         if len(anchor.triangles) > MOST_TO_COMPARE:
             anchor, bound_of_anchor = surface, bound
     return found
-
-
-def wanted_of(triangles: I32, ratio: float, smallest: int) -> int:
-    """How many triangles the next level is to have; 0: there is to be none.
-
-    Borders stay, and one of n sides needs about n triangles: the ratio is that of all others. Else a level would have
-    nothing but its borders. (Very large meshes are looked at when they have become smaller.)
-    """
-    n_fixed = len(border_points(triangles)) if len(triangles) <= MOST_TO_COLLAPSE else 0
-    n_free = int((len(triangles) - n_fixed) * ratio)
-    n_wanted = min(n_fixed + n_free, max(MOST_OF_LEVEL, n_fixed))
-    return n_wanted if smallest <= n_free and n_wanted <= STUCK * len(triangles) else 0
 
 
 def stored(corners: Corners, mesh: Mesh) -> Corners:

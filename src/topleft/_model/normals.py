@@ -1,6 +1,7 @@
 """Faces: normals of triangles, of vertices and of creased corners, the side that these are on, the box round a mesh.
 
-Input: vertices and triangles. Output: arrays whose bits depend neither on the machine nor on the number of threads.
+And what a matrix makes of points and normals. Input: vertices and triangles, or rows. Output: arrays whose bits depend
+neither on the machine nor on the number of threads.
 
 Based on: Thurmer, G., and C. A. Wuthrich, "Computing Vertex Normals from Polygonal Facets", Journal of Graphics
 Tools 3(1), 1998 (normals weighted by the angle at the vertex).
@@ -16,12 +17,13 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft import _engine
-from topleft._base.arrays import as_checked_triangles, as_frozen, bad_triangle
+from topleft._base.arrays import as_checked_triangles, as_frozen, refuse_rows
 from topleft._base.threads import run_parts, threads_of_rows
 
 __all__ = [
-    "CornerNormals", "angle_weighted_normals", "box_of_triangles", "color_rows", "creased_normals", "face_normal_rows",
-    "face_normals", "moved", "turned_faces", "unit_or_zero", "unit_rows",
+    "CornerNormals", "angle_weighted_normals", "box_of_triangles", "color_rows", "creased_normals", "determinant",
+    "face_normal_rows", "face_normals", "is_similarity", "moved", "turn_of_normals", "turned_faces", "unit_or_zero",
+    "unit_rows",
 ]  # fmt: skip
 
 FloatArray = npt.NDArray[np.floating[Any]]
@@ -169,7 +171,7 @@ def angle_weighted_normals(vertices: FloatArray, triangles: I32, *, threads: int
         return _engine.vertex_normals(source, corners, first, end, out)
 
     n_threads = min(threads_of_rows(len(corners)), MAX_THREADS_OF_VERTICES) if threads is None else threads
-    _check(run_parts(add_up, len(points), n_threads), corners, len(points))
+    refuse_rows(run_parts(add_up, len(points), n_threads), corners, len(points))
     return out
 
 
@@ -254,6 +256,38 @@ def moved(points: FloatArray, matrix: F64) -> F64:
     return out
 
 
+def turn_of_normals(view: F64) -> F64:
+    """The matrix (3, 3) that takes rows of normals to eye space, but for their lengths: the inverse of that of points.
+
+    Its numbers are sums of products, the same on every machine.
+    """
+    rows = view[:3, :3].tolist()
+    (a, b, c), (d, e, f), (g, h, i) = rows
+    adjugate = [
+        [e * i - f * h, c * h - b * i, b * f - c * e],
+        [f * g - d * i, a * i - c * g, c * d - a * f],
+        [d * h - e * g, b * g - a * h, a * e - b * d],
+    ]
+    return np.array(adjugate) * math.copysign(1.0, determinant(rows))
+
+
+def is_similarity(view: F64) -> bool:
+    """Whether a matrix (4, 4) keeps angles and does not mirror, so that light may be computed before it."""
+    rows = view[:3, :3].tolist()
+    (a, b, c), (d, e, f), (g, h, i) = rows
+    squares = a * a + b * b + c * c, d * d + e * e + f * f, g * g + h * h + i * i
+    products = a * d + b * e + c * f, a * g + b * h + c * i, d * g + e * h + f * i
+    scale = sum(squares) / 3
+    error = max(map(abs, (*products, *(square - scale for square in squares))))
+    return determinant(rows) > 0 and error <= 1e-9 * scale
+
+
+def determinant(rows: list[list[float]]) -> float:
+    """Of a matrix (3, 3): NumPy's takes ten times as long for one."""
+    (a, b, c), (d, e, f), (g, h, i) = rows
+    return a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
+
+
 def color_rows(colors: U8) -> F32:
     """Rows (N, 4) float32 of colours (N, 3) or (N, 4): red, green, blue, and 1."""
     rows = np.empty((len(colors), 4), np.float32)
@@ -273,14 +307,8 @@ def _over_faces(
     points, corners = _contiguous(vertices), as_frozen(np.ascontiguousarray(triangles, np.int32))
     source, n_threads = _engine.Source(points), threads_of_rows(len(corners), threads)
     rows = run_parts(lambda first, end: work(source, corners, first, end), len(corners), n_threads)
-    _check(rows, corners, len(points))
+    refuse_rows(rows, corners, len(points))  # the caller's array may have changed since it was checked
 
 
 def _contiguous(rows: FloatArray) -> FloatArray:
     return np.ascontiguousarray(rows, rows.dtype if rows.dtype in (np.float32, np.float64) else np.float64)
-
-
-def _check(bad_rows: list[int], triangles: I32, n_vertices: int) -> None:
-    """The caller's array may have changed since it was checked."""
-    if max(bad_rows) >= 0:
-        raise bad_triangle(triangles, min(row for row in bad_rows if row >= 0), n_vertices)

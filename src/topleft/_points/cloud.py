@@ -19,13 +19,12 @@ from topleft._base.memory import FreshMemory, empty
 from topleft._base.options import PointShape
 from topleft._camera.camera import Camera
 from topleft._model.light import TO_HEADLIGHT, Light, LightKind, LightSpace
-from topleft._model.normals import moved, unit_or_zero
+from topleft._model.normals import determinant, moved, turn_of_normals, unit_or_zero
 from topleft._model.points import Points, PointUnit
 from topleft._points.points import PointFragments, draw_points
 from topleft._raster.classic import refuse_classic
 from topleft._raster.rasterize import refuse_many
 from topleft._raster.view import View, ViewOptions
-from topleft._shade.look import determinant, turn_of_normals
 from topleft._shade.shade import Shading, ShadingOptions, eye_distance, shade_numbers, shade_samples
 
 __all__ = ["CLOUD_LAYERS", "CloudBuffer", "draw_cloud", "shade_cloud"]
@@ -55,6 +54,7 @@ def draw_cloud(
     if options.get("cull", "none") != "none":
         raise ValueError("points have no side to cull")
     frame = options.get("viewport") or size
+    sizes = sizes_px(cloud, camera, frame)
     positions: npt.NDArray[Any] = cloud.positions
     if camera.lens is None:
         options["transform"] = camera.clip_from_world(frame)
@@ -63,7 +63,7 @@ def draw_cloud(
     view = View.parse(size, cast(ViewOptions, options), why_snapped="the corners of points lie on the grid")
     refuse_many(view, "a cloud")
     refuse_classic(view, "points")
-    return draw_points(FRESH, positions, sizes_px(cloud, camera, frame), PointShape(cloud.shape), view)
+    return draw_points(FRESH, positions, sizes, PointShape(cloud.shape), view)
 
 
 def draw_share(cloud: Points, camera: Camera, size: tuple[int, int], **options: Any) -> npt.NDArray[Any]:
@@ -90,13 +90,13 @@ def sizes_px(cloud: Points, camera: Camera, frame: tuple[int, int]) -> float | F
     if cloud.unit == PointUnit.PX:
         return cloud.size
     eye = moved(cloud.positions, camera.view)
+    unit_of_eye = abs(determinant(camera.view[:3, :3].tolist())) ** (1 / 3)
     if camera.lens is not None:
         eye = camera.lens.bend(eye)
     projection = camera.clip_from_eye(frame)
     x, y, z = eye.T
     a, b, c, d = projection[3].tolist()
     w = ((a * x + b * y) + c * z) + d
-    unit_of_eye = abs(determinant(camera.view[:3, :3].tolist())) ** (1 / 3)
     scale = unit_of_eye * abs(float(projection[1, 1])) * frame[1] / 2
     sizes: F64 = np.asarray(cloud.size) * scale / np.where(w > 0, w, 1)
     return sizes
@@ -134,10 +134,9 @@ def colors_of(ids: npt.NDArray[np.int32], depth: F32, cloud: Points, camera: Cam
     is_seen = np.zeros(len(cloud), np.bool_)
     is_seen[ids] = True
     rows = np.flatnonzero(is_seen)
-    row_of = np.empty(len(cloud), np.int32)
-    row_of[rows] = np.arange(len(rows))
+    row_of = np.cumsum(is_seen) - 1
     if options.mode is Shading.NORMALS:
-        return np.rint(127.5 * eye_normals(cloud, camera, rows) + 127.5).astype(np.uint8)[row_of[ids]]
+        return np.rint(127.5 * in_eye_space(cloud, camera, rows)[1] + 127.5).astype(np.uint8)[row_of[ids]]
     plain = np.array(options.color or DEFAULT_COLOR, np.uint8)
     own = np.broadcast_to(plain, (len(rows), 3)) if cloud.colors is None else cloud.colors[rows, :3]
     light = decode[own] / LINEAR_ONE
@@ -156,46 +155,43 @@ def steps_of(light: F64) -> npt.NDArray[np.intp]:
     return np.rint(LINEAR_ONE * light.clip(0, 1)).astype(np.intp)
 
 
-def eye_normals(cloud: Points, camera: Camera, rows: npt.NDArray[np.intp]) -> F64:
-    """Unit normals (P, 3) of some points in eye space, on the side that is seen; 0 where there is none."""
+def in_eye_space(cloud: Points, camera: Camera, rows: npt.NDArray[np.intp]) -> tuple[F64, F64]:
+    """Positions (P, 3) of some points in eye space, and unit normals on the side that is seen; 0: none."""
     given = cast(npt.NDArray[Any], cloud.normals)[rows]
     matrix = np.eye(4)
     matrix[:3, :3] = turn_of_normals(camera.view).T
-    normals = unit_or_zero(moved(unit_or_zero(given), matrix))
-    if camera.projection[3, :3].any():
-        to_eye = -moved(cloud.positions[rows], camera.view)
-    else:
-        to_eye = np.broadcast_to(np.array([0.0, 0.0, 1.0]), normals.shape)
+    eye, normals = moved(cloud.positions[rows], camera.view), unit_or_zero(moved(unit_or_zero(given), matrix))
+    to_eye = -eye if camera.projection[3, :3].any() else np.broadcast_to(np.array([0.0, 0.0, 1.0]), normals.shape)
     normals[dot(normals, to_eye) < 0] *= -1
-    return normals
+    return eye, normals
 
 
 def light_at(cloud: Points, camera: Camera, rows: npt.NDArray[np.intp], options: ShadingOptions) -> F64:
     """How much of red, green and blue (P, 3) some points send back: as a mesh does, without highlights."""
-    normals = eye_normals(cloud, camera, rows)
+    eye, normals = in_eye_space(cloud, camera, rows)
     total = np.full((len(rows), 3), options.ambient)
     if options.lights is None:
         half = (1 + dot(normals, TO_HEADLIGHT)) / 2
         total += (max(0.0, 1 - options.ambient) * half * half * half)[:, None]
     for light in options.lights or ():
-        total += lambert(light, normals, cloud, camera, rows)[:, None] * np.array(light_of(light.color)[:3])
+        total += lambert(light, eye, normals, camera.view)[:, None] * np.array(light_of(light.color)[:3])
     total[~normals.any(axis=1)] = 1.0
     return total
 
 
-def lambert(light: Light, normals: F64, cloud: Points, camera: Camera, rows: npt.NDArray[np.intp]) -> F64:
-    """The cosine of one light at some points, times its intensity: (P,)."""
+def lambert(light: Light, eye: F64, normals: F64, view: F64) -> F64:
+    """The cosine of one light at some points (P, 3) in eye space, times its intensity: (P,)."""
     is_point = light.kind == LightKind.POINT
     at = np.array([light.at])
     if light.space == LightSpace.WORLD:
-        matrix = camera.view if is_point else np.vstack([np.c_[camera.view[:3, :3], np.zeros(3)], [0, 0, 0, 1]])
+        matrix = view if is_point else np.vstack([np.c_[view[:3, :3], np.zeros(3)], [0, 0, 0, 1]])
         at = moved(at, matrix)
+    way = at - eye if is_point else at
+    cosine = light.intensity * np.maximum(dot(normals, unit_or_zero(way)), 0)
     if not is_point:
-        return light.intensity * np.maximum(dot(normals, unit_or_zero(at)[0]), 0)
-    way = at - moved(cloud.positions[rows], camera.view)
-    unit_of_eye = abs(determinant(camera.view[:3, :3].tolist())) ** (1 / 3)
-    falloff = 1 + light.falloff * dot(way, way) / unit_of_eye**2
-    return light.intensity * np.maximum(dot(normals, unit_or_zero(way)), 0) / falloff
+        return cosine
+    unit_of_eye = abs(determinant(view[:3, :3].tolist())) ** (1 / 3)
+    return cosine / (1 + light.falloff * dot(way, way) / unit_of_eye**2)
 
 
 def dot(a: F64, b: F64) -> F64:
@@ -261,7 +257,7 @@ def camera_normal(buffer: CloudBuffer) -> F32:
     """The normal of the point in eye space, on the side that is seen, (H, W, 3) float32."""
     if buffer.subject.normals is None:
         raise ValueError("normals need points that have them")
-    return buffer.spread(eye_normals(buffer.subject, buffer.camera, np.arange(len(buffer.subject))), 0.0)
+    return buffer.spread(in_eye_space(buffer.subject, buffer.camera, np.arange(len(buffer.subject)))[1], 0.0)
 
 
 def world_normal(buffer: CloudBuffer) -> F32:
@@ -270,7 +266,7 @@ def world_normal(buffer: CloudBuffer) -> F32:
         raise ValueError("normals need points that have them")
     back = np.eye(4)
     back[:3, :3] = buffer.camera.view[:3, :3].T  # the transpose, where positions take the inverse
-    own = eye_normals(buffer.subject, buffer.camera, np.arange(len(buffer.subject)))
+    _, own = in_eye_space(buffer.subject, buffer.camera, np.arange(len(buffer.subject)))
     return buffer.spread(unit_or_zero(moved(own, back)), 0.0)
 
 

@@ -200,12 +200,12 @@ def draw_points(
     ids: NDArray[np.int32] = memory.empty("sample ids", (n_samples, height, width), np.int32)
     depth: NDArray[np.float32] = memory.empty("sample depth", (n_samples, height, width), np.float32)
     array = as_vertices(positions, has_transform=view.transform is not None)
-    source, n_points = source_of(array, view), len(array)
+    n_points = len(array)
     is_near = all(abs(at) << view.grid_bits < FARTHEST_WINDOW_FX for at in view.origin)
     frags = PointFragments(ids, depth, n_points)
     if 0 in view.size:
         return frags
-    records = snap_points(memory, array, source, view) if is_near else np.empty(0, np.uint8)
+    records = snap_points(memory, array, view) if is_near else np.empty(0, np.uint8)
     sizes = sizes_in_fx(sizes_px, view.grid_bits)
     samples: list[tuple[int, int]] = sample_positions(n_samples, view.grid_bits).tolist()
     sink = Sink.FARTHEST if is_farthest else Sink.NEAREST
@@ -233,7 +233,7 @@ def rows_of(
     return draw_rows
 
 
-def snap_points(memory: Memory, array: NDArray[Any], source: _engine.Source, view: View) -> NDArray[np.uint8]:
+def snap_points(memory: Memory, array: NDArray[Any], view: View) -> NDArray[np.uint8]:
     """The records of all points; those that cannot be drawn are marked.
 
     Raises
@@ -241,7 +241,7 @@ def snap_points(memory: Memory, array: NDArray[Any], source: _engine.Source, vie
     ValueError
         If a position is not finite.
     """
-    n = len(array)
+    source, n = source_of(array, view), len(array)
     viewport = view.engine_viewport() if source.is_clip_space and n else None
     records, _, n_bad, _ = snap(memory, source, n, threads_to_snap(view.threads, n, 0), view, viewport, with_depth=True)
     if n_bad:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from topleft import _engine
-from topleft._base.arrays import bad_triangle
+from topleft._base.arrays import refuse_rows
 from topleft._base.memory import FRESH, Memory
 from topleft._base.options import Sink
 from topleft._base.threads import count_threads, run_parts
@@ -155,9 +155,7 @@ class ClusteredMesh:
         is_used: NDArray[np.uint8] = np.full(len(points) // _engine.BLOCK + 1, triangles is None, np.uint8)
         ids = [np.ascontiguousarray(array, np.int32).ravel() for array in triangles or ()]
         for array in ids:
-            bad_row = _engine.mark_vertices(array, own, len(points), is_used)
-            if bad_row >= 0:
-                raise bad_triangle(own, bad_row, len(points))
+            refuse_rows([_engine.mark_vertices(array, own, len(points), is_used)], own, len(points))
         records: NDArray[np.uint8] = memory.empty("records", (len(points) * _engine.VERTEX_BYTES,), np.uint8)
         bad, wide, clipped = source.project_blocks(is_used, self._viewport, records)
         if bad or wide or (clipped and triangles is None):

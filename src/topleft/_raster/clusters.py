@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from topleft import _engine
-from topleft._base.memory import CACHE_LINE
+from topleft._base.memory import allocate
 from topleft._base.threads import count_threads, run_parts
 
 __all__ = ["Backoff", "Clusters", "Meshlets"]
@@ -133,13 +133,13 @@ class Meshlets:
         How much memory the copy takes.
     """
 
-    def __init__(self, clusters: Clusters, threads: int | None = None) -> None:
+    def __init__(self, clusters: Clusters) -> None:
         """Grow the triangles of clusters with float32 points, in the order that these have along a curve."""
         points, triangles, order = clusters.points, clusters.triangles, clusters.order
         n = len(triangles)
         source = _engine.Source(points)
         n_pieces = -(-n // _engine.MESHLET_PIECE)
-        n_parts = min(n_pieces, count_threads(threads, n))
+        n_parts = min(n_pieces, count_threads(None, n))
 
         def grow(first_piece: int, end_piece: int) -> tuple[NDArray[np.uint8], NDArray[np.float32], NDArray[np.uint8]]:
             first, end = first_piece * _engine.MESHLET_PIECE, min(end_piece * _engine.MESHLET_PIECE, n)
@@ -155,7 +155,7 @@ class Meshlets:
 
         parts = run_parts(grow, n_pieces, n_parts)
         n_meshlets = sum(len(part[2]) for part in parts)
-        meshlets = aligned(n_meshlets * _engine.MESHLET_BYTES)
+        meshlets = allocate(n_meshlets * _engine.MESHLET_BYTES)[: n_meshlets * _engine.MESHLET_BYTES]
         np.concatenate([part[0] for part in parts], out=meshlets)
         bounds: NDArray[np.float32] = np.zeros((_engine.MESHLET_BOUNDS, n_meshlets + _engine.MESHLET_TAIL), np.float32)
         np.concatenate([part[1].T for part in parts], axis=1, out=bounds[:, :n_meshlets])
@@ -168,13 +168,6 @@ class Meshlets:
 
     def __len__(self) -> int:
         return len(self.engine)
-
-
-def aligned(n_bytes: int) -> NDArray[np.uint8]:
-    """Return bytes that begin with a line of the cache."""
-    block: NDArray[np.uint8] = np.empty(n_bytes + CACHE_LINE, np.uint8)
-    first = -block.ctypes.data % CACHE_LINE
-    return block[first : first + n_bytes]
 
 
 def box_of(points: NDArray[Any]) -> NDArray[np.float64]:

@@ -21,6 +21,7 @@ from topleft._base.threads import count_threads, run_parts
 from topleft._raster.choices import can_share
 from topleft._raster.classic import refuse_classic
 from topleft._raster.fragments import Fragments
+from topleft._raster.sampling import bits_of_bands
 from topleft._raster.snap import Snapped, snap_mesh
 from topleft._raster.view import View, ViewOptions
 from topleft.typing import DepthTestOption
@@ -207,10 +208,8 @@ def peel_meshes(
         return ids, depth
     n_threads = min(height, count_threads(view.threads, sum(snapped.n_triangles for snapped in meshes)))
     # without bins each band looks at all triangles: few bands; a band has less than 2**31 pixels
-    n_rows = BAND_BYTES // (8 * n_layers * width) if can_share(view) else min(height, (2**31 - 1) // width)
-    band_bits = max(0, n_rows.bit_length() - 1)
-    while band_bits and height >> band_bits < 2 * n_threads:
-        band_bits -= 1
+    n_pixels = BAND_BYTES // (8 * n_layers) if can_share(view) else min(height * width, 2**31 - 1)
+    band_bits = bits_of_bands((height, width), n_pixels, n_threads)
     bins = [bins_of(memory, snapped, view, band_bits, reach_fx) for snapped in meshes]
     n_bands = -(-height >> band_bits)
 

@@ -88,7 +88,8 @@ def glass_of(
     masks = blended_masks(subject, options)
     if masks is None:
         return None
-    placed, view = place(scene_of(subject), camera, size, view_options, material=options.material)
+    scene = scene_of(subject)
+    placed, view = place(scene, camera, size, view_options, material=options.material)
     refuse_many(view, "rasterize")
     if placed.bent is not None:  # the parts that a lens makes of the triangles
         masks = [mask if mask is None else mask[bent.source] for mask, bent in zip(masks, placed.bent, strict=True)]

@@ -35,6 +35,7 @@ def draw_all_edges(
     cull: CullOption,
 ) -> None:
     """Draw the edges of every instance that the visibility buffer does not hide."""
+    behind = depth_behind(frags.depth)
     for instance in scene_of(subject):
         own_camera, own_cull = camera.placed(instance.transform), cull_of(cull, instance)
         back = cull_of("back", instance)
@@ -45,7 +46,7 @@ def draw_all_edges(
             if own_cull == "none":  # of the others the edges of what shows its front
                 kinds.append((some_of(instance.mesh, is_single == 1), back))
         for mesh, side in kinds:
-            draw_edges(picture, frags, mesh, own_camera, cull=side, threads=options.threads)
+            draw_edges(picture, behind, mesh, own_camera, cull=side, threads=options.threads)
 
 
 def some_of(mesh: Mesh, is_some: npt.NDArray[np.bool_]) -> Mesh:
@@ -60,21 +61,21 @@ def cull_of(cull: CullOption, instance: Instance) -> CullOption:
 
 def draw_edges(
     picture: npt.NDArray[np.uint8],
-    frags: Fragments,
+    depth: npt.NDArray[np.float32],
     mesh: Mesh,
     camera: Camera,
     *,
-    cull: CullOption = "none",
-    threads: int | None = None,
+    cull: CullOption,
+    threads: int | None,
 ) -> None:
-    """Draw the edges of the mesh over its picture (H, W, 4), those that the visibility buffer does not hide."""
-    height, width = frags.depth.shape
+    """Draw the edges of the mesh over its picture (H, W, 4), those that are not behind a depth (H, W)."""
+    height, width = depth.shape
     size = width, height
     vertices, triangles, transform, bent = seen_through(mesh, camera, size)
     if bent is not None:
         triangles, cull = bent.outline(transform, cull), "none"
     lines = wireframe(
-        vertices, triangles, size, transform=transform, depth=depth_behind(frags.depth), antialias=True, cull=cull,
+        vertices, triangles, size, transform=transform, depth=depth, antialias=True, cull=cull,
         threads=threads,
     )  # fmt: skip
     on = lines > 0

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from topleft._render.instances import PlacedScene
 
 __all__ = [
-    "BentFragments", "Part", "SceneDepthLayers", "SceneFragments", "VisiblePart", "drawn_of", "join",
+    "BentFragments", "Part", "SceneDepthLayers", "SceneFragments", "VisiblePart", "join",
     "parts_of",
 ]  # fmt: skip
 
@@ -61,7 +61,8 @@ class VisiblePart(Part):
     @cached_property
     def drawn(self) -> tuple[Fragments, Mesh]:
         """The fragments and the mesh as they were drawn, for the kernels: through a lens those of its parts."""
-        return drawn_of(self.frags, self.mesh)
+        frags, mesh = self.frags, self.mesh
+        return (frags.drawn, frags.bent.mesh_of(mesh)) if isinstance(frags, BentFragments) else (frags, mesh)
 
     @property
     def place(self) -> npt.NDArray[np.float64]:
@@ -99,11 +100,6 @@ def join(
             to, made = to.view(np.uint32), made.view(np.uint32)  # a pixel at once
         np.copyto(to, made, where=part.seen.reshape(part.seen.shape + (1,) * (to.ndim - 2)))
     return picture
-
-
-def drawn_of(frags: Fragments, mesh: Mesh) -> tuple[Fragments, Mesh]:
-    """The fragments and the mesh as they were drawn: through a lens those of its parts."""
-    return (frags.drawn, frags.bent.mesh_of(mesh)) if isinstance(frags, BentFragments) else (frags, mesh)
 
 
 class InstanceIds:

@@ -1,12 +1,16 @@
-"""Takes out what materials cut out, so that what lies behind a hole shows, whatever instance it belongs to.
+"""Takes out what materials cut out, so that what lies behind a hole shows, whatever instance it belongs to: alpha test.
 
 Input: buffers or layers of a `Mesh` or `Scene`, materials. Output: the same without holes: first all triangles without
-holes are drawn again, then, instance by instance, the others, as in `alpha_test`.
+holes are drawn again, then, instance by instance, the others, each tested pixel by pixel (or sample by sample).
+
+The test takes the opacity of the texture at the pixel, filtered as its colour is. Nothing is peeled and nothing needs
+an order, however many holes lie behind each other; it costs a second pass over the mesh.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -14,18 +18,39 @@ import numpy.typing as npt
 
 from topleft import _engine
 from topleft._base.options import Sink
-from topleft._base.threads import threads_for
+from topleft._base.threads import run_parts, threads_for
 from topleft._camera.camera import Camera
 from topleft._model.material import Material
-from topleft._model.mesh import Mesh
+from topleft._model.mesh import Mesh, has_holes
 from topleft._raster.fragments import Fragments
 from topleft._render.bend import BentMesh
 from topleft._render.fragments import BentFragments, SceneFragments
 from topleft._render.instances import PlacedScene
 from topleft._scene.scene import Scene, collapsed, meshes_of, scene_of
-from topleft._shade.alpha_test import Cut, cut_of, cut_out, draw_cut
+from topleft._shade.look import ShadingInputs
 
-__all__ = ["Holed", "cut_scene", "cuts_of", "draw_holed", "holed_instances", "solid_scene", "without_holes"]
+__all__ = ["Cut", "Holed", "cut_scene", "cuts_of", "draw_holed", "holed_instances", "solid_scene", "without_holes"]
+
+I32 = npt.NDArray[np.int32]
+F32 = npt.NDArray[np.float32]
+
+
+@dataclass(frozen=True, eq=False)
+class Cut:
+    """Materials of a mesh, and which triangles have holes in theirs."""
+
+    materials: Sequence[Material]
+    rows: I32 | None
+    is_cut: npt.NDArray[np.bool_]
+
+    @property
+    def triangles(self) -> I32:
+        """Those with holes."""
+        return np.flatnonzero(self.is_cut).astype(np.int32)
+
+    def of_parts(self, source: npt.NDArray[np.int64]) -> Cut:
+        """The same of parts of triangles."""
+        return Cut(self.materials, None if self.rows is None else self.rows[source], self.is_cut[source])
 
 
 class Holed(NamedTuple):
@@ -35,6 +60,17 @@ class Holed(NamedTuple):
     mesh: Mesh
     camera: Camera
     cut: Cut
+
+
+def cut_of(mesh: Mesh, material: Material | None = None) -> Cut | None:
+    """What the materials of a mesh, or this one, cut out of it; None if nothing."""
+    materials = mesh.materials if material is None else (material,)
+    holes = [has_holes(one, mesh) for one in materials]
+    if not any(holes):
+        return None
+    with_holes = np.array(holes)
+    rows = mesh.material_of_triangle if material is None and len(materials) > 1 else None
+    return Cut(materials, rows, np.full(len(mesh.triangles), True) if rows is None else with_holes[rows])
 
 
 def cuts_of(subject: Mesh | Scene, material: Material | None) -> list[Cut | None]:
@@ -49,11 +85,14 @@ def without_holes(
     cuts = cuts_of(subject, material)
     if 0 in frags.id.shape or not any(cuts):
         return frags
+    bent: Sequence[BentMesh] | None = [frags.bent] if isinstance(frags, BentFragments) else None
     if isinstance(frags, SceneFragments):
-        return cut_scene(frags, holed_instances(scene_of(subject), cuts, camera, frags.placed.bent), threads)
-    drawn, bent = (frags.drawn, [frags.bent]) if isinstance(frags, BentFragments) else (frags, None)
-    (holed,) = holed_instances(scene_of(subject), cuts, camera, bent)
-    cut_out(drawn, holed.mesh, holed.camera, holed.cut, threads=threads)
+        bent = frags.placed.bent
+    holed = holed_instances(scene_of(subject), cuts, camera, bent)
+    if isinstance(frags, SceneFragments):
+        return cut_scene(frags, holed, threads)
+    drawn = frags.drawn if isinstance(frags, BentFragments) else frags
+    cut_out(drawn, *holed[0][1:], threads=threads)
     return frags.again() if isinstance(frags, BentFragments) else frags
 
 
@@ -87,11 +126,54 @@ def cut_scene(frags: SceneFragments, holed: Sequence[Holed], threads: int | None
     return SceneFragments(ids, depth, placed, positions)
 
 
+def cut_out(frags: Fragments, mesh: Mesh, camera: Camera, cut: Cut, *, threads: int | None = None) -> None:
+    """Take out of the buffers of `rasterize` what materials cut out; changes `frags` in place.
+
+    Parameters
+    ----------
+    frags : Fragments
+        What `rasterize` returned for the mesh with `depth_test="less"`.
+    mesh, camera
+        As in `topleft.shade`.
+    cut : Cut
+        Of the mesh.
+    threads : int, optional
+        Never changes a bit.
+    """
+    samples, _ = frags._sampled()
+    for sample in samples or (frags,):
+        cut_sample(sample, mesh, camera, cut, threads)
+
+
+def cut_sample(sample: Fragments, mesh: Mesh, camera: Camera, cut: Cut, threads: int | None) -> None:
+    """Draw the buffers of one sample anew: triangles without holes, then the others."""
+    triangles = cut.triangles
+    opaque = np.append(np.flatnonzero(~cut.is_cut), 0).astype(np.int32)  # one more than is drawn
+    scene = sample._snapped_with(np.arange(len(mesh.triangles), dtype=np.int32))  # all are drawn anew
+    ids, depth = sample.triangle, sample.depth
+    inputs = inputs_of(scene, mesh, camera, ids.shape[::-1], cut)
+
+    def cut_rows(first: int, end: int) -> None:
+        _engine.cut_out(scene, inputs.shading, opaque, triangles, ids, depth, first, end - first)
+
+    run_parts(cut_rows, len(ids), threads_for(threads, len(mesh.triangles)))
+
+
+def inputs_of(scene: _engine.SnappedMesh, mesh: Mesh, camera: Camera, size: tuple[int, ...], cut: Cut) -> ShadingInputs:
+    """What the kernel reads of materials with holes."""
+    if scene.exact is not None:
+        raise ValueError("subpixel_bits must be in 0..16 where textures cut holes, got 'exact'")
+    inputs = ShadingInputs(scene, mesh, camera, (size[0], size[1]), cut.rows, is_flat=False)
+    inputs.set_materials(mesh, cut.materials, is_unlit=True)
+    inputs.set_view(0, None, (0, 0, 0, 0))
+    return inputs
+
+
 def draw_holed(
     placed: PlacedScene,
     holed: Sequence[Holed],
-    ids: npt.NDArray[np.int32],
-    depth: npt.NDArray[np.float32],
+    ids: I32,
+    depth: F32,
     *,
     at: tuple[int, int] = (0, 0),
     is_peeled: bool = False,
@@ -100,5 +182,25 @@ def draw_holed(
     """Draw the triangles with holes over the planes of what one sample sees (1, H, W), or over layers (K, H, W)."""
     for i, mesh, camera, cut in holed:
         scene = placed.snap(i).mesh.seen_from(*at)
-        n_threads = threads_for(threads, len(mesh.triangles))
-        draw_cut(scene, mesh, camera, cut, ids, depth, is_peeled=is_peeled, n_threads=n_threads)
+        draw_cut(scene, mesh, camera, cut, ids, depth, is_peeled=is_peeled, threads=threads)
+
+
+def draw_cut(
+    scene: _engine.SnappedMesh,
+    mesh: Mesh,
+    camera: Camera,
+    cut: Cut,
+    ids: I32,
+    depth: F32,
+    *,
+    is_peeled: bool,
+    threads: int | None,
+) -> None:
+    """The same of one instance."""
+    triangles = cut.triangles
+    inputs = inputs_of(scene, mesh, camera, ids.shape[:0:-1], cut)
+
+    def draw_rows(first: int, end: int) -> None:
+        _engine.cut_out_over(scene, inputs.shading, triangles, ids, depth, is_peeled, first, end - first)
+
+    run_parts(draw_rows, ids.shape[1], threads_for(threads, len(mesh.triangles)))

@@ -18,6 +18,7 @@ from topleft._model.environment import Environment
 from topleft._model.light import Fog, Light, LightKind, LightSpace
 from topleft._model.material import Material
 from topleft._model.mesh import Mesh
+from topleft._model.normals import is_similarity
 from topleft._model.points import Points
 from topleft._model.texture import Texture
 from topleft._points.cloud import shade_cloud
@@ -25,7 +26,6 @@ from topleft._points.points import PointFragments
 from topleft._raster.fragments import Fragments
 from topleft._render.fragments import SceneFragments, VisiblePart, join, parts_of
 from topleft._scene.scene import Instance, Scene, meshes_of
-from topleft._shade.look import is_similarity
 from topleft._shade.shade import Places, Shading, ShadingOptions, shade_mesh, shade_numbers, shade_samples
 from topleft.typing import ShadingOption
 
@@ -35,7 +35,10 @@ U8 = npt.NDArray[np.uint8]
 
 
 def in_space_of(instance: Instance | None, options: ShadingOptions, camera: Camera) -> ShadingOptions:
-    """The options with lights as they stand in the object space of an instance, as bright as they are in the world."""
+    """The options with lights as they stand in the object space of an instance, as bright as they are in the world.
+
+    `camera`: as it stands there.
+    """
     if instance is None:
         return options
     if options.environment is not None:
@@ -44,7 +47,7 @@ def in_space_of(instance: Instance | None, options: ShadingOptions, camera: Came
         return options
     object_from_world = np.linalg.inv(instance.transform)
     # `ShadingInputs` measures distances in object space where the way to the eye keeps angles, else in eye space.
-    in_object_space = is_similarity(camera.view @ instance.transform)
+    in_object_space = is_similarity(camera.view)
     scale = np.cbrt(abs(np.linalg.det(instance.transform[:3, :3]))) if in_object_space else 1.0
     moved = []
     for light in options.lights:
@@ -167,7 +170,9 @@ def shade_by(frags: Fragments, mesh: Mesh | Scene, camera: Camera, options: Shad
 
 def shade_part(part: VisiblePart, camera: Camera, options: ShadingOptions) -> U8:
     """The picture of the rectangle of a part."""
-    return shade_mesh(*part.drawn, part.camera(camera), in_space_of(part.instance, options, camera))
+    own_camera = part.camera(camera)
+    own_options = in_space_of(part.instance, options, own_camera)
+    return shade_mesh(*part.drawn, own_camera, own_options)
 
 
 def check_drawn(frags: Fragments, mesh: Mesh | Scene) -> None:

@@ -19,14 +19,13 @@ from topleft._raster.composite import composite
 from topleft._raster.peel import DepthLayers, peel
 from topleft._raster.view import WindowOptions
 from topleft._render.fragments import SceneDepthLayers
-from topleft._render.holes import cuts_of, draw_holed, holed_instances, solid_scene
+from topleft._render.holes import Cut, cuts_of, draw_holed, holed_instances, solid_scene
 from topleft._render.instances import peel_scene
 from topleft._render.render import DEFAULT_SIZE
 from topleft._render.scene_shade import shade
 from topleft._render.through_lens import seen_through
 from topleft._scene.adapt import MeshLike
 from topleft._scene.scene import Scene, as_meshes, scene_of
-from topleft._shade.alpha_test import Cut
 from topleft._shade.shade import LookOptions
 from topleft.typing import CullOption, DepthTestOption, SamplesOption, ShadingOption
 

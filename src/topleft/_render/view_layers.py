@@ -240,27 +240,16 @@ def gbuffer_of(
     size, subject = as_size(size), as_subject(mesh)
     camera = camera_for(subject, camera, size)
     options: dict[str, Any] = {"cull": cull, "subpixel_bits": subpixel_bits, "threads": threads}
-    if isinstance(subject, Points):
-        return CloudBuffer(
-            subject,
-            camera,
-            size,
-            options,
-            look,
-            None if camera_to is None else as_camera(camera_to, "camera_to"),
-            None if transforms_to is None else as_transforms(transforms_to, 1),
-        )
-    subject = detailed(subject, camera, size, tolerance, cull=cull, material=look.get("material"))
-    return GBuffer(
-        subject=subject,
-        camera=camera,
-        size=size,
-        options=options,
-        look=look,
-        camera_to=None if camera_to is None else as_camera(camera_to, "camera_to"),
-        transforms_to=None if transforms_to is None else as_transforms(transforms_to, len(meshes_of(subject))),
-        rasterizer=rasterizer,
+    if not isinstance(subject, Points):
+        subject = detailed(subject, camera, size, tolerance, cull=cull, material=look.get("material"))
+    n = 1 if isinstance(subject, Points) else len(meshes_of(subject))
+    flow = (
+        None if camera_to is None else as_camera(camera_to, "camera_to"),
+        None if transforms_to is None else as_transforms(transforms_to, n),
     )
+    if isinstance(subject, Points):
+        return CloudBuffer(subject, camera, size, options, look, *flow)
+    return GBuffer(subject, camera, size, options, look, *flow, rasterizer)
 
 
 def as_transforms(transforms: npt.ArrayLike, n: int) -> F64:

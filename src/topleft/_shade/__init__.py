@@ -1,6 +1,5 @@
 """From a visibility buffer to light, and from light to sRGB.
 
-alpha_test.py  takes out of a visibility buffer what the textures of its triangles leave out
 look.py        prepares what the kernels read: materials, lights, the rays of a camera, a mesh as rows of float32
 shade.py       shades the visible pixels of one mesh, resolves several samples a pixel, gives distances and normals
 """

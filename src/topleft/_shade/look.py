@@ -24,10 +24,20 @@ from topleft._model.environment import DEFAULT_ENVIRONMENT, Environment
 from topleft._model.light import TO_HEADLIGHT, Fog, Light, LightKind, LightSpace
 from topleft._model.material import AlphaMode, Material
 from topleft._model.mesh import Mesh, is_laid
-from topleft._model.normals import box_of_triangles, color_rows, face_normal_rows, moved, turned_faces, unit_rows
+from topleft._model.normals import (
+    box_of_triangles,
+    color_rows,
+    determinant,
+    face_normal_rows,
+    is_similarity,
+    moved,
+    turn_of_normals,
+    turned_faces,
+    unit_rows,
+)
 from topleft._model.texture import Texture
 
-__all__ = ["CameraRays", "ShadingInputs", "ShadingMesh", "is_similarity", "turn_of_normals"]
+__all__ = ["CameraRays", "ShadingInputs", "ShadingMesh"]
 
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
@@ -65,17 +75,6 @@ class CameraRays:
     distance_scale: float
 
 
-def is_similarity(view: F64) -> bool:
-    """Whether a matrix (4, 4) keeps angles and does not mirror, so that light may be computed before it."""
-    rows = view[:3, :3].tolist()
-    (a, b, c), (d, e, f), (g, h, i) = rows
-    squares = a * a + b * b + c * c, d * d + e * e + f * f, g * g + h * h + i * i
-    products = a * d + b * e + c * f, a * g + b * h + c * i, d * g + e * h + f * i
-    scale = sum(squares) / 3
-    error = max(map(abs, (*products, *(square - scale for square in squares))))
-    return determinant(rows) > 0 and error <= 1e-9 * scale
-
-
 def rays_of(camera: Camera, size: tuple[int, int], center: F64, *, in_eye_space: bool) -> CameraRays:
     """How the camera sees shading space: the world, or its own eye space, moved so that `center` is the origin."""
     view = np.eye(4) if in_eye_space else camera.view
@@ -103,27 +102,6 @@ def rays_of(camera: Camera, size: tuple[int, int], center: F64, *, in_eye_space:
     return CameraRays(has_perspective, eye, ray, linear / size_of_unit, origin, size_of_unit, start, scale)
 
 
-def determinant(rows: list[list[float]]) -> float:
-    """Of a matrix (3, 3): NumPy's takes ten times as long for one."""
-    (a, b, c), (d, e, f), (g, h, i) = rows
-    return a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
-
-
-def turn_of_normals(view: F64) -> F64:
-    """The matrix (3, 3) that takes rows of normals to eye space, but for their lengths: the inverse of that of points.
-
-    Its numbers are sums of products, the same on every machine.
-    """
-    rows = view[:3, :3].tolist()
-    (a, b, c), (d, e, f), (g, h, i) = rows
-    adjugate = [
-        [e * i - f * h, c * h - b * i, b * f - c * e],
-        [f * g - d * i, a * i - c * g, c * d - a * f],
-        [d * h - e * g, b * g - a * h, a * e - b * d],
-    ]
-    return np.array(adjugate) * math.copysign(1.0, determinant(rows))
-
-
 class ShadingMesh:
     """What shading needs of a mesh.
 
@@ -143,16 +121,16 @@ class ShadingMesh:
     def __init__(self, mesh: Mesh, view: F64 | None = None) -> None:
         """`view`: (4, 4), takes the mesh to eye space first."""
         corners = None if mesh.is_faceted else mesh.corner_normals()
-        self._triangles = mesh.triangles
-        self.normal_of_corner = None if corners is None else corners.of_corner
-        self.positions = mesh.vertices if view is None else moved(mesh.vertices, view)
-        low, high = box_of_triangles(self.positions, self._triangles).astype(self.positions.dtype)
-        self.center: F64 = np.asarray(low / 2 + high / 2, np.float64)
         if mesh.is_faceted:  # nobody reads normals of vertices where every face has its own
             self.normals = np.ones((len(mesh.vertices), 4), np.float32)
         else:
             normals = mesh.vertex_normals() if corners is None else corners.rows
             self.normals = unit_rows(normals, None if view is None else turn_of_normals(view))
+        self._triangles = mesh.triangles
+        self.normal_of_corner = None if corners is None else corners.of_corner
+        self.positions = mesh.vertices if view is None else moved(mesh.vertices, view)
+        low, high = box_of_triangles(self.positions, self._triangles).astype(self.positions.dtype)
+        self.center: F64 = np.asarray(low / 2 + high / 2, np.float64)
         self.colors = None if mesh.colors is None else color_rows(mesh.colors)
 
     @cached_property
