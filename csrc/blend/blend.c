@@ -166,9 +166,10 @@ static int64_t blend_window(const tl_snapped *snapped, const tl_window *window, 
     b->n_samples = b->stride * (window->height - 1) + window->width;
     b->n_channels = canvas->n_channels, b->is_flat = canvas->is_flat, b->mode = mix_of(canvas);
     b->target = (tl_target){.sink = TL_SINK_BLEND, .pixels = b, .stride_px = b->stride, .n_samples = b->n_samples};
-    const int32_t ground = canvas->ground ? packed_color(canvas->ground, canvas->n_channels) : 0;
-    for (int64_t row = 0; canvas->ground && row < window->height; row++)
-        put_solid(b->packed + row * b->stride, window->width, ground);
+    b->ground = canvas->ground ? packed_color(canvas->ground, canvas->n_channels) : 0;
+    b->n_laid = canvas->ground ? 0 : window->height;
+    if (snapped->mesh.exact || !canvas->is_area)
+        lay_ground(b, window->height);
     for (int64_t row = 0; canvas->packed && !canvas->ground && row < window->height; row++)
         pack_u8((const uint8_t *)canvas->pixels + row * canvas->stride_px * n_channels, window->width,
                 canvas->n_channels, canvas->packed + row * b->stride);

@@ -46,6 +46,7 @@ static __attribute__((noinline)) void flush_atlas(area_pass *p)
         if (p->area.n[kind])
             flush_edges(&p->area, kind, 1);
     flush_quads(&p->area.plane);
+    lay_ground(b, b->window->height);
     for (int k = 0; k < p->n; k++) {
         const int64_t id = p->id[k];
         const int32_t row = p->row[k], col = p->col[k], next = k + 2 < p->n ? k + 2 : k;
@@ -166,6 +167,7 @@ static int64_t blend_areas(blend_state *b)
         const int64_t bad_row = first_bad_row(snapped->triangles, snapped->n_triangles, snapped->mesh.n_vertices);
         for (int64_t i = 0; bad_row < 0 && i < snapped->n_triangles && !tl_is_given_up(window); i++)
             blend_area_alone(b, i);
+        lay_ground(b, window->height);
         return bad_row;
     }
     area_pass p;

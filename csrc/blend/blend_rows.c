@@ -116,8 +116,17 @@ TL_INLINE int blend_between(blend_state *b, const area_plane *plane, blend_side 
     vi_store(at[0], vi_select(drawn, vi_add(rows, left->col), base));
     vi_store(at[1], vi_select(drawn, vi_add(rows, to), base));
     vi_store(first, vi_add(rows, from));
-    for (int k = 0; k < n; k++)
+    const int is_laid_beside = b->n_laid <= row && b->whole_mode == TL_MIX_REPLACE;
+    lay_ground(b, is_laid_beside ? row : row + n);
+    for (int k = 0; k < n; k++) {
+        const int64_t start = (row + k) * b->stride, end = start + plane->n_cols;
+        if (is_laid_beside && first[k] > start)
+            put_solid(b->packed + start, first[k] - start, b->ground);
+        if (is_laid_beside && at[1][k] < end)
+            put_solid(b->packed + at[1][k], end - at[1][k], b->ground);
         mix_run(b, first[k], at[1][k] - first[k]);
+    }
+    b->n_laid = max64(b->n_laid, row + n);
     for (int k = 0; k < 2; k++)
         for (int q = 0; q < sides[k]->n_quads; q++)
             mix_ramps(b, sides[k], q, k ? TL_WHOLE : 0, at[k], n, mode);

@@ -254,6 +254,7 @@ static void blend_strip(blend_state *b, const tl_triangle *pieces, int64_t n, in
                       bits, &from, &to);
         left = lesser(left, from), right = greater(right, to);
     }
+    lay_ground(b, row + n_rows);
     left = greater(left - (double)window->x_px, 0.0),
     right = lesser(right - (double)window->x_px, (double)window->width);
     if (!(left < right))

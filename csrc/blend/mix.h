@@ -42,6 +42,8 @@ typedef struct blend_state {
     float *floats;    /* float32: a channel a lane */
     int64_t stride;   /* in pixels, of either */
     int64_t n_samples;
+    int32_t ground; /* what all pixels get first; uint8 */
+    int64_t n_laid; /* rows that have it, the first ones; all, where there is none */
     int n_channels, is_flat;
     tl_mix mode;
     tl_mix whole_mode; /* what the triangle at hand does to pixels that it covers whole */

@@ -186,6 +186,13 @@ TL_INLINE void put_solid(int32_t *pixels, int64_t n, int32_t color)
     vi_store(last, colors);
 }
 
+/* Sees to it that the ground is laid in rows below end_row. */
+static inline void lay_ground(blend_state *b, int64_t end_row)
+{
+    for (; b->n_laid < end_row; b->n_laid++)
+        put_solid(b->packed + b->n_laid * b->stride, b->window->width, b->ground);
+}
+
 /* n_rows runs of pixels that the triangle covers whole: n[k * step] of them from first[k * step] on, none where n <=
  * 0. */
 TL_INLINE void mix_runs_u8(blend_state *b, const int32_t *first, const int32_t *n, int step, int n_rows, tl_mix mode)
