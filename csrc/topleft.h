@@ -187,7 +187,8 @@ typedef struct {
     float *depth; /* PAINT, NEAREST, FARTHEST; the same stride */
     int64_t stride_px;
     int64_t n_samples; /* from the first sample to the last, set by draw */
-    /* MASK, SAMPLES: tl_covered_words(samples of stride_px * height of the window), at most 2^31 pixels */
+    /* MASK, SAMPLES: tl_covered_words(samples of stride_px * height of the window), at most 2^31 pixels.  LABEL: the
+     * same, or NULL; where it is given, triangles come from the last to the first. */
     uint64_t *covered;
     /* SAMPLES: 2^sample_bits samples a pixel, 1 to 4; stride_px is the width of the window */
     int sample_bits;

@@ -301,11 +301,12 @@ static void clear(const tl_window *window, const tl_target *target)
         clear_layers(window, target);
         return;
     }
-    if (target->sink == TL_SINK_MASK || target->sink == TL_SINK_SAMPLES) {
+    if (target->covered) {
         const int64_t n_bits = target->stride_px * window->height << target->sample_bits;
         memset(target->covered, 0, (size_t)tl_covered_words(n_bits) * sizeof(uint64_t));
-        return;
     }
+    if (target->sink == TL_SINK_MASK || target->sink == TL_SINK_SAMPLES)
+        return;
     for (int64_t row = 0; row < window->height; row++) {
         const int64_t at = row * target->stride_px;
         memset((int32_t *)target->pixels + at, target->sink == TL_SINK_COUNT ? 0 : 0xff,

@@ -193,3 +193,26 @@ def test_large_triangles_by_area(isa, shape, blend):
                 tl.fill(corners, [[0, 1, 2]], np.repeat(color, 3, 0), SIZE, per="vertex", out=smooth, **options)
             assert (flat == smooth).all()
             assert (flat != ground).any()
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize("threads", [1, 3])
+@pytest.mark.parametrize("sampling_", ["msaa2", "msaa4", "msaa16"])
+def test_samples_from_the_last_triangle_to_the_first(isa, threads, sampling_):
+    """Flat colours, large triangles over small ones and under them, have the bits of colours of vertices."""
+    large, _ = strewn(7, 60, 200.0)
+    small, _ = strewn(8, 400, 12.0)
+    parts = [large[:90], small[:600], large[90:], small[600:], large[:30] + 3]
+    vertices = np.concatenate(parts)[:, :2]
+    triangles = np.arange(len(vertices), dtype=np.int32).reshape(-1, 3)
+    rng = np.random.default_rng(9)
+    ground = rng.integers(0, 256, (SIZE[1], SIZE[0], 4)).astype(np.uint8)
+    for channels, background in ((4, None), (4, (9, 8, 7, 6)), (3, 50), (1, 0)):
+        colors = rng.integers(0, 256, (len(triangles), channels)).astype(np.uint8)
+        flat, smooth = ground[..., :channels].copy(), ground[..., :channels].copy()
+        options = {"sampling": sampling_, "background": background, "threads": threads}
+        with on(isa):
+            tl.fill(vertices, triangles, colors, SIZE, per="triangle", out=flat, **options)
+            tl.fill(vertices, triangles, np.repeat(colors, 3, 0), SIZE, per="vertex", out=smooth, **options)
+        assert (flat == smooth).all()
+        assert (flat != ground[..., :channels]).any()

@@ -335,8 +335,10 @@ def find_instances(ids: I32, first_ids: NDArray[np.int64], out: I32, boxes: I32 
 def fill_bands(
     meshes: Sequence[SnappedMesh],
     labels: I32,
+    covered: NDArray[np.uint64],
     palette: Palette,
     pixels: Array,
+    ground: Array | None,
     bins: Bins,
     first_band: int,
     end_band: int,

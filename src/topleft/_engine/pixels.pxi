@@ -48,10 +48,11 @@ cdef class Palette:
                 self.mean(&labels[0, first_row, 0], sample_bits, labels.shape[1] * width, n_rows * width, &flat[0], first_row * width)
 
 
-def fill_bands(meshes, int32_t[:, ::1] labels, Palette palette, pixels, Bins bins, int64_t first_band, int64_t end_band):
+def fill_bands(meshes, int32_t[:, ::1] labels, uint64_t[::1] covered, Palette palette, pixels, ground, Bins bins, int64_t first_band, int64_t end_band):
     """Write the mean colours of samples over bands of (H, W[, C]) pixels: `meshes` is the mesh as each of them sees it.
 
-    `labels`: memory for those of a band, (S, rows * W).
+    `labels`: memory for those of a band, (S, rows * W); `covered`: a bit for each pixel of it. `ground`: a row (W[, C]) that all
+    rows get first, or None.
     """
     cdef tl_snapped seen[16]
     cdef SnappedMesh mesh
@@ -60,20 +61,25 @@ def fill_bands(meshes, int32_t[:, ::1] labels, Palette palette, pixels, Bins bin
     cdef tl_share share = no_share()
     cdef uint8_t[::1] flat = as_bytes(pixels)
     cdef int k, n_samples = len(meshes), sample_bits = int(len(meshes)).bit_length() - 1
-    cdef int64_t band, first_row, n_rows, height = pixels.shape[0], width = pixels.shape[1]
+    cdef const uint8_t[::1] ground_row = None if ground is None else as_bytes(ground)
+    cdef int64_t band, first_row, n_rows, height = pixels.shape[0], width = pixels.shape[1], row, n_row_bytes = flat.shape[0] // height
     for k in range(n_samples):
         mesh = meshes[k]
         seen[k] = mesh.snapped
     memset(&target, 0, sizeof(target))
     target.sink, target.stride_px = <tl_sink>LABEL, width
+    target.covered = &covered[0]
     share.is_first = share.is_last = True
     with nogil:
         for band in range(first_band, end_band):
             first_row = band << bins.band_bits
             n_rows = min(<int64_t>1 << bins.band_bits, height - first_row)
             window = mesh.window(first_row, n_rows, width)
-            share.ids = &bins.listed[0] + bins.starts[band]
             share.end = bins.starts[band + 1] - bins.starts[band]
+            share.ids = bins.backwards(band)
+            if ground_row is not None:
+                for row in range(first_row, first_row + n_rows):
+                    memcpy(&flat[row * n_row_bytes], &ground_row[0], n_row_bytes)
             for k in range(n_samples):
                 target.pixels = &labels[k, 0]
                 K.draw(&seen[k], &window, &target, &share)

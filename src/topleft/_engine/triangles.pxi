@@ -405,6 +405,16 @@ cdef class Bins:
         with nogil:
             K.list_bins(&self.bins, self.n_bands, &self.starts[0], &listed[0])
 
+    cdef const int32_t *backwards(self, int64_t band) noexcept nogil:
+        """Return the triangles of a band after they have been turned round: from the last to the first."""
+        cdef int32_t *ids = &self.listed[0] + self.starts[band]
+        cdef int64_t i, n = self.starts[band + 1] - self.starts[band]
+        cdef int32_t other
+        for i in range(n // 2):
+            other = ids[i]
+            ids[i], ids[n - 1 - i] = ids[n - 1 - i], other
+        return ids
+
 
 def draw_bands(meshes, targets, Bins bins, int64_t first_band, int64_t end_band):
     """Clear and draw bands of several pictures, a mesh each, one band of all after the other."""

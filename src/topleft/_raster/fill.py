@@ -108,7 +108,9 @@ def draw_fill(
             ground = np.zeros((), palette.dtype)
         is_drawn = bool(canvas.size and snapped.n_triangles)
         is_blended = blending.is_needed or choices.is_direct(snapped, view, palette.dtype, is_flat=is_flat)
-        can_lay = is_drawn and is_blended and palette.dtype == np.uint8 and view.sampling.n_samples == 1
+        has_samples = view.sampling.n_samples > 1
+        can_lay = is_drawn and is_blended and palette.dtype == np.uint8 and not has_samples
+        can_lay = can_lay or (is_drawn and not is_blended and has_samples and is_flat and choices.can_share(view))
         is_few = is_drawn and not blending.is_needed and choices.fills_few(snapped, view, palette, is_flat=is_flat)
         if ground is not None and not (can_lay or is_few):
             lay_ground(canvas, ground)
@@ -119,8 +121,8 @@ def draw_fill(
             fill_few(snapped, view, palette, canvas, ground, transfer)
         elif is_blended:
             blend(memory, snapped, view, palette, canvas, blending, transfer, is_flat=is_flat, ground=ground)
-        elif view.sampling.n_samples > 1:
-            paint_samples(memory, snapped, view, palette, canvas, transfer, is_flat=is_flat)
+        elif has_samples:
+            paint_samples(memory, snapped, view, palette, canvas, transfer, is_flat=is_flat, ground=ground)
         else:
             paint(memory, snapped, view, palette, canvas, is_flat=is_flat)
     view.mark("shade")
@@ -246,15 +248,19 @@ def paint_samples(
     transfer: _engine.Transfer | None,
     *,
     is_flat: bool,
+    ground: NDArray[Any] | None,
 ) -> None:
-    """Draw coloured triangles over contiguous pixels, each pixel the mean of its samples."""
+    """Draw coloured triangles over contiguous pixels, each pixel the mean of its samples.
+
+    `ground`, for flat colours: the colour that all pixels get before.
+    """
     width, height = view.size
     positions = sample_positions(view.sampling.n_samples, view.grid_bits)
     drawing = choices.drawing(view, snapped, Sink.LABEL)
     n_threads = drawing.n_threads
     if is_flat and choices.can_share(view):
         palette = _engine.Palette(colors, transfer)
-        if draw_means(memory, snapped.mesh, snapped.n_triangles, positions, palette, pixels, n_threads):
+        if draw_means(memory, snapped.mesh, snapped.n_triangles, positions, palette, pixels, ground, n_threads):
             snapped.refuse()
         view.mark("draw")
         return

@@ -241,11 +241,13 @@ def draw_means(
     positions: NDArray[np.int32],
     palette: _engine.Palette,
     pixels: NDArray[Any],
+    ground: NDArray[Any] | None,
     n_threads: int,
 ) -> bool:
     """Write the mean colour of the samples over (H, W[, C]) pixels, in painter's order; returns as `draw_planes` does.
 
-    The mesh is near, and labels live no longer than a band of rows.
+    `ground`: the colour that all pixels get before. The mesh is near. Labels live no longer than a band of rows, which
+    is drawn from the last triangle to the first: rows of large ones leave out samples that other large ones cover.
     """
     height, width = pixels.shape[:2]
     n = len(positions)
@@ -255,11 +257,14 @@ def draw_means(
     meshes = [mesh.seen_from(x, y) for x, y in positions.tolist()]
     n_parts = max(1, min(n_threads, bins.n_bands))
     labels = list(memory.empty("sample labels", (n_parts, n, width << bins.band_bits), np.int32))
-    run_parts(
-        lambda first, end: _engine.fill_bands(meshes, labels.pop(), palette, pixels, bins, first, end),
-        bins.n_bands,
-        n_parts,
-    )
+    n_words = (width << bins.band_bits) // 64 + 2
+    covered = list(memory.empty("covered labels", (n_parts, n_words), np.uint64))
+    row = None if ground is None else np.broadcast_to(ground, pixels.shape[1:]).astype(pixels.dtype)
+
+    def fill_part(first: int, end: int) -> None:
+        _engine.fill_bands(meshes, labels.pop(), covered.pop(), palette, pixels, row, bins, first, end)
+
+    run_parts(fill_part, bins.n_bands, n_parts)
     return False
 
 
