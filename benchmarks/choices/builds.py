@@ -27,8 +27,6 @@ BUILDS: Mapping[str, tuple[str, str, Mapping[str, str]]] = {
     "boxes to 4x4": ("raster/batch.c", "TL_SMALL_BOX", {"none": "2"}),
     "boxes to 16x16": ("raster/batch.c", "TL_MIDDLE_BOX", {"to 8x8": "8", "to 12x12": "12"}),
     "boxes to 62x62": ("raster/batch.c", "TL_MAX_BOX_PX", {"to 16x16": "16", "to 32x32": "32"}),
-    "bands of few": ("blend/blend.c", "TL_FEW_TRIANGLES", {"never": "0", "always": "(1 << 30)"}),
-    "band of colours": ("blend/blend.c", "TL_BAND_BYTES", {"64 KiB": "(1 << 16)", "1 MiB": "(1 << 20)"}),
 }
 """By choice: the file, the constant, and other values by name."""
 
@@ -79,13 +77,11 @@ def imported_from(folder: Path) -> Iterator[ModuleType]:
         sys.modules.update(own)
 
 
-def concerns(choice: str, scene: Scene) -> bool:
-    """Tell whether a constant could matter to a scene."""
-    if choice.startswith("boxes"):
-        return (scene.verb in ("rasterize", "coverage") and scene.sampling == "center") or (
-            scene.verb == "coverage" and scene.sampling in MSAA
-        )
-    return scene.verb == "fill" and scene.sampling == "center"
+def is_concerned(scene: Scene) -> bool:
+    """Tell whether limits of boxes could matter to a scene."""
+    return scene.verb in ("rasterize", "coverage") and (
+        scene.sampling == "center" or (scene.verb == "coverage" and scene.sampling in MSAA)
+    )
 
 
 def load_builds(choice: str, folder: Path) -> dict[str, ModuleType]:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.choices.builds import BUILDS, concerns, load_builds, ways_with
+from benchmarks.choices.builds import BUILDS, is_concerned, load_builds, ways_with
 from benchmarks.choices.scenes import Scene, scenes
 from benchmarks.choices.ways import CHOICES, THREADED
 from benchmarks.harness.arguments import refuse_unknown
@@ -71,9 +71,7 @@ def makers_of(options: Options) -> dict[str, Callable[[Scene], Ways]]:
     for name in wanted:
         if name in BUILDS and options.builds:
             libraries = load_builds(name, options.builds)
-            makers[name] = lambda scene, name=name, own=libraries: (
-                ways_with(scene, own) if concerns(name, scene) else []
-            )
+            makers[name] = lambda scene, own=libraries: ways_with(scene, own) if is_concerned(scene) else []
     return makers
 
 

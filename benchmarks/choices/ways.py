@@ -205,6 +205,27 @@ def of_bands(scene: Scene) -> Ways:
     return constant(scene, sampling, name, sizes)
 
 
+def of_sorting(scene: Scene) -> Ways:
+    """Triangles sorted into bands of rows, one band after the other, or drawn as they come."""
+    if scene.sampling != "center" or scene.verb not in ("rasterize", "overdraw"):
+        return []
+    return other_than(scene, choices, "pays_to_sort", {True: "sorted", False: "as they come"})
+
+
+def of_blended_bands(scene: Scene) -> Ways:
+    """Colours in bands of rows that stay in the cache, where that is said to pay, or all rows at once, or always so."""
+    if scene.verb != "fill" or scene.sampling not in ("center", "area"):
+        return []
+
+    def whole(view: View, *_: Any, **__: Any) -> int:
+        return view.size[1]
+
+    def bands(_view: View, _snapped: Any, row_bytes: int, **__: Any) -> int:
+        return max(1, choices.BLEND_BAND_BYTES // row_bytes)
+
+    return constant(scene, choices, "rows_to_blend", {"at once": whole, "in bands": bands})
+
+
 def of_sums(scene: Scene) -> Ways:
     """Areas in 32 bits, tried first, or in 64."""
     if scene.sampling != "area" or scene.verb != "coverage":
@@ -287,6 +308,8 @@ CHOICES: Mapping[str, Callable[[Scene], Ways]] = {
     "samples": of_samples,
     "planes": of_planes,
     "band size": of_bands,
+    "sorting": of_sorting,
+    "bands of colours": of_blended_bands,
     "sums of areas": of_sums,
     "memory": of_memory,
     "threads": of_threads,

@@ -122,12 +122,14 @@ TL_INLINE void blend_area_batch(area_pass *p, int64_t i, const int32_t *corners,
     vm alone =
         vm_or(vi_gt_unsigned(vi_sub(x_max, x_min), max_extent), vi_gt_unsigned(vi_sub(y_max, y_min), max_extent));
     alone = vm_or(alone, vm_or(vi_gt(n_cols, vi_set1(TL_ATLAS_COLS - 2)), vi_gt(n_rows, vi_set1(TL_ATLAS_COLS - 1))));
-    alone = vm_and(live, vm_or(alone, vi_eq(x_min, vi_set1(TL_SPECIAL))));
+    const vm is_special = vi_eq(x_min, vi_set1(TL_SPECIAL));
     const vi right = vi_set1((int32_t)min64(window->x_px + window->width, INT32_MAX));
     const vi bottom = vi_set1((int32_t)min64(window->y_px + window->height, INT32_MAX));
     const vm meets_cols = vm_and(vi_gt(right, col), vi_gt(last_col, vi_set1((int32_t)window->x_px - 1)));
     const vm meets_rows = vm_and(vi_gt(bottom, row), vi_gt(last_row, vi_set1((int32_t)window->y_px - 1)));
-    vm drawn = vm_and(vm_and_not(live, alone), vm_and(meets_cols, meets_rows));
+    const vm meets = vm_and(meets_cols, meets_rows);
+    vm drawn = vm_and(vm_and_not(live, vm_or(alone, is_special)), meets);
+    alone = vm_and(live, vm_or(is_special, vm_and(alone, meets)));
     if (!vm_any(vm_or(drawn, alone)))
         return;
     /* twice the area: differences below 2^21, so every step is exact in float64 */

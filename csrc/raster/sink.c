@@ -146,7 +146,7 @@ TL_INLINE void put_plain(const tl_target *target, tl_sink sink, int64_t at, int6
     }
 }
 
-/* Samples of a word, of labels that come from the last triangle to the first: those in `covered` can no longer change. */
+/* Samples of a word, of labels that come from the last triangle to the first: `covered` ones can no longer change. */
 TL_INLINE void put_word(const tl_target *target, int64_t word, uint64_t samples, vi name)
 {
     const uint64_t fresh = samples & ~target->covered[word];

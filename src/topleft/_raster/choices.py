@@ -159,13 +159,13 @@ MIN_PIXELS_A_VERTEX = 4
 
 #: What is saved where triangles are sorted into bands of rows that stay in the second-level cache, ns: a pixel that is
 #: cleared there, of ids and depth; where triangles lie far apart from one to the next, a row and a covered sample of
-#: ids and depth, and a covered sample of four bytes. And what sorting costs: a triangle, and one that lies far from
-#: the next. On a Sapphire Rapids, in 1920x1080, ids and depth of a mesh of 10,000 triangles take 0.87 of the time,
-#: strewn ones, 1,000 of 300 px, 20,000 of 40 px and 200,000 of 8 px, 0.7, 0.5 and 0.5, 40 frames with the far ones
-#: first 0.5; counts of those of 300 px 0.65. 1,000,000 strewn ones of 3 px would take 1.5 times as long, 1,000,000 of
-#: a mesh 1.1 times.
+#: ids and depth, and a covered sample of four bytes. And what sorting costs: a triangle that is seen, one that is not,
+#: and one more where it lies far from the next. On a Sapphire Rapids, in 1920x1080, ids and depth of a mesh of 10,000
+#: triangles take 0.87 of the time, strewn ones, 1,000 of 300 px, 20,000 of 40 px and 200,000 of 8 px, 0.7, 0.5 and 0.5,
+#: 40 frames with the far ones first 0.5; counts of those of 300 px 0.65. 1,000,000 strewn ones of 3 px would take 1.5
+#: times as long, 1,000,000 of a mesh 1.1 times.
 CLEARED_PIXEL_NS, SAVED_ROW_NS, SAVED_SAMPLE_NS, SAVED_STORE_NS = 0.1, 8.0, 0.1, 0.1
-SORTED_TRIANGLE_NS, FAR_TRIANGLE_NS = 10.0, 20.0
+SORTED_TRIANGLE_NS, OUTSIDE_TRIANGLE_NS, FAR_TRIANGLE_NS = 10.0, 4.0, 20.0
 
 #: Rows of a triangle, on the mean, from which on rows are saved: pixels of smaller boxes are fetched before they are
 #: drawn. 250,000 triangles of 7 px take 0.6 of the time, 300,000 of 6 px 0.93 to 1.2, 400,000 of 5 px 1.2.
@@ -175,10 +175,12 @@ MIN_ROWS_TO_SORT = 4.3
 BAND_PIXELS = 1 << 17
 
 #: Bytes of a band of colours that stays there; what it saves of each row of a triangle and each pixel that is met
-#: again, ns; and by area, what a triangle costs in each band that it reaches into. 1,000 triangles of 300 px take 0.43
-#: of the time by samples, 0.65 by area, 20,000 of 40 px by samples 0.5.
+#: again, ns. And what a band costs: to look at a triangle and at a vertex once more, and by area a triangle that
+#: reaches into it. 1,000 triangles of 300 px take 0.43 of the time by samples, 0.65 by area, 20,000 of 40 px by samples
+#: 0.5, a mesh of 10,000 0.7 to 0.8, one of 100,000 1.0; 200,000 of 8 px that share no vertices would take 1.3 times.
 BLEND_BAND_BYTES = 768 << 10
 BLENDED_ROW_NS, BLENDED_PIXEL_NS, STRIP_NS = 4.0, 0.1, 1000.0
+SEEN_TRIANGLE_NS, SEEN_VERTEX_NS = 0.5, 1.1
 
 #: What it does not matter to in which order triangles are drawn.
 ORDER_FREE = frozenset({Sink.MASK, Sink.COUNT, Sink.NEAREST, Sink.FARTHEST, Sink.SAMPLES})
@@ -438,10 +440,11 @@ def pays_to_sort(view: View, snapped: Snapped, sink: Sink) -> bool:
     met_ns = n_rows * SAVED_ROW_NS + n_covered * SAVED_SAMPLE_NS if has_depth else n_covered * SAVED_STORE_NS
     if n_rows < MIN_ROWS_TO_SORT * n_seen:
         met_ns = 0.0
-    if cleared_ns + met_ns <= n * SORTED_TRIANGLE_NS:
+    sorted_ns = n_seen * SORTED_TRIANGLE_NS + (n - n_seen) * OUTSIDE_TRIANGLE_NS
+    if cleared_ns + met_ns <= sorted_ns:
         return False
     scatter = guess_scatter(view, snapped)
-    return cleared_ns + scatter * met_ns > n * (SORTED_TRIANGLE_NS + scatter * FAR_TRIANGLE_NS)
+    return cleared_ns + scatter * met_ns > sorted_ns + scatter * n_seen * FAR_TRIANGLE_NS
 
 
 def pays_to_bound(view: View, snapped: Snapped, sink: Sink) -> bool:
@@ -472,7 +475,7 @@ def rows_to_blend(view: View, snapped: Snapped, row_bytes: int, *, lays_ground: 
     n_covered = n_layers * width * height
     again_ns = n_triangle_rows * BLENDED_ROW_NS + n_covered * BLENDED_PIXEL_NS
     ground_ns = min(n_covered, width * height) * BLENDED_PIXEL_NS if lays_ground else 0.0
-    cost_ns = height / n_rows * snapped.n_triangles * TRIANGLE_NS
+    cost_ns = height / n_rows * (snapped.n_triangles * SEEN_TRIANGLE_NS + snapped.n_vertices * SEEN_VERTEX_NS)
     if view.sampling is Sampling.AREA:
         cost_ns += n_triangle_rows / n_rows * STRIP_NS
     return n_rows if ground_ns + again_ns * guess_scatter(view, snapped) > cost_ns else height
