@@ -72,14 +72,10 @@ TL_INLINE void walk_rows(const tl_triangle *t, const tl_window *window, const tl
             vd_store(z_row, vd_add(vd_set1(t->z[0]), vd_mul(vd_set1(t->slope_y), ys)));
         }
         const int n = t->row1 - row0 < TL_LANES ? (int)(t->row1 - row0) : TL_LANES;
-        for (int k = 0; k < TL_LANES && k < n; k++) {
+        for (int k = 0; k < n; k++) {
             const int64_t at = (row0 + k) * target->stride_px + t->col0;
             if (!sink_has_depth(sink)) {
-                if (first[k] >= end[k])
-                    continue;
-                if (sink == TL_SINK_LABEL && target->covered)
-                    put_uncovered(target, at + first[k], end[k] - first[k], t->id);
-                else
+                if (first[k] < end[k])
                     put_plain(target, sink, at + first[k], end[k] - first[k], t->id);
                 continue;
             }

@@ -117,6 +117,30 @@ TL_INLINE void put_numbers(const tl_target *target, tl_sink sink, int64_t at, vm
                   at + TL_LANES <= target->n_samples);
 }
 
+/* Samples of a word, of labels that come from the last triangle to the first: `covered` ones can no longer change. */
+TL_INLINE void put_word(const tl_target *target, int64_t word, uint64_t samples, vi name)
+{
+    const uint64_t fresh = samples & ~target->covered[word];
+    if (!fresh)
+        return;
+    target->covered[word] |= fresh;
+    int32_t *const pixels = (int32_t *)target->pixels + (word << 6);
+    for (int k = TL_LANES == 1 ? __builtin_ctzll(fresh) : 0; k < 64 && fresh >> k; k += TL_LANES) {
+        const vm m = vm_from_bits((unsigned)(fresh >> k) & (unsigned)((1ull << TL_LANES) - 1));
+        vi_store_some(pixels + k, m, vi_max(vi_load_masked(m, pixels + k), name),
+                      (word << 6) + k + TL_LANES <= target->n_samples);
+    }
+}
+TL_INLINE void put_uncovered(const tl_target *target, int64_t at, int64_t n, int32_t id)
+{
+    const vi name = vi_set1(id ^ target->flip);
+    const int64_t last = (at + n - 1) >> 6;
+    uint64_t samples = ~0ull << (at & 63);
+    for (int64_t word = at >> 6; word < last; word++, samples = ~0ull)
+        put_word(target, word, samples, name);
+    put_word(target, last, samples & ~0ull >> (63 - ((at + n - 1) & 63)), name);
+}
+
 /* A span of samples without depth. */
 TL_INLINE void put_plain(const tl_target *target, tl_sink sink, int64_t at, int64_t n, int32_t id)
 {
@@ -136,6 +160,10 @@ TL_INLINE void put_plain(const tl_target *target, tl_sink sink, int64_t at, int6
         cover_samples(target, at, n);
         return;
     }
+    if (sink == TL_SINK_LABEL && target->covered) {
+        put_uncovered(target, at, n, id);
+        return;
+    }
     int32_t *pixels = (int32_t *)target->pixels + at;
     const vi name = vi_set1(id ^ target->flip);
     for (int64_t k = 0; k < n; k += TL_LANES) {
@@ -144,30 +172,6 @@ TL_INLINE void put_plain(const tl_target *target, tl_sink sink, int64_t at, int6
         vi_store_some(pixels + k, m, sink == TL_SINK_COUNT ? vi_add(old, vi_set1(1)) : vi_max(old, name),
                       at + k + TL_LANES <= target->n_samples);
     }
-}
-
-/* Samples of a word, of labels that come from the last triangle to the first: `covered` ones can no longer change. */
-TL_INLINE void put_word(const tl_target *target, int64_t word, uint64_t samples, vi name)
-{
-    const uint64_t fresh = samples & ~target->covered[word];
-    if (!fresh)
-        return;
-    target->covered[word] |= fresh;
-    int32_t *const pixels = (int32_t *)target->pixels + (word << 6);
-    for (int k = 0; k < 64; k += TL_LANES) {
-        const vm m = vm_from_bits((unsigned)(fresh >> k) & (unsigned)((1ull << TL_LANES) - 1));
-        vi_store_some(pixels + k, m, vi_max(vi_load_masked(m, pixels + k), name),
-                      (word << 6) + k + TL_LANES <= target->n_samples);
-    }
-}
-TL_INLINE void put_uncovered(const tl_target *target, int64_t at, int64_t n, int32_t id)
-{
-    const vi name = vi_set1(id ^ target->flip);
-    const int64_t last = (at + n - 1) >> 6;
-    uint64_t samples = ~0ull << (at & 63);
-    for (int64_t word = at >> 6; word < last; word++, samples = ~0ull)
-        put_word(target, word, samples, name);
-    put_word(target, last, samples & ~0ull >> (63 - ((at + n - 1) & 63)), name);
 }
 
 /* The one rounding of depth to float32; + 0 makes -0 a 0. */
