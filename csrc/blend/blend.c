@@ -97,7 +97,8 @@ TL_INLINE void blend_batch(blend_pass *p, const int32_t *corners, vi id, vm live
     if (!load_batch(s, corners, id, live, &b))
         return;
     find_boxes(s, &b);
-    const vm is_special = vi_eq(b.x_min, vi_set1(s->limits.special_x));
+    const vi special = vi_set1(s->limits.special_x); /* of a sample it may be the greatest number, not the least */
+    const vm is_special = vm_or(vm_or(vi_eq(b.c.x[0], special), vi_eq(b.c.x[1], special)), vi_eq(b.c.x[2], special));
     vm drawn = vm_and(b.drawn, has_box(&b)), alone = vm_and(b.alone, vm_or(is_special, has_box(&b)));
     if (TL_LANES == 1) { /* one lane gains nothing from the rows above */
         alone = vm_or(alone, drawn);
