@@ -85,7 +85,8 @@ static void draw(const tl_snapped *scene, const tl_window *window, tl_target tar
     tl_share share = {.end = scene->n_triangles, .is_first = 1, .is_last = 1};
     const int is_mask = target.sink == TL_SINK_MASK, is_share = target.sink == TL_SINK_SAMPLES;
     target.pixels = is_mask ? (void *)bytes : is_share ? (void *)floats : (void *)ids;
-    target.depth = with_depth ? depth : NULL, target.covered = covered, target.stride_px = WIDTH;
+    target.depth = with_depth ? depth : NULL, target.stride_px = WIDTH;
+    target.covered = target.sink == TL_SINK_MASK || target.sink == TL_SINK_SAMPLES ? covered : NULL;
     char row[64];
     if (k->draw(scene, window, &target, &share) >= 0)
         exit(3);
@@ -156,6 +157,7 @@ static void draw_values(const tl_snapped *scene, const tl_window *window, const 
                                       .blend = blend,
                                       .ground = GROUND,
                                       .is_area = is_area,
+                                      .band_rows = 37,
                                       .cells = cells};
             k->blend(scene, window, &canvas);
             tell(name, what, bytes, 4 * N_PX);
