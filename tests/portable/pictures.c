@@ -86,7 +86,7 @@ static void draw(const tl_snapped *scene, const tl_window *window, tl_target tar
     const int is_mask = target.sink == TL_SINK_MASK, is_share = target.sink == TL_SINK_SAMPLES;
     target.pixels = is_mask ? (void *)bytes : is_share ? (void *)floats : (void *)ids;
     target.depth = with_depth ? depth : NULL, target.stride_px = WIDTH;
-    target.covered = target.sink == TL_SINK_MASK || target.sink == TL_SINK_SAMPLES ? covered : NULL;
+    target.covered = is_mask || is_share ? covered : NULL;
     char row[64];
     if (k->draw(scene, window, &target, &share) >= 0)
         exit(3);
