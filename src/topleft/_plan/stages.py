@@ -378,8 +378,8 @@ def plan_threads(facts: Facts, costs: Costs) -> Stage:
         each = f"{MIN_THREAD_NS / 1e6:g} ms for each of {usable}"
         why = f"about {facts.work_ms:.2g} ms of work are {is_enough} {each}; {wake}"
     if facts.in_bands:
-        sorted_ = f"the {n:,} triangles lie far apart from one to the next, so they are sorted into bands of rows"
-        rejected = ("triangles as they come: most of their pixels would have left the cache",)
+        sorted_ = f"the {n:,} triangles are sorted into bands of rows, which are cleared and drawn in the cache"
+        rejected = ("triangles as they come: what that saves is less than what pixels outside of the cache cost",)
         who = "1, the caller's own" if n_threads == 1 else f"{n_threads}, each its bands of rows"
         return Stage("threads", f"{who}; one band after the other", f"{why}; {sorted_}", rejected)
     if n_threads == 1:

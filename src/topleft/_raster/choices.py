@@ -465,7 +465,7 @@ def guess_scatter(view: View, snapped: Snapped) -> float:
 def rows_to_blend(view: View, snapped: Snapped, row_bytes: int, *, lays_ground: bool) -> int:
     """Return how many rows are blended before the next: a band that stays in the cache, where all are met again.
 
-    Each band sets up all triangles.
+    Each band looks at all triangles.
     """
     width, height = view.size
     n_rows = max(1, BLEND_BAND_BYTES // row_bytes)
