@@ -8,6 +8,7 @@
 #include "vertex/clip.c"
 #include "clusters/cluster_sort.c"
 #include "clusters/cluster_view.c"
+#include "clusters/mark.c"
 #include "raster/raster.c"
 #include "raster/bin.c"
 #include "raster/setup.c"
@@ -83,6 +84,7 @@ const tl_kernels TL_KERNELS = {
     .interpolate = interpolate,
     .paint_flat = paint_flat,
     .paint_gouraud = paint_gouraud,
+    .mark_vertices = mark_vertices,
     .place_on_curve = place_on_curve,
     .sort_keys = sort_keys,
     .cut_clusters = cut_clusters,

@@ -22,6 +22,11 @@ typedef struct tl_kernels {
     void (*clip)(const tl_source *source, const tl_vertex *vertices, const int32_t *triangles, const int32_t *ids,
                  int64_t n, const tl_view *view, tl_pieces *pieces);
 
+    /* Marks the blocks of 2^block_bits vertices that the triangles among n ids use; returns -1, or one of them with an
+     * index outside [0, n_vertices). */
+    int64_t (*mark_vertices)(const int32_t *ids, int64_t n, const int32_t *triangles, int64_t n_triangles,
+                             int64_t n_vertices, int block_bits, uint8_t *is_used);
+
     /* Where the middles of triangles lie on a curve that keeps neighbours together; `box` is low and high of the
      * vertices. */
     void (*place_on_curve)(const tl_source *source, const int32_t *triangles, int64_t first, int64_t end,

@@ -87,6 +87,7 @@ typedef enum { TL_SHOW_LIGHT = 0, TL_SHOW_NORMALS = 1, TL_SHOW_MATCAP = 2 } tl_s
 
 typedef struct {
     const float *normals; /* rows of four: the unit normal, or 0, and 1/w; of the vertices */
+    int finds_inverse_w;  /* instead of reading it there, from the vertices and their matrix, for those that show */
     /* (n_triangles, 3): the row of `corner_normals` that each corner has; NULL: the normals are those of its vertex */
     const int32_t *normal_of_corner;
     const float *corner_normals; /* rows of four: the unit normal, or 0, and what is not read */

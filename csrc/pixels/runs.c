@@ -200,33 +200,6 @@ TL_INLINE void load_normal_rows(const shade_runs *s, int slot, int32_t rows[3][T
             rows[k][lane] = of_corner[3 * (int64_t)ids[lane] + k];
 }
 
-/* Normals and q of the corners. */
-TL_INLINE void load_normals(const shade_runs *s, int slot, run_setup *r)
-{
-    const tl_shading *shading = s->shading;
-    _Alignas(64) int32_t rows[3][TL_MAX_LANES];
-    if (shading->normal_of_corner)
-        load_normal_rows(s, slot, rows);
-    for (int k = 0; k < 3; k++) {
-        vi c[4];
-        if (shading->normal_of_corner) {
-            const vi at = vi_add(vi_shift_left(vi_load(r->corners[k]), 2), vi_set1(3));
-            if (s->snapped->mesh.n_vertices >> 29) /* places of numbers need more than 31 bits */
-                vi_load_records(shading->normals, 16, r->corners[k], c);
-            else
-                c[3] = vi_gather(vm_all(), (const int32_t *)shading->normals, at);
-            const vi inv_w = c[3];
-            vi_load_records(shading->corner_normals, 16, rows[k], c);
-            c[3] = inv_w;
-        } else {
-            vi_load_records(shading->normals, 16, r->corners[k], c);
-        }
-        for (int axis = 0; axis < 3; axis++)
-            r->normal[k][axis] = vf_of_bits(c[axis]);
-        r->q[k] = vf_of_bits(c[3]);
-    }
-}
-
 /* The positions (x, y, z) of TL_LANES vertices, of rows of three float32 or float64. */
 TL_INLINE void load_positions(const void *positions, int is_f64, const int32_t *vertices, vd *p)
 {
@@ -270,6 +243,53 @@ TL_INLINE void load_positions_f32(const float *positions, const int32_t *vertice
             lanes[axis][lane] = positions[3 * (int64_t)vertices[lane] + axis];
     for (int axis = 0; axis < 3; axis++)
         p[axis] = vf_load(lanes[axis]);
+}
+
+/* 1/w of TL_LANES vertices, as set_inverse_w has it; the source has a matrix. */
+TL_INLINE vf find_inverse_w(const tl_source *source, const int32_t *vertices)
+{
+    if (source->scalar == TL_F32) {
+        const float *m = (const float *)source->matrix + 12;
+        vf p[3];
+        load_positions_f32(source->data, vertices, p);
+        const vf sum = vf_add(vf_mul(vf_set1(m[0]), p[0]), vf_mul(vf_set1(m[1]), p[1]));
+        return vf_div(vf_set1(1.0f), vf_add(vf_add(sum, vf_mul(vf_set1(m[2]), p[2])), vf_set1(m[3])));
+    }
+    const double *m = (const double *)source->matrix + 12;
+    vd p[3];
+    load_positions(source->data, 1, vertices, p);
+    const vd sum = vd_add(vd_mul(vd_set1(m[0]), p[0]), vd_mul(vd_set1(m[1]), p[1]));
+    return vf_from_vd(vd_div(vd_set1(1.0), vd_add(vd_add(sum, vd_mul(vd_set1(m[2]), p[2])), vd_set1(m[3]))));
+}
+
+/* Normals and q of the corners. */
+TL_INLINE void load_normals(const shade_runs *s, int slot, run_setup *r)
+{
+    const tl_shading *shading = s->shading;
+    _Alignas(64) int32_t rows[3][TL_MAX_LANES];
+    if (shading->normal_of_corner)
+        load_normal_rows(s, slot, rows);
+    for (int k = 0; k < 3; k++) {
+        vi c[4], own[4];
+        if (shading->normal_of_corner)
+            vi_load_records(shading->corner_normals, 16, rows[k], c);
+        else
+            vi_load_records(shading->normals, 16, r->corners[k], c);
+        for (int axis = 0; axis < 3; axis++)
+            r->normal[k][axis] = vf_of_bits(c[axis]);
+        if (shading->finds_inverse_w) {
+            r->q[k] = find_inverse_w(s->snapped->mesh.source, r->corners[k]);
+            continue;
+        }
+        if (shading->normal_of_corner && s->snapped->mesh.n_vertices >> 29) { /* places of numbers take 32 bits */
+            vi_load_records(shading->normals, 16, r->corners[k], own);
+            c[3] = own[3];
+        } else if (shading->normal_of_corner) {
+            const vi at = vi_add(vi_shift_left(vi_load(r->corners[k]), 2), vi_set1(3));
+            c[3] = vi_gather(vm_all(), (const int32_t *)shading->normals, at);
+        }
+        r->q[k] = vf_of_bits(c[3]);
+    }
 }
 
 /* The edges of the triangles of TL_LANES runs from their first corners on, over the longest coordinate of each.
@@ -566,18 +586,76 @@ TL_INLINE vm set_edges(shade_runs *s, int slot, int64_t row, run_setup *r)
     return is_special;
 }
 
+/* Of a mesh with fewer triangles all that runs read is in the second-level cache; asking for it takes 5 % then. */
+#define TL_FETCHED_TRIANGLES 500000
+#define TL_FETCH_RUNS 32 /* how many runs before its turn the rows of a run's corners are asked for */
+
+/* Indices are not checked yet: addresses, and no pointers. */
+TL_INLINE void fetch_row(const void *rows, uintptr_t n_bytes, int32_t row)
+{
+    __builtin_prefetch((const void *)((uintptr_t)rows + (uint32_t)row * n_bytes));
+}
+
+/* Asks for what names the corners of runs [first, end), and for the normals of their faces. */
+TL_INLINE void fetch_triangles(const shade_runs *s, int first, int end)
+{
+    const tl_shading *shading = s->shading;
+    for (int slot = first; slot < end; slot++) {
+        const int32_t id = s->ints[RUN_ID][slot];
+        fetch_row(s->snapped->triangles, 12, id);
+        if (shading && shading->face_normals)
+            fetch_row(shading->face_normals, 16, id);
+        else if (shading && shading->normal_of_corner)
+            fetch_row(shading->normal_of_corner, 12, id);
+    }
+}
+
+/* Asks for the corners of runs [first, end). */
+TL_INLINE void fetch_corners(const shade_runs *s, int first, int end)
+{
+    const tl_shading *shading = s->shading;
+    const tl_source *source = s->snapped->mesh.source;
+    for (int slot = first; slot < end; slot++) {
+        const int64_t at = 3 * (int64_t)s->ints[RUN_ID][slot];
+        for (int k = 0; k < 3; k++) {
+            const int32_t corner = s->snapped->triangles[at + k];
+            fetch_row(s->snapped->mesh.vertices, sizeof(tl_vertex), corner);
+            if (shading->normal_of_corner)
+                fetch_row(shading->corner_normals, 16, shading->normal_of_corner[at + k]);
+            if (!shading->normal_of_corner || !shading->finds_inverse_w)
+                fetch_row(shading->normals, 16, corner);
+            if (shading->finds_inverse_w)
+                fetch_row(source->data, source->scalar == TL_F32 ? 12 : 24, corner);
+            if (s->needs_uv)
+                fetch_row(shading->uv, 8, corner);
+            if (s->needs_colors)
+                fetch_row(shading->colors, 16, corner);
+        }
+    }
+}
+
 /* Prepares the runs of a row, a vector of them at a time. */
 TL_ONCE void set_runs(shade_runs *s, int64_t row)
 {
     const tl_shading *shading = s->shading;
+    const int fetches = s->snapped->n_triangles >= TL_FETCHED_TRIANGLES, end = TL_LANES + s->n_runs;
     s->n_special = 0;
+    if (fetches) {
+        fetch_triangles(s, TL_LANES, (int)min64(end, TL_LANES + 2 * TL_FETCH_RUNS));
+        fetch_corners(s, TL_LANES, (int)min64(end, TL_LANES + TL_FETCH_RUNS));
+    }
     if (s->n_runs) /* the rest of the last vector: a triangle that is there */
         vi_store(s->ints[RUN_ID] + TL_LANES + s->n_runs, vi_set1(s->ints[RUN_ID][TL_LANES + s->n_runs - 1]));
-    for (int slot = TL_LANES; slot < TL_LANES + s->n_runs; slot += TL_LANES) {
+    for (int slot = TL_LANES; slot < end; slot += TL_LANES) {
         run_setup r;
+        if (fetches) {
+            const int ahead = slot + TL_FETCH_RUNS, behind = ahead + TL_FETCH_RUNS;
+            fetch_triangles(s, behind, (int)min64(end, behind + TL_LANES));
+            fetch_corners(s, ahead, (int)min64(end, ahead + TL_LANES));
+        }
         run_corners(s, slot, r.corners);
         vi_store(s->ints[RUN_SPECIAL] + slot, vi_set1(0));
-        const vm is_special = vm_and(set_edges(s, slot, row, &r), vm_first(TL_LANES + s->n_runs - slot));
+        const vm is_special = vm_and(set_edges(s, slot, row, &r), vm_first(end - slot));
         load_normals(s, slot, &r);
         for (unsigned rest = vm_bits(is_special); rest; rest &= rest - 1)
             set_special(s, slot, __builtin_ctz(rest), row, &r);

@@ -39,7 +39,7 @@ static void start_weights(weighed_span *r, const tl_snapped *snapped, const tl_w
 {
     const tl_source *source = snapped->mesh.source;
     shade_runs *s = &r->runs;
-    s->snapped = snapped, s->window = window;
+    s->snapped = snapped, s->window = window, s->shading = NULL;
     memset(s->ints, 0, sizeof s->ints);
     memset(r->q, 0, sizeof r->q);
     memset(r->corners, 0, sizeof r->corners);
@@ -110,12 +110,17 @@ TL_INLINE void load_inverse_w(const tl_vertex_set *set, const int32_t *vertices,
 TL_INLINE void load_run_corners(weighed_span *r)
 {
     shade_runs *s = &r->runs;
-    for (int slot = TL_LANES; slot < TL_LANES + s->n_runs; slot += TL_LANES) {
+    const int fetches = s->snapped->n_triangles >= TL_FETCHED_TRIANGLES, end = TL_LANES + s->n_runs;
+    for (int slot = TL_LANES; slot < end; slot += TL_LANES) {
         int32_t corners[3][TL_MAX_LANES];
+        if (fetches)
+            fetch_triangles(s, slot + TL_FETCH_RUNS, (int)min64(end, slot + TL_FETCH_RUNS + TL_LANES));
         const vm is_there = run_corners(s, slot, corners);
         vi_store(s->ints[RUN_SPECIAL] + slot, vi_select(is_there, vi_set1(0), vi_set1(TL_ALONE)));
         for (int k = 0; k < 3; k++) {
             vi_store(r->corners[k] + slot, vi_load(corners[k]));
+            for (int lane = 0; fetches && lane < TL_LANES; lane++)
+                fetch_row(s->snapped->mesh.vertices, sizeof(tl_vertex), corners[k][lane]);
             if (r->has_w)
                 load_inverse_w(&s->snapped->mesh, corners[k], r->q[k] + slot);
         }

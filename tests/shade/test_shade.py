@@ -212,6 +212,26 @@ def test_shade_windows_are_crops(sampling):
         assert_same(part, picture[21:85, 37:120])
 
 
+@pytest.mark.parametrize("sampling", ["center", "msaa4"])
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("changes", [{}, {"crease": 6}], ids=["smooth", "creased"])
+def test_shade_windows_of_fewer_pixels_than_vertices_are_crops(changes, dtype, sampling):
+    """The whole has 1/w of all vertices, the windows of those that show."""
+    mesh = replace(COLORED, vertices=COLORED.vertices.astype(dtype), **changes)
+    size, camera = (200, 160), CAMERAS["perspective"]
+    material = tl.Material(texture=tl.Texture(NOISE), specular=0.5, shininess=30)
+    assert 100 * 90 < len(mesh.vertices) <= 200 * 160
+    assert (mesh.corner_normals() is None) == (not changes)
+
+    def pictures(size, origin=(0, 0)):
+        frags = tl.rasterize_mesh(mesh, camera, size, origin=origin, viewport=(200, 160), sampling=sampling)
+        for shading in ("smooth", "flat", "unlit"):
+            yield shade(frags, mesh, camera, shading=shading, lights=LIGHTS, material=material, fog=tl.Fog(3, 9))
+
+    for part, picture in zip(pictures((100, 90), (50, 40)), pictures(size), strict=True):
+        assert_same(part, picture[40:130, 50:150])
+
+
 def test_shade_each_isa_gives_the_same_bits():
     assert len(hashes_on_each_isa(__file__, "center", "msaa8")) == 1
 

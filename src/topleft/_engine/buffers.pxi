@@ -1,7 +1,8 @@
 # Describes what a pass reads and writes: viewport, vertices, buffers of pixels, indices, clipped pieces.
 
 cdef enum:
-    VERTEX_BLOCK = 16  # vertices that are snapped together when some of them are needed: whole vectors
+    VERTEX_BLOCK_BITS = 4
+    VERTEX_BLOCK = 1 << VERTEX_BLOCK_BITS  # vertices that are snapped together when some of them are needed: whole vectors
 
 
 cdef class Viewport:

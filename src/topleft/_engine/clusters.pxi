@@ -12,18 +12,11 @@ def mark_vertices(const int32_t[::1] ids, const int32_t[:, ::1] corners, int64_t
 
     Returns -1, or a triangle with an index outside [0, n_vertices).
     """
-    cdef int64_t i, k, n = ids.shape[0], bad = -1
-    cdef int32_t last = -1, corner
+    cdef int64_t bad
+    if not (ids.shape[0] and corners.shape[0]):
+        return -1
     with nogil:
-        for i in range(n):
-            if ids[i] != last and ids[i] >= 0:
-                for k in range(3):
-                    corner = corners[ids[i], k]
-                    if 0 <= corner < n_vertices:
-                        is_used[corner // VERTEX_BLOCK] = 1
-                    else:
-                        bad = ids[i]
-            last = ids[i]
+        bad = K.mark_vertices(&ids[0], ids.shape[0], &corners[0, 0], corners.shape[0], n_vertices, VERTEX_BLOCK_BITS, &is_used[0])
     return bad
 
 

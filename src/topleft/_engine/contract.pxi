@@ -334,6 +334,7 @@ cdef extern from "topleft.h" nogil:
         float falloff
     ctypedef struct tl_shading:
         const float *normals
+        bint finds_inverse_w
         const int32_t *normal_of_corner
         const float *corner_normals
         const float *face_normals
@@ -491,6 +492,7 @@ cdef extern from "topleft.h" nogil:
         tl_vertex_counts (*snap)(const tl_source *, int64_t, int64_t, int, int, tl_vertex *, tl_wide *) noexcept nogil
         tl_vertex_counts (*project)(const tl_source *, int64_t, int64_t, const tl_view *, tl_vertex *, tl_wide *) noexcept nogil
         void (*clip)(const tl_source *, const tl_vertex *, const int32_t *, const int32_t *, int64_t, const tl_view *, tl_pieces *) noexcept nogil
+        int64_t (*mark_vertices)(const int32_t *, int64_t, const int32_t *, int64_t, int64_t, int, uint8_t *) noexcept nogil
         void (*place_on_curve)(const tl_source *, const int32_t *, int64_t, int64_t, const double *, uint32_t *) noexcept nogil
         void (*sort_keys)(const uint32_t *, int64_t, uint64_t *, uint64_t *, int32_t *) noexcept nogil
         int64_t (*cut_clusters)(const int32_t *, const int32_t *, int64_t, int32_t *, tl_cluster *, int32_t *, uint8_t *, int64_t *) noexcept nogil

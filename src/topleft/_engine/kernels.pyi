@@ -143,6 +143,7 @@ class SnappedMesh:
     def count_classes(
         self, sink: int, width: int, height: int, samples: I32 | None = None
     ) -> tuple[int, list[tuple[int, float, float]]]: ...
+    def finds_inverse_w(self, n_pixels: int) -> bool: ...
     def with_inverse_w(self, n_pixels: int, empty: Callable[..., Array] = ...) -> SnappedMesh: ...
     def numbered_from(self, first_id: int) -> SnappedMesh: ...
     @property
@@ -376,6 +377,7 @@ class ShadingTable:
     def __init__(
         self,
         normals: F32,
+        finds_inverse_w: bool,
         normal_of_corner: I32 | None,
         corner_normals: F32 | None,
         face_normals: F32 | None,

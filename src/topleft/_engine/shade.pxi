@@ -63,14 +63,14 @@ cdef class ShadingTable:
     cdef uint8_t[::1] materials
     cdef uint8_t[::1] lights
 
-    def __init__(self, const float[:, ::1] normals, const int32_t[:, ::1] normal_of_corner,
+    def __init__(self, const float[:, ::1] normals, bint finds_inverse_w, const int32_t[:, ::1] normal_of_corner,
                  const float[:, ::1] corner_normals, const float[:, ::1] face_normals, positions, const uint8_t[::1] is_turned,
                  const float[:, ::1] uv, const float[:, ::1] uv1, const float[:, ::1] colors, bint has_alpha, float front_side,
                  const int32_t[::1] material_of, const float[::1] decode):
         cdef const uint8_t[::1] raw = as_bytes(positions)
         cdef tl_shading *s = &self.shading
         self.arrays = (normals, normal_of_corner, corner_normals, face_normals, raw, is_turned, uv, uv1, colors, material_of, decode)
-        s.normals = &normals[0, 0] if normals.shape[0] else NULL
+        s.normals, s.finds_inverse_w = &normals[0, 0] if normals.shape[0] else NULL, finds_inverse_w
         s.normal_of_corner = NULL
         if normal_of_corner is not None and normal_of_corner.shape[0]:
             s.normal_of_corner, s.corner_normals = &normal_of_corner[0, 0], &corner_normals[0, 0]

@@ -203,13 +203,16 @@ class ShadingInputs:
         self.view = camera.view
         self.back_side = -1.0 if np.linalg.det(camera.view[:3, :3]) > 0 else 1.0
         self.is_in_eye_space = in_eye_space
-        normals = self.mesh.normals
+        normals, finds_inverse_w = self.mesh.normals, False
         if scene.viewport is not None and self.rays.has_perspective:
-            own = normals[: len(mesh.vertices)]
-            normals = empty(own.shape, np.float32)
-            _engine.set_inverse_w(scene, own, normals)
+            finds_inverse_w = scene.finds_inverse_w(size[0] * size[1])
+            if not finds_inverse_w:
+                own = normals[: len(mesh.vertices)]
+                normals = empty(own.shape, np.float32)
+                _engine.set_inverse_w(scene, own, normals)
         self.shading = _engine.ShadingTable(
             normals,
+            finds_inverse_w,
             self.mesh.normal_of_corner,
             self.mesh.normals,
             self.mesh.face_normals if is_flat else None,
