@@ -50,11 +50,11 @@ FLAGS_C = [
 # takes twice the time to compile for no call that is measurably faster; -Og saves a third of it, and costs the smallest
 # calls 5 %.
 FLAGS_CYTHON = [
-    "-O1", "-g0", "-fvisibility=hidden", "-fno-lto",
+    "-O1", "-g0", "-ffp-contract=off", "-fno-fast-math", "-fvisibility=hidden", "-fno-lto",
     "-Wno-unused-function", "-Wno-unused-parameter", "-Wno-missing-field-initializers", "-Wno-cast-function-type",
 ]  # fmt: skip
 # The classics do their arithmetic in Cython.
-FLAGS_CLASSIC = [*FLAGS_CYTHON, "-O3", "-ffp-contract=off", "-fno-fast-math", "-fno-math-errno"]
+FLAGS_CLASSIC = [*FLAGS_CYTHON, "-O3", "-fno-math-errno"]
 # For findings of a sanitizer: where they are, and integers whose overflow the language does not define.
 FLAGS_SANITIZED = ["-O1", "-g1", "-fno-omit-frame-pointer", "-fno-wrapv"]
 FLAGS_AVX2 = ["-mavx2", "-mfma", "-mbmi", "-mbmi2", "-mlzcnt", "-mpopcnt"]

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias, get_args
 import numpy as np
 import numpy.typing as npt
 
+from topleft import _engine
 from topleft._base.arrays import as_array, as_real, as_size, as_square, as_vector, check_regular, set_read_only, shown
 from topleft._base.options import check_choice
 from topleft._camera.lens import Lens, lens_of_opencv
@@ -104,10 +105,10 @@ class Camera:
     def __repr__(self) -> str:
         """One line: where it stands, where it looks, how wide."""
         try:
-            eye = np.linalg.solve(self.view[:3, :3], -self.view[:3, 3])
+            eye = _engine.product(_engine.inverse(self.view[:3, :3]), -self.view[:3, 3])
         except np.linalg.LinAlgError:
             return "Camera(singular view)"
-        forward = -self.view[2, :3] / (np.linalg.norm(self.view[2, :3]) or 1.0)
+        forward = -self.view[2, :3] / (_engine.length(self.view[2, :3]) or 1.0)
         words = [f"eye=({', '.join(f'{x:.4g}' for x in eye)})", f"forward=({', '.join(f'{x:.3g}' for x in forward)})"]
         up = float(self.projection[1, 1])
         if up and self.projection[3, :3].any():
@@ -134,7 +135,7 @@ class Camera:
         """
         if self.lens is not None:
             raise ValueError("no matrix describes a camera with a lens; rasterize_mesh draws through it")
-        return self.clip_from_eye(size) @ self.view
+        return _engine.product(self.clip_from_eye(size), self.view)
 
     def clip_from_eye(self, size: int | tuple[int, int]) -> F64:
         """The projection (4, 4) float64 for a picture of this size; with a lens it acts on what the lens has bent."""
@@ -150,7 +151,7 @@ class Camera:
 
     def placed(self, transform: F64) -> Camera:
         """The same camera in the object space of what stands at `transform` (4, 4), world from object."""
-        return replace(self, view=self.view @ transform)
+        return replace(self, view=_engine.product(self.view, transform))
 
     def project(self, points: npt.ArrayLike, size: int | tuple[int, int]) -> F64:
         """Where world points lie in a picture.
@@ -180,11 +181,11 @@ class Camera:
         world, (width, height) = as_real("points", points), as_size(size)
         if world.ndim != 2 or world.shape[1] != 3:
             raise ValueError(f"points must have shape (N, 3), got {world.shape}")
-        eye = world @ self.view[:3, :3].T + self.view[:3, 3]
+        eye = _engine.product(world, self.view[:3, :3].T) + self.view[:3, 3]
         if self.lens is not None:
             eye = self.lens.bend(eye)
         projection = self.clip_from_eye(size)
-        clip = eye @ projection[:, :3].T + projection[:, 3]
+        clip = _engine.product(eye, projection[:, :3].T) + projection[:, 3]
         with np.errstate(divide="ignore", invalid="ignore"):
             ndc = clip[:, :3] / clip[:, 3:]
         return np.stack([(ndc[:, 0] + 1) * (width / 2), (1 - ndc[:, 1]) * (height / 2), (ndc[:, 2] + 1) / 2], axis=1)
@@ -329,7 +330,7 @@ class Camera:
         """
         eye, target, up = as_vector("eye", eye), as_vector("target", target), as_vector("up", up)
         view = view_matrix(eye, target, up)
-        distance = float(np.linalg.norm(target - eye))
+        distance = _engine.length(target - eye)
         near = 0.01 * distance if near is None else near
         far = 100 * distance if far is None else far
         if ortho_height is not None:
@@ -395,8 +396,9 @@ class Camera:
         ndc_of_px = np.array([[2 / width, 0, -1], [0, -2 / height, 1], [0, 0, 1]])
         eye_of_camera = np.diag([1.0, -1.0, -1.0, 1.0])
         projection = perspective_matrix(90, near, far)
-        projection[:2, :3] = (ndc_of_px @ px_of_center @ matrix)[:2] @ eye_of_camera[:3, :3]
-        return cls(eye_of_camera @ pose, projection, lens=lens_of_opencv(distortion, fisheye))
+        ndc_of_matrix = _engine.product(_engine.product(ndc_of_px, px_of_center), matrix)
+        projection[:2, :3] = _engine.product(ndc_of_matrix[:2], eye_of_camera[:3, :3])
+        return cls(_engine.product(eye_of_camera, pose), projection, lens=lens_of_opencv(distortion, fisheye))
 
     @classmethod
     def framing(

@@ -5,14 +5,16 @@ Input: a path. Output: `Camera`, one for each node that holds one.
 
 from __future__ import annotations
 
+import math
 import os
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from topleft import _engine
 from topleft._base.arrays import as_path
 from topleft._camera.camera import Camera
-from topleft._camera.matrices import F64, box_matrix, frustum_matrix
+from topleft._camera.matrices import F64, box_matrix, frustum_matrix, tangent
 from topleft._io.load import GLTF_SUFFIXES, reading
 from topleft._io.references import InputFile
 from topleft.errors import MeshError
@@ -71,13 +73,13 @@ def _camera(own: CameraOfFile, source: InputFile) -> Camera:
         raise MeshError("a camera of it stands nowhere")
     # A node may be scaled, and the eye is not: its axes keep their directions alone.
     axes = own.world_from_eye[:3, :3]
-    lengths = np.linalg.norm(axes, axis=0)
+    lengths = np.sqrt((axes * axes).sum(axis=0))
     if not (lengths > 0).all():
         raise MeshError(f"cannot read {str(source.path)!r}: a camera of it stands in a space without a volume")
     rigid = np.eye(4)
     rigid[:3, :3] = axes / lengths
     rigid[:3, 3] = own.world_from_eye[:3, 3]
-    view: F64 = np.linalg.inv(rigid).astype(np.float64)
+    view = _engine.inverse(rigid.astype(np.float64))
     return Camera(view, _projection(own), aspect=1.0)
 
 
@@ -88,7 +90,7 @@ def _projection(own: CameraOfFile) -> F64:
     if own.kind == "orthographic":
         half = numbers["ymag"]
         return box_matrix(-half, half, -half, half, near, numbers["zfar"])
-    half = float(np.tan(numbers["yfov"] / 2)) * near
+    half = tangent(math.degrees(numbers["yfov"]) / 2) * near
     matrix = frustum_matrix(-half, half, -half, half, near, 2 * near if far is None else far)
     if far is None:
         matrix[2, 2:] = -1, -2 * near

@@ -16,6 +16,7 @@ from typing import ClassVar, Protocol
 import numpy as np
 import numpy.typing as npt
 
+from topleft import _engine
 from topleft._base.arrays import as_number, as_real
 
 F64 = npt.NDArray[np.float64]
@@ -136,7 +137,8 @@ class OpenCVLens:
 
     def _tilt(self, u: F64, v: F64) -> tuple[F64, F64]:
         """Places in a plane that is turned about x, then y, seen from the lens."""
-        (cos_x, cos_y), (sin_x, sin_y) = (f([self.tau_x, self.tau_y]) for f in (np.cos, np.sin))
+        cos_x, sin_x = _engine.cosine_and_sine(math.degrees(self.tau_x))
+        cos_y, sin_y = _engine.cosine_and_sine(math.degrees(self.tau_y))
         a = cos_y * u + sin_x * sin_y * v - sin_y * cos_x
         b = cos_x * v + sin_x
         c = sin_y * u - cos_y * sin_x * v + cos_y * cos_x
@@ -196,8 +198,7 @@ class FisheyeLens:
     def distort(self, points: F64) -> F64:
         """Places (N, 2) in the image plane of points (N, 3)."""
         points = _as_points(points)
-        off_axis = np.hypot(points[:, 0], points[:, 1])
-        angle = np.arctan2(off_axis, points[:, 2])
+        off_axis, angle = _engine.off_axis(points)
         t2 = angle * angle
         bent = angle * (1 + t2 * (self.k1 + t2 * (self.k2 + t2 * (self.k3 + t2 * self.k4))))
         # On the axis, where the angle is nothing, the direction is too.
@@ -206,7 +207,7 @@ class FisheyeLens:
 
     def range_along(self, points: F64) -> F64:
         """The distance from the lens."""
-        return np.sqrt(np.einsum("ij,ij->i", points, points))
+        return np.sqrt(_engine.row_products(points, points))
 
     def bend(self, points_eye: F64) -> F64:
         """Where points (N, 3) in eye space must be for a camera without the lens to see the same."""

@@ -13,6 +13,7 @@ from typing import TypeAlias, get_args
 import numpy as np
 import numpy.typing as npt
 
+from topleft import _engine
 from topleft._base.arrays import as_number, as_real, check_regular
 from topleft._base.options import check_choice
 from topleft._model.mesh import Mesh, extreme_points, used_vertices
@@ -114,25 +115,25 @@ def split_matrix(clip_from_world: F64) -> tuple[F64, F64]:
     check_regular(name, clip_from_world)
     has_perspective = bool(clip_from_world[3, :3].any())
     linear = clip_from_world[:3, :3]
-    if not has_perspective and np.allclose(linear @ linear.T, np.eye(3), rtol=0, atol=1e-6):
+    if not has_perspective and np.allclose(_engine.product(linear, linear.T), np.eye(3), rtol=0, atol=1e-6):
         raise ValueError(
             f"{name} must be a projection times a view, got a pose: Camera.perspective(view, near=, far=) adds one"
         )
-    scale = np.linalg.norm(clip_from_world[3, :3]) if has_perspective else clip_from_world[3, 3]
+    scale = _engine.length(clip_from_world[3, :3]) if has_perspective else clip_from_world[3, 3]
     matrix = clip_from_world / scale
     rows = matrix[[0, 1, 3 if has_perspective else 2]]
     ends = np.array([0.0, 0.0, 0.0 if has_perspective else -1.0])
     try:
-        eye = np.linalg.solve(rows[:, :3], ends - rows[:, 3])
+        eye = _engine.product(_engine.inverse(rows[:, :3]), ends - rows[:, 3])
     except np.linalg.LinAlgError:
         raise ValueError(f"{name} must have an eye, got {clip_from_world.tolist()}") from None
-    back = -rows[2, :3] / np.linalg.norm(rows[2, :3])
-    up = rows[1, :3] - (rows[1, :3] @ back) * back
-    up /= np.linalg.norm(up)
+    back = -rows[2, :3] / _engine.length(rows[2, :3])
+    up = rows[1, :3] - _engine.product(rows[1, :3], back) * back
+    up /= _engine.length(up)
     view = np.eye(4)
     view[:3, :3] = np.cross(up, back), up, back
-    view[:3, 3] = -view[:3, :3] @ eye
-    projection = matrix @ np.linalg.inv(view)
+    view[:3, 3] = _engine.product(-view[:3, :3], eye)
+    projection = _engine.product(matrix, _engine.inverse(view))
     error = 1e-9 * np.abs(projection).max()
     if np.abs(projection[2, :2]).max() > error:
         raise ValueError(f"{name} must have depth along the view alone, got planes that lie aslant")
@@ -200,18 +201,18 @@ def view_matrix(eye: F64, target: F64, up: F64) -> F64:
         If eye and target coincide, or if `up` is zero or parallel to the view.
     """
     forward = target - eye
-    distance = np.linalg.norm(forward)
+    distance = _engine.length(forward)
     if distance == 0:
         raise ValueError(f"eye and target must differ, got {eye.tolist()} for both")
     forward = forward / distance
     right = np.cross(forward, up)
     # Below 1e-12 of the length of `up` the direction is made of rounding errors.
-    if np.linalg.norm(right) <= 1e-12 * np.linalg.norm(up):
+    if _engine.length(right) <= 1e-12 * _engine.length(up):
         raise ValueError(f"up must not be zero or parallel to the view, got {up.tolist()}")
-    right /= np.linalg.norm(right)
+    right /= _engine.length(right)
     view = np.eye(4)
     view[:3, :3] = right, np.cross(right, forward), -forward
-    view[:3, 3] = -view[:3, :3] @ eye
+    view[:3, 3] = _engine.product(-view[:3, :3], eye)
     return view
 
 
@@ -235,22 +236,34 @@ def orbit_view(
         raise ValueError(f"azimuth_deg must be finite, got {azimuth_deg}")
     if not -90 <= as_number("elevation_deg", elevation_deg) <= 90:
         raise ValueError(f"elevation_deg must lie in -90 to 90, got {elevation_deg}")
-    azimuth, elevation = np.radians([azimuth_deg, elevation_deg])
-    outward = np.array([np.cos(elevation) * np.sin(azimuth), np.sin(elevation), np.cos(elevation) * np.cos(azimuth)])
+    cosine, sine = _engine.cosine_and_sine(azimuth_deg)
+    level, height = _engine.cosine_and_sine(elevation_deg)
+    outward = np.array([level * sine, height, level * cosine])
     axis = np.array([0.0, 1.0, 0.0])
     if abs(elevation_deg) > 89:  # from a pole: the limit of the pictures on the way there
-        axis = np.array([-np.sin(azimuth), 0, -np.cos(azimuth)]) * np.sign(elevation)
+        axis = np.array([-sine, 0, -cosine]) * np.sign(elevation_deg)
     if up == "z":
         outward, axis = outward[[0, 2, 1]] * [1, -1, 1], axis[[0, 2, 1]] * [1, -1, 1]
     at = np.asarray(target, np.float64)
     return view_matrix(at + distance * outward, at, axis)
 
 
+def tangent(degrees: float) -> float:
+    """The tangent of an angle."""
+    cosine, sine = _engine.cosine_and_sine(degrees)
+    return sine / cosine
+
+
+def sine_of_tangent(value: float) -> float:
+    """The sine of the angle that has a tangent."""
+    return value / math.sqrt(1 + value * value)
+
+
 def perspective_matrix(fov_y_deg: float, near: float, far: float) -> F64:
     """Clip from eye (4, 4) float64 for a square picture; see `Camera.perspective`."""
     check_fov(fov_y_deg)
     check_planes(near, far)
-    scale = 1 / np.tan(np.radians(fov_y_deg) / 2)
+    scale = 1 / tangent(fov_y_deg / 2)
     matrix = np.diag([scale, scale, (far + near) / (near - far), 0])
     matrix[2, 3] = 2 * far * near / (near - far)
     matrix[3, 2] = -1
@@ -304,20 +317,20 @@ def framing_matrices(
     center, radius = bounding_sphere(ends)
     check_fov(fov_y_deg)
     check_positive("aspect", aspect)
-    tan_y = np.tan(np.radians(fov_y_deg) / 2)
+    tan_y = tangent(fov_y_deg / 2)
     # The sphere touches the pyramid of view at sin, not tan, of the half angle.
-    distance = radius * FRAMING_MARGIN / np.sin(np.arctan(tan_y * min(1.0, aspect)))
+    distance = radius * FRAMING_MARGIN / sine_of_tangent(tan_y * min(1.0, aspect))
     height = 2 * radius * FRAMING_MARGIN / min(1.0, aspect)
     right, above = 0.0, 0.0
     if points is not None:
         turn = orbit_view((0, 0, 0), 1.0, azimuth_deg, elevation_deg, up=up)[:3, :3]
-        points = (points - center) @ turn.T
+        points = _engine.product(points - center, turn.T)
         if fills:
             share = 1 - 2 * SILHOUETTE_MARGIN
             right, above, distance = place_to_fill(points, share * tan_y * aspect, share * tan_y)
             if ortho:
                 right, above, half = place_to_fill(points, aspect, 1.0, ortho=True)
-                distance, height = radius / np.sin(np.arctan(tan_y)), 2 * half / share
+                distance, height = radius / sine_of_tangent(tan_y), 2 * half / share
         else:
             distance = distance_to_fit(points, tan_y * aspect, tan_y)
             height = 2 * FRAMING_MARGIN * max(np.abs(points[:, 1]).max(), np.abs(points[:, 0]).max() / aspect)

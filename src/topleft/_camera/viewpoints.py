@@ -13,6 +13,7 @@ from typing import TypedDict, Unpack
 import numpy as np
 import numpy.typing as npt
 
+from topleft import _engine
 from topleft._base.arrays import as_count
 from topleft._camera.camera import Camera
 from topleft._camera.matrices import THREE_QUARTER_DEG, Framed, as_framed, bounding_sphere, ends_to_frame
@@ -117,7 +118,7 @@ def viewpoints(subject: MeshLike | Scene | npt.ArrayLike, n: int, **framing: Unp
     height = 1 - (2 * np.arange(n) + 1) / n
     return [
         Camera.framing(sphere, azimuth_deg=i * GOLDEN_ANGLE_DEG % 360, elevation_deg=elevation_deg, **framing)
-        for i, elevation_deg in enumerate(np.degrees(np.arcsin(height)).tolist())
+        for i, elevation_deg in enumerate(map(_engine.arc_sine, height.tolist()))
     ]
 
 

@@ -7,6 +7,7 @@ contract.pxi   declares the structs and kernels of csrc
 exact.pxi      draws triangles whose vertices are not snapped
 isa.py         chooses the instruction set that runs, and tells how this copy was built
 kernels.pyx    holds the kernel table in use; includes the parts, and gives their names to Python
+matrices.pxi   multiplies and inverts small matrices, the same on every machine
 meshlets.pxi   grows a mesh into meshlets, and draws those that a view may show
 mesh.pxi       computes normals of a mesh, and distances between surfaces
 pause.pxi      ends a draw: Ctrl-C, and threads whose part is given up

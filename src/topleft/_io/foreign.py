@@ -22,6 +22,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 import numpy.typing as npt
 
+from topleft import _engine
 from topleft._io.notes import Notes
 from topleft._io.references import Cloud, InputFile, numbers_of_text
 from topleft._model.from_trimesh import placed
@@ -155,7 +156,7 @@ def _parts(scene: Any, source: InputFile) -> Iterator[Mesh]:
             yield placed(geometry, transform)
         elif hasattr(geometry, "colors") and len(getattr(geometry, "vertices", ())):
             source.notes.add("points not drawn")
-            points = np.asarray(geometry.vertices) @ transform[:3, :3].T + transform[:3, 3]
+            points = _engine.product(geometry.vertices, transform[:3, :3].T) + transform[:3, 3]
             source.check_n_vertices(len(points))
             colors = np.asarray(geometry.colors)
             source.clouds.append(Cloud(points, colors if colors.shape == (len(points), 4) else None))

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from topleft import _engine
 from topleft._base.color import encode_srgb
 from topleft._io.gltf_accessors import Accessors, Tree, entry, normalized
 from topleft._io.gltf_materials import Materials
@@ -235,7 +236,7 @@ class _Nodes:
             at = self._parent.get(at)
         world = np.eye(4) if at is None else self._matrices[at]
         for at in reversed(chain):
-            world = self._matrices[at] = world @ local_matrix(entry(self._tree, "nodes", at))
+            world = self._matrices[at] = _engine.product(world, local_matrix(entry(self._tree, "nodes", at)))
         return world
 
 
@@ -329,7 +330,7 @@ class _Reader:
         elif "material" in primitive:
             color = self._materials.material(primitive["material"]).color or (255, 255, 255)
             colors = np.tile(np.array([*color, 255], np.uint8), (len(points), 1))
-        self._source.clouds.append(Cloud(points @ matrix[:3, :3].T + matrix[:3, 3], colors))
+        self._source.clouds.append(Cloud(_engine.product(points, matrix[:3, :3].T) + matrix[:3, 3], colors))
 
     def _places(self, index: int, node: Tree) -> list[F64]:
         """World from mesh: once, or once for each instance."""
@@ -346,7 +347,7 @@ class _Reader:
             matrices[:, :3, :3] *= given["SCALE"][:n, None, :]
         if "TRANSLATION" in given:
             matrices[:, :3, 3] = given["TRANSLATION"][:n]
-        return list(world @ matrices)
+        return [_engine.product(world, matrix) for matrix in matrices]
 
     def _shape(self, node: Tree, i: int, primitive: Tree, weights: Any) -> _Shape | None:
         """The triangles of a primitive, moved by its morph targets and its skin; None if it has none."""

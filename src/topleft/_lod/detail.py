@@ -23,6 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from topleft import _engine
 from topleft._base.arrays import as_number, as_size, shown
 from topleft._camera.camera import Camera, CameraLike, as_camera
 from topleft._lod.levels import Extent, Level, Levels
@@ -175,7 +176,7 @@ def scales(
     """What tells how many pixels a unit is at most on some levels, as `pixels_per_unit`, in a view."""
     matrix = camera.clip_from_world(viewport or size)
     if transform is not None:
-        matrix = matrix @ np.asarray(transform, np.float64)
+        matrix = _engine.product(matrix, np.asarray(transform, np.float64))
     rows, window = matrix.tolist(), window_of(size, viewport, origin)
     return lambda *levels: pixels_per_unit(rows, viewport or size, window, [level.extent for level in levels])
 

@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from topleft import _engine
 from topleft._base.arrays import as_array, as_number, as_vector, set_read_only
 from topleft._base.color import LIGHT_OF_SRGB, Color, ColorLike, as_color, light_of
 from topleft._base.options import parse
@@ -131,16 +132,15 @@ class Environment:
     @property
     def axes(self) -> F64:
         """The rotation (3, 3) that takes directions of `space` to where y is up."""
-        up = np.array(self.up) / np.linalg.norm(self.up)
+        up = np.array(self.up) / _engine.length(self.up)
         cosine = up[1]
         if cosine < -1 + 1e-12:
             upright = np.diag([1.0, -1.0, -1.0])
         else:  # the shortest way from `up` to y
             cross = np.array([[0, -up[0], 0], [up[0], 0, up[2]], [0, -up[2], 0]])
-            upright = np.eye(3) + cross + cross @ cross / (1 + cosine)
-        c, s = np.cos(np.radians(self.turn)), np.sin(np.radians(self.turn))
-        turned: F64 = np.array([[c, 0, -s], [0, 1, 0], [s, 0, c]]) @ upright
-        return turned
+            upright = np.eye(3) + cross + _engine.product(cross, cross) / (1 + cosine)
+        c, s = _engine.cosine_and_sine(self.turn)
+        return _engine.product(np.array([[c, 0, -s], [0, 1, 0], [s, 0, c]]), upright)
 
     @cached_property
     def levels(self) -> tuple[F32, I32] | None:

@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from topleft import _engine
 from topleft._model.material import Material
 from topleft._model.mesh import NO_CREASE, Mesh, coincident, with_normals
-from topleft._model.normals import angle_weighted_normals
+from topleft._model.normals import angle_weighted_normals, determinant
 
 __all__ = ["joined", "placed_arrays"]
 
@@ -27,10 +28,12 @@ def placed_arrays(
     if np.array_equal(transform, np.eye(4)):
         return vertices, triangles, normals
     linear = transform[:3, :3]
-    if np.linalg.det(linear) < 0:  # a mirror turns the triangles over
+    volume = determinant(linear.tolist())
+    if volume < 0:  # a mirror turns the triangles over
         triangles = triangles[:, ::-1]
-    normals = None if normals is None else normals @ np.linalg.pinv(linear)
-    return vertices @ linear.T + transform[:3, 3], triangles, normals
+    if normals is not None:
+        normals = _engine.product(normals, _engine.inverse(linear) if volume else np.linalg.pinv(linear))
+    return _engine.product(vertices, linear.T) + transform[:3, 3], triangles, normals
 
 
 def joined(parts: list[Mesh], crease: float = NO_CREASE) -> Mesh:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from topleft import _engine
 from topleft._base.arrays import as_number, as_vector
 from topleft._base.color import Color, ColorLike, as_color
 from topleft._base.options import parse
@@ -21,7 +22,7 @@ from topleft.typing import LightKindOption, SpaceOption
 
 F64 = npt.NDArray[np.float64]
 
-TO_HEADLIGHT = np.array([-0.35, 0.45, 1.0]) / np.linalg.norm([-0.35, 0.45, 1.0])
+TO_HEADLIGHT = np.array([-0.35, 0.45, 1.0]) / _engine.length([-0.35, 0.45, 1.0])
 """Direction of the headlight in eye space: from over the viewer's left shoulder, so that up and left read as lit."""
 
 AMBIENT = 0.03

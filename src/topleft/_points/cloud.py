@@ -14,6 +14,7 @@ from typing import Any, cast
 import numpy as np
 import numpy.typing as npt
 
+from topleft import _engine
 from topleft._base.color import DEFAULT_COLOR, LINEAR_ONE, light_of, srgb_tables
 from topleft._base.memory import FreshMemory, empty
 from topleft._base.options import PointShape
@@ -78,7 +79,7 @@ def through_lens(positions: npt.NDArray[Any], camera: Camera, frame: tuple[int, 
     eye = moved(positions, camera.view)
     with np.errstate(all="ignore"):
         places = camera.project(positions.astype(np.float64), frame)
-        angle = np.arctan2(np.hypot(eye[:, 0], eye[:, 1]), -eye[:, 2])
+        _, angle = _engine.off_axis(eye * [1, 1, -1])
     is_seen = np.isfinite(places).all(axis=1) & (places[:, 2] >= 0) & (places[:, 2] <= 1)
     is_seen &= angle < (camera.lens.max_angle if camera.lens is not None else np.pi)
     places[~is_seen] = NOWHERE_PX, NOWHERE_PX, 0

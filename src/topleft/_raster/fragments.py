@@ -44,7 +44,8 @@ class GivenCorners(NamedTuple):
         points = as_array("vertices", self.vertices)[rows].astype(np.float64)
         if self.transform is not None:
             matrix = np.asarray(as_array("transform", self.transform), np.float64)
-            points = points @ matrix[:, :3].T + matrix[:, 3]
+            moved = _engine.product(points.reshape(-1, points.shape[-1]), matrix[:, :3].T) + matrix[:, 3]
+            points = moved.reshape(*points.shape[:-1], 4)
         if points.shape[-1] < 4:
             return np.stack([points[..., 0], points[..., 1], np.ones(points.shape[:-1])], axis=-1)
         (width, height), (x, y, _, w) = self.viewport, np.moveaxis(points, -1, 0)
@@ -57,7 +58,7 @@ class GivenCorners(NamedTuple):
         """
         corners = self.homogeneous(ids)
         crossed = np.cross(np.roll(corners, -1, axis=1), np.roll(corners, -2, axis=1))
-        area = np.einsum("nk,nk->n", corners[:, 0], crossed[:, 0])
+        area = _engine.row_products(corners[:, 0], crossed[:, 0])
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             steps = crossed / area[:, None, None]
         steps[..., 2] = corners[..., 2]
@@ -328,7 +329,7 @@ class Fragments:
         if self.corners is None or self.corners.transform is None:
             raise ValueError("distance needs vertices (V, 3) in the world, drawn with transform= or by rasterize_mesh")
         points = np.asarray(as_array("vertices", self.corners.vertices), np.float64)
-        return self.interpolate(-(points @ view[2, :3] + view[2, 3]), background=np.inf)
+        return self.interpolate(-(_engine.product(points, view[2, :3]) + view[2, 3]), background=np.inf)
 
     def only(self, rows: NDArray[np.intp], cols: NDArray[np.intp]) -> Fragments:
         """Return what is left when no other pixels than these show a triangle."""

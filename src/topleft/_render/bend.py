@@ -11,6 +11,7 @@ they split it alike, and no gap opens.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
@@ -20,6 +21,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from topleft import _engine
 from topleft._base.arrays import set_aligned
 from topleft._base.options import Cull, parse
 from topleft._camera.camera import Camera
@@ -33,8 +35,8 @@ Bools = npt.NDArray[np.bool_]
 Parts = tuple[I64, I64, F64, Bools]
 """Triangles (N, 3), their sources (N,), weights (N, 3, 3) and which sides are outline (N, 3)."""
 
-MAX_EDGE_ANGLE = 0.25
-"""Longer edges, in radians as the lens sees them, are halved in any case: so every triangle is small enough on the
+LEAST_EDGE_COSINE, _ = _engine.cosine_and_sine(math.degrees(0.25))
+"""Edges of a greater angle, as the lens sees them, are halved in any case: so every triangle is small enough on the
 sphere of directions for the test of what the picture cannot show."""
 
 MAX_RANGE_ERROR = 2.0**-12
@@ -120,7 +122,7 @@ class BentMesh:
 
         def spread(values: npt.NDArray[Any]) -> F64:
             of_parts = np.zeros((int(self.triangles.max(initial=-1)) + 1, values.shape[1]))
-            of_parts[self.triangles.ravel()] = np.matmul(self.weights, values[corners]).reshape(-1, values.shape[1])
+            of_parts[self.triangles.ravel()] = weighed(self.weights, values[corners]).reshape(-1, values.shape[1])
             return of_parts
 
         rows = mesh.material_of_triangle
@@ -138,7 +140,7 @@ class BentMesh:
             crease=mesh.crease,
         )
         if creased is not None and of_vertices is not None:
-            own = np.matmul(self.weights, creased.rows[creased.of_corner[self.source]]).reshape(-1, 3)
+            own = weighed(self.weights, creased.rows[creased.of_corner[self.source]]).reshape(-1, 3)
             of_corner = len(of_vertices) + np.arange(self.triangles.size, dtype=np.int32).reshape(-1, 3)
             table = np.concatenate([of_vertices, own])
             keep_corner_normals(parts, CornerNormals(table, of_corner, parts.triangles.ravel()))
@@ -149,7 +151,7 @@ class BentMesh:
 
         `cull` leaves out the edges that only culled triangles have.
         """
-        x, y = (self.points_eye[:, :2] / -self.points_eye[:, 2:] @ projection[:2, :2].T)[self.triangles].T
+        x, y = _engine.product(self.points_eye[:, :2] / -self.points_eye[:, 2:], projection[:2, :2].T)[self.triangles].T
         area = (x[1] - x[0]) * (y[2] - y[0]) - (x[2] - x[0]) * (y[1] - y[0])
         sign = {Cull.NONE: 0, Cull.BACK: 1, Cull.FRONT: -1}[parse(Cull, "cull", cull)]
         is_drawn = self.is_outline & (area * sign > 0 if sign else np.ones(len(area), bool))[:, None]
@@ -169,11 +171,11 @@ class LensMap:
         self.lens = lens
         self.px_from_plane = px_from_plane
         angles = np.linspace(0, lens.max_angle, N_ANGLES)
-        azimuth = np.arange(N_AZIMUTHS) * (2 * np.pi / N_AZIMUTHS)
-        around = np.stack([np.cos(azimuth), np.sin(azimuth)], axis=1)
+        azimuth_deg = np.arange(N_AZIMUTHS) * (360 / N_AZIMUTHS)
+        around = np.array([_engine.cosine_and_sine(degrees) for degrees in azimuth_deg.tolist()])
         with np.errstate(all="ignore"):  # beyond the turn there may be anything
             rings = lens.distort(_rings(angles, around)).reshape(N_ANGLES, N_AZIMUTHS, 2)
-            steps = np.diff(np.einsum("raj,aj->ra", rings, around), axis=0).min(axis=1)
+            steps = np.diff((rings * around).sum(axis=2), axis=0).min(axis=1)
         turns = np.flatnonzero(~(steps > 0))
         last = int(turns[0]) if len(turns) else N_ANGLES - 1
         last = max(last, 1)
@@ -187,16 +189,15 @@ class LensMap:
         self.max_angle = min(float(all_angles[shown[-1]]) + 2 * step if len(shown) else np.pi, WIDEST)
         # A little beyond what shows the extension may begin: the tamer, the fewer edges there are halved.
         self._extend(angles, rings, min(last, int(np.searchsorted(angles, self.max_angle + 2 * step))))
-        self.least_cosine = np.cos(min(self.max_angle / 2 + np.pi / 4, np.radians(89.9)))
+        self.least_cosine, _ = _engine.cosine_and_sine(min(math.degrees(self.max_angle) / 2 + 45, 89.9))
 
     def __call__(self, points: F64) -> tuple[F64, F64]:
         """Places (N, 2) in the image plane and ranges (N,) of points (N, 3), both finite whatever the points are."""
-        off_axis = np.hypot(points[:, 0], points[:, 1])
-        angle = np.arctan2(off_axis, points[:, 2])
+        off_axis, angle = _engine.off_axis(points)
         sides, length = points[:, :2], off_axis[:, None]
         around = np.divide(sides, length, out=np.zeros((len(points), 2)), where=length > 0)
         around[(off_axis == 0) & (angle > 0), 0] = 1.0
-        far = np.sqrt(np.einsum("ij,ij->i", points, points))
+        far = np.sqrt(_engine.row_products(points, points))
         reach = np.maximum(self.lens.range_along(points), far * self.least_cosine)
         return self._place(points, around, angle), np.maximum(reach, np.finfo(float).tiny)
 
@@ -219,16 +220,26 @@ class LensMap:
         beyond = ~near
         if beyond.any():
             rim = np.empty((beyond.sum(), 3))
-            rim[:, :2], rim[:, 2] = np.sin(self.limit) * around[beyond], np.cos(self.limit)
+            cosine, sine = _engine.cosine_and_sine(math.degrees(self.limit))
+            rim[:, :2], rim[:, 2] = sine * around[beyond], cosine
             outwards = self.slope * (angle[beyond] - self.limit)
             place[beyond] = self.lens.distort(rim) + outwards[:, None] * around[beyond]
         return place
 
 
+def weighed(weights: F64, corners: npt.NDArray[Any]) -> F64:
+    """Values (T, 3, K) at the corners of parts, of those (T, 3, K) at the corners of their triangles."""
+    sums: F64 = weights[:, :, 0, None] * corners[:, None, 0]
+    for k in (1, 2):
+        sums += weights[:, :, k, None] * corners[:, None, k]
+    return sums
+
+
 def _rings(angles: F64, around: F64) -> F64:
     """Directions (N_ANGLES * N_AZIMUTHS, 3) at these angles from the axis."""
-    sides = np.sin(angles)[:, None, None] * around
-    ahead = np.broadcast_to(np.cos(angles)[:, None, None], (*sides.shape[:2], 1))
+    cosine, sine = np.array([_engine.cosine_and_sine(degrees) for degrees in np.degrees(angles).tolist()]).T
+    sides = sine[:, None, None] * around
+    ahead = np.broadcast_to(cosine[:, None, None], (*sides.shape[:2], 1))
     return np.concatenate([sides, ahead], axis=2).reshape(-1, 3)
 
 
@@ -271,7 +282,7 @@ def bend(
     half = np.array([[size[0] / 2], [size[1] / 2]])
     px_from_plane = half * projection[:2, :3] * FLIP
     lens_map = _lens_map(lens, px_from_plane.tobytes(), (max(size[0], 1), max(size[1], 1)))
-    points = (np.asarray(vertices, np.float64) @ camera.view[:3, :3].T + camera.view[:3, 3]) * FLIP
+    points = (_engine.product(vertices, camera.view[:3, :3].T) + camera.view[:3, 3]) * FLIP
     # Window depth is below 0 for ranges under this one.
     near = projection[2, 3] / (projection[2, 2] - 1) if near_clip else 0.0
     return _Subdivision(lens_map, points, lens.tolerance_px, near).run(np.asarray(triangles, np.int64))
@@ -350,7 +361,7 @@ class _Subdivision:
 
     def _add(self, points: F64) -> None:
         place, reach = self.lens_map(points)
-        far = np.sqrt(np.einsum("ij,ij->i", points, points))[:, None]
+        far = np.sqrt(_engine.row_products(points, points))[:, None]
         direction = np.divide(points, far, out=np.tile([0.0, 0.0, 1.0], (len(points), 1)), where=far > 0)
         self.points = np.concatenate([self.points, points])
         self.place = np.concatenate([self.place, place])
@@ -364,10 +375,10 @@ class _Subdivision:
         """
         corners = self.direction[triangles]
         middle = corners.sum(axis=1)
-        length = np.sqrt(np.einsum("ij,ij->i", middle, middle))
+        length = np.sqrt(_engine.row_products(middle, middle))
         middle /= np.maximum(length, 1e-300)[:, None]
-        cosine = np.einsum("tij,tj->ti", corners, middle).min(axis=1)
-        off_axis = np.arctan2(np.hypot(middle[:, 0], middle[:, 1]), middle[:, 2])
+        cosine = np.min([_engine.row_products(corners[:, k], middle) for k in range(3)], axis=0)
+        _, off_axis = _engine.off_axis(middle)
         is_cap = (length > 1e-6) & (cosine > 1e-6)
         # Rounding of the arc cosine near 1: 1e-7 is more than it.
         is_outside = is_cap & (off_axis - np.arccos(np.clip(cosine, -1, 1)) > self.lens_map.max_angle + 1e-7)
@@ -376,8 +387,8 @@ class _Subdivision:
 
     def _is_bent(self, low: I64, high: I64) -> Bools:
         """Whether edges have to be halved; nothing but their ends is looked at, and the ends may change places."""
-        cosine = np.einsum("ij,ij->i", self.direction[low], self.direction[high])
-        is_bent = cosine < np.cos(MAX_EDGE_ANGLE)
+        cosine = _engine.row_products(self.direction[low], self.direction[high])
+        is_bent = cosine < LEAST_EDGE_COSINE
         ask = np.flatnonzero(~is_bent)
         a, b = low[ask], high[ask]
         px_a, px_b = self.lens_map.px(self.place[a]), self.lens_map.px(self.place[b])

@@ -22,7 +22,7 @@ from topleft._camera.camera import Camera
 from topleft._model.mesh import Mesh
 from topleft._raster.fragments import Fragments, Viewer, as_sample, view_of
 from topleft._raster.peel import DepthLayers
-from topleft._render.bend import BentMesh
+from topleft._render.bend import BentMesh, weighed
 from topleft._scene.scene import Instance, Scene, meshes_of
 
 if TYPE_CHECKING:
@@ -242,9 +242,9 @@ class SceneFragments(InstanceIds, Fragments):
     def distance(self, camera: Viewer) -> NDArray[np.float32]:
         """Return the distance along the view of what each pixel shows, as `Fragments.distance` does."""
         view = view_of(camera)
-        rows = [view[2] @ instance.transform for instance in self.whole]
+        rows = [_engine.product(view[2], instance.transform) for instance in self.whole]
         meshes = meshes_of(self.whole)
-        values = [-(mesh.vertices @ row[:3] + row[3]) for mesh, row in zip(meshes, rows, strict=True)]
+        values = [-(_engine.product(mesh.vertices, row[:3]) + row[3]) for mesh, row in zip(meshes, rows, strict=True)]
         return self.interpolate(values, background=np.inf)
 
     def _checked(self, values: Any) -> list[NDArray[Any]]:
@@ -373,7 +373,7 @@ class BentFragments(Fragments):
     def distance(self, camera: Viewer) -> NDArray[np.float32]:
         """Return the distance along the view of what each pixel shows, as `Fragments.distance` does."""
         view = view_of(camera)
-        return self.interpolate(-(self._mesh.vertices @ view[2, :3] + view[2, 3]), background=np.inf)
+        return self.interpolate(-(_engine.product(self._mesh.vertices, view[2, :3]) + view[2, 3]), background=np.inf)
 
     def _interpolated(self, array: NDArray[np.float32], background: float) -> NDArray[np.float32]:
         """The attribute of checked values, by way of the parts."""
@@ -391,10 +391,10 @@ class BentFragments(Fragments):
         _, slopes = self.drawn.interpolate(self._corners_of_parts(array), derivatives=True)
         return slopes if array.ndim > 1 else slopes[..., 0, :]
 
-    def _corners_of_parts(self, array: NDArray[np.float32]) -> NDArray[np.float32]:
+    def _corners_of_parts(self, array: NDArray[np.float32]) -> NDArray[np.float64]:
         """Checked values at the corners of the parts, (T, 3, K)."""
         if array.ndim == 3:
             corners = array[self.bent.source]
         else:
             corners = array.reshape(len(array), -1)[self._mesh.triangles[self.bent.source]]
-        return np.matmul(self.bent.weights, corners)
+        return weighed(self.bent.weights, corners)

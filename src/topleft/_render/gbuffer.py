@@ -161,10 +161,10 @@ def project(points: F64, camera: Camera, transform: F64, size: tuple[int, int]) 
     projection = camera.clip_from_eye(size)
     if camera.lens is None:
         is_seen = np.ones(len(points), np.bool_)
-        x, y, w = moved(points, (projection @ camera.view @ transform)[[0, 1, 3]]).T
+        x, y, w = moved(points, _engine.product(_engine.product(projection, camera.view), transform)[[0, 1, 3]]).T
     else:
-        eye = moved(points, (camera.view @ transform)[:3])
-        is_seen = np.arctan2(np.hypot(eye[:, 0], eye[:, 1]), -eye[:, 2]) < camera.lens.max_angle
+        eye = moved(points, _engine.product(camera.view, transform)[:3])
+        is_seen = _engine.off_axis(eye * [1, 1, -1])[1] < camera.lens.max_angle
         x, y, w = moved(camera.lens.bend(eye), projection[[0, 1, 3]]).T
     w[~(is_seen & (w > 0))] = np.nan
     width, height = size

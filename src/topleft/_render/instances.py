@@ -133,7 +133,7 @@ class PlacedScene:
     def _make_view(self, i: int) -> View:
         instance, view = self.scene[i], self._view
         cull = MIRRORED[view.cull] if instance.is_mirrored else view.cull
-        own = replace(view, transform=self._clip_from_world @ instance.transform, cull=cull)
+        own = replace(view, transform=_engine.product(self._clip_from_world, instance.transform), cull=cull)
         is_single = self.whole[i].mesh.single_sided(self._material)
         if is_single is None:
             return own
@@ -207,11 +207,10 @@ def pays_in_clusters(placed: PlacedScene, clip_from_world: NDArray[np.float64], 
 def front_to_back(scene: Scene, clip_from_world: NDArray[np.float64]) -> NDArray[np.intp]:
     """Return the instances by the distance of the middle of their boxes: by w, or by z where all w are equal."""
     boxes = {id(instance.mesh): instance.mesh.vertex_box.reshape(2, 3).mean(axis=0) for instance in scene}
-    middles = np.array([
-        instance.transform[:3, :3] @ boxes[id(instance.mesh)] + instance.transform[:3, 3] for instance in scene
-    ])  # fmt: skip
+    places = [(instance.transform[:3, :3], instance.transform[:3, 3], boxes[id(instance.mesh)]) for instance in scene]
+    middles = np.array([_engine.product(linear, middle) + offset for linear, offset, middle in places])
     row = clip_from_world[3] if clip_from_world[3, :3].any() else clip_from_world[2]
-    return np.argsort(middles @ row[:3], kind="stable")
+    return np.argsort(_engine.product(middles, row[:3]), kind="stable")
 
 
 def survey_instances(placed: PlacedScene) -> Survey:
@@ -227,8 +226,8 @@ def count_layers(scene: Scene, clip_from_world: NDArray[np.float64]) -> float:
     boxes = {id(instance.mesh): instance.mesh.vertex_box for instance in scene}
     lows, highs = np.array([boxes[id(instance.mesh)].reshape(2, 3) for instance in scene]).swapaxes(0, 1)
     corners = np.where(CORNERS, highs[:, None], lows[:, None])
-    matrices = np.array([clip_from_world @ instance.transform for instance in scene])
-    clip = np.einsum("nij,nkj->nki", matrices[..., :3], corners) + matrices[:, None, :, 3]
+    matrices = np.array([_engine.product(clip_from_world, instance.transform) for instance in scene])
+    clip = (matrices[:, None, :, :3] * corners[:, :, None]).sum(axis=3) + matrices[:, None, :, 3]
     clip = clip[(clip[..., 3] > 0).all(axis=1)]  # a box about the eye has no outline
     cells = np.rint((clip[..., :2] / clip[..., 3:] + 1) * (0.5 * CELLS)).clip(0, CELLS).astype(np.intp)
     (left, top), (right, bottom) = cells.min(axis=1).T, cells.max(axis=1).T

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from topleft import _engine
 from topleft._base.arrays import as_names
 from topleft._points.cloud import CLOUD_LAYERS, CloudBuffer
 from topleft._render.blended import blended_masks
@@ -79,16 +80,19 @@ def depth(gbuffer: GBuffer) -> Array:
 
 def distance(gbuffer: GBuffer) -> Array:
     """Distance along the view (H, W) float32, world units, +inf where nothing is."""
-    rows = -gbuffer.camera.view[2:3]
-    return gbuffer.join((), np.inf, lambda one: gbuffer.evaluate(one, PointKind.ROWS, rows @ one.place, np.inf))
+    return of_eye_space(gbuffer, PointKind.ROWS, -gbuffer.camera.view[2:3])
 
 
 def ray_distance(gbuffer: GBuffer) -> Array:
     """Distance from the eye (H, W) float32, world units, +inf where nothing is; along the view without perspective."""
     if not gbuffer.camera.projection[3, :3].any():
         return distance(gbuffer)
-    rows = gbuffer.camera.view[:3]
-    return gbuffer.join((), np.inf, lambda one: gbuffer.evaluate(one, PointKind.LENGTH, rows @ one.place, np.inf))
+    return of_eye_space(gbuffer, PointKind.LENGTH, gbuffer.camera.view[:3])
+
+
+def of_eye_space(gbuffer: GBuffer, kind: PointKind, rows: F64) -> Array:
+    """What rows of eye from world tell of the points that show, +inf where nothing is."""
+    return gbuffer.join((), np.inf, lambda one: gbuffer.evaluate(one, kind, _engine.product(rows, one.place), np.inf))
 
 
 def triangle(gbuffer: GBuffer) -> Array:
@@ -150,7 +154,7 @@ def flow(gbuffer: GBuffer) -> Array:
         here = part.place
         there = here if gbuffer.transforms_to is None else gbuffer.transforms_to[part.i]
         if begin.lens is None and end.lens is None:
-            ways = [camera.clip_from_eye(size) @ camera.view @ at for camera, at in ((begin, here), (end, there))]
+            ways = [_engine.product(camera.clip_from_world(size), at) for camera, at in ((begin, here), (end, there))]
             rows = np.concatenate([way[[0, 1, 3]] for way in ways])
             return gbuffer.evaluate(part, PointKind.FLOW, rows, np.nan, size=size)
         picture = np.full((*part.seen.shape, 2), np.nan, np.float32)

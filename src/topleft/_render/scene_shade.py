@@ -12,13 +12,14 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
+from topleft import _engine
 from topleft._base.color import DEFAULT_COLOR, WHITE, ColorLike
 from topleft._camera.camera import Camera, CameraLike, as_camera
 from topleft._model.environment import Environment
 from topleft._model.light import Fog, Light, LightKind, LightSpace
 from topleft._model.material import Material
 from topleft._model.mesh import Mesh
-from topleft._model.normals import is_similarity
+from topleft._model.normals import determinant, is_similarity
 from topleft._model.points import Points
 from topleft._model.texture import Texture
 from topleft._points.cloud import shade_cloud
@@ -45,14 +46,14 @@ def in_space_of(instance: Instance | None, options: ShadingOptions, camera: Came
         options = replace(options, world_from_mesh=instance.transform[:3, :3])
     if not options.lights:
         return options
-    object_from_world = np.linalg.inv(instance.transform)
+    object_from_world = _engine.inverse(instance.transform)
     # `ShadingInputs` measures distances in object space where the way to the eye keeps angles, else in eye space.
     in_object_space = is_similarity(camera.view)
-    scale = np.cbrt(abs(np.linalg.det(instance.transform[:3, :3]))) if in_object_space else 1.0
+    scale = _engine.cube_root(abs(determinant(instance.transform[:3, :3].tolist()))) if in_object_space else 1.0
     moved = []
     for light in options.lights:
         at = np.array([*light.at, light.kind == LightKind.POINT])
-        at = at if light.space == LightSpace.EYE else object_from_world @ at
+        at = at if light.space == LightSpace.EYE else _engine.product(object_from_world, at)
         moved.append(replace(light, at=tuple(at[:3]), falloff=float(light.falloff * scale**2)))
     return replace(options, lights=moved)
 

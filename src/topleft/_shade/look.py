@@ -6,7 +6,6 @@ Input: a mesh, its materials, lights, a camera and the size of the whole picture
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -78,27 +77,27 @@ class CameraRays:
 def rays_of(camera: Camera, size: tuple[int, int], center: F64, *, in_eye_space: bool) -> CameraRays:
     """How the camera sees shading space: the world, or its own eye space, moved so that `center` is the origin."""
     view = np.eye(4) if in_eye_space else camera.view
-    clip = camera.clip_from_eye(size) @ view
+    clip = _engine.product(camera.clip_from_eye(size), view)
     width, height = size
     has_perspective = bool(clip[3, :3].any())
     rows = clip[[0, 1, 3 if has_perspective else 2]]
-    world_from_rows = np.linalg.inv(rows[:, :3])
-    offset = world_from_rows @ rows[:, 3]
+    world_from_rows = _engine.inverse(rows[:, :3])
+    offset = _engine.product(world_from_rows, rows[:, 3])
     # the corner, one column, one row and the whole depth, of clip space
     ends = [[-1, 1, 1 if has_perspective else -1], [2 / width, 0, 0], [0, -2 / height, 0], [0, 0, 2]]
-    ray = np.array(ends) @ world_from_rows.T
+    ray = _engine.product(np.array(ends), world_from_rows.T)
     if has_perspective:
         eye = -offset - center
         start, scale = 0.0, 1.0 / -float(camera.projection[3, 2])
     else:
         ray[0] -= offset + center
-        eye = -ray[3] / np.linalg.norm(ray[3])
+        eye = -ray[3] / _engine.length(ray[3])
         (a, b), (c, d) = camera.projection[2:, 2:]
         near, far = ((ndc * d - b) / (ndc * c - a) for ndc in (-1.0, 1.0))
         start, scale = near, far - near
-    size_of_unit = math.cbrt(determinant(view[:3, :3].tolist()))
+    size_of_unit = _engine.cube_root(determinant(view[:3, :3].tolist()))
     linear = view[:3, :3]
-    origin = linear @ center + view[:3, 3]
+    origin = _engine.product(linear, center) + view[:3, 3]
     return CameraRays(has_perspective, eye, ray, linear / size_of_unit, origin, size_of_unit, start, scale)
 
 
@@ -201,7 +200,7 @@ class ShadingInputs:
         viewport = size if scene.viewport is None else scene.viewport.size
         self.rays = rays_of(camera, viewport, self.mesh.center, in_eye_space=in_eye_space)
         self.view = camera.view
-        self.back_side = -1.0 if np.linalg.det(camera.view[:3, :3]) > 0 else 1.0
+        self.back_side = -1.0 if determinant(camera.view[:3, :3].tolist()) > 0 else 1.0
         self.is_in_eye_space = in_eye_space
         normals, finds_inverse_w = self.mesh.normals, False
         if scene.viewport is not None and self.rays.has_perspective:
@@ -256,7 +255,7 @@ class ShadingInputs:
     def set_lights(self, lights: Sequence[Light] | None, ambient: float) -> None:
         """Take the lights, in shading space."""
         if lights is None:
-            at = self.rays.eye_from.T @ TO_HEADLIGHT
+            at = _engine.product(self.rays.eye_from.T, TO_HEADLIGHT)
             rows: list[tuple[Any, ...]] = [(WRAPPED_LIGHT, at, (max(0.0, 1 - ambient),) * 3, 0.0)]
         else:
             rows = [self._light(light) for light in lights]
@@ -270,9 +269,9 @@ class ShadingInputs:
         own = DEFAULT_ENVIRONMENT if environment is None else environment
         rows = self.rays.eye_from
         if own.space is LightSpace.WORLD:
-            rows = np.linalg.inv(self.view[:3, :3]) @ rows
-            rows = rows if world_from_mesh is None else world_from_mesh @ rows
-        rows = own.axes @ (rows / math.cbrt(abs(determinant(rows.tolist()))))
+            rows = _engine.product(_engine.inverse(self.view[:3, :3]), rows)
+            rows = rows if world_from_mesh is None else _engine.product(world_from_mesh, rows)
+        rows = _engine.product(own.axes, rows / _engine.cube_root(abs(determinant(rows.tolist()))))
         texels, table = own.levels or (None, None)
         diffuse = 0.0 if environment is None else 1.0
         self.shading.set_surroundings(_engine.Surroundings(texels, table, *own.colors, diffuse, rows.tolist()))
@@ -282,13 +281,14 @@ class ShadingInputs:
         in_eye_space = light.space is LightSpace.EYE
         if light.kind is LightKind.DIRECTIONAL:
             if in_eye_space or self.is_in_eye_space:
-                at = at if in_eye_space else self.view[:3, :3] @ at
-                at = rays.eye_from.T @ at
-            at = at / np.linalg.norm(at)
+                at = at if in_eye_space else _engine.product(self.view[:3, :3], at)
+                at = _engine.product(rays.eye_from.T, at)
+            at = at / _engine.length(at)
         elif in_eye_space:
-            at = rays.eye_from.T @ (at - rays.origin) / rays.scale
+            at = _engine.product(rays.eye_from.T, at - rays.origin) / rays.scale
         else:
-            at = (self.view[:3, :3] @ at + self.view[:3, 3] if self.is_in_eye_space else at) - self.mesh.center
+            in_space = _engine.product(self.view[:3, :3], at) + self.view[:3, 3] if self.is_in_eye_space else at
+            at = in_space - self.mesh.center
         rgb = light_of(light.color)[:3]
         return LIGHT_CODES[LightKind(light.kind)], at, tuple(light.intensity * c for c in rgb), light.falloff
 
@@ -302,7 +302,7 @@ class ShadingInputs:
     def set_turn(self, show: int, turn: F64) -> None:
         """Take what is told, in a space that the matrix (3, 3) takes eye space to."""
         rays = self.rays
-        rows = (turn @ rays.eye_from).tolist()
+        rows = _engine.product(turn, rays.eye_from).tolist()
         eyes = rows, rays.has_perspective, rays.eye.tolist(), rays.ray.tolist()
         self.shading.set_view(show, None, *eyes, (0, 0, 0, 0), (0, 0, 0, 0))
 

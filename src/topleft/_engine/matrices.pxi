@@ -1,0 +1,192 @@
+# Small matrices, sines and roots, the same on every machine: sums in one order, no fused multiply-add, no library whose
+# last bit depends on the processor.
+
+from libc.math cimport fabs, floor, fmod, frexp, ldexp, rint
+
+cdef double PI = 3.141592653589793
+cdef double RADIANS_A_DEGREE = PI / 180.0
+cdef double[13] ODD_PARTS = [1.0 / k for k in range(1, 26, 2)]
+
+
+cdef object as_numbers(values, int n_dims):
+    array = np.asarray(values, np.float64)
+    if array.ndim != n_dims:
+        raise ValueError(f"an array must have {n_dims} dimensions here, got shape {array.shape}")
+    return array
+
+
+def product(a, b):
+    """Return the matrix product of float64 arrays (n, k) and (k, m); either may be a vector (k,)."""
+    cdef Py_ssize_t i, j, k
+    cdef double total
+    is_row, is_column = np.ndim(a) == 1, np.ndim(b) == 1
+    cdef const double[:, :] left = as_numbers(a[None] if is_row else a, 2)
+    cdef const double[:, :] right = as_numbers(b[:, None] if is_column else b, 2)
+    if left.shape[1] != right.shape[0]:
+        raise ValueError(f"matrices must fit, got shapes {np.shape(a)} and {np.shape(b)}")
+    result = np.empty((left.shape[0], right.shape[1]))
+    cdef double[:, ::1] out = result
+    with nogil:
+        for i in range(left.shape[0]):
+            for j in range(right.shape[1]):
+                total = 0.0
+                for k in range(left.shape[1]):
+                    total = total + left[i, k] * right[k, j]
+                out[i, j] = total
+    if is_row and is_column:
+        return float(result[0, 0])
+    return result[0] if is_row else result[:, 0] if is_column else result
+
+
+def inverse(a):
+    """Return the inverse of a float64 matrix (n, n), n at most 4; a LinAlgError if it is singular."""
+    cdef const double[:, :] given = as_numbers(a, 2)
+    cdef Py_ssize_t n = given.shape[0], i, j, k, best
+    cdef double[4][8] rows
+    cdef double factor, pivot
+    if given.shape[1] != n or n > 4:
+        raise ValueError(f"a matrix must be square, of 4 rows at most, got shape {np.shape(a)}")
+    for i in range(n):
+        for j in range(n):
+            rows[i][j] = given[i, j]
+            rows[i][n + j] = 1.0 if i == j else 0.0
+    for k in range(n):  # the largest number of each column becomes the pivot
+        best = k
+        for i in range(k + 1, n):
+            if fabs(rows[i][k]) > fabs(rows[best][k]):
+                best = i
+        if rows[best][k] == 0.0:
+            raise np.linalg.LinAlgError("Singular matrix")
+        if best != k:
+            for j in range(2 * n):
+                rows[k][j], rows[best][j] = rows[best][j], rows[k][j]
+        pivot = rows[k][k]
+        for i in range(n):
+            if i != k:
+                factor = rows[i][k] / pivot
+                for j in range(k, 2 * n):
+                    rows[i][j] = rows[i][j] - factor * rows[k][j]
+    result = np.empty((n, n))
+    cdef double[:, ::1] out = result
+    for i in range(n):
+        for j in range(n):
+            out[i, j] = rows[i][n + j] / rows[i][i]
+    return result
+
+
+def row_products(a, b):
+    """Return the products (N,) of rows of float64 arrays (N, 3), each row of one with the same row of the other."""
+    cdef const double[:, :] left = as_numbers(a, 2)
+    cdef const double[:, :] right = as_numbers(b, 2)
+    cdef Py_ssize_t i, n = left.shape[0]
+    if np.shape(a) != np.shape(b) or left.shape[1] != 3:
+        raise ValueError(f"arrays must have one shape (N, 3), got {np.shape(a)} and {np.shape(b)}")
+    result = np.empty(n)
+    cdef double[::1] out = result
+    with nogil:
+        for i in range(n):
+            out[i] = (left[i, 0] * right[i, 0] + left[i, 1] * right[i, 1]) + left[i, 2] * right[i, 2]
+    return result
+
+
+def length(vector):
+    """Return the root of the sum of the squares of a vector of float64."""
+    cdef const double[:] given = as_numbers(vector, 1)
+    cdef double total = 0.0
+    cdef Py_ssize_t i
+    for i in range(given.shape[0]):
+        total = total + given[i] * given[i]
+    return sqrt(total)
+
+
+def cosine_and_sine(double degrees):
+    """Return the cosine and the sine of an angle in degrees; of whole quarters 0, 1 and -1 as they are."""
+    cdef double turns = fmod(degrees, 360.0)
+    cdef int quarter = <int>rint(turns / 90.0)
+    cdef double x = (turns - 90.0 * quarter) * RADIANS_A_DEGREE, square = x * x
+    # Taylor's series within an eighth of a turn: the next terms are below half a last bit.
+    cdef double sine = 1.0 / 355687428096000.0
+    sine = sine * square - 1.0 / 1307674368000.0
+    sine = sine * square + 1.0 / 6227020800.0
+    sine = sine * square - 1.0 / 39916800.0
+    sine = sine * square + 1.0 / 362880.0
+    sine = sine * square - 1.0 / 5040.0
+    sine = sine * square + 1.0 / 120.0
+    sine = sine * square - 1.0 / 6.0
+    sine = x + x * (square * sine)
+    cdef double cosine = 1.0 / 20922789888000.0
+    cosine = cosine * square - 1.0 / 87178291200.0
+    cosine = cosine * square + 1.0 / 479001600.0
+    cosine = cosine * square - 1.0 / 3628800.0
+    cosine = cosine * square + 1.0 / 40320.0
+    cosine = cosine * square - 1.0 / 720.0
+    cosine = cosine * square + 1.0 / 24.0
+    cosine = 1.0 - (0.5 * square - square * (square * cosine))
+    if quarter & 1:
+        cosine, sine = -sine, cosine
+    if quarter & 2:
+        cosine, sine = -cosine, -sine
+    return cosine + 0.0, sine + 0.0  # no -0
+
+
+def cube_root(double a):
+    """Return the cube root of a finite float64, within two of its last bits."""
+    cdef int exponent, thirds, k
+    cdef double m = frexp(fabs(a), &exponent), root = 1.0
+    if a == 0.0:
+        return a
+    thirds = <int>floor(exponent / 3.0)
+    m = ldexp(m, exponent - 3 * thirds)  # from 1/2 to 4
+    for k in range(7):  # Newton's method
+        root = (2.0 * root + m / (root * root)) / 3.0
+    root = ldexp(root, thirds)
+    return -root if a < 0.0 else root
+
+
+cdef double arc_tangent(double t) noexcept nogil:
+    """Of 0 to 1, in radians."""
+    cdef double square, total = 0.0
+    cdef int k
+    for k in range(2):  # of a quarter of the angle, 0.2 at most
+        t = t / (1.0 + sqrt(1.0 + t * t))
+    square = t * t
+    for k in range(12, -1, -1):  # Gregory's series
+        total = ODD_PARTS[k] - square * total
+    return 4.0 * t * total
+
+
+def arc_sine(double sine):
+    """Return the angle in degrees, -90 to 90, of a sine of -1 to 1, within four of its last bits."""
+    cdef double half = arc_tangent(fabs(sine) / (1.0 + sqrt((1.0 - sine) * (1.0 + sine))))
+    cdef double angle = min(90.0, 2.0 * half / RADIANS_A_DEGREE)
+    return -angle if sine < 0.0 else angle
+
+
+@cython.cdivision(True)  # 0 over 0 is no number, and is not read
+def off_axis(points):
+    """Return the distances (N,) of points (N, 3) from the z axis, and their angles from where it points, in radians."""
+    cdef const double[:, :] given = as_numbers(points, 2)
+    cdef Py_ssize_t i, n = given.shape[0]
+    cdef double x, y, z, most, far
+    distances, angles = np.empty(n), np.empty(n)
+    cdef double[::1] off = distances
+    cdef double[::1] angle = angles
+    with nogil:
+        for i in range(n):
+            x, y, z = given[i, 0], given[i, 1], given[i, 2]
+            most = max(fabs(x), fabs(y))
+            if most > 0.0 or most != most:
+                x, y = x / most, y / most
+                off[i] = most * sqrt(x * x + y * y)
+            else:
+                off[i] = 0.0
+            most = max(off[i], fabs(z))
+            x, z = off[i] / most, z / most
+            far = sqrt(x * x + z * z)
+            if most == 0.0:
+                angle[i] = 0.0
+            elif z >= 0.0:
+                angle[i] = 2.0 * arc_tangent(x / (far + z))
+            else:
+                angle[i] = PI - 2.0 * arc_tangent(x / (far - z))
+    return distances, angles

@@ -1,0 +1,46 @@
+"""Cameras and pictures do not depend on what the libraries below NumPy do on this processor."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PROGRAM = Path(__file__).with_name("same_everywhere.py")
+
+#: OpenBLAS has other kernels for each processor, glibc and NumPy other sines with and without fused multiply-add.
+PROCESSORS = {
+    "old": {
+        "OPENBLAS_CORETYPE": "Prescott",
+        "GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2,-FMA,-FMA4,-AVX512F",
+        "NPY_DISABLE_CPU_FEATURES": " ".join(np.show_config(mode="dicts")["SIMD Extensions"].get("found", [])),
+    },
+    "sandybridge": {"OPENBLAS_CORETYPE": "Sandybridge"},
+    "haswell": {"OPENBLAS_CORETYPE": "Haswell"},
+}
+
+
+def hash_on(processor):
+    done = subprocess.run(
+        [sys.executable, "-W", "ignore", PROGRAM],
+        env=os.environ | processor,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return done.stdout.strip()
+
+
+@pytest.fixture(scope="module")
+def own_hash():
+    return hash_on({})
+
+
+@pytest.mark.parametrize("name", PROCESSORS)
+def test_cameras_are_the_same_on_another_processor(own_hash, name):
+    assert re.fullmatch(r"[0-9a-f]{64}", own_hash)
+    assert hash_on(PROCESSORS[name]) == own_hash

@@ -1,0 +1,92 @@
+"""Small matrices, sines and roots against exact numbers, or NumPy's within a few last bits."""
+
+import math
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from topleft import _engine
+
+RNG = np.random.default_rng(4)
+
+
+@pytest.mark.parametrize("shapes", [((4, 4), (4, 4)), ((7, 3), (3, 3)), ((3,), (3, 2)), ((2, 3), (3,)), ((4,), (4,))])
+def test_product_of_whole_numbers_is_exact(shapes):
+    a, b = (RNG.integers(-999, 999, shape) for shape in shapes)
+    assert np.array_equal(_engine.product(a, b), a @ b)
+
+
+def test_product_takes_any_stride_and_sums_in_order():
+    a, b = RNG.normal(size=(6, 8))[::2, ::-2], RNG.normal(size=(4, 9)).T[::3].T
+    expected = np.zeros((3, 3))
+    for k in range(4):
+        expected = expected + a[:, k, None] * b[k]
+    assert np.array_equal(_engine.product(a, b), expected)
+
+
+def test_row_products_sum_in_order():
+    a, b = RNG.normal(size=(2, 50, 3))
+    assert np.array_equal(_engine.row_products(a, b), a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2])
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 4])
+def test_inverse_is_as_near_as_its_condition_lets_it(n):
+    for _ in range(200):
+        matrix = RNG.normal(size=(n, n)) * 10.0 ** RNG.integers(-6, 6, (n, 1))
+        exact = [[sum(map(Fraction.__mul__, map(Fraction, row), map(Fraction, column))) for column in rows.T.tolist()]
+                 for rows in [_engine.inverse(matrix)] for row in matrix.tolist()]  # fmt: skip
+        error = max(abs(value - (i == j)) for i, row in enumerate(exact) for j, value in enumerate(row))
+        assert error <= 1e-14 * np.linalg.cond(matrix)
+
+
+def test_inverse_changes_rows_where_the_first_pivot_is_0():
+    assert _engine.inverse(np.array([[0.0, 2.0], [4.0, 0.0]])).tolist() == [[0.0, 0.25], [0.5, 0.0]]
+
+
+def test_wrong_matrices_are_refused():
+    with pytest.raises(np.linalg.LinAlgError):
+        _engine.inverse(np.array([[1.0, 2.0], [2.0, 4.0]]))
+    with pytest.raises(ValueError, match="square, of 4 rows at most"):
+        _engine.inverse(np.eye(5))
+    with pytest.raises(ValueError, match=r"matrices must fit, got shapes \(2, 3\) and \(2, 3\)"):
+        _engine.product(np.ones((2, 3)), np.ones((2, 3)))
+    with pytest.raises(ValueError, match="must have 2 dimensions"):
+        _engine.product(np.ones((2, 3, 3)), np.eye(3))
+    with pytest.raises(ValueError, match="one shape"):
+        _engine.row_products(np.ones((2, 3)), np.ones((3, 3)))
+
+
+def test_quarter_turns_are_exact():
+    found = [_engine.cosine_and_sine(90.0 * k) for k in range(-5, 6)]
+    assert found == [((1, 0), (0, 1), (-1, 0), (0, -1))[k % 4] for k in range(-5, 6)]
+    assert not any(math.copysign(1, number) < 0 and number == 0 for pair in found for number in pair)
+
+
+def test_angles_are_those_of_numpy():
+    degrees = RNG.uniform(-800, 800, 5000)
+    cosine, sine = np.array([_engine.cosine_and_sine(angle) for angle in degrees.tolist()]).T
+    radians = np.radians(np.fmod(degrees, 360))
+    assert np.abs(cosine - np.cos(radians)).max() < 2e-15
+    assert np.abs(sine - np.sin(radians)).max() < 2e-15
+    heights = np.append(RNG.uniform(-1, 1, 2000), [-1, 0, 1])
+    found = [_engine.arc_sine(height) for height in heights.tolist()]
+    assert np.abs(found - np.degrees(np.arcsin(heights))).max() < 1e-13
+    assert max(map(abs, found)) == 90
+
+
+def test_off_axis_is_that_of_numpy():
+    points = RNG.normal(size=(5000, 3)) * 10.0 ** RNG.uniform(-8, 8, (5000, 3))
+    points = np.concatenate([points, [[0, 0, 1], [0, 0, -1], [1e200, 1e200, 1], [1e-200, 0, -1e-200]]])
+    distance, angle = _engine.off_axis(points)
+    expected = np.hypot(points[:, 0], points[:, 1])
+    assert np.allclose(distance, expected, rtol=1e-15, atol=0)
+    assert np.abs(angle - np.arctan2(expected, points[:, 2])).max() < 2e-15
+    assert np.isnan(_engine.off_axis([[np.nan, 0, 1]])).all()
+
+
+def test_cube_root_and_length():
+    for value in (0.0, 1.0, 27.0, -8.0, 2.0**-900, 1e300, 3e-310):
+        root = Fraction(_engine.cube_root(value))
+        assert abs(root**3 - Fraction(value)) <= abs(Fraction(value)) * Fraction(1, 10**15)
+    assert _engine.length([3, 4, 12]) == 13
