@@ -1,4 +1,4 @@
-"""Prints a hash of what cameras, scenes and lenses compute in float64, for `test_same_everywhere.py`."""
+"""Prints a hash of what cameras, scenes, lenses and environments compute, for `test_same_everywhere.py`."""
 
 import hashlib
 from dataclasses import replace
@@ -10,6 +10,8 @@ import topleft as tl
 RNG = np.random.default_rng(8)
 VERTICES, TRIANGLES = RNG.integers(-50, 50, (30, 3)) / 16, RNG.integers(0, 30, (40, 3))
 MESH, SIZE = tl.Mesh(VERTICES, TRIANGLES), (40, 30)
+SKY = tl.Environment(image=np.kron(RNG.integers(0, 256, (8, 16, 3)), np.ones((4, 4, 1))).astype(np.uint8), turn=20)
+METAL = tl.Material(metallic=1.0, roughness=0.3)
 LENSES = (tl.FisheyeLens(0.1, -0.02), tl.OpenCVLens(-0.2, 0.05, tau_x=0.1, tau_y=-0.05))
 FITS = ("sphere", "box", "points", "silhouette")
 
@@ -55,6 +57,8 @@ def main():
         with np.errstate(all="ignore"):
             for numbers in numbers_of(camera, made[k - 1], k):
                 digest.update(np.ascontiguousarray(numbers).tobytes())
+    digest.update(SKY.levels[0].tobytes())
+    digest.update(tl.render(MESH, made[0], SIZE, environment=SKY, material=METAL).tobytes())
     print(digest.hexdigest())
 
 

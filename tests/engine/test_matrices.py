@@ -85,6 +85,12 @@ def test_off_axis_is_that_of_numpy():
     assert np.isnan(_engine.off_axis([[np.nan, 0, 1]])).all()
 
 
+def test_log2_is_that_of_math():
+    for value in (*2.0 ** RNG.uniform(-900, 900, 500), *RNG.uniform(0.7, 1.5, 500)):
+        assert abs(_engine.log2(value) - math.log2(value)) <= 4e-16 * max(1, abs(math.log2(value)))
+    assert [_engine.log2(2.0**k) for k in (-1000, -1, 0, 1, 10)] == [-1000, -1, 0, 1, 10]
+
+
 def test_cube_root_and_length():
     for value in (0.0, 1.0, 27.0, -8.0, 2.0**-900, 1e300, 3e-310):
         root = Fraction(_engine.cube_root(value))

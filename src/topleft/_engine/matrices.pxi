@@ -129,6 +129,18 @@ def cosine_and_sine(double degrees):
     return cosine + 0.0, sine + 0.0  # no -0
 
 
+def log2(double a):
+    """Return the binary logarithm of a positive float64, within two of its last bits, or of those of 1."""
+    cdef int exponent, k
+    cdef double m = frexp(a, &exponent), total = 0.0, t
+    if m < 0.7071067811865476:
+        m, exponent = 2.0 * m, exponent - 1
+    t = (m - 1.0) / (m + 1.0)
+    for k in range(12, -1, -1):  # ln m = 2 artanh t
+        total = ODD_PARTS[k] + t * t * total
+    return exponent + 2.8853900817779268 * t * total
+
+
 def cube_root(double a):
     """Return the cube root of a finite float64, within two of its last bits."""
     cdef int exponent, thirds, k

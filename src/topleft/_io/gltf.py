@@ -434,7 +434,8 @@ class _Reader:
             inverse = self._accessors.array(row["inverseBindMatrices"])
             if inverse.shape[1] != 16 or len(inverse) < len(joints):
                 raise MeshError(f"skins[{skin}] has {len(inverse)} inverse bind matrices for {len(joints)} joints")
-            matrices = matrices @ inverse[: len(joints)].astype(np.float64).reshape(-1, 4, 4).transpose(0, 2, 1)
+            bind = inverse[: len(joints)].reshape(-1, 4, 4).transpose(0, 2, 1)
+            matrices = np.array([_engine.product(*pair) for pair in zip(matrices, bind, strict=True)]).reshape(-1, 4, 4)
         n = len(values["POSITION"])
         blended = np.zeros((n, 3, 4))
         total = np.zeros((n, 1, 1))
@@ -454,11 +455,11 @@ class _Reader:
                 blended += weight * matrices[at[:, column], :3]
                 total += weight
         blended /= np.where(total == 0, 1, total)
-        moved = {"POSITION": np.einsum("nij,nj->ni", blended[:, :, :3], values["POSITION"]) + blended[:, :, 3]}
+        moved = {"POSITION": (blended[:, :, :3] * values["POSITION"][:, None]).sum(axis=2) + blended[:, :, 3]}
         if "NORMAL" in values:
             a, b, c = blended[:, 0, :3], blended[:, 1, :3], blended[:, 2, :3]
             cofactors = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
-            moved["NORMAL"] = np.einsum("nij,nj->ni", cofactors, values["NORMAL"])
+            moved["NORMAL"] = (cofactors * values["NORMAL"][:, None]).sum(axis=2)
         return moved
 
 

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from topleft import _engine
 from topleft._base.color import LIGHT_OF_SRGB, Color, encode_srgb
 from topleft._io.gltf_accessors import Accessors, Tree, entry, uri_content, whole
 from topleft._io.references import InputFile
@@ -227,7 +228,7 @@ def metallic_of_specular(diffuse: F64, specular: F64) -> tuple[F64, F64]:
     Based on: KhronosGroup/glTF, extensions/2.0/Archived/KHR_materials_pbrSpecularGlossiness/examples.
     """
     brightness = np.array([0.299, 0.587, 0.114])
-    d, s = (np.sqrt((colors**2) @ brightness) for colors in (diffuse, specular))
+    d, s = (np.sqrt((colors**2 * brightness).sum(axis=-1)) for colors in (diffuse, specular))
     left = 1 - specular.max(axis=-1)
     b = d * left / (1 - DIELECTRIC) + s - 2 * DIELECTRIC
     root = np.sqrt(np.maximum(b**2 - 4 * DIELECTRIC * (DIELECTRIC - s), 0))
@@ -271,9 +272,9 @@ def transform_of(row: Tree) -> npt.NDArray[np.float64]:
     """
     angle = _number(row, "rotation", 0)
     (du, dv), (su, sv) = _numbers(row, "offset", (0, 0)), _numbers(row, "scale", (1, 1))
-    cos, sin = math.cos(angle), math.sin(angle)
+    cos, sin = _engine.cosine_and_sine(math.degrees(angle))
     downwards = np.array([[su * cos, sv * sin, du], [-su * sin, sv * cos, dv], [0, 0, 1]])
-    return UP @ downwards @ np.vstack([UP, [0, 0, 1]])
+    return _engine.product(_engine.product(UP, downwards), np.vstack([UP, [0, 0, 1]]))
 
 
 def srgb_of_light(light: Any) -> Color:

@@ -299,7 +299,7 @@ def _scalar_of(picture: U8, channel: str, default: str) -> U8:
         case "m" | "a":
             return picture[..., 3]
         case _:
-            return np.rint(picture[..., :3] @ [0.2126, 0.7152, 0.0722]).astype(np.uint8)
+            return np.rint((picture[..., :3] * [0.2126, 0.7152, 0.0722]).sum(axis=-1)).astype(np.uint8)
 
 
 def _same_size(color: U8, alpha: U8) -> tuple[U8, U8]:
@@ -321,7 +321,7 @@ def normals_of_heights(heights: U8, scale: float) -> U8:
     slope_u = np.roll(values, -1, axis=1) - np.roll(values, 1, axis=1)
     slope_v = np.roll(values, 1, axis=0) - np.roll(values, -1, axis=0)
     normals = np.dstack([-slope_u, -slope_v, np.ones_like(values)])
-    normals /= np.linalg.norm(normals, axis=2, keepdims=True)
+    normals /= np.sqrt((normals * normals).sum(axis=2, keepdims=True))
     return np.rint(127.5 * (normals + 1)).astype(np.uint8)
 
 

@@ -14,6 +14,7 @@ GPU Gems 3, 2007 (halvings by the density of the directions).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from functools import cached_property
@@ -194,8 +195,8 @@ def octahedral_directions(n: int) -> tuple[F32, F32]:
     y = 1 - np.abs(x) - np.abs(z)
     below = np.maximum(-y, 0)
     at = np.stack([x - np.copysign(below, x), y, z - np.copysign(below, z)], axis=2)
-    length = np.linalg.norm(at, axis=2, keepdims=True)
-    angle = length[..., 0] ** -3.0
+    length = np.sqrt((at * at).sum(axis=2, keepdims=True))
+    angle = 1 / (length * length * length)[..., 0]
     return (at / length).astype(np.float32), (angle * (4 * np.pi / angle.sum())).astype(np.float32)
 
 
@@ -221,8 +222,10 @@ def mirrored_levels(image: F32) -> list[F32]:
 def look_up_sphere(image: F32, at: F32) -> F32:
     """The light (P, 3) of an equirectangular picture in unit directions, between its four nearest pixels."""
     height, width = image.shape[:2]
-    x = (np.arctan2(at[:, 2], at[:, 0]) / (2 * np.pi) + 0.5) * width - 0.5
-    y = np.arccos(np.clip(at[:, 1], -1, 1)) / np.pi * height - 0.5
+    _, away = _engine.off_axis(np.stack([at[:, 2], np.zeros(len(at)), at[:, 0]], axis=1))
+    _, below = _engine.off_axis(at[:, [0, 2, 1]])
+    x = (np.copysign(away, at[:, 2]) / (2 * np.pi) + 0.5) * width - 0.5
+    y = below / np.pi * height - 0.5
     column, row = np.floor(x).astype(int), np.floor(y).astype(int)
     share_x, share_y = (x - column)[:, None].astype(np.float32), (y - row)[:, None].astype(np.float32)
     columns = [(column + k) % width for k in (0, 1)]
@@ -267,27 +270,29 @@ def blurred(halvings: list[F32], size: int, roughness: float) -> F32:
     if roughness > LEAST_SUMMED:
 
         def facets(cosine: F32) -> F32:
-            return cosine * (np.float32(0.5 * (alpha2 - 1)) * (1 + cosine) + 1) ** np.float32(-2)
+            spread = np.float32(0.5 * (alpha2 - 1)) * (1 + cosine) + 1
+            return cosine / (spread * spread)
 
         return gathered(halvings, size, facets)
     normal = octahedral_directions(size)[0].reshape(-1, 3)
     helper = np.where(np.abs(normal[:, 1:2]) < 0.9, [[0, 1, 0]], [[1, 0, 0]]).astype(np.float32)
     tangent = np.cross(helper, normal)
-    tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
+    tangent /= np.sqrt((tangent * tangent).sum(axis=1, keepdims=True))
     bitangent = np.cross(normal, tangent)
     whole = [bordered(level) for level in halvings]
     light, weights = np.zeros((len(normal), 3), np.float32), 0.0
     for k in range(N_DIRECTIONS):  # Hammersley's points on the distribution of the facets
-        share, around = (k + 0.5) / N_DIRECTIONS, 2 * np.pi * int(f"{k:06b}"[::-1], 2) / N_DIRECTIONS
+        share, around_deg = (k + 0.5) / N_DIRECTIONS, 360 * int(f"{k:06b}"[::-1], 2) / N_DIRECTIONS
         squared = (1 - share) / (1 + (alpha2 - 1) * share)  # the cosine of the facet
         cosine = 2 * squared - 1  # of the direction that it mirrors
         if cosine <= 0:
             continue
-        sine = np.sqrt(1 - cosine * cosine)
+        sine = math.sqrt(1 - cosine * cosine)
+        across, along = _engine.cosine_and_sine(around_deg)
         density = alpha2 / (np.pi * (squared * (alpha2 - 1) + 1) ** 2) / 4
         own, texel = 1 / (N_DIRECTIONS * density), 4 * np.pi / halvings[0].shape[0] ** 2
-        lod = min(max(0.5 * np.log2(own / texel) + 0.5, 0.0), len(halvings) - 1.0)
-        at = tangent * np.float32(sine * np.cos(around)) + bitangent * np.float32(sine * np.sin(around))
+        lod = min(max(0.5 * _engine.log2(own / texel) + 0.5, 0.0), len(halvings) - 1.0)
+        at = tangent * np.float32(sine * across) + bitangent * np.float32(sine * along)
         at += normal * np.float32(cosine)
         fine = int(lod)
         seen = look_up_octahedron(whole[fine], at)
@@ -303,11 +308,14 @@ def gathered(halvings: list[F32], size: int, weigh: Callable[[F32], F32]) -> F32
     source = next((level for level in halvings if len(level) <= SIZE_OF_SUMS), halvings[-1])
     to, angle = octahedral_directions(len(source))
     light = np.concatenate([source, np.ones_like(angle)[..., None]], axis=2) * angle[..., None]
-    toward = np.ascontiguousarray(to.reshape(-1, 3).T)
-    sums = [
-        weigh(np.maximum(some @ toward, 0)) @ light.reshape(-1, 4)
-        for some in np.array_split(octahedral_directions(size)[0].reshape(-1, 3), max(1, size // 8))
-    ]
+    x, y, z = to.reshape(-1, 3).T.copy()
+    channels = light.reshape(-1, 4).T.copy()
+    sums = []
+    # Products of matrices would have other last bits on other processors.
+    for some in np.array_split(octahedral_directions(size)[0].reshape(-1, 3), max(1, size * size // 32)):
+        cosine = some[:, :1] * x + some[:, 1:2] * y + some[:, 2:] * z
+        weights = weigh(np.maximum(cosine, 0))
+        sums.append(np.stack([(weights * channel).sum(axis=1) for channel in channels], axis=1))
     total = np.concatenate(sums)
     mean = total[:, :3] / total[:, 3:]
     return mean.astype(np.float32).reshape(size, size, 3)

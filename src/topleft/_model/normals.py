@@ -110,7 +110,7 @@ def creased_normals(
     source, n_threads = _engine.Source(points), threads_of_rows(n_triangles, threads)
     normals, angles = np.empty((n_triangles, 3)), np.empty((n_triangles, 3))
     run_parts(lambda a, b: _engine.face_angles(source, corners, a, b, normals, angles), n_triangles, n_threads)
-    least_cosine = math.cos(math.radians(min(crease_deg + EQUAL_ANGLE_DEG, 180.0)))
+    least_cosine, _ = _engine.cosine_and_sine(min(crease_deg + EQUAL_ANGLE_DEG, 180.0))
     fans = _engine.Fans(corners, len(points), normals, angles, least_cosine)
     groups, n_groups = np.empty((n_triangles, 3), np.int32), np.empty(len(points), np.int32)
     run_parts(lambda a, b: fans.find_creases(a, b, groups, n_groups), len(points), n_threads)

@@ -84,7 +84,7 @@ def _cut(polygons: F64) -> I64:
         relative = polygons - polygons[:, :1]
         area = np.cross(relative, np.roll(relative, -1, axis=1)).sum(axis=1)
         edges = np.roll(polygons, -1, axis=1) - polygons
-        turns = np.einsum("fkc,fc->fk", np.cross(np.roll(edges, 1, axis=1), edges), area)
+        turns = (np.cross(np.roll(edges, 1, axis=1), edges) * area[:, None]).sum(axis=2)
         reflex = turns < -TURNS_TOO_SMALL * (area**2).sum(axis=1)[:, None]
     if k == 4:
         cut[reflex[:, 1] | reflex[:, 3]] = [[1, 2, 3], [1, 3, 0]]
