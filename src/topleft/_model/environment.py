@@ -266,11 +266,11 @@ def look_up_octahedron(level: F32, at: F32) -> F32:
 
 def blurred(halvings: list[F32], size: int, roughness: float) -> F32:
     """What a surface of this roughness sees in each direction, (size, size, 3)."""
-    alpha2 = roughness**4
+    alpha2 = roughness * roughness * roughness * roughness
     if roughness > LEAST_SUMMED:
 
         def facets(cosine: F32) -> F32:
-            spread = np.float32(0.5 * (alpha2 - 1)) * (1 + cosine) + 1
+            spread: F32 = np.float32(0.5 * (alpha2 - 1)) * (1 + cosine) + 1
             return cosine / (spread * spread)
 
         return gathered(halvings, size, facets)
@@ -289,7 +289,8 @@ def blurred(halvings: list[F32], size: int, roughness: float) -> F32:
             continue
         sine = math.sqrt(1 - cosine * cosine)
         across, along = _engine.cosine_and_sine(around_deg)
-        density = alpha2 / (np.pi * (squared * (alpha2 - 1) + 1) ** 2) / 4
+        spread = squared * (alpha2 - 1) + 1
+        density = alpha2 / (np.pi * spread * spread) / 4
         own, texel = 1 / (N_DIRECTIONS * density), 4 * np.pi / halvings[0].shape[0] ** 2
         lod = min(max(0.5 * _engine.log2(own / texel) + 0.5, 0.0), len(halvings) - 1.0)
         at = tangent * np.float32(sine * across) + bitangent * np.float32(sine * along)

@@ -54,7 +54,7 @@ def in_space_of(instance: Instance | None, options: ShadingOptions, camera: Came
     for light in options.lights:
         at = np.array([*light.at, light.kind == LightKind.POINT])
         at = at if light.space == LightSpace.EYE else _engine.product(object_from_world, at)
-        moved.append(replace(light, at=tuple(at[:3]), falloff=float(light.falloff * scale**2)))
+        moved.append(replace(light, at=tuple(at[:3]), falloff=float(light.falloff * (scale * scale))))
     return replace(options, lights=moved)
 
 
