@@ -197,7 +197,7 @@ def octahedral_directions(n: int) -> tuple[F32, F32]:
     at = np.stack([x - np.copysign(below, x), y, z - np.copysign(below, z)], axis=2)
     length = np.sqrt((at * at).sum(axis=2, keepdims=True))
     angle = 1 / (length * length * length)[..., 0]
-    return (at / length).astype(np.float32), (angle * (4 * np.pi / angle.sum())).astype(np.float32)
+    return (at / length).astype(np.float32), angle * np.float32(4 * np.pi / float(angle.sum()))
 
 
 def mirrored_levels(image: F32) -> list[F32]:
