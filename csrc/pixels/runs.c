@@ -586,7 +586,7 @@ TL_INLINE vm set_edges(shade_runs *s, int slot, int64_t row, run_setup *r)
     return is_special;
 }
 
-/* Of a mesh with fewer triangles all that runs read is in the second-level cache; asking for it takes 5 % then. */
+/* With fewer triangles asking saves nothing: shading takes 1.02 times as long with 300,000, 1.1 to 1.2 with 120,000. */
 #define TL_FETCHED_TRIANGLES 500000
 #define TL_FETCH_RUNS 32 /* how many runs before its turn the rows of a run's corners are asked for */
 

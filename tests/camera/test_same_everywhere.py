@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-ROOT = Path(__file__).parents[2]
 PROGRAM = Path(__file__).with_name("same_everywhere.py")
 
 #: Of NumPy 1.26 and 2.4, with every OpenBLAS tried.

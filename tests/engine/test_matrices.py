@@ -28,6 +28,7 @@ def test_product_takes_any_stride_and_sums_in_order():
 def test_row_products_sum_in_order():
     a, b = RNG.normal(size=(2, 50, 3))
     assert np.array_equal(_engine.row_products(a, b), a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2])
+    assert np.array_equal(_engine.row_products(a, b[0]), _engine.row_products(a, np.tile(b[0], (50, 1))))
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 4])
@@ -53,8 +54,10 @@ def test_wrong_matrices_are_refused():
         _engine.product(np.ones((2, 3)), np.ones((2, 3)))
     with pytest.raises(ValueError, match="must have 2 dimensions"):
         _engine.product(np.ones((2, 3, 3)), np.eye(3))
-    with pytest.raises(ValueError, match="one shape"):
+    with pytest.raises(ValueError, match="broadcast"):
         _engine.row_products(np.ones((2, 3)), np.ones((3, 3)))
+    with pytest.raises(ValueError, match="three numbers"):
+        _engine.row_products(np.ones((2, 4)), np.ones((2, 4)))
 
 
 def test_quarter_turns_are_exact():

@@ -232,6 +232,28 @@ def test_shade_windows_of_fewer_pixels_than_vertices_are_crops(changes, dtype, s
         assert_same(part, picture[40:130, 50:150])
 
 
+@pytest.mark.parametrize("crease", [180, 6])
+def test_a_mesh_whose_rows_are_asked_for_ahead_looks_like_a_small_one(crease):
+    """500,000 triangles that do not show behind those that do, in a shuffled order."""
+    small = tl.Mesh(COLORED.vertices, COLORED.triangles, COLORED.vertex_normals(), COLORED.colors, uv=COLORED.uv)
+    nothing = np.zeros((500_000, 3), np.int32)  # triangles without area
+    order = RNG.permutation(len(small.triangles) + len(nothing))
+    large = replace(small, triangles=np.concatenate([small.triangles, nothing])[order])
+    if crease < 180:
+        small, large = (replace(mesh, normals=None, crease=crease) for mesh in (small, large))
+    material = tl.Material(texture=tl.Texture(NOISE), specular=0.5, shininess=30)
+    for size in ((120, 90), (200, 160)):  # with 1/w of the vertices that show, and of all
+        one, other = (tl.rasterize_mesh(mesh, CAMERAS["perspective"], size) for mesh in (small, large))
+        assert np.array_equal(order[other.triangle[other.mask]], one.triangle[one.mask])
+        assert_same(other.barycentric(), one.barycentric())
+        for shading in ("smooth", "flat"):
+            pictures = [
+                shade(frags, mesh, CAMERAS["perspective"], shading=shading, lights=LIGHTS, material=material)
+                for frags, mesh in ((one, small), (other, large))
+            ]
+            assert_same(*pictures)
+
+
 def test_shade_each_isa_gives_the_same_bits():
     assert len(hashes_on_each_isa(__file__, "center", "msaa8")) == 1
 

@@ -34,6 +34,7 @@ from topleft._camera.matrices import (
     view_matrix,
 )
 from topleft._model.mesh import Mesh
+from topleft._model.normals import moved
 from topleft._model.points import Points
 from topleft._scene.adapt import MeshLike
 from topleft._scene.scene import Scene
@@ -181,7 +182,7 @@ class Camera:
         world, (width, height) = as_real("points", points), as_size(size)
         if world.ndim != 2 or world.shape[1] != 3:
             raise ValueError(f"points must have shape (N, 3), got {world.shape}")
-        eye = _engine.product(world, self.view[:3, :3].T) + self.view[:3, 3]
+        eye = moved(world, self.view)
         if self.lens is not None:
             eye = self.lens.bend(eye)
         projection = self.clip_from_eye(size)

@@ -19,11 +19,12 @@ def product(a, b):
     """Return the matrix product of float64 arrays (n, k) and (k, m); either may be a vector (k,)."""
     cdef Py_ssize_t i, j, k
     cdef double total
-    is_row, is_column = np.ndim(a) == 1, np.ndim(b) == 1
+    a, b = np.asarray(a, np.float64), np.asarray(b, np.float64)
+    is_row, is_column = a.ndim == 1, b.ndim == 1
     cdef const double[:, :] left = as_numbers(a[None] if is_row else a, 2)
     cdef const double[:, :] right = as_numbers(b[:, None] if is_column else b, 2)
     if left.shape[1] != right.shape[0]:
-        raise ValueError(f"matrices must fit, got shapes {np.shape(a)} and {np.shape(b)}")
+        raise ValueError(f"matrices must fit, got shapes {a.shape} and {b.shape}")
     result = np.empty((left.shape[0], right.shape[1]))
     cdef double[:, ::1] out = result
     with nogil:
@@ -75,12 +76,12 @@ def inverse(a):
 
 
 def row_products(a, b):
-    """Return the products (N,) of rows of float64 arrays (N, 3), each row of one with the same row of the other."""
+    """Return the products (N,) of rows of float64 arrays (N, 3) with a row, or each with the same row of the other."""
     cdef const double[:, :] left = as_numbers(a, 2)
-    cdef const double[:, :] right = as_numbers(b, 2)
+    cdef const double[:, :] right = np.broadcast_to(as_numbers(b, np.ndim(b)), np.shape(a))
     cdef Py_ssize_t i, n = left.shape[0]
-    if np.shape(a) != np.shape(b) or left.shape[1] != 3:
-        raise ValueError(f"arrays must have one shape (N, 3), got {np.shape(a)} and {np.shape(b)}")
+    if left.shape[1] != 3:
+        raise ValueError(f"rows must have three numbers, got shape {np.shape(a)}")
     result = np.empty(n)
     cdef double[::1] out = result
     with nogil:

@@ -22,11 +22,11 @@ from xml.etree.ElementTree import Element
 import numpy as np
 import numpy.typing as npt
 
-from topleft import _engine
 from topleft._io.notes import Notes
 from topleft._io.references import Cloud, InputFile, numbers_of_text
 from topleft._model.from_trimesh import placed
 from topleft._model.mesh import Mesh
+from topleft._model.normals import moved
 from topleft._model.polygons import triangulate
 from topleft.errors import MeshError, MissingPackageError
 
@@ -156,7 +156,7 @@ def _parts(scene: Any, source: InputFile) -> Iterator[Mesh]:
             yield placed(geometry, transform)
         elif hasattr(geometry, "colors") and len(getattr(geometry, "vertices", ())):
             source.notes.add("points not drawn")
-            points = _engine.product(geometry.vertices, transform[:3, :3].T) + transform[:3, 3]
+            points = moved(np.asarray(geometry.vertices), transform)
             source.check_n_vertices(len(points))
             colors = np.asarray(geometry.colors)
             source.clouds.append(Cloud(points, colors if colors.shape == (len(points), 4) else None))

@@ -25,6 +25,7 @@ from topleft._io.gltf_materials import Materials
 from topleft._io.references import Cloud, InputFile
 from topleft._model.joined import placed_arrays
 from topleft._model.mesh import Mesh
+from topleft._model.normals import moved
 from topleft.errors import MeshError, MissingPackageError
 
 Array = npt.NDArray[Any]
@@ -330,7 +331,7 @@ class _Reader:
         elif "material" in primitive:
             color = self._materials.material(primitive["material"]).color or (255, 255, 255)
             colors = np.tile(np.array([*color, 255], np.uint8), (len(points), 1))
-        self._source.clouds.append(Cloud(_engine.product(points, matrix[:3, :3].T) + matrix[:3, 3], colors))
+        self._source.clouds.append(Cloud(moved(points, matrix), colors))
 
     def _places(self, index: int, node: Tree) -> list[F64]:
         """World from mesh: once, or once for each instance."""

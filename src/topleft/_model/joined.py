@@ -14,7 +14,7 @@ import numpy.typing as npt
 from topleft import _engine
 from topleft._model.material import Material
 from topleft._model.mesh import NO_CREASE, Mesh, coincident, with_normals
-from topleft._model.normals import angle_weighted_normals, determinant
+from topleft._model.normals import angle_weighted_normals, determinant, moved
 
 __all__ = ["joined", "placed_arrays"]
 
@@ -33,7 +33,7 @@ def placed_arrays(
         triangles = triangles[:, ::-1]
     if normals is not None:
         normals = _engine.product(normals, _engine.inverse(linear) if volume else np.linalg.pinv(linear))
-    return _engine.product(vertices, linear.T) + transform[:3, 3], triangles, normals
+    return moved(vertices, transform), triangles, normals
 
 
 def joined(parts: list[Mesh], crease: float = NO_CREASE) -> Mesh:

@@ -163,7 +163,7 @@ def in_eye_space(cloud: Points, camera: Camera, rows: npt.NDArray[np.intp]) -> t
     matrix[:3, :3] = turn_of_normals(camera.view).T
     eye, normals = moved(cloud.positions[rows], camera.view), unit_or_zero(moved(unit_or_zero(given), matrix))
     to_eye = -eye if camera.projection[3, :3].any() else np.broadcast_to(np.array([0.0, 0.0, 1.0]), normals.shape)
-    normals[dot(normals, to_eye) < 0] *= -1
+    normals[_engine.row_products(normals, to_eye) < 0] *= -1
     return eye, normals
 
 
@@ -172,7 +172,7 @@ def light_at(cloud: Points, camera: Camera, rows: npt.NDArray[np.intp], options:
     eye, normals = in_eye_space(cloud, camera, rows)
     total = np.full((len(rows), 3), options.ambient)
     if options.lights is None:
-        half = (1 + dot(normals, TO_HEADLIGHT)) / 2
+        half = (1 + _engine.row_products(normals, TO_HEADLIGHT)) / 2
         total += (max(0.0, 1 - options.ambient) * half * half * half)[:, None]
     for light in options.lights or ():
         total += lambert(light, eye, normals, camera.view)[:, None] * np.array(light_of(light.color)[:3])
@@ -188,18 +188,11 @@ def lambert(light: Light, eye: F64, normals: F64, view: F64) -> F64:
         matrix = view if is_point else np.vstack([np.c_[view[:3, :3], np.zeros(3)], [0, 0, 0, 1]])
         at = moved(at, matrix)
     way = at - eye if is_point else at
-    cosine = light.intensity * np.maximum(dot(normals, unit_or_zero(way)), 0)
+    cosine = light.intensity * np.maximum(_engine.row_products(normals, unit_or_zero(way)), 0)
     if not is_point:
         return cosine
     unit_of_eye = abs(determinant(view[:3, :3].tolist())) ** (1 / 3)
-    return cosine / (1 + light.falloff * dot(way, way) / unit_of_eye**2)
-
-
-def dot(a: F64, b: F64) -> F64:
-    """Products of rows (P, 3) with a row or rows, the same on every machine."""
-    x, y, z = a.T
-    u, v, w = b.T
-    return (x * u + y * v) + z * w
+    return cosine / (1 + light.falloff * _engine.row_products(way, way) / unit_of_eye**2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -251,7 +244,7 @@ def ray_distance(buffer: CloudBuffer) -> F32:
     """Distance of the point from the eye, (H, W) float32."""
     if not buffer.camera.projection[3, :3].any():
         return distance(buffer)
-    return buffer.spread(np.sqrt(dot(buffer.eye, buffer.eye)), np.inf)
+    return buffer.spread(np.sqrt(_engine.row_products(buffer.eye, buffer.eye)), np.inf)
 
 
 def camera_normal(buffer: CloudBuffer) -> F32:

@@ -27,7 +27,7 @@ from topleft._base.options import Cull, parse
 from topleft._camera.camera import Camera
 from topleft._camera.lens import FLIP, Lens
 from topleft._model.mesh import Mesh, keep_corner_normals
-from topleft._model.normals import CornerNormals
+from topleft._model.normals import CornerNormals, moved
 
 F64 = npt.NDArray[np.float64]
 I64 = npt.NDArray[np.int64]
@@ -35,7 +35,7 @@ Bools = npt.NDArray[np.bool_]
 Parts = tuple[I64, I64, F64, Bools]
 """Triangles (N, 3), their sources (N,), weights (N, 3, 3) and which sides are outline (N, 3)."""
 
-LEAST_EDGE_COSINE, _ = _engine.cosine_and_sine(math.degrees(0.25))
+LEAST_EDGE_COSINE = _engine.cosine_and_sine(math.degrees(0.25))[0]
 """Edges of a greater angle, as the lens sees them, are halved in any case: so every triangle is small enough on the
 sphere of directions for the test of what the picture cannot show."""
 
@@ -282,7 +282,7 @@ def bend(
     half = np.array([[size[0] / 2], [size[1] / 2]])
     px_from_plane = half * projection[:2, :3] * FLIP
     lens_map = _lens_map(lens, px_from_plane.tobytes(), (max(size[0], 1), max(size[1], 1)))
-    points = (_engine.product(vertices, camera.view[:3, :3].T) + camera.view[:3, 3]) * FLIP
+    points = moved(vertices, camera.view) * FLIP
     # Window depth is below 0 for ranges under this one.
     near = projection[2, 3] / (projection[2, 2] - 1) if near_clip else 0.0
     return _Subdivision(lens_map, points, lens.tolerance_px, near).run(np.asarray(triangles, np.int64))

@@ -19,6 +19,7 @@ from topleft._base.memory import empty
 from topleft._base.threads import run_parts, threads_for
 from topleft._camera.camera import Camera
 from topleft._model.mesh import Mesh
+from topleft._model.normals import moved
 from topleft._raster.fragments import Fragments
 from topleft._raster.verbs import Rasterizer
 from topleft._render.fragments import VisiblePart, join, parts_of
@@ -145,15 +146,6 @@ class GBuffer:
     ) -> npt.NDArray[Any]:
         """What `evaluate` does, with the threads of this buffer."""
         return evaluate(part, what, rows, background, size=size, threads=self.options.get("threads"))
-
-
-def moved(points: F64, matrix: F64) -> F64:
-    """Points (P, 3) taken through the first rows of a matrix, (N, 4) of N rows: (P, N) float64.
-
-    Written out, for a library's product of matrices rounds as it likes.
-    """
-    x, y, z = points.T
-    return np.stack([((a * x + b * y) + c * z) + d for a, b, c, d in matrix], -1)
 
 
 def project(points: F64, camera: Camera, transform: F64, size: tuple[int, int]) -> F64:

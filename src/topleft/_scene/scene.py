@@ -16,11 +16,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from topleft import _engine
 from topleft._base.arrays import INT32_MAX, as_square, check_regular, set_read_only, shown
 from topleft._io.load import load
 from topleft._model.mesh import Mesh, extreme_points, used_vertices
-from topleft._model.normals import determinant
+from topleft._model.normals import determinant, moved
 from topleft._model.points import Points
 from topleft._raster.clusters import Backoff
 from topleft._scene.adapt import MeshLike, as_mesh, is_mesh_like
@@ -237,8 +236,7 @@ def is_pair(value: object) -> bool:
 
 def world_corners(instance: Instance) -> F64:
     """The vertices that triangles of an instance use, in the world: (N, 3) float64."""
-    linear, offset = instance.transform[:3, :3], instance.transform[:3, 3]
-    return _engine.product(used_vertices(instance.mesh), linear.T) + offset
+    return moved(used_vertices(instance.mesh), instance.transform)
 
 
 def as_subject(given: MeshLike | Scene | Points) -> Mesh | Scene | Points:
