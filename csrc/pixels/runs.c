@@ -67,6 +67,7 @@ typedef struct {
     /* the light is the grey of srgb.c: per channel the line and the root of its colour */
     int is_grey;
     float grey_line[3], grey_root[3];
+    int has_far_texels; /* some are asked for before they are read */
     int n_runs, n_special;
     int first_run[TL_SPAN]; /* of each vector: how many runs have begun before it */
     unsigned starts[TL_SPAN], visible[TL_SPAN];

@@ -20,6 +20,20 @@
 #include "shade/surroundings.c"
 #include "shade/texture.c"
 
+#define TL_MAX_TEXTURES 5 /* of a material */
+
+/* The textures of a material; returns how many it has. */
+TL_INLINE int textures_of(const tl_material *m, const tl_texture **textures)
+{
+    const tl_texture *const all[TL_MAX_TEXTURES] = {m->texture, m->metallic_roughness, m->occlusion_map, m->normal_map,
+                                                    m->emission_map};
+    int n = 0;
+    for (int k = 0; k < (m->is_full ? TL_MAX_TEXTURES : 1); k++)
+        if (all[k])
+            textures[n++] = all[k];
+    return n;
+}
+
 /* A set of uv whose coefficients begin at `first`, those of its gradients at `gradient`. */
 TL_INLINE void find_uv(const shaded_lanes *p, int first, int gradient, vf *uv, vf *du, vf *dv)
 {
@@ -195,33 +209,31 @@ static void light_rough(const shaded_lanes *p, const tl_material *m, const vf *f
 }
 
 /* The light of a full material, as all lanes would see it. */
-static void shade_full(shaded_lanes *p, const tl_material *m, vf *rgb)
+static void shade_full(shaded_lanes *p, const tl_material *m, laid_texture *laid, vf *rgb)
 {
     vf found[4], occlusion = vf_set1(1.0f);
-    laid_texture laid;
-    laid.as = (const tl_texture *)0;
     if (p->s->needs_more)
         set_more(p);
-    find_base(p, m, &laid, rgb);
+    find_base(p, m, laid, rgb);
     if (m->is_unlit)
         return;
     if (m->metallic_roughness)
-        look_up_rgb(p, m->metallic_roughness, &laid, found);
+        look_up_rgb(p, m->metallic_roughness, laid, found);
     if (m->occlusion_map) {
         vf texel[4];
         if (m->occlusion_map == m->metallic_roughness)
             texel[0] = found[0];
         else
-            look_up_rgb(p, m->occlusion_map, &laid, texel);
+            look_up_rgb(p, m->occlusion_map, laid, texel);
         occlusion = vf_fma(vf_set1(m->occlusion), vf_sub(texel[0], vf_set1(1.0f)), vf_set1(1.0f));
     }
     if (m->is_metallic)
-        light_rough(p, m, found, &laid, occlusion, rgb);
+        light_rough(p, m, found, laid, occlusion, rgb);
     else
-        light_plain(p, m, &laid, occlusion, rgb);
+        light_plain(p, m, laid, occlusion, rgb);
     if (m->emission_map) {
         vf texel[4];
-        look_up_rgb(p, m->emission_map, &laid, texel);
+        look_up_rgb(p, m->emission_map, laid, texel);
         for (int c = 0; c < 3; c++)
             rgb[c] = vf_fma(vf_set1(m->emission[c]), texel[c], rgb[c]);
     } else {

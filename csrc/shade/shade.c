@@ -15,19 +15,19 @@
 #include "pixels/runs.c"
 #include "pixels/weights.c"
 #include "shade/light.c"
+#include "shade/prefetch.c"
 #include "shade/shade_pixels.c"
 #include "shade/srgb.c"
 
 /* Notes what a full material needs. */
 static void note_full(shade_runs *s, const tl_material *m)
 {
-    const tl_texture *const textures[5] = {m->texture, m->metallic_roughness, m->occlusion_map, m->normal_map,
-                                           m->emission_map};
-    for (int k = 0; k < 5; k++)
-        if (textures[k]) {
-            s->needs_uv |= textures[k]->uv_set == 0;
-            s->needs_uv1 |= textures[k]->uv_set == 1;
-        }
+    const tl_texture *textures[TL_MAX_TEXTURES];
+    const int n = textures_of(m, textures);
+    for (int k = 0; k < n; k++) {
+        s->needs_uv |= textures[k]->uv_set == 0;
+        s->needs_uv1 |= textures[k]->uv_set == 1;
+    }
     if (m->normal_map && !m->is_unlit)
         s->needs_tangents[m->normal_map->uv_set] = 1;
 }
@@ -58,6 +58,7 @@ static void start_runs(shade_runs *s, const tl_snapped *snapped, const tl_window
     s->needs_point = shows_light && ((is_lit && has_points) || shines);
     s->needs_more = s->needs_uv1 || s->needs_alpha || s->needs_tangents[0] || s->needs_tangents[1];
     s->needs_q = s->needs_uv || s->needs_more || s->needs_colors || s->needs_point || shading->fog_scale != 0.0f;
+    note_far(s);
     start_grey(s);
     memset(s->ints, 0, sizeof s->ints);
     for (int k = 0; k < N_RUN_FLOATS; k++)
@@ -73,13 +74,11 @@ TL_INLINE int start_span(shade_runs *s, const int32_t *ids, int64_t row, int64_t
     return n;
 }
 
-TL_INLINE vi shaded_word(shaded_lanes *p, int64_t row, const float *depth)
+TL_INLINE vi encode_light(const tl_shading *shading, const vf *rgba)
 {
-    const tl_show show = p->s->shading->show;
-    vf rgb[3];
-    shade_pixels(p, row, depth, rgb);
-    const vi opacity = p->s->shading->wants_opacity ? vi_rint(vf_mul(vf_set1(255.0f), p->opacity)) : vi_set1(255);
-    return to_word(to_byte(show, rgb[0]), to_byte(show, rgb[1]), to_byte(show, rgb[2]), opacity);
+    const vi opacity = shading->wants_opacity ? vi_rint(vf_mul(vf_set1(255.0f), rgba[3])) : vi_set1(255);
+    return to_word(to_byte(shading->show, rgba[0]), to_byte(shading->show, rgba[1]), to_byte(shading->show, rgba[2]),
+                   opacity);
 }
 
 /* The picture of a visibility buffer; rows of window->width. */
@@ -87,6 +86,7 @@ static void shade(const tl_snapped *snapped, const tl_window *window, const tl_v
                   const int32_t *ids, const float *depth, uint8_t *pixels)
 {
     shade_runs s;
+    started_span span;
     int32_t background;
     memcpy(&background, shading->background_bytes, 4);
     start_runs(&s, snapped, window, view, shading);
@@ -94,13 +94,18 @@ static void shade(const tl_snapped *snapped, const tl_window *window, const tl_v
         tl_count_work(window, TL_SHADE_PX * window->width);
         for (int64_t column = 0; column < window->width; column += TL_SPAN) {
             const int64_t at = row * window->width + column;
-            const int n = start_span(&s, ids, row, column);
+            const int n = start_span(&s, ids, row, column), n_vectors = (n + TL_LANES - 1) / TL_LANES;
+            span.next = 0;
             for (int x = 0, i = 0; x < n; x += TL_LANES, i++) {
                 vi word = vi_set1(background);
-                if (s.visible[i]) {
+                if (s.visible[i] && s.is_grey) {
                     shaded_lanes p;
                     find_pixels(&p, &s, i, column);
-                    word = vi_select(p.visible, s.is_grey ? grey_word(&p) : shaded_word(&p, row, depth + at + x), word);
+                    word = vi_select(p.visible, grey_word(&p), word);
+                } else if (s.visible[i]) {
+                    vf rgba[4];
+                    light_pixels(&span, &s, i, n_vectors, column, row, depth + at + x, rgba);
+                    word = vi_select(vm_from_bits(s.visible[i]), encode_light(shading, rgba), word);
                 }
                 if (n - x >= TL_LANES)
                     vi_store((int32_t *)pixels + at + x, word);

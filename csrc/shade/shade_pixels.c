@@ -101,6 +101,18 @@ TL_INLINE void set_normals(shaded_lanes *p)
 
 TL_INLINE void set_uv_lanes(shaded_lanes *p) { find_uv(p, RUN_U, RUN_GRADIENT, p->uv, p->du, p->dv); }
 
+/* Vector i of the span that begins at `column`, and what attributes are weighted by. */
+TL_INLINE void start_lanes(shaded_lanes *p, const shade_runs *s, int i, int64_t column)
+{
+    find_pixels(p, s, i, column);
+    if (s->needs_q) {
+        p->q = weighed(p, RUN_Q, RUN_Q + 1, RUN_Q + 2);
+        p->inv_q = vf_div(vf_set1(1.0f), p->q);
+    }
+    if (s->needs_uv)
+        set_uv_lanes(p);
+}
+
 /* The colours of the vertices: interpolated as sRGB values, rounded to whole ones, then turned to light. */
 TL_INLINE void set_colors(shaded_lanes *p)
 {
@@ -133,11 +145,11 @@ TL_INLINE void set_points(shaded_lanes *p, int64_t row, const float *depth)
 }
 
 /* The light of one material, as all lanes would see it. */
-TL_INLINE void shade_material(shaded_lanes *p, const tl_material *m, vf *rgb)
+TL_INLINE void shade_material(shaded_lanes *p, const tl_material *m, laid_texture *laid, vf *rgb)
 {
     const tl_shading *shading = p->s->shading;
     if (m->is_full) {
-        shade_full(p, m, rgb);
+        shade_full(p, m, laid, rgb);
         return;
     }
     for (int c = 0; c < 3; c++)
@@ -147,7 +159,7 @@ TL_INLINE void shade_material(shaded_lanes *p, const tl_material *m, vf *rgb)
             rgb[c] = vf_mul(rgb[c], p->color[c]);
     if (m->texture) {
         vf texel[4];
-        sample_texture(m->texture, p->uv[0], p->uv[1], p->du, p->dv, texel, 3);
+        sample_laid(m->texture, p->uv[0], p->uv[1], p->du, p->dv, laid, texel, 3);
         for (int c = 0; c < 3; c++)
             rgb[c] = vf_mul(rgb[c], texel[c]);
     }
@@ -172,8 +184,14 @@ TL_INLINE void shade_material(shaded_lanes *p, const tl_material *m, vf *rgb)
             rgb[c] = vf_fma(vf_set1(m->specular[c]), specular[c], rgb[c]);
 }
 
+/* Numbers that no material has mean the first one. */
+TL_INLINE const tl_material *material_at(const tl_shading *shading, int32_t number)
+{
+    return &shading->materials[number < 0 || number >= shading->n_materials ? 0 : number];
+}
+
 /* Each lane by its own material. */
-static void shade_materials(shaded_lanes *p, vf *rgb)
+static void shade_materials(shaded_lanes *p, laid_texture *laid, vf *rgb)
 {
     vf opacity = vf_set1(1.0f);
     const tl_shading *shading = p->s->shading;
@@ -184,7 +202,7 @@ static void shade_materials(shaded_lanes *p, vf *rgb)
         const int32_t own = number[__builtin_ctz(vm_bits(rest))];
         const vm lanes = vm_and(rest, vi_eq(material, vi_set1(own)));
         vf light[3];
-        shade_material(p, &shading->materials[own < 0 || own >= shading->n_materials ? 0 : own], light);
+        shade_material(p, material_at(shading, own), laid, light);
         for (int c = 0; c < 3; c++)
             rgb[c] = vf_select(lanes, light[c], rgb[c]);
         if (shading->wants_opacity)
@@ -212,8 +230,9 @@ TL_INLINE vf in_eye_space(const shaded_lanes *p, int axis)
     return dot3(row, p->normal);
 }
 
-/* What vector i of a span shows.  `depth` is that of its first pixel; it is read without perspective only. */
-TL_INLINE void shade_pixels(shaded_lanes *p, int64_t row, const float *depth, vf *rgb)
+/* Light and opacity of pixels that are started; `laid` is nothing yet, or where a texture of theirs is read.
+ * `depth` is that of the first pixel; it is read without perspective only. */
+TL_INLINE void shade_pixels(shaded_lanes *p, laid_texture *laid, int64_t row, const float *depth, vf *rgba)
 {
     const shade_runs *s = p->s;
     const tl_shading *shading = s->shading;
@@ -221,38 +240,34 @@ TL_INLINE void shade_pixels(shaded_lanes *p, int64_t row, const float *depth, vf
     p->opacity = vf_set1(1.0f);
     if (s->needs_normal)
         set_normals(p);
-    if (s->needs_q) {
-        p->q = weighed(p, RUN_Q, RUN_Q + 1, RUN_Q + 2);
-        p->inv_q = vf_div(vf_set1(1.0f), p->q);
-    }
     if (shading->show == TL_SHOW_NORMALS) {
         for (int axis = 0; axis < 3; axis++)
-            rgb[axis] = vf_fma(vf_set1(127.5f), in_eye_space(p, axis), vf_set1(127.5f));
+            rgba[axis] = vf_fma(vf_set1(127.5f), in_eye_space(p, axis), vf_set1(127.5f));
+        rgba[3] = p->opacity;
         return;
     }
     for (int c = 0; c < 3; c++)
-        rgb[c] = zero;
+        rgba[c] = zero;
     if (shading->show == TL_SHOW_MATCAP) {
         vf texel[4];
         const vf none[2] = {zero, zero};
         sample_texture(shading->matcap, vf_fma(half, in_eye_space(p, 0), half), vf_fma(half, in_eye_space(p, 1), half),
                        none, none, texel, 3);
         for (int c = 0; c < 3; c++)
-            rgb[c] = texel[c];
+            rgba[c] = texel[c];
     } else {
-        if (s->needs_uv)
-            set_uv_lanes(p);
         if (s->needs_colors)
             set_colors(p);
         if (s->needs_point)
             set_points(p, row, depth);
         if (shading->material_of)
-            shade_materials(p, rgb);
+            shade_materials(p, laid, rgba);
         else
-            shade_material(p, shading->materials, rgb);
+            shade_material(p, shading->materials, laid, rgba);
     }
     if (shading->fog_scale != 0.0f)
-        fade(p, depth, rgb);
+        fade(p, depth, rgba);
+    rgba[3] = p->opacity;
 }
 
 #endif

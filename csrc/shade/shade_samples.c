@@ -14,6 +14,7 @@
 #include "lanes/lanes.h"
 #include "vertex/fixed.h"
 #include "pixels/runs.c"
+#include "shade/prefetch.c"
 #include "shade/shade.c"
 #include "shade/shade_pixels.c"
 #include "shade/srgb.c"
@@ -52,18 +53,19 @@ TL_INLINE int find_first_seen(sample_sums *sums, const int32_t *ids, int64_t str
 /* Shades what sums->ids names and adds it, times the samples that see it. */
 TL_INLINE void add_shaded(sample_sums *sums, shade_runs *s, int64_t row, int64_t column, int n, const float *depth)
 {
+    started_span span;
+    span.next = 0;
     find_runs(s, sums->ids, n);
     set_runs(s, row);
     for (int x = 0, i = 0; x < n; x += TL_LANES, i++) {
         if (!s->visible[i])
             continue;
-        shaded_lanes p;
-        vf rgb[3];
-        find_pixels(&p, s, i, column);
-        shade_pixels(&p, row, depth + x, rgb);
-        const vf weight = vf_select(p.visible, vf_load(sums->n_seen + x), vf_set1(0.0f)), zero = vf_set1(0.0f);
+        const vm visible = vm_from_bits(s->visible[i]);
+        vf rgba[4];
+        light_pixels(&span, s, i, (n + TL_LANES - 1) / TL_LANES, column, row, depth + x, rgba);
+        const vf weight = vf_select(visible, vf_load(sums->n_seen + x), vf_set1(0.0f)), zero = vf_set1(0.0f);
         for (int c = 0; c < 3; c++) {
-            const vf sum = vf_fma(weight, vf_select(p.visible, rgb[c], zero), vf_load(sums->light[c] + x));
+            const vf sum = vf_fma(weight, vf_select(visible, rgba[c], zero), vf_load(sums->light[c] + x));
             vf_store(sums->light[c] + x, sum);
         }
         vf_store(sums->n_lit + x, vf_add(weight, vf_load(sums->n_lit + x)));

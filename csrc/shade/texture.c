@@ -151,9 +151,10 @@ TL_INLINE int is_laid_alike(const tl_texture *a, const tl_texture *b)
                       a->uv_set == b->uv_set && !a->has_transform && !b->has_transform);
 }
 
-/* u and v are folded; not of textures with the filter "nearest" */
+/* Not of textures with the filter "nearest". */
 TL_INLINE void find_texels(const tl_texture *t, vf u, vf v, const vf *du, const vf *dv, laid_texture *laid)
 {
+    u = folded(u, t->wrap_u), v = folded(v, t->wrap_v);
     laid->as = t, laid->has_coarse = 0;
     if (t->filter == TL_FILTER_BILINEAR) {
         find_quad(t, vi_set1(0), u, v, &laid->fine);
@@ -188,7 +189,7 @@ TL_INLINE void sample_laid(const tl_texture *t, vf u, vf v, const vf *du, const 
         sample_nearest(t, folded(u, t->wrap_u), folded(v, t->wrap_v), rgba);
     } else {
         if (!laid->as || !is_laid_alike(t, laid->as))
-            find_texels(t, folded(u, t->wrap_u), folded(v, t->wrap_v), du, dv, laid);
+            find_texels(t, u, v, du, dv, laid);
         filter_texels(t, laid, rgba, n_channels);
     }
     for (int c = 0; c < n_channels; c++)

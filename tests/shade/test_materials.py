@@ -241,6 +241,30 @@ def test_full_materials_threads_change_no_bit(n):
 
 
 @pytest.mark.parametrize("sampling", ["center", "msaa4"])
+def test_texels_that_are_asked_for_are_those_that_are_read(sampling):
+    """Those of large textures are asked for before their turn, by the first set of uv and not by the second."""
+    pixels = np.random.default_rng(3).integers(0, 256, (3, 512, 1024, 3), dtype=np.uint8)
+    rows = np.arange(len(KNOT.triangles)) // 5 % 4
+
+    def picture(uv_set):
+        own = {"uv_set": uv_set, "wrap": "mirror"}
+        materials = (
+            tl.Material(
+                texture=tl.Texture(pixels[0], **own), metallic=0.6,
+                metallic_roughness_texture=tl.Texture(pixels[1], encoding="linear", **own),
+                normal_texture=tl.Texture(pixels[2], encoding="linear", **own), opacity=0.7, alpha_mode="blend",
+            ),
+            tl.Material(texture=tl.Texture(pixels[1], "bilinear", **own), roughness=0.5),
+            tl.Material(texture=tl.Texture(pixels[2], "nearest", **own), roughness=0.5),
+            tl.Material(color=WHITE),
+        )  # fmt: skip
+        mesh = replace(KNOT, uv1=KNOT.uv, materials=materials, material_of_triangle=rows)
+        return tl.render(mesh, CAMERAS["perspective"], (601, 90), sampling=sampling)
+
+    assert_same(picture(0), picture(1))
+
+
+@pytest.mark.parametrize("sampling", ["center", "msaa4"])
 def test_full_materials_windows_are_crops(sampling):
     whole = everything(sampling=sampling)
     for part, picture in zip(everything(origin=(37, 21), size=(83, 64), sampling=sampling), whole, strict=True):
