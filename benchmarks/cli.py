@@ -6,7 +6,7 @@ import argparse
 import functools
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from benchmarks.accuracy.study import STUDY as ACCURACY
@@ -94,6 +94,11 @@ def study_of(record: Record) -> Study:
     return STUDIES[record.get("kind", RUN.kind)]
 
 
+def parts_of(record: Record) -> dict[str, Callable[[Record], str | None]]:
+    """Return what the markers of a page stand for; those of other studies stay."""
+    return {name: lambda _: None for study in STUDIES.values() for name in study.parts} | dict(study_of(record).parts)
+
+
 def measure(study: Study, arguments: argparse.Namespace) -> None:
     """Measure, write, print."""
     out = getattr(arguments, "record", None)
@@ -120,7 +125,7 @@ def document(arguments: argparse.Namespace) -> None:
     """Replace what stands between the markers of a page."""
     record = json.loads(arguments.file.read_text())
     text = arguments.page.read_text(encoding="utf-8")
-    write_text(arguments.page, with_parts(text, record, study_of(record).parts))
+    write_text(arguments.page, with_parts(text, record, parts_of(record)))
 
 
 def print_names(_: argparse.Namespace) -> None:

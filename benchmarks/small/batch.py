@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import argparse
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -30,6 +30,7 @@ from benchmarks.harness.records import Record, Save, tell
 from benchmarks.harness.rounds import turn_of_each
 from benchmarks.peers import OURS, load_peer, why_not
 from benchmarks.report.study import Study
+from benchmarks.report.tables import facts_text, table_text
 from benchmarks.scenes.cases import Case, views_scene
 
 PEERS = ("llvmpipe", "riley", "deodr", "vtk")
@@ -134,20 +135,27 @@ def lines(record: dict[str, Any]) -> Iterator[str]:
     width, height = record["size"]
     yield f"## {record['n_views']} views of {record['n_triangles']:,} triangles, {width}x{height}, shaded"
     yield ""
-    yield f"{record['machine']['cpu']}; {record['isa']}; {record['date']}; commit {record['commit']}"
+    yield facts_text(record)
     yield ""
-    yield "| | gives | threads | views/s | best round | over one thread | time over ours on 1 | other outline, px |"
-    yield "|---|---|---|---|---|---|---|---|"
-    for task, label in zip(TASKS, ("", ", PNG"), strict=True):
-        for run in sorted((run for run in record["runs"] if run["task"] == task), key=lambda run: -run["views_per_s"]):
-            yield (
-                f"| {run['name']}{label} | {run['gives']} | {run['threads']} | {run['views_per_s']:.0f} "
-                f"| {run['best_views_per_s']:.0f} | {run['over_one_thread']:.2f}x | {run['ours_is_faster']:.2f}x "
-                f"| {run['different_px']} |"
-            )
+    yield from views_text(record).splitlines()
     if record["skipped"]:
         yield ""
         yield "Skipped: " + "; ".join(f"{entry['name']}: {entry['reason']}" for entry in record["skipped"])
+
+
+def views_text(record: Record) -> str:
+    """A row for each contestant, the fastest first: in memory, then files."""
+    rows = [
+        [
+            run["name"] + label, run["gives"], str(run["threads"]), f"{run['views_per_s']:.0f}",
+            f"{run['best_views_per_s']:.0f}", f"{run['over_one_thread']:.2f}x", f"{run['ours_is_faster']:.2f}x",
+            f"{run['different_px']:,}",
+        ]
+        for task, label in zip(TASKS, ("", ", PNG"), strict=True)
+        for run in sorted((run for run in record["runs"] if run["task"] == task), key=lambda run: -run["views_per_s"])
+    ]  # fmt: skip
+    head = ["", "gives", "threads", "views/s", "best round", "over one thread", "time over ours on 1"]
+    return table_text([*head, "other outline, px"], rows)
 
 
 def _name(contestant: Contestant) -> str:
@@ -171,4 +179,7 @@ def run(arguments: argparse.Namespace, _: Save) -> Record:
     return run_batch(options_of(Options, arguments))
 
 
-STUDY = Study("batch", "measure many pictures: views a second, in memory and as PNG", add_arguments, run, lines)
+PARTS: dict[str, Callable[[Record], str | None]] = {"batch-facts": facts_text, "batch": views_text}
+"""What the markers `<!-- table: NAME -->` of the page stand for."""
+
+STUDY = Study("batch", "measure many pictures: views a second, in memory and as PNG", add_arguments, run, lines, PARTS)

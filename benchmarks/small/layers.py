@@ -19,7 +19,7 @@ from benchmarks.harness.machine import describe
 from benchmarks.harness.records import Record, Save
 from benchmarks.harness.turns import take_turns, turn_of
 from benchmarks.report.study import Study
-from benchmarks.report.tables import table
+from benchmarks.report.tables import facts_text, table
 
 SIZE = (512, 512)
 N_TRIANGLES = 70_000
@@ -72,4 +72,10 @@ def lines(record: Record) -> Iterator[str]:
     yield from table(["layer", "fastest, ms", "median, ms", "over the picture"], rows)
 
 
-STUDY = Study("layers", "time each layer of a view beside its picture", add_arguments, run, lines)
+PARTS: dict[str, Callable[[Record], str | None]] = {
+    "layers-facts": facts_text,
+    "layers": lambda record: "\n".join(lines(record)),
+}
+"""What the markers `<!-- table: NAME -->` of the page stand for."""
+
+STUDY = Study("layers", "time each layer of a view beside its picture", add_arguments, run, lines, PARTS)
