@@ -11,8 +11,8 @@ from benchmarks.harness.machine import PAGES, RECORDS, ROOT
 from benchmarks.report.pages import MARKED, with_parts
 
 FILLED = {
-    "accuracy": ["accuracy.md", "speed.md"], "atlas": ["atlas.md"],
-    "choices": ["choices.md"], "pictures": ["pictures.md"],
+    "accuracy": ["accuracy.md", "speed.md"], "atlas": ["atlas.md"], "batch": ["performance.md"],
+    "choices": ["choices.md"], "layers": ["performance.md"], "pictures": ["pictures.md"],
     "scenes": ["performance.md"], "smooth": ["performance.md"], "static": ["static.md"],
 }  # fmt: skip
 """Pages by the record that they show."""
