@@ -62,8 +62,11 @@ cdef class Source:
         """Snap the pixels of vertices [first, end) into records; returns the numbers of bad, wide and clipped vertices."""
         cdef tl_wide *table = <tl_wide *>&wide[0, 0] if wide is not None else NULL
         cdef tl_vertex_counts counts
-        with nogil:
+        if end - first < HELD_VERTICES:
             counts = K.snap(&self.source, first, end, subpixel_bits, with_depth, <tl_vertex *>&records[0], table)
+        else:
+            with nogil:
+                counts = K.snap(&self.source, first, end, subpixel_bits, with_depth, <tl_vertex *>&records[0], table)
         return counts.n_bad, counts.n_wide, counts.n_clipped
 
     def take(self, int64_t first, int64_t end, double[:, ::1] points, int bits=-1):
@@ -80,8 +83,11 @@ cdef class Source:
         """Project and snap vertices [first, end) into records; returns the numbers of bad, wide and clipped vertices."""
         cdef tl_wide *table = <tl_wide *>&wide[0, 0] if wide is not None else NULL
         cdef tl_vertex_counts counts
-        with nogil:
+        if end - first < HELD_VERTICES:
             counts = K.project(&self.source, first, end, &viewport.view, <tl_vertex *>&records[0], table)
+        else:
+            with nogil:
+                counts = K.project(&self.source, first, end, &viewport.view, <tl_vertex *>&records[0], table)
         return counts.n_bad, counts.n_wide, counts.n_clipped
 
     def project_points(self, int64_t first, int64_t end, Viewport viewport, double[:, ::1] points):
@@ -164,7 +170,9 @@ cdef class Target:
 def first_bad_row(const int32_t[:, ::1] triangles, int64_t n_vertices):
     """Return the first row with an index outside ``[0, n_vertices)``, -1 if there is none."""
     cdef int64_t n = triangles.shape[0], row = -1
-    if n:
+    if 0 < n < HELD_VERTICES:
+        row = K.first_bad_row(&triangles[0, 0], n, n_vertices)
+    elif n:
         with nogil:
             row = K.first_bad_row(&triangles[0, 0], n, n_vertices)
     return row
@@ -173,7 +181,9 @@ def first_bad_row(const int32_t[:, ::1] triangles, int64_t n_vertices):
 def narrow_triangles(const int64_t[:, ::1] triangles, int64_t n_vertices, int32_t[:, ::1] out):
     """Write the indices as int32; returns the first row with one outside ``[0, n_vertices)``, -1 if there is none."""
     cdef int64_t n = triangles.shape[0], row = -1
-    if n:
+    if 0 < n < HELD_VERTICES:
+        row = K.narrow_triangles(&triangles[0, 0], n, n_vertices, &out[0, 0])
+    elif n:
         with nogil:
             row = K.narrow_triangles(&triangles[0, 0], n, n_vertices, &out[0, 0])
     return row

@@ -68,6 +68,12 @@ def compiler_info() -> dict[str, object]:
 cdef enum:
     LABEL = 2  # TL_SINK_LABEL
 
+# Less work than this keeps the GIL: a thread that let go of it waits for those that take it, 50 us and more each time.
+cdef enum:
+    HELD_VERTICES = 1 << 15
+    HELD_PX = 1 << 14  # whose light is found
+    HELD_DRAWN_PX = 1 << 24  # if each triangle covered the whole window
+
 VERTEX_BYTES = sizeof(tl_vertex)
 PLACED = TL_PLACED  # numbers of a vertex behind a transform that is not snapped
 CELL_CLEAR = TL_CELL_CLEAR

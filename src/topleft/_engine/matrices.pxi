@@ -15,10 +15,19 @@ cdef object as_numbers(values, int n_dims):
     return array
 
 
-def product(a, b):
-    """Return the matrix product of float64 arrays (n, k) and (k, m); either may be a vector (k,)."""
+cdef void multiply(const double[:, :] left, const double[:, :] right, double[:, ::1] out) noexcept nogil:
     cdef Py_ssize_t i, j, k
     cdef double total
+    for i in range(left.shape[0]):
+        for j in range(right.shape[1]):
+            total = 0.0
+            for k in range(left.shape[1]):
+                total = total + left[i, k] * right[k, j]
+            out[i, j] = total
+
+
+def product(a, b):
+    """Return the matrix product of float64 arrays (n, k) and (k, m); either may be a vector (k,)."""
     a, b = np.asarray(a, np.float64), np.asarray(b, np.float64)
     is_row, is_column = a.ndim == 1, b.ndim == 1
     cdef const double[:, :] left = as_numbers(a[None] if is_row else a, 2)
@@ -27,13 +36,11 @@ def product(a, b):
         raise ValueError(f"matrices must fit, got shapes {a.shape} and {b.shape}")
     result = np.empty((left.shape[0], right.shape[1]))
     cdef double[:, ::1] out = result
-    with nogil:
-        for i in range(left.shape[0]):
-            for j in range(right.shape[1]):
-                total = 0.0
-                for k in range(left.shape[1]):
-                    total = total + left[i, k] * right[k, j]
-                out[i, j] = total
+    if left.shape[0] < HELD_VERTICES:
+        multiply(left, right, out)
+    else:
+        with nogil:
+            multiply(left, right, out)
     if is_row and is_column:
         return float(result[0, 0])
     return result[0] if is_row else result[:, 0] if is_column else result

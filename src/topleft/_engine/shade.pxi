@@ -160,8 +160,11 @@ def set_inverse_w(SnappedMesh mesh, const float[:, ::1] rows, float[:, ::1] out)
     if n == 0:
         return
     if mesh.is_used is None:
-        with nogil:
+        if n < HELD_VERTICES:
             K.set_inverse_w(mesh.snapped.mesh.source, &rows[0, 0], 0, n, &out[0, 0])
+        else:
+            with nogil:
+                K.set_inverse_w(mesh.snapped.mesh.source, &rows[0, 0], 0, n, &out[0, 0])
         return
     n_blocks = mesh.is_used.shape[0]
     with nogil:
@@ -179,8 +182,11 @@ def shade(SnappedMesh mesh, ShadingTable shading, const int32_t[:, ::1] ids, con
     """Write rows of the picture (H, W, 4) of a visibility buffer."""
     cdef tl_window window = mesh.window(first_row, n_rows, ids.shape[1])
     if n_rows and ids.shape[1]:
-        with nogil:
+        if n_rows * ids.shape[1] <= HELD_PX:
             K.shade(&mesh.snapped, &window, mesh.clip_view(), &shading.shading, &ids[first_row, 0], &depth[first_row, 0], &pixels[first_row, 0, 0])
+        else:
+            with nogil:
+                K.shade(&mesh.snapped, &window, mesh.clip_view(), &shading.shading, &ids[first_row, 0], &depth[first_row, 0], &pixels[first_row, 0, 0])
         raise_if_given_up()
 
 
