@@ -7,6 +7,7 @@ import pickle
 import sys
 import threading
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from dataclasses import replace
 from multiprocessing import get_context
 
 import numpy as np
@@ -16,6 +17,7 @@ from batch_jobs import BOX, CORNERS, EXECUTORS, FACES, SIZE, orbit, pictures, vi
 import topleft as tl
 from topleft._batch import jobs
 from topleft._batch.jobs import JobRunner
+from topleft._batch.workers import workers_of
 from topleft.errors import MissingPackageError
 
 
@@ -78,6 +80,17 @@ def test_batch_chunks_are_neighbours_of_one_scene():
     listed = [*views(7), *views(2, other), *views(1)]
     assert tl.render_batch(listed, executor=inline, chunk=3).finish().n_made == 10
     assert inline.sizes == [3, 3, 1, 2, 1]
+
+
+def test_batch_threads_get_several_small_pictures_of_a_list():
+    threads, job = workers_of(2), views(1)[0]
+    assert [threads.together(job, n) for n in (None, 7, 8, 16, 31, 32, 1000)] == [1, 1, 1, 2, 3, 4, 4]
+    assert threads.together(replace(job, size=(1024, 1025)), 1000) == 1
+    assert threads.together(replace(job, size="large"), 1000) == 1
+    expected = pictures(41)
+    for listed in (views(41), iter(views(41))):
+        drawn = [result.picture for result in tl.render_batch(listed, executor=2)]
+        assert np.array_equal(drawn, expected)
 
 
 def test_batch_left_early_drops_what_has_not_begun():

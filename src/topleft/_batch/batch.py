@@ -144,7 +144,8 @@ def render_batch(
         URLs each is asked for.
     chunk : int, optional
         How many neighbouring jobs of one scene are handed to a worker together: less to send for each picture. Unless
-        given 1, and on a cluster as many as should take 0.2 s, by the plan of the first job of each scene.
+        given 1; on threads up to 4 of a list of jobs, of pictures of a megapixel at most; on a cluster as many as
+        should take 0.2 s, by the plan of the first job of each scene.
     window : int, optional
         How many chunks are on the way at a time; unless given, 2 a worker and 2 more.
     time_limit : float, seconds, optional
@@ -196,9 +197,8 @@ def render_batch(
         results = _one_by_one(iter(jobs), resume)
     else:
         in_flight = _InFlight(workers, n_window or 2 * workers.n_workers + 2, wish is Order.COMPLETED)
-        results = in_flight.results(
-            _chunks(iter(jobs), workers.together if n_chunk is None else lambda _: n_chunk, resume)
-        )
+        chunks = _chunks(iter(jobs), lambda job: n_chunk or workers.together(job, n_jobs), resume)
+        results = in_flight.results(chunks)
     return Batch(results, _bar(n_jobs) if progress is True else progress or None, collects=collects)
 
 

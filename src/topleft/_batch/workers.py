@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from topleft._base.arrays import as_size
 from topleft._batch.jobs import Job, JobRunner, Outcome
 from topleft._lod.levels import Level, Levels, keep_levels
 from topleft._lod.simplify import levels_of
@@ -23,6 +24,9 @@ from topleft.errors import MissingPackageError
 __all__ = ["Workers", "workers_of"]
 
 Jobs = Sequence[tuple[int, Job]]
+
+MOST_TOGETHER, SMALL_PX = 4, 1 << 20
+"""How many jobs a thread gets together, and of how large pictures."""
 
 N_SPOOLED = 8
 """Meshes whose files are kept for jobs to come, besides those that a job on the way needs."""
@@ -67,8 +71,8 @@ class Workers:
         """Submit jobs together."""
         raise NotImplementedError
 
-    def together(self, job: Job) -> int:  # noqa: ARG002
-        """How many jobs of a scene are handed over together unless the caller says."""
+    def together(self, job: Job, n_jobs: int | None) -> int:  # noqa: ARG002
+        """How many jobs of a scene are handed over together unless the caller says; of `n_jobs`, if that is known."""
         return 1
 
     def release(self, jobs: Jobs) -> None:
@@ -93,6 +97,14 @@ class BorrowedThreads(Workers):
     def submit(self, jobs: Jobs) -> Future[list[Outcome]]:
         """Submit jobs together."""
         return self._executor.submit(self._runner.draw, jobs)
+
+    def together(self, job: Job, n_jobs: int | None) -> int:
+        """Several small pictures of many that are listed: each time the caller is woken workers wait for the GIL."""
+        try:
+            width, height = as_size(job.size)
+        except (TypeError, ValueError):  # what is wrong with a job is told when it is drawn
+            return 1
+        return max(1, min(MOST_TOGETHER, (n_jobs or 0) // (4 * self.n_workers))) if width * height <= SMALL_PX else 1
 
 
 class OwnThreads(BorrowedThreads):
