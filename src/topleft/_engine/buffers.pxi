@@ -62,7 +62,7 @@ cdef class Source:
         """Snap the pixels of vertices [first, end) into records; returns the numbers of bad, wide and clipped vertices."""
         cdef tl_wide *table = <tl_wide *>&wide[0, 0] if wide is not None else NULL
         cdef tl_vertex_counts counts
-        if end - first < HELD_VERTICES:
+        if end - first == self.source.n < HELD_VERTICES:
             counts = K.snap(&self.source, first, end, subpixel_bits, with_depth, <tl_vertex *>&records[0], table)
         else:
             with nogil:
@@ -83,7 +83,7 @@ cdef class Source:
         """Project and snap vertices [first, end) into records; returns the numbers of bad, wide and clipped vertices."""
         cdef tl_wide *table = <tl_wide *>&wide[0, 0] if wide is not None else NULL
         cdef tl_vertex_counts counts
-        if end - first < HELD_VERTICES:
+        if end - first == self.source.n < HELD_VERTICES:
             counts = K.project(&self.source, first, end, &viewport.view, <tl_vertex *>&records[0], table)
         else:
             with nogil:

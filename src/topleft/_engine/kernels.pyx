@@ -69,6 +69,7 @@ cdef enum:
     LABEL = 2  # TL_SINK_LABEL
 
 # Less work than this keeps the GIL: a thread that let go of it waits for those that take it, 50 us and more each time.
+# Not so parts of a work, which threads do side by side.
 cdef enum:
     HELD_VERTICES = 1 << 15
     HELD_PX = 1 << 14  # whose light is found

@@ -182,7 +182,7 @@ def shade(SnappedMesh mesh, ShadingTable shading, const int32_t[:, ::1] ids, con
     """Write rows of the picture (H, W, 4) of a visibility buffer."""
     cdef tl_window window = mesh.window(first_row, n_rows, ids.shape[1])
     if n_rows and ids.shape[1]:
-        if n_rows * ids.shape[1] <= HELD_PX:
+        if n_rows == ids.shape[0] and n_rows * ids.shape[1] <= HELD_PX:
             K.shade(&mesh.snapped, &window, mesh.clip_view(), &shading.shading, &ids[first_row, 0], &depth[first_row, 0], &pixels[first_row, 0, 0])
         else:
             with nogil:

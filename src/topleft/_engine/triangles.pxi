@@ -229,7 +229,7 @@ cdef class SnappedMesh:
         cdef int64_t bad_row
         share.first, share.end, share.is_first, share.is_last = 0, self.snapped.n_triangles, is_first, is_last
         share.counts = &counts
-        if (n_rows * target.width + 64) * self.snapped.n_triangles < HELD_DRAWN_PX:
+        if n_rows == target.height and (n_rows * target.width + 64) * self.snapped.n_triangles < HELD_DRAWN_PX:
             bad_row = K.draw(&self.snapped, &window, &rows, &share)
         else:
             with nogil:
