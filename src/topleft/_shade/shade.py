@@ -46,6 +46,9 @@ U8 = npt.NDArray[np.uint8]
 I32 = npt.NDArray[np.int32]
 Places = tuple[npt.NDArray[np.intp], ...]
 
+MIN_PX_PER_THREAD = 1 << 14
+"""Pixels whose light is worth a thread: a tenth of a millisecond. A scene is shaded instance by instance."""
+
 
 class Shading(StrEnum):
     """What the colour of a pixel tells."""
@@ -182,7 +185,9 @@ def shade_mesh(frags: Fragments, mesh: Mesh, camera: Camera, options: ShadingOpt
             listed = None if split is None else split.split
             _engine.shade_samples(scene, look.shading, positions, ids, depth, listed, *part)
 
-    run_parts(shade_rows, len(picture), count_threads(options.threads, len(mesh.triangles)))
+    n_px = picture.shape[0] * picture.shape[1]
+    n_threads = min(count_threads(options.threads, len(mesh.triangles)), n_px // MIN_PX_PER_THREAD)
+    run_parts(shade_rows, len(picture), n_threads)
     return picture
 
 
