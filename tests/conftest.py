@@ -30,6 +30,12 @@ def pytest_collection_modifyitems(items):
             item.add_marker(pytest.mark.quick)
 
 
+@pytest.fixture
+def shared_rows(monkeypatch):
+    """Pictures however small are shaded by as many threads as are asked for."""
+    monkeypatch.setattr("topleft._shade.shade.MIN_PX_PER_THREAD", 1)
+
+
 #: Packages of the extra `test` that scenes and comparisons of tests need; the library itself never does.
 TEST_PACKAGES = frozenset({"matplotlib", "meshio", "scipy"})
 

@@ -237,6 +237,7 @@ def test_blended_through_a_lens():
     assert (bent != straight).any()
 
 
+@pytest.mark.usefixtures("shared_rows")
 @pytest.mark.parametrize("sampling", ["center", "msaa4"])
 def test_blended_threads_change_no_bit(sampling):
     one, many = (tl.render(MESH, CAMERA, SIZE, threads=n, sampling=sampling) for n in (1, 5))

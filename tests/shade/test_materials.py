@@ -234,6 +234,7 @@ def everything(threads=None, origin=(0, 0), size=SIZE, sampling="center"):
             yield tl.shade(frags, mesh, camera, threads=threads, **look)
 
 
+@pytest.mark.usefixtures("shared_rows")
 @pytest.mark.parametrize("n", [2, 8])
 def test_full_materials_threads_change_no_bit(n):
     for one, many in zip(everything(1), everything(n), strict=True):

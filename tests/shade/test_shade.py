@@ -199,6 +199,7 @@ def everything(threads=None, origin=(0, 0), size=SIZE, sampling="center"):
             yield shade(frags, COLORED, camera, shading=shading, **options)
 
 
+@pytest.mark.usefixtures("shared_rows")
 @pytest.mark.parametrize("sampling", ["center", "msaa4"])
 def test_shade_threads_change_no_bit(sampling):
     for one, three in zip(everything(1, sampling=sampling), everything(3, sampling=sampling), strict=True):
