@@ -25,7 +25,7 @@ __all__ = ["Workers", "workers_of"]
 
 Jobs = Sequence[tuple[int, Job]]
 
-MOST_TOGETHER, SMALL_PX = 4, 1 << 20
+MOST_OF_A_THREAD, SMALL_PX = 4, 1 << 20
 """How many jobs a thread gets together, and of how large pictures."""
 
 N_SPOOLED = 8
@@ -104,7 +104,7 @@ class BorrowedThreads(Workers):
             width, height = as_size(job.size)
         except (TypeError, ValueError):  # what is wrong with a job is told when it is drawn
             return 1
-        return max(1, min(MOST_TOGETHER, (n_jobs or 0) // (4 * self.n_workers))) if width * height <= SMALL_PX else 1
+        return max(1, min(MOST_OF_A_THREAD, (n_jobs or 0) // (4 * self.n_workers))) if width * height <= SMALL_PX else 1
 
 
 class OwnThreads(BorrowedThreads):

@@ -119,7 +119,7 @@ def _render(groups: Sequence[MeshJobs], options: argparse.Namespace) -> tuple[li
         results = stack.enter_context(
             render_batch(
                 jobs, executor=executor, progress=bar.step, on_error="collect", order="completed",
-                resume=options.resume, chunk=None if options.dask else 1 if isinstance(executor, int) else chunk,
+                resume=options.resume, chunk=None if options.dask or isinstance(executor, int) else chunk,
             )
         )  # fmt: skip
         for result in results:
