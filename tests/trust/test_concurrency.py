@@ -154,3 +154,10 @@ def test_a_pool_of_processes_begun_after_the_parent_has_drawn_draws():
 def test_python_that_ends_while_threads_draw_ends(end):
     ended = subprocess.run([sys.executable, "-c", EXIT + end], capture_output=True, text=True, timeout=120)
     assert (ended.returncode, ended.stderr) == (0, "")
+
+
+def test_batch_ended_by_a_signal_never_hangs_wherever_a_lock_was_taken():
+    run = [sys.executable, SUPPORT / "hostile/interrupted_batches.py"]
+    ended = subprocess.run(run, capture_output=True, text=True, timeout=120, env=environment())
+    assert ended.returncode == 0, ended.stderr
+    assert int(ended.stdout.split()[0]) > 20

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sized
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
+from concurrent.futures import BrokenExecutor, Executor, Future
 from dataclasses import dataclass
 from enum import StrEnum
+from queue import SimpleQueue
 from types import TracebackType
 from typing import Any
 
@@ -22,7 +22,7 @@ from topleft._base.arrays import as_count, as_number, shown
 from topleft._base.options import parse
 from topleft._base.whole_file import is_whole
 from topleft._batch.jobs import Job, JobRunner, Outcome, as_job
-from topleft._batch.workers import Workers, workers_of
+from topleft._batch.workers import Workers, signals_put_off, workers_of
 from topleft.errors import MeshWarning, MissingPackageError
 from topleft.typing import OnErrorOption, OrderOption
 
@@ -292,25 +292,33 @@ def _one_by_one(jobs: Iterator[object], resume: bool) -> Iterator[Result]:
         yield Result(index, job, outcome.picture, outcome.error, warnings=outcome.warnings)
 
 
-@dataclass
+@dataclass(eq=False)
 class _Task:
     """Jobs that a worker gets together; `future` is None where all are done already."""
 
     jobs: list[tuple[int, Job]]
     future: Future[list[Outcome]] | None = None
+    came: list[Outcome] | BaseException | None = None
+    has_arrived: bool = False
+
+    def end(self, future: Future[list[Outcome]]) -> None:
+        """Keep what came of it; called where it ends, so that the calling thread needs none of the future's locks."""
+        try:
+            self.came = future.result()
+        except BaseException as error:  # told by `results`
+            self.came = error
 
     def results(self) -> list[Result]:
         """What came of them."""
-        if self.future is None:
+        if self.came is None:
             return [Result(index, job, is_skipped=True) for index, job in self.jobs]
-        try:
-            outcomes = self.future.result()
-        except Exception as error:  # what a worker could not even send back
-            return [Result(index, job, error=error) for index, job in self.jobs]
-        pairs = zip(self.jobs, outcomes, strict=True)
+        if isinstance(self.came, Exception):  # what a worker could not even send back
+            return [Result(index, job, error=self.came) for index, job in self.jobs]
+        if isinstance(self.came, BaseException):
+            raise self.came
         return [
             Result(index, job, outcome.picture, outcome.error, warnings=outcome.warnings)
-            for (index, job), outcome in pairs
+            for (index, job), outcome in zip(self.jobs, self.came, strict=True)
         ]
 
 
@@ -347,13 +355,20 @@ def _is_same(one: object, other: object) -> bool:
 
 
 class _InFlight:
-    """Tasks that are on the way, a bounded number of them."""
+    """Tasks that are on the way, a bounded number of them.
+
+    Futures and executors are touched while signals are put off: a handler that raises would leave their locks taken,
+    and workers would wait for ever. What is done arrives through a queue, at which the calling thread can be
+    interrupted.
+    """
 
     def __init__(self, workers: Workers, window: int, as_completed: bool) -> None:
         self._workers = workers
         self._window = window
         self._as_completed = as_completed
-        self._tasks: deque[_Task] = deque()
+        self._tasks: dict[_Task, None] = {}
+        self._done: SimpleQueue[_Task] = SimpleQueue()
+        self._pid = os.getpid()
 
     def results(self, chunks: Iterator[tuple[list[tuple[int, Job]], bool]]) -> Iterator[Result]:
         """Yield the results of all."""
@@ -361,18 +376,24 @@ class _InFlight:
         try:
             while self._fill(chunks):
                 if self._workers.restart_after_fork():  # a fork took the workers away: what was on the way begins again
+                    self._pid, self._done = os.getpid(), SimpleQueue()
                     for task in self._tasks:
-                        if task.future is not None:
-                            task.future = self._workers.submit(task.jobs)
-                task = self._next_done() if self._as_completed else self._tasks.popleft()
+                        if task.future is not None and task.came is None:
+                            self._submit(task)
+                        elif not task.has_arrived:
+                            self._done.put(task)
+                task = self._next_done()
+                del self._tasks[task]
                 results = task.results()
                 self._workers.release(task.jobs)
                 yield from results
         finally:
-            for task in self._tasks:
-                if task.future is not None:
-                    task.future.cancel()
-            self._workers.stop([task.future for task in self._tasks if task.future is not None])
+            if self._pid == os.getpid():  # in a forked child nothing is on the way
+                with signals_put_off():
+                    self._workers.cancel([task.future for task in self._tasks if task.future is not None])
+                while not all(task.future is None or task.came is not None for task in self._tasks):
+                    self._done.get()
+            self._workers.stop()
 
     def _fill(self, chunks: Iterator[tuple[list[tuple[int, Job]], bool]]) -> bool:
         """Put tasks on the way while there is room; tell whether there are any."""
@@ -381,28 +402,38 @@ class _InFlight:
             if found is None:
                 break
             jobs, is_done = found
-            self._tasks.append(_Task(jobs, None if is_done else self._submit(jobs)))
+            task = _Task(jobs)
+            if is_done:
+                self._tasks[task] = None
+                self._done.put(task)
+            else:
+                self._submit(task)
         return bool(self._tasks)
 
-    def _submit(self, jobs: list[tuple[int, Job]]) -> Future[list[Outcome]]:
-        """Submit jobs; to workers of which one was killed they are submitted as ones that have failed for that."""
-        try:
-            return self._workers.submit(jobs)
-        except BrokenExecutor as error:
-            failed: Future[list[Outcome]] = Future()
-            failed.set_exception(error)
-            return failed
+    def _submit(self, task: _Task) -> None:
+        """Submit a task; to workers of which one was killed as one that has failed for that."""
+        sent, done = self._workers.prepare(task.jobs), self._done
+
+        def end(future: Future[list[Outcome]]) -> None:
+            task.end(future)
+            done.put(task)
+
+        with signals_put_off():
+            try:
+                task.future = self._workers.submit(sent)
+            except BrokenExecutor as error:
+                task.future = Future()
+                task.future.set_exception(error)
+            self._tasks[task] = None
+            task.future.add_done_callback(end)
 
     def _next_done(self) -> _Task:
-        """Take out a task that is done, the earliest of them."""
-
-        def is_done(task: _Task) -> bool:
-            return task.future is None or task.future.done()
-
-        if not any(map(is_done, self._tasks)):
-            wait([task.future for task in self._tasks if task.future is not None], return_when=FIRST_COMPLETED)
-        task = next(filter(is_done, self._tasks))
-        self._tasks.remove(task)
+        """Wait for the next task: in the order of the jobs, or as they are done."""
+        if self._as_completed:
+            return self._done.get()
+        task = next(iter(self._tasks))
+        while not task.has_arrived:
+            self._done.get().has_arrived = True
         return task
 
 

@@ -14,7 +14,7 @@ import os
 import threading
 from collections import OrderedDict, deque
 from collections.abc import Sequence
-from concurrent.futures import Future, wait
+from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -105,6 +105,12 @@ class ClusterWorkers(Workers):
             If one has another version.
         """
         check_workers(self._client)
+
+    def prepare(self, jobs: Jobs) -> Jobs:
+        """Return jobs, once the levels of detail are made that their mesh is sent with."""
+        if needs_levels(jobs[0][1]):
+            coarser_levels_of(jobs[0][1].scene)
+        return jobs
 
     def submit(self, jobs: Jobs) -> Future[list[Outcome]]:
         """Submit jobs together, their mesh by itself."""
@@ -249,10 +255,13 @@ class ClusterWorkers(Workers):
             if kept is not None:
                 kept.n_users -= 1
 
-    def stop(self, futures: Sequence[Future[Any]]) -> None:
-        """Wait until what has begun is finished, then free the meshes."""
+    def cancel(self, futures: Sequence[Future[Any]]) -> None:
+        """Drop what has not begun; what is lost from now on is not sent again."""
         self._ends = True
-        wait(futures)
+        super().cancel(futures)
+
+    def stop(self) -> None:
+        """Free the meshes."""
         with self._lock:
             self._kept.clear()
 

@@ -6,9 +6,12 @@ Input: the `executor` of a batch, and jobs. Output: futures of outcomes.
 from __future__ import annotations
 
 import os
+import signal
+import threading
 from collections import OrderedDict
-from collections.abc import Sequence
-from concurrent.futures import Executor, Future, wait
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Executor, Future
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -21,7 +24,7 @@ from topleft._model.mesh import Mesh
 from topleft._scene.scene import Scene
 from topleft.errors import MissingPackageError
 
-__all__ = ["Workers", "workers_of"]
+__all__ = ["Workers", "signals_put_off", "workers_of"]
 
 Jobs = Sequence[tuple[int, Job]]
 
@@ -30,6 +33,35 @@ MOST_OF_A_THREAD, SMALL_PX = 4, 1 << 20
 
 N_SPOOLED = 8
 """Meshes whose files are kept for jobs to come, besides those that a job on the way needs."""
+
+
+@contextmanager
+def signals_put_off() -> Iterator[None]:
+    """Let SIGINT and SIGTERM wait for their handlers in Python, which may raise, until the block is left.
+
+    A mask would not do: another thread gets the signal then, and the handler runs in the main thread all the same.
+    """
+    if threading.current_thread() is threading.main_thread():
+        with _put_off(signal.SIGINT), _put_off(signal.SIGTERM):
+            yield
+    else:
+        yield
+
+
+@contextmanager
+def _put_off(number: signal.Signals) -> Iterator[None]:
+    handler = signal.getsignal(number)
+    if not callable(handler):
+        yield
+        return
+    came: list[int] = []
+    try:
+        signal.signal(number, lambda number, _: came.append(number))
+        yield
+    finally:
+        signal.signal(number, handler)
+        if came:
+            signal.raise_signal(number)
 
 
 def workers_of(executor: object) -> Workers | None:
@@ -67,8 +99,12 @@ class Workers:
     def start(self) -> None:
         """Get ready; called before the first job."""
 
+    def prepare(self, jobs: Jobs) -> Jobs:
+        """Return jobs as they are submitted; what takes long is done here, where signals are heard."""
+        return jobs
+
     def submit(self, jobs: Jobs) -> Future[list[Outcome]]:
-        """Submit jobs together."""
+        """Submit jobs together, as `prepare` returns them."""
         raise NotImplementedError
 
     def together(self, job: Job, n_jobs: int | None) -> int:  # noqa: ARG002
@@ -82,9 +118,13 @@ class Workers:
         """Return whether a fork had ended the workers, which have been started again."""
         return False
 
-    def stop(self, futures: Sequence[Future[Any]]) -> None:
-        """Wait until what has begun is finished; not for what was cancelled: broken pools forget it."""
-        wait([future for future in futures if not future.cancelled()])
+    def cancel(self, futures: Sequence[Future[Any]]) -> None:
+        """Drop what has not begun."""
+        for future in futures:
+            future.cancel()
+
+    def stop(self) -> None:
+        """Free what the batch has kept; called when all that had begun is finished."""
 
 
 class BorrowedThreads(Workers):
@@ -128,8 +168,8 @@ class OwnThreads(BorrowedThreads):
         self.start()
         return True
 
-    def stop(self, futures: Sequence[Future[Any]]) -> None:  # noqa: ARG002
-        """Wait until what has begun is finished, then end the threads."""
+    def stop(self) -> None:
+        """End the threads."""
         if self._pid == os.getpid():
             self._executor.shutdown(cancel_futures=True)
 
@@ -149,19 +189,21 @@ class LocalProcesses(Workers):
         """Get ready."""
         self._spool = Spool()
 
+    def prepare(self, jobs: Jobs) -> Jobs:
+        """Return jobs with their meshes replaced by where to find them."""
+        return [(index, replace(job, scene=self._spool.hold(job.scene, needs_levels(job)))) for index, job in jobs]
+
     def submit(self, jobs: Jobs) -> Future[list[Outcome]]:
-        """Submit jobs together, their meshes replaced by where to find them."""
-        light = [(index, replace(job, scene=self._spool.hold(job.scene, needs_levels(job)))) for index, job in jobs]
-        return self._executor.submit(draw_in_process, self._spool.token, light)
+        """Submit jobs together."""
+        return self._executor.submit(draw_in_process, self._spool.token, list(jobs))
 
     def release(self, jobs: Jobs) -> None:
         """Free their meshes."""
         for _, job in jobs:
             self._spool.release(job.scene, needs_levels(job))
 
-    def stop(self, futures: Sequence[Future[Any]]) -> None:
-        """Wait until what has begun is finished, then remove the files."""
-        super().stop(futures)
+    def stop(self) -> None:
+        """Remove the files."""
         self._spool.close()
 
 
