@@ -91,6 +91,7 @@ const tl_kernels TL_KERNELS = {
     .measure_clusters = measure_clusters,
     .survey_clusters = survey_clusters,
     .count_hidden = count_hidden,
+    .find_shown = find_shown,
     .drop_sides = drop_sides_of_mesh,
     .list_edges = list_edges,
     .draw_lines = draw_lines,

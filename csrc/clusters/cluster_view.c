@@ -346,6 +346,20 @@ static int64_t count_hidden(const tl_clustered *mesh, const tl_cluster_view *v, 
     return n;
 }
 
+/* Tells of n boxes, each under a matrix of its own, whether they may show: not outside of the window, nor, with a target
+ * of depths, behind what it shows. */
+static void find_shown(const tl_cluster_view *view, const double *boxes, const double *matrices, int64_t n,
+                       const tl_window *window, const tl_target *target, uint8_t *shown)
+{
+    tl_cluster_view own = *view;
+    for (int64_t i = 0; i < n; i++) {
+        memcpy(own.matrix, matrices + 16 * i, sizeof own.matrix);
+        const seen_box box = place_box(boxes + 6 * i, boxes + 6 * i + 3, own.matrix);
+        unsigned within = 0;
+        shown[i] = !is_outside(&box, &own, &within) && !(target && is_hidden(&box, &own, window, target, INT64_MAX));
+    }
+}
+
 /* A cluster as a mesh of its own. */
 typedef struct {
     tl_snapped snapped;

@@ -1,5 +1,7 @@
 """Scenes: instances into one buffer, bit for bit the picture of one mesh that holds all of them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from comparing import assert_same
@@ -10,10 +12,12 @@ import topleft as tl
 from topleft import _engine
 from topleft._base.color import srgb_tables
 from topleft._camera.camera import Camera
+from topleft._raster import choices
 from topleft._raster.snap import Snapped
-from topleft._render import instances
+from topleft._render import fragments, instances
 from topleft._render.fragments import SceneFragments
 from topleft._render.render import rasterize_mesh
+from topleft._scene import scene as placed
 from topleft.methods.reference.sampling import mean
 
 
@@ -251,10 +255,84 @@ def test_scene_without_instances_is_refused():
         tl.Scene([])
 
 
-def test_scene_of_too_many_triangles_is_refused():
-    mesh = tl.Mesh([[0, 0, 0]], np.zeros((1 << 20, 3), np.int32))
-    with pytest.raises(ValueError, match=f"a scene must have at most {2**31 - 1} triangles, got {2**31}"):
-        tl.Scene([mesh] * 2048)
+BENT = replace(tl.Camera.look_at((0, 0, 5)), lens=tl.FisheyeLens())
+CORNERS_OF_A_SQUARE = [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]
+LARGE = tl.Mesh(CORNERS_OF_A_SQUARE, np.tile(np.array([[0, 1, 2], [0, 2, 3]], np.int32), (1 << 19, 1)))
+
+
+def large_scene():
+    """2,049 squares of a million triangles, all but the first and the last behind the first: 2**31 + 2**20 in all."""
+    matrices = np.tile(np.eye(4), (2049, 1, 1))
+    matrices[:, :3, 3] = [-1, 0, -5]
+    matrices[1:-1, :3, :3] *= 0.25
+    matrices[0, :3, 3], matrices[-1, :3, 3] = [-1, 0, 0], [1.2, 0, 0]
+    return tl.Scene([(LARGE, matrix) for matrix in matrices])
+
+
+def test_scene_of_more_triangles_than_int32_counts_is_drawn():
+    scene, camera, size = large_scene(), tl.Camera.look_at((0, 0, 5)), (64, 48)
+    frags = tl.rasterize_mesh(scene, camera, size)
+    few = tl.rasterize_mesh(tl.Scene([scene[0], scene[2048]]), camera, size)
+    assert set(np.unique(few.instance)) == {-1, 0, 1}
+    assert frags.id.dtype == np.int64
+    assert np.array_equal(frags.instance, np.where(few.instance == 1, 2048, few.instance))
+    assert np.array_equal(frags.triangle, few.triangle)
+    assert np.array_equal(frags.id, np.where(few.mask, (frags.instance.astype(np.int64) << 20) + few.triangle, -1))
+    assert np.array_equal(frags.depth, few.depth)
+    assert np.array_equal(frags.barycentric(), few.barycentric())
+
+
+@pytest.mark.parametrize(
+    ("verb", "what"),
+    [
+        (lambda scene, camera: tl.visible_layers(scene, camera, (8, 8)), "a scene that is peeled"),
+        (lambda scene, camera: tl.rasterize_mesh(scene, BENT, (8, 8)), "a scene behind a lens"),
+    ],
+)
+def test_scene_of_more_triangles_than_int32_counts_is_refused_where_it_has_to_be(verb, what):
+    with pytest.raises(ValueError, match=f"{what} must have at most {2**31 - 1} triangles, got {2**31 + 2**20}"):
+        verb(large_scene(), tl.Camera.look_at((0, 0, 5)))
+
+
+def random_scene(rng):
+    """Instances of three meshes anywhere, some twice in one place, some mirrored, and a camera."""
+    spread = float(rng.choice([1, 3, 10]))
+    standing: list[tl.Instance] = []
+    for _ in range(int(rng.choice([2, 17, 40]))):
+        matrix = np.eye(4)
+        matrix[:3, :3] *= rng.choice([0.3, 1, 2, -1])
+        matrix[:3, 3] = rng.normal(0, spread, 3)
+        again = standing[-1].transform if standing and rng.random() < 0.2 else matrix
+        standing.append(tl.Instance(BALLS[int(rng.integers(len(BALLS)))], again))
+    return standing, tl.Camera.look_at(rng.normal(0, spread, 3), rng.normal(0, 0.3, 3), fov_y_deg=rng.uniform(20, 100))
+
+
+BALLS = [tl.Mesh(vertices.astype(dtype), triangles)
+         for dtype in (np.float32, np.float64) for vertices, triangles in (tl.scenes.blob(700),)]  # fmt: skip
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize("most_ids", [2**31 - 1, 5000, 1500])
+@pytest.mark.parametrize("seed", range(6))
+def test_instances_in_rounds_and_groups_are_drawn_as_one_after_the_other(isa, seed, most_ids, monkeypatch):
+    rng = np.random.default_rng(seed)
+    standing, camera = random_scene(rng)
+    options = {
+        "cull": str(rng.choice(["none", "back", "front"])), "depth_test": [None, "less", "greater"][seed % 3],
+        "threads": int(rng.choice([1, 3])), "sampling": ["center", "msaa2"][seed % 2],
+    }  # fmt: skip
+    whole = tl.rasterize_mesh(tl.Scene(standing), camera, (60, 40), **options)
+    monkeypatch.setattr(choices, "pays_to_cluster", lambda *_: True)
+    monkeypatch.setattr(choices, "pays_to_draw_instances", lambda *_: True)
+    monkeypatch.setattr(instances, "FIRST_ROUND", int(rng.choice([1, 4])))
+    for module in (placed, instances, fragments):
+        monkeypatch.setattr(module, "INT32_MAX", most_ids)
+    with on(isa):
+        found = tl.rasterize_mesh(tl.Scene(standing), camera, (60, 40), **options)
+    assert found.id.dtype == (np.int64 if 700 * len(standing) > most_ids else np.int32)
+    for name in ("id", "depth", "instance", "triangle", "samples_id", "samples_instance", "samples_triangle"):
+        assert np.array_equal(getattr(found, name), getattr(whole, name)), name
+    assert np.array_equal(found.barycentric(), whole.barycentric())
 
 
 @pytest.mark.parametrize("instance", [3, b"cube", (CUBE,), None, [CUBE, CUBE], tl.Scene([CUBE])])

@@ -4,6 +4,7 @@ blocks.pxi     keeps the memory of arrays that have died for arrays to come
 buffers.pxi    describes what a pass reads and writes: viewport, vertices, buffers, indices, clipped pieces
 clusters.pxi   sorts a mesh into clusters and draws those that a view needs
 contract.pxi   declares the structs and kernels of csrc
+detail.pxi     bounds how far points may be off in a picture: what levels of detail are chosen by
 exact.pxi      draws triangles whose vertices are not snapped
 isa.py         chooses the instruction set that runs, and tells how this copy was built
 kernels.pyx    holds the kernel table in use; includes the parts, and gives their names to Python

@@ -111,6 +111,20 @@ cdef class ClusterView:
         v.is_farthest, v.cull = is_farthest, mesh.snapped.cull
 
 
+def find_shown(SnappedMesh mesh, ClusterView view, const double[:, ::1] boxes, const double[:, :, ::1] matrices, Target target, bint is_drawn,
+               uint8_t[::1] shown):
+    """Tell of boxes (N, 6), each under a matrix of its own (N, 4, 4), whether they may show in a picture.
+
+    They do not where they lie outside of it or, if it `is_drawn`, behind what it shows. `view`: with any matrix; `mesh`:
+    how it is seen.
+    """
+    cdef tl_window window = mesh.window(0, target.height, target.width)
+    cdef tl_target rows = target.rows(0)
+    if boxes.shape[0]:
+        with nogil:
+            K.find_shown(&view.view, &boxes[0, 0], &matrices[0, 0, 0], boxes.shape[0], &window, &rows if is_drawn else NULL, &shown[0])
+
+
 cdef class Clustered:
     """A mesh in object space, sorted into clusters; keeps what it points to alive."""
 

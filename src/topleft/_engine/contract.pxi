@@ -498,6 +498,7 @@ cdef extern from "topleft.h" nogil:
         int64_t (*cut_clusters)(const int32_t *, const int32_t *, int64_t, int32_t *, tl_cluster *, int32_t *, uint8_t *, int64_t *) noexcept nogil
         void (*measure_clusters)(const tl_source *, const uint8_t *, int64_t, int64_t, tl_cluster *, double *) noexcept nogil
         void (*survey_clusters)(const tl_clustered *, const tl_cluster_view *, int64_t, int64_t *) noexcept nogil
+        void (*find_shown)(const tl_cluster_view *, const double *, const double *, int64_t, const tl_window *, const tl_target *, uint8_t *) noexcept nogil
         int64_t (*count_hidden)(const tl_clustered *, const tl_cluster_view *, const tl_window *, const tl_target *, int64_t,
                                 int64_t *) noexcept nogil
         int64_t (*first_bad)(const tl_vertex *, int64_t, const int32_t *, int64_t) noexcept nogil

@@ -469,6 +469,21 @@ class ClusterView:
         is_farthest: bool,
     ) -> None: ...
 
+def pixels_per_unit(matrix: F64, size: tuple[int, int], window: F64, extents: F64) -> float | None: ...
+def coarsest_levels(
+    matrices: F64,
+    size: tuple[int, int],
+    window: F64,
+    extents: F64,
+    bounds: F64,
+    tolerance: float,
+    levels: I64,
+    scales: F64,
+) -> None: ...
+def find_shown(
+    mesh: SnappedMesh, view: ClusterView, boxes: F64, matrices: F64, target: Target, is_drawn: bool, shown: U8
+) -> None: ...
+
 class Clustered:
     n_triangles: int
     def __init__(self, clusters: U8, group_boxes: F64, corners: U8, names: I32) -> None: ...

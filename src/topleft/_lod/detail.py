@@ -15,30 +15,27 @@ pixels, shear, the edge of the frame and instances that are scaled are in the ma
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from itertools import product
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from numpy.typing import NDArray
 
 from topleft import _engine
 from topleft._base.arrays import as_number, as_size, shown
 from topleft._camera.camera import Camera, CameraLike, as_camera
-from topleft._lod.levels import Extent, Level, Levels
+from topleft._lod.levels import Level, Levels
 from topleft._lod.simplify import levels_of
 from topleft._model.material import Material
 from topleft._model.mesh import Mesh, has_holes
 from topleft._scene.adapt import MeshLike, as_mesh
-from topleft._scene.scene import Scene
+from topleft._scene.scene import Scene, meshes_of
 from topleft.typing import CullOption
 
 __all__ = ["Detail", "check_tolerance", "choose_detail", "detailed", "pixels_of_bound"]
 
 F64 = npt.NDArray[np.float64]
-Rows = Sequence[Sequence[float]]
-Ends = tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -148,50 +145,51 @@ def choose_detail(
     levels = levels_of(mesh)
     if len(levels) == 1:
         return whole("it has no coarser level")
-    scale_of = scales(camera, size, viewport, origin, transform)
+    sight = sight_of(camera, size, viewport, origin)
+    place = None if transform is None else np.asarray(transform, np.float64)
 
     def rejected(i: int) -> str:
-        scale = scale_of(levels[0], levels[i])
+        scale = sight.scale_of(place, levels[0], levels[i])
         off = "reach the near or the far plane, or the eye"
         if scale is not None:
             off = f"be off by {levels[i].bound * scale:.3g} px"
         return f"level {i}, {len(levels[i].mesh.triangles):,} triangles: may {off}"
 
-    i, bound_px = coarsest(levels, scale_of, tolerance)
+    matrix = sight.clip_from_world if place is None else _engine.product(sight.clip_from_world, place)
+    (i,), (scale,) = (found.tolist() for found in sight.coarsest(matrix[None], levels, tolerance))
     if i == 0:
         return whole(f"no coarser level is sure to be within {tolerance:g} px", (rejected(1),))
+    bound_px = levels[i].bound * scale
     why = f"no point that shows is off by more than {bound_px:.3g} px, and {tolerance:g} px are allowed"
     others = [rejected(i + 1)] if i + 1 < len(levels) else []
     others.append(f"the mesh itself, {n:,} triangles: finer than the picture has to be")
     return Detail(i, levels[i].mesh, levels[i].bound, bound_px, tolerance, n, why, tuple(others))
 
 
-def scales(
-    camera: Camera,
-    size: tuple[int, int],
-    viewport: tuple[int, int] | None,
-    origin: tuple[int, int],
-    transform: npt.ArrayLike | None,
-) -> Callable[..., float | None]:
-    """What tells how many pixels a unit is at most on some levels, as `pixels_per_unit`, in a view."""
-    matrix = camera.clip_from_world(viewport or size)
-    if transform is not None:
-        matrix = _engine.product(matrix, np.asarray(transform, np.float64))
-    rows, window = matrix.tolist(), window_of(size, viewport, origin)
-    return lambda *levels: pixels_per_unit(rows, viewport or size, window, [level.extent for level in levels])
+class Sight(NamedTuple):
+    """What a view says of how far points may be off."""
+
+    clip_from_world: F64
+    viewport: tuple[int, int]
+    window: F64  # as `window_of` gives it
+
+    def scale_of(self, place: F64 | None, *levels: Level) -> float | None:
+        """How many pixels a unit is at most on some levels; None where nothing is known of that."""
+        matrix = self.clip_from_world if place is None else _engine.product(self.clip_from_world, place)
+        return _engine.pixels_per_unit(matrix, self.viewport, self.window, np.stack([level.extent for level in levels]))
+
+    def coarsest(self, matrices: F64, levels: Levels, tolerance: float) -> tuple[NDArray[np.int64], F64]:
+        """The last level that is sure to be within a tolerance under each matrix, 0 for none, and its scale."""
+        found: NDArray[np.int64] = np.empty(len(matrices), np.int64)
+        scales: F64 = np.empty(len(matrices))
+        given = matrices, self.viewport, self.window, levels.extents, levels.bounds, tolerance
+        _engine.coarsest_levels(*given, found, scales)
+        return found, scales
 
 
-def coarsest(levels: Levels, scale_of: Callable[..., float | None], tolerance: float) -> tuple[int, float]:
-    """The last level that is sure to be within a tolerance, and its bound in pixels; 0 for none but the first."""
-    least_scale = scale_of(levels[0])
-    if least_scale is None:
-        return 0, 0.0
-    for i in reversed(range(1, len(levels))):
-        if levels[i].bound * least_scale <= tolerance:  # it is no less where the level reaches beyond the mesh
-            scale = scale_of(levels[0], levels[i])
-            if scale is not None and levels[i].bound * scale <= tolerance:
-                return i, levels[i].bound * scale
-    return 0, 0.0
+def sight_of(camera: Camera, size: tuple[int, int], viewport: tuple[int, int] | None, origin: tuple[int, int]) -> Sight:
+    """What a view says of how far points may be off."""
+    return Sight(camera.clip_from_world(viewport or size), viewport or size, window_of(size, viewport, origin))
 
 
 def check_tolerance(tolerance: float) -> float:
@@ -216,8 +214,8 @@ def why_whole(mesh: Mesh, camera: Camera, tolerance: float, cull: str, material:
     return None
 
 
-def window_of(size: tuple[int, int], viewport: tuple[int, int] | None, origin: tuple[int, int]) -> list[Ends]:
-    """Where in normalised device coordinates pixels are looked at: lower and upper x, and y.
+def window_of(size: tuple[int, int], viewport: tuple[int, int] | None, origin: tuple[int, int]) -> F64:
+    """Where in normalised device coordinates pixels are looked at: lower and upper x, and y, (4,).
 
     All of the viewport, so that a window of a picture has the level of the whole; more where the window has more.
     """
@@ -225,12 +223,10 @@ def window_of(size: tuple[int, int], viewport: tuple[int, int] | None, origin: t
     for first, n, whole in zip(origin, size, viewport or size, strict=True):
         low, high = min(0, first), max(whole, first + n)
         ends.append((2 * (low - 1) / max(whole, 1) - 1, 2 * (high + 1) / max(whole, 1) - 1))
-    return [ends[0], (-ends[1][1], -ends[1][0])]
+    return np.array([*ends[0], -ends[1][1], -ends[1][0]])
 
 
-def pixels_of_bound(
-    matrix: F64, viewport: tuple[int, int], window: Sequence[Ends], original: Level, level: Level
-) -> float | None:
+def pixels_of_bound(matrix: F64, viewport: tuple[int, int], window: F64, original: Level, level: Level) -> float | None:
     """How far a point that shows may be off, pixels; None where nothing is known of that.
 
     Parameters
@@ -238,75 +234,12 @@ def pixels_of_bound(
     matrix : (4, 4) float64
         Clip from object.
     viewport : (width, height), pixels
-    window : two pairs of float
+    window : (4,) float64
         What `window_of` gives.
     original, level : Level
     """
-    scale = pixels_per_unit(matrix.tolist(), viewport, window, [original.extent, level.extent])
+    scale = _engine.pixels_per_unit(matrix, viewport, window, np.stack([original.extent, level.extent]))
     return None if scale is None else level.bound * scale
-
-
-def pixels_per_unit(
-    matrix: Rows, viewport: tuple[int, int], window: Sequence[Ends], extents: Sequence[Extent]
-) -> float | None:
-    """How many pixels a point that shows moves at most where it moves by one unit, on surfaces of these extents.
-
-    Never less for more surfaces. In numbers of Python, of which all take as long as a few calls of NumPy.
-    """
-    of_x, of_y, of_z, of_w = matrix
-    box = Box([min(lows) for lows in zip(*(one.low for one in extents), strict=True)],
-              [max(highs) for highs in zip(*(one.high for one in extents), strict=True)])  # fmt: skip
-    nearest = least(of_w, box, extents)
-    ends = [[w + sign * z for w, z in zip(of_w, of_z, strict=True)] for sign in (1.0, -1.0)]
-    if not nearest > 0 or not all(least(row, box, extents) >= 0 for row in ends):
-        return None
-    if box.least(of_w) > 0:  # then the box shows nowhere but between its corners
-        shown = box.places(of_x, of_y, of_w)
-        window = [(max(end[0], min(at)), min(end[1], max(at))) for end, at in zip(window, shown, strict=True)]
-        if any(low > high for low, high in window):
-            return 0.0
-    moves = [
-        [[n / 2 * (a - u * w) for a, w in zip(row[:3], of_w[:3], strict=True)] for u in at]
-        for row, n, at in zip((of_x, of_y), viewport, window, strict=True)
-    ]
-    # A billionth more for what float64 rounds here.
-    return max(stretch(right, down) for right, down in product(*moves)) / nearest * (1 + 1e-9)
-
-
-class Box(NamedTuple):
-    """The least and the largest coordinates of some surfaces."""
-
-    low: list[float]
-    high: list[float]
-
-    def least(self, row: Sequence[float]) -> float:
-        """The least value of an affine function in it."""
-        (x, y, z, constant), low, high = row, self.low, self.high
-        return constant + min(x * low[0], x * high[0]) + min(y * low[1], y * high[1]) + min(z * low[2], z * high[2])
-
-    def places(self, of_x: Sequence[float], of_y: Sequence[float], of_w: Sequence[float]) -> tuple[list[float], ...]:
-        """The picture of its corners: all x / w, all y / w."""
-        corners = [(corner, dot(of_w, corner) + of_w[3]) for corner in product(*zip(self.low, self.high, strict=True))]
-        return [(dot(of_x, at) + of_x[3]) / w for at, w in corners], [
-            (dot(of_y, at) + of_y[3]) / w for at, w in corners
-        ]
-
-
-def least(row: Sequence[float], box: Box, extents: Sequence[Extent]) -> float:
-    """A bound from below on an affine function on all surfaces: by their box, or by their spheres."""
-    length = math.sqrt(dot(row, row))
-    return max(box.least(row), row[3] + min(dot(row, one.center) - length * one.radius for one in extents))
-
-
-def stretch(a: Sequence[float], b: Sequence[float]) -> float:
-    """The largest singular value of a matrix of two rows."""
-    aa, ab, bb = dot(a, a), dot(a, b), dot(b, b)
-    return math.sqrt((aa + bb) / 2 + math.hypot((aa - bb) / 2, ab))
-
-
-def dot(a: Sequence[float], b: Sequence[float]) -> float:
-    """The product of the first three numbers of each."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def detailed(
@@ -319,8 +252,15 @@ def detailed(
         return mesh
     if isinstance(mesh, Mesh):
         return level_of(mesh, camera, size, tolerance, **options)
-    own = [level_of(one.mesh, camera, size, tolerance, transform=one.transform, **options) for one in mesh]
-    return Scene([replace(one, mesh=level) for one, level in zip(mesh, own, strict=True)])
+    sight = sight_of(camera, size, options.get("viewport"), options.get("origin", (0, 0)))
+    matrices = mesh.clip_from_objects(sight.clip_from_world)
+    meshes = meshes_of(mesh)
+    for one, at in mesh.meshes.values():
+        if not why_whole(one, camera, tolerance, options.get("cull", "none"), options.get("material")):
+            levels = levels_of(one)
+            for i, level in zip(at.tolist(), sight.coarsest(matrices[at], levels, tolerance)[0].tolist(), strict=True):
+                meshes[i] = levels[level].mesh if level else one
+    return mesh.with_meshes(meshes)
 
 
 def level_of(
@@ -333,10 +273,10 @@ def level_of(
     material: Material | None = None,
     viewport: tuple[int, int] | None = None,
     origin: tuple[int, int] = (0, 0),
-    transform: npt.ArrayLike | None = None,
 ) -> Mesh:
     """The mesh of `choose_detail`, of checked arguments, without its words."""
     if why_whole(mesh, camera, tolerance, cull, material):
         return mesh
-    levels = levels_of(mesh)
-    return levels[coarsest(levels, scales(camera, size, viewport, origin, transform), tolerance)[0]].mesh
+    levels, sight = levels_of(mesh), sight_of(camera, size, viewport, origin)
+    level = int(sight.coarsest(sight.clip_from_world[None], levels, tolerance)[0][0])
+    return levels[level].mesh if level else mesh

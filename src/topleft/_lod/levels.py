@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -30,15 +30,6 @@ F64 = npt.NDArray[np.float64]
 
 #: The arrays of a mesh, by the names that they have in files.
 ARRAYS = ("vertices", "triangles", "normals", "colors", "uv", "uv1", "material_of_triangle")
-
-
-class Extent(NamedTuple):
-    """Where a surface lies, in numbers of Python: a view asks for a few of them, not for arrays."""
-
-    low: list[float]
-    high: list[float]
-    center: list[float]
-    radius: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,14 +57,13 @@ class Level:
     known: float = 0.0
 
     @cached_property
-    def extent(self) -> Extent:
-        """The box and the sphere round it all."""
+    def extent(self) -> F64:
+        """The box round it all, lowest and highest x, y, z, and the sphere, centre and radius: (10,) float64."""
         box = self.mesh.bounds
         center, radius = bounding_sphere(self.mesh.extreme_points())
         if not (np.isfinite(box).all() and np.isfinite(radius)):
-            return Extent([-math.inf] * 3, [math.inf] * 3, [0.0] * 3, math.inf)
-        low, high = box.tolist()
-        return Extent(low, high, center.tolist(), float(radius))
+            return np.array([-math.inf] * 3 + [math.inf] * 3 + [0.0] * 3 + [math.inf])
+        return np.array([*box.ravel(), *center, radius])
 
 
 class Levels(Sequence[Level]):
@@ -100,6 +90,16 @@ class Levels(Sequence[Level]):
         # Not the mesh itself: it is what keeps its levels alive, and a circle would keep both for ever.
         self._original = Level(replace(mesh))
         self._coarser = tuple(coarser)
+
+    @cached_property
+    def extents(self) -> F64:
+        """That of each level, (N, 10) float64."""
+        return np.stack([level.extent for level in self])
+
+    @cached_property
+    def bounds(self) -> F64:
+        """That of each level, (N,) float64."""
+        return np.array([level.bound for level in self], np.float64)
 
     def __len__(self) -> int:
         return 1 + len(self._coarser)

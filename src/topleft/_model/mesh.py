@@ -228,6 +228,11 @@ class Mesh:
         """Lowest and highest x, y, z of all finite vertices, (6,) float64; zeros without any."""
         return box_of(self.vertices)
 
+    @cached_property
+    def is_finite(self) -> bool:
+        """Whether all vertices are finite."""
+        return bool(np.isfinite(self.vertices).all())
+
     def note_drawn(self) -> int:
         """Note that there is a picture of the mesh; returns how many there were before."""
         n_drawn: int = self.__dict__.get("_n_drawn", 0)

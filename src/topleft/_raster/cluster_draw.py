@@ -111,6 +111,10 @@ class ClusteredMesh:
         n_others, _, n_drawn = clusters.engine.draw(empty, self._own, seen, may_be_hidden, *place, is_first, is_last)
         return others[:n_others].copy(), n_drawn
 
+    def seen(self, sink: int) -> tuple[_engine.ClusterView, _engine.SnappedMesh]:
+        """Return what boxes need to know of the picture, under this mesh's matrix, and how it is seen."""
+        return self._seen(sink), self._empty
+
     def count_drawn(self, sink: Sink) -> int:
         """Return how many clusters the picture draws, by one thread: those that are not left out, nor hidden."""
         width, height = self._view.size
@@ -228,8 +232,11 @@ def draw_clustered(
     target: _engine.Target,
     height: int,
     sample: tuple[int, int] = (0, 0),
+    *,
+    is_first: bool = True,
+    is_last: bool = True,
 ) -> bool:
-    """Clear a target and draw meshes, a thread for each memory.
+    """Clear a target and draw meshes, a thread for each memory; of several calls the first clears, the last finishes.
 
     Returns False, with the target in any state, where a vertex does not fit or is not finite: the whole meshes are then
     to be drawn, which tells why.
@@ -239,7 +246,9 @@ def draw_clustered(
     def draw_rows(i: int, _: int) -> list[NDArray[np.int32]]:
         rows = height * i // n_parts, height * (i + 1) // n_parts
         return [
-            mesh.draw_rows(memories[i], target, *rows, sample=sample, is_first=k == 0, is_last=k == last)[0]
+            mesh.draw_rows(
+                memories[i], target, *rows, sample=sample, is_first=is_first and k == 0, is_last=is_last and k == last
+            )[0]
             for k, mesh in enumerate(meshes)
         ]
 

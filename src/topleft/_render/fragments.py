@@ -16,7 +16,7 @@ import numpy.typing as npt
 from numpy.typing import NDArray
 
 from topleft import _engine
-from topleft._base.arrays import as_array, set_aligned, shown
+from topleft._base.arrays import INT32_MAX, as_aligned, as_array, set_aligned, shown
 from topleft._base.memory import empty
 from topleft._camera.camera import Camera
 from topleft._model.mesh import Mesh
@@ -32,6 +32,9 @@ __all__ = [
     "BentFragments", "Part", "SceneDepthLayers", "SceneFragments", "VisiblePart", "join",
     "parts_of",
 ]  # fmt: skip
+
+Ids = NDArray[np.int32] | NDArray[np.int64]
+"""What counts the triangles of all instances: int64 where int32 does not."""
 
 WHOLE = slice(None), slice(None)
 """The box of a part that is all of the picture."""
@@ -105,7 +108,7 @@ def join(
 class InstanceIds:
     """What ids of triangles of all instances tell, of a buffer or of layers."""
 
-    id: NDArray[np.int32]
+    id: Any  # Ids
     placed: Any
 
     @cached_property
@@ -131,7 +134,8 @@ class SceneFragments(InstanceIds, Fragments):
     triangle : ndarray of int32, shape (H, W)
         Index of its triangle in the mesh of that instance, -1 where there is none.
     id : ndarray of int32, shape (H, W)
-        The triangles of all instances counted in their order: the number that decides ties.
+        The triangles of all instances counted in their order: the number that decides ties. int64 where there are more
+        than 2**31 - 1 of them.
     depth, mask
         As in `Fragments`. `interpolate` takes a sequence of arrays, one of each instance, all with as many channels.
     samples_instance, samples_triangle, samples_id, samples_depth : ndarray, shape (H, W, S)
@@ -147,14 +151,10 @@ class SceneFragments(InstanceIds, Fragments):
     (0, -1)
     """
 
-    _planes: tuple[NDArray[np.int32], NDArray[np.float32]]
+    _planes: Any  # Ids, and depth
 
     def __init__(
-        self,
-        ids: NDArray[np.int32],
-        depth: NDArray[np.float32],
-        placed: PlacedScene,
-        positions: Sequence[tuple[int, int]],
+        self, ids: Ids, depth: NDArray[np.float32], placed: PlacedScene, positions: Sequence[tuple[int, int]]
     ) -> None:
         """Take planes (S, H, W) of what was drawn, and where their samples lie."""
         self.drawn_planes = ids, depth
@@ -182,11 +182,9 @@ class SceneFragments(InstanceIds, Fragments):
     @cached_property
     def _found(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
         """Which instance shows (H, W), and the boxes of pixels round each (N, 4): left, top, right, bottom."""
-        ids = np.require(self.id, np.int32, ["C", "A"])
-        instance = empty(ids.shape, np.int32)
+        ids: Ids = np.ascontiguousarray(as_aligned(self.id))
         boxes = np.tile(np.array([*ids.shape[::-1], 0, 0], np.int32), (len(self.placed.whole_first_ids) - 1, 1))
-        _engine.find_instances(ids, self.placed.whole_first_ids, instance, boxes)
-        return instance, boxes
+        return find_instances(ids, self.placed.whole_first_ids, boxes), boxes
 
     @cached_property
     def instance(self) -> NDArray[np.int32]:
@@ -211,7 +209,7 @@ class SceneFragments(InstanceIds, Fragments):
 
     def only(self, rows: NDArray[np.intp], cols: NDArray[np.intp]) -> SceneFragments:
         """Return what is left when no other pixels than these show a triangle."""
-        ids = np.full((1, *self.id.shape), -1, np.int32)
+        ids = np.full((1, *self.id.shape), -1, self.id.dtype)
         ids[0, rows, cols] = self.drawn_planes[0][0, rows, cols]
         return SceneFragments(ids, self.depth[None], self.placed, self.positions[:1])
 
@@ -226,8 +224,7 @@ class SceneFragments(InstanceIds, Fragments):
             left, top, right, bottom = boxes[i].tolist()
             box = slice(top, bottom), slice(left, right)
             first, end = self.placed.first_ids[i : i + 2].tolist()
-            own = self.drawn_planes[0][0][box] - np.int32(first)
-            own[own.view(np.uint32) >= end - first] = -1
+            own = local_part(self.drawn_planes[0][0][box], first, end)
             scene = self.placed.snap_part(i, own).seen_from(*self.positions[0]).moved(left, top)
             mesh = self.placed.scene[i].mesh
             frags = Fragments(own, self.depth[box], scene, len(mesh.vertices), len(mesh.triangles))
@@ -308,7 +305,7 @@ class SceneDepthLayers(InstanceIds, DepthLayers):
         return
 
     @property
-    def id(self) -> NDArray[np.int32]:  # type: ignore[override]  # none assigns it
+    def id(self) -> NDArray[np.int32]:  # none assigns it
         """The triangles of all instances counted in their order, int32 (H, W, K)."""
         return np.moveaxis(self.planes[0], 0, -1)
 
@@ -319,20 +316,43 @@ class SceneDepthLayers(InstanceIds, DepthLayers):
         return SceneFragments(ids[k : k + 1], depth[k : k + 1], self.placed, [(0, 0)])
 
 
-def instance_of_ids(ids: NDArray[np.int32], first_ids: NDArray[np.int64]) -> NDArray[np.int32]:
+def instance_of_ids(ids: Ids, first_ids: NDArray[np.int64]) -> NDArray[np.int32]:
     """Return the instance that each id belongs to, -1 for -1."""
     if len(first_ids) == 2:
         return ids >> 31
-    flat = np.ascontiguousarray(ids).reshape(1, -1)
-    found = empty(flat.shape, np.int32)
-    _engine.find_instances(flat, first_ids, found, None)
-    return found.reshape(ids.shape)
+    flat: Any = np.ascontiguousarray(ids).reshape(1, -1)
+    return find_instances(flat, first_ids, None).reshape(ids.shape)
 
 
-def local_ids(ids: NDArray[np.int32], instance: NDArray[np.int32], first_ids: NDArray[np.int64]) -> NDArray[np.int32]:
+def find_instances(ids: Ids, first_ids: NDArray[np.int64], boxes: NDArray[np.int32] | None) -> NDArray[np.int32]:
+    """Return the same of contiguous ids (H, W), and widen the boxes of those that show."""
+    found = empty(ids.shape, np.int32)
+    if ids.dtype == np.int32:
+        _engine.find_instances(cast("NDArray[np.int32]", ids), first_ids, found, boxes)
+        return found
+    found[...] = -1
+    first = 0
+    while first < len(first_ids) - 1:
+        end = int(np.searchsorted(first_ids, first_ids[first] + INT32_MAX, side="right")) - 1
+        own, part = local_part(ids, *first_ids[[first, end]].tolist()), empty(ids.shape, np.int32)
+        own_ids = first_ids[first : end + 1] - first_ids[first]
+        _engine.find_instances(own, own_ids, part, None if boxes is None else boxes[first:end])
+        np.add(part, np.int32(first), out=found, where=own >= 0)
+        first = end
+    return found
+
+
+def local_part(ids: Ids, first: int, end: int) -> NDArray[np.int32]:
+    """Return ids less the first of those in [first, end), which int32 counts; -1 for others."""
+    own: NDArray[Any] = ids - ids.dtype.type(first)
+    own[own.view(np.dtype(f"u{own.itemsize}")) >= end - first] = -1
+    return own.astype(np.int32, copy=False)
+
+
+def local_ids(ids: Ids, instance: NDArray[np.int32], first_ids: NDArray[np.int64]) -> NDArray[np.int32]:
     """Return the index of each triangle in its mesh, -1 for -1."""
-    first = np.append(first_ids[:-1], 0).astype(np.int32)
-    return ids - first[instance]  # instance -1 takes the last of them, 0
+    first: NDArray[Any] = np.append(first_ids[:-1], 0).astype(ids.dtype)
+    return (ids - first[instance]).astype(np.int32, copy=False)  # instance -1 takes the last of them, 0
 
 
 class BentFragments(Fragments):

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -87,6 +87,7 @@ def without_holes(
         return frags
     bent: Sequence[BentMesh] | None = [frags.bent] if isinstance(frags, BentFragments) else None
     if isinstance(frags, SceneFragments):
+        frags.whole.check_counted("a scene with holes in its materials")
         bent = frags.placed.bent
     holed = holed_instances(scene_of(subject), cuts, camera, bent)
     if isinstance(frags, SceneFragments):
@@ -118,7 +119,8 @@ def solid_scene(scene: Scene, holed: Sequence[Holed]) -> Scene:
 
 def cut_scene(frags: SceneFragments, holed: Sequence[Holed], threads: int | None) -> SceneFragments:
     """Draw the planes of fragments anew, as their triangles were drawn, and return fragments of them."""
-    placed, positions, (ids, depth) = frags.placed, frags.positions, frags.drawn_planes
+    placed, positions, (_, depth) = frags.placed, frags.positions, frags.drawn_planes
+    ids = cast("I32", frags.drawn_planes[0])  # as `without_holes` has checked
     targets = [_engine.Target(Sink.NEAREST, *planes, None) for planes in zip(ids, depth, strict=True)]
     placed.of(solid_scene(placed.scene, holed)).draw(targets, positions, ids.shape[1])
     for k, at in enumerate(positions):

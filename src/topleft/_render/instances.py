@@ -5,7 +5,6 @@ In: `Scene`, the matrix of a camera, the options of a view.  Out: `SceneFragment
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -15,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from topleft import _engine
-from topleft._base.arrays import set_aligned
-from topleft._base.memory import FRESH, SCRATCH, KeptMemory, check_fits, empty
+from topleft._base.arrays import INT32_MAX, set_aligned
+from topleft._base.memory import FRESH, SCRATCH, KeptMemory, Memory, check_fits, empty
 from topleft._base.options import DepthTest, Sampling, Sink, parse
 from topleft._base.threads import count_threads, run_parts
 from topleft._camera.camera import Camera
@@ -31,7 +30,7 @@ from topleft._raster.rasterize import canvas_of, refuse_many
 from topleft._raster.sampling import sample_positions, sum_areas
 from topleft._raster.snap import Snapped, snap_mesh
 from topleft._raster.view import View, ViewOptions
-from topleft._render.fragments import SceneDepthLayers, SceneFragments
+from topleft._render.fragments import Ids, SceneDepthLayers, SceneFragments
 from topleft._render.through_lens import DrawnScene, scene_through
 from topleft._scene.scene import Scene
 from topleft.typing import DepthTestOption
@@ -49,6 +48,9 @@ MIRRORED = {0: 0, 1: 2, 2: 1}
 
 #: Instances that tell what a picture shows of all, and clusters of each: less than a tenth of a millisecond.
 SURVEYED_INSTANCES, SURVEYED_OF_EACH = 4, 25
+
+#: Instances that are drawn before it is looked which others they hide.
+FIRST_ROUND = 16
 
 #: Cells on each side of the picture in which layers are counted: of 15 by 8 pixels at 1920x1080.
 CELLS = 128
@@ -78,10 +80,11 @@ class PlacedScene:
         with_depth: bool,
         may_cluster: bool = True,
         material: Material | None = None,
+        first_id: int = 0,
     ) -> None:
         self.scene, self.whole, self._clip_from_world, self.bent = self._drawn = drawn
         self.first_ids, self.whole_first_ids = drawn.scene.first_ids, drawn.whole.first_ids
-        self._view = view
+        self._view, self._first_id = view, first_id
         self._material = material  # instead of those of the meshes
         self._with_depth = with_depth
         self._may_cluster = may_cluster
@@ -98,7 +101,7 @@ class PlacedScene:
         drawn = self._drawn._replace(scene=scene)
         return PlacedScene(drawn, self._view, with_depth=self._with_depth, may_cluster=False, material=self._material)
 
-    def whole_ids(self, ids: NDArray[np.int32]) -> NDArray[np.int32]:
+    def whole_ids(self, ids: Ids) -> Ids:
         """Return ids in terms of the whole scene: as they are, but for a lens."""
         if self.bent is None:
             return ids
@@ -111,7 +114,7 @@ class PlacedScene:
         mesh = self.scene[i].mesh
         view, with_depth = self._view_of(i), self._with_depth
         snapped = snap_mesh(FRESH, mesh.vertices, mesh.triangles, view, with_depth=with_depth, out=None)
-        return replace(snapped, mesh=snapped.mesh.numbered_from(int(self.first_ids[i])))
+        return replace(snapped, mesh=snapped.mesh.numbered_from(self._number(i)))
 
     def corners(self, i: int) -> GivenCorners:
         """Return what an instance is drawn from."""
@@ -133,7 +136,7 @@ class PlacedScene:
     def _make_view(self, i: int) -> View:
         instance, view = self.scene[i], self._view
         cull = MIRRORED[view.cull] if instance.is_mirrored else view.cull
-        own = replace(view, transform=_engine.product(self._clip_from_world, instance.transform), cull=cull)
+        own = replace(view, transform=self._clip_from_objects[i], cull=cull)
         is_single = self.whole[i].mesh.single_sided(self._material)
         if is_single is None:
             return own
@@ -146,12 +149,55 @@ class PlacedScene:
 
     @cached_property
     def _has_sides(self) -> bool:
-        masks = (instance.mesh.single_sided(self._material) for instance in self.whole)
+        masks = (mesh.single_sided(self._material) for mesh, _ in self.whole.meshes.values())
         return any(mask is not None and not mask.all() for mask in masks)
 
     def clustered(self, i: int) -> tuple[Clusters, View, int]:
         """Return the clusters of an instance's mesh, how they are seen, and what triangle 0 is called."""
-        return self.scene[i].mesh.clusters, self._view_of(i), int(self.first_ids[i])
+        return self.scene[i].mesh.clusters, self._view_of(i), self._number(i)
+
+    def _number(self, i: int) -> int:
+        """What triangle 0 of an instance is called in a buffer of ids, if there is one, and int32 counts them."""
+        has_ids = self._with_depth and self.scene.n_triangles <= INT32_MAX
+        return int(self.first_ids[i]) + self._first_id if has_ids else 0
+
+    def groups(self) -> Iterator[tuple[int, PlacedScene]]:
+        """Yield parts of the scene whose triangles int32 counts from 1 on, each with where its own ids begin."""
+        for first, group in self.scene.groups:
+            placed = PlacedScene(
+                self._drawn._replace(scene=group, whole=group), self._view, with_depth=self._with_depth,
+                may_cluster=self._may_cluster, material=self._material, first_id=1,
+            )  # fmt: skip
+            yield int(self.first_ids[first]), placed
+
+    def shown(self, some: NDArray[np.intp], target: _engine.Target, *, is_drawn: bool) -> NDArray[np.intp]:
+        """Return those of some instances whose boxes may show in a target: in front of what it shows, if it `is_drawn`.
+
+        At least the first one otherwise, which clears the target if nothing shows.
+        """
+        may_show: NDArray[np.uint8] = np.ones(len(some), np.uint8)
+        for dtype in (np.float32, np.float64):
+            own = np.flatnonzero(self._is_float32[some] == (dtype == np.float32))
+            if not len(own):
+                continue
+            chosen = some[own]
+            seen, mesh = ClusteredMesh(*self.clustered(int(chosen[0]))).seen(target.sink)
+            shown: NDArray[np.uint8] = np.empty(len(own), np.uint8)
+            matrices = self._clip_from_objects[chosen].astype(dtype).astype(np.float64)  # as the vertex stage has them
+            _engine.find_shown(mesh, seen, self.scene.boxes[chosen], matrices, target, is_drawn, shown)
+            may_show[own] = shown
+        return some[:1] if not is_drawn and not may_show.any() else some[may_show != 0]
+
+    @cached_property
+    def _clip_from_objects(self) -> NDArray[np.float64]:
+        return self.scene.clip_from_objects(self._clip_from_world)
+
+    @cached_property
+    def _is_float32(self) -> NDArray[np.bool_]:
+        is_float32 = np.empty(len(self.scene), np.bool_)
+        for mesh, at in self.scene.meshes.values():
+            is_float32[at] = mesh.clusters.points.dtype == np.float32
+        return is_float32
 
     def chunks(self) -> Iterator[list[Snapped]]:
         """Yield the instances in their order, as many at a time as `VERTICES_AT_ONCE` allows."""
@@ -166,21 +212,26 @@ class PlacedScene:
         if chunk:
             yield chunk
 
-    def draw(self, targets: list[_engine.Target], positions: Sequence[tuple[int, int]], height: int) -> None:
-        """Clear targets of that many rows, one a sample, and draw what each sees; (0, 0) is the pixel's centre."""
+    def draw(
+        self, targets: list[_engine.Target], positions: Sequence[tuple[int, int]], height: int, *, is_first: bool = True
+    ) -> None:
+        """Draw what each sample sees into targets of that many rows; (0, 0) is the pixel's centre.
+
+        `is_first`: clear them before; otherwise what is there stays unless something lies before it.
+        """
         n_parts = count_threads(self._view.threads, self.scene.n_triangles)
         n_parts = min(height, max(n_parts, height * self._view.size[0] // MOST_PIXELS_OF_PART))
         seen = self._clip_from_world, self._view
-        if self._can_cluster(Sink(targets[0].sink)) and pays_in_clusters(self, *seen):
+        is_group = self._first_id > 0  # of a scene so large that clusters pay for it
+        if self._can_cluster(Sink(targets[0].sink)) and (is_group or pays_in_clusters(self, *seen)):
             order = front_to_back(self.scene, self._clip_from_world)
-            if Sink(targets[0].sink) in (Sink.NEAREST, Sink.FARTHEST):
+            if is_first and Sink(targets[0].sink) in (Sink.NEAREST, Sink.FARTHEST):
                 shape = _engine.Target.bounds_shape(height, self._view.size[0])
                 for target in targets:
                     target.keep_bounds(FRESH.empty("bounds", shape, np.float32))
-            if draw_placed(self, order, targets, positions, height, n_parts):
+            if draw_placed(self, order, targets, positions, height, n_parts, is_first=is_first):
                 return
         n_left = len(self.scene)
-        is_first = True
         for chunk in self.chunks():
             n_left -= len(chunk)
             for target, at in zip(targets, positions, strict=True):
@@ -192,10 +243,8 @@ class PlacedScene:
 def pays_in_clusters(placed: PlacedScene, clip_from_world: NDArray[np.float64], view: View) -> bool:
     """Tell whether a scene whose meshes may be drawn in clusters is, and note that they are drawn."""
     scene = placed.scene
-    n_instances = Counter(id(instance.mesh) for instance in scene)
-    meshes = {id(instance.mesh): instance.mesh for instance in scene}
     n = scene.n_triangles
-    wanted = [choices.pays_to_cluster(n, mesh.note_drawn(), n_instances[key]) for key, mesh in meshes.items()]
+    wanted = [choices.pays_to_cluster(n, mesh.note_drawn(), len(at)) for mesh, at in scene.meshes.values()]
     if not all(wanted) or not scene.backoff.is_over():
         return False
     survey = survey_instances(placed)
@@ -206,9 +255,11 @@ def pays_in_clusters(placed: PlacedScene, clip_from_world: NDArray[np.float64], 
 
 def front_to_back(scene: Scene, clip_from_world: NDArray[np.float64]) -> NDArray[np.intp]:
     """Return the instances by the distance of the middle of their boxes: by w, or by z where all w are equal."""
-    boxes = {id(instance.mesh): instance.mesh.vertex_box.reshape(2, 3).mean(axis=0) for instance in scene}
-    places = [(instance.transform[:3, :3], instance.transform[:3, 3], boxes[id(instance.mesh)]) for instance in scene]
-    middles = np.array([_engine.product(linear, middle) + offset for linear, offset, middle in places])
+    boxes = np.empty((len(scene), 6))
+    for mesh, at in scene.meshes.values():
+        boxes[at] = mesh.vertex_box
+    middles = 0.5 * (boxes[:, :3] + boxes[:, 3:])
+    middles = (scene.transforms[:, :3, :3] * middles[:, None]).sum(axis=2) + scene.transforms[:, :3, 3]
     row = clip_from_world[3] if clip_from_world[3, :3].any() else clip_from_world[2]
     return np.argsort(_engine.product(middles, row[:3]), kind="stable")
 
@@ -223,10 +274,9 @@ def survey_instances(placed: PlacedScene) -> Survey:
 
 def count_layers(scene: Scene, clip_from_world: NDArray[np.float64]) -> float:
     """Return how many boxes of instances lie one behind the other, on the mean over the picture where there are any."""
-    boxes = {id(instance.mesh): instance.mesh.vertex_box for instance in scene}
-    lows, highs = np.array([boxes[id(instance.mesh)].reshape(2, 3) for instance in scene]).swapaxes(0, 1)
+    lows, highs = scene.boxes[:, :3], scene.boxes[:, 3:]
     corners = np.where(CORNERS, highs[:, None], lows[:, None])
-    matrices = np.array([_engine.product(clip_from_world, instance.transform) for instance in scene])
+    matrices = scene.clip_from_objects(clip_from_world)
     clip = (matrices[:, None, :, :3] * corners[:, :, None]).sum(axis=3) + matrices[:, None, :, 3]
     clip = clip[(clip[..., 3] > 0).all(axis=1)]  # a box about the eye has no outline
     cells = np.rint((clip[..., :2] / clip[..., 3:] + 1) * (0.5 * CELLS)).clip(0, CELLS).astype(np.intp)
@@ -245,12 +295,46 @@ def draw_placed(
     positions: Sequence[tuple[int, int]],
     height: int,
     n_threads: int,
+    *,
+    is_first: bool,
 ) -> bool:
-    """Clear targets, one a sample, and draw what each sees; returns as `draw_clustered` does."""
-    scenes = [ClusteredMesh(*placed.clustered(i)) for i in order.tolist()]
+    """Draw what each sample sees into targets, as `PlacedScene.draw` does; returns as `draw_clustered` does."""
     memories = [KeptMemory() for _ in range(n_threads)]
-    seen = zip(targets, positions, strict=True)
-    return all(draw_clustered(memories, scenes, target, height, at) for target, at in seen)
+    return all(
+        draw_rounds(placed, order, target, height, at, memories, is_first=is_first)
+        for target, at in zip(targets, positions, strict=True)
+    )
+
+
+def draw_rounds(
+    placed: PlacedScene,
+    order: NDArray[np.intp],
+    target: _engine.Target,
+    height: int,
+    at: tuple[int, int],
+    memories: Sequence[Memory],
+    *,
+    is_first: bool,
+) -> bool:
+    """Draw what a sample sees into a target, as `draw_placed` does.
+
+    In rounds, each of about as many instances as those before it together: of the others those are left out that lie
+    outside, or behind what has been drawn.
+    """
+    keeps_order = Sink(target.sink) in (Sink.NEAREST, Sink.FARTHEST)
+    order = placed.shown(order, target, is_drawn=keeps_order and not is_first)
+    first, n = 0, FIRST_ROUND if keeps_order else len(order)
+    while True:
+        meshes = [ClusteredMesh(*placed.clustered(i)) for i in order[first : first + n].tolist()]
+        clears, first = is_first and first == 0, first + n
+        if not draw_clustered(memories, meshes, target, height, at, is_first=clears, is_last=first >= len(order)):
+            return False
+        if first >= len(order):
+            return True
+        order = np.append(order[:first], placed.shown(order[first:], target, is_drawn=True))
+        n = first
+        if first >= len(order):
+            return True
 
 
 def rows_of(
@@ -310,10 +394,30 @@ def draw_nearest(placed: PlacedScene, view: View, test: DepthTest | None = Depth
     check_fits((n, height, width), np.int32, np.float32)
     ids: NDArray[np.int32] = FRESH.empty("ids", (n, height, width), np.int32)
     depth: NDArray[np.float32] = FRESH.empty("depth", (n, height, width), np.float32)
-    if width and height:
-        targets = [_engine.Target(sink, *planes, None) for planes in zip(ids, depth, strict=True)]
+    targets = [_engine.Target(sink, *planes, None) for planes in zip(ids, depth, strict=True) if width and height]
+    if placed.scene.n_triangles > INT32_MAX:
+        return SceneFragments(draw_groups(placed, targets, positions, ids), depth, placed, positions)
+    if targets:
         placed.draw(targets, positions, height)
     return SceneFragments(ids, depth, placed, positions)
+
+
+def draw_groups(
+    placed: PlacedScene, targets: list[_engine.Target], positions: Sequence[tuple[int, int]], ids: NDArray[np.int32]
+) -> NDArray[np.int64]:
+    """Draw a scene with more triangles than int32 counts; returns ids in int64, -1 where there is nothing.
+
+    One group after the other into the planes `ids` of the targets, where 0 stands for what earlier groups have drawn:
+    it is less than all other ids, so that ties are decided as in one picture.
+    """
+    counted: NDArray[np.int64] = np.full(ids.shape, -1, np.int64)
+    if targets:
+        for k, (first, group) in enumerate(placed.groups()):
+            group.draw(targets, positions, ids.shape[1], is_first=k == 0)
+            is_new = ids > 0
+            np.add(ids, first - 1, out=counted, where=is_new, dtype=np.int64)
+            ids[is_new] = 0
+    return counted
 
 
 def peel_scene(
@@ -327,6 +431,7 @@ def peel_scene(
     **options: Any,
 ) -> SceneDepthLayers:
     """Return the nearest layers of a scene; options as those of `peel`, without `transform`."""
+    scene.check_counted("a scene that is peeled")
     placed, view = place(scene, camera, size, options, material=material)
     n, is_farthest = check_peel(view, layers, depth_test)
     snapped = [placed.snap(i) for i in range(len(scene))]  # a band of rows is drawn once, with all instances

@@ -91,6 +91,7 @@ def scene_through(scene: Scene, camera: Camera, frame: tuple[int, int], *, near_
     """
     if camera.lens is None:
         return DrawnScene(scene, scene, camera.clip_from_world(frame), None)
+    scene.check_counted("a scene behind a lens")
     many, instances = [], []
     for instance in scene:
         mesh = instance.mesh

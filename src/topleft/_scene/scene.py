@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from topleft import _engine
 from topleft._base.arrays import INT32_MAX, as_square, check_regular, set_read_only, shown
 from topleft._io.load import load
 from topleft._model.mesh import Mesh, extreme_points, used_vertices
@@ -88,6 +89,12 @@ class Instance:
         name = "" if self.name is None else f", name={self.name!r}"
         return f"Instance({self.mesh!r}, at=({place}){name})"
 
+    def with_mesh(self, mesh: Mesh) -> Instance:
+        """Return another mesh in the same place, which has been checked."""
+        instance = object.__new__(Instance)
+        vars(instance).update(vars(self), mesh=mesh)
+        return instance
+
     @cached_property
     def is_mirrored(self) -> bool:
         """Whether the matrix turns the winding of triangles over."""
@@ -107,7 +114,7 @@ class Scene:
     Raises
     ------
     ValueError
-        If there is no instance, or they have more than 2**31 - 1 triangles together.
+        If there is no instance.
     TypeError
         If an instance is something else.
 
@@ -132,8 +139,10 @@ class Scene:
         object.__setattr__(self, "instances", tuple(map(as_instance, instances)))
         if not self.instances:
             raise ValueError("a scene needs at least one instance, got none")
-        if self.n_triangles > INT32_MAX:
-            raise ValueError(f"a scene must have at most {INT32_MAX} triangles, got {self.n_triangles}")
+
+    def __getstate__(self) -> dict[str, object]:
+        """What another process needs: the rest is found out there."""
+        return {"instances": self.instances}
 
     def _repr_html_(self) -> str:
         """A table of the instances, the first hundred of them."""
@@ -167,12 +176,73 @@ class Scene:
     @property
     def n_triangles(self) -> int:
         """Triangles of all instances together."""
-        return sum(len(instance.mesh.triangles) for instance in self.instances)
+        return int(self.first_ids[-1])
 
-    @property
+    @cached_property
     def first_ids(self) -> npt.NDArray[np.int64]:
         """Where the triangles of each instance begin when all are counted, and the number of all: (N + 1,) int64."""
-        return np.cumsum([0, *(len(instance.mesh.triangles) for instance in self.instances)], dtype=np.int64)
+        first_ids = np.cumsum([0, *(len(instance.mesh.triangles) for instance in self.instances)], dtype=np.int64)
+        first_ids.flags.writeable = False
+        return first_ids
+
+    @cached_property
+    def transforms(self) -> F64:
+        """World from object of each instance, (N, 4, 4)."""
+        transforms = np.stack([instance.transform for instance in self.instances])
+        transforms.flags.writeable = False
+        return transforms
+
+    def clip_from_objects(self, clip_from_world: F64) -> F64:
+        """Clip from object of each instance, (N, 4, 4): the product of each, to the bit."""
+        columns = np.ascontiguousarray(self.transforms.transpose(1, 0, 2)).reshape(4, -1)
+        products = _engine.product(clip_from_world, columns).reshape(4, -1, 4)
+        return np.ascontiguousarray(products.transpose(1, 0, 2))
+
+    @cached_property
+    def meshes(self) -> dict[int, tuple[Mesh, npt.NDArray[np.intp]]]:
+        """The different meshes, by their `id`, and which instances are of each, ascending."""
+        found: dict[int, list[int]] = {}
+        for i, instance in enumerate(self.instances):
+            found.setdefault(id(instance.mesh), []).append(i)
+        return {key: (self.instances[at[0]].mesh, np.array(at, np.intp)) for key, at in found.items()}
+
+    @cached_property
+    def boxes(self) -> F64:
+        """The `vertex_box` of the mesh of each instance, (N, 6); NaN where a vertex is not finite."""
+        boxes = np.empty((len(self), 6))
+        for mesh, at in self.meshes.values():
+            boxes[at] = mesh.vertex_box if mesh.is_finite else np.nan
+        return boxes
+
+    @cached_property
+    def groups(self) -> tuple[tuple[int, Scene], ...]:
+        """The scene in parts whose triangles int32 can count from 1 on, each with the index of its first instance."""
+        first_ids, groups, first = self.first_ids, [], 0
+        while first < len(self):
+            end = int(np.searchsorted(first_ids, first_ids[first] + INT32_MAX, side="right")) - 1
+            part = object.__new__(Scene)
+            vars(part).update(instances=self.instances[first:end], transforms=self.transforms[first:end])
+            groups.append((first, part))
+            first = end
+        return tuple(groups)
+
+    def check_counted(self, what: str) -> None:
+        """Check that int32 counts all triangles.
+
+        Raises
+        ------
+        ValueError
+            If it does not.
+        """
+        if self.n_triangles > INT32_MAX:
+            raise ValueError(f"{what} must have at most {INT32_MAX} triangles, got {self.n_triangles}")
+
+    def with_meshes(self, meshes: Sequence[Mesh]) -> Scene:
+        """Return the scene with other meshes, which stand where these do."""
+        scene = object.__new__(Scene)
+        instances = tuple(one.with_mesh(mesh) for one, mesh in zip(self.instances, meshes, strict=True))
+        vars(scene).update(instances=instances, transforms=self.transforms)
+        return scene
 
     @property
     def bounds(self) -> F64:
