@@ -55,8 +55,8 @@ typedef struct tl_kernels {
     int64_t (*count_hidden)(const tl_clustered *mesh, const tl_cluster_view *view, const tl_window *window,
                             const tl_target *target, int64_t step, int64_t *n_hidden);
 
-    /* Tells of n boxes, each under a matrix of its own in place of the view's, whether they may show: not outside of the
-     * window, nor, unless target is NULL, behind what that shows. */
+    /* Tells of n boxes, each under a matrix of its own in place of the view's, whether they may show: not outside of
+     * the window, nor, unless target is NULL, behind what that shows. */
     void (*find_shown)(const tl_cluster_view *view, const double *boxes, const double *matrices, int64_t n,
                        const tl_window *window, const tl_target *target, uint8_t *shown);
 

@@ -346,8 +346,8 @@ static int64_t count_hidden(const tl_clustered *mesh, const tl_cluster_view *v, 
     return n;
 }
 
-/* Tells of n boxes, each under a matrix of its own, whether they may show: not outside of the window, nor, with a target
- * of depths, behind what it shows. */
+/* Tells of n boxes, each under a matrix of its own, whether they may show: not outside of the window, nor, with a
+ * target of depths, behind what it shows. */
 static void find_shown(const tl_cluster_view *view, const double *boxes, const double *matrices, int64_t n,
                        const tl_window *window, const tl_target *target, uint8_t *shown)
 {
