@@ -31,6 +31,7 @@ from benchmarks.small.field import STUDY as FIELD
 from benchmarks.small.fresh import STUDY as FRESH
 from benchmarks.small.gate import STUDY as GATE
 from benchmarks.small.growth import STUDY as GROWTH
+from benchmarks.small.instances import STUDY as INSTANCES
 from benchmarks.small.large import STUDY as LARGE
 from benchmarks.small.layers import STUDY as LAYERS
 from benchmarks.small.memset import STUDY as MEMSET
@@ -46,6 +47,7 @@ STUDIES = {
     for study in (
         RUN, ACCURACY, BATCH, ATLAS, CHOICES, STATIC, PICTURES, LEVELS, LAYERS, FIELD, SAMPLINGS, PLANNER, MEMSET,
         GROWTH, POLYGONS, REAL_FILES, FRESH, LARGE, GATE, TILES, EXPLORER, CLUSTER, NO_SNAP, TOLERANCE, SAMPLES,
+        INSTANCES,
     )
 }  # fmt: skip
 

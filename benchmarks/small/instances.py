@@ -1,0 +1,136 @@
+"""Time scenes of thousands of instances, and one mesh of hundreds of millions of triangles from a memory map.
+
+Instances of a blob stand in rows, one behind the other; the first picture sorts the mesh and is not counted. The mapped
+mesh is of blobs in a grid, written to a temporary folder; its memory is that of the process without what is mapped.
+"""
+
+from __future__ import annotations
+
+import argparse
+import statistics
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import topleft as tl
+from benchmarks.harness.arguments import add_out, positive
+from benchmarks.harness.machine import describe
+from benchmarks.harness.records import Record, Save
+from benchmarks.report.study import Study
+from benchmarks.report.tables import table
+
+SIZE = (1920, 1080)
+WIDE = 10
+"""Instances in a row."""
+
+MAPPED_AT_ONCE = 10_000_000
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--triangles", type=positive, default=1_000_000, metavar="N", help="of the blob (%(default)s)")
+    parser.add_argument("--counts", type=positive, nargs="+", default=[200, 3000], metavar="N", help="(%(default)s)")
+    parser.add_argument("--rounds", type=positive, default=11, metavar="N", help="(%(default)s)")
+    parser.add_argument(
+        "--mapped", type=int, default=0, metavar="N", help="times 10 million triangles from a memory map; 40 take 7 GB"
+    )
+    add_out(parser)
+
+
+def in_rows(mesh: tl.Mesh, n: int) -> tl.Scene:
+    """So many instances, row behind row."""
+    matrices = np.tile(np.eye(4), (n, 1, 1))
+    matrices[:, 0, 3] = 1.3 * (np.arange(n) % WIDE - (WIDE - 1) / 2)
+    matrices[:, 2, 3] = -1.3 * (np.arange(n) // WIDE)
+    return tl.Scene([(mesh, matrix) for matrix in matrices])
+
+
+def seconds_of(call: Callable[[], object], rounds: int) -> list[float]:
+    """Seconds by the clock of some calls."""
+    found = []
+    for _ in range(rounds):
+        start = time.perf_counter()
+        call()
+        found.append(time.perf_counter() - start)
+    return found
+
+
+def run(arguments: argparse.Namespace, _: Save) -> Record:
+    """Measure seconds, by the clock."""
+    rows: list[dict[str, Any]] = []
+    vertices, triangles = tl.scenes.blob(arguments.triangles)
+    mesh, camera = tl.Mesh(vertices.astype(np.float32), triangles), tl.Camera.look_at((0, 0.2, 7.0), fov_y_deg=60)
+    for n in arguments.counts:
+        scene = in_rows(mesh, n)
+        for tolerance in (0.0, 0.5):
+            for threads in (1, 2):
+                options = {"tolerance": tolerance, "threads": threads}
+                frags = tl.rasterize_mesh(scene, camera, SIZE, **options)
+                found = seconds_of(lambda scene=scene, how=options: tl.rasterize_mesh(scene, camera, SIZE, **how),
+                                   arguments.rounds)  # fmt: skip
+                rows.append({"instances": n, "triangles": n * len(mesh.triangles), **options,
+                             "shown": len(np.unique(frags.instance)) - 1, "seconds": found})  # fmt: skip
+    if arguments.mapped:
+        rows.append(mapped(arguments.mapped))
+    return {"kind": "instances"} | describe() | {"rows": rows}
+
+
+def mapped(n: int) -> dict[str, Any]:
+    """Draw so many blobs of ten million triangles, all in one mesh of mapped arrays, once."""
+    points, triangles = tl.scenes.blob(MAPPED_AT_ONCE)
+    n_points, n_triangles = len(points), len(triangles)
+    with tempfile.TemporaryDirectory() as folder:
+        arrays = [
+            np.lib.format.open_memmap(Path(folder, name), "w+", dtype, (n * size, 3))
+            for name, dtype, size in (("v.npy", np.float32, n_points), ("t.npy", np.int32, n_triangles))
+        ]
+        for i in range(n):
+            arrays[0][i * n_points : (i + 1) * n_points] = points * (1 + 0.01 * i) + [
+                2.6 * (i % 8 - 3.5), 0, -2.6 * (i // 8)
+            ]  # fmt: skip
+            arrays[1][i * n_triangles : (i + 1) * n_triangles] = triangles + i * n_points
+        del points, triangles
+        camera = tl.Camera.look_at((0, 6, 12), (0, -1, -4), fov_y_deg=60)
+        rasterizer = tl.Rasterizer(SIZE, threads=2)
+        transform = camera.clip_from_world(SIZE)
+        found = seconds_of(lambda: rasterizer.rasterize(*arrays, transform=transform), 3)
+        return {"instances": 1, "triangles": n * n_triangles, "tolerance": 0.0, "threads": 2, "shown": 1,
+                "seconds": found[1:], "own_gb": own_gb()}  # fmt: skip
+
+
+def own_gb() -> float | None:
+    """Memory of the process that is not of a file, GB; None where the system does not say."""
+    if not sys.platform.startswith("linux"):
+        return None
+    lines = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
+    return next(int(line.split()[1]) for line in lines if line.startswith("RssAnon")) / 1e6
+
+
+def lines(record: Record) -> Iterator[str]:
+    """The table: a row a scene, tolerance and number of threads."""
+    rows = []
+    for row in record["rows"]:
+        spread = statistics.quantiles(row["seconds"]) if len(row["seconds"]) > 1 else 3 * row["seconds"]
+        rows.append([f"{row['instances']:,}", f"{row['triangles']:,}", f"{row['tolerance']:g}", str(row["threads"]),
+                     str(row["shown"]), f"{min(row['seconds']):.3f}", f"{spread[1]:.3f}",
+                     f"{spread[0]:.3f} to {spread[2]:.3f}",
+                     f"{row['own_gb']:.1f}" if row.get("own_gb") else ""])  # fmt: skip
+    head = [
+        "instances",
+        "triangles",
+        "tolerance, px",
+        "threads",
+        "show",
+        "least, s",
+        "median, s",
+        "quartiles",
+        "own GB",
+    ]
+    yield from table(head, rows)
+
+
+STUDY = Study("instances", "time thousands of instances, and a mesh from a memory map", add_arguments, run, lines)
