@@ -21,9 +21,8 @@ from topleft._base.arrays import as_checked_triangles, as_frozen, refuse_rows
 from topleft._base.threads import run_parts, threads_of_rows
 
 __all__ = [
-    "CornerNormals", "angle_weighted_normals", "box_of_triangles", "color_rows", "creased_normals", "determinant",
-    "face_normal_rows", "face_normals", "is_similarity", "moved", "turn_of_normals", "turned_faces", "unit_or_zero",
-    "unit_rows",
+    "CornerNormals", "angle_weighted_normals", "box_of_triangles", "color_rows", "creased_normals", "face_normal_rows",
+    "face_normals", "moved", "turn_of_normals", "turned_faces", "unit_or_zero", "unit_rows",
 ]  # fmt: skip
 
 FloatArray = npt.NDArray[np.floating[Any]]
@@ -261,31 +260,13 @@ def turn_of_normals(view: F64) -> F64:
 
     Its numbers are sums of products, the same on every machine.
     """
-    rows = view[:3, :3].tolist()
-    (a, b, c), (d, e, f), (g, h, i) = rows
+    (a, b, c), (d, e, f), (g, h, i) = view[:3, :3].tolist()
     adjugate = [
         [e * i - f * h, c * h - b * i, b * f - c * e],
         [f * g - d * i, a * i - c * g, c * d - a * f],
         [d * h - e * g, b * g - a * h, a * e - b * d],
     ]
-    return np.array(adjugate) * math.copysign(1.0, determinant(rows))
-
-
-def is_similarity(view: F64) -> bool:
-    """Whether a matrix (4, 4) keeps angles and does not mirror, so that light may be computed before it."""
-    rows = view[:3, :3].tolist()
-    (a, b, c), (d, e, f), (g, h, i) = rows
-    squares = a * a + b * b + c * c, d * d + e * e + f * f, g * g + h * h + i * i
-    products = a * d + b * e + c * f, a * g + b * h + c * i, d * g + e * h + f * i
-    scale = sum(squares) / 3
-    error = max(map(abs, (*products, *(square - scale for square in squares))))
-    return determinant(rows) > 0 and error <= 1e-9 * scale
-
-
-def determinant(rows: list[list[float]]) -> float:
-    """Of a matrix (3, 3): NumPy's takes ten times as long for one."""
-    (a, b, c), (d, e, f), (g, h, i) = rows
-    return a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
+    return np.array(adjugate) * math.copysign(1.0, _engine.determinant(view[:3, :3]))
 
 
 def color_rows(colors: U8) -> F32:

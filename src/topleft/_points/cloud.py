@@ -20,7 +20,7 @@ from topleft._base.memory import FreshMemory, empty
 from topleft._base.options import PointShape
 from topleft._camera.camera import Camera
 from topleft._model.light import TO_HEADLIGHT, Light, LightKind, LightSpace
-from topleft._model.normals import determinant, moved, turn_of_normals, unit_or_zero
+from topleft._model.normals import moved, turn_of_normals, unit_or_zero
 from topleft._model.points import Points, PointUnit
 from topleft._points.points import PointFragments, draw_points
 from topleft._raster.classic import refuse_classic
@@ -91,7 +91,7 @@ def sizes_px(cloud: Points, camera: Camera, frame: tuple[int, int]) -> float | F
     if cloud.unit == PointUnit.PX:
         return cloud.size
     eye = moved(cloud.positions, camera.view)
-    unit_of_eye = abs(determinant(camera.view[:3, :3].tolist())) ** (1 / 3)
+    unit_of_eye = abs(_engine.determinant(camera.view[:3, :3])) ** (1 / 3)
     if camera.lens is not None:
         eye = camera.lens.bend(eye)
     projection = camera.clip_from_eye(frame)
@@ -191,7 +191,7 @@ def lambert(light: Light, eye: F64, normals: F64, view: F64) -> F64:
     cosine = light.intensity * np.maximum(_engine.row_products(normals, unit_or_zero(way)), 0)
     if not is_point:
         return cosine
-    unit_of_eye = abs(determinant(view[:3, :3].tolist())) ** (1 / 3)
+    unit_of_eye = abs(_engine.determinant(view[:3, :3])) ** (1 / 3)
     return cosine / (1 + light.falloff * _engine.row_products(way, way) / unit_of_eye**2)
 
 
