@@ -234,25 +234,21 @@ def box_of_triangles(vertices: FloatArray, triangles: I32, *, threads: int | Non
 
 def unit_or_zero(vectors: FloatArray) -> F64:
     """Vectors (N, 3) scaled to length 1, float64; zero stays zero, and what is not finite becomes zero."""
-    out = np.empty((len(vectors), 3))
-    _over_rows(vectors, lambda source, first, end: _engine.unit_vectors(source, None, first, end, out, None))
-    return out
+    return _row_by_row(vectors, lambda source, a, b, out: _engine.unit_vectors(source, None, a, b, out, None))
 
 
 def unit_rows(vectors: FloatArray, turn: F64 | None = None) -> F32:
     """The same as rows (N, 4) float32, the last number 1; of `vectors @ turn` where there is a matrix (3, 3)."""
-    rows = np.empty((len(vectors), 4), np.float32)
     matrix = None if turn is None else np.ascontiguousarray(turn, np.float64)
-    _over_rows(vectors, lambda source, first, end: _engine.unit_vectors(source, matrix, first, end, None, rows))
-    return rows
+    return _row_by_row(
+        vectors, lambda source, a, b, out: _engine.unit_vectors(source, matrix, a, b, None, out), 4, np.float32
+    )
 
 
 def moved(points: FloatArray, matrix: F64) -> F64:
     """Points (N, 3), float64, moved by an affine matrix (4, 4)."""
-    out = np.empty((len(points), 3))
     rows = np.ascontiguousarray(matrix, np.float64)
-    _over_rows(points, lambda source, first, end: _engine.move_points(source, rows, first, end, out))
-    return out
+    return _row_by_row(points, lambda source, a, b, out: _engine.move_points(source, rows, a, b, out))
 
 
 def turn_of_normals(view: F64) -> F64:
@@ -277,9 +273,13 @@ def color_rows(colors: U8) -> F32:
     return rows
 
 
-def _over_rows(rows: FloatArray, work: Callable[[_engine.Source, int, int], None]) -> None:
-    source = _engine.Source(_contiguous(rows))
-    run_parts(lambda first, end: work(source, first, end), len(rows), threads_of_rows(len(rows)))
+def _row_by_row(
+    rows: FloatArray, work: Callable[[_engine.Source, int, int, Any], None], n_columns: int = 3, dtype: Any = np.float64
+) -> npt.NDArray[Any]:
+    """What `work` writes of ranges of the rows."""
+    source, out = _engine.Source(_contiguous(rows)), np.empty((len(rows), n_columns), dtype)
+    run_parts(lambda first, end: work(source, first, end, out), len(rows), threads_of_rows(len(rows)))
+    return out
 
 
 def _over_faces(
