@@ -21,7 +21,7 @@ from topleft._base.arrays import as_checked_triangles, as_frozen, refuse_rows
 from topleft._base.threads import run_parts, threads_of_rows
 
 __all__ = [
-    "CornerNormals", "angle_weighted_normals", "box_of_triangles", "color_rows", "creased_normals", "face_normal_rows",
+    "CornerNormals", "angle_weighted_normals", "box_of_triangles", "creased_normals", "face_normal_rows",
     "face_normals", "moved", "turn_of_normals", "turned_faces", "unit_or_zero", "unit_rows",
 ]  # fmt: skip
 
@@ -263,14 +263,6 @@ def turn_of_normals(view: F64) -> F64:
         [d * h - e * g, b * g - a * h, a * e - b * d],
     ]
     return np.array(adjugate) * math.copysign(1.0, _engine.determinant(view[:3, :3]))
-
-
-def color_rows(colors: U8) -> F32:
-    """Rows (N, 4) float32 of colours (N, 3) or (N, 4): red, green, blue, and 1."""
-    rows = np.empty((len(colors), 4), np.float32)
-    n_threads = threads_of_rows(len(colors))
-    run_parts(lambda first, end: _engine.color_rows(colors, first, end, rows), len(colors), n_threads)
-    return rows
 
 
 def _row_by_row(

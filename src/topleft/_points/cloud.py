@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from topleft import _engine
 from topleft._base.color import DEFAULT_COLOR, LINEAR_ONE, light_of, srgb_tables
-from topleft._base.memory import FreshMemory, empty
+from topleft._base.memory import FRESH, empty
 from topleft._base.options import PointShape
 from topleft._camera.camera import Camera, pixels_of
 from topleft._camera.lens import Lens
@@ -34,8 +34,6 @@ __all__ = ["CLOUD_LAYERS", "CloudBuffer", "draw_cloud", "shade_cloud"]
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
 U8 = npt.NDArray[np.uint8]
-
-FRESH = FreshMemory()
 
 NOWHERE_PX = 1e12
 """Where points stand that a lens does not see: no window shows it."""

@@ -18,20 +18,13 @@ import numpy.typing as npt
 from topleft import _engine
 from topleft._base.color import DEFAULT_COLOR, LIGHT_OF_SRGB, Color, light_of
 from topleft._base.memory import empty
+from topleft._base.threads import run_parts, threads_of_rows
 from topleft._camera.camera import Camera
 from topleft._model.environment import DEFAULT_ENVIRONMENT, Environment
 from topleft._model.light import TO_HEADLIGHT, Fog, Light, LightKind, LightSpace
 from topleft._model.material import AlphaMode, Material
 from topleft._model.mesh import Mesh, is_laid
-from topleft._model.normals import (
-    box_of_triangles,
-    color_rows,
-    face_normal_rows,
-    moved,
-    turn_of_normals,
-    turned_faces,
-    unit_rows,
-)
+from topleft._model.normals import box_of_triangles, face_normal_rows, moved, turn_of_normals, turned_faces, unit_rows
 from topleft._model.texture import Texture
 
 __all__ = ["CameraRays", "ShadingInputs", "ShadingMesh"]
@@ -140,6 +133,14 @@ class ShadingMesh:
         """(T,): 1 where the normals of the corners point to the other side than the triangle; None if none does."""
         turned = turned_faces(self.positions, self._triangles, self.normals, self.normal_of_corner)
         return turned if turned.view(np.bool_).any() else None
+
+
+def color_rows(colors: npt.NDArray[np.uint8]) -> F32:
+    """Rows (N, 4) float32 of colours (N, 3) or (N, 4): red, green, blue, and 1."""
+    rows = np.empty((len(colors), 4), np.float32)
+    n_threads = threads_of_rows(len(colors))
+    run_parts(lambda first, end: _engine.color_rows(colors, first, end, rows), len(colors), n_threads)
+    return rows
 
 
 _shading_meshes: WeakKeyDictionary[Mesh, ShadingMesh] = WeakKeyDictionary()
