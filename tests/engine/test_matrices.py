@@ -45,6 +45,12 @@ def test_inverse_changes_rows_where_the_first_pivot_is_0():
     assert _engine.inverse(np.array([[0.0, 2.0], [4.0, 0.0]])).tolist() == [[0.0, 0.25], [0.5, 0.0]]
 
 
+def test_determinant_adds_up_the_first_row_in_order():
+    for a, b, c in RNG.normal(size=(50, 3, 3)):
+        expected = a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0])
+        assert _engine.determinant([a, b, c]) == expected + a[2] * (b[0] * c[1] - b[1] * c[0])
+
+
 def test_wrong_matrices_are_refused():
     with pytest.raises(np.linalg.LinAlgError):
         _engine.inverse(np.array([[1.0, 2.0], [2.0, 4.0]]))
@@ -54,6 +60,8 @@ def test_wrong_matrices_are_refused():
         _engine.product(np.ones((2, 3)), np.ones((2, 3)))
     with pytest.raises(ValueError, match="must have 2 dimensions"):
         _engine.product(np.ones((2, 3, 3)), np.eye(3))
+    with pytest.raises(ValueError, match=r"shape \(3, 3\), got \(4, 4\)"):
+        _engine.determinant(np.eye(4))
     with pytest.raises(ValueError, match="broadcast"):
         _engine.row_products(np.ones((2, 3)), np.ones((3, 3)))
     with pytest.raises(ValueError, match="three numbers"):

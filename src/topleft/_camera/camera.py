@@ -40,7 +40,7 @@ from topleft._scene.adapt import MeshLike
 from topleft._scene.scene import Scene
 from topleft.typing import FitOption, UpOption
 
-__all__ = ["DEFAULT_FOV_Y_DEG", "Camera", "CameraLike", "as_camera", "camera_for"]
+__all__ = ["DEFAULT_FOV_Y_DEG", "Camera", "CameraLike", "as_camera", "camera_for", "pixels_of"]
 
 DEFAULT_FOV_Y_DEG = 40.0
 
@@ -179,17 +179,11 @@ class Camera:
         >>> Camera.look_at((0, 0, 5)).project([(0, 0, 0)], (200, 100))[0, :2].tolist()
         [100.0, 50.0]
         """
-        world, (width, height) = as_real("points", points), as_size(size)
+        world, size = as_real("points", points), as_size(size)
         if world.ndim != 2 or world.shape[1] != 3:
             raise ValueError(f"points must have shape (N, 3), got {world.shape}")
         eye = moved(world, self.view)
-        if self.lens is not None:
-            eye = self.lens.bend(eye)
-        projection = self.clip_from_eye(size)
-        clip = _engine.product(eye, projection[:, :3].T) + projection[:, 3]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            ndc = clip[:, :3] / clip[:, 3:]
-        return np.stack([(ndc[:, 0] + 1) * (width / 2), (1 - ndc[:, 1]) * (height / 2), (ndc[:, 2] + 1) / 2], axis=1)
+        return pixels_of(eye if self.lens is None else self.lens.bend(eye), self.clip_from_eye(size), size)
 
     @classmethod
     def from_matrix(cls, clip_from_world: npt.ArrayLike) -> Camera:
@@ -452,6 +446,15 @@ class Camera:
         fills = fit == "silhouette"
         matrices = framing_matrices(ends, points, angles, up=up, ortho=ortho, aspect=aspect, fills=fills)
         return cls(*matrices, aspect=1.0)
+
+
+def pixels_of(points_eye: F64, projection: F64, size: tuple[int, int]) -> F64:
+    """What `Camera.project` returns of points in eye space, as the lens has bent them."""
+    width, height = size
+    clip = _engine.product(points_eye, projection[:, :3].T) + projection[:, 3]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ndc = clip[:, :3] / clip[:, 3:]
+    return np.stack([(ndc[:, 0] + 1) * (width / 2), (1 - ndc[:, 1]) * (height / 2), (ndc[:, 2] + 1) / 2], axis=1)
 
 
 CameraLike: TypeAlias = Camera | npt.NDArray[Any]

@@ -82,6 +82,18 @@ def inverse(a):
     return result
 
 
+def determinant(a):
+    """Return the determinant of a float64 matrix (3, 3)."""
+    cdef const double[:, :] m = as_numbers(a, 2)
+    if m.shape[0] != 3 or m.shape[1] != 3:
+        raise ValueError(f"a matrix must have shape (3, 3), got {np.shape(a)}")
+    return (
+        m[0, 0] * (m[1, 1] * m[2, 2] - m[1, 2] * m[2, 1])
+        - m[0, 1] * (m[1, 0] * m[2, 2] - m[1, 2] * m[2, 0])
+        + m[0, 2] * (m[1, 0] * m[2, 1] - m[1, 1] * m[2, 0])
+    )
+
+
 def row_products(a, b):
     """Return the products (N,) of rows of float64 arrays (N, 3) with a row, or each with the same row of the other."""
     cdef const double[:, :] left = as_numbers(a, 2)

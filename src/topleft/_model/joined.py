@@ -14,7 +14,7 @@ import numpy.typing as npt
 from topleft import _engine
 from topleft._model.material import Material
 from topleft._model.mesh import NO_CREASE, Mesh, coincident, with_normals
-from topleft._model.normals import angle_weighted_normals, determinant, moved
+from topleft._model.normals import angle_weighted_normals, moved
 
 __all__ = ["joined", "placed_arrays"]
 
@@ -28,7 +28,7 @@ def placed_arrays(
     if np.array_equal(transform, np.eye(4)):
         return vertices, triangles, normals
     linear = transform[:3, :3]
-    volume = determinant(linear.tolist())
+    volume = _engine.determinant(linear)
     if volume < 0:  # a mirror turns the triangles over
         triangles = triangles[:, ::-1]
     if normals is not None:

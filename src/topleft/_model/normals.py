@@ -21,9 +21,8 @@ from topleft._base.arrays import as_checked_triangles, as_frozen, refuse_rows
 from topleft._base.threads import run_parts, threads_of_rows
 
 __all__ = [
-    "CornerNormals", "angle_weighted_normals", "box_of_triangles", "color_rows", "creased_normals", "determinant",
-    "face_normal_rows", "face_normals", "is_similarity", "moved", "turn_of_normals", "turned_faces", "unit_or_zero",
-    "unit_rows",
+    "CornerNormals", "angle_weighted_normals", "box_of_triangles", "creased_normals", "face_normal_rows",
+    "face_normals", "moved", "turn_of_normals", "turned_faces", "unit_or_zero", "unit_rows",
 ]  # fmt: skip
 
 FloatArray = npt.NDArray[np.floating[Any]]
@@ -235,25 +234,21 @@ def box_of_triangles(vertices: FloatArray, triangles: I32, *, threads: int | Non
 
 def unit_or_zero(vectors: FloatArray) -> F64:
     """Vectors (N, 3) scaled to length 1, float64; zero stays zero, and what is not finite becomes zero."""
-    out = np.empty((len(vectors), 3))
-    _over_rows(vectors, lambda source, first, end: _engine.unit_vectors(source, None, first, end, out, None))
-    return out
+    return _row_by_row(vectors, lambda source, a, b, out: _engine.unit_vectors(source, None, a, b, out, None))
 
 
 def unit_rows(vectors: FloatArray, turn: F64 | None = None) -> F32:
     """The same as rows (N, 4) float32, the last number 1; of `vectors @ turn` where there is a matrix (3, 3)."""
-    rows = np.empty((len(vectors), 4), np.float32)
     matrix = None if turn is None else np.ascontiguousarray(turn, np.float64)
-    _over_rows(vectors, lambda source, first, end: _engine.unit_vectors(source, matrix, first, end, None, rows))
-    return rows
+    return _row_by_row(
+        vectors, lambda source, a, b, out: _engine.unit_vectors(source, matrix, a, b, None, out), 4, np.float32
+    )
 
 
 def moved(points: FloatArray, matrix: F64) -> F64:
     """Points (N, 3), float64, moved by an affine matrix (4, 4)."""
-    out = np.empty((len(points), 3))
     rows = np.ascontiguousarray(matrix, np.float64)
-    _over_rows(points, lambda source, first, end: _engine.move_points(source, rows, first, end, out))
-    return out
+    return _row_by_row(points, lambda source, a, b, out: _engine.move_points(source, rows, a, b, out))
 
 
 def turn_of_normals(view: F64) -> F64:
@@ -261,44 +256,22 @@ def turn_of_normals(view: F64) -> F64:
 
     Its numbers are sums of products, the same on every machine.
     """
-    rows = view[:3, :3].tolist()
-    (a, b, c), (d, e, f), (g, h, i) = rows
+    (a, b, c), (d, e, f), (g, h, i) = view[:3, :3].tolist()
     adjugate = [
         [e * i - f * h, c * h - b * i, b * f - c * e],
         [f * g - d * i, a * i - c * g, c * d - a * f],
         [d * h - e * g, b * g - a * h, a * e - b * d],
     ]
-    return np.array(adjugate) * math.copysign(1.0, determinant(rows))
+    return np.array(adjugate) * math.copysign(1.0, _engine.determinant(view[:3, :3]))
 
 
-def is_similarity(view: F64) -> bool:
-    """Whether a matrix (4, 4) keeps angles and does not mirror, so that light may be computed before it."""
-    rows = view[:3, :3].tolist()
-    (a, b, c), (d, e, f), (g, h, i) = rows
-    squares = a * a + b * b + c * c, d * d + e * e + f * f, g * g + h * h + i * i
-    products = a * d + b * e + c * f, a * g + b * h + c * i, d * g + e * h + f * i
-    scale = sum(squares) / 3
-    error = max(map(abs, (*products, *(square - scale for square in squares))))
-    return determinant(rows) > 0 and error <= 1e-9 * scale
-
-
-def determinant(rows: list[list[float]]) -> float:
-    """Of a matrix (3, 3): NumPy's takes ten times as long for one."""
-    (a, b, c), (d, e, f), (g, h, i) = rows
-    return a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
-
-
-def color_rows(colors: U8) -> F32:
-    """Rows (N, 4) float32 of colours (N, 3) or (N, 4): red, green, blue, and 1."""
-    rows = np.empty((len(colors), 4), np.float32)
-    n_threads = threads_of_rows(len(colors))
-    run_parts(lambda first, end: _engine.color_rows(colors, first, end, rows), len(colors), n_threads)
-    return rows
-
-
-def _over_rows(rows: FloatArray, work: Callable[[_engine.Source, int, int], None]) -> None:
-    source = _engine.Source(_contiguous(rows))
-    run_parts(lambda first, end: work(source, first, end), len(rows), threads_of_rows(len(rows)))
+def _row_by_row(
+    rows: FloatArray, work: Callable[[_engine.Source, int, int, Any], None], n_columns: int = 3, dtype: Any = np.float64
+) -> npt.NDArray[Any]:
+    """What `work` writes of ranges of the rows."""
+    source, out = _engine.Source(_contiguous(rows)), np.empty((len(rows), n_columns), dtype)
+    run_parts(lambda first, end: work(source, first, end, out), len(rows), threads_of_rows(len(rows)))
+    return out
 
 
 def _over_faces(

@@ -16,11 +16,12 @@ import numpy.typing as npt
 
 from topleft import _engine
 from topleft._base.color import DEFAULT_COLOR, LINEAR_ONE, light_of, srgb_tables
-from topleft._base.memory import FreshMemory, empty
+from topleft._base.memory import FRESH, empty
 from topleft._base.options import PointShape
-from topleft._camera.camera import Camera
+from topleft._camera.camera import Camera, pixels_of
+from topleft._camera.lens import Lens
 from topleft._model.light import TO_HEADLIGHT, Light, LightKind, LightSpace
-from topleft._model.normals import determinant, moved, turn_of_normals, unit_or_zero
+from topleft._model.normals import moved, turn_of_normals, unit_or_zero
 from topleft._model.points import Points, PointUnit
 from topleft._points.points import PointFragments, draw_points
 from topleft._raster.classic import refuse_classic
@@ -33,8 +34,6 @@ __all__ = ["CLOUD_LAYERS", "CloudBuffer", "draw_cloud", "shade_cloud"]
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
 U8 = npt.NDArray[np.uint8]
-
-FRESH = FreshMemory()
 
 NOWHERE_PX = 1e12
 """Where points stand that a lens does not see: no window shows it."""
@@ -55,12 +54,20 @@ def draw_cloud(
     if options.get("cull", "none") != "none":
         raise ValueError("points have no side to cull")
     frame = options.get("viewport") or size
-    sizes = sizes_px(cloud, camera, frame)
     positions: npt.NDArray[Any] = cloud.positions
+    sizes: float | F64 = cloud.size
     if camera.lens is None:
         options["transform"] = camera.clip_from_world(frame)
-    else:
-        positions = through_lens(positions, camera, frame)
+    if camera.lens is not None or cloud.unit != PointUnit.PX:
+        eye = moved(positions, camera.view)
+        bent = eye if camera.lens is None else camera.lens.bend(eye)
+        projection = camera.clip_from_eye(frame)
+        if cloud.unit != PointUnit.PX:
+            unit_of_eye = abs(_engine.determinant(camera.view[:3, :3])) ** (1 / 3)
+            scale = unit_of_eye * abs(float(projection[1, 1])) * frame[1] / 2
+            sizes = np.asarray(cloud.size) * scale / w_of(bent, projection)
+        if camera.lens is not None:
+            positions = through_lens(eye, bent, camera.lens, projection, frame)
     view = View.parse(size, cast(ViewOptions, options), why_snapped="the corners of points lie on the grid")
     refuse_many(view, "a cloud")
     refuse_classic(view, "points")
@@ -74,33 +81,22 @@ def draw_share(cloud: Points, camera: Camera, size: tuple[int, int], **options: 
     return frags.mask if is_seen.shape[-1] == 1 else is_seen.mean(axis=-1, dtype=np.float32)
 
 
-def through_lens(positions: npt.NDArray[Any], camera: Camera, frame: tuple[int, int]) -> F64:
-    """Where the points lie in the picture of a lens: pixels and depth (N, 3)."""
-    eye = moved(positions, camera.view)
+def through_lens(eye: F64, bent: F64, lens: Lens, projection: F64, frame: tuple[int, int]) -> F64:
+    """Where points in eye space lie in the picture of a lens, which bends them: pixels and depth (N, 3)."""
     with np.errstate(all="ignore"):
-        places = camera.project(positions.astype(np.float64), frame)
+        places = pixels_of(bent, projection, frame)
         _, angle = _engine.off_axis(eye * [1, 1, -1])
     is_seen = np.isfinite(places).all(axis=1) & (places[:, 2] >= 0) & (places[:, 2] <= 1)
-    is_seen &= angle < (camera.lens.max_angle if camera.lens is not None else np.pi)
-    places[~is_seen] = NOWHERE_PX, NOWHERE_PX, 0
+    places[~(is_seen & (angle < lens.max_angle))] = NOWHERE_PX, NOWHERE_PX, 0
     return places
 
 
-def sizes_px(cloud: Points, camera: Camera, frame: tuple[int, int]) -> float | F64:
-    """How large the points are in the picture: those of the world as what faces the viewer at their distance."""
-    if cloud.unit == PointUnit.PX:
-        return cloud.size
-    eye = moved(cloud.positions, camera.view)
-    unit_of_eye = abs(determinant(camera.view[:3, :3].tolist())) ** (1 / 3)
-    if camera.lens is not None:
-        eye = camera.lens.bend(eye)
-    projection = camera.clip_from_eye(frame)
-    x, y, z = eye.T
+def w_of(bent: F64, projection: F64) -> F64:
+    """What divides the sizes (N,) of points of the world in a picture; 1 for what it cannot show."""
+    x, y, z = bent.T
     a, b, c, d = projection[3].tolist()
     w = ((a * x + b * y) + c * z) + d
-    scale = unit_of_eye * abs(float(projection[1, 1])) * frame[1] / 2
-    sizes: F64 = np.asarray(cloud.size) * scale / np.where(w > 0, w, 1)
-    return sizes
+    return np.where(w > 0, w, 1)
 
 
 def shade_cloud(frags: PointFragments, cloud: Points, camera: Camera, options: ShadingOptions) -> U8:
@@ -191,7 +187,7 @@ def lambert(light: Light, eye: F64, normals: F64, view: F64) -> F64:
     cosine = light.intensity * np.maximum(_engine.row_products(normals, unit_or_zero(way)), 0)
     if not is_point:
         return cosine
-    unit_of_eye = abs(determinant(view[:3, :3].tolist())) ** (1 / 3)
+    unit_of_eye = abs(_engine.determinant(view[:3, :3])) ** (1 / 3)
     return cosine / (1 + light.falloff * _engine.row_products(way, way) / unit_of_eye**2)
 
 

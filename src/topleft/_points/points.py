@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine
 from topleft._base.arrays import as_array, as_number, as_places, as_point_size, as_real, as_vertices
-from topleft._base.memory import FreshMemory, Memory, check_fits
+from topleft._base.memory import FRESH, Memory, check_fits
 from topleft._base.options import DepthTest, PointShape, Sink, parse
 from topleft._base.threads import count_threads, run_parts
 from topleft._raster.choices import threads_to_snap
@@ -26,8 +26,6 @@ from topleft._raster.view import View, ViewOptions
 from topleft.typing import DepthTestOption, PointShapeOption
 
 __all__ = ["MOST_POINT_PX", "PointFragments", "draw_points", "points"]
-
-FRESH = FreshMemory()
 
 MOST_POINT_PX = 1 << 14
 """The largest size of a point, pixels: squares of it in sub-pixels stay below 2**60."""

@@ -15,8 +15,8 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft import _engine
-from topleft._base.arrays import as_array, as_checked_triangles, as_real
-from topleft._base.memory import SCRATCH, FreshMemory, check_fits, fits
+from topleft._base.arrays import INT32_MAX, as_array, as_checked_triangles, as_real
+from topleft._base.memory import FRESH, SCRATCH, check_fits, fits
 from topleft._base.options import parse
 from topleft._base.threads import run_parts
 from topleft._field.grid import Grid
@@ -36,10 +36,6 @@ MAX_BLOCK_ENTRIES = 1 << 16
 
 #: What the kernel writes beyond the last entry: a whole vector.
 TAIL = 16
-
-INT32_MAX = 2**31 - 1
-
-FRESH = FreshMemory()
 
 
 @dataclass(frozen=True)

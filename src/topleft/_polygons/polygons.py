@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._base.arrays import apart_from, as_array, as_size, as_subpixel_bits, as_window
-from topleft._base.memory import SCRATCH, FreshMemory, empty
+from topleft._base.memory import FRESH, SCRATCH, empty
 from topleft._base.options import Sampling, parse
 from topleft._base.threads import parse_threads, run_parts
 from topleft._field.grid import Grid
@@ -25,8 +25,6 @@ from topleft._raster.sampling import SAMPLE_GRID_BITS, sample_positions
 from topleft.typing import RuleOption, SamplingOption
 
 __all__ = ["Rule", "frame_of", "polygons"]
-
-FRESH = FreshMemory()
 
 
 class Rule(StrEnum):

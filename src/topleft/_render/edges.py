@@ -6,6 +6,7 @@ Input: a picture (H, W, 4) uint8, `Fragments`, the `Mesh` or `Scene` and the `Ca
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -39,19 +40,15 @@ def draw_all_edges(
     for instance in scene_of(subject):
         own_camera, own_cull = camera.placed(instance.transform), cull_of(cull, instance)
         back = cull_of("back", instance)
+        vertices, triangles = instance.mesh.vertices, instance.mesh.triangles
         is_single = instance.mesh.single_sided(options.material)
-        kinds = [(instance.mesh, own_cull)]
+        kinds = [(triangles, own_cull)]
         if is_single is not None and own_cull != back:
-            kinds = [(some_of(instance.mesh, is_single == 0), own_cull)]
+            kinds = [(triangles[is_single == 0], own_cull)]
             if own_cull == "none":  # of the others the edges of what shows its front
-                kinds.append((some_of(instance.mesh, is_single == 1), back))
-        for mesh, side in kinds:
-            draw_edges(picture, behind, mesh, own_camera, cull=side, threads=options.threads)
-
-
-def some_of(mesh: Mesh, is_some: npt.NDArray[np.bool_]) -> Mesh:
-    """A mesh of some of its triangles, for edges."""
-    return Mesh(mesh.vertices, mesh.triangles[is_some])
+                kinds.append((triangles[is_single == 1], back))
+        for some, side in kinds:
+            draw_edges(picture, behind, vertices, some, own_camera, cull=side, threads=options.threads)
 
 
 def cull_of(cull: CullOption, instance: Instance) -> CullOption:
@@ -62,16 +59,17 @@ def cull_of(cull: CullOption, instance: Instance) -> CullOption:
 def draw_edges(
     picture: npt.NDArray[np.uint8],
     depth: npt.NDArray[np.float32],
-    mesh: Mesh,
+    vertices: npt.NDArray[Any],
+    triangles: npt.NDArray[Any],
     camera: Camera,
     *,
     cull: CullOption,
     threads: int | None,
 ) -> None:
-    """Draw the edges of the mesh over its picture (H, W, 4), those that are not behind a depth (H, W)."""
+    """Draw the edges of triangles over the picture (H, W, 4), those that are not behind a depth (H, W)."""
     height, width = depth.shape
     size = width, height
-    vertices, triangles, transform, bent = seen_through(mesh, camera, size)
+    vertices, triangles, transform, bent = seen_through(vertices, triangles, camera, size)
     if bent is not None:
         triangles, cull = bent.outline(transform, cull), "none"
     lines = wireframe(

@@ -220,7 +220,8 @@ def rasterize_subject(
     """
     if isinstance(subject, Scene):
         return draw_scene(subject, camera, size, material=material, **view)
-    drawn = seen_through(subject, camera, view.get("viewport") or size, near_clip=view.get("near_clip", True))
+    frame, near_clip = view.get("viewport") or size, view.get("near_clip", True)
+    drawn = seen_through(subject.vertices, subject.triangles, camera, frame, near_clip=near_clip)
     view["transform"] = drawn.transform
     if not isinstance(rasterizer, Rasterizer | None):
         raise TypeError(f"rasterizer must be a Rasterizer or None, got {shown(rasterizer)}")

@@ -7,55 +7,29 @@ with alpha.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 
-from topleft import _engine
 from topleft._base.color import DEFAULT_COLOR, WHITE, ColorLike
 from topleft._camera.camera import Camera, CameraLike, as_camera
 from topleft._model.environment import Environment
-from topleft._model.light import Fog, Light, LightKind, LightSpace
+from topleft._model.light import Fog, Light
 from topleft._model.material import Material
 from topleft._model.mesh import Mesh
-from topleft._model.normals import determinant, is_similarity
 from topleft._model.points import Points
 from topleft._model.texture import Texture
 from topleft._points.cloud import shade_cloud
 from topleft._points.points import PointFragments
 from topleft._raster.fragments import Fragments
 from topleft._render.fragments import SceneFragments, VisiblePart, join, parts_of
-from topleft._scene.scene import Instance, Scene, meshes_of
+from topleft._scene.scene import Scene, meshes_of
 from topleft._shade.shade import Places, Shading, ShadingOptions, shade_mesh, shade_numbers, shade_samples
 from topleft.typing import ShadingOption
 
 __all__ = ["shade", "shade_by", "shade_part"]
 
 U8 = npt.NDArray[np.uint8]
-
-
-def in_space_of(instance: Instance | None, options: ShadingOptions, camera: Camera) -> ShadingOptions:
-    """The options with lights as they stand in the object space of an instance, as bright as they are in the world.
-
-    `camera`: as it stands there.
-    """
-    if instance is None:
-        return options
-    if options.environment is not None:
-        options = replace(options, world_from_mesh=instance.transform[:3, :3])
-    if not options.lights:
-        return options
-    object_from_world = _engine.inverse(instance.transform)
-    # `ShadingInputs` measures distances in object space where the way to the eye keeps angles, else in eye space.
-    in_object_space = is_similarity(camera.view)
-    scale = _engine.cube_root(abs(determinant(instance.transform[:3, :3].tolist()))) if in_object_space else 1.0
-    moved = []
-    for light in options.lights:
-        at = np.array([*light.at, light.kind == LightKind.POINT])
-        at = at if light.space == LightSpace.EYE else _engine.product(object_from_world, at)
-        moved.append(replace(light, at=tuple(at[:3]), falloff=float(light.falloff * (scale * scale))))
-    return replace(options, lights=moved)
 
 
 def shade(
@@ -171,9 +145,8 @@ def shade_by(frags: Fragments, mesh: Mesh | Scene, camera: Camera, options: Shad
 
 def shade_part(part: VisiblePart, camera: Camera, options: ShadingOptions) -> U8:
     """The picture of the rectangle of a part."""
-    own_camera = part.camera(camera)
-    own_options = in_space_of(part.instance, options, own_camera)
-    return shade_mesh(*part.drawn, own_camera, own_options)
+    place = None if part.instance is None else part.instance.transform
+    return shade_mesh(*part.drawn, part.camera(camera), options, place)
 
 
 def check_drawn(frags: Fragments, mesh: Mesh | Scene) -> None:

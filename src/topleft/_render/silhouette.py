@@ -102,7 +102,8 @@ def silhouette(
     options: Any = {"sampling": sampling, "cull": cull, "threads": threads} | view
     if isinstance(subject, Scene):
         return draw_scene_coverage(subject, camera, size, out, **options)
-    drawn = seen_through(subject, camera, view.get("viewport") or size, near_clip=view.get("near_clip", True))
+    frame, near_clip = view.get("viewport") or size, view.get("near_clip", True)
+    drawn = seen_through(subject.vertices, subject.triangles, camera, frame, near_clip=near_clip)
     options |= {"transform": drawn.transform, "plan": drawn.sided(view.get("plan"), subject.single_sided())}
     mask: npt.NDArray[Any] = coverage(drawn.vertices, drawn.triangles, size, out=out, **options)
     return mask

@@ -21,14 +21,16 @@ from topleft._scene.scene import Instance, Scene
 
 __all__ = ["DrawnMesh", "DrawnScene", "StaticPlan", "scene_through", "seen_through"]
 
+Array = npt.NDArray[Any]
+
 MIRROR = np.diag([-1.0, 1.0, 1.0, 1.0])
 
 
 class DrawnMesh(NamedTuple):
     """What the verbs draw of a mesh."""
 
-    vertices: npt.NDArray[Any]
-    triangles: npt.NDArray[np.integer[Any]]
+    vertices: Array
+    triangles: Array
     transform: npt.NDArray[np.float64]
     bent: BentMesh | None
 
@@ -51,11 +53,13 @@ class SidedPlan:
         return own.without_backs(self._is_single)
 
 
-def seen_through(mesh: Mesh, camera: Camera, frame: tuple[int, int], *, near_clip: bool = True) -> DrawnMesh:
+def seen_through(
+    vertices: Array, triangles: Array, camera: Camera, frame: tuple[int, int], *, near_clip: bool = True
+) -> DrawnMesh:
     """The mesh as it is, and the camera's matrix for a whole picture of this size; or as the camera's lens bends it."""
     if camera.lens is None:
-        return DrawnMesh(mesh.vertices, mesh.triangles, camera.clip_from_world(frame), None)
-    bent = bend(mesh.vertices, mesh.triangles, camera, camera.lens, frame, near_clip=near_clip)
+        return DrawnMesh(vertices, triangles, camera.clip_from_world(frame), None)
+    bent = bend(vertices, triangles, camera, camera.lens, frame, near_clip=near_clip)
     return DrawnMesh(bent.points_eye, bent.triangles, camera.clip_from_eye(frame), bent)
 
 

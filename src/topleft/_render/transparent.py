@@ -186,6 +186,6 @@ def visible_layers(
     check_straight(camera)
     if isinstance(subject, Scene):
         return peel_scene(subject, camera, size, **options)
-    drawn = seen_through(subject, camera, options.get("viewport") or size)
+    drawn = seen_through(subject.vertices, subject.triangles, camera, options.get("viewport") or size)
     options["plan"] = drawn.sided(options.get("plan"), subject.single_sided())
     return peel(subject.vertices, subject.triangles, size, transform=drawn.transform, **options)

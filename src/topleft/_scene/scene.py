@@ -20,7 +20,7 @@ from topleft import _engine
 from topleft._base.arrays import INT32_MAX, as_square, check_regular, set_read_only, shown
 from topleft._io.load import load
 from topleft._model.mesh import Mesh, extreme_points, used_vertices
-from topleft._model.normals import determinant, moved
+from topleft._model.normals import moved
 from topleft._model.points import Points
 from topleft._raster.clusters import Backoff
 from topleft._scene.adapt import MeshLike, as_mesh, is_mesh_like
@@ -98,7 +98,7 @@ class Instance:
     @cached_property
     def is_mirrored(self) -> bool:
         """Whether the matrix turns the winding of triangles over."""
-        return determinant(self.transform[:3, :3].tolist()) < 0
+        return _engine.determinant(self.transform[:3, :3]) < 0
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -18,22 +18,13 @@ import numpy.typing as npt
 from topleft import _engine
 from topleft._base.color import DEFAULT_COLOR, LIGHT_OF_SRGB, Color, light_of
 from topleft._base.memory import empty
+from topleft._base.threads import run_parts, threads_of_rows
 from topleft._camera.camera import Camera
 from topleft._model.environment import DEFAULT_ENVIRONMENT, Environment
 from topleft._model.light import TO_HEADLIGHT, Fog, Light, LightKind, LightSpace
 from topleft._model.material import AlphaMode, Material
 from topleft._model.mesh import Mesh, is_laid
-from topleft._model.normals import (
-    box_of_triangles,
-    color_rows,
-    determinant,
-    face_normal_rows,
-    is_similarity,
-    moved,
-    turn_of_normals,
-    turned_faces,
-    unit_rows,
-)
+from topleft._model.normals import box_of_triangles, face_normal_rows, moved, turn_of_normals, turned_faces, unit_rows
 from topleft._model.texture import Texture
 
 __all__ = ["CameraRays", "ShadingInputs", "ShadingMesh"]
@@ -95,7 +86,7 @@ def rays_of(camera: Camera, size: tuple[int, int], center: F64, *, in_eye_space:
         (a, b), (c, d) = camera.projection[2:, 2:]
         near, far = ((ndc * d - b) / (ndc * c - a) for ndc in (-1.0, 1.0))
         start, scale = near, far - near
-    size_of_unit = _engine.cube_root(determinant(view[:3, :3].tolist()))
+    size_of_unit = _engine.cube_root(_engine.determinant(view[:3, :3]))
     linear = view[:3, :3]
     origin = _engine.product(linear, center) + view[:3, 3]
     return CameraRays(has_perspective, eye, ray, linear / size_of_unit, origin, size_of_unit, start, scale)
@@ -144,6 +135,14 @@ class ShadingMesh:
         return turned if turned.view(np.bool_).any() else None
 
 
+def color_rows(colors: npt.NDArray[np.uint8]) -> F32:
+    """Rows (N, 4) float32 of colours (N, 3) or (N, 4): red, green, blue, and 1."""
+    rows = np.empty((len(colors), 4), np.float32)
+    n_threads = threads_of_rows(len(colors))
+    run_parts(lambda first, end: _engine.color_rows(colors, first, end, rows), len(colors), n_threads)
+    return rows
+
+
 _shading_meshes: WeakKeyDictionary[Mesh, ShadingMesh] = WeakKeyDictionary()
 
 
@@ -181,6 +180,16 @@ def full_part(material: Material, mesh: Mesh) -> tuple[Any, ...]:
     return (*numbers, material.emission, *engines)
 
 
+def is_similarity(view: F64) -> bool:
+    """Whether a matrix (4, 4) keeps angles and does not mirror, so that light may be computed before it."""
+    (a, b, c), (d, e, f), (g, h, i) = view[:3, :3].tolist()
+    squares = a * a + b * b + c * c, d * d + e * e + f * f, g * g + h * h + i * i
+    products = a * d + b * e + c * f, a * g + b * h + c * i, d * g + e * h + f * i
+    scale = sum(squares) / 3
+    error = max(map(abs, (*products, *(square - scale for square in squares))))
+    return error <= 1e-9 * scale and _engine.determinant(view[:3, :3]) > 0
+
+
 class ShadingInputs:
     """The numbers of one picture, as the kernels read them."""
 
@@ -200,7 +209,7 @@ class ShadingInputs:
         viewport = size if scene.viewport is None else scene.viewport.size
         self.rays = rays_of(camera, viewport, self.mesh.center, in_eye_space=in_eye_space)
         self.view = camera.view
-        self.back_side = -1.0 if determinant(camera.view[:3, :3].tolist()) > 0 else 1.0
+        self.back_side = -1.0 if _engine.determinant(camera.view[:3, :3]) > 0 else 1.0
         self.is_in_eye_space = in_eye_space
         normals, finds_inverse_w = self.mesh.normals, False
         if scene.viewport is not None and self.rays.has_perspective:
@@ -252,29 +261,45 @@ class ShadingInputs:
         """Have the opacity of the surface in the alpha of the picture; all materials are full."""
         self.shading.set_wants_opacity()
 
-    def set_lights(self, lights: Sequence[Light] | None, ambient: float) -> None:
-        """Take the lights, in shading space."""
+    def set_lights(self, lights: Sequence[Light] | None, ambient: float, world_from_mesh: F64 | None = None) -> None:
+        """Take the lights, in shading space.
+
+        `world_from_mesh`: (4, 4) for a mesh that stands in the world by a matrix, whose camera is the one in its space.
+        """
         if lights is None:
             at = _engine.product(self.rays.eye_from.T, TO_HEADLIGHT)
             rows: list[tuple[Any, ...]] = [(WRAPPED_LIGHT, at, (max(0.0, 1 - ambient),) * 3, 0.0)]
         else:
-            rows = [self._light(light) for light in lights]
+            placed = lights if world_from_mesh is None else self._lights_by(lights, world_from_mesh)
+            rows = [self._light(light) for light in placed]
         self.shading.set_lights(rows, (ambient,) * 3)
 
     def set_environment(self, environment: Environment | None, world_from_mesh: F64 | None = None) -> None:
         """Take the environment, or what metallic surfaces mirror without one.
 
-        `world_from_mesh`: (3, 3) for a mesh that stands in the world by a matrix, whose camera is the one in its space.
+        `world_from_mesh`: as for `set_lights`.
         """
         own = DEFAULT_ENVIRONMENT if environment is None else environment
         rows = self.rays.eye_from
         if own.space is LightSpace.WORLD:
             rows = _engine.product(_engine.inverse(self.view[:3, :3]), rows)
-            rows = rows if world_from_mesh is None else _engine.product(world_from_mesh, rows)
-        rows = _engine.product(own.axes, rows / _engine.cube_root(abs(determinant(rows.tolist()))))
+            rows = rows if world_from_mesh is None else _engine.product(world_from_mesh[:3, :3], rows)
+        rows = _engine.product(own.axes, rows / _engine.cube_root(abs(_engine.determinant(rows))))
         texels, table = own.levels or (None, None)
         diffuse = 0.0 if environment is None else 1.0
         self.shading.set_surroundings(_engine.Surroundings(texels, table, *own.colors, diffuse, rows.tolist()))
+
+    def _lights_by(self, lights: Sequence[Light], world_from_mesh: F64) -> list[Light]:
+        """The lights as they stand in the space of a mesh, as bright as they are in the world."""
+        mesh_from_world = _engine.inverse(world_from_mesh)
+        # Distances are measured in the space of the mesh, or in eye space, whose unit is that of the world.
+        scale = 1.0 if self.is_in_eye_space else _engine.cube_root(abs(_engine.determinant(world_from_mesh[:3, :3])))
+        placed = []
+        for light in lights:
+            at = np.array([*light.at, light.kind == LightKind.POINT])
+            at = at if light.space == LightSpace.EYE else _engine.product(mesh_from_world, at)
+            placed.append(replace(light, at=tuple(at[:3]), falloff=float(light.falloff * (scale * scale))))
+        return placed
 
     def _light(self, light: Light) -> tuple[Any, ...]:
         rays, at = self.rays, np.array(light.at)

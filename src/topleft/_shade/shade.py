@@ -93,8 +93,6 @@ class ShadingOptions:
     fog: Fog | None
     environment: Environment | None
     threads: int | None
-    world_from_mesh: F64 | None = None
-    """(3, 3): of an instance of a scene."""
     shows_opacity: bool = False
     """Whether the picture's alpha is the opacity of the surface."""
 
@@ -144,9 +142,12 @@ def plain_material(color: Color | None) -> Material:
     return Material(color)
 
 
-def shade_mesh(frags: Fragments, mesh: Mesh, camera: Camera, options: ShadingOptions) -> U8:
+def shade_mesh(
+    frags: Fragments, mesh: Mesh, camera: Camera, options: ShadingOptions, world_from_mesh: F64 | None = None
+) -> U8:
     """Shade the triangles that show, all samples of them: the picture (H, W, 4) uint8.
 
+    `world_from_mesh`: (4, 4) of an instance of a scene; the camera is the one in the space of its mesh.
     The kernel reads the mesh triangle by triangle, so it has to be the one that was drawn: of a lens its parts.
     """
     picture = empty((*frags.triangle.shape, 4), np.uint8)
@@ -167,9 +168,9 @@ def shade_mesh(frags: Fragments, mesh: Mesh, camera: Camera, options: ShadingOpt
     look = ShadingInputs(scene, mesh, camera, picture.shape[1::-1], rows, is_flat=options.mode is Shading.FLAT)
     all_full = options.environment is not None or options.shows_opacity
     look.set_materials(mesh, own, is_unlit=options.mode is Shading.UNLIT, all_full=all_full)
-    look.set_lights(options.lights, options.ambient)
+    look.set_lights(options.lights, options.ambient, world_from_mesh)
     if options.environment is not None or any(one.is_metallic_rough for one in own):
-        look.set_environment(options.environment, options.world_from_mesh)
+        look.set_environment(options.environment, world_from_mesh)
     if options.shows_opacity:
         look.set_opacity()
     look.set_view(SHOW_CODES.get(options.mode, 0), options.matcap, options.background)
