@@ -22,7 +22,7 @@ from benchmarks.harness.arguments import add_out, positive
 from benchmarks.harness.machine import describe
 from benchmarks.harness.records import Record, Save
 from benchmarks.report.study import Study
-from benchmarks.report.tables import table
+from benchmarks.report.tables import facts_text, table
 
 SIZE = (1920, 1080)
 WIDE = 10
@@ -133,4 +133,12 @@ def lines(record: Record) -> Iterator[str]:
     yield from table(head, rows)
 
 
-STUDY = Study("instances", "time thousands of instances, and a mesh from a memory map", add_arguments, run, lines)
+PARTS: dict[str, Callable[[Record], str | None]] = {
+    "instances-facts": facts_text,
+    "instances": lambda record: "\n".join(lines(record)),
+}
+"""What the markers `<!-- table: NAME -->` of the page stand for."""
+
+STUDY = Study(
+    "instances", "time thousands of instances, and a mesh from a memory map", add_arguments, run, lines, PARTS
+)
