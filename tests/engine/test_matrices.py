@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from topleft import _engine
+from topleft._model.normals import determinant
 
 RNG = np.random.default_rng(4)
 
@@ -43,6 +44,28 @@ def test_inverse_is_as_near_as_its_condition_lets_it(n):
 
 def test_inverse_changes_rows_where_the_first_pivot_is_0():
     assert _engine.inverse(np.array([[0.0, 2.0], [4.0, 0.0]])).tolist() == [[0.0, 0.25], [0.5, 0.0]]
+
+
+@pytest.mark.parametrize("has_perspective", [True, False])
+def test_camera_rays_are_products_and_inverses(has_perspective):
+    view, center, size = np.linalg.qr(RNG.normal(size=(4, 4)))[0], RNG.normal(size=3), (640, 480)
+    projection = np.diag(RNG.uniform(1, 2, 4))
+    projection[2:, 2:] = [[-1.1, -2.2], [-1.0, 0.0]] if has_perspective else [[-0.1, -1.2], [0.0, 1.0]]
+    view[3] = 0, 0, 0, 1
+    clip = _engine.product(projection, view)
+    rows = clip[[0, 1, 3 if has_perspective else 2]]
+    back = _engine.inverse(rows[:, :3])
+    offset = _engine.product(back, rows[:, 3])
+    ends = [[-1, 1, 1 if has_perspective else -1], [2 / size[0], 0, 0], [0, -2 / size[1], 0], [0, 0, 2]]
+    ray = _engine.product(np.array(ends), back.T)
+    eye = -offset - center if has_perspective else -ray[3] / _engine.length(ray[3])
+    if not has_perspective:
+        ray[0] -= offset + center
+    found, rows, scale = _engine.camera_rays(projection, view, center, *size)
+    assert found == has_perspective
+    assert scale == _engine.cube_root(determinant(view[:3, :3].tolist()))
+    origin = _engine.product(view[:3, :3], center) + view[:3, 3]
+    assert np.array_equal(rows, np.vstack([eye, ray, view[:3, :3] / scale, origin]))
 
 
 def test_wrong_matrices_are_refused():
