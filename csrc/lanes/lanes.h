@@ -36,6 +36,7 @@
  *   vd_or(a, b)             the bits of both: 0 where both are
  *   vf_store_pairs, vf_store_triples    pixels of two or three numbers, one after the other
  * vi_load_records(base, scale, i, c), vf_load_pairs 16 bytes at base + scale * i[k], 8 at base + 8 * i[k], as columns
+ *   vi_load_rows(base, i, c)    16 bytes at base + 8 * i[k], as columns; i are unsigned
  *   hm_, hf_, hi_, hd_      the few that short rows need, in half vectors of TL_HALF_LANES (0: there are none)
  *   vi_mul_halves, vi_mul_high_halves    lower and upper halves of the products of unsigned 16-bit halves
  *   vi_scale_halves(a, b)   (a * b + 2^14) >> 15 of signed 16-bit halves; b = -2^15 is -1

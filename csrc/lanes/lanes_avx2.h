@@ -403,6 +403,18 @@ TL_INLINE void vi_load_records(const void *base, int scale, const int32_t *i, vi
                         load_two_records(base, scale, i + 2), load_two_records(base, scale, i + 3)};
     transpose_quads(rows, c);
 }
+TL_INLINE __m256i load_two_rows(const char *base, const int32_t *i)
+{
+    const __m128i a = _mm_loadu_si128((const __m128i *)(base + 8 * (uint64_t)(uint32_t)i[0]));
+    const __m128i b = _mm_loadu_si128((const __m128i *)(base + 8 * (uint64_t)(uint32_t)i[4]));
+    return _mm256_inserti128_si256(_mm256_castsi128_si256(a), b, 1);
+}
+TL_INLINE void vi_load_rows(const void *base, const int32_t *i, vi *c)
+{
+    const vi rows[4] = {load_two_rows(base, i), load_two_rows(base, i + 1), load_two_rows(base, i + 2),
+                        load_two_rows(base, i + 3)};
+    transpose_quads(rows, c);
+}
 TL_INLINE __m256i load_four_pairs(const char *base, const int32_t *i)
 {
     __m128i two[2];

@@ -411,6 +411,22 @@ TL_INLINE void vi_load_records(const void *base, int scale, const int32_t *i, vi
                         load_four_records(base, scale, i + 2), load_four_records(base, scale, i + 3)};
     transpose_quads(rows, c);
 }
+TL_INLINE vi load_four_rows(const char *base, const int32_t *i)
+{
+    const __m128i a = _mm_loadu_si128((const __m128i *)(base + 8 * (uint64_t)(uint32_t)i[0]));
+    const __m128i b = _mm_loadu_si128((const __m128i *)(base + 8 * (uint64_t)(uint32_t)i[4]));
+    const __m128i c = _mm_loadu_si128((const __m128i *)(base + 8 * (uint64_t)(uint32_t)i[8]));
+    const __m128i d = _mm_loadu_si128((const __m128i *)(base + 8 * (uint64_t)(uint32_t)i[12]));
+    const __m256i low = _mm256_inserti128_si256(_mm256_castsi128_si256(a), b, 1);
+    const __m256i high = _mm256_inserti128_si256(_mm256_castsi128_si256(c), d, 1);
+    return _mm512_inserti64x4(_mm512_castsi256_si512(low), high, 1);
+}
+TL_INLINE void vi_load_rows(const void *base, const int32_t *i, vi *c)
+{
+    const vi rows[4] = {load_four_rows(base, i), load_four_rows(base, i + 1), load_four_rows(base, i + 2),
+                        load_four_rows(base, i + 3)};
+    transpose_quads(rows, c);
+}
 TL_INLINE vi load_eight_pairs(const char *base, const int32_t *i)
 {
     __m128i two[4];

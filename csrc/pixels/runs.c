@@ -68,12 +68,14 @@ typedef struct {
     int is_grey;
     float grey_line[3], grey_root[3];
     int has_far_texels; /* some are asked for before they are read */
+    int is_plain;       /* edge functions and normals of vertices are all that runs need */
     int n_runs, n_special;
     int first_run[TL_SPAN]; /* of each vector: how many runs have begun before it */
     unsigned starts[TL_SPAN], visible[TL_SPAN];
     /* vectors of runs begin with a cache line: one across two takes twice as long */
     _Alignas(64) int32_t ints[N_RUN_INTS][TL_SPAN_ROOM];
     _Alignas(64) float floats[N_RUN_FLOATS][TL_SPAN_ROOM];
+    _Alignas(64) int32_t corners[3][TL_SPAN_ROOM]; /* see keep_corners */
     special_run special[TL_SPAN];
 } shade_runs;
 
@@ -377,6 +379,18 @@ static void set_more_attributes(shade_runs *s, int slot, const run_setup *r)
         }
 }
 
+/* Normals of the corners of TL_LANES runs, weighted, and how short their sum may be. */
+TL_INLINE void put_normals(shade_runs *s, int slot, vf area, const vf *q, const vf (*normal)[3])
+{
+    const vf most = vf_mul(vf_mul(area, vf_set1(TL_NO_NORMAL)), vf_max(q[0], vf_max(q[1], q[2])));
+    const vf side = s->shading->is_turned ? side_of_normals(s, slot) : vf_set1(1.0f);
+    put(s, RUN_SHORTEST, slot, vf_mul(most, most));
+    for (int k = 0; k < 3; k++) {
+        const vf turned = vf_mul(q[k], side), same[3] = {turned, turned, turned};
+        put_three(s, RUN_NORMAL + 3 * k, slot, same, normal[k][0], normal[k][1], normal[k][2]);
+    }
+}
+
 /* Everything but edge functions of TL_LANES runs. */
 TL_INLINE void set_attributes(shade_runs *s, int slot, const run_setup *r)
 {
@@ -385,13 +399,7 @@ TL_INLINE void set_attributes(shade_runs *s, int slot, const run_setup *r)
     if (shading->face_normals) {
         set_face_normals(s, slot, r->area);
     } else if (s->needs_normal) {
-        const vf most = vf_mul(vf_mul(r->area, vf_set1(TL_NO_NORMAL)), vf_max(q[0], vf_max(q[1], q[2])));
-        const vf side = shading->is_turned ? side_of_normals(s, slot) : vf_set1(1.0f);
-        put(s, RUN_SHORTEST, slot, vf_mul(most, most));
-        for (int k = 0; k < 3; k++) {
-            const vf turned = vf_mul(q[k], side), same[3] = {turned, turned, turned};
-            put_three(s, RUN_NORMAL + 3 * k, slot, same, r->normal[k][0], r->normal[k][1], r->normal[k][2]);
-        }
+        put_normals(s, slot, r->area, q, (const vf(*)[3])r->normal);
     }
     if (s->needs_q)
         for (int k = 0; k < 3; k++)
@@ -545,26 +553,18 @@ static void set_no_edges(shade_runs *s, int slot, run_setup *r)
     r->area = vf_set1(0.0f);
 }
 
-/* Edge functions of TL_LANES runs in a row, at column 0 of the row: what wraps on the way there comes back at the
- * pixel. */
-TL_INLINE vm set_edges(shade_runs *s, int slot, int64_t row, run_setup *r)
+/* Edge functions of TL_LANES runs in a row, from their corners, at column 0 of the row: what wraps on the way there
+ * comes back at the pixel.  Returns the runs that need others; their sum is the area. */
+TL_INLINE vm find_edges(shade_runs *s, int slot, int64_t row, vi *x, vi *y, vf *col_step, vf *row_step)
 {
     const tl_vertex_set *set = &s->snapped->mesh;
     const int bits = s->window->subpixel_bits;
     const int32_t half = (1 << bits) >> 1;
     const vi px = vi_set1((int32_t)((uint32_t)s->window->x_px << bits) + half + set->sample_x_fx);
     const vi py = vi_set1((int32_t)((uint32_t)(row + s->window->y_px) << bits) + half + set->sample_y_fx);
-    vi x[3], y[3];
     vm is_special = bits == 0 ? vm_all() : vm_first(0);
-    if (set->exact) {
-        set_no_edges(s, slot, r);
-        return vm_all();
-    }
-    for (int k = 0; k < 3; k++) {
-        vz z;
-        load_vertices_by(1, set->vertices, r->corners[k], &x[k], &y[k], &z);
+    for (int k = 0; k < 3; k++)
         is_special = vm_or(is_special, vi_eq(x[k], vi_set1(TL_SPECIAL)));
-    }
     const vf width = vf_from_vi(vi_sub(vi_max(x[0], vi_max(x[1], x[2])), vi_min(x[0], vi_min(x[1], x[2]))));
     const vf height = vf_from_vi(vi_sub(vi_max(y[0], vi_max(y[1], y[2])), vi_min(y[0], vi_min(y[1], y[2]))));
     is_special = vm_or(is_special, vf_ge(vf_mul(width, height), vf_set1(TL_INT32_BOX)));
@@ -574,8 +574,8 @@ TL_INLINE vm set_edges(shade_runs *s, int slot, int64_t row, run_setup *r)
     for (int k = 0; k < 3; k++) {
         const int a = k == 2 ? 0 : k + 1, b = 3 - k - a;
         const vi e = vi_sub(vi_mul(x[b], y[a]), vi_mul(x[a], y[b])), step = vi_shift_left(vi_sub(y[b], y[a]), bits);
-        r->col_step[k] = vf_from_vi(step);
-        r->row_step[k] = vf_from_vi(vi_shift_left(vi_sub(x[a], x[b]), bits));
+        col_step[k] = vf_from_vi(step);
+        row_step[k] = vf_from_vi(vi_shift_left(vi_sub(x[a], x[b]), bits));
         sum = vi_add(sum, e);
         if (k) {
             vi_store(s->ints[RUN_E1 + k - 1] + slot, e);
@@ -583,7 +583,24 @@ TL_INLINE vm set_edges(shade_runs *s, int slot, int64_t row, run_setup *r)
         }
     }
     vi_store(s->ints[RUN_SUM] + slot, sum);
-    r->area = vf_from_vi(sum);
+    return is_special;
+}
+
+/* The same of corners that are not loaded yet. */
+TL_INLINE vm set_edges(shade_runs *s, int slot, int64_t row, run_setup *r)
+{
+    const tl_vertex_set *set = &s->snapped->mesh;
+    vi x[3], y[3];
+    if (set->exact) {
+        set_no_edges(s, slot, r);
+        return vm_all();
+    }
+    for (int k = 0; k < 3; k++) {
+        vz z;
+        load_vertices_by(1, set->vertices, r->corners[k], &x[k], &y[k], &z);
+    }
+    const vm is_special = find_edges(s, slot, row, x, y, r->col_step, r->row_step);
+    r->area = vf_from_vi(vi_load(s->ints[RUN_SUM] + slot));
     return is_special;
 }
 
@@ -635,36 +652,106 @@ TL_INLINE void fetch_corners(const shade_runs *s, int first, int end)
     }
 }
 
-/* Prepares the runs of a row, a vector of them at a time. */
-TL_ONCE void set_runs(shade_runs *s, int64_t row)
+/* The corners of all runs, times 2^shift.  A pass of its own, as what is stored number by number is not yet there for
+ * vectors, nor the other way round: meanwhile the processor has the next vector of runs. */
+TL_INLINE void keep_corners(shade_runs *s, int fetches, int shift)
 {
-    const tl_shading *shading = s->shading;
-    const int fetches = s->snapped->n_triangles >= TL_FETCHED_TRIANGLES, end = TL_LANES + s->n_runs;
-    s->n_special = 0;
-    if (fetches) {
+    const int end = TL_LANES + s->n_runs;
+    if (fetches)
         fetch_triangles(s, TL_LANES, (int)min64(end, TL_LANES + 2 * TL_FETCH_RUNS));
-        fetch_corners(s, TL_LANES, (int)min64(end, TL_LANES + TL_FETCH_RUNS));
-    }
-    if (s->n_runs) /* the rest of the last vector: a triangle that is there */
-        vi_store(s->ints[RUN_ID] + TL_LANES + s->n_runs, vi_set1(s->ints[RUN_ID][TL_LANES + s->n_runs - 1]));
     for (int slot = TL_LANES; slot < end; slot += TL_LANES) {
+        _Alignas(64) int32_t corners[3][TL_MAX_LANES];
+        const int ahead = slot + 2 * TL_FETCH_RUNS;
+        if (fetches)
+            fetch_triangles(s, ahead, (int)min64(end, ahead + TL_LANES));
+        run_corners(s, slot, corners);
+        for (int k = 0; k < 3; k++)
+            vi_store(s->corners[k] + slot, vi_shift_left(vi_load(corners[k]), shift));
+    }
+}
+
+/* Edge functions and attributes of the runs of a row, a vector of them at a time. */
+TL_INLINE void set_any_runs(shade_runs *s, int64_t row, int fetches)
+{
+    const int end = TL_LANES + s->n_runs;
+    keep_corners(s, fetches, 0);
+    if (fetches)
+        fetch_corners(s, TL_LANES, (int)min64(end, TL_LANES + TL_FETCH_RUNS));
+    for (int slot = TL_LANES; slot < end; slot += TL_LANES) {
+        const int ahead = slot + TL_FETCH_RUNS;
         run_setup r;
-        if (fetches) {
-            const int ahead = slot + TL_FETCH_RUNS, behind = ahead + TL_FETCH_RUNS;
-            fetch_triangles(s, behind, (int)min64(end, behind + TL_LANES));
+        if (fetches)
             fetch_corners(s, ahead, (int)min64(end, ahead + TL_LANES));
-        }
-        run_corners(s, slot, r.corners);
+        for (int k = 0; k < 3; k++)
+            vi_spill(r.corners[k], vi_load(s->corners[k] + slot));
         vi_store(s->ints[RUN_SPECIAL] + slot, vi_set1(0));
         const vm is_special = vm_and(set_edges(s, slot, row, &r), vm_first(end - slot));
         load_normals(s, slot, &r);
         for (unsigned rest = vm_bits(is_special); rest; rest &= rest - 1)
             set_special(s, slot, __builtin_ctz(rest), row, &r);
         set_attributes(s, slot, &r);
-        if (shading->material_of)
-            for (int lane = 0; lane < TL_LANES; lane++)
-                s->ints[RUN_MATERIAL][slot + lane] = shading->material_of[s->ints[RUN_ID][slot + lane]];
     }
+}
+
+/* Normal and q of corner k of TL_LANES runs. */
+TL_INLINE vf load_plain_normal(const shade_runs *s, int slot, int k, vf *normal)
+{
+    vi c[4];
+    vi_load_rows(s->shading->normals, s->corners[k] + slot, c);
+    for (int axis = 0; axis < 3; axis++)
+        normal[axis] = vf_of_bits(c[axis]);
+    return vf_of_bits(c[3]);
+}
+
+/* The same of runs that need no more than normals of vertices, where none is special: 0 if one is.  Passes of few
+ * operations, so that those of several vectors of runs overlap. */
+TL_INLINE int set_plain_runs(shade_runs *s, int64_t row, int fetches)
+{
+    const int end = TL_LANES + s->n_runs;
+    vm is_special = vm_first(0);
+    keep_corners(s, fetches, 1);
+    if (fetches)
+        fetch_corners(s, TL_LANES, (int)min64(end, TL_LANES + TL_FETCH_RUNS));
+    for (int slot = TL_LANES; slot < end; slot += TL_LANES) {
+        const int ahead = slot + TL_FETCH_RUNS;
+        vi x[3], y[3];
+        vf col_step[3], row_step[3];
+        if (fetches)
+            fetch_corners(s, ahead, (int)min64(end, ahead + TL_LANES));
+        for (int k = 0; k < 3; k++) {
+            vi c[4];
+            vi_load_rows(s->snapped->mesh.vertices, s->corners[k] + slot, c);
+            x[k] = c[0], y[k] = c[1];
+        }
+        is_special = vm_or(is_special, find_edges(s, slot, row, x, y, col_step, row_step));
+    }
+    if (vm_any(is_special))
+        return 0;
+    for (int slot = TL_LANES; slot < end; slot += TL_LANES) {
+        vf q[3], normal[3][3];
+        q[0] = load_plain_normal(s, slot, 0, normal[0]);
+        q[1] = load_plain_normal(s, slot, 1, normal[1]);
+        q[2] = load_plain_normal(s, slot, 2, normal[2]);
+        put_normals(s, slot, vf_from_vi(vi_load(s->ints[RUN_SUM] + slot)), q, (const vf(*)[3])normal);
+    }
+    return 1;
+}
+
+/* Prepares the runs of a row. */
+TL_ONCE void set_runs(shade_runs *s, int64_t row)
+{
+    const tl_shading *shading = s->shading;
+    const int fetches = s->snapped->n_triangles >= TL_FETCHED_TRIANGLES, end = TL_LANES + s->n_runs;
+    s->n_special = 0;
+    if (!s->n_runs)
+        return;
+    /* the rest of the last vector: a triangle that is there */
+    vi_store(s->ints[RUN_ID] + end, vi_set1(s->ints[RUN_ID][end - 1]));
+    if (!s->is_plain || !set_plain_runs(s, row, fetches))
+        set_any_runs(s, row, fetches);
+    if (shading->material_of)
+        for (int slot = TL_LANES; slot < end; slot++)
+            s->ints[RUN_MATERIAL][slot] = shading->material_of[s->ints[RUN_ID][slot]];
 }
 
 /* A vector of pixels: where its lanes find their runs, and what they are to show. */

@@ -58,6 +58,8 @@ static void start_runs(shade_runs *s, const tl_snapped *snapped, const tl_window
     s->needs_point = shows_light && ((is_lit && has_points) || shines);
     s->needs_more = s->needs_uv1 || s->needs_alpha || s->needs_tangents[0] || s->needs_tangents[1];
     s->needs_q = s->needs_uv || s->needs_more || s->needs_colors || s->needs_point || shading->fog_scale != 0.0f;
+    s->is_plain = s->needs_normal && !s->needs_q && !shading->face_normals && !shading->normal_of_corner &&
+                  !shading->finds_inverse_w && !snapped->mesh.exact && window->subpixel_bits > 0;
     note_far(s);
     start_grey(s);
     memset(s->ints, 0, sizeof s->ints);
@@ -81,6 +83,24 @@ TL_INLINE vi encode_light(const tl_shading *shading, const vf *rgba)
                    opacity);
 }
 
+/* n pixels of a span in grey light: first the light of all, then the words, as either alone overlaps with its like. */
+TL_ONCE void shade_grey_span(shade_runs *s, int n, int64_t column, int32_t background, int32_t *pixels)
+{
+    _Alignas(64) float light[TL_SPAN_ROOM];
+    for (int x = 0, i = 0; x < n; x += TL_LANES, i++)
+        if (s->visible[i])
+            light_grey(s, i, column, light + x);
+    for (int x = 0, i = 0; x < n; x += TL_LANES, i++) {
+        vi word = vi_set1(background);
+        if (s->visible[i])
+            word = vi_select(vm_from_bits(s->visible[i]), grey_word(s, vf_load(light + x)), word);
+        if (n - x >= TL_LANES)
+            vi_store(pixels + x, word);
+        else
+            vi_store_masked(pixels + x, vm_first(n - x), word);
+    }
+}
+
 /* The picture of a visibility buffer; rows of window->width. */
 static void shade(const tl_snapped *snapped, const tl_window *window, const tl_view *view, const tl_shading *shading,
                   const int32_t *ids, const float *depth, uint8_t *pixels)
@@ -95,14 +115,14 @@ static void shade(const tl_snapped *snapped, const tl_window *window, const tl_v
         for (int64_t column = 0; column < window->width; column += TL_SPAN) {
             const int64_t at = row * window->width + column;
             const int n = start_span(&s, ids, row, column), n_vectors = (n + TL_LANES - 1) / TL_LANES;
+            if (s.is_grey) {
+                shade_grey_span(&s, n, column, background, (int32_t *)pixels + at);
+                continue;
+            }
             span.next = 0;
             for (int x = 0, i = 0; x < n; x += TL_LANES, i++) {
                 vi word = vi_set1(background);
-                if (s.visible[i] && s.is_grey) {
-                    shaded_lanes p;
-                    find_pixels(&p, &s, i, column);
-                    word = vi_select(p.visible, grey_word(&p), word);
-                } else if (s.visible[i]) {
+                if (s.visible[i]) {
                     vf rgba[4];
                     light_pixels(&span, &s, i, n_vectors, column, row, depth + at + x, rgba);
                     word = vi_select(vm_from_bits(s.visible[i]), encode_light(shading, rgba), word);

@@ -26,14 +26,21 @@ static void set_special_edges(shaded_lanes *p)
     }
 }
 
-/* The lanes of vector i of the span that begins at `column`, and their edge functions as float32, of all runs. */
-TL_INLINE void find_pixels(shaded_lanes *p, const shade_runs *s, int i, int64_t column)
+/* The lanes of vector i of the span that begins at `column`, and their edge functions as float32, but for those of
+ * special runs. */
+TL_INLINE void find_most_pixels(shaded_lanes *p, const shade_runs *s, int i, int64_t column)
 {
     vi e[3], sum;
     find_lanes(p, s, i, column, e, &sum);
     p->area = vf_from_vi(sum);
     for (int k = 0; k < 3; k++)
         p->e[k] = vf_from_vi(e[k]);
+}
+
+/* The same of all runs. */
+TL_INLINE void find_pixels(shaded_lanes *p, const shade_runs *s, int i, int64_t column)
+{
+    find_most_pixels(p, s, i, column);
     if (s->n_special)
         set_special_edges(p);
 }
@@ -81,20 +88,26 @@ static void replace_normals(shaded_lanes *p, vm lanes)
         p->normal[axis] = vf_load(n[axis]);
 }
 
-/* Unit normals towards the viewer. */
-TL_INLINE void set_normals(shaded_lanes *p)
+/* Unit normals towards the viewer; returns the lanes that have none, as those of the corners cancel. */
+TL_INLINE vm find_normals(shaded_lanes *p)
 {
     if (p->s->shading->face_normals) {
         for (int axis = 0; axis < 3; axis++)
             p->normal[axis] = pick(p, RUN_NORMAL + axis);
-        return;
+        return vm_first(0);
     }
     for (int axis = 0; axis < 3; axis++)
         p->normal[axis] = weighed(p, RUN_NORMAL + axis, RUN_NORMAL + 3 + axis, RUN_NORMAL + 6 + axis);
     const vf squared = dot3(p->normal, p->normal), scale = vf_div(vf_set1(1.0f), vf_sqrt(squared));
     for (int axis = 0; axis < 3; axis++)
         p->normal[axis] = vf_mul(p->normal[axis], scale);
-    const vm has_none = vm_and(p->visible, vf_ge(pick(p, RUN_SHORTEST), squared));
+    return vm_and(p->visible, vf_ge(pick(p, RUN_SHORTEST), squared));
+}
+
+/* The same, and the normal of the face where there is none. */
+TL_INLINE void set_normals(shaded_lanes *p)
+{
+    const vm has_none = find_normals(p);
     if (vm_any(has_none))
         replace_normals(p, has_none);
 }

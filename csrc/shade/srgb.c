@@ -104,20 +104,45 @@ static void start_grey(shade_runs *s)
     }
 }
 
-TL_INLINE vi grey_word(shaded_lanes *p)
+/* The light of pixels that have their normals, in steps. */
+TL_INLINE vf grey_light(const shaded_lanes *p)
 {
-    const shade_runs *s = p->s;
-    const vf last = vf_set1(255.0f), line_end = vf_set1(SRGB_LINE_END * SRGB_SLOPE / TL_LIGHT_STEPS);
     lit_surface surface;
-    vf diffuse[3], specular[3], scale;
-    vi byte[3];
-    set_normals(p);
+    vf diffuse[3], specular[3];
     for (int axis = 0; axis < 3; axis++)
         /* nothing shines */
         surface.normal[axis] = p->normal[axis], surface.point[axis] = surface.to_eye[axis] = vf_set1(0.0f);
-    add_lights(&surface, s->shading, 0.0f, diffuse, specular);
-    const vf steps = vf_mul(diffuse[0], vf_set1(TL_GREY_STEPS)), root = srgb_root(steps, &scale);
-    const vf curve = vf_mul(root, scale);
+    add_lights(&surface, p->s->shading, 0.0f, diffuse, specular);
+    return vf_mul(diffuse[0], vf_set1(TL_GREY_STEPS));
+}
+
+/* The same of vector i of the span that begins at `column`, whatever its runs and normals are. */
+static void light_any_grey(const shade_runs *s, int i, int64_t column, float *steps)
+{
+    shaded_lanes p;
+    find_pixels(&p, s, i, column);
+    set_normals(&p);
+    vf_store(steps, grey_light(&p));
+}
+
+/* The same.  Calls that take the lanes would have them all stored for every vector, so the rare cases begin again. */
+TL_INLINE void light_grey(const shade_runs *s, int i, int64_t column, float *steps)
+{
+    shaded_lanes p;
+    find_most_pixels(&p, s, i, column);
+    if (s->n_special || vm_any(find_normals(&p)))
+        light_any_grey(s, i, column, steps);
+    else
+        vf_store(steps, grey_light(&p));
+}
+
+/* Their words: one root for three channels. */
+TL_INLINE vi grey_word(const shade_runs *s, vf steps)
+{
+    const vf last = vf_set1(255.0f), line_end = vf_set1(SRGB_LINE_END * SRGB_SLOPE / TL_LIGHT_STEPS);
+    vf scale;
+    vi byte[3];
+    const vf root = srgb_root(steps, &scale), curve = vf_mul(root, scale);
     for (int c = 0; c < 3; c++) {
         const vf line = vf_mul(steps, vf_set1(s->grey_line[c]));
         const vf bent = vf_fma(curve, vf_set1(s->grey_root[c]), vf_set1(-SRGB_OFFSET));

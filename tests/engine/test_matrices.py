@@ -51,6 +51,28 @@ def test_determinant_adds_up_the_first_row_in_order():
         assert _engine.determinant([a, b, c]) == expected + a[2] * (b[0] * c[1] - b[1] * c[0])
 
 
+@pytest.mark.parametrize("has_perspective", [True, False])
+def test_camera_rays_are_products_and_inverses(has_perspective):
+    view, center, size = np.linalg.qr(RNG.normal(size=(4, 4)))[0], RNG.normal(size=3), (640, 480)
+    projection = np.diag(RNG.uniform(1, 2, 4))
+    projection[2:, 2:] = [[-1.1, -2.2], [-1.0, 0.0]] if has_perspective else [[-0.1, -1.2], [0.0, 1.0]]
+    view[3] = 0, 0, 0, 1
+    clip = _engine.product(projection, view)
+    rows = clip[[0, 1, 3 if has_perspective else 2]]
+    back = _engine.inverse(rows[:, :3])
+    offset = _engine.product(back, rows[:, 3])
+    ends = [[-1, 1, 1 if has_perspective else -1], [2 / size[0], 0, 0], [0, -2 / size[1], 0], [0, 0, 2]]
+    ray = _engine.product(np.array(ends), back.T)
+    eye = -offset - center if has_perspective else -ray[3] / _engine.length(ray[3])
+    if not has_perspective:
+        ray[0] -= offset + center
+    found, rows, scale = _engine.camera_rays(projection, view, center, *size)
+    assert found == has_perspective
+    assert scale == _engine.cube_root(_engine.determinant(view[:3, :3]))
+    origin = _engine.product(view[:3, :3], center) + view[:3, 3]
+    assert np.array_equal(rows, np.vstack([eye, ray, view[:3, :3] / scale, origin]))
+
+
 def test_wrong_matrices_are_refused():
     with pytest.raises(np.linalg.LinAlgError):
         _engine.inverse(np.array([[1.0, 2.0], [2.0, 4.0]]))

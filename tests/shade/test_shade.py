@@ -151,6 +151,21 @@ def test_shade_triangles_across_the_near_plane_and_huge_ones_keep_their_attribut
     assert np.abs(got[rows, cols, 0] - expected)[is_near].max() <= 1
 
 
+def test_shade_small_triangles_look_alike_beside_huge_ones_in_their_rows():
+    ball = tl.Mesh(*tl.scenes.icosphere(3))
+    floor = np.array([[-50, -1, 9], [50, -1, 9], [0, -1, -200]])  # of float64 edge functions
+    both = tl.Mesh(
+        np.concatenate([ball.vertices, floor]), np.concatenate([ball.triangles, [np.arange(3) + len(ball.vertices)]])
+    )
+    camera = tl.Camera.look_at((0, 0.5, 4), (0, 0, 0), near=0.1, far=1000)
+    frags = tl.rasterize_mesh(both, camera, (300, 200))
+    is_ball = frags.mask & (frags.triangle < len(ball.triangles))
+    assert (is_ball & ((frags.triangle == len(ball.triangles)).any(axis=1))[:, None]).sum() > 4000
+    for shading in ("smooth", "normals"):
+        alone, beside = (tl.render(mesh, camera, (300, 200), shading=shading) for mesh in (ball, both))
+        assert np.array_equal(alone[is_ball], beside[is_ball])
+
+
 def test_shade_normals_that_cancel_leave_that_of_the_face():
     normals = [[0, 0, 1], [0, 0, -1], [0, 0, 0]]
     mesh = tl.Mesh([[-1, -1, 0], [1, -1, 0], [0, 1, 0]], [[0, 1, 2]], normals=normals)
@@ -247,7 +262,7 @@ def test_a_mesh_whose_rows_are_asked_for_ahead_looks_like_a_small_one(crease):
         one, other = (tl.rasterize_mesh(mesh, CAMERAS["perspective"], size) for mesh in (small, large))
         assert np.array_equal(order[other.triangle[other.mask]], one.triangle[one.mask])
         assert_same(other.barycentric(), one.barycentric())
-        for shading in ("smooth", "flat"):
+        for shading in ("smooth", "flat", "normals"):
             pictures = [
                 shade(frags, mesh, CAMERAS["perspective"], shading=shading, lights=LIGHTS, material=material)
                 for frags, mesh in ((one, small), (other, large))

@@ -45,6 +45,7 @@ def encode_srgb(light: F64) -> F64:
 LIGHT_OF_SRGB: F32 = decode_srgb(np.arange(256) / 255).astype(np.float32)
 """(256,) float32: the light, 0 to 1, of each sRGB value."""
 LIGHT_OF_SRGB.flags.writeable = False
+_LIGHTS: list[float] = LIGHT_OF_SRGB.tolist()
 
 
 @lru_cache(maxsize=1)
@@ -80,6 +81,8 @@ def as_color(name: str, color: ColorLike, n_channels: int) -> Color:
     if isinstance(color, str):
         named = color_of_name(name, color)
         channels: tuple[int, ...] = named if n_channels == 4 or named[3] < 255 else named[:3]
+    elif type(color) is tuple and all(type(channel) is int and 0 <= channel <= 255 for channel in color):
+        channels = (*color, 255) if n_channels == 4 and len(color) == 3 else color  # as below, without an array
     else:
         array = as_array(name, color)
         if array.ndim != 1 or array.dtype.kind not in "fiu":
@@ -120,8 +123,7 @@ def color_of_name(name: str, text: str) -> tuple[int, int, int, int]:
 
 def light_of(color: Color) -> tuple[float, ...]:
     """Linear red, green and blue of an sRGB colour, and its opacity of 0 to 1 (1 unless it has one)."""
-    red, green, blue = (float(LIGHT_OF_SRGB[channel]) for channel in color[:3])
-    return red, green, blue, color[3] / 255 if len(color) == 4 else 1.0
+    return _LIGHTS[color[0]], _LIGHTS[color[1]], _LIGHTS[color[2]], color[3] / 255 if len(color) == 4 else 1.0
 
 
 def id_colors(ids: npt.NDArray[np.integer[Any]]) -> U8:

@@ -46,17 +46,12 @@ def product(a, b):
     return result[0] if is_row else result[:, 0] if is_column else result
 
 
-def inverse(a):
-    """Return the inverse of a float64 matrix (n, n), n at most 4; a LinAlgError if it is singular."""
-    cdef const double[:, :] given = as_numbers(a, 2)
-    cdef Py_ssize_t n = given.shape[0], i, j, k, best
-    cdef double[4][8] rows
+cdef int invert(double[8] *rows, Py_ssize_t n) except -1:
+    """Turn the rows of a matrix (n, n), n at most 4, into those of its inverse, n numbers further on in each row."""
+    cdef Py_ssize_t i, j, k, best
     cdef double factor, pivot
-    if given.shape[1] != n or n > 4:
-        raise ValueError(f"a matrix must be square, of 4 rows at most, got shape {np.shape(a)}")
     for i in range(n):
         for j in range(n):
-            rows[i][j] = given[i, j]
             rows[i][n + j] = 1.0 if i == j else 0.0
     for k in range(n):  # the largest number of each column becomes the pivot
         best = k
@@ -74,12 +69,38 @@ def inverse(a):
                 factor = rows[i][k] / pivot
                 for j in range(k, 2 * n):
                     rows[i][j] = rows[i][j] - factor * rows[k][j]
+    for i in range(n):
+        for j in range(n):
+            rows[i][n + j] = rows[i][n + j] / rows[i][i]
+    return 0
+
+
+def inverse(a):
+    """Return the inverse of a float64 matrix (n, n), n at most 4; a LinAlgError if it is singular."""
+    cdef const double[:, :] given = as_numbers(a, 2)
+    cdef Py_ssize_t n = given.shape[0], i, j
+    cdef double[4][8] rows
+    if given.shape[1] != n or n > 4:
+        raise ValueError(f"a matrix must be square, of 4 rows at most, got shape {np.shape(a)}")
+    for i in range(n):
+        for j in range(n):
+            rows[i][j] = given[i, j]
+    invert(rows, n)
     result = np.empty((n, n))
     cdef double[:, ::1] out = result
     for i in range(n):
         for j in range(n):
-            out[i, j] = rows[i][n + j] / rows[i][i]
+            out[i, j] = rows[i][n + j]
     return result
+
+
+cdef double determinant_of(const double[:, :] m) noexcept:
+    """That of the first three rows and columns."""
+    return (
+        m[0, 0] * (m[1, 1] * m[2, 2] - m[1, 2] * m[2, 1])
+        - m[0, 1] * (m[1, 0] * m[2, 2] - m[1, 2] * m[2, 0])
+        + m[0, 2] * (m[1, 0] * m[2, 1] - m[1, 1] * m[2, 0])
+    )
 
 
 def determinant(a):
@@ -87,11 +108,65 @@ def determinant(a):
     cdef const double[:, :] m = as_numbers(a, 2)
     if m.shape[0] != 3 or m.shape[1] != 3:
         raise ValueError(f"a matrix must have shape (3, 3), got {np.shape(a)}")
-    return (
-        m[0, 0] * (m[1, 1] * m[2, 2] - m[1, 2] * m[2, 1])
-        - m[0, 1] * (m[1, 0] * m[2, 2] - m[1, 2] * m[2, 0])
-        + m[0, 2] * (m[1, 0] * m[2, 1] - m[1, 1] * m[2, 0])
-    )
+    return determinant_of(m)
+
+
+@cython.cdivision(True)  # IEEE: no number where there is none
+def camera_rays(const double[:, :] clip_from_eye, const double[:, :] view, const double[:] center, double width, double height):
+    """Return how a camera sees a space whose origin is at `center`, as `CameraRays` of _shade/look.py holds it.
+
+    `view`: (4, 4), to eye space. The result: whether there is perspective, rows (9, 3) float64, the scale. The rows: eye,
+    four of rays, three to eye space, origin.
+    """
+    cdef double[4][4] clip
+    cdef double[3] offset
+    cdef double[4][8] rows
+    cdef Py_ssize_t i, j, k
+    cdef double total, unit
+    for i in range(4):
+        for j in range(4):
+            total = 0.0
+            for k in range(4):
+                total = total + clip_from_eye[i, k] * view[k, j]
+            clip[i][j] = total
+    cdef bint has_perspective = clip[3][0] != 0.0 or clip[3][1] != 0.0 or clip[3][2] != 0.0
+    cdef int[3] own = [0, 1, 3 if has_perspective else 2]
+    for i in range(3):
+        for j in range(3):
+            rows[i][j] = clip[own[i]][j]
+    invert(rows, 3)
+    for i in range(3):
+        total = 0.0
+        for k in range(3):
+            total = total + rows[i][3 + k] * clip[own[k]][3]
+        offset[i] = total
+    # the corner, one column, one row and the whole depth, of clip space
+    cdef double[4][3] ends = [[-1.0, 1.0, 1.0 if has_perspective else -1.0], [2.0 / width, 0.0, 0.0], [0.0, -2.0 / height, 0.0], [0.0, 0.0, 2.0]]
+    result = np.empty((9, 3))
+    cdef double[:, ::1] out = result
+    for i in range(4):
+        for j in range(3):
+            total = 0.0
+            for k in range(3):
+                total = total + ends[i][k] * rows[j][3 + k]
+            out[1 + i, j] = total
+    if has_perspective:
+        for j in range(3):
+            out[0, j] = -offset[j] - center[j]
+    else:
+        for j in range(3):
+            out[1, j] = out[1, j] - (offset[j] + center[j])
+        unit = length(result[4])
+        for j in range(3):
+            out[0, j] = -out[4, j] / unit
+    unit = cube_root(determinant_of(view))
+    for i in range(3):
+        total = 0.0
+        for k in range(3):
+            out[5 + i, k] = view[i, k] / unit
+            total = total + view[i, k] * center[k]
+        out[8, i] = total + view[i, 3]
+    return has_perspective, result, unit
 
 
 def row_products(a, b):

@@ -68,28 +68,14 @@ class CameraRays:
 def rays_of(camera: Camera, size: tuple[int, int], center: F64, *, in_eye_space: bool) -> CameraRays:
     """How the camera sees shading space: the world, or its own eye space, moved so that `center` is the origin."""
     view = np.eye(4) if in_eye_space else camera.view
-    clip = _engine.product(camera.clip_from_eye(size), view)
-    width, height = size
-    has_perspective = bool(clip[3, :3].any())
-    rows = clip[[0, 1, 3 if has_perspective else 2]]
-    world_from_rows = _engine.inverse(rows[:, :3])
-    offset = _engine.product(world_from_rows, rows[:, 3])
-    # the corner, one column, one row and the whole depth, of clip space
-    ends = [[-1, 1, 1 if has_perspective else -1], [2 / width, 0, 0], [0, -2 / height, 0], [0, 0, 2]]
-    ray = _engine.product(np.array(ends), world_from_rows.T)
+    has_perspective, rows, scale = _engine.camera_rays(camera.clip_from_eye(size), view, center, *size)
     if has_perspective:
-        eye = -offset - center
-        start, scale = 0.0, 1.0 / -float(camera.projection[3, 2])
+        start, way = 0.0, 1.0 / -float(camera.projection[3, 2])
     else:
-        ray[0] -= offset + center
-        eye = -ray[3] / _engine.length(ray[3])
         (a, b), (c, d) = camera.projection[2:, 2:]
         near, far = ((ndc * d - b) / (ndc * c - a) for ndc in (-1.0, 1.0))
-        start, scale = near, far - near
-    size_of_unit = _engine.cube_root(_engine.determinant(view[:3, :3]))
-    linear = view[:3, :3]
-    origin = _engine.product(linear, center) + view[:3, 3]
-    return CameraRays(has_perspective, eye, ray, linear / size_of_unit, origin, size_of_unit, start, scale)
+        start, way = near, far - near
+    return CameraRays(has_perspective, rows[0], rows[1:5], rows[5:8], rows[8], scale, start, way)
 
 
 class ShadingMesh:

@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import lru_cache
-from typing import TypedDict
+from typing import Any, TypedDict
 
 import numpy as np
 import numpy.typing as npt
@@ -156,12 +156,9 @@ def shade_mesh(
         return picture
     scene = frags._snapped
     split = frags._split
-    if split is None:
-        planes = frags.samples_triangle.transpose(2, 0, 1), frags.samples_depth.transpose(2, 0, 1)
-    else:
-        planes = split.ids[None], split.depth[None]
-    kinds = np.int32, np.float32
-    ids, depth = (np.require(array, kind, ["C", "A"]) for array, kind in zip(planes, kinds, strict=True))
+    several = (split.ids[None], split.depth[None]) if split is not None else frags._sampled()[1]
+    planes = several or (frags.id[None], frags.depth[None])
+    ids, depth = as_read(planes[0], np.int32), as_read(planes[1], np.float32)
     own = (options.material,) if options.material is not None else mesh.materials
     own = own or (plain_material(options.color if mesh.colors is None else None),)
     rows = mesh.material_of_triangle if own is mesh.materials and len(own) > 1 else None
@@ -190,6 +187,11 @@ def shade_mesh(
     n_threads = min(count_threads(options.threads, len(mesh.triangles)), n_px // MIN_PX_PER_THREAD)
     run_parts(shade_rows, len(picture), n_threads)
     return picture
+
+
+def as_read(planes: npt.NDArray[Any], kind: type) -> npt.NDArray[Any]:
+    """Planes as kernels read them: as they are, if that is so."""
+    return planes if planes.dtype == kind and planes.flags.carray else np.require(planes, kind, ["C", "A"])
 
 
 def shade_numbers(frags: Fragments, camera: Camera, options: ShadingOptions) -> U8:
