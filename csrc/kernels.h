@@ -159,8 +159,9 @@ typedef struct tl_kernels {
                        float *out);
 
     /* Colours where labels are not -1: per triangle, or interpolated screen-linearly from those of the vertices.
-     * n_channels of uint8 or float32 a colour. */
-    void (*paint_flat)(const int32_t *labels, int64_t n, const uint8_t *colors, int pixel_bytes, uint8_t *pixels);
+     * n_channels of uint8 or float32 a colour.  `ground`, or NULL: the colour elsewhere. */
+    void (*paint_flat)(const int32_t *labels, int64_t n, const uint8_t *colors, int pixel_bytes, const uint8_t *ground,
+                       uint8_t *pixels);
     void (*paint_gouraud)(const tl_snapped *snapped, const tl_window *window, const int32_t *labels, const void *colors,
                           int n_channels, int is_u8, void *pixels);
 

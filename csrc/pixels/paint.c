@@ -17,41 +17,45 @@
 #include "pixels/weights_one.c"
 
 /* The first samples of paint_flat whose colours have four bytes, a vector at a time; returns how many. */
-TL_INLINE int64_t paint_words(const int32_t *labels, int64_t n, const uint8_t *colors, uint8_t *restrict out)
+TL_INLINE int64_t paint_words(const int32_t *labels, int64_t n, const uint8_t *colors, const uint8_t *ground,
+                              uint8_t *restrict out)
 {
+    int32_t under = 0;
     int64_t k = 0;
+    if (ground)
+        memcpy(&under, ground, 4);
     for (; TL_LANES > 1 && k + TL_LANES <= n; k += TL_LANES) {
         const vi label = vi_load(labels + k);
         const vm m = vi_gt(label, vi_set1(-1));
-        if (vm_any(m))
-            vi_store_some((int32_t *)(out + 4 * k), m, vi_gather(m, (const int32_t *)colors, label), 1);
+        int32_t *const to = (int32_t *)(out + 4 * k);
+        if (ground)
+            vi_store(to, vi_select(m, vi_gather(m, (const int32_t *)colors, label), vi_set1(under)));
+        else if (vm_any(m))
+            vi_store_some(to, m, vi_gather(m, (const int32_t *)colors, label), 1);
     }
     return k;
 }
 
-/* Copies the colour of each labelled sample's triangle; samples with label -1 stay as they are. */
-static void paint_flat(const int32_t *labels, int64_t n, const uint8_t *colors, int pixel_bytes, uint8_t *restrict out)
+/* Samples from k on, each of n_bytes. */
+TL_INLINE void paint_bytes(const int32_t *labels, int64_t k, int64_t n, const uint8_t *colors, const uint8_t *ground,
+                           uint8_t *restrict out, const size_t n_bytes)
+{
+    for (; k < n; k++) {
+        const uint8_t *from = labels[k] < 0 ? ground : colors + (size_t)labels[k] * n_bytes;
+        if (from)
+            memcpy(out + (size_t)k * n_bytes, from, n_bytes);
+    }
+}
+
+/* Copies the colour of each labelled sample's triangle; samples with label -1 get that of the ground, or stay. */
+static void paint_flat(const int32_t *labels, int64_t n, const uint8_t *colors, int pixel_bytes, const uint8_t *ground,
+                       uint8_t *restrict out)
 {
     switch (pixel_bytes) {
-    case 1:
-        for (int64_t k = 0; k < n; k++)
-            if (labels[k] >= 0)
-                out[k] = colors[labels[k]];
-        return;
-    case 3:
-        for (int64_t k = 0; k < n; k++)
-            if (labels[k] >= 0)
-                memcpy(out + 3 * k, colors + 3 * (int64_t)labels[k], 3);
-        return;
-    case 4:
-        for (int64_t k = paint_words(labels, n, colors, out); k < n; k++)
-            if (labels[k] >= 0)
-                memcpy(out + 4 * k, colors + 4 * (int64_t)labels[k], 4);
-        return;
-    default:
-        for (int64_t k = 0; k < n; k++)
-            if (labels[k] >= 0)
-                memcpy(out + k * pixel_bytes, colors + (int64_t)labels[k] * pixel_bytes, (size_t)pixel_bytes);
+    case 1: paint_bytes(labels, 0, n, colors, ground, out, 1); return;
+    case 3: paint_bytes(labels, 0, n, colors, ground, out, 3); return;
+    case 4: paint_bytes(labels, paint_words(labels, n, colors, ground, out), n, colors, ground, out, 4); return;
+    default: paint_bytes(labels, 0, n, colors, ground, out, (size_t)pixel_bytes);
     }
 }
 

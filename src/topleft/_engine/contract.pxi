@@ -522,7 +522,7 @@ cdef extern from "topleft.h" nogil:
         void (*inverse_w)(const tl_source *, int64_t, int64_t, double *) noexcept nogil
         void (*barycentric)(const tl_snapped *, const tl_window *, const int32_t *, float *) noexcept nogil
         void (*interpolate)(const tl_snapped *, const tl_window *, const int32_t *, const float *, int, int, float, float *) noexcept nogil
-        void (*paint_flat)(const int32_t *, int64_t, const uint8_t *, int, uint8_t *) noexcept nogil
+        void (*paint_flat)(const int32_t *, int64_t, const uint8_t *, int, const uint8_t *, uint8_t *) noexcept nogil
         void (*paint_gouraud)(const tl_snapped *, const tl_window *, const int32_t *, const void *, int, int, void *) noexcept nogil
         void (*fill_slopes)(const tl_sloped *, const int32_t *, const float *, int64_t, float *) noexcept nogil
         void (*fill_texels)(const tl_levels *, const int32_t *, const float *, const float *, float, int64_t, float *) noexcept nogil

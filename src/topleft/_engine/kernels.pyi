@@ -167,6 +167,7 @@ class SnappedMesh:
         is_flat: bool,
         is_u8: bool,
         n_channels: int,
+        ground: U8 | None = None,
     ) -> None: ...
     def blend(
         self,

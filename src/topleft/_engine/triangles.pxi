@@ -287,17 +287,18 @@ cdef class SnappedMesh:
         return status
 
     def paint(self, const int32_t[:, ::1] labels, const uint8_t[::1] colors, uint8_t[::1] pixels, int64_t first_row, int64_t n_rows,
-              bint is_flat, bint is_u8, int n_channels):
-        """Colour the rows [first_row, first_row + n_rows) by their labels."""
+              bint is_flat, bint is_u8, int n_channels, const uint8_t[::1] ground=None):
+        """Colour the rows [first_row, first_row + n_rows) by their labels; `ground`, of flat ones: the colour elsewhere."""
         cdef int64_t width = labels.shape[1]
         cdef int pixel_bytes = n_channels if is_u8 else 4 * n_channels
+        cdef const void *under = data(ground) if ground is not None else NULL
         cdef tl_window window = self.window(first_row, n_rows, width)
         if width == 0 or n_rows == 0 or self.snapped.n_triangles == 0:
             return
         with nogil:
             if is_flat:
                 K.paint_flat(&labels[first_row, 0], n_rows * width, <const uint8_t *>data(colors), pixel_bytes,
-                             &pixels[first_row * width * pixel_bytes])
+                             <const uint8_t *>under, &pixels[first_row * width * pixel_bytes])
             else:
                 K.paint_gouraud(&self.snapped, &window, &labels[first_row, 0], data(colors), n_channels, is_u8,
                                 &pixels[first_row * width * pixel_bytes])

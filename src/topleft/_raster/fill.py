@@ -110,7 +110,7 @@ def draw_fill(
         is_blended = blending.is_needed or choices.is_direct(snapped, view, palette.dtype, is_flat=is_flat)
         has_samples = view.sampling.n_samples > 1
         can_lay = is_drawn and is_blended and palette.dtype == np.uint8 and not has_samples
-        can_lay = can_lay or (is_drawn and not is_blended and has_samples and is_flat and choices.can_share(view))
+        can_lay = can_lay or (is_drawn and not is_blended and is_flat and (not has_samples or choices.can_share(view)))
         is_few = is_drawn and not blending.is_needed and choices.fills_few(snapped, view, palette, is_flat=is_flat)
         if ground is not None and not (can_lay or is_few):
             lay_ground(canvas, ground)
@@ -124,7 +124,7 @@ def draw_fill(
         elif has_samples:
             paint_samples(memory, snapped, view, palette, canvas, transfer, is_flat=is_flat, ground=ground)
         else:
-            paint(memory, snapped, view, palette, canvas, is_flat=is_flat)
+            paint(memory, snapped, view, palette, canvas, is_flat=is_flat, ground=ground)
     view.mark("shade")
     return result
 
@@ -223,18 +223,29 @@ def fill_few(
 
 
 def paint(
-    memory: Memory, snapped: Snapped, view: View, colors: NDArray[Any], pixels: NDArray[Any], *, is_flat: bool
+    memory: Memory,
+    snapped: Snapped,
+    view: View,
+    colors: NDArray[Any],
+    pixels: NDArray[Any],
+    *,
+    is_flat: bool,
+    ground: NDArray[Any] | None = None,
 ) -> None:
-    """Draw coloured triangles over contiguous pixels: first which triangle shows in each, then its colour."""
+    """Draw coloured triangles over contiguous pixels: first which triangle shows in each, then its colour.
+
+    `ground`, for flat colours: that of pixels where none shows.
+    """
     width, height = view.size
     labels = memory.empty("labels", (height, width), np.int32)
     drawing = choices.drawing(view, snapped, Sink.LABEL)
     draw(memory, snapped, view, drawing, labels)
     palette, flat = _engine.as_bytes(colors), _engine.as_bytes(pixels)
-    n_channels = 1 if colors.ndim == 1 else colors.shape[1]
+    n_channels, is_u8 = 1 if colors.ndim == 1 else colors.shape[1], colors.dtype == np.uint8
+    under = None if ground is None else _engine.as_bytes(np.full(pixels.shape[2:] or 1, ground))
 
     def paint_rows(first: int, end: int) -> None:
-        snapped.mesh.paint(labels, palette, flat, first, end - first, is_flat, colors.dtype == np.uint8, n_channels)
+        snapped.mesh.paint(labels, palette, flat, first, end - first, is_flat, is_u8, n_channels, under)
 
     run_parts(paint_rows, height, drawing.n_threads)
 
