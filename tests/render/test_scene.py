@@ -14,7 +14,7 @@ from topleft._base.color import srgb_tables
 from topleft._camera.camera import Camera
 from topleft._raster import choices
 from topleft._raster.snap import Snapped
-from topleft._render import fragments, instances
+from topleft._render import instances
 from topleft._render.fragments import SceneFragments
 from topleft._render.render import rasterize_mesh
 from topleft._scene import scene as placed
@@ -255,6 +255,7 @@ def test_scene_without_instances_is_refused():
         tl.Scene([])
 
 
+CUT = tl.Material(alpha_mode="mask", alpha_cutoff=0.75, opacity=0.5)
 BENT = replace(tl.Camera.look_at((0, 0, 5)), lens=tl.FisheyeLens())
 CORNERS_OF_A_SQUARE = [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]
 LARGE = tl.Mesh(CORNERS_OF_A_SQUARE, np.tile(np.array([[0, 1, 2], [0, 2, 3]], np.int32), (1 << 19, 1)))
@@ -287,6 +288,13 @@ def test_scene_of_more_triangles_than_int32_counts_is_drawn():
     [
         (lambda scene, camera: tl.visible_layers(scene, camera, (8, 8)), "a scene that is peeled"),
         (lambda scene, camera: tl.rasterize_mesh(scene, BENT, (8, 8)), "a scene behind a lens"),
+        (
+            lambda scene, camera: tl.render(
+                scene, camera, (8, 8), material=tl.Material(alpha_mode="blend", opacity=0.5)
+            ),
+            "a scene that something shows through",
+        ),
+        (lambda scene, camera: tl.render(scene, camera, (8, 8), material=CUT), "a scene with holes in its materials"),
     ],
 )
 def test_scene_of_more_triangles_than_int32_counts_is_refused_where_it_has_to_be(verb, what):
@@ -325,7 +333,7 @@ def test_instances_in_rounds_and_groups_are_drawn_as_one_after_the_other(isa, se
     monkeypatch.setattr(choices, "pays_to_cluster", lambda *_: True)
     monkeypatch.setattr(choices, "pays_to_draw_instances", lambda *_: True)
     monkeypatch.setattr(instances, "FIRST_ROUND", int(rng.choice([1, 4])))
-    for module in (placed, instances, fragments):
+    for module in (placed, instances):
         monkeypatch.setattr(module, "INT32_MAX", most_ids)
     with on(isa):
         found = tl.rasterize_mesh(tl.Scene(standing), camera, (60, 40), **options)

@@ -89,6 +89,7 @@ def glass_of(
     if masks is None:
         return None
     scene = scene_of(subject)
+    scene.check_counted("a scene that something shows through")
     placed, view = place(scene, camera, size, view_options, material=options.material)
     refuse_many(view, "rasterize")
     if placed.bent is not None:  # the parts that a lens makes of the triangles

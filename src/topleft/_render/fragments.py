@@ -16,14 +16,14 @@ import numpy.typing as npt
 from numpy.typing import NDArray
 
 from topleft import _engine
-from topleft._base.arrays import INT32_MAX, as_aligned, as_array, set_aligned, shown
+from topleft._base.arrays import as_aligned, as_array, set_aligned, shown
 from topleft._base.memory import empty
 from topleft._camera.camera import Camera
 from topleft._model.mesh import Mesh
 from topleft._raster.fragments import Fragments, Viewer, as_sample, view_of
 from topleft._raster.peel import DepthLayers
 from topleft._render.bend import BentMesh, weighed
-from topleft._scene.scene import Instance, Scene, meshes_of
+from topleft._scene.scene import Instance, Scene, counted_ranges, meshes_of
 
 if TYPE_CHECKING:
     from topleft._render.instances import PlacedScene
@@ -331,14 +331,11 @@ def find_instances(ids: Ids, first_ids: NDArray[np.int64], boxes: NDArray[np.int
         _engine.find_instances(cast("NDArray[np.int32]", ids), first_ids, found, boxes)
         return found
     found[...] = -1
-    first = 0
-    while first < len(first_ids) - 1:
-        end = int(np.searchsorted(first_ids, first_ids[first] + INT32_MAX, side="right")) - 1
+    for first, end in counted_ranges(first_ids):
         own, part = local_part(ids, *first_ids[[first, end]].tolist()), empty(ids.shape, np.int32)
         own_ids = first_ids[first : end + 1] - first_ids[first]
         _engine.find_instances(own, own_ids, part, None if boxes is None else boxes[first:end])
         np.add(part, np.int32(first), out=found, where=own >= 0)
-        first = end
     return found
 
 

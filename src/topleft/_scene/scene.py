@@ -25,7 +25,7 @@ from topleft._model.points import Points
 from topleft._raster.clusters import Backoff
 from topleft._scene.adapt import MeshLike, as_mesh, is_mesh_like
 
-__all__ = ["Instance", "Scene", "as_meshes", "as_subject", "collapsed", "meshes_of", "scene_of"]
+__all__ = ["Instance", "Scene", "as_meshes", "as_subject", "collapsed", "counted_ranges", "meshes_of", "scene_of"]
 
 F64 = npt.NDArray[np.float64]
 
@@ -217,13 +217,11 @@ class Scene:
     @cached_property
     def groups(self) -> tuple[tuple[int, Scene], ...]:
         """The scene in parts whose triangles int32 can count from 1 on, each with the index of its first instance."""
-        first_ids, groups, first = self.first_ids, [], 0
-        while first < len(self):
-            end = int(np.searchsorted(first_ids, first_ids[first] + INT32_MAX, side="right")) - 1
+        groups = []
+        for first, end in counted_ranges(self.first_ids):
             part = object.__new__(Scene)
             vars(part).update(instances=self.instances[first:end], transforms=self.transforms[first:end])
             groups.append((first, part))
-            first = end
         return tuple(groups)
 
     def check_counted(self, what: str) -> None:
@@ -268,6 +266,15 @@ class Scene:
         if not used:
             raise ValueError("a scene without triangles has no bounds")
         return extreme_points(*used)
+
+
+def counted_ranges(first_ids: npt.NDArray[np.int64]) -> Iterator[tuple[int, int]]:
+    """Yield the ranges of instances whose triangles int32 can count from 1 on, by where the ids of each begin."""
+    first = 0
+    while first < len(first_ids) - 1:
+        end = int(np.searchsorted(first_ids, first_ids[first] + INT32_MAX, side="right")) - 1
+        yield first, end
+        first = end
 
 
 def as_instance(value: object) -> Instance:
