@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import gc
 import itertools
 import pickle
 import sys
 import threading
+import weakref
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import replace
 from multiprocessing import get_context
@@ -207,6 +209,17 @@ def test_batch_of_an_endless_generator_is_bounded(executor, order):
             next(results)
         assert next(asked) <= 20 + 4 + 1
     assert list(results) == []
+
+
+@pytest.mark.parametrize("order", ["jobs", "completed"])
+def test_batch_pictures_end_with_the_last_who_holds_them(order):
+    """Not with the next collection of cycles, which may be thousands of pictures later."""
+    gc.disable()
+    try:
+        seen = [weakref.ref(result.picture) for result in tl.render_batch(views(24), executor=2, order=order)]
+        assert sum(picture() is not None for picture in seen) <= 1  # `result` of the last
+    finally:
+        gc.enable()
 
 
 def test_batch_begins_when_it_is_iterated():

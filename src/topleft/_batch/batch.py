@@ -386,6 +386,7 @@ class _InFlight:
                 del self._tasks[task]
                 results = task.results()
                 self._workers.release(task.jobs)
+                task.future = task.came = None  # the future holds the task, and that the pictures
                 yield from results
         finally:
             if self._pid == os.getpid():  # in a forked child nothing is on the way
