@@ -95,6 +95,14 @@ def test_batch_threads_get_several_small_pictures_of_a_list():
         assert np.array_equal(drawn, expected)
 
 
+def test_batch_threads_get_pictures_one_by_one_at_the_end(monkeypatch):
+    sizes = []
+    draw = JobRunner.draw
+    monkeypatch.setattr(JobRunner, "draw", lambda self, some: (sizes.append(len(some)), draw(self, some))[1])
+    assert tl.render_batch(views(44), executor=2).finish().n_made == 44
+    assert sorted(sizes, reverse=True) == [4, 4, 4, 4, 3, 3, 2, 2, 2, 2, 1, 1, 1, *7 * [1], *4 * [1]]
+
+
 def test_batch_left_early_drops_what_has_not_begun():
     gate, begun = threading.Event(), []
 

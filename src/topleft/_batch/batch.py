@@ -144,8 +144,8 @@ def render_batch(
         URLs each is asked for.
     chunk : int, optional
         How many neighbouring jobs of one scene are handed to a worker together: less to send for each picture. Unless
-        given 1; on threads up to 4 of a list of jobs, of pictures of a megapixel at most; on a cluster as many as
-        should take 0.2 s, by the plan of the first job of each scene.
+        given 1; on threads up to 4 of a list of jobs, fewer towards its end, of pictures of a megapixel at most; on a
+        cluster as many as should take 0.2 s, by the plan of the first job of each scene.
     window : int, optional
         How many chunks are on the way at a time; unless given, 2 a worker and 2 more.
     time_limit : float, seconds, optional
@@ -197,7 +197,11 @@ def render_batch(
         results = _one_by_one(iter(jobs), resume)
     else:
         in_flight = _InFlight(workers, n_window or 2 * workers.n_workers + 2, wish is Order.COMPLETED)
-        chunks = _chunks(iter(jobs), lambda job: n_chunk or workers.together(job, n_jobs), resume)
+
+        def most(job: Job, index: int) -> int:
+            return n_chunk or workers.together(job, None if n_jobs is None else n_jobs - index)
+
+        chunks = _chunks(iter(jobs), most, resume)
         results = in_flight.results(chunks)
     return Batch(results, _bar(n_jobs) if progress is True else progress or None, collects=collects)
 
@@ -323,9 +327,12 @@ class _Task:
 
 
 def _chunks(
-    jobs: Iterator[object], most: Callable[[Job], int], resume: bool
+    jobs: Iterator[object], most: Callable[[Job, int], int], resume: bool
 ) -> Iterator[tuple[list[tuple[int, Job]], bool]]:
-    """Yield neighbouring jobs of one scene, so many together as the first allows, and whether their files are there."""
+    """Yield neighbouring jobs of one scene, and whether their files are there.
+
+    `most` tells how many together, of the first of them and its index.
+    """
     together: list[tuple[int, Job]] = []
     n = 1
     for index, item in enumerate(jobs):
@@ -340,7 +347,7 @@ def _chunks(
             yield together, False
             together = []
         if not together:
-            n = most(job)
+            n = most(job, index)
         together.append((index, job))
         if len(together) >= n:  # at once: the next job may be long in coming
             yield together, False

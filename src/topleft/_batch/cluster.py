@@ -212,7 +212,7 @@ class ClusterWorkers(Workers):
             job, promise, n_trials = self._suspects.popleft()
         self._send([job], promise, n_trials=n_trials)
 
-    def together(self, job: Job, n_jobs: int | None) -> int:  # noqa: ARG002
+    def together(self, job: Job, n_left: int | None) -> int:  # noqa: ARG002
         """How many jobs of a scene make a task: by what the plan of the first one says."""
         key = id(job.scene)
         if key not in self._together:

@@ -107,8 +107,8 @@ class Workers:
         """Submit jobs together, as `prepare` returns them."""
         raise NotImplementedError
 
-    def together(self, job: Job, n_jobs: int | None) -> int:  # noqa: ARG002
-        """How many jobs of a scene are handed over together unless the caller says; of `n_jobs`, if that is known."""
+    def together(self, job: Job, n_left: int | None) -> int:  # noqa: ARG002
+        """How many jobs of a scene are handed over together unless the caller says; of `n_left`, if that is known."""
         return 1
 
     def release(self, jobs: Jobs) -> None:
@@ -138,13 +138,16 @@ class BorrowedThreads(Workers):
         """Submit jobs together."""
         return self._executor.submit(self._runner.draw, jobs)
 
-    def together(self, job: Job, n_jobs: int | None) -> int:
-        """Several small pictures of many that are listed: each time the caller is woken workers wait for the GIL."""
+    def together(self, job: Job, n_left: int | None) -> int:
+        """Several small pictures of many that are listed: each time the caller is woken workers wait for the GIL.
+
+        Of few one by one, so that no thread draws the last four while the others have nothing to do.
+        """
         try:
             width, height = as_size(job.size)
         except (TypeError, ValueError):  # what is wrong with a job is told when it is drawn
             return 1
-        return max(1, min(MOST_OF_A_THREAD, (n_jobs or 0) // (4 * self.n_workers))) if width * height <= SMALL_PX else 1
+        return max(1, min(MOST_OF_A_THREAD, (n_left or 0) // (4 * self.n_workers))) if width * height <= SMALL_PX else 1
 
 
 class OwnThreads(BorrowedThreads):

@@ -82,7 +82,8 @@ class ClusteredMesh:
             is_drawn = self.draw_meshlets(memory, target, min(n_threads, height))
         else:
             is_drawn = draw_clustered([memory] if n_threads == 1 else [FRESH] * n_threads, [self], target, height)
-        if is_drawn and choices.can_draw_meshlets(self._view, Sink(target.sink), clusters.points.dtype):
+        can_draw_meshlets = choices.can_draw_meshlets(self._view, Sink(target.sink), clusters.points.dtype)
+        if is_drawn and can_draw_meshlets and clusters.is_look_due():
             clusters.hidden = self.hidden_share(target)
         return is_drawn
 
