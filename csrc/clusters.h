@@ -35,8 +35,10 @@ typedef struct {
     double eye[4];           /* what the rows of x, y and w take to 0 */
     double scale_x, scale_y; /* sub-pixels a unit of normalized device coordinates */
     double half_width_px, half_height_px;
-    double length[3]; /* of the rows of x, y and w, without their last number */
-    double error;     /* of the vertex stage, as a share of the sum of all terms of a row */
+    double sample_px[2]; /* the one sample of a pixel, from its left and from its top */
+    int has_one_sample;  /* which alone decides: not so of conservative coverage, and of several samples at once */
+    double length[3];    /* of the rows of x, y and w, without their last number */
+    double error;        /* of the vertex stage, as a share of the sum of all terms of a row */
     int near_clip, far_clip, zero_to_one;
     int is_farthest; /* what lies farther is drawn first */
     tl_cull cull;

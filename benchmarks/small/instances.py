@@ -1,17 +1,20 @@
 """Time scenes of thousands of instances, and one mesh of hundreds of millions of triangles from a memory map.
 
-Instances of a blob stand in rows, one behind the other; the first picture sorts the mesh and is not counted. The mapped
-mesh is of blobs in a grid, written to a temporary folder; its memory is that of the process without what is mapped.
+Instances of a blob stand in rows, one behind the other; the first picture sorts the mesh and is not counted. Those of a
+smaller blob are strewn far away, where most are smaller than a pixel. The mapped mesh is of blobs in a grid, written to
+a temporary folder; its memory is that of the process without what is mapped.
 """
 
 from __future__ import annotations
 
 import argparse
+import itertools
 import statistics
 import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -28,12 +31,15 @@ SIZE = (1920, 1080)
 WIDE = 10
 """Instances in a row."""
 
+STREWN_TRIANGLES = 20_000
+
 MAPPED_AT_ONCE = 10_000_000
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--triangles", type=positive, default=1_000_000, metavar="N", help="of the blob (%(default)s)")
     parser.add_argument("--counts", type=positive, nargs="+", default=[200, 3000], metavar="N", help="(%(default)s)")
+    parser.add_argument("--strewn", type=int, default=20_000, metavar="N", help="far away (%(default)s)")
     parser.add_argument("--rounds", type=positive, default=11, metavar="N", help="(%(default)s)")
     parser.add_argument(
         "--mapped", type=int, default=0, metavar="N", help="times 10 million triangles from a memory map; 40 take 7 GB"
@@ -46,6 +52,13 @@ def in_rows(mesh: tl.Mesh, n: int) -> tl.Scene:
     matrices = np.tile(np.eye(4), (n, 1, 1))
     matrices[:, 0, 3] = 1.3 * (np.arange(n) % WIDE - (WIDE - 1) / 2)
     matrices[:, 2, 3] = -1.3 * (np.arange(n) // WIDE)
+    return tl.Scene([(mesh, matrix) for matrix in matrices])
+
+
+def strewn(mesh: tl.Mesh, n: int) -> tl.Scene:
+    """So many instances in a cube, as a camera far away sees them: a third of a pixel wide."""
+    matrices = np.tile(np.eye(4), (n, 1, 1))
+    matrices[:, :3, 3] = np.random.default_rng(0).uniform(-4000, 4000, (n, 3))
     return tl.Scene([(mesh, matrix) for matrix in matrices])
 
 
@@ -62,21 +75,30 @@ def seconds_of(call: Callable[[], object], rounds: int) -> list[float]:
 def run(arguments: argparse.Namespace, _: Save) -> Record:
     """Measure seconds, by the clock."""
     rows: list[dict[str, Any]] = []
-    vertices, triangles = tl.scenes.blob(arguments.triangles)
-    mesh, camera = tl.Mesh(vertices.astype(np.float32), triangles), tl.Camera.look_at((0, 0.2, 7.0), fov_y_deg=60)
+
+    def measure(kind: str, scene: tl.Scene, camera: tl.Camera, tolerances: tuple[float, ...]) -> None:
+        for tolerance, threads in itertools.product(tolerances, (1, 2)):
+            options = {"tolerance": tolerance, "threads": threads}
+            call = partial(tl.rasterize_mesh, scene, camera, SIZE, **options)
+            frags, found = call(), seconds_of(call, arguments.rounds)
+            rows.append({"scene": kind, "instances": len(scene), "triangles": scene.n_triangles, **options,
+                         "shown": len(np.unique(frags.instance)) - 1, "seconds": found})  # fmt: skip
+
+    mesh, camera = blob(arguments.triangles), tl.Camera.look_at((0, 0.2, 7.0), fov_y_deg=60)
     for n in arguments.counts:
-        scene = in_rows(mesh, n)
-        for tolerance in (0.0, 0.5):
-            for threads in (1, 2):
-                options = {"tolerance": tolerance, "threads": threads}
-                frags = tl.rasterize_mesh(scene, camera, SIZE, **options)
-                found = seconds_of(lambda scene=scene, how=options: tl.rasterize_mesh(scene, camera, SIZE, **how),
-                                   arguments.rounds)  # fmt: skip
-                rows.append({"instances": n, "triangles": n * len(mesh.triangles), **options,
-                             "shown": len(np.unique(frags.instance)) - 1, "seconds": found})  # fmt: skip
+        measure("in rows", in_rows(mesh, n), camera, (0.0, 0.5))
+    if arguments.strewn:
+        far = tl.Camera.look_at((0, 0, 12_000), fov_y_deg=50, near=1, far=20_000)
+        measure("strewn, far", strewn(blob(STREWN_TRIANGLES), arguments.strewn), far, (0.0,))
     if arguments.mapped:
         rows.append(mapped(arguments.mapped))
     return {"kind": "instances"} | describe() | {"rows": rows}
+
+
+def blob(n: int) -> tl.Mesh:
+    """A blob of about so many triangles, in float32."""
+    vertices, triangles = tl.scenes.blob(n)
+    return tl.Mesh(vertices.astype(np.float32), triangles)
 
 
 def mapped(n: int) -> dict[str, Any]:
@@ -98,8 +120,8 @@ def mapped(n: int) -> dict[str, Any]:
         rasterizer = tl.Rasterizer(SIZE, threads=2)
         transform = camera.clip_from_world(SIZE)
         found = seconds_of(lambda: rasterizer.rasterize(*arrays, transform=transform), 3)
-        return {"instances": 1, "triangles": n * n_triangles, "tolerance": 0.0, "threads": 2, "shown": 1,
-                "seconds": found[1:], "own_gb": own_gb()}  # fmt: skip
+        return {"scene": "mapped", "instances": 1, "triangles": n * n_triangles, "tolerance": 0.0, "threads": 2,
+                "shown": 1, "seconds": found[1:], "own_gb": own_gb()}  # fmt: skip
 
 
 def own_gb() -> float | None:
@@ -115,11 +137,12 @@ def lines(record: Record) -> Iterator[str]:
     rows = []
     for row in record["rows"]:
         spread = statistics.quantiles(row["seconds"]) if len(row["seconds"]) > 1 else 3 * row["seconds"]
-        rows.append([f"{row['instances']:,}", f"{row['triangles']:,}", f"{row['tolerance']:g}", str(row["threads"]),
-                     str(row["shown"]), f"{min(row['seconds']):.3f}", f"{spread[1]:.3f}",
+        rows.append([row["scene"], f"{row['instances']:,}", f"{row['triangles']:,}", f"{row['tolerance']:g}",
+                     str(row["threads"]), str(row["shown"]), f"{min(row['seconds']):.3f}", f"{spread[1]:.3f}",
                      f"{spread[0]:.3f} to {spread[2]:.3f}",
                      f"{row['own_gb']:.1f}" if row.get("own_gb") else ""])  # fmt: skip
     head = [
+        "scene",
         "instances",
         "triangles",
         "tolerance, px",

@@ -91,6 +91,30 @@ static int is_outside(const seen_box *box, const tl_cluster_view *v, unsigned *w
     return 0;
 }
 
+/* Whether a box within the near and far planes is certain to hold no sample, after the snap: as of most clusters of a
+ * mesh that has many triangles for a pixel.
+ *
+ * x / w of the middle is q, and elsewhere differs from it by (x - q w) / w, a form that is small in the middle. */
+static int is_between_samples(const seen_box *box, const tl_cluster_view *v)
+{
+    const double w_min = box->f[3].centre - box->f[3].reach - v->error * box->f[3].terms;
+    if (!(v->has_one_sample && w_min > 0.0))
+        return 0;
+    const double half[2] = {v->half_width_px, -v->half_height_px}, scale[2] = {v->scale_x, v->scale_y};
+    for (int k = 0; k < 2; k++) {
+        const double q = box->f[k].centre / box->f[3].centre;
+        double reach;
+        const double middle = mixed_form(box, v, k, 1.0, -q, &reach);
+        reach += fabs(middle) + v->error * (box->f[k].terms + fabs(q) * box->f[3].terms);
+        const double at = half[k] * q + (fabs(half[k]) - v->sample_px[k]);
+        const double moved = 0.75 * fabs(half[k]) / scale[k] + 0x1p-50 * (fabs(at) + fabs(half[k])); /* by the snap */
+        const double far = fabs(half[k]) * reach / w_min + moved;
+        if (floor(at + far) < at - far)
+            return 1;
+    }
+    return 0;
+}
+
 /* Whether every triangle of a box within the near and far planes is certain to be turned the way that is culled after
  * the snap.
  *
@@ -298,7 +322,8 @@ static int64_t cull_clusters(const tl_clustered *mesh, const tl_cluster_view *v,
             unsigned within = within_group;
             if (is_outside(&own, v, &within))
                 continue;
-            if (v->cull != TL_CULL_NONE && (within & TL_IN_DEPTH) == TL_IN_DEPTH && is_turned_away(c, v, &own))
+            if ((within & TL_IN_DEPTH) == TL_IN_DEPTH &&
+                (is_between_samples(&own, v) || (v->cull != TL_CULL_NONE && is_turned_away(c, v, &own))))
                 continue;
             const int32_t number = (int32_t)i;
             found[n++] = (found_cluster){shows_back(c, v, &own) ? ~number : number,
@@ -317,7 +342,7 @@ static void survey_clusters(const tl_clustered *mesh, const tl_cluster_view *v, 
         const tl_cluster *c = mesh->clusters + i;
         const seen_box box = place_box(c->low, c->high, v->matrix);
         unsigned within = 0;
-        if (is_outside(&box, v, &within))
+        if (is_outside(&box, v, &within) || ((within & TL_IN_DEPTH) == TL_IN_DEPTH && is_between_samples(&box, v)))
             n_of[TL_FATE_OUTSIDE]++;
         else if (v->cull != TL_CULL_NONE && (within & TL_IN_DEPTH) == TL_IN_DEPTH && is_turned_away(c, v, &box))
             n_of[TL_FATE_TURNED]++;
@@ -338,7 +363,8 @@ static int64_t count_hidden(const tl_clustered *mesh, const tl_cluster_view *v, 
         const seen_box box = place_box(c->low, c->high, v->matrix);
         unsigned within = 0;
         if (is_outside(&box, v, &within) ||
-            (v->cull != TL_CULL_NONE && (within & TL_IN_DEPTH) == TL_IN_DEPTH && is_turned_away(c, v, &box)))
+            ((within & TL_IN_DEPTH) == TL_IN_DEPTH &&
+             (is_between_samples(&box, v) || (v->cull != TL_CULL_NONE && is_turned_away(c, v, &box)))))
             continue;
         n++;
         *n_hidden += is_cluster_hidden(c, v, window, target);
@@ -346,8 +372,8 @@ static int64_t count_hidden(const tl_clustered *mesh, const tl_cluster_view *v, 
     return n;
 }
 
-/* Tells of n boxes, each under a matrix of its own, whether they may show: not outside of the window, nor, with a
- * target of depths, behind what it shows. */
+/* Tells of n boxes, each under a matrix of its own, whether they may show: not outside of the window or between
+ * samples, nor, with a target of depths, behind what it shows. */
 static void find_shown(const tl_cluster_view *view, const double *boxes, const double *matrices, int64_t n,
                        const tl_window *window, const tl_target *target, uint8_t *shown)
 {
@@ -356,7 +382,9 @@ static void find_shown(const tl_cluster_view *view, const double *boxes, const d
         memcpy(own.matrix, matrices + 16 * i, sizeof own.matrix);
         const seen_box box = place_box(boxes + 6 * i, boxes + 6 * i + 3, own.matrix);
         unsigned within = 0;
-        shown[i] = !is_outside(&box, &own, &within) && !(target && is_hidden(&box, &own, window, target, INT64_MAX));
+        shown[i] = !is_outside(&box, &own, &within) &&
+                   !((within & TL_IN_DEPTH) == TL_IN_DEPTH && is_between_samples(&box, &own)) &&
+                   !(target && is_hidden(&box, &own, window, target, INT64_MAX));
     }
 }
 

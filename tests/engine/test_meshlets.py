@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from comparing import assert_same
-from engine_cases import THREADS, Drawn, on
+from engine_cases import THREADS, Drawn, flat_grid, on, small_views
 from pages import before_a_page, behind_a_page
 
 import topleft as tl
@@ -123,6 +123,20 @@ def draw(mesh, clusters, depth_test="less", size=SIZE, out=None, **view):
 def assert_same_fragments(got, expected):
     assert_same(got.triangle, expected.triangle)
     assert_same(got.depth.view(np.int32), expected.depth.view(np.int32))
+
+
+@needs_meshlets
+@pytest.mark.parametrize("name", ["fine", "grid"])
+def test_many_triangles_a_pixel_have_the_same_bits(name, drawn):
+    """Of which most lie between samples, and meshlets of them are left out."""
+    vertices, triangles = flat_grid() if name == "grid" else MESHES[name]
+    mesh = vertices.astype(np.float32), triangles.astype(np.int32)
+    clusters = Clusters(*mesh)
+    for i, view in enumerate(small_views(np.random.default_rng(6), 100)):
+        test = ("less", "greater")[i % 4 == 0]
+        expected = draw(mesh, None, test, **view)
+        assert_same_fragments(draw(mesh, clusters, test, threads=THREADS[i % len(THREADS)], **view), expected)
+    assert len(drawn) == 100
 
 
 @needs_meshlets

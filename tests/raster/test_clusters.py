@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 from comparing import assert_same
-from engine_cases import ON_EACH_ISA, THREADS, Drawn, on
+from engine_cases import ON_EACH_ISA, THREADS, Drawn, flat_grid, on, small_views
 
 import topleft as tl
 from topleft import _engine
@@ -194,7 +194,7 @@ def test_every_triangle_stands_in_one_cluster():
     for name in MESHES:
         mesh = as_arrays(name)
         clusters = Clusters(*mesh)
-        view = {"transform": tl.Camera.look_at((0, 0, 9)).clip_from_world(SIZE)}
+        view = {"transform": tl.Camera.look_at((0, 0, 9)).clip_from_world(SIZE), "sampling": "outer"}
         assert share_left(mesh, **view) == 1
         assert count_drawn(mesh, **view)[1] == len(clusters)
         assert len(clusters) <= 1.5 * len(mesh[1]) / 64
@@ -205,6 +205,7 @@ def test_far_side_is_left_out():
     vertices, triangles = MESHES["fine"]
     sphere = (vertices / np.linalg.norm(vertices, axis=1)[:, None]).astype(np.float32), triangles.astype(np.int32)
     whole = {"transform": tl.Camera.look_at((0, 0, 3)).clip_from_world((4 * SIZE[0], 4 * SIZE[1]))}
+    whole["sampling"] = "outer"  # of which nothing lies between samples
     assert share_left(sphere, **whole) == 1
     assert 1 / 3 < share_left(sphere, cull="back", **whole) < 0.7  # a third shows
     assert 2 / 3 < share_left(sphere, cull="front", **whole) < 0.9
@@ -225,6 +226,29 @@ def test_what_is_hidden_is_left_out():
     transform = tl.Camera.look_at((0, 0, 3)).clip_from_world(SIZE)
     n_drawn, n_seen = count_drawn(as_arrays("fine"), transform=transform)
     assert n_drawn < 0.7 * n_seen
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("name", ["fine", "blob", "grid"])
+@ON_EACH_ISA
+def test_many_triangles_a_pixel_have_the_same_bits(isa, name, dtype):
+    vertices, triangles = flat_grid() if name == "grid" else MESHES[name]
+    mesh = vertices.astype(dtype), triangles.astype(np.int32)
+    clusters = Clusters(*mesh)
+    n_seen = 0
+    with on(isa):
+        for i, view in enumerate(small_views(np.random.default_rng(5), 40)):
+            test = ("less", "greater")[i % 4 == 0]
+            expected = draw(mesh, None, test, **view)
+            assert_same_fragments(draw(mesh, clusters, test, threads=THREADS[i % len(THREADS)], **view), expected)
+            n_seen += expected.mask.any()
+    assert n_seen > 10
+
+
+def test_what_lies_between_samples_is_left_out():
+    view = {"transform": tl.Camera.look_at((0, 0, 3)).clip_from_world((8, 6)), "viewport": (8, 6)}
+    assert 0.1 < share_left(as_arrays("fine"), **view) < 0.5
+    assert share_left(as_arrays("fine"), sampling="outer", **view) == 1
 
 
 def test_what_lies_outside_is_left_out():
@@ -353,6 +377,40 @@ def test_scenes_have_the_same_bits(sampling, monkeypatch):
             assert_same(got, expected)
         n_shown += len(np.unique(pictures[0][0])) > 10
     assert n_shown > 10
+
+
+@pytest.mark.parametrize("sampling", ["center", "msaa4", "outer", "area"])
+@ON_EACH_ISA
+def test_instances_between_samples_are_left_out(isa, sampling, monkeypatch):
+    """And nobody misses them: most of these are a third of a pixel wide."""
+    rng = np.random.default_rng(41)
+    meshes = [tl.Mesh(*tl.scenes.shape("cube")), tl.Mesh(np.float32(flat_grid(9)[0]), flat_grid(9)[1])]
+    camera = tl.Camera.look_at((0, 0, 900), near=1.0, far=2000.0)
+    drawn = []
+
+    def draw_noted(memories, meshes, *how, **more):
+        drawn.extend(meshes)
+        return draw_clustered(memories, meshes, *how, **more)
+
+    monkeypatch.setattr("topleft._render.instances.draw_clustered", draw_noted)
+    for trial in range(3):
+        at = np.tile(np.eye(4), (200, 1, 1))
+        at[:, :3, 3] = rng.uniform(-200, 200, (200, 3))
+        scene = tl.Scene([(meshes[i % 2], matrix) for i, matrix in enumerate(at)])
+        view = {"cull": ("none", "back")[trial % 2], "sampling": sampling}
+        found = []
+        for pays in (False, True):
+            monkeypatch.setattr(choices, "pays_to_cluster", lambda *_, pays=pays: pays)
+            with on(isa):
+                found.append([tl.silhouette(scene, camera, SIZE, sampling=sampling)])
+                if sampling in ("center", "msaa4"):
+                    frags = tl.rasterize_mesh(scene, camera, SIZE, **view)
+                    found[-1] += [frags.samples_id, frags.samples_depth]
+        for got, expected in zip(*found, strict=True):
+            assert_same(got, expected)
+        assert found[0][0].any()
+    if sampling == "center":
+        assert 20 < len(drawn) / 6 < 60  # of 200 instances
 
 
 def test_scene_that_does_not_fit_is_refused_as_without(always):

@@ -57,6 +57,34 @@ def hashes_on_each_isa(path, *samplings):
     return found
 
 
+def flat_grid(side=129):
+    """A square of equal triangles: (V, 3) vertices and triangles."""
+    x, y = np.meshgrid(*[np.linspace(-1, 1, side)] * 2)
+    corner = np.arange(side * side).reshape(side, side)
+    a, b, c, d = corner[:-1, :-1], corner[:-1, 1:], corner[1:, :-1], corner[1:, 1:]
+    return np.stack([x, y, 0 * x], -1).reshape(-1, 3), np.stack([a, c, b, b, c, d], axis=-1).reshape(-1, 3)
+
+
+def small_views(rng, n):
+    """Views in which a unit of space is few pixels, or part of one; in some, edges of a flat grid lie on samples."""
+    for _ in range(n):
+        eye = rng.normal(size=3) if rng.uniform() < 0.6 else np.array([0.0, 0.0, 1.0])
+        eye *= rng.choice([3.0, 10.0, 30.0, 100.0, 400.0]) / np.linalg.norm(eye)
+        size = tuple(rng.integers(1, (160, 120)).tolist())
+        viewport = tuple(side * int(rng.choice([1, 1, 4])) for side in size)
+        ortho_height = float(rng.choice([2, 3, 16, 128, size[1] / 8])) if rng.uniform() < 0.5 else None
+        middle = rng.uniform(-0.5, 0.5, 3) * rng.choice([0, 1])
+        camera = tl.Camera.look_at(eye, middle, (0.1, 1, 0), near=0.01, far=1e4, ortho_height=ortho_height)
+        yield {
+            "size": size,
+            "transform": camera.clip_from_world(viewport),
+            "viewport": viewport,
+            "origin": tuple(rng.integers((-5, -5), np.subtract(viewport, size) + 6).tolist()),
+            "cull": str(rng.choice(["none", "back", "front"])),
+            "subpixel_bits": int(rng.choice([0, 4, 8, 8])),
+        }  # fmt: skip
+
+
 @dataclass(frozen=True)
 class Expected:
     """Pictures of a scene; ids and depth by depth test."""

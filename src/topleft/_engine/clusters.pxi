@@ -81,10 +81,10 @@ cdef class ClusterView:
 
     cdef tl_cluster_view view
 
-    def __init__(self, Source source, SnappedMesh mesh, int64_t first_row, int64_t n_rows, int64_t width, double margin_px, double error, bint is_farthest):
+    def __init__(self, Source source, SnappedMesh mesh, int64_t first_row, int64_t n_rows, int64_t width, double margin_px, double error, tl_sink sink):
         """`source`: whose matrix is clip from object; `mesh`: how it is seen; beyond `margin_px` around the window nothing shows.
 
-        `error`: of the vertex stage, as a share of the terms that it adds up.
+        `error`: of the vertex stage, as a share of the terms that it adds up; `sink`: what becomes of a covered sample.
         """
         cdef tl_cluster_view *v = &self.view
         cdef const tl_view *how = &mesh.viewport.view
@@ -108,7 +108,9 @@ cdef class ClusterView:
         v.length[1] = sqrt(y[0] * y[0] + y[1] * y[1] + y[2] * y[2])
         v.length[2] = sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
         v.error, v.near_clip, v.far_clip, v.zero_to_one = error, how.near_clip, how.far_clip, how.zero_to_one
-        v.is_farthest, v.cull = is_farthest, mesh.snapped.cull
+        v.is_farthest, v.cull = sink == TL_SINK_FARTHEST, mesh.snapped.cull
+        v.has_one_sample = window.test == TL_TEST_SAMPLE and sink != TL_SINK_SAMPLES
+        v.sample_px[0], v.sample_px[1] = 0.5 + mesh.snapped.mesh.sample_x_fx / unit, 0.5 + mesh.snapped.mesh.sample_y_fx / unit
 
 
 def find_shown(SnappedMesh mesh, ClusterView view, const double[:, ::1] boxes, const double[:, :, ::1] matrices, Target target, bint is_drawn,

@@ -69,7 +69,7 @@ cdef extern from "topleft.h" nogil:
         int64_t *n
         double *boxes
         double *covered
-    int TL_MAX_LAYERS, TL_SINK_PEEL
+    int TL_MAX_LAYERS, TL_SINK_PEEL, TL_SINK_FARTHEST, TL_SINK_SAMPLES, TL_TEST_SAMPLE
     ctypedef struct tl_peeled:
         int n_layers, is_farthest
         int32_t *ids
@@ -174,6 +174,8 @@ cdef extern from "topleft.h" nogil:
         double eye[4]
         double scale_x, scale_y
         double half_width_px, half_height_px
+        double sample_px[2]
+        int has_one_sample
         double length[3]
         double error
         int near_clip, far_clip, zero_to_one, is_farthest

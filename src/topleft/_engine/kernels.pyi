@@ -467,7 +467,7 @@ class ClusterView:
         width: int,
         margin_px: float,
         error: float,
-        is_farthest: bool,
+        sink: int,
     ) -> None: ...
 
 def pixels_per_unit(matrix: F64, size: tuple[int, int], window: F64, extents: F64) -> float | None: ...

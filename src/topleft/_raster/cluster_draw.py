@@ -112,9 +112,10 @@ class ClusteredMesh:
         n_others, _, n_drawn = clusters.engine.draw(empty, self._own, seen, may_be_hidden, *place, is_first, is_last)
         return others[:n_others].copy(), n_drawn
 
-    def seen(self, sink: int) -> tuple[_engine.ClusterView, _engine.SnappedMesh]:
-        """Return what boxes need to know of the picture, under this mesh's matrix, and how it is seen."""
-        return self._seen(sink), self._empty
+    def seen(self, sink: int, sample: tuple[int, int]) -> tuple[_engine.ClusterView, _engine.SnappedMesh]:
+        """Return what boxes need to know of the picture, under this mesh's matrix, and how a sample sees it."""
+        empty = self._empty.seen_from(*sample)
+        return self._seen(sink, empty=empty), empty
 
     def count_drawn(self, sink: Sink) -> int:
         """Return how many clusters the picture draws, by one thread: those that are not left out, nor hidden."""
@@ -180,9 +181,7 @@ class ClusteredMesh:
         """Return what clusters need to know of rows [first, end) of the picture, or of all; `empty`: of a sample."""
         width, height = self._view.size
         n_rows, how = (height if end is None else end) - first, (MARGIN_PX, STAGE_ERROR[self.clusters.points.dtype])
-        return _engine.ClusterView(
-            self._own, empty or self._empty, first, n_rows, width, *how, sink == Sink.FARTHEST
-        )  # fmt: skip
+        return _engine.ClusterView(self._own, empty or self._empty, first, n_rows, width, *how, sink)
 
     def _snapped(
         self,

@@ -170,8 +170,10 @@ class PlacedScene:
             )  # fmt: skip
             yield int(self.first_ids[first]), placed
 
-    def shown(self, some: NDArray[np.intp], target: _engine.Target, *, is_drawn: bool) -> NDArray[np.intp]:
-        """Return those of some instances whose boxes may show in a target: in front of what it shows, if it `is_drawn`.
+    def shown(
+        self, some: NDArray[np.intp], target: _engine.Target, at: tuple[int, int], *, is_drawn: bool
+    ) -> NDArray[np.intp]:
+        """Return those of some instances whose boxes may show a sample: before the target's depths, if it `is_drawn`.
 
         At least the first one otherwise, which clears the target if nothing shows.
         """
@@ -181,7 +183,7 @@ class PlacedScene:
             if not len(own):
                 continue
             chosen = some[own]
-            seen, mesh = ClusteredMesh(*self.clustered(int(chosen[0]))).seen(target.sink)
+            seen, mesh = ClusteredMesh(*self.clustered(int(chosen[0]))).seen(target.sink, at)
             shown: NDArray[np.uint8] = np.empty(len(own), np.uint8)
             matrices = self._clip_from_objects[chosen].astype(dtype).astype(np.float64)  # as the vertex stage has them
             _engine.find_shown(mesh, seen, self.scene.boxes[chosen], matrices, target, is_drawn, shown)
@@ -322,7 +324,7 @@ def draw_rounds(
     outside, or behind what has been drawn.
     """
     keeps_order = Sink(target.sink) in (Sink.NEAREST, Sink.FARTHEST)
-    order = placed.shown(order, target, is_drawn=keeps_order and not is_first)
+    order = placed.shown(order, target, at, is_drawn=keeps_order and not is_first)
     first, n = 0, FIRST_ROUND if keeps_order else len(order)
     while True:
         meshes = [ClusteredMesh(*placed.clustered(i)) for i in order[first : first + n].tolist()]
@@ -331,7 +333,7 @@ def draw_rounds(
             return False
         if first >= len(order):
             return True
-        order = np.append(order[:first], placed.shown(order[first:], target, is_drawn=True))
+        order = np.append(order[:first], placed.shown(order[first:], target, at, is_drawn=True))
         n = first
         if first >= len(order):
             return True
