@@ -52,6 +52,9 @@ SURVEYED_INSTANCES, SURVEYED_OF_EACH = 4, 25
 #: Instances that are drawn before it is looked which others they hide.
 FIRST_ROUND = 16
 
+#: Instances of which there are objects at a time: Python's search for cycles goes through all that live.
+MOST_AT_ONCE = 128
+
 #: Cells on each side of the picture in which layers are counted: of 15 by 8 pixels at 1920x1080.
 CELLS = 128
 
@@ -326,17 +329,17 @@ def draw_rounds(
     keeps_order = Sink(target.sink) in (Sink.NEAREST, Sink.FARTHEST)
     order = placed.shown(order, target, at, is_drawn=keeps_order and not is_first)
     first, n = 0, FIRST_ROUND if keeps_order else len(order)
-    while True:
-        meshes = [ClusteredMesh(*placed.clustered(i)) for i in order[first : first + n].tolist()]
-        clears, first = is_first and first == 0, first + n
-        if not draw_clustered(memories, meshes, target, height, at, is_first=clears, is_last=first >= len(order)):
-            return False
-        if first >= len(order):
-            return True
-        order = np.append(order[:first], placed.shown(order[first:], target, at, is_drawn=True))
-        n = first
-        if first >= len(order):
-            return True
+    while first < len(order):
+        end = min(first + n, len(order))
+        for k in range(first, end, MOST_AT_ONCE):
+            meshes = [ClusteredMesh(*placed.clustered(i)) for i in order[k : min(k + MOST_AT_ONCE, end)].tolist()]
+            ends = {"is_first": is_first and k == 0, "is_last": k + MOST_AT_ONCE >= len(order)}
+            if not draw_clustered(memories, meshes, target, height, at, **ends):
+                return False
+        if end < len(order):
+            order = np.append(order[:end], placed.shown(order[end:], target, at, is_drawn=True))
+        first = n = end
+    return True
 
 
 def rows_of(
