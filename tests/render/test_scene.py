@@ -330,17 +330,39 @@ def test_instances_in_rounds_and_groups_are_drawn_as_one_after_the_other(isa, se
         "threads": int(rng.choice([1, 3])), "sampling": ["center", "msaa2"][seed % 2],
     }  # fmt: skip
     whole = tl.rasterize_mesh(tl.Scene(standing), camera, (60, 40), **options)
+    mask_options = {"threads": 3, "sampling": ["center", "outer", "msaa4"][seed % 3]}
+    mask = tl.silhouette(tl.Scene(standing), camera, (60, 40), **mask_options)
     monkeypatch.setattr(choices, "pays_to_cluster", lambda *_: True)
     monkeypatch.setattr(choices, "pays_to_draw_instances", lambda *_: True)
     monkeypatch.setattr(instances, "FIRST_ROUND", int(rng.choice([1, 4])))
+    monkeypatch.setattr(instances, "MIN_TRIANGLES_TO_SHARE", 0)
     for module in (placed, instances):
         monkeypatch.setattr(module, "INT32_MAX", most_ids)
     with on(isa):
         found = tl.rasterize_mesh(tl.Scene(standing), camera, (60, 40), **options)
+        assert np.array_equal(tl.silhouette(tl.Scene(standing), camera, (60, 40), **mask_options), mask)
     assert found.id.dtype == (np.int64 if 700 * len(standing) > most_ids else np.int32)
     for name in ("id", "depth", "instance", "triangle", "samples_id", "samples_instance", "samples_triangle"):
         assert np.array_equal(getattr(found, name), getattr(whole, name)), name
     assert np.array_equal(found.barycentric(), whole.barycentric())
+
+
+@pytest.mark.parametrize(("height", "n"), [(40, 1), (40, 2), (40, 3), (4, 4), (5, 4), (1, 1)])
+def test_bands_of_instances_share_the_rows(height, n):
+    """Also where all instances lie in one row, above the window, or behind the eye."""
+    camera = tl.Camera.look_at((0, 0, 9), near=0.1, far=50.0)
+    at = np.tile(np.eye(4), (10, 1, 1))
+    at[:, 1, 3], at[:, 2, 3] = np.repeat([-2, -2, 0, 1, 90], 2), np.tile([0, 20], 5)
+    standing = [tl.Instance(BALLS[0], matrix) for matrix in at]
+    placed = instances.place(tl.Scene(standing), camera, (60, height), {})[0]
+    for some in (range(10), (0, 2), (8,), (1, 3, 5), (4, 4, 4)):
+        tops = placed.split_rows(np.array(some), height, n)
+        assert tops[0] == 0
+        assert tops[-1] == height
+        assert len(tops) == n + 1
+        assert min(np.diff(tops)) >= 1
+    if n == 2:
+        assert placed.split_rows(np.arange(0, 8, 2), height, n)[1] in range(20, 30)  # two at -2, one in the middle
 
 
 @pytest.mark.parametrize("instance", [3, b"cube", (CUBE,), None, [CUBE, CUBE], tl.Scene([CUBE])])

@@ -22,7 +22,7 @@ from topleft._raster.clusters import Clusters
 from topleft._raster.snap import snap_mesh, source_of
 from topleft._raster.view import View
 
-__all__ = ["ClusteredMesh", "Survey", "draw_clustered"]
+__all__ = ["ClusteredMesh", "Survey", "draw_clustered", "draw_others"]
 
 #: A bound of the error of the vertex stage as a share of the terms that it adds up: four roundings, and the same again
 #: for how the bounds themselves are computed, in float64; twice that.
@@ -112,10 +112,13 @@ class ClusteredMesh:
         n_others, _, n_drawn = clusters.engine.draw(empty, self._own, seen, may_be_hidden, *place, is_first, is_last)
         return others[:n_others].copy(), n_drawn
 
-    def seen(self, sink: int, sample: tuple[int, int]) -> tuple[_engine.ClusterView, _engine.SnappedMesh]:
-        """Return what boxes need to know of the picture, under this mesh's matrix, and how a sample sees it."""
+    def seen(
+        self, sink: int, sample: tuple[int, int], rows: tuple[int, int] | None = None
+    ) -> tuple[_engine.ClusterView, _engine.SnappedMesh]:
+        """Return what boxes need to know of some rows of the picture, or of all, and how a sample sees this mesh."""
         empty = self._empty.seen_from(*sample)
-        return self._seen(sink, empty=empty), empty
+        first, end = rows or (0, self._view.size[1])
+        return self._seen(sink, first, end, empty), empty
 
     def count_drawn(self, sink: Sink) -> int:
         """Return how many clusters the picture draws, by one thread: those that are not left out, nor hidden."""
@@ -137,7 +140,7 @@ class ClusteredMesh:
         parts = draw_pass(memory, drawn, len(meshlets), self.clusters.n_triangles, height, n_parts)
         if not any(map(len, parts)):
             return True
-        return draw_others([memory] * n_parts, self, np.unique(np.concatenate(parts)), target, height, (0, 0))
+        return draw_others(memory, self, np.unique(np.concatenate(parts)), target, equal_bands(height, n_parts), (0, 0))
 
     def part(self, *triangles: NDArray[np.int32]) -> _engine.SnappedMesh:
         """Return the mesh with what some triangles use snapped, maybe more; -1 is no triangle."""
@@ -242,12 +245,18 @@ def draw_clustered(
     to be drawn, which tells why.
     """
     n_parts, last = min(height, len(memories)), len(meshes) - 1
+    tops = equal_bands(height, n_parts)
 
     def draw_rows(i: int, _: int) -> list[NDArray[np.int32]]:
-        rows = height * i // n_parts, height * (i + 1) // n_parts
         return [
             mesh.draw_rows(
-                memories[i], target, *rows, sample=sample, is_first=is_first and k == 0, is_last=is_last and k == last
+                memories[i],
+                target,
+                tops[i],
+                tops[i + 1],
+                sample=sample,
+                is_first=is_first and k == 0,
+                is_last=is_last and k == last,
             )[0]
             for k, mesh in enumerate(meshes)
         ]
@@ -257,27 +266,35 @@ def draw_clustered(
         if not any(map(len, parts)):
             continue
         others = np.unique(np.concatenate(parts))
-        if not draw_others(memories, mesh, others, target, height, sample):
+        if not draw_others(memories[0], mesh, others, target, tops, sample):
             return False
     return True
 
 
+def equal_bands(height: int, n: int) -> list[int]:
+    """Return the first rows of n bands of as many rows, and `height`."""
+    return [height * i // n for i in range(n + 1)]
+
+
 def draw_others(
-    memories: Sequence[Memory],
+    memory: Memory,
     mesh: ClusteredMesh,
     triangles: NDArray[np.int32],
     target: _engine.Target,
-    height: int,
+    tops: Sequence[int],
     sample: tuple[int, int],
 ) -> bool:
-    """Draw some triangles of a mesh over what is there; returns as `draw_clustered` does."""
-    part = mesh.try_part([triangles], memories[0])
+    """Draw some triangles of a mesh over what is there; returns as `draw_clustered` does.
+
+    `tops`: the first rows of the bands that the others were drawn in, and the height: a mask has its bits band by band.
+    """
+    part = mesh.try_part([triangles], memory)
     if part is None:
         return False
     seen = part.seen_from(*sample)
 
-    def draw_rows(first: int, end: int) -> None:
-        seen.draw_listed(target, first, end - first, triangles, True)
+    def draw_band(i: int, _: int) -> None:
+        seen.draw_listed(target, tops[i], tops[i + 1] - tops[i], triangles, True)
 
-    run_parts(draw_rows, height, min(height, len(memories)))
+    run_parts(draw_band, len(tops) - 1, len(tops) - 1)
     return True
