@@ -72,6 +72,7 @@ typedef struct {
     const tl_target *target;   /* NEAREST, FARTHEST */
     const tl_kernels *kernels; /* what draws triangles that are large, or need care */
     int32_t first_id;
+    int32_t sample_x_fx, sample_y_fx; /* where in a pixel it is sampled, from the centre */
 } tl_meshlet_pass;
 
 /* What one unit does, which is compiled for AVX-512 with VBMI alone. */

@@ -47,7 +47,10 @@ static __attribute__((noinline)) void draw_with_care(meshlet_batch *s, const tl_
         return;
     memset(triangles + 3 * n, 0, 3 * TL_MAX_LANES * sizeof *triangles);
     const tl_snapped snapped = {
-        .mesh = {.vertices = vertices, .n_vertices = TL_MESHLET_VERTICES},
+        .mesh = {.vertices = vertices,
+                 .n_vertices = TL_MESHLET_VERTICES,
+                 .sample_x_fx = pass->sample_x_fx,
+                 .sample_y_fx = pass->sample_y_fx},
         .triangles = triangles,
         .n_triangles = n,
         .cull = pass->seen->cull,

@@ -163,7 +163,9 @@ static void start_meshlets(meshlet_batch *s, const tl_meshlet_pass *pass, int32_
     s->fine_bits = TL_PX_BITS - window->subpixel_bits;
     memcpy(s->matrix, pass->source->matrix, sizeof s->matrix);
     s->scale_x = pass->seen->scale_x, s->scale_y = pass->seen->scale_y;
-    s->x_fx = s->scale_x - unit * (double)window->x_px, s->y_fx = s->scale_y - unit * (double)window->y_px;
+    /* a sample off the centre sees what the centre sees of vertices that have moved the other way */
+    s->x_fx = s->scale_x - unit * (double)window->x_px - (double)pass->sample_x_fx;
+    s->y_fx = s->scale_y - unit * (double)window->y_px - (double)pass->sample_y_fx;
     s->is_zero_to_one = pass->view->zero_to_one;
     s->n_slots = s->n_fragments = s->small.n = s->middle.n = s->rows.n = 0;
     memset(s->sample, 0, sizeof s->sample); /* what is prefetched behind the end of the list */

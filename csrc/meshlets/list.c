@@ -84,9 +84,11 @@ static lane_view place_view(const tl_meshlet_pass *pass)
         l.length[i] = (float)(v->length[i] * 1.0001);
     l.scale[0] = (float)v->scale_x, l.scale[1] = (float)v->scale_y;
     l.half_px[0] = (float)v->half_width_px, l.half_px[1] = (float)v->half_height_px;
-    l.origin_px[0] = (float)(v->half_width_px - (double)pass->window->x_px);
-    l.origin_px[1] = (float)(v->half_height_px - (double)pass->window->y_px);
-    l.pixel = (float)(v->half_width_px / v->scale_x); /* a sub-pixel */
+    const double pixel = v->half_width_px / v->scale_x; /* a sub-pixel */
+    /* a pixel begins half a pixel before its sample, wherever that lies */
+    l.origin_px[0] = (float)(v->half_width_px - (double)pass->window->x_px - pixel * (double)pass->sample_x_fx);
+    l.origin_px[1] = (float)(v->half_height_px - (double)pass->window->y_px - pixel * (double)pass->sample_y_fx);
+    l.pixel = (float)pixel;
     l.is_zero_to_one = v->zero_to_one, l.is_farthest = v->is_farthest;
     return l;
 }

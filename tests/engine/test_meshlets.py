@@ -110,6 +110,7 @@ def drawn(monkeypatch):
     draw = ClusteredMesh.draw_meshlets
     monkeypatch.setattr(choices, "pays_to_grow", lambda *_: True)
     monkeypatch.setattr(choices, "pays_to_draw_meshlets", lambda *_: True)
+    monkeypatch.setattr(choices, "pays_to_draw_samples", lambda *_: True)
     monkeypatch.setattr(ClusteredMesh, "draw_meshlets", lambda *a: pictures.append(1) or draw(*a))
     return pictures
 
@@ -142,6 +143,32 @@ def test_picture_has_the_same_bits(name, drawn):
             assert_same(got.barycentric(), expected.barycentric())
     assert len(drawn) == 150
     assert n_seen > 40
+
+
+def sampled(rng, views):
+    """The same views with several samples a pixel, on a grid that these lie on."""
+    for view in views:
+        sampling = str(rng.choice(["msaa2", "msaa4", "msaa4", "msaa8", "msaa16"]))
+        yield view | {"sampling": sampling, "subpixel_bits": int(rng.choice([4, 5, 7, 8, 8, 8]))}
+
+
+@needs_meshlets
+@pytest.mark.parametrize("name", MESHES)
+def test_each_sample_has_the_same_bits(name, drawn):
+    rng = np.random.default_rng(23)
+    mesh = MESHES[name]
+    clusters = Clusters(*mesh)
+    n_planes = 0
+    for i, view in enumerate(sampled(rng, cameras(rng, 40))):
+        test, size = ("less", "greater")[i % 4 == 0], (SIZE, (37 + 5 * i, 11 + 3 * i))[i % 3 == 0]
+        expected = draw(mesh, None, test, size, threads=1, **view)
+        got = draw(mesh, clusters, test, size, threads=THREADS[i % len(THREADS)], **view)
+        assert_same(got.samples_triangle, expected.samples_triangle)
+        assert_same(got.samples_depth.view(np.int32), expected.samples_depth.view(np.int32))
+        n_planes += got.samples_triangle.shape[-1]
+        if i % 8 == 0:
+            assert_same(got.sample(-1).barycentric(), expected.sample(-1).barycentric())
+    assert len(drawn) == n_planes
 
 
 @needs_meshlets

@@ -129,4 +129,5 @@ cdef class MeshletPass:
         drawn.mesh, drawn.seen, drawn.source = &self.meshlets.mesh, &self.seen.view, &self.source.source
         drawn.view, drawn.window, drawn.target, drawn.kernels = &self.mesh.viewport.view, window, target, K
         drawn.first_id = self.mesh.snapped.first_id
+        drawn.sample_x_fx, drawn.sample_y_fx = self.mesh.snapped.mesh.sample_x_fx, self.mesh.snapped.mesh.sample_y_fx
         return drawn
