@@ -1,5 +1,5 @@
-/* Meshlets: what a mesh of float32 vertices is grown into where bytes can be permuted, and what drawing them needs.
- * Part of the contract of topleft.h, which includes it behind the types that it uses. */
+/* Meshlets: what a mesh is grown into where bytes can be permuted and its coordinates are float32 numbers, and what
+ * drawing them needs.  Part of the contract of topleft.h, which includes it behind the types that it uses. */
 #include "topleft.h" /* before the guard: it includes this file behind its types */
 
 #ifndef TOPLEFT_MESHLETS_H

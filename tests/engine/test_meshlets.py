@@ -128,9 +128,10 @@ def assert_same_fragments(got, expected):
 
 @needs_meshlets
 @pytest.mark.parametrize("name", MESHES)
-def test_picture_has_the_same_bits(name, drawn):
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_picture_has_the_same_bits(name, dtype, drawn):
     rng = np.random.default_rng(17)
-    mesh = MESHES[name]
+    mesh = MESHES[name][0].astype(dtype), MESHES[name][1]
     clusters = Clusters(*mesh)
     n_seen = 0
     for i, view in enumerate(cameras(rng, 150)):
@@ -154,9 +155,10 @@ def sampled(rng, views):
 
 @needs_meshlets
 @pytest.mark.parametrize("name", MESHES)
-def test_each_sample_has_the_same_bits(name, drawn):
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_each_sample_has_the_same_bits(name, dtype, drawn):
     rng = np.random.default_rng(23)
-    mesh = MESHES[name]
+    mesh = MESHES[name][0].astype(dtype), MESHES[name][1]
     clusters = Clusters(*mesh)
     n_planes = 0
     for i, view in enumerate(sampled(rng, cameras(rng, 40))):
@@ -263,25 +265,35 @@ def test_mesh_is_grown_when_it_has_been_drawn_often(monkeypatch):
 
 @needs_meshlets
 @pytest.mark.parametrize(
-    ("options", "dtype"),
+    ("options", "is_float32"),
     [
-        ({"cull": "back"}, np.float64),
-        ({"cull": "back", "near_clip": False}, np.float32),
-        ({"cull": "back", "subpixel_bits": 9}, np.float32),
-        ({"cull": "back", "viewport": (20_000, 120)}, np.float32),
-        ({"cull": "back", "origin": (-20_000, 0)}, np.float32),
+        ({"cull": "back"}, False),
+        ({"cull": "back", "near_clip": False}, True),
+        ({"cull": "back", "subpixel_bits": 9}, True),
+        ({"cull": "back", "subpixel_bits": 3, "sampling": "msaa4"}, True),
+        ({"cull": "back", "viewport": (20_000, 120)}, True),
+        ({"cull": "back", "origin": (-20_000, 0)}, True),
     ],
 )
-def test_what_meshlets_cannot_draw_is_left_to_clusters(options, dtype):
-    assert choices.can_draw_meshlets(View.parse(SIZE, {"cull": "back"}), Sink.NEAREST, np.dtype(np.float32))
-    assert not choices.can_draw_meshlets(View.parse(SIZE, options), Sink.NEAREST, np.dtype(dtype))
+def test_what_meshlets_cannot_draw_is_left_to_clusters(options, is_float32):
+    assert choices.can_draw_meshlets(View.parse(SIZE, {"cull": "back"}), Sink.NEAREST, is_float32=True)
+    assert not choices.can_draw_meshlets(View.parse(SIZE, options), Sink.NEAREST, is_float32=is_float32)
+
+
+@pytest.mark.parametrize("number", [0.1, 1e300, 1 + 2.0**-24, np.nan])
+def test_coordinates_are_float32_numbers_or_not(number):
+    points, triangles = np.zeros((3, 3)), np.zeros((1, 3), np.int32)
+    points[1] = 0.5, -(2.0**-140), np.inf
+    assert Clusters(points, triangles).is_float32
+    points[2, 1] = number
+    assert not Clusters(points, triangles).is_float32
 
 
 def test_scalar_kernels_have_no_meshlets():
     with on("scalar"):
         assert not _engine.has_meshlets()
         view = View.parse(SIZE, {"cull": "back"})
-        assert not choices.can_draw_meshlets(view, Sink.NEAREST, np.dtype(np.float32))
+        assert not choices.can_draw_meshlets(view, Sink.NEAREST, is_float32=True)
 
 
 @pytest.mark.parametrize(

@@ -37,7 +37,7 @@ def grow_meshlets(Source source, const int32_t[:, ::1] triangles, const int32_t[
 
 
 cdef class Grown:
-    """A mesh of float32 vertices in object space, grown into meshlets; keeps what it points to alive."""
+    """A mesh in object space whose coordinates are float32 numbers, grown into meshlets; keeps what it points to alive."""
 
     cdef tl_meshlets mesh
     cdef object arrays

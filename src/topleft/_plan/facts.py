@@ -272,7 +272,7 @@ def find_cluster_facts(mesh: Mesh, view: View, verb: str, test: DepthTest | None
     few = seen.survey(SURVEYED_OF_SAMPLES if view.sampling.n_samples > 1 else SURVEYED)
     n, beyond = len(clusters), seen.find_beyond
     pays = choices.pays_to_draw_from(ClusterRoute.CLUSTERS, view, n_triangles, few, 0.0, beyond)
-    can_grow = choices.can_draw_meshlets(view, sink, clusters.points.dtype)
+    can_grow = choices.can_draw_meshlets(view, sink, is_float32=clusters.is_float32)
     can_grow = can_grow and choices.pays_to_grow(choices.MIN_PICTURES_TO_GROW, n_triangles, n)
     if not (pays or can_grow):
         return ClusterFacts(None, MOST_SHOWS)

@@ -339,7 +339,7 @@ def cluster_route(
     `find_beyond`: the share of the vertices beyond the near or far plane.
     """
     n = clusters.n_triangles
-    is_grown = can_draw_meshlets(view, sink, clusters.points.dtype)
+    is_grown = can_draw_meshlets(view, sink, is_float32=clusters.is_float32)
     is_grown = is_grown and pays_to_grow(clusters.n_pictures, n, len(clusters))
     if is_grown and pays_to_draw_from(ClusterRoute.MESHLETS, view, n, survey, clusters.hidden, find_beyond):
         return ClusterRoute.MESHLETS
@@ -381,12 +381,13 @@ def pays_to_draw_clusters(view: View, n_triangles: int, survey: Survey) -> bool:
     return survey.front <= MAX_FRONT_TO_CLUSTER and survey.outside >= least
 
 
-def can_draw_meshlets(view: View, sink: Sink, dtype: np.dtype[Any]) -> bool:
+def can_draw_meshlets(view: View, sink: Sink, *, is_float32: bool) -> bool:
     """Tell whether a view of a mesh in clusters may be drawn from meshlets, where there is code for these.
 
-    They hold float32 vertices, and draw triangles in 16 bits, of what lies between near and far.
+    They hold coordinates that are float32 numbers, whatever their dtype, and draw triangles in 16 bits, of what lies
+    between near and far.
     """
-    if not (_engine.has_meshlets() and sink in (Sink.NEAREST, Sink.FARTHEST) and dtype == np.float32):
+    if not (_engine.has_meshlets() and sink in (Sink.NEAREST, Sink.FARTHEST) and is_float32):
         return False
     is_near = max(*view.size, *view.viewport, *map(abs, view.origin)) <= _engine.MAX_DRAWN_PX
     is_clipped = view.near_clip and view.far_clip

@@ -103,7 +103,7 @@ class ClusteredMesh:
 
     def note_hidden(self, target: _engine.Target) -> None:
         """Note how much of the mesh lies behind what a target holds, which decides how the next picture is drawn."""
-        if choices.can_draw_meshlets(self._view, Sink(target.sink), self.clusters.points.dtype):
+        if choices.can_draw_meshlets(self._view, Sink(target.sink), is_float32=self.clusters.is_float32):
             self.clusters.hidden = self.hidden_share(target)
 
     def draw_rows(
