@@ -1,5 +1,5 @@
-/* Meshlets: what a mesh of float32 vertices is grown into where bytes can be permuted, and what drawing them needs.
- * Part of the contract of topleft.h, which includes it behind the types that it uses. */
+/* Meshlets: what a mesh is grown into where bytes can be permuted and its coordinates are float32 numbers, and what
+ * drawing them needs.  Part of the contract of topleft.h, which includes it behind the types that it uses. */
 #include "topleft.h" /* before the guard: it includes this file behind its types */
 
 #ifndef TOPLEFT_MESHLETS_H
@@ -72,6 +72,7 @@ typedef struct {
     const tl_target *target;   /* NEAREST, FARTHEST */
     const tl_kernels *kernels; /* what draws triangles that are large, or need care */
     int32_t first_id;
+    int32_t sample_x_fx, sample_y_fx; /* where in a pixel it is sampled, from the centre */
 } tl_meshlet_pass;
 
 /* What one unit does, which is compiled for AVX-512 with VBMI alone. */

@@ -64,7 +64,9 @@ typedef struct {
     int32_t stride_px, width, row0, row1;
     int32_t first_id;
     int is_farthest, fine_bits; /* bits that the grid is finer than the picture's sub-pixels */
+    int is_f64;                 /* whether vertices are transformed in float64, by the second matrix */
     float matrix[16];
+    double matrix64[16];
     double scale_x, scale_y, x_fx, y_fx; /* of the picture's middle, in the window */
     int is_zero_to_one;
     int32_t *others;

@@ -19,15 +19,19 @@ static __attribute__((noinline)) void draw_with_care(meshlet_batch *s, const tl_
 {
     enum { TAIL = TL_CLUSTER_TAIL };
     const tl_meshlet_pass *pass = s->pass;
-    float points[3 * (TL_MESHLET_VERTICES + TAIL)];
+    float points32[3 * (TL_MESHLET_VERTICES + TAIL)];
+    double points64[3 * (TL_MESHLET_VERTICES + TAIL)];
     tl_vertex vertices[TL_MESHLET_VERTICES + TAIL];
     int32_t triangles[3 * (TL_MESHLET_ROOM + TL_MAX_LANES)], names[TL_MESHLET_ROOM + TL_MAX_LANES];
     int64_t n = 0;
     for (int i = 0; i < TL_MESHLET_VERTICES; i++)
-        points[3 * i] = m->x[i], points[3 * i + 1] = m->y[i], points[3 * i + 2] = m->z[i];
-    memset(points + 3 * TL_MESHLET_VERTICES, 0, 3 * TAIL * sizeof *points);
+        points32[3 * i] = m->x[i], points32[3 * i + 1] = m->y[i], points32[3 * i + 2] = m->z[i];
+    memset(points32 + 3 * TL_MESHLET_VERTICES, 0, 3 * TAIL * sizeof *points32);
+    for (int i = 0; s->is_f64 && i < 3 * (TL_MESHLET_VERTICES + TAIL); i++)
+        points64[i] = (double)points32[i];
     tl_source source = *pass->source;
-    source.data = points, source.n = TL_MESHLET_VERTICES + TAIL;
+    source.data = s->is_f64 ? (const void *)points64 : (const void *)points32;
+    source.n = TL_MESHLET_VERTICES + TAIL;
     pass->kernels->project(&source, 0, TL_MESHLET_VERTICES, pass->view, vertices, NULL);
     for (int i = 0; i < TL_MESHLET_ROOM; i++) {
         if (!(which[i >> 6] >> (i & 63) & 1) || m->corners[0][i] == m->corners[1][i]) /* or an empty one */
@@ -47,7 +51,10 @@ static __attribute__((noinline)) void draw_with_care(meshlet_batch *s, const tl_
         return;
     memset(triangles + 3 * n, 0, 3 * TL_MAX_LANES * sizeof *triangles);
     const tl_snapped snapped = {
-        .mesh = {.vertices = vertices, .n_vertices = TL_MESHLET_VERTICES},
+        .mesh = {.vertices = vertices,
+                 .n_vertices = TL_MESHLET_VERTICES,
+                 .sample_x_fx = pass->sample_x_fx,
+                 .sample_y_fx = pass->sample_y_fx},
         .triangles = triangles,
         .n_triangles = n,
         .cull = pass->seen->cull,

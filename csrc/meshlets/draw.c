@@ -80,10 +80,18 @@ static void draw_batch_of_meshlets(meshlet_batch *s)
 
 static inline int32_t in_slot(int32_t px) { return px < 0 ? 0 : px > 255 ? 255 : px; }
 
+static __attribute__((noinline)) vi snap_slot_f64(meshlet_batch *s, meshlet_slot *slot)
+{
+    return snap_slot(s, slot, 0, 1);
+}
+
 static __attribute__((noinline)) void draw_on_32_bits(meshlet_batch *s, meshlet_slot *slot)
 {
     s->is_too_far = 0;
-    snap_slot(s, slot, 1);
+    if (s->is_f64)
+        snap_slot(s, slot, 1, 1);
+    else
+        snap_slot(s, slot, 1, 0);
     if (s->is_too_far) {
         const uint64_t all[2] = {UINT64_MAX, UINT64_MAX};
         draw_with_care(s, slot->meshlet, all);
@@ -105,7 +113,7 @@ TL_INLINE void draw_meshlet(meshlet_batch *s, tl_seen_meshlet at)
     slot->alone[0] = slot->alone[1] = 0;
     slot->name0 = (int32_t)(m->names - (const int32_t *)s->meshlets);
     slot->base = (at.below_px - 1) * s->stride_px + at.left_px;
-    const vi any = snap_slot(s, slot, 0);
+    const vi any = s->is_f64 ? snap_slot_f64(s, slot) : snap_slot(s, slot, 0, 0);
     if (__builtin_expect(vm_any(vi_any_bit(any, vi_set1(~(INT16_MAX >> s->fine_bits)))), 0)) {
         draw_on_32_bits(s, slot);
         return;
@@ -161,9 +169,13 @@ static void start_meshlets(meshlet_batch *s, const tl_meshlet_pass *pass, int32_
     s->row0 = row0, s->row1 = row1, s->first_id = pass->first_id;
     s->is_farthest = pass->target->sink == TL_SINK_FARTHEST;
     s->fine_bits = TL_PX_BITS - window->subpixel_bits;
-    memcpy(s->matrix, pass->source->matrix, sizeof s->matrix);
+    s->is_f64 = pass->source->scalar == TL_F64;
+    memcpy(s->is_f64 ? (void *)s->matrix64 : (void *)s->matrix, pass->source->matrix,
+           s->is_f64 ? sizeof s->matrix64 : sizeof s->matrix);
     s->scale_x = pass->seen->scale_x, s->scale_y = pass->seen->scale_y;
-    s->x_fx = s->scale_x - unit * (double)window->x_px, s->y_fx = s->scale_y - unit * (double)window->y_px;
+    /* a sample off the centre sees what the centre sees of vertices that have moved the other way */
+    s->x_fx = s->scale_x - unit * (double)window->x_px - (double)pass->sample_x_fx;
+    s->y_fx = s->scale_y - unit * (double)window->y_px - (double)pass->sample_y_fx;
     s->is_zero_to_one = pass->view->zero_to_one;
     s->n_slots = s->n_fragments = s->small.n = s->middle.n = s->rows.n = 0;
     memset(s->sample, 0, sizeof s->sample); /* what is prefetched behind the end of the list */

@@ -30,13 +30,14 @@ typedef struct {
 #define TL_LARGEST_W 0x1p60
 #define TL_MAX_PX 16000 /* from the window's corner: where 16 bits hold pixels, and sub-pixels are certain */
 
-/* A view in float32. */
+/* A view in float32.  A matrix of float64 is rounded here, by 2^-24 of each term, and its vertex stage errs by less:
+ * together by less than a vertex stage of float32. */
 typedef struct {
     float row[4][4];
     lane_form forms[TL_N_FORMS];
     float eye[3], eye_w, eye_factor, eye_error;
     float length[3], terms[4];
-    float scale[2], half_px[2], origin_px[2], sample_px[2], pixel;
+    float scale[2], half_px[2], origin_px[2], pixel;
     int is_zero_to_one, is_farthest;
 } lane_view;
 
@@ -84,10 +85,11 @@ static lane_view place_view(const tl_meshlet_pass *pass)
         l.length[i] = (float)(v->length[i] * 1.0001);
     l.scale[0] = (float)v->scale_x, l.scale[1] = (float)v->scale_y;
     l.half_px[0] = (float)v->half_width_px, l.half_px[1] = (float)v->half_height_px;
-    l.origin_px[0] = (float)(v->half_width_px - (double)pass->window->x_px);
-    l.origin_px[1] = (float)(v->half_height_px - (double)pass->window->y_px);
-    l.sample_px[0] = (float)v->sample_px[0], l.sample_px[1] = (float)v->sample_px[1];
-    l.pixel = (float)(v->half_width_px / v->scale_x); /* a sub-pixel */
+    const double pixel = v->half_width_px / v->scale_x; /* a sub-pixel */
+    /* a pixel begins half a pixel before its sample, wherever that lies */
+    l.origin_px[0] = (float)(v->half_width_px - (double)pass->window->x_px - pixel * (double)pass->sample_x_fx);
+    l.origin_px[1] = (float)(v->half_height_px - (double)pass->window->y_px - pixel * (double)pass->sample_y_fx);
+    l.pixel = (float)pixel;
     l.is_zero_to_one = v->zero_to_one, l.is_farthest = v->is_farthest;
     return l;
 }
@@ -151,15 +153,16 @@ TL_INLINE void place_reach(const lane_view *l, vf inverse_w, lane_bounds *b)
     b->moved = vf_fma(vf_max(moved[0], moved[1]), inverse_w, set(0.501f));
 }
 
-/* The meshlets that are certain to hold no sample.  Beside what corners move, `at` has errors: no more than those of
- * the vertex stage for the forms, and 0.013 pixels for the division and the sum, of numbers below 2^15. */
+/* The meshlets that are certain to hold no sample, each of which lies half a pixel from where `at` begins.  Beside what
+ * corners move, `at` has errors: no more than those of the vertex stage for the forms, and 0.013 pixels for the division
+ * and the sum, of numbers below 2^15. */
 TL_INLINE vm between_samples(const lane_view *l, const lane_bounds *b, const vf at[2])
 {
     vm between[2];
     for (int k = 0; k < 2; k++) {
         const vf far = vf_fma(vf_fma(b->reach[k], b->bound[TL_BOUND_RADIUS], vf_mul(b->moved, set(4.0f))),
                               set(l->pixel), set(0.03f));
-        const vf middle = vf_sub(at[k], set(l->sample_px[k]));
+        const vf middle = vf_sub(at[k], set(0.5f));
         const vf last = vf_from_vi(vi_floor(vf_add(middle, far)));
         between[k] = vf_lt(last, vf_sub(middle, far));
     }

@@ -18,19 +18,23 @@
 /* A number below 2^19, 1.5 * 2^20 added: the high word counts from here, the low word is the fraction. */
 #define TL_WORDS_OF 0x1.8p20
 #define TL_WORD0 0x41380000
-/* Fractions of 2^-32 that are too near to a half to tell: 1/w errs by 2^-47, and x/w is less than 2^23 sub-pixels. */
+/* Fractions of 2^-32 that are too near to a half to tell: 1/w errs by 2^-47, of a float64 w by 2^-46, and x/w is less
+ * than 2^23 sub-pixels. */
 #define TL_UNCERTAIN 1024
 
 /* The row and column of one vertex as project.c rounds them, in the picture's sub-pixels. */
 static void snap_exactly(const meshlet_batch *s, const tl_meshlet *m, int i, double *x, double *y)
 {
-    float p[4];
+    double p[4];
     for (int k = 0; k < 4; k++) {
         const float *row = s->matrix + 4 * k;
-        p[k] = ((row[0] * m->x[i] + row[1] * m->y[i]) + row[2] * m->z[i]) + row[3];
+        const double *row64 = s->matrix64 + 4 * k;
+        p[k] = s->is_f64
+                   ? ((row64[0] * (double)m->x[i] + row64[1] * (double)m->y[i]) + row64[2] * (double)m->z[i]) + row64[3]
+                   : (double)(((row[0] * m->x[i] + row[1] * m->y[i]) + row[2] * m->z[i]) + row[3]);
     }
-    *x = rint(((double)p[0] / (double)p[3] + 1.0) * s->scale_x);
-    *y = rint((1.0 - (double)p[1] / (double)p[3]) * s->scale_y);
+    *x = rint((p[0] / p[3] + 1.0) * s->scale_x);
+    *y = rint((1.0 - p[1] / p[3]) * s->scale_y);
 }
 
 TL_INLINE vf clip_row(const float *row, vf x, vf y, vf z)
@@ -39,9 +43,38 @@ TL_INLINE vf clip_row(const float *row, vf x, vf y, vf z)
     return vf_add(vf_add(sum, vf_mul(vf_set1(row[2]), z)), vf_set1(row[3]));
 }
 
+TL_INLINE vd clip_row_f64(const double *row, vd x, vd y, vd z)
+{
+    const vd sum = vd_add(vd_mul(vd_set1(row[0]), x), vd_mul(vd_set1(row[1]), y));
+    return vd_add(vd_add(sum, vd_mul(vd_set1(row[2]), z)), vd_set1(row[3]));
+}
+
+/* Sixteen vertices in clip space, transformed in float32 or in float64; returns w in float32. */
+TL_INLINE vf clip_vertices(const meshlet_batch *s, const tl_meshlet *m, int first, int is_f64, vd *p)
+{
+    const vf x = vf_load(m->x + first), y = vf_load(m->y + first), z = vf_load(m->z + first);
+    if (is_f64) {
+        for (int k = 0; k < 4; k++)
+            p[k] = clip_row_f64(s->matrix64 + 4 * k, vd_from_vf(x), vd_from_vf(y), vd_from_vf(z));
+        return vf_from_vd(p[3]);
+    }
+    const vf w = clip_row(s->matrix + 12, x, y, z);
+    for (int k = 0; k < 3; k++)
+        p[k] = vd_from_vf(clip_row(s->matrix + 4 * k, x, y, z));
+    p[3] = vd_from_vf(w);
+    return w;
+}
+
+/* z/w, correctly rounded, where 1/w is known to 2^-47: of float32 numbers as one_quotient in lanes_avx512.h. */
+TL_INLINE vd depth_quotient(vd z, vd w, vd inverse, int is_f64)
+{
+    const vd q = vd_mul(z, inverse);
+    return is_f64 ? vd_div(z, w) : vd_fma(vd_fnma(q, w, z), inverse, q);
+}
+
 /* Snaps the vertices of a slot, as 16-bit pairs or as 32-bit numbers.  Returns the bits of all numbers before they are
  * shifted to the finer grid, which tell whether they fit. */
-TL_INLINE vi snap_slot(meshlet_batch *s, meshlet_slot *slot, int is_wide)
+TL_INLINE vi snap_slot(meshlet_batch *s, meshlet_slot *slot, int is_wide, int is_f64)
 {
     const tl_meshlet *m = slot->meshlet;
     const double unit = (double)(TL_PX >> s->fine_bits);
@@ -52,18 +85,14 @@ TL_INLINE vi snap_slot(meshlet_batch *s, meshlet_slot *slot, int is_wide)
     uint64_t uncertain = 0;
 #pragma GCC unroll 4
     for (int k = 0; k < 4; k++) {
-        const vf x = vf_load(m->x + 16 * k), y = vf_load(m->y + 16 * k), z = vf_load(m->z + 16 * k);
-        const vf w32 = clip_row(s->matrix + 12, x, y, z);
-        const vd clip_x = vd_from_vf(clip_row(s->matrix, x, y, z)),
-                 clip_y = vd_from_vf(clip_row(s->matrix + 4, x, y, z));
-        const vd clip_z = vd_from_vf(clip_row(s->matrix + 8, x, y, z)), w = vd_from_vf(w32);
+        vd p[4];
+        const vf w32 = clip_vertices(s, m, 16 * k, is_f64, p);
         vd inverse = vd_from_vf(vf_div(vf_set1(1.0f), w32));
-        inverse = vd_fma(inverse, vd_fnma(w, inverse, one), inverse); /* 1/w to 2^-47 */
-        vd q = vd_mul(clip_z, inverse);
-        q = vd_fma(vd_fnma(q, w, clip_z), inverse, q); /* correctly rounded, as one_quotient in lanes_avx512.h */
+        inverse = vd_fma(inverse, vd_fnma(p[3], inverse, one), inverse); /* 1/w to 2^-47, of float64 to 2^-46 */
+        const vd q = depth_quotient(p[2], p[3], inverse, is_f64);
         vi x_fx, x_rest, y_fx, y_rest, z_low, z_high;
-        vd_part_words(vd_fma(vd_mul(clip_x, inverse), scale_x, add_x), &x_rest, &x_fx);
-        vd_part_words(vd_fma(vd_mul(clip_y, inverse), scale_y, add_y), &y_rest, &y_fx);
+        vd_part_words(vd_fma(vd_mul(p[0], inverse), scale_x, add_x), &x_rest, &x_fx);
+        vd_part_words(vd_fma(vd_mul(p[1], inverse), scale_y, add_y), &y_rest, &y_fx);
         vd_part_words(s->is_zero_to_one ? q : vd_mul(vd_add(q, one), half), &z_low, &z_high);
         x_fx = vi_sub(x_fx, vi_set1(TL_WORD0)), y_fx = vi_sub(y_fx, vi_set1(TL_WORD0));
         const vi near_by = vi_set1(TL_UNCERTAIN), range = vi_set1(2 * TL_UNCERTAIN);

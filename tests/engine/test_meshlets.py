@@ -110,6 +110,7 @@ def drawn(monkeypatch):
     draw = ClusteredMesh.draw_meshlets
     monkeypatch.setattr(choices, "pays_to_grow", lambda *_: True)
     monkeypatch.setattr(choices, "pays_to_draw_meshlets", lambda *_: True)
+    monkeypatch.setattr(choices, "pays_to_draw_samples", lambda *_: True)
     monkeypatch.setattr(ClusteredMesh, "draw_meshlets", lambda *a: pictures.append(1) or draw(*a))
     return pictures
 
@@ -141,9 +142,10 @@ def test_many_triangles_a_pixel_have_the_same_bits(name, drawn):
 
 @needs_meshlets
 @pytest.mark.parametrize("name", MESHES)
-def test_picture_has_the_same_bits(name, drawn):
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_picture_has_the_same_bits(name, dtype, drawn):
     rng = np.random.default_rng(17)
-    mesh = MESHES[name]
+    mesh = MESHES[name][0].astype(dtype), MESHES[name][1]
     clusters = Clusters(*mesh)
     n_seen = 0
     for i, view in enumerate(cameras(rng, 150)):
@@ -156,6 +158,33 @@ def test_picture_has_the_same_bits(name, drawn):
             assert_same(got.barycentric(), expected.barycentric())
     assert len(drawn) == 150
     assert n_seen > 40
+
+
+def sampled(rng, views):
+    """The same views with several samples a pixel, on a grid that these lie on."""
+    for view in views:
+        sampling = str(rng.choice(["msaa2", "msaa4", "msaa4", "msaa8", "msaa16"]))
+        yield view | {"sampling": sampling, "subpixel_bits": int(rng.choice([4, 5, 7, 8, 8, 8]))}
+
+
+@needs_meshlets
+@pytest.mark.parametrize("name", MESHES)
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_each_sample_has_the_same_bits(name, dtype, drawn):
+    rng = np.random.default_rng(23)
+    mesh = MESHES[name][0].astype(dtype), MESHES[name][1]
+    clusters = Clusters(*mesh)
+    n_planes = 0
+    for i, view in enumerate(sampled(rng, cameras(rng, 40))):
+        test, size = ("less", "greater")[i % 4 == 0], (SIZE, (37 + 5 * i, 11 + 3 * i))[i % 3 == 0]
+        expected = draw(mesh, None, test, size, threads=1, **view)
+        got = draw(mesh, clusters, test, size, threads=THREADS[i % len(THREADS)], **view)
+        assert_same(got.samples_triangle, expected.samples_triangle)
+        assert_same(got.samples_depth.view(np.int32), expected.samples_depth.view(np.int32))
+        n_planes += got.samples_triangle.shape[-1]
+        if i % 8 == 0:
+            assert_same(got.sample(-1).barycentric(), expected.sample(-1).barycentric())
+    assert len(drawn) == n_planes
 
 
 @needs_meshlets
@@ -250,25 +279,35 @@ def test_mesh_is_grown_when_it_has_been_drawn_often(monkeypatch):
 
 @needs_meshlets
 @pytest.mark.parametrize(
-    ("options", "dtype"),
+    ("options", "is_float32"),
     [
-        ({"cull": "back"}, np.float64),
-        ({"cull": "back", "near_clip": False}, np.float32),
-        ({"cull": "back", "subpixel_bits": 9}, np.float32),
-        ({"cull": "back", "viewport": (20_000, 120)}, np.float32),
-        ({"cull": "back", "origin": (-20_000, 0)}, np.float32),
+        ({"cull": "back"}, False),
+        ({"cull": "back", "near_clip": False}, True),
+        ({"cull": "back", "subpixel_bits": 9}, True),
+        ({"cull": "back", "subpixel_bits": 3, "sampling": "msaa4"}, True),
+        ({"cull": "back", "viewport": (20_000, 120)}, True),
+        ({"cull": "back", "origin": (-20_000, 0)}, True),
     ],
 )
-def test_what_meshlets_cannot_draw_is_left_to_clusters(options, dtype):
-    assert choices.can_draw_meshlets(View.parse(SIZE, {"cull": "back"}), Sink.NEAREST, np.dtype(np.float32))
-    assert not choices.can_draw_meshlets(View.parse(SIZE, options), Sink.NEAREST, np.dtype(dtype))
+def test_what_meshlets_cannot_draw_is_left_to_clusters(options, is_float32):
+    assert choices.can_draw_meshlets(View.parse(SIZE, {"cull": "back"}), Sink.NEAREST, is_float32=True)
+    assert not choices.can_draw_meshlets(View.parse(SIZE, options), Sink.NEAREST, is_float32=is_float32)
+
+
+@pytest.mark.parametrize("number", [0.1, 1e300, 1 + 2.0**-24, np.nan])
+def test_coordinates_are_float32_numbers_or_not(number):
+    points, triangles = np.zeros((3, 3)), np.zeros((1, 3), np.int32)
+    points[1] = 0.5, -(2.0**-140), np.inf
+    assert Clusters(points, triangles).is_float32
+    points[2, 1] = number
+    assert not Clusters(points, triangles).is_float32
 
 
 def test_scalar_kernels_have_no_meshlets():
     with on("scalar"):
         assert not _engine.has_meshlets()
         view = View.parse(SIZE, {"cull": "back"})
-        assert not choices.can_draw_meshlets(view, Sink.NEAREST, np.dtype(np.float32))
+        assert not choices.can_draw_meshlets(view, Sink.NEAREST, is_float32=True)
 
 
 @pytest.mark.parametrize(

@@ -310,7 +310,7 @@ def test_plan_of_a_mesh_tells_of_its_meshlets_and_counts_their_bytes(cull, is_wh
     ("n_triangles", "options", "why"),
     [
         (500, {}, "done before sorting"),
-        (60_000, {"sampling": "msaa4"}, "several samples"),
+        (60_000, {"sampling": "msaa4", "subpixel_bits": 2}, "finer grid"),
         (60_000, {"depth_test": None}, "order of the triangles"),
         (60_000, {"cull": "back"}, "most of the mesh shows"),
         (60_000, {"outputs": "coverage"}, "arrays, which may change"),
@@ -320,6 +320,25 @@ def test_plan_of_a_mesh_tells_why_it_is_drawn_whole(n_triangles, options, why):
     mesh = tl.Mesh(*tl.scenes.blob(n_triangles))
     row = stage(tl.plan(mesh, tl.Camera.framing(mesh), (320, 240), **options), "clusters")
     assert (row.choice, why in row.why) == ("none", True)
+
+
+def test_plan_of_several_samples_tells_of_a_plane_of_each():
+    mesh = tl.Mesh(*tl.scenes.blob(150_000))
+    camera = tl.Camera.look_at((0, 0, 3), near=0.01, far=100.0)
+    two, eight = (tl.plan(mesh, camera, (320, 240), sampling=f"msaa{n}", threads=1) for n in (2, 8))
+    assert stage(eight, "clusters").choice == stage(two, "clusters").choice != "none"
+    assert stage(eight, "sampling").choice == "8 samples a pixel, a picture of each"
+    assert eight.result_bytes == {"triangle": 8 * 4 * 320 * 240, "depth": 8 * 4 * 320 * 240}
+    assert not {"bins", "bands", "samples of bands"} & set(eight.scratch_bytes)
+    assert 3 * two.estimated_ms < eight.estimated_ms < 4 * two.estimated_ms
+    frags = tl.rasterize(
+        mesh.vertices, mesh.triangles, (320, 240), transform=camera.clip_from_world((320, 240)),
+        sampling="msaa8", plan=eight,
+    )  # fmt: skip
+    assert frags._split is None
+    whole = tl.plan(mesh, camera, (1920, 1080), sampling="msaa8", cull="back")
+    assert stage(whole, "clusters").choice == "none"
+    assert "samples of bands" in whole.scratch_bytes
 
 
 def test_plan_of_a_mesh_draws_its_clusters_and_no_other_vertices():

@@ -25,6 +25,7 @@ def however_little_it_pays(monkeypatch):
     """Views are drawn in clusters even where that does not pay."""
     monkeypatch.setattr(choices, "pays_to_draw_clusters", lambda *_: True)
     monkeypatch.setattr(choices, "pays_to_draw_instances", lambda *_: True)
+    monkeypatch.setattr(choices, "pays_to_draw_samples", lambda *_: True)
 
 
 def meshes():
@@ -106,6 +107,31 @@ def test_picture_has_the_same_bits(name, dtype):
             assert_same(got.barycentric(), expected.barycentric())
             assert_same(got.interpolate(mesh[0]), expected.interpolate(mesh[0]))
     assert n_drawn > 30
+
+
+def draw_forms(clusters, mesh, view, depth_test):
+    """What several samples see: ids, depth, and attributes of the first and the last."""
+    frags = draw(mesh, clusters, depth_test, **view)
+    found = [frags.samples_triangle, frags.samples_depth.view(np.int32), frags.triangle, frags.depth]
+    for sample in (frags, frags.sample(-1)):
+        found += [sample.barycentric(), sample.interpolate(mesh[0])]
+    return found
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize("name", ["blob", "torus-knot", "soup"])
+def test_each_sample_has_the_same_bits(isa, name):
+    rng = np.random.default_rng(31)
+    meshes_of = {dtype: as_arrays(name, dtype) for dtype in (np.float32, np.float64)}
+    clusters_of = {dtype: Clusters(*mesh) for dtype, mesh in meshes_of.items()}
+    with on(isa):
+        for i, view in enumerate(cameras(rng, 40)):
+            dtype, test = (np.float32, np.float64)[i % 2], ("less", "greater")[i % 5 == 0]
+            view |= {"sampling": str(rng.choice(["msaa2", "msaa4", "msaa8", "msaa16"]))}
+            expected = draw_forms(None, meshes_of[dtype], view | {"threads": 1}, test)
+            got = draw_forms(clusters_of[dtype], meshes_of[dtype], view | {"threads": THREADS[i % len(THREADS)]}, test)
+            for one, other in zip(got, expected, strict=True):
+                assert_same(one, other)
 
 
 @ON_EACH_ISA

@@ -16,6 +16,8 @@ from topleft._render.through_lens import scene_through
 SIZE = (160, 120)
 CAMERA = tl.Camera.look_at((0, 0, 3), near=0.01, far=100.0)
 
+MATRIX = CAMERA.clip_from_world(SIZE)
+
 
 def as_floats(vertices, triangles):
     return vertices.astype(np.float32), triangles.astype(np.int32)
@@ -41,6 +43,49 @@ FINE = as_floats(*tl.scenes.blob(300_000))
 def test_clusters_are_drawn_where_enough_is_left_out(n, cull, outside, front, pays):
     view = View.parse(SIZE, {"cull": cull})
     assert choices.pays_to_draw_clusters(view, n, Survey(outside, 0.0, 1 - outside - front, front)) == pays
+
+
+FROM_CLUSTERS, FROM_MESHLETS = choices.ClusterRoute.CLUSTERS, choices.ClusterRoute.MESHLETS
+
+
+@pytest.mark.parametrize(
+    ("route", "n", "cull", "outside", "front", "beyond", "pays"),
+    [
+        (FROM_CLUSTERS, 300_000, "none", 0.0, 0.4, 0.0, True),
+        (FROM_CLUSTERS, 100_000, "none", 0.0, 0.4, 0.0, False),  # too few for the pixels
+        (FROM_CLUSTERS, 300_000, "none", 0.0, 0.9, 0.0, False),  # most show
+        (FROM_CLUSTERS, 1_000_000, "back", 0.0, 0.4, 0.0, False),
+        (FROM_CLUSTERS, 10_000_000, "back", 0.0, 0.4, 0.0, True),
+        (FROM_CLUSTERS, 300_000, "back", 0.95, 0.0, 0.5, True),  # from inside
+        (FROM_CLUSTERS, 300_000, "back", 0.95, 0.0, 0.0, False),
+        (FROM_CLUSTERS, 300_000, "back", 0.5, 0.4, 0.5, False),
+        (FROM_MESHLETS, 100_000, "none", 0.0, 0.4, 0.0, True),
+        (FROM_MESHLETS, 300_000, "back", 0.0, 0.4, 0.0, False),
+        (FROM_MESHLETS, 1_000_000, "back", 0.0, 0.4, 0.0, True),
+        (FROM_MESHLETS, 1_000_000, "back", 0.95, 0.0, 0.0, False),
+    ],
+)
+def test_samples_are_drawn_from_clusters_where_triangles_are_many(route, n, cull, outside, front, beyond, pays):
+    view, survey = View.parse((1920, 1080), {"cull": cull, "sampling": "msaa4"}), Survey(outside, 0.0, 0.0, front)
+    assert choices.pays_to_draw_samples(route, view, n, survey, lambda: beyond) == pays
+
+
+@pytest.mark.parametrize("clip_depth", ["minus_one_to_one", "zero_to_one"])
+def test_vertices_beyond_near_and_far_are_counted(clip_depth):
+    points = np.array([[0, 0, z] for z in (-3, -1.5, -0.5, 0.5, 0.75, 2)], np.float32)
+    clusters = Clusters(points, np.array([[0, 1, 2], [3, 4, 5]], np.int32))
+    view = View.parse(SIZE, {"transform": np.eye(4), "clip_depth": clip_depth})
+    assert ClusteredMesh(clusters, view).find_beyond() == (0.5 if clip_depth == "minus_one_to_one" else 4 / 6)
+
+
+def test_mesh_of_several_samples_is_drawn_from_clusters_where_they_pay():
+    mesh = tl.Mesh(*FINE)
+    mesh.note_drawn()
+    for cull, in_planes in (("none", True), ("back", False)):
+        frags = tl.rasterize_mesh(mesh, CAMERA, SIZE, sampling="msaa4", cull=cull)
+        assert (frags._split is None) == in_planes
+        expected = tl.rasterize(*FINE, SIZE, transform=MATRIX, sampling="msaa4", cull=cull)
+        assert (frags.samples_triangle == expected.samples_triangle).all()
 
 
 @pytest.mark.parametrize("cull", ["none", "back", "front"])

@@ -354,15 +354,15 @@ def test_bands_of_instances_share_the_rows(height, n):
     at = np.tile(np.eye(4), (10, 1, 1))
     at[:, 1, 3], at[:, 2, 3] = np.repeat([-2, -2, 0, 1, 90], 2), np.tile([0, 20], 5)
     standing = [tl.Instance(BALLS[0], matrix) for matrix in at]
-    placed = instances.place(tl.Scene(standing), camera, (60, height), {})[0]
+    seen = instances.place(tl.Scene(standing), camera, (60, height), {})[0]
     for some in (range(10), (0, 2), (8,), (1, 3, 5), (4, 4, 4)):
-        tops = placed.split_rows(np.array(some), height, n)
+        tops = seen.split_rows(np.array(some), height, n)
         assert tops[0] == 0
         assert tops[-1] == height
         assert len(tops) == n + 1
         assert min(np.diff(tops)) >= 1
     if n == 2:
-        assert placed.split_rows(np.arange(0, 8, 2), height, n)[1] in range(20, 30)  # two at -2, one in the middle
+        assert seen.split_rows(np.arange(0, 8, 2), height, n)[1] in range(20, 30)  # two at -2, one in the middle
 
 
 @pytest.mark.parametrize("instance", [3, b"cube", (CUBE,), None, [CUBE, CUBE], tl.Scene([CUBE])])

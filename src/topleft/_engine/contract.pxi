@@ -212,7 +212,7 @@ cdef extern from "topleft.h" nogil:
         const tl_window *window
         const tl_target *target
         const tl_kernels *kernels
-        int32_t first_id
+        int32_t first_id, sample_x_fx, sample_y_fx
     ctypedef struct tl_meshlet_kernels:
         int64_t (*grow)(const tl_source *, const int32_t *, const int32_t *, int64_t, int64_t, int32_t *, void *, tl_meshlet *,
                         float *, uint8_t *) noexcept nogil

@@ -37,7 +37,7 @@ def grow_meshlets(Source source, const int32_t[:, ::1] triangles, const int32_t[
 
 
 cdef class Grown:
-    """A mesh of float32 vertices in object space, grown into meshlets; keeps what it points to alive."""
+    """A mesh in object space whose coordinates are float32 numbers, grown into meshlets; keeps what it points to alive."""
 
     cdef tl_meshlets mesh
     cdef object arrays
@@ -129,4 +129,5 @@ cdef class MeshletPass:
         drawn.mesh, drawn.seen, drawn.source = &self.meshlets.mesh, &self.seen.view, &self.source.source
         drawn.view, drawn.window, drawn.target, drawn.kernels = &self.mesh.viewport.view, window, target, K
         drawn.first_id = self.mesh.snapped.first_id
+        drawn.sample_x_fx, drawn.sample_y_fx = self.mesh.snapped.mesh.sample_x_fx, self.mesh.snapped.mesh.sample_y_fx
         return drawn

@@ -17,8 +17,8 @@ from topleft._base.memory import FRESH, empty
 from topleft._base.options import DepthTest, Sampling, Sink
 from topleft._model.mesh import Mesh
 from topleft._raster import choices
-from topleft._raster.choices import Drawing, Route
-from topleft._raster.cluster_draw import ClusteredMesh
+from topleft._raster.choices import ClusterRoute, Drawing, Route
+from topleft._raster.cluster_draw import SURVEYED, SURVEYED_OF_SAMPLES, ClusteredMesh
 from topleft._raster.clusters import Clusters
 from topleft._raster.sampling import area_cells, sample_positions, split_bytes
 from topleft._raster.snap import Snapped, snap_mesh
@@ -122,9 +122,20 @@ class Facts:
         return self.view.sampling.n_samples > 1 and self.verb in ("rasterize", "fill")
 
     @property
+    def draws_bands(self) -> bool:
+        """Whether each sample is a picture of its own, drawn band after band of rows."""
+        return self.draws_planes and not self.in_clusters
+
+    @property
     def is_split(self) -> bool:
         """Whether the samples of pixels that show one triangle are kept once."""
-        return self.verb == "rasterize" and choices.can_split(self.view, self.n_triangles)
+        can_split = self.verb == "rasterize" and choices.can_split(self.view, self.n_triangles)
+        return can_split and not self.in_clusters
+
+    @property
+    def in_clusters(self) -> bool:
+        """Whether a mesh is drawn cluster by cluster, each sample a picture of its own."""
+        return self.clusters is not None and self.clusters.clusters is not None
 
     @property
     def is_shared(self) -> bool:
@@ -247,19 +258,21 @@ def find_cluster_facts(mesh: Mesh, view: View, verb: str, test: DepthTest | None
     n_triangles = len(mesh.triangles)
     if verb != "rasterize":
         return ClusterFacts(None, f"{verb} draws arrays, which may change")
-    if view.sampling is not Sampling.CENTER:
-        return ClusterFacts(None, "with several samples a pixel, bands of rows are drawn, a sample after the other")
     sink = choices.fragment_sink(test, has_depth=True)
     if view.is_exact:
         return ClusterFacts(None, "vertices that are not snapped are drawn from beginning to end")
+    if view.grid_bits != view.subpixel_bits:
+        return ClusterFacts(None, "samples lie on a finer grid than the vertices")
     if not choices.can_cluster(view, sink):
         return ClusterFacts(None, "the order of the triangles matters, or the window lies too far off")
     if not choices.pays_to_cluster(n_triangles, 1):
         return ClusterFacts(None, f"{n_triangles:,} triangles are done before sorting them would pay")
     clusters = mesh.clusters
     seen = ClusteredMesh(clusters, view)
-    pays, n = choices.pays_to_draw_clusters(view, n_triangles, seen.survey()), len(clusters)
-    can_grow = choices.can_draw_meshlets(view, sink, clusters.points.dtype)
+    few = seen.survey(SURVEYED_OF_SAMPLES if view.sampling.n_samples > 1 else SURVEYED)
+    n, beyond = len(clusters), seen.find_beyond
+    pays = choices.pays_to_draw_from(ClusterRoute.CLUSTERS, view, n_triangles, few, 0.0, beyond)
+    can_grow = choices.can_draw_meshlets(view, sink, is_float32=clusters.is_float32)
     can_grow = can_grow and choices.pays_to_grow(choices.MIN_PICTURES_TO_GROW, n_triangles, n)
     if not (pays or can_grow):
         return ClusterFacts(None, MOST_SHOWS)
@@ -267,7 +280,8 @@ def find_cluster_facts(mesh: Mesh, view: View, verb: str, test: DepthTest | None
     n_outside, n_turned, n_drawn = round(found.outside * n), round(found.turned * n), seen.count_drawn(sink)
     n_hidden = n - n_outside - n_turned - n_drawn
     hidden = n_hidden / max(1, n_hidden + n_drawn)
-    is_grown = can_grow and choices.pays_to_draw_meshlets(view, n_triangles, found, hidden)
+    drawn_from = ClusterRoute.MESHLETS, view, n_triangles, found, hidden, beyond
+    is_grown = can_grow and choices.pays_to_draw_from(*drawn_from)
     meshlet_bytes = bytes_of_meshlets(clusters) if is_grown else 0
     if not pays:
         return ClusterFacts(None, MOST_SHOWS, meshlet_bytes=meshlet_bytes)
@@ -308,12 +322,11 @@ def memory_of(facts: Facts) -> tuple[dict[str, int], dict[str, int]]:
         scratch["labels"] = 4 * n_pixels
     elif facts.is_split:
         scratch |= split_bytes(n, (height, width), n_samples, facts.drawing.n_threads)[0]
-    elif facts.draws_planes and not is_empty and n and choices.can_share(view) and not facts.is_few:
+    elif facts.draws_bands and not is_empty and n and choices.can_share(view) and not facts.is_few:
         scratch["bins"] = 12 * (n + 16)
         scratch["bands"] = 4 * (n + 1)
     found = facts.clusters
-    is_whole = found is None or found.clusters is None
-    if facts.route is Route.DEPTH and facts.drawing.is_bounded and is_whole:
+    if facts.in_clusters or (facts.route is Route.DEPTH and facts.drawing.is_bounded):
         rows, segments = _engine.Target.bounds_shape(height, width)
         scratch["bounds"] = 4 * rows * segments
     if found is not None and found.clusters is not None:  # the records are not needed, unless a plane cuts

@@ -69,11 +69,12 @@ def find_stages(facts: Facts, costs: Costs) -> tuple[Stage, ...]:
     stages = [plan_input(facts, costs), *plan_vertices(facts, costs), plan_arithmetic(facts), plan_cull(facts)]
     stages += [plan_method(facts, costs), *plan_sink(facts, costs)]
     stages += [plan_threads(facts, costs), plan_memory(facts, costs)]
-    return tuple(stages if facts.clusters is None else with_clusters(stages, facts.clusters))
+    n_samples = facts.view.sampling.n_samples
+    return tuple(stages if facts.clusters is None else with_clusters(stages, facts.clusters, n_samples))
 
 
-def with_clusters(stages: list[Stage], found: ClusterFacts) -> list[Stage]:
-    """Return the stages of a mesh that is drawn again, with one that tells what its clusters save."""
+def with_clusters(stages: list[Stage], found: ClusterFacts, n_samples: int) -> list[Stage]:
+    """Return the stages of a mesh that is drawn again, with one that tells what its clusters save, for each sample."""
     if found.clusters is None:
         stages[1:1] = [Stage("clusters", "none", found.why_not, timed_in="method"), *plan_meshlets(found)]
         return stages
@@ -89,13 +90,13 @@ def with_clusters(stages: list[Stage], found: ClusterFacts) -> list[Stage]:
     row = Stage("clusters", choice, why, rejected, timed_in="method")
     vertex_stages = ("transform", "clip", "snap")
     share = found.n_drawn / max(1.0, found.n_drawn + LEFT_OUT_SHARE * (n - found.n_drawn))
-    total = CLUSTER_TEST_NS * n / 1e6
+    total = CLUSTER_TEST_NS * n_samples * n / 1e6
     scaled = []
     for stage in stages:
         if stage.name == "input":
             scaled.append(replace(stage, choice="a copy of the mesh, sorted and checked once", rejected=()))
         elif stage.name in vertex_stages:
-            total += (stage.estimated_ms or 0.0) * share
+            total += n_samples * (stage.estimated_ms or 0.0) * share
             scaled.append(replace(stage, estimated_ms=None, timed_in="method"))
         elif stage.name == "method":
             total += (stage.estimated_ms or 0.0) * share
@@ -319,6 +320,9 @@ def plan_sink(facts: Facts, costs: Costs) -> Iterator[Stage]:
              Sampling.INNER: "squares that are held"}  # fmt: skip
     rejected = () if n == 1 else ("a full draw for each sample: setup, culling and boxes are shared",)
     choice, why = names.get(view.sampling, f"{n} samples a pixel"), f"sampling={str(view.sampling)!r} was asked for"
+    if n > 1 and facts.in_clusters:
+        choice = f"{choice}, a picture of each"
+        rejected = ("all samples of a band of rows before the next: the whole mesh would be snapped and sorted first",)
     yield Stage("sampling", choice, why, rejected, timed_in="method")
     if facts.is_direct or (facts.is_few and facts.verb == "fill"):
         why = "triangles are few for the picture: their colours go straight to it"

@@ -97,6 +97,12 @@ class Clusters:
         self.n_bytes = sum(array.nbytes for array in arrays)
 
     @cached_property
+    def is_float32(self) -> bool:
+        """Whether all coordinates are float32 numbers, as those of most files are, whatever their dtype."""
+        with np.errstate(over="ignore"):
+            return bool((self.points == self.points.astype(np.float32)).all())
+
+    @cached_property
     def meshlets(self) -> Meshlets:
         """The same triangles in meshlets, made when they are first asked for (`pays_to_grow` in `choices.py`)."""
         return Meshlets(self)
@@ -145,8 +151,8 @@ class Meshlets:
     """
 
     def __init__(self, clusters: Clusters) -> None:
-        """Grow the triangles of clusters with float32 points, in the order that these have along a curve."""
-        points, triangles, order = clusters.points, clusters.triangles, clusters.order
+        """Grow the triangles of clusters with float32 numbers, in the order that these have along a curve."""
+        points, triangles, order = clusters.points.astype(np.float32, copy=False), clusters.triangles, clusters.order
         n = len(triangles)
         source = _engine.Source(points)
         n_pieces = -(-n // _engine.MESHLET_PIECE)

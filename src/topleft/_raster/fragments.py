@@ -136,7 +136,7 @@ class Fragments:
         return self._samples, self._planes
 
     def _set_planes(
-        self, ids: NDArray[np.int32], depth: NDArray[np.float32], meshes: Sequence[_engine.SnappedMesh]
+        self, ids: NDArray[np.int32], depth: NDArray[np.float32], meshes: Sequence[_engine.SnappedMesh | PartOfMesh]
     ) -> None:
         """Take ids and depth of several samples, (S, H, W), and the mesh as each sample sees it."""
         numbers = self._n_vertices, self._n_triangles
@@ -196,7 +196,7 @@ class Fragments:
         cls,
         triangle: NDArray[np.int32],
         depth: NDArray[np.float32],
-        meshes: Sequence[_engine.SnappedMesh],
+        meshes: Sequence[_engine.SnappedMesh | PartOfMesh],
         n_vertices: int,
         n_triangles: int,
     ) -> Fragments:

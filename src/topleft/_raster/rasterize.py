@@ -274,6 +274,9 @@ def draw_fragments(
     return ROUTES[route](memory, snapped, view, asked, drawing).drawn_from(corners)
 
 
+Buffers = tuple[NDArray[np.int32], NDArray[np.float32]]
+
+
 def draw_labels(memory: Memory, snapped: Snapped, view: View, asked: Asked, drawing: Drawing) -> Fragments:
     """Draw ids of triangles at depth 0, which is written when it is asked for."""
     with canvas_of(memory, "triangle", asked.ids_out, view.size[::-1], np.int32) as (ids, canvas):
@@ -319,16 +322,28 @@ def draw_samples(memory: Memory, snapped: Snapped, view: View, asked: Asked, dra
             snapped.refuse()
         view.mark("draw")
         return Fragments.of_split(split, snapped.n_vertices, snapped.n_triangles)
-    ids: NDArray[np.int32] = memory.empty("sample ids", (n, height, width), np.int32)
-    depth: NDArray[np.float32] = memory.empty("sample depth", (n, height, width), np.float32)
+    ids, depth = planes_of(memory, view)
     draw_all_samples(memory, snapped, view, positions, drawing, ids, depth)
     lay_background(ids, depth, drawing.sink, asked.background)
-    for name, out, planes in (("triangle", asked.ids_out, ids), ("depth", asked.depth_out, depth)):
-        if out is not None:
-            result = as_out(f"out {name}", out, (height, width, n), planes.dtype.type)
-            result[...] = np.moveaxis(planes, 0, -1)
+    copy_planes(ids, depth, asked)
     meshes = [snapped.mesh.seen_from(x, y) for x, y in positions.tolist()]
     return Fragments.of_samples(ids, depth, meshes, snapped.n_vertices, snapped.n_triangles)
+
+
+def planes_of(memory: Memory, view: View) -> Buffers:
+    """Return ids and depth of all samples to draw into, (S, H, W)."""
+    (width, height), n = view.size, view.sampling.n_samples
+    shape = n, height, width
+    return memory.empty("sample ids", shape, np.int32), memory.empty("sample depth", shape, np.float32)
+
+
+def copy_planes(ids: NDArray[np.int32], depth: NDArray[np.float32], asked: Asked) -> None:
+    """Write planes of samples to the arrays that a caller gave, (H, W, S)."""
+    for name, out, planes in (("triangle", asked.ids_out, ids), ("depth", asked.depth_out, depth)):
+        if out is not None:
+            n, height, width = planes.shape
+            result = as_out(f"out {name}", out, (height, width, n), planes.dtype.type)
+            result[...] = np.moveaxis(planes, 0, -1)
 
 
 ROUTES = {Route.LABELS: draw_labels, Route.FLAT: draw_flat, Route.DEPTH: draw_depth, Route.SAMPLES: draw_samples}
@@ -339,7 +354,7 @@ def draw_clusters(memory: Memory, vertices: ArrayLike, view: View, asked: Asked)
 
     None where there are no clusters, where drawing them does not pay, or where only the mesh can tell what is wrong.
     """
-    if view.plan is None or view.transform is None or view.sampling.n_samples > 1:
+    if view.plan is None or view.transform is None:
         return None
     sink = choices.fragment_sink(asked.test, has_depth=True)
     clusters = view.plan.find_clusters(vertices) if choices.can_cluster(view, sink) else None
@@ -352,16 +367,40 @@ def draw_clusters(memory: Memory, vertices: ArrayLike, view: View, asked: Asked)
     route = mesh.route(sink)
     if route is choices.ClusterRoute.WHOLE:
         return None
+    if view.sampling.n_samples > 1:
+        return draw_cluster_samples(memory, mesh, view, asked, sink, route)
     with buffers_of(memory, view, asked) as ((ids, depth), (ids_canvas, depth_canvas)):
         bounds = memory.empty("bounds", _engine.Target.bounds_shape(*ids_canvas.shape), np.float32)
-        if not mesh.draw(memory, _engine.Target(sink, ids_canvas, depth_canvas, None, bounds=bounds), route):
+        target = _engine.Target(sink, ids_canvas, depth_canvas, None, bounds=bounds)
+        if not mesh.draw(memory, target, route):
             return None
+        mesh.note_hidden(target)
         lay_background(ids_canvas, depth_canvas, sink, asked.background)
     view.mark("draw")
     return Fragments(ids, depth, mesh.part, len(clusters.points), clusters.n_triangles)
 
 
-Buffers = tuple[NDArray[np.int32], NDArray[np.float32]]
+def draw_cluster_samples(
+    memory: Memory, mesh: ClusteredMesh, view: View, asked: Asked, sink: Sink, route: choices.ClusterRoute
+) -> Fragments | None:
+    """Draw a mesh in clusters into a plane a sample, one after the other; None as `draw_clusters` returns it."""
+    (width, height), n = view.size, view.sampling.n_samples
+    check_fits((n, height, width), np.int32, np.float32)
+    samples = [(x, y) for x, y in sample_positions(n, view.grid_bits).tolist()]
+    memory = MemoryOf(memory, "samples")
+    ids, depth = planes_of(memory, view)
+    bounds = memory.empty("bounds", _engine.Target.bounds_shape(height, width), np.float32)
+    for plane, z, sample in zip(ids, depth, samples, strict=True):
+        target = _engine.Target(sink, plane, z, None, bounds=bounds)
+        if not mesh.draw(memory, target, route, sample):
+            return None
+    mesh.note_hidden(target)
+    lay_background(ids, depth, sink, asked.background)
+    view.mark("draw")
+    copy_planes(ids, depth, asked)
+    clusters = mesh.clusters
+    parts = mesh.parts_of_samples(ids, samples)
+    return Fragments.of_samples(ids, depth, parts, len(clusters.points), clusters.n_triangles)
 
 
 @contextmanager
