@@ -212,6 +212,10 @@ static inline int64_t tl_segments(int64_t width) { return (width + (1 << TL_SEGM
 #define TL_FEW_SLOTS 128
 #define TL_FEW_SPANS 4096
 
+#define TL_BLENDED_ROWS 32  /* of colours that are blended, a band */
+#define TL_BLENDED_RUNS 128 /* of a row of these */
+#define TL_FEW_BLENDED 16   /* triangles */
+
 /* How many are few, by what is done otherwise: bits are drawn; every triangle is stored over a background; labels are
  * drawn first, or samples averaged. */
 typedef enum { TL_FEW_OF_BITS = 2, TL_FEW_STORED = 4, TL_FEW_LABELLED = 64 } tl_few;
@@ -220,6 +224,12 @@ static inline int tl_are_few(int64_t n, int n_samples, int64_t width, int64_t he
     const int64_t px_each = most < TL_FEW_LABELLED ? (int64_t)1 << 18 : 4096 * (n_samples > 4 ? n_samples : 4);
     const int fits = n * n_samples <= TL_FEW_SLOTS && width >= 64 && width < INT32_MAX;
     return n <= (int64_t)most && fits && n * px_each <= width * height;
+}
+
+/* The same of flat colours that are blended over a background. */
+static inline int tl_few_are_blended(int64_t n, int64_t width, int64_t height)
+{
+    return n <= TL_FEW_BLENDED && width >= 64 && width < (1 << 25) && n << 18 <= width * height;
 }
 
 /* Bits of a label where those of a pixel's samples stand in one word.  No label has all of them set. */
@@ -328,10 +338,11 @@ typedef struct {
     int n_channels, is_u8, is_flat;
     tl_blend blend;
     int is_premultiplied;  /* colours hold alpha already; otherwise the last of 2 or 4 channels is alpha */
-    const uint8_t *ground; /* uint8: the colour that all pixels get first, or NULL: they stay as they are */
+    const uint8_t *ground; /* uint8 or is_few: the colour that all pixels get first, or NULL: they stay as they are */
+    int is_few;            /* flat triangles over a ground, at most TL_FEW_BLENDED, are drawn row by row */
     int is_area;           /* the share of the pixel that the triangle covers counts, not its centre */
     int64_t band_rows;     /* drawn at once, > 0: with fewer all triangles are set up more often */
-    int32_t *packed;       /* uint8 with other than 4 channels: room for the window, a row after the other */
+    int32_t *packed;       /* uint8 with other than 4 channels: room for the window; is_few: for TL_BLENDED_ROWS rows */
     int32_t *cells;        /* is_area: tl_blend_cells(width), all TL_CELL_CLEAR, and left so */
 } tl_canvas;
 

@@ -21,6 +21,7 @@
 #include "raster/rows.c"
 #include "blend/blend_area.c"
 #include "blend/blend_exact.c"
+#include "blend/blend_few.c"
 #include "blend/mix.c"
 #include "blend/mix.h"
 #include "blend/mix_u8.c"
@@ -29,21 +30,6 @@ typedef struct {
     batch_state batch; /* its queue `rows` holds what waits */
     blend_state mix;
 } blend_pass;
-
-/* Triangle i, or its pieces, by itself. */
-static __attribute__((noinline)) void blend_alone(blend_state *b, int64_t i)
-{
-    int32_t own[3];
-    const triangle_parts parts = parts_of(b->snapped, i, own);
-    if (!parts.n || (b->is_flat && !begin_flat(b, i)))
-        return;
-    for (int k = 0; k < parts.n; k++) {
-        const int32_t *corners = parts.corners + 3 * k;
-        if (!b->is_flat)
-            begin_gouraud(b, i, &parts.set, corners, parts.is_cut);
-        draw_triangle(&parts.set, corners, (int32_t)i, b->snapped, b->window, &b->target, TL_SINK_BLEND);
-    }
-}
 
 /* Row ends of TL_LANES triangles of at most 62 x 62 samples: see rows.c for why they are exact. */
 TL_INLINE void setup_blend_rows(const lane_triangles *t, vi n_cols, int n_rows, vi stride, blend_rows *rows)
@@ -164,12 +150,15 @@ static int64_t blend_window(const tl_snapped *snapped, const tl_window *window, 
     b->snapped = snapped, b->window = window, b->canvas = canvas;
     b->packed = canvas->is_u8 ? canvas->packed ? canvas->packed : canvas->pixels : NULL;
     b->floats = canvas->is_u8 ? NULL : canvas->pixels;
-    b->stride = canvas->packed ? window->width : canvas->stride_px;
+    b->stride = canvas->packed || canvas->is_few ? window->width : canvas->stride_px;
     b->n_samples = b->stride * (window->height - 1) + window->width;
     b->n_channels = canvas->n_channels, b->is_flat = canvas->is_flat, b->mode = mix_of(canvas);
     b->target = (tl_target){.sink = TL_SINK_BLEND, .pixels = b, .stride_px = b->stride, .n_samples = b->n_samples};
-    b->ground = canvas->ground ? packed_color(canvas->ground, canvas->n_channels) : 0;
+    b->ground = canvas->ground && canvas->is_u8 ? packed_color(canvas->ground, canvas->n_channels) : 0;
     b->n_laid = canvas->ground ? 0 : window->height;
+    b->few = NULL;
+    if (canvas->is_few)
+        return blend_few(b);
     if (snapped->mesh.exact || !canvas->is_area)
         lay_ground(b, window->height);
     for (int64_t row = 0; canvas->packed && !canvas->ground && row < window->height; row++)
@@ -200,7 +189,7 @@ static int64_t blend(const tl_snapped *snapped, const tl_window *window, const t
 {
     const int64_t pixel_bytes = canvas->n_channels * (canvas->is_u8 ? 1 : 4);
     const int64_t fitting = max64(1, (((int64_t)1 << 31) - 1) / canvas->stride_px);
-    const int64_t rows_at_once = min64(fitting, canvas->band_rows);
+    const int64_t rows_at_once = canvas->is_few ? window->height : min64(fitting, canvas->band_rows);
     for (int64_t row = 0; row < window->height; row += rows_at_once) {
         tl_window band = *window;
         tl_canvas part = *canvas;

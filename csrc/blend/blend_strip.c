@@ -22,6 +22,7 @@
 #include "area/ramp.c"
 #include "blend/mix.c"
 #include "blend/mix.h"
+#include "blend/mix_few.c"
 #include "blend/mix_f32.c"
 #include "blend/mix_u8.c"
 
@@ -32,6 +33,11 @@ TL_INLINE void mix_block(blend_state *b, int64_t at, vm m, vi sums, int is_u8, t
     const vm on = vm_and(m, vi_gt(area, vi_set1(0)));
     if (!vm_any(on))
         return;
+    if (b->few) {
+        const unsigned bits = vm_bits(on);
+        const int first = __builtin_ctz(bits);
+        take_aside(b, at + first, 32 - __builtin_clz(bits) - first);
+    }
     if (!b->is_flat) {
         const unsigned bits = vm_bits(on);
         const int first = __builtin_ctz(bits), n = 32 - __builtin_clz(bits) - first;

@@ -15,6 +15,7 @@
 #include "vertex/fixed.h"
 #include "exact/pieces_exact.c"
 #include "exact/sign.c"
+#include "raster/alone.c"
 #include "raster/setup.c"
 #include "raster/sink.c"
 #include "pixels/paint.c"
@@ -219,7 +220,8 @@ static void mix_runs(blend_state *b, const int32_t *first, const int32_t *n, int
         }
 }
 
-static void mix_run(struct blend_state *b, int64_t at, int64_t n)
+/* One of them, into pixels. */
+static void mix_pixels(blend_state *b, int64_t at, int64_t n)
 {
     /* long runs, mostly: 1.6 times as fast at 300 px */
     if (b->is_flat && b->canvas->is_u8 && b->whole_mode == TL_MIX_REPLACE) {
@@ -227,6 +229,21 @@ static void mix_run(struct blend_state *b, int64_t at, int64_t n)
         return;
     }
     mix_runs(b, &(int32_t){(int32_t)at}, &(int32_t){(int32_t)n}, 1, 1);
+}
+
+/* Triangle i, or its pieces, by itself. */
+static __attribute__((noinline)) void blend_alone(blend_state *b, int64_t i)
+{
+    int32_t own[3];
+    const triangle_parts parts = parts_of(b->snapped, i, own);
+    if (!parts.n || (b->is_flat && !begin_flat(b, i)))
+        return;
+    for (int k = 0; k < parts.n; k++) {
+        const int32_t *corners = parts.corners + 3 * k;
+        if (!b->is_flat)
+            begin_gouraud(b, i, &parts.set, corners, parts.is_cut);
+        draw_triangle(&parts.set, corners, (int32_t)i, b->snapped, b->window, &b->target, TL_SINK_BLEND);
+    }
 }
 
 #endif

@@ -127,6 +127,33 @@ static void put_pixels(char *pixels, int64_t n, const char *value, size_t pixel_
     }
 }
 
+/* The same, of many pixels, by vectors that begin at multiples of their size: as many as hold whole pixels, three of
+ * pixels of 3 or 12 bytes. */
+TL_INLINE void put_patterns(char *pixels, int64_t n, const char *value, int64_t pixel_bytes, int n_vectors)
+{
+    const int64_t size = 4 * TL_LANES, period = n_vectors * size;
+    const int64_t all = n * pixel_bytes, to_aligned = size - (int64_t)((uintptr_t)pixels % (uintptr_t)size);
+    char pattern[5 * 4 * TL_MAX_LANES];
+    if (period % pixel_bytes || all < 2 * period) {
+        put_pixels(pixels, n, value, (size_t)pixel_bytes);
+        return;
+    }
+    put_pixels(pattern, (period + size) / pixel_bytes + 1, value, (size_t)pixel_bytes);
+    const int32_t *aligned = (const int32_t *)(const void *)(pattern + to_aligned);
+    const vi a = vi_load(aligned), b = vi_load(aligned + (n_vectors == 3 ? TL_LANES : 0));
+    const vi c = vi_load(aligned + (n_vectors == 3 ? 2 * TL_LANES : 0));
+    memcpy(pixels, pattern, (size_t)size);
+    for (char *p = pixels + to_aligned; p + period <= pixels + all; p += period) {
+        int32_t *const words = (int32_t *)(void *)p;
+        vi_store(words, a);
+        if (n_vectors == 3) {
+            vi_store(words + TL_LANES, b);
+            vi_store(words + 2 * TL_LANES, c);
+        }
+    }
+    memcpy(pixels + all - period, pattern, (size_t)period); /* some of it again */
+}
+
 /* A run that is known as far as `end`, and may go on: in a picture whose rows follow one another in the next row, too.
  * Pixels are counted from the first one of the rows that this pass writes. */
 typedef struct {
@@ -156,8 +183,10 @@ TL_INLINE void close_run(const open_run *run, int pixel_bytes)
         put_bytes((uint8_t *)pixels, n, (uint8_t)run->value[0], may_pass);
     else if (pixel_bytes == 4)
         put_words((int32_t *)(void *)pixels, n, word, may_pass);
+    else if (pixel_bytes % 3)
+        put_patterns(pixels, n, run->value, pixel_bytes, 1);
     else
-        put_pixels(pixels, n, run->value, (size_t)pixel_bytes);
+        put_patterns(pixels, n, run->value, pixel_bytes, 3);
 }
 
 /* The pixels [first, end) hold `value`. */

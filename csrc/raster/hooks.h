@@ -8,7 +8,7 @@
 
 #include "lanes/lanes.h"
 
-/* TL_SINK_BLEND, in blend/mix.c: the colours of the pixels [at, at + n). */
+/* TL_SINK_BLEND, in blend/mix_few.c: the colours of the pixels [at, at + n). */
 struct blend_state;
 static void mix_run(struct blend_state *b, int64_t at, int64_t n);
 

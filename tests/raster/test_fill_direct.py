@@ -122,3 +122,49 @@ def test_rasterize_out_may_be_depth_alone():
     frags = tl.rasterize([[0, 0, 1], [4, 0, 1], [0, 4, 1]], [[0, 1, 2]], (3, 2), out=(None, depth))
     assert frags.depth is depth
     assert depth.tolist() == [[1, 1, 1], [1, 1, np.inf]]
+
+
+LARGE = (1100, 1003)
+"""Room for four triangles that are few: a triangle for 2**18 pixels."""
+
+
+def large_triangles(kind: str, channels: int):
+    """Four triangles over much of a picture, opaque and translucent, which share edges and reach beyond it."""
+    vertices = np.array([[-90.3, 12.7], [1003.1, -40.2], [1234.5, 950.25], [300.4, 1090.6], [20.5, 500.5], [700, 510]])
+    triangles = np.array([[0, 1, 2], [0, 2, 3], [4, 5, 3], [1, 4, 5]], np.int32)
+    colors = np.random.default_rng(channels).integers(0, 256, (4, channels)).astype(np.uint8)
+    colors[1::2, -1] = 255
+    return vertices, triangles, colors if kind == "uint8" else (colors / 255).astype(np.float32)
+
+
+@pytest.mark.parametrize("blend", ["replace", "over", "premultiplied", "add", "multiply"])
+@pytest.mark.parametrize("sampling", ["area", "center"])
+@pytest.mark.parametrize(("kind", "channels"), [("uint8", 3), ("uint8", 4), ("float32", 1), ("float32", 4)])
+def test_fill_of_few_large_triangles_over_a_background_is_that_over_a_picture(kind, channels, sampling, blend):
+    if channels < 4 and blend in ("over", "premultiplied"):
+        pytest.skip("no alpha")
+    alpha = "premultiplied" if blend == "premultiplied" else "straight"
+    options = {"sampling": sampling, "blend": "over" if blend == "premultiplied" else blend, "alpha": alpha}
+    vertices, triangles, colors = large_triangles(kind, channels)
+    ground = colors[0] // 2 if kind == "uint8" else colors[0] / 2
+    out = np.empty((*LARGE[::-1], channels), colors.dtype)
+    out[...] = ground
+    tl.fill(vertices, triangles, colors, LARGE, per="triangle", out=out, **options)
+    for threads in (1, 3):
+        picture = tl.fill(
+            vertices, triangles, colors, LARGE, per="triangle", background=ground, threads=threads, **options
+        )
+        assert (picture == out).all()
+
+
+def test_fill_of_few_large_triangles_writes_nothing_beside_a_strided_out():
+    vertices, triangles, colors = large_triangles("uint8", 3)
+    around = np.full((LARGE[1], LARGE[0] + 5, 3), 9, np.uint8)
+    tl.fill(
+        vertices, triangles, colors, LARGE, per="triangle", background=1, blend="add", sampling="area",
+        out=around[:, 2:-3],
+    )  # fmt: skip
+    assert (around[:, :2] == 9).all()
+    assert (around[:, -3:] == 9).all()
+    expected = tl.fill(vertices, triangles, colors, LARGE, per="triangle", background=1, blend="add", sampling="area")
+    assert (around[:, 2:-3] == expected).all()

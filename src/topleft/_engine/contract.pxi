@@ -136,6 +136,7 @@ cdef extern from "topleft.h" nogil:
         tl_blend blend
         int is_premultiplied
         const uint8_t *ground
+        int is_few
         int is_area
         int64_t band_rows
         int32_t *packed
@@ -145,7 +146,9 @@ cdef extern from "topleft.h" nogil:
         TL_FEW_OF_BITS
         TL_FEW_STORED
         TL_FEW_LABELLED
+    int64_t TL_BLENDED_ROWS
     bint tl_are_few(int64_t n, int n_samples, int64_t width, int64_t height, tl_few most)
+    bint tl_few_are_blended(int64_t n, int64_t width, int64_t height)
     ctypedef struct tl_snapped:
         tl_vertex_set mesh
         const int32_t *triangles

@@ -23,6 +23,7 @@ AREA_OVERFLOW: int
 FEW_OF_BITS: int
 FEW_STORED: int
 FEW_LABELLED: int
+BLENDED_ROWS: int
 MAX_LAYERS: int
 CLUSTER: int
 CLUSTER_GROUP: int
@@ -185,7 +186,9 @@ class SnappedMesh:
         ground: U8 | None,
         packed: I32 | None,
         cells: I32 | None,
+        is_few: bool = False,
     ) -> int: ...
+    def blends_few(self, width: int, height: int) -> bool: ...
     def is_few(self, width: int, height: int, n_samples: int, most: int) -> bool: ...
     def fill_few(
         self,

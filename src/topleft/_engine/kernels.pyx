@@ -79,6 +79,7 @@ VERTEX_BYTES = sizeof(tl_vertex)
 PLACED = TL_PLACED  # numbers of a vertex behind a transform that is not snapped
 CELL_CLEAR = TL_CELL_CLEAR
 AREA_OVERFLOW = TL_AREA_OVERFLOW
+BLENDED_ROWS = TL_BLENDED_ROWS
 FEW_OF_BITS, FEW_STORED, FEW_LABELLED = <int>TL_FEW_OF_BITS, <int>TL_FEW_STORED, <int>TL_FEW_LABELLED
 MAX_LAYERS = TL_MAX_LAYERS
 SCALARS = {np.dtype(np.float32): 0, np.dtype(np.float64): 1, np.dtype(np.int64): 2}  # tl_scalar

@@ -304,10 +304,11 @@ cdef class SnappedMesh:
                                 &pixels[first_row * width * pixel_bytes])
 
     def blend(self, uint8_t[::1] pixels, int64_t width, int64_t first_row, int64_t n_rows, const uint8_t[::1] colors, int n_channels,
-              bint is_u8, bint is_flat, int blend, bint is_premultiplied, int64_t band_rows, const uint8_t[::1] ground, int32_t[::1] packed, int32_t[::1] cells):
+              bint is_u8, bint is_flat, int blend, bint is_premultiplied, int64_t band_rows, const uint8_t[::1] ground, int32_t[::1] packed, int32_t[::1] cells,
+              bint is_few=False):
         """Blend the colours of triangles into rows [first_row, first_row + n_rows) of a picture, one after the other.
 
-        `band_rows`: so many rows are finished before the next. `ground`: one colour, which the rows get first, or None. `packed`: room for the picture, for uint8 with other than 4 channels; `cells`: clear, for areas. Returns as `draw` does.
+        `band_rows`: so many rows are finished before the next. `ground`: one colour, which the rows get first, or None. `packed`: room for the picture, for uint8 with other than 4 channels; `cells`: clear, for areas. `is_few`: flat colours over a ground are written row by row, and `packed` has room for BLENDED_ROWS rows. Returns as `draw` does.
         """
         cdef tl_canvas canvas
         cdef tl_window window = self.window(first_row, n_rows, width)
@@ -320,7 +321,8 @@ cdef class SnappedMesh:
         canvas.blend, canvas.is_premultiplied, canvas.is_area = <tl_blend>blend, is_premultiplied, cells is not None
         canvas.band_rows = band_rows
         canvas.ground = &ground[0] if ground is not None else NULL
-        canvas.packed = &packed[first_row * width] if packed is not None else NULL
+        canvas.is_few = is_few
+        canvas.packed = &packed[0 if is_few else first_row * width] if packed is not None else NULL
         canvas.cells = &cells[0] if cells is not None else NULL
         with nogil:
             bad_row = K.blend(&self.snapped, &window, &canvas)
@@ -334,6 +336,11 @@ cdef class SnappedMesh:
         """
         cdef int64_t n = self.snapped.n_triangles + (self.snapped.pieces.n_pieces if self.snapped.pieces != NULL else 0)
         return self.snapped.mesh.exact == NULL and tl_are_few(n, n_samples, width, height, <tl_few>most)
+
+    def blends_few(self, int64_t width, int64_t height):
+        """Tell whether flat colours are to be blended over a background row by row: large triangles, which are snapped."""
+        cdef int64_t n = self.snapped.n_triangles + (self.snapped.pieces.n_pieces if self.snapped.pieces != NULL else 0)
+        return self.snapped.mesh.exact == NULL and tl_few_are_blended(n, width, height)
 
     def fill_few(self, pixels, int64_t first_row, int64_t n_rows, colors, Transfer transfer, const uint8_t[::1] ground,
                  const int32_t[:, ::1] samples_fx):

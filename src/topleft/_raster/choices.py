@@ -596,6 +596,16 @@ def fills_few(snapped: Snapped, view: View, colors: NDArray[Any], *, is_flat: bo
     return is_flat and view.sampling is not Sampling.AREA and snapped.mesh.is_few(*view.size, n_samples, most)
 
 
+def blends_few(snapped: Snapped, view: View, colors: NDArray[Any], *, is_flat: bool) -> bool:
+    """Tell whether flat colours are blended over a background row by row.
+
+    By area four bytes a pixel are blended where they are, which is as fast for one triangle and faster for several.
+    """
+    is_in_place = colors.dtype == np.uint8 and colors.shape[1:] == (4,)
+    pays = is_flat and view.sampling.n_samples == 1 and not (view.sampling is Sampling.AREA and is_in_place)
+    return pays and snapped.mesh.blends_few(*view.size)
+
+
 def is_direct(snapped: Snapped, view: View, dtype: np.dtype[Any], *, is_flat: bool) -> bool:
     """Tell whether colours are best stored triangle by triangle, without labels in between.
 

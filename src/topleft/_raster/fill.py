@@ -111,16 +111,20 @@ def draw_fill(
         has_samples = view.sampling.n_samples > 1
         can_lay = is_drawn and is_blended and palette.dtype == np.uint8 and not has_samples
         can_lay = can_lay or (is_drawn and not is_blended and is_flat and (not has_samples or choices.can_share(view)))
-        is_few = is_drawn and not blending.is_needed and choices.fills_few(snapped, view, palette, is_flat=is_flat)
+        if blending.is_needed:
+            is_few = is_drawn and choices.blends_few(snapped, view, palette, is_flat=is_flat)
+        else:
+            is_few = is_drawn and choices.fills_few(snapped, view, palette, is_flat=is_flat)
         if ground is not None and not (can_lay or is_few):
             lay_ground(canvas, ground)
             ground = None
         if not is_drawn:
             pass
-        elif is_few and ground is not None:
+        elif is_few and not blending.is_needed and ground is not None:
             fill_few(snapped, view, palette, canvas, ground, transfer)
         elif is_blended:
-            blend(memory, snapped, view, palette, canvas, blending, transfer, is_flat=is_flat, ground=ground)
+            options = blending, transfer, is_few and ground is not None
+            blend(memory, snapped, view, palette, canvas, *options, is_flat=is_flat, ground=ground)
         elif has_samples:
             paint_samples(memory, snapped, view, palette, canvas, transfer, is_flat=is_flat, ground=ground)
         else:
@@ -292,13 +296,14 @@ def blend(
     pixels: NDArray[Any],
     blending: Blending,
     transfer: _engine.Transfer | None,
+    is_few: bool,
     *,
     is_flat: bool,
     ground: NDArray[Any] | None = None,
 ) -> None:
     """Blend coloured triangles into contiguous pixels; with several samples a pixel each is a picture of its own.
 
-    `ground`, for uint8 with one sample a pixel: the colour that all pixels get before.
+    `ground`, for uint8 with one sample a pixel, or `is_few`: the colour that all pixels get before.
     """
     n_threads = choices.threads_to_draw(view, snapped, Sink.LABEL)
     if view.sampling.n_samples == 1:
@@ -311,7 +316,8 @@ def blend(
     n_channels = 1 if colors.ndim == 1 else colors.shape[1]
     pixel_bytes = 4 if colors.dtype == np.uint8 else 4 * n_channels
     row_bytes = pixel_bytes * view.size[0]
-    band_rows = choices.rows_to_blend(view, snapped, row_bytes, lays_ground=ground is not None)
+    lays_ground = ground is not None
+    band_rows = 0 if is_few else choices.rows_to_blend(view, snapped, row_bytes, lays_ground=lays_ground)
     for mesh, picture in zip(meshes, pictures, strict=True):
         if blend_colors(memory, mesh, colors, picture, blending, n_threads, band_rows, is_flat=is_flat, ground=ground):
             snapped.refuse()
@@ -334,13 +340,15 @@ def blend_colors(
 ) -> bool:
     """Blend a mesh into contiguous pixels; returns whether a triangle has an index outside the vertices.
 
-    `band_rows`: so many are finished before the next. `ground`, for uint8: the colour that all pixels get before.
+    `band_rows`: so many are finished before the next; 0: few triangles, row by row. `ground`, for uint8 or few
+    triangles: the colour that all pixels get before.
     """
     height, width = pixels.shape[:2]
     n_parts = min(height, n_threads)
     n_channels, is_u8 = 1 if colors.ndim == 1 else colors.shape[1], colors.dtype == np.uint8
     flat, palette = _engine.as_bytes(pixels), _engine.as_bytes(colors)
-    packed = memory.empty("packed", (height * width,), np.int32) if is_u8 and n_channels != 4 else None
+    n_packed = width * (n_parts * _engine.BLENDED_ROWS if band_rows == 0 else height)
+    packed = memory.empty("packed", (n_packed,), np.int32) if is_u8 and n_channels != 4 else None
     n_cells = _engine.blend_cells(width)
     cells = memory.constant("cells", n_parts * n_cells, _engine.CELL_CLEAR) if blending.by_area else None
     under = None if ground is None else _engine.as_bytes(np.full(pixels.shape[2:] or 1, ground))
@@ -349,9 +357,10 @@ def blend_colors(
     def blend_part(i: int, _: int) -> int:
         first, end = height * i // n_parts, height * (i + 1) // n_parts
         own = None if cells is None else cells[n_cells * i : n_cells * (i + 1)]
+        room = packed[_engine.BLENDED_ROWS * width * i :] if packed is not None and band_rows == 0 else packed
         return mesh.blend(
             flat, width, first, end - first, palette, n_channels, is_u8, is_flat,
-            code, is_premultiplied, band_rows, under, packed, own,
+            code, is_premultiplied, band_rows, under, room, own, is_few=band_rows == 0,
         )  # fmt: skip
 
     return max(run_parts(blend_part, n_parts, n_parts)) >= 0

@@ -1,0 +1,168 @@
+/* Mix, a few large flat triangles over one colour: rows as runs of pixels, which are not in memory yet.
+ * In: what the triangle at hand covers whole or in part.  Out: runs, and pixels that stand aside.
+ *
+ * What a triangle covers whole becomes a bit in the key of a run; the colour of a key is blended once and kept.
+ * Pixels that a triangle covers in part stand aside: where they belong in the picture, or if a pixel there is no lane
+ * in a band of rows beside it.  They are blended one triangle after the other, as in a picture without runs. */
+#ifndef TL_MIX_FEW_C
+#define TL_MIX_FEW_C
+
+#include <stdint.h>
+#include <string.h>
+
+#include "topleft.h"
+#include "lanes/lanes.h"
+#include "few/row_runs.c"
+#include "blend/mix.c"
+#include "blend/mix.h"
+#include "blend/mix_u8.c"
+
+#define TL_KEY_ASIDE (1ull << 63) /* the pixels of the run stand aside, each for itself */
+#define TL_MIXED_KEYS_BITS 4
+
+/* The colour of a key: as it stands in the picture, and as a pixel of the canvas. */
+typedef struct {
+    uint64_t key;
+    char value[16];
+    union {
+        int32_t packed;
+        float floats[4];
+    } canvas;
+} mixed_color;
+
+typedef struct few_state {
+    const tl_canvas *canvas; /* the picture; the state of the pass draws aside */
+    int pixel_bytes, is_in_place;
+    int64_t id; /* of the triangle at hand */
+    mixed_color colors[1 << TL_MIXED_KEYS_BITS];
+    row_runs rows[TL_BLENDED_ROWS];
+    blend_state one; /* a picture of one pixel */
+} few_state;
+
+/* ---- colours ----------------------------------------------------------------------------------------------------- */
+
+/* Blends the triangles of a key over the ground, one pixel. */
+static __attribute__((noinline)) void mix_key(few_state *f, uint64_t key, mixed_color *c)
+{
+    blend_state *one = &f->one;
+    const int n_channels = f->canvas->n_channels, is_u8 = f->canvas->is_u8;
+    int32_t packed[TL_MAX_LANES + 1] = {one->ground};
+    float floats[4 * (TL_MAX_LANES + 1)] = {0};
+    if (!is_u8)
+        memcpy(floats, f->canvas->ground, sizeof *floats * (size_t)n_channels);
+    one->packed = packed, one->floats = floats;
+    for (uint64_t bits = key; bits; bits &= bits - 1)
+        if (begin_flat(one, __builtin_ctzll(bits)))
+            mix_pixels(one, 0, 1);
+    c->key = key;
+    if (is_u8) {
+        uint8_t bytes[4];
+        c->canvas.packed = packed[0];
+        if (n_channels == 4)
+            memcpy(bytes, packed, 4);
+        else
+            unpack_u8(packed, 1, n_channels, bytes);
+        memcpy(c->value, bytes, (size_t)n_channels);
+    } else {
+        memcpy(c->canvas.floats, floats, sizeof *floats * (size_t)n_channels);
+        memcpy(c->value, floats, sizeof *floats * (size_t)n_channels);
+    }
+}
+
+TL_INLINE const mixed_color *color_of_mix(few_state *f, uint64_t key)
+{
+    mixed_color *c = f->colors + (key * 0x9e3779b97f4a7c15u >> (64 - TL_MIXED_KEYS_BITS));
+    if (c->key != key)
+        mix_key(f, key, c);
+    return c;
+}
+
+/* ---- runs -------------------------------------------------------------------------------------------------------- */
+
+/* The run that begins at `col`, which is cut where none does; r->n where col is the end of the row. */
+TL_INLINE int run_from(row_runs *r, int32_t col)
+{
+    int k = 0;
+    while (k < r->n && r->col[k + 1] <= col)
+        k++;
+    if (k < r->n && r->col[k] < col)
+        cut_run(r, k++, col);
+    return k;
+}
+
+/* Runs [k, end) become one, whose pixels stand aside, together with neighbours of that kind. */
+TL_INLINE void join_runs(row_runs *r, int k, int end)
+{
+    if (k > 0 && r->key[k - 1] == TL_KEY_ASIDE)
+        k--;
+    if (end < r->n && r->key[end] == TL_KEY_ASIDE)
+        end++;
+    const int n_gone = end - k - 1;
+    r->key[k] = TL_KEY_ASIDE;
+    for (int i = k + 1; n_gone > 0 && i + n_gone <= r->n; i++)
+        r->col[i] = r->col[i + n_gone], r->key[i] = r->key[i + n_gone];
+    r->n -= n_gone;
+}
+
+/* Sees to it that the pixels [first, end) of a row stand aside. */
+static __attribute__((noinline)) void put_aside(blend_state *b, int64_t row, int32_t first, int32_t end)
+{
+    few_state *f = b->few;
+    row_runs *r = f->rows + row;
+    if (r->n >= TL_BLENDED_RUNS) /* more cuts than convex shapes make: all of the row */
+        first = 0, end = r->col[r->n];
+    const int from = run_from(r, first), to = run_from(r, end);
+    const int64_t at = row * b->stride, n_channels = b->n_channels;
+    for (int k = from; k < to; k++) {
+        if (r->key[k] == TL_KEY_ASIDE)
+            continue;
+        const mixed_color *c = color_of_mix(f, r->key[k]);
+        if (f->canvas->is_u8)
+            for (int32_t i = r->col[k]; i < r->col[k + 1]; i++)
+                b->packed[at + i] = c->canvas.packed;
+        else
+            for (int32_t i = r->col[k]; i < r->col[k + 1]; i++)
+                memcpy(b->floats + (at + i) * n_channels, c->canvas.floats, sizeof(float) * (size_t)n_channels);
+    }
+    join_runs(r, from, to);
+}
+
+static void take_aside(blend_state *b, int64_t at, int64_t n)
+{
+    const int64_t row = (int64_t)((uint32_t)at / (uint32_t)b->stride);
+    const int32_t first = (int32_t)(at - row * b->stride), end = (int32_t)(first + n);
+    const row_runs *r = b->few->rows + row;
+    for (int k = 0; k < r->n && r->col[k] <= first; k++)
+        if (r->key[k] == TL_KEY_ASIDE && end <= r->col[k + 1])
+            return;
+    put_aside(b, row, first, end);
+}
+
+static void lay_whole(blend_state *b, int64_t at, int64_t n)
+{
+    few_state *f = b->few;
+    const int64_t row = (int64_t)((uint32_t)at / (uint32_t)b->stride), start = row * b->stride;
+    const uint64_t bit = 1ull << f->id;
+    row_runs *r = f->rows + row;
+    if (r->n >= TL_BLENDED_RUNS)
+        put_aside(b, row, 0, r->col[r->n]);
+    const int from = run_from(r, (int32_t)(at - start)), to = run_from(r, (int32_t)(at - start + n));
+    for (int k = from; k < to; k++) {
+        if (b->whole_mode == TL_MIX_REPLACE)
+            r->key[k] = bit;
+        else if (r->key[k] == TL_KEY_ASIDE)
+            mix_pixels(b, start + r->col[k], r->col[k + 1] - r->col[k]);
+        else
+            r->key[k] |= bit;
+    }
+}
+
+static void mix_run(struct blend_state *b, int64_t at, int64_t n)
+{
+    if (b->few)
+        lay_whole(b, at, n);
+    else
+        mix_pixels(b, at, n);
+}
+
+#endif
