@@ -108,15 +108,14 @@ def counting(fates: Fates) -> Forced:
     class CountedScene(ClusteredMesh):
         def __init__(self, clusters: Clusters, view: Any, first_id: int = 0) -> None:
             super().__init__(clusters, view, first_id)
-            n, seen = len(clusters), self.survey(len(clusters))
-            self.counts = n, round(n * (1 - seen.outside)), round(n * (seen.back + seen.front))
             self.clusters = copy.copy(clusters)
             self.clusters.engine = CountedEngine(clusters.engine, fates)
 
         def draw_rows(self, *arguments: Any, **options: Any) -> Any:
-            fates.n, fates.n_in_view, fates.n_turned_here = (
-                a + b for a, b in zip((fates.n, fates.n_in_view, fates.n_turned_here), self.counts, strict=True)
-            )
+            n, seen = len(self.clusters), self.survey(len(self.clusters), options.get("sample", (0, 0)))
+            fates.n += n
+            fates.n_in_view += round(n * (1 - seen.outside))
+            fates.n_turned_here += round(n * (seen.back + seen.front))
             return super().draw_rows(*arguments, **options)
 
     rasterize = sys.modules["topleft._raster.rasterize"]  # not the verb of the same name

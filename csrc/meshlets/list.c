@@ -153,9 +153,9 @@ TL_INLINE void place_reach(const lane_view *l, vf inverse_w, lane_bounds *b)
     b->moved = vf_fma(vf_max(moved[0], moved[1]), inverse_w, set(0.501f));
 }
 
-/* The meshlets that are certain to hold no sample, each of which lies half a pixel from where `at` begins.  Beside what
- * corners move, `at` has errors: no more than those of the vertex stage for the forms, and 0.013 pixels for the division
- * and the sum, of numbers below 2^15. */
+/* The meshlets that are certain to hold no sample, each of which lies half a pixel from where `at` begins.  Beside
+ * what corners move, `at` has errors: no more than those of the vertex stage for the forms, and 0.013 pixels for the
+ * division and the sum, of numbers below 2^15. */
 TL_INLINE vm between_samples(const lane_view *l, const lane_bounds *b, const vf at[2])
 {
     vm between[2];

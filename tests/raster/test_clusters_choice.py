@@ -5,7 +5,7 @@ import pytest
 
 import topleft as tl
 from topleft._base.options import Sink
-from topleft._raster import choices, cluster_draw
+from topleft._raster import choices
 from topleft._raster.cluster_draw import ClusteredMesh, Survey
 from topleft._raster.clusters import Backoff, Clusters
 from topleft._raster.view import View
@@ -170,8 +170,8 @@ def test_instances_are_drawn_from_clusters_where_enough_is_left_out(view, outsid
 def test_scene_asks_before_it_draws_clusters(monkeypatch):
     scene = standing([(0, 0, -3.0 * k) for k in range(16)], tl.Mesh(*as_floats(*tl.scenes.blob(10_000))))
     drawn = []
-    draw = cluster_draw.draw_clustered
-    monkeypatch.setattr(instances, "draw_clustered", lambda *a, **k: drawn.append(1) or draw(*a, **k))
+    draw = instances.draw_round
+    monkeypatch.setattr(instances, "draw_round", lambda *a, **k: drawn.append(1) or draw(*a, **k))
     camera = tl.Camera.look_at((0, 0, 30), ortho_height=4.0, near=1.0, far=100.0)
     for layers, n_drawn in ((3.0, 1), (100.0, 0)):
         drawn.clear()

@@ -65,10 +65,11 @@ class ClusteredMesh:
         self._own = source_of(clusters.own_points, view)
         self._empty = self._snapped(self._own, NO_RECORDS, clusters.triangles[:0], None)
 
-    def survey(self, n_most: int = SURVEYED) -> Survey:
-        """Return what becomes of the clusters, by about `n_most` of them, evenly spread over the mesh."""
+    def survey(self, n_most: int = SURVEYED, sample: tuple[int, int] = (0, 0)) -> Survey:
+        """Return what becomes of the clusters at a sample, by about `n_most` of them, evenly spread over the mesh."""
         n_of: NDArray[np.int64] = np.zeros(4, np.int64)
-        self.clusters.engine.survey(self._seen(Sink.NEAREST), max(1, round(len(self.clusters) / n_most)), n_of)
+        seen = self._seen(Sink.NEAREST, empty=self._empty.seen_from(*sample))
+        self.clusters.engine.survey(seen, max(1, round(len(self.clusters) / n_most)), n_of)
         n = max(1, int(n_of.sum()))
         return Survey(*(count / n for count in n_of.tolist()))
 
