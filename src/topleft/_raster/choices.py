@@ -127,8 +127,8 @@ MIN_OUTSIDE_TO_CLUSTER = ((60_000, 0.1, 0.6), (500_000, 0.0, 0.33), (math.inf, 0
 #: than is said here nothing is gained. Of large triangles less may be hidden, for meshlets are drawn from top to
 #: bottom: on a Sapphire Rapids, in 1920x1080, views of a scan of 100,000 triangles beyond these limits take 1.15 to 1.5
 #: times as long, and of blobs of which both sides are drawn 1.1 to 1.3 times.
-#: 30,000 triangles with culled faces in 1920x1080, half or a fifth of them in view, 0.01 a pixel, take 1.25 to 1.9 times
-#: as long on a Zen 4 whose last-level cache others use, too; 5 % of them 0.8 to 1.1 times.
+#: 30,000 triangles with culled faces in 1920x1080, half or a fifth of them in view, 0.01 a pixel, take 1.25 to 1.9
+#: times as long on a Zen 4 whose last-level cache others use, too; 5 % of them 0.8 to 1.1 times.
 #: Growing takes about three times as long as sorting clusters, which some 100 pictures pay back; a mesh that is drawn
 #: 16 times is likely to be drawn more.
 MIN_PICTURES_TO_GROW = 16

@@ -54,8 +54,9 @@ FIRST_ROUND = 16
 
 #: Triangles of an instance, on the mean, from which on threads draw clusters together: with fewer, most is Python. Two
 #: threads, us an instance that shows, 1,000 triangles 41 (one thread 31), 3,000 75 (45), 10,000 60 (87), 100,000 427
-#: (567).
+#: (567). And rows of one, on the mean: two threads take 0.10 s for 20,000 that are a third of a pixel high, one 0.06.
 MIN_TRIANGLES_TO_SHARE = 6_000
+MIN_ROWS_TO_SHARE = 8
 
 #: Cells on each side of the picture in which layers are counted: of 15 by 8 pixels at 1920x1080.
 CELLS = 128
@@ -204,14 +205,18 @@ class PlacedScene:
     def split_rows(self, some: NDArray[np.intp], height: int, n: int) -> list[int]:
         """Return the first rows of n bands with about as many of some instances each, and `height`.
 
-        Instances of about one distance often lie in one band of equal bands.
+        Instances of about one distance often lie in one band of equal bands. Small ones are left to one thread.
         """
         if n == 1:
             return [0, height]
         boxes, matrices, view = self.scene.boxes[some], self._clip_from_objects[some][:, [1, 3]], self._view
-        middles = 0.5 * (boxes[:, None, :3] + boxes[:, None, 3:])
-        y, w = ((matrices[:, :, :3] * middles).sum(axis=2) + matrices[:, :, 3]).T
-        rows = (1 - y / np.where(w > 0, w, np.inf)) * (0.5 * view.viewport[1]) - view.origin[1]
+        low, high = boxes[:, None, :3], boxes[:, None, 3:]
+        y, w = (0.5 * (matrices[:, :, :3] * (low + high)).sum(axis=2) + matrices[:, :, 3]).T
+        w = np.where(w > 0, w, np.inf)
+        reach = 0.5 * (np.abs(matrices[:, 0, :3]) * (high - low)[:, 0]).sum(axis=1)
+        if np.mean(reach / w) * view.viewport[1] < MIN_ROWS_TO_SHARE:
+            return [0, height]
+        rows = (1 - y / w) * (0.5 * view.viewport[1]) - view.origin[1]
         wished = np.quantile(rows, np.arange(1, n) / n).clip(0, height)
         tops = [0]
         for k, top in enumerate(wished.tolist(), 1):
@@ -382,8 +387,8 @@ def draw_round(
 
     One after the other, and an object only of that: Python's search for cycles goes through all that live.
     """
-    n_parts = min(height, len(memories))
-    tops = placed.split_rows(some, height, n_parts)
+    tops = placed.split_rows(some, height, min(height, len(memories)))
+    n_parts = len(tops) - 1
 
     def draw_rows(k: int, _: int) -> dict[int, NDArray[np.int32]]:
         rows = tops[k], tops[k + 1]
