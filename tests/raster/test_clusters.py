@@ -12,7 +12,8 @@ from topleft import _engine
 from topleft._base.memory import FreshMemory
 from topleft._base.options import Sink
 from topleft._raster import choices
-from topleft._raster.cluster_draw import ClusteredMesh, draw_clustered
+from topleft._raster.choices import ClusterRoute
+from topleft._raster.cluster_draw import ClusteredMesh
 from topleft._raster.clusters import Clusters
 from topleft._raster.rasterize import draw_coverage, draw_fragments, draw_overdraw
 from topleft._raster.view import View
@@ -189,15 +190,14 @@ def test_masks_and_counts_have_the_same_bits(isa, sink):
     whole = {Sink.MASK: draw_coverage, Sink.COUNT: draw_overdraw}[sink]
     n_compared = 0
     for options in cameras(np.random.default_rng(8), 30):
-        view = View.parse(SIZE, options)
+        view = View.parse(SIZE, options | {"threads": 2})
         with on("scalar"):
             expected = whole(FreshMemory(), *mesh, view, None)
         with on(isa):
             pixels = np.empty_like(expected)
             covered = np.empty(_engine.Target.covered_shape(SIZE[1], SIZE[0]), np.uint64)
             target = _engine.Target(sink, pixels, None, covered)
-            memories, seen = [FreshMemory() for _ in range(2)], ClusteredMesh(clusters, view)
-            if not draw_clustered(memories, [seen], target, SIZE[1]):
+            if not ClusteredMesh(clusters, view).draw(FreshMemory(), target, ClusterRoute.CLUSTERS):
                 continue  # a vertex does not fit 32 bits
         assert_same(pixels, expected)
         n_compared += expected.any()

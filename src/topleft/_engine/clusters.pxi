@@ -117,8 +117,8 @@ def find_shown(SnappedMesh mesh, ClusterView view, const double[:, ::1] boxes, c
                uint8_t[::1] shown):
     """Tell of boxes (N, 6), each under a matrix of its own (N, 4, 4), whether they may show in a picture.
 
-    They do not where they lie outside of it or, if it `is_drawn`, behind what it shows. `view`: with any matrix; `mesh`:
-    how it is seen.
+    They do not where they lie outside of it, between samples or, if it `is_drawn`, behind what it shows. `view`: with any
+    matrix; `mesh`: how it is seen.
     """
     cdef tl_window window = mesh.window(0, target.height, target.width)
     cdef tl_target rows = target.rows(0)

@@ -55,6 +55,7 @@ __all__ = [
     "pays_to_draw_meshlets",
     "pays_to_draw_samples",
     "pays_to_grow",
+    "pays_to_share_instances",
     "pays_to_snap_all",
     "pays_without_depth",
     "route",
@@ -193,6 +194,11 @@ MAX_SAMPLES_A_TRIANGLE, MIN_OUTSIDE_FROM_INSIDE = 100, 0.7
 #: 1.5 and 1.4.
 MIN_LAYERS_TO_CLUSTER = 3.0
 MIN_OUTSIDE_OF_INSTANCES = (0.1, 0.33)
+
+#: Triangles and rows of an instance, on the mean, from which on threads draw the clusters of a scene together: with
+#: fewer, most of the time is Python. Two threads, us an instance that shows: 1,000 triangles 41 (one thread 31), 3,000
+#: 75 (45), 10,000 60 (87), 100,000 427 (567); 20,000 instances that are a third of a pixel high take 0.10 s (0.06).
+MIN_TRIANGLES_OF_INSTANCE, MIN_ROWS_OF_INSTANCE = 6_000, 8
 
 #: Pixels for each vertex from which on attributes of a mesh in clusters have all vertices snapped: to find those that
 #: show reads all pixels. `render` of 100,000 triangles seen whole in 1920x1080: 9.5 ms and, of those alone, 11.1; of
@@ -428,6 +434,11 @@ def pays_to_draw_instances(view: View, n_triangles: int, survey: Survey, count_l
     least = MIN_OUTSIDE_OF_INSTANCES[view.sampling.n_samples > 1]
     pays = survey.outside >= least and pays_to_draw_clusters(view, n_triangles, survey)
     return pays or count_layers() >= MIN_LAYERS_TO_CLUSTER
+
+
+def pays_to_share_instances(n_triangles: int, n_rows: float) -> bool:
+    """Tell whether threads share the rows of a scene that is drawn in clusters; of an instance, on the mean."""
+    return n_triangles >= MIN_TRIANGLES_OF_INSTANCE and n_rows >= MIN_ROWS_OF_INSTANCE
 
 
 def pays_to_snap_all(n_vertices: int, n_pixels: int) -> bool:

@@ -23,7 +23,7 @@ from topleft._raster.clusters import Clusters
 from topleft._raster.snap import snap_mesh, source_of
 from topleft._raster.view import View
 
-__all__ = ["ClusteredMesh", "Survey", "draw_clustered", "draw_others"]
+__all__ = ["ClusteredMesh", "Survey", "draw_clustered", "equal_bands"]
 
 #: A bound of the error of the vertex stage as a share of the terms that it adds up: four roundings, and the same again
 #: for how the bounds themselves are computed, in float64; twice that.
@@ -99,8 +99,11 @@ class ClusteredMesh:
         height, n_threads = self._view.size[1], count_threads(self._view.threads, self.clusters.n_triangles)
         if route is ClusterRoute.MESHLETS:
             return self.draw_meshlets(memory, target, min(n_threads, height), sample)
-        memories = [memory] if n_threads == 1 else [FRESH] * n_threads
-        return draw_clustered(memories, [self], target, height, sample)
+        memories, tops = (
+            [memory] if n_threads == 1 else [FRESH] * n_threads,
+            equal_bands(height, min(n_threads, height)),
+        )
+        return draw_clustered(memories, tops, lambda *_: [0], lambda _: self, target, sample)
 
     def note_hidden(self, target: _engine.Target) -> None:
         """Note how much of the mesh lies behind what a target holds, which decides how the next picture is drawn."""
@@ -272,42 +275,37 @@ def draw_pass(
 
 def draw_clustered(
     memories: Sequence[Memory],
-    meshes: Sequence[ClusteredMesh],
+    tops: Sequence[int],
+    own: Callable[[int, int], Sequence[int]],
+    mesh_of: Callable[[int], ClusteredMesh],
     target: _engine.Target,
-    height: int,
-    sample: tuple[int, int] = (0, 0),
+    sample: tuple[int, int],
     *,
     is_first: bool = True,
     is_last: bool = True,
 ) -> bool:
-    """Clear a target and draw meshes, a thread for each memory; of several calls the first clears, the last finishes.
+    """Clear a target and draw meshes, a thread for each band; of several calls the first clears, the last finishes.
 
-    Returns False, with the target in any state, where a vertex does not fit or is not finite: the whole meshes are then
-    to be drawn, which tells why.
+    `tops`: the first rows of the bands, and the height; `own(first, end)`: the numbers of the meshes that are drawn in
+    these rows, one at least; `mesh_of`: the mesh of a number, made when its turn comes and not before, for Python's
+    search for cycles goes through all objects that live. Returns False, with the target in any state, where a vertex
+    does not fit or is not finite: the whole meshes are then to be drawn, which tells why.
     """
-    n_parts, last = min(height, len(memories)), len(meshes) - 1
-    tops = equal_bands(height, n_parts)
 
-    def draw_rows(i: int, _: int) -> list[NDArray[np.int32]]:
-        return [
-            mesh.draw_rows(
-                memories[i],
-                target,
-                tops[i],
-                tops[i + 1],
-                sample=sample,
-                is_first=is_first and k == 0,
-                is_last=is_last and k == last,
-            )[0]
-            for k, mesh in enumerate(meshes)
-        ]
+    def draw_band(k: int, _: int) -> dict[int, NDArray[np.int32]]:
+        rows, left = (tops[k], tops[k + 1]), {}
+        numbers = own(*rows)
+        for i in numbers:
+            ends = {"is_first": is_first and i == numbers[0], "is_last": is_last and i == numbers[-1]}
+            others, _ = mesh_of(i).draw_rows(memories[k], target, *rows, sample=sample, **ends)
+            if len(others):
+                left[i] = others
+        return left
 
-    found = zip(*run_parts(draw_rows, n_parts, n_parts), strict=True)
-    for mesh, parts in zip(meshes, found, strict=True):
-        if not any(map(len, parts)):
-            continue
-        others = np.unique(np.concatenate(parts))
-        if not draw_others(memories[0], mesh, others, target, tops, sample):
+    parts = run_parts(draw_band, len(tops) - 1, len(tops) - 1)
+    for i in dict.fromkeys(i for part in parts for i in part):
+        others = np.unique(np.concatenate([part[i] for part in parts if i in part]))
+        if not draw_others(memories[0], mesh_of(i), others, target, tops, sample):
             return False
     return True
 

@@ -22,7 +22,7 @@ from topleft._camera.camera import Camera
 from topleft._model.material import Material
 from topleft._raster import choices
 from topleft._raster.classic import refuse_classic
-from topleft._raster.cluster_draw import ClusteredMesh, Survey, draw_others
+from topleft._raster.cluster_draw import ClusteredMesh, Survey, draw_clustered, equal_bands
 from topleft._raster.clusters import Clusters
 from topleft._raster.fragments import GivenCorners
 from topleft._raster.peel import check_peel, peel_meshes
@@ -51,12 +51,6 @@ SURVEYED_INSTANCES, SURVEYED_OF_EACH = 4, 25
 
 #: Instances that are drawn before it is looked which others they hide.
 FIRST_ROUND = 16
-
-#: Triangles of an instance, on the mean, from which on threads draw clusters together: with fewer, most is Python. Two
-#: threads, us an instance that shows, 1,000 triangles 41 (one thread 31), 3,000 75 (45), 10,000 60 (87), 100,000 427
-#: (567). And rows of one, on the mean: two threads take 0.10 s for 20,000 that are a third of a pixel high, one 0.06.
-MIN_TRIANGLES_TO_SHARE = 6_000
-MIN_ROWS_TO_SHARE = 8
 
 #: Cells on each side of the picture in which layers are counted: of 15 by 8 pixels at 1920x1080.
 CELLS = 128
@@ -207,14 +201,16 @@ class PlacedScene:
 
         Instances of about one distance often lie in one band of equal bands. Small ones are left to one thread.
         """
-        if n == 1:
-            return [0, height]
-        boxes, matrices, view = self.scene.boxes[some], self._clip_from_objects[some][:, [1, 3]], self._view
+        view = self._view
+        if n == 1 or height * view.size[0] > MOST_PIXELS_OF_PART:
+            return equal_bands(height, n)
+        boxes, matrices = self.scene.boxes[some], self._clip_from_objects[some][:, [1, 3]]
         low, high = boxes[:, None, :3], boxes[:, None, 3:]
         y, w = (0.5 * (matrices[:, :, :3] * (low + high)).sum(axis=2) + matrices[:, :, 3]).T
         w = np.where(w > 0, w, np.inf)
         reach = 0.5 * (np.abs(matrices[:, 0, :3]) * (high - low)[:, 0]).sum(axis=1)
-        if np.mean(reach / w) * view.viewport[1] < MIN_ROWS_TO_SHARE:
+        n_rows = float(np.mean(reach / w)) * view.viewport[1]
+        if not choices.pays_to_share_instances(self.scene.n_triangles // len(self.scene), n_rows):
             return [0, height]
         rows = (1 - y / w) * (0.5 * view.viewport[1]) - view.origin[1]
         wished = np.quantile(rows, np.arange(1, n) / n).clip(0, height)
@@ -260,8 +256,6 @@ class PlacedScene:
         is_group = self._first_id > 0  # of a scene so large that clusters pay for it
         if self._can_cluster(Sink(targets[0].sink)) and (is_group or pays_in_clusters(self, *seen)):
             order = front_to_back(self.scene, self._clip_from_world)
-            if self.scene.n_triangles < MIN_TRIANGLES_TO_SHARE * len(self.scene):
-                n_parts = 1
             if is_first and Sink(targets[0].sink) in (Sink.NEAREST, Sink.FARTHEST):
                 shape = _engine.Target.bounds_shape(height, self._view.size[0])
                 for target in targets:
@@ -356,7 +350,7 @@ def draw_rounds(
     """Draw what a sample sees into a target, as `draw_placed` does.
 
     In rounds, each of about as many instances as those before it together: of the others those are left out that lie
-    outside, or behind what has been drawn.
+    outside, between samples, or behind what has been drawn.
     """
     keeps_order = Sink(target.sink) in (Sink.NEAREST, Sink.FARTHEST)
     order = placed.shown(order, target, at, is_drawn=keeps_order and not is_first)
@@ -379,34 +373,16 @@ def draw_round(
     height: int,
     at: tuple[int, int],
     memories: Sequence[Memory],
-    *,
-    is_first: bool,
-    is_last: bool,
+    **ends: bool,
 ) -> bool:
-    """Draw what a sample sees of some instances, as `draw_clustered` draws meshes: each thread those in its rows.
-
-    One after the other, and an object only of that: Python's search for cycles goes through all that live.
-    """
+    """Draw what a sample sees of some instances, each thread those in its rows; returns as `draw_clustered` does."""
     tops = placed.split_rows(some, height, min(height, len(memories)))
-    n_parts = len(tops) - 1
 
-    def draw_rows(k: int, _: int) -> dict[int, NDArray[np.int32]]:
-        rows = tops[k], tops[k + 1]
-        own = (some if n_parts == 1 else placed.shown(some, target, at, rows, is_drawn=False)).tolist()
-        left = {}
-        for i in own:
-            ends = {"is_first": is_first and i == own[0], "is_last": is_last and i == own[-1]}
-            others, _ = ClusteredMesh(*placed.clustered(i)).draw_rows(memories[k], target, *rows, sample=at, **ends)
-            if len(others):
-                left[i] = others
-        return left
+    def own(first: int, end: int) -> list[int]:
+        shown = some if len(tops) == 2 else placed.shown(some, target, at, (first, end), is_drawn=False)
+        return shown.tolist()
 
-    parts = run_parts(draw_rows, n_parts, n_parts)
-    for i in dict.fromkeys(i for part in parts for i in part):
-        others = np.unique(np.concatenate([part[i] for part in parts if i in part]))
-        if not draw_others(memories[0], ClusteredMesh(*placed.clustered(i)), others, target, tops, at):
-            return False
-    return True
+    return draw_clustered(memories, tops, own, lambda i: ClusteredMesh(*placed.clustered(i)), target, at, **ends)
 
 
 def rows_of(
