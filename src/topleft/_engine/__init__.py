@@ -3,7 +3,6 @@
 blocks.pxi     keeps the memory of arrays that have died for arrays to come
 buffers.pxi    describes what a pass reads and writes: viewport, vertices, buffers, indices, clipped pieces
 clusters.pxi   sorts a mesh into clusters and draws those that a view needs
-contract.pxi   declares the structs and kernels of csrc
 detail.pxi     bounds how far points may be off in a picture: what levels of detail are chosen by
 exact.pxi      draws triangles whose vertices are not snapped
 isa.py         chooses the instruction set that runs, and tells how this copy was built
@@ -18,7 +17,7 @@ shade.pxi      shades pixels and tests their alpha
 tiles.pxi      lists the windows that triangles touch, and merges visibility buffers
 triangles.pxi  draws snapped triangles: whole, by bands of rows, in layers
 
-kernels.pyi has the types of what kernels.pyx gives.
+kernels.pyi, which the build makes, has the types of what kernels.pyx gives.
 """
 
 from topleft._engine.kernels import *  # noqa: F403
