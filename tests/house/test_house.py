@@ -157,12 +157,22 @@ def test_private_names_stay_in_their_file():
 
 
 @pytest.mark.parametrize("room", ROOMS, ids=short)
-def test_map_of_a_room_lists_its_files(room):
-    files = {path.name for path in room.iterdir() if path.suffix in (".py", ".pyx", ".pxi")} - {"__init__.py"}
-    folders = {f"{path.parent.name}/" for path in room.glob("*/__init__.py")}
+def test_room_says_what_it_is_and_lists_no_files(room):
     lines = (ast.get_docstring(parsed(room / "__init__.py")) or "").splitlines()
-    listed = [line.split()[0] for line in lines if re.match(r"\w+(\.(py|pyx|pxi)|/) +\S", line)]
-    assert sorted(listed) == sorted(files | folders)  # in the order to read them
+    assert lines
+    assert [line for line in lines if re.match(r"\w+\.(py|pyx|pxi) +\S", line)] == []
+
+
+def test_head_of_a_file_says_what_it_is():
+    lost = [path for path in PYTHON if not ast.get_docstring(parsed(path))]
+    begins = re.compile(r'(?:# cython:[^\n]*\n)*(?:# |/\* |""")\w')
+    lost += [path for path in [*CYTHON, *C] if not begins.match(path.read_text(encoding="utf-8"))]
+    assert not lost, "\n".join(map(short, lost))
+
+
+def test_exports_are_listed_in_public_files_alone():
+    listed = [path for path in PYTHON if "__all__" in names_of(path)]
+    assert [short(path) for path in listed if re.search("/_[^_]", short(path))] == []
 
 
 @pytest.mark.parametrize("kind", ["src/**/*.py", "csrc/**/*.[ch]", "tests/**/test_*.py"])

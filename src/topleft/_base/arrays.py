@@ -14,42 +14,6 @@ from numpy.typing import ArrayLike, NDArray
 from topleft import _engine
 from topleft._base.threads import run_parts
 
-__all__ = [
-    "apart_from",
-    "as_aligned",
-    "as_background",
-    "as_checked_triangles",
-    "as_colors",
-    "as_count",
-    "as_frozen",
-    "as_names",
-    "as_number",
-    "as_out",
-    "as_pair",
-    "as_path",
-    "as_places",
-    "as_point_size",
-    "as_real",
-    "as_size",
-    "as_square",
-    "as_subpixel_bits",
-    "as_transform",
-    "as_triangles",
-    "as_values",
-    "as_vector",
-    "as_vertices",
-    "as_window",
-    "check_progress",
-    "check_regular",
-    "check_rows",
-    "is_frozen",
-    "narrow_triangles",
-    "refuse_rows",
-    "set_aligned",
-    "set_read_only",
-    "shown",
-]
-
 #: The largest side of a picture and the largest number of triangles or vertices: ids and indices are int32.
 INT32_MAX = 2**31 - 1
 

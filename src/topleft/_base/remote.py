@@ -15,8 +15,6 @@ from typing import Any
 from topleft._base.arrays import shown
 from topleft.errors import MissingPackageError
 
-__all__ = ["Place", "RemotePath", "as_place", "is_url", "place_of"]
-
 #: File systems on which what is being written shows before it is whole: there it gets another name first. Stores of
 #: objects show an object when all of it is there.
 SHOWS_PARTS = frozenset({"arrow_hdfs", "dbfs", "ftp", "hdfs", "sftp", "smb", "ssh", "webhdfs"})

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from topleft._base.array_types import Array
 from topleft._base.arrays import as_count, as_number, shown
 from topleft._base.options import parse
 from topleft._base.whole_file import is_whole
@@ -26,9 +27,6 @@ from topleft._batch.workers import Workers, signals_put_off, workers_of
 from topleft.errors import MeshWarning, MissingPackageError
 from topleft.typing import OnErrorOption, OrderOption
 
-__all__ = ["Batch", "Job", "Result", "Summary", "render_batch"]
-
-Array = npt.NDArray[Any]
 Progress = Callable[["Result"], object]
 
 

@@ -13,11 +13,11 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft import _engine
+from topleft._base.array_types import F64
 from topleft._base.arrays import as_array, as_real, as_size, as_square, as_vector, check_regular, set_read_only, shown
 from topleft._base.options import check_choice
 from topleft._camera.lens import Lens, lens_of_opencv
 from topleft._camera.matrices import (
-    F64,
     THREE_QUARTER_DEG,
     as_framed,
     box_corners,
@@ -39,8 +39,6 @@ from topleft._model.points import Points
 from topleft._scene.adapt import MeshLike
 from topleft._scene.scene import Scene
 from topleft.typing import FitOption, UpOption
-
-__all__ = ["DEFAULT_FOV_Y_DEG", "Camera", "CameraLike", "as_camera", "camera_for", "pixels_of"]
 
 DEFAULT_FOV_Y_DEG = 40.0
 

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from topleft._base.array_types import U8
 from topleft._base.arrays import as_number
 from topleft._base.color import Color, as_color
 from topleft._camera.camera import Camera
@@ -37,10 +38,6 @@ from topleft._render.render import rasterize_mesh, render
 from topleft._render.view_layers import render_layers
 from topleft.errors import MeshError
 from topleft.scenes import SHAPES, shape
-
-__all__ = ["HANDLERS", "LAYERS", "MeshView", "draw", "load_bytes"]
-
-U8 = NDArray[np.uint8]
 
 MAX_SIDE_PX, MAX_PIXELS = 8192, 2**23
 """Of a frame: 4K; with 16 samples a pixel, a gigabyte of memory."""

@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any, TypeAlias, get_args
 import numpy as np
 import numpy.typing as npt
 
+from topleft._base.array_types import F64
 from topleft._base.arrays import as_array, as_real, as_size, shown
 from topleft._base.options import check_choice
 from topleft._scene.adapt import MeshLike, as_polygons
 from topleft._scene.cells import Polygons
 from topleft.typing import YOption
 
-F64 = npt.NDArray[np.float64]
 Extent = tuple[float, float, float, float]
 ExtentLike: TypeAlias = Sequence[float] | npt.NDArray[Any]
 

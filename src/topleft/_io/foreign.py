@@ -22,6 +22,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 import numpy.typing as npt
 
+from topleft._base.array_types import Array
 from topleft._io.notes import Notes
 from topleft._io.references import Cloud, InputFile, numbers_of_text
 from topleft._model.from_trimesh import placed
@@ -29,8 +30,6 @@ from topleft._model.mesh import Mesh
 from topleft._model.normals import moved
 from topleft._model.polygons import triangulate
 from topleft.errors import MeshError, MissingPackageError
-
-Array = npt.NDArray[Any]
 
 NO_TRIANGLES = {
     ".svg": "it holds curves in a plane",

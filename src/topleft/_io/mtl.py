@@ -15,16 +15,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from topleft._base.array_types import U8
 from topleft._base.color import Color, decode_srgb
 from topleft._io.references import InputFile
 from topleft._model.material import AlphaMode, Material
 from topleft._model.texture import Texture, Wrap
 from topleft.errors import MeshError
 from topleft.typing import EncodingOption
-
-U8 = npt.NDArray[np.uint8]
 
 OPTION_LENGTHS = {
     "-s": 3, "-o": 3, "-t": 3, "-mm": 2, "-bm": 1, "-clamp": 1, "-blendu": 1, "-blendv": 1, "-imfchan": 1, "-boost": 1,

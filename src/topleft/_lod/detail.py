@@ -23,6 +23,7 @@ import numpy.typing as npt
 from numpy.typing import NDArray
 
 from topleft import _engine
+from topleft._base.array_types import F64
 from topleft._base.arrays import as_number, as_size, shown
 from topleft._camera.camera import Camera, CameraLike, as_camera
 from topleft._lod.levels import Level, Levels
@@ -32,10 +33,6 @@ from topleft._model.mesh import Mesh, has_holes
 from topleft._scene.adapt import MeshLike, as_mesh
 from topleft._scene.scene import Scene, meshes_of
 from topleft.typing import CullOption
-
-__all__ = ["Detail", "check_tolerance", "choose_detail", "detailed", "pixels_of_bound"]
-
-F64 = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft import _engine
+from topleft._base.array_types import F32, F64, I32, U8
 from topleft._base.arrays import as_array, as_checked_triangles, set_read_only, shown
 from topleft._model.material import Material
 from topleft._model.normals import CornerNormals, angle_weighted_normals, box_of_triangles, creased_normals
@@ -22,10 +23,6 @@ from topleft._model.texture import Texture
 from topleft._raster.clusters import Clusters, box_of
 
 FloatArray = npt.NDArray[np.floating[Any]]
-F32 = npt.NDArray[np.float32]
-F64 = npt.NDArray[np.float64]
-I32 = npt.NDArray[np.int32]
-U8 = npt.NDArray[np.uint8]
 
 NO_CREASE = 180.0
 """The crease angle at which no edge is sharp, degrees."""

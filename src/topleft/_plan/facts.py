@@ -24,8 +24,6 @@ from topleft._raster.sampling import area_cells, sample_positions, split_bytes
 from topleft._raster.snap import Snapped, snap_mesh
 from topleft._raster.view import View
 
-__all__ = ["CLASSES", "ClusterFacts", "Facts", "find_cluster_facts", "find_facts", "memory_of"]
-
 #: The names of `tl_class` in ``csrc/topleft.h``.
 CLASSES = (
     "degenerate", "culled", "outside", "between", "tiny", "small", "middle", "rows", "long",

@@ -18,8 +18,6 @@ from topleft._raster import choices
 from topleft._raster.choices import MIN_THREAD_NS, Route
 from topleft.methods import METHODS
 
-__all__ = ["Stage", "find_stages"]
-
 
 @dataclass(frozen=True, slots=True)
 class Stage:

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft import _engine
+from topleft._base.array_types import F32, F64, U8
 from topleft._base.color import DEFAULT_COLOR, LINEAR_ONE, light_of, srgb_tables
 from topleft._base.memory import FRESH, empty
 from topleft._base.options import PointShape
@@ -28,12 +29,6 @@ from topleft._raster.classic import refuse_classic
 from topleft._raster.rasterize import refuse_many
 from topleft._raster.view import View, ViewOptions
 from topleft._shade.shade import Shading, ShadingOptions, eye_distance, shade_numbers, shade_samples
-
-__all__ = ["CLOUD_LAYERS", "CloudBuffer", "draw_cloud", "shade_cloud"]
-
-F32 = npt.NDArray[np.float32]
-F64 = npt.NDArray[np.float64]
-U8 = npt.NDArray[np.uint8]
 
 NOWHERE_PX = 1e12
 """Where points stand that a lens does not see: no window shows it."""

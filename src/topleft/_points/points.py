@@ -25,8 +25,6 @@ from topleft._raster.snap import refine, snap, source_of
 from topleft._raster.view import View, ViewOptions
 from topleft.typing import DepthTestOption, PointShapeOption
 
-__all__ = ["MOST_POINT_PX", "PointFragments", "draw_points", "points"]
-
 MOST_POINT_PX = 1 << 14
 """The largest size of a point, pixels: squares of it in sub-pixels stay below 2**60."""
 

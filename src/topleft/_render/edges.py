@@ -20,8 +20,6 @@ from topleft._scene.scene import Instance, Scene, scene_of
 from topleft._shade.shade import ShadingOptions
 from topleft.typing import CullOption
 
-__all__ = ["EDGE_COLOR", "depth_behind", "draw_all_edges"]
-
 EDGE_COLOR = (24, 28, 40)
 TURNED: Mapping[str, CullOption] = {"back": "front", "front": "back"}
 

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft import _engine
+from topleft._base.array_types import F64
 from topleft._base.memory import empty
 from topleft._base.threads import run_parts, threads_for
 from topleft._camera.camera import Camera
@@ -26,10 +27,6 @@ from topleft._render.fragments import VisiblePart, join, parts_of
 from topleft._render.holes import cuts_of, without_holes
 from topleft._render.render import rasterize_subject
 from topleft._scene.scene import Scene
-
-__all__ = ["GBuffer", "PointKind", "evaluate", "points_of", "project"]
-
-F64 = npt.NDArray[np.float64]
 
 
 class PointKind(IntEnum):

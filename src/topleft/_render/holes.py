@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft import _engine
+from topleft._base.array_types import F32, I32
 from topleft._base.options import Sink
 from topleft._base.threads import run_parts, threads_for
 from topleft._camera.camera import Camera
@@ -28,11 +29,6 @@ from topleft._render.fragments import BentFragments, SceneFragments
 from topleft._render.instances import PlacedScene
 from topleft._scene.scene import Scene, collapsed, meshes_of, scene_of
 from topleft._shade.look import ShadingInputs
-
-__all__ = ["Cut", "Holed", "cut_scene", "cuts_of", "draw_holed", "holed_instances", "solid_scene", "without_holes"]
-
-I32 = npt.NDArray[np.int32]
-F32 = npt.NDArray[np.float32]
 
 
 @dataclass(frozen=True, eq=False)

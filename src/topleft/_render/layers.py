@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft import _engine
+from topleft._base.array_types import F64, Array
 from topleft._base.arrays import as_names
 from topleft._points.cloud import CLOUD_LAYERS, CloudBuffer
 from topleft._render.blended import blended_masks
@@ -26,13 +27,8 @@ from topleft._render.transparent import render_transparent
 from topleft._scene.scene import meshes_of
 from topleft._shade.shade import ShadingOptions, shade_normals
 
-__all__ = ["LAYERS", "check_layers", "draw_layers"]
-
 NOT_OF_LIGHT = ("cull", "edges", "sampling", "subpixel_bits")
 """Options of `render` that say which triangle is seen where, not how it is lit."""
-
-Array = npt.NDArray[Any]
-F64 = npt.NDArray[np.float64]
 
 
 def color(gbuffer: GBuffer) -> Array:

@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from topleft._base.array_types import U8
 from topleft._base.color import DEFAULT_COLOR, WHITE, ColorLike
 from topleft._camera.camera import Camera, CameraLike, as_camera
 from topleft._model.environment import Environment
@@ -26,10 +26,6 @@ from topleft._render.fragments import SceneFragments, VisiblePart, join, parts_o
 from topleft._scene.scene import Scene, meshes_of
 from topleft._shade.shade import Places, Shading, ShadingOptions, shade_mesh, shade_numbers, shade_samples
 from topleft.typing import ShadingOption
-
-__all__ = ["shade", "shade_by", "shade_part"]
-
-U8 = npt.NDArray[np.uint8]
 
 
 def shade(

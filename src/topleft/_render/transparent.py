@@ -29,8 +29,6 @@ from topleft._scene.scene import Scene, as_meshes, scene_of
 from topleft._shade.shade import LookOptions
 from topleft.typing import CullOption, DepthTestOption, SamplesOption, ShadingOption
 
-__all__ = ["render_transparent", "visible_layers"]
-
 CLEAR = (0, 0, 0, 0)
 
 

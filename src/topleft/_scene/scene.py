@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft import _engine
+from topleft._base.array_types import F64
 from topleft._base.arrays import INT32_MAX, as_square, check_regular, set_read_only, shown
 from topleft._io.load import load
 from topleft._model.mesh import Mesh, extreme_points, used_vertices
@@ -24,10 +25,6 @@ from topleft._model.normals import moved
 from topleft._model.points import Points
 from topleft._raster.clusters import Backoff
 from topleft._scene.adapt import MeshLike, as_mesh, is_mesh_like
-
-__all__ = ["Instance", "Scene", "as_meshes", "as_subject", "collapsed", "counted_ranges", "meshes_of", "scene_of"]
-
-F64 = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft import _engine
+from topleft._base.array_types import F32, F64
 from topleft._base.color import DEFAULT_COLOR, LIGHT_OF_SRGB, Color, light_of
 from topleft._base.memory import empty
 from topleft._base.threads import run_parts, threads_of_rows
@@ -26,11 +27,6 @@ from topleft._model.material import AlphaMode, Material
 from topleft._model.mesh import Mesh, is_laid
 from topleft._model.normals import box_of_triangles, face_normal_rows, moved, turn_of_normals, turned_faces, unit_rows
 from topleft._model.texture import Texture
-
-__all__ = ["CameraRays", "ShadingInputs", "ShadingMesh"]
-
-F32 = npt.NDArray[np.float32]
-F64 = npt.NDArray[np.float64]
 
 LIGHT_CODES = {LightKind.DIRECTIONAL: 0, LightKind.POINT: 1}  # tl_light_kind in csrc/shading.h
 WRAPPED_LIGHT = 2

@@ -22,6 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft import _engine
+from topleft._base.array_types import F32, F64, I32, U8
 from topleft._base.arrays import shown
 from topleft._base.color import DEFAULT_COLOR, LINEAR_ONE, WHITE, Color, ColorLike, as_color, id_colors, srgb_tables
 from topleft._base.memory import empty
@@ -38,12 +39,6 @@ from topleft._raster.sampling import sample_positions
 from topleft._shade.look import ShadingInputs
 from topleft.typing import ShadingOption
 
-__all__ = ["LookOptions", "Shading", "ShadingOptions", "shade_mesh", "shade_numbers"]
-
-F32 = npt.NDArray[np.float32]
-F64 = npt.NDArray[np.float64]
-U8 = npt.NDArray[np.uint8]
-I32 = npt.NDArray[np.int32]
 Places = tuple[npt.NDArray[np.intp], ...]
 
 MIN_PX_PER_THREAD = 1 << 14

@@ -14,8 +14,6 @@ from typing import Any
 from topleft._base.cluster import MOST_RESTARTS, check_workers, quiet, result_of, wait_for_scheduler
 from topleft.errors import TopleftError
 
-__all__ = ["write_on_cluster"]
-
 Block = tuple[int, int, int]
 
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from topleft._base.array_types import Array
 from topleft._base.arrays import as_aligned
 from topleft._tiles.ahead import kept_memory
 from topleft._tiles.blocks import Triangles
@@ -21,11 +22,6 @@ from topleft.errors import MissingPackageError
 
 if TYPE_CHECKING:
     from topleft._tiles.tiles import Tiles
-
-__all__ = ["dask_array_of", "data_array_of"]
-
-
-Array = npt.NDArray[Any]
 
 
 @dataclass(frozen=True)

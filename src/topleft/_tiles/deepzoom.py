@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
+from topleft._base.array_types import U8, Array
 from topleft._base.arrays import as_count, check_progress, shown
 from topleft._base.color import id_colors
 from topleft._base.remote import as_place
@@ -27,10 +27,6 @@ from topleft._tiles.levels import Progress, Written, check_executor, halved, lev
 if TYPE_CHECKING:
     from topleft._tiles.tiles import Tiles
 
-__all__ = ["write_deepzoom"]
-
-Array = npt.NDArray[Any]
-U8 = npt.NDArray[np.uint8]
 
 FINGERPRINT = "topleft.txt"
 

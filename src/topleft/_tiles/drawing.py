@@ -16,8 +16,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
 import numpy as np
-import numpy.typing as npt
 
+from topleft._base.array_types import F64, I32, Array
 from topleft._base.arrays import as_array, as_colors, set_aligned, shown
 from topleft._base.memory import FRESH, Memory
 from topleft._base.options import Per, Sampling, Sink, check_choice, parse
@@ -29,11 +29,6 @@ from topleft._raster.view import View
 from topleft._tiles.ahead import kept_memory
 from topleft._tiles.blocks import Triangles
 
-__all__ = ["KINDS", "Painter", "Payload", "painter_of"]
-
-Array = npt.NDArray[Any]
-F64 = npt.NDArray[np.float64]
-I32 = npt.NDArray[np.int32]
 Size = tuple[int, int]
 
 VIEW_OPTIONS = ("cull", "subpixel_bits")

@@ -15,8 +15,6 @@ from topleft._base.arrays import shown
 from topleft._base.remote import RemotePath, as_place
 from topleft._base.whole_file import write_whole
 
-__all__ = ["DiskFolder", "Folder", "check_space", "folder_of"]
-
 
 class Folder(Protocol):
     """Where chunks are kept."""

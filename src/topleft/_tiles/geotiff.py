@@ -26,6 +26,7 @@ from typing import IO, TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from topleft._base.array_types import Array
 from topleft._base.arrays import as_count, as_number, check_progress, shown
 from topleft._base.options import check_choice
 from topleft._base.remote import as_place
@@ -38,9 +39,6 @@ from topleft.errors import MissingPackageError
 if TYPE_CHECKING:
     from topleft._tiles.tiles import Tiles
 
-__all__ = ["write_geotiff"]
-
-Array = npt.NDArray[Any]
 
 COMPRESSIONS = ("deflate", "none")
 LIMIT_CLASSIC = 1 << 32  # bytes that offsets of a plain TIFF reach

@@ -15,16 +15,13 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
+from topleft._base.array_types import Array
 from topleft._base.arrays import check_progress, shown
 from topleft._base.cluster import is_client
 from topleft.errors import MissingPackageError
 
 if TYPE_CHECKING:
     from topleft._tiles.tiles import Tiles
-
-__all__ = ["Layout", "Progress", "Step", "Written", "check_executor", "halved", "n_levels_to", "write_levels"]
-
-Array = npt.NDArray[Any]
 
 
 @dataclass(frozen=True)

@@ -11,19 +11,14 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from topleft import _engine
+from topleft._base.array_types import F32, I32
 from topleft._base.arrays import INT32_MAX, as_array, shown
 from topleft._base.options import DepthTest, parse
 from topleft._base.threads import parse_threads, run_parts
 from topleft._raster.fragments import Fragments
 from topleft.typing import DepthTestOption
-
-__all__ = ["merge"]
-
-I32 = npt.NDArray[np.int32]
-F32 = npt.NDArray[np.float32]
 
 RULES = {DepthTest.LESS: 0, DepthTest.GREATER: 1, None: 2}  # tl_merge_rule in csrc/tiles.h
 

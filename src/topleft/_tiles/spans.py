@@ -24,12 +24,10 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft import _engine
+from topleft._base.array_types import F64, I32
 from topleft._base.memory import Memory
 from topleft._tiles.ahead import in_order, kept_memory
 from topleft._tiles.blocks import BLOCK, Triangles
-
-I32 = npt.NDArray[np.int32]
-F64 = npt.NDArray[np.float64]
 
 SPAN_BYTES = 12
 

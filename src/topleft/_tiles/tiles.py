@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from topleft._base.array_types import Array
 from topleft._base.arrays import as_count, as_pair, as_path, as_size
 from topleft._base.options import check_choice
 from topleft._base.threads import available_threads, parse_threads
@@ -28,9 +29,6 @@ from topleft.typing import RasterKindOption, TiffCompressionOption, YOption, Zar
 if TYPE_CHECKING:
     from topleft._tiles.levels import Progress, Written
 
-__all__ = ["Tiles", "Window", "tiles"]
-
-Array = npt.NDArray[Any]
 Path = str | os.PathLike[str]
 
 #: Pixels a side of a window. 80 px a triangle, two cores: 166 Mpx/s with 1024, 203 with 2048, 152 with 4096; what is

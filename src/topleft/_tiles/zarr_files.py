@@ -16,8 +16,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
+from topleft._base.array_types import Array
 from topleft._base.arrays import as_count, as_size, check_progress
 from topleft._base.options import check_choice
 from topleft._tiles.folders import DiskFolder, Folder, check_space, folder_of
@@ -27,9 +27,6 @@ from topleft.errors import MissingPackageError
 if TYPE_CHECKING:
     from topleft._tiles.tiles import Tiles
 
-__all__ = ["write_zarr"]
-
-Array = npt.NDArray[Any]
 
 COMPRESSIONS = ("gzip", "zstd", "none")
 

@@ -2,18 +2,6 @@
 
 Exit status: 0, all pictures were written; 1, some of several inputs failed and the rest were written, or, with
 --strict, a mesh lacks something of its file; 2, nothing could be done with what was asked, told in one line on stderr.
-
-animation.py  writes the views of a mesh one after the other, by Pillow or ffmpeg
-arguments.py  defines what `topleft render` takes
-doctor.py     runs `topleft doctor`
-explain.py    runs `topleft explain` and `topleft calibrate`
-explore.py    runs `topleft explore`
-job_file.py   reads jobs from TOML or JSON
-mask.py       runs `topleft mask`
-raster.py     runs `topleft raster`
-render.py     runs `topleft render`: from arguments to files
-sheet.py      puts many pictures, reduced, on one
-targets.py    finds which picture goes to which file, before anything is drawn
 """
 
 from __future__ import annotations

@@ -15,8 +15,6 @@ from topleft._render.render import DEFAULT_SIZE
 from topleft.cli.arguments import SUBPIXEL_BITS_HELP, UP_HELP, UsageError, positive, size, subpixel_bits, tolerance
 from topleft.cli.targets import MeshSource, Orbit
 
-__all__ = ["add_plan_commands", "run_calibrate", "run_explain"]
-
 
 def run_explain(options: argparse.Namespace) -> int:
     """Print how a view of a mesh is drawn: what is chosen at each stage, why, and what it takes."""

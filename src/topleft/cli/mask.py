@@ -17,8 +17,6 @@ from topleft._polygons.polygons import Rule, polygons
 from topleft.cli.arguments import UsageError, positive, size
 from topleft.cli.render import FAILED, complain
 
-__all__ = ["add_mask_command", "run_mask"]
-
 DEFAULT_SIDE = 1024
 
 MASK_HELP = """\

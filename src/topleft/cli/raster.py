@@ -21,8 +21,6 @@ from topleft.cli.render import client_of, complain
 if TYPE_CHECKING:
     from topleft._tiles.levels import Written
 
-__all__ = ["add_raster_command", "run_raster"]
-
 RASTER_HELP = """\
 MESH is a mesh file, or two .npy files with a comma between them: vertices.npy,triangles.npy. Binary STL, binary PLY of
 triangles and .npy are mapped and need not fit memory. x and y are the plane, z is the height.

@@ -30,8 +30,6 @@ from topleft.cli.sheet import make_sheet
 from topleft.cli.targets import MeshJobs, check_targets, check_words, plan_jobs
 from topleft.errors import MeshWarning, MissingPackageError, TopleftError
 
-__all__ = ["FAILED", "client_of", "complain", "complain_of_lacks", "one_line", "run_render"]
-
 FAILED = 1
 """Exit status: a part of the work failed."""
 
