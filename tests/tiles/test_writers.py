@@ -21,6 +21,7 @@ from topleft._tiles.geotiff import differences, sums
 from topleft._tiles.levels import halved
 
 SRC = str(Path(tl.__file__).parents[1])
+CHILD = {**os.environ, "PYTHONPATH": SRC}
 RNG = np.random.default_rng(6)
 POINTS = RNG.uniform([500000, 5000000, 0], [500300, 5000200, 9], (200, 3))
 POINTS[:, 0] -= np.where(POINTS[:, 0] > 500150, 0, 20)
@@ -324,6 +325,89 @@ def test_interrupted_run_goes_on(tmp_path, name):
         assert files_of(folder) == files_of(tmp_path / "whole")
 
 
+@pytest.mark.parametrize("name", ["a.tif"])
+def test_second_writer_is_refused(tmp_path, name):
+    """Whether it goes on or begins; what the first one writes is whole, and the lock goes with it."""
+    told = []
+
+    def write_again(step):
+        for options in ({}, {"resume": True}):
+            with pytest.raises(BlockingIOError, match=f"{name} is being written by another call") as info:
+                WRITERS[name](raster_of("labels"), tmp_path / "a" / name, **options)
+            told.append(info.value)
+
+    (tmp_path / "a").mkdir()
+    (tmp_path / "b").mkdir()
+    WRITERS[name](raster_of("labels"), tmp_path / "a" / name, progress=write_again)
+    WRITERS[name](raster_of("labels"), tmp_path / "b" / name)
+    assert len(told) > 2
+    assert files_of(tmp_path / "a") == files_of(tmp_path / "b")
+
+
+HELD = """
+import sys
+sys.path[:0] = sys.argv[2:]
+from test_writers import raster_of
+def wait(step):
+    print("writes", flush=True)
+    sys.stdin.read()
+raster_of("labels").to_geotiff(sys.argv[1], tile=16, progress=wait)
+"""
+
+
+def test_lock_holds_between_processes_and_ends_with_a_killed_one(tmp_path):
+    folders = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "support")]
+    command = [sys.executable, "-c", HELD, str(tmp_path / "a.tif"), *folders]
+    with subprocess.Popen(command, env=CHILD, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as other:
+        assert other.stdout.readline() == "writes\n"
+        with pytest.raises(BlockingIOError, match=r"a\.tif is being written by another call"):
+            raster_of("labels").to_geotiff(tmp_path / "a.tif", tile=16)
+        other.kill()
+    raster_of("labels").to_geotiff(tmp_path / "a.tif", tile=16, resume=True)
+    assert [path.name for path in tmp_path.iterdir()] == ["a.tif"]
+
+
+def test_part_that_has_gone_is_told(tmp_path):
+    """A blank part of the file would be a lie."""
+    written = []
+
+    def clean(step):
+        written.append(step)
+        if step.n_done == step.n_blocks:
+            (tmp_path / "a.tif.parts/0/1_2").unlink()
+
+    with pytest.raises(FileNotFoundError, match=r"a\.tif\.parts.0.1_2 has gone while the raster was written"):
+        raster_of("labels").to_geotiff(tmp_path / "a.tif", tile=16, progress=clean)
+    assert not (tmp_path / "a.tif").exists()
+    assert raster_of("labels").to_geotiff(tmp_path / "a.tif", tile=16, resume=True).n_drawn == 1
+
+
+@pytest.mark.parametrize("options", [{}, {"resume": True}])
+def test_parts_of_somebody_else_are_left_alone(tmp_path, options):
+    (tmp_path / "a.tif.parts").mkdir()
+    (tmp_path / "a.tif.parts/thesis.txt").write_text("my only copy")
+    with pytest.raises(FileExistsError, match=r"a\.tif\.parts is no folder of an unfinished raster"):
+        raster_of("labels").to_geotiff(tmp_path / "a.tif", tile=16, **options)
+    assert files_of(tmp_path) == {"a.tif.parts/thesis.txt": b"my only copy"}
+
+
+def test_file_of_somebody_else_among_the_parts_stays(tmp_path):
+    thesis = tmp_path / "a.tif.parts/0/.thesis.00000000.part"
+
+    def put(step):
+        thesis.write_text("my only copy")
+        if step.n_done == 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        raster_of("labels").to_geotiff(tmp_path / "a.tif", tile=16, progress=put)
+    with pytest.raises(FileExistsError, match=r"a\.tif\.parts holds 0.\.thesis\.00000000\.part, which is of no raster"):
+        raster_of("labels").to_geotiff(tmp_path / "a.tif", tile=16)
+    raster_of("labels").to_geotiff(tmp_path / "a.tif", tile=16, resume=True)
+    assert (tmp_path / "a.tif").exists()
+    assert [path.name for path in sorted(tmp_path.rglob("*")) if path.is_file()] == ["a.tif", thesis.name]
+
+
 KILLED = """
 import os, sys, time
 import numpy as np, topleft as tl
@@ -346,11 +430,9 @@ else:
 
 @pytest.mark.parametrize("kind", ["zarr", "tif"])
 def test_killed_run_goes_on_and_draws_no_whole_window_twice(tmp_path, kind):
-    env = {**os.environ, "PYTHONPATH": SRC}
-
     def run(path):
         command = [sys.executable, "-c", KILLED, kind, str(path)]
-        return subprocess.Popen(command, env=env, stdout=subprocess.PIPE, text=True)
+        return subprocess.Popen(command, env=CHILD, stdout=subprocess.PIPE, text=True)
 
     def whole_windows(path):
         folder = path / "0/c" if kind == "zarr" else path.with_name(path.name + ".parts") / "0"
@@ -440,9 +522,8 @@ def test_absent_package_is_told_with_what_to_install(tmp_path, package, call):
         "raster = tl.tiles(([[0, 0], [9, 0], [0, 9]], [[0, 1, 2]]), tl.Grid((64, 64), (0, 9, 0, 9)))\n"
         f"try:\n    raster.{call}\nexcept tl.MissingPackageError as error: print(error)"
     )
-    env = {**os.environ, "PYTHONPATH": SRC}
     done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path, env=env, check=True
+        [sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path, env=CHILD, check=True
     )
     assert "pip install" in done.stdout
 

@@ -14,7 +14,6 @@ Standard, 1.0, 2023; Adobe Photoshop TIFF Technical Note 3, 2005 (the predictor 
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
 import struct
@@ -31,8 +30,17 @@ from topleft._base.options import check_choice
 from topleft._base.remote import as_place
 from topleft._base.whole_file import write_whole
 from topleft._field.grid import Grid
-from topleft._tiles.folders import DiskFolder, check_space
-from topleft._tiles.levels import Progress, Written, check_executor, halved, level_size, n_levels_to, write_levels
+from topleft._tiles.folders import MANIFEST, DiskFolder, check_space, only_writer
+from topleft._tiles.levels import (
+    Progress,
+    Written,
+    blocks_with_pixels,
+    check_executor,
+    halved,
+    level_size,
+    n_levels_to,
+    write_levels,
+)
 from topleft.errors import MissingPackageError
 
 if TYPE_CHECKING:
@@ -103,7 +111,7 @@ class TiffLayout:
         """Return the pixels of a block that is there."""
         content = self.folder.get(self.name(level, row, column))
         if content is None:
-            raise OSError(f"{self.folder.path / self.name(level, row, column)} has gone while the raster was written")
+            raise gone(self, level, row, column)
         rows, columns = self.tiles_of(level, row, column)
         n = len(rows) * len(columns)
         lengths = np.frombuffer(content, "<u4", n)
@@ -208,27 +216,51 @@ def write_geotiff(
     layout = TiffLayout(
         folder, raster.size, window, side, raster.painter.channels, dtype, raster.painter.empty, n_levels, compression
     )
-    prepare(raster, layout, f"{raster.fingerprint} tiff {side} {compression} {n_levels}", file, resume)
-    written = write_levels(
-        raster,
-        layout,
-        dtype=dtype,
-        blank=raster.painter.empty,
-        halve=lambda pixels: halved(pixels, raster.painter.nodata, is_mean=raster.has_means),
-        progress=progress,
-        executor=executor,
-    )
-    write_whole(file, lambda out: assemble(layout, out, told, geo))
-    shutil.rmtree(folder.path)
+    with only_writer(file):
+        prepare(raster, layout, f"{raster.fingerprint} tiff {side} {compression} {n_levels}", file, resume)
+        written = write_levels(
+            raster,
+            layout,
+            dtype=dtype,
+            blank=raster.painter.empty,
+            halve=lambda pixels: halved(pixels, raster.painter.nodata, is_mean=raster.has_means),
+            progress=progress,
+            executor=executor,
+        )
+        check_whole(layout, blocks_with_pixels(raster, n_levels))
+        write_whole(file, lambda out: assemble(layout, out, told, geo))
+        folder.remove()
     return written
+
+
+def check_whole(layout: TiffLayout, levels: list[npt.NDArray[np.bool_]]) -> None:
+    """Raise an error unless all blocks are there.
+
+    Raises
+    ------
+    FileNotFoundError
+        If one has been removed since it was written.
+    """
+    for level, blocks in enumerate(levels):
+        for row, column in np.argwhere(blocks).tolist():
+            if not layout.is_there(level, row, column):
+                raise gone(layout, level, row, column)
+
+
+def gone(layout: TiffLayout, level: int, row: int, column: int) -> FileNotFoundError:
+    """What is said of a block that is not there any more."""
+    name = layout.folder.path / layout.name(level, row, column)
+    return FileNotFoundError(f"{name} has gone while the raster was written: resume=True writes it again")
 
 
 def prepare(raster: Tiles, layout: TiffLayout, fingerprint: str, file: Path, resume: bool) -> None:
     """Make the folder of parts, or take the one that an earlier run of the same raster has left."""
     folder = layout.folder
-    manifest = folder.get("manifest.json")
+    manifest = folder.get(MANIFEST)
+    if manifest is None and folder.exists():
+        raise FileExistsError(f"{folder.path} is no folder of an unfinished raster: move it, or write elsewhere")
     if resume and manifest is not None:
-        if json.loads(manifest).get("fingerprint") != fingerprint:
+        if manifest.decode(errors="replace") != fingerprint:
             raise ValueError(
                 f"{folder.path} is not of this raster: the mesh, an option or the size of windows differs; "
                 "remove it, or write elsewhere"
@@ -248,9 +280,9 @@ def prepare(raster: Tiles, layout: TiffLayout, fingerprint: str, file: Path, res
         n = int(n * min(1.0, 1.25 * sum(len(layout.encoded(part)) for part in parts) / (len(parts) * tile * tile
                 * layout.dtype.itemsize * int(np.prod(layout.channels, dtype=int)))))  # fmt: skip
     check_space(file.absolute().parent, 2 * (n + n // 3 * (layout.n_levels > 1)), f"a raster of {raster.shape}")
-    if folder.exists():
-        shutil.rmtree(folder.path)
-    folder.put("manifest.json", json.dumps({"fingerprint": fingerprint}).encode())
+    folder.check_own()
+    folder.remove()
+    folder.put(MANIFEST, fingerprint.encode())
 
 
 def geo_tags(crs: str | int | None, grid: Grid | None) -> Tags:

@@ -22,7 +22,17 @@ from topleft.errors import MissingPackageError
 if TYPE_CHECKING:
     from topleft._tiles.tiles import Tiles
 
-__all__ = ["Layout", "Progress", "Step", "Written", "check_executor", "halved", "n_levels_to", "write_levels"]
+__all__ = [
+    "Layout",
+    "Progress",
+    "Step",
+    "Written",
+    "blocks_with_pixels",
+    "check_executor",
+    "halved",
+    "n_levels_to",
+    "write_levels",
+]
 
 Array = npt.NDArray[Any]
 
@@ -126,6 +136,17 @@ def halved(pixels: Array, nodata: float | None, *, is_mean: bool) -> Array:
     return np.where(n > 0, total / np.maximum(n, 1), empty).astype(pixels.dtype)
 
 
+def blocks_with_pixels(raster: Tiles, n_levels: int) -> list[npt.NDArray[np.bool_]]:
+    """For each level which of its blocks hold more than background (rows, columns): these are written."""
+    there = [raster.index.counts > 0]
+    for _ in range(1, n_levels):
+        below = there[-1]
+        even = np.pad(below, [(0, below.shape[0] % 2), (0, below.shape[1] % 2)])
+        quads = even.reshape(even.shape[0] // 2, 2, even.shape[1] // 2, 2)
+        there.append(np.asarray(quads.any(axis=(1, 3))))
+    return there
+
+
 def write_levels(
     raster: Tiles,
     layout: Layout,
@@ -150,12 +171,7 @@ def write_levels(
     executor : dask.distributed.Client, optional
         Whose workers draw and write the windows; levels are made of these here.
     """
-    there: list[npt.NDArray[Any]] = [raster.index.counts > 0]  # which blocks hold more than background
-    for _ in range(1, layout.n_levels):
-        below = there[-1]
-        even = np.pad(below, [(0, below.shape[0] % 2), (0, below.shape[1] % 2)])
-        quads = even.reshape(even.shape[0] // 2, 2, even.shape[1] // 2, 2)
-        there.append(np.asarray(quads.any(axis=(1, 3))))
+    there = blocks_with_pixels(raster, layout.n_levels)
     n_blocks = int(sum(level.sum() for level in there))
     channels = () if prepare is None else prepare(raster.painter.blank((1, 1))).shape[2:]
     channels = channels or (raster.painter.channels if prepare is None else ())
