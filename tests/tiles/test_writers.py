@@ -1,5 +1,6 @@
 """Rasters in files: Zarr, GeoTIFF, Deep Zoom; what was killed goes on and ends up the same."""
 
+import contextlib
 import io
 import itertools
 import json
@@ -278,7 +279,7 @@ def test_what_does_not_fit_the_disk_is_told_before_a_byte_is_written(tmp_path, n
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("name", ["a.zarr", "a.dzi"])
+@pytest.mark.parametrize("name", WRITERS)
 def test_what_is_there_is_not_written_over(tmp_path, name):
     WRITERS[name](raster_of("labels"), tmp_path / name)
     with pytest.raises(FileExistsError, match="exists: resume=True goes on with it"):
@@ -325,7 +326,7 @@ def test_interrupted_run_goes_on(tmp_path, name):
         assert files_of(folder) == files_of(tmp_path / "whole")
 
 
-@pytest.mark.parametrize("name", ["a.tif"])
+@pytest.mark.parametrize("name", WRITERS)
 def test_second_writer_is_refused(tmp_path, name):
     """Whether it goes on or begins; what the first one writes is whole, and the lock goes with it."""
     told = []
@@ -367,45 +368,193 @@ def test_lock_holds_between_processes_and_ends_with_a_killed_one(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["a.tif"]
 
 
-def test_part_that_has_gone_is_told(tmp_path):
-    """A blank part of the file would be a lie."""
-    written = []
+@pytest.mark.parametrize("name", WRITERS)
+def test_part_that_has_gone_is_told(tmp_path, name):
+    """A blank part would be a lie."""
+    place = {"a.zarr": "a.zarr/0/c/1/2", "a.tif": "a.tif.parts/0/4_8", "a.dzi": "a_files/9/8_4.png"}[name]
 
     def clean(step):
-        written.append(step)
         if step.n_done == step.n_blocks:
-            (tmp_path / "a.tif.parts/0/1_2").unlink()
+            (tmp_path / place).unlink()
 
-    with pytest.raises(FileNotFoundError, match=r"a\.tif\.parts.0.1_2 has gone while the raster was written"):
-        raster_of("labels").to_geotiff(tmp_path / "a.tif", tile=16, progress=clean)
-    assert not (tmp_path / "a.tif").exists()
-    assert raster_of("labels").to_geotiff(tmp_path / "a.tif", tile=16, resume=True).n_drawn == 1
-
-
-@pytest.mark.parametrize("options", [{}, {"resume": True}])
-def test_parts_of_somebody_else_are_left_alone(tmp_path, options):
-    (tmp_path / "a.tif.parts").mkdir()
-    (tmp_path / "a.tif.parts/thesis.txt").write_text("my only copy")
-    with pytest.raises(FileExistsError, match=r"a\.tif\.parts is no folder of an unfinished raster"):
-        raster_of("labels").to_geotiff(tmp_path / "a.tif", tile=16, **options)
-    assert files_of(tmp_path) == {"a.tif.parts/thesis.txt": b"my only copy"}
+    with pytest.raises(FileNotFoundError, match=r"(1.2|4_8|8_4\.png) has gone while the raster was written: resume"):
+        WRITERS[name](raster_of("labels"), tmp_path / name, progress=clean)
+    assert not (tmp_path / name).is_file()
+    assert WRITERS[name](raster_of("labels"), tmp_path / name, resume=True).n_drawn == 1
 
 
-def test_file_of_somebody_else_among_the_parts_stays(tmp_path):
-    thesis = tmp_path / "a.tif.parts/0/.thesis.00000000.part"
+@pytest.mark.parametrize("options", [{}, {"resume": True}, {"overwrite": True}])
+@pytest.mark.parametrize(
+    ("name", "strange"),
+    [
+        ("a.tif", "a.tif.parts/thesis.txt"),
+        ("a.tif", "a.tif.parts/0/0_0"),
+        ("a.tif", "a.tif"),
+        ("a.tif", "a.tif/thesis.txt"),
+        ("a.zarr", "a.zarr/thesis.txt"),
+        ("a.zarr", "a.zarr/zarr.json"),
+        ("a.zarr", "a.zarr"),
+        ("a.dzi", "a_files/0/0_0.png"),
+        ("a.dzi", "a_files"),
+        ("a.dzi", "a.dzi"),
+    ],
+)
+def test_what_is_of_somebody_else_is_left_alone(tmp_path, name, strange, options):
+    path = tmp_path / strange
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text("[" * 100_000 if strange.endswith("json") else "my only copy")
+    there = path.read_bytes()
+    with pytest.raises(FileExistsError, match=r"was not written by topleft: move it, or write elsewhere"):
+        WRITERS[name](raster_of("labels"), tmp_path / name, **options)
+    assert [entry for entry in tmp_path.rglob("*") if entry.is_file()] == [path]
+    assert path.read_bytes() == there
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_file_of_somebody_else_within_a_raster_stays(tmp_path, name):
+    """To go on is no harm; to replace it all would remove it."""
+    folder = {"a.zarr": "a.zarr", "a.tif": "a.tif.parts", "a.dzi": "a_files"}[name]
+    thesis = tmp_path / folder / "0" / ".thesis.00000000.part"
 
     def put(step):
+        thesis.parent.mkdir(exist_ok=True)
         thesis.write_text("my only copy")
         if step.n_done == 3:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        raster_of("labels").to_geotiff(tmp_path / "a.tif", tile=16, progress=put)
-    with pytest.raises(FileExistsError, match=r"a\.tif\.parts holds 0.\.thesis\.00000000\.part, which is of no raster"):
-        raster_of("labels").to_geotiff(tmp_path / "a.tif", tile=16)
-    raster_of("labels").to_geotiff(tmp_path / "a.tif", tile=16, resume=True)
-    assert (tmp_path / "a.tif").exists()
-    assert [path.name for path in sorted(tmp_path.rglob("*")) if path.is_file()] == ["a.tif", thesis.name]
+        WRITERS[name](raster_of("labels"), tmp_path / name, progress=put)
+    there = files_of(tmp_path)
+    with pytest.raises(FileExistsError, match=r"0.\.thesis\.00000000\.part was not written by topleft"):
+        WRITERS[name](raster_of("labels"), tmp_path / name, overwrite=True)
+    assert files_of(tmp_path) == there
+    assert WRITERS[name](raster_of("labels"), tmp_path / name, resume=True).n_kept >= 2
+    assert thesis.read_text() == "my only copy"
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_file_of_somebody_else_that_comes_meanwhile_stays(tmp_path, name):
+    """The raster is not finished then, and nothing is lost: it goes on when the file has been moved."""
+    if name == "a.zarr":
+        return
+
+    def put(step):
+        (tmp_path / name).write_text("my only copy")
+
+    with pytest.raises(FileExistsError, match="was not written by topleft"):
+        WRITERS[name](raster_of("labels"), tmp_path / name, progress=put)
+    assert (tmp_path / name).read_text() == "my only copy"
+    (tmp_path / name).unlink()
+    assert WRITERS[name](raster_of("labels"), tmp_path / name, resume=True).n_drawn == 0
+
+
+@pytest.mark.parametrize("is_whole", [True, False])
+@pytest.mark.parametrize("name", WRITERS)
+def test_raster_is_replaced_when_that_is_asked_for(tmp_path, name, is_whole):
+    """One that is finished or not, of another mesh, another kind and other levels; nothing of it stays."""
+    old, new = raster_of("field", 128), raster_of("labels", mesh=CORNER)
+
+    def stop(step):
+        if not is_whole:
+            raise KeyboardInterrupt
+
+    for folder in ("a", "b"):
+        (tmp_path / folder).mkdir()
+    with contextlib.suppress(KeyboardInterrupt):
+        WRITERS[name](old, tmp_path / "a" / name, progress=stop)
+    (tmp_path / "a" / name).parent.joinpath("beside.txt").write_text("stays")
+    with pytest.raises(FileExistsError, match="exists: resume=True goes on with it"):
+        WRITERS[name](new, tmp_path / "a" / name)
+    with pytest.raises(ValueError, match="give one of them"):
+        WRITERS[name](new, tmp_path / "a" / name, overwrite=True, resume=True)
+    WRITERS[name](new, tmp_path / "a" / name, overwrite=True)
+    WRITERS[name](new, tmp_path / "b" / name)
+    assert files_of(tmp_path / "a") == {**files_of(tmp_path / "b"), "beside.txt": b"stays"}
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_finished_raster_is_kept_when_it_goes_on(tmp_path, name):
+    first = WRITERS[name](raster_of("labels"), tmp_path / name)
+    there = files_of(tmp_path)
+    again = WRITERS[name](raster_of("labels"), tmp_path / name, resume=True)
+    assert (again.n_drawn, again.n_kept, again.n_blank) == (0, first.n_drawn, first.n_blank)
+    assert files_of(tmp_path) == there
+
+
+def test_geotiff_of_another_nodata_or_crs_is_another_one(tmp_path):
+    raster_of("labels").to_geotiff(tmp_path / "a.tif", tile=16)
+    with pytest.raises(ValueError, match=r"a\.tif is not of this raster"):
+        raster_of("labels").to_geotiff(tmp_path / "a.tif", tile=16, nodata=7, resume=True)
+
+
+def test_empty_file_and_folder_are_written_over(tmp_path):
+    """As those that tempfile makes."""
+    (tmp_path / "a.tif").touch()
+    (tmp_path / "a.zarr").mkdir()
+    for name in ("a.tif", "a.zarr"):
+        assert WRITERS[name](raster_of("labels"), tmp_path / name).n_drawn == 19
+
+
+def test_urls_are_replaced_and_what_is_not_ours_stays():
+    fsspec = pytest.importorskip("fsspec", reason="the tiles extra is not installed")
+    store = fsspec.filesystem("memory")
+    store.pipe_file("/bucket/b.zarr/zarr.json", b"{}")
+    with pytest.raises(FileExistsError, match=r"memory://bucket/b\.zarr was not written by topleft"):
+        raster_of("labels").to_zarr("memory://bucket/b.zarr", overwrite=True)
+    raster_of("field").to_zarr("memory://bucket/c.zarr", levels=3)
+    store.pipe_file("/bucket/c.zarr/thesis.txt", b"my only copy")
+    with pytest.raises(FileExistsError, match=r"memory://bucket/c\.zarr/thesis\.txt was not written by topleft"):
+        raster_of("labels").to_zarr("memory://bucket/c.zarr", overwrite=True)
+    store.rm_file("/bucket/c.zarr/thesis.txt")
+    raster_of("labels").to_zarr("memory://bucket/c.zarr", overwrite=True)
+    raster_of("labels").to_zarr("memory://bucket/d.zarr")
+    names = [store.find(f"/bucket/{folder}.zarr") for folder in "cd"]
+    assert [name.replace("/c.zarr", "/d.zarr") for name in names[0]] == names[1]
+
+
+DAMAGES = {
+    "cut": lambda content: content[: len(content) // 2],
+    "empty": lambda content: b"",
+    "noise": lambda content: RNG.integers(0, 256, len(content), np.uint8).tobytes(),
+    "flip": lambda content: content[: (n := len(content) // 2)] + bytes([content[n] ^ 1]) + content[n + 1 :],
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+@pytest.mark.parametrize("name", WRITERS)
+def test_damaged_tile_is_written_again(tmp_path, name, damage):
+    """At any level, whether another one is made of it or not."""
+    for folder in ("whole", "cut"):
+        (tmp_path / folder).mkdir()
+    WRITERS[name](raster_of("labels"), tmp_path / "whole" / name)
+    where = {"a.zarr": "a.zarr/{}/c", "a.tif": "a.tif.parts/{}", "a.dzi": "a_files/{}"}[name]
+
+    def stop(step):
+        if step.n_done > 20:  # the 19 windows, and two of the next level
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        WRITERS[name](raster_of("labels"), tmp_path / "cut" / name, progress=stop)
+    for level in (9, 8) if name == "a.dzi" else (0, 1):
+        tiles = [path for path in (tmp_path / "cut" / where.format(level)).rglob("*") if path.is_file()]
+        tile = max(tiles, key=lambda path: path.stat().st_size)
+        tile.write_bytes(DAMAGES[damage](tile.read_bytes()))
+    written = WRITERS[name](raster_of("labels"), tmp_path / "cut" / name, resume=True)
+    assert (written.n_drawn, written.n_kept) == (1, 18)
+    assert files_of(tmp_path / "cut") == files_of(tmp_path / "whole")
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_tile_that_is_damaged_meanwhile_is_told(tmp_path, name):
+    place = {"a.zarr": "a.zarr/0/c/1/2", "a.tif": "a.tif.parts/0/4_8", "a.dzi": "a_files/9/8_4.png"}[name]
+
+    def harm(step):
+        if step.n_done == 19:
+            (tmp_path / place).write_bytes(b"x")
+
+    with pytest.raises(OSError, match=r"(1.2|4_8|8_4\.png) is damaged \(.*\): resume=True writes it again"):
+        WRITERS[name](raster_of("labels"), tmp_path / name, progress=harm)
+    assert WRITERS[name](raster_of("labels"), tmp_path / name, resume=True).n_drawn == 1
 
 
 KILLED = """

@@ -7,6 +7,7 @@ file:// is a path of this machine.
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path, PurePosixPath
@@ -132,6 +133,17 @@ class RemotePath:
             return int(fs.info(name).get("size") or 0)
         except FileNotFoundError:
             return 0
+
+    def names_below(self) -> list[str]:
+        """The names of all files below it, with slashes."""
+        fs, name = self._reached
+        return [found[len(name.rstrip("/")) + 1 :] for found in fs.find(name)]
+
+    def unlink(self) -> None:
+        """Remove the file, if it is there."""
+        fs, name = self._reached
+        with suppress(FileNotFoundError):
+            fs.rm_file(name)
 
     def read_bytes(self) -> bytes:
         """Return what the file holds."""

@@ -11,6 +11,7 @@ geotiff.py    writes cloud-optimised GeoTIFF
 levels.py     writes all windows of a raster and its coarser levels, once each
 merge.py      merges visibility buffers of shares of the triangles
 spans.py      finds the triangles of each window
+store.py      keeps blocks of pixels as tiles, which the three formats encode
 tiles.py      defines `Tiles`: a raster that is drawn window by window
 zarr_files.py writes Zarr, version 3
 """
