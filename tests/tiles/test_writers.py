@@ -126,6 +126,12 @@ def test_zarr_goes_to_what_fsspec_reaches():
     assert raster.to_zarr("memory://bucket/a.zarr", compression="none", resume=True).n_kept == 19
 
 
+def test_url_that_cannot_be_written_to_is_told():
+    pytest.importorskip("fsspec", reason="the tiles extra is not installed")
+    with pytest.raises(ValueError, match=r"cannot write to data://x\.zarr/zarr\.json: Read only filesystem"):
+        raster_of("labels").to_zarr("data://x.zarr")
+
+
 # GeoTIFF
 
 
@@ -193,6 +199,23 @@ def test_geotiff_in_pixels_and_with_y_down(tmp_path):
     with tifffile.TiffFile(tmp_path / "b.tif") as file:
         assert file.pages[0].tags[34264].value[5] == 1.0
         assert equal(file.asarray(), down[:])
+
+
+@pytest.mark.parametrize("limit", [1 << 32, 1000])
+@pytest.mark.parametrize("compression", ["deflate", "none"])
+@pytest.mark.parametrize("kind", ["labels", "coverage", "shares", "colors", "alpha"])
+def test_geotiff_is_read_by_pillow(tmp_path, kind, compression, limit, monkeypatch):
+    """All levels, with blank tiles, plain and big."""
+    monkeypatch.setattr("topleft._tiles.geotiff.LIMIT_CLASSIC", limit)
+    raster = raster_of(kind)
+    raster.to_geotiff(tmp_path / "a.tif", tile=32, compression=compression)
+    level = raster[:].view(np.uint8) if raster.dtype == bool else raster[:]
+    with Image.open(tmp_path / "a.tif") as found:
+        assert found.n_frames == 5
+        for i in range(5):
+            found.seek(i)
+            assert equal(np.asarray(found), level)
+            level = halved(level, raster.painter.nodata, is_mean=raster.has_means)
 
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.int32, np.float32, np.float64, np.uint16, np.int64])

@@ -152,6 +152,12 @@ class RemotePath:
 
     def write_bytes(self, content: bytes) -> None:
         """Write the file, whole or not at all."""
+        try:
+            self._send(content)
+        except (NotImplementedError, ValueError) as error:  # what there is for that kind of URL reads only
+            raise ValueError(f"cannot write to {self.url}: {error}") from None
+
+    def _send(self, content: bytes) -> None:
         fs, name = self._reached
         protocols = {fs.protocol} if isinstance(fs.protocol, str) else set(fs.protocol)
         if not protocols & SHOWS_PARTS:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -161,14 +162,9 @@ def write_levels(
     try:
         with ThreadPoolExecutor(n_threads, thread_name_prefix="topleft-tiles") as pool:
             for level, blocks in enumerate(there):
-                listed = [(level, row, column) for row, column in np.argwhere(blocks).tolist()]
+                listed: list[tuple[int, int, int]] = [(level, *block) for block in np.argwhere(blocks).tolist()]
                 kept: set[tuple[int, int, int]] = set()
-
-                def look(*block: int, kept: set[tuple[int, ...]] = kept) -> None:  # type: ignore[assignment]
-                    if store.is_whole(*block):
-                        kept.add(block)
-
-                for _ in _in_turn(pool, look, iter(listed), n_threads):
+                for _ in _in_turn(pool, partial(note_whole, store, kept), iter(listed), n_threads):
                     pass
                 waiting = [block for block in listed if block not in kept]
                 n_kept, n_done = n_kept + len(kept) * (level == 0), n_done + len(kept)
@@ -187,6 +183,12 @@ def write_levels(
         if bar is not None:
             bar.close()
     return Written(n_drawn, n_kept, int(there[0].size - there[0].sum()))
+
+
+def note_whole(store: TileStore, kept: set[tuple[int, int, int]], level: int, row: int, column: int) -> None:
+    """Add a block that is there and whole to others."""
+    if store.is_whole(level, row, column):
+        kept.add((level, row, column))
 
 
 def check_whole(store: TileStore, there: list[npt.NDArray[np.bool_]]) -> None:

@@ -24,7 +24,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft import _engine
-from topleft._base.memory import Memory
+from topleft._base.memory import Memory, check_fits
 from topleft._tiles.ahead import in_order, kept_memory
 from topleft._tiles.blocks import BLOCK, Triangles
 
@@ -108,6 +108,7 @@ class WindowIndex:
     ) -> None:
         """`check`: looks at the corners of each block, and gets what tells where one of its triangles is."""
         self.tiling = tiling
+        check_fits((tiling.n_rows, tiling.n_columns + 1), np.int32, np.int32)
         self.counts = np.zeros((tiling.n_rows, tiling.n_columns), np.int32)
         self.n_spans = 0
         self._runs: list[_Run] = []

@@ -246,8 +246,9 @@ def begin(
         return True
     if isinstance(folder, DiskFolder):
         check_space(folder.path, n_copies * bytes_of(raster, store, prepare), f"a raster of {raster.shape}")
-    folder.check_own()
-    folder.remove()
+    if there:
+        folder.check_own()
+        folder.remove()
     return False
 
 
