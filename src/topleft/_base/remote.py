@@ -152,13 +152,13 @@ class RemotePath:
 
     def write_bytes(self, content: bytes) -> None:
         """Write the file, whole or not at all."""
+        fs, name = self._reached
         try:
-            self._send(content)
+            self._send(fs, name, content)
         except (NotImplementedError, ValueError) as error:  # what there is for that kind of URL reads only
             raise ValueError(f"cannot write to {self.url}: {error}") from None
 
-    def _send(self, content: bytes) -> None:
-        fs, name = self._reached
+    def _send(self, fs: Any, name: str, content: bytes) -> None:
         protocols = {fs.protocol} if isinstance(fs.protocol, str) else set(fs.protocol)
         if not protocols & SHOWS_PARTS:
             fs.pipe_file(name, content)

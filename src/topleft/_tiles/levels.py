@@ -162,7 +162,7 @@ def write_levels(
     try:
         with ThreadPoolExecutor(n_threads, thread_name_prefix="topleft-tiles") as pool:
             for level, blocks in enumerate(there):
-                listed: list[tuple[int, int, int]] = [(level, *block) for block in np.argwhere(blocks).tolist()]
+                listed = [(level, row, column) for row, column in np.argwhere(blocks).tolist()]
                 kept: set[tuple[int, int, int]] = set()
                 for _ in _in_turn(pool, partial(note_whole, store, kept), iter(listed), n_threads):
                     pass
