@@ -17,9 +17,9 @@ from comparing import files_of
 from PIL import Image
 
 import topleft as tl
-from topleft._tiles.deepzoom import halved_colors
-from topleft._tiles.geotiff import differences, sums
-from topleft._tiles.levels import halved
+from topleft._apps.tiles.deepzoom import halved_colors
+from topleft._apps.tiles.geotiff import differences, sums
+from topleft._apps.tiles.levels import halved
 
 SRC = str(Path(tl.__file__).parents[1])
 CHILD = {**os.environ, "PYTHONPATH": SRC}
@@ -178,7 +178,7 @@ def test_geotiff_is_cloud_optimised(tmp_path, kind):
 
 def test_geotiff_beyond_4_gb_is_bigtiff(tmp_path, monkeypatch):
     tifffile = pytest.importorskip("tifffile", reason="tifffile is not installed")
-    monkeypatch.setattr("topleft._tiles.geotiff.LIMIT_CLASSIC", 1000)
+    monkeypatch.setattr("topleft._apps.tiles.geotiff.LIMIT_CLASSIC", 1000)
     raster = raster_of("height_map")
     raster.to_geotiff(tmp_path / "a.tif", tile=32, compression="none")
     with tifffile.TiffFile(tmp_path / "a.tif") as file:
@@ -206,7 +206,7 @@ def test_geotiff_in_pixels_and_with_y_down(tmp_path):
 @pytest.mark.parametrize("kind", ["labels", "coverage", "shares", "colors", "alpha"])
 def test_geotiff_is_read_by_pillow(tmp_path, kind, compression, limit, monkeypatch):
     """All levels, with blank tiles, plain and big."""
-    monkeypatch.setattr("topleft._tiles.geotiff.LIMIT_CLASSIC", limit)
+    monkeypatch.setattr("topleft._apps.tiles.geotiff.LIMIT_CLASSIC", limit)
     raster = raster_of(kind)
     raster.to_geotiff(tmp_path / "a.tif", tile=32, compression=compression)
     level = raster[:].view(np.uint8) if raster.dtype == bool else raster[:]

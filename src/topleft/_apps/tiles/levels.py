@@ -1,0 +1,283 @@
+"""Writes all windows of a raster, and levels of half the size, each window once.
+
+Input: a raster, and a store: where its blocks of pixels go. Output: the chunks. A block is a window at level 0,
+and as many pixels at the coarser levels; those are made of the blocks below them, as they were written. Which blocks
+are there is read off the chunks themselves, so a run that was killed goes on where it stopped.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft._apps.tiles.folders import DiskFolder
+from topleft._apps.tiles.store import TileStore
+from topleft._core.base.arrays import check_progress, shown
+from topleft._core.base.cluster import is_client
+from topleft.errors import MissingPackageError
+
+if TYPE_CHECKING:
+    from topleft._apps.tiles.tiles import Tiles
+
+__all__ = ["Progress", "Step", "Written", "blocks_with_pixels", "check_executor", "halved", "write_levels"]
+
+Array = npt.NDArray[Any]
+
+
+@dataclass(frozen=True)
+class Step:
+    """A block that is written.
+
+    Attributes
+    ----------
+    level, row, column : int
+        Which one; level 0 are the windows.
+    n_done, n_blocks : int
+        How many are there now, and how many there will be; blank ones are not counted.
+    """
+
+    level: int
+    row: int
+    column: int
+    n_done: int
+    n_blocks: int
+
+
+Progress = Callable[[Step], object]
+
+
+@dataclass(frozen=True)
+class Written:
+    """What writing a raster did.
+
+    Attributes
+    ----------
+    n_drawn : int
+        Windows that were drawn.
+    n_kept : int
+        Windows that an earlier run had written.
+    n_blank : int
+        Windows without triangles, which are not drawn.
+    """
+
+    n_drawn: int
+    n_kept: int
+    n_blank: int
+
+
+def halved(pixels: Array, nodata: float | None, *, is_mean: bool) -> Array:
+    """Return pixels of half the size: the mean of four, those without data left out, or the upper left of them.
+
+    A last row or column without a partner counts twice.
+    """
+    if not is_mean:
+        return np.ascontiguousarray(pixels[::2, ::2])
+    height, width = pixels.shape[:2]
+    pads = [(0, height % 2), (0, width % 2)] + [(0, 0)] * (pixels.ndim - 2)
+    even = np.pad(pixels, pads, "edge") if height % 2 or width % 2 else pixels
+    quads = [even[y::2, x::2] for y in (0, 1) for x in (0, 1)]
+    if pixels.dtype.kind in "iub":
+        total = np.sum(quads, axis=0, dtype=np.int64)
+        return ((total + 2) >> 2).astype(pixels.dtype)
+    wide = [quad.astype(np.float64) for quad in quads]
+    if nodata is None:
+        return (((wide[0] + wide[1]) + (wide[2] + wide[3])) / 4).astype(pixels.dtype)
+    empty = np.float64(pixels.dtype.type(nodata))
+    is_there = [~np.isnan(quad) if np.isnan(empty) else quad != empty for quad in wide]
+    n = np.sum(is_there, axis=0)
+    parts = [np.where(has, quad, 0.0) for has, quad in zip(is_there, wide, strict=True)]
+    total = (parts[0] + parts[1]) + (parts[2] + parts[3])
+    return np.where(n > 0, total / np.maximum(n, 1), empty).astype(pixels.dtype)
+
+
+def blocks_with_pixels(raster: Tiles, n_levels: int) -> list[npt.NDArray[np.bool_]]:
+    """For each level which of its blocks hold more than background (rows, columns): these are written."""
+    there = [raster.index.counts > 0]
+    for _ in range(1, n_levels):
+        below = there[-1]
+        even = np.pad(below, [(0, below.shape[0] % 2), (0, below.shape[1] % 2)])
+        quads = even.reshape(even.shape[0] // 2, 2, even.shape[1] // 2, 2)
+        there.append(np.asarray(quads.any(axis=(1, 3))))
+    return there
+
+
+def write_levels(
+    raster: Tiles,
+    store: TileStore,
+    *,
+    halve: Callable[[Array], Array],
+    prepare: Callable[[Array], Array] | None = None,
+    progress: Progress | bool | None = None,
+    executor: Any = None,
+) -> Written:
+    """Write all blocks that are not there yet, level by level.
+
+    Parameters
+    ----------
+    halve : function of an array
+        Makes the level above.
+    prepare : function of an array, optional
+        Makes what is written of the pixels of a window.
+    executor : dask.distributed.Client, optional
+        Whose workers draw and write the windows; levels are made of these here.
+    """
+    there = blocks_with_pixels(raster, store.n_levels)
+    n_blocks = int(sum(level.sum() for level in there))
+    check_progress(progress)
+    bar = _bar(n_blocks) if progress is True else None
+    tell = bar.tell if bar is not None else progress if callable(progress) else None
+    n_done = n_drawn = n_kept = 0
+
+    def make(level: int, row: int, column: int) -> None:
+        if level == 0:
+            pixels = raster.draw_window(row, column, threads=1 if n_threads > 1 else None)
+            store.write(0, row, column, pixels if prepare is None else prepare(pixels))
+            return
+        store.write(level, row, column, halve(together(level - 1, row, column)))
+
+    def together(level: int, row: int, column: int) -> Array:
+        """The four blocks of a level that lie below one of the next."""
+        rows = range(2 * row, min(2 * row + 2, there[level].shape[0]))
+        columns = range(2 * column, min(2 * column + 2, there[level].shape[1]))
+        height = sum(store.shape_of(level, r, columns[0])[0] for r in rows)
+        width = sum(store.shape_of(level, rows[0], c)[1] for c in columns)
+        pixels = np.empty((height, width, *store.channels), store.dtype)
+        pixels[...] = store.empty
+        w, h = raster.window_size
+        for r in rows:
+            for c in columns:
+                if there[level][r, c]:
+                    y, x = (r - rows[0]) * h, (c - columns[0]) * w
+                    block = store.read(level, r, c)
+                    pixels[y : y + block.shape[0], x : x + block.shape[1]] = block
+        return pixels
+
+    n_threads = raster.n_threads
+    try:
+        with ThreadPoolExecutor(n_threads, thread_name_prefix="topleft-tiles") as pool:
+            for level, blocks in enumerate(there):
+                listed = [(level, row, column) for row, column in np.argwhere(blocks).tolist()]
+                kept: set[tuple[int, int, int]] = set()
+                for _ in _in_turn(pool, partial(note_whole, store, kept), iter(listed), n_threads):
+                    pass
+                waiting = [block for block in listed if block not in kept]
+                n_kept, n_done = n_kept + len(kept) * (level == 0), n_done + len(kept)
+                if bar is not None:
+                    bar.begin(n_done)
+                for done in (
+                    _in_turn(pool, make, iter(waiting), n_threads)
+                    if executor is None or level
+                    else _on_workers(executor, raster, store, prepare, iter(waiting))
+                ):
+                    n_drawn, n_done = n_drawn + (level == 0), n_done + 1
+                    if tell is not None:
+                        tell(Step(*done, n_done, n_blocks))
+        check_whole(store, there)
+    finally:
+        if bar is not None:
+            bar.close()
+    return Written(n_drawn, n_kept, int(there[0].size - there[0].sum()))
+
+
+def note_whole(store: TileStore, kept: set[tuple[int, int, int]], level: int, row: int, column: int) -> None:
+    """Add a block that is there and whole to others."""
+    if store.is_whole(level, row, column):
+        kept.add((level, row, column))
+
+
+def check_whole(store: TileStore, there: list[npt.NDArray[np.bool_]]) -> None:
+    """Raise an error if a tile that was written to a disk is not there any more.
+
+    Raises
+    ------
+    FileNotFoundError
+        If so.
+    """
+    if not isinstance(store.folder, DiskFolder):
+        return
+    for level, blocks in enumerate(there):
+        for row, column in np.argwhere(blocks).tolist():
+            name = store.missing(level, row, column)
+            if name is not None:
+                raise store.gone(name)
+
+
+def check_executor(executor: Any) -> None:
+    """Raise an error for what is no client of Dask."""
+    if not (executor is None or is_client(executor)):
+        raise TypeError(f"executor must be a dask.distributed.Client or None, got {shown(executor)}")
+
+
+def _on_workers(
+    client: Any,
+    raster: Tiles,
+    store: TileStore,
+    prepare: Callable[[Array], Array] | None,
+    blocks: Iterator[tuple[int, int, int]],
+) -> Iterator[tuple[int, int, int]]:
+    """Let workers of a cluster draw and write windows; yield each when it is there."""
+    from topleft._apps.tiles.cluster import WriteJob, write_on_cluster
+    from topleft._apps.tiles.dask_array import WindowJob
+
+    seen = store.seen_from_elsewhere()
+
+    def make(block: tuple[int, int, int]) -> WriteJob:
+        _, row, column = block
+        return WriteJob(seen, WindowJob(raster, row, column), row, column, prepare)
+
+    return write_on_cluster(client, make, blocks)
+
+
+def _in_turn(
+    pool: ThreadPoolExecutor,
+    make: Callable[[int, int, int], None],
+    blocks: Iterator[tuple[int, int, int]],
+    n_threads: int,
+) -> Iterator[tuple[int, int, int]]:
+    """Make blocks, so many at a time as there are threads; yield each when it is there."""
+    running: dict[Future[None], tuple[int, int, int]] = {}
+    try:
+        while True:
+            while len(running) < n_threads and (block := next(blocks, None)) is not None:
+                running[pool.submit(make, *block)] = block
+            if not running:
+                return
+            for future in wait(running, return_when=FIRST_COMPLETED).done:
+                block = running.pop(future)
+                future.result()
+                yield block
+    finally:
+        wait(running)
+
+
+class _LevelBar:
+    """A bar with rate and remaining time."""
+
+    def __init__(self, bar: Any) -> None:
+        self._bar = bar
+
+    def begin(self, n_done: int) -> None:
+        """Count what an earlier run has done."""
+        self._bar.update(n_done - self._bar.n)
+
+    def tell(self, step: Step) -> None:
+        """Go on by one."""
+        self._bar.update(step.n_done - self._bar.n)
+
+    def close(self) -> None:
+        """Leave it on the screen as it is."""
+        self._bar.close()
+
+
+def _bar(n_blocks: int) -> _LevelBar:
+    try:
+        from tqdm import tqdm
+    except ImportError:
+        raise MissingPackageError("progress=True needs the package tqdm: pip install 'topleft[render]'") from None
+    return _LevelBar(tqdm(total=n_blocks, unit=" windows"))
