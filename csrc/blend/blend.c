@@ -22,6 +22,7 @@
 #include "blend/blend_area.c"
 #include "blend/blend_exact.c"
 #include "blend/blend_few.c"
+#include "blend/blend_queue.c"
 #include "blend/mix.c"
 #include "blend/mix.h"
 #include "blend/mix_u8.c"
@@ -31,48 +32,9 @@ typedef struct {
     blend_state mix;
 } blend_pass;
 
-/* Row ends of TL_LANES triangles of at most 62 x 62 samples: see rows.c for why they are exact. */
-TL_INLINE void setup_blend_rows(const lane_triangles *t, vi n_cols, int n_rows, vi stride, blend_rows *rows)
-{
-    lane_edges e;
-    sort_edges(t, &e);
-    vi sample = t->sample;
-    for (int row = 0; row < n_rows; row++) {
-        vi begin, end;
-        next_row(&e, n_cols, &begin, &end);
-        begin = vi_min(begin, n_cols), end = vi_max(end, vi_set1(0)); /* corners may not be those of the box any more */
-        vi_store(rows->first[row], vi_add(sample, begin));
-        vi_store(rows->n[row], vi_sub(end, begin));
-        sample = vi_add(sample, stride);
-    }
-}
-
 static __attribute__((noinline)) void flush_blend(blend_pass *p)
 {
-    blend_state *b = &p->mix;
-    box_queue *q = &p->batch.rows;
-    const int n = q->n;
-    q->n = 0;
-    for (int i = 0; i < n; i += TL_LANES) {
-        lane_triangles t;
-        blend_rows rows;
-        vd no_depth[3];
-        const int end = n - i < TL_LANES ? n - i : TL_LANES;
-        int max_rows = 0;
-        pop(&p->batch, TL_SINK_BLEND, q, i, n, &t, no_depth);
-        for (int k = 0; k < end; k++)
-            max_rows = q->size[i + k] >> 16 > max_rows ? q->size[i + k] >> 16 : max_rows;
-        setup_blend_rows(&t, vi_and(vi_load(q->size + i), vi_set1(0xffff)), max_rows, vi_set1((int32_t)b->stride),
-                         &rows);
-        for (int k = 0; k < end; k++) {
-            const int64_t id = q->id[i + k];
-            if (!b->is_flat)
-                begin_gouraud_of_mesh(b, id);
-            else if (!begin_flat(b, id))
-                continue;
-            mix_runs(b, &rows.first[0][k], &rows.n[0][k], TL_MAX_LANES, q->size[i + k] >> 16);
-        }
-    }
+    flush_blend_rows((walk_state){.fixed = &p->batch}, TL_FIXED, &p->mix);
 }
 
 /* Setup and cull of TL_LANES triangles, which come after all that wait. */

@@ -13,9 +13,9 @@
 #include "vertex/snap.c"
 #include "exact/alone_exact.c"
 #include "exact/draw_exact.c"
-#include "exact/rows_exact.c"
 #include "exact/setup_exact.c"
 #include "raster/batch.c"
+#include "blend/blend_queue.c"
 #include "blend/mix.c"
 #include "blend/mix.h"
 
@@ -35,87 +35,9 @@ static __attribute__((noinline)) void blend_exact_alone(exact_state *s, blend_st
     draw_lone(s, (int32_t)drawn, TL_SINK_BLEND);
 }
 
-/* Row ends of TL_LANES triangles of at most 62 x 62 samples; returns the lanes with one in doubt. */
-TL_INLINE vm find_blend_rows(const lane_exact *t, const exact_edges *e, vi n_cols, int n_rows, int32_t stride,
-                             blend_rows *rows)
-{
-    const vi zero = vi_set1(0), one = vi_set1(1);
-    vm doubted = vm_first(0);
-    vi sample = t->sample;
-    for (int row = 0; row < n_rows; row++) {
-        vi quotient[3];
-        for (int side = 0; side < 3; side++) {
-            const vf q = vf_mul(vf_fma(e->step[side], vf_set1((float)row), e->start[side]), e->inverse[side]);
-            quotient[side] = vi_floor(q);
-            doubted = vm_or(doubted, is_near_integer(q, e->band[side]));
-        }
-        const vi left = vi_select(e->third_is_left, vi_min(quotient[0], quotient[2]), quotient[0]);
-        const vi right = vi_select(e->third_is_right, vi_min(quotient[1], quotient[2]), quotient[1]);
-        const vi begin = vi_max(vi_sub(zero, left), zero), end = vi_max(vi_min(vi_add(right, one), n_cols), zero);
-        vi_store(rows->first[row], vi_add(sample, begin));
-        vi_store(rows->n[row], vi_sub(end, begin));
-        sample = vi_add(sample, vi_set1(stride));
-    }
-    return vm_and(doubted, t->live);
-}
-
-/* Decides the row ends of the lanes in doubt: on the grid by lanes, else by the exact sign. */
-static __attribute__((noinline)) void ask_blend_rows(exact_state *s, int i, lane_exact *t, exact_edges *e, vi n_cols,
-                                                     int n_rows, int32_t stride, vm doubted, blend_rows *rows)
-{
-    const box_queue *q = &s->rows.boxes;
-    int32_t sample[TL_MAX_LANES];
-    if (vm_any(vm_and(try_grid(s, t, 0), doubted))) {
-        sort_exact_edges(s, t, TL_FAR_BAND, e);
-        doubted = find_blend_rows(t, e, n_cols, n_rows, stride, rows);
-    }
-    vi_store(sample, t->sample);
-    for (unsigned left = vm_bits(doubted); left; left &= left - 1) {
-        const int k = __builtin_ctz(left), n = q->size[i + k] >> 16;
-        asked_triangle a;
-        set_asked(s, q, i, k, t, TL_FAR_BAND, &a);
-        for (int row = 0; row < n; row++) {
-            int64_t first, end;
-            decide_row(&a, row, &first, &end, s->counts);
-            rows->first[row][k] = sample[k] + row * stride + (int32_t)first;
-            rows->n[row][k] = (int32_t)(end - first);
-        }
-        s->counts->n_asked += n;
-    }
-}
-
 static __attribute__((noinline)) void flush_exact_blend(exact_blend *p)
 {
-    exact_state *s = &p->exact;
-    blend_state *b = &p->mix;
-    box_queue *q = &s->rows.boxes;
-    const int32_t stride = (int32_t)b->stride;
-    for (int i = 0; i < q->n; i += TL_LANES) {
-        lane_exact t;
-        exact_edges e;
-        blend_rows rows;
-        const int end = q->n - i < TL_LANES ? q->n - i : TL_LANES;
-        const vi n_cols = vi_and(vi_load(q->size + i), vi_set1(0xffff));
-        int max_rows = 0;
-        for (int k = 0; k < end; k++)
-            max_rows = q->size[i + k] >> 16 > max_rows ? q->size[i + k] >> 16 : max_rows;
-        pop_exact(s, TL_SINK_BLEND, &s->rows, i, &t);
-        setup_exact(s, TL_SINK_BLEND, &t, 0);
-        sort_exact_edges(s, &t, TL_FAR_BAND, &e);
-        const vm doubted = find_blend_rows(&t, &e, n_cols, max_rows, stride, &rows);
-        if (__builtin_expect(vm_any(doubted), 0))
-            ask_blend_rows(s, i, &t, &e, n_cols, max_rows, stride, doubted, &rows);
-        const unsigned live = vm_bits(t.live);
-        for (int k = 0; k < end; k++) {
-            const int64_t id = q->id[i + k];
-            if (!(live >> k & 1) || (b->is_flat && !begin_flat(b, id)))
-                continue;
-            if (!b->is_flat)
-                begin_exact_gouraud(b, id, -1);
-            mix_runs(b, &rows.first[0][k], &rows.n[0][k], TL_MAX_LANES, q->size[i + k] >> 16);
-        }
-    }
-    q->n = 0;
+    flush_blend_rows((walk_state){.floats = &p->exact}, TL_FLOAT, &p->mix);
 }
 
 /* Setup of TL_LANES triangles, which come after all that wait. */

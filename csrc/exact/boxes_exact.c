@@ -210,7 +210,7 @@ TL_INLINE void flush_small_exact(exact_state *s, tl_sink sink)
     for (int i = 0; i < q->n; i += TL_LANES) {
         lane_exact t;
         const vi box = vi_load(q->size + i);
-        pop_exact(s, sink, &s->small, i, &t);
+        pop_exact(s, sink, &s->small, i, q->n, &t);
         measure_points(&t);
         n_fragments = draw_exact_boxes(s, sink, &t, vi_and(box, vi_set1(0xffff)), vi_shift_right(box, 16), TL_SMALL_BOX,
                                        n_fragments);

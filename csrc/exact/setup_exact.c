@@ -44,6 +44,7 @@
 #include "vertex/project.c"
 #include "exact/sign.c"
 #include "raster/batch.c"
+#include "raster/geometry.h"
 #include "raster/setup.c"
 #include "raster/sink.c"
 
@@ -55,53 +56,6 @@
 #define TL_GRID_VECTORS 64    /* on fine grids few vectors have a tie */
 #define TL_EXACT_BOX 64.0f    /* pixels */
 #define TL_HALF_UNIT 0x1p-17f /* half of what edge functions on the grid are multiples of */
-
-/* A queue of boxes, and X * Y of each extent. */
-typedef struct {
-    box_queue boxes;
-    float xy[TL_QUEUE + TL_MAX_LANES];
-} exact_queue;
-
-/* Everything that one pass over a mesh needs; on the stack of draw_exact. */
-typedef struct {
-    const tl_snapped *mesh; /* with the triangles that are drawn */
-    const tl_exact_points *points;
-    const tl_window *window;
-    const tl_target *target;
-    tl_exact_counts *counts;
-    tl_share *share;
-    int64_t left, top, right, bottom; /* picture pixels */
-    double centre_x, centre_y;        /* of a pixel's sample, from its upper left corner; of squares 0 */
-    vi last_vertex;
-    int64_t bad_row;    /* of triangles, -1: none so far */
-    int has_places;     /* of vertices, and all of the window lies within their limit */
-    int may_be_on_grid; /* the triangles that asked last were: of so many vectors, that is looked at first */
-    exact_queue small, middle, rows;
-    int n_slivers; /* triangles of the queues that have no depth plane, and wait to be drawn by themselves */
-    int32_t slivers[4 * (TL_QUEUE + TL_MAX_LANES)];
-    fragment_list fragments;
-} exact_state;
-
-/* TL_LANES triangles, turned so that their areas are positive. */
-typedef struct {
-    vi ids;
-    vd x[3], y[3], z[3];           /* z: where there is depth */
-    tl_test test;                  /* a constant where the sink is */
-    vd sample_x, sample_y;         /* the first sample of the box, in the picture; of squares the upper left corner */
-    vf e[3], dx[3], dy[3];         /* edge functions there, and what a row adds and a column subtracts */
-    vf xy;                         /* X * Y */
-    vf from_x[3], from_y[3], band; /* of boxes of up to 4x4: points from the first sample, and the band of samples */
-    vi sample;                     /* the first sample: row * stride_px + column */
-    vm live;                       /* of those that are there, the ones with an area, and that are not culled */
-    vm turned;                     /* corners 1 and 2 have changed places in e, dx and dy */
-    vm to_turn;                    /* and are still to do so in x and y */
-    vm on_grid;                    /* e, dx and dy are exact, in units of their own */
-} lane_exact;
-
-/* z = (z0 + slope_y * (y - y0)) + slope_x * (x - x0), in pixels from corner 0. */
-typedef struct {
-    vd z0, slope_x, slope_y;
-} exact_planes;
 
 /* The corners of a triangle that is turned, or not. */
 TL_INLINE void load_turned(const exact_state *s, int32_t id, int is_turned, exact_point *p)
@@ -426,11 +380,10 @@ TL_INLINE void take_out_slivers(exact_state *s, lane_exact *t)
 }
 
 /* Loads the triangles [i, i + TL_LANES) of a queue. */
-TL_INLINE void pop_exact(const exact_state *s, tl_sink sink, const exact_queue *queue, int i, lane_exact *t)
+TL_INLINE void pop_exact(const exact_state *s, tl_sink sink, const exact_queue *queue, int i, int n, lane_exact *t)
 {
     int32_t corners[3 * TL_LANES];
     const box_queue *q = &queue->boxes;
-    const int n = q->n;
     pop_corners(s->mesh, s->last_vertex, q, i, n, corners);
     load_points(s->points, sink, corners, t->x, t->y, t->z);
     t->ids = vi_load(q->id + i);

@@ -29,7 +29,7 @@
 
 /* Triangles that wait until a vector is full of their kind.  Their vertices are read again then: they are still in the
  * first-level cache, and packing twelve vectors a queue cost more. */
-typedef struct {
+typedef struct box_queue {
     int n;
     /* picture pixel of the first sample of the box */
     int32_t col[TL_QUEUE + TL_MAX_LANES], row[TL_QUEUE + TL_MAX_LANES];

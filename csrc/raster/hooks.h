@@ -6,6 +6,7 @@
 
 #include <stdint.h>
 
+#include "topleft.h"
 #include "lanes/lanes.h"
 
 /* TL_SINK_BLEND, in blend/mix_few.c: the colours of the pixels [at, at + n). */
@@ -23,5 +24,20 @@ static void draw_tiny_of_samples(struct batch_state *s, const struct lane_triang
 static void flush_small_of_samples(struct batch_state *s);
 static void flush_middle_of_samples(struct batch_state *s);
 static void flush_rows_of_samples(struct batch_state *s);
+
+/* TL_FLOAT, in exact/rows_exact.c: TL_LANES triangles at i in a queue of n, and what is in doubt, decided. */
+struct box_queue;
+struct exact_queue;
+struct exact_state;
+struct lane_exact;
+struct row_ends;
+struct row_lanes;
+TL_INLINE void load_floats(struct exact_state *s, tl_sink sink, const struct exact_queue *queue, int i, int n,
+                           float far, struct lane_exact *t, struct row_lanes *r);
+static void refine_middle_rows(struct exact_state *s, const struct box_queue *q, int i, struct lane_exact *t,
+                               vm doubted, int n_rows, int32_t (*bits)[TL_MAX_LANES]);
+static void refine_row_ends(struct exact_state *s, int i, int k, const struct lane_exact *t, int row0, unsigned doubted,
+                            struct row_ends *ends);
+static vm try_grid(struct exact_state *s, struct lane_exact *t, int of_boxes);
 
 #endif

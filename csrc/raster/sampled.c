@@ -117,11 +117,10 @@ TL_INLINE lane_span sampled_span(const vf *v, const vf *inverse, vm third_is_lef
                                  int sample_bits)
 {
     const vi zero = vi_set1(0), minus_one = vi_set1(-1);
-    vi quotient[3];
+    vi quotient[3], left, right;
     for (int side = 0; side < 3; side++)
         quotient[side] = vi_floor(vf_mul(v[side], inverse[side]));
-    const vi left = vi_select(third_is_left, vi_min(quotient[0], quotient[2]), quotient[0]);
-    const vi right = vi_select(third_is_right, vi_min(quotient[1], quotient[2]), quotient[1]);
+    meet_third(quotient, third_is_left, third_is_right, &left, &right);
     const vm beyond_flat = vm_and_not(vm_and_not(vi_gt(zero, quotient[2]), third_is_left), third_is_right);
     const vi end = vi_min(vi_sub(right, minus_one), n_cols);
     const vi begin = vi_min(vi_max(vi_sub(zero, left), zero), n_cols);
