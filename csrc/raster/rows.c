@@ -1,5 +1,5 @@
 /* Rows: triangles with boxes of 5 to 62 samples a side, by the ends of TL_LANES rows at a time.
- * In: the queues of batch.c, or of setup_exact.c.  Out: rows of samples to the sink.
+ * In: queues of boxes.  Out: rows of samples to the sink.
  *
  * An edge ends a row at floor(q), q = v / d, d = |dy|: samples up to floor(q) lie inside a right edge, samples from
  * -floor(q) on inside a left one.
@@ -7,10 +7,10 @@
  * TL_FIXED: v = E' at the row's first sample.  It is computed in float32 as floor((v + 0.5) * (1 / d)), exactly:
  * v + 0.5 has at most 22 bits; with |v / d| < 64 the two roundings err by less than 64 * 2^-22 = 2^-16, while
  * (v + 0.5) / d is at least 0.5 / d > 2^-15 from an integer.  Farther out the clamp to the box swallows the error.
- * Squares (batch.c): 60 pixels of 2^8 make |v| < 2^22, which float32 still holds exactly, half included.
+ * Squares (triangles_fixed.c): 60 pixels of 2^8 make |v| < 2^22, which float32 still holds exactly, half included.
  *
- * TL_FLOAT: v = E there, rounded.  Where q is nearer to an integer than the band says (setup_exact.c), that one column
- * is in doubt, and rows_exact.c decides. */
+ * TL_FLOAT: v = E there, rounded.  Where q is nearer to an integer than the band says (triangles_float.c), that one
+ * column is in doubt, and refine.c decides. */
 #ifndef TL_ROWS_C
 #define TL_ROWS_C
 
@@ -18,15 +18,13 @@
 
 #include "topleft.h"
 #include "lanes/lanes.h"
+#include "sink/covered.c"
+#include "sink/sink.c"
 #include "raster/alone.c"
-#include "raster/batch.c"
-#include "raster/covered.c"
-#include "raster/geometry.h"
-#include "raster/hooks.h"
-#include "raster/sink.c"
-
-#define TL_NEAR_BAND 0x1.2p-19f /* 36 u: of row ends up to 17 columns away */
-#define TL_FAR_BAND 0x1.04p-17f /* 130 u: up to 62 */
+#include "raster/refine.c"
+#include "raster/state.h"
+#include "raster/triangles_fixed.c"
+#include "raster/triangles_float.c"
 
 /* Which edge of TL_LANES triangles is the first on the left, the first on the right, and the third one, which is on
  * either side or horizontal: edge 0 or 1 by is0 and is1 of that place, else edge 2. */
@@ -42,18 +40,11 @@ typedef struct {
     vm third_is_left, third_is_right;
 } lane_edges;
 
-/* Their depth planes: z = (z0 + slope_y * (y - y0)) + slope_x * (x - x0), in units of plane_step. */
-typedef struct {
-    vd z0, slope_x, slope_y;
-    vd x, y;   /* of the first sample */
-    vd x0, y0; /* TL_FLOAT; else 0 */
-} row_planes;
-
 /* TL_LANES triangles of a queue. */
-typedef struct row_lanes {
+typedef struct {
     lane_edges edges;
-    row_planes planes; /* where the sink has depth */
-    vi sample;         /* the first sample: row * stride_px + column */
+    lane_planes planes; /* where the sink has depth */
+    vi sample;          /* the first sample: row * stride_px + column */
     unsigned live;
 } row_lanes;
 
@@ -66,11 +57,6 @@ typedef struct {
     float band[3][TL_MAX_LANES];
     double x0[TL_MAX_LANES], y0[TL_MAX_LANES];
 } row_edges;
-
-/* The samples [first, end) of TL_LANES rows of one triangle. */
-typedef struct row_ends {
-    int32_t first[TL_MAX_LANES], end[TL_MAX_LANES];
-} row_ends;
 
 /* ---- edges ----------------------------------------------------------------------------------------------- */
 
@@ -128,27 +114,46 @@ TL_INLINE void sort_fixed_edges(const lane_triangles *t, lane_edges *r)
     sort_edges(TL_FIXED, &sides, start, step, inverse, NULL, r);
 }
 
-/* How many triangles of a queue of n a vector at i holds. */
-TL_INLINE int lanes_at(int i, int n) { return n - i < TL_LANES ? n - i : TL_LANES; }
-
-TL_INLINE void load_fixed(const batch_state *s, tl_sink sink, const box_queue *q, int i, int n, row_lanes *r)
+TL_INLINE void sort_float_edges(const walk_state *s, const lane_exact *t, float far, lane_edges *r)
 {
-    lane_triangles t;
-    vd z[3];
-    pop(s, sink, q, i, n, &t, z);
-    sort_fixed_edges(&t, &r->edges);
-    r->sample = t.sample, r->live = (1u << lanes_at(i, n)) - 1;
-    if (sink_has_depth(sink)) {
-        const lane_planes p = plane_lanes(&t, z);
-        r->planes = (row_planes){p.z0, p.slope_x, p.slope_y, p.x, p.y, vd_set1(0.0), vd_set1(0.0)};
+    const vf zero = vf_set1(0.0f);
+    vf inverse[3], band[3];
+    vm left[3], right[3];
+    set_bands(s, t, far, inverse, band);
+    for (int k = 0; k < 3; k++)
+        left[k] = vf_lt(t->dy[k], zero), right[k] = vf_lt(zero, t->dy[k]);
+    const lane_sides sides = sides_of(left, right);
+    sort_edges(TL_FLOAT, &sides, t->e, t->dx, inverse, band, r);
+}
+
+/* The triangles [i, i + TL_LANES) of a queue of n, whose rows end up to 17 or 62 columns away, as `far` says.  t: of
+ * TL_FLOAT, for what is refined. */
+TL_INLINE void load_rows(walk_state *s, tl_geometry g, tl_sink sink, const box_queue *q, int i, int n, float far,
+                         lane_exact *t, row_lanes *r)
+{
+    if (g == TL_FIXED) {
+        lane_triangles own;
+        vd z[3];
+        pop_fixed(s, sink, q, i, n, &own, z);
+        sort_fixed_edges(&own, &r->edges);
+        r->sample = own.sample, r->live = (1u << lanes_at(i, n)) - 1;
+        if (sink_has_depth(sink))
+            r->planes = plane_lanes(&own, z);
+        return;
     }
+    pop_float(s, sink, q, i, n, t);
+    setup_float(s, sink, t, 0);
+    sort_float_edges(s, t, far, &r->edges);
+    r->sample = t->sample, r->live = vm_bits(t->live);
+    if (sink_has_depth(sink))
+        r->planes = plane_of_lanes(s, t);
 }
 
 TL_INLINE void store_edges(tl_geometry g, tl_sink sink, const row_lanes *lanes, row_edges *r)
 {
     const vi zero = vi_set1(0), yes = vi_set1(-1);
     const lane_edges *e = &lanes->edges;
-    const row_planes *p = &lanes->planes;
+    const lane_planes *p = &lanes->planes;
     for (int side = 0; side < 3; side++) {
         vf_store(r->start[side], e->start[side]);
         vf_store(r->step[side], e->step[side]);
@@ -227,16 +232,6 @@ TL_INLINE void find_rows_of_one(tl_geometry g, const row_edges *r, int k, vm thi
         *first = vi_max(*first, zero), *end = vi_min(*end, vi_set1(n_cols));
 }
 
-/* The most rows of the boxes [i, i + TL_LANES) of a queue of n. */
-TL_INLINE int most_rows(const box_queue *q, int i, int n)
-{
-    const int end = lanes_at(i, n);
-    int most = 0;
-    for (int k = 0; k < end; k++)
-        most = q->size[i + k] >> 16 > most ? q->size[i + k] >> 16 : most;
-    return most;
-}
-
 /* ---- boxes of up to 16 rows and TL_LANES columns --------------------------------------------------------- */
 
 /* Rows of a block of at most TL_LANES columns; the depth of a sample is the sum of its row's and its column's. */
@@ -302,7 +297,7 @@ TL_INLINE vm find_middle_rows(tl_geometry g, tl_sink sink, row_lanes *r, vi n_co
                               middle_rows *m)
 {
     const vi zero = vi_set1(0);
-    const row_planes *p = &r->planes;
+    const lane_planes *p = &r->planes;
     vm doubted = vm_first(0);
     vi_store(m->sample, r->sample);
     if (sink_has_depth(sink)) {
@@ -320,39 +315,37 @@ TL_INLINE vm find_middle_rows(tl_geometry g, tl_sink sink, row_lanes *r, vi n_co
     return doubted;
 }
 
-TL_INLINE void walk_middle_queue(walk_state s, tl_geometry g, tl_sink sink)
+TL_INLINE void flush_middle(walk_state *s, tl_geometry g, tl_sink sink)
 {
-    box_queue *q = middle_queue(s, g);
+    box_queue *q = &s->middle;
     const double step = plane_step(s, g);
     const int n = q->n;
     q->n = 0;
     for (int i = 0; i < n; i += TL_LANES) {
-        lane_exact t; /* TL_FLOAT */
+        lane_exact t;
         row_lanes r;
         middle_rows m;
-        if (g == TL_FIXED)
-            load_fixed(s.fixed, sink, q, i, n, &r);
-        else
-            load_floats(s.floats, sink, &s.floats->middle, i, n, TL_NEAR_BAND, &t, &r);
+        load_rows(s, g, sink, q, i, n, TL_NEAR_BAND, &t, &r);
         const int max_rows = most_rows(q, i, n);
         const vi n_cols = vi_and(vi_load(q->size + i), vi_set1(0xffff));
         const vm doubted = find_middle_rows(g, sink, &r, n_cols, max_rows, step, &m);
         if (g == TL_FLOAT && __builtin_expect(vm_bits(doubted) & r.live, 0))
-            refine_middle_rows(s.floats, q, i, &t, vm_and(doubted, t.live), max_rows, m.bits);
-        TL_SINK_CALL(draw_middle, target_of(s, g)->sink, mesh_of(s, g), target_of(s, g), q, i, r.live, &m)
+            refine_middle_rows(s, q, i, &t, vm_and(doubted, t.live), max_rows, m.bits);
+        TL_SINK_CALL(draw_middle, s->target->sink, s->snapped, s->target, q, i, r.live, &m)
     }
 }
+TL_WALK_COPIES(flush_middle)
 
 /* ---- boxes of up to 62 x 62 samples ---------------------------------------------------------------------- */
 
-/* Triangle k of those at i in the queue, in blocks of TL_LANES x TL_LANES samples.  (An int for k takes 3 % more time of
- * masks on AVX-512: gcc spills another register then.) */
-TL_INLINE void draw_rows(walk_state s, tl_geometry g, const tl_target *target, tl_sink sink, const row_edges *r,
+/* Triangle k of those at i in the queue, in blocks of TL_LANES x TL_LANES samples.  With an int for k, gcc spills a
+ * register more of the mask's copy: 3 % of its time on AVX-512. */
+TL_INLINE void draw_rows(walk_state *s, tl_geometry g, const tl_target *target, tl_sink sink, const row_edges *r,
                          const lane_exact *t, int i, int64_t k)
 {
     const double unit = plane_step(s, g);
-    const box_queue *q = rows_queue(s, g);
-    const int32_t size = q->size[i + k], id = name_of(mesh_of(s, g), q->id[i + k]), sample = r->sample[k];
+    const box_queue *q = &s->rows;
+    const int32_t size = q->size[i + k], id = name_of(s->snapped, q->id[i + k]), sample = r->sample[k];
     const int n_cols = size & 0xffff, n_rows = size >> 16;
     const vi zero = vi_set1(0);
     const vm third_is_left = vi_gt(zero, vi_set1(r->third_is_left[k]));
@@ -368,7 +361,7 @@ TL_INLINE void draw_rows(walk_state s, tl_geometry g, const tl_target *target, t
         doubted = vm_and(doubted, vm_first(n_rows - row0));
         if (g == TL_FLOAT && __builtin_expect(vm_any(doubted), 0)) {
             row_ends ends;
-            refine_row_ends(s.floats, i, (int)k, t, row0, vm_bits(doubted), &ends);
+            refine_row_ends(s, i, (int)k, t, row0, vm_bits(doubted), &ends);
             first = vi_load(ends.first), end = vi_load(ends.end);
         }
         end = vi_select(vm_first(n_rows - row0), end, zero);
@@ -397,72 +390,51 @@ TL_INLINE void draw_rows(walk_state s, tl_geometry g, const tl_target *target, t
     }
 }
 
-/* The n triangles at i in the queue; TL_FLOAT: those in `live`. */
-TL_INLINE void draw_all_rows(walk_state s, tl_geometry g, const row_edges *r, const lane_exact *t, int i, int n,
+/* The triangles in `live` of those at i in the queue; TL_FIXED: the first n. */
+TL_INLINE void draw_all_rows(walk_state *s, tl_geometry g, const row_edges *r, const lane_exact *t, int i, int n,
                              unsigned live, tl_sink sink)
 {
-    const tl_target target = *target_of(s, g); /* a copy that no store can change */
+    const tl_target target = *s->target; /* a copy that no store can change */
     for (int64_t k = 0; k < n; k++)
         if (g == TL_FIXED || live >> k & 1)
             draw_rows(s, g, &target, sink, r, t, i, k);
 }
 
-TL_INLINE void draw_fixed_rows(batch_state *s, const row_edges *r, int i, int n, tl_sink sink)
+TL_INLINE void draw_rows_fixed(walk_state *s, const row_edges *r, int i, int n, tl_sink sink)
 {
-    draw_all_rows((walk_state){.fixed = s}, TL_FIXED, r, NULL, i, n, 0, sink);
+    draw_all_rows(s, TL_FIXED, r, NULL, i, n, 0, sink);
 }
-TL_SINK_COPIES(draw_fixed_rows, (batch_state *s, const row_edges *r, int i, int n), s, r, i, n)
+TL_SINK_COPIES(draw_rows_fixed, (walk_state * s, const row_edges *r, int i, int n), s, r, i, n)
 
-TL_INLINE void draw_float_rows(exact_state *s, const row_edges *r, const lane_exact *t, int i, unsigned live,
+TL_INLINE void draw_rows_float(walk_state *s, const row_edges *r, const lane_exact *t, int i, unsigned live,
                                tl_sink sink)
 {
-    draw_all_rows((walk_state){.floats = s}, TL_FLOAT, r, t, i, TL_LANES, live, sink);
+    draw_all_rows(s, TL_FLOAT, r, t, i, TL_LANES, live, sink);
 }
-TL_SINK_COPIES(draw_float_rows, (exact_state * s, const row_edges *r, const lane_exact *t, int i, unsigned live), s, r,
+TL_SINK_COPIES(draw_rows_float, (walk_state * s, const row_edges *r, const lane_exact *t, int i, unsigned live), s, r,
                t, i, live)
 
-TL_INLINE void walk_rows_queue(walk_state s, tl_geometry g, tl_sink sink)
+TL_INLINE void flush_rows(walk_state *s, tl_geometry g, tl_sink sink)
 {
-    box_queue *q = rows_queue(s, g);
+    box_queue *q = &s->rows;
     const int n = q->n;
     q->n = 0;
     for (int i = 0; i < n; i += TL_LANES) {
-        lane_exact t; /* TL_FLOAT */
+        lane_exact t;
         row_lanes lanes;
         row_edges r;
+        load_rows(s, g, sink, q, i, n, TL_FAR_BAND, &t, &lanes);
+        store_edges(g, sink, &lanes, &r);
         if (g == TL_FIXED) {
-            load_fixed(s.fixed, sink, q, i, n, &lanes);
-            store_edges(g, sink, &lanes, &r);
-            TL_SINK_CALL(draw_fixed_rows, s.fixed->target->sink, s.fixed, &r, i, lanes_at(i, n))
+            TL_SINK_CALL(draw_rows_fixed, s->target->sink, s, &r, i, lanes_at(i, n))
             continue;
         }
-        load_floats(s.floats, sink, &s.floats->rows, i, n, TL_FAR_BAND, &t, &lanes);
-        store_edges(g, sink, &lanes, &r);
-        const int64_t n_asked = s.floats->counts->n_asked;
-        TL_SINK_CALL(draw_float_rows, s.floats->target->sink, s.floats, &r, &t, i, lanes.live)
-        if (s.floats->counts->n_asked != n_asked)
-            try_grid(s.floats, &t, 0);
+        const int64_t n_asked = s->counts->n_asked;
+        TL_SINK_CALL(draw_rows_float, s->target->sink, s, &r, &t, i, lanes.live)
+        if (s->counts->n_asked != n_asked)
+            try_grid(s, &t, 0);
     }
 }
-
-/* ---- the copies ------------------------------------------------------------------------------------------ */
-
-TL_INLINE void flush_middle(batch_state *s, tl_sink sink)
-{
-    walk_middle_queue((walk_state){.fixed = s}, TL_FIXED, sink);
-}
-TL_INLINE void flush_rows(batch_state *s, tl_sink sink) { walk_rows_queue((walk_state){.fixed = s}, TL_FIXED, sink); }
-TL_INLINE void flush_middle_exact(exact_state *s, tl_sink sink)
-{
-    walk_middle_queue((walk_state){.floats = s}, TL_FLOAT, sink);
-}
-TL_INLINE void flush_rows_exact(exact_state *s, tl_sink sink)
-{
-    walk_rows_queue((walk_state){.floats = s}, TL_FLOAT, sink);
-}
-TL_LIST_COPIES(flush_middle, (batch_state *s), s)
-TL_LIST_COPIES(flush_rows, (batch_state *s), s)
-TL_LIST_COPIES(flush_middle_exact, (exact_state * s), s)
-TL_LIST_COPIES(flush_rows_exact, (exact_state * s), s)
+TL_WALK_COPIES(flush_rows)
 
 #endif

@@ -1,20 +1,25 @@
-/* What rows.c asks of vertices that are not snapped.
- * In: a queue of setup_exact.c.  Out: edges in float32 with bands; row ends that lie in the band of doubt, by the exact
- * sign. */
-#ifndef TL_ROWS_EXACT_C
-#define TL_ROWS_EXACT_C
+/* Refine: row ends of vertices that are not snapped which lie in the band of doubt.
+ * In: a vector of triangles, and rows.  Out: row ends, by float64 and, where that does not tell, by the exact sign. */
+#ifndef TL_REFINE_C
+#define TL_REFINE_C
 
 #include <math.h>
 #include <stdint.h>
 
 #include "topleft.h"
 #include "lanes/lanes.h"
-#include "exact/setup_exact.c"
 #include "exact/sign.c"
-#include "raster/alone.c"
-#include "raster/batch.c"
-#include "raster/rows.c"
-#include "raster/sink.c"
+#include "sink/sink.c"
+#include "raster/state.h"
+#include "raster/triangles_float.c"
+
+#define TL_NEAR_BAND 0x1.2p-19f /* 36 u: of row ends up to 17 columns away */
+#define TL_FAR_BAND 0x1.04p-17f /* 130 u: up to 62 */
+
+/* The samples [first, end) of TL_LANES rows of one triangle. */
+typedef struct {
+    int32_t first[TL_MAX_LANES], end[TL_MAX_LANES];
+} row_ends;
 
 /* The row ends of one triangle, for what is asked. */
 typedef struct {
@@ -26,7 +31,7 @@ typedef struct {
 } asked_triangle;
 
 /* The band of an edge of a triangle: in columns. */
-TL_INLINE void set_bands(const exact_state *s, const lane_exact *t, float far, vf *inverse, vf *band)
+TL_INLINE void set_bands(const walk_state *s, const lane_exact *t, float far, vf *inverse, vf *band)
 {
     const vf zero = vf_set1(0.0f), margin = vf_mul(t->xy, vf_set1(TL_ROW_BAND));
     const vf slack = vf_set1(far * (float)s->points->band), never = vf_set1(-1.0f);
@@ -37,33 +42,6 @@ TL_INLINE void set_bands(const exact_state *s, const lane_exact *t, float far, v
         band[k] = vf_select(vm_or(level, t->on_grid), never, vf_add(vf_mul(margin, inverse[k]), slack));
     }
 }
-
-TL_INLINE void sort_float_edges(const exact_state *s, const lane_exact *t, float far, lane_edges *r)
-{
-    const vf zero = vf_set1(0.0f);
-    vf inverse[3], band[3];
-    vm left[3], right[3];
-    set_bands(s, t, far, inverse, band);
-    for (int k = 0; k < 3; k++)
-        left[k] = vf_lt(t->dy[k], zero), right[k] = vf_lt(zero, t->dy[k]);
-    const lane_sides sides = sides_of(left, right);
-    sort_edges(TL_FLOAT, &sides, t->e, t->dx, inverse, band, r);
-}
-
-TL_INLINE void load_floats(exact_state *s, tl_sink sink, const exact_queue *queue, int i, int n, float far,
-                           lane_exact *t, row_lanes *r)
-{
-    pop_exact(s, sink, queue, i, n, t);
-    setup_exact(s, sink, t, 0);
-    sort_float_edges(s, t, far, &r->edges);
-    r->sample = t->sample, r->live = vm_bits(t->live);
-    if (sink_has_depth(sink)) {
-        const exact_planes p = plane_of_lanes(s, t);
-        r->planes = (row_planes){p.z0, p.slope_x, p.slope_y, t->sample_x, t->sample_y, t->x[0], t->y[0]};
-    }
-}
-
-/* ---- what is asked ------------------------------------------------------------------------------------- */
 
 /* Whether column k of a row lies inside edge i. */
 TL_INLINE int is_column_inside(const asked_triangle *a, int i, double y, int64_t k, tl_exact_counts *counts)
@@ -117,7 +95,7 @@ TL_INLINE void decide_row(const asked_triangle *a, int64_t row, int64_t *first, 
 }
 
 /* Lane k of a vector of triangles, in the numbers that lanes have. */
-static __attribute__((noinline)) void set_asked(const exact_state *s, const box_queue *q, int i, int k,
+static __attribute__((noinline)) void set_asked(const walk_state *s, const box_queue *q, int i, int k,
                                                 const lane_exact *t, float far, asked_triangle *a)
 {
     vf inverse[3], band[3];
@@ -221,7 +199,7 @@ TL_INLINE vm list_columns(const lane_exact *t, const vf *inverse, const vf *band
 
 /* Decides all rows of the lanes in doubt: by their grid, by float64 at each column in doubt, by the exact sign; and
  * rows whose bands are wide by themselves. */
-static __attribute__((noinline)) void refine_middle_rows(exact_state *s, const box_queue *q, int i, lane_exact *t,
+static __attribute__((noinline)) void refine_middle_rows(walk_state *s, const box_queue *q, int i, lane_exact *t,
                                                          vm doubted, int n_rows, int32_t (*bits)[TL_MAX_LANES])
 {
     const vi size = vi_load(q->size + i), n_cols = vi_and(size, vi_set1(0xffff));
@@ -295,11 +273,11 @@ TL_INLINE void ask_row_ends(const asked_triangle *a, int row0, unsigned doubted,
 }
 
 /* The rows from row0 on of triangle k of those at i in the queue. */
-static __attribute__((noinline)) void refine_row_ends(exact_state *s, int i, int k, const lane_exact *t, int row0,
+static __attribute__((noinline)) void refine_row_ends(walk_state *s, int i, int k, const lane_exact *t, int row0,
                                                       unsigned doubted, row_ends *ends)
 {
     asked_triangle a;
-    set_asked(s, &s->rows.boxes, i, k, t, TL_FAR_BAND, &a);
+    set_asked(s, &s->rows, i, k, t, TL_FAR_BAND, &a);
     ask_row_ends(&a, row0, doubted, ends, s->counts);
 }
 
