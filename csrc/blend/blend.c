@@ -2,9 +2,9 @@
  * In: vertex records, triangles and their colours.  Out: pixels.
  *
  * Nothing is drawn out of order: one queue of triangles, whose setup and row ends are computed a vector of triangles at
- * a time, as in rows.c, and whose rows are then drawn triangle by triangle.  What lanes cannot take empties the queue and
- * is drawn by itself.  Where clip planes cut triangles that are not snapped, all are, and the pieces of one in its place.
- * Bands of rows see the same triangles in the same order, so threads cannot change a bit. */
+ * a time, as in rows.c, and whose rows are then drawn triangle by triangle.  What lanes cannot take empties the queue
+ * and is drawn by itself.  Where clip planes cut triangles that are not snapped, all of them are, and the pieces of one
+ * in its place.  Bands of rows see the same triangles in the same order, so threads cannot change a bit. */
 #ifndef TL_BLEND_C
 #define TL_BLEND_C
 

@@ -1,9 +1,10 @@
 /* Sampled: triangles in lanes, tested at all samples of a pixel at once.
- * In: triangles and queues of boxes that hold every pixel with a covered sample.  Out: bits of samples.
+ * In: triangles that are snapped and queues of boxes, which hold every pixel with a covered sample.  Out: bits of
+ * samples.
  *
  * A sample moves an edge function by 2 (dx * y - dy * x), from the centre, and nothing else: load, cull, setup and
- * queues are shared.  Ranges are those of squares (triangles_fixed.c).  A box is up to a pixel too large, so where row ends
- * decide, a horizontal edge is tested. */
+ * queues are shared.  Ranges are those of squares (triangles_fixed.c).  A box is up to a pixel too large, so where row
+ * ends decide, a horizontal edge is tested. */
 #ifndef TL_SAMPLED_C
 #define TL_SAMPLED_C
 

@@ -1,6 +1,7 @@
 /* The state of a pass over a mesh, and triangles on their way through it, of either geometry: TL_FIXED, vertices that
- * are snapped (triangles_fixed.c), and TL_FLOAT, vertices that are not (triangles_float.c).  Each walker has a copy for either: a geometry is
- * a constant wherever it is a parameter, as a sink is, and what the other one needs is in no copy. */
+ * are snapped (triangles_fixed.c), and TL_FLOAT, vertices that are not (triangles_float.c).  Each walker has a copy for
+ * either: a geometry is a constant wherever it is a parameter, as a sink is, and what the other one needs is in no
+ * copy. */
 #ifndef TL_STATE_H
 #define TL_STATE_H
 

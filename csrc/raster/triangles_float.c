@@ -1,4 +1,5 @@
-/* Float: TL_LANES triangles at a time whose vertices are not snapped, as edge functions in float32 with a band of doubt.
+/* Float: TL_LANES triangles at a time whose vertices are not snapped, as edge functions in float32 with a band of
+ * doubt.
  * In: points in pixels and triangles.  Out: boxes, edge functions, depth planes; which lanes lie on a grid.
  *
  * A sample belongs to a triangle by the sign of the exact edge functions of the float64 numbers that stand in the
@@ -33,7 +34,8 @@
  * 5. Vertices on 2^-8 px: ties are systematic, so lanes that ask are looked at, and the band of those on the grid is 0.
  *    Boxes of up to 4x4 samples: points are measured without an error, edge functions are multiples of 2^-16, and while
  *    XY <= 64 nothing is rounded in 2., as all its numbers are below 2^7; they are moved by half a unit where a tie is
- *    not within, and otherwise the other way.  Larger boxes: integers of 2^-8 px, as triangles_fixed.c and rows.c have them.
+ *    not within, and otherwise the other way.  Larger boxes: integers of 2^-8 px, as triangles_fixed.c and rows.c have
+ *    them.
  *
  * tests/raster/test_exact.py draws with bands four times narrower, which give wrong pictures. */
 #ifndef TL_TRIANGLES_FLOAT_C
@@ -268,7 +270,8 @@ TL_INLINE void set_ties(lane_exact *t, vm m)
     t->on_grid = vm_or(t->on_grid, m);
 }
 
-/* Sets the edge functions of the lanes in m to those of triangles_fixed.c, half a unit inwards: none is ever 0 at a sample. */
+/* Sets the edge functions of the lanes in m to those of triangles_fixed.c, half a unit inwards: none is ever 0 at a
+ * sample. */
 static __attribute__((noinline)) void set_grid_edges(lane_exact *t, vm m)
 {
     vi x[3], y[3]; /* doubled, from the first sample */
