@@ -128,12 +128,15 @@ def _tree_and_blob(source: InputFile) -> tuple[Tree, bytes | None]:
         raise MeshError("its JSON is nested too deeply") from None
     if not isinstance(tree, dict):
         raise MeshError("its JSON is no object")
-    asset = tree.get("asset", {})
-    version = str(asset.get("version", "") if isinstance(asset, dict) else "")
+    asset = tree.get("asset")
+    asset = asset if isinstance(asset, dict) else {}
+    version, needed = str(asset.get("version", "")), str(asset.get("minVersion", "2.0"))
     if version.startswith("1") or (not version and isinstance(tree.get("meshes"), dict)):
         raise _glTF1(source)
     if not version.startswith("2"):
         raise MeshError(f"cannot read {str(source.path)!r}: its version of glTF is {version[:20]!r}, and 2.0 is read")
+    if needed not in ("2.0", "2") and not needed.startswith("1."):
+        raise MeshError(f"cannot read {str(source.path)!r}: it needs version {needed[:20]!r} of glTF, and 2.0 is read")
     return tree, blob
 
 
