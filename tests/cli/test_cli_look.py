@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from first_pictures import camera_of, first_picture
+from gltf_files import GltfFile
 from PIL import Image
 
 import topleft as tl
@@ -68,6 +69,15 @@ def test_render_environment_is_light_from_all_around(run, checks, text, up, envi
 def test_render_opacity_is_glass(run, layers):
     assert run("render", "torus-knot", "-o", "a.png", "--opacity", 0.4, *layers, *SMALL) == (0, [])
     assert np.array_equal(pixels("a.png"), tl.render_transparent(KNOT, camera_of(KNOT), SIZE, opacity=0.4))
+
+
+@pytest.mark.parametrize(("cull", "is_shown"), [((), 0), (("--cull", "none"), 1), (("--cull", "front"), 1)])
+def test_render_cull_that_is_typed_wins_over_the_material(run, folder, cull, is_shown):
+    file = GltfFile(materials=[{}]).shown([[0, 0, 0], [0, 1, 0], [1, 0, 0]], material=0)  # seen from behind
+    (folder / "a.glb").write_bytes(file.glb())
+    view = ["--azimuth", 0, "--elevation", 0, "--background", "transparent"]
+    assert run("render", "a.glb", "-o", "a.png", *view, *cull, *SMALL) == (0, [])
+    assert pixels("a.png")[..., 3].any() == is_shown
 
 
 def test_render_unlit_shows_the_color(run):

@@ -188,7 +188,12 @@ def add_picture_arguments(parser: argparse.ArgumentParser) -> None:
         help="draw a coarser level of the mesh whose outline is off by at most PX pixels (default 0: the mesh)",
     )
     add("--wireframe", action="store_true", help="draw the edges over it")
-    add("--cull", choices=[str(side) for side in Cull], default="none", help="leave out triangles (default none)")
+    add(
+        "--cull",
+        choices=[str(side) for side in Cull],
+        default=None,
+        help="the side to leave out, whatever materials say (default: backs of those that have one side)",
+    )
     samplings = [str(mode) for mode in Sampling if mode is Sampling.CENTER or mode.n_samples > 1]
     add(
         "--sampling",
