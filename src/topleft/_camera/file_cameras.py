@@ -20,7 +20,7 @@ from topleft._io.references import InputFile
 from topleft.errors import MeshError
 
 if TYPE_CHECKING:
-    from topleft._io.gltf import CameraOfFile
+    from topleft._io.gltf.reader import CameraOfFile
 
 
 def load_cameras(path: str | os.PathLike[str]) -> list[Camera]:
@@ -60,7 +60,7 @@ def load_cameras(path: str | os.PathLike[str]) -> list[Camera]:
     def cameras() -> list[Camera]:
         if source.path.suffix.lower() not in GLTF_SUFFIXES:
             return []
-        from topleft._io.gltf import read_cameras  # as late as in `load`
+        from topleft._io.gltf.reader import read_cameras  # as late as in `load`
 
         return [_camera(own, source) for own in read_cameras(source)]
 

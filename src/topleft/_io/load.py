@@ -99,7 +99,7 @@ def _mesh(source: InputFile, crease: float) -> Mesh | Points:
     """The mesh of the file; a reader is imported when a file needs it."""
     match source.path.suffix.lower():
         case suffix if suffix in GLTF_SUFFIXES:
-            from topleft._io.gltf import read_gltf
+            from topleft._io.gltf.reader import read_gltf
 
             parts = read_gltf(source)
         case ".obj":

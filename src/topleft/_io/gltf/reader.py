@@ -20,8 +20,8 @@ import numpy.typing as npt
 
 from topleft import _engine
 from topleft._base.color import encode_srgb
-from topleft._io.gltf_accessors import Accessors, Tree, entry, normalized
-from topleft._io.gltf_materials import Materials
+from topleft._io.gltf.accessors import Accessors, Tree, entry, normalized
+from topleft._io.gltf.materials import Materials
 from topleft._io.references import Cloud, InputFile
 from topleft._model.joined import placed_arrays
 from topleft._model.mesh import Mesh

@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from topleft import _engine
 from topleft._base.color import LIGHT_OF_SRGB, Color, encode_srgb
-from topleft._io.gltf_accessors import Accessors, Tree, entry, uri_content, whole
+from topleft._io.gltf.accessors import Accessors, Tree, entry, uri_content, whole
 from topleft._io.references import InputFile
 from topleft._model.material import AlphaMode, Material
 from topleft._model.texture import Texture
