@@ -15,7 +15,7 @@ from topleft import _engine
 from topleft._base.arrays import as_path
 from topleft._camera.camera import Camera
 from topleft._camera.matrices import F64, box_matrix, frustum_matrix, tangent
-from topleft._io.load import GLTF_SUFFIXES, reading
+from topleft._io.load import GLTF_SUFFIXES, as_moment, reading
 from topleft._io.references import InputFile
 from topleft.errors import MeshError
 
@@ -23,13 +23,17 @@ if TYPE_CHECKING:
     from topleft._io.gltf.reader import CameraOfFile
 
 
-def load_cameras(path: str | os.PathLike[str]) -> list[Camera]:
+def load_cameras(
+    path: str | os.PathLike[str], *, time: float | None = None, clip: int | str | None = None
+) -> list[Camera]:
     r"""The cameras of a glTF or GLB file, in the order of the nodes that hold them; of other formats none.
 
     Parameters
     ----------
     path : path
         The file that `load` reads the mesh from.
+    time, clip
+        As for `load`: where an animation has the nodes of the cameras at a time.
 
     Returns
     -------
@@ -42,7 +46,9 @@ def load_cameras(path: str | os.PathLike[str]) -> list[Camera]:
     FileNotFoundError
         If there is no such file.
     MeshError
-        If the file is broken, or a camera of it has numbers that none can have.
+        If the file is broken, or a camera of it has numbers that none can have, or there is no such animation.
+    ValueError
+        If `time` is negative, infinite or NaN.
 
     Examples
     --------
@@ -56,6 +62,7 @@ def load_cameras(path: str | os.PathLike[str]) -> list[Camera]:
     []
     """
     source = InputFile(as_path("path", path))
+    source.moment = as_moment(time, clip)
 
     def cameras() -> list[Camera]:
         if source.path.suffix.lower() not in GLTF_SUFFIXES:

@@ -12,6 +12,7 @@ from topleft._base.options import Cull, Sampling
 from topleft._camera.camera import DEFAULT_FOV_Y_DEG
 from topleft._camera.matrices import THREE_QUARTER_DEG
 from topleft._io.images import PICTURE_SUFFIXES, SUFFIXES
+from topleft._io.load import as_seconds
 from topleft._model.mesh import DEFAULT_CREASE, as_crease
 from topleft._model.points import DEFAULT_POINT_SIZE
 from topleft._render.layers import LAYERS, check_layers
@@ -135,6 +136,20 @@ def add_picture_arguments(parser: argparse.ArgumentParser) -> None:
     add("--size", type=size, default=DEFAULT_SIZE, metavar="WxH", help=f"pixels (default {width}x{height})")
     add("--views", type=views, default=1, metavar="N", help="a turntable of N pictures (default 1)")
     add("--layers", type=_layers, default=(), metavar="NAME,...", help="what to write; see below (default color)")
+    add(
+        "--time",
+        type=_seconds,
+        default=None,
+        metavar="SECONDS",
+        help="of an animation of a glTF file (default: at rest)",
+    )
+    add(
+        "--clip",
+        type=_clip,
+        default=None,
+        metavar="N|NAME|all",
+        help="which animation --time is of, from 0 (default the first)",
+    )
     add(
         "--threads",
         type=positive,
@@ -266,6 +281,17 @@ def _point_size(text: str) -> float:
         return float(as_point_size("--point-size", float(text), 1))
     except ValueError:
         raise argparse.ArgumentTypeError(f"must be a positive number of pixels, got {text!r}") from None
+
+
+def _seconds(text: str) -> float:
+    try:
+        return as_seconds(float(text))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"must be a number of seconds, 0 or more, got {text!r}") from None
+
+
+def _clip(text: str) -> int | str:
+    return int(text) if text.isdecimal() else text
 
 
 def _crease(text: str) -> float:

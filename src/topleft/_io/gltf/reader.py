@@ -1,4 +1,4 @@
-"""Reads glTF 2.0 and GLB: nodes, meshes, materials, skins and morph targets at rest, cameras.
+"""Reads glTF 2.0 and GLB: nodes, meshes, materials, skins, morph targets, cameras; at rest or at a time.
 
 Input: a file, unchecked. Output: `Mesh` parts in the order of the nodes, placed in the world; poses of cameras.
 
@@ -21,6 +21,7 @@ import numpy.typing as npt
 from topleft import _engine
 from topleft._base.color import encode_srgb
 from topleft._io.gltf.accessors import Accessors, Tree, entry, normalized
+from topleft._io.gltf.animations import posed
 from topleft._io.gltf.materials import Materials
 from topleft._io.references import Cloud, InputFile
 from topleft._model.joined import placed_arrays
@@ -85,11 +86,11 @@ def read_gltf(source: InputFile) -> list[Mesh]:
     tree, blob = _tree_and_blob(source)
     _check_extensions(tree, source)
     accessors = Accessors(tree, blob, source)
-    reader = _Reader(tree, accessors, Materials(tree, accessors, source), source)
-    parts = list(reader.parts())
-    if tree.get("animations"):
+    if source.moment is not None:
+        tree = posed(tree, accessors, source.moment, source)
+    elif tree.get("animations"):
         source.notes.add("animations not played: everything is at rest")
-    return parts
+    return list(_Reader(tree, accessors, Materials(tree, accessors, source), source).parts())
 
 
 def read_cameras(source: InputFile) -> list[CameraOfFile]:
@@ -100,7 +101,9 @@ def read_cameras(source: InputFile) -> list[CameraOfFile]:
     MeshError
         If the file is broken.
     """
-    tree, _ = _tree_and_blob(source)
+    tree, blob = _tree_and_blob(source)
+    if source.moment is not None:
+        tree = posed(tree, Accessors(tree, blob, source), source.moment, source)
     nodes = _Nodes(tree)
     cameras = []
     for index in nodes.shown():
