@@ -11,14 +11,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from topleft._core import engine
+from topleft._core.base.array_types import F64
 from topleft._meshes.io.gltf.accessors import Accessors, Tree, entry
 from topleft._meshes.io.references import InputFile, Moment
 from topleft.errors import MeshError
-
-F64 = npt.NDArray[np.float64]
 
 ALL_CLIPS = "all"
 N_NUMBERS = {"translation": 3, "rotation": 4, "scale": 3, "weights": None}
