@@ -153,7 +153,7 @@ class Texture:
         """What the kernels read; made when it is first needed."""
         return self._mipmap(None)
 
-    def engine_cut_at(self, cutoff: float) -> engine.Mipmap:
+    def compiled_cut_at(self, cutoff: float) -> engine.Mipmap:
         """The same for an alpha test: its halvings let through as much of their area as the picture does."""
         if not self.has_alpha or self.filter is not Filter.TRILINEAR or not 0 < cutoff <= 1:
             return self.compiled
