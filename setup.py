@@ -1,5 +1,5 @@
-"""Build `topleft._engine.kernels`: one Cython unit, one dispatcher and one kernel unit per instruction set; and the
-classics, `topleft.methods.classics.classic_kernels`: one Cython unit, for the compiler's default instruction set.
+"""Build `topleft._core.engine.kernels`: one Cython unit, one dispatcher and one kernel unit per instruction set; and
+the classics, `topleft.methods.classics.classic_kernels`: one Cython unit, for the compiler's default instruction set.
 
 Everything that is not about compiling stands in `pyproject.toml`. What the engine declares of csrc, and its types for
 type checkers, are made by `packaging/bindings.py`. setuptools gives all sources of an extension the same
@@ -36,7 +36,7 @@ ROOT = Path(__file__).resolve().parent
 sys.path.insert(0, str(ROOT / "packaging"))
 import bindings  # noqa: E402
 
-ENGINE = "topleft._engine.kernels"
+ENGINE = "topleft._core.engine.kernels"
 CLASSICS = "topleft.methods.classics.classic_kernels"
 
 WARNINGS = ["-Wall", "-Wextra"]

@@ -44,7 +44,7 @@ def main(folder: Path) -> None:
     check(wheel.name, in_wheel, modules, in_wheel - modules - extensions - metadata)
 
     top = {"LICENSE", "MANIFEST.in", "README.md", "packaging/bindings.py", "pyproject.toml", "setup.py"}
-    made = {"src/topleft/_engine/kernels.c", "src/topleft/_engine/kernels.pyi"}
+    made = {"src/topleft/_core/engine/kernels.c", "src/topleft/_core/engine/kernels.pyi"}
     built = {name for name in in_sdist if name.endswith((".so", ".o", ".pyc"))} | made
     check(sdist.name, in_sdist, top | files_below("csrc", "src", "tests") - made, built)
 

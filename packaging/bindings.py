@@ -13,7 +13,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 CSRC = ROOT / "csrc"
-ENGINE = ROOT / "src/topleft/_engine"
+ENGINE = ROOT / "src/topleft/_core/engine"
 STUB = ENGINE / "kernels.pyi"
 
 ENUM = r"enum \{(?P<members>[^}]*)\} ?(?P<enum>\w*);"

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from benchmarks.atlas.maps import tabulate
 from benchmarks.scenes.families import NO_SNAP
-from topleft._explore.race import PRODUCTION
+from topleft._apps.explore.race import PRODUCTION
 from topleft.methods import reference
 from topleft.methods.reference.integers import ExactPicture
 from topleft.scene_families import (

@@ -13,7 +13,7 @@ from benchmarks.atlas import shrink as atlas_shrink
 from benchmarks.atlas.depth import DEPTH_FAMILIES, DepthScene, Picture, draw, draw_clip, draw_pieces, judge_depth
 from benchmarks.harness.machine import IMAGES, PAGES, RECORDS, ROOT
 
-from topleft._explore.race import PRODUCTION, Entry, entries
+from topleft._apps.explore.race import PRODUCTION, Entry, entries
 from topleft.failure_scenes import FAILURE_SCENES, picture
 from topleft.methods import CLASSICS
 from topleft.methods.reference.integers import ExactPicture

@@ -1,1 +1,0 @@
-"""Points, drawn as discs or squares: arrays in pixels or clip space, and clouds seen by a camera."""

@@ -1,1 +1,0 @@
-"""From a visibility buffer to light, and from light to sRGB."""
