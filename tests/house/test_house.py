@@ -177,12 +177,6 @@ def test_exports_are_listed_in_public_files_alone():
     assert [short(path) for path in listed if re.search("/_[^_]", short(path))] == []
 
 
-@pytest.mark.parametrize("kind", ["src/**/*.py", "csrc/**/*.[ch]", "tests/**/test_*.py"])
-def test_room_has_at_most_15_files(kind):
-    rooms = Counter(short(path.parent) for path in ROOT.glob(kind) if path.name not in ("__init__.py", "__main__.py"))
-    assert {room: n for room, n in rooms.items() if n > 15} == {}
-
-
 # Numbers
 
 #: On the way from a camera to a picture: NumPy's products, inverses and most of its angles are those of libraries that

@@ -15,7 +15,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import NoReturn
 
-from topleft._apps.cli.arguments import REFUSED, Parser, UsageError, add_render_arguments
+from topleft._apps.cli.arguments import REFUSED, Parser, add_render_arguments
 from topleft._apps.cli.doctor import add_doctor_command
 from topleft._apps.cli.explain import add_plan_commands
 from topleft._apps.cli.explore import add_explore_command
@@ -25,8 +25,6 @@ from topleft._apps.cli.render import FAILED, complain, complain_of_lacks, one_li
 from topleft._core.engine.isa import build_info
 from topleft._meshes.io.notes import listening
 from topleft.errors import TopleftError
-
-__all__ = ["FAILED", "REFUSED", "UsageError", "main"]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

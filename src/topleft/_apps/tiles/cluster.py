@@ -21,7 +21,7 @@ Block = tuple[int, int, int]
 class WriteJob:
     """A window to be drawn and written elsewhere."""
 
-    layout: Any
+    store: Any
     draw: Callable[[], Any]
     row: int
     column: int
@@ -30,7 +30,7 @@ class WriteJob:
     def __call__(self) -> None:
         """Draw and write it."""
         pixels = self.draw()
-        self.layout.write(0, self.row, self.column, pixels if self.prepare is None else self.prepare(pixels))
+        self.store.write(0, self.row, self.column, pixels if self.prepare is None else self.prepare(pixels))
 
 
 def run_write(job: WriteJob) -> None:

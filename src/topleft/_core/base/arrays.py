@@ -242,14 +242,14 @@ def as_number(name: str, value: object) -> float:
     return float(array)
 
 
-def as_count(name: str, value: object) -> int:
-    """Return a whole number of at least 1."""
+def as_count(name: str, value: object, smallest: int = 1) -> int:
+    """Return a whole number that is not below another."""
     try:
         n = operator.index(value)  # type: ignore[arg-type]
     except TypeError:
         raise TypeError(f"{name} must be an integer, got {shown(value)}") from None
-    if n < 1:
-        raise ValueError(f"{name} must be at least 1, got {n}")
+    if n < smallest:
+        raise ValueError(f"{name} must be at least {smallest}, got {n}")
     return n
 
 
