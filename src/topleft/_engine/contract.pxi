@@ -419,6 +419,7 @@ cdef extern from "topleft.h" nogil:
         int64_t n_polygons
         int bits, is_nonzero
         int32_t sample_x_fx, sample_y_fx
+        int64_t *crossings_left
         tl_pause *pause
     ctypedef struct tl_polygon_box:
         int32_t left, top, right, bottom

@@ -22,7 +22,7 @@ from topleft._base.threads import run_parts
 from topleft._field.grid import Grid
 from topleft._polygons.draw import cells_for
 from topleft._polygons.polygons import Rule, frame_of
-from topleft._polygons.prepared import Prepared, prepare
+from topleft._polygons.prepared import MAX_CROSSINGS, Prepared, prepare
 from topleft._polygons.rings import as_points, as_rings, rings_of_triangles
 from topleft.typing import RuleOption
 
@@ -149,6 +149,7 @@ def overlap(
     origin: tuple[int, int] = (0, 0),
     subpixel_bits: int = 8,
     assume_valid: bool = False,
+    max_crossings: int = MAX_CROSSINGS,
     threads: int | None = None,
     out: Overlap | None = None,
 ) -> Overlap:
@@ -156,7 +157,7 @@ def overlap(
 
     Parameters
     ----------
-    rings, size, rule, origin, subpixel_bits, assume_valid, threads
+    rings, size, rule, origin, subpixel_bits, assume_valid, max_crossings, threads
         As in `polygons`.
     triangles : array_like of integers, shape (T, 3), optional
         Then `rings` are the vertices (V, 2) of a mesh, and its triangles the polygons.
@@ -196,7 +197,7 @@ def overlap(
     else:
         vertices = as_points(rings, "vertices")
         given = rings_of_triangles(vertices, as_checked_triangles(triangles, len(vertices)))
-    found, frame = frame_of(given, size, origin, subpixel_bits, threads, 1)
+    found, frame = frame_of(given, size, origin, subpixel_bits, threads, 1, max_crossings)
     prepared = prepare(SCRATCH, found, frame, is_nonzero=is_nonzero)
     prepared.certify(assume_valid=assume_valid)
     if out is not None and not isinstance(out, Overlap):

@@ -12,13 +12,13 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from topleft._base.arrays import apart_from, as_array, as_size, as_subpixel_bits, as_window
+from topleft._base.arrays import apart_from, as_array, as_count, as_size, as_subpixel_bits, as_window
 from topleft._base.memory import FRESH, SCRATCH, empty
 from topleft._base.options import Sampling, parse
 from topleft._base.threads import parse_threads, run_parts
 from topleft._field.grid import Grid
 from topleft._polygons.draw import add_shares, draw_labels, draw_mask
-from topleft._polygons.prepared import Frame, Prepared, prepare
+from topleft._polygons.prepared import MAX_CROSSINGS, Frame, Prepared, prepare
 from topleft._polygons.rings import RingSet, as_rings
 from topleft._raster.rasterize import canvas_of, open_canvas
 from topleft._raster.sampling import SAMPLE_GRID_BITS, sample_positions
@@ -53,6 +53,7 @@ def polygons(
     origin: tuple[int, int] = (0, 0),
     subpixel_bits: int = 8,
     assume_valid: bool = False,
+    max_crossings: int = MAX_CROSSINGS,
     threads: int | None = None,
     out: npt.NDArray[Any] | None = None,
 ) -> npt.NDArray[Any]:
@@ -89,6 +90,8 @@ def polygons(
         For "area", "outer" and "inner": the rings of a polygon neither cross nor touch, its first one is its border and
         all others are holes in it; they may run either way. Saves the search for crossings. What is drawn of polygons
         of which this is not true is undefined.
+    max_crossings : int
+        For "area", "outer" and "inner": how often rings may cross within the picture. Each crossing takes time.
     threads : int or None
         Never changes a bit.
     out : ndarray of the result's dtype, shape (H, W) or (H, W, C), optional
@@ -103,8 +106,8 @@ def polygons(
     Raises
     ------
     ValueError
-        For a wrong shape, an unknown option, offsets that do not fit, a ring of fewer than three points, or a point
-        that is not finite or lies beyond ``2**60`` sub-pixels.
+        For a wrong shape, an unknown option, offsets that do not fit, a ring of fewer than three points, a point
+        that is not finite or lies beyond ``2**60`` sub-pixels, or rings that cross more than `max_crossings` times.
     TypeError
         For what is no polygon, and a wrong dtype.
 
@@ -137,7 +140,7 @@ def polygons(
     """
     how = parse(Sampling, "sampling", sampling)
     is_nonzero = parse(Rule, "rule", rule) is Rule.NONZERO
-    found, frame = frame_of(as_rings(rings).apart_from(out), size, origin, subpixel_bits, threads, how.n_samples)
+    found, frame = frame_of(as_rings(rings).apart_from(out), size, origin, subpixel_bits, threads, how.n_samples, max_crossings)
     shape = frame.size[::-1]
     if values is None:
         if background is not None:
@@ -174,6 +177,7 @@ def frame_of(
     subpixel_bits: object,
     threads: object,
     n_samples: int,
+    max_crossings: object = MAX_CROSSINGS,
 ) -> tuple[RingSet, Frame]:
     """Return the rings in pixels, and the window that they are drawn in."""
     if isinstance(size, Grid):
@@ -181,7 +185,8 @@ def frame_of(
     bits = as_subpixel_bits(subpixel_bits)
     grid_bits = max(1 if n_samples == 1 else SAMPLE_GRID_BITS, bits)
     corner = as_window(origin, grid_bits + 2)
-    return rings, Frame(as_size(size), corner, bits, grid_bits, parse_threads(threads))
+    most = as_count("max_crossings", max_crossings)
+    return rings, Frame(as_size(size), corner, bits, grid_bits, parse_threads(threads), most)
 
 
 def draw_binary(

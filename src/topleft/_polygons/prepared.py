@@ -12,11 +12,15 @@ from topleft._base.memory import SCRATCH, Memory, times_that_fit
 from topleft._base.threads import available_threads, run_parts
 from topleft._polygons.rings import RingSet
 
-__all__ = ["Frame", "Prepared", "prepare", "threads_for"]
+__all__ = ["MAX_CROSSINGS", "Frame", "Prepared", "prepare", "threads_for"]
 
 #: Points, and pixels, that are worth a thread: below, one is done before the other has begun.
 MIN_POINTS_PER_THREAD = 50_000
 MIN_PIXELS_PER_THREAD = 1 << 20
+
+
+#: How often rings may cross where areas are exact: 4 s of one core.
+MAX_CROSSINGS = 50_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +32,7 @@ class Frame:
     subpixel_bits: int
     grid_bits: int  # of the grid that holds points and samples
     threads: int | None
+    max_crossings: int = MAX_CROSSINGS
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +55,7 @@ class Prepared:
     def certify(self, *, assume_valid: bool) -> None:
         """Find out of which polygons the rings do not meet, and what the area of each ring counts."""
         engine, n = self.engine, len(self)
-        engine.make_weights()
+        engine.make_weights(self.frame.max_crossings)
         n_words = 0 if assume_valid else engine.certify_words()
 
         def certify_part(first: int, end: int) -> None:
