@@ -38,6 +38,7 @@
 #include "shade/shade_samples.c"
 #include "shade/alpha_test.c"
 #include "mesh/creases.c"
+#include "mesh/ears.c"
 #include "mesh/equal.c"
 #include "mesh/normals.c"
 #include "mesh/nearest.c"
@@ -117,6 +118,7 @@ const tl_kernels TL_KERNELS = {
     .list_corners = list_corners,
     .find_creases = find_creases,
     .sum_creases = sum_creases,
+    .cut_faces = cut_faces,
     .box_of_faces = box_of_faces,
     .unit_vectors = unit_vectors,
     .move_points = move_points,

@@ -11,11 +11,11 @@
 #include <stdint.h>
 #include <string.h>
 
+#include "base/sort_pairs.h"
 #include "lanes/lanes.h"
 #include "polygons.h"
 #include "polygons/points.c"
 #include "polygons/slabs.c"
-#include "polygons/sort_pairs.c"
 #include "vertex/fixed.h"
 
 /* Counts the rows [top, bottom) that edges pass, or cuts the edges there. */

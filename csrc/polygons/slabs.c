@@ -17,9 +17,9 @@
 #include <stdint.h>
 #include <string.h>
 
+#include "base/sort_pairs.h"
 #include "polygons.h"
 #include "polygons/points.c"
-#include "polygons/sort_pairs.c"
 
 #define TL_THIN 0x1p-44 /* px of height */
 

@@ -276,6 +276,14 @@ cdef extern from "topleft.h" nogil:
         const double *normals
         const double *angles
         double least_cosine
+    ctypedef struct tl_faces:
+        const double *points
+        const int64_t *corners
+        const int64_t *n_corners
+        int64_t n_faces
+        int64_t most_steps
+        tl_pause *pause
+    int64_t tl_ear_words(int64_t n_corners)
     ctypedef struct tl_creases:
         const int32_t *starts
         const int32_t *groups
@@ -549,6 +557,7 @@ cdef extern from "topleft.h" nogil:
         void (*list_corners)(const int32_t *, int64_t, int64_t, int32_t *, int32_t *) noexcept nogil
         void (*find_creases)(const tl_fans *, int64_t, int64_t, uint64_t *, int32_t *, int32_t *) noexcept nogil
         void (*sum_creases)(const tl_fans *, const tl_creases *, int64_t, int64_t) noexcept nogil
+        int64_t (*cut_faces)(const tl_faces *, int64_t *, int64_t *) noexcept nogil
         int64_t (*box_of_faces)(const tl_source *, const int32_t *, int64_t, int64_t, double *) noexcept nogil
         void (*unit_vectors)(const tl_source *, const double *, int64_t, int64_t, double *, float *) noexcept nogil
         void (*move_points)(const tl_source *, const double *, int64_t, int64_t, double *) noexcept nogil

@@ -587,6 +587,9 @@ def find_turned(
     source: Source, triangles: I32, first: int, end: int, normals: F32, row_of_corner: I32, is_turned: U8
 ) -> int: ...
 def face_angles(source: Source, triangles: I32, first: int, end: int, normals: F64, angles: F64) -> int: ...
+def cut_faces(
+    points: F64, corners: I64, n_corners: I64, most_corners: int, most_steps: int, triangles: I64
+) -> int: ...
 
 class Fans:
     most_corners: int
