@@ -25,7 +25,7 @@
 
 #define TL_EAR_LEVELS 11 /* of either tree: 8^11 corners are more than int32 counts */
 #define TL_EAR_STEPS_TO_ASK 16384
-#define TL_EAR_WIDTH 8   /* children of a box, and corners of a leaf */
+#define TL_EAR_WIDTH 8 /* children of a box, and corners of a leaf */
 
 /* Of the area of a polygon: corners that turn by less are straight, whatever the rounding says. */
 #define TL_TURN_TOO_SMALL 1e-12
@@ -183,7 +183,8 @@ static ear_triangle ear_of(const ear_face *f, int32_t i)
         t.dx[k] = t.x[(k + 1) % 3] - t.x[k], t.dy[k] = t.y[(k + 1) % 3] - t.y[k];
     t.box = (ear_box){fmin(fmin(t.x[0], t.x[1]), t.x[2]), fmin(fmin(t.y[0], t.y[1]), t.y[2]),
                       fmax(fmax(t.x[0], t.x[1]), t.x[2]), fmax(fmax(t.y[0], t.y[1]), t.y[2]), 0};
-    const double more = 0x1p-46 / fabs(turn_at(f, i)); /* infinite for a straight corner: all of the line counts as inside */
+    const double more =
+        0x1p-46 / fabs(turn_at(f, i)); /* infinite for a straight corner: all of the line counts as inside */
     const double more_x = more * (t.box.x1 - t.box.x0) + 0x1p-50, more_y = more * (t.box.y1 - t.box.y0) + 0x1p-50;
     t.box.x0 -= more < 1 ? more_x : 8, t.box.x1 += more < 1 ? more_x : 8;
     t.box.y0 -= more < 1 ? more_y : 8, t.box.y1 += more < 1 ? more_y : 8;

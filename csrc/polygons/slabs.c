@@ -41,7 +41,8 @@ typedef struct {
     const tl_polygons *p;
     const tl_edge_piece *pieces;
     int32_t *active; /* pieces that reach into the pixel */
-    int32_t *at, *change; /* winding numbers left of the pixel: by how much they change at which height, in sub-pixels */
+    int32_t *at,
+        *change; /* winding numbers left of the pixel: by how much they change at which height, in sub-pixels */
     keyed *events, *spare; /* by height */
     slab_edge *edges, *moved;
     double *crossings; /* a tree: the heights at which neighbours cross, each node the least below it */
@@ -161,7 +162,8 @@ static void sort_slab(piece_row *w)
     for (int i = 1; i < n; i++) {
         const slab_edge e = w->edges[i];
         int k = i;
-        for (; k > 0 && (w->edges[k - 1].top > e.top || (w->edges[k - 1].top == e.top && w->edges[k - 1].bottom > e.bottom));
+        for (; k > 0 &&
+               (w->edges[k - 1].top > e.top || (w->edges[k - 1].top == e.top && w->edges[k - 1].bottom > e.bottom));
              k--)
             w->edges[k] = w->edges[k - 1];
         w->edges[k] = e;

@@ -71,6 +71,59 @@ def test_area_of_a_ring_that_crosses_itself_is_that_of_the_rule():
         )
 
 
+def chords(n, size):
+    """A ring of n points, of which each edge crosses three of four others."""
+    turns = 2.4 * np.arange(n)
+    return np.round((np.stack([np.cos(turns), np.sin(turns)], 1) * 0.45 + 0.5) * size * 256) / 256
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize("rule", ["evenodd", "nonzero"])
+@pytest.mark.parametrize(("n", "size"), [(40, (5, 4)), (50, (2, 3)), (60, (1, 1))])
+def test_areas_of_rings_that_cross_in_each_pixel_are_within_bound(isa, rule, n, size):
+    """Up to 1,300 crossings a pixel."""
+    ring = chords(n, np.array(size))
+    exact = np.array([[float(a) for a in row] for row in ref.polygon_areas([ring], size, rule)])
+    with on(isa):
+        assert abs(tl.polygons(ring, size, rule=rule, sampling="area") - exact).max() <= UNIT
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+@pytest.mark.parametrize("sampling", ["area", "outer", "inner"])
+def test_rings_that_cross_too_often_are_refused(sampling, threads):
+    ring, how = chords(101, 40), {"sampling": sampling, "threads": threads}
+    drawn, n = [[ring], [ring]], 2 * n_crossings(ring)
+    picture = tl.polygons(drawn, (40, 40), max_crossings=n + 2 * len(ring), **how)
+    assert (picture == tl.polygons(drawn, (40, 40), **how)).all()
+    with pytest.raises(ValueError, match=f"rings must cross at most {n - 1:,} times .* max_crossings= allows more"):
+        tl.polygons(drawn, (40, 40), max_crossings=n - 1, **how)
+
+
+def n_crossings(ring):
+    a, b = ring, np.roll(ring, -1, axis=0)
+
+    def sides(p, q, r):
+        d, e = q - p, r - p
+        return np.sign(d[..., 0] * e[..., 1] - d[..., 1] * e[..., 0])
+
+    of_starts, of_ends = sides(a[:, None], b[:, None], a[None]), sides(a[:, None], b[:, None], b[None])
+    return int(((of_starts * of_ends < 0) & (of_starts * of_ends < 0).T).sum()) // 2
+
+
+def test_crossings_outside_of_the_window_are_not_counted():
+    ring = chords(101, 40)
+    n = n_crossings(ring) // 2
+    with pytest.raises(ValueError, match=f"at most {n:,} times"):
+        tl.overlap([[ring]], (40, 40), max_crossings=n)
+    assert len(tl.overlap([[ring]], (3, 3), max_crossings=n, origin=(28, 18)).areas) > 0
+
+
+@pytest.mark.parametrize(("value", "error"), [(0, "at least 1, got 0"), (1.5, "must be an integer")])
+def test_max_crossings_is_a_number(value, error):
+    with pytest.raises((TypeError, ValueError), match=error):
+        tl.polygons([(0, 0), (4, 0), (4, 4)], (5, 5), max_crossings=value)
+
+
 def test_assumed_valid_polygons_are_the_same_to_the_bit():
     rng = np.random.default_rng(8)
     for turn in (1, -1):

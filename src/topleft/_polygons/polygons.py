@@ -91,7 +91,8 @@ def polygons(
         all others are holes in it; they may run either way. Saves the search for crossings. What is drawn of polygons
         of which this is not true is undefined.
     max_crossings : int
-        For "area", "outer" and "inner": how often rings may cross within the picture. Each crossing takes time.
+        For "area", "outer" and "inner": how often rings may cross or touch within the picture; fifty million
+        take some 4 s.
     threads : int or None
         Never changes a bit.
     out : ndarray of the result's dtype, shape (H, W) or (H, W, C), optional
@@ -140,7 +141,9 @@ def polygons(
     """
     how = parse(Sampling, "sampling", sampling)
     is_nonzero = parse(Rule, "rule", rule) is Rule.NONZERO
-    found, frame = frame_of(as_rings(rings).apart_from(out), size, origin, subpixel_bits, threads, how.n_samples, max_crossings)
+    found, frame = frame_of(
+        as_rings(rings).apart_from(out), size, origin, subpixel_bits, threads, how.n_samples, max_crossings
+    )
     shape = frame.size[::-1]
     if values is None:
         if background is not None:
