@@ -281,3 +281,9 @@ def test_rings_that_cross_too_often_are_refused_with_the_option(files, run):
     assert run("mask", "plane.json", "-o", "m.png", "--sampling", "area") == (0, [])
     status, lines = run("mask", "plane.json", "-o", "m.png", "--sampling", "area", "--max-crossings", "3000")
     assert (status, len(lines), "at most 3,000 times" in lines[0]) == (2, 1, True)
+
+
+def test_extent_without_polygons_is_told(files, run):
+    status, lines = run("mask", "map.geojson", "-o", "m.png", "--size", "7x4", "--extent", 1000, 1001, 0, 1)
+    assert (status, len(lines)) == (0, 1)
+    assert "map: no polygon meets a pixel of the grid" in lines[0]

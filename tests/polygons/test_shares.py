@@ -1,6 +1,7 @@
 """Areas of polygons and the table of overlaps: near fractions, and to the last bit where they must be."""
 
 import tracemalloc
+import warnings
 
 import numpy as np
 import pytest
@@ -258,6 +259,84 @@ def test_table_sums_means_and_spreads():
     assert table.means(raster)[:2].tolist() == [1.5, 12.5 / 3]
     assert np.isnan(table.means(raster)[2])
     assert table.spread([2, 10, 1]).tolist() == [[2, 7, 10], [0, 5, 10]]
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64, np.int16, np.int64])
+def test_pixels_without_data_do_not_count(dtype):
+    table = tl.overlap([[square(0, 0, 2, 1)], [square(1.5, 0, 3, 2)], [square(2, 1, 3, 2)]], (3, 2))
+    raster = np.array([[1, 2, -9999], [5, -9999, -9999]], dtype)
+    assert table.means(raster, nodata=-9999).tolist()[:2] == [1.5, 2]
+    assert np.isnan(table.means(raster, nodata=-9999.0)[2])
+    assert table.sums(raster, nodata=np.float64(-9999)).tolist() == [3, 1, 0]
+    masked = np.ma.masked_equal(raster, -9999)
+    assert table.means(masked).tolist()[:2] == [1.5, 2]
+    assert table.sums(masked, nodata=1).tolist() == [2, 1, 0]
+    assert (
+        table.sums(np.ma.array(raster)).tolist() == table.sums(raster).tolist() == [3, 1 - 4 * 4999.5 - 4999.5, -9999]
+    )
+
+
+@pytest.mark.parametrize("nodata", [0.1, -3.4028234663852886e38, float("nan"), float("inf")])
+def test_no_data_is_told_in_the_dtype_of_the_raster(nodata):
+    table = tl.overlap([[square(0, 0, 2, 1)]], (2, 1))
+    assert table.means(np.array([[4, nodata]], np.float32), nodata=nodata).tolist() == [4]
+    assert table.means(np.array([[4, 8]], np.uint8), nodata=nodata).tolist() == [6]
+
+
+def test_no_data_that_a_raster_names_itself_does_not_count():
+    table = tl.overlap([[square(0, 0, 2, 1)]], (2, 1))
+
+    class Raster:
+        def __init__(self, **attrs):
+            self.attrs = attrs
+
+        def __array__(self, dtype=None, copy=None):
+            return np.array([[4, -1]], np.float32)
+
+    for said in ({"_FillValue": -1}, {"nodatavals": (-1.0,)}, {"missing_value": np.float32(-1)}, {"nodata": -1}):
+        assert table.means(Raster(**said)).tolist() == [4]
+    for said in ({}, {"nodata": None}, {"_FillValue": "none"}, {"nodatavals": ()}):
+        assert table.means(Raster(**said)).tolist() == [1.5]
+
+    class Dataset:
+        count = 1
+
+        def read(self, band, masked):
+            assert (band, masked) == (1, True)
+            return np.ma.masked_equal([[4, -1]], -1)
+
+    assert table.means(Dataset()).tolist() == [4]
+    Dataset.count = 3
+    with pytest.raises(ValueError, match=r"raster must have one band, got 3: pass raster.read\(1, masked=True\)"):
+        table.means(Dataset())
+
+
+@pytest.mark.parametrize("nodata", ["x", [1, 2], 1j])
+def test_no_data_that_is_no_number_is_refused(nodata):
+    with pytest.raises(TypeError, match="nodata must be a number"):
+        tl.overlap([[square(0, 0, 2, 1)]], (2, 1)).means([[1, 2]], nodata=nodata)
+
+
+def test_polygons_of_another_crs_are_told():
+    utm, degrees = tl.Grid((4, 4), (5e5, 6e5, 5e6, 6e6)), tl.Grid((4, 4), (10, 11, 45, 46))
+    lonlat, metres = [[square(10, 45, 11, 46)]], [[square(5e5, 5e6, 6e5, 6e6)]]
+    said = "no polygon meets a pixel of the grid: the polygons lie in x 10 to 11, y 45 to 46, the grid in x 500000 to "
+    with pytest.warns(UserWarning, match=f"^{said}.*the polygons may be degrees, the grid cannot: transform"):
+        assert not len(tl.overlap(lonlat, utm).areas)
+    with pytest.warns(UserWarning, match="the grid may be degrees, the polygons cannot"):
+        assert not tl.polygons(metres, degrees).any()
+    with pytest.warns(UserWarning, match="are they of another CRS than the grid"):
+        assert (tl.polygons([[square(5, 5, 6, 6)]], degrees, values="index") == -1).all()
+
+
+def test_polygons_of_which_one_meets_the_grid_are_not_told():
+    grid = tl.Grid((4, 4), (10, 11, 45, 46))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        tl.overlap([[square(0, 0, 1, 1)], [square(10, 45, 10.1, 45.1)]], grid)
+        tl.overlap([], grid)
+        tl.overlap([[square(9, 9, 10, 10)]], (4, 4))
+        tl.overlap([[square(10, 45, 10.1, 45.1)]], grid, origin=(50, 50))
 
 
 def test_table_is_a_sparse_matrix():

@@ -5,6 +5,7 @@ Input: rings and a size. Output: an array (H, W) or (H, W, C).
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, Literal
@@ -141,14 +142,14 @@ def polygons(
     """
     how = parse(Sampling, "sampling", sampling)
     is_nonzero = parse(Rule, "rule", rule) is Rule.NONZERO
-    found, frame = frame_of(
-        as_rings(rings).apart_from(out), size, origin, subpixel_bits, threads, how.n_samples, max_crossings
-    )
+    given = as_rings(rings).apart_from(out)
+    found, frame = frame_of(given, size, origin, subpixel_bits, threads, how.n_samples, max_crossings)
     shape = frame.size[::-1]
     if values is None:
         if background is not None:
             raise ValueError("background needs values: a mask is False where no polygon is")
         prepared = prepare(SCRATCH, found, frame, is_nonzero=is_nonzero)
+        warn_if_apart(prepared, given, size)
         if how in (Sampling.CENTER, Sampling.OUTER, Sampling.INNER):
             result, canvas = open_canvas(FRESH, "mask", out, shape, np.bool_)  # without a context: that is 2 us of 40
             if canvas.size:
@@ -167,6 +168,7 @@ def polygons(
         return result
     paint = as_paint(apart_from(out, "values", values), background, len(found), how)
     prepared = prepare(SCRATCH, found, frame, is_nonzero=is_nonzero)
+    warn_if_apart(prepared, given, size)
     with canvas_of(FRESH, "values", out, (*shape, *paint.table.shape[1:]), paint.table.dtype.type) as (result, canvas):
         if canvas.size:
             paint_values(prepared, canvas, paint, how, is_nonzero=is_nonzero, assume_valid=assume_valid)
@@ -190,6 +192,28 @@ def frame_of(
     corner = as_window(origin, grid_bits + 2)
     most = as_count("max_crossings", max_crossings)
     return rings, Frame(as_size(size), corner, bits, grid_bits, parse_threads(threads), most)
+
+
+def warn_if_apart(prepared: Prepared, given: RingSet, size: object) -> None:
+    """Warn the caller's caller of polygons of which none meets a pixel of a grid."""
+    if not isinstance(size, Grid) or not len(given.points) or 0 in size.size or prepared.frame.origin != (0, 0):
+        return
+    left, top, right, bottom = prepared.engine.boxes_px.T
+    if ((left < right) & (top < bottom)).any():
+        return
+    (x_min, y_min), (x_max, y_max) = given.points.min(axis=0).tolist(), given.points.max(axis=0).tolist()
+    own, grid = [x_min, x_max, y_min, y_max], list(size.extent)
+    are_degrees, is_grid_of_degrees = (-180 <= e[0] and e[1] <= 360 and -90 <= e[2] and e[3] <= 90 for e in (own, grid))
+    why = "are they of another CRS than the grid?"
+    if are_degrees != is_grid_of_degrees:
+        degrees, other = ("polygons", "grid") if are_degrees else ("grid", "polygons")
+        why = f"the {degrees} may be degrees, the {other} cannot: transform the polygons to the CRS of the grid"
+    warnings.warn(
+        "no polygon meets a pixel of the grid: the polygons lie in x {:g} to {:g}, y {:g} to {:g}, the grid in x {:g} "
+        "to {:g}, y {:g} to {:g}; ".format(*own, *grid)
+        + why,
+        stacklevel=3,
+    )
 
 
 def draw_binary(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 import re
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -50,7 +51,12 @@ def run_mask(options: argparse.Namespace) -> int:
     status, paths = 0, paths_of(pictures, options.out)
     for path, picture in zip(paths, pictures, strict=True):
         path.parent.mkdir(parents=True, exist_ok=True)
-        save_image(path, draw(picture, options))
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always", UserWarning)
+            drawn = draw(picture, options)
+        save_image(path, drawn)
+        for one in caught:
+            complain(f"{picture.name}: {one.message}")
         if picture.n_skipped:
             complain(f"{picture.name}: {picture.n_skipped} objects are no polygons and were left out")
             status = FAILED
