@@ -70,7 +70,7 @@ def paths_of(pictures: list[PolygonPicture], out: str) -> list[Path]:
         words = {"{name}": picture.name, "{folder}": picture.folder, "{index}": f"{i:03d}"}
         if "{folder}" in out and Path(picture.folder).is_absolute():
             raise UsageError(f"-o {out}: image {picture.name} lies in {picture.folder}, no folder within another")
-        path = Path(re.sub(r"\{(name|folder|index)\}", lambda word, words=words: words[word[0]], out))
+        path = Path("".join(words.get(part, part) for part in re.split(r"(\{name\}|\{folder\}|\{index\})", out)))
         if path in found:
             folders = f"{found[path].folder}/{found[path].name} and {picture.folder}/{picture.name}"
             raise UsageError(f"-o {out}: images {folders} would both go to {path}; {{folder}} or {{index}} parts them")
