@@ -23,7 +23,7 @@ typedef struct {
     int bits;
     int is_nonzero;                   /* the rule: winding other than 0 instead of odd */
     int32_t sample_x_fx, sample_y_fx; /* the sample from the pixel's centre */
-    int64_t *crossings_left;          /* of all threads: how often rings may cross where areas are exact */
+    int64_t *crossings_left;          /* of all threads: how often rings may cross, see slabs.c */
     struct tl_pause *pause;           /* of this call, or NULL: what has begun is drawn to its end */
 } tl_polygons;
 

@@ -23,7 +23,11 @@
 
 #define TL_THIN 0x1p-44 /* px of height */
 
-#define TL_FEW_NEW 8            /* pieces that are sorted in by insertion */
+#define TL_FEW_NEW 8 /* pieces that are sorted in by insertion */
+/* Slabs of many edges count as crossings, too: so many edges take as long as one. */
+#define TL_FEW_EDGES 64
+#define TL_EDGES_OF_CROSSING 16
+
 #define TL_CROSSINGS_TO_ASK 256 /* after which it is asked whether to go on; a power of two */
 
 /* A piece that passes the slab. */
@@ -259,7 +263,10 @@ static double resolve_slab(piece_row *w, int64_t col, double y, double next)
         e->winding = winding, e->since = y;
         winding += w->pieces[e->piece].sign;
     }
-    if (is_polygon_given_up(w->p, 4 * n))
+    w->n_crossings += n > TL_FEW_EDGES ? n / TL_EDGES_OF_CROSSING : 0;
+    if (w->n_crossings > TL_CROSSINGS_TO_ASK)
+        count_crossings(w);
+    if (is_polygon_given_up(w->p, 4 * n) || cross_too_often(w->p))
         w->is_given_up = 1;
     if (is_crossed)
         return resolve_crossings(w, col, y, next, winding);

@@ -119,6 +119,19 @@ def test_crossings_outside_of_the_window_are_not_counted():
     assert len(tl.overlap([[ring]], (3, 3), max_crossings=n, origin=(28, 18)).areas) > 0
 
 
+def test_edges_that_crowd_a_pixel_count_as_crossings():
+    """A zigzag of parallel edges, each of which enters and leaves the pixel by itself."""
+    n = 2000
+    at = np.arange(n)
+    middle = np.stack([0.5 + at / n, 1.5 - at / n], axis=1)
+    zigzag = np.where(at[:, None] % 2, middle + 3, middle - 3)
+    ring = np.concatenate([zigzag, [(5, 5), (6, 6), (6, 5), (5, 6), (5, -9)]])
+    how = {"subpixel_bits": 12, "sampling": "area"}
+    assert tl.polygons(ring, 2, max_crossings=10**9, **how).shape == (2, 2)
+    with pytest.raises(ValueError, match="cross or crowd a pixel more often"):
+        tl.polygons(ring, 2, max_crossings=10_000, **how)
+
+
 @pytest.mark.parametrize(("value", "error"), [(0, "at least 1, got 0"), (1.5, "must be an integer")])
 def test_max_crossings_is_a_number(value, error):
     with pytest.raises((TypeError, ValueError), match=error):

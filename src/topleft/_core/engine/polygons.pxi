@@ -96,7 +96,7 @@ cdef class SnappedPolygons:
         raise_if_given_up()
         if self.crossings_left < 0:
             raise ValueError(f"rings must cross at most {self.max_crossings:,} times within the picture where areas are "
-                             "exact, and cross more often: max_crossings= allows more")
+                             "exact, and cross or crowd a pixel more often: max_crossings= allows more")
         return 0
 
     def certify_words(self):

@@ -93,7 +93,7 @@ def polygons(
         of which this is not true is undefined.
     max_crossings : int
         For "area", "outer" and "inner": how often rings may cross or touch within the picture; fifty million
-        take some 4 s.
+        take some 4 s. Where more than 64 edges pass a pixel side by side, it counts as well.
     threads : int or None
         Never changes a bit.
     out : ndarray of the result's dtype, shape (H, W) or (H, W, C), optional
