@@ -7,17 +7,11 @@ Polygons in space are seen along their area vector. Convex ones become fans; of 
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-import numpy.typing as npt
 
 from topleft._core import engine
+from topleft._core.base.array_types import F64, I64, Array
 from topleft._core.base.arrays import INT32_MAX
-
-Array = npt.NDArray[Any]
-F64 = npt.NDArray[np.float64]
-I64 = npt.NDArray[np.int64]
 
 MAX_STEPS = 1 << 30
 """Of all polygons of a call: some seconds. One of 100,000 corners takes up to 200,000,000."""
