@@ -11,12 +11,12 @@
 #include <stdint.h>
 #include <string.h>
 
+#include "polygons.h"
 #include "base/sort_pairs.h"
 #include "lanes/lanes.h"
-#include "polygons.h"
+#include "vertex/fixed.h"
 #include "polygons/points.c"
 #include "polygons/slabs.c"
-#include "vertex/fixed.h"
 
 /* Counts the rows [top, bottom) that edges pass, or cuts the edges there. */
 TL_INLINE void cut_edges(const tl_polygons *p, int is_wide, int64_t polygon, int64_t top, int64_t bottom, int64_t *next,
