@@ -19,9 +19,9 @@
 #include <math.h>
 #include <stdint.h>
 
-#include "base/sort_pairs.h"
 #include "faces.h"
 #include "topleft.h"
+#include "base/sort_pairs.h"
 
 #define TL_EAR_LEVELS 11 /* of either tree: 8^11 corners are more than int32 counts */
 #define TL_EAR_STEPS_TO_ASK 16384

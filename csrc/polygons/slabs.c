@@ -17,8 +17,8 @@
 #include <stdint.h>
 #include <string.h>
 
-#include "base/sort_pairs.h"
 #include "polygons.h"
+#include "base/sort_pairs.h"
 #include "polygons/points.c"
 
 #define TL_THIN 0x1p-44 /* px of height */
