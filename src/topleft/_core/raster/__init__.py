@@ -1,6 +1,7 @@
 """Arrays in, arrays out: the verbs of triangles. It has never heard of a mesh of the caller's, a camera or a file.
 
 choices.py       chooses what is done before anything is drawn: a function for each choice, for verbs and planner
+costs.py         the table of costs that choices and estimates follow from
 classic.py       draws with a classic of the literature behind the public verbs
 cluster_draw.py  draws the clusters that a view shows, and snaps what attributes need
 clusters.py      sorts a mesh into clusters once, so that a view leaves out what cannot show in it
