@@ -1,4 +1,4 @@
-"""What the shipped costs decide, on a grid of cases: a change of the table, or of its use, that decides otherwise shows.
+"""What the shipped costs decide, on a grid of cases: a change of the table that decides otherwise shows.
 
 `python tests/plan/test_decisions.py` prints `DECIDED` anew, for a change that is meant.
 """
@@ -130,8 +130,8 @@ def colours():
 
 
 GRIDS = (
-    arrays_by_threads, draws_by_threads, shares, clusters, meshlets, sampled, instances, flat, sorting, bounds, blending,
-    colours,
+    arrays_by_threads, draws_by_threads, shares, clusters, meshlets, sampled, instances, flat, sorting, bounds,
+    blending, colours,
 )  # fmt: skip
 
 #: Of each grid: cases, how many are not the commonest, and the beginning of a hash of all.
@@ -160,12 +160,12 @@ def summary(decided):
 
 
 @pytest.mark.parametrize("grid", GRIDS)
-def test_shipped_costs_decide_as_measured(monkeypatch, grid):
-    monkeypatch.setattr(choices, "available_threads", lambda: 8)
+def test_shipped_costs_decide_as_measured(force, grid):
+    force(available_threads=8)
     assert summary(grid()) == DECIDED[grid.__name__]
 
 
 if __name__ == "__main__":
-    choices.available_threads = lambda: 8
-    for one in GRIDS:
-        print(f'    "{one.__name__}": {summary(one())},'.replace("'", '"'))
+    with choices.forced(available_threads=8):
+        for one in GRIDS:
+            print(f'    "{one.__name__}": {summary(one())},'.replace("'", '"'))

@@ -286,7 +286,7 @@ def save_costs(costs: Costs, path: Path | None = None) -> Path:
 
 
 def rounded(value: Any) -> Any:
-    """Return numbers to four digits: more were never measured."""
+    """Return numbers to six digits: more were never measured."""
     if isinstance(value, tuple):
         return [rounded(item) for item in value]
-    return float(f"{value:.4g}") if isinstance(value, float) else value
+    return float(f"{value:.6g}") if isinstance(value, float) else value

@@ -38,6 +38,9 @@ __all__ = ["calibrate"]
 
 GROUPS = {"mask": Sink.MASK, "count": Sink.COUNT, "depth": Sink.NEAREST, "samples": Sink.SAMPLES, "area": Sink.COUNT}
 
+#: The clock of what several threads do.
+WALL = time.perf_counter_ns
+
 FRAMES = ((640, 360), (1280, 720), (1920, 1080))
 
 #: Number and size in pixels of the triangles of the scenes that are fitted, and of those that are not.
@@ -91,14 +94,14 @@ def calibrate(*, n_rounds: int = 7) -> Costs:
     )
 
 
-def least_ns(work: Callable[[], object], n_rounds: int) -> float:
+def least_ns(work: Callable[[], object], n_rounds: int, clock: Callable[[], int] = time.thread_time_ns) -> float:
     """Return the least time of some runs, after one that does not count."""
     work()
     times = []
     for _ in range(n_rounds):
-        start = time.perf_counter_ns()
+        start = clock()
         work()
-        times.append(time.perf_counter_ns() - start)
+        times.append(clock() - start)
     return float(min(times))
 
 
@@ -227,7 +230,7 @@ def measure_others(n_rounds: int) -> dict[str, float]:
         "paint": max(0.01, (painted - counted) / ids.size),
         "flat_pixel": least_ns(lambda: engine.set_flat_depth(ids, depth, 0, height, True, 0.5, 1.0), n_rounds)
         / ids.size,
-        "wake": least_ns(lambda: [run_parts(lambda first, _: first, 2, 2) for _ in range(20)], n_rounds) / 20,
+        "wake": least_ns(lambda: [run_parts(lambda first, _: first, 2, 2) for _ in range(20)], n_rounds, WALL) / 20,
         "touch": least_ns(lambda: allocate(fresh).fill(0), n_rounds) / fresh,
     }
 
@@ -253,7 +256,7 @@ def measure_parallel(n_rounds: int) -> float:
         return 1.0
     vertices, triangles, _ = random_triangles(60_000, 12)
     pair = [Rasterizer(FRAMES[-1], threads=n) for n in (1, 2)]
-    one, two = (least_ns(partial(picture.rasterize, vertices, triangles), 5 * n_rounds) for picture in pair)
+    one, two = (least_ns(partial(picture.rasterize, vertices, triangles), 5 * n_rounds, WALL) for picture in pair)
     return min(2.0, max(1.0, one / two))
 
 
@@ -320,7 +323,7 @@ def tune(own: Costs, n_rounds: int) -> Costs:
         kept = replace(own, **{name: getattr(shipped, name) for name in (*one.rows, *MEASURED.get(one.choice, ()))})
         tables = [kept, *(scaled(table, one.rows, by) for table in (own, kept) for by in FACTORS)]
         fitted, others = (
-            np.stack([losses(one, draw, tables, n_rounds) for draw in one.draws(seed)]) for seed in (1, 2)
+            np.stack([losses(one, draw, tables, min(5, n_rounds)) for draw in one.draws(seed)]) for seed in (1, 2)
         )
         best = int(np.argmin(fitted.mean(axis=0)))
         if others[:, best].mean() > others[:, 0].mean() - LEAST_GAIN:
@@ -364,7 +367,7 @@ def losses(one: Tuned, draw: Callable[[], object], tables: list[Costs], n_rounds
     for _ in range(n_rounds):
         for i, way in enumerate(one.ways):
             with choices.forced(**{one.choice: way}):
-                took[i] = min(took[i], least_ns(draw, 1))
+                took[i] = min(took[i], least_ns(draw, 1, time.thread_time_ns if one.threads == 1 else WALL))
     return np.asarray(np.log(took[picked] / took.min()))
 
 
