@@ -28,16 +28,6 @@ if TYPE_CHECKING:
     from topleft._core.raster.clusters import Clusters
     from topleft._core.raster.snap import Snapped
 
-__all__ = [
-    "ClusterRoute", "Drawing", "Route", "blends_few", "can_cluster", "can_draw_meshlets", "can_share", "can_split",
-    "cluster_route", "common_depth", "drawing", "draws_few", "earlier_wins", "fills_few", "first_depth", "forced",
-    "fragment_sink", "is_affine", "is_direct", "is_flat", "is_shared", "must_cut", "pays_float_lanes", "pays_to_bound",
-    "pays_to_cluster", "pays_to_draw_clusters", "pays_to_draw_from", "pays_to_draw_instances", "pays_to_draw_meshlets",
-    "pays_to_draw_samples", "pays_to_grow", "pays_to_share", "pays_to_share_instances", "pays_to_snap_all",
-    "pays_to_sort", "pays_without_depth", "route", "rows_to_blend", "threads_to_convert", "threads_to_draw",
-    "threads_to_snap", "work_ns",
-]  # fmt: skip
-
 #: What it does not matter to in which order triangles are drawn.
 ORDER_FREE = frozenset({Sink.MASK, Sink.COUNT, Sink.NEAREST, Sink.FARTHEST, Sink.SAMPLES})
 
@@ -524,4 +514,5 @@ def is_direct(snapped: Snapped, view: View, dtype: np.dtype[Any], *, is_flat: bo
 
 
 #: What `forced` forces, beside costs.
-FORCEABLE = frozenset(name for name in __all__ if name[0].islower() and name != "forced") | {"available_threads"}
+FORCEABLE = {name for name, one in globals().items() if callable(one) and one.__module__ == __name__ and name.islower()}
+FORCEABLE = FORCEABLE - {"forced", "constantly"} | {"available_threads"}

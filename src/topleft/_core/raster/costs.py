@@ -21,9 +21,6 @@ from numpy.typing import NDArray
 from topleft._core.base.options import Sampling, Sink
 from topleft._core.base.whole_file import write_whole
 
-__all__ = ["CALLS", "FEATURES", "Costs", "cache_file", "cost_table", "draw_features", "load_costs", "save_costs",
-           "sink_group", "use_costs"]  # fmt: skip
-
 #: What the time of a draw is made of, in this order: triangles by how they are drawn, samples, pixels of the picture.
 FEATURES = (
     "hidden", "tiny", "small", "middle", "rows", "long", "64-bit", "128-bit", "point", "span", "pixel", "cold",

@@ -34,8 +34,6 @@ from topleft._core.raster.view import View, ViewOptions
 from topleft.scenes import blob, random_triangles
 from topleft.typing import SamplingOption
 
-__all__ = ["calibrate"]
-
 GROUPS = {"mask": Sink.MASK, "count": Sink.COUNT, "depth": Sink.NEAREST, "samples": Sink.SAMPLES, "area": Sink.COUNT}
 
 #: The clock of what several threads do.

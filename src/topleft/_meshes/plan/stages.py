@@ -18,8 +18,6 @@ from topleft._meshes.lod.detail import Detail
 from topleft._meshes.plan.facts import ClusterFacts, Decided, Facts, memory_of
 from topleft.methods import METHODS
 
-__all__ = ["Stage", "find_stages"]
-
 
 @dataclass(frozen=True, slots=True)
 class Stage:
