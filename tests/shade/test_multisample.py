@@ -11,7 +11,6 @@ from engine_cases import ON_EACH_ISA, on
 
 import topleft as tl
 from topleft._core.base.color import id_colors, srgb_tables
-from topleft._core.raster import choices
 from topleft._core.raster.cluster_draw import ClusteredMesh
 from topleft._meshes.picture.shade import GREY_OF_FARTHEST, GREY_OF_NEAREST, colors_of_numbers
 from topleft.methods.reference.sampling import mean
@@ -47,7 +46,7 @@ def test_picture_is_the_same_from_planes_of_samples(isa, shading, size):
 
 
 @pytest.mark.parametrize("look", [{}, {"shading": "ids"}, {"cutoff": 0.5}, {"edges": True}, {"cull": "back"}])
-def test_picture_of_a_mesh_that_is_drawn_again_has_the_same_bits(monkeypatch, look):
+def test_picture_of_a_mesh_that_is_drawn_again_has_the_same_bits(monkeypatch, force, look):
     """It is drawn from clusters then, a plane a sample, and what these show is snapped once for all samples."""
     vertices, triangles = tl.scenes.blob(30_000)
     holes = np.full((8, 8, 4), 255, np.uint8)
@@ -57,7 +56,7 @@ def test_picture_of_a_mesh_that_is_drawn_again_has_the_same_bits(monkeypatch, lo
     mesh = tl.Mesh(vertices.astype(np.float32), triangles, uv=3 * vertices[:, :2], materials=[leaf])
     near = tl.Camera.look_at((0.2, 0.1, 1.2), near=0.01, far=100)
     n_planes, draw_plane = [], ClusteredMesh.draw
-    monkeypatch.setattr(choices, "pays_to_draw_samples", lambda *_: True)
+    force(pays_to_draw_samples=True)
     monkeypatch.setattr(ClusteredMesh, "draw", lambda *a: n_planes.append(1) or draw_plane(*a))
     first, again = (tl.render(mesh, near, (200, 150), sampling="msaa4", **look) for _ in range(2))
     assert len(n_planes) == 4
