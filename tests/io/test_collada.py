@@ -10,6 +10,7 @@ import pytest
 
 import topleft as tl
 from topleft._io.foreign import simplified
+from topleft._io.budget import Budget
 from topleft._io.notes import Notes
 from topleft.errors import MeshError, MeshWarning
 
@@ -39,7 +40,7 @@ def collada(primitives=POLYLIST, positions=CHEVRON, node="<instance_geometry url
 
 def simple(content):
     notes = Notes("a.dae")
-    return ElementTree.fromstring(simplified(content, notes)), [line.partition(": ")[2] for line in notes.lines]
+    return ElementTree.fromstring(simplified(content, notes, Budget("a.dae"))), [line.partition(": ")[2] for line in notes.lines]
 
 
 def area_of(root):
@@ -96,7 +97,7 @@ def test_collada_animations_and_lines_are_told():
 )
 def test_collada_that_is_broken_is_told(content, message):
     with pytest.raises(MeshError, match=message):
-        simplified(content, Notes("a.dae"))
+        simplified(content, Notes("a.dae"), Budget("a.dae"))
 
 
 @pytest.mark.parametrize("suffix", [".dae", ".zae"])

@@ -15,6 +15,7 @@ from topleft import _engine
 from topleft._base.arrays import as_path
 from topleft._camera.camera import Camera
 from topleft._camera.matrices import F64, box_matrix, frustum_matrix, tangent
+from topleft._io.budget import Budget
 from topleft._io.load import GLTF_SUFFIXES, reading
 from topleft._io.references import InputFile
 from topleft.errors import MeshError
@@ -55,7 +56,7 @@ def load_cameras(path: str | os.PathLike[str]) -> list[Camera]:
     ...     tl.load_cameras(path)
     []
     """
-    source = InputFile(as_path("path", path))
+    source = InputFile(as_path("path", path), Budget(os.fspath(path)))
 
     def cameras() -> list[Camera]:
         if source.path.suffix.lower() not in GLTF_SUFFIXES:

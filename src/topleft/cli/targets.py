@@ -22,9 +22,10 @@ from topleft._base.whole_file import remove_stale_parts
 from topleft._batch.jobs import Job
 from topleft._camera.camera import Camera
 from topleft._camera.file_cameras import load_cameras
+from topleft._io.budget import Budget
 from topleft._io.images import SUFFIXES
 from topleft._io.load import load
-from topleft._io.references import decoded
+from topleft._io.references import opened, rgba_of
 from topleft._model.environment import Environment
 from topleft._model.material import Material
 from topleft._model.mesh import DEFAULT_CREASE, Mesh
@@ -114,7 +115,12 @@ def read_image(path: str) -> npt.NDArray[np.uint8]:
     if not Path(path).is_file() and Path(path).exists():
         raise ImageError(f"cannot read {path!r}: it is no file")
     try:
-        return decoded(Path(path).read_bytes())
+        budget = Budget(path)
+        budget.read(Path(path).stat().st_size)
+        with opened(Path(path).read_bytes()) as image:
+            if not budget.has("max_texture_pixels", image.width * image.height):
+                raise MeshError(f"of more than {budget.limit('max_texture_pixels')} pixels")
+            return rgba_of(image)
     except MeshError as error:
         raise ImageError(f"cannot read {path!r}: it is {error}") from None
     except (OSError, ValueError, SyntaxError, EOFError) as error:
