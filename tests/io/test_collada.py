@@ -40,7 +40,9 @@ def collada(primitives=POLYLIST, positions=CHEVRON, node="<instance_geometry url
 
 def simple(content):
     notes = Notes("a.dae")
-    return ElementTree.fromstring(simplified(content, notes, Budget("a.dae"))), [line.partition(": ")[2] for line in notes.lines]
+    return ElementTree.fromstring(simplified(content, notes, Budget("a.dae"))), [
+        line.partition(": ")[2] for line in notes.lines
+    ]
 
 
 def area_of(root):

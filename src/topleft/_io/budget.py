@@ -29,7 +29,7 @@ LIMITS = {
     "max_lines": Limit("lines and elements", 1 << 19, 0.25),
     "max_vertices": Limit("vertices", 1 << 22, 1),
     "max_triangles": Limit("triangles", 1 << 22, 1),
-    "max_nodes": Limit("parts (nodes, instances, materials, joints, names and members of files)", 1 << 16, 1 / 64),
+    "max_nodes": Limit("parts (nodes, instances, materials, joints, names and members of files)", 1 << 15, 0.01),
     "max_texture_pixels": Limit("pixels of textures", 1 << 26, 16),
 }
 """By the options of `topleft.load`. 8 bytes of text are one in an archive; 16 pixels a byte are plain ones of PNG."""

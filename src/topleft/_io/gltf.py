@@ -343,7 +343,9 @@ class _Reader:
         if instancing is None:
             return [world]
         rows = instancing["attributes"]
-        given = {name: self._accessors.array(rows[name]) for name in ("TRANSLATION", "ROTATION", "SCALE") if name in rows}
+        given = {
+            name: self._accessors.array(rows[name]) for name in ("TRANSLATION", "ROTATION", "SCALE") if name in rows
+        }
         n = min(map(len, given.values()), default=0)
         self._source.budget.check("max_nodes", n)
         matrices = np.tile(np.eye(4), (n, 1, 1))

@@ -51,8 +51,8 @@ def load(
         180: none is, 0: all are.
     max_vertices, max_triangles, max_nodes : int, optional
         A file with more, or one that says so, is refused: nodes with a mesh and instances count each time, and so do
-        their vertices and triangles. Unless given 4,194,304 vertices, 4,194,304 triangles and 65,536 nodes, or as many
-        as the file has bytes, and one node for 64 bytes.
+        their vertices and triangles. Unless given 4,194,304 vertices, 4,194,304 triangles and 32,768 nodes, or as many
+        as the file has bytes, and one node for 100 bytes.
     max_texture_pixels : int, optional
         Of all pictures together, and of textures that are made of them: those beyond are left out. Unless given
         67,108,864 (8192 x 8192), or 16 for each byte.

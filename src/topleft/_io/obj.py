@@ -377,8 +377,7 @@ def _materials(text: _Text, source: InputFile) -> tuple[tuple[Material, ...], I6
 def _library(text: _Text, source: InputFile) -> dict[str, Callable[[], Material]]:
     known: dict[str, Callable[[], Material]] = {}
     read: set[Path] = set()
-    for line in text.lines_of(b"mtllib").tolist():
-        rest = text.rest_of(line)
+    for rest in dict.fromkeys(text.rest_of(line) for line in text.lines_of(b"mtllib").tolist()):
         names = [rest] if rest.lower().endswith(".mtl") and rest.lower().count(".mtl") == 1 else rest.split() or [rest]
         for name in names:
             path = source.find(name, "material libraries")

@@ -69,6 +69,7 @@ class InputFile:
         self._home = self._folder if home is None else home
         self._is_unpacked = archive is not None
         self._found: dict[tuple[Path, str], Path | None] = {}
+        self._resolved: dict[Path, Path] = {}
         self._listings: dict[Path, dict[str, Path]] = {}
         self._pictures: dict[Any, U8 | None] = {}
         self._not_laid: set[int] = set()
@@ -137,7 +138,11 @@ class InputFile:
     def picture(self, name: str, folder: Path | None = None) -> U8 | None:
         """The picture (H, W, 4) of a file that the mesh names; each is read once, whatever names it has."""
         path = self.find(name, "textures", folder)
-        return None if path is None else self.decoded(path.resolve(), name, lambda: self.read_at(path, name, "textures"))
+        if path is None:
+            return None
+        if path not in self._resolved:
+            self._resolved[path] = path.resolve()
+        return self.decoded(self._resolved[path], name, lambda: self.read_at(path, name, "textures"))
 
     def decoded(self, key: Any, name: str, read: Callable[[], bytes | None]) -> U8 | None:
         """The picture (H, W, 4) of the bytes that `read` returns; that of a key is decoded once."""

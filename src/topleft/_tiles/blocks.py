@@ -26,6 +26,7 @@ from topleft import _engine
 from topleft._base.arrays import INT32_MAX, as_aligned, as_array, shown
 from topleft._base.memory import FRESH, Memory
 from topleft._io.load import load
+from topleft._io.npy import check_header
 from topleft._io.ply import mapped_elements
 from topleft._io.stl_off import mapped_corners
 from topleft._scene.adapt import as_polygons
@@ -241,6 +242,8 @@ def of_arrays(points: Any, triangles: Any, faces: Array | None = None, n_faces: 
 def mapped_npy(path: Path) -> Array:
     """Return the array of a .npy file, mapped."""
     try:
+        with path.open("rb") as file:
+            check_header(file, path.stat().st_size)
         return np.load(path, mmap_mode="r")
     except ValueError as error:
         raise MeshError(f"cannot read {path}: {error}") from None

@@ -1,6 +1,7 @@
-"""Small files that multiply two of their parts: `python tests/support/hostile/multiplying.py [FORMAT ...] [--pair A B]`.
+"""Small files that multiply two of their parts: `python tests/support/hostile/multiplying.py`.
 
-Each format is a function of how often it has each of its parts; each pair of parts is made as large as 5 MB allow.
+Each format is a function of how often it has each of its parts; each pair of parts is made as large as 5 MB allow, or
+`--bytes`. `glb obj:faces obj:faces:pixels` tries a format, a part and a pair.
 Every file is read by a process of its own. Prints the CPU seconds and the memory of each, and ends with status 1 if one
 takes more than 5 s or 1 GB, or ends otherwise than in a mesh, in words or in a missing package.
 """
@@ -9,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import bz2
+import functools
 import gzip
 import io
 import itertools
@@ -33,6 +35,7 @@ import topleft as tl
 from topleft.errors import MeshWarning, MissingPackageError, TopleftError
 
 MOST_BYTES = 5_000_000
+MOST_UNPACKED = 64_000_000  # which is more than any of them may have
 MOST_SECONDS = 5
 MOST_MEMORY = 1 << 30
 MADE, REFUSED, WITHOUT = 0, 3, 4
@@ -41,6 +44,7 @@ Files = dict[str, bytes]
 Sizes = dict[str, int]
 
 
+@functools.lru_cache(64)
 def png(n_pixels: int) -> bytes:
     """A plain PNG of about so many pixels, without the memory for them."""
     side = max(1, int(n_pixels**0.5))
@@ -153,7 +157,9 @@ def ply(n: Sizes) -> Files:
     kinds = "property uchar x\nproperty uchar y\nproperty uchar z\nproperty uchar s\nproperty uchar t\n"
     vertices = np.zeros((max(3, n["vertices"]), 5), np.uint8)
     vertices[1, 0] = vertices[2, 1] = 1
-    rows = [bytes([3, 0, 1, 2])] * n["faces"] + [bytes([k % 253 + 3, *([0, 1, 2] * 85)[: k % 253 + 3]]) for k in range(n["sizes"])]
+    rows = [bytes([3, 0, 1, 2])] * n["faces"] + [
+        bytes([k % 253 + 3, *([0, 1, 2] * 85)[: k % 253 + 3]]) for k in range(n["sizes"])
+    ]
     rows += [b"\0"] * (n["empty"] - 1)
     if n["corners"] > 1:
         rows = [np.uint32(n["corners"]).tobytes() + bytes([0, 1, 2]) * (n["corners"] // 3) + bytes(n["corners"] % 3)]
@@ -166,7 +172,10 @@ def ply(n: Sizes) -> Files:
     more = "element e 0\n" * (n["elements"] - 1) + "element f 0\n" + "property uchar q\n" * (n["properties"] - 1)
     head = f"ply\nformat binary_little_endian 1.0\ncomment TextureFile t.png\nelement vertex {len(vertices)}\n{kinds}"
     del extra
-    return {"a.ply": (head + faces + more + "end_header\n").encode() + vertices.tobytes() + b"".join(rows), "t.png": png(n["pixels"])}
+    return {
+        "a.ply": (head + faces + more + "end_header\n").encode() + vertices.tobytes() + b"".join(rows),
+        "t.png": png(n["pixels"]),
+    }
 
 
 TEXT_PLY = {"vertices": 400_000, "faces": 600_000, "sizes": 2_000, "blanks": 4_900_000}
@@ -176,7 +185,9 @@ def text_ply(n: Sizes) -> Files:
     faces = ["3 0 1 2"] * n["faces"] + [f"{3 * k} " + "0 1 2 " * k for k in range(2, n["sizes"] + 1)]
     head = f"ply\nformat ascii 1.0\nelement vertex {n['vertices'] + 2}\nproperty float x\nproperty float y\nproperty float z\n"
     head += f"element face {len(faces)}\nproperty list int int vertex_indices\nend_header\n"
-    return {"a.ply": (head + "0 1 0\n1 0 0\n" + "0 0 0\n" * n["vertices"] + "\n".join(faces) + "\n" * n["blanks"]).encode()}
+    return {
+        "a.ply": (head + "0 1 0\n1 0 0\n" + "0 0 0\n" * n["vertices"] + "\n".join(faces) + "\n" * n["blanks"]).encode()
+    }
 
 
 OFF = {"vertices": 400_000, "faces": 600_000, "sizes": 2_000, "colors": 300_000, "blanks": 4_900_000}
@@ -207,7 +218,9 @@ COLLADA = {
 
 def collada(n: Sizes) -> Files:
     materials = max(n["materials"], n["names"])
-    images = "".join(f"<image id='i{i}'><init_from>{'./' * (i % 40)}t.png</init_from></image>" for i in range(n["names"]))
+    images = "".join(
+        f"<image id='i{i}'><init_from>{'./' * (i % 40)}t.png</init_from></image>" for i in range(n["names"])
+    )
     effects = "".join(
         f"<effect id='e{i}'><profile_COMMON><newparam sid='s'><surface type='2D'><init_from>i{i % n['names']}</init_from>"
         "</surface></newparam><newparam sid='t'><sampler2D><source>s</source></sampler2D></newparam><technique sid='c'>"
@@ -218,10 +231,15 @@ def collada(n: Sizes) -> Files:
     bound = "".join(f"<instance_material symbol='y{i}' target='#m{i % materials}'/>" for i in range(n["bound"]))
     placed = f"<instance_geometry url='#g'><bind_material><technique_common>{bound}</technique_common></bind_material></instance_geometry>"
     vertex = "<input semantic='VERTEX' source='#v' offset='0'/>"
-    triangles = f"<triangles material='y0' count='{n['corners']}'>{vertex}<p>{'0 1 2 ' * n['corners']}</p></triangles>" * n["lists"]
+    triangles = (
+        f"<triangles material='y0' count='{n['corners']}'>{vertex}<p>{'0 1 2 ' * n['corners']}</p></triangles>"
+        * n["lists"]
+    )
     polygons = f"<polygons count='{n['polygons']}'>{vertex}{'<p>0 1 2</p>' * n['polygons']}</polygons>"
+    z = "<instance_node url='#z'/>"
     doubled = "<library_nodes><node id='d0'><instance_node url='#z'/></node>" + "".join(
-        f"<node id='d{k + 1}'>{f'<instance_node url={chr(39)}#d{k}{chr(39)}/>' * 2}</node>" for k in reversed(range(n["doubled"]))
+        f"<node id='d{k + 1}'>{f'<instance_node url={chr(39)}#d{k}{chr(39)}/>' * 2}</node>"
+        for k in reversed(range(n["doubled"]))
     )
     return {
         "a.dae": (
@@ -233,8 +251,7 @@ def collada(n: Sizes) -> Files:
             "<param name='Y' type='float'/><param name='Z' type='float'/></accessor></technique_common></source><vertices id='v'>"
             f"<input semantic='POSITION' source='#s'/></vertices>{triangles}{polygons}</mesh></geometry></library_geometries>"
             f"{doubled}<node id='z'>{placed}</node></library_nodes><library_visual_scenes><visual_scene id='w'><node id='n'>"
-            f"<instance_node url='#d{n['doubled']}'/>{placed * (n['nodes'] - 1)}{'<instance_node url=' + chr(39) + '#z' + chr(39) + '/>'}"
-            f"{'<instance_node url=' + chr(39) + '#z' + chr(39) + '/>' * (n['shared'] - 1)}{'<extra/>' * (n['elements'] - 1)}</node></visual_scene>"
+            f"<instance_node url='#d{n['doubled']}'/>{placed * (n['nodes'] - 1)}{z * n['shared']}{'<extra/>' * (n['elements'] - 1)}</node></visual_scene>"
             "</library_visual_scenes><scene><instance_visual_scene url='#w'/></scene></COLLADA>"
         ).encode(),
         "t.png": png(n["pixels"]),
@@ -242,7 +259,7 @@ def collada(n: Sizes) -> Files:
 
 
 THREEMF = {
-    "triangles": 5_000_000, "vertices": 5_000_000, "objects": 300_000, "items": 1_000_000, "components": 1_000_000,
+    "triangles": 600_000, "vertices": 600_000, "objects": 300_000, "items": 600_000, "components": 600_000,
     "doubled": 60, "deep": 100_000, "elsewhere": 300_000,
 }  # fmt: skip
 
@@ -266,13 +283,15 @@ def threemf(n: Sizes) -> Files:
     model = f"<model {space}><resources>{objects}</resources><build>{f'<item objectid={chr(39)}d{last}{chr(39)}/>' * n['items']}</build></model>"
     other = f"<model {space}><resources><object id='0'>{mesh}</object></resources><build/></model>"
     stream = io.BytesIO()
-    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:
+    if len(model) > MOST_UNPACKED:
+        return {"a.3mf": bytes(MOST_BYTES)}
+    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
         archive.writestr("3D/3dmodel.model", model)
         archive.writestr("3D/b.model", other if n["elsewhere"] > 1 else "")
     return {"a.3mf": stream.getvalue()}
 
 
-ARCHIVES = {"bytes": 300_000_000, "members": 40_000, "lines": 100_000_000, "shift": 1000, "deep": 2_000}
+ARCHIVES = {"bytes": 40_000_000, "members": 40_000, "lines": 40_000_000, "shift": 1000, "deep": 2_000}
 
 
 def zipped(n: Sizes) -> Files:
@@ -311,14 +330,16 @@ def bzipped(n: Sizes) -> Files:
 
 
 def packed_ply(n: Sizes) -> Files:
-    stream = io.BytesIO()
-    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, content in ply(n).items():
+    stream, files = io.BytesIO(), ply(n)
+    if len(files["a.ply"]) > MOST_UNPACKED:
+        return {"a.zip": bytes(MOST_BYTES)}
+    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+        for name, content in files.items():
             archive.writestr(name, content)
     return {"a.zip": stream.getvalue()}
 
 
-LEVELS = {"levels": 3_000, "bytes": 300_000_000, "other": 300_000_000}
+LEVELS = {"levels": 3_000, "bytes": 80_000_000, "other": 200_000_000}
 
 
 def levels(n: Sizes) -> Files:
@@ -329,7 +350,9 @@ def levels(n: Sizes) -> Files:
     from topleft._lod.levels import digest_of
 
     bounds = np.zeros(n["levels"])
-    np.savez_compressed(stream, mesh=np.array(digest_of(mesh)), bound=bounds, known=bounds, z=np.zeros(n["other"], np.uint8), **own)
+    np.savez_compressed(
+        stream, mesh=np.array(digest_of(mesh)), bound=bounds, known=bounds, z=np.zeros(n["other"], np.uint8), **own
+    )
     return {"a.npz": stream.getvalue()}
 
 
@@ -342,17 +365,31 @@ FORMATS = {
 }  # fmt: skip
 
 
-def files_of(kind: str, pair: tuple[str, ...]) -> Files:
-    """A file whose two parts are as many as 5 MB allow."""
+@functools.lru_cache(None)
+def costs_bytes(kind: str, name: str) -> bool:
+    """Whether a part makes a file larger; one that does not is always as large as it may be."""
     most, make = FORMATS[kind]
-    sizes = {name: most[name] if name in pair else 1 for name in most}
-    while True:
-        files = make(dict(sizes))
-        if sum(map(len, files.values())) < MOST_BYTES:
-            return files
-        smaller = {name: make({**sizes, name: max(1, sizes[name] // 2)}) for name in pair if sizes[name] > 1}
-        largest = min(smaller, key=lambda name: sum(map(len, smaller[name].values())))
-        sizes[largest] //= 2
+    few = min(most[name], 1 << 16)
+    return sum(map(len, make({**dict.fromkeys(most, 1), name: few}).values())) > 0.5 * few
+
+
+def files_of(kind: str, pair: tuple[str, ...], most_bytes: int = MOST_BYTES) -> Files:
+    """A file whose two parts are as many as its bytes allow."""
+    most, make = FORMATS[kind]
+    growing = [name for name in pair if costs_bytes(kind, name)]
+    sizes = dict.fromkeys(most, 1) | {name: most[name] for name in pair}
+    sizes |= dict.fromkeys(growing, 1)
+    files = make(dict(sizes))
+    while any(sizes[name] < most[name] for name in growing):
+        n_before = sum(map(len, files.values()))
+        sizes |= {name: min(most[name], 2 * sizes[name]) for name in growing}
+        larger = make(dict(sizes))
+        if sum(map(len, larger.values())) >= most_bytes:
+            break
+        files = larger
+        if n_before > most_bytes // 2:
+            break
+    return files
 
 
 def read(path: Path) -> int:
@@ -378,10 +415,10 @@ def read(path: Path) -> int:
     return MADE
 
 
-def run(kind: str, pair: tuple[str, ...]) -> bool:
+def run(kind: str, pair: tuple[str, ...], most_bytes: int) -> bool:
     """Whether a file is read or refused within the time and the memory."""
     with tempfile.TemporaryDirectory() as name:
-        files = files_of(kind, pair)
+        files = files_of(kind, pair, most_bytes)
         for each, content in files.items():
             Path(name, each).write_bytes(content)
         n_bytes = sum(map(len, files.values()))
@@ -399,32 +436,36 @@ def run(kind: str, pair: tuple[str, ...]) -> bool:
         _, status, used = os.wait4(child, 0)
     seconds, memory = used.ru_utime + used.ru_stime, used.ru_maxrss * 1024
     code = os.waitstatus_to_exitcode(status)
-    how = {MADE: "made", REFUSED: "refused", WITHOUT: "without its package", -signal.SIGXCPU: "too slow"}.get(code, str(code))
+    how = {MADE: "made", REFUSED: "refused", WITHOUT: "without its package", -signal.SIGXCPU: "too slow"}.get(
+        code, str(code)
+    )
     is_right = code in (MADE, REFUSED, WITHOUT) and seconds <= MOST_SECONDS and memory <= MOST_MEMORY
     mark = "" if is_right else "  <-- must not be"
-    print(f"{kind:11} {' x '.join(pair):30} {n_bytes / 1e6:5.2f} MB {seconds:6.2f} s {memory / 1e6:6.0f} MB {how}{mark}", flush=True)
+    print(
+        f"{kind:11} {' x '.join(pair):30} {n_bytes / 1e6:5.2f} MB {seconds:6.2f} s {memory / 1e6:6.0f} MB {how}{mark}",
+        flush=True,
+    )
     return is_right
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("formats", nargs="*", choices=[*FORMATS, []], default=[])
-    parser.add_argument("--pair", nargs=2, help="two parts, which may be one")
+    parser.add_argument("asked", nargs="*", metavar="FORMAT[:PART[:PART]]", default=list(FORMATS))
+    parser.add_argument("--bytes", type=int, default=MOST_BYTES, help="of a file, before it is read")
     options = parser.parse_args()
-    np.zeros(1)
     for module in ("trimesh", "collada", "lxml.etree", "networkx", "PIL.Image"):
         try:
             __import__(module)
         except ImportError:
             print(f"{module} is not installed")
     start, n, wrong = time.monotonic(), 0, []
-    for kind in options.formats or FORMATS:
+    for asked in options.asked:
+        kind, *pair = asked.split(":")
         parts = FORMATS[kind][0]
-        pairs = [tuple(dict.fromkeys(options.pair))] if options.pair else [*((one,) for one in parts), *itertools.combinations(parts, 2)]
-        for pair in pairs:
+        for each in [tuple(pair)] if pair else [*((one,) for one in parts), *itertools.combinations(parts, 2)]:
             n += 1
-            if not run(kind, pair):
-                wrong.append((kind, *pair))
+            if not run(kind, each, options.bytes):
+                wrong.append((kind, *each))
     print(f"{n} files, {len(wrong)} that must not be: {wrong} ({time.monotonic() - start:.0f} s)")
     return bool(wrong)
 
