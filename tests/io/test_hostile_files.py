@@ -313,7 +313,7 @@ def test_load_of_an_archive_writes_nothing_outside_of_its_folder(tmp_path, monke
 def test_load_of_an_archive_without_a_mesh_or_broken_is_told(tmp_path):
     with zipfile.ZipFile(tmp_path / "a.zip", "w") as archive:
         archive.writestr("a.txt", "hello")
-    with pytest.raises(MeshError, match="its archive holds no .gltf"):
+    with pytest.raises(MeshError, match=r"its archive holds no \.gltf"):
         tl.load(tmp_path / "a.zip")
     (tmp_path / "a.obj.gz").write_bytes(gzip.compress(OBJ)[:-9])
     with pytest.raises(MeshError, match="its archive is broken"):

@@ -245,8 +245,7 @@ def load_bytes(data: bytes | memoryview, name: str) -> tuple[Mesh, list[str]]:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             try:
-                is_large = Path(path).stat().st_size > MAX_VERTICES
-                mesh = load(path, max_vertices=MAX_VERTICES if is_large else None)
+                mesh = load(path, max_vertices=MAX_VERTICES if len(data) > MAX_VERTICES else None)
             except MeshError as error:
                 raise MeshError(str(error).replace(str(path), Path(name).name)) from None
         lacks = [str(one.message).replace(str(path), Path(name).name) for one in caught]

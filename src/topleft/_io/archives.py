@@ -11,7 +11,7 @@ import tarfile
 import tempfile
 import zipfile
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Protocol
@@ -27,11 +27,7 @@ MESH_SUFFIXES = (
 
 PIECE_BYTES = 1 << 20
 MOST_FOLDERS = 32
-OPENERS: dict[str, Callable[[IO[bytes]], IO[bytes]]] = {
-    ".gz": lambda file: gzip.open(file),
-    ".tgz": lambda file: gzip.open(file),
-    ".bz2": lambda file: bz2.open(file),
-}
+"""Of the name of a member."""
 
 BROKEN = (zipfile.BadZipFile, tarfile.TarError, EOFError, NotImplementedError, RuntimeError, zlib.error)
 
@@ -72,7 +68,7 @@ def unpacked(source: InputFile) -> Iterator[list[InputFile]]:
 class Counted:
     """A reader whose bytes are counted as they are unpacked."""
 
-    def __init__(self, content: IO[bytes], budget: Budget) -> None:
+    def __init__(self, content: SupportsRead, budget: Budget) -> None:
         self._content = content
         self._budget = budget
 
@@ -95,7 +91,7 @@ def _written(file: IO[bytes], source: InputFile, folder: Path) -> list[Path]:
     if suffix in (".zip", ".zae"):
         return _written_of_zip(file, budget, folder)
     stem = Path(source.path.stem)
-    with OPENERS[suffix](file) as content:
+    with bz2.BZ2File(file) if suffix == ".bz2" else gzip.GzipFile(fileobj=file) as content:
         counted = Counted(content, budget)
         if suffix != ".tgz" and stem.suffix.lower() != ".tar":
             _write(counted, folder / stem.name)

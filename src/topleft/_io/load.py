@@ -57,7 +57,8 @@ def load(
         Of all pictures together, and of textures that are made of them: those beyond are left out. Unless given
         67,108,864 (8192 x 8192), or 16 for each byte.
     max_lines : int, optional
-        Of lines of OBJ and OFF and elements of XML: a file with more is refused. Unless given 524,288, or one for 4 bytes.
+        Of lines of text, rows of PLY and elements of XML: a file with more is refused. Unless given 524,288, or one for
+        4 bytes.
     max_bytes : int, optional
         Of the file and all that it names: more are refused. Unless given 8 GiB.
     max_unpacked_bytes : int, optional

@@ -63,7 +63,7 @@ class InputFile:
     ) -> None:
         self.path = path
         self.budget = budget
-        self.notes = Notes(str(path)) if archive is None else archive.notes
+        self.notes: Notes = Notes(str(path)) if archive is None else archive.notes
         self.clouds: list[Cloud] = [] if archive is None else archive.clouds
         self._folder = path.parent.resolve()
         self._home = self._folder if home is None else home
@@ -254,7 +254,7 @@ def rgba_of(image: Image.Image) -> U8:
     pixels = np.empty((image.height, image.width, 4), np.uint8)
     for top in range(0, image.height, ROWS_AT_ONCE):
         rows = image.crop((0, top, image.width, min(top + ROWS_AT_ONCE, image.height)))
-        pixels[top : top + ROWS_AT_ONCE] = rows.convert("RGBA")
+        pixels[top : top + ROWS_AT_ONCE] = np.asarray(rows.convert("RGBA"))
     return pixels
 
 

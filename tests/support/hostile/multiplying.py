@@ -60,8 +60,8 @@ def png(n_pixels: int) -> bytes:
 
 
 GLTF = {
-    "nodes": 300_000, "primitives": 100_000, "instances": 200_000_000, "stored_instances": 1_000_000, "targets": 200_000,
-    "joints": 300_000, "influences": 50_000, "vertices": 200_000_000, "stored_vertices": 1_600_000,
+    "nodes": 300_000, "primitives": 100_000, "instances": 200_000_000, "stored_instances": 1_000_000,
+    "targets": 200_000, "joints": 300_000, "influences": 50_000, "vertices": 200_000_000, "stored_vertices": 1_600_000,
     "indices": 600_000_000, "stored_indices": 4_000_000, "materials": 60_000, "textures": 60_000, "images": 60_000,
     "views": 60_000, "pixels": 1 << 26, "skins": 60_000,
 }  # fmt: skip
@@ -123,7 +123,8 @@ def glb(n: Sizes) -> Files:
 
 OBJ = {
     "vertices": 600_000, "faces": 600_000, "corners": 300_000, "sizes": 2_000, "groups": 200_000, "uses": 300_000,
-    "materials": 300_000, "libraries": 400_000, "spellings": 60_000, "names": 200_000, "pixels": 1 << 26, "lines": 4_900_000,
+    "materials": 300_000, "libraries": 400_000, "spellings": 60_000, "names": 200_000,
+    "pixels": 1 << 26, "lines": 4_900_000,
 }  # fmt: skip
 
 
@@ -148,8 +149,8 @@ def obj(n: Sizes) -> Files:
 
 
 PLY = {
-    "vertices": 1_600_000, "faces": 1_200_000, "corners": 2_000_000, "sizes": 250, "strip": 4_900_000, "strips": 1_000_000,
-    "empty": 4_900_000, "elements": 200_000, "properties": 200_000, "pixels": 1 << 26,
+    "vertices": 1_600_000, "faces": 1_200_000, "corners": 2_000_000, "sizes": 250, "strip": 4_900_000,
+    "strips": 1_000_000, "empty": 4_900_000, "elements": 200_000, "properties": 200_000, "pixels": 1 << 26,
 }  # fmt: skip
 
 
@@ -183,7 +184,8 @@ TEXT_PLY = {"vertices": 400_000, "faces": 600_000, "sizes": 2_000, "blanks": 4_9
 
 def text_ply(n: Sizes) -> Files:
     faces = ["3 0 1 2"] * n["faces"] + [f"{3 * k} " + "0 1 2 " * k for k in range(2, n["sizes"] + 1)]
-    head = f"ply\nformat ascii 1.0\nelement vertex {n['vertices'] + 2}\nproperty float x\nproperty float y\nproperty float z\n"
+    head = f"ply\nformat ascii 1.0\nelement vertex {n['vertices'] + 2}\n"
+    head += "property float x\nproperty float y\nproperty float z\n"
     head += f"element face {len(faces)}\nproperty list int int vertex_indices\nend_header\n"
     return {
         "a.ply": (head + "0 1 0\n1 0 0\n" + "0 0 0\n" * n["vertices"] + "\n".join(faces) + "\n" * n["blanks"]).encode()
@@ -212,7 +214,8 @@ def stl(n: Sizes) -> Files:
 
 COLLADA = {
     "nodes": 100_000, "doubled": 60, "shared": 60_000, "lists": 50_000, "corners": 2_000_000, "numbers": 2_000_000,
-    "materials": 20_000, "bound": 50_000, "names": 20_000, "pixels": 1 << 26, "elements": 1_200_000, "polygons": 400_000,
+    "materials": 20_000, "bound": 50_000, "names": 20_000, "pixels": 1 << 26,
+    "elements": 1_200_000, "polygons": 400_000,
 }  # fmt: skip
 
 
@@ -222,14 +225,18 @@ def collada(n: Sizes) -> Files:
         f"<image id='i{i}'><init_from>{'./' * (i % 40)}t.png</init_from></image>" for i in range(n["names"])
     )
     effects = "".join(
-        f"<effect id='e{i}'><profile_COMMON><newparam sid='s'><surface type='2D'><init_from>i{i % n['names']}</init_from>"
-        "</surface></newparam><newparam sid='t'><sampler2D><source>s</source></sampler2D></newparam><technique sid='c'>"
+        f"<effect id='e{i}'><profile_COMMON><newparam sid='s'><surface type='2D'>"
+        f"<init_from>i{i % n['names']}</init_from></surface></newparam>"
+        "<newparam sid='t'><sampler2D><source>s</source></sampler2D></newparam><technique sid='c'>"
         "<phong><diffuse><texture texture='t' texcoord='u'/></diffuse></phong></technique></profile_COMMON></effect>"
         for i in range(materials)
     )
     rows = "".join(f"<material id='m{i}'><instance_effect url='#e{i}'/></material>" for i in range(materials))
     bound = "".join(f"<instance_material symbol='y{i}' target='#m{i % materials}'/>" for i in range(n["bound"]))
-    placed = f"<instance_geometry url='#g'><bind_material><technique_common>{bound}</technique_common></bind_material></instance_geometry>"
+    placed = (
+        f"<instance_geometry url='#g'><bind_material><technique_common>{bound}</technique_common></bind_material>"
+        "</instance_geometry>"
+    )
     vertex = "<input semantic='VERTEX' source='#v' offset='0'/>"
     triangles = (
         f"<triangles material='y0' count='{n['corners']}'>{vertex}<p>{'0 1 2 ' * n['corners']}</p></triangles>"
@@ -247,12 +254,14 @@ def collada(n: Sizes) -> Files:
             f"<library_images>{images}</library_images><library_effects>{effects}</library_effects>"
             f"<library_materials>{rows}</library_materials><library_geometries><geometry id='g'><mesh><source id='s'>"
             f"<float_array id='a' count='{9 * n['numbers']}'>{'0 0 0 1 0 0 0 1 0 ' * n['numbers']}</float_array>"
-            f"<technique_common><accessor source='#a' count='{3 * n['numbers']}' stride='3'><param name='X' type='float'/>"
-            "<param name='Y' type='float'/><param name='Z' type='float'/></accessor></technique_common></source><vertices id='v'>"
-            f"<input semantic='POSITION' source='#s'/></vertices>{triangles}{polygons}</mesh></geometry></library_geometries>"
-            f"{doubled}<node id='z'>{placed}</node></library_nodes><library_visual_scenes><visual_scene id='w'><node id='n'>"
-            f"<instance_node url='#d{n['doubled']}'/>{placed * (n['nodes'] - 1)}{z * n['shared']}{'<extra/>' * (n['elements'] - 1)}</node></visual_scene>"
-            "</library_visual_scenes><scene><instance_visual_scene url='#w'/></scene></COLLADA>"
+            f"<technique_common><accessor source='#a' count='{3 * n['numbers']}' stride='3'>"
+            "<param name='X' type='float'/><param name='Y' type='float'/><param name='Z' type='float'/></accessor>"
+            "</technique_common></source><vertices id='v'><input semantic='POSITION' source='#s'/></vertices>"
+            f"{triangles}{polygons}</mesh></geometry></library_geometries>{doubled}<node id='z'>{placed}</node>"
+            "</library_nodes><library_visual_scenes><visual_scene id='w'><node id='n'>"
+            f"<instance_node url='#d{n['doubled']}'/>{placed * (n['nodes'] - 1)}{z * n['shared']}"
+            f"{'<extra/>' * (n['elements'] - 1)}</node></visual_scene></library_visual_scenes>"
+            "<scene><instance_visual_scene url='#w'/></scene></COLLADA>"
         ).encode(),
         "t.png": png(n["pixels"]),
     }  # fmt: skip
@@ -277,10 +286,11 @@ def threemf(n: Sizes) -> Files:
     more += "<component objectid='0' path='/3D/b.model'/>" * (n["elsewhere"] - 1)
     objects += f"<object id='d0'><components>{more}</components></object>"
     for k in range(n["doubled"] + n["deep"]):
-        twice = "<component objectid='d{}'/>".format(k) * (2 if k < n["doubled"] else 1)
+        twice = f"<component objectid='d{k}'/>" * (2 if k < n["doubled"] else 1)
         objects += f"<object id='d{k + 1}'><components>{twice}</components></object>"
     last = n["doubled"] + n["deep"]
-    model = f"<model {space}><resources>{objects}</resources><build>{f'<item objectid={chr(39)}d{last}{chr(39)}/>' * n['items']}</build></model>"
+    items = f"<item objectid='d{last}'/>" * n["items"]
+    model = f"<model {space}><resources>{objects}</resources><build>{items}</build></model>"
     other = f"<model {space}><resources><object id='0'>{mesh}</object></resources><build/></model>"
     stream = io.BytesIO()
     if len(model) > MOST_UNPACKED:
