@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import topleft as tl
-from topleft._io.budget import Budget
 from topleft._io.foreign import simplified
+from topleft._io.limits.budget import Budget
 from topleft._io.notes import Notes
 from topleft.errors import MeshError, MeshWarning
 

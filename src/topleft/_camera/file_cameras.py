@@ -15,7 +15,7 @@ from topleft import _engine
 from topleft._base.arrays import as_path
 from topleft._camera.camera import Camera
 from topleft._camera.matrices import F64, box_matrix, frustum_matrix, tangent
-from topleft._io.budget import Budget
+from topleft._io.limits.budget import Budget
 from topleft._io.load import GLTF_SUFFIXES, reading
 from topleft._io.references import InputFile
 from topleft.errors import MeshError

@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 from topleft import failure_scenes, scenes
 from topleft._base.arrays import as_checked_triangles, as_size, as_vertices
 from topleft._explore.session import Content
-from topleft._io.budget import Budget
-from topleft._io.npy import arrays_of
+from topleft._io.limits.budget import Budget
+from topleft._io.limits.npy import arrays_of
 from topleft._model.mesh import Mesh
 from topleft._scene.adapt import as_mesh
 from topleft.errors import MeshError

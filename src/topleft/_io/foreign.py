@@ -25,11 +25,11 @@ from xml.etree.ElementTree import Element
 import numpy as np
 import numpy.typing as npt
 
-from topleft._io.archives import check_zip
-from topleft._io.budget import Budget
+from topleft._io.limits.archives import check_zip
+from topleft._io.limits.budget import Budget
+from topleft._io.limits.walks import walks
 from topleft._io.notes import Notes
 from topleft._io.references import Cloud, InputFile, numbers_of_text
-from topleft._io.walks import walks
 from topleft._model.from_trimesh import Textures, placed
 from topleft._model.mesh import Mesh
 from topleft._model.normals import moved

@@ -14,7 +14,7 @@ from typing import TypeVar
 import numpy as np
 
 from topleft._base.arrays import as_path
-from topleft._io.budget import Budget
+from topleft._io.limits.budget import Budget
 from topleft._io.notes import tell
 from topleft._io.references import InputFile
 from topleft._model.joined import joined
@@ -155,7 +155,7 @@ def _parts(source: InputFile) -> list[Mesh]:
 
             return read_off(source)
         case suffix if suffix in ARCHIVE_SUFFIXES:
-            from topleft._io.archives import unpacked
+            from topleft._io.limits.archives import unpacked
 
             with unpacked(source) as members:
                 return [part for member in members for part in _parts(member)]

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from topleft._io.budget import Budget
+from topleft._io.limits.budget import Budget
 from topleft._io.notes import Notes
 from topleft._model.texture import MAX_TEXTURE_SIZE
 from topleft.errors import MeshError

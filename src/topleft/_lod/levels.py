@@ -21,8 +21,8 @@ import numpy.typing as npt
 from topleft._base.arrays import as_path, shown
 from topleft._base.whole_file import write_whole
 from topleft._camera.matrices import bounding_sphere
-from topleft._io.budget import Budget
-from topleft._io.npy import arrays_of
+from topleft._io.limits.budget import Budget
+from topleft._io.limits.npy import arrays_of
 from topleft._model.mesh import Mesh
 from topleft.errors import MeshError
 

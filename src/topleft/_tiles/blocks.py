@@ -25,8 +25,8 @@ import numpy.typing as npt
 from topleft import _engine
 from topleft._base.arrays import INT32_MAX, as_aligned, as_array, shown
 from topleft._base.memory import FRESH, Memory
+from topleft._io.limits.npy import check_header
 from topleft._io.load import load
-from topleft._io.npy import check_header
 from topleft._io.ply import mapped_elements
 from topleft._io.stl_off import mapped_corners
 from topleft._scene.adapt import as_polygons

@@ -22,8 +22,8 @@ from topleft._base.whole_file import remove_stale_parts
 from topleft._batch.jobs import Job
 from topleft._camera.camera import Camera
 from topleft._camera.file_cameras import load_cameras
-from topleft._io.budget import Budget
 from topleft._io.images import SUFFIXES
+from topleft._io.limits.budget import Budget
 from topleft._io.load import load
 from topleft._io.references import opened, rgba_of
 from topleft._model.environment import Environment

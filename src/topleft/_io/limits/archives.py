@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Protocol
 
-from topleft._io.budget import Budget
+from topleft._io.limits.budget import Budget
 from topleft._io.references import InputFile
 from topleft.errors import MeshError
 

@@ -6,7 +6,6 @@ Input: a file, unchecked. Output: arrays; no memory is taken for more than the f
 from __future__ import annotations
 
 import math
-import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,7 +14,7 @@ from typing import IO, Any
 import numpy as np
 import numpy.typing as npt
 
-from topleft._io.budget import Budget
+from topleft._io.limits.budget import Budget
 from topleft.errors import MeshError
 
 Array = npt.NDArray[Any]
@@ -51,6 +50,8 @@ def arrays_of(path: Path, budget: Budget) -> Iterator[Callable[[str], Array | No
     MeshError
         If an array is broken, or all that are asked for have more bytes than allowed.
     """
+    import zipfile  # which few need, and which imports much
+
     budget.read(path.stat().st_size)
     with zipfile.ZipFile(path) as archive:
 
