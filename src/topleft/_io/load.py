@@ -157,7 +157,8 @@ def _parts(source: InputFile) -> list[Mesh]:
         case suffix if suffix in ARCHIVE_SUFFIXES:
             from topleft._io.limits.archives import unpacked
 
-            with unpacked(source) as members:
+            with unpacked(source.path, source.budget) as (folder, paths):
+                members = [InputFile(path, source.budget, archive=source, home=folder) for path in paths]
                 return [part for member in members for part in _parts(member)]
         case _:
             from topleft._io.foreign import read_by_trimesh
