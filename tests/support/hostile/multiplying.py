@@ -357,7 +357,7 @@ def levels(n: Sizes) -> Files:
     mesh = tl.Mesh(QUAD, [(0, 1, 2)])
     own = {f"vertices_{i}": np.zeros((n["bytes"] // 12 // n["levels"] + 3, 3), np.float32) for i in range(n["levels"])}
     stream = io.BytesIO()
-    from topleft._lod.levels import digest_of
+    from topleft._meshes.lod.levels import digest_of
 
     bounds = np.zeros(n["levels"])
     np.savez_compressed(
@@ -411,7 +411,7 @@ def read(path: Path) -> int:
     warnings.simplefilter("ignore", MeshWarning)
     try:
         if path.suffix == ".npz":
-            from topleft._lod.levels import Levels
+            from topleft._meshes.lod.levels import Levels
 
             Levels.load(path, tl.Mesh(QUAD, [(0, 1, 2)]))
         else:

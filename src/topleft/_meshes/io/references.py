@@ -1,0 +1,265 @@
+"""Reads the files that a mesh file names: material libraries, buffers, pictures; from its own folder and nowhere else.
+
+Input: names out of a file that nobody has checked. Output: bytes, or the pixels of a picture; None, and a note, for
+what is not there, lies outside of the folder or cannot be read.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft._meshes.io.limits.budget import Budget
+from topleft._meshes.io.notes import Notes
+from topleft._meshes.model.texture import MAX_TEXTURE_SIZE
+from topleft.errors import MeshError
+
+if TYPE_CHECKING:
+    from PIL import Image
+
+U8 = npt.NDArray[np.uint8]
+
+ROWS_AT_ONCE = 256
+"""Rows of a picture that are made RGBA together."""
+
+PICTURE_FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "TGA", "GIF", "TIFF", "PPM", "DDS", "AVIF")
+"""Formats of Pillow that are data and nothing else: EPS, say, would run a program."""
+
+
+class Cloud(NamedTuple):
+    """Points of a file that belong to no triangle."""
+
+    positions: npt.NDArray[Any]
+    colors: U8 | None = None
+    """(N, 4) sRGB."""
+    normals: npt.NDArray[Any] | None = None
+
+
+class InputFile:
+    """A mesh file, the files beside it, what may be taken from them, and what was missing.
+
+    Parameters
+    ----------
+    path : Path
+        The mesh file.
+    budget : Budget
+        What it may make.
+    archive : InputFile, optional
+        The archive that it was unpacked from, which gets its notes and its points.
+    home : Path, optional
+        The folder that it may name files of: its own unless given.
+    """
+
+    def __init__(
+        self, path: Path, budget: Budget, *, archive: InputFile | None = None, home: Path | None = None
+    ) -> None:
+        self.path = path
+        self.budget = budget
+        self.notes: Notes = Notes(str(path)) if archive is None else archive.notes
+        self.clouds: list[Cloud] = [] if archive is None else archive.clouds
+        self._folder = path.parent.resolve()
+        self._home = self._folder if home is None else home
+        self._is_unpacked = archive is not None
+        self._found: dict[tuple[Path, str], Path | None] = {}
+        self._resolved: dict[Path, Path] = {}
+        self._listings: dict[Path, dict[str, Path]] = {}
+        self._pictures: dict[Any, U8 | None] = {}
+        self._not_laid: set[int] = set()
+
+    def content(self) -> bytes:
+        """The bytes of the mesh file."""
+        return self._read(self.path)
+
+    def read(self, name: str, what: str, folder: Path | None = None) -> bytes | None:
+        """The content of a file that the mesh names; `what` is the plural of its kind, for notes."""
+        path = self.find(name, what, folder)
+        return None if path is None else self.read_at(path, name, what)
+
+    def read_at(self, path: Path, name: str, what: str) -> bytes | None:
+        """The content of a file that has been found."""
+        try:
+            return self._read(path)
+        except OSError:
+            self.notes.add(f"{what} that cannot be read", name)
+            return None
+
+    def _read(self, path: Path) -> bytes:
+        if not self._is_unpacked:
+            self.budget.read(path.stat().st_size)
+        return path.read_bytes()
+
+    def find(self, name: str, what: str, folder: Path | None = None) -> Path | None:
+        """Where such a file is: in the folder of the mesh, or below.
+
+        What is named by a path that leads elsewhere, as other machines have them, is looked for in the folder itself.
+        """
+        key = self._folder if folder is None else folder, name
+        if key not in self._found:
+            self.budget.spend("max_nodes", 1)
+            self._found[key] = self._looked_for(name.replace("\\", "/"), what, key[0])
+        return self._found[key]
+
+    def _looked_for(self, name: str, what: str, folder: Path) -> Path | None:
+        home = self._home
+        leads_elsewhere = "\0" in name or re.match(r"/|[A-Za-z][A-Za-z0-9+.-]*:", name) is not None
+        try:
+            if not leads_elsewhere:
+                found = self._as_spelled(folder / name)
+                if found is not None and found.resolve().is_relative_to(home):
+                    return found
+                leads_elsewhere = not (folder / name).resolve().is_relative_to(home) or found is not None
+            if leads_elsewhere and not re.match(r"[A-Za-z][A-Za-z0-9+.-]+:", name):
+                found = self._as_spelled(folder / name.rpartition("/")[2].replace("\0", ""))
+                if found is not None and found.resolve().is_relative_to(home):
+                    return found
+        except (OSError, RuntimeError, ValueError):  # names that no disk can have; circles of links
+            pass
+        where = "outside of its folder not read" if leads_elsewhere else "not found"
+        self.notes.add(f"{what} {where}", name)
+        return None
+
+    def _as_spelled(self, path: Path) -> Path | None:
+        """The file of that name, whatever the case of its letters; no pipe, no device."""
+        if path.is_file():
+            return path
+        if path.parent not in self._listings:
+            others = sorted(path.parent.iterdir(), reverse=True) if path.parent.is_dir() else ()
+            self._listings[path.parent] = {other.name.casefold(): other for other in others if other.is_file()}
+        return self._listings[path.parent].get(path.name.casefold())
+
+    def picture(self, name: str, folder: Path | None = None) -> U8 | None:
+        """The picture (H, W, 4) of a file that the mesh names; each is read once, whatever names it has."""
+        path = self.find(name, "textures", folder)
+        if path is None:
+            return None
+        if path not in self._resolved:
+            self._resolved[path] = path.resolve()
+        return self.decoded(self._resolved[path], name, lambda: self.read_at(path, name, "textures"))
+
+    def decoded(self, key: Any, name: str, read: Callable[[], bytes | None]) -> U8 | None:
+        """The picture (H, W, 4) of the bytes that `read` returns; that of a key is decoded once."""
+        if key not in self._pictures:
+            content = read()
+            self._pictures[key] = picture = None if content is None else self._decode(content, name)
+            if picture is not None:
+                self._not_laid.add(id(picture))
+        return self._pictures[key]
+
+    def picture_content(self, name: str) -> bytes | None:
+        """The bytes of a picture that the mesh names, for somebody else to decode; counted each time."""
+        path = self.find(name, "textures")
+        content = None if path is None else self.read_at(path, name, "textures")
+        if content is None:
+            return None
+        try:
+            with opened(content) as image:
+                return content if self.may_have(image.width * image.height, name) else None
+        except Exception:  # as in `_decode`
+            self.notes.add("textures that cannot be read", name)
+            return None
+
+    def may_lay(self, picture: U8, name: str) -> bool:
+        """Whether a texture may be made of a picture, or of as many pixels; if not, that is noted.
+
+        The first texture of each picture that was decoded has been counted.
+        """
+        if id(picture) in self._not_laid:
+            self._not_laid.remove(id(picture))
+            return True
+        return self.may_have(picture.shape[0] * picture.shape[1], name)
+
+    def may_have(self, n_pixels: int, name: str) -> bool:
+        """Whether there may be so many more pixels of textures; if not, that is noted."""
+        if self.budget.has("max_texture_pixels", n_pixels):
+            self.budget.spend("max_texture_pixels", n_pixels)
+            return True
+        most = self.budget.limit("max_texture_pixels")
+        self.notes.add(f"textures beyond the {most} pixels of max_texture_pixels not read", name)
+        return False
+
+    def _decode(self, content: bytes, name: str) -> U8 | None:
+        try:
+            with opened(content) as image:
+                return rgba_of(image) if self.may_have(image.width * image.height, name) else None
+        except MeshError as error:
+            self.notes.add(f"textures {error} not read", name)
+        except Exception:  # broken bytes end in whatever the decoder meets: OSError, SyntaxError, struct.error, ...
+            self.notes.add("textures that cannot be read", name)
+        return None
+
+
+def numbers_of_text(content: bytes, dtype: Any = np.float64) -> npt.NDArray[Any]:
+    """The numbers that a text holds and nothing else does.
+
+    Raises
+    ------
+    MeshError
+        If something else is in it.
+    """
+    if not content.strip():
+        return np.zeros(0, dtype)
+    try:
+        with warnings.catch_warnings():
+            warnings.filterwarnings("error", message="string or file could not be read")
+            return np.fromstring(content, dtype, sep=" ")
+    except (ValueError, DeprecationWarning):
+        raise MeshError("a number in it is none") from None
+
+
+def whole_numbers(values: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
+    """The values as int64; those that have none there come out as any."""
+    with np.errstate(invalid="ignore"):
+        return values.astype(np.int64)
+
+
+@contextmanager
+def opened(content: bytes) -> Iterator[Image.Image]:
+    """A picture whose pixels have not been decoded.
+
+    Raises
+    ------
+    MeshError
+        If a side of it is too long.
+    OSError, ValueError, SyntaxError
+        If it is broken.
+    """
+    from PIL import Image
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            image = Image.open(io.BytesIO(content), formats=[name for name in PICTURE_FORMATS if name in _known()])
+        except Image.DecompressionBombError:
+            raise MeshError("of more pixels than Pillow opens") from None
+        with image:
+            if max(image.size) > MAX_TEXTURE_SIZE:
+                raise MeshError(f"with more than {MAX_TEXTURE_SIZE} pixels a side")
+            yield image
+
+
+def rgba_of(image: Image.Image) -> U8:
+    """The picture (H, W, 4), uint8, a few rows at a time: all of it is there twice and not more often."""
+    if image.mode.startswith("I"):  # 16 bits, which convert() would cut off at 255
+        grey = (np.asarray(image).clip(0, 65535) >> 8).astype(np.uint8)
+        return np.dstack([grey, grey, grey, np.full_like(grey, 255)])
+    image.load()
+    pixels = np.empty((image.height, image.width, 4), np.uint8)
+    for top in range(0, image.height, ROWS_AT_ONCE):
+        rows = image.crop((0, top, image.width, min(top + ROWS_AT_ONCE, image.height)))
+        pixels[top : top + ROWS_AT_ONCE] = np.asarray(rows.convert("RGBA"))
+    return pixels
+
+
+def _known() -> set[str]:
+    from PIL import Image
+
+    Image.init()
+    return set(Image.OPEN)
