@@ -17,6 +17,7 @@ import zlib
 from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import Any
 from urllib.parse import unquote
 from xml.etree import ElementTree
@@ -25,6 +26,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 import numpy.typing as npt
 
+from topleft._core.base.array_types import Array
 from topleft._meshes.io.limits.archives import check_zip
 from topleft._meshes.io.limits.budget import Budget
 from topleft._meshes.io.limits.walks import walks
@@ -35,8 +37,6 @@ from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.model.normals import moved
 from topleft._meshes.model.polygons import triangulate
 from topleft.errors import MeshError, MissingPackageError
-
-Array = npt.NDArray[Any]
 
 NO_TRIANGLES = {
     ".svg": "it holds curves in a plane",
@@ -75,8 +75,8 @@ def read_by_trimesh(source: InputFile) -> list[Mesh]:
     _check_what_it_is(source, suffix)
     try:
         with quiet():
-            scene = _scene(trimesh, source, suffix)
-            parts = list(_parts(scene, source))
+            scene, double_sided = _scene(trimesh, source, suffix)
+            parts = [_sided(part, double_sided) for part in _parts(scene, source)]
     except NotImplementedError:
         readable = " ".join(sorted(trimesh.available_formats() | {"obj", "ply", "stl", "gltf", "glb"}))
         raise MeshError(
@@ -173,12 +173,15 @@ class Model3MF:
                 self.elsewhere.append((name, path))
 
 
-def _scene(trimesh: Any, source: InputFile, suffix: str) -> Any:
-    """What trimesh reads of a file; of COLLADA, after its polygons have been cut."""
+def _scene(trimesh: Any, source: InputFile, suffix: str) -> tuple[Any, bool | None]:
+    """What trimesh reads of a file, and whether all materials have two sides, or None: each says so itself.
+
+    COLLADA is read after its polygons have been cut; of the sides of its materials trimesh reads nothing.
+    """
     content = source.content()
     if suffix != ".dae":
         del content  # which is counted
-        return trimesh.load_scene(str(source.path), process=False)
+        return trimesh.load_scene(str(source.path), process=False), None
 
     class Beside(trimesh.resolvers.FilePathResolver):  # type: ignore[misc]
         def get(self, name: str) -> bytes:
@@ -187,9 +190,17 @@ def _scene(trimesh: Any, source: InputFile, suffix: str) -> Any:
                 raise FileNotFoundError(name)
             return content
 
-    simple = io.BytesIO(simplified(content, source.notes, source.budget))
+    simple, double_sided = simplified(content, source.notes, source.budget)
     _note_missing_pictures(content, source)
-    return trimesh.load_scene(simple, file_type="dae", resolver=Beside(str(source.path)), process=False)
+    scene = trimesh.load_scene(io.BytesIO(simple), file_type="dae", resolver=Beside(str(source.path)), process=False)
+    return scene, double_sided
+
+
+def _sided(mesh: Mesh, double_sided: bool | None) -> Mesh:
+    """The mesh with materials of two sides, or of one; None: as they are."""
+    if double_sided is None:
+        return mesh
+    return replace(mesh, materials=tuple(replace(one, double_sided=double_sided) for one in mesh.materials))
 
 
 def _note_missing_pictures(content: bytes, source: InputFile) -> None:
@@ -234,8 +245,8 @@ def quiet() -> Iterator[None]:
         logger.removeHandler(handler)
 
 
-def simplified(content: bytes, notes: Notes, budget: Budget) -> bytes:
-    """The file with triangles alone.
+def simplified(content: bytes, notes: Notes, budget: Budget) -> tuple[bytes, bool]:
+    """The file with triangles alone, and whether its materials have two sides: unless all say that they have one.
 
     Raises
     ------
@@ -270,7 +281,16 @@ def simplified(content: bytes, notes: Notes, budget: Budget) -> bytes:
     if root.find(f"{space}library_animations/{space}animation") is not None:
         notes.add("animations not played: everything is at rest")
     _check_walks(root, space, named, budget)
-    return ElementTree.tostring(root)
+    return ElementTree.tostring(root), _has_two_sides(root, space, notes)
+
+
+def _has_two_sides(root: Element, space: str, notes: Notes) -> bool:
+    """Whether materials are drawn from both sides, as without a word of theirs: no effect says 0, or not all do."""
+    effects = list(root.iter(f"{space}effect"))
+    n_single = sum(row.findtext(f".//{space}double_sided", "").strip() == "0" for row in effects)
+    if 0 < n_single < len(effects):
+        notes.add("materials of one side among others drawn from both sides")
+    return n_single == 0 or n_single < len(effects)
 
 
 def _check_walks(root: Element, space: str, named: dict[str | None, Element], budget: Budget) -> None:

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from topleft._core.base.array_types import U8
 from topleft._meshes.io.limits.budget import Budget
 from topleft._meshes.io.notes import Notes
 from topleft._meshes.model.texture import MAX_TEXTURE_SIZE
@@ -24,8 +25,6 @@ from topleft.errors import MeshError
 
 if TYPE_CHECKING:
     from PIL import Image
-
-U8 = npt.NDArray[np.uint8]
 
 ROWS_AT_ONCE = 256
 """Rows of a picture that are made RGBA together."""
@@ -41,6 +40,15 @@ class Cloud(NamedTuple):
     colors: U8 | None = None
     """(N, 4) sRGB."""
     normals: npt.NDArray[Any] | None = None
+
+
+class Moment(NamedTuple):
+    """Which time of which animation of a file is read."""
+
+    time: float
+    """Seconds."""
+    clip: int | str | None = None
+    """The index or the name of the animation."""
 
 
 class InputFile:
@@ -65,6 +73,7 @@ class InputFile:
         self.budget = budget
         self.notes: Notes = Notes(str(path)) if archive is None else archive.notes
         self.clouds: list[Cloud] = [] if archive is None else archive.clouds
+        self.moment: Moment | None = None if archive is None else archive.moment
         self._folder = path.parent.resolve()
         self._home = self._folder if home is None else home
         self._is_unpacked = archive is not None
