@@ -9,15 +9,13 @@ import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import IO, Any
+from typing import IO
 
 import numpy as np
-import numpy.typing as npt
 
+from topleft._core.base.array_types import Array
 from topleft._meshes.io.limits.budget import Budget
 from topleft.errors import MeshError
-
-Array = npt.NDArray[Any]
 
 
 def check_header(file: IO[bytes], n_bytes: int) -> None:
