@@ -10,7 +10,6 @@
 #include <stdint.h>
 
 #include "nearest.h"
-#include "shading.h"
 #include "tiles.h"
 
 /* Where there is no number. The sign is clear; that of Microsoft's NAN depends on the compiler. */
@@ -481,6 +480,7 @@ typedef struct {
 #include "clusters.h"
 #include "exact.h"
 #include "polygons.h"
+#include "shading.h"
 #include "kernels.h"
 #include "meshlets.h"
 

@@ -146,7 +146,8 @@ def test_scene_picture_of_samples_is_their_mean_each_triangle_shaded_once(shadin
     rows = np.moveaxis(samples, 0, 2)
     expected = [[mean(pixel, is_straight=True, tables=srgb_tables()) for pixel in row] for row in rows]
     assert (first > 0).any()
-    assert_same(got, np.array(expected, np.uint8))
+    # The light of samples is not rounded: each by at most half a level, which the mean (concave) makes no larger.
+    assert np.abs(got.astype(int) - np.array(expected)).max() <= (shading == "smooth")
 
 
 @ON_EACH_ISA

@@ -177,46 +177,64 @@ def set_inverse_w(SnappedMesh mesh, const float[:, ::1] rows, float[:, ::1] out)
             i = end + 1
 
 
-def shade(SnappedMesh mesh, ShadingTable shading, const int32_t[:, ::1] ids, const float[:, ::1] depth, uint8_t[:, :, ::1] pixels,
-          int64_t first_row, int64_t n_rows):
-    """Write rows of the picture (H, W, 4) of a visibility buffer."""
-    cdef tl_window window = mesh.window(first_row, n_rows, ids.shape[1])
-    if n_rows and ids.shape[1]:
-        if n_rows == ids.shape[0] and n_rows * ids.shape[1] <= HELD_PX:
-            K.shade(&mesh.snapped, &window, mesh.clip_view(), &shading.shading, &ids[first_row, 0], &depth[first_row, 0], &pixels[first_row, 0, 0])
-        else:
+cdef class ShadedScene:
+    """The instances of a picture as kernels shade them; keeps what they point to alive."""
+
+    cdef tl_shaded_scene scene
+    cdef SnappedMesh mesh  # the first: all have its window
+    cdef uint8_t[::1] rows
+    cdef object arrays
+
+    def __init__(self, meshes, tables, first_ids):
+        """Take at least one mesh and as many shading tables, and what triangle 0 of each is called in the ids."""
+        cdef int64_t i, n = len(meshes)
+        cdef SnappedMesh mesh
+        cdef ShadingTable table
+        cdef tl_shaded *instances
+        self.arrays, self.mesh = (meshes, tables), meshes[0]
+        self.rows = np.empty(n * sizeof(tl_shaded), np.uint8)
+        instances = <tl_shaded *>&self.rows[0]
+        for i in range(n):
+            mesh, table = meshes[i], tables[i]
+            instances[i].snapped, instances[i].shading, instances[i].first_id = &mesh.snapped, &table.shading, first_ids[i]
+        self.scene.instances, self.scene.n, self.scene.view = instances, n, self.mesh.clip_view()
+
+    def shade(self, const int32_t[:, ::1] ids, const float[:, ::1] depth, uint8_t[:, :, ::1] pixels, int64_t first_row, int64_t n_rows):
+        """Write rows of the picture (H, W, 4) of a visibility buffer."""
+        cdef tl_window window = self.mesh.window(first_row, n_rows, ids.shape[1])
+        if n_rows and ids.shape[1]:
+            if n_rows == ids.shape[0] and n_rows * ids.shape[1] <= HELD_PX:
+                K.shade(&self.scene, &window, &ids[first_row, 0], &depth[first_row, 0], &pixels[first_row, 0, 0])
+            else:
+                with nogil:
+                    K.shade(&self.scene, &window, &ids[first_row, 0], &depth[first_row, 0], &pixels[first_row, 0, 0])
+            raise_if_given_up()
+
+    def shade_samples(self, const int32_t[:, ::1] positions, const int32_t[:, :, ::1] ids, const float[:, :, ::1] depth, Split split,
+                      uint8_t[:, :, ::1] pixels, int64_t first_row, int64_t n_rows):
+        """Write rows of the picture (H, W, 4) of a visibility buffer with several samples a pixel.
+
+        `ids` and `depth`: (S, H, W), or with `split` (1, H, W), what the first sample sees.
+        """
+        cdef tl_window window = self.mesh.window(first_row, n_rows, ids.shape[2])
+        cdef int sample_bits = int(positions.shape[0]).bit_length() - 1
+        cdef int64_t stride = ids.shape[1] * ids.shape[2]
+        cdef tl_split rows
+        if split is not None:
+            rows = split.from_row(first_row)
+        if n_rows and ids.shape[2]:
             with nogil:
-                K.shade(&mesh.snapped, &window, mesh.clip_view(), &shading.shading, &ids[first_row, 0], &depth[first_row, 0], &pixels[first_row, 0, 0])
-        raise_if_given_up()
+                K.shade_samples(&self.scene, &window, &positions[0, 0], sample_bits, stride, &ids[0, first_row, 0], &depth[0, first_row, 0],
+                                &rows if split is not None else NULL, &pixels[first_row, 0, 0])
+            raise_if_given_up()
 
-
-def shade_samples(SnappedMesh mesh, ShadingTable shading, const int32_t[:, ::1] positions, const int32_t[:, :, ::1] ids,
-                  const float[:, :, ::1] depth, Split split, uint8_t[:, :, ::1] pixels, int64_t first_row, int64_t n_rows):
-    """Write rows of the picture (H, W, 4) of a visibility buffer with several samples a pixel.
-
-    `ids` and `depth`: (S, H, W), or with `split` (1, H, W), what the first sample sees.
-    """
-    cdef tl_window window = mesh.window(first_row, n_rows, ids.shape[2])
-    cdef int sample_bits = int(positions.shape[0]).bit_length() - 1
-    cdef int64_t stride = ids.shape[1] * ids.shape[2]
-    cdef tl_split rows
-    if split is not None:
-        rows = split.from_row(first_row)
-    if n_rows and ids.shape[2]:
-        with nogil:
-            K.shade_samples(&mesh.snapped, &window, mesh.clip_view(), &shading.shading, &positions[0, 0], sample_bits, stride, &ids[0, first_row, 0],
-                            &depth[0, first_row, 0], &rows if split is not None else NULL, &pixels[first_row, 0, 0])
-        raise_if_given_up()
-
-
-def shade_normals(SnappedMesh mesh, ShadingTable shading, const int32_t[:, ::1] ids, float[:, :, ::1] out, int64_t first_row,
-                  int64_t n_rows):
-    """Write rows of the unit normals (H, W, 3) of a visibility buffer."""
-    cdef tl_window window = mesh.window(first_row, n_rows, ids.shape[1])
-    if n_rows and ids.shape[1]:
-        with nogil:
-            K.shade_normals(&mesh.snapped, &window, mesh.clip_view(), &shading.shading, &ids[first_row, 0], &out[first_row, 0, 0])
-        raise_if_given_up()
+    def shade_normals(self, const int32_t[:, ::1] ids, float[:, :, ::1] out, int64_t first_row, int64_t n_rows):
+        """Write rows of the unit normals (H, W, 3) of a visibility buffer."""
+        cdef tl_window window = self.mesh.window(first_row, n_rows, ids.shape[1])
+        if n_rows and ids.shape[1]:
+            with nogil:
+                K.shade_normals(&self.scene, &window, &ids[first_row, 0], &out[first_row, 0, 0])
+            raise_if_given_up()
 
 
 def cut_out(SnappedMesh mesh, ShadingTable shading, const int32_t[::1] opaque, const int32_t[::1] triangles, int32_t[:, ::1] ids,

@@ -16,7 +16,7 @@ from topleft._base.texels import as_levels
 from topleft._raster.sampling import SplitSamples
 from topleft.typing import EncodingOption, FilterOption, WrapOption
 
-__all__ = ["Fragments", "GivenCorners", "as_sample", "view_of"]
+__all__ = ["Fragments", "GivenCorners", "SeenSamples", "as_sample", "view_of"]
 
 #: Makes the snapped mesh that attributes of some triangles need: these are snapped, no others.
 PartOfMesh = Callable[..., _engine.SnappedMesh]
@@ -64,6 +64,26 @@ class GivenCorners(NamedTuple):
         steps[..., 2] = corners[..., 2]
         steps[~np.isfinite(steps).all(axis=(1, 2))] = 0  # of triangles without area before the snap
         return steps
+
+
+class SeenSamples(NamedTuple):
+    """What the samples of a picture see, as kernels read it."""
+
+    ids: NDArray[np.int32]
+    """Planes (S, H, W), or (1, H, W) of the first with `split`."""
+    depth: NDArray[np.float32]
+    split: _engine.Split | None
+    n_samples: int
+
+    @classmethod
+    def of(cls, ids: NDArray[Any], depth: NDArray[Any], split: _engine.Split | None = None, n: int = 0) -> Self:
+        """Take planes; those that kernels cannot read are copied."""
+        return cls(as_read(ids, np.int32), as_read(depth, np.float32), split, n or len(ids))
+
+
+def as_read(planes: NDArray[Any], kind: type) -> NDArray[Any]:
+    """Planes as kernels read them: as they are, if that is so."""
+    return planes if planes.dtype == kind and planes.flags.carray else np.require(planes, kind, ["C", "A"])
 
 
 class Fragments:
@@ -145,6 +165,13 @@ class Fragments:
         self.id, self._depth = ids[0], depth[0]
         if self.corners is not None:
             self.drawn_from(self.corners)
+
+    def _seen(self) -> SeenSamples:
+        """Return what the samples see."""
+        if self._split is not None:
+            found = self._split
+            return SeenSamples.of(found.ids[None], found.depth[None], found.split, len(found.positions))
+        return SeenSamples.of(*(self._sampled()[1] or (self.id[None], self.depth[None])))
 
     def __repr__(self) -> str:
         height, width = self.triangle.shape

@@ -29,9 +29,9 @@ from topleft._raster.peel import peel_meshes
 from topleft._raster.rasterize import refuse_many
 from topleft._raster.snap import Snapped
 from topleft._raster.view import View
-from topleft._render.fragments import SceneFragments, parts_of
+from topleft._render.fragments import SceneFragments
 from topleft._render.instances import PlacedScene, draw_nearest, place
-from topleft._render.scene_shade import shade_by, shade_part
+from topleft._render.scene_shade import shade_by
 from topleft._scene.scene import Scene, collapsed, meshes_of, scene_of
 from topleft._shade.shade import Shading, ShadingOptions
 
@@ -180,11 +180,11 @@ class Glass:
             if not (ids[k] >= 0).any():
                 break
             layer = SceneFragments(ids[k : k + 1], depth[k : k + 1], self.blended, [at_sample])
-            for part in parts_of(layer, self.scene):
-                own, pixels = shade_part(part, self.camera, self.options)[part.seen], numbers[part.box][part.seen]
-                share = through[pixels] * (own[:, 3] / np.float32(255))
-                light[pixels] += share[:, None] * LIGHT_OF_SRGB[own[:, :3]]
-                through[pixels] -= share
+            seen = layer.mask
+            own, pixels = shade_by(layer, self.scene, self.camera, self.options)[seen], numbers[seen]
+            share = through[pixels] * (own[:, 3] / np.float32(255))
+            light[pixels] += share[:, None] * LIGHT_OF_SRGB[own[:, :3]]
+            through[pixels] -= share
         share = through * (under[:, 3] / np.float32(255))
         light += share[:, None] * LIGHT_OF_SRGB[under[:, :3]]
         alpha += 1 - through + share

@@ -165,7 +165,10 @@ def inputs_of(scene: _engine.SnappedMesh, mesh: Mesh, camera: Camera, size: tupl
     """What the kernel reads of materials with holes."""
     if scene.exact is not None:
         raise ValueError("subpixel_bits must be in 0..16 where textures cut holes, got 'exact'")
-    inputs = ShadingInputs(scene, mesh, camera, (size[0], size[1]), cut.rows, is_flat=False)
+    finds_inverse_w = len(mesh.vertices) > size[0] * size[1]
+    inputs = ShadingInputs(
+        scene, mesh, camera, (size[0], size[1]), cut.rows, is_flat=False, finds_inverse_w=finds_inverse_w
+    )
     inputs.set_materials(mesh, cut.materials, is_unlit=True)
     inputs.set_view(0, None, (0, 0, 0, 0))
     return inputs

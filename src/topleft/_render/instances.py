@@ -121,10 +121,10 @@ class PlacedScene:
         mesh, view = self.scene[i].mesh, self._view_of(i)
         return GivenCorners(mesh.vertices, mesh.triangles, view.transform, view.viewport)
 
-    def snap_part(self, i: int, triangles: NDArray[np.int32]) -> _engine.SnappedMesh:
+    def snap_part(self, i: int, triangles: Callable[[], NDArray[np.int32]]) -> _engine.SnappedMesh:
         """Return what some triangles of an instance need, snapped: all of it, unless its mesh is drawn in clusters."""
         if self._can_cluster(Sink.NEAREST) and self.scene[i].mesh.has_clusters:
-            return ClusteredMesh(*self.clustered(i)).part(triangles)
+            return ClusteredMesh(*self.clustered(i)).part(triangles())
         return self.snap(i).mesh
 
     def _view_of(self, i: int) -> View:

@@ -188,7 +188,9 @@ class ShadingInputs:
         material_of: npt.NDArray[np.int32] | None,
         *,
         is_flat: bool,
+        finds_inverse_w: bool,
     ) -> None:
+        """`finds_inverse_w`: 1/w is found for the vertices that show, where it can be; otherwise for all."""
         is_flat = is_flat or mesh.is_faceted
         in_eye_space = not is_similarity(camera.view)
         self.mesh = ShadingMesh(mesh, camera.view) if in_eye_space else shading_mesh_of(mesh)
@@ -197,13 +199,13 @@ class ShadingInputs:
         self.view = camera.view
         self.back_side = -1.0 if _engine.determinant(camera.view[:3, :3]) > 0 else 1.0
         self.is_in_eye_space = in_eye_space
-        normals, finds_inverse_w = self.mesh.normals, False
-        if scene.viewport is not None and self.rays.has_perspective:
-            finds_inverse_w = scene.finds_inverse_w(size[0] * size[1])
-            if not finds_inverse_w:
-                own = normals[: len(mesh.vertices)]
-                normals = empty(own.shape, np.float32)
-                _engine.set_inverse_w(scene, own, normals)
+        normals = self.mesh.normals
+        has_w = scene.viewport is not None and self.rays.has_perspective
+        finds_inverse_w = has_w and finds_inverse_w and scene.can_find_inverse_w
+        if has_w and not finds_inverse_w:
+            own = normals[: len(mesh.vertices)]
+            normals = empty(own.shape, np.float32)
+            _engine.set_inverse_w(scene, own, normals)
         self.shading = _engine.ShadingTable(
             normals,
             finds_inverse_w,

@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import lru_cache
-from typing import Any, TypedDict
+from typing import Any, NamedTuple, TypedDict
 
 import numpy as np
 import numpy.typing as npt
@@ -33,12 +33,12 @@ from topleft._model.light import AMBIENT, Fog, Light, as_not_negative
 from topleft._model.material import Material
 from topleft._model.mesh import Mesh
 from topleft._model.texture import Texture
-from topleft._raster.fragments import Fragments
+from topleft._raster.fragments import Fragments, SeenSamples
 from topleft._raster.sampling import sample_positions
 from topleft._shade.look import ShadingInputs
 from topleft.typing import ShadingOption
 
-__all__ = ["LookOptions", "Shading", "ShadingOptions", "shade_mesh", "shade_numbers"]
+__all__ = ["LookOptions", "Shading", "ShadingOptions", "Shown", "shade_instances", "shade_numbers"]
 
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
@@ -142,56 +142,78 @@ def plain_material(color: Color | None) -> Material:
     return Material(color)
 
 
-def shade_mesh(
-    frags: Fragments, mesh: Mesh, camera: Camera, options: ShadingOptions, world_from_mesh: F64 | None = None
-) -> U8:
+class Shown(NamedTuple):
+    """An instance as it is shaded."""
+
+    snapped: _engine.SnappedMesh
+    mesh: Mesh
+    """The mesh as it was drawn, which kernels read triangle by triangle: of a lens its parts."""
+    first_id: int = 0
+    """What its triangle 0 is called in the ids."""
+    place: F64 | None = None
+    """World from object, (4, 4); None: the world is the space of the mesh."""
+
+    def camera(self, camera: Camera) -> Camera:
+        """The camera as it stands in the object space of the instance, without its lens."""
+        return camera.straightened() if self.place is None else camera.straightened().placed(self.place)
+
+
+def shade_instances(shown: Sequence[Shown], seen: SeenSamples, camera: Camera, options: ShadingOptions) -> U8:
     """Shade the triangles that show, all samples of them: the picture (H, W, 4) uint8.
 
-    `world_from_mesh`: (4, 4) of an instance of a scene; the camera is the one in the space of its mesh.
-    The kernel reads the mesh triangle by triangle, so it has to be the one that was drawn: of a lens its parts.
+    `shown`: at least the instances that show, in the order of their ids.
     """
-    picture = empty((*frags.triangle.shape, 4), np.uint8)
-    if not len(mesh.triangles) or 0 in frags.triangle.shape:
+    height, width = seen.ids.shape[1:]
+    picture = empty((height, width, 4), np.uint8)
+    n_triangles = sum(len(one.mesh.triangles) for one in shown)
+    if not n_triangles or not picture.size:
         picture[...] = options.background
         return picture
-    scene = frags._snapped
-    split = frags._split
-    several = (split.ids[None], split.depth[None]) if split is not None else frags._sampled()[1]
-    planes = several or (frags.id[None], frags.depth[None])
-    ids, depth = as_read(planes[0], np.int32), as_read(planes[1], np.float32)
-    own = (options.material,) if options.material is not None else mesh.materials
-    own = own or (plain_material(options.color if mesh.colors is None else None),)
-    rows = mesh.material_of_triangle if own is mesh.materials and len(own) > 1 else None
-    look = ShadingInputs(scene, mesh, camera, picture.shape[1::-1], rows, is_flat=options.mode is Shading.FLAT)
-    all_full = options.environment is not None or options.shows_opacity
-    look.set_materials(mesh, own, is_unlit=options.mode is Shading.UNLIT, all_full=all_full)
-    look.set_lights(options.lights, options.ambient, world_from_mesh)
-    if options.environment is not None or any(one.is_metallic_rough for one in own):
-        look.set_environment(options.environment, world_from_mesh)
-    if options.shows_opacity:
-        look.set_opacity()
-    look.set_view(SHOW_CODES.get(options.mode, 0), options.matcap, options.background)
-    look.set_fog(options.fog)
-    n_samples = len(ids) if split is None else len(split.positions)
-    positions = None if n_samples == 1 else sample_positions(n_samples, scene.subpixel_bits)
+    n_px = height * width
+    finds_inverse_w = sum(len(one.mesh.vertices) for one in shown) > n_px
+    looks = [look_of(one, camera, (width, height), options, finds_inverse_w=finds_inverse_w) for one in shown]
+    scene = scene_of_tables(shown, [look.shading for look in looks])
+    positions = None if seen.n_samples == 1 else sample_positions(seen.n_samples, shown[0].snapped.subpixel_bits)
 
     def shade_rows(first: int, end: int) -> None:
         part = picture, first, end - first
         if positions is None:
-            _engine.shade(scene, look.shading, ids[0], depth[0], *part)
+            scene.shade(seen.ids[0], seen.depth[0], *part)
         else:
-            listed = None if split is None else split.split
-            _engine.shade_samples(scene, look.shading, positions, ids, depth, listed, *part)
+            scene.shade_samples(positions, seen.ids, seen.depth, seen.split, *part)
 
-    n_px = picture.shape[0] * picture.shape[1]
-    n_threads = min(count_threads(options.threads, len(mesh.triangles)), n_px // MIN_PX_PER_THREAD)
-    run_parts(shade_rows, len(picture), n_threads)
+    n_threads = min(count_threads(options.threads, n_triangles), n_px // MIN_PX_PER_THREAD)
+    run_parts(shade_rows, height, n_threads)
     return picture
 
 
-def as_read(planes: npt.NDArray[Any], kind: type) -> npt.NDArray[Any]:
-    """Planes as kernels read them: as they are, if that is so."""
-    return planes if planes.dtype == kind and planes.flags.carray else np.require(planes, kind, ["C", "A"])
+def scene_of_tables(shown: Sequence[Shown], tables: Sequence[_engine.ShadingTable]) -> _engine.ShadedScene:
+    """What kernels read of instances."""
+    return _engine.ShadedScene([one.snapped for one in shown], tables, [one.first_id for one in shown])
+
+
+def look_of(
+    shown: Shown, camera: Camera, size: tuple[int, int], options: ShadingOptions, *, finds_inverse_w: bool
+) -> ShadingInputs:
+    """What kernels read of an instance."""
+    mesh = shown.mesh
+    own = (options.material,) if options.material is not None else mesh.materials
+    own = own or (plain_material(options.color if mesh.colors is None else None),)
+    rows = mesh.material_of_triangle if own is mesh.materials and len(own) > 1 else None
+    look = ShadingInputs(
+        shown.snapped, mesh, shown.camera(camera), size, rows, is_flat=options.mode is Shading.FLAT,
+        finds_inverse_w=finds_inverse_w,
+    )  # fmt: skip
+    all_full = options.environment is not None or options.shows_opacity
+    look.set_materials(mesh, own, is_unlit=options.mode is Shading.UNLIT, all_full=all_full)
+    look.set_lights(options.lights, options.ambient, shown.place)
+    if options.environment is not None or any(one.is_metallic_rough for one in own):
+        look.set_environment(options.environment, shown.place)
+    if options.shows_opacity:
+        look.set_opacity()
+    look.set_view(SHOW_CODES.get(options.mode, 0), options.matcap, options.background)
+    look.set_fog(options.fog)
+    return look
 
 
 def shade_numbers(frags: Fragments, camera: Camera, options: ShadingOptions) -> U8:
@@ -289,13 +311,18 @@ def shade_samples(
     return picture
 
 
-def shade_normals(frags: Fragments, mesh: Mesh, camera: Camera, turn: F64, *, threads: int | None = None) -> F32:
+def shade_normals(
+    shown: Sequence[Shown], ids: I32, camera: Camera, turn: F64, *, threads: int | None = None
+) -> F32:
     """Unit normals (H, W, 3) float32 of the visible pixels, on the side that is seen, 0 where nothing is.
 
     Parameters
     ----------
-    frags, mesh, camera
-        As in `topleft.shade`.
+    shown
+        At least the instances that show, in the order of their ids.
+    ids : (H, W) int32
+    camera : Camera
+        That of the picture.
     turn : (3, 3) float64
         From eye space to where the normals are wanted.
     threads : int, optional
@@ -307,19 +334,22 @@ def shade_normals(frags: Fragments, mesh: Mesh, camera: Camera, turn: F64, *, th
     inverted looks like one whose faces are not, and no edge of light runs through a triangle. Where those of the
     corners cancel, or there are none, it is the normal of the face.
     """
-    ids = np.require(frags.triangle, np.int32, ["C", "A"])
-    if not len(mesh.triangles) or 0 in ids.shape:
+    n_triangles = sum(len(one.mesh.triangles) for one in shown)
+    if not n_triangles or 0 in ids.shape:
         return np.zeros((*ids.shape, 3), np.float32)
     out = empty((*ids.shape, 3), np.float32)
-    scene = frags._snapped
-    look = ShadingInputs(scene, mesh, camera, ids.shape[::-1], None, is_flat=False)
-    look.set_turn(SHOW_CODES[Shading.NORMALS], turn)
-    n_threads = threads_for(threads, len(mesh.triangles))
-
-    def shade_rows(first: int, end: int) -> None:
-        _engine.shade_normals(scene, look.shading, ids, out, first, end - first)
-
-    run_parts(shade_rows, len(ids), n_threads)
+    finds_inverse_w = sum(len(one.mesh.vertices) for one in shown) > ids.size
+    tables = []
+    for one in shown:
+        size = ids.shape[1], ids.shape[0]
+        look = ShadingInputs(
+            one.snapped, one.mesh, one.camera(camera), size, None, is_flat=False, finds_inverse_w=finds_inverse_w
+        )
+        look.set_turn(SHOW_CODES[Shading.NORMALS], turn)
+        tables.append(look.shading)
+    scene = scene_of_tables(shown, tables)
+    run_parts(lambda first, end: scene.shade_normals(ids, out, first, end - first), len(ids),
+              threads_for(threads, n_triangles))  # fmt: skip
     return out
 
 
