@@ -13,7 +13,7 @@ import topleft as tl
 from topleft._base.color import id_colors, srgb_tables
 from topleft._raster import choices
 from topleft._raster.cluster_draw import ClusteredMesh
-from topleft._shade.shade import GREY_OF_FARTHEST, GREY_OF_NEAREST, colors_of_numbers
+from topleft._shade.shade import GREY_OF_FARTHEST, GREY_OF_NEAREST
 from topleft.methods.reference.sampling import mean
 
 SIZE = (48, 36)
@@ -88,11 +88,11 @@ def test_outline_over_nothing_has_the_colour_of_the_surface():
 def test_a_triangle_is_shaded_once_in_a_pixel(monkeypatch):
     shaded = []
 
-    def count(ids, *arguments):
+    def count(ids):
         shaded.append(len(ids))
-        return colors_of_numbers(ids, *arguments)
+        return id_colors(ids)
 
-    monkeypatch.setattr(sys.modules["topleft._shade.shade"], "colors_of_numbers", count)
+    monkeypatch.setattr(sys.modules["topleft._shade.shade"], "id_colors", count)
     tl.render(KNOT, size=SIZE, sampling="msaa8", shading="ids")
     ids = tl.rasterize_mesh(KNOT, size=SIZE, sampling="msaa8").samples_triangle
     pairs = sum(len(set(pixel) - {-1}) for row in ids.tolist() for pixel in row)

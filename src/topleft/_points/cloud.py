@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from topleft import _engine
 from topleft._base.color import DEFAULT_COLOR, LINEAR_ONE, light_of, srgb_tables
-from topleft._base.memory import FRESH, empty
+from topleft._base.memory import FRESH
 from topleft._base.options import PointShape
 from topleft._camera.camera import Camera, pixels_of
 from topleft._camera.lens import Lens
@@ -27,7 +27,7 @@ from topleft._points.points import PointFragments, draw_points
 from topleft._raster.classic import refuse_classic
 from topleft._raster.rasterize import refuse_many
 from topleft._raster.view import View, ViewOptions
-from topleft._shade.shade import Shading, ShadingOptions, eye_distance, shade_numbers, shade_samples
+from topleft._shade.shade import Shading, ShadingOptions, eye_distance, shade_each, shade_numbers
 
 __all__ = ["CLOUD_LAYERS", "CloudBuffer", "draw_cloud", "shade_cloud"]
 
@@ -113,16 +113,9 @@ def shade_cloud(frags: PointFragments, cloud: Points, camera: Camera, options: S
         raise ValueError("shading 'normals' needs points that have normals")
     if options.mode in (Shading.IDS, Shading.DEPTH):
         return shade_numbers(frags, camera, options)
-
-    def shade_one(sample: Any) -> U8:
-        picture = empty((*sample.id.shape, 4), np.uint8)
-        picture[...] = options.background
-        seen = sample.mask
-        picture[seen, :3] = colors_of(sample.id[seen], sample.depth[seen], cloud, camera, options)
-        picture[seen, 3] = 255
-        return picture
-
-    return shade_samples(frags, shade_one, options.background)
+    return shade_each(
+        frags._seen(), options.background, lambda ids, depth: colors_of(ids, depth, cloud, camera, options)
+    )
 
 
 def colors_of(ids: npt.NDArray[np.int32], depth: F32, cloud: Points, camera: Camera, options: ShadingOptions) -> U8:

@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import Any, Literal, NamedTuple, Protocol, Self, overload
 
 import numpy as np
+import numpy.typing as npt
 from numpy.typing import ArrayLike, NDArray
 
 from topleft import _engine
@@ -69,8 +70,8 @@ class GivenCorners(NamedTuple):
 class SeenSamples(NamedTuple):
     """What the samples of a picture see, as kernels read it."""
 
-    ids: NDArray[np.int32]
-    """Planes (S, H, W), or (1, H, W) of the first with `split`."""
+    ids: NDArray[Any]
+    """int32, planes (S, H, W), or (1, H, W) of the first with `split`; int64 where int32 does not count triangles."""
     depth: NDArray[np.float32]
     split: _engine.Split | None
     n_samples: int
@@ -78,10 +79,26 @@ class SeenSamples(NamedTuple):
     @classmethod
     def of(cls, ids: NDArray[Any], depth: NDArray[Any], split: _engine.Split | None = None, n: int = 0) -> Self:
         """Take planes; those that kernels cannot read are copied."""
-        return cls(as_read(ids, np.int32), as_read(depth, np.float32), split, n or len(ids))
+        return cls(as_read(ids, ids.dtype), as_read(depth, np.float32), split, n or len(ids))
+
+    def split_pixels(self) -> tuple[tuple[NDArray[np.intp], NDArray[np.intp]], NDArray[Any], NDArray[np.float32]]:
+        """Return the pixels (P,), (P,) whose samples see several triangles, and what these see: ids and depth (S, P)."""
+        ids, depth, split = self.ids, self.depth, self.split
+        if split is None:
+            is_split = np.zeros(ids.shape[1:], np.bool_)
+            for other in ids[1:]:
+                is_split |= other != ids[0]
+            rows, columns = np.nonzero(is_split)
+            return (rows, columns), ids[:, rows, columns], depth[:, rows, columns]
+        counts = split.rows[:, 1] - split.rows[:, 0]
+        rows = np.repeat(np.arange(len(counts)), counts)
+        own = np.arange(counts.sum()) + np.repeat(split.rows[:, 0] - (np.cumsum(counts) - counts), counts)
+        columns = split.columns[own].astype(np.intp)
+        others = (ids[:, rows, columns], split.ids[:, own]), (depth[:, rows, columns], split.depth[:, own])
+        return (rows, columns), *map(np.concatenate, others)
 
 
-def as_read(planes: NDArray[Any], kind: type) -> NDArray[Any]:
+def as_read(planes: NDArray[Any], kind: npt.DTypeLike) -> NDArray[Any]:
     """Planes as kernels read them: as they are, if that is so."""
     return planes if planes.dtype == kind and planes.flags.carray else np.require(planes, kind, ["C", "A"])
 
@@ -166,8 +183,12 @@ class Fragments:
         if self.corners is not None:
             self.drawn_from(self.corners)
 
+    def _whole(self, ids: NDArray[Any]) -> NDArray[Any]:
+        """Return what `.id` calls drawn triangles: as they are called there, but for parts that a lens makes of them."""
+        return ids
+
     def _seen(self) -> SeenSamples:
-        """Return what the samples see."""
+        """Return what the samples see, as it was drawn."""
         if self._split is not None:
             found = self._split
             return SeenSamples.of(found.ids[None], found.depth[None], found.split, len(found.positions))

@@ -213,8 +213,10 @@ class SceneFragments(InstanceIds, Fragments):
         """Index of the triangle in its mesh that each sample sees, int32 (H, W, S)."""
         return local_ids(self.samples_id, self.samples_instance, self.placed.whole_first_ids)
 
+    def _whole(self, ids: Ids) -> Ids:
+        return self.placed.whole_ids(ids)
+
     def _seen(self) -> SeenSamples:
-        """Return what the samples see."""
         return SeenSamples.of(*self.drawn_planes)
 
     @cached_property
@@ -405,8 +407,10 @@ class BentFragments(Fragments):
             self._planes = planes and (self.bent.wholes[planes[0]], planes[1])
         return self._samples, self._planes
 
+    def _whole(self, ids: NDArray[np.int32]) -> NDArray[np.int32]:
+        return self.bent.wholes[ids]
+
     def _seen(self) -> SeenSamples:
-        """Return what the samples see: parts."""
         return self.drawn._seen()
 
     def again(self) -> BentFragments:

@@ -44,7 +44,6 @@ F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
 U8 = npt.NDArray[np.uint8]
 I32 = npt.NDArray[np.int32]
-Places = tuple[npt.NDArray[np.intp], ...]
 
 MIN_PX_PER_THREAD = 1 << 14
 """Pixels whose light is worth a thread: a tenth of a millisecond. A scene is shaded instance by instance."""
@@ -218,33 +217,54 @@ def look_of(
 
 def shade_numbers(frags: Fragments, camera: Camera, options: ShadingOptions) -> U8:
     """Colour each triangle by its id, or by its distance: the picture (H, W, 4) uint8."""
-    ends = options.depth_range or distances(frags, camera) if options.mode is Shading.DEPTH else None
+    seen = frags._seen()
+    if options.mode is Shading.IDS:
+        return shade_each(seen, options.background, lambda ids, _: id_colors(frags._whole(ids)))
+    ends = options.depth_range or distances(seen, camera)
+    return shade_each(seen, options.background, lambda _, depth: greys_of(depth, camera, ends))
 
-    def picture_one(sample: Fragments) -> U8:
-        picture = empty((*sample.id.shape, 4), np.uint8)
-        picture[...] = options.background
-        at = np.nonzero(sample.mask)
-        picture[at] = color_at(sample, at)
+
+def shade_each(seen: SeenSamples, background: Color, colors_of: Callable[[I32, F32], U8]) -> U8:
+    """The picture (H, W, 4) uint8 of colours (P, 3) that ids and depths have.
+
+    A triangle has one colour in a pixel, that at the first of the samples that see it. Their light is averaged, alpha
+    as it is.
+    """
+    ids, depth = seen.ids[0], seen.depth[0]
+    picture = empty((*ids.shape, 4), np.uint8)
+    picture[...] = background
+    at = np.nonzero(ids >= 0)
+    picture[at] = opaque(colors_of(ids[at], depth[at]))
+    if seen.n_samples == 1:
         return picture
+    at, split_ids, split_depth = seen.split_pixels()
+    colors = np.empty((*split_ids.shape, 4), np.uint8)
+    colors[...] = background
+    colors[0] = picture[at]
+    for k, own in enumerate(split_ids[1:], 1):
+        is_new = own >= 0
+        for before in range(k):
+            is_known = is_new & (own == split_ids[before])
+            colors[k, is_known] = colors[before, is_known]
+            is_new &= ~is_known
+        colors[k, is_new] = opaque(colors_of(own[is_new], split_depth[k, is_new]))
+    means = np.empty((1, *colors.shape[1:]), np.uint8)
+    _engine.mean_colors(colors[:, None], means, 0, 1, 4, _engine.Transfer(srgb_tables(), 3, is_straight=True))
+    picture[at] = means[0]
+    return picture
 
-    def color_at(sample: Fragments, at: Places) -> U8:
-        return colors_of_numbers(sample.id[at], sample.depth[at], camera, ends)
 
-    return shade_samples(frags, picture_one, options.background, color_at)
+def opaque(colors: U8) -> U8:
+    """Colours (P, 3) with alpha 255."""
+    return np.concatenate([colors, np.full((len(colors), 1), 255, np.uint8)], axis=1)
 
 
-def colors_of_numbers(ids: I32, depth: F32, camera: Camera, depth_range: tuple[float, float] | None) -> U8:
-    """The colours (P, 4) of ids, or of distances when they have a range."""
-    colors = np.full((len(ids), 4), 255, np.uint8)
-    if depth_range is None:
-        colors[:, :3] = id_colors(ids)
-    elif len(depth):
-        nearest, farthest = depth_range
-        distance = eye_distance(depth, camera)
-        share = np.clip((distance - nearest) / max(farthest - nearest, np.finfo(np.float64).tiny), 0, 1)
-        grey = GREY_OF_NEAREST + (GREY_OF_FARTHEST - GREY_OF_NEAREST) * share
-        colors[:, :3] = np.rint(grey).astype(np.uint8)[:, None]
-    return colors
+def greys_of(depth: F32, camera: Camera, ends: tuple[float, float]) -> U8:
+    """The greys (P, 3) of depths: near ones are bright, the ends of the range are neither black nor white."""
+    nearest, farthest = ends
+    share = np.clip((eye_distance(depth, camera) - nearest) / max(farthest - nearest, np.finfo(np.float64).tiny), 0, 1)
+    grey = np.rint(GREY_OF_NEAREST + (GREY_OF_FARTHEST - GREY_OF_NEAREST) * share).astype(np.uint8)
+    return np.repeat(grey[:, None], 3, axis=1)
 
 
 def eye_distance(depth: F32, camera: Camera) -> F64:
@@ -254,61 +274,16 @@ def eye_distance(depth: F32, camera: Camera) -> F64:
     return (ndc * d - b) / (ndc * c - a)
 
 
-def distances(frags: Fragments, camera: Camera) -> tuple[float, float] | None:
-    """The least and the greatest distance along the view of what any sample shows; None where there is nothing."""
-    depth = frags.samples_depth[frags.samples_triangle >= 0]
+def distances(seen: SeenSamples, camera: Camera) -> tuple[float, float]:
+    """The least and the greatest distance along the view of what is shown."""
+    depth = seen.depth[0][seen.ids[0] >= 0]
+    if seen.n_samples > 1:
+        _, ids, others = seen.split_pixels()
+        depth = np.append(depth, others[ids >= 0])
     if not depth.size:
-        return None
+        return 0.0, 0.0
     ends = eye_distance(np.array([depth.min(), depth.max()]), camera)
     return float(ends[0]), float(ends[1])
-
-
-def shade_samples(
-    frags: Fragments,
-    shade_one: Callable[[Fragments], U8],
-    background: tuple[int, ...],
-    color_at: Callable[[Fragments, Places], U8] | None = None,
-) -> U8:
-    """Return the mean colour of the samples, (H, W, 4) uint8: light is averaged, alpha as it is.
-
-    `shade_one` gives the picture of one sample; pixels whose triangle an earlier sample has shown are left out of it.
-    `color_at` gives the colours (P, 4) of pixels alone, where there is a quicker way to them.
-    """
-    if frags.samples_depth.shape[-1] == 1:
-        return shade_one(frags)
-    ids = [frags.sample(k).id for k in range(frags.samples_depth.shape[-1])]
-    picture = shade_one(frags.sample(0))  # of the first sample; right wherever one triangle has all samples
-    is_split = np.zeros(ids[0].shape, np.bool_)
-    for other in ids[1:]:
-        is_split |= other != ids[0]
-    at = np.nonzero(is_split)
-    split = np.stack([own[at] for own in ids])  # (S, P)
-    decode, encode = srgb_tables()
-    light, alpha = np.zeros((split.shape[1], 3), np.int64), np.zeros(split.shape[1], np.int64)
-
-    def add(colors: U8, share: npt.NDArray[np.int64]) -> None:
-        weight = share * colors[:, 3]
-        light[...] += weight[:, None] * decode[colors[:, :3]]
-        alpha[...] += weight
-
-    ground = np.broadcast_to(np.array(background, np.uint8), (split.shape[1], 4))
-    add(ground, (split < 0).sum(0))
-    for k, own in enumerate(split):
-        is_new = (own >= 0) & (split[:k] != own).all(0)
-        share = (split == own).sum(0) * is_new
-        if k == 0:
-            add(picture[at], share)
-        elif is_new.any():
-            where, sample = (at[0][is_new], at[1][is_new]), frags.sample(k)
-            colors = np.zeros((split.shape[1], 4), np.uint8)
-            colors[is_new] = color_at(sample, where) if color_at else shade_one(sample.only(*where))[where]
-            add(colors, share)
-    steps = (2 * light + alpha[:, None]) // np.maximum(2 * alpha, 1)[:, None]  # to nearest, of at most LINEAR_ONE
-    mean = np.empty((split.shape[1], 4), np.uint8)
-    mean[:, :3] = encode[np.minimum(steps, LINEAR_ONE)]
-    mean[:, 3] = np.rint(alpha / len(ids))  # exact sixteenths
-    picture[at] = mean
-    return picture
 
 
 def shade_normals(
