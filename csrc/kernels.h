@@ -179,9 +179,10 @@ typedef struct tl_kernels {
     /* Copies rows [first, end) of four numbers, the last of them replaced by 1/w of the vertex. */
     void (*set_inverse_w)(const tl_source *source, const float *rows, int64_t first, int64_t end, float *out);
 
-    /* The picture of a visibility buffer, rows of window->width: uint8 red, green, blue, opacity. */
-    void (*shade)(const tl_shaded_scene *scene, const tl_window *window, const int32_t *ids, const float *depth,
-                  uint8_t *pixels);
+    /* The picture of a visibility buffer, rows of window->width: uint8 red, green, blue, opacity; as the sample sees it
+     * that lies at_fx = (x, y) sub-pixels from the centre, NULL: that which each mesh is seen from. */
+    void (*shade)(const tl_shaded_scene *scene, const tl_window *window, const int32_t *at_fx, const int32_t *ids,
+                  const float *depth, uint8_t *pixels);
 
     /* The same from planes of ids and depth that lie `stride` pixels apart, one a sample; samples_fx as in tl_target.
      * With `split`, whose rows begin with the window's, there is the plane of the first sample alone. */

@@ -61,7 +61,7 @@ typedef struct {
     const tl_window *window;
     const tl_shading *shading;
     const tl_view *view;
-    int32_t first_id; /* what triangle 0 is called in the ids */
+    int32_t first_id;                                               /* what triangle 0 is called in the ids */
     int needs_q, needs_normal, needs_uv, needs_colors, needs_point; /* whether anything that is shown depends on it */
     int needs_alpha, needs_uv1, needs_tangents[2];                  /* the same; tangents of each set of uv */
     int needs_more;                                                 /* any of these */

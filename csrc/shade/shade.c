@@ -78,8 +78,8 @@ TL_INLINE void shade_runs_of(const shade_runs *s, int n, int64_t column, int64_t
 }
 
 /* The picture of a visibility buffer; rows of window->width. */
-static void shade(const tl_shaded_scene *scene, const tl_window *window, const int32_t *ids, const float *depth,
-                  uint8_t *pixels)
+static void shade(const tl_shaded_scene *scene, const tl_window *window, const int32_t *at_fx, const int32_t *ids,
+                  const float *depth, uint8_t *pixels)
 {
     shade_runs s;
     span_list list;
@@ -97,7 +97,7 @@ static void shade(const tl_shaded_scene *scene, const tl_window *window, const i
             list_instances(&list, ids + at, n);
             for (int k = 0; k < list.n; k++) {
                 const int first = list.parts[k].first, n_own = list.parts[k].end - first;
-                set_part(&s, &list, k, NULL);
+                set_part(&s, &list, k, at_fx);
                 find_runs(&s, ids + at + first, n_own);
                 set_runs(&s, row);
                 shade_runs_of(&s, n_own, column + first, row, depth + at + first, own + first);

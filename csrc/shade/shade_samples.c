@@ -53,7 +53,7 @@ TL_INLINE int find_first_seen(sample_sums *sums, const int32_t *ids, int64_t str
 /* Shades n pixels of a span from place `first` on, whose runs are set, and adds their light, as a display shows it,
  * times the samples that see it. */
 TL_INLINE void add_samples(sample_sums *sums, const shade_runs *s, int first, int n, int64_t column, int64_t row,
-                         const float *depth)
+                           const float *depth)
 {
     const vf zero = vf_set1(0.0f), most = vf_set1(s->shading->show == TL_SHOW_NORMALS ? 255.0f : 1.0f);
     started_span span;

@@ -18,6 +18,7 @@ from topleft._render import instances
 from topleft._render.fragments import SceneFragments
 from topleft._render.render import rasterize_mesh
 from topleft._scene import scene as placed
+from topleft._shade import shade
 from topleft.methods.reference.sampling import mean
 
 
@@ -282,6 +283,10 @@ def test_scene_of_more_triangles_than_int32_counts_is_drawn():
     assert np.array_equal(frags.id, np.where(few.mask, (frags.instance.astype(np.int64) << 20) + few.triangle, -1))
     assert np.array_equal(frags.depth, few.depth)
     assert np.array_equal(frags.barycentric(), few.barycentric())
+    look = {"lights": [tl.Light((1, 2, 3))]}
+    assert_same(
+        tl.shade(frags, scene, camera, **look), tl.shade(few, tl.Scene([scene[0], scene[2048]]), camera, **look)
+    )
 
 
 @pytest.mark.parametrize(
@@ -346,6 +351,14 @@ def test_instances_in_rounds_and_groups_are_drawn_as_one_after_the_other(isa, se
     for name in ("id", "depth", "instance", "triangle", "samples_id", "samples_instance", "samples_triangle"):
         assert np.array_equal(getattr(found, name), getattr(whole, name)), name
     assert np.array_equal(found.barycentric(), whole.barycentric())
+    n_in_row = max(len(set(row.ravel().tolist()) - {-1}) for row in found.samples_instance)
+    monkeypatch.setattr(shade, "INT32_MAX", max(most_ids, 700 * n_in_row))  # the picture is shaded in some parts
+    pictures = [tl.shade(frags, tl.Scene(standing), camera, shading="flat") for frags in (found, whole)]
+    assert_same(*pictures)
+    if found.id.dtype == np.int64 and n_in_row:
+        monkeypatch.setattr(shade, "INT32_MAX", 699)
+        with pytest.raises(ValueError, match="the instances in a row of pixels must have at most 699 triangles, got "):
+            tl.shade(found, tl.Scene(standing), camera)
 
 
 @pytest.mark.parametrize(("height", "n"), [(40, 1), (40, 2), (40, 3), (4, 4), (5, 4), (1, 1)])

@@ -501,7 +501,7 @@ cdef extern from "topleft.h" nogil:
         void (*set_inverse_w)(const tl_source *, const float *, int64_t, int64_t, float *) noexcept nogil
         void (*cut_out)(const tl_snapped *, const tl_window *, const tl_view *, const tl_shading *, const int32_t *, int64_t, const tl_target *) noexcept nogil
         void (*shade_samples)(const tl_shaded_scene *, const tl_window *, const int32_t *, int, int64_t, const int32_t *, const float *, const tl_split *, uint8_t *) noexcept nogil
-        void (*shade)(const tl_shaded_scene *, const tl_window *, const int32_t *, const float *, uint8_t *) noexcept nogil
+        void (*shade)(const tl_shaded_scene *, const tl_window *, const int32_t *, const int32_t *, const float *, uint8_t *) noexcept nogil
         tl_vertex_counts (*snap)(const tl_source *, int64_t, int64_t, int, int, tl_vertex *, tl_wide *) noexcept nogil
         tl_vertex_counts (*project)(const tl_source *, int64_t, int64_t, const tl_view *, tl_vertex *, tl_wide *) noexcept nogil
         void (*clip)(const tl_source *, const tl_vertex *, const int32_t *, const int32_t *, int64_t, const tl_view *, tl_pieces *) noexcept nogil

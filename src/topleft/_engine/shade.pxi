@@ -199,15 +199,20 @@ cdef class ShadedScene:
             instances[i].snapped, instances[i].shading, instances[i].first_id = &mesh.snapped, &table.shading, first_ids[i]
         self.scene.instances, self.scene.n, self.scene.view = instances, n, self.mesh.clip_view()
 
-    def shade(self, const int32_t[:, ::1] ids, const float[:, ::1] depth, uint8_t[:, :, ::1] pixels, int64_t first_row, int64_t n_rows):
-        """Write rows of the picture (H, W, 4) of a visibility buffer."""
+    def shade(self, const int32_t[:, ::1] ids, const float[:, ::1] depth, uint8_t[:, :, ::1] pixels, int64_t first_row, int64_t n_rows,
+              const int32_t[::1] at=None):
+        """Write rows of the picture (H, W, 4) of a visibility buffer, as the sample at (x, y) sub-pixels from the centre sees it.
+
+        Unless given it is that which each mesh is seen from.
+        """
         cdef tl_window window = self.mesh.window(first_row, n_rows, ids.shape[1])
+        cdef const int32_t *at_fx = &at[0] if at is not None else NULL
         if n_rows and ids.shape[1]:
             if n_rows == ids.shape[0] and n_rows * ids.shape[1] <= HELD_PX:
-                K.shade(&self.scene, &window, &ids[first_row, 0], &depth[first_row, 0], &pixels[first_row, 0, 0])
+                K.shade(&self.scene, &window, at_fx, &ids[first_row, 0], &depth[first_row, 0], &pixels[first_row, 0, 0])
             else:
                 with nogil:
-                    K.shade(&self.scene, &window, &ids[first_row, 0], &depth[first_row, 0], &pixels[first_row, 0, 0])
+                    K.shade(&self.scene, &window, at_fx, &ids[first_row, 0], &depth[first_row, 0], &pixels[first_row, 0, 0])
             raise_if_given_up()
 
     def shade_samples(self, const int32_t[:, ::1] positions, const int32_t[:, :, ::1] ids, const float[:, :, ::1] depth, Split split,

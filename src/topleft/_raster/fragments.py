@@ -82,7 +82,7 @@ class SeenSamples(NamedTuple):
         return cls(as_read(ids, ids.dtype), as_read(depth, np.float32), split, n or len(ids))
 
     def split_pixels(self) -> tuple[tuple[NDArray[np.intp], NDArray[np.intp]], NDArray[Any], NDArray[np.float32]]:
-        """Return the pixels (P,), (P,) whose samples see several triangles, and what these see: ids and depth (S, P)."""
+        """Return rows and columns (P,) of pixels whose samples see several triangles, and ids and depths (S, P)."""
         ids, depth, split = self.ids, self.depth, self.split
         if split is None:
             is_split = np.zeros(ids.shape[1:], np.bool_)
@@ -94,8 +94,8 @@ class SeenSamples(NamedTuple):
         rows = np.repeat(np.arange(len(counts)), counts)
         own = np.arange(counts.sum()) + np.repeat(split.rows[:, 0] - (np.cumsum(counts) - counts), counts)
         columns = split.columns[own].astype(np.intp)
-        others = (ids[:, rows, columns], split.ids[:, own]), (depth[:, rows, columns], split.depth[:, own])
-        return (rows, columns), *map(np.concatenate, others)
+        split_ids = np.concatenate([ids[:, rows, columns], split.ids[:, own]])
+        return (rows, columns), split_ids, np.concatenate([depth[:, rows, columns], split.depth[:, own]])
 
 
 def as_read(planes: NDArray[Any], kind: npt.DTypeLike) -> NDArray[Any]:
@@ -184,7 +184,7 @@ class Fragments:
             self.drawn_from(self.corners)
 
     def _whole(self, ids: NDArray[Any]) -> NDArray[Any]:
-        """Return what `.id` calls drawn triangles: as they are called there, but for parts that a lens makes of them."""
+        """Return what `.id` calls triangles that were drawn: the same, but for parts that a lens makes of them."""
         return ids
 
     def _seen(self) -> SeenSamples:

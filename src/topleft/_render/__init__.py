@@ -10,7 +10,7 @@ instances.py     draws the instances of a scene into one buffer, whole or in clu
 layers.py        draws each layer by its name: the registry of all there are
 notebook.py      makes the picture that a mesh or a visibility buffer shows of itself in a notebook
 render.py        renders: a mesh or scene and a camera to a picture, or to its visibility buffer, in one call
-scene_shade.py   shades a visibility buffer, of a scene each instance by itself, where it shows
+scene_shade.py   shades a visibility buffer of a mesh, a scene or points
 silhouette.py    draws silhouettes: where a mesh or scene is, as a mask
 through_lens.py  finds what to draw of a mesh or scene: itself, or the parts that its lens makes of it
 transparent.py   draws transparent pictures: peels layers, shades each and composites them

@@ -25,15 +25,15 @@ from topleft._base.memory import SCRATCH
 from topleft._camera.camera import Camera
 from topleft._model.material import AlphaMode, Material
 from topleft._model.mesh import Mesh, has_opacity, is_laid
+from topleft._raster.fragments import SeenSamples
 from topleft._raster.peel import peel_meshes
 from topleft._raster.rasterize import refuse_many
 from topleft._raster.snap import Snapped
 from topleft._raster.view import View
-from topleft._render.fragments import SceneFragments
+from topleft._render.fragments import SceneFragments, shown_of
 from topleft._render.instances import PlacedScene, draw_nearest, place
-from topleft._render.scene_shade import shade_by
 from topleft._scene.scene import Scene, collapsed, meshes_of, scene_of
-from topleft._shade.shade import Shading, ShadingOptions
+from topleft._shade.shade import Lit, Shading, ShadingOptions
 
 __all__ = ["Glass", "blended_masks", "glass_of"]
 
@@ -127,11 +127,19 @@ class Glass:
         """The same, ready to be peeled."""
         return [self.blended.snap(i) for i, mask in enumerate(self.masks) if mask is not None]
 
+    @cached_property
+    def lit(self) -> Lit:
+        """The same, ready to be shaded."""
+        some = [i for i, mask in enumerate(self.masks) if mask is not None]
+        shown = [self.whole.as_shown(i, one.mesh, self.scene) for i, one in zip(some, self.snapped, strict=True)]
+        return Lit(shown, self.camera, self.view.size, self.options)
+
     def lay_over(self, picture: U8, frags: SceneFragments) -> None:
         """Lay what is visible of the blended triangles over the picture of what is opaque."""
         if 0 in self.view.size:
             return
         positions = frags.positions
+        opaque = Lit(shown_of(frags, self.scene), self.camera, self.view.size, self.under)
         layers = [self.peel(frags, k) for k in range(len(positions))]
         is_seen = np.logical_or.reduce([ids[0] >= 0 for ids, _ in layers])
         at = np.nonzero(is_seen)
@@ -141,7 +149,8 @@ class Glass:
         for k, planes in enumerate(layers):
             under = picture
             if len(positions) > 1:
-                under = shade_by(frags.sample(k).only(*at), self.scene, self.camera, self.under)
+                sample = frags.sample(k).only(*at)
+                under = opaque.picture(sample._seen(), np.array(positions[k], np.int32))
             self.composite(*planes, positions[k], under[at], numbers, light, alpha)
         color = light / np.maximum(alpha, np.float32(1e-20))[:, None]
         steps = np.rint(np.minimum(color, 1) * LINEAR_ONE).astype(np.int64)
@@ -179,9 +188,9 @@ class Glass:
         for k in range(len(ids)):
             if not (ids[k] >= 0).any():
                 break
-            layer = SceneFragments(ids[k : k + 1], depth[k : k + 1], self.blended, [at_sample])
-            seen = layer.mask
-            own, pixels = shade_by(layer, self.scene, self.camera, self.options)[seen], numbers[seen]
+            seen = ids[k] >= 0
+            layer = SeenSamples.of(ids[k : k + 1], depth[k : k + 1])
+            own, pixels = self.lit.picture(layer, np.array(at_sample, np.int32))[seen], numbers[seen]
             share = through[pixels] * (own[:, 3] / np.float32(255))
             light[pixels] += share[:, None] * LIGHT_OF_SRGB[own[:, :3]]
             through[pixels] -= share

@@ -18,13 +18,12 @@ from numpy.typing import NDArray
 from topleft import _engine
 from topleft._base.arrays import as_aligned, as_array, set_aligned, shown
 from topleft._base.memory import empty
-from topleft._camera.camera import Camera
 from topleft._model.mesh import Mesh
 from topleft._raster.fragments import Fragments, SeenSamples, Viewer, as_sample, view_of
 from topleft._raster.peel import DepthLayers
 from topleft._render.bend import BentMesh, weighed
 from topleft._scene.scene import Instance, Scene, counted_ranges, meshes_of
-from topleft._shade.shade import Shown
+from topleft._shade.shade import ShownInstance
 
 if TYPE_CHECKING:
     from topleft._render.instances import PlacedScene
@@ -85,19 +84,14 @@ def parts_of(frags: Fragments, subject: Mesh | Scene) -> Sequence[VisiblePart]:
     return [VisiblePart(part.i, part.box, part.frags, subject[part.i].mesh, subject[part.i]) for part in found]
 
 
-def shown_of(frags: Fragments, subject: Mesh | Scene) -> Sequence[Shown]:
+def shown_of(frags: Fragments, subject: Mesh | Scene) -> Sequence[ShownInstance]:
     """The instances that some sample sees, as they are shaded, of the mesh or scene that was drawn."""
     if isinstance(frags, SceneFragments):
-        bent = frags.placed.bent
-        scene = cast(Scene, subject)
-        return [
-            Shown(snapped, scene[i].mesh if bent is None else bent[i].mesh_of(scene[i].mesh), first, scene[i].transform)
-            for i, snapped, first in frags.snapped
-        ]
+        return [frags.placed.as_shown(i, snapped, cast(Scene, subject)) for i, snapped in frags.snapped]
     mesh = cast(Mesh, subject)
     if isinstance(frags, BentFragments):
-        return [Shown(frags.drawn._snapped, frags.bent.mesh_of(mesh))]
-    return [Shown(frags._snapped, mesh)]
+        return [ShownInstance(frags.drawn._snapped, frags.bent.mesh_of(mesh))]
+    return [ShownInstance(frags._snapped, mesh)]
 
 
 def join(
@@ -220,8 +214,8 @@ class SceneFragments(InstanceIds, Fragments):
         return SeenSamples.of(*self.drawn_planes)
 
     @cached_property
-    def snapped(self) -> tuple[tuple[int, _engine.SnappedMesh, int], ...]:
-        """Each instance that some sample sees: its index, its mesh, and what its triangle 0 is called."""
+    def snapped(self) -> tuple[tuple[int, _engine.SnappedMesh], ...]:
+        """Each instance that some sample sees: its index, and its mesh as the first sample sees it."""
         ids, first_ids = self.drawn_planes[0], self.placed.first_ids
         boxes = np.tile(np.array([*ids.shape[:0:-1], 0, 0], np.int32), (len(first_ids) - 1, 1))
         for plane in ids:
@@ -232,7 +226,7 @@ class SceneFragments(InstanceIds, Fragments):
             first, end = first_ids[i : i + 2].tolist()
             part = ids[:, top:bottom, left:right]
             mesh = self.placed.snap_part(i, lambda part=part, first=first, end=end: local_part(part, first, end))
-            found.append((i, mesh.seen_from(*self.positions[0]), first))
+            found.append((i, mesh.seen_from(*self.positions[0])))
         return tuple(found)
 
     def _at_sample(self, i: int) -> SceneFragments:

@@ -33,6 +33,7 @@ from topleft._raster.view import View, ViewOptions
 from topleft._render.fragments import Ids, SceneDepthLayers, SceneFragments
 from topleft._render.through_lens import DrawnScene, scene_through
 from topleft._scene.scene import Scene
+from topleft._shade.shade import ShownInstance
 from topleft.typing import DepthTestOption
 
 __all__ = ["PlacedScene", "draw_nearest", "draw_scene", "draw_scene_coverage", "peel_scene", "place"]
@@ -126,6 +127,11 @@ class PlacedScene:
         if self._can_cluster(Sink.NEAREST) and self.scene[i].mesh.has_clusters:
             return ClusteredMesh(*self.clustered(i)).part(triangles())
         return self.snap(i).mesh
+
+    def as_shown(self, i: int, snapped: _engine.SnappedMesh, scene: Scene) -> ShownInstance:
+        """Return an instance as it is shaded, with the mesh that it has in this scene."""
+        mesh = scene[i].mesh if self.bent is None else self.bent[i].mesh_of(scene[i].mesh)
+        return ShownInstance(snapped, mesh, int(self.first_ids[i]), scene[i].transform)
 
     def _view_of(self, i: int) -> View:
         last = self._last

@@ -1,4 +1,4 @@
-"""Shades a visibility buffer, of a scene each instance by itself, in the rectangle that it shows in.
+"""Shades a visibility buffer of a mesh, a scene or points.
 
 Input: `Fragments`, the `Mesh` or `Scene` and the `Camera` they were made with. Output: a picture (H, W, 4) uint8, sRGB
 with alpha.

@@ -1,6 +1,6 @@
-"""Shades the visible pixels of one mesh, resolves several samples a pixel, gives distances and normals.
+"""Shades the visible pixels of instances, all samples of them; colours by ids and distances; gives normals.
 
-Input: `Fragments`, the mesh and the camera they were made with. Output: a picture (H, W, 4) uint8, sRGB with alpha.
+Input: what samples see, the instances that show, and a camera. Output: a picture (H, W, 4) uint8, sRGB with alpha.
 
 Light is added up in linear light: colours are decoded from sRGB, lit, and encoded again, so that a surface that gets
 half the light is half as bright on a screen. The kernel is csrc/shade/shade.c.
@@ -16,14 +16,14 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import lru_cache
-from typing import Any, NamedTuple, TypedDict
+from typing import NamedTuple, TypedDict
 
 import numpy as np
 import numpy.typing as npt
 
 from topleft import _engine
-from topleft._base.arrays import shown
-from topleft._base.color import DEFAULT_COLOR, LINEAR_ONE, WHITE, Color, ColorLike, as_color, id_colors, srgb_tables
+from topleft._base.arrays import INT32_MAX, shown
+from topleft._base.color import DEFAULT_COLOR, WHITE, Color, ColorLike, as_color, id_colors, srgb_tables
 from topleft._base.memory import empty
 from topleft._base.options import parse
 from topleft._base.threads import count_threads, parse_threads, run_parts, threads_for
@@ -38,7 +38,7 @@ from topleft._raster.sampling import sample_positions
 from topleft._shade.look import ShadingInputs
 from topleft.typing import ShadingOption
 
-__all__ = ["LookOptions", "Shading", "ShadingOptions", "Shown", "shade_instances", "shade_numbers"]
+__all__ = ["Lit", "LookOptions", "Shading", "ShadingOptions", "ShownInstance", "shade_instances", "shade_numbers"]
 
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
@@ -141,7 +141,7 @@ def plain_material(color: Color | None) -> Material:
     return Material(color)
 
 
-class Shown(NamedTuple):
+class ShownInstance(NamedTuple):
     """An instance as it is shaded."""
 
     snapped: _engine.SnappedMesh
@@ -157,42 +157,87 @@ class Shown(NamedTuple):
         return camera.straightened() if self.place is None else camera.straightened().placed(self.place)
 
 
-def shade_instances(shown: Sequence[Shown], seen: SeenSamples, camera: Camera, options: ShadingOptions) -> U8:
-    """Shade the triangles that show, all samples of them: the picture (H, W, 4) uint8.
+class Lit:
+    """Instances that are ready to be shaded: at least those that show, in the order of their ids."""
 
-    `shown`: at least the instances that show, in the order of their ids.
-    """
-    height, width = seen.ids.shape[1:]
-    picture = empty((height, width, 4), np.uint8)
-    n_triangles = sum(len(one.mesh.triangles) for one in shown)
-    if not n_triangles or not picture.size:
-        picture[...] = options.background
+    def __init__(
+        self, shown: Sequence[ShownInstance], camera: Camera, size: tuple[int, int], options: ShadingOptions
+    ) -> None:
+        self.options, self.size = options, size
+        self.n_triangles = sum(len(one.mesh.triangles) for one in shown)
+        if self.n_triangles and all(size):
+            self.subpixel_bits = shown[0].snapped.subpixel_bits
+            finds_inverse_w = sum(len(one.mesh.vertices) for one in shown) > size[0] * size[1]
+            looks = [look_of(one, camera, size, options, finds_inverse_w=finds_inverse_w) for one in shown]
+            self.scene = scene_of_tables(shown, [look.shading for look in looks])
+
+    def picture(self, seen: SeenSamples, at: I32 | None = None) -> U8:
+        """Shade the triangles that show, all samples of them: the picture (H, W, 4) uint8.
+
+        `at`: where the one sample that sees them lies, sub-pixels from the centre, unless the meshes are seen from it.
+        """
+        width, height = self.size
+        picture = empty((height, width, 4), np.uint8)
+        if not self.n_triangles or not picture.size:
+            picture[...] = self.options.background
+            return picture
+        positions = None if seen.n_samples == 1 else sample_positions(seen.n_samples, self.subpixel_bits)
+
+        def shade_rows(first: int, end: int) -> None:
+            part = picture, first, end - first
+            if positions is None:
+                self.scene.shade(seen.ids[0], seen.depth[0], *part, at)
+            else:
+                self.scene.shade_samples(positions, seen.ids, seen.depth, seen.split, *part)
+
+        n_threads = min(count_threads(self.options.threads, self.n_triangles), width * height // MIN_PX_PER_THREAD)
+        run_parts(shade_rows, height, n_threads)
         return picture
-    n_px = height * width
-    finds_inverse_w = sum(len(one.mesh.vertices) for one in shown) > n_px
-    looks = [look_of(one, camera, (width, height), options, finds_inverse_w=finds_inverse_w) for one in shown]
-    scene = scene_of_tables(shown, [look.shading for look in looks])
-    positions = None if seen.n_samples == 1 else sample_positions(seen.n_samples, shown[0].snapped.subpixel_bits)
-
-    def shade_rows(first: int, end: int) -> None:
-        part = picture, first, end - first
-        if positions is None:
-            scene.shade(seen.ids[0], seen.depth[0], *part)
-        else:
-            scene.shade_samples(positions, seen.ids, seen.depth, seen.split, *part)
-
-    n_threads = min(count_threads(options.threads, n_triangles), n_px // MIN_PX_PER_THREAD)
-    run_parts(shade_rows, height, n_threads)
-    return picture
 
 
-def scene_of_tables(shown: Sequence[Shown], tables: Sequence[_engine.ShadingTable]) -> _engine.ShadedScene:
+def shade_instances(shown: Sequence[ShownInstance], seen: SeenSamples, camera: Camera, options: ShadingOptions) -> U8:
+    """The picture (H, W, 4) uint8 of instances, as `Lit` has it."""
+    height, width = seen.ids.shape[1:]
+    if seen.ids.dtype == np.int32:
+        return Lit(shown, camera, (width, height), options).picture(seen)
+    renamed = rename(shown, seen)
+    if renamed is not None:
+        return Lit(renamed[0], camera, (width, height), options).picture(renamed[1])
+    halves = []
+    for first, end in ((0, height // 2), (height // 2, height)):
+        ids, depth = (np.ascontiguousarray(planes[:, first:end]) for planes in (seen.ids, seen.depth))
+        moved = [one._replace(snapped=one.snapped.moved(0, first)) for one in shown]
+        halves.append(shade_instances(moved, SeenSamples.of(ids, depth), camera, options))
+    return np.concatenate(halves)
+
+
+def rename(shown: Sequence[ShownInstance], seen: SeenSamples) -> tuple[list[ShownInstance], SeenSamples] | None:
+    """Call triangles by numbers that int32 holds, of those instances alone that are seen; None where it does not.
+
+    A row of pixels is not halved.
+    """
+    first_ids = np.array([one.first_id for one in shown], np.int64)
+    place = np.searchsorted(first_ids, seen.ids, side="right") - 1
+    own = [shown[i] for i in np.unique(place[place >= 0])]
+    ends = np.cumsum([0, *(len(one.mesh.triangles) for one in own)])
+    if ends[-1] > INT32_MAX and seen.ids.shape[1] > 1:
+        return None
+    if ends[-1] > INT32_MAX:
+        raise ValueError(f"the instances in a row of pixels must have at most {INT32_MAX} triangles, got {ends[-1]}")
+    new = np.searchsorted([one.first_id for one in own], seen.ids, side="right") - 1
+    shift = np.array([one.first_id for one in own] + [0], np.int64) - [*ends[:-1], 0]
+    ids = (seen.ids - shift[new]).astype(np.int32)
+    named = [one._replace(first_id=int(end)) for one, end in zip(own, ends[:-1], strict=True)]
+    return named, seen._replace(ids=ids)
+
+
+def scene_of_tables(shown: Sequence[ShownInstance], tables: Sequence[_engine.ShadingTable]) -> _engine.ShadedScene:
     """What kernels read of instances."""
     return _engine.ShadedScene([one.snapped for one in shown], tables, [one.first_id for one in shown])
 
 
 def look_of(
-    shown: Shown, camera: Camera, size: tuple[int, int], options: ShadingOptions, *, finds_inverse_w: bool
+    shown: ShownInstance, camera: Camera, size: tuple[int, int], options: ShadingOptions, *, finds_inverse_w: bool
 ) -> ShadingInputs:
     """What kernels read of an instance."""
     mesh = shown.mesh
@@ -287,7 +332,7 @@ def distances(seen: SeenSamples, camera: Camera) -> tuple[float, float]:
 
 
 def shade_normals(
-    shown: Sequence[Shown], ids: I32, camera: Camera, turn: F64, *, threads: int | None = None
+    shown: Sequence[ShownInstance], ids: I32, camera: Camera, turn: F64, *, threads: int | None = None
 ) -> F32:
     """Unit normals (H, W, 3) float32 of the visible pixels, on the side that is seen, 0 where nothing is.
 

@@ -7,7 +7,6 @@ from comparing import assert_same
 from engine_cases import ON_EACH_ISA, on
 
 import topleft as tl
-from topleft.typing import LayerOption
 
 N_CASES = 24
 
