@@ -10,7 +10,7 @@ import pytest
 
 import topleft as tl
 from topleft import methods, testing
-from topleft._explore.content import content_of
+from topleft._apps.explore.content import content_of
 
 ROOT = Path(tl.__file__).parent
 CUBE = tl.Mesh(*tl.scenes.shape("cube"))
@@ -337,8 +337,8 @@ def takes_arguments(function):
     return any(each.name != "self" and each.annotation not in (bool, "bool") for each in parameters)
 
 
-def test_every_promised_method_is_tried(make_api):
-    promised = [(owner, getattr(tl, owner), name) for owner, names in make_api.MEMBERS.items() for name in names]
+def test_every_promised_method_is_tried(promised):
+    promised = [(owner, getattr(tl, owner), name) for owner, names in promised.items() for name in names]
     promised += [("Rasterizer", tl.Rasterizer, name) for name in dir(tl.Rasterizer) if not name.startswith("_")]
     promised += [("testing", testing, name) for name in testing.__all__]
     methods_of = {

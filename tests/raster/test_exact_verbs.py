@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from strategies import CLIP_SCENES, soup, with_depth
 
 import topleft as tl
-from topleft._render.holes import cut_of, cut_out
+from topleft._meshes.picture.holes import cut_of, cut_out
 from topleft.methods import reference
 from topleft.methods.reference import blend as ref_blend
 from topleft.methods.reference import peel as ref_peel

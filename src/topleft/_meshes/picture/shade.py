@@ -1,0 +1,387 @@
+"""Shades the visible pixels of instances, all samples of them; colours by ids and distances; gives normals.
+
+Input: what samples see, the instances that show, and a camera. Output: a picture (H, W, 4) uint8, sRGB with alpha.
+
+Light is added up in linear light: colours are decoded from sRGB, lit, and encoded again, so that a surface that gets
+half the light is half as bright on a screen. The kernel is csrc/shade/shade.c.
+
+Based on: Phong, B. T., "Illumination for Computer Generated Pictures", Communications of the ACM 18(6), 1975 (normals
+interpolated, light computed in the pixel); Blinn, J. F., "Models of Light Reflection for Computer Synthesized
+Pictures", SIGGRAPH 1977 (highlights).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import lru_cache
+from typing import NamedTuple, TypedDict
+
+import numpy as np
+import numpy.typing as npt
+
+from topleft._core import engine
+from topleft._core.base.arrays import INT32_MAX, shown
+from topleft._core.base.color import DEFAULT_COLOR, WHITE, Color, ColorLike, as_color, id_colors, srgb_tables
+from topleft._core.base.memory import empty
+from topleft._core.base.options import parse
+from topleft._core.base.threads import count_threads, parse_threads, run_parts, threads_for
+from topleft._core.raster.fragments import Fragments, SeenSamples
+from topleft._core.raster.sampling import sample_positions
+from topleft._meshes.camera.camera import Camera
+from topleft._meshes.model.environment import Environment
+from topleft._meshes.model.light import AMBIENT, Fog, Light, as_not_negative
+from topleft._meshes.model.material import Material
+from topleft._meshes.model.mesh import Mesh
+from topleft._meshes.model.texture import Texture
+from topleft._meshes.picture.look import ShadingInputs
+from topleft.typing import ShadingOption
+
+__all__ = ["Lit", "LookOptions", "Shading", "ShadingOptions", "ShownInstance", "shade_instances", "shade_numbers"]
+
+F32 = npt.NDArray[np.float32]
+F64 = npt.NDArray[np.float64]
+U8 = npt.NDArray[np.uint8]
+I32 = npt.NDArray[np.int32]
+
+MIN_PX_PER_THREAD = 1 << 14
+"""Pixels whose light is worth a thread: a tenth of a millisecond. A scene is shaded instance by instance."""
+
+
+class Shading(StrEnum):
+    """What the colour of a pixel tells."""
+
+    SMOOTH = "smooth"
+    FLAT = "flat"
+    UNLIT = "unlit"
+    MATCAP = "matcap"
+    IDS = "ids"
+    DEPTH = "depth"
+    NORMALS = "normals"
+
+
+SHOW_CODES = {Shading.NORMALS: 1, Shading.MATCAP: 2}  # tl_show in csrc/shading.h; light: 0
+GREY_OF_NEAREST, GREY_OF_FARTHEST = 224, 32
+"""Greys of the depth picture: neither black nor white, so that it shows on both."""
+
+
+class LookOptions(TypedDict, total=False):
+    """The options of `shade` that `render` passes on."""
+
+    lights: Light | Sequence[Light] | None
+    ambient: float | None
+    material: Material | None
+    matcap: Texture | None
+    fog: Fog | None
+    environment: Environment | None
+
+
+@dataclass(frozen=True, eq=False)
+class ShadingOptions:
+    """The options of `topleft.shade`, checked."""
+
+    mode: Shading
+    color: Color
+    background: Color
+    depth_range: tuple[float, float] | None
+    lights: Sequence[Light] | None
+    ambient: float
+    material: Material | None
+    matcap: Texture | None
+    fog: Fog | None
+    environment: Environment | None
+    threads: int | None
+    shows_opacity: bool = False
+    """Whether the picture's alpha is the opacity of the surface."""
+
+    @classmethod
+    def parse(
+        cls,
+        shading: ShadingOption = "smooth",
+        color: ColorLike = DEFAULT_COLOR,
+        background: ColorLike = WHITE,
+        depth_range: tuple[float, float] | None = None,
+        lights: Light | Sequence[Light] | None = None,
+        ambient: float | None = None,
+        material: Material | None = None,
+        matcap: Texture | None = None,
+        fog: Fog | None = None,
+        environment: Environment | None = None,
+        threads: int | None = None,
+    ) -> ShadingOptions:
+        """Check the options of a call."""
+        mode = parse(Shading, "shading", shading)
+        lights = (lights,) if isinstance(lights, Light) else lights
+        if lights is not None and (not isinstance(lights, Iterable) or isinstance(lights, np.ndarray | str | dict)):
+            raise TypeError(f"lights must be a Light or a sequence of them, got {shown(lights)}")
+        _check_types(lights=(lights or ()), material=material, matcap=matcap, fog=fog, environment=environment)
+        if mode is Shading.MATCAP and matcap is None:
+            raise ValueError("matcap must be a Texture for shading 'matcap', got None")
+        if environment is not None:  # which lights by itself
+            lights, ambient = lights or (), ambient or 0.0
+        return cls(
+            mode,
+            as_color("color", color, 3),
+            as_color("background", background, 4),
+            depth_range,
+            lights,
+            AMBIENT if ambient is None else as_not_negative("ambient", ambient),
+            material,
+            matcap,
+            fog,
+            environment,
+            parse_threads(threads),
+        )
+
+
+@lru_cache(maxsize=64)
+def plain_material(color: Color | None) -> Material:
+    """The material of a mesh that has none; checking one takes a hundredth of a small picture."""
+    return Material(color)
+
+
+class ShownInstance(NamedTuple):
+    """An instance as it is shaded."""
+
+    snapped: engine.SnappedMesh
+    mesh: Mesh
+    """The mesh as it was drawn, which kernels read triangle by triangle: of a lens its parts."""
+    first_id: int = 0
+    """What its triangle 0 is called in the ids."""
+    place: F64 | None = None
+    """World from object, (4, 4); None: the world is the space of the mesh."""
+
+    def camera(self, camera: Camera) -> Camera:
+        """The camera as it stands in the object space of the instance, without its lens."""
+        return camera.straightened() if self.place is None else camera.straightened().placed(self.place)
+
+
+class Lit:
+    """Instances that are ready to be shaded: at least those that show, in the order of their ids."""
+
+    def __init__(
+        self, shown: Sequence[ShownInstance], camera: Camera, size: tuple[int, int], options: ShadingOptions
+    ) -> None:
+        self.options, self.size = options, size
+        self.n_triangles = sum(len(one.mesh.triangles) for one in shown)
+        if self.n_triangles and all(size):
+            self.subpixel_bits = shown[0].snapped.subpixel_bits
+            finds_inverse_w = sum(len(one.mesh.vertices) for one in shown) > size[0] * size[1]
+            looks = [look_of(one, camera, size, options, finds_inverse_w=finds_inverse_w) for one in shown]
+            self.scene = scene_of_tables(shown, [look.shading for look in looks])
+
+    def picture(self, seen: SeenSamples, at: I32 | None = None) -> U8:
+        """Shade the triangles that show, all samples of them: the picture (H, W, 4) uint8.
+
+        `at`: where the one sample that sees them lies, sub-pixels from the centre, unless the meshes are seen from it.
+        """
+        width, height = self.size
+        picture = empty((height, width, 4), np.uint8)
+        if not self.n_triangles or not picture.size:
+            picture[...] = self.options.background
+            return picture
+        positions = None if seen.n_samples == 1 else sample_positions(seen.n_samples, self.subpixel_bits)
+
+        def shade_rows(first: int, end: int) -> None:
+            part = picture, first, end - first
+            if positions is None:
+                self.scene.shade(seen.ids[0], seen.depth[0], *part, at)
+            else:
+                self.scene.shade_samples(positions, seen.ids, seen.depth, seen.split, *part)
+
+        n_threads = min(count_threads(self.options.threads, self.n_triangles), width * height // MIN_PX_PER_THREAD)
+        run_parts(shade_rows, height, n_threads)
+        return picture
+
+
+def shade_instances(shown: Sequence[ShownInstance], seen: SeenSamples, camera: Camera, options: ShadingOptions) -> U8:
+    """The picture (H, W, 4) uint8 of instances, as `Lit` has it."""
+    height, width = seen.ids.shape[1:]
+    if seen.ids.dtype == np.int32:
+        return Lit(shown, camera, (width, height), options).picture(seen)
+    renamed = rename(shown, seen)
+    if renamed is not None:
+        return Lit(renamed[0], camera, (width, height), options).picture(renamed[1])
+    halves = []
+    for first, end in ((0, height // 2), (height // 2, height)):
+        ids, depth = (np.ascontiguousarray(planes[:, first:end]) for planes in (seen.ids, seen.depth))
+        moved = [one._replace(snapped=one.snapped.moved(0, first)) for one in shown]
+        halves.append(shade_instances(moved, SeenSamples.of(ids, depth), camera, options))
+    return np.concatenate(halves)
+
+
+def rename(shown: Sequence[ShownInstance], seen: SeenSamples) -> tuple[list[ShownInstance], SeenSamples] | None:
+    """Call triangles by numbers that int32 holds, of those instances alone that are seen; None where it does not.
+
+    A row of pixels is not halved.
+    """
+    first_ids = np.array([one.first_id for one in shown], np.int64)
+    place = np.searchsorted(first_ids, seen.ids, side="right") - 1
+    own = [shown[i] for i in np.unique(place[place >= 0])]
+    ends = np.cumsum([0, *(len(one.mesh.triangles) for one in own)])
+    if ends[-1] > INT32_MAX and seen.ids.shape[1] > 1:
+        return None
+    if ends[-1] > INT32_MAX:
+        raise ValueError(f"the instances in a row of pixels must have at most {INT32_MAX} triangles, got {ends[-1]}")
+    new = np.searchsorted([one.first_id for one in own], seen.ids, side="right") - 1
+    shift = np.array([one.first_id for one in own] + [0], np.int64) - [*ends[:-1], 0]
+    ids = (seen.ids - shift[new]).astype(np.int32)
+    named = [one._replace(first_id=int(end)) for one, end in zip(own, ends[:-1], strict=True)]
+    return named, seen._replace(ids=ids)
+
+
+def scene_of_tables(shown: Sequence[ShownInstance], tables: Sequence[engine.ShadingTable]) -> engine.ShadedScene:
+    """What kernels read of instances."""
+    return engine.ShadedScene([one.snapped for one in shown], tables, [one.first_id for one in shown])
+
+
+def look_of(
+    shown: ShownInstance, camera: Camera, size: tuple[int, int], options: ShadingOptions, *, finds_inverse_w: bool
+) -> ShadingInputs:
+    """What kernels read of an instance."""
+    mesh = shown.mesh
+    own = (options.material,) if options.material is not None else mesh.materials
+    own = own or (plain_material(options.color if mesh.colors is None else None),)
+    rows = mesh.material_of_triangle if own is mesh.materials and len(own) > 1 else None
+    look = ShadingInputs(
+        shown.snapped, mesh, shown.camera(camera), size, rows, is_flat=options.mode is Shading.FLAT,
+        finds_inverse_w=finds_inverse_w,
+    )  # fmt: skip
+    all_full = options.environment is not None or options.shows_opacity
+    look.set_materials(mesh, own, is_unlit=options.mode is Shading.UNLIT, all_full=all_full)
+    look.set_lights(options.lights, options.ambient, shown.place)
+    if options.environment is not None or any(one.is_metallic_rough for one in own):
+        look.set_environment(options.environment, shown.place)
+    if options.shows_opacity:
+        look.set_opacity()
+    look.set_view(SHOW_CODES.get(options.mode, 0), options.matcap, options.background)
+    look.set_fog(options.fog)
+    return look
+
+
+def shade_numbers(frags: Fragments, camera: Camera, options: ShadingOptions) -> U8:
+    """Colour each triangle by its id, or by its distance: the picture (H, W, 4) uint8."""
+    seen = frags._seen()
+    if options.mode is Shading.IDS:
+        return shade_each(seen, options.background, lambda ids, _: id_colors(frags._whole(ids)))
+    ends = options.depth_range or distances(seen, camera)
+    return shade_each(seen, options.background, lambda _, depth: greys_of(depth, camera, ends))
+
+
+def shade_each(seen: SeenSamples, background: Color, colors_of: Callable[[I32, F32], U8]) -> U8:
+    """The picture (H, W, 4) uint8 of colours (P, 3) that ids and depths have.
+
+    A triangle has one colour in a pixel, that at the first of the samples that see it. Their light is averaged, alpha
+    as it is.
+    """
+    ids, depth = seen.ids[0], seen.depth[0]
+    picture = empty((*ids.shape, 4), np.uint8)
+    picture[...] = background
+    at = np.nonzero(ids >= 0)
+    picture[at] = opaque(colors_of(ids[at], depth[at]))
+    if seen.n_samples == 1:
+        return picture
+    at, split_ids, split_depth = seen.split_pixels()
+    colors = np.empty((*split_ids.shape, 4), np.uint8)
+    colors[...] = background
+    colors[0] = picture[at]
+    for k, own in enumerate(split_ids[1:], 1):
+        is_new = own >= 0
+        for before in range(k):
+            is_known = is_new & (own == split_ids[before])
+            colors[k, is_known] = colors[before, is_known]
+            is_new &= ~is_known
+        colors[k, is_new] = opaque(colors_of(own[is_new], split_depth[k, is_new]))
+    means = np.empty((1, *colors.shape[1:]), np.uint8)
+    engine.mean_colors(colors[:, None], means, 0, 1, 4, engine.Transfer(srgb_tables(), 3, is_straight=True))
+    picture[at] = means[0]
+    return picture
+
+
+def opaque(colors: U8) -> U8:
+    """Colours (P, 3) with alpha 255."""
+    return np.concatenate([colors, np.full((len(colors), 1), 255, np.uint8)], axis=1)
+
+
+def greys_of(depth: F32, camera: Camera, ends: tuple[float, float]) -> U8:
+    """The greys (P, 3) of depths: near ones are bright, the ends of the range are neither black nor white."""
+    nearest, farthest = ends
+    share = np.clip((eye_distance(depth, camera) - nearest) / max(farthest - nearest, np.finfo(np.float64).tiny), 0, 1)
+    grey = np.rint(GREY_OF_NEAREST + (GREY_OF_FARTHEST - GREY_OF_NEAREST) * share).astype(np.uint8)
+    return np.repeat(grey[:, None], 3, axis=1)
+
+
+def eye_distance(depth: F32, camera: Camera) -> F64:
+    """Distance along the view, world units, of window depths in [0, 1]: `-z` in eye space."""
+    (a, b), (c, d) = camera.projection[2:, 2:]
+    ndc = 2.0 * depth.astype(np.float64) - 1
+    return (ndc * d - b) / (ndc * c - a)
+
+
+def distances(seen: SeenSamples, camera: Camera) -> tuple[float, float]:
+    """The least and the greatest distance along the view of what is shown."""
+    depth = seen.depth[0][seen.ids[0] >= 0]
+    if seen.n_samples > 1:
+        _, ids, others = seen.split_pixels()
+        depth = np.append(depth, others[ids >= 0])
+    if not depth.size:
+        return 0.0, 0.0
+    ends = eye_distance(np.array([depth.min(), depth.max()]), camera)
+    return float(ends[0]), float(ends[1])
+
+
+def shade_normals(
+    shown: Sequence[ShownInstance], ids: I32, camera: Camera, turn: F64, *, threads: int | None = None
+) -> F32:
+    """Unit normals (H, W, 3) float32 of the visible pixels, on the side that is seen, 0 where nothing is.
+
+    Parameters
+    ----------
+    shown
+        At least the instances that show, in the order of their ids.
+    ids : (H, W) int32
+    camera : Camera
+        That of the picture.
+    turn : (3, 3) float64
+        From eye space to where the normals are wanted.
+    threads : int, optional
+        Never changes a bit.
+
+    Notes
+    -----
+    A triangle seen from behind has its normals turned round as a whole, never pixel by pixel: so a mesh whose faces are
+    inverted looks like one whose faces are not, and no edge of light runs through a triangle. Where those of the
+    corners cancel, or there are none, it is the normal of the face.
+    """
+    n_triangles = sum(len(one.mesh.triangles) for one in shown)
+    if not n_triangles or 0 in ids.shape:
+        return np.zeros((*ids.shape, 3), np.float32)
+    out = empty((*ids.shape, 3), np.float32)
+    finds_inverse_w = sum(len(one.mesh.vertices) for one in shown) > ids.size
+    tables = []
+    for one in shown:
+        size = ids.shape[1], ids.shape[0]
+        look = ShadingInputs(
+            one.snapped, one.mesh, one.camera(camera), size, None, is_flat=False, finds_inverse_w=finds_inverse_w
+        )
+        look.set_turn(SHOW_CODES[Shading.NORMALS], turn)
+        tables.append(look.shading)
+    scene = scene_of_tables(shown, tables)
+    run_parts(lambda first, end: scene.shade_normals(ids, out, first, end - first), len(ids),
+              threads_for(threads, n_triangles))  # fmt: skip
+    return out
+
+
+def _check_types(lights: Sequence[Light], material: object, matcap: object, fog: object, environment: object) -> None:
+    for light in lights:
+        if not isinstance(light, Light):
+            raise TypeError(f"lights must be of Light, got {type(light).__name__}: a direction is Light((0, 1, 0))")
+    kinds = (
+        ("material", material, Material), ("matcap", matcap, Texture), ("fog", fog, Fog),
+        ("environment", environment, Environment),
+    )  # fmt: skip
+    for name, value, kind in kinds:
+        if value is not None and not isinstance(value, kind):
+            article = "an" if kind is Environment else "a"
+            raise TypeError(f"{name} must be {article} {kind.__name__}, got {type(value).__name__}")
